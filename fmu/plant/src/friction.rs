@@ -1,0 +1,224 @@
+//! The bearing's friction.
+//!
+//! ```text
+//! tau_f = -b w - sgn(w) T_C(w) B(theta),   T_C(w) = c + d exp(-(w/w_s)^2)
+//! ```
+//!
+//! (thesis eq. 5.1), with the directional factor of thesis 5.4,
+//!
+//! ```text
+//! B+-(theta) = 1 +- eta + sum over h = 1, 2 of a_h+- cos(h theta) + b_h+- sin(h theta),
+//! ```
+//!
+//! + while the hub turns forwards, - backwards. At rest the law is set-valued:
+//! the bearing holds any torque between -(c + d) B- and (c + d) B+. The smooth
+//! variant replaces sgn(w) by T = tanh(w/eps) and blends the two directions,
+//! sgn(w) B -> T [(B+ + B-)/2 + T (B+ - B-)/2], which never drives the hub.
+
+use crate::series::{self, Series, ZERO};
+use crate::{Friction, FrictionModel};
+
+/// How the hub stands to the bearing under the set-valued law.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(i8)]
+pub enum Contact {
+    /// Turning backwards, w < 0.
+    Backward = -1,
+    /// At rest, held by dry friction.
+    Stuck = 0,
+    /// Turning forwards, w > 0.
+    Forward = 1,
+}
+
+/// B+-(theta) of one direction.
+#[derive(Clone, Copy, Debug)]
+struct Bracket {
+    mean: f64,
+    /// Coefficients of cos theta, sin theta, cos 2 theta, sin 2 theta.
+    harmonics: [f64; 4],
+}
+
+impl Bracket {
+    fn at(&self, theta: f64) -> f64 {
+        let [a1, b1, a2, b2] = self.harmonics;
+        let (s1, c1) = libm::sincos(theta);
+        let (s2, c2) = libm::sincos(2.0 * theta);
+        self.mean + a1 * c1 + b1 * s1 + a2 * c2 + b2 * s2
+    }
+
+    /// A lower bound of B over all angles, exact to 2e-6 of the harmonics' size.
+    fn lowest(&self) -> f64 {
+        const POINTS: usize = 4096;
+        let angle = |j: usize| core::f64::consts::TAU * j as f64 / POINTS as f64;
+        let lowest = (0..POINTS).map(|j| self.at(angle(j))).fold(f64::INFINITY, f64::min);
+        // Between two points B falls below both by at most |B''| (spacing/2)^2 / 2.
+        let [a1, b1, a2, b2] = self.harmonics.map(f64::abs);
+        let bend = a1 + b1 + 4.0 * (a2 + b2);
+        lowest - bend * (angle(1) / 2.0) * (angle(1) / 2.0) / 2.0
+    }
+}
+
+/// The law of friction with the power series of its parts.
+#[derive(Clone, Debug)]
+pub struct Law {
+    pub model: FrictionModel,
+    b: f64,
+    c: f64,
+    d: f64,
+    omega_s: f64,
+    eps: f64,
+    forward: Bracket,
+    backward: Bracket,
+    /// Does B depend on the angle?
+    angular: bool,
+    /// u = -(w/w_s)^2, e = exp u, t_c = T_C(w)
+    u: Series,
+    e: Series,
+    t_c: Series,
+    /// v = w/eps, t = tanh v, sech2 = 1 - t^2
+    v: Series,
+    t: Series,
+    sech2: Series,
+    /// cos and sin of theta and 2 theta in turn, as in `Bracket::harmonics`
+    trig: [Series; 4],
+    /// 2 theta
+    theta2: Series,
+    /// B of the present direction, or (smooth) the blend of both
+    bracket: Series,
+    /// (B+ + B-)/2 and (B+ - B-)/2 for the smooth law
+    even: Series,
+    odd: Series,
+    /// T [even + T odd]
+    sign: Series,
+    /// tau_f
+    pub tau_f: Series,
+}
+
+impl Law {
+    pub fn new(p: &Friction) -> Law {
+        let forward = Bracket { mean: 1.0 + p.asymmetry, harmonics: p.harmonics_forward };
+        let backward = Bracket { mean: 1.0 - p.asymmetry, harmonics: p.harmonics_backward };
+        Law {
+            model: p.model,
+            b: p.b,
+            c: p.c,
+            d: p.d,
+            omega_s: p.omega_s,
+            eps: p.eps,
+            forward,
+            backward,
+            angular: [forward, backward].iter().any(|b| b.harmonics != [0.0; 4]),
+            u: ZERO,
+            e: ZERO,
+            t_c: ZERO,
+            v: ZERO,
+            t: ZERO,
+            sech2: ZERO,
+            trig: [ZERO; 4],
+            theta2: ZERO,
+            bracket: ZERO,
+            even: ZERO,
+            odd: ZERO,
+            sign: ZERO,
+            tau_f: ZERO,
+        }
+    }
+
+    /// What is wrong with the parameters together: dry friction may not drive.
+    pub fn problems(p: &Friction) -> Vec<String> {
+        let law = Law::new(p);
+        let directions = [(law.forward, "forward", '+'), (law.backward, "backward", '-')];
+        let wrong = directions.into_iter().filter(|(b, ..)| !(b.lowest() > 0.0));
+        wrong
+            .map(|(bracket, name, sign)| {
+                format!(
+                    "friction.asymmetry and friction.{name}_* make the dry friction's factor \
+                     1 {sign} asymmetry + harmonics as low as {:.6}, so the bearing would drive \
+                     the hub; it must stay above 0 at every angle",
+                    bracket.lowest()
+                )
+            })
+            .collect()
+    }
+
+    /// Is rest a state of its own (the set-valued law)?
+    pub fn can_stick(&self) -> bool {
+        self.model == FrictionModel::Stribeck
+    }
+
+    /// The largest torques that the bearing holds at rest against a push
+    /// backwards and forwards, N m (both >= 0).
+    pub fn holds(&self, theta: f64) -> (f64, f64) {
+        let dry = self.c + self.d;
+        (dry * self.backward.at(theta), dry * self.forward.at(theta))
+    }
+
+    /// Coefficient n of tau_f while the hub slips.
+    #[inline(always)]
+    pub fn slip(&mut self, n: usize, contact: Contact, theta: &Series, omega: &Series, omega2: &Series) {
+        let dry = match self.model {
+            FrictionModel::None => {
+                self.tau_f[n] = 0.0;
+                return;
+            }
+            FrictionModel::Viscous => 0.0,
+            FrictionModel::Stribeck => {
+                self.dry_torque(n, omega2);
+                let bracket =
+                    if contact == Contact::Forward { self.forward } else { self.backward };
+                let size = if self.angular {
+                    self.harmonics(n, theta);
+                    self.bracket[n] = combine(&bracket, &self.trig, n);
+                    series::mul(&self.t_c, &self.bracket, n)
+                } else {
+                    bracket.mean * self.t_c[n]
+                };
+                if contact == Contact::Forward { size } else { -size }
+            }
+            FrictionModel::StribeckSmooth => {
+                self.dry_torque(n, omega2);
+                self.v[n] = omega[n] / self.eps;
+                self.t[n] = if n == 0 {
+                    libm::tanh(self.v[0])
+                } else {
+                    series::chain(&self.v, &self.sech2, n)
+                };
+                let t2 = series::square(&self.t, n);
+                self.sech2[n] = if n == 0 { 1.0 - t2 } else { -t2 };
+                if self.angular {
+                    self.harmonics(n, theta);
+                }
+                let forward = combine(&self.forward, &self.trig, n);
+                let backward = combine(&self.backward, &self.trig, n);
+                self.even[n] = (forward + backward) / 2.0;
+                self.odd[n] = (forward - backward) / 2.0;
+                self.bracket[n] = self.even[n] + series::mul(&self.t, &self.odd, n);
+                self.sign[n] = series::mul(&self.t, &self.bracket, n);
+                series::mul(&self.t_c, &self.sign, n)
+            }
+        };
+        self.tau_f[n] = -self.b * omega[n] - dry;
+    }
+
+    /// Coefficient n of T_C(w) = c + d exp(-(w/w_s)^2).
+    #[inline(always)]
+    fn dry_torque(&mut self, n: usize, omega2: &Series) {
+        self.u[n] = -omega2[n] / (self.omega_s * self.omega_s);
+        self.e[n] = series::exp(&self.u, &self.e, n);
+        self.t_c[n] = if n == 0 { self.c + self.d * self.e[0] } else { self.d * self.e[n] };
+    }
+
+    fn harmonics(&mut self, n: usize, theta: &Series) {
+        self.theta2[n] = 2.0 * theta[n];
+        let [c1, s1, c2, s2] = &mut self.trig;
+        (s1[n], c1[n]) = series::sin_cos(theta, s1, c1, n);
+        (s2[n], c2[n]) = series::sin_cos(&self.theta2, s2, c2, n);
+    }
+}
+
+/// Coefficient n of B+-(theta).
+fn combine(bracket: &Bracket, trig: &[Series; 4], n: usize) -> f64 {
+    let mean = if n == 0 { bracket.mean } else { 0.0 };
+    let terms = bracket.harmonics.iter().zip(trig);
+    mean + terms.map(|(coefficient, series)| coefficient * series[n]).sum::<f64>()
+}

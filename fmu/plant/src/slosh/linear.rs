@@ -1,0 +1,118 @@
+//! Linear planar pendulum. q_y = al, the tangential angle in rad; q_x unused.
+//!
+//! ```text
+//! T   = r (m g al + c l al'),   no share of J beyond the hub's I0
+//! al'' = -(c/m) al' - (g/l) al - (r/l) w'
+//! ```
+//!
+//! (thesis 4.27, 4.29 with the sign of the slosh torque corrected: with the
+//! printed one the plant makes energy from nothing.)
+//! ```text
+//! E = m (r w + l al')^2/2 + m g l al^2/2,  H = m r (r w + l al')
+//! ```
+
+use super::{Angles, Hub, Load, Mode};
+use crate::series::{Series, ZERO, mul_ramp, square, value};
+use crate::tank::Pendulum;
+
+#[derive(Clone, Debug)]
+pub struct Linear {
+    p: Pendulum,
+    /// al, al', al''
+    al: Series,
+    al_d: Series,
+    al_dd: Series,
+    /// g al
+    g_al: Series,
+    /// sqrt(g/l) at the start of the expansion, rad/s
+    omega_n: f64,
+}
+
+impl Mode for Linear {
+    fn new(p: &Pendulum) -> Self {
+        Linear { p: *p, al: ZERO, al_d: ZERO, al_dd: ZERO, g_al: ZERO, omega_n: 0.0 }
+    }
+
+    fn coordinates(&self, at: &Angles) -> [f64; 4] {
+        [0.0, at.angle[1], 0.0, at.rate[1]]
+    }
+
+    fn angles(&self) -> Angles {
+        Angles { angle: [0.0, self.al[0]], rate: [0.0, self.al_d[0]] }
+    }
+
+    fn start(&mut self, q: &[f64; 4]) {
+        (self.al[0], self.al_d[0]) = (q[1], q[3]);
+    }
+
+    #[inline(always)]
+    fn load(&mut self, n: usize, hub: &Hub) -> Load {
+        let Pendulum { m, l, c, r, .. } = self.p;
+        if n == 0 {
+            self.omega_n = libm::sqrt(hub.g[0] / l);
+        }
+        self.g_al[n] = mul_ramp(&hub.g, &self.al, n);
+        Load { j: 0.0, t: r * (m * self.g_al[n] + c * l * self.al_d[n]) }
+    }
+
+    #[inline(always)]
+    fn respond(&mut self, n: usize, hub: &Hub) {
+        let Pendulum { m, l, c, r, .. } = self.p;
+        self.al_dd[n] = -(c / m) * self.al_d[n] - (self.g_al[n] + r * hub.omega_dot[n]) / l;
+    }
+
+    #[inline(always)]
+    fn grow(&mut self, n: usize) {
+        self.al[n + 1] = self.al_d[n] / (n + 1) as f64;
+        self.al_d[n + 1] = self.al_dd[n] / (n + 1) as f64;
+    }
+
+    #[inline(always)]
+    fn size(&self) -> f64 {
+        self.al_d[0].abs() + self.omega_n * self.al[0].abs()
+    }
+
+    #[inline(always)]
+    fn term(&self, n: usize) -> f64 {
+        self.al_d[n].abs()
+    }
+
+    #[inline(always)]
+    fn heat(&mut self, n: usize) -> f64 {
+        self.p.c * self.p.l * self.p.l * square(&self.al_d, n)
+    }
+
+    #[inline(always)]
+    fn at(&self, n: usize, t: f64) -> [f64; 4] {
+        [0.0, value(&self.al, n, t), 0.0, value(&self.al_d, n, t)]
+    }
+
+    /// Tangential -m (r w' + l al''); radial from the bob's place (r, l al):
+    /// m (r w^2 + 2 w l al' + w' l al), of second order in the motion.
+    fn force(&self, hub: &Hub) -> [f64; 2] {
+        let Pendulum { m, l, r, .. } = self.p;
+        let (w, wd) = (hub.omega[0], hub.omega_dot[0]);
+        let radial = m * (r * w * w + 2.0 * w * l * self.al_d[0] + wd * l * self.al[0]);
+        [radial, -m * (r * wd + l * self.al_dd[0])]
+    }
+
+    /// r F_y: in the linear model the force acts at the hinge.
+    fn torque(&self, hub: &Hub) -> f64 {
+        self.p.r * self.force(hub)[1]
+    }
+
+    fn energy(&self, hub: &Hub) -> f64 {
+        let Pendulum { m, l, r, .. } = self.p;
+        let speed = r * hub.omega[0] + l * self.al_d[0];
+        (m * speed * speed + m * hub.g[0] * l * self.al[0] * self.al[0]) / 2.0
+    }
+
+    fn momentum(&self, hub: &Hub) -> f64 {
+        let Pendulum { m, l, r, .. } = self.p;
+        m * r * (r * hub.omega[0] + l * self.al_d[0])
+    }
+
+    fn out_of_range(&self, _: &[f64; 4]) -> Option<&'static str> {
+        None
+    }
+}

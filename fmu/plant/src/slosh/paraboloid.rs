@@ -1,0 +1,194 @@
+//! A mass on the paraboloid z = |q|^2/(2 l) with a quartic spring: rotary motion
+//! hardens less than a pendulum's. q = (x, y) is the bob minus the hinge, m, in the
+//! hub's frame. With N = l^2 + |q|^2, h = hardening/R^2 and the hub's Coriolis and
+//! centrifugal forces a = (2 w y' + w^2 (r + x), -2 w x' + w^2 y):
+//!
+//! ```text
+//! mu   = [ q.a + |q'|^2 + g l (1 + h |q|^2) ] / N
+//! q''  = -(c/m) q' + a - mu q + w' [ (y, -(r + x)) + (r y/N) q ]
+//! J    = m r^2 y^2 / N                 (beyond the hub's I0)
+//! T    = m r mu y + c [ (r + x) y' - y x' ]
+//! E = m [(x' - w y)^2 + (y' + w (r + x))^2 + z'^2]/2 + m (g/l) [|q|^2/2 + h |q|^4/4]
+//! heat c (|q'|^2 + z'^2),  z' = q.q'/l
+//! ```
+//!
+//! Lagrange's equations for this E and the Rayleigh function c (|q'|^2 + z'^2)/2.
+//! For small q a pendulum is the case h = 1/(2 l^2).
+
+use super::{Angles, Hub, Load, Mode};
+use crate::series::{Series, ZERO, mul, mul_ramp, mul_tail, square, value};
+use crate::tank::Pendulum;
+
+#[derive(Clone, Debug)]
+pub struct Paraboloid {
+    p: Pendulum,
+    q: [Series; 2],
+    q_d: [Series; 2],
+    q_dd: [Series; 2],
+    /// r + x
+    arm: Series,
+    /// N, a, mu and the factor g l (1 + h |q|^2) before g
+    n: Series,
+    a: [Series; 2],
+    mu: Series,
+    spring: Series,
+    /// r y / N and w' times it
+    lever: Series,
+    push: Series,
+    /// -(c/m) q' + a - mu q
+    b: [Series; 2],
+    /// q.q' (heat)
+    rise: Series,
+    omega_n: f64,
+}
+
+impl Mode for Paraboloid {
+    fn new(p: &Pendulum) -> Self {
+        Paraboloid {
+            p: *p,
+            q: [ZERO; 2],
+            q_d: [ZERO; 2],
+            q_dd: [ZERO; 2],
+            arm: ZERO,
+            n: ZERO,
+            a: [ZERO; 2],
+            mu: ZERO,
+            spring: ZERO,
+            lever: ZERO,
+            push: ZERO,
+            b: [ZERO; 2],
+            rise: ZERO,
+            omega_n: 0.0,
+        }
+    }
+
+    fn coordinates(&self, at: &Angles) -> [f64; 4] {
+        let q = at.angle.map(|angle| self.p.l * libm::sin(angle));
+        let rate = |i: usize| self.p.l * libm::cos(at.angle[i]) * at.rate[i];
+        [q[0], q[1], rate(0), rate(1)]
+    }
+
+    fn angles(&self) -> Angles {
+        let l = self.p.l;
+        let sin = [0, 1].map(|i| (self.q[i][0] / l).clamp(-1.0, 1.0));
+        let rate = |i: usize| {
+            let cos = libm::sqrt((1.0 - sin[i]) * (1.0 + sin[i]));
+            if cos > 0.0 { self.q_d[i][0] / (l * cos) } else { 0.0 }
+        };
+        Angles { angle: sin.map(libm::asin), rate: [rate(0), rate(1)] }
+    }
+
+    fn start(&mut self, q: &[f64; 4]) {
+        (self.q[0][0], self.q[1][0]) = (q[0], q[1]);
+        (self.q_d[0][0], self.q_d[1][0]) = (q[2], q[3]);
+    }
+
+    #[inline(always)]
+    fn load(&mut self, n: usize, hub: &Hub) -> Load {
+        let Pendulum { m, l, c, r, hardening, .. } = self.p;
+        let (one, first) = if n == 0 { (1.0, true) } else { (0.0, false) };
+        if first {
+            self.omega_n = libm::sqrt(hub.g[0] / l);
+        }
+        let [x, y] = &self.q;
+        let [x_d, y_d] = &self.q_d;
+        self.arm[n] = one * r + x[n];
+        let q2 = square(x, n) + square(y, n);
+        self.n[n] = one * l * l + q2;
+        self.spring[n] = l * (one + hardening * q2);
+        self.a[0][n] =
+            2.0 * mul(&hub.omega, y_d, n) + mul(&hub.omega2, &self.arm, n);
+        self.a[1][n] = -2.0 * mul(&hub.omega, x_d, n) + mul(&hub.omega2, y, n);
+        let numerator = mul(x, &self.a[0], n)
+            + mul(y, &self.a[1], n)
+            + square(x_d, n)
+            + square(y_d, n)
+            + mul_ramp(&hub.g, &self.spring, n);
+        self.mu[n] = (numerator - mul_tail(&self.n, &self.mu, n)) / self.n[0];
+        self.lever[n] = (r * y[n] - mul_tail(&self.n, &self.lever, n)) / self.n[0];
+        let mu_q = [mul(&self.mu, x, n), mul(&self.mu, y, n)];
+        for i in 0..2 {
+            self.b[i][n] = -(c / m) * self.q_d[i][n] + self.a[i][n] - mu_q[i];
+        }
+        Load {
+            j: m * r * mul(&self.lever, y, n),
+            t: m * r * mu_q[1] + c * (mul(&self.arm, y_d, n) - mul(y, x_d, n)),
+        }
+    }
+
+    #[inline(always)]
+    fn respond(&mut self, n: usize, hub: &Hub) {
+        let [x, y] = &self.q;
+        let wd = &hub.omega_dot;
+        self.push[n] = mul(&self.lever, wd, n);
+        self.q_dd[0][n] = self.b[0][n] + mul(wd, y, n) + mul(&self.push, x, n);
+        self.q_dd[1][n] = self.b[1][n] - mul(wd, &self.arm, n) + mul(&self.push, y, n);
+    }
+
+    #[inline(always)]
+    fn grow(&mut self, n: usize) {
+        for i in 0..2 {
+            self.q[i][n + 1] = self.q_d[i][n] / (n + 1) as f64;
+            self.q_d[i][n + 1] = self.q_dd[i][n] / (n + 1) as f64;
+        }
+    }
+
+    #[inline(always)]
+    fn size(&self) -> f64 {
+        let largest = |pair: &[Series; 2]| f64::max(pair[0][0].abs(), pair[1][0].abs());
+        (largest(&self.q_d) + self.omega_n * largest(&self.q)) / self.p.l
+    }
+
+    #[inline(always)]
+    fn term(&self, n: usize) -> f64 {
+        f64::max(self.q_d[0][n].abs(), self.q_d[1][n].abs()) / self.p.l
+    }
+
+    #[inline(always)]
+    fn heat(&mut self, n: usize) -> f64 {
+        let Pendulum { l, c, .. } = self.p;
+        let ([x, y], [x_d, y_d]) = (&self.q, &self.q_d);
+        self.rise[n] = mul(x, x_d, n) + mul(y, y_d, n);
+        c * (square(x_d, n) + square(y_d, n) + square(&self.rise, n) / (l * l))
+    }
+
+    #[inline(always)]
+    fn at(&self, n: usize, t: f64) -> [f64; 4] {
+        let ([x, y], [x_d, y_d]) = (&self.q, &self.q_d);
+        [value(x, n, t), value(y, n, t), value(x_d, n, t), value(y_d, n, t)]
+    }
+
+    /// Minus the bob's mass times its acceleration, -m (q'' - a - w' (y, -(r + x))).
+    fn force(&self, hub: &Hub) -> [f64; 2] {
+        let wd = hub.omega_dot[0];
+        let euler = [wd * self.q[1][0], -wd * self.arm[0]];
+        [0, 1].map(|i| -self.p.m * (self.q_dd[i][0] - self.a[i][0] - euler[i]))
+    }
+
+    fn torque(&self, hub: &Hub) -> f64 {
+        let [f_x, f_y] = self.force(hub);
+        self.arm[0] * f_y - self.q[1][0] * f_x
+    }
+
+    fn energy(&self, hub: &Hub) -> f64 {
+        let Pendulum { m, l, hardening, .. } = self.p;
+        let (x, y, x_d, y_d) = (self.q[0][0], self.q[1][0], self.q_d[0][0], self.q_d[1][0]);
+        let w = hub.omega[0];
+        let (v_x, v_y) = (x_d - w * y, y_d + w * self.arm[0]);
+        let v_z = (x * x_d + y * y_d) / l;
+        let q2 = x * x + y * y;
+        m * (v_x * v_x + v_y * v_y + v_z * v_z) / 2.0
+            + m * hub.g[0] / l * (q2 / 2.0 + hardening * q2 * q2 / 4.0)
+    }
+
+    fn momentum(&self, hub: &Hub) -> f64 {
+        let (y, x_d, y_d) = (self.q[1][0], self.q_d[0][0], self.q_d[1][0]);
+        let arm = self.arm[0];
+        self.p.m * (hub.omega[0] * (arm * arm + y * y) + arm * y_d - y * x_d)
+    }
+
+    fn out_of_range(&self, q: &[f64; 4]) -> Option<&'static str> {
+        let out = q[0] * q[0] + q[1] * q[1] >= self.p.l * self.p.l;
+        out.then_some("its mass has moved by its length l, where the surface stands at 45 degrees")
+    }
+}

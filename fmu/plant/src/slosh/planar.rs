@@ -1,0 +1,150 @@
+//! Nonlinear planar pendulum: the bob swings in the tangential plane only, with
+//! centripetal terms and a changing inertia. q_y = al in rad; q_x unused.
+//! With s = sin al, c_ = cos al, the bob at (r, l s, -l c_) in the hub's frame:
+//!
+//! ```text
+//! p    = g s + (c/m) l al' - l w^2 s c_          (restoring specific force)
+//! J    = m (r^2 + l^2) s^2                        (beyond the hub's I0)
+//! T    = m [ -2 l^2 s c_ w al' + r l s al'^2 + r c_ p ]
+//! al'' = -(r/l) c_ w' - p/l
+//! E = m [(r w + l c_ al')^2 + (l s al')^2 + (l s w)^2]/2 + 2 m g l sin^2(al/2)
+//! H = m [(r^2 + l^2 s^2) w + r l c_ al']
+//! ```
+//!
+//! Lagrange's equations for this bob on the hub; to first order the linear model.
+
+use super::{Angles, Hub, Load, Mode};
+use crate::series::{Series, ZERO, mul, mul_ramp, sin_cos, square, value};
+use crate::tank::Pendulum;
+
+#[derive(Clone, Debug)]
+pub struct Planar {
+    p: Pendulum,
+    al: Series,
+    al_d: Series,
+    al_dd: Series,
+    s: Series,
+    c: Series,
+    /// s c_, w al', al'^2, w^2 s c_, p
+    sc: Series,
+    w_al_d: Series,
+    al_d2: Series,
+    force: Series,
+    omega_n: f64,
+}
+
+impl Mode for Planar {
+    fn new(p: &Pendulum) -> Self {
+        Planar {
+            p: *p,
+            al: ZERO,
+            al_d: ZERO,
+            al_dd: ZERO,
+            s: ZERO,
+            c: ZERO,
+            sc: ZERO,
+            w_al_d: ZERO,
+            al_d2: ZERO,
+            force: ZERO,
+            omega_n: 0.0,
+        }
+    }
+
+    fn coordinates(&self, at: &Angles) -> [f64; 4] {
+        [0.0, at.angle[1], 0.0, at.rate[1]]
+    }
+
+    fn angles(&self) -> Angles {
+        Angles { angle: [0.0, self.al[0]], rate: [0.0, self.al_d[0]] }
+    }
+
+    fn start(&mut self, q: &[f64; 4]) {
+        (self.al[0], self.al_d[0]) = (q[1], q[3]);
+    }
+
+    #[inline(always)]
+    fn load(&mut self, n: usize, hub: &Hub) -> Load {
+        let Pendulum { m, l, c, r, .. } = self.p;
+        if n == 0 {
+            self.omega_n = libm::sqrt(hub.g[0] / l);
+        }
+        (self.s[n], self.c[n]) = sin_cos(&self.al, &self.s, &self.c, n);
+        self.sc[n] = mul(&self.s, &self.c, n);
+        self.w_al_d[n] = mul(&hub.omega, &self.al_d, n);
+        self.al_d2[n] = square(&self.al_d, n);
+        self.force[n] = mul_ramp(&hub.g, &self.s, n) + (c / m) * l * self.al_d[n]
+            - l * mul(&hub.omega2, &self.sc, n);
+        Load {
+            j: m * (r * r + l * l) * square(&self.s, n),
+            t: m * (-2.0 * l * l * mul(&self.sc, &self.w_al_d, n)
+                + r * l * mul(&self.s, &self.al_d2, n)
+                + r * mul(&self.c, &self.force, n)),
+        }
+    }
+
+    #[inline(always)]
+    fn respond(&mut self, n: usize, hub: &Hub) {
+        let Pendulum { l, r, .. } = self.p;
+        self.al_dd[n] = -(r / l) * mul(&self.c, &hub.omega_dot, n) - self.force[n] / l;
+    }
+
+    #[inline(always)]
+    fn grow(&mut self, n: usize) {
+        self.al[n + 1] = self.al_d[n] / (n + 1) as f64;
+        self.al_d[n + 1] = self.al_dd[n] / (n + 1) as f64;
+    }
+
+    #[inline(always)]
+    fn size(&self) -> f64 {
+        self.al_d[0].abs() + self.omega_n * f64::min(self.al[0].abs(), 1.0)
+    }
+
+    #[inline(always)]
+    fn term(&self, n: usize) -> f64 {
+        self.al_d[n].abs()
+    }
+
+    #[inline(always)]
+    fn heat(&mut self, n: usize) -> f64 {
+        self.p.c * self.p.l * self.p.l * square(&self.al_d, n)
+    }
+
+    #[inline(always)]
+    fn at(&self, n: usize, t: f64) -> [f64; 4] {
+        [0.0, value(&self.al, n, t), 0.0, value(&self.al_d, n, t)]
+    }
+
+    /// -m times the bob's acceleration at (r, l s); the plane's guide takes the
+    /// radial part.
+    fn force(&self, hub: &Hub) -> [f64; 2] {
+        let Pendulum { m, l, r, .. } = self.p;
+        let (s, c, ad) = (self.s[0], self.c[0], self.al_d[0]);
+        let (w, wd) = (hub.omega[0], hub.omega_dot[0]);
+        let (y, y_d, y_dd) = (l * s, l * c * ad, l * (c * self.al_dd[0] - s * ad * ad));
+        [m * (wd * y + 2.0 * w * y_d + w * w * r), -m * (y_dd + wd * r - w * w * y)]
+    }
+
+    fn torque(&self, hub: &Hub) -> f64 {
+        let [f_x, f_y] = self.force(hub);
+        self.p.r * f_y - self.p.l * self.s[0] * f_x
+    }
+
+    fn energy(&self, hub: &Hub) -> f64 {
+        let Pendulum { m, l, r, .. } = self.p;
+        let (s, c, ad, w) = (self.s[0], self.c[0], self.al_d[0], hub.omega[0]);
+        let (along, up, across) = (r * w + l * c * ad, l * s * ad, l * s * w);
+        let half = libm::sin(self.al[0] / 2.0);
+        m * (along * along + up * up + across * across) / 2.0
+            + 2.0 * m * hub.g[0] * l * half * half
+    }
+
+    fn momentum(&self, hub: &Hub) -> f64 {
+        let Pendulum { m, l, r, .. } = self.p;
+        let (s, c) = (self.s[0], self.c[0]);
+        m * ((r * r + l * l * s * s) * hub.omega[0] + r * l * c * self.al_d[0])
+    }
+
+    fn out_of_range(&self, _: &[f64; 4]) -> Option<&'static str> {
+        None
+    }
+}

@@ -1,0 +1,126 @@
+//! The reaction wheel that turns a torque command into torque on the hub.
+//!
+//! The rotor takes the reaction, I_w W' = -tau, W its absolute rate. The torque is
+//! limited to tau_max; at a speed limit only torque that brings W back is given
+//! (thesis Table 5.4). W follows from the command alone, so a step with a linear
+//! command is cut into pieces with linear torque before the hub's motion is known.
+
+use crate::{Ramp, Wheel};
+
+impl Wheel {
+    /// What is wrong with the parameters together.
+    pub(crate) fn problems(&self) -> Vec<String> {
+        if self.speed_min <= self.speed_0 && self.speed_0 <= self.speed_max {
+            return Vec::new();
+        }
+        vec![format!(
+            "wheel.speed_0 = {} rad/s does not lie between wheel.speed_min = {} rad/s and \
+             wheel.speed_max = {} rad/s",
+            self.speed_0, self.speed_min, self.speed_max
+        )]
+    }
+
+    /// The torque on the hub at a command and rotor speed, N m.
+    pub(crate) fn torque(&self, speed: f64, command: Ramp) -> f64 {
+        self.piece(speed, command).value
+    }
+
+    /// The torque's value and slope from now on. A command at a limit is within it
+    /// or beyond it by where it goes.
+    fn piece(&self, speed: f64, command: Ramp) -> Ramp {
+        let Ramp { value, slope } = command;
+        if !self.enabled {
+            return command;
+        }
+        let rises = value > 0.0 || (value == 0.0 && slope > 0.0);
+        let falls = value < 0.0 || (value == 0.0 && slope < 0.0);
+        let blocked = (falls && speed >= self.speed_max) || (rises && speed <= self.speed_min);
+        if blocked {
+            Ramp { value: 0.0, slope: 0.0 }
+        } else if value > self.tau_max || (value == self.tau_max && slope > 0.0) {
+            Ramp { value: self.tau_max, slope: 0.0 }
+        } else if value < -self.tau_max || (value == -self.tau_max && slope < 0.0) {
+            Ramp { value: -self.tau_max, slope: 0.0 }
+        } else {
+            command
+        }
+    }
+
+    /// The next piece, at most `h` long: its length, the torque on it and the
+    /// rotor's speed after it. The command has fallen on `command.at(length)` then.
+    pub(crate) fn next(&self, speed: f64, command: Ramp, h: f64) -> (f64, Ramp, f64) {
+        let torque = self.piece(speed, command);
+        if !self.enabled {
+            return (h, torque, speed - torque.integral(h) / self.inertia);
+        }
+        // The command passes one of its limits, or zero.
+        let mut length = h;
+        if command.slope != 0.0 {
+            for level in [-self.tau_max, 0.0, self.tau_max] {
+                let t = (level - command.value) / command.slope;
+                if t > 0.0 && t < length {
+                    length = t;
+                }
+            }
+        }
+        // The rotor reaches a speed limit. Within a piece the torque keeps its sign,
+        // so this is the only root of a t + b t^2/2 = (speed - limit) I_w ahead.
+        let end = speed - torque.integral(length) / self.inertia;
+        let limit = end.max(self.speed_min).min(self.speed_max);
+        if limit != end {
+            let Ramp { value: a, slope: b } = torque;
+            let turn = (speed - limit) * self.inertia;
+            let root = libm::sqrt(f64::max(a * a + 2.0 * b * turn, 0.0));
+            let t = 2.0 * turn / (a + root.copysign(turn));
+            return (t.max(0.0).min(length), torque, limit);
+        }
+        (length, torque, end)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(wheel: &Wheel, mut command: Ramp, h: f64) -> (f64, f64, usize) {
+        let (mut speed, mut t, mut impulse, mut pieces) = (wheel.speed_0, 0.0, 0.0, 0);
+        while t < h {
+            let (length, torque, after) = wheel.next(speed, command, h - t);
+            impulse += torque.integral(length);
+            (speed, t, pieces) = (after, t + length, pieces + 1);
+            command.value = command.at(length);
+            assert!(pieces < 10, "a linear command has few pieces");
+        }
+        (impulse, speed, pieces)
+    }
+
+    fn wheel() -> Wheel {
+        Wheel { enabled: true, ..Wheel::default() }
+    }
+
+    #[test]
+    fn torque_is_clipped_at_the_limit() {
+        // A ramp through 0 from -1 to 1 N m in 2 s keeps zero impulse; both ends are clipped.
+        let (impulse, speed, _) = run(&wheel(), Ramp { value: -0.5, slope: 0.5 }, 2.0);
+        assert!(impulse.abs() < 1e-15);
+        assert!((speed - wheel().speed_0).abs() < 1e-10);
+        let (impulse, ..) = run(&wheel(), Ramp { value: 1.0, slope: 0.0 }, 0.01);
+        assert!((impulse - 0.0026).abs() < 1e-15);
+    }
+
+    #[test]
+    fn momentum_on_the_hub_is_what_the_rotor_lost_until_it_saturates() {
+        let w = wheel();
+        // 0.1 N m brakes the rotor from 1600 to 200 rpm in 3.3 s; after that nothing.
+        let (impulse, speed, _) = run(&w, Ramp { value: 0.1, slope: 0.0 }, 10.0);
+        assert!((impulse - w.inertia * (w.speed_0 - w.speed_min)).abs() < 1e-15);
+        assert_eq!(speed, w.speed_min);
+    }
+
+    #[test]
+    fn torque_that_brings_the_rotor_back_is_given_at_the_limit() {
+        let w = Wheel { speed_0: wheel().speed_min, ..wheel() };
+        assert_eq!(w.torque(w.speed_0, Ramp { value: 0.1, slope: 0.0 }), 0.0);
+        assert_eq!(w.torque(w.speed_0, Ramp { value: -0.1, slope: 0.0 }), -0.1);
+    }
+}
