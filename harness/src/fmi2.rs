@@ -1,0 +1,1027 @@
+//! The FMI 2.0 co-simulation C ABI, seen from the host: opens a packed `.fmu`,
+//! loads its binary and turns the 34 C functions into safe calls whose errors
+//! carry the FMU's own words.
+//!
+//! The only unsafe code of the harness is in this file.
+#![allow(unsafe_code)]
+
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
+use std::fs::File;
+use std::io::Read;
+use std::marker::PhantomData;
+use std::path::{Path, PathBuf};
+use std::ptr::{null, null_mut};
+use std::sync::Mutex;
+
+use anyhow::{Context, Result, bail};
+use libloading::Library;
+use sha2::{Digest, Sha256};
+
+use crate::description::{ModelDescription, Type, Value};
+
+/// Folder of the binaries for the platform this program was built for (FMI 2.0, section 2.3).
+pub const PLATFORM: &str = if cfg!(target_os = "windows") {
+    if cfg!(target_pointer_width = "64") { "win64" } else { "win32" }
+} else if cfg!(target_os = "macos") {
+    "darwin64"
+} else if cfg!(target_pointer_width = "64") {
+    "linux64"
+} else {
+    "linux32"
+};
+
+// ---------------------------------------------------------------- C types
+
+type Component = *mut c_void;
+type State = *mut c_void;
+
+/// `fmi2Status`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Status {
+    /// All well.
+    Ok,
+    /// All well, but look at the message.
+    Warning,
+    /// The step was not done.
+    Discard,
+    /// The call failed; the instance lives on.
+    Error,
+    /// All instances of the FMU are lost.
+    Fatal,
+    /// The step goes on in the background.
+    Pending,
+}
+
+impl From<c_int> for Status {
+    fn from(status: c_int) -> Self {
+        match status {
+            0 => Status::Ok,
+            1 => Status::Warning,
+            2 => Status::Discard,
+            3 => Status::Error,
+            5 => Status::Pending,
+            _ => Status::Fatal,
+        }
+    }
+}
+
+/// The environment handed to the logger: the shim in `logger.c` calls `write`.
+#[repr(C)]
+struct Sink {
+    write: extern "C" fn(*mut Sink, c_int, *const c_char, *const c_char),
+    messages: Mutex<Vec<Message>>,
+}
+
+/// One message of the FMU's logger.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Message {
+    /// How bad it is.
+    pub status: Status,
+    /// Log category, as in modelDescription.xml.
+    pub category: String,
+    /// The text.
+    pub text: String,
+}
+
+/// Messages kept per instance; a chatty FMU shall not eat the memory.
+const MESSAGES_KEPT: usize = 1000;
+
+extern "C" fn write(sink: *mut Sink, status: c_int, category: *const c_char, text: *const c_char) {
+    // SAFETY: the shim passes on the environment given to fmi2Instantiate, which the instance
+    // keeps alive, and two strings that it terminated itself or got from the FMU.
+    let (sink, category, text) =
+        unsafe { (&*sink, CStr::from_ptr(category), CStr::from_ptr(text)) };
+    let message = Message {
+        status: status.into(),
+        category: category.to_string_lossy().into_owned(),
+        text: text.to_string_lossy().into_owned(),
+    };
+    let mut messages = sink.messages.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    if messages.len() < MESSAGES_KEPT {
+        messages.push(message);
+    }
+}
+
+unsafe extern "C" {
+    fn hubslosh_logger(
+        environment: *mut c_void,
+        instance: *const c_char,
+        status: c_int,
+        category: *const c_char,
+        format: *const c_char,
+        ...
+    );
+    fn calloc(count: usize, size: usize) -> *mut c_void;
+    fn free(memory: *mut c_void);
+}
+
+type Logger = unsafe extern "C" fn(
+    *mut c_void,
+    *const c_char,
+    c_int,
+    *const c_char,
+    *const c_char,
+    ...
+);
+
+/// `fmi2CallbackFunctions`.
+#[repr(C)]
+struct CallbackFunctions {
+    logger: Option<Logger>,
+    allocate_memory: Option<unsafe extern "C" fn(usize, usize) -> *mut c_void>,
+    free_memory: Option<unsafe extern "C" fn(*mut c_void)>,
+    step_finished: Option<unsafe extern "C" fn(*mut c_void, c_int)>,
+    environment: *mut c_void,
+}
+
+type Real = f64;
+type Refs = *const u32;
+type Call = unsafe extern "C" fn(Component) -> c_int;
+type Get<T> = unsafe extern "C" fn(Component, Refs, usize, *mut T) -> c_int;
+type Set<T> = unsafe extern "C" fn(Component, Refs, usize, *const T) -> c_int;
+type GetStatus<T> = unsafe extern "C" fn(Component, c_int, *mut T) -> c_int;
+
+/// Declares the table of C functions once: field, symbol, type.
+macro_rules! functions {
+    ($($field:ident $symbol:literal $type:ty;)*) => {
+        struct Functions { $($field: $type,)* }
+
+        impl Functions {
+            /// Names of all functions a co-simulation FMU must export.
+            const SYMBOLS: &[&str] = &[$($symbol),*];
+
+            /// # Safety
+            /// The library must be an FMI 2.0 binary: the types are taken on trust.
+            unsafe fn load(library: &Library) -> Result<Self, libloading::Error> {
+                Ok(Functions { $($field: *unsafe { library.get::<$type>($symbol)? },)* })
+            }
+        }
+    };
+}
+
+functions! {
+    get_types_platform "fmi2GetTypesPlatform" unsafe extern "C" fn() -> *const c_char;
+    get_version "fmi2GetVersion" unsafe extern "C" fn() -> *const c_char;
+    set_debug_logging "fmi2SetDebugLogging" unsafe extern "C" fn(Component, c_int, usize, *const *const c_char) -> c_int;
+    instantiate "fmi2Instantiate" unsafe extern "C" fn(*const c_char, c_int, *const c_char, *const c_char, *const CallbackFunctions, c_int, c_int) -> Component;
+    free_instance "fmi2FreeInstance" unsafe extern "C" fn(Component);
+    setup_experiment "fmi2SetupExperiment" unsafe extern "C" fn(Component, c_int, Real, Real, c_int, Real) -> c_int;
+    enter_initialization_mode "fmi2EnterInitializationMode" Call;
+    exit_initialization_mode "fmi2ExitInitializationMode" Call;
+    terminate "fmi2Terminate" Call;
+    reset "fmi2Reset" Call;
+    get_real "fmi2GetReal" Get<Real>;
+    get_integer "fmi2GetInteger" Get<c_int>;
+    get_boolean "fmi2GetBoolean" Get<c_int>;
+    get_string "fmi2GetString" Get<*const c_char>;
+    set_real "fmi2SetReal" Set<Real>;
+    set_integer "fmi2SetInteger" Set<c_int>;
+    set_boolean "fmi2SetBoolean" Set<c_int>;
+    set_string "fmi2SetString" Set<*const c_char>;
+    get_fmu_state "fmi2GetFMUstate" unsafe extern "C" fn(Component, *mut State) -> c_int;
+    set_fmu_state "fmi2SetFMUstate" unsafe extern "C" fn(Component, State) -> c_int;
+    free_fmu_state "fmi2FreeFMUstate" unsafe extern "C" fn(Component, *mut State) -> c_int;
+    serialized_fmu_state_size "fmi2SerializedFMUstateSize" unsafe extern "C" fn(Component, State, *mut usize) -> c_int;
+    serialize_fmu_state "fmi2SerializeFMUstate" unsafe extern "C" fn(Component, State, *mut c_char, usize) -> c_int;
+    deserialize_fmu_state "fmi2DeSerializeFMUstate" unsafe extern "C" fn(Component, *const c_char, usize, *mut State) -> c_int;
+    get_directional_derivative "fmi2GetDirectionalDerivative" unsafe extern "C" fn(Component, Refs, usize, Refs, usize, *const Real, *mut Real) -> c_int;
+    set_real_input_derivatives "fmi2SetRealInputDerivatives" unsafe extern "C" fn(Component, Refs, usize, *const c_int, *const Real) -> c_int;
+    get_real_output_derivatives "fmi2GetRealOutputDerivatives" unsafe extern "C" fn(Component, Refs, usize, *const c_int, *mut Real) -> c_int;
+    do_step "fmi2DoStep" unsafe extern "C" fn(Component, Real, Real, c_int) -> c_int;
+    cancel_step "fmi2CancelStep" Call;
+    get_status "fmi2GetStatus" GetStatus<c_int>;
+    get_real_status "fmi2GetRealStatus" GetStatus<Real>;
+    get_integer_status "fmi2GetIntegerStatus" GetStatus<c_int>;
+    get_boolean_status "fmi2GetBooleanStatus" GetStatus<c_int>;
+    get_string_status "fmi2GetStringStatus" GetStatus<*const c_char>;
+}
+
+// ---------------------------------------------------------------- the FMU
+
+/// An opened FMU: unpacked to a temporary directory, its binary loaded.
+pub struct Fmu {
+    description: ModelDescription,
+    functions: Functions,
+    resources: String,
+    hash: String,
+    path: PathBuf,
+    // dropped in this order: first the code, then the files
+    _library: Library,
+    _directory: tempfile::TempDir,
+}
+
+impl Fmu {
+    /// Opens a packed FMU and loads the binary for this platform.
+    pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref().to_path_buf();
+        let name = path.display();
+        let mut file = File::open(&path).with_context(|| format!("{name} cannot be opened"))?;
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).with_context(|| format!("{name} cannot be read"))?;
+        let hash = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
+        let mut archive = zip::ZipArchive::new(std::io::Cursor::new(bytes))
+            .with_context(|| format!("{name} is not an FMU: it is not a zip archive"))?;
+        let directory =
+            tempfile::Builder::new().prefix("hubslosh-").tempdir().context("no temporary directory")?;
+        archive
+            .extract(directory.path())
+            .with_context(|| format!("{name} cannot be unpacked to {}", directory.path().display()))?;
+
+        let xml = directory.path().join("modelDescription.xml");
+        if !xml.exists() {
+            bail!("{name} is not an FMU: it has no modelDescription.xml");
+        }
+        let text = std::fs::read_to_string(&xml)
+            .with_context(|| format!("modelDescription.xml in {name} cannot be read"))?;
+        let description =
+            ModelDescription::from_xml(&text).with_context(|| format!("{name} cannot be used"))?;
+        if description.fmi_version != "2.0" {
+            bail!("{name} is of FMI version {}; this host drives 2.0", description.fmi_version);
+        }
+        let Some(co_simulation) = &description.co_simulation else {
+            bail!("{name} offers no co-simulation; this host drives nothing else");
+        };
+        let binary =
+            format!("binaries/{PLATFORM}/{}{}", co_simulation.model_identifier, std::env::consts::DLL_SUFFIX);
+        let binary_path = directory.path().join(&binary);
+        if !binary_path.exists() {
+            let there: Vec<_> = archive
+                .file_names()
+                .flatten()
+                .filter(|n| n.starts_with("binaries/") && !n.ends_with('/'))
+                .collect();
+            let there = if there.is_empty() { "none".into() } else { there.join(", ") };
+            bail!("{name} has no binary for this platform, {binary} (binaries in it: {there})");
+        }
+        // SAFETY: loading runs the library's initialisers; that is what opening an FMU means.
+        let library = unsafe { Library::new(&binary_path) }
+            .with_context(|| format!("{binary} in {name} cannot be loaded"))?;
+        let missing: Vec<&str> = Functions::SYMBOLS
+            .iter()
+            // SAFETY: only asked whether the symbol is there.
+            .filter(|symbol| unsafe { library.get::<*const c_void>(**symbol) }.is_err())
+            .copied()
+            .collect();
+        if !missing.is_empty() {
+            bail!("{binary} in {name} lacks {}", missing.join(", "));
+        }
+        // SAFETY: the binary says it follows FMI 2.0, whose types are declared above.
+        let functions = unsafe { Functions::load(&library) }
+            .with_context(|| format!("{binary} in {name} cannot be used"))?;
+        let resources = format!("file://{}/resources", directory.path().display());
+        Ok(Fmu { description, functions, resources, hash, path, _library: library, _directory: directory })
+    }
+
+    /// What the FMU says of itself.
+    pub fn description(&self) -> &ModelDescription {
+        &self.description
+    }
+
+    /// SHA-256 of the `.fmu` file, in hexadecimal digits.
+    pub fn hash(&self) -> &str {
+        &self.hash
+    }
+
+    /// The file it was opened from.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Names of the C functions every co-simulation FMU must export.
+    pub fn symbols() -> &'static [&'static str] {
+        Functions::SYMBOLS
+    }
+
+    /// What fmi2GetVersion says.
+    pub fn version(&self) -> String {
+        // SAFETY: takes nothing, returns a constant string.
+        unsafe { CStr::from_ptr((self.functions.get_version)()) }.to_string_lossy().into_owned()
+    }
+
+    /// What fmi2GetTypesPlatform says.
+    pub fn types_platform(&self) -> String {
+        // SAFETY: as above.
+        unsafe { CStr::from_ptr((self.functions.get_types_platform)()) }
+            .to_string_lossy()
+            .into_owned()
+    }
+
+    /// A new co-simulation instance with logging on.
+    pub fn instantiate(&self, name: &str) -> Result<Instance<'_>, CallError> {
+        self.instantiate_with(&self.instantiation(name))
+    }
+
+    /// The arguments [`Fmu::instantiate`] uses, to be bent for tests of bad calls.
+    pub fn instantiation<'a>(&'a self, name: &'a str) -> Instantiation<'a> {
+        Instantiation {
+            name: Some(name),
+            co_simulation: true,
+            guid: Some(&self.description.guid),
+            resources: Some(&self.resources),
+            callbacks: Callbacks::Full,
+            logging: true,
+        }
+    }
+
+    /// Calls fmi2Instantiate with exactly these arguments.
+    pub fn instantiate_with(&self, with: &Instantiation) -> Result<Instance<'_>, CallError> {
+        const CALL: &str = "fmi2Instantiate";
+        let c_string = |text: Option<&str>| text.map(|t| CString::new(t).unwrap_or_default());
+        let (name, guid, resources) =
+            (c_string(with.name), c_string(with.guid), c_string(with.resources));
+        let pointer = |text: &Option<CString>| text.as_ref().map_or(null(), |t| t.as_ptr());
+        let sink = Box::into_raw(Box::new(Sink { write, messages: Mutex::default() }));
+        let full = with.callbacks == Callbacks::Full;
+        let callbacks = Box::into_raw(Box::new(CallbackFunctions {
+            logger: full.then_some(hubslosh_logger as Logger),
+            allocate_memory: full.then_some(calloc),
+            free_memory: full.then_some(free),
+            step_finished: None,
+            environment: if full { sink.cast() } else { null_mut() },
+        }));
+        // SAFETY: strings and callbacks outlive the call; sink and callbacks outlive the instance.
+        let component = unsafe {
+            (self.functions.instantiate)(
+                pointer(&name),
+                with.co_simulation.into(),
+                pointer(&guid),
+                pointer(&resources),
+                if with.callbacks == Callbacks::Null { null() } else { callbacks },
+                0,
+                with.logging.into(),
+            )
+        };
+        // A NULL component never reaches the FMU again: Drop frees only the sink.
+        let instance = Instance { fmu: self, component, sink, callbacks, one_thread: PhantomData };
+        if component.is_null() {
+            let messages = instance.take_messages();
+            return Err(CallError { call: CALL, status: Status::Error, messages });
+        }
+        Ok(instance)
+    }
+
+    /// For tests: what each function that takes an instance answers to NULL.
+    /// fmi2FreeInstance(NULL), which answers nothing, is called as well.
+    pub fn calls_with_null_instance(&self) -> Vec<(&'static str, Status)> {
+        let f = &self.functions;
+        let c: Component = null_mut();
+        let (mut i, mut x, mut n, mut s, mut t): (c_int, Real, usize, State, *const c_char) =
+            (0, 0.0, 0, null_mut(), null());
+        // SAFETY: the FMU must refuse a NULL instance before it touches anything else; every other
+        // pointer is valid or comes with the length 0.
+        let answers = unsafe {
+            (f.free_instance)(c);
+            [
+                ("fmi2SetDebugLogging", (f.set_debug_logging)(c, 0, 0, null())),
+                ("fmi2SetupExperiment", (f.setup_experiment)(c, 0, 0.0, 0.0, 0, 0.0)),
+                ("fmi2EnterInitializationMode", (f.enter_initialization_mode)(c)),
+                ("fmi2ExitInitializationMode", (f.exit_initialization_mode)(c)),
+                ("fmi2Terminate", (f.terminate)(c)),
+                ("fmi2Reset", (f.reset)(c)),
+                ("fmi2GetReal", (f.get_real)(c, null(), 0, null_mut())),
+                ("fmi2GetInteger", (f.get_integer)(c, null(), 0, null_mut())),
+                ("fmi2GetBoolean", (f.get_boolean)(c, null(), 0, null_mut())),
+                ("fmi2GetString", (f.get_string)(c, null(), 0, null_mut())),
+                ("fmi2SetReal", (f.set_real)(c, null(), 0, null())),
+                ("fmi2SetInteger", (f.set_integer)(c, null(), 0, null())),
+                ("fmi2SetBoolean", (f.set_boolean)(c, null(), 0, null())),
+                ("fmi2SetString", (f.set_string)(c, null(), 0, null())),
+                ("fmi2GetFMUstate", (f.get_fmu_state)(c, &mut s)),
+                ("fmi2SetFMUstate", (f.set_fmu_state)(c, s)),
+                ("fmi2FreeFMUstate", (f.free_fmu_state)(c, &mut s)),
+                ("fmi2SerializedFMUstateSize", (f.serialized_fmu_state_size)(c, s, &mut n)),
+                ("fmi2SerializeFMUstate", (f.serialize_fmu_state)(c, s, null_mut(), 0)),
+                ("fmi2DeSerializeFMUstate", (f.deserialize_fmu_state)(c, null(), 0, &mut s)),
+                (
+                    "fmi2GetDirectionalDerivative",
+                    (f.get_directional_derivative)(c, null(), 0, null(), 0, null(), null_mut()),
+                ),
+                (
+                    "fmi2SetRealInputDerivatives",
+                    (f.set_real_input_derivatives)(c, null(), 0, null(), null()),
+                ),
+                (
+                    "fmi2GetRealOutputDerivatives",
+                    (f.get_real_output_derivatives)(c, null(), 0, null(), null_mut()),
+                ),
+                ("fmi2DoStep", (f.do_step)(c, 0.0, 1.0, 0)),
+                ("fmi2CancelStep", (f.cancel_step)(c)),
+                ("fmi2GetStatus", (f.get_status)(c, 0, &mut i)),
+                ("fmi2GetRealStatus", (f.get_real_status)(c, 2, &mut x)),
+                ("fmi2GetIntegerStatus", (f.get_integer_status)(c, 0, &mut i)),
+                ("fmi2GetBooleanStatus", (f.get_boolean_status)(c, 3, &mut i)),
+                ("fmi2GetStringStatus", (f.get_string_status)(c, 1, &mut t)),
+            ]
+        };
+        answers.into_iter().map(|(call, status)| (call, status.into())).collect()
+    }
+}
+
+/// Arguments of fmi2Instantiate; `None` becomes a NULL pointer.
+#[derive(Clone, Debug)]
+pub struct Instantiation<'a> {
+    /// Instance name.
+    pub name: Option<&'a str>,
+    /// Co-simulation (true) or model exchange (false).
+    pub co_simulation: bool,
+    /// GUID the host expects.
+    pub guid: Option<&'a str>,
+    /// URI of the unpacked resources folder.
+    pub resources: Option<&'a str>,
+    /// Which callbacks are handed over.
+    pub callbacks: Callbacks,
+    /// Whether the FMU may log.
+    pub logging: bool,
+}
+
+/// Which callback functions fmi2Instantiate is given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Callbacks {
+    /// Logger and memory functions.
+    Full,
+    /// A struct whose members are all NULL.
+    Empty,
+    /// No struct at all.
+    Null,
+}
+
+/// A call that did not succeed: which, how, and what the FMU said.
+#[derive(Clone, Debug)]
+pub struct CallError {
+    /// The C function.
+    pub call: &'static str,
+    /// What it returned (fmi2Instantiate, which returns NULL: `Error`).
+    pub status: Status,
+    /// What the FMU logged during the call.
+    pub messages: Vec<Message>,
+}
+
+impl CallError {
+    /// What the FMU logged, in one line.
+    pub fn text(&self) -> String {
+        self.messages.iter().map(|m| m.text.trim()).collect::<Vec<_>>().join("; ")
+    }
+}
+
+impl std::fmt::Display for CallError {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match (self.call, self.status) {
+            ("fmi2Instantiate", _) => write!(f, "fmi2Instantiate gave no instance")?,
+            (call, status) => write!(f, "{call} returned fmi2{status:?}")?,
+        }
+        match self.text() {
+            text if text.is_empty() => write!(f, " without a message"),
+            text => write!(f, ": {text}"),
+        }
+    }
+}
+
+impl std::error::Error for CallError {}
+
+// ---------------------------------------------------------------- an instance
+
+/// One instance of the FMU; freed when dropped. Belongs to the thread that made it.
+pub struct Instance<'fmu> {
+    fmu: &'fmu Fmu,
+    component: Component,
+    sink: *mut Sink,
+    callbacks: *mut CallbackFunctions,
+    one_thread: PhantomData<*mut ()>,
+}
+
+impl Drop for Instance<'_> {
+    fn drop(&mut self) {
+        // SAFETY: made by fmi2Instantiate and Box::into_raw, freed here alone; the instance goes
+        // first, because it may still log.
+        unsafe {
+            if !self.component.is_null() {
+                (self.fmu.functions.free_instance)(self.component);
+            }
+            drop(Box::from_raw(self.callbacks));
+            drop(Box::from_raw(self.sink));
+        }
+    }
+}
+
+/// A snapshot of an instance (`fmi2FMUstate`). Belongs to the instance it was taken from, and must
+/// be given back to it with [`Instance::free_state`]; otherwise its memory is lost.
+pub struct FmuState(State);
+
+/// Result of a call.
+pub type Called<T = ()> = Result<T, CallError>;
+
+impl<'fmu> Instance<'fmu> {
+    /// The FMU it is an instance of.
+    pub fn fmu(&self) -> &'fmu Fmu {
+        self.fmu
+    }
+
+    /// Everything logged since the last time somebody asked.
+    pub fn take_messages(&self) -> Vec<Message> {
+        // SAFETY: the sink lives as long as the instance.
+        let sink = unsafe { &*self.sink };
+        std::mem::take(&mut *sink.messages.lock().unwrap_or_else(|poisoned| poisoned.into_inner()))
+    }
+
+    fn check(&self, call: &'static str, status: c_int) -> Called {
+        match Status::from(status) {
+            Status::Ok | Status::Warning => Ok(()),
+            status => Err(CallError { call, status, messages: self.take_messages() }),
+        }
+    }
+
+    /// fmi2SetDebugLogging.
+    pub fn set_debug_logging(&mut self, on: bool, categories: &[&str]) -> Called {
+        let categories: Vec<CString> =
+            categories.iter().map(|c| CString::new(*c).unwrap_or_default()).collect();
+        let pointers: Vec<*const c_char> = categories.iter().map(|c| c.as_ptr()).collect();
+        // SAFETY: pointers to strings that outlive the call.
+        let status = unsafe {
+            (self.fmu.functions.set_debug_logging)(
+                self.component,
+                on.into(),
+                pointers.len(),
+                if pointers.is_empty() { null() } else { pointers.as_ptr() },
+            )
+        };
+        self.check("fmi2SetDebugLogging", status)
+    }
+
+    /// fmi2SetupExperiment: times in s; `tolerance` is relative.
+    pub fn setup_experiment(
+        &mut self,
+        tolerance: Option<f64>,
+        start: f64,
+        stop: Option<f64>,
+    ) -> Called {
+        // SAFETY: plain values.
+        let status = unsafe {
+            (self.fmu.functions.setup_experiment)(
+                self.component,
+                tolerance.is_some().into(),
+                tolerance.unwrap_or(0.0),
+                start,
+                stop.is_some().into(),
+                stop.unwrap_or(0.0),
+            )
+        };
+        self.check("fmi2SetupExperiment", status)
+    }
+
+    /// fmi2EnterInitializationMode.
+    pub fn enter_initialization_mode(&mut self) -> Called {
+        // SAFETY: plain call on a live instance; so are the next four.
+        let status = unsafe { (self.fmu.functions.enter_initialization_mode)(self.component) };
+        self.check("fmi2EnterInitializationMode", status)
+    }
+
+    /// fmi2ExitInitializationMode.
+    pub fn exit_initialization_mode(&mut self) -> Called {
+        // SAFETY: see above.
+        let status = unsafe { (self.fmu.functions.exit_initialization_mode)(self.component) };
+        self.check("fmi2ExitInitializationMode", status)
+    }
+
+    /// fmi2Terminate.
+    pub fn terminate(&mut self) -> Called {
+        // SAFETY: see above.
+        let status = unsafe { (self.fmu.functions.terminate)(self.component) };
+        self.check("fmi2Terminate", status)
+    }
+
+    /// fmi2Reset.
+    pub fn reset(&mut self) -> Called {
+        // SAFETY: see above.
+        let status = unsafe { (self.fmu.functions.reset)(self.component) };
+        self.check("fmi2Reset", status)
+    }
+
+    /// fmi2CancelStep.
+    pub fn cancel_step(&mut self) -> Called {
+        // SAFETY: see above.
+        let status = unsafe { (self.fmu.functions.cancel_step)(self.component) };
+        self.check("fmi2CancelStep", status)
+    }
+
+    /// fmi2DoStep from `time` by `step`, s; the past is never asked for again.
+    pub fn do_step(&mut self, time: f64, step: f64) -> Called {
+        self.do_step_keeping(time, step, true)
+    }
+
+    /// fmi2DoStep, saying whether the past may still be asked for
+    /// (noSetFMUStatePriorToCurrentPoint = `forget`).
+    pub fn do_step_keeping(&mut self, time: f64, step: f64, forget: bool) -> Called {
+        // SAFETY: plain values on a live instance.
+        let status =
+            unsafe { (self.fmu.functions.do_step)(self.component, time, step, forget.into()) };
+        self.check("fmi2DoStep", status)
+    }
+
+    // ------------------------------------------------ variables by reference
+
+    /// fmi2GetReal.
+    pub fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Called {
+        assert_eq!(references.len(), values.len());
+        // SAFETY: two slices of the length given; so in all calls of this section.
+        let status = unsafe {
+            (self.fmu.functions.get_real)(
+                self.component,
+                references.as_ptr(),
+                references.len(),
+                values.as_mut_ptr(),
+            )
+        };
+        self.check("fmi2GetReal", status)
+    }
+
+    /// fmi2SetReal.
+    pub fn set_real(&mut self, references: &[u32], values: &[f64]) -> Called {
+        assert_eq!(references.len(), values.len());
+        // SAFETY: see get_real.
+        let status = unsafe {
+            (self.fmu.functions.set_real)(
+                self.component,
+                references.as_ptr(),
+                references.len(),
+                values.as_ptr(),
+            )
+        };
+        self.check("fmi2SetReal", status)
+    }
+
+    /// fmi2GetInteger (enumerations too).
+    pub fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Called {
+        assert_eq!(references.len(), values.len());
+        // SAFETY: see get_real.
+        let status = unsafe {
+            (self.fmu.functions.get_integer)(
+                self.component,
+                references.as_ptr(),
+                references.len(),
+                values.as_mut_ptr(),
+            )
+        };
+        self.check("fmi2GetInteger", status)
+    }
+
+    /// fmi2SetInteger (enumerations too).
+    pub fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Called {
+        assert_eq!(references.len(), values.len());
+        // SAFETY: see get_real.
+        let status = unsafe {
+            (self.fmu.functions.set_integer)(
+                self.component,
+                references.as_ptr(),
+                references.len(),
+                values.as_ptr(),
+            )
+        };
+        self.check("fmi2SetInteger", status)
+    }
+
+    /// fmi2GetBoolean; the C values, of which only 0 and 1 are proper.
+    pub fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Called {
+        assert_eq!(references.len(), values.len());
+        // SAFETY: see get_real.
+        let status = unsafe {
+            (self.fmu.functions.get_boolean)(
+                self.component,
+                references.as_ptr(),
+                references.len(),
+                values.as_mut_ptr(),
+            )
+        };
+        self.check("fmi2GetBoolean", status)
+    }
+
+    /// fmi2SetBoolean; the C values, of which every non-zero one is true.
+    pub fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Called {
+        assert_eq!(references.len(), values.len());
+        // SAFETY: see get_real.
+        let status = unsafe {
+            (self.fmu.functions.set_boolean)(
+                self.component,
+                references.as_ptr(),
+                references.len(),
+                values.as_ptr(),
+            )
+        };
+        self.check("fmi2SetBoolean", status)
+    }
+
+    /// fmi2GetString; the texts are copied, because the FMU's live only until the next call.
+    pub fn get_string(&mut self, references: &[u32]) -> Called<Vec<String>> {
+        let mut pointers: Vec<*const c_char> = vec![null(); references.len()];
+        // SAFETY: see get_real.
+        let status = unsafe {
+            (self.fmu.functions.get_string)(
+                self.component,
+                references.as_ptr(),
+                references.len(),
+                pointers.as_mut_ptr(),
+            )
+        };
+        self.check("fmi2GetString", status)?;
+        let text = |p: *const c_char| {
+            if p.is_null() {
+                return String::new();
+            }
+            // SAFETY: the FMU answered OK, so it points to a terminated string of the FMU.
+            unsafe { CStr::from_ptr(p) }.to_string_lossy().into_owned()
+        };
+        Ok(pointers.into_iter().map(text).collect())
+    }
+
+    /// fmi2SetString.
+    pub fn set_string(&mut self, references: &[u32], values: &[&str]) -> Called {
+        assert_eq!(references.len(), values.len());
+        let values: Vec<CString> =
+            values.iter().map(|v| CString::new(*v).unwrap_or_default()).collect();
+        let pointers: Vec<*const c_char> = values.iter().map(|v| v.as_ptr()).collect();
+        // SAFETY: see get_real.
+        let status = unsafe {
+            (self.fmu.functions.set_string)(
+                self.component,
+                references.as_ptr(),
+                references.len(),
+                pointers.as_ptr(),
+            )
+        };
+        self.check("fmi2SetString", status)
+    }
+
+    /// fmi2SetRealInputDerivatives.
+    pub fn set_real_input_derivatives(
+        &mut self,
+        references: &[u32],
+        orders: &[i32],
+        values: &[f64],
+    ) -> Called {
+        assert!(references.len() == orders.len() && orders.len() == values.len());
+        // SAFETY: see get_real.
+        let status = unsafe {
+            (self.fmu.functions.set_real_input_derivatives)(
+                self.component,
+                references.as_ptr(),
+                references.len(),
+                orders.as_ptr(),
+                values.as_ptr(),
+            )
+        };
+        self.check("fmi2SetRealInputDerivatives", status)
+    }
+
+    /// fmi2GetRealOutputDerivatives.
+    pub fn get_real_output_derivatives(
+        &mut self,
+        references: &[u32],
+        orders: &[i32],
+        values: &mut [f64],
+    ) -> Called {
+        assert!(references.len() == orders.len() && orders.len() == values.len());
+        // SAFETY: see get_real.
+        let status = unsafe {
+            (self.fmu.functions.get_real_output_derivatives)(
+                self.component,
+                references.as_ptr(),
+                references.len(),
+                orders.as_ptr(),
+                values.as_mut_ptr(),
+            )
+        };
+        self.check("fmi2GetRealOutputDerivatives", status)
+    }
+
+    /// fmi2GetDirectionalDerivative: d(unknowns) for a change `change` of the knowns.
+    pub fn get_directional_derivative(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        change: &[f64],
+    ) -> Called<Vec<f64>> {
+        assert_eq!(knowns.len(), change.len());
+        let mut answer = vec![0.0; unknowns.len()];
+        // SAFETY: see get_real.
+        let status = unsafe {
+            (self.fmu.functions.get_directional_derivative)(
+                self.component,
+                unknowns.as_ptr(),
+                unknowns.len(),
+                knowns.as_ptr(),
+                knowns.len(),
+                change.as_ptr(),
+                answer.as_mut_ptr(),
+            )
+        };
+        self.check("fmi2GetDirectionalDerivative", status)?;
+        Ok(answer)
+    }
+
+    // ------------------------------------------------ variables by name
+
+    /// The value of a variable.
+    pub fn get(&mut self, name: &str) -> Result<Value> {
+        let variable = self.fmu.description.variable(name)?;
+        let reference = [variable.reference];
+        Ok(match variable.kind() {
+            Type::Real => {
+                let mut value = [0.0];
+                self.get_real(&reference, &mut value)?;
+                Value::Real(value[0])
+            }
+            Type::Integer | Type::Enumeration => {
+                let mut value = [0];
+                self.get_integer(&reference, &mut value)?;
+                Value::Integer(value[0])
+            }
+            Type::Boolean => {
+                let mut value = [0];
+                self.get_boolean(&reference, &mut value)?;
+                Value::Boolean(value[0] != 0)
+            }
+            Type::String => Value::String(self.get_string(&reference)?.remove(0)),
+        })
+    }
+
+    /// The value of a real variable.
+    pub fn real(&mut self, name: &str) -> Result<f64> {
+        match self.get(name)? {
+            Value::Real(value) => Ok(value),
+            other => bail!("{name} is not a Real but {other:?}"),
+        }
+    }
+
+    /// Sets a variable from text: a number, `true`/`false`, or an enumeration's value by name or
+    /// number.
+    pub fn set(&mut self, name: &str, text: &str) -> Result<()> {
+        let description = &self.fmu.description;
+        let variable = description.variable(name)?;
+        let reference = [variable.reference];
+        match description.value(variable, text)? {
+            Value::Real(value) => self.set_real(&reference, &[value]),
+            Value::Integer(value) => self.set_integer(&reference, &[value]),
+            Value::Boolean(value) => self.set_boolean(&reference, &[value.into()]),
+            Value::String(value) => self.set_string(&reference, &[&value]),
+        }
+        .with_context(|| format!("{name}={text} was refused"))
+    }
+
+    // ------------------------------------------------ snapshots
+
+    /// fmi2GetFMUstate into a new snapshot.
+    pub fn get_state(&mut self) -> Called<FmuState> {
+        let mut state = FmuState(null_mut());
+        self.get_state_into(&mut state)?;
+        Ok(state)
+    }
+
+    /// fmi2GetFMUstate into a snapshot that is there already.
+    pub fn get_state_into(&mut self, state: &mut FmuState) -> Called {
+        // SAFETY: NULL or a handle from this FMU.
+        let status = unsafe { (self.fmu.functions.get_fmu_state)(self.component, &mut state.0) };
+        self.check("fmi2GetFMUstate", status)
+    }
+
+    /// fmi2SetFMUstate.
+    pub fn set_state(&mut self, state: &FmuState) -> Called {
+        // SAFETY: a handle from this FMU.
+        let status = unsafe { (self.fmu.functions.set_fmu_state)(self.component, state.0) };
+        self.check("fmi2SetFMUstate", status)
+    }
+
+    /// fmi2FreeFMUstate.
+    pub fn free_state(&mut self, mut state: FmuState) -> Called {
+        // SAFETY: a handle from this FMU, gone after this call.
+        let status = unsafe { (self.fmu.functions.free_fmu_state)(self.component, &mut state.0) };
+        self.check("fmi2FreeFMUstate", status)
+    }
+
+    /// fmi2SerializeFMUstate.
+    pub fn serialize(&mut self, state: &FmuState) -> Called<Vec<u8>> {
+        let mut size = 0;
+        // SAFETY: a handle from this FMU, a place for the size.
+        let status = unsafe {
+            (self.fmu.functions.serialized_fmu_state_size)(self.component, state.0, &mut size)
+        };
+        self.check("fmi2SerializedFMUstateSize", status)?;
+        let mut bytes = vec![0u8; size];
+        // SAFETY: `size` bytes are there.
+        let status = unsafe {
+            (self.fmu.functions.serialize_fmu_state)(
+                self.component,
+                state.0,
+                bytes.as_mut_ptr().cast(),
+                size,
+            )
+        };
+        self.check("fmi2SerializeFMUstate", status)?;
+        Ok(bytes)
+    }
+
+    /// fmi2DeSerializeFMUstate.
+    pub fn deserialize(&mut self, bytes: &[u8]) -> Called<FmuState> {
+        let mut state = FmuState(null_mut());
+        // SAFETY: `bytes.len()` bytes are there.
+        let status = unsafe {
+            (self.fmu.functions.deserialize_fmu_state)(
+                self.component,
+                bytes.as_ptr().cast(),
+                bytes.len(),
+                &mut state.0,
+            )
+        };
+        self.check("fmi2DeSerializeFMUstate", status)?;
+        Ok(state)
+    }
+
+    // ------------------------------------------------ status of an asynchronous step
+
+    /// fmi2GetStatus, `kind` being an fmi2StatusKind.
+    pub fn status(&mut self, kind: i32) -> Called<i32> {
+        let mut value = 0;
+        // SAFETY: a place for the answer; so in the next four.
+        let status = unsafe { (self.fmu.functions.get_status)(self.component, kind, &mut value) };
+        self.check("fmi2GetStatus", status).map(|()| value)
+    }
+
+    /// fmi2GetRealStatus.
+    pub fn real_status(&mut self, kind: i32) -> Called<f64> {
+        let mut value = 0.0;
+        // SAFETY: see status.
+        let status =
+            unsafe { (self.fmu.functions.get_real_status)(self.component, kind, &mut value) };
+        self.check("fmi2GetRealStatus", status).map(|()| value)
+    }
+
+    /// fmi2GetIntegerStatus.
+    pub fn integer_status(&mut self, kind: i32) -> Called<i32> {
+        let mut value = 0;
+        // SAFETY: see status.
+        let status =
+            unsafe { (self.fmu.functions.get_integer_status)(self.component, kind, &mut value) };
+        self.check("fmi2GetIntegerStatus", status).map(|()| value)
+    }
+
+    /// fmi2GetBooleanStatus.
+    pub fn boolean_status(&mut self, kind: i32) -> Called<bool> {
+        let mut value = 0;
+        // SAFETY: see status.
+        let status =
+            unsafe { (self.fmu.functions.get_boolean_status)(self.component, kind, &mut value) };
+        self.check("fmi2GetBooleanStatus", status).map(|()| value != 0)
+    }
+
+    /// fmi2GetStringStatus.
+    pub fn string_status(&mut self, kind: i32) -> Called<String> {
+        let mut value = null();
+        // SAFETY: see status.
+        let status =
+            unsafe { (self.fmu.functions.get_string_status)(self.component, kind, &mut value) };
+        self.check("fmi2GetStringStatus", status)?;
+        if value.is_null() {
+            return Ok(String::new());
+        }
+        // SAFETY: the FMU answered OK, so it points to a terminated string of the FMU.
+        Ok(unsafe { CStr::from_ptr(value) }.to_string_lossy().into_owned())
+    }
+
+    // ------------------------------------------------ for tests of bad calls
+
+    /// fmi2GetReal with `count` and NULL pointers: an FMU must accept 0 and refuse the rest.
+    pub fn get_real_null(&mut self, count: usize) -> Called {
+        // SAFETY: the point of the call is that the FMU looks before it leaps; so in the next four.
+        let status =
+            unsafe { (self.fmu.functions.get_real)(self.component, null(), count, null_mut()) };
+        self.check("fmi2GetReal", status)
+    }
+
+    /// fmi2SetReal with `count` and NULL pointers.
+    pub fn set_real_null(&mut self, count: usize) -> Called {
+        // SAFETY: see get_real_null.
+        let status =
+            unsafe { (self.fmu.functions.set_real)(self.component, null(), count, null()) };
+        self.check("fmi2SetReal", status)
+    }
+
+    /// fmi2SetString with one NULL text.
+    pub fn set_string_null(&mut self, reference: u32) -> Called {
+        // SAFETY: see get_real_null.
+        let status = unsafe {
+            (self.fmu.functions.set_string)(self.component, &reference, 1, &null::<c_char>())
+        };
+        self.check("fmi2SetString", status)
+    }
+
+    /// fmi2SetFMUstate with NULL.
+    pub fn set_state_null(&mut self) -> Called {
+        self.set_state(&FmuState(null_mut()))
+    }
+
+    /// fmi2FreeFMUstate with NULL and with a pointer to NULL, which must both be fine.
+    pub fn free_state_null(&mut self) -> Called {
+        // SAFETY: see get_real_null.
+        let status = unsafe { (self.fmu.functions.free_fmu_state)(self.component, null_mut()) };
+        self.check("fmi2FreeFMUstate", status)?;
+        self.free_state(FmuState(null_mut()))
+    }
+}

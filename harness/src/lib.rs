@@ -1,0 +1,13 @@
+//! A host for the HubSlosh FMU: packs it, drives it, looks at what comes out.
+//!
+//! It meets the FMU only as any other host does: as a packed `.fmu`, through
+//! its C ABI. No code is shared with the model.
+
+pub mod description;
+pub mod fmi2;
+pub mod html;
+pub mod output;
+pub mod pack;
+pub mod profile;
+pub mod run;
+pub mod table;

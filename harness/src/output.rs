@@ -1,0 +1,55 @@
+//! Files appear whole or not at all: written beside their place under a
+//! temporary name, then renamed.
+
+use std::fs::File;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+
+/// Writes `path` through `write`; if that fails, nothing is left and an older file stays as it was.
+pub fn atomically<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T>) -> Result<T> {
+    let name = path.display();
+    let directory = match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent,
+        _ => Path::new("."),
+    };
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".hubslosh-");
+    #[cfg(unix)] // what any other program would give a new file; tempfile's 0600 is for secrets
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    let mut file =
+        builder.tempfile_in(directory).with_context(|| format!("{name} cannot be written"))?;
+    if path.is_dir() {
+        anyhow::bail!("{name} cannot be written: it is a directory");
+    }
+    let result = write(file.as_file_mut())?;
+    file.persist(path).with_context(|| format!("{name} cannot be written"))?;
+    Ok(result)
+}
+
+/// Makes a directory and those above it.
+pub fn directory(path: &Path) -> Result<()> {
+    std::fs::create_dir_all(path)
+        .with_context(|| format!("the directory {} cannot be made", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use super::*;
+
+    #[test]
+    fn a_failed_write_leaves_the_old_file_and_no_other() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a.txt");
+        std::fs::write(&path, "old").unwrap();
+        let failed = atomically(&path, |file| {
+            file.write_all(b"half")?;
+            anyhow::bail!("no more")
+        });
+        assert_eq!(failed.map(|()| ()).unwrap_err().to_string(), "no more");
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
+        assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 1);
+    }
+}
