@@ -1,0 +1,869 @@
+//! The C interface of FMI 2.0 for Co-Simulation: 34 functions, and the only
+//! unsafe code of the FMU.
+//!
+//! Every function catches panics; one that happens poisons the instance and is
+//! told to the logger. Pointers may be NULL wherever the standard does not
+//! forbid it, and mostly where it does. What the functions mean is in
+//! [`crate::instance`] and [`crate::snapshot`]; here is only how C says it.
+
+#![allow(unsafe_code)]
+// The names are the standard's.
+#![allow(non_camel_case_types, non_upper_case_globals)]
+// The safety contract of every function is the FMI 2.0 standard's: a component
+// comes from fmi2Instantiate and is not yet freed, arrays have the lengths given,
+// strings end with NUL.
+#![allow(clippy::missing_safety_doc)]
+
+use std::any::Any;
+use std::ffi::{CStr, CString, c_char, c_int, c_uint, c_void};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::ptr;
+
+use crate::calls::{self, Call, Fault, Mode, Severity};
+use crate::instance::Instance;
+use crate::log::{Filter, category};
+use crate::variable::Value;
+use crate::{snapshot, table};
+
+/// An instance, opaque to the host.
+pub type fmi2Component = *mut c_void;
+/// The host's own pointer, handed back to it.
+pub type fmi2ComponentEnvironment = *mut c_void;
+/// A saved state, opaque to the host.
+pub type fmi2FMUstate = *mut c_void;
+/// The number of a variable.
+pub type fmi2ValueReference = c_uint;
+/// A real number.
+pub type fmi2Real = f64;
+/// An integer.
+pub type fmi2Integer = c_int;
+/// 0 is false, everything else true.
+pub type fmi2Boolean = c_int;
+/// A character.
+pub type fmi2Char = c_char;
+/// Text that ends with NUL.
+pub type fmi2String = *const fmi2Char;
+/// A byte of a saved state.
+pub type fmi2Byte = c_char;
+
+/// What a call returns.
+pub type fmi2Status = c_int;
+/// All is well.
+pub const fmi2OK: fmi2Status = 0;
+/// Never returned.
+pub const fmi2Warning: fmi2Status = 1;
+/// The question has no answer.
+pub const fmi2Discard: fmi2Status = 2;
+/// The call was refused or failed.
+pub const fmi2Error: fmi2Status = 3;
+/// The instance is unusable.
+pub const fmi2Fatal: fmi2Status = 4;
+/// Never returned.
+pub const fmi2Pending: fmi2Status = 5;
+
+/// What kind of FMU the host wants.
+pub type fmi2Type = c_int;
+/// Model Exchange.
+pub const fmi2ModelExchange: fmi2Type = 0;
+/// Co-Simulation.
+pub const fmi2CoSimulation: fmi2Type = 1;
+
+/// What the host asks of fmi2GetStatus and its kin.
+pub type fmi2StatusKind = c_int;
+/// The result of an asynchronous step.
+pub const fmi2DoStepStatus: fmi2StatusKind = 0;
+/// What an asynchronous step is busy with.
+pub const fmi2PendingStatus: fmi2StatusKind = 1;
+/// How far the last step came.
+pub const fmi2LastSuccessfulTime: fmi2StatusKind = 2;
+/// Whether the FMU wants to end the simulation.
+pub const fmi2Terminated: fmi2StatusKind = 3;
+
+/// The host's logger: printf with a few words before.
+pub type fmi2CallbackLogger = Option<
+    unsafe extern "C" fn(
+        environment: fmi2ComponentEnvironment,
+        instance_name: fmi2String,
+        status: fmi2Status,
+        category: fmi2String,
+        message: fmi2String,
+        ...
+    ),
+>;
+
+/// The host's functions. Only the logger is used; each may be NULL.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+#[allow(missing_docs)]
+pub struct fmi2CallbackFunctions {
+    pub logger: fmi2CallbackLogger,
+    pub allocateMemory: Option<unsafe extern "C" fn(usize, usize) -> *mut c_void>,
+    pub freeMemory: Option<unsafe extern "C" fn(*mut c_void)>,
+    pub stepFinished: Option<unsafe extern "C" fn(fmi2ComponentEnvironment, fmi2Status)>,
+    pub componentEnvironment: fmi2ComponentEnvironment,
+}
+
+/// Marks a live component, so that a wrong handle is an error and no crash.
+const COMPONENT: u64 = 0x4875_6253_6c6f_7368;
+/// Marks a live saved state.
+const STATE: u64 = 0x5374_6174_6548_7562;
+
+/// What a component handle points to.
+#[repr(C)]
+struct Component {
+    mark: u64,
+    instance: Instance,
+    log: Log,
+}
+
+/// What a state handle points to.
+#[repr(C)]
+struct SavedState {
+    mark: u64,
+    instance: Instance,
+}
+
+/// The way to the host's logger.
+struct Log {
+    // Copied: the host's struct need not outlive fmi2Instantiate.
+    callbacks: fmi2CallbackFunctions,
+    instance_name: CString,
+    filter: Filter,
+}
+
+impl Log {
+    fn report(&self, fault: &Fault) {
+        let Some(logger) = self.callbacks.logger else { return };
+        if !self.filter.wants(fault.severity) {
+            return;
+        }
+        let category = c_string(category(fault.severity));
+        let message = c_string(&fault.text);
+        // The text is an argument, not the format: it may contain a percent sign.
+        unsafe {
+            logger(
+                self.callbacks.componentEnvironment,
+                self.instance_name.as_ptr(),
+                status(fault.severity),
+                category.as_ptr(),
+                c"%s".as_ptr(),
+                message.as_ptr(),
+            );
+        }
+    }
+}
+
+fn status(severity: Severity) -> fmi2Status {
+    match severity {
+        Severity::Discard => fmi2Discard,
+        Severity::Error => fmi2Error,
+        Severity::Fatal => fmi2Fatal,
+    }
+}
+
+fn c_string(text: &str) -> CString {
+    CString::new(text.replace('\0', " ")).unwrap_or_default()
+}
+
+/// The host's text: `None` for NULL.
+unsafe fn text(string: fmi2String) -> Option<String> {
+    if string.is_null() {
+        return None;
+    }
+    Some(unsafe { CStr::from_ptr(string) }.to_string_lossy().into_owned())
+}
+
+/// The host's array; NULL is fine when it is empty.
+unsafe fn array<'a, T>(
+    call: &Call,
+    name: &str,
+    pointer: *const T,
+    length: usize,
+) -> Result<&'a [T], Fault> {
+    if length == 0 {
+        return Ok(&[]);
+    }
+    if pointer.is_null() {
+        return Err(null(call, name));
+    }
+    Ok(unsafe { std::slice::from_raw_parts(pointer, length) })
+}
+
+/// As [`array`], to write to.
+unsafe fn array_mut<'a, T>(
+    call: &Call,
+    name: &str,
+    pointer: *mut T,
+    length: usize,
+) -> Result<&'a mut [T], Fault> {
+    if length == 0 {
+        return Ok(&mut []);
+    }
+    if pointer.is_null() {
+        return Err(null(call, name));
+    }
+    Ok(unsafe { std::slice::from_raw_parts_mut(pointer, length) })
+}
+
+/// A place of the host's to write one thing to.
+unsafe fn place<'a, T>(call: &Call, name: &str, pointer: *mut T) -> Result<&'a mut T, Fault> {
+    unsafe { pointer.as_mut() }.ok_or_else(|| null(call, name))
+}
+
+fn null(call: &Call, name: &str) -> Fault {
+    call.error(format_args!("argument {name} is NULL"))
+}
+
+unsafe fn saved_state<'a>(call: &Call, handle: fmi2FMUstate) -> Result<&'a mut SavedState, Fault> {
+    if handle.is_null() {
+        return Err(null(call, "FMUstate"));
+    }
+    if !handle.cast::<SavedState>().is_aligned()
+        || unsafe { ptr::read(handle.cast::<u64>()) } != STATE
+    {
+        return Err(call.error("argument FMUstate is not a saved state of this FMU"));
+    }
+    Ok(unsafe { &mut *handle.cast::<SavedState>() })
+}
+
+/// Does `body` on the component behind the handle: failures are logged and become
+/// the status, a panic poisons the instance.
+unsafe fn on(
+    handle: fmi2Component,
+    call: &Call,
+    body: impl FnOnce(&mut Component) -> Result<(), Fault>,
+) -> fmi2Status {
+    if handle.is_null()
+        || !handle.cast::<Component>().is_aligned()
+        || unsafe { ptr::read(handle.cast::<u64>()) } != COMPONENT
+    {
+        return fmi2Error;
+    }
+    let component = unsafe { &mut *handle.cast::<Component>() };
+    let result = catch_unwind(AssertUnwindSafe(|| body(component)));
+    let fault = match result {
+        Ok(Ok(())) => return fmi2OK,
+        Ok(Err(fault)) => fault,
+        Err(payload) => {
+            component.instance.poison();
+            let text = format!("{} panicked: {}", call.name, panic_text(&*payload));
+            Fault { severity: Severity::Fatal, text }
+        }
+    };
+    component.log.report(&fault);
+    status(fault.severity)
+}
+
+fn panic_text(payload: &(dyn Any + Send)) -> &str {
+    let text = payload.downcast_ref::<&str>().copied();
+    text.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("no text")
+}
+
+/// Panics are told to the host's logger and printed nowhere. The hook belongs to
+/// this library's own copy of std, not to the host.
+fn silence_panics() {
+    // In this crate's own tests std is the test runner's.
+    #[cfg(not(test))]
+    {
+        static ONCE: std::sync::Once = std::sync::Once::new();
+        ONCE.call_once(|| std::panic::set_hook(Box::new(|_| {})));
+    }
+}
+
+// ---- Inquiry, life and death ----
+
+/// "default": the C types above.
+#[unsafe(no_mangle)]
+pub extern "C" fn fmi2GetTypesPlatform() -> fmi2String {
+    c"default".as_ptr()
+}
+
+/// "2.0"
+#[unsafe(no_mangle)]
+pub extern "C" fn fmi2GetVersion() -> fmi2String {
+    c"2.0".as_ptr()
+}
+
+/// Chooses what is logged.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetDebugLogging(
+    c: fmi2Component,
+    loggingOn: fmi2Boolean,
+    nCategories: usize,
+    categories: *const fmi2String,
+) -> fmi2Status {
+    let call = &calls::SET_DEBUG_LOGGING;
+    unsafe {
+        on(c, call, |component| {
+            call.check(component.instance.mode())?;
+            if loggingOn == 0 {
+                component.log.filter = Filter::NONE;
+                return Ok(());
+            }
+            let mut names = Vec::new();
+            for category in array(call, "categories", categories, nCategories)? {
+                names.push(text(*category).ok_or_else(|| null(call, "categories[]"))?);
+            }
+            component.log.filter = Filter::of(&names).map_err(|why| call.error(why))?;
+            Ok(())
+        })
+    }
+}
+
+/// Makes an instance. NULL on failure, and the logger is told why.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2Instantiate(
+    instanceName: fmi2String,
+    fmuType: fmi2Type,
+    fmuGUID: fmi2String,
+    _fmuResourceLocation: fmi2String,
+    functions: *const fmi2CallbackFunctions,
+    _visible: fmi2Boolean,
+    _loggingOn: fmi2Boolean,
+) -> fmi2Component {
+    if functions.is_null() {
+        return ptr::null_mut();
+    }
+    silence_panics();
+    let made = catch_unwind(|| unsafe {
+        let name = text(instanceName);
+        let log = Log {
+            callbacks: *functions,
+            instance_name: c_string(name.as_deref().unwrap_or("")),
+            filter: Filter::ALL,
+        };
+        match refusal(name, fmuType, text(fmuGUID)) {
+            None => {
+                let instance = Instance::new();
+                Box::into_raw(Box::new(Component { mark: COMPONENT, instance, log })).cast()
+            }
+            Some(why) => {
+                let text = format!("fmi2Instantiate: {why}");
+                log.report(&Fault { severity: Severity::Error, text });
+                ptr::null_mut()
+            }
+        }
+    });
+    made.unwrap_or(ptr::null_mut())
+}
+
+/// Why no instance can be made like this.
+fn refusal(name: Option<String>, kind: fmi2Type, guid: Option<String>) -> Option<String> {
+    let expected = table::guid();
+    if name.is_none_or(|name| name.trim().is_empty()) {
+        return Some("the instance has no name".into());
+    }
+    if kind != fmi2CoSimulation {
+        return Some(format!("fmuType {kind} is not offered; only fmi2CoSimulation is"));
+    }
+    match guid {
+        None => Some(format!("fmuGUID is NULL; expected {expected}")),
+        Some(guid) if guid != expected => Some(format!(
+            "fmuGUID is {guid}; expected {expected}: model description and binary do not belong together"
+        )),
+        Some(_) => None,
+    }
+}
+
+/// Frees an instance; NULL is fine.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2FreeInstance(c: fmi2Component) {
+    unsafe {
+        if c.is_null()
+            || !c.cast::<Component>().is_aligned()
+            || ptr::read(c.cast::<u64>()) != COMPONENT
+        {
+            return;
+        }
+        // A later call with this handle should be an error as long as nobody
+        // else got the memory.
+        ptr::write_volatile(c.cast::<u64>(), 0);
+        let _ = catch_unwind(|| drop(Box::from_raw(c.cast::<Component>())));
+    }
+}
+
+/// Tells times and tolerance.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetupExperiment(
+    c: fmi2Component,
+    toleranceDefined: fmi2Boolean,
+    tolerance: fmi2Real,
+    startTime: fmi2Real,
+    stopTimeDefined: fmi2Boolean,
+    stopTime: fmi2Real,
+) -> fmi2Status {
+    let tolerance = (toleranceDefined != 0).then_some(tolerance);
+    let stop = (stopTimeDefined != 0).then_some(stopTime);
+    unsafe {
+        on(c, &calls::SETUP_EXPERIMENT, |component| {
+            component.instance.setup_experiment(tolerance, startTime, stop)
+        })
+    }
+}
+
+/// From here on all variables can be read.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2EnterInitializationMode(c: fmi2Component) -> fmi2Status {
+    unsafe {
+        on(c, &calls::ENTER_INITIALIZATION, |component| {
+            component.instance.enter_initialization_mode()
+        })
+    }
+}
+
+/// From here on parameters are fixed, and steps can be made.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2ExitInitializationMode(c: fmi2Component) -> fmi2Status {
+    unsafe {
+        on(c, &calls::EXIT_INITIALIZATION, |component| {
+            component.instance.exit_initialization_mode()
+        })
+    }
+}
+
+/// Ends the simulation; values can still be read.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2Terminate(c: fmi2Component) -> fmi2Status {
+    unsafe { on(c, &calls::TERMINATE, |component| component.instance.terminate()) }
+}
+
+/// As new.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2Reset(c: fmi2Component) -> fmi2Status {
+    unsafe { on(c, &calls::RESET, |component| component.instance.reset()) }
+}
+
+// ---- Values ----
+
+/// The values of all references, each turned into its C type by `as_c`.
+unsafe fn get<T>(
+    c: fmi2Component,
+    call: &Call,
+    (vr, nvr, value): (*const fmi2ValueReference, usize, *mut T),
+    as_c: impl Fn(Value) -> Option<T>,
+) -> fmi2Status {
+    unsafe {
+        on(c, call, |component| {
+            call.check(component.instance.mode())?;
+            let references = array(call, "vr", vr, nvr)?;
+            let places = array_mut(call, "value", value, nvr)?;
+            for (reference, place) in references.iter().zip(places) {
+                let value = as_c(component.instance.get(call, *reference)?);
+                *place = value.ok_or_else(|| call.error("wrong type"))?;
+            }
+            Ok(())
+        })
+    }
+}
+
+/// Sets all references, each from its C type by `from_c`.
+unsafe fn set<T: Copy>(
+    c: fmi2Component,
+    call: &Call,
+    (vr, nvr, value): (*const fmi2ValueReference, usize, *const T),
+    from_c: impl Fn(T) -> Value,
+) -> fmi2Status {
+    unsafe {
+        on(c, call, |component| {
+            call.check(component.instance.mode())?;
+            let references = array(call, "vr", vr, nvr)?;
+            let values = array(call, "value", value, nvr)?;
+            component.instance.set(call, references, |n| from_c(values[n]))
+        })
+    }
+}
+
+/// Reads reals.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetReal(
+    c: fmi2Component,
+    vr: *const fmi2ValueReference,
+    nvr: usize,
+    value: *mut fmi2Real,
+) -> fmi2Status {
+    let as_c = |value| match value {
+        Value::Real(x) => Some(x),
+        _ => None,
+    };
+    unsafe { get(c, &calls::GET_REAL, (vr, nvr, value), as_c) }
+}
+
+/// Reads integers and enumerations.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetInteger(
+    c: fmi2Component,
+    vr: *const fmi2ValueReference,
+    nvr: usize,
+    value: *mut fmi2Integer,
+) -> fmi2Status {
+    let as_c = |value| match value {
+        Value::Integer(n) => Some(n),
+        _ => None,
+    };
+    unsafe { get(c, &calls::GET_INTEGER, (vr, nvr, value), as_c) }
+}
+
+/// Reads Booleans: 0 or 1.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetBoolean(
+    c: fmi2Component,
+    vr: *const fmi2ValueReference,
+    nvr: usize,
+    value: *mut fmi2Boolean,
+) -> fmi2Status {
+    let as_c = |value| match value {
+        Value::Boolean(b) => Some(fmi2Boolean::from(b)),
+        _ => None,
+    };
+    unsafe { get(c, &calls::GET_BOOLEAN, (vr, nvr, value), as_c) }
+}
+
+/// There are no strings.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetString(
+    c: fmi2Component,
+    vr: *const fmi2ValueReference,
+    nvr: usize,
+    value: *mut fmi2String,
+) -> fmi2Status {
+    unsafe { get(c, &calls::GET_STRING, (vr, nvr, value), |_| None) }
+}
+
+/// Sets reals.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetReal(
+    c: fmi2Component,
+    vr: *const fmi2ValueReference,
+    nvr: usize,
+    value: *const fmi2Real,
+) -> fmi2Status {
+    unsafe { set(c, &calls::SET_REAL, (vr, nvr, value), Value::Real) }
+}
+
+/// Sets integers and enumerations.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetInteger(
+    c: fmi2Component,
+    vr: *const fmi2ValueReference,
+    nvr: usize,
+    value: *const fmi2Integer,
+) -> fmi2Status {
+    unsafe { set(c, &calls::SET_INTEGER, (vr, nvr, value), Value::Integer) }
+}
+
+/// Sets Booleans: everything but 0 is true.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetBoolean(
+    c: fmi2Component,
+    vr: *const fmi2ValueReference,
+    nvr: usize,
+    value: *const fmi2Boolean,
+) -> fmi2Status {
+    unsafe { set(c, &calls::SET_BOOLEAN, (vr, nvr, value), |b| Value::Boolean(b != 0)) }
+}
+
+/// There are no strings.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetString(
+    c: fmi2Component,
+    vr: *const fmi2ValueReference,
+    nvr: usize,
+    value: *const fmi2String,
+) -> fmi2Status {
+    // No variable is a string, so the value is never looked at.
+    unsafe { set(c, &calls::SET_STRING, (vr, nvr, value), |_| Value::Boolean(false)) }
+}
+
+// ---- Saved states ----
+
+/// Saves the state, into the handle that is there or into a new one.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetFMUstate(
+    c: fmi2Component,
+    FMUstate: *mut fmi2FMUstate,
+) -> fmi2Status {
+    let call = &calls::GET_FMU_STATE;
+    unsafe {
+        on(c, call, |component| {
+            call.check(component.instance.mode())?;
+            let handle = place(call, "FMUstate", FMUstate)?;
+            if handle.is_null() {
+                *handle = new_state(component.instance.clone());
+            } else {
+                saved_state(call, *handle)?.instance.clone_from(&component.instance);
+            }
+            Ok(())
+        })
+    }
+}
+
+fn new_state(instance: Instance) -> fmi2FMUstate {
+    Box::into_raw(Box::new(SavedState { mark: STATE, instance })).cast()
+}
+
+/// Takes a saved state, this instance's or another's, in any state of life.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetFMUstate(c: fmi2Component, FMUstate: fmi2FMUstate) -> fmi2Status {
+    let call = &calls::SET_FMU_STATE;
+    unsafe {
+        on(c, call, |component| component.instance.restore(&saved_state(call, FMUstate)?.instance))
+    }
+}
+
+/// Frees a saved state and clears the handle; NULL is fine.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2FreeFMUstate(
+    c: fmi2Component,
+    FMUstate: *mut fmi2FMUstate,
+) -> fmi2Status {
+    let call = &calls::FREE_FMU_STATE;
+    unsafe {
+        on(c, call, |_| {
+            if FMUstate.is_null() || (*FMUstate).is_null() {
+                return Ok(());
+            }
+            saved_state(call, *FMUstate)?.mark = 0;
+            drop(Box::from_raw((*FMUstate).cast::<SavedState>()));
+            *FMUstate = ptr::null_mut();
+            Ok(())
+        })
+    }
+}
+
+/// How many bytes a saved state takes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SerializedFMUstateSize(
+    c: fmi2Component,
+    FMUstate: fmi2FMUstate,
+    size: *mut usize,
+) -> fmi2Status {
+    let call = &calls::SERIALIZED_SIZE;
+    unsafe {
+        on(c, call, |component| {
+            call.check(component.instance.mode())?;
+            saved_state(call, FMUstate)?;
+            *place(call, "size", size)? = snapshot::size();
+            Ok(())
+        })
+    }
+}
+
+/// Writes a saved state to the host's bytes.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SerializeFMUstate(
+    c: fmi2Component,
+    FMUstate: fmi2FMUstate,
+    serializedState: *mut fmi2Byte,
+    size: usize,
+) -> fmi2Status {
+    let call = &calls::SERIALIZE;
+    unsafe {
+        on(c, call, |component| {
+            call.check(component.instance.mode())?;
+            let bytes = snapshot::to_bytes(&saved_state(call, FMUstate)?.instance);
+            if size < bytes.len() {
+                return Err(call.error(format_args!(
+                    "size is {size}; a saved state takes {} bytes",
+                    bytes.len()
+                )));
+            }
+            let room = array_mut(call, "serializedState", serializedState.cast::<u8>(), size)?;
+            room[..bytes.len()].copy_from_slice(&bytes);
+            Ok(())
+        })
+    }
+}
+
+/// Makes a saved state from bytes. The handle is written, never read: the host
+/// need not have set it.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2DeSerializeFMUstate(
+    c: fmi2Component,
+    serializedState: *const fmi2Byte,
+    size: usize,
+    FMUstate: *mut fmi2FMUstate,
+) -> fmi2Status {
+    let call = &calls::DESERIALIZE;
+    unsafe {
+        on(c, call, |component| {
+            call.check(component.instance.mode())?;
+            if FMUstate.is_null() {
+                return Err(null(call, "FMUstate"));
+            }
+            let bytes = array(call, "serializedState", serializedState.cast::<u8>(), size)?;
+            let instance = snapshot::from_bytes(bytes).map_err(|why| call.error(why))?;
+            ptr::write(FMUstate, new_state(instance));
+            Ok(())
+        })
+    }
+}
+
+/// Not offered.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetDirectionalDerivative(
+    c: fmi2Component,
+    _vUnknown_ref: *const fmi2ValueReference,
+    _nUnknown: usize,
+    _vKnown_ref: *const fmi2ValueReference,
+    _nKnown: usize,
+    _dvKnown: *const fmi2Real,
+    _dvUnknown: *mut fmi2Real,
+) -> fmi2Status {
+    let call = &calls::DIRECTIONAL_DERIVATIVE;
+    unsafe {
+        on(c, call, |component| {
+            call.check(component.instance.mode())?;
+            Err(call.error("not offered: providesDirectionalDerivative is false"))
+        })
+    }
+}
+
+// ---- Co-Simulation ----
+
+/// The slopes of inputs over the next step.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetRealInputDerivatives(
+    c: fmi2Component,
+    vr: *const fmi2ValueReference,
+    nvr: usize,
+    order: *const fmi2Integer,
+    value: *const fmi2Real,
+) -> fmi2Status {
+    let call = &calls::SET_INPUT_DERIVATIVES;
+    unsafe {
+        on(c, call, |component| {
+            let references = array(call, "vr", vr, nvr)?;
+            let orders = array(call, "order", order, nvr)?;
+            let values = array(call, "value", value, nvr)?;
+            component.instance.set_input_derivatives(references, orders, values)
+        })
+    }
+}
+
+/// The derivatives of some outputs.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetRealOutputDerivatives(
+    c: fmi2Component,
+    vr: *const fmi2ValueReference,
+    nvr: usize,
+    order: *const fmi2Integer,
+    value: *mut fmi2Real,
+) -> fmi2Status {
+    let call = &calls::GET_OUTPUT_DERIVATIVES;
+    unsafe {
+        on(c, call, |component| {
+            call.check(component.instance.mode())?;
+            let references = array(call, "vr", vr, nvr)?;
+            let orders = array(call, "order", order, nvr)?;
+            let places = array_mut(call, "value", value, nvr)?;
+            for ((reference, order), place) in references.iter().zip(orders).zip(places) {
+                *place = component.instance.output_derivative(*reference, *order)?;
+            }
+            Ok(())
+        })
+    }
+}
+
+/// One step. `noSetFMUStatePriorToCurrentPoint` changes nothing here: no past is
+/// kept.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2DoStep(
+    c: fmi2Component,
+    currentCommunicationPoint: fmi2Real,
+    communicationStepSize: fmi2Real,
+    _noSetFMUStatePriorToCurrentPoint: fmi2Boolean,
+) -> fmi2Status {
+    unsafe {
+        on(c, &calls::DO_STEP, |component| {
+            component.instance.do_step(currentCommunicationPoint, communicationStepSize)
+        })
+    }
+}
+
+/// Steps are never asynchronous, so there is nothing to cancel.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2CancelStep(c: fmi2Component) -> fmi2Status {
+    let call = &calls::CANCEL_STEP;
+    unsafe {
+        on(c, call, |component| {
+            call.check(component.instance.mode())?;
+            Err(call.error("no step is running: fmi2DoStep returns when the step is done"))
+        })
+    }
+}
+
+/// Answers a question about the last step, or discards it.
+unsafe fn answer<T>(
+    c: fmi2Component,
+    call: &Call,
+    kind: fmi2StatusKind,
+    value: *mut T,
+    known: impl FnOnce(&Instance) -> Option<T>,
+) -> fmi2Status {
+    unsafe {
+        on(c, call, |component| {
+            call.check(component.instance.mode())?;
+            let place = place(call, "value", value)?;
+            let value = known(&component.instance);
+            *place = value
+                .ok_or_else(|| call.discard(format_args!("status kind {kind} has no value")))?;
+            Ok(())
+        })
+    }
+}
+
+/// How the last step ended.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetStatus(
+    c: fmi2Component,
+    s: fmi2StatusKind,
+    value: *mut fmi2Status,
+) -> fmi2Status {
+    let known = |instance: &Instance| {
+        let ended = if instance.mode() == Mode::Failed { fmi2Error } else { fmi2OK };
+        (s == fmi2DoStepStatus).then_some(ended)
+    };
+    unsafe { answer(c, &calls::GET_STATUS, s, value, known) }
+}
+
+/// How far the last step came.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetRealStatus(
+    c: fmi2Component,
+    s: fmi2StatusKind,
+    value: *mut fmi2Real,
+) -> fmi2Status {
+    let known = |instance: &Instance| (s == fmi2LastSuccessfulTime).then_some(instance.time());
+    unsafe { answer(c, &calls::GET_REAL_STATUS, s, value, known) }
+}
+
+/// No integer says anything about the last step.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetIntegerStatus(
+    c: fmi2Component,
+    s: fmi2StatusKind,
+    value: *mut fmi2Integer,
+) -> fmi2Status {
+    unsafe { answer(c, &calls::GET_INTEGER_STATUS, s, value, |_| None) }
+}
+
+/// The FMU never ends the simulation by itself.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetBooleanStatus(
+    c: fmi2Component,
+    s: fmi2StatusKind,
+    value: *mut fmi2Boolean,
+) -> fmi2Status {
+    let known = |_: &Instance| (s == fmi2Terminated).then_some(0);
+    unsafe { answer(c, &calls::GET_BOOLEAN_STATUS, s, value, known) }
+}
+
+/// No step is ever pending.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetStringStatus(
+    c: fmi2Component,
+    s: fmi2StatusKind,
+    value: *mut fmi2String,
+) -> fmi2Status {
+    unsafe { answer(c, &calls::GET_STRING_STATUS, s, value, |_| None) }
+}
