@@ -153,6 +153,24 @@ impl Law {
         (dry * self.backward.at(theta), dry * self.forward.at(theta))
     }
 
+    /// How far ahead the series of tau_f can converge, s, from w, w' and w''. tanh has
+    /// its nearest poles at distance sqrt(v^2 + (pi/2)^2) from v = w/eps, and it is so
+    /// flat away from 0 that its coefficients there do not tell; half the way is safe.
+    pub fn reach(&self, omega: &Series) -> f64 {
+        if self.model != FrictionModel::StribeckSmooth {
+            return f64::INFINITY;
+        }
+        let [v, v1, v2] = [omega[0], omega[1], omega[2]].map(|x| (x / self.eps).abs());
+        let half = libm::sqrt(v * v + 2.4674) / 2.0;
+        2.0 * half / (v1 + libm::sqrt(v1 * v1 + 4.0 * v2 * half))
+    }
+
+    /// How many small terms in a row show that the series has converged. One term may
+    /// vanish by symmetry; of tanh(w/eps) from w = w' = 0 on, three in a row do.
+    pub fn quiet_terms(&self) -> usize {
+        if self.model == FrictionModel::StribeckSmooth { 4 } else { 2 }
+    }
+
     /// Coefficient n of tau_f while the hub slips.
     #[inline(always)]
     pub fn slip(&mut self, n: usize, contact: Contact, theta: &Series, omega: &Series, omega2: &Series) {

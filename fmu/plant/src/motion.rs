@@ -1,7 +1,7 @@
 //! Steps through time: a Taylor-series integrator with an automaton for stick and slip.
 //!
 //! Over one step the whole motion is a power series in time (`series.rs`). The order
-//! grows until two terms in a row, at the step's end, are below the tolerance; where
+//! grows until terms in a row, at the step's end, are below the tolerance; where
 //! the highest order does not get there, the step is cut to the length at which it
 //! does. So short steps are cheap, nothing is ever rejected, and the series between
 //! the ends is as exact as at the ends: the instants at which the hub comes to rest
@@ -134,9 +134,10 @@ impl Motion {
     #[inline(always)]
     fn expand<M: Mode>(&mut self, modes: &mut [M], h: f64, contact: Contact) -> (usize, f64) {
         let allowed = STEP_SHARE * self.tolerance;
+        let mut h = h;
         let (mut hub_scale, mut slosh_scale) = (0.0, 0.0);
-        let mut small_before = false;
         let mut power = 1.0; // h^n
+        let mut small = 0;
         for n in 0..ORDER {
             self.rates(modes, n, contact);
             let next = (n + 1) as f64;
@@ -145,20 +146,24 @@ impl Motion {
             for mode in modes.iter_mut() {
                 mode.grow(n);
             }
-            if n == 0 {
-                let slosh = modes.iter().map(Mode::size).fold(0.0, f64::max);
-                // The hub passes zero many times; the scale of its rate must not.
-                hub_scale = NOTHING + self.hub.omega[0].abs() + self.hub.omega[1].abs() * h.min(0.1);
-                slosh_scale = NOTHING + slosh + hub_scale;
+            if n == 1 {
+                h = h.min(self.friction.reach(&self.hub.omega));
+                // The hub's rate passes zero many times; the scale of its error must not.
+                let [w, w_d] = [self.hub.omega[0], self.hub.omega[1]].map(f64::abs);
+                hub_scale = NOTHING + w + w_d * h.min(0.1);
+                slosh_scale = hub_scale + modes.iter().map(Mode::size).fold(0.0, f64::max);
+                power = h;
             }
-            power *= h;
-            let slosh = modes.iter().map(|m| m.term(n + 1)).fold(0.0, f64::max);
-            let small = self.hub.omega[n + 1].abs() * power <= allowed * hub_scale
-                && slosh * power <= allowed * slosh_scale;
-            if small && small_before && n + 1 >= MIN_ORDER {
-                return (n + 1, h);
+            if n >= 1 {
+                power *= h;
+                let slosh = modes.iter().map(|m| m.term(n + 1)).fold(0.0, f64::max);
+                let is_small = self.hub.omega[n + 1].abs() * power <= allowed * hub_scale
+                    && slosh * power <= allowed * slosh_scale;
+                small = if is_small { small + 1 } else { 0 };
+                if small >= self.friction.quiet_terms() && n + 1 >= MIN_ORDER {
+                    return (n + 1, h);
+                }
             }
-            small_before = small;
         }
         // The last two terms reach the tolerance at this length.
         let length = |n: usize| {

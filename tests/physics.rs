@@ -1,0 +1,268 @@
+//! Laws that hold for every model, parameter and input: energy, momentum, limits.
+
+use common::{FRICTION, SLOSH, anywhere, bench};
+use plant::{FrictionModel, Inputs, Outputs, Plant, Ramp, SloshModel};
+
+/// Tolerance of all runs here. The plant's errors come out two to three decades
+/// below the tolerance, so the bounds of 1e-8 below leave it room without hiding
+/// a wrong term, which shows as a part of the energy turned over.
+const TOLERANCE: f64 = 1e-9;
+
+fn plant(p: &plant::Parameters, inputs: &Inputs) -> Plant {
+    Plant::new(p, inputs, 0.0, TOLERANCE).unwrap()
+}
+
+/// Energy turned over so far: work in either direction, and heat.
+struct Turnover {
+    first: Outputs,
+    last: Outputs,
+    sum: f64,
+}
+
+impl Turnover {
+    fn new(first: Outputs) -> Turnover {
+        Turnover { first, last: first, sum: 0.0 }
+    }
+
+    fn add(&mut self, now: Outputs) {
+        self.sum += (now.work - self.last.work).abs() + (now.heat - self.last.heat).abs();
+        self.last = now;
+    }
+
+    /// |E(t) - E(0) - work + heat| against the energy turned over or present.
+    fn residual(&self) -> f64 {
+        let gained = self.last.energy - self.first.energy;
+        (gained - self.last.work + self.last.heat).abs() / (self.sum + self.first.energy)
+    }
+}
+
+#[test]
+fn energy_balances_for_every_model_friction_and_damping() {
+    let mut rng = fastrand::Rng::with_seed(1);
+    for slosh in SLOSH {
+        for friction in FRICTION {
+            for _ in 0..25 {
+                let p = anywhere(&mut rng, slosh, friction);
+                // Torque that would turn the hub by a fraction of a turn per s^2.
+                let torque = p.hub.inertia;
+                let mut inputs = Inputs::default();
+                let mut plant = plant(&p, &inputs);
+                let mut energy = Turnover::new(plant.outputs(&inputs));
+                for _ in 0..100 {
+                    inputs.tau_cmd.slope = torque * (rng.f64() - 0.5) * 4.0;
+                    inputs.tau_ext = Ramp::held(torque * (rng.f64() - 0.5));
+                    let h = 0.05 * rng.f64() + 1e-3;
+                    if let Err(error) = plant.step(&inputs, h) {
+                        // Only the paraboloid ends at its rim.
+                        assert_eq!(slosh, SloshModel::Paraboloid, "{error} {p:?}");
+                        break;
+                    }
+                    inputs.tau_cmd = Ramp::held(inputs.tau_cmd.at(h));
+                    energy.add(plant.outputs(&inputs));
+                }
+                assert!(energy.residual() < 1e-8, "{:.1e} {p:?}", energy.residual());
+            }
+        }
+    }
+}
+
+#[test]
+fn power_dissipated_is_what_the_energy_loses() {
+    // Central difference of the energy over 2 ms against the power: its error is
+    // (2 pi f h)^2/6 of the power's change, some 1e-4.
+    for slosh in SLOSH {
+        let mut p = bench(slosh, FrictionModel::Viscous);
+        (p.init.omega, p.init.slosh_angle, p.init.slosh_rate_radial) = (0.1, 0.2, 1.0);
+        let inputs = Inputs::default();
+        let mut plant = plant(&p, &inputs);
+        let before = plant.outputs(&inputs).energy;
+        plant.step(&inputs, 1e-3).unwrap();
+        let power = plant.outputs(&inputs).power_dissipated;
+        plant.step(&inputs, 1e-3).unwrap();
+        let lost = (before - plant.outputs(&inputs).energy) / 2e-3;
+        assert!((power / lost - 1.0).abs() < 1e-3, "{slosh:?}: {power} {lost}");
+    }
+}
+
+#[test]
+fn momentum_is_constant_without_torque_and_friction() {
+    let mut rng = fastrand::Rng::with_seed(2);
+    for slosh in SLOSH {
+        for _ in 0..50 {
+            let p = anywhere(&mut rng, slosh, FrictionModel::None);
+            let inputs = Inputs::default();
+            let mut plant = plant(&p, &inputs);
+            let first = plant.outputs(&inputs);
+            let mut largest = first.momentum.abs();
+            let mut change: f64 = 0.0;
+            for _ in 0..100 {
+                if plant.step(&inputs, 0.05).is_err() {
+                    assert_eq!(slosh, SloshModel::Paraboloid);
+                    break;
+                }
+                let now = plant.outputs(&inputs);
+                // The hub's own share shows the size of what is exchanged.
+                largest = largest.max((now.omega * p.hub.inertia).abs());
+                change = change.max((now.momentum - first.momentum).abs());
+            }
+            assert!(change <= 1e-10 * largest, "{slosh:?} {:.1e} {p:?}", change / largest);
+        }
+    }
+}
+
+#[test]
+fn momentum_grows_by_the_torque_alone_however_the_liquid_damps() {
+    let mut p = bench(SloshModel::Spherical, FrictionModel::None);
+    p.slosh.zeta_from_correlation = false;
+    p.slosh.zeta = 0.1;
+    (p.init.slosh_angle, p.init.slosh_rate_radial) = (0.4, 3.0);
+    let inputs = Inputs { tau_cmd: Ramp::held(0.01), ..Inputs::default() };
+    let mut plant = plant(&p, &inputs);
+    let first = plant.outputs(&inputs).momentum;
+    plant.step(&inputs, 10.0).unwrap();
+    assert!((plant.outputs(&inputs).momentum - first - 0.1).abs() < 1e-11);
+}
+
+#[test]
+fn energy_never_grows_without_torque() {
+    let mut rng = fastrand::Rng::with_seed(3);
+    for slosh in SLOSH {
+        for friction in FRICTION {
+            for _ in 0..10 {
+                let mut p = anywhere(&mut rng, slosh, friction);
+                p.slosh.zeta_from_correlation = true;
+                let inputs = Inputs::default();
+                let mut plant = plant(&p, &inputs);
+                let first = plant.outputs(&inputs);
+                let mut last = first;
+                for _ in 0..200 {
+                    if plant.step(&inputs, 0.05).is_err() {
+                        assert_eq!(slosh, SloshModel::Paraboloid);
+                        break;
+                    }
+                    let now = plant.outputs(&inputs);
+                    // Rounding of the energy itself and the step's own error.
+                    assert!(now.energy <= last.energy + 1e-11 * first.energy, "{p:?}");
+                    assert!(now.power_dissipated >= 0.0, "{p:?}");
+                    assert!(now.heat >= last.heat - 1e-13 * first.energy, "{p:?}");
+                    last = now;
+                }
+                let damped = slosh != SloshModel::Frozen || friction != FrictionModel::None;
+                if damped && first.energy > 0.0 {
+                    assert!(last.heat > 0.0, "damping makes heat: {p:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn hub_equation_holds_between_the_outputs() {
+    let mut rng = fastrand::Rng::with_seed(4);
+    for slosh in SLOSH {
+        for friction in FRICTION {
+            for _ in 0..20 {
+                let p = anywhere(&mut rng, slosh, friction);
+                let mut inputs = Inputs::default();
+                inputs.tau_cmd = Ramp::held(p.hub.inertia * rng.f64());
+                inputs.tau_ext = Ramp::held(p.hub.inertia * rng.f64());
+                let mut plant = plant(&p, &inputs);
+                let _ = plant.step(&inputs, 0.3);
+                let o = plant.outputs(&inputs);
+                let terms = [o.tau_actuator, inputs.tau_ext.value, o.tau_friction, o.tau_fluid];
+                let size = terms.iter().map(|t| t.abs()).sum::<f64>();
+                let rest = p.hub.inertia * o.omega_dot - terms.iter().sum::<f64>();
+                // The liquid's torque is built from forces, independently of omega_dot's
+                // own formula: rounding of a heavy liquid on a light hub is left.
+                assert!(rest.abs() <= 1e-11 * size, "{slosh:?} {friction:?} {rest:e} {size:e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn stuck_hub_is_exactly_at_rest() {
+    let mut p = bench(SloshModel::Linear, FrictionModel::Stribeck);
+    // 1 mrad pulls with 1.7 mN m, together 3.7 mN m of the 5.9 mN m that hold.
+    p.init.slosh_angle = 0.001;
+    let inputs = Inputs { tau_cmd: Ramp::held(0.002), ..Inputs::default() };
+    let mut plant = plant(&p, &inputs);
+    for _ in 0..500 {
+        plant.step(&inputs, 0.02).unwrap();
+        let o = plant.outputs(&inputs);
+        assert!(o.stuck && o.omega == 0.0 && o.omega_dot == 0.0 && o.theta == 0.0);
+        assert!(o.slosh_rate != 0.0, "the liquid goes on moving");
+    }
+}
+
+#[test]
+fn trajectory_does_not_depend_on_how_time_is_cut() {
+    let mut rng = fastrand::Rng::with_seed(5);
+    for slosh in SLOSH {
+        for friction in FRICTION {
+            let mut p = bench(slosh, friction);
+            p.init.slosh_angle = 0.3;
+            p.init.slosh_angle_radial = 0.1;
+            let mut runs = Vec::new();
+            for cut in 0..3 {
+                // The same input signal: a ramp of torque over 10 s.
+                let ramp = Ramp { value: -0.02, slope: 0.004 };
+                let mut inputs = Inputs { tau_cmd: ramp, ..Inputs::default() };
+                let mut plant = plant(&p, &inputs);
+                while plant.time() < 10.0 {
+                    let h = [0.02, 0.005, rng.f64() * 0.2 + 1e-6][cut].min(10.0 - plant.time());
+                    plant.step(&inputs, h).unwrap();
+                    inputs.tau_cmd.value = ramp.at(plant.time());
+                }
+                runs.push(plant.outputs(&inputs));
+            }
+            for other in &runs[1..] {
+                assert!((runs[0].omega - other.omega).abs() < TOLERANCE, "{slosh:?} {friction:?}");
+                assert!((runs[0].slosh_angle - other.slosh_angle).abs() < TOLERANCE);
+            }
+        }
+    }
+}
+
+#[test]
+fn nonlinear_models_approach_the_linear_one_quadratically() {
+    // Largest difference from the linear model against the motion's size: halving
+    // the amplitude must quarter it (a cubic term in planar, quadratic in spherical).
+    for slosh in [SloshModel::Planar, SloshModel::Spherical, SloshModel::Paraboloid] {
+        let difference = |amplitude: f64| {
+            let run = |slosh| {
+                let mut p = bench(slosh, FrictionModel::Viscous);
+                p.init.slosh_angle = amplitude;
+                let inputs = Inputs::default();
+                let mut plant = plant(&p, &inputs);
+                (0..50)
+                    .map(|_| {
+                        plant.step(&inputs, 0.02).unwrap();
+                        plant.outputs(&inputs).omega
+                    })
+                    .collect::<Vec<f64>>()
+            };
+            let pairs = run(SloshModel::Linear).into_iter().zip(run(slosh));
+            pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / amplitude
+        };
+        let ratio = difference(0.02) / difference(0.01);
+        assert!((ratio - 4.0).abs() < 0.1, "{slosh:?}: {ratio}");
+    }
+}
+
+#[test]
+fn a_vanishing_liquid_leaves_the_frozen_model() {
+    let run = |slosh, rho| {
+        let mut p = bench(slosh, FrictionModel::Stribeck);
+        p.fluid.rho = rho;
+        let inputs = Inputs { tau_cmd: Ramp::held(0.02), ..Inputs::default() };
+        let mut plant = plant(&p, &inputs);
+        plant.step(&inputs, 2.0).unwrap();
+        plant.outputs(&inputs).omega
+    };
+    for slosh in [SloshModel::Linear, SloshModel::Planar, SloshModel::Spherical] {
+        let frozen = run(SloshModel::Frozen, 1e-3);
+        // 2 mg of water on 0.32 kg m2: the pendulum's share is 1e-7 of the inertia.
+        assert!((run(slosh, 1e-3) / frozen - 1.0).abs() < 1e-6, "{slosh:?}");
+    }
+}
