@@ -10,7 +10,7 @@
 //! B+-(theta) = 1 +- eta + sum over h = 1, 2 of a_h+- cos(h theta) + b_h+- sin(h theta),
 //! ```
 //!
-//! + while the hub turns forwards, - backwards. At rest the law is set-valued:
+//! with + while the hub turns forwards, - backwards. At rest the law is set-valued:
 //! the bearing holds any torque between -(c + d) B- and (c + d) B+. The smooth
 //! variant replaces sgn(w) by T = tanh(w/eps) and blends the two directions,
 //! sgn(w) B -> T [(B+ + B-)/2 + T (B+ - B-)/2], which never drives the hub.
@@ -41,6 +41,9 @@ struct Bracket {
 impl Bracket {
     fn at(&self, theta: f64) -> f64 {
         let [a1, b1, a2, b2] = self.harmonics;
+        if self.harmonics == [0.0; 4] {
+            return self.mean;
+        }
         let (s1, c1) = libm::sincos(theta);
         let (s2, c2) = libm::sincos(2.0 * theta);
         self.mean + a1 * c1 + b1 * s1 + a2 * c2 + b2 * s2
@@ -128,7 +131,7 @@ impl Law {
     pub fn problems(p: &Friction) -> Vec<String> {
         let law = Law::new(p);
         let directions = [(law.forward, "forward", '+'), (law.backward, "backward", '-')];
-        let wrong = directions.into_iter().filter(|(b, ..)| !(b.lowest() > 0.0));
+        let wrong = directions.into_iter().filter(|(b, ..)| b.lowest() <= 0.0);
         wrong
             .map(|(bracket, name, sign)| {
                 format!(
@@ -171,72 +174,78 @@ impl Law {
         if self.model == FrictionModel::StribeckSmooth { 4 } else { 2 }
     }
 
-    /// Coefficient n of tau_f while the hub slips.
+    /// Coefficient N of tau_f while the hub slips.
     #[inline(always)]
-    pub fn slip(&mut self, n: usize, contact: Contact, theta: &Series, omega: &Series, omega2: &Series) {
+    pub fn slip<const N: usize>(
+        &mut self,
+        contact: Contact,
+        theta: &Series,
+        omega: &Series,
+        omega2: &Series,
+    ) {
         let dry = match self.model {
             FrictionModel::None => {
-                self.tau_f[n] = 0.0;
+                self.tau_f[N] = 0.0;
                 return;
             }
             FrictionModel::Viscous => 0.0,
             FrictionModel::Stribeck => {
-                self.dry_torque(n, omega2);
+                self.dry_torque::<N>(omega2);
                 let bracket =
                     if contact == Contact::Forward { self.forward } else { self.backward };
                 let size = if self.angular {
-                    self.harmonics(n, theta);
-                    self.bracket[n] = combine(&bracket, &self.trig, n);
-                    series::mul(&self.t_c, &self.bracket, n)
+                    self.harmonics::<N>(theta);
+                    self.bracket[N] = combine::<N>(&bracket, &self.trig);
+                    series::mul::<N>(&self.t_c, &self.bracket)
                 } else {
-                    bracket.mean * self.t_c[n]
+                    bracket.mean * self.t_c[N]
                 };
                 if contact == Contact::Forward { size } else { -size }
             }
             FrictionModel::StribeckSmooth => {
-                self.dry_torque(n, omega2);
-                self.v[n] = omega[n] / self.eps;
-                self.t[n] = if n == 0 {
+                self.dry_torque::<N>(omega2);
+                self.v[N] = omega[N] / self.eps;
+                self.t[N] = if N == 0 {
                     libm::tanh(self.v[0])
                 } else {
-                    series::chain(&self.v, &self.sech2, n)
+                    series::chain::<N>(&self.v, &self.sech2)
                 };
-                let t2 = series::square(&self.t, n);
-                self.sech2[n] = if n == 0 { 1.0 - t2 } else { -t2 };
+                let t2 = series::square::<N>(&self.t);
+                self.sech2[N] = if N == 0 { 1.0 - t2 } else { -t2 };
                 if self.angular {
-                    self.harmonics(n, theta);
+                    self.harmonics::<N>(theta);
                 }
-                let forward = combine(&self.forward, &self.trig, n);
-                let backward = combine(&self.backward, &self.trig, n);
-                self.even[n] = (forward + backward) / 2.0;
-                self.odd[n] = (forward - backward) / 2.0;
-                self.bracket[n] = self.even[n] + series::mul(&self.t, &self.odd, n);
-                self.sign[n] = series::mul(&self.t, &self.bracket, n);
-                series::mul(&self.t_c, &self.sign, n)
+                let forward = combine::<N>(&self.forward, &self.trig);
+                let backward = combine::<N>(&self.backward, &self.trig);
+                self.even[N] = (forward + backward) / 2.0;
+                self.odd[N] = (forward - backward) / 2.0;
+                self.bracket[N] = self.even[N] + series::mul::<N>(&self.t, &self.odd);
+                self.sign[N] = series::mul::<N>(&self.t, &self.bracket);
+                series::mul::<N>(&self.t_c, &self.sign)
             }
         };
-        self.tau_f[n] = -self.b * omega[n] - dry;
+        self.tau_f[N] = -self.b * omega[N] - dry;
     }
 
-    /// Coefficient n of T_C(w) = c + d exp(-(w/w_s)^2).
+    /// Coefficient N of T_C(w) = c + d exp(-(w/w_s)^2).
     #[inline(always)]
-    fn dry_torque(&mut self, n: usize, omega2: &Series) {
-        self.u[n] = -omega2[n] / (self.omega_s * self.omega_s);
-        self.e[n] = series::exp(&self.u, &self.e, n);
-        self.t_c[n] = if n == 0 { self.c + self.d * self.e[0] } else { self.d * self.e[n] };
+    fn dry_torque<const N: usize>(&mut self, omega2: &Series) {
+        self.u[N] = -omega2[N] / (self.omega_s * self.omega_s);
+        self.e[N] = series::exp::<N>(&self.u, &self.e);
+        self.t_c[N] = if N == 0 { self.c + self.d * self.e[0] } else { self.d * self.e[N] };
     }
 
-    fn harmonics(&mut self, n: usize, theta: &Series) {
-        self.theta2[n] = 2.0 * theta[n];
+    fn harmonics<const N: usize>(&mut self, theta: &Series) {
+        self.theta2[N] = 2.0 * theta[N];
         let [c1, s1, c2, s2] = &mut self.trig;
-        (s1[n], c1[n]) = series::sin_cos(theta, s1, c1, n);
-        (s2[n], c2[n]) = series::sin_cos(&self.theta2, s2, c2, n);
+        (s1[N], c1[N]) = series::sin_cos::<N>(theta, s1, c1);
+        (s2[N], c2[N]) = series::sin_cos::<N>(&self.theta2, s2, c2);
     }
 }
 
-/// Coefficient n of B+-(theta).
-fn combine(bracket: &Bracket, trig: &[Series; 4], n: usize) -> f64 {
-    let mean = if n == 0 { bracket.mean } else { 0.0 };
+/// Coefficient N of B+-(theta).
+fn combine<const N: usize>(bracket: &Bracket, trig: &[Series; 4]) -> f64 {
+    let mean = series::constant::<N>(bracket.mean);
     let terms = bracket.harmonics.iter().zip(trig);
-    mean + terms.map(|(coefficient, series)| coefficient * series[n]).sum::<f64>()
+    mean + terms.map(|(coefficient, series)| coefficient * series[N]).sum::<f64>()
 }

@@ -358,6 +358,11 @@ impl Plant {
         self.state.time
     }
 
+    /// The hub's rate, rad/s.
+    pub fn omega(&self) -> f64 {
+        self.state.omega
+    }
+
     /// What follows from the parameters.
     pub fn calculated(&self) -> &Calculated {
         &self.calculated
@@ -384,27 +389,12 @@ impl Plant {
             let (length, torque, speed) =
                 self.wheel.next(state.wheel_speed, now(inputs.tau_cmd), h - t);
             let external = now(inputs.tau_ext);
-            let tau = Ramp {
-                value: torque.value + external.value,
-                slope: torque.slope + external.slope,
-            };
-            let mut gyro = state.gyro;
-            let imu = self.imu;
-            let start_time = state.start_time;
-            let mut watch = |from: f64, length: f64, omega: &dyn Fn(f64) -> f64| {
-                while imu.enabled {
-                    let due = start_time + imu.next_sample(&gyro) - from;
-                    // Communication points meet sampling instants only to rounding.
-                    if due > length + 1e-9 / imu.rate {
-                        break;
-                    }
-                    imu.sample(&mut gyro, omega(due.max(0.0).min(length)));
-                }
-            };
+            let tau =
+                Ramp { value: torque.value + external.value, slope: torque.slope + external.slope };
+            let acting = (tau, now(inputs.g_axial));
             with_modes!(&mut self.liquid, modes => self.motion.advance(
-                modes, &mut state, (tau, now(inputs.g_axial)), length, &mut steps, &mut watch,
+                modes, &mut state, acting, length, &self.imu, &mut steps,
             ))?;
-            state.gyro = gyro;
             state.wheel_speed = speed;
             t = if length == h - t { h } else { t + length };
         }
@@ -420,7 +410,7 @@ impl Plant {
         let contact = self.state.contact;
         with_modes!(&mut self.liquid, modes => {
             self.motion.start(modes, &self.state, tau, inputs.g_axial);
-            self.motion.rates(modes, 0, contact);
+            self.motion.rates::<0, _>(modes, contact);
         });
     }
 
@@ -455,7 +445,7 @@ impl Plant {
             tau_fluid += mode.torque(hub);
             energy += mode.energy(hub);
             momentum += mode.momentum(hub);
-            heat += mode.heat(0);
+            heat += mode.heat::<0>();
             let angles = mode.angles();
             wave[0] += self.wave[i] * angles.angle[0];
             wave[1] += self.wave[i] * angles.angle[1];

@@ -26,9 +26,23 @@ impl Imu {
         Gyro { next: 0, bias: self.bias_instability / 0.664 * spread, held: 0.0 }
     }
 
-    /// Seconds from the start to the gyro's next sample.
-    pub(crate) fn next_sample(&self, gyro: &Gyro) -> f64 {
-        gyro.next as f64 / self.rate
+    /// Takes the samples that fall due within `length` from `since_start` on, both s;
+    /// `omega` is the hub's rate as a function of the time within.
+    pub(crate) fn follow(
+        &self,
+        gyro: &mut Gyro,
+        since_start: f64,
+        length: f64,
+        omega: impl Fn(f64) -> f64,
+    ) {
+        loop {
+            let due = gyro.next as f64 / self.rate - since_start;
+            // Communication points meet sampling instants only to rounding.
+            if due > length + 1e-9 / self.rate {
+                break;
+            }
+            self.sample(gyro, omega(due.max(0.0).min(length)));
+        }
     }
 
     /// Takes the next sample of the rate `omega`.

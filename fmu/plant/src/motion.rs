@@ -8,9 +8,9 @@
 //! or breaks away are roots of polynomials, found without stepping back.
 
 use crate::friction::{Contact, Law};
-use crate::series::{self, ORDER, Series, ZERO};
+use crate::series::{self, ORDER, Series, ZERO, for_each_order};
 use crate::slosh::{Hub, Mode};
-use crate::{MODES, Ramp, State};
+use crate::{Imu, MODES, Ramp, State};
 
 /// Error of one step against the tolerance asked for. A step's error is forgotten
 /// as the liquid's motion decays, within some thousand steps.
@@ -83,14 +83,26 @@ pub(crate) struct Motion {
     inertia: Series,
     /// tau + T, the torque that the bearing must hold at rest.
     pub net: Series,
-    power: Series,
+    /// Power of the torques from outside, and heat of bearing and liquid, W.
+    work: Series,
+    heat: Series,
 }
 
 impl Motion {
     pub fn new(i0: f64, friction: Law, tolerance: f64) -> Motion {
         let hub = Hub { omega: ZERO, omega2: ZERO, omega_dot: ZERO, g: [0.0; 2] };
-        let (theta, inertia, net, power) = (ZERO, ZERO, ZERO, ZERO);
-        Motion { i0, friction, tolerance, theta, hub, tau: [0.0; 2], inertia, net, power }
+        Motion {
+            i0,
+            friction,
+            tolerance,
+            theta: ZERO,
+            hub,
+            tau: [0.0; 2],
+            inertia: ZERO,
+            net: ZERO,
+            work: ZERO,
+            heat: ZERO,
+        }
     }
 
     /// Puts everything at the state, with the given torque and specific force.
@@ -104,28 +116,41 @@ impl Motion {
         }
     }
 
-    /// Coefficient n of every quantity from coefficients up to n of the state.
+    /// Coefficient N of every quantity from coefficients up to N of the state.
     #[inline(always)]
-    pub fn rates<M: Mode>(&mut self, modes: &mut [M], n: usize, contact: Contact) {
-        self.hub.omega2[n] = series::square(&self.hub.omega, n);
-        let (mut inertia, mut net) = (0.0, if n < 2 { self.tau[n] } else { 0.0 });
+    pub fn rates<const N: usize, M: Mode>(&mut self, modes: &mut [M], contact: Contact) {
+        self.hub.omega2[N] = series::square::<N>(&self.hub.omega);
+        let (mut inertia, mut net) = (0.0, if N < 2 { self.tau[N] } else { 0.0 });
         for mode in modes.iter_mut() {
-            let load = mode.load(n, &self.hub);
+            let load = mode.load::<N>(&self.hub);
             inertia += load.j;
             net += load.t;
         }
-        self.inertia[n] = if n == 0 { self.i0 + inertia } else { inertia };
-        self.net[n] = net;
-        self.hub.omega_dot[n] = if contact == Contact::Stuck {
-            self.friction.tau_f[n] = -net;
+        self.inertia[N] = series::constant::<N>(self.i0) + inertia;
+        self.net[N] = net;
+        self.hub.omega_dot[N] = if contact == Contact::Stuck {
+            self.friction.tau_f[N] = -net;
             0.0
         } else {
-            self.friction.slip(n, contact, &self.theta, &self.hub.omega, &self.hub.omega2);
-            let torque = net + self.friction.tau_f[n];
-            (torque - series::mul_tail(&self.inertia, &self.hub.omega_dot, n)) / self.inertia[0]
+            self.friction.slip::<N>(contact, &self.theta, &self.hub.omega, &self.hub.omega2);
+            let torque = net + self.friction.tau_f[N];
+            (torque - series::mul_tail::<N>(&self.inertia, &self.hub.omega_dot)) / self.inertia[0]
         };
+        self.work[N] = series::mul_ramp::<N>(&self.tau, &self.hub.omega);
+        self.heat[N] = -series::mul::<N>(&self.friction.tau_f, &self.hub.omega);
         for mode in modes.iter_mut() {
-            mode.respond(n, &self.hub);
+            mode.respond::<N>(&self.hub);
+            self.heat[N] += mode.heat::<N>();
+        }
+    }
+
+    /// Coefficient N + 1 of the state from coefficient N of its rates.
+    #[inline(always)]
+    fn grow<const N: usize, M: Mode>(&mut self, modes: &mut [M]) {
+        self.theta[N + 1] = self.hub.omega[N] / (N + 1) as f64;
+        self.hub.omega[N + 1] = self.hub.omega_dot[N] / (N + 1) as f64;
+        for mode in modes.iter_mut() {
+            mode.grow::<N>();
         }
     }
 
@@ -134,42 +159,38 @@ impl Motion {
     #[inline(always)]
     fn expand<M: Mode>(&mut self, modes: &mut [M], h: f64, contact: Contact) -> (usize, f64) {
         let allowed = STEP_SHARE * self.tolerance;
+        let quiet_terms = self.friction.quiet_terms();
         let mut h = h;
-        let (mut hub_scale, mut slosh_scale) = (0.0, 0.0);
-        let mut power = 1.0; // h^n
-        let mut small = 0;
-        for n in 0..ORDER {
-            self.rates(modes, n, contact);
-            let next = (n + 1) as f64;
-            self.theta[n + 1] = self.hub.omega[n] / next;
-            self.hub.omega[n + 1] = self.hub.omega_dot[n] / next;
-            for mode in modes.iter_mut() {
-                mode.grow(n);
-            }
-            if n == 1 {
+        let (mut hub_allowed, mut slosh_allowed) = (0.0, 0.0);
+        let mut power = 1.0; // h^(N+1)
+        let mut quiet = 0;
+        for_each_order!(N => {
+            self.rates::<N, M>(modes, contact);
+            self.grow::<N, M>(modes);
+            if N == 1 {
                 h = h.min(self.friction.reach(&self.hub.omega));
+                power = h;
                 // The hub's rate passes zero many times; the scale of its error must not.
                 let [w, w_d] = [self.hub.omega[0], self.hub.omega[1]].map(f64::abs);
-                hub_scale = NOTHING + w + w_d * h.min(0.1);
-                slosh_scale = hub_scale + modes.iter().map(Mode::size).fold(0.0, f64::max);
-                power = h;
+                let hub_scale = NOTHING + w + w_d * h.min(0.1);
+                let slosh_scale = hub_scale + modes.iter().map(Mode::size).fold(0.0, f64::max);
+                (hub_allowed, slosh_allowed) = (allowed * hub_scale, allowed * slosh_scale);
             }
-            if n >= 1 {
-                power *= h;
-                let slosh = modes.iter().map(|m| m.term(n + 1)).fold(0.0, f64::max);
-                let is_small = self.hub.omega[n + 1].abs() * power <= allowed * hub_scale
-                    && slosh * power <= allowed * slosh_scale;
-                small = if is_small { small + 1 } else { 0 };
-                if small >= self.friction.quiet_terms() && n + 1 >= MIN_ORDER {
-                    return (n + 1, h);
+            power *= h;
+            if N + 2 >= MIN_ORDER {
+                let slosh = modes.iter().map(|m| m.term(N + 1)).fold(0.0, f64::max);
+                let is_quiet = self.hub.omega[N + 1].abs() * power <= hub_allowed
+                    && slosh * power <= slosh_allowed;
+                quiet = if is_quiet { quiet + 1 } else { 0 };
+                if quiet >= quiet_terms {
+                    return (N + 1, h);
                 }
             }
-        }
+        });
         // The last two terms reach the tolerance at this length.
         let length = |n: usize| {
             let slosh = modes.iter().map(|m| m.term(n)).fold(0.0, f64::max);
-            let hub = self.hub.omega[n].abs() / hub_scale;
-            let term = f64::max(hub, slosh / slosh_scale) / allowed;
+            let term = f64::max(self.hub.omega[n].abs() / hub_allowed, slosh / slosh_allowed);
             if term > 0.0 { libm::exp(-libm::log(term) / n as f64) } else { h }
         };
         (ORDER, h.min(length(ORDER)).min(length(ORDER - 1)))
@@ -184,7 +205,7 @@ impl Motion {
         if state.omega < 0.0 {
             return Contact::Backward;
         }
-        self.rates(modes, 0, Contact::Stuck);
+        self.rates::<0, M>(modes, Contact::Stuck);
         let (against_backward, against_forward) = self.friction.holds(state.theta);
         // A hub that has just broken away is at the limit, give or take rounding.
         let limit = |hold: f64, from: Contact| {
@@ -199,10 +220,8 @@ impl Motion {
 
     /// When, within `h`, the hub comes to rest, from the series of order n.
     fn time_of_rest(&self, n: usize, h: f64, contact: Contact) -> Option<f64> {
-        let mut rate = ZERO;
-        for j in 0..=n {
-            rate[j] = contact as i8 as f64 * self.hub.omega[j];
-        }
+        let sign = contact as i8 as f64;
+        let rate = self.hub.omega.map(|x| sign * x);
         // A hub that has just broken away starts with no rate, and with hardly any
         // acceleration: these roots at t = 0 are behind it.
         let first = rate[..n].iter().position(|&x| x > 0.0)?;
@@ -214,10 +233,7 @@ impl Motion {
     fn time_of_break_away(&self, n: usize, h: f64) -> Option<(f64, Contact)> {
         let (against_backward, against_forward) = self.friction.holds(self.theta[0]);
         let root = |sign: f64, hold: f64| {
-            let mut left = ZERO;
-            for j in 0..n {
-                left[j] = -sign * self.net[j];
-            }
+            let mut left = self.net.map(|x| -sign * x);
             left[0] += hold;
             // At a torque that is just held and falls there is no break-away.
             let behind = if left[0] > 0.0 { 0 } else { left[..n].iter().position(|&x| x > 0.0)? };
@@ -232,16 +248,16 @@ impl Motion {
     }
 
     /// Moves the state on by `h`, during which torque and specific force run along
-    /// their ramps. `watch(start, length, omega)` sees the hub's rate as a function of
-    /// the time since `start` over every step. On an error the state is unusable.
+    /// their ramps; the gyro takes the samples that fall due. `steps` counts against
+    /// [`MAX_STEPS`]. On an error the state is unusable.
     pub fn advance<M: Mode>(
         &mut self,
         modes: &mut [M],
         state: &mut State,
         (tau, g): (Ramp, Ramp),
         h: f64,
+        imu: &Imu,
         steps: &mut usize,
-        watch: &mut dyn FnMut(f64, f64, &dyn Fn(f64) -> f64),
     ) -> Result<(), StepError> {
         let begin = state.time;
         let mut t = 0.0;
@@ -269,27 +285,17 @@ impl Motion {
             if let Some((at, _)) = event {
                 length = at;
             }
-            // A length that is not a number fails here too.
-            if !(length >= 0.0) {
+            if length.is_nan() {
                 return Err(StepError::NotFinite { time: begin + t });
             }
-            watch(begin + t, length, &|s| series::value(&self.hub.omega, n, s));
-
-            // work and heat
+            if imu.enabled {
+                let since_start = begin + t - state.start_time;
+                let omega = |s| series::value(&self.hub.omega, n, s);
+                imu.follow(&mut state.gyro, since_start, length, omega);
+            }
             let stuck = contact == Contact::Stuck;
-            for j in 0..=n {
-                let bearing =
-                    if stuck { 0.0 } else { -series::mul(&self.friction.tau_f, &self.hub.omega, j) };
-                let liquid: f64 = modes.iter_mut().map(|m| m.heat(j)).sum();
-                self.power[j] = bearing + liquid;
-            }
-            state.heat += series::integral(&self.power, n - 1, length);
-            for j in 0..=n {
-                self.power[j] = series::mul_ramp(&self.tau, &self.hub.omega, j);
-            }
-            state.work += series::integral(&self.power, n, length);
-
-            // the end of the step
+            state.work += series::integral(&self.work, n - 1, length);
+            state.heat += series::integral(&self.heat, n - 1, length);
             state.theta = series::value(&self.theta, n, length);
             state.omega = if stuck { 0.0 } else { series::value(&self.hub.omega, n, length) };
             for (i, (mode, q)) in modes.iter().zip(&mut state.modes).enumerate() {

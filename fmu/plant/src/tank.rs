@@ -8,12 +8,12 @@ use crate::{Fluid, MODES, Parameters, SloshModel, Tank};
 /// Zeros xi_n of J1', the derivative of the Bessel function (17 digits).
 const XI: [f64; MODES] = [
     1.841_183_781_340_659_5,
-    5.331_442_773_525_033,
+    5.331_442_773_525_032_5,
     8.536_316_366_346_286,
     11.706_004_902_592_063,
     14.863_588_633_909_034,
     18.015_527_862_681_804,
-    21.164_369_859_188_788,
+    21.164_369_859_188_792,
     24.311_326_857_210_776,
     27.457_050_571_059_245,
     30.601_922_972_669_094,
@@ -63,8 +63,7 @@ fn mikishev_dorozhkin(tank: &Tank, fluid: &Fluid, g: f64) -> f64 {
     let radius = tank.d / 2.0;
     let fill = tank.h / radius;
     let re = fluid.nu / libm::sqrt(g * radius * radius * radius);
-    let bracket =
-        0.318 / libm::sinh(1.84 * fill) * (1.0 + (1.0 - fill) / libm::cosh(1.84 * fill));
+    let bracket = 0.318 / libm::sinh(1.84 * fill) * (1.0 + (1.0 - fill) / libm::cosh(1.84 * fill));
     0.79 * libm::sqrt(re) * (1.0 + bracket)
 }
 

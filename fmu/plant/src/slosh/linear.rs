@@ -46,25 +46,25 @@ impl Mode for Linear {
     }
 
     #[inline(always)]
-    fn load(&mut self, n: usize, hub: &Hub) -> Load {
+    fn load<const N: usize>(&mut self, hub: &Hub) -> Load {
         let Pendulum { m, l, c, r, .. } = self.p;
-        if n == 0 {
+        if N == 0 {
             self.omega_n = libm::sqrt(hub.g[0] / l);
         }
-        self.g_al[n] = mul_ramp(&hub.g, &self.al, n);
-        Load { j: 0.0, t: r * (m * self.g_al[n] + c * l * self.al_d[n]) }
+        self.g_al[N] = mul_ramp::<N>(&hub.g, &self.al);
+        Load { j: 0.0, t: r * (m * self.g_al[N] + c * l * self.al_d[N]) }
     }
 
     #[inline(always)]
-    fn respond(&mut self, n: usize, hub: &Hub) {
+    fn respond<const N: usize>(&mut self, hub: &Hub) {
         let Pendulum { m, l, c, r, .. } = self.p;
-        self.al_dd[n] = -(c / m) * self.al_d[n] - (self.g_al[n] + r * hub.omega_dot[n]) / l;
+        self.al_dd[N] = -(c / m) * self.al_d[N] - (self.g_al[N] + r * hub.omega_dot[N]) / l;
     }
 
     #[inline(always)]
-    fn grow(&mut self, n: usize) {
-        self.al[n + 1] = self.al_d[n] / (n + 1) as f64;
-        self.al_d[n + 1] = self.al_dd[n] / (n + 1) as f64;
+    fn grow<const N: usize>(&mut self) {
+        self.al[N + 1] = self.al_d[N] / (N + 1) as f64;
+        self.al_d[N + 1] = self.al_dd[N] / (N + 1) as f64;
     }
 
     #[inline(always)]
@@ -78,8 +78,8 @@ impl Mode for Linear {
     }
 
     #[inline(always)]
-    fn heat(&mut self, n: usize) -> f64 {
-        self.p.c * self.p.l * self.p.l * square(&self.al_d, n)
+    fn heat<const N: usize>(&mut self) -> f64 {
+        self.p.c * self.p.l * self.p.l * square::<N>(&self.al_d)
     }
 
     #[inline(always)]

@@ -60,18 +60,18 @@ pub trait Mode {
     fn angles(&self) -> Angles;
     /// Sets the coordinates at the start of the expansion.
     fn start(&mut self, q: &[f64; 4]);
-    /// Coefficient n of J and T, from coefficients up to n of q, q' and w.
-    fn load(&mut self, n: usize, hub: &Hub) -> Load;
-    /// Coefficient n of q'', after `load(n)`, when w' is known up to n.
-    fn respond(&mut self, n: usize, hub: &Hub);
-    /// Coefficient n + 1 of q and q' from coefficient n of q' and q''.
-    fn grow(&mut self, n: usize);
+    /// Coefficient N of J and T, from coefficients up to N of q, q' and w.
+    fn load<const N: usize>(&mut self, hub: &Hub) -> Load;
+    /// Coefficient N of q'', after `load`, when w' is known up to N.
+    fn respond<const N: usize>(&mut self, hub: &Hub);
+    /// Coefficient N + 1 of q and q' from coefficient N of q' and q''.
+    fn grow<const N: usize>(&mut self);
     /// Size of the motion, rad/s: the scale of its errors.
     fn size(&self) -> f64;
-    /// Size of coefficient n of the rates.
+    /// Size of coefficient `n` of the rates.
     fn term(&self, n: usize) -> f64;
-    /// Coefficient n of the heat made by the mode, W.
-    fn heat(&mut self, n: usize) -> f64;
+    /// Coefficient N of the heat made by the mode, W.
+    fn heat<const N: usize>(&mut self) -> f64;
     /// Coordinates at t from the series cut after order n.
     fn at(&self, n: usize, t: f64) -> [f64; 4];
     /// Force of the bob on the tank, N, radial and tangential, at order 0.

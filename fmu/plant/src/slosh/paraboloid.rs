@@ -16,7 +16,7 @@
 //! For small q a pendulum is the case h = 1/(2 l^2).
 
 use super::{Angles, Hub, Load, Mode};
-use crate::series::{Series, ZERO, mul, mul_ramp, mul_tail, square, value};
+use crate::series::{Series, ZERO, constant, mul, mul_ramp, mul_tail, square, value};
 use crate::tank::Pendulum;
 
 #[derive(Clone, Debug)]
@@ -84,52 +84,51 @@ impl Mode for Paraboloid {
     }
 
     #[inline(always)]
-    fn load(&mut self, n: usize, hub: &Hub) -> Load {
+    fn load<const N: usize>(&mut self, hub: &Hub) -> Load {
         let Pendulum { m, l, c, r, hardening, .. } = self.p;
-        let (one, first) = if n == 0 { (1.0, true) } else { (0.0, false) };
-        if first {
+        let one = constant::<N>(1.0);
+        if N == 0 {
             self.omega_n = libm::sqrt(hub.g[0] / l);
         }
         let [x, y] = &self.q;
         let [x_d, y_d] = &self.q_d;
-        self.arm[n] = one * r + x[n];
-        let q2 = square(x, n) + square(y, n);
-        self.n[n] = one * l * l + q2;
-        self.spring[n] = l * (one + hardening * q2);
-        self.a[0][n] =
-            2.0 * mul(&hub.omega, y_d, n) + mul(&hub.omega2, &self.arm, n);
-        self.a[1][n] = -2.0 * mul(&hub.omega, x_d, n) + mul(&hub.omega2, y, n);
-        let numerator = mul(x, &self.a[0], n)
-            + mul(y, &self.a[1], n)
-            + square(x_d, n)
-            + square(y_d, n)
-            + mul_ramp(&hub.g, &self.spring, n);
-        self.mu[n] = (numerator - mul_tail(&self.n, &self.mu, n)) / self.n[0];
-        self.lever[n] = (r * y[n] - mul_tail(&self.n, &self.lever, n)) / self.n[0];
-        let mu_q = [mul(&self.mu, x, n), mul(&self.mu, y, n)];
+        self.arm[N] = one * r + x[N];
+        let q2 = square::<N>(x) + square::<N>(y);
+        self.n[N] = one * l * l + q2;
+        self.spring[N] = l * (one + hardening * q2);
+        self.a[0][N] = 2.0 * mul::<N>(&hub.omega, y_d) + mul::<N>(&hub.omega2, &self.arm);
+        self.a[1][N] = -2.0 * mul::<N>(&hub.omega, x_d) + mul::<N>(&hub.omega2, y);
+        let numerator = mul::<N>(x, &self.a[0])
+            + mul::<N>(y, &self.a[1])
+            + square::<N>(x_d)
+            + square::<N>(y_d)
+            + mul_ramp::<N>(&hub.g, &self.spring);
+        self.mu[N] = (numerator - mul_tail::<N>(&self.n, &self.mu)) / self.n[0];
+        self.lever[N] = (r * y[N] - mul_tail::<N>(&self.n, &self.lever)) / self.n[0];
+        let mu_q = [mul::<N>(&self.mu, x), mul::<N>(&self.mu, y)];
         for i in 0..2 {
-            self.b[i][n] = -(c / m) * self.q_d[i][n] + self.a[i][n] - mu_q[i];
+            self.b[i][N] = -(c / m) * self.q_d[i][N] + self.a[i][N] - mu_q[i];
         }
         Load {
-            j: m * r * mul(&self.lever, y, n),
-            t: m * r * mu_q[1] + c * (mul(&self.arm, y_d, n) - mul(y, x_d, n)),
+            j: m * r * mul::<N>(&self.lever, y),
+            t: m * r * mu_q[1] + c * (mul::<N>(&self.arm, y_d) - mul::<N>(y, x_d)),
         }
     }
 
     #[inline(always)]
-    fn respond(&mut self, n: usize, hub: &Hub) {
+    fn respond<const N: usize>(&mut self, hub: &Hub) {
         let [x, y] = &self.q;
         let wd = &hub.omega_dot;
-        self.push[n] = mul(&self.lever, wd, n);
-        self.q_dd[0][n] = self.b[0][n] + mul(wd, y, n) + mul(&self.push, x, n);
-        self.q_dd[1][n] = self.b[1][n] - mul(wd, &self.arm, n) + mul(&self.push, y, n);
+        self.push[N] = mul::<N>(&self.lever, wd);
+        self.q_dd[0][N] = self.b[0][N] + mul::<N>(wd, y) + mul::<N>(&self.push, x);
+        self.q_dd[1][N] = self.b[1][N] - mul::<N>(wd, &self.arm) + mul::<N>(&self.push, y);
     }
 
     #[inline(always)]
-    fn grow(&mut self, n: usize) {
+    fn grow<const N: usize>(&mut self) {
         for i in 0..2 {
-            self.q[i][n + 1] = self.q_d[i][n] / (n + 1) as f64;
-            self.q_d[i][n + 1] = self.q_dd[i][n] / (n + 1) as f64;
+            self.q[i][N + 1] = self.q_d[i][N] / (N + 1) as f64;
+            self.q_d[i][N + 1] = self.q_dd[i][N] / (N + 1) as f64;
         }
     }
 
@@ -145,11 +144,11 @@ impl Mode for Paraboloid {
     }
 
     #[inline(always)]
-    fn heat(&mut self, n: usize) -> f64 {
+    fn heat<const N: usize>(&mut self) -> f64 {
         let Pendulum { l, c, .. } = self.p;
         let ([x, y], [x_d, y_d]) = (&self.q, &self.q_d);
-        self.rise[n] = mul(x, x_d, n) + mul(y, y_d, n);
-        c * (square(x_d, n) + square(y_d, n) + square(&self.rise, n) / (l * l))
+        self.rise[N] = mul::<N>(x, x_d) + mul::<N>(y, y_d);
+        c * (square::<N>(x_d) + square::<N>(y_d) + square::<N>(&self.rise) / (l * l))
     }
 
     #[inline(always)]

@@ -63,35 +63,35 @@ impl Mode for Planar {
     }
 
     #[inline(always)]
-    fn load(&mut self, n: usize, hub: &Hub) -> Load {
+    fn load<const N: usize>(&mut self, hub: &Hub) -> Load {
         let Pendulum { m, l, c, r, .. } = self.p;
-        if n == 0 {
+        if N == 0 {
             self.omega_n = libm::sqrt(hub.g[0] / l);
         }
-        (self.s[n], self.c[n]) = sin_cos(&self.al, &self.s, &self.c, n);
-        self.sc[n] = mul(&self.s, &self.c, n);
-        self.w_al_d[n] = mul(&hub.omega, &self.al_d, n);
-        self.al_d2[n] = square(&self.al_d, n);
-        self.force[n] = mul_ramp(&hub.g, &self.s, n) + (c / m) * l * self.al_d[n]
-            - l * mul(&hub.omega2, &self.sc, n);
+        (self.s[N], self.c[N]) = sin_cos::<N>(&self.al, &self.s, &self.c);
+        self.sc[N] = mul::<N>(&self.s, &self.c);
+        self.w_al_d[N] = mul::<N>(&hub.omega, &self.al_d);
+        self.al_d2[N] = square::<N>(&self.al_d);
+        self.force[N] = mul_ramp::<N>(&hub.g, &self.s) + (c / m) * l * self.al_d[N]
+            - l * mul::<N>(&hub.omega2, &self.sc);
         Load {
-            j: m * (r * r + l * l) * square(&self.s, n),
-            t: m * (-2.0 * l * l * mul(&self.sc, &self.w_al_d, n)
-                + r * l * mul(&self.s, &self.al_d2, n)
-                + r * mul(&self.c, &self.force, n)),
+            j: m * (r * r + l * l) * square::<N>(&self.s),
+            t: m * (-2.0 * l * l * mul::<N>(&self.sc, &self.w_al_d)
+                + r * l * mul::<N>(&self.s, &self.al_d2)
+                + r * mul::<N>(&self.c, &self.force)),
         }
     }
 
     #[inline(always)]
-    fn respond(&mut self, n: usize, hub: &Hub) {
+    fn respond<const N: usize>(&mut self, hub: &Hub) {
         let Pendulum { l, r, .. } = self.p;
-        self.al_dd[n] = -(r / l) * mul(&self.c, &hub.omega_dot, n) - self.force[n] / l;
+        self.al_dd[N] = -(r / l) * mul::<N>(&self.c, &hub.omega_dot) - self.force[N] / l;
     }
 
     #[inline(always)]
-    fn grow(&mut self, n: usize) {
-        self.al[n + 1] = self.al_d[n] / (n + 1) as f64;
-        self.al_d[n + 1] = self.al_dd[n] / (n + 1) as f64;
+    fn grow<const N: usize>(&mut self) {
+        self.al[N + 1] = self.al_d[N] / (N + 1) as f64;
+        self.al_d[N + 1] = self.al_dd[N] / (N + 1) as f64;
     }
 
     #[inline(always)]
@@ -105,8 +105,8 @@ impl Mode for Planar {
     }
 
     #[inline(always)]
-    fn heat(&mut self, n: usize) -> f64 {
-        self.p.c * self.p.l * self.p.l * square(&self.al_d, n)
+    fn heat<const N: usize>(&mut self) -> f64 {
+        self.p.c * self.p.l * self.p.l * square::<N>(&self.al_d)
     }
 
     #[inline(always)]
@@ -134,8 +134,7 @@ impl Mode for Planar {
         let (s, c, ad, w) = (self.s[0], self.c[0], self.al_d[0], hub.omega[0]);
         let (along, up, across) = (r * w + l * c * ad, l * s * ad, l * s * w);
         let half = libm::sin(self.al[0] / 2.0);
-        m * (along * along + up * up + across * across) / 2.0
-            + 2.0 * m * hub.g[0] * l * half * half
+        m * (along * along + up * up + across * across) / 2.0 + 2.0 * m * hub.g[0] * l * half * half
     }
 
     fn momentum(&self, hub: &Hub) -> f64 {

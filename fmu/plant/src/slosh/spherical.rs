@@ -28,7 +28,7 @@
 //! Derived from the bob's Lagrangian; checked against a unit-vector form.
 
 use super::{Angles, Hub, Load, Mode};
-use crate::series::{Series, ZERO, mul, mul_ramp, mul_tail, square, value};
+use crate::series::{Series, ZERO, constant, mul, mul_ramp, mul_tail, square, value};
 use crate::tank::Pendulum;
 
 #[derive(Clone, Debug)]
@@ -138,74 +138,70 @@ impl Mode for Spherical {
     }
 
     #[inline(always)]
-    fn load(&mut self, n: usize, hub: &Hub) -> Load {
+    fn load<const N: usize>(&mut self, hub: &Hub) -> Load {
         let Pendulum { m, l, c, r, .. } = self.p;
-        let one = if n == 0 { 1.0 } else { 0.0 };
-        if n == 0 {
+        let one = constant::<N>(1.0);
+        if N == 0 {
             self.omega_n = libm::sqrt(hub.g[0] / l);
         }
         let [x, y] = &self.xi;
         let [x_d, y_d] = &self.xi_d;
         // geometry
-        let (x2, y2) = (square(x, n), square(y, n));
-        self.sum[n] = one + x2 + y2;
-        self.difference[n] = x2 - y2;
-        self.product[n] = mul(x, y, n);
-        self.k[n] = (2.0 * one - mul_tail(&self.sum, &self.k, n)) / self.sum[0];
-        self.dir[0][n] = mul(&self.k, x, n);
-        self.dir[1][n] = mul(&self.k, y, n);
-        self.dir[2][n] = one - self.k[n];
-        self.e[0][n] = (one - self.difference[n]) / 2.0;
-        self.e[1][n] = -self.product[n];
-        self.a[0][n] = y[n] + r / l * self.product[n];
-        self.a[1][n] = -x[n] - r / l * (one + self.difference[n]) / 2.0;
+        let (x2, y2) = (square::<N>(x), square::<N>(y));
+        self.sum[N] = one + x2 + y2;
+        self.difference[N] = x2 - y2;
+        self.product[N] = mul::<N>(x, y);
+        self.k[N] = (2.0 * one - mul_tail::<N>(&self.sum, &self.k)) / self.sum[0];
+        self.dir[0][N] = mul::<N>(&self.k, x);
+        self.dir[1][N] = mul::<N>(&self.k, y);
+        self.dir[2][N] = one - self.k[N];
+        self.e[0][N] = (one - self.difference[N]) / 2.0;
+        self.e[1][N] = -self.product[N];
+        self.a[0][N] = y[N] + r / l * self.product[N];
+        self.a[1][N] = -x[N] - r / l * (one + self.difference[N]) / 2.0;
         // rates
-        self.v[0][n] = x_d[n] - mul(&hub.omega, y, n);
-        self.v[1][n] = y_d[n] + mul(&hub.omega, x, n);
-        self.xi_d_v[0][n] = x_d[n] + self.v[0][n];
-        self.xi_d_v[1][n] = y_d[n] + self.v[1][n];
-        self.rho[n] = mul(x, x_d, n) + mul(y, y_d, n);
-        self.k_rho[n] = mul(&self.k, &self.rho, n);
-        self.v2[n] = square(&self.v[0], n) + square(&self.v[1], n);
-        self.k_v2[n] = mul(&self.k, &self.v2, n);
+        self.v[0][N] = x_d[N] - mul::<N>(&hub.omega, y);
+        self.v[1][N] = y_d[N] + mul::<N>(&hub.omega, x);
+        self.xi_d_v[0][N] = x_d[N] + self.v[0][N];
+        self.xi_d_v[1][N] = y_d[N] + self.v[1][N];
+        self.rho[N] = mul::<N>(x, x_d) + mul::<N>(y, y_d);
+        self.k_rho[N] = mul::<N>(&self.k, &self.rho);
+        self.v2[N] = square::<N>(&self.v[0]) + square::<N>(&self.v[1]);
+        self.k_v2[N] = mul::<N>(&self.k, &self.v2);
         // B
-        let turn = [
-            mul(&hub.omega, &self.xi_d_v[1], n),
-            -mul(&hub.omega, &self.xi_d_v[0], n),
-        ];
+        let turn = [mul::<N>(&hub.omega, &self.xi_d_v[1]), -mul::<N>(&hub.omega, &self.xi_d_v[0])];
         for i in 0..2 {
-            self.b[i][n] = turn[i]
-                - mul_ramp(&hub.g, &self.xi[i], n) / l
-                - c / m * self.xi_d[i][n]
-                + 2.0 * mul(&self.k_rho, &self.v[i], n)
-                - mul(&self.k_v2, &self.xi[i], n)
-                + r / l * mul(&hub.omega2, &self.e[i], n);
+            self.b[i][N] =
+                turn[i] - mul_ramp::<N>(&hub.g, &self.xi[i]) / l - c / m * self.xi_d[i][N]
+                    + 2.0 * mul::<N>(&self.k_rho, &self.v[i])
+                    - mul::<N>(&self.k_v2, &self.xi[i])
+                    + r / l * mul::<N>(&hub.omega2, &self.e[i]);
         }
         // J and T
-        self.pull[n] = l * mul(&self.k, &self.k_v2, n) + r * mul(&hub.omega2, &self.dir[0], n)
-            - mul_ramp(&hub.g, &self.dir[2], n);
-        self.swirl[n] = mul(x, y_d, n) - mul(y, x_d, n);
-        self.k_swirl[n] = mul(&self.k, &self.swirl, n);
-        let p_y_d = mul(&self.k, y_d, n) - mul(&self.k_rho, &self.dir[1], n);
+        self.pull[N] = l * mul::<N>(&self.k, &self.k_v2) + r * mul::<N>(&hub.omega2, &self.dir[0])
+            - mul_ramp::<N>(&hub.g, &self.dir[2]);
+        self.swirl[N] = mul::<N>(x, y_d) - mul::<N>(y, x_d);
+        self.k_swirl[N] = mul::<N>(&self.k, &self.swirl);
+        let p_y_d = mul::<N>(&self.k, y_d) - mul::<N>(&self.k_rho, &self.dir[1]);
         Load {
-            j: m * r * r * square(&self.dir[1], n),
-            t: m * r * mul(&self.dir[1], &self.pull, n)
-                + c * l * (r * p_y_d + l * mul(&self.k, &self.k_swirl, n)),
+            j: m * r * r * square::<N>(&self.dir[1]),
+            t: m * r * mul::<N>(&self.dir[1], &self.pull)
+                + c * l * (r * p_y_d + l * mul::<N>(&self.k, &self.k_swirl)),
         }
     }
 
     #[inline(always)]
-    fn respond(&mut self, n: usize, hub: &Hub) {
+    fn respond<const N: usize>(&mut self, hub: &Hub) {
         for i in 0..2 {
-            self.xi_dd[i][n] = self.b[i][n] + mul(&self.a[i], &hub.omega_dot, n);
+            self.xi_dd[i][N] = self.b[i][N] + mul::<N>(&self.a[i], &hub.omega_dot);
         }
     }
 
     #[inline(always)]
-    fn grow(&mut self, n: usize) {
+    fn grow<const N: usize>(&mut self) {
         for i in 0..2 {
-            self.xi[i][n + 1] = self.xi_d[i][n] / (n + 1) as f64;
-            self.xi_d[i][n + 1] = self.xi_dd[i][n] / (n + 1) as f64;
+            self.xi[i][N + 1] = self.xi_d[i][N] / (N + 1) as f64;
+            self.xi_d[i][N + 1] = self.xi_dd[i][N] / (N + 1) as f64;
         }
     }
 
@@ -222,10 +218,10 @@ impl Mode for Spherical {
 
     /// c l^2 k^2 |xi'|^2
     #[inline(always)]
-    fn heat(&mut self, n: usize) -> f64 {
-        self.xi_d2[n] = square(&self.xi_d[0], n) + square(&self.xi_d[1], n);
-        self.k_xi_d2[n] = mul(&self.k, &self.xi_d2, n);
-        self.p.c * self.p.l * self.p.l * mul(&self.k, &self.k_xi_d2, n)
+    fn heat<const N: usize>(&mut self) -> f64 {
+        self.xi_d2[N] = square::<N>(&self.xi_d[0]) + square::<N>(&self.xi_d[1]);
+        self.k_xi_d2[N] = mul::<N>(&self.k, &self.xi_d2);
+        self.p.c * self.p.l * self.p.l * mul::<N>(&self.k, &self.k_xi_d2)
     }
 
     #[inline(always)]

@@ -1,0 +1,518 @@
+//! One instance's life: which calls are allowed when, what is refused and how,
+//! that a refused call changes nothing, and that a saved state is all there is.
+
+use HubSlosh::calls::{
+    Fault, GET_BOOLEAN, GET_INTEGER, GET_REAL, Mode, SET_BOOLEAN, SET_INTEGER, SET_REAL, Severity,
+};
+use HubSlosh::instance::{DEFAULT_TOLERANCE, Instance};
+use HubSlosh::snapshot::{from_bytes, size, to_bytes};
+use HubSlosh::table::{self, SCALARS};
+use HubSlosh::variable::{Causality, Kind, Value};
+
+fn reference(name: &str) -> u32 {
+    table::find(name).unwrap_or_else(|| panic!("no variable {name}"))
+}
+
+fn try_set(instance: &mut Instance, name: &str, value: Value) -> Result<(), Fault> {
+    let call = match value {
+        Value::Real(_) => &SET_REAL,
+        Value::Integer(_) => &SET_INTEGER,
+        Value::Boolean(_) => &SET_BOOLEAN,
+    };
+    instance.set(call, &[reference(name)], |_| value)
+}
+
+fn set(instance: &mut Instance, values: &[(&str, Value)]) {
+    for (name, value) in values {
+        try_set(instance, name, *value).unwrap();
+    }
+}
+
+fn get_by_reference(instance: &mut Instance, reference: u32) -> Result<Value, Fault> {
+    let call = match SCALARS[reference as usize].variable.c_type() {
+        "Real" => &GET_REAL,
+        "Integer" => &GET_INTEGER,
+        _ => &GET_BOOLEAN,
+    };
+    instance.get(call, reference)
+}
+
+fn real(instance: &mut Instance, name: &str) -> f64 {
+    match get_by_reference(instance, reference(name)) {
+        Ok(Value::Real(x)) => x,
+        other => panic!("{name}: {other:?}"),
+    }
+}
+
+/// Every value there is, as bits.
+fn all(instance: &mut Instance) -> Vec<u64> {
+    let each = (0..SCALARS.len() as u32).map(|n| match get_by_reference(instance, n).unwrap() {
+        Value::Real(x) => x.to_bits(),
+        Value::Integer(n) => n as u64,
+        Value::Boolean(b) => u64::from(b),
+    });
+    each.collect()
+}
+
+/// Ready to step from `start`.
+fn stepping_from(start: f64, stop: Option<f64>, values: &[(&str, Value)]) -> Instance {
+    let mut instance = Instance::new();
+    set(&mut instance, values);
+    instance.setup_experiment(None, start, stop).unwrap();
+    instance.enter_initialization_mode().unwrap();
+    instance.exit_initialization_mode().unwrap();
+    instance
+}
+
+fn stepping(values: &[(&str, Value)]) -> Instance {
+    stepping_from(0.0, None, values)
+}
+
+const fn number(n: i32) -> Value {
+    Value::Integer(n)
+}
+
+/// Everything moves: all models of the liquid, wheel and gyro on.
+fn lively(slosh_model: i32, friction_model: i32) -> Instance {
+    stepping(&[
+        ("slosh.model", number(slosh_model)),
+        ("friction.model", number(friction_model)),
+        ("slosh.modes", number(2)),
+        ("init.omega", Value::Real(0.3)),
+        ("init.slosh_angle", Value::Real(0.2)),
+        ("init.slosh_angle_radial", Value::Real(0.1)),
+        ("wheel.enabled", Value::Boolean(true)),
+        ("imu.enabled", Value::Boolean(true)),
+        ("tau_cmd", Value::Real(0.05)),
+    ])
+}
+
+#[test]
+fn calls_are_refused_in_the_wrong_state_and_change_nothing() {
+    let mut instance = Instance::new();
+    let before = to_bytes(&instance);
+    assert!(instance.exit_initialization_mode().is_err());
+    assert!(instance.do_step(0.0, 0.1).is_err());
+    assert!(instance.terminate().is_err());
+    assert!(instance.get(&GET_REAL, reference("omega")).is_err());
+    assert_eq!(to_bytes(&instance), before);
+
+    instance.enter_initialization_mode().unwrap();
+    assert!(instance.setup_experiment(None, 0.0, None).is_err());
+    assert!(instance.enter_initialization_mode().is_err());
+    assert!(instance.do_step(0.0, 0.1).is_err());
+
+    instance.exit_initialization_mode().unwrap();
+    assert!(instance.enter_initialization_mode().is_err());
+    let fault = try_set(&mut instance, "tank.h", Value::Real(0.05)).unwrap_err();
+    assert!(fault.text.contains("fmi2SetReal: tank.h") && fault.text.contains("stepping"));
+
+    instance.terminate().unwrap();
+    assert!(instance.do_step(0.0, 0.1).is_err());
+    assert!(try_set(&mut instance, "tau_cmd", Value::Real(0.1)).is_err());
+    all(&mut instance);
+}
+
+#[test]
+fn parameters_and_inputs_can_be_set_before_and_after_setup_and_in_initialization_mode() {
+    let mut instance = Instance::new();
+    set(&mut instance, &[("tank.h", Value::Real(0.06)), ("tau_cmd", Value::Real(0.01))]);
+    instance.setup_experiment(None, 0.0, None).unwrap();
+    set(&mut instance, &[("tank.h", Value::Real(0.07)), ("tau_cmd", Value::Real(0.02))]);
+    instance.enter_initialization_mode().unwrap();
+    let at_7_cm = real(&mut instance, "slosh.frequency[1]");
+    set(&mut instance, &[("tank.h", Value::Real(0.08)), ("g_axial", Value::Real(9.81))]);
+    assert!(real(&mut instance, "slosh.frequency[1]") > at_7_cm, "deeper liquid is faster");
+    instance.exit_initialization_mode().unwrap();
+    assert_eq!(real(&mut instance, "tank.h"), 0.08);
+}
+
+/// The frequency belongs to the specific force there is when initialization ends.
+#[test]
+fn inputs_set_in_initialization_mode_count_from_the_start() {
+    let mut instance = Instance::new();
+    instance.enter_initialization_mode().unwrap();
+    let on_earth = real(&mut instance, "slosh.frequency[1]");
+    set(&mut instance, &[("g_axial", Value::Real(9.81 / 4.0))]);
+    instance.exit_initialization_mode().unwrap();
+    let quarter = real(&mut instance, "slosh.frequency[1]");
+    // sqrt(g/l): two roundings.
+    assert!((quarter / on_earth - 0.5).abs() < 1e-15);
+}
+
+#[test]
+fn all_bad_parameters_are_reported_at_once_and_can_be_mended() {
+    let mut instance = Instance::new();
+    set(
+        &mut instance,
+        &[
+            ("tank.h", Value::Real(-1.0)),
+            ("tank.d", Value::Real(f64::NAN)),
+            ("init.theta", Value::Real(f64::INFINITY)),
+            ("slosh.modes", number(11)),
+            ("slosh.model", number(0)),
+            ("friction.model", number(i32::MIN)),
+        ],
+    );
+    instance.enter_initialization_mode().unwrap();
+    let fault = instance.exit_initialization_mode().unwrap_err();
+    assert_eq!(fault.severity, Severity::Error);
+    for part in [
+        "tank.h = -1.0 m (allowed: 0.0001 m to 100.0 m)",
+        "tank.d = NaN m",
+        "init.theta = inf rad (allowed: any finite number)",
+        "slosh.modes = 11 (allowed: 1 to 10)",
+        "slosh.model = 0 (allowed: 1 frozen, 2 linear",
+        "friction.model = -2147483648",
+    ] {
+        assert!(fault.text.contains(part), "{part} is not in: {}", fault.text);
+    }
+    assert_eq!(instance.mode(), Mode::Initialization);
+    set(
+        &mut instance,
+        &[
+            ("tank.h", Value::Real(0.1)),
+            ("tank.d", Value::Real(0.163)),
+            ("init.theta", Value::Real(0.0)),
+            ("slosh.modes", number(1)),
+            ("slosh.model", number(2)),
+            ("friction.model", number(4)),
+        ],
+    );
+    instance.exit_initialization_mode().unwrap();
+}
+
+#[test]
+fn parameters_that_contradict_each_other_are_reported() {
+    let mut instance = Instance::new();
+    set(&mut instance, &[("wheel.speed_min", Value::Real(1e4))]);
+    instance.enter_initialization_mode().unwrap();
+    let fault = instance.exit_initialization_mode().unwrap_err();
+    assert!(fault.text.contains("wheel.speed_min"), "{}", fault.text);
+}
+
+#[test]
+fn wrong_inputs_are_refused_on_the_spot() {
+    let mut instance = stepping(&[]);
+    let before = to_bytes(&instance);
+    for (name, value) in [("tau_cmd", f64::NAN), ("tau_ext", f64::NEG_INFINITY), ("g_axial", -1e-9)]
+    {
+        let fault = try_set(&mut instance, name, Value::Real(value)).unwrap_err();
+        assert!(fault.text.contains(name), "{}", fault.text);
+    }
+    // One wrong value among good ones: none is taken.
+    let references = [reference("tau_cmd"), reference("tau_ext")];
+    assert!(instance.set(&SET_REAL, &references, |n| Value::Real([1.0, f64::NAN][n])).is_err());
+    assert!(instance.set_input_derivatives(&references, &[1, 1], &[1.0, f64::NAN]).is_err());
+    assert!(instance.set_input_derivatives(&references, &[1, 2], &[1.0, 1.0]).is_err());
+    assert!(instance.set_input_derivatives(&[reference("omega")], &[1], &[1.0]).is_err());
+    assert_eq!(to_bytes(&instance), before);
+}
+
+#[test]
+fn unknown_and_mistyped_references_are_refused_with_name_and_type() {
+    let mut instance = stepping(&[]);
+    let fault = instance.get(&GET_REAL, 4711).unwrap_err();
+    assert!(fault.text.contains("4711"), "{}", fault.text);
+    let fault = instance.get(&GET_INTEGER, reference("omega")).unwrap_err();
+    assert!(fault.text.contains("omega") && fault.text.contains("Real"), "{}", fault.text);
+    let fault = instance.get(&GET_REAL, reference("stuck")).unwrap_err();
+    assert!(fault.text.contains("stuck") && fault.text.contains("Boolean"), "{}", fault.text);
+    assert!(try_set(&mut instance, "omega", Value::Real(1.0)).is_err());
+    assert!(try_set(&mut instance, "slosh.mass[3]", Value::Real(1.0)).is_err());
+}
+
+#[test]
+fn experiment_that_makes_no_sense_is_refused() {
+    let mut instance = Instance::new();
+    let before = to_bytes(&instance);
+    assert!(instance.setup_experiment(None, f64::NAN, None).is_err());
+    assert!(instance.setup_experiment(None, 1.0, Some(0.0)).is_err());
+    assert!(instance.setup_experiment(None, 0.0, Some(f64::INFINITY)).is_err());
+    for tolerance in [0.0, -1e-6, 1e-15, 0.5, f64::NAN] {
+        assert!(instance.setup_experiment(Some(tolerance), 0.0, None).is_err());
+    }
+    assert_eq!(to_bytes(&instance), before);
+    instance.setup_experiment(Some(DEFAULT_TOLERANCE), -5.0, Some(-5.0)).unwrap();
+}
+
+#[test]
+fn steps_that_make_no_sense_are_refused_and_change_nothing() {
+    let mut instance = stepping_from(0.0, Some(1.0), &[("init.omega", Value::Real(0.1))]);
+    instance.do_step(0.0, 0.25).unwrap();
+    let before = to_bytes(&instance);
+    for h in [0.0, -0.1, f64::NAN, f64::INFINITY] {
+        assert!(instance.do_step(0.25, h).is_err(), "{h}");
+    }
+    for at in [0.0, 0.5, f64::NAN] {
+        assert!(instance.do_step(at, 0.1).is_err(), "{at}");
+    }
+    let fault = instance.do_step(0.25, 0.76).unwrap_err();
+    assert!(fault.text.contains("stop time"), "{}", fault.text);
+    assert_eq!(to_bytes(&instance), before);
+    instance.do_step(0.25, 0.75).unwrap();
+}
+
+/// Hosts say n h or add up h; both are off the true time by some ulps, and so is
+/// the stop time.
+#[test]
+fn communication_points_may_wobble_by_rounding() {
+    let h = 0.1;
+    for start in [0.0, 1e6] {
+        let mut added = start;
+        let steps = 2000;
+        let mut instance = stepping_from(start, Some(start + f64::from(steps) * h), &[]);
+        for n in 0..steps {
+            let at = if n % 2 == 0 { start + f64::from(n) * h } else { added };
+            instance.do_step(at, h).unwrap();
+            assert_eq!(instance.time(), at + h, "lands exactly where the host says");
+            added += h;
+        }
+    }
+}
+
+/// With a slope, one long step sees the same input as many short ones. Both are
+/// within the tolerance 1e-8 (relative) of the truth.
+#[test]
+fn input_with_a_slope_does_not_depend_on_how_time_is_cut() {
+    let run = |cuts: u32| {
+        let mut instance =
+            stepping(&[("friction.model", number(2)), ("tau_cmd", Value::Real(-0.05))]);
+        let h = 1.0 / f64::from(cuts);
+        for n in 0..cuts {
+            let command = [reference("tau_cmd")];
+            instance.set_input_derivatives(&command, &[1], &[0.1]).unwrap();
+            instance.do_step(f64::from(n) * h, h).unwrap();
+        }
+        // It stands where the ramp ended, and stays there.
+        assert!((real(&mut instance, "tau_cmd") - 0.05).abs() < 1e-15);
+        instance.do_step(1.0, 1.0).unwrap();
+        assert!((real(&mut instance, "tau_cmd") - 0.05).abs() < 1e-15);
+        real(&mut instance, "theta")
+    };
+    let (whole, cut) = (run(1), run(64));
+    assert!((whole - cut).abs() < 1e-7 * whole.abs(), "{whole} {cut}");
+}
+
+#[test]
+fn specific_force_may_run_down_to_nothing_but_not_below() {
+    let down = |slope: f64| {
+        let mut instance = stepping(&[("init.slosh_angle", Value::Real(0.1))]);
+        let references = [reference("g_axial")];
+        for n in 0..3 {
+            instance.set_input_derivatives(&references, &[1], &[slope]).unwrap();
+            let before = to_bytes(&instance);
+            if let Err(fault) = instance.do_step(f64::from(n) * 0.1, 0.1) {
+                assert_eq!(to_bytes(&instance), before);
+                return Err(fault);
+            }
+        }
+        Ok(real(&mut instance, "g_axial"))
+    };
+    // Three steps of 0.1 s: 9.81 / 0.3 per second hits 0 up to rounding.
+    let end = down(-9.81 / 0.3).unwrap();
+    assert!((0.0..1e-14).contains(&end), "{end}");
+    let fault = down(-33.0).unwrap_err();
+    assert!(fault.text.contains("g_axial"), "{}", fault.text);
+}
+
+#[test]
+fn reset_is_a_fresh_instance() {
+    let fresh = to_bytes(&Instance::new());
+    let mut instance = lively(4, 4);
+    instance.do_step(0.0, 0.5).unwrap();
+    instance.reset().unwrap();
+    assert_eq!(to_bytes(&instance), fresh);
+
+    let mut failed = diverged();
+    failed.reset().unwrap();
+    assert_eq!(to_bytes(&failed), fresh);
+}
+
+/// A torque that no number can hold the effect of.
+fn diverged() -> Instance {
+    let mut instance = stepping(&[("tau_cmd", Value::Real(1e308))]);
+    instance.do_step(0.0, 10.0).unwrap_err();
+    instance
+}
+
+#[test]
+fn after_a_step_that_failed_values_can_be_read_and_a_saved_state_restored() {
+    let good = stepping(&[]);
+    let mut instance = diverged();
+    assert_eq!(instance.mode(), Mode::Failed);
+    assert_eq!(real(&mut instance, "theta"), 0.0);
+    assert!(instance.do_step(0.0, 1.0).is_err());
+    instance.restore(&good).unwrap();
+    instance.do_step(0.0, 1.0).unwrap();
+}
+
+#[test]
+fn after_a_panic_every_call_is_fatal() {
+    let mut instance = stepping(&[]);
+    instance.poison();
+    assert_eq!(instance.do_step(0.0, 1.0).unwrap_err().severity, Severity::Fatal);
+    assert_eq!(instance.reset().unwrap_err().severity, Severity::Fatal);
+    assert_eq!(instance.get(&GET_REAL, 0).unwrap_err().severity, Severity::Fatal);
+    assert_eq!(instance.restore(&Instance::new()).unwrap_err().severity, Severity::Fatal);
+}
+
+/// Bit for bit, for every model, in memory and through bytes, into the same
+/// instance and into one that was only just made.
+#[test]
+fn restored_state_continues_as_if_nothing_had_happened() {
+    for slosh_model in 1..=5 {
+        for friction_model in 1..=4 {
+            let mut original = lively(slosh_model, friction_model);
+            original.do_step(0.0, 0.777).unwrap();
+            original.set_input_derivatives(&[reference("tau_cmd")], &[1], &[-0.3]).unwrap();
+            let saved = original.clone();
+            let bytes = to_bytes(&saved);
+            let here = all(&mut original);
+            original.do_step(0.777, 0.4).unwrap();
+            original.do_step(1.177, 0.1).unwrap();
+            let there = all(&mut original);
+            assert_ne!(here, there);
+
+            original.restore(&saved).unwrap();
+            let mut other = Instance::new();
+            other.restore(&from_bytes(&bytes).unwrap()).unwrap();
+            for instance in [&mut original, &mut other] {
+                assert_eq!(all(instance), here, "slosh {slosh_model}, friction {friction_model}");
+                instance.do_step(0.777, 0.4).unwrap();
+                instance.do_step(1.177, 0.1).unwrap();
+                assert_eq!(all(instance), there, "slosh {slosh_model}, friction {friction_model}");
+            }
+        }
+    }
+}
+
+#[test]
+fn state_can_be_saved_in_every_state_of_life() {
+    let mut initializing = Instance::new();
+    set(&mut initializing, &[("tank.h", Value::Real(-1.0))]);
+    initializing.enter_initialization_mode().unwrap();
+    let mut terminated = lively(2, 4);
+    terminated.do_step(0.0, 0.1).unwrap();
+    terminated.terminate().unwrap();
+    for saved in [Instance::new(), initializing, terminated, diverged(), lively(2, 4)] {
+        let bytes = to_bytes(&saved);
+        assert_eq!(bytes.len(), size());
+        let read = from_bytes(&bytes).unwrap();
+        assert_eq!(read.mode(), saved.mode());
+        assert_eq!(to_bytes(&read), bytes);
+    }
+}
+
+#[test]
+fn bytes_that_are_no_state_are_refused() {
+    let mut instance = lively(4, 4);
+    instance.do_step(0.0, 0.1).unwrap();
+    let bytes = to_bytes(&instance);
+    for length in 0..bytes.len() {
+        assert!(from_bytes(&bytes[..length]).is_err(), "cut off after {length}");
+    }
+    for place in 0..bytes.len() {
+        let mut damaged = bytes.clone();
+        damaged[place] ^= 0x10;
+        assert!(from_bytes(&damaged).is_err(), "damaged at {place}");
+    }
+    let mut longer = bytes.clone();
+    longer.push(0);
+    assert!(from_bytes(&longer).is_err());
+    assert!(from_bytes(b"HubSlosh").is_err());
+}
+
+#[test]
+fn output_derivatives_are_the_variables_that_are_derivatives() {
+    let mut instance = lively(4, 4);
+    instance.do_step(0.0, 0.3).unwrap();
+    for (output, derivative) in [
+        ("theta", "omega"),
+        ("omega", "omega_dot"),
+        ("slosh_angle", "slosh_rate"),
+        ("slosh_angle_radial", "slosh_rate_radial"),
+    ] {
+        let expected = real(&mut instance, derivative);
+        assert_eq!(instance.output_derivative(reference(output), 1).unwrap(), expected);
+        assert!(instance.output_derivative(reference(output), 2).is_err());
+    }
+    assert!(instance.output_derivative(reference("wave_height"), 1).is_err());
+}
+
+/// What the model description promises: an importer breaks algebraic loops by it.
+#[test]
+fn no_variable_follows_an_input_at_once_that_it_does_not_list() {
+    for slosh_model in 1..=5 {
+        for friction_model in 1..=4 {
+            // Moving, and stuck right at the start.
+            let mut moving = lively(slosh_model, friction_model);
+            moving.do_step(0.0, 0.5).unwrap();
+            let stuck = stepping(&[
+                ("slosh.model", number(slosh_model)),
+                ("friction.model", number(friction_model)),
+            ]);
+            for instance in [moving, stuck] {
+                for (input, _) in table::ramps() {
+                    let mut other = instance.clone();
+                    let value = real(&mut other, input.name) + 0.1;
+                    set(&mut other, &[(input.name, Value::Real(value))]);
+                    let (before, after) = (all(&mut instance.clone()), all(&mut other));
+                    for (n, scalar) in SCALARS.iter().enumerate() {
+                        let v = scalar.variable;
+                        let computed = matches!(v.causality, Causality::Output | Causality::Local);
+                        if computed && !v.depends_on.contains(&input.name) {
+                            assert_eq!(before[n], after[n], "{} follows {}", v.name, input.name);
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The same for the values at the start and the parameters.
+#[test]
+fn no_variable_starts_from_a_parameter_that_it_does_not_list() {
+    let base: &[(&str, Value)] = &[
+        ("init.omega", Value::Real(0.3)),
+        ("init.slosh_angle", Value::Real(0.2)),
+        ("init.slosh_angle_radial", Value::Real(0.1)),
+        ("init.slosh_rate", Value::Real(0.2)),
+        ("init.slosh_rate_radial", Value::Real(0.1)),
+        ("wheel.enabled", Value::Boolean(true)),
+        ("imu.enabled", Value::Boolean(true)),
+        ("tau_cmd", Value::Real(0.05)),
+    ];
+    for slosh_model in 1..=5 {
+        let mut instance = Instance::new();
+        set(&mut instance, base);
+        set(&mut instance, &[("slosh.model", number(slosh_model))]);
+        instance.enter_initialization_mode().unwrap();
+        let before = all(&mut instance);
+        for parameter in table::parameters() {
+            let mut other = instance.clone();
+            let reference = reference(parameter.name);
+            let value = match (get_by_reference(&mut other, reference).unwrap(), parameter.kind) {
+                (Value::Real(x), _) => Value::Real(x * 1.01 + 0.01),
+                (Value::Integer(n), Kind::Enumeration(of)) => number(n % of.items.len() as i32 + 1),
+                (Value::Integer(n), _) => number(n + 1),
+                (Value::Boolean(b), _) => Value::Boolean(!b),
+            };
+            set(&mut other, &[(parameter.name, value)]);
+            let after = all(&mut other);
+            for (n, scalar) in SCALARS.iter().enumerate() {
+                let v = scalar.variable;
+                let computed =
+                    matches!(v.causality, Causality::Output | Causality::CalculatedParameter);
+                let listed = v.starts_from.iter().any(|name| {
+                    *name == parameter.name
+                        || (name.ends_with('.') && parameter.name.starts_with(name))
+                });
+                if computed && !listed {
+                    assert_eq!(before[n], after[n], "{} starts from {}", v.name, parameter.name);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,291 @@
+//! modelDescription.xml says what the binary does, and says it legally.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use HubSlosh::calls::{GET_BOOLEAN, GET_INTEGER, GET_REAL};
+use HubSlosh::instance::Instance;
+use HubSlosh::table;
+use HubSlosh::variable::{Causality, Value};
+
+/// An element of the XML with its attributes.
+struct Element {
+    name: String,
+    attributes: BTreeMap<String, String>,
+    /// Names of the elements around it, outermost first.
+    path: Vec<String>,
+}
+
+impl Element {
+    fn get(&self, attribute: &str) -> Option<&str> {
+        self.attributes.get(attribute).map(String::as_str)
+    }
+
+    fn number(&self, attribute: &str) -> Option<f64> {
+        self.get(attribute).map(|text| text.parse().unwrap())
+    }
+
+    /// Indices in an attribute that is a list.
+    fn list(&self, attribute: &str) -> Vec<usize> {
+        let words = self.get(attribute).unwrap().split_whitespace();
+        words.map(|word| word.parse().unwrap()).collect()
+    }
+}
+
+fn committed() -> String {
+    std::fs::read_to_string(model_description::PATH).unwrap()
+}
+
+/// All elements of the committed file, in its order.
+fn elements() -> Vec<Element> {
+    let text = committed();
+    let (mut all, mut path) = (Vec::new(), Vec::new());
+    for event in xml::EventReader::from_str(&text) {
+        match event.unwrap() {
+            xml::reader::XmlEvent::StartElement { name, attributes, .. } => {
+                let attributes =
+                    attributes.into_iter().map(|a| (a.name.local_name, a.value)).collect();
+                all.push(Element { name: name.local_name.clone(), attributes, path: path.clone() });
+                path.push(name.local_name);
+            }
+            xml::reader::XmlEvent::EndElement { .. } => {
+                path.pop();
+            }
+            _ => {}
+        }
+    }
+    all
+}
+
+/// Each variable with the element of its type.
+fn variables() -> Vec<(Element, Element)> {
+    let mut all = Vec::new();
+    let mut rest = elements().into_iter();
+    while let Some(element) = rest.next() {
+        if element.name == "ScalarVariable" {
+            all.push((element, rest.next().unwrap()));
+        }
+    }
+    all
+}
+
+fn unknowns(list: &str) -> Vec<Element> {
+    let mut all = elements();
+    all.retain(|e| e.name == "Unknown" && e.path.last().is_some_and(|p| p == list));
+    all
+}
+
+#[test]
+fn committed_file_is_what_the_table_says() {
+    assert!(
+        committed() == model_description::xml().unwrap(),
+        "modelDescription.xml is out of date: run `cargo run --release -p model-description`"
+    );
+}
+
+#[test]
+fn guid_is_the_binarys() {
+    assert_eq!(elements()[0].get("guid"), Some(table::guid().as_str()));
+}
+
+#[test]
+fn start_values_are_the_binarys_to_the_last_bit() {
+    let mut fresh = Instance::new();
+    let mut count = 0;
+    for (variable, kind) in variables() {
+        let Some(start) = kind.get("start") else { continue };
+        let reference = variable.get("valueReference").unwrap().parse().unwrap();
+        match kind.name.as_str() {
+            "Real" => {
+                let Value::Real(x) = fresh.get(&GET_REAL, reference).unwrap() else { panic!() };
+                assert_eq!(start.parse::<f64>().unwrap().to_bits(), x.to_bits());
+            }
+            "Boolean" => {
+                let value = fresh.get(&GET_BOOLEAN, reference).unwrap();
+                assert_eq!(Value::Boolean(start.parse().unwrap()), value);
+            }
+            _ => {
+                let value = fresh.get(&GET_INTEGER, reference).unwrap();
+                assert_eq!(Value::Integer(start.parse().unwrap()), value);
+            }
+        }
+        count += 1;
+    }
+    let set_by_host = [Causality::Input, Causality::Parameter];
+    let expected = table::SCALARS.iter().filter(|s| set_by_host.contains(&s.variable.causality));
+    assert_eq!(count, expected.count());
+}
+
+#[test]
+fn start_values_are_within_min_and_max() {
+    for (variable, kind) in variables() {
+        if !matches!(kind.name.as_str(), "Real" | "Integer") {
+            continue;
+        }
+        let (min, max) = (kind.number("min"), kind.number("max"));
+        let name = variable.get("name").unwrap();
+        if let Some(start) = kind.number("start") {
+            assert!(min.is_none_or(|min| min <= start), "{name}");
+            assert!(max.is_none_or(|max| start <= max), "{name}");
+        }
+        if let (Some(min), Some(max)) = (min, max) {
+            assert!(min < max, "{name}");
+        }
+    }
+}
+
+#[test]
+fn causality_decides_on_variability_initial_and_start() {
+    for (variable, kind) in variables() {
+        let name = variable.get("name").unwrap();
+        let moving = if kind.name == "Real" { "continuous" } else { "discrete" };
+        let expected = match variable.get("causality").unwrap() {
+            "input" => (moving, None, true),
+            "output" | "local" => (moving, Some("calculated"), false),
+            "parameter" => ("fixed", Some("exact"), true),
+            "calculatedParameter" => ("fixed", Some("calculated"), false),
+            other => panic!("{name}: {other}"),
+        };
+        let variability = variable.get("variability").unwrap();
+        let found = (variability, variable.get("initial"), kind.get("start").is_some());
+        assert_eq!(found, expected, "{name}");
+        assert!(variable.get("description").is_some_and(|d| !d.is_empty()), "{name}");
+    }
+}
+
+#[test]
+fn names_and_value_references_are_unique() {
+    let all = variables();
+    for attribute in ["name", "valueReference"] {
+        let unique: BTreeSet<_> = all.iter().map(|(v, _)| v.get(attribute).unwrap()).collect();
+        assert_eq!(unique.len(), all.len(), "{attribute}");
+    }
+}
+
+/// Simulink turns dotted ports into buses and cuts parameters' names after 55
+/// characters.
+#[test]
+fn ports_have_flat_names_and_parameters_short_ones() {
+    for (variable, _) in variables() {
+        let name = variable.get("name").unwrap();
+        match variable.get("causality").unwrap() {
+            "input" | "output" => assert!(!name.contains(['.', '[']), "{name}"),
+            _ => assert!(name.len() <= 55, "{name}"),
+        }
+    }
+}
+
+#[test]
+fn every_unit_and_display_unit_is_defined() {
+    let mut units: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    let mut unit = String::new();
+    for element in elements() {
+        match element.name.as_str() {
+            "Unit" => {
+                unit = element.get("name").unwrap().into();
+                units.insert(unit.clone(), BTreeSet::new());
+            }
+            "DisplayUnit" => {
+                let name = element.get("name").unwrap().to_string();
+                units.get_mut(&unit).unwrap().insert(name);
+                assert!(element.number("factor").unwrap() > 0.0);
+            }
+            _ => {}
+        }
+    }
+    let mut used = BTreeSet::new();
+    for (variable, kind) in variables() {
+        if kind.name == "Real" {
+            let name = variable.get("name").unwrap();
+            let unit = kind.get("unit").unwrap();
+            let displayed = units.get(unit).unwrap_or_else(|| panic!("unit of {name}"));
+            if let Some(display_unit) = kind.get("displayUnit") {
+                assert!(displayed.contains(display_unit), "display unit of {name}");
+            }
+            used.insert(unit.to_string());
+        }
+    }
+    assert_eq!(used, units.into_keys().collect(), "units that nobody uses");
+}
+
+#[test]
+fn enumerations_are_declared() {
+    let types: BTreeSet<_> = elements()
+        .iter()
+        .filter(|e| e.name == "SimpleType")
+        .map(|e| e.get("name").unwrap().to_string())
+        .collect();
+    for (variable, kind) in variables() {
+        if kind.name == "Enumeration" {
+            let declared = kind.get("declaredType").unwrap();
+            assert!(types.contains(declared), "{}", variable.get("name").unwrap());
+        }
+    }
+}
+
+#[test]
+fn structure_lists_every_output_once_and_what_is_computed_at_the_start() {
+    let with = |causalities: &[&str]| -> Vec<usize> {
+        let all = variables();
+        let meant = all
+            .iter()
+            .zip(1..)
+            .filter(|((v, _), _)| causalities.contains(&v.get("causality").unwrap()));
+        meant.map(|(_, index)| index).collect()
+    };
+    let listed = |list: &str| -> Vec<usize> {
+        unknowns(list).iter().map(|e| e.get("index").unwrap().parse().unwrap()).collect()
+    };
+    assert_eq!(listed("Outputs"), with(&["output"]));
+    assert_eq!(listed("InitialUnknowns"), with(&["output", "calculatedParameter"]));
+}
+
+/// An importer takes missing dependencies for a dependency on everything, and
+/// sees algebraic loops where there are none.
+#[test]
+fn dependencies_are_always_given_and_point_to_what_the_host_sets() {
+    let all = variables();
+    let causality = |index: &usize| all[index - 1].0.get("causality").unwrap();
+    for (list, allowed) in
+        [("Outputs", &["input"][..]), ("InitialUnknowns", &["input", "parameter"][..])]
+    {
+        for unknown in unknowns(list) {
+            let dependencies = unknown.list("dependencies");
+            assert!(dependencies.is_sorted_by(|a, b| a < b));
+            assert!(dependencies.iter().all(|index| allowed.contains(&causality(index))));
+            let kinds = unknown.get("dependenciesKind").unwrap().split_whitespace();
+            assert_eq!(kinds.count(), dependencies.len());
+        }
+    }
+}
+
+#[test]
+fn every_name_in_the_table_s_dependencies_means_something() {
+    for variable in table::TABLE {
+        for name in variable.depends_on {
+            assert!(table::ramps().any(|(input, _)| input.name == *name), "{name}");
+        }
+        for name in variable.starts_from {
+            let meant = |p: &str| p == *name || (name.ends_with('.') && p.starts_with(name));
+            assert!(table::parameters().any(|p| meant(p.name)), "{name}");
+        }
+    }
+}
+
+/// Programs and scripts of others use these; more may be added.
+#[test]
+fn names_that_others_build_on_are_there() {
+    let names = "tau_cmd tau_ext g_axial theta omega omega_dot slosh_angle slosh_rate \
+        slosh_angle_radial tau_friction tau_fluid F_tangential F_radial wave_height omega_imu \
+        slosh_rate_radial energy momentum power_dissipated tau_actuator wheel_speed stuck regime \
+        hub.I tank.d tank.h tank.r fluid.rho fluid.nu fluid.sigma slosh.model slosh.modes \
+        slosh.zeta_from_correlation slosh.zeta slosh.hardening friction.model friction.b \
+        friction.c friction.d friction.omega_s friction.eps init.theta init.omega \
+        init.slosh_angle init.slosh_angle_radial init.slosh_rate init.slosh_rate_radial \
+        wheel.enabled wheel.I wheel.speed_0 wheel.speed_min wheel.speed_max wheel.tau_max \
+        imu.enabled imu.rate imu.arw imu.bias_instability imu.bias_time imu.lsb imu.seed \
+        tank.m_liq tank.m_0 tank.bond slosh.mass[1] slosh.mass[10] slosh.length[10] \
+        slosh.frequency[10] slosh.damping[10]";
+    for name in names.split_whitespace() {
+        assert!(table::find(name).is_some(), "{name}");
+    }
+}
