@@ -351,7 +351,7 @@ pub unsafe extern "C" fn fmi2Instantiate(
 fn refusal(name: Option<String>, kind: fmi2Type, guid: Option<String>) -> Option<String> {
     let expected = table::guid();
     if name.is_none_or(|name| name.trim().is_empty()) {
-        return Some("the instance has no name".into());
+        return Some("instanceName is NULL or empty".into());
     }
     if kind != fmi2CoSimulation {
         return Some(format!("fmuType {kind} is not offered; only fmi2CoSimulation is"));
@@ -866,4 +866,132 @@ pub unsafe extern "C" fn fmi2GetStringStatus(
     value: *mut fmi2String,
 ) -> fmi2Status {
     unsafe { answer(c, &calls::GET_STRING_STATUS, s, value, |_| None) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An instance without a logger.
+    fn instantiate() -> fmi2Component {
+        let callbacks = fmi2CallbackFunctions {
+            logger: None,
+            allocateMemory: None,
+            freeMemory: None,
+            stepFinished: None,
+            componentEnvironment: ptr::null_mut(),
+        };
+        let guid = c_string(&table::guid());
+        let made = unsafe {
+            let name = c"one".as_ptr();
+            fmi2Instantiate(name, fmi2CoSimulation, guid.as_ptr(), ptr::null(), &callbacks, 0, 0)
+        };
+        assert!(!made.is_null());
+        made
+    }
+
+    #[test]
+    fn panic_is_fatal_then_and_later_and_freeing_still_works() {
+        let c = instantiate();
+        let mut state = ptr::null_mut();
+        unsafe {
+            assert_eq!(fmi2GetFMUstate(c, &mut state), fmi2OK);
+            assert_eq!(on(c, &calls::DO_STEP, |_| panic!("this is a test")), fmi2Fatal);
+            assert_eq!(fmi2Reset(c), fmi2Fatal);
+            assert_eq!(fmi2GetReal(c, ptr::null(), 0, ptr::null_mut()), fmi2Fatal);
+            assert_eq!(fmi2GetFMUstate(c, &mut state), fmi2Fatal);
+            assert_eq!(fmi2SetFMUstate(c, state), fmi2Fatal);
+            assert_eq!(fmi2GetStatus(c, fmi2DoStepStatus, &mut 0), fmi2Fatal);
+            assert_eq!(fmi2FreeFMUstate(c, &mut state), fmi2OK);
+            assert!(state.is_null());
+            fmi2FreeInstance(c);
+        }
+    }
+
+    #[test]
+    fn handles_that_are_no_instance_are_an_error() {
+        let mut other = [0u64; 64];
+        for handle in [ptr::null_mut(), other.as_mut_ptr().cast()] {
+            unsafe {
+                assert_eq!(fmi2Reset(handle), fmi2Error);
+                assert_eq!(fmi2DoStep(handle, 0.0, 1.0, 0), fmi2Error);
+                fmi2FreeInstance(handle);
+            }
+        }
+    }
+
+    #[test]
+    fn null_is_fine_for_nothing_and_an_error_otherwise() {
+        let c = instantiate();
+        unsafe {
+            assert_eq!(fmi2SetReal(c, ptr::null(), 0, ptr::null()), fmi2OK);
+            assert_eq!(fmi2GetString(c, ptr::null(), 0, ptr::null_mut()), fmi2OK);
+            assert_eq!(fmi2SetReal(c, ptr::null(), 1, ptr::null()), fmi2Error);
+            assert_eq!(fmi2SetReal(c, &0, 1, ptr::null()), fmi2Error);
+            assert_eq!(fmi2GetReal(c, &0, 1, ptr::null_mut()), fmi2Error);
+            assert_eq!(fmi2SetDebugLogging(c, 1, 0, ptr::null()), fmi2OK);
+            assert_eq!(fmi2SetDebugLogging(c, 1, 1, ptr::null()), fmi2Error);
+            assert_eq!(fmi2SetDebugLogging(c, 1, 1, &ptr::null()), fmi2Error);
+            assert_eq!(fmi2GetFMUstate(c, ptr::null_mut()), fmi2Error);
+            assert_eq!(fmi2SetFMUstate(c, ptr::null_mut()), fmi2Error);
+            assert_eq!(fmi2FreeFMUstate(c, ptr::null_mut()), fmi2OK);
+            assert_eq!(fmi2FreeFMUstate(c, &mut ptr::null_mut()), fmi2OK);
+            assert_eq!(fmi2DeSerializeFMUstate(c, ptr::null(), 8, &mut ptr::null_mut()), fmi2Error);
+            assert_eq!(fmi2GetRealStatus(c, fmi2LastSuccessfulTime, ptr::null_mut()), fmi2Error);
+            fmi2FreeInstance(c);
+        }
+    }
+
+    #[test]
+    fn handle_of_a_saved_state_is_reused() {
+        let c = instantiate();
+        let mut state = ptr::null_mut();
+        unsafe {
+            assert_eq!(fmi2GetFMUstate(c, &mut state), fmi2OK);
+            let first = state;
+            assert_eq!(fmi2GetFMUstate(c, &mut state), fmi2OK);
+            assert_eq!(state, first);
+            // The same bytes fit only if there is room for all of them.
+            let mut size = 0;
+            assert_eq!(fmi2SerializedFMUstateSize(c, state, &mut size), fmi2OK);
+            let mut bytes = vec![0; size];
+            assert_eq!(fmi2SerializeFMUstate(c, state, bytes.as_mut_ptr(), size - 1), fmi2Error);
+            assert_eq!(fmi2SerializeFMUstate(c, state, bytes.as_mut_ptr(), size), fmi2OK);
+            // The handle need not be set.
+            let mut another: fmi2FMUstate = ptr::without_provenance_mut(0xdead_beef);
+            assert_eq!(fmi2DeSerializeFMUstate(c, bytes.as_ptr(), size, &mut another), fmi2OK);
+            assert_eq!(fmi2SetFMUstate(c, another), fmi2OK);
+            assert_eq!(fmi2FreeFMUstate(c, &mut another), fmi2OK);
+            assert_eq!(fmi2FreeFMUstate(c, &mut state), fmi2OK);
+            fmi2FreeInstance(c);
+        }
+    }
+
+    #[test]
+    fn questions_without_an_answer_are_discarded() {
+        let c = instantiate();
+        unsafe {
+            assert_eq!(fmi2GetRealStatus(c, fmi2Terminated, &mut 0.0), fmi2Discard);
+            assert_eq!(fmi2GetIntegerStatus(c, fmi2DoStepStatus, &mut 0), fmi2Discard);
+            assert_eq!(fmi2GetStringStatus(c, fmi2PendingStatus, &mut ptr::null()), fmi2Discard);
+            let mut terminated = 1;
+            assert_eq!(fmi2GetBooleanStatus(c, fmi2Terminated, &mut terminated), fmi2OK);
+            assert_eq!(terminated, 0);
+            fmi2FreeInstance(c);
+        }
+    }
+
+    #[test]
+    fn instance_is_refused_without_name_or_guid_and_for_model_exchange() {
+        let guid = Some(table::guid());
+        let name = Some("one".to_string());
+        assert_eq!(refusal(name.clone(), fmi2CoSimulation, guid.clone()), None);
+        assert!(refusal(None, fmi2CoSimulation, guid.clone()).is_some());
+        assert!(refusal(Some(" ".into()), fmi2CoSimulation, guid.clone()).is_some());
+        assert!(refusal(name.clone(), fmi2ModelExchange, guid.clone()).is_some());
+        assert!(refusal(name.clone(), 7, guid).is_some());
+        assert!(refusal(name.clone(), fmi2CoSimulation, None).unwrap().contains("NULL"));
+        let wrong = refusal(name, fmi2CoSimulation, Some("{0}".into())).unwrap();
+        assert!(wrong.contains("{0}") && wrong.contains(&table::guid()));
+    }
 }

@@ -264,7 +264,8 @@ impl Instance {
     /// fmi2GetRealOutputDerivatives: the outputs whose derivative is a variable
     /// too have one.
     pub fn output_derivative(&mut self, reference: u32, order: i32) -> Result<f64, Fault> {
-        const KNOWN: [(&str, fn(&Outputs) -> f64); 4] = [
+        type Derivative = fn(&Outputs) -> f64;
+        const KNOWN: [(&str, Derivative); 4] = [
             ("theta", |o| o.omega),
             ("omega", |o| o.omega_dot),
             ("slosh_angle", |o| o.slosh_rate),
