@@ -459,7 +459,9 @@ pub struct CallError {
 impl CallError {
     /// What the FMU logged, in one line.
     pub fn text(&self) -> String {
-        self.messages.iter().map(|m| m.text.trim()).collect::<Vec<_>>().join("; ")
+        let prefix = format!("{}: ", self.call); // the FMU may name the call as well; once will do
+        let text = |m: &Message| m.text.trim().trim_start_matches(&prefix).to_string();
+        self.messages.iter().map(text).collect::<Vec<_>>().join("; ")
     }
 }
 

@@ -3,6 +3,8 @@
 //! It meets the FMU only as any other host does: as a packed `.fmu`, through
 //! its C ABI. No code is shared with the model.
 
+pub mod analysis;
+pub mod campaign;
 pub mod description;
 pub mod fmi2;
 pub mod html;

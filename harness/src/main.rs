@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, Result, bail};
 use clap::{Args, Parser, Subcommand};
+use hubslosh::campaign::{self, Plan, Sweep};
 use hubslosh::fmi2::Fmu;
 use hubslosh::pack;
 use hubslosh::profile::{self, Profile, Torque};
@@ -28,6 +29,7 @@ struct Cli {
 enum Command {
     Pack(PackArgs),
     Run(RunArgs),
+    Campaign(CampaignArgs),
 }
 
 /// Builds the FMU's binary and packs it.
@@ -35,7 +37,7 @@ enum Command {
 #[command(after_help = "Example:\n  hubslosh pack --out dist/HubSlosh.fmu")]
 struct PackArgs {
     /// Where to put the FMU.
-    #[arg(long, value_name = "FILE", default_value = "dist/HubSlosh.fmu")]
+    #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
     out: PathBuf,
 }
 
@@ -73,12 +75,51 @@ struct RunArgs {
     )]
     columns: Vec<String>,
     /// The FMU.
-    #[arg(long, value_name = "FILE", default_value = "dist/HubSlosh.fmu")]
+    #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
     fmu: PathBuf,
     /// Where to put the signals, .csv or .parquet.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 }
+
+/// Drives the FMU through the thesis's sweeps at several fills and amplitudes, and reports.
+///
+/// Runs that are there already (same FMU, parameters and profile) are not done again.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  hubslosh campaign\n  \
+    hubslosh campaign --fills 0.05,0.1 --amplitudes 0.1 --set friction.model=viscous --out dist/viscous")]
+struct CampaignArgs {
+    /// Slosh models, by name.
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', default_value = "linear")]
+    model: Vec<String>,
+    /// Fills, m.
+    #[arg(long, value_name = "M,…", value_delimiter = ',', default_values_t = campaign::FILLS)]
+    fills: Vec<f64>,
+    /// Torque amplitudes, N.m.
+    #[arg(long, value_name = "NM,…", value_delimiter = ',', default_values_t = campaign::AMPLITUDES)]
+    amplitudes: Vec<f64>,
+    /// How the frequency grows from 1.25 to 3.5 Hz in 2700 s.
+    #[arg(long, value_enum, default_value = "exponential")]
+    sweep: Sweep,
+    /// Sets a parameter or an input by its FMU name; enumerations by name or number.
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
+    settings: Vec<(String, String)>,
+    /// Relative tolerance of the FMU's solver [default: the FMU's own].
+    #[arg(long, value_name = "NUMBER")]
+    tolerance: Option<f64>,
+    /// Do runs again that are there already.
+    #[arg(long)]
+    force: bool,
+    /// The FMU.
+    #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
+    fmu: PathBuf,
+    /// Directory for runs, features.csv and report.html.
+    #[arg(long, value_name = "DIRECTORY", default_value = DEFAULT_CAMPAIGN)]
+    out: PathBuf,
+}
+
+const DEFAULT_FMU: &str = "dist/HubSlosh.fmu";
+const DEFAULT_CAMPAIGN: &str = "dist/campaign";
 
 fn run_help() -> String {
     format!(
@@ -101,7 +142,8 @@ fn main() -> ExitCode {
     let done = match Cli::parse().command {
         Some(Command::Pack(args)) => pack(&args.out),
         Some(Command::Run(args)) => run(args),
-        None => bail_todo(),
+        Some(Command::Campaign(args)) => campaign(&args.fmu, args.plan()),
+        None => everything(),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -112,8 +154,10 @@ fn main() -> ExitCode {
     }
 }
 
-fn bail_todo() -> Result<()> {
-    bail!("not yet")
+/// What `cargo run --release` does.
+fn everything() -> Result<()> {
+    pack(Path::new(DEFAULT_FMU))?;
+    campaign(Path::new(DEFAULT_FMU), Plan::thesis(Path::new(DEFAULT_CAMPAIGN)))
 }
 
 fn pack(out: &Path) -> Result<()> {
@@ -152,5 +196,45 @@ fn run(args: RunArgs) -> Result<()> {
     ]);
     table.write(&args.out, &notes)?;
     println!("{} rows in {}", table.rows(), args.out.display());
+    Ok(())
+}
+
+impl CampaignArgs {
+    fn plan(&self) -> Plan {
+        Plan {
+            models: self.model.clone(),
+            fills: self.fills.clone(),
+            amplitudes: self.amplitudes.clone(),
+            sweep: self.sweep,
+            settings: self.settings.clone(),
+            tolerance: self.tolerance,
+            force: self.force,
+            out: self.out.clone(),
+        }
+    }
+}
+
+fn campaign(fmu: &Path, plan: Plan) -> Result<()> {
+    let fmu = Fmu::open(fmu)?;
+    let results = plan.execute(&fmu)?;
+    let features = plan.out.join("features.csv");
+    campaign::write_features(&results.outcomes, &features)?;
+    let reused = results.outcomes.iter().filter(|o| o.reused).count();
+    println!(
+        "{} runs ({} made, {reused} were there), {} failed; features in {}",
+        results.outcomes.len(),
+        results.outcomes.len() - reused,
+        results.failures.len(),
+        features.display(),
+    );
+    for o in &results.outcomes {
+        println!("{} {:?} {:?} {:?}", o.case.name(), o.demodulated_features, o.spa_features, o.figures);
+    }
+    for failure in &results.failures {
+        eprintln!("{} failed: {}", failure.case.name(), failure.reason);
+    }
+    if !results.failures.is_empty() {
+        bail!("{} of the campaign's runs failed", results.failures.len());
+    }
     Ok(())
 }

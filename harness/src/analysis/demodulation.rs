@@ -1,0 +1,49 @@
+//! Sweep-synchronous demodulation: the Fourier coefficient of torque and rate at
+//! the sweep's own phase, over a window that slides with the sweep,
+//!
+//! ```text
+//! Y(t) = Σ w(t' − t) y(t') e^{−jφ(t')},   H(f(t)) = Y(t) / U(t)
+//! ```
+//!
+//! φ is the known phase of the sweep (it is not estimated), w a Hann window of a
+//! fixed number of cycles. U is formed with the same window, so whatever the
+//! window does to amplitude and phase cancels in H. Harmonics that friction makes
+//! turn by many cycles within the window and drop out.
+
+use super::{Complex64, FrequencyResponse};
+use crate::profile::Profile;
+
+/// Length of the window in cycles of the sweep. 24 cycles are 10 s at 2.4 Hz, in which the thesis's
+/// sweep moves by 9 mHz: little against the 14 mHz half-power width of the slosh at 10 cm, and long
+/// enough to tell the harmonics of a sticking bearing from the sweep.
+pub const CYCLES: f64 = 24.0;
+
+/// Frequency response of `output` to `input`, sampled at `time` (s, evenly), while `sweep` passes
+/// each of `frequencies` (Hz). Frequencies it does not pass are left out.
+pub fn frequency_response(
+    sweep: &Profile,
+    time: &[f64],
+    input: &[f64],
+    output: &[f64],
+    frequencies: &[f64],
+) -> FrequencyResponse {
+    let carrier: Vec<Complex64> =
+        time.iter().map(|&t| Complex64::cis(-sweep.phase(t))).collect();
+    let mut result = FrequencyResponse::default();
+    for &frequency in frequencies {
+        let Some(centre) = sweep.time_of(frequency) else { continue };
+        let half = CYCLES / frequency / 2.0;
+        let from = time.partition_point(|&t| t < centre - half);
+        let to = time.partition_point(|&t| t <= centre + half);
+        let (mut u, mut y) = (Complex64::default(), Complex64::default());
+        for i in from..to {
+            let hann = 1.0 + (std::f64::consts::PI * (time[i] - centre) / half).cos();
+            let weight = carrier[i] * hann;
+            u += weight * input[i];
+            y += weight * output[i];
+        }
+        result.frequency.push(frequency);
+        result.response.push(y / u);
+    }
+    result
+}
