@@ -68,7 +68,8 @@ pub struct Law {
     b: f64,
     c: f64,
     d: f64,
-    omega_s: f64,
+    /// 1/w_s^2
+    inv_omega_s2: f64,
     eps: f64,
     forward: Bracket,
     backward: Bracket,
@@ -106,7 +107,7 @@ impl Law {
             b: p.b,
             c: p.c,
             d: p.d,
-            omega_s: p.omega_s,
+            inv_omega_s2: 1.0 / (p.omega_s * p.omega_s),
             eps: p.eps,
             forward,
             backward,
@@ -230,7 +231,7 @@ impl Law {
     /// Coefficient N of T_C(w) = c + d exp(-(w/w_s)^2).
     #[inline(always)]
     fn dry_torque<const N: usize>(&mut self, omega2: &Series) {
-        self.u[N] = -omega2[N] / (self.omega_s * self.omega_s);
+        self.u[N] = -omega2[N] * self.inv_omega_s2;
         self.e[N] = series::exp::<N>(&self.u, &self.e);
         self.t_c[N] = if N == 0 { self.c + self.d * self.e[0] } else { self.d * self.e[N] };
     }

@@ -27,19 +27,20 @@ impl Imu {
     }
 
     /// Takes the samples that fall due within `length` from `since_start` on, both s;
-    /// `omega` is the hub's rate as a function of the time within.
+    /// `omega` is the hub's rate as a function of the time within. Returns their number.
     pub(crate) fn follow(
         &self,
         gyro: &mut Gyro,
         since_start: f64,
         length: f64,
         omega: impl Fn(f64) -> f64,
-    ) {
+    ) -> usize {
+        let first = gyro.next;
         loop {
             let due = gyro.next as f64 / self.rate - since_start;
             // Communication points meet sampling instants only to rounding.
             if due > length + 1e-9 / self.rate {
-                break;
+                return (gyro.next - first) as usize;
             }
             self.sample(gyro, omega(due.max(0.0).min(length)));
         }

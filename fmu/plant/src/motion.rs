@@ -10,7 +10,7 @@
 use crate::friction::{Contact, Law};
 use crate::series::{self, ORDER, Series, ZERO, for_each_order};
 use crate::slosh::{Hub, Mode};
-use crate::{Imu, MODES, Ramp, State};
+use crate::{Imu, Ramp, State};
 
 /// Error of one step against the tolerance asked for. A step's error is forgotten
 /// as the liquid's motion decays, within some thousand steps.
@@ -19,8 +19,9 @@ const STEP_SHARE: f64 = 1e-2;
 /// Rates below this are nothing, rad/s: the floor of the error's scale.
 const NOTHING: f64 = 1e-6;
 
-/// The integrator's steps that one call may take.
-const MAX_STEPS: usize = 200_000;
+/// The integrator's steps, and the gyro's samples, that one call may take: at worst a
+/// few seconds of work.
+const MAX_STEPS: usize = 1_000_000;
 
 /// The lowest order that is trusted to show that a series has converged.
 const MIN_ORDER: usize = 5;
@@ -58,8 +59,8 @@ impl core::fmt::Display for StepError {
             StepError::TooManySteps { time } => write!(
                 f,
                 "the integrator used up its {MAX_STEPS} steps at t = {time} s; take shorter \
-                 communication steps or a looser tolerance, or, with stribeck_smooth, a larger \
-                 friction.eps"
+                 communication steps or a looser tolerance, with stribeck_smooth a larger \
+                 friction.eps, with the gyro a lower imu.rate"
             ),
             StepError::OutOfRange { time, mode, what } => {
                 write!(f, "slosh mode {mode} left its range at t = {time} s: {what}")
@@ -81,6 +82,8 @@ pub(crate) struct Motion {
     /// Torque of wheel and environment over the step.
     tau: [f64; 2],
     inertia: Series,
+    /// 1/J at the start of the expansion
+    inv_inertia: f64,
     /// tau + T, the torque that the bearing must hold at rest.
     pub net: Series,
     /// Power of the torques from outside, and heat of bearing and liquid, W.
@@ -99,6 +102,7 @@ impl Motion {
             hub,
             tau: [0.0; 2],
             inertia: ZERO,
+            inv_inertia: 0.0,
             net: ZERO,
             work: ZERO,
             heat: ZERO,
@@ -127,6 +131,9 @@ impl Motion {
             net += load.t;
         }
         self.inertia[N] = series::constant::<N>(self.i0) + inertia;
+        if N == 0 {
+            self.inv_inertia = 1.0 / self.inertia[0];
+        }
         self.net[N] = net;
         self.hub.omega_dot[N] = if contact == Contact::Stuck {
             self.friction.tau_f[N] = -net;
@@ -134,7 +141,8 @@ impl Motion {
         } else {
             self.friction.slip::<N>(contact, &self.theta, &self.hub.omega, &self.hub.omega2);
             let torque = net + self.friction.tau_f[N];
-            (torque - series::mul_tail::<N>(&self.inertia, &self.hub.omega_dot)) / self.inertia[0]
+            let rest = series::mul_tail::<N>(&self.inertia, &self.hub.omega_dot);
+            (torque - rest) * self.inv_inertia
         };
         self.work[N] = series::mul_ramp::<N>(&self.tau, &self.hub.omega);
         self.heat[N] = -series::mul::<N>(&self.friction.tau_f, &self.hub.omega);
@@ -147,8 +155,8 @@ impl Motion {
     /// Coefficient N + 1 of the state from coefficient N of its rates.
     #[inline(always)]
     fn grow<const N: usize, M: Mode>(&mut self, modes: &mut [M]) {
-        self.theta[N + 1] = self.hub.omega[N] / (N + 1) as f64;
-        self.hub.omega[N + 1] = self.hub.omega_dot[N] / (N + 1) as f64;
+        self.theta[N + 1] = series::next::<N>(self.hub.omega[N]);
+        self.hub.omega[N + 1] = series::next::<N>(self.hub.omega_dot[N]);
         for mode in modes.iter_mut() {
             mode.grow::<N>();
         }
@@ -291,7 +299,7 @@ impl Motion {
             if imu.enabled {
                 let since_start = begin + t - state.start_time;
                 let omega = |s| series::value(&self.hub.omega, n, s);
-                imu.follow(&mut state.gyro, since_start, length, omega);
+                *steps += imu.follow(&mut state.gyro, since_start, length, omega);
             }
             let stuck = contact == Contact::Stuck;
             state.work += series::integral(&self.work, n - 1, length);
@@ -343,7 +351,7 @@ impl State {
     }
 
     fn is_finite(&self) -> bool {
-        let modes: f64 = self.modes[..MODES].iter().flatten().map(|x| x * 0.0).sum();
-        (self.theta * 0.0 + self.omega * 0.0 + modes) == 0.0
+        let modes = self.modes.iter().flatten().all(|x| x.is_finite());
+        self.theta.is_finite() && self.omega.is_finite() && modes
     }
 }

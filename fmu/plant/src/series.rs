@@ -26,6 +26,12 @@ pub fn constant<const N: usize>(a: f64) -> f64 {
     if N == 0 { a } else { 0.0 }
 }
 
+/// Coefficient N + 1 of x from coefficient N of x'.
+#[inline(always)]
+pub fn next<const N: usize>(rate: f64) -> f64 {
+    rate * const { 1.0 / (N + 1) as f64 }
+}
+
 /// Coefficient N of a b: sum of a_j b_(N-j).
 #[inline(always)]
 pub fn mul<const N: usize>(a: &Series, b: &Series) -> f64 {
@@ -120,18 +126,18 @@ pub fn integral(a: &Series, n: usize, t: f64) -> f64 {
 /// is a step that cannot pass the first zero, and it converges to it
 /// quadratically, as Newton's does.
 pub fn first_root(a: &[f64], h: f64) -> Option<f64> {
-    let (mut power, mut fall, mut bend) = (1.0, 0.0, 0.0);
-    for (j, x) in a.iter().enumerate().skip(1) {
-        if j >= 2 {
-            bend += (j * (j - 1)) as f64 * x.abs() * power;
-            power *= h;
-            fall += f64::max(0.0, -x * power * h);
-        } else {
-            fall += f64::max(0.0, -x * h);
-        }
+    let (mut power, mut lowest) = (1.0, a[0]);
+    for x in &a[1..] {
+        power *= h;
+        lowest += f64::min(0.0, x * power);
     }
-    if a[0] > fall {
+    if lowest > 0.0 {
         return None;
+    }
+    let (mut power, mut bend) = (1.0, 0.0);
+    for (j, x) in a.iter().enumerate().skip(2) {
+        bend += (j * (j - 1)) as f64 * x.abs() * power;
+        power *= h;
     }
     let mut t = 0.0;
     // Far from a tangency some five steps do; the limit only bounds the work.

@@ -30,6 +30,10 @@ pub struct Pendulum {
     pub c: f64,
     /// Distance of the hinge from the bearing's axis, m.
     pub r: f64,
+    /// c/m, r/l and 1/l: quotients that every order of every step needs.
+    pub c_m: f64,
+    pub r_l: f64,
+    pub inv_l: f64,
     /// Wall elevation per slosh angle, m/rad: a_n = 2 R / (xi_n^2 - 1).
     pub wave: f64,
     /// Coefficient of the quartic spring over R^2, 1/m2 (paraboloid only).
@@ -59,6 +63,7 @@ pub struct Calculated {
 /// zeta = 0.79 sqrt(Re) [1 + (0.318/sinh(1.84 h/R)) (1 + (1 - h/R)/cosh(1.84 h/R))],
 /// Re = nu/sqrt(g R^3), R the tank's radius (Mikishev and Dorozhkin; Dodge 2000).
 /// Measured tanks scatter by about 30 % around it.
+#[allow(clippy::approx_constant)] // 0.318 is the correlation's, not 1/pi
 fn mikishev_dorozhkin(tank: &Tank, fluid: &Fluid, g: f64) -> f64 {
     let radius = tank.d / 2.0;
     let fill = tank.h / radius;
@@ -104,7 +109,7 @@ impl Calculated {
             let (m, l) = (self.mass[n], self.length[n]);
             let c = 2.0 * self.damping[n] * core::f64::consts::TAU * self.frequency[n] * m;
             let wave = 2.0 * radius / (XI[n] * XI[n] - 1.0);
-            Pendulum { m, l, c, r, wave, hardening }
+            Pendulum { m, l, c, r, c_m: c / m, r_l: r / l, inv_l: 1.0 / l, wave, hardening }
         })
     }
 }

@@ -12,7 +12,7 @@
 //! ```
 
 use super::{Angles, Hub, Load, Mode};
-use crate::series::{Series, ZERO, mul_ramp, square, value};
+use crate::series::{Series, ZERO, mul_ramp, next, square, value};
 use crate::tank::Pendulum;
 
 #[derive(Clone, Debug)]
@@ -49,7 +49,7 @@ impl Mode for Linear {
     fn load<const N: usize>(&mut self, hub: &Hub) -> Load {
         let Pendulum { m, l, c, r, .. } = self.p;
         if N == 0 {
-            self.omega_n = libm::sqrt(hub.g[0] / l);
+            self.omega_n = libm::sqrt(f64::max(hub.g[0], 0.0) / l);
         }
         self.g_al[N] = mul_ramp::<N>(&hub.g, &self.al);
         Load { j: 0.0, t: r * (m * self.g_al[N] + c * l * self.al_d[N]) }
@@ -57,14 +57,14 @@ impl Mode for Linear {
 
     #[inline(always)]
     fn respond<const N: usize>(&mut self, hub: &Hub) {
-        let Pendulum { m, l, c, r, .. } = self.p;
-        self.al_dd[N] = -(c / m) * self.al_d[N] - (self.g_al[N] + r * hub.omega_dot[N]) / l;
+        let Pendulum { c_m, r_l, inv_l, .. } = self.p;
+        self.al_dd[N] = -c_m * self.al_d[N] - inv_l * self.g_al[N] - r_l * hub.omega_dot[N];
     }
 
     #[inline(always)]
     fn grow<const N: usize>(&mut self) {
-        self.al[N + 1] = self.al_d[N] / (N + 1) as f64;
-        self.al_d[N + 1] = self.al_dd[N] / (N + 1) as f64;
+        self.al[N + 1] = next::<N>(self.al_d[N]);
+        self.al_d[N + 1] = next::<N>(self.al_dd[N]);
     }
 
     #[inline(always)]

@@ -16,7 +16,7 @@
 //! For small q a pendulum is the case h = 1/(2 l^2).
 
 use super::{Angles, Hub, Load, Mode};
-use crate::series::{Series, ZERO, constant, mul, mul_ramp, mul_tail, square, value};
+use crate::series::{Series, ZERO, constant, mul, mul_ramp, mul_tail, next, square, value};
 use crate::tank::Pendulum;
 
 #[derive(Clone, Debug)]
@@ -85,10 +85,10 @@ impl Mode for Paraboloid {
 
     #[inline(always)]
     fn load<const N: usize>(&mut self, hub: &Hub) -> Load {
-        let Pendulum { m, l, c, r, hardening, .. } = self.p;
+        let Pendulum { m, l, c, r, c_m, hardening, .. } = self.p;
         let one = constant::<N>(1.0);
         if N == 0 {
-            self.omega_n = libm::sqrt(hub.g[0] / l);
+            self.omega_n = libm::sqrt(f64::max(hub.g[0], 0.0) / l);
         }
         let [x, y] = &self.q;
         let [x_d, y_d] = &self.q_d;
@@ -107,7 +107,7 @@ impl Mode for Paraboloid {
         self.lever[N] = (r * y[N] - mul_tail::<N>(&self.n, &self.lever)) / self.n[0];
         let mu_q = [mul::<N>(&self.mu, x), mul::<N>(&self.mu, y)];
         for i in 0..2 {
-            self.b[i][N] = -(c / m) * self.q_d[i][N] + self.a[i][N] - mu_q[i];
+            self.b[i][N] = -c_m * self.q_d[i][N] + self.a[i][N] - mu_q[i];
         }
         Load {
             j: m * r * mul::<N>(&self.lever, y),
@@ -127,8 +127,8 @@ impl Mode for Paraboloid {
     #[inline(always)]
     fn grow<const N: usize>(&mut self) {
         for i in 0..2 {
-            self.q[i][N + 1] = self.q_d[i][N] / (N + 1) as f64;
-            self.q_d[i][N + 1] = self.q_dd[i][N] / (N + 1) as f64;
+            self.q[i][N + 1] = next::<N>(self.q_d[i][N]);
+            self.q_d[i][N + 1] = next::<N>(self.q_dd[i][N]);
         }
     }
 

@@ -14,7 +14,7 @@
 //! Lagrange's equations for this bob on the hub; to first order the linear model.
 
 use super::{Angles, Hub, Load, Mode};
-use crate::series::{Series, ZERO, mul, mul_ramp, sin_cos, square, value};
+use crate::series::{Series, ZERO, mul, mul_ramp, next, sin_cos, square, value};
 use crate::tank::Pendulum;
 
 #[derive(Clone, Debug)]
@@ -64,15 +64,15 @@ impl Mode for Planar {
 
     #[inline(always)]
     fn load<const N: usize>(&mut self, hub: &Hub) -> Load {
-        let Pendulum { m, l, c, r, .. } = self.p;
+        let Pendulum { m, l, c_m, r, .. } = self.p;
         if N == 0 {
-            self.omega_n = libm::sqrt(hub.g[0] / l);
+            self.omega_n = libm::sqrt(f64::max(hub.g[0], 0.0) / l);
         }
         (self.s[N], self.c[N]) = sin_cos::<N>(&self.al, &self.s, &self.c);
         self.sc[N] = mul::<N>(&self.s, &self.c);
         self.w_al_d[N] = mul::<N>(&hub.omega, &self.al_d);
         self.al_d2[N] = square::<N>(&self.al_d);
-        self.force[N] = mul_ramp::<N>(&hub.g, &self.s) + (c / m) * l * self.al_d[N]
+        self.force[N] = mul_ramp::<N>(&hub.g, &self.s) + c_m * l * self.al_d[N]
             - l * mul::<N>(&hub.omega2, &self.sc);
         Load {
             j: m * (r * r + l * l) * square::<N>(&self.s),
@@ -84,14 +84,14 @@ impl Mode for Planar {
 
     #[inline(always)]
     fn respond<const N: usize>(&mut self, hub: &Hub) {
-        let Pendulum { l, r, .. } = self.p;
-        self.al_dd[N] = -(r / l) * mul::<N>(&self.c, &hub.omega_dot) - self.force[N] / l;
+        let Pendulum { r_l, inv_l, .. } = self.p;
+        self.al_dd[N] = -r_l * mul::<N>(&self.c, &hub.omega_dot) - inv_l * self.force[N];
     }
 
     #[inline(always)]
     fn grow<const N: usize>(&mut self) {
-        self.al[N + 1] = self.al_d[N] / (N + 1) as f64;
-        self.al_d[N + 1] = self.al_dd[N] / (N + 1) as f64;
+        self.al[N + 1] = next::<N>(self.al_d[N]);
+        self.al_d[N + 1] = next::<N>(self.al_dd[N]);
     }
 
     #[inline(always)]

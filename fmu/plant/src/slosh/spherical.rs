@@ -28,7 +28,7 @@
 //! Derived from the bob's Lagrangian; checked against a unit-vector form.
 
 use super::{Angles, Hub, Load, Mode};
-use crate::series::{Series, ZERO, constant, mul, mul_ramp, mul_tail, square, value};
+use crate::series::{Series, ZERO, constant, mul, mul_ramp, mul_tail, next, square, value};
 use crate::tank::Pendulum;
 
 #[derive(Clone, Debug)]
@@ -139,10 +139,10 @@ impl Mode for Spherical {
 
     #[inline(always)]
     fn load<const N: usize>(&mut self, hub: &Hub) -> Load {
-        let Pendulum { m, l, c, r, .. } = self.p;
+        let Pendulum { m, l, c, r, c_m, r_l, inv_l, .. } = self.p;
         let one = constant::<N>(1.0);
         if N == 0 {
-            self.omega_n = libm::sqrt(hub.g[0] / l);
+            self.omega_n = libm::sqrt(f64::max(hub.g[0], 0.0) / l);
         }
         let [x, y] = &self.xi;
         let [x_d, y_d] = &self.xi_d;
@@ -157,8 +157,8 @@ impl Mode for Spherical {
         self.dir[2][N] = one - self.k[N];
         self.e[0][N] = (one - self.difference[N]) / 2.0;
         self.e[1][N] = -self.product[N];
-        self.a[0][N] = y[N] + r / l * self.product[N];
-        self.a[1][N] = -x[N] - r / l * (one + self.difference[N]) / 2.0;
+        self.a[0][N] = y[N] + r_l * self.product[N];
+        self.a[1][N] = -x[N] - r_l * (one + self.difference[N]) / 2.0;
         // rates
         self.v[0][N] = x_d[N] - mul::<N>(&hub.omega, y);
         self.v[1][N] = y_d[N] + mul::<N>(&hub.omega, x);
@@ -172,10 +172,10 @@ impl Mode for Spherical {
         let turn = [mul::<N>(&hub.omega, &self.xi_d_v[1]), -mul::<N>(&hub.omega, &self.xi_d_v[0])];
         for i in 0..2 {
             self.b[i][N] =
-                turn[i] - mul_ramp::<N>(&hub.g, &self.xi[i]) / l - c / m * self.xi_d[i][N]
+                turn[i] - inv_l * mul_ramp::<N>(&hub.g, &self.xi[i]) - c_m * self.xi_d[i][N]
                     + 2.0 * mul::<N>(&self.k_rho, &self.v[i])
                     - mul::<N>(&self.k_v2, &self.xi[i])
-                    + r / l * mul::<N>(&hub.omega2, &self.e[i]);
+                    + r_l * mul::<N>(&hub.omega2, &self.e[i]);
         }
         // J and T
         self.pull[N] = l * mul::<N>(&self.k, &self.k_v2) + r * mul::<N>(&hub.omega2, &self.dir[0])
@@ -200,8 +200,8 @@ impl Mode for Spherical {
     #[inline(always)]
     fn grow<const N: usize>(&mut self) {
         for i in 0..2 {
-            self.xi[i][N + 1] = self.xi_d[i][N] / (N + 1) as f64;
-            self.xi_d[i][N + 1] = self.xi_dd[i][N] / (N + 1) as f64;
+            self.xi[i][N + 1] = next::<N>(self.xi_d[i][N]);
+            self.xi_d[i][N + 1] = next::<N>(self.xi_dd[i][N]);
         }
     }
 
