@@ -212,7 +212,7 @@ impl State {
 
 /// The slosh modes in use, as the chosen model has them.
 #[derive(Clone, Debug)]
-enum Liquid {
+pub(crate) enum Liquid {
     Linear(Vec<Linear>),
     Planar(Vec<Planar>),
     Spherical(Vec<Spherical>),
@@ -231,6 +231,8 @@ macro_rules! with_modes {
     };
 }
 
+pub(crate) use with_modes;
+
 /// Hub, bearing, tank, wheel and gyro.
 #[derive(Clone, Debug)]
 pub struct Plant {
@@ -243,11 +245,11 @@ pub struct Plant {
     /// Wall elevation per slosh angle of each mode, m/rad, and the tank's radius, m.
     wave: [f64; MODES],
     radius: f64,
-    wheel: Wheel,
-    imu: Imu,
-    motion: Box<Motion>,
-    liquid: Liquid,
-    state: State,
+    pub(crate) wheel: Wheel,
+    pub(crate) imu: Imu,
+    pub(crate) motion: Box<Motion>,
+    pub(crate) liquid: Liquid,
+    pub(crate) state: State,
 }
 
 impl Plant {
@@ -404,9 +406,9 @@ impl Plant {
     }
 
     /// Evaluates the equations at the present instant.
-    fn rates(&mut self, inputs: &Inputs) {
+    pub(crate) fn rates(&mut self, inputs: &Inputs) {
         let tau_actuator = self.wheel.torque(self.state.wheel_speed, inputs.tau_cmd);
-        let tau = Ramp::held(tau_actuator + inputs.tau_ext.value);
+        let tau = Ramp::held(tau_actuator.value + inputs.tau_ext.value);
         let contact = self.state.contact;
         with_modes!(&mut self.liquid, modes => {
             self.motion.start(modes, &self.state, tau, inputs.g_axial);
@@ -471,7 +473,7 @@ impl Plant {
             energy,
             momentum,
             power_dissipated: heat,
-            tau_actuator: self.wheel.torque(state.wheel_speed, inputs.tau_cmd),
+            tau_actuator: self.wheel.torque(state.wheel_speed, inputs.tau_cmd).value,
             wheel_speed: state.wheel_speed,
             stuck: contact == Contact::Stuck,
             regime: match wave_height / self.radius {

@@ -10,6 +10,7 @@
 //! steps through time and finds stick and slip, `friction.rs`, `slosh/`, `tank.rs`,
 //! `wheel.rs`, `imu.rs` say what their names say, `series.rs` is the arithmetic.
 
+mod equations;
 mod friction;
 mod hub;
 mod imu;
@@ -20,6 +21,7 @@ mod slosh;
 mod tank;
 mod wheel;
 
+pub use equations::{INDICATORS, STATES};
 pub use hub::{Inputs, Outputs, Plant, Ramp, Regime, State};
 pub use motion::StepError;
 pub use parameters::{

@@ -87,8 +87,8 @@ pub(crate) struct Motion {
     /// tau + T, the torque that the bearing must hold at rest.
     pub net: Series,
     /// Power of the torques from outside, and heat of bearing and liquid, W.
-    work: Series,
-    heat: Series,
+    pub work: Series,
+    pub heat: Series,
 }
 
 impl Motion {

@@ -20,14 +20,9 @@ impl Wheel {
         )]
     }
 
-    /// The torque on the hub at a command and rotor speed, N m.
-    pub(crate) fn torque(&self, speed: f64, command: Ramp) -> f64 {
-        self.piece(speed, command).value
-    }
-
-    /// The torque's value and slope from now on. A command at a limit is within it
-    /// or beyond it by where it goes.
-    fn piece(&self, speed: f64, command: Ramp) -> Ramp {
+    /// The torque on the hub, N m, at a command and rotor speed, and its slope from now
+    /// on. A command at a limit is within it or beyond it by where it goes.
+    pub(crate) fn torque(&self, speed: f64, command: Ramp) -> Ramp {
         let Ramp { value, slope } = command;
         if !self.enabled {
             return command;
@@ -49,7 +44,7 @@ impl Wheel {
     /// The next piece, at most `h` long: its length, the torque on it and the
     /// rotor's speed after it. The command has fallen on `command.at(length)` then.
     pub(crate) fn next(&self, speed: f64, command: Ramp, h: f64) -> (f64, Ramp, f64) {
-        let torque = self.piece(speed, command);
+        let torque = self.torque(speed, command);
         if !self.enabled {
             return (h, torque, speed - torque.integral(h) / self.inertia);
         }
@@ -120,7 +115,7 @@ mod tests {
     #[test]
     fn torque_that_brings_the_rotor_back_is_given_at_the_limit() {
         let w = Wheel { speed_0: wheel().speed_min, ..wheel() };
-        assert_eq!(w.torque(w.speed_0, Ramp { value: 0.1, slope: 0.0 }), 0.0);
-        assert_eq!(w.torque(w.speed_0, Ramp { value: -0.1, slope: 0.0 }), -0.1);
+        assert_eq!(w.torque(w.speed_0, Ramp { value: 0.1, slope: 0.0 }).value, 0.0);
+        assert_eq!(w.torque(w.speed_0, Ramp { value: -0.1, slope: 0.0 }).value, -0.1);
     }
 }

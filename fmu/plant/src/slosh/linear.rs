@@ -45,6 +45,14 @@ impl Mode for Linear {
         (self.al[0], self.al_d[0]) = (q[1], q[3]);
     }
 
+    fn aim(&mut self, dq: &[f64; 4]) {
+        (self.al[1], self.al_d[1]) = (dq[1], dq[3]);
+    }
+
+    fn rate(&self, n: usize) -> [f64; 4] {
+        [0.0, self.al_d[n], 0.0, self.al_dd[n]]
+    }
+
     #[inline(always)]
     fn load<const N: usize>(&mut self, hub: &Hub) -> Load {
         let Pendulum { m, l, c, r, .. } = self.p;

@@ -60,6 +60,10 @@ pub trait Mode {
     fn angles(&self) -> Angles;
     /// Sets the coordinates at the start of the expansion.
     fn start(&mut self, q: &[f64; 4]);
+    /// Sets the direction, coefficient 1 of the coordinates, for a partial derivative.
+    fn aim(&mut self, dq: &[f64; 4]);
+    /// Coefficient n of q_x', q_y', q_x'', q_y''.
+    fn rate(&self, n: usize) -> [f64; 4];
     /// Coefficient N of J and T, from coefficients up to N of q, q' and w.
     fn load<const N: usize>(&mut self, hub: &Hub) -> Load;
     /// Coefficient N of q'', after `load`, when w' is known up to N.

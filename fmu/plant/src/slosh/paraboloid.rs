@@ -83,6 +83,15 @@ impl Mode for Paraboloid {
         (self.q_d[0][0], self.q_d[1][0]) = (q[2], q[3]);
     }
 
+    fn aim(&mut self, dq: &[f64; 4]) {
+        (self.q[0][1], self.q[1][1]) = (dq[0], dq[1]);
+        (self.q_d[0][1], self.q_d[1][1]) = (dq[2], dq[3]);
+    }
+
+    fn rate(&self, n: usize) -> [f64; 4] {
+        [self.q_d[0][n], self.q_d[1][n], self.q_dd[0][n], self.q_dd[1][n]]
+    }
+
     #[inline(always)]
     fn load<const N: usize>(&mut self, hub: &Hub) -> Load {
         let Pendulum { m, l, c, r, c_m, hardening, .. } = self.p;

@@ -137,6 +137,15 @@ impl Mode for Spherical {
         (self.xi_d[0][0], self.xi_d[1][0]) = (q[2], q[3]);
     }
 
+    fn aim(&mut self, dq: &[f64; 4]) {
+        (self.xi[0][1], self.xi[1][1]) = (dq[0], dq[1]);
+        (self.xi_d[0][1], self.xi_d[1][1]) = (dq[2], dq[3]);
+    }
+
+    fn rate(&self, n: usize) -> [f64; 4] {
+        [self.xi_d[0][n], self.xi_d[1][n], self.xi_dd[0][n], self.xi_dd[1][n]]
+    }
+
     #[inline(always)]
     fn load<const N: usize>(&mut self, hub: &Hub) -> Load {
         let Pendulum { m, l, c, r, c_m, r_l, inv_l, .. } = self.p;
