@@ -120,8 +120,7 @@ fn differences(name: &str, fill: &Fill, run: &Run, tolerance: f64) -> Vec<String
             *worst = worst.max(error);
         }
         let last = run.work.len() - 1;
-        for (signal, got, want) in
-            [("work", o.work, &run.work), ("heat", o.heat, &run.dissipated)]
+        for (signal, got, want) in [("work", o.work, &run.work), ("heat", o.heat, &run.dissipated)]
         {
             let scale = want[last].abs().max(run.dissipated[last]).max(1e-12);
             let worst = largest_error.entry(signal).or_default();
