@@ -331,7 +331,7 @@ impl Fmu {
             (c_string(with.name), c_string(with.guid), c_string(with.resources));
         let pointer = |text: &Option<CString>| text.as_ref().map_or(null(), |t| t.as_ptr());
         let sink = Box::into_raw(Box::new(Sink { write, messages: Mutex::default() }));
-        let full = with.callbacks == Callbacks::Full;
+        let full = matches!(with.callbacks, Callbacks::Full | Callbacks::Fleeting);
         let callbacks = Box::into_raw(Box::new(CallbackFunctions {
             logger: full.then_some(hubslosh_logger as Logger),
             allocate_memory: full.then_some(calloc),
@@ -351,6 +351,10 @@ impl Fmu {
                 with.logging.into(),
             )
         };
+        if with.callbacks == Callbacks::Fleeting {
+            // SAFETY: made above, read by nobody any more.
+            unsafe { callbacks.write_bytes(0, 1) };
+        }
         // A NULL component never reaches the FMU again: Drop frees only the sink.
         let instance = Instance { fmu: self, component, sink, callbacks, one_thread: PhantomData };
         if component.is_null() {
@@ -439,6 +443,9 @@ pub struct Instantiation<'a> {
 pub enum Callbacks {
     /// Logger and memory functions.
     Full,
+    /// As `Full`, and the struct is wiped once fmi2Instantiate has returned: it is valid during
+    /// that call alone.
+    Fleeting,
     /// A struct whose members are all NULL.
     Empty,
     /// No struct at all.

@@ -1,0 +1,795 @@
+//! The packed FMU through its C interface, called as hosts call it, well and
+//! badly. Every test works on the file that users get.
+
+use std::collections::BTreeSet;
+use std::fs::File;
+
+use hubslosh::description::Type;
+use hubslosh::fmi2::{CallError, Callbacks, Fmu, Instance, Message, Status};
+use hubslosh::pack::packed_for_tests;
+use object::Object;
+
+/// fmi2StatusKind
+const DO_STEP_STATUS: i32 = 0;
+const PENDING_STATUS: i32 = 1;
+const LAST_SUCCESSFUL_TIME: i32 = 2;
+const TERMINATED: i32 = 3;
+
+fn open() -> Fmu {
+    Fmu::open(packed_for_tests()).unwrap()
+}
+
+fn reference(fmu: &Fmu, name: &str) -> u32 {
+    fmu.description().variable(name).unwrap().reference
+}
+
+/// Ready to step from 0 s on.
+fn stepping<'fmu>(fmu: &'fmu Fmu, settings: &[(&str, &str)]) -> Instance<'fmu> {
+    stepping_from(fmu, 0.0, None, settings)
+}
+
+fn stepping_from<'fmu>(
+    fmu: &'fmu Fmu,
+    start: f64,
+    stop: Option<f64>,
+    settings: &[(&str, &str)],
+) -> Instance<'fmu> {
+    let mut instance = fmu.instantiate("one").unwrap();
+    for (name, value) in settings {
+        instance.set(name, value).unwrap();
+    }
+    instance.setup_experiment(None, start, stop).unwrap();
+    instance.enter_initialization_mode().unwrap();
+    instance.exit_initialization_mode().unwrap();
+    instance
+}
+
+/// Everything moves, sticks, samples and saturates.
+const LIVELY: &[(&str, &str)] = &[
+    ("slosh.model", "spherical"),
+    ("slosh.modes", "2"),
+    ("init.omega", "0.05"),
+    ("init.slosh_angle", "0.2"),
+    ("init.slosh_angle_radial", "0.1"),
+    ("wheel.enabled", "true"),
+    ("imu.enabled", "true"),
+];
+
+/// Every variable there is, as bits.
+fn all(instance: &mut Instance) -> Vec<u64> {
+    let variables = &instance.fmu().description().variables.list;
+    let each = variables.iter().map(|variable| {
+        let reference = [variable.reference];
+        match variable.kind() {
+            Type::Real => {
+                let mut value = [0.0];
+                instance.get_real(&reference, &mut value).unwrap();
+                value[0].to_bits()
+            }
+            Type::Boolean => {
+                let mut value = [0];
+                instance.get_boolean(&reference, &mut value).unwrap();
+                value[0] as u64
+            }
+            _ => {
+                let mut value = [0];
+                instance.get_integer(&reference, &mut value).unwrap();
+                value[0] as u64
+            }
+        }
+    });
+    each.collect()
+}
+
+/// All there is to an instance, as bytes.
+fn state(instance: &mut Instance) -> Vec<u8> {
+    let saved = instance.get_state().unwrap();
+    let bytes = instance.serialize(&saved).unwrap();
+    instance.free_state(saved).unwrap();
+    bytes
+}
+
+/// One second in uneven steps under a torque that turns.
+fn drive(instance: &mut Instance, from: f64) {
+    let torque = [reference(instance.fmu(), "tau_cmd")];
+    let mut at = from;
+    for (n, h) in [0.01, 0.14, 0.2, 0.05, 0.3, 0.3].into_iter().enumerate() {
+        instance.set_real(&torque, &[0.03 * (n as f64 - 2.0)]).unwrap();
+        instance.set_real_input_derivatives(&torque, &[1], &[0.1]).unwrap();
+        instance.do_step(at, h).unwrap();
+        at += h;
+    }
+}
+
+/// The call was refused with fmi2Error and one message, which contains all of `parts`.
+#[track_caller]
+fn refused<T>(result: Result<T, CallError>, parts: &[&str]) {
+    let Err(error) = result else { panic!("not refused") };
+    assert_eq!(error.status, Status::Error, "{error}");
+    let [message] = &error.messages[..] else { panic!("{:?}", error.messages) };
+    assert!(message.text.starts_with(error.call), "{} is not named: {}", error.call, message.text);
+    for part in parts {
+        assert!(message.text.contains(part), "{part} is not in: {}", message.text);
+    }
+}
+
+// ---- Archive and binary ----
+
+fn archive() -> zip::ZipArchive<File> {
+    zip::ZipArchive::new(File::open(packed_for_tests()).unwrap()).unwrap()
+}
+
+#[test]
+fn archive_begins_with_the_model_description_and_is_plain() {
+    let mut archive = archive();
+    let mut names = BTreeSet::new();
+    for n in 0..archive.len() {
+        let file = archive.by_index(n).unwrap();
+        let name = file.name().unwrap().into_owned();
+        assert_eq!(n == 0, name == "modelDescription.xml", "{name} is number {n}");
+        let plain = matches!(
+            file.compression(),
+            zip::CompressionMethod::Deflated | zip::CompressionMethod::Stored
+        );
+        assert!(plain && !file.encrypted() && !file.is_symlink(), "{name}");
+        assert!(!name.contains('\\') && !name.starts_with('/') && !name.contains(".."), "{name}");
+        let time = file.last_modified().unwrap();
+        assert_eq!((time.year(), time.month(), time.day()), (1980, 1, 1), "{name}");
+        assert!(names.insert(name.clone()), "{name} is there twice");
+    }
+}
+
+#[test]
+fn the_same_source_gives_the_same_archive() {
+    let directory = tempfile();
+    let again = directory.path().join("again.fmu");
+    hubslosh::pack::pack(&again).unwrap();
+    // Cargo builds once for both; what packing adds is the same each time.
+    assert!(std::fs::read(again).unwrap() == std::fs::read(packed_for_tests()).unwrap());
+}
+
+fn tempfile() -> tempfile::TempDir {
+    tempfile::tempdir().unwrap()
+}
+
+#[test]
+fn binary_exports_the_functions_of_fmi_and_nothing_else() {
+    let mut archive = archive();
+    let binaries: Vec<String> = archive
+        .file_names()
+        .flatten()
+        .filter(|name| name.starts_with("binaries/"))
+        .map(String::from)
+        .collect();
+    assert!(!binaries.is_empty());
+    let expected: BTreeSet<String> = Fmu::symbols().iter().map(|s| s.to_string()).collect();
+    for name in binaries {
+        let mut bytes = Vec::new();
+        std::io::copy(&mut archive.by_name(&name).unwrap(), &mut bytes).unwrap();
+        let binary = object::File::parse(&*bytes).unwrap();
+        let exported: BTreeSet<String> = binary
+            .exports()
+            .unwrap()
+            .iter()
+            // Mach-O puts an underscore before every C name.
+            .map(|export| String::from_utf8_lossy(export.name()).trim_start_matches('_').into())
+            .collect();
+        assert_eq!(exported, expected, "{name}");
+    }
+}
+
+#[test]
+fn binary_says_that_it_is_fmi_2_with_the_standard_s_types() {
+    let fmu = open();
+    assert_eq!((fmu.version().as_str(), fmu.types_platform().as_str()), ("2.0", "default"));
+}
+
+#[test]
+fn functions_that_are_not_offered_say_so() {
+    let fmu = open();
+    let mut instance = stepping(&fmu, &[]);
+    refused(instance.cancel_step(), &["no step is running"]);
+    refused(instance.get_string(&[0]), &["theta", "Real"]);
+    refused(instance.set_string(&[0], &["one"]), &["theta", "Real"]);
+    refused(instance.set_string_null(0), &["theta", "Real"]);
+}
+
+// ---- Loading, copies, threads ----
+
+#[test]
+fn survives_loading_and_unloading_many_times() {
+    for _ in 0..200 {
+        let fmu = open();
+        let mut instance = stepping(&fmu, &[]);
+        instance.do_step(0.0, 0.1).unwrap();
+        // A panic hook or anything else left behind would point to code that is gone.
+        refused(instance.do_step(f64::NAN, 0.1), &[]);
+    }
+}
+
+#[test]
+fn several_copies_and_instances_do_not_disturb_each_other() {
+    let (first, second) = (open(), open());
+    let mut alone = stepping(&first, LIVELY);
+    drive(&mut alone, 0.0);
+    let expected = all(&mut alone);
+    let mut instances: Vec<_> =
+        [&first, &second].into_iter().cycle().take(20).map(|fmu| stepping(fmu, LIVELY)).collect();
+    let torque = [reference(&first, "tau_cmd")];
+    // In turns: each step of `drive` in all of them.
+    let mut at = 0.0;
+    for (n, h) in [0.01, 0.14, 0.2, 0.05, 0.3, 0.3].into_iter().enumerate() {
+        for instance in &mut instances {
+            instance.set_real(&torque, &[0.03 * (n as f64 - 2.0)]).unwrap();
+            instance.set_real_input_derivatives(&torque, &[1], &[0.1]).unwrap();
+            instance.do_step(at, h).unwrap();
+        }
+        at += h;
+    }
+    for instance in &mut instances {
+        assert_eq!(all(instance), expected);
+    }
+}
+
+#[test]
+fn instances_in_several_threads_give_the_same_bits() {
+    let fmu = open();
+    let run = || {
+        let mut instance = stepping(&fmu, LIVELY);
+        for n in 0..20 {
+            drive(&mut instance, n as f64);
+        }
+        all(&mut instance)
+    };
+    let expected = run();
+    std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..8).map(|_| scope.spawn(run)).collect();
+        for thread in threads {
+            assert_eq!(thread.join().unwrap(), expected);
+        }
+    });
+}
+
+/// Rounding to nearest, numbers below the normal range kept, the directory where
+/// it was.
+#[test]
+fn host_s_arithmetic_and_directory_are_left_alone() {
+    let arithmetic = || {
+        let [one, three, small] = [1.0, 3.0, f64::MIN_POSITIVE].map(std::hint::black_box);
+        [one / three, -one / three, small / three, 2.5f64.round_ties_even()].map(f64::to_bits)
+    };
+    let before = (arithmetic(), std::env::current_dir().unwrap());
+    let fmu = open();
+    let mut instance = stepping(&fmu, LIVELY);
+    drive(&mut instance, 0.0);
+    assert_eq!((arithmetic(), std::env::current_dir().unwrap()), before);
+}
+
+// ---- Making an instance ----
+
+#[test]
+fn wrong_or_missing_guid_gives_no_instance_and_a_reason() {
+    let fmu = open();
+    let guid = fmu.description().guid.as_str();
+    for wrong in [None, Some(""), Some("{8c4e810f-3df3-4a00-8276-176fa3c9f000}"), Some("%s%n%d")] {
+        let mut with = fmu.instantiation("one");
+        with.guid = wrong;
+        refused(fmu.instantiate_with(&with), &[wrong.unwrap_or("NULL"), guid]);
+    }
+}
+
+#[test]
+fn missing_name_gives_no_instance_and_a_reason() {
+    let fmu = open();
+    for wrong in [None, Some(""), Some(" \t")] {
+        let mut with = fmu.instantiation("one");
+        with.name = wrong;
+        refused(fmu.instantiate_with(&with), &["instanceName"]);
+    }
+}
+
+#[test]
+fn without_callbacks_there_is_no_instance_and_no_crash() {
+    let fmu = open();
+    let mut with = fmu.instantiation("one");
+    with.callbacks = Callbacks::Null;
+    assert!(fmu.instantiate_with(&with).is_err());
+}
+
+#[test]
+fn every_callback_and_the_resource_location_may_be_null() {
+    let fmu = open();
+    let mut with = fmu.instantiation("one");
+    with.callbacks = Callbacks::Empty;
+    with.resources = None;
+    let mut instance = fmu.instantiate_with(&with).unwrap();
+    instance.enter_initialization_mode().unwrap();
+    instance.exit_initialization_mode().unwrap();
+    instance.do_step(0.0, 0.1).unwrap();
+    // Has something to say, and nobody to say it to.
+    assert!(instance.do_step(0.0, -0.1).is_err());
+    // Neither has a failing fmi2Instantiate.
+    with.guid = None;
+    assert!(fmu.instantiate_with(&with).is_err());
+}
+
+#[test]
+fn callbacks_name_and_guid_need_not_outlive_fmi2_instantiate() {
+    let fmu = open();
+    let mut with = fmu.instantiation("one");
+    with.callbacks = Callbacks::Fleeting;
+    let mut instance = fmu.instantiate_with(&with).unwrap();
+    refused(instance.do_step(0.0, 0.1), &["fmi2DoStep"]);
+}
+
+#[test]
+fn unusual_names_are_fine() {
+    let fmu = open();
+    for name in ["%s%n", "Ünwucht 液", &"x".repeat(10_000)] {
+        fmu.instantiate(name).unwrap();
+    }
+}
+
+#[test]
+fn no_function_minds_a_null_instance() {
+    for (call, status) in open().calls_with_null_instance() {
+        assert_eq!(status, Status::Error, "{call}");
+    }
+}
+
+// ---- The logger ----
+
+#[test]
+fn messages_are_proper_text_in_a_declared_category() {
+    let fmu = open();
+    let xml = {
+        let mut text = String::new();
+        let mut archive = archive();
+        let mut file = archive.by_name("modelDescription.xml").unwrap();
+        std::io::Read::read_to_string(&mut file, &mut text).unwrap();
+        text
+    };
+    let mut instance = stepping(&fmu, &[]);
+    let errors = [
+        instance.do_step(0.0, f64::NAN).unwrap_err(),
+        instance.get_real(&[u32::MAX], &mut [0.0]).unwrap_err(),
+        instance.get_real_null(1).unwrap_err(),
+        instance.real_status(PENDING_STATUS).unwrap_err(),
+        instance.set_debug_logging(true, &["%s%n Ü"]).unwrap_err(),
+    ];
+    for Message { category, text, status } in errors.iter().flat_map(|e| &e.messages) {
+        assert!(xml.contains(&format!("<Category name=\"{category}\"")), "{category}");
+        assert!(!text.is_empty() && text.trim() == text && !text.contains('\u{fffd}'), "{text:?}");
+        assert!(!text.contains('\n'), "{text:?}");
+        assert!(matches!(status, Status::Error | Status::Discard));
+    }
+}
+
+#[test]
+fn a_percent_sign_is_text_and_no_format() {
+    let fmu = open();
+    let mut instance = fmu.instantiate("one").unwrap();
+    let text = "%s%s%s%n%d %";
+    refused(instance.set_debug_logging(true, &[text]), &[text, "logStatusError"]);
+}
+
+#[test]
+fn messages_come_in_the_categories_asked_for() {
+    let fmu = open();
+    let mut instance = stepping(&fmu, &[]);
+    let messages = |instance: &mut Instance| {
+        instance.do_step(0.0, -1.0).unwrap_err().messages.len()
+            + 10 * instance.real_status(PENDING_STATUS).unwrap_err().messages.len()
+    };
+    instance.set_debug_logging(true, &[]).unwrap();
+    assert_eq!(messages(&mut instance), 11, "no categories means all");
+    instance.set_debug_logging(true, &["logStatusDiscard"]).unwrap();
+    assert_eq!(messages(&mut instance), 10);
+    instance.set_debug_logging(true, &["logStatusError", "logStatusFatal"]).unwrap();
+    assert_eq!(messages(&mut instance), 1);
+    instance.set_debug_logging(false, &[]).unwrap();
+    assert_eq!(messages(&mut instance), 0);
+    instance.set_debug_logging(true, &["logAll"]).unwrap();
+    assert_eq!(messages(&mut instance), 11);
+}
+
+/// A host that logs everything and names a tolerance hears nothing, and never gets
+/// a warning: some take anything but fmi2OK for a failure.
+#[test]
+fn normal_use_is_silent() {
+    let fmu = open();
+    let mut instance = fmu.instantiate("one").unwrap();
+    instance.set_debug_logging(true, &[]).unwrap();
+    for (name, value) in LIVELY {
+        instance.set(name, value).unwrap();
+    }
+    instance.setup_experiment(Some(1e-6), 0.0, Some(10.0)).unwrap();
+    instance.enter_initialization_mode().unwrap();
+    instance.exit_initialization_mode().unwrap();
+    for n in 0..10 {
+        drive(&mut instance, n as f64);
+        all(&mut instance);
+    }
+    instance.terminate().unwrap();
+    assert_eq!(instance.take_messages(), []);
+}
+
+// ---- The order of calls ----
+
+#[test]
+fn calls_in_the_wrong_state_are_refused_with_call_and_state() {
+    let fmu = open();
+    let torque = [reference(&fmu, "tau_cmd")];
+    let omega = [reference(&fmu, "omega")];
+
+    let mut instance = fmu.instantiate("one").unwrap();
+    let before = state(&mut instance);
+    refused(instance.exit_initialization_mode(), &["\"instantiated\"", "initialization mode"]);
+    refused(instance.do_step(0.0, 0.1), &["\"instantiated\"", "stepping"]);
+    refused(instance.terminate(), &["\"instantiated\""]);
+    refused(instance.cancel_step(), &["\"instantiated\""]);
+    refused(instance.get_real(&omega, &mut [0.0]), &["omega", "\"instantiated\""]);
+    refused(instance.get_real_output_derivatives(&omega, &[1], &mut [0.0]), &["\"instantiated\""]);
+    refused(instance.get_directional_derivative(&omega, &torque, &[1.0]), &["\"instantiated\""]);
+    assert_eq!(state(&mut instance), before);
+
+    instance.enter_initialization_mode().unwrap();
+    refused(instance.enter_initialization_mode(), &["\"initialization mode\""]);
+    refused(instance.setup_experiment(None, 0.0, None), &["\"initialization mode\""]);
+    refused(instance.do_step(0.0, 0.1), &["\"initialization mode\""]);
+    refused(instance.terminate(), &["\"initialization mode\""]);
+
+    instance.exit_initialization_mode().unwrap();
+    refused(instance.enter_initialization_mode(), &["\"stepping\""]);
+    refused(instance.exit_initialization_mode(), &["\"stepping\""]);
+    refused(instance.setup_experiment(None, 0.0, None), &["\"stepping\""]);
+
+    instance.terminate().unwrap();
+    refused(instance.terminate(), &["\"terminated\""]);
+    refused(instance.do_step(0.0, 0.1), &["\"terminated\""]);
+    refused(instance.set_real(&torque, &[0.1]), &["\"terminated\""]);
+    all(&mut instance);
+}
+
+#[test]
+fn anything_can_be_set_before_and_after_setup_experiment_inputs_too() {
+    let fmu = open();
+    let mut instance = fmu.instantiate("one").unwrap();
+    instance.set("tau_cmd", "0.01").unwrap();
+    instance.set("tank.h", "0.05").unwrap();
+    instance.setup_experiment(None, 0.0, None).unwrap();
+    instance.set("tau_cmd", "0.02").unwrap();
+    instance.set("tank.h", "0.06").unwrap();
+    instance.enter_initialization_mode().unwrap();
+    instance.set("tau_cmd", "0.03").unwrap();
+    instance.set("tank.h", "0.07").unwrap();
+    all(&mut instance);
+    instance.exit_initialization_mode().unwrap();
+    assert_eq!(instance.real("tau_cmd").unwrap(), 0.03);
+    assert_eq!(instance.real("tank.h").unwrap(), 0.07);
+}
+
+#[test]
+fn setup_experiment_may_be_left_out() {
+    let fmu = open();
+    let mut instance = fmu.instantiate("one").unwrap();
+    instance.enter_initialization_mode().unwrap();
+    instance.exit_initialization_mode().unwrap();
+    instance.do_step(0.0, 0.1).unwrap();
+}
+
+#[test]
+fn nothing_to_get_or_set_is_fine_with_null_and_something_is_not() {
+    let fmu = open();
+    let mut instance = stepping(&fmu, &[]);
+    instance.get_real_null(0).unwrap();
+    instance.set_real_null(0).unwrap();
+    refused(instance.get_real_null(1), &["vr is NULL"]);
+    refused(instance.set_real_null(1), &["vr is NULL"]);
+}
+
+#[test]
+fn unknown_mistyped_and_computed_variables_are_refused_by_name() {
+    let fmu = open();
+    let mut instance = stepping(&fmu, &[]);
+    let [omega, stuck, regime, height] =
+        ["omega", "stuck", "regime", "tank.h"].map(|n| [reference(&fmu, n)]);
+    refused(instance.get_real(&[u32::MAX], &mut [0.0]), &["4294967295"]);
+    refused(instance.get_real(&stuck, &mut [0.0]), &["stuck", "Boolean"]);
+    refused(instance.get_integer(&omega, &mut [0]), &["omega", "Real"]);
+    refused(instance.get_boolean(&regime, &mut [0]), &["regime", "Integer"]);
+    refused(instance.set_boolean(&omega, &[1]), &["omega", "Real"]);
+    refused(instance.set_integer(&regime, &[1]), &["regime", "computed"]);
+    refused(instance.set_real(&height, &[0.1]), &["tank.h", "fixed", "stepping"]);
+}
+
+#[test]
+fn every_boolean_that_is_not_0_is_true_and_reads_1() {
+    let fmu = open();
+    let mut instance = fmu.instantiate("one").unwrap();
+    let enabled = [reference(&fmu, "imu.enabled")];
+    for (set, got) in [(2, 1), (0, 0), (-1, 1), (i32::MIN, 1)] {
+        instance.set_boolean(&enabled, &[set]).unwrap();
+        let mut value = [7];
+        instance.get_boolean(&enabled, &mut value).unwrap();
+        assert_eq!(value, [got]);
+    }
+}
+
+// ---- Parameters and inputs ----
+
+#[test]
+fn all_bad_parameters_are_reported_at_once_and_can_be_mended() {
+    let fmu = open();
+    let mut instance = fmu.instantiate("one").unwrap();
+    let bad = [("tank.h", "-1"), ("tank.d", "NaN"), ("init.theta", "inf"), ("slosh.modes", "11")];
+    for (name, value) in bad {
+        instance.set(name, value).unwrap();
+    }
+    instance.set_integer(&[reference(&fmu, "slosh.model")], &[0]).unwrap();
+    instance.enter_initialization_mode().unwrap();
+    refused(
+        instance.exit_initialization_mode(),
+        &[
+            "tank.h = -1.0 m (allowed: 0.0001 m to 100.0 m)",
+            "tank.d = NaN m",
+            "init.theta = inf rad",
+            "slosh.modes = 11 (allowed: 1 to 10)",
+            "slosh.model = 0 (allowed: 1 frozen, 2 linear",
+        ],
+    );
+    let good = [("tank.h", "0.1"), ("tank.d", "0.163"), ("init.theta", "0"), ("slosh.modes", "1")];
+    for (name, value) in good {
+        instance.set(name, value).unwrap();
+    }
+    instance.set("slosh.model", "linear").unwrap();
+    instance.exit_initialization_mode().unwrap();
+}
+
+#[test]
+fn parameters_that_contradict_each_other_are_reported() {
+    let fmu = open();
+    let mut instance = fmu.instantiate("one").unwrap();
+    instance.set("wheel.speed_min", "1000").unwrap();
+    instance.enter_initialization_mode().unwrap();
+    refused(instance.exit_initialization_mode(), &["wheel.speed_0", "wheel.speed_min"]);
+}
+
+#[test]
+fn inputs_that_are_no_number_or_out_of_range_are_refused_on_the_spot() {
+    let fmu = open();
+    let mut instance = stepping(&fmu, LIVELY);
+    let before = state(&mut instance);
+    let inputs = ["tau_cmd", "tau_ext", "g_axial"].map(|n| reference(&fmu, n));
+    for (n, value) in [(0, f64::NAN), (1, f64::NEG_INFINITY), (2, -1.0)] {
+        let mut values = [0.1, 0.2, 9.0];
+        values[n] = value;
+        refused(instance.set_real(&inputs, &values), &[["tau_cmd", "tau_ext", "g_axial"][n]]);
+        let slope = [f64::NAN];
+        refused(instance.set_real_input_derivatives(&inputs[n..=n], &[1], &slope), &["NaN"]);
+        refused(instance.set_real_input_derivatives(&inputs[n..=n], &[2], &[0.1]), &["order 2"]);
+    }
+    assert_eq!(state(&mut instance), before);
+}
+
+// ---- Steps ----
+
+#[test]
+fn steps_of_no_positive_length_are_refused_and_change_nothing() {
+    let fmu = open();
+    let mut instance = stepping(&fmu, LIVELY);
+    instance.do_step(0.0, 0.5).unwrap();
+    let before = state(&mut instance);
+    for h in [0.0, -0.0, -0.1, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        refused(instance.do_step(0.5, h), &["communicationStepSize"]);
+    }
+    for at in [0.0, 0.4, 0.51, 1e9, f64::NAN, f64::INFINITY] {
+        refused(instance.do_step(at, 0.1), &["currentCommunicationPoint"]);
+    }
+    assert_eq!(state(&mut instance), before);
+    instance.do_step(0.5, 0.1).unwrap();
+}
+
+/// Hosts say n h or add up h: both are off the true time by a few ulps.
+#[test]
+fn communication_point_may_wobble_by_rounding_and_is_landed_on_exactly() {
+    let fmu = open();
+    let h = 0.1;
+    for start in [0.0, -100.0, 1e6] {
+        let steps = 1000;
+        let stop = start + f64::from(steps) * h;
+        let mut instance = stepping_from(&fmu, start, Some(stop), &[]);
+        let mut added = start;
+        for n in 0..steps {
+            let at = if n % 2 == 0 { start + f64::from(n) * h } else { added };
+            instance.do_step(at, h).unwrap();
+            assert_eq!(instance.real_status(LAST_SUCCESSFUL_TIME).unwrap(), at + h);
+            added += h;
+        }
+    }
+}
+
+#[test]
+fn a_step_past_the_stop_time_is_refused() {
+    let fmu = open();
+    let mut instance = stepping_from(&fmu, 0.0, Some(1.0), &[]);
+    instance.do_step(0.0, 0.75).unwrap();
+    refused(instance.do_step(0.75, 0.26), &["stop time"]);
+    instance.do_step(0.75, 0.25).unwrap();
+    refused(instance.do_step(1.0, 1e-3), &["stop time"]);
+}
+
+/// Powers of two, so that all times are exact.
+#[test]
+fn the_time_of_the_start_does_not_matter() {
+    let fmu = open();
+    let run = |start: f64| {
+        let mut instance = stepping_from(&fmu, start, None, &[("init.slosh_angle", "0.2")]);
+        for n in 0..64 {
+            instance.do_step(start + f64::from(n) * 0.125, 0.125).unwrap();
+        }
+        ["theta", "slosh_angle", "energy"].map(|name| instance.real(name).unwrap().to_bits())
+    };
+    let expected = run(0.0);
+    for start in [-1024.0, -2.0, 65536.0] {
+        assert_eq!(run(start), expected, "{start}");
+    }
+}
+
+#[test]
+fn an_experiment_that_makes_no_sense_is_refused() {
+    let fmu = open();
+    let mut instance = fmu.instantiate("one").unwrap();
+    refused(instance.setup_experiment(None, f64::NAN, None), &["startTime"]);
+    refused(instance.setup_experiment(None, 1.0, Some(0.0)), &["stopTime"]);
+    refused(instance.setup_experiment(Some(0.0), 0.0, None), &["tolerance"]);
+    instance.setup_experiment(Some(1e-6), 0.0, Some(1.0)).unwrap();
+}
+
+#[test]
+fn a_run_that_diverges_is_an_error_and_never_rubbish() {
+    let fmu = open();
+    let mut instance = stepping(&fmu, &[("tau_cmd", "1e308")]);
+    refused(instance.do_step(0.0, 10.0), &["no longer finite"]);
+    assert_eq!(instance.status(DO_STEP_STATUS).unwrap(), 3, "fmi2Error");
+    assert_eq!(instance.real_status(LAST_SUCCESSFUL_TIME).unwrap(), 0.0);
+    assert_eq!(instance.real("theta").unwrap(), 0.0, "stands where it was");
+    refused(instance.do_step(0.0, 0.1), &["\"step failed\""]);
+    instance.terminate().unwrap();
+}
+
+#[test]
+fn the_last_step_can_be_asked_about() {
+    let fmu = open();
+    let mut instance = stepping(&fmu, &[]);
+    instance.do_step(0.0, 0.25).unwrap();
+    assert_eq!(instance.status(DO_STEP_STATUS).unwrap(), 0, "fmi2OK");
+    assert_eq!(instance.real_status(LAST_SUCCESSFUL_TIME).unwrap(), 0.25);
+    assert!(!instance.boolean_status(TERMINATED).unwrap());
+    // No step is ever pending.
+    let unanswered = [
+        instance.string_status(PENDING_STATUS).unwrap_err(),
+        instance.integer_status(DO_STEP_STATUS).unwrap_err(),
+        instance.status(77).unwrap_err(),
+    ];
+    for error in unanswered {
+        assert_eq!(error.status, Status::Discard, "{error}");
+    }
+}
+
+// ---- Reset, end, saved states ----
+
+#[test]
+fn reset_from_every_state_is_a_fresh_instance_bit_for_bit() {
+    let fmu = open();
+    let mut fresh = fmu.instantiate("one").unwrap();
+    let expected = state(&mut fresh);
+    let mut initializing = fmu.instantiate("one").unwrap();
+    initializing.set("tank.h", "NaN").unwrap();
+    initializing.setup_experiment(Some(1e-5), 3.0, Some(4.0)).unwrap();
+    initializing.enter_initialization_mode().unwrap();
+    let mut stepped = stepping_from(&fmu, 5.0, Some(9.0), LIVELY);
+    drive(&mut stepped, 5.0);
+    let mut terminated = stepping(&fmu, LIVELY);
+    terminated.terminate().unwrap();
+    let mut failed = stepping(&fmu, &[("tau_cmd", "1e308")]);
+    failed.do_step(0.0, 10.0).unwrap_err();
+    for mut instance in [fresh, initializing, stepped, terminated, failed] {
+        instance.reset().unwrap();
+        assert_eq!(state(&mut instance), expected);
+        // And it lives as a fresh one.
+        let mut other = stepping(&fmu, LIVELY);
+        for (name, value) in LIVELY {
+            instance.set(name, value).unwrap();
+        }
+        instance.setup_experiment(None, 0.0, None).unwrap();
+        instance.enter_initialization_mode().unwrap();
+        instance.exit_initialization_mode().unwrap();
+        drive(&mut instance, 0.0);
+        drive(&mut other, 0.0);
+        assert_eq!(state(&mut instance), state(&mut other));
+    }
+}
+
+#[test]
+fn a_terminated_instance_can_still_be_read() {
+    let fmu = open();
+    let mut instance = stepping(&fmu, LIVELY);
+    drive(&mut instance, 0.0);
+    let last = all(&mut instance);
+    instance.terminate().unwrap();
+    assert_eq!(all(&mut instance), last);
+}
+
+/// Back, and into an instance that was only just made: no setup, no initialization.
+#[test]
+fn a_saved_state_continues_bit_for_bit_also_in_a_new_instance() {
+    let fmu = open();
+    for model in ["frozen", "linear", "planar", "spherical", "paraboloid"] {
+        let mut instance = fmu.instantiate("one").unwrap();
+        for (name, value) in LIVELY {
+            instance.set(name, value).unwrap();
+        }
+        instance.set("slosh.model", model).unwrap();
+        instance.enter_initialization_mode().unwrap();
+        instance.exit_initialization_mode().unwrap();
+        drive(&mut instance, 0.0);
+        let saved = instance.get_state().unwrap();
+        let bytes = instance.serialize(&saved).unwrap();
+        let here = all(&mut instance);
+        drive(&mut instance, 1.0);
+        let there = all(&mut instance);
+
+        instance.set_state(&saved).unwrap();
+        assert_eq!(all(&mut instance), here, "{model}");
+        drive(&mut instance, 1.0);
+        assert_eq!(all(&mut instance), there, "{model}");
+        instance.free_state(saved).unwrap();
+
+        let elsewhere = open();
+        let mut other = elsewhere.instantiate("other").unwrap();
+        let read = other.deserialize(&bytes).unwrap();
+        other.set_state(&read).unwrap();
+        assert_eq!(all(&mut other), here, "{model}");
+        drive(&mut other, 1.0);
+        assert_eq!(all(&mut other), there, "{model}");
+        other.free_state(read).unwrap();
+    }
+}
+
+#[test]
+fn the_handle_of_a_saved_state_is_reused_and_null_is_fine_to_free() {
+    let fmu = open();
+    let mut instance = stepping(&fmu, LIVELY);
+    let mut saved = instance.get_state().unwrap();
+    drive(&mut instance, 0.0);
+    let here = all(&mut instance);
+    instance.get_state_into(&mut saved).unwrap();
+    drive(&mut instance, 1.0);
+    instance.set_state(&saved).unwrap();
+    assert_eq!(all(&mut instance), here);
+    instance.free_state(saved).unwrap();
+    instance.free_state_null().unwrap();
+    refused(instance.set_state_null(), &["FMUstate is NULL"]);
+}
+
+#[test]
+fn bytes_that_are_no_state_are_refused() {
+    let fmu = open();
+    let mut instance = stepping(&fmu, LIVELY);
+    drive(&mut instance, 0.0);
+    let bytes = state(&mut instance);
+    assert!(bytes.starts_with(b"HubSlosh"));
+    assert!(bytes.windows(38).any(|w| w == fmu.description().guid.as_bytes()), "carries the GUID");
+    refused(instance.deserialize(&[]).map(drop), &[]);
+    refused(instance.deserialize(&[0; 200]).map(drop), &["not a saved state"]);
+    refused(instance.deserialize(&bytes[..bytes.len() - 1]).map(drop), &["bytes"]);
+    refused(instance.deserialize(&[&bytes[..], &[0]].concat()).map(drop), &["bytes"]);
+    let mut rng = fastrand::Rng::with_seed(5);
+    for _ in 0..1000 {
+        let mut damaged = bytes.clone();
+        damaged[rng.usize(..bytes.len())] ^= 1 << rng.u8(..8);
+        refused(instance.deserialize(&damaged).map(drop), &[]);
+    }
+    assert_eq!(state(&mut instance), bytes);
+}
