@@ -1,0 +1,68 @@
+"""Makes a virtual environment, or finds it as it should be; needs nothing but Python.
+
+As a program: ``python3 environment.py DIRECTORY REQUIREMENTS`` prints the interpreter's path.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+OLDEST = (3, 11)
+"""Oldest Python that the scripts here run on."""
+
+
+def target() -> Path:
+    """Return the directory for built things: Cargo's."""
+    root = Path(__file__).resolve().parents[2]
+    return root / os.environ.get("CARGO_TARGET_DIR", "target")
+
+
+def ensure(directory: Path, requirements: Path) -> Path:
+    """Return the interpreter of the virtual environment in ``directory``.
+
+    The environment is made anew when the requirements file or the Python that makes it is not
+    the one it was made with. Leaves the program with a sentence when it cannot be made.
+    """
+    python = directory / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+    stamp = directory / "made-from.txt"
+    made_from = f"{sys.executable} {sys.version}\n{requirements.read_text()}"
+    if python.exists() and stamp.exists() and stamp.read_text() == made_from:
+        return python
+    if sys.version_info < OLDEST:
+        wanted, there = ".".join(map(str, OLDEST)), sys.version.split()[0]
+        sys.exit(f"error: Python {wanted} or newer is needed; {sys.executable} is {there}")
+    shutil.rmtree(directory, ignore_errors=True)
+    _run(
+        [sys.executable, "-m", "venv", str(directory)],
+        f"the virtual environment {directory} could not be made; "
+        "is Python's module venv installed (Debian: python3-venv)?",
+    )
+    _run(
+        [
+            str(python),
+            "-m",
+            "pip",
+            "install",
+            "--disable-pip-version-check",
+            "-r",
+            str(requirements),
+        ],
+        f"the packages of {requirements} could not be installed; is there a network?",
+    )
+    stamp.write_text(made_from)
+    return python
+
+
+def _run(command: list[str], sentence: str) -> None:
+    """Run ``command``; if it fails, show what it said and leave with ``sentence``."""
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    if done.returncode != 0:
+        sys.exit(f"{done.stdout}\nerror: {sentence}")
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 3:
+        sys.exit("usage: python3 environment.py DIRECTORY REQUIREMENTS")
+    print(ensure(Path(sys.argv[1]).absolute(), Path(sys.argv[2])))

@@ -1,0 +1,58 @@
+"""What the tests share: the packed FMU and the harness's binary.
+
+    pytest harness/python --fmu dist/HubSlosh.fmu --hubslosh target/release/hubslosh
+
+``cargo test --release`` calls it so, with an FMU that it packs itself.
+"""
+
+import os
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hubslosh import COLUMNS, TORQUE, read_table
+
+ROOT = Path(__file__).resolve().parents[3]
+TARGET = ROOT / os.environ.get("CARGO_TARGET_DIR", "target")
+
+Harness = Callable[..., dict[str, np.ndarray]]
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Say where the FMU and the harness are."""
+    exe = "hubslosh.exe" if os.name == "nt" else "hubslosh"
+    parser.addoption("--fmu", type=Path, default=ROOT / "dist" / "HubSlosh.fmu")
+    parser.addoption("--hubslosh", type=Path, default=TARGET / "release" / exe)
+
+
+def _option(request: pytest.FixtureRequest, name: str) -> Path:
+    path: Path = request.config.getoption(name).absolute()
+    if not path.is_file():
+        pytest.exit(f"{name}: there is no file {path}; cargo run --release -- pack", returncode=4)
+    return path
+
+
+@pytest.fixture(scope="session")
+def fmu(request: pytest.FixtureRequest) -> Path:
+    """Return the packed FMU."""
+    return _option(request, "--fmu")
+
+
+@pytest.fixture(scope="session")
+def harness(request: pytest.FixtureRequest, fmu: Path, tmp_path_factory) -> Harness:
+    """Return a function that makes one run with ``hubslosh run`` and reads what it wrote."""
+    binary = _option(request, "--hubslosh")
+
+    def run(*arguments: str, columns: tuple[str, ...] = COLUMNS) -> dict[str, np.ndarray]:
+        out = tmp_path_factory.mktemp("harness") / "run.parquet"
+        command = [binary, "run", *arguments, "--columns", ",".join(columns)]
+        done = subprocess.run(
+            [*command, "--fmu", fmu, "--out", out], capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        return read_table(out, ["time", TORQUE, *columns])
+
+    return run

@@ -1,0 +1,58 @@
+"""The script here speaks to people."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hubslosh import FmuError, Plant, drive, read_table, write_table
+
+SCRIPT = Path(__file__).resolve().parents[1] / "hubslosh.py"
+
+
+def test_the_program_drives_the_fmu_and_writes_a_table(fmu: Path, tmp_path: Path) -> None:
+    """A torque history in, signals out, numbers to the last digit."""
+    time = np.arange(101) * 0.02
+    torque, answer = tmp_path / "torque.csv", tmp_path / "answer.csv"
+    write_table(torque, {"time": time, "tau_cmd": 0.1 * np.sin(15 * time)})
+    command = [sys.executable, SCRIPT, "--fmu", fmu, "--input", torque, "--out", answer]
+    options = ["--set", "slosh.model=spherical", "--set", "friction.model=none"]
+    done = subprocess.run([*command, *options], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    table = read_table(answer, ["time", "omega"])
+    settings = {"slosh.model": 4, "friction.model": 1}
+    assert np.array_equal(
+        table["omega"], drive(fmu, time, 0.1 * np.sin(15 * time), settings)["omega"]
+    )
+
+
+@pytest.mark.parametrize(
+    ("settings", "sentence"),
+    [
+        ({"tank.height": 0.1}, "no variable tank.height; did you mean tank.h"),
+        ({"slosh.model": "conical"}, "there are frozen, linear, planar, spherical, paraboloid"),
+        ({"wheel.enabled": "yes"}, "there are true, false"),
+        ({"hub.I": "heavy"}, "hub.I cannot be 'heavy'"),
+        ({"tank.h": 0.0}, "tank.h"),
+        ({"theta": 1.0}, "theta is computed"),
+    ],
+)
+def test_wrong_settings_are_told_in_a_sentence(fmu: Path, settings: dict, sentence: str) -> None:
+    """The FMU's own words where it has any."""
+    with pytest.raises(FmuError) as told:
+        Plant(fmu, settings)
+    assert sentence in str(told.value)
+
+
+def test_a_torque_that_is_no_number_is_refused(fmu: Path) -> None:
+    """NaN stops the run where it stands."""
+    with pytest.raises(FmuError, match="tau_cmd"):
+        drive(fmu, [0, 1, 2], [0, float("nan"), 0])
+
+
+def test_a_missing_fmu_is_told(tmp_path: Path) -> None:
+    """With the command that makes it."""
+    with pytest.raises(FmuError, match="pack makes it"):
+        Plant(tmp_path / "none.fmu")

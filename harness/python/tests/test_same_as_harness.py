@@ -1,0 +1,58 @@
+"""fmpy and the harness are two hosts of one FMU: the same torque gives the same motion."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import Harness
+
+from hubslosh import COLUMNS, TORQUE, drive, read_table, write_table
+
+MODELS = ["frozen", "linear", "planar", "spherical", "paraboloid"]
+SWEEP = "exp-sweep:amplitude=0.1,f0=1.25,f1=3.5,duration=300"
+
+
+@pytest.mark.parametrize("friction", ["stribeck", "stribeck_smooth"])
+@pytest.mark.parametrize("model", MODELS)
+def test_a_sweep_of_five_minutes_gives_the_same_rate(
+    fmu: Path, harness: Harness, model: str, friction: str
+) -> None:
+    """Both hosts hand over the same numbers, so nothing but a host's bug can part them.
+
+    1e-12 rad/s is what the project promises; it is 1e-11 of the largest rate.
+    """
+    settings = {"slosh.model": model, "friction.model": friction}
+    flags = [f for name, value in settings.items() for f in ("--set", f"{name}={value}")]
+    theirs = harness("--profile", SWEEP, "--step", "0.02", *flags)
+    ours = drive(fmu, theirs["time"], theirs[TORQUE], settings)
+    assert len(theirs["time"]) == 15001
+    assert np.ptp(theirs["omega"]) > 0.05
+    for name in COLUMNS:
+        assert np.abs(ours[name] - theirs[name]).max() <= 1e-12, name
+
+
+def test_a_held_torque_and_a_tolerance_give_the_same_rate(fmu: Path, harness: Harness) -> None:
+    """The torque in stairs, at another step, tolerance, tank and start."""
+    settings = {"slosh.model": "spherical", "tank.h": 0.05, "init.slosh_angle": 0.1}
+    flags = [f for name, value in settings.items() for f in ("--set", f"{name}={value}")]
+    profile = "pulse:amplitude=0.05,start=0.1,width=1,duration=20"
+    theirs = harness(
+        "--profile", profile, "--step", "0.005", "--tolerance", "1e-6", "--hold", *flags
+    )
+    ours = drive(fmu, theirs["time"], theirs[TORQUE], settings, tolerance=1e-6, hold=True)
+    assert np.abs(ours["omega"] - theirs["omega"]).max() <= 1e-12
+
+
+def test_a_written_torque_history_drives_the_harness_alike(
+    fmu: Path, harness: Harness, tmp_path: Path
+) -> None:
+    """The other way round: a table written here is read there, every digit of it."""
+    time = np.arange(1001) * 0.02
+    torque = 0.05 * np.sin(2 * np.pi * 2.4 * time)
+    ours = drive(fmu, time, torque)
+    for ending in ("csv", "parquet"):
+        path = tmp_path / f"torque.{ending}"
+        write_table(path, {"time": time, TORQUE: torque})
+        theirs = harness("--input", str(path))
+        assert np.array_equal(theirs[TORQUE], read_table(path, [TORQUE])[TORQUE])
+        assert np.abs(ours["omega"] - theirs["omega"]).max() <= 1e-12

@@ -1,0 +1,123 @@
+"""fmpy's own simulation loop, as a user calls it."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fmpy import simulate_fmu, simulation
+
+from hubslosh import drive
+
+STEP = 0.02  # s
+TIME = np.arange(3001) * STEP
+
+
+def tau(time: np.ndarray) -> np.ndarray:
+    """Return a torque near the slosh frequency, N·m."""
+    return 0.05 * np.sin(2 * np.pi * 2.4 * time)
+
+
+def table(time: np.ndarray, torque: np.ndarray) -> np.ndarray:
+    """Return fmpy's input as its documentation shows it."""
+    return np.array(list(zip(time, torque, strict=True)), [("time", float), ("tau_cmd", float)])
+
+
+def simulate(fmu: Path, **arguments) -> np.ndarray:
+    """Return the rate over a minute in steps of 20 ms, rad/s."""
+    result = simulate_fmu(
+        str(fmu), stop_time=60, output_interval=STEP, output=["omega"], **arguments
+    )
+    here = np.searchsorted(result["time"], TIME - 1e-9)
+    assert np.abs(result["time"][here] - TIME).max() < 1e-9
+    return np.asarray(result["omega"])[here]
+
+
+def difference(a: np.ndarray, b: np.ndarray) -> float:
+    """Return the largest difference, relative to the largest value of ``b``."""
+    return np.abs(a - b).max() / np.abs(b).max()
+
+
+@pytest.fixture
+def repaired(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let fmpy's ``set_input_derivatives`` work with any number of inputs, not just nine."""
+
+    class Input(simulation.Input):
+        def __init__(self, *args, **kwargs) -> None:
+            super().__init__(*args, **kwargs)
+            self.continuous = [
+                c._replace(derivatives=(c.values._type_ * len(c.vrs))()) for c in self.continuous
+            ]
+
+    monkeypatch.setattr(simulation, "Input", Input)
+
+
+def test_held_input_is_what_the_harness_holds(fmu: Path) -> None:
+    """A plain table: fmpy holds each value over the step. Only rounding parts the two."""
+    rate = drive(fmu, TIME, tau(TIME), hold=True)["omega"]
+    assert difference(simulate(fmu, input=table(TIME, tau(TIME))), rate) <= 1e-9
+
+
+def test_held_input_half_a_step_early_has_no_delay(fmu: Path) -> None:
+    """What example.py does.
+
+    Held values are late by half a step: ωH/2 = 0.15 of the torque. Taken half a step early, what
+    is left is of second order: (ωH)²/24 = 0.004 of the torque's fundamental is missing, and
+    within a step the torque is off by up to ωH/2 both ways, which moves the rate by (ωH)²/8 =
+    0.011 of what it would be on the hub alone, a few times what it is near the dip.
+    """
+    fine = np.arange(60001) * 0.001
+    exact = drive(fmu, fine, tau(fine))["omega"][::20]
+    held = simulate(fmu, input=table(TIME, tau(TIME)))
+    early = simulate(fmu, input=table(TIME - STEP / 2, tau(TIME)))
+    assert 0.1 < difference(held, exact) < 0.3
+    assert difference(early, exact) < 0.03
+
+
+def test_fmpy_still_allots_nine_derivatives(fmu: Path) -> None:
+    """With fmpy 0.3.32, its latest, ``set_input_derivatives`` needs exactly nine inputs.
+
+    When this fails, fmpy has been repaired: drop the fixture `repaired`, and let example.py
+    and README say ``set_input_derivatives=True``.
+    """
+    with pytest.raises(ValueError, match="same size"):
+        simulate(fmu, input=table(TIME, tau(TIME)), set_input_derivatives=True)
+
+
+@pytest.mark.usefixtures("repaired")
+def test_interpolated_input_is_what_the_harness_hands_over(fmu: Path) -> None:
+    """The FMU's part of fmpy's interpolation is in order.
+
+    Where a communication point meets a row, fmpy hands over the slope that ends there. Rows
+    early by 1e-9 s make it the one that begins, and the torque wrong by 1e-9 s · ω = 2e-8.
+    """
+    rate = drive(fmu, TIME, tau(TIME))["omega"]
+    early = table(TIME - 1e-9, tau(TIME))
+    assert difference(simulate(fmu, input=early, set_input_derivatives=True), rate) <= 1e-7
+
+
+def test_jumps_in_the_input_are_met(fmu: Path) -> None:
+    """A pulse with upright edges between the output points; fmpy steps onto them."""
+    edges = [(0.0, 0.0), (1.003, 0.0), (1.003, 0.05), (2.007, 0.05), (2.007, 0.0), (60.0, 0.0)]
+    theirs = simulate(fmu, input=np.array(edges, [("time", float), ("tau_cmd", float)]))
+    time = np.union1d(TIME, [1.003, 2.007])
+    torque = np.where((time >= 1.003) & (time < 2.007), 0.05, 0.0)
+    rate = drive(fmu, time, torque, hold=True)["omega"][np.isin(time, TIME)]
+    assert difference(theirs, rate) <= 1e-9
+
+
+def test_wrong_start_values_stop_the_simulation(fmu: Path) -> None:
+    """tank.h = 0 is no tank."""
+    with pytest.raises(Exception, match="fmi2ExitInitializationMode"):
+        simulate(fmu, start_values={"tank.h": 0})
+
+
+def test_the_example_runs(fmu: Path) -> None:
+    """It is what the documentation shows."""
+    example = Path(__file__).resolve().parents[1] / "example.py"
+    done = subprocess.run(
+        [sys.executable, str(example), str(fmu)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "largest rate 0.0" in done.stdout

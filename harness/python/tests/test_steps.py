@@ -1,0 +1,49 @@
+"""How the host cuts time does not matter."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hubslosh import drive
+
+DURATION = 60  # s
+KNOTS = np.arange(10 * DURATION + 1) / 10
+"""Corners of the torque, s; communication points of every run."""
+TORQUE = 0.05 * np.sin(2 * np.pi * 2.35 * KNOTS)
+"""N·m at the knots, straight lines between them; near the slosh frequency, rest included."""
+
+
+def communication_points(cut: str) -> np.ndarray:
+    """Return growing times, s, all knots among them."""
+    if cut == "random":
+        between = np.random.default_rng(1).uniform(0, DURATION, 1200)
+        return np.union1d(KNOTS, between)
+    steps = {"20 ms": 5, "5 ms": 20}[cut]
+    return np.arange(len(KNOTS) * steps - steps + 1) / (10 * steps)
+
+
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-8, 1e-10])
+@pytest.mark.parametrize("friction", ["stribeck", "stribeck_smooth"])
+@pytest.mark.parametrize("model", ["linear", "planar", "spherical", "paraboloid"])
+def test_20_ms_5_ms_and_random_steps_agree_within_the_tolerance(
+    fmu: Path, model: str, friction: str, tolerance: float
+) -> None:
+    """The same piecewise linear torque in three cuts: rate and angle at the knots.
+
+    Allowed is the tolerance asked for, relative to each signal's maximum.
+    """
+    settings = {"slosh.model": model, "friction.model": friction}
+    columns = ("theta", "omega", "slosh_angle", "slosh_angle_radial")
+    runs = []
+    for cut in ("20 ms", "5 ms", "random"):
+        time = communication_points(cut)
+        torque = np.interp(time, KNOTS, TORQUE)
+        run = drive(fmu, time, torque, settings, tolerance=tolerance, columns=columns)
+        at_knots = np.searchsorted(time, KNOTS - 1e-9)
+        assert np.abs(time[at_knots] - KNOTS).max() < 1e-12
+        runs.append({name: run[name][at_knots] for name in columns})
+    for name in columns:
+        largest = np.abs(runs[0][name]).max()
+        for other in runs[1:]:
+            assert np.abs(other[name] - runs[0][name]).max() <= tolerance * largest, name

@@ -1,0 +1,19 @@
+"""fmpy's validator finds nothing to say about the FMU."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+from fmpy.validation import validate_fmu
+
+
+def test_the_validator_finds_no_problems(fmu: Path) -> None:
+    """Schema, names, model structure, start values, causalities, units."""
+    assert validate_fmu(str(fmu)) == []
+
+
+def test_the_command_says_so_too(fmu: Path) -> None:
+    """As a user calls it."""
+    command = [sys.executable, "-m", "fmpy", "validate", str(fmu)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout.strip()) == (0, "No problems found."), done.stderr
