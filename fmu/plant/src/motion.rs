@@ -19,9 +19,9 @@ const STEP_SHARE: f64 = 1e-2;
 /// Rates below this are nothing, rad/s: the floor of the error's scale.
 const NOTHING: f64 = 1e-6;
 
-/// The integrator's steps, and the gyro's samples, that one call may take: at worst a
-/// few seconds of work.
-const MAX_STEPS: usize = 1_000_000;
+/// The integrator's steps, and the gyro's samples, that one call may take: one mode needs a
+/// fraction of a second for them, ten spherical ones some six seconds.
+const MAX_STEPS: usize = 200_000;
 
 /// The lowest order that is trusted to show that a series has converged.
 const MIN_ORDER: usize = 5;

@@ -42,6 +42,54 @@ pub fn mul<const N: usize>(a: &Series, b: &Series) -> f64 {
     sum
 }
 
+/// Coefficients of a vector in the plane: two series that most rules treat alike, so
+/// that a processor does both at once.
+pub type Pair = [[f64; 2]; ORDER + 1];
+
+/// Both series zero.
+pub const ZERO_PAIR: Pair = [[0.0; 2]; ORDER + 1];
+
+/// Coefficient N of a b, b a vector.
+#[inline(always)]
+pub fn scale<const N: usize>(a: &Series, b: &Pair) -> [f64; 2] {
+    let mut sum = [0.0; 2];
+    for j in 0..=N {
+        sum = [sum[0] + a[j] * b[N - j][0], sum[1] + a[j] * b[N - j][1]];
+    }
+    sum
+}
+
+/// Coefficient N of (a_1 b_1, a_2 b_2).
+#[inline(always)]
+pub fn each<const N: usize>(a: &Pair, b: &Pair) -> [f64; 2] {
+    let mut sum = [0.0; 2];
+    for j in 0..=N {
+        let (a, b) = (a[j], b[N - j]);
+        sum = [sum[0] + a[0] * b[0], sum[1] + a[1] * b[1]];
+    }
+    sum
+}
+
+/// Coefficient N of a.b.
+#[inline(always)]
+pub fn dot<const N: usize>(a: &Pair, b: &Pair) -> f64 {
+    let [x, y] = each::<N>(a, b);
+    x + y
+}
+
+/// Coefficient N of (ramp) a, a a vector.
+#[inline(always)]
+pub fn scale_ramp<const N: usize>(ramp: &[f64; 2], a: &Pair) -> [f64; 2] {
+    let before = if N == 0 { [0.0; 2] } else { a[N.saturating_sub(1)] };
+    [0, 1].map(|i| ramp[0] * a[N][i] + ramp[1] * before[i])
+}
+
+/// The value at t of the vector cut after order n.
+#[inline(always)]
+pub fn value_pair(a: &Pair, n: usize, t: f64) -> [f64; 2] {
+    a[..=n].iter().rev().fold([0.0; 2], |sum, x| [sum[0] * t + x[0], sum[1] * t + x[1]])
+}
+
 /// Coefficient N of a b without its term a_0 b_N.
 #[inline(always)]
 pub fn mul_tail<const N: usize>(a: &Series, b: &Series) -> f64 {

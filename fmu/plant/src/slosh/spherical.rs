@@ -28,38 +28,44 @@
 //! Derived from the bob's Lagrangian; checked against a unit-vector form.
 
 use super::{Angles, Hub, Load, Mode};
-use crate::series::{Series, ZERO, constant, mul, mul_ramp, mul_tail, next, square, value};
+use crate::series::{
+    Pair, Series, ZERO, ZERO_PAIR, constant, dot, each, mul, mul_ramp, mul_tail, next, scale,
+    scale_ramp, square, value_pair,
+};
 use crate::tank::Pendulum;
 
 #[derive(Clone, Debug)]
 pub struct Spherical {
     p: Pendulum,
-    xi: [Series; 2],
-    xi_d: [Series; 2],
-    xi_dd: [Series; 2],
-    /// xi_1^2 - xi_2^2 and 1 + xi_1^2 + xi_2^2, xi_1 xi_2
-    difference: Series,
+    xi: Pair,
+    xi_d: Pair,
+    xi_dd: Pair,
+    /// xi' with its components exchanged
+    xi_d_swapped: Pair,
+    /// 1 + |xi|^2, k
     sum: Series,
-    product: Series,
     k: Series,
-    /// p_x, p_y, p_z
-    dir: [Series; 3],
-    v: [Series; 2],
+    /// (p_x, p_y), p_x, p_y, p_z
+    across: Pair,
+    p_x: Series,
+    p_y: Series,
+    p_z: Series,
+    v: Pair,
     /// xi' + v
-    xi_d_v: [Series; 2],
+    xi_d_v: Pair,
     rho: Series,
     /// k rho, |v|^2, k |v|^2
     k_rho: Series,
     v2: Series,
     k_v2: Series,
-    /// S and r p_y S m, the rod's pull
+    /// S
     pull: Series,
     /// xi_1 xi_2' - xi_2 xi_1' and k times it
     swirl: Series,
     k_swirl: Series,
-    e: [Series; 2],
-    a: [Series; 2],
-    b: [Series; 2],
+    e: Pair,
+    a: Pair,
+    b: Pair,
     /// |xi'|^2, k |xi'|^2 (heat)
     xi_d2: Series,
     k_xi_d2: Series,
@@ -70,7 +76,7 @@ impl Spherical {
     /// p' at order 0.
     fn dir_d(&self) -> [f64; 3] {
         let (k, rho) = (self.k[0], self.rho[0]);
-        let along = |i: usize| k * self.xi_d[i][0] - k * k * rho * self.xi[i][0];
+        let along = |i: usize| k * self.xi_d[0][i] - k * k * rho * self.xi[0][i];
         [along(0), along(1), k * k * rho]
     }
 
@@ -78,7 +84,7 @@ impl Spherical {
     fn bob(&self) -> [f64; 4] {
         let Pendulum { l, r, .. } = self.p;
         let d = self.dir_d();
-        [r + l * self.dir[0][0], l * self.dir[1][0], l * d[0], l * d[1]]
+        [r + l * self.p_x[0], l * self.p_y[0], l * d[0], l * d[1]]
     }
 }
 
@@ -86,16 +92,18 @@ impl Mode for Spherical {
     fn new(p: &Pendulum) -> Self {
         Spherical {
             p: *p,
-            xi: [ZERO; 2],
-            xi_d: [ZERO; 2],
-            xi_dd: [ZERO; 2],
-            difference: ZERO,
+            xi: ZERO_PAIR,
+            xi_d: ZERO_PAIR,
+            xi_dd: ZERO_PAIR,
+            xi_d_swapped: ZERO_PAIR,
             sum: ZERO,
-            product: ZERO,
             k: ZERO,
-            dir: [ZERO; 3],
-            v: [ZERO; 2],
-            xi_d_v: [ZERO; 2],
+            across: ZERO_PAIR,
+            p_x: ZERO,
+            p_y: ZERO,
+            p_z: ZERO,
+            v: ZERO_PAIR,
+            xi_d_v: ZERO_PAIR,
             rho: ZERO,
             k_rho: ZERO,
             v2: ZERO,
@@ -103,9 +111,9 @@ impl Mode for Spherical {
             pull: ZERO,
             swirl: ZERO,
             k_swirl: ZERO,
-            e: [ZERO; 2],
-            a: [ZERO; 2],
-            b: [ZERO; 2],
+            e: ZERO_PAIR,
+            a: ZERO_PAIR,
+            b: ZERO_PAIR,
             xi_d2: ZERO,
             k_xi_d2: ZERO,
             omega_n: 0.0,
@@ -124,7 +132,7 @@ impl Mode for Spherical {
 
     fn angles(&self) -> Angles {
         let d = self.dir_d();
-        let p = [0, 1].map(|i| self.dir[i][0].clamp(-1.0, 1.0));
+        let p = self.across[0].map(|p| p.clamp(-1.0, 1.0));
         let rate = |i: usize| {
             let cos = libm::sqrt((1.0 - p[i]) * (1.0 + p[i]));
             if cos > 0.0 { d[i] / cos } else { 0.0 }
@@ -133,17 +141,16 @@ impl Mode for Spherical {
     }
 
     fn start(&mut self, q: &[f64; 4]) {
-        (self.xi[0][0], self.xi[1][0]) = (q[0], q[1]);
-        (self.xi_d[0][0], self.xi_d[1][0]) = (q[2], q[3]);
+        (self.xi[0], self.xi_d[0]) = ([q[0], q[1]], [q[2], q[3]]);
     }
 
     fn aim(&mut self, dq: &[f64; 4]) {
-        (self.xi[0][1], self.xi[1][1]) = (dq[0], dq[1]);
-        (self.xi_d[0][1], self.xi_d[1][1]) = (dq[2], dq[3]);
+        (self.xi[1], self.xi_d[1]) = ([dq[0], dq[1]], [dq[2], dq[3]]);
     }
 
     fn rate(&self, n: usize) -> [f64; 4] {
-        [self.xi_d[0][n], self.xi_d[1][n], self.xi_dd[0][n], self.xi_dd[1][n]]
+        let ([x_d, y_d], [x_dd, y_dd]) = (self.xi_d[n], self.xi_dd[n]);
+        [x_d, y_d, x_dd, y_dd]
     }
 
     #[inline(always)]
@@ -153,106 +160,107 @@ impl Mode for Spherical {
         if N == 0 {
             self.omega_n = libm::sqrt(f64::max(hub.g[0], 0.0) / l);
         }
-        let [x, y] = &self.xi;
-        let [x_d, y_d] = &self.xi_d;
+        let ([x, y], [x_d, y_d]) = (self.xi[N], self.xi_d[N]);
+        self.xi_d_swapped[N] = [y_d, x_d];
         // geometry
-        let (x2, y2) = (square::<N>(x), square::<N>(y));
+        let [x2, y2] = each::<N>(&self.xi, &self.xi);
+        let mut xy = 0.0;
+        for j in 0..=N {
+            xy += self.xi[j][0] * self.xi[N - j][1];
+        }
         self.sum[N] = one + x2 + y2;
-        self.difference[N] = x2 - y2;
-        self.product[N] = mul::<N>(x, y);
         self.k[N] = (2.0 * one - mul_tail::<N>(&self.sum, &self.k)) / self.sum[0];
-        self.dir[0][N] = mul::<N>(&self.k, x);
-        self.dir[1][N] = mul::<N>(&self.k, y);
-        self.dir[2][N] = one - self.k[N];
-        self.e[0][N] = (one - self.difference[N]) / 2.0;
-        self.e[1][N] = -self.product[N];
-        self.a[0][N] = y[N] + r_l * self.product[N];
-        self.a[1][N] = -x[N] - r_l * (one + self.difference[N]) / 2.0;
+        self.across[N] = scale::<N>(&self.k, &self.xi);
+        [self.p_x[N], self.p_y[N]] = self.across[N];
+        self.p_z[N] = one - self.k[N];
+        self.e[N] = [(one - x2 + y2) / 2.0, -xy];
+        self.a[N] = [y + r_l * xy, -x - r_l * (one + x2 - y2) / 2.0];
         // rates
-        self.v[0][N] = x_d[N] - mul::<N>(&hub.omega, y);
-        self.v[1][N] = y_d[N] + mul::<N>(&hub.omega, x);
-        self.xi_d_v[0][N] = x_d[N] + self.v[0][N];
-        self.xi_d_v[1][N] = y_d[N] + self.v[1][N];
-        self.rho[N] = mul::<N>(x, x_d) + mul::<N>(y, y_d);
+        let turned = scale::<N>(&hub.omega, &self.xi);
+        self.v[N] = [x_d - turned[1], y_d + turned[0]];
+        self.xi_d_v[N] = [x_d + self.v[N][0], y_d + self.v[N][1]];
+        self.rho[N] = dot::<N>(&self.xi, &self.xi_d);
+        self.v2[N] = dot::<N>(&self.v, &self.v);
         self.k_rho[N] = mul::<N>(&self.k, &self.rho);
-        self.v2[N] = square::<N>(&self.v[0]) + square::<N>(&self.v[1]);
         self.k_v2[N] = mul::<N>(&self.k, &self.v2);
         // B
-        let turn = [mul::<N>(&hub.omega, &self.xi_d_v[1]), -mul::<N>(&hub.omega, &self.xi_d_v[0])];
+        let turned = scale::<N>(&hub.omega, &self.xi_d_v);
+        let turned = [turned[1], -turned[0]];
+        let along = scale::<N>(&self.k_rho, &self.v);
+        let back = scale::<N>(&self.k_v2, &self.xi);
+        let out = scale::<N>(&hub.omega2, &self.e);
+        let fall = scale_ramp::<N>(&hub.g, &self.xi);
         for i in 0..2 {
-            self.b[i][N] =
-                turn[i] - inv_l * mul_ramp::<N>(&hub.g, &self.xi[i]) - c_m * self.xi_d[i][N]
-                    + 2.0 * mul::<N>(&self.k_rho, &self.v[i])
-                    - mul::<N>(&self.k_v2, &self.xi[i])
-                    + r_l * mul::<N>(&hub.omega2, &self.e[i]);
+            let drag = c_m * self.xi_d[N][i];
+            self.b[N][i] =
+                turned[i] - inv_l * fall[i] - drag + 2.0 * along[i] - back[i] + r_l * out[i];
         }
         // J and T
-        self.pull[N] = l * mul::<N>(&self.k, &self.k_v2) + r * mul::<N>(&hub.omega2, &self.dir[0])
-            - mul_ramp::<N>(&hub.g, &self.dir[2]);
-        self.swirl[N] = mul::<N>(x, y_d) - mul::<N>(y, x_d);
+        self.pull[N] = l * mul::<N>(&self.k, &self.k_v2) + r * mul::<N>(&hub.omega2, &self.p_x)
+            - mul_ramp::<N>(&hub.g, &self.p_z);
+        let [plus, minus] = each::<N>(&self.xi, &self.xi_d_swapped);
+        self.swirl[N] = plus - minus;
         self.k_swirl[N] = mul::<N>(&self.k, &self.swirl);
-        let p_y_d = mul::<N>(&self.k, y_d) - mul::<N>(&self.k_rho, &self.dir[1]);
+        let k_xi_d = scale::<N>(&self.k, &self.xi_d);
+        let p_y_d = k_xi_d[1] - mul::<N>(&self.k_rho, &self.p_y);
         Load {
-            j: m * r * r * square::<N>(&self.dir[1]),
-            t: m * r * mul::<N>(&self.dir[1], &self.pull)
+            j: m * r * r * square::<N>(&self.p_y),
+            t: m * r * mul::<N>(&self.p_y, &self.pull)
                 + c * l * (r * p_y_d + l * mul::<N>(&self.k, &self.k_swirl)),
         }
     }
 
     #[inline(always)]
     fn respond<const N: usize>(&mut self, hub: &Hub) {
-        for i in 0..2 {
-            self.xi_dd[i][N] = self.b[i][N] + mul::<N>(&self.a[i], &hub.omega_dot);
-        }
+        let pushed = scale::<N>(&hub.omega_dot, &self.a);
+        self.xi_dd[N] = [self.b[N][0] + pushed[0], self.b[N][1] + pushed[1]];
     }
 
     #[inline(always)]
     fn grow<const N: usize>(&mut self) {
-        for i in 0..2 {
-            self.xi[i][N + 1] = next::<N>(self.xi_d[i][N]);
-            self.xi_d[i][N + 1] = next::<N>(self.xi_dd[i][N]);
-        }
+        self.xi[N + 1] = self.xi_d[N].map(next::<N>);
+        self.xi_d[N + 1] = self.xi_dd[N].map(next::<N>);
     }
 
     #[inline(always)]
     fn size(&self) -> f64 {
-        let largest = |pair: &[Series; 2]| f64::max(pair[0][0].abs(), pair[1][0].abs());
-        largest(&self.xi_d) + self.omega_n * largest(&self.xi)
+        let largest = |[x, y]: [f64; 2]| f64::max(x.abs(), y.abs());
+        largest(self.xi_d[0]) + self.omega_n * largest(self.xi[0])
     }
 
     #[inline(always)]
     fn term(&self, n: usize) -> f64 {
-        f64::max(self.xi_d[0][n].abs(), self.xi_d[1][n].abs())
+        f64::max(self.xi_d[n][0].abs(), self.xi_d[n][1].abs())
     }
 
     /// c l^2 k^2 |xi'|^2
     #[inline(always)]
     fn heat<const N: usize>(&mut self) -> f64 {
-        self.xi_d2[N] = square::<N>(&self.xi_d[0]) + square::<N>(&self.xi_d[1]);
+        self.xi_d2[N] = dot::<N>(&self.xi_d, &self.xi_d);
         self.k_xi_d2[N] = mul::<N>(&self.k, &self.xi_d2);
         self.p.c * self.p.l * self.p.l * mul::<N>(&self.k, &self.k_xi_d2)
     }
 
     #[inline(always)]
     fn at(&self, n: usize, t: f64) -> [f64; 4] {
-        let [x, y] = &self.xi;
-        let [x_d, y_d] = &self.xi_d;
-        [value(x, n, t), value(y, n, t), value(x_d, n, t), value(y_d, n, t)]
+        let [x, y] = value_pair(&self.xi, n, t);
+        let [x_d, y_d] = value_pair(&self.xi_d, n, t);
+        [x, y, x_d, y_d]
     }
 
     /// The rod's pull along p and the drag.
     fn force(&self, hub: &Hub) -> [f64; 2] {
         let Pendulum { m, l, c, r, .. } = self.p;
         let d = self.dir_d();
-        let pull = m * (self.pull[0] - r * self.dir[1][0] * hub.omega_dot[0]);
-        [0, 1].map(|i| pull * self.dir[i][0] + c * l * d[i])
+        let pull = m * (self.pull[0] - r * self.p_y[0] * hub.omega_dot[0]);
+        [0, 1].map(|i| pull * self.across[0][i] + c * l * d[i])
     }
 
     /// The pull acts at the hinge, the drag at the bob.
     fn torque(&self, hub: &Hub) -> f64 {
         let Pendulum { l, c, r, .. } = self.p;
         let d = self.dir_d();
-        let swirl = self.dir[0][0] * d[1] - self.dir[1][0] * d[0];
+        let swirl = self.p_x[0] * d[1] - self.p_y[0] * d[0];
         r * self.force(hub)[1] + c * l * l * swirl
     }
 
@@ -261,7 +269,8 @@ impl Mode for Spherical {
         let ([x, y, x_d, y_d], w) = (self.bob(), hub.omega[0]);
         let (v_x, v_y, v_z) = (x_d - w * y, y_d + w * x, l * self.dir_d()[2]);
         // 2 - k = |xi|^2 k, without cancellation near rest
-        let height = l * self.k[0] * (self.sum[0] - 1.0);
+        let [xi_1, xi_2] = self.xi[0];
+        let height = l * self.k[0] * (xi_1 * xi_1 + xi_2 * xi_2);
         m * (v_x * v_x + v_y * v_y + v_z * v_z) / 2.0 + m * hub.g[0] * height
     }
 
