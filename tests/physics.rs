@@ -266,3 +266,70 @@ fn a_vanishing_liquid_leaves_the_frozen_model() {
         assert!((run(slosh, 1e-3) / frozen - 1.0).abs() < 1e-6, "{slosh:?}");
     }
 }
+
+/// Random steps in the default test; `HUBSLOSH_RANDOM_STEPS=1000000` runs a million.
+const RANDOM_STEPS: usize = 5_000;
+
+#[test]
+fn random_steps_end_in_numbers_or_in_a_clear_error() {
+    let count = std::env::var("HUBSLOSH_RANDOM_STEPS").map_or(RANDOM_STEPS, |s| s.parse().unwrap());
+    let mut rng = fastrand::Rng::with_seed(6);
+    let (mut done, mut refused) = (0, 0);
+    while done < count {
+        let slosh = SLOSH[rng.usize(0..SLOSH.len())];
+        let friction = FRICTION[rng.usize(0..FRICTION.len())];
+        // Half of the plants are the bench, which 100 N m throws about at 310 rad/s2; a
+        // smaller plant gets no more than that.
+        let mut p =
+            if rng.bool() { bench(slosh, friction) } else { anywhere(&mut rng, slosh, friction) };
+        p.slosh.modes = rng.usize(1..=plant::MODES);
+        p.wheel.enabled = rng.u8(..) < 32;
+        p.imu.enabled = rng.u8(..) < 32;
+        let largest = f64::min(100.0, 310.0 * p.hub.inertia);
+        let mut inputs = Inputs::default();
+        let mut plant = plant(&p, &inputs);
+        for _ in 0..50 {
+            let h = 10f64.powf(rng.f64() * 7.0 - 6.0);
+            let torque = largest * (2.0 * rng.f64() - 1.0) * 10f64.powf(-4.0 * rng.f64());
+            inputs.tau_cmd = Ramp { value: torque, slope: (rng.f64() - 0.5) * torque / h };
+            inputs.tau_ext = Ramp::held(torque * (rng.f64() - 0.5));
+            inputs.g_axial = Ramp::held(if rng.u8(..) < 8 { 0.0 } else { 20.0 * rng.f64() });
+            let before = *plant.state();
+            done += 1;
+            match plant.step(&inputs, h) {
+                Ok(()) => {
+                    let o = plant.outputs(&inputs);
+                    let all = [
+                        o.theta,
+                        o.omega,
+                        o.omega_dot,
+                        o.slosh_angle,
+                        o.slosh_rate,
+                        o.slosh_angle_radial,
+                        o.slosh_rate_radial,
+                        o.tau_friction,
+                        o.tau_fluid,
+                        o.f_tangential,
+                        o.f_radial,
+                        o.wave_height,
+                        o.omega_imu,
+                        o.energy,
+                        o.momentum,
+                        o.power_dissipated,
+                        o.work,
+                        o.heat,
+                        o.wheel_speed,
+                    ];
+                    assert!(all.iter().all(|x| x.is_finite()), "{o:?} {p:?}");
+                }
+                Err(error) => {
+                    refused += 1;
+                    assert!(error.to_string().len() > 20);
+                    assert_eq!(*plant.state(), before, "a refused step leaves the state");
+                    break;
+                }
+            }
+        }
+    }
+    println!("{done} steps, {refused} refused");
+}
