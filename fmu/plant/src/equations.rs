@@ -6,16 +6,26 @@
 //! discrete state: it changes in [`Plant::take_event`] alone, when an indicator has
 //! crossed zero.
 
-use crate::friction::Contact;
+use crate::friction::{Contact, Law};
 use crate::hub::{Liquid, with_modes};
 use crate::slosh::Mode;
-use crate::{Inputs, MODES, Plant, Ramp};
+use crate::{Friction, FrictionModel, Inputs, MODES, Outputs, Plant, Ramp, StepError};
 
 /// Number of continuous states.
 pub const STATES: usize = 6 + 4 * MODES;
 
 /// Number of event indicators.
 pub const INDICATORS: usize = 8;
+
+/// How many of the gyro's samples may fall due at once: a host that has passed more of
+/// them by does not look at the time events.
+const SAMPLES_AT_ONCE: f64 = 1e6;
+
+/// By how much the coordinates move to either side for a derivative by differences, as
+/// a share of the size at which they curve (1 rad, or a pendulum's length). What is left
+/// out, SHARE^4/30 of the fifth derivative, and the rounding, 1e-16/SHARE, are both
+/// about 1e-13.
+const SHARE: f64 = 1.0 / 512.0;
 
 impl Plant {
     /// x. Units: rad, rad/s, J, J, s, rad/s; mode coordinates as in `slosh`.
@@ -78,6 +88,98 @@ impl Plant {
         self.rate_coefficients(1, -torque.slope / self.wheel.inertia)
     }
 
+    /// The derivative of the outputs in the direction (dx, du); what is discrete in them
+    /// is as it is now. Contact and wheel are held.
+    ///
+    /// Friction, heat and the hub's acceleration come from the series and are exact.
+    /// Forces, energy and the like are smooth in x once the friction is just another
+    /// torque tau_f + tau_f' s, so they are differentiated by central differences with
+    /// Richardson's extrapolation, four evaluations, good to about 1e-12 of their size.
+    pub fn output_derivatives(
+        &mut self,
+        inputs: &Inputs,
+        dx: &[f64; STATES],
+        du: &[f64; 3],
+    ) -> Outputs {
+        let now = self.outputs_held(inputs);
+        let rate = self.directional_derivative(inputs, dx, du);
+        let motion = &self.motion;
+        let (friction, friction_d, heat_d) =
+            (motion.friction.tau_f[0], motion.friction.tau_f[1], motion.heat[1]);
+        let command = Ramp { value: inputs.tau_cmd.value, slope: du[0] };
+        let torque = self.wheel.torque(self.state.wheel_speed, command);
+
+        // From here on without wheel and friction: their torques are prescribed.
+        let x = self.continuous_states();
+        let size = self.size_of_direction(dx, du);
+        let step = if size > 0.0 { SHARE / size } else { 1.0 };
+        let with_wheel = std::mem::replace(&mut self.wheel.enabled, false);
+        let law = std::mem::replace(&mut self.motion.friction.model, FrictionModel::None);
+        let [p2, p1, m1, m2] = [2.0, 1.0, -1.0, -2.0].map(|steps| {
+            let s = steps * step;
+            let moved: [f64; STATES] = core::array::from_fn(|i| x[i] + s * dx[i]);
+            self.set_continuous_states(&moved);
+            self.outputs_held(&Inputs {
+                tau_cmd: Ramp::held(torque.at(s)),
+                tau_ext: Ramp::held(inputs.tau_ext.value + s * du[1] + friction + s * friction_d),
+                g_axial: Ramp::held(inputs.g_axial.value + s * du[2]),
+            })
+        });
+        self.wheel.enabled = with_wheel;
+        self.motion.friction.model = law;
+        self.set_continuous_states(&x);
+
+        let by_differences = |get: fn(&Outputs) -> f64| {
+            (8.0 * (get(&p1) - get(&m1)) - (get(&p2) - get(&m2))) / (12.0 * step)
+        };
+        let wave = [by_differences(|o| o.wave[0]), by_differences(|o| o.wave[1])];
+        let wave_height = now.wave[0] * wave[0] + now.wave[1] * wave[1];
+        Outputs {
+            theta: dx[0],
+            omega: dx[1],
+            omega_dot: rate[1],
+            slosh_angle: by_differences(|o| o.slosh_angle),
+            slosh_rate: by_differences(|o| o.slosh_rate),
+            slosh_angle_radial: by_differences(|o| o.slosh_angle_radial),
+            slosh_rate_radial: by_differences(|o| o.slosh_rate_radial),
+            tau_friction: friction_d,
+            tau_fluid: self.hub_inertia * rate[1] - torque.slope - du[1] - friction_d,
+            f_tangential: by_differences(|o| o.f_tangential),
+            f_radial: by_differences(|o| o.f_radial),
+            // A cone: at its tip there is no derivative.
+            wave_height: if now.wave_height > 0.0 { wave_height / now.wave_height } else { 0.0 },
+            wave,
+            omega_imu: if self.imu.enabled { 0.0 } else { dx[1] },
+            energy: by_differences(|o| o.energy),
+            momentum: by_differences(|o| o.momentum),
+            power_dissipated: heat_d,
+            tau_actuator: torque.slope,
+            wheel_speed: dx[5],
+            work: dx[2],
+            heat: dx[3],
+            event_time: 0.0,
+            stuck_time: dx[4],
+            ..now
+        }
+    }
+
+    /// Size of a direction, in units in which 1 is where the outputs curve. What they
+    /// are linear in counts less: it may move far.
+    fn size_of_direction(&self, dx: &[f64; STATES], du: &[f64; 3]) -> f64 {
+        let torque = 10.0 * self.motion.i0;
+        let hub = [dx[1] / 10.0, du[0] / torque, du[1] / torque, du[2] / 10.0];
+        let hub = hub.iter().fold(0.0, |size: f64, d| size.max(d.abs()));
+        let lengths = &self.calculated().length;
+        let is_length = matches!(self.liquid, Liquid::Paraboloid(_));
+        let modes = dx[6..].as_chunks::<4>().0.iter().zip(lengths).map(|(dq, length)| {
+            let unit = if is_length && *length > 0.0 { *length } else { 1.0 };
+            let q = f64::max(dq[0].abs(), dq[1].abs());
+            let v = f64::max(dq[2].abs(), dq[3].abs());
+            q.max(v / 10.0) / unit
+        });
+        modes.fold(hub, f64::max)
+    }
+
     /// Coefficient n of x' as the series have it.
     fn rate_coefficients(&self, n: usize, wheel: f64) -> [f64; STATES] {
         let motion = &self.motion;
@@ -128,31 +230,76 @@ impl Plant {
 
     /// Does what is due at the present instant: puts a hub that has just stopped
     /// exactly at rest, finds its new contact, keeps the rotor within its speeds, takes
-    /// the gyro's samples. Returns whether continuous states have changed.
-    pub fn take_event(&mut self, inputs: &Inputs) -> bool {
-        let before = self.continuous_states();
-        let speed = self.state.wheel_speed;
+    /// the gyro's samples. Returns whether continuous states have changed. On an error
+    /// nothing has changed.
+    pub fn take_event(&mut self, inputs: &Inputs) -> Result<bool, StepError> {
+        let (before, time) = (self.continuous_states(), self.state.time);
+        if self.next_time_event().is_some_and(|due| time - due > SAMPLES_AT_ONCE / self.imu.rate) {
+            return Err(StepError::TooManySteps { time });
+        }
         if self.wheel.enabled {
+            let speed = self.state.wheel_speed;
             self.state.wheel_speed = speed.max(self.wheel.speed_min).min(self.wheel.speed_max);
         }
-        if self.motion.friction.can_stick() {
-            let contact = self.state.contact;
-            if contact as i8 as f64 * self.state.omega <= 0.0 {
+        if self.state.contact as i8 as f64 * self.state.omega <= 0.0 {
+            if self.motion.friction.can_stick() {
                 self.state.omega = 0.0;
-                self.rates(inputs);
-                let contact = with_modes!(&mut self.liquid, modes => {
-                    self.motion.contact(modes, &self.state)
-                });
-                let time = self.state.time;
-                self.state.touch(contact, time);
             }
+            self.find_contact(inputs);
         }
-        if self.imu.enabled {
-            let since_start = self.state.time - self.state.start_time;
+        // Hosts land on a time event exactly, or on it but for rounding.
+        let slack = 1e-9 / self.imu.rate;
+        while self.next_time_event().is_some_and(|due| due <= time + slack) {
             let omega = self.state.omega;
-            self.imu.follow(&mut self.state.gyro, since_start, 0.0, |_| omega);
+            self.imu.sample(&mut self.state.gyro, omega);
         }
-        self.continuous_states() != before
+        Ok(self.continuous_states() != before)
+    }
+
+    /// Gives the hub the contact that its rate or, at rest, the torques make.
+    fn find_contact(&mut self, inputs: &Inputs) {
+        self.rates(inputs);
+        let contact = with_modes!(&mut self.liquid, modes => {
+            self.motion.contact(modes, &self.state)
+        });
+        let time = self.state.time;
+        self.state.touch(contact, time);
+    }
+
+    /// Whether a change of the contact is overdue: a host has integrated past a sign
+    /// change of the indicators 0, 1 or 2 that it did not see.
+    pub fn is_contact_overdue(&mut self, inputs: &Inputs) -> bool {
+        self.event_indicators(inputs)[..3].iter().any(|indicator| *indicator < 0.0)
+    }
+
+    /// How often the contact has changed since the start, when last, s, and what it is
+    /// (-1 turning backwards, 0 stuck, 1 turning forwards).
+    pub fn last_contact(&self) -> (i32, f64, i32) {
+        (self.state.event_count, self.state.event_time, self.state.contact as i32)
+    }
+
+    /// Takes another law of friction from here on.
+    pub fn set_friction(&mut self, p: &Friction, inputs: &Inputs) -> Result<(), Vec<String>> {
+        let problems = Law::problems(p);
+        if !problems.is_empty() {
+            return Err(problems);
+        }
+        self.motion.friction = Law::new(p);
+        self.find_contact(inputs);
+        Ok(())
+    }
+
+    /// Whether the states that the host has set are within the models' range.
+    pub fn check_range(&self) -> Result<(), StepError> {
+        let time = self.state.time;
+        with_modes!(&self.liquid, modes => {
+            for (i, (mode, q)) in modes.iter().zip(&self.state.modes).enumerate() {
+                if let Some(what) = mode.out_of_range(q) {
+                    return Err(StepError::OutOfRange { time, mode: i + 1, what });
+                }
+            }
+        });
+        Ok(())
     }
 
     /// When the gyro takes its next sample, s; `None` without a gyro.
@@ -252,6 +399,120 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn output_derivatives_agree_with_finite_differences() {
+        // Every continuous output.
+        let reals: [fn(&Outputs) -> f64; 20] = [
+            |o| o.theta,
+            |o| o.omega,
+            |o| o.omega_dot,
+            |o| o.slosh_angle,
+            |o| o.slosh_rate,
+            |o| o.slosh_angle_radial,
+            |o| o.slosh_rate_radial,
+            |o| o.tau_friction,
+            |o| o.tau_fluid,
+            |o| o.f_tangential,
+            |o| o.f_radial,
+            |o| o.wave_height,
+            |o| o.omega_imu,
+            |o| o.energy,
+            |o| o.momentum,
+            |o| o.power_dissipated,
+            |o| o.tau_actuator,
+            |o| o.wheel_speed,
+            |o| o.work,
+            |o| o.heat,
+        ];
+        for slosh in SLOSH {
+            for friction in FRICTION {
+                for stuck in [false, true] {
+                    let (mut plant, inputs) = plant(slosh, friction);
+                    if stuck {
+                        if friction != FrictionModel::Stribeck {
+                            continue;
+                        }
+                        plant.state.contact = Contact::Stuck;
+                        plant.state.omega = 0.0;
+                    }
+                    let x = plant.continuous_states();
+                    // Any direction at all; the models' own scatter of sizes is 0.01 to 1.
+                    let dx: [f64; STATES] = core::array::from_fn(|i| libm::sin(1.0 + i as f64));
+                    let du = [0.3, -0.4, 0.7];
+                    // Central differences leave the square of this times the third
+                    // derivative, 1e-10 of what curves over 0.1, and round at 1e-16 / 1e-6.
+                    let eps = 1e-6 * if slosh == SloshModel::Paraboloid { 0.1 } else { 1.0 };
+                    let at = |sign: f64, plant: &mut Plant| {
+                        let moved = core::array::from_fn(|i| x[i] + sign * eps * dx[i]);
+                        let moved_input = |u: Ramp, du: f64| Ramp::held(u.value + sign * eps * du);
+                        plant.set_continuous_states(&moved);
+                        plant.outputs_held(&Inputs {
+                            tau_cmd: moved_input(inputs.tau_cmd, du[0]),
+                            tau_ext: moved_input(inputs.tau_ext, du[1]),
+                            g_axial: moved_input(inputs.g_axial, du[2]),
+                        })
+                    };
+                    let (plus, minus) = (at(1.0, &mut plant), at(-1.0, &mut plant));
+                    plant.set_continuous_states(&x);
+                    let before = plant.outputs_held(&inputs);
+                    let derivatives = plant.output_derivatives(&inputs, &dx, &du);
+                    assert_eq!(plant.outputs_held(&inputs), before, "nothing has moved");
+                    for (n, get) in reals.iter().enumerate() {
+                        let difference = (get(&plus) - get(&minus)) / (2.0 * eps);
+                        let got = get(&derivatives);
+                        let size = difference.abs().max(get(&before).abs()).max(0.1);
+                        assert!(
+                            (difference - got).abs() < 1e-7 * size,
+                            "{slosh:?} {friction:?} output {n}: {got} {difference}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn samples_that_are_due_are_taken_and_no_host_can_ask_for_endless_many() {
+        let mut p = Parameters::default();
+        p.imu.enabled = true;
+        p.imu.rate = 1e4;
+        let inputs = Inputs::default();
+        // At 1e6 s, ten microseconds after which the clock shows 1e-10 s and no less.
+        let mut plant = Plant::new(&p, &inputs, 1e6, 1e-9).unwrap();
+        for _ in 0..100 {
+            let due = plant.next_time_event().unwrap();
+            plant.set_time(due);
+            plant.take_event(&inputs).unwrap();
+            assert!(plant.next_time_event().unwrap() > due);
+        }
+        let before = *plant.state();
+        plant.set_time(1e12);
+        assert!(plant.take_event(&inputs).is_err());
+        plant.set_time(before.time);
+        assert_eq!(*plant.state(), before);
+    }
+
+    #[test]
+    fn friction_can_be_changed_while_running() {
+        let (mut plant, inputs) = plant(SloshModel::Linear, FrictionModel::Stribeck);
+        let held = Inputs { tau_cmd: Ramp::held(0.0), ..inputs };
+        plant.set_continuous_states(&[0.0; STATES]);
+        plant.find_contact(&held);
+        assert_eq!(plant.last_contact().2, -1, "-0.03 N m is more than the bearing holds");
+        let mut strong = Parameters::default().friction;
+        strong.c = 1.0;
+        plant.set_friction(&strong, &held).unwrap();
+        assert_eq!(plant.last_contact().2, 0);
+        plant.step(&held, 1.0).unwrap();
+        assert_eq!(plant.omega(), 0.0);
+        strong.asymmetry = 2.0;
+        assert!(plant.set_friction(&strong, &held).is_err());
+        strong = Friction { model: FrictionModel::None, ..Friction::default() };
+        plant.set_friction(&strong, &held).unwrap();
+        plant.step(&held, 1.0).unwrap();
+        assert!(plant.omega() < 0.0);
     }
 
     #[test]

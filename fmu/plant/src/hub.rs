@@ -96,6 +96,8 @@ pub struct Outputs {
     pub f_radial: f64,
     /// Wave amplitude at the tank's wall by linear theory, m.
     pub wave_height: f64,
+    /// Its radial and tangential part, m.
+    pub wave: [f64; 2],
     /// Reading of the gyro, rad/s.
     pub omega_imu: f64,
     /// Kinetic and potential energy of hub and liquid, J.
@@ -237,7 +239,7 @@ pub(crate) use with_modes;
 #[derive(Clone, Debug)]
 pub struct Plant {
     calculated: Calculated,
-    hub_inertia: f64,
+    pub(crate) hub_inertia: f64,
     /// Mass and inertia of the frozen liquid, kg, kg m2; distance of the tank, m.
     m_0: f64,
     i_0: f64,
@@ -418,18 +420,32 @@ impl Plant {
 
     /// What the plant shows now, under the inputs' present values.
     pub fn outputs(&mut self, inputs: &Inputs) -> Outputs {
-        // Torque that was changed since the last step may already have broken the hub
-        // away, or a break-away instant ago may be undone.
+        self.with_present_contact(inputs, |plant| plant.outputs_held(inputs))
+    }
+
+    /// Looks at the plant with the contact that the present inputs give: torque that was
+    /// changed since the last step may already have broken the hub away, or a break-away
+    /// an instant ago may be undone.
+    pub fn with_present_contact<T>(
+        &mut self,
+        inputs: &Inputs,
+        look: impl FnOnce(&mut Plant) -> T,
+    ) -> T {
         let before = self.state.contact;
         if self.state.omega == 0.0 {
             self.rates(inputs);
             self.state.contact =
                 with_modes!(&mut self.liquid, modes => self.motion.contact(modes, &self.state));
         }
+        let seen = look(self);
+        self.state.contact = before;
+        seen
+    }
+
+    /// As [`Plant::outputs`], with the contact that the last step or event has left.
+    pub fn outputs_held(&mut self, inputs: &Inputs) -> Outputs {
         self.rates(inputs);
         let contact = self.state.contact;
-        self.state.contact = before;
-
         let state = &self.state;
         let hub = &self.motion.hub;
         let (w, wd) = (state.omega, hub.omega_dot[0]);
@@ -469,6 +485,7 @@ impl Plant {
             f_tangential: force[1],
             f_radial: force[0],
             wave_height,
+            wave,
             omega_imu: if self.imu.enabled { state.gyro.held } else { w },
             energy,
             momentum,
