@@ -393,14 +393,14 @@ pub const HEADER: [&str; 19] = [
 ];
 
 impl Outcome {
-    /// The features that go into `features.csv`.
+    /// The features that go into `features.csv`: those of the demodulated response, which say what
+    /// the hub did while the sweep passed, the sweep's shift of the peak included (see the report).
     pub fn features(&self) -> &Features {
         &self.demodulated_features
     }
 
-    /// Its row of `features.csv`; figures that are not found stay empty.
-    fn row(&self) -> [String; 19] {
-        let features = self.features();
+    /// Its row with these features; figures that are not found stay empty.
+    fn row(&self, features: &Features) -> [String; 19] {
         let figures = &self.figures;
         let number = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
         let mut row: [String; 19] = Default::default();
@@ -424,16 +424,20 @@ impl Outcome {
     }
 }
 
-/// Writes `features.csv`.
-pub fn write_features(outcomes: &[Outcome], path: &Path) -> Result<()> {
-    output::atomically(path, |file| {
-        let mut writer = csv::Writer::from_writer(file);
-        writer.write_record(HEADER)?;
-        for outcome in outcomes {
-            writer.write_record(outcome.row())?;
-        }
-        writer.flush().context("the disk refused")
-    })
+/// Writes `features.csv`, and `features_spa.csv` with the same columns from the `spa` responses.
+pub fn write_features(outcomes: &[Outcome], directory: &Path) -> Result<()> {
+    let write = |name: &str, features: fn(&Outcome) -> &Features| {
+        output::atomically(&directory.join(name), |file| {
+            let mut writer = csv::Writer::from_writer(file);
+            writer.write_record(HEADER)?;
+            for outcome in outcomes {
+                writer.write_record(outcome.row(features(outcome)))?;
+            }
+            writer.flush().context("the disk refused")
+        })
+    };
+    write("features.csv", Outcome::features)?;
+    write("features_spa.csv", |outcome| &outcome.spa_features)
 }
 
 #[cfg(test)]

@@ -11,5 +11,7 @@ pub mod html;
 pub mod output;
 pub mod pack;
 pub mod profile;
+pub mod report;
 pub mod run;
+pub mod svg;
 pub mod table;

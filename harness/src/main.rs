@@ -10,6 +10,7 @@ use hubslosh::campaign::{self, Plan, Sweep};
 use hubslosh::fmi2::Fmu;
 use hubslosh::pack;
 use hubslosh::profile::{self, Profile, Torque};
+use hubslosh::report;
 use hubslosh::run::Run;
 use hubslosh::table;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -217,19 +218,16 @@ impl CampaignArgs {
 fn campaign(fmu: &Path, plan: Plan) -> Result<()> {
     let fmu = Fmu::open(fmu)?;
     let results = plan.execute(&fmu)?;
-    let features = plan.out.join("features.csv");
-    campaign::write_features(&results.outcomes, &features)?;
+    campaign::write_features(&results.outcomes, &plan.out)?;
+    let page = plan.out.join("report.html");
+    report::write(&page, &plan, &fmu, &results)?;
     let reused = results.outcomes.iter().filter(|o| o.reused).count();
     println!(
-        "{} runs ({} made, {reused} were there), {} failed; features in {}",
-        results.outcomes.len(),
+        "{} runs made, {reused} were there already\nfeatures: {}\nreport:   {}",
         results.outcomes.len() - reused,
-        results.failures.len(),
-        features.display(),
+        plan.out.join("features.csv").display(),
+        page.display(),
     );
-    for o in &results.outcomes {
-        println!("{} {:?} {:?} {:?}", o.case.name(), o.demodulated_features, o.spa_features, o.figures);
-    }
     for failure in &results.failures {
         eprintln!("{} failed: {}", failure.case.name(), failure.reason);
     }

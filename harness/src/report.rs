@@ -1,0 +1,536 @@
+//! `report.html`: one self-contained page on a campaign.
+
+use std::f64::consts::TAU;
+use std::fmt::Write as _;
+use std::path::Path;
+
+use anyhow::Result;
+
+use crate::analysis::features::Features;
+use crate::analysis::{BAND, FrequencyResponse, demodulation, logarithmic_grid, spa};
+use crate::campaign::{Outcome, Plan, Results, STEP, Sweep, thousandths};
+use crate::fmi2::Fmu;
+use crate::html::escape;
+use crate::output;
+use crate::svg::{Axis, Chart, Series, Style};
+
+/// Writes the report.
+pub fn write(path: &Path, plan: &Plan, fmu: &Fmu, results: &Results) -> Result<()> {
+    let page = page(plan, fmu, results);
+    output::atomically(path, |file| Ok(std::io::Write::write_all(file, page.as_bytes())?))
+}
+
+/// The runs of one model at one fill, by amplitude.
+struct Group<'a> {
+    model: &'a str,
+    fill: f64,
+    runs: Vec<&'a Outcome>,
+    /// Features of the exact linear response on the same grid.
+    exact: Features,
+    exact_response: FrequencyResponse,
+}
+
+impl Group<'_> {
+    fn title(&self) -> String {
+        format!("{} model, {} cm fill", self.model, cm(self.fill))
+    }
+}
+
+fn groups<'a>(plan: &Plan, results: &'a Results) -> Vec<Group<'a>> {
+    let mut groups: Vec<Group> = Vec::new();
+    for run in &results.outcomes {
+        let same = |g: &&mut Group| g.model == run.case.model && g.fill == run.case.fill;
+        match groups.iter_mut().find(same) {
+            Some(group) => group.runs.push(run),
+            None => {
+                let exact_response = run.linear.frequency_response(&logarithmic_grid(BAND, 2000));
+                groups.push(Group {
+                    model: &run.case.model,
+                    fill: run.case.fill,
+                    runs: vec![run],
+                    exact: Features::of(&exact_response),
+                    exact_response,
+                });
+            }
+        }
+    }
+    debug_assert!(groups.len() <= plan.models.len() * plan.fills.len());
+    groups
+}
+
+fn page(plan: &Plan, fmu: &Fmu, results: &Results) -> String {
+    let groups = groups(plan, results);
+    let amplitudes = &plan.amplitudes;
+    let mut page = String::new();
+    let _ = write!(
+        page,
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <title>HubSlosh: sweep campaign</title>\n<style>\n{}{}</style>\n</head>\n<body><main>\n",
+        include_str!("report.css"),
+        amplitude_colors(amplitudes.len())
+    );
+    page.push_str(&introduction(plan, fmu, results, &groups));
+    page.push_str("<h2>Frequency responses</h2>\n<p>Hub rate over commanded torque while the sweep passes each frequency, one curve per torque amplitude. The dip stands at the slosh frequency, where the liquid holds the hub still; the peak, where hub and liquid swing against each other, stands above it. Rest the pointer on a curve to see which run it is.</p>\n");
+    page.push_str(&amplitude_legend(amplitudes));
+    for group in &groups {
+        page.push_str(&responses(group, amplitudes));
+    }
+    page.push_str("<h2>Features against torque amplitude</h2>\n<p>For a linear plant with linear friction these would be horizontal lines. What bends them at small torque is the bearing: dry friction counts most when the torque is small.</p>\n<div class=\"legend\"><span><i style=\"color:var(--e0)\"></i>while the sweep passes (demodulation; in <code>features.csv</code>)</span><span><i class=\"dash\" style=\"color:var(--e1)\"></i>over the whole record (<code>spa</code>)</span><span><i class=\"dash\" style=\"color:var(--exact)\"></i>exact, linear with viscous friction</span></div>\n");
+    for group in &groups {
+        page.push_str(&features(group));
+    }
+    page.push_str(&bearing_and_liquid(&groups));
+    page.push_str(&estimators(plan, &groups));
+    page.push_str(&table(&groups));
+    page.push_str(&provenance(plan, fmu));
+    page.push_str("</main></body>\n</html>\n");
+    page
+}
+
+// ---------------------------------------------------------------- text
+
+fn introduction(plan: &Plan, fmu: &Fmu, results: &Results, groups: &[Group]) -> String {
+    let profile = plan.profile(1.0);
+    let kind = match plan.sweep {
+        Sweep::Exponential => "exponential",
+        Sweep::Linear => "linear",
+    };
+    let mut out = format!(
+        "<h1>A hub, a sloshing tank and a sticking bearing</h1>\n\
+         <p class=\"lead\">{} sweeps of the HubSlosh FMU (version {}): {kind}, {} to {} Hz in {} s, torque amplitudes {} to {} mN·m, sampled at {} Hz.</p>\n",
+        results.outcomes.len(),
+        escape(&fmu.description().version),
+        BAND.0,
+        BAND.1,
+        profile.duration(),
+        thousandths(plan.amplitudes.iter().copied().fold(f64::MAX, f64::min)),
+        thousandths(plan.amplitudes.iter().copied().fold(f64::MIN, f64::max)),
+        (1.0 / STEP).round(),
+    );
+    if !results.failures.is_empty() {
+        let _ = write!(out, "<div class=\"failed\"><p><b>{} runs failed:</b></p><ul>", results.failures.len());
+        for failure in &results.failures {
+            let _ = write!(out, "<li><code>{}</code>: {}</li>", escape(&failure.case.name()), escape(&failure.reason));
+        }
+        out.push_str("</ul></div>\n");
+    }
+    out.push_str("<div class=\"cards\">");
+    for group in groups {
+        let over = |get: &dyn Fn(&Outcome) -> Option<f64>| {
+            let values: Vec<f64> = group.runs.iter().filter_map(|run| get(run)).collect();
+            match values.iter().copied().reduce(f64::min).zip(values.iter().copied().reduce(f64::max)) {
+                Some((low, high)) if high - low < 5e-5 => format!("{low:.4}"),
+                Some((low, high)) => format!("{low:.3} … {high:.3}"),
+                None => "none".into(),
+            }
+        };
+        for (what, value, exact) in [
+            ("dip", over(&|run| run.features().f_dip), group.exact.f_dip),
+            ("swept peak", over(&|run| run.features().f_res), group.exact.f_res),
+        ] {
+            let _ = write!(
+                out,
+                "<div class=\"card\"><b>{value} Hz</b><span>{what}, {} cm, {}{}</span></div>",
+                cm(group.fill),
+                escape(group.model),
+                exact.map_or(String::new(), |f| format!(" (exact linear {f:.4} Hz)")),
+            );
+        }
+    }
+    out.push_str("</div>\n");
+    out
+}
+
+fn estimators(plan: &Plan, groups: &[Group]) -> String {
+    let mut out = format!(
+        "<h2>How the figures are found</h2>\n\
+         <p><b>Demodulation</b> (solid, in <code>features.csv</code>). Torque and rate are multiplied by e<sup>−jφ(t)</sup>, φ being the sweep's own known phase, and averaged over a Hann window of {cycles} cycles that slides with the sweep. Their ratio is the response the moment the sweep passes that frequency: what a lock-in amplifier would show. Both signals see the same window, so its effect on amplitude and phase cancels; harmonics that the bearing makes average out.</p>\n\
+         <p><b><code>spa</code></b> (broken). MATLAB's Blackman–Tukey estimate, which the thesis used: covariances of the whole record up to a lag of {lag} s, Hann lag window, Fourier transform, ratio of cross spectrum to input spectrum. It resolves about {resolution:.0} mHz, which fills a narrow dip a little.</p>\n\
+         <p><b>Features.</b> f<sub>res</sub> and f<sub>dip</sub> are the most prominent local maximum and minimum of |H| between {from} and {to} Hz, refined by a parabola through three points of log |H|; Δf is their distance, the notch depth their difference in dB. They are local on purpose: with strong damping the largest |H| in the band is its lower edge, not the slosh peak.</p>\n\
+         <p><b>Energy residual.</b> Largest |E(t) − E(0) − work + heat| of a run over the energy turned over, Σ|Δwork| + heat. It is the FMU's own book-keeping, checked at every sample.</p>\n\
+         <h2>Why the swept peak stands higher than the exact one</h2>\n\
+         <p>The sweep is not slow enough for the liquid. Bare-wall damping makes the peak so narrow that the sweep crosses its half-power width in less time than the slosh needs to decay: the oscillation is still growing when its best frequency has gone by, so an upward sweep sees the largest rate later, at a higher frequency, and a little lower than it would be in a dwell. A bench that sweeps at this rate and reads the envelope sees the same shift; it belongs to the experiment, not to the plant.</p>\n",
+        cycles = demodulation::CYCLES,
+        lag = spa::LAG,
+        resolution = 1e3 / spa::LAG,
+        from = BAND.0,
+        to = BAND.1,
+    );
+    out.push_str("<div class=\"wide\"><table><thead><tr><th>Fill</th><th>exact peak</th><th>half-power width<br>2ζf</th><th>sweep rate there</th><th>time to cross</th><th>slosh decay time<br>1/(2πζf)</th><th>peak, demodulated<br>(largest torque)</th><th>shift</th><th>peak, <code>spa</code></th><th>shift</th></tr></thead><tbody>\n");
+    for group in groups {
+        let (Some(mode), Some(exact), Some(run)) =
+            (group.runs[0].linear.modes.first(), group.exact.f_res, group.runs.last())
+        else {
+            continue;
+        };
+        let width = 2.0 * mode.damping * mode.frequency;
+        let rate = plan.profile(1.0).rate_at(exact);
+        let shift = |f: Option<f64>| f.map_or(String::new(), |f| format!("{:+.1} mHz", (f - exact) * 1e3));
+        let _ = writeln!(
+            out,
+            "<tr><td>{} cm, {}</td><td>{exact:.4} Hz</td><td>{:.1} mHz</td><td>{:.2} mHz/s</td><td>{:.1} s</td><td>{:.1} s</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+            cm(group.fill),
+            escape(group.model),
+            width * 1e3,
+            rate * 1e3,
+            width / rate,
+            1.0 / (TAU * mode.damping * mode.frequency),
+            hertz(run.demodulated_features.f_res),
+            shift(run.demodulated_features.f_res),
+            hertz(run.spa_features.f_res),
+            shift(run.spa_features.f_res),
+        );
+    }
+    out.push_str("</tbody></table></div>\n<p>The second estimator is the proof. For a linear plant the ratio of whole-record spectra is the frequency response however fast the input swept, because the ringing after the peak is in the record too; and there the shift is gone. The dip does not move in either: at a zero the hub hardly turns, so there is nothing that rings. When runs of a nonlinear model are compared, both views count: demodulation says what happened at that moment, <code>spa</code> gives the best linear summary of the whole.</p>\n");
+    out
+}
+
+fn provenance(plan: &Plan, fmu: &Fmu) -> String {
+    let description = fmu.description();
+    let settings: Vec<_> = plan.settings.iter().map(|(k, v)| format!("{k} = {v}")).collect();
+    let tolerance = match (plan.tolerance, description.default_experiment.tolerance) {
+        (Some(t), _) => t.to_string(),
+        (None, Some(t)) => format!("the FMU's own ({t})"),
+        (None, None) => "the FMU's own".into(),
+    };
+    let rows = [
+        ("FMU", format!("{}, version {}", description.model_name, description.version)),
+        ("made by", description.generation_tool.clone()),
+        ("GUID", description.guid.clone()),
+        ("SHA-256", fmu.hash().to_string()),
+        ("slosh.model", plan.models.join(", ")),
+        ("parameters", if settings.is_empty() { "the FMU's start values".into() } else { settings.join(", ") }),
+        ("torque", format!("{}; value and slope handed over every {} s", plan.profile(1.0).to_string().replace("amplitude=1,", ""), STEP)),
+        ("tolerance", tolerance),
+        ("driven by", format!("hubslosh {}", env!("CARGO_PKG_VERSION"))),
+    ];
+    let mut out = String::from("<h2>What was run</h2>\n<dl>");
+    for (name, value) in rows.iter().filter(|(_, value)| !value.is_empty()) {
+        let _ = write!(out, "<dt>{name}</dt><dd><code>{}</code></dd>", escape(value));
+    }
+    out.push_str("</dl>\n<p>Each run lies in <code>runs/</code> as Parquet with the same particulars in its metadata; the figures of the table above lie in <code>features.csv</code>, and those of <code>spa</code> in the same columns in <code>features_spa.csv</code>. <code>hubslosh campaign</code> makes everything again.</p>\n");
+    out
+}
+
+fn table(groups: &[Group]) -> String {
+    let mut out = String::from(
+        "<h2>All figures</h2>\n<div class=\"wide\"><table><thead>\n\
+         <tr><th colspan=\"3\">Run</th><th colspan=\"4\">While the sweep passes</th><th colspan=\"4\">Whole record (<code>spa</code>)</th><th colspan=\"4\">The run itself</th></tr>\n\
+         <tr><th>model</th><th>fill<br>cm</th><th>torque<br>mN·m</th><th>f<sub>dip</sub><br>Hz</th><th>f<sub>res</sub><br>Hz</th><th>Δf<br>mHz</th><th>notch<br>dB</th><th>f<sub>dip</sub><br>Hz</th><th>f<sub>res</sub><br>Hz</th><th>Δf<br>mHz</th><th>notch<br>dB</th><th>peak slosh<br>angle, deg</th><th>peak wave<br>mm</th><th>stuck<br>s</th><th>energy<br>residual</th></tr>\n</thead><tbody>\n",
+    );
+    for group in groups {
+        for run in &group.runs {
+            let _ = write!(
+                out,
+                "<tr><td>{}</td><td>{}</td><td>{}</td>",
+                escape(group.model),
+                cm(group.fill),
+                thousandths(run.case.amplitude)
+            );
+            for features in [&run.demodulated_features, &run.spa_features] {
+                let cell = |value: Option<f64>, digits: usize| match value {
+                    Some(value) => format!("<td>{value:.digits$}</td>"),
+                    None => "<td>none</td>".into(),
+                };
+                out.push_str(&cell(features.f_dip, 4));
+                out.push_str(&cell(features.f_res, 4));
+                out.push_str(&cell(features.delta_f().map(|f| f * 1e3), 1));
+                out.push_str(&cell(features.notch_db, 2));
+            }
+            let figures = &run.figures;
+            let _ = writeln!(
+                out,
+                "<td>{:.1}</td><td>{:.1}</td><td>{:.3}</td><td>{:.1e}</td></tr>",
+                figures.peak_slosh_angle.to_degrees(),
+                figures.peak_wave_height * 1e3,
+                figures.stuck,
+                figures.max_energy_residual
+            );
+        }
+    }
+    out.push_str("</tbody></table></div>\n");
+    out
+}
+
+// ---------------------------------------------------------------- figures
+
+const FREQUENCY_TICKS: [f64; 6] = [1.25, 1.5, 2.0, 2.5, 3.0, 3.5];
+
+fn responses(group: &Group, amplitudes: &[f64]) -> String {
+    let level = |r: &FrequencyResponse| zip(&r.frequency, &r.decibels());
+    let phase = |r: &FrequencyResponse| zip(&r.frequency, &r.degrees());
+    let curves = |of: &dyn Fn(&FrequencyResponse) -> Vec<(f64, f64)>| {
+        let mut series: Vec<Series> = group
+            .runs
+            .iter()
+            .map(|run| Series {
+                points: of(&run.demodulated),
+                color: amplitude_color(amplitudes, run.case.amplitude),
+                style: Style::Line,
+                title: format!("{} mN·m", thousandths(run.case.amplitude)),
+            })
+            .collect();
+        series.push(exact(of(&group.exact_response)));
+        series
+    };
+    let levels = || curves(&level).into_iter().flat_map(|s| s.points).map(|(_, y)| y);
+    let size = (560.0, 330.0);
+    let band = Axis::logarithmic("frequency / Hz", BAND, &FREQUENCY_TICKS);
+    let dip = group.exact.f_dip.unwrap_or(BAND.0);
+    let peak = group.exact.f_res.unwrap_or(BAND.1);
+    let around = Axis::linear("frequency / Hz", [dip - 0.08, peak + 0.12], 0.3, 6);
+    let decibels = Axis::linear("|H| / dB re 1 (rad/s)/(N·m)", levels(), 10.0, 6);
+
+    let charts = [
+        Chart {
+            title: format!("Magnitude, {}", group.title()),
+            size,
+            x: band.clone(),
+            y: decibels.clone(),
+            series: curves(&level),
+        },
+        Chart {
+            title: "Magnitude around dip and peak".into(),
+            size,
+            x: around.clone(),
+            y: decibels.clone(),
+            series: curves(&level),
+        },
+        Chart {
+            title: format!("Phase, {}", group.title()),
+            size,
+            x: band,
+            y: degrees_axis(group),
+            series: curves(&phase),
+        },
+        estimator_chart(group, size, peak),
+    ];
+    let mut out = format!("<h3>{} cm fill, {} model</h3>\n<div class=\"two\">\n", cm(group.fill), escape(group.model));
+    for chart in charts {
+        out.push_str(&chart.svg());
+    }
+    out.push_str("</div>\n");
+    out
+}
+
+fn degrees_axis(group: &Group) -> Axis {
+    let beyond = group.runs.iter().any(|r| r.demodulated.degrees().iter().any(|p| p.abs() > 100.0));
+    let to = if beyond { 180.0 } else { 90.0 };
+    let ticks = (-4..=4).map(|i| f64::from(i) * 45.0).filter(|t| t.abs() <= to).collect();
+    Axis { label: "phase / deg".into(), from: -to * 1.05, to: to * 1.05, logarithmic: false, ticks }
+}
+
+/// The peak of the run with the largest torque, as each estimator sees it.
+fn estimator_chart(group: &Group, size: (f64, f64), peak: f64) -> Chart {
+    let x = Axis::linear("frequency / Hz", [peak - 0.04, peak + 0.06], 0.1, 5);
+    let inside = |points: Vec<(f64, f64)>| -> Vec<(f64, f64)> {
+        points.into_iter().filter(|(f, _)| (x.from..=x.to).contains(f)).collect()
+    };
+    let magnitude = |r: &FrequencyResponse| {
+        inside(r.frequency.iter().zip(&r.response).map(|(f, h)| (*f, h.norm())).collect())
+    };
+    let mut series = Vec::new();
+    if let Some(run) = group.runs.last() {
+        series.push(Series {
+            points: magnitude(&run.demodulated),
+            color: "var(--e0)".into(),
+            style: Style::Line,
+            title: "while the sweep passes (demodulation)".into(),
+        });
+        series.push(Series {
+            points: magnitude(&run.spa),
+            color: "var(--e1)".into(),
+            style: Style::Dashed,
+            title: "over the whole record (spa)".into(),
+        });
+    }
+    series.push(exact(magnitude(&group.exact_response)));
+    let top = series.iter().flat_map(|s| &s.points).map(|(_, y)| *y).fold(0.0, f64::max);
+    let y = Axis::linear("|H| / (rad/s)/(N·m)", [0.0, top], 0.1, 5);
+    let amplitude = group.runs.last().map_or(0.0, |run| thousandths(run.case.amplitude));
+    Chart {
+        title: format!("The sweep shifts the peak: {amplitude} mN·m, demodulated (blue), spa (orange), exact"),
+        size,
+        x,
+        y,
+        series,
+    }
+}
+
+fn features(group: &Group) -> String {
+    let mut out = format!("<h3>{} cm fill, {} model</h3>\n<div class=\"four\">\n", cm(group.fill), escape(group.model));
+    type Get = fn(&Features) -> Option<f64>;
+    let panels: [(&str, &str, Get, f64, f64); 4] = [
+        ("Dip", "f_dip / Hz", |f| f.f_dip, 0.01, 1.0),
+        ("Peak", "f_res / Hz", |f| f.f_res, 0.03, 1.0),
+        ("Distance", "Δf / mHz", |f| f.delta_f(), 20.0, 1e3),
+        ("Notch depth", "notch / dB", |f| f.notch_db, 5.0, 1.0),
+    ];
+    for (title, label, get, span, scale) in panels {
+        let points = |of: &dyn Fn(&Outcome) -> Features| -> Vec<(f64, f64)> {
+            group
+                .runs
+                .iter()
+                .filter_map(|run| {
+                    Some((thousandths(run.case.amplitude), get(&of(run))? * scale))
+                })
+                .collect()
+        };
+        let x = torque_axis(group.runs.iter().copied());
+        let mut series = vec![
+            Series {
+                points: points(&|run| run.spa_features),
+                color: "var(--e1)".into(),
+                style: Style::OpenDots,
+                title: "spa".into(),
+            },
+            Series {
+                points: points(&|run| run.demodulated_features),
+                color: "var(--e0)".into(),
+                style: Style::Dots,
+                title: "demodulation".into(),
+            },
+        ];
+        if let Some(value) = get(&group.exact) {
+            series.insert(0, exact(vec![(x.from, value * scale), (x.to, value * scale)]));
+        }
+        let values = series.iter().flat_map(|s| &s.points).map(|(_, y)| *y);
+        let y = Axis::linear(label, values.collect::<Vec<_>>(), span, 5);
+        out.push_str(&Chart { title: title.into(), size: (330.0, 260.0), x, y, series }.svg());
+    }
+    out.push_str("</div>\n");
+    out
+}
+
+fn bearing_and_liquid(groups: &[Group]) -> String {
+    let mut out = String::from(
+        "<h2>Bearing, liquid, book-keeping</h2>\n<p>At small torque the bearing sticks for part of every cycle, most of all near the dip. The wave height is the linear formula's; beyond a quarter of the tank's radius it says that linear slosh theory no longer holds, not how high the water stands. So a linear model's runs at the larger torques are computed faithfully, but they are not what a tank does.</p>\n<div class=\"legend\">",
+    );
+    for (i, group) in groups.iter().enumerate() {
+        let _ = write!(out, "<span><i style=\"color:{}\"></i>{}</span>", fill_color(i), escape(&group.title()));
+    }
+    out.push_str("</div>\n<div class=\"four\">\n");
+    type Get = fn(&Outcome) -> f64;
+    let panels: [(&str, &str, Get, bool); 4] = [
+        ("Time stuck in the sweep", "stuck / s", |run| run.figures.stuck, true),
+        ("Largest slosh angle", "angle / deg", |run| run.figures.peak_slosh_angle.to_degrees(), false),
+        ("Largest wave height", "height / mm", |run| run.figures.peak_wave_height * 1e3, false),
+        ("Energy residual", "residual / energy turned over", |run| run.figures.max_energy_residual, true),
+    ];
+    for (title, label, get, decades) in panels {
+        let series: Vec<Series> = groups
+            .iter()
+            .enumerate()
+            .map(|(i, group)| Series {
+                points: group
+                    .runs
+                    .iter()
+                    .map(|run| (thousandths(run.case.amplitude), get(run)))
+                    .filter(|(_, y)| !decades || *y > 0.0)
+                    .collect(),
+                color: fill_color(i),
+                style: Style::Dots,
+                title: group.title(),
+            })
+            .collect();
+        let values: Vec<f64> = series.iter().flat_map(|s| &s.points).map(|(_, y)| *y).collect();
+        let nothing = values.is_empty();
+        let y = if decades {
+            Axis::decades(label, values)
+        } else {
+            Axis::linear(label, values.into_iter().chain([0.0]), 1.0, 5)
+        };
+        let title = if nothing { format!("{title}: none") } else { title.to_string() };
+        let x = torque_axis(groups.iter().flat_map(|g| g.runs.iter().copied()));
+        out.push_str(&Chart { title, size: (330.0, 260.0), x, y, series }.svg());
+    }
+    out.push_str("</div>\n");
+    out
+}
+
+fn torque_axis<'a>(runs: impl Iterator<Item = &'a Outcome>) -> Axis {
+    let values: Vec<f64> = runs.map(|run| thousandths(run.case.amplitude)).chain([0.0]).collect();
+    Axis::linear("torque amplitude / mN·m", values, 10.0, 5)
+}
+
+fn exact(points: Vec<(f64, f64)>) -> Series {
+    Series {
+        points,
+        color: "var(--exact)".into(),
+        style: Style::Dashed,
+        title: "exact, linear model with viscous friction".into(),
+    }
+}
+
+fn zip(x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {
+    x.iter().copied().zip(y.iter().copied()).collect()
+}
+
+// ---------------------------------------------------------------- colours and numbers
+
+/// The colour map "viridis", which is ordered in lightness and safe for colour-blind readers.
+const VIRIDIS: [[f64; 3]; 10] = [
+    [68.0, 1.0, 84.0],
+    [72.0, 40.0, 120.0],
+    [62.0, 73.0, 137.0],
+    [49.0, 104.0, 142.0],
+    [38.0, 130.0, 142.0],
+    [31.0, 158.0, 137.0],
+    [53.0, 183.0, 121.0],
+    [110.0, 206.0, 88.0],
+    [181.0, 222.0, 43.0],
+    [253.0, 231.0, 37.0],
+];
+
+/// CSS variables --a0, --a1, … from small to large amplitude: on paper without the bright end,
+/// which would be lost there, in the dark without the dark end.
+fn amplitude_colors(count: usize) -> String {
+    let scheme = |from: f64, to: f64| {
+        let mut rules = String::new();
+        for i in 0..count {
+            let part = if count > 1 { i as f64 / (count - 1) as f64 } else { 0.5 };
+            let place = (from + (to - from) * part) * 9.0;
+            let (low, mix) = ((place as usize).min(8), place - (place as usize).min(8) as f64);
+            let [r, g, b] =
+                [0, 1, 2].map(|c| VIRIDIS[low][c] * (1.0 - mix) + VIRIDIS[low + 1][c] * mix);
+            let _ = write!(rules, "--a{i}: rgb({r:.0} {g:.0} {b:.0}); ");
+        }
+        rules
+    };
+    format!(
+        ":root {{ {}}}\n@media (prefers-color-scheme: dark) {{ :root {{ {}}} }}\n",
+        scheme(0.0, 0.86),
+        scheme(0.25, 1.0)
+    )
+}
+
+fn amplitude_color(amplitudes: &[f64], amplitude: f64) -> String {
+    let mut sorted = amplitudes.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    format!("var(--a{})", sorted.iter().position(|a| *a == amplitude).unwrap_or(0))
+}
+
+fn amplitude_legend(amplitudes: &[f64]) -> String {
+    let mut sorted = amplitudes.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let mut out = String::from("<div class=\"legend\"><span>Torque amplitude in mN·m:</span>");
+    for (i, amplitude) in sorted.iter().enumerate() {
+        let _ = write!(out, "<span><i style=\"color:var(--a{i})\"></i>{}</span>", thousandths(*amplitude));
+    }
+    out.push_str("<span><i class=\"dash\" style=\"color:var(--exact)\"></i>exact transfer function of the linear model with viscous friction</span></div>\n");
+    out
+}
+
+fn fill_color(i: usize) -> String {
+    format!("var(--f{})", i % 4)
+}
+
+/// A length in cm, without the dust of binary fractions.
+fn cm(length: f64) -> f64 {
+    thousandths(length) / 10.0
+}
+
+fn hertz(value: Option<f64>) -> String {
+    value.map_or("none".into(), |f| format!("{f:.4} Hz"))
+}
