@@ -267,6 +267,96 @@ fn a_vanishing_liquid_leaves_the_frozen_model() {
     }
 }
 
+#[test]
+fn friction_that_would_drive_the_hub_is_refused() {
+    let refused = |asymmetry: f64, forward: [f64; 4]| {
+        let mut p = bench(SloshModel::Linear, FrictionModel::Stribeck);
+        p.friction.asymmetry = asymmetry;
+        p.friction.harmonics_forward = forward;
+        Plant::new(&p, &Inputs::default(), 0.0, TOLERANCE).err()
+    };
+    assert_eq!(refused(0.5, [0.4, 0.0, 0.0, 0.0]), None);
+    assert_eq!(refused(-0.5, [0.3, 0.0, 0.0, 0.1]), None);
+    // 1 - 0.5 - 0.4 sqrt(2) < 0
+    let problems = refused(-0.5, [0.4, 0.4, 0.0, 0.0]).unwrap();
+    assert!(problems[0].contains("friction.asymmetry"), "{problems:?}");
+    assert_eq!(refused(1.1, [0.0; 4]).unwrap().len(), 1, "only backwards is below 0");
+}
+
+#[test]
+fn a_bearing_with_a_preferred_direction_holds_less_in_it() {
+    // Breaks away at (c + d)(1 -+ eta): 4.737 and 7.105 mN m.
+    let mut p = bench(SloshModel::Frozen, FrictionModel::Stribeck);
+    p.friction.asymmetry = -0.2;
+    let stuck = |torque: f64| {
+        let inputs = Inputs { tau_cmd: Ramp::held(torque), ..Inputs::default() };
+        plant(&p, &inputs).outputs(&inputs).stuck
+    };
+    assert!(stuck(4.736e-3) && !stuck(4.738e-3));
+    assert!(stuck(-7.105e-3) && !stuck(-7.106e-3));
+}
+
+#[test]
+fn hub_liquid_and_wheel_together_keep_their_momentum() {
+    let mut p = bench(SloshModel::Spherical, FrictionModel::None);
+    p.wheel.enabled = true;
+    // Saturates: torque limit at first, then the rotor's lowest speed.
+    let inputs = Inputs { tau_cmd: Ramp { value: 0.5, slope: -0.05 }, ..Inputs::default() };
+    let mut plant = plant(&p, &inputs);
+    let total = |o: Outputs| o.momentum + p.wheel.inertia * o.wheel_speed;
+    let first = total(plant.outputs(&inputs));
+    plant.step(&inputs, 20.0).unwrap();
+    let last = plant.outputs(&inputs);
+    assert!((total(last) - first).abs() < 1e-11, "{:e}", total(last) - first);
+    assert!(last.wheel_speed > p.wheel.speed_min, "the reversed command speeds it up again");
+}
+
+#[test]
+fn without_gravity_the_liquid_keeps_its_place_and_nothing_breaks() {
+    for slosh in SLOSH {
+        let mut p = bench(slosh, FrictionModel::Stribeck);
+        p.init.slosh_angle = 0.1;
+        let mut inputs = Inputs::default();
+        let mut plant = plant(&p, &inputs);
+        inputs.g_axial = Ramp { value: 9.81, slope: -9.81 };
+        plant.step(&inputs, 1.0).unwrap();
+        inputs.g_axial = Ramp::held(0.0);
+        for _ in 0..10 {
+            if plant.step(&inputs, 0.1).is_err() {
+                assert_eq!(slosh, SloshModel::Paraboloid, "only it has a rim to drift over");
+                break;
+            }
+        }
+        let o = plant.outputs(&inputs);
+        assert!(o.omega.is_finite() && o.slosh_angle.is_finite() && o.energy >= 0.0);
+    }
+}
+
+#[test]
+fn gyro_reads_the_same_however_time_is_cut() {
+    let mut p = bench(SloshModel::Linear, FrictionModel::Viscous);
+    p.imu.enabled = true;
+    p.imu.lsb = 1e-6;
+    p.init.slosh_angle = 0.1;
+    let inputs = Inputs::default();
+    let reading = |cut: f64| {
+        let mut plant = plant(&p, &inputs);
+        while plant.time() < 1.99 {
+            plant.step(&inputs, cut).unwrap();
+        }
+        let at = 2.005 - plant.time();
+        plant.step(&inputs, at).unwrap();
+        plant.outputs(&inputs)
+    };
+    let first = reading(0.02);
+    assert!((first.omega_imu - first.omega).abs() > 0.0, "it is a sample with noise");
+    for cut in [0.005, 0.0137, 0.4] {
+        // Equal noise; the rate itself differs within the tolerance, at most one step of
+        // the quantisation.
+        assert!((reading(cut).omega_imu - first.omega_imu).abs() < 1.1e-6, "{cut}");
+    }
+}
+
 /// Random steps in the default test; `HUBSLOSH_RANDOM_STEPS=1000000` runs a million.
 const RANDOM_STEPS: usize = 5_000;
 
