@@ -151,6 +151,8 @@ pub struct Outcome {
     pub spa_features: Features,
     /// Its exact linear counterpart with viscous friction, from the FMU's calculated parameters.
     pub linear: Linear,
+    /// Radius of the tank, m.
+    pub tank_radius: f64,
     /// It was there already.
     pub reused: bool,
 }
@@ -283,6 +285,7 @@ impl Plan {
         let recipe = self.recipe(fmu, &run, case);
         let mut instance = run.initialise(fmu)?;
         let linear = exact_linear(&mut instance)?;
+        let tank_radius = instance.real("tank.d")? / 2.0;
         let there = if self.force { None } else { stored(path, &recipe) };
         let reused = there.is_some();
         let (table, figures) = match there {
@@ -316,6 +319,7 @@ impl Plan {
             demodulated,
             spa,
             linear,
+            tank_radius,
             reused,
         })
     }

@@ -121,7 +121,7 @@ fn introduction(plan: &Plan, fmu: &Fmu, results: &Results, groups: &[Group]) -> 
             let values: Vec<f64> = group.runs.iter().filter_map(|run| get(run)).collect();
             match values.iter().copied().reduce(f64::min).zip(values.iter().copied().reduce(f64::max)) {
                 Some((low, high)) if high - low < 5e-5 => format!("{low:.4}"),
-                Some((low, high)) => format!("{low:.3} … {high:.3}"),
+                Some((low, high)) => format!("{low:.3}–{high:.3}"),
                 None => "none".into(),
             }
         };
@@ -150,14 +150,14 @@ fn estimators(plan: &Plan, groups: &[Group]) -> String {
          <p><b>Features.</b> f<sub>res</sub> and f<sub>dip</sub> are the most prominent local maximum and minimum of |H| between {from} and {to} Hz, refined by a parabola through three points of log |H|; Δf is their distance, the notch depth their difference in dB. They are local on purpose: with strong damping the largest |H| in the band is its lower edge, not the slosh peak.</p>\n\
          <p><b>Energy residual.</b> Largest |E(t) − E(0) − work + heat| of a run over the energy turned over, Σ|Δwork| + heat. It is the FMU's own book-keeping, checked at every sample.</p>\n\
          <h2>Why the swept peak stands higher than the exact one</h2>\n\
-         <p>The sweep is not slow enough for the liquid. Bare-wall damping makes the peak so narrow that the sweep crosses its half-power width in less time than the slosh needs to decay: the oscillation is still growing when its best frequency has gone by, so an upward sweep sees the largest rate later, at a higher frequency, and a little lower than it would be in a dwell. A bench that sweeps at this rate and reads the envelope sees the same shift; it belongs to the experiment, not to the plant.</p>\n",
+         <p>The sweep is not slow enough for the liquid. Bare-wall damping makes the peak so narrow that the sweep crosses its half-power width in less time than the slosh needs to decay: the oscillation is still growing when its best frequency has gone by, so an upward sweep sees the largest rate later, at a higher frequency, and a little lower than it would be in a dwell. The ripple behind the peak is the beat between that ringing and the torque that has moved on. A bench that sweeps at this rate and reads the envelope sees the same shift; it belongs to the experiment, not to the plant.</p>\n",
         cycles = demodulation::CYCLES,
         lag = spa::LAG,
         resolution = 1e3 / spa::LAG,
         from = BAND.0,
         to = BAND.1,
     );
-    out.push_str("<div class=\"wide\"><table><thead><tr><th>Fill</th><th>exact peak</th><th>half-power width<br>2ζf</th><th>sweep rate there</th><th>time to cross</th><th>slosh decay time<br>1/(2πζf)</th><th>peak, demodulated<br>(largest torque)</th><th>shift</th><th>peak, <code>spa</code></th><th>shift</th></tr></thead><tbody>\n");
+    out.push_str("<div class=\"wide\"><table><thead><tr><th>fill</th><th>exact<br>peak</th><th>half-power<br>width 2ζf</th><th>sweep rate<br>there</th><th>time to<br>cross</th><th>slosh decays<br>in 1/(2πζf)</th><th>largest torque,<br>swept peak</th><th>its<br>shift</th><th>largest torque,<br><code>spa</code> peak</th><th>its<br>shift</th></tr></thead><tbody>\n");
     for group in groups {
         let (Some(mode), Some(exact), Some(run)) =
             (group.runs[0].linear.modes.first(), group.exact.f_res, group.runs.last())
@@ -182,7 +182,7 @@ fn estimators(plan: &Plan, groups: &[Group]) -> String {
             shift(run.spa_features.f_res),
         );
     }
-    out.push_str("</tbody></table></div>\n<p>The second estimator is the proof. For a linear plant the ratio of whole-record spectra is the frequency response however fast the input swept, because the ringing after the peak is in the record too; and there the shift is gone. The dip does not move in either: at a zero the hub hardly turns, so there is nothing that rings. When runs of a nonlinear model are compared, both views count: demodulation says what happened at that moment, <code>spa</code> gives the best linear summary of the whole.</p>\n");
+    out.push_str("</tbody></table></div>\n<p>The second estimator is the proof. For a linear plant the ratio of whole-record spectra is the frequency response however fast the input swept, because the ringing after the peak is in the record too; and there the shift is gone. The dip hardly moves in either: there the hub stands nearly still, so there is little that could ring; only at the smallest torques, where the bearing sticks near the dip, does the sweep see it a few mHz late. When runs of a nonlinear model are compared, both views count: demodulation says what happened at that moment, <code>spa</code> gives the best linear summary of the whole.</p>\n");
     out
 }
 
@@ -289,6 +289,7 @@ fn responses(group: &Group, amplitudes: &[f64]) -> String {
             x: band.clone(),
             y: decibels.clone(),
             series: curves(&level),
+            legend: false,
         },
         Chart {
             title: "Magnitude around dip and peak".into(),
@@ -296,13 +297,15 @@ fn responses(group: &Group, amplitudes: &[f64]) -> String {
             x: around.clone(),
             y: decibels.clone(),
             series: curves(&level),
+            legend: false,
         },
         Chart {
             title: format!("Phase, {}", group.title()),
             size,
             x: band,
-            y: degrees_axis(group),
+            y: degrees_axis(&curves(&phase)),
             series: curves(&phase),
+            legend: false,
         },
         estimator_chart(group, size, peak),
     ];
@@ -314,11 +317,21 @@ fn responses(group: &Group, amplitudes: &[f64]) -> String {
     out
 }
 
-fn degrees_axis(group: &Group) -> Axis {
-    let beyond = group.runs.iter().any(|r| r.demodulated.degrees().iter().any(|p| p.abs() > 100.0));
-    let to = if beyond { 180.0 } else { 90.0 };
-    let ticks = (-4..=4).map(|i| f64::from(i) * 45.0).filter(|t| t.abs() <= to).collect();
-    Axis { label: "phase / deg".into(), from: -to * 1.05, to: to * 1.05, logarithmic: false, ticks }
+/// Phases in steps of 45 degrees.
+fn degrees_axis(series: &[Series]) -> Axis {
+    let places = |pick: fn(f64) -> f64, fold: fn(f64, f64) -> f64| {
+        let phases = series.iter().flat_map(|s| &s.points).map(|(_, y)| pick(*y / 45.0));
+        phases.reduce(fold).unwrap_or(0.0)
+    };
+    let (low, high) = (places(f64::floor, f64::min), places(f64::ceil, f64::max));
+    let ticks = (low as i32..=high as i32).map(|i| f64::from(i) * 45.0).collect();
+    Axis {
+        label: "phase / deg".into(),
+        from: low * 45.0,
+        to: high * 45.0,
+        logarithmic: false,
+        ticks,
+    }
 }
 
 /// The peak of the run with the largest torque, as each estimator sees it.
@@ -336,13 +349,13 @@ fn estimator_chart(group: &Group, size: (f64, f64), peak: f64) -> Chart {
             points: magnitude(&run.demodulated),
             color: "var(--e0)".into(),
             style: Style::Line,
-            title: "while the sweep passes (demodulation)".into(),
+            title: "while the sweep passes".into(),
         });
         series.push(Series {
             points: magnitude(&run.spa),
             color: "var(--e1)".into(),
             style: Style::Dashed,
-            title: "over the whole record (spa)".into(),
+            title: "whole record (spa)".into(),
         });
     }
     series.push(exact(magnitude(&group.exact_response)));
@@ -350,11 +363,12 @@ fn estimator_chart(group: &Group, size: (f64, f64), peak: f64) -> Chart {
     let y = Axis::linear("|H| / (rad/s)/(N·m)", [0.0, top], 0.1, 5);
     let amplitude = group.runs.last().map_or(0.0, |run| thousandths(run.case.amplitude));
     Chart {
-        title: format!("The sweep shifts the peak: {amplitude} mN·m, demodulated (blue), spa (orange), exact"),
+        title: format!("The peak at {amplitude} mN·m, as each estimator sees it"),
         size,
         x,
         y,
         series,
+        legend: true,
     }
 }
 
@@ -397,7 +411,7 @@ fn features(group: &Group) -> String {
         }
         let values = series.iter().flat_map(|s| &s.points).map(|(_, y)| *y);
         let y = Axis::linear(label, values.collect::<Vec<_>>(), span, 5);
-        out.push_str(&Chart { title: title.into(), size: (330.0, 260.0), x, y, series }.svg());
+        out.push_str(&Chart { title: title.into(), size: (330.0, 260.0), x, y, series, legend: false }.svg());
     }
     out.push_str("</div>\n");
     out
@@ -405,7 +419,7 @@ fn features(group: &Group) -> String {
 
 fn bearing_and_liquid(groups: &[Group]) -> String {
     let mut out = String::from(
-        "<h2>Bearing, liquid, book-keeping</h2>\n<p>At small torque the bearing sticks for part of every cycle, most of all near the dip. The wave height is the linear formula's; beyond a quarter of the tank's radius it says that linear slosh theory no longer holds, not how high the water stands. So a linear model's runs at the larger torques are computed faithfully, but they are not what a tank does.</p>\n<div class=\"legend\">",
+        "<h2>Bearing, liquid, book-keeping</h2>\n<p>At small torque the bearing sticks for part of every cycle, most of all near the dip. The wave height is the linear formula's; beyond a quarter of the tank's radius (broken line) it says that linear slosh theory no longer holds, not how high the water stands. So a linear model's runs at the larger torques are computed faithfully, but they are not what a tank does.</p>\n<div class=\"legend\">",
     );
     for (i, group) in groups.iter().enumerate() {
         let _ = write!(out, "<span><i style=\"color:{}\"></i>{}</span>", fill_color(i), escape(&group.title()));
@@ -419,7 +433,8 @@ fn bearing_and_liquid(groups: &[Group]) -> String {
         ("Energy residual", "residual / energy turned over", |run| run.figures.max_energy_residual, true),
     ];
     for (title, label, get, decades) in panels {
-        let series: Vec<Series> = groups
+        let x = torque_axis(groups.iter().flat_map(|g| g.runs.iter().copied()));
+        let mut series: Vec<Series> = groups
             .iter()
             .enumerate()
             .map(|(i, group)| Series {
@@ -434,6 +449,15 @@ fn bearing_and_liquid(groups: &[Group]) -> String {
                 title: group.title(),
             })
             .collect();
+        if let ("Largest wave height", Some(group)) = (title, groups.first()) {
+            let limit = group.runs[0].tank_radius / 4.0 * 1e3;
+            series.push(Series {
+                points: vec![(x.from, limit), (x.to, limit)],
+                color: "var(--exact)".into(),
+                style: Style::Dashed,
+                title: "a quarter of the tank's radius".into(),
+            });
+        }
         let values: Vec<f64> = series.iter().flat_map(|s| &s.points).map(|(_, y)| *y).collect();
         let nothing = values.is_empty();
         let y = if decades {
@@ -442,8 +466,7 @@ fn bearing_and_liquid(groups: &[Group]) -> String {
             Axis::linear(label, values.into_iter().chain([0.0]), 1.0, 5)
         };
         let title = if nothing { format!("{title}: none") } else { title.to_string() };
-        let x = torque_axis(groups.iter().flat_map(|g| g.runs.iter().copied()));
-        out.push_str(&Chart { title, size: (330.0, 260.0), x, y, series }.svg());
+        out.push_str(&Chart { title, size: (330.0, 260.0), x, y, series, legend: false }.svg());
     }
     out.push_str("</div>\n");
     out
@@ -451,7 +474,8 @@ fn bearing_and_liquid(groups: &[Group]) -> String {
 
 fn torque_axis<'a>(runs: impl Iterator<Item = &'a Outcome>) -> Axis {
     let values: Vec<f64> = runs.map(|run| thousandths(run.case.amplitude)).chain([0.0]).collect();
-    Axis::linear("torque amplitude / mN·m", values, 10.0, 5)
+    let axis = Axis::linear("torque amplitude / mN·m", values, 10.0, 5);
+    Axis { to: axis.to * 1.03, ..axis } // room for the last dot
 }
 
 fn exact(points: Vec<(f64, f64)>) -> Series {
@@ -459,7 +483,7 @@ fn exact(points: Vec<(f64, f64)>) -> Series {
         points,
         color: "var(--exact)".into(),
         style: Style::Dashed,
-        title: "exact, linear model with viscous friction".into(),
+        title: "exact, linear and viscous".into(),
     }
 }
 

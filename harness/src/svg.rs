@@ -113,6 +113,8 @@ pub struct Chart {
     pub y: Axis,
     /// The curves, the first one lowest.
     pub series: Vec<Series>,
+    /// Whether the curves' titles are written into the upper right corner.
+    pub legend: bool,
 }
 
 /// Space beside the plot for numbers and labels, px: left, right, top, bottom.
@@ -178,6 +180,17 @@ impl Chart {
                 .filter(|(px, py)| px.is_finite() && py.is_finite())
                 .collect();
             out.push_str(&curve(&points, series));
+        }
+        for (i, series) in self.series.iter().filter(|_| self.legend).enumerate() {
+            let at = top + 14.0 + 16.0 * i as f64;
+            let sample = [(right - 30.0, at - 4.0), (right - 6.0, at - 4.0)];
+            out.push_str(&curve(&sample, series));
+            let _ = write!(
+                out,
+                "<text class=\"label\" x=\"{:.1}\" y=\"{at:.1}\" text-anchor=\"end\">{}</text>",
+                right - 36.0,
+                escape(&series.title)
+            );
         }
         out.push_str("</svg></svg>\n");
         out

@@ -94,7 +94,7 @@ mod tests {
 
     /// The linear bench driven by a sweep sampled at 50 Hz and joined by lines, integrated with RK4
     /// in 2.5 ms (phase error over a whole sweep: 2e-5 rad). Returns time, torque and rate.
-    pub fn swept(plant: &Linear, sweep: Profile) -> [Vec<f64>; 3] {
+    fn swept(plant: &Linear, sweep: Profile) -> [Vec<f64>; 3] {
         let torque = Torque::Profile(sweep);
         let mode = plant.modes[0];
         let (w, r) = (TAU * mode.frequency, plant.arm);
@@ -143,8 +143,17 @@ mod tests {
                 let [time, tau, omega] = swept(&plant, sweep);
                 let lock_in = demodulation::frequency_response(&sweep, &time, &tau, &omega, &grid);
                 let spa = spa::frequency_response(0.02, &tau, &omega, &grid, spa::LAG);
-                let (a, b) = (Features::of(&lock_in), Features::of(&spa));
-                println!("{sweep}\n  exact {f_dip} {f_res}\n  lock-in {a:?}\n  spa {b:?}");
+                let (lock_in, spa) = (Features::of(&lock_in), Features::of(&spa));
+                // the acceptance figure for the dip is 2 mHz; both are ten times better
+                assert!((lock_in.f_dip.unwrap() - f_dip).abs() < 2e-4, "{sweep}: {lock_in:?}");
+                assert!((spa.f_dip.unwrap() - f_dip).abs() < 2e-4, "{sweep}: {spa:?}");
+                // the whole record knows no sweep rate: the peak stands where it should, to a
+                // fraction of the 5 mHz resolution
+                assert!((spa.f_res.unwrap() - f_res).abs() < 3e-4, "{sweep}: {spa:?}");
+                // while the sweep passes, the peak comes late by about its half-power width,
+                // 14 and 15 mHz
+                let shift = lock_in.f_res.unwrap() - f_res;
+                assert!((0.014..0.020).contains(&shift), "{sweep}: {lock_in:?}");
             }
         }
     }
