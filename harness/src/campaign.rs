@@ -308,8 +308,7 @@ impl Plan {
         let column = |name| table.column(name).unwrap_or_default();
         let (time, tau, omega) = (column("time"), column("tau_cmd"), column("omega_imu"));
         let sweep = self.profile(case.amplitude);
-        let demodulated =
-            demodulation::frequency_response(&sweep, time, tau, omega, frequencies);
+        let demodulated = demodulation::frequency_response(&sweep, time, tau, omega, frequencies);
         let spa = spa::frequency_response(STEP, tau, omega, frequencies, spa::LAG);
         Ok(Outcome {
             case: case.clone(),

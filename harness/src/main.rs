@@ -47,7 +47,12 @@ struct PackArgs {
 #[command(after_help = run_help())]
 struct RunArgs {
     /// Torque profile, name:key=value,…
-    #[arg(long, value_name = "PROFILE", conflicts_with = "input", required_unless_present = "input")]
+    #[arg(
+        long,
+        value_name = "PROFILE",
+        conflicts_with = "input",
+        required_unless_present = "input"
+    )]
     profile: Option<Profile>,
     /// Torque history with the columns time (s) and tau_cmd (N.m), .csv or .parquet.
     #[arg(long, value_name = "FILE")]
@@ -134,8 +139,9 @@ fn run_help() -> String {
 }
 
 fn setting(text: &str) -> Result<(String, String)> {
-    let (name, value) =
-        text.split_once('=').with_context(|| format!("\"{text}\" is not of the form name=value"))?;
+    let (name, value) = text
+        .split_once('=')
+        .with_context(|| format!("\"{text}\" is not of the form name=value"))?;
     Ok((name.trim().into(), value.trim().into()))
 }
 

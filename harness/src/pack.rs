@@ -50,7 +50,8 @@ pub fn packed_for_tests() -> &'static Path {
             archive(&binary, &out)?;
             Ok(out)
         });
-        packed.unwrap_or_else(|error| panic!("the FMU for the tests could not be packed: {error:#}"))
+        packed
+            .unwrap_or_else(|error| panic!("the FMU for the tests could not be packed: {error:#}"))
     })
 }
 
@@ -174,7 +175,8 @@ fn documentation(description: &ModelDescription) -> String {
             let named = items.iter().find(|i| i.value.to_string() == start);
             let mut meaning = escape(&variable.description);
             if !items.is_empty() {
-                let all: Vec<_> = items.iter().map(|i| format!("{} = {}", i.value, i.name)).collect();
+                let all: Vec<_> =
+                    items.iter().map(|i| format!("{} = {}", i.value, i.name)).collect();
                 let _ = write!(meaning, " <small>({})</small>", escape(&all.join(", ")));
             }
             let _ = writeln!(

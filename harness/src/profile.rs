@@ -95,28 +95,25 @@ impl FromStr for Profile {
     /// `name` or `name:key=value,key=value`; what is not given has its default.
     fn from_str(text: &str) -> Result<Self> {
         let (name, rest) = text.split_once(':').unwrap_or((text, ""));
-        let (name, defaults) =
-            PROFILES.iter().find(|(n, _)| *n == name).with_context(|| {
-                let names = PROFILES.iter().map(|(n, _)| *n);
-                let all: Vec<_> = names.clone().collect();
-                let hint = did_you_mean(name, names);
-                format!("there is no profile \"{name}\" (there are {}){hint}", all.join(", "))
-            })?;
+        let (name, defaults) = PROFILES.iter().find(|(n, _)| *n == name).with_context(|| {
+            let names = PROFILES.iter().map(|(n, _)| *n);
+            let all: Vec<_> = names.clone().collect();
+            let hint = did_you_mean(name, names);
+            format!("there is no profile \"{name}\" (there are {}){hint}", all.join(", "))
+        })?;
         let mut values = defaults.to_vec();
         for pair in rest.split(',').filter(|pair| !pair.is_empty()) {
-            let (key, value) = pair
-                .split_once('=')
-                .with_context(|| format!("profile {name}: \"{pair}\" is not of the form key=value"))?;
+            let (key, value) = pair.split_once('=').with_context(|| {
+                format!("profile {name}: \"{pair}\" is not of the form key=value")
+            })?;
             let keys: Vec<_> = defaults.iter().map(|(k, _)| *k).collect();
             let slot = values.iter_mut().find(|(k, _)| *k == key.trim()).with_context(|| {
                 format!("profile {name} has no parameter \"{key}\" (it has {})", keys.join(", "))
             })?;
-            slot.1 = value
-                .trim()
-                .parse()
-                .ok()
-                .filter(|v: &f64| v.is_finite())
-                .with_context(|| format!("profile {name}: {key} wants a number, not \"{value}\""))?;
+            slot.1 =
+                value.trim().parse().ok().filter(|v: &f64| v.is_finite()).with_context(|| {
+                    format!("profile {name}: {key} wants a number, not \"{value}\"")
+                })?;
         }
         let of = |key: &str| values.iter().find(|(k, _)| *k == key).map_or(0.0, |(_, v)| *v);
         let (amplitude, duration) = (of("amplitude"), of("duration"));
@@ -365,7 +362,8 @@ mod tests {
 
     #[test]
     fn rows_are_joined_by_lines_or_held() {
-        let rows = |held| Torque::Rows { time: vec![0.0, 1.0, 3.0], tau: vec![0.0, 2.0, 0.0], held };
+        let rows =
+            |held| Torque::Rows { time: vec![0.0, 1.0, 3.0], tau: vec![0.0, 2.0, 0.0], held };
         assert_eq!((rows(false).at(0.5), rows(false).at(2.0)), (1.0, 1.0));
         assert_eq!((rows(true).at(0.5), rows(true).at(2.0)), (0.0, 2.0));
         assert_eq!(rows(false).chord(0.0, 0.5), (0.0, 2.0));

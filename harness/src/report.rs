@@ -109,9 +109,18 @@ fn introduction(plan: &Plan, fmu: &Fmu, results: &Results, groups: &[Group]) -> 
         (1.0 / STEP).round(),
     );
     if !results.failures.is_empty() {
-        let _ = write!(out, "<div class=\"failed\"><p><b>{} runs failed:</b></p><ul>", results.failures.len());
+        let _ = write!(
+            out,
+            "<div class=\"failed\"><p><b>{} runs failed:</b></p><ul>",
+            results.failures.len()
+        );
         for failure in &results.failures {
-            let _ = write!(out, "<li><code>{}</code>: {}</li>", escape(&failure.case.name()), escape(&failure.reason));
+            let _ = write!(
+                out,
+                "<li><code>{}</code>: {}</li>",
+                escape(&failure.case.name()),
+                escape(&failure.reason)
+            );
         }
         out.push_str("</ul></div>\n");
     }
@@ -119,7 +128,12 @@ fn introduction(plan: &Plan, fmu: &Fmu, results: &Results, groups: &[Group]) -> 
     for group in groups {
         let over = |get: &dyn Fn(&Outcome) -> Option<f64>| {
             let values: Vec<f64> = group.runs.iter().filter_map(|run| get(run)).collect();
-            match values.iter().copied().reduce(f64::min).zip(values.iter().copied().reduce(f64::max)) {
+            match values
+                .iter()
+                .copied()
+                .reduce(f64::min)
+                .zip(values.iter().copied().reduce(f64::max))
+            {
                 Some((low, high)) if high - low < 5e-5 => format!("{low:.4}"),
                 Some((low, high)) => format!("{low:.3}–{high:.3}"),
                 None => "none".into(),
@@ -166,7 +180,8 @@ fn estimators(plan: &Plan, groups: &[Group]) -> String {
         };
         let width = 2.0 * mode.damping * mode.frequency;
         let rate = plan.profile(1.0).rate_at(exact);
-        let shift = |f: Option<f64>| f.map_or(String::new(), |f| format!("{:+.1} mHz", (f - exact) * 1e3));
+        let shift =
+            |f: Option<f64>| f.map_or(String::new(), |f| format!("{:+.1} mHz", (f - exact) * 1e3));
         let _ = writeln!(
             out,
             "<tr><td>{} cm, {}</td><td>{exact:.4} Hz</td><td>{:.1} mHz</td><td>{:.2} mHz/s</td><td>{:.1} s</td><td>{:.1} s</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
@@ -200,8 +215,18 @@ fn provenance(plan: &Plan, fmu: &Fmu) -> String {
         ("GUID", description.guid.clone()),
         ("SHA-256", fmu.hash().to_string()),
         ("slosh.model", plan.models.join(", ")),
-        ("parameters", if settings.is_empty() { "the FMU's start values".into() } else { settings.join(", ") }),
-        ("torque", format!("{}; value and slope handed over every {} s", plan.profile(1.0).to_string().replace("amplitude=1,", ""), STEP)),
+        (
+            "parameters",
+            if settings.is_empty() { "the FMU's start values".into() } else { settings.join(", ") },
+        ),
+        (
+            "torque",
+            format!(
+                "{}; value and slope handed over every {} s",
+                plan.profile(1.0).to_string().replace("amplitude=1,", ""),
+                STEP
+            ),
+        ),
         ("tolerance", tolerance),
         ("driven by", format!("hubslosh {}", env!("CARGO_PKG_VERSION"))),
     ];
@@ -309,7 +334,11 @@ fn responses(group: &Group, amplitudes: &[f64]) -> String {
         },
         estimator_chart(group, size, peak),
     ];
-    let mut out = format!("<h3>{} cm fill, {} model</h3>\n<div class=\"two\">\n", cm(group.fill), escape(group.model));
+    let mut out = format!(
+        "<h3>{} cm fill, {} model</h3>\n<div class=\"two\">\n",
+        cm(group.fill),
+        escape(group.model)
+    );
     for chart in charts {
         out.push_str(&chart.svg());
     }
@@ -373,7 +402,11 @@ fn estimator_chart(group: &Group, size: (f64, f64), peak: f64) -> Chart {
 }
 
 fn features(group: &Group) -> String {
-    let mut out = format!("<h3>{} cm fill, {} model</h3>\n<div class=\"four\">\n", cm(group.fill), escape(group.model));
+    let mut out = format!(
+        "<h3>{} cm fill, {} model</h3>\n<div class=\"four\">\n",
+        cm(group.fill),
+        escape(group.model)
+    );
     type Get = fn(&Features) -> Option<f64>;
     let panels: [(&str, &str, Get, f64, f64); 4] = [
         ("Dip", "f_dip / Hz", |f| f.f_dip, 0.01, 1.0),
@@ -386,9 +419,7 @@ fn features(group: &Group) -> String {
             group
                 .runs
                 .iter()
-                .filter_map(|run| {
-                    Some((thousandths(run.case.amplitude), get(&of(run))? * scale))
-                })
+                .filter_map(|run| Some((thousandths(run.case.amplitude), get(&of(run))? * scale)))
                 .collect()
         };
         let x = torque_axis(group.runs.iter().copied());
@@ -411,7 +442,9 @@ fn features(group: &Group) -> String {
         }
         let values = series.iter().flat_map(|s| &s.points).map(|(_, y)| *y);
         let y = Axis::linear(label, values.collect::<Vec<_>>(), span, 5);
-        out.push_str(&Chart { title: title.into(), size: (330.0, 260.0), x, y, series, legend: false }.svg());
+        out.push_str(
+            &Chart { title: title.into(), size: (330.0, 260.0), x, y, series, legend: false }.svg(),
+        );
     }
     out.push_str("</div>\n");
     out
@@ -422,15 +455,30 @@ fn bearing_and_liquid(groups: &[Group]) -> String {
         "<h2>Bearing, liquid, book-keeping</h2>\n<p>At small torque the bearing sticks for part of every cycle, most of all near the dip. The wave height is the linear formula's; beyond a quarter of the tank's radius (broken line) it says that linear slosh theory no longer holds, not how high the water stands. So a linear model's runs at the larger torques are computed faithfully, but they are not what a tank does.</p>\n<div class=\"legend\">",
     );
     for (i, group) in groups.iter().enumerate() {
-        let _ = write!(out, "<span><i style=\"color:{}\"></i>{}</span>", fill_color(i), escape(&group.title()));
+        let _ = write!(
+            out,
+            "<span><i style=\"color:{}\"></i>{}</span>",
+            fill_color(i),
+            escape(&group.title())
+        );
     }
     out.push_str("</div>\n<div class=\"four\">\n");
     type Get = fn(&Outcome) -> f64;
     let panels: [(&str, &str, Get, bool); 4] = [
         ("Time stuck in the sweep", "stuck / s", |run| run.figures.stuck, true),
-        ("Largest slosh angle", "angle / deg", |run| run.figures.peak_slosh_angle.to_degrees(), false),
+        (
+            "Largest slosh angle",
+            "angle / deg",
+            |run| run.figures.peak_slosh_angle.to_degrees(),
+            false,
+        ),
         ("Largest wave height", "height / mm", |run| run.figures.peak_wave_height * 1e3, false),
-        ("Energy residual", "residual / energy turned over", |run| run.figures.max_energy_residual, true),
+        (
+            "Energy residual",
+            "residual / energy turned over",
+            |run| run.figures.max_energy_residual,
+            true,
+        ),
     ];
     for (title, label, get, decades) in panels {
         let x = torque_axis(groups.iter().flat_map(|g| g.runs.iter().copied()));
@@ -540,7 +588,11 @@ fn amplitude_legend(amplitudes: &[f64]) -> String {
     sorted.sort_by(f64::total_cmp);
     let mut out = String::from("<div class=\"legend\"><span>Torque amplitude in mN·m:</span>");
     for (i, amplitude) in sorted.iter().enumerate() {
-        let _ = write!(out, "<span><i style=\"color:var(--a{i})\"></i>{}</span>", thousandths(*amplitude));
+        let _ = write!(
+            out,
+            "<span><i style=\"color:var(--a{i})\"></i>{}</span>",
+            thousandths(*amplitude)
+        );
     }
     out.push_str("<span><i class=\"dash\" style=\"color:var(--exact)\"></i>exact transfer function of the linear model with viscous friction</span></div>\n");
     out

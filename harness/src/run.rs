@@ -41,7 +41,11 @@ impl Run {
     pub fn steps(&self) -> usize {
         let exact = (self.stop - self.start()) / self.step;
         // 2700 s / 0.02 s is 135000 steps, however the quotient rounds
-        if (exact - exact.round()).abs() < 1e-6 { exact.round() as usize } else { exact.ceil() as usize }
+        if (exact - exact.round()).abs() < 1e-6 {
+            exact.round() as usize
+        } else {
+            exact.ceil() as usize
+        }
     }
 
     /// Fails with one sentence if the numbers make no sense.

@@ -22,7 +22,12 @@ pub struct Axis {
 
 impl Axis {
     /// An axis with about `count` round ticks that covers all `values`, and at least `span`.
-    pub fn linear(label: &str, values: impl IntoIterator<Item = f64>, span: f64, count: usize) -> Self {
+    pub fn linear(
+        label: &str,
+        values: impl IntoIterator<Item = f64>,
+        span: f64,
+        count: usize,
+    ) -> Self {
         let (mut low, mut high) = range(values);
         let lack = (span - (high - low)) / 2.0;
         if lack > 0.0 {
@@ -71,7 +76,11 @@ fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
 /// The next of 1, 2, 5 times a power of ten.
 fn round_step(step: f64) -> f64 {
     let power = 10f64.powf(step.max(1e-300).log10().floor());
-    [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter().find(|s| *s >= step * 0.999).unwrap_or(step)
+    [1.0, 2.0, 5.0, 10.0]
+        .map(|m| m * power)
+        .into_iter()
+        .find(|s| *s >= step * 0.999)
+        .unwrap_or(step)
 }
 
 /// How a series is drawn.
@@ -124,8 +133,7 @@ impl Chart {
     /// The `<svg>` element.
     pub fn svg(&self) -> String {
         let (width, height) = self.size;
-        let (left, right, top, bottom) =
-            (MARGIN.0, width - MARGIN.1, MARGIN.2, height - MARGIN.3);
+        let (left, right, top, bottom) = (MARGIN.0, width - MARGIN.1, MARGIN.2, height - MARGIN.3);
         let x = |value: f64| left + (right - left) * self.x.place(value);
         let y = |value: f64| bottom - (bottom - top) * self.y.place(value);
         let mut out = format!(
@@ -215,7 +223,8 @@ fn curve(points: &[(f64, f64)], series: &Series) -> String {
     );
     if let Some(fill) = dots {
         for (x, y) in points {
-            let _ = write!(out, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\" style=\"fill:{fill}\"/>");
+            let _ =
+                write!(out, "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"3\" style=\"fill:{fill}\"/>");
         }
     }
     out.push_str("</g>");
@@ -250,7 +259,10 @@ fn simplified(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 fn number(value: f64, axis: &Axis) -> String {
     let written = if axis.logarithmic && !(1e-3..1e4).contains(&value.abs()) {
         let exponent = value.log10().round() as i32;
-        return format!("10<tspan dy=\"-4\" font-size=\"8\">{}</tspan>", minus(&exponent.to_string()));
+        return format!(
+            "10<tspan dy=\"-4\" font-size=\"8\">{}</tspan>",
+            minus(&exponent.to_string())
+        );
     } else if axis.logarithmic {
         format!("{value}")
     } else {

@@ -73,7 +73,10 @@ impl Table {
     /// The table with only the columns `names`, which must be there.
     pub fn only(&self, names: &[&str]) -> Table {
         let column = |name: &&str| self.column(name).expect("a column of this table").to_vec();
-        Table::new(names.iter().map(|n| n.to_string()).collect(), names.iter().map(column).collect())
+        Table::new(
+            names.iter().map(|n| n.to_string()).collect(),
+            names.iter().map(column).collect(),
+        )
     }
 
     /// Reads the columns `wanted` of a file, which may hold others. Every value must be a finite
@@ -184,9 +187,8 @@ fn read_csv(file: File, wanted: &[&str]) -> Result<Table> {
         let record = record.with_context(|| format!("row {}", row + 1))?;
         for (column, &position) in columns.iter_mut().zip(&positions) {
             let text = &record[position];
-            let value = text
-                .parse()
-                .map_err(|_| anyhow!("row {}: \"{text}\" is not a number", row + 1))?;
+            let value =
+                text.parse().map_err(|_| anyhow!("row {}: \"{text}\" is not a number", row + 1))?;
             column.push(value);
         }
     }
@@ -226,7 +228,8 @@ fn read_values<T: DataType>(
     let (mut levels, mut values) = (Vec::new(), Vec::new());
     let mut done = 0;
     while done < rows {
-        let (read, _, _) = reader.read_records(rows - done, Some(&mut levels), None, &mut values)?;
+        let (read, _, _) =
+            reader.read_records(rows - done, Some(&mut levels), None, &mut values)?;
         ensure!(read > 0, "it ends too early");
         done += read;
     }

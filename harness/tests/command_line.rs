@@ -74,7 +74,14 @@ fn a_run_leaves_the_columns_asked_for() {
     let directory = tempfile::tempdir().unwrap();
     let done = short_run(
         directory.path(),
-        &["--profile", "sine:frequency=2", "--columns", "theta,omega,stuck", "--set", "slosh.model=linear"],
+        &[
+            "--profile",
+            "sine:frequency=2",
+            "--columns",
+            "theta,omega,stuck",
+            "--set",
+            "slosh.model=linear",
+        ],
     );
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     let table = Table::read(
@@ -187,14 +194,14 @@ fn files_that_cannot_be_read_or_written_are_named() {
     std::fs::write(directory.join("not.parquet"), "no parquet").unwrap();
     let fmu = packed_for_tests().to_str().unwrap();
     for (arguments, words) in [
-        (&["run", "--profile", "zero", "--fmu", "none.fmu", "--out", "a.csv"][..], &["none.fmu"][..]),
+        (
+            &["run", "--profile", "zero", "--fmu", "none.fmu", "--out", "a.csv"][..],
+            &["none.fmu"][..],
+        ),
         (&["run", "--profile", "zero", "--fmu", "not.fmu", "--out", "a.csv"], &["not.fmu", "zip"]),
         (&["run", "--input", "none.csv", "--fmu", fmu, "--out", "a.csv"], &["none.csv"]),
         (&["run", "--input", "not.parquet", "--fmu", fmu, "--out", "a.csv"], &["not.parquet"]),
-        (
-            &["run", "--profile", "zero", "--fmu", fmu, "--out", "nowhere/a.csv"],
-            &["nowhere/a.csv"],
-        ),
+        (&["run", "--profile", "zero", "--fmu", fmu, "--out", "nowhere/a.csv"], &["nowhere/a.csv"]),
         (&["run", "--profile", "zero", "--fmu", fmu, "--out", "a.txt"], &["a.txt", ".parquet"]),
         (&["run", "--profile", "zero", "--step", "0", "--fmu", fmu, "--out", "a.csv"], &["step"]),
         (&["campaign", "--fmu", fmu, "--out", "not.fmu/c"], &["not.fmu/c"]),

@@ -27,8 +27,7 @@ pub fn frequency_response(
     output: &[f64],
     frequencies: &[f64],
 ) -> FrequencyResponse {
-    let carrier: Vec<Complex64> =
-        time.iter().map(|&t| Complex64::cis(-sweep.phase(t))).collect();
+    let carrier: Vec<Complex64> = time.iter().map(|&t| Complex64::cis(-sweep.phase(t))).collect();
     let mut result = FrequencyResponse::default();
     for &frequency in frequencies {
         let Some(centre) = sweep.time_of(frequency) else { continue };
