@@ -162,7 +162,9 @@ fn binary_exports_the_functions_of_fmi_and_nothing_else() {
         .map(String::from)
         .collect();
     assert!(!binaries.is_empty());
-    let expected: BTreeSet<String> = Fmu::symbols().iter().map(|s| s.to_string()).collect();
+    let expected: BTreeSet<String> =
+        Fmu::symbols().iter().chain(Fmu::exchange_symbols()).map(|s| s.to_string()).collect();
+    assert_eq!(expected.len(), 44);
     for name in binaries {
         let mut bytes = Vec::new();
         std::io::copy(&mut archive.by_name(&name).unwrap(), &mut bytes).unwrap();
@@ -279,8 +281,11 @@ fn wrong_or_missing_guid_gives_no_instance_and_a_reason() {
 }
 
 #[test]
-fn missing_name_gives_no_instance_and_a_reason() {
+fn missing_name_and_unknown_type_give_no_instance_and_a_reason() {
     let fmu = open();
+    let mut with = fmu.instantiation("one");
+    with.kind = 2;
+    refused(fmu.instantiate_with(&with), &["fmuType = 2"]);
     for wrong in [None, Some(""), Some(" \t")] {
         let mut with = fmu.instantiation("one");
         with.name = wrong;
@@ -393,13 +398,29 @@ fn messages_come_in_the_categories_asked_for() {
     assert_eq!(messages(&mut instance), 11);
 }
 
-/// A host that logs everything and names a tolerance hears nothing, and never gets
-/// a warning: some take anything but fmi2OK for a failure.
+#[test]
+fn stick_and_slip_are_told_to_those_who_ask() {
+    let fmu = open();
+    let mut instance = stepping(&fmu, &[("init.omega", "0.1"), ("slosh.model", "frozen")]);
+    instance.set_debug_logging(true, &["logEvents"]).unwrap();
+    let torque = [reference(&fmu, "tau_cmd")];
+    instance.do_step(0.0, 20.0).unwrap();
+    instance.set_real(&torque, &[-0.1]).unwrap();
+    instance.do_step(20.0, 1.0).unwrap();
+    let messages = instance.take_messages();
+    let texts: Vec<_> = messages.iter().map(|m| m.text.as_str()).collect();
+    assert!(messages.iter().all(|m| (m.status, m.category.as_str()) == (Status::Ok, "logEvents")));
+    assert_eq!(texts.len(), 2, "{texts:?}");
+    assert!(texts[0].contains("stuck at t = "), "{texts:?}");
+    assert!(texts[1].contains("broke away backwards at t = 20.0 s"), "{texts:?}");
+}
+
+/// A host that has logging on and names a tolerance hears nothing, and never gets a
+/// warning: some take anything but fmi2OK for a failure.
 #[test]
 fn normal_use_is_silent() {
     let fmu = open();
     let mut instance = fmu.instantiate("one").unwrap();
-    instance.set_debug_logging(true, &[]).unwrap();
     for (name, value) in LIVELY {
         instance.set(name, value).unwrap();
     }
@@ -431,6 +452,7 @@ fn calls_in_the_wrong_state_are_refused_with_call_and_state() {
     refused(instance.get_real(&omega, &mut [0.0]), &["omega", "\"instantiated\""]);
     refused(instance.get_real_output_derivatives(&omega, &[1], &mut [0.0]), &["\"instantiated\""]);
     refused(instance.get_directional_derivative(&omega, &torque, &[1.0]), &["\"instantiated\""]);
+    refused(instance.enter_event_mode(), &["\"instantiated\"", "Model Exchange"]);
     assert_eq!(state(&mut instance), before);
 
     instance.enter_initialization_mode().unwrap();
@@ -443,6 +465,8 @@ fn calls_in_the_wrong_state_are_refused_with_call_and_state() {
     refused(instance.enter_initialization_mode(), &["\"stepping\""]);
     refused(instance.exit_initialization_mode(), &["\"stepping\""]);
     refused(instance.setup_experiment(None, 0.0, None), &["\"stepping\""]);
+    refused(instance.set_time(1.0), &["\"stepping\"", "Model Exchange"]);
+    refused(instance.new_discrete_states().map(drop), &["\"stepping\"", "Model Exchange"]);
 
     instance.terminate().unwrap();
     refused(instance.terminate(), &["\"terminated\""]);

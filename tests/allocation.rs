@@ -1,33 +1,38 @@
 //! Stepping takes no memory from the host's heap: no lock, no waiting, no leak,
 //! however long the run.
 
-use HubSlosh::calls::{GET_REAL, SET_BOOLEAN, SET_INTEGER, SET_REAL};
+use HubSlosh::calls::{GET_REAL, Interface, SET_BOOLEAN, SET_INTEGER, SET_REAL};
 use HubSlosh::instance::Instance;
 use HubSlosh::table;
 use HubSlosh::variable::Value;
 use allocation_counter::measure;
+use plant::{INDICATORS, STATES};
 
 fn reference(name: &str) -> u32 {
     table::find(name).unwrap()
+}
+
+/// Everything on.
+fn initialised(interface: Interface, slosh_model: i32, friction_model: i32) -> Instance {
+    let mut instance = Instance::new(interface);
+    for (name, value) in
+        [("slosh.model", slosh_model), ("friction.model", friction_model), ("slosh.modes", 3)]
+    {
+        instance.set(&SET_INTEGER, &[reference(name)], |_| Value::Integer(value)).unwrap();
+    }
+    for name in ["wheel.enabled", "imu.enabled"] {
+        instance.set(&SET_BOOLEAN, &[reference(name)], |_| Value::Boolean(true)).unwrap();
+    }
+    instance.enter_initialization_mode().unwrap();
+    instance.exit_initialization_mode().unwrap();
+    instance
 }
 
 #[test]
 fn stepping_setting_and_getting_allocate_nothing() {
     for slosh_model in 1..=5 {
         for friction_model in 1..=4 {
-            let mut instance = Instance::new();
-            for (name, value) in [
-                ("slosh.model", slosh_model),
-                ("friction.model", friction_model),
-                ("slosh.modes", 3),
-            ] {
-                instance.set(&SET_INTEGER, &[reference(name)], |_| Value::Integer(value)).unwrap();
-            }
-            for name in ["wheel.enabled", "imu.enabled"] {
-                instance.set(&SET_BOOLEAN, &[reference(name)], |_| Value::Boolean(true)).unwrap();
-            }
-            instance.enter_initialization_mode().unwrap();
-            instance.exit_initialization_mode().unwrap();
+            let mut instance = initialised(Interface::CoSimulation, slosh_model, friction_model);
             let torque = [reference("tau_cmd")];
             let outputs = ["theta", "energy", "tank.m_liq", "tau_cmd", "hub.I"].map(reference);
             let count = measure(|| {
@@ -38,6 +43,48 @@ fn stepping_setting_and_getting_allocate_nothing() {
                     for output in outputs {
                         instance.get(&GET_REAL, output).unwrap();
                     }
+                }
+            });
+            assert_eq!(count.count_total, 0, "slosh {slosh_model}, friction {friction_model}");
+        }
+    }
+}
+
+#[test]
+fn calls_of_model_exchange_allocate_nothing() {
+    for slosh_model in 1..=5 {
+        for friction_model in 1..=4 {
+            let mut instance = initialised(Interface::ModelExchange, slosh_model, friction_model);
+            let torque = [reference("tau_cmd")];
+            let outputs = ["theta", "energy", "der(omega)", "slosh.v_radial[2]"].map(reference);
+            let count = measure(|| {
+                let (mut x, mut derivatives) = ([0.0; STATES], [0.0; STATES]);
+                let (mut indicators, mut time) = ([0.0; INDICATORS], 0.0);
+                for n in 0..100 {
+                    instance.new_discrete_states().unwrap();
+                    instance.enter_continuous_time_mode().unwrap();
+                    instance.continuous_states(&mut x).unwrap();
+                    for _ in 0..10 {
+                        instance.derivatives(&mut derivatives).unwrap();
+                        for (x, rate) in x.iter_mut().zip(&derivatives) {
+                            *x += 1e-4 * rate;
+                        }
+                        time += 1e-4;
+                        instance.set_time(time).unwrap();
+                        instance.set_continuous_states(&x).unwrap();
+                        instance.event_indicators(&mut indicators).unwrap();
+                        instance.completed_integrator_step().unwrap();
+                    }
+                    for output in outputs {
+                        instance.get(&GET_REAL, output).unwrap();
+                    }
+                    let mut answer = [0.0];
+                    instance
+                        .directional_derivative(&outputs[2..3], &torque, &[1.0], &mut answer)
+                        .unwrap();
+                    instance.enter_event_mode().unwrap();
+                    let command = 0.1 * f64::from(n % 7 - 3);
+                    instance.set(&SET_REAL, &torque, |_| Value::Real(command)).unwrap();
                 }
             });
             assert_eq!(count.count_total, 0, "slosh {slosh_model}, friction {friction_model}");

@@ -1,5 +1,5 @@
-//! The C interface of FMI 2.0 for Co-Simulation: 34 functions, and the only
-//! unsafe code of the FMU.
+//! The C interface of FMI 2.0, Model Exchange and Co-Simulation: 44 functions, and the
+//! only unsafe code of the FMU.
 //!
 //! Every function catches panics; one that happens poisons the instance and is
 //! told to the logger. Pointers may be NULL wherever the standard does not
@@ -19,9 +19,9 @@ use std::ffi::{CStr, CString, c_char, c_int, c_uint, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::ptr;
 
-use crate::calls::{self, Call, Fault, Mode, Severity};
+use crate::calls::{self, Call, Fault, Interface, Mode, Severity};
 use crate::instance::Instance;
-use crate::log::{Filter, category};
+use crate::log::{Filter, Topic, category};
 use crate::variable::Value;
 use crate::{snapshot, table};
 
@@ -133,18 +133,45 @@ struct Log {
 
 impl Log {
     fn report(&self, fault: &Fault) {
-        let Some(logger) = self.callbacks.logger else { return };
-        if !self.filter.wants(fault.severity) {
+        let topic = Topic::Failure(fault.severity);
+        if self.filter.wants(topic) {
+            self.write(status(fault.severity), topic, &fault.text);
+        }
+    }
+
+    /// Tells that the hub has stuck or broken away, if it has since `before` and if
+    /// somebody wants to know.
+    fn report_event(&self, call: &Call, before: Option<(i32, f64, i32)>, now: &Instance) {
+        let (Some((count, ..)), Some((new_count, time, contact))) = (before, now.last_contact())
+        else {
+            return;
+        };
+        if new_count == count || !self.filter.wants(Topic::Event) {
             return;
         }
-        let category = c_string(category(fault.severity));
-        let message = c_string(&fault.text);
+        let what = match contact {
+            0 => "stuck",
+            1 => "broke away forwards",
+            _ => "broke away backwards",
+        };
+        let changes = match new_count - count {
+            1 => String::new(),
+            n => format!(", the last of {n} changes in this call"),
+        };
+        let text = format!("{}: the hub {what} at t = {time:?} s{changes}", call.name);
+        self.write(fmi2OK, Topic::Event, &text);
+    }
+
+    fn write(&self, status: fmi2Status, topic: Topic, text: &str) {
+        let Some(logger) = self.callbacks.logger else { return };
+        let category = c_string(category(topic));
+        let message = c_string(text);
         // The text is an argument, not the format: it may contain a percent sign.
         unsafe {
             logger(
                 self.callbacks.componentEnvironment,
                 self.instance_name.as_ptr(),
-                status(fault.severity),
+                status,
                 category.as_ptr(),
                 c"%s".as_ptr(),
                 message.as_ptr(),
@@ -295,7 +322,7 @@ pub unsafe extern "C" fn fmi2SetDebugLogging(
     let call = &calls::SET_DEBUG_LOGGING;
     unsafe {
         on(c, call, |component| {
-            call.check(component.instance.mode())?;
+            component.instance.check(call)?;
             if loggingOn == 0 {
                 component.log.filter = Filter::NONE;
                 return Ok(());
@@ -330,14 +357,14 @@ pub unsafe extern "C" fn fmi2Instantiate(
         let log = Log {
             callbacks: *functions,
             instance_name: c_string(name.as_deref().unwrap_or("")),
-            filter: Filter::ALL,
+            filter: Filter::FAILURES,
         };
-        match refusal(name, fmuType, text(fmuGUID)) {
-            None => {
-                let instance = Instance::new();
+        match interface(name, fmuType, text(fmuGUID)) {
+            Ok(interface) => {
+                let instance = Instance::new(interface);
                 Box::into_raw(Box::new(Component { mark: COMPONENT, instance, log })).cast()
             }
-            Some(why) => {
+            Err(why) => {
                 let text = format!("fmi2Instantiate: {why}");
                 log.report(&Fault { severity: Severity::Error, text });
                 ptr::null_mut()
@@ -347,21 +374,27 @@ pub unsafe extern "C" fn fmi2Instantiate(
     made.unwrap_or(ptr::null_mut())
 }
 
-/// Why no instance can be made like this.
-fn refusal(name: Option<String>, kind: fmi2Type, guid: Option<String>) -> Option<String> {
+/// What the instance is for, or why there can be none like this.
+fn interface(
+    name: Option<String>,
+    kind: fmi2Type,
+    guid: Option<String>,
+) -> Result<Interface, String> {
     let expected = table::guid();
     if name.is_none_or(|name| name.trim().is_empty()) {
-        return Some("instanceName is NULL or empty".into());
+        return Err("instanceName is NULL or empty".into());
     }
-    if kind != fmi2CoSimulation {
-        return Some(format!("fmuType {kind} is not offered; only fmi2CoSimulation is"));
-    }
+    let interface = match kind {
+        fmi2ModelExchange => Interface::ModelExchange,
+        fmi2CoSimulation => Interface::CoSimulation,
+        _ => return Err(format!("fmuType = {kind} (allowed: 0 Model Exchange, 1 Co-Simulation)")),
+    };
     match guid {
-        None => Some(format!("fmuGUID is NULL; expected {expected}")),
-        Some(guid) if guid != expected => Some(format!(
+        None => Err(format!("fmuGUID is NULL; expected {expected}")),
+        Some(guid) if guid != expected => Err(format!(
             "fmuGUID is {guid}; expected {expected}: model description and binary do not belong together"
         )),
-        Some(_) => None,
+        Some(_) => Ok(interface),
     }
 }
 
@@ -444,7 +477,7 @@ unsafe fn get<T>(
 ) -> fmi2Status {
     unsafe {
         on(c, call, |component| {
-            call.check(component.instance.mode())?;
+            component.instance.check(call)?;
             let references = array(call, "vr", vr, nvr)?;
             let places = array_mut(call, "value", value, nvr)?;
             for (reference, place) in references.iter().zip(places) {
@@ -465,7 +498,7 @@ unsafe fn set<T: Copy>(
 ) -> fmi2Status {
     unsafe {
         on(c, call, |component| {
-            call.check(component.instance.mode())?;
+            component.instance.check(call)?;
             let references = array(call, "vr", vr, nvr)?;
             let values = array(call, "value", value, nvr)?;
             component.instance.set(call, references, |n| from_c(values[n]))
@@ -585,7 +618,7 @@ pub unsafe extern "C" fn fmi2GetFMUstate(
     let call = &calls::GET_FMU_STATE;
     unsafe {
         on(c, call, |component| {
-            call.check(component.instance.mode())?;
+            component.instance.check(call)?;
             let handle = place(call, "FMUstate", FMUstate)?;
             if handle.is_null() {
                 *handle = new_state(component.instance.clone());
@@ -640,7 +673,7 @@ pub unsafe extern "C" fn fmi2SerializedFMUstateSize(
     let call = &calls::SERIALIZED_SIZE;
     unsafe {
         on(c, call, |component| {
-            call.check(component.instance.mode())?;
+            component.instance.check(call)?;
             saved_state(call, FMUstate)?;
             *place(call, "size", size)? = snapshot::size();
             Ok(())
@@ -659,7 +692,7 @@ pub unsafe extern "C" fn fmi2SerializeFMUstate(
     let call = &calls::SERIALIZE;
     unsafe {
         on(c, call, |component| {
-            call.check(component.instance.mode())?;
+            component.instance.check(call)?;
             let bytes = snapshot::to_bytes(&saved_state(call, FMUstate)?.instance);
             if size < bytes.len() {
                 return Err(call.error(format_args!(
@@ -686,7 +719,7 @@ pub unsafe extern "C" fn fmi2DeSerializeFMUstate(
     let call = &calls::DESERIALIZE;
     unsafe {
         on(c, call, |component| {
-            call.check(component.instance.mode())?;
+            component.instance.check(call)?;
             if FMUstate.is_null() {
                 return Err(null(call, "FMUstate"));
             }
@@ -698,24 +731,186 @@ pub unsafe extern "C" fn fmi2DeSerializeFMUstate(
     }
 }
 
-/// Not offered.
+/// What the unknowns do when the knowns go in a direction.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2GetDirectionalDerivative(
     c: fmi2Component,
-    _vUnknown_ref: *const fmi2ValueReference,
-    _nUnknown: usize,
-    _vKnown_ref: *const fmi2ValueReference,
-    _nKnown: usize,
-    _dvKnown: *const fmi2Real,
-    _dvUnknown: *mut fmi2Real,
+    vUnknown_ref: *const fmi2ValueReference,
+    nUnknown: usize,
+    vKnown_ref: *const fmi2ValueReference,
+    nKnown: usize,
+    dvKnown: *const fmi2Real,
+    dvUnknown: *mut fmi2Real,
 ) -> fmi2Status {
     let call = &calls::DIRECTIONAL_DERIVATIVE;
     unsafe {
         on(c, call, |component| {
-            call.check(component.instance.mode())?;
-            Err(call.error("not offered: providesDirectionalDerivative is false"))
+            component.instance.check(call)?;
+            let unknowns = array(call, "vUnknown_ref", vUnknown_ref, nUnknown)?;
+            let knowns = array(call, "vKnown_ref", vKnown_ref, nKnown)?;
+            let direction = array(call, "dvKnown", dvKnown, nKnown)?;
+            let answers = array_mut(call, "dvUnknown", dvUnknown, nUnknown)?;
+            component.instance.directional_derivative(unknowns, knowns, direction, answers)
         })
     }
+}
+
+// ---- Model Exchange ----
+
+/// What fmi2NewDiscreteStates tells.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[allow(missing_docs)]
+pub struct fmi2EventInfo {
+    pub newDiscreteStatesNeeded: fmi2Boolean,
+    pub terminateSimulation: fmi2Boolean,
+    pub nominalsOfContinuousStatesChanged: fmi2Boolean,
+    pub valuesOfContinuousStatesChanged: fmi2Boolean,
+    pub nextEventTimeDefined: fmi2Boolean,
+    pub nextEventTime: fmi2Real,
+}
+
+/// At an event.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2EnterEventMode(c: fmi2Component) -> fmi2Status {
+    unsafe { on(c, &calls::ENTER_EVENT, |component| component.instance.enter_event_mode()) }
+}
+
+/// Does what is due at the event.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2NewDiscreteStates(
+    c: fmi2Component,
+    eventInfo: *mut fmi2EventInfo,
+) -> fmi2Status {
+    let call = &calls::NEW_DISCRETE_STATES;
+    unsafe {
+        on(c, call, |component| {
+            component.instance.check(call)?;
+            let place = place(call, "eventInfo", eventInfo)?;
+            let before = component.instance.last_contact();
+            let info = component.instance.new_discrete_states()?;
+            *place = fmi2EventInfo {
+                valuesOfContinuousStatesChanged: info.states_changed.into(),
+                nextEventTimeDefined: info.next_time.is_some().into(),
+                nextEventTime: info.next_time.unwrap_or(0.0),
+                ..fmi2EventInfo::default()
+            };
+            component.log.report_event(call, before, &component.instance);
+            Ok(())
+        })
+    }
+}
+
+/// Between events.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2EnterContinuousTimeMode(c: fmi2Component) -> fmi2Status {
+    unsafe {
+        on(c, &calls::ENTER_CONTINUOUS_TIME, |component| {
+            component.instance.enter_continuous_time_mode()
+        })
+    }
+}
+
+/// The host has made a step and will not go back behind it. No past is kept, so
+/// `noSetFMUStatePriorToCurrentPoint` changes nothing.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2CompletedIntegratorStep(
+    c: fmi2Component,
+    _noSetFMUStatePriorToCurrentPoint: fmi2Boolean,
+    enterEventMode: *mut fmi2Boolean,
+    terminateSimulation: *mut fmi2Boolean,
+) -> fmi2Status {
+    let call = &calls::COMPLETED_STEP;
+    unsafe {
+        on(c, call, |component| {
+            component.instance.check(call)?;
+            let enter = place(call, "enterEventMode", enterEventMode)?;
+            let terminate = place(call, "terminateSimulation", terminateSimulation)?;
+            *enter = component.instance.completed_integrator_step()?.into();
+            *terminate = 0;
+            Ok(())
+        })
+    }
+}
+
+/// The present time.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetTime(c: fmi2Component, time: fmi2Real) -> fmi2Status {
+    unsafe { on(c, &calls::SET_TIME, |component| component.instance.set_time(time)) }
+}
+
+/// The states as the host has integrated them.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2SetContinuousStates(
+    c: fmi2Component,
+    x: *const fmi2Real,
+    nx: usize,
+) -> fmi2Status {
+    let call = &calls::SET_CONTINUOUS_STATES;
+    unsafe {
+        on(c, call, |component| {
+            component.instance.check(call)?;
+            component.instance.set_continuous_states(array(call, "x", x, nx)?)
+        })
+    }
+}
+
+/// Fills the host's array by `body`.
+unsafe fn fill(
+    c: fmi2Component,
+    call: &Call,
+    (name, pointer, length): (&str, *mut fmi2Real, usize),
+    body: impl FnOnce(&mut Instance, &mut [fmi2Real]) -> Result<(), Fault>,
+) -> fmi2Status {
+    unsafe {
+        on(c, call, |component| {
+            component.instance.check(call)?;
+            body(&mut component.instance, array_mut(call, name, pointer, length)?)
+        })
+    }
+}
+
+/// The derivatives of the states, in the order of the model description.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetDerivatives(
+    c: fmi2Component,
+    derivatives: *mut fmi2Real,
+    nx: usize,
+) -> fmi2Status {
+    let into = ("derivatives", derivatives, nx);
+    unsafe { fill(c, &calls::GET_DERIVATIVES, into, Instance::derivatives) }
+}
+
+/// Functions that cross zero at events.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetEventIndicators(
+    c: fmi2Component,
+    eventIndicators: *mut fmi2Real,
+    ni: usize,
+) -> fmi2Status {
+    let into = ("eventIndicators", eventIndicators, ni);
+    unsafe { fill(c, &calls::GET_EVENT_INDICATORS, into, Instance::event_indicators) }
+}
+
+/// The states, in the order of the model description.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetContinuousStates(
+    c: fmi2Component,
+    x: *mut fmi2Real,
+    nx: usize,
+) -> fmi2Status {
+    unsafe { fill(c, &calls::GET_CONTINUOUS_STATES, ("x", x, nx), Instance::continuous_states) }
+}
+
+/// The states' orders of magnitude.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn fmi2GetNominalsOfContinuousStates(
+    c: fmi2Component,
+    x_nominal: *mut fmi2Real,
+    nx: usize,
+) -> fmi2Status {
+    let into = ("x_nominal", x_nominal, nx);
+    unsafe { fill(c, &calls::GET_NOMINALS, into, |instance, x| instance.nominals(x)) }
 }
 
 // ---- Co-Simulation ----
@@ -752,7 +947,7 @@ pub unsafe extern "C" fn fmi2GetRealOutputDerivatives(
     let call = &calls::GET_OUTPUT_DERIVATIVES;
     unsafe {
         on(c, call, |component| {
-            call.check(component.instance.mode())?;
+            component.instance.check(call)?;
             let references = array(call, "vr", vr, nvr)?;
             let orders = array(call, "order", order, nvr)?;
             let places = array_mut(call, "value", value, nvr)?;
@@ -773,9 +968,13 @@ pub unsafe extern "C" fn fmi2DoStep(
     communicationStepSize: fmi2Real,
     _noSetFMUStatePriorToCurrentPoint: fmi2Boolean,
 ) -> fmi2Status {
+    let call = &calls::DO_STEP;
     unsafe {
-        on(c, &calls::DO_STEP, |component| {
-            component.instance.do_step(currentCommunicationPoint, communicationStepSize)
+        on(c, call, |component| {
+            let before = component.instance.last_contact();
+            component.instance.do_step(currentCommunicationPoint, communicationStepSize)?;
+            component.log.report_event(call, before, &component.instance);
+            Ok(())
         })
     }
 }
@@ -786,7 +985,7 @@ pub unsafe extern "C" fn fmi2CancelStep(c: fmi2Component) -> fmi2Status {
     let call = &calls::CANCEL_STEP;
     unsafe {
         on(c, call, |component| {
-            call.check(component.instance.mode())?;
+            component.instance.check(call)?;
             Err(call.error("no step is running: fmi2DoStep returns when the step is done"))
         })
     }
@@ -802,7 +1001,7 @@ unsafe fn answer<T>(
 ) -> fmi2Status {
     unsafe {
         on(c, call, |component| {
-            call.check(component.instance.mode())?;
+            component.instance.check(call)?;
             let place = place(call, "value", value)?;
             let value = known(&component.instance);
             *place = value
@@ -982,16 +1181,17 @@ mod tests {
     }
 
     #[test]
-    fn instance_is_refused_without_name_or_guid_and_for_model_exchange() {
+    fn instance_is_refused_without_name_or_guid_and_of_an_unknown_type() {
         let guid = Some(table::guid());
         let name = Some("one".to_string());
-        assert_eq!(refusal(name.clone(), fmi2CoSimulation, guid.clone()), None);
-        assert!(refusal(None, fmi2CoSimulation, guid.clone()).is_some());
-        assert!(refusal(Some(" ".into()), fmi2CoSimulation, guid.clone()).is_some());
-        assert!(refusal(name.clone(), fmi2ModelExchange, guid.clone()).is_some());
-        assert!(refusal(name.clone(), 7, guid).is_some());
-        assert!(refusal(name.clone(), fmi2CoSimulation, None).unwrap().contains("NULL"));
-        let wrong = refusal(name, fmi2CoSimulation, Some("{0}".into())).unwrap();
+        let made = |name, kind, guid| interface(name, kind, guid);
+        assert_eq!(made(name.clone(), 0, guid.clone()), Ok(Interface::ModelExchange));
+        assert_eq!(made(name.clone(), 1, guid.clone()), Ok(Interface::CoSimulation));
+        assert!(made(None, fmi2CoSimulation, guid.clone()).is_err());
+        assert!(made(Some(" ".into()), fmi2CoSimulation, guid.clone()).is_err());
+        assert!(made(name.clone(), 7, guid).unwrap_err().contains('7'));
+        assert!(made(name.clone(), fmi2CoSimulation, None).unwrap_err().contains("NULL"));
+        let wrong = made(name, fmi2CoSimulation, Some("{0}".into())).unwrap_err();
         assert!(wrong.contains("{0}") && wrong.contains(&table::guid()));
     }
 }

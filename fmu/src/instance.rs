@@ -4,11 +4,15 @@
 //! plant could not compute: the plant stands where it was, but the instance goes
 //! to the state "step failed", where it can be read, reset, or given a saved
 //! state.
+//!
+//! In Model Exchange the host integrates: it sets time and states, and what is
+//! discrete (the contact of hub and bearing, the wave's regime, the gyro's reading)
+//! changes in [`Instance::new_discrete_states`] alone.
 
-use plant::{Inputs, Outputs, Parameters, Plant, Ramp};
+use plant::{INDICATORS, Inputs, Outputs, Parameters, Plant, Ramp, Regime, STATES};
 
-use crate::calls::{self, Call, Fault, Mode};
-use crate::table::{self, SCALARS, Scalar};
+use crate::calls::{self, Call, Fault, Interface, Mode};
+use crate::table::{self, RATES, SCALARS, Scalar};
 use crate::variable::{Access, Causality, Value, Variable};
 
 /// The tolerance when the host names none.
@@ -24,6 +28,7 @@ const TIME_SLACK: f64 = 1e-9;
 /// Cloning it is saving its state: there is nothing else to an instance.
 #[derive(Clone, Debug)]
 pub struct Instance {
+    pub(crate) interface: Interface,
     pub(crate) mode: Mode,
     pub(crate) start: f64,
     pub(crate) stop: Option<f64>,
@@ -36,20 +41,33 @@ pub struct Instance {
     /// There from the first look at it in initialization mode; gone when a
     /// parameter or an input is set there.
     pub(crate) plant: Option<Plant>,
+    /// The regime since the last event, in Model Exchange once initialised.
+    pub(crate) regime: Option<Regime>,
     /// What the plant shows now, if somebody has asked.
     pub(crate) shown: Option<Outputs>,
 }
 
-impl Default for Instance {
-    fn default() -> Self {
-        Instance::new()
-    }
+/// What fmi2NewDiscreteStates tells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EventInfo {
+    /// The FMU has changed continuous states.
+    pub states_changed: bool,
+    /// When the next event is due at the latest, s.
+    pub next_time: Option<f64>,
+}
+
+/// What a variable does in a direction of states and inputs.
+struct Slopes {
+    states: [f64; STATES],
+    rates: [f64; STATES],
+    outputs: Outputs,
 }
 
 impl Instance {
     /// As fmi2Instantiate leaves it.
-    pub fn new() -> Instance {
+    pub fn new(interface: Interface) -> Instance {
         Instance {
+            interface,
             mode: Mode::Instantiated,
             start: 0.0,
             stop: None,
@@ -58,8 +76,19 @@ impl Instance {
             parameters: table::parameters().filter_map(Variable::start).collect(),
             inputs: Inputs::default(),
             plant: None,
+            regime: None,
             shown: None,
         }
+    }
+
+    /// What it is made for.
+    pub fn interface(&self) -> Interface {
+        self.interface
+    }
+
+    /// Whether a call is allowed now.
+    pub fn check(&self, call: &Call) -> Result<(), Fault> {
+        call.check(self.interface, self.mode)
     }
 
     /// Where it is in its life.
@@ -85,7 +114,7 @@ impl Instance {
         stop: Option<f64>,
     ) -> Result<(), Fault> {
         let call = &calls::SETUP_EXPERIMENT;
-        call.check(self.mode)?;
+        self.check(call)?;
         let mut problems = Vec::new();
         if !start.is_finite() {
             problems.push(format!("startTime = {start:?} (allowed: any finite number)"));
@@ -113,7 +142,7 @@ impl Instance {
 
     /// fmi2EnterInitializationMode
     pub fn enter_initialization_mode(&mut self) -> Result<(), Fault> {
-        calls::ENTER_INITIALIZATION.check(self.mode)?;
+        self.check(&calls::ENTER_INITIALIZATION)?;
         self.mode = Mode::Initialization;
         Ok(())
     }
@@ -121,29 +150,35 @@ impl Instance {
     /// fmi2ExitInitializationMode: here at the latest bad parameters come up.
     pub fn exit_initialization_mode(&mut self) -> Result<(), Fault> {
         let call = &calls::EXIT_INITIALIZATION;
-        call.check(self.mode)?;
-        self.plant(call)?;
-        self.mode = Mode::Stepping;
+        self.check(call)?;
+        let regime = self.shown(call)?.regime;
+        match self.interface {
+            Interface::CoSimulation => self.mode = Mode::Stepping,
+            Interface::ModelExchange => {
+                self.mode = Mode::Event;
+                self.regime = Some(regime);
+            }
+        }
         Ok(())
     }
 
     /// fmi2Terminate
     pub fn terminate(&mut self) -> Result<(), Fault> {
-        calls::TERMINATE.check(self.mode)?;
+        self.check(&calls::TERMINATE)?;
         self.mode = Mode::Terminated;
         Ok(())
     }
 
     /// fmi2Reset: as new.
     pub fn reset(&mut self) -> Result<(), Fault> {
-        calls::RESET.check(self.mode)?;
-        *self = Instance::new();
+        self.check(&calls::RESET)?;
+        *self = Instance::new(self.interface);
         Ok(())
     }
 
     /// fmi2GetReal and its kin: one value.
     pub fn get(&mut self, call: &Call, reference: u32) -> Result<Value, Fault> {
-        call.check(self.mode)?;
+        self.check(call)?;
         let scalar = scalar(call, reference)?;
         let name = scalar.variable.name;
         if let Access::Input(ramp) = scalar.variable.access {
@@ -160,9 +195,17 @@ impl Instance {
                 Mode::Initialization.name()
             )));
         }
-        let value = match scalar.variable.causality {
-            Causality::CalculatedParameter => {
+        let value = match (scalar.variable.access, scalar.variable.state) {
+            (Access::Calculated(_) | Access::CalculatedPerMode(_), _) => {
                 scalar.variable.calculated(self.plant(call)?.calculated(), scalar.element)
+            }
+            (Access::State, Some(place)) => {
+                let states = self.plant(call)?.continuous_states();
+                Some(Value::Real(states[place.at(scalar.element)]))
+            }
+            (Access::Rate(place), _) => {
+                let rates = self.look(call, |plant, inputs| plant.derivatives(inputs))?;
+                Some(Value::Real(rates[place.at(scalar.element)]))
             }
             _ => scalar.variable.shown(self.shown(call)?),
         };
@@ -176,9 +219,14 @@ impl Instance {
         references: &[u32],
         value: impl Fn(usize) -> Value,
     ) -> Result<(), Fault> {
-        call.check(self.mode)?;
+        self.check(call)?;
+        let mut tunes = false;
         for (n, reference) in references.iter().enumerate() {
-            self.check_set(call, *reference, value(n))?;
+            let variable = self.check_set(call, *reference, value(n))?;
+            tunes |= variable.causality == Causality::Parameter && self.is_running();
+        }
+        if tunes {
+            self.tune(call, references, &value)?;
         }
         for (n, reference) in references.iter().enumerate() {
             let scalar = scalar(call, *reference)?;
@@ -192,41 +240,73 @@ impl Instance {
             }
         }
         if !references.is_empty() {
-            self.forget();
+            // What follows from parameters and inputs has to be computed anew.
+            self.shown = None;
+            if !self.is_running() {
+                self.plant = None;
+            }
         }
         Ok(())
     }
 
-    fn check_set(&self, call: &Call, reference: u32, value: Value) -> Result<(), Fault> {
+    /// Parameters that are fixed can no longer be set.
+    fn is_running(&self) -> bool {
+        !matches!(self.mode, Mode::Instantiated | Mode::Initialization)
+    }
+
+    fn check_set(
+        &self,
+        call: &Call,
+        reference: u32,
+        value: Value,
+    ) -> Result<&'static Variable, Fault> {
         let variable = scalar(call, reference)?.variable;
-        match variable.causality {
-            // Wrong inputs are refused on the spot, wrong parameters all
-            // together when initialization ends.
-            Causality::Input => match variable.problem(value) {
-                Some(problem) => Err(call.error(problem)),
-                None => Ok(()),
-            },
-            Causality::Parameter if self.mode == Mode::Stepping => Err(call.error(format_args!(
-                "{} is a fixed parameter and cannot be set in state \"{}\"; it can in: {}, {}",
-                variable.name,
-                self.mode.name(),
-                Mode::Instantiated.name(),
-                Mode::Initialization.name()
-            ))),
-            Causality::Parameter => Ok(()),
-            _ => Err(call.error(format_args!(
+        let is_parameter = variable.causality == Causality::Parameter;
+        if !is_parameter && variable.causality != Causality::Input {
+            return Err(call.error(format_args!(
                 "{} is computed; only inputs and parameters can be set",
                 variable.name
-            ))),
+            )));
+        }
+        if is_parameter && self.is_running() {
+            let (kind, modes) = match variable.tunable {
+                true => ("tunable", &[Mode::Stepping, Mode::Event][..]),
+                false => ("fixed", &[][..]),
+            };
+            if !modes.contains(&self.mode) {
+                let (name, now) = (variable.name, self.mode.name());
+                let mut all = vec![Mode::Instantiated.name(), Mode::Initialization.name()];
+                all.extend(modes.iter().map(|mode| mode.name()));
+                return Err(call.error(format_args!(
+                    "{name} is a {kind} parameter and cannot be set in state \"{now}\"; it can in: {}",
+                    all.join(", ")
+                )));
+            }
+        }
+        // Wrong inputs and wrong values while running are refused on the spot, wrong
+        // parameters before that all together when initialization ends.
+        match variable.problem(value) {
+            Some(problem) if !is_parameter || self.is_running() => Err(call.error(problem)),
+            _ => Ok(variable),
         }
     }
 
-    /// What follows from parameters and inputs has to be computed anew.
-    fn forget(&mut self) {
-        self.shown = None;
-        if self.mode != Mode::Stepping {
-            self.plant = None;
+    /// Gives the running plant what has been set among its tunable parameters.
+    fn tune(
+        &mut self,
+        call: &Call,
+        references: &[u32],
+        value: &impl Fn(usize) -> Value,
+    ) -> Result<(), Fault> {
+        let mut parameters =
+            self.plant_parameters().map_err(|problems| call.error(problems.join("; ")))?;
+        for (n, reference) in references.iter().enumerate() {
+            scalar(call, *reference)?.variable.set_parameter(&mut parameters, value(n));
         }
+        let inputs = self.inputs;
+        self.plant(call)?
+            .set_friction(&parameters.friction, &inputs)
+            .map_err(|problems| call.error(problems.join("; ")))
     }
 
     /// fmi2SetRealInputDerivatives: the slope holds for the next step only.
@@ -237,7 +317,7 @@ impl Instance {
         values: &[f64],
     ) -> Result<(), Fault> {
         let call = &calls::SET_INPUT_DERIVATIVES;
-        call.check(self.mode)?;
+        self.check(call)?;
         let mut slopes = Vec::with_capacity(references.len());
         for ((reference, order), slope) in references.iter().zip(orders).zip(values) {
             let variable = scalar(call, *reference)?.variable;
@@ -261,35 +341,81 @@ impl Instance {
         Ok(())
     }
 
-    /// fmi2GetRealOutputDerivatives: the outputs whose derivative is a variable
-    /// too have one.
+    /// fmi2GetRealOutputDerivatives: the time derivative of a variable, the inputs
+    /// running along the slopes that are set for the next step.
     pub fn output_derivative(&mut self, reference: u32, order: i32) -> Result<f64, Fault> {
-        type Derivative = fn(&Outputs) -> f64;
-        const KNOWN: [(&str, Derivative); 4] = [
-            ("theta", |o| o.omega),
-            ("omega", |o| o.omega_dot),
-            ("slosh_angle", |o| o.slosh_rate),
-            ("slosh_angle_radial", |o| o.slosh_rate_radial),
-        ];
         let call = &calls::GET_OUTPUT_DERIVATIVES;
-        call.check(self.mode)?;
-        let name = scalar(call, reference)?.variable.name;
-        match KNOWN.iter().find(|(known, _)| *known == name) {
-            Some((_, derivative)) if order == 1 => Ok(derivative(self.shown(call)?)),
-            _ => {
-                let known: Vec<_> = KNOWN.iter().map(|(known, _)| *known).collect();
-                Err(call.error(format_args!(
-                    "no derivative of order {order} of {name}; there are those of order 1 of {}",
-                    known.join(", ")
-                )))
+        self.check(call)?;
+        let scalar = scalar(call, reference)?;
+        if order != 1 {
+            let name = scalar.name();
+            return Err(call.error(format_args!("order {order} of {name} (allowed: 1)")));
+        }
+        let inputs = self.inputs;
+        let states = self.look(call, |plant, inputs| plant.derivatives(inputs))?;
+        self.slopes(call, states, &inputs)?.of(call, &scalar)
+    }
+
+    /// fmi2GetDirectionalDerivative: what the unknowns do when the knowns, inputs or
+    /// continuous states, go in a direction.
+    pub fn directional_derivative(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        direction: &[f64],
+        answers: &mut [f64],
+    ) -> Result<(), Fault> {
+        let call = &calls::DIRECTIONAL_DERIVATIVE;
+        self.check(call)?;
+        let mut states = [0.0; STATES];
+        let nowhere = Ramp::held(0.0);
+        let mut along = Inputs { tau_cmd: nowhere, tau_ext: nowhere, g_axial: nowhere };
+        for (reference, d) in knowns.iter().zip(direction) {
+            let scalar = scalar(call, *reference)?;
+            if !d.is_finite() {
+                return Err(call.error(format_args!(
+                    "direction of {} = {d} (allowed: any finite number)",
+                    scalar.name()
+                )));
+            }
+            match (scalar.variable.access, scalar.variable.state) {
+                (Access::Input(ramp), _) => ramp(&mut along).slope += d,
+                (_, Some(place)) => states[place.at(scalar.element)] += d,
+                _ => {
+                    return Err(call.error(format_args!(
+                        "{} is not among the knowns: it is neither an input nor a continuous state",
+                        scalar.name()
+                    )));
+                }
             }
         }
+        let slopes = self.slopes(call, states, &along)?;
+        for (reference, answer) in unknowns.iter().zip(answers) {
+            *answer = slopes.of(call, &scalar(call, *reference)?)?;
+        }
+        Ok(())
+    }
+
+    /// What everything does when the states go in a direction and the inputs along
+    /// their slopes.
+    fn slopes(
+        &mut self,
+        call: &Call,
+        states: [f64; STATES],
+        along: &Inputs,
+    ) -> Result<Slopes, Fault> {
+        let du = [along.tau_cmd.slope, along.tau_ext.slope, along.g_axial.slope];
+        self.look(call, |plant, inputs| Slopes {
+            states,
+            rates: plant.directional_derivative(inputs, &states, &du),
+            outputs: plant.output_derivatives(inputs, &states, &du),
+        })
     }
 
     /// fmi2DoStep: from `at` on by `h`. Does not allocate unless it fails.
     pub fn do_step(&mut self, at: f64, h: f64) -> Result<(), Fault> {
         let call = &calls::DO_STEP;
-        call.check(self.mode)?;
+        self.check(call)?;
         if !(h.is_finite() && h > 0.0) {
             return Err(call.error(format_args!(
                 "communicationStepSize = {h:?} s (allowed: greater than 0, finite)"
@@ -345,9 +471,154 @@ impl Instance {
         Ok((used, after))
     }
 
+    // ---- Model Exchange ----
+
+    /// fmi2EnterEventMode
+    pub fn enter_event_mode(&mut self) -> Result<(), Fault> {
+        self.check(&calls::ENTER_EVENT)?;
+        self.mode = Mode::Event;
+        Ok(())
+    }
+
+    /// fmi2NewDiscreteStates: everything that is due now. Once is enough; calling it
+    /// again, after other inputs, does no harm.
+    pub fn new_discrete_states(&mut self) -> Result<EventInfo, Fault> {
+        let call = &calls::NEW_DISCRETE_STATES;
+        self.check(call)?;
+        let event = self.look(call, |plant, inputs| plant.take_event(inputs))?;
+        let states_changed = event.map_err(|why| call.error(why))?;
+        self.shown = None;
+        self.regime = None;
+        self.regime = Some(self.shown(call)?.regime);
+        Ok(EventInfo { states_changed, next_time: self.plant(call)?.next_time_event() })
+    }
+
+    /// fmi2EnterContinuousTimeMode
+    pub fn enter_continuous_time_mode(&mut self) -> Result<(), Fault> {
+        self.check(&calls::ENTER_CONTINUOUS_TIME)?;
+        self.mode = Mode::Continuous;
+        Ok(())
+    }
+
+    /// fmi2CompletedIntegratorStep: whether an event has to be handled, because the
+    /// regime has changed or the host has overlooked a change of the contact.
+    pub fn completed_integrator_step(&mut self) -> Result<bool, Fault> {
+        let call = &calls::COMPLETED_STEP;
+        self.check(call)?;
+        let time = self.time;
+        if let Some(stop) = self.stop
+            && time > stop + TIME_SLACK * stop.abs().max(1.0)
+        {
+            return Err(
+                call.error(format_args!("the step to {time:?} s has passed the stop time {stop:?} s"))
+            );
+        }
+        let range = self.plant(call)?.check_range();
+        if let Err(why) = range {
+            self.mode = Mode::Failed;
+            return Err(call.error(why));
+        }
+        let (regime, overdue) = self.look(call, |plant, inputs| {
+            (plant.outputs_held(inputs).regime, plant.is_contact_overdue(inputs))
+        })?;
+        Ok(overdue || self.regime != Some(regime))
+    }
+
+    /// fmi2SetTime
+    pub fn set_time(&mut self, time: f64) -> Result<(), Fault> {
+        let call = &calls::SET_TIME;
+        self.check(call)?;
+        if !time.is_finite() {
+            return Err(call.error(format_args!("time = {time:?} s (allowed: any finite number)")));
+        }
+        self.plant(call)?.set_time(time);
+        self.time = time;
+        self.shown = None;
+        Ok(())
+    }
+
+    /// fmi2SetContinuousStates. Numbers that are none are discarded: the integrator
+    /// should try a shorter step.
+    pub fn set_continuous_states(&mut self, states: &[f64]) -> Result<(), Fault> {
+        let call = &calls::SET_CONTINUOUS_STATES;
+        self.check(call)?;
+        check_length(call, "nx", states.len(), STATES)?;
+        let mut all = [0.0; STATES];
+        for (place, x) in table::places().zip(states) {
+            if !x.is_finite() {
+                let name = table::state_at(place).map_or("a state".into(), Scalar::name);
+                return Err(
+                    call.discard(format_args!("{name} = {x:?} (allowed: any finite number)"))
+                );
+            }
+            all[place] = *x;
+        }
+        self.plant(call)?.set_continuous_states(&all);
+        self.shown = None;
+        Ok(())
+    }
+
+    /// fmi2GetContinuousStates
+    pub fn continuous_states(&mut self, states: &mut [f64]) -> Result<(), Fault> {
+        let call = &calls::GET_CONTINUOUS_STATES;
+        self.check(call)?;
+        check_length(call, "nx", states.len(), STATES)?;
+        let all = self.plant(call)?.continuous_states();
+        for (place, x) in table::places().zip(states) {
+            *x = all[place];
+        }
+        Ok(())
+    }
+
+    /// fmi2GetDerivatives. Numbers that are none are discarded, as above.
+    pub fn derivatives(&mut self, derivatives: &mut [f64]) -> Result<(), Fault> {
+        let call = &calls::GET_DERIVATIVES;
+        self.check(call)?;
+        check_length(call, "nx", derivatives.len(), STATES)?;
+        let all = self.look(call, |plant, inputs| plant.derivatives(inputs))?;
+        for ((place, rate), x) in table::places().zip(&RATES).zip(derivatives) {
+            *x = all[place];
+            if !x.is_finite() {
+                return Err(call.discard(format_args!("{} = {x:?}", rate.name())));
+            }
+        }
+        Ok(())
+    }
+
+    /// fmi2GetEventIndicators
+    pub fn event_indicators(&mut self, indicators: &mut [f64]) -> Result<(), Fault> {
+        let call = &calls::GET_EVENT_INDICATORS;
+        self.check(call)?;
+        check_length(call, "ni", indicators.len(), INDICATORS)?;
+        let all = self.look(call, |plant, inputs| plant.event_indicators(inputs))?;
+        indicators.copy_from_slice(&all);
+        Ok(())
+    }
+
+    /// fmi2GetNominalsOfContinuousStates
+    pub fn nominals(&self, nominals: &mut [f64]) -> Result<(), Fault> {
+        let call = &calls::GET_NOMINALS;
+        self.check(call)?;
+        check_length(call, "nx", nominals.len(), STATES)?;
+        for (place, x) in table::places().zip(nominals) {
+            *x = table::state_at(place).map_or(1.0, |state| state.variable.nominal());
+        }
+        Ok(())
+    }
+
+    // ---- Saved states and what is behind it all ----
+
     /// fmi2SetFMUstate
     pub fn restore(&mut self, saved: &Instance) -> Result<(), Fault> {
-        calls::SET_FMU_STATE.check(self.mode)?;
+        let call = &calls::SET_FMU_STATE;
+        self.check(call)?;
+        if saved.interface != self.interface {
+            return Err(call.error(format_args!(
+                "the state is of an instance for {}, and this one is for {}",
+                saved.interface.name(),
+                self.interface.name()
+            )));
+        }
         self.clone_from(saved);
         Ok(())
     }
@@ -376,15 +647,61 @@ impl Instance {
 
     /// What the plant shows now; it is computed when it is first asked for.
     fn shown(&mut self, call: &Call) -> Result<&Outputs, Fault> {
-        let shown = match self.shown {
+        let mut shown = match self.shown {
             Some(shown) => shown,
-            None => {
-                let inputs = self.inputs;
-                self.plant(call)?.outputs(&inputs)
-            }
+            None => self.look(call, |plant, inputs| plant.outputs_held(inputs))?,
         };
+        if let Some(regime) = self.regime {
+            shown.regime = regime;
+        }
         Ok(self.shown.insert(shown))
     }
+
+    /// Looks at the plant: in Co-Simulation with the contact that the present inputs
+    /// give; in Model Exchange, where it changes at events alone, with the one it has.
+    fn look<T>(
+        &mut self,
+        call: &Call,
+        look: impl FnOnce(&mut Plant, &Inputs) -> T,
+    ) -> Result<T, Fault> {
+        let inputs = self.inputs;
+        let interface = self.interface;
+        let plant = self.plant(call)?;
+        Ok(match interface {
+            Interface::CoSimulation => {
+                plant.with_present_contact(&inputs, |plant| look(plant, &inputs))
+            }
+            Interface::ModelExchange => look(plant, &inputs),
+        })
+    }
+
+    /// How often hub and bearing have changed their contact, when last, and what it is;
+    /// see [`Plant::last_contact`].
+    pub fn last_contact(&self) -> Option<(i32, f64, i32)> {
+        self.plant.as_ref().map(Plant::last_contact)
+    }
+}
+
+impl Slopes {
+    fn of(&self, call: &Call, scalar: &Scalar) -> Result<f64, Fault> {
+        let v = scalar.variable;
+        match (v.access, v.state, v.shown(&self.outputs)) {
+            (Access::Rate(place), ..) => Ok(self.rates[place.at(scalar.element)]),
+            (_, Some(place), _) => Ok(self.states[place.at(scalar.element)]),
+            (_, _, Some(Value::Real(slope))) => Ok(slope),
+            _ => {
+                let name = scalar.name();
+                Err(call.error(format_args!("{name} is not computed from states and inputs")))
+            }
+        }
+    }
+}
+
+fn check_length(call: &Call, name: &str, given: usize, needed: usize) -> Result<(), Fault> {
+    if given == needed {
+        return Ok(());
+    }
+    Err(call.error(format_args!("{name} = {given} (allowed: {needed})")))
 }
 
 /// The variable of a value reference, if it has the type that the call is for.

@@ -1,12 +1,21 @@
 //! Which messages go to the host's logger.
 //!
-//! Only calls that fail are worth a message; a host that asks for everything
-//! gets no chatter. `loggingOn` of fmi2Instantiate switches *debug* messages, of
-//! which there are none: failures are reported either way, because a status
-//! without a reason helps nobody. fmi2SetDebugLogging is an explicit wish and is
-//! obeyed: off means silence.
+//! Calls that fail, and, for those who ask, stick and slip. A host that asks for
+//! nothing gets no chatter: `loggingOn` of fmi2Instantiate switches nothing, because
+//! failures are reported either way (a status without a reason helps nobody) and
+//! events only on an explicit wish. fmi2SetDebugLogging is one and is obeyed: off means
+//! silence, and no category named means all.
 
 use crate::calls::Severity;
+
+/// What a message is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Topic {
+    /// The hub sticks or breaks away.
+    Event,
+    /// A call has failed.
+    Failure(Severity),
+}
 
 /// A log category of the model description.
 #[derive(Debug)]
@@ -15,48 +24,56 @@ pub struct Category {
     pub name: &'static str,
     /// What it holds.
     pub description: &'static str,
-    /// The failure it is for; `None` stands for all of them.
-    pub severity: Option<Severity>,
+    /// What it is for; `None` stands for everything.
+    pub topic: Option<Topic>,
 }
 
 /// All categories there are.
-pub const CATEGORIES: [Category; 4] = [
+pub const CATEGORIES: [Category; 5] = [
+    Category {
+        name: "logEvents",
+        description: "Each time the hub sticks in its bearing or breaks away",
+        topic: Some(Topic::Event),
+    },
     Category {
         name: "logStatusDiscard",
         description: "Why a call returned fmi2Discard",
-        severity: Some(Severity::Discard),
+        topic: Some(Topic::Failure(Severity::Discard)),
     },
     Category {
         name: "logStatusError",
         description: "Why a call returned fmi2Error",
-        severity: Some(Severity::Error),
+        topic: Some(Topic::Failure(Severity::Error)),
     },
     Category {
         name: "logStatusFatal",
         description: "Why a call returned fmi2Fatal",
-        severity: Some(Severity::Fatal),
+        topic: Some(Topic::Failure(Severity::Fatal)),
     },
-    Category { name: "logAll", description: "All of the above", severity: None },
+    Category { name: "logAll", description: "All of the above", topic: None },
 ];
 
-/// The category of messages of this severity.
-pub fn category(severity: Severity) -> &'static str {
-    CATEGORIES.iter().find(|c| c.severity == Some(severity)).map_or("logAll", |c| c.name)
+/// The category of messages on this topic.
+pub fn category(topic: Topic) -> &'static str {
+    CATEGORIES.iter().find(|c| c.topic == Some(topic)).map_or("logAll", |c| c.name)
 }
 
 /// What one instance logs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Filter {
+    events: bool,
     discard: bool,
     error: bool,
     fatal: bool,
 }
 
 impl Filter {
-    /// Everything; this is how an instance starts.
-    pub const ALL: Filter = Filter { discard: true, error: true, fatal: true };
+    /// Every failure; this is how an instance starts.
+    pub const FAILURES: Filter = Filter { events: false, discard: true, error: true, fatal: true };
+    /// Everything.
+    pub const ALL: Filter = Filter { events: true, ..Filter::FAILURES };
     /// Silence.
-    pub const NONE: Filter = Filter { discard: false, error: false, fatal: false };
+    pub const NONE: Filter = Filter { events: false, discard: false, error: false, fatal: false };
 
     /// Only these categories; none given means all. Unknown names are an error
     /// that lists them and the known ones.
@@ -67,11 +84,9 @@ impl Filter {
         let mut filter = Filter::NONE;
         let mut unknown = Vec::new();
         for name in names {
-            match CATEGORIES.iter().find(|c| c.name == name) {
-                Some(Category { severity: None, .. }) => filter = Filter::ALL,
-                Some(Category { severity: Some(Severity::Discard), .. }) => filter.discard = true,
-                Some(Category { severity: Some(Severity::Error), .. }) => filter.error = true,
-                Some(Category { severity: Some(Severity::Fatal), .. }) => filter.fatal = true,
+            match CATEGORIES.iter().find(|c| c.name == name).map(|c| c.topic) {
+                Some(None) => filter = Filter::ALL,
+                Some(Some(topic)) => *filter.switch(topic) = true,
                 None => unknown.push(format!("\"{name}\"")),
             }
         }
@@ -82,12 +97,17 @@ impl Filter {
         Err(format!("unknown log category {}; known: {}", unknown.join(", "), known.join(", ")))
     }
 
-    /// Whether messages of this severity are wanted.
-    pub fn wants(&self, severity: Severity) -> bool {
-        match severity {
-            Severity::Discard => self.discard,
-            Severity::Error => self.error,
-            Severity::Fatal => self.fatal,
+    /// Whether messages on this topic are wanted.
+    pub fn wants(mut self, topic: Topic) -> bool {
+        *self.switch(topic)
+    }
+
+    fn switch(&mut self, topic: Topic) -> &mut bool {
+        match topic {
+            Topic::Event => &mut self.events,
+            Topic::Failure(Severity::Discard) => &mut self.discard,
+            Topic::Failure(Severity::Error) => &mut self.error,
+            Topic::Failure(Severity::Fatal) => &mut self.fatal,
         }
     }
 }
@@ -104,8 +124,15 @@ mod tests {
     #[test]
     fn only_the_categories_asked_for_are_wanted() {
         let filter = Filter::of(&["logStatusFatal".into()]).unwrap();
-        assert!(filter.wants(Severity::Fatal));
-        assert!(!filter.wants(Severity::Error));
+        assert!(filter.wants(Topic::Failure(Severity::Fatal)));
+        assert!(!filter.wants(Topic::Failure(Severity::Error)));
+        assert!(!filter.wants(Topic::Event));
+    }
+
+    #[test]
+    fn events_are_for_those_who_ask() {
+        assert!(!Filter::FAILURES.wants(Topic::Event));
+        assert!(Filter::of(&["logEvents".into()]).unwrap().wants(Topic::Event));
     }
 
     #[test]
@@ -115,9 +142,10 @@ mod tests {
     }
 
     #[test]
-    fn every_severity_has_its_category() {
-        assert_eq!(category(Severity::Discard), "logStatusDiscard");
-        assert_eq!(category(Severity::Error), "logStatusError");
-        assert_eq!(category(Severity::Fatal), "logStatusFatal");
+    fn every_topic_has_its_category() {
+        assert_eq!(category(Topic::Event), "logEvents");
+        assert_eq!(category(Topic::Failure(Severity::Discard)), "logStatusDiscard");
+        assert_eq!(category(Topic::Failure(Severity::Error)), "logStatusError");
+        assert_eq!(category(Topic::Failure(Severity::Fatal)), "logStatusFatal");
     }
 }

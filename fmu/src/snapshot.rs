@@ -10,6 +10,7 @@
 //! | length of the whole | 4 |
 //! | GUID of the variable table | 38 |
 //! | state of life, flags (1: stop time, 2: plant) | 1 + 1 |
+//! | interface, regime (0: none) | 1 + 1 |
 //! | start, stop, tolerance, time | 4 x 8 |
 //! | parameters in the table's order: number, or 0/1 | 8 each |
 //! | inputs: value, slope | 16 each |
@@ -18,22 +19,22 @@
 //!
 //! Everything else about a plant follows from its parameters.
 
-use plant::{Plant, Ramp, State};
+use plant::{Plant, Ramp, Regime, State};
 
-use crate::calls::Mode;
+use crate::calls::{Interface, Mode};
 use crate::hash::Hash;
 use crate::instance::{Instance, TOLERANCES};
 use crate::table;
 use crate::variable::{Value, Variable};
 
 const MAGIC: &[u8; 8] = b"HubSlosh";
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 const HAS_STOP: u8 = 1;
 const HAS_PLANT: u8 = 2;
 
 /// The number of bytes; the same for every state.
 pub fn size() -> usize {
-    let head = 8 + 4 + 4 + 38 + 2 + 4 * 8;
+    let head = 8 + 4 + 4 + 38 + 4 + 4 * 8;
     let set = table::parameters().count() * 8 + table::ramps().count() * 16;
     head + set + State::WORDS * 8 + 16
 }
@@ -47,7 +48,8 @@ pub fn to_bytes(saved: &Instance) -> Vec<u8> {
     bytes.extend(table::guid().as_bytes());
     let stop = if saved.stop.is_some() { HAS_STOP } else { 0 };
     let plant = if saved.plant.is_some() { HAS_PLANT } else { 0 };
-    bytes.extend([saved.mode as u8, stop | plant]);
+    let regime = saved.regime.map_or(0, |regime| regime as u8);
+    bytes.extend([saved.mode as u8, stop | plant, saved.interface as u8, regime]);
     for time in [saved.start, saved.stop.unwrap_or(0.0), saved.tolerance, saved.time] {
         bytes.extend(time.to_le_bytes());
     }
@@ -100,11 +102,24 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Instance, String> {
         return Err("the saved state is damaged: its checksum is wrong".into());
     }
 
-    let [mode, flags] = rest.take()?;
-    let mode = Mode::ALL.get(usize::from(mode)).copied().filter(|m| *m != Mode::Fatal);
+    let [mode, flags, interface, regime] = rest.take()?;
+    let interface = match interface {
+        0 => Interface::ModelExchange,
+        1 => Interface::CoSimulation,
+        _ => return Err("the saved state is damaged: no such interface".into()),
+    };
+    let possible = |m: &Mode| *m != Mode::Fatal && m.only_in().is_none_or(|only| only == interface);
+    let mode = Mode::ALL.get(usize::from(mode)).copied().filter(possible);
     let mode = mode.ok_or("the saved state is damaged: no such state of life")?;
-    let mut saved = Instance::new();
+    let mut saved = Instance::new(interface);
     saved.mode = mode;
+    saved.regime = match regime {
+        0 => None,
+        1 => Some(Regime::Linear),
+        2 => Some(Regime::Transitional),
+        3 => Some(Regime::Nonlinear),
+        _ => return Err("the saved state is damaged: no such regime".into()),
+    };
     saved.start = rest.finite("start time")?;
     saved.stop = Some(rest.finite("stop time")?).filter(|_| flags & HAS_STOP != 0);
     saved.tolerance = rest.finite("tolerance")?;
@@ -124,7 +139,7 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Instance, String> {
     for word in &mut words {
         *word = u64::from_le_bytes(rest.take()?);
     }
-    let stepped = matches!(mode, Mode::Stepping | Mode::Terminated | Mode::Failed);
+    let stepped = !matches!(mode, Mode::Instantiated | Mode::Initialization);
     if flags & HAS_PLANT != 0 {
         let parameters = saved.plant_parameters().map_err(|problems| problems.join("; "))?;
         let state = State::from_words(&words);

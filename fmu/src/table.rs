@@ -10,13 +10,13 @@
 //! sampling rate that can be stepped) and are wide otherwise; what parameters
 //! mean together is for the plant to judge.
 
-use plant::{FrictionModel, Inputs, Ramp, SloshModel};
+use plant::{FrictionModel, INDICATORS, Inputs, Ramp, STATES, SloshModel};
 
 use crate::hash::Hash;
 use crate::variable::{
-    Access, Causality, Enumeration, Item, Kind, Value, Variable, calculated, calculated_per_mode,
-    choice, count, input, integer, local, local_choice, local_flag, local_integer, output,
-    parameter, switch,
+    Access, Causality, Enumeration, Item, Kind, Place, Value, Variable, calculated,
+    calculated_per_mode, choice, coordinate, count, input, integer, local, local_choice,
+    local_flag, local_integer, output, parameter, rate, switch,
 };
 
 /// The FMU's name in every sense: modelName, modelIdentifier, file name.
@@ -24,13 +24,36 @@ pub const MODEL: &str = "HubSlosh";
 /// The version of model and table.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-// What outputs follow at once. The hub's acceleration balances all torques, the
-// restoring force of the liquid (proportional to g_axial) among them, and stuck
-// friction carries what is left; forces and torques of the liquid contain the
-// hub's acceleration.
-const TORQUES: &[&str] = &["tau_cmd", "tau_ext", "g_axial"];
-// Where they start.
-const DYNAMICS: &[&str] = &["hub.", "tank.", "fluid.", "slosh.", "friction.", "init.", "wheel."];
+// What follows what at once. The hub's acceleration balances all torques, the restoring
+// force of the liquid (proportional to g_axial) among them, and stuck friction carries
+// what is left; forces and torques of the liquid contain the hub's acceleration. Angle
+// and rate are in it through the friction, wheel_speed through the wheel's limits.
+#[rustfmt::skip]
+const ALL_TORQUES: &[&str] = &[
+    "theta", "omega", "wheel_speed",
+    "slosh.q_radial", "slosh.q_tangential", "slosh.v_radial", "slosh.v_tangential",
+    "tau_cmd", "tau_ext", "g_axial",
+];
+const HUB_AND_LIQUID: &[&str] =
+    &["omega", "slosh.q_radial", "slosh.q_tangential", "slosh.v_radial", "slosh.v_tangential"];
+#[rustfmt::skip]
+const HEAT: &[&str] = &[
+    "theta", "omega",
+    "slosh.q_radial", "slosh.q_tangential", "slosh.v_radial", "slosh.v_tangential",
+];
+const MODE_1: &[&str] = &["slosh.q_radial[1]", "slosh.q_tangential[1]"];
+const MODE_1_MOVING: &[&str] = &[
+    "slosh.q_radial[1]",
+    "slosh.q_tangential[1]",
+    "slosh.v_radial[1]",
+    "slosh.v_tangential[1]",
+];
+// Where they start. The damping belongs to the g_axial at the start.
+#[rustfmt::skip]
+const DYNAMICS: &[&str] = &[
+    "tau_cmd", "tau_ext", "g_axial",
+    "hub.", "tank.", "fluid.", "slosh.", "friction.", "init.", "wheel.",
+];
 const LIQUID: &[&str] = &["tank.", "fluid.", "slosh."];
 // The plant keeps positions and velocities in space, not angles: going there and
 // back mixes the directions in the last digit.
@@ -42,41 +65,41 @@ pub static TABLE: &[Variable] = &[
     // Outputs
     output("theta", |o| o.theta, "rad",
         "Hub angle about the bearing axis, counter-clockwise from above positive, not wrapped")
-        .shown_in("deg").from(&["init.theta"]),
+        .shown_in("deg").state(0).follows(&["theta"]).from(&["init.theta"]),
     output("omega", |o| o.omega, "rad/s",
         "Hub rate, the derivative of theta")
-        .shown_in("deg/s").about(0.1).from(&["init.omega"]),
+        .shown_in("deg/s").about(0.1).state(1).reinit().follows(&["omega"]).from(&["init.omega"]),
     output("omega_dot", |o| o.omega_dot, "rad/s2",
         "Hub acceleration, the derivative of omega; 0 while the hub is stuck")
-        .shown_in("deg/s2").follows(TORQUES).from(DYNAMICS),
+        .shown_in("deg/s2").follows(ALL_TORQUES).from(DYNAMICS),
     output("slosh_angle", |o| o.slosh_angle, "rad",
         "Slosh angle of mode 1, tangential, positive when the liquid is displaced towards +theta; its sine is displacement over pendulum length")
-        .shown_in("deg").about(0.1).from(SLOSH_START),
+        .shown_in("deg").about(0.1).follows(MODE_1).from(SLOSH_START),
     output("slosh_rate", |o| o.slosh_rate, "rad/s",
         "Derivative of slosh_angle")
-        .shown_in("deg/s").from(SLOSH_START),
+        .shown_in("deg/s").follows(MODE_1_MOVING).from(SLOSH_START),
     output("slosh_angle_radial", |o| o.slosh_angle_radial, "rad",
         "Slosh angle of mode 1, radial, positive when the liquid is displaced outwards, away from the bearing axis; 0 in planar models")
-        .shown_in("deg").about(0.1).from(SLOSH_START),
+        .shown_in("deg").about(0.1).follows(MODE_1).from(SLOSH_START),
     output("tau_friction", |o| o.tau_friction, "N.m",
         "Torque of the bearing's friction on the hub, opposes omega; while stuck it balances all other torques")
-        .shown_in("mN.m").about(0.01).follows(TORQUES).from(DYNAMICS),
+        .shown_in("mN.m").about(0.01).follows(ALL_TORQUES).from(DYNAMICS),
     output("tau_fluid", |o| o.tau_fluid, "N.m",
         "Torque of the whole liquid, its frozen part included, on the hub: hub.I omega_dot = tau_actuator + tau_ext + tau_friction + tau_fluid")
-        .shown_in("mN.m").about(0.1).follows(TORQUES).from(DYNAMICS),
+        .shown_in("mN.m").about(0.1).follows(ALL_TORQUES).from(DYNAMICS),
     output("F_tangential", |o| o.f_tangential, "N",
         "Force of the liquid, its frozen part included, on the tank, hub frame: tangential, positive towards +theta")
-        .follows(TORQUES).from(DYNAMICS),
+        .follows(ALL_TORQUES).from(DYNAMICS),
     output("F_radial", |o| o.f_radial, "N",
         "Force of the liquid, its frozen part included, on the tank, hub frame: radial, positive outwards")
-        .follows(TORQUES).from(DYNAMICS),
+        .follows(ALL_TORQUES).from(DYNAMICS),
     output("wave_height", |o| o.wave_height, "m",
         "Height of the wave at the tank's wall above the surface at rest, from linear theory; above a quarter of the tank's radius an indicator rather than a height")
         .shown_in("mm").about(0.01)
-        .from(SLOSH_START),
+        .follows(&["slosh.q_radial", "slosh.q_tangential"]).from(SLOSH_START),
     output("omega_imu", |o| o.omega_imu, "rad/s",
         "What a rate gyro on the hub reads: sampled, noisy, quantised; equal to omega while imu.enabled is false")
-        .shown_in("deg/s").about(0.1).from(&["init.omega", "imu."]),
+        .shown_in("deg/s").about(0.1).follows(&["omega"]).from(&["init.omega", "imu."]),
 
     // Inputs
     input("tau_cmd", |i| &mut i.tau_cmd, "N.m",
@@ -92,38 +115,92 @@ pub static TABLE: &[Variable] = &[
     // Locals
     local("slosh_rate_radial", |o| o.slosh_rate_radial, "rad/s",
         "Derivative of slosh_angle_radial")
-        .shown_in("deg/s"),
+        .shown_in("deg/s").follows(MODE_1_MOVING),
     local("energy", |o| o.energy, "J",
         "Kinetic and potential energy of hub and liquid, 0 at rest")
-        .follows(&["g_axial"]),
+        .about(0.01).follows(ALL_TORQUES),
     local("momentum", |o| o.momentum, "kg.m2/s",
-        "Angular momentum of hub and liquid about the bearing axis"),
+        "Angular momentum of hub and liquid about the bearing axis")
+        .follows(HUB_AND_LIQUID),
     local("power_dissipated", |o| o.power_dissipated, "W",
-        "Power turned into heat by bearing and liquid together, never negative"),
+        "Power turned into heat by bearing and liquid together, never negative")
+        .follows(HEAT),
     local("work", |o| o.work, "J",
-        "Work done on the hub by tau_actuator and tau_ext since the start"),
+        "Work done on the hub by tau_actuator and tau_ext since the start")
+        .about(0.01).state(2).follows(&["work"]),
     local("heat", |o| o.heat, "J",
-        "Heat made by bearing and liquid since the start"),
+        "Heat made by bearing and liquid since the start")
+        .about(0.01).state(3).follows(&["heat"]),
     local("tau_actuator", |o| o.tau_actuator, "N.m",
         "Torque of the actuator on the hub, positive towards +theta: tau_cmd after the wheel's limits")
-        .shown_in("mN.m").follows(&["tau_cmd"]),
+        .shown_in("mN.m").follows(&["tau_cmd", "wheel_speed"]),
     local("wheel_speed", |o| o.wheel_speed, "rad/s",
         "Absolute speed of the wheel's rotor; a positive tau_actuator slows it down")
-        .shown_in("rpm"),
+        .shown_in("rpm").about(100.0).state(5).reinit().follows(&["wheel_speed"]).from(&["wheel.speed_0"]),
     local_flag("stuck", |o| o.stuck,
         "The hub is held by dry friction")
-        .follows(TORQUES),
+        .follows(ALL_TORQUES),
     local_choice("regime", &REGIME, |o| o.regime as i32,
-        "How far wave_height is inside the range of linear theory"),
+        "How far wave_height is inside the range of linear theory")
+        .follows(&["slosh.q_radial", "slosh.q_tangential"]),
     local_integer("friction_mode", |o| o.friction_mode,
         "Branch of the set-valued friction law: -1 turning backwards, 0 stuck, 1 turning forwards; 1 with other laws")
-        .follows(TORQUES),
+        .follows(ALL_TORQUES),
     local_integer("event_count", |o| o.event_count,
         "How often friction_mode has changed since the start"),
     local("event_time", |o| o.event_time, "s",
         "When friction_mode changed last"),
     local("stuck_time", |o| o.stuck_time, "s",
-        "Time spent stuck since the start"),
+        "Time spent stuck since the start")
+        .state(4).follows(&["stuck_time"]),
+
+    // The slosh modes' coordinates: with theta, omega, work, heat, stuck_time and
+    // wheel_speed the continuous states
+    coordinate("slosh.q_radial", 0,
+        "Radial coordinate of a slosh mode, positive outwards. Models linear and planar: unused; spherical: stereographic, the tangent of half the pendulum's angle from the vertical times the direction's radial part (unit 1); paraboloid: displacement (m)")
+        .about(0.01).follows(&["slosh.q_radial[]"]).from(SLOSH_START),
+    coordinate("slosh.q_tangential", 1,
+        "Tangential coordinate of a slosh mode, positive towards +theta. Models linear and planar: slosh angle (rad); spherical: stereographic, as slosh.q_radial (unit 1); paraboloid: displacement (m)")
+        .about(0.01).follows(&["slosh.q_tangential[]"]).from(SLOSH_START),
+    coordinate("slosh.v_radial", 2,
+        "Derivative of slosh.q_radial; its unit is that of slosh.q_radial per second")
+        .about(0.1).follows(&["slosh.v_radial[]"]).from(SLOSH_START),
+    coordinate("slosh.v_tangential", 3,
+        "Derivative of slosh.q_tangential; its unit is that of slosh.q_tangential per second")
+        .about(0.1).follows(&["slosh.v_tangential[]"]).from(SLOSH_START),
+
+    // The derivatives of the continuous states; a Model Exchange host has them in this
+    // order
+    rate("der(theta)", Place::Of(0), "rad/s",
+        "Derivative of theta: omega")
+        .follows(&["omega"]).from(&["init.omega"]),
+    rate("der(omega)", Place::Of(1), "rad/s2",
+        "Derivative of omega: omega_dot")
+        .follows(ALL_TORQUES).from(DYNAMICS),
+    rate("der(work)", Place::Of(2), "W",
+        "Derivative of work: power of tau_actuator and tau_ext")
+        .follows(&["omega", "wheel_speed", "tau_cmd", "tau_ext"]).from(&["init.omega", "wheel."]),
+    rate("der(heat)", Place::Of(3), "W",
+        "Derivative of heat: power_dissipated")
+        .follows(HEAT).from(DYNAMICS),
+    rate("der(stuck_time)", Place::Of(4), "1",
+        "Derivative of stuck_time: 1 while stuck, 0 otherwise")
+        .follows(ALL_TORQUES).from(DYNAMICS),
+    rate("der(wheel_speed)", Place::Of(5), "rad/s2",
+        "Derivative of wheel_speed: -tau_actuator/wheel.I")
+        .follows(&["wheel_speed", "tau_cmd"]).from(&["wheel."]),
+    rate("der(slosh.q_radial)", Place::PerMode(0), "",
+        "Derivative of slosh.q_radial: slosh.v_radial")
+        .follows(&["slosh.v_radial[]"]).from(SLOSH_START),
+    rate("der(slosh.q_tangential)", Place::PerMode(1), "",
+        "Derivative of slosh.q_tangential: slosh.v_tangential")
+        .follows(&["slosh.v_tangential[]"]).from(SLOSH_START),
+    rate("der(slosh.v_radial)", Place::PerMode(2), "",
+        "Derivative of slosh.v_radial")
+        .follows(ALL_TORQUES).from(DYNAMICS),
+    rate("der(slosh.v_tangential)", Place::PerMode(3), "",
+        "Derivative of slosh.v_tangential")
+        .follows(ALL_TORQUES).from(DYNAMICS),
 
     // Hub, tank, liquid
     parameter("hub.I", |p| &mut p.hub.inertia, "kg.m2",
@@ -170,49 +247,50 @@ pub static TABLE: &[Variable] = &[
     // Bearing
     choice("friction.model", &FRICTION_MODEL, |p| p.friction.model as i32,
         |p, n| set_item(&mut p.friction.model, &FRICTION_MODELS, n),
-        "Law of the bearing's friction"),
+        "Law of the bearing's friction")
+        .tunable(),
     parameter("friction.b", |p| &mut p.friction.b, "N.m.s",
         "Viscous coefficient")
-        .range(0.0, 1e6),
+        .range(0.0, 1e6).tunable(),
     parameter("friction.c", |p| &mut p.friction.c, "N.m",
         "Coulomb torque")
-        .shown_in("mN.m").range(0.0, 1e6),
+        .shown_in("mN.m").range(0.0, 1e6).tunable(),
     parameter("friction.d", |p| &mut p.friction.d, "N.m",
         "Static torque in excess of the Coulomb torque")
-        .shown_in("mN.m").range(0.0, 1e6),
+        .shown_in("mN.m").range(0.0, 1e6).tunable(),
     parameter("friction.omega_s", |p| &mut p.friction.omega_s, "rad/s",
         "Stribeck speed: the excess falls with exp(-(omega/omega_s)^2)")
-        .shown_in("deg/s").range(1e-6, 1e6),
+        .shown_in("deg/s").range(1e-6, 1e6).tunable(),
     parameter("friction.eps", |p| &mut p.friction.eps, "rad/s",
         "Width of the smoothed sign, model stribeck_smooth only")
-        .shown_in("deg/s").range(1e-7, 1e3),
+        .shown_in("deg/s").range(1e-7, 1e3).tunable(),
     parameter("friction.asymmetry", |p| &mut p.friction.asymmetry, "1",
         "Dry friction is 1 + asymmetry times as strong forwards and 1 - asymmetry times backwards")
-        .range(-0.999, 0.999),
+        .range(-0.999, 0.999).tunable(),
     parameter("friction.forward_cos1", |p| &mut p.friction.harmonics_forward[0], "1",
         "Relative variation of dry friction with cos(theta) while turning forwards")
-        .range(-1.0, 1.0),
+        .range(-1.0, 1.0).tunable(),
     parameter("friction.forward_sin1", |p| &mut p.friction.harmonics_forward[1], "1",
         "Relative variation of dry friction with sin(theta) while turning forwards")
-        .range(-1.0, 1.0),
+        .range(-1.0, 1.0).tunable(),
     parameter("friction.forward_cos2", |p| &mut p.friction.harmonics_forward[2], "1",
         "Relative variation of dry friction with cos(2 theta) while turning forwards")
-        .range(-1.0, 1.0),
+        .range(-1.0, 1.0).tunable(),
     parameter("friction.forward_sin2", |p| &mut p.friction.harmonics_forward[3], "1",
         "Relative variation of dry friction with sin(2 theta) while turning forwards")
-        .range(-1.0, 1.0),
+        .range(-1.0, 1.0).tunable(),
     parameter("friction.backward_cos1", |p| &mut p.friction.harmonics_backward[0], "1",
         "Relative variation of dry friction with cos(theta) while turning backwards")
-        .range(-1.0, 1.0),
+        .range(-1.0, 1.0).tunable(),
     parameter("friction.backward_sin1", |p| &mut p.friction.harmonics_backward[1], "1",
         "Relative variation of dry friction with sin(theta) while turning backwards")
-        .range(-1.0, 1.0),
+        .range(-1.0, 1.0).tunable(),
     parameter("friction.backward_cos2", |p| &mut p.friction.harmonics_backward[2], "1",
         "Relative variation of dry friction with cos(2 theta) while turning backwards")
-        .range(-1.0, 1.0),
+        .range(-1.0, 1.0).tunable(),
     parameter("friction.backward_sin2", |p| &mut p.friction.harmonics_backward[3], "1",
         "Relative variation of dry friction with sin(2 theta) while turning backwards")
-        .range(-1.0, 1.0),
+        .range(-1.0, 1.0).tunable(),
 
     // Where the motion starts
     parameter("init.theta", |p| &mut p.init.theta, "rad",
@@ -413,6 +491,8 @@ pub static UNITS: &[Unit] = &[
 pub struct Scalar {
     /// Its entry.
     pub variable: &'static Variable,
+    /// Its value reference, and its place among all scalars.
+    pub reference: u32,
     /// Its place in the family, 0 for the first.
     pub element: usize,
     /// How many parameters come before it.
@@ -422,10 +502,44 @@ pub struct Scalar {
 impl Scalar {
     /// Its name, with the mode's number in a family.
     pub fn name(&self) -> String {
-        match self.variable.access {
-            Access::CalculatedPerMode(_) => format!("{}[{}]", self.variable.name, self.element + 1),
-            _ => self.variable.name.into(),
+        let name = self.variable.name;
+        if self.variable.len() == 1 {
+            return name.into();
         }
+        match name.strip_suffix(')') {
+            Some(derivative) => format!("{derivative}[{}])", self.element + 1),
+            None => format!("{name}[{}]", self.element + 1),
+        }
+    }
+
+    /// The inputs and continuous states that it follows without delay.
+    pub fn follows(&self) -> impl Iterator<Item = &'static Scalar> {
+        let known = SCALARS.iter().filter(|s| {
+            s.variable.causality == Causality::Input || s.variable.state.is_some()
+        });
+        known.filter(|s| self.is_meant(self.variable.depends_on, s))
+    }
+
+    /// The inputs and parameters that its value at the start follows from.
+    pub fn starts_from(&self) -> impl Iterator<Item = &'static Scalar> {
+        let known = SCALARS.iter().filter(|s| {
+            matches!(s.variable.causality, Causality::Input | Causality::Parameter)
+        });
+        known.filter(|s| {
+            self.is_meant(self.variable.depends_on, s) || self.is_meant(self.variable.starts_from, s)
+        })
+    }
+
+    fn is_meant(&self, names: &[&str], other: &Scalar) -> bool {
+        let v = other.variable;
+        names.iter().any(|name| match name.strip_suffix("[]") {
+            Some(family) => family == v.name && self.element == other.element,
+            None => {
+                *name == v.name
+                    || (name.ends_with('.') && v.name.starts_with(name))
+                    || (name.ends_with(']') && *name == other.name())
+            }
+        })
     }
 }
 
@@ -442,12 +556,12 @@ pub const SCALAR_COUNT: usize = {
 
 /// Every scalar; the place is its value reference.
 pub static SCALARS: [Scalar; SCALAR_COUNT] = {
-    let mut scalars = [Scalar { variable: &TABLE[0], element: 0, slot: 0 }; SCALAR_COUNT];
+    let mut scalars = [Scalar { variable: &TABLE[0], reference: 0, element: 0, slot: 0 }; SCALAR_COUNT];
     let (mut n, mut entry, mut slot) = (0, 0, 0);
     while entry < TABLE.len() {
         let mut element = 0;
         while element < TABLE[entry].len() {
-            scalars[n] = Scalar { variable: &TABLE[entry], element, slot };
+            scalars[n] = Scalar { variable: &TABLE[entry], reference: n as u32, element, slot };
             n += 1;
             element += 1;
         }
@@ -458,6 +572,35 @@ pub static SCALARS: [Scalar; SCALAR_COUNT] = {
     }
     scalars
 };
+
+/// The derivatives of the continuous states: this is the order in which a Model
+/// Exchange host has states, derivatives and nominals.
+pub static RATES: [Scalar; STATES] = {
+    let mut rates = [SCALARS[0]; STATES];
+    let (mut n, mut reference) = (0, 0);
+    while reference < SCALAR_COUNT {
+        if matches!(SCALARS[reference].variable.access, Access::Rate(_)) {
+            rates[n] = SCALARS[reference];
+            n += 1;
+        }
+        reference += 1;
+    }
+    assert!(n == STATES, "every state has one derivative");
+    rates
+};
+
+/// The places in the plant of the continuous states, in the host's order.
+pub fn places() -> impl Iterator<Item = usize> {
+    RATES.iter().filter_map(|scalar| match scalar.variable.access {
+        Access::Rate(place) => Some(place.at(scalar.element)),
+        _ => None,
+    })
+}
+
+/// The variable of the continuous state at a place in the plant.
+pub fn state_at(place: usize) -> Option<&'static Scalar> {
+    SCALARS.iter().find(|s| s.variable.state.is_some_and(|state| state.at(s.element) == place))
+}
 
 /// The parameters, in the table's order.
 pub fn parameters() -> impl Iterator<Item = &'static Variable> {
@@ -480,10 +623,10 @@ pub fn find(name: &str) -> Option<u32> {
 /// A hash of all the table says and of the version: a host that brings another
 /// one has read another model description.
 pub fn guid() -> String {
-    let mut hash = Hash::new().text(MODEL).text(VERSION);
+    let mut hash = Hash::new().text(MODEL).text(VERSION).bytes(&[INDICATORS as u8]);
     for v in TABLE {
         hash = hash.text(v.name).text(v.description).text(&format!("{:?}", v.causality));
-        hash = hash.bytes(&[v.len() as u8]);
+        hash = hash.bytes(&[v.len() as u8, u8::from(v.reinit), u8::from(v.tunable)]);
         hash = match v.kind {
             Kind::Real(q) => {
                 let text = hash.text("Real").text(q.unit).text(q.display_unit.unwrap_or(""));
@@ -561,6 +704,19 @@ mod tests {
                 assert_eq!(variable.problem(start), None);
             }
         }
+    }
+
+    #[test]
+    fn every_continuous_state_has_its_derivative_under_its_name() {
+        for (place, rate) in places().zip(&RATES) {
+            let state = state_at(place).unwrap();
+            assert_eq!(rate.name(), format!("der({})", state.name()));
+        }
+        let mut all: Vec<usize> = places().collect();
+        all.sort_unstable();
+        assert!(all.into_iter().eq(0..STATES));
+        let states = SCALARS.iter().filter(|s| s.variable.state.is_some());
+        assert_eq!(states.count(), STATES);
     }
 
     #[test]

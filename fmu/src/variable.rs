@@ -1,6 +1,6 @@
 //! What a variable of the FMU is: the words [`crate::table`] is written in.
 
-use plant::{Calculated, Inputs, MODES, Outputs, Parameters, Ramp};
+use plant::{Calculated, Inputs, MODES, Outputs, Parameters, Ramp, STATES};
 
 /// The value of one scalar, as it crosses the C interface. Enumerations are
 /// integers there.
@@ -32,7 +32,7 @@ pub enum Causality {
 /// A real quantity. Units are names of [`crate::table::UNITS`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quantity {
-    /// SI.
+    /// SI; "" where it is another one in every slosh model.
     pub unit: &'static str,
     /// What people read instead.
     pub display_unit: Option<&'static str>,
@@ -82,6 +82,25 @@ pub enum Kind {
     Enumeration(&'static Enumeration),
 }
 
+/// A place among the plant's continuous states, or among their derivatives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// This one.
+    Of(usize),
+    /// This one of the four coordinates of each slosh mode.
+    PerMode(usize),
+}
+
+impl Place {
+    /// The place of a family's member, 0 for the first.
+    pub const fn at(self, element: usize) -> usize {
+        match self {
+            Place::Of(place) => place,
+            Place::PerMode(coordinate) => STATES - 4 * MODES + 4 * element + coordinate,
+        }
+    }
+}
+
 /// Where a variable lives in the plant.
 #[derive(Clone, Copy, Debug)]
 #[allow(missing_docs)]
@@ -100,6 +119,10 @@ pub enum Access {
     },
     Calculated(fn(&Calculated) -> f64),
     CalculatedPerMode(fn(&Calculated) -> &[f64; MODES]),
+    /// A continuous state that is not among the outputs.
+    State,
+    /// The derivative of a continuous state.
+    Rate(Place),
 }
 
 /// A variable, or a family of variables with one number per slosh mode.
@@ -115,10 +138,17 @@ pub struct Variable {
     pub kind: Kind,
     /// Where it lives.
     pub access: Access,
-    /// The inputs it follows without delay.
+    /// Its place, if it is a continuous state.
+    pub state: Option<Place>,
+    /// Whether an event can make this state jump.
+    pub reinit: bool,
+    /// Whether this parameter can be set while the simulation runs.
+    pub tunable: bool,
+    /// The inputs and continuous states it follows without delay: a name as it is, the
+    /// name of a family for all members, or with "[]" for the member of the same mode.
     pub depends_on: &'static [&'static str],
-    /// The parameters that its value at the start follows from; a name that ends
-    /// with a dot stands for all parameters that begin like that.
+    /// The parameters and inputs that its value at the start follows from besides; a
+    /// name that ends with a dot stands for all parameters that begin like that.
     pub starts_from: &'static [&'static str],
 }
 
@@ -129,7 +159,18 @@ const fn variable(
     access: Access,
     description: &'static str,
 ) -> Variable {
-    Variable { name, description, causality, kind, access, depends_on: &[], starts_from: &[] }
+    Variable {
+        name,
+        description,
+        causality,
+        kind,
+        access,
+        state: None,
+        reinit: false,
+        tunable: false,
+        depends_on: &[],
+        starts_from: &[],
+    }
 }
 
 const fn quantity(unit: &'static str) -> Kind {
@@ -161,6 +202,26 @@ pub(crate) const fn local(
     description: &'static str,
 ) -> Variable {
     variable(name, Causality::Local, quantity(unit), Access::ShownReal(get), description)
+}
+
+/// One of the four coordinates of each slosh mode.
+pub(crate) const fn coordinate(
+    name: &'static str,
+    coordinate: usize,
+    description: &'static str,
+) -> Variable {
+    let variable = variable(name, Causality::Local, quantity(""), Access::State, description);
+    Variable { state: Some(Place::PerMode(coordinate)), ..variable }
+}
+
+/// The derivative of a continuous state; its name is "der(" the state's name ")".
+pub(crate) const fn rate(
+    name: &'static str,
+    of: Place,
+    unit: &'static str,
+    description: &'static str,
+) -> Variable {
+    variable(name, Causality::Local, quantity(unit), Access::Rate(of), description)
 }
 
 pub(crate) const fn local_flag(
@@ -293,13 +354,31 @@ impl Variable {
         self
     }
 
-    /// It follows these inputs without delay.
+    /// It is the plant's continuous state at this place.
+    pub(crate) const fn state(mut self, place: usize) -> Variable {
+        self.state = Some(Place::Of(place));
+        self
+    }
+
+    /// An event can make this state jump.
+    pub(crate) const fn reinit(mut self) -> Variable {
+        self.reinit = true;
+        self
+    }
+
+    /// It can be set while the simulation runs.
+    pub(crate) const fn tunable(mut self) -> Variable {
+        self.tunable = true;
+        self
+    }
+
+    /// It follows these inputs and states without delay.
     pub(crate) const fn follows(mut self, inputs: &'static [&'static str]) -> Variable {
         self.depends_on = inputs;
         self
     }
 
-    /// Its first value follows from these parameters.
+    /// Its first value follows from these parameters and inputs besides.
     pub(crate) const fn from(mut self, parameters: &'static [&'static str]) -> Variable {
         self.starts_from = parameters;
         self
@@ -308,7 +387,8 @@ impl Variable {
     /// How many scalars it is.
     pub const fn len(&self) -> usize {
         match self.access {
-            Access::CalculatedPerMode(_) => MODES,
+            Access::CalculatedPerMode(_) | Access::Rate(Place::PerMode(_)) => MODES,
+            Access::State => MODES,
             _ => 1,
         }
     }
@@ -375,6 +455,14 @@ impl Variable {
         match self.kind {
             Kind::Real(quantity) => quantity.min,
             _ => None,
+        }
+    }
+
+    /// The order of magnitude of a quantity; 1 if nothing else is said.
+    pub const fn nominal(&self) -> f64 {
+        match self.kind {
+            Kind::Real(Quantity { nominal: Some(nominal), .. }) => nominal,
+            _ => 1.0,
         }
     }
 
@@ -446,7 +534,9 @@ impl Variable {
 
     fn with_unit(&self, x: f64) -> String {
         match self.kind {
-            Kind::Real(Quantity { unit, .. }) if unit != "1" => format!("{x:?} {unit}"),
+            Kind::Real(Quantity { unit, .. }) if !["", "1"].contains(&unit) => {
+                format!("{x:?} {unit}")
+            }
             _ => format!("{x:?}"),
         }
     }

@@ -1,6 +1,6 @@
-//! The FMI 2.0 co-simulation C ABI, seen from the host: opens a packed `.fmu`,
-//! loads its binary and turns the 34 C functions into safe calls whose errors
-//! carry the FMU's own words.
+//! The FMI 2.0 C ABI, seen from the host: opens a packed `.fmu`, loads its binary
+//! and turns the 34 C functions of co-simulation into safe calls whose errors carry
+//! the FMU's own words; those of model exchange too, where the FMU has them.
 //!
 //! The only unsafe code of the harness is in this file.
 #![allow(unsafe_code)]
@@ -139,27 +139,29 @@ type Refs = *const u32;
 type Call = unsafe extern "C" fn(Component) -> c_int;
 type Get<T> = unsafe extern "C" fn(Component, Refs, usize, *mut T) -> c_int;
 type Set<T> = unsafe extern "C" fn(Component, Refs, usize, *const T) -> c_int;
+type GetVector = unsafe extern "C" fn(Component, *mut Real, usize) -> c_int;
 type GetStatus<T> = unsafe extern "C" fn(Component, c_int, *mut T) -> c_int;
 
-/// Declares the table of C functions once: field, symbol, type.
+/// Declares a table of C functions once: field, symbol, type.
 macro_rules! functions {
-    ($($field:ident $symbol:literal $type:ty;)*) => {
-        struct Functions { $($field: $type,)* }
+    ($table:ident: $($field:ident $symbol:literal $type:ty;)*) => {
+        struct $table { $($field: $type,)* }
 
-        impl Functions {
-            /// Names of all functions a co-simulation FMU must export.
+        impl $table {
+            /// Names of all the functions.
             const SYMBOLS: &[&str] = &[$($symbol),*];
 
             /// # Safety
             /// The library must be an FMI 2.0 binary: the types are taken on trust.
             unsafe fn load(library: &Library) -> Result<Self, libloading::Error> {
-                Ok(Functions { $($field: *unsafe { library.get::<$type>($symbol)? },)* })
+                Ok($table { $($field: *unsafe { library.get::<$type>($symbol)? },)* })
             }
         }
     };
 }
 
-functions! {
+// What a co-simulation FMU must export.
+functions! { Functions:
     get_types_platform "fmi2GetTypesPlatform" unsafe extern "C" fn() -> *const c_char;
     get_version "fmi2GetVersion" unsafe extern "C" fn() -> *const c_char;
     set_debug_logging "fmi2SetDebugLogging" unsafe extern "C" fn(Component, c_int, usize, *const *const c_char) -> c_int;
@@ -196,12 +198,41 @@ functions! {
     get_string_status "fmi2GetStringStatus" GetStatus<*const c_char>;
 }
 
+// What a model exchange FMU must export besides (and fmi2SetRealInputDerivatives to
+// fmi2GetStringStatus, above, not).
+functions! { ExchangeFunctions:
+    enter_event_mode "fmi2EnterEventMode" Call;
+    new_discrete_states "fmi2NewDiscreteStates" unsafe extern "C" fn(Component, *mut EventInfo) -> c_int;
+    enter_continuous_time_mode "fmi2EnterContinuousTimeMode" Call;
+    completed_integrator_step "fmi2CompletedIntegratorStep" unsafe extern "C" fn(Component, c_int, *mut c_int, *mut c_int) -> c_int;
+    set_time "fmi2SetTime" unsafe extern "C" fn(Component, Real) -> c_int;
+    set_continuous_states "fmi2SetContinuousStates" unsafe extern "C" fn(Component, *const Real, usize) -> c_int;
+    get_derivatives "fmi2GetDerivatives" GetVector;
+    get_event_indicators "fmi2GetEventIndicators" GetVector;
+    get_continuous_states "fmi2GetContinuousStates" GetVector;
+    get_nominals "fmi2GetNominalsOfContinuousStates" GetVector;
+}
+
+/// `fmi2EventInfo`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[allow(missing_docs)]
+pub struct EventInfo {
+    pub new_discrete_states_needed: c_int,
+    pub terminate_simulation: c_int,
+    pub nominals_changed: c_int,
+    pub values_changed: c_int,
+    pub next_event_time_defined: c_int,
+    pub next_event_time: f64,
+}
+
 // ---------------------------------------------------------------- the FMU
 
 /// An opened FMU: unpacked to a temporary directory, its binary loaded.
 pub struct Fmu {
     description: ModelDescription,
     functions: Functions,
+    exchange: Option<ExchangeFunctions>,
     resources: String,
     hash: String,
     path: PathBuf,
@@ -268,8 +299,10 @@ impl Fmu {
         // SAFETY: the binary says it follows FMI 2.0, whose types are declared above.
         let functions = unsafe { Functions::load(&library) }
             .with_context(|| format!("{binary} in {name} cannot be used"))?;
+        // SAFETY: as above; an FMU without model exchange lacks them, and nothing is wrong.
+        let exchange = unsafe { ExchangeFunctions::load(&library) }.ok();
         let resources = format!("file://{}/resources", directory.path().display());
-        Ok(Fmu { description, functions, resources, hash, path, _library: library, _directory: directory })
+        Ok(Fmu { description, functions, exchange, resources, hash, path, _library: library, _directory: directory })
     }
 
     /// What the FMU says of itself.
@@ -290,6 +323,12 @@ impl Fmu {
     /// Names of the C functions every co-simulation FMU must export.
     pub fn symbols() -> &'static [&'static str] {
         Functions::SYMBOLS
+    }
+
+    /// Names of the C functions every model exchange FMU must export besides, nine of those
+    /// above being of co-simulation alone.
+    pub fn exchange_symbols() -> &'static [&'static str] {
+        ExchangeFunctions::SYMBOLS
     }
 
     /// What fmi2GetVersion says.
@@ -315,7 +354,7 @@ impl Fmu {
     pub fn instantiation<'a>(&'a self, name: &'a str) -> Instantiation<'a> {
         Instantiation {
             name: Some(name),
-            co_simulation: true,
+            kind: CO_SIMULATION,
             guid: Some(&self.description.guid),
             resources: Some(&self.resources),
             callbacks: Callbacks::Full,
@@ -343,7 +382,7 @@ impl Fmu {
         let component = unsafe {
             (self.functions.instantiate)(
                 pointer(&name),
-                with.co_simulation.into(),
+                with.kind,
                 pointer(&guid),
                 pointer(&resources),
                 if with.callbacks == Callbacks::Null { null() } else { callbacks },
@@ -417,17 +456,43 @@ impl Fmu {
                 ("fmi2GetStringStatus", (f.get_string_status)(c, 1, &mut t)),
             ]
         };
+        let mut answers = answers.to_vec();
+        if let Some(f) = &self.exchange {
+            // SAFETY: as above.
+            answers.extend(unsafe {
+                [
+                    ("fmi2EnterEventMode", (f.enter_event_mode)(c)),
+                    ("fmi2NewDiscreteStates", (f.new_discrete_states)(c, null_mut())),
+                    ("fmi2EnterContinuousTimeMode", (f.enter_continuous_time_mode)(c)),
+                    (
+                        "fmi2CompletedIntegratorStep",
+                        (f.completed_integrator_step)(c, 0, null_mut(), null_mut()),
+                    ),
+                    ("fmi2SetTime", (f.set_time)(c, 0.0)),
+                    ("fmi2SetContinuousStates", (f.set_continuous_states)(c, null(), 0)),
+                    ("fmi2GetDerivatives", (f.get_derivatives)(c, null_mut(), 0)),
+                    ("fmi2GetEventIndicators", (f.get_event_indicators)(c, null_mut(), 0)),
+                    ("fmi2GetContinuousStates", (f.get_continuous_states)(c, null_mut(), 0)),
+                    ("fmi2GetNominalsOfContinuousStates", (f.get_nominals)(c, null_mut(), 0)),
+                ]
+            });
+        }
         answers.into_iter().map(|(call, status)| (call, status.into())).collect()
     }
 }
+
+/// fmi2Type of an instance that the host integrates.
+pub const MODEL_EXCHANGE: i32 = 0;
+/// fmi2Type of an instance that integrates itself.
+pub const CO_SIMULATION: i32 = 1;
 
 /// Arguments of fmi2Instantiate; `None` becomes a NULL pointer.
 #[derive(Clone, Debug)]
 pub struct Instantiation<'a> {
     /// Instance name.
     pub name: Option<&'a str>,
-    /// Co-simulation (true) or model exchange (false).
-    pub co_simulation: bool,
+    /// fmi2Type: [`CO_SIMULATION`] or [`MODEL_EXCHANGE`].
+    pub kind: i32,
     /// GUID the host expects.
     pub guid: Option<&'a str>,
     /// URI of the unpacked resources folder.
@@ -992,6 +1057,102 @@ impl<'fmu> Instance<'fmu> {
         }
         // SAFETY: the FMU answered OK, so it points to a terminated string of the FMU.
         Ok(unsafe { CStr::from_ptr(value) }.to_string_lossy().into_owned())
+    }
+
+    // ------------------------------------------------ model exchange
+
+    fn exchange(&self) -> &'fmu ExchangeFunctions {
+        let functions = self.fmu.exchange.as_ref();
+        functions.expect("the FMU exports the functions of model exchange")
+    }
+
+    /// fmi2EnterEventMode. As all calls of this section it panics when the FMU does not have it.
+    pub fn enter_event_mode(&mut self) -> Called {
+        // SAFETY: plain call on a live instance; so in enter_continuous_time_mode.
+        let status = unsafe { (self.exchange().enter_event_mode)(self.component) };
+        self.check("fmi2EnterEventMode", status)
+    }
+
+    /// fmi2EnterContinuousTimeMode.
+    pub fn enter_continuous_time_mode(&mut self) -> Called {
+        // SAFETY: see enter_event_mode.
+        let status = unsafe { (self.exchange().enter_continuous_time_mode)(self.component) };
+        self.check("fmi2EnterContinuousTimeMode", status)
+    }
+
+    /// fmi2NewDiscreteStates.
+    pub fn new_discrete_states(&mut self) -> Called<EventInfo> {
+        let mut info = EventInfo::default();
+        // SAFETY: a place for the answer.
+        let status = unsafe { (self.exchange().new_discrete_states)(self.component, &mut info) };
+        self.check("fmi2NewDiscreteStates", status).map(|()| info)
+    }
+
+    /// fmi2CompletedIntegratorStep: enterEventMode, terminateSimulation.
+    pub fn completed_integrator_step(&mut self) -> Called<(bool, bool)> {
+        let (mut enter, mut terminate) = (0, 0);
+        // SAFETY: places for the answers.
+        let status = unsafe {
+            (self.exchange().completed_integrator_step)(
+                self.component,
+                1,
+                &mut enter,
+                &mut terminate,
+            )
+        };
+        self.check("fmi2CompletedIntegratorStep", status)
+            .map(|()| (enter != 0, terminate != 0))
+    }
+
+    /// fmi2SetTime, s.
+    pub fn set_time(&mut self, time: f64) -> Called {
+        // SAFETY: plain value on a live instance.
+        let status = unsafe { (self.exchange().set_time)(self.component, time) };
+        self.check("fmi2SetTime", status)
+    }
+
+    /// fmi2SetContinuousStates.
+    pub fn set_continuous_states(&mut self, x: &[f64]) -> Called {
+        // SAFETY: a slice of the length given; so in the next four.
+        let status = unsafe {
+            (self.exchange().set_continuous_states)(self.component, x.as_ptr(), x.len())
+        };
+        self.check("fmi2SetContinuousStates", status)
+    }
+
+    /// fmi2GetContinuousStates.
+    pub fn continuous_states(&mut self, x: &mut [f64]) -> Called {
+        // SAFETY: see set_continuous_states.
+        let status = unsafe {
+            (self.exchange().get_continuous_states)(self.component, x.as_mut_ptr(), x.len())
+        };
+        self.check("fmi2GetContinuousStates", status)
+    }
+
+    /// fmi2GetDerivatives.
+    pub fn derivatives(&mut self, dx: &mut [f64]) -> Called {
+        // SAFETY: see set_continuous_states.
+        let status = unsafe {
+            (self.exchange().get_derivatives)(self.component, dx.as_mut_ptr(), dx.len())
+        };
+        self.check("fmi2GetDerivatives", status)
+    }
+
+    /// fmi2GetEventIndicators.
+    pub fn event_indicators(&mut self, z: &mut [f64]) -> Called {
+        // SAFETY: see set_continuous_states.
+        let status = unsafe {
+            (self.exchange().get_event_indicators)(self.component, z.as_mut_ptr(), z.len())
+        };
+        self.check("fmi2GetEventIndicators", status)
+    }
+
+    /// fmi2GetNominalsOfContinuousStates.
+    pub fn nominals(&mut self, x: &mut [f64]) -> Called {
+        // SAFETY: see set_continuous_states.
+        let status =
+            unsafe { (self.exchange().get_nominals)(self.component, x.as_mut_ptr(), x.len()) };
+        self.check("fmi2GetNominalsOfContinuousStates", status)
     }
 
     // ------------------------------------------------ for tests of bad calls

@@ -9,7 +9,7 @@ pub mod schema;
 use HubSlosh::instance::DEFAULT_TOLERANCE;
 use HubSlosh::log::CATEGORIES;
 use HubSlosh::table::{self, ENUMERATIONS, MODEL, SCALARS, Scalar, UNITS, VERSION};
-use HubSlosh::variable::{Causality, Kind, Value, Variable};
+use HubSlosh::variable::{Access, Causality, Kind, Value};
 
 /// Where the committed XML is.
 pub const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/modelDescription.xml");
@@ -44,19 +44,29 @@ fn description() -> schema::ModelDescription {
         generation_tool: format!("{MODEL} {VERSION}"),
         generation_date_and_time: RELEASED,
         variable_naming_convention: "structured",
-        number_of_event_indicators: 0,
+        number_of_event_indicators: plant::INDICATORS,
+        model_exchange: schema::ModelExchange {
+            model_identifier: MODEL,
+            needs_execution_tool: false,
+            completed_integrator_step_not_needed: false,
+            can_be_instantiated_only_once_per_process: false,
+            can_not_use_memory_management_functions: true,
+            can_get_and_set_fmu_state: true,
+            can_serialize_fmu_state: true,
+            provides_directional_derivative: true,
+        },
         co_simulation: schema::CoSimulation {
             model_identifier: MODEL,
             needs_execution_tool: false,
             can_handle_variable_communication_step_size: true,
             can_interpolate_inputs: true,
-            max_output_derivative_order: 0,
+            max_output_derivative_order: 1,
             can_run_asynchronuously: false,
             can_be_instantiated_only_once_per_process: false,
             can_not_use_memory_management_functions: true,
             can_get_and_set_fmu_state: true,
             can_serialize_fmu_state: true,
-            provides_directional_derivative: false,
+            provides_directional_derivative: true,
         },
         units: schema::Units { all: UNITS.iter().map(unit).collect() },
         types: schema::Types { all: ENUMERATIONS.into_iter().map(simple_type).collect() },
@@ -73,16 +83,18 @@ fn description() -> schema::ModelDescription {
             step_size: real(STEP_SIZE),
         },
         variables: schema::Variables {
-            all: SCALARS.iter().enumerate().map(|(n, scalar)| variable(n, scalar)).collect(),
+            all: SCALARS.iter().map(variable).collect(),
         },
         structure: schema::Structure {
-            outputs: unknowns(&[Causality::Output], |v| indices(v.depends_on)),
-            initial_unknowns: unknowns(&[Causality::Output, Causality::CalculatedParameter], |v| {
-                let mut all = indices(v.depends_on);
-                all.extend(indices(v.starts_from));
-                all.sort_unstable();
-                all
-            }),
+            outputs: unknowns(is_output, |s| s.follows().collect()),
+            derivatives: unknowns(is_rate, |s| s.follows().collect()),
+            initial_unknowns: unknowns(
+                |s| {
+                    let calculated = s.variable.causality == Causality::CalculatedParameter;
+                    is_output(s) || calculated || s.variable.state.is_some() || is_rate(s)
+                },
+                |s| s.starts_from().collect(),
+            ),
         },
     }
 }
@@ -122,7 +134,7 @@ fn simple_type(of: &HubSlosh::variable::Enumeration) -> schema::SimpleType {
     }
 }
 
-fn variable(reference: usize, scalar: &Scalar) -> schema::ScalarVariable {
+fn variable(scalar: &Scalar) -> schema::ScalarVariable {
     let v = scalar.variable;
     let (causality, initial) = match v.causality {
         Causality::Input => ("input", None),
@@ -132,6 +144,7 @@ fn variable(reference: usize, scalar: &Scalar) -> schema::ScalarVariable {
         Causality::CalculatedParameter => ("calculatedParameter", Some("calculated")),
     };
     let variability = match (v.causality, v.kind) {
+        (Causality::Parameter, _) if v.tunable => "tunable",
         (Causality::Parameter | Causality::CalculatedParameter, _) => "fixed",
         (_, Kind::Real(_)) => "continuous",
         _ => "discrete",
@@ -143,12 +156,17 @@ fn variable(reference: usize, scalar: &Scalar) -> schema::ScalarVariable {
     });
     let kind = match v.kind {
         Kind::Real(q) => schema::Kind::Real {
-            unit: q.unit,
+            unit: Some(q.unit).filter(|unit| !unit.is_empty()),
             display_unit: q.display_unit,
             min: q.min.map(real),
             max: q.max.map(real),
             nominal: q.nominal.map(real),
             start,
+            derivative: match v.access {
+                Access::Rate(place) => table::state_at(place.at(scalar.element)).map(index),
+                _ => None,
+            },
+            reinit: v.reinit.then_some(true),
         },
         Kind::Integer { min, max } => schema::Kind::Integer { min, max, start },
         Kind::Boolean => schema::Kind::Boolean { start },
@@ -156,7 +174,7 @@ fn variable(reference: usize, scalar: &Scalar) -> schema::ScalarVariable {
     };
     schema::ScalarVariable {
         name: scalar.name(),
-        value_reference: reference,
+        value_reference: scalar.reference,
         description: v.description,
         causality,
         variability,
@@ -170,32 +188,32 @@ fn real(x: f64) -> String {
     format!("{x:?}")
 }
 
-/// Scalars of these causalities in the order of their indices, with what they
-/// depend on.
+fn is_output(scalar: &Scalar) -> bool {
+    scalar.variable.causality == Causality::Output
+}
+
+fn is_rate(scalar: &Scalar) -> bool {
+    matches!(scalar.variable.access, Access::Rate(_))
+}
+
+/// Place among the variables, counted from 1.
+fn index(scalar: &Scalar) -> usize {
+    scalar.reference as usize + 1
+}
+
+/// Some of the scalars in the order of their indices, with what they depend on.
 fn unknowns(
-    causalities: &[Causality],
-    dependencies: impl Fn(&Variable) -> Vec<usize>,
+    of_interest: impl Fn(&Scalar) -> bool,
+    dependencies: impl Fn(&Scalar) -> Vec<&'static Scalar>,
 ) -> schema::Unknowns {
-    let of_interest =
-        SCALARS.iter().zip(1..).filter(|(s, _)| causalities.contains(&s.variable.causality));
-    let all = of_interest.map(|(scalar, index)| {
-        let dependencies = dependencies(scalar.variable);
-        let text: Vec<_> = dependencies.iter().map(usize::to_string).collect();
+    let all = SCALARS.iter().filter(|scalar| of_interest(scalar)).map(|scalar| {
+        let text: Vec<_> =
+            dependencies(scalar).into_iter().map(|known| index(known).to_string()).collect();
         schema::Unknown {
-            index,
+            index: index(scalar),
             dependencies: text.join(" "),
             dependencies_kind: vec!["dependent"; text.len()].join(" "),
         }
     });
     schema::Unknowns { all: all.collect() }
-}
-
-/// The indices of inputs and parameters by name, or by the part of it before and
-/// with a dot.
-fn indices(names: &[&str]) -> Vec<usize> {
-    let meant = |v: &Variable| {
-        matches!(v.causality, Causality::Input | Causality::Parameter)
-            && names.iter().any(|n| *n == v.name || (n.ends_with('.') && v.name.starts_with(n)))
-    };
-    SCALARS.iter().zip(1..).filter(|(s, _)| meant(s.variable)).map(|(_, index)| index).collect()
 }

@@ -31,7 +31,9 @@ pub struct ModelDescription {
     #[serde(rename = "@variableNamingConvention")]
     pub variable_naming_convention: &'static str,
     #[serde(rename = "@numberOfEventIndicators")]
-    pub number_of_event_indicators: u32,
+    pub number_of_event_indicators: usize,
+    #[serde(rename = "ModelExchange")]
+    pub model_exchange: ModelExchange,
     #[serde(rename = "CoSimulation")]
     pub co_simulation: CoSimulation,
     #[serde(rename = "UnitDefinitions")]
@@ -48,7 +50,29 @@ pub struct ModelDescription {
     pub structure: Structure,
 }
 
-/// `<CoSimulation>`: what the FMU can do.
+/// `<ModelExchange>`: what the FMU can do when the host integrates.
+#[derive(Debug, Serialize)]
+#[allow(missing_docs)]
+pub struct ModelExchange {
+    #[serde(rename = "@modelIdentifier")]
+    pub model_identifier: &'static str,
+    #[serde(rename = "@needsExecutionTool")]
+    pub needs_execution_tool: bool,
+    #[serde(rename = "@completedIntegratorStepNotNeeded")]
+    pub completed_integrator_step_not_needed: bool,
+    #[serde(rename = "@canBeInstantiatedOnlyOncePerProcess")]
+    pub can_be_instantiated_only_once_per_process: bool,
+    #[serde(rename = "@canNotUseMemoryManagementFunctions")]
+    pub can_not_use_memory_management_functions: bool,
+    #[serde(rename = "@canGetAndSetFMUstate")]
+    pub can_get_and_set_fmu_state: bool,
+    #[serde(rename = "@canSerializeFMUstate")]
+    pub can_serialize_fmu_state: bool,
+    #[serde(rename = "@providesDirectionalDerivative")]
+    pub provides_directional_derivative: bool,
+}
+
+/// `<CoSimulation>`: what the FMU can do when it integrates itself.
 #[derive(Debug, Serialize)]
 #[allow(missing_docs)]
 pub struct CoSimulation {
@@ -207,7 +231,7 @@ pub struct ScalarVariable {
     #[serde(rename = "@name")]
     pub name: String,
     #[serde(rename = "@valueReference")]
-    pub value_reference: usize,
+    pub value_reference: u32,
     #[serde(rename = "@description")]
     pub description: &'static str,
     #[serde(rename = "@causality")]
@@ -226,7 +250,7 @@ pub struct ScalarVariable {
 pub enum Kind {
     Real {
         #[serde(rename = "@unit")]
-        unit: &'static str,
+        unit: Option<&'static str>,
         #[serde(rename = "@displayUnit")]
         display_unit: Option<&'static str>,
         #[serde(rename = "@min")]
@@ -237,6 +261,10 @@ pub enum Kind {
         nominal: Option<String>,
         #[serde(rename = "@start")]
         start: Option<String>,
+        #[serde(rename = "@derivative")]
+        derivative: Option<usize>,
+        #[serde(rename = "@reinit")]
+        reinit: Option<bool>,
     },
     Integer {
         #[serde(rename = "@min")]
@@ -264,6 +292,8 @@ pub enum Kind {
 pub struct Structure {
     #[serde(rename = "Outputs")]
     pub outputs: Unknowns,
+    #[serde(rename = "Derivatives")]
+    pub derivatives: Unknowns,
     #[serde(rename = "InitialUnknowns")]
     pub initial_unknowns: Unknowns,
 }

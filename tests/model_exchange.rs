@@ -1,0 +1,426 @@
+//! Model Exchange: a host that integrates the packed FMU's equations itself meets what
+//! the FMU does in Co-Simulation.
+
+use std::collections::BTreeMap;
+
+use hubslosh::fmi2::{EventInfo, Fmu, Instance, MODEL_EXCHANGE, Status};
+use hubslosh::pack::packed_for_tests;
+
+fn open() -> Fmu {
+    Fmu::open(packed_for_tests()).unwrap()
+}
+
+const STATES: usize = 46;
+const INDICATORS: usize = 8;
+
+/// What changes the inputs or parameters and when, s.
+type Changes<'a> = &'a [(f64, &'a str, &'a str)];
+
+fn set_up<'fmu>(fmu: &'fmu Fmu, kind: i32, settings: &[(&str, &str)]) -> Instance<'fmu> {
+    let mut with = fmu.instantiation("one");
+    with.kind = kind;
+    let mut instance = fmu.instantiate_with(&with).unwrap();
+    for (name, value) in settings {
+        instance.set(name, value).unwrap();
+    }
+    instance.setup_experiment(Some(1e-12), 0.0, None).unwrap();
+    instance.enter_initialization_mode().unwrap();
+    instance.exit_initialization_mode().unwrap();
+    instance
+}
+
+/// A host with a fixed step, Runge-Kutta of order 4, and bisection for events.
+struct Host<'fmu> {
+    instance: Instance<'fmu>,
+    time: f64,
+    x: [f64; STATES],
+    /// State events, time events and step events that have been handled.
+    events: [usize; 3],
+    next: EventInfo,
+}
+
+impl<'fmu> Host<'fmu> {
+    fn new(fmu: &'fmu Fmu, settings: &[(&str, &str)]) -> Self {
+        let instance = set_up(fmu, MODEL_EXCHANGE, settings);
+        let mut host =
+            Host { instance, time: 0.0, x: [0.0; STATES], events: [0; 3], next: EventInfo::default() };
+        host.event_iteration();
+        host
+    }
+
+    fn event_iteration(&mut self) {
+        loop {
+            self.next = self.instance.new_discrete_states().unwrap();
+            assert_eq!(self.next.terminate_simulation, 0);
+            if self.next.new_discrete_states_needed == 0 {
+                break;
+            }
+        }
+        self.instance.enter_continuous_time_mode().unwrap();
+        self.instance.continuous_states(&mut self.x).unwrap();
+    }
+
+    fn rates(&mut self, time: f64, x: &[f64; STATES]) -> [f64; STATES] {
+        let mut rates = [0.0; STATES];
+        self.instance.set_time(time).unwrap();
+        self.instance.set_continuous_states(x).unwrap();
+        self.instance.derivatives(&mut rates).unwrap();
+        rates
+    }
+
+    fn indicators(&mut self, time: f64, x: &[f64; STATES]) -> [f64; INDICATORS] {
+        let mut indicators = [0.0; INDICATORS];
+        self.instance.set_time(time).unwrap();
+        self.instance.set_continuous_states(x).unwrap();
+        self.instance.event_indicators(&mut indicators).unwrap();
+        indicators
+    }
+
+    /// The states after a step of `h`.
+    fn step(&mut self, h: f64) -> [f64; STATES] {
+        let (t, x) = (self.time, self.x);
+        let moved = |rate: &[f64; STATES], h: f64| std::array::from_fn(|i| x[i] + h * rate[i]);
+        let k1 = self.rates(t, &x);
+        let k2 = self.rates(t + h / 2.0, &moved(&k1, h / 2.0));
+        let k3 = self.rates(t + h / 2.0, &moved(&k2, h / 2.0));
+        let k4 = self.rates(t + h, &moved(&k3, h));
+        std::array::from_fn(|i| x[i] + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]))
+    }
+
+    /// Integrates to `end` in steps of at most `h`.
+    fn run(&mut self, end: f64, h: f64) {
+        while self.time < end - 1e-12 {
+            let due = match self.next.next_event_time_defined {
+                0 => f64::INFINITY,
+                _ => self.next.next_event_time,
+            };
+            let is_due = due <= (self.time + h).min(end);
+            let goal = if is_due { due } else { (self.time + h).min(end) };
+            let before = self.indicators(self.time, &self.x.clone());
+            // A sign change that begins at zero is one that has just been handled.
+            let crosses = |z: &[f64; INDICATORS]| {
+                before.iter().zip(z).any(|(before, z)| before * z < 0.0)
+            };
+            let mut length = goal - self.time;
+            let mut x = self.step(length);
+            let crossed = crosses(&self.indicators(goal, &x));
+            if crossed {
+                let (mut low, mut high) = (0.0, length);
+                for _ in 0..60 {
+                    let middle = (low + high) / 2.0;
+                    let there = self.step(middle);
+                    let z = self.indicators(self.time + middle, &there);
+                    if crosses(&z) { high = middle } else { low = middle }
+                }
+                length = high;
+                x = self.step(length);
+            }
+            self.time = if crossed { self.time + length } else { goal };
+            self.x = x;
+            self.instance.set_time(self.time).unwrap();
+            self.instance.set_continuous_states(&x).unwrap();
+            let (step_event, terminate) = self.instance.completed_integrator_step().unwrap();
+            assert!(!terminate);
+            if crossed || is_due || step_event {
+                let kind = if crossed { 0 } else if is_due { 1 } else { 2 };
+                self.events[kind] += 1;
+                self.instance.enter_event_mode().unwrap();
+                self.event_iteration();
+            }
+        }
+    }
+}
+
+/// Every real output and some locals.
+fn values(instance: &mut Instance) -> BTreeMap<String, f64> {
+    let variables = &instance.fmu().description().variables.list;
+    let outputs = variables.iter().filter(|v| v.causality == "output").map(|v| v.name.as_str());
+    let locals = ["energy", "momentum", "work", "heat", "stuck_time", "wheel_speed"];
+    let names: Vec<&str> = outputs.chain(locals).collect();
+    names.into_iter().map(|name| (name.to_string(), instance.real(name).unwrap())).collect()
+}
+
+/// Runs both to `end` and returns the host, for its counts, after comparing everything
+/// once a second.
+fn compare(
+    settings: &[(&str, &str)],
+    changes: Changes,
+    (end, h, allowed): (f64, f64, f64),
+) -> ([usize; 3], i32) {
+    let fmu = open();
+    let mut own = set_up(&fmu, hubslosh::fmi2::CO_SIMULATION, settings);
+    let mut host = Host::new(&fmu, settings);
+    let mut stops: Vec<f64> = (1..=end as usize).map(|n| n as f64).collect();
+    stops.extend(changes.iter().map(|change| change.0));
+    stops.sort_unstable_by(f64::total_cmp);
+    let mut time = 0.0;
+    for stop in stops {
+        if stop > time {
+            own.do_step(time, stop - time).unwrap();
+            host.run(stop, h);
+            time = stop;
+        }
+        for (_, name, value) in changes.iter().filter(|change| change.0 == time) {
+            own.set(name, value).unwrap();
+            host.instance.enter_event_mode().unwrap();
+            host.instance.set(name, value).unwrap();
+            host.event_iteration();
+        }
+        let (own, exchanged) = (values(&mut own), values(&mut host.instance));
+        for (name, expected) in own {
+            let got = exchanged[&name];
+            assert!(
+                (got - expected).abs() <= allowed * expected.abs().max(1.0),
+                "{name} at {time} s: {got} {expected} {settings:?}"
+            );
+        }
+    }
+    let count = own.get("event_count").unwrap();
+    assert_eq!(host.instance.get("event_count").unwrap(), count);
+    for name in ["stuck", "friction_mode"] {
+        assert_eq!(host.instance.get(name).unwrap(), own.get(name).unwrap(), "{name}");
+    }
+    let hubslosh::description::Value::Integer(count) = count else { panic!() };
+    (host.events, count)
+}
+
+/// At 15 rad/s order 4 with 0.5 ms is late by omega (omega h)^4/120 = 4e-10 rad a second,
+/// 1e-8 after 20 s; forces are some newtons, slosh rates some rad/s.
+#[test]
+fn a_host_that_integrates_meets_co_simulation_with_stick_and_slip() {
+    for model in ["frozen", "linear", "planar", "spherical", "paraboloid"] {
+        let settings = [
+            ("slosh.model", model),
+            ("init.omega", "0.08"),
+            ("init.slosh_angle", "0.3"),
+            ("init.slosh_angle_radial", "0.1"),
+            ("friction.asymmetry", "0.1"),
+            ("friction.forward_cos1", "0.2"),
+        ];
+        let changes = [(7.0, "tau_cmd", "0.03"), (8.5, "tau_cmd", "-0.02"), (12.0, "tau_cmd", "0")];
+        let (events, count) = compare(&settings, &changes, (20.0, 5e-4, 1e-7));
+        assert!(count >= 3, "{model}: {count} changes of contact, {events:?}");
+    }
+}
+
+/// Two modes; friction laws without stick.
+#[test]
+fn a_host_that_integrates_meets_co_simulation_with_every_friction() {
+    for friction in ["none", "viscous", "stribeck_smooth"] {
+        let settings = [
+            ("slosh.model", "spherical"),
+            ("slosh.modes", "2"),
+            ("friction.model", friction),
+            ("friction.eps", "0.01"),
+            ("init.slosh_angle", "0.2"),
+            ("init.slosh_rate_radial", "1"),
+            ("tau_cmd", "0.01"),
+        ];
+        compare(&settings, &[], (10.0, 2.5e-4, 1e-7));
+    }
+}
+
+/// The wheel saturates in torque and speed; the gyro's samples are time events. The
+/// noise is the same to the bit, the rate below it to 1e-7.
+#[test]
+fn wheel_and_gyro_are_events_of_model_exchange() {
+    let settings = [
+        ("wheel.enabled", "true"),
+        ("wheel.tau_max", "0.05"),
+        ("imu.enabled", "true"),
+        ("imu.rate", "7"),
+        ("init.slosh_angle", "0.2"),
+    ];
+    let changes = [
+        (1.0, "tau_cmd", "0.2"),
+        (6.0, "tau_cmd", "-0.04"),
+        (9.0, "tau_ext", "-0.03"),
+        (12.0, "tau_cmd", "0.01"),
+    ];
+    let (events, _) = compare(&settings, &changes, (15.0, 5e-4, 1e-7));
+    assert_eq!(events[1], 15 * 7);
+}
+
+/// Large waves leave the linear regime: a step event, seen at the end of a step.
+#[test]
+fn regime_changes_at_events_alone() {
+    let fmu = open();
+    let settings = [("slosh.model", "planar"), ("init.slosh_angle", "0.5"), ("tau_cmd", "0.02")];
+    let mut host = Host::new(&fmu, &settings);
+    let mut seen = Vec::new();
+    for n in 1..=200 {
+        host.run(f64::from(n) * 0.01, 1e-3);
+        let ratio = host.instance.real("wave_height").unwrap() / (0.163 / 2.0);
+        let regime = host.instance.get("regime").unwrap();
+        let expected = if ratio < 0.15 { 1 } else if ratio <= 0.25 { 2 } else { 3 };
+        assert_eq!(regime, hubslosh::description::Value::Integer(expected), "{n}");
+        seen.push(expected);
+    }
+    assert!(host.events[2] > 5 && seen.contains(&1) && seen.contains(&3), "{:?}", host.events);
+
+    // Between events it stays, whatever the states are.
+    let mut x = host.x;
+    let before = host.instance.get("regime").unwrap();
+    x[6..].fill(0.0);
+    let other = host.instance.real("wave_height").unwrap();
+    host.instance.set_continuous_states(&x).unwrap();
+    assert_ne!(host.instance.real("wave_height").unwrap(), other);
+    assert_eq!(host.instance.get("regime").unwrap(), before);
+}
+
+/// A host without root finding, Euler at 50 us: first order, and no better.
+#[test]
+fn euler_meets_co_simulation_to_first_order() {
+    let fmu = open();
+    let settings = [("init.omega", "0.08"), ("init.slosh_angle", "0.3")];
+    let mut own = set_up(&fmu, hubslosh::fmi2::CO_SIMULATION, &settings);
+    own.do_step(0.0, 5.0).unwrap();
+    let mut worst = Vec::new();
+    for h in [1e-4, 5e-5] {
+        let mut host = Host::new(&fmu, &settings);
+        let steps = (5.0 / h as f64).round() as usize;
+        let mut events = 0;
+        for n in 1..=steps {
+            let rates = host.rates(host.time, &host.x.clone());
+            host.x = std::array::from_fn(|i| host.x[i] + h * rates[i]);
+            host.time = n as f64 * h;
+            host.instance.set_time(host.time).unwrap();
+            host.instance.set_continuous_states(&host.x.clone()).unwrap();
+            // The FMU says when a change is overdue.
+            if host.instance.completed_integrator_step().unwrap().0 {
+                events += 1;
+                host.instance.enter_event_mode().unwrap();
+                host.event_iteration();
+            }
+        }
+        assert!(events > 0);
+        let got = host.instance.real("theta").unwrap();
+        worst.push((got - own.real("theta").unwrap()).abs());
+    }
+    // (omega_1 h)/2 of energy a radian: a per cent at 50 us after 5 s.
+    assert!(worst[1] < 1e-3 && worst[1] < 0.7 * worst[0], "{worst:?}");
+}
+
+#[test]
+fn calls_of_model_exchange_in_the_wrong_state_are_refused() {
+    let fmu = open();
+    let mut with = fmu.instantiation("one");
+    with.kind = MODEL_EXCHANGE;
+    let mut instance = fmu.instantiate_with(&with).unwrap();
+    let mut x = [0.0; STATES];
+    macro_rules! refused {
+        ($call:expr, $($part:expr),*) => {
+            let error = $call.unwrap_err();
+            assert_eq!(error.status, Status::Error, "{error}");
+            $(assert!(error.text().contains($part), "{} is not in {error}", $part);)*
+        };
+    }
+    refused!(instance.continuous_states(&mut x), "\"instantiated\"");
+    refused!(instance.new_discrete_states(), "\"instantiated\"", "event mode");
+    refused!(instance.do_step(0.0, 0.1), "Co-Simulation", "Model Exchange");
+    instance.nominals(&mut x).unwrap();
+    assert!(x.iter().all(|x| *x > 0.0));
+
+    instance.enter_initialization_mode().unwrap();
+    refused!(instance.set_time(0.0), "\"initialization mode\"", "event mode");
+    instance.continuous_states(&mut x).unwrap();
+    instance.exit_initialization_mode().unwrap();
+
+    refused!(instance.set_continuous_states(&x), "\"event mode\"", "continuous-time mode");
+    refused!(instance.enter_event_mode(), "\"event mode\"");
+    refused!(instance.status(0), "Co-Simulation");
+    instance.set("friction.c", "0.01").unwrap();
+    assert!(instance.set("tank.h", "0.05").is_err());
+    instance.enter_continuous_time_mode().unwrap();
+
+    refused!(instance.new_discrete_states(), "\"continuous-time mode\"");
+    refused!(instance.set_time(f64::NAN), "time = NaN s");
+    refused!(instance.derivatives(&mut [0.0; 3]), "nx = 3", "46");
+    refused!(instance.event_indicators(&mut [0.0; STATES]), "ni = 46", "8");
+    refused!(instance.set_continuous_states(&x[1..]), "nx = 45");
+    let before = x;
+    x[3] = f64::NAN;
+    let error = instance.set_continuous_states(&x).unwrap_err();
+    assert_eq!(error.status, Status::Discard);
+    assert!(error.text().contains("stuck_time") || error.text().contains("heat"), "{error}");
+    instance.continuous_states(&mut x).unwrap();
+    assert_eq!(x, before);
+    // Inputs may change, parameters not.
+    instance.set("tau_cmd", "0.1").unwrap();
+    let error = instance.set("friction.c", "0.02").unwrap_err();
+    assert!(format!("{error:#}").contains("event mode"), "{error:#}");
+
+    instance.terminate().unwrap();
+    instance.derivatives(&mut x).unwrap();
+    refused!(instance.enter_event_mode(), "\"terminated\"");
+    instance.reset().unwrap();
+    refused!(instance.enter_event_mode(), "\"instantiated\"");
+}
+
+#[test]
+fn a_step_past_the_stop_time_is_refused_and_a_trial_past_it_is_not() {
+    let fmu = open();
+    let mut with = fmu.instantiation("one");
+    with.kind = MODEL_EXCHANGE;
+    let mut instance = fmu.instantiate_with(&with).unwrap();
+    instance.setup_experiment(None, 0.0, Some(1.0)).unwrap();
+    instance.enter_initialization_mode().unwrap();
+    instance.exit_initialization_mode().unwrap();
+    instance.new_discrete_states().unwrap();
+    instance.enter_continuous_time_mode().unwrap();
+    instance.set_time(1.1).unwrap();
+    instance.derivatives(&mut [0.0; STATES]).unwrap();
+    assert!(instance.completed_integrator_step().unwrap_err().text().contains("stop time"));
+    instance.set_time(1.0 + 1e-12).unwrap();
+    instance.completed_integrator_step().unwrap();
+}
+
+#[test]
+fn states_out_of_the_models_range_end_the_run() {
+    let fmu = open();
+    let mut host = Host::new(&fmu, &[("slosh.model", "paraboloid")]);
+    let mut x = host.x;
+    // slosh.q_radial[1]; the length is 4.5 cm.
+    x[6] = 0.1;
+    host.instance.set_continuous_states(&x).unwrap();
+    let error = host.instance.completed_integrator_step().unwrap_err();
+    assert!(error.text().contains("slosh mode 1 left its range"), "{error}");
+    assert!(host.instance.enter_event_mode().is_err());
+    host.instance.terminate().unwrap();
+}
+
+/// Saved in continuous-time mode, restored into a new instance: the same bits on.
+#[test]
+fn a_saved_state_of_model_exchange_continues_bit_for_bit() {
+    let fmu = open();
+    let settings =
+        [("slosh.model", "spherical"), ("imu.enabled", "true"), ("init.slosh_angle", "0.3")];
+    let mut host = Host::new(&fmu, &settings);
+    host.run(1.0, 1e-3);
+    let saved = host.instance.get_state().unwrap();
+    let bytes = host.instance.serialize(&saved).unwrap();
+    let (time, x, next) = (host.time, host.x, host.next);
+    host.run(3.0, 1e-3);
+    let there = values(&mut host.instance);
+
+    let mut with = fmu.instantiation("two");
+    with.kind = MODEL_EXCHANGE;
+    let mut instance = fmu.instantiate_with(&with).unwrap();
+    let read = instance.deserialize(&bytes).unwrap();
+    instance.set_state(&read).unwrap();
+    instance.free_state(read).unwrap();
+    let mut other = Host { instance, time, x, events: [0; 3], next };
+    other.run(3.0, 1e-3);
+    assert_eq!(values(&mut other.instance), there);
+
+    host.instance.set_state(&saved).unwrap();
+    (host.time, host.x, host.next) = (time, x, next);
+    host.run(3.0, 1e-3);
+    assert_eq!(values(&mut host.instance), there);
+    host.instance.free_state(saved).unwrap();
+
+    let mut own = fmu.instantiate("three").unwrap();
+    let read = own.deserialize(&bytes).unwrap();
+    assert!(own.set_state(&read).unwrap_err().text().contains("Model Exchange"));
+    own.free_state(read).unwrap();
+}
