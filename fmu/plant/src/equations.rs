@@ -247,6 +247,16 @@ impl Plant {
             }
             self.find_contact(inputs);
         }
+        // A host's root finder may land on the very instant of the break-away, where the
+        // torque is still held; the next sign change would never come.
+        if self.state.contact == Contact::Stuck {
+            let indicators = self.event_indicators(inputs);
+            if indicators[1] <= 0.0 {
+                self.state.touch(Contact::Forward, time);
+            } else if indicators[2] <= 0.0 {
+                self.state.touch(Contact::Backward, time);
+            }
+        }
         // Hosts land on a time event exactly, or on it but for rounding.
         let slack = 1e-9 / self.imu.rate;
         while self.next_time_event().is_some_and(|due| due <= time + slack) {
@@ -470,6 +480,25 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    #[test]
+    fn torque_at_the_very_limit_breaks_the_hub_away_at_an_event() {
+        let mut p = Parameters::default();
+        p.slosh.model = SloshModel::Frozen;
+        let rest = Inputs::default();
+        for sign in [1.0, -1.0] {
+            let mut plant = Plant::new(&p, &rest, 0.0, 1e-9).unwrap();
+            let limit = sign * (p.friction.c + p.friction.d);
+            let inputs = Inputs { tau_cmd: Ramp::held(limit), ..rest };
+            let indicators = plant.event_indicators(&inputs);
+            assert!(indicators[1] == 0.0 || indicators[2] == 0.0);
+            plant.take_event(&inputs).unwrap();
+            assert_eq!(plant.last_contact().2, sign as i32);
+            // And again at the same instant.
+            plant.take_event(&inputs).unwrap();
+            assert_eq!(plant.last_contact(), (1, 0.0, sign as i32));
         }
     }
 
