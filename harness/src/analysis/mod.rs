@@ -10,7 +10,11 @@
 pub mod demodulation;
 pub mod features;
 pub mod linear;
+pub mod residual;
+pub mod rotary;
 pub mod spa;
+pub mod transfer_function;
+pub mod welch;
 
 pub use realfft::num_complex::Complex64;
 
