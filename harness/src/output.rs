@@ -48,7 +48,7 @@ mod tests {
             file.write_all(b"half")?;
             anyhow::bail!("no more")
         });
-        assert_eq!(failed.map(|()| ()).unwrap_err().to_string(), "no more");
+        assert_eq!(failed.unwrap_err().to_string(), "no more");
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
         assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 1);
     }
