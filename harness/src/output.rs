@@ -44,7 +44,7 @@ mod tests {
         let directory = tempfile::tempdir().unwrap();
         let path = directory.path().join("a.txt");
         std::fs::write(&path, "old").unwrap();
-        let failed = atomically(&path, |file| {
+        let failed: Result<()> = atomically(&path, |file| {
             file.write_all(b"half")?;
             anyhow::bail!("no more")
         });
