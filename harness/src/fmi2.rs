@@ -115,14 +115,8 @@ unsafe extern "C" {
     fn free(memory: *mut c_void);
 }
 
-type Logger = unsafe extern "C" fn(
-    *mut c_void,
-    *const c_char,
-    c_int,
-    *const c_char,
-    *const c_char,
-    ...
-);
+type Logger =
+    unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *const c_char, *const c_char, ...);
 
 /// `fmi2CallbackFunctions`.
 #[repr(C)]
@@ -252,11 +246,13 @@ impl Fmu {
         let hash = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
         let mut archive = zip::ZipArchive::new(std::io::Cursor::new(bytes))
             .with_context(|| format!("{name} is not an FMU: it is not a zip archive"))?;
-        let directory =
-            tempfile::Builder::new().prefix("hubslosh-").tempdir().context("no temporary directory")?;
-        archive
-            .extract(directory.path())
-            .with_context(|| format!("{name} cannot be unpacked to {}", directory.path().display()))?;
+        let directory = tempfile::Builder::new()
+            .prefix("hubslosh-")
+            .tempdir()
+            .context("no temporary directory")?;
+        archive.extract(directory.path()).with_context(|| {
+            format!("{name} cannot be unpacked to {}", directory.path().display())
+        })?;
 
         let xml = directory.path().join("modelDescription.xml");
         if !xml.exists() {
@@ -272,8 +268,11 @@ impl Fmu {
         let Some(co_simulation) = &description.co_simulation else {
             bail!("{name} offers no co-simulation; this host drives nothing else");
         };
-        let binary =
-            format!("binaries/{PLATFORM}/{}{}", co_simulation.model_identifier, std::env::consts::DLL_SUFFIX);
+        let binary = format!(
+            "binaries/{PLATFORM}/{}{}",
+            co_simulation.model_identifier,
+            std::env::consts::DLL_SUFFIX
+        );
         let binary_path = directory.path().join(&binary);
         if !binary_path.exists() {
             let there: Vec<_> = archive
@@ -302,7 +301,16 @@ impl Fmu {
         // SAFETY: as above; an FMU without model exchange lacks them, and nothing is wrong.
         let exchange = unsafe { ExchangeFunctions::load(&library) }.ok();
         let resources = format!("file://{}/resources", directory.path().display());
-        Ok(Fmu { description, functions, exchange, resources, hash, path, _library: library, _directory: directory })
+        Ok(Fmu {
+            description,
+            functions,
+            exchange,
+            resources,
+            hash,
+            path,
+            _library: library,
+            _directory: directory,
+        })
     }
 
     /// What the FMU says of itself.
@@ -1100,8 +1108,7 @@ impl<'fmu> Instance<'fmu> {
                 &mut terminate,
             )
         };
-        self.check("fmi2CompletedIntegratorStep", status)
-            .map(|()| (enter != 0, terminate != 0))
+        self.check("fmi2CompletedIntegratorStep", status).map(|()| (enter != 0, terminate != 0))
     }
 
     /// fmi2SetTime, s.
@@ -1114,9 +1121,8 @@ impl<'fmu> Instance<'fmu> {
     /// fmi2SetContinuousStates.
     pub fn set_continuous_states(&mut self, x: &[f64]) -> Called {
         // SAFETY: a slice of the length given; so in the next four.
-        let status = unsafe {
-            (self.exchange().set_continuous_states)(self.component, x.as_ptr(), x.len())
-        };
+        let status =
+            unsafe { (self.exchange().set_continuous_states)(self.component, x.as_ptr(), x.len()) };
         self.check("fmi2SetContinuousStates", status)
     }
 
@@ -1132,9 +1138,8 @@ impl<'fmu> Instance<'fmu> {
     /// fmi2GetDerivatives.
     pub fn derivatives(&mut self, dx: &mut [f64]) -> Called {
         // SAFETY: see set_continuous_states.
-        let status = unsafe {
-            (self.exchange().get_derivatives)(self.component, dx.as_mut_ptr(), dx.len())
-        };
+        let status =
+            unsafe { (self.exchange().get_derivatives)(self.component, dx.as_mut_ptr(), dx.len()) };
         self.check("fmi2GetDerivatives", status)
     }
 
