@@ -11,6 +11,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::analysis::features::Features;
 use crate::analysis::linear::{Linear, Mode};
+use crate::analysis::residual::ModelFit;
+use crate::analysis::rotary::{self, Rotary};
+use crate::analysis::welch::Spectra;
 use crate::analysis::{BAND, FrequencyResponse, demodulation, logarithmic_grid, spa};
 use crate::fmi2::{Fmu, Instance};
 use crate::output;
@@ -149,6 +152,13 @@ pub struct Outcome {
     pub demodulated_features: Features,
     /// Dip and peak of the `spa` response.
     pub spa_features: Features,
+    /// The thesis's linear model, fitted to the `spa` response.
+    pub fit: Option<ModelFit>,
+    /// Signal-to-noise ratio of the rate at the peak and at the dip, dB, from its coherence
+    /// with the torque.
+    pub snr_db: Option<[f64; 2]>,
+    /// Where the liquid turned.
+    pub rotary: Rotary,
     /// Its exact linear counterpart with viscous friction, from the FMU's calculated parameters.
     pub linear: Linear,
     /// Radius of the tank, m.
@@ -310,11 +320,24 @@ impl Plan {
         let sweep = self.profile(case.amplitude);
         let demodulated = demodulation::frequency_response(&sweep, time, tau, omega, frequencies);
         let spa = spa::frequency_response(STEP, tau, omega, frequencies, spa::LAG);
+        let spa_features = Features::of(&spa);
+        let spectra = Spectra::of(STEP, tau, omega);
+        let snr_db = spa_features
+            .f_res
+            .zip(spa_features.f_dip)
+            .map(|(peak, dip)| [spectra.snr_db(peak), spectra.snr_db(dip)]);
+        let slosh =
+            |name| demodulation::frequency_response(&sweep, time, tau, column(name), frequencies);
+        let (radial, tangential) = (slosh("slosh_angle_radial"), slosh("slosh_angle"));
+        let swirl = rotary::swirl(&radial, &tangential, case.amplitude);
         Ok(Outcome {
             case: case.clone(),
             figures,
             demodulated_features: Features::of(&demodulated),
-            spa_features: Features::of(&spa),
+            fit: ModelFit::of(STEP, tau, omega, &spa, &spa_features),
+            snr_db,
+            rotary: Rotary::of(&radial.frequency, &swirl),
+            spa_features,
             demodulated,
             spa,
             linear,
@@ -373,7 +396,7 @@ fn exact_linear(instance: &mut Instance) -> Result<Linear> {
 }
 
 /// Columns of `features.csv`.
-pub const HEADER: [&str; 19] = [
+pub const HEADER: [&str; 26] = [
     "model",
     "fill_m",
     "amplitude_nm",
@@ -393,6 +416,13 @@ pub const HEADER: [&str; 19] = [
     "peak_wave_height_m",
     "max_energy_residual",
     "stuck_s",
+    "zero_hz",
+    "zero_damping",
+    "pole_hz",
+    "pole_damping",
+    "rotary_from_hz",
+    "rotary_to_hz",
+    "swirl",
 ];
 
 impl Outcome {
@@ -403,10 +433,10 @@ impl Outcome {
     }
 
     /// Its row with these features; figures that are not found stay empty.
-    fn row(&self, features: &Features) -> [String; 19] {
+    fn row(&self, features: &Features) -> [String; 26] {
         let figures = &self.figures;
         let number = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
-        let mut row: [String; 19] = Default::default();
+        let mut row: [String; 26] = Default::default();
         let mut put = |name: &str, value: String| {
             let place = HEADER.iter().position(|h| *h == name).expect("a column of the header");
             row[place] = value;
@@ -423,6 +453,22 @@ impl Outcome {
         put("peak_wave_height_m", figures.peak_wave_height.to_string());
         put("max_energy_residual", figures.max_energy_residual.to_string());
         put("stuck_s", figures.stuck.to_string());
+        if let Some(fit) = &self.fit {
+            put("fit_freq_pct", fit.fit_frequency.to_string());
+            put("fit_time_pct", fit.fit_time.to_string());
+            put("coherence", fit.coherence.to_string());
+            put("skewness", fit.skewness.to_string());
+            put("kurtosis", fit.kurtosis.to_string());
+            put("zero_hz", fit.model.zero_frequency().to_string());
+            put("zero_damping", fit.model.zero_damping().to_string());
+            put("pole_hz", fit.model.pole_frequency().to_string());
+            put("pole_damping", fit.model.pole_damping.to_string());
+        }
+        put("snr_res_db", number(self.snr_db.map(|[peak, _]| peak)));
+        put("snr_dip_db", number(self.snr_db.map(|[_, dip]| dip)));
+        put("rotary_from_hz", number(self.rotary.from));
+        put("rotary_to_hz", number(self.rotary.to));
+        put("swirl", self.rotary.swirl.to_string());
         row
     }
 }

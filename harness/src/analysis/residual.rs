@@ -1,4 +1,54 @@
-//! What a fitted model leaves of a signal: moments of its distribution (thesis 6.3.5).
+//! The thesis's linear model of a run, how well it fits, and what it leaves (6.3.2 to 6.3.5).
+
+use super::FrequencyResponse;
+use super::features::Features;
+use super::transfer_function::{TransferFunction, fit_time};
+use super::welch::Spectra;
+
+/// A transfer function fitted to a run, and what it leaves of the run.
+#[derive(Clone, Copy, Debug)]
+pub struct ModelFit {
+    /// Three poles, two zeros.
+    pub model: TransferFunction,
+    /// Fit in the frequency domain, %.
+    pub fit_frequency: f64,
+    /// Fit in the time domain, %.
+    pub fit_time: f64,
+    /// Mean coherence of residual and torque between dip and peak.
+    pub coherence: f64,
+    /// Skewness of the residual.
+    pub skewness: f64,
+    /// Kurtosis of the residual; a Gaussian has 3.
+    pub kurtosis: f64,
+}
+
+impl ModelFit {
+    /// Fits the model to the measured response and drives it with the run's own torque.
+    /// Signals are sampled every `step` s; `None` where there is no response to fit or no
+    /// dip and peak to look between.
+    pub fn of(
+        step: f64,
+        torque: &[f64],
+        rate: &[f64],
+        measured: &FrequencyResponse,
+        features: &Features,
+    ) -> Option<Self> {
+        let model = TransferFunction::fit(measured)?;
+        let mean = rate.iter().sum::<f64>() / rate.len() as f64;
+        let answer = model.simulate(step, torque);
+        let residual: Vec<f64> = rate.iter().zip(&answer).map(|(y, m)| y - mean - m).collect();
+        let (skewness, kurtosis) = skewness_and_kurtosis(&residual);
+        let spectra = Spectra::of(step, torque, &residual);
+        Some(ModelFit {
+            model,
+            fit_frequency: model.fit_frequency(measured),
+            fit_time: fit_time(rate, &answer),
+            coherence: spectra.mean_coherence(features.f_dip?, features.f_res?),
+            skewness,
+            kurtosis,
+        })
+    }
+}
 
 /// Skewness and kurtosis of a signal: the means of z³ and z⁴, z the signal less its mean
 /// over its standard deviation. A Gaussian has 0 and 3.

@@ -65,7 +65,8 @@ mod tests {
         let one = Complex64::new(1.0, 0.0);
         // x = cos φ has the coefficient 1, y = sin φ −i: from outwards towards +θ.
         let radial = response(&[one, one, one * 1e-4]);
-        let tangential = response(&[Complex64::new(0.0, -1.0), one * 0.3, Complex64::new(0.0, 1e-4)]);
+        let tangential =
+            response(&[Complex64::new(0.0, -1.0), one * 0.3, Complex64::new(0.0, 1e-4)]);
         let numbers = swirl(&radial, &tangential, 1.0);
         assert_eq!(numbers, [1.0, 0.0, 0.0]);
         let rotary = Rotary::of(&[1.0, 2.0, 3.0], &numbers);
