@@ -393,6 +393,125 @@ fn restored_state_continues_as_if_nothing_had_happened() {
     }
 }
 
+/// One random step, of any length, with or without a slope, sometimes with other
+/// friction.
+fn random_step(rng: &mut fastrand::Rng, instance: &mut Instance) {
+    let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();
+    let inputs = ["tau_cmd", "tau_ext", "g_axial"].map(reference);
+    let values = [between(-0.1, 0.1), between(-0.05, 0.05), between(5.0, 15.0)];
+    let slopes = [between(-0.5, 0.5), between(-0.5, 0.5), between(-5.0, 5.0)];
+    let friction = between(0.0, 0.01);
+    let h = 10f64.powf(between(-4.0, -0.5));
+    instance.set(&SET_REAL, &inputs, |n| Value::Real(values[n])).unwrap();
+    if rng.bool() {
+        instance.set_input_derivatives(&inputs, &[1; 3], &slopes).unwrap();
+    }
+    if rng.u8(..8) == 0 {
+        set(instance, &[("friction.c", Value::Real(friction))]);
+    }
+    if rng.bool() {
+        all(instance);
+    }
+    instance.do_step(instance.time(), h).unwrap();
+}
+
+/// What a host with an adaptive or iterating master does.
+#[test]
+fn rollback_is_exact_in_a_thousand_random_sequences() {
+    let mut rng = fastrand::Rng::with_seed(11);
+    for n in 0..1000 {
+        let mut instance = stepping(&[
+            ("slosh.model", number(n % 5 + 1)),
+            ("friction.model", number(n / 5 % 4 + 1)),
+            ("slosh.modes", number(rng.i32(1..=4))),
+            ("friction.eps", Value::Real(1e-3)),
+            ("init.omega", Value::Real(0.1 * rng.f64())),
+            ("init.slosh_angle", Value::Real(0.2 * rng.f64())),
+            ("wheel.enabled", Value::Boolean(rng.bool())),
+            ("wheel.tau_max", Value::Real(0.05)),
+            ("imu.enabled", Value::Boolean(rng.bool())),
+        ]);
+        for _ in 0..rng.usize(..5) {
+            random_step(&mut rng, &mut instance);
+        }
+        let saved = to_bytes(&instance);
+        let tape = rng.clone();
+        let steps = rng.usize(1..5);
+        let run = |instance: &mut Instance| {
+            let mut rng = tape.clone();
+            for _ in 0..steps {
+                random_step(&mut rng, instance);
+            }
+            to_bytes(instance)
+        };
+        let first = run(&mut instance);
+        let read = from_bytes(&saved).unwrap();
+        instance.restore(&read).unwrap();
+        assert!(to_bytes(&instance) == saved, "sequence {n}");
+        assert!(run(&mut instance) == first, "sequence {n}");
+        let mut other = fresh();
+        other.restore(&read).unwrap();
+        assert!(run(&mut other) == first, "sequence {n}, another instance");
+    }
+}
+
+/// Whatever is called with whatever arguments: an answer or a refusal, and no panic.
+#[test]
+fn random_calls_never_panic() {
+    let mut rng = fastrand::Rng::with_seed(13);
+    let odd = [f64::NAN, f64::INFINITY, -f64::INFINITY, 0.0, -1.0, 1e308, -1e300, 5e-324, 1e9];
+    for n in 0..400 {
+        let interface = [Interface::CoSimulation, Interface::ModelExchange][n % 2];
+        let mut instance = Instance::new(interface);
+        let mut time = 0.0;
+        let mut saved = instance.clone();
+        for _ in 0..60 {
+            let real = |rng: &mut fastrand::Rng| match rng.u8(..4) {
+                0 => odd[rng.usize(..odd.len())],
+                _ => rng.f64() * 2.0 - 1.0,
+            };
+            let x = real(&mut rng);
+            let any = rng.u32(..SCALARS.len() as u32 + 3);
+            let _ = match rng.u8(..24) {
+                0 => instance.setup_experiment(Some(x.abs() * 1e-6), 0.0, None),
+                1 | 2 => instance.enter_initialization_mode(),
+                3 | 4 => instance.exit_initialization_mode(),
+                5 | 6 => {
+                    time = instance.time();
+                    instance.do_step(time, 0.01 * x.min(1.0))
+                }
+                7 => instance.set(&SET_REAL, &[any], |_| Value::Real(x)),
+                8 => instance.set(&SET_INTEGER, &[any], |_| number(x as i32 + 2)),
+                9 => instance.set(&SET_BOOLEAN, &[any], |_| Value::Boolean(x > 0.0)),
+                10 => instance.get(&GET_REAL, any).map(drop),
+                11 => instance.new_discrete_states().map(drop),
+                12 | 13 => instance.enter_continuous_time_mode(),
+                14 => instance.enter_event_mode(),
+                15 => {
+                    time += x.abs();
+                    instance.set_time(time)
+                }
+                16 => {
+                    let mut states = [0.0; STATES];
+                    states.fill_with(|| real(&mut rng));
+                    instance.set_continuous_states(&states)
+                }
+                17 => instance.derivatives(&mut [0.0; STATES]),
+                18 => instance.event_indicators(&mut [0.0; plant::INDICATORS]),
+                19 => instance.completed_integrator_step().map(drop),
+                20 => instance.directional_derivative(&[any], &[any / 2], &[x], &mut [0.0]),
+                21 => instance.output_derivative(any, 1).map(drop),
+                22 => instance.set_input_derivatives(&[12 + any % 3], &[1], &[x]),
+                _ if rng.bool() => {
+                    saved = from_bytes(&to_bytes(&instance)).unwrap();
+                    Ok(())
+                }
+                _ => instance.restore(&saved),
+            };
+        }
+    }
+}
+
 #[test]
 fn state_can_be_saved_in_every_state_of_life() {
     let mut initializing = fresh();
@@ -540,19 +659,18 @@ fn check_directional_derivatives(rng: &mut fastrand::Rng, slosh_model: i32, fric
     // Central differences with Richardson's extrapolation: 1e-12 is left out, rounding
     // is 1e-13.
     let h = 1e-3;
-    let start: Vec<f64> =
-        inputs.iter().map(|n| match instance.get(&GET_REAL, *n).unwrap() {
+    let start: Vec<f64> = inputs
+        .iter()
+        .map(|n| match instance.get(&GET_REAL, *n).unwrap() {
             Value::Real(x) => x,
             other => panic!("{other:?}"),
-        }).collect();
+        })
+        .collect();
     let at = |s: f64| -> Vec<f64> {
         let mut moved = instance.clone();
         moved.set(&SET_REAL, &inputs, |n| Value::Real(start[n] + s * direction[n])).unwrap();
-        let x: Vec<f64> = states
-            .iter()
-            .zip(&direction[inputs.len()..])
-            .map(|(x, d)| x + s * d)
-            .collect();
+        let x: Vec<f64> =
+            states.iter().zip(&direction[inputs.len()..]).map(|(x, d)| x + s * d).collect();
         moved.set_continuous_states(&x).unwrap();
         let value = |n: &u32| match moved.get(&GET_REAL, *n).unwrap() {
             Value::Real(x) => x,

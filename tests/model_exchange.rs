@@ -42,8 +42,13 @@ struct Host<'fmu> {
 impl<'fmu> Host<'fmu> {
     fn new(fmu: &'fmu Fmu, settings: &[(&str, &str)]) -> Self {
         let instance = set_up(fmu, MODEL_EXCHANGE, settings);
-        let mut host =
-            Host { instance, time: 0.0, x: [0.0; STATES], events: [0; 3], next: EventInfo::default() };
+        let mut host = Host {
+            instance,
+            time: 0.0,
+            x: [0.0; STATES],
+            events: [0; 3],
+            next: EventInfo::default(),
+        };
         host.event_iteration();
         host
     }
@@ -98,9 +103,8 @@ impl<'fmu> Host<'fmu> {
             let goal = if is_due { due } else { (self.time + h).min(end) };
             let before = self.indicators(self.time, &self.x.clone());
             // A sign change that begins at zero is one that has just been handled.
-            let crosses = |z: &[f64; INDICATORS]| {
-                before.iter().zip(z).any(|(before, z)| before * z < 0.0)
-            };
+            let crosses =
+                |z: &[f64; INDICATORS]| before.iter().zip(z).any(|(before, z)| before * z < 0.0);
             let mut length = goal - self.time;
             let mut x = self.step(length);
             let crossed = crosses(&self.indicators(goal, &x));
@@ -122,7 +126,13 @@ impl<'fmu> Host<'fmu> {
             let (step_event, terminate) = self.instance.completed_integrator_step().unwrap();
             assert!(!terminate);
             if crossed || is_due || step_event {
-                let kind = if crossed { 0 } else if is_due { 1 } else { 2 };
+                let kind = if crossed {
+                    0
+                } else if is_due {
+                    1
+                } else {
+                    2
+                };
                 self.events[kind] += 1;
                 self.instance.enter_event_mode().unwrap();
                 self.event_iteration();
@@ -252,7 +262,13 @@ fn regime_changes_at_events_alone() {
         host.run(f64::from(n) * 0.01, 1e-3);
         let ratio = host.instance.real("wave_height").unwrap() / (0.163 / 2.0);
         let regime = host.instance.get("regime").unwrap();
-        let expected = if ratio < 0.15 { 1 } else if ratio <= 0.25 { 2 } else { 3 };
+        let expected = if ratio < 0.15 {
+            1
+        } else if ratio <= 0.25 {
+            2
+        } else {
+            3
+        };
         assert_eq!(regime, hubslosh::description::Value::Integer(expected), "{n}");
         seen.push(expected);
     }

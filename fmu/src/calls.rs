@@ -201,7 +201,8 @@ impl Call {
                 interface.name()
             )));
         }
-        let possible = Mode::ALL.iter().filter(|m| m.only_in().is_none_or(|only| only == interface));
+        let possible =
+            Mode::ALL.iter().filter(|m| m.only_in().is_none_or(|only| only == interface));
         let allowed: Vec<_> =
             possible.filter(|m| self.allowed & m.bit() != 0).map(|m| m.name()).collect();
         Err(self.error(format_args!(

@@ -509,9 +509,9 @@ impl Instance {
         if let Some(stop) = self.stop
             && time > stop + TIME_SLACK * stop.abs().max(1.0)
         {
-            return Err(
-                call.error(format_args!("the step to {time:?} s has passed the stop time {stop:?} s"))
-            );
+            return Err(call.error(format_args!(
+                "the step to {time:?} s has passed the stop time {stop:?} s"
+            )));
         }
         let range = self.plant(call)?.check_range();
         if let Err(why) = range {

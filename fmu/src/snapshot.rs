@@ -148,6 +148,9 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Instance, String> {
     } else if stepped {
         return Err("the saved state is damaged: the plant is missing".into());
     }
+    if saved.regime.is_some() != (stepped && interface == Interface::ModelExchange) {
+        return Err("the saved state is damaged: regime".into());
+    }
     Ok(saved)
 }
 

@@ -42,12 +42,8 @@ const HEAT: &[&str] = &[
     "slosh.q_radial", "slosh.q_tangential", "slosh.v_radial", "slosh.v_tangential",
 ];
 const MODE_1: &[&str] = &["slosh.q_radial[1]", "slosh.q_tangential[1]"];
-const MODE_1_MOVING: &[&str] = &[
-    "slosh.q_radial[1]",
-    "slosh.q_tangential[1]",
-    "slosh.v_radial[1]",
-    "slosh.v_tangential[1]",
-];
+const MODE_1_MOVING: &[&str] =
+    &["slosh.q_radial[1]", "slosh.q_tangential[1]", "slosh.v_radial[1]", "slosh.v_tangential[1]"];
 // Where they start. The damping belongs to the g_axial at the start.
 #[rustfmt::skip]
 const DYNAMICS: &[&str] = &[
@@ -514,19 +510,20 @@ impl Scalar {
 
     /// The inputs and continuous states that it follows without delay.
     pub fn follows(&self) -> impl Iterator<Item = &'static Scalar> {
-        let known = SCALARS.iter().filter(|s| {
-            s.variable.causality == Causality::Input || s.variable.state.is_some()
-        });
+        let known = SCALARS
+            .iter()
+            .filter(|s| s.variable.causality == Causality::Input || s.variable.state.is_some());
         known.filter(|s| self.is_meant(self.variable.depends_on, s))
     }
 
     /// The inputs and parameters that its value at the start follows from.
     pub fn starts_from(&self) -> impl Iterator<Item = &'static Scalar> {
-        let known = SCALARS.iter().filter(|s| {
-            matches!(s.variable.causality, Causality::Input | Causality::Parameter)
-        });
+        let known = SCALARS
+            .iter()
+            .filter(|s| matches!(s.variable.causality, Causality::Input | Causality::Parameter));
         known.filter(|s| {
-            self.is_meant(self.variable.depends_on, s) || self.is_meant(self.variable.starts_from, s)
+            self.is_meant(self.variable.depends_on, s)
+                || self.is_meant(self.variable.starts_from, s)
         })
     }
 
@@ -556,7 +553,8 @@ pub const SCALAR_COUNT: usize = {
 
 /// Every scalar; the place is its value reference.
 pub static SCALARS: [Scalar; SCALAR_COUNT] = {
-    let mut scalars = [Scalar { variable: &TABLE[0], reference: 0, element: 0, slot: 0 }; SCALAR_COUNT];
+    let mut scalars =
+        [Scalar { variable: &TABLE[0], reference: 0, element: 0, slot: 0 }; SCALAR_COUNT];
     let (mut n, mut entry, mut slot) = (0, 0, 0);
     while entry < TABLE.len() {
         let mut element = 0;

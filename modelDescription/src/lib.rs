@@ -82,9 +82,7 @@ fn description() -> schema::ModelDescription {
             tolerance: real(DEFAULT_TOLERANCE),
             step_size: real(STEP_SIZE),
         },
-        variables: schema::Variables {
-            all: SCALARS.iter().map(variable).collect(),
-        },
+        variables: schema::Variables { all: SCALARS.iter().map(variable).collect() },
         structure: schema::Structure {
             outputs: unknowns(is_output, |s| s.follows().collect()),
             derivatives: unknowns(is_rate, |s| s.follows().collect()),
