@@ -7,7 +7,7 @@ use std::path::Path;
 use anyhow::Result;
 
 use crate::analysis::features::Features;
-use crate::analysis::{BAND, FrequencyResponse, demodulation, logarithmic_grid, spa};
+use crate::analysis::{BAND, FrequencyResponse, demodulation, logarithmic_grid, rotary, spa};
 use crate::campaign::{Outcome, Plan, Results, STEP, Sweep, thousandths};
 use crate::fmi2::Fmu;
 use crate::html::escape;
@@ -81,6 +81,7 @@ fn page(plan: &Plan, fmu: &Fmu, results: &Results) -> String {
         page.push_str(&features(group));
     }
     page.push_str(&bearing_and_liquid(&groups));
+    page.push_str(&linear_fit(&groups));
     page.push_str(&estimators(plan, &groups));
     page.push_str(&table(&groups));
     page.push_str(&provenance(plan, fmu));
@@ -450,10 +451,77 @@ fn features(group: &Group) -> String {
     out
 }
 
+/// A small chart of one figure against torque, one line per group.
+struct Panel {
+    title: &'static str,
+    label: &'static str,
+    get: fn(&Outcome) -> Option<f64>,
+    /// A logarithmic axis, which leaves out what is not positive.
+    decades: bool,
+    /// A level to compare with, and what it is.
+    level: Option<(f64, &'static str)>,
+}
+
 fn bearing_and_liquid(groups: &[Group]) -> String {
+    let quarter = groups
+        .first()
+        .map(|group| (group.runs[0].tank_radius / 4.0 * 1e3, "a quarter of the tank's radius"));
+    let panel = |title, label, get, decades| Panel { title, label, get, decades, level: None };
     let mut out = String::from(
-        "<h2>Bearing, liquid, book-keeping</h2>\n<p>At small torque the bearing sticks for part of every cycle, most of all near the dip. The wave height is the linear formula's; beyond a quarter of the tank's radius (broken line) it says that linear slosh theory no longer holds, not how high the water stands. So a linear model's runs at the larger torques are computed faithfully, but they are not what a tank does.</p>\n<div class=\"legend\">",
+        "<h2>Bearing, liquid, book-keeping</h2>\n<p>At small torque the bearing sticks for part of every cycle, most of all near the dip. The wave height is the linear formula's; beyond a quarter of the tank's radius (broken line) it says that linear slosh theory no longer holds, not how high the water stands. So a linear model's runs at the larger torques are computed faithfully, but they are not what a tank does.</p>\n",
     );
+    out.push_str(&panels(
+        groups,
+        [
+            panel("Time stuck in the sweep", "stuck / s", |run| Some(run.figures.stuck), true),
+            panel(
+                "Largest slosh angle",
+                "angle / deg",
+                |run| Some(run.figures.peak_slosh_angle.to_degrees()),
+                false,
+            ),
+            Panel {
+                level: quarter,
+                ..panel(
+                    "Largest wave height",
+                    "height / mm",
+                    |run| Some(run.figures.peak_wave_height * 1e3),
+                    false,
+                )
+            },
+            panel(
+                "Energy residual",
+                "residual / energy turned over",
+                |run| Some(run.figures.max_energy_residual),
+                true,
+            ),
+        ],
+    ));
+    out
+}
+
+fn linear_fit(groups: &[Group]) -> String {
+    let panel = |title, label, get| Panel { title, label, get, decades: false, level: None };
+    let mut out = String::from(
+        "<h2>How far one linear model reaches</h2>\n<p>A transfer function with three poles and two zeros is fitted to each run's <code>spa</code> response and driven with the run's own torque, as in the thesis. What it can't be is dry friction at small torque and, in the nonlinear models, a resonance that moves with the amplitude. Coherence: of what it leaves with the torque, between dip and peak (Welch, 8 segments). Swirl: 0 for motion in a plane, 1 for a circle; where it passes the broken line the liquid turns.</p>\n",
+    );
+    out.push_str(&panels(
+        groups,
+        [
+            panel("Fit, frequency domain", "fit / %", |run| Some(run.fit?.fit_frequency)),
+            panel("Fit, time domain", "fit / %", |run| Some(run.fit?.fit_time)),
+            panel("Coherence of the rest", "mean coherence", |run| Some(run.fit?.coherence)),
+            Panel {
+                level: Some((rotary::ROTARY, "counts as rotary")),
+                ..panel("Swirl", "largest |swirl|", |run| Some(run.rotary.swirl.abs()))
+            },
+        ],
+    ));
+    out
+}
+
+fn panels(groups: &[Group], panels: [Panel; 4]) -> String {
+    let mut out = String::from("<div class=\"legend\">");
     for (i, group) in groups.iter().enumerate() {
         let _ = write!(
             out,
@@ -463,24 +531,7 @@ fn bearing_and_liquid(groups: &[Group]) -> String {
         );
     }
     out.push_str("</div>\n<div class=\"four\">\n");
-    type Get = fn(&Outcome) -> f64;
-    let panels: [(&str, &str, Get, bool); 4] = [
-        ("Time stuck in the sweep", "stuck / s", |run| run.figures.stuck, true),
-        (
-            "Largest slosh angle",
-            "angle / deg",
-            |run| run.figures.peak_slosh_angle.to_degrees(),
-            false,
-        ),
-        ("Largest wave height", "height / mm", |run| run.figures.peak_wave_height * 1e3, false),
-        (
-            "Energy residual",
-            "residual / energy turned over",
-            |run| run.figures.max_energy_residual,
-            true,
-        ),
-    ];
-    for (title, label, get, decades) in panels {
+    for Panel { title, label, get, decades, level } in panels {
         let x = torque_axis(groups.iter().flat_map(|g| g.runs.iter().copied()));
         let mut series: Vec<Series> = groups
             .iter()
@@ -489,21 +540,20 @@ fn bearing_and_liquid(groups: &[Group]) -> String {
                 points: group
                     .runs
                     .iter()
-                    .map(|run| (thousandths(run.case.amplitude), get(run)))
-                    .filter(|(_, y)| !decades || *y > 0.0)
+                    .filter_map(|run| Some((thousandths(run.case.amplitude), get(run)?)))
+                    .filter(|(_, y)| y.is_finite() && (!decades || *y > 0.0))
                     .collect(),
                 color: fill_color(i),
                 style: Style::Dots,
                 title: group.title(),
             })
             .collect();
-        if let ("Largest wave height", Some(group)) = (title, groups.first()) {
-            let limit = group.runs[0].tank_radius / 4.0 * 1e3;
+        if let Some((level, what)) = level {
             series.push(Series {
-                points: vec![(x.from, limit), (x.to, limit)],
+                points: vec![(x.from, level), (x.to, level)],
                 color: "var(--exact)".into(),
                 style: Style::Dashed,
-                title: "a quarter of the tank's radius".into(),
+                title: what.into(),
             });
         }
         let values: Vec<f64> = series.iter().flat_map(|s| &s.points).map(|(_, y)| *y).collect();
