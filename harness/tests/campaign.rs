@@ -56,7 +56,8 @@ fn files_have_the_names_and_columns_others_build_on_and_a_second_start_finds_the
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
 
     let text = std::fs::read_to_string(directory.join("c/features.csv")).unwrap();
-    assert_eq!(text.lines().next(), Some(HEADER));
+    // these columns first, others may follow
+    assert!(text.lines().next().unwrap().starts_with(HEADER));
     for row in features(directory) {
         // the thesis's sticking bearing at 10 cm: ranges of the acceptance check
         let number = |name: &str| row[name].parse::<f64>().unwrap();
