@@ -694,6 +694,43 @@ fn check_directional_derivatives(rng: &mut fastrand::Rng, slosh_model: i32, fric
     }
 }
 
+/// sqrt(g/l)/2 pi by g; theta by its start; the hub's acceleration by the torque, which is
+/// one over the inertia of hub and liquid when nothing else moves.
+#[test]
+fn directional_derivatives_in_initialization_mode_are_by_inputs_and_parameters() {
+    let mut instance = fresh();
+    set(
+        &mut instance,
+        &[
+            ("slosh.model", number(1)),
+            ("friction.model", number(1)),
+            ("init.slosh_angle", Value::Real(0.1)),
+        ],
+    );
+    instance.enter_initialization_mode().unwrap();
+    let derivative = |instance: &mut Instance, unknown: &str, known: &str| {
+        let mut answer = [0.0];
+        let (unknown, known) = ([reference(unknown)], [reference(known)]);
+        instance.directional_derivative(&unknown, &known, &[2.0], &mut answer).unwrap();
+        answer[0] / 2.0
+    };
+    let close = |a: f64, b: f64| (a - b).abs() < 1e-9 * b.abs();
+    let inertia = real(&mut instance, "hub.I")
+        + real(&mut instance, "tank.m_liq") * real(&mut instance, "tank.r").powi(2);
+    assert!(close(derivative(&mut instance, "omega_dot", "tau_ext"), 1.0 / inertia));
+    assert!(close(derivative(&mut instance, "der(omega)", "tau_cmd"), 1.0 / inertia));
+    assert!(close(derivative(&mut instance, "theta", "init.theta"), 1.0));
+    set(&mut instance, &[("slosh.model", number(2))]);
+    let frequency = real(&mut instance, "slosh.frequency[1]");
+    let by_g = derivative(&mut instance, "slosh.frequency[1]", "g_axial");
+    assert!(close(by_g, frequency / 2.0 / 9.81), "{by_g}");
+    let before = to_bytes(&instance);
+    let (omega, mass) = ([reference("omega")], [reference("slosh.mass[1]")]);
+    assert!(instance.directional_derivative(&omega, &omega, &[1.0], &mut [0.0]).is_err());
+    assert!(instance.directional_derivative(&omega, &mass, &[1.0], &mut [0.0]).is_err());
+    assert!(to_bytes(&instance) == before);
+}
+
 #[test]
 fn directional_derivatives_of_what_has_none_are_refused() {
     let mut instance = lively(4, 4);

@@ -294,7 +294,7 @@ fn euler_meets_co_simulation_to_first_order() {
     let mut worst = Vec::new();
     for h in [1e-4, 5e-5] {
         let mut host = Host::new(&fmu, &settings);
-        let steps = (5.0 / h as f64).round() as usize;
+        let steps = (5.0f64 / h).round() as usize;
         let mut events = 0;
         for n in 1..=steps {
             let rates = host.rates(host.time, &host.x.clone());

@@ -154,7 +154,7 @@ mod list {
     pub static SERIALIZED_SIZE:          Call = call("fmi2SerializedFMUstateSize", ANY);
     pub static SERIALIZE:                Call = call("fmi2SerializeFMUstate", ANY);
     pub static DESERIALIZE:              Call = call("fmi2DeSerializeFMUstate", ANY);
-    pub static DIRECTIONAL_DERIVATIVE:   Call = of("Real", "fmi2GetDirectionalDerivative", RUN);
+    pub static DIRECTIONAL_DERIVATIVE:   Call = of("Real", "fmi2GetDirectionalDerivative", M | RUN);
 
     pub static SET_INPUT_DERIVATIVES:    Call = cs(of("Real", "fmi2SetRealInputDerivatives", I | M | S));
     pub static GET_OUTPUT_DERIVATIVES:   Call = cs(of("Real", "fmi2GetRealOutputDerivatives", RUN));

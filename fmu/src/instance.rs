@@ -229,22 +229,25 @@ impl Instance {
             self.tune(call, references, &value)?;
         }
         for (n, reference) in references.iter().enumerate() {
-            let scalar = scalar(call, *reference)?;
-            match (scalar.variable.access, value(n)) {
-                (Access::Input(ramp), Value::Real(x)) => ramp(&mut self.inputs).value = x,
-                (_, value) => {
-                    if let Some(slot) = self.parameters.get_mut(scalar.slot) {
-                        *slot = value;
-                    }
+            self.put(call, *reference, value(n))?;
+        }
+        Ok(())
+    }
+
+    /// Sets an input or a parameter; what follows from it has to be computed anew.
+    fn put(&mut self, call: &Call, reference: u32, value: Value) -> Result<(), Fault> {
+        let scalar = scalar(call, reference)?;
+        match (scalar.variable.access, value) {
+            (Access::Input(ramp), Value::Real(x)) => ramp(&mut self.inputs).value = x,
+            (_, value) => {
+                if let Some(slot) = self.parameters.get_mut(scalar.slot) {
+                    *slot = value;
                 }
             }
         }
-        if !references.is_empty() {
-            // What follows from parameters and inputs has to be computed anew.
-            self.shown = None;
-            if !self.is_running() {
-                self.plant = None;
-            }
+        self.shown = None;
+        if !self.is_running() {
+            self.plant = None;
         }
         Ok(())
     }
@@ -356,8 +359,9 @@ impl Instance {
         self.slopes(call, states, &inputs)?.of(call, &scalar)
     }
 
-    /// fmi2GetDirectionalDerivative: what the unknowns do when the knowns, inputs or
-    /// continuous states, go in a direction.
+    /// fmi2GetDirectionalDerivative: what the unknowns do when the knowns go in a
+    /// direction. Knowns are inputs and continuous states; in initialization mode, where
+    /// the states are unknown as well, inputs and parameters.
     pub fn directional_derivative(
         &mut self,
         unknowns: &[u32],
@@ -367,17 +371,15 @@ impl Instance {
     ) -> Result<(), Fault> {
         let call = &calls::DIRECTIONAL_DERIVATIVE;
         self.check(call)?;
+        if self.mode == Mode::Initialization {
+            return self.initial_derivative(call, unknowns, (knowns, direction), answers);
+        }
         let mut states = [0.0; STATES];
         let nowhere = Ramp::held(0.0);
         let mut along = Inputs { tau_cmd: nowhere, tau_ext: nowhere, g_axial: nowhere };
         for (reference, d) in knowns.iter().zip(direction) {
             let scalar = scalar(call, *reference)?;
-            if !d.is_finite() {
-                return Err(call.error(format_args!(
-                    "direction of {} = {d} (allowed: any finite number)",
-                    scalar.name()
-                )));
-            }
+            check_direction(call, &scalar, *d)?;
             match (scalar.variable.access, scalar.variable.state) {
                 (Access::Input(ramp), _) => ramp(&mut along).slope += d,
                 (_, Some(place)) => states[place.at(scalar.element)] += d,
@@ -392,6 +394,56 @@ impl Instance {
         let slopes = self.slopes(call, states, &along)?;
         for (reference, answer) in unknowns.iter().zip(answers) {
             *answer = slopes.of(call, &scalar(call, *reference)?)?;
+        }
+        Ok(())
+    }
+
+    /// As above, by central differences with Richardson's extrapolation between
+    /// instances that start elsewhere: each known moves by a thousandth of its value, or
+    /// of its order of magnitude where it is smaller.
+    fn initial_derivative(
+        &self,
+        call: &Call,
+        unknowns: &[u32],
+        (knowns, direction): (&[u32], &[f64]),
+        answers: &mut [f64],
+    ) -> Result<(), Fault> {
+        const SHARE: f64 = 1.0 / 1024.0;
+        let mut start = Vec::with_capacity(knowns.len());
+        let mut size: f64 = 0.0;
+        for (reference, d) in knowns.iter().zip(direction) {
+            let scalar = scalar(call, *reference)?;
+            check_direction(call, &scalar, *d)?;
+            let known = [Causality::Input, Causality::Parameter];
+            let value = match self.clone().get(call, *reference)? {
+                Value::Real(x) if known.contains(&scalar.variable.causality) => x,
+                _ => {
+                    return Err(call.error(format_args!(
+                        "{} is not among the knowns: in initialization mode these are inputs and \
+                         parameters",
+                        scalar.name()
+                    )));
+                }
+            };
+            let unit = if value == 0.0 { scalar.variable.nominal() } else { value.abs() };
+            size = size.max(d.abs() / unit);
+            start.push(value);
+        }
+        let step = if size > 0.0 { SHARE / size } else { 1.0 };
+        let at = |s: f64| -> Result<Vec<f64>, Fault> {
+            let mut moved = self.clone();
+            for ((reference, x), d) in knowns.iter().zip(&start).zip(direction) {
+                moved.put(call, *reference, Value::Real(x + s * step * d))?;
+            }
+            let values = unknowns.iter().map(|reference| match moved.get(call, *reference)? {
+                Value::Real(x) => Ok(x),
+                _ => Err(call.error("wrong type")),
+            });
+            values.collect()
+        };
+        let (p2, p1, m1, m2) = (at(2.0)?, at(1.0)?, at(-1.0)?, at(-2.0)?);
+        for (n, answer) in answers.iter_mut().take(unknowns.len()).enumerate() {
+            *answer = (8.0 * (p1[n] - m1[n]) - (p2[n] - m2[n])) / (12.0 * step);
         }
         Ok(())
     }
@@ -695,6 +747,14 @@ impl Slopes {
             }
         }
     }
+}
+
+fn check_direction(call: &Call, scalar: &Scalar, d: f64) -> Result<(), Fault> {
+    if d.is_finite() {
+        return Ok(());
+    }
+    let name = scalar.name();
+    Err(call.error(format_args!("direction of {name} = {d} (allowed: any finite number)")))
 }
 
 fn check_length(call: &Call, name: &str, given: usize, needed: usize) -> Result<(), Fault> {

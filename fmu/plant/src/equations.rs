@@ -94,7 +94,7 @@ impl Plant {
     /// Friction, heat and the hub's acceleration come from the series and are exact.
     /// Forces, energy and the like are smooth in x once the friction is just another
     /// torque tau_f + tau_f' s, so they are differentiated by central differences with
-    /// Richardson's extrapolation, four evaluations, good to about 1e-12 of their size.
+    /// Richardson's extrapolation, four evaluations, good to 1e-9 of their size.
     pub fn output_derivatives(
         &mut self,
         inputs: &Inputs,
