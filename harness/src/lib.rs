@@ -4,12 +4,14 @@
 //! its C ABI. No code is shared with the model.
 
 pub mod analysis;
+pub mod binary;
 pub mod campaign;
 pub mod description;
 pub mod fmi2;
 pub mod html;
 pub mod output;
 pub mod pack;
+pub mod platforms;
 pub mod profile;
 pub mod report;
 pub mod run;

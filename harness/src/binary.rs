@@ -1,0 +1,471 @@
+//! What a binary of an FMU asks of the machine that loads it, and what it
+//! offers: read from the file itself, whichever platform it is for.
+//!
+//! An FMU is loaded by programs its maker never saw: a MATLAB on an old Linux
+//! cluster, a Windows without development tools. A library or a symbol version
+//! that is not there stops it before its first line runs.
+
+use std::fmt;
+
+use anyhow::{Context, Result, bail};
+use object::macho;
+use object::read::elf::{Dyn as _, ElfFile64};
+use object::read::macho::{FatArch as _, LoadCommandVariant, MachOFatFile32, MachOFile64};
+use object::read::pe::PeFile64;
+use object::{Architecture, Endianness, FileKind, LittleEndian, Object, elf};
+use sha2::{Digest, Sha256};
+
+/// The newest glibc a binary may need: that of the oldest Linux still in use with simulation tools.
+pub const GLIBC: Version = Version(2, 17);
+/// The newest macOS a binary may need: the first one on both architectures.
+pub const MACOS: Version = Version(11, 0);
+
+/// Libraries that are part of glibc.
+const LINUX_LIBRARIES: [&str; 7] = [
+    "ld-linux-x86-64.so.2",
+    "libc.so.6",
+    "libdl.so.2",
+    "libm.so.6",
+    "libpthread.so.0",
+    "librt.so.1",
+    "libutil.so.1",
+];
+/// Libraries that are part of Windows (since 8; no run-time library of a compiler among them), in
+/// small letters.
+const WINDOWS_LIBRARIES: [&str; 12] = [
+    "advapi32.dll",
+    "api-ms-win-core-synch-l1-2-0.dll",
+    "bcrypt.dll",
+    "bcryptprimitives.dll",
+    "kernel32.dll",
+    "msvcrt.dll",
+    "ntdll.dll",
+    "ole32.dll",
+    "shell32.dll",
+    "user32.dll",
+    "userenv.dll",
+    "ws2_32.dll",
+];
+/// Where the libraries that are part of macOS are.
+const MACOS_LIBRARIES: [&str; 2] = ["/usr/lib/libSystem.B.dylib", "/usr/lib/libc++.1.dylib"];
+
+/// Major and minor version.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Version(pub u32, pub u32);
+
+impl fmt::Display for Version {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{}.{}", self.0, self.1)
+    }
+}
+
+/// Kind of a binary, by the operating system it is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// ELF, x86-64.
+    Linux,
+    /// PE, x86-64.
+    Windows,
+    /// Mach-O, one or several architectures.
+    MacOs,
+}
+
+/// A binary, seen from outside.
+#[derive(Clone, Debug)]
+pub struct Binary {
+    /// Operating system.
+    pub kind: Kind,
+    /// Size of the file, bytes.
+    pub size: usize,
+    /// `x86_64`, `arm64`, in the order of the file.
+    pub architectures: Vec<&'static str>,
+    /// Libraries the loader must find.
+    pub libraries: Vec<String>,
+    /// Folders the binary tells the loader to search.
+    pub search_paths: Vec<String>,
+    /// Newest version of glibc (Linux) or macOS it needs.
+    pub needs: Option<Version>,
+    /// Names it exports, in alphabetical order.
+    pub exports: Vec<String>,
+    /// What is wrong with its code signature; macOS kills a process that loads unsigned code for
+    /// arm64.
+    pub signature: Option<String>,
+}
+
+impl Binary {
+    /// Reads a binary.
+    pub fn read(bytes: &[u8]) -> Result<Self> {
+        let kind = FileKind::parse(bytes).context("not a binary of any platform")?;
+        let mut binary = match kind {
+            FileKind::Elf64 => linux(bytes),
+            FileKind::Pe64 => windows(bytes),
+            FileKind::MachO64 => macos(bytes),
+            FileKind::MachOFat32 => universal(bytes),
+            other => bail!("not a binary for 64 bits of Linux, Windows or macOS, but {other:?}"),
+        }
+        .with_context(|| format!("a damaged binary ({kind:?})"))?;
+        binary.size = bytes.len();
+        for list in [&mut binary.libraries, &mut binary.exports] {
+            list.sort();
+            list.dedup();
+        }
+        Ok(binary)
+    }
+
+    /// Everything that would keep it from loading on a machine without development tools, or a
+    /// host from finding the functions `wanted`; one sentence each.
+    pub fn faults(&self, wanted: &[&str]) -> Vec<String> {
+        let mut faults = Vec::new();
+        let (architectures, libraries, newest): (&[_], &[&str], _) = match self.kind {
+            Kind::Linux => (&["x86_64"], &LINUX_LIBRARIES, Some(("glibc", GLIBC))),
+            Kind::Windows => (&["x86_64"], &WINDOWS_LIBRARIES, None),
+            Kind::MacOs => (&["x86_64", "arm64"], &MACOS_LIBRARIES, Some(("macOS", MACOS))),
+        };
+        for architecture in architectures.iter().filter(|a| !self.architectures.contains(a)) {
+            faults.push(format!("it has no code for {architecture}"));
+        }
+        for library in &self.libraries {
+            let name = if self.kind == Kind::Windows { &library.to_lowercase() } else { library };
+            if !libraries.contains(&name.as_str()) {
+                faults.push(format!("it needs {library}, which is no part of every system"));
+            }
+        }
+        if let (Some((system, newest)), Some(needed)) = (newest, self.needs)
+            && needed > newest
+        {
+            faults.push(format!("it needs {system} {needed}; {newest} must do"));
+        }
+        for path in &self.search_paths {
+            faults.push(format!("it has the loader search {path}"));
+        }
+        if let Some(fault) = &self.signature {
+            faults.push(format!("macOS would not load its arm64 half: {fault}"));
+        }
+        let lacking: Vec<_> =
+            wanted.iter().filter(|w| !self.exports.iter().any(|e| e == **w)).copied().collect();
+        if !lacking.is_empty() {
+            faults.push(format!("it does not export {}", lacking.join(", ")));
+        }
+        // On macOS names are bound to the library they come from, so that others do no harm; and
+        // the linker that links it elsewhere exports a few of Rust's.
+        let others: Vec<_> =
+            self.exports.iter().map(String::as_str).filter(|e| !e.starts_with("fmi2")).collect();
+        if self.kind != Kind::MacOs && !others.is_empty() {
+            faults.push(format!("it also exports {}", others.join(", ")));
+        }
+        faults
+    }
+}
+
+/// `1104600 bytes, x86_64, glibc 2.14, 44 functions, needs libc.so.6, …`
+impl fmt::Display for Binary {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{} bytes, {}", self.size, self.architectures.join(" + "))?;
+        if let Some(needs) = self.needs {
+            let system = if self.kind == Kind::MacOs { "macOS" } else { "glibc" };
+            write!(f, ", {system} {needs}")?;
+        }
+        let functions = self.exports.iter().filter(|e| e.starts_with("fmi2")).count();
+        write!(f, ", {functions} functions, needs {}", self.libraries.join(", "))
+    }
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn architecture(architecture: Architecture) -> &'static str {
+    match architecture {
+        Architecture::X86_64 => "x86_64",
+        Architecture::Aarch64 => "arm64",
+        _ => "another architecture",
+    }
+}
+
+fn common<'data>(kind: Kind, file: &impl Object<'data>) -> Result<Binary> {
+    Ok(Binary {
+        kind,
+        size: 0,
+        architectures: vec![architecture(file.architecture())],
+        libraries: Vec::new(),
+        search_paths: Vec::new(),
+        needs: None,
+        exports: file.exports()?.iter().map(|export| text(export.name())).collect(),
+        signature: None,
+    })
+}
+
+fn linux(bytes: &[u8]) -> Result<Binary> {
+    let file = ElfFile64::<Endianness>::parse(bytes)?;
+    let endian = file.endian();
+    let sections = file.elf_section_table();
+    let mut binary = common(Kind::Linux, &file)?;
+    if let Some((dynamic, link)) = sections.dynamic(endian, bytes)? {
+        let strings = sections.strings(endian, bytes, link)?;
+        for entry in dynamic {
+            match entry.tag(endian) {
+                elf::DT_NEEDED => binary.libraries.push(text(entry.string(endian, strings)?)),
+                elf::DT_RPATH | elf::DT_RUNPATH => {
+                    binary.search_paths.push(text(entry.string(endian, strings)?));
+                }
+                _ => {}
+            }
+        }
+    }
+    if let Some((mut files, link)) = sections.gnu_verneed(endian, bytes)? {
+        let strings = sections.strings(endian, bytes, link)?;
+        while let Some((_, mut versions)) = files.next()? {
+            while let Some(version) = versions.next()? {
+                let name = text(version.name(endian, strings)?);
+                binary.needs = binary.needs.max(glibc_version(&name));
+            }
+        }
+    }
+    Ok(binary)
+}
+
+/// 2.14 of `GLIBC_2.14`; `GLIBC_2.2.5` is 2.2 for this purpose.
+fn glibc_version(name: &str) -> Option<Version> {
+    let mut numbers = name.strip_prefix("GLIBC_")?.split('.').map(str::parse);
+    Some(Version(numbers.next()?.ok()?, numbers.next()?.ok()?))
+}
+
+fn windows(bytes: &[u8]) -> Result<Binary> {
+    let file = PeFile64::parse(bytes)?;
+    let mut binary = common(Kind::Windows, &file)?;
+    if let Some(table) = file.import_table()? {
+        let mut descriptors = table.descriptors()?;
+        while let Some(descriptor) = descriptors.next()? {
+            binary.libraries.push(text(table.name(descriptor.name.get(LittleEndian))?));
+        }
+    }
+    Ok(binary)
+}
+
+fn macos(bytes: &[u8]) -> Result<Binary> {
+    let file = MachOFile64::<Endianness>::parse(bytes)?;
+    let endian = file.endian();
+    let mut binary = common(Kind::MacOs, &file)?;
+    for name in &mut binary.exports {
+        // C's names carry an underscore there
+        if let Some(plain) = name.strip_prefix('_') {
+            *name = plain.into();
+        }
+    }
+    let mut signature = None;
+    let mut commands = file.macho_load_commands()?;
+    while let Some(command) = commands.next()? {
+        match command.variant()? {
+            LoadCommandVariant::Dylib(library) => {
+                binary.libraries.push(text(command.string(endian, library.dylib.name)?));
+            }
+            LoadCommandVariant::Rpath(path) => {
+                binary.search_paths.push(text(command.string(endian, path.path)?));
+            }
+            LoadCommandVariant::BuildVersion(version) => {
+                // xxxx.yy.zz
+                let oldest = version.minos.get(endian);
+                binary.needs = Some(Version(oldest >> 16, (oldest >> 8) & 0xff));
+            }
+            LoadCommandVariant::LinkeditData(data) if command.cmd() == macho::LC_CODE_SIGNATURE => {
+                let start = data.dataoff.get(endian) as usize;
+                signature = bytes.get(start..start + data.datasize.get(endian) as usize);
+            }
+            _ => {}
+        }
+    }
+    if binary.architectures == ["arm64"] {
+        binary.signature = match signature {
+            None => Some("it is not signed".into()),
+            Some(signature) => signature_fault(bytes, signature),
+        };
+    }
+    Ok(binary)
+}
+
+fn universal(bytes: &[u8]) -> Result<Binary> {
+    let mut whole: Option<Binary> = None;
+    for part in MachOFatFile32::parse(bytes)?.arches() {
+        let part = macos(part.data(bytes)?)?;
+        let Some(whole) = &mut whole else {
+            whole = Some(part);
+            continue;
+        };
+        whole.exports.retain(|export| part.exports.contains(export));
+        whole.architectures.extend(part.architectures);
+        whole.libraries.extend(part.libraries);
+        whole.search_paths.extend(part.search_paths);
+        whole.needs = whole.needs.max(part.needs);
+        whole.signature = whole.signature.take().or(part.signature);
+    }
+    whole.context("no code in it")
+}
+
+/// Whether the hashes in the code directory of a signature are those of the code: a binary that
+/// was changed after it was signed (stripped, say) is killed.
+fn signature_fault(bytes: &[u8], signature: &[u8]) -> Option<String> {
+    const SIGNATURE: u32 = 0xfade_0cc0; // CSMAGIC_EMBEDDED_SIGNATURE
+    const DIRECTORY: u32 = 0xfade_0c02; // CSMAGIC_CODEDIRECTORY
+    const SHA256: u8 = 2; // CS_HASHTYPE_SHA256
+    let number = |at: usize| {
+        let four = signature.get(at..at + 4)?.try_into().ok()?;
+        Some(u32::from_be_bytes(four) as usize)
+    };
+    let wrong_pages = || {
+        let is = |at, magic: u32| number(at) == Some(magic as usize);
+        if !is(0, SIGNATURE) {
+            return None;
+        }
+        // a magic number, a length, a count, then a type and an offset for each blob
+        let directory =
+            (0..number(8)?).filter_map(|i| number(16 + 8 * i)).find(|at| is(*at, DIRECTORY))?;
+        let hashes = directory + number(directory + 16)?;
+        let (slots, end) = (number(directory + 28)?, number(directory + 32)?);
+        let kind = signature.get(directory + 36..directory + 40)?;
+        if kind[..2] != [32, SHA256] || kind[3] > 16 {
+            return None;
+        }
+        let pages: Vec<_> = bytes.get(..end)?.chunks(1 << kind[3]).collect();
+        let wrong = pages
+            .iter()
+            .enumerate()
+            .filter(|(i, page)| {
+                let hash = signature.get(hashes + 32 * i..hashes + 32 * (i + 1));
+                hash != Some(Sha256::digest(page).as_slice())
+            })
+            .count();
+        Some(if pages.len() == slots { wrong } else { pages.len().max(1) })
+    };
+    match wrong_pages() {
+        None => Some("its signature cannot be read".into()),
+        Some(0) => None,
+        Some(wrong) => Some(format!("{wrong} pages of it differ from what was signed")),
+    }
+}
+
+/// Joins binaries for several architectures of macOS into one universal binary.
+pub fn join(parts: &[Vec<u8>]) -> Result<Vec<u8>> {
+    const ALIGNMENT: u32 = 14; // 2^14: arm64's pages are the larger ones
+    let page = 1 << ALIGNMENT;
+    // the head: magic number, count, then five numbers for each part, all big-endian
+    let mut head = vec![macho::FAT_MAGIC, parts.len() as u32];
+    let mut body = vec![0; page];
+    for part in parts {
+        // type and subtype of the processor follow the magic number of a Mach-O file
+        let number = |at: usize| -> Option<u32> {
+            Some(u32::from_le_bytes(part.get(at..at + 4)?.try_into().ok()?))
+        };
+        let (Some(macho::MH_MAGIC_64), Some(cpu), Some(subtype)) =
+            (number(0), number(4), number(8))
+        else {
+            bail!("a part of the universal binary is no Mach-O file");
+        };
+        body.resize(body.len().next_multiple_of(page), 0);
+        head.extend([cpu, subtype, body.len() as u32, part.len() as u32, ALIGNMENT]);
+        body.extend(part);
+    }
+    for (i, number) in head.into_iter().enumerate() {
+        body[4 * i..4 * i + 4].copy_from_slice(&number.to_be_bytes());
+    }
+    Ok(body)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn good(kind: Kind) -> Binary {
+        let (architectures, library, needs) = match kind {
+            Kind::Linux => (vec!["x86_64"], "libc.so.6", Some(GLIBC)),
+            Kind::Windows => (vec!["x86_64"], "KERNEL32.dll", None),
+            Kind::MacOs => (vec!["x86_64", "arm64"], MACOS_LIBRARIES[0], Some(MACOS)),
+        };
+        Binary {
+            kind,
+            size: 1,
+            architectures,
+            libraries: vec![library.into()],
+            search_paths: Vec::new(),
+            needs,
+            exports: vec!["fmi2DoStep".into()],
+            signature: None,
+        }
+    }
+
+    #[test]
+    fn a_binary_that_needs_only_the_system_has_no_fault() {
+        for kind in [Kind::Linux, Kind::Windows, Kind::MacOs] {
+            assert_eq!(good(kind).faults(&["fmi2DoStep"]), [""; 0], "{kind:?}");
+        }
+    }
+
+    #[test]
+    fn every_fault_is_told_at_once() {
+        let mut linux = good(Kind::Linux);
+        linux.libraries.push("libgcc_s.so.1".into());
+        linux.needs = glibc_version("GLIBC_2.34");
+        linux.exports.push("rust_eh_personality".into());
+        linux.search_paths.push("/opt/lib".into());
+        assert_eq!(
+            linux.faults(&["fmi2DoStep", "fmi2Reset"]),
+            [
+                "it needs libgcc_s.so.1, which is no part of every system",
+                "it needs glibc 2.34; 2.17 must do",
+                "it has the loader search /opt/lib",
+                "it does not export fmi2Reset",
+                "it also exports rust_eh_personality",
+            ]
+        );
+        let mut windows = good(Kind::Windows);
+        windows.libraries.push("VCRUNTIME140.dll".into());
+        assert_eq!(windows.faults(&[]).len(), 1);
+        let mut macos = good(Kind::MacOs);
+        macos.architectures.pop();
+        macos.needs = Some(Version(12, 0));
+        macos.signature = Some("it is not signed".into());
+        assert_eq!(macos.faults(&[]).len(), 3);
+    }
+
+    #[test]
+    fn versions_of_glibc_are_numbers_not_texts() {
+        assert!(glibc_version("GLIBC_2.4") < glibc_version("GLIBC_2.14"));
+        assert_eq!(glibc_version("GLIBC_2.2.5"), Some(Version(2, 2)));
+        assert_eq!(glibc_version("GLIBC_PRIVATE"), None);
+    }
+
+    #[test]
+    fn a_signature_fits_only_the_code_it_was_made_for() {
+        let code = vec![7u8; 5000]; // two pages of 4096
+        let mut directory = vec![0u8; 44];
+        let mut put = |at: usize, number: u32| {
+            directory[at..at + 4].copy_from_slice(&number.to_be_bytes());
+        };
+        put(0, 0xfade_0c02);
+        put(16, 44); // the hashes follow
+        put(28, 2);
+        put(32, 5000);
+        directory[36..40].copy_from_slice(&[32, 2, 0, 12]);
+        let mut signature: Vec<u8> =
+            [0xfade_0cc0u32, 0, 1, 0, 20].iter().flat_map(|n| n.to_be_bytes()).collect();
+        signature.extend(directory);
+        for page in code.chunks(4096) {
+            signature.extend(Sha256::digest(page).iter());
+        }
+        assert_eq!(signature_fault(&code, &signature), None);
+        let mut changed = code.clone();
+        changed[4500] = 8;
+        let fault = signature_fault(&changed, &signature);
+        assert_eq!(fault.as_deref(), Some("1 pages of it differ from what was signed"));
+        assert!(signature_fault(&code, &signature[..30]).is_some());
+    }
+
+    #[test]
+    fn rubbish_is_no_binary() {
+        for bytes in
+            [&b""[..], b"MZ", b"\x7fELF\x02\x01\x01", &[0xca, 0xfe, 0xba, 0xbe, 0, 0, 0, 9]]
+        {
+            assert!(Binary::read(bytes).is_err());
+        }
+        assert!(join(&[b"no Mach-O".to_vec()]).is_err());
+    }
+}
