@@ -163,9 +163,11 @@ fn hub_equation_holds_between_the_outputs() {
         for friction in FRICTION {
             for _ in 0..20 {
                 let p = anywhere(&mut rng, slosh, friction);
-                let mut inputs = Inputs::default();
-                inputs.tau_cmd = Ramp::held(p.hub.inertia * rng.f64());
-                inputs.tau_ext = Ramp::held(p.hub.inertia * rng.f64());
+                let inputs = Inputs {
+                    tau_cmd: Ramp::held(p.hub.inertia * rng.f64()),
+                    tau_ext: Ramp::held(p.hub.inertia * rng.f64()),
+                    ..Inputs::default()
+                };
                 let mut plant = plant(&p, &inputs);
                 let _ = plant.step(&inputs, 0.3);
                 let o = plant.outputs(&inputs);

@@ -154,7 +154,7 @@ fn differences(name: &str, fill: &Fill, run: &Run, tolerance: f64) -> Vec<String
     let allowed = f64::max(1e-8, 10f64.powf(-run.digits));
     let mut wrong: Vec<String> = largest_error
         .iter()
-        .filter(|(_, error)| !(**error <= allowed))
+        .filter(|(_, error)| **error > allowed || error.is_nan())
         .map(|(signal, error)| format!("{name}: {signal} is off by {error:.1e} of its maximum"))
         .collect();
     if run.friction == "stribeck" {

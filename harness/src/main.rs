@@ -35,7 +35,9 @@ enum Command {
 
 /// Builds the FMU's binary and packs it.
 #[derive(Args)]
-#[command(after_help = "Examples:\n  hubslosh pack --out dist/HubSlosh.fmu\n  hubslosh pack --all-platforms")]
+#[command(
+    after_help = "Examples:\n  hubslosh pack --out dist/HubSlosh.fmu\n  hubslosh pack --all-platforms"
+)]
 struct PackArgs {
     /// Where to put the FMU.
     #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
