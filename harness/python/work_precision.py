@@ -42,16 +42,16 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGES = ROOT / "modelDescription" / "documentation"
 SWEEP = 2700.0  # s
 STEP = 0.02  # s
-COUNTED = (40.0, 140.0)  # s of sweep between which instructions are counted
+COUNTED = (10.0, 30.0)  # s of sweep between which instructions are counted
 
 RUST = {
     "HubSlosh, linear": ("linear", [f"1e-{n}" for n in range(2, 12)]),
     "HubSlosh, spherical": ("spherical", [f"1e-{n}" for n in range(2, 12)]),
     "ode_solvers Dopri5": ("dopri5", [f"1e-{n}" for n in range(3, 12)]),
     "ode_solvers Dop853": ("dop853", [f"1e-{n}" for n in range(3, 12)]),
-    "RK4, fixed step": ("rk4", ["5e-3", "1e-3", "2e-4", "5e-5", "1e-5"]),
+    "RK4, fixed step": ("rk4", ["5e-3", "1e-3", "2e-4", "5e-5"]),
 }
-SCIPY = {"SciPy RK45": ("RK45", [1e-4, 1e-6, 1e-8]), "SciPy LSODA": ("LSODA", [1e-5, 1e-7, 1e-9])}
+SCIPY = {"SciPy RK45": ("RK45", [1e-4, 1e-6]), "SciPy LSODA": ("LSODA", [1e-5, 1e-7, 1e-9])}
 
 
 def build() -> Path:
@@ -185,9 +185,10 @@ def main() -> None:
     for name, (method, tolerances) in RUST.items():
         exact = reference["spherical" if method == "spherical" else "linear"]
         for tolerance in tolerances:
-            # The fastest of three: other programs only ever add time.
-            runs = [run(program, method, tolerance, str(SWEEP), exact) for _ in range(3)]
-            cost, error = min(runs)
+            # The fastest of three, of one that is slow: other programs only ever add time.
+            cost, error = run(program, method, tolerance, str(SWEEP), exact)
+            for _ in range(2 if cost < 2e4 else 0):
+                cost = min(cost, run(program, method, tolerance, str(SWEEP), exact)[0])
             count = instructions(program, method, tolerance)
             all_points.setdefault(name, []).append((tolerance, cost, error, count))
             print(f"{name:20} {tolerance:6} {error:.1e} rad/s {cost:9.0f} ns", flush=True)
@@ -219,7 +220,7 @@ def main() -> None:
         "![work-precision diagram](work_precision.svg)",
         "",
         f"One RK4 step of 5 ms on the same equations took {unit:.0f} ns; it is the unit of cost. "
-        "Instructions are callgrind's and repeat on any machine; times are the least of three. "
+        "Instructions are callgrind's and repeat on any machine; times are the least of three (of one where a run takes seconds). "
         "The FMU's cost is that of the whole round through its C interface: two sets, "
         "fmi2DoStep, one get.",
         "",
