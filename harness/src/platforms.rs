@@ -77,8 +77,9 @@ pub const PLATFORMS: [Platform; 3] = [
         ],
         tools: &[CARGO_ZIGBUILD, ZIG],
         cargo: Cargo::Zig,
-        // hosts load it by its path; the name must not be that of a folder on this machine
-        link: &["-Wl,-install_name,@rpath/HubSlosh.dylib"],
+        // Hosts load it by its path; its name must not be that of a folder on this machine. Without
+        // debug information (-S) the identifier that zig gives it does not depend on one either.
+        link: &["-Wl,-install_name,@rpath/HubSlosh.dylib", "-Wl,-S"],
     },
     Platform {
         folder: "linux64",
