@@ -107,7 +107,7 @@ pub(crate) fn cargo_build(mut command: Command, quiet: bool) -> Result<PathBuf> 
     let built = command
         .stderr(Stdio::inherit())
         .output()
-        .context("cargo cannot be run; building the FMU needs Rust (https://rustup.rs)")?;
+        .context("cargo cannot be run; building the FMU needs Rust")?;
     if !built.status.success() {
         bail!("the FMU's binary did not build");
     }
