@@ -699,14 +699,17 @@ impl Instance {
 
     /// What the plant shows now; it is computed when it is first asked for.
     fn shown(&mut self, call: &Call) -> Result<&Outputs, Fault> {
-        let mut shown = match self.shown {
-            Some(shown) => shown,
-            None => self.look(call, |plant, inputs| plant.outputs_held(inputs))?,
-        };
-        if let Some(regime) = self.regime {
-            shown.regime = regime;
+        if self.shown.is_none() {
+            self.shown = Some(self.look(call, |plant, inputs| plant.outputs_held(inputs))?);
         }
-        Ok(self.shown.insert(shown))
+        match (&mut self.shown, self.regime) {
+            (Some(shown), Some(regime)) => {
+                shown.regime = regime;
+                Ok(shown)
+            }
+            (Some(shown), None) => Ok(shown),
+            (None, _) => Err(call.error("the outputs were not computed")),
+        }
     }
 
     /// Looks at the plant: in Co-Simulation with the contact that the present inputs

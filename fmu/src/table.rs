@@ -605,10 +605,24 @@ pub fn parameters() -> impl Iterator<Item = &'static Variable> {
     TABLE.iter().filter(|v| v.causality == Causality::Parameter)
 }
 
+/// Places of the inputs in the table, found once: every step goes through them.
+static INPUTS: [usize; 3] = {
+    let (mut places, mut found, mut place) = ([0; 3], 0, 0);
+    while place < TABLE.len() {
+        if matches!(TABLE[place].access, Access::Input(_)) {
+            places[found] = place;
+            found += 1;
+        }
+        place += 1;
+    }
+    assert!(found == places.len(), "as many as there are inputs");
+    places
+};
+
 /// The inputs' accessors, in the table's order.
 pub fn ramps() -> impl Iterator<Item = (&'static Variable, fn(&mut Inputs) -> &mut Ramp)> {
-    TABLE.iter().filter_map(|v| match v.access {
-        Access::Input(ramp) => Some((v, ramp)),
+    INPUTS.iter().filter_map(|&place| match TABLE[place].access {
+        Access::Input(ramp) => Some((&TABLE[place], ramp)),
         _ => None,
     })
 }
