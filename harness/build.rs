@@ -1,7 +1,9 @@
-//! Compiles the one piece of C there is: the logger a host must hand to an FMU
-//! is variadic, and stable Rust cannot define a variadic function.
+//! Compiles the pieces of C there are: the logger a host must hand to an FMU is variadic, and
+//! stable Rust cannot define a variadic function; what an FMU shares with its host (floating-point
+//! control, locale, signals) is C's to tell.
 
 fn main() {
     println!("cargo::rerun-if-changed=src/logger.c");
-    cc::Build::new().file("src/logger.c").compile("hubslosh_logger");
+    println!("cargo::rerun-if-changed=src/host_state.c");
+    cc::Build::new().file("src/logger.c").file("src/host_state.c").compile("hubslosh_host");
 }

@@ -162,8 +162,11 @@ fn binary_exports_the_functions_of_fmi_and_nothing_else() {
         .map(String::from)
         .collect();
     assert!(!binaries.is_empty());
-    let expected: BTreeSet<String> =
-        Fmu::symbols().iter().chain(Fmu::exchange_symbols()).map(|s| s.to_string()).collect();
+    let expected: BTreeSet<String> = [Fmu::symbols(), Fmu::step_symbols(), Fmu::exchange_symbols()]
+        .concat()
+        .iter()
+        .map(|s| s.to_string())
+        .collect();
     assert_eq!(expected.len(), 44);
     for name in binaries {
         let mut bytes = Vec::new();

@@ -28,6 +28,9 @@ pub struct ModelDescription {
     /// Present if the FMU brings its own solver, as this host needs.
     #[serde(rename = "CoSimulation")]
     pub co_simulation: Option<CoSimulation>,
+    /// Present if the host may integrate.
+    #[serde(rename = "ModelExchange")]
+    pub model_exchange: Option<ModelExchange>,
     /// Units, with those that people like to see them in.
     #[serde(rename = "UnitDefinitions", default)]
     pub units: UnitDefinitions,
@@ -45,6 +48,14 @@ pub struct ModelDescription {
 /// Element `CoSimulation`.
 #[derive(Clone, Debug, Deserialize)]
 pub struct CoSimulation {
+    /// Name of the binary, without the platform's ending.
+    #[serde(rename = "@modelIdentifier")]
+    pub model_identifier: String,
+}
+
+/// Element `ModelExchange`.
+#[derive(Clone, Debug, Deserialize)]
+pub struct ModelExchange {
     /// Name of the binary, without the platform's ending.
     #[serde(rename = "@modelIdentifier")]
     pub model_identifier: String,

@@ -5,6 +5,7 @@
 //! The only unsafe code of the harness is in this file.
 #![allow(unsafe_code)]
 
+use std::cell::Cell;
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::fs::File;
 use std::io::Read;
@@ -111,6 +112,9 @@ unsafe extern "C" {
         format: *const c_char,
         ...
     );
+    fn hubslosh_float_control() -> u32;
+    fn hubslosh_locale() -> *const c_char;
+    fn hubslosh_signal_handlers() -> u64;
     fn calloc(count: usize, size: usize) -> *mut c_void;
     fn free(memory: *mut c_void);
 }
@@ -154,7 +158,7 @@ macro_rules! functions {
     };
 }
 
-// What a co-simulation FMU must export.
+// What every FMU must export.
 functions! { Functions:
     get_types_platform "fmi2GetTypesPlatform" unsafe extern "C" fn() -> *const c_char;
     get_version "fmi2GetVersion" unsafe extern "C" fn() -> *const c_char;
@@ -181,6 +185,10 @@ functions! { Functions:
     serialize_fmu_state "fmi2SerializeFMUstate" unsafe extern "C" fn(Component, State, *mut c_char, usize) -> c_int;
     deserialize_fmu_state "fmi2DeSerializeFMUstate" unsafe extern "C" fn(Component, *const c_char, usize, *mut State) -> c_int;
     get_directional_derivative "fmi2GetDirectionalDerivative" unsafe extern "C" fn(Component, Refs, usize, Refs, usize, *const Real, *mut Real) -> c_int;
+}
+
+// What a co-simulation FMU must export besides.
+functions! { StepFunctions:
     set_real_input_derivatives "fmi2SetRealInputDerivatives" unsafe extern "C" fn(Component, Refs, usize, *const c_int, *const Real) -> c_int;
     get_real_output_derivatives "fmi2GetRealOutputDerivatives" unsafe extern "C" fn(Component, Refs, usize, *const c_int, *mut Real) -> c_int;
     do_step "fmi2DoStep" unsafe extern "C" fn(Component, Real, Real, c_int) -> c_int;
@@ -192,8 +200,7 @@ functions! { Functions:
     get_string_status "fmi2GetStringStatus" GetStatus<*const c_char>;
 }
 
-// What a model exchange FMU must export besides (and fmi2SetRealInputDerivatives to
-// fmi2GetStringStatus, above, not).
+// What a model exchange FMU must export besides.
 functions! { ExchangeFunctions:
     enter_event_mode "fmi2EnterEventMode" Call;
     new_discrete_states "fmi2NewDiscreteStates" unsafe extern "C" fn(Component, *mut EventInfo) -> c_int;
@@ -220,19 +227,55 @@ pub struct EventInfo {
     pub next_event_time: f64,
 }
 
+/// What of this process an FMU shares with its host and must leave as it is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct HostState {
+    /// Rounding mode, exception masks and flushing of small numbers.
+    pub float_control: u32,
+    /// The C library's locale.
+    pub locale: String,
+    /// A fingerprint of the signal handlers; 0 where there are none.
+    pub signal_handlers: u64,
+}
+
+impl HostState {
+    /// As it is now.
+    pub fn now() -> Self {
+        // SAFETY: the three take nothing; the locale's name is a terminated string of the C library.
+        unsafe {
+            HostState {
+                float_control: hubslosh_float_control(),
+                locale: CStr::from_ptr(hubslosh_locale()).to_string_lossy().into_owned(),
+                signal_handlers: hubslosh_signal_handlers(),
+            }
+        }
+    }
+}
+
+/// All files below a folder; none if it cannot be read.
+fn files_below(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let below = entries.flat_map(|entry| match entry.path() {
+        path if path.is_dir() => files_below(&path),
+        path => vec![path],
+    });
+    below.collect()
+}
+
 // ---------------------------------------------------------------- the FMU
 
 /// An opened FMU: unpacked to a temporary directory, its binary loaded.
 pub struct Fmu {
     description: ModelDescription,
     functions: Functions,
+    stepping: Option<StepFunctions>,
     exchange: Option<ExchangeFunctions>,
     resources: String,
     hash: String,
     path: PathBuf,
     // dropped in this order: first the code, then the files
     _library: Library,
-    _directory: tempfile::TempDir,
+    _directory: Option<tempfile::TempDir>,
 }
 
 impl Fmu {
@@ -254,7 +297,24 @@ impl Fmu {
             format!("{name} cannot be unpacked to {}", directory.path().display())
         })?;
 
-        let xml = directory.path().join("modelDescription.xml");
+        let mut fmu = Fmu::load(directory.path(), &path)?;
+        let description = &fmu.description;
+        if description.fmi_version != "2.0" {
+            bail!("{name} is of FMI version {}; this host drives 2.0", description.fmi_version);
+        }
+        if description.co_simulation.is_none() {
+            bail!("{name} offers no co-simulation; this host drives nothing else");
+        }
+        fmu.hash = hash;
+        fmu._directory = Some(directory);
+        Ok(fmu)
+    }
+
+    /// Loads the binary of an FMU that is unpacked in `directory`, for co-simulation, model exchange
+    /// or both; errors speak of `path`. [`Fmu::hash`] is empty.
+    pub fn load(directory: &Path, path: &Path) -> Result<Self> {
+        let name = path.display();
+        let xml = directory.join("modelDescription.xml");
         if !xml.exists() {
             bail!("{name} is not an FMU: it has no modelDescription.xml");
         }
@@ -262,54 +322,51 @@ impl Fmu {
             .with_context(|| format!("modelDescription.xml in {name} cannot be read"))?;
         let description =
             ModelDescription::from_xml(&text).with_context(|| format!("{name} cannot be used"))?;
-        if description.fmi_version != "2.0" {
-            bail!("{name} is of FMI version {}; this host drives 2.0", description.fmi_version);
-        }
-        let Some(co_simulation) = &description.co_simulation else {
-            bail!("{name} offers no co-simulation; this host drives nothing else");
-        };
-        let binary = format!(
-            "binaries/{PLATFORM}/{}{}",
-            co_simulation.model_identifier,
-            std::env::consts::DLL_SUFFIX
-        );
-        let binary_path = directory.path().join(&binary);
+        let interface = description.co_simulation.as_ref();
+        let identifier = interface
+            .map(|i| &i.model_identifier)
+            .or(description.model_exchange.as_ref().map(|i| &i.model_identifier))
+            .with_context(|| format!("{name} offers neither co-simulation nor model exchange"))?;
+        let binary = format!("binaries/{PLATFORM}/{identifier}{}", std::env::consts::DLL_SUFFIX);
+        let binary_path = directory.join(&binary);
         if !binary_path.exists() {
-            let there: Vec<_> = archive
-                .file_names()
-                .flatten()
-                .filter(|n| n.starts_with("binaries/") && !n.ends_with('/'))
-                .collect();
+            let mut there = files_below(&directory.join("binaries"))
+                .iter()
+                .filter_map(|file| file.strip_prefix(directory).ok())
+                .map(|file| file.display().to_string())
+                .collect::<Vec<_>>();
+            there.sort();
             let there = if there.is_empty() { "none".into() } else { there.join(", ") };
             bail!("{name} has no binary for this platform, {binary} (binaries in it: {there})");
         }
         // SAFETY: loading runs the library's initialisers; that is what opening an FMU means.
         let library = unsafe { Library::new(&binary_path) }
             .with_context(|| format!("{binary} in {name} cannot be loaded"))?;
-        let missing: Vec<&str> = Functions::SYMBOLS
-            .iter()
-            // SAFETY: only asked whether the symbol is there.
-            .filter(|symbol| unsafe { library.get::<*const c_void>(**symbol) }.is_err())
-            .copied()
-            .collect();
-        if !missing.is_empty() {
-            bail!("{binary} in {name} lacks {}", missing.join(", "));
+        let mut needed = Functions::SYMBOLS.to_vec();
+        if description.co_simulation.is_some() {
+            needed.extend(StepFunctions::SYMBOLS);
+        }
+        // SAFETY: only asked whether the symbol is there.
+        needed.retain(|symbol| unsafe { library.get::<*const c_void>(*symbol) }.is_err());
+        if !needed.is_empty() {
+            bail!("{binary} in {name} lacks {}", needed.join(", "));
         }
         // SAFETY: the binary says it follows FMI 2.0, whose types are declared above.
         let functions = unsafe { Functions::load(&library) }
             .with_context(|| format!("{binary} in {name} cannot be used"))?;
-        // SAFETY: as above; an FMU without model exchange lacks them, and nothing is wrong.
-        let exchange = unsafe { ExchangeFunctions::load(&library) }.ok();
-        let resources = format!("file://{}/resources", directory.path().display());
+        // SAFETY: as above; an FMU of one interface lacks the other's, and nothing is wrong.
+        let (stepping, exchange) =
+            unsafe { (StepFunctions::load(&library).ok(), ExchangeFunctions::load(&library).ok()) };
         Ok(Fmu {
             description,
             functions,
+            stepping,
             exchange,
-            resources,
-            hash,
-            path,
+            resources: format!("file://{}/resources", directory.display()),
+            hash: String::new(),
+            path: path.to_path_buf(),
             _library: library,
-            _directory: directory,
+            _directory: None,
         })
     }
 
@@ -328,13 +385,17 @@ impl Fmu {
         &self.path
     }
 
-    /// Names of the C functions every co-simulation FMU must export.
+    /// Names of the 25 C functions every FMU must export.
     pub fn symbols() -> &'static [&'static str] {
         Functions::SYMBOLS
     }
 
-    /// Names of the C functions every model exchange FMU must export besides, nine of those
-    /// above being of co-simulation alone.
+    /// Names of the 9 C functions every co-simulation FMU must export besides.
+    pub fn step_symbols() -> &'static [&'static str] {
+        StepFunctions::SYMBOLS
+    }
+
+    /// Names of the 10 C functions every model exchange FMU must export besides.
     pub fn exchange_symbols() -> &'static [&'static str] {
         ExchangeFunctions::SYMBOLS
     }
@@ -403,7 +464,14 @@ impl Fmu {
             unsafe { callbacks.write_bytes(0, 1) };
         }
         // A NULL component never reaches the FMU again: Drop frees only the sink.
-        let instance = Instance { fmu: self, component, sink, callbacks, one_thread: PhantomData };
+        let instance = Instance {
+            fmu: self,
+            component,
+            sink,
+            callbacks,
+            warned: Cell::new(None),
+            one_thread: PhantomData,
+        };
         if component.is_null() {
             let messages = instance.take_messages();
             return Err(CallError { call: CALL, status: Status::Error, messages });
@@ -447,24 +515,31 @@ impl Fmu {
                     "fmi2GetDirectionalDerivative",
                     (f.get_directional_derivative)(c, null(), 0, null(), 0, null(), null_mut()),
                 ),
-                (
-                    "fmi2SetRealInputDerivatives",
-                    (f.set_real_input_derivatives)(c, null(), 0, null(), null()),
-                ),
-                (
-                    "fmi2GetRealOutputDerivatives",
-                    (f.get_real_output_derivatives)(c, null(), 0, null(), null_mut()),
-                ),
-                ("fmi2DoStep", (f.do_step)(c, 0.0, 1.0, 0)),
-                ("fmi2CancelStep", (f.cancel_step)(c)),
-                ("fmi2GetStatus", (f.get_status)(c, 0, &mut i)),
-                ("fmi2GetRealStatus", (f.get_real_status)(c, 2, &mut x)),
-                ("fmi2GetIntegerStatus", (f.get_integer_status)(c, 0, &mut i)),
-                ("fmi2GetBooleanStatus", (f.get_boolean_status)(c, 3, &mut i)),
-                ("fmi2GetStringStatus", (f.get_string_status)(c, 1, &mut t)),
             ]
         };
         let mut answers = answers.to_vec();
+        if let Some(f) = &self.stepping {
+            // SAFETY: as above.
+            answers.extend(unsafe {
+                [
+                    (
+                        "fmi2SetRealInputDerivatives",
+                        (f.set_real_input_derivatives)(c, null(), 0, null(), null()),
+                    ),
+                    (
+                        "fmi2GetRealOutputDerivatives",
+                        (f.get_real_output_derivatives)(c, null(), 0, null(), null_mut()),
+                    ),
+                    ("fmi2DoStep", (f.do_step)(c, 0.0, 1.0, 0)),
+                    ("fmi2CancelStep", (f.cancel_step)(c)),
+                    ("fmi2GetStatus", (f.get_status)(c, 0, &mut i)),
+                    ("fmi2GetRealStatus", (f.get_real_status)(c, 2, &mut x)),
+                    ("fmi2GetIntegerStatus", (f.get_integer_status)(c, 0, &mut i)),
+                    ("fmi2GetBooleanStatus", (f.get_boolean_status)(c, 3, &mut i)),
+                    ("fmi2GetStringStatus", (f.get_string_status)(c, 1, &mut t)),
+                ]
+            });
+        }
         if let Some(f) = &self.exchange {
             // SAFETY: as above.
             answers.extend(unsafe {
@@ -568,6 +643,7 @@ pub struct Instance<'fmu> {
     component: Component,
     sink: *mut Sink,
     callbacks: *mut CallbackFunctions,
+    warned: Cell<Option<&'static str>>,
     one_thread: PhantomData<*mut ()>,
 }
 
@@ -605,9 +681,18 @@ impl<'fmu> Instance<'fmu> {
         std::mem::take(&mut *sink.messages.lock().unwrap_or_else(|poisoned| poisoned.into_inner()))
     }
 
+    /// The last call that returned fmi2Warning since somebody asked.
+    pub fn take_warning(&self) -> Option<&'static str> {
+        self.warned.take()
+    }
+
     fn check(&self, call: &'static str, status: c_int) -> Called {
         match Status::from(status) {
-            Status::Ok | Status::Warning => Ok(()),
+            Status::Ok => Ok(()),
+            Status::Warning => {
+                self.warned.set(Some(call));
+                Ok(())
+            }
             status => Err(CallError { call, status, messages: self.take_messages() }),
         }
     }
@@ -681,7 +766,7 @@ impl<'fmu> Instance<'fmu> {
     /// fmi2CancelStep.
     pub fn cancel_step(&mut self) -> Called {
         // SAFETY: see above.
-        let status = unsafe { (self.fmu.functions.cancel_step)(self.component) };
+        let status = unsafe { (self.stepping().cancel_step)(self.component) };
         self.check("fmi2CancelStep", status)
     }
 
@@ -695,7 +780,7 @@ impl<'fmu> Instance<'fmu> {
     pub fn do_step_keeping(&mut self, time: f64, step: f64, forget: bool) -> Called {
         // SAFETY: plain values on a live instance.
         let status =
-            unsafe { (self.fmu.functions.do_step)(self.component, time, step, forget.into()) };
+            unsafe { (self.stepping().do_step)(self.component, time, step, forget.into()) };
         self.check("fmi2DoStep", status)
     }
 
@@ -842,7 +927,7 @@ impl<'fmu> Instance<'fmu> {
         assert!(references.len() == orders.len() && orders.len() == values.len());
         // SAFETY: see get_real.
         let status = unsafe {
-            (self.fmu.functions.set_real_input_derivatives)(
+            (self.stepping().set_real_input_derivatives)(
                 self.component,
                 references.as_ptr(),
                 references.len(),
@@ -863,7 +948,7 @@ impl<'fmu> Instance<'fmu> {
         assert!(references.len() == orders.len() && orders.len() == values.len());
         // SAFETY: see get_real.
         let status = unsafe {
-            (self.fmu.functions.get_real_output_derivatives)(
+            (self.stepping().get_real_output_derivatives)(
                 self.component,
                 references.as_ptr(),
                 references.len(),
@@ -1022,7 +1107,7 @@ impl<'fmu> Instance<'fmu> {
     pub fn status(&mut self, kind: i32) -> Called<i32> {
         let mut value = 0;
         // SAFETY: a place for the answer; so in the next four.
-        let status = unsafe { (self.fmu.functions.get_status)(self.component, kind, &mut value) };
+        let status = unsafe { (self.stepping().get_status)(self.component, kind, &mut value) };
         self.check("fmi2GetStatus", status).map(|()| value)
     }
 
@@ -1030,8 +1115,7 @@ impl<'fmu> Instance<'fmu> {
     pub fn real_status(&mut self, kind: i32) -> Called<f64> {
         let mut value = 0.0;
         // SAFETY: see status.
-        let status =
-            unsafe { (self.fmu.functions.get_real_status)(self.component, kind, &mut value) };
+        let status = unsafe { (self.stepping().get_real_status)(self.component, kind, &mut value) };
         self.check("fmi2GetRealStatus", status).map(|()| value)
     }
 
@@ -1040,7 +1124,7 @@ impl<'fmu> Instance<'fmu> {
         let mut value = 0;
         // SAFETY: see status.
         let status =
-            unsafe { (self.fmu.functions.get_integer_status)(self.component, kind, &mut value) };
+            unsafe { (self.stepping().get_integer_status)(self.component, kind, &mut value) };
         self.check("fmi2GetIntegerStatus", status).map(|()| value)
     }
 
@@ -1049,7 +1133,7 @@ impl<'fmu> Instance<'fmu> {
         let mut value = 0;
         // SAFETY: see status.
         let status =
-            unsafe { (self.fmu.functions.get_boolean_status)(self.component, kind, &mut value) };
+            unsafe { (self.stepping().get_boolean_status)(self.component, kind, &mut value) };
         self.check("fmi2GetBooleanStatus", status).map(|()| value != 0)
     }
 
@@ -1058,7 +1142,7 @@ impl<'fmu> Instance<'fmu> {
         let mut value = null();
         // SAFETY: see status.
         let status =
-            unsafe { (self.fmu.functions.get_string_status)(self.component, kind, &mut value) };
+            unsafe { (self.stepping().get_string_status)(self.component, kind, &mut value) };
         self.check("fmi2GetStringStatus", status)?;
         if value.is_null() {
             return Ok(String::new());
@@ -1068,6 +1152,11 @@ impl<'fmu> Instance<'fmu> {
     }
 
     // ------------------------------------------------ model exchange
+
+    fn stepping(&self) -> &'fmu StepFunctions {
+        let functions = self.fmu.stepping.as_ref();
+        functions.expect("the FMU exports the functions of co-simulation")
+    }
 
     fn exchange(&self) -> &'fmu ExchangeFunctions {
         let functions = self.fmu.exchange.as_ref();
@@ -1176,6 +1265,25 @@ impl<'fmu> Instance<'fmu> {
         let status =
             unsafe { (self.fmu.functions.set_real)(self.component, null(), count, null()) };
         self.check("fmi2SetReal", status)
+    }
+
+    /// fmi2Get… and fmi2Set… of each type without variables and with NULL pointers, which must be fine.
+    pub fn nothing_null(&mut self) -> [(&'static str, Status); 8] {
+        let (f, c) = (&self.fmu.functions, self.component);
+        // SAFETY: see get_real_null.
+        let answers = unsafe {
+            [
+                ("fmi2GetReal", (f.get_real)(c, null(), 0, null_mut())),
+                ("fmi2GetInteger", (f.get_integer)(c, null(), 0, null_mut())),
+                ("fmi2GetBoolean", (f.get_boolean)(c, null(), 0, null_mut())),
+                ("fmi2GetString", (f.get_string)(c, null(), 0, null_mut())),
+                ("fmi2SetReal", (f.set_real)(c, null(), 0, null())),
+                ("fmi2SetInteger", (f.set_integer)(c, null(), 0, null())),
+                ("fmi2SetBoolean", (f.set_boolean)(c, null(), 0, null())),
+                ("fmi2SetString", (f.set_string)(c, null(), 0, null())),
+            ]
+        };
+        answers.map(|(call, status)| (call, status.into()))
     }
 
     /// fmi2SetString with one NULL text.

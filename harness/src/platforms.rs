@@ -135,7 +135,7 @@ pub fn build() -> Result<Vec<Built>> {
             Err(parts) => binary::join(&parts)?,
         };
         let binary = Binary::read(&bytes).with_context(|| platform.folder)?;
-        let wanted = [Fmu::symbols(), Fmu::exchange_symbols()].concat();
+        let wanted = [Fmu::symbols(), Fmu::step_symbols(), Fmu::exchange_symbols()].concat();
         let found = binary.faults(&wanted);
         faults.extend(found.iter().map(|fault| format!("\n  {}: {fault}", platform.folder)));
         for folder in bench.private() {

@@ -1,0 +1,42 @@
+/* What an FMU shares with its host and must leave as it is. */
+#include <fenv.h>
+#include <locale.h>
+#include <signal.h>
+#include <stddef.h>
+#include <stdint.h>
+#if defined(__x86_64__) || defined(_M_X64)
+#include <xmmintrin.h>
+#endif
+
+/* Rounding mode, exception masks, flushing of small numbers; not the flags of what has happened,
+ * which every computation sets. */
+uint32_t hubslosh_float_control(void)
+{
+#if defined(__x86_64__) || defined(_M_X64)
+    return _mm_getcsr() & ~0x3fu;
+#else
+    return (uint32_t)fegetround();
+#endif
+}
+
+const char *hubslosh_locale(void)
+{
+    const char *name = setlocale(LC_ALL, NULL);
+    return name ? name : "";
+}
+
+/* FNV-1a over the handlers of all signals. */
+uint64_t hubslosh_signal_handlers(void)
+{
+    uint64_t hash = 0;
+#if defined(__unix__) || defined(__APPLE__)
+    int signal;
+    hash = 14695981039346656037u;
+    for (signal = 1; signal < 32; signal++) {
+        struct sigaction action;
+        if (sigaction(signal, NULL, &action) == 0)
+            hash = (hash ^ (uint64_t)(uintptr_t)action.sa_handler) * 1099511628211u;
+    }
+#endif
+    return hash;
+}
