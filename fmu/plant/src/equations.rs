@@ -234,7 +234,10 @@ impl Plant {
     /// nothing has changed.
     pub fn take_event(&mut self, inputs: &Inputs) -> Result<bool, StepError> {
         let (before, time) = (self.continuous_states(), self.state.time);
-        if self.next_time_event().is_some_and(|due| time - due > SAMPLES_AT_ONCE / self.imu.rate) {
+        let period = 1.0 / self.imu.rate;
+        // Too many, or so far from zero that the clock can't tell one sample from the next.
+        let endless = |due| time - due > SAMPLES_AT_ONCE * period || time + period <= time;
+        if self.next_time_event().is_some_and(endless) {
             return Err(StepError::TooManySteps { time });
         }
         if self.wheel.enabled {
@@ -521,6 +524,24 @@ mod tests {
         assert!(plant.take_event(&inputs).is_err());
         plant.set_time(before.time);
         assert_eq!(*plant.state(), before);
+        // Where seconds are the smallest difference there is.
+        let mut plant = Plant::new(&p, &inputs, 1e16, 1e-9).unwrap();
+        assert!(plant.take_event(&inputs).is_err());
+    }
+
+    #[test]
+    fn a_step_with_more_samples_than_allowed_is_refused_at_once() {
+        let mut p = Parameters::default();
+        p.slosh.model = SloshModel::Frozen;
+        p.imu.enabled = true;
+        let inputs = Inputs::default();
+        let mut plant = Plant::new(&p, &inputs, 0.0, 1e-9).unwrap();
+        let before = *plant.state();
+        // Hub and liquid rest: one step of the integrator, and 5e13 samples.
+        let refused = plant.step(&inputs, 1e12);
+        assert!(matches!(refused, Err(StepError::TooManySteps { .. })), "{refused:?}");
+        assert_eq!(*plant.state(), before);
+        plant.step(&inputs, 100.0).unwrap();
     }
 
     #[test]

@@ -6,7 +6,7 @@
 
 use crate::friction::{Contact, Law};
 use crate::imu::Gyro;
-use crate::motion::{Motion, StepError};
+use crate::motion::{MAX_STEPS, Motion, StepError};
 use crate::slosh::linear::Linear;
 use crate::slosh::paraboloid::Paraboloid;
 use crate::slosh::planar::Planar;
@@ -193,7 +193,9 @@ impl State {
             *q = number(12 + j);
         }
         let finite = (0..Self::WORDS - 2).all(|j| number(j).is_finite());
-        finite.then_some(State {
+        // Beyond this the samples' instants can't be told apart.
+        let countable = words[1] <= 1 << f64::MANTISSA_DIGITS;
+        (finite && countable).then_some(State {
             time: number(0),
             theta: number(1),
             omega: number(2),
@@ -389,6 +391,11 @@ impl Plant {
         let begin = state.time;
         let (mut t, mut steps) = (0.0, 0);
         while t < h {
+            // A piece of no length takes no step of the integrator; it counts as one.
+            steps += 1;
+            if steps > MAX_STEPS {
+                return Err(StepError::TooManySteps { time: begin + t });
+            }
             let now = |x: Ramp| Ramp { value: x.at(t), slope: x.slope };
             let (length, torque, speed) =
                 self.wheel.next(state.wheel_speed, now(inputs.tau_cmd), h - t);

@@ -26,24 +26,26 @@ impl Imu {
         Gyro { next: 0, bias: self.bias_instability / 0.664 * spread, held: 0.0 }
     }
 
-    /// Takes the samples that fall due within `length` from `since_start` on, both s;
-    /// `omega` is the hub's rate as a function of the time within. Returns their number.
+    /// Takes the samples that fall due within `length` from `since_start` on, both s, but
+    /// one more than `allowed` at most; `omega` is the hub's rate as a function of the time
+    /// within. Returns their number.
     pub(crate) fn follow(
         &self,
         gyro: &mut Gyro,
         since_start: f64,
         length: f64,
         omega: impl Fn(f64) -> f64,
+        allowed: usize,
     ) -> usize {
-        let first = gyro.next;
-        loop {
+        for taken in 0..=allowed {
             let due = gyro.next as f64 / self.rate - since_start;
             // Communication points meet sampling instants only to rounding.
             if due > length + 1e-9 / self.rate {
-                return (gyro.next - first) as usize;
+                return taken;
             }
             self.sample(gyro, omega(due.max(0.0).min(length)));
         }
+        allowed + 1
     }
 
     /// Takes the next sample of the rate `omega`.

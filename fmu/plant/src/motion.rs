@@ -21,7 +21,7 @@ const NOTHING: f64 = 1e-6;
 
 /// The integrator's steps, and the gyro's samples, that one call may take: one mode needs a
 /// fraction of a second for them, ten spherical ones some six seconds.
-const MAX_STEPS: usize = 200_000;
+pub(crate) const MAX_STEPS: usize = 200_000;
 
 /// The lowest order that is trusted to show that a series has converged.
 const MIN_ORDER: usize = 5;
@@ -299,7 +299,11 @@ impl Motion {
             if imu.enabled {
                 let since_start = begin + t - state.start_time;
                 let omega = |s| series::value(&self.hub.omega, n, s);
-                *steps += imu.follow(&mut state.gyro, since_start, length, omega);
+                let allowed = MAX_STEPS - *steps;
+                *steps += imu.follow(&mut state.gyro, since_start, length, omega, allowed);
+                if *steps > MAX_STEPS {
+                    return Err(StepError::TooManySteps { time: begin + t });
+                }
             }
             let stuck = contact == Contact::Stuck;
             state.work += series::integral(&self.work, n - 1, length);
