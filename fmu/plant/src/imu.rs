@@ -52,8 +52,10 @@ impl Imu {
     pub(crate) fn sample(&self, gyro: &mut Gyro, omega: f64) {
         let (white, wander) = normals(self.seed, gyro.next);
         let reading = omega + gyro.bias + self.arw * libm::sqrt(self.rate) * white;
-        gyro.held =
-            if self.lsb > 0.0 { libm::rint(reading / self.lsb) * self.lsb } else { reading };
+        let steps = libm::rint(reading / self.lsb);
+        // Steps too small to be seen change nothing; no steps (0) are not even a number.
+        let seen = steps.abs() < 1e16;
+        gyro.held = if seen { steps * self.lsb } else { reading };
         let keep = libm::exp(-1.0 / (self.rate * self.bias_time));
         let spread = self.bias_instability / 0.664 * libm::sqrt(1.0 - keep * keep);
         gyro.bias = keep * gyro.bias + spread * wander;
@@ -123,5 +125,11 @@ mod tests {
         let steps = gyro.held / imu.lsb;
         assert!((steps - steps.round()).abs() < 1e-9);
         assert!((gyro.held - 0.012_3).abs() < 2.5e-3, "within noise and half a step");
+        for lsb in [0.0, 1e-300, f64::from_bits(1)] {
+            let fine = Imu { lsb, ..imu };
+            let mut gyro = fine.start();
+            fine.sample(&mut gyro, 0.012_3);
+            assert!((gyro.held - 0.012_3).abs() < 2e-3, "within noise");
+        }
     }
 }
