@@ -1,39 +1,38 @@
-//! A campaign: the same sweep at several fills and amplitudes, in parallel, each
-//! run stored and analysed.
+//! A campaign: the runs of a plan, made in parallel, each stored and analysed.
+//!
+//! A stored run is taken again, whoever made it, if `runs/<name>.parquet` is whole and its notes
+//! (Parquet key-value metadata) hold the run's [recipe](Campaign::recipe), to the letter. Everything
+//! in the tables comes from the run's [columns](STORED); so another importer that writes the columns
+//! and the notes given by [`Campaign::list`] gets the same tables.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use crate::analysis::features::Features;
 use crate::analysis::linear::{Linear, Mode};
 use crate::analysis::residual::ModelFit;
 use crate::analysis::rotary::{self, Rotary};
 use crate::analysis::welch::Spectra;
-use crate::analysis::{BAND, FrequencyResponse, demodulation, logarithmic_grid, spa};
+use crate::analysis::{FrequencyResponse, demodulation, logarithmic_grid, spa};
+use crate::description::Value;
 use crate::fmi2::{Fmu, Instance};
 use crate::output;
-use crate::profile::{Profile, Torque};
+use crate::plan::{Case, Plan};
+use crate::profile::Torque;
 use crate::run::Run;
 use crate::table::{self, Table};
 
-/// The thesis's fills, m.
-pub const FILLS: [f64; 2] = [0.05, 0.10];
-/// The thesis's amplitudes, N·m (its Table 5.2 and chapter 7).
-pub const AMPLITUDES: [f64; 11] =
-    [0.0125, 0.025, 0.05, 0.075, 0.1, 0.125, 0.15, 0.175, 0.2, 0.225, 0.25];
-/// Communication step: the thesis's IMU at 50 Hz, s.
-pub const STEP: f64 = 0.02;
-
-/// Columns of a stored run.
-const STORED: [&str; 6] =
-    ["time", "tau_cmd", "omega", "omega_imu", "slosh_angle", "slosh_angle_radial"];
-/// Variables looked at while running, beside `time` and `tau_cmd`.
-const WATCHED: [&str; 8] = [
+/// Columns of a stored run, SI units, at every communication point from the torque's start to the
+/// stop time; others may follow. The first six are what people look at; wave height, energy,
+/// work, heat and the time stuck are there for the tables.
+pub const STORED: [&str; 11] = [
+    "time",
+    "tau_cmd",
     "omega",
     "omega_imu",
     "slosh_angle",
@@ -42,67 +41,25 @@ const WATCHED: [&str; 8] = [
     "energy",
     "work",
     "heat",
+    "stuck_time",
 ];
 
-/// Frequencies at which responses are evaluated: 1.2 mHz apart at the dip.
+/// Frequencies at which responses are evaluated: 1.2 mHz apart at the dip of the thesis's sweep.
 const GRID_POINTS: usize = 2000;
 
-/// How the frequency grows during the sweep.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Sweep {
-    /// Exponentially.
-    Exponential,
-    /// Evenly.
-    Linear,
-}
-
-/// What a campaign does.
+/// A plan that is carried out.
 #[derive(Clone, Debug)]
-pub struct Plan {
-    /// Values of `slosh.model`, by name.
-    pub models: Vec<String>,
-    /// Fills (`tank.h`), m.
-    pub fills: Vec<f64>,
-    /// Torque amplitudes, N·m.
-    pub amplitudes: Vec<f64>,
-    /// The sweep: 1.25 to 3.5 Hz in 2700 s.
-    pub sweep: Sweep,
-    /// Further start values by FMU name.
-    pub settings: Vec<(String, String)>,
-    /// Relative tolerance of the FMU's solver; `None`: the FMU's own.
-    pub tolerance: Option<f64>,
+pub struct Campaign {
+    /// What is to be done.
+    pub plan: Plan,
     /// Do again what is there already.
     pub force: bool,
-    /// Directory for runs, features and report.
+    /// Directory for runs, tables and report.
     pub out: PathBuf,
 }
 
-/// One run of a campaign.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Case {
-    /// Value of `slosh.model`.
-    pub model: String,
-    /// Fill, m.
-    pub fill: f64,
-    /// Torque amplitude, N·m.
-    pub amplitude: f64,
-}
-
-impl Case {
-    /// `linear_100mm_12.5`: model, fill in mm, amplitude in mN·m.
-    pub fn name(&self) -> String {
-        let [fill, amplitude] = [self.fill, self.amplitude].map(thousandths);
-        format!("{}_{fill}mm_{amplitude}", self.model)
-    }
-}
-
-/// A quantity in thousandths of its unit, without the dust of binary fractions.
-pub fn thousandths(value: f64) -> f64 {
-    (value * 1e9).round() / 1e6
-}
-
-/// Figures that are collected while a run goes on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// Figures of a run as a whole.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Figures {
     /// Largest |slosh_angle|, rad.
     pub peak_slosh_angle: f64,
@@ -117,7 +74,7 @@ pub struct Figures {
 }
 
 impl Figures {
-    fn of(table: &Table, stuck: f64) -> Self {
+    fn of(table: &Table) -> Self {
         let column = |name| table.column(name).unwrap_or_default();
         let peak = |name| column(name).iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         let (energy, work, heat) = (column("energy"), column("work"), column("heat"));
@@ -132,7 +89,7 @@ impl Figures {
             peak_radial_angle: peak("slosh_angle_radial"),
             peak_wave_height: peak("wave_height"),
             max_energy_residual: if turned > 0.0 { residual / turned } else { 0.0 },
-            stuck,
+            stuck: column("stuck_time").last().copied().unwrap_or(0.0),
         }
     }
 }
@@ -142,11 +99,11 @@ impl Figures {
 pub struct Outcome {
     /// Which run.
     pub case: Case,
-    /// Collected while it went on.
+    /// Of the run as a whole.
     pub figures: Figures,
-    /// Response by sweep-synchronous demodulation.
+    /// Response by sweep-synchronous demodulation; empty if the torque is no sweep.
     pub demodulated: FrequencyResponse,
-    /// Response by `spa`.
+    /// Response by `spa`; empty if the torque is neither sweep nor noise.
     pub spa: FrequencyResponse,
     /// Dip and peak of the demodulated response.
     pub demodulated_features: Features,
@@ -157,8 +114,8 @@ pub struct Outcome {
     /// Signal-to-noise ratio of the rate at the peak and at the dip, dB, from its coherence
     /// with the torque.
     pub snr_db: Option<[f64; 2]>,
-    /// Where the liquid turned.
-    pub rotary: Rotary,
+    /// Where in the sweep the liquid turned.
+    pub rotary: Option<Rotary>,
     /// Its exact linear counterpart with viscous friction, from the FMU's calculated parameters.
     pub linear: Linear,
     /// Radius of the tank, m.
@@ -185,90 +142,23 @@ pub struct Results {
     pub failures: Vec<Failure>,
 }
 
-impl Plan {
-    /// The thesis's 22 runs with the linear model.
-    pub fn thesis(out: &Path) -> Self {
-        Plan {
-            models: vec!["linear".into()],
-            fills: FILLS.to_vec(),
-            amplitudes: AMPLITUDES.to_vec(),
-            sweep: Sweep::Exponential,
-            settings: Vec::new(),
-            tolerance: None,
-            force: false,
-            out: out.to_path_buf(),
-        }
-    }
-
-    /// Its runs.
-    pub fn cases(&self) -> Vec<Case> {
-        let mut cases = Vec::new();
-        for model in &self.models {
-            for &fill in &self.fills {
-                for &amplitude in &self.amplitudes {
-                    cases.push(Case { model: model.clone(), fill, amplitude });
-                }
-            }
-        }
-        cases
-    }
-
-    /// The sweep with the amplitude of a case.
-    pub fn profile(&self, amplitude: f64) -> Profile {
-        let ((f0, f1), duration) = (BAND, 2700.0);
-        match self.sweep {
-            Sweep::Exponential => Profile::ExpSweep { amplitude, f0, f1, duration },
-            Sweep::Linear => Profile::LinSweep { amplitude, f0, f1, duration },
-        }
-    }
-
-    fn run(&self, case: &Case) -> Run {
-        let mut settings = vec![
-            ("slosh.model".to_string(), case.model.clone()),
-            ("tank.h".to_string(), case.fill.to_string()),
-        ];
-        settings.extend(self.settings.iter().cloned());
-        let profile = self.profile(case.amplitude);
-        Run {
-            settings,
-            torque: Torque::Profile(profile),
-            step: STEP,
-            stop: profile.duration(),
-            tolerance: self.tolerance,
-            hold: false,
-        }
-    }
-
-    /// Makes all runs that are not there yet and analyses all of them.
+impl Campaign {
+    /// Makes all runs that are not there yet and analyses all of them. Leaves the runs and the
+    /// plan's text in the directory; tables are written by [`Campaign::write_tables`].
     pub fn execute(&self, fmu: &Fmu) -> Result<Results> {
-        for (name, values) in [("fills", &self.fills), ("amplitudes", &self.amplitudes)] {
-            ensure!(!values.is_empty(), "a campaign needs {name}");
-            if let Some(value) = values.iter().find(|v| !v.is_finite()) {
-                bail!("{name} must be numbers, not {value}");
-            }
-        }
-        for fixed in ["slosh.model", "tank.h", "tau_cmd"] {
-            ensure!(
-                self.settings.iter().all(|(name, _)| name != fixed),
-                "{fixed} is what the campaign varies; use --model, --fills, --amplitudes"
-            );
-        }
+        let cases = self.plan.cases(fmu.description())?;
         let runs = self.out.join("runs");
         output::directory(&runs)?;
-        let cases = self.cases();
-        let steps: u64 = cases.iter().map(|case| self.run(case).steps() as u64).sum();
+        output::atomically(&self.plan_file(), |file| {
+            Ok(std::io::Write::write_all(file, self.plan.text.as_bytes())?)
+        })?;
+        let steps: u64 = cases.iter().map(|case| case.run().steps() as u64).sum();
         let bar = ProgressBar::new(steps).with_style(ProgressStyle::with_template(
             "{msg} {bar:40} {percent:>3} %  {elapsed} gone, {eta} to go",
         )?);
         bar.set_message(format!("{} runs", cases.len()));
-        let frequencies = logarithmic_grid(BAND, GRID_POINTS);
-        let results: Vec<Result<Outcome>> = cases
-            .par_iter()
-            .map(|case| {
-                let path = runs.join(case.name() + ".parquet");
-                self.outcome(fmu, case, &path, &frequencies, &bar)
-            })
-            .collect();
+        let results: Vec<Result<Outcome>> =
+            cases.par_iter().map(|case| self.outcome(fmu, case, &runs, &bar)).collect();
         bar.finish_and_clear();
 
         let mut collected = Results::default();
@@ -283,97 +173,254 @@ impl Plan {
         Ok(collected)
     }
 
-    fn outcome(
-        &self,
-        fmu: &Fmu,
-        case: &Case,
-        path: &Path,
-        frequencies: &[f64],
-        bar: &ProgressBar,
-    ) -> Result<Outcome> {
-        let run = self.run(case);
-        let recipe = self.recipe(fmu, &run, case);
+    /// The copy of the plan beside the results.
+    fn plan_file(&self) -> PathBuf {
+        self.out.join("plan.toml")
+    }
+
+    /// The command that makes everything in the directory again.
+    pub fn command(&self, fmu: &Fmu) -> String {
+        let word = |path: &Path| {
+            let text = path.display().to_string();
+            if text.contains(' ') { format!("\"{text}\"") } else { text }
+        };
+        format!(
+            "hubslosh campaign --plan {} --fmu {} --out {}",
+            word(&self.plan_file()),
+            word(fmu.path()),
+            word(&self.out)
+        )
+    }
+
+    /// The expanded runs for another program to make: for each its name, its file in the campaign's
+    /// directory, what to set, the torque (as text for `hubslosh torque`), times, and the notes
+    /// that its Parquet file must carry for the analysis to take it.
+    pub fn list(&self, fmu: &Fmu) -> Result<serde_json::Value> {
+        let description = fmu.description();
+        let mut runs = Vec::new();
+        for case in self.plan.cases(description)? {
+            let run = case.run();
+            let mut settings = serde_json::Map::new();
+            for (name, text) in &case.settings {
+                let value = match description.value(description.variable(name)?, text)? {
+                    // an enumeration keeps its item's name
+                    Value::Integer(i) if i.to_string() == *text => json!(i),
+                    Value::Integer(_) => json!(text),
+                    Value::Real(x) => json!(x),
+                    Value::Boolean(b) => json!(b),
+                    Value::String(s) => json!(s),
+                };
+                settings.insert(name.clone(), value);
+            }
+            runs.push(json!({
+                "name": case.name,
+                "file": format!("runs/{}.parquet", case.name),
+                "varied": self.plan.varied().into_iter().zip(&case.varied).collect::<BTreeMap<_, _>>(),
+                "settings": settings,
+                "profile": case.profile,
+                "start": run.start(),
+                "stop": run.stop,
+                "step": run.step,
+                "steps": run.steps(),
+                "tolerance": run.tolerance,
+                "hold": run.hold,
+                "notes": recipe(fmu, &case),
+            }));
+        }
+        Ok(json!({
+            "title": self.plan.title,
+            "fmu": {
+                "path": fmu.path(),
+                "sha256": fmu.hash(),
+                "guid": description.guid,
+                "version": description.version,
+            },
+            "out": self.out,
+            "columns": STORED,
+            "runs": runs,
+        }))
+    }
+
+    fn outcome(&self, fmu: &Fmu, case: &Case, runs: &Path, bar: &ProgressBar) -> Result<Outcome> {
+        let run = case.run();
+        let path = runs.join(format!("{}.parquet", case.name));
+        let recipe = recipe(fmu, case);
         let mut instance = run.initialise(fmu)?;
         let linear = exact_linear(&mut instance)?;
         let tank_radius = instance.real("tank.d")? / 2.0;
-        let there = if self.force { None } else { stored(path, &recipe) };
+        let there = match self.force || !path.exists() {
+            true => None,
+            false => stored(&path, &run, &recipe)
+                .map_err(|why| bar.println(format!("{} is made again: {why:#}", path.display())))
+                .ok(),
+        };
         let reused = there.is_some();
-        let (table, figures) = match there {
-            Some(found) => {
+        let table = match there {
+            Some(table) => {
                 bar.inc(run.steps() as u64);
-                found
+                table
             }
             None => {
-                let table = run.drive(&mut instance, &WATCHED, |steps| bar.inc(steps))?;
-                let figures = Figures::of(&table, instance.real("stuck_time")?);
-                let table = table.only(&STORED);
-                let mut notes = recipe;
-                notes.insert("figures".into(), serde_json::to_string(&figures)?);
-                table.write(path, &notes)?;
-                (table, figures)
+                // `time` and `tau_cmd` are there anyway
+                let table = run.drive(&mut instance, &STORED[2..], |steps| bar.inc(steps))?;
+                table.write(&path, &recipe)?;
+                table
             }
         };
         drop(instance);
 
         let column = |name| table.column(name).unwrap_or_default();
         let (time, tau, omega) = (column("time"), column("tau_cmd"), column("omega_imu"));
-        let sweep = self.profile(case.amplitude);
-        let demodulated = demodulation::frequency_response(&sweep, time, tau, omega, frequencies);
-        let spa = spa::frequency_response(STEP, tau, omega, frequencies, spa::LAG);
-        let spa_features = Features::of(&spa);
-        let spectra = Spectra::of(STEP, tau, omega);
-        let snr_db = spa_features
-            .f_res
-            .zip(spa_features.f_dip)
-            .map(|(peak, dip)| [spectra.snr_db(peak), spectra.snr_db(dip)]);
-        let slosh =
-            |name| demodulation::frequency_response(&sweep, time, tau, column(name), frequencies);
-        let (radial, tangential) = (slosh("slosh_angle_radial"), slosh("slosh_angle"));
-        let swirl = rotary::swirl(&radial, &tangential, case.amplitude);
-        Ok(Outcome {
+        let mut outcome = Outcome {
             case: case.clone(),
-            figures,
-            demodulated_features: Features::of(&demodulated),
-            fit: ModelFit::of(STEP, tau, omega, &spa, &spa_features),
-            snr_db,
-            rotary: Rotary::of(&radial.frequency, &swirl),
-            spa_features,
-            demodulated,
-            spa,
+            figures: Figures::of(&table),
+            demodulated: FrequencyResponse::default(),
+            spa: FrequencyResponse::default(),
+            demodulated_features: Features::default(),
+            spa_features: Features::default(),
+            fit: None,
+            snr_db: None,
+            rotary: None,
             linear,
             tank_radius,
             reused,
-        })
+        };
+        let Torque::Profile(profile) = &run.torque else {
+            return Ok(outcome);
+        };
+        let Some(band) = profile.band() else {
+            return Ok(outcome);
+        };
+        let frequencies = logarithmic_grid(band, GRID_POINTS);
+        outcome.spa = spa::frequency_response(run.step, tau, omega, &frequencies, spa::LAG);
+        outcome.spa_features = Features::of(&outcome.spa);
+        let spectra = Spectra::of(run.step, tau, omega);
+        outcome.snr_db = outcome
+            .spa_features
+            .f_res
+            .zip(outcome.spa_features.f_dip)
+            .map(|(peak, dip)| [spectra.snr_db(peak), spectra.snr_db(dip)]);
+        outcome.fit = ModelFit::of(run.step, tau, omega, &outcome.spa, &outcome.spa_features);
+        if let (true, Some(amplitude)) = (profile.is_sweep(), case.amplitude) {
+            let demodulated =
+                |signal| demodulation::frequency_response(profile, time, tau, signal, &frequencies);
+            outcome.demodulated = demodulated(omega);
+            outcome.demodulated_features = Features::of(&outcome.demodulated);
+            let radial = demodulated(column("slosh_angle_radial"));
+            let tangential = demodulated(column("slosh_angle"));
+            let swirl = rotary::swirl(&radial, &tangential, amplitude.abs());
+            outcome.rotary = Some(Rotary::of(&radial.frequency, &swirl));
+        }
+        Ok(outcome)
     }
 
-    /// What a run was made from: two runs with the same recipe are the same run.
-    fn recipe(&self, fmu: &Fmu, run: &Run, case: &Case) -> BTreeMap<String, String> {
-        let settings: Vec<_> = run.settings.iter().map(|(k, v)| format!("{k}={v}")).collect();
-        BTreeMap::from(
-            [
-                ("fmu", fmu.hash().to_string()),
-                ("guid", fmu.description().guid.clone()),
-                ("version", fmu.description().version.clone()),
-                ("settings", settings.join(" ")),
-                ("profile", self.profile(case.amplitude).to_string()),
-                ("step", run.step.to_string()),
-                ("stop", run.stop.to_string()),
-                ("tolerance", run.tolerance.map_or("the FMU's own".into(), |t| t.to_string())),
-                ("torque", "linear over each step".to_string()),
-            ]
-            .map(|(key, value)| (key.to_string(), value)),
-        )
+    /// Writes `features.csv`, `features_spa.csv` with the same columns from the `spa` responses, and
+    /// `runs.csv`: every run, failed ones too, with what it was made from and all figures.
+    pub fn write_tables(&self, fmu: &Fmu, results: &Results) -> Result<()> {
+        let write = |name: &str, header: &[&str], rows: Vec<Vec<String>>| {
+            output::atomically(&self.out.join(name), |file| {
+                let mut writer = csv::Writer::from_writer(file);
+                writer.write_record(header)?;
+                for row in rows {
+                    writer.write_record(row)?;
+                }
+                writer.flush().context("the disk refused")
+            })
+        };
+        let features = |of: fn(&Outcome) -> &Features| {
+            results.outcomes.iter().map(|outcome| outcome.row(of(outcome)).to_vec()).collect()
+        };
+        write("features.csv", &HEADER, features(Outcome::features))?;
+        write("features_spa.csv", &HEADER, features(|outcome| &outcome.spa_features))?;
+
+        const MADE_FROM: [&str; 8] = [
+            "name",
+            "error",
+            "fmu_sha256",
+            "fmu_version",
+            "profile",
+            "step_s",
+            "stop_s",
+            "tolerance",
+        ];
+        let header = [&MADE_FROM, &self.plan.varied()[..], &HEADER].concat();
+        let row = |case: &Case, error: &str, figures: Vec<String>| {
+            let made_from = [
+                case.name.clone(),
+                error.to_string(),
+                fmu.hash().to_string(),
+                fmu.description().version.clone(),
+                case.profile.clone(),
+                case.step.to_string(),
+                case.stop.to_string(),
+                case.tolerance.map_or(String::new(), |t| t.to_string()),
+            ];
+            [made_from.to_vec(), case.varied.clone(), figures].concat()
+        };
+        let made = results
+            .outcomes
+            .iter()
+            .map(|outcome| row(&outcome.case, "", outcome.row(outcome.features()).to_vec()));
+        let failed = results.failures.iter().map(|failure| {
+            let mut figures = vec![String::new(); HEADER.len()];
+            for (place, value) in figures.iter_mut().zip(identity(&failure.case)) {
+                *place = value;
+            }
+            row(&failure.case, &failure.reason, figures)
+        });
+        write("runs.csv", &header, made.chain(failed).collect())
     }
 }
 
-/// The stored run, if it is there, whole, and of this recipe.
-fn stored(path: &Path, recipe: &BTreeMap<String, String>) -> Option<(Table, Figures)> {
-    let mut notes = table::notes(path).ok()?;
-    let figures = serde_json::from_str(&notes.remove("figures")?).ok()?;
-    if &notes != recipe {
-        return None;
+/// What a run was made from: two runs with the same recipe are the same run. These are the notes
+/// of its Parquet file, which may hold others too:
+///
+/// * `fmu`, `guid`, `version`: SHA-256 of the FMU's file, and what it says of itself,
+/// * `settings`: what is set before the start, `name=value` in this order, parted by spaces,
+/// * `profile`: the torque; `torque_sha256`: of the file, if it comes from one,
+/// * `step`, `stop`: s; `tolerance`: the relative tolerance handed to the FMU,
+/// * `torque`: whether the FMU is told the torque's slope over each step.
+fn recipe(fmu: &Fmu, case: &Case) -> BTreeMap<String, String> {
+    let settings: Vec<_> = case.settings.iter().map(|(k, v)| format!("{k}={v}")).collect();
+    let torque = if case.hold { "held over each step" } else { "linear over each step" };
+    let mut recipe = BTreeMap::from(
+        [
+            ("fmu", fmu.hash().to_string()),
+            ("guid", fmu.description().guid.clone()),
+            ("version", fmu.description().version.clone()),
+            ("settings", settings.join(" ")),
+            ("profile", case.profile.clone()),
+            ("step", case.step.to_string()),
+            ("stop", case.stop.to_string()),
+            ("tolerance", case.tolerance.map_or("the FMU's own".into(), |t| t.to_string())),
+            ("torque", torque.to_string()),
+        ]
+        .map(|(key, value)| (key.to_string(), value)),
+    );
+    if let Some(hash) = &case.torque_sha256 {
+        recipe.insert("torque_sha256".into(), hash.clone());
     }
-    Some((Table::read(path, &STORED).ok()?, figures))
+    recipe
+}
+
+/// The stored run, if it is whole and of this recipe; else why not.
+fn stored(path: &Path, run: &Run, recipe: &BTreeMap<String, String>) -> Result<Table> {
+    let notes = table::notes(path).context("it is not whole")?;
+    for (key, wanted) in recipe {
+        let found = notes.get(key).with_context(|| format!("it has no note \"{key}\""))?;
+        ensure!(found == wanted, "its note \"{key}\" is \"{found}\", not \"{wanted}\"");
+    }
+    let table = Table::read(path, &STORED)?;
+    let last = table.column("time").and_then(|time| time.last()).copied();
+    ensure!(
+        table.rows() == run.steps() + 1 && last == Some(run.stop),
+        "it has {} rows to {:?} s, not {} to {} s",
+        table.rows(),
+        last.unwrap_or(f64::NAN),
+        run.steps() + 1,
+        run.stop
+    );
+    Ok(table)
 }
 
 /// The linear model with viscous friction that has the FMU's own (calculated) parameters.
@@ -432,18 +479,19 @@ impl Outcome {
         &self.demodulated_features
     }
 
-    /// Its row with these features; figures that are not found stay empty.
+    /// Its row with these features; figures that are not found, or that its torque cannot show,
+    /// stay empty.
     fn row(&self, features: &Features) -> [String; 26] {
         let figures = &self.figures;
         let number = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
         let mut row: [String; 26] = Default::default();
+        for (place, value) in row.iter_mut().zip(identity(&self.case)) {
+            *place = value;
+        }
         let mut put = |name: &str, value: String| {
             let place = HEADER.iter().position(|h| *h == name).expect("a column of the header");
             row[place] = value;
         };
-        put("model", self.case.model.clone());
-        put("fill_m", self.case.fill.to_string());
-        put("amplitude_nm", self.case.amplitude.to_string());
         put("f_res_hz", number(features.f_res));
         put("f_dip_hz", number(features.f_dip));
         put("delta_f_hz", number(features.delta_f()));
@@ -466,40 +514,17 @@ impl Outcome {
         }
         put("snr_res_db", number(self.snr_db.map(|[peak, _]| peak)));
         put("snr_dip_db", number(self.snr_db.map(|[_, dip]| dip)));
-        put("rotary_from_hz", number(self.rotary.from));
-        put("rotary_to_hz", number(self.rotary.to));
-        put("swirl", self.rotary.swirl.to_string());
+        if let Some(rotary) = &self.rotary {
+            put("rotary_from_hz", number(rotary.from));
+            put("rotary_to_hz", number(rotary.to));
+            put("swirl", rotary.swirl.to_string());
+        }
         row
     }
 }
 
-/// Writes `features.csv`, and `features_spa.csv` with the same columns from the `spa` responses.
-pub fn write_features(outcomes: &[Outcome], directory: &Path) -> Result<()> {
-    let write = |name: &str, features: fn(&Outcome) -> &Features| {
-        output::atomically(&directory.join(name), |file| {
-            let mut writer = csv::Writer::from_writer(file);
-            writer.write_record(HEADER)?;
-            for outcome in outcomes {
-                writer.write_record(outcome.row(features(outcome)))?;
-            }
-            writer.flush().context("the disk refused")
-        })
-    };
-    write("features.csv", Outcome::features)?;
-    write("features_spa.csv", |outcome| &outcome.spa_features)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_thesis_campaign_has_22_runs_with_plain_names() {
-        let cases = Plan::thesis(Path::new("dist/campaign")).cases();
-        assert_eq!(cases.len(), 22);
-        assert_eq!(cases[0].name(), "linear_50mm_12.5");
-        assert_eq!(cases[21].name(), "linear_100mm_250");
-        let other = Case { model: "planar".into(), fill: 0.07, amplitude: 0.1 + 0.2 };
-        assert_eq!(other.name(), "planar_70mm_300");
-    }
+/// The first three columns of a row: model, fill, amplitude.
+fn identity(case: &Case) -> [String; 3] {
+    let amplitude = case.amplitude.map_or(String::new(), |a| a.to_string());
+    [case.model.clone(), case.fill.to_string(), amplitude]
 }

@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use clap::{Args, Parser, Subcommand};
-use hubslosh::campaign::{self, Plan, Sweep};
+use hubslosh::campaign::Campaign;
 use hubslosh::fmi2::Fmu;
 use hubslosh::pack;
-use hubslosh::profile::{self, Profile, Torque};
+use hubslosh::plan::{self, Plan};
+use hubslosh::profile::{self, Torque, Written};
 use hubslosh::report;
 use hubslosh::run::Run;
 use hubslosh::table;
@@ -30,6 +31,7 @@ struct Cli {
 enum Command {
     Pack(PackArgs),
     Run(RunArgs),
+    Torque(TorqueArgs),
     Campaign(CampaignArgs),
 }
 
@@ -59,7 +61,7 @@ struct RunArgs {
         conflicts_with = "input",
         required_unless_present = "input"
     )]
-    profile: Option<Profile>,
+    profile: Option<String>,
     /// Torque history with the columns time (s) and tau_cmd (N.m), .csv or .parquet.
     #[arg(long, value_name = "FILE")]
     input: Option<PathBuf>,
@@ -94,21 +96,53 @@ struct RunArgs {
     out: PathBuf,
 }
 
-/// Drives the FMU through the thesis's sweeps at several fills and amplitudes, and reports.
+/// Writes a profile's torque alone: time (s), tau_cmd (N.m), and tau_slope (N.m/s), which is the
+/// torque's derivative until the next row.
+///
+/// Given value and slope at every row the FMU sees what `hubslosh run` shows it, jumps included;
+/// time and tau_cmd alone are a torque history for --input, for a bench or Simulink.
+#[derive(Args)]
+#[command(after_help = torque_help())]
+struct TorqueArgs {
+    /// Torque profile, name:key=value,…
+    #[arg(long, value_name = "PROFILE")]
+    profile: String,
+    /// Time between rows, s.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.02)]
+    step: f64,
+    /// Time of the last row, s [default: the end of the profile].
+    #[arg(long, value_name = "SECONDS")]
+    stop: Option<f64>,
+    /// Where to put the torque, .csv or .parquet.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+/// Drives the FMU through a plan's runs, or the thesis's sweeps at several fills and amplitudes,
+/// and reports.
 ///
 /// Runs that are there already (same FMU, parameters and profile) are not done again.
 #[derive(Args)]
-#[command(after_help = "Examples:\n  hubslosh campaign\n  \
-    hubslosh campaign --fills 0.05,0.1 --amplitudes 0.1 --set friction.model=viscous --out dist/viscous")]
+#[command(after_help = campaign_help())]
 struct CampaignArgs {
+    /// Plan: a TOML file, or the name of a built-in plan (below).
+    #[arg(
+        long,
+        value_name = "FILE",
+        conflicts_with_all = ["model", "fills", "amplitudes", "sweep", "settings", "tolerance"]
+    )]
+    plan: Option<String>,
+    /// Print the runs as JSON for another program to make, and make none.
+    #[arg(long)]
+    list: bool,
     /// Slosh models, by name.
     #[arg(long, value_name = "NAME,…", value_delimiter = ',', default_value = "linear")]
     model: Vec<String>,
     /// Fills, m.
-    #[arg(long, value_name = "M,…", value_delimiter = ',', default_values_t = campaign::FILLS)]
+    #[arg(long, value_name = "M,…", value_delimiter = ',', default_values_t = plan::FILLS)]
     fills: Vec<f64>,
     /// Torque amplitudes, N.m.
-    #[arg(long, value_name = "NM,…", value_delimiter = ',', default_values_t = campaign::AMPLITUDES)]
+    #[arg(long, value_name = "NM,…", value_delimiter = ',', default_values_t = plan::AMPLITUDES)]
     amplitudes: Vec<f64>,
     /// How the frequency grows from 1.25 to 3.5 Hz in 2700 s.
     #[arg(long, value_enum, default_value = "exponential")]
@@ -125,9 +159,19 @@ struct CampaignArgs {
     /// The FMU.
     #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
     fmu: PathBuf,
-    /// Directory for runs, features.csv and report.html.
-    #[arg(long, value_name = "DIRECTORY", default_value = DEFAULT_CAMPAIGN)]
-    out: PathBuf,
+    /// Directory for runs, tables and report.html [default: dist/campaign, or dist/ and the plan's
+    /// name].
+    #[arg(long, value_name = "DIRECTORY")]
+    out: Option<PathBuf>,
+}
+
+/// How the frequency of `campaign`'s sweep grows.
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Sweep {
+    /// Exponentially.
+    Exponential,
+    /// Evenly.
+    Linear,
 }
 
 const DEFAULT_FMU: &str = "dist/HubSlosh.fmu";
@@ -144,6 +188,29 @@ fn run_help() -> String {
     )
 }
 
+fn torque_help() -> String {
+    format!(
+        "Profiles, with their defaults (torque in N.m, frequencies in Hz, times in s):\n{}\n\
+         Example:\n  hubslosh torque --profile bang-stop-bang:amplitude=0.2,bang=2 --step 0.02 --out torque.csv",
+        profile::help()
+    )
+}
+
+fn campaign_help() -> String {
+    let mut plans = String::new();
+    for (name, text) in plan::BUILT_IN {
+        let title = Plan::parse(text).map(|plan| plan.title).unwrap_or_default();
+        plans.push_str(&format!("  {name:18} {title}\n"));
+    }
+    format!(
+        "Built-in plans:\n{plans}\n\
+         Examples:\n  hubslosh campaign\n  \
+         hubslosh campaign --plan thesis_models\n  \
+         hubslosh campaign --plan mine.toml --out dist/mine\n  \
+         hubslosh campaign --fills 0.05,0.1 --amplitudes 0.1 --set friction.model=viscous --out dist/viscous"
+    )
+}
+
 fn setting(text: &str) -> Result<(String, String)> {
     let (name, value) = text
         .split_once('=')
@@ -156,7 +223,8 @@ fn main() -> ExitCode {
         Some(Command::Pack(args)) if args.all_platforms => pack_all(&args.out),
         Some(Command::Pack(args)) => pack(&args.out),
         Some(Command::Run(args)) => run(args),
-        Some(Command::Campaign(args)) => campaign(&args.fmu, args.plan()),
+        Some(Command::Torque(args)) => torque(&args),
+        Some(Command::Campaign(args)) => campaign_of(&args),
         None => everything(),
     };
     match done {
@@ -171,7 +239,9 @@ fn main() -> ExitCode {
 /// What `cargo run --release` does.
 fn everything() -> Result<()> {
     pack(Path::new(DEFAULT_FMU))?;
-    campaign(Path::new(DEFAULT_FMU), Plan::thesis(Path::new(DEFAULT_CAMPAIGN)))
+    let campaign =
+        Campaign { plan: Plan::read("thesis")?, force: false, out: DEFAULT_CAMPAIGN.into() };
+    drive(&Fmu::open(DEFAULT_FMU)?, &campaign)
 }
 
 fn pack(out: &Path) -> Result<()> {
@@ -190,8 +260,8 @@ fn pack_all(out: &Path) -> Result<()> {
 
 fn run(args: RunArgs) -> Result<()> {
     table::check_ending(&args.out)?;
-    let torque = match (args.profile, &args.input) {
-        (Some(profile), _) => Torque::Profile(profile),
+    let torque = match (&args.profile, &args.input) {
+        (Some(profile), _) => profile.parse::<Written>()?.torque()?,
         (None, Some(path)) => Torque::read(path, args.hold)?,
         (None, None) => bail!("a run needs --profile or --input"),
     };
@@ -221,36 +291,90 @@ fn run(args: RunArgs) -> Result<()> {
     Ok(())
 }
 
+fn torque(args: &TorqueArgs) -> Result<()> {
+    table::check_ending(&args.out)?;
+    let torque = args.profile.parse::<Written>()?.torque()?;
+    let run = Run {
+        settings: Vec::new(),
+        stop: args.stop.unwrap_or(torque.span().1),
+        torque,
+        step: args.step,
+        tolerance: None,
+        hold: false,
+    };
+    run.check()?;
+    let table = run.torque_table();
+    table.write(&args.out, &BTreeMap::from([("profile".into(), args.profile.clone())]))?;
+    println!("{} rows in {}", table.rows(), args.out.display());
+    Ok(())
+}
+
 impl CampaignArgs {
-    fn plan(&self) -> Plan {
-        Plan {
-            models: self.model.clone(),
-            fills: self.fills.clone(),
-            amplitudes: self.amplitudes.clone(),
-            sweep: self.sweep,
-            settings: self.settings.clone(),
-            tolerance: self.tolerance,
-            force: self.force,
-            out: self.out.clone(),
+    /// The plan that the flags without `--plan` stand for.
+    fn flags_as_plan(&self) -> Result<Plan> {
+        for (name, _) in &self.settings {
+            ensure!(
+                !["slosh.model", "tank.h", "tau_cmd"].contains(&name.as_str()),
+                "{name} is what the campaign varies; use --model, --fills, --amplitudes"
+            );
         }
+        let kind = match self.sweep {
+            Sweep::Exponential => "exp-sweep",
+            Sweep::Linear => "lin-sweep",
+        };
+        let mut table = toml::Table::new();
+        table.insert("title".into(), "Sweeps at several fills and amplitudes".into());
+        table.insert("profile".into(), format!("{kind}:f0=1.25,f1=3.5,duration=2700").into());
+        if let Some(tolerance) = self.tolerance {
+            table.insert("tolerance".into(), tolerance.into());
+        }
+        let settings =
+            self.settings.iter().map(|(name, value)| (name.clone(), value.as_str().into()));
+        table.insert("set".into(), settings.collect::<toml::Table>().into());
+        let vary = [
+            ("slosh.model", toml::Value::from(self.model.clone())),
+            ("tank.h", self.fills.clone().into()),
+            ("profile.amplitude", self.amplitudes.clone().into()),
+        ];
+        let vary = vary.into_iter().map(|(name, values)| (name.to_string(), values));
+        table.insert("vary".into(), vary.collect::<toml::Table>().into());
+        Plan::parse(&toml::to_string(&table)?)
     }
 }
 
-fn campaign(fmu: &Path, plan: Plan) -> Result<()> {
-    let fmu = Fmu::open(fmu)?;
-    let results = plan.execute(&fmu)?;
-    campaign::write_features(&results.outcomes, &plan.out)?;
-    let page = plan.out.join("report.html");
-    report::write(&page, &plan, &fmu, &results)?;
+fn campaign_of(args: &CampaignArgs) -> Result<()> {
+    let (plan, out) = match &args.plan {
+        Some(file) => {
+            let stem = Path::new(file).file_stem().unwrap_or_default();
+            (Plan::read(file)?, Path::new("dist").join(stem))
+        }
+        None => (args.flags_as_plan()?, DEFAULT_CAMPAIGN.into()),
+    };
+    let out = args.out.clone().unwrap_or(out);
+    let campaign = Campaign { plan, force: args.force, out };
+    let fmu = Fmu::open(&args.fmu)?;
+    if args.list {
+        println!("{:#}", campaign.list(&fmu)?);
+        return Ok(());
+    }
+    drive(&fmu, &campaign)
+}
+
+fn drive(fmu: &Fmu, campaign: &Campaign) -> Result<()> {
+    let results = campaign.execute(fmu)?;
+    campaign.write_tables(fmu, &results)?;
+    let page = campaign.out.join("report.html");
+    report::write(&page, campaign, fmu, &results)?;
     let reused = results.outcomes.iter().filter(|o| o.reused).count();
     println!(
-        "{} runs made, {reused} were there already\nfeatures: {}\nreport:   {}",
+        "{} runs made, {reused} were there already\nfeatures: {}\nruns:     {}\nreport:   {}",
         results.outcomes.len() - reused,
-        plan.out.join("features.csv").display(),
+        campaign.out.join("features.csv").display(),
+        campaign.out.join("runs.csv").display(),
         page.display(),
     );
     for failure in &results.failures {
-        eprintln!("{} failed: {}", failure.case.name(), failure.reason);
+        eprintln!("{} failed: {}", failure.case.name, failure.reason);
     }
     if !results.failures.is_empty() {
         bail!("{} of the campaign's runs failed", results.failures.len());

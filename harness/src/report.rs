@@ -8,23 +8,30 @@ use anyhow::Result;
 
 use crate::analysis::features::Features;
 use crate::analysis::{BAND, FrequencyResponse, demodulation, logarithmic_grid, rotary, spa};
-use crate::campaign::{Outcome, Plan, Results, STEP, Sweep, thousandths};
+use crate::campaign::{Campaign, Outcome, Results};
 use crate::fmi2::Fmu;
 use crate::html::escape;
 use crate::output;
+use crate::plan::{Plan, thousandths};
+use crate::profile::{Profile, Torque};
 use crate::svg::{Axis, Chart, Series, Style};
 
 /// Writes the report.
-pub fn write(path: &Path, plan: &Plan, fmu: &Fmu, results: &Results) -> Result<()> {
-    let page = page(plan, fmu, results);
+pub fn write(path: &Path, campaign: &Campaign, fmu: &Fmu, results: &Results) -> Result<()> {
+    let page = page(campaign, fmu, results);
     output::atomically(path, |file| Ok(std::io::Write::write_all(file, page.as_bytes())?))
 }
 
-/// The runs of one model at one fill, by amplitude.
+/// Runs that differ in nothing but the torque's amplitude (and what is drawn at random).
 struct Group<'a> {
     model: &'a str,
-    fill: f64,
+    /// m; `None` if it is drawn at random.
+    fill: Option<f64>,
+    /// What else tells it from the other groups, such as `tank.d = 0.111`.
+    others: Vec<String>,
     runs: Vec<&'a Outcome>,
+    /// The sweep of its first run.
+    sweep: Option<&'a Profile>,
     /// Features of the exact linear response on the same grid.
     exact: Features,
     exact_response: FrequencyResponse,
@@ -32,59 +39,116 @@ struct Group<'a> {
 
 impl Group<'_> {
     fn title(&self) -> String {
-        format!("{} model, {} cm fill", self.model, cm(self.fill))
+        let mut title = format!("{} model", self.model);
+        if let Some(fill) = self.fill {
+            let _ = write!(title, ", {} cm fill", cm(fill));
+        }
+        for other in &self.others {
+            let _ = write!(title, ", {other}");
+        }
+        title
+    }
+
+    fn heading(&self) -> String {
+        format!("<h3>{}</h3>\n", escape(&self.title()))
+    }
+}
+
+/// The sweep that drives a run, if it is one.
+fn sweep(run: &Outcome) -> Option<&Profile> {
+    match &*run.case.torque {
+        Torque::Profile(profile) if profile.is_sweep() => Some(profile),
+        _ => None,
     }
 }
 
 fn groups<'a>(plan: &Plan, results: &'a Results) -> Vec<Group<'a>> {
+    // the places, among all that is varied, of what tells groups apart beside model and fill
+    let grouping = plan.grouping();
+    let others: Vec<(usize, &str)> = plan
+        .varied()
+        .into_iter()
+        .enumerate()
+        .filter(|(_, name)| grouping.contains(name))
+        .filter(|(_, name)| !["slosh.model", "tank.h", "profile.amplitude"].contains(name))
+        .collect();
+    let drawn_fill = plan.is_random() && !grouping.contains(&"tank.h");
     let mut groups: Vec<Group> = Vec::new();
     for run in &results.outcomes {
-        let same = |g: &&mut Group| g.model == run.case.model && g.fill == run.case.fill;
+        let values = others.iter().filter(|(i, _)| !run.case.varied[*i].is_empty());
+        let key: Vec<String> =
+            values.map(|(i, name)| format!("{name} = {}", run.case.varied[*i])).collect();
+        let same = |g: &&mut Group| {
+            g.model == run.case.model
+                && g.fill.is_none_or(|fill| fill == run.case.fill)
+                && g.others == key
+        };
         match groups.iter_mut().find(same) {
             Some(group) => group.runs.push(run),
             None => {
-                let exact_response = run.linear.frequency_response(&logarithmic_grid(BAND, 2000));
+                let sweep = sweep(run);
+                let band = sweep.and_then(Profile::band).unwrap_or(BAND);
+                let exact_response = run.linear.frequency_response(&logarithmic_grid(band, 2000));
                 groups.push(Group {
                     model: &run.case.model,
-                    fill: run.case.fill,
+                    fill: (!drawn_fill).then_some(run.case.fill),
+                    others: key,
                     runs: vec![run],
+                    sweep,
                     exact: Features::of(&exact_response),
                     exact_response,
                 });
             }
         }
     }
-    debug_assert!(groups.len() <= plan.models.len() * plan.fills.len());
     groups
 }
 
-fn page(plan: &Plan, fmu: &Fmu, results: &Results) -> String {
+fn page(campaign: &Campaign, fmu: &Fmu, results: &Results) -> String {
+    let plan = &campaign.plan;
     let groups = groups(plan, results);
-    let amplitudes = &plan.amplitudes;
+    let mut amplitudes: Vec<f64> =
+        results.outcomes.iter().filter_map(|run| run.case.amplitude).collect();
+    amplitudes.sort_by(f64::total_cmp);
+    amplitudes.dedup();
+    // each panel only where it says something: draws have no order along an axis
+    let swept = groups.iter().any(|group| group.sweep.is_some()) && !plan.is_random();
+    let along = amplitudes.len() > 1 && !plan.is_random();
     let mut page = String::new();
     let _ = write!(
         page,
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>HubSlosh: sweep campaign</title>\n<style>\n{}{}</style>\n</head>\n<body><main>\n",
+         <title>HubSlosh: {}</title>\n<style>\n{}{}</style>\n</head>\n<body><main>\n",
+        escape(&plan.title),
         include_str!("report.css"),
         amplitude_colors(amplitudes.len())
     );
     page.push_str(&introduction(plan, fmu, results, &groups));
-    page.push_str("<h2>Frequency responses</h2>\n<p>Hub rate over commanded torque while the sweep passes each frequency, one curve per torque amplitude. The dip stands at the slosh frequency, where the liquid holds the hub still; the peak, where hub and liquid swing against each other, stands above it. Rest the pointer on a curve to see which run it is.</p>\n");
-    page.push_str(&amplitude_legend(amplitudes));
-    for group in &groups {
-        page.push_str(&responses(group, amplitudes));
+    if swept {
+        page.push_str("<h2>Frequency responses</h2>\n<p>Hub rate over commanded torque while the sweep passes each frequency, one curve per torque amplitude. The dip stands at the slosh frequency, where the liquid holds the hub still; the peak, where hub and liquid swing against each other, stands above it. Rest the pointer on a curve to see which run it is.</p>\n");
+        page.push_str(&amplitude_legend(&amplitudes));
+        for group in groups.iter().filter(|group| group.sweep.is_some()) {
+            page.push_str(&responses(group, &amplitudes));
+        }
     }
-    page.push_str("<h2>Features against torque amplitude</h2>\n<p>For a linear plant with linear friction these would be horizontal lines. What bends them at small torque is the bearing: dry friction counts most when the torque is small.</p>\n<div class=\"legend\"><span><i style=\"color:var(--e0)\"></i>while the sweep passes (demodulation; in <code>features.csv</code>)</span><span><i class=\"dash\" style=\"color:var(--e1)\"></i>over the whole record (<code>spa</code>)</span><span><i class=\"dash\" style=\"color:var(--exact)\"></i>exact, linear with viscous friction</span></div>\n");
-    for group in &groups {
-        page.push_str(&features(group));
+    if swept && along {
+        page.push_str("<h2>Features against torque amplitude</h2>\n<p>For a linear plant with linear friction these would be horizontal lines. What bends them at small torque is the bearing: dry friction counts most when the torque is small.</p>\n<div class=\"legend\"><span><i style=\"color:var(--e0)\"></i>while the sweep passes (demodulation; in <code>features.csv</code>)</span><span><i class=\"dash\" style=\"color:var(--e1)\"></i>over the whole record (<code>spa</code>)</span><span><i class=\"dash\" style=\"color:var(--exact)\"></i>exact, linear with viscous friction</span></div>\n");
+        for group in groups.iter().filter(|group| group.sweep.is_some()) {
+            page.push_str(&features(group));
+        }
     }
-    page.push_str(&bearing_and_liquid(&groups));
-    page.push_str(&linear_fit(&groups));
-    page.push_str(&estimators(plan, &groups));
-    page.push_str(&table(&groups));
-    page.push_str(&provenance(plan, fmu));
+    if along {
+        page.push_str(&bearing_and_liquid(&groups));
+    }
+    if swept && along {
+        page.push_str(&linear_fit(&groups));
+    }
+    if swept {
+        page.push_str(&estimators(&groups));
+    }
+    page.push_str(&table(plan, results));
+    page.push_str(&provenance(campaign, fmu, results));
     page.push_str("</main></body>\n</html>\n");
     page
 }
@@ -92,22 +156,14 @@ fn page(plan: &Plan, fmu: &Fmu, results: &Results) -> String {
 // ---------------------------------------------------------------- text
 
 fn introduction(plan: &Plan, fmu: &Fmu, results: &Results, groups: &[Group]) -> String {
-    let profile = plan.profile(1.0);
-    let kind = match plan.sweep {
-        Sweep::Exponential => "exponential",
-        Sweep::Linear => "linear",
-    };
     let mut out = format!(
         "<h1>A hub, a sloshing tank and a sticking bearing</h1>\n\
-         <p class=\"lead\">{} sweeps of the HubSlosh FMU (version {}): {kind}, {} to {} Hz in {} s, torque amplitudes {} to {} mN·m, sampled at {} Hz.</p>\n",
+         <p class=\"lead\">{}. {} runs of the HubSlosh FMU (version {}), sampled at {:.0} Hz: {}.</p>\n",
+        escape(if plan.title.is_empty() { "A campaign" } else { &plan.title }),
         results.outcomes.len(),
         escape(&fmu.description().version),
-        BAND.0,
-        BAND.1,
-        profile.duration(),
-        thousandths(plan.amplitudes.iter().copied().fold(f64::MAX, f64::min)),
-        thousandths(plan.amplitudes.iter().copied().fold(f64::MIN, f64::max)),
-        (1.0 / STEP).round(),
+        results.outcomes.first().map_or(0.0, |run| 1.0 / run.case.step),
+        escape(&torques(results)),
     );
     if !results.failures.is_empty() {
         let _ = write!(
@@ -119,14 +175,14 @@ fn introduction(plan: &Plan, fmu: &Fmu, results: &Results, groups: &[Group]) -> 
             let _ = write!(
                 out,
                 "<li><code>{}</code>: {}</li>",
-                escape(&failure.case.name()),
+                escape(&failure.case.name),
                 escape(&failure.reason)
             );
         }
         out.push_str("</ul></div>\n");
     }
     out.push_str("<div class=\"cards\">");
-    for group in groups {
+    for group in groups.iter().filter(|group| group.sweep.is_some()) {
         let over = |get: &dyn Fn(&Outcome) -> Option<f64>| {
             let values: Vec<f64> = group.runs.iter().filter_map(|run| get(run)).collect();
             match values
@@ -146,10 +202,11 @@ fn introduction(plan: &Plan, fmu: &Fmu, results: &Results, groups: &[Group]) -> 
         ] {
             let _ = write!(
                 out,
-                "<div class=\"card\"><b>{value} Hz</b><span>{what}, {} cm, {}{}</span></div>",
-                cm(group.fill),
-                escape(group.model),
-                exact.map_or(String::new(), |f| format!(" (exact linear {f:.4} Hz)")),
+                "<div class=\"card\"><b>{value} Hz</b><span>{what}, {}{}</span></div>",
+                escape(&group.title()),
+                exact
+                    .filter(|_| !plan.is_random())
+                    .map_or(String::new(), |f| format!(" (exact linear {f:.4} Hz)")),
             );
         }
     }
@@ -157,7 +214,7 @@ fn introduction(plan: &Plan, fmu: &Fmu, results: &Results, groups: &[Group]) -> 
     out
 }
 
-fn estimators(plan: &Plan, groups: &[Group]) -> String {
+fn estimators(groups: &[Group]) -> String {
     let mut out = format!(
         "<h2>How the figures are found</h2>\n\
          <p><b>Demodulation</b> (solid, in <code>features.csv</code>). Torque and rate are multiplied by e<sup>−jφ(t)</sup>, φ being the sweep's own known phase, and averaged over a Hann window of {cycles} cycles that slides with the sweep. Their ratio is the response the moment the sweep passes that frequency: what a lock-in amplifier would show. Both signals see the same window, so its effect on amplitude and phase cancels; harmonics that the bearing makes average out.</p>\n\
@@ -172,22 +229,21 @@ fn estimators(plan: &Plan, groups: &[Group]) -> String {
         from = BAND.0,
         to = BAND.1,
     );
-    out.push_str("<div class=\"wide\"><table><thead><tr><th>fill</th><th>exact<br>peak</th><th>half-power<br>width 2ζf</th><th>sweep rate<br>there</th><th>time to<br>cross</th><th>slosh decays<br>in 1/(2πζf)</th><th>largest torque,<br>swept peak</th><th>its<br>shift</th><th>largest torque,<br><code>spa</code> peak</th><th>its<br>shift</th></tr></thead><tbody>\n");
+    out.push_str("<div class=\"wide\"><table><thead><tr><th>runs</th><th>exact<br>peak</th><th>half-power<br>width 2ζf</th><th>sweep rate<br>there</th><th>time to<br>cross</th><th>slosh decays<br>in 1/(2πζf)</th><th>largest torque,<br>swept peak</th><th>its<br>shift</th><th>largest torque,<br><code>spa</code> peak</th><th>its<br>shift</th></tr></thead><tbody>\n");
     for group in groups {
-        let (Some(mode), Some(exact), Some(run)) =
-            (group.runs[0].linear.modes.first(), group.exact.f_res, group.runs.last())
+        let (Some(mode), Some(exact), Some(run), Some(sweep)) =
+            (group.runs[0].linear.modes.first(), group.exact.f_res, group.runs.last(), group.sweep)
         else {
             continue;
         };
         let width = 2.0 * mode.damping * mode.frequency;
-        let rate = plan.profile(1.0).rate_at(exact);
+        let rate = sweep.rate_at(exact).abs();
         let shift =
             |f: Option<f64>| f.map_or(String::new(), |f| format!("{:+.1} mHz", (f - exact) * 1e3));
         let _ = writeln!(
             out,
-            "<tr><td>{} cm, {}</td><td>{exact:.4} Hz</td><td>{:.1} mHz</td><td>{:.2} mHz/s</td><td>{:.1} s</td><td>{:.1} s</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
-            cm(group.fill),
-            escape(group.model),
+            "<tr><td>{}</td><td>{exact:.4} Hz</td><td>{:.1} mHz</td><td>{:.2} mHz/s</td><td>{:.1} s</td><td>{:.1} s</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+            escape(&group.title()),
             width * 1e3,
             rate * 1e3,
             width / rate,
@@ -202,32 +258,58 @@ fn estimators(plan: &Plan, groups: &[Group]) -> String {
     out
 }
 
-fn provenance(plan: &Plan, fmu: &Fmu) -> String {
+/// The profiles of the runs, without what is varied along them.
+fn torques(results: &Results) -> String {
+    let mut profiles: Vec<&str> =
+        results.outcomes.iter().map(|run| run.case.profile.as_str()).collect();
+    profiles.sort_unstable();
+    profiles.dedup();
+    match profiles[..] {
+        [] => "none".into(),
+        [one] => one.into(),
+        // what they have in common, key by key
+        [first, ..] => {
+            let (name, rest) = first.split_once(':').unwrap_or((first, ""));
+            let same = |part: &&str| {
+                profiles.iter().all(|p| {
+                    let parts = p.strip_prefix(name).and_then(|p| p.strip_prefix(':'));
+                    parts.is_some_and(|parts| parts.split(',').any(|other| other == *part))
+                })
+            };
+            let common: Vec<_> = rest.split(',').filter(same).collect();
+            match common[..] {
+                [] => format!("{} torques", profiles.len()),
+                _ => format!("{name}:{} ({} torques)", common.join(","), profiles.len()),
+            }
+        }
+    }
+}
+
+fn provenance(campaign: &Campaign, fmu: &Fmu, results: &Results) -> String {
     let description = fmu.description();
-    let settings: Vec<_> = plan.settings.iter().map(|(k, v)| format!("{k} = {v}")).collect();
-    let tolerance = match (plan.tolerance, description.default_experiment.tolerance) {
-        (Some(t), _) => t.to_string(),
-        (None, Some(t)) => format!("the FMU's own ({t})"),
-        (None, None) => "the FMU's own".into(),
-    };
+    let (plan, first) = (&campaign.plan, results.outcomes.first().map(|run| &run.case));
+    let settings: Vec<_> = plan.set().iter().map(|(k, v)| format!("{k} = {v}")).collect();
+    let tolerance =
+        match (first.and_then(|c| c.tolerance), description.default_experiment.tolerance) {
+            (Some(t), _) => t.to_string(),
+            (None, Some(t)) => format!("the FMU's own ({t})"),
+            (None, None) => "the FMU's own".into(),
+        };
+    let torque = first.map_or(String::new(), |case| {
+        let what = if case.hold { "value" } else { "value and slope" };
+        format!("{}; {what} handed over every {} s", torques(results), case.step)
+    });
     let rows = [
         ("FMU", format!("{}, version {}", description.model_name, description.version)),
         ("made by", description.generation_tool.clone()),
         ("GUID", description.guid.clone()),
         ("SHA-256", fmu.hash().to_string()),
-        ("slosh.model", plan.models.join(", ")),
+        ("varied", plan.varied().join(", ")),
         (
             "parameters",
             if settings.is_empty() { "the FMU's start values".into() } else { settings.join(", ") },
         ),
-        (
-            "torque",
-            format!(
-                "{}; value and slope handed over every {} s",
-                plan.profile(1.0).to_string().replace("amplitude=1,", ""),
-                STEP
-            ),
-        ),
+        ("torque", torque),
         ("tolerance", tolerance),
         ("driven by", format!("hubslosh {}", env!("CARGO_PKG_VERSION"))),
     ];
@@ -235,53 +317,92 @@ fn provenance(plan: &Plan, fmu: &Fmu) -> String {
     for (name, value) in rows.iter().filter(|(_, value)| !value.is_empty()) {
         let _ = write!(out, "<dt>{name}</dt><dd><code>{}</code></dd>", escape(value));
     }
-    out.push_str("</dl>\n<p>Each run lies in <code>runs/</code> as Parquet with the same particulars in its metadata; the figures of the table above lie in <code>features.csv</code>, and those of <code>spa</code> in the same columns in <code>features_spa.csv</code>. <code>hubslosh campaign</code> makes everything again.</p>\n");
+    let _ = write!(
+        out,
+        "</dl>\n<p>Each run lies in <code>runs/</code> as Parquet with its particulars in its metadata. <code>features.csv</code> holds the figures of the table above, <code>features_spa.csv</code> those of <code>spa</code> in the same columns, <code>runs.csv</code> all of them with everything that was varied, <code>plan.toml</code> the plan. This makes everything here again:</p>\n<p><code>{}</code></p>\n",
+        escape(&campaign.command(fmu))
+    );
     out
 }
 
-fn table(groups: &[Group]) -> String {
-    let mut out = String::from(
+fn table(plan: &Plan, results: &Results) -> String {
+    let varied = plan.varied();
+    let others: Vec<(usize, &str)> = varied
+        .into_iter()
+        .enumerate()
+        .filter(|(_, name)| !["slosh.model", "tank.h", "profile.amplitude"].contains(name))
+        .collect();
+    let heads: String =
+        others.iter().map(|(_, name)| format!("<th>{}</th>", escape(name))).collect();
+    let mut out = format!(
         "<h2>All figures</h2>\n<div class=\"wide\"><table><thead>\n\
-         <tr><th colspan=\"3\">Run</th><th colspan=\"4\">While the sweep passes</th><th colspan=\"4\">Whole record (<code>spa</code>)</th><th colspan=\"4\">The run itself</th></tr>\n\
-         <tr><th>model</th><th>fill<br>cm</th><th>torque<br>mN·m</th><th>f<sub>dip</sub><br>Hz</th><th>f<sub>res</sub><br>Hz</th><th>Δf<br>mHz</th><th>notch<br>dB</th><th>f<sub>dip</sub><br>Hz</th><th>f<sub>res</sub><br>Hz</th><th>Δf<br>mHz</th><th>notch<br>dB</th><th>peak slosh<br>angle, deg</th><th>peak wave<br>mm</th><th>stuck<br>s</th><th>energy<br>residual</th></tr>\n</thead><tbody>\n",
+         <tr><th colspan=\"{}\">Run</th><th colspan=\"4\">While the sweep passes</th><th colspan=\"4\">Whole record (<code>spa</code>)</th><th colspan=\"4\">The run itself</th></tr>\n\
+         <tr><th>model</th><th>fill<br>cm</th><th>torque<br>mN·m</th>{heads}<th>f<sub>dip</sub><br>Hz</th><th>f<sub>res</sub><br>Hz</th><th>Δf<br>mHz</th><th>notch<br>dB</th><th>f<sub>dip</sub><br>Hz</th><th>f<sub>res</sub><br>Hz</th><th>Δf<br>mHz</th><th>notch<br>dB</th><th>peak slosh<br>angle, deg</th><th>peak wave<br>mm</th><th>stuck<br>s</th><th>energy<br>residual</th></tr>\n</thead><tbody>\n",
+        3 + others.len()
     );
-    for group in groups {
-        for run in &group.runs {
-            let _ = write!(
-                out,
-                "<tr><td>{}</td><td>{}</td><td>{}</td>",
-                escape(group.model),
-                cm(group.fill),
-                thousandths(run.case.amplitude)
-            );
-            for features in [&run.demodulated_features, &run.spa_features] {
-                let cell = |value: Option<f64>, digits: usize| match value {
-                    Some(value) => format!("<td>{value:.digits$}</td>"),
-                    None => "<td>none</td>".into(),
-                };
-                out.push_str(&cell(features.f_dip, 4));
-                out.push_str(&cell(features.f_res, 4));
-                out.push_str(&cell(features.delta_f().map(|f| f * 1e3), 1));
-                out.push_str(&cell(features.notch_db, 2));
-            }
-            let figures = &run.figures;
-            let _ = writeln!(
-                out,
-                "<td>{:.1}</td><td>{:.1}</td><td>{:.3}</td><td>{:.1e}</td></tr>",
-                figures.peak_slosh_angle.to_degrees(),
-                figures.peak_wave_height * 1e3,
-                figures.stuck,
-                figures.max_energy_residual
-            );
+    for run in &results.outcomes {
+        let _ = write!(
+            out,
+            "<tr><td>{}</td><td>{}</td><td>{}</td>",
+            escape(&run.case.model),
+            cm(run.case.fill),
+            run.case.amplitude.map_or(String::new(), |a| thousandths(a).to_string())
+        );
+        for (place, _) in &others {
+            let _ = write!(out, "<td>{}</td>", escape(&shortened(&run.case.varied[*place])));
         }
+        for (features, response) in
+            [(&run.demodulated_features, &run.demodulated), (&run.spa_features, &run.spa)]
+        {
+            let cell = |value: Option<f64>, digits: usize| match value {
+                Some(value) => format!("<td>{value:.digits$}</td>"),
+                None if response.frequency.is_empty() => "<td></td>".into(),
+                None => "<td>none</td>".into(),
+            };
+            out.push_str(&cell(features.f_dip, 4));
+            out.push_str(&cell(features.f_res, 4));
+            out.push_str(&cell(features.delta_f().map(|f| f * 1e3), 1));
+            out.push_str(&cell(features.notch_db, 2));
+        }
+        let figures = &run.figures;
+        let _ = writeln!(
+            out,
+            "<td>{:.1}</td><td>{:.1}</td><td>{:.3}</td><td>{:.1e}</td></tr>",
+            figures.peak_slosh_angle.to_degrees(),
+            figures.peak_wave_height * 1e3,
+            figures.stuck,
+            figures.max_energy_residual
+        );
     }
     out.push_str("</tbody></table></div>\n");
     out
 }
 
+/// A drawn number to six digits; any other text as it is.
+fn shortened(text: &str) -> String {
+    match text.parse::<f64>() {
+        Ok(value) if text.len() > 8 => format!("{value:.5e}"),
+        _ => text.to_string(),
+    }
+}
+
 // ---------------------------------------------------------------- figures
 
-const FREQUENCY_TICKS: [f64; 6] = [1.25, 1.5, 2.0, 2.5, 3.0, 3.5];
+fn frequency_ticks(from: f64, to: f64) -> Vec<f64> {
+    if (from, to) == BAND {
+        return vec![1.25, 1.5, 2.0, 2.5, 3.0, 3.5];
+    }
+    Axis::linear("", [from, to], 0.0, 6)
+        .ticks
+        .into_iter()
+        .filter(|f| (from..=to).contains(f))
+        .collect()
+}
+
+/// Amplitude of a run's torque, N·m; 0 where there is none.
+fn torque_of(run: &Outcome) -> f64 {
+    run.case.amplitude.unwrap_or(0.0)
+}
 
 fn responses(group: &Group, amplitudes: &[f64]) -> String {
     let level = |r: &FrequencyResponse| zip(&r.frequency, &r.decibels());
@@ -292,9 +413,9 @@ fn responses(group: &Group, amplitudes: &[f64]) -> String {
             .iter()
             .map(|run| Series {
                 points: of(&run.demodulated),
-                color: amplitude_color(amplitudes, run.case.amplitude),
+                color: amplitude_color(amplitudes, torque_of(run)),
                 style: Style::Line,
-                title: format!("{} mN·m", thousandths(run.case.amplitude)),
+                title: format!("{} mN·m", thousandths(torque_of(run))),
             })
             .collect();
         series.push(exact(of(&group.exact_response)));
@@ -302,9 +423,10 @@ fn responses(group: &Group, amplitudes: &[f64]) -> String {
     };
     let levels = || curves(&level).into_iter().flat_map(|s| s.points).map(|(_, y)| y);
     let size = (560.0, 330.0);
-    let band = Axis::logarithmic("frequency / Hz", BAND, &FREQUENCY_TICKS);
-    let dip = group.exact.f_dip.unwrap_or(BAND.0);
-    let peak = group.exact.f_res.unwrap_or(BAND.1);
+    let (from, to) = group.sweep.and_then(Profile::band).unwrap_or(BAND);
+    let band = Axis::logarithmic("frequency / Hz", (from, to), &frequency_ticks(from, to));
+    let dip = group.exact.f_dip.unwrap_or(from);
+    let peak = group.exact.f_res.unwrap_or(to);
     let around = Axis::linear("frequency / Hz", [dip - 0.08, peak + 0.12], 0.3, 6);
     let decibels = Axis::linear("|H| / dB re 1 (rad/s)/(N·m)", levels(), 10.0, 6);
 
@@ -335,11 +457,7 @@ fn responses(group: &Group, amplitudes: &[f64]) -> String {
         },
         estimator_chart(group, size, peak),
     ];
-    let mut out = format!(
-        "<h3>{} cm fill, {} model</h3>\n<div class=\"two\">\n",
-        cm(group.fill),
-        escape(group.model)
-    );
+    let mut out = format!("{}<div class=\"two\">\n", group.heading());
     for chart in charts {
         out.push_str(&chart.svg());
     }
@@ -391,7 +509,7 @@ fn estimator_chart(group: &Group, size: (f64, f64), peak: f64) -> Chart {
     series.push(exact(magnitude(&group.exact_response)));
     let top = series.iter().flat_map(|s| &s.points).map(|(_, y)| *y).fold(0.0, f64::max);
     let y = Axis::linear("|H| / (rad/s)/(N·m)", [0.0, top], 0.1, 5);
-    let amplitude = group.runs.last().map_or(0.0, |run| thousandths(run.case.amplitude));
+    let amplitude = group.runs.last().map_or(0.0, |run| thousandths(torque_of(run)));
     Chart {
         title: format!("The peak at {amplitude} mN·m, as each estimator sees it"),
         size,
@@ -403,11 +521,7 @@ fn estimator_chart(group: &Group, size: (f64, f64), peak: f64) -> Chart {
 }
 
 fn features(group: &Group) -> String {
-    let mut out = format!(
-        "<h3>{} cm fill, {} model</h3>\n<div class=\"four\">\n",
-        cm(group.fill),
-        escape(group.model)
-    );
+    let mut out = format!("{}<div class=\"four\">\n", group.heading());
     type Get = fn(&Features) -> Option<f64>;
     let panels: [(&str, &str, Get, f64, f64); 4] = [
         ("Dip", "f_dip / Hz", |f| f.f_dip, 0.01, 1.0),
@@ -420,7 +534,7 @@ fn features(group: &Group) -> String {
             group
                 .runs
                 .iter()
-                .filter_map(|run| Some((thousandths(run.case.amplitude), get(&of(run))? * scale)))
+                .filter_map(|run| Some((thousandths(torque_of(run)), get(&of(run))? * scale)))
                 .collect()
         };
         let x = torque_axis(group.runs.iter().copied());
@@ -513,7 +627,7 @@ fn linear_fit(groups: &[Group]) -> String {
             panel("Coherence of the rest", "mean coherence", |run| Some(run.fit?.coherence)),
             Panel {
                 level: Some((rotary::ROTARY, "counts as rotary")),
-                ..panel("Swirl", "largest |swirl|", |run| Some(run.rotary.swirl.abs()))
+                ..panel("Swirl", "largest |swirl|", |run| Some(run.rotary?.swirl.abs()))
             },
         ],
     ));
@@ -540,7 +654,7 @@ fn panels(groups: &[Group], panels: [Panel; 4]) -> String {
                 points: group
                     .runs
                     .iter()
-                    .filter_map(|run| Some((thousandths(run.case.amplitude), get(run)?)))
+                    .filter_map(|run| Some((thousandths(torque_of(run)), get(run)?)))
                     .filter(|(_, y)| y.is_finite() && (!decades || *y > 0.0))
                     .collect(),
                 color: fill_color(i),
@@ -571,7 +685,7 @@ fn panels(groups: &[Group], panels: [Panel; 4]) -> String {
 }
 
 fn torque_axis<'a>(runs: impl Iterator<Item = &'a Outcome>) -> Axis {
-    let values: Vec<f64> = runs.map(|run| thousandths(run.case.amplitude)).chain([0.0]).collect();
+    let values: Vec<f64> = runs.map(|run| thousandths(torque_of(run))).chain([0.0]).collect();
     let axis = Axis::linear("torque amplitude / mN·m", values, 10.0, 5);
     Axis { to: axis.to * 1.03, ..axis } // room for the last dot
 }
@@ -652,9 +766,9 @@ fn fill_color(i: usize) -> String {
     format!("var(--f{})", i % 4)
 }
 
-/// A length in cm, without the dust of binary fractions.
+/// A length in cm to the micrometre.
 fn cm(length: f64) -> f64 {
-    thousandths(length) / 10.0
+    (length * 1e6).round() / 1e4
 }
 
 fn hertz(value: Option<f64>) -> String {

@@ -48,6 +48,30 @@ impl Run {
         }
     }
 
+    /// Communication point `k`, s; the last is the stop time.
+    fn time(&self, k: usize) -> f64 {
+        if k == self.steps() { self.stop } else { self.start() + k as f64 * self.step }
+    }
+
+    /// The torque as a run hands it to the FMU: at every communication point `time` (s), `tau_cmd`
+    /// (N·m) and `tau_slope`, its derivative until the next point (N·m/s).
+    pub fn torque_table(&self) -> Table {
+        let steps = self.steps();
+        let mut columns = vec![Vec::new(); 3];
+        for k in 0..=steps {
+            let t = self.time(k);
+            let (tau, slope) = match k {
+                _ if k == steps => (self.torque.at(t), 0.0),
+                _ => self.torque.chord(t, self.time(k + 1) - t),
+            };
+            let slope = if self.hold { 0.0 } else { slope };
+            for (column, value) in columns.iter_mut().zip([t, tau, slope]) {
+                column.push(value);
+            }
+        }
+        Table::new(["time", TORQUE, "tau_slope"].map(String::from).to_vec(), columns)
+    }
+
     /// Fails with one sentence if the numbers make no sense.
     pub fn check(&self) -> Result<()> {
         ensure!(
@@ -104,11 +128,11 @@ impl Run {
         let steps = self.steps();
         let mut recorder = Recorder::new(instance, columns, steps + 1)?;
         let torque = [instance.fmu().description().variable(TORQUE)?.reference];
-        let (start, points) = (self.start(), steps + 1);
+        let points = steps + 1;
         let (mut time, mut tau_cmd) = (Vec::with_capacity(points), Vec::with_capacity(points));
-        let mut t = start;
+        let mut t = self.start();
         for step in 1..=steps {
-            let next = if step == steps { self.stop } else { start + step as f64 * self.step };
+            let next = self.time(step);
             let (tau, slope) = self.torque.chord(t, next - t);
             time.push(t);
             tau_cmd.push(tau);
