@@ -37,6 +37,13 @@ impl Plant {
         x
     }
 
+    /// Element `place` of x.
+    pub fn continuous_state(&self, place: usize) -> f64 {
+        let s = &self.state;
+        let hub = [s.theta, s.omega, s.work, s.heat, s.stuck_time, s.wheel_speed];
+        hub.get(place).copied().unwrap_or_else(|| s.modes.as_flattened()[place - hub.len()])
+    }
+
     /// Takes x from the host.
     pub fn set_continuous_states(&mut self, x: &[f64; STATES]) {
         let s = &mut self.state;
@@ -77,12 +84,12 @@ impl Plant {
         let contact = self.state.contact;
         with_modes!(&mut self.liquid, modes => {
             self.motion.start(modes, &self.state, tau, along(inputs.g_axial, du[2]));
+            self.motion.rates::<0, _>(modes, contact);
             self.motion.theta[1] = dx[0];
             self.motion.hub.omega[1] = dx[1];
             for (mode, dq) in modes.iter_mut().zip(dx[6..].as_chunks::<4>().0) {
                 mode.aim(dq);
             }
-            self.motion.rates::<0, _>(modes, contact);
             self.motion.rates::<1, _>(modes, contact);
         });
         self.rate_coefficients(1, -torque.slope / self.wheel.inertia)

@@ -75,18 +75,18 @@ pub struct Law {
     backward: Bracket,
     /// Does B depend on the angle?
     angular: bool,
-    /// u = -(w/w_s)^2, e = exp u, t_c = T_C(w)
-    u: Series,
+    /// u' with u = -(w/w_s)^2, e = exp u, t_c = T_C(w)
+    u_d: Series,
     e: Series,
     t_c: Series,
-    /// v = w/eps, t = tanh v, sech2 = 1 - t^2
-    v: Series,
+    /// v' with v = w/eps, t = tanh v, sech2 = 1 - t^2
+    v_d: Series,
     t: Series,
     sech2: Series,
     /// cos and sin of theta and 2 theta in turn, as in `Bracket::harmonics`
     trig: [Series; 4],
-    /// 2 theta
-    theta2: Series,
+    /// theta' and 2 theta'
+    angles_d: [Series; 2],
     /// B of the present direction, or (smooth) the blend of both
     bracket: Series,
     /// (B+ + B-)/2 and (B+ - B-)/2 for the smooth law
@@ -112,14 +112,14 @@ impl Law {
             forward,
             backward,
             angular: [forward, backward].iter().any(|b| b.harmonics != [0.0; 4]),
-            u: ZERO,
+            u_d: ZERO,
             e: ZERO,
             t_c: ZERO,
-            v: ZERO,
+            v_d: ZERO,
             t: ZERO,
             sech2: ZERO,
             trig: [ZERO; 4],
-            theta2: ZERO,
+            angles_d: [ZERO; 2],
             bracket: ZERO,
             even: ZERO,
             odd: ZERO,
@@ -195,7 +195,7 @@ impl Law {
                 let bracket =
                     if contact == Contact::Forward { self.forward } else { self.backward };
                 let size = if self.angular {
-                    self.harmonics::<N>(theta);
+                    self.harmonics::<N>(theta[N]);
                     self.bracket[N] = combine::<N>(&bracket, &self.trig);
                     series::mul::<N>(&self.t_c, &self.bracket)
                 } else {
@@ -205,16 +205,15 @@ impl Law {
             }
             FrictionModel::StribeckSmooth => {
                 self.dry_torque::<N>(omega2);
-                self.v[N] = omega[N] / self.eps;
                 self.t[N] = if N == 0 {
-                    libm::tanh(self.v[0])
+                    libm::tanh(omega[0] / self.eps)
                 } else {
-                    series::chain::<N>(&self.v, &self.sech2)
+                    series::chain::<N>(omega[N] / self.eps, &mut self.v_d, &self.sech2)
                 };
                 let t2 = series::square::<N>(&self.t);
                 self.sech2[N] = if N == 0 { 1.0 - t2 } else { -t2 };
                 if self.angular {
-                    self.harmonics::<N>(theta);
+                    self.harmonics::<N>(theta[N]);
                 }
                 let forward = combine::<N>(&self.forward, &self.trig);
                 let backward = combine::<N>(&self.backward, &self.trig);
@@ -231,16 +230,17 @@ impl Law {
     /// Coefficient N of T_C(w) = c + d exp(-(w/w_s)^2).
     #[inline(always)]
     fn dry_torque<const N: usize>(&mut self, omega2: &Series) {
-        self.u[N] = -omega2[N] * self.inv_omega_s2;
-        self.e[N] = series::exp::<N>(&self.u, &self.e);
-        self.t_c[N] = if N == 0 { self.c + self.d * self.e[0] } else { self.d * self.e[N] };
+        let u = -omega2[N] * self.inv_omega_s2;
+        self.e[N] =
+            if N == 0 { libm::exp(u) } else { series::chain::<N>(u, &mut self.u_d, &self.e) };
+        self.t_c[N] = series::constant::<N>(self.c) + self.d * self.e[N];
     }
 
-    fn harmonics<const N: usize>(&mut self, theta: &Series) {
-        self.theta2[N] = 2.0 * theta[N];
+    fn harmonics<const N: usize>(&mut self, theta: f64) {
         let [c1, s1, c2, s2] = &mut self.trig;
-        (s1[N], c1[N]) = series::sin_cos::<N>(theta, s1, c1);
-        (s2[N], c2[N]) = series::sin_cos::<N>(&self.theta2, s2, c2);
+        let [once_d, twice_d] = &mut self.angles_d;
+        (s1[N], c1[N]) = series::sin_cos::<N>(theta, once_d, s1, c1);
+        (s2[N], c2[N]) = series::sin_cos::<N>(2.0 * theta, twice_d, s2, c2);
     }
 }
 

@@ -387,7 +387,17 @@ impl Plant {
     /// Moves on by exactly `h` > 0 seconds; the inputs run along their ramps. On an
     /// error the plant is as before.
     pub fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), StepError> {
-        let mut state = self.state;
+        let before = self.state;
+        let done = self.advance(inputs, h);
+        if done.is_err() {
+            self.state = before;
+        }
+        done
+    }
+
+    /// As [`Plant::step`], but an error leaves the state unusable.
+    fn advance(&mut self, inputs: &Inputs, h: f64) -> Result<(), StepError> {
+        let state = &mut self.state;
         let begin = state.time;
         let (mut t, mut steps) = (0.0, 0);
         while t < h {
@@ -404,13 +414,12 @@ impl Plant {
                 Ramp { value: torque.value + external.value, slope: torque.slope + external.slope };
             let acting = (tau, now(inputs.g_axial));
             with_modes!(&mut self.liquid, modes => self.motion.advance(
-                modes, &mut state, acting, length, &self.imu, &mut steps,
+                modes, state, acting, length, &self.imu, &mut steps,
             ))?;
             state.wheel_speed = speed;
             t = if length == h - t { h } else { t + length };
         }
         state.time = begin + h;
-        self.state = state;
         Ok(())
     }
 

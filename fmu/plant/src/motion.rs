@@ -120,7 +120,8 @@ impl Motion {
         }
     }
 
-    /// Coefficient N of every quantity from coefficients up to N of the state.
+    /// Coefficient N of every quantity from coefficients up to N of the state, and
+    /// coefficient N + 1 of the state.
     #[inline(always)]
     pub fn rates<const N: usize, M: Mode>(&mut self, modes: &mut [M], contact: Contact) {
         self.hub.omega2[N] = series::square::<N>(&self.hub.omega);
@@ -141,24 +142,20 @@ impl Motion {
         } else {
             self.friction.slip::<N>(contact, &self.theta, &self.hub.omega, &self.hub.omega2);
             let torque = net + self.friction.tau_f[N];
-            let rest = series::mul_tail::<N>(&self.inertia, &self.hub.omega_dot);
+            let rest = if M::MOVES_INERTIA {
+                series::mul_tail::<N>(&self.inertia, &self.hub.omega_dot)
+            } else {
+                0.0
+            };
             (torque - rest) * self.inv_inertia
         };
+        self.theta[N + 1] = series::next::<N>(self.hub.omega[N]);
+        self.hub.omega[N + 1] = series::next::<N>(self.hub.omega_dot[N]);
         self.work[N] = series::mul_ramp::<N>(&self.tau, &self.hub.omega);
         self.heat[N] = -series::mul::<N>(&self.friction.tau_f, &self.hub.omega);
         for mode in modes.iter_mut() {
             mode.respond::<N>(&self.hub);
             self.heat[N] += mode.heat::<N>();
-        }
-    }
-
-    /// Coefficient N + 1 of the state from coefficient N of its rates.
-    #[inline(always)]
-    fn grow<const N: usize, M: Mode>(&mut self, modes: &mut [M]) {
-        self.theta[N + 1] = series::next::<N>(self.hub.omega[N]);
-        self.hub.omega[N + 1] = series::next::<N>(self.hub.omega_dot[N]);
-        for mode in modes.iter_mut() {
-            mode.grow::<N>();
         }
     }
 
@@ -174,7 +171,6 @@ impl Motion {
         let mut quiet = 0;
         for_each_order!(N => {
             self.rates::<N, M>(modes, contact);
-            self.grow::<N, M>(modes);
             if N == 1 {
                 h = h.min(self.friction.reach(&self.hub.omega));
                 power = h;
@@ -186,7 +182,7 @@ impl Motion {
             }
             power *= h;
             if N + 2 >= MIN_ORDER {
-                let slosh = modes.iter().map(|m| m.term(N + 1)).fold(0.0, f64::max);
+                let slosh = modes.iter().map(|m| m.term(N + 1)).fold(0.0, larger);
                 let is_quiet = self.hub.omega[N + 1].abs() * power <= hub_allowed
                     && slosh * power <= slosh_allowed;
                 quiet = if is_quiet { quiet + 1 } else { 0 };
@@ -228,8 +224,13 @@ impl Motion {
 
     /// When, within `h`, the hub comes to rest, from the series of order n.
     fn time_of_rest(&self, n: usize, h: f64, contact: Contact) -> Option<f64> {
+        let omega = &self.hub.omega;
+        let change = omega[1..=n].iter().rev().fold(0.0, |sum, x| (sum + x.abs()) * h);
+        if omega[0].abs() > change {
+            return None; // far from rest
+        }
         let sign = contact as i8 as f64;
-        let rate = self.hub.omega.map(|x| sign * x);
+        let rate = omega.map(|x| sign * x);
         // A hub that has just broken away starts with no rate, and with hardly any
         // acceleration: these roots at t = 0 are behind it.
         let first = rate[..n].iter().position(|&x| x > 0.0)?;
@@ -335,13 +336,19 @@ impl Motion {
                 }
                 None => self.start(modes, state, now(tau), now(g)),
             }
-            if !state.is_finite() {
+            if !state.is_finite(modes.len()) {
                 return Err(StepError::NotFinite { time: begin + t });
             }
         }
         state.time = begin + h;
         Ok(())
     }
+}
+
+/// The larger of two sizes; unlike `f64::max` it minds no NaN, which ends the step elsewhere.
+#[inline(always)]
+fn larger(a: f64, b: f64) -> f64 {
+    if b > a { b } else { a }
 }
 
 impl State {
@@ -354,8 +361,9 @@ impl State {
         }
     }
 
-    fn is_finite(&self) -> bool {
-        let modes = self.modes.iter().flatten().all(|x| x.is_finite());
+    /// Of the hub and so many modes.
+    fn is_finite(&self, modes: usize) -> bool {
+        let modes = self.modes[..modes].iter().flatten().all(|x| x.is_finite());
         self.theta.is_finite() && self.omega.is_finite() && modes
     }
 }

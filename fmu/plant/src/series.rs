@@ -70,6 +70,17 @@ pub fn each<const N: usize>(a: &Pair, b: &Pair) -> [f64; 2] {
     sum
 }
 
+/// Coefficient N of (a_1^2, a_2^2).
+#[inline(always)]
+pub fn squares<const N: usize>(a: &Pair) -> [f64; 2] {
+    let mut half = [0.0; 2];
+    for j in 0..N.div_ceil(2) {
+        half = [half[0] + a[j][0] * a[N - j][0], half[1] + a[j][1] * a[N - j][1]];
+    }
+    let middle = if N.is_multiple_of(2) { a[N / 2].map(|x| x * x) } else { [0.0; 2] };
+    [2.0 * half[0] + middle[0], 2.0 * half[1] + middle[1]]
+}
+
 /// Coefficient N of a.b.
 #[inline(always)]
 pub fn dot<const N: usize>(a: &Pair, b: &Pair) -> f64 {
@@ -116,27 +127,23 @@ pub fn mul_ramp<const N: usize>(ramp: &[f64; 2], a: &Series) -> f64 {
     if N == 0 { ramp[0] * a[0] } else { ramp[0] * a[N] + ramp[1] * a[N - 1] }
 }
 
-/// Coefficient N >= 1 of f where f' = g u', from g's coefficients below N:
-/// (1/N) sum of j u_j g_(N-j).
+/// Coefficient N >= 1 of f where f' = g u', from u's coefficient N and g's below N;
+/// `u_d` keeps the coefficients of u'.
 #[inline(always)]
-pub fn chain<const N: usize>(u: &Series, g: &Series) -> f64 {
+pub fn chain<const N: usize>(u: f64, u_d: &mut Series, g: &Series) -> f64 {
+    u_d[N - 1] = N as f64 * u;
     let mut sum = 0.0;
-    for j in 1..=N {
-        sum += j as f64 / N as f64 * u[j] * g[N - j];
+    for j in 0..N {
+        sum += u_d[j] * g[N - 1 - j];
     }
-    sum
+    sum * const { 1.0 / N as f64 }
 }
 
-/// Coefficient N of e = exp(u), from e's coefficients below N.
+/// Coefficient N of (sin a, cos a), from a's coefficient N and theirs below N; `a_d` keeps
+/// the coefficients of a'.
 #[inline(always)]
-pub fn exp<const N: usize>(u: &Series, e: &Series) -> f64 {
-    if N == 0 { libm::exp(u[0]) } else { chain::<N>(u, e) }
-}
-
-/// Coefficient N of s = sin(a) and c = cos(a), from theirs below N.
-#[inline(always)]
-pub fn sin_cos<const N: usize>(a: &Series, s: &Series, c: &Series) -> (f64, f64) {
-    if N == 0 { libm::sincos(a[0]) } else { (chain::<N>(a, c), -chain::<N>(a, s)) }
+pub fn sin_cos<const N: usize>(a: f64, a_d: &mut Series, s: &Series, c: &Series) -> (f64, f64) {
+    if N == 0 { libm::sincos(a) } else { (chain::<N>(a, a_d, c), -chain::<N>(a, a_d, s)) }
 }
 
 /// Does something with `$N` as the constants 0, 1, ... [`ORDER`] - 1, in turn.
@@ -162,8 +169,16 @@ pub fn value(a: &Series, n: usize, t: f64) -> f64 {
 /// The integral from 0 to t of the series cut after order n.
 #[inline(always)]
 pub fn integral(a: &Series, n: usize, t: f64) -> f64 {
-    let sum = (0..=n).rev().fold(0.0, |sum, j| sum * t + a[j] / (j + 1) as f64);
-    sum * t
+    const SHARES: Series = {
+        let (mut shares, mut j) = (ZERO, 0);
+        while j <= ORDER {
+            shares[j] = 1.0 / (j + 1) as f64;
+            j += 1;
+        }
+        shares
+    };
+    let terms = a[..=n].iter().zip(&SHARES).rev();
+    terms.fold(0.0, |sum, (x, share)| sum * t + x * share) * t
 }
 
 /// The first t in (0, h] at which the polynomial `a`, positive at t = 0, has
@@ -217,10 +232,8 @@ mod tests {
     use super::*;
 
     /// u(t) = 0.3 + t - t^2/2
-    fn u() -> Series {
-        let mut u = ZERO;
-        (u[0], u[1], u[2]) = (0.3, 1.0, -0.5);
-        u
+    fn u(n: usize) -> f64 {
+        [0.3, 1.0, -0.5].get(n).copied().unwrap_or(0.0)
     }
 
     // At t = 0.1 what is cut off is below rounding; a few ulp remain.
@@ -228,18 +241,18 @@ mod tests {
 
     #[test]
     fn exp_of_a_series_is_the_series_of_exp() {
-        let mut e = ZERO;
+        let (mut e, mut u_d) = (ZERO, ZERO);
         for_each_order!(N => {
-            e[N] = exp::<N>(&u(), &e);
+            e[N] = if N == 0 { f64::exp(u(0)) } else { chain::<N>(u(N), &mut u_d, &e) };
         });
         assert!((value(&e, ORDER, 0.1) - f64::exp(0.395)).abs() < 4.0 * ULPS);
     }
 
     #[test]
     fn sin_and_cos_of_a_series_are_the_series_of_sin_and_cos() {
-        let (mut s, mut c) = (ZERO, ZERO);
+        let (mut s, mut c, mut u_d) = (ZERO, ZERO, ZERO);
         for_each_order!(N => {
-            (s[N], c[N]) = sin_cos::<N>(&u(), &s, &c);
+            (s[N], c[N]) = sin_cos::<N>(u(N), &mut u_d, &s, &c);
             let one = square::<N>(&s) + mul::<N>(&c, &c);
             assert!((one - constant::<N>(1.0)).abs() < ULPS);
         });

@@ -29,6 +29,8 @@ pub struct Linear {
 }
 
 impl Mode for Linear {
+    const MOVES_INERTIA: bool = false;
+
     fn new(p: &Pendulum) -> Self {
         Linear { p: *p, al: ZERO, al_d: ZERO, al_dd: ZERO, g_al: ZERO, omega_n: 0.0 }
     }
@@ -67,10 +69,6 @@ impl Mode for Linear {
     fn respond<const N: usize>(&mut self, hub: &Hub) {
         let Pendulum { c_m, r_l, inv_l, .. } = self.p;
         self.al_dd[N] = -c_m * self.al_d[N] - inv_l * self.g_al[N] - r_l * hub.omega_dot[N];
-    }
-
-    #[inline(always)]
-    fn grow<const N: usize>(&mut self) {
         self.al[N + 1] = next::<N>(self.al_d[N]);
         self.al_d[N + 1] = next::<N>(self.al_dd[N]);
     }

@@ -52,6 +52,8 @@ pub struct Angles {
 
 /// One slosh mode as a set of power series in time.
 pub trait Mode {
+    /// Whether J changes as the mode moves.
+    const MOVES_INERTIA: bool = true;
     /// The mode at rest; `start` puts it somewhere.
     fn new(pendulum: &Pendulum) -> Self;
     /// Coordinates from angles with sin(angle) = displacement/l and their rates.
@@ -66,10 +68,9 @@ pub trait Mode {
     fn rate(&self, n: usize) -> [f64; 4];
     /// Coefficient N of J and T, from coefficients up to N of q, q' and w.
     fn load<const N: usize>(&mut self, hub: &Hub) -> Load;
-    /// Coefficient N of q'', after `load`, when w' is known up to N.
+    /// Coefficient N of q'' and with it N + 1 of q and q', after `load`, when w' is known up
+    /// to N.
     fn respond<const N: usize>(&mut self, hub: &Hub);
-    /// Coefficient N + 1 of q and q' from coefficient N of q' and q''.
-    fn grow<const N: usize>(&mut self);
     /// Size of the motion, rad/s: the scale of its errors.
     fn size(&self) -> f64;
     /// Size of coefficient `n` of the rates.

@@ -131,10 +131,6 @@ impl Mode for Paraboloid {
         self.push[N] = mul::<N>(&self.lever, wd);
         self.q_dd[0][N] = self.b[0][N] + mul::<N>(wd, y) + mul::<N>(&self.push, x);
         self.q_dd[1][N] = self.b[1][N] - mul::<N>(wd, &self.arm) + mul::<N>(&self.push, y);
-    }
-
-    #[inline(always)]
-    fn grow<const N: usize>(&mut self) {
         for i in 0..2 {
             self.q[i][N + 1] = next::<N>(self.q_d[i][N]);
             self.q_d[i][N + 1] = next::<N>(self.q_dd[i][N]);

@@ -23,6 +23,8 @@ pub struct Planar {
     al: Series,
     al_d: Series,
     al_dd: Series,
+    /// al' as `sin_cos` keeps it
+    slope: Series,
     s: Series,
     c: Series,
     /// s c_, w al', al'^2, w^2 s c_, p
@@ -40,6 +42,7 @@ impl Mode for Planar {
             al: ZERO,
             al_d: ZERO,
             al_dd: ZERO,
+            slope: ZERO,
             s: ZERO,
             c: ZERO,
             sc: ZERO,
@@ -76,7 +79,7 @@ impl Mode for Planar {
         if N == 0 {
             self.omega_n = libm::sqrt(f64::max(hub.g[0], 0.0) / l);
         }
-        (self.s[N], self.c[N]) = sin_cos::<N>(&self.al, &self.s, &self.c);
+        (self.s[N], self.c[N]) = sin_cos::<N>(self.al[N], &mut self.slope, &self.s, &self.c);
         self.sc[N] = mul::<N>(&self.s, &self.c);
         self.w_al_d[N] = mul::<N>(&hub.omega, &self.al_d);
         self.al_d2[N] = square::<N>(&self.al_d);
@@ -94,10 +97,6 @@ impl Mode for Planar {
     fn respond<const N: usize>(&mut self, hub: &Hub) {
         let Pendulum { r_l, inv_l, .. } = self.p;
         self.al_dd[N] = -r_l * mul::<N>(&self.c, &hub.omega_dot) - inv_l * self.force[N];
-    }
-
-    #[inline(always)]
-    fn grow<const N: usize>(&mut self) {
         self.al[N + 1] = next::<N>(self.al_d[N]);
         self.al_d[N + 1] = next::<N>(self.al_dd[N]);
     }

@@ -21,7 +21,7 @@
 //!
 //! ```text
 //! J = m r^2 p_y^2     (beyond the hub's I0)
-//! T = m r p_y S + c l [ r p_y' + l (p_x p_y' - p_y p_x') ]
+//! T = m r p_y S + c l [ r p_y' + l (p_x p_y' - p_y p_x') ],  p_x p_y' - p_y p_x' = k^2 (xi_1 xi_2' - xi_2 xi_1')
 //! E = m |velocity|^2/2 + m g l (2 - k),  heat c l^2 |p'|^2,  |p'| = k |xi'|
 //! ```
 //!
@@ -30,7 +30,7 @@
 use super::{Angles, Hub, Load, Mode};
 use crate::series::{
     Pair, Series, ZERO, ZERO_PAIR, constant, dot, each, mul, mul_ramp, mul_tail, next, scale,
-    scale_ramp, square, value_pair,
+    scale_ramp, square, squares, value_pair,
 };
 use crate::tank::Pendulum;
 
@@ -40,8 +40,6 @@ pub struct Spherical {
     xi: Pair,
     xi_d: Pair,
     xi_dd: Pair,
-    /// xi' with its components exchanged
-    xi_d_swapped: Pair,
     /// 1 + |xi|^2, k
     sum: Series,
     k: Series,
@@ -53,29 +51,25 @@ pub struct Spherical {
     v: Pair,
     /// xi' + v
     xi_d_v: Pair,
-    rho: Series,
-    /// k rho, |v|^2, k |v|^2
+    /// (rho, |v|^2), k rho, k |v|^2
+    rho_v2: Pair,
     k_rho: Series,
-    v2: Series,
     k_v2: Series,
     /// S
     pull: Series,
-    /// xi_1 xi_2' - xi_2 xi_1' and k times it
-    swirl: Series,
-    k_swirl: Series,
+    /// k xi' and the same with its components exchanged
+    k_xi_d: Pair,
+    k_xi_d_swapped: Pair,
     e: Pair,
     a: Pair,
     b: Pair,
-    /// |xi'|^2, k |xi'|^2 (heat)
-    xi_d2: Series,
-    k_xi_d2: Series,
     omega_n: f64,
 }
 
 impl Spherical {
     /// p' at order 0.
     fn dir_d(&self) -> [f64; 3] {
-        let (k, rho) = (self.k[0], self.rho[0]);
+        let (k, rho) = (self.k[0], self.rho_v2[0][0]);
         let along = |i: usize| k * self.xi_d[0][i] - k * k * rho * self.xi[0][i];
         [along(0), along(1), k * k * rho]
     }
@@ -95,7 +89,6 @@ impl Mode for Spherical {
             xi: ZERO_PAIR,
             xi_d: ZERO_PAIR,
             xi_dd: ZERO_PAIR,
-            xi_d_swapped: ZERO_PAIR,
             sum: ZERO,
             k: ZERO,
             across: ZERO_PAIR,
@@ -104,18 +97,15 @@ impl Mode for Spherical {
             p_z: ZERO,
             v: ZERO_PAIR,
             xi_d_v: ZERO_PAIR,
-            rho: ZERO,
+            rho_v2: ZERO_PAIR,
             k_rho: ZERO,
-            v2: ZERO,
             k_v2: ZERO,
             pull: ZERO,
-            swirl: ZERO,
-            k_swirl: ZERO,
+            k_xi_d: ZERO_PAIR,
+            k_xi_d_swapped: ZERO_PAIR,
             e: ZERO_PAIR,
             a: ZERO_PAIR,
             b: ZERO_PAIR,
-            xi_d2: ZERO,
-            k_xi_d2: ZERO,
             omega_n: 0.0,
         }
     }
@@ -161,9 +151,8 @@ impl Mode for Spherical {
             self.omega_n = libm::sqrt(f64::max(hub.g[0], 0.0) / l);
         }
         let ([x, y], [x_d, y_d]) = (self.xi[N], self.xi_d[N]);
-        self.xi_d_swapped[N] = [y_d, x_d];
         // geometry
-        let [x2, y2] = each::<N>(&self.xi, &self.xi);
+        let [x2, y2] = squares::<N>(&self.xi);
         let mut xy = 0.0;
         for j in 0..=N {
             xy += self.xi[j][0] * self.xi[N - j][1];
@@ -179,10 +168,9 @@ impl Mode for Spherical {
         let turned = scale::<N>(&hub.omega, &self.xi);
         self.v[N] = [x_d - turned[1], y_d + turned[0]];
         self.xi_d_v[N] = [x_d + self.v[N][0], y_d + self.v[N][1]];
-        self.rho[N] = dot::<N>(&self.xi, &self.xi_d);
-        self.v2[N] = dot::<N>(&self.v, &self.v);
-        self.k_rho[N] = mul::<N>(&self.k, &self.rho);
-        self.k_v2[N] = mul::<N>(&self.k, &self.v2);
+        let [v2_x, v2_y] = squares::<N>(&self.v);
+        self.rho_v2[N] = [dot::<N>(&self.xi, &self.xi_d), v2_x + v2_y];
+        [self.k_rho[N], self.k_v2[N]] = scale::<N>(&self.k, &self.rho_v2);
         // B
         let turned = scale::<N>(&hub.omega, &self.xi_d_v);
         let turned = [turned[1], -turned[0]];
@@ -198,15 +186,14 @@ impl Mode for Spherical {
         // J and T
         self.pull[N] = l * mul::<N>(&self.k, &self.k_v2) + r * mul::<N>(&hub.omega2, &self.p_x)
             - mul_ramp::<N>(&hub.g, &self.p_z);
-        let [plus, minus] = each::<N>(&self.xi, &self.xi_d_swapped);
-        self.swirl[N] = plus - minus;
-        self.k_swirl[N] = mul::<N>(&self.k, &self.swirl);
-        let k_xi_d = scale::<N>(&self.k, &self.xi_d);
-        let p_y_d = k_xi_d[1] - mul::<N>(&self.k_rho, &self.p_y);
+        let [k_x_d, k_y_d] = scale::<N>(&self.k, &self.xi_d);
+        self.k_xi_d[N] = [k_x_d, k_y_d];
+        self.k_xi_d_swapped[N] = [k_y_d, k_x_d];
+        let p_y_d = k_y_d - mul::<N>(&self.k_rho, &self.p_y);
+        let [plus, minus] = each::<N>(&self.across, &self.k_xi_d_swapped);
         Load {
             j: m * r * r * square::<N>(&self.p_y),
-            t: m * r * mul::<N>(&self.p_y, &self.pull)
-                + c * l * (r * p_y_d + l * mul::<N>(&self.k, &self.k_swirl)),
+            t: m * r * mul::<N>(&self.p_y, &self.pull) + c * l * (r * p_y_d + l * (plus - minus)),
         }
     }
 
@@ -214,10 +201,6 @@ impl Mode for Spherical {
     fn respond<const N: usize>(&mut self, hub: &Hub) {
         let pushed = scale::<N>(&hub.omega_dot, &self.a);
         self.xi_dd[N] = [self.b[N][0] + pushed[0], self.b[N][1] + pushed[1]];
-    }
-
-    #[inline(always)]
-    fn grow<const N: usize>(&mut self) {
         self.xi[N + 1] = self.xi_d[N].map(next::<N>);
         self.xi_d[N + 1] = self.xi_dd[N].map(next::<N>);
     }
@@ -233,12 +216,11 @@ impl Mode for Spherical {
         f64::max(self.xi_d[n][0].abs(), self.xi_d[n][1].abs())
     }
 
-    /// c l^2 k^2 |xi'|^2
+    /// c l^2 |k xi'|^2
     #[inline(always)]
     fn heat<const N: usize>(&mut self) -> f64 {
-        self.xi_d2[N] = dot::<N>(&self.xi_d, &self.xi_d);
-        self.k_xi_d2[N] = mul::<N>(&self.k, &self.xi_d2);
-        self.p.c * self.p.l * self.p.l * mul::<N>(&self.k, &self.k_xi_d2)
+        let [x, y] = squares::<N>(&self.k_xi_d);
+        self.p.c * self.p.l * self.p.l * (x + y)
     }
 
     #[inline(always)]
