@@ -2,8 +2,8 @@
 //! that a refused call changes nothing, and that a saved state is all there is.
 
 use HubSlosh::calls::{
-    Fault, GET_BOOLEAN, GET_INTEGER, GET_REAL, Interface, Mode, SET_BOOLEAN, SET_INTEGER, SET_REAL,
-    Severity,
+    CType, Fault, GET_BOOLEAN, GET_INTEGER, GET_REAL, Interface, Mode, SET_BOOLEAN, SET_INTEGER,
+    SET_REAL, Severity,
 };
 use HubSlosh::instance::{DEFAULT_TOLERANCE, Instance};
 use HubSlosh::snapshot::{from_bytes, size, to_bytes};
@@ -36,8 +36,8 @@ fn set(instance: &mut Instance, values: &[(&str, Value)]) {
 
 fn get_by_reference(instance: &mut Instance, reference: u32) -> Result<Value, Fault> {
     let call = match SCALARS[reference as usize].variable.c_type() {
-        "Real" => &GET_REAL,
-        "Integer" => &GET_INTEGER,
+        CType::Real => &GET_REAL,
+        CType::Integer => &GET_INTEGER,
         _ => &GET_BOOLEAN,
     };
     instance.get(call, reference)

@@ -85,13 +85,23 @@ impl Mode {
     }
 }
 
+/// The C types that values are got and set with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum CType {
+    Real,
+    Integer,
+    Boolean,
+    String,
+}
+
 /// A function of FMI 2.0 and the states in which it may be called.
 #[derive(Debug)]
 pub struct Call {
     /// The function's name.
     pub name: &'static str,
-    /// The C type of the values it passes: "" if that is not its business.
-    pub c_type: &'static str,
+    /// The C type of the values it passes, if that is its business.
+    pub c_type: Option<CType>,
     allowed: u8,
     /// The interface it belongs to, if not to both.
     only_in: Option<Interface>,
@@ -110,11 +120,11 @@ const ANY: u8 = I | M | S | E | C | T | F;
 const RUN: u8 = S | E | C | T | F;
 
 const fn call(name: &'static str, allowed: u8) -> Call {
-    Call { name, c_type: "", allowed, only_in: None }
+    Call { name, c_type: None, allowed, only_in: None }
 }
 
-const fn of(c_type: &'static str, name: &'static str, allowed: u8) -> Call {
-    Call { name, c_type, allowed, only_in: None }
+const fn of(c_type: CType, name: &'static str, allowed: u8) -> Call {
+    Call { name, c_type: Some(c_type), allowed, only_in: None }
 }
 
 /// Of Co-Simulation.
@@ -130,6 +140,7 @@ const fn me(call: Call) -> Call {
 #[allow(missing_docs)]
 #[rustfmt::skip]
 mod list {
+    use super::CType::*;
     use super::*;
     pub static SET_DEBUG_LOGGING:        Call = call("fmi2SetDebugLogging", ANY);
     pub static SETUP_EXPERIMENT:         Call = call("fmi2SetupExperiment", I);
@@ -140,24 +151,24 @@ mod list {
     // Parameters and inputs can be read from the start; everything else has a
     // value from initialization mode on. Which variable can be set when is the
     // variable's business.
-    pub static GET_REAL:                 Call = of("Real", "fmi2GetReal", ANY);
-    pub static GET_INTEGER:              Call = of("Integer", "fmi2GetInteger", ANY);
-    pub static GET_BOOLEAN:              Call = of("Boolean", "fmi2GetBoolean", ANY);
-    pub static GET_STRING:               Call = of("String", "fmi2GetString", ANY);
-    pub static SET_REAL:                 Call = of("Real", "fmi2SetReal", I | M | S | E | C);
-    pub static SET_INTEGER:              Call = of("Integer", "fmi2SetInteger", I | M | S | E | C);
-    pub static SET_BOOLEAN:              Call = of("Boolean", "fmi2SetBoolean", I | M | S | E | C);
-    pub static SET_STRING:               Call = of("String", "fmi2SetString", I | M | S | E | C);
+    pub static GET_REAL:                 Call = of(Real, "fmi2GetReal", ANY);
+    pub static GET_INTEGER:              Call = of(Integer, "fmi2GetInteger", ANY);
+    pub static GET_BOOLEAN:              Call = of(Boolean, "fmi2GetBoolean", ANY);
+    pub static GET_STRING:               Call = of(String, "fmi2GetString", ANY);
+    pub static SET_REAL:                 Call = of(Real, "fmi2SetReal", I | M | S | E | C);
+    pub static SET_INTEGER:              Call = of(Integer, "fmi2SetInteger", I | M | S | E | C);
+    pub static SET_BOOLEAN:              Call = of(Boolean, "fmi2SetBoolean", I | M | S | E | C);
+    pub static SET_STRING:               Call = of(String, "fmi2SetString", I | M | S | E | C);
     pub static GET_FMU_STATE:            Call = call("fmi2GetFMUstate", ANY);
     pub static SET_FMU_STATE:            Call = call("fmi2SetFMUstate", ANY);
     pub static FREE_FMU_STATE:           Call = call("fmi2FreeFMUstate", ANY | Mode::Fatal.bit());
     pub static SERIALIZED_SIZE:          Call = call("fmi2SerializedFMUstateSize", ANY);
     pub static SERIALIZE:                Call = call("fmi2SerializeFMUstate", ANY);
     pub static DESERIALIZE:              Call = call("fmi2DeSerializeFMUstate", ANY);
-    pub static DIRECTIONAL_DERIVATIVE:   Call = of("Real", "fmi2GetDirectionalDerivative", M | RUN);
+    pub static DIRECTIONAL_DERIVATIVE:   Call = of(Real, "fmi2GetDirectionalDerivative", M | RUN);
 
-    pub static SET_INPUT_DERIVATIVES:    Call = cs(of("Real", "fmi2SetRealInputDerivatives", I | M | S));
-    pub static GET_OUTPUT_DERIVATIVES:   Call = cs(of("Real", "fmi2GetRealOutputDerivatives", RUN));
+    pub static SET_INPUT_DERIVATIVES:    Call = cs(of(Real, "fmi2SetRealInputDerivatives", I | M | S));
+    pub static GET_OUTPUT_DERIVATIVES:   Call = cs(of(Real, "fmi2GetRealOutputDerivatives", RUN));
     pub static DO_STEP:                  Call = cs(call("fmi2DoStep", S));
     pub static CANCEL_STEP:              Call = cs(call("fmi2CancelStep", S));
     pub static GET_STATUS:               Call = cs(call("fmi2GetStatus", ANY));
@@ -181,11 +192,22 @@ pub use list::*;
 
 impl Call {
     /// Whether it may be called in this state; if not, the message says where.
+    #[inline]
     pub fn check(&self, interface: Interface, mode: Mode) -> Result<(), Fault> {
         let foreign = self.only_in.filter(|only| *only != interface);
         if foreign.is_none() && self.allowed & mode.bit() != 0 {
             return Ok(());
         }
+        self.refuse(foreign, interface, mode)
+    }
+
+    #[cold]
+    fn refuse(
+        &self,
+        foreign: Option<Interface>,
+        interface: Interface,
+        mode: Mode,
+    ) -> Result<(), Fault> {
         if mode == Mode::Fatal {
             let text = "an earlier call panicked; the instance can only be freed";
             return Err(Fault {
@@ -213,6 +235,7 @@ impl Call {
     }
 
     /// This call failed.
+    #[cold]
     pub fn error(&self, why: impl fmt::Display) -> Fault {
         Fault { severity: Severity::Error, text: format!("{}: {why}", self.name) }
     }

@@ -199,9 +199,9 @@ impl Instance {
             (Access::Calculated(_) | Access::CalculatedPerMode(_), _) => {
                 scalar.variable.calculated(self.plant(call)?.calculated(), scalar.element)
             }
-            (Access::State, Some(place)) => {
-                let states = self.plant(call)?.continuous_states();
-                Some(Value::Real(states[place.at(scalar.element)]))
+            (_, Some(place)) => {
+                let state = self.plant(call)?.continuous_state(place.at(scalar.element));
+                Some(Value::Real(state))
             }
             (Access::Rate(place), _) => {
                 let rates = self.look(call, |plant, inputs| plant.derivatives(inputs))?;
@@ -321,13 +321,12 @@ impl Instance {
     ) -> Result<(), Fault> {
         let call = &calls::SET_INPUT_DERIVATIVES;
         self.check(call)?;
-        let mut slopes = Vec::with_capacity(references.len());
         for ((reference, order), slope) in references.iter().zip(orders).zip(values) {
             let variable = scalar(call, *reference)?.variable;
             let name = variable.name;
-            let Access::Input(ramp) = variable.access else {
+            if variable.causality != Causality::Input {
                 return Err(call.error(format_args!("{name} is not an input")));
-            };
+            }
             if *order != 1 {
                 return Err(call.error(format_args!("order {order} of {name} (allowed: 1)")));
             }
@@ -336,10 +335,11 @@ impl Instance {
                     "derivative of {name} = {slope} (allowed: any finite number)"
                 )));
             }
-            slopes.push((ramp, *slope));
         }
-        for (ramp, slope) in slopes {
-            ramp(&mut self.inputs).slope = slope;
+        for (reference, slope) in references.iter().zip(values) {
+            if let Access::Input(ramp) = scalar(call, *reference)?.variable.access {
+                ramp(&mut self.inputs).slope = *slope;
+            }
         }
         Ok(())
     }
@@ -356,7 +356,7 @@ impl Instance {
         }
         let inputs = self.inputs;
         let states = self.look(call, |plant, inputs| plant.derivatives(inputs))?;
-        self.slopes(call, states, &inputs)?.of(call, &scalar)
+        self.slopes(call, states, &inputs)?.of(call, scalar)
     }
 
     /// fmi2GetDirectionalDerivative: what the unknowns do when the knowns go in a
@@ -379,7 +379,7 @@ impl Instance {
         let mut along = Inputs { tau_cmd: nowhere, tau_ext: nowhere, g_axial: nowhere };
         for (reference, d) in knowns.iter().zip(direction) {
             let scalar = scalar(call, *reference)?;
-            check_direction(call, &scalar, *d)?;
+            check_direction(call, scalar, *d)?;
             match (scalar.variable.access, scalar.variable.state) {
                 (Access::Input(ramp), _) => ramp(&mut along).slope += d,
                 (_, Some(place)) => states[place.at(scalar.element)] += d,
@@ -393,7 +393,7 @@ impl Instance {
         }
         let slopes = self.slopes(call, states, &along)?;
         for (reference, answer) in unknowns.iter().zip(answers) {
-            *answer = slopes.of(call, &scalar(call, *reference)?)?;
+            *answer = slopes.of(call, scalar(call, *reference)?)?;
         }
         Ok(())
     }
@@ -413,7 +413,7 @@ impl Instance {
         let mut size: f64 = 0.0;
         for (reference, d) in knowns.iter().zip(direction) {
             let scalar = scalar(call, *reference)?;
-            check_direction(call, &scalar, *d)?;
+            check_direction(call, scalar, *d)?;
             let known = [Causality::Input, Causality::Parameter];
             let value = match self.clone().get(call, *reference)? {
                 Value::Real(x) if known.contains(&scalar.variable.causality) => x,
@@ -700,16 +700,17 @@ impl Instance {
     /// What the plant shows now; it is computed when it is first asked for.
     fn shown(&mut self, call: &Call) -> Result<&Outputs, Fault> {
         if self.shown.is_none() {
-            self.shown = Some(self.look(call, |plant, inputs| plant.outputs_held(inputs))?);
+            let (inputs, regime) = (self.inputs, self.regime);
+            let interface = self.interface;
+            let plant = self.plant(call)?;
+            let mut shown = match interface {
+                Interface::CoSimulation => plant.outputs(&inputs),
+                Interface::ModelExchange => plant.outputs_held(&inputs),
+            };
+            shown.regime = regime.unwrap_or(shown.regime);
+            self.shown = Some(shown);
         }
-        match (&mut self.shown, self.regime) {
-            (Some(shown), Some(regime)) => {
-                shown.regime = regime;
-                Ok(shown)
-            }
-            (Some(shown), None) => Ok(shown),
-            (None, _) => Err(call.error("the outputs were not computed")),
-        }
+        self.shown.as_ref().ok_or_else(|| call.error("the outputs were not computed"))
     }
 
     /// Looks at the plant: in Co-Simulation with the contact that the present inputs
@@ -768,7 +769,8 @@ fn check_length(call: &Call, name: &str, given: usize, needed: usize) -> Result<
 }
 
 /// The variable of a value reference, if it has the type that the call is for.
-fn scalar(call: &Call, reference: u32) -> Result<Scalar, Fault> {
+#[inline]
+fn scalar(call: &Call, reference: u32) -> Result<&'static Scalar, Fault> {
     let found = usize::try_from(reference).ok().and_then(|n| SCALARS.get(n));
     let Some(scalar) = found else {
         return Err(call.error(format_args!(
@@ -777,11 +779,11 @@ fn scalar(call: &Call, reference: u32) -> Result<Scalar, Fault> {
         )));
     };
     let c_type = scalar.variable.c_type();
-    if c_type != call.c_type {
+    if call.c_type != Some(c_type) {
         return Err(call.error(format_args!(
-            "{} (value reference {reference}) is of type {c_type}",
+            "{} (value reference {reference}) is of type {c_type:?}",
             scalar.name()
         )));
     }
-    Ok(*scalar)
+    Ok(scalar)
 }

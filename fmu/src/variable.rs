@@ -1,5 +1,6 @@
 //! What a variable of the FMU is: the words [`crate::table`] is written in.
 
+use crate::calls::CType;
 use plant::{Calculated, Inputs, MODES, Outputs, Parameters, Ramp, STATES};
 
 /// The value of one scalar, as it crosses the C interface. Enumerations are
@@ -466,18 +467,24 @@ impl Variable {
         }
     }
 
-    /// The C type it is got and set with: "Real", "Integer" or "Boolean".
-    pub const fn c_type(&self) -> &'static str {
+    /// The C type it is got and set with.
+    #[inline]
+    pub const fn c_type(&self) -> CType {
         match self.kind {
-            Kind::Real(_) => "Real",
-            Kind::Integer { .. } | Kind::Enumeration(_) => "Integer",
-            Kind::Boolean => "Boolean",
+            Kind::Real(_) => CType::Real,
+            Kind::Integer { .. } | Kind::Enumeration(_) => CType::Integer,
+            Kind::Boolean => CType::Boolean,
         }
     }
 
     /// What is wrong with `value`, in words: `name = value unit (allowed: …)`.
+    #[inline]
     pub fn problem(&self, value: Value) -> Option<String> {
-        let good = match (self.kind, value) {
+        if self.allows(value) { None } else { Some(self.refusal(value)) }
+    }
+
+    fn allows(&self, value: Value) -> bool {
+        match (&self.kind, value) {
             (Kind::Real(Quantity { min, max, .. }), Value::Real(x)) => {
                 x.is_finite() && min.is_none_or(|m| x >= m) && max.is_none_or(|m| x <= m)
             }
@@ -489,17 +496,18 @@ impl Variable {
             }
             (Kind::Boolean, Value::Boolean(_)) => true,
             _ => false,
-        };
-        if good {
-            return None;
         }
-        Some(match value {
+    }
+
+    #[cold]
+    fn refusal(&self, value: Value) -> String {
+        match value {
             Value::Real(x) => {
                 format!("{} = {} (allowed: {})", self.name, self.with_unit(x), self.allowed())
             }
             Value::Integer(n) => format!("{} = {n} (allowed: {})", self.name, self.allowed()),
             Value::Boolean(b) => format!("{} = {b} (allowed: {})", self.name, self.allowed()),
-        })
+        }
     }
 
     /// The range in words.
