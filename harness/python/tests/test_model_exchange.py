@@ -28,8 +28,6 @@ stay: a few hundred times as much comes together, 1e-6. The liquid swings with 1
 rate is off by 15 times as much as its angle.
 """
 MODELS = {"frozen": 1, "linear": 2, "planar": 3, "spherical": 4, "paraboloid": 5}
-EVENTS = {"frozen": 8, "linear": 20, "planar": 20, "spherical": 20, "paraboloid": 20}
-"""How often the hub sticks or breaks away in 20 s, at least."""
 
 
 def tau() -> np.ndarray:
