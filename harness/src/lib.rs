@@ -18,5 +18,6 @@ pub mod profile;
 pub mod random;
 pub mod report;
 pub mod run;
+pub mod scaling;
 pub mod svg;
 pub mod table;
