@@ -43,11 +43,29 @@ pub fn mul<const N: usize>(a: &Series, b: &Series) -> f64 {
 }
 
 /// Coefficients of a vector in the plane: two series that most rules treat alike, so
-/// that a processor does both at once.
-pub type Pair = [[f64; 2]; ORDER + 1];
+/// that a processor does both at once, from memory aligned for it.
+#[derive(Clone, Debug)]
+#[repr(align(16))]
+pub struct Pair([[f64; 2]; ORDER + 1]);
 
 /// Both series zero.
-pub const ZERO_PAIR: Pair = [[0.0; 2]; ORDER + 1];
+pub const ZERO_PAIR: Pair = Pair([[0.0; 2]; ORDER + 1]);
+
+impl core::ops::Index<usize> for Pair {
+    type Output = [f64; 2];
+
+    #[inline(always)]
+    fn index(&self, n: usize) -> &[f64; 2] {
+        &self.0[n]
+    }
+}
+
+impl core::ops::IndexMut<usize> for Pair {
+    #[inline(always)]
+    fn index_mut(&mut self, n: usize) -> &mut [f64; 2] {
+        &mut self.0[n]
+    }
+}
 
 /// Coefficient N of a b, b a vector.
 #[inline(always)]
@@ -98,7 +116,7 @@ pub fn scale_ramp<const N: usize>(ramp: &[f64; 2], a: &Pair) -> [f64; 2] {
 /// The value at t of the vector cut after order n.
 #[inline(always)]
 pub fn value_pair(a: &Pair, n: usize, t: f64) -> [f64; 2] {
-    a[..=n].iter().rev().fold([0.0; 2], |sum, x| [sum[0] * t + x[0], sum[1] * t + x[1]])
+    a.0[..=n].iter().rev().fold([0.0; 2], |sum, x| [sum[0] * t + x[0], sum[1] * t + x[1]])
 }
 
 /// Coefficient N of a b without its term a_0 b_N.
