@@ -4,7 +4,9 @@
 //! `HubSlosh::table`, and the XML is committed so that a change of the interface
 //! shows in a diff.
 
+pub mod icon;
 pub mod schema;
+pub mod variables;
 
 use HubSlosh::instance::DEFAULT_TOLERANCE;
 use HubSlosh::log::CATEGORIES;
