@@ -6,7 +6,10 @@
 pub mod analysis;
 pub mod binary;
 pub mod campaign;
+pub mod components;
 pub mod description;
+pub mod documentation;
+pub mod example;
 pub mod fmi2;
 pub mod html;
 pub mod noise;
@@ -16,6 +19,7 @@ pub mod plan;
 pub mod platforms;
 pub mod profile;
 pub mod random;
+pub mod release;
 pub mod report;
 pub mod run;
 pub mod scaling;

@@ -7,10 +7,12 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail, ensure};
 use clap::{Args, Parser, Subcommand};
 use hubslosh::campaign::Campaign;
+use hubslosh::example;
 use hubslosh::fmi2::Fmu;
 use hubslosh::pack;
 use hubslosh::plan::{self, Plan};
 use hubslosh::profile::{self, Torque, Written};
+use hubslosh::release;
 use hubslosh::report;
 use hubslosh::run::Run;
 use hubslosh::scaling::{self, Flight, Liquid};
@@ -35,6 +37,20 @@ enum Command {
     Torque(TorqueArgs),
     Campaign(CampaignArgs),
     Scale(ScaleArgs),
+    /// Writes the example that travels with the FMU (modelDescription/extra): torque and answer.
+    Example {
+        /// The FMU that answers.
+        #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
+        fmu: PathBuf,
+    },
+    /// Builds the release for all platforms: the FMU, its hash, its bill of materials.
+    #[command(after_help = "Example:\n  hubslosh release\n\n\
+        On a Debian machine harness/platforms/setup gets what building for all platforms takes.")]
+    Release {
+        /// Directory for the release's files.
+        #[arg(long, value_name = "DIRECTORY", default_value = DEFAULT_RELEASE)]
+        out: PathBuf,
+    },
 }
 
 /// Builds the FMU's binary and packs it.
@@ -257,6 +273,7 @@ enum Scale {
 }
 
 const DEFAULT_FMU: &str = "dist/HubSlosh.fmu";
+const DEFAULT_RELEASE: &str = "dist/release";
 const DEFAULT_CAMPAIGN: &str = "dist/campaign";
 
 fn run_help() -> String {
@@ -308,6 +325,8 @@ fn main() -> ExitCode {
         Some(Command::Torque(args)) => torque(&args),
         Some(Command::Campaign(args)) => campaign_of(&args),
         Some(Command::Scale(args)) => scale(args.what),
+        Some(Command::Example { fmu }) => example(&fmu),
+        Some(Command::Release { out }) => release(&out),
         None => everything(),
     };
     match done {
@@ -372,6 +391,20 @@ fn pack_all(out: &Path) -> Result<()> {
         println!("{}: {}", built.folder, built.binary);
     }
     println!("packed {} ({} bytes)", out.display(), out.metadata()?.len());
+    Ok(())
+}
+
+fn example(fmu: &Path) -> Result<()> {
+    let folder = example::folder();
+    example::write(&Fmu::open(fmu)?, &folder)?;
+    println!("wrote {}", folder.display());
+    Ok(())
+}
+
+fn release(out: &Path) -> Result<()> {
+    for path in release::write(out)? {
+        println!("{} ({} bytes)", path.display(), path.metadata()?.len());
+    }
     Ok(())
 }
 

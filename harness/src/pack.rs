@@ -1,7 +1,7 @@
-//! Builds the FMU's binary and packs it, with its description, its
-//! documentation and its licences, into a `.fmu` (FMI 2.0, section 2.3).
+//! Builds the FMU's binary and packs it, with all that should travel with it, into a `.fmu`
+//! (FMI 2.0, section 2.3).
 
-use std::fmt::Write as _;
+use std::collections::BTreeSet;
 use std::io::{Seek, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -11,18 +11,23 @@ use anyhow::{Context, Result, bail};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
+use crate::components;
 use crate::description::ModelDescription;
+use crate::documentation;
+use crate::example;
 use crate::fmi2::PLATFORM;
-use crate::html::escape;
 use crate::output;
 use crate::platforms::{self, Built};
 
 /// Cargo package of the FMU's binary.
-const PACKAGE: &str = "hubslosh-fmu";
+pub(crate) const PACKAGE: &str = "hubslosh-fmu";
 /// Cargo profile it is built with.
 const PROFILE: &str = "fmu";
-/// Licence texts at the project's root that travel with the FMU.
-const LICENCES: [&str; 2] = ["LICENSE-MIT", "LICENSE-APACHE"];
+/// Folder below the FMU's `extra`: the model's name, where FMI asks for a domain turned round.
+/// The project has no domain, and another's is not to be taken.
+pub const EXTRA: &str = "extra/HubSlosh";
+/// The software bill of materials in the FMU.
+pub const BILL: &str = "extra/HubSlosh/HubSlosh.cdx.json";
 
 /// The project's root: the folder above this crate when it was compiled.
 pub fn root() -> PathBuf {
@@ -38,19 +43,36 @@ pub fn pack(out: &Path) -> Result<()> {
 /// Builds the FMU's binaries for all platforms and packs them to `out`.
 pub fn pack_all(out: &Path) -> Result<Vec<Built>> {
     let all = platforms::build()?;
-    let binaries: Vec<_> = all.iter().map(|b| (b.folder, b.ending, b.bytes.clone())).collect();
+    let binaries: Vec<_> = all
+        .iter()
+        .map(|b| Packed { folder: b.folder, ending: b.ending, bytes: b.bytes.clone() })
+        .collect();
     archive(&binaries, out)?;
     Ok(all)
 }
 
-/// A binary with its folder under `binaries/` and the ending of its name there.
-type Packed = (&'static str, &'static str, Vec<u8>);
+/// A binary to be packed.
+pub struct Packed {
+    /// Folder under `binaries/`.
+    pub folder: &'static str,
+    /// Ending of its name there.
+    pub ending: &'static str,
+    /// The file.
+    pub bytes: Vec<u8>,
+}
+
+impl Packed {
+    /// Its name in the FMU of a model.
+    pub fn name(&self, model: &str) -> String {
+        format!("binaries/{}/{model}{}", self.folder, self.ending)
+    }
+}
 
 /// A binary for the platform this program runs on.
 fn native(binary: &Path) -> Result<Packed> {
     let bytes =
         std::fs::read(binary).with_context(|| format!("{} cannot be read", binary.display()))?;
-    Ok((PLATFORM, std::env::consts::DLL_SUFFIX, bytes))
+    Ok(Packed { folder: PLATFORM, ending: std::env::consts::DLL_SUFFIX, bytes })
 }
 
 /// The packed FMU for tests: built and packed once per process to `test-fmu/HubSlosh.fmu` in the
@@ -127,31 +149,63 @@ pub(crate) fn cargo_build(mut command: Command, quiet: bool) -> Result<PathBuf> 
 
 /// Packs binaries; the file appears whole or not at all.
 fn archive(binaries: &[Packed], out: &Path) -> Result<()> {
+    let files = files(binaries)?;
+    if let Some(parent) = out.parent().filter(|parent| !parent.as_os_str().is_empty()) {
+        output::directory(parent)?;
+    }
+    output::atomically(out, |file| zip(file, &files))
+        .with_context(|| format!("{} was not packed", out.display()))
+}
+
+/// What is in the FMU, in the order of the archive; modelDescription.xml first, as some hosts
+/// expect.
+fn files(binaries: &[Packed]) -> Result<Vec<(String, Vec<u8>)>> {
     let root = root();
+    let source = root.join("modelDescription");
     let read = |path: PathBuf| {
         std::fs::read(&path).with_context(|| format!("{} cannot be read", path.display()))
     };
-    let xml = read(root.join("modelDescription").join("modelDescription.xml"))?;
+    let xml = read(source.join("modelDescription.xml"))?;
     let description = ModelDescription::from_xml(&String::from_utf8_lossy(&xml))?;
     let identifier = description
         .co_simulation
         .as_ref()
         .map(|c| c.model_identifier.clone())
         .context("modelDescription.xml offers no co-simulation")?;
-    // the order of the archive; modelDescription.xml first, as some hosts expect
-    let mut files = vec![("modelDescription.xml".to_string(), xml)];
-    for (folder, ending, bytes) in binaries {
-        files.push((format!("binaries/{folder}/{identifier}{ending}"), bytes.clone()));
+    let icon = read(source.join("terminalsAndIcons").join("icon.png"))?;
+    let mut files =
+        vec![("modelDescription.xml".to_string(), xml), ("model.png".to_string(), icon.clone())];
+    for binary in binaries {
+        files.push((binary.name(&identifier), binary.bytes.clone()));
     }
-    files.push(("documentation/index.html".to_string(), documentation(&description).into_bytes()));
-    for licence in LICENCES {
-        files.push((format!("documentation/licenses/{licence}"), read(root.join(licence))?));
+
+    let title = format!("{} {}", description.model_name, description.version);
+    let pages = documentation::render(&source.join("documentation"), &title)?;
+    files.push(("documentation/index.html".into(), pages.page.into_bytes()));
+    for (name, figure) in pages.figures {
+        files.push((format!("documentation/{name}"), figure));
     }
-    if let Some(parent) = out.parent().filter(|parent| !parent.as_os_str().is_empty()) {
-        output::directory(parent)?;
+
+    let components = components::linked(binaries)?;
+    let note = components::licence_note(&description, &components);
+    files.push(("documentation/licenses/license.txt".into(), note.into_bytes()));
+    let texts: BTreeSet<_> = components.iter().flat_map(|component| &component.texts).collect();
+    for text in texts {
+        let own = components::OWN_TEXTS.contains(&text.as_str());
+        let folder = if own { root.clone() } else { source.join("licenses") };
+        files.push((format!("documentation/licenses/{text}"), read(folder.join(text))?));
     }
-    output::atomically(out, |file| zip(file, &files))
-        .with_context(|| format!("{} was not packed", out.display()))
+
+    files.push(("terminalsAndIcons/icon.png".into(), icon));
+    for name in ["terminalsAndIcons/icon.svg", "terminalsAndIcons/terminalsAndIcons.xml"] {
+        files.push((name.into(), read(source.join(name))?));
+    }
+    for name in example::FILES {
+        files.push((format!("{EXTRA}/{name}"), read(source.join(EXTRA).join(name))?));
+    }
+    let bill = components::bill(&description, binaries, &components);
+    files.push((BILL.into(), bill.into_bytes()));
+    Ok(files)
 }
 
 /// Same files, same bytes: order, times and attributes are fixed.
@@ -168,67 +222,6 @@ fn zip(out: &mut (impl Write + Seek), files: &[(String, Vec<u8>)]) -> Result<()>
     }
     archive.finish()?;
     Ok(())
-}
-
-/// `documentation/index.html`: what the model is and a table of its variables, made from the
-/// model description so that the two cannot drift apart.
-fn documentation(description: &ModelDescription) -> String {
-    let mut page = format!(
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n<title>{name}</title>\n<style>\
-         :root{{color-scheme:light dark}}body{{font:15px/1.5 system-ui,sans-serif;max-width:70em;margin:2em auto;padding:0 1em}}\
-         table{{border-collapse:collapse;width:100%}}th,td{{text-align:left;padding:.25em .6em;border-bottom:1px solid #8884;vertical-align:top}}\
-         code{{white-space:nowrap}}</style></head><body>\n<h1>{name} {version}</h1>\n<p>{text}</p>\n\
-         <p>FMI {fmi} co-simulation. A spacecraft hub turns by the angle <code>theta</code> about a vertical axis; a tank \
-         stands at the distance <code>tank.r</code> from it. Angles and torques are positive counter-clockwise seen from above; \
-         <code>slosh_angle</code> is positive when the liquid is displaced towards +<code>theta</code>, \
-         <code>slosh_angle_radial</code> when it is displaced outwards. All values are exchanged in the units given here.</p>\n\
-         <p><code>tau_cmd</code> is held over a communication step unless the host sets its first derivative \
-         (fmi2SetRealInputDerivatives), which makes it linear over the step. Any communication step size gives the same motion \
-         within the tolerance for the same torque.</p>\n",
-        name = escape(&description.model_name),
-        version = escape(&description.version),
-        text = escape(&description.description),
-        fmi = escape(&description.fmi_version),
-    );
-    for (causality, title) in [
-        ("input", "Inputs"),
-        ("output", "Outputs"),
-        ("parameter", "Parameters"),
-        ("calculatedParameter", "Calculated parameters"),
-        ("local", "Local variables"),
-    ] {
-        let variables: Vec<_> =
-            description.variables.list.iter().filter(|v| v.causality == causality).collect();
-        if variables.is_empty() {
-            continue;
-        }
-        let _ = writeln!(
-            page,
-            "<h2>{title}</h2>\n<table><tr><th>Name</th><th>Unit</th><th>Start</th><th>Meaning</th></tr>"
-        );
-        for variable in variables {
-            let attributes = variable.attributes();
-            let start = attributes.start.as_deref().unwrap_or("");
-            let items = description.items(variable);
-            let named = items.iter().find(|i| i.value.to_string() == start);
-            let mut meaning = escape(&variable.description);
-            if !items.is_empty() {
-                let all: Vec<_> =
-                    items.iter().map(|i| format!("{} = {}", i.value, i.name)).collect();
-                let _ = write!(meaning, " <small>({})</small>", escape(&all.join(", ")));
-            }
-            let _ = writeln!(
-                page,
-                "<tr><td><code>{}</code></td><td>{}</td><td>{}</td><td>{meaning}</td></tr>",
-                escape(&variable.name),
-                escape(attributes.unit.as_deref().unwrap_or("")),
-                escape(named.map_or(start, |i| &i.name)),
-            );
-        }
-        page.push_str("</table>\n");
-    }
-    page.push_str("</body></html>\n");
-    page
 }
 
 #[cfg(test)]

@@ -1,0 +1,70 @@
+//! The example in the FMU's `extra` folder is the FMU's.
+
+use hubslosh::example;
+use hubslosh::fmi2::Fmu;
+use hubslosh::pack::packed_for_tests;
+use hubslosh::table::Table;
+
+/// Largest difference of each column over the column's largest value, at the reference's rows.
+fn differences(answer: &Table, reference: &Table) -> Vec<(String, f64)> {
+    let every = (answer.rows() - 1) / (reference.rows() - 1);
+    let names = reference.names().iter();
+    names
+        .map(|name| {
+            let (answer, reference) =
+                (answer.column(name).unwrap(), reference.column(name).unwrap());
+            let largest = reference.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+            let pairs = answer.iter().step_by(every).zip(reference);
+            let difference = pairs.fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()));
+            (name.clone(), if difference == 0.0 { 0.0 } else { difference / largest })
+        })
+        .collect()
+}
+
+fn reference() -> Table {
+    let path = example::folder().join(example::REFERENCE);
+    let text = std::fs::read_to_string(&path).unwrap();
+    let names: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+    Table::read(&path, &names).unwrap()
+}
+
+#[test]
+fn replayed_input_gives_the_reference_result() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let input = example::folder().join(example::INPUT);
+    let answer = example::replay(&fmu, &input, None, false).unwrap();
+    let reference = reference();
+    assert_eq!(reference.rows(), 201);
+    for (name, difference) in differences(&answer, &reference) {
+        // what README.md beside the example states; the default tolerance is 1e-8
+        assert!(difference < 1e-6, "{name}: {difference:e}");
+    }
+    // the hub must have slipped and come to rest, else the example shows little
+    let omega = answer.column("omega").unwrap();
+    assert!(omega.iter().any(|w| w.abs() > 0.02) && omega.ends_with(&[0.0, 0.0]));
+}
+
+#[test]
+fn held_torque_is_within_what_the_example_says() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let input = example::folder().join(example::INPUT);
+    let answer = example::replay(&fmu, &input, None, true).unwrap();
+    let all = differences(&answer, &reference());
+    let worst = all.iter().map(|(_, difference)| *difference).fold(0.0, f64::max);
+    assert!((1e-6..HELD).contains(&worst), "{all:?}");
+}
+
+#[test]
+fn committed_files_are_what_the_command_writes() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    example::write(&fmu, folder.path()).unwrap();
+    for name in example::FILES.into_iter().filter(|name| *name != "README.md") {
+        let made = std::fs::read_to_string(folder.path().join(name)).unwrap();
+        let committed = std::fs::read_to_string(example::folder().join(name)).unwrap();
+        if name == example::REFERENCE {
+            continue; // its last digits may turn; its values are compared above
+        }
+        assert!(made == committed, "{name} is out of date: run `hubslosh example`");
+    }
+}
