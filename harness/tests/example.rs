@@ -51,7 +51,7 @@ fn held_torque_is_within_what_the_example_says() {
     let answer = example::replay(&fmu, &input, None, true).unwrap();
     let all = differences(&answer, &reference());
     let worst = all.iter().map(|(_, difference)| *difference).fold(0.0, f64::max);
-    assert!((1e-6..HELD).contains(&worst), "{all:?}");
+    assert!((1e-6..0.5).contains(&worst), "{all:?}");
 }
 
 #[test]
