@@ -115,6 +115,12 @@ impl Binary {
     /// Everything that would keep it from loading on a machine without development tools, or a
     /// host from finding the functions `wanted`; one sentence each.
     pub fn faults(&self, wanted: &[&str]) -> Vec<String> {
+        let (loading, lacking) = (self.loading_faults(), self.lacking(wanted));
+        loading.into_iter().chain(lacking).chain(self.surplus()).collect()
+    }
+
+    /// What would keep it from loading on a machine without development tools.
+    pub fn loading_faults(&self) -> Vec<String> {
         let mut faults = Vec::new();
         let (architectures, libraries, newest): (&[_], &[&str], _) = match self.kind {
             Kind::Linux => (&["x86_64"], &LINUX_LIBRARIES, Some(("glibc", GLIBC))),
@@ -141,19 +147,24 @@ impl Binary {
         if let Some(fault) = &self.signature {
             faults.push(format!("macOS would not load its arm64 half: {fault}"));
         }
+        faults
+    }
+
+    /// The functions among `wanted` that it does not export, in one sentence.
+    pub fn lacking(&self, wanted: &[&str]) -> Option<String> {
         let lacking: Vec<_> =
             wanted.iter().filter(|w| !self.exports.iter().any(|e| e == **w)).copied().collect();
-        if !lacking.is_empty() {
-            faults.push(format!("it does not export {}", lacking.join(", ")));
-        }
+        (!lacking.is_empty()).then(|| format!("it does not export {}", lacking.join(", ")))
+    }
+
+    /// What it exports beside functions of the FMI, in one sentence.
+    pub fn surplus(&self) -> Option<String> {
         // On macOS names are bound to the library they come from, so that others do no harm; and
         // the linker that links it elsewhere exports a few of Rust's.
         let others: Vec<_> =
             self.exports.iter().map(String::as_str).filter(|e| !e.starts_with("fmi2")).collect();
-        if self.kind != Kind::MacOs && !others.is_empty() {
-            faults.push(format!("it also exports {}", others.join(", ")));
-        }
-        faults
+        (self.kind != Kind::MacOs && !others.is_empty())
+            .then(|| format!("it also exports {}", others.join(", ")))
     }
 }
 

@@ -380,6 +380,11 @@ impl Fmu {
         &self.hash
     }
 
+    /// Whether its binary has all functions of model exchange.
+    pub fn has_exchange(&self) -> bool {
+        self.exchange.is_some()
+    }
+
     /// The file it was opened from.
     pub fn path(&self) -> &Path {
         &self.path

@@ -6,6 +6,7 @@
 pub mod analysis;
 pub mod binary;
 pub mod campaign;
+pub mod check;
 pub mod components;
 pub mod description;
 pub mod documentation;

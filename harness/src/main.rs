@@ -8,6 +8,7 @@ use anyhow::{Context, Result, bail, ensure};
 use clap::{Args, Parser, Subcommand};
 use hubslosh::campaign::Campaign;
 use hubslosh::example;
+use hubslosh::check::command::{CheckArgs, CheckCallsArgs};
 use hubslosh::fmi2::Fmu;
 use hubslosh::pack;
 use hubslosh::plan::{self, Plan};
@@ -36,6 +37,10 @@ enum Command {
     Run(RunArgs),
     Torque(TorqueArgs),
     Campaign(CampaignArgs),
+    Check(CheckArgs),
+    /// The calls of one rule of `check`, in a process of their own.
+    #[command(hide = true)]
+    CheckCalls(CheckCallsArgs),
     Scale(ScaleArgs),
     /// Writes the example that travels with the FMU (modelDescription/extra): torque and answer.
     Example {
@@ -327,6 +332,8 @@ fn main() -> ExitCode {
         Some(Command::Scale(args)) => scale(args.what),
         Some(Command::Example { fmu }) => example(&fmu),
         Some(Command::Release { out }) => release(&out),
+        Some(Command::Check(args)) => args.run(),
+        Some(Command::CheckCalls(args)) => args.run(),
         None => everything(),
     };
     match done {

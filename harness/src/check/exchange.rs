@@ -1,0 +1,128 @@
+//! Model Exchange (FMI 2.0.5, section 3.2).
+
+use anyhow::Result;
+
+use super::Findings;
+use super::description::Variable;
+use super::guest::{Guest, Interface, Reading, STEPS, Session};
+use super::life::expect_refusal;
+
+/// An instance in continuous-time mode, or the reason why there is none.
+fn continuous<'g>(guest: &'g Guest, findings: &mut Findings) -> Result<Option<Session<'g>>> {
+    if !guest.interfaces().contains(&Interface::ModelExchange) {
+        findings.skip("it offers no Model Exchange");
+        return Ok(None);
+    }
+    guest.running(Interface::ModelExchange).map(Some)
+}
+
+/// Each derivative with its state, in the order of ModelStructure: that of all state vectors.
+pub fn states(guest: &Guest) -> Vec<(&Variable, &Variable)> {
+    let d = guest.description();
+    let pair = |index| {
+        let derivative: &Variable = d.at(index)?;
+        Some((derivative, d.at(derivative.derivative_of()?)?))
+    };
+    d.derivatives.iter().filter_map(|unknown| pair(unknown.index)).collect()
+}
+
+/// `exchange.run`
+pub fn run(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let Some(mut session) = continuous(guest, findings)? else { return Ok(()) };
+    session.advance(2 * STEPS)?;
+    let readings = session.readings()?;
+    for (v, reading) in guest.variables().iter().zip(readings) {
+        if let Reading::Real(x) = reading
+            && !x.is_finite()
+        {
+            findings.add(v.place(), format!("it is {x} after {} steps", 2 * STEPS));
+        }
+    }
+    Ok(())
+}
+
+/// `exchange.vectors`
+pub fn vectors(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let Some(mut session) = continuous(guest, findings)? else { return Ok(()) };
+    let (nx, ni) = (states(guest).len(), session.indicators());
+    for moved in [false, true] {
+        if moved {
+            session.advance(3)?;
+        }
+        let (mut x, mut dx, mut nominals, mut z) =
+            (vec![f64::NAN; nx], vec![f64::NAN; nx], vec![f64::NAN; nx], vec![f64::NAN; ni]);
+        guest.doing(format!("the vectors of {nx} states and {ni} event indicators"));
+        session.instance.continuous_states(&mut x)?;
+        session.instance.derivatives(&mut dx)?;
+        session.instance.nominals(&mut nominals)?;
+        session.instance.event_indicators(&mut z)?;
+        for (call, values, above_0) in [
+            ("fmi2GetContinuousStates", x, false),
+            ("fmi2GetDerivatives", dx, false),
+            ("fmi2GetNominalsOfContinuousStates", nominals, true),
+            ("fmi2GetEventIndicators", z, false),
+        ] {
+            let fits = |x: f64| x.is_finite() && (!above_0 || x > 0.0);
+            if let Some(n) = values.iter().position(|x| !fits(*x)) {
+                let allowed = if above_0 { "finite, above 0" } else { "finite" };
+                findings
+                    .add(call, format!("element {} is {} (allowed: {allowed})", n + 1, values[n]));
+            }
+        }
+        if !findings.list.is_empty() {
+            return Ok(());
+        }
+    }
+    Ok(())
+}
+
+/// `exchange.lengths`
+pub fn lengths(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let Some(mut session) = continuous(guest, findings)? else { return Ok(()) };
+    let (nx, ni) = (states(guest).len(), session.indicators());
+    let place = |call: &str, n: usize, right: usize| {
+        let place = format!("{call} with room for {n} numbers instead of {right}");
+        guest.doing(&place);
+        place
+    };
+    let (mut x, mut z) = (vec![0.0; nx + 1], vec![0.0; ni + 1]);
+    let i = &mut session.instance;
+    let here = place("fmi2GetContinuousStates", nx + 1, nx);
+    expect_refusal(findings, here, i.continuous_states(&mut x));
+    let here = place("fmi2GetDerivatives", nx + 1, nx);
+    expect_refusal(findings, here, i.derivatives(&mut x));
+    let here = place("fmi2GetEventIndicators", ni + 1, ni);
+    expect_refusal(findings, here, i.event_indicators(&mut z));
+    let here = place("fmi2SetContinuousStates", nx + 1, nx);
+    expect_refusal(findings, here, i.set_continuous_states(&x));
+    Ok(())
+}
+
+/// `exchange.variables`
+pub fn variables(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let Some(mut session) = continuous(guest, findings)? else { return Ok(()) };
+    let states = states(guest);
+    if states.is_empty() {
+        findings.skip("it has no continuous states");
+        return Ok(());
+    }
+    session.advance(3)?;
+    let (mut x, mut dx) = (vec![0.0; states.len()], vec![0.0; states.len()]);
+    guest.doing("fmi2GetContinuousStates and fmi2GetDerivatives");
+    session.instance.continuous_states(&mut x)?;
+    session.instance.derivatives(&mut dx)?;
+    for (n, (derivative, state)) in states.iter().enumerate() {
+        for (v, vector, call) in
+            [(state, x[n], "fmi2GetContinuousStates"), (derivative, dx[n], "fmi2GetDerivatives")]
+        {
+            let read = session.get(v)?;
+            if !read.is(&Reading::Real(vector)) {
+                findings.add(
+                    v.place(),
+                    format!("it reads {read}, but {call} gives {vector:?} in place {}", n + 1),
+                );
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,188 @@
+//! Rules of calls run in a process of their own: an FMU that crashes, hangs or ends the process is
+//! a finding. What the process is about to do and what it found go through a file, because the FMU
+//! may write to stdout.
+
+use std::fs::File;
+use std::io::Write;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result};
+use serde::{Deserialize, Serialize};
+
+use super::guest::{Guest, Unusable};
+use super::{Findings, Look, Options, RULES, Rule};
+
+/// The hidden subcommand of `hubslosh`.
+pub const SUBCOMMAND: &str = "check-calls";
+/// After so many endless calls no more are made: the check would take for ever as well.
+const HANGS: usize = 3;
+/// Bytes shown of what an FMU prints.
+const PRINTED: usize = 200;
+
+/// One line of the file.
+#[derive(Serialize, Deserialize)]
+enum Line {
+    /// What comes next.
+    Doing(String),
+    /// All that was found; the last line.
+    Done(Findings),
+}
+
+/// Where the process writes what it does.
+pub struct Trace(File);
+
+impl Trace {
+    fn write(&self, line: &Line) -> Result<()> {
+        let mut text = serde_json::to_string(line)?;
+        text.push('\n');
+        // One call without a buffer: what was written is there when the process crashes.
+        (&self.0).write_all(text.as_bytes())?;
+        Ok(())
+    }
+
+    /// Another hand on the same file.
+    pub fn again(&self) -> Result<Trace> {
+        Ok(Trace(self.0.try_clone()?))
+    }
+
+    /// Tells what comes next.
+    pub fn doing(&self, what: &str) {
+        // Without it a crash is told less well; that is all.
+        let _ = self.write(&Line::Doing(what.into()));
+    }
+}
+
+/// Looks at one rule in a process of its own; `path` is what the FMU is called, `directory` where it
+/// is unpacked.
+pub fn look(
+    rule: &'static Rule,
+    directory: &Path,
+    path: &Path,
+    options: &Options,
+    hung: &AtomicUsize,
+    findings: &mut Findings,
+) {
+    if hung.load(Ordering::Relaxed) >= HANGS {
+        return findings.skip(format!("{HANGS} rules have ended in endless calls already"));
+    }
+    match run(rule, directory, path, options, findings) {
+        Ok(true) => {
+            hung.fetch_add(1, Ordering::Relaxed);
+        }
+        Ok(false) => {}
+        Err(error) => findings.fail("hubslosh", format!("the calls could not be made: {error:#}")),
+    }
+}
+
+/// Whether it had to be killed.
+fn run(
+    rule: &'static Rule,
+    directory: &Path,
+    path: &Path,
+    options: &Options,
+    findings: &mut Findings,
+) -> Result<bool> {
+    let folder = tempfile::tempdir().context("no temporary directory")?;
+    let answer = folder.path().join("answer");
+    let printed = folder.path().join("printed");
+    let output = File::create(&printed)?;
+    let mut child = Command::new(&options.program)
+        .arg(SUBCOMMAND)
+        .arg(rule.id)
+        .arg(directory)
+        .arg(path)
+        .arg(&answer)
+        .stdin(Stdio::null())
+        .stdout(output.try_clone()?)
+        .stderr(output)
+        .spawn()
+        .with_context(|| format!("{} cannot be run", options.program.display()))?;
+    let started = Instant::now();
+    let ended = loop {
+        if let Some(status) = child.try_wait()? {
+            break Some(status);
+        }
+        if started.elapsed() > options.limit {
+            // It may have ended just now; either is fine.
+            let _ = child.kill();
+            child.wait()?;
+            break None;
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    };
+    let lines = std::fs::read_to_string(&answer).unwrap_or_default();
+    let mut doing = "loading the binary".to_string();
+    let mut done = None;
+    for line in lines.lines() {
+        match serde_json::from_str(line) {
+            Ok(Line::Doing(what)) => doing = what,
+            Ok(Line::Done(found)) => done = Some(found),
+            Err(_) => {} // cut off by the crash
+        }
+    }
+    let printed = std::fs::read(&printed).unwrap_or_default();
+    match (done, ended) {
+        (Some(found), _) => {
+            *findings = found;
+            if rule.id == "host.silent" && !printed.is_empty() {
+                let text = String::from_utf8_lossy(&printed);
+                let start: String = text.chars().take(PRINTED).collect();
+                findings.add("stdout or stderr", format!("it prints {start:?}"));
+            }
+        }
+        // One rule tells it; the others would say the same.
+        (None, Some(status)) if doing == LOADING && rule.id != "load.opens" => {
+            findings.skip(format!("the process ended while {doing} ({status})"));
+        }
+        (None, Some(status)) => {
+            let text = String::from_utf8_lossy(&printed);
+            let last = text.lines().rfind(|line| !line.trim().is_empty());
+            let last = last.map(|line| format!("; it printed {line:?}")).unwrap_or_default();
+            findings.fail(
+                doing,
+                format!("the process ended ({status}{last}); allowed: every call returns"),
+            );
+        }
+        (None, None) => findings.fail(
+            doing,
+            format!(
+                "no end after {:.0} s (allowed: every call returns; --limit gives more time)",
+                options.limit.as_secs_f64()
+            ),
+        ),
+    }
+    Ok(ended.is_none())
+}
+
+/// What the process does first.
+const LOADING: &str = "loading the binary";
+
+/// The other side: looks at the rule and writes what it finds to `answer`.
+pub fn answer(id: &str, directory: &Path, path: &Path, answer: &Path) -> Result<()> {
+    let rule = RULES.iter().find(|rule| rule.id == id).context("no such rule")?;
+    let Look::Calls(look) = rule.look else { anyhow::bail!("{id} makes no calls") };
+    let trace = Trace(File::create(answer)?);
+    trace.doing(LOADING);
+    let mut findings = Findings::new(rule.severity);
+    match Guest::open(directory, path, trace) {
+        Err(error) if rule.id == "load.opens" => findings.add("the binary", format!("{error:#}")),
+        Err(error) => findings.skip(format!("it cannot be loaded: {error:#}")),
+        Ok(guest) => {
+            if let Err(error) = look(&guest, &mut findings) {
+                match error.downcast_ref::<Unusable>() {
+                    Some(unusable) if unusable.rule != rule.id => {
+                        findings.skip(format!("{unusable}"))
+                    }
+                    _ => findings.add(guest.now(), format!("{error:#}")),
+                }
+            }
+            guest.doing("unloading the binary");
+            let trace = guest.close();
+            return trace.write(&Line::Done(findings));
+        }
+    }
+    Trace(File::options().append(true).open(answer)?).write(&Line::Done(findings))
+}

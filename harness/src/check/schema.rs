@@ -1,0 +1,400 @@
+//! The schema of modelDescription.xml (FMI 2.0.5, section 2.2) as a table: which elements stand
+//! where and in which order, which attributes they have and how those are written.
+
+use super::element::{Element, double};
+use super::{Description, Findings};
+
+/// How the value of an attribute is written.
+#[derive(Clone, Copy)]
+enum Written {
+    Text,
+    Boolean,
+    Int,
+    Unsigned,
+    Double,
+    Time,
+    /// Whole numbers with spaces between.
+    Indices,
+    OneOf(&'static [&'static str]),
+    /// Words from a list with spaces between.
+    Words(&'static [&'static str]),
+}
+
+use Written::*;
+
+/// An element: `parent/name`, or `name` if it is the same wherever it stands.
+struct Kind {
+    name: &'static str,
+    needed: &'static [(&'static str, Written)],
+    optional: &'static [(&'static str, Written)],
+    children: Children,
+}
+
+/// What stands inside an element.
+enum Children {
+    /// Anything.
+    Any,
+    /// Each of these at most once, in this order; those with `!` must be there.
+    Sequence(&'static [&'static str]),
+    /// One or more of this.
+    Many(&'static str),
+    /// One of these, then what else there may be.
+    Choice(&'static [&'static str], &'static [&'static str]),
+}
+
+use Children::*;
+
+const CAUSALITY: Written =
+    OneOf(&["parameter", "calculatedParameter", "input", "output", "local", "independent"]);
+const VARIABILITY: Written = OneOf(&["constant", "fixed", "tunable", "discrete", "continuous"]);
+const INITIAL: Written = OneOf(&["exact", "approx", "calculated"]);
+const DEPENDENCY: Written = Words(&["dependent", "constant", "fixed", "tunable", "discrete"]);
+const TYPES: &[&str] = &["Real", "Integer", "Boolean", "String", "Enumeration"];
+
+const fn kind(
+    name: &'static str,
+    needed: &'static [(&'static str, Written)],
+    optional: &'static [(&'static str, Written)],
+    children: Children,
+) -> Kind {
+    Kind { name, needed, optional, children }
+}
+
+#[rustfmt::skip]
+static KINDS: &[Kind] = &[
+    kind("fmiModelDescription",
+        // fmiVersion's value is a rule of its own
+        &[("fmiVersion", Text), ("modelName", Text), ("guid", Text)],
+        &[("description", Text), ("author", Text), ("version", Text), ("copyright", Text),
+          ("license", Text), ("generationTool", Text), ("generationDateAndTime", Time),
+          ("variableNamingConvention", OneOf(&["flat", "structured"])),
+          ("numberOfEventIndicators", Unsigned)],
+        Sequence(&["ModelExchange", "CoSimulation", "UnitDefinitions", "TypeDefinitions",
+            "LogCategories", "DefaultExperiment", "VendorAnnotations", "!ModelVariables",
+            "!ModelStructure"])),
+    kind("ModelExchange", &[("modelIdentifier", Text)],
+        &[("needsExecutionTool", Boolean), ("completedIntegratorStepNotNeeded", Boolean),
+          ("canBeInstantiatedOnlyOncePerProcess", Boolean),
+          ("canNotUseMemoryManagementFunctions", Boolean), ("canGetAndSetFMUstate", Boolean),
+          ("canSerializeFMUstate", Boolean), ("providesDirectionalDerivative", Boolean)],
+        Sequence(&["SourceFiles"])),
+    kind("CoSimulation", &[("modelIdentifier", Text)],
+        &[("needsExecutionTool", Boolean), ("canHandleVariableCommunicationStepSize", Boolean),
+          ("canInterpolateInputs", Boolean), ("maxOutputDerivativeOrder", Unsigned),
+          ("canRunAsynchronuously", Boolean), ("canBeInstantiatedOnlyOncePerProcess", Boolean),
+          ("canNotUseMemoryManagementFunctions", Boolean), ("canGetAndSetFMUstate", Boolean),
+          ("canSerializeFMUstate", Boolean), ("providesDirectionalDerivative", Boolean)],
+        Sequence(&["SourceFiles"])),
+    kind("SourceFiles", &[], &[], Many("File")),
+    kind("File", &[("name", Text)], &[], Sequence(&[])),
+    kind("UnitDefinitions", &[], &[], Many("Unit")),
+    kind("Unit", &[("name", Text)], &[], Choice(&[], &["BaseUnit", "DisplayUnit"])),
+    kind("BaseUnit", &[],
+        &[("kg", Int), ("m", Int), ("s", Int), ("A", Int), ("K", Int), ("mol", Int), ("cd", Int),
+          ("rad", Int), ("factor", Double), ("offset", Double)],
+        Sequence(&[])),
+    kind("DisplayUnit", &[("name", Text)], &[("factor", Double), ("offset", Double)], Sequence(&[])),
+    kind("TypeDefinitions", &[], &[], Many("SimpleType")),
+    kind("SimpleType", &[("name", Text)], &[("description", Text)], Choice(TYPES, &[])),
+    kind("SimpleType/Real", &[],
+        &[("quantity", Text), ("unit", Text), ("displayUnit", Text), ("relativeQuantity", Boolean),
+          ("min", Double), ("max", Double), ("nominal", Double), ("unbounded", Boolean)],
+        Sequence(&[])),
+    kind("SimpleType/Integer", &[], &[("quantity", Text), ("min", Int), ("max", Int)], Sequence(&[])),
+    kind("SimpleType/Boolean", &[], &[], Sequence(&[])),
+    kind("SimpleType/String", &[], &[], Sequence(&[])),
+    kind("SimpleType/Enumeration", &[], &[("quantity", Text)], Many("Item")),
+    kind("Item", &[("name", Text), ("value", Int)], &[("description", Text)], Sequence(&[])),
+    kind("LogCategories", &[], &[], Many("Category")),
+    kind("Category", &[("name", Text)], &[("description", Text)], Sequence(&[])),
+    kind("DefaultExperiment", &[],
+        &[("startTime", Double), ("stopTime", Double), ("tolerance", Double), ("stepSize", Double)],
+        Sequence(&[])),
+    kind("VendorAnnotations", &[], &[], Many("Tool")),
+    kind("Annotations", &[], &[], Many("Tool")),
+    kind("Tool", &[("name", Text)], &[], Any),
+    kind("ModelVariables", &[], &[], Many("ScalarVariable")),
+    kind("ScalarVariable", &[("name", Text), ("valueReference", Unsigned)],
+        &[("description", Text), ("causality", CAUSALITY), ("variability", VARIABILITY),
+          ("initial", INITIAL), ("canHandleMultipleSetPerTimeInstant", Boolean)],
+        Choice(TYPES, &["Annotations"])),
+    kind("ScalarVariable/Real", &[],
+        &[("declaredType", Text), ("quantity", Text), ("unit", Text), ("displayUnit", Text),
+          ("relativeQuantity", Boolean), ("min", Double), ("max", Double), ("nominal", Double),
+          ("unbounded", Boolean), ("start", Double), ("derivative", Unsigned), ("reinit", Boolean)],
+        Sequence(&[])),
+    kind("ScalarVariable/Integer", &[],
+        &[("declaredType", Text), ("quantity", Text), ("min", Int), ("max", Int), ("start", Int)],
+        Sequence(&[])),
+    kind("ScalarVariable/Boolean", &[], &[("declaredType", Text), ("start", Boolean)], Sequence(&[])),
+    kind("ScalarVariable/String", &[], &[("declaredType", Text), ("start", Text)], Sequence(&[])),
+    kind("ScalarVariable/Enumeration", &[("declaredType", Text)],
+        &[("quantity", Text), ("min", Int), ("max", Int), ("start", Int)],
+        Sequence(&[])),
+    kind("ModelStructure", &[], &[], Sequence(&["Outputs", "Derivatives", "InitialUnknowns"])),
+    kind("Outputs", &[], &[], Many("Unknown")),
+    kind("Derivatives", &[], &[], Many("Unknown")),
+    kind("InitialUnknowns", &[], &[], Many("Unknown")),
+    kind("Unknown", &[("index", Unsigned)],
+        &[("dependencies", Indices), ("dependenciesKind", DEPENDENCY)],
+        Sequence(&[])),
+];
+
+fn find(parent: &str, name: &str) -> Option<&'static Kind> {
+    let full = format!("{parent}/{name}");
+    KINDS.iter().find(|k| k.name == full).or_else(|| KINDS.iter().find(|k| k.name == name))
+}
+
+impl Written {
+    /// What is allowed, if this is not.
+    fn allowed(self, value: &str) -> Option<String> {
+        let value = value.trim();
+        let (fits, allowed) = match self {
+            Text => return None,
+            Boolean => {
+                (matches!(value, "true" | "false" | "0" | "1"), "true, false, 1, 0".to_string())
+            }
+            Int => (value.parse::<i32>().is_ok(), "a whole number of 32 bits".to_string()),
+            Unsigned => (value.parse::<u32>().is_ok(), "a whole number from 0 on".to_string()),
+            Double => (
+                double(value).is_some(),
+                "a number with a decimal point, INF, -INF or NaN".to_string(),
+            ),
+            Time => (is_time(value), "year-month-dayThour:minute:secondZ".to_string()),
+            Indices => (
+                value.split_whitespace().all(|word| word.parse::<u32>().is_ok()),
+                "whole numbers with spaces between".to_string(),
+            ),
+            OneOf(words) => (words.contains(&value), words.join(", ")),
+            Words(words) => {
+                (value.split_whitespace().all(|word| words.contains(&word)), words.join(", "))
+            }
+        };
+        (!fits).then_some(allowed)
+    }
+}
+
+/// Whether it is an `xs:dateTime`; fractions of seconds and time zones are allowed.
+fn is_time(text: &str) -> bool {
+    let Some((date, time)) = text.split_once('T') else { return false };
+    let date: Vec<Option<u32>> = date.split('-').map(|part| part.parse().ok()).collect();
+    let [Some(_), Some(month @ 1..=12), Some(day @ 1..)] = date[..] else { return false };
+    let days = match month {
+        2 => 29,
+        4 | 6 | 9 | 11 => 30,
+        _ => 31,
+    };
+    let zone = time.find(['Z', '+', '-']).unwrap_or(time.len());
+    let (clock, zone) = time.split_at(zone);
+    let zone_fits = matches!(zone, "" | "Z")
+        || zone[1..].split_once(':').is_some_and(|(h, m)| {
+            h.len() == 2 && m.len() == 2 && h.parse::<u32>().is_ok() && m.parse::<u32>().is_ok()
+        });
+    let parts: Vec<&str> = clock.split(':').collect();
+    let [hour, minute, second] = parts[..] else { return false };
+    let below = |text: &str, limit: f64| {
+        text.len() >= 2
+            && text.starts_with(|c: char| c.is_ascii_digit())
+            && double(text).is_some_and(|x| (0.0..limit).contains(&x))
+    };
+    let whole = |text: &str| text.len() == 2 && text.parse::<u32>().is_ok();
+    day <= days
+        && zone_fits
+        && whole(hour)
+        && whole(minute)
+        && below(hour, 24.0)
+        && below(minute, 60.0)
+        && below(second, 61.0)
+}
+
+fn place(element: &Element) -> String {
+    match element.get("name") {
+        Some(name) => format!("line {}, {} \"{name}\"", element.line, element.name),
+        None => format!("line {}, {}", element.line, element.name),
+    }
+}
+
+/// `xml.schema`: elements and attributes that are there, missing or in the wrong order.
+pub fn structure(description: &Description, findings: &mut Findings) {
+    let root = &description.root;
+    if root.name != "fmiModelDescription" {
+        return findings.add(place(root), "the root element is not fmiModelDescription");
+    }
+    elements("", root, findings);
+}
+
+fn elements(parent: &str, element: &Element, findings: &mut Findings) {
+    let Some(kind) = find(parent, &element.name) else { return };
+    for (attribute, _) in &element.attributes {
+        let known = kind.needed.iter().chain(kind.optional).any(|(name, _)| name == attribute);
+        // xsi:noNamespaceSchemaLocation belongs to XML itself
+        if !known && attribute != "noNamespaceSchemaLocation" && attribute != "schemaLocation" {
+            let all: Vec<_> =
+                kind.needed.iter().chain(kind.optional).map(|(name, _)| *name).collect();
+            findings.add(
+                place(element),
+                format!("the schema has no attribute {attribute} (allowed: {})", all.join(", ")),
+            );
+        }
+    }
+    for (name, _) in kind.needed {
+        if element.get(name).is_none() {
+            findings.add(place(element), format!("the attribute {name} is missing"));
+        }
+    }
+    children(kind, element, findings);
+    if !matches!(kind.children, Any) {
+        for child in &element.children {
+            elements(&element.name, child, findings);
+        }
+    }
+}
+
+fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
+    let unknown = |child: &Element, allowed: &[&str], findings: &mut Findings| {
+        let allowed = match allowed.len() {
+            0 => "nothing".to_string(),
+            _ => allowed.join(", ").replace('!', ""),
+        };
+        findings.add(
+            place(child),
+            format!("it does not belong into {} (allowed: {allowed})", element.name),
+        );
+    };
+    match kind.children {
+        Any => {}
+        Many(name) => {
+            if element.children.is_empty() {
+                findings.add(place(element), format!("it is empty (allowed: one {name} or more)"));
+            }
+            for child in element.children.iter().filter(|child| child.name != name) {
+                unknown(child, &[name], findings);
+            }
+        }
+        Sequence(names) => {
+            let mut reached = 0;
+            let mut seen: Vec<&str> = Vec::new();
+            for child in &element.children {
+                let at = names.iter().position(|name| name.trim_start_matches('!') == child.name);
+                let Some(at) = at else {
+                    unknown(child, names, findings);
+                    continue;
+                };
+                if seen.contains(&child.name.as_str()) {
+                    findings.add(place(child), "it is there twice (allowed: once)");
+                } else if at < reached && child.name != "ModelExchange" {
+                    // the two interfaces may come in any order
+                    findings.add(
+                        place(child),
+                        format!(
+                            "it stands after {} (allowed order: {})",
+                            names[reached].trim_start_matches('!'),
+                            names.join(", ").replace('!', "")
+                        ),
+                    );
+                }
+                reached = reached.max(at);
+                seen.push(&child.name);
+            }
+            for name in names.iter().filter_map(|name| name.strip_prefix('!')) {
+                if !seen.contains(&name) {
+                    findings.add(place(element), format!("the element {name} is missing"));
+                }
+            }
+        }
+        Choice(choice, rest) => {
+            let chosen =
+                element.children.iter().filter(|child| choice.contains(&child.name.as_str()));
+            let count = chosen.count();
+            if !choice.is_empty() && count != 1 {
+                findings.add(
+                    place(element),
+                    format!("{count} types are given (allowed: one of {})", choice.join(", ")),
+                );
+            }
+            let all = [choice, rest].concat();
+            let mut reached = 0;
+            for child in &element.children {
+                match all.iter().position(|name| *name == child.name) {
+                    None => unknown(child, &all, findings),
+                    // the types come first, whichever it is
+                    Some(at) if at.max(choice.len().saturating_sub(1)) < reached => {
+                        findings.add(
+                            place(child),
+                            format!("it stands too late (allowed order: {})", all.join(", ")),
+                        );
+                    }
+                    Some(at) => reached = reached.max(at.max(choice.len().saturating_sub(1))),
+                }
+            }
+        }
+    }
+}
+
+/// `xml.values`: how the values of attributes are written.
+pub fn values(description: &Description, findings: &mut Findings) {
+    value("", &description.root, findings);
+}
+
+fn value(parent: &str, element: &Element, findings: &mut Findings) {
+    let Some(kind) = find(parent, &element.name) else { return };
+    for (name, written) in kind.needed.iter().chain(kind.optional) {
+        if let Some(value) = element.get(name)
+            && let Some(allowed) = written.allowed(value)
+        {
+            findings.add(place(element), format!("{name}=\"{value}\" (allowed: {allowed})"));
+        }
+    }
+    if !matches!(kind.children, Any) {
+        for child in &element.children {
+            self::value(&element.name, child, findings);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_those_of_xml() {
+        for right in [
+            "2026-01-31T12:00:00Z",
+            "2026-01-31T12:00:00.25+01:00",
+            "2026-01-31T12:00:00",
+            "2024-02-29T23:59:59Z",
+        ] {
+            assert!(is_time(right), "{right}");
+        }
+        for wrong in [
+            "2026-01-31",
+            "2026-13-31T12:00:00Z",
+            "2026-04-31T12:00:00Z",
+            "31.01.2026 12:00",
+            "2026-01-31T25:00:00Z",
+            "2026-01-31T12:00Z",
+            "2026-01-31T12:00:00Zulu",
+            "2026-01-31 12:00:00Z",
+            "",
+            "T",
+        ] {
+            assert!(!is_time(wrong), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn every_element_that_stands_inside_another_is_in_the_table() {
+        for kind in KINDS {
+            let names: Vec<&str> = match kind.children {
+                Any => vec![],
+                Many(name) => vec![name],
+                Sequence(names) => names.to_vec(),
+                Choice(a, b) => [a, b].concat(),
+            };
+            let parent = kind.name.rsplit('/').next().unwrap();
+            for name in names {
+                assert!(find(parent, name.trim_start_matches('!')).is_some(), "{parent}/{name}");
+            }
+        }
+    }
+}

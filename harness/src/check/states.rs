@@ -1,0 +1,202 @@
+//! Saved states (FMI 2.0.5, section 2.1.8).
+
+use anyhow::Result;
+
+use super::Findings;
+use super::guest::{Guest, Interface, Mark, Reading, STEPS, Session};
+
+/// Interfaces that declare a capability; none is a reason to skip.
+fn with(guest: &Guest, flag: &str, findings: &mut Findings) -> Vec<Interface> {
+    let mut all = guest.interfaces();
+    all.retain(|interface| guest.can(*interface, flag));
+    if all.is_empty() {
+        findings.skip(format!("{flag} is not declared"));
+    }
+    all
+}
+
+const SAVE: &str = "canGetAndSetFMUstate";
+const SERIALIZE: &str = "canSerializeFMUstate";
+
+/// Goes on by some steps from where the host was when it saved the state.
+fn go_on(session: &mut Session, from: &Mark) -> Result<Vec<Reading>> {
+    session.go_back(from);
+    session.advance(STEPS)?;
+    session.readings()
+}
+
+/// `states.rollback`
+pub fn rollback(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    for interface in with(guest, SAVE, findings) {
+        let mut session = guest.running(interface)?;
+        session.advance(3)?;
+        guest.doing("fmi2GetFMUstate");
+        let state = session.instance.get_state()?;
+        let here = session.mark();
+        let before = session.readings()?;
+        let first = go_on(&mut session, &here)?;
+        guest.doing("fmi2SetFMUstate");
+        session.instance.set_state(&state)?;
+        let restored = session.readings()?;
+        if let Some(text) = session.difference(&restored, &before) {
+            findings.add(format!("right after fmi2SetFMUstate ({})", interface.name()), text);
+        }
+        let second = go_on(&mut session, &here)?;
+        if let Some(text) = session.difference(&second, &first) {
+            let place = format!("{STEPS} steps after fmi2SetFMUstate ({})", interface.name());
+            findings.add(place, text);
+        }
+        guest.doing("fmi2FreeFMUstate");
+        session.instance.free_state(state)?;
+    }
+    Ok(())
+}
+
+/// `states.handle`
+pub fn handle(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    for interface in with(guest, SAVE, findings) {
+        let mut session = guest.running(interface)?;
+        let mut state = session.instance.get_state()?;
+        session.advance(3)?;
+        guest.doing("fmi2GetFMUstate into a handle that is there already");
+        session.instance.get_state_into(&mut state)?;
+        let here = session.mark();
+        let first = go_on(&mut session, &here)?;
+        session.instance.set_state(&state)?;
+        let second = go_on(&mut session, &here)?;
+        if let Some(text) = session.difference(&second, &first) {
+            findings.add(format!("a handle used again ({})", interface.name()), text);
+        }
+        session.instance.free_state(state)?;
+        guest.doing("fmi2FreeFMUstate of NULL");
+        session.instance.free_state_null()?;
+    }
+    Ok(())
+}
+
+/// `states.bytes`
+pub fn bytes(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    for interface in with(guest, SERIALIZE, findings) {
+        let (first, here, bytes) = {
+            let mut session = guest.running(interface)?;
+            session.advance(3)?;
+            let state = session.instance.get_state()?;
+            guest.doing("fmi2SerializeFMUstate");
+            let bytes = session.instance.serialize(&state)?;
+            if session.instance.serialize(&state)? != bytes {
+                findings.add(
+                    "fmi2SerializeFMUstate",
+                    "the same state gives other bytes the second time",
+                );
+            }
+            session.instance.free_state(state)?;
+            let here = session.mark();
+            (go_on(&mut session, &here)?, here, bytes)
+        };
+        // One instance that has lived, one that was neither set up nor initialised.
+        for lived in [true, false] {
+            let mut other = match lived {
+                true => guest.running(interface)?,
+                false => guest.session(interface)?,
+            };
+            guest.doing(match lived {
+                true => "fmi2DeSerializeFMUstate in another instance",
+                false => "fmi2DeSerializeFMUstate and fmi2SetFMUstate in an instance without setup",
+            });
+            let state = other.instance.deserialize(&bytes)?;
+            other.instance.set_state(&state)?;
+            let second = go_on(&mut other, &here)?;
+            if let Some(text) = other.difference(&second, &first) {
+                findings.add(format!("{} ({})", guest.now(), interface.name()), text);
+            }
+            other.instance.free_state(state)?;
+        }
+    }
+    Ok(())
+}
+
+/// `states.garbage`
+pub fn garbage(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    for interface in with(guest, SERIALIZE, findings) {
+        let mut session = guest.running(interface)?;
+        session.advance(3)?;
+        let state = session.instance.get_state()?;
+        let bytes = session.instance.serialize(&state)?;
+        session.instance.free_state(state)?;
+        drop(session);
+        let mut flipped = bytes.clone();
+        if let Some(byte) = flipped.get_mut(bytes.len() / 2) {
+            *byte ^= 0x55;
+        }
+        let half = bytes[..bytes.len() / 2].to_vec();
+        let longer = [&bytes[..], &[0; 8]].concat();
+        for (what, bytes) in [
+            ("no bytes", Vec::new()),
+            ("half of the bytes", half),
+            ("8 bytes too many", longer),
+            ("zeros", vec![0; bytes.len()]),
+            ("one byte changed", flipped),
+        ] {
+            let place = format!("fmi2DeSerializeFMUstate with {what} ({})", interface.name());
+            let mut session = guest.running(interface)?;
+            session.advance(3)?;
+            let before = session.readings()?;
+            guest.doing(&place);
+            let accepted = match session.instance.deserialize(&bytes) {
+                Err(_) => false,
+                Ok(state) => {
+                    let set = session.instance.set_state(&state).is_ok();
+                    let _ = session.instance.free_state(state);
+                    set
+                }
+            };
+            if accepted {
+                findings.add(place, "it is accepted (allowed: fmi2Error)");
+                break;
+            }
+            // After an error it may refuse to be read.
+            if let Ok(after) = session.readings()
+                && let Some(text) = session.difference(&after, &before)
+            {
+                findings.add(place, format!("it is refused, but {text}"));
+            }
+        }
+        let mut session = guest.running(interface)?;
+        guest.doing("fmi2SetFMUstate(NULL)");
+        if session.instance.set_state_null().is_ok() {
+            findings.add(guest.now(), "it is accepted (allowed: fmi2Error)");
+        }
+    }
+    Ok(())
+}
+
+/// `states.modes`
+pub fn modes(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    for interface in with(guest, SAVE, findings) {
+        for mode in ["instantiated", "initialization mode", "terminated"] {
+            let mut session = guest.session(interface)?;
+            match mode {
+                "initialization mode" => {
+                    session.instance.setup_experiment(None, session.time, None)?;
+                    session.instance.enter_initialization_mode()?;
+                }
+                "terminated" => {
+                    session.initialise()?;
+                    session.instance.terminate()?;
+                }
+                _ => {}
+            }
+            let place =
+                format!("fmi2GetFMUstate and fmi2SetFMUstate, {mode} ({})", interface.name());
+            guest.doing(&place);
+            let done = session.instance.get_state().and_then(|state| {
+                let set = session.instance.set_state(&state);
+                session.instance.free_state(state).and(set)
+            });
+            if let Err(error) = done {
+                findings.add(place, error.to_string());
+            }
+        }
+    }
+    Ok(())
+}
