@@ -1,5 +1,9 @@
 //! What several tests share.
 
+use std::path::PathBuf;
+use std::process::{Command, Output};
+
+use hubslosh::pack;
 use plant::{FrictionModel, Parameters, SloshModel};
 
 /// Every slosh model.
@@ -56,4 +60,41 @@ pub fn anywhere(rng: &mut fastrand::Rng, slosh: SloshModel, friction: FrictionMo
     p.init.slosh_rate_radial = between(-2.0, 2.0);
     p.slosh.modes = rng.usize(1..=plant::MODES);
     p
+}
+
+/// The output of a command that must succeed.
+///
+/// # Panics
+/// If it does not, with what it said and `sentence`.
+pub fn run(command: &mut Command, sentence: &str) -> String {
+    let why = match command.output() {
+        Err(error) => error.to_string(),
+        Ok(Output { status, stdout, stderr }) => {
+            let out = String::from_utf8_lossy(&stdout).into_owned();
+            if status.success() {
+                return out;
+            }
+            out + &String::from_utf8_lossy(&stderr)
+        }
+    };
+    panic!("{why}\n{sentence}\n(the command: {command:?})");
+}
+
+/// The interpreter of the tests' virtual environment, which is made if need be.
+///
+/// # Panics
+/// If it can't be made.
+pub fn python() -> PathBuf {
+    let target =
+        pack::packed_for_tests().ancestors().nth(2).expect("<target>/test-fmu/HubSlosh.fmu");
+    let scripts = pack::root().join("harness").join("python");
+    let first = if cfg!(windows) { "python" } else { "python3" };
+    let path = run(
+        Command::new(first)
+            .arg(scripts.join("environment.py"))
+            .arg(target.join("python").join("tests"))
+            .arg(scripts.join("requirements.txt")),
+        "the tests in Python need Python 3.11 or newer with its module venv, and the network once",
+    );
+    PathBuf::from(path.trim())
 }

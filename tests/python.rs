@@ -2,40 +2,10 @@
 //! in a virtual environment of their own in the target directory.
 
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 
+use common::{python, run};
 use hubslosh::pack;
-
-/// The output of a command that must succeed.
-///
-/// # Panics
-/// If it does not, with what it said and `sentence`.
-fn run(command: &mut Command, sentence: &str) -> String {
-    let why = match command.output() {
-        Err(error) => error.to_string(),
-        Ok(Output { status, stdout, stderr }) => {
-            let out = String::from_utf8_lossy(&stdout).into_owned();
-            if status.success() {
-                return out;
-            }
-            out + &String::from_utf8_lossy(&stderr)
-        }
-    };
-    panic!("{why}\n{sentence}\n(the command: {command:?})");
-}
-
-/// The interpreter of the virtual environment, made if need be.
-fn python(target: &Path, scripts: &Path) -> PathBuf {
-    let first = if cfg!(windows) { "python" } else { "python3" };
-    let path = run(
-        Command::new(first)
-            .arg(scripts.join("environment.py"))
-            .arg(target.join("python").join("tests"))
-            .arg(scripts.join("requirements.txt")),
-        "the tests in Python need Python 3.11 or newer with its module venv, and the network once",
-    );
-    PathBuf::from(path.trim())
-}
 
 /// The harness's binary, of the profile that this test was built with; it is
 /// another package's, so Cargo does not say where it is.
@@ -56,7 +26,7 @@ fn fmpy_drives_the_fmu_as_the_harness_does() {
     let target = fmu.ancestors().nth(2).expect("<target>/test-fmu/HubSlosh.fmu");
     let scripts = pack::root().join("harness").join("python");
     let said = run(
-        Command::new(python(target, &scripts))
+        Command::new(python())
             .args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider"])
             .args([Path::new("--fmu"), fmu])
             .args([Path::new("--hubslosh"), &binary(target)])

@@ -1,0 +1,18 @@
+/* The hostile host: see host.c. */
+#include <stddef.h>
+#include <stdint.h>
+
+/* A call that takes longer is a failure, s. */
+extern double host_slowest_allowed;
+
+/* What happened so far, over all inputs. */
+extern struct host_report {
+    unsigned long inputs, calls, accepted, messages;
+    /* of a single call, s */
+    double slowest;
+    const char *slowest_call;
+} host_report;
+
+/* Turns the bytes into calls of the FMU with this GUID; aborts with a sentence on what must not
+ * happen. */
+void host_run(const char *guid, const uint8_t *data, size_t size);

@@ -1,0 +1,60 @@
+//! What the fuzzer does to an instance, as functions of bytes: the tests call them as well.
+//!
+//! Everything here panics when something happens that must not, whatever the bytes are.
+
+pub mod states;
+pub mod values;
+
+use HubSlosh::calls::{self, Call};
+use HubSlosh::instance::Instance;
+use HubSlosh::snapshot::{from_bytes, to_bytes};
+use HubSlosh::table::{SCALARS, Scalar};
+use HubSlosh::variable::{Access, Causality, Kind, Value};
+
+/// The call that reads a variable of this type.
+fn getter(scalar: &Scalar) -> &'static Call {
+    match scalar.variable.kind {
+        Kind::Real(_) => &calls::GET_REAL,
+        Kind::Integer { .. } | Kind::Enumeration(_) => &calls::GET_INTEGER,
+        Kind::Boolean => &calls::GET_BOOLEAN,
+    }
+}
+
+/// A value's own call to set it.
+fn setter(value: Value) -> &'static Call {
+    match value {
+        Value::Real(_) => &calls::SET_REAL,
+        Value::Integer(_) => &calls::SET_INTEGER,
+        Value::Boolean(_) => &calls::SET_BOOLEAN,
+    }
+}
+
+/// Every output and local variable of a plant in motion can be read and is a number.
+///
+/// # Panics
+/// If not.
+fn everything_is_a_number(instance: &mut Instance) {
+    let shown = |scalar: &&Scalar| {
+        matches!(scalar.variable.causality, Causality::Output | Causality::Local)
+            // these are read one by one from all states together: slow, and seen in the states
+            && !matches!(scalar.variable.access, Access::Rate(_))
+    };
+    for scalar in SCALARS.iter().filter(shown) {
+        match instance.get(getter(scalar), scalar.reference) {
+            Ok(Value::Real(x)) => assert!(x.is_finite(), "{} = {x}", scalar.name()),
+            Ok(_) => {}
+            Err(fault) => panic!("{}: {}", scalar.name(), fault.text),
+        }
+    }
+}
+
+/// A state that is written out reads back as itself, and writes the same bytes.
+///
+/// # Panics
+/// If not.
+fn survives_being_saved(instance: &Instance) -> Instance {
+    let bytes = to_bytes(instance);
+    let again = from_bytes(&bytes).unwrap_or_else(|why| panic!("own bytes are refused: {why}"));
+    assert!(to_bytes(&again) == bytes, "bytes that were read are written otherwise");
+    again
+}

@@ -1,0 +1,119 @@
+//! Any parameters, inputs and step sizes: a run ends in numbers or in an error, a refused call
+//! changes nothing, and going back and stepping again gives the same bits.
+
+use std::time::{Duration, Instant};
+
+use arbitrary::{Result, Unstructured};
+
+use HubSlosh::calls::{Interface, Mode};
+use HubSlosh::instance::Instance;
+use HubSlosh::snapshot::to_bytes;
+use HubSlosh::table::SCALARS;
+use HubSlosh::variable::{Causality, Kind, Quantity, Value};
+
+use crate::{everything_is_a_number, setter, survives_being_saved};
+
+/// Steps of one run.
+const STEPS: usize = 12;
+/// The longest step, s. A step's work is bounded by the plant; this keeps the fuzzer fast.
+const LONGEST: f64 = 2.0;
+/// A run that was this slow ends: stiff plants may use up the steps they are allowed each time.
+const SLOW: Duration = Duration::from_secs(1);
+
+/// Makes an instance, sets some values, runs it.
+pub fn run(data: &[u8]) {
+    // Bytes that run out end the run.
+    _ = co_simulation(&mut Unstructured::new(data));
+}
+
+fn co_simulation(data: &mut Unstructured) -> Result<()> {
+    let mut instance = Instance::new(Interface::CoSimulation);
+    for _ in 0..data.int_in_range(0..=12)? {
+        set_something(&mut instance, data)?;
+    }
+    let tolerance =
+        if data.ratio(1, 2)? { Some(10f64.powi(data.int_in_range(-15..=0)?)) } else { None };
+    let start = real(data)?;
+    let stop = if data.ratio(1, 4)? { Some(start + real(data)?.abs()) } else { None };
+    _ = instance.setup_experiment(tolerance, start, stop);
+    _ = instance.enter_initialization_mode();
+    if instance.exit_initialization_mode().is_err() {
+        return Ok(());
+    }
+    everything_is_a_number(&mut instance);
+    let begun = Instant::now();
+    for _ in 0..STEPS {
+        if begun.elapsed() > SLOW {
+            break;
+        }
+        for _ in 0..data.int_in_range(0..=2)? {
+            set_something(&mut instance, data)?;
+        }
+        if data.ratio(1, 3)? {
+            let input = data.choose(&SCALARS)?.reference;
+            _ = instance.set_input_derivatives(&[input], &[1], &[real(data)?]);
+        }
+        let h = real(data)?.min(LONGEST);
+        let before = to_bytes(&instance);
+        let mut again = survives_being_saved(&instance);
+        let at = instance.time();
+        let done = instance.do_step(at, h);
+        assert_eq!(again.do_step(at, h), done, "the same step, another answer");
+        if done.is_ok() {
+            everything_is_a_number(&mut instance);
+            assert_eq!(instance.time(), at + h);
+        } else if instance.mode() == Mode::Stepping {
+            assert!(to_bytes(&instance) == before, "a refused step has changed something");
+        } else {
+            // It stands where it was, and can be read.
+            everything_is_a_number(&mut instance);
+            assert_eq!(instance.time(), at);
+        }
+        everything_is_a_number(&mut again);
+        assert!(to_bytes(&again) == to_bytes(&instance), "the same step, another state");
+    }
+    Ok(())
+}
+
+/// Sets a parameter or an input, mostly to something allowed; refusals change nothing.
+fn set_something(instance: &mut Instance, data: &mut Unstructured) -> Result<()> {
+    let scalar = data.choose(&SCALARS)?;
+    if !matches!(scalar.variable.causality, Causality::Parameter | Causality::Input) {
+        return Ok(());
+    }
+    let value = match scalar.variable.kind {
+        Kind::Real(quantity) => Value::Real(within(quantity, data)?),
+        Kind::Integer { .. } => Value::Integer(data.int_in_range(-1..=11)?),
+        Kind::Enumeration(of) => Value::Integer(data.int_in_range(0..=of.items.len() as i32 + 1)?),
+        Kind::Boolean => Value::Boolean(data.arbitrary()?),
+    };
+    let before = to_bytes(instance);
+    if instance.set(setter(value), &[scalar.reference], |_| value).is_err() {
+        assert!(to_bytes(instance) == before, "a refused value has changed something");
+    }
+    Ok(())
+}
+
+/// A value of a quantity: at its limits, between them, of its order of magnitude, or anything.
+fn within(quantity: Quantity, data: &mut Unstructured) -> Result<f64> {
+    let (min, max) = (quantity.min.unwrap_or(-1e3), quantity.max.unwrap_or(1e3));
+    let share = f64::from(data.int_in_range(0..=1000u16)?) / 1000.0;
+    Ok(match data.int_in_range(0..=7)? {
+        0 => min,
+        1 => max,
+        2 => min + share * (max - min),
+        // evenly in the logarithm
+        3 | 4 if min > 0.0 => min * (max / min).powf(share),
+        5 | 6 => quantity.nominal.unwrap_or(1.0) * (2.0 * share - 1.0),
+        _ => real(data)?,
+    })
+}
+
+/// A number of everyday size, mostly; else any.
+fn real(data: &mut Unstructured) -> Result<f64> {
+    if data.ratio(1, 8)? {
+        return Ok(f64::from_bits(data.arbitrary()?));
+    }
+    let mantissa = f64::from(data.int_in_range(-100..=1000i32)?);
+    Ok(mantissa * 10f64.powi(data.int_in_range(-6..=0)?))
+}

@@ -1,0 +1,30 @@
+"""Compares a host's results with what fmpy gets from the FMU for the same release.
+
+    python harness/hosts/compare.py RESULTS.csv dist/HubSlosh.fmu init.slosh_angle=0.3
+
+The table needs the columns time, omega and slosh_angle. Prints the largest differences; between the
+rows of a host that interpolates, 1e-6 is what to expect of Model Exchange at a tolerance of 1e-9.
+"""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
+from hubslosh import drive, read_table
+
+SIGNALS = ["omega", "slosh_angle"]
+
+results = read_table(Path(sys.argv[1]), ["time", *SIGNALS])
+# Hosts write a row before and one after an event: the last of a time counts.
+time, first = np.unique(results["time"][::-1], return_index=True)
+here = {name: results[name][::-1][first] for name in SIGNALS}
+settings = dict(text.split("=", 1) for text in sys.argv[3:])
+there = drive(
+    Path(sys.argv[2]), time, np.zeros(len(time)), settings, hold=True, tolerance=1e-12,
+    columns=SIGNALS,
+)  # fmt: skip
+for name in SIGNALS:
+    difference = np.abs(here[name] - there[name]).max()
+    print(f"{name}: up to {np.abs(there[name]).max():.4f}, differs by up to {difference:.1e}")

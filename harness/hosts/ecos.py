@@ -1,0 +1,53 @@
+"""HubSlosh in ecos (PyPI: ecospy 0.7), a co-simulation master of its own; tried on Linux.
+
+    pip install ecospy==0.7.2 fmpy==0.3.32 numpy     # and Debian's libtbb12 for ecospy
+    python harness/hosts/ecos.py dist/HubSlosh.fmu
+
+Drives the FMU with a sine for a minute and prints by how much the motion differs from what fmpy
+gets for the same steps. Two things to know: ecos can't set enumerations (`slosh.model`,
+`friction.model`), so it has the linear model; and it does not say when an FMU returns an error:
+look at the values, as here.
+"""
+
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+from ecospy import EcosSimulation, EcosSimulationStructure
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
+from hubslosh import drive
+
+STEP = 0.02  # s
+PARAMETERS = {"tank.h": 0.05, "init.slosh_angle": 0.1, "init.omega": 0.02, "slosh.modes": 2}
+SIGNALS = ["theta", "omega", "slosh_angle"]
+
+fmu = Path(sys.argv[1]).resolve()
+time = np.arange(3001) * STEP
+torque = 0.05 * np.sin(2 * math.pi * 2.4 * time)  # N·m, held over a step
+
+with EcosSimulationStructure() as structure:
+    structure.add_model("plant", str(fmu))
+    structure.add_parameter_set(
+        "start", {f"plant::{name}": value for name, value in PARAMETERS.items()}
+    )
+    with EcosSimulation(structure=structure, step_size=STEP) as simulation:
+        if not simulation.init(parameter_set="start"):
+            sys.exit("error: ecos could not initialise the FMU")
+        rows = [[simulation.get_real(f"plant::{name}") for name in SIGNALS]]
+        for value in torque[:-1]:
+            simulation.set_real("plant::tau_cmd", value)
+            simulation.step()
+            rows.append([simulation.get_real(f"plant::{name}") for name in SIGNALS])
+        if abs(simulation.get_time() - time[-1]) > 1e-9:
+            sys.exit(f"error: ecos ended at {simulation.get_time()} s, not at {time[-1]} s")
+        simulation.terminate()
+
+here = dict(zip(SIGNALS, np.array(rows).T, strict=True))
+there = drive(fmu, time, torque, PARAMETERS, hold=True, columns=SIGNALS)
+for name in SIGNALS:
+    difference = np.abs(here[name] - there[name]).max()
+    print(f"{name}: up to {np.abs(here[name]).max():.4f}, {difference:.1e} from fmpy")
+    if not difference <= 1e-9 * np.abs(there[name]).max():
+        sys.exit(f"error: {name} differs by {difference:.1e}")

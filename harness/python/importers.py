@@ -1,0 +1,78 @@
+"""What others say of the packed FMU: the standard's XML schema, fmpy's validation and fmutool.
+
+As a program: ``python importers.py dist/HubSlosh.fmu``; leaves with 1 when anybody finds anything.
+``.ci/importers`` makes the environment (requirements-importers.txt) and calls it.
+"""
+
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import fmpy
+from fmpy import simulate_fmu
+from fmpy.validation import validate_fmu
+from lxml import etree
+
+
+def schema_findings(fmu: Path) -> list[str]:
+    """Return what the schema of FMI 2.0, as fmpy carries it, finds in modelDescription.xml."""
+    folder = Path(fmpy.__file__).parent / "schema" / "fmi2"
+    schema = etree.XMLSchema(etree.parse(str(folder / "fmi2ModelDescription.xsd")))
+    with zipfile.ZipFile(fmu) as archive:
+        document = etree.fromstring(archive.read("modelDescription.xml"))
+    schema.validate(document)
+    return [f"line {entry.line}: {entry.message}" for entry in schema.error_log]
+
+
+def fmpy_findings(fmu: Path) -> list[str]:
+    """Return what fmpy's validation finds, and what keeps it from simulating."""
+    findings = [str(problem) for problem in validate_fmu(str(fmu))]
+    for interface in ("CoSimulation", "ModelExchange"):
+        try:
+            result = simulate_fmu(str(fmu), fmi_type=interface, stop_time=1.0, validate=True)
+        except Exception as error:
+            findings.append(f"{interface}: {error}")
+        else:
+            if abs(result["time"][-1] - 1.0) > 1e-9:
+                findings.append(f"{interface} ended at {result['time'][-1]} s, not at 1 s")
+    return findings
+
+
+def fmutool_findings(fmu: Path) -> list[str]:
+    """Return what ``fmutool -check`` (PyPI's fmu-manipulation-toolbox) says but for "all well"."""
+    program = Path(sys.executable).with_name("fmutool")
+    done = subprocess.run(
+        [program, "-input", fmu, "-check"], capture_output=True, text=True, check=False
+    )
+    said = [line.strip() for line in (done.stdout + done.stderr).splitlines() if line.strip()]
+    # Each check ends with one sentence of its own when it has found nothing.
+    well = ("seems to be compliant with FMI-2.0", "No semantic error against the FMI-2 standard")
+    findings = [line for line in said if not line.startswith("INFO")]
+    findings += [f'does not say "{words}"' for words in well if words not in done.stdout]
+    return findings if done.returncode == 0 else [*said, f"ended with {done.returncode}"]
+
+
+def main() -> None:
+    """Ask all, show what they find."""
+    if len(sys.argv) != 2:
+        sys.exit("usage: python importers.py FMU")
+    fmu = Path(sys.argv[1])
+    if not fmu.is_file():
+        sys.exit(f"error: there is no file {fmu}; cargo run --release -- pack")
+    asked = {
+        "XML schema of FMI 2.0": schema_findings,
+        f"fmpy {fmpy.__version__}": fmpy_findings,
+        "fmutool": fmutool_findings,
+    }
+    count = 0
+    for who, findings_of in asked.items():
+        findings = findings_of(fmu)
+        count += len(findings)
+        print(f"{who}: {len(findings)} findings")
+        print("".join(f"  {finding}\n" for finding in findings), end="")
+    sys.exit(1 if count else 0)
+
+
+if __name__ == "__main__":
+    main()
