@@ -12,8 +12,10 @@ As a program::
 
 import argparse
 import difflib
+import os
 import shutil
 import sys
+import tempfile
 from collections.abc import Mapping, Sequence
 from ctypes import byref
 from pathlib import Path
@@ -182,6 +184,56 @@ class Plant:
         self._call("doStep", self.time, end - self.time)
         self.time = end
 
+    def follow(
+        self,
+        time: Sequence[float],
+        torque: Sequence[float],
+        slope: Sequence[float] | None,
+        columns: Sequence[str],
+    ) -> np.ndarray:
+        """Go from row to row of a torque history and return ``columns`` at every row.
+
+        time: s, from the present time on, growing. torque: ``tau_cmd`` there, N·m. slope: its
+        derivative until the next row, N·m/s; None: the torque is held. Returns one row per time.
+
+        These are the calls of `set`, `step` and `get`, with arguments made once for all rows.
+        """
+        kinds = {name: self._variable(name).type for name in columns}
+        reals = [name for name in columns if kinds[name] == "Real"]
+        others = [name for name in columns if kinds[name] != "Real"]
+        fmu, c = self._instance, self._instance.component
+        wanted = (fmi2.fmi2ValueReference * len(reals))(
+            *(self._variables[name].valueReference for name in reals)
+        )
+        values = (fmi2.fmi2Real * len(reals))()
+        read = np.frombuffer(values)
+        place = (fmi2.fmi2ValueReference * 1)(self._variables[TORQUE].valueReference)
+        first = (fmi2.fmi2Integer * 1)(1)
+        tau, rise = (fmi2.fmi2Real * 1)(), (fmi2.fmi2Real * 1)()
+        answer = np.empty((len(time), len(columns)))
+        last = len(time) - 1
+        for k, now in enumerate(time):
+            _messages.clear()
+            try:
+                fmu.fmi2GetReal(c, wanted, len(reals), values)
+                answer[k, : len(reals)] = read
+                if others:
+                    answer[k, len(reals) :] = self.get(others)
+                if k == last:
+                    break
+                tau[0] = torque[k]
+                fmu.fmi2SetReal(c, place, 1, tau)
+                if slope is not None:
+                    rise[0] = slope[k]
+                    fmu.fmi2SetRealInputDerivatives(c, place, 1, first, rise)
+                fmu.fmi2DoStep(c, now, time[k + 1] - now, fmi2.fmi2True)
+            except FMICallException as error:
+                said = " ".join([str(error), *_messages])
+                raise FmuError(f"the run stopped at t = {now} s: {said}") from None
+            self.time = time[k + 1]
+        order = [*reals, *others]
+        return answer[:, [order.index(name) for name in columns]]
+
     def save(self) -> tuple[float, bytes]:
         """Return the time (s) and the serialized state, for `restore` of any instance."""
         state = self._call("getFMUstate")
@@ -241,28 +293,32 @@ def drive(
     torque: Sequence[float] | np.ndarray,
     settings: Mapping[str, Value] | None = None,
     *,
+    slope: Sequence[float] | np.ndarray | None = None,
     tolerance: float | None = None,
     hold: bool = False,
     columns: Sequence[str] = COLUMNS,
 ) -> dict[str, np.ndarray]:
     """Drive a new instance through a torque history, one step from row to row.
 
-    time: communication points, s, growing. torque: ``tau_cmd`` there, N·m; straight lines
-    between them, or held from row to row if ``hold``. settings, tolerance: as for `Plant`.
+    time: communication points, s, growing. torque: ``tau_cmd`` there, N·m. slope: its derivative
+    from each row to the next, N·m/s; None: straight lines between the rows. hold: the torque is
+    held from row to row, whatever the slope. settings, tolerance: as for `Plant`.
 
     Returns the columns ``time``, ``tau_cmd`` and ``columns``, one row per communication point.
     """
     t, tau = np.asarray(time, float).tolist(), np.asarray(torque, float).tolist()
     if len(t) != len(tau) or len(t) < 2:
         raise FmuError(f"a torque history needs two rows or more, not {len(t)} and {len(tau)}")
-    rows = []
+    if hold:
+        rise = None
+    elif slope is None:
+        rise = (np.diff(tau) / np.diff(t)).tolist()
+    else:
+        rise = np.asarray(slope, float).tolist()
+        if len(rise) != len(t):
+            raise FmuError(f"a slope for each of the {len(t)} rows is needed, not {len(rise)}")
     with Plant(fmu, settings, tolerance=tolerance, start=t[0], stop=t[-1], torque=tau[0]) as plant:
-        rows.append(plant.get(columns))
-        for k in range(len(t) - 1):
-            slope = None if hold else (tau[k + 1] - tau[k]) / (t[k + 1] - t[k])
-            plant.step(t[k + 1], tau[k], slope)
-            rows.append(plant.get(columns))
-    values = np.array(rows).T
+        values = plant.follow(t, tau, rise, columns).T
     return {"time": np.array(t), TORQUE: np.array(tau)} | dict(zip(columns, values, strict=True))
 
 
@@ -285,13 +341,37 @@ def read_table(path: Path, columns: Sequence[str]) -> dict[str, np.ndarray]:
     return {name: table[name].to_numpy().astype(float) for name in columns}
 
 
-def write_table(path: Path, table: Mapping[str, np.ndarray]) -> None:
-    """Write columns of numbers to a .csv or .parquet file; every digit comes back."""
+def write_table(
+    path: Path, table: Mapping[str, np.ndarray], notes: Mapping[str, str] | None = None
+) -> None:
+    """Write columns of numbers to a .csv or .parquet file; every digit comes back.
+
+    notes: for a Parquet file's key-value metadata. The file appears whole or not at all: it is
+    written beside its place under another name, then renamed.
+    """
     import pyarrow.csv
     import pyarrow.parquet
 
-    write = pyarrow.csv.write_csv if _format(path) == "csv" else pyarrow.parquet.write_table
-    write(pyarrow.table(dict(table)), path)
+    columns = pyarrow.table(dict(table)).replace_schema_metadata(dict(notes or {}))
+    ending = _format(path)
+    try:
+        handle, name = tempfile.mkstemp(prefix=".hubslosh-", dir=path.parent)
+        os.close(handle)
+        beside = Path(name)
+        try:
+            if ending == "csv":
+                pyarrow.csv.write_csv(columns, beside)
+            else:
+                pyarrow.parquet.write_table(columns, beside, compression="zstd")
+            # mkstemp's permissions are for secrets; give it those of any new file
+            mask = os.umask(0)
+            os.umask(mask)
+            beside.chmod(0o666 & ~mask)
+            beside.replace(path)
+        finally:
+            beside.unlink(missing_ok=True)
+    except OSError as error:
+        raise FmuError(f"{path} cannot be written: {error}") from None
 
 
 def _format(path: Path) -> str:

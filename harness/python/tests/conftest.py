@@ -28,7 +28,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--hubslosh", type=Path, default=TARGET / "release" / exe)
 
 
-def _option(request: pytest.FixtureRequest, name: str) -> Path:
+def option(request: pytest.FixtureRequest, name: str) -> Path:
+    """Return the file that a flag names."""
     path: Path = request.config.getoption(name).absolute()
     if not path.is_file():
         pytest.exit(f"{name}: there is no file {path}; cargo run --release -- pack", returncode=4)
@@ -38,13 +39,13 @@ def _option(request: pytest.FixtureRequest, name: str) -> Path:
 @pytest.fixture(scope="session")
 def fmu(request: pytest.FixtureRequest) -> Path:
     """Return the packed FMU."""
-    return _option(request, "--fmu")
+    return option(request, "--fmu")
 
 
 @pytest.fixture(scope="session")
 def harness(request: pytest.FixtureRequest, fmu: Path, tmp_path_factory) -> Harness:
     """Return a function that makes one run with ``hubslosh run`` and reads what it wrote."""
-    binary = _option(request, "--hubslosh")
+    binary = option(request, "--hubslosh")
 
     def run(*arguments: str, columns: tuple[str, ...] = COLUMNS) -> dict[str, np.ndarray]:
         out = tmp_path_factory.mktemp("harness") / "run.parquet"

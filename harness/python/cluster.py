@@ -1,0 +1,340 @@
+"""Makes the runs of a campaign's plan on a Dask cluster, with fmpy as the FMU's host.
+
+    python3 harness/python/cluster.py --plan monte_carlo --workers 4
+    python3 harness/python/cluster.py --plan mine.toml --scheduler tcp://head:8786
+
+needs dist/HubSlosh.fmu and the program hubslosh (``cargo run --release -- pack`` makes both) and
+Python 3.11 or newer; the first start makes a virtual environment in the target directory and
+needs the network. Without ``--scheduler`` the workers are processes of this machine.
+
+``hubslosh campaign --list`` says what is to be run, ``hubslosh torque`` with which torque. A worker
+gets the FMU once, and torque and settings with every run; it sends the signals back: no disk is
+shared. This side writes runs/<name>.parquet, each whole or not at all. In the end ``hubslosh
+campaign`` reads the runs and writes tables and report: the same as if it had made them.
+
+Start the same command again after an interruption: runs that are there are not made again. A run
+whose worker dies is given to another worker. Workers of a real cluster need ``--nthreads 1`` and
+the packages of requirements-cluster.txt.
+"""
+
+import argparse
+import hashlib
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import environment
+
+try:
+    import cloudpickle
+    import dask
+    import numpy as np
+    import pyarrow
+    import pyarrow.parquet
+    from distributed import Client, KilledWorker, LocalCluster, as_completed, get_worker
+    from distributed.client import FutureCancelledError
+    from distributed.diagnostics.plugin import UploadFile
+    from tqdm import tqdm
+
+    import hubslosh
+except ModuleNotFoundError as missing:
+    here = environment.target() / "python" / "cluster"
+    if Path(sys.prefix) == here:
+        sys.exit(f"error: {here} is damaged ({missing}); delete it and try again")
+    requirements = Path(__file__).with_name("requirements-cluster.txt")
+    sys.exit(subprocess.run([environment.ensure(here, requirements), *sys.argv]).returncode)
+
+# workers have no file of ours but those that `prepare` sends: what they call travels with the call
+cloudpickle.register_pickle_by_value(sys.modules[__name__])
+
+Run = dict[str, Any]
+"""One run of ``hubslosh campaign --list``; its keys are in campaigns.md."""
+
+TORQUE_COLUMNS = ("time", hubslosh.TORQUE, "tau_slope")
+
+
+class CampaignError(Exception):
+    """Why no run, or no further run, can be made."""
+
+
+class Harness:
+    """The program ``hubslosh``, with an FMU, a plan and a directory for what comes out."""
+
+    def __init__(self, program: Path, fmu: Path, plan: str, out: Path) -> None:
+        """Take them as they are; `listing` finds out whether they are there."""
+        self.program, self.fmu, self.plan, self.out = program, fmu, plan, out
+
+    def listing(self) -> dict[str, Any]:
+        """Return what is to be run."""
+        return json.loads(self._say(*self._campaign(), "--list"))
+
+    def torque(self, run: Run) -> list[np.ndarray]:
+        """Return a run's torque: time (s), ``tau_cmd`` (N·m), its slope until the next row."""
+        with tempfile.TemporaryDirectory() as directory:
+            path = Path(directory) / "torque.parquet"
+            numbers = ["--step", repr(run["step"]), "--stop", repr(run["stop"])]
+            self._say("torque", "--profile", run["profile"], *numbers, "--out", str(path))
+            return list(hubslosh.read_table(path, TORQUE_COLUMNS).values())
+
+    def analyse(self) -> bool:
+        """Write tables and report from the stored runs; whether every run is in them.
+
+        Its words go to the terminal. It makes runs that are not there, as it always does.
+        """
+        return subprocess.run([self.program, *self._campaign()]).returncode == 0
+
+    def _campaign(self) -> list[str]:
+        return ["campaign", "--plan", self.plan, "--fmu", str(self.fmu), "--out", str(self.out)]
+
+    def _say(self, *arguments: str) -> str:
+        try:
+            done = subprocess.run([self.program, *arguments], capture_output=True, text=True)
+        except OSError as error:
+            raise CampaignError(
+                f"{self.program} cannot be started ({error}); cargo run --release -- pack "
+                "makes it, or say where it is with --hubslosh"
+            ) from None
+        if done.returncode != 0:
+            raise CampaignError(done.stderr.strip().removeprefix("error: "))
+        return done.stdout
+
+
+def why_not_stored(path: Path, run: Run, columns: list[str]) -> str | None:
+    """Return why the file is not the whole of this run, or None if it is.
+
+    The harness judges the stored runs by the same rules when it reads them.
+    """
+    try:
+        file = pyarrow.parquet.ParquetFile(path)
+        notes = file.schema_arrow.metadata or {}
+        for key, wanted in run["notes"].items():
+            found = notes.get(key.encode(), b"").decode(errors="replace")
+            if found != wanted:
+                return f'its note "{key}" is "{found}", not "{wanted}"'
+        times = hubslosh.read_table(path, columns)["time"]
+    except (OSError, pyarrow.ArrowException, hubslosh.FmuError) as error:
+        return f"it is not whole: {error}"
+    if len(times) != run["steps"] + 1 or times[-1] != run["stop"]:
+        return f"it has {len(times)} rows, not {run['steps'] + 1} to {run['stop']} s"
+    return None
+
+
+def drive_here(
+    fmu: str, run: Run, torque: list[np.ndarray], columns: list[str]
+) -> tuple[dict[str, np.ndarray] | None, str]:
+    """Make one run: what a worker does. Returns its columns and who made it, or None and why."""
+    import os
+    from importlib.metadata import version
+    from pathlib import Path
+
+    import hubslosh
+
+    time, tau, slope = torque
+    try:
+        table = hubslosh.drive(
+            Path(get_worker().local_directory) / fmu,
+            time,
+            tau,
+            run["settings"],
+            slope=slope,
+            tolerance=run["tolerance"],
+            hold=run["hold"],
+            columns=[name for name in columns if name not in ("time", hubslosh.TORQUE)],
+        )
+    except hubslosh.FmuError as error:
+        return None, str(error)
+    return table, f"fmpy {version('fmpy')}, Dask, process {os.getpid()}"
+
+
+def prepare(client: Client, fmu: Path, sha256: str) -> str:
+    """Give every worker, those that come later too, the FMU and hubslosh.py.
+
+    Returns the FMU's file name there. Workers that cannot host it are refused.
+    """
+    threads = client.nthreads()
+    if not threads:
+        raise CampaignError("the cluster has no workers")
+    many = [address for address, count in threads.items() if count != 1]
+    if many:
+        raise CampaignError(
+            f"start the workers with --nthreads 1, one per core: {', '.join(many)} "
+            "would make several runs in turns, as Python runs one thread at a time"
+        )
+    data = fmu.read_bytes()
+    if hashlib.sha256(data).hexdigest() != sha256:
+        raise CampaignError(f"{fmu} has changed just now; start again")
+    with tempfile.TemporaryDirectory() as directory:
+        copy = Path(directory) / f"{sha256}.fmu"
+        copy.write_bytes(data)
+        for file, load in ((copy, False), (Path(hubslosh.__file__), True)):
+            try:
+                client.register_plugin(UploadFile(str(file), load=load), name=file.name)
+            except ModuleNotFoundError as error:
+                raise CampaignError(
+                    f"the workers lack a package ({error}); requirements-cluster.txt says which "
+                    "they need"
+                ) from None
+    return copy.name
+
+
+def make_runs(
+    client: Client, harness: Harness, made: Callable[[Run], None] = lambda run: None
+) -> dict[str, str]:
+    """Make all runs of the plan that are not there yet; return, by name, why some failed.
+
+    A run is written as soon as it comes back; then `made` hears of it.
+    """
+    todo = harness.listing()
+    columns = todo["columns"]
+    (harness.out / "runs").mkdir(parents=True, exist_ok=True)
+    missing = []
+    for run in todo["runs"]:
+        path = harness.out / run["file"]
+        why = why_not_stored(path, run, columns) if path.exists() else ""
+        if why:
+            print(f"{path} is made again: {why}")
+        if why is not None:
+            missing.append(run)
+    fmu = prepare(client, harness.fmu, todo["fmu"]["sha256"])
+    there = len(todo["runs"]) - len(missing)
+    print(
+        f"{len(missing)} runs to make, {there} are there already; {len(client.nthreads())} workers"
+    )
+
+    failed: dict[str, str] = {}
+    runs = {}  # by key, those that are under way
+
+    def futures() -> Iterator[Any]:
+        torque, torque_of = [], None
+        for run in missing:
+            of = (run["profile"], run["step"], run["stop"])
+            if of != torque_of:
+                torque, torque_of = harness.torque(run), of
+            key = f"{run['name']}-{os.urandom(8).hex()}"  # the scheduler must not know it already
+            runs[key] = run
+            yield client.submit(drive_here, fmu, run, torque, columns, key=key)
+
+    coming = futures()
+    under_way = as_completed()
+
+    def fill() -> None:
+        # One run per worker at a time: a run that kills its worker takes no other with it, and
+        # torques and signals do not pile up on the scheduler.
+        while len(runs) < max(1, len(client.nthreads())):
+            future = next(coming, None)
+            if future is None:
+                return
+            under_way.add(future)
+
+    with tqdm(
+        total=sum(run["steps"] for run in missing), unit=" steps", unit_scale=True, smoothing=0.05,
+        bar_format="{percentage:3.0f} % {bar:40} {elapsed} gone, {remaining} to go", disable=None,
+    ) as bar:  # fmt: skip
+        fill()
+        for future in under_way:
+            run = runs.pop(future.key)
+            fill()
+            try:
+                table, said = future.result()
+            except FutureCancelledError:
+                raise CampaignError(
+                    "the scheduler is gone; start the same command again to go on from here"
+                ) from None
+            except Exception as error:  # whatever went wrong on the worker, with this run alone
+                table, said = None, reason(error)
+            if table is None:
+                failed[run["name"]] = said
+            else:
+                notes = run["notes"] | {"made_by": said}
+                whole = {name: table[name] for name in columns}
+                hubslosh.write_table(harness.out / run["file"], whole, notes)
+                made(run)
+            bar.update(run["steps"])
+    return failed
+
+
+def reason(error: BaseException) -> str:
+    """Return why a run failed by no word of the FMU's, for whoever planned it."""
+    if isinstance(error, KilledWorker):
+        return f"{error.allowed_failures + 1} workers died while they made it"
+    return f"{type(error).__name__}: {error}"
+
+
+@contextmanager
+def cluster(workers: int, scheduler: str | None) -> Iterator[Client]:
+    """Yield a client of the cluster at that address, or of one of this machine's processes."""
+    if scheduler is not None:
+        try:
+            client = Client(scheduler, timeout="10s")
+        except (OSError, ValueError) as error:
+            raise CampaignError(f"no scheduler answers at {scheduler}: {error}") from None
+        with client:
+            yield client
+        return
+    with (
+        tempfile.TemporaryDirectory() as directory,
+        dask.config.set({"temporary-directory": directory}),
+        LocalCluster(workers, threads_per_worker=1, dashboard_address=None) as local,
+        Client(local) as client,
+    ):
+        yield client
+
+
+def arguments(description: str) -> argparse.ArgumentParser:
+    """Return the flags that say which program, FMU, plan and workers."""
+    program = environment.target() / "release" / ("hubslosh.exe" if os.name == "nt" else "hubslosh")
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument(
+        "--plan", required=True, metavar="FILE", help="a plan file, or the name of a built-in plan"
+    )
+    parser.add_argument("--fmu", type=Path, default=Path("dist/HubSlosh.fmu"), metavar="FILE")
+    parser.add_argument(
+        "--hubslosh", type=Path, default=program, metavar="FILE", help="the harness's program"
+    )
+    parser.add_argument(
+        "--workers", type=positive, default=os.cpu_count(), metavar="N",
+        help="processes on this machine [default: one per core]",
+    )  # fmt: skip
+    return parser
+
+
+def positive(text: str) -> int:
+    """Return a number of workers."""
+    if not text.isdecimal() or int(text) == 0:
+        raise argparse.ArgumentTypeError(f'"{text}" is not a number of workers, 1 or more')
+    return int(text)
+
+
+def main() -> None:
+    """Make the runs, then have the harness analyse them."""
+    parser = arguments("Makes a plan's runs on a Dask cluster, with fmpy as host.")
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS",
+        help="of a running Dask cluster, tcp://HOST:PORT [default: workers on this machine]",
+    )  # fmt: skip
+    parser.add_argument(
+        "--out", type=Path, metavar="DIRECTORY",
+        help="for runs, tables and report [default: dist/ and the plan's name]",
+    )  # fmt: skip
+    args = parser.parse_args()
+    out = args.out or Path("dist") / Path(args.plan).stem
+    harness = Harness(args.hubslosh, args.fmu, args.plan, out)
+    try:
+        harness.listing()  # what is wrong with the plan is said before any worker starts
+        with cluster(args.workers, args.scheduler) as client:
+            failed = make_runs(client, harness)
+    except (CampaignError, hubslosh.FmuError) as error:
+        sys.exit(f"error: {error}")
+    for name, why in failed.items():
+        print(f"{name} failed on the cluster: {why}", file=sys.stderr)
+    sys.exit(0 if harness.analyse() else 1)
+
+
+if __name__ == "__main__":
+    main()

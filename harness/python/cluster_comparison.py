@@ -1,0 +1,160 @@
+"""Makes a plan's runs twice and says how far the tables differ: by the harness, and by Dask.
+
+    python3 harness/python/cluster_comparison.py --plan monte_carlo --workers 2
+
+The Dask workers host the FMU through fmpy; as soon as there is a run, one of them is killed in
+the middle of another. Compared are all columns of features.csv, features_spa.csv and runs.csv and
+all signals of all runs. Ends with an error if anything differs by more than 1e-9 of itself.
+
+Needs what cluster.py needs. The 200 runs of monte_carlo take some minutes on two cores.
+"""
+
+import csv
+import math
+import os
+import shutil
+import sys
+import time
+from pathlib import Path
+
+import cluster  # first: it makes the virtual environment and starts this program in it
+
+# isort: split
+import numpy as np
+import psutil
+import pyarrow.parquet
+from distributed import Client
+
+import hubslosh
+
+MOST = 1e-9
+"""Largest difference that passes, relative."""
+
+
+class Killer:
+    """Kills one local worker in the middle of a run, after the first run that was made."""
+
+    def __init__(self, client: Client) -> None:
+        """Wait for `made`."""
+        self.client = client
+        self.process: int | None = None
+        """The killed worker's process."""
+        self.interrupted = ""
+        """The run that it was making."""
+
+    def made(self, run: cluster.Run) -> None:
+        """Kill a worker, if none was killed yet and one is busy."""
+        if self.process is not None:
+            return
+        for address, process in self.client.run(os.getpid).items():
+            # stopped first: so it cannot end its run between the look and the blow
+            worker = psutil.Process(process)
+            worker.suspend()
+            time.sleep(0.2)  # what it said before has arrived
+            busy = self.client.processing().get(address, ())
+            if busy:
+                self.process, self.interrupted = process, busy[0].rpartition("-")[0]
+                worker.kill()
+                return
+            worker.resume()
+
+
+def difference(a: str, b: str) -> float:
+    """Return how far two cells differ: numbers relatively, texts by 0 or infinity."""
+    if a == b:
+        return 0.0
+    try:
+        x, y = float(a), float(b)
+    except ValueError:
+        return math.inf
+    return abs(x - y) / max(abs(x), abs(y))
+
+
+def table_differences(one: Path, other: Path) -> dict[str, float]:
+    """Return the largest difference in each column of two CSV files of the same shape."""
+    tables = []
+    for path in (one, other):
+        with path.open(newline="") as file:
+            tables.append(list(csv.reader(file)))
+    if tables[0][0] != tables[1][0] or len(tables[0]) != len(tables[1]):
+        sys.exit(f"error: {one} and {other} have not the same columns and rows")
+    rows = list(zip(*(table[1:] for table in tables), strict=True))
+    return {
+        name: max((difference(a[i], b[i]) for a, b in rows), default=0.0)
+        for i, name in enumerate(tables[0][0])
+    }
+
+
+def signal_differences(one: Path, other: Path, columns: list[str]) -> dict[str, float]:
+    """Return the largest difference in each column of two runs, over the column's largest value."""
+    a, b = (hubslosh.read_table(path, columns) for path in (one, other))
+    largest = {name: np.abs(a[name]).max() for name in columns}
+    return {
+        name: float(np.abs(a[name] - b[name]).max() / (largest[name] or 1.0)) for name in columns
+    }
+
+
+def maker(path: Path) -> str:
+    """Return who made a stored run, as its notes say."""
+    return (pyarrow.parquet.read_schema(path).metadata or {}).get(b"made_by", b"").decode()
+
+
+def compare(
+    client: Client, ours: cluster.Harness, theirs: cluster.Harness
+) -> tuple[dict[str, float], Killer]:
+    """Make the plan's runs in both ways; return the largest difference of every column.
+
+    ours: by the harness. theirs: by Dask, one worker killed on the way; its directory is emptied
+    first. Columns are named file:column; those of the signals start with runs:.
+    """
+    shutil.rmtree(theirs.out, ignore_errors=True)
+    killer = Killer(client)
+    failed = cluster.make_runs(client, theirs, killer.made)
+    for harness in (theirs, ours):
+        if not harness.analyse() or failed:
+            sys.exit(f"error: not all runs of {harness.plan} could be made")
+    worst: dict[str, float] = {}
+
+    def note(file: str, columns: dict[str, float]) -> None:
+        for name, value in columns.items():
+            worst[f"{file}:{name}"] = max(value, worst.get(f"{file}:{name}", 0.0))
+
+    for file in ("features.csv", "features_spa.csv", "runs.csv"):
+        note(file, table_differences(ours.out / file, theirs.out / file))
+    todo = theirs.listing()
+    for run in todo["runs"]:
+        pair = (harness.out / run["file"] for harness in (ours, theirs))
+        note("runs", signal_differences(*pair, todo["columns"]))
+    return worst, killer
+
+
+def main() -> None:
+    """Compare, and print the worst."""
+    parser = cluster.arguments("Compares a plan's runs by the harness with those by Dask.")
+    parser.add_argument(
+        "--out", type=Path, metavar="DIRECTORY",
+        help="for both campaigns [default: dist/cluster_comparison/ and the plan's name]",
+    )  # fmt: skip
+    args = parser.parse_args()
+    out = args.out or Path("dist") / "cluster_comparison" / Path(args.plan).stem
+    ours, theirs = (
+        cluster.Harness(args.hubslosh, args.fmu, args.plan, out / name)
+        for name in ("harness", "dask")
+    )
+    try:
+        theirs.listing()  # what is wrong with the plan is said before any worker starts
+        with cluster.cluster(args.workers, None) as client:
+            worst, killer = compare(client, ours, theirs)
+    except (cluster.CampaignError, hubslosh.FmuError) as error:
+        sys.exit(f"error: {error}")
+    again = maker(theirs.out / "runs" / f"{killer.interrupted}.parquet")
+    print(
+        f"process {killer.process} was killed while it made {killer.interrupted}; made by {again}"
+    )
+    column = max(worst, key=lambda name: worst[name])
+    print(f"worst of {len(worst)} columns: {worst[column]:.1e} ({column})")
+    sys.exit(0 if worst[column] <= MOST else f"error: more than {MOST:.0e}")
+
+
+if __name__ == "__main__":
+    main()

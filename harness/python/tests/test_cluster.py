@@ -1,0 +1,122 @@
+"""A plan's runs on a Dask cluster: the harness's tables, whatever happens to runs and workers."""
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from conftest import option
+from distributed import Client
+
+import cluster
+from cluster_comparison import compare, difference, maker
+
+PLAN = """
+title = "Sweeps and a pulse"
+profile = "exp-sweep:f0=2.1,f1=2.8,duration=120"
+[set]
+imu.enabled = true
+[[run]]
+profile = "exp-sweep:f0=2.1,f1=2.8,duration=120,amplitude=0.05"
+[[run]]
+profile = "exp-sweep:f0=2.1,f1=2.8,duration=120,amplitude=0.2"
+[[run]]
+profile = "pulse:amplitude=0.2,start=1,width=1,duration=60"
+[vary]
+slosh.model = ["linear", "spherical"]
+[count]
+imu.seed = 5
+"""
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[Client]:
+    """Return a client of two workers."""
+    with cluster.cluster(2, None) as client:
+        yield client
+
+
+@pytest.fixture
+def harness(request: pytest.FixtureRequest, fmu: Path, tmp_path: Path):
+    """Return a function that makes a `cluster.Harness` of a plan's text and a directory's name."""
+
+    def make(plan: str, out: str) -> cluster.Harness:
+        path = tmp_path / "plan.toml"
+        path.write_text(plan)
+        return cluster.Harness(option(request, "--hubslosh"), fmu, str(path), tmp_path / out)
+
+    return make
+
+
+def test_with_a_worker_killed_on_the_way_every_column_is_the_harness_s(client, harness) -> None:
+    """Same calls with the same numbers: same bits, in tables and signals."""
+    theirs = harness(PLAN, "theirs")
+    worst, killer = compare(client, harness(PLAN, "ours"), theirs)
+    assert len(worst) > 80
+    assert max(worst.values()) == 0.0, worst
+    again = maker(theirs.out / "runs" / f"{killer.interrupted}.parquet")
+    assert again.startswith("fmpy ")
+    assert not again.endswith(f" {killer.process}"), "the run was not interrupted"
+
+
+def test_a_refused_run_and_one_that_kills_its_workers_leave_the_others_alone(
+    client, harness, monkeypatch
+) -> None:
+    """And a second start makes only what is missing, broken, or of another recipe."""
+    plan = 'profile = "sine:duration=2"\n[vary]\ntank.h = [0.05, -1, 0.07, 0.09, 0.11]\n'
+    ours = harness(plan, "c")
+    right = cluster.drive_here
+
+    def drive_here(fmu, run, torque, columns):
+        """Drive, but die in one run."""
+        if run["settings"]["tank.h"] == 0.07:
+            import os
+
+            os._exit(1)
+        return right(fmu, run, torque, columns)
+
+    # one death is enough; four, as usual, take longer
+    monkeypatch.setattr(client.cluster.scheduler, "allowed_failures", 0)
+    monkeypatch.setattr(cluster, "drive_here", drive_here)
+    made: list[str] = []
+    failed = cluster.make_runs(client, ours, lambda run: made.append(run["name"]))
+    assert sorted(made) == ["linear_110mm_100", "linear_50mm_100", "linear_90mm_100"]
+    assert list(failed) == ["linear_-1000mm_100", "linear_70mm_100"]
+    assert "tank.h = -1" in failed["linear_-1000mm_100"]
+    assert failed["linear_70mm_100"] == "1 workers died while they made it"
+    monkeypatch.undo()
+
+    whole = ours.out / "runs" / "linear_50mm_100.parquet"
+    whole.write_bytes(whole.read_bytes()[:-100])
+    made.clear()
+    failed = cluster.make_runs(client, ours, lambda run: made.append(run["name"]))
+    assert sorted(made) == ["linear_50mm_100", "linear_70mm_100"]
+    assert list(failed) == ["linear_-1000mm_100"]
+    assert not list(ours.out.rglob(".hubslosh-*"))
+    changed = harness(plan.replace("duration=2", "duration=3"), "c")
+    made.clear()
+    cluster.make_runs(client, changed, lambda run: made.append(run["name"]))
+    assert len(made) == 4
+
+
+def test_what_is_wrong_is_said_before_a_worker_starts(monkeypatch, capsys, fmu, tmp_path) -> None:
+    """Plan, program, number of workers: one sentence each, and nothing made."""
+    monkeypatch.chdir(tmp_path)
+    for flags, words in (
+        (["--hubslosh", "nowhere"], "nowhere cannot be started"),
+        (["--workers", "0"], '"0" is not a number of workers'),
+    ):
+        arguments = ["cluster.py", "--plan", "thesis", "--fmu", str(fmu), *flags]
+        monkeypatch.setattr(sys, "argv", arguments)
+        with pytest.raises(SystemExit) as left:
+            cluster.main()
+        assert left.value.code != 0
+        assert words in f"{left.value.code} {capsys.readouterr().err}"
+    assert not list(tmp_path.iterdir())
+
+
+def test_differences_of_cells_are_relative_and_a_text_differs_or_not() -> None:
+    """Empty against a number is no small difference."""
+    assert difference("1.5", "1.50") == 0.0
+    assert difference("2.0", "2.000000002") == pytest.approx(1e-9)
+    assert difference("", "0.1") == difference("a", "b") == float("inf")
