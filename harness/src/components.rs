@@ -40,8 +40,8 @@ pub struct Component {
     pub platforms: BTreeSet<&'static str>,
 }
 
-/// Crates that Rust's standard library is made from. Its panic messages name those that are
-/// linked, with their versions.
+/// Crates that Rust's standard library is made from. Panic messages name those whose code is linked
+/// and can panic, with their versions.
 const STANDARD: [(&str, &str); 10] = [
     ("addr2line", "Apache-2.0 OR MIT"),
     ("adler2", "0BSD OR MIT OR Apache-2.0"),
@@ -111,7 +111,10 @@ pub fn linked(binaries: &[Packed]) -> Result<Vec<Component>> {
         texts: vec![STANDARD_TEXT.into()],
         purl: String::new(),
         sha256: None,
-        origin: "Rust's standard library: core, alloc, std, panic_unwind, compiler_builtins".into(),
+        origin:
+            "Rust's standard library: core, alloc, std, panic_unwind, compiler_builtins, and of \
+                 the crates it is made from what is used; those that the binaries name follow"
+                .into(),
         platforms: everywhere,
     });
     let mut crates_of_std: BTreeMap<(String, String), BTreeSet<&str>> = BTreeMap::new();
@@ -164,7 +167,7 @@ fn crates(platforms: &BTreeSet<&'static str>) -> Result<Vec<Component>> {
     let root = pack::root();
     let said = pack::cargo()
         .current_dir(&root)
-        .args(["metadata", "--format-version", "1", "--locked"])
+        .args(["metadata", "--format-version", "1"])
         .output()
         .context("cargo cannot be run; packing the FMU needs Rust")?;
     if !said.status.success() {

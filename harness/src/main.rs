@@ -7,8 +7,8 @@ use std::process::ExitCode;
 use anyhow::{Context, Result, bail, ensure};
 use clap::{Args, Parser, Subcommand};
 use hubslosh::campaign::Campaign;
-use hubslosh::example;
 use hubslosh::check::command::{CheckArgs, CheckCallsArgs};
+use hubslosh::example;
 use hubslosh::fmi2::Fmu;
 use hubslosh::pack;
 use hubslosh::plan::{self, Plan};
@@ -48,7 +48,7 @@ enum Command {
         #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
         fmu: PathBuf,
     },
-    /// Builds the release for all platforms: the FMU, its hash, its bill of materials.
+    /// Builds and checks the release for all platforms: the FMU, its hash, its bill of materials.
     #[command(after_help = "Example:\n  hubslosh release\n\n\
         On a Debian machine harness/platforms/setup gets what building for all platforms takes.")]
     Release {

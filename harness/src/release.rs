@@ -1,11 +1,16 @@
-//! A release to take away: the FMU for all platforms, its hash and its bill of materials.
+//! A release to take away: the FMU for all platforms, its hash, its bill of materials and the
+//! report of its check.
 
-use std::io::Read;
+use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
+use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::check::{self, Options, Severity};
 use crate::components;
+use crate::output;
 use crate::pack;
 
 /// One file of an FMU.
@@ -23,25 +28,53 @@ pub fn path(folder: &Path) -> PathBuf {
     folder.join(format!("HubSlosh-{}.fmu", env!("CARGO_PKG_VERSION")))
 }
 
-/// Builds for all platforms and writes the release's files to `folder`: the FMU, `.sha256`, as
-/// `sha256sum --check` reads it, and `.cdx.json`. Returns what was written.
+/// Builds for all platforms, checks, and writes the release's files to `folder`: the FMU, `.sha256`,
+/// as `sha256sum --check` reads it, `.cdx.json`, and the report of the check. Returns what was
+/// written; an FMU that breaks a rule is not released.
 pub fn write(folder: &Path) -> Result<Vec<PathBuf>> {
-    let fmu = path(folder);
+    let made = tempfile::tempdir().context("there is no place for temporary files")?;
+    let fmu = path(made.path());
     for built in pack::pack_all(&fmu)? {
         eprintln!("{}: {}", built.folder, built.binary);
     }
     let bytes = std::fs::read(&fmu).with_context(|| format!("{} cannot be read", fmu.display()))?;
     let name = fmu.file_name().unwrap_or_default().to_string_lossy();
     let hash = format!("{}  {name}\n", components::sha256(&bytes));
-    let beside = [
-        (fmu.with_extension("fmu.sha256"), hash.into_bytes()),
-        (fmu.with_extension("cdx.json"), read(&fmu, pack::BILL)?),
+    let report = checked(&fmu)?;
+    let bill = read(&fmu, pack::BILL)?;
+    let files = [
+        ("fmu", bytes),
+        ("fmu.sha256", hash.into_bytes()),
+        ("cdx.json", bill),
+        ("check.txt", report.into_bytes()),
     ];
-    let mut written = vec![fmu];
-    for (path, bytes) in beside {
-        std::fs::write(&path, bytes)
-            .with_context(|| format!("{} was not written", path.display()))?;
+    output::directory(folder)?;
+    let mut written = Vec::new();
+    for (ending, bytes) in files {
+        let path = path(folder).with_extension(ending);
+        output::atomically(&path, |file| Ok(file.write_all(&bytes)?))?;
         written.push(path);
     }
     Ok(written)
+}
+
+/// The report of `hubslosh check` on the FMU; fails with it if there are errors.
+fn checked(fmu: &Path) -> Result<String> {
+    let program = std::env::current_exe().context("this program cannot find itself")?;
+    let options = Options { program, only: vec![], limit: Duration::from_secs(60) };
+    let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template(
+        "checking {bar:40} {pos} of {len} rules of calls  {elapsed} gone, {eta} to go",
+    )?);
+    let mut report = check::check(fmu, &options, |rules| {
+        bar.set_length(rules as u64);
+        bar.inc(1);
+    })?;
+    bar.finish_and_clear();
+    // not where it happened to lie while it was checked
+    report.path = fmu.file_name().unwrap_or_default().into();
+    let text = report.text();
+    match report.count(Severity::Error) {
+        0 => Ok(text),
+        _ => bail!("nothing is released, the FMU breaks rules:\n{text}"),
+    }
 }

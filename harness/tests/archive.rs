@@ -24,8 +24,8 @@ fn text(files: &BTreeMap<String, Vec<u8>>, name: &str) -> String {
 
 /// Values of an attribute, wherever it is.
 fn attributes(page: &str, name: &str) -> BTreeSet<String> {
-    let parts = page.split(&format!(" {name}=\"")).skip(1);
-    parts.map(|part| part.split('"').next().unwrap().to_string()).collect()
+    let before = format!(" {name}=\"");
+    page.split(&before).skip(1).map(|part| part.split('"').next().unwrap().to_string()).collect()
 }
 
 #[test]

@@ -50,6 +50,15 @@ fn hash_and_bill_beside_the_release_are_its_own() {
 }
 
 #[test]
+fn release_passed_the_check() {
+    let Some(fmu) = released() else { return };
+    let report = std::fs::read_to_string(fmu.with_extension("check.txt")).unwrap();
+    let sum = report.lines().last().unwrap();
+    let name = fmu.file_name().unwrap().to_string_lossy();
+    assert!(sum.starts_with(&format!("{name}: 0 errors, ")), "{report}");
+}
+
+#[test]
 fn release_is_small_and_for_three_platforms() {
     let Some(fmu) = released() else { return };
     for binary in ["darwin64/HubSlosh.dylib", "linux64/HubSlosh.so", "win64/HubSlosh.dll"] {
