@@ -15,9 +15,10 @@ use serde_json::json;
 
 use crate::analysis::features::Features;
 use crate::analysis::linear::{Linear, Mode};
+use crate::analysis::off_axis::{self, OffAxis};
 use crate::analysis::residual::ModelFit;
 use crate::analysis::rotary::{self, Rotary};
-use crate::analysis::welch::Spectra;
+use crate::analysis::welch::{self, Spectra};
 use crate::analysis::{FrequencyResponse, demodulation, logarithmic_grid, spa};
 use crate::description::Value;
 use crate::fmi2::{Fmu, Instance};
@@ -29,8 +30,8 @@ use crate::table::{self, Table};
 
 /// Columns of a stored run, SI units, at every communication point from the torque's start to the
 /// stop time; others may follow. The first six are what people look at; wave height, energy,
-/// work, heat and the time stuck are there for the tables.
-pub const STORED: [&str; 11] = [
+/// work, heat, the time stuck and the liquid's force on the tank are there for the tables.
+pub const STORED: [&str; 13] = [
     "time",
     "tau_cmd",
     "omega",
@@ -42,6 +43,8 @@ pub const STORED: [&str; 11] = [
     "work",
     "heat",
     "stuck_time",
+    "F_tangential",
+    "F_radial",
 ];
 
 /// Frequencies at which responses are evaluated: 1.2 mHz apart at the dip of the thesis's sweep.
@@ -94,6 +97,38 @@ impl Figures {
     }
 }
 
+/// The wave's path seen from above, in two short stretches of a run.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SloshPath {
+    /// Where the wave is largest: angles outwards and towards +θ, rad.
+    pub largest: Vec<(f64, f64)>,
+    /// Around the moment at which it begins to turn; empty if it does not.
+    pub onset: Vec<(f64, f64)>,
+}
+
+impl SloshPath {
+    /// Length of the stretch around the largest wave, s.
+    pub const LARGEST: f64 = 3.0;
+    /// Length of the stretch around the beginning, s.
+    pub const ONSET: f64 = 16.0;
+
+    fn of(table: &Table, onset: Option<f64>) -> Self {
+        let column = |name| table.column(name).unwrap_or_default();
+        let (time, radial, tangential) =
+            (column("time"), column("slosh_angle_radial"), column("slosh_angle"));
+        let size = |i: usize| radial[i].hypot(tangential[i]);
+        let top = (0..time.len()).max_by(|&a, &b| size(a).total_cmp(&size(b))).map(|i| time[i]);
+        let stretch = |centre: Option<f64>, length: f64| {
+            let Some(centre) = centre else { return Vec::new() };
+            (0..time.len())
+                .filter(|&i| (time[i] - centre).abs() <= length / 2.0)
+                .map(|i| (radial[i], tangential[i]))
+                .collect()
+        };
+        SloshPath { largest: stretch(top, Self::LARGEST), onset: stretch(onset, Self::ONSET) }
+    }
+}
+
 /// A run that was made (or was there), and what it shows.
 #[derive(Clone, Debug)]
 pub struct Outcome {
@@ -105,17 +140,31 @@ pub struct Outcome {
     pub demodulated: FrequencyResponse,
     /// Response by `spa`; empty if the torque is neither sweep nor noise.
     pub spa: FrequencyResponse,
+    /// Response by Welch's H1 estimate; empty if the torque is neither sweep nor noise.
+    pub h1: FrequencyResponse,
     /// Dip and peak of the demodulated response.
     pub demodulated_features: Features,
     /// Dip and peak of the `spa` response.
     pub spa_features: Features,
+    /// Dip and peak of the H1 response.
+    pub h1_features: Features,
     /// The thesis's linear model, fitted to the `spa` response.
     pub fit: Option<ModelFit>,
     /// Signal-to-noise ratio of the rate at the peak and at the dip, dB, from its coherence
     /// with the torque.
     pub snr_db: Option<[f64; 2]>,
+    /// The same, dB, over the band: frequency (Hz) and ratio.
+    pub snr_over_band: Vec<(f64, f64)>,
+    /// Coherence of what the fit leaves with the torque over the band: frequency (Hz) and coherence.
+    pub coherence_over_band: Vec<(f64, f64)>,
     /// Where in the sweep the liquid turned.
     pub rotary: Option<Rotary>,
+    /// How much of the liquid's force was off the axis, in a sweep.
+    pub off_axis: Option<OffAxis>,
+    /// The leakage at the demodulated response's frequencies; empty if the torque is no sweep.
+    pub leakage: Vec<f64>,
+    /// The wave's path seen from above; empty if the torque is no sweep.
+    pub path: SloshPath,
     /// Its exact linear counterpart with viscous friction, from the FMU's calculated parameters.
     pub linear: Linear,
     /// Radius of the tank, m.
@@ -276,11 +325,18 @@ impl Campaign {
             figures: Figures::of(&table),
             demodulated: FrequencyResponse::default(),
             spa: FrequencyResponse::default(),
+            h1: FrequencyResponse::default(),
             demodulated_features: Features::default(),
             spa_features: Features::default(),
+            h1_features: Features::default(),
             fit: None,
             snr_db: None,
+            snr_over_band: Vec::new(),
+            coherence_over_band: Vec::new(),
             rotary: None,
+            off_axis: None,
+            leakage: Vec::new(),
+            path: SloshPath::default(),
             linear,
             tank_radius,
             reused,
@@ -294,28 +350,49 @@ impl Campaign {
         let frequencies = logarithmic_grid(band, GRID_POINTS);
         outcome.spa = spa::frequency_response(run.step, tau, omega, &frequencies, spa::LAG);
         outcome.spa_features = Features::of(&outcome.spa);
-        let spectra = Spectra::of(run.step, tau, omega);
+        let spectra = Spectra::of(run.step, tau, omega, welch::RESPONSE);
+        outcome.h1 = spectra.h1(band);
+        outcome.h1_features = Features::of(&outcome.h1);
+        let snr = spectra.snr_db();
+        outcome.snr_over_band = spectra.within(band, &snr);
         outcome.snr_db = outcome
             .spa_features
             .f_res
             .zip(outcome.spa_features.f_dip)
-            .map(|(peak, dip)| [spectra.snr_db(peak), spectra.snr_db(dip)]);
-        outcome.fit = ModelFit::of(run.step, tau, omega, &outcome.spa, &outcome.spa_features);
+            .map(|(peak, dip)| [spectra.at(&snr, peak), spectra.at(&snr, dip)]);
+        if let Some((fit, residual)) =
+            ModelFit::of(run.step, tau, omega, &outcome.spa, &outcome.spa_features)
+        {
+            let spectra = Spectra::of(run.step, tau, &residual, welch::COHERENCE);
+            outcome.coherence_over_band = spectra.within(band, &spectra.coherence());
+            outcome.fit = Some(fit);
+        }
         if let (true, Some(amplitude)) = (profile.is_sweep(), case.amplitude) {
-            let demodulated =
-                |signal| demodulation::frequency_response(profile, time, tau, signal, &frequencies);
-            outcome.demodulated = demodulated(omega);
-            outcome.demodulated_features = Features::of(&outcome.demodulated);
-            let radial = demodulated(column("slosh_angle_radial"));
-            let tangential = demodulated(column("slosh_angle"));
+            let signals = ["omega_imu", "slosh_angle_radial", "slosh_angle", "F_radial"];
+            let [response, radial, tangential, force] = demodulation::frequency_responses(
+                profile,
+                time,
+                tau,
+                signals.map(column),
+                &frequencies,
+            );
+            outcome.demodulated_features = Features::of(&response);
+            outcome.demodulated = response;
             let swirl = rotary::swirl(&radial, &tangential, amplitude.abs());
-            outcome.rotary = Some(Rotary::of(&radial.frequency, &swirl));
+            let passed = &radial.frequency;
+            let times: Vec<f64> = passed.iter().filter_map(|f| profile.time_of(*f)).collect();
+            let turned = Rotary::of(passed, &times, &swirl);
+            outcome.path = SloshPath::of(&table, turned.from.and_then(|f| profile.time_of(f)));
+            outcome.rotary = Some(turned);
+            outcome.leakage = off_axis::leakage(&force, outcome.linear.arm);
+            let (radial, tangential) = (column("F_radial"), column("F_tangential"));
+            outcome.off_axis = Some(OffAxis::of(radial, tangential, &outcome.leakage));
         }
         Ok(outcome)
     }
 
-    /// Writes `features.csv`, `features_spa.csv` with the same columns from the `spa` responses, and
-    /// `runs.csv`: every run, failed ones too, with what it was made from and all figures.
+    /// Writes `features.csv`, `features_spa.csv` and `features_h1.csv` with the same columns from the
+    /// `spa` and H1 responses, and `runs.csv`: every run, failed ones too, with what it was made from and all figures.
     pub fn write_tables(&self, fmu: &Fmu, results: &Results) -> Result<()> {
         let write = |name: &str, header: &[&str], rows: Vec<Vec<String>>| {
             output::atomically(&self.out.join(name), |file| {
@@ -332,6 +409,7 @@ impl Campaign {
         };
         write("features.csv", &HEADER, features(Outcome::features))?;
         write("features_spa.csv", &HEADER, features(|outcome| &outcome.spa_features))?;
+        write("features_h1.csv", &HEADER, features(|outcome| &outcome.h1_features))?;
 
         const MADE_FROM: [&str; 8] = [
             "name",
@@ -443,7 +521,7 @@ fn exact_linear(instance: &mut Instance) -> Result<Linear> {
 }
 
 /// Columns of `features.csv`.
-pub const HEADER: [&str; 26] = [
+pub const HEADER: [&str; 31] = [
     "model",
     "fill_m",
     "amplitude_nm",
@@ -470,6 +548,11 @@ pub const HEADER: [&str; 26] = [
     "rotary_from_hz",
     "rotary_to_hz",
     "swirl",
+    "rotary_s",
+    "off_axis_median",
+    "off_axis_energy",
+    "leakage",
+    "regime",
 ];
 
 impl Outcome {
@@ -479,12 +562,22 @@ impl Outcome {
         &self.demodulated_features
     }
 
+    /// The liquid's regime at its largest wave, from the wave height over the tank's radius (thesis
+    /// 2.3.5): linear below 0.15, nonlinear above 0.25.
+    pub fn regime(&self) -> &'static str {
+        match self.figures.peak_wave_height / self.tank_radius {
+            ratio if ratio < 0.15 => "linear",
+            ratio if ratio <= 0.25 => "transitional",
+            _ => "nonlinear",
+        }
+    }
+
     /// Its row with these features; figures that are not found, or that its torque cannot show,
     /// stay empty.
-    fn row(&self, features: &Features) -> [String; 26] {
+    fn row(&self, features: &Features) -> [String; 31] {
         let figures = &self.figures;
         let number = |value: Option<f64>| value.map_or(String::new(), |v| v.to_string());
-        let mut row: [String; 26] = Default::default();
+        let mut row: [String; 31] = Default::default();
         for (place, value) in row.iter_mut().zip(identity(&self.case)) {
             *place = value;
         }
@@ -518,7 +611,14 @@ impl Outcome {
             put("rotary_from_hz", number(rotary.from));
             put("rotary_to_hz", number(rotary.to));
             put("swirl", rotary.swirl.to_string());
+            put("rotary_s", rotary.time.to_string());
         }
+        if let Some(off_axis) = &self.off_axis {
+            put("off_axis_median", off_axis.median.to_string());
+            put("off_axis_energy", off_axis.energy.to_string());
+            put("leakage", off_axis.leakage.to_string());
+        }
+        put("regime", self.regime().into());
         row
     }
 }

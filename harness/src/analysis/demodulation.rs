@@ -18,31 +18,36 @@ use crate::profile::Profile;
 /// enough to tell the harmonics of a sticking bearing from the sweep.
 pub const CYCLES: f64 = 24.0;
 
-/// Frequency response of `output` to `input`, sampled at `time` (s, evenly), while `sweep` passes
+/// Frequency responses of `outputs` to `input`, sampled at `time` (s, evenly), while `sweep` passes
 /// each of `frequencies` (Hz). Frequencies it does not pass are left out.
-pub fn frequency_response(
+pub fn frequency_responses<const N: usize>(
     sweep: &Profile,
     time: &[f64],
     input: &[f64],
-    output: &[f64],
+    outputs: [&[f64]; N],
     frequencies: &[f64],
-) -> FrequencyResponse {
+) -> [FrequencyResponse; N] {
     let carrier: Vec<Complex64> = time.iter().map(|&t| Complex64::cis(-sweep.phase(t))).collect();
-    let mut result = FrequencyResponse::default();
+    let mut results: [FrequencyResponse; N] = std::array::from_fn(|_| Default::default());
     for &frequency in frequencies {
         let Some(centre) = sweep.time_of(frequency) else { continue };
         let half = CYCLES / frequency / 2.0;
         let from = time.partition_point(|&t| t < centre - half);
         let to = time.partition_point(|&t| t <= centre + half);
-        let (mut u, mut y) = (Complex64::default(), Complex64::default());
+        let mut u = Complex64::default();
+        let mut y = [Complex64::default(); N];
         for i in from..to {
             let hann = 1.0 + (std::f64::consts::PI * (time[i] - centre) / half).cos();
             let weight = carrier[i] * hann;
             u += weight * input[i];
-            y += weight * output[i];
+            for (sum, output) in y.iter_mut().zip(&outputs) {
+                *sum += weight * output[i];
+            }
         }
-        result.frequency.push(frequency);
-        result.response.push(y / u);
+        for (result, sum) in results.iter_mut().zip(y) {
+            result.frequency.push(frequency);
+            result.response.push(sum / u);
+        }
     }
-    result
+    results
 }

@@ -14,16 +14,20 @@ pub struct Features {
 }
 
 impl Features {
-    /// Finds the dip and the peak.
+    /// Finds the dip and the peak: the two ends of the largest rise of |H| (in dB) as the frequency
+    /// grows.
     ///
-    /// Both are *local* extrema. The thesis takes the largest |H| in the band (its 6.9), but a damped
-    /// slosh peak is lower than the band's edge at 1.25 Hz, where the hub's inertia alone answers.
-    /// Of the local extrema the most prominent counts, not the ripple of the sweep's start.
+    /// Where the thesis's definition holds, smallest and largest |H| in the band (its 6.9 and
+    /// 6.10), this is the same. It also holds where that one fails: a damped peak is lower than the
+    /// band's edge at 1.25 Hz, where the hub's inertia alone answers, and the ripple behind the peak
+    /// may go deeper than the dip. An end of the band is neither dip nor peak, and a rise of less
+    /// than [`LEAST`] is no slosh.
     pub fn of(response: &FrequencyResponse) -> Self {
         let level = response.decibels();
-        let negative: Vec<f64> = level.iter().map(|v| -v).collect();
-        let peak = most_prominent(&level).map(|i| vertex(response, &level, i));
-        let dip = most_prominent(&negative).map(|i| vertex(response, &level, i));
+        let Some((low, high)) = largest_rise(&level) else { return Features::default() };
+        let inner = |i: usize| i > 0 && i + 1 < level.len();
+        let dip = inner(low).then(|| vertex(response, &level, low));
+        let peak = inner(high).then(|| vertex(response, &level, high));
         Features {
             f_res: peak.map(|(f, _)| f),
             f_dip: dip.map(|(f, _)| f),
@@ -37,22 +41,20 @@ impl Features {
     }
 }
 
-/// The local maximum that stands highest above the saddle to higher ground, or to the end of the
-/// data, whichever saddle is higher.
-fn most_prominent(level: &[f64]) -> Option<usize> {
-    // how far one sinks going from `top` over `path` until the ground is higher than the top
-    let descent = |top: f64, path: &mut dyn Iterator<Item = &f64>| {
-        path.take_while(|v| **v <= top).fold(0.0_f64, |depth, v| depth.max(top - v))
-    };
-    (1..level.len().saturating_sub(1))
-        .filter(|&i| level[i] > level[i - 1] && level[i] >= level[i + 1])
-        .map(|i| {
-            let left = descent(level[i], &mut level[..i].iter().rev());
-            let right = descent(level[i], &mut level[i + 1..].iter());
-            (left.min(right), i)
-        })
-        .max_by(|a, b| a.0.total_cmp(&b.0))
-        .map(|(_, i)| i)
+/// Least rise from dip to peak that counts, dB: a tank damped to ζ = 0.05 still rises by 3.9.
+pub const LEAST: f64 = 1.0;
+
+/// Places of the lowest and the highest value between which a sequence rises most.
+fn largest_rise(level: &[f64]) -> Option<(usize, usize)> {
+    let (mut lowest, mut best, mut rise) = (0, None, LEAST);
+    for (i, &value) in level.iter().enumerate() {
+        if value < level[lowest] {
+            lowest = i;
+        } else if value - level[lowest] > rise {
+            (rise, best) = (value - level[lowest], Some((lowest, i)));
+        }
+    }
+    best
 }
 
 /// Vertex of the parabola through the extremum's three points (dB over log f): frequency in Hz and
@@ -84,6 +86,33 @@ mod tests {
             assert!((features.f_res.unwrap() - f_res).abs() < 2e-5, "{features:?}");
             assert!((features.notch_db.unwrap() - notch).abs() < 0.02, "{features:?}");
         }
+    }
+
+    #[test]
+    fn a_ripple_behind_the_peak_that_goes_deeper_than_the_dip_is_no_dip() {
+        let mut response =
+            Linear::bench_10_cm(0.0029757).frequency_response(&logarithmic_grid(BAND, 2000));
+        let clean = Features::of(&response);
+        for (f, h) in response.frequency.iter().zip(&mut response.response) {
+            // a trough of a beat, 60 mHz behind the peak, 5 dB deeper than the dip
+            *h *= 1.0 - 0.994 * (-((f - 2.52) / 0.004_f64).powi(2)).exp();
+        }
+        let level = response.decibels();
+        let deepest = (0..level.len()).min_by(|&a, &b| level[a].total_cmp(&level[b])).unwrap();
+        assert!(response.frequency[deepest] > clean.f_res.unwrap());
+        assert_eq!(Features::of(&response), clean);
+    }
+
+    #[test]
+    fn a_band_without_rise_or_that_ends_too_early_has_no_features() {
+        let hub = Linear { inertia: 0.4, friction: 0.04, arm: 0.2, modes: vec![] };
+        let grid = logarithmic_grid(BAND, 2000);
+        assert_eq!(Features::of(&hub.frequency_response(&grid)), Features::default());
+        // up to 2.4 Hz there is the dip, but the peak is not reached
+        let early = logarithmic_grid((1.25, 2.4), 2000);
+        let features = Features::of(&Linear::bench_10_cm(0.003).frequency_response(&early));
+        assert!(features.f_dip.is_some() && features.f_res.is_none(), "{features:?}");
+        assert_eq!((features.notch_db, features.delta_f()), (None, None));
     }
 
     #[test]

@@ -1,15 +1,18 @@
 //! From a run's signals to the frequency response of torque to hub rate, and
 //! from that to its features.
 //!
-//! Two estimators, which answer different questions:
+//! Three estimators, which answer different questions:
 //! * [`demodulation`]: what the hub does while the sweep passes a frequency, as
 //!   a lock-in amplifier shows it. It feeds `features.csv`.
 //! * [`spa`]: MATLAB's Blackman–Tukey estimate over the whole record, as the
 //!   thesis used it. It stands beside the first in the report.
+//! * [`welch`]: the H1 estimate from averaged segments, which most tools call
+//!   the transfer function of two records.
 
 pub mod demodulation;
 pub mod features;
 pub mod linear;
+pub mod off_axis;
 pub mod residual;
 pub mod rotary;
 pub mod spa;

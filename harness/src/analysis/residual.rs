@@ -3,7 +3,7 @@
 use super::FrequencyResponse;
 use super::features::Features;
 use super::transfer_function::{TransferFunction, fit_time};
-use super::welch::Spectra;
+use super::welch::{self, Spectra};
 
 /// A transfer function fitted to a run, and what it leaves of the run.
 #[derive(Clone, Copy, Debug)]
@@ -25,28 +25,32 @@ pub struct ModelFit {
 impl ModelFit {
     /// Fits the model to the measured response and drives it with the run's own torque.
     /// Signals are sampled every `step` s; `None` where there is no response to fit or no
-    /// dip and peak to look between.
+    /// dip and peak to look between. Also returns what the model leaves, rad/s.
     pub fn of(
         step: f64,
         torque: &[f64],
         rate: &[f64],
         measured: &FrequencyResponse,
         features: &Features,
-    ) -> Option<Self> {
+    ) -> Option<(Self, Vec<f64>)> {
         let model = TransferFunction::fit(measured)?;
         let mean = rate.iter().sum::<f64>() / rate.len() as f64;
-        let answer = model.simulate(step, torque);
-        let residual: Vec<f64> = rate.iter().zip(&answer).map(|(y, m)| y - mean - m).collect();
+        let forced = model.simulate(step, torque);
+        let missing: Vec<f64> = rate.iter().zip(&forced).map(|(y, m)| y - mean - m).collect();
+        let free = model.free_answer(step, &missing);
+        let residual: Vec<f64> = missing.iter().zip(&free).map(|(e, f)| e - f).collect();
+        let answer: Vec<f64> = forced.iter().zip(&free).map(|(m, f)| mean + m + f).collect();
         let (skewness, kurtosis) = skewness_and_kurtosis(&residual);
-        let spectra = Spectra::of(step, torque, &residual);
-        Some(ModelFit {
+        let spectra = Spectra::of(step, torque, &residual, welch::COHERENCE);
+        let fit = ModelFit {
             model,
             fit_frequency: model.fit_frequency(measured),
             fit_time: fit_time(rate, &answer),
             coherence: spectra.mean_coherence(features.f_dip?, features.f_res?),
             skewness,
             kurtosis,
-        })
+        };
+        Some((fit, residual))
     }
 }
 

@@ -24,6 +24,8 @@ pub struct Rotary {
     pub from: Option<f64>,
     /// Last frequency at which it does, Hz.
     pub to: Option<f64>,
+    /// How long it turns, s.
+    pub time: f64,
     /// Swirl of largest size in the sweep.
     pub swirl: f64,
 }
@@ -38,17 +40,20 @@ pub fn swirl(radial: &FrequencyResponse, tangential: &FrequencyResponse, torque:
 }
 
 impl Rotary {
-    /// From the swirl over the sweep's frequencies (Hz).
-    pub fn of(frequency: &[f64], swirl: &[f64]) -> Self {
-        let turning: Vec<f64> = frequency
-            .iter()
-            .zip(swirl)
-            .filter(|(_, s)| s.abs() > ROTARY)
-            .map(|(f, _)| *f)
-            .collect();
-        let swirl =
-            swirl.iter().fold(0.0, |m: f64, s: &f64| if s.abs() > m.abs() { *s } else { m });
-        Rotary { from: turning.first().copied(), to: turning.last().copied(), swirl }
+    /// From the swirl at the frequencies (Hz) that a sweep passes at these times (s).
+    pub fn of(frequency: &[f64], time: &[f64], swirl: &[f64]) -> Self {
+        let turning: Vec<usize> = (0..swirl.len()).filter(|&i| swirl[i].abs() > ROTARY).collect();
+        // each point stands for the time half-way to its neighbours
+        let share = |i: usize| {
+            let (before, after) = (i.saturating_sub(1), (i + 1).min(time.len() - 1));
+            (time[after] - time[before]).abs() / 2.0
+        };
+        Rotary {
+            from: turning.first().map(|&i| frequency[i]),
+            to: turning.last().map(|&i| frequency[i]),
+            time: turning.iter().fold(0.0, |sum, &i| sum + share(i)),
+            swirl: swirl.iter().fold(0.0, |m: f64, s| if s.abs() > m.abs() { *s } else { m }),
+        }
     }
 }
 
@@ -69,7 +74,8 @@ mod tests {
             response(&[Complex64::new(0.0, -1.0), one * 0.3, Complex64::new(0.0, 1e-4)]);
         let numbers = swirl(&radial, &tangential, 1.0);
         assert_eq!(numbers, [1.0, 0.0, 0.0]);
-        let rotary = Rotary::of(&[1.0, 2.0, 3.0], &numbers);
+        let rotary = Rotary::of(&[1.0, 2.0, 3.0], &[0.0, 10.0, 20.0], &numbers);
         assert_eq!((rotary.from, rotary.to, rotary.swirl), (Some(1.0), Some(1.0), 1.0));
+        assert_eq!(rotary.time, 5.0);
     }
 }

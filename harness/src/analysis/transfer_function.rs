@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::storage::Owned;
-use nalgebra::{DMatrix, DVector, Dyn, Matrix5, OMatrix, SVector, U6, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Dyn, Matrix3, Matrix5, OMatrix, SVector, U6, Vector3, Vector6};
 
 use super::{Complex64, FrequencyResponse};
 
@@ -103,6 +103,35 @@ impl TransferFunction {
         }
         answer.truncate(input.len());
         answer
+    }
+
+    /// What the model does without input, from the initial state that comes closest (least squares)
+    /// to a signal sampled every `step` s.
+    ///
+    /// The measured band says little of the real pole: it may be fitted as slow as a minute or an
+    /// hour. From rest the torque's first half cycle would then leave an offset that the model keeps
+    /// all the time and the hub loses in seconds. MATLAB's `compare` estimates the initial state for
+    /// the same reason.
+    pub fn free_answer(&self, step: f64, signal: &[f64]) -> Vec<f64> {
+        let decay = self.pole_damping * self.pole_omega;
+        let turn = self.pole_omega * (1.0 - self.pole_damping.powi(2)).max(0.0).sqrt();
+        // the pair's second answer is t e^(-decay t) where it is not oscillating; a pair of
+        // real poles is taken as that
+        let answers = |k: usize| {
+            let t = k as f64 * step;
+            let (pair, second) =
+                ((-decay * t).exp(), if turn > 0.0 { (turn * t).sin() } else { t });
+            Vector3::new((-self.real_pole * t).exp(), pair * (turn * t).cos(), pair * second)
+        };
+        let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+        for (k, value) in signal.iter().enumerate() {
+            let row = answers(k);
+            normal += row * row.transpose();
+            right += row * *value;
+        }
+        let Some(inverse) = normal.try_inverse() else { return vec![0.0; signal.len()] };
+        let weights = inverse * right;
+        (0..signal.len()).map(|k| weights.dot(&answers(k))).collect()
     }
 }
 

@@ -1,4 +1,16 @@
-//! Welch's averaged spectra: Hamming windows, half overlapping, means taken off.
+//! Welch's averaged spectra: Hamming windows, half overlapping, means taken off (thesis 6.3.3).
+//!
+//! The thesis does not say how long the segments are, and for a sweep everything hangs on that. A
+//! sweep is at one frequency only for a moment. If just one segment sees it pass there, nothing is
+//! averaged, and the coherence is 1 whatever the two signals are. The sweep stays within a segment's
+//! resolution 1/L for 1/(L · rate); half-overlapping segments follow each other by L/2: so
+//! 2/(rate · L²) of them see each frequency.
+//!
+//! * [`COHERENCE`], 20 s: six segments at the thesis's 1/1200 Hz/s. Coherence then asks whether the
+//!   ratio of the two signals stays the same while the sweep passes 50 mHz.
+//! * [`RESPONSE`], a ninth of twice the record (MATLAB's choice when it is not told): 600 s of the
+//!   thesis's sweep, which resolves the dip. For the H1 estimate, which needs no average there, and
+//!   for the signal-to-noise ratio: one segment has the sweep, the others the noise alone.
 
 use realfft::RealFftPlanner;
 
@@ -7,6 +19,25 @@ use super::{Complex64, FrequencyResponse};
 /// Segments of a record, as MATLAB's `mscohere`, `cpsd` and `tfestimate` take them when
 /// they are not told otherwise.
 pub const SEGMENTS: usize = 8;
+
+/// How long segments are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Segments {
+    /// So many seconds, but short enough for [`SEGMENTS`] of them.
+    Seconds(f64),
+    /// As long as [`SEGMENTS`] of them can be.
+    Longest,
+}
+
+/// Segments for coherence, 20 s.
+pub const COHERENCE: Segments = Segments::Seconds(20.0);
+
+/// Segments for the H1 estimate and the signal-to-noise ratio.
+pub const RESPONSE: Segments = Segments::Longest;
+
+/// Zeros are put behind each segment up to this many times its length, so that a band as narrow as
+/// that from dip to peak still holds several bins.
+const PADDING: usize = 4;
 
 /// Averaged auto- and cross-spectra of two signals, in arbitrary but common units.
 pub struct Spectra {
@@ -22,19 +53,24 @@ pub struct Spectra {
 
 impl Spectra {
     /// Of two equally long signals sampled every `step` s.
-    pub fn of(step: f64, input: &[f64], output: &[f64]) -> Self {
+    pub fn of(step: f64, input: &[f64], output: &[f64], segments: Segments) -> Self {
         // Half overlap: SEGMENTS segments of length L cover (SEGMENTS + 1) L/2.
-        let length = (2 * input.len() / (SEGMENTS + 1)).max(2);
-        let fft = RealFftPlanner::<f64>::new().plan_fft_forward(length);
+        let longest = (2 * input.len() / (SEGMENTS + 1)).max(2);
+        let length = match segments {
+            Segments::Seconds(seconds) => ((seconds / step).round() as usize).clamp(2, longest),
+            Segments::Longest => longest,
+        };
+        let padded = PADDING * length;
+        let fft = RealFftPlanner::<f64>::new().plan_fft_forward(padded);
         let window: Vec<f64> = (0..length)
             .map(|i| {
                 let turn = std::f64::consts::TAU * i as f64 / (length - 1) as f64;
                 0.54 - 0.46 * turn.cos()
             })
             .collect();
-        let bins = length / 2 + 1;
+        let bins = padded / 2 + 1;
         let mut all = Spectra {
-            resolution: 1.0 / (step * length as f64),
+            resolution: 1.0 / (step * padded as f64),
             input: vec![0.0; bins],
             output: vec![0.0; bins],
             cross: vec![Complex64::default(); bins],
@@ -43,6 +79,7 @@ impl Spectra {
         let spectrum = |signal: &[f64], mean: f64| {
             let mut windowed: Vec<f64> =
                 signal.iter().zip(&window).map(|(x, w)| (x - mean) * w).collect();
+            windowed.resize(padded, 0.0);
             let mut spectrum = fft.make_output_vec();
             fft.process(&mut windowed, &mut spectrum).expect("lengths are the plan's");
             spectrum
@@ -79,13 +116,20 @@ impl Spectra {
         band.iter().sum::<f64>() / band.len() as f64
     }
 
-    /// Signal-to-noise ratio at a frequency from the coherence γ²: 10 log10(γ²/(1 − γ²)), dB
-    /// (thesis 6.19).
-    pub fn snr_db(&self, frequency: f64) -> f64 {
-        let bin = ((frequency / self.resolution).round() as usize).min(self.cross.len() - 1);
-        let power = self.input[bin] * self.output[bin];
-        let coherence = self.cross[bin].norm_sqr() / power;
-        10.0 * (coherence / (1.0 - coherence)).log10()
+    /// Signal-to-noise ratio from the coherence γ²: 10 log10(γ²/(1 − γ²)), dB, per bin (thesis 6.19).
+    pub fn snr_db(&self) -> Vec<f64> {
+        self.coherence().into_iter().map(|c| 10.0 * (c / (1.0 - c)).log10()).collect()
+    }
+
+    /// What a value per bin is in the bin nearest to a frequency, Hz.
+    pub fn at(&self, values: &[f64], frequency: f64) -> f64 {
+        values[((frequency / self.resolution).round() as usize).min(values.len() - 1)]
+    }
+
+    /// Frequencies (Hz) and values of the bins within a band, Hz.
+    pub fn within(&self, (from, to): (f64, f64), values: &[f64]) -> Vec<(f64, f64)> {
+        let bins = values.iter().enumerate().map(|(k, v)| (k as f64 * self.resolution, *v));
+        bins.filter(|(f, _)| (from..=to).contains(f)).collect()
     }
 
     /// The H1 estimate S_uy / S_uu within a band, Hz.
@@ -120,12 +164,12 @@ mod tests {
     fn coherence_is_one_through_a_gain_and_one_eighth_between_strangers() {
         let (u, v) = (noise(1, 90_000), noise(77, 90_000));
         let gained: Vec<f64> = u.iter().map(|x| -3.0 * x).collect();
-        let through = Spectra::of(0.02, &u, &gained);
+        let through = Spectra::of(0.02, &u, &gained, RESPONSE);
         assert!((through.mean_coherence(1.0, 20.0) - 1.0).abs() < 1e-12);
         assert!((through.h1((5.0, 5.1)).response[0].re + 3.0).abs() < 1e-9);
         // K averages of unrelated spectra have the mean coherence 1/K; half-overlapping
         // Hamming segments count as some 7 of 8.
-        let strangers = Spectra::of(0.02, &u, &v).mean_coherence(1.0, 20.0);
+        let strangers = Spectra::of(0.02, &u, &v, RESPONSE).mean_coherence(1.0, 20.0);
         assert!((0.11..0.17).contains(&strangers), "{strangers}");
     }
 
@@ -133,10 +177,26 @@ mod tests {
     fn snr_is_the_ratio_of_the_powers() {
         let (u, v) = (noise(5, 900_000), noise(9, 900_000));
         let mixed: Vec<f64> = u.iter().zip(&v).map(|(u, v)| u + v / 10.0).collect();
-        let spectra = Spectra::of(0.02, &u, &mixed);
-        let bins = (1..200).map(|k| spectra.snr_db(k as f64 * 0.1));
+        let spectra = Spectra::of(0.02, &u, &mixed, RESPONSE);
+        let snr = spectra.snr_db();
+        let bins = (1..200).map(|k| spectra.at(&snr, k as f64 * 0.1));
         let mean = bins.sum::<f64>() / 199.0;
         // 20 dB; the mean of a logarithm of few averages lies some 0.7 dB off.
         assert!((mean - 20.0).abs() < 1.5, "{mean}");
+    }
+
+    #[test]
+    fn a_sweep_and_a_stranger_are_coherent_only_if_too_few_segments_see_each_frequency() {
+        // 1 to 2 Hz at the thesis's rate: six segments of 20 s see each frequency, or one of 267 s
+        let sine = |turns: fn(f64) -> f64| -> Vec<f64> {
+            let time = (0..60_000).map(|k| k as f64 * 0.02);
+            time.map(|t| (std::f64::consts::TAU * turns(t)).sin()).collect()
+        };
+        let sweep = sine(|t| t + t * t / 2400.0);
+        // its phase goes on by half a turn every 10 s against the sweep's: nothing in common
+        let other = sine(|t| 1.05 * t + t * t / 2400.0);
+        let mean = |segments| Spectra::of(0.02, &sweep, &other, segments).mean_coherence(1.2, 1.8);
+        let (short, long) = (mean(COHERENCE), mean(RESPONSE));
+        assert!(short < 0.01 && long > 0.5, "{short}, {long}");
     }
 }
