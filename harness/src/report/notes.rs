@@ -1,0 +1,148 @@
+//! The text at the end: how the figures are found, all of them, and what was run.
+
+use super::*;
+
+pub(super) fn estimators(groups: &[Group]) -> String {
+    let mut out = format!(
+        "<h2>How the figures are found</h2>\n\
+         <p><b>Demodulation</b> (solid, in <code>features.csv</code>). Torque and rate are multiplied by e<sup>−jφ(t)</sup>, φ being the sweep's own known phase, and averaged over a Hann window of {cycles} cycles that slides with the sweep. Their ratio is the response the moment the sweep passes that frequency: what a lock-in amplifier would show. Both signals see the same window, so its effect on amplitude and phase cancels; harmonics that the bearing makes average out.</p>\n\
+         <p><b><code>spa</code></b> (broken). MATLAB's Blackman–Tukey estimate, which the thesis used: covariances of the whole record up to a lag of {lag} s, Hann lag window, Fourier transform, ratio of cross spectrum to input spectrum. It resolves about {resolution:.0} mHz, which fills a narrow dip a little.</p>\n\
+         <p><b>Welch, H1.</b> Eight half-overlapping Hamming segments, averaged cross spectrum over averaged input spectrum: what most tools call the transfer function of two records.</p>\n\
+         <p><b>Features.</b> f<sub>dip</sub> and f<sub>res</sub> are the two ends of the largest rise of |H| as the frequency grows, within the sweep's band, refined by a parabola through three points of log |H|; Δf is their distance, the notch depth their difference in dB. For a bench with little damping they are the smallest and the largest |H| in the band, as in the thesis; with strong damping the largest |H| is the band's lower edge, not the slosh peak, and the ripple behind the peak may go deeper than the dip.</p>\n\
+         <p><b>Fit.</b> Three poles, two zeros, least squares on the complex <code>spa</code> response. In time it is driven with the run's torque from the initial state that fits best, as MATLAB's <code>compare</code> does: the band says little of a slow real pole, and from rest such a pole would keep the offset of the first half cycle for the whole run.</p>\n\
+         <p><b>Energy residual.</b> Largest |E(t) − E(0) − work + heat| of a run over the energy turned over, Σ|Δwork| + heat. It is the FMU's own book-keeping, checked at every sample.</p>\n\
+         <h2>Why the swept peak stands higher than the exact one</h2>\n\
+         <p>The sweep is not slow enough for the liquid. Bare-wall damping makes the peak so narrow that the sweep crosses its half-power width in less time than the slosh needs to decay: the oscillation is still growing when its best frequency has gone by, so an upward sweep sees the largest rate later, at a higher frequency, and a little lower than it would be in a dwell. The ripple behind the peak is the beat between that ringing and the torque that has moved on. A bench that sweeps at this rate and reads the envelope sees the same shift; it belongs to the experiment, not to the plant.</p>\n",
+        cycles = demodulation::CYCLES,
+        lag = spa::LAG,
+        resolution = 1e3 / spa::LAG,
+    );
+    out.push_str("<div class=\"wide\"><table><thead><tr><th>runs</th><th>exact<br>peak</th><th>half-power<br>width 2ζf</th><th>sweep rate<br>there</th><th>time to<br>cross</th><th>slosh decays<br>in 1/(2πζf)</th><th>largest torque,<br>swept peak</th><th>its<br>shift</th><th>largest torque,<br><code>spa</code> peak</th><th>its<br>shift</th></tr></thead><tbody>\n");
+    for group in groups {
+        let (Some(mode), Some(exact), Some(run), Some(sweep)) =
+            (group.runs[0].linear.modes.first(), group.exact.f_res, group.runs.last(), group.sweep)
+        else {
+            continue;
+        };
+        let width = 2.0 * mode.damping * mode.frequency;
+        let rate = sweep.rate_at(exact).abs();
+        let shift =
+            |f: Option<f64>| f.map_or(String::new(), |f| format!("{:+.1} mHz", (f - exact) * 1e3));
+        let _ = writeln!(
+            out,
+            "<tr><td>{}</td><td>{exact:.4} Hz</td><td>{:.1} mHz</td><td>{:.2} mHz/s</td><td>{:.1} s</td><td>{:.1} s</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+            escape(&group.title()),
+            width * 1e3,
+            rate * 1e3,
+            width / rate,
+            1.0 / (TAU * mode.damping * mode.frequency),
+            hertz(run.demodulated_features.f_res),
+            shift(run.demodulated_features.f_res),
+            hertz(run.spa_features.f_res),
+            shift(run.spa_features.f_res),
+        );
+    }
+    out.push_str("</tbody></table></div>\n<p>The second estimator is the proof. For a linear plant the ratio of whole-record spectra is the frequency response however fast the input swept, because the ringing after the peak is in the record too; and there the shift is gone. The dip hardly moves in either: there the hub stands nearly still, so there is little that could ring; only at the smallest torques, where the bearing sticks near the dip, does the sweep see it a few mHz late. When runs of a nonlinear model are compared, both views count: demodulation says what happened at that moment, <code>spa</code> gives the best linear summary of the whole.</p>\n");
+    out
+}
+
+pub(super) fn table(plan: &Plan, results: &Results) -> String {
+    let varied = plan.varied();
+    let others: Vec<(usize, &str)> = varied
+        .into_iter()
+        .enumerate()
+        .filter(|(_, name)| !["slosh.model", "tank.h", "profile.amplitude"].contains(name))
+        .collect();
+    let heads: String =
+        others.iter().map(|(_, name)| format!("<th>{}</th>", escape(name))).collect();
+    let mut out = format!(
+        "<h2>All figures</h2>\n<div class=\"wide\"><table><thead>\n\
+         <tr><th colspan=\"{}\">Run</th><th colspan=\"4\">While the sweep passes</th><th colspan=\"4\">Whole record (<code>spa</code>)</th><th colspan=\"4\">The run itself</th></tr>\n\
+         <tr><th>model</th><th>fill<br>cm</th><th>torque<br>mN·m</th>{heads}<th>f<sub>dip</sub><br>Hz</th><th>f<sub>res</sub><br>Hz</th><th>Δf<br>mHz</th><th>notch<br>dB</th><th>f<sub>dip</sub><br>Hz</th><th>f<sub>res</sub><br>Hz</th><th>Δf<br>mHz</th><th>notch<br>dB</th><th>peak slosh<br>angle, deg</th><th>peak wave<br>mm</th><th>stuck<br>s</th><th>energy<br>residual</th></tr>\n</thead><tbody>\n",
+        3 + others.len()
+    );
+    for run in &results.outcomes {
+        let _ = write!(
+            out,
+            "<tr><td>{}</td><td>{}</td><td>{}</td>",
+            escape(&run.case.model),
+            cm(run.case.fill),
+            run.case.amplitude.map_or(String::new(), |a| thousandths(a).to_string())
+        );
+        for (place, _) in &others {
+            let _ = write!(out, "<td>{}</td>", escape(&shortened(&run.case.varied[*place])));
+        }
+        for (features, response) in
+            [(&run.demodulated_features, &run.demodulated), (&run.spa_features, &run.spa)]
+        {
+            let cell = |value: Option<f64>, digits: usize| match value {
+                Some(value) => format!("<td>{value:.digits$}</td>"),
+                None if response.frequency.is_empty() => "<td></td>".into(),
+                None => "<td>none</td>".into(),
+            };
+            out.push_str(&cell(features.f_dip, 4));
+            out.push_str(&cell(features.f_res, 4));
+            out.push_str(&cell(features.delta_f().map(|f| f * 1e3), 1));
+            out.push_str(&cell(features.notch_db, 2));
+        }
+        let figures = &run.figures;
+        let _ = writeln!(
+            out,
+            "<td>{:.1}</td><td>{:.1}</td><td>{:.3}</td><td>{:.1e}</td></tr>",
+            figures.peak_slosh_angle.to_degrees(),
+            figures.peak_wave_height * 1e3,
+            figures.stuck,
+            figures.max_energy_residual
+        );
+    }
+    out.push_str("</tbody></table></div>\n");
+    out
+}
+
+/// A drawn number to six digits; any other text as it is.
+fn shortened(text: &str) -> String {
+    match text.parse::<f64>() {
+        Ok(value) if text.len() > 8 => format!("{value:.5e}"),
+        _ => text.to_string(),
+    }
+}
+
+pub(super) fn provenance(campaign: &Campaign, fmu: &Fmu, results: &Results) -> String {
+    let description = fmu.description();
+    let (plan, first) = (&campaign.plan, results.outcomes.first().map(|run| &run.case));
+    let settings: Vec<_> = plan.set().iter().map(|(k, v)| format!("{k} = {v}")).collect();
+    let tolerance =
+        match (first.and_then(|c| c.tolerance), description.default_experiment.tolerance) {
+            (Some(t), _) => t.to_string(),
+            (None, Some(t)) => format!("the FMU's own ({t})"),
+            (None, None) => "the FMU's own".into(),
+        };
+    let torque = first.map_or(String::new(), |case| {
+        let what = if case.hold { "value" } else { "value and slope" };
+        format!("{}; {what} handed over every {} s", torques(results), case.step)
+    });
+    let rows = [
+        ("FMU", format!("{}, version {}", description.model_name, description.version)),
+        ("made by", description.generation_tool.clone()),
+        ("GUID", description.guid.clone()),
+        ("SHA-256", fmu.hash().to_string()),
+        ("varied", plan.varied().join(", ")),
+        (
+            "parameters",
+            if settings.is_empty() { "the FMU's start values".into() } else { settings.join(", ") },
+        ),
+        ("torque", torque),
+        ("tolerance", tolerance),
+        ("driven by", format!("hubslosh {}", env!("CARGO_PKG_VERSION"))),
+    ];
+    let mut out = String::from("<h2>What was run</h2>\n<dl>");
+    for (name, value) in rows.iter().filter(|(_, value)| !value.is_empty()) {
+        let _ = write!(out, "<dt>{name}</dt><dd><code>{}</code></dd>", escape(value));
+    }
+    let _ = write!(
+        out,
+        "</dl>\n<p>Each run lies in <code>runs/</code> as Parquet with its particulars in its metadata. <code>features.csv</code> holds the figures of the table above, <code>features_spa.csv</code> and <code>features_h1.csv</code> those of the other estimators in the same columns, <code>runs.csv</code> all of them with everything that was varied, <code>plan.toml</code> the plan. This makes everything here again:</p>\n<p><code>{}</code></p>\n",
+        escape(&campaign.command(fmu))
+    );
+    out
+}
