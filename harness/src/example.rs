@@ -63,13 +63,13 @@ pub fn replay(fmu: &Fmu, input: &Path, tolerance: Option<f64>, hold: bool) -> Re
     run.drive(&mut instance, &columns, |_| {})
 }
 
-/// A sine near the sloshing frequency that swells and fades, then nothing: the hub slips, reverses,
-/// comes to rest, and the sloshing liquid pulls at it.
+/// A sine below the sloshing frequency that swells and fades, then nothing: the hub slips, reverses
+/// and comes to rest, while the liquid still pulls at it.
 fn torque() -> Table {
     let rows = (STOP / STEP).round() as usize;
     let time: Vec<f64> = (0..=rows).map(|row| round(row as f64 * STEP, 6)).collect();
     let swell = |t: f64| (t / 2.0).min((10.0 - t) / 2.0).clamp(0.0, 1.0);
-    let tau = time.iter().map(|&t| round(0.05 * swell(t) * (TAU * 2.3 * t).sin(), 6)).collect();
+    let tau = time.iter().map(|&t| round(0.1 * swell(t) * (TAU * 2.0 * t).sin(), 6)).collect();
     Table::new(vec!["time".into(), "tau_cmd".into()], vec![time, tau])
 }
 
