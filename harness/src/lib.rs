@@ -12,6 +12,7 @@ pub mod description;
 pub mod documentation;
 pub mod example;
 pub mod fmi2;
+pub mod gyro;
 pub mod html;
 pub mod noise;
 pub mod output;

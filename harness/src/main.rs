@@ -10,6 +10,7 @@ use hubslosh::campaign::Campaign;
 use hubslosh::check::command::{CheckArgs, CheckCallsArgs};
 use hubslosh::example;
 use hubslosh::fmi2::Fmu;
+use hubslosh::gyro::Recording;
 use hubslosh::pack;
 use hubslosh::plan::{self, Plan};
 use hubslosh::profile::{self, Torque, Written};
@@ -42,6 +43,7 @@ enum Command {
     #[command(hide = true)]
     CheckCalls(CheckCallsArgs),
     Scale(ScaleArgs),
+    Gyro(GyroArgs),
     /// Writes the example that travels with the FMU (modelDescription/extra): torque and answer.
     Example {
         /// The FMU that answers.
@@ -277,9 +279,33 @@ enum Scale {
     },
 }
 
+/// Records the gyro for hours at rest and compares the noise that its Allan deviation shows with
+/// the noise put in. Leaves allan.csv and allan.svg.
+#[derive(Args)]
+#[command(after_help = "Examples:\n  hubslosh gyro\n  \
+    hubslosh gyro --set imu.arw=1e-4 --set imu.bias_time=300 --hours 12 --out dist/other_gyro")]
+struct GyroArgs {
+    /// Length of each record, h.
+    #[arg(long, value_name = "HOURS", default_value_t = 6.0)]
+    hours: f64,
+    /// Number of records; their imu.seed counts from 1.
+    #[arg(long, value_name = "NUMBER", default_value_t = 8)]
+    records: usize,
+    /// Sets a parameter by its FMU name.
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
+    settings: Vec<(String, String)>,
+    /// The FMU.
+    #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
+    fmu: PathBuf,
+    /// Directory for allan.csv and allan.svg.
+    #[arg(long, value_name = "DIRECTORY", default_value = DEFAULT_GYRO)]
+    out: PathBuf,
+}
+
 const DEFAULT_FMU: &str = "dist/HubSlosh.fmu";
 const DEFAULT_RELEASE: &str = "dist/release";
 const DEFAULT_CAMPAIGN: &str = "dist/campaign";
+const DEFAULT_GYRO: &str = "dist/gyro";
 
 fn run_help() -> String {
     format!(
@@ -330,6 +356,7 @@ fn main() -> ExitCode {
         Some(Command::Torque(args)) => torque(&args),
         Some(Command::Campaign(args)) => campaign_of(&args),
         Some(Command::Scale(args)) => scale(args.what),
+        Some(Command::Gyro(args)) => gyro(args),
         Some(Command::Example { fmu }) => example(&fmu),
         Some(Command::Release { out }) => release(&out),
         Some(Command::Check(args)) => args.run(),
@@ -376,6 +403,15 @@ fn scale(what: Scale) -> Result<()> {
         }
     };
     print!("{text}");
+    Ok(())
+}
+
+fn gyro(args: GyroArgs) -> Result<()> {
+    let recording = Recording { settings: args.settings, hours: args.hours, records: args.records };
+    let found = recording.characterise(&Fmu::open(&args.fmu)?)?;
+    found.write(&args.out)?;
+    print!("{}", found.text());
+    println!("{}\n{}", args.out.join("allan.csv").display(), args.out.join("allan.svg").display());
     Ok(())
 }
 

@@ -9,6 +9,7 @@
 //! * [`welch`]: the H1 estimate from averaged segments, which most tools call
 //!   the transfer function of two records.
 
+pub mod allan;
 pub mod demodulation;
 pub mod features;
 pub mod linear;
