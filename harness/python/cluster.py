@@ -280,7 +280,9 @@ def cluster(workers: int, scheduler: str | None) -> Iterator[Client]:
     with (
         tempfile.TemporaryDirectory() as directory,
         dask.config.set({"temporary-directory": directory}),
-        LocalCluster(workers, threads_per_worker=1, dashboard_address=None) as local,
+        LocalCluster(
+            n_workers=workers, threads_per_worker=1, dashboard_address="localhost:0"
+        ) as local,
         Client(local) as client,
     ):
         yield client
