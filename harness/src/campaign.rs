@@ -597,7 +597,7 @@ impl Outcome {
         if let Some(fit) = &self.fit {
             put("fit_freq_pct", fit.fit_frequency.to_string());
             put("fit_time_pct", fit.fit_time.to_string());
-            put("coherence", fit.coherence.to_string());
+            put("coherence", number(fit.coherence));
             put("skewness", fit.skewness.to_string());
             put("kurtosis", fit.kurtosis.to_string());
             put("zero_hz", fit.model.zero_frequency().to_string());

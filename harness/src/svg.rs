@@ -144,8 +144,11 @@ impl Chart {
             let _ = write!(
                 out,
                 "<path class=\"grid\" d=\"M{at:.1} {top}V{bottom}\"/>\
-                 <text class=\"tick\" x=\"{at:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>",
+                 <text class=\"tick\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"{}\">{}</text>",
+                // a number at the right end would be cut off at the drawing's edge
+                if at > right - 6.0 { width } else { at },
                 bottom + 15.0,
+                if at > right - 6.0 { "end" } else { "middle" },
                 number(tick, &self.x)
             );
         }

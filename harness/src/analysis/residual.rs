@@ -14,8 +14,8 @@ pub struct ModelFit {
     pub fit_frequency: f64,
     /// Fit in the time domain, %.
     pub fit_time: f64,
-    /// Mean coherence of residual and torque between dip and peak.
-    pub coherence: f64,
+    /// Mean coherence of residual and torque between dip and peak, if there are such.
+    pub coherence: Option<f64>,
     /// Skewness of the residual.
     pub skewness: f64,
     /// Kurtosis of the residual; a Gaussian has 3.
@@ -24,8 +24,8 @@ pub struct ModelFit {
 
 impl ModelFit {
     /// Fits the model to the measured response and drives it with the run's own torque.
-    /// Signals are sampled every `step` s; `None` where there is no response to fit or no
-    /// dip and peak to look between. Also returns what the model leaves, rad/s.
+    /// Signals are sampled every `step` s; `None` where there is no response to fit. Also returns
+    /// what the model leaves, rad/s.
     pub fn of(
         step: f64,
         torque: &[f64],
@@ -46,7 +46,10 @@ impl ModelFit {
             model,
             fit_frequency: model.fit_frequency(measured),
             fit_time: fit_time(rate, &answer),
-            coherence: spectra.mean_coherence(features.f_dip?, features.f_res?),
+            coherence: features
+                .f_dip
+                .zip(features.f_res)
+                .map(|(dip, peak)| spectra.mean_coherence(dip, peak)),
             skewness,
             kurtosis,
         };

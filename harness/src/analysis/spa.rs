@@ -37,37 +37,74 @@ pub fn frequency_response(
         forward.process(&mut padded, &mut spectrum).expect("lengths are the plan's");
         spectrum
     };
-    // circular covariance -> Hann lag window -> spectrum again
-    let smoothed = |mut cross: Vec<Complex64>| {
+    // covariances at +k and -k steps under the Hann lag window; nothing at -0, which is +0
+    let tapered = |mut cross: Vec<Complex64>| -> Vec<(f64, f64)> {
         for end in [0, cross.len() - 1] {
             cross[end].im = 0.0; // real by symmetry; the inverse insists on it exactly
         }
         let mut covariance = backward.make_output_vec();
         backward.process(&mut cross, &mut covariance).expect("lengths are the plan's");
-        for (i, value) in covariance.iter_mut().enumerate() {
-            let tau = i.min(length - i);
-            *value *= if tau <= lags {
-                (1.0 + (std::f64::consts::PI * tau as f64 / lags as f64).cos()) / 2.0
-            } else {
-                0.0
-            };
-        }
-        let mut spectrum = forward.make_output_vec();
-        forward.process(&mut covariance, &mut spectrum).expect("lengths are the plan's");
-        spectrum
+        let weight = |k: usize| (1.0 + (std::f64::consts::PI * k as f64 / lags as f64).cos()) / 2.0;
+        let pair = |k: usize| match k {
+            0 => (covariance[0], 0.0),
+            _ => (weight(k) * covariance[k], weight(k) * covariance[length - k]),
+        };
+        (0..=lags).map(pair).collect()
     };
     let (u, y) = (spectrum(input), spectrum(output));
-    let yu = smoothed(y.iter().zip(&u).map(|(y, u)| y * u.conj()).collect());
-    let uu = smoothed(u.iter().map(|u| (u * u.conj()).re.into()).collect());
+    let yu = tapered(y.iter().zip(&u).map(|(y, u)| y * u.conj()).collect());
+    let uu = tapered(u.iter().map(|u| (u * u.conj()).re.into()).collect());
 
-    // the lag window makes both spectra smooth over 1/lag, many bins: a line between bins will do
-    let at = |spectrum: &[Complex64], frequency: f64| {
-        let bin = (frequency * step * length as f64).clamp(0.0, (spectrum.len() - 2) as f64);
-        let (low, part) = (bin as usize, bin.fract());
-        spectrum[low] * (1.0 - part) + spectrum[low + 1] * part
+    // summed at the very frequencies: a line between a transform's bins misses deep dips
+    let response = |&frequency: &f64| {
+        let turn = Complex64::cis(-std::f64::consts::TAU * frequency * step);
+        let mut phase = Complex64::new(1.0, 0.0);
+        let (mut cross, mut auto) = (Complex64::default(), 0.0);
+        for ((ahead, behind), (either, other)) in yu.iter().zip(&uu) {
+            cross += Complex64::new(phase.re * (ahead + behind), phase.im * (ahead - behind));
+            auto += phase.re * (either + other);
+            phase *= turn;
+        }
+        cross / auto
     };
     FrequencyResponse {
         frequency: frequencies.to_vec(),
-        response: frequencies.iter().map(|&f| at(&yu, f) / at(&uu, f)).collect(),
+        response: frequencies.iter().map(response).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_is_the_sum_of_its_definition() {
+        // noise through a short filter; 40 samples, lags up to 9 of them, summed as it is written
+        let step = 0.1;
+        let u: Vec<f64> = (0..40u32).map(|k| f64::from(k * k * 7919 % 101) / 50.0 - 1.0).collect();
+        let y: Vec<f64> =
+            (0..40).map(|k| u[k] - if k > 1 { 0.7 * u[k - 2] } else { 0.0 }).collect();
+        let frequencies = [0.3, 1.7, 4.1];
+        let found = frequency_response(step, &u, &y, &frequencies, 0.9);
+        let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
+        let (mu, my) = (mean(&u), mean(&y));
+        for (f, h) in frequencies.iter().zip(&found.response) {
+            let sum = |x: &[f64], mx: f64| {
+                let mut sum = Complex64::default();
+                for lag in -9i32..=9 {
+                    let inside = |t: i32| (0..40).contains(&(t + lag)).then_some(t);
+                    let covariance: f64 = (0..40)
+                        .filter_map(inside)
+                        .map(|t| (x[(t + lag) as usize] - mx) * (u[t as usize] - mu))
+                        .sum();
+                    let weight = (1.0 + (std::f64::consts::PI * f64::from(lag) / 9.0).cos()) / 2.0;
+                    let angle = -std::f64::consts::TAU * f * step * f64::from(lag);
+                    sum += covariance * weight * Complex64::cis(angle);
+                }
+                sum
+            };
+            let expected = sum(&y, my) / sum(&u, mu);
+            assert!((h - expected).norm() < 1e-12 * expected.norm(), "{h} {expected}");
+        }
     }
 }

@@ -156,7 +156,7 @@ pub(super) fn linear_fit(groups: &[Group]) -> String {
         [
             panel("Fit, frequency domain", "fit / %", |run| Some(run.fit?.fit_frequency)),
             panel("Fit, time domain", "fit / %", |run| Some(run.fit?.fit_time)),
-            panel("Coherence of the rest", "mean coherence", |run| Some(run.fit?.coherence)),
+            panel("Coherence of the rest", "mean coherence", |run| run.fit?.coherence),
             panel("Signal over noise, dip", "SNR / dB", |run| Some(run.snr_db?[1])),
         ],
     ));

@@ -5,23 +5,30 @@ use super::*;
 /// Dip and peak in all draws of a group.
 struct Figure {
     title: &'static str,
+    label: &'static str,
     unit: &'static str,
     of: fn(&Outcome) -> Option<f64>,
 }
 
 const FIGURES: [Figure; 4] = [
-    Figure { title: "Dip", unit: "f_dip / Hz", of: |run| run.features().f_dip },
-    Figure { title: "Peak", unit: "f_res / Hz", of: |run| run.features().f_res },
+    Figure { title: "Dip", label: "f_dip / Hz", unit: "Hz", of: |run| run.features().f_dip },
+    Figure { title: "Peak", label: "f_res / Hz", unit: "Hz", of: |run| run.features().f_res },
     Figure {
         title: "Distance",
-        unit: "Δf / mHz",
+        label: "Δf / mHz",
+        unit: "mHz",
         of: |run| run.features().delta_f().map(|f| f * 1e3),
     },
-    Figure { title: "Notch depth", unit: "notch / dB", of: |run| run.features().notch_db },
+    Figure {
+        title: "Notch depth",
+        label: "notch / dB",
+        unit: "dB",
+        of: |run| run.features().notch_db,
+    },
 ];
 
 /// Histograms of the features, and dip and peak over every drawn parameter.
-pub(super) fn draws(plan: &Plan, groups: &[Group]) -> String {
+pub(super) fn draws(plan: &Plan, fmu: &Fmu, groups: &[Group]) -> String {
     let grouping = plan.grouping();
     let drawn: Vec<(usize, &str)> = plan
         .varied()
@@ -42,7 +49,10 @@ pub(super) fn draws(plan: &Plan, groups: &[Group]) -> String {
             }
         }
         for (place, name) in &drawn {
-            out.push_str(&scatter(group, *place, name).svg());
+            let unit =
+                fmu.description().variable(name).ok().and_then(|v| v.attributes().unit.clone());
+            let label = unit.map_or(name.to_string(), |unit| format!("{name} / {unit}"));
+            out.push_str(&scatter(group, *place, name, &label).svg());
         }
         out.push_str("</div>\n");
     }
@@ -66,7 +76,7 @@ fn correlation(points: &[(f64, f64)]) -> f64 {
 }
 
 fn histogram(figure: &Figure, values: &[f64]) -> Chart {
-    let x = Axis::linear(figure.unit, values.iter().copied(), 1e-6, 4);
+    let x = Axis::linear(figure.label, values.iter().copied(), 1e-6, 4);
     let bins = 24;
     let width = (x.to - x.from) / bins as f64;
     let mut counts = vec![0.0; bins];
@@ -82,7 +92,7 @@ fn histogram(figure: &Figure, values: &[f64]) -> Chart {
     let (mean, deviation) = moments(values);
     let digits = if mean > 20.0 { 1 } else { 4 };
     Chart {
-        title: format!("{}: {mean:.digits$} ± {deviation:.digits$}", figure.title),
+        title: format!("{}: {mean:.digits$} ± {deviation:.digits$} {}", figure.title, figure.unit),
         size: (330.0, 260.0),
         x,
         y: Axis::linear("draws", counts.iter().copied().chain([0.0]), 1.0, 5),
@@ -96,7 +106,7 @@ fn histogram(figure: &Figure, values: &[f64]) -> Chart {
     }
 }
 
-fn scatter(group: &Group, place: usize, name: &str) -> Chart {
+fn scatter(group: &Group, place: usize, name: &str, label: &str) -> Chart {
     let figures = [(&FIGURES[0], "var(--e0)"), (&FIGURES[1], "var(--e1)")];
     let mut correlations = Vec::new();
     let mut series = Vec::new();
@@ -123,7 +133,7 @@ fn scatter(group: &Group, place: usize, name: &str) -> Chart {
     Chart {
         title: format!("{name}: ρ = {:.2}, {:.2}", correlations[0], correlations[1]),
         size: (330.0, 260.0),
-        x: Axis::linear(name, all(|p| p.0), 1e-9, 4),
+        x: Axis::linear(label, all(|p| p.0), 1e-9, 4),
         y: Axis::linear("from the mean / mHz", all(|p| p.1), 1.0, 5),
         series,
         legend: false,

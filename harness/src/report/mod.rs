@@ -166,7 +166,7 @@ fn page(campaign: &Campaign, fmu: &Fmu, results: &Results) -> String {
         page.push_str(&paths::paths(&groups));
     }
     if plan.is_random() && groups.iter().any(|group| group.sweep.is_some()) {
-        page.push_str(&draws::draws(plan, &groups));
+        page.push_str(&draws::draws(plan, fmu, &groups));
     }
     if swept {
         page.push_str(&notes::estimators(&groups));

@@ -80,7 +80,7 @@ fn fit_time(run: &Outcome) -> Option<f64> {
 }
 
 fn coherence(run: &Outcome) -> Option<f64> {
-    Some(run.fit?.coherence)
+    run.fit?.coherence
 }
 
 fn notch(run: &Outcome) -> Option<f64> {
