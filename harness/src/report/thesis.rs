@@ -281,7 +281,7 @@ const STATEMENTS: &[Statement] = &[
         section: "7.1.3, fig. 7.10",
         who: Who::Synthetic,
         says: "The synthetic coherence starts high and falls to a plateau of 0.25 to 0.35.",
-        rule: "at 0.0125 N·m more than 0.2 above the mean from 0.125 N·m up, which lies there to 0.05",
+        rule: "at 0.0125 N·m more than 0.2 above the mean from 0.125 N·m up, which lies there to 0.05; the level hangs on the segments' length, 20 s here and unknown there",
         shows: |group| {
             let low = coherence(at(group, LEAST)?)?;
             let plateau = mean(&from(group, 0.125, coherence)?);
