@@ -3,10 +3,13 @@
 As a program: ``python3 environment.py DIRECTORY REQUIREMENTS`` prints the interpreter's path.
 """
 
+import contextlib
 import os
 import shutil
 import subprocess
 import sys
+import time
+from collections.abc import Iterator
 from pathlib import Path
 
 OLDEST = (3, 11)
@@ -23,8 +26,14 @@ def ensure(directory: Path, requirements: Path) -> Path:
     """Return the interpreter of the virtual environment in ``directory``.
 
     The environment is made anew when the requirements file or the Python that makes it is not
-    the one it was made with. Leaves the program with a sentence when it cannot be made.
+    the one it was made with. One process makes it; others that want it meanwhile wait. Leaves
+    the program with a sentence when it cannot be made.
     """
+    with _alone(directory.with_name(directory.name + ".lock")):
+        return _ensure(directory, requirements)
+
+
+def _ensure(directory: Path, requirements: Path) -> Path:
     python = directory / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     stamp = directory / "made-from.txt"
     made_from = f"{sys.executable} {sys.version}\n{requirements.read_text()}"
@@ -53,6 +62,30 @@ def ensure(directory: Path, requirements: Path) -> Path:
     )
     stamp.write_text(made_from)
     return python
+
+
+@contextlib.contextmanager
+def _alone(lock: Path) -> Iterator[None]:
+    """Wait until no other process is between here and the end of its ``with``.
+
+    The system lets go of the lock when the process ends, however it ends.
+    """
+    lock.parent.mkdir(parents=True, exist_ok=True)
+    with lock.open("a") as file:
+        if os.name == "nt":
+            import msvcrt
+
+            while True:
+                try:
+                    msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+                    break
+                except OSError:
+                    time.sleep(0.1)
+        else:
+            import fcntl
+
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield
 
 
 def _run(command: list[str], sentence: str) -> None:
