@@ -62,7 +62,7 @@ impl Plant {
         self.rates(inputs);
         let stuck = self.state.contact == Contact::Stuck;
         let torque = self.wheel.torque(self.state.wheel_speed, inputs.tau_cmd);
-        let mut rate = self.rate_coefficients(0, -torque.value / self.wheel.inertia);
+        let mut rate = self.rate_coefficients::<0>(-torque.value / self.wheel.inertia);
         rate[4] = if stuck { 1.0 } else { 0.0 };
         rate
     }
@@ -88,11 +88,11 @@ impl Plant {
             self.motion.theta[1] = dx[0];
             self.motion.hub.omega[1] = dx[1];
             for (mode, dq) in modes.iter_mut().zip(dx[6..].as_chunks::<4>().0) {
-                mode.aim(dq);
+                mode.aim(dq, &self.motion.hub);
             }
             self.motion.rates::<1, _>(modes, contact);
         });
-        self.rate_coefficients(1, -torque.slope / self.wheel.inertia)
+        self.rate_coefficients::<1>(-torque.slope / self.wheel.inertia)
     }
 
     /// The derivative of the outputs in the direction (dx, du); what is discrete in them
@@ -187,21 +187,21 @@ impl Plant {
         modes.fold(hub, f64::max)
     }
 
-    /// Coefficient n of x' as the series have it.
-    fn rate_coefficients(&self, n: usize, wheel: f64) -> [f64; STATES] {
+    /// Coefficient N of x' as the series have it.
+    fn rate_coefficients<const N: usize>(&self, wheel: f64) -> [f64; STATES] {
         let motion = &self.motion;
         let mut rate = [0.0; STATES];
         rate[..6].copy_from_slice(&[
-            motion.hub.omega[n],
-            motion.hub.omega_dot[n],
-            motion.work[n],
-            motion.heat[n],
+            motion.hub.omega[N],
+            motion.hub.omega_dot[N],
+            motion.work[N],
+            motion.heat[N],
             0.0,
             wheel,
         ]);
         with_modes!(&self.liquid, modes => {
             for (mode, rate) in modes.iter().zip(rate[6..].as_chunks_mut::<4>().0) {
-                *rate = mode.rate(n);
+                *rate = mode.rate::<N>(&motion.hub);
             }
         });
         rate

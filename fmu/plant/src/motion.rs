@@ -116,7 +116,7 @@ impl Motion {
         self.hub.g = [g.value, g.slope];
         self.tau = [tau.value, tau.slope];
         for (mode, q) in modes.iter_mut().zip(&state.modes) {
-            mode.start(q);
+            mode.start(q, &self.hub);
         }
     }
 
@@ -312,7 +312,7 @@ impl Motion {
             state.theta = series::value(&self.theta, n, length);
             state.omega = if stuck { 0.0 } else { series::value(&self.hub.omega, n, length) };
             for (i, (mode, q)) in modes.iter().zip(&mut state.modes).enumerate() {
-                *q = mode.at(n, length);
+                *q = mode.at(n, length, state.omega);
                 if let Some(what) = mode.out_of_range(q) {
                     let time = begin + t + length;
                     return Err(StepError::OutOfRange { time, mode: i + 1, what });

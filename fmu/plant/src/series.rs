@@ -77,6 +77,16 @@ pub fn scale<const N: usize>(a: &Series, b: &Pair) -> [f64; 2] {
     sum
 }
 
+/// Coefficient N of a b_i, b a vector.
+#[inline(always)]
+pub fn mul_part<const N: usize>(a: &Series, b: &Pair, i: usize) -> f64 {
+    let mut sum = a[0] * b[N][i];
+    for j in 1..=N {
+        sum += a[j] * b[N - j][i];
+    }
+    sum
+}
+
 /// Coefficient N of (a_1 b_1, a_2 b_2).
 #[inline(always)]
 pub fn each<const N: usize>(a: &Pair, b: &Pair) -> [f64; 2] {
@@ -104,13 +114,6 @@ pub fn squares<const N: usize>(a: &Pair) -> [f64; 2] {
 pub fn dot<const N: usize>(a: &Pair, b: &Pair) -> f64 {
     let [x, y] = each::<N>(a, b);
     x + y
-}
-
-/// Coefficient N of (ramp) a, a a vector.
-#[inline(always)]
-pub fn scale_ramp<const N: usize>(ramp: &[f64; 2], a: &Pair) -> [f64; 2] {
-    let before = if N == 0 { [0.0; 2] } else { a[N.saturating_sub(1)] };
-    [0, 1].map(|i| ramp[0] * a[N][i] + ramp[1] * before[i])
 }
 
 /// The value at t of the vector cut after order n.

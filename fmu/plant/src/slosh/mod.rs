@@ -60,12 +60,13 @@ pub trait Mode {
     fn coordinates(&self, at: &Angles) -> [f64; 4];
     /// The reverse, at order 0.
     fn angles(&self) -> Angles;
-    /// Sets the coordinates at the start of the expansion.
-    fn start(&mut self, q: &[f64; 4]);
-    /// Sets the direction, coefficient 1 of the coordinates, for a partial derivative.
-    fn aim(&mut self, dq: &[f64; 4]);
-    /// Coefficient n of q_x', q_y', q_x'', q_y''.
-    fn rate(&self, n: usize) -> [f64; 4];
+    /// Sets the coordinates at the start of the expansion; w is known to order 0.
+    fn start(&mut self, q: &[f64; 4], hub: &Hub);
+    /// Sets the direction, coefficient 1 of the coordinates, for a partial derivative; w is
+    /// known to order 1.
+    fn aim(&mut self, dq: &[f64; 4], hub: &Hub);
+    /// Coefficient N, 0 or 1, of q_x', q_y', q_x'', q_y''.
+    fn rate<const N: usize>(&self, hub: &Hub) -> [f64; 4];
     /// Coefficient N of J and T, from coefficients up to N of q, q' and w.
     fn load<const N: usize>(&mut self, hub: &Hub) -> Load;
     /// Coefficient N of q'' and with it N + 1 of q and q', after `load`, when w' is known up
@@ -77,8 +78,8 @@ pub trait Mode {
     fn term(&self, n: usize) -> f64;
     /// Coefficient N of the heat made by the mode, W.
     fn heat<const N: usize>(&mut self) -> f64;
-    /// Coordinates at t from the series cut after order n.
-    fn at(&self, n: usize, t: f64) -> [f64; 4];
+    /// Coordinates at t, where the hub turns with `omega`, from the series cut after order n.
+    fn at(&self, n: usize, t: f64, omega: f64) -> [f64; 4];
     /// Force of the bob on the tank, N, radial and tangential, at order 0.
     fn force(&self, hub: &Hub) -> [f64; 2];
     /// Torque of the bob on the hub, N m, at order 0.

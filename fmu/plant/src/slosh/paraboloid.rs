@@ -78,18 +78,18 @@ impl Mode for Paraboloid {
         Angles { angle: sin.map(libm::asin), rate: [rate(0), rate(1)] }
     }
 
-    fn start(&mut self, q: &[f64; 4]) {
+    fn start(&mut self, q: &[f64; 4], _: &Hub) {
         (self.q[0][0], self.q[1][0]) = (q[0], q[1]);
         (self.q_d[0][0], self.q_d[1][0]) = (q[2], q[3]);
     }
 
-    fn aim(&mut self, dq: &[f64; 4]) {
+    fn aim(&mut self, dq: &[f64; 4], _: &Hub) {
         (self.q[0][1], self.q[1][1]) = (dq[0], dq[1]);
         (self.q_d[0][1], self.q_d[1][1]) = (dq[2], dq[3]);
     }
 
-    fn rate(&self, n: usize) -> [f64; 4] {
-        [self.q_d[0][n], self.q_d[1][n], self.q_dd[0][n], self.q_dd[1][n]]
+    fn rate<const N: usize>(&self, _: &Hub) -> [f64; 4] {
+        [self.q_d[0][N], self.q_d[1][N], self.q_dd[0][N], self.q_dd[1][N]]
     }
 
     #[inline(always)]
@@ -157,7 +157,7 @@ impl Mode for Paraboloid {
     }
 
     #[inline(always)]
-    fn at(&self, n: usize, t: f64) -> [f64; 4] {
+    fn at(&self, n: usize, t: f64, _: f64) -> [f64; 4] {
         let ([x, y], [x_d, y_d]) = (&self.q, &self.q_d);
         [value(x, n, t), value(y, n, t), value(x_d, n, t), value(y_d, n, t)]
     }

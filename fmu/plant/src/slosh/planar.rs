@@ -61,16 +61,16 @@ impl Mode for Planar {
         Angles { angle: [0.0, self.al[0]], rate: [0.0, self.al_d[0]] }
     }
 
-    fn start(&mut self, q: &[f64; 4]) {
+    fn start(&mut self, q: &[f64; 4], _: &Hub) {
         (self.al[0], self.al_d[0]) = (q[1], q[3]);
     }
 
-    fn aim(&mut self, dq: &[f64; 4]) {
+    fn aim(&mut self, dq: &[f64; 4], _: &Hub) {
         (self.al[1], self.al_d[1]) = (dq[1], dq[3]);
     }
 
-    fn rate(&self, n: usize) -> [f64; 4] {
-        [0.0, self.al_d[n], 0.0, self.al_dd[n]]
+    fn rate<const N: usize>(&self, _: &Hub) -> [f64; 4] {
+        [0.0, self.al_d[N], 0.0, self.al_dd[N]]
     }
 
     #[inline(always)]
@@ -117,7 +117,7 @@ impl Mode for Planar {
     }
 
     #[inline(always)]
-    fn at(&self, n: usize, t: f64) -> [f64; 4] {
+    fn at(&self, n: usize, t: f64, _: f64) -> [f64; 4] {
         [0.0, value(&self.al, n, t), 0.0, value(&self.al_d, n, t)]
     }
 

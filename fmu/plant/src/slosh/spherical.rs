@@ -1,84 +1,111 @@
-//! Spherical (conical) pendulum in stereographic coordinates: the bob's direction
-//! from the hinge, in the hub's frame, is
+//! Spherical (conical) pendulum. Its coordinates are stereographic: the bob's direction
+//! from the hinge, a unit vector in the hub's frame, is
 //!
 //! ```text
 //! p = (k xi_1, k xi_2, 1 - k),   k = 2/(1 + |xi|^2),   q = xi
 //! ```
 //!
-//! (rest is xi = 0; only the bob straight up is singular). With R the quarter turn
-//! (a, b) -> (-b, a), v = xi' + w R xi the rate seen from outside the hub, and
-//! rho = xi.xi', Newton's law on the sphere reads
+//! (rest is xi = 0; only the bob straight up is singular). The motion is expanded in p
+//! and in v, the bob's velocity from the hinge as seen from outside the hub, over l: in
+//! these Newton's law has few products and no quotient. With R the quarter turn
+//! (a, b) -> (-b, a) of the horizontal part, e_x outwards, e_y along +theta, e_z up:
 //!
 //! ```text
-//! xi'' = B + A w'
-//! B = -(g/l) xi - (c/m) xi' - w R (xi' + v) + 2 k rho v - k |v|^2 xi + (r/l) w^2 e
-//! e = ((1 - xi_1^2 + xi_2^2)/2, -xi_1 xi_2)
-//! A = (xi_2, -xi_1) + (r/l) (xi_1 xi_2, -(1 + xi_1^2 - xi_2^2)/2)
+//! p' = v - w R p
+//! v' = -w R v - L p + (r/l) (w^2 e_x - w' e_y) - (g/l) e_z - (c/m) p'
 //! ```
 //!
-//! The rod pulls with m (S - r p_y w'), S = l k^2 |v|^2 + r w^2 p_x - g p_z, at the
-//! hinge; the drag c l p' acts on the tank at the bob. So
+//! m l L is the pull of the rod. It keeps v.p = 0, so
+//!
+//! ```text
+//! L = L_0 - (r/l) w' p_y,   L_0 = |v|^2 - (g/l) p_z + (r/l) w^2 p_x
+//! ```
+//!
+//! The rod pulls at the hinge; the drag c l p' acts on the tank at the bob. So
 //!
 //! ```text
 //! J = m r^2 p_y^2     (beyond the hub's I0)
-//! T = m r p_y S + c l [ r p_y' + l (p_x p_y' - p_y p_x') ],  p_x p_y' - p_y p_x' = k^2 (xi_1 xi_2' - xi_2 xi_1')
-//! E = m |velocity|^2/2 + m g l (2 - k),  heat c l^2 |p'|^2,  |p'| = k |xi'|
+//! T = m r l p_y L_0 + c l [ r p_y' + l (p_x p_y' - p_y p_x') ]
+//! E = m |l v + r w e_y|^2/2 + m g l (1 + p_z),  heat c l^2 |p'|^2
+//! H = m [ (r + l p_x) (l v_y + r w) - l p_y l v_x ]
 //! ```
 //!
-//! Derived from the bob's Lagrangian; checked against a unit-vector form.
+//! Checked against the equations for xi itself and against a pendulum in angles (tests).
 
 use super::{Angles, Hub, Load, Mode};
 use crate::series::{
-    Pair, Series, ZERO, ZERO_PAIR, constant, dot, each, mul, mul_ramp, mul_tail, next, scale,
-    scale_ramp, square, squares, value_pair,
+    Pair, Series, ZERO, ZERO_PAIR, constant, dot, each, mul, mul_part, mul_ramp, mul_tail, next,
+    scale, square, squares, value, value_pair,
 };
 use crate::tank::Pendulum;
 
 #[derive(Clone, Debug)]
 pub struct Spherical {
     p: Pendulum,
+    /// Coordinates, 1 + |xi|^2, k, xi.xi' and k xi.xi': orders 0 and 1 alone.
     xi: Pair,
     xi_d: Pair,
-    xi_dd: Pair,
-    /// 1 + |xi|^2, k
     sum: Series,
     k: Series,
-    /// (p_x, p_y), p_x, p_y, p_z
-    across: Pair,
-    p_x: Series,
-    p_y: Series,
-    p_z: Series,
-    v: Pair,
-    /// xi' + v
-    xi_d_v: Pair,
-    /// (rho, |v|^2), k rho, k |v|^2
-    rho_v2: Pair,
+    rho: Series,
     k_rho: Series,
-    k_v2: Series,
-    /// S
+    /// The bob's direction, horizontally and upwards.
+    dir: Pair,
+    dir_z: Series,
+    /// p' horizontally, and with its components exchanged; upwards it is v_z.
+    dir_d: Pair,
+    dir_d_swapped: Pair,
+    v: Pair,
+    v_z: Series,
+    v_d: Pair,
+    v_z_d: Series,
+    /// v_z^2
+    v_z2: Series,
+    /// L_0, L
+    pull_0: Series,
     pull: Series,
-    /// k xi' and the same with its components exchanged
-    k_xi_d: Pair,
-    k_xi_d_swapped: Pair,
-    e: Pair,
-    a: Pair,
-    b: Pair,
     omega_n: f64,
 }
 
 impl Spherical {
-    /// p' at order 0.
-    fn dir_d(&self) -> [f64; 3] {
-        let (k, rho) = (self.k[0], self.rho_v2[0][0]);
-        let along = |i: usize| k * self.xi_d[0][i] - k * k * rho * self.xi[0][i];
-        [along(0), along(1), k * k * rho]
+    /// Coefficient N of direction and velocity from those of the coordinates:
+    /// p' = k xi' - v_z xi, v_z = k^2 xi.xi'.
+    #[inline(always)]
+    fn place<const N: usize>(&mut self, hub: &Hub) {
+        let one = constant::<N>(1.0);
+        let [x2, y2] = squares::<N>(&self.xi);
+        self.sum[N] = one + x2 + y2;
+        self.k[N] = (2.0 * one - mul_tail::<N>(&self.sum, &self.k)) / self.sum[0];
+        self.dir[N] = scale::<N>(&self.k, &self.xi);
+        self.dir_z[N] = one - self.k[N];
+        self.rho[N] = dot::<N>(&self.xi, &self.xi_d);
+        self.k_rho[N] = mul::<N>(&self.k, &self.rho);
+        self.v_z[N] = mul::<N>(&self.k, &self.k_rho);
+        let (along, back) = (scale::<N>(&self.k, &self.xi_d), scale::<N>(&self.v_z, &self.xi));
+        let turned = scale::<N>(&hub.omega, &self.dir);
+        self.v[N] = [along[0] - back[0] - turned[1], along[1] - back[1] + turned[0]];
     }
 
-    /// Bob in the hub's frame, horizontally: X, Y, X', Y'.
-    fn bob(&self) -> [f64; 4] {
+    /// Coefficient N of k xi'' = p'' + 2 v_z xi' + v_z' xi, p'' = v' - w' R p - w R p'.
+    fn k_xi_dd<const N: usize>(&self, hub: &Hub) -> [f64; 2] {
+        let [x, y] = scale::<N>(&hub.omega_dot, &self.dir);
+        let [x_d, y_d] = scale::<N>(&hub.omega, &self.dir_d);
+        let dir_dd = [self.v_d[N][0] + y + y_d, self.v_d[N][1] - x - x_d];
+        let twice = scale::<N>(&self.v_z, &self.xi_d);
+        let once = scale::<N>(&self.v_z_d, &self.xi);
+        [0, 1].map(|i| dir_dd[i] + 2.0 * twice[i] + once[i])
+    }
+
+    /// Bob in the hub's frame, horizontally, m: X, Y.
+    fn bob(&self) -> [f64; 2] {
         let Pendulum { l, r, .. } = self.p;
-        let d = self.dir_d();
-        [r + l * self.p_x[0], l * self.p_y[0], l * d[0], l * d[1]]
+        [r + l * self.dir[0][0], l * self.dir[0][1]]
+    }
+
+    /// Its velocity as seen from outside, in the hub's frame, m/s: X, Y, Z.
+    fn velocity(&self, hub: &Hub) -> [f64; 3] {
+        let Pendulum { l, r, .. } = self.p;
+        [l * self.v[0][0], l * self.v[0][1] + r * hub.omega[0], l * self.v_z[0]]
     }
 }
 
@@ -88,24 +115,21 @@ impl Mode for Spherical {
             p: *p,
             xi: ZERO_PAIR,
             xi_d: ZERO_PAIR,
-            xi_dd: ZERO_PAIR,
             sum: ZERO,
             k: ZERO,
-            across: ZERO_PAIR,
-            p_x: ZERO,
-            p_y: ZERO,
-            p_z: ZERO,
-            v: ZERO_PAIR,
-            xi_d_v: ZERO_PAIR,
-            rho_v2: ZERO_PAIR,
+            rho: ZERO,
             k_rho: ZERO,
-            k_v2: ZERO,
+            dir: ZERO_PAIR,
+            dir_z: ZERO,
+            dir_d: ZERO_PAIR,
+            dir_d_swapped: ZERO_PAIR,
+            v: ZERO_PAIR,
+            v_z: ZERO,
+            v_d: ZERO_PAIR,
+            v_z_d: ZERO,
+            v_z2: ZERO,
+            pull_0: ZERO,
             pull: ZERO,
-            k_xi_d: ZERO_PAIR,
-            k_xi_d_swapped: ZERO_PAIR,
-            e: ZERO_PAIR,
-            a: ZERO_PAIR,
-            b: ZERO_PAIR,
             omega_n: 0.0,
         }
     }
@@ -121,8 +145,7 @@ impl Mode for Spherical {
     }
 
     fn angles(&self) -> Angles {
-        let d = self.dir_d();
-        let p = self.across[0].map(|p| p.clamp(-1.0, 1.0));
+        let (p, d) = (self.dir[0].map(|p| p.clamp(-1.0, 1.0)), self.dir_d[0]);
         let rate = |i: usize| {
             let cos = libm::sqrt((1.0 - p[i]) * (1.0 + p[i]));
             if cos > 0.0 { d[i] / cos } else { 0.0 }
@@ -130,140 +153,192 @@ impl Mode for Spherical {
         Angles { angle: p.map(libm::asin), rate: [rate(0), rate(1)] }
     }
 
-    fn start(&mut self, q: &[f64; 4]) {
+    fn start(&mut self, q: &[f64; 4], hub: &Hub) {
         (self.xi[0], self.xi_d[0]) = ([q[0], q[1]], [q[2], q[3]]);
+        self.place::<0>(hub);
     }
 
-    fn aim(&mut self, dq: &[f64; 4]) {
+    fn aim(&mut self, dq: &[f64; 4], hub: &Hub) {
         (self.xi[1], self.xi_d[1]) = ([dq[0], dq[1]], [dq[2], dq[3]]);
+        self.place::<1>(hub);
     }
 
-    fn rate(&self, n: usize) -> [f64; 4] {
-        let ([x_d, y_d], [x_dd, y_dd]) = (self.xi_d[n], self.xi_dd[n]);
+    fn rate<const N: usize>(&self, hub: &Hub) -> [f64; 4] {
+        let at_once = self.k_xi_dd::<0>(hub).map(|a| a / self.k[0]);
+        let [x_dd, y_dd] = if N == 0 {
+            at_once
+        } else {
+            let k_xi_dd = self.k_xi_dd::<N>(hub);
+            [0, 1].map(|i| (k_xi_dd[i] - self.k[N] * at_once[i]) / self.k[0])
+        };
+        let [x_d, y_d] = self.xi_d[N];
         [x_d, y_d, x_dd, y_dd]
     }
 
     #[inline(always)]
     fn load<const N: usize>(&mut self, hub: &Hub) -> Load {
-        let Pendulum { m, l, c, r, c_m, r_l, inv_l, .. } = self.p;
-        let one = constant::<N>(1.0);
+        let Pendulum { m, l, c, r, r_l, inv_l, .. } = self.p;
         if N == 0 {
             self.omega_n = libm::sqrt(f64::max(hub.g[0], 0.0) / l);
         }
-        let ([x, y], [x_d, y_d]) = (self.xi[N], self.xi_d[N]);
-        // geometry
-        let [x2, y2] = squares::<N>(&self.xi);
-        let mut xy = 0.0;
-        for j in 0..=N {
-            xy += self.xi[j][0] * self.xi[N - j][1];
-        }
-        self.sum[N] = one + x2 + y2;
-        self.k[N] = (2.0 * one - mul_tail::<N>(&self.sum, &self.k)) / self.sum[0];
-        self.across[N] = scale::<N>(&self.k, &self.xi);
-        [self.p_x[N], self.p_y[N]] = self.across[N];
-        self.p_z[N] = one - self.k[N];
-        self.e[N] = [(one - x2 + y2) / 2.0, -xy];
-        self.a[N] = [y + r_l * xy, -x - r_l * (one + x2 - y2) / 2.0];
-        // rates
-        let turned = scale::<N>(&hub.omega, &self.xi);
-        self.v[N] = [x_d - turned[1], y_d + turned[0]];
-        self.xi_d_v[N] = [x_d + self.v[N][0], y_d + self.v[N][1]];
+        let [w_x, w_y] = scale::<N>(&hub.omega, &self.dir);
+        let (x_d, y_d) = (self.v[N][0] + w_y, self.v[N][1] - w_x);
+        self.dir_d[N] = [x_d, y_d];
+        self.dir_d_swapped[N] = [y_d, x_d];
         let [v2_x, v2_y] = squares::<N>(&self.v);
-        self.rho_v2[N] = [dot::<N>(&self.xi, &self.xi_d), v2_x + v2_y];
-        [self.k_rho[N], self.k_v2[N]] = scale::<N>(&self.k, &self.rho_v2);
-        // B
-        let turned = scale::<N>(&hub.omega, &self.xi_d_v);
-        let turned = [turned[1], -turned[0]];
-        let along = scale::<N>(&self.k_rho, &self.v);
-        let back = scale::<N>(&self.k_v2, &self.xi);
-        let out = scale::<N>(&hub.omega2, &self.e);
-        let fall = scale_ramp::<N>(&hub.g, &self.xi);
-        for i in 0..2 {
-            let drag = c_m * self.xi_d[N][i];
-            self.b[N][i] =
-                turned[i] - inv_l * fall[i] - drag + 2.0 * along[i] - back[i] + r_l * out[i];
-        }
-        // J and T
-        self.pull[N] = l * mul::<N>(&self.k, &self.k_v2) + r * mul::<N>(&hub.omega2, &self.p_x)
-            - mul_ramp::<N>(&hub.g, &self.p_z);
-        let [k_x_d, k_y_d] = scale::<N>(&self.k, &self.xi_d);
-        self.k_xi_d[N] = [k_x_d, k_y_d];
-        self.k_xi_d_swapped[N] = [k_y_d, k_x_d];
-        let p_y_d = k_y_d - mul::<N>(&self.k_rho, &self.p_y);
-        let [plus, minus] = each::<N>(&self.across, &self.k_xi_d_swapped);
+        self.v_z2[N] = square::<N>(&self.v_z);
+        self.pull_0[N] = v2_x + v2_y + self.v_z2[N] - inv_l * mul_ramp::<N>(&hub.g, &self.dir_z)
+            + r_l * mul_part::<N>(&hub.omega2, &self.dir, 0);
+        let [plus, minus] = each::<N>(&self.dir, &self.dir_d_swapped);
         Load {
-            j: m * r * r * square::<N>(&self.p_y),
-            t: m * r * mul::<N>(&self.p_y, &self.pull) + c * l * (r * p_y_d + l * (plus - minus)),
+            j: m * r * r * squares::<N>(&self.dir)[1],
+            t: m * r * l * mul_part::<N>(&self.pull_0, &self.dir, 1)
+                + c * l * (r * y_d + l * (plus - minus)),
         }
     }
 
     #[inline(always)]
     fn respond<const N: usize>(&mut self, hub: &Hub) {
-        let pushed = scale::<N>(&hub.omega_dot, &self.a);
-        self.xi_dd[N] = [self.b[N][0] + pushed[0], self.b[N][1] + pushed[1]];
-        self.xi[N + 1] = self.xi_d[N].map(next::<N>);
-        self.xi_d[N + 1] = self.xi_dd[N].map(next::<N>);
+        let Pendulum { c_m, r_l, inv_l, .. } = self.p;
+        self.pull[N] = self.pull_0[N] - r_l * mul_part::<N>(&hub.omega_dot, &self.dir, 1);
+        let [w_x, w_y] = scale::<N>(&hub.omega, &self.v);
+        let pulled = scale::<N>(&self.pull, &self.dir);
+        let fall = inv_l * if N < 2 { hub.g[N] } else { 0.0 };
+        self.v_d[N] = [
+            w_y - pulled[0] - c_m * self.dir_d[N][0] + r_l * hub.omega2[N],
+            -w_x - pulled[1] - c_m * self.dir_d[N][1] - r_l * hub.omega_dot[N],
+        ];
+        self.v_z_d[N] = -mul::<N>(&self.pull, &self.dir_z) - fall - c_m * self.v_z[N];
+        self.dir[N + 1] = self.dir_d[N].map(next::<N>);
+        self.dir_z[N + 1] = next::<N>(self.v_z[N]);
+        self.v[N + 1] = self.v_d[N].map(next::<N>);
+        self.v_z[N + 1] = next::<N>(self.v_z_d[N]);
     }
 
     #[inline(always)]
     fn size(&self) -> f64 {
-        let largest = |[x, y]: [f64; 2]| f64::max(x.abs(), y.abs());
-        largest(self.xi_d[0]) + self.omega_n * largest(self.xi[0])
+        largest(self.dir_d[0]) + self.omega_n * largest(self.dir[0])
     }
 
     #[inline(always)]
     fn term(&self, n: usize) -> f64 {
-        f64::max(self.xi_d[n][0].abs(), self.xi_d[n][1].abs())
+        largest(self.v[n]).max(self.v_z[n].abs())
     }
 
-    /// c l^2 |k xi'|^2
+    /// c l^2 |p'|^2
     #[inline(always)]
     fn heat<const N: usize>(&mut self) -> f64 {
-        let [x, y] = squares::<N>(&self.k_xi_d);
-        self.p.c * self.p.l * self.p.l * (x + y)
+        let [x, y] = squares::<N>(&self.dir_d);
+        self.p.c * self.p.l * self.p.l * (x + y + self.v_z2[N])
     }
 
+    /// xi = p/k and k xi' = p' + v_z xi; k = 1 - p_z, above the horizontal by |p| = 1.
     #[inline(always)]
-    fn at(&self, n: usize, t: f64) -> [f64; 4] {
-        let [x, y] = value_pair(&self.xi, n, t);
-        let [x_d, y_d] = value_pair(&self.xi_d, n, t);
-        [x, y, x_d, y_d]
+    fn at(&self, n: usize, t: f64, omega: f64) -> [f64; 4] {
+        let ([x, y], z) = (value_pair(&self.dir, n, t), value(&self.dir_z, n, t));
+        let ([v_x, v_y], v_z) = (value_pair(&self.v, n, t), value(&self.v_z, n, t));
+        let inv_k = if z > 0.0 { (1.0 + z) / (x * x + y * y) } else { 1.0 / (1.0 - z) };
+        let (xi, eta) = (inv_k * x, inv_k * y);
+        let rate = |d: f64, xi: f64| inv_k * (d + v_z * xi);
+        [xi, eta, rate(v_x + omega * y, xi), rate(v_y - omega * x, eta)]
     }
 
     /// The rod's pull along p and the drag.
-    fn force(&self, hub: &Hub) -> [f64; 2] {
-        let Pendulum { m, l, c, r, .. } = self.p;
-        let d = self.dir_d();
-        let pull = m * (self.pull[0] - r * self.p_y[0] * hub.omega_dot[0]);
-        [0, 1].map(|i| pull * self.across[0][i] + c * l * d[i])
+    fn force(&self, _: &Hub) -> [f64; 2] {
+        let Pendulum { m, l, c, .. } = self.p;
+        [0, 1].map(|i| m * l * self.pull[0] * self.dir[0][i] + c * l * self.dir_d[0][i])
     }
 
     /// The pull acts at the hinge, the drag at the bob.
     fn torque(&self, hub: &Hub) -> f64 {
         let Pendulum { l, c, r, .. } = self.p;
-        let d = self.dir_d();
-        let swirl = self.p_x[0] * d[1] - self.p_y[0] * d[0];
-        r * self.force(hub)[1] + c * l * l * swirl
+        let ([x, y], [x_d, y_d]) = (self.dir[0], self.dir_d[0]);
+        r * self.force(hub)[1] + c * l * l * (x * y_d - y * x_d)
     }
 
     fn energy(&self, hub: &Hub) -> f64 {
         let Pendulum { m, l, .. } = self.p;
-        let ([x, y, x_d, y_d], w) = (self.bob(), hub.omega[0]);
-        let (v_x, v_y, v_z) = (x_d - w * y, y_d + w * x, l * self.dir_d()[2]);
-        // 2 - k = |xi|^2 k, without cancellation near rest
+        let [v_x, v_y, v_z] = self.velocity(hub);
+        // 1 + p_z = |xi|^2 k, without cancellation near rest
         let [xi_1, xi_2] = self.xi[0];
         let height = l * self.k[0] * (xi_1 * xi_1 + xi_2 * xi_2);
         m * (v_x * v_x + v_y * v_y + v_z * v_z) / 2.0 + m * hub.g[0] * height
     }
 
     fn momentum(&self, hub: &Hub) -> f64 {
-        let ([x, y, x_d, y_d], w) = (self.bob(), hub.omega[0]);
-        self.p.m * (w * (x * x + y * y) + x * y_d - y * x_d)
+        let ([x, y], [v_x, v_y, _]) = (self.bob(), self.velocity(hub));
+        self.p.m * (x * v_y - y * v_x)
     }
 
     fn out_of_range(&self, q: &[f64; 4]) -> Option<&'static str> {
         // |xi| = 1e3 is a bob within 0.12 degrees of straight up.
         let up = q[0] * q[0] + q[1] * q[1] > 1e6;
         up.then_some("its bob stands straight up, where a pendulum says nothing about a liquid")
+    }
+}
+
+fn largest([x, y]: [f64; 2]) -> f64 {
+    f64::max(x.abs(), y.abs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::series::ORDER;
+
+    /// Lagrange's equations of the bob in xi, with v = xi' + w R xi and rho = xi.xi':
+    ///
+    /// ```text
+    /// xi'' = B + A w'
+    /// B = -(g/l) xi - (c/m) xi' - w R (xi' + v) + 2 k rho v - k |v|^2 xi + (r/l) w^2 e
+    /// e = ((1 - xi_1^2 + xi_2^2)/2, -xi_1 xi_2)
+    /// A = (xi_2, -xi_1) + (r/l) (xi_1 xi_2, -(1 + xi_1^2 - xi_2^2)/2)
+    /// ```
+    fn lagrange(p: &Pendulum, q: [f64; 4], w: f64, w_d: f64, g: f64) -> [f64; 2] {
+        let [x, y, x_d, y_d] = q;
+        let (k, rho) = (2.0 / (1.0 + x * x + y * y), x * x_d + y * y_d);
+        let v = [x_d - w * y, y_d + w * x];
+        let v2 = v[0] * v[0] + v[1] * v[1];
+        let coriolis = [w * (y_d + v[1]), -w * (x_d + v[0])];
+        let e = [(1.0 - x * x + y * y) / 2.0, -x * y];
+        let a = [y + p.r_l * x * y, -x - p.r_l * (1.0 + x * x - y * y) / 2.0];
+        core::array::from_fn(|i| {
+            let (xi, xi_d) = ([x, y][i], [x_d, y_d][i]);
+            coriolis[i] - g / p.l * xi - p.c_m * xi_d + 2.0 * k * rho * v[i] - k * v2 * xi
+                + p.r_l * w * w * e[i]
+                + a[i] * w_d
+        })
+    }
+
+    /// From hanging to 20 degrees from straight up, and what p and v say is the same motion.
+    #[test]
+    fn direction_and_velocity_move_as_lagrange_has_the_coordinates() {
+        let mut rng = fastrand::Rng::with_seed(3);
+        let mut between = |low: f64, high: f64| low + rng.f64() * (high - low);
+        for _ in 0..1000 {
+            let (m, l, c, r) = (0.7, between(0.02, 0.2), between(0.0, 0.5), between(0.0, 0.4));
+            let (c_m, r_l, inv_l) = (c / m, r / l, 1.0 / l);
+            let p = Pendulum { m, l, c, r, c_m, r_l, inv_l, wave: 0.0, hardening: 0.0 };
+            let q = core::array::from_fn(|i| between(-4.0, 4.0) * if i < 2 { 1.0 } else { 5.0 });
+            let (w, w_d, g) = (between(-2.0, 2.0), between(-9.0, 9.0), between(0.0, 20.0));
+            let mut hub = Hub { omega: ZERO, omega2: ZERO, omega_dot: ZERO, g: [g, 0.0] };
+            (hub.omega[0], hub.omega2[0], hub.omega_dot[0]) = (w, w * w, w_d);
+            let mut mode = Spherical::new(&p);
+            mode.start(&q, &hub);
+            mode.load::<0>(&hub);
+            mode.respond::<0>(&hub);
+            let expected = lagrange(&p, q, w, w_d, g);
+            let [.., x_dd, y_dd] = mode.rate::<0>(&hub);
+            // The terms are up to k |v|^2 |xi|, 1e4, and half of them are taken as 1/k, 20, of
+            // smaller ones.
+            let size = 1.0 + expected[0].abs().max(expected[1].abs()) + 1e3;
+            assert!((x_dd - expected[0]).abs() < 1e-13 * size, "{x_dd} {}", expected[0]);
+            assert!((y_dd - expected[1]).abs() < 1e-13 * size, "{y_dd} {}", expected[1]);
+            // The way back.
+            let back = mode.at(ORDER, 0.0, w);
+            for (a, b) in back.iter().zip(q) {
+                assert!((a - b).abs() < 1e-13 * (1.0 + b.abs()), "{a} {b}");
+            }
+        }
     }
 }
