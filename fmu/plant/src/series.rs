@@ -32,14 +32,34 @@ pub fn next<const N: usize>(rate: f64) -> f64 {
     rate * const { 1.0 / (N + 1) as f64 }
 }
 
+// Each sum has its newest coefficients, number N, last: they come out of other sums of this
+// order, and a processor adds up the rest while it waits for them.
+
+/// Sum of `term(j)` over 0 <= j <= N, ends last.
+#[inline(always)]
+fn sum<const N: usize>(term: impl Fn(usize) -> f64) -> f64 {
+    match N {
+        0 => term(0),
+        1 => term(0) + term(1),
+        _ => (2..N).fold(term(1), |sum, j| sum + term(j)) + term(0) + term(N),
+    }
+}
+
+/// As [`sum`], for vectors.
+#[inline(always)]
+fn sum_pair<const N: usize>(term: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
+    let add = |a: [f64; 2], b: [f64; 2]| [a[0] + b[0], a[1] + b[1]];
+    match N {
+        0 => term(0),
+        1 => add(term(0), term(1)),
+        _ => add(add((2..N).fold(term(1), |sum, j| add(sum, term(j))), term(0)), term(N)),
+    }
+}
+
 /// Coefficient N of a b: sum of a_j b_(N-j).
 #[inline(always)]
 pub fn mul<const N: usize>(a: &Series, b: &Series) -> f64 {
-    let mut sum = a[0] * b[N];
-    for j in 1..=N {
-        sum += a[j] * b[N - j];
-    }
-    sum
+    sum::<N>(|j| a[j] * b[N - j])
 }
 
 /// Coefficients of a vector in the plane: two series that most rules treat alike, so
@@ -70,39 +90,26 @@ impl core::ops::IndexMut<usize> for Pair {
 /// Coefficient N of a b, b a vector.
 #[inline(always)]
 pub fn scale<const N: usize>(a: &Series, b: &Pair) -> [f64; 2] {
-    let mut sum = [0.0; 2];
-    for j in 0..=N {
-        sum = [sum[0] + a[j] * b[N - j][0], sum[1] + a[j] * b[N - j][1]];
-    }
-    sum
+    sum_pair::<N>(|j| [a[j] * b[N - j][0], a[j] * b[N - j][1]])
 }
 
 /// Coefficient N of a b_i, b a vector.
 #[inline(always)]
 pub fn mul_part<const N: usize>(a: &Series, b: &Pair, i: usize) -> f64 {
-    let mut sum = a[0] * b[N][i];
-    for j in 1..=N {
-        sum += a[j] * b[N - j][i];
-    }
-    sum
+    sum::<N>(|j| a[j] * b[N - j][i])
 }
 
 /// Coefficient N of (a_1 b_1, a_2 b_2).
 #[inline(always)]
 pub fn each<const N: usize>(a: &Pair, b: &Pair) -> [f64; 2] {
-    let mut sum = [0.0; 2];
-    for j in 0..=N {
-        let (a, b) = (a[j], b[N - j]);
-        sum = [sum[0] + a[0] * b[0], sum[1] + a[1] * b[1]];
-    }
-    sum
+    sum_pair::<N>(|j| [a[j][0] * b[N - j][0], a[j][1] * b[N - j][1]])
 }
 
 /// Coefficient N of (a_1^2, a_2^2).
 #[inline(always)]
 pub fn squares<const N: usize>(a: &Pair) -> [f64; 2] {
     let mut half = [0.0; 2];
-    for j in 0..N.div_ceil(2) {
+    for j in (0..N.div_ceil(2)).rev() {
         half = [half[0] + a[j][0] * a[N - j][0], half[1] + a[j][1] * a[N - j][1]];
     }
     let middle = if N.is_multiple_of(2) { a[N / 2].map(|x| x * x) } else { [0.0; 2] };
@@ -135,11 +142,15 @@ pub fn mul_tail<const N: usize>(a: &Series, b: &Series) -> f64 {
 /// Coefficient N of a^2.
 #[inline(always)]
 pub fn square<const N: usize>(a: &Series) -> f64 {
+    if N == 0 {
+        return a[0] * a[0];
+    }
     let mut half = 0.0;
-    for j in 0..N.div_ceil(2) {
+    for j in 1..N.div_ceil(2) {
         half += a[j] * a[N - j];
     }
-    2.0 * half + if N.is_multiple_of(2) { a[N / 2] * a[N / 2] } else { 0.0 }
+    let middle = if N.is_multiple_of(2) { a[N / 2] * a[N / 2] } else { 0.0 };
+    2.0 * half + middle + 2.0 * a[0] * a[N]
 }
 
 /// Coefficient N of (ramp) a, where the ramp is `ramp[0] + ramp[1] t`.
@@ -153,11 +164,11 @@ pub fn mul_ramp<const N: usize>(ramp: &[f64; 2], a: &Series) -> f64 {
 #[inline(always)]
 pub fn chain<const N: usize>(u: f64, u_d: &mut Series, g: &Series) -> f64 {
     u_d[N - 1] = N as f64 * u;
-    let mut sum = 0.0;
-    for j in 0..N {
-        sum += u_d[j] * g[N - 1 - j];
+    let mut before = 0.0;
+    for j in 0..N - 1 {
+        before += u_d[j] * g[N - 1 - j];
     }
-    sum * const { 1.0 / N as f64 }
+    before * const { 1.0 / N as f64 } + u * g[0]
 }
 
 /// Coefficient N of (sin a, cos a), from a's coefficient N and theirs below N; `a_d` keeps
