@@ -278,9 +278,7 @@ impl Bench {
         let linker = MINGW.program;
         command.env("CARGO_TARGET_X86_64_PC_WINDOWS_GNU_LINKER", linker);
         pack::arguments(&mut command);
-        command
-            .arg("--")
-            .args(platform.link.iter().map(|argument| format!("-Clink-arg={argument}")));
+        command.args(platform.link.iter().map(|argument| format!("-Clink-arg={argument}")));
         command
     }
 }
