@@ -64,7 +64,7 @@ pub static TABLE: &[Variable] = &[
         .shown_in("deg").state(0).follows(&["theta"]).from(&["init.theta"]),
     output("omega", |o| o.omega, "rad/s",
         "Hub rate, the derivative of theta")
-        .shown_in("deg/s").about(0.1).state(1).reinit().follows(&["omega"]).from(&["init.omega"]),
+        .shown_in("deg/s").about(0.01).state(1).reinit().follows(&["omega"]).from(&["init.omega"]),
     output("omega_dot", |o| o.omega_dot, "rad/s2",
         "Hub acceleration, the derivative of omega; 0 while the hub is stuck")
         .shown_in("deg/s2").follows(ALL_TORQUES).from(DYNAMICS),
@@ -154,16 +154,16 @@ pub static TABLE: &[Variable] = &[
     // wheel_speed the continuous states
     coordinate("slosh.q_radial", 0,
         "Radial coordinate of a slosh mode, positive outwards. Models linear and planar: unused; spherical: stereographic, the tangent of half the pendulum's angle from the vertical times the direction's radial part (unit 1); paraboloid: displacement (m)")
-        .about(0.01).follows(&["slosh.q_radial[]"]).from(SLOSH_START),
+        .about(1e-3).follows(&["slosh.q_radial[]"]).from(SLOSH_START),
     coordinate("slosh.q_tangential", 1,
         "Tangential coordinate of a slosh mode, positive towards +theta. Models linear and planar: slosh angle (rad); spherical: stereographic, as slosh.q_radial (unit 1); paraboloid: displacement (m)")
-        .about(0.01).follows(&["slosh.q_tangential[]"]).from(SLOSH_START),
+        .about(1e-3).follows(&["slosh.q_tangential[]"]).from(SLOSH_START),
     coordinate("slosh.v_radial", 2,
         "Derivative of slosh.q_radial; its unit is that of slosh.q_radial per second")
-        .about(0.1).follows(&["slosh.v_radial[]"]).from(SLOSH_START),
+        .about(0.01).follows(&["slosh.v_radial[]"]).from(SLOSH_START),
     coordinate("slosh.v_tangential", 3,
         "Derivative of slosh.q_tangential; its unit is that of slosh.q_tangential per second")
-        .about(0.1).follows(&["slosh.v_tangential[]"]).from(SLOSH_START),
+        .about(0.01).follows(&["slosh.v_tangential[]"]).from(SLOSH_START),
 
     // The derivatives of the continuous states; a Model Exchange host has them in this
     // order
