@@ -235,3 +235,23 @@ fn an_fmu_whose_description_and_binary_do_not_belong_together_is_refused() {
     edited_fmu(directory, |_| Some("<fmiModelDescription".into()));
     refuses(directory, run, &["Edited.fmu", "modelDescription.xml"]);
 }
+
+#[test]
+fn the_scaling_page_shows_what_its_commands_print() {
+    let page = hubslosh::pack::root().join("modelDescription/documentation/scaling.md");
+    let page = std::fs::read_to_string(page).unwrap();
+    let mut commands = 0;
+    for block in page.split("\n\n") {
+        let Some((command, shown)) = block.split_once('\n') else { continue };
+        let Some(arguments) = command.strip_prefix("    $ hubslosh ") else { continue };
+        let arguments: Vec<&str> = arguments.split(' ').collect();
+        let output = hubslosh(Path::new("."), &arguments);
+        let printed = String::from_utf8(output.stdout).unwrap();
+        let shown: Vec<&str> =
+            shown.lines().map(|line| line.strip_prefix("    ").unwrap_or(line)).collect();
+        let printed: Vec<&str> = printed.lines().map(str::trim_end).collect();
+        assert_eq!(shown, printed, "{command}");
+        commands += 1;
+    }
+    assert_eq!(commands, 4);
+}

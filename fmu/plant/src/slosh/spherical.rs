@@ -30,7 +30,8 @@
 //! H = m [ (r + l p_x) (l v_y + r w) - l p_y l v_x ]
 //! ```
 //!
-//! Checked against the equations for xi itself and against a pendulum in angles (tests).
+//! Checked against Lagrange's equations for xi (below), against another way to the hub's
+//! acceleration (tests/rotary.rs) and against a pendulum in angles (Basilisk).
 
 use super::{Angles, Hub, Load, Mode};
 use crate::series::{
