@@ -10,7 +10,7 @@
 //!   name, set-valued friction; without REFERENCE it writes its rates there to compare
 //!   with later (`work_precision linear 1e-13 2700 1 --write FILE`).
 //! * `dopri5`, `dop853`: ode_solvers on the linear model with sgn(omega) smoothed to
-//!   tanh(omega/1e-5), over the whole sweep in one call; `dopri5@4e-8` with another scale
+//!   tanh(omega/1e-5), over the whole sweep in one call; `dopri5@1e-8` with another scale
 //!   than 1e-5 rad/s.
 //! * `rk4`: classical fixed-step Runge-Kutta on the same, TOLERANCE is the step in s.
 //!
