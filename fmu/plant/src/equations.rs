@@ -552,6 +552,23 @@ mod tests {
     }
 
     #[test]
+    fn a_motion_whose_energy_is_no_number_is_refused() {
+        for slosh in SLOSH {
+            // omega, and the tangential rate of the first mode
+            let places = if slosh == SloshModel::Frozen { &[1][..] } else { &[1, 9] };
+            for &place in places {
+                let (mut plant, inputs) = plant(slosh, FrictionModel::Viscous);
+                let mut x = plant.continuous_states();
+                x[place] = 1e160; // its square is infinite
+                plant.set_continuous_states(&x);
+                let before = *plant.state();
+                assert!(plant.step(&inputs, 1e-6).is_err(), "{slosh:?} {place}");
+                assert_eq!(*plant.state(), before);
+            }
+        }
+    }
+
+    #[test]
     fn friction_can_be_changed_while_running() {
         let (mut plant, inputs) = plant(SloshModel::Linear, FrictionModel::Stribeck);
         let held = Inputs { tau_cmd: Ramp::held(0.0), ..inputs };

@@ -19,6 +19,9 @@ const STEP_SHARE: f64 = 1e-2;
 /// Rates below this are nothing, rad/s: the floor of the error's scale.
 const NOTHING: f64 = 1e-6;
 
+/// From here on energies and forces may be no numbers, though angles and rates still are.
+const HUGE: f64 = 1e100;
+
 /// The integrator's steps, and the gyro's samples, that one call may take: one mode needs a
 /// fraction of a second for them, ten spherical ones some six seconds.
 pub(crate) const MAX_STEPS: usize = 200_000;
@@ -361,9 +364,10 @@ impl State {
         }
     }
 
-    /// Of the hub and so many modes.
+    /// Hub and so many modes, and what is made of them: numbers whose squares are numbers too.
     fn is_finite(&self, modes: usize) -> bool {
-        let modes = self.modes[..modes].iter().flatten().all(|x| x.is_finite());
-        self.theta.is_finite() && self.omega.is_finite() && modes
+        let is_number = |x: &f64| x.abs() < HUGE; // NaN is not
+        let hub = [self.theta, self.omega, self.work, self.heat];
+        hub.iter().chain(self.modes[..modes].iter().flatten()).all(is_number)
     }
 }
