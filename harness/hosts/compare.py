@@ -7,6 +7,7 @@ rows of a host that interpolates, 1e-6 is what to expect of Model Exchange at a 
 """
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -16,15 +17,37 @@ from hubslosh import drive, read_table
 
 SIGNALS = ["omega", "slosh_angle"]
 
-results = read_table(Path(sys.argv[1]), ["time", *SIGNALS])
-# Hosts write a row before and one after an event: the last of a time counts.
-time, first = np.unique(results["time"][::-1], return_index=True)
-here = {name: results[name][::-1][first] for name in SIGNALS}
-settings = dict(text.split("=", 1) for text in sys.argv[3:])
-there = drive(
-    Path(sys.argv[2]), time, np.zeros(len(time)), settings, hold=True, tolerance=1e-12,
-    columns=SIGNALS,
-)  # fmt: skip
-for name in SIGNALS:
-    difference = np.abs(here[name] - there[name]).max()
-    print(f"{name}: up to {np.abs(there[name]).max():.4f}, differs by up to {difference:.1e}")
+Signals = Mapping[str, np.ndarray]
+"""Histories by the names of the FMU's variables, SI units."""
+
+
+def compare(here: Signals, there: Signals, allowed: float = np.inf) -> None:
+    """Print the largest difference of each of a host's signals from fmpy's.
+
+    allowed: leave with 1 beyond this part of the signal's largest value.
+    """
+    for name, values in here.items():
+        largest, difference = np.abs(there[name]).max(), np.abs(values - there[name]).max()
+        print(f"{name}: up to {largest:.4f}, differs from fmpy's by up to {difference:.1e}")
+        if not difference <= allowed * largest:
+            sys.exit(f"error: {name} differs by {difference:.1e}")
+
+
+def main() -> None:
+    """Compare a table."""
+    if len(sys.argv) < 3:
+        sys.exit("usage: python compare.py RESULTS FMU [PARAMETER=VALUE]…")
+    results = read_table(Path(sys.argv[1]), ["time", *SIGNALS])
+    # Hosts write a row before and one after an event: the last of a time counts.
+    time, first = np.unique(results["time"][::-1], return_index=True)
+    here = {name: results[name][::-1][first] for name in SIGNALS}
+    settings = dict(text.split("=", 1) for text in sys.argv[3:])
+    there = drive(
+        Path(sys.argv[2]), time, np.zeros(len(time)), settings, hold=True, tolerance=1e-12,
+        columns=SIGNALS,
+    )  # fmt: skip
+    compare(here, there)
+
+
+if __name__ == "__main__":
+    main()

@@ -16,6 +16,8 @@ from pathlib import Path
 import numpy as np
 from ecospy import EcosSimulation, EcosSimulationStructure
 
+from compare import compare
+
 sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
 from hubslosh import drive
 
@@ -46,8 +48,4 @@ with EcosSimulationStructure() as structure:
 
 here = dict(zip(SIGNALS, np.array(rows).T, strict=True))
 there = drive(fmu, time, torque, PARAMETERS, hold=True, columns=SIGNALS)
-for name in SIGNALS:
-    difference = np.abs(here[name] - there[name]).max()
-    print(f"{name}: up to {np.abs(here[name]).max():.4f}, {difference:.1e} from fmpy")
-    if not difference <= 1e-9 * np.abs(there[name]).max():
-        sys.exit(f"error: {name} differs by {difference:.1e}")
+compare(here, there, allowed=1e-9)

@@ -37,7 +37,7 @@ except ModuleNotFoundError as missing:
     sys.exit(subprocess.run([environment.ensure(here, requirements), *sys.argv]).returncode)
 
 matplotlib.use("svg")
-import matplotlib.pyplot as plt  # noqa: E402 (the backend is chosen first)
+import matplotlib.pyplot as plt  # the backend is chosen first
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = ROOT / "modelDescription" / "documentation"
@@ -135,7 +135,7 @@ def scipy(method: str, tolerance: float, exact: np.ndarray) -> tuple[float, floa
 
 
 def basilisk() -> list[tuple[str, float, float]]:
-    """Return step in ms, cost beside ours at 1e-8, and error of Basilisk's RK4, as basilisk.md has them."""
+    """Return what basilisk.md has of its RK4: step in ms, cost beside ours at 1e-8, error."""
     rows = re.findall(
         r"^\| Basilisk's RK4 \| (\S+) \| (\S+) \| (\S+) \|$",
         (PAGES / "basilisk.md").read_text(),
@@ -246,12 +246,13 @@ def main() -> None:
         "![work-precision diagram](work_precision.svg)",
         "",
         f"One RK4 step of 5 ms on the same equations took {unit:.0f} ns; it is the unit of cost. "
-        "Instructions are callgrind's and repeat on any machine; times are the least of ten runs, piece by piece of 10 s, "
-        "of three whole runs for ode_solvers, of one for SciPy. "
+        "Instructions are callgrind's and repeat on any machine; times are the least of ten "
+        "runs, piece by piece of 10 s, of three whole runs for ode_solvers, of one for SciPy. "
         "The FMU's cost is that of the whole round through its C interface: two sets, "
         "fmi2DoStep, one get.",
         "",
-        "| error at most, rad/s | RK4 steps per 20 ms: linear | spherical | best other method, beside linear |",
+        "| error at most, rad/s | RK4 steps per 20 ms: linear | spherical "
+        "| best other method, beside linear |",
         "| --- | --- | --- | --- |",
         *ratios,
         "",

@@ -9,6 +9,7 @@ import environment
 
 
 def test_those_who_want_one_environment_at_once_get_one_that_works(tmp_path: Path) -> None:
+    """One process makes it, the others wait."""
     requirements = tmp_path / "requirements.txt"
     requirements.write_text("# nothing\n")
     command = [sys.executable, environment.__file__, tmp_path / "made", requirements]

@@ -89,9 +89,7 @@ def model_exchange(
     return {name: np.asarray(result[name])[here].astype(float) for name in result.dtype.names}
 
 
-def co_simulation(
-    fmu: Path, start: dict[str, float], torque: np.ndarray
-) -> dict[str, np.ndarray]:
+def co_simulation(fmu: Path, start: dict[str, float], torque: np.ndarray) -> dict[str, np.ndarray]:
     """Return the signals at TIME as the FMU itself finds them, to 1e-12."""
     columns = [*SIGNALS, "event_count"]
     return drive(fmu, TIME, torque, start, tolerance=1e-12, hold=True, columns=columns)
@@ -103,18 +101,14 @@ def test_cvode_finds_the_motion_of_co_simulation_on_the_bench(fmu: Path, model: 
     start = {"slosh.model": MODELS[model]}
     expected = co_simulation(fmu, start, bench_tau())
     assert expected["event_count"][-1] >= 70, "the hub sticks and slips"
-    found = model_exchange(
-        fmu, start, bench_tau(), held=1, solver="CVode", relative_tolerance=1e-9
-    )
+    found = model_exchange(fmu, start, bench_tau(), held=1, solver="CVode", relative_tolerance=1e-9)
     assert found["event_count"][-1] == expected["event_count"][-1]
     for name in SIGNALS:
         assert difference(found, expected, name) <= 1e-6, name
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_cvode_finds_the_motion_of_co_simulation_when_it_is_violent(
-    fmu: Path, model: str
-) -> None:
+def test_cvode_finds_the_motion_of_co_simulation_when_it_is_violent(fmu: Path, model: str) -> None:
     """Stick and slip as CVODE's root finder sees them, from jump to jump of the torque."""
     start = start_values(model)
     expected = co_simulation(fmu, start, tau())
