@@ -2,13 +2,14 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* A call that takes longer is a failure, s. */
+/* A call that takes more of the processor's time is a failure, s. Time on the clock would accuse calls
+ * that only waited for their turn on a busy machine. */
 extern double host_slowest_allowed;
 
 /* What happened so far, over all inputs. */
 extern struct host_report {
     unsigned long inputs, calls, accepted, messages;
-    /* of a single call, s */
+    /* of a single call, processor's time, s */
     double slowest;
     const char *slowest_call;
 } host_report;
