@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use hubslosh::description::{Type, Value};
 use hubslosh::fmi2::{EventInfo, Fmu, Instance, MODEL_EXCHANGE, Status};
 use hubslosh::pack::packed_for_tests;
 
@@ -190,7 +191,7 @@ fn compare(
     for name in ["stuck", "friction_mode"] {
         assert_eq!(host.instance.get(name).unwrap(), own.get(name).unwrap(), "{name}");
     }
-    let hubslosh::description::Value::Integer(count) = count else { panic!() };
+    let Value::Integer(count) = count else { panic!() };
     (host.events, count)
 }
 
@@ -342,11 +343,12 @@ fn calls_of_model_exchange_in_the_wrong_state_are_refused() {
     instance.continuous_states(&mut x).unwrap();
     instance.exit_initialization_mode().unwrap();
 
-    refused!(instance.set_continuous_states(&x), "\"event mode\"", "continuous-time mode");
-    refused!(instance.enter_event_mode(), "\"event mode\"");
+    refused!(instance.completed_integrator_step(), "\"event mode\"", "continuous-time mode");
     refused!(instance.status(0), "Co-Simulation");
+    instance.new_discrete_states().unwrap();
     instance.set("friction.c", "0.01").unwrap();
-    assert!(instance.set("tank.h", "0.05").is_err());
+    let error = instance.set("tank.h", "0.05").unwrap_err();
+    assert!(format!("{error:#}").contains("fixed parameter"), "{error:#}");
     instance.enter_continuous_time_mode().unwrap();
 
     refused!(instance.new_discrete_states(), "\"continuous-time mode\"");
@@ -371,6 +373,110 @@ fn calls_of_model_exchange_in_the_wrong_state_are_refused() {
     refused!(instance.enter_event_mode(), "\"terminated\"");
     instance.reset().unwrap();
     refused!(instance.enter_event_mode(), "\"instantiated\"");
+}
+
+/// OpenModelica 1.20 to 1.27 ends the initialization first and then sets all parameters but
+/// enumerations; it sets states, and enters event mode, in the event mode that it is in already
+/// (issue 12893 of its tracker; the template importFMU2ModelExchange of its CodegenFMU.tpl).
+#[test]
+fn openmodelica_up_to_1_27_gets_the_motion_of_the_parameters_it_sets() {
+    let settings = [
+        ("tank.h", "0.05"),
+        ("slosh.modes", "2"),
+        ("slosh.zeta_from_correlation", "false"),
+        ("friction.d", "0.004"),
+        ("init.slosh_angle", "0.3"),
+        ("init.omega", "0.08"),
+    ];
+    let fmu = open();
+    let mut with = fmu.instantiation("one");
+    with.kind = MODEL_EXCHANGE;
+    let mut instance = fmu.instantiate_with(&with).unwrap();
+    instance.setup_experiment(None, 0.0, None).unwrap();
+    instance.enter_initialization_mode().unwrap();
+    instance.exit_initialization_mode().unwrap();
+
+    let (mut reals, mut integers, mut booleans) = (vec![], vec![], vec![]);
+    let variables = &fmu.description().variables.list;
+    for v in variables.iter().filter(|v| v.causality == "parameter") {
+        let set = settings.iter().find(|(name, _)| *name == v.name).map(|(_, value)| *value);
+        let text = set.or(v.attributes().start.as_deref()).unwrap();
+        match fmu.description().value(v, text).unwrap() {
+            _ if v.kind() == Type::Enumeration => {}
+            Value::Real(x) => reals.push((v.reference, x)),
+            Value::Integer(n) => integers.push((v.reference, n)),
+            Value::Boolean(b) => booleans.push((v.reference, i32::from(b))),
+            Value::String(_) => panic!("{} is a text", v.name),
+        }
+    }
+    let (references, given): (Vec<_>, Vec<_>) = reals.into_iter().unzip();
+    instance.set_real(&references, &given).unwrap();
+    let (references, given): (Vec<_>, Vec<_>) = integers.into_iter().unzip();
+    instance.set_integer(&references, &given).unwrap();
+    let (references, given): (Vec<_>, Vec<_>) = booleans.into_iter().unzip();
+    instance.set_boolean(&references, &given).unwrap();
+
+    let mut host =
+        Host { instance, time: 0.0, x: [0.0; STATES], events: [0; 3], next: EventInfo::default() };
+    host.instance.continuous_states(&mut host.x).unwrap();
+    for (name, value) in [("tau_cmd", "0"), ("tau_ext", "0"), ("g_axial", "9.81")] {
+        host.instance.set(name, value).unwrap();
+    }
+    host.instance.set_continuous_states(&host.x).unwrap();
+    host.instance.event_indicators(&mut [0.0; INDICATORS]).unwrap();
+    host.indicators(0.0, &host.x.clone());
+    host.instance.enter_event_mode().unwrap();
+    host.event_iteration();
+    host.run(5.0, 5e-4);
+
+    let mut own = set_up(&fmu, hubslosh::fmi2::CO_SIMULATION, &settings);
+    own.do_step(0.0, 5.0).unwrap();
+    let exchanged = values(&mut host.instance);
+    for (name, expected) in values(&mut own) {
+        let got = exchanged[&name];
+        // as with stick and slip above
+        let allowed = 1e-7 * expected.abs().max(1.0);
+        assert!((got - expected).abs() <= allowed, "{name}: {got} {expected}");
+    }
+}
+
+#[test]
+fn parameters_set_after_initialization_are_as_good_as_before_and_bad_ones_are_refused() {
+    let fmu = open();
+    let mut late = set_up(&fmu, MODEL_EXCHANGE, &[]);
+    late.set("init.slosh_angle", "0.3").unwrap();
+    let error = late.set("tank.h", "-1").unwrap_err();
+    assert!(format!("{error:#}").contains("tank.h = -1.0 m (allowed: "), "{error:#}");
+    // The limits, set one after the other, contradict each other for a moment.
+    late.set("wheel.speed_min", "400").unwrap();
+    let error = late.new_discrete_states().unwrap_err();
+    assert!(error.text().contains("wheel.speed_max"), "{error}");
+    late.set("wheel.speed_max", "500").unwrap();
+    late.set("wheel.speed_0", "450").unwrap();
+    let saved = late.get_state().unwrap();
+    let mut early = set_up(
+        &fmu,
+        MODEL_EXCHANGE,
+        &[
+            ("init.slosh_angle", "0.3"),
+            ("wheel.speed_min", "400"),
+            ("wheel.speed_max", "500"),
+            ("wheel.speed_0", "450"),
+        ],
+    );
+    early.new_discrete_states().unwrap();
+    late.new_discrete_states().unwrap();
+    assert_eq!(values(&mut late), values(&mut early));
+    // Now it is an event as any other; going back brings the first one back.
+    assert!(late.set("init.slosh_angle", "0.2").is_err());
+    let bytes = late.serialize(&saved).unwrap();
+    let read = late.deserialize(&bytes).unwrap();
+    late.set_state(&read).unwrap();
+    late.set("init.slosh_angle", "0.2").unwrap();
+    assert_eq!(late.real("slosh_angle").unwrap(), 0.2);
+    for state in [saved, read] {
+        late.free_state(state).unwrap();
+    }
 }
 
 #[test]

@@ -32,7 +32,7 @@ pub enum Mode {
     Initialization = 1,
     /// Co-Simulation: ready for fmi2DoStep.
     Stepping = 2,
-    /// Model Exchange: at an event, or just initialised.
+    /// Model Exchange: at an event.
     Event = 3,
     /// Model Exchange: between events.
     Continuous = 4,
@@ -42,11 +42,14 @@ pub enum Mode {
     Failed = 6,
     /// A call panicked. Only freeing is left.
     Fatal = 7,
+    /// Model Exchange: event mode after initialization mode. Parameters can still be set, as
+    /// OpenModelica does; the first call that goes on makes it an event as any other.
+    Initialized = 8,
 }
 
 impl Mode {
     /// All of them, each at the place of its number.
-    pub const ALL: [Mode; 8] = [
+    pub const ALL: [Mode; 9] = [
         Mode::Instantiated,
         Mode::Initialization,
         Mode::Stepping,
@@ -55,6 +58,7 @@ impl Mode {
         Mode::Terminated,
         Mode::Failed,
         Mode::Fatal,
+        Mode::Initialized,
     ];
 
     /// As messages name it.
@@ -63,7 +67,7 @@ impl Mode {
             Mode::Instantiated => "instantiated",
             Mode::Initialization => "initialization mode",
             Mode::Stepping => "stepping",
-            Mode::Event => "event mode",
+            Mode::Event | Mode::Initialized => "event mode",
             Mode::Continuous => "continuous-time mode",
             Mode::Terminated => "terminated",
             Mode::Failed => "step failed",
@@ -75,13 +79,13 @@ impl Mode {
     pub const fn only_in(self) -> Option<Interface> {
         match self {
             Mode::Stepping => Some(Interface::CoSimulation),
-            Mode::Event | Mode::Continuous => Some(Interface::ModelExchange),
+            Mode::Event | Mode::Initialized | Mode::Continuous => Some(Interface::ModelExchange),
             _ => None,
         }
     }
 
-    const fn bit(self) -> u8 {
-        1 << self as u8
+    const fn bit(self) -> u16 {
+        1 << self as u16
     }
 }
 
@@ -102,28 +106,28 @@ pub struct Call {
     pub name: &'static str,
     /// The C type of the values it passes, if that is its business.
     pub c_type: Option<CType>,
-    allowed: u8,
+    allowed: u16,
     /// The interface it belongs to, if not to both.
     only_in: Option<Interface>,
 }
 
-const I: u8 = Mode::Instantiated.bit();
-const M: u8 = Mode::Initialization.bit();
-const S: u8 = Mode::Stepping.bit();
-const E: u8 = Mode::Event.bit();
-const C: u8 = Mode::Continuous.bit();
-const T: u8 = Mode::Terminated.bit();
-const F: u8 = Mode::Failed.bit();
+const I: u16 = Mode::Instantiated.bit();
+const M: u16 = Mode::Initialization.bit();
+const S: u16 = Mode::Stepping.bit();
+const E: u16 = Mode::Event.bit() | Mode::Initialized.bit();
+const C: u16 = Mode::Continuous.bit();
+const T: u16 = Mode::Terminated.bit();
+const F: u16 = Mode::Failed.bit();
 /// All but fatal.
-const ANY: u8 = I | M | S | E | C | T | F;
+const ANY: u16 = I | M | S | E | C | T | F;
 /// All in which the plant moves or has moved.
-const RUN: u8 = S | E | C | T | F;
+const RUN: u16 = S | E | C | T | F;
 
-const fn call(name: &'static str, allowed: u8) -> Call {
+const fn call(name: &'static str, allowed: u16) -> Call {
     Call { name, c_type: None, allowed, only_in: None }
 }
 
-const fn of(c_type: CType, name: &'static str, allowed: u8) -> Call {
+const fn of(c_type: CType, name: &'static str, allowed: u16) -> Call {
     Call { name, c_type: Some(c_type), allowed, only_in: None }
 }
 
@@ -177,12 +181,15 @@ mod list {
     pub static GET_BOOLEAN_STATUS:       Call = cs(call("fmi2GetBooleanStatus", ANY));
     pub static GET_STRING_STATUS:        Call = cs(call("fmi2GetStringStatus", ANY));
 
-    pub static ENTER_EVENT:              Call = me(call("fmi2EnterEventMode", C));
+    // The standard has this in continuous-time mode alone; OpenModelica up to 1.27 calls it in
+    // the event mode after initialization too.
+    pub static ENTER_EVENT:              Call = me(call("fmi2EnterEventMode", E | C));
     pub static NEW_DISCRETE_STATES:      Call = me(call("fmi2NewDiscreteStates", E));
     pub static ENTER_CONTINUOUS_TIME:    Call = me(call("fmi2EnterContinuousTimeMode", E));
     pub static COMPLETED_STEP:           Call = me(call("fmi2CompletedIntegratorStep", C));
     pub static SET_TIME:                 Call = me(call("fmi2SetTime", E | C));
-    pub static SET_CONTINUOUS_STATES:    Call = me(call("fmi2SetContinuousStates", C));
+    // As above.
+    pub static SET_CONTINUOUS_STATES:    Call = me(call("fmi2SetContinuousStates", E | C));
     pub static GET_DERIVATIVES:          Call = me(call("fmi2GetDerivatives", M | E | C | T | F));
     pub static GET_EVENT_INDICATORS:     Call = me(call("fmi2GetEventIndicators", M | E | C | T | F));
     pub static GET_CONTINUOUS_STATES:    Call = me(call("fmi2GetContinuousStates", M | E | C | T | F));
@@ -225,6 +232,8 @@ impl Call {
         }
         let possible =
             Mode::ALL.iter().filter(|m| m.only_in().is_none_or(|only| only == interface));
+        // To a host the first event mode is one as any other.
+        let possible = possible.filter(|m| **m != Mode::Initialized);
         let allowed: Vec<_> =
             possible.filter(|m| self.allowed & m.bit() != 0).map(|m| m.name()).collect();
         Err(self.error(format_args!(

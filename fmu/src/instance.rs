@@ -39,9 +39,9 @@ pub struct Instance {
     pub(crate) parameters: Vec<Value>,
     pub(crate) inputs: Inputs,
     /// There from the first look at it in initialization mode; gone when a
-    /// parameter or an input is set there.
+    /// parameter or an input is set there, or a parameter just after it.
     pub(crate) plant: Option<Plant>,
-    /// The regime since the last event, in Model Exchange once initialised.
+    /// The regime since the last event, in Model Exchange once it goes on.
     pub(crate) regime: Option<Regime>,
     /// What the plant shows now, if somebody has asked.
     pub(crate) shown: Option<Outputs>,
@@ -151,20 +151,28 @@ impl Instance {
     pub fn exit_initialization_mode(&mut self) -> Result<(), Fault> {
         let call = &calls::EXIT_INITIALIZATION;
         self.check(call)?;
-        let regime = self.shown(call)?.regime;
-        match self.interface {
-            Interface::CoSimulation => self.mode = Mode::Stepping,
-            Interface::ModelExchange => {
-                self.mode = Mode::Event;
-                self.regime = Some(regime);
-            }
+        self.shown(call)?;
+        self.mode = match self.interface {
+            Interface::CoSimulation => Mode::Stepping,
+            Interface::ModelExchange => Mode::Initialized,
+        };
+        Ok(())
+    }
+
+    /// Model Exchange goes on from initialization: parameters are what they are now.
+    fn go_on(&mut self, call: &Call) -> Result<(), Fault> {
+        if self.mode == Mode::Initialized {
+            self.regime = Some(self.shown(call)?.regime);
+            self.mode = Mode::Event;
         }
         Ok(())
     }
 
     /// fmi2Terminate
     pub fn terminate(&mut self) -> Result<(), Fault> {
-        self.check(&calls::TERMINATE)?;
+        let call = &calls::TERMINATE;
+        self.check(call)?;
+        self.go_on(call)?;
         self.mode = Mode::Terminated;
         Ok(())
     }
@@ -237,24 +245,28 @@ impl Instance {
     /// Sets an input or a parameter; what follows from it has to be computed anew.
     fn put(&mut self, call: &Call, reference: u32, value: Value) -> Result<(), Fault> {
         let scalar = scalar(call, reference)?;
-        match (scalar.variable.access, value) {
-            (Access::Input(ramp), Value::Real(x)) => ramp(&mut self.inputs).value = x,
+        let initial = match (scalar.variable.access, value) {
+            (Access::Input(ramp), Value::Real(x)) => {
+                ramp(&mut self.inputs).value = x;
+                matches!(self.mode, Mode::Instantiated | Mode::Initialization)
+            }
             (_, value) => {
                 if let Some(slot) = self.parameters.get_mut(scalar.slot) {
                     *slot = value;
                 }
+                !self.is_running()
             }
-        }
+        };
         self.shown = None;
-        if !self.is_running() {
+        if initial {
             self.plant = None;
         }
         Ok(())
     }
 
     /// Parameters that are fixed can no longer be set.
-    fn is_running(&self) -> bool {
-        !matches!(self.mode, Mode::Instantiated | Mode::Initialization)
+    pub(crate) fn is_running(&self) -> bool {
+        !matches!(self.mode, Mode::Instantiated | Mode::Initialization | Mode::Initialized)
     }
 
     fn check_set(
@@ -286,10 +298,11 @@ impl Instance {
                 )));
             }
         }
-        // Wrong inputs and wrong values while running are refused on the spot, wrong
-        // parameters before that all together when initialization ends.
+        // Wrong parameters are refused all together when initialization ends, everything
+        // else on the spot.
+        let later = is_parameter && matches!(self.mode, Mode::Instantiated | Mode::Initialization);
         match variable.problem(value) {
-            Some(problem) if !is_parameter || self.is_running() => Err(call.error(problem)),
+            Some(problem) if !later => Err(call.error(problem)),
             _ => Ok(variable),
         }
     }
@@ -527,7 +540,9 @@ impl Instance {
 
     /// fmi2EnterEventMode
     pub fn enter_event_mode(&mut self) -> Result<(), Fault> {
-        self.check(&calls::ENTER_EVENT)?;
+        let call = &calls::ENTER_EVENT;
+        self.check(call)?;
+        self.go_on(call)?;
         self.mode = Mode::Event;
         Ok(())
     }
@@ -537,6 +552,7 @@ impl Instance {
     pub fn new_discrete_states(&mut self) -> Result<EventInfo, Fault> {
         let call = &calls::NEW_DISCRETE_STATES;
         self.check(call)?;
+        self.go_on(call)?;
         let event = self.look(call, |plant, inputs| plant.take_event(inputs))?;
         let states_changed = event.map_err(|why| call.error(why))?;
         self.shown = None;
@@ -547,7 +563,9 @@ impl Instance {
 
     /// fmi2EnterContinuousTimeMode
     pub fn enter_continuous_time_mode(&mut self) -> Result<(), Fault> {
-        self.check(&calls::ENTER_CONTINUOUS_TIME)?;
+        let call = &calls::ENTER_CONTINUOUS_TIME;
+        self.check(call)?;
+        self.go_on(call)?;
         self.mode = Mode::Continuous;
         Ok(())
     }
@@ -583,6 +601,7 @@ impl Instance {
         if !time.is_finite() {
             return Err(call.error(format_args!("time = {time:?} s (allowed: any finite number)")));
         }
+        self.go_on(call)?;
         self.plant(call)?.set_time(time);
         self.time = time;
         self.shown = None;
@@ -605,6 +624,7 @@ impl Instance {
             }
             all[place] = *x;
         }
+        self.go_on(call)?;
         self.plant(call)?.set_continuous_states(&all);
         self.shown = None;
         Ok(())

@@ -139,16 +139,15 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Instance, String> {
     for word in &mut words {
         *word = u64::from_le_bytes(rest.take()?);
     }
-    let stepped = !matches!(mode, Mode::Instantiated | Mode::Initialization);
     if flags & HAS_PLANT != 0 {
         let parameters = saved.plant_parameters().map_err(|problems| problems.join("; "))?;
         let state = State::from_words(&words);
         let state = state.ok_or("the saved state is damaged: the plant's state")?;
         saved.plant = Some(Plant::resume(&parameters, &state, saved.tolerance));
-    } else if stepped {
+    } else if saved.is_running() {
         return Err("the saved state is damaged: the plant is missing".into());
     }
-    if saved.regime.is_some() != (stepped && interface == Interface::ModelExchange) {
+    if saved.regime.is_some() != (saved.is_running() && interface == Interface::ModelExchange) {
         return Err("the saved state is damaged: regime".into());
     }
     Ok(saved)
