@@ -1,0 +1,21 @@
+"""HubSlosh as SSP in OMSimulator 3, tried with its sources of November 2025 on Linux.
+
+    python harness/hosts/ssp.py dist/HubSlosh.fmu dist/HubSlosh.ssp
+    OMSimulatorPython3 harness/hosts/omsimulator.py        # from the project's root
+    python harness/hosts/compare.py dist/omsimulator_ssp.csv dist/HubSlosh.fmu tank.h=0.05 \
+        slosh.modes=2 init.slosh_angle=0.1 init.omega=0.02
+
+The system is that of ssp/: the liquid is released, nothing drives the hub.
+"""
+
+from OMSimulator import SSP, CRef, Settings
+
+Settings.suppressPath = True
+system = SSP("dist/HubSlosh.ssp").instantiate()
+system.setResultFile("dist/omsimulator_ssp.csv")
+system.setFixedStepSize(0.02)  # s
+system.initialize()
+system.simulate()
+print("slosh_angle", system.getValue(CRef("bench", "plant", "slosh_angle")), "rad")
+system.terminate()
+system.delete()
