@@ -800,6 +800,18 @@ fn the_handle_of_a_saved_state_is_reused_and_null_is_fine_to_free() {
     refused(instance.set_state_null(), &["FMUstate is NULL"]);
 }
 
+/// A mistake of fmusim 0.0.39, which would end its run with an error.
+#[test]
+fn a_saved_state_is_freed_by_itself_as_by_its_address() {
+    let fmu = open();
+    let mut instance = stepping(&fmu, &[]);
+    let saved = instance.get_state().unwrap();
+    instance.do_step(0.0, 0.1).unwrap();
+    instance.set_state(&saved).unwrap();
+    instance.free_state_itself(saved).unwrap();
+    instance.do_step(0.0, 0.1).unwrap();
+}
+
 #[test]
 fn bytes_that_are_no_state_are_refused() {
     let fmu = open();

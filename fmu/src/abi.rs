@@ -643,7 +643,8 @@ pub unsafe extern "C" fn fmi2SetFMUstate(c: fmi2Component, FMUstate: fmi2FMUstat
     }
 }
 
-/// Frees a saved state and clears the handle; NULL is fine.
+/// Frees a saved state and clears the handle; NULL is fine. fmusim (0.0.39) gives the state itself in
+/// place of the handle's address: known by its mark, which no address equals, it is freed too.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2FreeFMUstate(
     c: fmi2Component,
@@ -655,9 +656,13 @@ pub unsafe extern "C" fn fmi2FreeFMUstate(
             if FMUstate.is_null() || (*FMUstate).is_null() {
                 return Ok(());
             }
-            saved_state(call, *FMUstate)?.mark = 0;
-            drop(Box::from_raw((*FMUstate).cast::<SavedState>()));
-            *FMUstate = ptr::null_mut();
+            let is_itself = ptr::read(FMUstate.cast::<u64>()) == STATE;
+            let state = if is_itself { FMUstate.cast() } else { *FMUstate };
+            saved_state(call, state)?.mark = 0;
+            drop(Box::from_raw(state.cast::<SavedState>()));
+            if !is_itself {
+                *FMUstate = ptr::null_mut();
+            }
             Ok(())
         })
     }

@@ -1305,6 +1305,13 @@ impl<'fmu> Instance<'fmu> {
         self.set_state(&FmuState(null_mut()))
     }
 
+    /// fmi2FreeFMUstate with the state itself in place of its address, as fmusim calls it.
+    pub fn free_state_itself(&mut self, state: FmuState) -> Called {
+        // SAFETY: a handle from this FMU, gone after this call; it points to more than a pointer.
+        let status = unsafe { (self.fmu.functions.free_fmu_state)(self.component, state.0.cast()) };
+        self.check("fmi2FreeFMUstate", status)
+    }
+
     /// fmi2FreeFMUstate with NULL and with a pointer to NULL, which must both be fine.
     pub fn free_state_null(&mut self) -> Called {
         // SAFETY: see get_real_null.
