@@ -463,6 +463,12 @@ static void call(void) {
     case 26: CALL(fmi2SetFMUstate, c, state()); break;
     case 27:
         handle = &states[slot()];
+        if (*handle && one_in(8)) {
+            /* by itself in place of its address, as fmusim does; the host forgets it if it is gone */
+            if (CALL(fmi2FreeFMUstate, c, (fmi2FMUstate *)*handle) == fmi2OK)
+                *handle = NULL;
+            break;
+        }
         CALL(fmi2FreeFMUstate, c, one_in(24) ? NULL : handle);
         break;
     case 28: CALL(fmi2SerializedFMUstateSize, c, state(), array(1, sizeof(size_t))); break;

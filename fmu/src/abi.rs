@@ -444,7 +444,8 @@ pub unsafe extern "C" fn fmi2EnterInitializationMode(c: fmi2Component) -> fmi2St
     }
 }
 
-/// From here on parameters are fixed, and steps can be made.
+/// From here on parameters are fixed (in Model Exchange from the next call that goes on), and
+/// steps can be made.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2ExitInitializationMode(c: fmi2Component) -> fmi2Status {
     unsafe {
@@ -658,7 +659,9 @@ pub unsafe extern "C" fn fmi2FreeFMUstate(
             }
             let is_itself = ptr::read(FMUstate.cast::<u64>()) == STATE;
             let state = if is_itself { FMUstate.cast() } else { *FMUstate };
-            saved_state(call, state)?.mark = 0;
+            saved_state(call, state)?;
+            // as in fmi2FreeInstance
+            ptr::write_volatile(state.cast::<u64>(), 0);
             drop(Box::from_raw(state.cast::<SavedState>()));
             if !is_itself {
                 *FMUstate = ptr::null_mut();

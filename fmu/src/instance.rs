@@ -38,8 +38,8 @@ pub struct Instance {
     /// The parameters' values in the table's order, right or wrong.
     pub(crate) parameters: Vec<Value>,
     pub(crate) inputs: Inputs,
-    /// There from the first look at it in initialization mode; gone when a
-    /// parameter or an input is set there, or a parameter just after it.
+    /// There from the first look at it in initialization mode; gone when a parameter or an
+    /// input is set before the instance runs.
     pub(crate) plant: Option<Plant>,
     /// The regime since the last event, in Model Exchange once it goes on.
     pub(crate) regime: Option<Regime>,
@@ -245,26 +245,22 @@ impl Instance {
     /// Sets an input or a parameter; what follows from it has to be computed anew.
     fn put(&mut self, call: &Call, reference: u32, value: Value) -> Result<(), Fault> {
         let scalar = scalar(call, reference)?;
-        let initial = match (scalar.variable.access, value) {
-            (Access::Input(ramp), Value::Real(x)) => {
-                ramp(&mut self.inputs).value = x;
-                matches!(self.mode, Mode::Instantiated | Mode::Initialization)
-            }
+        match (scalar.variable.access, value) {
+            (Access::Input(ramp), Value::Real(x)) => ramp(&mut self.inputs).value = x,
             (_, value) => {
                 if let Some(slot) = self.parameters.get_mut(scalar.slot) {
                     *slot = value;
                 }
-                !self.is_running()
             }
-        };
+        }
         self.shown = None;
-        if initial {
+        if !self.is_running() {
             self.plant = None;
         }
         Ok(())
     }
 
-    /// Parameters that are fixed can no longer be set.
+    /// Parameters that are fixed can no longer be set, and the motion has begun.
     pub(crate) fn is_running(&self) -> bool {
         !matches!(self.mode, Mode::Instantiated | Mode::Initialization | Mode::Initialized)
     }
@@ -552,9 +548,9 @@ impl Instance {
     pub fn new_discrete_states(&mut self) -> Result<EventInfo, Fault> {
         let call = &calls::NEW_DISCRETE_STATES;
         self.check(call)?;
-        self.go_on(call)?;
         let event = self.look(call, |plant, inputs| plant.take_event(inputs))?;
         let states_changed = event.map_err(|why| call.error(why))?;
+        self.mode = Mode::Event;
         self.shown = None;
         self.regime = None;
         self.regime = Some(self.shown(call)?.regime);
