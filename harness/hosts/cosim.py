@@ -11,7 +11,6 @@ things to know: libcosim ignores enumerations (`slosh.model`, `friction.model`),
 linear model; and when an FMU returns an error it prints the FMU's message and ends the process.
 """
 
-import math
 import sys
 import tempfile
 import zipfile
@@ -24,13 +23,9 @@ from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
 from libcosimpy.CosimManipulator import CosimManipulator
 from libcosimpy.CosimObserver import CosimObserver
 
-from compare import compare
+from compare import STEP, compare, drive, sine
 from ssp import pack
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
-from hubslosh import drive
-
-STEP = 0.02  # s
 SIGNALS = ["theta", "omega", "slosh_angle", "omega_imu"]
 
 
@@ -61,13 +56,13 @@ def main() -> None:
     if len(sys.argv) != 2:
         sys.exit("usage: python cosim.py FMU")
     fmu = Path(sys.argv[1]).resolve()
-    time = np.arange(3001) * STEP
-    torque = 0.05 * np.sin(2 * math.pi * 2.4 * time)
+    time, torque = sine(60)
     with tempfile.TemporaryDirectory() as name:
         system, folder = Path(name) / "HubSlosh.ssp", Path(name) / "system"
         pack(fmu, system)
         read_ssd(str(system), validate=True)
         release = read_ssv(str(system), "resources/release.ssv", validate=True)
+        # libcosim takes the archive's folder.
         with zipfile.ZipFile(system) as archive:
             archive.extractall(folder)
         here = libcosim(folder, time, torque)

@@ -9,25 +9,21 @@ gets for the same steps. Two things to know: ecos can't set enumerations (`slosh
 look at the values, as here.
 """
 
-import math
 import sys
 from pathlib import Path
 
 import numpy as np
 from ecospy import EcosSimulation, EcosSimulationStructure
 
-from compare import compare
+from compare import STEP, compare, drive, sine
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "python"))
-from hubslosh import drive
-
-STEP = 0.02  # s
 PARAMETERS = {"tank.h": 0.05, "init.slosh_angle": 0.1, "init.omega": 0.02, "slosh.modes": 2}
 SIGNALS = ["theta", "omega", "slosh_angle"]
 
+if len(sys.argv) != 2:
+    sys.exit("usage: python ecos.py FMU")
 fmu = Path(sys.argv[1]).resolve()
-time = np.arange(3001) * STEP
-torque = 0.05 * np.sin(2 * math.pi * 2.4 * time)  # N·m, held over a step
+time, torque = sine(60)
 
 with EcosSimulationStructure() as structure:
     structure.add_model("plant", str(fmu))

@@ -3,8 +3,8 @@
 -- omsimulator.py.
 --
 --   OMSimulator harness/hosts/omsimulator.lua        (from the project's root)
---   python harness/hosts/compare.py dist/omsimulator_cs.csv dist/HubSlosh.fmu slosh.model=4 init.slosh_angle=0.3 init.omega=0.1
---   python harness/hosts/compare.py dist/omsimulator_me.csv dist/HubSlosh.fmu slosh.model=4 init.slosh_angle=0.3 init.omega=0.1
+--   python harness/hosts/compare.py dist/omsimulator_cs.csv dist/HubSlosh.fmu --prefix cs.root.plant. --driven slosh.model=4 init.slosh_angle=0.3 init.omega=0.1
+--   python harness/hosts/compare.py dist/omsimulator_me.csv dist/HubSlosh.fmu --prefix me.root.plant. slosh.model=4 init.slosh_angle=0.3 init.omega=0.1
 
 local step = 0.02 -- s
 

@@ -382,7 +382,8 @@ def _format(path: Path) -> str:
     return ending
 
 
-def _setting(text: str) -> tuple[str, str]:
+def setting(text: str) -> tuple[str, str]:
+    """Return name and value of an argument NAME=VALUE."""
     name, equals, value = text.partition("=")
     if not equals:
         raise argparse.ArgumentTypeError(f'"{text}" is not of the form name=value')
@@ -399,7 +400,7 @@ def main() -> None:
     )  # fmt: skip
     parser.add_argument("--out", type=Path, required=True, metavar="FILE")
     parser.add_argument(
-        "--set", type=_setting, action="append", default=[], metavar="NAME=VALUE", dest="settings",
+        "--set", type=setting, action="append", default=[], metavar="NAME=VALUE", dest="settings",
         help="a parameter or an input by its FMU name, SI units",
     )  # fmt: skip
     parser.add_argument("--tolerance", type=float, help="relative, for the FMU's solver")
