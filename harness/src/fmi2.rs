@@ -791,109 +791,73 @@ impl<'fmu> Instance<'fmu> {
 
     // ------------------------------------------------ variables by reference
 
+    /// One of the functions that write values into a slice.
+    fn fetch<T>(
+        &mut self,
+        name: &'static str,
+        function: Get<T>,
+        references: &[u32],
+        values: &mut [T],
+    ) -> Called {
+        assert_eq!(references.len(), values.len());
+        // SAFETY: two slices of the length given.
+        let status = unsafe {
+            function(self.component, references.as_ptr(), references.len(), values.as_mut_ptr())
+        };
+        self.check(name, status)
+    }
+
+    /// One of the functions that read values from a slice.
+    fn give<T>(
+        &mut self,
+        name: &'static str,
+        function: Set<T>,
+        references: &[u32],
+        values: &[T],
+    ) -> Called {
+        assert_eq!(references.len(), values.len());
+        // SAFETY: two slices of the length given.
+        let status = unsafe {
+            function(self.component, references.as_ptr(), references.len(), values.as_ptr())
+        };
+        self.check(name, status)
+    }
+
     /// fmi2GetReal.
     pub fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Called {
-        assert_eq!(references.len(), values.len());
-        // SAFETY: two slices of the length given; so in all calls of this section.
-        let status = unsafe {
-            (self.fmu.functions.get_real)(
-                self.component,
-                references.as_ptr(),
-                references.len(),
-                values.as_mut_ptr(),
-            )
-        };
-        self.check("fmi2GetReal", status)
+        self.fetch("fmi2GetReal", self.fmu.functions.get_real, references, values)
     }
 
     /// fmi2SetReal.
     pub fn set_real(&mut self, references: &[u32], values: &[f64]) -> Called {
-        assert_eq!(references.len(), values.len());
-        // SAFETY: see get_real.
-        let status = unsafe {
-            (self.fmu.functions.set_real)(
-                self.component,
-                references.as_ptr(),
-                references.len(),
-                values.as_ptr(),
-            )
-        };
-        self.check("fmi2SetReal", status)
+        self.give("fmi2SetReal", self.fmu.functions.set_real, references, values)
     }
 
     /// fmi2GetInteger (enumerations too).
     pub fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Called {
-        assert_eq!(references.len(), values.len());
-        // SAFETY: see get_real.
-        let status = unsafe {
-            (self.fmu.functions.get_integer)(
-                self.component,
-                references.as_ptr(),
-                references.len(),
-                values.as_mut_ptr(),
-            )
-        };
-        self.check("fmi2GetInteger", status)
+        self.fetch("fmi2GetInteger", self.fmu.functions.get_integer, references, values)
     }
 
     /// fmi2SetInteger (enumerations too).
     pub fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Called {
-        assert_eq!(references.len(), values.len());
-        // SAFETY: see get_real.
-        let status = unsafe {
-            (self.fmu.functions.set_integer)(
-                self.component,
-                references.as_ptr(),
-                references.len(),
-                values.as_ptr(),
-            )
-        };
-        self.check("fmi2SetInteger", status)
+        self.give("fmi2SetInteger", self.fmu.functions.set_integer, references, values)
     }
 
     /// fmi2GetBoolean; the C values, of which only 0 and 1 are proper.
     pub fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Called {
-        assert_eq!(references.len(), values.len());
-        // SAFETY: see get_real.
-        let status = unsafe {
-            (self.fmu.functions.get_boolean)(
-                self.component,
-                references.as_ptr(),
-                references.len(),
-                values.as_mut_ptr(),
-            )
-        };
-        self.check("fmi2GetBoolean", status)
+        self.fetch("fmi2GetBoolean", self.fmu.functions.get_boolean, references, values)
     }
 
     /// fmi2SetBoolean; the C values, of which every non-zero one is true.
     pub fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Called {
-        assert_eq!(references.len(), values.len());
-        // SAFETY: see get_real.
-        let status = unsafe {
-            (self.fmu.functions.set_boolean)(
-                self.component,
-                references.as_ptr(),
-                references.len(),
-                values.as_ptr(),
-            )
-        };
-        self.check("fmi2SetBoolean", status)
+        self.give("fmi2SetBoolean", self.fmu.functions.set_boolean, references, values)
     }
 
     /// fmi2GetString; the texts are copied, because the FMU's live only until the next call.
     pub fn get_string(&mut self, references: &[u32]) -> Called<Vec<String>> {
         let mut pointers: Vec<*const c_char> = vec![null(); references.len()];
-        // SAFETY: see get_real.
-        let status = unsafe {
-            (self.fmu.functions.get_string)(
-                self.component,
-                references.as_ptr(),
-                references.len(),
-                pointers.as_mut_ptr(),
-            )
-        };
-        self.check("fmi2GetString", status)?;
+        let function = self.fmu.functions.get_string;
+        self.fetch("fmi2GetString", function, references, &mut pointers)?;
         let text = |p: *const c_char| {
             if p.is_null() {
                 return String::new();
@@ -906,20 +870,10 @@ impl<'fmu> Instance<'fmu> {
 
     /// fmi2SetString.
     pub fn set_string(&mut self, references: &[u32], values: &[&str]) -> Called {
-        assert_eq!(references.len(), values.len());
         let values: Vec<CString> =
             values.iter().map(|v| CString::new(*v).unwrap_or_default()).collect();
         let pointers: Vec<*const c_char> = values.iter().map(|v| v.as_ptr()).collect();
-        // SAFETY: see get_real.
-        let status = unsafe {
-            (self.fmu.functions.set_string)(
-                self.component,
-                references.as_ptr(),
-                references.len(),
-                pointers.as_ptr(),
-            )
-        };
-        self.check("fmi2SetString", status)
+        self.give("fmi2SetString", self.fmu.functions.set_string, references, &pointers)
     }
 
     /// fmi2SetRealInputDerivatives.
@@ -930,7 +884,7 @@ impl<'fmu> Instance<'fmu> {
         values: &[f64],
     ) -> Called {
         assert!(references.len() == orders.len() && orders.len() == values.len());
-        // SAFETY: see get_real.
+        // SAFETY: slices of the lengths given.
         let status = unsafe {
             (self.stepping().set_real_input_derivatives)(
                 self.component,
@@ -951,7 +905,7 @@ impl<'fmu> Instance<'fmu> {
         values: &mut [f64],
     ) -> Called {
         assert!(references.len() == orders.len() && orders.len() == values.len());
-        // SAFETY: see get_real.
+        // SAFETY: slices of the lengths given.
         let status = unsafe {
             (self.stepping().get_real_output_derivatives)(
                 self.component,
@@ -973,7 +927,7 @@ impl<'fmu> Instance<'fmu> {
     ) -> Called<Vec<f64>> {
         assert_eq!(knowns.len(), change.len());
         let mut answer = vec![0.0; unknowns.len()];
-        // SAFETY: see get_real.
+        // SAFETY: slices of the lengths given.
         let status = unsafe {
             (self.fmu.functions.get_directional_derivative)(
                 self.component,

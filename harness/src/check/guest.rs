@@ -215,9 +215,50 @@ impl Guest {
 
     /// A new instance, initialised with what the FMU suggests.
     pub fn running(&self, interface: Interface) -> Result<Session<'_>> {
+        self.session_in(interface, Stage::Initialised)
+    }
+
+    /// A new instance in a state of its life.
+    pub fn session_in(&self, interface: Interface, stage: Stage) -> Result<Session<'_>> {
         let mut session = self.session(interface)?;
-        session.initialise()?;
+        match stage {
+            Stage::Instantiated => {}
+            Stage::Initialization => {
+                session.instance.setup_experiment(None, session.time, None)?;
+                session.instance.enter_initialization_mode()?;
+            }
+            Stage::Initialised => session.initialise()?,
+            Stage::Terminated => {
+                session.initialise()?;
+                session.instance.terminate()?;
+            }
+        }
         Ok(session)
+    }
+}
+
+/// The states of an instance's life in which rules call it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// After fmi2Instantiate.
+    Instantiated,
+    /// After fmi2EnterInitializationMode.
+    Initialization,
+    /// Ready for a step; in Model Exchange in continuous-time mode.
+    Initialised,
+    /// After fmi2Terminate.
+    Terminated,
+}
+
+impl Stage {
+    /// As findings name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Stage::Instantiated => "instantiated",
+            Stage::Initialization => "initialization mode",
+            Stage::Initialised => "initialised",
+            Stage::Terminated => "terminated",
+        }
     }
 }
 

@@ -4,7 +4,7 @@
 use anyhow::Result;
 
 use super::Findings;
-use super::guest::{Guest, Interface, Reading, STEPS, Session};
+use super::guest::{Guest, Interface, Reading, STEPS, Session, Stage};
 use crate::fmi2::{CallError, Callbacks, HostState, Instantiation, Status};
 
 /// `load.opens`: what came before is the check.
@@ -278,22 +278,15 @@ fn perturb(session: &mut Session) {
 pub fn reset_anywhere(guest: &Guest, findings: &mut Findings) -> Result<()> {
     for interface in guest.interfaces() {
         guest.running(interface)?; // if that fails, another rule tells
-        for from in ["instantiated", "initialization mode", "terminated", "after an error"] {
-            let mut session = guest.session(interface)?;
-            match from {
-                "initialization mode" => {
-                    session.instance.setup_experiment(None, session.time, None)?;
-                    session.instance.enter_initialization_mode()?;
-                }
-                "terminated" => {
-                    session.initialise()?;
-                    session.instance.terminate()?;
-                }
-                "after an error" => {
-                    session.initialise()?;
-                    let _ = session.instance.get_real(&[u32::MAX], &mut [0.0]);
-                }
-                _ => {}
+        for (stage, from) in [
+            (Stage::Instantiated, Stage::Instantiated.name()),
+            (Stage::Initialization, Stage::Initialization.name()),
+            (Stage::Terminated, Stage::Terminated.name()),
+            (Stage::Initialised, "after an error"),
+        ] {
+            let mut session = guest.session_in(interface, stage)?;
+            if stage == Stage::Initialised {
+                let _ = session.instance.get_real(&[u32::MAX], &mut [0.0]);
             }
             let place = format!("fmi2Reset, {from} ({})", interface.name());
             guest.doing(&place);
@@ -345,37 +338,27 @@ pub fn order(guest: &Guest, findings: &mut Findings) -> Result<()> {
         ("fmi2EnterContinuousTimeMode", |s| s.instance.enter_continuous_time_mode());
     let completed: Misplaced =
         ("fmi2CompletedIntegratorStep", |s| s.instance.completed_integrator_step().map(|_| ()));
-    let common: [(&str, Vec<Misplaced>); 4] = [
-        ("instantiated", vec![exit, terminate]),
-        ("initialization mode", vec![setup, enter, terminate]),
-        ("initialised", vec![setup, enter, exit]),
-        ("terminated", vec![setup, enter, exit, terminate]),
+    let common: [(Stage, Vec<Misplaced>); 4] = [
+        (Stage::Instantiated, vec![exit, terminate]),
+        (Stage::Initialization, vec![setup, enter, terminate]),
+        (Stage::Initialised, vec![setup, enter, exit]),
+        (Stage::Terminated, vec![setup, enter, exit, terminate]),
     ];
     for interface in guest.interfaces() {
         let own = match interface {
             Interface::CoSimulation => vec![step],
             Interface::ModelExchange => vec![event, discrete, continuous, completed],
         };
-        for (state, calls) in &common {
-            let more: &[Misplaced] = match *state {
-                "initialised" if interface == Interface::CoSimulation => &[],
+        for (stage, calls) in &common {
+            let more: &[Misplaced] = match stage {
+                Stage::Initialised if interface == Interface::CoSimulation => &[],
                 // continuous-time mode allows the first and the last
-                "initialised" => &own[1..3],
+                Stage::Initialised => &own[1..3],
                 _ => &own,
             };
             for (call, made) in calls.iter().chain(more) {
-                let mut session = guest.session(interface)?;
-                match *state {
-                    "instantiated" => {}
-                    "initialization mode" => {
-                        session.instance.setup_experiment(None, session.time, None)?;
-                        session.instance.enter_initialization_mode()?;
-                    }
-                    _ => session.initialise()?,
-                }
-                if *state == "terminated" {
-                    session.instance.terminate()?;
-                }
+                let mut session = guest.session_in(interface, *stage)?;
+                let state = stage.name();
                 let place = format!("{call} in state \"{state}\" ({})", interface.name());
                 guest.doing(&place);
                 expect_refusal(findings, place, made(&mut session));

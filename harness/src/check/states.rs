@@ -3,7 +3,7 @@
 use anyhow::Result;
 
 use super::Findings;
-use super::guest::{Guest, Interface, Mark, Reading, STEPS, Session};
+use super::guest::{Guest, Interface, Mark, Reading, STEPS, Session, Stage};
 
 /// Interfaces that declare a capability; none is a reason to skip.
 fn with(guest: &Guest, flag: &str, findings: &mut Findings) -> Vec<Interface> {
@@ -173,19 +173,9 @@ pub fn garbage(guest: &Guest, findings: &mut Findings) -> Result<()> {
 /// `states.modes`
 pub fn modes(guest: &Guest, findings: &mut Findings) -> Result<()> {
     for interface in with(guest, SAVE, findings) {
-        for mode in ["instantiated", "initialization mode", "terminated"] {
-            let mut session = guest.session(interface)?;
-            match mode {
-                "initialization mode" => {
-                    session.instance.setup_experiment(None, session.time, None)?;
-                    session.instance.enter_initialization_mode()?;
-                }
-                "terminated" => {
-                    session.initialise()?;
-                    session.instance.terminate()?;
-                }
-                _ => {}
-            }
+        for stage in [Stage::Instantiated, Stage::Initialization, Stage::Terminated] {
+            let mut session = guest.session_in(interface, stage)?;
+            let mode = stage.name();
             let place =
                 format!("fmi2GetFMUstate and fmi2SetFMUstate, {mode} ({})", interface.name());
             guest.doing(&place);
