@@ -335,11 +335,14 @@ fn calls_of_model_exchange_in_the_wrong_state_are_refused() {
     refused!(instance.continuous_states(&mut x), "\"instantiated\"");
     refused!(instance.new_discrete_states(), "\"instantiated\"", "event mode");
     refused!(instance.do_step(0.0, 0.1), "Co-Simulation", "Model Exchange");
+    refused!(instance.set_continuous_states(&x), "\"instantiated\"", "continuous-time mode");
     instance.nominals(&mut x).unwrap();
     assert!(x.iter().all(|x| *x > 0.0));
 
     instance.enter_initialization_mode().unwrap();
     refused!(instance.set_time(0.0), "\"initialization mode\"", "event mode");
+    refused!(instance.set_continuous_states(&x), "\"initialization mode\"", "event mode");
+    refused!(instance.enter_event_mode(), "\"initialization mode\"", "continuous-time mode");
     instance.continuous_states(&mut x).unwrap();
     instance.exit_initialization_mode().unwrap();
 
@@ -371,6 +374,7 @@ fn calls_of_model_exchange_in_the_wrong_state_are_refused() {
     instance.terminate().unwrap();
     instance.derivatives(&mut x).unwrap();
     refused!(instance.enter_event_mode(), "\"terminated\"");
+    refused!(instance.set_continuous_states(&x), "\"terminated\"");
     instance.reset().unwrap();
     refused!(instance.enter_event_mode(), "\"instantiated\"");
 }
