@@ -34,7 +34,7 @@ const TOLERANCE: f64 = 1e-12;
 
 /// Where the files are committed.
 pub fn folder() -> PathBuf {
-    pack::root().join("modelDescription").join(pack::EXTRA)
+    pack::root().join("modelDescription/HubSlosh").join(pack::EXTRA)
 }
 
 /// Writes input, options and reference to `folder`, the reference from the given FMU.

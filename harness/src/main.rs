@@ -44,7 +44,7 @@ enum Command {
     CheckCalls(CheckCallsArgs),
     Scale(ScaleArgs),
     Gyro(GyroArgs),
-    /// Writes the example that travels with the FMU (modelDescription/extra): torque and answer.
+    /// Writes the example that travels with the FMU (modelDescription/HubSlosh/extra): torque and answer.
     Example {
         /// The FMU that answers.
         #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]

@@ -168,7 +168,7 @@ fn archive(binaries: &[Packed], out: &Path) -> Result<()> {
 /// expect.
 fn files(binaries: &[Packed]) -> Result<Vec<(String, Vec<u8>)>> {
     let root = root();
-    let source = root.join("modelDescription");
+    let source = root.join("modelDescription").join("HubSlosh");
     let read = |path: PathBuf| {
         std::fs::read(&path).with_context(|| format!("{} cannot be read", path.display()))
     };
@@ -199,7 +199,7 @@ fn files(binaries: &[Packed]) -> Result<Vec<(String, Vec<u8>)>> {
     let texts: BTreeSet<_> = components.iter().flat_map(|component| &component.texts).collect();
     for text in texts {
         let own = components::OWN_TEXTS.contains(&text.as_str());
-        let folder = if own { root.clone() } else { source.join("licenses") };
+        let folder = if own { root.clone() } else { root.join("modelDescription/licenses") };
         files.push((format!("documentation/licenses/{text}"), read(folder.join(text))?));
     }
 

@@ -1,5 +1,5 @@
 //! A campaign's plan: a TOML file, read, checked and expanded into runs. The format by example:
-//! `modelDescription/documentation/campaigns.md`.
+//! `modelDescription/HubSlosh/documentation/campaigns.md`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -844,7 +844,7 @@ mod tests {
 
     /// The FMU's own description, without the FMU.
     fn description() -> ModelDescription {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../modelDescription/modelDescription.xml");
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../modelDescription/HubSlosh/modelDescription.xml");
         ModelDescription::from_xml(&std::fs::read_to_string(path).unwrap()).unwrap()
     }
 

@@ -49,7 +49,7 @@ fn every_link_and_figure_of_the_documentation_is_in_the_fmu() {
 
 #[test]
 fn every_page_is_listed_in_the_introduction() {
-    let folder = hubslosh::pack::root().join("modelDescription").join("documentation");
+    let folder = hubslosh::pack::root().join("modelDescription/HubSlosh/documentation");
     let introduction = std::fs::read_to_string(folder.join("index.md")).unwrap();
     for file in folder.read_dir().unwrap().flatten() {
         let name = file.file_name().to_string_lossy().into_owned();

@@ -238,7 +238,7 @@ fn an_fmu_whose_description_and_binary_do_not_belong_together_is_refused() {
 
 #[test]
 fn the_scaling_page_shows_what_its_commands_print() {
-    let page = hubslosh::pack::root().join("modelDescription/documentation/scaling.md");
+    let page = hubslosh::pack::root().join("modelDescription/HubSlosh/documentation/scaling.md");
     let page = std::fs::read_to_string(page).unwrap();
     let mut commands = 0;
     for block in page.split("\n\n") {

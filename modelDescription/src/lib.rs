@@ -14,7 +14,7 @@ use HubSlosh::table::{self, ENUMERATIONS, MODEL, SCALARS, Scalar, UNITS, VERSION
 use HubSlosh::variable::{Access, Causality, Kind, Value};
 
 /// Where the committed XML is.
-pub const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/modelDescription.xml");
+pub const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/HubSlosh/modelDescription.xml");
 
 /// The date of the release; not of the build, which the same commit must survive
 /// byte for byte.

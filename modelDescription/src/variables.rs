@@ -6,7 +6,7 @@ use HubSlosh::table::{ENUMERATIONS, TABLE};
 use HubSlosh::variable::{Causality, Kind, Value, Variable};
 
 /// Where the committed page is.
-pub const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/documentation/variables.md");
+pub const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/HubSlosh/documentation/variables.md");
 
 const CHAPTERS: [(Causality, &str, &str); 5] = [
     (
