@@ -4,10 +4,10 @@
 use std::collections::BTreeSet;
 use std::fs::File;
 
-use hubslosh::description::Type;
-use hubslosh::fmi2::{CallError, Callbacks, Fmu, Instance, Message, Status};
-use hubslosh::pack::packed_for_tests;
+use host::description::Type;
+use host::fmi2::{CallError, Callbacks, Fmu, Instance, Message, Status};
 use object::Object;
+use pack::packed_for_tests;
 
 /// fmi2StatusKind
 const DO_STEP_STATUS: i32 = 0;
@@ -143,7 +143,7 @@ fn archive_begins_with_the_model_description_and_is_plain() {
 fn the_same_source_gives_the_same_archive() {
     let directory = tempfile();
     let again = directory.path().join("again.fmu");
-    hubslosh::pack::pack(&again).unwrap();
+    pack::pack(&again).unwrap();
     // Cargo builds once for both; what packing adds is the same each time.
     assert!(std::fs::read(again).unwrap() == std::fs::read(packed_for_tests()).unwrap());
 }

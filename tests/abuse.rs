@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use common::{python, run};
-use hubslosh::fmi2::Fmu;
-use hubslosh::pack::{packed_for_tests, root};
+use host::fmi2::Fmu;
+use pack::{packed_for_tests, root};
 
 /// The unpacked binary, and what the C hosts need to know of the FMU.
 struct Unpacked {

@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 use std::process::{Command, Output};
 
-use hubslosh::pack;
 use plant::{FrictionModel, Parameters, SloshModel};
 
 /// Every slosh model.

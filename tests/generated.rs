@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 
 use HubSlosh::table::TABLE;
 use HubSlosh::variable::Causality;
-use hubslosh::pack;
 use model_description::{icon, variables};
 
 const GENERATE: &str = "run `cargo run --release -p model-description`";
@@ -34,7 +33,8 @@ fn icon_is_a_png_of_the_drawing() {
 
 #[test]
 fn every_input_and_output_is_in_one_terminal() {
-    let path = pack::root().join("modelDescription/HubSlosh/terminalsAndIcons/terminalsAndIcons.xml");
+    let path =
+        pack::root().join("modelDescription/HubSlosh/terminalsAndIcons/terminalsAndIcons.xml");
     let text = std::fs::read_to_string(path).unwrap();
     let mut members = BTreeMap::new();
     for event in xml::EventReader::from_str(&text) {

@@ -6,8 +6,8 @@ use fmi::EventFlags;
 use fmi::fmi2::import::Fmi2Import;
 use fmi::fmi2::instance::{CoSimulation, Common, ModelExchange};
 use fmi::traits::FmiImport;
-use hubslosh::fmi2::{Fmu, Instance, MODEL_EXCHANGE};
-use hubslosh::pack::packed_for_tests;
+use host::fmi2::{Fmu, Instance, MODEL_EXCHANGE};
+use pack::packed_for_tests;
 
 const STATES: usize = 46;
 const INDICATORS: usize = 8;
@@ -60,7 +60,7 @@ fn co_simulation_gives_the_crate_fmi_the_bits_that_it_gives_us() {
     let mut theirs = import.instantiate_cs("theirs", false, true).unwrap();
     assert_eq!(theirs.get_types_platform(), "default");
     start(&mut theirs, &fmu);
-    let mut ours = started(&fmu, hubslosh::fmi2::CO_SIMULATION);
+    let mut ours = started(&fmu, host::fmi2::CO_SIMULATION);
     let outputs: Vec<u32> = (0..OUTPUTS as u32).collect();
     let torque = references(&fmu, &["tau_cmd"]);
     let (mut saved, mut after) = (Vec::new(), Vec::new());

@@ -3,9 +3,9 @@
 
 use std::collections::BTreeMap;
 
-use hubslosh::description::{Type, Value};
-use hubslosh::fmi2::{EventInfo, Fmu, Instance, MODEL_EXCHANGE, Status};
-use hubslosh::pack::packed_for_tests;
+use host::description::{Type, Value};
+use host::fmi2::{EventInfo, Fmu, Instance, MODEL_EXCHANGE, Status};
+use pack::packed_for_tests;
 
 fn open() -> Fmu {
     Fmu::open(packed_for_tests()).unwrap()
@@ -159,7 +159,7 @@ fn compare(
     (end, h, allowed): (f64, f64, f64),
 ) -> ([usize; 3], i32) {
     let fmu = open();
-    let mut own = set_up(&fmu, hubslosh::fmi2::CO_SIMULATION, settings);
+    let mut own = set_up(&fmu, host::fmi2::CO_SIMULATION, settings);
     let mut host = Host::new(&fmu, settings);
     let mut stops: Vec<f64> = (1..=end as usize).map(|n| n as f64).collect();
     stops.extend(changes.iter().map(|change| change.0));
@@ -270,7 +270,7 @@ fn regime_changes_at_events_alone() {
         } else {
             3
         };
-        assert_eq!(regime, hubslosh::description::Value::Integer(expected), "{n}");
+        assert_eq!(regime, host::description::Value::Integer(expected), "{n}");
         seen.push(expected);
     }
     assert!(host.events[2] > 5 && seen.contains(&1) && seen.contains(&3), "{:?}", host.events);
@@ -290,7 +290,7 @@ fn regime_changes_at_events_alone() {
 fn euler_meets_co_simulation_to_first_order() {
     let fmu = open();
     let settings = [("init.omega", "0.08"), ("init.slosh_angle", "0.3")];
-    let mut own = set_up(&fmu, hubslosh::fmi2::CO_SIMULATION, &settings);
+    let mut own = set_up(&fmu, host::fmi2::CO_SIMULATION, &settings);
     own.do_step(0.0, 5.0).unwrap();
     let mut worst = Vec::new();
     for h in [1e-4, 5e-5] {
@@ -436,7 +436,7 @@ fn openmodelica_up_to_1_27_gets_the_motion_of_the_parameters_it_sets() {
     host.run(5.0, 5e-4);
 
     let all: Vec<_> = settings.into_iter().chain(inputs).collect();
-    let mut own = set_up(&fmu, hubslosh::fmi2::CO_SIMULATION, &all);
+    let mut own = set_up(&fmu, host::fmi2::CO_SIMULATION, &all);
     own.do_step(0.0, 5.0).unwrap();
     let exchanged = values(&mut host.instance);
     for (name, expected) in values(&mut own) {

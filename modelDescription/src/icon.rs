@@ -4,7 +4,8 @@
 use resvg::{tiny_skia, usvg};
 
 /// The drawing.
-pub const SOURCE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/HubSlosh/terminalsAndIcons/icon.svg");
+pub const SOURCE: &str =
+    concat!(env!("CARGO_MANIFEST_DIR"), "/HubSlosh/terminalsAndIcons/icon.svg");
 /// Where the committed picture is; the FMU has it as `model.png` and as `terminalsAndIcons/icon.png`.
 pub const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/HubSlosh/terminalsAndIcons/icon.png");
 /// Width and height, px.

@@ -1,0 +1,248 @@
+//! The simulated gyro looked at as one on a bench: hours at rest, the Allan deviation, the noise that
+//! it shows beside the noise that was put in. What is computed: [`allan`].
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use anyhow::{Context, Result, ensure};
+use rayon::prelude::*;
+
+use crate::analysis::allan::{self, Noise, Point};
+use crate::profile::{Torque, Written};
+use crate::progress::Progress;
+use crate::run::Run;
+use crate::svg::{Axis, Chart, Series, Style};
+use crate::table::Table;
+use host::fmi2::Fmu;
+use host::output;
+
+/// The longest record in steps, about 0.3 GB.
+const MOST_STEPS: f64 = 1e7;
+/// The shortest record in correlation times of the bias, for its peak (at 1.89) to be seen: the
+/// longest averaging time is a tenth of the record.
+const LEAST_TIMES: f64 = 30.0;
+
+/// What is to be recorded.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    /// Start values by FMU name, as text; not `imu.enabled` and `imu.seed`.
+    pub settings: Vec<(String, String)>,
+    /// Length of a record, h.
+    pub hours: f64,
+    /// Records: their `imu.seed` counts from 1.
+    pub records: usize,
+}
+
+/// What was put in and what was found.
+#[derive(Clone, Debug)]
+pub struct Characteristics {
+    /// What was put in; N with the noise that rounding to `imu.lsb` adds, lsb/√(12 rate).
+    pub asked: Noise,
+    /// What the mean of the records' Allan variances shows.
+    pub found: Noise,
+    /// Standard errors of `found`, from the scatter of the single records; not numbers if there is
+    /// only one.
+    pub error: Noise,
+    /// The mean of the records' Allan variances, (rad/s)².
+    pub points: Vec<Point>,
+}
+
+impl Recording {
+    /// Makes the records, several at a time, and looks at them. Fails if the hub does not rest, if
+    /// the gyro has no noise, or if the records are too short for its bias.
+    pub fn characterise(
+        &self,
+        fmu: &Fmu,
+        watch: &(dyn Fn(Progress) + Sync),
+    ) -> Result<Characteristics> {
+        ensure!(self.records > 0, "at least one record is needed");
+        ensure!(
+            self.hours > 0.0 && self.hours.is_finite(),
+            "a record must last a positive number of hours, not {}",
+            self.hours
+        );
+        for name in ["imu.enabled", "imu.seed"] {
+            ensure!(
+                self.settings.iter().all(|(set, _)| set != name),
+                "{name} cannot be set: the gyro is on, the records' seeds count from 1"
+            );
+        }
+        let seconds = self.hours * 3600.0;
+        let mut instance = self.run(1, 1.0, 1.0)?.initialise(fmu)?;
+        let mut real = |name: &str| instance.real(name);
+        let (rate, lsb) = (real("imu.rate")?, real("imu.lsb")?);
+        let asked = Noise {
+            arw: real("imu.arw")?.hypot(lsb / (12.0 * rate).sqrt()),
+            bias_instability: real("imu.bias_instability")?,
+            bias_time: real("imu.bias_time")?,
+        };
+        drop(instance);
+        ensure!(
+            asked.arw > 0.0 || asked.bias_instability > 0.0,
+            "the gyro has no noise: imu.arw, imu.bias_instability and imu.lsb are 0"
+        );
+        ensure!(
+            asked.bias_instability == 0.0 || seconds >= LEAST_TIMES * asked.bias_time,
+            "a bias of imu.bias_time = {} s needs records of {:.2} h or more, not {} h",
+            asked.bias_time,
+            LEAST_TIMES * asked.bias_time / 3600.0,
+            self.hours
+        );
+        ensure!(
+            (100.0..=MOST_STEPS).contains(&(seconds * rate)),
+            "{} h at imu.rate = {rate} Hz are {:.0} samples; 100 to {MOST_STEPS:.0} are allowed",
+            self.hours,
+            seconds * rate
+        );
+
+        let runs = (1..=self.records)
+            .map(|seed| self.run(seed, 1.0 / rate, seconds))
+            .collect::<Result<Vec<_>>>()?;
+        let steps = runs.iter().map(|run| run.steps() as u64).sum();
+        watch(Progress::Begins { runs: runs.len(), steps });
+        let records: Vec<Vec<Point>> =
+            runs.par_iter().map(|run| record(run, fmu, watch)).collect::<Result<_>>()?;
+        Characteristics::of(asked, &records)
+    }
+
+    /// One record, sampled at the gyro's own instants.
+    fn run(&self, seed: usize, step: f64, stop: f64) -> Result<Run> {
+        let ours = [("imu.enabled", "true".to_string()), ("imu.seed", seed.to_string())];
+        let ours = ours.map(|(name, value)| (name.to_string(), value));
+        let torque: Torque = format!("zero:duration={stop}").parse::<Written>()?.torque()?;
+        let settings = [&self.settings[..], &ours].concat();
+        Ok(Run { settings, torque, step, stop, tolerance: None, hold: true })
+    }
+}
+
+/// The Allan variances of one record.
+fn record(run: &Run, fmu: &Fmu, watch: &(dyn Fn(Progress) + Sync)) -> Result<Vec<Point>> {
+    let mut instance = run.initialise(fmu)?;
+    let table =
+        run.drive(&mut instance, &["omega", "omega_imu"], |steps| watch(Progress::Steps(steps)))?;
+    let column = |name| table.column(name).unwrap_or_default();
+    ensure!(
+        column("omega").iter().all(|omega| *omega == 0.0),
+        "the hub does not rest: leave its start, its torques and the friction of the bearing alone"
+    );
+    Ok(allan::variances(run.step, column("omega_imu")))
+}
+
+impl Characteristics {
+    fn of(asked: Noise, records: &[Vec<Point>]) -> Result<Self> {
+        let count = records.len() as f64;
+        let points: Vec<Point> = (0..records[0].len())
+            .map(|i| Point {
+                tau: records[0][i].tau,
+                variance: records.iter().map(|record| record[i].variance).sum::<f64>() / count,
+            })
+            .collect();
+        let why = "the gyro's readings do not change; is imu.lsb larger than its noise?";
+        let found = Noise::fitted(&points).context(why)?;
+        let each: Vec<Noise> = records.iter().filter_map(|record| Noise::fitted(record)).collect();
+        let error = |of: fn(&Noise) -> f64| {
+            let mean = each.iter().map(of).sum::<f64>() / count;
+            let squares: f64 = each.iter().map(|noise| (of(noise) - mean).powi(2)).sum();
+            (squares / (count - 1.0) / count).sqrt()
+        };
+        let error = Noise {
+            arw: error(|noise| noise.arw),
+            bias_instability: error(|noise| noise.bias_instability),
+            bias_time: error(|noise| noise.bias_time),
+        };
+        Ok(Characteristics { asked, found, error, points })
+    }
+
+    /// What was asked for and what was found, as lines of text.
+    pub fn text(&self) -> String {
+        let mut text = format!(
+            "{:22}{:>12}{:>12}{:>12}{:>16}\n",
+            "", "asked", "found", "deviation", "standard error"
+        );
+        for (name, of) in QUANTITIES {
+            let (asked, found, error) = (of(&self.asked), of(&self.found), of(&self.error));
+            let percent = |part: f64| match part / asked * 100.0 {
+                percent if percent.is_finite() => format!("{percent:.2} %"),
+                _ => "-".into(),
+            };
+            text.push_str(&format!(
+                "{name:22}{asked:>12.4e}{found:>12.4e}{:>12}{:>16}\n",
+                percent(found - asked),
+                percent(error)
+            ));
+        }
+        text
+    }
+
+    /// Writes `allan.csv` and `allan.svg` into the directory, which is made.
+    pub fn write(&self, directory: &Path) -> Result<()> {
+        output::directory(directory)?;
+        let deviation = |of: &dyn Fn(&Point) -> f64| -> Vec<f64> {
+            self.points.iter().map(|point| of(point).sqrt()).collect()
+        };
+        let columns = vec![
+            self.points.iter().map(|point| point.tau).collect(),
+            deviation(&|point| point.variance),
+            deviation(&|point| self.asked.variance(point.tau)),
+            deviation(&|point| self.found.variance(point.tau)),
+        ];
+        let names = ["tau_s", "deviation", "asked", "fitted"].map(String::from).to_vec();
+        Table::new(names, columns).write(&directory.join("allan.csv"), &BTreeMap::new())?;
+        output::atomically(&directory.join("allan.svg"), |file| {
+            Ok(std::io::Write::write_all(file, self.picture().as_bytes())?)
+        })
+    }
+
+    /// The Allan deviations, as a file of its own.
+    fn picture(&self) -> String {
+        let curve = |of: &dyn Fn(&Point) -> f64| -> Vec<(f64, f64)> {
+            self.points.iter().map(|point| (point.tau, of(point).sqrt())).collect()
+        };
+        let series = |points, color: &str, style, title: &str| Series {
+            points,
+            color: color.into(),
+            style,
+            title: title.into(),
+        };
+        let measured = curve(&|point| point.variance);
+        let chart = Chart {
+            title: "Allan deviation of the simulated gyro at rest".into(),
+            size: (640.0, 400.0),
+            x: Axis::decades("averaging time / s", measured.iter().map(|p| p.0)),
+            y: Axis::decades("Allan deviation / (rad/s)", measured.iter().map(|p| p.1)),
+            series: vec![
+                series(
+                    curve(&|point| self.asked.arw.powi(2) / point.tau),
+                    "#888888",
+                    Style::Dashed,
+                    "white noise asked for, slope −1/2",
+                ),
+                series(measured, "#0b6aa8", Style::Dots, "found"),
+                series(
+                    curve(&|point| self.asked.variance(point.tau)),
+                    "#b45309",
+                    Style::Line,
+                    "noise and bias asked for",
+                ),
+            ],
+            legend: true,
+        };
+        let style = "<style>svg { background: #ffffff; font: 11px system-ui, sans-serif }\
+             text { fill: #1d2733 } .title { font-size: 12.5px; font-weight: 600 }\
+             .grid { stroke: #dde3ea; stroke-width: .7; fill: none }\
+             .frame { stroke: #66758a; fill: none }\
+             .curve path { fill: none; stroke-width: 1.5 }</style>";
+        let svg = chart.svg().replacen("<svg ", "<svg xmlns=\"http://www.w3.org/2000/svg\" ", 1);
+        svg.replacen('>', &format!(">{style}"), 1)
+    }
+}
+
+/// A figure of the noise by its name and unit.
+type Quantity = (&'static str, fn(&Noise) -> f64);
+
+/// What the table shows.
+const QUANTITIES: [Quantity; 3] = [
+    ("N, rad/s/sqrt(Hz)", |noise| noise.arw),
+    ("B, rad/s", |noise| noise.bias_instability),
+    ("imu.bias_time, s", |noise| noise.bias_time),
+];

@@ -1,0 +1,221 @@
+//! One run: a torque history through one instance of the FMU.
+
+use anyhow::{Context, Result, bail, ensure};
+
+use crate::profile::Torque;
+use crate::table::Table;
+use host::description::Type;
+use host::fmi2::{Fmu, Instance};
+
+/// What is to be run.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// Start values by FMU name, as text; set in this order.
+    pub settings: Vec<(String, String)>,
+    /// The torque command.
+    pub torque: Torque,
+    /// Communication step H, s.
+    pub step: f64,
+    /// Stop time, s.
+    pub stop: f64,
+    /// Relative tolerance for the FMU's solver; `None`: the FMU's own.
+    pub tolerance: Option<f64>,
+    /// The torque is held over each step (else its value at t comes with the slope of the chord
+    /// to t + H).
+    pub hold: bool,
+}
+
+/// The input that carries the torque.
+const TORQUE: &str = "tau_cmd";
+
+/// Steps between two reports of progress.
+const REPORT_EVERY: usize = 1024;
+
+impl Run {
+    /// Start time, s: that of the torque history.
+    pub fn start(&self) -> f64 {
+        self.torque.span().0
+    }
+
+    /// Number of communication steps; the last may be shorter than H.
+    pub fn steps(&self) -> usize {
+        let exact = (self.stop - self.start()) / self.step;
+        // 2700 s / 0.02 s is 135000 steps, however the quotient rounds
+        if (exact - exact.round()).abs() < 1e-6 {
+            exact.round() as usize
+        } else {
+            exact.ceil() as usize
+        }
+    }
+
+    /// Communication point `k`, s; the last is the stop time.
+    fn time(&self, k: usize) -> f64 {
+        if k == self.steps() { self.stop } else { self.start() + k as f64 * self.step }
+    }
+
+    /// The torque as a run hands it to the FMU: at every communication point `time` (s), `tau_cmd`
+    /// (N·m) and `tau_slope`, its derivative until the next point (N·m/s).
+    pub fn torque_table(&self) -> Table {
+        let steps = self.steps();
+        let mut columns = vec![Vec::new(); 3];
+        for k in 0..=steps {
+            let t = self.time(k);
+            let (tau, slope) = match k {
+                _ if k == steps => (self.torque.at(t), 0.0),
+                _ => self.torque.chord(t, self.time(k + 1) - t),
+            };
+            let slope = if self.hold { 0.0 } else { slope };
+            for (column, value) in columns.iter_mut().zip([t, tau, slope]) {
+                column.push(value);
+            }
+        }
+        Table::new(["time", TORQUE, "tau_slope"].map(String::from).to_vec(), columns)
+    }
+
+    /// Fails with one sentence if the numbers make no sense.
+    pub fn check(&self) -> Result<()> {
+        ensure!(
+            self.step > 0.0 && self.step.is_finite(),
+            "the step must be a positive number of seconds, not {}",
+            self.step
+        );
+        ensure!(
+            self.stop > self.start() && self.stop.is_finite(),
+            "the stop time must be later than {} s, not {} s",
+            self.start(),
+            self.stop
+        );
+        if let Some(tolerance) = self.tolerance {
+            ensure!(
+                tolerance > 0.0 && tolerance.is_finite(),
+                "the tolerance must be a positive number, not {tolerance}"
+            );
+        }
+        Ok(())
+    }
+
+    /// A new instance with the start values set, ready for the first step.
+    pub fn initialise<'fmu>(&self, fmu: &'fmu Fmu) -> Result<Instance<'fmu>> {
+        self.check()?;
+        let mut instance = fmu.instantiate("run")?;
+        for (name, value) in &self.settings {
+            let variable = fmu.description().variable(name)?;
+            match variable.causality.as_str() {
+                "input" if name == TORQUE => bail!("{TORQUE} comes from the profile or the file"),
+                "parameter" | "input" => instance.set(name, value)?,
+                other => bail!(
+                    "{name} cannot be set: it is of causality {other}, not a parameter or an input"
+                ),
+            }
+        }
+        instance.setup_experiment(self.tolerance, self.start(), Some(self.stop))?;
+        instance.enter_initialization_mode()?;
+        let reference = [fmu.description().variable(TORQUE)?.reference];
+        instance.set_real(&reference, &[self.torque.at(self.start())])?;
+        instance.exit_initialization_mode()?;
+        Ok(instance)
+    }
+
+    /// Steps an initialised instance to the stop time. The table has `time`, `tau_cmd` and the
+    /// variables `columns` at every communication point. `progress` hears how many steps were
+    /// made since it was last called.
+    pub fn drive(
+        &self,
+        instance: &mut Instance,
+        columns: &[&str],
+        progress: impl Fn(u64),
+    ) -> Result<Table> {
+        let steps = self.steps();
+        let mut recorder = Recorder::new(instance, columns, steps + 1)?;
+        let torque = [instance.fmu().description().variable(TORQUE)?.reference];
+        let points = steps + 1;
+        let (mut time, mut tau_cmd) = (Vec::with_capacity(points), Vec::with_capacity(points));
+        let mut t = self.start();
+        for step in 1..=steps {
+            let next = self.time(step);
+            let (tau, slope) = self.torque.chord(t, next - t);
+            time.push(t);
+            tau_cmd.push(tau);
+            recorder.record(instance)?;
+            instance
+                .set_real(&torque, &[tau])
+                .and_then(|()| {
+                    if self.hold {
+                        return Ok(());
+                    }
+                    instance.set_real_input_derivatives(&torque, &[1], &[slope])
+                })
+                .and_then(|()| instance.do_step(t, next - t))
+                .with_context(|| format!("the run stopped at t = {t} s"))?;
+            t = next;
+            if step % REPORT_EVERY == 0 {
+                progress(REPORT_EVERY as u64);
+            }
+        }
+        progress((steps % REPORT_EVERY) as u64);
+        time.push(t);
+        tau_cmd.push(self.torque.at(t));
+        recorder.record(instance)?;
+
+        let names = ["time", TORQUE].iter().chain(columns).map(|n| n.to_string()).collect();
+        Ok(Table::new(names, [vec![time, tau_cmd], recorder.columns()].concat()))
+    }
+}
+
+/// Reads the recorded variables of each type with one call.
+struct Recorder {
+    reals: Vec<u32>,
+    others: Vec<(Type, u32)>,
+    /// Which column each value belongs to: first the reals, then the others.
+    places: Vec<usize>,
+    values: Vec<f64>,
+    columns: Vec<Vec<f64>>,
+}
+
+impl Recorder {
+    fn new(instance: &Instance, names: &[&str], points: usize) -> Result<Self> {
+        let (mut reals, mut others) = (Vec::new(), Vec::new());
+        let (mut real_places, mut other_places) = (Vec::new(), Vec::new());
+        for (place, name) in names.iter().enumerate() {
+            let variable = instance.fmu().description().variable(name)?;
+            match variable.kind() {
+                Type::Real => {
+                    reals.push(variable.reference);
+                    real_places.push(place);
+                }
+                Type::String => bail!("{name} is a text; only numbers can be recorded"),
+                kind => {
+                    others.push((kind, variable.reference));
+                    other_places.push(place);
+                }
+            }
+        }
+        Ok(Recorder {
+            values: vec![0.0; reals.len()],
+            reals,
+            others,
+            places: [real_places, other_places].concat(),
+            columns: vec![Vec::with_capacity(points); names.len()],
+        })
+    }
+
+    fn record(&mut self, instance: &mut Instance) -> Result<()> {
+        instance.get_real(&self.reals, &mut self.values)?;
+        for (value, place) in self.values.iter().zip(&self.places) {
+            self.columns[*place].push(*value);
+        }
+        for ((kind, reference), place) in self.others.iter().zip(&self.places[self.reals.len()..]) {
+            let mut value = [0];
+            match kind {
+                Type::Boolean => instance.get_boolean(&[*reference], &mut value)?,
+                _ => instance.get_integer(&[*reference], &mut value)?,
+            }
+            self.columns[*place].push(value[0].into());
+        }
+        Ok(())
+    }
+
+    fn columns(self) -> Vec<Vec<f64>> {
+        self.columns
+    }
+}

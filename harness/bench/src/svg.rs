@@ -1,0 +1,484 @@
+//! Charts and heat maps as inline SVG. Colours are CSS values, so that a page can change
+//! them with the reader's light or dark scheme.
+
+use std::fmt::Write as _;
+
+use host::html::escape;
+
+/// One axis.
+#[derive(Clone, Debug)]
+pub struct Axis {
+    /// What is along it, with its unit.
+    pub label: String,
+    /// Value at the left or lower end.
+    pub from: f64,
+    /// Value at the right or upper end.
+    pub to: f64,
+    /// Even in the logarithm.
+    pub logarithmic: bool,
+    /// Values that are written at the axis.
+    pub ticks: Vec<f64>,
+}
+
+impl Axis {
+    /// An axis with about `count` round ticks that covers all `values`, and at least `span`.
+    pub fn linear(
+        label: &str,
+        values: impl IntoIterator<Item = f64>,
+        span: f64,
+        count: usize,
+    ) -> Self {
+        let (mut low, mut high) = range(values);
+        let lack = (span - (high - low)) / 2.0;
+        if lack > 0.0 {
+            (low, high) = (low - lack, high + lack);
+        }
+        let step = round_step((high - low) / count as f64);
+        let (from, to) = ((low / step).floor() * step, (high / step).ceil() * step);
+        let ticks = (0..=((to - from) / step).round() as i32).map(|i| from + i as f64 * step);
+        Axis { label: label.into(), from, to, logarithmic: false, ticks: ticks.collect() }
+    }
+
+    /// An axis over whole decades that covers all positive `values`.
+    pub fn decades(label: &str, values: impl IntoIterator<Item = f64>) -> Self {
+        let (low, high) = range(values.into_iter().filter(|v| *v > 0.0).map(f64::log10));
+        let (low, mut high) = ((low + 1e-9).floor() as i32, (high - 1e-9).ceil() as i32);
+        high = high.max(low + 1);
+        let every = (high - low + 5) / 6;
+        let ticks = (low..=high).step_by(every as usize).map(|e| 10f64.powi(e)).collect();
+        let (from, to) = (10f64.powi(low), 10f64.powi(high));
+        Axis { label: label.into(), from, to, logarithmic: true, ticks }
+    }
+
+    /// An axis from end to end, even in the logarithm, with the given ticks.
+    pub fn logarithmic(label: &str, (from, to): (f64, f64), ticks: &[f64]) -> Self {
+        Axis { label: label.into(), from, to, logarithmic: true, ticks: ticks.to_vec() }
+    }
+
+    /// Place along the axis, 0 to 1.
+    fn place(&self, value: f64) -> f64 {
+        if self.logarithmic {
+            (value / self.from).ln() / (self.to / self.from).ln()
+        } else {
+            (value - self.from) / (self.to - self.from)
+        }
+    }
+}
+
+fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
+    let (low, high) = values
+        .into_iter()
+        .filter(|v| v.is_finite())
+        .fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
+    if low > high { (0.0, 1.0) } else { (low, high) }
+}
+
+/// The next of 1, 2, 5 times a power of ten.
+fn round_step(step: f64) -> f64 {
+    let power = 10f64.powf(step.max(1e-300).log10().floor());
+    [1.0, 2.0, 5.0, 10.0]
+        .map(|m| m * power)
+        .into_iter()
+        .find(|s| *s >= step * 0.999)
+        .unwrap_or(step)
+}
+
+/// How a series is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Style {
+    /// A line.
+    Line,
+    /// A broken line.
+    Dashed,
+    /// A line with filled dots.
+    Dots,
+    /// A broken line with open dots.
+    OpenDots,
+    /// Small dots without a line.
+    Cloud,
+}
+
+/// One curve.
+#[derive(Clone, Debug)]
+pub struct Series {
+    /// Points; those that are not finite are left out.
+    pub points: Vec<(f64, f64)>,
+    /// CSS colour.
+    pub color: String,
+    /// How it is drawn.
+    pub style: Style,
+    /// Shown when the pointer rests on it.
+    pub title: String,
+}
+
+/// A chart.
+#[derive(Clone, Debug)]
+pub struct Chart {
+    /// What it shows; also its description for those who do not see it.
+    pub title: String,
+    /// Width and height of the drawing, px.
+    pub size: (f64, f64),
+    /// Horizontal axis.
+    pub x: Axis,
+    /// Vertical axis.
+    pub y: Axis,
+    /// The curves, the first one lowest.
+    pub series: Vec<Series>,
+    /// Whether the curves' titles are written into the upper right corner.
+    pub legend: bool,
+}
+
+/// Space beside the plot for numbers and labels, px: left, right, top, bottom.
+const MARGIN: (f64, f64, f64, f64) = (56.0, 12.0, 26.0, 40.0);
+
+impl Chart {
+    /// The `<svg>` element.
+    pub fn svg(&self) -> String {
+        let (width, height) = self.size;
+        let (left, right, top, bottom) = (MARGIN.0, width - MARGIN.1, MARGIN.2, height - MARGIN.3);
+        let x = |value: f64| left + (right - left) * self.x.place(value);
+        let y = |value: f64| bottom - (bottom - top) * self.y.place(value);
+        let mut out = opening(&self.title, self.size);
+        for &tick in &self.x.ticks {
+            let at = x(tick);
+            let _ = write!(
+                out,
+                "<path class=\"grid\" d=\"M{at:.1} {top}V{bottom}\"/>\
+                 <text class=\"tick\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"{}\">{}</text>",
+                // a number at the right end would be cut off at the drawing's edge
+                if at > right - 6.0 { width } else { at },
+                bottom + 15.0,
+                if at > right - 6.0 { "end" } else { "middle" },
+                number(tick, &self.x)
+            );
+        }
+        for &tick in &self.y.ticks {
+            let at = y(tick);
+            let _ = write!(
+                out,
+                "<path class=\"grid\" d=\"M{left} {at:.1}H{right}\"/>\
+                 <text class=\"tick\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
+                left - 6.0,
+                at + 3.5,
+                number(tick, &self.y)
+            );
+        }
+        let _ = write!(
+            out,
+            "<path class=\"frame\" d=\"M{left} {top}V{bottom}H{right}\"/>\
+             <text class=\"label\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>\
+             <text class=\"label\" transform=\"translate(13 {:.1}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
+            (left + right) / 2.0,
+            height - 7.0,
+            escape(&self.x.label),
+            (top + bottom) / 2.0,
+            escape(&self.y.label)
+        );
+        // a nested svg cuts off what leaves the plot
+        let _ = write!(
+            out,
+            "<svg x=\"{left}\" y=\"{top}\" width=\"{w}\" height=\"{h}\" viewBox=\"{left} {top} {w} {h}\">",
+            w = right - left,
+            h = bottom - top
+        );
+        for series in &self.series {
+            let points: Vec<(f64, f64)> = series
+                .points
+                .iter()
+                .map(|&(px, py)| (x(px), y(py)))
+                .filter(|(px, py)| px.is_finite() && py.is_finite())
+                .collect();
+            out.push_str(&curve(&points, series));
+        }
+        for (i, series) in self.series.iter().filter(|_| self.legend).enumerate() {
+            let at = top + 14.0 + 16.0 * i as f64;
+            let sample = [(right - 30.0, at - 4.0), (right - 6.0, at - 4.0)];
+            out.push_str(&curve(&sample, series));
+            let _ = write!(
+                out,
+                "<text class=\"label\" x=\"{:.1}\" y=\"{at:.1}\" text-anchor=\"end\">{}</text>",
+                right - 36.0,
+                escape(&series.title)
+            );
+        }
+        out.push_str("</svg></svg>\n");
+        out
+    }
+}
+
+/// The opening tag of a drawing, with its title.
+fn opening(title: &str, (width, height): (f64, f64)) -> String {
+    format!(
+        "<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{title}\">\
+         <text class=\"title\" x=\"{}\" y=\"15\">{title}</text>",
+        MARGIN.0,
+        title = escape(title)
+    )
+}
+
+/// A heat map: one row of cells for each of several values of something, over a common axis.
+#[derive(Clone, Debug)]
+pub struct HeatMap {
+    /// What it shows.
+    pub title: String,
+    /// Width and height of the drawing, px.
+    pub size: (f64, f64),
+    /// Horizontal axis.
+    pub x: Axis,
+    /// What tells the rows apart, with its unit.
+    pub rows_label: String,
+    /// The rows, the first one lowest: what is written beside it, and points along the axis with
+    /// their values.
+    pub rows: Vec<(String, Vec<(f64, f64)>)>,
+    /// The scale of the values; what is beyond its ends has their colours.
+    pub scale: Axis,
+    /// CSS colour of a place on the scale, 0 to 1.
+    pub color: fn(f64) -> String,
+}
+
+/// Cells in a row of a heat map, and steps of its colour scale.
+const CELLS: usize = 150;
+const SHADES: usize = 32;
+
+impl HeatMap {
+    /// The `<svg>` element. A cell has the mean of the values in it; without any it has its left
+    /// neighbour's, and stays empty before the first value and behind the last.
+    pub fn svg(&self) -> String {
+        let (width, height) = self.size;
+        let bar = width - 46.0; // the scale stands right of it
+        let (left, right, top, bottom) = (MARGIN.0, bar - 10.0, MARGIN.2, height - MARGIN.3);
+        let row_height = (bottom - top) / self.rows.len().max(1) as f64;
+        let cell = (right - left) / CELLS as f64;
+        let mut shades: Vec<String> = vec![String::new(); SHADES];
+        let mut out = opening(&self.title, self.size);
+        for (k, (label, points)) in self.rows.iter().enumerate() {
+            let middle = bottom - (k as f64 + 0.5) * row_height;
+            let mut sums = vec![(0.0, 0usize); CELLS];
+            for (x, value) in points.iter().filter(|(_, v)| v.is_finite()) {
+                let place = self.x.place(*x) * CELLS as f64;
+                if (0.0..=CELLS as f64).contains(&place) {
+                    let sum = &mut sums[(place as usize).min(CELLS - 1)];
+                    *sum = (sum.0 + value, sum.1 + 1);
+                }
+            }
+            let shade = |(sum, count): (f64, usize)| {
+                let place = self.scale.place(sum / count.max(1) as f64).clamp(0.0, 1.0);
+                (count > 0).then_some(((place * SHADES as f64) as usize).min(SHADES - 1))
+            };
+            // between two values there is no gap, however narrow the cells
+            let filled = |sums: &[(f64, usize)]| {
+                let places =
+                    || sums.iter().enumerate().filter(|(_, sum)| sum.1 > 0).map(|(i, _)| i);
+                places().next().zip(places().next_back())
+            };
+            if let Some((first, last)) = filled(&sums) {
+                for i in first + 1..last {
+                    if sums[i].1 == 0 {
+                        sums[i] = sums[i - 1];
+                    }
+                }
+            }
+            // neighbours of one shade are one stroke
+            let mut from = 0;
+            while from < CELLS {
+                let this = shade(sums[from]);
+                let run = sums[from..].iter().take_while(|sum| shade(**sum) == this).count();
+                if let Some(this) = this {
+                    let (x, length) = (left + from as f64 * cell, run as f64 * cell + 0.2);
+                    let _ = write!(shades[this], "M{x:.1} {middle:.1}h{length:.1}");
+                }
+                from += run;
+            }
+            let _ = write!(
+                out,
+                "<text class=\"tick\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
+                left - 6.0,
+                middle + 3.5,
+                escape(label)
+            );
+        }
+        let color = |i: usize| (self.color)((i as f64 + 0.5) / SHADES as f64);
+        for (i, path) in shades.iter().enumerate().filter(|(_, path)| !path.is_empty()) {
+            let _ = write!(
+                out,
+                "<path class=\"cells\" d=\"{path}\" stroke=\"{}\" stroke-width=\"{:.1}\"/>",
+                color(i),
+                row_height + 0.3
+            );
+        }
+        for &tick in &self.x.ticks {
+            let at = left + (right - left) * self.x.place(tick);
+            let _ = write!(
+                out,
+                "<path class=\"frame\" d=\"M{at:.1} {bottom}v4\"/>\
+                 <text class=\"tick\" x=\"{at:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>",
+                bottom + 15.0,
+                number(tick, &self.x)
+            );
+        }
+        let step = (bottom - top) / SHADES as f64;
+        for i in 0..SHADES {
+            let _ = write!(
+                out,
+                "<path class=\"cells\" d=\"M{bar} {:.1}h9\" stroke=\"{}\" stroke-width=\"{:.1}\"/>",
+                bottom - (i as f64 + 0.5) * step,
+                color(i),
+                step + 0.3
+            );
+        }
+        for &tick in &self.scale.ticks {
+            let _ = write!(
+                out,
+                "<text class=\"tick\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
+                bar + 12.0,
+                bottom - (bottom - top) * self.scale.place(tick) + 3.5,
+                number(tick, &self.scale)
+            );
+        }
+        let _ = writeln!(
+            out,
+            "<text class=\"label\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>\
+             <text class=\"label\" transform=\"translate(13 {:.1}) rotate(-90)\" text-anchor=\"middle\">{}</text>\
+             <text class=\"label\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text></svg>",
+            (left + right) / 2.0,
+            height - 7.0,
+            escape(&self.x.label),
+            (top + bottom) / 2.0,
+            escape(&self.rows_label),
+            width - 2.0,
+            height - 7.0,
+            escape(&self.scale.label)
+        );
+        out
+    }
+}
+
+fn curve(points: &[(f64, f64)], series: &Series) -> String {
+    let mut path = String::new();
+    let line = if series.style == Style::Cloud { Vec::new() } else { simplified(points) };
+    for (i, (x, y)) in line.into_iter().enumerate() {
+        let _ = write!(path, "{}{x:.1} {y:.1}", if i == 0 { "M" } else { "L" });
+    }
+    let (dash, dots) = match series.style {
+        Style::Line => ("", None),
+        Style::Dashed => (" stroke-dasharray=\"6 4\"", None),
+        Style::Dots | Style::Cloud => ("", Some(series.color.as_str())),
+        Style::OpenDots => (" stroke-dasharray=\"3 3\"", Some("var(--paper)")),
+    };
+    let mut out = format!(
+        "<g class=\"curve\" style=\"stroke:{color}\"><title>{title}</title>",
+        color = series.color,
+        title = escape(&series.title),
+    );
+    if !path.is_empty() {
+        let _ = write!(out, "<path d=\"{path}\"{dash}/>");
+    }
+    if let Some(fill) = dots {
+        let radius = if series.style == Style::Cloud { 1.5 } else { 3.0 };
+        for (x, y) in points {
+            let _ = write!(
+                out,
+                "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" style=\"fill:{fill}\"/>"
+            );
+        }
+    }
+    out.push_str("</g>");
+    out
+}
+
+/// Leaves out the points that lie within a tenth of a pixel of the line through the others
+/// (Ramer, Douglas and Peucker).
+fn simplified(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    if points.len() < 3 {
+        return points.to_vec();
+    }
+    let mut kept = vec![false; points.len()];
+    let mut spans = vec![(0, points.len() - 1)];
+    while let Some((from, to)) = spans.pop() {
+        (kept[from], kept[to]) = (true, true);
+        let ((ax, ay), (bx, by)) = (points[from], points[to]);
+        let length = (bx - ax).hypot(by - ay).max(1e-9);
+        let away = |i: usize| {
+            let (px, py) = points[i];
+            ((bx - ax) * (py - ay) - (by - ay) * (px - ax)).abs() / length
+        };
+        let farthest = (from + 1..to).max_by(|&a, &b| away(a).total_cmp(&away(b)));
+        if let Some(middle) = farthest.filter(|&i| away(i) > 0.1) {
+            spans.extend([(from, middle), (middle, to)]);
+        }
+    }
+    points.iter().zip(kept).filter(|(_, kept)| *kept).map(|(point, _)| *point).collect()
+}
+
+/// A tick's number with the digits its axis needs.
+fn number(value: f64, axis: &Axis) -> String {
+    let written = if axis.logarithmic && !(1e-3..1e4).contains(&value.abs()) {
+        let exponent = value.log10().round() as i32;
+        return format!(
+            "10<tspan dy=\"-4\" font-size=\"8\">{}</tspan>",
+            minus(&exponent.to_string())
+        );
+    } else if axis.logarithmic {
+        format!("{value}")
+    } else {
+        let step = axis.ticks.windows(2).map(|t| t[1] - t[0]).fold(f64::MAX, f64::min);
+        let digits = (-(step.log10() + 1e-9).floor()).clamp(0.0, 9.0) as usize;
+        format!("{:.digits$}", if value.abs() < step * 1e-6 { 0.0 } else { value })
+    };
+    minus(&written)
+}
+
+/// A true minus sign.
+fn minus(text: &str) -> String {
+    text.replace('-', "\u{2212}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_and_cover_the_values() {
+        let axis = Axis::linear("f / Hz", [2.4568, 2.4603], 0.02, 4);
+        assert!(axis.from <= 2.4568 && axis.to >= 2.4603 && axis.to - axis.from >= 0.02);
+        let written: Vec<_> = axis.ticks.iter().map(|t| number(*t, &axis)).collect();
+        assert_eq!(written, ["2.445", "2.450", "2.455", "2.460", "2.465", "2.470"]);
+        let axis = Axis::decades("t / s", [0.0, 0.003, 59.0]);
+        assert_eq!((axis.from, axis.to, axis.ticks.len()), (0.001, 100.0, 6));
+    }
+
+    #[test]
+    fn a_straight_line_keeps_its_ends_and_a_corner_stays() {
+        let line: Vec<_> = (0..100).map(|i| (i as f64, 2.0 * i as f64)).collect();
+        assert_eq!(simplified(&line), [line[0], line[99]]);
+        let corner = [(0.0, 0.0), (1.0, 0.0), (1.0, 5.0)];
+        assert_eq!(simplified(&corner), corner);
+    }
+
+    #[test]
+    fn a_heat_map_has_the_mean_of_each_cell_and_nothing_where_there_is_nothing() {
+        let map = HeatMap {
+            title: "t".into(),
+            size: (330.0, 260.0),
+            x: Axis::linear("x", [0.0, 1.0], 1.0, 5),
+            rows_label: "r".into(),
+            // -1 and 1 fall into one cell, 7 lies beyond the scale
+            rows: vec![(
+                "a".into(),
+                vec![(0.001, -1.0), (0.002, 1.0), (0.9999, f64::NAN), (0.998, 7.0)],
+            )],
+            scale: Axis::linear("v", [-1.0, 1.0], 2.0, 4),
+            color: |place| format!("shade{}", (place * SHADES as f64) as usize),
+        };
+        let svg = map.svg();
+        let cells = |shade: &str| {
+            svg.split("<path class=\"cells\" d=\"")
+                .skip(1)
+                .filter(|path| path.contains(&format!("stroke=\"{shade}\"")))
+                .count()
+        };
+        // every shade stands once in the scale; mean 0 is the middle one, 7 the last
+        assert_eq!((cells("shade16"), cells("shade31"), cells("shade0")), (2, 2, 1));
+        assert!(!svg.contains("NaN"));
+    }
+}

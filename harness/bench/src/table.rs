@@ -1,0 +1,278 @@
+//! Columns of numbers with names, in CSV or Parquet files (told apart by the
+//! ending). Signals are in SI units under the FMU's names, `time` in s.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+use std::sync::Arc;
+
+use anyhow::{Context, Result, anyhow, bail, ensure};
+use parquet::basic::{Compression, Encoding, Repetition, Type as Physical, ZstdLevel};
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use parquet::data_type::{DataType, DoubleType};
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::WriterProperties;
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::file::writer::SerializedFileWriter;
+use parquet::schema::types::Type;
+
+use host::output::atomically;
+
+/// Columns of equal length.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Table {
+    names: Vec<String>,
+    columns: Vec<Vec<f64>>,
+}
+
+/// How a table is stored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Csv,
+    Parquet,
+}
+
+fn format_of(path: &Path) -> Result<Format> {
+    match path.extension().and_then(|e| e.to_str()).map(str::to_lowercase).as_deref() {
+        Some("csv") => Ok(Format::Csv),
+        Some("parquet") => Ok(Format::Parquet),
+        _ => bail!("{}: the name must end in .csv or .parquet", path.display()),
+    }
+}
+
+/// Fails unless `path` names a kind of file that can be written.
+pub fn check_ending(path: &Path) -> Result<()> {
+    format_of(path).map(|_| ())
+}
+
+impl Table {
+    /// A table of the given columns.
+    pub fn new(names: Vec<String>, columns: Vec<Vec<f64>>) -> Self {
+        assert_eq!(names.len(), columns.len());
+        assert!(columns.windows(2).all(|pair| pair[0].len() == pair[1].len()));
+        Table { names, columns }
+    }
+
+    /// Number of rows.
+    pub fn rows(&self) -> usize {
+        self.columns.first().map_or(0, Vec::len)
+    }
+
+    /// Names of the columns.
+    pub fn names(&self) -> &[String] {
+        &self.names
+    }
+
+    /// The column of that name.
+    pub fn column(&self, name: &str) -> Option<&[f64]> {
+        let index = self.names.iter().position(|n| n == name)?;
+        Some(&self.columns[index])
+    }
+
+    /// The table with only the columns `names`, which must be there.
+    pub fn only(&self, names: &[&str]) -> Table {
+        let column = |name: &&str| self.column(name).expect("a column of this table").to_vec();
+        Table::new(
+            names.iter().map(|n| n.to_string()).collect(),
+            names.iter().map(column).collect(),
+        )
+    }
+
+    /// Reads the columns `wanted` of a file, which may hold others. Every value must be a finite
+    /// number.
+    pub fn read(path: &Path, wanted: &[&str]) -> Result<Table> {
+        let name = path.display();
+        let format = format_of(path)?;
+        let file = File::open(path).with_context(|| format!("{name} cannot be opened"))?;
+        let table = match format {
+            Format::Csv => read_csv(file, wanted),
+            Format::Parquet => read_parquet(file, wanted),
+        }
+        .with_context(|| format!("{name} cannot be used"))?;
+        for (column, values) in table.names.iter().zip(&table.columns) {
+            if let Some(row) = values.iter().position(|v| !v.is_finite()) {
+                bail!("{name}, row {}: {column} is {}, not a number", row + 1, values[row]);
+            }
+        }
+        Ok(table)
+    }
+
+    /// Writes the table; `notes` go into a Parquet file's key-value metadata.
+    pub fn write(&self, path: &Path, notes: &BTreeMap<String, String>) -> Result<()> {
+        let format = format_of(path)?;
+        atomically(path, |file| match format {
+            Format::Csv => self.write_csv(file),
+            Format::Parquet => self.write_parquet(file, notes),
+        })
+        .with_context(|| format!("{} was not written", path.display()))
+    }
+
+    fn write_csv(&self, file: &mut File) -> Result<()> {
+        let mut out = BufWriter::new(file);
+        writeln!(out, "{}", self.names.join(","))?;
+        for row in 0..self.rows() {
+            for (i, column) in self.columns.iter().enumerate() {
+                // the shortest digits that read back to the same number
+                write!(out, "{}{:?}", if i == 0 { "" } else { "," }, column[row])?;
+            }
+            writeln!(out)?;
+        }
+        out.flush()?;
+        Ok(())
+    }
+
+    fn write_parquet(&self, file: &mut File, notes: &BTreeMap<String, String>) -> Result<()> {
+        let fields = self
+            .names
+            .iter()
+            .map(|name| {
+                Type::primitive_type_builder(name, Physical::DOUBLE)
+                    .with_repetition(Repetition::REQUIRED)
+                    .build()
+                    .map(Arc::new)
+            })
+            .collect::<Result<_, _>>()?;
+        let schema = Type::group_type_builder("schema").with_fields(fields).build()?;
+        let notes = notes.iter().map(|(k, v)| KeyValue::new(k.clone(), v.clone())).collect();
+        let properties = WriterProperties::builder()
+            .set_dictionary_enabled(false)
+            .set_encoding(Encoding::BYTE_STREAM_SPLIT) // exponents beside exponents: they compress
+            .set_compression(Compression::ZSTD(ZstdLevel::try_new(1)?))
+            .set_key_value_metadata(Some(notes))
+            .build();
+        let mut writer = SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties))?;
+        let mut group = writer.next_row_group()?;
+        for values in &self.columns {
+            let mut column = group.next_column()?.context("fewer columns than names")?;
+            column.typed::<DoubleType>().write_batch(values, None, None)?;
+            column.close()?;
+        }
+        group.close()?;
+        writer.close()?;
+        Ok(())
+    }
+}
+
+/// The key-value metadata of a Parquet file; an error if the file is not complete.
+pub fn notes(path: &Path) -> Result<BTreeMap<String, String>> {
+    let reader = SerializedFileReader::new(File::open(path)?)?;
+    let pairs = reader.metadata().file_metadata().key_value_metadata();
+    Ok(pairs
+        .into_iter()
+        .flatten()
+        .map(|pair| (pair.key.clone(), pair.value.clone().unwrap_or_default()))
+        .collect())
+}
+
+/// Where each wanted column stands, or which are missing.
+fn positions<'a>(there: impl Iterator<Item = &'a str>, wanted: &[&str]) -> Result<Vec<usize>> {
+    let there: Vec<&str> = there.map(str::trim).collect();
+    let missing: Vec<_> = wanted.iter().copied().filter(|w| !there.contains(w)).collect();
+    ensure!(
+        missing.is_empty(),
+        "it has no column {} (columns in it: {})",
+        missing.join(", "),
+        there.join(", ")
+    );
+    Ok(wanted.iter().flat_map(|w| there.iter().position(|t| t == w)).collect())
+}
+
+fn read_csv(file: File, wanted: &[&str]) -> Result<Table> {
+    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(file);
+    let header = reader.headers().context("it has no header row")?.clone();
+    let positions = positions(header.iter().map(|h| h.trim_start_matches('\u{feff}')), wanted)?;
+    let mut columns = vec![Vec::new(); wanted.len()];
+    for (row, record) in reader.records().enumerate() {
+        let record = record.with_context(|| format!("row {}", row + 1))?;
+        for (column, &position) in columns.iter_mut().zip(&positions) {
+            let text = &record[position];
+            let value =
+                text.parse().map_err(|_| anyhow!("row {}: \"{text}\" is not a number", row + 1))?;
+            column.push(value);
+        }
+    }
+    Ok(Table::new(wanted.iter().map(|w| w.to_string()).collect(), columns))
+}
+
+fn read_parquet(file: File, wanted: &[&str]) -> Result<Table> {
+    let reader = SerializedFileReader::new(file).context("it is not a complete Parquet file")?;
+    let metadata = reader.metadata();
+    let schema = metadata.file_metadata().schema_descr();
+    let positions = positions(schema.columns().iter().map(|c| c.name()), wanted)?;
+    let mut columns = vec![Vec::new(); wanted.len()];
+    for group in 0..metadata.num_row_groups() {
+        let group = reader.get_row_group(group)?;
+        let rows = group.metadata().num_rows() as usize;
+        for (&position, (name, values)) in positions.iter().zip(wanted.iter().zip(&mut columns)) {
+            match group.get_column_reader(position)? {
+                ColumnReader::DoubleColumnReader(r) => read_values(r, rows, values, |v| v),
+                ColumnReader::FloatColumnReader(r) => read_values(r, rows, values, f64::from),
+                ColumnReader::Int32ColumnReader(r) => read_values(r, rows, values, f64::from),
+                ColumnReader::Int64ColumnReader(r) => read_values(r, rows, values, |v| v as f64),
+                _ => bail!("column {name} does not hold numbers"),
+            }
+            .with_context(|| format!("column {name}"))?;
+        }
+    }
+    Ok(Table::new(wanted.iter().map(|w| w.to_string()).collect(), columns))
+}
+
+/// Appends `rows` values; a missing one becomes NaN, which [`Table::read`] refuses by row.
+fn read_values<T: DataType>(
+    mut reader: ColumnReaderImpl<T>,
+    rows: usize,
+    into: &mut Vec<f64>,
+    convert: impl Fn(T::T) -> f64,
+) -> Result<()> {
+    let (mut levels, mut values) = (Vec::new(), Vec::new());
+    let mut done = 0;
+    while done < rows {
+        let (read, _, _) =
+            reader.read_records(rows - done, Some(&mut levels), None, &mut values)?;
+        ensure!(read > 0, "it ends too early");
+        done += read;
+    }
+    let mut values = values.into_iter().map(convert);
+    if levels.is_empty() {
+        into.extend(values);
+    } else {
+        let level = |level: i16| if level > 0 { values.next() } else { None };
+        into.extend(levels.into_iter().map(level).map(|v| v.unwrap_or(f64::NAN)));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table() -> Table {
+        let names = ["time", "tau_cmd", "omega"].map(String::from).to_vec();
+        Table::new(names, vec![vec![0.0, 0.02], vec![0.1, 1.0 / 3.0], vec![-1e-300, 2e17]])
+    }
+
+    #[test]
+    fn numbers_come_back_bit_for_bit_from_both_formats() {
+        let directory = tempfile::tempdir().unwrap();
+        for name in ["a.csv", "a.parquet"] {
+            let path = directory.path().join(name);
+            table().write(&path, &BTreeMap::from([("k".into(), "v".into())])).unwrap();
+            let back = Table::read(&path, &["omega", "time"]).unwrap();
+            assert_eq!(back, table().only(&["omega", "time"]));
+        }
+        assert_eq!(notes(&directory.path().join("a.parquet")).unwrap()["k"], "v");
+    }
+
+    #[test]
+    fn a_missing_column_and_a_nan_are_named() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("a.csv");
+        std::fs::write(&path, "time,torque\n0,1\n").unwrap();
+        let error = format!("{:#}", Table::read(&path, &["time", "tau_cmd"]).unwrap_err());
+        assert!(error.contains("no column tau_cmd (columns in it: time, torque)"), "{error}");
+        std::fs::write(&path, "time,tau_cmd\n0,1\n1,NaN\n").unwrap();
+        let error = format!("{:#}", Table::read(&path, &["time", "tau_cmd"]).unwrap_err());
+        assert!(error.contains("a.csv, row 2: tau_cmd is NaN"), "{error}");
+    }
+}

@@ -1,0 +1,4 @@
+//! What the bench finds of the packed FMU.
+
+mod example;
+mod gyro;

@@ -1,0 +1,387 @@
+//! What modelDescription.xml says of dependencies, against what the binary does (FMI 2.0.5,
+//! sections 2.2.8 and 2.1.9): everything a variable may depend on is moved, and one looks whether
+//! the variable moves as well. At the start as declared, and at many others, since what a variable
+//! depends on depends on parameters, and a state that is 0 hides a product.
+
+use std::collections::BTreeSet;
+
+use anyhow::Result;
+
+use super::Findings;
+use super::description::{Unknown, Variable};
+use super::exchange::states;
+use super::guest::{Guest, Interface, Reading, Session, start_value};
+use super::life::first;
+use super::values::items;
+use host::description::Type;
+
+/// Starts that are tried before a declared feedthrough counts as not there.
+const TRIES: u64 = 600;
+/// Starts that are tried at the least, to find dependencies that are not declared.
+const AT_LEAST: u64 = 40;
+/// A change below this share of a variable's size is rounding, and no dependency.
+const ROUNDING: f64 = 1e-9;
+
+/// An instance with parameters somewhere else; the 0th try leaves them as they are.
+fn moved<'g>(guest: &'g Guest, interface: Interface, attempt: u64) -> Result<Session<'g>> {
+    let mut session = guest.session(interface)?;
+    if attempt == 0 {
+        return Ok(session);
+    }
+    let mut random = fastrand::Rng::with_seed(attempt);
+    let parameters = guest.variables().iter().filter(|v| v.is_set_by_hosts());
+    for v in parameters {
+        let Some(start) = start_value(v) else { continue };
+        // Some things happen only where other numbers are as the author left them, zeros above all.
+        let kept = match attempt % 3 {
+            0 => 0.0,
+            1 => 1.0,
+            _ => 0.6,
+        };
+        let is_choice = v.kind == Type::Enumeration;
+        if (v.is_real() && random.f64() < kept) || (is_choice && random.f64() < 0.4) {
+            continue;
+        }
+        let (min, max) = v.bounds();
+        let value = match start {
+            Reading::Real(0.0) => {
+                let span = if max.is_finite() { max.min(1.0) } else { v.nominal().min(1.0) };
+                let size = 0.2 * span * 10f64.powf(-5.0 * random.f64());
+                let moved = if random.bool() { size } else { -size };
+                Reading::Real(moved.max(min).min(max.max(min)))
+            }
+            Reading::Real(x) => {
+                Reading::Real((x * (0.7 + 0.6 * random.f64())).max(min).min(max.max(min)))
+            }
+            Reading::Integer(_) if v.kind == Type::Enumeration => {
+                let items = items(guest, v);
+                match random.choice(&items) {
+                    Some(item) => Reading::Integer(*item),
+                    None => continue,
+                }
+            }
+            // the bounds more often than what lies between
+            Reading::Integer(_) if max - min <= 1e6 => {
+                let inside = min + ((max - min + 1.0) * random.f64()).floor();
+                let all = [min, max, max, inside];
+                Reading::Integer(random.choice(all).unwrap_or(min) as i32)
+            }
+            Reading::Boolean(_) => Reading::Boolean(random.bool().into()),
+            _ => continue,
+        };
+        // One that is refused keeps its value.
+        let _ = session.set(v, &value);
+    }
+    Ok(session)
+}
+
+/// Whether a value differs from another one by more than rounding.
+fn has_moved(v: &Variable, a: &Reading, b: &Reading) -> bool {
+    match (a, b) {
+        (Reading::Real(a), Reading::Real(b)) => {
+            let size = a.abs().max(b.abs()).max(1e-3 * v.nominal());
+            (a - b).abs() > ROUNDING * size
+        }
+        (a, b) => !a.is(b),
+    }
+}
+
+/// What has been seen to move with what.
+struct Seen {
+    /// (unknown, known), by index.
+    pairs: BTreeSet<(usize, usize)>,
+    /// Those of them that were a change of at least the last bit.
+    traces: BTreeSet<(usize, usize)>,
+    /// Known variables that could be moved at all.
+    moved: BTreeSet<usize>,
+}
+
+impl Seen {
+    fn nothing() -> Seen {
+        Seen { pairs: BTreeSet::new(), traces: BTreeSet::new(), moved: BTreeSet::new() }
+    }
+
+    fn compare(
+        &mut self,
+        unknowns: &[&Variable],
+        known: &Variable,
+        before: &[Reading],
+        after: &[Reading],
+    ) {
+        self.moved.insert(known.index);
+        for ((unknown, before), after) in unknowns.iter().zip(before).zip(after) {
+            if !before.is(after) {
+                self.traces.insert((unknown.index, known.index));
+            }
+            if has_moved(unknown, before, after) {
+                self.pairs.insert((unknown.index, known.index));
+            }
+        }
+    }
+
+    /// Whether all feedthrough that is declared has been seen.
+    fn is_complete(&self, feedthrough: &BTreeSet<(usize, usize)>) -> bool {
+        feedthrough.iter().all(|pair| self.traces.contains(pair))
+    }
+
+    /// Tells what was seen and not declared. That a state which is an output moves with itself is
+    /// nothing to tell.
+    fn tell(&self, guest: &Guest, lists: &[&Unknown], when: &str, findings: &mut Findings) {
+        for unknown in lists {
+            let Some(declared) = &unknown.dependencies else { continue };
+            let missing = self
+                .pairs
+                .iter()
+                .filter(|(u, k)| *u == unknown.index && u != k && !declared.contains(k));
+            let missing: Vec<_> = missing.map(|(_, k)| name(guest, *k)).collect();
+            if !missing.is_empty() {
+                findings.add(
+                    format!("line {}, {}", unknown.line, name(guest, unknown.index)),
+                    format!("{when} it changes with {}, which is not declared", missing.join(", ")),
+                );
+            }
+        }
+    }
+}
+
+fn name(guest: &Guest, index: usize) -> &str {
+    guest.description().at(index).map_or("?", |v| v.name.as_str())
+}
+
+fn read(session: &mut Session, variables: &[&Variable]) -> Result<Vec<Reading>> {
+    variables.iter().map(|v| Ok(session.get(v)?)).collect()
+}
+
+/// `dependencies.running`
+pub fn running(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let d = guest.description();
+    let lists: Vec<&Unknown> = d.outputs.iter().chain(&d.derivatives).collect();
+    if let Some(seen) = watch(guest, findings, &BTreeSet::new())? {
+        seen.tell(guest, &lists, "while running", findings);
+    }
+    Ok(())
+}
+
+/// `dependencies.feedthrough`
+pub fn feedthrough(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let d = guest.description();
+    if !guest.interfaces().contains(&Interface::ModelExchange) {
+        findings.skip("in Co-Simulation an output may wait for the next step to follow its inputs");
+        return Ok(());
+    }
+    let is_input = |index: usize| d.at(index).is_some_and(|v| v.causality == "input");
+    let declared: BTreeSet<(usize, usize)> = d
+        .outputs
+        .iter()
+        .flat_map(|u| u.dependencies.iter().flatten().map(|known| (u.index, *known)))
+        .filter(|(_, known)| is_input(*known))
+        .collect();
+    let Some(seen) = watch(guest, findings, &declared)? else { return Ok(()) };
+    for (output, input) in declared.iter().filter(|pair| !seen.traces.contains(pair)) {
+        if seen.moved.contains(input) {
+            let (output, input) = (name(guest, *output), name(guest, *input));
+            findings.add(
+                format!("Outputs, {output}"),
+                format!(
+                    "it is declared to depend on the input {input}, but at {TRIES} different starts it \
+                     never changed with it: hosts see an algebraic loop where there is none"
+                ),
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Moves inputs and states one by one at many starts, until what is wanted has been seen.
+fn watch(
+    guest: &Guest,
+    findings: &mut Findings,
+    wanted: &BTreeSet<(usize, usize)>,
+) -> Result<Option<Seen>> {
+    let d = guest.description();
+    let lists: Vec<&Unknown> = d.outputs.iter().chain(&d.derivatives).collect();
+    let unknowns: Vec<&Variable> = lists.iter().filter_map(|u| d.at(u.index)).collect();
+    if unknowns.is_empty() {
+        findings.skip("it has neither outputs nor derivatives");
+        return Ok(None);
+    }
+    let exchange = guest.interfaces().contains(&Interface::ModelExchange);
+    let interface = if exchange { Interface::ModelExchange } else { first(guest)? };
+    let inputs: Vec<_> = guest.variables().iter().filter(|v| v.causality == "input").collect();
+    let states = states(guest);
+    let mut seen = Seen::nothing();
+    for attempt in 0..TRIES {
+        let mut session = moved(guest, interface, attempt)?;
+        guest.doing(format!("initialising with other parameters, try {attempt}"));
+        // Parameters that do not go together are another try's luck.
+        if session.initialise().is_err() {
+            continue;
+        }
+        session.count = attempt as usize;
+        // At rest with inputs as they are every other time.
+        if session.advance(if attempt % 2 == 0 { 0 } else { attempt as usize % 8 }).is_err() {
+            continue;
+        }
+        // Small changes at two tries, large ones at the next two.
+        let share = if attempt / 2 % 2 == 0 { 1.0 / 1024.0 } else { 0.25 };
+        guest.doing(format!("moving inputs one by one, try {attempt}"));
+        let before = read(&mut session, &unknowns)?;
+        for v in &inputs {
+            let start = session.get(v)?;
+            let Some(other) = elsewhere(guest, v, &start, share) else { continue };
+            if session.set(v, &other).is_ok() {
+                let after = read(&mut session, &unknowns)?;
+                seen.compare(&unknowns, v, &before, &after);
+                session.set(v, &start)?;
+            }
+        }
+        if exchange && !states.is_empty() {
+            guest.doing(format!("moving states one by one, try {attempt}"));
+            let mut x = vec![0.0; states.len()];
+            session.instance.continuous_states(&mut x)?;
+            for (n, (_, state)) in states.iter().enumerate() {
+                let mut there = x.clone();
+                there[n] += share * x[n].abs().max(0.1 * state.nominal());
+                // Outside what the model can compute: another try.
+                if session.instance.set_continuous_states(&there).is_ok()
+                    && let Ok(after) = read(&mut session, &unknowns)
+                {
+                    seen.compare(&unknowns, state, &before, &after);
+                }
+                session.instance.set_continuous_states(&x)?;
+            }
+        }
+        if attempt >= AT_LEAST && seen.is_complete(wanted) {
+            break;
+        }
+    }
+    Ok(Some(seen))
+}
+
+/// Another value of a known, by about `share` of its size.
+fn elsewhere(guest: &Guest, v: &Variable, now: &Reading, share: f64) -> Option<Reading> {
+    let Reading::Real(x) = now else { return super::values::other_value(guest, v, now) };
+    let (min, max) = v.bounds();
+    let step = share * x.abs().max(0.1 * v.nominal().min(max.abs()));
+    let there = if x + step <= max { x + step } else { x - step };
+    (there >= min && there != *x).then_some(Reading::Real(there))
+}
+
+/// `dependencies.initial`
+pub fn initial(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let d = guest.description();
+    let lists: Vec<&Unknown> = d.initial_unknowns.iter().collect();
+    let unknowns: Vec<&Variable> = lists.iter().filter_map(|u| d.at(u.index)).collect();
+    if unknowns.is_empty() {
+        findings.skip("it has no InitialUnknowns");
+        return Ok(());
+    }
+    let knowns: Vec<_> = guest.variables().iter().filter(|v| v.is_set_by_hosts()).collect();
+    let interface = first(guest)?;
+    let mut seen = Seen::nothing();
+    for attempt in 0..AT_LEAST {
+        let mut session = moved(guest, interface, attempt)?;
+        session.instance.setup_experiment(None, session.time, None)?;
+        session.instance.enter_initialization_mode()?;
+        guest.doing(format!("moving inputs and parameters in initialization mode, try {attempt}"));
+        let Ok(before) = read(&mut session, &unknowns) else { continue };
+        let share = if attempt / 2 % 2 == 0 { 1.0 / 1024.0 } else { 0.25 };
+        for v in &knowns {
+            let start = session.get(v)?;
+            let Some(other) = elsewhere(guest, v, &start, share) else { continue };
+            if session.set(v, &other).is_ok() {
+                if let Ok(after) = read(&mut session, &unknowns) {
+                    seen.compare(&unknowns, v, &before, &after);
+                }
+                session.set(v, &start)?;
+            }
+        }
+    }
+    seen.tell(guest, &lists, "in initialization mode", findings);
+    Ok(())
+}
+
+/// `dependencies.directional`
+pub fn directional(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    /// What differences and the FMU's own answer may differ by, relative to the largest derivative
+    /// of the unknown: differences lose half of the digits, curvature takes more.
+    const AGREE: f64 = 1e-3;
+    let d = guest.description();
+    if !guest.interfaces().contains(&Interface::ModelExchange)
+        || !guest.can(Interface::ModelExchange, "providesDirectionalDerivative")
+    {
+        findings.skip("providesDirectionalDerivative is not declared for Model Exchange, which alone gives access to the states");
+        return Ok(());
+    }
+    let unknowns: Vec<&Variable> = d
+        .outputs
+        .iter()
+        .chain(&d.derivatives)
+        .filter_map(|u| d.at(u.index))
+        .filter(|v| v.is_continuous())
+        .collect();
+    let references: Vec<u32> = unknowns.iter().map(|v| v.reference).collect();
+    let states = states(guest);
+    let inputs: Vec<_> =
+        guest.variables().iter().filter(|v| v.causality == "input" && v.is_continuous()).collect();
+    let mut session = guest.running(Interface::ModelExchange)?;
+    session.advance(3)?;
+    let mut x = vec![0.0; states.len()];
+    session.instance.continuous_states(&mut x)?;
+    let knowns = inputs
+        .iter()
+        .map(|v| (*v, None))
+        .chain(states.iter().enumerate().map(|(n, (_, state))| (*state, Some(n))));
+    for (v, place) in knowns {
+        guest.doing(format!("fmi2GetDirectionalDerivative along {}", v.name));
+        let given =
+            session.instance.get_directional_derivative(&references, &[v.reference], &[1.0]);
+        let given = match given {
+            Ok(given) => given,
+            Err(error) => {
+                findings.add(v.place(), error.to_string());
+                continue;
+            }
+        };
+        let now = session.get(v)?;
+        let Reading::Real(here) = now else { continue };
+        let values = |session: &mut Session, there: f64| -> Result<Vec<f64>> {
+            match place {
+                None => session.set(v, &Reading::Real(there))?,
+                Some(n) => {
+                    let mut moved = x.clone();
+                    moved[n] = there;
+                    session.instance.set_continuous_states(&moved)?;
+                }
+            }
+            let mut values = vec![0.0; references.len()];
+            session.instance.get_real(&references, &mut values)?;
+            Ok(values)
+        };
+        let h = 1e-5 * here.abs().max(0.1 * v.nominal());
+        let (above, below) = (values(&mut session, here + h)?, values(&mut session, here - h)?);
+        let centre = values(&mut session, here)?;
+        for (n, unknown) in unknowns.iter().enumerate() {
+            let (right, left) = ((above[n] - centre[n]) / h, (centre[n] - below[n]) / h);
+            let rounding = 1e-13 * centre[n].abs().max(1e-3 * unknown.nominal()) / h;
+            // A state that is an output as well; a corner, which has no derivative.
+            if unknown.index == v.index {
+                continue;
+            }
+            if (right - left).abs() > 0.01 * right.abs().max(left.abs()) + rounding {
+                continue;
+            }
+            let difference = (above[n] - below[n]) / (2.0 * h);
+            if (given[n] - difference).abs() > AGREE * difference.abs() + 10.0 * rounding {
+                findings.add(
+                    format!("d {} / d {}", unknown.name, v.name),
+                    format!(
+                        "fmi2GetDirectionalDerivative gives {}, differences {difference}",
+                        given[n]
+                    ),
+                );
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,343 @@
+//! `hubslosh check`: does an FMU keep the rules of FMI 2.0, and those that hosts add?
+//!
+//! Every rule is an entry of one table, [`RULES`], with the function that looks. Rules of the
+//! archive, the description and the binaries look at the file. Rules of calls load the binary for
+//! this platform and call it as hosts do, each in a process of its own: an FMU that crashes or hangs
+//! is a finding, not the end of the check.
+
+pub mod archive;
+pub mod binaries;
+pub mod dependencies;
+pub mod description;
+pub mod element;
+pub mod exchange;
+pub mod guest;
+pub mod junit;
+pub mod life;
+pub mod log;
+pub mod process;
+pub mod rules;
+pub mod schema;
+pub mod states;
+pub mod steps;
+pub mod values;
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use anyhow::{Context, Result, bail};
+use host::fmi2::PLATFORM;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+pub use self::archive::Archive;
+pub use self::binaries::Binaries;
+pub use self::description::Description;
+pub use self::guest::Guest;
+pub use self::rules::RULES;
+
+/// How bad it is to break a rule.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum Severity {
+    /// The standard forbids it, or hosts fail.
+    Error,
+    /// Some host stumbles, or people are left in the dark.
+    Warning,
+}
+
+impl Severity {
+    /// As reports write it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Severity::Error => "error",
+            Severity::Warning => "warning",
+        }
+    }
+}
+
+/// One rule: what must hold, who says so, and how to look.
+pub struct Rule {
+    /// Group and name, `group.name`.
+    pub id: &'static str,
+    /// What must hold.
+    pub title: &'static str,
+    /// The section of FMI 2.0.5, or the host that trips over it.
+    pub source: &'static str,
+    /// How bad it is to break it; a crash or an endless call is an error whatever is written here.
+    pub severity: Severity,
+    /// How to look.
+    pub look: Look,
+}
+
+/// The function behind a rule, by what it looks at.
+pub enum Look {
+    /// The zip archive.
+    Archive(fn(&Archive, &mut Findings)),
+    /// modelDescription.xml.
+    Description(fn(&Description, &mut Findings)),
+    /// The files under `binaries/`.
+    Binaries(fn(&Binaries, &mut Findings)),
+    /// The loaded FMU, in a process of its own. A call that fails although it must not is a finding.
+    Calls(fn(&Guest, &mut Findings) -> Result<()>),
+}
+
+/// A rule that is broken.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Finding {
+    /// How bad it is.
+    pub severity: Severity,
+    /// Where: a file, a line, a variable, a call.
+    pub place: String,
+    /// What is wrong and what is allowed.
+    pub text: String,
+}
+
+/// What came of looking at one rule.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Findings {
+    severity: Severity,
+    /// All that is wrong; empty if nothing is.
+    pub list: Vec<Finding>,
+    /// Why the rule does not apply, or could not be looked at.
+    pub skipped: Option<String>,
+}
+
+impl Findings {
+    /// Nothing found yet; what will be found is this bad.
+    pub fn new(severity: Severity) -> Findings {
+        Findings { severity, list: Vec::new(), skipped: None }
+    }
+
+    /// The rule is broken.
+    pub fn add(&mut self, place: impl Into<String>, text: impl Into<String>) {
+        self.list.push(Finding { severity: self.severity, place: place.into(), text: text.into() });
+    }
+
+    /// The rule is broken, and that is an error whatever the rule says.
+    pub fn fail(&mut self, place: impl Into<String>, text: impl Into<String>) {
+        self.add(place, text);
+        if let Some(last) = self.list.last_mut() {
+            last.severity = Severity::Error;
+        }
+    }
+
+    /// The rule does not apply.
+    pub fn skip(&mut self, why: impl Into<String>) {
+        self.skipped = Some(why.into());
+    }
+}
+
+/// What came of a rule.
+pub struct Outcome {
+    /// The rule.
+    pub rule: &'static Rule,
+    /// What was found.
+    pub findings: Findings,
+    /// How long it took.
+    pub time: Duration,
+}
+
+/// How to check.
+pub struct Options {
+    /// The program that makes the calls, `hubslosh`, run with the hidden subcommand `check-calls`.
+    pub program: PathBuf,
+    /// Rules or groups of rules to look at, by the beginning of their names; empty for all.
+    pub only: Vec<String>,
+    /// Time that the calls of one rule may take.
+    pub limit: Duration,
+}
+
+/// Everything that was looked at.
+pub struct Report {
+    /// The FMU.
+    pub path: PathBuf,
+    /// One for each rule, in the table's order.
+    pub outcomes: Vec<Outcome>,
+}
+
+/// Looks at all rules, or those asked for; `progress` is called after each rule of calls with their
+/// number.
+///
+/// # Errors
+/// If the file cannot be read, a rule asked for is unknown, or there is no place to unpack. Whatever
+/// is wrong with the FMU is no error but a finding.
+pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) -> Result<Report> {
+    let known = |name: &str| RULES.iter().any(|rule| is_meant(rule, name));
+    let unknown: Vec<_> = options.only.iter().filter(|name| !known(name)).cloned().collect();
+    if !unknown.is_empty() {
+        let mut groups: Vec<_> =
+            RULES.iter().filter_map(|rule| rule.id.split('.').next()).collect();
+        groups.dedup();
+        bail!(
+            "no rule is called {} (groups of rules: {}; `hubslosh check --rules` lists all)",
+            unknown.join(", "),
+            groups.join(", ")
+        );
+    }
+    let bytes =
+        std::fs::read(path).with_context(|| format!("{} cannot be read", path.display()))?;
+    let archive = Archive::read(&bytes);
+    let description = archive.file("modelDescription.xml").map(Description::read);
+    let description = match &description {
+        Some(Ok(description)) => Ok(description),
+        Some(Err(why)) => Err(format!("modelDescription.xml cannot be read: {why}")),
+        None => Err("there is no modelDescription.xml".to_string()),
+    };
+    let binaries = Binaries::new(&archive, description.as_ref().ok().copied());
+    let directory = archive.unpack()?;
+
+    let meant: Vec<&'static Rule> = RULES
+        .iter()
+        .filter(|rule| options.only.is_empty() || options.only.iter().any(|o| is_meant(rule, o)))
+        .collect();
+    let calls = meant.iter().filter(|rule| matches!(rule.look, Look::Calls(_))).count();
+    let callable = match &description {
+        Err(why) => Err(why.clone()),
+        Ok(_) if binaries.own().is_none() => {
+            Err(format!("it has no binary for this platform, {PLATFORM}"))
+        }
+        Ok(_) => Ok(()),
+    };
+    let hung = std::sync::atomic::AtomicUsize::new(0);
+    let one = |rule: &&'static Rule| {
+        let started = std::time::Instant::now();
+        let mut findings = Findings::new(rule.severity);
+        match (&rule.look, &description) {
+            (Look::Archive(look), _) => look(&archive, &mut findings),
+            (Look::Description(look), Ok(description)) => look(description, &mut findings),
+            // That it is missing or not well-formed is a rule of its own.
+            (Look::Description(_), Err(why)) => findings.skip(why.clone()),
+            (Look::Binaries(look), _) => look(&binaries, &mut findings),
+            (Look::Calls(_), _) => {
+                match &callable {
+                    Ok(()) => {
+                        process::look(rule, directory.path(), path, options, &hung, &mut findings)
+                    }
+                    Err(why) => findings.skip(why.clone()),
+                }
+                progress(calls);
+            }
+        }
+        Outcome { rule, findings, time: started.elapsed() }
+    };
+    let outcomes = meant.par_iter().map(one).collect();
+    Ok(Report { path: path.to_path_buf(), outcomes })
+}
+
+fn is_meant(rule: &Rule, name: &str) -> bool {
+    rule.id == name || rule.id.strip_prefix(name).is_some_and(|rest| rest.starts_with('.'))
+}
+
+/// Findings of one rule that a person is shown; all of them are in the JUnit file.
+const SHOWN: usize = 8;
+
+impl Report {
+    /// How many findings are as bad as this.
+    pub fn count(&self, severity: Severity) -> usize {
+        self.all().filter(|(_, finding)| finding.severity == severity).count()
+    }
+
+    /// All findings, each with its rule.
+    pub fn all(&self) -> impl Iterator<Item = (&'static Rule, &Finding)> {
+        self.outcomes.iter().flat_map(|o| o.findings.list.iter().map(move |f| (o.rule, f)))
+    }
+
+    /// For people: every finding, what was skipped and why, and a sum.
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        for outcome in &self.outcomes {
+            let Outcome { rule, findings, .. } = outcome;
+            for finding in findings.list.iter().take(SHOWN) {
+                let _ = writeln!(
+                    text,
+                    "{} {}: {}: {}",
+                    finding.severity.name(),
+                    rule.id,
+                    finding.place,
+                    finding.text
+                );
+            }
+            if findings.list.len() > SHOWN {
+                let _ = writeln!(text, "  and {} more like these", findings.list.len() - SHOWN);
+            }
+            if !findings.list.is_empty() {
+                let _ = writeln!(text, "  rule: {} [{}]", rule.title, rule.source);
+            }
+        }
+        let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
+        for outcome in &self.outcomes {
+            let Some(why) = outcome.findings.skipped.as_deref() else { continue };
+            match reasons.iter_mut().find(|(known, _)| *known == why) {
+                Some((_, rules)) => rules.push(outcome.rule.id),
+                None => reasons.push((why, vec![outcome.rule.id])),
+            }
+        }
+        for (why, rules) in reasons {
+            match rules.len() {
+                1 => _ = writeln!(text, "skipped {}: {why}", rules[0]),
+                n => {
+                    _ = writeln!(text, "skipped {n} rules, {} to {}: {why}", rules[0], rules[n - 1])
+                }
+            }
+        }
+        let skipped = self.outcomes.iter().filter(|o| o.findings.skipped.is_some()).count();
+        let _ = writeln!(
+            text,
+            "{}: {} errors, {} warnings; {} rules looked at, {skipped} skipped",
+            self.path.display(),
+            self.count(Severity::Error),
+            self.count(Severity::Warning),
+            self.outcomes.len() - skipped,
+        );
+        text
+    }
+}
+
+/// The table of rules as Markdown, as the documentation shows it.
+pub fn table() -> String {
+    let mut text = String::new();
+    let mut group = "";
+    for rule in RULES {
+        let (this, _) = rule.id.split_once('.').unwrap_or((rule.id, ""));
+        if this != group {
+            group = this;
+            text.push_str("\n| rule | what must hold | source | |\n| --- | --- | --- | --- |\n");
+        }
+        let _ = writeln!(
+            text,
+            "| `{}` | {} | {} | {} |",
+            rule.id,
+            rule.title,
+            rule.source,
+            rule.severity.name()
+        );
+    }
+    text.trim_start().to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn rules_have_names_of_their_own_and_stand_in_groups() {
+        let names: BTreeSet<_> = RULES.iter().map(|rule| rule.id).collect();
+        assert_eq!(names.len(), RULES.len());
+        let mut groups: Vec<_> = RULES.iter().map(|r| r.id.split_once('.').unwrap().0).collect();
+        groups.dedup();
+        let unique: BTreeSet<_> = groups.iter().collect();
+        assert_eq!(unique.len(), groups.len(), "a group is torn apart: {groups:?}");
+    }
+
+    #[test]
+    fn a_group_means_its_rules_and_no_others() {
+        let rule = |id| RULES.iter().find(|rule| rule.id == id).unwrap();
+        assert!(is_meant(rule("zip.names"), "zip"));
+        assert!(is_meant(rule("zip.names"), "zip.names"));
+        assert!(!is_meant(rule("zip.names"), "zip.name"));
+        assert!(!is_meant(rule("zip.names"), "xml"));
+    }
+}

@@ -1,0 +1,152 @@
+//! The logger (FMI 2.0.5, section 2.1.5).
+
+use anyhow::Result;
+
+use super::Findings;
+use super::guest::{Guest, STEPS};
+use super::life::first;
+use host::fmi2::{Instantiation, Message};
+
+/// What an FMU says to several mistakes.
+fn complaints(guest: &Guest) -> Result<Vec<Message>> {
+    let interface = first(guest)?;
+    let mut all = Vec::new();
+    guest.doing("fmi2Instantiate with another GUID");
+    let with = Instantiation {
+        kind: interface.kind(),
+        guid: Some("another"),
+        ..guest.fmu().instantiation("check")
+    };
+    if let Err(error) = guest.fmu().instantiate_with(&with) {
+        all.extend(error.messages);
+    }
+    let mut session = guest.session(interface)?;
+    guest.doing("fmi2SetDebugLogging");
+    session.instance.set_debug_logging(true, &[])?;
+    let _ = session.instance.exit_initialization_mode();
+    if session.initialise().is_ok() {
+        let _ = session.instance.get_real(&[u32::MAX], &mut [0.0]);
+        session.advance(STEPS)?;
+    }
+    all.extend(session.instance.take_messages());
+    Ok(all)
+}
+
+/// `log.percent`
+pub fn percent(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let interface = first(guest)?;
+    // If the text becomes the format, %d prints some number and %% one sign; neither can crash.
+    const TEXT: &str = "{a%db%%c}";
+    let mut told = Vec::new();
+    let place = format!("a message about {TEXT:?}");
+    guest.doing(&place);
+    let with = Instantiation {
+        kind: interface.kind(),
+        guid: Some(TEXT),
+        ..guest.fmu().instantiation(TEXT)
+    };
+    if let Err(error) = guest.fmu().instantiate_with(&with) {
+        told.extend(error.messages);
+    }
+    let mut session = guest.session(interface)?;
+    if let Err(error) = session.instance.set_debug_logging(true, &[TEXT]) {
+        told.extend(error.messages);
+    }
+    let echoes: Vec<_> = told.iter().filter(|m| m.text.contains("{a")).collect();
+    for message in &echoes {
+        if !message.text.contains(TEXT) {
+            findings.add(
+                &place,
+                format!(
+                    "it arrives as {:?} (allowed: format \"%s\", the text as argument)",
+                    message.text
+                ),
+            );
+        }
+    }
+    if echoes.is_empty() {
+        findings.skip("no message repeats what the host said");
+    }
+    Ok(())
+}
+
+/// `log.categories`
+pub fn categories(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let root = &guest.description().root;
+    let declared: Vec<&str> = root.list("LogCategories").filter_map(|c| c.get("name")).collect();
+    if declared.is_empty() {
+        findings.skip("no categories are declared");
+        return Ok(());
+    }
+    let mut unknown: Vec<String> = complaints(guest)?
+        .into_iter()
+        .map(|message| message.category)
+        .filter(|category| !declared.contains(&category.as_str()))
+        .collect();
+    unknown.sort();
+    unknown.dedup();
+    for category in unknown {
+        let all = declared.join(", ");
+        findings.add("a message", format!("its category is {category:?} (declared: {all})"));
+    }
+    Ok(())
+}
+
+/// `log.text`
+pub fn text(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let messages = complaints(guest)?;
+    if messages.is_empty() {
+        findings.skip("it logs nothing");
+    }
+    for message in messages {
+        let text = &message.text;
+        let fault = if text.trim().is_empty() {
+            "it is empty"
+        } else if text.ends_with(['\n', '\r']) {
+            "it ends with a line break"
+        } else if text.contains('\u{fffd}') {
+            "it is not UTF-8"
+        } else {
+            continue;
+        };
+        findings.add(format!("the message {text:?}"), fault);
+    }
+    Ok(())
+}
+
+/// `log.quiet`
+pub fn quiet(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    for interface in guest.interfaces() {
+        guest.doing("fmi2Instantiate, loggingOn");
+        let with = Instantiation { kind: interface.kind(), ..guest.fmu().instantiation("check") };
+        let mut session = guest.session(interface)?;
+        session.instance = guest.fmu().instantiate_with(&with)?;
+        session.initialise()?;
+        session.advance(STEPS)?;
+        session.instance.terminate()?;
+        let messages = session.instance.take_messages();
+        if let Some(message) = messages.first() {
+            findings.add(
+                format!("an ordinary run, loggingOn ({})", interface.name()),
+                format!("{} messages, the first {:?}", messages.len(), message.text),
+            );
+        }
+    }
+    Ok(())
+}
+
+/// `log.switch`
+pub fn switch(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let mut session = guest.session(first(guest)?)?;
+    let root = &guest.description().root;
+    let declared: Vec<&str> = root.list("LogCategories").filter_map(|c| c.get("name")).collect();
+    let sets = declared.iter().map(std::slice::from_ref).chain([&[][..], &declared[..]]);
+    for (set, on) in sets.flat_map(|set| [(set, true), (set, false)]) {
+        let place = format!("fmi2SetDebugLogging({on}, {set:?})");
+        guest.doing(&place);
+        if let Err(error) = session.instance.set_debug_logging(on, set) {
+            findings.add(place, error.to_string());
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,340 @@
+//! Co-Simulation steps (FMI 2.0.5, section 4.2).
+
+use anyhow::Result;
+
+use super::Findings;
+use super::guest::{Guest, Interface, Reading, STEPS, Session};
+use super::life::expect_refusal;
+use host::fmi2::Status;
+
+/// A stepping instance, or the reason why there is none.
+fn stepping<'g>(guest: &'g Guest, findings: &mut Findings) -> Result<Option<Session<'g>>> {
+    if !guest.interfaces().contains(&Interface::CoSimulation) {
+        findings.skip("it offers no Co-Simulation");
+        return Ok(None);
+    }
+    guest.running(Interface::CoSimulation).map(Some)
+}
+
+/// Whether steps may have any size.
+fn variable_steps(guest: &Guest, findings: &mut Findings) -> bool {
+    let can = guest.can(Interface::CoSimulation, "canHandleVariableCommunicationStepSize");
+    if !can {
+        findings.skip("canHandleVariableCommunicationStepSize is not declared");
+    }
+    can
+}
+
+/// `steps.run`
+pub fn run(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    const LONG: usize = 200;
+    let Some(mut session) = stepping(guest, findings)? else { return Ok(()) };
+    for _ in 0..LONG {
+        if let Err(error) = session.advance(1) {
+            if session.has_ended(&error) {
+                break;
+            }
+            let allowed = match error.status {
+                Status::Discard => " (without fmi2Terminated; two hosts try for ever)",
+                _ => "",
+            };
+            findings.add(guest.now(), format!("{error}{allowed}"));
+            return Ok(());
+        }
+    }
+    let readings = session.readings()?;
+    for (v, reading) in guest.variables().iter().zip(readings) {
+        if let Reading::Real(x) = reading
+            && !x.is_finite()
+        {
+            findings
+                .add(v.place(), format!("it is {x} after {LONG} steps, which all returned fmi2OK"));
+        }
+    }
+    Ok(())
+}
+
+/// `steps.size`
+pub fn size(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    for h in [0.0, -0.01, f64::NAN, f64::INFINITY] {
+        // After an error an FMU may refuse everything: a new instance each time.
+        let Some(mut session) = stepping(guest, findings)? else { return Ok(()) };
+        session.advance(3)?;
+        let before = session.readings()?;
+        let place = format!("fmi2DoStep with communicationStepSize = {h:?}");
+        guest.doing(&place);
+        let time = session.time;
+        let answer = session.instance.do_step(time, h);
+        let is_refused = answer.is_err();
+        expect_refusal(findings, place.clone(), answer);
+        if is_refused
+            && let Ok(after) = session.readings()
+            && let Some(text) = session.difference(&after, &before)
+        {
+            findings.add(&place, format!("it is refused, but {text}"));
+        }
+    }
+    Ok(())
+}
+
+/// `steps.point`
+pub fn point(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    for off in [2.0, -1.0, f64::NAN] {
+        let Some(mut session) = stepping(guest, findings)? else { return Ok(()) };
+        session.advance(3)?;
+        let wrong = session.time + off * session.step;
+        let place = format!("fmi2DoStep from {wrong:?} s, {:?} s being reached", session.time);
+        guest.doing(&place);
+        let answer = session.instance.do_step(wrong, session.step);
+        expect_refusal(findings, place, answer);
+    }
+    Ok(())
+}
+
+/// `steps.wobble`
+pub fn wobble(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    const LONG: usize = 200;
+    let Some(mut session) = stepping(guest, findings)? else { return Ok(()) };
+    let (start, h) = (session.time, session.step);
+    for n in 0..LONG {
+        // n·h and t + h differ by ulps; some hosts take one, some the other
+        let product = start + n as f64 * h;
+        let wobbled = match n % 3 {
+            0 => product,
+            1 => product.next_up(),
+            _ => product.next_down(),
+        };
+        session.stimulate()?;
+        guest.doing(format!("fmi2DoStep from {wobbled:?} s, {product:?} s by {h:?} s being meant"));
+        if let Err(error) = session.instance.do_step(wobbled, h) {
+            if session.has_ended(&error) {
+                break;
+            }
+            findings.add(guest.now(), format!("{error} (allowed: some ulps either way)"));
+            return Ok(());
+        }
+    }
+    Ok(())
+}
+
+/// `steps.start_time`
+pub fn start_time(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    for interface in guest.interfaces() {
+        guest.running(interface)?; // if that fails, another rule tells
+        for start in [guest.experiment().start + 1000.0, guest.experiment().start - 3.0] {
+            let mut session = guest.session(interface)?;
+            let place = format!("start time {start} s ({})", interface.name());
+            if let Err(error) = session.initialise_at(start, None, guest.experiment().tolerance) {
+                findings.add(place, error.to_string());
+            } else if let Err(error) = session.advance(STEPS) {
+                findings.add(place, error.to_string());
+            }
+        }
+    }
+    Ok(())
+}
+
+/// `steps.stop_time`
+pub fn stop_time(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    if stepping(guest, findings)?.is_none() {
+        return Ok(());
+    }
+    let experiment = guest.experiment();
+    let stop = experiment.start + STEPS as f64 * experiment.step;
+    let mut session = guest.session(Interface::CoSimulation)?;
+    session.initialise_at(experiment.start, Some(stop), experiment.tolerance)?;
+    // summing up leaves the last point some ulps beside the stop time
+    if let Err(error) = session.advance(STEPS) {
+        findings.add(
+            guest.now(),
+            format!("{error} (the stop time is {stop:?} s; rounding must be forgiven)"),
+        );
+        return Ok(());
+    }
+    let place = format!("fmi2DoStep past the stop time {stop} s");
+    guest.doing(&place);
+    let answer = session.instance.do_step(session.time, session.step);
+    expect_refusal(findings, place, answer);
+    Ok(())
+}
+
+/// `steps.tolerance`
+pub fn tolerance(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let start = guest.experiment().start;
+    let mut fails = Vec::new();
+    for interface in guest.interfaces() {
+        for tolerance in [None, Some(1e-4), Some(1e-6)] {
+            let mut session = guest.session(interface)?;
+            let done = session
+                .initialise_at(start, None, tolerance)
+                .map_err(anyhow::Error::from)
+                .and_then(|()| Ok(session.advance(3)?));
+            if let Err(error) = done {
+                let given = tolerance.map_or("none".into(), |x: f64| x.to_string());
+                fails.push((interface, format!("tolerance {given} ({})", interface.name()), error));
+            }
+        }
+    }
+    // Where none works, the tolerance is not to blame; another rule tells.
+    for interface in guest.interfaces() {
+        let of_this = fails.iter().filter(|(i, ..)| *i == interface);
+        if of_this.clone().count() < 3 {
+            for (_, place, error) in of_this {
+                findings.add(place, error.to_string());
+            }
+        }
+    }
+    Ok(())
+}
+
+/// `steps.cut`
+pub fn cut(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    /// Errors of many steps add up, and the tolerance is a step's.
+    const SLACK: f64 = 1e3;
+    let Some(session) = stepping(guest, findings)? else { return Ok(()) };
+    drop(session);
+    if !variable_steps(guest, findings) {
+        return Ok(());
+    }
+    let Some(tolerance) = guest.experiment().tolerance else {
+        findings.skip("no tolerance is suggested");
+        return Ok(());
+    };
+    // The same inputs, held over each of the long steps.
+    let run = |parts: usize| -> Result<(Vec<f64>, Vec<f64>)> {
+        let mut session = guest.running(Interface::CoSimulation)?;
+        let outputs: Vec<_> = guest
+            .variables()
+            .iter()
+            .filter(|v| v.causality == "output" && v.is_continuous())
+            .collect();
+        let mut scale = vec![0.0f64; outputs.len()];
+        let mut last = vec![0.0; outputs.len()];
+        let start = session.time;
+        for step in 0..STEPS {
+            session.count = step;
+            session.stimulate()?;
+            for part in 1..=parts {
+                let end = start + session.step * (step as f64 + part as f64 / parts as f64);
+                session.go(end - session.time)?;
+                session.time = end;
+            }
+            for (n, v) in outputs.iter().enumerate() {
+                if let Reading::Real(x) = session.get(v)? {
+                    scale[n] = scale[n].max(x.abs());
+                    last[n] = x;
+                }
+            }
+        }
+        Ok((last, scale))
+    };
+    let (whole, scale) = run(1)?;
+    for parts in [2, 5] {
+        let (cut, _) = run(parts)?;
+        let outputs =
+            guest.variables().iter().filter(|v| v.causality == "output" && v.is_continuous());
+        for (n, v) in outputs.enumerate() {
+            let allowed = SLACK * tolerance * scale[n].max(1e-3 * v.nominal());
+            let off = (whole[n] - cut[n]).abs();
+            if off > allowed {
+                findings.add(
+                    v.place(),
+                    format!(
+                        "{} after {STEPS} steps, {} after {} shorter ones: {off:.1e} off (allowed: {allowed:.1e})",
+                        whole[n], cut[n], parts * STEPS
+                    ),
+                );
+            }
+        }
+        if !findings.list.is_empty() {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// `steps.inputs`
+pub fn inputs(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let Some(mut session) = stepping(guest, findings)? else { return Ok(()) };
+    let inputs: Vec<_> =
+        guest.variables().iter().filter(|v| v.causality == "input" && v.is_real()).collect();
+    if inputs.is_empty() {
+        findings.skip("it has no Real inputs");
+        return Ok(());
+    }
+    for v in &inputs {
+        let mut session = guest.running(Interface::CoSimulation)?;
+        let place = format!("{} = NaN, then a step", v.name);
+        guest.doing(&place);
+        let refused =
+            session.set(v, &Reading::Real(f64::NAN)).is_err() || session.go(session.step).is_err();
+        if !refused {
+            findings.add(place, "fmi2OK (allowed: fmi2Error and a message)");
+        }
+    }
+    let can = guest.can(Interface::CoSimulation, "canInterpolateInputs");
+    for v in inputs.iter().filter(|v| can && v.is_continuous()) {
+        let place = format!("fmi2SetRealInputDerivatives of {}", v.name);
+        guest.doing(&place);
+        let set = session.instance.set_real_input_derivatives(&[v.reference], &[1], &[0.0]);
+        if let Err(error) = set {
+            findings.add(place, format!("{error}, but canInterpolateInputs is declared"));
+        }
+    }
+    Ok(())
+}
+
+/// `steps.output_derivatives`
+pub fn output_derivatives(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let Some(mut session) = stepping(guest, findings)? else { return Ok(()) };
+    let interface = guest.description().co_simulation.as_ref();
+    let order = interface.and_then(|i| i.number("maxOutputDerivativeOrder")).unwrap_or(0.0);
+    if order < 1.0 {
+        findings.skip("maxOutputDerivativeOrder is 0");
+        return Ok(());
+    }
+    let outputs: Vec<_> =
+        guest.variables().iter().filter(|v| v.causality == "output" && v.is_continuous()).collect();
+    let references: Vec<u32> = outputs.iter().map(|v| v.reference).collect();
+    session.advance(STEPS)?;
+    let mut declared = vec![f64::NAN; outputs.len()];
+    guest.doing("fmi2GetRealOutputDerivatives of every output");
+    session.instance.get_real_output_derivatives(
+        &references,
+        &vec![1; outputs.len()],
+        &mut declared,
+    )?;
+    if !guest.can(Interface::CoSimulation, "canHandleVariableCommunicationStepSize") {
+        return Ok(());
+    }
+    // Differences over two short steps, held inputs; where they disagree the output is not smooth.
+    let h = session.step * 1e-3;
+    let mut points = Vec::new();
+    for n in 0..3 {
+        let mut values = vec![0.0; outputs.len()];
+        session.instance.get_real(&references, &mut values)?;
+        points.push(values);
+        if n < 2 {
+            session.go(h)?;
+        }
+    }
+    for (n, v) in outputs.iter().enumerate() {
+        let (first, second) =
+            ((points[1][n] - points[0][n]) / h, (points[2][n] - points[1][n]) / h);
+        let at_start = 1.5 * first - 0.5 * second;
+        let smooth = (first - second).abs() <= 0.1 * first.abs().max(second.abs());
+        // a hundredth of the value, and what rounding of the values leaves
+        let rounding = 1e-9 * points[0][n].abs().max(1e-3 * v.nominal()) / h;
+        let off = (declared[n] - at_start).abs();
+        if declared[n].is_nan() || (smooth && off > 1e-2 * at_start.abs() + rounding) {
+            findings.add(
+                v.place(),
+                format!(
+                    "the derivative is given as {}, but the output changes by {at_start} per s",
+                    declared[n]
+                ),
+            );
+        }
+    }
+    Ok(())
+}

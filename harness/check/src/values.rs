@@ -1,0 +1,412 @@
+//! Reading and setting variables (FMI 2.0.5, section 2.1.7).
+
+use std::collections::BTreeSet;
+
+use anyhow::Result;
+
+use super::Findings;
+use super::description::Variable;
+use super::guest::{Guest, Reading, STEPS, Session, start_value};
+use super::life::{expect_refusal, first};
+use host::description::Type;
+use host::fmi2::{Called, Instance};
+
+/// Variables that hosts set, each with its start value.
+fn settable(guest: &Guest) -> impl Iterator<Item = (&Variable, Reading)> {
+    let all = guest.variables().iter().filter(|v| v.is_set_by_hosts());
+    all.filter_map(|v| Some((v, start_value(v)?)))
+}
+
+fn initializing<'g>(guest: &'g Guest) -> Result<Session<'g>> {
+    // if it does not initialise, another rule tells
+    guest.running(first(guest)?)?;
+    let mut session = guest.session(first(guest)?)?;
+    session.instance.setup_experiment(None, session.time, None)?;
+    session.instance.enter_initialization_mode()?;
+    Ok(session)
+}
+
+/// `values.start`
+pub fn start(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let starts: Vec<_> = guest
+        .variables()
+        .iter()
+        .filter(|v| v.initial.as_deref() != Some("approx"))
+        .filter_map(|v| Some((v, start_value(v)?)))
+        .collect();
+    let mut wrong = BTreeSet::new();
+    let mut look = |session: &mut Session, when: &str, only_parameters: bool| {
+        for (v, start) in &starts {
+            // an output or a state that starts from its start value may move on with time
+            if only_parameters && !v.is_set_by_hosts() {
+                continue;
+            }
+            let Ok(value) = session.get(v) else { continue }; // values.readable tells
+            if !value.is(start) && wrong.insert(v.index) {
+                findings.add(
+                    v.place(),
+                    format!("start {start} in modelDescription.xml, {value} in the binary {when}"),
+                );
+            }
+        }
+    };
+    let mut session = initializing(guest)?;
+    guest.doing("reading start values in initialization mode");
+    look(&mut session, "before initialisation", false);
+    session.leave_initialisation()?;
+    guest.doing("reading start values after initialisation");
+    look(&mut session, "after initialisation", true);
+    Ok(())
+}
+
+/// `values.readable`
+pub fn readable(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let mut session = initializing(guest)?;
+    let mut told = BTreeSet::new();
+    let mut look = |session: &mut Session, when: &str| {
+        for v in guest.variables() {
+            guest.doing(format!("reading {} {when}", v.name));
+            let fault = match session.get(v) {
+                Err(error) => error.to_string(),
+                Ok(Reading::Real(x)) if !x.is_finite() => {
+                    format!("it is {x} {when} (allowed: finite)")
+                }
+                Ok(_) => continue,
+            };
+            if told.insert(v.index) {
+                findings.add(v.place(), fault);
+            }
+        }
+    };
+    look(&mut session, "in initialization mode");
+    session.leave_initialisation()?;
+    look(&mut session, "after initialisation");
+    session.advance(3)?;
+    look(&mut session, "after steps");
+    Ok(())
+}
+
+/// `values.booleans`
+pub fn booleans(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let mut session = initializing(guest)?;
+    let all: Vec<_> = guest.variables().iter().filter(|v| v.kind == Type::Boolean).collect();
+    if all.is_empty() {
+        findings.skip("it has no Booleans");
+    }
+    for v in all {
+        guest.doing(format!("reading and setting {}", v.name));
+        if let Reading::Boolean(value @ (..=-1 | 2..)) = session.get(v)? {
+            findings.add(v.place(), format!("it reads as {value} (allowed: 0 and 1)"));
+        }
+        if v.is_set_by_hosts() && session.set(v, &Reading::Boolean(2)).is_ok() {
+            match session.get(v)? {
+                Reading::Boolean(1) => {}
+                other => {
+                    findings.add(v.place(), format!("set to 2, which is true, it reads {other:?}"))
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// `values.round_trip`
+pub fn round_trip(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let mut session = initializing(guest)?;
+    let mut fresh = guest.session(first(guest)?)?;
+    for (v, start) in settable(guest) {
+        guest.doing(format!("setting {} to {start}", v.name));
+        // as hosts do that set every start value before they set up
+        if let Err(error) = fresh.set(v, &start) {
+            findings.add(
+                v.place(),
+                format!("its own start value is refused when instantiated: {error}"),
+            );
+        }
+        let mut tried = vec![start.clone()];
+        tried.extend(other_value(guest, v, &start));
+        tried.push(start);
+        for value in tried {
+            guest.doing(format!("setting {} to {value}", v.name));
+            // another value than the start may be refused
+            if session.set(v, &value).is_err() {
+                continue;
+            }
+            let read = session.get(v)?;
+            if !read.is(&value) {
+                findings.add(v.place(), format!("set to {value}, it reads {read}"));
+                break;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A value near the start that is allowed.
+pub fn other_value(guest: &Guest, v: &Variable, start: &Reading) -> Option<Reading> {
+    let (min, max) = v.bounds();
+    match start {
+        Reading::Real(x) => {
+            let step = x.abs().max(v.nominal() * 1e-3) / 1024.0;
+            let step = step.min((max - min) / 4.0);
+            let moved = if x + step <= max { x + step } else { x - step };
+            (moved >= min && moved != *x).then_some(Reading::Real(moved))
+        }
+        Reading::Integer(n) => {
+            let allowed: Vec<i32> = match v.kind {
+                Type::Enumeration => items(guest, v),
+                _ => vec![n.saturating_add(1), n.saturating_sub(1)],
+            };
+            let fits = |m: &i32| m != n && f64::from(*m) >= min && f64::from(*m) <= max;
+            allowed.into_iter().find(fits).map(Reading::Integer)
+        }
+        Reading::Boolean(b) => Some(Reading::Boolean((*b == 0).into())),
+        Reading::Text(text) => Some(Reading::Text(format!("{text}x"))),
+    }
+}
+
+/// Values an enumeration can take.
+pub fn items(guest: &Guest, v: &Variable) -> Vec<i32> {
+    let declared = v.typed.get("declaredType");
+    let types = guest.description().root.list("TypeDefinitions");
+    let simple = types.filter(|t| t.get("name").is_some() && t.get("name") == declared);
+    let items = simple.flat_map(|t| t.list("Enumeration"));
+    items.filter_map(|item| item.get("value")?.trim().parse().ok()).collect()
+}
+
+/// `values.nothing`
+pub fn nothing(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let mut session = initializing(guest)?;
+    guest.doing("fmi2Get… and fmi2Set… with nvr = 0 and NULL pointers");
+    for (call, status) in session.instance.nothing_null() {
+        if status != host::fmi2::Status::Ok {
+            findings
+                .add(format!("{call} with nvr = 0"), format!("fmi2{status:?} (allowed: fmi2OK)"));
+        }
+    }
+    Ok(())
+}
+
+/// `values.unknown`
+pub fn unknown(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let taken: BTreeSet<u32> = guest.variables().iter().map(|v| v.reference).collect();
+    let largest = taken.last().copied().unwrap_or(0);
+    let free = [u32::MAX, largest.saturating_add(1)];
+    let calls: [Call; 8] = [
+        ("fmi2GetReal", |i, r| i.get_real(&[r], &mut [0.0])),
+        ("fmi2SetReal", |i, r| i.set_real(&[r], &[0.0])),
+        ("fmi2GetInteger", |i, r| i.get_integer(&[r], &mut [0])),
+        ("fmi2SetInteger", |i, r| i.set_integer(&[r], &[0])),
+        ("fmi2GetBoolean", |i, r| i.get_boolean(&[r], &mut [0])),
+        ("fmi2SetBoolean", |i, r| i.set_boolean(&[r], &[0])),
+        ("fmi2GetString", |i, r| i.get_string(&[r]).map(|_| ())),
+        ("fmi2SetString", |i, r| i.set_string(&[r], &["x"])),
+    ];
+    for reference in free.into_iter().filter(|r| !taken.contains(r)) {
+        for call in calls {
+            let what = format!("the unknown value reference {reference}");
+            refused(guest, findings, call, reference, &what)?;
+        }
+    }
+    Ok(())
+}
+
+/// A call with one value reference.
+type Call = (&'static str, fn(&mut Instance, u32) -> Called);
+
+/// The call must be refused. Each goes to an instance of its own: after an error some refuse all.
+fn refused(
+    guest: &Guest,
+    findings: &mut Findings,
+    (name, call): Call,
+    reference: u32,
+    what: &str,
+) -> Result<()> {
+    let mut session = guest.running(first(guest)?)?;
+    let place = format!("{name} of {what}");
+    guest.doing(&place);
+    let answer = call(&mut session.instance, reference);
+    expect_refusal(findings, place, answer);
+    Ok(())
+}
+
+/// `values.wrong_type`
+pub fn wrong_type(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    // Value references count for each type by itself.
+    let of = |kinds: &[Type]| -> BTreeSet<u32> {
+        let all = guest.variables().iter().filter(|v| kinds.contains(&v.kind));
+        all.map(|v| v.reference).collect()
+    };
+    let integers = of(&[Type::Integer, Type::Enumeration]);
+    let (reals, booleans, texts) = (of(&[Type::Real]), of(&[Type::Boolean]), of(&[Type::String]));
+    let of_real: [(Call, &BTreeSet<u32>); 4] = [
+        (("fmi2GetInteger", |i, r| i.get_integer(&[r], &mut [0])), &integers),
+        (("fmi2SetInteger", |i, r| i.set_integer(&[r], &[0])), &integers),
+        (("fmi2GetBoolean", |i, r| i.get_boolean(&[r], &mut [0])), &booleans),
+        (("fmi2GetString", |i, r| i.get_string(&[r]).map(|_| ())), &texts),
+    ];
+    let mut looked = false;
+    for (call, others) in of_real {
+        if let Some(reference) = reals.difference(others).next() {
+            looked = true;
+            refused(guest, findings, call, *reference, "a Real")?;
+        }
+    }
+    let get_real: Call = ("fmi2GetReal", |i, r| i.get_real(&[r], &mut [0.0]));
+    for (others, what) in [(&integers, "an Integer"), (&booleans, "a Boolean")] {
+        if let Some(reference) = others.difference(&reals).next() {
+            looked = true;
+            refused(guest, findings, get_real, *reference, what)?;
+        }
+    }
+    if !looked {
+        findings.skip("every value reference is used by every type");
+    }
+    Ok(())
+}
+
+/// `values.fixed`
+pub fn fixed(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let fixed =
+        settable(guest).filter(|(v, _)| v.causality == "parameter" && v.variability == "fixed");
+    let mut any = false;
+    for (v, start) in fixed {
+        any = true;
+        let mut session = guest.running(first(guest)?)?;
+        session.advance(1)?;
+        let place = format!("setting the fixed parameter {} after initialisation", v.name);
+        guest.doing(&place);
+        let answer = session.set(v, &start);
+        expect_refusal(findings, place, answer);
+    }
+    if !any {
+        findings.skip("it has no fixed parameters");
+    }
+    Ok(())
+}
+
+/// `values.computed`
+pub fn computed(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let aliases: BTreeSet<_> =
+        settable(guest).map(|(v, _)| (v.kind == Type::Real, v.reference)).collect();
+    let mut any = false;
+    for causality in ["output", "local", "calculatedParameter"] {
+        // Those with initial exact or approx can be set before initialisation, not later.
+        let v = guest.variables().iter().find(|v| {
+            v.causality == causality
+                && v.initial.as_deref() == Some("calculated")
+                && !aliases.contains(&(v.kind == Type::Real, v.reference))
+        });
+        let Some(v) = v else { continue };
+        any = true;
+        let mut session = guest.running(first(guest)?)?;
+        let value = session.get(v)?;
+        let place = format!("setting the {causality} {} after initialisation", v.name);
+        guest.doing(&place);
+        let answer = session.set(v, &value);
+        expect_refusal(findings, place, answer);
+    }
+    if !any {
+        findings.skip("nothing is declared as calculated");
+    }
+    Ok(())
+}
+
+/// `values.limits`
+pub fn limits(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let mut any = false;
+    for (v, _) in settable(guest).filter(|(v, _)| matches!(v.kind, Type::Real | Type::Integer)) {
+        let (min, max) = v.bounds();
+        for (bound, outwards) in [(min, -1.0), (max, 1.0)] {
+            if !bound.is_finite() {
+                continue;
+            }
+            any = true;
+            let outside = match v.kind {
+                Type::Real => bound + outwards * bound.abs().max(1e-3 * v.nominal()),
+                _ => bound + outwards,
+            };
+            let try_at = |x: f64| -> Result<Option<String>> {
+                let mut session = guest.session(first(guest)?)?;
+                guest.doing(format!("setting {} to {x:?} and initialising", v.name));
+                let value = match v.kind {
+                    Type::Real => Reading::Real(x),
+                    _ => Reading::Integer(x as i32),
+                };
+                if let Err(error) = session.set(v, &value) {
+                    return Ok(Some(error.to_string()));
+                }
+                Ok(session.initialise().err().map(|error| error.to_string()))
+            };
+            // Refused as contradicting another parameter is fine: that one is named as well.
+            if let Some(why) = try_at(bound)?
+                && !settable(guest).any(|(o, _)| o.name != v.name && mentions(&why, &o.name))
+            {
+                findings.add(
+                    v.place(),
+                    format!("{bound} is allowed by min and max, but refused: {why}"),
+                );
+            }
+            if outside.is_finite()
+                && (v.kind == Type::Real || i32::try_from(outside as i64).is_ok())
+                && try_at(outside)?.is_none()
+            {
+                findings.add(
+                    v.place(),
+                    format!("{outside} is outside min and max ({min} to {max}), but accepted"),
+                );
+            }
+        }
+    }
+    if !any {
+        findings.skip("no variable that hosts set has a min or a max");
+    }
+    Ok(())
+}
+
+/// Whether a text contains a name as a whole word.
+fn mentions(text: &str, name: &str) -> bool {
+    let part = |c: char| c.is_alphanumeric() || matches!(c, '_' | '.' | '[');
+    text.match_indices(name).any(|(at, _)| {
+        let (before, after) = (text[..at].chars().last(), text[at + name.len()..].chars().next());
+        !before.is_some_and(part) && !after.is_some_and(|c| part(c) && c != '.')
+    })
+}
+
+/// `values.not_a_number`
+pub fn not_a_number(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    // inputs have a rule of their own
+    let reals = settable(guest).filter(|(v, _)| v.kind == Type::Real && v.causality != "input");
+    for (v, _) in reals {
+        for x in [f64::NAN, f64::INFINITY] {
+            let mut session = guest.session(first(guest)?)?;
+            let place = format!("{} = {x}, then a step", v.name);
+            guest.doing(&place);
+            let refused = session.set(v, &Reading::Real(x)).is_err()
+                || session.initialise().is_err()
+                || session.go(session.step).is_err();
+            if !refused {
+                findings
+                    .add(place, "nobody objects (allowed: fmi2Error at the step at the latest)");
+                break;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// `values.no_warning`
+pub fn no_warning(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    for interface in guest.interfaces() {
+        let mut session = guest.running(interface)?;
+        session.advance(STEPS)?;
+        session.readings()?;
+        if let Some(call) = session.instance.take_warning() {
+            findings.add(
+                format!("an ordinary run ({})", interface.name()),
+                format!("{call} returns fmi2Warning (allowed: fmi2OK)"),
+            );
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,160 @@
+//! `hubslosh campaign`.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Result, bail, ensure};
+use bench::campaign::Campaign;
+use bench::plan::{self, Plan};
+use bench::report;
+use host::fmi2::Fmu;
+
+use super::{DEFAULT_CAMPAIGN, DEFAULT_FMU, setting};
+use crate::progress;
+
+/// Drives the FMU through a plan's runs, or the thesis's sweeps at several fills and amplitudes,
+/// and reports.
+///
+/// Runs that are there already (same FMU, parameters and profile) are not done again.
+#[derive(clap::Args)]
+#[command(after_help = help())]
+pub struct CampaignArgs {
+    /// Plan: a TOML file, or the name of a built-in plan (below).
+    #[arg(
+        long,
+        value_name = "FILE",
+        conflicts_with_all = ["model", "fills", "amplitudes", "sweep", "settings", "tolerance"]
+    )]
+    plan: Option<String>,
+    /// Print the runs as JSON for another program to make, and make none.
+    #[arg(long)]
+    list: bool,
+    /// Slosh models, by name.
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', default_value = "linear")]
+    model: Vec<String>,
+    /// Fills, m.
+    #[arg(long, value_name = "M,…", value_delimiter = ',', default_values_t = plan::FILLS)]
+    fills: Vec<f64>,
+    /// Torque amplitudes, N.m.
+    #[arg(long, value_name = "NM,…", value_delimiter = ',', default_values_t = plan::AMPLITUDES)]
+    amplitudes: Vec<f64>,
+    /// How the frequency grows from 1.25 to 3.5 Hz in 2700 s.
+    #[arg(long, value_enum, default_value = "exponential")]
+    sweep: Sweep,
+    /// Sets a parameter or an input by its FMU name; enumerations by name or number.
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
+    settings: Vec<(String, String)>,
+    /// Relative tolerance of the FMU's solver [default: the FMU's own].
+    #[arg(long, value_name = "NUMBER")]
+    tolerance: Option<f64>,
+    /// Do runs again that are there already.
+    #[arg(long)]
+    force: bool,
+    /// The FMU.
+    #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
+    fmu: PathBuf,
+    /// Directory for runs, tables and report.html [default: dist/campaign, or dist/ and the plan's
+    /// name].
+    #[arg(long, value_name = "DIRECTORY")]
+    out: Option<PathBuf>,
+}
+
+/// How the frequency of `campaign`'s sweep grows.
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Sweep {
+    /// Exponentially.
+    Exponential,
+    /// Evenly.
+    Linear,
+}
+
+impl CampaignArgs {
+    /// Runs the command.
+    pub fn run(self) -> Result<()> {
+        let (plan, out) = match &self.plan {
+            Some(file) => {
+                let stem = Path::new(file).file_stem().unwrap_or_default();
+                (Plan::read(file)?, Path::new("dist").join(stem))
+            }
+            None => (self.flags_as_plan()?, DEFAULT_CAMPAIGN.into()),
+        };
+        let out = self.out.clone().unwrap_or(out);
+        let campaign = Campaign { plan, force: self.force, out };
+        let fmu = Fmu::open(&self.fmu)?;
+        if self.list {
+            println!("{:#}", campaign.list(&fmu)?);
+            return Ok(());
+        }
+        drive(&fmu, &campaign)
+    }
+
+    /// The plan that the flags without `--plan` stand for.
+    fn flags_as_plan(&self) -> Result<Plan> {
+        for (name, _) in &self.settings {
+            ensure!(
+                !["slosh.model", "tank.h", "tau_cmd"].contains(&name.as_str()),
+                "{name} is what the campaign varies; use --model, --fills, --amplitudes"
+            );
+        }
+        let kind = match self.sweep {
+            Sweep::Exponential => "exp-sweep",
+            Sweep::Linear => "lin-sweep",
+        };
+        let mut table = toml::Table::new();
+        table.insert("title".into(), "Sweeps at several fills and amplitudes".into());
+        table.insert("profile".into(), format!("{kind}:f0=1.25,f1=3.5,duration=2700").into());
+        if let Some(tolerance) = self.tolerance {
+            table.insert("tolerance".into(), tolerance.into());
+        }
+        let settings =
+            self.settings.iter().map(|(name, value)| (name.clone(), value.as_str().into()));
+        table.insert("set".into(), settings.collect::<toml::Table>().into());
+        let vary = [
+            ("slosh.model", toml::Value::from(self.model.clone())),
+            ("tank.h", self.fills.clone().into()),
+            ("profile.amplitude", self.amplitudes.clone().into()),
+        ];
+        let vary = vary.into_iter().map(|(name, values)| (name.to_string(), values));
+        table.insert("vary".into(), vary.collect::<toml::Table>().into());
+        Plan::parse(&toml::to_string(&table)?)
+    }
+}
+
+/// Carries a campaign out and leaves tables and report.
+pub fn drive(fmu: &Fmu, campaign: &Campaign) -> Result<()> {
+    let bar = progress::of_runs()?;
+    let results = campaign.execute(fmu, &|news| progress::show(&bar, news))?;
+    bar.finish_and_clear();
+    campaign.write_tables(fmu, &results)?;
+    let page = campaign.out.join("report.html");
+    report::write(&page, campaign, fmu, &results)?;
+    let reused = results.outcomes.iter().filter(|o| o.reused).count();
+    println!(
+        "{} runs made, {reused} were there already\nfeatures: {}\nruns:     {}\nreport:   {}",
+        results.outcomes.len() - reused,
+        campaign.out.join("features.csv").display(),
+        campaign.out.join("runs.csv").display(),
+        page.display(),
+    );
+    for failure in &results.failures {
+        eprintln!("{} failed: {}", failure.case.name, failure.reason);
+    }
+    if !results.failures.is_empty() {
+        bail!("{} of the campaign's runs failed", results.failures.len());
+    }
+    Ok(())
+}
+
+fn help() -> String {
+    let mut plans = String::new();
+    for (name, text) in plan::BUILT_IN {
+        let title = Plan::parse(text).map(|plan| plan.title).unwrap_or_default();
+        plans.push_str(&format!("  {name:18} {title}\n"));
+    }
+    format!(
+        "Built-in plans:\n{plans}\n\
+         Examples:\n  hubslosh campaign\n  \
+         hubslosh campaign --plan thesis_models\n  \
+         hubslosh campaign --plan mine.toml --out dist/mine\n  \
+         hubslosh campaign --fills 0.05,0.1 --amplitudes 0.1 --set friction.model=viscous --out dist/viscous"
+    )
+}

@@ -1,0 +1,81 @@
+//! `hubslosh check`.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use anyhow::{Context, Result, bail};
+use check::{Options, Severity, check, junit, process, table};
+use host::output;
+
+use crate::progress;
+
+/// Checks an FMU 2.0 against the standard and against what hosts ask for.
+///
+/// Looks at the archive, the description and the binaries, and calls the binary for this platform as
+/// hosts do. The exit code is 0 when there are no errors; warnings are told only.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:\n  hubslosh check dist/HubSlosh.fmu\n  \
+    hubslosh check other.fmu --only zip,xml --junit check.xml\n  hubslosh check --rules")]
+pub struct CheckArgs {
+    /// The FMU.
+    #[arg(value_name = "FMU", required_unless_present = "rules")]
+    fmu: Option<PathBuf>,
+    /// Writes the report as JUnit XML, one test case for each rule.
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
+    /// Rules (zip.names) or groups of rules (zip) to look at [default: all].
+    #[arg(long, value_name = "RULE,…", value_delimiter = ',')]
+    only: Vec<String>,
+    /// Time that the calls of one rule may take, s.
+    #[arg(long, value_name = "SECONDS", default_value_t = 60.0)]
+    limit: f64,
+    /// Lists the rules as a Markdown table and checks nothing.
+    #[arg(long)]
+    rules: bool,
+}
+
+/// What `check` starts for the calls of one rule.
+#[derive(clap::Args)]
+pub struct CheckCallsArgs {
+    rule: String,
+    directory: PathBuf,
+    fmu: PathBuf,
+    answer: PathBuf,
+}
+
+impl CheckArgs {
+    /// Runs the command.
+    pub fn run(self) -> Result<()> {
+        if self.rules {
+            print!("{}", table());
+            return Ok(());
+        }
+        let fmu = self.fmu.as_ref().context("no FMU is given")?;
+        let limit = Duration::try_from_secs_f64(self.limit).ok().filter(|limit| !limit.is_zero());
+        let limit =
+            limit.with_context(|| format!("--limit {} (allowed: above 0 s)", self.limit))?;
+        let program = std::env::current_exe().context("this program cannot find itself")?;
+        let options = Options { program, only: self.only.clone(), limit };
+        let bar = progress::of_rules()?;
+        let report = check(fmu, &options, |rules| {
+            bar.set_length(rules as u64);
+            bar.inc(1);
+        })?;
+        bar.finish_and_clear();
+        print!("{}", report.text());
+        if let Some(path) = &self.junit {
+            output::atomically(path, |file| junit::write(&report, file))?;
+        }
+        match report.count(Severity::Error) {
+            0 => Ok(()),
+            errors => bail!("{} breaks the rules in {errors} places", fmu.display()),
+        }
+    }
+}
+
+impl CheckCallsArgs {
+    /// Runs the command.
+    pub fn run(self) -> Result<()> {
+        process::answer(&self.rule, &self.directory, &self.fmu, &self.answer)
+    }
+}

@@ -1,0 +1,27 @@
+//! `hubslosh example`.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use bench::example;
+use host::fmi2::Fmu;
+
+use super::DEFAULT_FMU;
+
+/// Writes the example that travels with the FMU (modelDescription/HubSlosh/extra): torque and answer.
+#[derive(clap::Args)]
+pub struct ExampleArgs {
+    /// The FMU that answers.
+    #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
+    fmu: PathBuf,
+}
+
+impl ExampleArgs {
+    /// Runs the command.
+    pub fn run(self) -> Result<()> {
+        let folder = pack::root().join("modelDescription/HubSlosh").join(pack::EXTRA);
+        example::write(&Fmu::open(&self.fmu)?, &folder)?;
+        println!("wrote {}", folder.display());
+        Ok(())
+    }
+}

@@ -1,0 +1,52 @@
+//! `hubslosh release`.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use anyhow::{Context, Result, bail};
+use check::{Options, Severity};
+use pack::release;
+
+use crate::progress;
+
+/// Where the release goes.
+const DEFAULT_RELEASE: &str = "dist/release";
+
+/// Builds and checks the release for all platforms: the FMU, its hash, its bill of materials.
+#[derive(clap::Args)]
+#[command(after_help = "Example:\n  hubslosh release\n\n\
+    On a Debian machine harness/platforms/setup gets what building for all platforms takes.")]
+pub struct ReleaseArgs {
+    /// Directory for the release's files.
+    #[arg(long, value_name = "DIRECTORY", default_value = DEFAULT_RELEASE)]
+    out: PathBuf,
+}
+
+impl ReleaseArgs {
+    /// Runs the command.
+    pub fn run(self) -> Result<()> {
+        for path in release::write(&self.out, checked)? {
+            println!("{} ({} bytes)", path.display(), path.metadata()?.len());
+        }
+        Ok(())
+    }
+}
+
+/// The report of `hubslosh check` on the FMU; fails with it if there are errors.
+fn checked(fmu: &Path) -> Result<String> {
+    let program = std::env::current_exe().context("this program cannot find itself")?;
+    let options = Options { program, only: vec![], limit: Duration::from_secs(60) };
+    let bar = progress::of_rules()?;
+    let mut report = check::check(fmu, &options, |rules| {
+        bar.set_length(rules as u64);
+        bar.inc(1);
+    })?;
+    bar.finish_and_clear();
+    // not where it happened to lie while it was checked
+    report.path = fmu.file_name().unwrap_or_default().into();
+    let text = report.text();
+    match report.count(Severity::Error) {
+        0 => Ok(text),
+        _ => bail!("nothing is released, the FMU breaks rules:\n{text}"),
+    }
+}

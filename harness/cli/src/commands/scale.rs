@@ -1,0 +1,123 @@
+//! `hubslosh scale`.
+
+use anyhow::Result;
+use bench::scaling::{self, Flight, Liquid};
+use clap::Subcommand;
+
+/// Says which tank in flight a bench stands for: Bond numbers, Froude's factors.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:\n  hubslosh scale thesis\n  \
+    hubslosh scale bond --flight-radius 2.0425 --flight-density 1141 --flight-tension 0.0132\n  \
+    hubslosh scale rotation --alpha 2.21 --flight-alpha 0.005\n  \
+    hubslosh scale froude --lambda 25 --density-ratio 1.14")]
+pub struct ScaleArgs {
+    #[command(subcommand)]
+    what: Scale,
+}
+
+#[derive(Subcommand)]
+enum Scale {
+    /// The figures of the thesis's 7.2, printed and computed.
+    Thesis,
+    /// Bond number of an acceleration, and the tank in flight that has the same.
+    Bond {
+        /// Density of the bench's liquid, kg/m3.
+        #[arg(long, default_value_t = scaling::WATER.density)]
+        density: f64,
+        /// Its surface tension, N/m.
+        #[arg(long, default_value_t = scaling::WATER.tension)]
+        tension: f64,
+        /// Acceleration along the tank's axis, m/s2.
+        #[arg(long, default_value_t = 9.81)]
+        acceleration: f64,
+        /// Radius of the bench's tank, m.
+        #[arg(long, default_value_t = scaling::BENCH.0)]
+        radius: f64,
+        /// Density of the liquid in flight, kg/m3 [default: the bench's].
+        #[arg(long)]
+        flight_density: Option<f64>,
+        /// Surface tension of the liquid in flight, N/m [default: the bench's].
+        #[arg(long)]
+        flight_tension: Option<f64>,
+        /// Radius of the tank in flight, m: gives its acceleration.
+        #[arg(long, conflicts_with = "flight_acceleration")]
+        flight_radius: Option<f64>,
+        /// Acceleration in flight, m/s2: gives the tank's radius.
+        #[arg(long)]
+        flight_acceleration: Option<f64>,
+    },
+    /// Bond numbers of a rotation, and the tanks that have the same at another one.
+    Rotation {
+        /// Density of the liquid, kg/m3.
+        #[arg(long, default_value_t = scaling::ROUND_WATER.density)]
+        density: f64,
+        /// Its surface tension, N/m.
+        #[arg(long, default_value_t = scaling::ROUND_WATER.tension)]
+        tension: f64,
+        /// Radius of the bench's tank, m.
+        #[arg(long, default_value_t = scaling::BENCH.0)]
+        radius: f64,
+        /// Distance of the tank from the axis, m.
+        #[arg(long, default_value_t = scaling::BENCH.1)]
+        arm: f64,
+        /// Largest angular acceleration on the bench, rad/s2.
+        #[arg(long)]
+        alpha: f64,
+        /// Largest angular rate on the bench, rad/s.
+        #[arg(long)]
+        omega: Option<f64>,
+        /// Angular acceleration in flight, rad/s2.
+        #[arg(long, default_value_t = 0.005)]
+        flight_alpha: f64,
+    },
+    /// What multiplies a model's figures to give the full size's.
+    Froude {
+        /// Length of the full size over the model's.
+        #[arg(long)]
+        lambda: f64,
+        /// Density of the full size's liquid over the model's.
+        #[arg(long, default_value_t = 1.0)]
+        density_ratio: f64,
+        /// Acceleration of the full size over the model's.
+        #[arg(long, default_value_t = 1.0)]
+        gravity_ratio: f64,
+    },
+}
+
+impl ScaleArgs {
+    /// Runs the command.
+    pub fn run(self) -> Result<()> {
+        let text = match self.what {
+            Scale::Thesis => scaling::thesis_text(),
+            Scale::Bond {
+                density,
+                tension,
+                acceleration,
+                radius,
+                flight_density,
+                flight_tension,
+                flight_radius,
+                flight_acceleration,
+            } => {
+                let bench = Liquid { density, tension };
+                let liquid = Liquid {
+                    density: flight_density.unwrap_or(density),
+                    tension: flight_tension.unwrap_or(tension),
+                };
+                let flight = flight_radius
+                    .map(Flight::Radius)
+                    .or(flight_acceleration.map(Flight::Acceleration));
+                scaling::bond_text(bench, (acceleration, radius), liquid, flight)?
+            }
+            Scale::Rotation { density, tension, radius, arm, alpha, omega, flight_alpha } => {
+                let liquid = Liquid { density, tension };
+                scaling::rotation_text(liquid, (radius, arm), (alpha, omega), flight_alpha)?
+            }
+            Scale::Froude { lambda, density_ratio, gravity_ratio } => {
+                scaling::froude_text(lambda, density_ratio, gravity_ratio)?
+            }
+        };
+        print!("{text}");
+        Ok(())
+    }
+}

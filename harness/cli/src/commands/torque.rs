@@ -1,0 +1,60 @@
+//! `hubslosh torque`.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use anyhow::Result;
+use bench::profile::{self, Written};
+use bench::run::Run;
+use bench::table;
+
+/// Writes a profile's torque alone: time (s), tau_cmd (N.m), and tau_slope (N.m/s), which is the
+/// torque's derivative until the next row.
+///
+/// Given value and slope at every row the FMU sees what `hubslosh run` shows it, jumps included;
+/// time and tau_cmd alone are a torque history for --input, for a bench or Simulink.
+#[derive(clap::Args)]
+#[command(after_help = help())]
+pub struct TorqueArgs {
+    /// Torque profile, name:key=value,…
+    #[arg(long, value_name = "PROFILE")]
+    profile: String,
+    /// Time between rows, s.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.02)]
+    step: f64,
+    /// Time of the last row, s [default: the end of the profile].
+    #[arg(long, value_name = "SECONDS")]
+    stop: Option<f64>,
+    /// Where to put the torque, .csv or .parquet.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+impl TorqueArgs {
+    /// Runs the command.
+    pub fn run(self) -> Result<()> {
+        table::check_ending(&self.out)?;
+        let torque = self.profile.parse::<Written>()?.torque()?;
+        let run = Run {
+            settings: Vec::new(),
+            stop: self.stop.unwrap_or(torque.span().1),
+            torque,
+            step: self.step,
+            tolerance: None,
+            hold: false,
+        };
+        run.check()?;
+        let table = run.torque_table();
+        table.write(&self.out, &BTreeMap::from([("profile".into(), self.profile.clone())]))?;
+        println!("{} rows in {}", table.rows(), self.out.display());
+        Ok(())
+    }
+}
+
+fn help() -> String {
+    format!(
+        "Profiles, with their defaults (torque in N.m, frequencies in Hz, times in s):\n{}\n\
+         Example:\n  hubslosh torque --profile bang-stop-bang:amplitude=0.2,bang=2 --step 0.02 --out torque.csv",
+        profile::help()
+    )
+}

@@ -1,0 +1,39 @@
+//! Progress bars on a terminal; the libraries only tell how far they are.
+
+use anyhow::Result;
+use bench::progress::Progress;
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// A bar for steps of one run.
+pub fn of_steps() -> Result<ProgressBar> {
+    bar("{bar:40} {percent:>3} %  {elapsed} gone, {eta} to go")
+}
+
+/// A bar for the steps of many runs.
+pub fn of_runs() -> Result<ProgressBar> {
+    bar("{msg} {bar:40} {percent:>3} %  {elapsed} gone, {eta} to go")
+}
+
+/// A bar for the rules of a check.
+pub fn of_rules() -> Result<ProgressBar> {
+    bar("{bar:40} {pos} of {len} rules of calls  {elapsed} gone, {eta} to go")
+}
+
+/// Not drawn where stderr is no terminal.
+fn bar(template: &str) -> Result<ProgressBar> {
+    Ok(ProgressBar::new(0).with_style(ProgressStyle::with_template(template)?))
+}
+
+/// Shows a piece of news of the bench.
+pub fn show(bar: &ProgressBar, news: Progress) {
+    match news {
+        Progress::Begins { runs, steps } => {
+            bar.set_length(steps);
+            bar.set_message(format!("{runs} runs"));
+        }
+        Progress::Steps(steps) => bar.inc(steps),
+        // where no bar is drawn, indicatif would swallow the line
+        Progress::Note(line) if bar.is_hidden() => eprintln!("{line}"),
+        Progress::Note(line) => bar.println(line),
+    }
+}

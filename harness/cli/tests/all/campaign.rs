@@ -1,0 +1,109 @@
+//! A small campaign from outside: its files, its figures, its second start.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use bench::table::Table;
+use pack::packed_for_tests;
+
+/// Header of features.csv, on which others build.
+const HEADER: &str = "model,fill_m,amplitude_nm,f_res_hz,f_dip_hz,delta_f_hz,notch_db,fit_freq_pct,fit_time_pct,coherence,snr_res_db,snr_dip_db,skewness,kurtosis,peak_slosh_angle_deg,peak_radial_angle_deg,peak_wave_height_m,max_energy_residual,stuck_s";
+
+fn campaign(directory: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_hubslosh"))
+        .current_dir(directory)
+        .args(["campaign", "--out", "c", "--fmu", packed_for_tests().to_str().unwrap()])
+        .args(arguments)
+        .output()
+        .expect("the program runs")
+}
+
+/// Rows of features.csv as name → text.
+fn features(directory: &Path) -> Vec<std::collections::HashMap<String, String>> {
+    let mut reader = csv::Reader::from_path(directory.join("c/features.csv")).unwrap();
+    reader.deserialize().map(|row| row.unwrap()).collect()
+}
+
+#[test]
+fn with_viscous_friction_the_dip_is_where_the_exact_transfer_function_has_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    for sweep in ["exponential", "linear"] {
+        let done = campaign(
+            directory,
+            &["--set", "friction.model=viscous", "--amplitudes", "0.1", "--sweep", sweep],
+        );
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        // minima of |H| to 12 digits, from the roots of d log|H|/df in 60-digit arithmetic; 2 mHz
+        // is a seventh of the half-power width
+        for (row, f_dip) in features(directory).iter().zip([2.1329468, 2.3431981]) {
+            let number = |name: &str| row[name].parse::<f64>().unwrap();
+            assert!((number("f_dip_hz") - f_dip).abs() < 0.002, "{row:?}");
+            assert!(number("f_res_hz") > number("f_dip_hz"), "{row:?}");
+            // the acceptance figure for a whole sweep
+            assert!(number("max_energy_residual") < 1e-8, "{row:?}");
+            assert_eq!(number("stuck_s"), 0.0);
+        }
+    }
+}
+
+#[test]
+fn files_have_the_names_and_columns_others_build_on_and_a_second_start_finds_them() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let short = ["--fills", "0.1", "--amplitudes", "0.0125,0.25"];
+    let done = campaign(directory, &short);
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+
+    let text = std::fs::read_to_string(directory.join("c/features.csv")).unwrap();
+    // these columns first, others may follow
+    assert!(text.lines().next().unwrap().starts_with(HEADER));
+    for row in features(directory) {
+        // the thesis's sticking bearing at 10 cm: ranges of the acceptance check
+        let number = |name: &str| row[name].parse::<f64>().unwrap();
+        assert!((number("f_dip_hz") - 2.344).abs() < 0.004, "{row:?}");
+        assert!((2.45..2.48).contains(&number("f_res_hz")), "{row:?}");
+    }
+    let run = directory.join("c/runs/linear_100mm_12.5.parquet");
+    let columns = ["time", "tau_cmd", "omega", "omega_imu", "slosh_angle", "slosh_angle_radial"];
+    let table = Table::read(&run, &columns).unwrap();
+    assert_eq!(table.rows(), 135_001);
+    assert_eq!(table.column("time").unwrap()[135_000], 2700.0);
+
+    // the page needs nothing from elsewhere
+    let page = std::fs::read_to_string(directory.join("c/report.html")).unwrap();
+    assert!(page.contains("<svg") && page.contains("Why the swept peak stands higher"));
+    for word in ["http://", "https://", "<script", "src=", "NaN"] {
+        assert!(!page.contains(word), "{word} is in the report");
+    }
+
+    // a second start makes only what is missing, broken, or of another recipe
+    let made = || std::fs::metadata(&run).unwrap().modified().unwrap();
+    let first = made();
+    assert!(String::from_utf8_lossy(&campaign(directory, &short).stdout).contains("2 were there"));
+    assert_eq!(made(), first);
+    assert_eq!(std::fs::read_to_string(directory.join("c/features.csv")).unwrap(), text);
+    let half = std::fs::read(&run).unwrap();
+    std::fs::write(&run, &half[..half.len() / 2]).unwrap();
+    assert!(String::from_utf8_lossy(&campaign(directory, &short).stdout).contains("1 were there"));
+    assert_eq!(Table::read(&run, &columns).unwrap(), table, "the same run, bit for bit");
+    let other = [&short[..], &["--tolerance", "1e-6"]].concat();
+    assert!(String::from_utf8_lossy(&campaign(directory, &other).stdout).contains("0 were there"));
+}
+
+#[test]
+fn a_failed_run_is_named_and_leaves_the_others_alone() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let done = campaign(directory, &["--fills", "0,0.1", "--amplitudes", "0.1"]);
+    assert!(!done.status.success());
+    let said = String::from_utf8_lossy(&done.stderr);
+    assert!(said.contains("linear_0mm_100") && said.contains("tank.h"), "{said}");
+    let rows = features(directory);
+    assert_eq!(rows.len(), 1);
+    assert_eq!(rows[0]["fill_m"], "0.1");
+    let runs: Vec<_> = std::fs::read_dir(directory.join("c/runs")).unwrap().collect();
+    assert_eq!(runs.len(), 1);
+    let page = std::fs::read_to_string(directory.join("c/report.html")).unwrap();
+    assert!(page.contains("linear_0mm_100"));
+}

@@ -1,0 +1,794 @@
+//! `hubslosh check`: our own FMU keeps every rule, and FMUs that break one are caught by it. The
+//! breakers are made from our own: an archive packed otherwise, a word changed in the XML, a byte in
+//! the binary, a library around it that misbehaves (shim.c).
+
+use std::collections::BTreeSet;
+use std::io::{Cursor, Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+use std::time::Duration;
+
+use ::check::element::Element;
+use ::check::{self, Options, RULES, Report, Severity};
+use host::fmi2::PLATFORM;
+use pack::packed_for_tests;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipArchive, ZipWriter};
+
+/// Files of an archive, in its order.
+type Files = Vec<(String, Vec<u8>)>;
+
+const XML: &str = "modelDescription.xml";
+
+fn ours() -> &'static Files {
+    static FILES: OnceLock<Files> = OnceLock::new();
+    FILES.get_or_init(|| {
+        let file = std::fs::File::open(packed_for_tests()).unwrap();
+        let mut archive = ZipArchive::new(file).unwrap();
+        let count = archive.len();
+        let read = |i| {
+            let mut file = archive.by_index(i).unwrap();
+            let mut bytes = Vec::new();
+            file.read_to_end(&mut bytes).unwrap();
+            (file.name().unwrap().into_owned(), bytes)
+        };
+        (0..count).map(read).collect()
+    })
+}
+
+fn zipped(files: &Files, method: CompressionMethod) -> Vec<u8> {
+    let mut to = ZipWriter::new(Cursor::new(Vec::new()));
+    for (name, bytes) in files {
+        let options = SimpleFileOptions::default().compression_method(method);
+        to.start_file(name.as_str(), options).unwrap();
+        to.write_all(bytes).unwrap();
+    }
+    to.finish().unwrap().into_inner()
+}
+
+/// Where binaries are, and what they are called.
+fn binary() -> String {
+    format!("binaries/{PLATFORM}/HubSlosh{}", std::env::consts::DLL_SUFFIX)
+}
+
+fn xml() -> String {
+    String::from_utf8(ours().iter().find(|(name, _)| name == XML).unwrap().1.clone()).unwrap()
+}
+
+fn with(name: &str, content: Vec<u8>) -> Files {
+    let mut files = ours().clone();
+    files.iter_mut().find(|(n, _)| n == name).unwrap().1 = content;
+    files
+}
+
+/// Looks at some rules of an FMU that is given as bytes.
+fn look(bytes: &[u8], only: &[&str]) -> Report {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("Mutant.fmu");
+    std::fs::write(&path, bytes).unwrap();
+    look_at(&path, only, 60.0)
+}
+
+fn look_at(path: &Path, only: &[&str], limit: f64) -> Report {
+    let options = Options {
+        program: PathBuf::from(env!("CARGO_BIN_EXE_hubslosh")),
+        only: only.iter().map(|rule| rule.to_string()).collect(),
+        limit: Duration::from_secs_f64(limit),
+    };
+    check::check(path, &options, |_| {}).unwrap()
+}
+
+/// Rules that are broken.
+fn broken(report: &Report) -> BTreeSet<&'static str> {
+    report.all().map(|(rule, _)| rule.id).collect()
+}
+
+/// Each FMU breaks exactly the rules that are meant, among those of the groups looked at.
+fn breaks(mutants: Vec<(&str, Vec<u8>, &[&str])>, groups: &[&str]) {
+    let mut wrong = Vec::new();
+    for (name, bytes, meant) in mutants {
+        let report = look(&bytes, groups);
+        let found = broken(&report);
+        if found != meant.iter().copied().collect() {
+            wrong.push(format!("{name}: meant {meant:?}, found {found:?}\n{}", report.text()));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn our_own_fmu_keeps_every_rule_and_none_is_skipped() {
+    let report = look_at(packed_for_tests(), &[], 120.0);
+    // A plain build is for this machine and takes its newer glibc and libgcc; `pack --all-platforms`
+    // does not, and is checked when it packs.
+    let others: Vec<_> = report.all().filter(|(rule, _)| rule.id != "bin.system").collect();
+    assert!(others.is_empty(), "{}", report.text());
+    assert_eq!(report.count(Severity::Error), 0);
+    let skipped: Vec<_> =
+        report.outcomes.iter().filter_map(|o| o.findings.skipped.clone()).collect();
+    assert_eq!(skipped, [""; 0]);
+    assert_eq!(report.outcomes.len(), RULES.len());
+}
+
+#[test]
+fn archives_that_hosts_stumble_over_are_told() {
+    const DEFLATED: CompressionMethod = CompressionMethod::Deflated;
+    let whole = zipped(ours(), DEFLATED);
+    let renamed = |from: &str, to: &str| {
+        let mut files = ours().clone();
+        files.iter_mut().find(|(name, _)| name == from).unwrap().0 = to.into();
+        zipped(&files, DEFLATED)
+    };
+    let without = |start: &str| {
+        let mut files = ours().clone();
+        files.retain(|(name, _)| !name.starts_with(start));
+        zipped(&files, DEFLATED)
+    };
+    let plus = |name: &str| {
+        let mut files = ours().clone();
+        files.push((name.into(), b"x".to_vec()));
+        zipped(&files, DEFLATED)
+    };
+    // The bits of the archive's own structures, in all headers of the first file: local header at
+    // 0, its twin in the central directory.
+    let central = whole.windows(4).position(|w| w == b"PK\x01\x02").unwrap();
+    let patched = |local: usize, value: u8| {
+        let mut bytes = whole.clone();
+        bytes[local] = value;
+        bytes[central + local + 2] = value;
+        bytes
+    };
+    let wrong_checksum = patched(14, whole[14] ^ 1);
+    let encrypted = patched(6, whole[6] | 1);
+    let bzip2 = patched(8, 12);
+    let twice = {
+        // a name of the same length, then changed to one that is there
+        let mut bytes = plus("documentation/indey.html");
+        let at: Vec<usize> = (0..bytes.len() - 20)
+            .filter(|at| bytes[*at..].starts_with(b"documentation/indey.html"))
+            .collect();
+        for at in at {
+            bytes[at + 18] = b'x';
+        }
+        bytes
+    };
+    let link = {
+        let mut to = ZipWriter::new_append(Cursor::new(whole.clone())).unwrap();
+        to.add_symlink("extra/link", "../../outside", SimpleFileOptions::default()).unwrap();
+        to.finish().unwrap().into_inner()
+    };
+    let mut swapped = ours().clone();
+    swapped.swap(0, 1);
+    breaks(
+        vec![
+            (
+                "truncated",
+                whole[..whole.len() - 100].to_vec(),
+                &["zip.readable", "zip.description", "zip.documentation", "zip.licenses"][..],
+            ),
+            ("wrong checksum", wrong_checksum, &["zip.readable"]),
+            ("encrypted", encrypted, &["zip.methods"]),
+            ("bzip2", bzip2, &["zip.methods"]),
+            (
+                "backslashes",
+                renamed("documentation/index.html", "documentation\\index.html"),
+                &["zip.names", "zip.documentation"],
+            ),
+            ("a way out", plus("../outside"), &["zip.names"]),
+            ("an absolute name", plus("/outside"), &["zip.names", "zip.folders"]),
+            ("a link", link, &["zip.links"]),
+            ("a name twice", twice, &["zip.duplicates"]),
+            ("capitals", plus("documentation/INDEX.html"), &["zip.duplicates"]),
+            ("description missing", without(XML), &["zip.description"]),
+            (
+                "description in a folder",
+                renamed(XML, "HubSlosh/modelDescription.xml"),
+                &["zip.description", "zip.folders"],
+            ),
+            ("description not first", zipped(&swapped, DEFLATED), &["zip.description_first"]),
+            ("documentation missing", without("documentation/index.html"), &["zip.documentation"]),
+            ("licence missing", without("documentation/licenses/"), &["zip.licenses"]),
+            ("another folder", plus("stuff/x"), &["zip.folders"]),
+            (
+                "no zip",
+                b"not a zip archive".to_vec(),
+                &["zip.readable", "zip.description", "zip.documentation", "zip.licenses"],
+            ),
+            (
+                "empty file",
+                Vec::new(),
+                &["zip.readable", "zip.description", "zip.documentation", "zip.licenses"],
+            ),
+        ],
+        &["zip"],
+    );
+}
+
+/// The XML with the first `from` after `after` changed to `to`.
+fn changed(after: &str, from: &str, to: &str) -> Vec<u8> {
+    let text = xml();
+    let at = text.find(after).unwrap_or_else(|| panic!("no {after}"));
+    let (head, tail) = text.split_at(at);
+    assert!(tail.contains(from), "no {from} after {after}");
+    let text = format!("{head}{}", tail.replacen(from, to, 1));
+    zipped(&with(XML, text.into_bytes()), CompressionMethod::Stored)
+}
+
+#[test]
+fn descriptions_that_break_a_rule_are_told() {
+    let hub = "name=\"hub.I\"";
+    let theta = "name=\"theta\"";
+    let outputs = "<Outputs>";
+    let initial = "<InitialUnknowns>";
+    let root = "<fmiModelDescription";
+    let line = |list: &str, n: usize| {
+        let text = xml();
+        let mut lines = text[text.find(list).unwrap()..].lines();
+        lines.nth(n + 1).unwrap().to_string()
+    };
+    let two = format!("{}\n{}", line(initial, 0), line(initial, 1));
+    let swapped = format!("{}\n{}", line(initial, 1), line(initial, 0));
+    let mut no_order = xml();
+    let (types, categories) = (
+        no_order.find("  <TypeDefinitions>").unwrap(),
+        no_order.find("  <LogCategories>").unwrap(),
+    );
+    let moved = no_order[types..categories].to_string();
+    no_order.replace_range(types..categories, "");
+    let at = no_order.find("  <ModelVariables>").unwrap();
+    no_order.insert_str(at, &moved);
+    let mut undeclared = xml();
+    let at = undeclared.find(outputs).unwrap();
+    let from = at + undeclared[at..].find(" dependencies=").unwrap();
+    let to = from + undeclared[from..].find("/>").unwrap();
+    undeclared.replace_range(from..to, "");
+    let own = |text: String| zipped(&with(XML, text.into_bytes()), CompressionMethod::Stored);
+    breaks(
+        vec![
+            (
+                "not well-formed",
+                changed("</ModelVariables>", "</ModelVariables>", ""),
+                &["xml.well_formed"][..],
+            ),
+            (
+                "fmiVersion 2.1",
+                changed(root, "fmiVersion=\"2.0\"", "fmiVersion=\"2.1\""),
+                &["xml.fmi_version"],
+            ),
+            ("order of elements", own(no_order), &["xml.schema"]),
+            (
+                "an unknown attribute",
+                changed(theta, "description", "comment=\"\" description"),
+                &["xml.schema"],
+            ),
+            ("a missing attribute", changed(theta, "valueReference=\"0\" ", ""), &["xml.schema"]),
+            (
+                "a missing GUID",
+                changed(root, "guid=\"", "guid=\"\" author2=\""),
+                &["xml.guid", "xml.schema"],
+            ),
+            (
+                "a bad date",
+                changed(root, "generationDateAndTime=\"2", "generationDateAndTime=\"31.01.2"),
+                &["xml.values", "xml.date"],
+            ),
+            ("a local time", changed("generationDateAndTime", "Z\"", "+01:00\""), &["xml.date"]),
+            (
+                "a broken exponent",
+                changed("<BaseUnit kg=\"1\"", "kg=\"1\"", "kg=\"0.5\""),
+                &["xml.values"],
+            ),
+            (
+                "a decimal comma",
+                changed(hub, "start=\"0.322414\"", "start=\"0,322414\""),
+                &["xml.values"],
+            ),
+            (
+                "no C identifier",
+                changed("<CoSimulation", "\"HubSlosh\"", "\"Hub-Slosh\""),
+                &["xml.model_identifier"],
+            ),
+            (
+                "serialize without get",
+                changed(
+                    "<CoSimulation",
+                    "canGetAndSetFMUstate=\"true\"",
+                    "canGetAndSetFMUstate=\"false\"",
+                ),
+                &["xml.capabilities", "xml.state_capability"],
+            ),
+            (
+                "interfaces that disagree",
+                changed(
+                    "<CoSimulation",
+                    "canNotUseMemoryManagementFunctions=\"true\"",
+                    "canNotUseMemoryManagementFunctions=\"false\"",
+                ),
+                &["xml.capabilities"],
+            ),
+            (
+                "states not saved",
+                changed(
+                    "<CoSimulation",
+                    "canSerializeFMUstate=\"true\"",
+                    "canSerializeFMUstate=\"false\"",
+                ),
+                &["xml.state_capability"],
+            ),
+            (
+                "stop before start",
+                changed("<DefaultExperiment", "stopTime=\"20.0\"", "stopTime=\"-1\""),
+                &["xml.default_experiment"],
+            ),
+            (
+                "an item's value twice",
+                changed("<Item name=\"linear\"", "value=\"2\"", "value=\"1\""),
+                &["xml.unique", "xml.range"],
+            ),
+            (
+                "a category twice",
+                changed("<Category name=\"logStatusError\"", "logStatusError", "logEvents"),
+                &["xml.unique"],
+            ),
+            (
+                "an undefined unit",
+                changed(theta, "unit=\"rad\"", "unit=\"radian\""),
+                &["xml.units"],
+            ),
+            (
+                "an undefined displayUnit",
+                changed(theta, "displayUnit=\"deg\"", "displayUnit=\"grad\""),
+                &["xml.units"],
+            ),
+            (
+                "an undefined type",
+                changed(
+                    "name=\"slosh.model\"",
+                    "declaredType=\"SloshModel\"",
+                    "declaredType=\"Slosh\"",
+                ),
+                &["xml.types"],
+            ),
+            (
+                "a name twice",
+                changed("name=\"omega\"", "name=\"omega\"", "name=\"theta\""),
+                &["xml.names"],
+            ),
+            ("an unstructured name", changed(hub, "hub.I", "hub..I"), &["xml.structured_names"]),
+            (
+                "a long name",
+                changed(hub, "hub.I", &format!("hub.{}", "I".repeat(60))),
+                &["xml.parameter_names"],
+            ),
+            (
+                "a dotted port",
+                changed(theta, "name=\"theta\"", "name=\"hub.theta\""),
+                &["xml.flat_ports"],
+            ),
+            (
+                "a continuous parameter",
+                changed(hub, "variability=\"fixed\"", "variability=\"continuous\""),
+                &["xml.causality"],
+            ),
+            (
+                "a continuous Integer",
+                changed(
+                    "name=\"friction_mode\"",
+                    "variability=\"discrete\"",
+                    "variability=\"continuous\"",
+                ),
+                &["xml.causality"],
+            ),
+            (
+                "no variability",
+                changed("name=\"friction_mode\"", "variability=\"discrete\" ", ""),
+                &["xml.variability"],
+            ),
+            (
+                "an input with initial",
+                changed(
+                    "name=\"tau_cmd\"",
+                    "variability=\"continuous\"",
+                    "variability=\"continuous\" initial=\"exact\"",
+                ),
+                &["xml.initial"],
+            ),
+            (
+                "calculated with start",
+                changed(theta, "displayUnit=\"deg\"", "displayUnit=\"deg\" start=\"0\""),
+                &["xml.start"],
+            ),
+            ("a parameter without start", changed(hub, " start=\"0.322414\"", ""), &["xml.start"]),
+            ("start NaN", changed(hub, "start=\"0.322414\"", "start=\"NaN\""), &["xml.finite"]),
+            (
+                "nominal 0",
+                changed("name=\"omega\"", "nominal=\"0.1\"", "nominal=\"0\""),
+                &["xml.finite"],
+            ),
+            ("start outside", changed(hub, "start=\"0.322414\"", "start=\"-1\""), &["xml.range"]),
+            (
+                "no such item",
+                changed("name=\"slosh.model\"", "start=\"2\"", "start=\"7\""),
+                &["xml.range"],
+            ),
+            (
+                "min above max",
+                changed("name=\"tank.d\"", "min=\"0.001\"", "min=\"1000\""),
+                &["xml.range"],
+            ),
+            (
+                "a shared reference",
+                changed("name=\"tau_ext\"", "valueReference=\"13\"", "valueReference=\"12\""),
+                &["xml.aliases"],
+            ),
+            (
+                "a derivative of nothing",
+                changed("name=\"der(omega)\"", "derivative=\"2\"", "derivative=\"9999\""),
+                &["xml.states", "xml.dependencies_known"],
+            ),
+            ("an output not listed", changed(outputs, &line(outputs, 0), ""), &["xml.outputs"]),
+            (
+                "an output listed twice",
+                changed(outputs, &line(outputs, 0), &format!("{0}{0}", line(outputs, 0))),
+                &["xml.outputs"],
+            ),
+            (
+                "a derivative not listed",
+                changed("<Derivatives>", &line("<Derivatives>", 0), ""),
+                &["xml.derivatives"],
+            ),
+            (
+                "an initial unknown twice",
+                changed(initial, &line(initial, 0), &format!("{0}{0}", line(initial, 0))),
+                &["xml.initial_unknowns"],
+            ),
+            (
+                "an initial unknown missing",
+                changed(initial, &line(initial, 0), ""),
+                &["xml.initial_unknowns"],
+            ),
+            (
+                "initial unknowns unsorted",
+                changed(initial, &two, &swapped),
+                &["xml.initial_unknowns"],
+            ),
+            (
+                "an index too far",
+                changed(outputs, "dependencies=\"", "dependencies=\"9999 "),
+                &["xml.indices", "xml.dependencies"],
+            ),
+            (
+                "a kind missing",
+                changed("index=\"3\"", "dependenciesKind=\"dependent ", "dependenciesKind=\""),
+                &["xml.dependencies"],
+            ),
+            ("no dependencies", own(undeclared), &["xml.dependencies_written"]),
+            (
+                "multiple set of a parameter",
+                changed(hub, "causality", "canHandleMultipleSetPerTimeInstant=\"true\" causality"),
+                &["xml.multiple_set"],
+            ),
+        ],
+        &["xml"],
+    );
+}
+
+#[test]
+fn binaries_that_no_host_can_use_are_told() {
+    let name = binary();
+    let ours = ours().iter().find(|(n, _)| *n == name).unwrap().1.clone();
+    let at = |text: &[u8]| ours.windows(text.len()).position(|w| w == text).unwrap();
+    let patched = |text: &[u8], to: &[u8]| {
+        let mut bytes = ours.clone();
+        bytes[at(text)..][..to.len()].copy_from_slice(to);
+        zipped(&with(&name, bytes), CompressionMethod::Stored)
+    };
+    let renamed = |to: &str| {
+        let mut files = self::ours().clone();
+        files.iter_mut().find(|(n, _)| *n == name).unwrap().0 = to.into();
+        zipped(&files, CompressionMethod::Stored)
+    };
+    // A plain build's need of a newer glibc is left out: the groups are looked at one by one.
+    breaks(
+        vec![
+            (
+                "a symbol missing",
+                patched(b"fmi2GetStringStatus\0", b"fmi2GotStringStatus\0"),
+                &["bin.symbols"][..],
+            ),
+            (
+                "a foreign symbol",
+                patched(b"fmi2GetStringStatus\0", b"printGetStringStatu\0"),
+                &["bin.symbols", "bin.extra_symbols"],
+            ),
+            (
+                "no binary",
+                zipped(&with(&name, b"text".to_vec()), CompressionMethod::Stored),
+                &["bin.format"],
+            ),
+            ("of another platform", renamed("binaries/win64/HubSlosh.dll"), &["bin.format"]),
+            (
+                "in an unknown folder",
+                renamed("binaries/x86_64-linux/HubSlosh.so"),
+                &["bin.present"],
+            ),
+            (
+                "of another name",
+                renamed(&name.replace("HubSlosh", "Other")),
+                &["bin.present", "bin.name"],
+            ),
+        ],
+        &["bin.present", "bin.name", "bin.format", "bin.symbols", "bin.extra_symbols"],
+    );
+}
+
+/// The library around ours, compiled once.
+fn shim() -> &'static [u8] {
+    static SHIM: OnceLock<Vec<u8>> = OnceLock::new();
+    SHIM.get_or_init(|| {
+        let directory = tempfile::tempdir().unwrap();
+        let out = directory.path().join("shim.so");
+        let done = Command::new("cc")
+            .args(["-std=c11", "-shared", "-fPIC", "-o"])
+            .arg(&out)
+            .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/all/shim.c"))
+            .args(["-ldl", "-lm"])
+            .output()
+            .expect("a C compiler is there");
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        std::fs::read(out).unwrap()
+    })
+}
+
+/// Our FMU, but for one misbehaviour.
+fn misbehaving(word: &str) -> Vec<u8> {
+    let name = binary();
+    let folder = format!("binaries/{PLATFORM}");
+    let ours = ours().iter().find(|(n, _)| *n == name).unwrap().1.clone();
+    let mut files = with(&name, shim().to_vec());
+    let text = xml();
+    let guid = text.split("guid=\"").nth(1).unwrap().split('"').next().unwrap();
+    files.push((format!("{folder}/real.so"), ours));
+    files.push((format!("{folder}/misbehaviour.txt"), format!("{word} {guid}\n").into_bytes()));
+    zipped(&files, CompressionMethod::Stored)
+}
+
+/// Each misbehaviour, and the rule that must tell it.
+const MISBEHAVIOURS: &[(&str, &str)] = &[
+    ("crashes_when_loaded", "load.opens"),
+    ("types_platform", "load.types_platform"),
+    ("version", "load.version"),
+    ("never_initialises", "load.initialises"),
+    ("endless_events", "load.initialises"),
+    ("remembers_loads", "load.again"),
+    ("any_guid", "instantiate.guid"),
+    ("swallows_messages", "instantiate.guid"),
+    ("needs_resources", "instantiate.arguments"),
+    ("needs_callbacks", "instantiate.callbacks"),
+    ("keeps_callbacks", "instantiate.copies"),
+    ("free_null_crashes", "instantiate.null"),
+    ("counts_steps", "life.instances"),
+    ("counts_instances", "life.deterministic"),
+    ("resets_not_all", "life.reset"),
+    ("no_reset_when_terminated", "life.reset_anywhere"),
+    ("terminate_fails", "life.terminate"),
+    ("any_order", "life.order"),
+    ("ends_the_process", "life.order"),
+    ("prints", "host.silent"),
+    ("rounds_up", "host.untouched"),
+    ("changes_directory", "host.untouched"),
+    ("leaks_files", "host.untouched"),
+    ("text_as_format", "log.percent"),
+    ("odd_category", "log.categories"),
+    ("line_break", "log.text"),
+    ("not_utf8", "log.text"),
+    ("chatters", "log.quiet"),
+    ("wants_categories", "log.switch"),
+    ("other_start", "values.start"),
+    ("not_a_number", "values.readable"),
+    ("true_is_two", "values.booleans"),
+    ("forgets_settings", "values.round_trip"),
+    ("wants_variables", "values.nothing"),
+    ("any_reference", "values.unknown"),
+    ("crashes_on_unknown", "values.unknown"),
+    ("swallows_messages", "values.unknown"),
+    ("any_type", "values.wrong_type"),
+    ("sets_anything", "values.fixed"),
+    ("sets_anything", "values.computed"),
+    ("any_number", "values.not_a_number"),
+    ("warns", "values.no_warning"),
+    ("discards", "steps.run"),
+    ("any_step", "steps.size"),
+    ("any_point", "steps.point"),
+    ("exact_time", "steps.wobble"),
+    ("starts_at_zero", "steps.start_time"),
+    ("passes_stop", "steps.stop_time"),
+    ("no_tolerance", "steps.tolerance"),
+    ("counts_steps", "steps.cut"),
+    ("any_number", "steps.inputs"),
+    ("no_slopes", "steps.inputs"),
+    ("wrong_slopes", "steps.output_derivatives"),
+    ("restores_nothing", "states.rollback"),
+    ("one_handle_only", "states.handle"),
+    ("reads_no_bytes", "states.bytes"),
+    ("wants_setup", "states.bytes"),
+    ("reads_garbage", "states.garbage"),
+    ("saves_only_running", "states.modes"),
+    ("wrong_directions", "dependencies.directional"),
+    ("zero_nominals", "exchange.vectors"),
+    ("any_length", "exchange.lengths"),
+    ("other_order", "exchange.variables"),
+];
+
+#[cfg(target_os = "linux")]
+#[test]
+fn binaries_that_misbehave_are_told_by_the_rule_that_is_meant() {
+    let rules: BTreeSet<&str> = MISBEHAVIOURS.iter().map(|(_, rule)| *rule).collect();
+    let rules: Vec<&str> = rules.into_iter().collect();
+    // without a misbehaviour the library around ours is as good as ours
+    let report = look(&misbehaving("none"), &rules);
+    assert_eq!(broken(&report), BTreeSet::new(), "{}", report.text());
+    let mut untold = Vec::new();
+    for (word, rule) in MISBEHAVIOURS {
+        let report = look(&misbehaving(word), &[rule]);
+        if !broken(&report).contains(rule) {
+            untold.push(format!("{word} is not told by {rule}: {}", report.text()));
+        }
+    }
+    assert!(untold.is_empty(), "{}", untold.join("\n"));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_call_without_end_is_a_finding_and_not_the_end_of_the_check() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("Mutant.fmu");
+    std::fs::write(&path, misbehaving("hangs_at_zero")).unwrap();
+    // Enough for the calls before it on a busy machine.
+    let report = look_at(&path, &["steps.size", "load.version"], 5.0);
+    let all: Vec<_> = report.all().collect();
+    let [(rule, finding)] = &all[..] else { panic!("{}", report.text()) };
+    assert_eq!((rule.id, finding.severity), ("steps.size", Severity::Error));
+    assert!(finding.place.contains("communicationStepSize = 0.0"), "{}", finding.place);
+    assert!(finding.text.contains("no end after 5 s"), "{}", finding.text);
+}
+
+#[test]
+fn descriptions_that_do_not_fit_the_binary_are_told() {
+    let hub = "name=\"hub.I\"";
+    let guid = changed("<fmiModelDescription", "guid=\"{", "guid=\"{x");
+    // theta and omega
+    let references = {
+        let text = xml();
+        let text = text
+            .replacen("valueReference=\"0\"", "valueReference=\"_\"", 1)
+            .replacen("valueReference=\"1\"", "valueReference=\"0\"", 1)
+            .replacen("valueReference=\"_\"", "valueReference=\"1\"", 1);
+        zipped(&with(XML, text.into_bytes()), CompressionMethod::Stored)
+    };
+    let unknown = |list: &str, name: &str, from: &str, to: &str| {
+        let text = xml();
+        let index = text[..text.find(&format!("name=\"{name}\"")).unwrap()]
+            .matches("<ScalarVariable")
+            .count();
+        let at = text.find(list).unwrap();
+        let after = format!("<Unknown index=\"{index}\"");
+        let at = at + text[at..].find(&after).unwrap();
+        let (head, tail) = text.split_at(at);
+        assert!(tail.starts_with(&after) && tail[..tail.find("/>").unwrap()].contains(from));
+        let text = format!("{head}{}", tail.replacen(from, to, 1));
+        zipped(&with(XML, text.into_bytes()), CompressionMethod::Stored)
+    };
+    let mut wrong = Vec::new();
+    for (name, bytes, rule) in [
+        ("another GUID", guid, "load.instance"),
+        ("another start", changed(hub, "start=\"0.322414\"", "start=\"0.322415\""), "values.start"),
+        ("a min that is refused", changed(hub, "min=\"1e-6\"", "min=\"-1\""), "values.limits"),
+        (
+            "a max that is passed",
+            changed(hub, "max=\"1000000000000.0\"", "max=\"10\""),
+            "values.limits",
+        ),
+        (
+            "a fixed parameter that is tunable",
+            changed("name=\"friction.b\"", "tunable", "fixed"),
+            "values.fixed",
+        ),
+        ("swapped references", references, "exchange.variables"),
+        (
+            "no binary",
+            zipped(&with(&binary(), b"text".to_vec()), CompressionMethod::Stored),
+            "load.opens",
+        ),
+        // the first input of omega_dot is tau_cmd
+        (
+            "a hidden feedthrough",
+            unknown("<Outputs>", "omega_dot", "dependencies=\"", "dependencies=\"\" x=\""),
+            "dependencies.running",
+        ),
+        (
+            "a false feedthrough",
+            unknown("<Outputs>", "theta", "dependencies=\"", "dependencies=\"13 "),
+            "dependencies.feedthrough",
+        ),
+        (
+            "a hidden start",
+            unknown("<InitialUnknowns>", "omega", "dependencies=\"", "dependencies=\"\" x=\""),
+            "dependencies.initial",
+        ),
+    ] {
+        let report = look(&bytes, &[rule]);
+        if !broken(&report).contains(rule) {
+            wrong.push(format!("{name} is not told by {rule}: {}", report.text()));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn an_fmu_that_gives_no_instance_is_told_once() {
+    let report = look(
+        &changed("<fmiModelDescription", "guid=\"{", "guid=\"{x"),
+        &["load", "life", "values", "steps"],
+    );
+    assert_eq!(broken(&report), BTreeSet::from(["load.instance"]), "{}", report.text());
+}
+
+fn hubslosh(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_hubslosh")).args(arguments).output().unwrap()
+}
+
+#[test]
+fn the_command_tells_people_by_text_and_machines_by_exit_code_and_junit() {
+    let directory = tempfile::tempdir().unwrap();
+    let good = packed_for_tests().to_str().unwrap();
+    let (bad, junit) = (directory.path().join("bad.fmu"), directory.path().join("junit.xml"));
+    std::fs::write(&bad, changed("name=\"hub.I\"", "start=\"0.322414\"", "start=\"-1\"")).unwrap();
+    let (bad, junit) = (bad.to_str().unwrap(), junit.to_str().unwrap());
+
+    let done = hubslosh(&["check", good, "--only", "zip,xml,load", "--junit", junit]);
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stdout));
+    let suite = Element::parse(&std::fs::read(junit).unwrap()).unwrap().children.remove(0);
+    let looked_at = |groups: &[&str]| {
+        RULES.iter().filter(|r| groups.contains(&r.id.split('.').next().unwrap())).count()
+    };
+    assert_eq!(suite.children.len(), looked_at(&["zip", "xml", "load"]));
+    assert_eq!(suite.get("failures"), Some("0"));
+
+    let done = hubslosh(&["check", bad, "--only", "xml", "--junit", junit]);
+    assert_eq!(done.status.code(), Some(1));
+    let said = String::from_utf8_lossy(&done.stdout).into_owned();
+    let word = |word: &str| assert!(said.contains(word), "\"{word}\" is not in: {said}");
+    for expected in ["error xml.range", "hub.I", "start=-1 (allowed: 0.000001 to", "[2.2.7]"] {
+        word(expected);
+    }
+    let suite = Element::parse(&std::fs::read(junit).unwrap()).unwrap().children.remove(0);
+    assert_eq!(suite.get("failures"), Some("1"));
+
+    for (arguments, word) in [
+        (&["check", "none.fmu"][..], "none.fmu"),
+        (&["check", good, "--only", "zipp"], "zipp"),
+        (&["check", good, "--limit", "0"], "--limit"),
+        (&["check", good, "--only", "zip", "--junit", "nowhere/j.xml"], "nowhere/j.xml"),
+        (&["check"], "<FMU>"),
+    ] {
+        let done = hubslosh(arguments);
+        assert!(!done.status.success(), "{arguments:?}");
+        let said = String::from_utf8_lossy(&done.stderr).into_owned();
+        assert!(said.contains(word), "\"{word}\" is not in: {said}");
+    }
+}
+
+#[test]
+fn documentation_lists_the_rules() {
+    let page = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../modelDescription/HubSlosh/documentation/check.md"
+    );
+    let page = std::fs::read_to_string(page).unwrap();
+    assert!(
+        page.contains(&check::table()),
+        "check.md is out of date: put what `hubslosh check --rules` prints under \"The rules\""
+    );
+}

@@ -1,0 +1,257 @@
+//! The program `hubslosh` from outside: what it makes, and what it says to bad
+//! input. Each failure is one sentence, a non-zero exit, and no new file.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use bench::table::Table;
+use pack::packed_for_tests;
+
+/// Runs `hubslosh` in `directory`.
+fn hubslosh(directory: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_hubslosh"))
+        .current_dir(directory)
+        .args(arguments)
+        .output()
+        .expect("the program runs")
+}
+
+/// A run of 0.2 s with further arguments.
+fn short_run(directory: &Path, arguments: &[&str]) -> Output {
+    let fmu = packed_for_tests().to_str().unwrap();
+    let common = ["run", "--fmu", fmu, "--stop", "0.2", "--out", "out.csv"];
+    hubslosh(directory, &[&common, arguments].concat())
+}
+
+/// Files in a directory, sorted.
+fn files(directory: &Path) -> Vec<String> {
+    let names = std::fs::read_dir(directory).unwrap().map(|f| f.unwrap().file_name());
+    let mut names: Vec<String> = names.map(|n| n.to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+/// The run fails with one line that says all of `words`, and leaves the directory as it was.
+fn refuses(directory: &Path, output: impl FnOnce() -> Output, words: &[&str]) {
+    let before = files(directory);
+    let output = output();
+    let said = String::from_utf8_lossy(&output.stderr).trim().to_string();
+    assert!(!output.status.success(), "it succeeded; {said}");
+    assert_eq!(said.lines().count(), 1, "not one sentence: {said}");
+    for word in words {
+        assert!(said.contains(word), "\"{word}\" is not in: {said}");
+    }
+    assert_eq!(files(directory), before, "it left something behind");
+}
+
+/// A copy of the FMU in `directory` whose modelDescription.xml went through `edit`; `None` leaves
+/// the file out.
+fn edited_fmu(directory: &Path, edit: impl Fn(String) -> Option<String>) -> PathBuf {
+    use std::io::{Read, Write};
+    let path = directory.join("Edited.fmu");
+    let mut from = zip::ZipArchive::new(std::fs::File::open(packed_for_tests()).unwrap()).unwrap();
+    let mut to = zip::ZipWriter::new(std::fs::File::create(&path).unwrap());
+    for i in 0..from.len() {
+        let mut file = from.by_index(i).unwrap();
+        let name = file.name().unwrap().into_owned();
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).unwrap();
+        if name == "modelDescription.xml" {
+            match edit(String::from_utf8(bytes).unwrap()) {
+                Some(text) => bytes = text.into_bytes(),
+                None => continue,
+            }
+        }
+        to.start_file(name, zip::write::SimpleFileOptions::default()).unwrap();
+        to.write_all(&bytes).unwrap();
+    }
+    to.finish().unwrap();
+    path
+}
+
+#[test]
+fn a_run_leaves_the_columns_asked_for() {
+    let directory = tempfile::tempdir().unwrap();
+    let done = short_run(
+        directory.path(),
+        &[
+            "--profile",
+            "sine:frequency=2",
+            "--columns",
+            "theta,omega,stuck",
+            "--set",
+            "slosh.model=linear",
+        ],
+    );
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let table = Table::read(
+        &directory.path().join("out.csv"),
+        &["time", "tau_cmd", "theta", "omega", "stuck"],
+    )
+    .unwrap();
+    assert_eq!(table.rows(), 11);
+    assert_eq!(table.column("time").unwrap()[10], 0.2);
+    // at rest, held by the bearing until the torque exceeds 5.9 mN.m
+    assert_eq!(table.column("stuck").unwrap()[0], 1.0);
+    assert!(table.column("omega").unwrap()[10] > 0.0);
+    assert_eq!(files(directory.path()), ["out.csv"]);
+}
+
+#[test]
+fn a_torque_file_gives_the_same_motion_as_csv_and_as_parquet() {
+    let directory = tempfile::tempdir().unwrap();
+    let time: Vec<f64> = (0..=10).map(|k| f64::from(k) * 0.02).collect();
+    let tau = time.iter().map(|t| 0.1 * (15.0 * t).sin()).collect();
+    let torque = Table::new(vec!["time".into(), "tau_cmd".into()], vec![time, tau]);
+    let mut answers = Vec::new();
+    for name in ["torque.csv", "torque.parquet"] {
+        torque.write(&directory.path().join(name), &Default::default()).unwrap();
+        let done = short_run(directory.path(), &["--input", name]);
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        answers.push(std::fs::read_to_string(directory.path().join("out.csv")).unwrap());
+    }
+    assert_eq!(answers[0], answers[1]);
+}
+
+#[test]
+fn an_unknown_name_brings_the_nearest() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    refuses(
+        directory,
+        || short_run(directory, &["--profile", "zero", "--set", "friction.modle=none"]),
+        &["no variable \"friction.modle\"", "did you mean \"friction.model\""],
+    );
+    refuses(
+        directory,
+        || short_run(directory, &["--profile", "zero", "--columns", "omegga"]),
+        &["no variable \"omegga\"", "\"omega\""],
+    );
+}
+
+#[test]
+fn a_value_of_the_wrong_kind_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    for (set, words) in [
+        ("friction.model=oily", &["friction.model", "stribeck (4)", "\"oily\""][..]),
+        ("tank.h=deep", &["tank.h wants a number", "\"deep\""]),
+        ("wheel.enabled=perhaps", &["wheel.enabled wants true or false"]),
+        ("omega=1", &["omega cannot be set", "output"]),
+        ("tau_cmd=1", &["tau_cmd comes from the profile or the file"]),
+    ] {
+        refuses(directory, || short_run(directory, &["--profile", "zero", "--set", set]), words);
+    }
+}
+
+#[test]
+fn a_tank_without_liquid_is_refused_in_the_fmus_own_words() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    for height in ["tank.h=0", "tank.h=-0.1", "tank.h=NaN"] {
+        refuses(
+            directory,
+            || short_run(directory, &["--profile", "zero", "--set", height]),
+            &["tank.h", "fmi2Error"],
+        );
+    }
+}
+
+#[test]
+fn a_torque_file_without_the_columns_names_those_missing_and_those_there() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    std::fs::write(directory.join("in.csv"), "time,torque\n0,1\n1,1\n").unwrap();
+    refuses(
+        directory,
+        || short_run(directory, &["--input", "in.csv"]),
+        &["in.csv", "no column tau_cmd", "columns in it: time, torque"],
+    );
+}
+
+#[test]
+fn a_torque_that_is_no_number_is_named_by_file_and_row() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    for (text, word) in [
+        ("time,tau_cmd\n0,1\n1,NaN\n2,0\n", "row 2"),
+        ("time,tau_cmd\n0,1\n1,1\n2,inf\n", "row 3"),
+        ("time,tau_cmd\n0,1\n1,one\n", "row 2"),
+        ("time,tau_cmd\n0,1\n1,1\n1,1\n", "row 3"),
+        ("time,tau_cmd\n0,1\n", "1 rows"),
+    ] {
+        std::fs::write(directory.join("in.csv"), text).unwrap();
+        let run = || short_run(directory, &["--input", "in.csv"]);
+        refuses(directory, run, &["in.csv", word]);
+    }
+}
+
+#[test]
+fn files_that_cannot_be_read_or_written_are_named() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    std::fs::write(directory.join("not.fmu"), "no zip").unwrap();
+    std::fs::write(directory.join("not.parquet"), "no parquet").unwrap();
+    let fmu = packed_for_tests().to_str().unwrap();
+    for (arguments, words) in [
+        (
+            &["run", "--profile", "zero", "--fmu", "none.fmu", "--out", "a.csv"][..],
+            &["none.fmu"][..],
+        ),
+        (&["run", "--profile", "zero", "--fmu", "not.fmu", "--out", "a.csv"], &["not.fmu", "zip"]),
+        (&["run", "--input", "none.csv", "--fmu", fmu, "--out", "a.csv"], &["none.csv"]),
+        (&["run", "--input", "not.parquet", "--fmu", fmu, "--out", "a.csv"], &["not.parquet"]),
+        (&["run", "--profile", "zero", "--fmu", fmu, "--out", "nowhere/a.csv"], &["nowhere/a.csv"]),
+        (&["run", "--profile", "zero", "--fmu", fmu, "--out", "a.txt"], &["a.txt", ".parquet"]),
+        (&["run", "--profile", "zero", "--step", "0", "--fmu", fmu, "--out", "a.csv"], &["step"]),
+        (&["campaign", "--fmu", fmu, "--out", "not.fmu/c"], &["not.fmu/c"]),
+        (&["campaign", "--fmu", "none.fmu"], &["none.fmu"]),
+    ] {
+        refuses(directory, || hubslosh(directory, arguments), words);
+    }
+}
+
+#[test]
+fn an_fmu_whose_description_and_binary_do_not_belong_together_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let run = || {
+        hubslosh(directory, &["run", "--profile", "zero", "--fmu", "Edited.fmu", "--out", "a.csv"])
+    };
+    let guid = |xml: String| {
+        let start = xml.find("guid=\"").unwrap() + 6;
+        Some(format!("{}x{}", &xml[..start], &xml[start..]))
+    };
+    edited_fmu(directory, guid);
+    refuses(directory, run, &["fmi2Instantiate", "GUID"]);
+    edited_fmu(directory, |_| None);
+    refuses(directory, run, &["no modelDescription.xml"]);
+    edited_fmu(directory, |xml| Some(xml.replace("fmiVersion=\"2.0\"", "fmiVersion=\"3.0\"")));
+    refuses(directory, run, &["FMI version 3.0"]);
+    edited_fmu(directory, |xml| {
+        Some(xml.replace("modelIdentifier=\"HubSlosh\"", "modelIdentifier=\"Other\""))
+    });
+    refuses(directory, run, &["no binary for this platform", "binaries in it: binaries/"]);
+    edited_fmu(directory, |_| Some("<fmiModelDescription".into()));
+    refuses(directory, run, &["Edited.fmu", "modelDescription.xml"]);
+}
+
+#[test]
+fn the_scaling_page_shows_what_its_commands_print() {
+    let page = pack::root().join("modelDescription/HubSlosh/documentation/scaling.md");
+    let page = std::fs::read_to_string(page).unwrap();
+    let mut commands = 0;
+    for block in page.split("\n\n") {
+        let Some((command, shown)) = block.split_once('\n') else { continue };
+        let Some(arguments) = command.strip_prefix("    $ hubslosh ") else { continue };
+        let arguments: Vec<&str> = arguments.split(' ').collect();
+        let output = hubslosh(Path::new("."), &arguments);
+        let printed = String::from_utf8(output.stdout).unwrap();
+        let shown: Vec<&str> =
+            shown.lines().map(|line| line.strip_prefix("    ").unwrap_or(line)).collect();
+        let printed: Vec<&str> = printed.lines().map(str::trim_end).collect();
+        assert_eq!(shown, printed, "{command}");
+        commands += 1;
+    }
+    assert_eq!(commands, 4);
+}

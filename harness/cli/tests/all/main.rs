@@ -1,0 +1,7 @@
+//! The program `hubslosh` from outside.
+
+mod campaign;
+mod check;
+mod command_line;
+mod plans;
+mod report;

@@ -1,0 +1,278 @@
+//! Campaigns from plan files, from outside: kill and start again, runs made by another importer,
+//! what the tables say where there is nothing to say.
+
+use std::collections::{BTreeMap, HashMap};
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use bench::table::Table;
+use host::fmi2::Fmu;
+use pack::packed_for_tests;
+
+/// `hubslosh` with these arguments.
+fn hubslosh(directory: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hubslosh"));
+    command.current_dir(directory).args(arguments);
+    command
+}
+
+/// `hubslosh campaign` on a plan of this text, into the directory `out`.
+fn campaign(directory: &Path, plan: &str, out: &str, arguments: &[&str]) -> Command {
+    std::fs::write(directory.join("plan.toml"), plan).unwrap();
+    let fmu = packed_for_tests().to_str().unwrap();
+    let common = ["campaign", "--plan", "plan.toml", "--fmu", fmu, "--out", out];
+    hubslosh(directory, &[&common, arguments].concat())
+}
+
+fn successful(mut command: Command) -> Output {
+    let done = command.output().expect("the program runs");
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    done
+}
+
+fn text(directory: &Path, file: &str) -> String {
+    std::fs::read_to_string(directory.join(file)).unwrap()
+}
+
+/// Rows of a CSV file as name → text.
+fn rows(directory: &Path, file: &str) -> Vec<HashMap<String, String>> {
+    let mut reader = csv::Reader::from_path(directory.join(file)).unwrap();
+    reader.deserialize().map(|row| row.unwrap()).collect()
+}
+
+const SWEEPS: &str = "title = \"Sweeps\"\n\
+    profile = \"exp-sweep:f0=2.1,f1=2.8,duration=DURATION\"\n\
+    [set]\nimu.enabled = true\n\
+    [vary]\nslosh.model = [\"linear\", \"spherical\"]\nhub.I = [0.3, 0.35]\nprofile.amplitude = [0.05, 0.1, 0.2]\n\
+    [count]\nimu.seed = 5\n";
+
+#[test]
+fn a_killed_campaign_goes_on_where_it_stopped() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let plan = SWEEPS.replace("DURATION", "900");
+    let mut child = campaign(directory, &plan, "killed", &[])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let runs = || -> Vec<std::path::PathBuf> {
+        let files = std::fs::read_dir(directory.join("killed/runs")).into_iter().flatten();
+        let paths = files.map(|f| f.unwrap().path());
+        paths.filter(|p| p.extension().is_some_and(|e| e == "parquet")).collect()
+    };
+    let begin = Instant::now();
+    while runs().is_empty() {
+        assert!(begin.elapsed() < Duration::from_secs(120), "no run in two minutes");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let left = runs();
+    assert!((1..12).contains(&left.len()), "it was killed too late: {} runs", left.len());
+    for run in &left {
+        assert_eq!(Table::read(run, &["time"]).unwrap().rows(), 45_001, "{}", run.display());
+    }
+    let said = successful(campaign(directory, &plan, "killed", &[])).stdout;
+    let said = String::from_utf8_lossy(&said);
+    assert!(said.contains(&format!("{} were there already", left.len())), "{said}");
+    successful(campaign(directory, &plan, "whole", &[]));
+    for file in ["features.csv", "features_spa.csv", "runs.csv", "plan.toml"] {
+        let [killed, whole] = ["killed", "whole"].map(|d| text(directory, &format!("{d}/{file}")));
+        assert_eq!(killed, whole, "{file}");
+    }
+}
+
+#[test]
+fn runs_made_by_another_importer_from_the_list_give_the_same_tables() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let plan = SWEEPS.replace("DURATION", "60");
+    let plan = format!(
+        "{plan}\n[[run]]\nname = \"up\"\n[[run]]\nname = \"bang\"\nprofile = \"bang-stop-bang:duration=20\"\n"
+    );
+    let list = successful(campaign(directory, &plan, "theirs", &["--list"])).stdout;
+    assert!(!directory.join("theirs").exists(), "--list makes nothing");
+    let list: serde_json::Value = serde_json::from_slice(&list).unwrap();
+    let runs = list["runs"].as_array().unwrap();
+    assert_eq!(runs.len(), 24);
+
+    // another importer: knows only the list, `hubslosh torque` and FMI
+    let fmu = Fmu::open(list["fmu"]["path"].as_str().unwrap()).unwrap();
+    let columns: Vec<String> = serde_json::from_value(list["columns"].clone()).unwrap();
+    std::fs::create_dir_all(directory.join("theirs/runs")).unwrap();
+    for run in runs {
+        let number = |key: &str| run[key].as_f64().unwrap();
+        let (step, stop) = (number("step").to_string(), number("stop").to_string());
+        let profile = run["profile"].as_str().unwrap();
+        let arguments = ["--profile", profile, "--step", &step, "--stop", &stop];
+        successful(hubslosh(
+            directory,
+            &[&["torque", "--out", "torque.parquet"], &arguments[..]].concat(),
+        ));
+        let torque =
+            Table::read(&directory.join("torque.parquet"), &["time", "tau_cmd", "tau_slope"]);
+        let torque = torque.unwrap();
+        let [time, tau, slope] =
+            ["time", "tau_cmd", "tau_slope"].map(|name| torque.column(name).unwrap());
+        let mut instance = fmu.instantiate("theirs").unwrap();
+        for (name, value) in run["settings"].as_object().unwrap() {
+            let value = value.as_str().map_or(value.to_string(), String::from);
+            instance.set(name, &value).unwrap();
+        }
+        instance.setup_experiment(None, time[0], Some(number("stop"))).unwrap();
+        instance.enter_initialization_mode().unwrap();
+        let reference = [fmu.description().variable("tau_cmd").unwrap().reference];
+        instance.set_real(&reference, &tau[..1]).unwrap();
+        instance.exit_initialization_mode().unwrap();
+        let mut recorded = vec![time.to_vec(), tau.to_vec()];
+        recorded.resize(columns.len(), Vec::new());
+        for k in 0..time.len() {
+            for (name, column) in columns.iter().zip(&mut recorded).skip(2) {
+                column.push(instance.real(name).unwrap());
+            }
+            if k + 1 < time.len() {
+                instance.set_real(&reference, &[tau[k]]).unwrap();
+                instance.set_real_input_derivatives(&reference, &[1], &[slope[k]]).unwrap();
+                instance.do_step(time[k], time[k + 1] - time[k]).unwrap();
+            }
+        }
+        let mut notes: BTreeMap<String, String> =
+            serde_json::from_value(run["notes"].clone()).unwrap();
+        notes.insert("made_by".into(), "another importer".into());
+        let file = directory.join("theirs").join(run["file"].as_str().unwrap());
+        Table::new(columns.clone(), recorded).write(&file, &notes).unwrap();
+    }
+
+    let said = successful(campaign(directory, &plan, "theirs", &[])).stdout;
+    assert!(String::from_utf8_lossy(&said).contains("0 runs made, 24 were there already"));
+    successful(campaign(directory, &plan, "ours", &[]));
+    for file in ["features.csv", "features_spa.csv", "runs.csv"] {
+        let [theirs, ours] = ["theirs", "ours"].map(|d| text(directory, &format!("{d}/{file}")));
+        assert_eq!(theirs, ours, "{file}");
+    }
+}
+
+#[test]
+fn a_stored_run_of_another_recipe_is_made_again_and_why_is_said() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let plan = "profile = \"sine:duration=1\"\n[[run]]\nname = \"a\"\nhub.I = 0.3\n";
+    successful(campaign(directory, plan, "c", &[]));
+    let changed = plan.replace("0.3", "0.4");
+    let done = successful(campaign(directory, &changed, "c", &[]));
+    assert!(String::from_utf8_lossy(&done.stdout).contains("1 runs made, 0 were there"));
+    // without its columns for the tables it does not count either
+    let run = directory.join("c/runs/a.parquet");
+    let notes = bench::table::notes(&run).unwrap();
+    Table::read(&run, &["time", "omega"]).unwrap().write(&run, &notes).unwrap();
+    let done = successful(campaign(directory, &changed, "c", &[]));
+    assert!(String::from_utf8_lossy(&done.stdout).contains("1 runs made, 0 were there"));
+}
+
+#[test]
+fn what_a_torque_cannot_show_stays_empty() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    std::fs::write(directory.join("torque.csv"), "time,tau_cmd\n1,0\n2,0.1\n3,0\n").unwrap();
+    let plan = "title = \"Without a sweep\"\nprofile = \"zero\"\n[vary]\nprofile = [\n\
+        \"sine:duration=5\", \"bang-stop-bang:duration=20\", \"acceleration-step:duration=10\",\n\
+        \"file:path=torque.csv\", \"noise:duration=100\", \"zero:duration=1\"]\n";
+    successful(campaign(directory, plan, "c", &[]));
+    let table = rows(directory, "c/runs.csv");
+    assert_eq!(table.len(), 6);
+    for row in &table {
+        for column in ["f_res_hz", "f_dip_hz", "delta_f_hz", "notch_db", "swirl", "rotary_from_hz"]
+        {
+            assert_eq!(row[column], "", "{column} of {}", row["name"]);
+        }
+        // only noise has a spectrum that a model can be fitted to
+        assert_eq!(row["fit_freq_pct"].is_empty(), row["name"] != "noise", "{row:?}");
+        assert!(row["peak_slosh_angle_deg"].parse::<f64>().unwrap() >= 0.0);
+        assert!(row["max_energy_residual"].parse::<f64>().unwrap() < 1e-8, "{row:?}");
+    }
+    let has_amplitude = |row: &&HashMap<String, String>| !row["amplitude_nm"].is_empty();
+    assert_eq!(table.iter().filter(has_amplitude).count(), 2);
+    for file in ["c/runs.csv", "c/features.csv", "c/features_spa.csv", "c/report.html"] {
+        assert!(!text(directory, file).contains("NaN"), "{file}");
+    }
+}
+
+#[test]
+fn a_failed_run_is_a_row_with_its_reason() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let plan = "profile = \"sine:duration=1\"\n[vary]\ntank.d = [-1, 0.163]\n";
+    let done = campaign(directory, plan, "c", &[]).output().unwrap();
+    assert!(!done.status.success());
+    let rows = rows(directory, "c/runs.csv");
+    assert_eq!(rows.len(), 2);
+    assert_eq!((rows[0]["name"].as_str(), rows[0]["error"].as_str()), ("d_0.163", ""));
+    assert_eq!((rows[1]["name"].as_str(), rows[1]["tank.d"].as_str()), ("d_-1", "-1"));
+    assert!(rows[1]["error"].contains("tank.d"), "{}", rows[1]["error"]);
+    assert!(text(directory, "c/report.html").contains("d_-1"));
+}
+
+#[test]
+fn a_wrong_plan_makes_nothing_and_says_everything() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let plan = "profile = \"sine:frequncy=1\"\n[set]\ntank.hh = 1\n";
+    let done = campaign(directory, plan, "c", &[]).output().unwrap();
+    let said = String::from_utf8_lossy(&done.stderr);
+    assert!(!done.status.success() && !directory.join("c").exists());
+    for words in ["\"frequncy\"", "\"tank.hh\"", "did you mean \"tank.h\""] {
+        assert!(said.contains(words), "{said}");
+    }
+    let done = hubslosh(directory, &["campaign", "--plan", "plan.toml", "--fills", "0.1"]).output();
+    let said = String::from_utf8(done.unwrap().stderr).unwrap();
+    assert!(said.contains("--plan") && said.contains("--fills"), "{said}");
+}
+
+#[test]
+fn the_command_in_the_report_makes_the_same_tables_again() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let fmu = packed_for_tests().to_str().unwrap();
+    // flags leave a plan too
+    successful(hubslosh(
+        directory,
+        &["campaign", "--fmu", fmu, "--fills", "0.1", "--amplitudes", "0.1", "--set", "hub.I=0.35"],
+    ));
+    let before = text(directory, "dist/campaign/runs.csv");
+    let page = text(directory, "dist/campaign/report.html");
+    let command =
+        page.split("<code>hubslosh campaign ").nth(1).unwrap().split("</code>").next().unwrap();
+    std::fs::remove_dir_all(directory.join("dist/campaign/runs")).unwrap();
+    std::fs::remove_file(directory.join("dist/campaign/runs.csv")).unwrap();
+    let arguments: Vec<&str> = ["campaign"].into_iter().chain(command.split(' ')).collect();
+    let said = successful(hubslosh(directory, &arguments)).stdout;
+    assert!(String::from_utf8_lossy(&said).contains("1 runs made"));
+    assert_eq!(text(directory, "dist/campaign/runs.csv"), before);
+    assert!(before.contains("linear_100mm_100"));
+}
+
+#[test]
+fn a_torque_is_written_with_its_slopes() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let profile = "pulse:amplitude=0.2,start=0.1,width=0.1,duration=0.5";
+    successful(hubslosh(
+        directory,
+        &["torque", "--profile", profile, "--step", "0.05", "--out", "t.csv"],
+    ));
+    let table = Table::read(&directory.join("t.csv"), &["time", "tau_cmd", "tau_slope"]).unwrap();
+    assert_eq!(table.rows(), 11);
+    assert_eq!(table.column("tau_cmd").unwrap()[1..5], [0.0, 0.2, 0.2, 0.0]);
+    assert!(table.column("tau_slope").unwrap().iter().all(|slope| *slope == 0.0), "no ramps");
+    for (arguments, word) in [
+        (&["--profile", "sin", "--out", "a.csv"][..], "did you mean \"sine\""),
+        (&["--profile", "sine", "--out", "a.txt"], ".parquet"),
+        (&["--profile", "sine", "--step", "0", "--out", "a.csv"], "step"),
+    ] {
+        let done = hubslosh(directory, &[&["torque"], arguments].concat()).output().unwrap();
+        let said = String::from_utf8_lossy(&done.stderr);
+        assert!(!done.status.success() && said.contains(word), "{said}");
+    }
+}

@@ -1,0 +1,11 @@
+//! Loads FMUs as any host does: the packed archive, what it says of itself, its binary.
+//!
+//! The rest of the harness meets an FMU only through this crate; no code is shared with a model.
+//! Whatever check, pack and bench need alike is here too: reading binaries of any platform, writing
+//! files so that they appear whole or not at all.
+
+pub mod binary;
+pub mod description;
+pub mod fmi2;
+pub mod html;
+pub mod output;

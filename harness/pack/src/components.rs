@@ -1,0 +1,403 @@
+//! What is linked into the FMU's binaries, found in the lock file and in the binaries themselves:
+//! as the note on licences and as a software bill of materials (CycloneDX 1.6).
+//!
+//! Licence texts are committed in modelDescription/licenses; their sources are named in
+//! [`licence_note`].
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
+
+use anyhow::{Context, Result, bail};
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
+
+use crate::project;
+use host::description::ModelDescription;
+
+/// A binary to be packed.
+pub struct Packed {
+    /// Folder under `binaries/`.
+    pub folder: &'static str,
+    /// Ending of its name there.
+    pub ending: &'static str,
+    /// The file.
+    pub bytes: Vec<u8>,
+}
+
+impl Packed {
+    /// Its name in the FMU of a model.
+    pub fn name(&self, model: &str) -> String {
+        format!("binaries/{}/{model}{}", self.folder, self.ending)
+    }
+}
+
+/// Licence of the project's own parts, SPDX.
+const OWN: &str = "MIT OR Apache-2.0";
+/// Texts of that licence, at the project's root.
+pub const OWN_TEXTS: [&str; 2] = ["LICENSE-MIT", "LICENSE-APACHE"];
+
+/// One part of a binary.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Component {
+    /// Its name where it comes from.
+    pub name: String,
+    /// Its version; `None` if it is that of the tool that linked it.
+    pub version: Option<String>,
+    /// Licence as an SPDX expression.
+    pub licence: String,
+    /// Files with the licence's text, in `documentation/licenses/`.
+    pub texts: Vec<String>,
+    /// Package URL.
+    pub purl: String,
+    /// SHA-256 of the package, if Cargo.lock has it.
+    pub sha256: Option<String>,
+    /// Where it comes from and what it is for.
+    pub origin: String,
+    /// Folders under `binaries/` whose binary has it.
+    pub platforms: BTreeSet<&'static str>,
+}
+
+/// Crates that Rust's standard library is made from. Panic messages name those whose code is linked
+/// and can panic, with their versions.
+const STANDARD: [(&str, &str); 10] = [
+    ("addr2line", "Apache-2.0 OR MIT"),
+    ("adler2", "0BSD OR MIT OR Apache-2.0"),
+    ("cfg-if", "MIT OR Apache-2.0"),
+    ("gimli", "MIT OR Apache-2.0"),
+    ("hashbrown", "MIT OR Apache-2.0"),
+    ("libc", "MIT OR Apache-2.0"),
+    ("memchr", "Unlicense OR MIT"),
+    ("miniz_oxide", "MIT OR Zlib OR Apache-2.0"),
+    ("object", "Apache-2.0 OR MIT"),
+    ("rustc-demangle", "MIT OR Apache-2.0"),
+];
+const STANDARD_TEXT: &str = "rust-standard-library.txt";
+
+/// What a linker adds, and a text by which the binary shows it.
+struct RunTime {
+    mark: &'static str,
+    name: &'static str,
+    licence: &'static str,
+    text: &'static str,
+    origin: &'static str,
+}
+
+const RUN_TIME: [RunTime; 4] = [
+    RunTime {
+        mark: "libunwind: ",
+        name: "llvm-libunwind",
+        licence: "Apache-2.0 WITH LLVM-exception",
+        text: "llvm-libunwind.txt",
+        origin: "Unwinding of panics, from zig's distribution; the text is its lib/libunwind/LICENSE.TXT",
+    },
+    RunTime {
+        // the two come together: zig links both where it builds for an old glibc
+        mark: "libunwind: ",
+        name: "glibc-nonshared",
+        licence: "LicenseRef-LGPL-2.1-or-later-with-unlimited-permission-to-link",
+        text: "glibc.txt",
+        origin: "stat64 and fstat64 for systems before glibc 2.33, from zig's distribution; the text is the \
+                 head of its lib/libc/glibc/io/stat64-2.32.c",
+    },
+    RunTime {
+        mark: "Mingw-w64 runtime failure",
+        name: "mingw-w64-runtime",
+        licence: "ZPL-2.1 AND LicenseRef-public-domain",
+        text: "mingw-w64.txt",
+        origin: "Start-up of the DLL, thread-local storage (public domain) and onexit tables; the text is \
+                 MinGW-w64's COPYING",
+    },
+    RunTime {
+        mark: "Mingw-w64 runtime failure",
+        name: "libgcc",
+        licence: "GPL-3.0-or-later WITH GCC-exception-3.1",
+        text: "gcc-runtime.txt",
+        origin: "Unwinding of panics (libgcc_eh) and crtbegin, from MinGW's GCC; the texts are the FSF's",
+    },
+];
+
+/// Everything that is linked into `binaries`. Fails if something is there whose licence is not
+/// known here.
+pub fn linked(binaries: &[Packed]) -> Result<Vec<Component>> {
+    let everywhere: BTreeSet<&str> = binaries.iter().map(|binary| binary.folder).collect();
+    let mut all = crates(&everywhere)?;
+    all.push(Component {
+        name: "std".into(),
+        version: Some(rust_version()?),
+        licence: "MIT OR Apache-2.0".into(),
+        texts: vec![STANDARD_TEXT.into()],
+        purl: String::new(),
+        sha256: None,
+        origin:
+            "Rust's standard library: core, alloc, std, panic_unwind, compiler_builtins, and of \
+                 the crates it is made from what is used; those that the binaries name follow"
+                .into(),
+        platforms: everywhere,
+    });
+    let mut crates_of_std: BTreeMap<(String, String), BTreeSet<&str>> = BTreeMap::new();
+    for binary in binaries {
+        for found in standard_crates(&binary.bytes)? {
+            crates_of_std.entry(found).or_default().insert(binary.folder);
+        }
+    }
+    for ((name, version), platforms) in crates_of_std {
+        let licence = STANDARD.iter().find(|(known, _)| *known == name).map_or("", |(_, l)| l);
+        all.push(Component {
+            purl: format!("pkg:cargo/{name}@{version}"),
+            name,
+            version: Some(version),
+            licence: licence.into(),
+            texts: vec![STANDARD_TEXT.into()],
+            sha256: None,
+            origin: "Part of Rust's standard library".into(),
+            platforms,
+        });
+    }
+    for part in RUN_TIME {
+        let platforms: BTreeSet<_> = binaries
+            .iter()
+            .filter(|binary| contains(&binary.bytes, part.mark))
+            .map(|binary| binary.folder)
+            .collect();
+        if !platforms.is_empty() {
+            all.push(Component {
+                name: part.name.into(),
+                version: None,
+                licence: part.licence.into(),
+                texts: vec![part.text.into()],
+                purl: String::new(),
+                sha256: None,
+                origin: part.origin.into(),
+                platforms,
+            });
+        }
+    }
+    for component in all.iter_mut().filter(|component| component.purl.is_empty()) {
+        let at = component.version.as_ref().map(|v| format!("@{v}")).unwrap_or_default();
+        component.purl = format!("pkg:generic/{}{at}", component.name);
+    }
+    Ok(all)
+}
+
+/// The FMU's package and all that Cargo links into it.
+fn crates(platforms: &BTreeSet<&'static str>) -> Result<Vec<Component>> {
+    let root = project::root();
+    let said = project::cargo()
+        .current_dir(&root)
+        .args(["metadata", "--format-version", "1"])
+        .output()
+        .context("cargo cannot be run; packing the FMU needs Rust")?;
+    if !said.status.success() {
+        let error = String::from_utf8_lossy(&said.stderr);
+        bail!("cargo does not say what the FMU is linked from: {}", error.trim());
+    }
+    let metadata: Value = serde_json::from_slice(&said.stdout)?;
+    let lock = std::fs::read_to_string(root.join("Cargo.lock")).context("Cargo.lock")?;
+    let lock: toml::Table = lock.parse().context("Cargo.lock cannot be understood")?;
+    let list = |value: &Value| value.as_array().cloned().unwrap_or_default();
+    let nodes = list(&metadata["resolve"]["nodes"]);
+    let packages = list(&metadata["packages"]);
+    let package = |id: &Value| packages.iter().find(|package| package["id"] == *id);
+    let first = packages.iter().find(|package| package["name"] == project::PACKAGE);
+    let mut wanted =
+        vec![first.context("the FMU's package is not in the workspace")?["id"].clone()];
+    let mut place = 0;
+    while place < wanted.len() {
+        let node = nodes.iter().find(|node| node["id"] == wanted[place]);
+        for dependency in node.map(|node| list(&node["deps"])).unwrap_or_default() {
+            // neither of tests nor of build scripts
+            let linked = list(&dependency["dep_kinds"]).iter().any(|kind| kind["kind"].is_null());
+            if linked && !wanted.contains(&dependency["pkg"]) {
+                wanted.push(dependency["pkg"].clone());
+            }
+        }
+        place += 1;
+    }
+    let mut all = Vec::new();
+    for package in wanted.iter().filter_map(package) {
+        let text = |key: &str| package[key].as_str().unwrap_or_default().to_string();
+        let (name, version) = (text("name"), text("version"));
+        let own = package["source"].is_null();
+        let locked = lock.get("package").and_then(|packages| packages.as_array());
+        let locked = locked.into_iter().flatten().find(|one| {
+            let is = |key: &str, value: &str| one.get(key).and_then(|v| v.as_str()) == Some(value);
+            is("name", &name) && is("version", &version)
+        });
+        let checksum = locked.and_then(|one| one.get("checksum")).and_then(|sum| sum.as_str());
+        all.push(Component {
+            purl: format!("pkg:cargo/{name}@{version}"),
+            licence: text("license"),
+            texts: if own {
+                OWN_TEXTS.map(String::from).to_vec()
+            } else {
+                vec![format!("{name}.txt")]
+            },
+            sha256: checksum.map(String::from),
+            origin: text("description"),
+            platforms: platforms.clone(),
+            name,
+            version: Some(version),
+        });
+    }
+    Ok(all)
+}
+
+/// "1.95.0"
+fn rust_version() -> Result<String> {
+    let rustc = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
+    let said =
+        std::process::Command::new(rustc).current_dir(project::root()).arg("--version").output();
+    let said = said.context("rustc cannot be run; packing the FMU needs Rust")?;
+    let said = String::from_utf8_lossy(&said.stdout);
+    let version = said.split_whitespace().nth(1).context("rustc does not say its version")?;
+    Ok(version.into())
+}
+
+fn contains(bytes: &[u8], text: &str) -> bool {
+    bytes.windows(text.len()).any(|window| window == text.as_bytes())
+}
+
+/// Crates of the standard library named in a binary, as in "/rust/deps/gimli-0.32.3/src".
+fn standard_crates(bytes: &[u8]) -> Result<BTreeSet<(String, String)>> {
+    const BEFORE: &[u8] = b"/rust/deps";
+    let mut all = BTreeSet::new();
+    let places = bytes.windows(BEFORE.len()).enumerate().filter(|(_, w)| *w == BEFORE);
+    for (place, _) in places {
+        // one separator, of this or of the target's system, on either side
+        let rest = &bytes[place + BEFORE.len() + 1..];
+        let end = rest.iter().position(|b| b"/\\".contains(b)).unwrap_or(0);
+        let folder = String::from_utf8_lossy(&rest[..end]);
+        let parts = folder.split_once("-").and_then(|_| folder.rsplit_once('-'));
+        let known = parts.filter(|(name, _)| STANDARD.iter().any(|(known, _)| known == name));
+        let Some((name, version)) = known else {
+            bail!(
+                "the binary holds {folder}, a crate of Rust's standard library whose licence is \
+                 not known: add it to STANDARD in harness/pack/src/components.rs and its text to \
+                 modelDescription/licenses/{STANDARD_TEXT}"
+            );
+        };
+        all.insert((name.to_string(), version.to_string()));
+    }
+    Ok(all)
+}
+
+/// `documentation/licenses/license.txt`: what is linked, and under which licence.
+pub fn licence_note(description: &ModelDescription, components: &[Component]) -> String {
+    let mut note = format!(
+        "{} {}\nSPDX-License-Identifier: {OWN}\n\n\
+         The texts are in LICENSE-MIT and LICENSE-APACHE; the choice is yours. The binaries also \
+         hold what is listed\nhere; none of it asks more than that its notice travels with the \
+         binary, as it does here.\n",
+        description.model_name, description.version
+    );
+    for component in components {
+        let platforms: Vec<_> = component.platforms.iter().copied().collect();
+        let _ = write!(
+            note,
+            "\n{} {}\n  {}\n  licence:   {}\n  text:      {}\n  platforms: {}\n",
+            component.name,
+            component.version.as_deref().unwrap_or("(version of the linking tool)"),
+            component.origin,
+            component.licence,
+            component.texts.join(", "),
+            platforms.join(", "),
+        );
+    }
+    note
+}
+
+/// The software bill of materials, CycloneDX 1.6. Neither a time nor a random number is in it, so
+/// the same binaries have the same bill.
+pub fn bill(
+    description: &ModelDescription,
+    binaries: &[Packed],
+    components: &[Component],
+) -> String {
+    let (name, version) = (&description.model_name, &description.version);
+    let this = format!("{name}@{version}");
+    let licences = |expression: &str| json!([{ "expression": expression }]);
+    let mut list = Vec::new();
+    for component in components {
+        let platforms = component.platforms.iter();
+        let mut entry = json!({
+            "type": "library",
+            "bom-ref": component.purl,
+            "name": component.name,
+            "description": component.origin,
+            "licenses": licences(&component.licence),
+            "purl": component.purl,
+            "properties": platforms
+                .map(|folder| json!({ "name": "hubslosh:platform", "value": folder }))
+                .collect::<Vec<_>>(),
+        });
+        if let Some(version) = &component.version {
+            entry["version"] = json!(version);
+        }
+        if let Some(hash) = &component.sha256 {
+            entry["hashes"] = json!([{ "alg": "SHA-256", "content": hash }]);
+        }
+        list.push(entry);
+    }
+    let parts = components.iter().map(|c| c.purl.clone());
+    let mut dependencies =
+        vec![json!({ "ref": this, "dependsOn": parts.clone().collect::<Vec<_>>() })];
+    dependencies.extend(parts.map(|purl| json!({ "ref": purl })));
+    let files = binaries.iter().map(|binary| {
+        json!({
+            "type": "file",
+            "name": binary.name(name),
+            "hashes": [{ "alg": "SHA-256", "content": sha256(&binary.bytes) }],
+        })
+    });
+    let bill = json!({
+        "bomFormat": "CycloneDX",
+        "specVersion": "1.6",
+        "version": 1,
+        "metadata": { "component": {
+            "type": "library",
+            "bom-ref": this,
+            "name": name,
+            "version": version,
+            "description": description.description,
+            "licenses": licences(OWN),
+            "components": files.collect::<Vec<_>>(),
+        }},
+        "components": list,
+        "dependencies": dependencies,
+    });
+    format!("{bill:#}\n")
+}
+
+/// SHA-256 in hexadecimal digits.
+pub fn sha256(bytes: &[u8]) -> String {
+    let mut text = String::new();
+    for byte in Sha256::digest(bytes) {
+        let _ = write!(text, "{byte:02x}");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn crates_of_std_are_found_by_name_and_version() {
+        let found = standard_crates(
+            b"x/rust/deps/rustc-demangle-0.1.27/src/v0.rs\0/rust/deps\\gimli-0.32.3\\src",
+        );
+        let found = found.unwrap();
+        let wanted = [("gimli", "0.32.3"), ("rustc-demangle", "0.1.27")];
+        assert_eq!(found, wanted.map(|(n, v)| (n.to_string(), v.to_string())).into());
+        let error = standard_crates(b"/rust/deps/new-thing-1.0.0/src").unwrap_err().to_string();
+        assert!(error.contains("new-thing-1.0.0"), "{error}");
+    }
+
+    #[test]
+    fn crates_are_those_of_the_lock_file() {
+        let all = crates(&BTreeSet::from(["linux64"])).unwrap();
+        let names: Vec<_> = all.iter().map(|c| c.name.as_str()).collect();
+        assert_eq!(names, [project::PACKAGE, "plant", "libm"]);
+        assert_eq!(all[2].sha256.as_ref().unwrap().len(), 64);
+    }
+}

@@ -1,0 +1,285 @@
+//! The three platforms an FMU for everybody is built for, and what building
+//! for each takes.
+//!
+//! Rust's compiler writes code for all of them; what has to be had besides is
+//! Rust's standard library for the target and a linker. `harness/platforms/setup`
+//! gets both on a Debian machine, into `target/tools`.
+
+use std::collections::BTreeMap;
+use std::env;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, bail};
+
+use host::binary::{self, Binary};
+use host::fmi2::Fmu;
+
+use crate::project;
+
+/// A platform of FMI 2.0, section 2.3.
+pub struct Platform {
+    /// Folder under `binaries/` of the FMU.
+    pub folder: &'static str,
+    /// Ending of the binary's name there.
+    pub ending: &'static str,
+    /// What is built; several are joined into one universal binary.
+    targets: &'static [Target],
+    /// Programs that building needs beside Rust.
+    tools: &'static [Tool],
+    /// Subcommand of Cargo, or another program with the same arguments.
+    cargo: Cargo,
+    /// Arguments of the linker.
+    link: &'static [&'static str],
+}
+
+struct Target {
+    /// As rustc knows it.
+    triple: &'static str,
+    /// Appended for `cargo-zigbuild`: the oldest glibc.
+    suffix: &'static str,
+}
+
+#[derive(Clone, Copy)]
+enum Cargo {
+    /// With the linker that Rust takes for the target.
+    Plain,
+    /// With zig as linker, which brings the symbols of every glibc and of macOS.
+    Zig,
+}
+
+struct Tool {
+    program: &'static str,
+    get: &'static str,
+}
+
+const CARGO_ZIGBUILD: Tool = Tool {
+    program: "cargo-zigbuild",
+    get: "cargo install --locked --version 0.24.1 cargo-zigbuild",
+};
+const ZIG: Tool = Tool {
+    program: "zig",
+    get: "Python package ziglang 0.17.1 (its `zig` must be on PATH), or zig itself",
+};
+const MINGW: Tool = Tool {
+    program: "x86_64-w64-mingw32-gcc",
+    get: "Debian package gcc-mingw-w64-x86-64-win32, or MinGW-w64",
+};
+
+/// All platforms, in the order of the archive.
+pub const PLATFORMS: [Platform; 3] = [
+    Platform {
+        folder: "darwin64",
+        ending: ".dylib",
+        targets: &[
+            Target { triple: "x86_64-apple-darwin", suffix: "" },
+            Target { triple: "aarch64-apple-darwin", suffix: "" },
+        ],
+        tools: &[CARGO_ZIGBUILD, ZIG],
+        cargo: Cargo::Zig,
+        // Hosts load it by its path; its name must not be that of a folder on this machine. Without
+        // debug information (-S) the identifier that zig gives it does not depend on one either.
+        link: &["-Wl,-install_name,@rpath/HubSlosh.dylib", "-Wl,-S"],
+    },
+    Platform {
+        folder: "linux64",
+        ending: ".so",
+        targets: &[Target { triple: "x86_64-unknown-linux-gnu", suffix: ".2.17" }],
+        tools: &[CARGO_ZIGBUILD, ZIG],
+        cargo: Cargo::Zig,
+        link: &[],
+    },
+    Platform {
+        folder: "win64",
+        ending: ".dll",
+        targets: &[Target { triple: "x86_64-pc-windows-gnu", suffix: "" }],
+        tools: &[MINGW],
+        cargo: Cargo::Plain,
+        // same source, same bytes: no time of building in the file
+        link: &["-Wl,--no-insert-timestamp"],
+    },
+];
+
+/// One platform's binary, checked.
+pub struct Built {
+    /// Folder under `binaries/`.
+    pub folder: &'static str,
+    /// Ending of its name there.
+    pub ending: &'static str,
+    /// The file.
+    pub bytes: Vec<u8>,
+    /// What it needs and offers.
+    pub binary: Binary,
+}
+
+/// Builds and checks the binaries of all platforms. Before anything is built, everything that is
+/// missing is named; after, every fault of every binary.
+pub fn build() -> Result<Vec<Built>> {
+    let bench = Bench::look()?;
+    bench.check()?;
+    let mut faults = Vec::new();
+    let mut all = Vec::new();
+    for platform in &PLATFORMS {
+        eprintln!("building for {}", platform.folder);
+        let parts = platform
+            .targets
+            .iter()
+            .map(|target| {
+                let path = project::cargo_build(bench.command(platform, target), false)
+                    .with_context(|| format!("{} ({})", platform.folder, target.triple))?;
+                std::fs::read(&path).with_context(|| format!("{} cannot be read", path.display()))
+            })
+            .collect::<Result<Vec<_>>>()?;
+        let bytes = match <[Vec<u8>; 1]>::try_from(parts) {
+            Ok([only]) => only,
+            Err(parts) => binary::join(&parts)?,
+        };
+        let binary = Binary::read(&bytes).with_context(|| platform.folder)?;
+        let wanted = [Fmu::symbols(), Fmu::step_symbols(), Fmu::exchange_symbols()].concat();
+        let found = binary.faults(&wanted);
+        faults.extend(found.iter().map(|fault| format!("\n  {}: {fault}", platform.folder)));
+        for folder in bench.private() {
+            if bytes.windows(folder.len()).any(|w| w == folder.as_bytes()) {
+                faults.push(format!("\n  {}: it names the folder {folder}", platform.folder));
+            }
+        }
+        all.push(Built { folder: platform.folder, ending: platform.ending, bytes, binary });
+    }
+    if !faults.is_empty() {
+        bail!("the binaries would not work everywhere, so nothing was packed:{}", faults.concat());
+    }
+    Ok(all)
+}
+
+/// Where this machine keeps what building needs.
+struct Bench {
+    root: PathBuf,
+    /// PATH with `target/tools/bin` in front.
+    path: OsString,
+    /// Folder of the Rust installation in use.
+    sysroot: PathBuf,
+    /// Source of the standard library, for targets whose compiled one is not installed.
+    source: Option<PathBuf>,
+    /// Cargo's home.
+    home: String,
+}
+
+impl Bench {
+    fn look() -> Result<Self> {
+        let root = project::root();
+        let tools = root.join("target").join("tools");
+        let mut folders = vec![tools.join("bin")];
+        folders.extend(env::split_paths(&env::var_os("PATH").unwrap_or_default()));
+        let rustc = |arguments: &[&str]| -> Result<String> {
+            let said = Command::new(env::var_os("RUSTC").unwrap_or_else(|| "rustc".into()))
+                .current_dir(&root)
+                .args(arguments)
+                .output()
+                .context("rustc cannot be run; building the FMU needs Rust")?;
+            Ok(String::from_utf8_lossy(&said.stdout).trim().into())
+        };
+        let sysroot = PathBuf::from(rustc(&["--print", "sysroot"])?);
+        // "rustc 1.95.0 (…)": a standard library of another version does not compile
+        let version = rustc(&["--version"])?;
+        let version = version.split_whitespace().nth(1).unwrap_or_default();
+        let source = [
+            tools.join(format!("rust-{version}")).join("library"),
+            sysroot.join("lib/rustlib/src/rust/library"),
+        ]
+        .into_iter()
+        .find(|folder| folder.join("std").is_dir());
+        let home = env::var_os("CARGO_HOME")
+            .map(PathBuf::from)
+            .or_else(|| env::home_dir().map(|home| home.join(".cargo")));
+        Ok(Bench {
+            root,
+            path: env::join_paths(folders).context("a folder on PATH has a strange name")?,
+            sysroot,
+            source,
+            home: home.unwrap_or_default().to_string_lossy().into_owned(),
+        })
+    }
+
+    /// Folders of this machine that no binary may name.
+    fn private(&self) -> Vec<String> {
+        let folders = [self.root.to_string_lossy().into_owned(), self.home.clone()];
+        folders.into_iter().filter(|folder| folder.len() > 1).collect()
+    }
+
+    fn has_program(&self, program: &str) -> bool {
+        let name = format!("{program}{}", env::consts::EXE_SUFFIX);
+        env::split_paths(&self.path).any(|folder| folder.join(&name).is_file())
+    }
+
+    fn has_standard_library(&self, triple: &str) -> bool {
+        let folder = self.sysroot.join("lib/rustlib").join(triple).join("lib");
+        let named = |entry: std::io::Result<std::fs::DirEntry>| {
+            entry.is_ok_and(|e| e.file_name().to_string_lossy().starts_with("libstd-"))
+        };
+        folder.read_dir().is_ok_and(|mut entries| entries.any(named))
+    }
+
+    /// Says all that is missing, for which platforms, and how to get it.
+    fn check(&self) -> Result<()> {
+        let mut missing: BTreeMap<String, Vec<&str>> = BTreeMap::new();
+        for platform in &PLATFORMS {
+            for tool in platform.tools.iter().filter(|tool| !self.has_program(tool.program)) {
+                let line = format!("{}: {}", tool.program, tool.get);
+                missing.entry(line).or_default().push(platform.folder);
+            }
+            for Target { triple, .. } in platform.targets {
+                if !self.has_standard_library(triple) && self.source.is_none() {
+                    let line =
+                        format!("Rust's standard library for {triple}: rustup target add {triple}");
+                    missing.entry(line).or_default().push(platform.folder);
+                }
+            }
+        }
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let lines: Vec<_> = missing
+            .iter()
+            .map(|(line, folders)| format!("\n  {line} ({})", folders.join(", ")))
+            .collect();
+        bail!(
+            "not all platforms can be built here, so nothing was packed; missing:{}\n\
+             On a Debian machine harness/platforms/setup gets all of it.",
+            lines.concat()
+        )
+    }
+
+    /// What builds the binary for one target.
+    fn command(&self, platform: &Platform, target: &Target) -> Command {
+        let mut command = match platform.cargo {
+            Cargo::Plain => project::cargo(),
+            Cargo::Zig => Command::new("cargo-zigbuild"),
+        };
+        command.env("PATH", &self.path);
+        command.args(["rustc", "--locked", "--target"]);
+        command.arg(format!("{}{}", target.triple, target.suffix));
+        // No path of this machine in the file: same source, same bytes, wherever it is built.
+        let registry = Path::new(&self.home).join("registry").join("src");
+        let mut flags = vec![
+            format!("--remap-path-prefix={}=.", self.root.display()),
+            format!("--remap-path-prefix={}=crates", registry.display()),
+        ];
+        if !self.has_standard_library(target.triple)
+            && let Some(source) = &self.source
+        {
+            // Building std is an unstable feature of Cargo, which these two names open.
+            command.env("RUSTC_BOOTSTRAP", "1").env("__CARGO_TESTS_ONLY_SRC_ROOT", source);
+            command.arg("-Zbuild-std=std,panic_unwind");
+            flags.push(format!("--remap-path-prefix={}=library", source.display()));
+        }
+        command.env("CARGO_ENCODED_RUSTFLAGS", flags.join("\x1f"));
+        command.env("MACOSX_DEPLOYMENT_TARGET", binary::MACOS.to_string());
+        command.env("SOURCE_DATE_EPOCH", "0");
+        let linker = MINGW.program;
+        command.env("CARGO_TARGET_X86_64_PC_WINDOWS_GNU_LINKER", linker);
+        project::arguments(&mut command);
+        command.args(platform.link.iter().map(|argument| format!("-Clink-arg={argument}")));
+        command
+    }
+}

@@ -1,0 +1,95 @@
+//! What travels in the FMU beside description and binaries.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use pack::{BILL, packed_for_tests};
+
+fn files() -> BTreeMap<String, Vec<u8>> {
+    use std::io::Read;
+    let file = std::fs::File::open(packed_for_tests()).unwrap();
+    let mut archive = zip::ZipArchive::new(file).unwrap();
+    let mut all = BTreeMap::new();
+    for i in 0..archive.len() {
+        let mut file = archive.by_index(i).unwrap();
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).unwrap();
+        all.insert(file.name().unwrap().into_owned(), bytes);
+    }
+    all
+}
+
+fn text(files: &BTreeMap<String, Vec<u8>>, name: &str) -> String {
+    String::from_utf8(files[name].clone()).unwrap()
+}
+
+/// Values of an attribute, wherever it is.
+fn attributes(page: &str, name: &str) -> BTreeSet<String> {
+    let before = format!(" {name}=\"");
+    page.split(&before).skip(1).map(|part| part.split('"').next().unwrap().to_string()).collect()
+}
+
+#[test]
+fn every_link_and_figure_of_the_documentation_is_in_the_fmu() {
+    let files = files();
+    let page = text(&files, "documentation/index.html");
+    let ids = attributes(&page, "id");
+    let links = attributes(&page, "href");
+    assert!(links.len() > 40, "the list of contents alone has more links");
+    for link in links {
+        let anchor = link.strip_prefix('#').unwrap_or_else(|| panic!("{link} leads out"));
+        assert!(ids.contains(anchor), "{link} leads nowhere");
+    }
+    let figures = attributes(&page, "src");
+    assert!(figures.contains("bench.svg"));
+    for figure in figures {
+        assert!(files.contains_key(&format!("documentation/{figure}")), "{figure} is missing");
+    }
+    assert!(!page.contains("<script"));
+}
+
+#[test]
+fn every_page_is_listed_in_the_introduction() {
+    let folder = pack::root().join("modelDescription/HubSlosh/documentation");
+    let introduction = std::fs::read_to_string(folder.join("index.md")).unwrap();
+    for file in folder.read_dir().unwrap().flatten() {
+        let name = file.file_name().to_string_lossy().into_owned();
+        if name.ends_with(".md") && name != "index.md" {
+            assert!(introduction.contains(&format!("]({name})")), "{name} is not listed");
+        }
+    }
+}
+
+#[test]
+fn every_licence_named_has_its_text() {
+    let files = files();
+    let note = text(&files, "documentation/licenses/license.txt");
+    assert!(note.contains("SPDX-License-Identifier: MIT OR Apache-2.0\n"));
+    let named: BTreeSet<&str> = note
+        .lines()
+        .filter_map(|line| line.trim().strip_prefix("text:"))
+        .flat_map(|texts| texts.split(','))
+        .map(str::trim)
+        .collect();
+    assert!(named.contains("libm.txt") && named.contains("rust-standard-library.txt"));
+    for text in named {
+        assert!(files[&format!("documentation/licenses/{text}")].len() > 500, "{text}");
+    }
+}
+
+#[test]
+fn bill_of_materials_lists_what_is_linked_and_refers_to_nothing_else() {
+    let files = files();
+    let bill: serde_json::Value = serde_json::from_slice(&files[BILL]).unwrap();
+    let parts = bill["components"].as_array().unwrap();
+    let names: BTreeSet<&str> = parts.iter().map(|part| part["name"].as_str().unwrap()).collect();
+    for name in ["hubslosh-fmu", "plant", "libm", "std", "gimli"] {
+        assert!(names.contains(name), "{name} is not in {names:?}");
+    }
+    // the harness's own crates are not in the FMU
+    assert!(!names.contains("zip") && !names.contains("clap"));
+    let references: BTreeSet<&str> = parts.iter().map(|p| p["bom-ref"].as_str().unwrap()).collect();
+    assert_eq!(references.len(), parts.len(), "references are unique");
+    for part in bill["dependencies"][0]["dependsOn"].as_array().unwrap() {
+        assert!(references.contains(part.as_str().unwrap()));
+    }
+}

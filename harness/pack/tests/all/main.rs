@@ -1,0 +1,4 @@
+//! The packed FMU and the release as files.
+
+mod archive;
+mod release;
