@@ -365,10 +365,9 @@ impl Campaign {
             .f_res
             .zip(outcome.spa_features.f_dip)
             .map(|(peak, dip)| [spectra.at(&snr, peak), spectra.at(&snr, dip)]);
-        if let Some((fit, residual)) =
+        if let Some((fit, spectra)) =
             ModelFit::of(run.step, tau, omega, &outcome.spa, &outcome.spa_features)
         {
-            let spectra = Spectra::of(run.step, tau, &residual, welch::COHERENCE);
             outcome.coherence_over_band = spectra.within(band, &spectra.coherence());
             outcome.fit = Some(fit);
         }

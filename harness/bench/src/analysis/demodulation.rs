@@ -28,6 +28,7 @@ pub fn frequency_responses<const N: usize>(
     frequencies: &[f64],
 ) -> [FrequencyResponse; N] {
     let carrier: Vec<Complex64> = time.iter().map(|&t| Complex64::cis(-sweep.phase(t))).collect();
+    let step = (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64;
     let mut results: [FrequencyResponse; N] = std::array::from_fn(|_| Default::default());
     for &frequency in frequencies {
         let Some(centre) = sweep.time_of(frequency) else { continue };
@@ -36,9 +37,14 @@ pub fn frequency_responses<const N: usize>(
         let to = time.partition_point(|&t| t <= centre + half);
         let mut u = Complex64::default();
         let mut y = [Complex64::default(); N];
+        // the window's cosine turns by the same angle from sample to sample; over some hundred of
+        // them that is exact to 1e-13, and costs a fifth of asking for each
+        let turns = |seconds: f64| Complex64::cis(std::f64::consts::PI * seconds / half);
+        let Some(first) = time.get(from) else { continue };
+        let (mut window, turn) = (turns(first - centre), turns(step));
         for i in from..to {
-            let hann = 1.0 + (std::f64::consts::PI * (time[i] - centre) / half).cos();
-            let weight = carrier[i] * hann;
+            let weight = carrier[i] * (1.0 + window.re);
+            window *= turn;
             u += weight * input[i];
             for (sum, output) in y.iter_mut().zip(&outputs) {
                 *sum += weight * output[i];

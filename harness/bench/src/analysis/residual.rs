@@ -6,7 +6,7 @@ use super::transfer_function::{TransferFunction, fit_time};
 use super::welch::{self, Spectra};
 
 /// A transfer function fitted to a run, and what it leaves of the run.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ModelFit {
     /// Three poles, two zeros.
     pub model: TransferFunction,
@@ -25,14 +25,14 @@ pub struct ModelFit {
 impl ModelFit {
     /// Fits the model to the measured response and drives it with the run's own torque.
     /// Signals are sampled every `step` s; `None` where there is no response to fit. Also returns
-    /// what the model leaves, rad/s.
+    /// the spectra of torque and residual, in segments for [`welch::COHERENCE`].
     pub fn of(
         step: f64,
         torque: &[f64],
         rate: &[f64],
         measured: &FrequencyResponse,
         features: &Features,
-    ) -> Option<(Self, Vec<f64>)> {
+    ) -> Option<(Self, Spectra)> {
         let model = TransferFunction::fit(measured)?;
         let mean = rate.iter().sum::<f64>() / rate.len() as f64;
         let forced = model.simulate(step, torque);
@@ -53,7 +53,7 @@ impl ModelFit {
             skewness,
             kurtosis,
         };
-        Some((fit, residual))
+        Some((fit, spectra))
     }
 }
 
