@@ -1,8 +1,8 @@
 //! The rate gyro on the hub: samples the hub's rate, adds white noise and a
-//! wandering bias, quantises, and holds the value until the next sample.
+//! Gauss-Markov bias, quantises, and holds the value until the next sample.
 //!
-//! White noise per sample sigma = N sqrt(rate) (N as an Allan coefficient); bias a
-//! first-order Gauss-Markov process with sigma_b = B/0.664 and correlation time
+//! White noise per sample sigma = N sqrt(rate) (N as an Allan coefficient); the bias is of
+//! first order, with sigma_b = B/0.664 and correlation time
 //! `bias_time` (thesis 5.5; IEEE Std 952). The noise of sample k is a function of
 //! the seed and k alone, so a restored state continues with the same noise.
 
@@ -52,10 +52,9 @@ impl Imu {
     pub(crate) fn sample(&self, gyro: &mut Gyro, omega: f64) {
         let (white, wander) = normals(self.seed, gyro.next);
         let reading = omega + gyro.bias + self.arw * libm::sqrt(self.rate) * white;
-        let steps = libm::rint(reading / self.lsb);
-        // Steps too small to be seen change nothing; no steps (0) are not even a number.
-        let seen = steps.abs() < 1e16;
-        gyro.held = if seen { steps * self.lsb } else { reading };
+        // Steps too small to be seen change nothing.
+        let seen = reading.abs() < 1e16 * self.lsb;
+        gyro.held = if seen { libm::rint(reading / self.lsb) * self.lsb } else { reading };
         let keep = libm::exp(-1.0 / (self.rate * self.bias_time));
         let spread = self.bias_instability / 0.664 * libm::sqrt(1.0 - keep * keep);
         gyro.bias = keep * gyro.bias + spread * wander;

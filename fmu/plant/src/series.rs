@@ -245,9 +245,12 @@ pub fn first_root(a: &[f64], h: f64) -> Option<f64> {
         if f <= 0.0 {
             return Some(t);
         }
-        let step = 2.0 * f / (libm::sqrt(slope * slope + 2.0 * bend * f) - slope);
-        let next = t + step;
-        // A constant polynomial's step is not a number.
+        let fall = libm::sqrt(slope * slope + 2.0 * bend * f) - slope;
+        // Straight and not falling.
+        if fall <= 0.0 {
+            return None;
+        }
+        let next = t + 2.0 * f / fall;
         if next > h || next.is_nan() {
             return None;
         }

@@ -68,8 +68,10 @@ fn mikishev_dorozhkin(tank: &Tank, fluid: &Fluid, g: f64) -> f64 {
     let radius = tank.d / 2.0;
     let fill = tank.h / radius;
     let re = fluid.nu / libm::sqrt(g * radius * radius * radius);
-    let bracket = 0.318 / libm::sinh(1.84 * fill) * (1.0 + (1.0 - fill) / libm::cosh(1.84 * fill));
-    0.79 * libm::sqrt(re) * (1.0 + bracket)
+    // Where sinh would overflow the bottom is out of reach anyway.
+    let depth = f64::min(1.84 * fill, 300.0);
+    let bottom = 0.318 / libm::sinh(depth) * (1.0 + (1.0 - fill) / libm::cosh(depth));
+    0.79 * libm::sqrt(re) * (1.0 + bottom)
 }
 
 impl Calculated {
