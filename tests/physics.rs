@@ -192,7 +192,7 @@ fn stuck_hub_is_exactly_at_rest() {
     for _ in 0..500 {
         plant.step(&inputs, 0.02).unwrap();
         let o = plant.outputs(&inputs);
-        assert!(o.stuck && o.omega == 0.0 && o.omega_dot == 0.0 && o.theta == 0.0);
+        assert!(o.discrete.stuck && o.omega == 0.0 && o.omega_dot == 0.0 && o.theta == 0.0);
         assert!(o.slosh_rate != 0.0, "the liquid goes on moving");
     }
 }
@@ -292,7 +292,7 @@ fn a_bearing_with_a_preferred_direction_holds_less_in_it() {
     p.friction.asymmetry = -0.2;
     let stuck = |torque: f64| {
         let inputs = Inputs { tau_cmd: Ramp::held(torque), ..Inputs::default() };
-        plant(&p, &inputs).outputs(&inputs).stuck
+        plant(&p, &inputs).outputs(&inputs).discrete.stuck
     };
     assert!(stuck(4.736e-3) && !stuck(4.738e-3));
     assert!(stuck(-7.105e-3) && !stuck(-7.106e-3));

@@ -97,7 +97,7 @@ fn differences(name: &str, fill: &Fill, run: &Run, tolerance: f64) -> Vec<String
     let mut inputs = Inputs { tau_cmd: Ramp::held(torque(0.0)), ..Inputs::default() };
     let mut plant = Plant::new(&fill.parameters(run), &inputs, 0.0, tolerance).unwrap();
     let first = plant.outputs(&inputs);
-    let mut events = vec![(0.0, first.friction_mode)];
+    let mut events = vec![(0.0, first.discrete.friction_mode)];
     let mut largest_error: BTreeMap<&str, f64> = BTreeMap::new();
     let steps_per_second = (1.0 / step).round() as usize;
     for second in 0..=20 {
@@ -138,12 +138,12 @@ fn differences(name: &str, fill: &Fill, run: &Run, tolerance: f64) -> Vec<String
                 plant.step(&inputs, step / 2.0).unwrap();
                 inputs.tau_cmd.value = inputs.tau_cmd.at(step / 2.0);
                 let o = plant.outputs(&inputs);
-                if o.event_count as usize == events.len() {
-                    events.push((o.event_time, o.friction_mode));
-                } else if o.event_count as usize > events.len() {
+                if o.discrete.event_count as usize == events.len() {
+                    events.push((o.discrete.event_time, o.discrete.friction_mode));
+                } else if o.discrete.event_count as usize > events.len() {
                     // Two events in one step: only the later one can be read.
                     events.push((f64::NAN, 2));
-                    events.push((o.event_time, o.friction_mode));
+                    events.push((o.discrete.event_time, o.discrete.friction_mode));
                 }
             }
             inputs.tau_cmd = Ramp::held(b);

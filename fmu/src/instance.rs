@@ -9,7 +9,7 @@
 //! discrete (the contact of hub and bearing, the wave's regime, the gyro's reading)
 //! changes in [`Instance::new_discrete_states`] alone.
 
-use plant::{INDICATORS, Inputs, Outputs, Parameters, Plant, Ramp, Regime, STATES};
+use plant::{INDICATORS, Inputs, Outputs, Parameters, Plant, Ramp, STATES};
 
 use crate::calls::{self, Call, Fault, Interface, Mode};
 use crate::table::{self, RATES, SCALARS, Scalar};
@@ -41,8 +41,6 @@ pub struct Instance {
     /// There from the first look at it in initialization mode; gone when a parameter or an
     /// input is set before the instance runs.
     pub(crate) plant: Option<Plant>,
-    /// The regime since the last event, in Model Exchange once it goes on.
-    pub(crate) regime: Option<Regime>,
     /// What the plant shows now, if somebody has asked.
     pub(crate) shown: Option<Outputs>,
 }
@@ -76,7 +74,6 @@ impl Instance {
             parameters: table::parameters().filter_map(Variable::start).collect(),
             inputs: Inputs::default(),
             plant: None,
-            regime: None,
             shown: None,
         }
     }
@@ -162,7 +159,7 @@ impl Instance {
     /// Model Exchange goes on from initialization: parameters are what they are now.
     fn go_on(&mut self, call: &Call) -> Result<(), Fault> {
         if self.mode == Mode::Initialized {
-            self.regime = Some(self.shown(call)?.regime);
+            self.plant(call)?;
             self.mode = Mode::Event;
         }
         Ok(())
@@ -208,8 +205,8 @@ impl Instance {
                 scalar.variable.calculated(self.plant(call)?.calculated(), scalar.element)
             }
             (_, Some(place)) => {
-                let state = self.plant(call)?.continuous_state(place.at(scalar.element));
-                Some(Value::Real(state))
+                let states = self.plant(call)?.continuous_states();
+                Some(Value::Real(states[place.at(scalar.element)]))
             }
             (Access::Rate(place), _) => {
                 let rates = self.look(call, |plant, inputs| plant.derivatives(inputs))?;
@@ -552,8 +549,6 @@ impl Instance {
         let states_changed = event.map_err(|why| call.error(why))?;
         self.mode = Mode::Event;
         self.shown = None;
-        self.regime = None;
-        self.regime = Some(self.shown(call)?.regime);
         Ok(EventInfo { states_changed, next_time: self.plant(call)?.next_time_event() })
     }
 
@@ -584,10 +579,7 @@ impl Instance {
             self.mode = Mode::Failed;
             return Err(call.error(why));
         }
-        let (regime, overdue) = self.look(call, |plant, inputs| {
-            (plant.outputs_held(inputs).regime, plant.is_contact_overdue(inputs))
-        })?;
-        Ok(overdue || self.regime != Some(regime))
+        self.look(call, |plant, inputs| plant.is_event_overdue(inputs))
     }
 
     /// fmi2SetTime
@@ -716,15 +708,13 @@ impl Instance {
     /// What the plant shows now; it is computed when it is first asked for.
     fn shown(&mut self, call: &Call) -> Result<&Outputs, Fault> {
         if self.shown.is_none() {
-            let (inputs, regime) = (self.inputs, self.regime);
+            let inputs = self.inputs;
             let interface = self.interface;
             let plant = self.plant(call)?;
-            let mut shown = match interface {
+            self.shown = Some(match interface {
                 Interface::CoSimulation => plant.outputs(&inputs),
                 Interface::ModelExchange => plant.outputs_held(&inputs),
-            };
-            shown.regime = regime.unwrap_or(shown.regime);
-            self.shown = Some(shown);
+            });
         }
         self.shown.as_ref().ok_or_else(|| call.error("the outputs were not computed"))
     }

@@ -10,7 +10,7 @@
 //! | length of the whole | 4 |
 //! | GUID of the variable table | 38 |
 //! | state of life, flags (1: stop time, 2: plant) | 1 + 1 |
-//! | interface, regime (0: none) | 1 + 1 |
+//! | interface, 0 | 1 + 1 |
 //! | start, stop, tolerance, time | 4 x 8 |
 //! | parameters in the table's order: number, or 0/1 | 8 each |
 //! | inputs: value, slope | 16 each |
@@ -19,7 +19,7 @@
 //!
 //! Everything else about a plant follows from its parameters.
 
-use plant::{Plant, Ramp, Regime, State};
+use plant::{Plant, Ramp, State};
 
 use crate::calls::{Interface, Mode};
 use crate::hash::Hash;
@@ -28,7 +28,7 @@ use crate::table;
 use crate::variable::{Value, Variable};
 
 const MAGIC: &[u8; 8] = b"HubSlosh";
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 const HAS_STOP: u8 = 1;
 const HAS_PLANT: u8 = 2;
 
@@ -48,8 +48,7 @@ pub fn to_bytes(saved: &Instance) -> Vec<u8> {
     bytes.extend(table::guid().as_bytes());
     let stop = if saved.stop.is_some() { HAS_STOP } else { 0 };
     let plant = if saved.plant.is_some() { HAS_PLANT } else { 0 };
-    let regime = saved.regime.map_or(0, |regime| regime as u8);
-    bytes.extend([saved.mode as u8, stop | plant, saved.interface as u8, regime]);
+    bytes.extend([saved.mode as u8, stop | plant, saved.interface as u8, 0]);
     for time in [saved.start, saved.stop.unwrap_or(0.0), saved.tolerance, saved.time] {
         bytes.extend(time.to_le_bytes());
     }
@@ -102,7 +101,7 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Instance, String> {
         return Err("the saved state is damaged: its checksum is wrong".into());
     }
 
-    let [mode, flags, interface, regime] = rest.take()?;
+    let [mode, flags, interface, _] = rest.take()?;
     let interface = match interface {
         0 => Interface::ModelExchange,
         1 => Interface::CoSimulation,
@@ -113,13 +112,6 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Instance, String> {
     let mode = mode.ok_or("the saved state is damaged: no such state of life")?;
     let mut saved = Instance::new(interface);
     saved.mode = mode;
-    saved.regime = match regime {
-        0 => None,
-        1 => Some(Regime::Linear),
-        2 => Some(Regime::Transitional),
-        3 => Some(Regime::Nonlinear),
-        _ => return Err("the saved state is damaged: no such regime".into()),
-    };
     saved.start = rest.finite("start time")?;
     saved.stop = Some(rest.finite("stop time")?).filter(|_| flags & HAS_STOP != 0);
     saved.tolerance = rest.finite("tolerance")?;
@@ -146,9 +138,6 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Instance, String> {
         saved.plant = Some(Plant::resume(&parameters, &state, saved.tolerance));
     } else if saved.is_running() {
         return Err("the saved state is damaged: the plant is missing".into());
-    }
-    if saved.regime.is_some() != (saved.is_running() && interface == Interface::ModelExchange) {
-        return Err("the saved state is damaged: regime".into());
     }
     Ok(saved)
 }

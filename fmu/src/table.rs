@@ -10,7 +10,7 @@
 //! sampling rate that can be stepped) and are wide otherwise; what parameters
 //! mean together is for the plant to judge.
 
-use plant::{FrictionModel, INDICATORS, Inputs, Ramp, STATES, SloshModel};
+use plant::{FrictionModel, INDICATORS, Inputs, Ramp, STATES, SloshModel, x};
 
 use crate::hash::Hash;
 use crate::variable::{
@@ -61,10 +61,10 @@ pub static TABLE: &[Variable] = &[
     // Outputs
     output("theta", |o| o.theta, "rad",
         "Hub angle about the bearing axis, counter-clockwise from above positive, not wrapped")
-        .shown_in("deg").state(0).follows(&["theta"]).from(&["init.theta"]),
+        .shown_in("deg").state(x::THETA).follows(&["theta"]).from(&["init.theta"]),
     output("omega", |o| o.omega, "rad/s",
         "Hub rate, the derivative of theta")
-        .shown_in("deg/s").about(0.01).state(1).reinit().follows(&["omega"]).from(&["init.omega"]),
+        .shown_in("deg/s").about(0.01).state(x::OMEGA).reinit().follows(&["omega"]).from(&["init.omega"]),
     output("omega_dot", |o| o.omega_dot, "rad/s2",
         "Hub acceleration, the derivative of omega; 0 while the hub is stuck")
         .shown_in("deg/s2").follows(ALL_TORQUES).from(DYNAMICS),
@@ -123,32 +123,32 @@ pub static TABLE: &[Variable] = &[
         .follows(HEAT),
     local("work", |o| o.work, "J",
         "Work done on the hub by tau_actuator and tau_ext since the start")
-        .about(0.01).state(2).follows(&["work"]),
+        .about(0.01).state(x::WORK).follows(&["work"]),
     local("heat", |o| o.heat, "J",
         "Heat made by bearing and liquid since the start")
-        .about(0.01).state(3).follows(&["heat"]),
+        .about(0.01).state(x::HEAT).follows(&["heat"]),
     local("tau_actuator", |o| o.tau_actuator, "N.m",
         "Torque of the actuator on the hub, positive towards +theta: tau_cmd after the wheel's limits")
         .shown_in("mN.m").follows(&["tau_cmd", "wheel_speed"]),
     local("wheel_speed", |o| o.wheel_speed, "rad/s",
         "Absolute speed of the wheel's rotor; a positive tau_actuator slows it down")
-        .shown_in("rpm").about(100.0).state(5).reinit().follows(&["wheel_speed"]).from(&["wheel.speed_0"]),
-    local_flag("stuck", |o| o.stuck,
+        .shown_in("rpm").about(100.0).state(x::WHEEL_SPEED).reinit().follows(&["wheel_speed"]).from(&["wheel.speed_0"]),
+    local_flag("stuck", |o| o.discrete.stuck,
         "The hub is held by dry friction")
         .follows(ALL_TORQUES),
-    local_choice("regime", &REGIME, |o| o.regime as i32,
+    local_choice("regime", &REGIME, |o| o.discrete.regime as i32,
         "How far wave_height is inside the range of linear theory")
         .follows(&["slosh.q_radial", "slosh.q_tangential"]),
-    local_integer("friction_mode", |o| o.friction_mode,
+    local_integer("friction_mode", |o| o.discrete.friction_mode,
         "Branch of the set-valued friction law: -1 turning backwards, 0 stuck, 1 turning forwards; 1 with other laws")
         .follows(ALL_TORQUES),
-    local_integer("event_count", |o| o.event_count,
+    local_integer("event_count", |o| o.discrete.event_count,
         "How often friction_mode has changed since the start"),
-    local("event_time", |o| o.event_time, "s",
+    local("event_time", |o| o.discrete.event_time, "s",
         "When friction_mode changed last"),
     local("stuck_time", |o| o.stuck_time, "s",
         "Time spent stuck since the start")
-        .state(4).follows(&["stuck_time"]),
+        .state(x::STUCK_TIME).follows(&["stuck_time"]),
 
     // The slosh modes' coordinates: with theta, omega, work, heat, stuck_time and
     // wheel_speed the continuous states
@@ -167,22 +167,22 @@ pub static TABLE: &[Variable] = &[
 
     // The derivatives of the continuous states; a Model Exchange host has them in this
     // order
-    rate("der(theta)", Place::Of(0), "rad/s",
+    rate("der(theta)", Place::Of(x::THETA), "rad/s",
         "Derivative of theta: omega")
         .follows(&["omega"]).from(&["init.omega"]),
-    rate("der(omega)", Place::Of(1), "rad/s2",
+    rate("der(omega)", Place::Of(x::OMEGA), "rad/s2",
         "Derivative of omega: omega_dot")
         .follows(ALL_TORQUES).from(DYNAMICS),
-    rate("der(work)", Place::Of(2), "W",
+    rate("der(work)", Place::Of(x::WORK), "W",
         "Derivative of work: power of tau_actuator and tau_ext")
         .follows(&["omega", "wheel_speed", "tau_cmd", "tau_ext"]).from(&["init.omega", "wheel."]),
-    rate("der(heat)", Place::Of(3), "W",
+    rate("der(heat)", Place::Of(x::HEAT), "W",
         "Derivative of heat: power_dissipated")
         .follows(HEAT).from(DYNAMICS),
-    rate("der(stuck_time)", Place::Of(4), "1",
+    rate("der(stuck_time)", Place::Of(x::STUCK_TIME), "1",
         "Derivative of stuck_time: 1 while stuck, 0 otherwise")
         .follows(ALL_TORQUES).from(DYNAMICS),
-    rate("der(wheel_speed)", Place::Of(5), "rad/s2",
+    rate("der(wheel_speed)", Place::Of(x::WHEEL_SPEED), "rad/s2",
         "Derivative of wheel_speed: -tau_actuator/wheel.I")
         .follows(&["wheel_speed", "tau_cmd"]).from(&["wheel."]),
     rate("der(slosh.q_radial)", Place::PerMode(0), "",
@@ -226,7 +226,7 @@ pub static TABLE: &[Variable] = &[
 
     // Slosh model
     choice("slosh.model", &SLOSH_MODEL, |p| p.slosh.model as i32,
-        |p, n| set_item(&mut p.slosh.model, &SLOSH_MODELS, n),
+        |p, n| set_item(&mut p.slosh.model, &SloshModel::ALL, n),
         "Mechanical model of the liquid"),
     count("slosh.modes", 1, plant::MODES as i32, |p| p.slosh.modes as i32,
         |p, n| p.slosh.modes = n.max(0) as usize,
@@ -242,7 +242,7 @@ pub static TABLE: &[Variable] = &[
 
     // Bearing
     choice("friction.model", &FRICTION_MODEL, |p| p.friction.model as i32,
-        |p, n| set_item(&mut p.friction.model, &FRICTION_MODELS, n),
+        |p, n| set_item(&mut p.friction.model, &FrictionModel::ALL, n),
         "Law of the bearing's friction")
         .tunable(),
     parameter("friction.b", |p| &mut p.friction.b, "N.m.s",
@@ -384,13 +384,6 @@ pub static SLOSH_MODEL: Enumeration = Enumeration {
         item("paraboloid", "Masses on a paraboloid with a quartic spring"),
     ],
 };
-const SLOSH_MODELS: [SloshModel; 5] = [
-    SloshModel::Frozen,
-    SloshModel::Linear,
-    SloshModel::Planar,
-    SloshModel::Spherical,
-    SloshModel::Paraboloid,
-];
 
 /// The laws of friction.
 pub static FRICTION_MODEL: Enumeration = Enumeration {
@@ -403,12 +396,6 @@ pub static FRICTION_MODEL: Enumeration = Enumeration {
         item("stribeck", "Stribeck curve as a set-valued law: sticks"),
     ],
 };
-const FRICTION_MODELS: [FrictionModel; 4] = [
-    FrictionModel::None,
-    FrictionModel::Viscous,
-    FrictionModel::StribeckSmooth,
-    FrictionModel::Stribeck,
-];
 
 /// How high the wave is.
 pub static REGIME: Enumeration = Enumeration {

@@ -1,55 +1,30 @@
 //! The plant as equations x' = f(x, u) with events, for hosts that integrate
 //! themselves, and their partial derivatives.
 //!
-//! x = [theta, omega, work, heat, stuck_time, wheel_speed, then q_x, q_y, q_x', q_y' of
-//! each mode]; modes that are not used stay at rest. The friction's contact is a
-//! discrete state: it changes in [`Plant::take_event`] alone, when an indicator has
-//! crossed zero.
+//! x is declared in `state.rs`. The friction's contact and the regime are discrete states:
+//! they change in [`Plant::take_event`] alone, when an indicator has crossed zero.
 
+use crate::Friction;
 use crate::friction::{Contact, Law};
-use crate::hub::{Liquid, with_modes};
-use crate::slosh::Mode;
-use crate::{Friction, FrictionModel, Inputs, MODES, Outputs, Plant, Ramp, StepError};
-
-/// Number of continuous states.
-pub const STATES: usize = 6 + 4 * MODES;
-
-/// Number of event indicators.
-pub const INDICATORS: usize = 8;
+use crate::motion::StepError;
+use crate::outputs::unsigned_zero;
+use crate::plant::{Inputs, Plant, Ramp};
+use crate::slosh::{SloshMode, with_modes};
+use crate::state::{INDICATORS, STATES, indicator, x};
 
 /// How many of the gyro's samples may fall due at once: a host that has passed more of
 /// them by does not look at the time events.
 const SAMPLES_AT_ONCE: f64 = 1e6;
 
-/// By how much the coordinates move to either side for a derivative by differences, as
-/// a share of the size at which they curve (1 rad, or a pendulum's length). What is left
-/// out, SHARE^4/30 of the fifth derivative, and the rounding, 1e-16/SHARE, are both
-/// about 1e-13.
-const SHARE: f64 = 1.0 / 512.0;
-
 impl Plant {
-    /// x. Units: rad, rad/s, J, J, s, rad/s; mode coordinates as in `slosh`.
-    pub fn continuous_states(&self) -> [f64; STATES] {
-        let s = &self.state;
-        let mut x = [0.0; STATES];
-        x[..6].copy_from_slice(&[s.theta, s.omega, s.work, s.heat, s.stuck_time, s.wheel_speed]);
-        x[6..].copy_from_slice(s.modes.as_flattened());
-        x
+    /// The continuous states, by the places in [`x`].
+    pub fn continuous_states(&self) -> &[f64; STATES] {
+        &self.state.x
     }
 
-    /// Element `place` of x.
-    pub fn continuous_state(&self, place: usize) -> f64 {
-        let s = &self.state;
-        let hub = [s.theta, s.omega, s.work, s.heat, s.stuck_time, s.wheel_speed];
-        hub.get(place).copied().unwrap_or_else(|| s.modes.as_flattened()[place - hub.len()])
-    }
-
-    /// Takes x from the host.
+    /// Takes the continuous states from the host.
     pub fn set_continuous_states(&mut self, x: &[f64; STATES]) {
-        let s = &mut self.state;
-        (s.theta, s.omega, s.work) = (x[0], x[1], x[2]);
-        (s.heat, s.stuck_time, s.wheel_speed) = (x[3], x[4], x[5]);
-        s.modes.as_flattened_mut().copy_from_slice(&x[6..]);
+        self.state.x = *x;
     }
 
     /// Takes the time from the host, s.
@@ -59,12 +34,12 @@ impl Plant {
 
     /// x'.
     pub fn derivatives(&mut self, inputs: &Inputs) -> [f64; STATES] {
-        self.rates(inputs);
+        self.evaluate(inputs);
         let stuck = self.state.contact == Contact::Stuck;
-        let torque = self.wheel.torque(self.state.wheel_speed, inputs.tau_cmd);
-        let mut rate = self.rate_coefficients::<0>(-torque.value / self.wheel.inertia);
-        rate[4] = if stuck { 1.0 } else { 0.0 };
-        rate
+        let torque = self.wheel.torque(self.state.x[x::WHEEL_SPEED], inputs.tau_cmd);
+        let mut derivatives = self.coefficients::<0>(-torque.value / self.wheel.inertia);
+        derivatives[x::STUCK_TIME] = if stuck { 1.0 } else { 0.0 };
+        derivatives.map(unsigned_zero)
     }
 
     /// The derivative of x' in the direction (dx, du), du = [tau_cmd, tau_ext, g_axial]:
@@ -77,219 +52,134 @@ impl Plant {
         du: &[f64; 3],
     ) -> [f64; STATES] {
         let along = |x: Ramp, slope: f64| Ramp { value: x.value, slope };
-        let torque = self.wheel.torque(self.state.wheel_speed, along(inputs.tau_cmd, du[0]));
+        let torque = self.wheel.torque(self.state.x[x::WHEEL_SPEED], along(inputs.tau_cmd, du[0]));
         let external = along(inputs.tau_ext, du[1]);
         let tau =
             Ramp { value: torque.value + external.value, slope: torque.slope + external.slope };
         let contact = self.state.contact;
         with_modes!(&mut self.liquid, modes => {
             self.motion.start(modes, &self.state, tau, along(inputs.g_axial, du[2]));
-            self.motion.rates::<0, _>(modes, contact);
-            self.motion.theta[1] = dx[0];
-            self.motion.hub.omega[1] = dx[1];
-            for (mode, dq) in modes.iter_mut().zip(dx[6..].as_chunks::<4>().0) {
-                mode.aim(dq, &self.motion.hub);
+            self.motion.derivatives::<0, _>(modes, contact);
+            self.motion.hub.theta[1] = dx[x::THETA];
+            self.motion.hub.omega[1] = dx[x::OMEGA];
+            for (mode, dq) in modes.iter_mut().zip(dx[x::SLOSH..].as_chunks::<4>().0) {
+                mode.seed_direction(dq, &self.motion.hub);
             }
-            self.motion.rates::<1, _>(modes, contact);
+            self.motion.derivatives::<1, _>(modes, contact);
         });
-        self.rate_coefficients::<1>(-torque.slope / self.wheel.inertia)
-    }
-
-    /// The derivative of the outputs in the direction (dx, du); what is discrete in them
-    /// is as it is now. Contact and wheel are held.
-    ///
-    /// Friction, heat and the hub's acceleration come from the series and are exact.
-    /// Forces, energy and the like are smooth in x once the friction is just another
-    /// torque tau_f + tau_f' s, so they are differentiated by central differences with
-    /// Richardson's extrapolation, four evaluations, good to 1e-9 of their size.
-    pub fn output_derivatives(
-        &mut self,
-        inputs: &Inputs,
-        dx: &[f64; STATES],
-        du: &[f64; 3],
-    ) -> Outputs {
-        let now = self.outputs_held(inputs);
-        let rate = self.directional_derivative(inputs, dx, du);
-        let motion = &self.motion;
-        let (friction, friction_d, heat_d) =
-            (motion.friction.tau_f[0], motion.friction.tau_f[1], motion.heat[1]);
-        let command = Ramp { value: inputs.tau_cmd.value, slope: du[0] };
-        let torque = self.wheel.torque(self.state.wheel_speed, command);
-
-        // From here on without wheel and friction: their torques are prescribed.
-        let x = self.continuous_states();
-        let size = self.size_of_direction(dx, du);
-        let step = if size > 0.0 { SHARE / size } else { 1.0 };
-        let with_wheel = std::mem::replace(&mut self.wheel.enabled, false);
-        let law = std::mem::replace(&mut self.motion.friction.model, FrictionModel::None);
-        let [p2, p1, m1, m2] = [2.0, 1.0, -1.0, -2.0].map(|steps| {
-            let s = steps * step;
-            let moved: [f64; STATES] = core::array::from_fn(|i| x[i] + s * dx[i]);
-            self.set_continuous_states(&moved);
-            self.outputs_held(&Inputs {
-                tau_cmd: Ramp::held(torque.at(s)),
-                tau_ext: Ramp::held(inputs.tau_ext.value + s * du[1] + friction + s * friction_d),
-                g_axial: Ramp::held(inputs.g_axial.value + s * du[2]),
-            })
-        });
-        self.wheel.enabled = with_wheel;
-        self.motion.friction.model = law;
-        self.set_continuous_states(&x);
-
-        let by_differences = |get: fn(&Outputs) -> f64| {
-            (8.0 * (get(&p1) - get(&m1)) - (get(&p2) - get(&m2))) / (12.0 * step)
-        };
-        let wave = [by_differences(|o| o.wave[0]), by_differences(|o| o.wave[1])];
-        let wave_height = now.wave[0] * wave[0] + now.wave[1] * wave[1];
-        Outputs {
-            theta: dx[0],
-            omega: dx[1],
-            omega_dot: rate[1],
-            slosh_angle: by_differences(|o| o.slosh_angle),
-            slosh_rate: by_differences(|o| o.slosh_rate),
-            slosh_angle_radial: by_differences(|o| o.slosh_angle_radial),
-            slosh_rate_radial: by_differences(|o| o.slosh_rate_radial),
-            tau_friction: friction_d,
-            tau_fluid: self.hub_inertia * rate[1] - torque.slope - du[1] - friction_d,
-            f_tangential: by_differences(|o| o.f_tangential),
-            f_radial: by_differences(|o| o.f_radial),
-            // A cone: at its tip there is no derivative.
-            wave_height: if now.wave_height > 0.0 { wave_height / now.wave_height } else { 0.0 },
-            wave,
-            omega_imu: if self.imu.enabled { 0.0 } else { dx[1] },
-            energy: by_differences(|o| o.energy),
-            momentum: by_differences(|o| o.momentum),
-            power_dissipated: heat_d,
-            tau_actuator: torque.slope,
-            wheel_speed: dx[5],
-            work: dx[2],
-            heat: dx[3],
-            event_time: 0.0,
-            stuck_time: dx[4],
-            ..now
-        }
-    }
-
-    /// Size of a direction, in units in which 1 is where the outputs curve. What they
-    /// are linear in counts less: it may move far.
-    fn size_of_direction(&self, dx: &[f64; STATES], du: &[f64; 3]) -> f64 {
-        let torque = 10.0 * self.motion.i0;
-        let hub = [dx[1] / 10.0, du[0] / torque, du[1] / torque, du[2] / 10.0];
-        let hub = hub.iter().fold(0.0, |size: f64, d| size.max(d.abs()));
-        let lengths = &self.calculated().length;
-        let is_length = matches!(self.liquid, Liquid::Paraboloid(_));
-        let modes = dx[6..].as_chunks::<4>().0.iter().zip(lengths).map(|(dq, length)| {
-            let unit = if is_length && *length > 0.0 { *length } else { 1.0 };
-            let q = f64::max(dq[0].abs(), dq[1].abs());
-            let v = f64::max(dq[2].abs(), dq[3].abs());
-            q.max(v / 10.0) / unit
-        });
-        modes.fold(hub, f64::max)
+        self.coefficients::<1>(-torque.slope / self.wheel.inertia)
     }
 
     /// Coefficient N of x' as the series have it.
-    fn rate_coefficients<const N: usize>(&self, wheel: f64) -> [f64; STATES] {
+    fn coefficients<const N: usize>(&self, wheel: f64) -> [f64; STATES] {
         let motion = &self.motion;
-        let mut rate = [0.0; STATES];
-        rate[..6].copy_from_slice(&[
-            motion.hub.omega[N],
-            motion.hub.omega_dot[N],
-            motion.work[N],
-            motion.heat[N],
-            0.0,
-            wheel,
-        ]);
+        let mut derivatives = [0.0; STATES];
+        derivatives[x::THETA] = motion.hub.omega[N];
+        derivatives[x::OMEGA] = motion.hub.omega_dot[N];
+        derivatives[x::WORK] = motion.power[N];
+        derivatives[x::HEAT] = motion.dissipation[N];
+        derivatives[x::WHEEL_SPEED] = wheel;
         with_modes!(&self.liquid, modes => {
-            for (mode, rate) in modes.iter().zip(rate[6..].as_chunks_mut::<4>().0) {
-                *rate = mode.rate::<N>(&motion.hub);
+            let slosh = derivatives[x::SLOSH..].as_chunks_mut::<4>().0;
+            for (mode, derivatives) in modes.iter().zip(slosh) {
+                *derivatives = mode.derivatives::<N>(&motion.hub);
             }
         });
-        rate
+        derivatives
     }
 
-    /// Functions that are positive between events and cross zero at them: the hub comes
-    /// to rest; it breaks away forwards, backwards; the command passes the wheel's
-    /// torque limits, and zero; the rotor reaches its highest, its lowest speed.
-    /// 1 where the event can't happen.
+    /// The event indicators, by the places in [`indicator`]: functions that are positive
+    /// between events and cross zero at them; 1 where the event can't happen, and never 0, so
+    /// that a host's root finder sees no crossing right after an event.
     pub fn event_indicators(&mut self, inputs: &Inputs) -> [f64; INDICATORS] {
-        let mut indicators = [1.0; INDICATORS];
-        if self.motion.friction.can_stick() {
+        let just_positive = |z: f64| if z == 0.0 { f64::MIN_POSITIVE } else { z };
+        self.indicators(inputs).map(just_positive)
+    }
+
+    /// The event indicators, exactly 0 at an event.
+    fn indicators(&mut self, inputs: &Inputs) -> [f64; INDICATORS] {
+        let mut z = [1.0; INDICATORS];
+        if self.motion.law.switches_at_rest() {
             if self.state.contact == Contact::Stuck {
-                self.rates(inputs);
+                self.evaluate(inputs);
+                let net = self.motion.net[0];
                 let (against_backward, against_forward) =
-                    self.motion.friction.holds(self.state.theta);
-                indicators[1] = against_forward - self.motion.net[0];
-                indicators[2] = against_backward + self.motion.net[0];
+                    self.motion.law.holds(self.state.x[x::THETA]);
+                z[indicator::BREAK_AWAY_FORWARD] = against_forward - net;
+                z[indicator::BREAK_AWAY_BACKWARD] = against_backward + net;
             } else {
-                indicators[0] = self.state.contact as i8 as f64 * self.state.omega;
+                z[indicator::REST] = self.state.contact as i8 as f64 * self.omega();
             }
         }
         if self.wheel.enabled {
-            let command = inputs.tau_cmd.value;
-            indicators[3] = self.wheel.tau_max - command;
-            indicators[4] = self.wheel.tau_max + command;
-            indicators[5] = command;
-            indicators[6] = self.wheel.speed_max - self.state.wheel_speed;
-            indicators[7] = self.state.wheel_speed - self.wheel.speed_min;
+            let (command, speed) = (inputs.tau_cmd.value, self.state.x[x::WHEEL_SPEED]);
+            z[indicator::TORQUE_MAX] = self.wheel.tau_max - command;
+            z[indicator::TORQUE_MIN] = self.wheel.tau_max + command;
+            z[indicator::TORQUE_SIGN] = command;
+            z[indicator::SPEED_MAX] = self.wheel.speed_max - speed;
+            z[indicator::SPEED_MIN] = speed - self.wheel.speed_min;
         }
-        indicators
+        z
     }
 
     /// Does what is due at the present instant: puts a hub that has just stopped
     /// exactly at rest, finds its new contact, keeps the rotor within its speeds, takes
-    /// the gyro's samples. Returns whether continuous states have changed. On an error
-    /// nothing has changed.
+    /// the gyro's samples, finds the regime. Returns whether continuous states have changed.
+    ///
+    /// # Errors
+    /// [`StepError::TooManySamples`]; nothing has changed.
     pub fn take_event(&mut self, inputs: &Inputs) -> Result<bool, StepError> {
-        let (before, time) = (self.continuous_states(), self.state.time);
+        let (before, time) = (self.state.x, self.state.time);
         let period = 1.0 / self.imu.rate;
         // Too many, or so far from zero that the clock can't tell one sample from the next.
         let endless = |due| time - due > SAMPLES_AT_ONCE * period || time + period <= time;
         if self.next_time_event().is_some_and(endless) {
-            return Err(StepError::TooManySteps { time });
+            return Err(StepError::TooManySamples { time });
         }
         if self.wheel.enabled {
-            let speed = self.state.wheel_speed;
-            self.state.wheel_speed = speed.max(self.wheel.speed_min).min(self.wheel.speed_max);
+            let speed = &mut self.state.x[x::WHEEL_SPEED];
+            *speed = speed.max(self.wheel.speed_min).min(self.wheel.speed_max);
         }
-        if self.state.contact as i8 as f64 * self.state.omega <= 0.0 {
-            if self.motion.friction.can_stick() {
-                self.state.omega = 0.0;
+        if self.state.contact as i8 as f64 * self.omega() <= 0.0 {
+            if self.motion.law.switches_at_rest() {
+                self.state.x[x::OMEGA] = 0.0;
             }
             self.find_contact(inputs);
         }
         // A host's root finder may land on the very instant of the break-away, where the
         // torque is still held; the next sign change would never come.
         if self.state.contact == Contact::Stuck {
-            let indicators = self.event_indicators(inputs);
-            if indicators[1] <= 0.0 {
-                self.state.touch(Contact::Forward, time);
-            } else if indicators[2] <= 0.0 {
-                self.state.touch(Contact::Backward, time);
+            let z = self.indicators(inputs);
+            if z[indicator::BREAK_AWAY_FORWARD] <= 0.0 {
+                self.state.record_contact(Contact::Forward, time);
+            } else if z[indicator::BREAK_AWAY_BACKWARD] <= 0.0 {
+                self.state.record_contact(Contact::Backward, time);
             }
         }
         // Hosts land on a time event exactly, or on it but for rounding.
         let slack = 1e-9 / self.imu.rate;
         while self.next_time_event().is_some_and(|due| due <= time + slack) {
-            let omega = self.state.omega;
+            let omega = self.omega();
             self.imu.sample(&mut self.state.gyro, omega);
         }
-        Ok(self.continuous_states() != before)
+        self.state.regime = self.present_regime(inputs);
+        Ok(self.state.x != before)
     }
 
-    /// Gives the hub the contact that its rate or, at rest, the torques make.
     fn find_contact(&mut self, inputs: &Inputs) {
-        self.rates(inputs);
-        let contact = with_modes!(&mut self.liquid, modes => {
-            self.motion.contact(modes, &self.state)
-        });
-        let time = self.state.time;
-        self.state.touch(contact, time);
+        let (contact, time) = (self.present_contact(inputs), self.state.time);
+        self.state.record_contact(contact, time);
     }
 
-    /// Whether a change of the contact is overdue: a host has integrated past a sign
-    /// change of the indicators 0, 1 or 2 that it did not see.
-    pub fn is_contact_overdue(&mut self, inputs: &Inputs) -> bool {
-        self.event_indicators(inputs)[..3].iter().any(|indicator| *indicator < 0.0)
+    /// Whether an event is overdue that no indicator of the host's last step has shown: the
+    /// host has integrated past a change of the contact, or the wave has reached another
+    /// regime.
+    pub fn is_event_overdue(&mut self, inputs: &Inputs) -> bool {
+        let z = self.indicators(inputs);
+        let of_contact =
+            [indicator::REST, indicator::BREAK_AWAY_FORWARD, indicator::BREAK_AWAY_BACKWARD];
+        of_contact.iter().any(|place| z[*place] < 0.0)
+            || self.present_regime(inputs) != self.state.regime
     }
 
     /// How often the contact has changed since the start, when last, s, and what it is
@@ -299,21 +189,27 @@ impl Plant {
     }
 
     /// Takes another law of friction from here on.
+    ///
+    /// # Errors
+    /// All that is wrong with the parameters together; nothing has changed.
     pub fn set_friction(&mut self, p: &Friction, inputs: &Inputs) -> Result<(), Vec<String>> {
         let problems = Law::problems(p);
         if !problems.is_empty() {
             return Err(problems);
         }
-        self.motion.friction = Law::new(p);
+        self.motion.law = Law::new(p);
         self.find_contact(inputs);
         Ok(())
     }
 
     /// Whether the states that the host has set are within the models' range.
+    ///
+    /// # Errors
+    /// [`StepError::OutOfRange`]
     pub fn check_range(&self) -> Result<(), StepError> {
         let time = self.state.time;
         with_modes!(&self.liquid, modes => {
-            for (i, (mode, q)) in modes.iter().zip(&self.state.modes).enumerate() {
+            for (i, (mode, q)) in modes.iter().zip(self.state.slosh()).enumerate() {
                 if let Some(what) = mode.out_of_range(q) {
                     return Err(StepError::OutOfRange { time, mode: i + 1, what });
                 }
@@ -332,21 +228,10 @@ impl Plant {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{FrictionModel, Parameters, SloshModel};
+    use crate::{FrictionModel, Outputs, Parameters, SloshModel};
 
-    const SLOSH: [SloshModel; 5] = [
-        SloshModel::Frozen,
-        SloshModel::Linear,
-        SloshModel::Planar,
-        SloshModel::Spherical,
-        SloshModel::Paraboloid,
-    ];
-    const FRICTION: [FrictionModel; 4] = [
-        FrictionModel::None,
-        FrictionModel::Viscous,
-        FrictionModel::StribeckSmooth,
-        FrictionModel::Stribeck,
-    ];
+    const SLOSH: [SloshModel; 5] = SloshModel::ALL;
+    const FRICTION: [FrictionModel; 4] = FrictionModel::ALL;
 
     fn plant(slosh: SloshModel, friction: FrictionModel) -> (Plant, Inputs) {
         let mut p = Parameters::default();
@@ -376,7 +261,7 @@ mod tests {
         for slosh in SLOSH {
             for friction in FRICTION {
                 let (mut plant, inputs) = plant(slosh, friction);
-                let x = plant.continuous_states();
+                let x = *plant.continuous_states();
                 let unit = |i: usize| -> ([f64; STATES], [f64; 3]) {
                     let (mut dx, mut du) = ([0.0; STATES], [0.0; 3]);
                     if i < STATES {
@@ -455,9 +340,9 @@ mod tests {
                             continue;
                         }
                         plant.state.contact = Contact::Stuck;
-                        plant.state.omega = 0.0;
+                        plant.state.x[x::OMEGA] = 0.0;
                     }
-                    let x = plant.continuous_states();
+                    let x = *plant.continuous_states();
                     // Any direction at all; the models' own scatter of sizes is 0.01 to 1.
                     let dx: [f64; STATES] = core::array::from_fn(|i| libm::sin(1.0 + i as f64));
                     let du = [0.3, -0.4, 0.7];
@@ -503,7 +388,9 @@ mod tests {
             let limit = sign * (p.friction.c + p.friction.d);
             let inputs = Inputs { tau_cmd: Ramp::held(limit), ..rest };
             let indicators = plant.event_indicators(&inputs);
-            assert!(indicators[1] == 0.0 || indicators[2] == 0.0);
+            let [forward, backward] =
+                [indicator::BREAK_AWAY_FORWARD, indicator::BREAK_AWAY_BACKWARD];
+            assert_eq!(indicators[forward].min(indicators[backward]), f64::MIN_POSITIVE);
             plant.take_event(&inputs).unwrap();
             assert_eq!(plant.last_contact().2, sign as i32);
             // And again at the same instant.
@@ -552,13 +439,17 @@ mod tests {
     }
 
     #[test]
-    fn a_motion_whose_energy_is_no_number_is_refused() {
+    fn a_motion_whose_energy_overflows_is_refused() {
         for slosh in SLOSH {
             // omega, and the tangential rate of the first mode
-            let places = if slosh == SloshModel::Frozen { &[1][..] } else { &[1, 9] };
+            let places = if slosh == SloshModel::Frozen {
+                &[x::OMEGA][..]
+            } else {
+                &[x::OMEGA, x::SLOSH + 3]
+            };
             for &place in places {
                 let (mut plant, inputs) = plant(slosh, FrictionModel::Viscous);
-                let mut x = plant.continuous_states();
+                let mut x = *plant.continuous_states();
                 x[place] = 1e160; // its square is infinite
                 plant.set_continuous_states(&x);
                 let before = *plant.state();
@@ -597,7 +488,7 @@ mod tests {
             let mut own = plant.clone();
             let h = 1e-4;
             for _ in 0..2000 {
-                let x = plant.continuous_states();
+                let x = *plant.continuous_states();
                 let mut rate_at = |rate: &[f64; STATES], h: f64| {
                     let moved: [f64; STATES] = core::array::from_fn(|i| x[i] + h * rate[i]);
                     plant.set_continuous_states(&moved);

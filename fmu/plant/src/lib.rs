@@ -6,26 +6,31 @@
 //! theta about +z; x points from the axis to the tank's centre (radial), y along
 //! +theta (tangential). SI units.
 //!
-//! Where to look: `hub.rs` couples everything and holds the outputs, `motion.rs`
-//! steps through time and finds stick and slip, `friction.rs`, `slosh/`, `tank.rs`,
-//! `wheel.rs`, `imu.rs` say what their names say, `series.rs` is the arithmetic.
+//! Where to look: `plant.rs` couples everything, `state.rs` declares the states, `outputs.rs`
+//! and `equations.rs` are what a host reads, `motion.rs` steps through time and finds stick
+//! and slip, `friction/`, `slosh/`, `tank.rs`, `wheel.rs`, `imu.rs` say what their names say,
+//! `series.rs` is the arithmetic.
 
 mod equations;
 mod friction;
-mod hub;
 mod imu;
 mod motion;
+mod outputs;
 mod parameters;
+mod plant;
 mod series;
 mod slosh;
+mod state;
 mod tank;
 mod wheel;
 
-pub use equations::{INDICATORS, STATES};
-pub use hub::{Inputs, Outputs, Plant, Ramp, Regime, State};
+pub use friction::FrictionModel;
 pub use motion::StepError;
+pub use outputs::{Discrete, Outputs, Regime};
 pub use parameters::{
-    Fluid, Friction, FrictionModel, Hub, Imu, Init, MODES, Parameters, Slosh, SloshModel, Tank,
-    Wheel,
+    Fluid, Friction, Hub, Imu, Init, MODES, Parameters, Slosh, Solver, Tank, Wheel,
 };
+pub use plant::{Inputs, Plant, Ramp};
+pub use slosh::SloshModel;
+pub use state::{INDICATORS, STATES, State, indicator, x};
 pub use tank::Calculated;

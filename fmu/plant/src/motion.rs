@@ -7,24 +7,19 @@
 //! the ends is as exact as at the ends: the instants at which the hub comes to rest
 //! or breaks away are roots of polynomials, found without stepping back.
 
+use crate::Imu;
 use crate::friction::{Contact, Law};
+use crate::plant::Ramp;
 use crate::series::{self, ORDER, Series, ZERO, for_each_order};
-use crate::slosh::{Hub, Mode};
-use crate::{Imu, Ramp, State};
+use crate::slosh::{HubMotion, SloshMode};
+use crate::state::{State, x};
 
 /// Error of one step against the tolerance asked for. A step's error is forgotten
 /// as the liquid's motion decays, within some thousand steps.
 const STEP_SHARE: f64 = 1e-2;
 
-/// Rates below this are nothing, rad/s: the floor of the error's scale.
-const NOTHING: f64 = 1e-6;
-
-/// From here on energies and forces may be no numbers, though angles and rates still are.
-const HUGE: f64 = 1e100;
-
-/// The integrator's steps, and the gyro's samples, that one call may take: one mode needs a
-/// fraction of a second for them, ten spherical ones some six seconds.
-pub(crate) const MAX_STEPS: usize = 200_000;
+/// The floor of the error's scale, rad/s.
+const RATE_FLOOR: f64 = 1e-6;
 
 /// The lowest order that is trusted to show that a series has converged.
 const MIN_ORDER: usize = 5;
@@ -32,17 +27,24 @@ const MIN_ORDER: usize = 5;
 /// Why a step was refused; its text is for the user. The state is as before the step.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StepError {
-    /// The motion grew beyond all numbers.
+    /// The motion overflows.
     NotFinite {
         /// When, s.
         time: f64,
     },
-    /// The step needs more work than is allowed.
+    /// The step needs more internal steps than `solver.max_steps`.
     TooManySteps {
         /// How far the integrator came, s.
         time: f64,
+        /// `solver.max_steps`.
+        max_steps: usize,
     },
-    /// A slosh mode left the range in which its model means anything.
+    /// More samples of the gyro are due than can be taken at once.
+    TooManySamples {
+        /// When, s.
+        time: f64,
+    },
+    /// A slosh mode left the range in which its model is valid.
     OutOfRange {
         /// When, s.
         time: f64,
@@ -57,13 +59,19 @@ impl core::fmt::Display for StepError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
             StepError::NotFinite { time } => {
-                write!(f, "the motion is no longer finite at t = {time} s")
+                write!(f, "the state is not finite at t = {time} s")
             }
-            StepError::TooManySteps { time } => write!(
+            StepError::TooManySteps { time, max_steps } => write!(
                 f,
-                "the integrator used up its {MAX_STEPS} steps at t = {time} s; take shorter \
-                 communication steps or a looser tolerance, with stribeck_smooth a larger \
+                "the step was stopped at t = {time} s after solver.max_steps = {max_steps} internal \
+                 steps (gyro samples count as steps); use shorter communication steps, a looser \
+                 tolerance or a larger solver.max_steps, with stribeck_smooth a larger \
                  friction.eps, with the gyro a lower imu.rate"
+            ),
+            StepError::TooManySamples { time } => write!(
+                f,
+                "more gyro samples are due at t = {time} s than can be taken at once; the host \
+                 has passed time events, or imu.rate is too high for times of this size"
             ),
             StepError::OutOfRange { time, mode, what } => {
                 write!(f, "slosh mode {mode} left its range at t = {time} s: {what}")
@@ -78,47 +86,50 @@ impl core::fmt::Display for StepError {
 pub(crate) struct Motion {
     /// Inertia of hub and frozen liquid, kg m2.
     pub i0: f64,
-    pub friction: Law,
-    pub tolerance: f64,
-    pub theta: Series,
-    pub hub: Hub,
+    pub law: Law,
+    tolerance: f64,
+    /// Internal steps and gyro samples that one call may take.
+    pub max_steps: usize,
+    pub hub: HubMotion,
     /// Torque of wheel and environment over the step.
     tau: [f64; 2],
     inertia: Series,
     /// 1/J at the start of the expansion
     inv_inertia: f64,
+    /// Torque of the bearing.
+    pub tau_f: Series,
     /// tau + T, the torque that the bearing must hold at rest.
     pub net: Series,
-    /// Power of the torques from outside, and heat of bearing and liquid, W.
-    pub work: Series,
-    pub heat: Series,
+    /// Power of the torques from outside, and dissipated in bearing and liquid, W.
+    pub power: Series,
+    pub dissipation: Series,
 }
 
 impl Motion {
-    pub fn new(i0: f64, friction: Law, tolerance: f64) -> Motion {
-        let hub = Hub { omega: ZERO, omega2: ZERO, omega_dot: ZERO, g: [0.0; 2] };
+    pub fn new(i0: f64, law: Law, tolerance: f64, max_steps: usize) -> Motion {
         Motion {
             i0,
-            friction,
+            law,
             tolerance,
-            theta: ZERO,
-            hub,
+            max_steps,
+            hub: HubMotion::REST,
             tau: [0.0; 2],
             inertia: ZERO,
             inv_inertia: 0.0,
+            tau_f: ZERO,
             net: ZERO,
-            work: ZERO,
-            heat: ZERO,
+            power: ZERO,
+            dissipation: ZERO,
         }
     }
 
     /// Puts everything at the state, with the given torque and specific force.
-    pub fn start<M: Mode>(&mut self, modes: &mut [M], state: &State, tau: Ramp, g: Ramp) {
-        self.theta[0] = state.theta;
-        self.hub.omega[0] = state.omega;
+    pub fn start<M: SloshMode>(&mut self, modes: &mut [M], state: &State, tau: Ramp, g: Ramp) {
+        self.hub.theta[0] = state.x[x::THETA];
+        self.hub.omega[0] = state.x[x::OMEGA];
         self.hub.g = [g.value, g.slope];
         self.tau = [tau.value, tau.slope];
-        for (mode, q) in modes.iter_mut().zip(&state.modes) {
+        for (mode, q) in modes.iter_mut().zip(state.slosh()) {
             mode.start(q, &self.hub);
         }
     }
@@ -126,13 +137,13 @@ impl Motion {
     /// Coefficient N of every quantity from coefficients up to N of the state, and
     /// coefficient N + 1 of the state.
     #[inline(always)]
-    pub fn rates<const N: usize, M: Mode>(&mut self, modes: &mut [M], contact: Contact) {
+    pub fn derivatives<const N: usize, M: SloshMode>(&mut self, modes: &mut [M], contact: Contact) {
         self.hub.omega2[N] = series::square::<N>(&self.hub.omega);
         let (mut inertia, mut net) = (0.0, if N < 2 { self.tau[N] } else { 0.0 });
         for mode in modes.iter_mut() {
-            let load = mode.load::<N>(&self.hub);
-            inertia += load.j;
-            net += load.t;
+            let reaction = mode.hub_reaction::<N>(&self.hub);
+            inertia += reaction.j;
+            net += reaction.t;
         }
         self.inertia[N] = series::constant::<N>(self.i0) + inertia;
         if N == 0 {
@@ -140,11 +151,11 @@ impl Motion {
         }
         self.net[N] = net;
         self.hub.omega_dot[N] = if contact == Contact::Stuck {
-            self.friction.tau_f[N] = -net;
+            self.tau_f[N] = -net;
             0.0
         } else {
-            self.friction.slip::<N>(contact, &self.theta, &self.hub.omega, &self.hub.omega2);
-            let torque = net + self.friction.tau_f[N];
+            self.tau_f[N] = self.law.torque::<N>(contact, &self.hub);
+            let torque = net + self.tau_f[N];
             let rest = if M::MOVES_INERTIA {
                 series::mul_tail::<N>(&self.inertia, &self.hub.omega_dot)
             } else {
@@ -152,51 +163,51 @@ impl Motion {
             };
             (torque - rest) * self.inv_inertia
         };
-        self.theta[N + 1] = series::next::<N>(self.hub.omega[N]);
+        self.hub.theta[N + 1] = series::next::<N>(self.hub.omega[N]);
         self.hub.omega[N + 1] = series::next::<N>(self.hub.omega_dot[N]);
-        self.work[N] = series::mul_ramp::<N>(&self.tau, &self.hub.omega);
-        self.heat[N] = -series::mul::<N>(&self.friction.tau_f, &self.hub.omega);
+        self.power[N] = series::mul_ramp::<N>(&self.tau, &self.hub.omega);
+        self.dissipation[N] = -series::mul::<N>(&self.tau_f, &self.hub.omega);
         for mode in modes.iter_mut() {
-            mode.respond::<N>(&self.hub);
-            self.heat[N] += mode.heat::<N>();
+            mode.accelerate::<N>(&self.hub);
+            self.dissipation[N] += mode.dissipation::<N>();
         }
     }
 
     /// Expands the motion up to `h` ahead. Returns the order and the length, at most
     /// `h`, at which the terms left out are below the tolerance.
     #[inline(always)]
-    fn expand<M: Mode>(&mut self, modes: &mut [M], h: f64, contact: Contact) -> (usize, f64) {
+    fn expand<M: SloshMode>(&mut self, modes: &mut [M], h: f64, contact: Contact) -> (usize, f64) {
         let allowed = STEP_SHARE * self.tolerance;
-        let quiet_terms = self.friction.quiet_terms();
+        let negligible_terms = self.law.negligible_terms();
         let mut h = h;
         let (mut hub_allowed, mut slosh_allowed) = (0.0, 0.0);
         let mut power = 1.0; // h^(N+1)
-        let mut quiet = 0;
+        let mut negligible = 0;
         for_each_order!(N => {
-            self.rates::<N, M>(modes, contact);
+            self.derivatives::<N, M>(modes, contact);
             if N == 1 {
-                h = h.min(self.friction.reach(&self.hub.omega));
+                h = h.min(self.law.convergence_radius(&self.hub.omega));
                 power = h;
                 // The hub's rate passes zero many times; the scale of its error must not.
                 let [w, w_d] = [self.hub.omega[0], self.hub.omega[1]].map(f64::abs);
-                let hub_scale = NOTHING + w + w_d * h.min(0.1);
-                let slosh_scale = hub_scale + modes.iter().map(Mode::size).fold(0.0, f64::max);
+                let hub_scale = RATE_FLOOR + w + w_d * h.min(0.1);
+                let slosh_scale = hub_scale + modes.iter().map(SloshMode::error_scale).fold(0.0, f64::max);
                 (hub_allowed, slosh_allowed) = (allowed * hub_scale, allowed * slosh_scale);
             }
             power *= h;
             if N + 2 >= MIN_ORDER {
-                let slosh = modes.iter().map(|m| m.term(N + 1)).fold(0.0, larger);
-                let is_quiet = self.hub.omega[N + 1].abs() * power <= hub_allowed
+                let slosh = modes.iter().map(|m| m.coefficient_norm(N + 1)).fold(0.0, larger);
+                let is_negligible = self.hub.omega[N + 1].abs() * power <= hub_allowed
                     && slosh * power <= slosh_allowed;
-                quiet = if is_quiet { quiet + 1 } else { 0 };
-                if quiet >= quiet_terms {
+                negligible = if is_negligible { negligible + 1 } else { 0 };
+                if negligible >= negligible_terms {
                     return (N + 1, h);
                 }
             }
         });
         // The last two terms reach the tolerance at this length.
         let length = |n: usize| {
-            let slosh = modes.iter().map(|m| m.term(n)).fold(0.0, f64::max);
+            let slosh = modes.iter().map(|m| m.coefficient_norm(n)).fold(0.0, f64::max);
             let term = f64::max(self.hub.omega[n].abs() / hub_allowed, slosh / slosh_allowed);
             if term > 0.0 { libm::exp(-libm::log(term) / n as f64) } else { h }
         };
@@ -205,24 +216,20 @@ impl Motion {
 
     /// The sign that the hub's contact has by its rate or, at rest, by the torque
     /// that the bearing would have to hold.
-    pub fn contact<M: Mode>(&mut self, modes: &mut [M], state: &State) -> Contact {
-        if !self.friction.can_stick() || state.omega > 0.0 {
+    pub fn contact<M: SloshMode>(&mut self, modes: &mut [M], state: &State) -> Contact {
+        let omega = state.x[x::OMEGA];
+        if !self.law.switches_at_rest() || omega > 0.0 {
             return Contact::Forward;
         }
-        if state.omega < 0.0 {
+        if omega < 0.0 {
             return Contact::Backward;
         }
-        self.rates::<0, M>(modes, Contact::Stuck);
-        let (against_backward, against_forward) = self.friction.holds(state.theta);
-        // A hub that has just broken away is at the limit, give or take rounding.
-        let limit = |hold: f64, from: Contact| {
-            if state.contact == from { hold * (1.0 - 1e-12) } else { hold }
-        };
-        match self.net[0] {
-            net if net > limit(against_forward, Contact::Forward) => Contact::Forward,
-            net if net < -limit(against_backward, Contact::Backward) => Contact::Backward,
-            _ => Contact::Stuck,
-        }
+        self.derivatives::<0, M>(modes, Contact::Stuck);
+        self.law.contact_at_rest(self.net[0], state.x[x::THETA], state.contact)
+    }
+
+    pub fn too_many_steps(&self, time: f64) -> StepError {
+        StepError::TooManySteps { time, max_steps: self.max_steps }
     }
 
     /// When, within `h`, the hub comes to rest, from the series of order n.
@@ -243,7 +250,7 @@ impl Motion {
 
     /// When, within `h`, the torque exceeds what the bearing holds, and to which side.
     fn time_of_break_away(&self, n: usize, h: f64) -> Option<(f64, Contact)> {
-        let (against_backward, against_forward) = self.friction.holds(self.theta[0]);
+        let (against_backward, against_forward) = self.law.holds(self.hub.theta[0]);
         let root = |sign: f64, hold: f64| {
             let mut left = self.net.map(|x| -sign * x);
             left[0] += hold;
@@ -261,8 +268,8 @@ impl Motion {
 
     /// Moves the state on by `h`, during which torque and specific force run along
     /// their ramps; the gyro takes the samples that fall due. `steps` counts against
-    /// [`MAX_STEPS`]. On an error the state is unusable.
-    pub fn advance<M: Mode>(
+    /// the largest number allowed. On an error the state is unusable.
+    pub fn advance<M: SloshMode>(
         &mut self,
         modes: &mut [M],
         state: &mut State,
@@ -274,20 +281,20 @@ impl Motion {
         let begin = state.time;
         let mut t = 0.0;
         self.start(modes, state, tau, g);
-        if state.omega == 0.0 {
+        if state.x[x::OMEGA] == 0.0 {
             let contact = self.contact(modes, state);
-            state.touch(contact, begin);
+            state.record_contact(contact, begin);
         }
         while t < h {
             *steps += 1;
-            if *steps > MAX_STEPS {
-                return Err(StepError::TooManySteps { time: begin + t });
+            if *steps > self.max_steps {
+                return Err(self.too_many_steps(begin + t));
             }
             let left = h - t;
             let contact = state.contact;
             let (n, mut length) = self.expand(modes, left, contact);
             let mut event = None;
-            if self.friction.can_stick() {
+            if self.law.switches_at_rest() {
                 if contact == Contact::Stuck {
                     event = self.time_of_break_away(n, length);
                 } else if let Some(rest) = self.time_of_rest(n, length, contact) {
@@ -303,39 +310,40 @@ impl Motion {
             if imu.enabled {
                 let since_start = begin + t - state.start_time;
                 let omega = |s| series::value(&self.hub.omega, n, s);
-                let allowed = MAX_STEPS - *steps;
+                let allowed = self.max_steps - *steps;
                 *steps += imu.follow(&mut state.gyro, since_start, length, omega, allowed);
-                if *steps > MAX_STEPS {
-                    return Err(StepError::TooManySteps { time: begin + t });
+                if *steps > self.max_steps {
+                    return Err(self.too_many_steps(begin + t));
                 }
             }
             let stuck = contact == Contact::Stuck;
-            state.work += series::integral(&self.work, n - 1, length);
-            state.heat += series::integral(&self.heat, n - 1, length);
-            state.theta = series::value(&self.theta, n, length);
-            state.omega = if stuck { 0.0 } else { series::value(&self.hub.omega, n, length) };
-            for (i, (mode, q)) in modes.iter().zip(&mut state.modes).enumerate() {
-                *q = mode.at(n, length, state.omega);
+            let omega = if stuck { 0.0 } else { series::value(&self.hub.omega, n, length) };
+            state.x[x::WORK] += series::integral(&self.power, n - 1, length);
+            state.x[x::HEAT] += series::integral(&self.dissipation, n - 1, length);
+            state.x[x::THETA] = series::value(&self.hub.theta, n, length);
+            state.x[x::OMEGA] = omega;
+            for (i, (mode, q)) in modes.iter().zip(state.slosh_mut()).enumerate() {
+                *q = mode.at(n, length, omega);
                 if let Some(what) = mode.out_of_range(q) {
                     let time = begin + t + length;
                     return Err(StepError::OutOfRange { time, mode: i + 1, what });
                 }
             }
             if stuck {
-                state.stuck_time += length;
+                state.x[x::STUCK_TIME] += length;
             }
             t = if length == left { h } else { t + length };
             let now = |x: Ramp| Ramp { value: x.at(t), slope: x.slope };
             match event {
                 Some((_, Contact::Stuck)) => {
-                    state.omega = 0.0;
+                    state.x[x::OMEGA] = 0.0;
                     self.start(modes, state, now(tau), now(g));
                     let contact = self.contact(modes, state);
-                    state.touch(contact, begin + t);
+                    state.record_contact(contact, begin + t);
                 }
                 Some((_, contact)) => {
                     self.start(modes, state, now(tau), now(g));
-                    state.touch(contact, begin + t);
+                    state.record_contact(contact, begin + t);
                 }
                 None => self.start(modes, state, now(tau), now(g)),
             }
@@ -352,22 +360,4 @@ impl Motion {
 #[inline(always)]
 fn larger(a: f64, b: f64) -> f64 {
     if b > a { b } else { a }
-}
-
-impl State {
-    /// Notes a new contact at `time`.
-    pub(crate) fn touch(&mut self, contact: Contact, time: f64) {
-        if contact != self.contact {
-            self.contact = contact;
-            self.event_count = self.event_count.saturating_add(1);
-            self.event_time = time;
-        }
-    }
-
-    /// Hub and so many modes, and what is made of them: numbers whose squares are numbers too.
-    fn is_finite(&self, modes: usize) -> bool {
-        let is_number = |x: &f64| x.abs() < HUGE; // NaN is not
-        let hub = [self.theta, self.omega, self.work, self.heat];
-        hub.iter().chain(self.modes[..modes].iter().flatten()).all(is_number)
-    }
 }

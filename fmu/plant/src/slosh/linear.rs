@@ -11,7 +11,7 @@
 //! E = m (r w + l al')^2/2 + m g l al^2/2,  H = m r (r w + l al')
 //! ```
 
-use super::{Angles, Hub, Load, Mode};
+use super::{Angles, HubMotion, HubReaction, SloshMode};
 use crate::series::{Series, ZERO, mul_ramp, next, square, value};
 use crate::tank::Pendulum;
 
@@ -28,7 +28,7 @@ pub struct Linear {
     omega_n: f64,
 }
 
-impl Mode for Linear {
+impl SloshMode for Linear {
     const MOVES_INERTIA: bool = false;
 
     fn new(p: &Pendulum) -> Self {
@@ -43,30 +43,30 @@ impl Mode for Linear {
         Angles { angle: [0.0, self.al[0]], rate: [0.0, self.al_d[0]] }
     }
 
-    fn start(&mut self, q: &[f64; 4], _: &Hub) {
+    fn start(&mut self, q: &[f64; 4], _: &HubMotion) {
         (self.al[0], self.al_d[0]) = (q[1], q[3]);
     }
 
-    fn aim(&mut self, dq: &[f64; 4], _: &Hub) {
+    fn seed_direction(&mut self, dq: &[f64; 4], _: &HubMotion) {
         (self.al[1], self.al_d[1]) = (dq[1], dq[3]);
     }
 
-    fn rate<const N: usize>(&self, _: &Hub) -> [f64; 4] {
+    fn derivatives<const N: usize>(&self, _: &HubMotion) -> [f64; 4] {
         [0.0, self.al_d[N], 0.0, self.al_dd[N]]
     }
 
     #[inline(always)]
-    fn load<const N: usize>(&mut self, hub: &Hub) -> Load {
+    fn hub_reaction<const N: usize>(&mut self, hub: &HubMotion) -> HubReaction {
         let Pendulum { m, l, c, r, .. } = self.p;
         if N == 0 {
             self.omega_n = libm::sqrt(f64::max(hub.g[0], 0.0) / l);
         }
         self.g_al[N] = mul_ramp::<N>(&hub.g, &self.al);
-        Load { j: 0.0, t: r * (m * self.g_al[N] + c * l * self.al_d[N]) }
+        HubReaction { j: 0.0, t: r * (m * self.g_al[N] + c * l * self.al_d[N]) }
     }
 
     #[inline(always)]
-    fn respond<const N: usize>(&mut self, hub: &Hub) {
+    fn accelerate<const N: usize>(&mut self, hub: &HubMotion) {
         let Pendulum { c_m, r_l, inv_l, .. } = self.p;
         self.al_dd[N] = -c_m * self.al_d[N] - inv_l * self.g_al[N] - r_l * hub.omega_dot[N];
         self.al[N + 1] = next::<N>(self.al_d[N]);
@@ -74,17 +74,17 @@ impl Mode for Linear {
     }
 
     #[inline(always)]
-    fn size(&self) -> f64 {
+    fn error_scale(&self) -> f64 {
         self.al_d[0].abs() + self.omega_n * self.al[0].abs()
     }
 
     #[inline(always)]
-    fn term(&self, n: usize) -> f64 {
+    fn coefficient_norm(&self, n: usize) -> f64 {
         self.al_d[n].abs()
     }
 
     #[inline(always)]
-    fn heat<const N: usize>(&mut self) -> f64 {
+    fn dissipation<const N: usize>(&mut self) -> f64 {
         self.p.c * self.p.l * self.p.l * square::<N>(&self.al_d)
     }
 
@@ -95,7 +95,7 @@ impl Mode for Linear {
 
     /// Tangential -m (r w' + l al''); radial from the bob's place (r, l al):
     /// m (r w^2 + 2 w l al' + w' l al), of second order in the motion.
-    fn force(&self, hub: &Hub) -> [f64; 2] {
+    fn force(&self, hub: &HubMotion) -> [f64; 2] {
         let Pendulum { m, l, r, .. } = self.p;
         let (w, wd) = (hub.omega[0], hub.omega_dot[0]);
         let radial = m * (r * w * w + 2.0 * w * l * self.al_d[0] + wd * l * self.al[0]);
@@ -103,22 +103,18 @@ impl Mode for Linear {
     }
 
     /// r F_y: in the linear model the force acts at the hinge.
-    fn torque(&self, hub: &Hub) -> f64 {
+    fn torque(&self, hub: &HubMotion) -> f64 {
         self.p.r * self.force(hub)[1]
     }
 
-    fn energy(&self, hub: &Hub) -> f64 {
+    fn energy(&self, hub: &HubMotion) -> f64 {
         let Pendulum { m, l, r, .. } = self.p;
         let speed = r * hub.omega[0] + l * self.al_d[0];
         (m * speed * speed + m * hub.g[0] * l * self.al[0] * self.al[0]) / 2.0
     }
 
-    fn momentum(&self, hub: &Hub) -> f64 {
+    fn momentum(&self, hub: &HubMotion) -> f64 {
         let Pendulum { m, l, r, .. } = self.p;
         m * r * (r * hub.omega[0] + l * self.al_d[0])
-    }
-
-    fn out_of_range(&self, _: &[f64; 4]) -> Option<&'static str> {
-        None
     }
 }

@@ -1,5 +1,6 @@
 //! The liquid's mechanical models: what a slosh mode must tell the hub and the
-//! integrator, and the models that do.
+//! integrator, and the models that do. All models are listed here, each is in a file of
+//! its own.
 //!
 //! A mode's coordinates are `q = [q_x, q_y, q_x', q_y']`, x radial (outwards), y
 //! tangential (towards +theta), measured in the hub's frame; each model says in
@@ -11,17 +12,98 @@
 //!
 //! where J, T, B and A do not contain w' (w the hub's rate).
 
-pub mod linear;
-pub mod paraboloid;
-pub mod planar;
-pub mod spherical;
+mod linear;
+mod paraboloid;
+mod planar;
+mod spherical;
 
-use crate::series::Series;
+use crate::series::{Series, ZERO};
 use crate::tank::Pendulum;
+use crate::{Calculated, Init, Parameters};
+use linear::Linear;
+use paraboloid::Paraboloid;
+use planar::Planar;
+use spherical::Spherical;
 
-/// The hub's motion as a mode sees it.
+/// The mechanical models of the liquid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum SloshModel {
+    /// The liquid is a rigid body.
+    Frozen = 1,
+    /// Linear planar pendulums.
+    Linear = 2,
+    /// Nonlinear planar pendulums.
+    Planar = 3,
+    /// Spherical pendulums: the liquid can rotate.
+    Spherical = 4,
+    /// Masses on a paraboloid with a quartic spring.
+    Paraboloid = 5,
+}
+
+impl SloshModel {
+    /// All of them, in the order of their numbers.
+    pub const ALL: [SloshModel; 5] = [
+        SloshModel::Frozen,
+        SloshModel::Linear,
+        SloshModel::Planar,
+        SloshModel::Spherical,
+        SloshModel::Paraboloid,
+    ];
+}
+
+/// The slosh modes in use, as the chosen model has them.
 #[derive(Clone, Debug)]
-pub struct Hub {
+pub(crate) enum Liquid {
+    Linear(Vec<Linear>),
+    Planar(Vec<Planar>),
+    Spherical(Vec<Spherical>),
+    Paraboloid(Vec<Paraboloid>),
+}
+
+/// Does the same with the modes of whatever model is in use.
+macro_rules! with_modes {
+    ($liquid:expr, $modes:ident => $do:expr) => {{
+        use $crate::slosh::Liquid;
+        match $liquid {
+            Liquid::Linear($modes) => $do,
+            Liquid::Planar($modes) => $do,
+            Liquid::Spherical($modes) => $do,
+            Liquid::Paraboloid($modes) => $do,
+        }
+    }};
+}
+pub(crate) use with_modes;
+
+impl Liquid {
+    /// The modes at rest.
+    pub fn new(p: &Parameters, calculated: &Calculated) -> Liquid {
+        fn modes<M: SloshMode>(p: &Parameters, calculated: &Calculated) -> Vec<M> {
+            calculated.pendulums(p).map(|pendulum| M::new(&pendulum)).collect()
+        }
+        match p.slosh.model {
+            // Frozen liquid is a linear model without modes.
+            SloshModel::Frozen | SloshModel::Linear => Liquid::Linear(modes(p, calculated)),
+            SloshModel::Planar => Liquid::Planar(modes(p, calculated)),
+            SloshModel::Spherical => Liquid::Spherical(modes(p, calculated)),
+            SloshModel::Paraboloid => Liquid::Paraboloid(modes(p, calculated)),
+        }
+    }
+
+    /// Why the motion can't start as the parameters say, if it can't.
+    pub fn start_problem(&self, init: &Init) -> Option<String> {
+        fn of<M: SloshMode>(_: &[M], init: &Init) -> Option<String> {
+            M::start_problem(init)
+        }
+        with_modes!(self, modes => of(modes, init))
+    }
+}
+
+/// The hub's motion as liquid and bearing see it.
+#[derive(Clone, Debug)]
+pub struct HubMotion {
+    /// theta, rad
+    pub theta: Series,
     /// w, rad/s
     pub omega: Series,
     /// w^2
@@ -32,9 +114,15 @@ pub struct Hub {
     pub g: [f64; 2],
 }
 
+impl HubMotion {
+    /// At rest, weightless.
+    pub const REST: HubMotion =
+        HubMotion { theta: ZERO, omega: ZERO, omega2: ZERO, omega_dot: ZERO, g: [0.0; 2] };
+}
+
 /// A mode's share of the hub's equation.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct Load {
+pub struct HubReaction {
     /// Inertia J, kg m2.
     pub j: f64,
     /// Torque T, N m.
@@ -51,43 +139,53 @@ pub struct Angles {
 }
 
 /// One slosh mode as a set of power series in time.
-pub trait Mode {
+pub trait SloshMode {
     /// Whether J changes as the mode moves.
     const MOVES_INERTIA: bool = true;
     /// The mode at rest; `start` puts it somewhere.
     fn new(pendulum: &Pendulum) -> Self;
+    /// Why the motion can't start as the parameters say, if it can't.
+    fn start_problem(_init: &Init) -> Option<String> {
+        None
+    }
+    /// A displacement of the coordinates at which forces and energies curve, in their unit.
+    fn coordinate_scale(&self) -> f64 {
+        1.0
+    }
     /// Coordinates from angles with sin(angle) = displacement/l and their rates.
     fn coordinates(&self, at: &Angles) -> [f64; 4];
     /// The reverse, at order 0.
     fn angles(&self) -> Angles;
     /// Sets the coordinates at the start of the expansion; w is known to order 0.
-    fn start(&mut self, q: &[f64; 4], hub: &Hub);
+    fn start(&mut self, q: &[f64; 4], hub: &HubMotion);
     /// Sets the direction, coefficient 1 of the coordinates, for a partial derivative; w is
     /// known to order 1.
-    fn aim(&mut self, dq: &[f64; 4], hub: &Hub);
+    fn seed_direction(&mut self, dq: &[f64; 4], hub: &HubMotion);
     /// Coefficient N, 0 or 1, of q_x', q_y', q_x'', q_y''.
-    fn rate<const N: usize>(&self, hub: &Hub) -> [f64; 4];
+    fn derivatives<const N: usize>(&self, hub: &HubMotion) -> [f64; 4];
     /// Coefficient N of J and T, from coefficients up to N of q, q' and w.
-    fn load<const N: usize>(&mut self, hub: &Hub) -> Load;
-    /// Coefficient N of q'' and with it N + 1 of q and q', after `load`, when w' is known up
-    /// to N.
-    fn respond<const N: usize>(&mut self, hub: &Hub);
-    /// Size of the motion, rad/s: the scale of its errors.
-    fn size(&self) -> f64;
-    /// Size of coefficient `n` of the rates.
-    fn term(&self, n: usize) -> f64;
-    /// Coefficient N of the heat made by the mode, W.
-    fn heat<const N: usize>(&mut self) -> f64;
+    fn hub_reaction<const N: usize>(&mut self, hub: &HubMotion) -> HubReaction;
+    /// Coefficient N of q'' and with it N + 1 of q and q', after `hub_reaction`, when w' is
+    /// known up to N.
+    fn accelerate<const N: usize>(&mut self, hub: &HubMotion);
+    /// Size of the motion, rad/s: what the tolerance is relative to.
+    fn error_scale(&self) -> f64;
+    /// Size of coefficient `n` of the rates, rad/s.
+    fn coefficient_norm(&self, n: usize) -> f64;
+    /// Coefficient N of the power that the mode dissipates, W.
+    fn dissipation<const N: usize>(&mut self) -> f64;
     /// Coordinates at t, where the hub turns with `omega`, from the series cut after order n.
     fn at(&self, n: usize, t: f64, omega: f64) -> [f64; 4];
     /// Force of the bob on the tank, N, radial and tangential, at order 0.
-    fn force(&self, hub: &Hub) -> [f64; 2];
+    fn force(&self, hub: &HubMotion) -> [f64; 2];
     /// Torque of the bob on the hub, N m, at order 0.
-    fn torque(&self, hub: &Hub) -> f64;
+    fn torque(&self, hub: &HubMotion) -> f64;
     /// Kinetic and potential energy, J, at order 0.
-    fn energy(&self, hub: &Hub) -> f64;
+    fn energy(&self, hub: &HubMotion) -> f64;
     /// Angular momentum about the bearing's axis, kg m2/s, at order 0.
-    fn momentum(&self, hub: &Hub) -> f64;
+    fn momentum(&self, hub: &HubMotion) -> f64;
     /// What makes the coordinates meaningless, if anything does.
-    fn out_of_range(&self, q: &[f64; 4]) -> Option<&'static str>;
+    fn out_of_range(&self, _q: &[f64; 4]) -> Option<&'static str> {
+        None
+    }
 }

@@ -15,7 +15,7 @@
 //! Lagrange's equations for this E and the Rayleigh function c (|q'|^2 + z'^2)/2.
 //! For small q a pendulum is the case h = 1/(2 l^2).
 
-use super::{Angles, Hub, Load, Mode};
+use super::{Angles, HubMotion, HubReaction, SloshMode};
 use crate::series::{Series, ZERO, constant, mul, mul_ramp, mul_tail, next, square, value};
 use crate::tank::Pendulum;
 
@@ -42,7 +42,7 @@ pub struct Paraboloid {
     omega_n: f64,
 }
 
-impl Mode for Paraboloid {
+impl SloshMode for Paraboloid {
     fn new(p: &Pendulum) -> Self {
         Paraboloid {
             p: *p,
@@ -62,6 +62,11 @@ impl Mode for Paraboloid {
         }
     }
 
+    /// A displacement is in m.
+    fn coordinate_scale(&self) -> f64 {
+        self.p.l
+    }
+
     fn coordinates(&self, at: &Angles) -> [f64; 4] {
         let q = at.angle.map(|angle| self.p.l * libm::sin(angle));
         let rate = |i: usize| self.p.l * libm::cos(at.angle[i]) * at.rate[i];
@@ -78,22 +83,22 @@ impl Mode for Paraboloid {
         Angles { angle: sin.map(libm::asin), rate: [rate(0), rate(1)] }
     }
 
-    fn start(&mut self, q: &[f64; 4], _: &Hub) {
+    fn start(&mut self, q: &[f64; 4], _: &HubMotion) {
         (self.q[0][0], self.q[1][0]) = (q[0], q[1]);
         (self.q_d[0][0], self.q_d[1][0]) = (q[2], q[3]);
     }
 
-    fn aim(&mut self, dq: &[f64; 4], _: &Hub) {
+    fn seed_direction(&mut self, dq: &[f64; 4], _: &HubMotion) {
         (self.q[0][1], self.q[1][1]) = (dq[0], dq[1]);
         (self.q_d[0][1], self.q_d[1][1]) = (dq[2], dq[3]);
     }
 
-    fn rate<const N: usize>(&self, _: &Hub) -> [f64; 4] {
+    fn derivatives<const N: usize>(&self, _: &HubMotion) -> [f64; 4] {
         [self.q_d[0][N], self.q_d[1][N], self.q_dd[0][N], self.q_dd[1][N]]
     }
 
     #[inline(always)]
-    fn load<const N: usize>(&mut self, hub: &Hub) -> Load {
+    fn hub_reaction<const N: usize>(&mut self, hub: &HubMotion) -> HubReaction {
         let Pendulum { m, l, c, r, c_m, hardening, .. } = self.p;
         let one = constant::<N>(1.0);
         if N == 0 {
@@ -118,14 +123,14 @@ impl Mode for Paraboloid {
         for i in 0..2 {
             self.b[i][N] = -c_m * self.q_d[i][N] + self.a[i][N] - mu_q[i];
         }
-        Load {
+        HubReaction {
             j: m * r * mul::<N>(&self.lever, y),
             t: m * r * mu_q[1] + c * (mul::<N>(&self.arm, y_d) - mul::<N>(y, x_d)),
         }
     }
 
     #[inline(always)]
-    fn respond<const N: usize>(&mut self, hub: &Hub) {
+    fn accelerate<const N: usize>(&mut self, hub: &HubMotion) {
         let [x, y] = &self.q;
         let wd = &hub.omega_dot;
         self.push[N] = mul::<N>(&self.lever, wd);
@@ -138,18 +143,18 @@ impl Mode for Paraboloid {
     }
 
     #[inline(always)]
-    fn size(&self) -> f64 {
+    fn error_scale(&self) -> f64 {
         let largest = |pair: &[Series; 2]| f64::max(pair[0][0].abs(), pair[1][0].abs());
         (largest(&self.q_d) + self.omega_n * largest(&self.q)) / self.p.l
     }
 
     #[inline(always)]
-    fn term(&self, n: usize) -> f64 {
+    fn coefficient_norm(&self, n: usize) -> f64 {
         f64::max(self.q_d[0][n].abs(), self.q_d[1][n].abs()) / self.p.l
     }
 
     #[inline(always)]
-    fn heat<const N: usize>(&mut self) -> f64 {
+    fn dissipation<const N: usize>(&mut self) -> f64 {
         let Pendulum { l, c, .. } = self.p;
         let ([x, y], [x_d, y_d]) = (&self.q, &self.q_d);
         self.rise[N] = mul::<N>(x, x_d) + mul::<N>(y, y_d);
@@ -163,18 +168,18 @@ impl Mode for Paraboloid {
     }
 
     /// Minus the bob's mass times its acceleration, -m (q'' - a - w' (y, -(r + x))).
-    fn force(&self, hub: &Hub) -> [f64; 2] {
+    fn force(&self, hub: &HubMotion) -> [f64; 2] {
         let wd = hub.omega_dot[0];
         let euler = [wd * self.q[1][0], -wd * self.arm[0]];
         [0, 1].map(|i| -self.p.m * (self.q_dd[i][0] - self.a[i][0] - euler[i]))
     }
 
-    fn torque(&self, hub: &Hub) -> f64 {
+    fn torque(&self, hub: &HubMotion) -> f64 {
         let [f_x, f_y] = self.force(hub);
         self.arm[0] * f_y - self.q[1][0] * f_x
     }
 
-    fn energy(&self, hub: &Hub) -> f64 {
+    fn energy(&self, hub: &HubMotion) -> f64 {
         let Pendulum { m, l, hardening, .. } = self.p;
         let (x, y, x_d, y_d) = (self.q[0][0], self.q[1][0], self.q_d[0][0], self.q_d[1][0]);
         let w = hub.omega[0];
@@ -185,7 +190,7 @@ impl Mode for Paraboloid {
             + m * hub.g[0] / l * (q2 / 2.0 + hardening * q2 * q2 / 4.0)
     }
 
-    fn momentum(&self, hub: &Hub) -> f64 {
+    fn momentum(&self, hub: &HubMotion) -> f64 {
         let (y, x_d, y_d) = (self.q[1][0], self.q_d[0][0], self.q_d[1][0]);
         let arm = self.arm[0];
         self.p.m * (hub.omega[0] * (arm * arm + y * y) + arm * y_d - y * x_d)

@@ -13,7 +13,7 @@
 //!
 //! Lagrange's equations for this bob on the hub; to first order the linear model.
 
-use super::{Angles, Hub, Load, Mode};
+use super::{Angles, HubMotion, HubReaction, SloshMode};
 use crate::series::{Series, ZERO, mul, mul_ramp, next, sin_cos, square, value};
 use crate::tank::Pendulum;
 
@@ -35,7 +35,7 @@ pub struct Planar {
     omega_n: f64,
 }
 
-impl Mode for Planar {
+impl SloshMode for Planar {
     fn new(p: &Pendulum) -> Self {
         Planar {
             p: *p,
@@ -61,20 +61,20 @@ impl Mode for Planar {
         Angles { angle: [0.0, self.al[0]], rate: [0.0, self.al_d[0]] }
     }
 
-    fn start(&mut self, q: &[f64; 4], _: &Hub) {
+    fn start(&mut self, q: &[f64; 4], _: &HubMotion) {
         (self.al[0], self.al_d[0]) = (q[1], q[3]);
     }
 
-    fn aim(&mut self, dq: &[f64; 4], _: &Hub) {
+    fn seed_direction(&mut self, dq: &[f64; 4], _: &HubMotion) {
         (self.al[1], self.al_d[1]) = (dq[1], dq[3]);
     }
 
-    fn rate<const N: usize>(&self, _: &Hub) -> [f64; 4] {
+    fn derivatives<const N: usize>(&self, _: &HubMotion) -> [f64; 4] {
         [0.0, self.al_d[N], 0.0, self.al_dd[N]]
     }
 
     #[inline(always)]
-    fn load<const N: usize>(&mut self, hub: &Hub) -> Load {
+    fn hub_reaction<const N: usize>(&mut self, hub: &HubMotion) -> HubReaction {
         let Pendulum { m, l, c_m, r, .. } = self.p;
         if N == 0 {
             self.omega_n = libm::sqrt(f64::max(hub.g[0], 0.0) / l);
@@ -85,7 +85,7 @@ impl Mode for Planar {
         self.al_d2[N] = square::<N>(&self.al_d);
         self.force[N] = mul_ramp::<N>(&hub.g, &self.s) + c_m * l * self.al_d[N]
             - l * mul::<N>(&hub.omega2, &self.sc);
-        Load {
+        HubReaction {
             j: m * (r * r + l * l) * square::<N>(&self.s),
             t: m * (-2.0 * l * l * mul::<N>(&self.sc, &self.w_al_d)
                 + r * l * mul::<N>(&self.s, &self.al_d2)
@@ -94,7 +94,7 @@ impl Mode for Planar {
     }
 
     #[inline(always)]
-    fn respond<const N: usize>(&mut self, hub: &Hub) {
+    fn accelerate<const N: usize>(&mut self, hub: &HubMotion) {
         let Pendulum { r_l, inv_l, .. } = self.p;
         self.al_dd[N] = -r_l * mul::<N>(&self.c, &hub.omega_dot) - inv_l * self.force[N];
         self.al[N + 1] = next::<N>(self.al_d[N]);
@@ -102,17 +102,17 @@ impl Mode for Planar {
     }
 
     #[inline(always)]
-    fn size(&self) -> f64 {
+    fn error_scale(&self) -> f64 {
         self.al_d[0].abs() + self.omega_n * f64::min(self.al[0].abs(), 1.0)
     }
 
     #[inline(always)]
-    fn term(&self, n: usize) -> f64 {
+    fn coefficient_norm(&self, n: usize) -> f64 {
         self.al_d[n].abs()
     }
 
     #[inline(always)]
-    fn heat<const N: usize>(&mut self) -> f64 {
+    fn dissipation<const N: usize>(&mut self) -> f64 {
         self.p.c * self.p.l * self.p.l * square::<N>(&self.al_d)
     }
 
@@ -123,7 +123,7 @@ impl Mode for Planar {
 
     /// -m times the bob's acceleration at (r, l s); the plane's guide takes the
     /// radial part.
-    fn force(&self, hub: &Hub) -> [f64; 2] {
+    fn force(&self, hub: &HubMotion) -> [f64; 2] {
         let Pendulum { m, l, r, .. } = self.p;
         let (s, c, ad) = (self.s[0], self.c[0], self.al_d[0]);
         let (w, wd) = (hub.omega[0], hub.omega_dot[0]);
@@ -131,12 +131,12 @@ impl Mode for Planar {
         [m * (wd * y + 2.0 * w * y_d + w * w * r), -m * (y_dd + wd * r - w * w * y)]
     }
 
-    fn torque(&self, hub: &Hub) -> f64 {
+    fn torque(&self, hub: &HubMotion) -> f64 {
         let [f_x, f_y] = self.force(hub);
         self.p.r * f_y - self.p.l * self.s[0] * f_x
     }
 
-    fn energy(&self, hub: &Hub) -> f64 {
+    fn energy(&self, hub: &HubMotion) -> f64 {
         let Pendulum { m, l, r, .. } = self.p;
         let (s, c, ad, w) = (self.s[0], self.c[0], self.al_d[0], hub.omega[0]);
         let (along, up, across) = (r * w + l * c * ad, l * s * ad, l * s * w);
@@ -144,13 +144,9 @@ impl Mode for Planar {
         m * (along * along + up * up + across * across) / 2.0 + 2.0 * m * hub.g[0] * l * half * half
     }
 
-    fn momentum(&self, hub: &Hub) -> f64 {
+    fn momentum(&self, hub: &HubMotion) -> f64 {
         let Pendulum { m, l, r, .. } = self.p;
         let (s, c) = (self.s[0], self.c[0]);
         m * ((r * r + l * l * s * s) * hub.omega[0] + r * l * c * self.al_d[0])
-    }
-
-    fn out_of_range(&self, _: &[f64; 4]) -> Option<&'static str> {
-        None
     }
 }

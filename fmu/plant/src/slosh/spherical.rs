@@ -33,7 +33,8 @@
 //! Checked against Lagrange's equations for xi (below), against another way to the hub's
 //! acceleration (tests/rotary.rs) and against a pendulum in angles (Basilisk).
 
-use super::{Angles, Hub, Load, Mode};
+use super::{Angles, HubMotion, HubReaction, SloshMode};
+use crate::Init;
 use crate::series::{
     Pair, Series, ZERO, ZERO_PAIR, constant, dot, each, mul, mul_part, mul_ramp, mul_tail, next,
     scale, square, squares, value, value_pair,
@@ -72,7 +73,7 @@ impl Spherical {
     /// Coefficient N of direction and velocity from those of the coordinates:
     /// p' = k xi' - v_z xi, v_z = k^2 xi.xi'.
     #[inline(always)]
-    fn place<const N: usize>(&mut self, hub: &Hub) {
+    fn place<const N: usize>(&mut self, hub: &HubMotion) {
         let one = constant::<N>(1.0);
         let [x2, y2] = squares::<N>(&self.xi);
         self.sum[N] = one + x2 + y2;
@@ -88,7 +89,7 @@ impl Spherical {
     }
 
     /// Coefficient N of k xi'' = p'' + 2 v_z xi' + v_z' xi, p'' = v' - w' R p - w R p'.
-    fn k_xi_dd<const N: usize>(&self, hub: &Hub) -> [f64; 2] {
+    fn k_xi_dd<const N: usize>(&self, hub: &HubMotion) -> [f64; 2] {
         let [x, y] = scale::<N>(&hub.omega_dot, &self.dir);
         let [x_d, y_d] = scale::<N>(&hub.omega, &self.dir_d);
         let dir_dd = [self.v_d[N][0] + y + y_d, self.v_d[N][1] - x - x_d];
@@ -104,13 +105,13 @@ impl Spherical {
     }
 
     /// Its velocity as seen from outside, in the hub's frame, m/s: X, Y, Z.
-    fn velocity(&self, hub: &Hub) -> [f64; 3] {
+    fn velocity(&self, hub: &HubMotion) -> [f64; 3] {
         let Pendulum { l, r, .. } = self.p;
         [l * self.v[0][0], l * self.v[0][1] + r * hub.omega[0], l * self.v_z[0]]
     }
 }
 
-impl Mode for Spherical {
+impl SloshMode for Spherical {
     fn new(p: &Pendulum) -> Self {
         Spherical {
             p: *p,
@@ -135,6 +136,18 @@ impl Mode for Spherical {
         }
     }
 
+    fn start_problem(init: &Init) -> Option<String> {
+        let sines = [init.slosh_angle_radial, init.slosh_angle].map(libm::sin);
+        let sum = sines[0] * sines[0] + sines[1] * sines[1];
+        (sum > 0.9999).then(|| {
+            format!(
+                "init.slosh_angle = {} and init.slosh_angle_radial = {} put the bob at or beyond \
+                 the horizontal: sin^2 + sin^2 = {sum:.6} must be below 1",
+                init.slosh_angle, init.slosh_angle_radial
+            )
+        })
+    }
+
     /// sin(angle) = p_x, p_y with the bob below its hinge.
     fn coordinates(&self, at: &Angles) -> [f64; 4] {
         let [p_x, p_y] = at.angle.map(libm::sin);
@@ -154,17 +167,17 @@ impl Mode for Spherical {
         Angles { angle: p.map(libm::asin), rate: [rate(0), rate(1)] }
     }
 
-    fn start(&mut self, q: &[f64; 4], hub: &Hub) {
+    fn start(&mut self, q: &[f64; 4], hub: &HubMotion) {
         (self.xi[0], self.xi_d[0]) = ([q[0], q[1]], [q[2], q[3]]);
         self.place::<0>(hub);
     }
 
-    fn aim(&mut self, dq: &[f64; 4], hub: &Hub) {
+    fn seed_direction(&mut self, dq: &[f64; 4], hub: &HubMotion) {
         (self.xi[1], self.xi_d[1]) = ([dq[0], dq[1]], [dq[2], dq[3]]);
         self.place::<1>(hub);
     }
 
-    fn rate<const N: usize>(&self, hub: &Hub) -> [f64; 4] {
+    fn derivatives<const N: usize>(&self, hub: &HubMotion) -> [f64; 4] {
         let at_once = self.k_xi_dd::<0>(hub).map(|a| a / self.k[0]);
         let [x_dd, y_dd] = if N == 0 {
             at_once
@@ -177,7 +190,7 @@ impl Mode for Spherical {
     }
 
     #[inline(always)]
-    fn load<const N: usize>(&mut self, hub: &Hub) -> Load {
+    fn hub_reaction<const N: usize>(&mut self, hub: &HubMotion) -> HubReaction {
         let Pendulum { m, l, c, r, r_l, inv_l, .. } = self.p;
         if N == 0 {
             self.omega_n = libm::sqrt(f64::max(hub.g[0], 0.0) / l);
@@ -191,7 +204,7 @@ impl Mode for Spherical {
         self.pull_0[N] = v2_x + v2_y + self.v_z2[N] - inv_l * mul_ramp::<N>(&hub.g, &self.dir_z)
             + r_l * mul_part::<N>(&hub.omega2, &self.dir, 0);
         let [plus, minus] = each::<N>(&self.dir, &self.dir_d_swapped);
-        Load {
+        HubReaction {
             j: m * r * r * squares::<N>(&self.dir)[1],
             t: m * r * l * mul_part::<N>(&self.pull_0, &self.dir, 1)
                 + c * l * (r * y_d + l * (plus - minus)),
@@ -199,7 +212,7 @@ impl Mode for Spherical {
     }
 
     #[inline(always)]
-    fn respond<const N: usize>(&mut self, hub: &Hub) {
+    fn accelerate<const N: usize>(&mut self, hub: &HubMotion) {
         let Pendulum { c_m, r_l, inv_l, .. } = self.p;
         self.pull[N] = self.pull_0[N] - r_l * mul_part::<N>(&hub.omega_dot, &self.dir, 1);
         let [w_x, w_y] = scale::<N>(&hub.omega, &self.v);
@@ -217,18 +230,18 @@ impl Mode for Spherical {
     }
 
     #[inline(always)]
-    fn size(&self) -> f64 {
+    fn error_scale(&self) -> f64 {
         largest(self.dir_d[0]) + self.omega_n * largest(self.dir[0])
     }
 
     #[inline(always)]
-    fn term(&self, n: usize) -> f64 {
+    fn coefficient_norm(&self, n: usize) -> f64 {
         largest(self.v[n]).max(self.v_z[n].abs())
     }
 
     /// c l^2 |p'|^2
     #[inline(always)]
-    fn heat<const N: usize>(&mut self) -> f64 {
+    fn dissipation<const N: usize>(&mut self) -> f64 {
         let [x, y] = squares::<N>(&self.dir_d);
         self.p.c * self.p.l * self.p.l * (x + y + self.v_z2[N])
     }
@@ -245,19 +258,19 @@ impl Mode for Spherical {
     }
 
     /// The rod's pull along p and the drag.
-    fn force(&self, _: &Hub) -> [f64; 2] {
+    fn force(&self, _: &HubMotion) -> [f64; 2] {
         let Pendulum { m, l, c, .. } = self.p;
         [0, 1].map(|i| m * l * self.pull[0] * self.dir[0][i] + c * l * self.dir_d[0][i])
     }
 
     /// The pull acts at the hinge, the drag at the bob.
-    fn torque(&self, hub: &Hub) -> f64 {
+    fn torque(&self, hub: &HubMotion) -> f64 {
         let Pendulum { l, c, r, .. } = self.p;
         let ([x, y], [x_d, y_d]) = (self.dir[0], self.dir_d[0]);
         r * self.force(hub)[1] + c * l * l * (x * y_d - y * x_d)
     }
 
-    fn energy(&self, hub: &Hub) -> f64 {
+    fn energy(&self, hub: &HubMotion) -> f64 {
         let Pendulum { m, l, .. } = self.p;
         let [v_x, v_y, v_z] = self.velocity(hub);
         // 1 + p_z = |xi|^2 k, without cancellation near rest
@@ -266,7 +279,7 @@ impl Mode for Spherical {
         m * (v_x * v_x + v_y * v_y + v_z * v_z) / 2.0 + m * hub.g[0] * height
     }
 
-    fn momentum(&self, hub: &Hub) -> f64 {
+    fn momentum(&self, hub: &HubMotion) -> f64 {
         let ([x, y], [v_x, v_y, _]) = (self.bob(), self.velocity(hub));
         self.p.m * (x * v_y - y * v_x)
     }
@@ -322,14 +335,14 @@ mod tests {
             let p = Pendulum { m, l, c, r, c_m, r_l, inv_l, wave: 0.0, hardening: 0.0 };
             let q = core::array::from_fn(|i| between(-4.0, 4.0) * if i < 2 { 1.0 } else { 5.0 });
             let (w, w_d, g) = (between(-2.0, 2.0), between(-9.0, 9.0), between(0.0, 20.0));
-            let mut hub = Hub { omega: ZERO, omega2: ZERO, omega_dot: ZERO, g: [g, 0.0] };
+            let mut hub = HubMotion { g: [g, 0.0], ..HubMotion::REST };
             (hub.omega[0], hub.omega2[0], hub.omega_dot[0]) = (w, w * w, w_d);
             let mut mode = Spherical::new(&p);
             mode.start(&q, &hub);
-            mode.load::<0>(&hub);
-            mode.respond::<0>(&hub);
+            mode.hub_reaction::<0>(&hub);
+            mode.accelerate::<0>(&hub);
             let expected = lagrange(&p, q, w, w_d, g);
-            let [.., x_dd, y_dd] = mode.rate::<0>(&hub);
+            let [.., x_dd, y_dd] = mode.derivatives::<0>(&hub);
             // The terms are up to k |v|^2 |xi|, 1e4, and half of them are taken as 1/k, 20, of
             // smaller ones.
             let size = 1.0 + expected[0].abs().max(expected[1].abs()) + 1e3;

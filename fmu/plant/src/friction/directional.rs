@@ -1,0 +1,134 @@
+//! The directional factor B of dry friction (thesis 5.4):
+//!
+//! ```text
+//! B+-(theta) = 1 +- eta + sum over h = 1, 2 of a_h+- cos(h theta) + b_h+- sin(h theta),
+//! ```
+//!
+//! with + while the hub turns forwards, - backwards.
+
+use super::Contact;
+use crate::Friction;
+use crate::series::{self, Series, ZERO};
+
+/// B+-(theta) of one direction.
+#[derive(Clone, Copy, Debug)]
+struct OneWay {
+    mean: f64,
+    /// Coefficients of cos theta, sin theta, cos 2 theta, sin 2 theta.
+    harmonics: [f64; 4],
+}
+
+impl OneWay {
+    fn at(&self, theta: f64) -> f64 {
+        let [a1, b1, a2, b2] = self.harmonics;
+        if self.harmonics == [0.0; 4] {
+            return self.mean;
+        }
+        let (s1, c1) = libm::sincos(theta);
+        let (s2, c2) = libm::sincos(2.0 * theta);
+        self.mean + a1 * c1 + b1 * s1 + a2 * c2 + b2 * s2
+    }
+
+    /// A lower bound of B over all angles, exact to 2e-6 of the harmonics' size.
+    fn lowest(&self) -> f64 {
+        if self.harmonics == [0.0; 4] {
+            return self.mean;
+        }
+        const POINTS: usize = 4096;
+        let angle = |j: usize| core::f64::consts::TAU * j as f64 / POINTS as f64;
+        let lowest = (0..POINTS).map(|j| self.at(angle(j))).fold(f64::INFINITY, f64::min);
+        // Between two points B falls below both by at most |B''| (spacing/2)^2 / 2.
+        let [a1, b1, a2, b2] = self.harmonics.map(f64::abs);
+        let bend = a1 + b1 + 4.0 * (a2 + b2);
+        lowest - bend * (angle(1) / 2.0) * (angle(1) / 2.0) / 2.0
+    }
+
+    /// Coefficient N of B.
+    #[inline(always)]
+    fn coefficient<const N: usize>(&self, trig: &[Series; 4]) -> f64 {
+        let mean = series::constant::<N>(self.mean);
+        let terms = self.harmonics.iter().zip(trig);
+        mean + terms.map(|(coefficient, series)| coefficient * series[N]).sum::<f64>()
+    }
+}
+
+/// B of both directions, with the power series of the angle's harmonics.
+#[derive(Clone, Debug)]
+pub struct DirectionalFactor {
+    forward: OneWay,
+    backward: OneWay,
+    /// cos and sin of theta and 2 theta in turn, as in `OneWay::harmonics`; there only if B
+    /// depends on the angle.
+    trig: Option<Box<[Series; 4]>>,
+    /// theta' and 2 theta'
+    angles_d: [Series; 2],
+}
+
+impl DirectionalFactor {
+    pub fn new(p: &Friction) -> DirectionalFactor {
+        let forward = OneWay { mean: 1.0 + p.asymmetry, harmonics: p.harmonics_forward };
+        let backward = OneWay { mean: 1.0 - p.asymmetry, harmonics: p.harmonics_backward };
+        let angular = [forward, backward].iter().any(|b| b.harmonics != [0.0; 4]);
+        let trig = angular.then(|| Box::new([ZERO; 4]));
+        DirectionalFactor { forward, backward, trig, angles_d: [ZERO; 2] }
+    }
+
+    /// What is wrong with the parameters together: dry friction may not drive.
+    pub fn problems(p: &Friction) -> Vec<String> {
+        let factor = DirectionalFactor::new(p);
+        let directions = [(factor.forward, "forward", '+'), (factor.backward, "backward", '-')];
+        let wrong = directions.into_iter().filter(|(b, ..)| b.lowest() <= 0.0);
+        wrong
+            .map(|(one_way, name, sign)| {
+                format!(
+                    "friction.asymmetry and friction.{name}_* make the dry friction's factor \
+                     1 {sign} asymmetry + harmonics as low as {:.6}, so the bearing would drive \
+                     the hub; it must stay above 0 at every angle",
+                    one_way.lowest()
+                )
+            })
+            .collect()
+    }
+
+    /// B- and B+ at an angle.
+    pub fn at(&self, theta: f64) -> (f64, f64) {
+        (self.backward.at(theta), self.forward.at(theta))
+    }
+
+    /// B of the direction in which the hub turns where it does not depend on the angle.
+    pub fn constant(&self, contact: Contact) -> Option<f64> {
+        self.trig.is_none().then(|| self.one_way(contact).mean)
+    }
+
+    /// Coefficient N of cos and sin; comes before the coefficients of B.
+    pub fn expand<const N: usize>(&mut self, theta: &Series) {
+        let Some(trig) = &mut self.trig else { return };
+        let [c1, s1, c2, s2] = &mut **trig;
+        let [once_d, twice_d] = &mut self.angles_d;
+        (s1[N], c1[N]) = series::sin_cos::<N>(theta[N], once_d, s1, c1);
+        (s2[N], c2[N]) = series::sin_cos::<N>(2.0 * theta[N], twice_d, s2, c2);
+    }
+
+    /// Coefficient N of B in the direction in which the hub turns.
+    pub fn coefficient<const N: usize>(&self, contact: Contact) -> f64 {
+        self.of::<N>(self.one_way(contact))
+    }
+
+    /// Coefficient N of (B+ + B-)/2 and (B+ - B-)/2.
+    pub fn even_odd<const N: usize>(&self) -> (f64, f64) {
+        let (forward, backward) = (self.of::<N>(&self.forward), self.of::<N>(&self.backward));
+        ((forward + backward) / 2.0, (forward - backward) / 2.0)
+    }
+
+    fn one_way(&self, contact: Contact) -> &OneWay {
+        if contact == Contact::Forward { &self.forward } else { &self.backward }
+    }
+
+    #[inline(always)]
+    fn of<const N: usize>(&self, one_way: &OneWay) -> f64 {
+        match &self.trig {
+            Some(trig) => one_way.coefficient::<N>(trig),
+            None => series::constant::<N>(one_way.mean),
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! Stribeck's curve as a set-valued law (thesis eq. 5.1 and 5.4):
+//!
+//! ```text
+//! tau_f = -b w - sgn(w) T_C(w) B(theta)        w != 0
+//! -(c + d) B+ <= tau_f <= (c + d) B-            w = 0
+//! ```
+//!
+//! At rest the bearing holds whatever torque it can: the hub is stuck, exactly.
+//!
+//! When to choose it: a bearing with dry friction, whenever the hub may come to rest or
+//! reverse. Stick and slip are located as events, so it is exact and fast. Its hub does not
+//! move at all while stuck; for motion before sliding a law with a bristle is needed.
+
+use super::curve::StribeckCurve;
+use super::directional::DirectionalFactor;
+use super::{Contact, FrictionLaw};
+use crate::Friction;
+use crate::series::{self, Series, ZERO};
+use crate::slosh::HubMotion;
+
+#[derive(Clone, Debug)]
+pub struct Stribeck {
+    b: f64,
+    curve: StribeckCurve,
+    factor: DirectionalFactor,
+    /// B of the present direction
+    present: Series,
+}
+
+impl Stribeck {
+    pub fn new(p: &Friction) -> Stribeck {
+        let (curve, factor) = (StribeckCurve::new(p), DirectionalFactor::new(p));
+        Stribeck { b: p.b, curve, factor, present: ZERO }
+    }
+}
+
+impl FrictionLaw for Stribeck {
+    const SWITCHES_AT_REST: bool = true;
+
+    #[inline(always)]
+    fn torque<const N: usize>(&mut self, contact: Contact, hub: &HubMotion) -> f64 {
+        self.curve.expand::<N>(&hub.omega2);
+        let dry = match self.factor.constant(contact) {
+            Some(factor) => factor * self.curve.torque[N],
+            None => {
+                self.factor.expand::<N>(&hub.theta);
+                self.present[N] = self.factor.coefficient::<N>(contact);
+                series::mul::<N>(&self.curve.torque, &self.present)
+            }
+        };
+        -self.b * hub.omega[N] - if contact == Contact::Forward { dry } else { -dry }
+    }
+
+    fn holds(&self, theta: f64) -> (f64, f64) {
+        let ((backward, forward), dry) = (self.factor.at(theta), self.curve.at_rest());
+        (dry * backward, dry * forward)
+    }
+
+    fn contact_at_rest(&self, net: f64, theta: f64, before: Contact) -> Contact {
+        let (against_backward, against_forward) = self.holds(theta);
+        // A hub that has just broken away is at the limit, give or take rounding.
+        let limit = |hold: f64, from: Contact| {
+            if before == from { hold * (1.0 - 1e-12) } else { hold }
+        };
+        match net {
+            net if net > limit(against_forward, Contact::Forward) => Contact::Forward,
+            net if net < -limit(against_backward, Contact::Backward) => Contact::Backward,
+            _ => Contact::Stuck,
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! Stribeck's curve with its jump at rest smoothed, T = tanh(w/eps) for sgn(w):
+//!
+//! ```text
+//! tau_f = -b w - T_C(w) T [(B+ + B-)/2 + T (B+ - B-)/2]
+//! ```
+//!
+//! The blend of the two directions never drives the hub.
+//!
+//! When to choose it: only to repeat results of others who smoothed the sign. The hub creeps
+//! where it should be at rest, and each reversal within eps takes steps of about
+//! eps/|w'| seconds: it costs far more than the set-valued law that it approximates.
+
+use super::curve::StribeckCurve;
+use super::directional::DirectionalFactor;
+use super::{Contact, FrictionLaw};
+use crate::Friction;
+use crate::series::{self, Series, ZERO};
+use crate::slosh::HubMotion;
+
+#[derive(Clone, Debug)]
+pub struct StribeckSmooth {
+    b: f64,
+    eps: f64,
+    curve: StribeckCurve,
+    factor: DirectionalFactor,
+    /// v' with v = w/eps, t = tanh v, sech2 = 1 - t^2
+    v_d: Series,
+    t: Series,
+    sech2: Series,
+    /// (B+ + B-)/2, (B+ - B-)/2 and their blend
+    even: Series,
+    odd: Series,
+    blend: Series,
+    /// T times the blend
+    sign: Series,
+}
+
+impl StribeckSmooth {
+    pub fn new(p: &Friction) -> StribeckSmooth {
+        StribeckSmooth {
+            b: p.b,
+            eps: p.eps,
+            curve: StribeckCurve::new(p),
+            factor: DirectionalFactor::new(p),
+            v_d: ZERO,
+            t: ZERO,
+            sech2: ZERO,
+            even: ZERO,
+            odd: ZERO,
+            blend: ZERO,
+            sign: ZERO,
+        }
+    }
+}
+
+impl FrictionLaw for StribeckSmooth {
+    /// One term may vanish by symmetry; of tanh(w/eps) from w = w' = 0 on, three in
+    /// succession do.
+    const NEGLIGIBLE_TERMS: usize = 4;
+
+    #[inline(always)]
+    fn torque<const N: usize>(&mut self, _: Contact, hub: &HubMotion) -> f64 {
+        self.curve.expand::<N>(&hub.omega2);
+        self.t[N] = if N == 0 {
+            libm::tanh(hub.omega[0] / self.eps)
+        } else {
+            series::chain::<N>(hub.omega[N] / self.eps, &mut self.v_d, &self.sech2)
+        };
+        let t2 = series::square::<N>(&self.t);
+        self.sech2[N] = if N == 0 { 1.0 - t2 } else { -t2 };
+        self.factor.expand::<N>(&hub.theta);
+        (self.even[N], self.odd[N]) = self.factor.even_odd::<N>();
+        self.blend[N] = self.even[N] + series::mul::<N>(&self.t, &self.odd);
+        self.sign[N] = series::mul::<N>(&self.t, &self.blend);
+        -self.b * hub.omega[N] - series::mul::<N>(&self.curve.torque, &self.sign)
+    }
+
+    /// tanh has its nearest poles at distance sqrt(v^2 + (pi/2)^2) from v = w/eps, and it is
+    /// so flat away from 0 that its coefficients there do not tell; half the way is safe.
+    fn convergence_radius(&self, omega: &Series) -> f64 {
+        let [v, v1, v2] = [omega[0], omega[1], omega[2]].map(|x| (x / self.eps).abs());
+        let half = libm::sqrt(v * v + 2.4674) / 2.0;
+        let speed = v1 + libm::sqrt(v1 * v1 + 4.0 * v2 * half);
+        // A hub at rest without torque stays.
+        if speed > 0.0 { 2.0 * half / speed } else { f64::INFINITY }
+    }
+}

@@ -1,0 +1,267 @@
+//! The plant as a whole: hub, bearing, tank, wheel and gyro, and how it steps.
+//!
+//! ```text
+//! I_hub w' = tau_actuator + tau_ext + tau_friction + tau_fluid
+//! ```
+
+use crate::friction::{Contact, Law};
+use crate::motion::{Motion, StepError};
+use crate::outputs::Regime;
+use crate::slosh::{Angles, Liquid, SloshMode, with_modes};
+use crate::state::{STATES, State, x};
+use crate::{Calculated, Imu, MODES, Parameters, Wheel};
+
+/// A quantity that is linear in time: `value + slope t`.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Ramp {
+    /// Value now.
+    pub value: f64,
+    /// Rate of change, 1/s.
+    pub slope: f64,
+}
+
+impl Ramp {
+    /// A quantity that stays.
+    pub fn held(value: f64) -> Ramp {
+        Ramp { value, slope: 0.0 }
+    }
+
+    /// The value after `t` seconds.
+    pub fn at(self, t: f64) -> f64 {
+        self.value + self.slope * t
+    }
+
+    pub(crate) fn integral(self, t: f64) -> f64 {
+        (self.value + self.slope * t / 2.0) * t
+    }
+
+    /// The same quantity with the origin of time moved on by `t`.
+    pub(crate) fn after(self, t: f64) -> Ramp {
+        Ramp { value: self.at(t), slope: self.slope }
+    }
+}
+
+/// What acts on the plant from outside, over one step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Inputs {
+    /// Torque command to the actuator, N m.
+    pub tau_cmd: Ramp,
+    /// Any other torque on the hub, N m.
+    pub tau_ext: Ramp,
+    /// Specific force along the tank's axis, m/s2, not negative.
+    pub g_axial: Ramp,
+}
+
+impl Default for Inputs {
+    fn default() -> Self {
+        Inputs { tau_cmd: Ramp::held(0.0), tau_ext: Ramp::held(0.0), g_axial: Ramp::held(9.81) }
+    }
+}
+
+/// Hub, bearing, tank, wheel and gyro.
+#[derive(Clone, Debug)]
+pub struct Plant {
+    calculated: Calculated,
+    pub(crate) hub_inertia: f64,
+    /// Mass and inertia of the liquid that moves with the tank, kg, kg m2; distance of the
+    /// tank, m.
+    pub(crate) m_0: f64,
+    pub(crate) i_0: f64,
+    pub(crate) r: f64,
+    /// Wall elevation per slosh angle of each mode, m/rad, and the tank's radius, m.
+    pub(crate) wave: [f64; MODES],
+    pub(crate) radius: f64,
+    pub(crate) wheel: Wheel,
+    pub(crate) imu: Imu,
+    pub(crate) motion: Box<Motion>,
+    pub(crate) liquid: Liquid,
+    pub(crate) state: State,
+}
+
+impl Plant {
+    /// A plant at the start of its motion, at `start_time` (s), with the inputs that
+    /// act then; `tolerance` is the relative error allowed in rates and angles.
+    ///
+    /// # Errors
+    /// The ranges of single parameters are the caller's business; what parameters
+    /// mean together is checked here and all problems are returned.
+    pub fn new(
+        p: &Parameters,
+        inputs: &Inputs,
+        start_time: f64,
+        tolerance: f64,
+    ) -> Result<Plant, Vec<String>> {
+        let mut problems = Law::problems(&p.friction);
+        problems.extend(p.wheel.problems());
+        let mut state = State {
+            time: start_time,
+            x: [0.0; STATES],
+            contact: Contact::Forward,
+            regime: Regime::Linear,
+            event_count: 0,
+            event_time: start_time,
+            start_time,
+            start_g: inputs.g_axial.value,
+            gyro: p.imu.start(),
+        };
+        state.x[x::THETA] = p.init.theta;
+        state.x[x::OMEGA] = p.init.omega;
+        state.x[x::WHEEL_SPEED] = p.wheel.speed_0;
+        let mut plant = Plant::of_parameters(p, state, tolerance);
+        problems.extend(plant.liquid.start_problem(&p.init));
+        if !problems.is_empty() {
+            return Err(problems);
+        }
+        let angles = Angles {
+            angle: [p.init.slosh_angle_radial, p.init.slosh_angle],
+            rate: [p.init.slosh_rate_radial, p.init.slosh_rate],
+        };
+        with_modes!(&plant.liquid, modes => {
+            if let Some(first) = modes.first() {
+                plant.state.slosh_mut()[0] = first.coordinates(&angles);
+            }
+        });
+        plant.state.contact = plant.present_contact(inputs);
+        plant.state.regime = plant.present_regime(inputs);
+        if plant.imu.enabled {
+            let omega = plant.omega();
+            plant.imu.sample(&mut plant.state.gyro, omega);
+        }
+        Ok(plant)
+    }
+
+    /// A plant that continues from a saved state of one with the same parameters.
+    pub fn resume(p: &Parameters, state: &State, tolerance: f64) -> Plant {
+        Plant::of_parameters(p, *state, tolerance)
+    }
+
+    fn of_parameters(p: &Parameters, state: State, tolerance: f64) -> Plant {
+        let calculated = Calculated::new(p, state.start_g);
+        let i_0 = calculated.m_0 * p.tank.r * p.tank.r + p.tank.own_inertia;
+        let mut wave = [0.0; MODES];
+        for (wave, pendulum) in wave.iter_mut().zip(calculated.pendulums(p)) {
+            *wave = pendulum.wave;
+        }
+        let law = Law::new(&p.friction);
+        let motion = Motion::new(p.hub.inertia + i_0, law, tolerance, p.solver.max_steps);
+        Plant {
+            hub_inertia: p.hub.inertia,
+            m_0: calculated.m_0,
+            i_0,
+            r: p.tank.r,
+            wave,
+            radius: p.tank.d / 2.0,
+            wheel: p.wheel,
+            imu: p.imu,
+            motion: Box::new(motion),
+            liquid: Liquid::new(p, &calculated),
+            calculated,
+            state,
+        }
+    }
+
+    /// The present time, s.
+    pub fn time(&self) -> f64 {
+        self.state.time
+    }
+
+    /// The hub's rate, rad/s.
+    pub fn omega(&self) -> f64 {
+        self.state.x[x::OMEGA]
+    }
+
+    /// What follows from the parameters.
+    pub fn calculated(&self) -> &Calculated {
+        &self.calculated
+    }
+
+    /// The state, for saving.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+
+    /// Goes back to a saved state of this plant or of one with the same parameters.
+    pub fn set_state(&mut self, state: &State) {
+        self.state = *state;
+    }
+
+    /// Moves on by exactly `h` > 0 seconds; the inputs run along their ramps.
+    ///
+    /// # Errors
+    /// See [`StepError`]; the plant is as before.
+    pub fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), StepError> {
+        let before = self.state;
+        let done = self.advance(inputs, h);
+        if done.is_err() {
+            self.state = before;
+        }
+        done
+    }
+
+    /// As [`Plant::step`], but an error leaves the state unusable.
+    fn advance(&mut self, inputs: &Inputs, h: f64) -> Result<(), StepError> {
+        let state = &mut self.state;
+        let begin = state.time;
+        let (mut t, mut steps) = (0.0, 0);
+        while t < h {
+            // A piece of no length takes no step of the integrator; it counts as one.
+            steps += 1;
+            if steps > self.motion.max_steps {
+                return Err(self.motion.too_many_steps(begin + t));
+            }
+            let speed = state.x[x::WHEEL_SPEED];
+            let (length, torque, speed) = self.wheel.next(speed, inputs.tau_cmd.after(t), h - t);
+            let external = inputs.tau_ext.after(t);
+            let tau =
+                Ramp { value: torque.value + external.value, slope: torque.slope + external.slope };
+            let acting = (tau, inputs.g_axial.after(t));
+            with_modes!(&mut self.liquid, modes => self.motion.advance(
+                modes, state, acting, length, &self.imu, &mut steps,
+            ))?;
+            state.x[x::WHEEL_SPEED] = speed;
+            t = if length == h - t { h } else { t + length };
+        }
+        state.time = begin + h;
+        Ok(())
+    }
+
+    /// Evaluates the equations at the present instant.
+    pub(crate) fn evaluate(&mut self, inputs: &Inputs) {
+        let tau_actuator = self.wheel.torque(self.state.x[x::WHEEL_SPEED], inputs.tau_cmd);
+        let tau = Ramp::held(tau_actuator.value + inputs.tau_ext.value);
+        let contact = self.state.contact;
+        with_modes!(&mut self.liquid, modes => {
+            self.motion.start(modes, &self.state, tau, inputs.g_axial);
+            self.motion.derivatives::<0, _>(modes, contact);
+        });
+    }
+
+    /// The contact that the hub's rate or, at rest, the torques make.
+    pub(crate) fn present_contact(&mut self, inputs: &Inputs) -> Contact {
+        self.evaluate(inputs);
+        with_modes!(&mut self.liquid, modes => self.motion.contact(modes, &self.state))
+    }
+
+    /// The regime that the present wave height makes.
+    pub(crate) fn present_regime(&mut self, inputs: &Inputs) -> Regime {
+        let wave_height = self.outputs_held(inputs).wave_height;
+        self.regime_of(wave_height)
+    }
+
+    /// Looks at the plant with the contact that the present inputs give: torque that was
+    /// changed since the last step may already have broken the hub away, or a break-away
+    /// an instant ago may be undone.
+    pub fn with_present_contact<T>(
+        &mut self,
+        inputs: &Inputs,
+        look: impl FnOnce(&mut Plant) -> T,
+    ) -> T {
+        let before = self.state.contact;
+        if self.omega() == 0.0 {
+            self.state.contact = self.present_contact(inputs);
+        }
+        let seen = look(self);
+        self.state.contact = before;
+        seen
+    }
+}

@@ -1,0 +1,203 @@
+//! The plant's state, and the names of its parts: the continuous states and the event
+//! indicators are declared here and nowhere else.
+
+use crate::friction::Contact;
+use crate::imu::Gyro;
+use crate::outputs::Regime;
+
+/// Places of the continuous states in x. A new one is a new constant before [`x::SLOSH`].
+pub mod x {
+    use crate::MODES;
+
+    /// Hub angle, rad.
+    pub const THETA: usize = 0;
+    /// Hub rate, rad/s.
+    pub const OMEGA: usize = 1;
+    /// Work of tau_actuator and tau_ext since the start, J.
+    pub const WORK: usize = 2;
+    /// Energy dissipated since the start, J.
+    pub const HEAT: usize = 3;
+    /// Time spent stuck since the start, s.
+    pub const STUCK_TIME: usize = 4;
+    /// Absolute rate of the wheel's rotor, rad/s.
+    pub const WHEEL_SPEED: usize = 5;
+    /// The first of the slosh coordinates: q_x, q_y, q_x', q_y' of mode 1, then of mode 2, …
+    /// Their unit is the slosh model's; modes that are not used stay at 0.
+    pub const SLOSH: usize = 6;
+    /// How many there are.
+    pub const COUNT: usize = SLOSH + 4 * MODES;
+}
+
+/// Number of continuous states.
+pub const STATES: usize = x::COUNT;
+
+/// Places of the event indicators: functions that are positive between events and cross
+/// zero at them.
+pub mod indicator {
+    /// The hub comes to rest.
+    pub const REST: usize = 0;
+    /// A stuck hub breaks away forwards.
+    pub const BREAK_AWAY_FORWARD: usize = 1;
+    /// A stuck hub breaks away backwards.
+    pub const BREAK_AWAY_BACKWARD: usize = 2;
+    /// The command passes the wheel's torque limit.
+    pub const TORQUE_MAX: usize = 3;
+    /// The command passes minus the wheel's torque limit.
+    pub const TORQUE_MIN: usize = 4;
+    /// The command to the wheel changes its sign.
+    pub const TORQUE_SIGN: usize = 5;
+    /// The rotor reaches its highest speed.
+    pub const SPEED_MAX: usize = 6;
+    /// The rotor reaches its lowest speed.
+    pub const SPEED_MIN: usize = 7;
+    /// How many there are.
+    pub const COUNT: usize = 8;
+}
+
+/// Number of event indicators.
+pub const INDICATORS: usize = indicator::COUNT;
+
+/// From here on energies and forces may overflow, though angles and rates do not yet.
+const MAX_MAGNITUDE: f64 = 1e100;
+
+/// The plant's memory: all that a saved state needs besides parameters and inputs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct State {
+    pub(crate) time: f64,
+    /// The continuous states, by the places in [`x`].
+    pub(crate) x: [f64; STATES],
+    pub(crate) contact: Contact,
+    /// Range of sloshing since the last event, for hosts that integrate themselves.
+    pub(crate) regime: Regime,
+    pub(crate) event_count: i32,
+    pub(crate) event_time: f64,
+    pub(crate) start_time: f64,
+    /// g_axial at the start: the slosh damping belongs to it.
+    pub(crate) start_g: f64,
+    pub(crate) gyro: Gyro,
+}
+
+impl State {
+    /// Length of the flat form.
+    pub const WORDS: usize = 2 + Self::REALS;
+
+    /// How many of the words are real numbers, the last of them x.
+    const REALS: usize = 6 + STATES;
+
+    /// The state as plain words, for saving.
+    pub fn to_words(&self) -> [u64; Self::WORDS] {
+        let mut words = [0; Self::WORDS];
+        let discrete = [self.contact as i8 as u8, self.regime as u8];
+        words[0] = u64::from(self.event_count as u32)
+            | u64::from(discrete[0]) << 32
+            | u64::from(discrete[1]) << 40;
+        words[1] = self.gyro.next;
+        let reals = [
+            self.time,
+            self.event_time,
+            self.start_time,
+            self.start_g,
+            self.gyro.bias,
+            self.gyro.held,
+        ];
+        for (word, real) in words[2..].iter_mut().zip(reals.iter().chain(&self.x)) {
+            *word = real.to_bits();
+        }
+        words
+    }
+
+    /// The reverse; `None` when the words are not a state.
+    pub fn from_words(words: &[u64; Self::WORDS]) -> Option<State> {
+        let contact = match (words[0] >> 32) as u8 as i8 {
+            -1 => Contact::Backward,
+            0 => Contact::Stuck,
+            1 => Contact::Forward,
+            _ => return None,
+        };
+        let regime = match words[0] >> 40 {
+            1 => Regime::Linear,
+            2 => Regime::Transitional,
+            3 => Regime::Nonlinear,
+            _ => return None,
+        };
+        let mut reals = [0.0; Self::REALS];
+        for (real, word) in reals.iter_mut().zip(&words[2..]) {
+            *real = f64::from_bits(*word);
+        }
+        let ([time, event_time, start_time, start_g, bias, held], x) = reals.split_first_chunk()?;
+        let finite = reals.iter().all(|real| real.is_finite());
+        // Beyond this the samples' instants can't be told apart.
+        let countable = words[1] <= 1 << f64::MANTISSA_DIGITS;
+        (finite && countable).then_some(State {
+            time: *time,
+            x: x.try_into().ok()?,
+            contact,
+            regime,
+            event_count: words[0] as u32 as i32,
+            event_time: *event_time,
+            start_time: *start_time,
+            start_g: *start_g,
+            gyro: Gyro { next: words[1], bias: *bias, held: *held },
+        })
+    }
+
+    /// The coordinates of each slosh mode, see `slosh`.
+    pub(crate) fn slosh(&self) -> &[[f64; 4]] {
+        self.x[x::SLOSH..].as_chunks().0
+    }
+
+    /// The same, to change.
+    pub(crate) fn slosh_mut(&mut self) -> &mut [[f64; 4]] {
+        self.x[x::SLOSH..].as_chunks_mut().0
+    }
+
+    /// Notes a new contact at `time`.
+    pub(crate) fn record_contact(&mut self, contact: Contact, time: f64) {
+        if contact != self.contact {
+            self.contact = contact;
+            self.event_count = self.event_count.saturating_add(1);
+            self.event_time = time;
+        }
+    }
+
+    /// Whether hub and so many modes, and their squares, are finite.
+    pub(crate) fn is_finite(&self, modes: usize) -> bool {
+        let within = |x: &f64| x.abs() < MAX_MAGNITUDE; // NaN is not
+        let hub = [x::THETA, x::OMEGA, x::WORK, x::HEAT];
+        hub.iter().all(|place| within(&self.x[*place]))
+            && self.slosh()[..modes].iter().flatten().all(within)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_the_state_and_nothing_else_is() {
+        let state = State {
+            time: 1.5,
+            x: core::array::from_fn(|i| i as f64 - 3.0),
+            contact: Contact::Backward,
+            regime: Regime::Nonlinear,
+            event_count: -1,
+            event_time: 0.25,
+            start_time: -7.0,
+            start_g: 9.81,
+            gyro: Gyro { next: 12, bias: -1e-5, held: 0.125 },
+        };
+        let words = state.to_words();
+        assert_eq!(State::from_words(&words), Some(state));
+        let with = |place: usize, word: u64| {
+            let mut wrong = words;
+            wrong[place] = word;
+            State::from_words(&wrong)
+        };
+        assert_eq!(with(0, 2 << 32 | 1 << 40), None, "no such contact");
+        assert_eq!(with(0, 1 << 32), None, "no such regime");
+        assert_eq!(with(1, u64::MAX), None, "samples that can't be counted");
+        for place in 2..State::WORDS {
+            assert_eq!(with(place, f64::NAN.to_bits()), None, "{place}");
+        }
+    }
+}
