@@ -3,24 +3,27 @@
 use std::path::PathBuf;
 use std::process::{Command, Output};
 
+use HubSlosh::table::TABLE;
 use plant::{FrictionModel, Parameters, SloshModel};
+use runtime::variable::Kind;
 
 /// Every slosh model.
-pub const SLOSH: [SloshModel; 5] = [
-    SloshModel::Frozen,
-    SloshModel::Linear,
-    SloshModel::Planar,
-    SloshModel::Spherical,
-    SloshModel::Paraboloid,
-];
+pub const SLOSH: [SloshModel; SloshModel::ALL.len()] = SloshModel::ALL;
 
 /// Every friction law.
-pub const FRICTION: [FrictionModel; 4] = [
-    FrictionModel::None,
-    FrictionModel::Viscous,
-    FrictionModel::StribeckSmooth,
-    FrictionModel::Stribeck,
-];
+pub const FRICTION: [FrictionModel; FrictionModel::ALL.len()] = FrictionModel::ALL;
+
+/// The numbers of the items of an enumeration, by the name of a variable.
+///
+/// # Panics
+/// If there is no such variable, or if it is not an enumeration.
+pub fn items(name: &str) -> std::ops::RangeInclusive<i32> {
+    let variable = TABLE.variables.iter().find(|v| v.name == name);
+    match variable.map(|v| v.kind) {
+        Some(Kind::Enumeration(of)) => 1..=of.items.len() as i32,
+        _ => panic!("{name} is not an enumeration"),
+    }
+}
 
 /// The bench with the given models.
 pub fn bench(slosh: SloshModel, friction: FrictionModel) -> Parameters {

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use common::{python, run};
+use crate::common::{python, run};
 
 /// The harness's binary, of the profile that this test was built with; it is
 /// another package's, so Cargo does not say where it is.

@@ -1,20 +1,31 @@
-//! modelDescription.xml from the FMU's variable table.
+//! modelDescription.xml from an FMU's variable table.
 //!
 //! Nothing is said here about any single variable: what the XML says of it is in
-//! `HubSlosh::table`, and the XML is committed so that a change of the interface
+//! the table, and the XML is committed so that a change of the interface
 //! shows in a diff.
 
 pub mod icon;
 pub mod schema;
 pub mod variables;
 
-use HubSlosh::instance::DEFAULT_TOLERANCE;
-use HubSlosh::log::CATEGORIES;
-use HubSlosh::table::{self, ENUMERATIONS, MODEL, SCALARS, Scalar, UNITS, VERSION};
-use HubSlosh::variable::{Access, Causality, Kind, Value};
+use std::path::PathBuf;
+
+use runtime::Model;
+use runtime::instance::DEFAULT_TOLERANCE;
+use runtime::log::categories;
+use runtime::table::Scalar;
+use runtime::unit::Unit;
+use runtime::variable::{Access, Causality, Enumeration, Kind, Value};
+
+/// The folder of a model's XML, documentation and pictures.
+pub fn folder<M: Model>() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(M::table().about.model)
+}
 
 /// Where the committed XML is.
-pub const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/HubSlosh/modelDescription.xml");
+pub fn path<M: Model>() -> PathBuf {
+    folder::<M>().join("modelDescription.xml")
+}
 
 /// The date of the release; not of the build, which the same commit must survive
 /// byte for byte.
@@ -25,30 +36,30 @@ const STOP_TIME: f64 = 20.0;
 const STEP_SIZE: f64 = 0.02;
 
 /// The file's text.
-pub fn xml() -> Result<String, serde_xml_rs::Error> {
+pub fn xml<M: Model>() -> Result<String, serde_xml_rs::Error> {
     let layout = xml::EmitterConfig::new().perform_indent(true).indent_string("  ");
-    let mut text = serde_xml_rs::SerdeXml::new().emitter(layout).to_string(&description())?;
+    let mut text = serde_xml_rs::SerdeXml::new().emitter(layout).to_string(&description::<M>())?;
     text.push('\n');
     Ok(text)
 }
 
-fn description() -> schema::ModelDescription {
+fn description<M: Model>() -> schema::ModelDescription {
+    let table = M::table();
     schema::ModelDescription {
         fmi_version: "2.0",
-        model_name: MODEL,
-        guid: table::guid(),
-        description: "A spacecraft hub on a bearing with dry friction that can stick, and on it a \
-                      tank with sloshing liquid, a reaction wheel and a rate gyro",
+        model_name: table.about.model,
+        guid: table.guid().into(),
+        description: table.about.description,
         author: env!("CARGO_PKG_AUTHORS"),
-        version: VERSION,
+        version: table.about.version,
         copyright: format!("(c) 2026 {}", env!("CARGO_PKG_AUTHORS")),
         license: env!("CARGO_PKG_LICENSE"),
-        generation_tool: format!("{MODEL} {VERSION}"),
+        generation_tool: format!("{} {}", table.about.model, table.about.version),
         generation_date_and_time: RELEASED,
         variable_naming_convention: "structured",
-        number_of_event_indicators: plant::INDICATORS,
+        number_of_event_indicators: table.about.event_indicators,
         model_exchange: schema::ModelExchange {
-            model_identifier: MODEL,
+            model_identifier: table.about.model,
             needs_execution_tool: false,
             completed_integrator_step_not_needed: false,
             can_be_instantiated_only_once_per_process: false,
@@ -58,7 +69,7 @@ fn description() -> schema::ModelDescription {
             provides_directional_derivative: true,
         },
         co_simulation: schema::CoSimulation {
-            model_identifier: MODEL,
+            model_identifier: table.about.model,
             needs_execution_tool: false,
             can_handle_variable_communication_step_size: true,
             can_interpolate_inputs: true,
@@ -70,11 +81,11 @@ fn description() -> schema::ModelDescription {
             can_serialize_fmu_state: true,
             provides_directional_derivative: true,
         },
-        units: schema::Units { all: UNITS.iter().map(unit).collect() },
-        types: schema::Types { all: ENUMERATIONS.into_iter().map(simple_type).collect() },
+        units: schema::Units { all: table.units().map(unit).collect() },
+        types: schema::Types { all: table.enumerations().into_iter().map(simple_type).collect() },
         log_categories: schema::LogCategories {
-            all: CATEGORIES
-                .iter()
+            all: categories(table)
+                .into_iter()
                 .map(|c| schema::Category { name: c.name, description: c.description })
                 .collect(),
         },
@@ -84,22 +95,22 @@ fn description() -> schema::ModelDescription {
             tolerance: real(DEFAULT_TOLERANCE),
             step_size: real(STEP_SIZE),
         },
-        variables: schema::Variables { all: SCALARS.iter().map(variable).collect() },
+        variables: schema::Variables { all: table.scalars.iter().map(variable).collect() },
         structure: schema::Structure {
-            outputs: unknowns(is_output, |s| s.follows().collect()),
-            derivatives: unknowns(is_rate, |s| s.follows().collect()),
-            initial_unknowns: unknowns(
+            outputs: unknowns::<M>(is_output, |s| s.depends_on().collect()),
+            derivatives: unknowns::<M>(is_derivative, |s| s.depends_on().collect()),
+            initial_unknowns: unknowns::<M>(
                 |s| {
                     let calculated = s.variable.causality == Causality::CalculatedParameter;
-                    is_output(s) || calculated || s.variable.state.is_some() || is_rate(s)
+                    is_output(s) || calculated || s.variable.state.is_some() || is_derivative(s)
                 },
-                |s| s.starts_from().collect(),
+                |s| s.initial_depends_on().collect(),
             ),
         },
     }
 }
 
-fn unit(unit: &table::Unit) -> schema::Unit {
+fn unit(unit: &Unit) -> schema::Unit {
     let exponent = |n: i32| (n != 0).then_some(n);
     schema::Unit {
         name: unit.name,
@@ -110,14 +121,14 @@ fn unit(unit: &table::Unit) -> schema::Unit {
             rad: exponent(rad),
         }),
         displayed: unit
-            .displayed
+            .display_units
             .iter()
             .map(|(name, factor)| schema::DisplayUnit { name, factor: real(*factor) })
             .collect(),
     }
 }
 
-fn simple_type(of: &HubSlosh::variable::Enumeration) -> schema::SimpleType {
+fn simple_type(of: &Enumeration) -> schema::SimpleType {
     let items = of.items.iter().zip(1..);
     schema::SimpleType {
         name: of.name,
@@ -134,7 +145,7 @@ fn simple_type(of: &HubSlosh::variable::Enumeration) -> schema::SimpleType {
     }
 }
 
-fn variable(scalar: &Scalar) -> schema::ScalarVariable {
+fn variable<M: Model>(scalar: &Scalar<M>) -> schema::ScalarVariable {
     let v = scalar.variable;
     let (causality, initial) = match v.causality {
         Causality::Input => ("input", None),
@@ -149,7 +160,7 @@ fn variable(scalar: &Scalar) -> schema::ScalarVariable {
         (_, Kind::Real(_)) => "continuous",
         _ => "discrete",
     };
-    let start = v.start().map(|value| match value {
+    let start = scalar.start().map(|value| match value {
         Value::Real(x) => real(x),
         Value::Integer(n) => n.to_string(),
         Value::Boolean(b) => b.to_string(),
@@ -163,7 +174,7 @@ fn variable(scalar: &Scalar) -> schema::ScalarVariable {
             nominal: q.nominal.map(real),
             start,
             derivative: match v.access {
-                Access::Rate(place) => table::state_at(place.at(scalar.element)).map(index),
+                Access::Derivative(place) => M::table().state_at(place(scalar.element)).map(index),
                 _ => None,
             },
             reinit: v.reinit.then_some(true),
@@ -188,25 +199,25 @@ fn real(x: f64) -> String {
     format!("{x:?}")
 }
 
-fn is_output(scalar: &Scalar) -> bool {
+fn is_output<M: Model>(scalar: &Scalar<M>) -> bool {
     scalar.variable.causality == Causality::Output
 }
 
-fn is_rate(scalar: &Scalar) -> bool {
-    matches!(scalar.variable.access, Access::Rate(_))
+fn is_derivative<M: Model>(scalar: &Scalar<M>) -> bool {
+    matches!(scalar.access, Access::Derivative(_))
 }
 
 /// Place among the variables, counted from 1.
-fn index(scalar: &Scalar) -> usize {
+fn index<M: Model>(scalar: &Scalar<M>) -> usize {
     scalar.reference as usize + 1
 }
 
 /// Some of the scalars in the order of their indices, with what they depend on.
-fn unknowns(
-    of_interest: impl Fn(&Scalar) -> bool,
-    dependencies: impl Fn(&Scalar) -> Vec<&'static Scalar>,
+fn unknowns<M: Model>(
+    of_interest: impl Fn(&Scalar<M>) -> bool,
+    dependencies: impl Fn(&Scalar<M>) -> Vec<&'static Scalar<M>>,
 ) -> schema::Unknowns {
-    let all = SCALARS.iter().filter(|scalar| of_interest(scalar)).map(|scalar| {
+    let all = M::table().scalars.iter().filter(|scalar| of_interest(scalar)).map(|scalar| {
         let text: Vec<_> =
             dependencies(scalar).into_iter().map(|known| index(known).to_string()).collect();
         schema::Unknown {

@@ -1,15 +1,20 @@
-//! Rewrites what is committed and follows from something else: modelDescription.xml and the
-//! page of variables from the variable table, the icon's pixels from its drawing.
+//! Rewrites what is committed and follows from something else: each FMU's modelDescription.xml
+//! and page of variables from its variable table, the icon's pixels from its drawing.
 
-use model_description::{PATH, icon, variables, xml};
+use model_description::{icon, path, variables, xml};
+use runtime::Model;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    std::fs::write(PATH, xml()?)?;
-    std::fs::write(variables::PATH, variables::page())?;
+    write::<HubSlosh::HubSlosh>()?;
     let picture = icon::draw(&std::fs::read_to_string(icon::SOURCE)?)?;
     std::fs::write(icon::PATH, picture.encode_png()?)?;
-    for path in [PATH, variables::PATH, icon::PATH] {
-        println!("wrote {path}");
-    }
+    println!("wrote {}", icon::PATH);
+    Ok(())
+}
+
+fn write<M: Model>() -> Result<(), Box<dyn std::error::Error>> {
+    std::fs::write(path::<M>(), xml::<M>()?)?;
+    std::fs::write(variables::path::<M>(), variables::page::<M>())?;
+    println!("wrote {}\nwrote {}", path::<M>().display(), variables::path::<M>().display());
     Ok(())
 }

@@ -1,12 +1,15 @@
 //! The documentation's page of all variables, from the FMU's variable table.
 
 use std::fmt::Write as _;
+use std::path::PathBuf;
 
-use HubSlosh::table::{ENUMERATIONS, TABLE};
-use HubSlosh::variable::{Causality, Kind, Value, Variable};
+use runtime::Model;
+use runtime::variable::{Causality, Kind, Value, Variable};
 
 /// Where the committed page is.
-pub const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/HubSlosh/documentation/variables.md");
+pub fn path<M: Model>() -> PathBuf {
+    crate::folder::<M>().join("documentation").join("variables.md")
+}
 
 const CHAPTERS: [(Causality, &str, &str); 5] = [
     (
@@ -37,13 +40,12 @@ const CHAPTERS: [(Causality, &str, &str); 5] = [
 ];
 
 /// The page's text, Markdown.
-pub fn page() -> String {
+pub fn page<M: Model>() -> String {
     let mut page = String::from(
         "<!-- Written by `cargo run --release -p model-description`; do not edit. -->\n\
          # All variables\n\n\
          Values cross the interface in the unit given first; the one in brackets is what tools \
-         are asked to display. A name with [1..10] stands for ten variables, one per slosh \
-         mode. Ranges are those the FMU holds the host to.\n",
+         are asked to display. A name with [1..10] stands for ten variables. Ranges are those the FMU holds the host to.\n",
     );
     for (causality, title, introduction) in CHAPTERS {
         let _ = write!(page, "\n## {title}\n\n{introduction}\n\n");
@@ -53,7 +55,7 @@ pub fn page() -> String {
         } else {
             "| name | unit | meaning |\n| --- | --- | --- |\n"
         });
-        for variable in TABLE.iter().filter(|v| v.causality == causality) {
+        for variable in M::table().variables.iter().filter(|v| v.causality == causality) {
             let _ = write!(page, "| `{}` | {} |", name(variable), unit(variable));
             if set_by_host {
                 let (min, max) = range(variable);
@@ -65,7 +67,7 @@ pub fn page() -> String {
     page.push_str(
         "\n## Enumerations\n\n| type | number | name | meaning |\n| --- | --- | --- | --- |\n",
     );
-    for of in ENUMERATIONS {
+    for of in M::table().enumerations() {
         for (item, number) in of.items.iter().zip(1..) {
             let (name, description) = (item.name, item.description);
             let _ = writeln!(page, "| {} | {number} | `{name}` | {description} |", of.name);
@@ -74,15 +76,11 @@ pub fn page() -> String {
     page
 }
 
-fn name(variable: &Variable) -> String {
-    match (variable.len(), variable.name.strip_suffix(')')) {
-        (1, _) => variable.name.into(),
-        (n, None) => format!("{}[1..{n}]", variable.name),
-        (n, Some(derivative)) => format!("{derivative}[1..{n}])"),
-    }
+fn name<M: Model>(variable: &Variable<M>) -> String {
+    variable.pattern()
 }
 
-fn unit(variable: &Variable) -> String {
+fn unit<M: Model>(variable: &Variable<M>) -> String {
     match variable.kind {
         Kind::Real(quantity) => match (quantity.unit, quantity.display_unit) {
             ("", _) => "depends on `slosh.model`".into(),
@@ -95,8 +93,9 @@ fn unit(variable: &Variable) -> String {
     }
 }
 
-fn start(variable: &Variable) -> String {
-    match (variable.start(), variable.kind) {
+fn start<M: Model>(variable: &Variable<M>) -> String {
+    let start = variable.start(&mut M::Parameters::default(), &mut M::Inputs::default(), 0);
+    match (start, variable.kind) {
         (Some(Value::Integer(n)), Kind::Enumeration(of)) => {
             let item = usize::try_from(n - 1).ok().and_then(|n| of.items.get(n));
             format!("`{}`", item.map_or("", |item| item.name))
@@ -108,7 +107,7 @@ fn start(variable: &Variable) -> String {
     }
 }
 
-fn range(variable: &Variable) -> (String, String) {
+fn range<M: Model>(variable: &Variable<M>) -> (String, String) {
     match variable.kind {
         Kind::Real(quantity) => {
             let text = |x: Option<f64>| x.map(number).unwrap_or_default();
@@ -127,7 +126,7 @@ fn number(x: f64) -> String {
     if x == 0.0 || (1e-4..1e5).contains(&x.abs()) { format!("{x}") } else { format!("{x:e}") }
 }
 
-fn notes(variable: &Variable) -> &'static str {
+fn notes<M: Model>(variable: &Variable<M>) -> &'static str {
     match (variable.tunable, variable.state.is_some()) {
         (true, _) => " (*tunable*)",
         (_, true) => " (*continuous state*)",

@@ -5,27 +5,29 @@
 pub mod states;
 pub mod values;
 
-use HubSlosh::calls::{self, Call};
-use HubSlosh::instance::Instance;
-use HubSlosh::snapshot::{from_bytes, to_bytes};
-use HubSlosh::table::{SCALARS, Scalar};
-use HubSlosh::variable::{Access, Causality, Kind, Value};
+use HubSlosh::Instance;
+use HubSlosh::Scalar;
+use HubSlosh::from_bytes;
+use HubSlosh::table::TABLE;
+use runtime::operation::{self as op, Operation};
+use runtime::snapshot::to_bytes;
+use runtime::variable::{Access, Causality, Kind, Value};
 
 /// The call that reads a variable of this type.
-fn getter(scalar: &Scalar) -> &'static Call {
+fn getter(scalar: &Scalar) -> &'static Operation {
     match scalar.variable.kind {
-        Kind::Real(_) => &calls::GET_REAL,
-        Kind::Integer { .. } | Kind::Enumeration(_) => &calls::GET_INTEGER,
-        Kind::Boolean => &calls::GET_BOOLEAN,
+        Kind::Real(_) => &op::GET_REAL,
+        Kind::Integer { .. } | Kind::Enumeration(_) => &op::GET_INTEGER,
+        Kind::Boolean => &op::GET_BOOLEAN,
     }
 }
 
 /// A value's own call to set it.
-fn setter(value: Value) -> &'static Call {
+fn setter(value: Value) -> &'static Operation {
     match value {
-        Value::Real(_) => &calls::SET_REAL,
-        Value::Integer(_) => &calls::SET_INTEGER,
-        Value::Boolean(_) => &calls::SET_BOOLEAN,
+        Value::Real(_) => &op::SET_REAL,
+        Value::Integer(_) => &op::SET_INTEGER,
+        Value::Boolean(_) => &op::SET_BOOLEAN,
     }
 }
 
@@ -37,9 +39,9 @@ fn everything_is_a_number(instance: &mut Instance) {
     let shown = |scalar: &&Scalar| {
         matches!(scalar.variable.causality, Causality::Output | Causality::Local)
             // these are read one by one from all states together: slow, and seen in the states
-            && !matches!(scalar.variable.access, Access::Rate(_))
+            && !matches!(scalar.variable.access, Access::Derivative(_))
     };
-    for scalar in SCALARS.iter().filter(shown) {
+    for scalar in TABLE.scalars.iter().filter(shown) {
         match instance.get(getter(scalar), scalar.reference) {
             Ok(Value::Real(x)) => assert!(x.is_finite(), "{} = {x}", scalar.name()),
             Ok(_) => {}

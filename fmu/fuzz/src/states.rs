@@ -3,13 +3,13 @@
 
 use std::sync::OnceLock;
 
-use HubSlosh::calls::{self, Interface, Mode};
-use HubSlosh::hash::Hash;
-use HubSlosh::instance::Instance;
-use HubSlosh::snapshot::{from_bytes, to_bytes};
-use HubSlosh::table;
-use HubSlosh::variable::Value;
-use plant::{INDICATORS, STATES};
+use HubSlosh::Instance;
+use HubSlosh::from_bytes;
+use HubSlosh::table::TABLE;
+use runtime::hash::Hash;
+use runtime::operation::{self as op, InstanceState, Interface};
+use runtime::snapshot::to_bytes;
+use runtime::variable::Value;
 
 use crate::{everything_is_a_number, setter, survives_being_saved};
 
@@ -40,7 +40,7 @@ pub fn run(data: &[u8]) {
     bytes[body..].copy_from_slice(&checksum);
     let Ok(read) = from_bytes(&bytes) else { return };
     let read = survives_being_saved(&read);
-    let mut instance = Instance::new(read.interface());
+    let mut instance = HubSlosh::instance(read.interface());
     instance.restore(&read).expect("a state that could be read can be restored");
     live(&mut instance);
 }
@@ -48,17 +48,17 @@ pub fn run(data: &[u8]) {
 /// What a host may do next. Calls may be refused; after a step that succeeded everything is a
 /// number.
 fn live(instance: &mut Instance) {
-    let torque = table::find("tau_cmd").expect("there is a tau_cmd");
+    let torque = TABLE.find("tau_cmd").expect("there is a tau_cmd");
     _ = instance.set(setter(Value::Real(0.1)), &[torque], |_| Value::Real(0.1));
-    if instance.mode() == Mode::Instantiated {
+    if instance.state() == InstanceState::Instantiated {
         _ = instance.enter_initialization_mode();
     }
-    if instance.mode() == Mode::Initialization {
+    if instance.state() == InstanceState::Initialization {
         _ = instance.exit_initialization_mode();
     }
-    for n in 0..table::SCALARS.len() as u32 {
-        _ = instance.get(&calls::GET_REAL, n);
-        _ = instance.output_derivative(n, 1);
+    for n in 0..TABLE.scalars.len() as u32 {
+        _ = instance.get(&op::GET_REAL, n);
+        _ = instance.output_derivatives(&[n], &[1], &mut [0.0]);
     }
     match instance.interface() {
         Interface::CoSimulation => {
@@ -69,15 +69,16 @@ fn live(instance: &mut Instance) {
             }
         }
         Interface::ModelExchange => {
+            let nx = TABLE.places().len();
             let (mut x, mut rates, mut indicators) =
-                ([0.0; STATES], [0.0; STATES], [0.0; INDICATORS]);
+                (vec![0.0; nx], vec![0.0; nx], vec![0.0; TABLE.about.event_indicators]);
             for _ in 0..3 {
                 _ = instance.new_discrete_states();
                 _ = instance.enter_continuous_time_mode();
                 _ = instance.continuous_states(&mut x);
                 _ = instance.derivatives(&mut rates);
                 _ = instance.event_indicators(&mut indicators);
-                for (x, rate) in x.iter_mut().zip(rates) {
+                for (x, rate) in x.iter_mut().zip(&rates) {
                     *x += 1e-3 * rate;
                 }
                 _ = instance.set_time(instance.time() + 1e-3);
@@ -98,7 +99,7 @@ fn bases() -> &'static [Vec<u8>] {
         let mut all = Vec::new();
         for interface in [Interface::CoSimulation, Interface::ModelExchange] {
             for model in 1..=5 {
-                let mut instance = Instance::new(interface);
+                let mut instance = HubSlosh::instance(interface);
                 let settings = [
                     ("slosh.model", Value::Integer(model)),
                     ("slosh.modes", Value::Integer(2)),
@@ -108,7 +109,7 @@ fn bases() -> &'static [Vec<u8>] {
                     ("imu.enabled", Value::Boolean(true)),
                 ];
                 for (name, value) in settings {
-                    let reference = table::find(name).expect("the table has the variable");
+                    let reference = TABLE.find(name).expect("the table has the variable");
                     instance.set(setter(value), &[reference], |_| value).expect("a good value");
                 }
                 all.push(to_bytes(&instance));

@@ -5,11 +5,11 @@ use std::time::{Duration, Instant};
 
 use arbitrary::{Result, Unstructured};
 
-use HubSlosh::calls::{Interface, Mode};
-use HubSlosh::instance::Instance;
-use HubSlosh::snapshot::to_bytes;
-use HubSlosh::table::SCALARS;
-use HubSlosh::variable::{Causality, Kind, Quantity, Value};
+use HubSlosh::Instance;
+use HubSlosh::table::TABLE;
+use runtime::operation::{InstanceState, Interface};
+use runtime::snapshot::to_bytes;
+use runtime::variable::{Causality, Kind, Quantity, Value};
 
 use crate::{everything_is_a_number, setter, survives_being_saved};
 
@@ -27,7 +27,7 @@ pub fn run(data: &[u8]) {
 }
 
 fn co_simulation(data: &mut Unstructured) -> Result<()> {
-    let mut instance = Instance::new(Interface::CoSimulation);
+    let mut instance = HubSlosh::instance(Interface::CoSimulation);
     for _ in 0..data.int_in_range(0..=12)? {
         set_something(&mut instance, data)?;
     }
@@ -50,7 +50,7 @@ fn co_simulation(data: &mut Unstructured) -> Result<()> {
             set_something(&mut instance, data)?;
         }
         if data.ratio(1, 3)? {
-            let input = data.choose(&SCALARS)?.reference;
+            let input = data.choose(&TABLE.scalars)?.reference;
             _ = instance.set_input_derivatives(&[input], &[1], &[real(data)?]);
         }
         let h = real(data)?.min(LONGEST);
@@ -62,7 +62,7 @@ fn co_simulation(data: &mut Unstructured) -> Result<()> {
         if done.is_ok() {
             everything_is_a_number(&mut instance);
             assert_eq!(instance.time(), at + h);
-        } else if instance.mode() == Mode::Stepping {
+        } else if instance.state() == InstanceState::Stepping {
             assert!(to_bytes(&instance) == before, "a refused step has changed something");
         } else {
             // It stands where it was, and can be read.
@@ -77,7 +77,7 @@ fn co_simulation(data: &mut Unstructured) -> Result<()> {
 
 /// Sets a parameter or an input, mostly to something allowed; refusals change nothing.
 fn set_something(instance: &mut Instance, data: &mut Unstructured) -> Result<()> {
-    let scalar = data.choose(&SCALARS)?;
+    let scalar = data.choose(&TABLE.scalars)?;
     if !matches!(scalar.variable.causality, Causality::Parameter | Causality::Input) {
         return Ok(());
     }

@@ -7,7 +7,7 @@ use std::ffi::{CString, c_char};
 
 // The host, and the functions that it calls.
 use HubSlosh as _;
-use HubSlosh::table;
+use HubSlosh::table::TABLE;
 use hubslosh_fuzz as _;
 use libfuzzer_sys::fuzz_target;
 
@@ -17,6 +17,6 @@ unsafe extern "C" {
 }
 
 fuzz_target!(|data: &[u8]| {
-    let guid = CString::new(table::guid()).expect("a GUID has no NUL");
+    let guid = CString::new(TABLE.guid()).expect("a GUID has no NUL");
     unsafe { host_run(guid.as_ptr(), data.as_ptr(), data.len()) }
 });

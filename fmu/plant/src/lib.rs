@@ -24,7 +24,7 @@ mod state;
 mod tank;
 mod wheel;
 
-pub use friction::FrictionModel;
+pub use friction::{Contact, FrictionModel};
 pub use motion::StepError;
 pub use outputs::{Discrete, Outputs, Regime};
 pub use parameters::{

@@ -98,11 +98,11 @@ pub(crate) fn unsigned_zero(x: f64) -> f64 {
 impl Plant {
     /// The outputs now, under the inputs' present values.
     pub fn outputs(&mut self, inputs: &Inputs) -> Outputs {
-        self.with_present_contact(inputs, |plant| {
-            let outputs = plant.outputs_held(inputs);
-            let regime = plant.regime_of(outputs.wave_height);
-            Outputs { discrete: Discrete { regime, ..outputs.discrete }, ..outputs }
-        })
+        let before = self.apply_present_contact(inputs);
+        let outputs = self.outputs_held(inputs);
+        self.revert_contact(before);
+        let regime = self.regime_of(outputs.wave_height);
+        Outputs { discrete: Discrete { regime, ..outputs.discrete }, ..outputs }
     }
 
     /// As [`Plant::outputs`], with contact and regime that the last event has left.

@@ -248,20 +248,19 @@ impl Plant {
         self.regime_of(wave_height)
     }
 
-    /// Looks at the plant with the contact that the present inputs give: torque that was
-    /// changed since the last step may already have broken the hub away, or a break-away
-    /// an instant ago may be undone.
-    pub fn with_present_contact<T>(
-        &mut self,
-        inputs: &Inputs,
-        look: impl FnOnce(&mut Plant) -> T,
-    ) -> T {
+    /// Gives the hub the contact that the present inputs make, and returns the one before, for
+    /// [`Plant::revert_contact`]: torque that was changed since the last step may already have
+    /// broken the hub away, or a break-away an instant ago may be undone.
+    pub fn apply_present_contact(&mut self, inputs: &Inputs) -> Contact {
         let before = self.state.contact;
         if self.omega() == 0.0 {
             self.state.contact = self.present_contact(inputs);
         }
-        let seen = look(self);
+        before
+    }
+
+    /// Undoes [`Plant::apply_present_contact`].
+    pub fn revert_contact(&mut self, before: Contact) {
         self.state.contact = before;
-        seen
     }
 }

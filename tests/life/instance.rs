@@ -1,22 +1,24 @@
 //! One instance's life: which calls are allowed when, what is refused and how,
 //! that a refused call changes nothing, and that a saved state is all there is.
 
-use HubSlosh::calls::{
-    CType, Fault, GET_BOOLEAN, GET_INTEGER, GET_REAL, Interface, Mode, SET_BOOLEAN, SET_INTEGER,
-    SET_REAL, Severity,
-};
-use HubSlosh::instance::{DEFAULT_TOLERANCE, Instance};
-use HubSlosh::snapshot::{from_bytes, size, to_bytes};
-use HubSlosh::table::{self, RATES, SCALARS, Scalar};
-use HubSlosh::variable::{Access, Causality, Kind, Value};
+use crate::common::items;
+use HubSlosh::table::TABLE;
+use HubSlosh::{Instance, Scalar, from_bytes};
 use plant::STATES;
+use runtime::instance::DEFAULT_TOLERANCE;
+use runtime::operation::{
+    CType, Fault, GET_BOOLEAN, GET_INTEGER, GET_REAL, InstanceState, Interface, SET_BOOLEAN,
+    SET_INTEGER, SET_REAL, Severity,
+};
+use runtime::snapshot::{size, to_bytes};
+use runtime::variable::{Access, Causality, Kind, Value};
 
 fn fresh() -> Instance {
-    Instance::new(Interface::CoSimulation)
+    HubSlosh::instance(Interface::CoSimulation)
 }
 
 fn reference(name: &str) -> u32 {
-    table::find(name).unwrap_or_else(|| panic!("no variable {name}"))
+    TABLE.find(name).unwrap_or_else(|| panic!("no variable {name}"))
 }
 
 fn try_set(instance: &mut Instance, name: &str, value: Value) -> Result<(), Fault> {
@@ -35,7 +37,7 @@ fn set(instance: &mut Instance, values: &[(&str, Value)]) {
 }
 
 fn get_by_reference(instance: &mut Instance, reference: u32) -> Result<Value, Fault> {
-    let call = match SCALARS[reference as usize].variable.c_type() {
+    let call = match TABLE.scalars[reference as usize].variable.c_type() {
         CType::Real => &GET_REAL,
         CType::Integer => &GET_INTEGER,
         _ => &GET_BOOLEAN,
@@ -50,13 +52,21 @@ fn real(instance: &mut Instance, name: &str) -> f64 {
     }
 }
 
+/// The time derivative of one variable.
+fn output_derivative(instance: &mut Instance, reference: u32, order: i32) -> Result<f64, Fault> {
+    let mut answer = [0.0];
+    instance.output_derivatives(&[reference], &[order], &mut answer)?;
+    Ok(answer[0])
+}
+
 /// Every value there is, as bits.
 fn all(instance: &mut Instance) -> Vec<u64> {
-    let each = (0..SCALARS.len() as u32).map(|n| match get_by_reference(instance, n).unwrap() {
-        Value::Real(x) => x.to_bits(),
-        Value::Integer(n) => n as u64,
-        Value::Boolean(b) => u64::from(b),
-    });
+    let each =
+        (0..TABLE.scalars.len() as u32).map(|n| match get_by_reference(instance, n).unwrap() {
+            Value::Real(x) => x.to_bits(),
+            Value::Integer(n) => n as u64,
+            Value::Boolean(b) => u64::from(b),
+        });
     each.collect()
 }
 
@@ -173,7 +183,7 @@ fn all_bad_parameters_are_reported_at_once_and_can_be_mended() {
     ] {
         assert!(fault.text.contains(part), "{part} is not in: {}", fault.text);
     }
-    assert_eq!(instance.mode(), Mode::Initialization);
+    assert_eq!(instance.state(), InstanceState::Initialization);
     set(
         &mut instance,
         &[
@@ -346,7 +356,7 @@ fn diverged() -> Instance {
 fn after_a_step_that_failed_values_can_be_read_and_a_saved_state_restored() {
     let good = stepping(&[]);
     let mut instance = diverged();
-    assert_eq!(instance.mode(), Mode::Failed);
+    assert_eq!(instance.state(), InstanceState::Failed);
     assert_eq!(real(&mut instance, "theta"), 0.0);
     assert!(instance.do_step(0.0, 1.0).is_err());
     instance.restore(&good).unwrap();
@@ -367,8 +377,8 @@ fn after_a_panic_every_call_is_fatal() {
 /// instance and into one that was only just made.
 #[test]
 fn restored_state_continues_as_if_nothing_had_happened() {
-    for slosh_model in 1..=5 {
-        for friction_model in 1..=4 {
+    for slosh_model in items("slosh.model") {
+        for friction_model in items("friction.model") {
             let mut original = lively(slosh_model, friction_model);
             original.do_step(0.0, 0.777).unwrap();
             original.set_input_derivatives(&[reference("tau_cmd")], &[1], &[-0.3]).unwrap();
@@ -462,7 +472,7 @@ fn random_calls_never_panic() {
     let odd = [f64::NAN, f64::INFINITY, -f64::INFINITY, 0.0, -1.0, 1e308, -1e300, 5e-324, 1e9];
     for n in 0..400 {
         let interface = [Interface::CoSimulation, Interface::ModelExchange][n % 2];
-        let mut instance = Instance::new(interface);
+        let mut instance = HubSlosh::instance(interface);
         let mut time = 0.0;
         let mut saved = instance.clone();
         for _ in 0..60 {
@@ -471,7 +481,7 @@ fn random_calls_never_panic() {
                 _ => rng.f64() * 2.0 - 1.0,
             };
             let x = real(&mut rng);
-            let any = rng.u32(..SCALARS.len() as u32 + 3);
+            let any = rng.u32(..TABLE.scalars.len() as u32 + 3);
             let _ = match rng.u8(..24) {
                 0 => instance.setup_experiment(Some(x.abs() * 1e-6), 0.0, None),
                 1 | 2 => instance.enter_initialization_mode(),
@@ -500,7 +510,7 @@ fn random_calls_never_panic() {
                 18 => instance.event_indicators(&mut [0.0; plant::INDICATORS]),
                 19 => instance.completed_integrator_step().map(drop),
                 20 => instance.directional_derivative(&[any], &[any / 2], &[x], &mut [0.0]),
-                21 => instance.output_derivative(any, 1).map(drop),
+                21 => output_derivative(&mut instance, any, 1).map(drop),
                 22 => instance.set_input_derivatives(&[12 + any % 3], &[1], &[x]),
                 _ if rng.bool() => {
                     saved = from_bytes(&to_bytes(&instance)).unwrap();
@@ -522,9 +532,9 @@ fn state_can_be_saved_in_every_state_of_life() {
     terminated.terminate().unwrap();
     for saved in [fresh(), initializing, terminated, diverged(), lively(2, 4)] {
         let bytes = to_bytes(&saved);
-        assert_eq!(bytes.len(), size());
+        assert_eq!(bytes.len(), size::<HubSlosh::HubSlosh>());
         let read = from_bytes(&bytes).unwrap();
-        assert_eq!(read.mode(), saved.mode());
+        assert_eq!(read.state(), saved.state());
         assert_eq!(to_bytes(&read), bytes);
     }
 }
@@ -552,7 +562,7 @@ fn bytes_that_are_no_state_are_refused() {
 /// 1e3/s^3 of a signal's size here, and to the rounding of 1e-16 / 1e-6.
 #[test]
 fn output_derivatives_are_how_the_outputs_move_on() {
-    for slosh_model in 1..=5 {
+    for slosh_model in items("slosh.model") {
         let mut instance = lively(slosh_model, 4);
         instance.do_step(0.0, 0.3).unwrap();
         set(&mut instance, &[("tau_cmd", Value::Real(0.02))]);
@@ -561,10 +571,10 @@ fn output_derivatives_are_how_the_outputs_move_on() {
             instance.set_input_derivatives(&[reference("tau_cmd")], &[1], &[slope]).unwrap();
         };
         set_slope(&mut instance);
-        for scalar in SCALARS.iter().filter(|s| s.variable.causality == Causality::Output) {
+        for scalar in TABLE.scalars.iter().filter(|s| s.variable.causality == Causality::Output) {
             let n = scalar.reference;
-            let derivative = instance.output_derivative(n, 1).unwrap();
-            assert!(instance.output_derivative(n, 2).is_err());
+            let derivative = output_derivative(&mut instance, n, 1).unwrap();
+            assert!(output_derivative(&mut instance, n, 2).is_err());
             let h = 1e-6;
             let mut other = instance.clone();
             let mut after = Vec::new();
@@ -584,17 +594,17 @@ fn output_derivatives_are_how_the_outputs_move_on() {
                 scalar.variable.name
             );
         }
-        assert!(instance.output_derivative(reference("tank.h"), 1).is_err());
+        assert!(output_derivative(&mut instance, reference("tank.h"), 1).is_err());
         let omega = real(&mut instance, "omega");
-        assert_eq!(instance.output_derivative(reference("theta"), 1).unwrap(), omega);
+        assert_eq!(output_derivative(&mut instance, reference("theta"), 1).unwrap(), omega);
     }
 }
 
 #[test]
 fn directional_derivatives_of_outputs_and_state_derivatives_match_finite_differences() {
     let mut rng = fastrand::Rng::with_seed(7);
-    for slosh_model in 1..=5 {
-        for friction_model in 1..=4 {
+    for slosh_model in items("slosh.model") {
+        for friction_model in items("friction.model") {
             for _ in 0..10 {
                 check_directional_derivatives(&mut rng, slosh_model, friction_model);
             }
@@ -605,7 +615,7 @@ fn directional_derivatives_of_outputs_and_state_derivatives_match_finite_differe
 /// At a random point in a random direction of inputs and states, through a Model
 /// Exchange instance, which lets its states be set.
 fn check_directional_derivatives(rng: &mut fastrand::Rng, slosh_model: i32, friction_model: i32) {
-    let mut instance = Instance::new(Interface::ModelExchange);
+    let mut instance = HubSlosh::instance(Interface::ModelExchange);
     let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();
     set(
         &mut instance,
@@ -640,8 +650,9 @@ fn check_directional_derivatives(rng: &mut fastrand::Rng, slosh_model: i32, fric
     }
     instance.set_continuous_states(&states).unwrap();
 
-    let inputs: Vec<u32> = table::ramps().map(|(v, _)| reference(v.name)).collect();
-    let states_by_reference: Vec<u32> = RATES
+    let inputs: Vec<u32> = TABLE.inputs().iter().map(|s| s.reference).collect();
+    let states_by_reference: Vec<u32> = TABLE
+        .derivatives()
         .iter()
         .map(|rate| reference(rate.name().trim_start_matches("der(").trim_end_matches(')')))
         .collect();
@@ -650,9 +661,10 @@ fn check_directional_derivatives(rng: &mut fastrand::Rng, slosh_model: i32, fric
         .map(|n| between(-1.0, 1.0) * if n >= inputs.len() + 6 { unit } else { 1.0 })
         .collect();
     let is_unknown = |s: &&Scalar| {
-        s.variable.causality == Causality::Output || matches!(s.variable.access, Access::Rate(_))
+        s.variable.causality == Causality::Output
+            || matches!(s.variable.access, Access::Derivative(_))
     };
-    let unknowns: Vec<u32> = SCALARS.iter().filter(is_unknown).map(|s| s.reference).collect();
+    let unknowns: Vec<u32> = TABLE.scalars.iter().filter(is_unknown).map(|s| s.reference).collect();
     let mut answers = vec![0.0; unknowns.len()];
     instance.directional_derivative(&unknowns, &knowns, &direction, &mut answers).unwrap();
 
@@ -680,7 +692,7 @@ fn check_directional_derivatives(rng: &mut fastrand::Rng, slosh_model: i32, fric
     };
     let [p2, p1, m1, m2] = [2.0, 1.0, -1.0, -2.0].map(|k| at(k * h));
     for (n, answer) in answers.iter().enumerate() {
-        let name = SCALARS[unknowns[n] as usize].name();
+        let name = TABLE.scalars[unknowns[n] as usize].name();
         // A cone: differences across its tip mean nothing.
         if name == "wave_height" && [p2[n], p1[n], m1[n], m2[n]].iter().any(|x| *x < 5e-3) {
             continue;
@@ -769,7 +781,7 @@ fn friction_can_be_changed_while_stepping_and_nothing_else() {
     instance.do_step(0.5, 0.5).unwrap();
     assert_eq!(real(&mut instance, "omega"), 0.0);
     // It goes into the saved state, and back out of it.
-    let mut other = Instance::new(Interface::CoSimulation);
+    let mut other = HubSlosh::instance(Interface::CoSimulation);
     other.restore(&from_bytes(&to_bytes(&instance)).unwrap()).unwrap();
     for instance in [&mut instance, &mut other] {
         instance.do_step(1.0, 0.5).unwrap();
@@ -783,7 +795,7 @@ fn friction_can_be_changed_while_stepping_and_nothing_else() {
 
 #[test]
 fn a_state_of_the_other_interface_is_refused() {
-    let mut exchange = Instance::new(Interface::ModelExchange);
+    let mut exchange = HubSlosh::instance(Interface::ModelExchange);
     let mut instance = fresh();
     assert!(instance.restore(&exchange).unwrap_err().text.contains("Model Exchange"));
     assert!(exchange.restore(&instance).is_err());
@@ -795,8 +807,8 @@ fn a_state_of_the_other_interface_is_refused() {
 /// What the model description promises: an importer breaks algebraic loops by it.
 #[test]
 fn no_variable_follows_an_input_at_once_that_it_does_not_list() {
-    for slosh_model in 1..=5 {
-        for friction_model in 1..=4 {
+    for slosh_model in items("slosh.model") {
+        for friction_model in items("friction.model") {
             // Moving, and stuck right at the start.
             let mut moving = lively(slosh_model, friction_model);
             moving.do_step(0.0, 0.5).unwrap();
@@ -805,16 +817,18 @@ fn no_variable_follows_an_input_at_once_that_it_does_not_list() {
                 ("friction.model", number(friction_model)),
             ]);
             for instance in [moving, stuck] {
-                for (input, _) in table::ramps() {
+                for input in TABLE.inputs() {
                     let mut other = instance.clone();
-                    let value = real(&mut other, input.name) + 0.1;
-                    set(&mut other, &[(input.name, Value::Real(value))]);
+                    let value = real(&mut other, &input.name()) + 0.1;
+                    set(&mut other, &[(&input.name(), Value::Real(value))]);
                     let (before, after) = (all(&mut instance.clone()), all(&mut other));
-                    for (n, scalar) in SCALARS.iter().enumerate() {
+                    for (n, scalar) in TABLE.scalars.iter().enumerate() {
                         let v = scalar.variable;
                         let computed = matches!(v.causality, Causality::Output | Causality::Local);
-                        if computed && !scalar.follows().any(|s| s.variable.name == input.name) {
-                            assert_eq!(before[n], after[n], "{} follows {}", v.name, input.name);
+                        if computed
+                            && !scalar.depends_on().any(|s| s.variable.name == input.variable.name)
+                        {
+                            assert_eq!(before[n], after[n], "{} follows {}", v.name, input.name());
                         }
                     }
                 }
@@ -836,32 +850,42 @@ fn no_variable_starts_from_a_parameter_that_it_does_not_list() {
         ("imu.enabled", Value::Boolean(true)),
         ("tau_cmd", Value::Real(0.05)),
     ];
-    for slosh_model in 1..=5 {
+    let reference_of_model = |group: &str| reference(&format!("{group}.model"));
+    for slosh_model in items("slosh.model") {
         let mut instance = fresh();
         set(&mut instance, base);
         set(&mut instance, &[("slosh.model", number(slosh_model))]);
         instance.enter_initialization_mode().unwrap();
         let before = all(&mut instance);
-        for parameter in table::parameters() {
+        for parameter in TABLE.parameters() {
             let mut other = instance.clone();
-            let reference = reference(parameter.name);
-            let value = match (get_by_reference(&mut other, reference).unwrap(), parameter.kind) {
-                (Value::Real(x), _) => Value::Real(x * 1.01 + 0.01),
-                (Value::Integer(n), Kind::Enumeration(of)) => number(n % of.items.len() as i32 + 1),
-                (Value::Integer(n), _) => number(n + 1),
-                (Value::Boolean(b), _) => Value::Boolean(!b),
-            };
-            set(&mut other, &[(parameter.name, value)]);
+            let reference = reference(&parameter.name());
+            let value =
+                match (get_by_reference(&mut other, reference).unwrap(), parameter.variable.kind) {
+                    (Value::Real(x), _) => Value::Real(x * 1.01 + 0.01),
+                    (Value::Integer(n), Kind::Enumeration(of)) => {
+                        number(n % of.items.len() as i32 + 1)
+                    }
+                    (Value::Integer(n), _) => number(n + 1),
+                    (Value::Boolean(b), _) => Value::Boolean(!b),
+                };
+            set(&mut other, &[(&parameter.name(), value)]);
+            // Beside another item of the enumeration it would be an error.
+            if let Some(group) = parameter.variable.name.strip_suffix(".kind") {
+                let model = TABLE.scalars[reference_of_model(group) as usize];
+                set(&mut other, &[(&model.name(), model.start().unwrap())]);
+            }
             let after = all(&mut other);
-            for (n, scalar) in SCALARS.iter().enumerate() {
+            for (n, scalar) in TABLE.scalars.iter().enumerate() {
                 let v = scalar.variable;
                 let computed =
                     matches!(v.causality, Causality::Output | Causality::CalculatedParameter)
                         || v.state.is_some()
-                        || matches!(v.access, Access::Rate(_));
-                let listed = scalar.starts_from().any(|s| s.variable.name == parameter.name);
+                        || matches!(v.access, Access::Derivative(_));
+                let listed =
+                    scalar.initial_depends_on().any(|s| s.variable.name == parameter.variable.name);
                 if computed && !listed {
-                    assert_eq!(before[n], after[n], "{} starts from {}", v.name, parameter.name);
+                    assert_eq!(before[n], after[n], "{} starts from {}", v.name, parameter.name());
                 }
             }
         }
@@ -872,10 +896,10 @@ fn no_variable_starts_from_a_parameter_that_it_does_not_list() {
 /// Jacobian that are not listed at 0.
 #[test]
 fn no_variable_follows_a_continuous_state_that_it_does_not_list() {
-    for slosh_model in 1..=5 {
-        for friction_model in 1..=4 {
+    for slosh_model in items("slosh.model") {
+        for friction_model in items("friction.model") {
             for enabled in [true, false] {
-                let mut instance = Instance::new(Interface::ModelExchange);
+                let mut instance = HubSlosh::instance(Interface::ModelExchange);
                 set(
                     &mut instance,
                     &[
@@ -900,16 +924,16 @@ fn no_variable_follows_a_continuous_state_that_it_does_not_list() {
                 let before = all(&mut instance);
                 let mut states = [0.0; STATES];
                 instance.continuous_states(&mut states).unwrap();
-                for (n, place) in table::places().enumerate() {
-                    let state = table::state_at(place).unwrap();
+                for (n, place) in TABLE.places().enumerate() {
+                    let state = TABLE.state_at(place).unwrap();
                     let mut moved = states;
                     moved[n] += 1e-3;
                     let mut other = instance.clone();
                     other.set_continuous_states(&moved).unwrap();
                     for (scalar, (before, after)) in
-                        SCALARS.iter().zip(before.iter().zip(all(&mut other)))
+                        TABLE.scalars.iter().zip(before.iter().zip(all(&mut other)))
                     {
-                        let listed = scalar.follows().any(|s| s.reference == state.reference);
+                        let listed = scalar.depends_on().any(|s| s.reference == state.reference);
                         if !listed {
                             let (name, state) = (scalar.name(), state.name());
                             assert_eq!(*before, after, "{name} follows {state}");
@@ -918,5 +942,47 @@ fn no_variable_follows_a_continuous_state_that_it_does_not_list() {
                 }
             }
         }
+    }
+}
+
+/// OpenModelica's import, ecos and libcosim set no enumerations, OMSimulator none called model.
+#[test]
+fn kinds_choose_what_the_enumerations_choose() {
+    for (kind, model) in [("slosh.kind", "slosh.model"), ("friction.kind", "friction.model")] {
+        for n in items(model) {
+            let motion = |name: &str| {
+                let start = [("init.slosh_angle", Value::Real(0.2)), (name, number(n))];
+                let mut instance = stepping(&start);
+                instance.do_step(0.0, 1.0).unwrap();
+                ["omega", "energy", "heat"].map(|name| real(&mut instance, name).to_bits())
+            };
+            assert_eq!(motion(kind), motion(model), "{kind} = {n}");
+        }
+        let too_many = items(model).count() as i32 + 1;
+        let mut instance = fresh();
+        set(&mut instance, &[(kind, number(too_many))]);
+        instance.enter_initialization_mode().unwrap();
+        let fault = instance.exit_initialization_mode().unwrap_err();
+        assert!(
+            fault.text.contains(kind) && fault.text.contains("allowed: 0 to"),
+            "{}",
+            fault.text
+        );
+    }
+}
+
+#[test]
+fn kinds_that_contradict_the_enumerations_are_all_reported() {
+    let mut instance = fresh();
+    set(&mut instance, &[("slosh.model", number(3)), ("slosh.kind", number(4))]);
+    set(&mut instance, &[("friction.model", number(1)), ("friction.kind", number(2))]);
+    instance.enter_initialization_mode().unwrap();
+    let fault = instance.exit_initialization_mode().unwrap_err();
+    for text in ["slosh.kind = 4", "slosh.model = 3", "friction.kind = 2", "friction.model = 1"] {
+        assert!(fault.text.contains(text), "{text} is not in: {}", fault.text);
+    }
+    // The same number twice is no contradiction, nor is the start value, which many hosts set.
+    for (model, kind) in [(4, 4), (2, 4)] {
+        stepping(&[("slosh.model", number(model)), ("slosh.kind", number(kind))]);
     }
 }

@@ -5,50 +5,54 @@
 //!
 //! | part | bytes |
 //! | --- | --- |
-//! | "HubSlosh" | 8 |
+//! | "FMUstate" | 8 |
 //! | version of this format | 4 |
 //! | length of the whole | 4 |
 //! | GUID of the variable table | 38 |
-//! | state of life, flags (1: stop time, 2: plant) | 1 + 1 |
+//! | instance state, flags (1: stop time, 2: model, 4: slopes) | 1 + 1 |
 //! | interface, 0 | 1 + 1 |
 //! | start, stop, tolerance, time | 4 x 8 |
 //! | parameters in the table's order: number, or 0/1 | 8 each |
 //! | inputs: value, slope | 16 each |
-//! | the plant's words | 8 each |
+//! | the model's words | 8 each |
 //! | checksum of all before | 16 |
 //!
-//! Everything else about a plant follows from its parameters.
+//! Everything else about a model follows from its parameters.
 
-use plant::{Plant, Ramp, State};
-
-use crate::calls::{Interface, Mode};
 use crate::hash::Hash;
 use crate::instance::{Instance, TOLERANCES};
-use crate::table;
-use crate::variable::{Value, Variable};
+use crate::model::Model;
+use crate::operation::{InstanceState, Interface, Version};
+use crate::table::Scalar;
+use crate::variable::{Access, Value};
 
-const MAGIC: &[u8; 8] = b"HubSlosh";
+const MAGIC: &[u8; 8] = b"FMUstate";
 const FORMAT: u32 = 3;
 const HAS_STOP: u8 = 1;
-const HAS_PLANT: u8 = 2;
+const HAS_MODEL: u8 = 2;
+const HAS_SLOPES: u8 = 4;
 
-/// The number of bytes; the same for every state.
-pub fn size() -> usize {
+/// The number of bytes; the same for every state of a model.
+pub fn size<M: Model>() -> usize {
+    let table = M::table();
     let head = 8 + 4 + 4 + 38 + 4 + 4 * 8;
-    let set = table::parameters().count() * 8 + table::ramps().count() * 16;
-    head + set + State::WORDS * 8 + 16
+    let set = table.parameters().len() * 8 + table.inputs().len() * 16;
+    head + set + table.about.saved_words * 8 + 16
 }
 
 /// A state as bytes.
-pub fn to_bytes(saved: &Instance) -> Vec<u8> {
-    let mut bytes = Vec::with_capacity(size());
+pub fn to_bytes<M: Model>(saved: &Instance<M>) -> Vec<u8> {
+    let (table, size) = (M::table(), size::<M>());
+    let mut bytes = Vec::with_capacity(size);
     bytes.extend(MAGIC);
     bytes.extend(FORMAT.to_le_bytes());
-    bytes.extend((size() as u32).to_le_bytes());
-    bytes.extend(table::guid().as_bytes());
-    let stop = if saved.stop.is_some() { HAS_STOP } else { 0 };
-    let plant = if saved.plant.is_some() { HAS_PLANT } else { 0 };
-    bytes.extend([saved.mode as u8, stop | plant, saved.interface as u8, 0]);
+    bytes.extend((size as u32).to_le_bytes());
+    bytes.extend(table.guid().as_bytes());
+    let flag = |is: bool, flag: u8| if is { flag } else { 0 };
+    let flags = flag(saved.stop.is_some(), HAS_STOP)
+        | flag(saved.model.is_some(), HAS_MODEL)
+        | flag(saved.sloped, HAS_SLOPES);
+    bytes.extend([saved.state as u8, flags, saved.interface as u8, 0]);
     for time in [saved.start, saved.stop.unwrap_or(0.0), saved.tolerance, saved.time] {
         bytes.extend(time.to_le_bytes());
     }
@@ -60,12 +64,18 @@ pub fn to_bytes(saved: &Instance) -> Vec<u8> {
         });
     }
     let mut inputs = saved.inputs;
-    for (_, ramp) in table::ramps() {
-        let Ramp { value, slope } = *ramp(&mut inputs);
-        bytes.extend(value.to_le_bytes());
-        bytes.extend(slope.to_le_bytes());
+    for scalar in table.inputs() {
+        if let Access::Input(ramp) = scalar.access {
+            for number in ramp(&mut inputs, scalar.element) {
+                bytes.extend(number.to_le_bytes());
+            }
+        }
     }
-    let words = saved.plant.as_ref().map_or([0; State::WORDS], |plant| plant.state().to_words());
+    let mut words = Vec::with_capacity(table.about.saved_words);
+    if let Some(model) = &saved.model {
+        model.save(&mut words);
+    }
+    words.resize(table.about.saved_words, 0);
     for word in words {
         bytes.extend(word.to_le_bytes());
     }
@@ -74,11 +84,13 @@ pub fn to_bytes(saved: &Instance) -> Vec<u8> {
     bytes
 }
 
-/// The state that the bytes hold, or why they hold none.
-pub fn from_bytes(bytes: &[u8]) -> Result<Instance, String> {
+/// The state that the bytes hold, for an instance of a version of FMI, or why they hold none.
+pub fn from_bytes<M: Model>(version: Version, bytes: &[u8]) -> Result<Instance<M>, String> {
+    let (table, size) = (M::table(), size::<M>());
+    let model = table.about.model;
     let mut rest = Reader(bytes);
     if rest.take::<8>()? != *MAGIC {
-        return Err("these bytes are not a saved state of HubSlosh".into());
+        return Err(format!("these bytes are not a saved state of {model}"));
     }
     let format = u32::from_le_bytes(rest.take()?);
     if format != FORMAT {
@@ -89,29 +101,34 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Instance, String> {
         return Err(format!("the saved state should have {length} bytes, not {}", bytes.len()));
     }
     let guid = rest.take::<38>()?;
-    if guid != table::guid().as_bytes() {
+    if guid != table.guid().as_bytes() {
         let guid = String::from_utf8_lossy(&guid);
-        return Err(format!("the saved state is of another HubSlosh, {guid}"));
+        return Err(format!(
+            "the saved state is of another FMU or of another version of {model}, {guid}"
+        ));
     }
-    if length != size() {
-        return Err(format!("a saved state has {} bytes, not {length}", size()));
+    if length != size {
+        return Err(format!("a saved state has {size} bytes, not {length}"));
     }
     let (body, checksum) = bytes.split_at(length - 16);
     if Hash::new().bytes(body).value().to_le_bytes() != checksum {
         return Err("the saved state is damaged: its checksum is wrong".into());
     }
 
-    let [mode, flags, interface, _] = rest.take()?;
+    let [state, flags, interface, _] = rest.take()?;
     let interface = match interface {
         0 => Interface::ModelExchange,
         1 => Interface::CoSimulation,
         _ => return Err("the saved state is damaged: no such interface".into()),
     };
-    let possible = |m: &Mode| *m != Mode::Fatal && m.only_in().is_none_or(|only| only == interface);
-    let mode = Mode::ALL.get(usize::from(mode)).copied().filter(possible);
-    let mode = mode.ok_or("the saved state is damaged: no such state of life")?;
-    let mut saved = Instance::new(interface);
-    saved.mode = mode;
+    let possible = |s: &InstanceState| {
+        *s != InstanceState::Fatal && s.only_in().is_none_or(|only| only == interface)
+    };
+    let state = InstanceState::ALL.get(usize::from(state)).copied().filter(possible);
+    let state = state.ok_or("the saved state is damaged: no such instance state")?;
+    let mut saved = Instance::new(version, interface);
+    saved.state = state;
+    saved.sloped = flags & HAS_SLOPES != 0;
     saved.start = rest.finite("start time")?;
     saved.stop = Some(rest.finite("stop time")?).filter(|_| flags & HAS_STOP != 0);
     saved.tolerance = rest.finite("tolerance")?;
@@ -119,25 +136,26 @@ pub fn from_bytes(bytes: &[u8]) -> Result<Instance, String> {
     if !TOLERANCES.contains(&saved.tolerance) {
         return Err("the saved state is damaged: tolerance".into());
     }
-    for (variable, value) in table::parameters().zip(&mut saved.parameters) {
-        *value = rest.value(variable, *value)?;
+    for (scalar, value) in table.parameters().iter().zip(&mut saved.parameters) {
+        *value = rest.value(scalar, *value)?;
     }
-    for (variable, ramp) in table::ramps() {
-        let value = rest.finite(variable.name)?;
-        let slope = rest.finite(variable.name)?;
-        *ramp(&mut saved.inputs) = Ramp { value, slope };
+    for scalar in table.inputs() {
+        if let Access::Input(ramp) = scalar.access {
+            for number in ramp(&mut saved.inputs, scalar.element) {
+                *number = rest.finite(scalar.variable.name)?;
+            }
+        }
     }
-    let mut words = [0; State::WORDS];
+    let mut words = vec![0; table.about.saved_words];
     for word in &mut words {
         *word = u64::from_le_bytes(rest.take()?);
     }
-    if flags & HAS_PLANT != 0 {
-        let parameters = saved.plant_parameters().map_err(|problems| problems.join("; "))?;
-        let state = State::from_words(&words);
-        let state = state.ok_or("the saved state is damaged: the plant's state")?;
-        saved.plant = Some(Plant::resume(&parameters, &state, saved.tolerance));
+    if flags & HAS_MODEL != 0 {
+        let parameters = saved.model_parameters().map_err(|problems| problems.join("; "))?;
+        let model = M::resume(&parameters, &words, saved.tolerance);
+        saved.model = Some(model.ok_or("the saved state is damaged: the model's state")?);
     } else if saved.is_running() {
-        return Err("the saved state is damaged: the plant is missing".into());
+        return Err("the saved state is damaged: the model is missing".into());
     }
     Ok(saved)
 }
@@ -160,14 +178,14 @@ impl Reader<'_> {
 
     /// A parameter's value, of the same type as `like`. Wrong values are
     /// possible: they can be saved before initialization ends.
-    fn value(&mut self, variable: &Variable, like: Value) -> Result<Value, String> {
+    fn value<M: Model>(&mut self, scalar: &Scalar<M>, like: Value) -> Result<Value, String> {
         let bytes = self.take()?;
         let number = i32::try_from(i64::from_le_bytes(bytes));
         match (like, number) {
             (Value::Real(_), _) => Ok(Value::Real(f64::from_le_bytes(bytes))),
             (Value::Integer(_), Ok(n)) => Ok(Value::Integer(n)),
             (Value::Boolean(_), Ok(n @ (0 | 1))) => Ok(Value::Boolean(n == 1)),
-            _ => Err(format!("the saved state is damaged: {}", variable.name)),
+            _ => Err(format!("the saved state is damaged: {}", scalar.name())),
         }
     }
 }

@@ -2,10 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use HubSlosh::calls::{GET_BOOLEAN, GET_INTEGER, GET_REAL, Interface};
-use HubSlosh::instance::Instance;
-use HubSlosh::table;
-use HubSlosh::variable::{Causality, Value, Variable};
+use HubSlosh::table::TABLE;
+use runtime::operation::{GET_BOOLEAN, GET_INTEGER, GET_REAL, Interface};
+use runtime::variable::{Causality, Value, Variable};
 
 /// An element of the XML with its attributes.
 struct Element {
@@ -32,7 +31,7 @@ impl Element {
 }
 
 fn committed() -> String {
-    std::fs::read_to_string(model_description::PATH).unwrap()
+    std::fs::read_to_string(model_description::path::<HubSlosh::HubSlosh>()).unwrap()
 }
 
 /// All elements of the committed file, in its order.
@@ -77,19 +76,19 @@ fn unknowns(list: &str) -> Vec<Element> {
 #[test]
 fn committed_file_is_what_the_table_says() {
     assert!(
-        committed() == model_description::xml().unwrap(),
+        committed() == model_description::xml::<HubSlosh::HubSlosh>().unwrap(),
         "modelDescription.xml is out of date: run `cargo run --release -p model-description`"
     );
 }
 
 #[test]
 fn guid_is_the_binarys() {
-    assert_eq!(elements()[0].get("guid"), Some(table::guid().as_str()));
+    assert_eq!(elements()[0].get("guid"), Some(TABLE.guid()));
 }
 
 #[test]
 fn start_values_are_the_binarys_to_the_last_bit() {
-    let mut fresh = Instance::new(Interface::CoSimulation);
+    let mut fresh = HubSlosh::instance(Interface::CoSimulation);
     let mut count = 0;
     for (variable, kind) in variables() {
         let Some(start) = kind.get("start") else { continue };
@@ -111,7 +110,7 @@ fn start_values_are_the_binarys_to_the_last_bit() {
         count += 1;
     }
     let set_by_host = [Causality::Input, Causality::Parameter];
-    let expected = table::SCALARS.iter().filter(|s| set_by_host.contains(&s.variable.causality));
+    let expected = TABLE.scalars.iter().filter(|s| set_by_host.contains(&s.variable.causality));
     assert_eq!(count, expected.count());
 }
 
@@ -311,20 +310,20 @@ fn dependencies_are_always_given_and_point_to_what_the_host_sets() {
 
 #[test]
 fn every_name_in_the_table_s_dependencies_means_something() {
-    for variable in table::TABLE {
+    for variable in TABLE.variables {
         for name in variable.depends_on {
             let family = name.split('[').next().unwrap();
-            let is_known = |v: &Variable| v.causality == Causality::Input || v.state.is_some();
-            assert!(table::TABLE.iter().any(|v| v.name == family && is_known(v)), "{name}");
+            let is_known = |v: &Variable<_>| v.causality == Causality::Input || v.state.is_some();
+            assert!(TABLE.variables.iter().any(|v| v.name == family && is_known(v)), "{name}");
         }
-        for name in variable.starts_from {
-            let meant = |v: &Variable| {
+        for name in variable.initial_depends_on {
+            let meant = |v: &Variable<_>| {
                 v.name == *name
                     || (v.causality == Causality::Parameter
                         && name.ends_with('.')
                         && v.name.starts_with(name))
             };
-            assert!(table::TABLE.iter().any(meant), "{name}");
+            assert!(TABLE.variables.iter().any(meant), "{name}");
         }
     }
 }
@@ -344,6 +343,6 @@ fn names_that_others_build_on_are_there() {
         tank.m_liq tank.m_0 tank.bond slosh.mass[1] slosh.mass[10] slosh.length[10] \
         slosh.frequency[10] slosh.damping[10]";
     for name in names.split_whitespace() {
-        assert!(table::find(name).is_some(), "{name}");
+        assert!(TABLE.find(name).is_some(), "{name}");
     }
 }

@@ -1,14 +1,14 @@
-//! The C interface of FMI 2.0, Model Exchange and Co-Simulation: 44 functions, and the
-//! only unsafe code of the FMU.
+//! The C interface of FMI 2.0, Model Exchange and Co-Simulation: 44 functions.
 //!
-//! Every function catches panics; one that happens poisons the instance and is
+//! Every function is generic in the model; [`crate::export_fmi2`] exports them for one model under
+//! their names. Every function catches panics; one that happens poisons the instance and is
 //! told to the logger. Pointers may be NULL wherever the standard does not
 //! forbid it, and mostly where it does. What the functions mean is in
 //! [`crate::instance`] and [`crate::snapshot`]; here is only how C says it.
 
 #![allow(unsafe_code)]
 // The names are the standard's.
-#![allow(non_camel_case_types, non_upper_case_globals)]
+#![allow(non_camel_case_types, non_upper_case_globals, non_snake_case)]
 // The safety contract of every function is the FMI 2.0 standard's: a component
 // comes from fmi2Instantiate and is not yet freed, arrays have the lengths given,
 // strings end with NUL.
@@ -19,11 +19,14 @@ use std::ffi::{CStr, CString, c_char, c_int, c_uint, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::ptr;
 
-use crate::calls::{self, Call, Fault, Interface, Mode, Severity};
 use crate::instance::Instance;
 use crate::log::{Filter, Topic, category};
+use crate::model::Model;
+use crate::operation::{
+    self as op, Call, Fault, InstanceState, Interface, Operation, Severity, Version,
+};
+use crate::snapshot;
 use crate::variable::Value;
-use crate::{snapshot, table};
 
 /// An instance, opaque to the host.
 pub type fmi2Component = *mut c_void;
@@ -103,6 +106,8 @@ pub struct fmi2CallbackFunctions {
     pub componentEnvironment: fmi2ComponentEnvironment,
 }
 
+const FMI2: Version = Version::Fmi2;
+
 /// Marks a live component, so that a wrong handle is an error and no crash.
 const COMPONENT: u64 = 0x4875_6253_6c6f_7368;
 /// Marks a live saved state.
@@ -110,17 +115,17 @@ const STATE: u64 = 0x5374_6174_6548_7562;
 
 /// What a component handle points to.
 #[repr(C)]
-struct Component {
+struct Component<M: Model> {
     mark: u64,
-    instance: Instance,
+    instance: Instance<M>,
     log: Log,
 }
 
 /// What a state handle points to.
 #[repr(C)]
-struct SavedState {
+struct SavedState<M: Model> {
     mark: u64,
-    instance: Instance,
+    instance: Instance<M>,
 }
 
 /// The way to the host's logger.
@@ -139,27 +144,25 @@ impl Log {
         }
     }
 
-    /// Tells that the hub has stuck or broken away, if it has since `before` and if
-    /// somebody wants to know.
-    fn report_event(&self, call: &Call, before: Option<(i32, f64, i32)>, now: &Instance) {
-        let (Some((count, ..)), Some((new_count, time, contact))) = (before, now.last_contact())
-        else {
-            return;
-        };
-        if new_count == count || !self.filter.wants(Topic::Event) {
+    /// Tells of the last event, if there was one since `before` were counted and if somebody wants
+    /// to know.
+    #[inline]
+    fn report_event<M: Model>(
+        &self,
+        operation: &'static Operation,
+        before: i32,
+        now: &Instance<M>,
+    ) {
+        let events = now.event_count().wrapping_sub(before);
+        if events == 0 || !self.filter.wants(Topic::Event) {
             return;
         }
-        let what = match contact {
-            0 => "stuck",
-            1 => "broke away forwards",
-            _ => "broke away backwards",
-        };
-        let changes = match new_count - count {
+        let many = match events {
             1 => String::new(),
-            n => format!(", the last of {n} changes in this call"),
+            n => format!(", the last of {n} events in this call"),
         };
-        let text = format!("{}: the hub {what} at t = {time:?} s{changes}", call.name);
-        self.write(fmi2OK, Topic::Event, &text);
+        let name = operation.call(FMI2).name();
+        self.write(fmi2OK, Topic::Event, &format!("{name}: {}{many}", now.last_event()));
     }
 
     fn write(&self, status: fmi2Status, topic: Topic, text: &str) {
@@ -241,39 +244,44 @@ fn null(call: &Call, name: &str) -> Fault {
     call.error(format_args!("argument {name} is NULL"))
 }
 
-unsafe fn saved_state<'a>(call: &Call, handle: fmi2FMUstate) -> Result<&'a mut SavedState, Fault> {
+unsafe fn saved_state<'a, M: Model>(
+    call: &Call,
+    handle: fmi2FMUstate,
+) -> Result<&'a mut SavedState<M>, Fault> {
     if handle.is_null() {
         return Err(null(call, "FMUstate"));
     }
-    if !handle.cast::<SavedState>().is_aligned()
+    if !handle.cast::<SavedState<M>>().is_aligned()
         || unsafe { ptr::read(handle.cast::<u64>()) } != STATE
     {
         return Err(call.error("argument FMUstate is not a saved state of this FMU"));
     }
-    Ok(unsafe { &mut *handle.cast::<SavedState>() })
+    Ok(unsafe { &mut *handle.cast::<SavedState<M>>() })
 }
 
 /// Does `body` on the component behind the handle: failures are logged and become
 /// the status, a panic poisons the instance.
-unsafe fn on(
+#[inline]
+unsafe fn on<M: Model>(
     handle: fmi2Component,
-    call: &Call,
-    body: impl FnOnce(&mut Component) -> Result<(), Fault>,
+    operation: &'static Operation,
+    body: impl FnOnce(&mut Component<M>) -> Result<(), Fault>,
 ) -> fmi2Status {
     if handle.is_null()
-        || !handle.cast::<Component>().is_aligned()
+        || !handle.cast::<Component<M>>().is_aligned()
         || unsafe { ptr::read(handle.cast::<u64>()) } != COMPONENT
     {
         return fmi2Error;
     }
-    let component = unsafe { &mut *handle.cast::<Component>() };
+    let component = unsafe { &mut *handle.cast::<Component<M>>() };
     let result = catch_unwind(AssertUnwindSafe(|| body(component)));
     let fault = match result {
         Ok(Ok(())) => return fmi2OK,
         Ok(Err(fault)) => fault,
         Err(payload) => {
             component.instance.poison();
-            let text = format!("{} panicked: {}", call.name, panic_text(&*payload));
+            let text =
+                format!("{} panicked: {}", operation.call(FMI2).name(), panic_text(&*payload));
             Fault { severity: Severity::Fatal, text }
         }
     };
@@ -300,29 +308,26 @@ fn silence_panics() {
 // ---- Inquiry, life and death ----
 
 /// "default": the C types above.
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi2GetTypesPlatform() -> fmi2String {
+pub fn fmi2GetTypesPlatform() -> fmi2String {
     c"default".as_ptr()
 }
 
 /// "2.0"
-#[unsafe(no_mangle)]
-pub extern "C" fn fmi2GetVersion() -> fmi2String {
+pub fn fmi2GetVersion() -> fmi2String {
     c"2.0".as_ptr()
 }
 
 /// Chooses what is logged.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetDebugLogging(
+pub unsafe fn fmi2SetDebugLogging<M: Model>(
     c: fmi2Component,
     loggingOn: fmi2Boolean,
     nCategories: usize,
     categories: *const fmi2String,
 ) -> fmi2Status {
-    let call = &calls::SET_DEBUG_LOGGING;
+    let operation = &op::SET_DEBUG_LOGGING;
     unsafe {
-        on(c, call, |component| {
-            component.instance.check(call)?;
+        on::<M>(c, operation, |component| {
+            let call = &component.instance.check(operation)?;
             if loggingOn == 0 {
                 component.log.filter = Filter::NONE;
                 return Ok(());
@@ -331,15 +336,14 @@ pub unsafe extern "C" fn fmi2SetDebugLogging(
             for category in array(call, "categories", categories, nCategories)? {
                 names.push(text(*category).ok_or_else(|| null(call, "categories[]"))?);
             }
-            component.log.filter = Filter::of(&names).map_err(|why| call.error(why))?;
+            component.log.filter = Filter::of(&names, M::table()).map_err(|why| call.error(why))?;
             Ok(())
         })
     }
 }
 
 /// Makes an instance. NULL on failure, and the logger is told why.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2Instantiate(
+pub unsafe fn fmi2Instantiate<M: Model>(
     instanceName: fmi2String,
     fmuType: fmi2Type,
     fmuGUID: fmi2String,
@@ -359,9 +363,9 @@ pub unsafe extern "C" fn fmi2Instantiate(
             instance_name: c_string(name.as_deref().unwrap_or("")),
             filter: Filter::FAILURES,
         };
-        match interface(name, fmuType, text(fmuGUID)) {
+        match interface::<M>(name, fmuType, text(fmuGUID)) {
             Ok(interface) => {
-                let instance = Instance::new(interface);
+                let instance = Instance::<M>::new(FMI2, interface);
                 Box::into_raw(Box::new(Component { mark: COMPONENT, instance, log })).cast()
             }
             Err(why) => {
@@ -375,12 +379,12 @@ pub unsafe extern "C" fn fmi2Instantiate(
 }
 
 /// What the instance is for, or why there can be none like this.
-fn interface(
+fn interface<M: Model>(
     name: Option<String>,
     kind: fmi2Type,
     guid: Option<String>,
 ) -> Result<Interface, String> {
-    let expected = table::guid();
+    let expected = M::table().guid();
     if name.is_none_or(|name| name.trim().is_empty()) {
         return Err("instanceName is NULL or empty".into());
     }
@@ -399,11 +403,10 @@ fn interface(
 }
 
 /// Frees an instance; NULL is fine.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2FreeInstance(c: fmi2Component) {
+pub unsafe fn fmi2FreeInstance<M: Model>(c: fmi2Component) {
     unsafe {
         if c.is_null()
-            || !c.cast::<Component>().is_aligned()
+            || !c.cast::<Component<M>>().is_aligned()
             || ptr::read(c.cast::<u64>()) != COMPONENT
         {
             return;
@@ -411,13 +414,12 @@ pub unsafe extern "C" fn fmi2FreeInstance(c: fmi2Component) {
         // A later call with this handle should be an error as long as nobody
         // else got the memory.
         ptr::write_volatile(c.cast::<u64>(), 0);
-        let _ = catch_unwind(|| drop(Box::from_raw(c.cast::<Component>())));
+        let _ = catch_unwind(|| drop(Box::from_raw(c.cast::<Component<M>>())));
     }
 }
 
 /// Tells times and tolerance.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetupExperiment(
+pub unsafe fn fmi2SetupExperiment<M: Model>(
     c: fmi2Component,
     toleranceDefined: fmi2Boolean,
     tolerance: fmi2Real,
@@ -428,17 +430,16 @@ pub unsafe extern "C" fn fmi2SetupExperiment(
     let tolerance = (toleranceDefined != 0).then_some(tolerance);
     let stop = (stopTimeDefined != 0).then_some(stopTime);
     unsafe {
-        on(c, &calls::SETUP_EXPERIMENT, |component| {
+        on::<M>(c, &op::SETUP_EXPERIMENT, |component| {
             component.instance.setup_experiment(tolerance, startTime, stop)
         })
     }
 }
 
 /// From here on all variables can be read.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2EnterInitializationMode(c: fmi2Component) -> fmi2Status {
+pub unsafe fn fmi2EnterInitializationMode<M: Model>(c: fmi2Component) -> fmi2Status {
     unsafe {
-        on(c, &calls::ENTER_INITIALIZATION, |component| {
+        on::<M>(c, &op::ENTER_INITIALIZATION, |component| {
             component.instance.enter_initialization_mode()
         })
     }
@@ -446,43 +447,41 @@ pub unsafe extern "C" fn fmi2EnterInitializationMode(c: fmi2Component) -> fmi2St
 
 /// From here on parameters are fixed (in Model Exchange from the next call that goes on), and
 /// steps can be made.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2ExitInitializationMode(c: fmi2Component) -> fmi2Status {
+pub unsafe fn fmi2ExitInitializationMode<M: Model>(c: fmi2Component) -> fmi2Status {
     unsafe {
-        on(c, &calls::EXIT_INITIALIZATION, |component| {
+        on::<M>(c, &op::EXIT_INITIALIZATION, |component| {
             component.instance.exit_initialization_mode()
         })
     }
 }
 
 /// Ends the simulation; values can still be read.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2Terminate(c: fmi2Component) -> fmi2Status {
-    unsafe { on(c, &calls::TERMINATE, |component| component.instance.terminate()) }
+pub unsafe fn fmi2Terminate<M: Model>(c: fmi2Component) -> fmi2Status {
+    unsafe { on::<M>(c, &op::TERMINATE, |component| component.instance.terminate()) }
 }
 
 /// As new.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2Reset(c: fmi2Component) -> fmi2Status {
-    unsafe { on(c, &calls::RESET, |component| component.instance.reset()) }
+pub unsafe fn fmi2Reset<M: Model>(c: fmi2Component) -> fmi2Status {
+    unsafe { on::<M>(c, &op::RESET, |component| component.instance.reset()) }
 }
 
 // ---- Values ----
 
 /// The values of all references, each turned into its C type by `as_c`.
-unsafe fn get<T>(
+#[inline]
+unsafe fn get<M: Model, T>(
     c: fmi2Component,
-    call: &Call,
+    operation: &'static Operation,
     (vr, nvr, value): (*const fmi2ValueReference, usize, *mut T),
     as_c: impl Fn(Value) -> Option<T>,
 ) -> fmi2Status {
     unsafe {
-        on(c, call, |component| {
-            component.instance.check(call)?;
+        on::<M>(c, operation, |component| {
+            let call = &component.instance.check(operation)?;
             let references = array(call, "vr", vr, nvr)?;
             let places = array_mut(call, "value", value, nvr)?;
             for (reference, place) in references.iter().zip(places) {
-                let value = as_c(component.instance.get(call, *reference)?);
+                let value = as_c(component.instance.get(operation, *reference)?);
                 *place = value.ok_or_else(|| call.error("wrong type"))?;
             }
             Ok(())
@@ -491,25 +490,25 @@ unsafe fn get<T>(
 }
 
 /// Sets all references, each from its C type by `from_c`.
-unsafe fn set<T: Copy>(
+#[inline]
+unsafe fn set<M: Model, T: Copy>(
     c: fmi2Component,
-    call: &Call,
+    operation: &'static Operation,
     (vr, nvr, value): (*const fmi2ValueReference, usize, *const T),
     from_c: impl Fn(T) -> Value,
 ) -> fmi2Status {
     unsafe {
-        on(c, call, |component| {
-            component.instance.check(call)?;
+        on::<M>(c, operation, |component| {
+            let call = &component.instance.check(operation)?;
             let references = array(call, "vr", vr, nvr)?;
             let values = array(call, "value", value, nvr)?;
-            component.instance.set(call, references, |n| from_c(values[n]))
+            component.instance.set(operation, references, |n| from_c(values[n]))
         })
     }
 }
 
 /// Reads reals.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetReal(
+pub unsafe fn fmi2GetReal<M: Model>(
     c: fmi2Component,
     vr: *const fmi2ValueReference,
     nvr: usize,
@@ -519,12 +518,11 @@ pub unsafe extern "C" fn fmi2GetReal(
         Value::Real(x) => Some(x),
         _ => None,
     };
-    unsafe { get(c, &calls::GET_REAL, (vr, nvr, value), as_c) }
+    unsafe { get::<M, _>(c, &op::GET_REAL, (vr, nvr, value), as_c) }
 }
 
 /// Reads integers and enumerations.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetInteger(
+pub unsafe fn fmi2GetInteger<M: Model>(
     c: fmi2Component,
     vr: *const fmi2ValueReference,
     nvr: usize,
@@ -534,12 +532,11 @@ pub unsafe extern "C" fn fmi2GetInteger(
         Value::Integer(n) => Some(n),
         _ => None,
     };
-    unsafe { get(c, &calls::GET_INTEGER, (vr, nvr, value), as_c) }
+    unsafe { get::<M, _>(c, &op::GET_INTEGER, (vr, nvr, value), as_c) }
 }
 
 /// Reads Booleans: 0 or 1.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetBoolean(
+pub unsafe fn fmi2GetBoolean<M: Model>(
     c: fmi2Component,
     vr: *const fmi2ValueReference,
     nvr: usize,
@@ -549,77 +546,71 @@ pub unsafe extern "C" fn fmi2GetBoolean(
         Value::Boolean(b) => Some(fmi2Boolean::from(b)),
         _ => None,
     };
-    unsafe { get(c, &calls::GET_BOOLEAN, (vr, nvr, value), as_c) }
+    unsafe { get::<M, _>(c, &op::GET_BOOLEAN, (vr, nvr, value), as_c) }
 }
 
 /// There are no strings.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetString(
+pub unsafe fn fmi2GetString<M: Model>(
     c: fmi2Component,
     vr: *const fmi2ValueReference,
     nvr: usize,
     value: *mut fmi2String,
 ) -> fmi2Status {
-    unsafe { get(c, &calls::GET_STRING, (vr, nvr, value), |_| None) }
+    unsafe { get::<M, _>(c, &op::GET_STRING, (vr, nvr, value), |_| None) }
 }
 
 /// Sets reals.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetReal(
+pub unsafe fn fmi2SetReal<M: Model>(
     c: fmi2Component,
     vr: *const fmi2ValueReference,
     nvr: usize,
     value: *const fmi2Real,
 ) -> fmi2Status {
-    unsafe { set(c, &calls::SET_REAL, (vr, nvr, value), Value::Real) }
+    unsafe { set::<M, _>(c, &op::SET_REAL, (vr, nvr, value), Value::Real) }
 }
 
 /// Sets integers and enumerations.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetInteger(
+pub unsafe fn fmi2SetInteger<M: Model>(
     c: fmi2Component,
     vr: *const fmi2ValueReference,
     nvr: usize,
     value: *const fmi2Integer,
 ) -> fmi2Status {
-    unsafe { set(c, &calls::SET_INTEGER, (vr, nvr, value), Value::Integer) }
+    unsafe { set::<M, _>(c, &op::SET_INTEGER, (vr, nvr, value), Value::Integer) }
 }
 
 /// Sets Booleans: everything but 0 is true.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetBoolean(
+pub unsafe fn fmi2SetBoolean<M: Model>(
     c: fmi2Component,
     vr: *const fmi2ValueReference,
     nvr: usize,
     value: *const fmi2Boolean,
 ) -> fmi2Status {
-    unsafe { set(c, &calls::SET_BOOLEAN, (vr, nvr, value), |b| Value::Boolean(b != 0)) }
+    unsafe { set::<M, _>(c, &op::SET_BOOLEAN, (vr, nvr, value), |b| Value::Boolean(b != 0)) }
 }
 
 /// There are no strings.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetString(
+pub unsafe fn fmi2SetString<M: Model>(
     c: fmi2Component,
     vr: *const fmi2ValueReference,
     nvr: usize,
     value: *const fmi2String,
 ) -> fmi2Status {
     // No variable is a string, so the value is never looked at.
-    unsafe { set(c, &calls::SET_STRING, (vr, nvr, value), |_| Value::Boolean(false)) }
+    unsafe { set::<M, _>(c, &op::SET_STRING, (vr, nvr, value), |_| Value::Boolean(false)) }
 }
 
 // ---- Saved states ----
 
 /// Saves the state, into the handle that is there or into a new one.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetFMUstate(
+pub unsafe fn fmi2GetFMUstate<M: Model>(
     c: fmi2Component,
     FMUstate: *mut fmi2FMUstate,
 ) -> fmi2Status {
-    let call = &calls::GET_FMU_STATE;
+    let operation = &op::GET_FMU_STATE;
     unsafe {
-        on(c, call, |component| {
-            component.instance.check(call)?;
+        on::<M>(c, operation, |component| {
+            let call = &component.instance.check(operation)?;
             let handle = place(call, "FMUstate", FMUstate)?;
             if handle.is_null() {
                 *handle = new_state(component.instance.clone());
@@ -631,38 +622,39 @@ pub unsafe extern "C" fn fmi2GetFMUstate(
     }
 }
 
-fn new_state(instance: Instance) -> fmi2FMUstate {
+fn new_state<M: Model>(instance: Instance<M>) -> fmi2FMUstate {
     Box::into_raw(Box::new(SavedState { mark: STATE, instance })).cast()
 }
 
 /// Takes a saved state, this instance's or another's, in any state of life.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetFMUstate(c: fmi2Component, FMUstate: fmi2FMUstate) -> fmi2Status {
-    let call = &calls::SET_FMU_STATE;
+pub unsafe fn fmi2SetFMUstate<M: Model>(c: fmi2Component, FMUstate: fmi2FMUstate) -> fmi2Status {
+    let operation = &op::SET_FMU_STATE;
     unsafe {
-        on(c, call, |component| component.instance.restore(&saved_state(call, FMUstate)?.instance))
+        on::<M>(c, operation, |component| {
+            let call = &component.instance.check(operation)?;
+            component.instance.restore(&saved_state(call, FMUstate)?.instance)
+        })
     }
 }
 
 /// Frees a saved state and clears the handle; NULL is fine. fmusim (0.0.39) gives the state itself in
 /// place of the handle's address: known by its mark, which no address equals, it is freed too.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2FreeFMUstate(
+pub unsafe fn fmi2FreeFMUstate<M: Model>(
     c: fmi2Component,
     FMUstate: *mut fmi2FMUstate,
 ) -> fmi2Status {
-    let call = &calls::FREE_FMU_STATE;
+    let operation = &op::FREE_FMU_STATE;
     unsafe {
-        on(c, call, |_| {
+        on::<M>(c, operation, |_| {
             if FMUstate.is_null() || (*FMUstate).is_null() {
                 return Ok(());
             }
             let is_itself = ptr::read(FMUstate.cast::<u64>()) == STATE;
             let state = if is_itself { FMUstate.cast() } else { *FMUstate };
-            saved_state(call, state)?;
+            saved_state::<M>(&operation.call(FMI2), state)?;
             // as in fmi2FreeInstance
             ptr::write_volatile(state.cast::<u64>(), 0);
-            drop(Box::from_raw(state.cast::<SavedState>()));
+            drop(Box::from_raw(state.cast::<SavedState<M>>()));
             if !is_itself {
                 *FMUstate = ptr::null_mut();
             }
@@ -672,36 +664,34 @@ pub unsafe extern "C" fn fmi2FreeFMUstate(
 }
 
 /// How many bytes a saved state takes.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SerializedFMUstateSize(
+pub unsafe fn fmi2SerializedFMUstateSize<M: Model>(
     c: fmi2Component,
     FMUstate: fmi2FMUstate,
     size: *mut usize,
 ) -> fmi2Status {
-    let call = &calls::SERIALIZED_SIZE;
+    let operation = &op::SERIALIZED_SIZE;
     unsafe {
-        on(c, call, |component| {
-            component.instance.check(call)?;
-            saved_state(call, FMUstate)?;
-            *place(call, "size", size)? = snapshot::size();
+        on::<M>(c, operation, |component| {
+            let call = &component.instance.check(operation)?;
+            saved_state::<M>(call, FMUstate)?;
+            *place(call, "size", size)? = snapshot::size::<M>();
             Ok(())
         })
     }
 }
 
 /// Writes a saved state to the host's bytes.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SerializeFMUstate(
+pub unsafe fn fmi2SerializeFMUstate<M: Model>(
     c: fmi2Component,
     FMUstate: fmi2FMUstate,
     serializedState: *mut fmi2Byte,
     size: usize,
 ) -> fmi2Status {
-    let call = &calls::SERIALIZE;
+    let operation = &op::SERIALIZE;
     unsafe {
-        on(c, call, |component| {
-            component.instance.check(call)?;
-            let bytes = snapshot::to_bytes(&saved_state(call, FMUstate)?.instance);
+        on::<M>(c, operation, |component| {
+            let call = &component.instance.check(operation)?;
+            let bytes = snapshot::to_bytes(&saved_state::<M>(call, FMUstate)?.instance);
             if size < bytes.len() {
                 return Err(call.error(format_args!(
                     "size is {size}; a saved state takes {} bytes",
@@ -717,22 +707,21 @@ pub unsafe extern "C" fn fmi2SerializeFMUstate(
 
 /// Makes a saved state from bytes. The handle is written, never read: the host
 /// need not have set it.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2DeSerializeFMUstate(
+pub unsafe fn fmi2DeSerializeFMUstate<M: Model>(
     c: fmi2Component,
     serializedState: *const fmi2Byte,
     size: usize,
     FMUstate: *mut fmi2FMUstate,
 ) -> fmi2Status {
-    let call = &calls::DESERIALIZE;
+    let operation = &op::DESERIALIZE;
     unsafe {
-        on(c, call, |component| {
-            component.instance.check(call)?;
+        on::<M>(c, operation, |component| {
+            let call = &component.instance.check(operation)?;
             if FMUstate.is_null() {
                 return Err(null(call, "FMUstate"));
             }
             let bytes = array(call, "serializedState", serializedState.cast::<u8>(), size)?;
-            let instance = snapshot::from_bytes(bytes).map_err(|why| call.error(why))?;
+            let instance = snapshot::from_bytes::<M>(FMI2, bytes).map_err(|why| call.error(why))?;
             ptr::write(FMUstate, new_state(instance));
             Ok(())
         })
@@ -740,8 +729,7 @@ pub unsafe extern "C" fn fmi2DeSerializeFMUstate(
 }
 
 /// What the unknowns do when the knowns go in a direction.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetDirectionalDerivative(
+pub unsafe fn fmi2GetDirectionalDerivative<M: Model>(
     c: fmi2Component,
     vUnknown_ref: *const fmi2ValueReference,
     nUnknown: usize,
@@ -750,10 +738,10 @@ pub unsafe extern "C" fn fmi2GetDirectionalDerivative(
     dvKnown: *const fmi2Real,
     dvUnknown: *mut fmi2Real,
 ) -> fmi2Status {
-    let call = &calls::DIRECTIONAL_DERIVATIVE;
+    let operation = &op::DIRECTIONAL_DERIVATIVE;
     unsafe {
-        on(c, call, |component| {
-            component.instance.check(call)?;
+        on::<M>(c, operation, |component| {
+            let call = &component.instance.check(operation)?;
             let unknowns = array(call, "vUnknown_ref", vUnknown_ref, nUnknown)?;
             let knowns = array(call, "vKnown_ref", vKnown_ref, nKnown)?;
             let direction = array(call, "dvKnown", dvKnown, nKnown)?;
@@ -779,23 +767,21 @@ pub struct fmi2EventInfo {
 }
 
 /// At an event.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2EnterEventMode(c: fmi2Component) -> fmi2Status {
-    unsafe { on(c, &calls::ENTER_EVENT, |component| component.instance.enter_event_mode()) }
+pub unsafe fn fmi2EnterEventMode<M: Model>(c: fmi2Component) -> fmi2Status {
+    unsafe { on::<M>(c, &op::ENTER_EVENT, |component| component.instance.enter_event_mode()) }
 }
 
 /// Does what is due at the event.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2NewDiscreteStates(
+pub unsafe fn fmi2NewDiscreteStates<M: Model>(
     c: fmi2Component,
     eventInfo: *mut fmi2EventInfo,
 ) -> fmi2Status {
-    let call = &calls::NEW_DISCRETE_STATES;
+    let operation = &op::NEW_DISCRETE_STATES;
     unsafe {
-        on(c, call, |component| {
-            component.instance.check(call)?;
+        on::<M>(c, operation, |component| {
+            let call = &component.instance.check(operation)?;
             let place = place(call, "eventInfo", eventInfo)?;
-            let before = component.instance.last_contact();
+            let before = component.instance.event_count();
             let info = component.instance.new_discrete_states()?;
             *place = fmi2EventInfo {
                 valuesOfContinuousStatesChanged: info.states_changed.into(),
@@ -803,17 +789,16 @@ pub unsafe extern "C" fn fmi2NewDiscreteStates(
                 nextEventTime: info.next_time.unwrap_or(0.0),
                 ..fmi2EventInfo::default()
             };
-            component.log.report_event(call, before, &component.instance);
+            component.log.report_event(operation, before, &component.instance);
             Ok(())
         })
     }
 }
 
 /// Between events.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2EnterContinuousTimeMode(c: fmi2Component) -> fmi2Status {
+pub unsafe fn fmi2EnterContinuousTimeMode<M: Model>(c: fmi2Component) -> fmi2Status {
     unsafe {
-        on(c, &calls::ENTER_CONTINUOUS_TIME, |component| {
+        on::<M>(c, &op::ENTER_CONTINUOUS_TIME, |component| {
             component.instance.enter_continuous_time_mode()
         })
     }
@@ -821,17 +806,16 @@ pub unsafe extern "C" fn fmi2EnterContinuousTimeMode(c: fmi2Component) -> fmi2St
 
 /// The host has made a step and will not go back behind it. No past is kept, so
 /// `noSetFMUStatePriorToCurrentPoint` changes nothing.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2CompletedIntegratorStep(
+pub unsafe fn fmi2CompletedIntegratorStep<M: Model>(
     c: fmi2Component,
     _noSetFMUStatePriorToCurrentPoint: fmi2Boolean,
     enterEventMode: *mut fmi2Boolean,
     terminateSimulation: *mut fmi2Boolean,
 ) -> fmi2Status {
-    let call = &calls::COMPLETED_STEP;
+    let operation = &op::COMPLETED_STEP;
     unsafe {
-        on(c, call, |component| {
-            component.instance.check(call)?;
+        on::<M>(c, operation, |component| {
+            let call = &component.instance.check(operation)?;
             let enter = place(call, "enterEventMode", enterEventMode)?;
             let terminate = place(call, "terminateSimulation", terminateSimulation)?;
             *enter = component.instance.completed_integrator_step()?.into();
@@ -842,99 +826,93 @@ pub unsafe extern "C" fn fmi2CompletedIntegratorStep(
 }
 
 /// The present time.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetTime(c: fmi2Component, time: fmi2Real) -> fmi2Status {
-    unsafe { on(c, &calls::SET_TIME, |component| component.instance.set_time(time)) }
+pub unsafe fn fmi2SetTime<M: Model>(c: fmi2Component, time: fmi2Real) -> fmi2Status {
+    unsafe { on::<M>(c, &op::SET_TIME, |component| component.instance.set_time(time)) }
 }
 
 /// The states as the host has integrated them.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetContinuousStates(
+pub unsafe fn fmi2SetContinuousStates<M: Model>(
     c: fmi2Component,
     x: *const fmi2Real,
     nx: usize,
 ) -> fmi2Status {
-    let call = &calls::SET_CONTINUOUS_STATES;
+    let operation = &op::SET_CONTINUOUS_STATES;
     unsafe {
-        on(c, call, |component| {
-            component.instance.check(call)?;
+        on::<M>(c, operation, |component| {
+            let call = &component.instance.check(operation)?;
             component.instance.set_continuous_states(array(call, "x", x, nx)?)
         })
     }
 }
 
 /// Fills the host's array by `body`.
-unsafe fn fill(
+unsafe fn fill<M: Model>(
     c: fmi2Component,
-    call: &Call,
+    operation: &'static Operation,
     (name, pointer, length): (&str, *mut fmi2Real, usize),
-    body: impl FnOnce(&mut Instance, &mut [fmi2Real]) -> Result<(), Fault>,
+    body: impl FnOnce(&mut Instance<M>, &mut [fmi2Real]) -> Result<(), Fault>,
 ) -> fmi2Status {
     unsafe {
-        on(c, call, |component| {
-            component.instance.check(call)?;
+        on::<M>(c, operation, |component| {
+            let call = &component.instance.check(operation)?;
             body(&mut component.instance, array_mut(call, name, pointer, length)?)
         })
     }
 }
 
 /// The derivatives of the states, in the order of the model description.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetDerivatives(
+pub unsafe fn fmi2GetDerivatives<M: Model>(
     c: fmi2Component,
     derivatives: *mut fmi2Real,
     nx: usize,
 ) -> fmi2Status {
     let into = ("derivatives", derivatives, nx);
-    unsafe { fill(c, &calls::GET_DERIVATIVES, into, Instance::derivatives) }
+    unsafe { fill::<M>(c, &op::GET_DERIVATIVES, into, Instance::derivatives) }
 }
 
 /// Functions that cross zero at events.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetEventIndicators(
+pub unsafe fn fmi2GetEventIndicators<M: Model>(
     c: fmi2Component,
     eventIndicators: *mut fmi2Real,
     ni: usize,
 ) -> fmi2Status {
     let into = ("eventIndicators", eventIndicators, ni);
-    unsafe { fill(c, &calls::GET_EVENT_INDICATORS, into, Instance::event_indicators) }
+    unsafe { fill::<M>(c, &op::GET_EVENT_INDICATORS, into, Instance::event_indicators) }
 }
 
 /// The states, in the order of the model description.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetContinuousStates(
+pub unsafe fn fmi2GetContinuousStates<M: Model>(
     c: fmi2Component,
     x: *mut fmi2Real,
     nx: usize,
 ) -> fmi2Status {
-    unsafe { fill(c, &calls::GET_CONTINUOUS_STATES, ("x", x, nx), Instance::continuous_states) }
+    unsafe { fill::<M>(c, &op::GET_CONTINUOUS_STATES, ("x", x, nx), Instance::continuous_states) }
 }
 
 /// The states' orders of magnitude.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetNominalsOfContinuousStates(
+pub unsafe fn fmi2GetNominalsOfContinuousStates<M: Model>(
     c: fmi2Component,
     x_nominal: *mut fmi2Real,
     nx: usize,
 ) -> fmi2Status {
     let into = ("x_nominal", x_nominal, nx);
-    unsafe { fill(c, &calls::GET_NOMINALS, into, |instance, x| instance.nominals(x)) }
+    unsafe { fill::<M>(c, &op::GET_NOMINALS, into, |instance, x| instance.nominals(x)) }
 }
 
 // ---- Co-Simulation ----
 
 /// The slopes of inputs over the next step.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetRealInputDerivatives(
+pub unsafe fn fmi2SetRealInputDerivatives<M: Model>(
     c: fmi2Component,
     vr: *const fmi2ValueReference,
     nvr: usize,
     order: *const fmi2Integer,
     value: *const fmi2Real,
 ) -> fmi2Status {
-    let call = &calls::SET_INPUT_DERIVATIVES;
+    let operation = &op::SET_INPUT_DERIVATIVES;
     unsafe {
-        on(c, call, |component| {
+        on::<M>(c, operation, |component| {
+            let call = &component.instance.check(operation)?;
             let references = array(call, "vr", vr, nvr)?;
             let orders = array(call, "order", order, nvr)?;
             let values = array(call, "value", value, nvr)?;
@@ -944,72 +922,66 @@ pub unsafe extern "C" fn fmi2SetRealInputDerivatives(
 }
 
 /// The derivatives of some outputs.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetRealOutputDerivatives(
+pub unsafe fn fmi2GetRealOutputDerivatives<M: Model>(
     c: fmi2Component,
     vr: *const fmi2ValueReference,
     nvr: usize,
     order: *const fmi2Integer,
     value: *mut fmi2Real,
 ) -> fmi2Status {
-    let call = &calls::GET_OUTPUT_DERIVATIVES;
+    let operation = &op::GET_OUTPUT_DERIVATIVES;
     unsafe {
-        on(c, call, |component| {
-            component.instance.check(call)?;
+        on::<M>(c, operation, |component| {
+            let call = &component.instance.check(operation)?;
             let references = array(call, "vr", vr, nvr)?;
             let orders = array(call, "order", order, nvr)?;
             let places = array_mut(call, "value", value, nvr)?;
-            for ((reference, order), place) in references.iter().zip(orders).zip(places) {
-                *place = component.instance.output_derivative(*reference, *order)?;
-            }
-            Ok(())
+            component.instance.output_derivatives(references, orders, places)
         })
     }
 }
 
 /// One step. `noSetFMUStatePriorToCurrentPoint` changes nothing here: no past is
 /// kept.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2DoStep(
+pub unsafe fn fmi2DoStep<M: Model>(
     c: fmi2Component,
     currentCommunicationPoint: fmi2Real,
     communicationStepSize: fmi2Real,
     _noSetFMUStatePriorToCurrentPoint: fmi2Boolean,
 ) -> fmi2Status {
-    let call = &calls::DO_STEP;
+    let operation = &op::DO_STEP;
     unsafe {
-        on(c, call, |component| {
-            let before = component.instance.last_contact();
+        on::<M>(c, operation, |component| {
+            let before = component.instance.event_count();
             component.instance.do_step(currentCommunicationPoint, communicationStepSize)?;
-            component.log.report_event(call, before, &component.instance);
+            component.log.report_event(operation, before, &component.instance);
             Ok(())
         })
     }
 }
 
 /// Steps are never asynchronous, so there is nothing to cancel.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2CancelStep(c: fmi2Component) -> fmi2Status {
-    let call = &calls::CANCEL_STEP;
+pub unsafe fn fmi2CancelStep<M: Model>(c: fmi2Component) -> fmi2Status {
+    let operation = &op::CANCEL_STEP;
     unsafe {
-        on(c, call, |component| {
-            component.instance.check(call)?;
+        on::<M>(c, operation, |component| {
+            let call = &component.instance.check(operation)?;
             Err(call.error("no step is running: fmi2DoStep returns when the step is done"))
         })
     }
 }
 
 /// Answers a question about the last step, or discards it.
-unsafe fn answer<T>(
+unsafe fn answer<M: Model, T>(
     c: fmi2Component,
-    call: &Call,
+    operation: &'static Operation,
     kind: fmi2StatusKind,
     value: *mut T,
-    known: impl FnOnce(&Instance) -> Option<T>,
+    known: impl FnOnce(&Instance<M>) -> Option<T>,
 ) -> fmi2Status {
     unsafe {
-        on(c, call, |component| {
-            component.instance.check(call)?;
+        on::<M>(c, operation, |component| {
+            let call = &component.instance.check(operation)?;
             let place = place(call, "value", value)?;
             let value = known(&component.instance);
             *place = value
@@ -1020,64 +992,131 @@ unsafe fn answer<T>(
 }
 
 /// How the last step ended.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetStatus(
+pub unsafe fn fmi2GetStatus<M: Model>(
     c: fmi2Component,
     s: fmi2StatusKind,
     value: *mut fmi2Status,
 ) -> fmi2Status {
-    let known = |instance: &Instance| {
-        let ended = if instance.mode() == Mode::Failed { fmi2Error } else { fmi2OK };
+    let known = |instance: &Instance<M>| {
+        let ended = if instance.state() == InstanceState::Failed { fmi2Error } else { fmi2OK };
         (s == fmi2DoStepStatus).then_some(ended)
     };
-    unsafe { answer(c, &calls::GET_STATUS, s, value, known) }
+    unsafe { answer::<M, _>(c, &op::GET_STATUS, s, value, known) }
 }
 
 /// How far the last step came.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetRealStatus(
+pub unsafe fn fmi2GetRealStatus<M: Model>(
     c: fmi2Component,
     s: fmi2StatusKind,
     value: *mut fmi2Real,
 ) -> fmi2Status {
-    let known = |instance: &Instance| (s == fmi2LastSuccessfulTime).then_some(instance.time());
-    unsafe { answer(c, &calls::GET_REAL_STATUS, s, value, known) }
+    let known = |instance: &Instance<M>| (s == fmi2LastSuccessfulTime).then_some(instance.time());
+    unsafe { answer::<M, _>(c, &op::GET_REAL_STATUS, s, value, known) }
 }
 
 /// No integer says anything about the last step.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetIntegerStatus(
+pub unsafe fn fmi2GetIntegerStatus<M: Model>(
     c: fmi2Component,
     s: fmi2StatusKind,
     value: *mut fmi2Integer,
 ) -> fmi2Status {
-    unsafe { answer(c, &calls::GET_INTEGER_STATUS, s, value, |_| None) }
+    unsafe { answer::<M, _>(c, &op::GET_INTEGER_STATUS, s, value, |_| None) }
 }
 
 /// The FMU never ends the simulation by itself.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetBooleanStatus(
+pub unsafe fn fmi2GetBooleanStatus<M: Model>(
     c: fmi2Component,
     s: fmi2StatusKind,
     value: *mut fmi2Boolean,
 ) -> fmi2Status {
-    let known = |_: &Instance| (s == fmi2Terminated).then_some(0);
-    unsafe { answer(c, &calls::GET_BOOLEAN_STATUS, s, value, known) }
+    let known = |_: &Instance<M>| (s == fmi2Terminated).then_some(0);
+    unsafe { answer::<M, _>(c, &op::GET_BOOLEAN_STATUS, s, value, known) }
 }
 
 /// No step is ever pending.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2GetStringStatus(
+pub unsafe fn fmi2GetStringStatus<M: Model>(
     c: fmi2Component,
     s: fmi2StatusKind,
     value: *mut fmi2String,
 ) -> fmi2Status {
-    unsafe { answer(c, &calls::GET_STRING_STATUS, s, value, |_| None) }
+    unsafe { answer::<M, _>(c, &op::GET_STRING_STATUS, s, value, |_| None) }
+}
+
+/// Exports the functions of FMI 2.0 for a model, under their names in C and as Rust functions of
+/// the module where it stands. A macro, because each FMU has to define these symbols itself.
+#[macro_export]
+macro_rules! export_fmi2 {
+    ($model:ty) => {
+        $crate::export_fmi2! { $model;
+            fn fmi2SetDebugLogging(c: fmi2Component, loggingOn: fmi2Boolean, nCategories: usize, categories: *const fmi2String) -> fmi2Status;
+            fn fmi2Instantiate(instanceName: fmi2String, fmuType: fmi2Type, fmuGUID: fmi2String, fmuResourceLocation: fmi2String, functions: *const fmi2CallbackFunctions, visible: fmi2Boolean, loggingOn: fmi2Boolean) -> fmi2Component;
+            fn fmi2FreeInstance(c: fmi2Component);
+            fn fmi2SetupExperiment(c: fmi2Component, toleranceDefined: fmi2Boolean, tolerance: fmi2Real, startTime: fmi2Real, stopTimeDefined: fmi2Boolean, stopTime: fmi2Real) -> fmi2Status;
+            fn fmi2EnterInitializationMode(c: fmi2Component) -> fmi2Status;
+            fn fmi2ExitInitializationMode(c: fmi2Component) -> fmi2Status;
+            fn fmi2Terminate(c: fmi2Component) -> fmi2Status;
+            fn fmi2Reset(c: fmi2Component) -> fmi2Status;
+            fn fmi2GetReal(c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, value: *mut fmi2Real) -> fmi2Status;
+            fn fmi2GetInteger(c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, value: *mut fmi2Integer) -> fmi2Status;
+            fn fmi2GetBoolean(c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, value: *mut fmi2Boolean) -> fmi2Status;
+            fn fmi2GetString(c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, value: *mut fmi2String) -> fmi2Status;
+            fn fmi2SetReal(c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, value: *const fmi2Real) -> fmi2Status;
+            fn fmi2SetInteger(c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, value: *const fmi2Integer) -> fmi2Status;
+            fn fmi2SetBoolean(c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, value: *const fmi2Boolean) -> fmi2Status;
+            fn fmi2SetString(c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, value: *const fmi2String) -> fmi2Status;
+            fn fmi2GetFMUstate(c: fmi2Component, FMUstate: *mut fmi2FMUstate) -> fmi2Status;
+            fn fmi2SetFMUstate(c: fmi2Component, FMUstate: fmi2FMUstate) -> fmi2Status;
+            fn fmi2FreeFMUstate(c: fmi2Component, FMUstate: *mut fmi2FMUstate) -> fmi2Status;
+            fn fmi2SerializedFMUstateSize(c: fmi2Component, FMUstate: fmi2FMUstate, size: *mut usize) -> fmi2Status;
+            fn fmi2SerializeFMUstate(c: fmi2Component, FMUstate: fmi2FMUstate, serializedState: *mut fmi2Byte, size: usize) -> fmi2Status;
+            fn fmi2DeSerializeFMUstate(c: fmi2Component, serializedState: *const fmi2Byte, size: usize, FMUstate: *mut fmi2FMUstate) -> fmi2Status;
+            fn fmi2GetDirectionalDerivative(c: fmi2Component, vUnknown_ref: *const fmi2ValueReference, nUnknown: usize, vKnown_ref: *const fmi2ValueReference, nKnown: usize, dvKnown: *const fmi2Real, dvUnknown: *mut fmi2Real) -> fmi2Status;
+            fn fmi2EnterEventMode(c: fmi2Component) -> fmi2Status;
+            fn fmi2NewDiscreteStates(c: fmi2Component, eventInfo: *mut fmi2EventInfo) -> fmi2Status;
+            fn fmi2EnterContinuousTimeMode(c: fmi2Component) -> fmi2Status;
+            fn fmi2CompletedIntegratorStep(c: fmi2Component, noSetFMUStatePriorToCurrentPoint: fmi2Boolean, enterEventMode: *mut fmi2Boolean, terminateSimulation: *mut fmi2Boolean) -> fmi2Status;
+            fn fmi2SetTime(c: fmi2Component, time: fmi2Real) -> fmi2Status;
+            fn fmi2SetContinuousStates(c: fmi2Component, x: *const fmi2Real, nx: usize) -> fmi2Status;
+            fn fmi2GetDerivatives(c: fmi2Component, derivatives: *mut fmi2Real, nx: usize) -> fmi2Status;
+            fn fmi2GetEventIndicators(c: fmi2Component, eventIndicators: *mut fmi2Real, ni: usize) -> fmi2Status;
+            fn fmi2GetContinuousStates(c: fmi2Component, x: *mut fmi2Real, nx: usize) -> fmi2Status;
+            fn fmi2GetNominalsOfContinuousStates(c: fmi2Component, x_nominal: *mut fmi2Real, nx: usize) -> fmi2Status;
+            fn fmi2SetRealInputDerivatives(c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, order: *const fmi2Integer, value: *const fmi2Real) -> fmi2Status;
+            fn fmi2GetRealOutputDerivatives(c: fmi2Component, vr: *const fmi2ValueReference, nvr: usize, order: *const fmi2Integer, value: *mut fmi2Real) -> fmi2Status;
+            fn fmi2DoStep(c: fmi2Component, currentCommunicationPoint: fmi2Real, communicationStepSize: fmi2Real, noSetFMUStatePriorToCurrentPoint: fmi2Boolean) -> fmi2Status;
+            fn fmi2CancelStep(c: fmi2Component) -> fmi2Status;
+            fn fmi2GetStatus(c: fmi2Component, s: fmi2StatusKind, value: *mut fmi2Status) -> fmi2Status;
+            fn fmi2GetRealStatus(c: fmi2Component, s: fmi2StatusKind, value: *mut fmi2Real) -> fmi2Status;
+            fn fmi2GetIntegerStatus(c: fmi2Component, s: fmi2StatusKind, value: *mut fmi2Integer) -> fmi2Status;
+            fn fmi2GetBooleanStatus(c: fmi2Component, s: fmi2StatusKind, value: *mut fmi2Boolean) -> fmi2Status;
+            fn fmi2GetStringStatus(c: fmi2Component, s: fmi2StatusKind, value: *mut fmi2String) -> fmi2Status;
+        }
+        #[allow(missing_docs, non_snake_case)]
+        #[unsafe(no_mangle)]
+        pub extern "C" fn fmi2GetTypesPlatform() -> $crate::v2::fmi2String {
+            $crate::v2::fmi2GetTypesPlatform()
+        }
+        #[allow(missing_docs, non_snake_case)]
+        #[unsafe(no_mangle)]
+        pub extern "C" fn fmi2GetVersion() -> $crate::v2::fmi2String {
+            $crate::v2::fmi2GetVersion()
+        }
+    };
+    ($model:ty; $(fn $name:ident($($argument:ident: $type:ty),*) $(-> $status:ty)?;)*) => {
+        $(
+            #[allow(missing_docs, non_snake_case, unsafe_code, clippy::missing_safety_doc)]
+            #[unsafe(no_mangle)]
+            pub unsafe extern "C" fn $name($($argument: $type),*) $(-> $status)? {
+                unsafe { $crate::v2::$name::<$model>($($argument),*) }
+            }
+        )*
+    };
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::spring::Spring;
 
     /// An instance without a logger.
     fn instantiate() -> fmi2Component {
@@ -1088,10 +1127,18 @@ mod tests {
             stepFinished: None,
             componentEnvironment: ptr::null_mut(),
         };
-        let guid = c_string(&table::guid());
+        let guid = c_string(Spring::table().guid());
         let made = unsafe {
             let name = c"one".as_ptr();
-            fmi2Instantiate(name, fmi2CoSimulation, guid.as_ptr(), ptr::null(), &callbacks, 0, 0)
+            fmi2Instantiate::<Spring>(
+                name,
+                fmi2CoSimulation,
+                guid.as_ptr(),
+                ptr::null(),
+                &callbacks,
+                0,
+                0,
+            )
         };
         assert!(!made.is_null());
         made
@@ -1102,16 +1149,16 @@ mod tests {
         let c = instantiate();
         let mut state = ptr::null_mut();
         unsafe {
-            assert_eq!(fmi2GetFMUstate(c, &mut state), fmi2OK);
-            assert_eq!(on(c, &calls::DO_STEP, |_| panic!("this is a test")), fmi2Fatal);
-            assert_eq!(fmi2Reset(c), fmi2Fatal);
-            assert_eq!(fmi2GetReal(c, ptr::null(), 0, ptr::null_mut()), fmi2Fatal);
-            assert_eq!(fmi2GetFMUstate(c, &mut state), fmi2Fatal);
-            assert_eq!(fmi2SetFMUstate(c, state), fmi2Fatal);
-            assert_eq!(fmi2GetStatus(c, fmi2DoStepStatus, &mut 0), fmi2Fatal);
-            assert_eq!(fmi2FreeFMUstate(c, &mut state), fmi2OK);
+            assert_eq!(fmi2GetFMUstate::<Spring>(c, &mut state), fmi2OK);
+            assert_eq!(on::<Spring>(c, &op::DO_STEP, |_| panic!("this is a test")), fmi2Fatal);
+            assert_eq!(fmi2Reset::<Spring>(c), fmi2Fatal);
+            assert_eq!(fmi2GetReal::<Spring>(c, ptr::null(), 0, ptr::null_mut()), fmi2Fatal);
+            assert_eq!(fmi2GetFMUstate::<Spring>(c, &mut state), fmi2Fatal);
+            assert_eq!(fmi2SetFMUstate::<Spring>(c, state), fmi2Fatal);
+            assert_eq!(fmi2GetStatus::<Spring>(c, fmi2DoStepStatus, &mut 0), fmi2Fatal);
+            assert_eq!(fmi2FreeFMUstate::<Spring>(c, &mut state), fmi2OK);
             assert!(state.is_null());
-            fmi2FreeInstance(c);
+            fmi2FreeInstance::<Spring>(c);
         }
     }
 
@@ -1120,9 +1167,9 @@ mod tests {
         let mut other = [0u64; 64];
         for handle in [ptr::null_mut(), other.as_mut_ptr().cast()] {
             unsafe {
-                assert_eq!(fmi2Reset(handle), fmi2Error);
-                assert_eq!(fmi2DoStep(handle, 0.0, 1.0, 0), fmi2Error);
-                fmi2FreeInstance(handle);
+                assert_eq!(fmi2Reset::<Spring>(handle), fmi2Error);
+                assert_eq!(fmi2DoStep::<Spring>(handle, 0.0, 1.0, 0), fmi2Error);
+                fmi2FreeInstance::<Spring>(handle);
             }
         }
     }
@@ -1131,21 +1178,27 @@ mod tests {
     fn null_is_fine_for_nothing_and_an_error_otherwise() {
         let c = instantiate();
         unsafe {
-            assert_eq!(fmi2SetReal(c, ptr::null(), 0, ptr::null()), fmi2OK);
-            assert_eq!(fmi2GetString(c, ptr::null(), 0, ptr::null_mut()), fmi2OK);
-            assert_eq!(fmi2SetReal(c, ptr::null(), 1, ptr::null()), fmi2Error);
-            assert_eq!(fmi2SetReal(c, &0, 1, ptr::null()), fmi2Error);
-            assert_eq!(fmi2GetReal(c, &0, 1, ptr::null_mut()), fmi2Error);
-            assert_eq!(fmi2SetDebugLogging(c, 1, 0, ptr::null()), fmi2OK);
-            assert_eq!(fmi2SetDebugLogging(c, 1, 1, ptr::null()), fmi2Error);
-            assert_eq!(fmi2SetDebugLogging(c, 1, 1, &ptr::null()), fmi2Error);
-            assert_eq!(fmi2GetFMUstate(c, ptr::null_mut()), fmi2Error);
-            assert_eq!(fmi2SetFMUstate(c, ptr::null_mut()), fmi2Error);
-            assert_eq!(fmi2FreeFMUstate(c, ptr::null_mut()), fmi2OK);
-            assert_eq!(fmi2FreeFMUstate(c, &mut ptr::null_mut()), fmi2OK);
-            assert_eq!(fmi2DeSerializeFMUstate(c, ptr::null(), 8, &mut ptr::null_mut()), fmi2Error);
-            assert_eq!(fmi2GetRealStatus(c, fmi2LastSuccessfulTime, ptr::null_mut()), fmi2Error);
-            fmi2FreeInstance(c);
+            assert_eq!(fmi2SetReal::<Spring>(c, ptr::null(), 0, ptr::null()), fmi2OK);
+            assert_eq!(fmi2GetString::<Spring>(c, ptr::null(), 0, ptr::null_mut()), fmi2OK);
+            assert_eq!(fmi2SetReal::<Spring>(c, ptr::null(), 1, ptr::null()), fmi2Error);
+            assert_eq!(fmi2SetReal::<Spring>(c, &0, 1, ptr::null()), fmi2Error);
+            assert_eq!(fmi2GetReal::<Spring>(c, &0, 1, ptr::null_mut()), fmi2Error);
+            assert_eq!(fmi2SetDebugLogging::<Spring>(c, 1, 0, ptr::null()), fmi2OK);
+            assert_eq!(fmi2SetDebugLogging::<Spring>(c, 1, 1, ptr::null()), fmi2Error);
+            assert_eq!(fmi2SetDebugLogging::<Spring>(c, 1, 1, &ptr::null()), fmi2Error);
+            assert_eq!(fmi2GetFMUstate::<Spring>(c, ptr::null_mut()), fmi2Error);
+            assert_eq!(fmi2SetFMUstate::<Spring>(c, ptr::null_mut()), fmi2Error);
+            assert_eq!(fmi2FreeFMUstate::<Spring>(c, ptr::null_mut()), fmi2OK);
+            assert_eq!(fmi2FreeFMUstate::<Spring>(c, &mut ptr::null_mut()), fmi2OK);
+            assert_eq!(
+                fmi2DeSerializeFMUstate::<Spring>(c, ptr::null(), 8, &mut ptr::null_mut()),
+                fmi2Error
+            );
+            assert_eq!(
+                fmi2GetRealStatus::<Spring>(c, fmi2LastSuccessfulTime, ptr::null_mut()),
+                fmi2Error
+            );
+            fmi2FreeInstance::<Spring>(c);
         }
     }
 
@@ -1154,23 +1207,29 @@ mod tests {
         let c = instantiate();
         let mut state = ptr::null_mut();
         unsafe {
-            assert_eq!(fmi2GetFMUstate(c, &mut state), fmi2OK);
+            assert_eq!(fmi2GetFMUstate::<Spring>(c, &mut state), fmi2OK);
             let first = state;
-            assert_eq!(fmi2GetFMUstate(c, &mut state), fmi2OK);
+            assert_eq!(fmi2GetFMUstate::<Spring>(c, &mut state), fmi2OK);
             assert_eq!(state, first);
             // The same bytes fit only if there is room for all of them.
             let mut size = 0;
-            assert_eq!(fmi2SerializedFMUstateSize(c, state, &mut size), fmi2OK);
+            assert_eq!(fmi2SerializedFMUstateSize::<Spring>(c, state, &mut size), fmi2OK);
             let mut bytes = vec![0; size];
-            assert_eq!(fmi2SerializeFMUstate(c, state, bytes.as_mut_ptr(), size - 1), fmi2Error);
-            assert_eq!(fmi2SerializeFMUstate(c, state, bytes.as_mut_ptr(), size), fmi2OK);
+            assert_eq!(
+                fmi2SerializeFMUstate::<Spring>(c, state, bytes.as_mut_ptr(), size - 1),
+                fmi2Error
+            );
+            assert_eq!(fmi2SerializeFMUstate::<Spring>(c, state, bytes.as_mut_ptr(), size), fmi2OK);
             // The handle need not be set.
             let mut another: fmi2FMUstate = ptr::without_provenance_mut(0xdead_beef);
-            assert_eq!(fmi2DeSerializeFMUstate(c, bytes.as_ptr(), size, &mut another), fmi2OK);
-            assert_eq!(fmi2SetFMUstate(c, another), fmi2OK);
-            assert_eq!(fmi2FreeFMUstate(c, &mut another), fmi2OK);
-            assert_eq!(fmi2FreeFMUstate(c, &mut state), fmi2OK);
-            fmi2FreeInstance(c);
+            assert_eq!(
+                fmi2DeSerializeFMUstate::<Spring>(c, bytes.as_ptr(), size, &mut another),
+                fmi2OK
+            );
+            assert_eq!(fmi2SetFMUstate::<Spring>(c, another), fmi2OK);
+            assert_eq!(fmi2FreeFMUstate::<Spring>(c, &mut another), fmi2OK);
+            assert_eq!(fmi2FreeFMUstate::<Spring>(c, &mut state), fmi2OK);
+            fmi2FreeInstance::<Spring>(c);
         }
     }
 
@@ -1178,21 +1237,24 @@ mod tests {
     fn questions_without_an_answer_are_discarded() {
         let c = instantiate();
         unsafe {
-            assert_eq!(fmi2GetRealStatus(c, fmi2Terminated, &mut 0.0), fmi2Discard);
-            assert_eq!(fmi2GetIntegerStatus(c, fmi2DoStepStatus, &mut 0), fmi2Discard);
-            assert_eq!(fmi2GetStringStatus(c, fmi2PendingStatus, &mut ptr::null()), fmi2Discard);
+            assert_eq!(fmi2GetRealStatus::<Spring>(c, fmi2Terminated, &mut 0.0), fmi2Discard);
+            assert_eq!(fmi2GetIntegerStatus::<Spring>(c, fmi2DoStepStatus, &mut 0), fmi2Discard);
+            assert_eq!(
+                fmi2GetStringStatus::<Spring>(c, fmi2PendingStatus, &mut ptr::null()),
+                fmi2Discard
+            );
             let mut terminated = 1;
-            assert_eq!(fmi2GetBooleanStatus(c, fmi2Terminated, &mut terminated), fmi2OK);
+            assert_eq!(fmi2GetBooleanStatus::<Spring>(c, fmi2Terminated, &mut terminated), fmi2OK);
             assert_eq!(terminated, 0);
-            fmi2FreeInstance(c);
+            fmi2FreeInstance::<Spring>(c);
         }
     }
 
     #[test]
     fn instance_is_refused_without_name_or_guid_and_of_an_unknown_type() {
-        let guid = Some(table::guid());
+        let guid = Some(Spring::table().guid().to_string());
         let name = Some("one".to_string());
-        let made = |name, kind, guid| interface(name, kind, guid);
+        let made = |name, kind, guid| interface::<Spring>(name, kind, guid);
         assert_eq!(made(name.clone(), 0, guid.clone()), Ok(Interface::ModelExchange));
         assert_eq!(made(name.clone(), 1, guid.clone()), Ok(Interface::CoSimulation));
         assert!(made(None, fmi2CoSimulation, guid.clone()).is_err());
@@ -1200,6 +1262,6 @@ mod tests {
         assert!(made(name.clone(), 7, guid).unwrap_err().contains('7'));
         assert!(made(name.clone(), fmi2CoSimulation, None).unwrap_err().contains("NULL"));
         let wrong = made(name, fmi2CoSimulation, Some("{0}".into())).unwrap_err();
-        assert!(wrong.contains("{0}") && wrong.contains(&table::guid()));
+        assert!(wrong.contains("{0}") && wrong.contains(Spring::table().guid()));
     }
 }

@@ -1,24 +1,26 @@
 //! Which messages go to the host's logger.
 //!
-//! Calls that fail, and, for those who ask, stick and slip. A host that asks for
+//! Calls that fail, and, for those who ask, the model's events. A host that asks for
 //! nothing gets no chatter: `loggingOn` of fmi2Instantiate switches nothing, because
 //! failures are reported either way (a status without a reason helps nobody) and
 //! events only on an explicit wish. fmi2SetDebugLogging is one and is obeyed: off means
 //! silence, and no category named means all.
 
-use crate::calls::Severity;
+use crate::model::Model;
+use crate::operation::Severity;
+use crate::table::Table;
 
 /// What a message is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Topic {
-    /// The hub sticks or breaks away.
+    /// An event of the model.
     Event,
     /// A call has failed.
     Failure(Severity),
 }
 
 /// A log category of the model description.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Category {
     /// As hosts name it.
     pub name: &'static str,
@@ -28,13 +30,7 @@ pub struct Category {
     pub topic: Option<Topic>,
 }
 
-/// All categories there are.
-pub const CATEGORIES: [Category; 5] = [
-    Category {
-        name: "logEvents",
-        description: "Each time the hub sticks in its bearing or breaks away",
-        topic: Some(Topic::Event),
-    },
+const FAILURES: [Category; 4] = [
     Category {
         name: "logStatusDiscard",
         description: "Why a call returned fmi2Discard",
@@ -52,10 +48,24 @@ pub const CATEGORIES: [Category; 5] = [
     },
     Category { name: "logAll", description: "All of the above", topic: None },
 ];
+const EVENTS: &str = "logEvents";
+
+/// All categories of a model.
+pub fn categories<M: Model>(table: &Table<M>) -> Vec<Category> {
+    let events =
+        Category { name: EVENTS, description: table.about.events, topic: Some(Topic::Event) };
+    let has_events = !table.about.events.is_empty();
+    has_events.then_some(events).into_iter().chain(FAILURES).collect()
+}
 
 /// The category of messages on this topic.
 pub fn category(topic: Topic) -> &'static str {
-    CATEGORIES.iter().find(|c| c.topic == Some(topic)).map_or("logAll", |c| c.name)
+    match topic {
+        Topic::Event => EVENTS,
+        Topic::Failure(_) => {
+            FAILURES.iter().find(|c| c.topic == Some(topic)).map_or("logAll", |c| c.name)
+        }
+    }
 }
 
 /// What one instance logs.
@@ -77,14 +87,15 @@ impl Filter {
 
     /// Only these categories; none given means all. Unknown names are an error
     /// that lists them and the known ones.
-    pub fn of(names: &[String]) -> Result<Filter, String> {
+    pub fn of<M: Model>(names: &[String], table: &Table<M>) -> Result<Filter, String> {
+        let categories = categories(table);
         if names.is_empty() {
             return Ok(Filter::ALL);
         }
         let mut filter = Filter::NONE;
         let mut unknown = Vec::new();
         for name in names {
-            match CATEGORIES.iter().find(|c| c.name == name).map(|c| c.topic) {
+            match categories.iter().find(|c| c.name == name).map(|c| c.topic) {
                 Some(None) => filter = Filter::ALL,
                 Some(Some(topic)) => *filter.switch(topic) = true,
                 None => unknown.push(format!("\"{name}\"")),
@@ -93,7 +104,7 @@ impl Filter {
         if unknown.is_empty() {
             return Ok(filter);
         }
-        let known: Vec<_> = CATEGORIES.iter().map(|c| c.name).collect();
+        let known: Vec<_> = categories.iter().map(|c| c.name).collect();
         Err(format!("unknown log category {}; known: {}", unknown.join(", "), known.join(", ")))
     }
 
@@ -115,15 +126,21 @@ impl Filter {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::Model;
+    use crate::spring::Spring;
+
+    fn of(names: &[String]) -> Result<Filter, String> {
+        Filter::of(names, Spring::table())
+    }
 
     #[test]
     fn no_category_means_all() {
-        assert_eq!(Filter::of(&[]), Ok(Filter::ALL));
+        assert_eq!(of(&[]), Ok(Filter::ALL));
     }
 
     #[test]
     fn only_the_categories_asked_for_are_wanted() {
-        let filter = Filter::of(&["logStatusFatal".into()]).unwrap();
+        let filter = of(&["logStatusFatal".into()]).unwrap();
         assert!(filter.wants(Topic::Failure(Severity::Fatal)));
         assert!(!filter.wants(Topic::Failure(Severity::Error)));
         assert!(!filter.wants(Topic::Event));
@@ -132,12 +149,11 @@ mod tests {
     #[test]
     fn events_are_for_those_who_ask() {
         assert!(!Filter::FAILURES.wants(Topic::Event));
-        assert!(Filter::of(&["logEvents".into()]).unwrap().wants(Topic::Event));
     }
 
     #[test]
     fn unknown_category_is_named_with_the_known_ones() {
-        let message = Filter::of(&["logStatusEror".into()]).unwrap_err();
+        let message = of(&["logStatusEror".into()]).unwrap_err();
         assert!(message.contains("logStatusEror") && message.contains("logStatusError"));
     }
 

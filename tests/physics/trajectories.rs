@@ -176,7 +176,7 @@ fn differences(name: &str, fill: &Fill, run: &Run, tolerance: f64) -> Vec<String
 }
 
 fn check(model: &str, tolerance: f64) {
-    let text = include_str!("reference/trajectories.json");
+    let text = include_str!("../reference/trajectories.json");
     let fills: BTreeMap<String, Fill> = serde_json::from_str(text).unwrap();
     let mut wrong = Vec::new();
     let mut runs = 0;

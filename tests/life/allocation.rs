@@ -1,20 +1,21 @@
 //! Stepping takes no memory from the host's heap: no lock, no waiting, no leak,
 //! however long the run.
 
-use HubSlosh::calls::{GET_REAL, Interface, SET_BOOLEAN, SET_INTEGER, SET_REAL};
-use HubSlosh::instance::Instance;
-use HubSlosh::table;
-use HubSlosh::variable::Value;
+use crate::common::items;
+use HubSlosh::Instance;
+use HubSlosh::table::TABLE;
 use allocation_counter::measure;
 use plant::{INDICATORS, STATES};
+use runtime::operation::{GET_REAL, Interface, SET_BOOLEAN, SET_INTEGER, SET_REAL};
+use runtime::variable::Value;
 
 fn reference(name: &str) -> u32 {
-    table::find(name).unwrap()
+    TABLE.find(name).unwrap()
 }
 
 /// Everything on.
 fn initialised(interface: Interface, slosh_model: i32, friction_model: i32) -> Instance {
-    let mut instance = Instance::new(interface);
+    let mut instance = HubSlosh::instance(interface);
     for (name, value) in
         [("slosh.model", slosh_model), ("friction.model", friction_model), ("slosh.modes", 3)]
     {
@@ -30,8 +31,8 @@ fn initialised(interface: Interface, slosh_model: i32, friction_model: i32) -> I
 
 #[test]
 fn stepping_setting_and_getting_allocate_nothing() {
-    for slosh_model in 1..=5 {
-        for friction_model in 1..=4 {
+    for slosh_model in items("slosh.model") {
+        for friction_model in items("friction.model") {
             let mut instance = initialised(Interface::CoSimulation, slosh_model, friction_model);
             let torque = [reference("tau_cmd")];
             let outputs = ["theta", "energy", "tank.m_liq", "tau_cmd", "hub.I"].map(reference);
@@ -52,8 +53,8 @@ fn stepping_setting_and_getting_allocate_nothing() {
 
 #[test]
 fn calls_of_model_exchange_allocate_nothing() {
-    for slosh_model in 1..=5 {
-        for friction_model in 1..=4 {
+    for slosh_model in items("slosh.model") {
+        for friction_model in items("friction.model") {
             let mut instance = initialised(Interface::ModelExchange, slosh_model, friction_model);
             let torque = [reference("tau_cmd")];
             let outputs = ["theta", "energy", "der(omega)", "slosh.v_radial[2]"].map(reference);

@@ -1,6 +1,6 @@
 //! Laws that hold for every model, parameter and input: energy, momentum, limits.
 
-use common::{FRICTION, SLOSH, anywhere, bench};
+use crate::common::{FRICTION, SLOSH, anywhere, bench};
 use plant::{FrictionModel, Inputs, Outputs, Plant, Ramp, SloshModel};
 
 /// Tolerance of all runs here. The plant's errors come out two to three decades

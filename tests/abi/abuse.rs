@@ -8,7 +8,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use common::{python, run};
+use crate::common::{python, run};
 use host::fmi2::Fmu;
 use pack::{packed_for_tests, root};
 
@@ -90,7 +90,7 @@ fn a_c_host_lives_through_everything_and_nothing_is_left_behind() {
     };
     let references = ["omega", "omega_dot", "tau_cmd", "slosh.model", "init.omega"];
     let said = run(
-        fmu.host("life", &["tests/abuse/life.c"], &[])
+        fmu.host("life", &["tests/abi/life.c"], &[])
             .arg(&fmu.library)
             .args([fmu.guid(), instances, loads])
             .args(references.map(|name| fmu.reference(name))),

@@ -1,0 +1,37 @@
+//! HubSlosh as an FMU: its variables ([`table`]) and its plant as a model of the runtime
+//! ([`model`]). The physics is the crate `plant` and knows nothing of this; what FMI demands is
+//! the crate `runtime`.
+
+// The library's name is the FMU's modelIdentifier.
+#![allow(non_snake_case)]
+
+pub mod model;
+pub mod table;
+
+pub use model::{HubSlosh, Parameters};
+
+use runtime::operation::{Interface, Version};
+
+/// An instance of the FMU.
+pub type Instance = runtime::instance::Instance<HubSlosh>;
+
+/// One scalar of the FMU's variables.
+pub type Scalar = runtime::table::Scalar<HubSlosh>;
+
+/// An instance as a host gets it through FMI 2.0, for hosts and tests in Rust.
+pub fn instance(interface: Interface) -> Instance {
+    Instance::new(Version::Fmi2, interface)
+}
+
+/// The saved state that the bytes hold, or why they hold none.
+pub fn from_bytes(bytes: &[u8]) -> Result<Instance, String> {
+    runtime::snapshot::from_bytes(Version::Fmi2, bytes)
+}
+
+/// The functions of FMI 2.0 that the binary exports.
+pub mod fmi2 {
+    // Their parameters are of the types of the standard's header.
+    pub use runtime::v2::*;
+
+    runtime::export_fmi2!(crate::HubSlosh);
+}

@@ -1,0 +1,200 @@
+//! The plant as a model of the runtime.
+
+use std::ops::{Deref, DerefMut};
+
+use plant::{
+    Calculated, Contact, FrictionModel, Inputs, Outputs, Plant, STATES, SloshModel, State,
+};
+use runtime::Model;
+use runtime::table::Table;
+
+use crate::table::{self, TABLE};
+
+/// Hub, bearing, tank, wheel and gyro.
+#[derive(Clone, Debug)]
+pub struct HubSlosh {
+    plant: Plant,
+    /// Whether the present inputs are applied, see [`Model::apply_present_inputs`].
+    present: bool,
+}
+
+impl HubSlosh {
+    /// What follows from the parameters.
+    pub fn calculated(&self) -> &Calculated {
+        self.plant.calculated()
+    }
+}
+
+/// The plant's parameters, and the ways round enumerations for hosts that set none.
+#[derive(Clone, Debug, Default)]
+pub struct Parameters {
+    plant: plant::Parameters,
+    /// The number of the slosh model, 0: as the enumeration says.
+    pub slosh_kind: i32,
+    /// The number of the friction law, 0: as the enumeration says.
+    pub friction_kind: i32,
+}
+
+impl Deref for Parameters {
+    type Target = plant::Parameters;
+
+    fn deref(&self) -> &plant::Parameters {
+        &self.plant
+    }
+}
+
+impl DerefMut for Parameters {
+    fn deref_mut(&mut self) -> &mut plant::Parameters {
+        &mut self.plant
+    }
+}
+
+impl Parameters {
+    /// What the plant is made of: the enumerations with `slosh.kind` and `friction.kind` applied.
+    fn resolved(&self) -> Result<plant::Parameters, Vec<String>> {
+        let mut p = self.plant;
+        let start = plant::Parameters::default();
+        let mut problems = Vec::new();
+        let mut conflict = |name: &str, model: i32, start: i32, kind: i32| {
+            if kind != 0 && model != start && model != kind {
+                problems.push(format!(
+                    "{name}.kind = {kind} contradicts {name}.model = {model} (allowed: 0, or the \
+                     same number, or {name}.model left at its start value {start})"
+                ));
+            }
+        };
+        conflict("slosh", p.slosh.model as i32, start.slosh.model as i32, self.slosh_kind);
+        conflict(
+            "friction",
+            p.friction.model as i32,
+            start.friction.model as i32,
+            self.friction_kind,
+        );
+        table::set_item(&mut p.slosh.model, &SloshModel::ALL, self.slosh_kind);
+        table::set_item(&mut p.friction.model, &FrictionModel::ALL, self.friction_kind);
+        if problems.is_empty() { Ok(p) } else { Err(problems) }
+    }
+}
+
+impl Model for HubSlosh {
+    type Parameters = Parameters;
+    type Inputs = Inputs;
+    type Outputs = Outputs;
+    type Discrete = Option<Contact>;
+
+    fn table() -> &'static Table<Self> {
+        &TABLE
+    }
+
+    fn new(
+        parameters: &Parameters,
+        inputs: &Inputs,
+        start_time: f64,
+        tolerance: f64,
+    ) -> Result<Self, Vec<String>> {
+        let plant = Plant::new(&parameters.resolved()?, inputs, start_time, tolerance)?;
+        Ok(HubSlosh { plant, present: false })
+    }
+
+    fn save(&self, words: &mut Vec<u64>) {
+        words.extend(self.plant.state().to_words());
+    }
+
+    fn resume(parameters: &Parameters, words: &[u64], tolerance: f64) -> Option<Self> {
+        let state = State::from_words(words.try_into().ok()?)?;
+        let plant = Plant::resume(&parameters.resolved().ok()?, &state, tolerance);
+        Some(HubSlosh { plant, present: false })
+    }
+
+    #[inline]
+    fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), String> {
+        self.plant.step(inputs, h).map_err(|why| why.to_string())
+    }
+
+    #[inline]
+    fn outputs(&mut self, inputs: &Inputs) -> Outputs {
+        if self.present { self.plant.outputs(inputs) } else { self.plant.outputs_held(inputs) }
+    }
+
+    #[inline]
+    fn continuous_states(&self) -> &[f64] {
+        self.plant.continuous_states()
+    }
+
+    fn set_continuous_states(&mut self, x: &[f64]) {
+        if let Some(x) = x.first_chunk::<STATES>() {
+            self.plant.set_continuous_states(x);
+        }
+    }
+
+    fn set_time(&mut self, time: f64) {
+        self.plant.set_time(time);
+    }
+
+    fn derivatives(&mut self, inputs: &Inputs, x_dot: &mut [f64]) {
+        x_dot.copy_from_slice(&self.plant.derivatives(inputs));
+    }
+
+    fn directional_derivative(
+        &mut self,
+        inputs: &Inputs,
+        dx: &[f64],
+        dx_dot: &mut [f64],
+    ) -> Outputs {
+        let du = [inputs.tau_cmd.slope, inputs.tau_ext.slope, inputs.g_axial.slope];
+        let mut direction = [0.0; STATES];
+        direction.copy_from_slice(dx);
+        dx_dot.copy_from_slice(&self.plant.directional_derivative(inputs, &direction, &du));
+        self.plant.output_derivatives(inputs, &direction, &du)
+    }
+
+    #[inline]
+    fn apply_present_inputs(&mut self, inputs: &Inputs) -> Option<Contact> {
+        self.present = true;
+        Some(self.plant.apply_present_contact(inputs))
+    }
+
+    #[inline]
+    fn revert(&mut self, before: Option<Contact>) {
+        self.present = false;
+        if let Some(contact) = before {
+            self.plant.revert_contact(contact);
+        }
+    }
+
+    fn tune(&mut self, parameters: &Parameters, inputs: &Inputs) -> Result<(), Vec<String>> {
+        self.plant.set_friction(&parameters.resolved()?.friction, inputs)
+    }
+
+    fn event_indicators(&mut self, inputs: &Inputs, indicators: &mut [f64]) {
+        indicators.copy_from_slice(&self.plant.event_indicators(inputs));
+    }
+
+    fn handle_event(&mut self, inputs: &Inputs) -> Result<bool, String> {
+        self.plant.take_event(inputs).map_err(|why| why.to_string())
+    }
+
+    fn next_time_event(&self) -> Option<f64> {
+        self.plant.next_time_event()
+    }
+
+    fn accept_step(&mut self, inputs: &Inputs) -> Result<bool, String> {
+        self.plant.check_range().map_err(|why| why.to_string())?;
+        Ok(self.plant.is_event_overdue(inputs))
+    }
+
+    #[inline]
+    fn event_count(&self) -> i32 {
+        self.plant.last_contact().0
+    }
+
+    fn last_event(&self) -> String {
+        let (_, time, contact) = self.plant.last_contact();
+        let what = match contact {
+            0 => "stuck",
+            1 => "broke away forwards",
+            _ => "broke away backwards",
+        };
+        format!("the hub {what} at t = {time:?} s")
+    }
+}

@@ -1,0 +1,451 @@
+//! Every variable of the FMU, once.
+//!
+//! A variable exists exactly when it has an entry here. The model description,
+//! the value references, get and set, start values, range checks, saved states
+//! and the GUID follow from this table. Start values are not written here: they are
+//! `plant::Parameters::default()` and `plant::Inputs::default()`, read through the
+//! entry's accessor.
+//!
+//! Ranges keep the plant sane (positive inertia, a tank that is a tank, a
+//! sampling rate that can be stepped) and are wide otherwise; what parameters
+//! mean together is for the plant to judge.
+
+use plant::{FrictionModel, INDICATORS, MODES, Ramp, SloshModel, State, x};
+use runtime::table::{About, Scalar, Table, scalar_count, scalars};
+use runtime::variable::{Enumeration, Item, Variable};
+
+use crate::HubSlosh;
+
+/// All that is said about the FMU's variables.
+pub static TABLE: Table<HubSlosh> = Table::new(
+    About {
+        model: "HubSlosh",
+        version: env!("CARGO_PKG_VERSION"),
+        description: "A spacecraft hub on a bearing with dry friction that can stick, and on it a \
+                      tank with sloshing liquid, a reaction wheel and a rate gyro",
+        events: "Each time the hub sticks in its bearing or breaks away",
+        event_indicators: INDICATORS,
+        saved_words: State::WORDS,
+    },
+    VARIABLES,
+    &SCALARS,
+);
+
+static SCALARS: [Scalar<HubSlosh>; scalar_count(VARIABLES)] = scalars(VARIABLES);
+
+// What follows what at once. The hub's acceleration balances all torques, the restoring
+// force of the liquid (proportional to g_axial) among them, and stuck friction carries
+// what is left; forces and torques of the liquid contain the hub's acceleration. Angle
+// and rate are in it through the friction, wheel_speed through the wheel's limits.
+#[rustfmt::skip]
+const ALL_TORQUES: &[&str] = &[
+    "theta", "omega", "wheel_speed",
+    "slosh.q_radial", "slosh.q_tangential", "slosh.v_radial", "slosh.v_tangential",
+    "tau_cmd", "tau_ext", "g_axial",
+];
+const HUB_AND_LIQUID: &[&str] =
+    &["omega", "slosh.q_radial", "slosh.q_tangential", "slosh.v_radial", "slosh.v_tangential"];
+#[rustfmt::skip]
+const HEAT: &[&str] = &[
+    "theta", "omega",
+    "slosh.q_radial", "slosh.q_tangential", "slosh.v_radial", "slosh.v_tangential",
+];
+const MODE_1: &[&str] = &["slosh.q_radial[1]", "slosh.q_tangential[1]"];
+const MODE_1_MOVING: &[&str] =
+    &["slosh.q_radial[1]", "slosh.q_tangential[1]", "slosh.v_radial[1]", "slosh.v_tangential[1]"];
+// Where they start. The damping belongs to the g_axial at the start.
+#[rustfmt::skip]
+const DYNAMICS: &[&str] = &[
+    "tau_cmd", "tau_ext", "g_axial",
+    "hub.", "tank.", "fluid.", "slosh.", "friction.", "init.", "wheel.",
+];
+const LIQUID: &[&str] = &["tank.", "fluid.", "slosh."];
+// The plant keeps positions and velocities in space, not angles: going there and
+// back mixes the directions in the last digit.
+const SLOSH_START: &[&str] = &["tank.", "slosh.", "init."];
+
+type V = Variable<HubSlosh>;
+
+/// The variables. Outputs come first, in reading order: hosts plot them all.
+#[rustfmt::skip]
+static VARIABLES: &[Variable<HubSlosh>] = &[
+    // Outputs
+    V::output("theta", |o, _| o.theta, "rad",
+        "Hub angle about the bearing axis, counter-clockwise from above positive, not wrapped")
+        .display_unit("deg").is_state(|_| x::THETA).depends_on(&["theta"]).initial_depends_on(&["init.theta"]),
+    V::output("omega", |o, _| o.omega, "rad/s",
+        "Hub rate, the derivative of theta")
+        .display_unit("deg/s").nominal(0.01).is_state(|_| x::OMEGA).reinit().depends_on(&["omega"]).initial_depends_on(&["init.omega"]),
+    V::output("omega_dot", |o, _| o.omega_dot, "rad/s2",
+        "Hub acceleration, the derivative of omega; 0 while the hub is stuck")
+        .display_unit("deg/s2").depends_on(ALL_TORQUES).initial_depends_on(DYNAMICS),
+    V::output("slosh_angle", |o, _| o.slosh_angle, "rad",
+        "Slosh angle of mode 1, tangential, positive when the liquid is displaced towards +theta; its sine is displacement over pendulum length")
+        .display_unit("deg").nominal(0.1).depends_on(MODE_1).initial_depends_on(SLOSH_START),
+    V::output("slosh_rate", |o, _| o.slosh_rate, "rad/s",
+        "Derivative of slosh_angle")
+        .display_unit("deg/s").depends_on(MODE_1_MOVING).initial_depends_on(SLOSH_START),
+    V::output("slosh_angle_radial", |o, _| o.slosh_angle_radial, "rad",
+        "Slosh angle of mode 1, radial, positive when the liquid is displaced outwards, away from the bearing axis; 0 in planar models")
+        .display_unit("deg").nominal(0.1).depends_on(MODE_1).initial_depends_on(SLOSH_START),
+    V::output("tau_friction", |o, _| o.tau_friction, "N.m",
+        "Torque of the bearing's friction on the hub, opposes omega; while stuck it balances all other torques")
+        .display_unit("mN.m").nominal(0.01).depends_on(ALL_TORQUES).initial_depends_on(DYNAMICS),
+    V::output("tau_fluid", |o, _| o.tau_fluid, "N.m",
+        "Torque of the whole liquid, its frozen part included, on the hub: hub.I omega_dot = tau_actuator + tau_ext + tau_friction + tau_fluid")
+        .display_unit("mN.m").nominal(0.1).depends_on(ALL_TORQUES).initial_depends_on(DYNAMICS),
+    V::output("F_tangential", |o, _| o.f_tangential, "N",
+        "Force of the liquid, its frozen part included, on the tank, hub frame: tangential, positive towards +theta")
+        .depends_on(ALL_TORQUES).initial_depends_on(DYNAMICS),
+    V::output("F_radial", |o, _| o.f_radial, "N",
+        "Force of the liquid, its frozen part included, on the tank, hub frame: radial, positive outwards")
+        .depends_on(ALL_TORQUES).initial_depends_on(DYNAMICS),
+    V::output("wave_height", |o, _| o.wave_height, "m",
+        "Height of the wave at the tank's wall above the surface at rest, from linear theory; above a quarter of the tank's radius an indicator rather than a height")
+        .display_unit("mm").nominal(0.01)
+        .depends_on(&["slosh.q_radial", "slosh.q_tangential"]).initial_depends_on(SLOSH_START),
+    V::output("omega_imu", |o, _| o.omega_imu, "rad/s",
+        "What a rate gyro on the hub reads: sampled, noisy, quantised; equal to omega while imu.enabled is false")
+        .display_unit("deg/s").nominal(0.1).depends_on(&["omega"]).initial_depends_on(&["init.omega", "imu."]),
+
+    // Inputs
+    V::input("tau_cmd", |i, _| parts(&mut i.tau_cmd), "N.m",
+        "Torque command to the actuator, positive turns the hub towards +theta; held over a step unless its derivative is set, which holds for one step")
+        .display_unit("mN.m").nominal(0.1),
+    V::input("tau_ext", |i, _| parts(&mut i.tau_ext), "N.m",
+        "Any other torque on the hub, positive towards +theta; held over a step unless its derivative is set, which holds for one step")
+        .display_unit("mN.m").nominal(0.1),
+    V::input("g_axial", |i, _| parts(&mut i.g_axial), "m/s2",
+        "Specific force along the tank's axis, pressing the liquid to the bottom: gravity on a bench, thrust acceleration in flight; held over a step unless its derivative is set, which holds for one step")
+        .at_least(0.0).nominal(10.0),
+
+    // Locals
+    V::local("slosh_rate_radial", |o, _| o.slosh_rate_radial, "rad/s",
+        "Derivative of slosh_angle_radial")
+        .display_unit("deg/s").depends_on(MODE_1_MOVING),
+    V::local("energy", |o, _| o.energy, "J",
+        "Kinetic and potential energy of hub and liquid, 0 at rest")
+        .nominal(0.01).depends_on(ALL_TORQUES),
+    V::local("momentum", |o, _| o.momentum, "kg.m2/s",
+        "Angular momentum of hub and liquid about the bearing axis")
+        .depends_on(HUB_AND_LIQUID),
+    V::local("power_dissipated", |o, _| o.power_dissipated, "W",
+        "Power turned into heat by bearing and liquid together, never negative")
+        .depends_on(HEAT),
+    V::local("work", |o, _| o.work, "J",
+        "Work done on the hub by tau_actuator and tau_ext since the start")
+        .nominal(0.01).is_state(|_| x::WORK).depends_on(&["work"]),
+    V::local("heat", |o, _| o.heat, "J",
+        "Heat made by bearing and liquid since the start")
+        .nominal(0.01).is_state(|_| x::HEAT).depends_on(&["heat"]),
+    V::local("tau_actuator", |o, _| o.tau_actuator, "N.m",
+        "Torque of the actuator on the hub, positive towards +theta: tau_cmd after the wheel's limits")
+        .display_unit("mN.m").depends_on(&["tau_cmd", "wheel_speed"]),
+    V::local("wheel_speed", |o, _| o.wheel_speed, "rad/s",
+        "Absolute speed of the wheel's rotor; a positive tau_actuator slows it down")
+        .display_unit("rpm").nominal(100.0).is_state(|_| x::WHEEL_SPEED).reinit().depends_on(&["wheel_speed"]).initial_depends_on(&["wheel.speed_0"]),
+    V::local_boolean("stuck", |o| o.discrete.stuck,
+        "The hub is held by dry friction")
+        .depends_on(ALL_TORQUES),
+    V::local_enumeration("regime", &REGIME, |o| o.discrete.regime as i32,
+        "How far wave_height is inside the range of linear theory")
+        .depends_on(&["slosh.q_radial", "slosh.q_tangential"]),
+    V::local_integer("friction_mode", |o| o.discrete.friction_mode,
+        "Branch of the set-valued friction law: -1 turning backwards, 0 stuck, 1 turning forwards; 1 with other laws")
+        .depends_on(ALL_TORQUES),
+    V::local_integer("event_count", |o| o.discrete.event_count,
+        "How often friction_mode has changed since the start"),
+    V::local("event_time", |o, _| o.discrete.event_time, "s",
+        "When friction_mode changed last"),
+    V::local("stuck_time", |o, _| o.stuck_time, "s",
+        "Time spent stuck since the start")
+        .is_state(|_| x::STUCK_TIME).depends_on(&["stuck_time"]),
+
+    // The slosh modes' coordinates: with theta, omega, work, heat, stuck_time and
+    // wheel_speed the continuous states
+    V::state("slosh.q_radial", |n| x::SLOSH + 4 * n + 0, "",
+        "Radial coordinate of a slosh mode, positive outwards. Models linear and planar: unused; spherical: stereographic, the tangent of half the pendulum's angle from the vertical times the direction's radial part (unit 1); paraboloid: displacement (m)")
+        .shape(&[MODES])
+        .nominal(1e-3).depends_on(&["slosh.q_radial[]"]).initial_depends_on(SLOSH_START),
+    V::state("slosh.q_tangential", |n| x::SLOSH + 4 * n + 1, "",
+        "Tangential coordinate of a slosh mode, positive towards +theta. Models linear and planar: slosh angle (rad); spherical: stereographic, as slosh.q_radial (unit 1); paraboloid: displacement (m)")
+        .shape(&[MODES])
+        .nominal(1e-3).depends_on(&["slosh.q_tangential[]"]).initial_depends_on(SLOSH_START),
+    V::state("slosh.v_radial", |n| x::SLOSH + 4 * n + 2, "",
+        "Derivative of slosh.q_radial; its unit is that of slosh.q_radial per second")
+        .shape(&[MODES])
+        .nominal(0.01).depends_on(&["slosh.v_radial[]"]).initial_depends_on(SLOSH_START),
+    V::state("slosh.v_tangential", |n| x::SLOSH + 4 * n + 3, "",
+        "Derivative of slosh.q_tangential; its unit is that of slosh.q_tangential per second")
+        .shape(&[MODES])
+        .nominal(0.01).depends_on(&["slosh.v_tangential[]"]).initial_depends_on(SLOSH_START),
+
+    // The derivatives of the continuous states; a Model Exchange host has them in this
+    // order
+    V::derivative("der(theta)", |_| x::THETA, "rad/s",
+        "Derivative of theta: omega")
+        .depends_on(&["omega"]).initial_depends_on(&["init.omega"]),
+    V::derivative("der(omega)", |_| x::OMEGA, "rad/s2",
+        "Derivative of omega: omega_dot")
+        .depends_on(ALL_TORQUES).initial_depends_on(DYNAMICS),
+    V::derivative("der(work)", |_| x::WORK, "W",
+        "Derivative of work: power of tau_actuator and tau_ext")
+        .depends_on(&["omega", "wheel_speed", "tau_cmd", "tau_ext"]).initial_depends_on(&["init.omega", "wheel."]),
+    V::derivative("der(heat)", |_| x::HEAT, "W",
+        "Derivative of heat: power_dissipated")
+        .depends_on(HEAT).initial_depends_on(DYNAMICS),
+    V::derivative("der(stuck_time)", |_| x::STUCK_TIME, "1",
+        "Derivative of stuck_time: 1 while stuck, 0 otherwise")
+        .depends_on(ALL_TORQUES).initial_depends_on(DYNAMICS),
+    V::derivative("der(wheel_speed)", |_| x::WHEEL_SPEED, "rad/s2",
+        "Derivative of wheel_speed: -tau_actuator/wheel.I")
+        .depends_on(&["wheel_speed", "tau_cmd"]).initial_depends_on(&["wheel."]),
+    V::derivative("der(slosh.q_radial)", |n| x::SLOSH + 4 * n + 0, "",
+        "Derivative of slosh.q_radial: slosh.v_radial")
+        .shape(&[MODES])
+        .depends_on(&["slosh.v_radial[]"]).initial_depends_on(SLOSH_START),
+    V::derivative("der(slosh.q_tangential)", |n| x::SLOSH + 4 * n + 1, "",
+        "Derivative of slosh.q_tangential: slosh.v_tangential")
+        .shape(&[MODES])
+        .depends_on(&["slosh.v_tangential[]"]).initial_depends_on(SLOSH_START),
+    V::derivative("der(slosh.v_radial)", |n| x::SLOSH + 4 * n + 2, "",
+        "Derivative of slosh.v_radial")
+        .shape(&[MODES])
+        .depends_on(ALL_TORQUES).initial_depends_on(DYNAMICS),
+    V::derivative("der(slosh.v_tangential)", |n| x::SLOSH + 4 * n + 3, "",
+        "Derivative of slosh.v_tangential")
+        .shape(&[MODES])
+        .depends_on(ALL_TORQUES).initial_depends_on(DYNAMICS),
+
+    // Hub, tank, liquid
+    V::parameter("hub.I", |p, _| &mut p.hub.inertia, "kg.m2",
+        "Moment of inertia of hub and dry tank about the bearing axis, without the wheel's rotor")
+        .range(1e-6, 1e12),
+    V::parameter("tank.d", |p, _| &mut p.tank.d, "m",
+        "Inner diameter of the upright cylindrical tank")
+        .display_unit("mm").range(1e-3, 100.0),
+    V::parameter("tank.h", |p, _| &mut p.tank.h, "m",
+        "Fill height")
+        .display_unit("mm").range(1e-4, 100.0),
+    V::parameter("tank.r", |p, _| &mut p.tank.r, "m",
+        "Distance of the tank's axis from the bearing axis")
+        .display_unit("mm").range(0.0, 1000.0),
+    V::parameter("tank.I_own", |p, _| &mut p.tank.own_inertia, "kg.m2",
+        "Moment of inertia of the liquid that turns with the tank about the tank's own axis; 0: an upright cylinder does not turn inviscid liquid")
+        .range(0.0, 1e6),
+    V::parameter("fluid.rho", |p, _| &mut p.fluid.rho, "kg/m3",
+        "Density of the liquid")
+        .range(1e-6, 1e5),
+    V::parameter("fluid.nu", |p, _| &mut p.fluid.nu, "m2/s",
+        "Kinematic viscosity of the liquid")
+        .display_unit("mm2/s").range(0.0, 1.0),
+    V::parameter("fluid.sigma", |p, _| &mut p.fluid.sigma, "N/m",
+        "Surface tension of the liquid")
+        .display_unit("mN/m").range(1e-9, 10.0),
+
+    // Slosh model
+    V::choice("slosh.model", &SLOSH_MODEL, |p| p.slosh.model as i32,
+        |p, n| set_item(&mut p.slosh.model, &SloshModel::ALL, n),
+        "Mechanical model of the liquid"),
+    V::integer("slosh.kind", |p, _| &mut p.slosh_kind,
+        "For hosts that set no enumerations: 0: as slosh.model says; otherwise the number of slosh.model's item. An error if slosh.model has been set to another one")
+        .between(0, SLOSH_MODEL.items.len() as i32),
+    V::count("slosh.modes", |p| p.slosh.modes as i32, |p, n| p.slosh.modes = n.max(0) as usize,
+        "How many slosh modes are kept; the mass of the others moves with the tank")
+        .between(1, MODES as i32),
+    V::switch("slosh.zeta_from_correlation", |p| &mut p.slosh.zeta_from_correlation,
+        "Damping ratio from the correlation of Mikishev and Dorozhkin; if false it is slosh.zeta"),
+    V::parameter("slosh.zeta", |p, _| &mut p.slosh.zeta, "1",
+        "Damping ratio of every mode when slosh.zeta_from_correlation is false")
+        .range(0.0, 0.999),
+    V::parameter("slosh.hardening", |p, _| &mut p.slosh.hardening, "1",
+        "Coefficient of the quartic spring, model paraboloid only")
+        .range(0.0, 100.0),
+
+    // Bearing
+    V::choice("friction.model", &FRICTION_MODEL, |p| p.friction.model as i32,
+        |p, n| set_item(&mut p.friction.model, &FrictionModel::ALL, n),
+        "Law of the bearing's friction")
+        .tunable(),
+    V::integer("friction.kind", |p, _| &mut p.friction_kind,
+        "For hosts that set no enumerations: 0: as friction.model says; otherwise the number of friction.model's item. An error if friction.model has been set to another one")
+        .between(0, FRICTION_MODEL.items.len() as i32).tunable(),
+    V::parameter("friction.b", |p, _| &mut p.friction.b, "N.m.s",
+        "Viscous coefficient")
+        .range(0.0, 1e6).tunable(),
+    V::parameter("friction.c", |p, _| &mut p.friction.c, "N.m",
+        "Coulomb torque")
+        .display_unit("mN.m").range(0.0, 1e6).tunable(),
+    V::parameter("friction.d", |p, _| &mut p.friction.d, "N.m",
+        "Static torque in excess of the Coulomb torque")
+        .display_unit("mN.m").range(0.0, 1e6).tunable(),
+    V::parameter("friction.omega_s", |p, _| &mut p.friction.omega_s, "rad/s",
+        "Stribeck speed: the excess falls with exp(-(omega/omega_s)^2)")
+        .display_unit("deg/s").range(1e-6, 1e6).tunable(),
+    V::parameter("friction.eps", |p, _| &mut p.friction.eps, "rad/s",
+        "Width of the smoothed sign, model stribeck_smooth only")
+        .display_unit("deg/s").range(1e-7, 1e3).tunable(),
+    V::parameter("friction.asymmetry", |p, _| &mut p.friction.asymmetry, "1",
+        "Dry friction is 1 + asymmetry times as strong forwards and 1 - asymmetry times backwards")
+        .range(-0.999, 0.999).tunable(),
+    V::parameter("friction.forward_cos1", |p, _| &mut p.friction.harmonics_forward[0], "1",
+        "Relative variation of dry friction with cos(theta) while turning forwards")
+        .range(-1.0, 1.0).tunable(),
+    V::parameter("friction.forward_sin1", |p, _| &mut p.friction.harmonics_forward[1], "1",
+        "Relative variation of dry friction with sin(theta) while turning forwards")
+        .range(-1.0, 1.0).tunable(),
+    V::parameter("friction.forward_cos2", |p, _| &mut p.friction.harmonics_forward[2], "1",
+        "Relative variation of dry friction with cos(2 theta) while turning forwards")
+        .range(-1.0, 1.0).tunable(),
+    V::parameter("friction.forward_sin2", |p, _| &mut p.friction.harmonics_forward[3], "1",
+        "Relative variation of dry friction with sin(2 theta) while turning forwards")
+        .range(-1.0, 1.0).tunable(),
+    V::parameter("friction.backward_cos1", |p, _| &mut p.friction.harmonics_backward[0], "1",
+        "Relative variation of dry friction with cos(theta) while turning backwards")
+        .range(-1.0, 1.0).tunable(),
+    V::parameter("friction.backward_sin1", |p, _| &mut p.friction.harmonics_backward[1], "1",
+        "Relative variation of dry friction with sin(theta) while turning backwards")
+        .range(-1.0, 1.0).tunable(),
+    V::parameter("friction.backward_cos2", |p, _| &mut p.friction.harmonics_backward[2], "1",
+        "Relative variation of dry friction with cos(2 theta) while turning backwards")
+        .range(-1.0, 1.0).tunable(),
+    V::parameter("friction.backward_sin2", |p, _| &mut p.friction.harmonics_backward[3], "1",
+        "Relative variation of dry friction with sin(2 theta) while turning backwards")
+        .range(-1.0, 1.0).tunable(),
+
+    // Where the motion starts
+    V::parameter("init.theta", |p, _| &mut p.init.theta, "rad",
+        "Hub angle at the start")
+        .display_unit("deg"),
+    V::parameter("init.omega", |p, _| &mut p.init.omega, "rad/s",
+        "Hub rate at the start")
+        .display_unit("deg/s").range(-1e3, 1e3),
+    V::parameter("init.slosh_angle", |p, _| &mut p.init.slosh_angle, "rad",
+        "slosh_angle at the start")
+        .display_unit("deg").range(-1.5, 1.5),
+    V::parameter("init.slosh_angle_radial", |p, _| &mut p.init.slosh_angle_radial, "rad",
+        "slosh_angle_radial at the start; without meaning in planar models")
+        .display_unit("deg").range(-1.5, 1.5),
+    V::parameter("init.slosh_rate", |p, _| &mut p.init.slosh_rate, "rad/s",
+        "slosh_rate at the start")
+        .display_unit("deg/s").range(-1e3, 1e3),
+    V::parameter("init.slosh_rate_radial", |p, _| &mut p.init.slosh_rate_radial, "rad/s",
+        "slosh_rate_radial at the start; without meaning in planar models")
+        .display_unit("deg/s").range(-1e3, 1e3),
+
+    // Reaction wheel
+    V::switch("wheel.enabled", |p| &mut p.wheel.enabled,
+        "The actuator is a reaction wheel with limits; if false its torque is the command"),
+    V::parameter("wheel.I", |p, _| &mut p.wheel.inertia, "kg.m2",
+        "Moment of inertia of the rotor; hub.I does not contain it")
+        .range(1e-9, 1e6),
+    V::parameter("wheel.speed_0", |p, _| &mut p.wheel.speed_0, "rad/s",
+        "Rotor speed at the start")
+        .display_unit("rpm").range(-1e5, 1e5),
+    V::parameter("wheel.speed_min", |p, _| &mut p.wheel.speed_min, "rad/s",
+        "Lowest rotor speed; there only torque that speeds the rotor up is given")
+        .display_unit("rpm").range(-1e5, 1e5),
+    V::parameter("wheel.speed_max", |p, _| &mut p.wheel.speed_max, "rad/s",
+        "Highest rotor speed; there only torque that slows the rotor down is given")
+        .display_unit("rpm").range(-1e5, 1e5),
+    V::parameter("wheel.tau_max", |p, _| &mut p.wheel.tau_max, "N.m",
+        "Largest torque of either sign")
+        .display_unit("mN.m").range(0.0, 1e6),
+
+    // Rate gyro
+    V::switch("imu.enabled", |p| &mut p.imu.enabled,
+        "omega_imu is sampled, noisy and quantised; if false it equals omega"),
+    V::parameter("imu.rate", |p, _| &mut p.imu.rate, "Hz",
+        "Sampling rate")
+        .range(0.1, 1e4),
+    V::parameter("imu.arw", |p, _| &mut p.imu.arw, "rad/s/sqrt(Hz)",
+        "Angle random walk; the standard deviation of one sample is this times the root of imu.rate")
+        .range(0.0, 10.0),
+    V::parameter("imu.bias_instability", |p, _| &mut p.imu.bias_instability, "rad/s",
+        "Bias instability; the bias is a first-order Gauss-Markov process of standard deviation imu.bias_instability/0.664")
+        .display_unit("deg/h").range(0.0, 10.0),
+    V::parameter("imu.bias_time", |p, _| &mut p.imu.bias_time, "s",
+        "Correlation time of the bias")
+        .range(1e-3, 1e9),
+    V::parameter("imu.lsb", |p, _| &mut p.imu.lsb, "rad/s",
+        "Quantisation step; 0: none")
+        .display_unit("deg/s").range(0.0, 10.0),
+    V::integer("imu.seed", |p, _| &mut p.imu.seed,
+        "Seed of the noise: the same seed gives the same noise on every platform"),
+
+    // What follows from the parameters
+    V::calculated("tank.m_liq", |m, _| m.calculated().m_liq, "kg",
+        "Mass of the liquid")
+        .initial_depends_on(&["tank.", "fluid."]),
+    V::calculated("tank.m_0", |m, _| m.calculated().m_0, "kg",
+        "Part of the liquid's mass that moves with the tank")
+        .initial_depends_on(LIQUID),
+    V::calculated("tank.bond", |m, _| m.calculated().bond, "1",
+        "Bond number: gravity over surface tension; the model holds far above 1")
+        .depends_on(&["g_axial"]).initial_depends_on(&["tank.", "fluid."]),
+    V::calculated("slosh.mass", |m, n| m.calculated().mass[n], "kg",
+        "Sloshing mass of a mode; 0 for modes that are not used")
+        .shape(&[MODES])
+        .initial_depends_on(LIQUID),
+    V::calculated("slosh.length", |m, n| m.calculated().length[n], "m",
+        "Pendulum length of a mode; 0 for modes that are not used")
+        .shape(&[MODES])
+        .display_unit("mm").initial_depends_on(LIQUID),
+    V::calculated("slosh.frequency", |m, n| m.calculated().frequency[n], "Hz",
+        "Natural frequency of a mode in the tank at rest, at the initial g_axial; 0 for modes that are not used")
+        .shape(&[MODES])
+        .depends_on(&["g_axial"]).initial_depends_on(LIQUID),
+    V::calculated("slosh.damping", |m, n| m.calculated().damping[n], "1",
+        "Damping ratio of a mode, at the initial g_axial; 0 for modes that are not used")
+        .shape(&[MODES])
+        .depends_on(&["g_axial"]).initial_depends_on(LIQUID),
+];
+
+/// The models of the liquid.
+static SLOSH_MODEL: Enumeration = Enumeration {
+    name: "SloshModel",
+    description: "Mechanical models of the liquid",
+    items: &[
+        Item::new("frozen", "The liquid is a rigid body"),
+        Item::new("linear", "Linear planar pendulums"),
+        Item::new("planar", "Nonlinear planar pendulums"),
+        Item::new("spherical", "Spherical pendulums: the liquid can rotate"),
+        Item::new("paraboloid", "Masses on a paraboloid with a quartic spring"),
+    ],
+};
+
+/// The laws of friction.
+static FRICTION_MODEL: Enumeration = Enumeration {
+    name: "FrictionModel",
+    description: "Laws of the bearing's friction",
+    items: &[
+        Item::new("none", "A free bearing"),
+        Item::new("viscous", "b omega"),
+        Item::new(
+            "stribeck_smooth",
+            "Stribeck curve, its jump at rest smoothed: creeps, never sticks",
+        ),
+        Item::new("stribeck", "Stribeck curve as a set-valued law: sticks"),
+    ],
+};
+
+/// How high the wave is.
+static REGIME: Enumeration = Enumeration {
+    name: "Regime",
+    description: "Wave height at the wall against the tank's radius R",
+    items: &[
+        Item::new("linear", "Below 0.15 R: linear theory holds"),
+        Item::new("transitional", "0.15 R to 0.25 R"),
+        Item::new("nonlinear", "Above 0.25 R: heights and forces are indications"),
+    ],
+};
+
+pub(crate) fn set_item<T: Copy>(field: &mut T, items: &[T], number: i32) {
+    if let Some(item) = usize::try_from(number).ok().and_then(|n| items.get(n.checked_sub(1)?)) {
+        *field = *item;
+    }
+}
+
+fn parts(ramp: &mut Ramp) -> [&mut f64; 2] {
+    [&mut ramp.value, &mut ramp.slope]
+}

@@ -1,0 +1,885 @@
+//! What the calls of a host do to one instance, in terms of no version of FMI's C interface.
+//!
+//! A call that is refused changes nothing. The one exception is a step that the
+//! model could not compute: the model stands where it was, but the instance goes
+//! to the state "step failed", where it can be read, reset, or given a saved
+//! state.
+//!
+//! In Model Exchange the host integrates: it sets time and states, and what is
+//! discrete changes in [`Instance::new_discrete_states`] alone.
+
+use crate::model::Model;
+use crate::operation::{self as op, Call, Fault, InstanceState, Interface, Operation, Version};
+use crate::table::Scalar;
+use crate::variable::{Access, Causality, Value};
+
+/// The tolerance when the host names none.
+pub const DEFAULT_TOLERANCE: f64 = 1e-8;
+/// The tolerances that a host can ask for.
+pub const TOLERANCES: std::ops::RangeInclusive<f64> = 1e-14..=1e-1;
+/// What two times may differ by, relative to the larger of time and step: hosts
+/// add up steps in their own way and are off by a few ulps.
+const TIME_SLACK: f64 = 1e-9;
+
+/// An instance of an FMU.
+///
+/// Cloning it is saving its state: there is nothing else to an instance.
+#[derive(Debug)]
+pub struct Instance<M: Model> {
+    version: Version,
+    pub(crate) interface: Interface,
+    pub(crate) state: InstanceState,
+    pub(crate) start: f64,
+    pub(crate) stop: Option<f64>,
+    pub(crate) tolerance: f64,
+    /// The communication point the host has reached.
+    pub(crate) time: f64,
+    /// The parameters' values in the table's order, right or wrong.
+    pub(crate) parameters: Vec<Value>,
+    pub(crate) inputs: M::Inputs,
+    /// Whether an input has a slope for the next step.
+    pub(crate) sloped: bool,
+    /// There from the first look at it in initialization mode; gone when a parameter or an
+    /// input is set before the instance runs.
+    pub(crate) model: Option<M>,
+    /// The outputs now, if somebody has asked.
+    pub(crate) outputs: Option<M::Outputs>,
+    /// Room for the continuous states in the model's order, for directions and derivatives.
+    scratch: [Vec<f64>; 2],
+}
+
+/// What fmi2NewDiscreteStates tells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EventInfo {
+    /// The FMU has changed continuous states.
+    pub states_changed: bool,
+    /// When the next event is due at the latest, s.
+    pub next_time: Option<f64>,
+}
+
+// Derived, the second would take memory anew.
+impl<M: Model> Clone for Instance<M> {
+    fn clone(&self) -> Self {
+        Instance {
+            parameters: self.parameters.clone(),
+            model: self.model.clone(),
+            scratch: self.scratch.clone(),
+            ..*self
+        }
+    }
+
+    /// Without taking memory where there is some already.
+    fn clone_from(&mut self, other: &Self) {
+        let mut parameters = std::mem::take(&mut self.parameters);
+        parameters.clone_from(&other.parameters);
+        let mut model = self.model.take();
+        model.clone_from(&other.model);
+        let scratch = std::mem::take(&mut self.scratch);
+        *self = Instance { parameters, model, scratch, ..*other };
+    }
+}
+
+impl<M: Model> Instance<M> {
+    /// As fmi2Instantiate leaves it.
+    pub fn new(version: Version, interface: Interface) -> Self {
+        let states = M::table().derivatives().len();
+        Instance {
+            version,
+            interface,
+            state: InstanceState::Instantiated,
+            start: 0.0,
+            stop: None,
+            tolerance: DEFAULT_TOLERANCE,
+            time: 0.0,
+            parameters: M::table().starts(),
+            inputs: M::Inputs::default(),
+            sloped: false,
+            model: None,
+            outputs: None,
+            scratch: [vec![0.0; states], vec![0.0; states]],
+        }
+    }
+
+    /// What it is made for.
+    pub fn interface(&self) -> Interface {
+        self.interface
+    }
+
+    /// The call of an operation in this instance's version of FMI, if it is allowed now.
+    #[inline]
+    pub fn check(&self, operation: &'static Operation) -> Result<Call, Fault> {
+        let call = operation.call(self.version);
+        call.check(self.interface, self.state)?;
+        Ok(call)
+    }
+
+    /// The state it is in.
+    pub fn state(&self) -> InstanceState {
+        self.state
+    }
+
+    /// The communication point the host has reached.
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// After a panic nothing it says can be trusted.
+    pub fn poison(&mut self) {
+        self.state = InstanceState::Fatal;
+    }
+
+    /// fmi2SetupExperiment: `None` where the host defines nothing.
+    pub fn setup_experiment(
+        &mut self,
+        tolerance: Option<f64>,
+        start: f64,
+        stop: Option<f64>,
+    ) -> Result<(), Fault> {
+        let call = &self.check(&op::SETUP_EXPERIMENT)?;
+        let mut problems = Vec::new();
+        if !start.is_finite() {
+            problems.push(format!("startTime = {start:?} (allowed: any finite number)"));
+        }
+        if let Some(stop) = stop
+            && !(stop.is_finite() && stop >= start)
+        {
+            problems.push(format!("stopTime = {stop:?} (allowed: startTime {start:?} or later)"));
+        }
+        if let Some(tolerance) = tolerance
+            && !TOLERANCES.contains(&tolerance)
+        {
+            let (low, high) = (TOLERANCES.start(), TOLERANCES.end());
+            problems.push(format!("tolerance = {tolerance:?} (allowed: {low:?} to {high:?})"));
+        }
+        if !problems.is_empty() {
+            return Err(call.error(problems.join("; ")));
+        }
+        self.tolerance = tolerance.unwrap_or(DEFAULT_TOLERANCE);
+        self.start = start;
+        self.stop = stop;
+        self.time = start;
+        Ok(())
+    }
+
+    /// fmi2EnterInitializationMode
+    pub fn enter_initialization_mode(&mut self) -> Result<(), Fault> {
+        self.check(&op::ENTER_INITIALIZATION)?;
+        self.state = InstanceState::Initialization;
+        Ok(())
+    }
+
+    /// fmi2ExitInitializationMode: here at the latest bad parameters come up.
+    pub fn exit_initialization_mode(&mut self) -> Result<(), Fault> {
+        let call = &self.check(&op::EXIT_INITIALIZATION)?;
+        self.outputs(call)?;
+        self.state = match self.interface {
+            Interface::CoSimulation => InstanceState::Stepping,
+            Interface::ModelExchange => InstanceState::Initialized,
+        };
+        Ok(())
+    }
+
+    /// Model Exchange goes on from initialization: parameters are what they are now.
+    fn leave_initialized(&mut self, call: &Call) -> Result<(), Fault> {
+        if self.state == InstanceState::Initialized {
+            self.model(call)?;
+            self.state = InstanceState::Event;
+        }
+        Ok(())
+    }
+
+    /// fmi2Terminate
+    pub fn terminate(&mut self) -> Result<(), Fault> {
+        let call = &self.check(&op::TERMINATE)?;
+        self.leave_initialized(call)?;
+        self.state = InstanceState::Terminated;
+        Ok(())
+    }
+
+    /// fmi2Reset: as new.
+    pub fn reset(&mut self) -> Result<(), Fault> {
+        self.check(&op::RESET)?;
+        *self = Instance::new(self.version, self.interface);
+        Ok(())
+    }
+
+    /// fmi2GetReal and its kin: one value.
+    #[inline]
+    pub fn get(&mut self, operation: &'static Operation, reference: u32) -> Result<Value, Fault> {
+        let call = &self.check(operation)?;
+        let scalar = scalar::<M>(call, reference)?;
+        match (scalar.access, &self.outputs) {
+            (Access::Output(get), Some(outputs)) if scalar.variable.state.is_none() => {
+                Ok(Value::Real(get(outputs, scalar.element)))
+            }
+            _ => self.get_any(call, scalar),
+        }
+    }
+
+    fn get_any(&mut self, call: &Call, scalar: &Scalar<M>) -> Result<Value, Fault> {
+        let element = scalar.element;
+        if let Access::Input(ramp) = scalar.access {
+            return Ok(Value::Real(*ramp(&mut self.inputs, element)[0]));
+        }
+        if scalar.variable.causality == Causality::Parameter {
+            let value = self.parameters.get(scalar.slot).copied();
+            return value.ok_or_else(|| no_value(call, scalar));
+        }
+        if self.state == InstanceState::Instantiated {
+            return Err(call.error(format_args!(
+                "{} has no value in state \"{}\"; it has one from {} on",
+                scalar.name(),
+                self.state.name(),
+                InstanceState::Initialization.name()
+            )));
+        }
+        if let Some(place) = scalar.state() {
+            return Ok(Value::Real(self.model(call)?.continuous_states()[place]));
+        }
+        Ok(match scalar.access {
+            Access::Calculated(get) => Value::Real(get(self.model(call)?, element)),
+            Access::Derivative(place) => {
+                let mut x_dot = std::mem::take(&mut self.scratch[0]);
+                let done = self.look(call, |model, inputs| model.derivatives(inputs, &mut x_dot));
+                let value = x_dot[place(element)];
+                self.scratch[0] = x_dot;
+                done?;
+                Value::Real(value)
+            }
+            Access::Output(get) => Value::Real(get(self.outputs(call)?, element)),
+            Access::OutputInteger(get) => Value::Integer(get(self.outputs(call)?)),
+            Access::OutputBoolean(get) => Value::Boolean(get(self.outputs(call)?)),
+            _ => return Err(no_value(call, scalar)),
+        })
+    }
+
+    /// fmi2SetReal and its kin: all of the values, or none.
+    #[inline]
+    pub fn set(
+        &mut self,
+        operation: &'static Operation,
+        references: &[u32],
+        value: impl Fn(usize) -> Value,
+    ) -> Result<(), Fault> {
+        let call = &self.check(operation)?;
+        let mut tunes = false;
+        for (n, reference) in references.iter().enumerate() {
+            let scalar = self.check_set(call, *reference, value(n))?;
+            tunes |= scalar.variable.causality == Causality::Parameter && self.is_running();
+        }
+        if tunes {
+            self.tune(call, references, &value)?;
+        }
+        for (n, reference) in references.iter().enumerate() {
+            self.put(call, *reference, value(n))?;
+        }
+        Ok(())
+    }
+
+    /// Sets an input or a parameter; what follows from it has to be computed anew.
+    #[inline]
+    fn put(&mut self, call: &Call, reference: u32, value: Value) -> Result<(), Fault> {
+        let scalar = scalar::<M>(call, reference)?;
+        match (scalar.access, value) {
+            (Access::Input(ramp), Value::Real(x)) => *ramp(&mut self.inputs, scalar.element)[0] = x,
+            (_, value) => {
+                if let Some(slot) = self.parameters.get_mut(scalar.slot) {
+                    *slot = value;
+                }
+            }
+        }
+        self.outputs = None;
+        if !self.is_running() {
+            self.model = None;
+        }
+        Ok(())
+    }
+
+    /// Parameters that are fixed can no longer be set, and the motion has begun.
+    #[inline]
+    pub(crate) fn is_running(&self) -> bool {
+        !matches!(
+            self.state,
+            InstanceState::Instantiated
+                | InstanceState::Initialization
+                | InstanceState::Initialized
+        )
+    }
+
+    #[inline]
+    fn check_set(
+        &self,
+        call: &Call,
+        reference: u32,
+        value: Value,
+    ) -> Result<&'static Scalar<M>, Fault> {
+        let scalar = scalar::<M>(call, reference)?;
+        let is_input = scalar.variable.causality == Causality::Input;
+        // Wrong parameters are refused all together when initialization ends, everything
+        // else on the spot.
+        if !is_input {
+            self.check_set_parameter(call, scalar)?;
+        }
+        let later = !is_input
+            && matches!(self.state, InstanceState::Instantiated | InstanceState::Initialization);
+        match scalar.problem(value) {
+            Some(problem) if !later => Err(call.error(problem)),
+            _ => Ok(scalar),
+        }
+    }
+
+    fn check_set_parameter(&self, call: &Call, scalar: &Scalar<M>) -> Result<(), Fault> {
+        if scalar.variable.causality != Causality::Parameter {
+            return Err(call.error(format_args!(
+                "{} is computed; only inputs and parameters can be set",
+                scalar.name()
+            )));
+        }
+        if !self.is_running() {
+            return Ok(());
+        }
+        let (kind, states) = match scalar.variable.tunable {
+            true => ("tunable", &[InstanceState::Stepping, InstanceState::Event][..]),
+            false => ("fixed", &[][..]),
+        };
+        if states.contains(&self.state) {
+            return Ok(());
+        }
+        let (name, now) = (scalar.name(), self.state.name());
+        let mut all =
+            vec![InstanceState::Instantiated.name(), InstanceState::Initialization.name()];
+        all.extend(states.iter().map(|state| state.name()));
+        Err(call.error(format_args!(
+            "{name} is a {kind} parameter and cannot be set in state \"{now}\"; it can in: {}",
+            all.join(", ")
+        )))
+    }
+
+    /// Gives the running model what has been set among its tunable parameters.
+    fn tune(
+        &mut self,
+        call: &Call,
+        references: &[u32],
+        value: &impl Fn(usize) -> Value,
+    ) -> Result<(), Fault> {
+        let mut parameters =
+            self.model_parameters().map_err(|problems| call.error(problems.join("; ")))?;
+        for (n, reference) in references.iter().enumerate() {
+            let scalar = scalar::<M>(call, *reference)?;
+            scalar.variable.set_parameter(&mut parameters, scalar.element, value(n));
+        }
+        let inputs = self.inputs;
+        self.model(call)?
+            .tune(&parameters, &inputs)
+            .map_err(|problems| call.error(problems.join("; ")))
+    }
+
+    /// fmi2SetRealInputDerivatives: the slope holds for the next step only.
+    pub fn set_input_derivatives(
+        &mut self,
+        references: &[u32],
+        orders: &[i32],
+        values: &[f64],
+    ) -> Result<(), Fault> {
+        let call = &self.check(&op::SET_INPUT_DERIVATIVES)?;
+        for ((reference, order), slope) in references.iter().zip(orders).zip(values) {
+            let scalar = scalar::<M>(call, *reference)?;
+            if scalar.variable.causality != Causality::Input {
+                return Err(call.error(format_args!("{} is not an input", scalar.name())));
+            }
+            check_order(call, scalar, *order)?;
+            if !slope.is_finite() {
+                return Err(call.error(format_args!(
+                    "derivative of {} = {slope} (allowed: any finite number)",
+                    scalar.name()
+                )));
+            }
+        }
+        for (reference, slope) in references.iter().zip(values) {
+            let scalar = scalar::<M>(call, *reference)?;
+            if let Access::Input(ramp) = scalar.access {
+                *ramp(&mut self.inputs, scalar.element)[1] = *slope;
+                self.sloped = true;
+            }
+        }
+        Ok(())
+    }
+
+    /// fmi2GetRealOutputDerivatives: time derivatives of variables, the inputs
+    /// running along the slopes that are set for the next step.
+    pub fn output_derivatives(
+        &mut self,
+        references: &[u32],
+        orders: &[i32],
+        answers: &mut [f64],
+    ) -> Result<(), Fault> {
+        let call = &self.check(&op::GET_OUTPUT_DERIVATIVES)?;
+        for (reference, order) in references.iter().zip(orders) {
+            check_order(call, scalar::<M>(call, *reference)?, *order)?;
+        }
+        let mut x_dot = std::mem::take(&mut self.scratch[0]);
+        let done = self.look(call, |model, inputs| model.derivatives(inputs, &mut x_dot));
+        self.scratch[0] = x_dot;
+        done?;
+        let inputs = self.inputs;
+        self.derivatives_along(call, references, &inputs, answers)
+    }
+
+    /// fmi2GetDirectionalDerivative: the derivative of the unknowns in a direction of the
+    /// knowns. Knowns are inputs and continuous states; in initialization mode, where
+    /// the motion's start is still to be found, inputs and real parameters.
+    pub fn directional_derivative(
+        &mut self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        direction: &[f64],
+        answers: &mut [f64],
+    ) -> Result<(), Fault> {
+        let call = &self.check(&op::DIRECTIONAL_DERIVATIVE)?;
+        if self.state == InstanceState::Initialization {
+            return self.initial_derivative(call, unknowns, (knowns, direction), answers);
+        }
+        let mut along = self.inputs;
+        for scalar in M::table().inputs() {
+            if let Access::Input(ramp) = scalar.access {
+                *ramp(&mut along, scalar.element)[1] = 0.0;
+            }
+        }
+        self.scratch[0].fill(0.0);
+        for (reference, d) in knowns.iter().zip(direction) {
+            let scalar = scalar::<M>(call, *reference)?;
+            check_direction(call, scalar, *d)?;
+            match (scalar.access, scalar.state()) {
+                (Access::Input(ramp), _) => *ramp(&mut along, scalar.element)[1] += d,
+                (_, Some(place)) => self.scratch[0][place] += d,
+                _ => {
+                    return Err(call.error(format_args!(
+                        "{} is not among the knowns: it is neither an input nor a continuous state",
+                        scalar.name()
+                    )));
+                }
+            }
+        }
+        self.derivatives_along(call, unknowns, &along, answers)
+    }
+
+    /// Derivatives of the unknowns in the direction of the states in the first scratch vector and
+    /// of the slopes of `along`.
+    fn derivatives_along(
+        &mut self,
+        call: &Call,
+        unknowns: &[u32],
+        along: &M::Inputs,
+        answers: &mut [f64],
+    ) -> Result<(), Fault> {
+        let [dx, mut dx_dot] = std::mem::take(&mut self.scratch);
+        let found =
+            self.look(call, |model, _| model.directional_derivative(along, &dx, &mut dx_dot));
+        let done = found.and_then(|outputs| {
+            for (reference, answer) in unknowns.iter().zip(answers) {
+                let scalar = scalar::<M>(call, *reference)?;
+                *answer = match (scalar.access, scalar.state()) {
+                    (Access::Derivative(place), _) => dx_dot[place(scalar.element)],
+                    (_, Some(place)) => dx[place],
+                    (Access::Output(get), _) => get(&outputs, scalar.element),
+                    _ => {
+                        return Err(call.error(format_args!(
+                            "{} is not computed from states and inputs",
+                            scalar.name()
+                        )));
+                    }
+                };
+            }
+            Ok(())
+        });
+        self.scratch = [dx, dx_dot];
+        done
+    }
+
+    /// As above, by central differences with Richardson's extrapolation between
+    /// instances that start elsewhere: each known moves by a thousandth of its value, or
+    /// of its order of magnitude where it is smaller.
+    fn initial_derivative(
+        &self,
+        call: &Call,
+        unknowns: &[u32],
+        (knowns, direction): (&[u32], &[f64]),
+        answers: &mut [f64],
+    ) -> Result<(), Fault> {
+        const SHARE: f64 = 1.0 / 1024.0;
+        let mut start = Vec::with_capacity(knowns.len());
+        let mut size: f64 = 0.0;
+        for (reference, d) in knowns.iter().zip(direction) {
+            let scalar = scalar::<M>(call, *reference)?;
+            check_direction(call, scalar, *d)?;
+            let known = [Causality::Input, Causality::Parameter];
+            let value = match self.clone().get_any(call, scalar)? {
+                Value::Real(x) if known.contains(&scalar.variable.causality) => x,
+                _ => {
+                    return Err(call.error(format_args!(
+                        "{} is not among the knowns: in initialization mode these are inputs and \
+                         parameters",
+                        scalar.name()
+                    )));
+                }
+            };
+            let unit = if value == 0.0 { scalar.variable.nominal_value() } else { value.abs() };
+            size = size.max(d.abs() / unit);
+            start.push(value);
+        }
+        let step = if size > 0.0 { SHARE / size } else { 1.0 };
+        let at = |s: f64| -> Result<Vec<f64>, Fault> {
+            let mut moved = self.clone();
+            for ((reference, x), d) in knowns.iter().zip(&start).zip(direction) {
+                moved.put(call, *reference, Value::Real(x + s * step * d))?;
+            }
+            let values = unknowns.iter().map(|reference| {
+                match moved.get_any(call, scalar::<M>(call, *reference)?)? {
+                    Value::Real(x) => Ok(x),
+                    _ => Err(call.error("wrong type")),
+                }
+            });
+            values.collect()
+        };
+        let (p2, p1, m1, m2) = (at(2.0)?, at(1.0)?, at(-1.0)?, at(-2.0)?);
+        for (n, answer) in answers.iter_mut().take(unknowns.len()).enumerate() {
+            *answer = (8.0 * (p1[n] - m1[n]) - (p2[n] - m2[n])) / (12.0 * step);
+        }
+        Ok(())
+    }
+
+    /// fmi2DoStep: from `at` on by `h`. Does not allocate unless it fails.
+    pub fn do_step(&mut self, at: f64, h: f64) -> Result<(), Fault> {
+        let call = &self.check(&op::DO_STEP)?;
+        if !(h.is_finite() && h > 0.0) {
+            return Err(call.error(format_args!(
+                "communicationStepSize = {h:?} s (allowed: greater than 0, finite)"
+            )));
+        }
+        // Written so that NaN does not pass.
+        let close = (at - self.time).abs() <= TIME_SLACK * self.time.abs().max(h);
+        if !close {
+            return Err(call.error(format_args!(
+                "currentCommunicationPoint = {at:?} s, but the last step ended at {:?} s",
+                self.time
+            )));
+        }
+        let end = at + h;
+        if let Some(stop) = self.stop
+            && end > stop + TIME_SLACK * stop.abs().max(h)
+        {
+            return Err(call
+                .error(format_args!("the step to {end:?} s would pass the stop time {stop:?} s")));
+        }
+        let ramps = if self.sloped { Some(self.inputs_over(call, h)?) } else { None };
+        let Some(model) = &mut self.model else {
+            return Err(call.error("the instance was never initialised"));
+        };
+        let during = ramps.as_ref().map_or(&self.inputs, |(during, _)| during);
+        if let Err(why) = model.step(during, h) {
+            self.state = InstanceState::Failed;
+            return Err(call.error(format_args!("step from {at:?} s to {end:?} s failed: {why}")));
+        }
+        self.time = end;
+        if let Some((_, after)) = ramps {
+            self.inputs = after;
+            self.sloped = false;
+        }
+        self.outputs = None;
+        Ok(())
+    }
+
+    /// The inputs during a step of `h`, and where they stand after it.
+    fn inputs_over(&self, call: &Call, h: f64) -> Result<(M::Inputs, M::Inputs), Fault> {
+        let mut during = self.inputs;
+        let mut after = self.inputs;
+        for scalar in M::table().inputs() {
+            let Access::Input(ramp) = scalar.access else { continue };
+            let [value, slope] = ramp(&mut during, scalar.element);
+            let mut end = *value + *slope * h;
+            let floor = scalar.variable.min().unwrap_or(f64::NEG_INFINITY);
+            // A ramp down to the smallest value may miss it by a rounding error.
+            if end < floor && end > floor - TIME_SLACK * (*value - floor) {
+                end = floor;
+                *slope = (floor - *value) / h;
+            }
+            if let Some(problem) = scalar.problem(Value::Real(end)) {
+                return Err(call.error(format_args!("at the end of the step {problem}")));
+            }
+            let [value, slope] = ramp(&mut after, scalar.element);
+            (*value, *slope) = (end, 0.0);
+        }
+        Ok((during, after))
+    }
+
+    // ---- Model Exchange ----
+
+    /// fmi2EnterEventMode
+    pub fn enter_event_mode(&mut self) -> Result<(), Fault> {
+        let call = &self.check(&op::ENTER_EVENT)?;
+        self.leave_initialized(call)?;
+        self.state = InstanceState::Event;
+        Ok(())
+    }
+
+    /// fmi2NewDiscreteStates: everything that is due now. Once is enough; calling it
+    /// again, after other inputs, does no harm.
+    pub fn new_discrete_states(&mut self) -> Result<EventInfo, Fault> {
+        let call = &self.check(&op::NEW_DISCRETE_STATES)?;
+        let event = self.look(call, |model, inputs| model.handle_event(inputs))?;
+        let states_changed = event.map_err(|why| call.error(why))?;
+        self.state = InstanceState::Event;
+        self.outputs = None;
+        Ok(EventInfo { states_changed, next_time: self.model(call)?.next_time_event() })
+    }
+
+    /// fmi2EnterContinuousTimeMode
+    pub fn enter_continuous_time_mode(&mut self) -> Result<(), Fault> {
+        let call = &self.check(&op::ENTER_CONTINUOUS_TIME)?;
+        self.leave_initialized(call)?;
+        self.state = InstanceState::Continuous;
+        Ok(())
+    }
+
+    /// fmi2CompletedIntegratorStep: whether an event has to be handled now.
+    pub fn completed_integrator_step(&mut self) -> Result<bool, Fault> {
+        let call = &self.check(&op::COMPLETED_STEP)?;
+        let time = self.time;
+        if let Some(stop) = self.stop
+            && time > stop + TIME_SLACK * stop.abs().max(1.0)
+        {
+            return Err(call.error(format_args!(
+                "the step to {time:?} s has passed the stop time {stop:?} s"
+            )));
+        }
+        let accepted = self.look(call, |model, inputs| model.accept_step(inputs))?;
+        self.outputs = None;
+        accepted.map_err(|why| {
+            self.state = InstanceState::Failed;
+            call.error(why)
+        })
+    }
+
+    /// fmi2SetTime
+    pub fn set_time(&mut self, time: f64) -> Result<(), Fault> {
+        let call = &self.check(&op::SET_TIME)?;
+        if !time.is_finite() {
+            return Err(call.error(format_args!("time = {time:?} s (allowed: any finite number)")));
+        }
+        self.leave_initialized(call)?;
+        self.model(call)?.set_time(time);
+        self.time = time;
+        self.outputs = None;
+        Ok(())
+    }
+
+    /// fmi2SetContinuousStates. NaN and infinity are discarded: the integrator
+    /// should try a shorter step.
+    pub fn set_continuous_states(&mut self, states: &[f64]) -> Result<(), Fault> {
+        let call = &self.check(&op::SET_CONTINUOUS_STATES)?;
+        let places = M::table().places();
+        check_length(call, "nx", states.len(), places.len())?;
+        for (place, x) in places.zip(states) {
+            if !x.is_finite() {
+                let name = M::table().state_at(place).map_or("a state".into(), Scalar::name);
+                return Err(
+                    call.discard(format_args!("{name} = {x:?} (allowed: any finite number)"))
+                );
+            }
+            self.scratch[0][place] = *x;
+        }
+        self.leave_initialized(call)?;
+        self.model(call)?;
+        if let Some(model) = &mut self.model {
+            model.set_continuous_states(&self.scratch[0]);
+        }
+        self.outputs = None;
+        Ok(())
+    }
+
+    /// fmi2GetContinuousStates
+    pub fn continuous_states(&mut self, states: &mut [f64]) -> Result<(), Fault> {
+        let call = &self.check(&op::GET_CONTINUOUS_STATES)?;
+        let places = M::table().places();
+        check_length(call, "nx", states.len(), places.len())?;
+        let all = self.model(call)?.continuous_states();
+        for (place, x) in places.zip(states) {
+            *x = all[place];
+        }
+        Ok(())
+    }
+
+    /// fmi2GetDerivatives. NaN and infinity are discarded, as above.
+    pub fn derivatives(&mut self, derivatives: &mut [f64]) -> Result<(), Fault> {
+        let call = &self.check(&op::GET_DERIVATIVES)?;
+        let places = M::table().places();
+        check_length(call, "nx", derivatives.len(), places.len())?;
+        let mut x_dot = std::mem::take(&mut self.scratch[0]);
+        let done = self.look(call, |model, inputs| model.derivatives(inputs, &mut x_dot));
+        for (place, x) in places.zip(&mut *derivatives) {
+            *x = x_dot[place];
+        }
+        self.scratch[0] = x_dot;
+        done?;
+        for (x, scalar) in derivatives.iter().zip(M::table().derivatives()) {
+            if !x.is_finite() {
+                return Err(call.discard(format_args!("{} = {x:?}", scalar.name())));
+            }
+        }
+        Ok(())
+    }
+
+    /// fmi2GetEventIndicators
+    pub fn event_indicators(&mut self, indicators: &mut [f64]) -> Result<(), Fault> {
+        let call = &self.check(&op::GET_EVENT_INDICATORS)?;
+        check_length(call, "ni", indicators.len(), M::table().about.event_indicators)?;
+        self.look(call, |model, inputs| model.event_indicators(inputs, indicators))
+    }
+
+    /// fmi2GetNominalsOfContinuousStates
+    pub fn nominals(&self, nominals: &mut [f64]) -> Result<(), Fault> {
+        let call = &self.check(&op::GET_NOMINALS)?;
+        let places = M::table().places();
+        check_length(call, "nx", nominals.len(), places.len())?;
+        for (place, x) in places.zip(nominals) {
+            *x = M::table().state_at(place).map_or(1.0, |s| s.variable.nominal_value());
+        }
+        Ok(())
+    }
+
+    // ---- Saved states and what is behind it all ----
+
+    /// fmi2SetFMUstate
+    pub fn restore(&mut self, saved: &Instance<M>) -> Result<(), Fault> {
+        let call = &self.check(&op::SET_FMU_STATE)?;
+        if saved.interface != self.interface {
+            return Err(call.error(format_args!(
+                "the state is of an instance for {}, and this one is for {}",
+                saved.interface.name(),
+                self.interface.name()
+            )));
+        }
+        self.clone_from(saved);
+        Ok(())
+    }
+
+    /// The model; it is made when it is first asked for.
+    #[inline]
+    fn model(&mut self, call: &Call) -> Result<&mut M, Fault> {
+        if self.model.is_none() {
+            self.make_model(call)?;
+        }
+        self.model.as_mut().ok_or_else(|| call.error("the instance was never initialised"))
+    }
+
+    #[cold]
+    fn make_model(&mut self, call: &Call) -> Result<(), Fault> {
+        let made = self
+            .model_parameters()
+            .and_then(|parameters| M::new(&parameters, &self.inputs, self.start, self.tolerance));
+        self.model = Some(made.map_err(|problems| call.error(problems.join("; ")))?);
+        Ok(())
+    }
+
+    /// The parameters as the model takes them, or all that is wrong with them.
+    pub(crate) fn model_parameters(&self) -> Result<M::Parameters, Vec<String>> {
+        let mut parameters = M::Parameters::default();
+        let mut problems = Vec::new();
+        for (scalar, value) in M::table().parameters().iter().zip(&self.parameters) {
+            scalar.variable.set_parameter(&mut parameters, scalar.element, *value);
+            problems.extend(scalar.problem(*value));
+        }
+        if problems.is_empty() { Ok(parameters) } else { Err(problems) }
+    }
+
+    /// The outputs now; they are computed when they are first asked for.
+    fn outputs(&mut self, call: &Call) -> Result<&M::Outputs, Fault> {
+        if self.outputs.is_none() {
+            self.outputs = Some(self.look(call, |model, inputs| model.outputs(inputs))?);
+        }
+        self.outputs.as_ref().ok_or_else(|| call.error("the outputs were not computed"))
+    }
+
+    /// Looks at the model: in Co-Simulation as the present inputs leave it; in Model Exchange,
+    /// where discrete changes happen at events alone, as it is.
+    fn look<T>(
+        &mut self,
+        call: &Call,
+        look: impl FnOnce(&mut M, &M::Inputs) -> T,
+    ) -> Result<T, Fault> {
+        let inputs = self.inputs;
+        let interface = self.interface;
+        let model = self.model(call)?;
+        Ok(match interface {
+            Interface::CoSimulation => {
+                let before = model.apply_present_inputs(&inputs);
+                let seen = look(model, &inputs);
+                model.revert(before);
+                seen
+            }
+            Interface::ModelExchange => look(model, &inputs),
+        })
+    }
+
+    /// How many events have happened since the start.
+    #[inline]
+    pub fn event_count(&self) -> i32 {
+        self.model.as_ref().map_or(0, M::event_count)
+    }
+
+    /// The last event, for the log.
+    pub fn last_event(&self) -> String {
+        self.model.as_ref().map_or(String::new(), M::last_event)
+    }
+}
+
+#[cold]
+fn no_value<M: Model>(call: &Call, scalar: &Scalar<M>) -> Fault {
+    call.error(format_args!("{} has no value", scalar.name()))
+}
+
+fn check_order<M: Model>(call: &Call, scalar: &Scalar<M>, order: i32) -> Result<(), Fault> {
+    if order == 1 {
+        return Ok(());
+    }
+    Err(call.error(format_args!("order {order} of {} (allowed: 1)", scalar.name())))
+}
+
+fn check_direction<M: Model>(call: &Call, scalar: &Scalar<M>, d: f64) -> Result<(), Fault> {
+    if d.is_finite() {
+        return Ok(());
+    }
+    let name = scalar.name();
+    Err(call.error(format_args!("direction of {name} = {d} (allowed: any finite number)")))
+}
+
+fn check_length(call: &Call, name: &str, given: usize, needed: usize) -> Result<(), Fault> {
+    if given == needed {
+        return Ok(());
+    }
+    Err(call.error(format_args!("{name} = {given} (allowed: {needed})")))
+}
+
+/// The variable of a value reference, if it has the type that the call is for.
+#[inline]
+fn scalar<M: Model>(call: &Call, reference: u32) -> Result<&'static Scalar<M>, Fault> {
+    match M::table().scalars.get(reference as usize) {
+        Some(scalar) if call.c_type() == Some(scalar.c_type) => Ok(scalar),
+        other => Err(wrong_reference(call, reference, other)),
+    }
+}
+
+#[cold]
+fn wrong_reference<M: Model>(call: &Call, reference: u32, found: Option<&Scalar<M>>) -> Fault {
+    match found {
+        Some(scalar) => call.error(format_args!(
+            "{} (value reference {reference}) is of type {:?}",
+            scalar.name(),
+            scalar.c_type
+        )),
+        None => call.error(format_args!(
+            "no variable has the value reference {reference}; the last one is {}",
+            M::table().scalars.len() - 1
+        )),
+    }
+}

@@ -1,0 +1,127 @@
+//! What a model must offer to become an FMU.
+
+use std::fmt::Debug;
+
+use crate::table::Table;
+
+/// A dynamic system with inputs, parameters, continuous states and events.
+///
+/// A clone is a saved state: nothing about a model is kept elsewhere. Times are in s.
+/// Functions that a smooth model without events does not need have a default.
+pub trait Model: Clone + Debug + Sized + 'static {
+    /// All parameters; the default holds the start values.
+    type Parameters: Clone + Debug + Default;
+    /// All inputs, each with its value now and its slope over the step; the default holds the
+    /// start values, slopes 0.
+    type Inputs: Copy + Debug + Default;
+    /// All that follows from states and inputs at one instant. The same type holds the outputs'
+    /// derivatives along a direction.
+    type Outputs: Copy + Debug;
+    /// What inputs can change at once of what is discrete; `()` for a model without events.
+    type Discrete: Default;
+
+    /// The variables and what else the model description says.
+    fn table() -> &'static Table<Self>;
+
+    /// The model at the start of its motion, with the inputs that act then. `tolerance` is the
+    /// relative error allowed. Single parameters are within their ranges; all that is wrong with
+    /// them together is returned.
+    fn new(
+        parameters: &Self::Parameters,
+        inputs: &Self::Inputs,
+        start_time: f64,
+        tolerance: f64,
+    ) -> Result<Self, Vec<String>>;
+
+    /// What else there is to save besides parameters and inputs, as plain words: always
+    /// [`About::saved_words`](crate::table::About::saved_words) of them.
+    fn save(&self, words: &mut Vec<u64>);
+
+    /// The reverse, with the same parameters; `None` when the words are no state.
+    fn resume(parameters: &Self::Parameters, words: &[u64], tolerance: f64) -> Option<Self>;
+
+    /// Moves on by exactly `h` > 0 seconds; the inputs run along their slopes. On an error the
+    /// model is as before. Does not allocate unless it fails.
+    fn step(&mut self, inputs: &Self::Inputs, h: f64) -> Result<(), String>;
+
+    /// What there is to see now.
+    fn outputs(&mut self, inputs: &Self::Inputs) -> Self::Outputs;
+
+    /// The continuous states, in an order of the model's own (see `Variable::state`).
+    fn continuous_states(&self) -> &[f64];
+
+    /// Takes the continuous states from the host.
+    fn set_continuous_states(&mut self, x: &[f64]);
+
+    /// Takes the time from the host.
+    fn set_time(&mut self, time: f64);
+
+    /// The derivatives of the continuous states.
+    fn derivatives(&mut self, inputs: &Self::Inputs, x_dot: &mut [f64]);
+
+    /// Derivatives in the direction of the states `dx` and of the inputs' slopes: of the states'
+    /// derivatives (into `dx_dot`), and of the outputs. What is discrete is held.
+    fn directional_derivative(
+        &mut self,
+        inputs: &Self::Inputs,
+        dx: &[f64],
+        dx_dot: &mut [f64],
+    ) -> Self::Outputs;
+
+    /// In Co-Simulation: changes what the present inputs change at once of what is discrete, before
+    /// the model is looked at; what is returned goes to [`Model::revert`] afterwards. In Model
+    /// Exchange discrete changes happen at events alone, and neither is called.
+    fn apply_present_inputs(&mut self, inputs: &Self::Inputs) -> Self::Discrete {
+        let _ = inputs;
+        Self::Discrete::default()
+    }
+
+    /// Undoes [`Model::apply_present_inputs`].
+    fn revert(&mut self, before: Self::Discrete) {
+        let _ = before;
+    }
+
+    /// Takes over the parameters that can change while the simulation runs.
+    fn tune(
+        &mut self,
+        parameters: &Self::Parameters,
+        inputs: &Self::Inputs,
+    ) -> Result<(), Vec<String>> {
+        let _ = (parameters, inputs);
+        Ok(())
+    }
+
+    /// Functions of the states that cross zero at events, [`About::event_indicators`](crate::table::About::event_indicators) of them.
+    fn event_indicators(&mut self, inputs: &Self::Inputs, indicators: &mut [f64]) {
+        let _ = (inputs, indicators);
+    }
+
+    /// Does what is due at the present instant and returns whether continuous states have
+    /// changed. On an error nothing has changed.
+    fn handle_event(&mut self, inputs: &Self::Inputs) -> Result<bool, String> {
+        let _ = inputs;
+        Ok(false)
+    }
+
+    /// When the next event is due that depends on time alone.
+    fn next_time_event(&self) -> Option<f64> {
+        None
+    }
+
+    /// Model Exchange: the host has accepted a step. Returns whether an event has to be handled
+    /// now, or why the states that the host has set mean nothing.
+    fn accept_step(&mut self, inputs: &Self::Inputs) -> Result<bool, String> {
+        let _ = inputs;
+        Ok(false)
+    }
+
+    /// How many events have happened since the start.
+    fn event_count(&self) -> i32 {
+        0
+    }
+
+    /// The last event, for the log: what happened, and when.
+    fn last_event(&self) -> String {
+        String::new()
+    }
+}

@@ -1,0 +1,408 @@
+//! A model's table of variables, and what follows from it.
+//!
+//! A variable exists exactly when it has an entry in the table. The model description, the value
+//! references, get and set, start values, range checks, saved states and the GUID follow.
+
+use std::sync::OnceLock;
+
+use crate::hash::Hash;
+use crate::model::Model;
+use crate::operation::CType;
+use crate::unit::{self, Unit};
+use crate::variable::{Access, Causality, Enumeration, Kind, Value, Variable};
+
+/// What a model description says of the FMU as a whole.
+#[derive(Clone, Copy, Debug)]
+pub struct About {
+    /// The FMU's name in every sense: modelName, modelIdentifier, file name.
+    pub model: &'static str,
+    /// The version of model and table.
+    pub version: &'static str,
+    /// What the FMU is.
+    pub description: &'static str,
+    /// What an event is, for the log; "" where there are none.
+    pub events: &'static str,
+    /// Number of event indicators.
+    pub event_indicators: usize,
+    /// Number of words that [`Model::save`] writes.
+    pub saved_words: usize,
+}
+
+/// Everything that is said about a model's variables. It takes no memory from the heap: a host may
+/// load and unload the FMU as often as it likes.
+#[derive(Debug)]
+pub struct Table<M: Model> {
+    /// Of the FMU as a whole.
+    pub about: About,
+    /// The variables.
+    pub variables: &'static [Variable<M>],
+    /// Every scalar; the place is its value reference. Made by [`scalars`].
+    pub scalars: &'static [Scalar<M>],
+    inputs: Span,
+    parameters: Span,
+    derivatives: Span,
+    guid: OnceLock<[u8; GUID_LENGTH]>,
+}
+
+/// Length of a GUID in braces.
+pub const GUID_LENGTH: usize = 38;
+
+/// Scalars that follow each other: the first, and the one after the last.
+type Span = (usize, usize);
+
+/// Where a table has the scalars of one kind.
+const fn span<M: Model>(scalars: &[Scalar<M>], kind: char) -> Span {
+    let (mut begin, mut end, mut n) = (0, 0, 0);
+    while n < scalars.len() {
+        let is_one = match kind {
+            'i' => matches!(scalars[n].access, Access::Input(_)),
+            'p' => matches!(scalars[n].variable.causality, Causality::Parameter),
+            _ => matches!(scalars[n].access, Access::Derivative(_)),
+        };
+        if is_one {
+            assert!(
+                begin == end || end == n,
+                "inputs, parameters and derivatives of states each stand together in the table"
+            );
+            if begin == end {
+                begin = n;
+            }
+            end = n + 1;
+        }
+        n += 1;
+    }
+    (begin, end)
+}
+
+/// One scalar of the table.
+#[derive(Debug)]
+pub struct Scalar<M: Model> {
+    /// Its entry.
+    pub variable: &'static Variable<M>,
+    /// Where it lives: the entry's, kept here because every call needs it.
+    pub access: Access<M>,
+    /// The C type that it is got and set with, likewise.
+    pub c_type: CType,
+    /// Its value reference, and its place among all scalars.
+    pub reference: u32,
+    /// Its place in the array, 0 for the first.
+    pub element: usize,
+    /// How many scalar parameters come before it.
+    pub slot: usize,
+}
+
+// Derived, these would ask the same of M.
+impl<M: Model> Clone for Scalar<M> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<M: Model> Copy for Scalar<M> {}
+
+/// Number of scalars of a table.
+pub const fn scalar_count<M: Model>(variables: &[Variable<M>]) -> usize {
+    let (mut count, mut entry) = (0, 0);
+    while entry < variables.len() {
+        count += variables[entry].len();
+        entry += 1;
+    }
+    count
+}
+
+/// Every scalar of a table; N is [`scalar_count`].
+pub const fn scalars<M: Model, const N: usize>(
+    variables: &'static [Variable<M>],
+) -> [Scalar<M>; N] {
+    let first = Scalar {
+        variable: &variables[0],
+        access: variables[0].access,
+        c_type: variables[0].c_type(),
+        reference: 0,
+        element: 0,
+        slot: 0,
+    };
+    let mut scalars = [first; N];
+    let (mut n, mut entry, mut slot) = (0, 0, 0);
+    while entry < variables.len() {
+        let variable = &variables[entry];
+        let mut element = 0;
+        while element < variable.len() {
+            scalars[n] = Scalar {
+                variable,
+                access: variable.access,
+                c_type: variable.c_type(),
+                reference: n as u32,
+                element,
+                slot,
+            };
+            n += 1;
+            element += 1;
+            if matches!(variable.causality, Causality::Parameter) {
+                slot += 1;
+            }
+        }
+        entry += 1;
+    }
+    assert!(n == N, "as many as scalar_count says");
+    scalars
+}
+
+impl<M: Model> Scalar<M> {
+    /// Its name, with its indices in an array.
+    pub fn name(&self) -> String {
+        self.variable.element_name(self.element)
+    }
+
+    /// Its place among the model's continuous states, if it is one.
+    #[inline]
+    pub fn state(&self) -> Option<usize> {
+        self.variable.state.map(|place| place(self.element))
+    }
+
+    /// What is wrong with a value of it, in words.
+    #[inline]
+    pub fn problem(&self, value: Value) -> Option<String> {
+        self.variable.problem(self.element, value)
+    }
+
+    /// Its value before the host sets anything: `None` when it is computed.
+    pub fn start(&self) -> Option<Value> {
+        let (mut parameters, mut inputs) = (M::Parameters::default(), M::Inputs::default());
+        self.variable.start(&mut parameters, &mut inputs, self.element)
+    }
+
+    /// The inputs and continuous states that it depends on without delay.
+    pub fn depends_on(&self) -> impl Iterator<Item = &'static Scalar<M>> {
+        let known = M::table()
+            .scalars
+            .iter()
+            .filter(|s| s.variable.causality == Causality::Input || s.variable.state.is_some());
+        known.filter(|s| self.names(self.variable.depends_on, s))
+    }
+
+    /// The inputs and parameters that its initial value depends on.
+    pub fn initial_depends_on(&self) -> impl Iterator<Item = &'static Scalar<M>> {
+        let known = M::table()
+            .scalars
+            .iter()
+            .filter(|s| matches!(s.variable.causality, Causality::Input | Causality::Parameter));
+        known.filter(|s| {
+            self.names(self.variable.depends_on, s)
+                || self.names(self.variable.initial_depends_on, s)
+        })
+    }
+
+    /// Whether `other` is among the names of a list of dependencies.
+    fn names(&self, names: &[&str], other: &Scalar<M>) -> bool {
+        let v = other.variable;
+        names.iter().any(|name| match name.strip_suffix("[]") {
+            Some(array) => array == v.name && self.element == other.element,
+            None => {
+                *name == v.name
+                    || (name.ends_with('.') && v.name.starts_with(name))
+                    || (name.ends_with(']') && *name == other.name())
+            }
+        })
+    }
+}
+
+impl<M: Model> Table<M> {
+    /// A model's table.
+    pub const fn new(
+        about: About,
+        variables: &'static [Variable<M>],
+        scalars: &'static [Scalar<M>],
+    ) -> Self {
+        Table {
+            about,
+            variables,
+            scalars,
+            inputs: span(scalars, 'i'),
+            parameters: span(scalars, 'p'),
+            derivatives: span(scalars, 'd'),
+            guid: OnceLock::new(),
+        }
+    }
+
+    /// The value reference of a name.
+    pub fn find(&self, name: &str) -> Option<u32> {
+        self.scalars.iter().position(|s| s.name() == name).map(|n| n as u32)
+    }
+
+    /// A hash of what a host depends on and of the version: a host that brings another one has
+    /// read another model description. Descriptions do not count.
+    pub fn guid(&self) -> &str {
+        let bytes = self.guid.get_or_init(|| {
+            let mut bytes = [0; GUID_LENGTH];
+            bytes.copy_from_slice(self.hash().as_bytes());
+            bytes
+        });
+        std::str::from_utf8(bytes).unwrap_or_default()
+    }
+
+    /// The parameters' start values, in the table's order.
+    pub fn starts(&self) -> Vec<Value> {
+        let (mut parameters, mut inputs) = (M::Parameters::default(), M::Inputs::default());
+        let start = |s: &Scalar<M>| s.variable.start(&mut parameters, &mut inputs, s.element);
+        self.parameters().iter().filter_map(start).collect()
+    }
+
+    /// The scalar inputs, in the table's order.
+    #[inline]
+    pub const fn inputs(&self) -> &'static [Scalar<M>] {
+        let (begin, end) = self.inputs;
+        self.scalars.split_at(end).0.split_at(begin).1
+    }
+
+    /// The scalar parameters, in the table's order.
+    #[inline]
+    pub const fn parameters(&self) -> &'static [Scalar<M>] {
+        let (begin, end) = self.parameters;
+        self.scalars.split_at(end).0.split_at(begin).1
+    }
+
+    /// The derivatives of the continuous states: this is the order in which a Model Exchange host
+    /// has states, derivatives and nominals.
+    #[inline]
+    pub const fn derivatives(&self) -> &'static [Scalar<M>] {
+        let (begin, end) = self.derivatives;
+        self.scalars.split_at(end).0.split_at(begin).1
+    }
+
+    /// The places in the model of the continuous states, in the host's order.
+    pub fn places(&self) -> impl ExactSizeIterator<Item = usize> + use<M> {
+        self.derivatives().iter().map(|s| match s.access {
+            Access::Derivative(place) => place(s.element),
+            _ => 0,
+        })
+    }
+
+    /// The variable of the continuous state at a place in the model.
+    pub fn state_at(&self, place: usize) -> Option<&'static Scalar<M>> {
+        self.scalars.iter().find(|s| s.state() == Some(place))
+    }
+
+    /// The units that the variables use.
+    pub fn units(&self) -> impl Iterator<Item = &'static Unit> {
+        let used = |unit: &&Unit| {
+            self.variables
+                .iter()
+                .any(|v| matches!(v.kind, Kind::Real(quantity) if quantity.unit == unit.name))
+        };
+        unit::UNITS.iter().filter(used)
+    }
+
+    /// The enumeration types that the variables use, in the order of their first use.
+    pub fn enumerations(&self) -> Vec<&'static Enumeration> {
+        let mut all: Vec<&'static Enumeration> = Vec::new();
+        for v in self.variables {
+            if let Kind::Enumeration(of) = v.kind
+                && !all.iter().any(|known| known.name == of.name)
+            {
+                all.push(of);
+            }
+        }
+        all
+    }
+
+    fn hash(&self) -> String {
+        let (mut parameters, mut inputs) = (M::Parameters::default(), M::Inputs::default());
+        let number = |h: Hash, x: Option<f64>| match x {
+            Some(x) => h.bytes(&x.to_bits().to_le_bytes()),
+            None => h.text("none"),
+        };
+        let mut hash = Hash::new().text(self.about.model).text(self.about.version);
+        hash = hash.bytes(&(self.about.event_indicators as u64).to_le_bytes());
+        for v in self.variables {
+            hash = hash.text(v.name).text(&format!("{:?} {:?}", v.causality, v.shape));
+            hash = hash.bytes(&[u8::from(v.reinit), u8::from(v.tunable)]);
+            hash = match v.kind {
+                Kind::Real(q) => {
+                    let text = hash.text("Real").text(q.unit).text(q.display_unit.unwrap_or(""));
+                    [q.min, q.max, q.nominal].into_iter().fold(text, number)
+                }
+                Kind::Integer { min, max } => hash.text(&format!("Integer {min:?} {max:?}")),
+                Kind::Boolean => hash.text("Boolean"),
+                Kind::Enumeration(of) => hash.text(of.name),
+            };
+            for element in 0..v.len() {
+                hash = match v.start(&mut parameters, &mut inputs, element) {
+                    Some(Value::Real(x)) => number(hash, Some(x)),
+                    Some(Value::Integer(n)) => hash.bytes(&n.to_le_bytes()),
+                    Some(Value::Boolean(b)) => hash.bytes(&[u8::from(b)]),
+                    None => hash.text("computed"),
+                };
+            }
+            hash = hash.text("depends on");
+            hash = v.depends_on.iter().fold(hash, |h, name| h.text(name));
+            hash = hash.text("initially on");
+            hash = v.initial_depends_on.iter().fold(hash, |h, name| h.text(name));
+        }
+        for of in self.enumerations() {
+            hash = of.items.iter().fold(hash.text(of.name), |h, item| h.text(item.name));
+        }
+        for unit in self.units() {
+            hash = hash.text(unit.name).text(&format!("{:?}", unit.base));
+            hash = unit
+                .display_units
+                .iter()
+                .fold(hash, |h, (name, factor)| number(h.text(name), Some(*factor)));
+        }
+        let hex = format!("{:032x}", hash.value());
+        format!(
+            "{{{}-{}-{}-{}-{}}}",
+            &hex[..8],
+            &hex[8..12],
+            &hex[12..16],
+            &hex[16..20],
+            &hex[20..]
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spring::Spring;
+
+    #[test]
+    fn value_references_lead_back_to_their_names() {
+        for (n, scalar) in Spring::table().scalars.iter().enumerate() {
+            assert_eq!(Spring::table().find(&scalar.name()), Some(n as u32));
+        }
+    }
+
+    #[test]
+    fn guid_has_the_form_of_one_and_no_description_in_it() {
+        let guid = Spring::table().guid();
+        let dashes: Vec<_> = guid.match_indices('-').map(|(n, _)| n).collect();
+        assert_eq!((guid.len(), dashes), (38, vec![9, 14, 19, 24]));
+        let of = |variables: &'static [Variable<Spring>]| {
+            Table::new(Spring::table().about, variables, &[]).hash()
+        };
+        let mut other = Spring::table().variables.to_vec();
+        assert_eq!(of(other.clone().leak()), guid);
+        other[0].description = "Something else";
+        assert_eq!(of(other.clone().leak()), guid);
+        other[0].depends_on = &[];
+        assert_ne!(of(other.leak()), guid);
+    }
+
+    #[test]
+    fn an_arrays_elements_have_their_indices_in_its_brackets() {
+        let scalar = Spring::table().variables[0];
+        let names = |name, shape| {
+            let v = Variable { name, shape, ..scalar };
+            (v.element_name(0), v.element_name(v.len() - 1), v.pattern())
+        };
+        let all = |a: &str, b: &str, c: &str| (a.to_string(), b.to_string(), c.to_string());
+        assert_eq!(names("a", &[]), all("a", "a", "a"));
+        assert_eq!(names("a.b", &[3]), all("a.b[1]", "a.b[3]", "a.b[1..3]"));
+        assert_eq!(names("der(a)", &[3]), all("der(a[1])", "der(a[3])", "der(a[1..3])"));
+        assert_eq!(
+            names("tank[].p", &[4, 3, 3]),
+            all("tank[1].p[1,1]", "tank[4].p[3,3]", "tank[1..4].p[1..3,1..3]")
+        );
+        assert_eq!(names("tank[].m", &[4]), all("tank[1].m", "tank[4].m", "tank[1..4].m"));
+    }
+}

@@ -1,0 +1,61 @@
+//! Units: a table of variables names them, the model description defines them.
+
+/// A unit as a product of powers of SI base units, and what people read instead.
+#[derive(Debug)]
+pub struct Unit {
+    /// As variables name it.
+    pub name: &'static str,
+    /// Exponents of kg, m, s, rad; `None` when they are not integers.
+    pub base: Option<[i32; 4]>,
+    /// Units to display it in, each with the number that multiplies the value.
+    pub display_units: &'static [(&'static str, f64)],
+}
+
+const DEG: f64 = 180.0 / std::f64::consts::PI;
+const RPM: f64 = 30.0 / std::f64::consts::PI;
+
+const fn unit(
+    name: &'static str,
+    [kg, m, s, rad]: [i32; 4],
+    display_units: &'static [(&'static str, f64)],
+) -> Unit {
+    Unit { name, base: Some([kg, m, s, rad]), display_units }
+}
+
+/// Every unit known; a model description holds those that its variables use.
+#[rustfmt::skip]
+pub static UNITS: &[Unit] = &[
+    //                kg  m   s  rad
+    unit("1",       [ 0,  0,  0, 0], &[]),
+    unit("kg",      [ 1,  0,  0, 0], &[]),
+    unit("kg/s",    [ 1,  0, -1, 0], &[]),
+    unit("m",       [ 0,  1,  0, 0], &[("mm", 1e3)]),
+    unit("s",       [ 0,  0,  1, 0], &[]),
+    unit("Hz",      [ 0,  0, -1, 0], &[]),
+    unit("1/s",     [ 0,  0, -1, 0], &[]),
+    unit("rad",     [ 0,  0,  0, 1], &[("deg", DEG)]),
+    unit("rad/s",   [ 0,  0, -1, 1], &[("deg/s", DEG), ("deg/h", 3600.0 * DEG), ("rpm", RPM)]),
+    unit("rad/s2",  [ 0,  0, -2, 1], &[("deg/s2", DEG)]),
+    unit("m/s",     [ 0,  1, -1, 0], &[]),
+    unit("m/s2",    [ 0,  1, -2, 0], &[]),
+    unit("m2/s",    [ 0,  2, -1, 0], &[("mm2/s", 1e6)]),
+    unit("kg/m3",   [ 1, -3,  0, 0], &[]),
+    unit("N/m",     [ 1,  0, -2, 0], &[("mN/m", 1e3)]),
+    unit("N",       [ 1,  1, -2, 0], &[]),
+    unit("N.s",     [ 1,  1, -1, 0], &[]),
+    unit("N.m",     [ 1,  2, -2, 0], &[("mN.m", 1e3)]),
+    unit("N.m.s",   [ 1,  2, -1, 0], &[]),
+    // The radian of a torsional stiffness or damping is what the torque is proportional to.
+    unit("N.m/rad", [ 1,  2, -2, -1], &[]),
+    unit("N.m.s/rad", [ 1, 2, -1, -1], &[]),
+    unit("kg.m2",   [ 1,  2,  0, 0], &[]),
+    unit("kg.m2/s", [ 1,  2, -1, 0], &[]),
+    unit("J",       [ 1,  2, -2, 0], &[]),
+    unit("W",       [ 1,  2, -3, 0], &[]),
+    Unit { name: "rad/s/sqrt(Hz)", base: None, display_units: &[] },
+];
+
+/// The unit of this name.
+pub fn find(name: &str) -> Option<&'static Unit> {
+    UNITS.iter().find(|unit| unit.name == name)
+}

@@ -1,0 +1,599 @@
+//! What a variable of an FMU is: the words that a model's table is written in.
+
+use crate::model::Model;
+use crate::operation::CType;
+
+/// The value of one scalar, as it crosses the C interface. Enumerations are
+/// integers there.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Value {
+    /// fmi2Real
+    Real(f64),
+    /// fmi2Integer
+    Integer(i32),
+    /// fmi2Boolean
+    Boolean(bool),
+}
+
+/// The role of a variable, as FMI names it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Causality {
+    /// Set by the host, at any time.
+    Input,
+    /// Meant to be connected or plotted.
+    Output,
+    /// For looking inside.
+    Local,
+    /// Set by the host before the end of the initialization mode.
+    Parameter,
+    /// Follows from the parameters.
+    CalculatedParameter,
+}
+
+/// A real quantity. Units are names of [`crate::unit::UNITS`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Quantity {
+    /// SI; "" where it is not the same for all parameters.
+    pub unit: &'static str,
+    /// What people read instead.
+    pub display_unit: Option<&'static str>,
+    /// Smallest value allowed.
+    pub min: Option<f64>,
+    /// Largest value allowed.
+    pub max: Option<f64>,
+    /// Order of magnitude.
+    pub nominal: Option<f64>,
+}
+
+/// An item of an enumeration; the first has the number 1.
+#[derive(Debug)]
+pub struct Item {
+    /// Its name.
+    pub name: &'static str,
+    /// What it means.
+    pub description: &'static str,
+}
+
+impl Item {
+    /// An item in a table.
+    pub const fn new(name: &'static str, description: &'static str) -> Item {
+        Item { name, description }
+    }
+}
+
+/// An enumeration type.
+#[derive(Debug)]
+pub struct Enumeration {
+    /// The type's name.
+    pub name: &'static str,
+    /// What it chooses.
+    pub description: &'static str,
+    /// Its items.
+    pub items: &'static [Item],
+}
+
+/// A variable's type.
+#[derive(Clone, Copy, Debug)]
+pub enum Kind {
+    /// A quantity with a unit.
+    Real(Quantity),
+    /// A number of something.
+    Integer {
+        /// Smallest value allowed.
+        min: Option<i32>,
+        /// Largest value allowed.
+        max: Option<i32>,
+    },
+    /// Yes or no.
+    Boolean,
+    /// One of several named things.
+    Enumeration(&'static Enumeration),
+}
+
+/// Where an array's elements are among the model's continuous states: from the element's number,
+/// 0 for the first, to the state's.
+pub type Place = fn(usize) -> usize;
+
+/// Where a variable lives in the model. The last argument is the element's number in an array,
+/// 0 for the first and for a scalar.
+#[derive(Debug)]
+#[allow(missing_docs)]
+pub enum Access<M: Model> {
+    /// Value and slope.
+    Input(fn(&mut M::Inputs, usize) -> [&mut f64; 2]),
+    Output(fn(&M::Outputs, usize) -> f64),
+    OutputInteger(fn(&M::Outputs) -> i32),
+    OutputBoolean(fn(&M::Outputs) -> bool),
+    Real(fn(&mut M::Parameters, usize) -> &mut f64),
+    Boolean(fn(&mut M::Parameters) -> &mut bool),
+    Integer(fn(&mut M::Parameters, usize) -> &mut i32),
+    /// A parameter that the model does not keep as an i32.
+    Choice {
+        get: fn(&M::Parameters) -> i32,
+        set: fn(&mut M::Parameters, i32),
+    },
+    /// Of the model itself: it does not change with time.
+    Calculated(fn(&M, usize) -> f64),
+    /// A continuous state that is not among the outputs.
+    State,
+    /// The derivative of a continuous state.
+    Derivative(Place),
+}
+
+/// A scalar variable, or an array of them.
+#[derive(Debug)]
+pub struct Variable<M: Model> {
+    /// Its name. An array's element has its indices, counted from 1, in the name's empty brackets;
+    /// those that find none follow in brackets of their own: `tank[].p` of the shape 4, 3, 3 is
+    /// `tank[1].p[1,1]`, `tank[1].p[1,2]`, …
+    pub name: &'static str,
+    /// What it is, with sign and frame.
+    pub description: &'static str,
+    /// Its role.
+    pub causality: Causality,
+    /// Its type.
+    pub kind: Kind,
+    /// Where it lives.
+    pub access: Access<M>,
+    /// An array's dimensions, none for a scalar.
+    pub shape: &'static [usize],
+    /// Its place, if it is a continuous state.
+    pub state: Option<Place>,
+    /// Whether an event can make this state jump.
+    pub reinit: bool,
+    /// Whether this parameter can be set while the simulation runs.
+    pub tunable: bool,
+    /// The inputs and continuous states it depends on without delay: a name as it is, the
+    /// name of an array for all elements, or with "[]" after it for the same element.
+    pub depends_on: &'static [&'static str],
+    /// The parameters and inputs that its initial value depends on besides; a
+    /// name that ends with a dot stands for all parameters that begin like that.
+    pub initial_depends_on: &'static [&'static str],
+}
+
+// Derived, these would ask the same of M.
+impl<M: Model> Clone for Access<M> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<M: Model> Copy for Access<M> {}
+impl<M: Model> Clone for Variable<M> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<M: Model> Copy for Variable<M> {}
+
+const fn variable<M: Model>(
+    name: &'static str,
+    causality: Causality,
+    kind: Kind,
+    access: Access<M>,
+    description: &'static str,
+) -> Variable<M> {
+    Variable {
+        name,
+        description,
+        causality,
+        kind,
+        access,
+        shape: &[],
+        state: None,
+        reinit: false,
+        tunable: false,
+        depends_on: &[],
+        initial_depends_on: &[],
+    }
+}
+
+const fn quantity(unit: &'static str) -> Kind {
+    Kind::Real(Quantity { unit, display_unit: None, min: None, max: None, nominal: None })
+}
+
+impl<M: Model> Variable<M> {
+    /// An input: its value and its slope.
+    pub const fn input(
+        name: &'static str,
+        ramp: fn(&mut M::Inputs, usize) -> [&mut f64; 2],
+        unit: &'static str,
+        description: &'static str,
+    ) -> Self {
+        variable(name, Causality::Input, quantity(unit), Access::Input(ramp), description)
+    }
+
+    /// An output.
+    pub const fn output(
+        name: &'static str,
+        get: fn(&M::Outputs, usize) -> f64,
+        unit: &'static str,
+        description: &'static str,
+    ) -> Self {
+        variable(name, Causality::Output, quantity(unit), Access::Output(get), description)
+    }
+
+    /// A real quantity to look at.
+    pub const fn local(
+        name: &'static str,
+        get: fn(&M::Outputs, usize) -> f64,
+        unit: &'static str,
+        description: &'static str,
+    ) -> Self {
+        variable(name, Causality::Local, quantity(unit), Access::Output(get), description)
+    }
+
+    /// A continuous state that is not among the outputs.
+    pub const fn state(
+        name: &'static str,
+        place: Place,
+        unit: &'static str,
+        description: &'static str,
+    ) -> Self {
+        variable(name, Causality::Local, quantity(unit), Access::State, description).is_state(place)
+    }
+
+    /// The derivative of a continuous state; its name is "der(" the state's name ")".
+    pub const fn derivative(
+        name: &'static str,
+        of: Place,
+        unit: &'static str,
+        description: &'static str,
+    ) -> Self {
+        variable(name, Causality::Local, quantity(unit), Access::Derivative(of), description)
+    }
+
+    /// A Boolean to look at.
+    pub const fn local_boolean(
+        name: &'static str,
+        get: fn(&M::Outputs) -> bool,
+        description: &'static str,
+    ) -> Self {
+        variable(name, Causality::Local, Kind::Boolean, Access::OutputBoolean(get), description)
+    }
+
+    /// An integer to look at.
+    pub const fn local_integer(
+        name: &'static str,
+        get: fn(&M::Outputs) -> i32,
+        description: &'static str,
+    ) -> Self {
+        let kind = Kind::Integer { min: None, max: None };
+        variable(name, Causality::Local, kind, Access::OutputInteger(get), description)
+    }
+
+    /// An item of an enumeration to look at.
+    pub const fn local_enumeration(
+        name: &'static str,
+        of: &'static Enumeration,
+        get: fn(&M::Outputs) -> i32,
+        description: &'static str,
+    ) -> Self {
+        let kind = Kind::Enumeration(of);
+        variable(name, Causality::Local, kind, Access::OutputInteger(get), description)
+    }
+
+    /// A real parameter.
+    pub const fn parameter(
+        name: &'static str,
+        field: fn(&mut M::Parameters, usize) -> &mut f64,
+        unit: &'static str,
+        description: &'static str,
+    ) -> Self {
+        variable(name, Causality::Parameter, quantity(unit), Access::Real(field), description)
+    }
+
+    /// A Boolean parameter.
+    pub const fn switch(
+        name: &'static str,
+        field: fn(&mut M::Parameters) -> &mut bool,
+        description: &'static str,
+    ) -> Self {
+        variable(name, Causality::Parameter, Kind::Boolean, Access::Boolean(field), description)
+    }
+
+    /// An integer parameter.
+    pub const fn integer(
+        name: &'static str,
+        field: fn(&mut M::Parameters, usize) -> &mut i32,
+        description: &'static str,
+    ) -> Self {
+        let kind = Kind::Integer { min: None, max: None };
+        variable(name, Causality::Parameter, kind, Access::Integer(field), description)
+    }
+
+    /// An integer parameter that the model keeps in another type.
+    pub const fn count(
+        name: &'static str,
+        get: fn(&M::Parameters) -> i32,
+        set: fn(&mut M::Parameters, i32),
+        description: &'static str,
+    ) -> Self {
+        let kind = Kind::Integer { min: None, max: None };
+        variable(name, Causality::Parameter, kind, Access::Choice { get, set }, description)
+    }
+
+    /// A parameter that is an item of an enumeration.
+    pub const fn choice(
+        name: &'static str,
+        of: &'static Enumeration,
+        get: fn(&M::Parameters) -> i32,
+        set: fn(&mut M::Parameters, i32),
+        description: &'static str,
+    ) -> Self {
+        let kind = Kind::Enumeration(of);
+        variable(name, Causality::Parameter, kind, Access::Choice { get, set }, description)
+    }
+
+    /// What follows from the parameters.
+    pub const fn calculated(
+        name: &'static str,
+        get: fn(&M, usize) -> f64,
+        unit: &'static str,
+        description: &'static str,
+    ) -> Self {
+        let access = Access::Calculated(get);
+        variable(name, Causality::CalculatedParameter, quantity(unit), access, description)
+    }
+
+    /// People read it in this unit.
+    pub const fn display_unit(mut self, unit: &'static str) -> Self {
+        if let Kind::Real(quantity) = &mut self.kind {
+            quantity.display_unit = Some(unit);
+        }
+        self
+    }
+
+    /// Allowed are `min` to `max`.
+    pub const fn range(mut self, min: f64, max: f64) -> Self {
+        if let Kind::Real(quantity) = &mut self.kind {
+            quantity.min = Some(min);
+            quantity.max = Some(max);
+        }
+        self
+    }
+
+    /// Allowed are the integers `min` to `max`.
+    pub const fn between(mut self, min: i32, max: i32) -> Self {
+        self.kind = Kind::Integer { min: Some(min), max: Some(max) };
+        self
+    }
+
+    /// Allowed is `min` and more.
+    pub const fn at_least(mut self, min: f64) -> Self {
+        if let Kind::Real(quantity) = &mut self.kind {
+            quantity.min = Some(min);
+        }
+        self
+    }
+
+    /// Its order of magnitude.
+    pub const fn nominal(mut self, nominal: f64) -> Self {
+        if let Kind::Real(quantity) = &mut self.kind {
+            quantity.nominal = Some(nominal);
+        }
+        self
+    }
+
+    /// It is an array with these dimensions.
+    pub const fn shape(mut self, shape: &'static [usize]) -> Self {
+        self.shape = shape;
+        self
+    }
+
+    /// It is a continuous state of the model.
+    pub const fn is_state(mut self, place: Place) -> Self {
+        self.state = Some(place);
+        self
+    }
+
+    /// An event can make this state jump.
+    pub const fn reinit(mut self) -> Self {
+        self.reinit = true;
+        self
+    }
+
+    /// It can be set while the simulation runs.
+    pub const fn tunable(mut self) -> Self {
+        self.tunable = true;
+        self
+    }
+
+    /// It depends on these inputs and states without delay.
+    pub const fn depends_on(mut self, known: &'static [&'static str]) -> Self {
+        self.depends_on = known;
+        self
+    }
+
+    /// Its initial value depends on these parameters and inputs besides.
+    pub const fn initial_depends_on(mut self, known: &'static [&'static str]) -> Self {
+        self.initial_depends_on = known;
+        self
+    }
+
+    /// How many scalars it is.
+    pub const fn len(&self) -> usize {
+        let (mut len, mut n) = (1, 0);
+        while n < self.shape.len() {
+            len *= self.shape[n];
+            n += 1;
+        }
+        len
+    }
+
+    /// No variable is.
+    pub const fn is_empty(&self) -> bool {
+        false
+    }
+
+    /// The name of an element, 0 for the first.
+    pub fn element_name(&self, element: usize) -> String {
+        let mut indices = Vec::with_capacity(self.shape.len());
+        let mut rest = element;
+        for length in self.shape.iter().rev() {
+            indices.push((rest % length + 1).to_string());
+            rest /= length;
+        }
+        indices.reverse();
+        self.indexed(&indices)
+    }
+
+    /// The name of an array with the range of its indices, `slosh.mass[1..10]`.
+    pub fn pattern(&self) -> String {
+        let ranges: Vec<_> = self.shape.iter().map(|length| format!("1..{length}")).collect();
+        self.indexed(&ranges)
+    }
+
+    fn indexed(&self, indices: &[String]) -> String {
+        let (inner, closing) = match self.name.strip_suffix(')') {
+            Some(inner) => (inner, ")"),
+            None => (self.name, ""),
+        };
+        let mut name = String::new();
+        let mut parts = inner.split("[]");
+        name.push_str(parts.next().unwrap_or_default());
+        let mut left = indices.iter();
+        for part in parts {
+            name.push_str(&format!("[{}]{part}", left.next().map_or("", String::as_str)));
+        }
+        let left: Vec<_> = left.map(String::as_str).collect();
+        if !left.is_empty() {
+            name.push_str(&format!("[{}]", left.join(",")));
+        }
+        name + closing
+    }
+
+    /// Its value before the host sets anything: `None` when it is computed.
+    pub fn start(
+        &self,
+        parameters: &mut M::Parameters,
+        inputs: &mut M::Inputs,
+        element: usize,
+    ) -> Option<Value> {
+        match self.access {
+            Access::Input(ramp) => Some(Value::Real(*ramp(inputs, element)[0])),
+            _ => self.parameter_value(parameters, element),
+        }
+    }
+
+    /// Its value in `parameters`: `None` when it is not a parameter. They are not changed: the
+    /// accessors that lend a field to be written serve reading as well.
+    pub fn parameter_value(&self, parameters: &mut M::Parameters, element: usize) -> Option<Value> {
+        match self.access {
+            Access::Real(field) => Some(Value::Real(*field(parameters, element))),
+            Access::Boolean(field) => Some(Value::Boolean(*field(parameters))),
+            Access::Integer(field) => Some(Value::Integer(*field(parameters, element))),
+            Access::Choice { get, .. } => Some(Value::Integer(get(parameters))),
+            _ => None,
+        }
+    }
+
+    /// Puts a value of its own type into `parameters`.
+    pub fn set_parameter(&self, parameters: &mut M::Parameters, element: usize, value: Value) {
+        match (self.access, value) {
+            (Access::Real(field), Value::Real(x)) => *field(parameters, element) = x,
+            (Access::Boolean(field), Value::Boolean(x)) => *field(parameters) = x,
+            (Access::Integer(field), Value::Integer(x)) => *field(parameters, element) = x,
+            (Access::Choice { set, .. }, Value::Integer(x)) => set(parameters, x),
+            _ => {}
+        }
+    }
+
+    /// The smallest value of a quantity that has one.
+    pub const fn min(&self) -> Option<f64> {
+        match self.kind {
+            Kind::Real(quantity) => quantity.min,
+            _ => None,
+        }
+    }
+
+    /// The order of magnitude of a quantity; 1 if nothing else is said.
+    pub const fn nominal_value(&self) -> f64 {
+        match self.kind {
+            Kind::Real(Quantity { nominal: Some(nominal), .. }) => nominal,
+            _ => 1.0,
+        }
+    }
+
+    /// The C type it is got and set with.
+    #[inline]
+    pub const fn c_type(&self) -> CType {
+        match self.kind {
+            Kind::Real(_) => CType::Real,
+            Kind::Integer { .. } | Kind::Enumeration(_) => CType::Integer,
+            Kind::Boolean => CType::Boolean,
+        }
+    }
+
+    /// What is wrong with `value` of an element, in words: `name = value unit (allowed: …)`.
+    #[inline]
+    pub fn problem(&self, element: usize, value: Value) -> Option<String> {
+        if self.allows(value) { None } else { Some(self.refusal(element, value)) }
+    }
+
+    fn allows(&self, value: Value) -> bool {
+        match (&self.kind, value) {
+            (Kind::Real(Quantity { min, max, .. }), Value::Real(x)) => {
+                x.is_finite() && min.is_none_or(|m| x >= m) && max.is_none_or(|m| x <= m)
+            }
+            (Kind::Integer { min, max }, Value::Integer(n)) => {
+                min.is_none_or(|m| n >= m) && max.is_none_or(|m| n <= m)
+            }
+            (Kind::Enumeration(of), Value::Integer(n)) => {
+                usize::try_from(n).is_ok_and(|n| (1..=of.items.len()).contains(&n))
+            }
+            (Kind::Boolean, Value::Boolean(_)) => true,
+            _ => false,
+        }
+    }
+
+    #[cold]
+    fn refusal(&self, element: usize, value: Value) -> String {
+        let name = self.element_name(element);
+        match value {
+            Value::Real(x) => {
+                format!("{name} = {} (allowed: {})", self.with_unit(x), self.allowed())
+            }
+            Value::Integer(n) => format!("{name} = {n} (allowed: {})", self.allowed()),
+            Value::Boolean(b) => format!("{name} = {b} (allowed: {})", self.allowed()),
+        }
+    }
+
+    /// The range in words.
+    fn allowed(&self) -> String {
+        match self.kind {
+            Kind::Real(Quantity { min, max, .. }) => match (min, max) {
+                (Some(min), Some(max)) => {
+                    format!("{} to {}", self.with_unit(min), self.with_unit(max))
+                }
+                (Some(min), None) => format!("at least {}, finite", self.with_unit(min)),
+                (None, Some(max)) => format!("at most {}, finite", self.with_unit(max)),
+                (None, None) => "any finite number".into(),
+            },
+            Kind::Integer { min, max } => match (min, max) {
+                (Some(min), Some(max)) => format!("{min} to {max}"),
+                (Some(min), None) => format!("at least {min}"),
+                (None, Some(max)) => format!("at most {max}"),
+                (None, None) => "any integer".into(),
+            },
+            Kind::Enumeration(of) => {
+                let items: Vec<_> = of
+                    .items
+                    .iter()
+                    .zip(1..)
+                    .map(|(item, n)| format!("{n} {}", item.name))
+                    .collect();
+                items.join(", ")
+            }
+            Kind::Boolean => "true, false".into(),
+        }
+    }
+
+    fn with_unit(&self, x: f64) -> String {
+        match self.kind {
+            Kind::Real(Quantity { unit, .. }) if !["", "1"].contains(&unit) => {
+                format!("{x:?} {unit}")
+            }
+            _ => format!("{x:?}"),
+        }
+    }
+}

@@ -1,0 +1,1 @@
+//! Nothing: the package's tests are in `tests.rs`.

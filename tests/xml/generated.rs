@@ -1,0 +1,34 @@
+//! What is committed and follows from something else is what it follows from; the icon is what
+//! importers want.
+
+use std::path::Path;
+
+use model_description::{icon, variables};
+
+const GENERATE: &str = "run `cargo run --release -p model-description`";
+
+fn committed(path: impl AsRef<Path>) -> Vec<u8> {
+    let path = path.as_ref();
+    std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+#[test]
+fn page_of_variables_is_what_the_table_says() {
+    let page = String::from_utf8(committed(&variables::path::<HubSlosh::HubSlosh>())).unwrap();
+    assert!(
+        page == variables::page::<HubSlosh::HubSlosh>(),
+        "variables.md is out of date: {GENERATE}"
+    );
+}
+
+#[test]
+fn icon_is_a_png_of_the_drawing() {
+    let png = committed(icon::PATH);
+    assert_eq!(&png[..8], b"\x89PNG\r\n\x1a\n");
+    let shown = resvg::tiny_skia::Pixmap::decode_png(&png).unwrap();
+    assert_eq!((shown.width(), shown.height()), (512, 512));
+    let drawn = icon::draw(&String::from_utf8(committed(icon::SOURCE)).unwrap()).unwrap();
+    // Edges may be shaded differently by a step or two where another processor rounds otherwise.
+    let far = shown.data().iter().zip(drawn.data()).filter(|(a, b)| a.abs_diff(**b) > 2).count();
+    assert_eq!(far, 0, "{} is out of date: {GENERATE}", icon::PATH);
+}
