@@ -5,13 +5,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use anyhow::{Context, Result, bail, ensure};
-use sha2::{Digest, Sha256};
 use toml::Value;
 
 use crate::profile::{Torque, Written};
 use crate::random::Random;
 use crate::run::Run;
 use host::description::{self, ModelDescription, Type, did_you_mean};
+use host::output::sha256;
 
 /// The thesis's fills, m.
 pub const FILLS: [f64; 2] = [0.05, 0.10];
@@ -425,7 +425,10 @@ impl Plan {
         // a file is read once, however many runs it drives
         let key = format!("{written:?}");
         if !torques.contains_key(&key) {
-            let hash = written.path().and_then(|path| std::fs::read(path).ok()).map(hexadecimal);
+            let hash = written
+                .path()
+                .and_then(|path| std::fs::read(path).ok())
+                .map(|bytes| sha256(&bytes));
             let torque = problems.take("", written.torque())?;
             torques.insert(key.clone(), (Arc::new(torque), hash));
         }
@@ -536,10 +539,6 @@ fn settable(description: &ModelDescription, name: &str, text: &str) -> Result<()
         variable.causality
     );
     description.value(variable, text).map(|_| ())
-}
-
-fn hexadecimal(bytes: Vec<u8>) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 // ---------------------------------------------------------------- the file's parts

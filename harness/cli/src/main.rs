@@ -65,7 +65,7 @@ fn main() -> ExitCode {
 
 /// What `cargo run --release` does.
 fn everything() -> Result<()> {
-    pack::native(Path::new(DEFAULT_FMU))?;
+    pack::native(::pack::HUBSLOSH, Path::new(DEFAULT_FMU))?;
     let campaign =
         Campaign { plan: Plan::read("thesis")?, force: false, out: DEFAULT_CAMPAIGN.into() };
     campaign::drive(&Fmu::open(DEFAULT_FMU)?, &campaign)

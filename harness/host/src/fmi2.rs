@@ -16,9 +16,9 @@ use std::sync::Mutex;
 
 use anyhow::{Context, Result, bail};
 use libloading::Library;
-use sha2::{Digest, Sha256};
 
 use crate::description::{ModelDescription, Type, Value};
+use crate::output::sha256;
 
 /// Folder of the binaries for the platform this program was built for (FMI 2.0, section 2.3).
 pub const PLATFORM: &str = if cfg!(target_os = "windows") {
@@ -286,7 +286,7 @@ impl Fmu {
         let mut file = File::open(&path).with_context(|| format!("{name} cannot be opened"))?;
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes).with_context(|| format!("{name} cannot be read"))?;
-        let hash = Sha256::digest(&bytes).iter().map(|byte| format!("{byte:02x}")).collect();
+        let hash = sha256(&bytes);
         let mut archive = zip::ZipArchive::new(std::io::Cursor::new(bytes))
             .with_context(|| format!("{name} is not an FMU: it is not a zip archive"))?;
         let directory = tempfile::Builder::new()

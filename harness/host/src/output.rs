@@ -1,10 +1,11 @@
-//! Files appear whole or not at all: written beside their place under a
-//! temporary name, then renamed.
+//! Files appear whole or not at all: written beside their place under a temporary name, then
+//! renamed. And what is in one, as a hash.
 
 use std::fs::File;
 use std::path::Path;
 
 use anyhow::{Context, Result};
+use sha2::{Digest, Sha256};
 
 /// Writes `path` through `write`; if that fails, nothing is left and an older file stays as it was.
 pub fn atomically<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T>) -> Result<T> {
@@ -33,11 +34,23 @@ pub fn directory(path: &Path) -> Result<()> {
         .with_context(|| format!("the directory {} cannot be made", path.display()))
 }
 
+/// SHA-256 in hexadecimal digits.
+pub fn sha256(bytes: &[u8]) -> String {
+    base16ct::lower::encode_string(&Sha256::digest(bytes))
+}
+
 #[cfg(test)]
 mod tests {
     use std::io::Write;
 
     use super::*;
+
+    #[test]
+    fn the_hash_is_that_of_the_standard() {
+        // FIPS 180-4, the example of one block
+        let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(sha256(b"abc"), expected);
+    }
 
     #[test]
     fn a_failed_write_leaves_the_old_file_and_no_other() {

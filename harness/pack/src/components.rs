@@ -8,28 +8,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use anyhow::{Context, Result, bail};
-use serde_json::{Value, json};
-use sha2::{Digest, Sha256};
+use cargo_metadata::{DependencyKind, MetadataCommand};
 
+use crate::archive::Packed;
+use crate::models::Model;
 use crate::project;
 use host::description::ModelDescription;
-
-/// A binary to be packed.
-pub struct Packed {
-    /// Folder under `binaries/`.
-    pub folder: &'static str,
-    /// Ending of its name there.
-    pub ending: &'static str,
-    /// The file.
-    pub bytes: Vec<u8>,
-}
-
-impl Packed {
-    /// Its name in the FMU of a model.
-    pub fn name(&self, model: &str) -> String {
-        format!("binaries/{}/{model}{}", self.folder, self.ending)
-    }
-}
+use host::output::sha256;
+use serde_json::json;
 
 /// Licence of the project's own parts, SPDX.
 const OWN: &str = "MIT OR Apache-2.0";
@@ -116,11 +102,11 @@ const RUN_TIME: [RunTime; 4] = [
     },
 ];
 
-/// Everything that is linked into `binaries`. Fails if something is there whose licence is not
+/// Everything that is linked into the `binaries` of a package. Fails if something is there whose licence is not
 /// known here.
-pub fn linked(binaries: &[Packed]) -> Result<Vec<Component>> {
+pub fn linked(package: &str, binaries: &[Packed]) -> Result<Vec<Component>> {
     let everywhere: BTreeSet<&str> = binaries.iter().map(|binary| binary.folder).collect();
-    let mut all = crates(&everywhere)?;
+    let mut all = crates(package, &everywhere)?;
     all.push(Component {
         name: "std".into(),
         version: Some(rust_version()?),
@@ -180,44 +166,33 @@ pub fn linked(binaries: &[Packed]) -> Result<Vec<Component>> {
 }
 
 /// The FMU's package and all that Cargo links into it.
-fn crates(platforms: &BTreeSet<&'static str>) -> Result<Vec<Component>> {
+fn crates(package: &str, platforms: &BTreeSet<&'static str>) -> Result<Vec<Component>> {
     let root = project::root();
-    let said = project::cargo()
+    let metadata = MetadataCommand::new()
         .current_dir(&root)
-        .args(["metadata", "--format-version", "1"])
-        .output()
-        .context("cargo cannot be run; packing the FMU needs Rust")?;
-    if !said.status.success() {
-        let error = String::from_utf8_lossy(&said.stderr);
-        bail!("cargo does not say what the FMU is linked from: {}", error.trim());
-    }
-    let metadata: Value = serde_json::from_slice(&said.stdout)?;
+        .exec()
+        .context("cargo does not say what the FMU is linked from")?;
     let lock = std::fs::read_to_string(root.join("Cargo.lock")).context("Cargo.lock")?;
     let lock: toml::Table = lock.parse().context("Cargo.lock cannot be understood")?;
-    let list = |value: &Value| value.as_array().cloned().unwrap_or_default();
-    let nodes = list(&metadata["resolve"]["nodes"]);
-    let packages = list(&metadata["packages"]);
-    let package = |id: &Value| packages.iter().find(|package| package["id"] == *id);
-    let first = packages.iter().find(|package| package["name"] == project::PACKAGE);
-    let mut wanted =
-        vec![first.context("the FMU's package is not in the workspace")?["id"].clone()];
+    let nodes = metadata.resolve.as_ref().map_or(&[][..], |resolve| &resolve.nodes);
+    let first = metadata.packages.iter().find(|one| one.name == package);
+    let first = first.with_context(|| format!("the workspace has no package {package}"))?;
+    let mut wanted = vec![&first.id];
     let mut place = 0;
     while place < wanted.len() {
-        let node = nodes.iter().find(|node| node["id"] == wanted[place]);
-        for dependency in node.map(|node| list(&node["deps"])).unwrap_or_default() {
+        let node = nodes.iter().find(|node| node.id == *wanted[place]);
+        for dependency in node.into_iter().flat_map(|node| &node.deps) {
             // neither of tests nor of build scripts
-            let linked = list(&dependency["dep_kinds"]).iter().any(|kind| kind["kind"].is_null());
-            if linked && !wanted.contains(&dependency["pkg"]) {
-                wanted.push(dependency["pkg"].clone());
+            let linked = dependency.dep_kinds.iter().any(|d| d.kind == DependencyKind::Normal);
+            if linked && !wanted.contains(&&dependency.pkg) {
+                wanted.push(&dependency.pkg);
             }
         }
         place += 1;
     }
     let mut all = Vec::new();
-    for package in wanted.iter().filter_map(package) {
-        let text = |key: &str| package[key].as_str().unwrap_or_default().to_string();
-        let (name, version) = (text("name"), text("version"));
-        let own = package["source"].is_null();
+    for package in wanted.into_iter().map(|id| &metadata[id]) {
+        let (name, version) = (package.name.to_string(), package.version.to_string());
         let locked = lock.get("package").and_then(|packages| packages.as_array());
         let locked = locked.into_iter().flatten().find(|one| {
             let is = |key: &str, value: &str| one.get(key).and_then(|v| v.as_str()) == Some(value);
@@ -226,14 +201,13 @@ fn crates(platforms: &BTreeSet<&'static str>) -> Result<Vec<Component>> {
         let checksum = locked.and_then(|one| one.get("checksum")).and_then(|sum| sum.as_str());
         all.push(Component {
             purl: format!("pkg:cargo/{name}@{version}"),
-            licence: text("license"),
-            texts: if own {
-                OWN_TEXTS.map(String::from).to_vec()
-            } else {
-                vec![format!("{name}.txt")]
+            licence: package.license.clone().unwrap_or_default(),
+            texts: match package.source {
+                None => OWN_TEXTS.map(String::from).to_vec(),
+                Some(_) => vec![format!("{name}.txt")],
             },
             sha256: checksum.map(String::from),
-            origin: text("description"),
+            origin: package.description.clone().unwrap_or_default(),
             platforms: platforms.clone(),
             name,
             version: Some(version),
@@ -306,9 +280,10 @@ pub fn licence_note(description: &ModelDescription, components: &[Component]) ->
     note
 }
 
-/// The software bill of materials, CycloneDX 1.6. Neither a time nor a random number is in it, so
-/// the same binaries have the same bill.
-pub fn bill(
+/// The software bill of materials (SBOM), CycloneDX 1.6. Neither a time nor a random number is in it, so
+/// the same binaries have the same SBOM.
+pub fn sbom(
+    model: &Model,
     description: &ModelDescription,
     binaries: &[Packed],
     components: &[Component],
@@ -345,11 +320,11 @@ pub fn bill(
     let files = binaries.iter().map(|binary| {
         json!({
             "type": "file",
-            "name": binary.name(name),
+            "name": binary.name(model.name),
             "hashes": [{ "alg": "SHA-256", "content": sha256(&binary.bytes) }],
         })
     });
-    let bill = json!({
+    let sbom = json!({
         "bomFormat": "CycloneDX",
         "specVersion": "1.6",
         "version": 1,
@@ -365,21 +340,13 @@ pub fn bill(
         "components": list,
         "dependencies": dependencies,
     });
-    format!("{bill:#}\n")
-}
-
-/// SHA-256 in hexadecimal digits.
-pub fn sha256(bytes: &[u8]) -> String {
-    let mut text = String::new();
-    for byte in Sha256::digest(bytes) {
-        let _ = write!(text, "{byte:02x}");
-    }
-    text
+    format!("{sbom:#}\n")
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::models::MODELS;
 
     #[test]
     fn crates_of_std_are_found_by_name_and_version() {
@@ -394,10 +361,14 @@ mod tests {
     }
 
     #[test]
-    fn crates_are_those_of_the_lock_file() {
-        let all = crates(&BTreeSet::from(["linux64"])).unwrap();
-        let names: Vec<_> = all.iter().map(|c| c.name.as_str()).collect();
-        assert_eq!(names, [project::PACKAGE, "plant", "libm"]);
-        assert_eq!(all[2].sha256.as_ref().unwrap().len(), 64);
+    fn of_other_people_s_crates_an_fmu_links_libm_alone() {
+        for model in &MODELS {
+            let all = crates(model.package, &BTreeSet::from(["linux64"])).unwrap();
+            assert_eq!(all[0].name, model.package);
+            let foreign: Vec<_> = all.iter().filter(|c| c.texts != OWN_TEXTS).collect();
+            let names: Vec<_> = foreign.iter().map(|c| c.name.as_str()).collect();
+            assert_eq!(names, ["libm"]);
+            assert_eq!(foreign[0].sha256.as_ref().unwrap().len(), 64, "as Cargo.lock has it");
+        }
     }
 }

@@ -16,6 +16,7 @@ use anyhow::{Context, Result, bail};
 use host::binary::{self, Binary};
 use host::fmi2::Fmu;
 
+use crate::models::Model;
 use crate::project;
 
 /// A platform of FMI 2.0, section 2.3.
@@ -30,7 +31,7 @@ pub struct Platform {
     tools: &'static [Tool],
     /// Subcommand of Cargo, or another program with the same arguments.
     cargo: Cargo,
-    /// Arguments of the linker.
+    /// Arguments of the linker; `{name}` is the model's.
     link: &'static [&'static str],
 }
 
@@ -80,7 +81,7 @@ pub const PLATFORMS: [Platform; 3] = [
         cargo: Cargo::Zig,
         // Hosts load it by its path; its name must not be that of a folder on this machine. Without
         // debug information (-S) the identifier that zig gives it does not depend on one either.
-        link: &["-Wl,-install_name,@rpath/HubSlosh.dylib", "-Wl,-S"],
+        link: &["-Wl,-install_name,@rpath/{name}.dylib", "-Wl,-S"],
     },
     Platform {
         folder: "linux64",
@@ -113,9 +114,9 @@ pub struct Built {
     pub binary: Binary,
 }
 
-/// Builds and checks the binaries of all platforms. Before anything is built, everything that is
+/// Builds and checks the binaries of an FMU for all platforms. Before anything is built, everything that is
 /// missing is named; after, every fault of every binary.
-pub fn build() -> Result<Vec<Built>> {
+pub fn build(model: &Model) -> Result<Vec<Built>> {
     let bench = Bench::look()?;
     bench.check()?;
     let mut faults = Vec::new();
@@ -126,7 +127,7 @@ pub fn build() -> Result<Vec<Built>> {
             .targets
             .iter()
             .map(|target| {
-                let path = project::cargo_build(bench.command(platform, target), false)
+                let path = project::cargo_build(bench.command(model, platform, target), false)
                     .with_context(|| format!("{} ({})", platform.folder, target.triple))?;
                 std::fs::read(&path).with_context(|| format!("{} cannot be read", path.display()))
             })
@@ -251,7 +252,7 @@ impl Bench {
     }
 
     /// What builds the binary for one target.
-    fn command(&self, platform: &Platform, target: &Target) -> Command {
+    fn command(&self, model: &Model, platform: &Platform, target: &Target) -> Command {
         let mut command = match platform.cargo {
             Cargo::Plain => project::cargo(),
             Cargo::Zig => Command::new("cargo-zigbuild"),
@@ -278,8 +279,9 @@ impl Bench {
         command.env("SOURCE_DATE_EPOCH", "0");
         let linker = MINGW.program;
         command.env("CARGO_TARGET_X86_64_PC_WINDOWS_GNU_LINKER", linker);
-        project::arguments(&mut command);
-        command.args(platform.link.iter().map(|argument| format!("-Clink-arg={argument}")));
+        project::arguments(&mut command, model.package);
+        let link = platform.link.iter().map(|argument| argument.replace("{name}", model.name));
+        command.args(link.map(|argument| format!("-Clink-arg={argument}")));
         command
     }
 }

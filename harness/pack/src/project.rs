@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail};
+use cargo_metadata::{Message, TargetKind};
 
 /// The project's root: two folders above this crate when it was compiled.
 pub fn root() -> PathBuf {
@@ -11,15 +12,18 @@ pub fn root() -> PathBuf {
     crate_root.ancestors().nth(2).unwrap_or(crate_root).to_path_buf()
 }
 
-/// Cargo package of the FMU's binary.
-pub(crate) const PACKAGE: &str = "hubslosh-fmu";
-/// Cargo profile it is built with.
+/// Cargo profile that binaries of FMUs are built with.
 const PROFILE: &str = "fmu";
-/// Builds for the platform this program runs on and returns where Cargo put the binary.
-pub(crate) fn build(quiet: bool) -> Result<PathBuf> {
+
+/// Builds the cdylib of a package of this workspace, as an FMU's binary for the platform this program
+/// runs on, and returns where Cargo put it. `quiet`: without Cargo's progress.
+///
+/// # Errors
+/// If there is no source or no Cargo, or if it does not compile.
+pub fn build(package: &str, quiet: bool) -> Result<PathBuf> {
     let mut command = cargo();
     command.arg("rustc");
-    arguments(&mut command);
+    arguments(&mut command, package);
     cargo_build(command, quiet)
 }
 
@@ -36,8 +40,8 @@ pub(crate) fn cargo() -> Command {
 /// processor waits; the linear model's step takes a fifth longer.
 ///
 /// What follows goes to the compiler.
-pub(crate) fn arguments(command: &mut Command) {
-    command.args(["--profile", PROFILE, "--package", PACKAGE, "--lib", "--crate-type", "cdylib"]);
+pub(crate) fn arguments(command: &mut Command, package: &str) {
+    command.args(["--profile", PROFILE, "--package", package, "--lib", "--crate-type", "cdylib"]);
     command.args(["--message-format", "json-render-diagnostics"]);
     command.args(["--", "-Cllvm-args=-slp-threshold=10"]);
 }
@@ -59,16 +63,14 @@ pub(crate) fn cargo_build(mut command: Command, quiet: bool) -> Result<PathBuf> 
     if !built.status.success() {
         bail!("the FMU's binary did not build");
     }
-    String::from_utf8_lossy(&built.stdout)
-        .lines()
-        .filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok())
-        .filter(|message| message["reason"] == "compiler-artifact")
-        .filter(|message| message["target"]["kind"][0] == "cdylib")
-        .flat_map(|message| message["filenames"].as_array().cloned().unwrap_or_default())
-        .filter_map(|name| name.as_str().map(PathBuf::from))
-        .find(|name| {
-            let ending = name.extension().unwrap_or_default();
-            ["so", "dll", "dylib"].iter().any(|library| ending == *library)
+    Message::parse_stream(&built.stdout[..])
+        .filter_map(|message| match message {
+            Ok(Message::CompilerArtifact(artifact)) => Some(artifact),
+            _ => None,
         })
+        .filter(|artifact| artifact.target.kind.contains(&TargetKind::CDyLib))
+        .flat_map(|artifact| artifact.filenames)
+        .find(|name| matches!(name.extension(), Some("so" | "dll" | "dylib")))
+        .map(PathBuf::from)
         .context("cargo built the FMU but does not say where its binary is")
 }

@@ -1,13 +1,13 @@
-//! A release to take away: the FMU for all platforms, its hash, its bill of materials and the
+//! A release to take away: the FMU for all platforms, its hash, its SBOM and the
 //! report of its check.
 
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use host::output;
+use host::output::{self, sha256};
 
-use crate::{BILL, components, pack_all};
+use crate::{Model, pack_all};
 
 /// One file of an FMU.
 pub fn read(fmu: &Path, name: &str) -> Result<Vec<u8>> {
@@ -19,35 +19,39 @@ pub fn read(fmu: &Path, name: &str) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Where the release of the present version is, in `folder`.
-pub fn path(folder: &Path) -> PathBuf {
-    folder.join(format!("HubSlosh-{}.fmu", env!("CARGO_PKG_VERSION")))
+/// Where the release of the present version of an FMU is, in `folder`.
+pub fn path(model: &Model, folder: &Path) -> PathBuf {
+    folder.join(format!("{}-{}.fmu", model.name, env!("CARGO_PKG_VERSION")))
 }
 
 /// Builds for all platforms, checks, and writes the release's files to `folder`: the FMU, `.sha256`,
 /// as `sha256sum --check` reads it, `.cdx.json`, and the report of the check, which `check` returns.
 /// Returns what was written; an FMU that `check` refuses is not released.
-pub fn write(folder: &Path, check: impl FnOnce(&Path) -> Result<String>) -> Result<Vec<PathBuf>> {
+pub fn write(
+    model: &Model,
+    folder: &Path,
+    check: impl FnOnce(&Path) -> Result<String>,
+) -> Result<Vec<PathBuf>> {
     let made = tempfile::tempdir().context("there is no place for temporary files")?;
-    let fmu = path(made.path());
-    for built in pack_all(&fmu)? {
+    let fmu = path(model, made.path());
+    for built in pack_all(model, &fmu)? {
         eprintln!("{}: {}", built.folder, built.binary);
     }
     let bytes = std::fs::read(&fmu).with_context(|| format!("{} cannot be read", fmu.display()))?;
     let name = fmu.file_name().unwrap_or_default().to_string_lossy();
-    let hash = format!("{}  {name}\n", components::sha256(&bytes));
+    let hash = format!("{}  {name}\n", sha256(&bytes));
     let report = check(&fmu)?;
-    let bill = read(&fmu, BILL)?;
+    let sbom = read(&fmu, &model.sbom())?;
     let files = [
         ("fmu", bytes),
         ("fmu.sha256", hash.into_bytes()),
-        ("cdx.json", bill),
+        ("cdx.json", sbom),
         ("check.txt", report.into_bytes()),
     ];
     output::directory(folder)?;
     let mut written = Vec::new();
     for (ending, bytes) in files {
-        let path = path(folder).with_extension(ending);
+        let path = path(model, folder).with_extension(ending);
         output::atomically(&path, |file| Ok(file.write_all(&bytes)?))?;
         written.push(path);
     }

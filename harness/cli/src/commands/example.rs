@@ -19,7 +19,7 @@ pub struct ExampleArgs {
 impl ExampleArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        let folder = pack::root().join("modelDescription/HubSlosh").join(pack::EXTRA);
+        let folder = pack::HUBSLOSH.folder().join(pack::HUBSLOSH.extra());
         example::write(&Fmu::open(&self.fmu)?, &folder)?;
         println!("wrote {}", folder.display());
         Ok(())

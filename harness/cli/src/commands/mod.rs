@@ -12,7 +12,7 @@ pub mod run;
 pub mod scale;
 pub mod torque;
 
-/// The FMU that commands pack or drive unless another is named.
+/// The FMU that commands drive unless another is named.
 pub const DEFAULT_FMU: &str = "dist/HubSlosh.fmu";
 /// Where a campaign goes.
 pub const DEFAULT_CAMPAIGN: &str = "dist/campaign";

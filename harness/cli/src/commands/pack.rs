@@ -3,18 +3,20 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
+use pack::Model;
 
-use super::DEFAULT_FMU;
-
-/// Builds the FMU's binary and packs it.
+/// Builds the binary of an FMU and packs it.
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  hubslosh pack --out dist/HubSlosh.fmu\n  hubslosh pack --all-platforms"
 )]
 pub struct PackArgs {
-    /// Where to put the FMU.
-    #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
-    out: PathBuf,
+    /// Which FMU.
+    #[arg(long, value_name = "NAME", default_value = pack::HUBSLOSH.name, value_parser = pack::model)]
+    model: &'static Model,
+    /// Where to put the FMU [default: dist/NAME.fmu].
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
     /// For Linux, Windows and macOS instead of this machine's platform; on a Debian machine
     /// harness/platforms/setup gets what that takes.
     #[arg(long)]
@@ -24,20 +26,21 @@ pub struct PackArgs {
 impl PackArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
+        let out = self.out.unwrap_or_else(|| format!("dist/{}.fmu", self.model.name).into());
         if !self.all_platforms {
-            return native(&self.out);
+            return native(self.model, &out);
         }
-        for built in ::pack::pack_all(&self.out)? {
+        for built in pack::pack_all(self.model, &out)? {
             println!("{}: {}", built.folder, built.binary);
         }
-        println!("packed {} ({} bytes)", self.out.display(), self.out.metadata()?.len());
+        println!("packed {} ({} bytes)", out.display(), out.metadata()?.len());
         Ok(())
     }
 }
 
 /// Packs for this machine's platform.
-pub fn native(out: &Path) -> Result<()> {
-    ::pack::pack(out)?;
+pub fn native(model: &Model, out: &Path) -> Result<()> {
+    pack::pack(model, out)?;
     println!("packed {}", out.display());
     Ok(())
 }

@@ -5,18 +5,21 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
 use check::{Options, Severity};
-use pack::release;
+use pack::{Model, release};
 
 use crate::progress;
 
 /// Where the release goes.
 const DEFAULT_RELEASE: &str = "dist/release";
 
-/// Builds and checks the release for all platforms: the FMU, its hash, its bill of materials.
+/// Builds and checks the release for all platforms: the FMU, its hash, its software bill of materials (SBOM).
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  hubslosh release\n\n\
     On a Debian machine harness/platforms/setup gets what building for all platforms takes.")]
 pub struct ReleaseArgs {
+    /// Which FMU.
+    #[arg(long, value_name = "NAME", default_value = pack::HUBSLOSH.name, value_parser = pack::model)]
+    model: &'static Model,
     /// Directory for the release's files.
     #[arg(long, value_name = "DIRECTORY", default_value = DEFAULT_RELEASE)]
     out: PathBuf,
@@ -25,7 +28,7 @@ pub struct ReleaseArgs {
 impl ReleaseArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        for path in release::write(&self.out, checked)? {
+        for path in release::write(self.model, &self.out, checked)? {
             println!("{} ({} bytes)", path.display(), path.metadata()?.len());
         }
         Ok(())

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use pack::{BILL, packed_for_tests};
+use pack::{HUBSLOSH, packed_for_tests};
 
 fn files() -> BTreeMap<String, Vec<u8>> {
     use std::io::Read;
@@ -49,7 +49,7 @@ fn every_link_and_figure_of_the_documentation_is_in_the_fmu() {
 
 #[test]
 fn every_page_is_listed_in_the_introduction() {
-    let folder = pack::root().join("modelDescription/HubSlosh/documentation");
+    let folder = HUBSLOSH.folder().join("documentation");
     let introduction = std::fs::read_to_string(folder.join("index.md")).unwrap();
     for file in folder.read_dir().unwrap().flatten() {
         let name = file.file_name().to_string_lossy().into_owned();
@@ -77,19 +77,49 @@ fn every_licence_named_has_its_text() {
 }
 
 #[test]
-fn bill_of_materials_lists_what_is_linked_and_refers_to_nothing_else() {
+fn sbom_lists_what_is_linked_and_refers_to_nothing_else() {
     let files = files();
-    let bill: serde_json::Value = serde_json::from_slice(&files[BILL]).unwrap();
-    let parts = bill["components"].as_array().unwrap();
+    let sbom: serde_json::Value = serde_json::from_slice(&files[&HUBSLOSH.sbom()]).unwrap();
+    let parts = sbom["components"].as_array().unwrap();
     let names: BTreeSet<&str> = parts.iter().map(|part| part["name"].as_str().unwrap()).collect();
-    for name in ["hubslosh-fmu", "plant", "libm", "std", "gimli"] {
+    for name in [HUBSLOSH.package, "plant", "libm", "std", "gimli"] {
         assert!(names.contains(name), "{name} is not in {names:?}");
     }
     // the harness's own crates are not in the FMU
     assert!(!names.contains("zip") && !names.contains("clap"));
     let references: BTreeSet<&str> = parts.iter().map(|p| p["bom-ref"].as_str().unwrap()).collect();
     assert_eq!(references.len(), parts.len(), "references are unique");
-    for part in bill["dependencies"][0]["dependsOn"].as_array().unwrap() {
+    for part in sbom["dependencies"][0]["dependsOn"].as_array().unwrap() {
         assert!(references.contains(part.as_str().unwrap()));
     }
+}
+
+#[test]
+fn an_archive_of_parts_has_these_and_no_more() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(&path, text).unwrap();
+        path
+    };
+    let binary = write("target/libm.so", "binary");
+    write("extra/resources/b.txt", "b");
+    write("extra/resources/a/c.txt", "c");
+    let out = folder.path().join("new/M.fmu");
+    let extra = folder.path().join("extra");
+    pack::archive::plain("<xml/>", &binary, "M", Some(&extra), &out).unwrap();
+    let archive = zip::ZipArchive::new(std::fs::File::open(&out).unwrap()).unwrap();
+    let names: Vec<_> = archive.file_names().flatten().map(|n| n.into_owned()).collect();
+    let ending = std::env::consts::DLL_SUFFIX;
+    let binary = format!("binaries/{}/M{ending}", host::fmi2::PLATFORM);
+    assert_eq!(names, ["modelDescription.xml", &binary, "resources/a/c.txt", "resources/b.txt"]);
+}
+
+#[test]
+fn an_fmu_2_has_its_icon_and_no_terminals_of_fmi_3() {
+    let files = files();
+    assert_eq!(files["model.png"][..8], *b"\x89PNG\r\n\x1a\n");
+    // FMI Library 3.0.4 and newer log terminalsAndIcons.xml in an FMU 2.0 as fatal
+    assert!(!files.keys().any(|name| name.starts_with("terminalsAndIcons")));
 }

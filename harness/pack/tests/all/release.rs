@@ -3,14 +3,14 @@
 
 use std::path::PathBuf;
 
-use pack::components::sha256;
-use pack::release;
+use host::output::sha256;
+use pack::{HUBSLOSH, release};
 
 /// The committed release of this version. There is none between a new version's number and its
 /// release; then an older one must be there.
 fn released() -> Option<PathBuf> {
     let folder = pack::root().join("dist").join("release");
-    let fmu = release::path(&folder);
+    let fmu = release::path(HUBSLOSH, &folder);
     if fmu.exists() {
         return Some(fmu);
     }
@@ -23,7 +23,7 @@ fn released() -> Option<PathBuf> {
 #[test]
 fn release_of_this_version_has_this_interface() {
     let Some(fmu) = released() else { return };
-    let source = pack::root().join("modelDescription/HubSlosh/modelDescription.xml");
+    let source = HUBSLOSH.folder().join("modelDescription.xml");
     let there = release::read(&fmu, "modelDescription.xml").unwrap();
     assert!(
         there == std::fs::read(source).unwrap(),
@@ -35,15 +35,15 @@ fn release_of_this_version_has_this_interface() {
 }
 
 #[test]
-fn hash_and_bill_beside_the_release_are_its_own() {
+fn hash_and_sbom_beside_the_release_are_its_own() {
     let Some(fmu) = released() else { return };
     let name = fmu.file_name().unwrap().to_string_lossy();
     let written = std::fs::read_to_string(fmu.with_extension("fmu.sha256")).unwrap();
     assert_eq!(written, format!("{}  {name}\n", sha256(&std::fs::read(&fmu).unwrap())));
     let beside = std::fs::read(fmu.with_extension("cdx.json")).unwrap();
-    assert!(beside == release::read(&fmu, pack::BILL).unwrap());
-    let bill: serde_json::Value = serde_json::from_slice(&beside).unwrap();
-    for file in bill["metadata"]["component"]["components"].as_array().unwrap() {
+    assert!(beside == release::read(&fmu, &HUBSLOSH.sbom()).unwrap());
+    let sbom: serde_json::Value = serde_json::from_slice(&beside).unwrap();
+    for file in sbom["metadata"]["component"]["components"].as_array().unwrap() {
         let binary = release::read(&fmu, file["name"].as_str().unwrap()).unwrap();
         assert_eq!(file["hashes"][0]["content"], sha256(&binary));
     }

@@ -1,0 +1,134 @@
+//! The `.fmu` as a zip archive (FMI 2.0, section 2.3): same files, same bytes.
+
+use std::io::{Seek, Write};
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use host::fmi2::PLATFORM;
+use host::output;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipWriter};
+
+/// Names in the archive and contents, in the archive's order; modelDescription.xml first, as some
+/// hosts expect.
+pub type Files = Vec<(String, Vec<u8>)>;
+
+/// A binary to be packed.
+pub struct Packed {
+    /// Folder under `binaries/`.
+    pub folder: &'static str,
+    /// Ending of its name there.
+    pub ending: &'static str,
+    /// The file.
+    pub bytes: Vec<u8>,
+}
+
+impl Packed {
+    /// A binary for the platform this program runs on.
+    pub fn native(binary: &Path) -> Result<Packed> {
+        let bytes = read(binary)?;
+        Ok(Packed { folder: PLATFORM, ending: std::env::consts::DLL_SUFFIX, bytes })
+    }
+
+    /// Its name in the FMU of that modelIdentifier.
+    pub fn name(&self, identifier: &str) -> String {
+        format!("binaries/{}/{identifier}{}", self.folder, self.ending)
+    }
+}
+
+/// Packs an FMU from its parts alone: description, binary for this platform, and every file below
+/// `extra` under its name relative to that folder (`resources/a.txt`, `sources/b.c`).
+///
+/// # Errors
+/// If a file cannot be read or written.
+pub fn plain(
+    xml: &str,
+    binary: &Path,
+    identifier: &str,
+    extra: Option<&Path>,
+    out: &Path,
+) -> Result<()> {
+    let binary = Packed::native(binary)?;
+    let mut files = vec![
+        ("modelDescription.xml".to_string(), xml.as_bytes().to_vec()),
+        (binary.name(identifier), binary.bytes),
+    ];
+    if let Some(folder) = extra {
+        files.extend(below(folder)?);
+    }
+    write(&files, out)
+}
+
+/// Packs files; the archive appears whole or not at all.
+pub fn write(files: &Files, out: &Path) -> Result<()> {
+    if let Some(parent) = out.parent().filter(|parent| !parent.as_os_str().is_empty()) {
+        output::directory(parent)?;
+    }
+    output::atomically(out, |file| zip(file, files))
+        .with_context(|| format!("{} was not packed", out.display()))
+}
+
+/// All files below a folder, their names relative to it, sorted.
+pub fn below(folder: &Path) -> Result<Files> {
+    let mut entries: Vec<_> = folder
+        .read_dir()
+        .and_then(|entries| entries.collect::<Result<Vec<_>, _>>())
+        .with_context(|| format!("{} cannot be read", folder.display()))?;
+    entries.sort_by_key(|entry| entry.file_name());
+    let mut files = Files::new();
+    for entry in entries {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if entry.path().is_dir() {
+            let inner = below(&entry.path())?;
+            files
+                .extend(inner.into_iter().map(|(inner, bytes)| (format!("{name}/{inner}"), bytes)));
+        } else {
+            files.push((name, read(&entry.path())?));
+        }
+    }
+    Ok(files)
+}
+
+/// A whole file.
+pub fn read(path: &Path) -> Result<Vec<u8>> {
+    std::fs::read(path).with_context(|| format!("{} cannot be read", path.display()))
+}
+
+/// Same files, same bytes: order, times and attributes are fixed.
+fn zip(out: &mut (impl Write + Seek), files: &[(String, Vec<u8>)]) -> Result<()> {
+    let mut archive = ZipWriter::new(out);
+    for (name, bytes) in files {
+        let mode = if name.starts_with("binaries/") { 0o755 } else { 0o644 };
+        let options = SimpleFileOptions::default()
+            .compression_method(CompressionMethod::Deflated)
+            .compression_level(Some(9)) // the release must stay below 2 MB
+            .last_modified_time(DateTime::default()) // 1980-01-01, the oldest a zip can say
+            .unix_permissions(mode);
+        archive.start_file(name.as_str(), options)?;
+        archive.write_all(bytes)?;
+    }
+    archive.finish()?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Cursor;
+
+    use super::*;
+
+    #[test]
+    fn the_same_files_give_the_same_bytes_in_the_given_order() {
+        let files =
+            [("b.txt".to_string(), b"two".to_vec()), ("binaries/a".to_string(), vec![0; 9999])];
+        let packed = || {
+            let mut out = Cursor::new(Vec::new());
+            zip(&mut out, &files).unwrap();
+            out.into_inner()
+        };
+        assert_eq!(packed(), packed());
+        let archive = zip::ZipArchive::new(Cursor::new(packed())).unwrap();
+        let names: Vec<_> = archive.file_names().flatten().map(|n| n.into_owned()).collect();
+        assert_eq!(names, ["b.txt", "binaries/a"]);
+    }
+}
