@@ -57,7 +57,7 @@ const LIVELY: &[(&str, &str)] = &[
 
 /// Every variable there is, as bits.
 fn all(instance: &mut Instance) -> Vec<u64> {
-    let variables = &instance.fmu().description().variables.list;
+    let variables = &instance.fmu().description().variables;
     let each = variables.iter().map(|variable| {
         let reference = [variable.reference];
         match variable.kind() {

@@ -144,7 +144,7 @@ impl<'fmu> Host<'fmu> {
 
 /// Every real output and some locals.
 fn values(instance: &mut Instance) -> BTreeMap<String, f64> {
-    let variables = &instance.fmu().description().variables.list;
+    let variables = &instance.fmu().description().variables;
     let outputs = variables.iter().filter(|v| v.causality == "output").map(|v| v.name.as_str());
     let locals = ["energy", "momentum", "work", "heat", "stuck_time", "wheel_speed"];
     let names: Vec<&str> = outputs.chain(locals).collect();
@@ -406,7 +406,7 @@ fn openmodelica_up_to_1_27_gets_the_motion_of_the_parameters_it_sets() {
     instance.exit_initialization_mode().unwrap();
 
     let (mut reals, mut integers, mut booleans) = (vec![], vec![], vec![]);
-    let variables = &fmu.description().variables.list;
+    let variables = &fmu.description().variables;
     for v in variables.iter().filter(|v| v.causality == "parameter") {
         let set = settings.iter().find(|(name, _)| *name == v.name).map(|(_, value)| *value);
         let text = set.or(v.attributes().start.as_deref()).unwrap();

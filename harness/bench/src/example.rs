@@ -66,7 +66,7 @@ fn torque() -> Table {
 }
 
 fn outputs(description: &ModelDescription) -> Vec<&str> {
-    let outputs = description.variables.list.iter().filter(|v| v.causality == "output");
+    let outputs = description.variables.iter().filter(|v| v.causality == "output");
     outputs.map(|v| v.name.as_str()).collect()
 }
 

@@ -3,8 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::Findings;
-use super::element::{Element, double};
 use host::description::Type;
+use host::xml::{Element, double};
 
 /// The parts of modelDescription.xml that rules need, read without judging.
 pub struct Description {

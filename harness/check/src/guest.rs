@@ -538,7 +538,7 @@ pub fn stimulus(v: &Variable, step: usize, n: usize) -> f64 {
 pub fn start_value(v: &Variable) -> Option<Reading> {
     let text = v.typed.get("start")?;
     Some(match v.kind {
-        Type::Real => Reading::Real(super::element::double(text)?),
+        Type::Real => Reading::Real(host::xml::double(text)?),
         Type::Integer | Type::Enumeration => Reading::Integer(text.trim().parse().ok()?),
         Type::Boolean => Reading::Boolean(matches!(text.trim(), "true" | "1").into()),
         Type::String => Reading::Text(text.to_string()),

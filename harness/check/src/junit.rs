@@ -3,80 +3,53 @@
 use std::io::Write;
 
 use anyhow::Result;
-use xml::writer::{EmitterConfig, EventWriter, XmlEvent};
+use quick_junit::{NonSuccessKind, TestCase, TestCaseStatus, TestSuite};
 
 use super::{Report, Severity};
 
 /// Writes the report. Rules are test cases, classed by their group; errors fail them, warnings are
 /// their output.
 pub fn write(report: &Report, out: &mut impl Write) -> Result<()> {
-    let failures = |outcome: &super::Outcome| {
-        outcome.findings.list.iter().any(|f| f.severity == Severity::Error)
-    };
-    let failed = report.outcomes.iter().filter(|o| failures(o)).count().to_string();
-    let skipped = report.outcomes.iter().filter(|o| o.findings.skipped.is_some()).count();
-    let tests = report.outcomes.len().to_string();
-    let path = report.path.display().to_string();
-    let mut writer =
-        EventWriter::new_with_config(&mut *out, EmitterConfig::new().perform_indent(true));
-    writer.write(XmlEvent::start_element("testsuites"))?;
-    writer.write(
-        XmlEvent::start_element("testsuite")
-            .attr("name", &writable(&path))
-            .attr("tests", &tests)
-            .attr("failures", &failed)
-            .attr("errors", "0")
-            .attr("skipped", &skipped.to_string()),
-    )?;
+    let mut suite = TestSuite::new(report.path.display().to_string());
     for outcome in &report.outcomes {
-        let group = outcome.rule.id.split('.').next().unwrap_or_default();
-        writer.write(
-            XmlEvent::start_element("testcase")
-                .attr("classname", group)
-                .attr("name", outcome.rule.id)
-                .attr("time", &format!("{:.3}", outcome.time.as_secs_f64())),
-        )?;
+        let rule = outcome.rule;
         let lines = |severity: Severity| {
             let of = outcome.findings.list.iter().filter(move |f| f.severity == severity);
-            let lines: Vec<_> = of.map(|f| writable(&format!("{}: {}", f.place, f.text))).collect();
-            lines.join("\n")
+            of.map(|f| format!("{}: {}", f.place, f.text)).collect::<Vec<_>>().join("\n")
         };
         let (errors, warnings) = (lines(Severity::Error), lines(Severity::Warning));
+        let mut status = match &outcome.findings.skipped {
+            _ if !errors.is_empty() => TestCaseStatus::non_success(NonSuccessKind::Failure),
+            Some(_) => TestCaseStatus::skipped(),
+            None => TestCaseStatus::success(),
+        };
         if !errors.is_empty() {
-            let message = format!("{} [{}]", outcome.rule.title, outcome.rule.source);
-            writer.write(XmlEvent::start_element("failure").attr("message", &message))?;
-            writer.write(XmlEvent::characters(&errors))?;
-            writer.write(XmlEvent::end_element())?;
+            status.set_message(format!("{} [{}]", rule.title, rule.source));
+            status.set_description(errors);
         } else if let Some(why) = &outcome.findings.skipped {
-            writer.write(XmlEvent::start_element("skipped").attr("message", &writable(why)))?;
-            writer.write(XmlEvent::end_element())?;
+            status.set_message(why.as_str());
         }
+        let mut case = TestCase::new(rule.id, status);
+        case.set_classname(rule.id.split('.').next().unwrap_or_default());
+        case.set_time(outcome.time);
         if !warnings.is_empty() {
-            writer.write(XmlEvent::start_element("system-out"))?;
-            writer.write(XmlEvent::characters(&format!("warning: {warnings}")))?;
-            writer.write(XmlEvent::end_element())?;
+            case.set_system_out(format!("warning: {warnings}"));
         }
-        writer.write(XmlEvent::end_element())?;
+        suite.add_test_case(case);
     }
-    writer.write(XmlEvent::end_element())?;
-    writer.write(XmlEvent::end_element())?;
-    writeln!(out)?;
+    let mut junit = quick_junit::Report::new("hubslosh check");
+    junit.add_test_suite(suite);
+    junit.serialize(out)?;
     Ok(())
-}
-
-/// Without the characters that XML cannot hold; an FMU may log any.
-fn writable(text: &str) -> String {
-    let allowed = |c: char| c >= ' ' || matches!(c, '\n' | '\t');
-    text.chars().map(|c| if allowed(c) { c } else { '\u{fffd}' }).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use std::time::Duration;
 
-    use super::super::element::Element;
     use super::super::{Findings, Outcome, RULES};
     use super::*;
+    use host::xml::Element;
 
     #[test]
     fn every_rule_is_a_case_and_any_text_can_be_told() {

@@ -9,7 +9,6 @@ pub mod archive;
 pub mod binaries;
 pub mod dependencies;
 pub mod description;
-pub mod element;
 pub mod exchange;
 pub mod guest;
 pub mod junit;

@@ -1,8 +1,8 @@
 //! The schema of modelDescription.xml (FMI 2.0.5, section 2.2) as a table: which elements stand
 //! where and in which order, which attributes they have and how those are written.
 
-use super::element::{Element, double};
 use super::{Description, Findings};
+use host::xml::{Element, double};
 
 /// How the value of an attribute is written.
 #[derive(Clone, Copy)]

@@ -1,199 +1,106 @@
-//! What an FMU says of itself: `modelDescription.xml` (FMI 2.0, section 2.2),
-//! as far as a co-simulation host needs it.
+//! What an FMU says of itself: `modelDescription.xml` (FMI 2.0, section 2.2), as far as a host needs
+//! it to drive the FMU.
 
-use anyhow::{Context, Result, bail};
-use serde::Deserialize;
+use anyhow::{Context, Result, anyhow, bail, ensure};
+
+use crate::xml::Element;
 
 /// The root element `fmiModelDescription`.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug)]
 pub struct ModelDescription {
     /// FMI version; "2.0" for every FMU this host can drive.
-    #[serde(rename = "@fmiVersion")]
     pub fmi_version: String,
     /// Name of the model.
-    #[serde(rename = "@modelName")]
     pub model_name: String,
     /// Fingerprint that XML and binary must share.
-    #[serde(rename = "@guid")]
     pub guid: String,
-    /// Version of the model.
-    #[serde(rename = "@version", default)]
+    /// Version of the model; empty if none is given.
     pub version: String,
-    /// One sentence on the model.
-    #[serde(rename = "@description", default)]
+    /// One sentence on the model; empty if there is none.
     pub description: String,
-    /// The tool that wrote the FMU.
-    #[serde(rename = "@generationTool", default)]
+    /// The tool that wrote the FMU; empty if none is given.
     pub generation_tool: String,
-    /// Present if the FMU brings its own solver, as this host needs.
-    #[serde(rename = "CoSimulation")]
-    pub co_simulation: Option<CoSimulation>,
+    /// Present if the FMU brings its own solver.
+    pub co_simulation: Option<Interface>,
     /// Present if the host may integrate.
-    #[serde(rename = "ModelExchange")]
-    pub model_exchange: Option<ModelExchange>,
-    /// Units, with those that people like to see them in.
-    #[serde(rename = "UnitDefinitions", default)]
-    pub units: UnitDefinitions,
-    /// Named types; here the enumerations.
-    #[serde(rename = "TypeDefinitions", default)]
-    pub types: TypeDefinitions,
+    pub model_exchange: Option<Interface>,
+    /// Named types.
+    pub types: Vec<SimpleType>,
     /// Start, stop, tolerance and step the author suggests.
-    #[serde(rename = "DefaultExperiment", default)]
     pub default_experiment: DefaultExperiment,
     /// The variables, in the order of the file.
-    #[serde(rename = "ModelVariables")]
-    pub variables: ModelVariables,
+    pub variables: Vec<Variable>,
 }
 
-/// Element `CoSimulation`.
-#[derive(Clone, Debug, Deserialize)]
-pub struct CoSimulation {
+/// Element `CoSimulation` or `ModelExchange`.
+#[derive(Clone, Debug)]
+pub struct Interface {
     /// Name of the binary, without the platform's ending.
-    #[serde(rename = "@modelIdentifier")]
-    pub model_identifier: String,
-}
-
-/// Element `ModelExchange`.
-#[derive(Clone, Debug, Deserialize)]
-pub struct ModelExchange {
-    /// Name of the binary, without the platform's ending.
-    #[serde(rename = "@modelIdentifier")]
     pub model_identifier: String,
 }
 
 /// Element `DefaultExperiment`; times in s.
-#[derive(Clone, Debug, Default, Deserialize)]
+#[derive(Clone, Debug, Default)]
 pub struct DefaultExperiment {
     /// Start time, s.
-    #[serde(rename = "@startTime")]
     pub start_time: Option<f64>,
     /// Stop time, s.
-    #[serde(rename = "@stopTime")]
     pub stop_time: Option<f64>,
     /// Relative tolerance of the FMU's solver.
-    #[serde(rename = "@tolerance")]
     pub tolerance: Option<f64>,
     /// Communication step, s.
-    #[serde(rename = "@stepSize")]
     pub step_size: Option<f64>,
 }
 
-/// Element `UnitDefinitions`.
-#[derive(Clone, Debug, Default, Deserialize)]
-pub struct UnitDefinitions {
-    /// The units.
-    #[serde(rename = "Unit", default)]
-    pub list: Vec<Unit>,
-}
-
-/// Element `Unit`.
-#[derive(Clone, Debug, Deserialize)]
-pub struct Unit {
-    /// Name used by variables.
-    #[serde(rename = "@name")]
-    pub name: String,
-}
-
-/// Element `TypeDefinitions`.
-#[derive(Clone, Debug, Default, Deserialize)]
-pub struct TypeDefinitions {
-    /// The types.
-    #[serde(rename = "SimpleType", default)]
-    pub list: Vec<SimpleType>,
-}
-
 /// Element `SimpleType`.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug)]
 pub struct SimpleType {
     /// Name used by variables as `declaredType`.
-    #[serde(rename = "@name")]
     pub name: String,
-    /// The items, if it is an enumeration.
-    #[serde(rename = "Enumeration")]
-    pub enumeration: Option<Enumeration>,
-}
-
-/// Element `Enumeration` of a type.
-#[derive(Clone, Debug, Deserialize)]
-pub struct Enumeration {
-    /// The values it can take.
-    #[serde(rename = "Item", default)]
+    /// The values it can take, if it is an enumeration.
     pub items: Vec<Item>,
 }
 
 /// One value of an enumeration.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug)]
 pub struct Item {
     /// Its name.
-    #[serde(rename = "@name")]
     pub name: String,
     /// Its number.
-    #[serde(rename = "@value")]
     pub value: i32,
 }
 
-/// Element `ModelVariables`.
-#[derive(Clone, Debug, Deserialize)]
-pub struct ModelVariables {
-    /// The variables, in the order of the file.
-    #[serde(rename = "ScalarVariable", default)]
-    pub list: Vec<Variable>,
-}
-
 /// Element `ScalarVariable`.
-#[derive(Clone, Debug, Deserialize)]
+#[derive(Clone, Debug)]
 pub struct Variable {
     /// Name, unique in the FMU.
-    #[serde(rename = "@name")]
     pub name: String,
     /// Number by which calls refer to it (within its type).
-    #[serde(rename = "@valueReference")]
     pub reference: u32,
     /// input, output, parameter, calculatedParameter, local or independent.
-    #[serde(rename = "@causality", default = "local_causality")]
     pub causality: String,
-    /// constant, fixed, tunable, discrete or continuous.
-    #[serde(rename = "@variability", default)]
+    /// constant, fixed, tunable, discrete or continuous; empty if it is not given.
     pub variability: String,
-    /// What it means.
-    #[serde(rename = "@description", default)]
+    /// What it means; empty if it is not said.
     pub description: String,
-    #[serde(rename = "Real")]
-    real: Option<Attributes>,
-    #[serde(rename = "Integer")]
-    integer: Option<Attributes>,
-    #[serde(rename = "Boolean")]
-    boolean: Option<Attributes>,
-    #[serde(rename = "String")]
-    string: Option<Attributes>,
-    #[serde(rename = "Enumeration")]
-    enumeration: Option<Attributes>,
-}
-
-fn local_causality() -> String {
-    "local".into()
+    kind: Type,
+    attributes: Attributes,
 }
 
 /// What the typed child of a `ScalarVariable` carries.
-#[derive(Clone, Debug, Default, Deserialize)]
+#[derive(Clone, Debug, Default)]
 pub struct Attributes {
     /// Start value, as written.
-    #[serde(rename = "@start")]
     pub start: Option<String>,
     /// Unit in which values are exchanged.
-    #[serde(rename = "@unit")]
     pub unit: Option<String>,
     /// Unit in which a person likes to read it.
-    #[serde(rename = "@displayUnit")]
     pub display_unit: Option<String>,
     /// Smallest value, as written.
-    #[serde(rename = "@min")]
     pub min: Option<String>,
     /// Largest value, as written.
-    #[serde(rename = "@max")]
     pub max: Option<String>,
     /// Name of the `SimpleType`.
-    #[serde(rename = "@declaredType")]
     pub declared_type: Option<String>,
 }
 
@@ -228,46 +135,131 @@ pub enum Value {
 impl Variable {
     /// Its type.
     pub fn kind(&self) -> Type {
-        self.typed().0
+        self.kind
     }
 
     /// Start, unit, bounds.
     pub fn attributes(&self) -> &Attributes {
-        self.typed().1
+        &self.attributes
+    }
+}
+
+/// Reads elements and keeps all that is wrong with them.
+#[derive(Default)]
+struct Reader {
+    problems: Vec<String>,
+}
+
+impl Reader {
+    /// An attribute that must be there and that `read` understands.
+    fn must<T: Default>(
+        &mut self,
+        element: &Element,
+        attribute: &str,
+        read: impl Fn(&str) -> Option<T>,
+    ) -> T {
+        let text = element.get(attribute);
+        text.and_then(read).unwrap_or_else(|| {
+            let why = text.map_or("is missing".into(), |text| format!("cannot be \"{text}\""));
+            self.problems
+                .push(format!("line {}, {}: {attribute} {why}", element.line, element.name));
+            T::default()
+        })
     }
 
-    fn typed(&self) -> (Type, &Attributes) {
-        const NOTHING: &Attributes = &Attributes {
-            start: None,
-            unit: None,
-            display_unit: None,
-            min: None,
-            max: None,
-            declared_type: None,
-        };
-        [
-            (Type::Real, &self.real),
-            (Type::Integer, &self.integer),
-            (Type::Boolean, &self.boolean),
-            (Type::String, &self.string),
-            (Type::Enumeration, &self.enumeration),
-        ]
-        .into_iter()
-        .find_map(|(kind, child)| Some((kind, child.as_ref()?)))
-        .unwrap_or((Type::Real, NOTHING))
+    fn text(&mut self, element: &Element, attribute: &str) -> String {
+        self.must(element, attribute, |text| Some(text.to_string()))
+    }
+
+    fn interface(&mut self, element: &Element) -> Interface {
+        Interface { model_identifier: self.text(element, "modelIdentifier") }
+    }
+
+    fn item(&mut self, element: &Element) -> Item {
+        let value = self.must(element, "value", |text| text.trim().parse().ok());
+        Item { name: self.text(element, "name"), value }
+    }
+
+    fn simple_type(&mut self, element: &Element) -> SimpleType {
+        let items = element.list("Enumeration").filter(|child| child.name == "Item");
+        SimpleType {
+            items: items.map(|item| self.item(item)).collect(),
+            name: self.text(element, "name"),
+        }
+    }
+
+    fn variable(&mut self, element: &Element) -> Variable {
+        const TYPES: [(&str, Type); 5] = [
+            ("Real", Type::Real),
+            ("Integer", Type::Integer),
+            ("Boolean", Type::Boolean),
+            ("String", Type::String),
+            ("Enumeration", Type::Enumeration),
+        ];
+        let typed = TYPES.iter().find_map(|(name, kind)| Some((*kind, element.child(name)?)));
+        if typed.is_none() {
+            self.problems.push(format!("line {}, {}: it has no type", element.line, element.name));
+        }
+        let of = |name: &str| typed.and_then(|(_, typed)| typed.get(name)).map(String::from);
+        Variable {
+            name: self.text(element, "name"),
+            reference: self.must(element, "valueReference", |text| text.trim().parse().ok()),
+            causality: element.get("causality").unwrap_or("local").into(),
+            variability: element.get("variability").unwrap_or_default().into(),
+            description: element.get("description").unwrap_or_default().into(),
+            kind: typed.map_or(Type::Real, |(kind, _)| kind),
+            attributes: Attributes {
+                start: of("start"),
+                unit: of("unit"),
+                display_unit: of("displayUnit"),
+                min: of("min"),
+                max: of("max"),
+                declared_type: of("declaredType"),
+            },
+        }
     }
 }
 
 impl ModelDescription {
     /// Reads the XML text.
+    ///
+    /// # Errors
+    /// If it is not well-formed, or without what a host needs; all that is missing is named.
     pub fn from_xml(text: &str) -> Result<Self> {
-        serde_xml_rs::from_str(text).context("modelDescription.xml cannot be understood")
+        let root = Element::parse(text.as_bytes())
+            .map_err(|why| anyhow!("modelDescription.xml, line and column {why}"))?;
+        let mut reader = Reader::default();
+        let optional = |name: &str| root.get(name).unwrap_or_default().to_string();
+        let description = ModelDescription {
+            fmi_version: reader.text(&root, "fmiVersion"),
+            model_name: reader.text(&root, "modelName"),
+            guid: reader.text(&root, "guid"),
+            version: optional("version"),
+            description: optional("description"),
+            generation_tool: optional("generationTool"),
+            co_simulation: root.child("CoSimulation").map(|e| reader.interface(e)),
+            model_exchange: root.child("ModelExchange").map(|e| reader.interface(e)),
+            types: root.list("TypeDefinitions").map(|e| reader.simple_type(e)).collect(),
+            default_experiment: match root.child("DefaultExperiment") {
+                None => DefaultExperiment::default(),
+                Some(element) => DefaultExperiment {
+                    start_time: element.number("startTime"),
+                    stop_time: element.number("stopTime"),
+                    tolerance: element.number("tolerance"),
+                    step_size: element.number("stepSize"),
+                },
+            },
+            variables: root.list("ModelVariables").map(|e| reader.variable(e)).collect(),
+        };
+        let problems = reader.problems;
+        ensure!(problems.is_empty(), "modelDescription.xml: {}", problems.join("; "));
+        Ok(description)
     }
 
     /// The variable of that name; if there is none, the error names those that look alike.
     pub fn variable(&self, name: &str) -> Result<&Variable> {
-        self.variables.list.iter().find(|v| v.name == name).with_context(|| {
-            let names = self.variables.list.iter().map(|v| v.name.as_str());
+        self.variables.iter().find(|v| v.name == name).with_context(|| {
+            let names = self.variables.iter().map(|v| v.name.as_str());
             format!("the FMU has no variable \"{name}\"{}", did_you_mean(name, names))
         })
     }
@@ -275,12 +267,8 @@ impl ModelDescription {
     /// The values an enumeration variable can take.
     pub fn items(&self, variable: &Variable) -> &[Item] {
         let declared = variable.attributes().declared_type.as_deref();
-        self.types
-            .list
-            .iter()
-            .find(|t| Some(t.name.as_str()) == declared)
-            .and_then(|t| t.enumeration.as_ref())
-            .map_or(&[], |e| &e.items)
+        let named = self.types.iter().find(|t| Some(t.name.as_str()) == declared);
+        named.map_or(&[], |t| &t.items)
     }
 
     /// Reads a value of a variable from text.
@@ -292,16 +280,16 @@ impl ModelDescription {
                 .parse()
                 .map(Value::Real)
                 .ok()
-                .with_context(|| format!("{name} wants a number, not \"{text}\"")),
+                .with_context(|| format!("{name} expects a number, not \"{text}\"")),
             Type::Integer => text
                 .parse()
                 .map(Value::Integer)
                 .ok()
-                .with_context(|| format!("{name} wants a whole number, not \"{text}\"")),
+                .with_context(|| format!("{name} expects a whole number, not \"{text}\"")),
             Type::Boolean => match text {
                 "true" | "1" => Ok(Value::Boolean(true)),
                 "false" | "0" => Ok(Value::Boolean(false)),
-                _ => bail!("{name} wants true or false, not \"{text}\""),
+                _ => bail!("{name} expects true or false, not \"{text}\""),
             },
             Type::String => Ok(Value::String(text.into())),
             Type::Enumeration => {
@@ -313,7 +301,7 @@ impl ModelDescription {
                     .with_context(|| {
                         let all: Vec<_> =
                             items.iter().map(|i| format!("{} ({})", i.name, i.value)).collect();
-                        format!("{name} wants one of {}, not \"{text}\"", all.join(", "))
+                        format!("{name} expects one of {}, not \"{text}\"", all.join(", "))
                     })
             }
         }
@@ -366,6 +354,19 @@ mod tests {
         assert_eq!(d.items(model)[1].name, "linear");
         assert_eq!(d.variable("omega").unwrap().attributes().unit.as_deref(), Some("rad/s"));
         assert_eq!(d.variable("wheel.enabled").unwrap().kind(), Type::Boolean);
+    }
+
+    #[test]
+    fn all_that_is_missing_is_named_with_its_line() {
+        let broken = XML
+            .replace(" guid=\"{1}\"", "")
+            .replace("valueReference=\"3\"", "valueReference=\"x\"");
+        let error = ModelDescription::from_xml(&broken).unwrap_err().to_string();
+        for words in
+            ["line 2, fmiModelDescription: guid is missing", "valueReference cannot be \"x\""]
+        {
+            assert!(error.contains(words), "{words}: {error}");
+        }
     }
 
     #[test]

@@ -9,3 +9,4 @@ pub mod description;
 pub mod fmi2;
 pub mod html;
 pub mod output;
+pub mod xml;

@@ -9,9 +9,9 @@ use std::process::{Command, Output};
 use std::sync::OnceLock;
 use std::time::Duration;
 
-use ::check::element::Element;
 use ::check::{self, Options, RULES, Report, Severity};
 use host::fmi2::PLATFORM;
+use host::xml::Element;
 use pack::packed_for_tests;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};

@@ -135,8 +135,8 @@ fn a_value_of_the_wrong_kind_is_refused() {
     let directory = directory.path();
     for (set, words) in [
         ("friction.model=oily", &["friction.model", "stribeck (4)", "\"oily\""][..]),
-        ("tank.h=deep", &["tank.h wants a number", "\"deep\""]),
-        ("wheel.enabled=perhaps", &["wheel.enabled wants true or false"]),
+        ("tank.h=deep", &["tank.h expects a number", "\"deep\""]),
+        ("wheel.enabled=perhaps", &["wheel.enabled expects true or false"]),
         ("omega=1", &["omega cannot be set", "output"]),
         ("tau_cmd=1", &["tau_cmd comes from the profile or the file"]),
     ] {

@@ -1,6 +1,9 @@
-//! An XML file as a tree of elements, each with the line it starts in.
+//! An XML file as a tree of elements, each with the line it starts in: the one reading of XML here.
 
-use xml::reader::{EventReader, ParserConfig, XmlEvent};
+use roxmltree::{Document, Node};
+
+/// Levels of elements that are read; a model description has eight.
+pub const DEEPEST: usize = 256;
 
 /// An element with its attributes and what is inside it; text is left out.
 #[derive(Clone, Debug, Default)]
@@ -16,35 +19,38 @@ pub struct Element {
 }
 
 impl Element {
-    /// Reads a file; the error says in which line it is not well-formed.
+    /// Reads a file; the error begins with the line and the column where it is not well-formed, is not
+    /// UTF-8, has a DOCTYPE, or nests elements deeper than [`DEEPEST`].
     pub fn parse(bytes: &[u8]) -> Result<Element, String> {
-        let mut reader = EventReader::new_with_config(bytes, ParserConfig::new());
-        // The last one is open, the first one stands for the file.
-        let mut open = vec![Element::default()];
-        loop {
-            let event = reader.next().map_err(|error| error.to_string())?;
-            match event {
-                XmlEvent::StartElement { name, attributes, .. } => open.push(Element {
-                    name: name.local_name,
-                    line: xml::common::Position::position(&reader).row + 1,
-                    attributes: attributes
-                        .into_iter()
-                        .map(|attribute| (attribute.name.local_name, attribute.value))
-                        .collect(),
-                    children: Vec::new(),
-                }),
-                XmlEvent::EndElement { .. } => {
-                    let done = open.pop().unwrap_or_default();
-                    if let Some(parent) = open.last_mut() {
-                        parent.children.push(done);
-                    }
-                }
-                XmlEvent::EndDocument => break,
-                _ => {}
-            }
+        let text = std::str::from_utf8(bytes).map_err(|error| {
+            let before = &bytes[..error.valid_up_to()];
+            let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
+            let column = 1 + before.iter().rev().take_while(|byte| **byte != b'\n').count();
+            format!("{line}:{column} it is not UTF-8")
+        })?;
+        let document = Document::parse(text).map_err(|error| {
+            let (place, what) = (error.pos().to_string(), error.to_string());
+            format!("{place} {}", what.strip_suffix(&format!(" at {place}")).unwrap_or(&what))
+        })?;
+        Element::of(document.root_element(), 1)
+    }
+
+    fn of(node: Node, depth: usize) -> Result<Element, String> {
+        let place = node.document().text_pos_at(node.range().start);
+        if depth > DEEPEST {
+            return Err(format!("{place} elements are nested deeper than {DEEPEST}"));
         }
-        let root = open.pop().and_then(|mut file| file.children.pop());
-        root.ok_or_else(|| "it has no element".to_string())
+        let attribute = |a: roxmltree::Attribute| (a.name().to_string(), a.value().to_string());
+        Ok(Element {
+            name: node.tag_name().name().into(),
+            line: place.row.into(),
+            attributes: node.attributes().map(attribute).collect(),
+            children: node
+                .children()
+                .filter(Node::is_element)
+                .map(|child| Element::of(child, depth + 1))
+                .collect::<Result<_, _>>()?,
+        })
     }
 
     /// The value of an attribute.
@@ -108,7 +114,16 @@ mod tests {
             assert!(Element::parse(text.as_bytes()).is_err(), "{text:?}");
         }
         assert!(Element::parse(b"<a>\n<b></a>").unwrap_err().contains("2:"));
-        assert!(Element::parse(b"<a x='\xff'/>").is_err());
+        assert_eq!(Element::parse(b"<a\nx='\xff'/>").unwrap_err(), "2:4 it is not UTF-8");
+    }
+
+    #[test]
+    fn entities_and_endless_nesting_are_refused() {
+        let bomb = "<!DOCTYPE a [<!ENTITY x \"y\">]><a>&x;</a>";
+        assert!(Element::parse(bomb.as_bytes()).unwrap_err().contains("DTD"));
+        let nested = |depth: usize| "<a>".repeat(depth) + &"</a>".repeat(depth);
+        assert!(Element::parse(nested(DEEPEST).as_bytes()).is_ok());
+        assert!(Element::parse(nested(200_000).as_bytes()).unwrap_err().contains("deeper than"));
     }
 
     #[test]
