@@ -10,7 +10,7 @@ use crate::motion::StepError;
 use crate::outputs::unsigned_zero;
 use crate::plant::{Inputs, Plant, Ramp};
 use crate::slosh::{SloshMode, with_modes};
-use crate::state::{INDICATORS, STATES, indicator, x};
+use crate::state::{Axial, INDICATORS, STATES, indicator, x};
 
 /// How many of the gyro's samples may fall due at once: a host that has passed more of
 /// them by does not look at the time events.
@@ -58,7 +58,8 @@ impl Plant {
             Ramp { value: torque.value + external.value, slope: torque.slope + external.slope };
         let contact = self.state.contact;
         with_modes!(&mut self.liquid, modes => {
-            self.motion.start(modes, &self.state, tau, along(inputs.g_axial, du[2]));
+            let acting = (tau, along(inputs.g_axial, du[2]));
+            self.motion.start(modes, &self.state, acting);
             self.motion.derivatives::<0, _>(modes, contact);
             self.motion.hub.theta[1] = dx[x::THETA];
             self.motion.hub.omega[1] = dx[x::OMEGA];
@@ -163,6 +164,7 @@ impl Plant {
             self.imu.sample(&mut self.state.gyro, omega);
         }
         self.state.regime = self.present_regime(inputs);
+        self.accept_step(inputs);
         Ok(self.state.x != before)
     }
 
@@ -200,6 +202,18 @@ impl Plant {
         self.motion.law = Law::new(p);
         self.find_contact(inputs);
         Ok(())
+    }
+
+    /// Books the work that a changing g_axial has done since the last accepted step; to be
+    /// called when the host's integrator has accepted one.
+    ///
+    /// The inputs' derivatives are not known here. The rule is exact to the fourth order of the
+    /// step where g_axial is linear in time, to the second where it is not.
+    pub fn accept_step(&mut self, inputs: &Inputs) {
+        let work = self.work_axial(inputs);
+        let [mass_height, rate] = self.mass_height(inputs);
+        let (g, time) = (inputs.g_axial.value, self.state.time);
+        self.state.axial = Axial { work, g, time, mass_height, rate };
     }
 
     /// Whether the states that the host has set are within the models' range.

@@ -8,9 +8,10 @@
 //!
 //! Where to look: `plant.rs` couples everything, `state.rs` declares the states, `outputs.rs`
 //! and `equations.rs` are what a host reads, `motion.rs` steps through time and finds stick
-//! and slip, `friction/`, `slosh/`, `tank.rs`, `wheel.rs`, `imu.rs` say what their names say,
+//! and slip, `friction/`, `slosh/`, `damping.rs`, `tank.rs`, `wheel.rs`, `imu.rs` say what their names say,
 //! `series.rs` is the arithmetic.
 
+mod damping;
 mod equations;
 mod friction;
 mod imu;

@@ -8,6 +8,7 @@
 //! or breaks away are roots of polynomials, found without stepping back.
 
 use crate::Imu;
+use crate::damping::Damping;
 use crate::friction::{Contact, Law};
 use crate::plant::Ramp;
 use crate::series::{self, ORDER, Series, ZERO, for_each_order};
@@ -87,6 +88,9 @@ pub(crate) struct Motion {
     /// Inertia of hub and frozen liquid, kg m2.
     pub i0: f64,
     pub law: Law,
+    pub damping: Damping,
+    /// The specific force below which damping is held, m/s2, see [`Damping::expand`].
+    near_weightless: f64,
     tolerance: f64,
     /// Internal steps and gyro samples that one call may take.
     pub max_steps: usize,
@@ -106,10 +110,12 @@ pub(crate) struct Motion {
 }
 
 impl Motion {
-    pub fn new(i0: f64, law: Law, tolerance: f64, max_steps: usize) -> Motion {
+    pub fn new(i0: f64, law: Law, damping: Damping, tolerance: f64, max_steps: usize) -> Motion {
         Motion {
             i0,
             law,
+            damping,
+            near_weightless: 0.0,
             tolerance,
             max_steps,
             hub: HubMotion::REST,
@@ -123,11 +129,19 @@ impl Motion {
         }
     }
 
+    /// Takes another law of slosh damping and returns the last one.
+    pub fn set_damping(&mut self, damping: Damping) -> Damping {
+        self.hub.g = [f64::NAN; 2];
+        std::mem::replace(&mut self.damping, damping)
+    }
+
     /// Puts everything at the state, with the given torque and specific force.
-    pub fn start<M: SloshMode>(&mut self, modes: &mut [M], state: &State, tau: Ramp, g: Ramp) {
+    pub fn start<M: SloshMode>(&mut self, modes: &mut [M], state: &State, (tau, g): (Ramp, Ramp)) {
         self.hub.theta[0] = state.x[x::THETA];
         self.hub.omega[0] = state.x[x::OMEGA];
-        self.hub.g = [g.value, g.slope];
+        if self.hub.g != [g.value, g.slope] {
+            self.damping.expand(g, self.near_weightless, &mut self.hub);
+        }
         self.tau = [tau.value, tau.slope];
         for (mode, q) in modes.iter_mut().zip(state.slosh()) {
             mode.start(q, &self.hub);
@@ -169,7 +183,7 @@ impl Motion {
         self.dissipation[N] = -series::mul::<N>(&self.tau_f, &self.hub.omega);
         for mode in modes.iter_mut() {
             mode.accelerate::<N>(&self.hub);
-            self.dissipation[N] += mode.dissipation::<N>();
+            self.dissipation[N] += mode.dissipation::<N>(&self.hub);
         }
     }
 
@@ -187,6 +201,7 @@ impl Motion {
             self.derivatives::<N, M>(modes, contact);
             if N == 1 {
                 h = h.min(self.law.convergence_radius(&self.hub.omega));
+                h = h.min(self.hub.damping_reach);
                 power = h;
                 // The hub's rate passes zero many times; the scale of its error must not.
                 let [w, w_d] = [self.hub.omega[0], self.hub.omega[1]].map(f64::abs);
@@ -280,7 +295,8 @@ impl Motion {
     ) -> Result<(), StepError> {
         let begin = state.time;
         let mut t = 0.0;
-        self.start(modes, state, tau, g);
+        self.near_weightless = Damping::floor(g, h);
+        self.start(modes, state, (tau, g));
         if state.x[x::OMEGA] == 0.0 {
             let contact = self.contact(modes, state);
             state.record_contact(contact, begin);
@@ -320,6 +336,9 @@ impl Motion {
             let omega = if stuck { 0.0 } else { series::value(&self.hub.omega, n, length) };
             state.x[x::WORK] += series::integral(&self.power, n - 1, length);
             state.x[x::HEAT] += series::integral(&self.dissipation, n - 1, length);
+            if g.slope != 0.0 {
+                state.axial.work += g.slope * self.integral_of_mass_height(modes, n, length);
+            }
             state.x[x::THETA] = series::value(&self.hub.theta, n, length);
             state.x[x::OMEGA] = omega;
             for (i, (mode, q)) in modes.iter().zip(state.slosh_mut()).enumerate() {
@@ -333,26 +352,40 @@ impl Motion {
                 state.x[x::STUCK_TIME] += length;
             }
             t = if length == left { h } else { t + length };
-            let now = |x: Ramp| Ramp { value: x.at(t), slope: x.slope };
+            let acting = (tau.after(t), g.after(t));
             match event {
                 Some((_, Contact::Stuck)) => {
                     state.x[x::OMEGA] = 0.0;
-                    self.start(modes, state, now(tau), now(g));
+                    self.start(modes, state, acting);
                     let contact = self.contact(modes, state);
                     state.record_contact(contact, begin + t);
                 }
                 Some((_, contact)) => {
-                    self.start(modes, state, now(tau), now(g));
+                    self.start(modes, state, acting);
                     state.record_contact(contact, begin + t);
                 }
-                None => self.start(modes, state, now(tau), now(g)),
+                None => self.start(modes, state, acting),
             }
             if !state.is_finite(modes.len()) {
                 return Err(StepError::NotFinite { time: begin + t });
             }
         }
         state.time = begin + h;
+        self.near_weightless = 0.0;
         Ok(())
+    }
+
+    /// Integral of the liquid's mass times height over `length`, kg m s, from the series of
+    /// order n: what the work through a ramp of g is made of.
+    #[cold]
+    fn integral_of_mass_height<M: SloshMode>(&self, modes: &mut [M], n: usize, length: f64) -> f64 {
+        let mut sum = ZERO;
+        for_each_order!(N => {
+            if N < n {
+                sum[N] = modes.iter_mut().map(|mode| mode.mass_height::<N>()).sum();
+            }
+        });
+        series::integral(&sum, n - 1, length)
     }
 }
 

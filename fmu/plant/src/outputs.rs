@@ -1,5 +1,6 @@
 //! What can be read of the plant at an instant, and its time derivatives along a direction.
 
+use crate::MODES;
 use crate::friction::{Contact, Law};
 use crate::plant::{Inputs, Plant, Ramp};
 use crate::slosh::{Angles, SloshMode, with_modes};
@@ -67,10 +68,16 @@ pub struct Outputs {
     pub wheel_speed: f64,
     /// Work of tau_actuator and tau_ext on the hub since the start, J.
     pub work: f64,
+    /// Work through the changes of g_axial on the liquid since the start, J:
+    /// energy - energy(0) = work + work_axial - heat.
+    pub work_axial: f64,
     /// Energy dissipated in bearing and liquid since the start, J.
     pub heat: f64,
     /// Time spent stuck since the start, s.
     pub stuck_time: f64,
+    /// Damping ratio of each mode at the present g_axial; 0 for modes that are not used, and
+    /// at g_axial = 0.
+    pub damping: [f64; MODES],
     /// What changes at events alone.
     pub discrete: Discrete,
 }
@@ -107,6 +114,7 @@ impl Plant {
 
     /// As [`Plant::outputs`], with contact and regime that the last event has left.
     pub fn outputs_held(&mut self, inputs: &Inputs) -> Outputs {
+        let work_axial = self.work_axial(inputs);
         self.evaluate(inputs);
         let state = &self.state;
         let hub = &self.motion.hub;
@@ -125,7 +133,7 @@ impl Plant {
             tau_fluid += mode.torque(hub);
             energy += mode.energy(hub);
             momentum += mode.momentum(hub);
-            dissipated += mode.dissipation::<0>();
+            dissipated += mode.dissipation::<0>(hub);
             let angles = mode.angles();
             wave[0] += self.wave[i] * angles.angle[0];
             wave[1] += self.wave[i] * angles.angle[1];
@@ -155,8 +163,10 @@ impl Plant {
             tau_actuator: unsigned_zero(tau_actuator),
             wheel_speed: state.x[x::WHEEL_SPEED],
             work: state.x[x::WORK],
+            work_axial,
             heat: state.x[x::HEAT],
             stuck_time: state.x[x::STUCK_TIME],
+            damping: self.motion.damping.ratios(inputs.g_axial.value),
             discrete: Discrete {
                 stuck: state.contact == Contact::Stuck,
                 regime: state.regime,
@@ -188,12 +198,16 @@ impl Plant {
         let command = Ramp { value: inputs.tau_cmd.value, slope: du[0] };
         let torque = self.wheel.torque(self.state.x[x::WHEEL_SPEED], command);
 
-        // From here on without wheel and friction: their torques are prescribed.
+        // From here on without wheel and friction: their torques are prescribed, and the slosh
+        // damping is linear in g.
         let before = self.state.x;
         let size = self.size_of_direction(dx, du);
         let step = if size > 0.0 { SHARE / size } else { 1.0 };
         let with_wheel = std::mem::replace(&mut self.wheel.enabled, false);
         let law = std::mem::replace(&mut self.motion.law, Law::NONE);
+        let g = inputs.g_axial.value;
+        let tangent = self.motion.damping.tangent(g);
+        let damping = self.motion.set_damping(tangent);
         let [p2, p1, m1, m2] = [2.0, 1.0, -1.0, -2.0].map(|steps| {
             let s = steps * step;
             self.state.x = core::array::from_fn(|i| before[i] + s * dx[i]);
@@ -205,6 +219,7 @@ impl Plant {
         });
         self.wheel.enabled = with_wheel;
         self.motion.law = law;
+        self.motion.set_damping(damping.clone());
         self.state.x = before;
 
         let by_differences = |get: fn(&Outputs) -> f64| {
@@ -235,8 +250,10 @@ impl Plant {
             tau_actuator: torque.slope,
             wheel_speed: dx[x::WHEEL_SPEED],
             work: dx[x::WORK],
+            work_axial: by_differences(|o| o.work_axial),
             heat: dx[x::HEAT],
             stuck_time: dx[x::STUCK_TIME],
+            damping: damping.slopes_of_ratios(g).map(|slope| slope * du[2]),
             discrete: now.discrete,
         }
     }

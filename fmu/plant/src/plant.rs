@@ -4,11 +4,12 @@
 //! I_hub w' = tau_actuator + tau_ext + tau_friction + tau_fluid
 //! ```
 
+use crate::damping::Damping;
 use crate::friction::{Contact, Law};
 use crate::motion::{Motion, StepError};
 use crate::outputs::Regime;
 use crate::slosh::{Angles, Liquid, SloshMode, with_modes};
-use crate::state::{STATES, State, x};
+use crate::state::{Axial, STATES, State, x};
 use crate::{Calculated, Imu, MODES, Parameters, Wheel};
 
 /// A quantity that is linear in time: `value + slope t`.
@@ -102,6 +103,7 @@ impl Plant {
             event_time: start_time,
             start_time,
             start_g: inputs.g_axial.value,
+            axial: Axial::default(),
             gyro: p.imu.start(),
         };
         state.x[x::THETA] = p.init.theta;
@@ -123,6 +125,9 @@ impl Plant {
         });
         plant.state.contact = plant.present_contact(inputs);
         plant.state.regime = plant.present_regime(inputs);
+        plant.state.axial.g = inputs.g_axial.value;
+        plant.state.axial.time = start_time;
+        plant.accept_step(inputs);
         if plant.imu.enabled {
             let omega = plant.omega();
             plant.imu.sample(&mut plant.state.gyro, omega);
@@ -142,8 +147,12 @@ impl Plant {
         for (wave, pendulum) in wave.iter_mut().zip(calculated.pendulums(p)) {
             *wave = pendulum.wave;
         }
-        let law = Law::new(&p.friction);
-        let motion = Motion::new(p.hub.inertia + i_0, law, tolerance, p.solver.max_steps);
+        // Without specific force at the start the damping refers to 1 m/s2.
+        let reference = if state.start_g > 0.0 { state.start_g } else { 1.0 };
+        let at_reference = Calculated::new(p, reference);
+        let damping = Damping::new(p, &at_reference, reference);
+        let (law, max_steps) = (Law::new(&p.friction), p.solver.max_steps);
+        let motion = Motion::new(p.hub.inertia + i_0, law, damping, tolerance, max_steps);
         Plant {
             hub_inertia: p.hub.inertia,
             m_0: calculated.m_0,
@@ -154,7 +163,7 @@ impl Plant {
             wheel: p.wheel,
             imu: p.imu,
             motion: Box::new(motion),
-            liquid: Liquid::new(p, &calculated),
+            liquid: Liquid::new(p, &at_reference),
             calculated,
             state,
         }
@@ -200,6 +209,9 @@ impl Plant {
 
     /// As [`Plant::step`], but an error leaves the state unusable.
     fn advance(&mut self, inputs: &Inputs, h: f64) -> Result<(), StepError> {
+        if inputs.g_axial.value != self.state.axial.g {
+            self.state.axial.work = self.work_axial(inputs);
+        }
         let state = &mut self.state;
         let begin = state.time;
         let (mut t, mut steps) = (0.0, 0);
@@ -222,7 +234,41 @@ impl Plant {
             t = if length == h - t { h } else { t + length };
         }
         state.time = begin + h;
+        state.axial.time = state.time;
+        state.axial.g = inputs.g_axial.at(h);
         Ok(())
+    }
+
+    /// Work through the changes of g_axial since the start, J, the present one included: of a
+    /// jump at an instant, g_axial's change times the liquid's mass times height; since the
+    /// last accepted step of a host that integrates itself by Hermite's rule, as if g_axial
+    /// had run along a line.
+    pub(crate) fn work_axial(&mut self, inputs: &Inputs) -> f64 {
+        let last = self.state.axial;
+        let change = inputs.g_axial.value - last.g;
+        if change == 0.0 {
+            return last.work;
+        }
+        let [mass_height, rate] = self.mass_height(inputs);
+        let h = self.state.time - last.time;
+        let mean = if h > 0.0 {
+            (last.mass_height + mass_height) / 2.0 + h / 12.0 * (last.rate - rate)
+        } else {
+            mass_height
+        };
+        last.work + change * mean
+    }
+
+    /// The liquid's mass times height above rest, kg m, and its rate.
+    pub(crate) fn mass_height(&mut self, inputs: &Inputs) -> [f64; 2] {
+        self.evaluate(inputs);
+        let contact = self.state.contact;
+        with_modes!(&mut self.liquid, modes => {
+            self.motion.derivatives::<1, _>(modes, contact);
+            modes.iter_mut().fold([0.0; 2], |[height, rate], mode| {
+                [height + mode.mass_height::<0>(), rate + mode.mass_height::<1>()]
+            })
+        })
     }
 
     /// Evaluates the equations at the present instant.
@@ -231,7 +277,7 @@ impl Plant {
         let tau = Ramp::held(tau_actuator.value + inputs.tau_ext.value);
         let contact = self.state.contact;
         with_modes!(&mut self.liquid, modes => {
-            self.motion.start(modes, &self.state, tau, inputs.g_axial);
+            self.motion.start(modes, &self.state, (tau, Ramp::held(inputs.g_axial.value)));
             self.motion.derivatives::<0, _>(modes, contact);
         });
     }

@@ -74,7 +74,21 @@ pub struct State {
     pub(crate) start_time: f64,
     /// g_axial at the start: the slosh damping belongs to it.
     pub(crate) start_g: f64,
+    pub(crate) axial: Axial,
     pub(crate) gyro: Gyro,
+}
+
+/// Where the work through a changing g_axial stands.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub(crate) struct Axial {
+    /// The work up to `time`, since the start, J, and the g_axial of that instant, m/s2.
+    pub work: f64,
+    pub time: f64,
+    pub g: f64,
+    /// The liquid's mass times height at that instant, kg m, and its rate: known after an
+    /// accepted step of a host that integrates itself.
+    pub mass_height: f64,
+    pub rate: f64,
 }
 
 impl State {
@@ -82,7 +96,7 @@ impl State {
     pub const WORDS: usize = 2 + Self::REALS;
 
     /// How many of the words are real numbers, the last of them x.
-    const REALS: usize = 6 + STATES;
+    const REALS: usize = 11 + STATES;
 
     /// The state as plain words, for saving.
     pub fn to_words(&self) -> [u64; Self::WORDS] {
@@ -97,6 +111,11 @@ impl State {
             self.event_time,
             self.start_time,
             self.start_g,
+            self.axial.work,
+            self.axial.time,
+            self.axial.g,
+            self.axial.mass_height,
+            self.axial.rate,
             self.gyro.bias,
             self.gyro.held,
         ];
@@ -124,20 +143,34 @@ impl State {
         for (real, word) in reals.iter_mut().zip(&words[2..]) {
             *real = f64::from_bits(*word);
         }
-        let ([time, event_time, start_time, start_g, bias, held], x) = reals.split_first_chunk()?;
+        let (head, x) = reals.split_first_chunk()?;
+        let [
+            time,
+            event_time,
+            start_time,
+            start_g,
+            work,
+            axial_time,
+            g,
+            mass_height,
+            rate,
+            bias,
+            held,
+        ] = *head;
         let finite = reals.iter().all(|real| real.is_finite());
         // Beyond this the samples' instants can't be told apart.
         let countable = words[1] <= 1 << f64::MANTISSA_DIGITS;
         (finite && countable).then_some(State {
-            time: *time,
+            time,
             x: x.try_into().ok()?,
             contact,
             regime,
             event_count: words[0] as u32 as i32,
-            event_time: *event_time,
-            start_time: *start_time,
-            start_g: *start_g,
-            gyro: Gyro { next: words[1], bias: *bias, held: *held },
+            event_time,
+            start_time,
+            start_g,
+            axial: Axial { work, time: axial_time, g, mass_height, rate },
+            gyro: Gyro { next: words[1], bias, held },
         })
     }
 
@@ -184,6 +217,7 @@ mod tests {
             event_time: 0.25,
             start_time: -7.0,
             start_g: 9.81,
+            axial: Axial { work: 0.5, time: 1.0, g: 2.0, mass_height: 3.0, rate: 4.0 },
             gyro: Gyro { next: 12, bias: -1e-5, held: 0.125 },
         };
         let words = state.to_words();

@@ -26,7 +26,7 @@ pub struct Pendulum {
     pub m: f64,
     /// Length, m.
     pub l: f64,
-    /// Viscous coefficient of the bob against the tank, N s/m.
+    /// Viscous coefficient of the bob against the tank at the reference g, N s/m.
     pub c: f64,
     /// Distance of the hinge from the bearing's axis, m.
     pub r: f64,
@@ -103,7 +103,7 @@ impl Calculated {
     }
 
     /// The pendulums in use. Their viscous coefficients c = 2 zeta omega_n m
-    /// belong to the `g` of [`Calculated::new`] and stay when g changes later.
+    /// belong to the `g` of [`Calculated::new`]; `damping.rs` has them at another.
     pub fn pendulums(&self, p: &Parameters) -> impl Iterator<Item = Pendulum> {
         let radius = p.tank.d / 2.0;
         let (r, hardening) = (p.tank.r, p.slosh.hardening / (radius * radius));

@@ -22,8 +22,9 @@ pub struct Linear {
     al: Series,
     al_d: Series,
     al_dd: Series,
-    /// g al
+    /// g al, (c/c_0) al'
     g_al: Series,
+    drag: Series,
     /// sqrt(g/l) at the start of the expansion, rad/s
     omega_n: f64,
 }
@@ -32,7 +33,7 @@ impl SloshMode for Linear {
     const MOVES_INERTIA: bool = false;
 
     fn new(p: &Pendulum) -> Self {
-        Linear { p: *p, al: ZERO, al_d: ZERO, al_dd: ZERO, g_al: ZERO, omega_n: 0.0 }
+        Linear { p: *p, al: ZERO, al_d: ZERO, al_dd: ZERO, g_al: ZERO, drag: ZERO, omega_n: 0.0 }
     }
 
     fn coordinates(&self, at: &Angles) -> [f64; 4] {
@@ -62,13 +63,14 @@ impl SloshMode for Linear {
             self.omega_n = libm::sqrt(f64::max(hub.g[0], 0.0) / l);
         }
         self.g_al[N] = mul_ramp::<N>(&hub.g, &self.al);
-        HubReaction { j: 0.0, t: r * (m * self.g_al[N] + c * l * self.al_d[N]) }
+        self.drag[N] = hub.drag::<N>(&self.al_d);
+        HubReaction { j: 0.0, t: r * (m * self.g_al[N] + c * l * self.drag[N]) }
     }
 
     #[inline(always)]
     fn accelerate<const N: usize>(&mut self, hub: &HubMotion) {
         let Pendulum { c_m, r_l, inv_l, .. } = self.p;
-        self.al_dd[N] = -c_m * self.al_d[N] - inv_l * self.g_al[N] - r_l * hub.omega_dot[N];
+        self.al_dd[N] = -c_m * self.drag[N] - inv_l * self.g_al[N] - r_l * hub.omega_dot[N];
         self.al[N + 1] = next::<N>(self.al_d[N]);
         self.al_d[N + 1] = next::<N>(self.al_dd[N]);
     }
@@ -84,8 +86,14 @@ impl SloshMode for Linear {
     }
 
     #[inline(always)]
-    fn dissipation<const N: usize>(&mut self) -> f64 {
-        self.p.c * self.p.l * self.p.l * square::<N>(&self.al_d)
+    fn dissipation<const N: usize>(&mut self, hub: &HubMotion) -> f64 {
+        self.p.c * self.p.l * self.p.l * hub.drag_power::<N>(&self.drag, &self.al_d)
+    }
+
+    /// m l al^2/2
+    #[inline(always)]
+    fn mass_height<const N: usize>(&mut self) -> f64 {
+        self.p.m * self.p.l * square::<N>(&self.al) / 2.0
     }
 
     #[inline(always)]

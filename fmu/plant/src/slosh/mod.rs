@@ -17,7 +17,7 @@ mod paraboloid;
 mod planar;
 mod spherical;
 
-use crate::series::{Series, ZERO};
+use crate::series::{Pair, Series, ZERO, mul, scale, square};
 use crate::tank::Pendulum;
 use crate::{Calculated, Init, Parameters};
 use linear::Linear;
@@ -112,12 +112,61 @@ pub struct HubMotion {
     pub omega_dot: Series,
     /// Specific force along the tank's axis, m/s2, and its rate.
     pub g: [f64; 2],
+    /// Slosh damping over that at the reference, c/c_0; order 0 alone while it is constant.
+    pub damping: Series,
+    pub damping_varies: bool,
+    /// How far ahead `damping` holds, s.
+    pub damping_reach: f64,
 }
 
 impl HubMotion {
     /// At rest, weightless.
-    pub const REST: HubMotion =
-        HubMotion { theta: ZERO, omega: ZERO, omega2: ZERO, omega_dot: ZERO, g: [0.0; 2] };
+    pub const REST: HubMotion = HubMotion {
+        theta: ZERO,
+        omega: ZERO,
+        omega2: ZERO,
+        omega_dot: ZERO,
+        g: [0.0; 2],
+        damping: ZERO,
+        damping_varies: false,
+        damping_reach: f64::INFINITY,
+    };
+
+    /// Coefficient N of (c/c_0) v, v a rate of the liquid.
+    #[inline(always)]
+    pub fn drag<const N: usize>(&self, v: &Series) -> f64 {
+        if self.damping_varies { mul_far::<N>(&self.damping, v) } else { self.damping[0] * v[N] }
+    }
+
+    /// Coefficient N of (c/c_0) v^2, `drag` being (c/c_0) v.
+    #[inline(always)]
+    pub fn drag_power<const N: usize>(&self, drag: &Series, v: &Series) -> f64 {
+        if self.damping_varies { mul_far::<N>(drag, v) } else { self.damping[0] * square::<N>(v) }
+    }
+
+    /// As `drag`, of a vector.
+    #[inline(always)]
+    pub fn drag_pair<const N: usize>(&self, v: &Pair) -> [f64; 2] {
+        if self.damping_varies {
+            scale_far::<N>(&self.damping, v)
+        } else {
+            v[N].map(|v| self.damping[0] * v)
+        }
+    }
+}
+
+// A changing g is rare: its sums stay out of the way of what is not.
+
+#[cold]
+#[inline(never)]
+fn mul_far<const N: usize>(a: &Series, b: &Series) -> f64 {
+    mul::<N>(a, b)
+}
+
+#[cold]
+#[inline(never)]
+fn scale_far<const N: usize>(a: &Series, b: &Pair) -> [f64; 2] {
+    scale::<N>(a, b)
 }
 
 /// A mode's share of the hub's equation.
@@ -172,8 +221,10 @@ pub trait SloshMode {
     fn error_scale(&self) -> f64;
     /// Size of coefficient `n` of the rates, rad/s.
     fn coefficient_norm(&self, n: usize) -> f64;
-    /// Coefficient N of the power that the mode dissipates, W.
-    fn dissipation<const N: usize>(&mut self) -> f64;
+    /// Coefficient N of the power that the mode dissipates, W, after `hub_reaction`.
+    fn dissipation<const N: usize>(&mut self, hub: &HubMotion) -> f64;
+    /// Coefficient N of mass times height above rest, kg m: the potential energy over g.
+    fn mass_height<const N: usize>(&mut self) -> f64;
     /// Coordinates at t, where the hub turns with `omega`, from the series cut after order n.
     fn at(&self, n: usize, t: f64, omega: f64) -> [f64; 4];
     /// Force of the bob on the tank, N, radial and tangential, at order 0.

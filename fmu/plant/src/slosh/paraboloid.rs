@@ -25,6 +25,8 @@ pub struct Paraboloid {
     q: [Series; 2],
     q_d: [Series; 2],
     q_dd: [Series; 2],
+    /// (c/c_0) q'
+    drag: [Series; 2],
     /// r + x
     arm: Series,
     /// N, a, mu and the factor g l (1 + h |q|^2) before g
@@ -37,8 +39,10 @@ pub struct Paraboloid {
     push: Series,
     /// -(c/m) q' + a - mu q
     b: [Series; 2],
-    /// q.q' (heat)
+    /// q.q', and (c/c_0) of it (dissipation); |q|^2 (height)
     rise: Series,
+    drag_rise: Series,
+    q2: Series,
     omega_n: f64,
 }
 
@@ -49,6 +53,7 @@ impl SloshMode for Paraboloid {
             q: [ZERO; 2],
             q_d: [ZERO; 2],
             q_dd: [ZERO; 2],
+            drag: [ZERO; 2],
             arm: ZERO,
             n: ZERO,
             a: [ZERO; 2],
@@ -58,6 +63,8 @@ impl SloshMode for Paraboloid {
             push: ZERO,
             b: [ZERO; 2],
             rise: ZERO,
+            drag_rise: ZERO,
+            q2: ZERO,
             omega_n: 0.0,
         }
     }
@@ -104,8 +111,12 @@ impl SloshMode for Paraboloid {
         if N == 0 {
             self.omega_n = libm::sqrt(f64::max(hub.g[0], 0.0) / l);
         }
+        for i in 0..2 {
+            self.drag[i][N] = hub.drag::<N>(&self.q_d[i]);
+        }
         let [x, y] = &self.q;
         let [x_d, y_d] = &self.q_d;
+        let [drag_x, drag_y] = &self.drag;
         self.arm[N] = one * r + x[N];
         let q2 = square::<N>(x) + square::<N>(y);
         self.n[N] = one * l * l + q2;
@@ -121,11 +132,11 @@ impl SloshMode for Paraboloid {
         self.lever[N] = (r * y[N] - mul_tail::<N>(&self.n, &self.lever)) / self.n[0];
         let mu_q = [mul::<N>(&self.mu, x), mul::<N>(&self.mu, y)];
         for i in 0..2 {
-            self.b[i][N] = -c_m * self.q_d[i][N] + self.a[i][N] - mu_q[i];
+            self.b[i][N] = -c_m * self.drag[i][N] + self.a[i][N] - mu_q[i];
         }
         HubReaction {
             j: m * r * mul::<N>(&self.lever, y),
-            t: m * r * mu_q[1] + c * (mul::<N>(&self.arm, y_d) - mul::<N>(y, x_d)),
+            t: m * r * mu_q[1] + c * (mul::<N>(&self.arm, drag_y) - mul::<N>(y, drag_x)),
         }
     }
 
@@ -154,11 +165,21 @@ impl SloshMode for Paraboloid {
     }
 
     #[inline(always)]
-    fn dissipation<const N: usize>(&mut self) -> f64 {
+    fn dissipation<const N: usize>(&mut self, hub: &HubMotion) -> f64 {
         let Pendulum { l, c, .. } = self.p;
         let ([x, y], [x_d, y_d]) = (&self.q, &self.q_d);
         self.rise[N] = mul::<N>(x, x_d) + mul::<N>(y, y_d);
-        c * (square::<N>(x_d) + square::<N>(y_d) + square::<N>(&self.rise) / (l * l))
+        self.drag_rise[N] = hub.drag::<N>(&self.rise);
+        let [along_x, along_y] = [0, 1].map(|i| hub.drag_power::<N>(&self.drag[i], &self.q_d[i]));
+        c * (along_x + along_y + hub.drag_power::<N>(&self.drag_rise, &self.rise) / (l * l))
+    }
+
+    /// m (|q|^2/2 + h |q|^4/4)/l
+    #[inline(always)]
+    fn mass_height<const N: usize>(&mut self) -> f64 {
+        let Pendulum { m, l, hardening, .. } = self.p;
+        self.q2[N] = square::<N>(&self.q[0]) + square::<N>(&self.q[1]);
+        m / l * (self.q2[N] / 2.0 + hardening * square::<N>(&self.q2) / 4.0)
     }
 
     #[inline(always)]

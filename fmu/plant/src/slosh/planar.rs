@@ -23,6 +23,8 @@ pub struct Planar {
     al: Series,
     al_d: Series,
     al_dd: Series,
+    /// (c/c_0) al'
+    drag: Series,
     /// al' as `sin_cos` keeps it
     slope: Series,
     s: Series,
@@ -42,6 +44,7 @@ impl SloshMode for Planar {
             al: ZERO,
             al_d: ZERO,
             al_dd: ZERO,
+            drag: ZERO,
             slope: ZERO,
             s: ZERO,
             c: ZERO,
@@ -83,7 +86,8 @@ impl SloshMode for Planar {
         self.sc[N] = mul::<N>(&self.s, &self.c);
         self.w_al_d[N] = mul::<N>(&hub.omega, &self.al_d);
         self.al_d2[N] = square::<N>(&self.al_d);
-        self.force[N] = mul_ramp::<N>(&hub.g, &self.s) + c_m * l * self.al_d[N]
+        self.drag[N] = hub.drag::<N>(&self.al_d);
+        self.force[N] = mul_ramp::<N>(&hub.g, &self.s) + c_m * l * self.drag[N]
             - l * mul::<N>(&hub.omega2, &self.sc);
         HubReaction {
             j: m * (r * r + l * l) * square::<N>(&self.s),
@@ -112,8 +116,16 @@ impl SloshMode for Planar {
     }
 
     #[inline(always)]
-    fn dissipation<const N: usize>(&mut self) -> f64 {
-        self.p.c * self.p.l * self.p.l * square::<N>(&self.al_d)
+    fn dissipation<const N: usize>(&mut self, hub: &HubMotion) -> f64 {
+        self.p.c * self.p.l * self.p.l * hub.drag_power::<N>(&self.drag, &self.al_d)
+    }
+
+    /// 2 m l sin^2(al/2), whose rate is m l s al'
+    #[inline(always)]
+    fn mass_height<const N: usize>(&mut self) -> f64 {
+        let Pendulum { m, l, .. } = self.p;
+        let half = libm::sin(self.al[0] / 2.0);
+        m * l * if N == 0 { 2.0 * half * half } else { -self.c[N] }
     }
 
     #[inline(always)]

@@ -54,9 +54,11 @@ pub struct Spherical {
     /// The bob's direction, horizontally and upwards.
     dir: Pair,
     dir_z: Series,
-    /// p' horizontally, and with its components exchanged; upwards it is v_z.
+    /// p' horizontally; upwards it is v_z.
     dir_d: Pair,
-    dir_d_swapped: Pair,
+    /// (c/c_0) p' horizontally, with its components exchanged, and upwards.
+    drag_swapped: Pair,
+    drag_z: Series,
     v: Pair,
     v_z: Series,
     v_d: Pair,
@@ -98,6 +100,16 @@ impl Spherical {
         [0, 1].map(|i| dir_dd[i] + 2.0 * twice[i] + once[i])
     }
 
+    /// Coefficient N of (c/c_0) |p'|^2.
+    #[cold]
+    #[inline(never)]
+    fn drag_power<const N: usize>(&self) -> f64 {
+        let horizontal = |i: usize| {
+            (0..=N).map(|j| self.dir_d[j][i] * self.drag_swapped[N - j][1 - i]).sum::<f64>()
+        };
+        horizontal(0) + horizontal(1) + mul::<N>(&self.v_z, &self.drag_z)
+    }
+
     /// Bob in the hub's frame, horizontally, m: X, Y.
     fn bob(&self) -> [f64; 2] {
         let Pendulum { l, r, .. } = self.p;
@@ -124,7 +136,8 @@ impl SloshMode for Spherical {
             dir: ZERO_PAIR,
             dir_z: ZERO,
             dir_d: ZERO_PAIR,
-            dir_d_swapped: ZERO_PAIR,
+            drag_swapped: ZERO_PAIR,
+            drag_z: ZERO,
             v: ZERO_PAIR,
             v_z: ZERO,
             v_d: ZERO_PAIR,
@@ -198,16 +211,18 @@ impl SloshMode for Spherical {
         let [w_x, w_y] = scale::<N>(&hub.omega, &self.dir);
         let (x_d, y_d) = (self.v[N][0] + w_y, self.v[N][1] - w_x);
         self.dir_d[N] = [x_d, y_d];
-        self.dir_d_swapped[N] = [y_d, x_d];
+        let [drag_x, drag_y] = hub.drag_pair::<N>(&self.dir_d);
+        self.drag_swapped[N] = [drag_y, drag_x];
+        self.drag_z[N] = hub.drag::<N>(&self.v_z);
         let [v2_x, v2_y] = squares::<N>(&self.v);
         self.v_z2[N] = square::<N>(&self.v_z);
         self.pull_0[N] = v2_x + v2_y + self.v_z2[N] - inv_l * mul_ramp::<N>(&hub.g, &self.dir_z)
             + r_l * mul_part::<N>(&hub.omega2, &self.dir, 0);
-        let [plus, minus] = each::<N>(&self.dir, &self.dir_d_swapped);
+        let [plus, minus] = each::<N>(&self.dir, &self.drag_swapped);
         HubReaction {
             j: m * r * r * squares::<N>(&self.dir)[1],
             t: m * r * l * mul_part::<N>(&self.pull_0, &self.dir, 1)
-                + c * l * (r * y_d + l * (plus - minus)),
+                + c * l * (r * drag_y + l * (plus - minus)),
         }
     }
 
@@ -217,12 +232,13 @@ impl SloshMode for Spherical {
         self.pull[N] = self.pull_0[N] - r_l * mul_part::<N>(&hub.omega_dot, &self.dir, 1);
         let [w_x, w_y] = scale::<N>(&hub.omega, &self.v);
         let pulled = scale::<N>(&self.pull, &self.dir);
+        let [drag_y, drag_x] = self.drag_swapped[N];
         let fall = inv_l * if N < 2 { hub.g[N] } else { 0.0 };
         self.v_d[N] = [
-            w_y - pulled[0] - c_m * self.dir_d[N][0] + r_l * hub.omega2[N],
-            -w_x - pulled[1] - c_m * self.dir_d[N][1] - r_l * hub.omega_dot[N],
+            w_y - pulled[0] - c_m * drag_x + r_l * hub.omega2[N],
+            -w_x - pulled[1] - c_m * drag_y - r_l * hub.omega_dot[N],
         ];
-        self.v_z_d[N] = -mul::<N>(&self.pull, &self.dir_z) - fall - c_m * self.v_z[N];
+        self.v_z_d[N] = -mul::<N>(&self.pull, &self.dir_z) - fall - c_m * self.drag_z[N];
         self.dir[N + 1] = self.dir_d[N].map(next::<N>);
         self.dir_z[N + 1] = next::<N>(self.v_z[N]);
         self.v[N + 1] = self.v_d[N].map(next::<N>);
@@ -241,9 +257,22 @@ impl SloshMode for Spherical {
 
     /// c l^2 |p'|^2
     #[inline(always)]
-    fn dissipation<const N: usize>(&mut self) -> f64 {
-        let [x, y] = squares::<N>(&self.dir_d);
-        self.p.c * self.p.l * self.p.l * (x + y + self.v_z2[N])
+    fn dissipation<const N: usize>(&mut self, hub: &HubMotion) -> f64 {
+        let speed2 = if hub.damping_varies {
+            self.drag_power::<N>()
+        } else {
+            let [x, y] = squares::<N>(&self.dir_d);
+            hub.damping[0] * (x + y + self.v_z2[N])
+        };
+        self.p.c * self.p.l * self.p.l * speed2
+    }
+
+    /// m l (1 + p_z), and 1 + p_z = |xi|^2 k without cancellation near rest
+    #[inline(always)]
+    fn mass_height<const N: usize>(&mut self) -> f64 {
+        let [xi_1, xi_2] = self.xi[0];
+        let Pendulum { m, l, .. } = self.p;
+        m * l * if N == 0 { self.k[0] * (xi_1 * xi_1 + xi_2 * xi_2) } else { self.dir_z[N] }
     }
 
     /// xi = p/k and k xi' = p' + v_z xi; k = 1 - p_z, above the horizontal by |p| = 1.
@@ -260,14 +289,15 @@ impl SloshMode for Spherical {
     /// The rod's pull along p and the drag.
     fn force(&self, _: &HubMotion) -> [f64; 2] {
         let Pendulum { m, l, c, .. } = self.p;
-        [0, 1].map(|i| m * l * self.pull[0] * self.dir[0][i] + c * l * self.dir_d[0][i])
+        let drag = |i: usize| self.drag_swapped[0][1 - i];
+        [0, 1].map(|i| m * l * self.pull[0] * self.dir[0][i] + c * l * drag(i))
     }
 
     /// The pull acts at the hinge, the drag at the bob.
     fn torque(&self, hub: &HubMotion) -> f64 {
         let Pendulum { l, c, r, .. } = self.p;
-        let ([x, y], [x_d, y_d]) = (self.dir[0], self.dir_d[0]);
-        r * self.force(hub)[1] + c * l * l * (x * y_d - y * x_d)
+        let ([x, y], [drag_y, drag_x]) = (self.dir[0], self.drag_swapped[0]);
+        r * self.force(hub)[1] + c * l * l * (x * drag_y - y * drag_x)
     }
 
     fn energy(&self, hub: &HubMotion) -> f64 {
@@ -336,6 +366,7 @@ mod tests {
             let q = core::array::from_fn(|i| between(-4.0, 4.0) * if i < 2 { 1.0 } else { 5.0 });
             let (w, w_d, g) = (between(-2.0, 2.0), between(-9.0, 9.0), between(0.0, 20.0));
             let mut hub = HubMotion { g: [g, 0.0], ..HubMotion::REST };
+            hub.damping[0] = 1.0;
             (hub.omega[0], hub.omega2[0], hub.omega_dot[0]) = (w, w * w, w_d);
             let mut mode = Spherical::new(&p);
             mode.start(&q, &hub);

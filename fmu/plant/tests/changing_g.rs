@@ -1,0 +1,314 @@
+//! A specific force along the tank's axis that changes while the plant runs: damping follows
+//! it, and the work it does is in the energy balance.
+
+use plant::{
+    FrictionModel, Inputs, Outputs, Parameters, Plant, Ramp, STATES, SloshModel, Solver, x,
+};
+
+const TOLERANCE: f64 = 1e-9;
+
+/// The models with sloshing liquid.
+const SLOSHING: [SloshModel; 4] =
+    [SloshModel::Linear, SloshModel::Planar, SloshModel::Spherical, SloshModel::Paraboloid];
+
+fn bench(slosh: SloshModel, friction: FrictionModel) -> Parameters {
+    let mut p = Parameters::default();
+    (p.slosh.model, p.friction.model) = (slosh, friction);
+    (p.init.omega, p.init.slosh_angle, p.init.slosh_angle_radial) = (0.05, 0.2, 0.1);
+    p.friction.eps = 1e-3;
+    p
+}
+
+fn at(g: f64) -> Inputs {
+    Inputs { g_axial: Ramp::held(g), ..Inputs::default() }
+}
+
+/// The specific force over 4 s: ramps, a jump up, one to 0 and one from there.
+const PIECES: [(Ramp, f64); 7] = [
+    (Ramp { value: 9.81, slope: -3.0 }, 1.0),
+    (Ramp { value: 6.81, slope: 0.0 }, 0.5),
+    (Ramp { value: 12.0, slope: 2.0 }, 0.5),
+    (Ramp { value: 13.0, slope: -26.0 }, 0.5),
+    (Ramp { value: 0.0, slope: 0.0 }, 0.2),
+    (Ramp { value: 0.0, slope: 10.0 }, 0.8),
+    (Ramp { value: 3.0, slope: 1.0 }, 0.5),
+];
+
+/// Runs along [`PIECES`], each cut into steps of about `h`; the outputs after each step.
+fn run(p: &Parameters, h: f64) -> Vec<Outputs> {
+    let mut plant = Plant::new(p, &at(9.81), 0.0, TOLERANCE).unwrap();
+    let mut all = vec![plant.outputs(&at(9.81))];
+    for (g, length) in PIECES {
+        let steps = (length / h).ceil().max(1.0);
+        let h = length / steps;
+        for k in 0..steps as usize {
+            let value = g.at(k as f64 * h);
+            let torque = Ramp { value: 0.02 - 0.1 * k as f64 * h, slope: -0.1 };
+            let inputs = Inputs {
+                g_axial: Ramp { value, slope: g.slope },
+                tau_cmd: torque,
+                ..Inputs::default()
+            };
+            plant.step(&inputs, h).unwrap();
+            let g_axial = Ramp::held(inputs.g_axial.at(h).max(0.0));
+            all.push(plant.outputs(&Inputs { g_axial, ..inputs }));
+        }
+    }
+    all
+}
+
+#[test]
+fn energy_balances_with_the_work_of_a_changing_g() {
+    for slosh in SloshModel::ALL {
+        for friction in FrictionModel::ALL {
+            for (correlation, zeta, modes) in [(true, 0.0, 1), (false, 0.05, 3), (false, 0.0, 1)] {
+                let mut p = bench(slosh, friction);
+                p.slosh.zeta_from_correlation = correlation;
+                (p.slosh.zeta, p.slosh.modes) = (zeta, modes);
+                let all = run(&p, 0.05);
+                let first = all[0];
+                let (mut throughput, mut axial) = (first.energy, 0.0);
+                for pair in all.windows(2) {
+                    let [last, now] = [pair[0], pair[1]];
+                    throughput += (now.work - last.work).abs()
+                        + (now.heat - last.heat).abs()
+                        + (now.work_axial - last.work_axial).abs();
+                    axial += (now.work_axial - last.work_axial).abs();
+                    let balance = now.energy - first.energy - now.work - now.work_axial + now.heat;
+                    // The integrator's tolerance; a missing term shows as a share of the whole.
+                    assert!(
+                        balance.abs() < 1e-8 * throughput,
+                        "{slosh:?} {friction:?} {balance:e}"
+                    );
+                }
+                let sloshes = slosh != SloshModel::Frozen;
+                assert_eq!(axial > 0.01 * throughput, sloshes, "{axial} of {throughput}");
+            }
+        }
+    }
+}
+
+#[test]
+fn motion_under_ramps_does_not_depend_on_how_time_is_cut() {
+    for slosh in SLOSHING {
+        for correlation in [true, false] {
+            let mut p = bench(slosh, FrictionModel::Viscous);
+            p.slosh.zeta_from_correlation = correlation;
+            p.slosh.zeta = 0.05;
+            let (coarse, fine) = (run(&p, 10.0), run(&p, 0.003));
+            let [a, b] = [coarse.last().unwrap(), fine.last().unwrap()];
+            // Rates of 2 rad/s at the tolerance.
+            assert!((a.omega - b.omega).abs() < 1e-9, "{slosh:?} {}", a.omega - b.omega);
+            assert!((a.slosh_rate - b.slosh_rate).abs() < 2e-9, "{slosh:?}");
+            // Energies of 0.1 J at the tolerance.
+            assert!((a.work_axial - b.work_axial).abs() < 1e-10, "{slosh:?}");
+        }
+    }
+}
+
+/// Runge-Kutta 4 with 20 µs steps on the linear pendulum, hub held by its inertia, c written
+/// out: another way to the same motion.
+#[test]
+fn damping_on_a_ramp_through_zero_is_that_of_the_formula() {
+    let mut p = bench(SloshModel::Linear, FrictionModel::None);
+    (p.slosh.zeta_from_correlation, p.slosh.zeta) = (false, 0.2);
+    p.hub.inertia = 1e9; // does not move
+    p.init.omega = 0.0;
+    let down = Inputs { g_axial: Ramp { value: 4.0, slope: -4.0 }, ..Inputs::default() };
+    let up = Inputs { g_axial: Ramp { value: 0.0, slope: 4.0 }, ..Inputs::default() };
+    let mut plant = Plant::new(&p, &down, 0.0, TOLERANCE).unwrap();
+    let length = plant.calculated().length[0];
+    plant.step(&down, 1.0).unwrap();
+    plant.step(&up, 1.0).unwrap();
+    let x = plant.continuous_states();
+    // c/m = 2 zeta sqrt(g/l) at any g
+    let pull = |t: f64, al: f64, rate: f64| {
+        let g = 4.0 * (t - 1.0).abs();
+        -2.0 * 0.2 * (g / length).sqrt() * rate - g / length * al
+    };
+    let (mut al, mut rate) = (0.2, 0.0);
+    let steps = 100_000;
+    let h = 2.0 / steps as f64;
+    for k in 0..steps {
+        let t = k as f64 * h;
+        let k1 = (rate, pull(t, al, rate));
+        let k2 =
+            (rate + h / 2.0 * k1.1, pull(t + h / 2.0, al + h / 2.0 * k1.0, rate + h / 2.0 * k1.1));
+        let k3 =
+            (rate + h / 2.0 * k2.1, pull(t + h / 2.0, al + h / 2.0 * k2.0, rate + h / 2.0 * k2.1));
+        let k4 = (rate + h * k3.1, pull(t + h, al + h * k3.0, rate + h * k3.1));
+        al += h / 6.0 * (k1.0 + 2.0 * (k2.0 + k3.0) + k4.0);
+        rate += h / 6.0 * (k1.1 + 2.0 * (k2.1 + k3.1) + k4.1);
+    }
+    // The root's kink at g = 0 leaves Runge-Kutta h^(3/2) = 9e-8 of the drag there.
+    assert!((x[x::SLOSH + 1] - al).abs() < 2e-8, "{} {al}", x[x::SLOSH + 1]);
+    assert!((x[x::SLOSH + 3] - rate).abs() < 2e-7, "{} {rate}", x[x::SLOSH + 3]);
+}
+
+#[test]
+fn ramps_to_zero_and_from_it_take_a_bounded_number_of_steps() {
+    for slosh in SLOSHING {
+        let mut p = bench(slosh, FrictionModel::None);
+        // 20 halvings to a millionth, 34 growths by half from there, and the motion's own.
+        p.solver = Solver { max_steps: 100 };
+        let inputs = |value, slope| Inputs { g_axial: Ramp { value, slope }, ..Inputs::default() };
+        let mut plant = Plant::new(&p, &at(9.81), 0.0, TOLERANCE).unwrap();
+        plant.step(&inputs(9.81, -98.1), 0.1).unwrap();
+        plant.step(&inputs(0.0, 98.1), 0.1).unwrap();
+        // And where the clock's rounding makes the end of the ramp.
+        let (slope, h) = (-9.81 / 0.3, 0.3);
+        let mut plant = Plant::new(&p, &at(9.81), 0.1, TOLERANCE).unwrap();
+        plant.step(&inputs(9.81, slope), h).unwrap();
+        assert!((inputs(9.81, slope).g_axial.at(h)).abs() < 1e-14);
+    }
+}
+
+/// Damping ratio from the logarithmic decrement of the free tangential motion, hub held.
+fn measured_zeta(p: &Parameters, g_start: f64, g: f64) -> f64 {
+    let mut plant = Plant::new(p, &at(g_start), 0.0, TOLERANCE).unwrap();
+    let length = plant.calculated().length[0];
+    if g != g_start {
+        let ramp = Ramp { value: g_start, slope: g - g_start };
+        plant.step(&Inputs { g_axial: ramp, ..Inputs::default() }, 1.0).unwrap();
+    }
+    // Peaks of the energy per g, every half period, over ten periods.
+    let period = core::f64::consts::TAU / (g / length).sqrt();
+    let amplitude2 = |plant: &Plant| {
+        let x = plant.continuous_states();
+        let (al, rate) = (x[x::SLOSH + 1], x[x::SLOSH + 3]);
+        al * al + rate * rate * length / g
+    };
+    let before = amplitude2(&plant);
+    for _ in 0..10 {
+        plant.step(&at(g), period).unwrap();
+    }
+    -(amplitude2(&plant) / before).ln() / (2.0 * core::f64::consts::TAU * 10.0)
+}
+
+#[test]
+fn damping_after_a_change_of_g_is_that_of_a_plant_started_there() {
+    for correlation in [true, false] {
+        let mut p = bench(SloshModel::Linear, FrictionModel::None);
+        p.hub.inertia = 1e9;
+        p.slosh.zeta_from_correlation = correlation;
+        p.init = plant::Init { slosh_angle: 0.1, ..Default::default() };
+        for g in [1.0, 0.1, 0.01] {
+            let (changed, started) = (measured_zeta(&p, 9.81, g), measured_zeta(&p, g, g));
+            assert!((changed / started - 1.0).abs() < 0.01, "{g}: {changed} {started}");
+            let plant = Plant::new(&p, &at(g), 0.0, TOLERANCE).unwrap();
+            let zeta = plant.calculated().damping[0];
+            // Energy and its peaks differ by zeta^2.
+            assert!((started / zeta - 1.0).abs() < 0.01, "{g}: {started} {zeta}");
+            let mut plant = Plant::new(&p, &at(9.81), 0.0, TOLERANCE).unwrap();
+            let shown = plant.outputs(&at(g)).damping[0];
+            assert!((shown / zeta - 1.0).abs() < 1e-14, "{shown} {zeta}");
+            assert_eq!(plant.outputs(&at(0.0)).damping[0], 0.0);
+        }
+    }
+}
+
+#[test]
+fn a_start_without_specific_force_gets_its_damping_later() {
+    for correlation in [true, false] {
+        let mut p = bench(SloshModel::Linear, FrictionModel::None);
+        p.hub.inertia = 1e9;
+        p.slosh.zeta_from_correlation = correlation;
+        p.init = plant::Init { slosh_angle: 0.1, ..Default::default() };
+        let mut plant = Plant::new(&p, &at(0.0), 0.0, TOLERANCE).unwrap();
+        let rest = plant.outputs(&at(0.0));
+        plant.step(&at(0.0), 1.0).unwrap();
+        assert_eq!(plant.outputs(&at(0.0)).heat, rest.heat, "nothing drags");
+        let (from_zero, started) = (measured_zeta(&p, 0.0, 1.0), measured_zeta(&p, 1.0, 1.0));
+        assert!((from_zero / started - 1.0).abs() < 1e-3, "{from_zero} {started}");
+    }
+}
+
+#[test]
+fn derivatives_along_g_are_those_of_the_changing_damping() {
+    for slosh in SLOSHING {
+        let mut p = bench(slosh, FrictionModel::Viscous);
+        p.init.slosh_rate = 1.0;
+        let mut plant = Plant::new(&p, &at(9.81), 0.0, TOLERANCE).unwrap();
+        // Somewhere else than where the work was booked last.
+        let (g, step) = (0.02, 1e-6);
+        let (none, du) = ([0.0; STATES], [0.0, 0.0, 1.0]);
+        let slopes = plant.directional_derivative(&at(g), &none, &du);
+        let outputs = plant.output_derivatives(&at(g), &none, &du);
+        let [above, below] = [g + step, g - step].map(|g| plant.derivatives(&at(g)));
+        for i in 0..STATES {
+            let difference = (above[i] - below[i]) / (2.0 * step);
+            // The square of 5e-5 of g, times the power's third derivative.
+            assert!((slopes[i] - difference).abs() < 1e-7 * (1.0 + difference.abs()), "{i}");
+        }
+        let [above, below] = [g + step, g - step].map(|g| plant.outputs(&at(g)));
+        let pairs: [fn(&Outputs) -> f64; 6] = [
+            |o| o.damping[0],
+            |o| o.work_axial,
+            |o| o.energy,
+            |o| o.f_tangential,
+            |o| o.power_dissipated,
+            |o| o.tau_fluid,
+        ];
+        for (n, get) in pairs.iter().enumerate() {
+            let difference = (get(&above) - get(&below)) / (2.0 * step);
+            let got = get(&outputs);
+            assert!((got - difference).abs() < 1e-6 * (1e-3 + difference.abs()), "{slosh:?} {n}");
+        }
+        // Without specific force there is no derivative; a finite one is given.
+        let at_zero = plant.directional_derivative(&at(0.0), &none, &du);
+        assert!(at_zero.iter().all(|x| x.is_finite()));
+        let at_zero = plant.output_derivatives(&at(0.0), &none, &du);
+        assert!(at_zero.f_tangential.is_finite() && at_zero.damping[0] == 0.0);
+    }
+}
+
+/// One run as a Model Exchange host makes it, fixed steps of Runge-Kutta 4; the balance's
+/// residual over the work of g.
+fn residual_of_a_host(p: &Parameters, h: f64, g: impl Fn(f64) -> f64) -> f64 {
+    let mut plant = Plant::new(p, &at(g(0.0)), 0.0, TOLERANCE).unwrap();
+    let energy = plant.outputs_held(&at(g(0.0))).energy;
+    let steps = (2.0 / h).round() as usize;
+    for k in 0..steps {
+        let t = k as f64 * h;
+        let x = *plant.continuous_states();
+        let mut derivatives = |direction: &[f64; STATES], s: f64| {
+            let moved = core::array::from_fn(|i| x[i] + s * direction[i]);
+            plant.set_continuous_states(&moved);
+            plant.set_time(t + s);
+            plant.derivatives(&at(g(t + s)))
+        };
+        let k1 = derivatives(&[0.0; STATES], 0.0);
+        let k2 = derivatives(&k1, h / 2.0);
+        let k3 = derivatives(&k2, h / 2.0);
+        let k4 = derivatives(&k3, h);
+        let mean = core::array::from_fn(|i| (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]) / 6.0);
+        derivatives(&mean, h);
+        plant.accept_step(&at(g(t + h)));
+    }
+    let o = plant.outputs_held(&at(g(2.0)));
+    // A jump at an instant: exact.
+    let jumped = at(g(2.0) + 3.0);
+    let after = plant.outputs_held(&jumped);
+    let jump = after.energy - o.energy - (after.work_axial - o.work_axial);
+    assert!(jump.abs() < 1e-14, "{jump:e}");
+    plant.take_event(&jumped).unwrap();
+    assert_eq!(plant.outputs_held(&jumped).work_axial, after.work_axial);
+    ((o.energy - energy - o.work - o.work_axial + o.heat) / o.work_axial).abs()
+}
+
+#[test]
+fn work_of_a_changing_g_is_booked_at_the_steps_a_host_accepts() {
+    for slosh in SLOSHING {
+        let p = bench(slosh, FrictionModel::Viscous);
+        // A line: fourth order, as the host's integrator. A sine: second order.
+        for (order, g) in [
+            (4, (|t: f64| 9.0 - 3.0 * t) as fn(f64) -> f64),
+            (2, |t: f64| 9.0 + 2.0 * libm::sin(5.0 * t)),
+        ] {
+            let [coarse, fine] = [4e-3, 2e-3].map(|h| residual_of_a_host(&p, h, g));
+            let rate = libm::log2(coarse / fine);
+            assert!(rate > order as f64 - 0.3, "{slosh:?} {order}: {coarse:e} {fine:e}");
+            assert!(fine < if order == 4 { 1e-6 } else { 1e-3 }, "{slosh:?}: {fine:e}");
+        }
+    }
+}
