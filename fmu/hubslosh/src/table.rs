@@ -49,6 +49,7 @@ const HUB_AND_LIQUID: &[&str] =
 const HEAT: &[&str] = &[
     "theta", "omega",
     "slosh.q_radial", "slosh.q_tangential", "slosh.v_radial", "slosh.v_tangential",
+    "g_axial",
 ];
 const MODE_1: &[&str] = &["slosh.q_radial[1]", "slosh.q_tangential[1]"];
 const MODE_1_MOVING: &[&str] =
