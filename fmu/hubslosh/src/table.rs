@@ -139,6 +139,12 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     V::local("heat", |o, _| o.heat, "J",
         "Heat made by bearing and liquid since the start")
         .nominal(0.01).is_state(|_| x::HEAT).depends_on(&["heat"]),
+    V::local("work_axial", |o, _| o.work_axial, "J",
+        "Work done on the liquid through changes of g_axial since the start: energy - energy(0) = work + work_axial - heat. Co-Simulation: exact, also for jumps; Model Exchange: added up at accepted steps, to the fourth order of their length where g_axial is linear in time")
+        .nominal(0.01).depends_on(&["slosh.q_radial", "slosh.q_tangential", "g_axial"]),
+    V::local("slosh.damping", |o, n| o.damping[n], "1",
+        "Damping ratio of a mode at the present g_axial; 0 for modes that are not used")
+        .shape(&[MODES]).depends_on(&["g_axial"]).initial_depends_on(LIQUID),
     V::local("tau_actuator", |o, _| o.tau_actuator, "N.m",
         "Torque of the actuator on the hub, positive towards +theta: tau_cmd after the wheel's limits")
         .display_unit("mN.m").depends_on(&["tau_cmd", "wheel_speed"]),
@@ -374,6 +380,12 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     V::integer("imu.seed", |p, _| &mut p.imu.seed,
         "Seed of the noise: the same seed gives the same noise on every platform"),
 
+    // Solver
+    V::count("solver.max_steps", |p| p.solver.max_steps as i32,
+        |p, n| p.solver.max_steps = n.max(0) as usize,
+        "Internal steps, and samples of the gyro, that one communication step may take: a step that needs more is refused")
+        .between(1, 1_000_000_000),
+
     // What follows from the parameters
     V::calculated("tank.m_liq", |m, _| m.calculated().m_liq, "kg",
         "Mass of the liquid")
@@ -394,10 +406,6 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         .display_unit("mm").initial_depends_on(LIQUID),
     V::calculated("slosh.frequency", |m, n| m.calculated().frequency[n], "Hz",
         "Natural frequency of a mode in the tank at rest, at the initial g_axial; 0 for modes that are not used")
-        .shape(&[MODES])
-        .depends_on(&["g_axial"]).initial_depends_on(LIQUID),
-    V::calculated("slosh.damping", |m, n| m.calculated().damping[n], "1",
-        "Damping ratio of a mode, at the initial g_axial; 0 for modes that are not used")
         .shape(&[MODES])
         .depends_on(&["g_axial"]).initial_depends_on(LIQUID),
 ];
