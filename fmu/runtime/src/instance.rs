@@ -208,8 +208,11 @@ impl<M: Model> Instance<M> {
     pub fn get(&mut self, operation: &'static Operation, reference: u32) -> Result<Value, Fault> {
         let call = &self.check(operation)?;
         let scalar = scalar::<M>(call, reference)?;
-        match (scalar.access, &self.outputs) {
-            (Access::Output(get), Some(outputs)) if scalar.variable.state.is_none() => {
+        match (scalar.state, scalar.access, &self.model, &self.outputs) {
+            (Some(place), _, Some(model), _) => {
+                Ok(Value::Real(model.continuous_states()[place(scalar.element)]))
+            }
+            (None, Access::Output(get), _, Some(outputs)) => {
                 Ok(Value::Real(get(outputs, scalar.element)))
             }
             _ => self.get_any(call, scalar),
@@ -262,6 +265,13 @@ impl<M: Model> Instance<M> {
         value: impl Fn(usize) -> Value,
     ) -> Result<(), Fault> {
         let call = &self.check(operation)?;
+        if let [reference] = references {
+            let scalar = self.check_set(call, *reference, value(0))?;
+            if matches!(scalar.access, Access::Input(_)) {
+                self.put(scalar, value(0));
+                return Ok(());
+            }
+        }
         let mut tunes = false;
         for (n, reference) in references.iter().enumerate() {
             let scalar = self.check_set(call, *reference, value(n))?;
@@ -271,15 +281,14 @@ impl<M: Model> Instance<M> {
             self.tune(call, references, &value)?;
         }
         for (n, reference) in references.iter().enumerate() {
-            self.put(call, *reference, value(n))?;
+            self.put(scalar::<M>(call, *reference)?, value(n));
         }
         Ok(())
     }
 
     /// Sets an input or a parameter; what follows from it has to be computed anew.
     #[inline]
-    fn put(&mut self, call: &Call, reference: u32, value: Value) -> Result<(), Fault> {
-        let scalar = scalar::<M>(call, reference)?;
+    fn put(&mut self, scalar: &Scalar<M>, value: Value) {
         match (scalar.access, value) {
             (Access::Input(ramp), Value::Real(x)) => *ramp(&mut self.inputs, scalar.element)[0] = x,
             (_, value) => {
@@ -292,7 +301,6 @@ impl<M: Model> Instance<M> {
         if !self.is_running() {
             self.model = None;
         }
-        Ok(())
     }
 
     /// Parameters that are fixed can no longer be set, and the motion has begun.
@@ -314,7 +322,7 @@ impl<M: Model> Instance<M> {
         value: Value,
     ) -> Result<&'static Scalar<M>, Fault> {
         let scalar = scalar::<M>(call, reference)?;
-        let is_input = scalar.variable.causality == Causality::Input;
+        let is_input = matches!(scalar.access, Access::Input(_));
         // Wrong parameters are refused all together when initialization ends, everything
         // else on the spot.
         if !is_input {
@@ -383,17 +391,7 @@ impl<M: Model> Instance<M> {
     ) -> Result<(), Fault> {
         let call = &self.check(&op::SET_INPUT_DERIVATIVES)?;
         for ((reference, order), slope) in references.iter().zip(orders).zip(values) {
-            let scalar = scalar::<M>(call, *reference)?;
-            if scalar.variable.causality != Causality::Input {
-                return Err(call.error(format_args!("{} is not an input", scalar.name())));
-            }
-            check_order(call, scalar, *order)?;
-            if !slope.is_finite() {
-                return Err(call.error(format_args!(
-                    "derivative of {} = {slope} (allowed: any finite number)",
-                    scalar.name()
-                )));
-            }
+            check_slope(call, scalar::<M>(call, *reference)?, *order, *slope)?;
         }
         for (reference, slope) in references.iter().zip(values) {
             let scalar = scalar::<M>(call, *reference)?;
@@ -531,7 +529,7 @@ impl<M: Model> Instance<M> {
         let at = |s: f64| -> Result<Vec<f64>, Fault> {
             let mut moved = self.clone();
             for ((reference, x), d) in knowns.iter().zip(&start).zip(direction) {
-                moved.put(call, *reference, Value::Real(x + s * step * d))?;
+                moved.put(scalar::<M>(call, *reference)?, Value::Real(x + s * step * d));
             }
             let values = unknowns.iter().map(|reference| {
                 match moved.get_any(call, scalar::<M>(call, *reference)?)? {
@@ -590,12 +588,16 @@ impl<M: Model> Instance<M> {
     }
 
     /// The inputs during a step of `h`, and where they stand after it.
+    #[inline]
     fn inputs_over(&self, call: &Call, h: f64) -> Result<(M::Inputs, M::Inputs), Fault> {
         let mut during = self.inputs;
         let mut after = self.inputs;
         for scalar in M::table().inputs() {
             let Access::Input(ramp) = scalar.access else { continue };
             let [value, slope] = ramp(&mut during, scalar.element);
+            if *slope == 0.0 {
+                continue;
+            }
             let mut end = *value + *slope * h;
             let floor = scalar.variable.min().unwrap_or(f64::NEG_INFINITY);
             // A ramp down to the smallest value may miss it by a rounding error.
@@ -836,6 +838,28 @@ impl<M: Model> Instance<M> {
 #[cold]
 fn no_value<M: Model>(call: &Call, scalar: &Scalar<M>) -> Fault {
     call.error(format_args!("{} has no value", scalar.name()))
+}
+
+/// Whether an input can have this derivative.
+#[inline]
+fn check_slope<M: Model>(
+    call: &Call,
+    scalar: &Scalar<M>,
+    order: i32,
+    slope: f64,
+) -> Result<(), Fault> {
+    let is_input = matches!(scalar.access, Access::Input(_));
+    if is_input && order == 1 && slope.is_finite() {
+        return Ok(());
+    }
+    if !is_input {
+        return Err(call.error(format_args!("{} is not an input", scalar.name())));
+    }
+    check_order(call, scalar, order)?;
+    Err(call.error(format_args!(
+        "derivative of {} = {slope} (allowed: any finite number)",
+        scalar.name()
+    )))
 }
 
 fn check_order<M: Model>(call: &Call, scalar: &Scalar<M>, order: i32) -> Result<(), Fault> {

@@ -9,7 +9,7 @@ use crate::hash::Hash;
 use crate::model::Model;
 use crate::operation::CType;
 use crate::unit::{self, Unit};
-use crate::variable::{Access, Causality, Enumeration, Kind, Value, Variable};
+use crate::variable::{Access, Causality, Enumeration, Kind, Place, Value, Variable};
 
 /// What a model description says of the FMU as a whole.
 #[derive(Clone, Copy, Debug)]
@@ -83,6 +83,8 @@ pub struct Scalar<M: Model> {
     pub access: Access<M>,
     /// The C type that it is got and set with, likewise.
     pub c_type: CType,
+    /// Its place among the model's continuous states, if it is one, likewise.
+    pub state: Option<Place>,
     /// Its value reference, and its place among all scalars.
     pub reference: u32,
     /// Its place in the array, 0 for the first.
@@ -117,6 +119,7 @@ pub const fn scalars<M: Model, const N: usize>(
         variable: &variables[0],
         access: variables[0].access,
         c_type: variables[0].c_type(),
+        state: variables[0].state,
         reference: 0,
         element: 0,
         slot: 0,
@@ -131,6 +134,7 @@ pub const fn scalars<M: Model, const N: usize>(
                 variable,
                 access: variable.access,
                 c_type: variable.c_type(),
+                state: variable.state,
                 reference: n as u32,
                 element,
                 slot,
@@ -156,7 +160,7 @@ impl<M: Model> Scalar<M> {
     /// Its place among the model's continuous states, if it is one.
     #[inline]
     pub fn state(&self) -> Option<usize> {
-        self.variable.state.map(|place| place(self.element))
+        self.state.map(|place| place(self.element))
     }
 
     /// What is wrong with a value of it, in words.

@@ -530,6 +530,7 @@ impl<M: Model> Variable<M> {
         if self.allows(value) { None } else { Some(self.refusal(element, value)) }
     }
 
+    #[inline]
     fn allows(&self, value: Value) -> bool {
         match (&self.kind, value) {
             (Kind::Real(Quantity { min, max, .. }), Value::Real(x)) => {
