@@ -93,24 +93,31 @@ impl Damping {
         }
     }
 
-    /// Puts g and the factor's series into the hub's motion. Where g is below `floor` the
-    /// factor is held at its mean until g has reached 0 or twice `floor`.
-    pub fn expand(&self, g: Ramp, floor: f64, hub: &mut HubMotion) {
+    /// Puts g and the course of the damping from here on into the hub's motion; returns the
+    /// factor now. Where g is below `floor` the factor is its mean until g has reached 0 or
+    /// twice `floor`.
+    pub fn expand(&self, g: Ramp, floor: f64, hub: &mut HubMotion) -> f64 {
         hub.g = [g.value, g.slope];
-        hub.damping_varies = false;
+        hub.damping = ZERO;
+        hub.damping[0] = 1.0;
         hub.damping_reach = f64::INFINITY;
-        if g.slope == 0.0 || self.zeta[0] == 0.0 {
-            hub.damping[0] = self.factor(g.value);
+        if !self.varies(g) {
+            self.factor(g.value)
         } else if g.value > floor {
-            hub.damping_varies = true;
             hub.damping_reach = SHARE_OF_RADIUS * g.value / g.slope.abs();
             hub.damping = self.series(g);
+            self.factor(g.value)
         } else if g.slope > 0.0 && floor > 0.0 {
             hub.damping_reach = (2.0 * floor - g.value) / g.slope;
-            hub.damping[0] = self.mean(g.value, 2.0 * floor);
+            self.mean(g.value, 2.0 * floor)
         } else {
-            hub.damping[0] = self.mean(g.value, 0.0);
+            self.mean(g.value, 0.0)
         }
+    }
+
+    /// Whether there is damping and it changes along `g`.
+    pub fn varies(&self, g: Ramp) -> bool {
+        g.slope != 0.0 && self.zeta[0] > 0.0
     }
 
     /// The specific force below which a ramp's factor is held.
@@ -118,11 +125,11 @@ impl Damping {
         if g.slope == 0.0 { 0.0 } else { NEAR_ZERO * f64::max(g.value, g.at(h)) }
     }
 
-    /// Binomial series of the factor along a ramp that starts above 0.
+    /// Binomial series of the factor over its first value, along a ramp that starts above 0.
     fn series(&self, g: Ramp) -> Series {
         let mut c = ZERO;
         let relative = g.slope / g.value;
-        c[0] = self.factor(g.value);
+        c[0] = 1.0;
         for n in 0..ORDER {
             c[n + 1] = c[n] * relative * (self.exponent - n as f64) / (n + 1) as f64;
         }

@@ -22,6 +22,9 @@ const STEP_SHARE: f64 = 1e-2;
 /// The floor of the error's scale, rad/s.
 const RATE_FLOOR: f64 = 1e-6;
 
+/// The highest order used where the specific force changes: rare, and each order is code.
+const RAMP_ORDER: usize = 10;
+
 /// The lowest order that is trusted to show that a series has converged.
 const MIN_ORDER: usize = 5;
 
@@ -118,7 +121,8 @@ impl Motion {
             near_weightless: 0.0,
             tolerance,
             max_steps,
-            hub: HubMotion::REST,
+            // No g yet: the first one sets the damping.
+            hub: HubMotion { g: [f64::NAN; 2], ..HubMotion::REST },
             tau: [0.0; 2],
             inertia: ZERO,
             inv_inertia: 0.0,
@@ -140,7 +144,8 @@ impl Motion {
         self.hub.theta[0] = state.x[x::THETA];
         self.hub.omega[0] = state.x[x::OMEGA];
         if self.hub.g != [g.value, g.slope] {
-            self.damping.expand(g, self.near_weightless, &mut self.hub);
+            let factor = self.damping.expand(g, self.near_weightless, &mut self.hub);
+            modes.iter_mut().for_each(|mode| mode.set_damping(factor));
         }
         self.tau = [tau.value, tau.slope];
         for (mode, q) in modes.iter_mut().zip(state.slosh()) {
@@ -151,11 +156,15 @@ impl Motion {
     /// Coefficient N of every quantity from coefficients up to N of the state, and
     /// coefficient N + 1 of the state.
     #[inline(always)]
-    pub fn derivatives<const N: usize, M: SloshMode>(&mut self, modes: &mut [M], contact: Contact) {
+    pub fn derivatives<const N: usize, const RAMP: bool, M: SloshMode>(
+        &mut self,
+        modes: &mut [M],
+        contact: Contact,
+    ) {
         self.hub.omega2[N] = series::square::<N>(&self.hub.omega);
         let (mut inertia, mut net) = (0.0, if N < 2 { self.tau[N] } else { 0.0 });
         for mode in modes.iter_mut() {
-            let reaction = mode.hub_reaction::<N>(&self.hub);
+            let reaction = mode.hub_reaction::<N, RAMP>(&self.hub);
             inertia += reaction.j;
             net += reaction.t;
         }
@@ -182,51 +191,64 @@ impl Motion {
         self.power[N] = series::mul_ramp::<N>(&self.tau, &self.hub.omega);
         self.dissipation[N] = -series::mul::<N>(&self.tau_f, &self.hub.omega);
         for mode in modes.iter_mut() {
-            mode.accelerate::<N>(&self.hub);
-            self.dissipation[N] += mode.dissipation::<N>(&self.hub);
+            mode.accelerate::<N, RAMP>(&self.hub);
+            self.dissipation[N] += mode.dissipation::<N, RAMP>();
         }
     }
 
     /// Expands the motion up to `h` ahead. Returns the order and the length, at most
     /// `h`, at which the terms left out are below the tolerance.
     #[inline(always)]
-    fn expand<M: SloshMode>(&mut self, modes: &mut [M], h: f64, contact: Contact) -> (usize, f64) {
+    fn expand<const RAMP: bool, M: SloshMode>(
+        &mut self,
+        modes: &mut [M],
+        h: f64,
+        contact: Contact,
+    ) -> (usize, f64) {
         let allowed = STEP_SHARE * self.tolerance;
         let negligible_terms = self.law.negligible_terms();
         let mut h = h;
         let (mut hub_allowed, mut slosh_allowed) = (0.0, 0.0);
         let mut power = 1.0; // h^(N+1)
         let mut negligible = 0;
-        for_each_order!(N => {
-            self.derivatives::<N, M>(modes, contact);
-            if N == 1 {
-                h = h.min(self.law.convergence_radius(&self.hub.omega));
-                h = h.min(self.hub.damping_reach);
-                power = h;
-                // The hub's rate passes zero many times; the scale of its error must not.
-                let [w, w_d] = [self.hub.omega[0], self.hub.omega[1]].map(f64::abs);
-                let hub_scale = RATE_FLOOR + w + w_d * h.min(0.1);
-                let slosh_scale = hub_scale + modes.iter().map(SloshMode::error_scale).fold(0.0, f64::max);
-                (hub_allowed, slosh_allowed) = (allowed * hub_scale, allowed * slosh_scale);
-            }
-            power *= h;
-            if N + 2 >= MIN_ORDER {
-                let slosh = modes.iter().map(|m| m.coefficient_norm(N + 1)).fold(0.0, larger);
-                let is_negligible = self.hub.omega[N + 1].abs() * power <= hub_allowed
-                    && slosh * power <= slosh_allowed;
-                negligible = if is_negligible { negligible + 1 } else { 0 };
-                if negligible >= negligible_terms {
-                    return (N + 1, h);
+        let highest = const { if RAMP { RAMP_ORDER } else { ORDER } };
+        'orders: {
+            for_each_order!(N => {
+                if RAMP && N == RAMP_ORDER {
+                    break 'orders;
                 }
-            }
-        });
+                self.derivatives::<N, RAMP, M>(modes, contact);
+                if N == 1 {
+                    h = h.min(self.law.convergence_radius(&self.hub.omega));
+                    if RAMP {
+                        h = h.min(self.hub.damping_reach);
+                    }
+                    power = h;
+                    // The hub's rate passes zero many times; the scale of its error must not.
+                    let [w, w_d] = [self.hub.omega[0], self.hub.omega[1]].map(f64::abs);
+                    let hub_scale = RATE_FLOOR + w + w_d * h.min(0.1);
+                    let slosh_scale = hub_scale + modes.iter().map(SloshMode::error_scale).fold(0.0, f64::max);
+                    (hub_allowed, slosh_allowed) = (allowed * hub_scale, allowed * slosh_scale);
+                }
+                power *= h;
+                if N + 2 >= MIN_ORDER {
+                    let slosh = modes.iter().map(|m| m.coefficient_norm(N + 1)).fold(0.0, larger);
+                    let is_negligible = self.hub.omega[N + 1].abs() * power <= hub_allowed
+                        && slosh * power <= slosh_allowed;
+                    negligible = if is_negligible { negligible + 1 } else { 0 };
+                    if negligible >= negligible_terms {
+                        return (N + 1, h);
+                    }
+                }
+            });
+        }
         // The last two terms reach the tolerance at this length.
         let length = |n: usize| {
             let slosh = modes.iter().map(|m| m.coefficient_norm(n)).fold(0.0, f64::max);
             let term = f64::max(self.hub.omega[n].abs() / hub_allowed, slosh / slosh_allowed);
             if term > 0.0 { libm::exp(-libm::log(term) / n as f64) } else { h }
         };
-        (ORDER, h.min(length(ORDER)).min(length(ORDER - 1)))
+        (highest, h.min(length(highest)).min(length(highest - 1)))
     }
 
     /// The sign that the hub's contact has by its rate or, at rest, by the torque
@@ -239,7 +261,7 @@ impl Motion {
         if omega < 0.0 {
             return Contact::Backward;
         }
-        self.derivatives::<0, M>(modes, Contact::Stuck);
+        self.derivatives::<0, false, M>(modes, Contact::Stuck);
         self.law.contact_at_rest(self.net[0], state.x[x::THETA], state.contact)
     }
 
@@ -288,6 +310,30 @@ impl Motion {
         &mut self,
         modes: &mut [M],
         state: &mut State,
+        acting: (Ramp, Ramp),
+        h: f64,
+        imu: &Imu,
+        steps: &mut usize,
+    ) -> Result<(), StepError> {
+        // The usual cases are compiled apart, without loops over modes.
+        match modes {
+            _ if acting.1.slope != 0.0 => {
+                self.advance_along::<true, M>(modes, state, acting, h, imu, steps)
+            }
+            [one] => {
+                let one = core::slice::from_mut(one);
+                self.advance_along::<false, M>(one, state, acting, h, imu, steps)
+            }
+            many => self.advance_along::<false, M>(many, state, acting, h, imu, steps),
+        }
+    }
+
+    /// As [`Motion::advance`]; `RAMP` says whether the specific force changes.
+    #[inline(always)]
+    fn advance_along<const RAMP: bool, M: SloshMode>(
+        &mut self,
+        modes: &mut [M],
+        state: &mut State,
         (tau, g): (Ramp, Ramp),
         h: f64,
         imu: &Imu,
@@ -308,7 +354,7 @@ impl Motion {
             }
             let left = h - t;
             let contact = state.contact;
-            let (n, mut length) = self.expand(modes, left, contact);
+            let (n, mut length) = self.expand::<RAMP, M>(modes, left, contact);
             let mut event = None;
             if self.law.switches_at_rest() {
                 if contact == Contact::Stuck {
@@ -336,7 +382,7 @@ impl Motion {
             let omega = if stuck { 0.0 } else { series::value(&self.hub.omega, n, length) };
             state.x[x::WORK] += series::integral(&self.power, n - 1, length);
             state.x[x::HEAT] += series::integral(&self.dissipation, n - 1, length);
-            if g.slope != 0.0 {
+            if RAMP {
                 state.axial.work += g.slope * self.integral_of_mass_height(modes, n, length);
             }
             state.x[x::THETA] = series::value(&self.hub.theta, n, length);
@@ -364,7 +410,8 @@ impl Motion {
                     self.start(modes, state, acting);
                     state.record_contact(contact, begin + t);
                 }
-                None => self.start(modes, state, acting),
+                None if t < h => self.start(modes, state, acting),
+                None => {}
             }
             if !state.is_finite(modes.len()) {
                 return Err(StepError::NotFinite { time: begin + t });
@@ -381,7 +428,7 @@ impl Motion {
     fn integral_of_mass_height<M: SloshMode>(&self, modes: &mut [M], n: usize, length: f64) -> f64 {
         let mut sum = ZERO;
         for_each_order!(N => {
-            if N < n {
+            if N < RAMP_ORDER && N < n {
                 sum[N] = modes.iter_mut().map(|mode| mode.mass_height::<N>()).sum();
             }
         });

@@ -133,7 +133,7 @@ impl Plant {
             tau_fluid += mode.torque(hub);
             energy += mode.energy(hub);
             momentum += mode.momentum(hub);
-            dissipated += mode.dissipation::<0>(hub);
+            dissipated += mode.dissipation::<0, false>();
             let angles = mode.angles();
             wave[0] += self.wave[i] * angles.angle[0];
             wave[1] += self.wave[i] * angles.angle[1];

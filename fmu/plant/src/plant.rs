@@ -264,7 +264,7 @@ impl Plant {
         self.evaluate(inputs);
         let contact = self.state.contact;
         with_modes!(&mut self.liquid, modes => {
-            self.motion.derivatives::<1, _>(modes, contact);
+            self.motion.derivatives::<1, false, _>(modes, contact);
             modes.iter_mut().fold([0.0; 2], |[height, rate], mode| {
                 [height + mode.mass_height::<0>(), rate + mode.mass_height::<1>()]
             })
@@ -278,7 +278,7 @@ impl Plant {
         let contact = self.state.contact;
         with_modes!(&mut self.liquid, modes => {
             self.motion.start(modes, &self.state, (tau, Ramp::held(inputs.g_axial.value)));
-            self.motion.derivatives::<0, _>(modes, contact);
+            self.motion.derivatives::<0, false, _>(modes, contact);
         });
     }
 

@@ -26,8 +26,9 @@ pub struct Pendulum {
     pub m: f64,
     /// Length, m.
     pub l: f64,
-    /// Viscous coefficient of the bob against the tank at the reference g, N s/m.
+    /// Viscous coefficient of the bob against the tank, N s/m, now and at the reference g.
     pub c: f64,
+    pub c_0: f64,
     /// Distance of the hinge from the bearing's axis, m.
     pub r: f64,
     /// c/m, r/l and 1/l: quotients that every order of every step needs.
@@ -38,6 +39,14 @@ pub struct Pendulum {
     pub wave: f64,
     /// Coefficient of the quartic spring over R^2, 1/m2 (paraboloid only).
     pub hardening: f64,
+}
+
+impl Pendulum {
+    /// Sets the viscous coefficient, `factor` times that at the reference g.
+    pub fn set_damping(&mut self, factor: f64) {
+        self.c = factor * self.c_0;
+        self.c_m = self.c / self.m;
+    }
 }
 
 /// What follows from the parameters; 0 for modes that are not used.
@@ -111,7 +120,7 @@ impl Calculated {
             let (m, l) = (self.mass[n], self.length[n]);
             let c = 2.0 * self.damping[n] * core::f64::consts::TAU * self.frequency[n] * m;
             let wave = 2.0 * radius / (XI[n] * XI[n] - 1.0);
-            Pendulum { m, l, c, r, c_m: c / m, r_l: r / l, inv_l: 1.0 / l, wave, hardening }
+            Pendulum { m, l, c, c_0: c, r, c_m: c / m, r_l: r / l, inv_l: 1.0 / l, wave, hardening }
         })
     }
 }

@@ -32,6 +32,15 @@ impl Stribeck {
         let (curve, factor) = (StribeckCurve::new(p), DirectionalFactor::new(p));
         Stribeck { b: p.b, curve, factor, present: ZERO }
     }
+
+    /// Coefficient N of T_C B where B depends on the angle.
+    // Once for all slosh models.
+    #[inline(never)]
+    fn dry_by_angle<const N: usize>(&mut self, contact: Contact, theta: &Series) -> f64 {
+        self.factor.expand::<N>(theta);
+        self.present[N] = self.factor.coefficient::<N>(contact);
+        series::mul::<N>(&self.curve.torque, &self.present)
+    }
 }
 
 impl FrictionLaw for Stribeck {
@@ -42,11 +51,7 @@ impl FrictionLaw for Stribeck {
         self.curve.expand::<N>(&hub.omega2);
         let dry = match self.factor.constant(contact) {
             Some(factor) => factor * self.curve.torque[N],
-            None => {
-                self.factor.expand::<N>(&hub.theta);
-                self.present[N] = self.factor.coefficient::<N>(contact);
-                series::mul::<N>(&self.curve.torque, &self.present)
-            }
+            None => self.dry_by_angle::<N>(contact, &hub.theta),
         };
         -self.b * hub.omega[N] - if contact == Contact::Forward { dry } else { -dry }
     }

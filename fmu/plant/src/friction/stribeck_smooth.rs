@@ -58,7 +58,8 @@ impl FrictionLaw for StribeckSmooth {
     /// succession do.
     const NEGLIGIBLE_TERMS: usize = 4;
 
-    #[inline(always)]
+    // Once for all slosh models.
+    #[inline(never)]
     fn torque<const N: usize>(&mut self, _: Contact, hub: &HubMotion) -> f64 {
         self.curve.expand::<N>(&hub.omega2);
         self.t[N] = if N == 0 {

@@ -12,7 +12,7 @@
 //! ```
 
 use super::{Angles, HubMotion, HubReaction, SloshMode};
-use crate::series::{Series, ZERO, mul_ramp, next, square, value};
+use crate::series::{Series, ZERO, mul, next, square, value};
 use crate::tank::Pendulum;
 
 #[derive(Clone, Debug)]
@@ -22,7 +22,7 @@ pub struct Linear {
     al: Series,
     al_d: Series,
     al_dd: Series,
-    /// g al, (c/c_0) al'
+    /// g al, and al' times the course of the damping
     g_al: Series,
     drag: Series,
     /// sqrt(g/l) at the start of the expansion, rad/s
@@ -34,6 +34,10 @@ impl SloshMode for Linear {
 
     fn new(p: &Pendulum) -> Self {
         Linear { p: *p, al: ZERO, al_d: ZERO, al_dd: ZERO, g_al: ZERO, drag: ZERO, omega_n: 0.0 }
+    }
+
+    fn set_damping(&mut self, factor: f64) {
+        self.p.set_damping(factor);
     }
 
     fn coordinates(&self, at: &Angles) -> [f64; 4] {
@@ -57,18 +61,18 @@ impl SloshMode for Linear {
     }
 
     #[inline(always)]
-    fn hub_reaction<const N: usize>(&mut self, hub: &HubMotion) -> HubReaction {
+    fn hub_reaction<const N: usize, const RAMP: bool>(&mut self, hub: &HubMotion) -> HubReaction {
         let Pendulum { m, l, c, r, .. } = self.p;
         if N == 0 {
             self.omega_n = libm::sqrt(f64::max(hub.g[0], 0.0) / l);
         }
-        self.g_al[N] = mul_ramp::<N>(&hub.g, &self.al);
-        self.drag[N] = hub.drag::<N>(&self.al_d);
+        self.g_al[N] = hub.weight::<N, RAMP>(&self.al);
+        self.drag[N] = hub.drag::<N, RAMP>(&self.al_d);
         HubReaction { j: 0.0, t: r * (m * self.g_al[N] + c * l * self.drag[N]) }
     }
 
     #[inline(always)]
-    fn accelerate<const N: usize>(&mut self, hub: &HubMotion) {
+    fn accelerate<const N: usize, const RAMP: bool>(&mut self, hub: &HubMotion) {
         let Pendulum { c_m, r_l, inv_l, .. } = self.p;
         self.al_dd[N] = -c_m * self.drag[N] - inv_l * self.g_al[N] - r_l * hub.omega_dot[N];
         self.al[N + 1] = next::<N>(self.al_d[N]);
@@ -86,8 +90,11 @@ impl SloshMode for Linear {
     }
 
     #[inline(always)]
-    fn dissipation<const N: usize>(&mut self, hub: &HubMotion) -> f64 {
-        self.p.c * self.p.l * self.p.l * hub.drag_power::<N>(&self.drag, &self.al_d)
+    fn dissipation<const N: usize, const RAMP: bool>(&mut self) -> f64 {
+        self.p.c
+            * self.p.l
+            * self.p.l
+            * if RAMP { mul::<N>(&self.drag, &self.al_d) } else { square::<N>(&self.al_d) }
     }
 
     /// m l al^2/2

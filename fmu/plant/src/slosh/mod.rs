@@ -17,7 +17,7 @@ mod paraboloid;
 mod planar;
 mod spherical;
 
-use crate::series::{Pair, Series, ZERO, mul, scale, square};
+use crate::series::{Series, ZERO, mul, mul_ramp};
 use crate::tank::Pendulum;
 use crate::{Calculated, Init, Parameters};
 use linear::Linear;
@@ -112,9 +112,8 @@ pub struct HubMotion {
     pub omega_dot: Series,
     /// Specific force along the tank's axis, m/s2, and its rate.
     pub g: [f64; 2],
-    /// Slosh damping over that at the reference, c/c_0; order 0 alone while it is constant.
+    /// Slosh damping over that at the start of the expansion.
     pub damping: Series,
-    pub damping_varies: bool,
     /// How far ahead `damping` holds, s.
     pub damping_reach: f64,
 }
@@ -128,45 +127,21 @@ impl HubMotion {
         omega_dot: ZERO,
         g: [0.0; 2],
         damping: ZERO,
-        damping_varies: false,
         damping_reach: f64::INFINITY,
     };
 
-    /// Coefficient N of (c/c_0) v, v a rate of the liquid.
+    /// Coefficient N of g a; `RAMP` says whether g changes.
     #[inline(always)]
-    pub fn drag<const N: usize>(&self, v: &Series) -> f64 {
-        if self.damping_varies { mul_far::<N>(&self.damping, v) } else { self.damping[0] * v[N] }
+    pub fn weight<const N: usize, const RAMP: bool>(&self, a: &Series) -> f64 {
+        if RAMP { mul_ramp::<N>(&self.g, a) } else { self.g[0] * a[N] }
     }
 
-    /// Coefficient N of (c/c_0) v^2, `drag` being (c/c_0) v.
+    /// Coefficient N of a rate v of the liquid times the course of the damping, which changes
+    /// with g.
     #[inline(always)]
-    pub fn drag_power<const N: usize>(&self, drag: &Series, v: &Series) -> f64 {
-        if self.damping_varies { mul_far::<N>(drag, v) } else { self.damping[0] * square::<N>(v) }
+    pub fn drag<const N: usize, const RAMP: bool>(&self, v: &Series) -> f64 {
+        if RAMP { mul::<N>(&self.damping, v) } else { v[N] }
     }
-
-    /// As `drag`, of a vector.
-    #[inline(always)]
-    pub fn drag_pair<const N: usize>(&self, v: &Pair) -> [f64; 2] {
-        if self.damping_varies {
-            scale_far::<N>(&self.damping, v)
-        } else {
-            v[N].map(|v| self.damping[0] * v)
-        }
-    }
-}
-
-// A changing g is rare: its sums stay out of the way of what is not.
-
-#[cold]
-#[inline(never)]
-fn mul_far<const N: usize>(a: &Series, b: &Series) -> f64 {
-    mul::<N>(a, b)
-}
-
-#[cold]
-#[inline(never)]
-fn scale_far<const N: usize>(a: &Series, b: &Pair) -> [f64; 2] {
-    scale::<N>(a, b)
 }
 
 /// A mode's share of the hub's equation.
@@ -197,6 +172,8 @@ pub trait SloshMode {
     fn start_problem(_init: &Init) -> Option<String> {
         None
     }
+    /// Sets the viscous coefficient, `factor` times that at the reference g.
+    fn set_damping(&mut self, factor: f64);
     /// A displacement of the coordinates at which forces and energies curve, in their unit.
     fn coordinate_scale(&self) -> f64 {
         1.0
@@ -212,17 +189,18 @@ pub trait SloshMode {
     fn seed_direction(&mut self, dq: &[f64; 4], hub: &HubMotion);
     /// Coefficient N, 0 or 1, of q_x', q_y', q_x'', q_y''.
     fn derivatives<const N: usize>(&self, hub: &HubMotion) -> [f64; 4];
-    /// Coefficient N of J and T, from coefficients up to N of q, q' and w.
-    fn hub_reaction<const N: usize>(&mut self, hub: &HubMotion) -> HubReaction;
+    /// Coefficient N of J and T, from coefficients up to N of q, q' and w; `RAMP` says whether
+    /// g changes along the expansion.
+    fn hub_reaction<const N: usize, const RAMP: bool>(&mut self, hub: &HubMotion) -> HubReaction;
     /// Coefficient N of q'' and with it N + 1 of q and q', after `hub_reaction`, when w' is
     /// known up to N.
-    fn accelerate<const N: usize>(&mut self, hub: &HubMotion);
+    fn accelerate<const N: usize, const RAMP: bool>(&mut self, hub: &HubMotion);
     /// Size of the motion, rad/s: what the tolerance is relative to.
     fn error_scale(&self) -> f64;
     /// Size of coefficient `n` of the rates, rad/s.
     fn coefficient_norm(&self, n: usize) -> f64;
     /// Coefficient N of the power that the mode dissipates, W, after `hub_reaction`.
-    fn dissipation<const N: usize>(&mut self, hub: &HubMotion) -> f64;
+    fn dissipation<const N: usize, const RAMP: bool>(&mut self) -> f64;
     /// Coefficient N of mass times height above rest, kg m: the potential energy over g.
     fn mass_height<const N: usize>(&mut self) -> f64;
     /// Coordinates at t, where the hub turns with `omega`, from the series cut after order n.

@@ -16,7 +16,7 @@
 //! For small q a pendulum is the case h = 1/(2 l^2).
 
 use super::{Angles, HubMotion, HubReaction, SloshMode};
-use crate::series::{Series, ZERO, constant, mul, mul_ramp, mul_tail, next, square, value};
+use crate::series::{Series, ZERO, constant, mul, mul_tail, next, square, value};
 use crate::tank::Pendulum;
 
 #[derive(Clone, Debug)]
@@ -25,7 +25,7 @@ pub struct Paraboloid {
     q: [Series; 2],
     q_d: [Series; 2],
     q_dd: [Series; 2],
-    /// (c/c_0) q'
+    /// q' times the course of the damping
     drag: [Series; 2],
     /// r + x
     arm: Series,
@@ -39,7 +39,7 @@ pub struct Paraboloid {
     push: Series,
     /// -(c/m) q' + a - mu q
     b: [Series; 2],
-    /// q.q', and (c/c_0) of it (dissipation); |q|^2 (height)
+    /// q.q' and that times the course of the damping (dissipation); |q|^2 (height)
     rise: Series,
     drag_rise: Series,
     q2: Series,
@@ -67,6 +67,10 @@ impl SloshMode for Paraboloid {
             q2: ZERO,
             omega_n: 0.0,
         }
+    }
+
+    fn set_damping(&mut self, factor: f64) {
+        self.p.set_damping(factor);
     }
 
     /// A displacement is in m.
@@ -105,14 +109,14 @@ impl SloshMode for Paraboloid {
     }
 
     #[inline(always)]
-    fn hub_reaction<const N: usize>(&mut self, hub: &HubMotion) -> HubReaction {
+    fn hub_reaction<const N: usize, const RAMP: bool>(&mut self, hub: &HubMotion) -> HubReaction {
         let Pendulum { m, l, c, r, c_m, hardening, .. } = self.p;
         let one = constant::<N>(1.0);
         if N == 0 {
             self.omega_n = libm::sqrt(f64::max(hub.g[0], 0.0) / l);
         }
         for i in 0..2 {
-            self.drag[i][N] = hub.drag::<N>(&self.q_d[i]);
+            self.drag[i][N] = hub.drag::<N, RAMP>(&self.q_d[i]);
         }
         let [x, y] = &self.q;
         let [x_d, y_d] = &self.q_d;
@@ -127,7 +131,7 @@ impl SloshMode for Paraboloid {
             + mul::<N>(y, &self.a[1])
             + square::<N>(x_d)
             + square::<N>(y_d)
-            + mul_ramp::<N>(&hub.g, &self.spring);
+            + hub.weight::<N, RAMP>(&self.spring);
         self.mu[N] = (numerator - mul_tail::<N>(&self.n, &self.mu)) / self.n[0];
         self.lever[N] = (r * y[N] - mul_tail::<N>(&self.n, &self.lever)) / self.n[0];
         let mu_q = [mul::<N>(&self.mu, x), mul::<N>(&self.mu, y)];
@@ -141,7 +145,7 @@ impl SloshMode for Paraboloid {
     }
 
     #[inline(always)]
-    fn accelerate<const N: usize>(&mut self, hub: &HubMotion) {
+    fn accelerate<const N: usize, const RAMP: bool>(&mut self, hub: &HubMotion) {
         let [x, y] = &self.q;
         let wd = &hub.omega_dot;
         self.push[N] = mul::<N>(&self.lever, wd);
@@ -165,13 +169,21 @@ impl SloshMode for Paraboloid {
     }
 
     #[inline(always)]
-    fn dissipation<const N: usize>(&mut self, hub: &HubMotion) -> f64 {
+    fn dissipation<const N: usize, const RAMP: bool>(&mut self) -> f64 {
         let Pendulum { l, c, .. } = self.p;
         let ([x, y], [x_d, y_d]) = (&self.q, &self.q_d);
         self.rise[N] = mul::<N>(x, x_d) + mul::<N>(y, y_d);
-        self.drag_rise[N] = hub.drag::<N>(&self.rise);
-        let [along_x, along_y] = [0, 1].map(|i| hub.drag_power::<N>(&self.drag[i], &self.q_d[i]));
-        c * (along_x + along_y + hub.drag_power::<N>(&self.drag_rise, &self.rise) / (l * l))
+        if RAMP {
+            // q.(d q') = d (q.q')
+            self.drag_rise[N] = mul::<N>(x, &self.drag[0]) + mul::<N>(y, &self.drag[1]);
+        }
+        let power = if RAMP {
+            let horizontal = mul::<N>(&self.drag[0], x_d) + mul::<N>(&self.drag[1], y_d);
+            (horizontal, mul::<N>(&self.drag_rise, &self.rise))
+        } else {
+            (square::<N>(x_d) + square::<N>(y_d), square::<N>(&self.rise))
+        };
+        c * (power.0 + power.1 / (l * l))
     }
 
     /// m (|q|^2/2 + h |q|^4/4)/l

@@ -14,7 +14,7 @@
 //! Lagrange's equations for this bob on the hub; to first order the linear model.
 
 use super::{Angles, HubMotion, HubReaction, SloshMode};
-use crate::series::{Series, ZERO, mul, mul_ramp, next, sin_cos, square, value};
+use crate::series::{Series, ZERO, mul, next, sin_cos, square, value};
 use crate::tank::Pendulum;
 
 #[derive(Clone, Debug)]
@@ -23,7 +23,7 @@ pub struct Planar {
     al: Series,
     al_d: Series,
     al_dd: Series,
-    /// (c/c_0) al'
+    /// al' times the course of the damping
     drag: Series,
     /// al' as `sin_cos` keeps it
     slope: Series,
@@ -56,6 +56,10 @@ impl SloshMode for Planar {
         }
     }
 
+    fn set_damping(&mut self, factor: f64) {
+        self.p.set_damping(factor);
+    }
+
     fn coordinates(&self, at: &Angles) -> [f64; 4] {
         [0.0, at.angle[1], 0.0, at.rate[1]]
     }
@@ -77,7 +81,7 @@ impl SloshMode for Planar {
     }
 
     #[inline(always)]
-    fn hub_reaction<const N: usize>(&mut self, hub: &HubMotion) -> HubReaction {
+    fn hub_reaction<const N: usize, const RAMP: bool>(&mut self, hub: &HubMotion) -> HubReaction {
         let Pendulum { m, l, c_m, r, .. } = self.p;
         if N == 0 {
             self.omega_n = libm::sqrt(f64::max(hub.g[0], 0.0) / l);
@@ -86,8 +90,8 @@ impl SloshMode for Planar {
         self.sc[N] = mul::<N>(&self.s, &self.c);
         self.w_al_d[N] = mul::<N>(&hub.omega, &self.al_d);
         self.al_d2[N] = square::<N>(&self.al_d);
-        self.drag[N] = hub.drag::<N>(&self.al_d);
-        self.force[N] = mul_ramp::<N>(&hub.g, &self.s) + c_m * l * self.drag[N]
+        self.drag[N] = hub.drag::<N, RAMP>(&self.al_d);
+        self.force[N] = hub.weight::<N, RAMP>(&self.s) + c_m * l * self.drag[N]
             - l * mul::<N>(&hub.omega2, &self.sc);
         HubReaction {
             j: m * (r * r + l * l) * square::<N>(&self.s),
@@ -98,7 +102,7 @@ impl SloshMode for Planar {
     }
 
     #[inline(always)]
-    fn accelerate<const N: usize>(&mut self, hub: &HubMotion) {
+    fn accelerate<const N: usize, const RAMP: bool>(&mut self, hub: &HubMotion) {
         let Pendulum { r_l, inv_l, .. } = self.p;
         self.al_dd[N] = -r_l * mul::<N>(&self.c, &hub.omega_dot) - inv_l * self.force[N];
         self.al[N + 1] = next::<N>(self.al_d[N]);
@@ -116,8 +120,11 @@ impl SloshMode for Planar {
     }
 
     #[inline(always)]
-    fn dissipation<const N: usize>(&mut self, hub: &HubMotion) -> f64 {
-        self.p.c * self.p.l * self.p.l * hub.drag_power::<N>(&self.drag, &self.al_d)
+    fn dissipation<const N: usize, const RAMP: bool>(&mut self) -> f64 {
+        self.p.c
+            * self.p.l
+            * self.p.l
+            * if RAMP { mul::<N>(&self.drag, &self.al_d) } else { square::<N>(&self.al_d) }
     }
 
     /// 2 m l sin^2(al/2), whose rate is m l s al'

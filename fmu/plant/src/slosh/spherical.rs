@@ -36,8 +36,8 @@
 use super::{Angles, HubMotion, HubReaction, SloshMode};
 use crate::Init;
 use crate::series::{
-    Pair, Series, ZERO, ZERO_PAIR, constant, dot, each, mul, mul_part, mul_ramp, mul_tail, next,
-    scale, square, squares, value, value_pair,
+    Pair, Series, ZERO, ZERO_PAIR, constant, dot, each, mul, mul_part, mul_tail, next, scale,
+    square, squares, value, value_pair,
 };
 use crate::tank::Pendulum;
 
@@ -56,7 +56,8 @@ pub struct Spherical {
     dir_z: Series,
     /// p' horizontally; upwards it is v_z.
     dir_d: Pair,
-    /// (c/c_0) p' horizontally, with its components exchanged, and upwards.
+    /// p' times the course of the damping: horizontally with its components exchanged, and
+    /// upwards.
     drag_swapped: Pair,
     drag_z: Series,
     v: Pair,
@@ -100,9 +101,7 @@ impl Spherical {
         [0, 1].map(|i| dir_dd[i] + 2.0 * twice[i] + once[i])
     }
 
-    /// Coefficient N of (c/c_0) |p'|^2.
-    #[cold]
-    #[inline(never)]
+    /// Coefficient N of |p'|^2 times the course of the damping.
     fn drag_power<const N: usize>(&self) -> f64 {
         let horizontal = |i: usize| {
             (0..=N).map(|j| self.dir_d[j][i] * self.drag_swapped[N - j][1 - i]).sum::<f64>()
@@ -147,6 +146,10 @@ impl SloshMode for Spherical {
             pull: ZERO,
             omega_n: 0.0,
         }
+    }
+
+    fn set_damping(&mut self, factor: f64) {
+        self.p.set_damping(factor);
     }
 
     fn start_problem(init: &Init) -> Option<String> {
@@ -203,7 +206,7 @@ impl SloshMode for Spherical {
     }
 
     #[inline(always)]
-    fn hub_reaction<const N: usize>(&mut self, hub: &HubMotion) -> HubReaction {
+    fn hub_reaction<const N: usize, const RAMP: bool>(&mut self, hub: &HubMotion) -> HubReaction {
         let Pendulum { m, l, c, r, r_l, inv_l, .. } = self.p;
         if N == 0 {
             self.omega_n = libm::sqrt(f64::max(hub.g[0], 0.0) / l);
@@ -211,12 +214,13 @@ impl SloshMode for Spherical {
         let [w_x, w_y] = scale::<N>(&hub.omega, &self.dir);
         let (x_d, y_d) = (self.v[N][0] + w_y, self.v[N][1] - w_x);
         self.dir_d[N] = [x_d, y_d];
-        let [drag_x, drag_y] = hub.drag_pair::<N>(&self.dir_d);
+        let [drag_x, drag_y] =
+            if RAMP { scale::<N>(&hub.damping, &self.dir_d) } else { [x_d, y_d] };
         self.drag_swapped[N] = [drag_y, drag_x];
-        self.drag_z[N] = hub.drag::<N>(&self.v_z);
+        self.drag_z[N] = hub.drag::<N, RAMP>(&self.v_z);
         let [v2_x, v2_y] = squares::<N>(&self.v);
         self.v_z2[N] = square::<N>(&self.v_z);
-        self.pull_0[N] = v2_x + v2_y + self.v_z2[N] - inv_l * mul_ramp::<N>(&hub.g, &self.dir_z)
+        self.pull_0[N] = v2_x + v2_y + self.v_z2[N] - inv_l * hub.weight::<N, RAMP>(&self.dir_z)
             + r_l * mul_part::<N>(&hub.omega2, &self.dir, 0);
         let [plus, minus] = each::<N>(&self.dir, &self.drag_swapped);
         HubReaction {
@@ -227,13 +231,13 @@ impl SloshMode for Spherical {
     }
 
     #[inline(always)]
-    fn accelerate<const N: usize>(&mut self, hub: &HubMotion) {
+    fn accelerate<const N: usize, const RAMP: bool>(&mut self, hub: &HubMotion) {
         let Pendulum { c_m, r_l, inv_l, .. } = self.p;
         self.pull[N] = self.pull_0[N] - r_l * mul_part::<N>(&hub.omega_dot, &self.dir, 1);
         let [w_x, w_y] = scale::<N>(&hub.omega, &self.v);
         let pulled = scale::<N>(&self.pull, &self.dir);
         let [drag_y, drag_x] = self.drag_swapped[N];
-        let fall = inv_l * if N < 2 { hub.g[N] } else { 0.0 };
+        let fall = inv_l * if N == 0 || (RAMP && N == 1) { hub.g[N] } else { 0.0 };
         self.v_d[N] = [
             w_y - pulled[0] - c_m * drag_x + r_l * hub.omega2[N],
             -w_x - pulled[1] - c_m * drag_y - r_l * hub.omega_dot[N],
@@ -257,12 +261,12 @@ impl SloshMode for Spherical {
 
     /// c l^2 |p'|^2
     #[inline(always)]
-    fn dissipation<const N: usize>(&mut self, hub: &HubMotion) -> f64 {
-        let speed2 = if hub.damping_varies {
+    fn dissipation<const N: usize, const RAMP: bool>(&mut self) -> f64 {
+        let speed2 = if RAMP {
             self.drag_power::<N>()
         } else {
             let [x, y] = squares::<N>(&self.dir_d);
-            hub.damping[0] * (x + y + self.v_z2[N])
+            x + y + self.v_z2[N]
         };
         self.p.c * self.p.l * self.p.l * speed2
     }
@@ -289,15 +293,14 @@ impl SloshMode for Spherical {
     /// The rod's pull along p and the drag.
     fn force(&self, _: &HubMotion) -> [f64; 2] {
         let Pendulum { m, l, c, .. } = self.p;
-        let drag = |i: usize| self.drag_swapped[0][1 - i];
-        [0, 1].map(|i| m * l * self.pull[0] * self.dir[0][i] + c * l * drag(i))
+        [0, 1].map(|i| m * l * self.pull[0] * self.dir[0][i] + c * l * self.dir_d[0][i])
     }
 
     /// The pull acts at the hinge, the drag at the bob.
     fn torque(&self, hub: &HubMotion) -> f64 {
         let Pendulum { l, c, r, .. } = self.p;
-        let ([x, y], [drag_y, drag_x]) = (self.dir[0], self.drag_swapped[0]);
-        r * self.force(hub)[1] + c * l * l * (x * drag_y - y * drag_x)
+        let ([x, y], [x_d, y_d]) = (self.dir[0], self.dir_d[0]);
+        r * self.force(hub)[1] + c * l * l * (x * y_d - y * x_d)
     }
 
     fn energy(&self, hub: &HubMotion) -> f64 {
@@ -362,16 +365,15 @@ mod tests {
         for _ in 0..1000 {
             let (m, l, c, r) = (0.7, between(0.02, 0.2), between(0.0, 0.5), between(0.0, 0.4));
             let (c_m, r_l, inv_l) = (c / m, r / l, 1.0 / l);
-            let p = Pendulum { m, l, c, r, c_m, r_l, inv_l, wave: 0.0, hardening: 0.0 };
+            let p = Pendulum { m, l, c, c_0: c, r, c_m, r_l, inv_l, wave: 0.0, hardening: 0.0 };
             let q = core::array::from_fn(|i| between(-4.0, 4.0) * if i < 2 { 1.0 } else { 5.0 });
             let (w, w_d, g) = (between(-2.0, 2.0), between(-9.0, 9.0), between(0.0, 20.0));
             let mut hub = HubMotion { g: [g, 0.0], ..HubMotion::REST };
-            hub.damping[0] = 1.0;
             (hub.omega[0], hub.omega2[0], hub.omega_dot[0]) = (w, w * w, w_d);
             let mut mode = Spherical::new(&p);
             mode.start(&q, &hub);
-            mode.hub_reaction::<0>(&hub);
-            mode.accelerate::<0>(&hub);
+            mode.hub_reaction::<0, false>(&hub);
+            mode.accelerate::<0, false>(&hub);
             let expected = lagrange(&p, q, w, w_d, g);
             let [.., x_dd, y_dd] = mode.derivatives::<0>(&hub);
             // The terms are up to k |v|^2 |xi|, 1e4, and half of them are taken as 1/k, 20, of
