@@ -100,3 +100,18 @@ pub fn python() -> PathBuf {
     );
     PathBuf::from(path.trim())
 }
+
+/// The binary `hubslosh`, of the profile that this test was built with; it is
+/// another package's, so Cargo does not say where it is.
+pub fn harness() -> PathBuf {
+    let mut build = Command::new(env!("CARGO"));
+    build.current_dir(pack::root()).args(["build", "--quiet", "--bin", "hubslosh"]);
+    let profile = if cfg!(debug_assertions) { "debug" } else { "release" };
+    if profile == "release" {
+        build.arg("--release");
+    }
+    run(&mut build, "the binary hubslosh did not build");
+    let target =
+        pack::packed_for_tests().ancestors().nth(2).expect("<target>/test-fmu/HubSlosh.fmu");
+    target.join(profile).join("hubslosh").with_extension(std::env::consts::EXE_EXTENSION)
+}

@@ -17,6 +17,7 @@ mod physics {
     mod trajectories;
 }
 mod python;
+mod second;
 mod xml {
     mod checklist;
     mod generated;

@@ -82,7 +82,9 @@ fn description<M: Model>() -> schema::ModelDescription {
             provides_directional_derivative: true,
         },
         units: schema::Units { all: table.units().map(unit).collect() },
-        types: schema::Types { all: table.enumerations().into_iter().map(simple_type).collect() },
+        types: Some(table.enumerations())
+            .filter(|all| !all.is_empty())
+            .map(|all| schema::Types { all: all.into_iter().map(simple_type).collect() }),
         log_categories: schema::LogCategories {
             all: categories(table)
                 .into_iter()

@@ -39,7 +39,7 @@ pub struct ModelDescription {
     #[serde(rename = "UnitDefinitions")]
     pub units: Units,
     #[serde(rename = "TypeDefinitions")]
-    pub types: Types,
+    pub types: Option<Types>,
     #[serde(rename = "LogCategories")]
     pub log_categories: LogCategories,
     #[serde(rename = "DefaultExperiment")]

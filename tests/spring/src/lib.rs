@@ -1,5 +1,4 @@
 //! A mass on a spring as an FMU.
-
 #![allow(non_snake_case)]
 
 pub mod spring;
