@@ -12,7 +12,7 @@ gets the FMU once, and torque and settings with every run; it sends the signals 
 shared. This side writes runs/<name>.parquet, each whole or not at all. In the end ``hubslosh
 campaign`` reads the runs and writes tables and report: the same as if it had made them.
 
-Start the same command again after an interruption: runs that are there are not made again. A run
+Start the same command again after an interruption: runs that are stored are reused. A run
 whose worker dies is given to another worker. Workers of a real cluster need ``--nthreads 1`` and
 the packages of requirements-cluster.txt.
 """
@@ -106,7 +106,7 @@ class Harness:
 
 
 def why_not_stored(path: Path, run: Run, columns: list[str]) -> str | None:
-    """Return why the file is not the whole of this run, or None if it is.
+    """Return why the file is not this run, complete, or None if it is.
 
     The harness judges the stored runs by the same rules when it reads them.
     """
@@ -116,12 +116,12 @@ def why_not_stored(path: Path, run: Run, columns: list[str]) -> str | None:
         for key, wanted in run["notes"].items():
             found = notes.get(key.encode(), b"").decode(errors="replace")
             if found != wanted:
-                return f'its note "{key}" is "{found}", not "{wanted}"'
+                return f"its {key} differs"
         times = hubslosh.read_table(path, columns)["time"]
     except (OSError, pyarrow.ArrowException, hubslosh.FmuError) as error:
-        return f"it is not whole: {error}"
+        return f"file incomplete: {error}"
     if len(times) != run["steps"] + 1 or times[-1] != run["stop"]:
-        return f"it has {len(times)} rows, not {run['steps'] + 1} to {run['stop']} s"
+        return f"file incomplete, {len(times)} rows of {run['steps'] + 1}"
     return None
 
 
@@ -198,13 +198,13 @@ def make_runs(
         path = harness.out / run["file"]
         why = why_not_stored(path, run, columns) if path.exists() else ""
         if why:
-            print(f"{path} is made again: {why}")
+            print(f"re-running {run['name']}: {why}")
         if why is not None:
             missing.append(run)
     fmu = prepare(client, harness.fmu, todo["fmu"]["sha256"])
     there = len(todo["runs"]) - len(missing)
     print(
-        f"{len(missing)} runs to make, {there} are there already; {len(client.nthreads())} workers"
+        f"{len(missing)} runs to simulate, {there} reused; {len(client.nthreads())} workers"
     )
 
     failed: dict[str, str] = {}

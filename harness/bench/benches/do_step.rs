@@ -17,7 +17,8 @@ use ode_solvers::{Dopri5, SVector, System};
 use pack::packed_for_tests;
 
 const STEP: f64 = 0.02;
-const SWEEP: Profile = Profile::LinSweep { amplitude: 0.1, f0: 2.2, f1: 2.6, duration: 200.0 };
+const SWEEP: &str = "lin-sweep:amplitude=0.1,f0=2.2,f1=2.6,duration=200";
+const DURATION: f64 = 200.0;
 
 /// θ, ω, α, α'.
 type State = SVector<f64, 4>;
@@ -83,8 +84,8 @@ fn best(mut run: impl FnMut() -> Duration) -> Duration {
 }
 
 fn main() {
-    let torque = Torque::Profile(SWEEP);
-    let steps = (SWEEP.duration() / STEP).round() as usize;
+    let torque = Torque::Profile(SWEEP.parse().expect("a profile"));
+    let steps = (DURATION / STEP).round() as usize;
     let knots: Vec<f64> = (0..=steps).map(|k| torque.at(k as f64 * STEP)).collect();
     let smooth = || Smooth { knots: knots.clone() };
 
@@ -134,7 +135,7 @@ fn main() {
         let settings =
             [("slosh.model", model), ("friction.model", friction), ("friction.eps", "1e-3")];
         let settings = settings.map(|(k, v)| (k.to_string(), v.to_string())).to_vec();
-        let stop = SWEEP.duration();
+        let stop = DURATION;
         let run = Run {
             settings,
             torque: torque.clone(),

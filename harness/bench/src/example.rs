@@ -8,7 +8,7 @@ use std::path::Path;
 use anyhow::{Context, Result};
 
 use crate::profile::Torque;
-use crate::run::Run;
+use crate::run::{Run, driven};
 use crate::table::Table;
 use host::description::ModelDescription;
 use host::fmi2::Fmu;
@@ -49,7 +49,15 @@ pub fn write(fmu: &Fmu, folder: &Path) -> Result<()> {
 pub fn replay(fmu: &Fmu, input: &Path, tolerance: Option<f64>, hold: bool) -> Result<Table> {
     let torque = Torque::read(input, hold)?;
     let (_, stop) = torque.span();
-    let run = Run { settings: vec![], torque, step: STEP, stop, tolerance, hold };
+    let run = Run {
+        settings: vec![],
+        input: driven(fmu.description(), None)?,
+        torque,
+        step: STEP,
+        stop,
+        tolerance,
+        hold,
+    };
     let columns = outputs(fmu.description());
     let mut instance = run.initialise(fmu)?;
     run.drive(&mut instance, &columns, |_| {})

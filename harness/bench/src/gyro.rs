@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use crate::analysis::allan::{self, Noise, Point};
 use crate::profile::{Torque, Written};
 use crate::progress::Progress;
-use crate::run::Run;
+use crate::run::{Run, TORQUE};
 use crate::svg::{Axis, Chart, Series, Style};
 use crate::table::Table;
 use host::fmi2::Fmu;
@@ -111,7 +111,15 @@ impl Recording {
         let ours = ours.map(|(name, value)| (name.to_string(), value));
         let torque: Torque = format!("zero:duration={stop}").parse::<Written>()?.torque()?;
         let settings = [&self.settings[..], &ours].concat();
-        Ok(Run { settings, torque, step, stop, tolerance: None, hold: true })
+        Ok(Run {
+            settings,
+            input: Some(TORQUE.into()),
+            torque,
+            step,
+            stop,
+            tolerance: None,
+            hold: true,
+        })
     }
 }
 

@@ -5,7 +5,6 @@ pub mod analysis;
 pub mod campaign;
 pub mod example;
 pub mod gyro;
-pub mod noise;
 pub mod plan;
 pub mod profile;
 pub mod progress;

@@ -9,7 +9,7 @@ use toml::Value;
 
 use crate::profile::{Torque, Written};
 use crate::random::Random;
-use crate::run::Run;
+use crate::run::{Run, driven};
 use host::description::{self, ModelDescription, Type, did_you_mean};
 use host::output::sha256;
 
@@ -59,11 +59,29 @@ pub struct Plan {
     stop: Option<f64>,
     tolerance: Option<f64>,
     hold: bool,
+    input: Option<String>,
     set: Values,
     vary: Vec<(String, Vec<String>)>,
     listed: Vec<Listed>,
     count: Vec<(String, i64)>,
     draws: Option<Draws>,
+}
+
+/// Sweeps of the bench from 1.25 to 3.5 Hz in 2700 s.
+#[derive(Clone, Debug)]
+pub struct Sweeps {
+    /// Values of `slosh.model`, by name.
+    pub models: Vec<String>,
+    /// Fills, m.
+    pub fills: Vec<f64>,
+    /// Torque amplitudes, N·m.
+    pub amplitudes: Vec<f64>,
+    /// Name of the profile, `exp-sweep` or `lin-sweep`.
+    pub profile: &'static str,
+    /// What is set in every run, by FMU name.
+    pub set: Vec<(String, String)>,
+    /// Relative tolerance of the FMU's solver; `None`: the FMU's own.
+    pub tolerance: Option<f64>,
 }
 
 /// One `[[run]]`.
@@ -115,10 +133,10 @@ pub struct Case {
     /// The values of what the plan varies, in the order of [`Plan::varied`]; empty where a
     /// `[[run]]` does not name one.
     pub varied: Vec<String>,
-    /// Value of `slosh.model`, by name.
-    pub model: String,
-    /// Fill (`tank.h`), m.
-    pub fill: f64,
+    /// Value of `slosh.model`, by name, if the FMU has it.
+    pub model: Option<String>,
+    /// Fill (`tank.h`), m, if the FMU has it.
+    pub fill: Option<f64>,
     /// The profile's `amplitude`, N·m, if it has one.
     pub amplitude: Option<f64>,
     /// The profile's text.
@@ -127,6 +145,8 @@ pub struct Case {
     pub torque: Arc<Torque>,
     /// SHA-256 of the torque's file, if it comes from one.
     pub torque_sha256: Option<String>,
+    /// The input that the torque drives; `None`: none.
+    pub input: Option<String>,
     /// Start values by FMU name.
     pub settings: Values,
     /// Communication step, s.
@@ -144,6 +164,7 @@ impl Case {
     pub fn run(&self) -> Run {
         Run {
             settings: self.settings.clone(),
+            input: self.input.clone(),
             torque: Torque::clone(&self.torque),
             step: self.step,
             stop: self.stop,
@@ -209,9 +230,10 @@ impl Plan {
     pub fn parse(text: &str) -> Result<Self> {
         let table: toml::Table = text.parse().context("it is not TOML")?;
         let mut problems = Problems::default();
-        const KEYS: [&str; 10] = [
+        const KEYS: [&str; 11] = [
             "title",
             "profile",
+            "input",
             "step",
             "stop",
             "tolerance",
@@ -229,6 +251,7 @@ impl Plan {
             problems.add("it has no profile, such as profile = \"exp-sweep:amplitude=0.1\"");
         }
         let profile = profile.and_then(|text| problems.take("", text.parse::<Written>()));
+        let input = text_at(&mut problems, &table, "input");
         let step = positive_at(&mut problems, &table, "step").unwrap_or(STEP);
         let stop = positive_at(&mut problems, &table, "stop");
         let tolerance = positive_at(&mut problems, &table, "tolerance");
@@ -236,7 +259,7 @@ impl Plan {
             None => false,
             Some(Value::Boolean(hold)) => *hold,
             Some(other) => {
-                problems.add(format!("hold wants true or false, not {other}"));
+                problems.add(format!("hold expects true or false, not {other}"));
                 false
             }
         };
@@ -268,6 +291,7 @@ impl Plan {
                 stop,
                 tolerance,
                 hold,
+                input,
                 set,
                 vary,
                 listed,
@@ -282,6 +306,52 @@ impl Plan {
         plan.each_name_once(&mut problems);
         problems.check()?;
         Ok(plan)
+    }
+
+    /// The thesis's sweeps for every one of these models, fills and amplitudes.
+    ///
+    /// # Errors
+    /// If a setting is one of what is varied.
+    pub fn sweeps(sweeps: Sweeps) -> Result<Self> {
+        let Sweeps { models, fills, amplitudes, profile, set, tolerance } = sweeps;
+        let numbers = |values: Vec<f64>| values.iter().map(f64::to_string).collect();
+        let vary: [(&str, Vec<String>); 3] =
+            [(NAMING[0], models), (NAMING[1], numbers(fills)), (NAMING[2], numbers(amplitudes))];
+        let mut plan = Plan {
+            title: "Sweeps at several fills and amplitudes".into(),
+            text: String::new(),
+            profile: format!("{profile}:f0=1.25,f1=3.5,duration=2700").parse()?,
+            step: STEP,
+            stop: None,
+            tolerance,
+            hold: false,
+            input: None,
+            set,
+            vary: vary.map(|(name, values)| (name.to_string(), values)).into(),
+            listed: Vec::new(),
+            count: Vec::new(),
+            draws: None,
+        };
+        let mut problems = Problems::default();
+        plan.each_name_once(&mut problems);
+        problems.check()?;
+        plan.text = plan.written()?;
+        Ok(plan)
+    }
+
+    /// A plan of [`Plan::sweeps`] as a file, which the campaign leaves beside its results.
+    fn written(&self) -> Result<String> {
+        let mut table = toml::Table::new();
+        table.insert("title".into(), self.title.clone().into());
+        table.insert("profile".into(), self.profile.to_string().into());
+        if let Some(tolerance) = self.tolerance {
+            table.insert("tolerance".into(), tolerance.into());
+        }
+        let set = self.set.iter().map(|(name, value)| (name.clone(), value.as_str().into()));
+        table.insert("set".into(), set.collect::<toml::Table>().into());
+        let vary = self.vary.iter().map(|(name, values)| (name.clone(), values.clone().into()));
+        table.insert("vary".into(), vary.collect::<toml::Table>().into());
+        Ok(toml::to_string(&table)?)
     }
 
     /// A name may be set, varied, listed, counted or drawn, but only one of these.
@@ -366,6 +436,8 @@ impl Plan {
         }
 
         let mut problems = Problems::default();
+        let input = driven(description, self.input.as_deref());
+        let input = input.context("no input = \"…\" in the plan")?;
         let mut torques = BTreeMap::new();
         let mut names = BTreeSet::new();
         let mut cases = Vec::with_capacity(count);
@@ -373,13 +445,13 @@ impl Plan {
             for draw in 0..draws {
                 let mut values = run.values.clone();
                 if let Some(random) = &self.draws {
-                    let drawn = random.draw(description, draw as u64);
+                    let drawn = random.draw(description, &self.profile, draw as u64);
                     values.extend(problems.take("[random.draw] ", drawn).unwrap_or_default());
                 }
                 for (name, first) in &self.count {
                     values.push((name.clone(), (first + cases.len() as i64).to_string()));
                 }
-                let case = self.case(description, &mut torques, &mut problems, &values);
+                let case = self.case(description, &input, &mut torques, &mut problems, &values);
                 let Some(mut case) = case else {
                     continue;
                 };
@@ -397,6 +469,7 @@ impl Plan {
     fn case(
         &self,
         description: &ModelDescription,
+        input: &Option<String>,
         torques: &mut BTreeMap<String, (Arc<Torque>, Option<String>)>,
         problems: &mut Problems,
         values: &Values,
@@ -419,7 +492,7 @@ impl Plan {
             .cloned()
             .collect();
         for (name, value) in &settings {
-            problems.take("", settable(description, name, value));
+            problems.take("", settable(description, input, name, value));
         }
 
         // a file is read once, however many runs it drives
@@ -450,8 +523,9 @@ impl Plan {
                     value.map_or(String::new(), |(_, v)| v.clone())
                 })
                 .collect(),
-            model: value("slosh.model").unwrap_or_default(),
-            fill: value("tank.h").and_then(|h| h.parse().ok()).unwrap_or(f64::NAN),
+            model: value("slosh.model"),
+            input: input.clone(),
+            fill: value("tank.h").and_then(|h| h.parse().ok()),
             amplitude: match &*torque {
                 Torque::Profile(profile) => profile.amplitude(),
                 Torque::Rows { .. } => None,
@@ -488,14 +562,14 @@ impl Plan {
             }
             None => run.values.iter().collect(),
         };
-        match case.amplitude {
-            Some(amplitude)
+        match (&case.model, case.fill, case.amplitude) {
+            (Some(model), Some(fill), Some(amplitude))
                 if run.name.is_none()
                     && self.draws.is_none()
                     && values.iter().all(|(name, _)| NAMING.contains(&name.as_str())) =>
             {
-                let [fill, amplitude] = [case.fill, amplitude].map(thousandths);
-                parts.push(format!("{}_{fill}mm_{amplitude}", case.model));
+                let [fill, amplitude] = [fill, amplitude].map(thousandths);
+                parts.push(format!("{model}_{fill}mm_{amplitude}"));
             }
             _ => {
                 for (name, value) in values {
@@ -530,9 +604,14 @@ impl Plan {
 }
 
 /// Fails unless the FMU has such a parameter or input and could read the value.
-fn settable(description: &ModelDescription, name: &str, text: &str) -> Result<()> {
+fn settable(
+    description: &ModelDescription,
+    input: &Option<String>,
+    name: &str,
+    text: &str,
+) -> Result<()> {
     let variable = description.variable(name)?;
-    ensure!(name != "tau_cmd", "tau_cmd comes from the profile");
+    ensure!(input.as_deref() != Some(name), "{name} comes from the profile");
     ensure!(
         ["parameter", "input"].contains(&variable.causality.as_str()),
         "{name} cannot be set: it is of causality {}, not a parameter or an input",
@@ -556,7 +635,7 @@ fn text_at(problems: &mut Problems, table: &toml::Table, key: &str) -> Option<St
     match table.get(key)? {
         Value::String(text) => Some(text.clone()),
         other => {
-            problems.add(format!("{key} wants a text in quotes, not {other}"));
+            problems.add(format!("{key} expects a text in quotes, not {other}"));
             None
         }
     }
@@ -574,7 +653,7 @@ fn positive_at(problems: &mut Problems, table: &toml::Table, key: &str) -> Optio
     let value = table.get(key)?;
     let positive = number(value).filter(|v| *v > 0.0);
     if positive.is_none() {
-        problems.add(format!("{key} wants a positive number, not {value}"));
+        problems.add(format!("{key} expects a positive number, not {value}"));
     }
     positive
 }
@@ -628,7 +707,7 @@ fn values(problems: &mut Problems, place: &str, table: &toml::Table) -> Values {
         match plain(value) {
             Some(text) => values.push((name, text)),
             None => problems.add(format!(
-                "{place} {name} wants a number, true, false or a text in quotes, not {value}"
+                "{place} {name} expects a number, true, false or a text in quotes, not {value}"
             )),
         }
     }
@@ -645,7 +724,7 @@ fn lists(problems: &mut Problems, table: &toml::Table) -> Vec<(String, Vec<Strin
         match texts {
             Some(texts) => lists.push((name, texts)),
             None => problems.add(format!(
-                "[vary] {name} wants a list of values, such as [0.05, 0.1], not {value}"
+                "[vary] {name} expects a list of values, such as [0.05, 0.1], not {value}"
             )),
         }
     }
@@ -661,7 +740,7 @@ fn counts(problems: &mut Problems, table: &toml::Table) -> Vec<(String, i64)> {
                 counts.push((name, *first))
             }
             _ => problems.add(format!(
-                "[count] {name} wants the whole number to count from, 0 to {}, not {value}",
+                "[count] {name} expects the whole number to count from, 0 to {}, not {value}",
                 i32::MAX / 2
             )),
         }
@@ -698,7 +777,7 @@ fn draws(problems: &mut Problems, table: &toml::Table) -> Option<Draws> {
         Some(Value::Integer(i)) if *i >= least => Some(*i as u64),
         Some(other) => {
             problems
-                .add(format!("[random] {key} wants a whole number from {least} on, not {other}"));
+                .add(format!("[random] {key} expects a whole number from {least} on, not {other}"));
             None
         }
         None => {
@@ -729,7 +808,7 @@ fn distribution(problems: &mut Problems, place: &str, value: &Value) -> Option<D
     ];
     let Some(table) = value.as_table() else {
         problems.add(format!(
-            "{place}it wants {{ distribution = \"normal\", mean = 1.0, deviation = 0.1 }} or the \
+            "{place}it expects {{ distribution = \"normal\", mean = 1.0, deviation = 0.1 }} or the \
              like, not {value}"
         ));
         return None;
@@ -747,14 +826,14 @@ fn distribution(problems: &mut Problems, place: &str, value: &Value) -> Option<D
     known(problems, place, table, &["distribution", first, second, "min", "max"]);
     let mut of = |key: &str, default: Option<f64>| match table.get(key) {
         None if default.is_none() => {
-            problems.add(format!("{place}{kind} wants {key}"));
+            problems.add(format!("{place}{kind} expects {key}"));
             None
         }
         None => default,
         Some(value) => {
             let found = number(value);
             if found.is_none() {
-                problems.add(format!("{place}{key} wants a number, not {value}"));
+                problems.add(format!("{place}{key} expects a number, not {value}"));
             }
             found
         }
@@ -786,7 +865,12 @@ fn distribution(problems: &mut Problems, place: &str, value: &Value) -> Option<D
 impl Draws {
     /// The values of draw `number`. Every draw has its own stream, so that it stays the same
     /// however many runs there are.
-    fn draw(&self, description: &ModelDescription, number: u64) -> Result<Values> {
+    fn draw(
+        &self,
+        description: &ModelDescription,
+        profile: &Written,
+        number: u64,
+    ) -> Result<Values> {
         let mut random = Random::new(self.seed, number);
         let mut values = Vec::with_capacity(self.draw.len());
         for (name, distribution) in &self.draw {
@@ -794,8 +878,10 @@ impl Draws {
                 true => None,
                 false => Some(description.variable(name)?),
             };
-            let whole =
-                variable.is_some_and(|v| v.kind() == Type::Integer) || name == "profile.seed";
+            let whole = match variable {
+                Some(variable) => variable.kind() == Type::Integer,
+                None => name.strip_prefix("profile.").is_some_and(|key| profile.is_whole(key)),
+            };
             values.push((name.clone(), distribution.draw(&mut random, name, variable, whole)?));
         }
         Ok(values)
@@ -886,6 +972,29 @@ mod tests {
     }
 
     #[test]
+    fn the_sweeps_of_the_command_line_are_those_of_the_plan_they_leave() {
+        let sweeps = |set: &[(&str, &str)]| {
+            let set = set.iter().map(|(name, value)| (name.to_string(), value.to_string()));
+            Plan::sweeps(Sweeps {
+                models: vec!["linear".into(), "spherical".into()],
+                fills: FILLS.to_vec(),
+                amplitudes: vec![0.0125, 0.1],
+                profile: "lin-sweep",
+                set: set.collect(),
+                tolerance: Some(1e-9),
+            })
+        };
+        let plan = sweeps(&[("friction.model", "viscous")]).unwrap();
+        let direct = plan.cases(&description()).unwrap();
+        let written = cases(&plan.text);
+        assert_eq!(direct.len(), 8);
+        assert_eq!(direct[0].name, "linear_50mm_12.5");
+        assert_eq!(format!("{direct:?}"), format!("{written:?}"));
+        let error = sweeps(&[("tank.h", "0.1")]).unwrap_err().to_string();
+        assert_eq!(error, "tank.h stands in [set] and in [vary]");
+    }
+
+    #[test]
     fn every_plan_file_is_built_in() {
         let directory = concat!(env!("CARGO_MANIFEST_DIR"), "/../campaigns");
         for file in std::fs::read_dir(directory).unwrap() {
@@ -901,7 +1010,7 @@ mod tests {
         let cases = plan.cases(&description()).unwrap();
         assert_eq!(cases[0].name, "linear_50mm_12.5");
         assert_eq!(cases[21].name, "linear_100mm_250");
-        let swept = |case: &Case| (case.fill, case.amplitude.unwrap());
+        let swept = |case: &Case| (case.fill.unwrap(), case.amplitude.unwrap());
         let all = FILLS.iter().flat_map(|h| AMPLITUDES.iter().map(move |a| (*h, *a)));
         assert!(cases.iter().map(swept).eq(all), "the command line's defaults are the same");
         let dusty = cases_of(
@@ -958,13 +1067,13 @@ mod tests {
         for words in [
             "there is no key \"titel\" (there are title, profile,",
             "did you mean \"title\"",
-            "profile wants a text in quotes, not 3",
-            "step wants a positive number, not -1",
-            "hold wants true or false, not 1",
-            "[set] tank.h wants a number, true, false or a text in quotes, not [1]",
+            "profile expects a text in quotes, not 3",
+            "step expects a positive number, not -1",
+            "hold expects true or false, not 1",
+            "[set] tank.h expects a number, true, false or a text in quotes, not [1]",
             "[set] profile.amplitude: write it into profile",
-            "[vary] tank.d wants a list of values, such as [0.05, 0.1], not 1",
-            "[random] runs wants a whole number from 1 on, not 0",
+            "[vary] tank.d expects a list of values, such as [0.05, 0.1], not 1",
+            "[random] runs expects a whole number from 1 on, not 0",
             "[random] has no seed",
             "[random.draw] hub.I: there is no distribution \"norml\" (there are normal, uniform, lognormal); did you mean \"normal\"",
             "[random.draw] tank.r: there is no key \"mx\"",
@@ -982,7 +1091,7 @@ mod tests {
         for words in [
             "no variable \"tank.hh\"; did you mean \"tank.h\"",
             "omega cannot be set",
-            "slosh.model wants one of frozen (1)",
+            "slosh.model expects one of frozen (1)",
             "tau_cmd comes from the profile",
             "profile sine: it has no parameter \"amplitde\"",
         ] {

@@ -4,7 +4,7 @@ use anyhow::{Context, Result, bail, ensure};
 
 use crate::profile::Torque;
 use crate::table::Table;
-use host::description::Type;
+use host::description::{ModelDescription, Type};
 use host::fmi2::{Fmu, Instance};
 
 /// What is to be run.
@@ -12,6 +12,8 @@ use host::fmi2::{Fmu, Instance};
 pub struct Run {
     /// Start values by FMU name, as text; set in this order.
     pub settings: Vec<(String, String)>,
+    /// The input that the torque drives, by FMU name; `None`: none is driven.
+    pub input: Option<String>,
     /// The torque command.
     pub torque: Torque,
     /// Communication step H, s.
@@ -25,8 +27,33 @@ pub struct Run {
     pub hold: bool,
 }
 
-/// The input that carries the torque.
-const TORQUE: &str = "tau_cmd";
+/// The input that the torque drives, where an FMU has one of that name.
+pub const TORQUE: &str = "tau_cmd";
+
+/// The input of an FMU that is driven: the one `asked` for; else [`TORQUE`]; else its only Real input;
+/// else none, if it has none.
+///
+/// # Errors
+/// If there is no such input, or if several could be meant.
+pub fn driven(description: &ModelDescription, asked: Option<&str>) -> Result<Option<String>> {
+    if let Some(name) = asked {
+        let variable = description.variable(name)?;
+        ensure!(
+            variable.causality == "input" && variable.kind() == Type::Real,
+            "{name} cannot be driven: it is not a Real input"
+        );
+        return Ok(Some(name.into()));
+    }
+    let inputs = description.variables.iter();
+    let inputs = inputs.filter(|v| v.causality == "input" && v.kind() == Type::Real);
+    let names: Vec<&str> = inputs.map(|v| v.name.as_str()).collect();
+    match names[..] {
+        _ if names.contains(&TORQUE) => Ok(Some(TORQUE.into())),
+        [] => Ok(None),
+        [only] => Ok(Some(only.into())),
+        _ => bail!("the FMU has several inputs ({}): name the one to drive", names.join(", ")),
+    }
+}
 
 /// Steps between two reports of progress.
 const REPORT_EVERY: usize = 1024;
@@ -101,7 +128,9 @@ impl Run {
         for (name, value) in &self.settings {
             let variable = fmu.description().variable(name)?;
             match variable.causality.as_str() {
-                "input" if name == TORQUE => bail!("{TORQUE} comes from the profile or the file"),
+                "input" if self.input.as_ref() == Some(name) => {
+                    bail!("{name} comes from the profile or the file")
+                }
                 "parameter" | "input" => instance.set(name, value)?,
                 other => bail!(
                     "{name} cannot be set: it is of causality {other}, not a parameter or an input"
@@ -110,13 +139,15 @@ impl Run {
         }
         instance.setup_experiment(self.tolerance, self.start(), Some(self.stop))?;
         instance.enter_initialization_mode()?;
-        let reference = [fmu.description().variable(TORQUE)?.reference];
-        instance.set_real(&reference, &[self.torque.at(self.start())])?;
+        if let Some(input) = &self.input {
+            let reference = [fmu.description().variable(input)?.reference];
+            instance.set_real(&reference, &[self.torque.at(self.start())])?;
+        }
         instance.exit_initialization_mode()?;
         Ok(instance)
     }
 
-    /// Steps an initialised instance to the stop time. The table has `time`, `tau_cmd` and the
+    /// Steps an initialised instance to the stop time. The table has `time`, the driven input and the
     /// variables `columns` at every communication point. `progress` hears how many steps were
     /// made since it was last called.
     pub fn drive(
@@ -127,7 +158,13 @@ impl Run {
     ) -> Result<Table> {
         let steps = self.steps();
         let mut recorder = Recorder::new(instance, columns, steps + 1)?;
-        let torque = [instance.fmu().description().variable(TORQUE)?.reference];
+        let description = instance.fmu().description();
+        let input = match &self.input {
+            Some(name) => Some([description.variable(name)?.reference]),
+            None => None,
+        };
+        let slopes = !self.hold
+            && description.co_simulation.as_ref().is_some_and(|cs| cs.can_interpolate_inputs);
         let points = steps + 1;
         let (mut time, mut tau_cmd) = (Vec::with_capacity(points), Vec::with_capacity(points));
         let mut t = self.start();
@@ -137,14 +174,14 @@ impl Run {
             time.push(t);
             tau_cmd.push(tau);
             recorder.record(instance)?;
-            instance
-                .set_real(&torque, &[tau])
-                .and_then(|()| {
-                    if self.hold {
-                        return Ok(());
-                    }
-                    instance.set_real_input_derivatives(&torque, &[1], &[slope])
-                })
+            let set = |instance: &mut Instance| match &input {
+                None => Ok(()),
+                Some(input) => instance.set_real(input, &[tau]).and_then(|()| match slopes {
+                    true => instance.set_real_input_derivatives(input, &[1], &[slope]),
+                    false => Ok(()),
+                }),
+            };
+            set(instance)
                 .and_then(|()| instance.do_step(t, next - t))
                 .with_context(|| format!("the run stopped at t = {t} s"))?;
             t = next;
@@ -157,8 +194,11 @@ impl Run {
         tau_cmd.push(self.torque.at(t));
         recorder.record(instance)?;
 
-        let names = ["time", TORQUE].iter().chain(columns).map(|n| n.to_string()).collect();
-        Ok(Table::new(names, [vec![time, tau_cmd], recorder.columns()].concat()))
+        let driven = self.input.clone().map(|input| (input, tau_cmd));
+        let head = [("time".to_string(), time)].into_iter().chain(driven);
+        let recorded = columns.iter().map(|name| name.to_string()).zip(recorder.columns());
+        let (names, columns) = head.chain(recorded).unzip();
+        Ok(Table::new(names, columns))
     }
 }
 

@@ -37,6 +37,8 @@ pub struct ModelDescription {
 pub struct Interface {
     /// Name of the binary, without the platform's ending.
     pub model_identifier: String,
+    /// In co-simulation: whether it takes derivatives of its inputs.
+    pub can_interpolate_inputs: bool,
 }
 
 /// Element `DefaultExperiment`; times in s.
@@ -172,7 +174,10 @@ impl Reader {
     }
 
     fn interface(&mut self, element: &Element) -> Interface {
-        Interface { model_identifier: self.text(element, "modelIdentifier") }
+        Interface {
+            model_identifier: self.text(element, "modelIdentifier"),
+            can_interpolate_inputs: element.flag("canInterpolateInputs"),
+        }
     }
 
     fn item(&mut self, element: &Element) -> Item {

@@ -272,6 +272,7 @@ pub struct Fmu {
     exchange: Option<ExchangeFunctions>,
     resources: String,
     hash: String,
+    binary_hash: String,
     path: PathBuf,
     // dropped in this order: first the code, then the files
     _library: Library,
@@ -339,6 +340,9 @@ impl Fmu {
             let there = if there.is_empty() { "none".into() } else { there.join(", ") };
             bail!("{name} has no binary for this platform, {binary} (binaries in it: {there})");
         }
+        let bytes = std::fs::read(&binary_path)
+            .with_context(|| format!("{binary} in {name} cannot be read"))?;
+        let binary_hash = sha256(&bytes);
         // SAFETY: loading runs the library's initialisers; that is what opening an FMU means.
         let library = unsafe { Library::new(&binary_path) }
             .with_context(|| format!("{binary} in {name} cannot be loaded"))?;
@@ -364,6 +368,7 @@ impl Fmu {
             exchange,
             resources: format!("file://{}/resources", directory.display()),
             hash: String::new(),
+            binary_hash,
             path: path.to_path_buf(),
             _library: library,
             _directory: None,
@@ -378,6 +383,11 @@ impl Fmu {
     /// SHA-256 of the `.fmu` file, in hexadecimal digits.
     pub fn hash(&self) -> &str {
         &self.hash
+    }
+
+    /// SHA-256 of the binary that is loaded, in hexadecimal digits.
+    pub fn binary_hash(&self) -> &str {
+        &self.binary_hash
     }
 
     /// Whether its binary has all functions of model exchange.

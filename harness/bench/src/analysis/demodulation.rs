@@ -11,7 +11,7 @@
 //! turn by many cycles within the window and drop out.
 
 use super::{Complex64, FrequencyResponse};
-use crate::profile::Profile;
+use crate::profile::Sweep;
 
 /// Length of the window in cycles of the sweep. 24 cycles are 10 s at 2.4 Hz, in which the thesis's
 /// sweep moves by 9 mHz: little against the 14 mHz half-power width of the slosh at 10 cm, and long
@@ -21,7 +21,7 @@ pub const CYCLES: f64 = 24.0;
 /// Frequency responses of `outputs` to `input`, sampled at `time` (s, evenly), while `sweep` passes
 /// each of `frequencies` (Hz). Frequencies it does not pass are left out.
 pub fn frequency_responses<const N: usize>(
-    sweep: &Profile,
+    sweep: &Sweep,
     time: &[f64],
     input: &[f64],
     outputs: [&[f64]; N],

@@ -138,7 +138,13 @@ mod tests {
         for kind in ["exp-sweep", "lin-sweep"] {
             let sweep: Profile = format!("{kind}:f0=3.5,f1=1.25").parse().unwrap();
             let [time, tau, omega] = swept(&Linear::bench_10_cm(0.0029757), &sweep);
-            let [lock_in] = demodulation::frequency_responses(&sweep, &time, &tau, [&omega], &grid);
+            let [lock_in] = demodulation::frequency_responses(
+                sweep.sweep().unwrap(),
+                &time,
+                &tau,
+                [&omega],
+                &grid,
+            );
             assert_eq!(lock_in.frequency.len(), grid.len());
             let spa = spa::frequency_response(0.02, &tau, &omega, &grid, spa::LAG);
             let (lock_in, spa) = (Features::of(&lock_in), Features::of(&spa));
@@ -164,8 +170,13 @@ mod tests {
             for sweep in ["exp-sweep", "lin-sweep"] {
                 let sweep: Profile = sweep.parse().unwrap();
                 let [time, tau, omega] = swept(&plant, &sweep);
-                let [lock_in] =
-                    demodulation::frequency_responses(&sweep, &time, &tau, [&omega], &grid);
+                let [lock_in] = demodulation::frequency_responses(
+                    sweep.sweep().unwrap(),
+                    &time,
+                    &tau,
+                    [&omega],
+                    &grid,
+                );
                 let spa = spa::frequency_response(0.02, &tau, &omega, &grid, spa::LAG);
                 let (lock_in, spa) = (Features::of(&lock_in), Features::of(&spa));
                 // the acceptance figure for the dip is 2 mHz; both are several times better

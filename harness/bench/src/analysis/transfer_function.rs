@@ -31,15 +31,16 @@ pub struct TransferFunction {
 }
 
 impl TransferFunction {
-    /// Frequency of the zeros, Hz; not a number where they are real and of opposite sign.
-    pub fn zero_frequency(&self) -> f64 {
-        (self.numerator[2] / self.numerator[0]).sqrt() / TAU
+    /// Frequency of the zeros, Hz; `None` where they are real and of opposite sign.
+    pub fn zero_frequency(&self) -> Option<f64> {
+        let [b2, _, b0] = self.numerator;
+        (b0 / b2 >= 0.0).then(|| (b0 / b2).sqrt() / TAU)
     }
 
-    /// Damping ratio of the zeros.
-    pub fn zero_damping(&self) -> f64 {
+    /// Damping ratio of the zeros; `None` where they have no frequency.
+    pub fn zero_damping(&self) -> Option<f64> {
         let [b2, b1, b0] = self.numerator;
-        b1 / b2 / (2.0 * (b0 / b2).sqrt())
+        (b0 / b2 > 0.0).then(|| b1 / b2 / (2.0 * (b0 / b2).sqrt()))
     }
 
     /// Frequency of the pair of poles, Hz.
@@ -283,8 +284,8 @@ mod tests {
         let measured = plant.frequency_response(&logarithmic_grid(BAND, 2000));
         let found = TransferFunction::fit(&measured).unwrap();
         assert!(found.fit_frequency(&measured) > 99.9999);
-        assert!((found.zero_frequency() - 2.343_618_143).abs() < 1e-6, "{found:?}");
-        assert!((found.zero_damping() - 0.002_975_693).abs() < 1e-7, "{found:?}");
+        assert!((found.zero_frequency().unwrap() - 2.343_618_143).abs() < 1e-6, "{found:?}");
+        assert!((found.zero_damping().unwrap() - 0.002_975_693).abs() < 1e-7, "{found:?}");
         let (re, im): (f64, f64) = (0.052_474_564_65, 15.431_581_060_83);
         let w = re.hypot(im);
         assert!((found.pole_omega - w).abs() < 1e-5, "{found:?}");

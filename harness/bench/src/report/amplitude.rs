@@ -32,7 +32,7 @@ pub(super) fn models_over_each_other(groups: &[Group]) -> String {
             }
             for group in &groups {
                 let points = group.runs.iter().filter_map(|run| {
-                    Some((thousandths(torque_of(run)), get(run.features())? * scale))
+                    Some((thousandths(torque_of(run)), get(&run.features())? * scale))
                 });
                 series.push(Series {
                     points: points.collect(),
@@ -66,19 +66,19 @@ pub(super) fn features(group: &Group) -> String {
         let x = torque_axis(group.runs.iter().copied());
         let mut series = vec![
             Series {
-                points: points(&|run| run.h1_features),
+                points: points(&|run| run.h1_features()),
                 color: "var(--e2)".into(),
                 style: Style::OpenDots,
                 title: "Welch, H1".into(),
             },
             Series {
-                points: points(&|run| run.spa_features),
+                points: points(&|run| run.spa_features()),
                 color: "var(--e1)".into(),
                 style: Style::OpenDots,
                 title: "spa".into(),
             },
             Series {
-                points: points(&|run| run.demodulated_features),
+                points: points(&|run| run.features()),
                 color: "var(--e0)".into(),
                 style: Style::Dots,
                 title: "demodulation".into(),
@@ -154,10 +154,12 @@ pub(super) fn linear_fit(groups: &[Group]) -> String {
     out.push_str(&panels(
         groups,
         [
-            panel("Fit, frequency domain", "fit / %", |run| Some(run.fit?.fit_frequency)),
-            panel("Fit, time domain", "fit / %", |run| Some(run.fit?.fit_time)),
-            panel("Coherence of the rest", "mean coherence", |run| run.fit?.coherence),
-            panel("Signal over noise, dip", "SNR / dB", |run| Some(run.snr_db?[1])),
+            panel("Fit, frequency domain", "fit / %", |run| Some(run.fit()?.fit_frequency)),
+            panel("Fit, time domain", "fit / %", |run| Some(run.fit()?.fit_time)),
+            panel("Coherence of the rest", "mean coherence", |run| run.fit()?.coherence),
+            panel("Signal over noise, dip", "SNR / dB", |run| {
+                Some(run.record.as_ref()?.snr_db?[1])
+            }),
         ],
     ));
     out
@@ -174,13 +176,13 @@ pub(super) fn out_of_the_plane(groups: &[Group]) -> String {
         [
             Panel {
                 level: Some((rotary::ROTARY, "counts as rotary")),
-                ..panel("Swirl", "largest |swirl|", |run| Some(run.rotary?.swirl.abs()))
+                ..panel("Swirl", "largest |swirl|", |run| Some(run.rotary()?.swirl.abs()))
             },
-            panel("Time turning in the sweep", "turning / s", |run| Some(run.rotary?.time)),
+            panel("Time turning in the sweep", "turning / s", |run| Some(run.rotary()?.time)),
             panel("Off-axis energy", "Σ F_r² / Σ (F_r² + F_t²)", |run| {
-                Some(run.off_axis?.energy)
+                Some(run.off_axis()?.energy)
             }),
-            panel("Leakage", "rms of r|F_r|/|τ|", |run| Some(run.off_axis?.leakage)),
+            panel("Leakage", "rms of r|F_r|/|τ|", |run| Some(run.off_axis()?.leakage)),
         ],
     ));
     out

@@ -1,10 +1,8 @@
 //! Heat maps over frequency and torque (thesis figures 7.11 to 7.16).
 
 use super::*;
+use crate::campaign::Curve;
 use crate::svg::HeatMap;
-
-/// Values over the frequency (Hz).
-type Curve = Vec<(f64, f64)>;
 
 /// One quantity: its name, its unit, what it is of a run, and the ends of its scale if they are
 /// not those of the values.
@@ -21,25 +19,33 @@ pub(super) fn maps(groups: &[Group]) -> String {
         Quantity {
             title: "Magnitude |H|",
             unit: "dB",
-            of: |run| zip(&run.demodulated.frequency, &run.demodulated.decibels()),
+            of: |run| passing(run),
             ends: Some((-40.0, 10.0)),
         },
         Quantity {
             title: "Residual-input coherence",
             unit: "γ²",
-            of: |run| run.coherence_over_band.clone(),
+            of: |run| {
+                let fit = run.record.as_ref().and_then(|record| record.fit.as_ref());
+                fit.map_or(Curve::new(), |(_, coherence)| coherence.clone())
+            },
             ends: Some((0.0, 1.0)),
         },
         Quantity {
             title: "Signal over noise",
             unit: "dB",
-            of: |run| run.snr_over_band.clone(),
+            of: |run| {
+                run.record.as_ref().map_or(Curve::new(), |record| record.snr_over_band.clone())
+            },
             ends: Some((-10.0, 60.0)),
         },
         Quantity {
             title: "Leakage",
             unit: "r|F_r|/|τ|",
-            of: |run| zip(&run.demodulated.frequency, &run.leakage),
+            of: |run| {
+                let passing = run.passing.as_ref();
+                passing.map_or(Curve::new(), |p| zip(&p.rate.response.frequency, &p.leakage))
+            },
             ends: None,
         },
     ];
@@ -60,7 +66,7 @@ pub(super) fn maps(groups: &[Group]) -> String {
         })
         .collect();
     for group in groups {
-        let (from, to) = group.sweep.and_then(Profile::band).unwrap_or(BAND);
+        let (from, to) = group.sweep.map(Sweep::band).unwrap_or(BAND);
         out.push_str(&group.heading());
         out.push_str("<div class=\"four\">\n");
         for (quantity, scale) in quantities.iter().zip(&scales) {

@@ -17,9 +17,9 @@ use anyhow::Result;
 
 use crate::analysis::features::Features;
 use crate::analysis::{BAND, FrequencyResponse, demodulation, logarithmic_grid, rotary, spa};
-use crate::campaign::{Campaign, Outcome, Results};
+use crate::campaign::{Campaign, Curve, Outcome, Results};
 use crate::plan::{Plan, thousandths};
-use crate::profile::{Profile, Torque};
+use crate::profile::{Sweep, Torque};
 use crate::svg::{Axis, Chart, Series, Style};
 use host::fmi2::Fmu;
 use host::html::escape;
@@ -40,7 +40,7 @@ struct Group<'a> {
     others: Vec<String>,
     runs: Vec<&'a Outcome>,
     /// The sweep of its first run.
-    sweep: Option<&'a Profile>,
+    sweep: Option<&'a Sweep>,
     /// Features of the exact linear response on the same grid.
     exact: Features,
     exact_response: FrequencyResponse,
@@ -63,10 +63,16 @@ impl Group<'_> {
     }
 }
 
+/// Level in dB over the frequency while the sweep passes.
+fn passing(run: &Outcome) -> Curve {
+    let response = run.passing.as_ref().map(|passing| &passing.rate.response);
+    response.map_or(Curve::new(), |r| zip(&r.frequency, &r.decibels()))
+}
+
 /// The sweep that drives a run, if it is one.
-fn sweep(run: &Outcome) -> Option<&Profile> {
+fn sweep(run: &Outcome) -> Option<&Sweep> {
     match &*run.case.torque {
-        Torque::Profile(profile) if profile.is_sweep() => Some(profile),
+        Torque::Profile(profile) => profile.sweep(),
         _ => None,
     }
 }
@@ -88,19 +94,17 @@ fn groups<'a>(plan: &Plan, results: &'a Results) -> Vec<Group<'a>> {
         let key: Vec<String> =
             values.map(|(i, name)| format!("{name} = {}", run.case.varied[*i])).collect();
         let same = |g: &&mut Group| {
-            g.model == run.case.model
-                && g.fill.is_none_or(|fill| fill == run.case.fill)
-                && g.others == key
+            g.model == run.model && g.fill.is_none_or(|fill| fill == run.fill) && g.others == key
         };
         match groups.iter_mut().find(same) {
             Some(group) => group.runs.push(run),
             None => {
                 let sweep = sweep(run);
-                let band = sweep.and_then(Profile::band).unwrap_or(BAND);
+                let band = sweep.map(Sweep::band).unwrap_or(BAND);
                 let exact_response = run.linear.frequency_response(&logarithmic_grid(band, 2000));
                 groups.push(Group {
-                    model: &run.case.model,
-                    fill: (!drawn_fill).then_some(run.case.fill),
+                    model: &run.model,
+                    fill: (!drawn_fill).then_some(run.fill),
                     others: key,
                     runs: vec![run],
                     sweep,

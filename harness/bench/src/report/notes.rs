@@ -36,10 +36,10 @@ pub(super) fn estimators(groups: &[Group]) -> String {
             rate * 1e3,
             width / rate,
             1.0 / (TAU * mode.damping * mode.frequency),
-            hertz(run.demodulated_features.f_res),
-            shift(run.demodulated_features.f_res),
-            hertz(run.spa_features.f_res),
-            shift(run.spa_features.f_res),
+            hertz(run.features().f_res),
+            shift(run.features().f_res),
+            hertz(run.spa_features().f_res),
+            shift(run.spa_features().f_res),
         );
     }
     out.push_str("</tbody></table></div>\n<p>The second estimator is the proof. For a linear plant the ratio of whole-record spectra is the frequency response however fast the input swept, because the ringing after the peak is in the record too; and there the shift is gone. The dip hardly moves in either: there the hub stands nearly still, so there is little that could ring; only at the smallest torques, where the bearing sticks near the dip, does the sweep see it a few mHz late. When runs of a nonlinear model are compared, both views count: demodulation says what happened at that moment, <code>spa</code> gives the best linear summary of the whole.</p>\n");
@@ -65,19 +65,19 @@ pub(super) fn table(plan: &Plan, results: &Results) -> String {
         let _ = write!(
             out,
             "<tr><td>{}</td><td>{}</td><td>{}</td>",
-            escape(&run.case.model),
-            cm(run.case.fill),
+            escape(&run.model),
+            cm(run.fill),
             run.case.amplitude.map_or(String::new(), |a| thousandths(a).to_string())
         );
         for (place, _) in &others {
             let _ = write!(out, "<td>{}</td>", escape(&shortened(&run.case.varied[*place])));
         }
-        for (features, response) in
-            [(&run.demodulated_features, &run.demodulated), (&run.spa_features, &run.spa)]
+        for (features, looked) in
+            [(run.features(), run.passing.is_some()), (run.spa_features(), run.record.is_some())]
         {
             let cell = |value: Option<f64>, digits: usize| match value {
                 Some(value) => format!("<td>{value:.digits$}</td>"),
-                None if response.frequency.is_empty() => "<td></td>".into(),
+                None if !looked => "<td></td>".into(),
                 None => "<td>none</td>".into(),
             };
             out.push_str(&cell(features.f_dip, 4));

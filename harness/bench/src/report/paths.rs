@@ -5,21 +5,25 @@ use crate::campaign::SloshPath;
 
 /// For each group whose liquid can leave its plane: the last run in which it does not turn, the
 /// beginning of turning in the first in which it does, and the largest wave of the last.
-pub(super) fn paths(groups: &[Group]) -> String {
+pub(super) fn paths<'a>(groups: &[Group<'a>]) -> String {
     let mut out = String::new();
     for group in groups {
-        let Some(first) = group.runs.iter().position(|run| !run.path.onset.is_empty()) else {
+        let path = |run: &'a Outcome| run.passing.as_ref().map(|passing| &passing.path);
+        let onset = |run: &'a Outcome| path(run)?.onset.as_ref();
+        let Some((first, rotary, begins)) =
+            group.runs.iter().enumerate().find_map(|(i, run)| Some((i, *run, onset(run)?)))
+        else {
             continue;
         };
-        let (turning, last) = (&group.runs[first], &group.runs[group.runs.len() - 1]);
+        let last = group.runs[group.runs.len() - 1];
         let mut charts = Vec::new();
         let title =
             |what: &str, run: &Outcome| format!("{what}, {} mN·m", thousandths(torque_of(run)));
-        if let Some(planar) = first.checked_sub(1).map(|i| &group.runs[i]) {
-            charts.push((title("In its plane", planar), &planar.path.largest));
+        if let Some(planar) = first.checked_sub(1).map(|i| group.runs[i]) {
+            charts.extend(path(planar).map(|p| (title("Planar slosh", planar), &p.largest)));
         }
-        charts.push((title("It begins to turn", turning), &turning.path.onset));
-        charts.push((title("Largest wave", last), &last.path.largest));
+        charts.push((title("Onset of rotary slosh", rotary), begins));
+        charts.extend(path(last).map(|p| (title("Largest wave", last), &p.largest)));
         let _ = writeln!(out, "{}<div class=\"three\">", group.heading());
         for (title, path) in charts {
             out.push_str(&chart(title, path, colors::model_color(group.model)).svg());

@@ -27,7 +27,7 @@ pub(super) fn models_over_each_other<'a>(groups: &[&Group<'a>]) -> String {
                 .filter_map(|group| {
                     let run = end(group)?;
                     Some(Series {
-                        points: zip(&run.demodulated.frequency, &run.demodulated.decibels()),
+                        points: passing(run),
                         color: colors::model_color(group.model),
                         style: Style::Line,
                         title: group.model.into(),
@@ -36,7 +36,7 @@ pub(super) fn models_over_each_other<'a>(groups: &[&Group<'a>]) -> String {
                 .collect();
             let exact_response = &models[0].exact_response;
             series.push(exact(zip(&exact_response.frequency, &exact_response.decibels())));
-            let (from, to) = models[0].sweep.and_then(Profile::band).unwrap_or(BAND);
+            let (from, to) = models[0].sweep.map(Sweep::band).unwrap_or(BAND);
             let levels = series.iter().flat_map(|s| &s.points).map(|(_, y)| *y);
             let y = Axis::linear("|H| / dB re 1 (rad/s)/(N·m)", levels, 10.0, 6);
             let torque = end(models[0]).map_or(0.0, |run| thousandths(torque_of(run)));
@@ -63,7 +63,7 @@ pub(super) fn responses(group: &Group, amplitudes: &[f64]) -> String {
             .runs
             .iter()
             .map(|run| Series {
-                points: of(&run.demodulated),
+                points: run.passing.as_ref().map_or(Curve::new(), |p| of(&p.rate.response)),
                 color: colors::amplitude_color(amplitudes, torque_of(run)),
                 style: Style::Line,
                 title: format!("{} mN·m", thousandths(torque_of(run))),
@@ -74,7 +74,7 @@ pub(super) fn responses(group: &Group, amplitudes: &[f64]) -> String {
     };
     let levels = || curves(&level).into_iter().flat_map(|s| s.points).map(|(_, y)| y);
     let size = (560.0, 330.0);
-    let (from, to) = group.sweep.and_then(Profile::band).unwrap_or(BAND);
+    let (from, to) = group.sweep.map(Sweep::band).unwrap_or(BAND);
     let band = Axis::logarithmic("frequency / Hz", (from, to), &frequency_ticks(from, to));
     let dip = group.exact.f_dip.unwrap_or(from);
     let peak = group.exact.f_res.unwrap_or(to);
@@ -135,7 +135,7 @@ fn degrees_axis(series: &[Series]) -> Axis {
 
 /// The peak of the run with the largest torque, as each estimator sees it.
 fn estimator_chart(group: &Group, size: (f64, f64)) -> Chart {
-    let seen = group.runs.last().and_then(|run| run.spa_features.f_res);
+    let seen = group.runs.last().and_then(|run| run.spa_features().f_res);
     let peak = seen.or(group.exact.f_res).unwrap_or(BAND.1);
     let x = Axis::linear("frequency / Hz", [peak - 0.04, peak + 0.06], 0.1, 5);
     let inside = |points: Vec<(f64, f64)>| -> Vec<(f64, f64)> {
@@ -145,21 +145,23 @@ fn estimator_chart(group: &Group, size: (f64, f64)) -> Chart {
         inside(r.frequency.iter().zip(&r.response).map(|(f, h)| (*f, h.norm())).collect())
     };
     let mut series = Vec::new();
-    if let Some(run) = group.runs.last() {
+    let last = group.runs.last();
+    let both = last.and_then(|run| Some((run.passing.as_ref()?, run.record.as_ref()?)));
+    if let Some((passing, record)) = both {
         series.push(Series {
-            points: magnitude(&run.demodulated),
+            points: magnitude(&passing.rate.response),
             color: "var(--e0)".into(),
             style: Style::Line,
             title: "while the sweep passes".into(),
         });
         series.push(Series {
-            points: magnitude(&run.spa),
+            points: magnitude(&record.spa.response),
             color: "var(--e1)".into(),
             style: Style::Dashed,
             title: "whole record (spa)".into(),
         });
         series.push(Series {
-            points: magnitude(&run.h1),
+            points: magnitude(&record.h1.response),
             color: "var(--e2)".into(),
             style: Style::Dashed,
             title: "whole record (Welch, H1)".into(),

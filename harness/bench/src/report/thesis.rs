@@ -72,31 +72,37 @@ fn ends(group: &Group, of: fn(&Outcome) -> Option<f64>) -> Option<(f64, f64, f64
 }
 
 fn fit_frequency(run: &Outcome) -> Option<f64> {
-    Some(run.fit?.fit_frequency)
+    Some(run.fit()?.fit_frequency)
 }
 
 fn fit_time(run: &Outcome) -> Option<f64> {
-    Some(run.fit?.fit_time)
+    Some(run.fit()?.fit_time)
 }
 
 fn coherence(run: &Outcome) -> Option<f64> {
-    run.fit?.coherence
+    run.fit()?.coherence
 }
 
 fn notch(run: &Outcome) -> Option<f64> {
-    run.spa_features.notch_db
+    run.spa_features().notch_db
 }
 
 /// Mean signal-to-noise ratio over the band, dB.
 fn snr(run: &Outcome) -> Option<f64> {
-    let values: Vec<f64> =
-        run.snr_over_band.iter().map(|(_, v)| *v).filter(|v| v.is_finite()).collect();
+    let values: Vec<f64> = run
+        .record
+        .as_ref()?
+        .snr_over_band
+        .iter()
+        .map(|(_, v)| *v)
+        .filter(|v| v.is_finite())
+        .collect();
     (!values.is_empty()).then(|| mean(&values))
 }
 
 /// The smallest torque at which the liquid turns, N·m.
 fn onset(group: &Group) -> Option<f64> {
-    let turns = |run: &&&Outcome| run.rotary.is_some_and(|rotary| rotary.from.is_some());
+    let turns = |run: &&&Outcome| run.rotary().is_some_and(|rotary| rotary.from.is_some());
     group.runs.iter().find(turns).map(|run| torque_of(run))
 }
 
@@ -107,7 +113,7 @@ const STATEMENTS: &[Statement] = &[
         says: "With growing torque peak and dip move apart: Δf grows.",
         rule: "Δf (spa) grows by more than 20 mHz from 0.05 to 0.25 N·m",
         shows: |group| {
-            let delta = |torque| at(group, torque)?.spa_features.delta_f();
+            let delta = |torque| at(group, torque)?.spa_features().delta_f();
             let (low, high) = (delta(0.05)?, delta(MOST)?);
             Some((format!("{:.0} → {:.0} mHz", low * 1e3, high * 1e3), high - low > 0.02))
         },
@@ -119,8 +125,8 @@ const STATEMENTS: &[Statement] = &[
         says: "Peak and dip hardly depend on the torque; Δf is constant beyond the smallest torques.",
         rule: "both (spa) stay within 4 mHz from 0.05 N·m up",
         shows: |group| {
-            let peak = spread(&from(group, 0.05, |run| run.spa_features.f_res)?);
-            let dip = spread(&from(group, 0.05, |run| run.spa_features.f_dip)?);
+            let peak = spread(&from(group, 0.05, |run| run.spa_features().f_res)?);
+            let dip = spread(&from(group, 0.05, |run| run.spa_features().f_dip)?);
             let text = format!("dip {:.1}, peak {:.1} mHz", dip * 1e3, peak * 1e3);
             Some((text, dip < 4e-3 && peak < 4e-3))
         },
@@ -149,7 +155,7 @@ const STATEMENTS: &[Statement] = &[
         rule: "|f_res − exact linear| (spa) stays below 0.1 Hz from 0.1 N·m up",
         shows: |group| {
             let exact = group.exact.f_res?;
-            let peaks = from(group, 0.1, |run| run.spa_features.f_res)?;
+            let peaks = from(group, 0.1, |run| run.spa_features().f_res)?;
             let away = peaks.iter().map(|f| f - exact);
             let most = away.fold(0.0, |m: f64, d| if d.abs() > m.abs() { d } else { m });
             Some((format!("up to {:+.1} mHz", most * 1e3), most.abs() < 0.1))
@@ -298,8 +304,14 @@ const STATEMENTS: &[Statement] = &[
         shows: |group| {
             let peak = group.exact.f_res?;
             let run = at(group, MOST)?;
-            let (near, rest): (Vec<_>, Vec<_>) =
-                run.coherence_over_band.iter().partition(|(f, _)| (f - peak).abs() < 0.2);
+            let (near, rest): (Vec<_>, Vec<_>) = run
+                .record
+                .as_ref()?
+                .fit
+                .as_ref()?
+                .1
+                .iter()
+                .partition(|(f, _)| (f - peak).abs() < 0.2);
             let values =
                 |points: Vec<(f64, f64)>| points.iter().map(|(_, v)| *v).collect::<Vec<_>>();
             let (near, rest) = (mean(&values(near)), mean(&values(rest)));
@@ -329,7 +341,7 @@ const STATEMENTS: &[Statement] = &[
         says: "Leakage off the axis rises again at large torque.",
         rule: "at 0.25 N·m more than twice that at 0.05 N·m",
         shows: |group| {
-            let leakage = |torque| Some(at(group, torque)?.off_axis?.leakage);
+            let leakage = |torque| Some(at(group, torque)?.off_axis()?.leakage);
             let (low, high) = (leakage(0.05)?, leakage(MOST)?);
             Some((format!("{low:.4} → {high:.4}"), high > 2.0 * low && high > 1e-3))
         },
@@ -344,7 +356,8 @@ const STATEMENTS: &[Statement] = &[
             let run = at(group, MOST)?;
             let peak = group.exact.f_res?;
             let (mut near, mut all) = (0.0, 0.0);
-            for (f, l) in run.demodulated.frequency.iter().zip(&run.leakage) {
+            let passing = run.passing.as_ref()?;
+            for (f, l) in passing.rate.response.frequency.iter().zip(&passing.leakage) {
                 let square = l * l;
                 all += square;
                 near += if (f - peak).abs() < 0.3 { square } else { 0.0 };
@@ -386,7 +399,7 @@ const STATEMENTS: &[Statement] = &[
             let turning = group
                 .runs
                 .iter()
-                .filter_map(|run| Some(run.rotary?.from? - run.demodulated_features.f_dip?));
+                .filter_map(|run| Some(run.rotary()?.from? - run.features().f_dip?));
             let least = turning.fold(f64::MAX, f64::min);
             let never = "never turns".to_string();
             Some(if least < f64::MAX {
@@ -404,7 +417,7 @@ const STATEMENTS: &[Statement] = &[
         rule: "at 0.2 N·m it turns for less than 90 % of the time between first and last",
         shows: |group| {
             let run = at(group, 0.2)?;
-            let rotary = run.rotary?;
+            let rotary = run.rotary()?;
             let Some(between) = rotary.from.zip(rotary.to) else {
                 return Some(("never turns".into(), false));
             };
@@ -421,7 +434,7 @@ const STATEMENTS: &[Statement] = &[
         says: "The sweep is slow enough to show the steady response.",
         rule: "while the sweep passes, the peak at 0.25 N·m stands within 5 mHz of the exact linear one",
         shows: |group| {
-            let shift = at(group, MOST)?.demodulated_features.f_res? - group.exact.f_res?;
+            let shift = at(group, MOST)?.features().f_res? - group.exact.f_res?;
             Some((format!("{:+.0} mHz", shift * 1e3), shift.abs() < 5e-3))
         },
         why: "See below why the swept peak stands higher. The whole record (spa) is free of it.",
@@ -429,14 +442,14 @@ const STATEMENTS: &[Statement] = &[
 ];
 
 fn softening(group: &Group) -> Option<Shown> {
-    let peak = |torque| at(group, torque)?.spa_features.f_res;
+    let peak = |torque| at(group, torque)?.spa_features().f_res;
     let (low, high) = (peak(LEAST)?, peak(0.05)?);
     Some((format!("{:+.1} mHz", (high - low) * 1e3), low - high > 1e-3))
 }
 
 fn notch_trend(group: &Group, sign: f64) -> Option<Shown> {
     let (low, high) = thirds(group, notch)?;
-    let (swept_low, swept_high) = thirds(group, |run| run.demodulated_features.notch_db)?;
+    let (swept_low, swept_high) = thirds(group, |run| run.features().notch_db)?;
     let text = format!("{low:.1} → {high:.1} ({swept_low:.1} → {swept_high:.1}) dB");
     Some((text, (high - low) * sign > 0.5))
 }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail, ensure};
 use bench::campaign::Campaign;
-use bench::plan::{self, Plan};
+use bench::plan::{self, Plan, Sweeps};
 use bench::report;
 use host::fmi2::Fmu;
 
@@ -95,27 +95,17 @@ impl CampaignArgs {
                 "{name} is what the campaign varies; use --model, --fills, --amplitudes"
             );
         }
-        let kind = match self.sweep {
-            Sweep::Exponential => "exp-sweep",
-            Sweep::Linear => "lin-sweep",
-        };
-        let mut table = toml::Table::new();
-        table.insert("title".into(), "Sweeps at several fills and amplitudes".into());
-        table.insert("profile".into(), format!("{kind}:f0=1.25,f1=3.5,duration=2700").into());
-        if let Some(tolerance) = self.tolerance {
-            table.insert("tolerance".into(), tolerance.into());
-        }
-        let settings =
-            self.settings.iter().map(|(name, value)| (name.clone(), value.as_str().into()));
-        table.insert("set".into(), settings.collect::<toml::Table>().into());
-        let vary = [
-            ("slosh.model", toml::Value::from(self.model.clone())),
-            ("tank.h", self.fills.clone().into()),
-            ("profile.amplitude", self.amplitudes.clone().into()),
-        ];
-        let vary = vary.into_iter().map(|(name, values)| (name.to_string(), values));
-        table.insert("vary".into(), vary.collect::<toml::Table>().into());
-        Plan::parse(&toml::to_string(&table)?)
+        Plan::sweeps(Sweeps {
+            models: self.model.clone(),
+            fills: self.fills.clone(),
+            amplitudes: self.amplitudes.clone(),
+            profile: match self.sweep {
+                Sweep::Exponential => "exp-sweep",
+                Sweep::Linear => "lin-sweep",
+            },
+            set: self.settings.clone(),
+            tolerance: self.tolerance,
+        })
     }
 }
 
@@ -125,16 +115,20 @@ pub fn drive(fmu: &Fmu, campaign: &Campaign) -> Result<()> {
     let results = campaign.execute(fmu, &|news| progress::show(&bar, news))?;
     bar.finish_and_clear();
     campaign.write_tables(fmu, &results)?;
-    let page = campaign.out.join("report.html");
-    report::write(&page, campaign, fmu, &results)?;
-    let reused = results.outcomes.iter().filter(|o| o.reused).count();
-    println!(
-        "{} runs made, {reused} were there already\nfeatures: {}\nruns:     {}\nreport:   {}",
-        results.outcomes.len() - reused,
-        campaign.out.join("features.csv").display(),
-        campaign.out.join("runs.csv").display(),
-        page.display(),
-    );
+    let (all, reused) = results.counts();
+    println!("{} runs simulated, {reused} reused", all - reused);
+    let file = |name: &str| campaign.out.join(name);
+    if results.unanalysed.is_empty() {
+        let page = file("report.html");
+        report::write(&page, campaign, fmu, &results)?;
+        println!("features: {}", file("features.csv").display());
+        println!("runs:     {}\nreport:   {}", file("runs.csv").display(), page.display());
+    } else {
+        println!(
+            "runs:     {} (the FMU is not the bench: no analysis)",
+            file("runs.csv").display()
+        );
+    }
     for failure in &results.failures {
         eprintln!("{} failed: {}", failure.case.name, failure.reason);
     }

@@ -5,8 +5,9 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use bench::profile::{self, Torque, Written};
-use bench::run::Run;
+use bench::run::{Run, driven};
 use bench::table;
+use host::description::{ModelDescription, Type};
 use host::fmi2::Fmu;
 
 use super::{DEFAULT_FMU, setting};
@@ -42,13 +43,12 @@ pub struct RunArgs {
     /// Hold the torque between rows and over each step, instead of joining by lines.
     #[arg(long)]
     hold: bool,
-    /// Variables to record beside time and tau_cmd.
-    #[arg(
-        long,
-        value_name = "NAME,…",
-        value_delimiter = ',',
-        default_value = "omega,omega_imu,slosh_angle,slosh_angle_radial"
-    )]
+    /// Input that the torque drives [default: tau_cmd, or the FMU's only Real input].
+    #[arg(long, value_name = "NAME")]
+    drive: Option<String>,
+    /// Variables to record beside time and the driven input [default:
+    /// omega,omega_imu,slosh_angle,slosh_angle_radial; all outputs of an FMU without these].
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     columns: Vec<String>,
     /// The FMU.
     #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
@@ -62,6 +62,7 @@ impl RunArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
         table::check_ending(&self.out)?;
+        let fmu = Fmu::open(&self.fmu)?;
         let torque = match (&self.profile, &self.input) {
             (Some(profile), _) => profile.parse::<Written>()?.torque()?,
             (None, Some(path)) => Torque::read(path, self.hold)?,
@@ -69,15 +70,19 @@ impl RunArgs {
         };
         let run = Run {
             settings: self.settings,
+            input: driven(fmu.description(), self.drive.as_deref())?,
             stop: self.stop.unwrap_or(torque.span().1),
             torque,
             step: self.step,
             tolerance: self.tolerance,
             hold: self.hold,
         };
-        let fmu = Fmu::open(&self.fmu)?;
         let mut instance = run.initialise(&fmu)?;
-        let columns: Vec<&str> = self.columns.iter().map(String::as_str).collect();
+        let columns = match self.columns.is_empty() {
+            true => default_columns(fmu.description()),
+            false => self.columns,
+        };
+        let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
         let bar = progress::of_steps()?;
         bar.set_length(run.steps() as u64);
         let table = run.drive(&mut instance, &columns, |steps| bar.inc(steps))?;
@@ -91,6 +96,16 @@ impl RunArgs {
         println!("{} rows in {}", table.rows(), self.out.display());
         Ok(())
     }
+}
+
+/// What people look at first: of the bench four signals, of another FMU all outputs that are numbers.
+fn default_columns(description: &ModelDescription) -> Vec<String> {
+    const BENCH: [&str; 4] = ["omega", "omega_imu", "slosh_angle", "slosh_angle_radial"];
+    if BENCH.iter().all(|name| description.variable(name).is_ok()) {
+        return BENCH.map(String::from).into();
+    }
+    let outputs = description.variables.iter().filter(|v| v.causality == "output");
+    outputs.filter(|v| v.kind() != Type::String).map(|v| v.name.clone()).collect()
 }
 
 fn help() -> String {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use bench::profile::{self, Written};
 use bench::run::Run;
 use bench::table;
@@ -17,8 +17,8 @@ use bench::table;
 #[command(after_help = help())]
 pub struct TorqueArgs {
     /// Torque profile, name:key=value,…
-    #[arg(long, value_name = "PROFILE")]
-    profile: String,
+    #[arg(long, value_name = "PROFILE", required_unless_present = "profiles")]
+    profile: Option<String>,
     /// Time between rows, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.02)]
     step: f64,
@@ -26,17 +26,26 @@ pub struct TorqueArgs {
     #[arg(long, value_name = "SECONDS")]
     stop: Option<f64>,
     /// Where to put the torque, .csv or .parquet.
-    #[arg(long, value_name = "FILE")]
-    out: PathBuf,
+    #[arg(long, value_name = "FILE", required_unless_present = "profiles")]
+    out: Option<PathBuf>,
+    /// Lists the profiles as a Markdown table and writes nothing.
+    #[arg(long)]
+    profiles: bool,
 }
 
 impl TorqueArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        table::check_ending(&self.out)?;
-        let torque = self.profile.parse::<Written>()?.torque()?;
+        if self.profiles {
+            print!("{}", profile::table());
+            return Ok(());
+        }
+        let (profile, out) = self.profile.zip(self.out).context("nothing to write")?;
+        table::check_ending(&out)?;
+        let torque = profile.parse::<Written>()?.torque()?;
         let run = Run {
             settings: Vec::new(),
+            input: None,
             stop: self.stop.unwrap_or(torque.span().1),
             torque,
             step: self.step,
@@ -45,8 +54,8 @@ impl TorqueArgs {
         };
         run.check()?;
         let table = run.torque_table();
-        table.write(&self.out, &BTreeMap::from([("profile".into(), self.profile.clone())]))?;
-        println!("{} rows in {}", table.rows(), self.out.display());
+        table.write(&out, &BTreeMap::from([("profile".into(), profile)]))?;
+        println!("{} rows in {}", table.rows(), out.display());
         Ok(())
     }
 }

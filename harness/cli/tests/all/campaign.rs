@@ -80,15 +80,15 @@ fn files_have_the_names_and_columns_others_build_on_and_a_second_start_finds_the
     // a second start makes only what is missing, broken, or of another recipe
     let made = || std::fs::metadata(&run).unwrap().modified().unwrap();
     let first = made();
-    assert!(String::from_utf8_lossy(&campaign(directory, &short).stdout).contains("2 were there"));
+    assert!(String::from_utf8_lossy(&campaign(directory, &short).stdout).contains("2 reused"));
     assert_eq!(made(), first);
     assert_eq!(std::fs::read_to_string(directory.join("c/features.csv")).unwrap(), text);
     let half = std::fs::read(&run).unwrap();
     std::fs::write(&run, &half[..half.len() / 2]).unwrap();
-    assert!(String::from_utf8_lossy(&campaign(directory, &short).stdout).contains("1 were there"));
+    assert!(String::from_utf8_lossy(&campaign(directory, &short).stdout).contains("1 reused"));
     assert_eq!(Table::read(&run, &columns).unwrap(), table, "the same run, bit for bit");
     let other = [&short[..], &["--tolerance", "1e-6"]].concat();
-    assert!(String::from_utf8_lossy(&campaign(directory, &other).stdout).contains("0 were there"));
+    assert!(String::from_utf8_lossy(&campaign(directory, &other).stdout).contains("0 reused"));
 }
 
 #[test]

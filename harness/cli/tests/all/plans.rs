@@ -76,7 +76,7 @@ fn a_killed_campaign_goes_on_where_it_stopped() {
     }
     let said = successful(campaign(directory, &plan, "killed", &[])).stdout;
     let said = String::from_utf8_lossy(&said);
-    assert!(said.contains(&format!("{} were there already", left.len())), "{said}");
+    assert!(said.contains(&format!("{} reused", left.len())), "{said}");
     successful(campaign(directory, &plan, "whole", &[]));
     for file in ["features.csv", "features_spa.csv", "runs.csv", "plan.toml"] {
         let [killed, whole] = ["killed", "whole"].map(|d| text(directory, &format!("{d}/{file}")));
@@ -146,7 +146,7 @@ fn runs_made_by_another_importer_from_the_list_give_the_same_tables() {
     }
 
     let said = successful(campaign(directory, &plan, "theirs", &[])).stdout;
-    assert!(String::from_utf8_lossy(&said).contains("0 runs made, 24 were there already"));
+    assert!(String::from_utf8_lossy(&said).contains("0 runs simulated, 24 reused"));
     successful(campaign(directory, &plan, "ours", &[]));
     for file in ["features.csv", "features_spa.csv", "runs.csv"] {
         let [theirs, ours] = ["theirs", "ours"].map(|d| text(directory, &format!("{d}/{file}")));
@@ -162,13 +162,13 @@ fn a_stored_run_of_another_recipe_is_made_again_and_why_is_said() {
     successful(campaign(directory, plan, "c", &[]));
     let changed = plan.replace("0.3", "0.4");
     let done = successful(campaign(directory, &changed, "c", &[]));
-    assert!(String::from_utf8_lossy(&done.stdout).contains("1 runs made, 0 were there"));
+    assert!(String::from_utf8_lossy(&done.stdout).contains("1 runs simulated, 0 reused"));
     // without its columns for the tables it does not count either
     let run = directory.join("c/runs/a.parquet");
     let notes = bench::table::notes(&run).unwrap();
     Table::read(&run, &["time", "omega"]).unwrap().write(&run, &notes).unwrap();
     let done = successful(campaign(directory, &changed, "c", &[]));
-    assert!(String::from_utf8_lossy(&done.stdout).contains("1 runs made, 0 were there"));
+    assert!(String::from_utf8_lossy(&done.stdout).contains("1 runs simulated, 0 reused"));
 }
 
 #[test]
@@ -248,7 +248,7 @@ fn the_command_in_the_report_makes_the_same_tables_again() {
     std::fs::remove_file(directory.join("dist/campaign/runs.csv")).unwrap();
     let arguments: Vec<&str> = ["campaign"].into_iter().chain(command.split(' ')).collect();
     let said = successful(hubslosh(directory, &arguments)).stdout;
-    assert!(String::from_utf8_lossy(&said).contains("1 runs made"));
+    assert!(String::from_utf8_lossy(&said).contains("1 runs simulated"));
     assert_eq!(text(directory, "dist/campaign/runs.csv"), before);
     assert!(before.contains("linear_100mm_100"));
 }

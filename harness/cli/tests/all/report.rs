@@ -67,7 +67,12 @@ fn a_linear_liquid_keeps_dip_and_peak_from_0_05_newton_metres_on() {
             assert!(spread(&values[1..]) < 4e-3, "{name}: {values:?}");
         }
     }
-    assert!(swept.iter().filter(|row| row["model"] == "linear").all(|row| row["rotary_s"] == "0"));
+    assert!(
+        swept
+            .iter()
+            .filter(|row| row["model"] == "linear")
+            .all(|row| row["rotary_s"].parse() == Ok(0.0))
+    );
 }
 
 #[test]
@@ -144,7 +149,7 @@ fn the_page_is_well_formed_and_has_every_panel() {
         "Residual-input coherence",
         "Leakage",
         "The wave seen from above",
-        "It begins to turn, 150 mN·m",
+        "Onset of rotary slosh, 150 mN·m",
         "Largest wave, 250 mN·m",
         "Welch, H1",
     ] {

@@ -9,6 +9,7 @@
 
 use std::f64::consts::TAU;
 
+use super::shape::Shape;
 use crate::random::Random;
 
 /// Number of sines. Over the thesis's band they stand 4.4 mHz apart, closer than the 5 mHz that
@@ -28,10 +29,8 @@ pub struct Noise {
     pub exponent: f64,
     /// Which of the noises of this kind.
     pub seed: u64,
-    /// Largest torque, N·m; beyond it the noise is cut off.
+    /// Largest torque, N·m; beyond it the noise is clipped.
     pub limit: f64,
-    /// Length, s.
-    pub duration: f64,
     tones: Vec<Tone>,
 }
 
@@ -47,14 +46,7 @@ struct Tone {
 
 impl Noise {
     /// A noise of that kind; the parameters are those of the fields.
-    pub fn new(
-        rms: f64,
-        (f0, f1): (f64, f64),
-        exponent: f64,
-        seed: u64,
-        limit: f64,
-        duration: f64,
-    ) -> Self {
+    pub fn new(rms: f64, (f0, f1): (f64, f64), exponent: f64, seed: u64, limit: f64) -> Self {
         let mut random = Random::new(seed, 0);
         let cell = (f1 - f0) / TONES as f64;
         let mut tones: Vec<Tone> = (0..TONES)
@@ -71,17 +63,22 @@ impl Noise {
         for tone in &mut tones {
             tone.amplitude *= rms / power.sqrt();
         }
-        Noise { rms, f0, f1, exponent, seed, limit, duration, tones }
+        Noise { rms, f0, f1, exponent, seed, limit, tones }
     }
+}
 
-    /// Torque at `t` (s), N·m.
-    pub fn at(&self, t: f64) -> f64 {
+impl Shape for Noise {
+    fn after(&self, t: f64) -> f64 {
         let sum: f64 = self
             .tones
             .iter()
             .map(|tone| tone.amplitude * libm::sin(tone.rate * t + tone.phase))
             .sum();
         sum.clamp(-self.limit, self.limit)
+    }
+
+    fn band(&self) -> Option<(f64, f64)> {
+        Some((self.f0, self.f1))
     }
 }
 
@@ -90,28 +87,28 @@ mod tests {
     use super::*;
     use crate::analysis::Complex64;
 
-    fn samples(noise: &Noise, step: f64) -> Vec<f64> {
-        (0..(noise.duration / step) as usize).map(|k| noise.at(k as f64 * step)).collect()
+    fn samples(noise: &Noise, duration: f64, step: f64) -> Vec<f64> {
+        (0..(duration / step) as usize).map(|k| noise.after(k as f64 * step)).collect()
     }
 
     #[test]
     fn noise_has_the_rms_asked_for_and_stays_within_the_limit() {
-        let noise = Noise::new(0.05, (1.25, 3.5), -1.0, 3, 0.26, 600.0);
-        let tau = samples(&noise, 0.05);
+        let noise = Noise::new(0.05, (1.25, 3.5), -1.0, 3, 0.26);
+        let tau = samples(&noise, 600.0, 0.05);
         let rms = (tau.iter().map(|v| v * v).sum::<f64>() / tau.len() as f64).sqrt();
         // 600 s resolve 1.7 mHz, so that tones 4.4 mHz apart on average mix little: a few per cent
         assert!((rms / 0.05 - 1.0).abs() < 0.05, "{rms}");
-        let loud = Noise::new(0.13, (1.25, 3.5), 0.0, 3, 0.26, 100.0);
-        let tau = samples(&loud, 0.05);
+        let loud = Noise::new(0.13, (1.25, 3.5), 0.0, 3, 0.26);
+        let tau = samples(&loud, 100.0, 0.05);
         assert!(tau.iter().all(|v| v.abs() <= 0.26) && tau.contains(&0.26));
     }
 
     #[test]
     fn noise_has_its_power_in_the_band_and_the_colour_asked_for() {
         let power = |exponent: f64, (from, to): (f64, f64)| {
-            let noise = Noise::new(0.05, (1.0, 4.0), exponent, 5, 1.0, 400.0);
+            let noise = Noise::new(0.05, (1.0, 4.0), exponent, 5, 1.0);
             let step = 0.1;
-            let tau = samples(&noise, step);
+            let tau = samples(&noise, 400.0, step);
             // under a Hann window of the record, at every multiple of 1/duration in the range
             let (first, last) = ((from * 400.0) as usize, (to * 400.0) as usize);
             (first..last)
@@ -140,9 +137,9 @@ mod tests {
 
     #[test]
     fn a_seed_is_one_noise_and_another_seed_another() {
-        let of = |seed| Noise::new(0.05, (1.25, 3.5), 0.0, seed, 0.26, 10.0);
+        let of = |seed| Noise::new(0.05, (1.25, 3.5), 0.0, seed, 0.26);
         assert_eq!(of(1), of(1));
-        let (a, b) = (samples(&of(1), 0.1), samples(&of(2), 0.1));
+        let (a, b) = (samples(&of(1), 10.0, 0.1), samples(&of(2), 10.0, 0.1));
         assert!(a.iter().zip(&b).all(|(x, y)| x != y));
     }
 }

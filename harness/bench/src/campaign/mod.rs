@@ -1,0 +1,321 @@
+//! A campaign: the runs of a plan, simulated in parallel, each stored and analysed.
+//!
+//! A stored run is reused, whoever made it, if `runs/<name>.parquet` is complete and its metadata
+//! (Parquet key-value pairs) hold the run's [recipe](store::recipe). Everything in the tables comes
+//! from the run's [columns](STORED); so another importer that writes the columns and the metadata
+//! given by [`Campaign::list`] gets the same tables.
+//!
+//! The analysis is that of the thesis's bench. Of an FMU without the bench's variables all outputs
+//! are stored, and `runs.csv` says what each run was made from.
+
+mod outcome;
+mod rows;
+mod store;
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use host::description::{ModelDescription, Type, Value};
+use host::fmi2::Fmu;
+use host::output;
+use rayon::prelude::*;
+use serde_json::json;
+
+pub use self::outcome::{Curve, Estimate, Figures, Outcome, Passing, Record, SloshPath};
+pub use self::rows::{FeatureRow, MadeFrom};
+use crate::plan::{Case, Plan};
+use crate::progress::Progress;
+
+/// Columns of a stored run of the bench, SI units, at every communication point from the torque's
+/// start to the stop time; others may follow. The first six are what people look at; wave height,
+/// energy, work, dissipated energy, the time in stiction and the liquid's force on the tank are there
+/// for the tables.
+pub const STORED: [&str; 13] = [
+    "time",
+    "tau_cmd",
+    "omega",
+    "omega_imu",
+    "slosh_angle",
+    "slosh_angle_radial",
+    "wave_height",
+    "energy",
+    "work",
+    "heat",
+    "stuck_time",
+    "F_tangential",
+    "F_radial",
+];
+
+/// Parameters of the bench that its analysis reads.
+const PARAMETERS: [&str; 8] = [
+    "slosh.model",
+    "slosh.mass[1]",
+    "tank.h",
+    "tank.d",
+    "tank.r",
+    "tank.m_0",
+    "hub.I",
+    "friction.b",
+];
+
+/// Whether an FMU is the bench, as far as the analysis asks.
+fn is_bench(description: &ModelDescription) -> bool {
+    let has = |name: &&str| description.variables.iter().any(|v| v.name == **name);
+    STORED[1..].iter().all(|name| has(&name)) && PARAMETERS.iter().all(|name| has(&name))
+}
+
+/// What is stored of a run of an FMU: [`STORED`] of the bench; else time, the driven input and every
+/// output that is a number.
+pub fn stored_columns(description: &ModelDescription, input: Option<&str>) -> Vec<String> {
+    if is_bench(description) {
+        return STORED.map(String::from).to_vec();
+    }
+    let outputs = description.variables.iter().filter(|v| v.causality == "output");
+    let outputs = outputs.filter(|v| v.kind() != Type::String).map(|v| v.name.clone());
+    ["time".to_string()].into_iter().chain(input.map(String::from)).chain(outputs).collect()
+}
+
+/// A plan that is carried out.
+#[derive(Clone, Debug)]
+pub struct Campaign {
+    /// What is to be done.
+    pub plan: Plan,
+    /// Simulate again what is stored already.
+    pub force: bool,
+    /// Directory for runs, tables and report.
+    pub out: PathBuf,
+}
+
+/// A run that failed, and why.
+#[derive(Clone, Debug)]
+pub struct Failure {
+    /// Which run.
+    pub case: Case,
+    /// Why.
+    pub reason: String,
+}
+
+/// A run of an FMU that is not the bench.
+#[derive(Clone, Debug)]
+pub struct Unanalysed {
+    /// Which run.
+    pub case: Case,
+    /// It was not simulated but read.
+    pub reused: bool,
+}
+
+impl Results {
+    /// Runs that did not fail, and how many of them were reused.
+    pub fn counts(&self) -> (usize, usize) {
+        let reused = self.outcomes.iter().map(|run| run.reused);
+        let reused: Vec<bool> = reused.chain(self.unanalysed.iter().map(|r| r.reused)).collect();
+        (reused.len(), reused.iter().filter(|reused| **reused).count())
+    }
+}
+
+/// What became of one run.
+enum Done {
+    Analysed(Box<Outcome>),
+    Unanalysed(Unanalysed),
+}
+
+/// All that a campaign found.
+#[derive(Clone, Debug, Default)]
+pub struct Results {
+    /// Analysed runs of the bench, by model, fill and amplitude as in the plan.
+    pub outcomes: Vec<Outcome>,
+    /// Runs of another FMU, which are not analysed.
+    pub unanalysed: Vec<Unanalysed>,
+    /// Runs that failed.
+    pub failures: Vec<Failure>,
+}
+
+impl Campaign {
+    /// Simulates all runs that are not stored yet and analyses all of them. Leaves the runs and the
+    /// plan's text in the directory; tables are written by [`Campaign::write_tables`].
+    pub fn execute(&self, fmu: &Fmu, watch: &(dyn Fn(Progress) + Sync)) -> Result<Results> {
+        let cases = self.plan.cases(fmu.description())?;
+        let runs = self.out.join("runs");
+        output::directory(&runs)?;
+        output::atomically(&self.plan_file(), |file| {
+            Ok(std::io::Write::write_all(file, self.plan.text.as_bytes())?)
+        })?;
+        let steps: u64 = cases.iter().map(|case| case.run().steps() as u64).sum();
+        watch(Progress::Begins { runs: cases.len(), steps });
+        let results: Vec<Result<Done>> =
+            cases.par_iter().map(|case| self.done(fmu, case, &runs, watch)).collect();
+
+        let mut collected = Results::default();
+        for (case, result) in cases.into_iter().zip(results) {
+            match result {
+                Ok(Done::Analysed(outcome)) => collected.outcomes.push(*outcome),
+                Ok(Done::Unanalysed(run)) => collected.unanalysed.push(run),
+                Err(error) => {
+                    collected.failures.push(Failure { case, reason: format!("{error:#}") })
+                }
+            }
+        }
+        Ok(collected)
+    }
+
+    /// The copy of the plan beside the results.
+    fn plan_file(&self) -> PathBuf {
+        self.out.join("plan.toml")
+    }
+
+    /// The command that reproduces everything in the directory.
+    pub fn command(&self, fmu: &Fmu) -> String {
+        let word = |path: &Path| {
+            let text = path.display().to_string();
+            if text.contains(' ') { format!("\"{text}\"") } else { text }
+        };
+        format!(
+            "hubslosh campaign --plan {} --fmu {} --out {}",
+            word(&self.plan_file()),
+            word(fmu.path()),
+            word(&self.out)
+        )
+    }
+
+    /// The expanded runs for another program to make: for each its name, its file in the campaign's
+    /// directory, what to set, the torque (as text for `hubslosh torque`), times, and the metadata
+    /// that its Parquet file must carry for the analysis to take it.
+    pub fn list(&self, fmu: &Fmu) -> Result<serde_json::Value> {
+        let description = fmu.description();
+        let mut columns = Vec::new();
+        let mut runs = Vec::new();
+        for case in self.plan.cases(description)? {
+            let run = case.run();
+            columns = stored_columns(description, run.input.as_deref());
+            let mut settings = serde_json::Map::new();
+            for (name, text) in &case.settings {
+                let value = match description.value(description.variable(name)?, text)? {
+                    // an enumeration keeps its item's name
+                    Value::Integer(i) if i.to_string() == *text => json!(i),
+                    Value::Integer(_) => json!(text),
+                    Value::Real(x) => json!(x),
+                    Value::Boolean(b) => json!(b),
+                    Value::String(s) => json!(s),
+                };
+                settings.insert(name.clone(), value);
+            }
+            runs.push(json!({
+                "name": case.name,
+                "file": format!("runs/{}.parquet", case.name),
+                "varied": self.plan.varied().into_iter().zip(&case.varied).collect::<BTreeMap<_, _>>(),
+                "settings": settings,
+                "profile": case.profile,
+                "start": run.start(),
+                "stop": run.stop,
+                "step": run.step,
+                "steps": run.steps(),
+                "tolerance": run.tolerance,
+                "hold": run.hold,
+                "notes": store::recipe(fmu, &case, &columns),
+            }));
+        }
+        Ok(json!({
+            "title": self.plan.title,
+            "fmu": {
+                "path": fmu.path(),
+                "sha256": fmu.hash(),
+                "binary_sha256": fmu.binary_hash(),
+                "guid": description.guid,
+                "version": description.version,
+            },
+            "out": self.out,
+            "columns": columns,
+            "runs": runs,
+        }))
+    }
+
+    fn done(
+        &self,
+        fmu: &Fmu,
+        case: &Case,
+        runs: &Path,
+        watch: &(dyn Fn(Progress) + Sync),
+    ) -> Result<Done> {
+        let run = case.run();
+        let path = runs.join(format!("{}.parquet", case.name));
+        let columns = stored_columns(fmu.description(), run.input.as_deref());
+        let recipe = store::recipe(fmu, case, &columns);
+        let mut instance = run.initialise(fmu)?;
+        let there = match self.force || !path.exists() {
+            true => None,
+            false => store::stored(&path, &run, &recipe, &columns)
+                .map_err(|why| watch(Progress::Note(store::because(case, &why))))
+                .ok(),
+        };
+        let reused = there.is_some();
+        let table = match there {
+            Some(table) => {
+                watch(Progress::Steps(run.steps() as u64));
+                table
+            }
+            None => {
+                // time and the driven input are there anyway
+                let others = columns[1 + usize::from(run.input.is_some())..].iter();
+                let others: Vec<&str> = others.map(String::as_str).collect();
+                let table =
+                    run.drive(&mut instance, &others, |steps| watch(Progress::Steps(steps)))?;
+                table.write(&path, &recipe)?;
+                table
+            }
+        };
+        if !is_bench(fmu.description()) {
+            return Ok(Done::Unanalysed(Unanalysed { case: case.clone(), reused }));
+        }
+        let outcome = Outcome::of(case, &run, &mut instance, &table, reused)?;
+        Ok(Done::Analysed(Box::new(outcome)))
+    }
+
+    /// Writes `features.csv`, `features_spa.csv` and `features_h1.csv` with the same columns from the
+    /// `spa` and H1 responses, and `runs.csv`: every run, failed ones too, with what it was made from
+    /// and all features. Without a run of the bench there is `runs.csv` alone.
+    pub fn write_tables(&self, fmu: &Fmu, results: &Results) -> Result<()> {
+        let write = |name: &str, fill: &dyn Fn(&mut csv::Writer<&mut File>) -> Result<()>| {
+            output::atomically(&self.out.join(name), |file| {
+                let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(file);
+                fill(&mut writer)?;
+                writer.flush().context("could not write")
+            })
+        };
+        let header = rows::columns::<FeatureRow>()?;
+        let features: [(&str, fn(&Outcome) -> _); 3] = [
+            ("features.csv", Outcome::features),
+            ("features_spa.csv", Outcome::spa_features),
+            ("features_h1.csv", Outcome::h1_features),
+        ];
+        for (name, of) in features.into_iter().filter(|_| results.unanalysed.is_empty()) {
+            write(name, &|writer| {
+                writer.write_record(&header)?;
+                for run in &results.outcomes {
+                    writer.serialize(FeatureRow::of(run, of(run)))?;
+                }
+                Ok(())
+            })?;
+        }
+        write("runs.csv", &|writer| {
+            let made_from = rows::columns::<MadeFrom>()?;
+            let varied = self.plan.varied().into_iter().map(String::from);
+            writer.write_record(made_from.into_iter().chain(varied).chain(header.clone()))?;
+            for run in &results.outcomes {
+                let row = FeatureRow::of(run, run.features());
+                writer.serialize((MadeFrom::of(&run.case, None, fmu), &run.case.varied, row))?;
+            }
+            for case in results.unanalysed.iter().map(|run| &run.case) {
+                let row = FeatureRow::unanalysed(case);
+                writer.serialize((MadeFrom::of(case, None, fmu), &case.varied, row))?;
+            }
+            for failure in &results.failures {
+                let case = &failure.case;
+                let row = FeatureRow::unanalysed(case);
+                writer.serialize((MadeFrom::of(case, Some(failure), fmu), &case.varied, row))?;
+            }
+            Ok(())
+        })
+    }
+}

@@ -1,0 +1,173 @@
+//! Stored runs, and whether they can be taken again.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use host::description::Value;
+use host::fmi2::Fmu;
+
+use super::Case;
+use crate::run::Run;
+use crate::table::{self, Table};
+
+/// Raised when stored runs of an older program mean something else.
+const FORMAT: &str = "1";
+
+/// What determines a run's numbers: two runs with the same recipe are the same run, whichever archive
+/// the FMU came in. It is the metadata of its Parquet file, which may hold more:
+///
+/// * `model`, `binary_sha256`: the model's name and the binary that was loaded,
+/// * `parameters`: every parameter and input with its start value, as a JSON object,
+/// * `settings`: what is set before the start, `name=value` in this order, separated by spaces,
+/// * `profile`: the torque; `torque_sha256`: of the file, if it comes from one,
+/// * `step`, `stop`: s; `tolerance`: the relative tolerance handed to the FMU,
+/// * `torque`: whether the FMU is told the torque's slope over each step,
+/// * `columns`: what is recorded; `format`: of all this.
+pub fn recipe(fmu: &Fmu, case: &Case, columns: &[String]) -> BTreeMap<String, String> {
+    let settings: Vec<_> = case.settings.iter().map(|(k, v)| format!("{k}={v}")).collect();
+    let torque = if case.hold { "held over each step" } else { "linear over each step" };
+    let mut recipe = BTreeMap::from(
+        [
+            ("format", FORMAT.to_string()),
+            ("model", fmu.description().model_name.clone()),
+            ("binary_sha256", fmu.binary_hash().to_string()),
+            ("parameters", serde_json::json!(parameters(fmu, case)).to_string()),
+            ("settings", settings.join(" ")),
+            ("profile", case.profile.clone()),
+            ("step", case.step.to_string()),
+            ("stop", case.stop.to_string()),
+            ("tolerance", case.tolerance.map_or("the FMU's own".into(), |t| t.to_string())),
+            ("torque", torque.to_string()),
+            ("columns", columns.join(",")),
+        ]
+        .map(|(key, value)| (key.to_string(), value)),
+    );
+    if let Some(hash) = &case.torque_sha256 {
+        recipe.insert("torque_sha256".into(), hash.clone());
+    }
+    recipe
+}
+
+/// Every parameter and input with the text of its start value: as the run sets it, or the FMU's own.
+/// Numbers are written in one way, enumerations by name.
+fn parameters(fmu: &Fmu, case: &Case) -> BTreeMap<String, String> {
+    let description = fmu.description();
+    let settable = description.variables.iter().filter(|variable| {
+        ["parameter", "input"].contains(&variable.causality.as_str())
+            && Some(&variable.name) != case.input.as_ref()
+    });
+    settable
+        .filter_map(|variable| {
+            let set = case.settings.iter().rfind(|(name, _)| *name == variable.name);
+            let text = set.map(|(_, text)| text).or(variable.attributes().start.as_ref())?;
+            let items = description.items(variable);
+            let text = match description.value(variable, text).ok()? {
+                Value::Real(x) => x.to_string(),
+                Value::Boolean(b) => b.to_string(),
+                Value::String(s) => s,
+                Value::Integer(i) => {
+                    let item = items.iter().find(|item| item.value == i);
+                    item.map_or(i.to_string(), |item| item.name.clone())
+                }
+            };
+            Some((variable.name.clone(), text))
+        })
+        .collect()
+}
+
+/// The stored run, if it is complete and of this recipe; else why not.
+pub fn stored(
+    path: &Path,
+    run: &Run,
+    recipe: &BTreeMap<String, String>,
+    columns: &[String],
+) -> Result<Table, String> {
+    const INCOMPLETE: &str = "file incomplete";
+    let found = table::notes(path).map_err(|_| INCOMPLETE.to_string())?;
+    if let Some(why) = difference(&found, recipe) {
+        return Err(why);
+    }
+    let names: Vec<&str> = columns.iter().map(String::as_str).collect();
+    let table = Table::read(path, &names).map_err(|_| INCOMPLETE.to_string())?;
+    let last = table.column("time").and_then(|time| time.last()).copied();
+    if table.rows() != run.steps() + 1 || last != Some(run.stop) {
+        return Err(format!("{INCOMPLETE}, {} rows of {}", table.rows(), run.steps() + 1));
+    }
+    Ok(table)
+}
+
+/// Parameters that are named when several differ.
+const NAMED: usize = 3;
+
+/// In what a stored run differs from the one that is wanted, in one line; `None` if in nothing.
+fn difference(
+    found: &BTreeMap<String, String>,
+    wanted: &BTreeMap<String, String>,
+) -> Option<String> {
+    let read = |notes: &BTreeMap<String, String>| -> BTreeMap<String, String> {
+        let text = notes.get("parameters").map_or("", String::as_str);
+        serde_json::from_str(text).unwrap_or_default()
+    };
+    // first what is behind everything else; parameters before the settings they come from
+    const ORDER: [&str; 4] = ["format", "model", "binary_sha256", "parameters"];
+    let rest = wanted.keys().map(String::as_str).filter(|key| !ORDER.contains(key));
+    // equal parameters set in another way are the same run
+    let keys = ORDER.into_iter().chain(rest).filter(|key| *key != "settings");
+    for key in keys {
+        let (was, is) = (found.get(key), &wanted[key]);
+        if was == Some(is) {
+            continue;
+        }
+        let Some(was) = was else { return Some(format!("its metadata has no {key}")) };
+        return Some(match key {
+            "parameters" => {
+                let (was, is) = (read(found), read(wanted));
+                let text = |value: Option<&String>| value.map_or("not there".into(), String::clone);
+                let names = is.keys().chain(was.keys().filter(|name| !is.contains_key(*name)));
+                let differ: Vec<String> = names
+                    .filter(|name| was.get(*name) != is.get(*name))
+                    .map(|name| {
+                        format!("{name} was {}, is {}", text(was.get(name)), text(is.get(name)))
+                    })
+                    .collect();
+                match differ.len().checked_sub(NAMED) {
+                    None | Some(0) => differ.join("; "),
+                    Some(more) => format!("{}; and {more} more", differ[..NAMED].join("; ")),
+                }
+            }
+            "binary_sha256" => "the FMU's binary was another one".into(),
+            "torque_sha256" => "the torque file has changed".into(),
+            _ => format!("{key} was {was}, is {is}"),
+        });
+    }
+    None
+}
+
+/// Why a stored run is of no use, as a sentence.
+pub fn because(case: &Case, why: &str) -> String {
+    format!("re-running {}: {why}", case.name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn notes(pairs: &[(&str, &str)]) -> BTreeMap<String, String> {
+        pairs.iter().map(|(k, v)| (k.to_string(), v.to_string())).collect()
+    }
+
+    #[test]
+    fn a_changed_parameter_is_named_with_both_values() {
+        let with = |b: &str| {
+            let all = format!("{{\"friction.b\":\"{b}\",\"tank.h\":\"0.1\"}}");
+            notes(&[("binary_sha256", "a"), ("format", "1"), ("model", "M"), ("parameters", &all)])
+        };
+        assert_eq!(difference(&with("0.03793"), &with("0.03793")), None);
+        let why = difference(&with("0.03793"), &with("0.04")).unwrap();
+        assert_eq!(why, "friction.b was 0.03793, is 0.04");
+        let mut other = with("0.04");
+        other.insert("binary_sha256".into(), "b".into());
+        let why = difference(&other, &with("0.05")).unwrap();
+        assert_eq!(why, "the FMU's binary was another one", "that alone decides");
+    }
+}
