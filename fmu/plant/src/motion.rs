@@ -371,7 +371,7 @@ impl Motion {
             }
             if imu.enabled {
                 let since_start = begin + t - state.start_time;
-                let omega = |s| series::value(&self.hub.omega, n, s);
+                let omega = |s| series::values([&self.hub.omega], n, s)[0];
                 let allowed = self.max_steps - *steps;
                 *steps += imu.follow(&mut state.gyro, since_start, length, omega, allowed);
                 if *steps > self.max_steps {
@@ -379,13 +379,15 @@ impl Motion {
                 }
             }
             let stuck = contact == Contact::Stuck;
-            let omega = if stuck { 0.0 } else { series::value(&self.hub.omega, n, length) };
-            state.x[x::WORK] += series::integral(&self.power, n - 1, length);
-            state.x[x::HEAT] += series::integral(&self.dissipation, n - 1, length);
+            let [theta, omega] = series::values([&self.hub.theta, &self.hub.omega], n, length);
+            let omega = if stuck { 0.0 } else { omega };
+            let [work, heat] = series::integrals([&self.power, &self.dissipation], n - 1, length);
+            state.x[x::WORK] += work;
+            state.x[x::HEAT] += heat;
             if RAMP {
                 state.axial.work += g.slope * self.integral_of_mass_height(modes, n, length);
             }
-            state.x[x::THETA] = series::value(&self.hub.theta, n, length);
+            state.x[x::THETA] = theta;
             state.x[x::OMEGA] = omega;
             for (i, (mode, q)) in modes.iter().zip(state.slosh_mut()).enumerate() {
                 *q = mode.at(n, length, omega);
@@ -432,7 +434,8 @@ impl Motion {
                 sum[N] = modes.iter_mut().map(|mode| mode.mass_height::<N>()).sum();
             }
         });
-        series::integral(&sum, n - 1, length)
+        let [integral] = series::integrals([&sum], n - 1, length);
+        integral
     }
 }
 

@@ -123,10 +123,18 @@ pub fn dot<const N: usize>(a: &Pair, b: &Pair) -> f64 {
     x + y
 }
 
-/// The value at t of the vector cut after order n.
+/// The values at t of several vectors cut after order n.
 #[inline(always)]
-pub fn value_pair(a: &Pair, n: usize, t: f64) -> [f64; 2] {
-    a.0[..=n].iter().rev().fold([0.0; 2], |sum, x| [sum[0] * t + x[0], sum[1] * t + x[1]])
+pub fn values_pair<const K: usize>(a: [&Pair; K], n: usize, t: f64) -> [[f64; 2]; K] {
+    let n = n.min(ORDER);
+    let mut sums = [[0.0; 2]; K];
+    for j in (0..=n).rev() {
+        for k in 0..K {
+            let [x, y] = a[k][j];
+            sums[k] = [sums[k][0] * t + x, sums[k][1] * t + y];
+        }
+    }
+    sums
 }
 
 /// Coefficient N of a b without its term a_0 b_N.
@@ -192,15 +200,22 @@ macro_rules! for_each_order {
 }
 pub(crate) use for_each_order;
 
-/// The value at t of the series cut after order n.
+/// The values at t of several series cut after order n.
 #[inline(always)]
-pub fn value(a: &Series, n: usize, t: f64) -> f64 {
-    a[..=n].iter().rev().fold(0.0, |sum, x| sum * t + x)
+pub fn values<const K: usize>(a: [&Series; K], n: usize, t: f64) -> [f64; K] {
+    let n = n.min(ORDER);
+    let mut sums = [0.0; K];
+    for j in (0..=n).rev() {
+        for k in 0..K {
+            sums[k] = sums[k] * t + a[k][j];
+        }
+    }
+    sums
 }
 
-/// The integral from 0 to t of the series cut after order n.
+/// The integrals from 0 to t of several series cut after order n.
 #[inline(always)]
-pub fn integral(a: &Series, n: usize, t: f64) -> f64 {
+pub fn integrals<const K: usize>(a: [&Series; K], n: usize, t: f64) -> [f64; K] {
     const SHARES: Series = {
         let (mut shares, mut j) = (ZERO, 0);
         while j <= ORDER {
@@ -209,8 +224,14 @@ pub fn integral(a: &Series, n: usize, t: f64) -> f64 {
         }
         shares
     };
-    let terms = a[..=n].iter().zip(&SHARES).rev();
-    terms.fold(0.0, |sum, (x, share)| sum * t + x * share) * t
+    let n = n.min(ORDER);
+    let mut sums = [0.0; K];
+    for j in (0..=n).rev() {
+        for k in 0..K {
+            sums[k] = sums[k] * t + a[k][j] * SHARES[j];
+        }
+    }
+    sums.map(|sum| sum * t)
 }
 
 /// The first t in (0, h] at which the polynomial `a`, positive at t = 0, has
@@ -280,7 +301,7 @@ mod tests {
         for_each_order!(N => {
             e[N] = if N == 0 { f64::exp(u(0)) } else { chain::<N>(u(N), &mut u_d, &e) };
         });
-        assert!((value(&e, ORDER, 0.1) - f64::exp(0.395)).abs() < 4.0 * ULPS);
+        assert!((values([&e], ORDER, 0.1)[0] - f64::exp(0.395)).abs() < 4.0 * ULPS);
     }
 
     #[test]
@@ -291,8 +312,8 @@ mod tests {
             let one = square::<N>(&s) + mul::<N>(&c, &c);
             assert!((one - constant::<N>(1.0)).abs() < ULPS);
         });
-        assert!((value(&s, ORDER, 0.1) - f64::sin(0.395)).abs() < ULPS);
-        assert!((value(&c, ORDER, 0.1) - f64::cos(0.395)).abs() < ULPS);
+        assert!((values([&s], ORDER, 0.1)[0] - f64::sin(0.395)).abs() < ULPS);
+        assert!((values([&c], ORDER, 0.1)[0] - f64::cos(0.395)).abs() < ULPS);
     }
 
     #[test]

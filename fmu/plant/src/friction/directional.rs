@@ -95,9 +95,13 @@ impl DirectionalFactor {
         (self.backward.at(theta), self.forward.at(theta))
     }
 
-    /// B of the direction in which the hub turns where it does not depend on the angle.
-    pub fn constant(&self, contact: Contact) -> Option<f64> {
-        self.trig.is_none().then(|| self.one_way(contact).mean)
+    pub fn depends_on_angle(&self) -> bool {
+        self.trig.is_some()
+    }
+
+    /// B of the direction in which the hub turns, without its harmonics.
+    pub fn mean(&self, contact: Contact) -> f64 {
+        self.one_way(contact).mean
     }
 
     /// Coefficient N of cos and sin; comes before the coefficients of B.

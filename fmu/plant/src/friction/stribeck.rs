@@ -23,7 +23,7 @@ pub struct Stribeck {
     b: f64,
     curve: StribeckCurve,
     factor: DirectionalFactor,
-    /// B of the present direction
+    /// sgn(w) B of the present direction; order 0 alone where it does not depend on the angle
     present: Series,
 }
 
@@ -33,12 +33,12 @@ impl Stribeck {
         Stribeck { b: p.b, curve, factor, present: ZERO }
     }
 
-    /// Coefficient N of T_C B where B depends on the angle.
+    /// Coefficient N of sgn(w) T_C B where B depends on the angle.
     // Once for all slosh models.
     #[inline(never)]
     fn dry_by_angle<const N: usize>(&mut self, contact: Contact, theta: &Series) -> f64 {
         self.factor.expand::<N>(theta);
-        self.present[N] = self.factor.coefficient::<N>(contact);
+        self.present[N] = contact as i8 as f64 * self.factor.coefficient::<N>(contact);
         series::mul::<N>(&self.curve.torque, &self.present)
     }
 }
@@ -49,11 +49,15 @@ impl FrictionLaw for Stribeck {
     #[inline(always)]
     fn torque<const N: usize>(&mut self, contact: Contact, hub: &HubMotion) -> f64 {
         self.curve.expand::<N>(&hub.omega2);
-        let dry = match self.factor.constant(contact) {
-            Some(factor) => factor * self.curve.torque[N],
-            None => self.dry_by_angle::<N>(contact, &hub.theta),
+        let dry = if self.factor.depends_on_angle() {
+            self.dry_by_angle::<N>(contact, &hub.theta)
+        } else {
+            if N == 0 {
+                self.present[0] = contact as i8 as f64 * self.factor.mean(contact);
+            }
+            self.present[0] * self.curve.torque[N]
         };
-        -self.b * hub.omega[N] - if contact == Contact::Forward { dry } else { -dry }
+        -self.b * hub.omega[N] - dry
     }
 
     fn holds(&self, theta: f64) -> (f64, f64) {

@@ -12,7 +12,7 @@
 //! ```
 
 use super::{Angles, HubMotion, HubReaction, SloshMode};
-use crate::series::{Series, ZERO, mul, next, square, value};
+use crate::series::{Series, ZERO, mul, next, square, values};
 use crate::tank::Pendulum;
 
 #[derive(Clone, Debug)]
@@ -105,7 +105,8 @@ impl SloshMode for Linear {
 
     #[inline(always)]
     fn at(&self, n: usize, t: f64, _: f64) -> [f64; 4] {
-        [0.0, value(&self.al, n, t), 0.0, value(&self.al_d, n, t)]
+        let [al, al_d] = values([&self.al, &self.al_d], n, t);
+        [0.0, al, 0.0, al_d]
     }
 
     /// Tangential -m (r w' + l al''); radial from the bob's place (r, l al):

@@ -16,7 +16,7 @@
 //! For small q a pendulum is the case h = 1/(2 l^2).
 
 use super::{Angles, HubMotion, HubReaction, SloshMode};
-use crate::series::{Series, ZERO, constant, mul, mul_tail, next, square, value};
+use crate::series::{Series, ZERO, constant, mul, mul_tail, next, square, values};
 use crate::tank::Pendulum;
 
 #[derive(Clone, Debug)]
@@ -197,7 +197,7 @@ impl SloshMode for Paraboloid {
     #[inline(always)]
     fn at(&self, n: usize, t: f64, _: f64) -> [f64; 4] {
         let ([x, y], [x_d, y_d]) = (&self.q, &self.q_d);
-        [value(x, n, t), value(y, n, t), value(x_d, n, t), value(y_d, n, t)]
+        values([x, y, x_d, y_d], n, t)
     }
 
     /// Minus the bob's mass times its acceleration, -m (q'' - a - w' (y, -(r + x))).

@@ -14,7 +14,7 @@
 //! Lagrange's equations for this bob on the hub; to first order the linear model.
 
 use super::{Angles, HubMotion, HubReaction, SloshMode};
-use crate::series::{Series, ZERO, mul, next, sin_cos, square, value};
+use crate::series::{Series, ZERO, mul, next, sin_cos, square, values};
 use crate::tank::Pendulum;
 
 #[derive(Clone, Debug)]
@@ -137,7 +137,8 @@ impl SloshMode for Planar {
 
     #[inline(always)]
     fn at(&self, n: usize, t: f64, _: f64) -> [f64; 4] {
-        [0.0, value(&self.al, n, t), 0.0, value(&self.al_d, n, t)]
+        let [al, al_d] = values([&self.al, &self.al_d], n, t);
+        [0.0, al, 0.0, al_d]
     }
 
     /// -m times the bob's acceleration at (r, l s); the plane's guide takes the

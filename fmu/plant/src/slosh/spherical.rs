@@ -37,7 +37,7 @@ use super::{Angles, HubMotion, HubReaction, SloshMode};
 use crate::Init;
 use crate::series::{
     Pair, Series, ZERO, ZERO_PAIR, constant, dot, each, mul, mul_part, mul_tail, next, scale,
-    square, squares, value, value_pair,
+    square, squares, values, values_pair,
 };
 use crate::tank::Pendulum;
 
@@ -282,8 +282,8 @@ impl SloshMode for Spherical {
     /// xi = p/k and k xi' = p' + v_z xi; k = 1 - p_z, above the horizontal by |p| = 1.
     #[inline(always)]
     fn at(&self, n: usize, t: f64, omega: f64) -> [f64; 4] {
-        let ([x, y], z) = (value_pair(&self.dir, n, t), value(&self.dir_z, n, t));
-        let ([v_x, v_y], v_z) = (value_pair(&self.v, n, t), value(&self.v_z, n, t));
+        let [[x, y], [v_x, v_y]] = values_pair([&self.dir, &self.v], n, t);
+        let [z, v_z] = values([&self.dir_z, &self.v_z], n, t);
         let inv_k = if z > 0.0 { (1.0 + z) / (x * x + y * y) } else { 1.0 / (1.0 - z) };
         let (xi, eta) = (inv_k * x, inv_k * y);
         let rate = |d: f64, xi: f64| inv_k * (d + v_z * xi);
