@@ -13,6 +13,10 @@ use super::Findings;
 
 /// Most bytes that one file of an archive may unpack to: a guard against zip bombs.
 const LARGEST: u64 = 1 << 30;
+/// Most bytes that all files of an archive together may unpack to.
+const LARGEST_SUM: u64 = 2 << 30;
+/// Most entries of an archive.
+const MOST_ENTRIES: usize = 200_000;
 
 /// What stands at the top of an FMU.
 const AT_THE_TOP: [&str; 9] = [
@@ -65,7 +69,12 @@ impl Archive {
             }
         };
         let mut body = Cursor::new(bytes);
+        let mut left = LARGEST_SUM;
         for entry in files {
+            if archive.entries.len() >= MOST_ENTRIES {
+                archive.broken = Some(format!("it has more than {MOST_ENTRIES} entries"));
+                break;
+            }
             let entry = match entry {
                 Ok(entry) => entry,
                 Err(error) => {
@@ -77,17 +86,22 @@ impl Archive {
                 (String::from_utf8_lossy(entry.name_raw()).into_owned(), entry.compression());
             let (encrypted, link) = (entry.encrypted(), entry.is_symlink());
             let mut content = Vec::new();
+            let most = LARGEST.min(left);
             let unpacked = entry
                 .with_reader(&mut body, ZipReadOptions::new())
                 .map_err(|error| error.to_string())
                 .and_then(|file| {
-                    file.take(LARGEST + 1)
-                        .read_to_end(&mut content)
-                        .map_err(|error| error.to_string())
+                    file.take(most + 1).read_to_end(&mut content).map_err(|error| error.to_string())
                 });
             let content = match unpacked {
                 Ok(size) if size as u64 > LARGEST => Err("it unpacks to more than 1 GiB".into()),
-                Ok(_) => Ok(content),
+                Ok(size) if size as u64 > left => {
+                    Err("with it the archive unpacks to more than 2 GiB".into())
+                }
+                Ok(size) => {
+                    left -= size as u64;
+                    Ok(content)
+                }
                 Err(why) => Err(why),
             };
             archive.entries.push(Entry { name, method, encrypted, link, content });

@@ -15,9 +15,20 @@ const PLATFORMS: [(&str, &str, Option<Kind>); 6] = [
     ("darwin64", ".dylib", Some(Kind::MacOs)),
 ];
 
+/// An interface that the description declares, and what its binary must be.
+struct Declared {
+    /// The element, ModelExchange or CoSimulation.
+    interface: &'static str,
+    identifier: String,
+    /// Functions its binary must export.
+    wanted: Vec<&'static str>,
+}
+
 /// A binary in its place.
 struct Placed {
     name: String,
+    /// Its name without the ending.
+    identifier: String,
     folder: &'static str,
     kind: Option<Kind>,
     binary: Result<Binary, String>,
@@ -31,8 +42,8 @@ pub struct Binaries {
     folders: Vec<String>,
     /// Files in folders of FMI 2.0 that no host will find, each with the names it looks for.
     elsewhere: Vec<(String, String)>,
-    /// Functions the FMU must export.
-    wanted: Vec<&'static str>,
+    /// The interfaces that are declared and name a binary.
+    declared: Vec<Declared>,
     has_sources: bool,
     described: bool,
 }
@@ -40,25 +51,31 @@ pub struct Binaries {
 impl Binaries {
     /// Reads all there are.
     pub fn new(archive: &Archive, description: Option<&Description>) -> Binaries {
-        let mut identifiers: Vec<&str> = Vec::new();
-        let mut wanted = Fmu::symbols().to_vec();
-        if let Some(d) = description {
-            if let Some(exchange) = &d.model_exchange {
-                wanted.extend(Fmu::exchange_symbols());
-                identifiers.extend(exchange.get("modelIdentifier"));
-            }
-            if let Some(stepping) = &d.co_simulation {
-                wanted.extend(Fmu::step_symbols());
-                identifiers.extend(stepping.get("modelIdentifier"));
-            }
-        }
+        let interfaces = description.into_iter().flat_map(|d| {
+            let exchange = d.model_exchange.as_ref();
+            let stepping = d.co_simulation.as_ref();
+            let exchange = exchange.map(|e| ("ModelExchange", e, Fmu::exchange_symbols()));
+            let stepping = stepping.map(|e| ("CoSimulation", e, Fmu::step_symbols()));
+            exchange.into_iter().chain(stepping)
+        });
+        let declared: Vec<Declared> = interfaces
+            .filter_map(|(interface, element, own)| {
+                Some(Declared {
+                    interface,
+                    identifier: element.get("modelIdentifier")?.to_string(),
+                    wanted: [Fmu::symbols(), own].concat(),
+                })
+            })
+            .collect();
+        let mut identifiers: Vec<&str> = declared.iter().map(|d| d.identifier.as_str()).collect();
         identifiers.sort_unstable();
         identifiers.dedup();
+        let identifiers: Vec<String> = identifiers.into_iter().map(str::to_string).collect();
         let mut all = Binaries {
             placed: Vec::new(),
             folders: Vec::new(),
             elsewhere: Vec::new(),
-            wanted,
+            declared,
             has_sources: archive.below("sources/").next().is_some(),
             described: description.is_some(),
         };
@@ -75,10 +92,11 @@ impl Binaries {
             };
             let names: Vec<String> =
                 identifiers.iter().map(|identifier| format!("{identifier}{ending}")).collect();
-            if names.iter().any(|n| n == file) {
+            if let Some(n) = names.iter().position(|n| n == file) {
                 let bytes = archive.file(name).unwrap_or_default();
                 let binary = Binary::read(bytes).map_err(|error| format!("{error:#}"));
-                all.placed.push(Placed { name: name.into(), folder, kind, binary });
+                let identifier = identifiers[n].clone();
+                all.placed.push(Placed { name: name.into(), identifier, folder, kind, binary });
             } else if file.ends_with(ending) {
                 all.elsewhere.push((name.into(), names.join(", ")));
             }
@@ -130,6 +148,47 @@ pub fn present(binaries: &Binaries, findings: &mut Findings) {
     }
 }
 
+/// `bin.each_interface`
+pub fn each_interface(binaries: &Binaries, findings: &mut Findings) {
+    let mut folders: Vec<&str> = binaries.placed.iter().map(|p| p.folder).collect();
+    folders.dedup();
+    if folders.is_empty() {
+        findings.skip("no platform has a binary of the model's name");
+    }
+    for folder in folders {
+        let ending = PLATFORMS.iter().find(|(known, ..)| *known == folder).map_or("", |p| p.1);
+        for Declared { interface, identifier, .. } in &binaries.declared {
+            let mut here = binaries.placed.iter().filter(|p| p.folder == folder);
+            if !here.any(|p| p.identifier == *identifier) {
+                findings.add(
+                    format!("binaries/{folder}/{identifier}{ending}"),
+                    format!(
+                        "it is missing: modelIdentifier of {interface} is \"{identifier}\" (allowed: \
+                         where one interface has its binary, so has the other)"
+                    ),
+                );
+            }
+        }
+    }
+}
+
+/// `bin.this_platform`
+pub fn this_platform(binaries: &Binaries, findings: &mut Findings) {
+    if !binaries.described {
+        return findings.skip("without a description nobody knows what the binary is called");
+    }
+    if binaries.own().is_none() {
+        let calls = super::RULES.iter().filter(|r| matches!(r.look, super::Look::Calls(_))).count();
+        findings.add(
+            format!("binaries/{PLATFORM}"),
+            format!(
+                "no binary is called here, so that {calls} rules are not looked at (needed for them: \
+                 the binary of this platform, or a check on one of the FMU's)"
+            ),
+        );
+    }
+}
+
 /// `bin.name`
 pub fn name(binaries: &Binaries, findings: &mut Findings) {
     // A library beside the binary is fine; a folder without the binary is not.
@@ -170,7 +229,13 @@ pub fn format(binaries: &Binaries, findings: &mut Findings) {
 /// `bin.symbols`
 pub fn symbols(binaries: &Binaries, findings: &mut Findings) {
     binaries.each(findings, |name, binary, findings| {
-        if let Some(fault) = binary.lacking(&binaries.wanted) {
+        let of = binaries.placed.iter().find(|p| p.name == name).map(|p| p.identifier.as_str());
+        let interfaces = binaries.declared.iter().filter(|d| of == Some(d.identifier.as_str()));
+        let mut wanted: Vec<&str> = interfaces.flat_map(|d| d.wanted.iter().copied()).collect();
+        // those that every FMU has are wanted by both interfaces
+        let mut seen = std::collections::BTreeSet::new();
+        wanted.retain(|symbol| seen.insert(*symbol));
+        if let Some(fault) = binary.lacking(&wanted) {
             findings.add(name, fault);
         }
     });

@@ -23,7 +23,7 @@ const AT_LEAST: u64 = 40;
 const ROUNDING: f64 = 1e-9;
 
 /// An instance with parameters somewhere else; the 0th try leaves them as they are.
-fn moved<'g>(guest: &'g Guest, interface: Interface, attempt: u64) -> Result<Session<'g>> {
+pub fn moved<'g>(guest: &'g Guest, interface: Interface, attempt: u64) -> Result<Session<'g>> {
     let mut session = guest.session(interface)?;
     if attempt == 0 {
         return Ok(session);

@@ -41,6 +41,32 @@ pub fn run(guest: &Guest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
+/// `exchange.event_iteration`
+pub fn event_iteration(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    // whatever else goes wrong is the business of other rules
+    let Some(mut session) = continuous(guest, findings)? else { return Ok(()) };
+    session.advance(2 * STEPS)
+}
+
+/// `exchange.next_event_time`
+pub fn next_event_time(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let Some(mut session) = continuous(guest, findings)? else { return Ok(()) };
+    session.advance(2 * STEPS)?;
+    if let Some((time, next)) = session.past_event() {
+        findings.add(
+            format!("fmi2NewDiscreteStates at t = {time:?} s"),
+            format!("nextEventTime is {next:?} (allowed: a later time, if nextEventTimeDefined)"),
+        );
+    }
+    Ok(())
+}
+
+/// `exchange.terminate_simulation`
+pub fn terminate_simulation(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let Some(mut session) = continuous(guest, findings)? else { return Ok(()) };
+    super::steps::tell_end(&mut session, findings)
+}
+
 /// `exchange.vectors`
 pub fn vectors(guest: &Guest, findings: &mut Findings) -> Result<()> {
     let Some(mut session) = continuous(guest, findings)? else { return Ok(()) };

@@ -3,15 +3,20 @@
 use std::cell::{Cell, RefCell};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 
 use super::description::{Description, Variable};
+use host::xml::Element;
 use super::process::Trace;
 use host::description::Type;
 use host::fmi2::{CO_SIMULATION, CallError, Called, Fmu, Instance, MODEL_EXCHANGE, Status};
 
 /// Steps of a short run.
 pub const STEPS: usize = 20;
+/// Calls of fmi2NewDiscreteStates after which an event iteration counts as endless.
+const ITERATIONS: usize = 100;
+/// Order of magnitude of a state that does not tell its own.
+const UNKNOWN_NOMINAL: f64 = 1e-3;
 
 /// One of the two interfaces of FMI 2.0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,7 +30,7 @@ pub enum Interface {
 /// Nothing can be said on most rules: one rule tells why, the others are skipped.
 #[derive(Debug)]
 pub struct Unusable {
-    /// The rule that tells.
+    /// The rule that tells; empty if it is no fault.
     pub rule: &'static str,
     /// Why.
     pub why: String,
@@ -41,7 +46,12 @@ impl std::error::Error for Unusable {}
 
 /// The loaded FMU.
 pub struct Guest {
-    fmu: Fmu,
+    /// The binaries: one, or two where modelIdentifier differs between the interfaces.
+    binaries: Vec<Fmu>,
+    /// The interfaces that can be called, Co-Simulation first, and the binary of each.
+    interfaces: Vec<(Interface, usize)>,
+    /// Why a binary that is there cannot be loaded.
+    broken: Option<String>,
     description: Description,
     trace: Trace,
     doing: RefCell<String>,
@@ -94,6 +104,8 @@ pub struct Experiment {
     pub start: f64,
     /// Relative tolerance, if one is suggested.
     pub tolerance: Option<f64>,
+    /// Suggested end, if there is one.
+    pub stop: Option<f64>,
     /// Communication step, s.
     pub step: f64,
 }
@@ -101,11 +113,45 @@ pub struct Experiment {
 impl Guest {
     /// Loads the FMU that is unpacked in `directory`.
     pub fn open(directory: &Path, path: &Path, trace: Trace) -> Result<Guest> {
-        let fmu = Fmu::load(directory, path)?;
         let xml = std::fs::read(directory.join("modelDescription.xml"))?;
         let description = Description::read(&xml).map_err(anyhow::Error::msg)?;
+        let identifier = |interface: &Option<Element>| {
+            interface.as_ref().and_then(|i| i.get("modelIdentifier")).map(str::to_string)
+        };
+        let declared = [
+            (Interface::CoSimulation, identifier(&description.co_simulation)),
+            (Interface::ModelExchange, identifier(&description.model_exchange)),
+        ];
+        let (mut binaries, mut interfaces) = (Vec::<Fmu>::new(), Vec::new());
+        let (mut broken, mut loaded) = (None, Vec::new());
+        for (interface, identifier) in declared {
+            let Some(identifier) = identifier else { continue };
+            let at = match loaded.iter().position(|known| *known == identifier) {
+                Some(at) => at,
+                None => match Fmu::load_for(interface.kind(), directory, path) {
+                    Ok(fmu) => {
+                        binaries.push(fmu);
+                        loaded.push(identifier);
+                        binaries.len() - 1
+                    }
+                    // that it is missing is a rule of its own
+                    Err(error) => {
+                        broken.get_or_insert(format!("{error:#}"));
+                        continue;
+                    }
+                },
+            };
+            if interface == Interface::CoSimulation || binaries[at].has_exchange() {
+                interfaces.push((interface, at));
+            }
+        }
+        if binaries.is_empty() {
+            bail!("{}", broken.unwrap_or_else(|| "it declares no interface".into()));
+        }
         Ok(Guest {
-            fmu,
+            binaries,
+            interfaces,
+            broken,
             description,
             trace,
             doing: RefCell::default(),
@@ -139,9 +185,20 @@ impl Guest {
         if doing.is_empty() { "a first call".into() } else { doing.clone() }
     }
 
-    /// The loaded binary.
-    pub fn fmu(&self) -> &Fmu {
-        &self.fmu
+    /// The binary of an interface.
+    pub fn fmu(&self, interface: Interface) -> &Fmu {
+        let of = self.interfaces.iter().find(|(i, _)| *i == interface);
+        &self.binaries[of.map_or(0, |(_, at)| *at)]
+    }
+
+    /// The loaded binaries.
+    pub fn binaries(&self) -> &[Fmu] {
+        &self.binaries
+    }
+
+    /// Why the binary of one interface cannot be loaded although it is there.
+    pub fn broken(&self) -> Option<&str> {
+        self.broken.as_deref()
     }
 
     /// What the FMU says of itself.
@@ -154,12 +211,9 @@ impl Guest {
         &self.description.variables
     }
 
-    /// The interfaces it offers, Co-Simulation first.
+    /// The interfaces that can be called, Co-Simulation first.
     pub fn interfaces(&self) -> Vec<Interface> {
-        let d = &self.description;
-        let stepping = d.co_simulation.is_some().then_some(Interface::CoSimulation);
-        let exchange = d.model_exchange.is_some() && self.fmu.has_exchange();
-        stepping.into_iter().chain(exchange.then_some(Interface::ModelExchange)).collect()
+        self.interfaces.iter().map(|(interface, _)| *interface).collect()
     }
 
     /// Whether an interface declares a capability.
@@ -177,13 +231,13 @@ impl Guest {
         let number = |name: &str| element.and_then(|e| e.number(name)).filter(|x| x.is_finite());
         let start = number("startTime").unwrap_or(0.0);
         let above_0 = |x: &f64| *x > 0.0;
-        let span = number("stopTime").map(|stop| stop - start).filter(above_0);
-        let step = number("stepSize").filter(above_0).or(span.map(|span| span / 500.0));
-        Experiment {
-            start,
-            tolerance: number("tolerance").filter(above_0),
-            step: step.unwrap_or(0.01),
-        }
+        let stop = number("stopTime").filter(|stop| *stop > start);
+        let span = stop.map_or(f64::INFINITY, |stop| stop - start);
+        let step = number("stepSize").filter(above_0);
+        // a step that leads past the end at once says nothing of the FMU
+        let step = step.filter(|step| *step <= span).unwrap_or(span / 500.0);
+        let step = if step.is_finite() { step } else { 0.01 };
+        Experiment { start, tolerance: number("tolerance").filter(above_0), stop, step }
     }
 
     /// A new instance.
@@ -194,22 +248,35 @@ impl Guest {
         }
         self.sessions.set(self.sessions.get() + 1);
         self.doing("fmi2Instantiate");
-        let mut with = self.fmu.instantiation("check");
+        let fmu = self.fmu(interface);
+        let mut with = fmu.instantiation("check");
         with.kind = interface.kind();
         with.logging = false;
-        let instance = self
-            .fmu
+        let instance = fmu
             .instantiate_with(&with)
             .map_err(|error| Unusable { rule: "load.instance", why: error.to_string() })?;
-        let Experiment { start, step, .. } = self.experiment();
+        let Experiment { start, stop, step, .. } = self.experiment();
+        // The step is the FMU's wish in Co-Simulation only. A run of Model Exchange ends before the
+        // suggested end, after which a model may do as it likes.
+        let longest = match (interface, stop) {
+            (Interface::ModelExchange, Some(stop)) => (stop - start) / (3 * STEPS) as f64,
+            _ => f64::INFINITY,
+        };
+        let states = super::exchange::states(self);
+        let nominal = |(_, state): &(&Variable, &Variable)| {
+            state.typed.number("nominal").map_or(UNKNOWN_NOMINAL, |_| state.nominal())
+        };
         Ok(Session {
             guest: self,
             interface,
             instance,
             time: start,
-            step,
+            step: step.min(longest),
             count: 0,
             next_event: None,
+            nominals: states.iter().map(nominal).collect(),
+            ended: None,
+            past_event: None,
         })
     }
 
@@ -295,6 +362,12 @@ pub struct Session<'g> {
     /// Steps made; inputs follow it.
     pub count: usize,
     next_event: Option<f64>,
+    /// Orders of magnitude of the states.
+    nominals: Vec<f64>,
+    /// When and by which call the FMU asked for the end of the simulation.
+    ended: Option<(f64, &'static str)>,
+    /// The first time at which the FMU gave a nextEventTime that had passed, and that.
+    past_event: Option<(f64, f64)>,
 }
 
 /// How far a host is.
@@ -303,6 +376,7 @@ pub struct Mark {
     time: f64,
     count: usize,
     next_event: Option<f64>,
+    ended: Option<(f64, &'static str)>,
 }
 
 impl<'g> Session<'g> {
@@ -310,8 +384,10 @@ impl<'g> Session<'g> {
     /// continuous-time mode, with what the FMU suggests.
     pub fn initialise(&mut self) -> Result<()> {
         let Experiment { start, tolerance, .. } = self.guest.experiment();
-        self.initialise_at(start, None, tolerance)
-            .map_err(|error| Unusable { rule: "load.initialises", why: error.to_string() }.into())
+        self.initialise_at(start, None, tolerance).map_err(|error| match error.downcast() {
+            Ok(unusable) => Unusable { ..unusable }.into(),
+            Err(error) => Unusable { rule: "load.initialises", why: error.to_string() }.into(),
+        })
     }
 
     /// As above, at any time.
@@ -320,7 +396,7 @@ impl<'g> Session<'g> {
         start: f64,
         stop: Option<f64>,
         tolerance: Option<f64>,
-    ) -> Called {
+    ) -> Result<()> {
         self.guest.doing(format!("fmi2SetupExperiment, startTime = {start}"));
         self.instance.setup_experiment(tolerance, start, stop)?;
         self.time = start;
@@ -330,7 +406,7 @@ impl<'g> Session<'g> {
     }
 
     /// fmi2ExitInitializationMode, and in Model Exchange on to continuous-time mode.
-    pub fn leave_initialisation(&mut self) -> Called {
+    pub fn leave_initialisation(&mut self) -> Result<()> {
         self.guest.doing("fmi2ExitInitializationMode");
         self.instance.exit_initialization_mode()?;
         match self.interface {
@@ -341,22 +417,89 @@ impl<'g> Session<'g> {
 
     /// Model Exchange: iterates in event mode until nothing is new, then goes on to continuous-time
     /// mode.
-    pub fn leave_event(&mut self) -> Called {
-        const ITERATIONS: usize = 100;
+    pub fn leave_event(&mut self) -> Result<()> {
+        self.iterate_events()?;
+        if self.is_ended() {
+            return Ok(());
+        }
+        self.guest.doing("fmi2EnterContinuousTimeMode");
+        Ok(self.instance.enter_continuous_time_mode()?)
+    }
+
+    /// Calls fmi2NewDiscreteStates until nothing is new.
+    fn iterate_events(&mut self) -> Result<()> {
         self.guest.doing("fmi2NewDiscreteStates");
         for _ in 0..ITERATIONS {
             let info = self.instance.new_discrete_states()?;
-            self.next_event = (info.next_event_time_defined != 0).then_some(info.next_event_time);
-            if info.new_discrete_states_needed == 0 {
-                self.guest.doing("fmi2EnterContinuousTimeMode");
-                return self.instance.enter_continuous_time_mode();
+            if info.terminate_simulation != 0 {
+                self.end("fmi2NewDiscreteStates");
+            }
+            if info.new_discrete_states_needed == 0 || self.is_ended() {
+                self.next_event =
+                    (info.next_event_time_defined != 0).then_some(info.next_event_time);
+                if let Some(next) =
+                    self.next_event.filter(|next| next.is_nan() || *next < self.time)
+                {
+                    self.past_event.get_or_insert((self.time, next));
+                }
+                return Ok(());
             }
         }
-        Err(CallError {
-            call: "fmi2NewDiscreteStates",
-            status: Status::Discard,
-            messages: Vec::new(),
-        })
+        let why = format!(
+            "newDiscreteStatesNeeded is still true after {ITERATIONS} calls of \
+             fmi2NewDiscreteStates at t = {:?} s, each of which returned fmi2OK (allowed: an \
+             iteration that ends)",
+            self.time
+        );
+        Err(Unusable { rule: "exchange.event_iteration", why }.into())
+    }
+
+    fn end(&mut self, call: &'static str) {
+        self.ended.get_or_insert((self.time, call));
+    }
+
+    /// Whether the FMU has asked for the end of the simulation; a host makes no more steps then.
+    pub fn is_ended(&self) -> bool {
+        self.ended.is_some()
+    }
+
+    /// When and by which call it did.
+    pub fn ended(&self) -> Option<(f64, &'static str)> {
+        self.ended
+    }
+
+    /// The first time at which nextEventTime had passed, and nextEventTime.
+    pub fn past_event(&self) -> Option<(f64, f64)> {
+        self.past_event
+    }
+
+    /// The next event in time that the FMU has told.
+    pub(super) fn next_event(&self) -> Option<f64> {
+        self.next_event
+    }
+
+    /// How many continuous states there are.
+    pub(super) fn states(&self) -> usize {
+        self.guest.description.states().len()
+    }
+
+    /// Order of magnitude of a state.
+    pub(super) fn nominal(&self, state: usize) -> f64 {
+        self.nominals.get(state).copied().unwrap_or(UNKNOWN_NOMINAL)
+    }
+
+    /// fmi2CompletedIntegratorStep, and the events that follow from it.
+    pub(super) fn complete_step(&mut self, crossed: bool) -> Result<()> {
+        let (enter, terminate) = self.instance.completed_integrator_step()?;
+        if terminate {
+            self.end("fmi2CompletedIntegratorStep");
+        }
+        let due = self.next_event.is_some_and(|next| self.time >= next);
+        if enter || crossed || due {
+            self.instance.enter_event_mode()?;
+            self.leave_event()?;
+        }
+        Ok(())
     }
 
     /// Sets all Real inputs to values that change from step to step.
@@ -371,91 +514,63 @@ impl<'g> Session<'g> {
         Ok(())
     }
 
-    /// Makes steps of the usual size, inputs changing.
-    pub fn advance(&mut self, steps: usize) -> Called {
+    /// Makes steps of the usual size, inputs changing, until the FMU asks for the end.
+    ///
+    /// # Errors
+    /// If one fails, which is the business of a rule of its own.
+    pub fn advance(&mut self, steps: usize) -> Result<()> {
+        let rule = match self.interface {
+            Interface::CoSimulation => "steps.run",
+            Interface::ModelExchange => "exchange.run",
+        };
         for _ in 0..steps {
-            self.stimulate()?;
-            self.go(self.step)?;
+            if self.is_ended() {
+                break;
+            }
+            let done = self.stimulate().map_err(anyhow::Error::from);
+            done.and_then(|()| self.go(self.step)).map_err(|error| match error.downcast() {
+                Ok(unusable) => Unusable { ..unusable },
+                Err(error) => Unusable { rule, why: format!("{}: {error}", self.guest.now()) },
+            })?;
         }
         Ok(())
     }
 
     /// What the host knows of how far it is; a saved state does not tell it.
     pub fn mark(&self) -> Mark {
-        Mark { time: self.time, count: self.count, next_event: self.next_event }
+        Mark { time: self.time, count: self.count, next_event: self.next_event, ended: self.ended }
     }
 
     /// Back to where the host was.
     pub fn go_back(&mut self, to: &Mark) {
-        (self.time, self.count, self.next_event) = (to.time, to.count, to.next_event);
+        (self.time, self.count) = (to.time, to.count);
+        (self.next_event, self.ended) = (to.next_event, to.ended);
     }
 
     /// Whether a step was discarded because the FMU wants to end the simulation.
-    pub fn has_ended(&mut self, error: &CallError) -> bool {
+    pub(super) fn has_terminated(&mut self, error: &CallError) -> bool {
         const TERMINATED: i32 = 3; // fmi2Terminated of fmi2StatusKind
         error.status == Status::Discard
-            && self.interface == Interface::CoSimulation
             && self.instance.boolean_status(TERMINATED).is_ok_and(|ended| ended)
     }
 
-    /// One step of any size, inputs as they are.
-    pub fn go(&mut self, h: f64) -> Called {
+    /// One step of any size, inputs as they are. In Model Exchange it may end earlier, if the states
+    /// change fast.
+    pub fn go(&mut self, h: f64) -> Result<()> {
         self.guest.doing(format!(
             "a step from {:?} s by {h:?} s ({})",
             self.time,
             self.interface.name()
         ));
         match self.interface {
-            Interface::CoSimulation => {
-                self.instance.do_step(self.time, h)?;
-                self.time += h;
-            }
-            Interface::ModelExchange => {
-                // Euler, in smaller steps: it only has to stay alive, and ends where h ends.
-                const PARTS: usize = 8;
-                let end = self.time + h;
-                let from = self.time;
-                for part in 1..=PARTS {
-                    let to =
-                        if part == PARTS { end } else { from + h * part as f64 / PARTS as f64 };
-                    self.euler(to)?;
-                }
-            }
+            Interface::CoSimulation => match self.instance.do_step(self.time, h) {
+                Ok(()) => self.time += h,
+                Err(error) if self.has_terminated(&error) => self.end("fmi2DoStep"),
+                Err(error) => return Err(error.into()),
+            },
+            Interface::ModelExchange => self.integrate(self.time + h)?,
         }
         self.count += 1;
-        Ok(())
-    }
-
-    fn euler(&mut self, to: f64) -> Called {
-        let states = self.guest.description.states().len();
-        let indicators = self.indicators();
-        let (mut x, mut dx) = (vec![0.0; states], vec![0.0; states]);
-        let (mut before, mut after) = (vec![0.0; indicators], vec![0.0; indicators]);
-        if indicators > 0 {
-            self.instance.event_indicators(&mut before)?;
-        }
-        if states > 0 {
-            self.instance.continuous_states(&mut x)?;
-            self.instance.derivatives(&mut dx)?;
-        }
-        for (x, dx) in x.iter_mut().zip(&dx) {
-            *x += (to - self.time) * dx;
-        }
-        self.instance.set_time(to)?;
-        self.time = to;
-        if states > 0 {
-            self.instance.set_continuous_states(&x)?;
-        }
-        if indicators > 0 {
-            self.instance.event_indicators(&mut after)?;
-        }
-        let (enter, _) = self.instance.completed_integrator_step()?;
-        let crossed = before.iter().zip(&after).any(|(a, b)| (*a > 0.0) != (*b > 0.0));
-        let due = self.next_event.is_some_and(|next| to >= next);
-        if enter || crossed || due {
-            self.instance.enter_event_mode()?;
-            self.leave_event()?;
-        }
         Ok(())
     }
 

@@ -6,19 +6,28 @@
 //! is a finding, not the end of the check.
 
 pub mod archive;
+pub mod arrays;
 pub mod binaries;
 pub mod dependencies;
 pub mod description;
 pub mod exchange;
 pub mod guest;
+pub mod integrate;
+pub mod json;
 pub mod junit;
+pub mod kinds;
 pub mod life;
 pub mod log;
+pub mod portable;
 pub mod process;
+pub mod ranges;
+pub mod reading;
 pub mod rules;
 pub mod schema;
 pub mod states;
 pub mod steps;
+pub mod tunable;
+pub mod units;
 pub mod values;
 
 use std::fmt::Write as _;
@@ -38,6 +47,7 @@ pub use self::rules::RULES;
 
 /// How bad it is to break a rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Severity {
     /// The standard forbids it, or hosts fail.
     Error,
@@ -100,12 +110,14 @@ pub struct Findings {
     pub list: Vec<Finding>,
     /// Why the rule does not apply, or could not be looked at.
     pub skipped: Option<String>,
+    /// The rule that must tell the fault for which this one could not be looked at.
+    told_by: Option<String>,
 }
 
 impl Findings {
     /// Nothing found yet; what will be found is this bad.
     pub fn new(severity: Severity) -> Findings {
-        Findings { severity, list: Vec::new(), skipped: None }
+        Findings { severity, list: Vec::new(), skipped: None, told_by: None }
     }
 
     /// The rule is broken.
@@ -124,6 +136,12 @@ impl Findings {
     /// The rule does not apply.
     pub fn skip(&mut self, why: impl Into<String>) {
         self.skipped = Some(why.into());
+    }
+
+    /// The rule cannot be looked at, for a fault that another rule tells.
+    pub fn skip_for(&mut self, rule: &str, why: impl Into<String>) {
+        self.skip(why);
+        self.told_by = Some(rule.into());
     }
 }
 
@@ -220,8 +238,26 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
         }
         Outcome { rule, findings, time: started.elapsed() }
     };
-    let outcomes = meant.par_iter().map(one).collect();
+    let mut outcomes: Vec<Outcome> = meant.par_iter().map(one).collect();
+    tell_what_nobody_tells(&mut outcomes);
     Ok(Report { path: path.to_path_buf(), outcomes })
+}
+
+/// A rule that was skipped for a fault that another rule tells becomes a finding if that rule was
+/// looked at and found nothing: the fault shows only here.
+fn tell_what_nobody_tells(outcomes: &mut [Outcome]) {
+    let silent: Vec<&str> = outcomes
+        .iter()
+        .filter(|o| o.findings.list.is_empty() && o.findings.skipped.is_none())
+        .map(|o| o.rule.id)
+        .collect();
+    for findings in outcomes.iter_mut().map(|outcome| &mut outcome.findings) {
+        if findings.told_by.as_deref().is_some_and(|rule| silent.contains(&rule))
+            && let Some(why) = findings.skipped.take()
+        {
+            findings.add("a run of this rule", why);
+        }
+    }
 }
 
 fn is_meant(rule: &Rule, name: &str) -> bool {

@@ -7,17 +7,22 @@ use super::Findings;
 use super::guest::{Guest, Interface, Reading, STEPS, Session, Stage};
 use host::fmi2::{CallError, Callbacks, HostState, Instantiation, Status};
 
-/// `load.opens`: what came before is the check.
-pub fn opens(_: &Guest, _: &mut Findings) -> Result<()> {
+/// `load.opens`: what came before is the check, but for the second binary of two.
+pub fn opens(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    if let Some(why) = guest.broken() {
+        findings.add("the binary of one interface", why);
+    }
     Ok(())
 }
 
 /// `load.types_platform`
 pub fn types_platform(guest: &Guest, findings: &mut Findings) -> Result<()> {
     guest.doing("fmi2GetTypesPlatform");
-    let answer = guest.fmu().types_platform();
-    if answer != "default" {
-        findings.add("fmi2GetTypesPlatform", format!("{answer:?} (allowed: \"default\")"));
+    for fmu in guest.binaries() {
+        let answer = fmu.types_platform();
+        if answer != "default" {
+            findings.add("fmi2GetTypesPlatform", format!("{answer:?} (allowed: \"default\")"));
+        }
     }
     Ok(())
 }
@@ -25,9 +30,11 @@ pub fn types_platform(guest: &Guest, findings: &mut Findings) -> Result<()> {
 /// `load.version`
 pub fn version(guest: &Guest, findings: &mut Findings) -> Result<()> {
     guest.doing("fmi2GetVersion");
-    let answer = guest.fmu().version();
-    if answer != "2.0" {
-        findings.add("fmi2GetVersion", format!("{answer:?} (allowed: \"2.0\")"));
+    for fmu in guest.binaries() {
+        let answer = fmu.version();
+        if answer != "2.0" {
+            findings.add("fmi2GetVersion", format!("{answer:?} (allowed: \"2.0\")"));
+        }
     }
     Ok(())
 }
@@ -85,21 +92,33 @@ pub fn first(guest: &Guest) -> Result<Interface> {
 /// `instantiate.guid`
 pub fn guid(guest: &Guest, findings: &mut Findings) -> Result<()> {
     let interface = first(guest)?;
-    let wrong = format!("{}x", guest.fmu().description().guid);
+    let wrong = format!("{}x", guest.fmu(interface).description().guid);
     for (what, guid) in [("another GUID", Some(wrong.as_str())), ("GUID NULL", None)] {
-        refused(guest, findings, what, &Instantiation { guid, ..arguments(guest, interface) });
+        refused(
+            guest,
+            interface,
+            findings,
+            what,
+            &Instantiation { guid, ..arguments(guest, interface) },
+        );
     }
     Ok(())
 }
 
 fn arguments(guest: &Guest, interface: Interface) -> Instantiation<'_> {
-    Instantiation { kind: interface.kind(), ..guest.fmu().instantiation("check") }
+    Instantiation { kind: interface.kind(), ..guest.fmu(interface).instantiation("check") }
 }
 
-fn refused(guest: &Guest, findings: &mut Findings, what: &str, with: &Instantiation) {
+fn refused(
+    guest: &Guest,
+    interface: Interface,
+    findings: &mut Findings,
+    what: &str,
+    with: &Instantiation,
+) {
     let place = format!("fmi2Instantiate with {what}");
     guest.doing(&place);
-    match guest.fmu().instantiate_with(with) {
+    match guest.fmu(interface).instantiate_with(with) {
         Ok(_) => findings.add(place, "it gives an instance (allowed: NULL)"),
         Err(error) if error.messages.is_empty() => {
             findings
@@ -115,14 +134,14 @@ pub fn arguments_null(guest: &Guest, findings: &mut Findings) -> Result<()> {
     let place = "fmi2Instantiate with the resource location NULL";
     guest.doing(place);
     let with = Instantiation { resources: None, ..arguments(guest, interface) };
-    if let Err(error) = guest.fmu().instantiate_with(&with)
+    if let Err(error) = guest.fmu(interface).instantiate_with(&with)
         && guest.description().co_simulation.is_some()
     {
         findings.add(place, error.to_string());
     }
     for (what, name) in [("instance name NULL", None), ("an empty instance name", Some(""))] {
         let with = Instantiation { name, ..arguments(guest, interface) };
-        refused(guest, findings, what, &with);
+        refused(guest, interface, findings, what, &with);
     }
     Ok(())
 }
@@ -137,7 +156,7 @@ pub fn callbacks(guest: &Guest, findings: &mut Findings) -> Result<()> {
     let place = "fmi2Instantiate with callbacks that are all NULL";
     guest.doing(place);
     let with = Instantiation { callbacks: Callbacks::Empty, ..arguments(guest, interface) };
-    match guest.fmu().instantiate_with(&with) {
+    match guest.fmu(interface).instantiate_with(&with) {
         Err(_) => findings.add(place, "it gives no instance"),
         Ok(mut instance) => {
             guest.doing("a refused call without a logger");
@@ -157,7 +176,7 @@ pub fn copies(guest: &Guest, findings: &mut Findings) -> Result<()> {
     let interface = first(guest)?;
     guest.doing("fmi2Instantiate with callbacks that are wiped afterwards");
     let with = Instantiation { callbacks: Callbacks::Fleeting, ..arguments(guest, interface) };
-    let mut instance = guest.fmu().instantiate_with(&with)?;
+    let mut instance = guest.fmu(interface).instantiate_with(&with)?;
     guest.doing("a refused call after the callbacks' struct was wiped");
     if let Err(error) = instance.get_real(&[u32::MAX], &mut [0.0])
         && error.messages.is_empty()
@@ -171,12 +190,14 @@ pub fn copies(guest: &Guest, findings: &mut Findings) -> Result<()> {
 /// `instantiate.null`
 pub fn null(guest: &Guest, findings: &mut Findings) -> Result<()> {
     guest.doing("fmi2FreeInstance(NULL), or another call with the instance NULL");
-    for (call, status) in guest.fmu().calls_with_null_instance() {
-        if !matches!(status, Status::Error | Status::Fatal) {
-            findings.add(
-                format!("{call} with the instance NULL"),
-                format!("fmi2{status:?} (allowed: fmi2Error)"),
-            );
+    for fmu in guest.binaries() {
+        for (call, status) in fmu.calls_with_null_instance() {
+            if !matches!(status, Status::Error | Status::Fatal) {
+                findings.add(
+                    format!("{call} with the instance NULL"),
+                    format!("fmi2{status:?} (allowed: fmi2Error)"),
+                );
+            }
         }
     }
     Ok(())

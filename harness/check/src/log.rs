@@ -15,9 +15,9 @@ fn complaints(guest: &Guest) -> Result<Vec<Message>> {
     let with = Instantiation {
         kind: interface.kind(),
         guid: Some("another"),
-        ..guest.fmu().instantiation("check")
+        ..guest.fmu(interface).instantiation("check")
     };
-    if let Err(error) = guest.fmu().instantiate_with(&with) {
+    if let Err(error) = guest.fmu(interface).instantiate_with(&with) {
         all.extend(error.messages);
     }
     let mut session = guest.session(interface)?;
@@ -43,9 +43,9 @@ pub fn percent(guest: &Guest, findings: &mut Findings) -> Result<()> {
     let with = Instantiation {
         kind: interface.kind(),
         guid: Some(TEXT),
-        ..guest.fmu().instantiation(TEXT)
+        ..guest.fmu(interface).instantiation(TEXT)
     };
-    if let Err(error) = guest.fmu().instantiate_with(&with) {
+    if let Err(error) = guest.fmu(interface).instantiate_with(&with) {
         told.extend(error.messages);
     }
     let mut session = guest.session(interface)?;
@@ -118,9 +118,10 @@ pub fn text(guest: &Guest, findings: &mut Findings) -> Result<()> {
 pub fn quiet(guest: &Guest, findings: &mut Findings) -> Result<()> {
     for interface in guest.interfaces() {
         guest.doing("fmi2Instantiate, loggingOn");
-        let with = Instantiation { kind: interface.kind(), ..guest.fmu().instantiation("check") };
+        let with =
+            Instantiation { kind: interface.kind(), ..guest.fmu(interface).instantiation("check") };
         let mut session = guest.session(interface)?;
-        session.instance = guest.fmu().instantiate_with(&with)?;
+        session.instance = guest.fmu(interface).instantiate_with(&with)?;
         session.initialise()?;
         session.advance(STEPS)?;
         session.instance.terminate()?;

@@ -174,7 +174,7 @@ pub fn answer(id: &str, directory: &Path, path: &Path, answer: &Path) -> Result<
             if let Err(error) = look(&guest, &mut findings) {
                 match error.downcast_ref::<Unusable>() {
                     Some(unusable) if unusable.rule != rule.id => {
-                        findings.skip(format!("{unusable}"))
+                        findings.skip_for(unusable.rule, unusable.to_string());
                     }
                     _ => findings.add(guest.now(), format!("{error:#}")),
                 }

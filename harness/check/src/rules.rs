@@ -2,8 +2,8 @@
 
 use super::Severity::{Error, Warning};
 use super::{
-    Look, Rule, Severity, archive, binaries, dependencies, description, exchange, life, log,
-    schema, states, steps, values,
+    Look, Rule, Severity, archive, arrays, binaries, dependencies, description, exchange, kinds,
+    life, log, portable, ranges, reading, schema, states, steps, tunable, units, values,
 };
 
 const fn rule(
@@ -24,6 +24,10 @@ pub static RULES: &[Rule] = &[
     rule("zip.readable", Error, "the file is a whole zip archive; every file unpacks, checksums and both headers of each agree", "2.3", Archive(archive::readable)),
     rule("zip.methods", Error, "files are stored or deflated, not encrypted", "2.3", Archive(archive::methods)),
     rule("zip.names", Error, "names are relative, with `/` between the parts, and stay inside", "2.3; hosts that unpack on Linux", Archive(archive::names)),
+    rule("zip.windows_names", Error, "names can be written on Windows: no devices (CON, NUL, COM1), none of < > : \" | ? *, no full stop or space at the end", "hosts that unpack on Windows", Archive(portable::windows_names)),
+    rule("zip.path_length", Warning, "paths have at most 160 characters, their parts at most 255 bytes", "Windows opens 259 characters, temporary folder included", Archive(portable::path_length)),
+    rule("zip.capitals", Error, "files and folders of FMI 2.0 are written with its capitals: binaries/linux64", "2.3; hosts on Linux", Archive(portable::capitals)),
+    rule("zip.file_and_folder", Error, "no file is a folder as well", "no host can unpack both", Archive(portable::file_and_folder)),
     rule("zip.links", Error, "no symbolic links", "2.3; hosts that unpack on Windows", Archive(archive::links)),
     rule("zip.duplicates", Error, "no name twice, capitals aside", "Windows and macOS keep one of them", Archive(archive::duplicates)),
     rule("zip.description", Error, "modelDescription.xml is at the root", "2.3", Archive(archive::description)),
@@ -33,6 +37,8 @@ pub static RULES: &[Rule] = &[
     rule("zip.folders", Warning, "only files and folders of FMI 2.0 at the top (and terminalsAndIcons, extra)", "2.3", Archive(archive::folders)),
 
     rule("xml.well_formed", Error, "modelDescription.xml is well-formed XML in UTF-8", "2.2", Archive(description::well_formed)),
+    rule("xml.size", Error, "modelDescription.xml has at most 256 levels of elements, 20 million nodes and 512 MiB", "hosts that read the tree by recursion", Archive(reading::size)),
+    rule("xml.doctype", Error, "modelDescription.xml has no document type declaration and no entities of its own", "parsers refuse it, expand entities without bound or open other files", Archive(reading::doctype)),
     rule("xml.schema", Error, "elements and attributes are those of the schema, in its order, none missing", "2.2, fmi2ModelDescription.xsd", Description(schema::structure)),
     rule("xml.values", Error, "attributes are written as the schema says: whole numbers (exponents of BaseUnit too), decimal points, known words", "2.2, fmi2ModelDescription.xsd", Description(schema::values)),
     rule("xml.fmi_version", Error, "fmiVersion is exactly 2.0", "2.2.1", Description(description::fmi_version)),
@@ -43,8 +49,13 @@ pub static RULES: &[Rule] = &[
     rule("xml.capabilities", Error, "capability flags do not contradict each other", "3.3.1, 4.3.1", Description(description::capabilities)),
     rule("xml.state_capability", Warning, "states can be saved and serialised", "Simulink steps back and restarts fast only then; OMSimulator's adaptive masters refuse without", Description(description::state_capability)),
     rule("xml.default_experiment", Warning, "start, stop, tolerance and step of the default experiment make sense", "2.2.5", Description(description::default_experiment)),
+    rule("xml.stop_time", Error, "stopTime of the default experiment is not before its startTime", "2.2.5", Description(description::stop_time)),
     rule("xml.unique", Error, "names of units, display units, types, items and log categories, and values of items, are unique", "2.2.2 to 2.2.4", Description(description::unique)),
-    rule("xml.units", Error, "every unit and displayUnit is defined and can be converted", "2.2.2, 2.2.7", Description(description::units)),
+    rule("xml.units", Error, "every unit and displayUnit is defined", "2.2.2, 2.2.7", Description(description::units)),
+    rule("xml.unit_numbers", Error, "factors of units are finite and not 0, offsets finite", "2.2.2", Description(units::numbers)),
+    rule("xml.base_units", Error, "exponents, factor and offset of BaseUnit are those of the unit's name, where that is one of SI or a common one", "2.2.2; hosts convert by them", Description(units::base_units)),
+    rule("xml.display_units", Error, "factor and offset of DisplayUnit lead from the unit to the one displayed, not back", "2.2.2; hosts convert by them", Description(units::display_units)),
+    rule("xml.derivative_units", Error, "the unit of a derivative is that of its state per second", "2.2.7, 2.2.2", Description(units::derivative_units)),
     rule("xml.types", Error, "every declaredType is defined, of the right type, and named like no variable", "2.2.3, 2.2.7", Description(description::types)),
     rule("xml.names", Error, "variables have names, each its own", "2.2.7", Description(description::names)),
     rule("xml.structured_names", Error, "names follow the declared naming convention", "2.2.9", Description(description::structured_names)),
@@ -69,6 +80,8 @@ pub static RULES: &[Rule] = &[
     rule("xml.dependencies_written", Warning, "every output says what it depends on", "Simulink and OMSimulator see algebraic loops else", Description(description::dependencies_written)),
 
     rule("bin.present", Error, "there is a binary of the model's name for a platform of FMI 2.0, or sources", "2.3", Binaries(binaries::present)),
+    rule("bin.each_interface", Error, "on every platform each interface has the binary that its modelIdentifier names", "2.3, 3.3.1, 4.3.1", Binaries(binaries::each_interface)),
+    rule("bin.this_platform", Warning, "there is a binary for the platform of the check; without it no calls are made", "what is not called is not checked", Binaries(binaries::this_platform)),
     rule("bin.name", Error, "binaries are called modelIdentifier and the platform's ending", "2.3", Binaries(binaries::name)),
     rule("bin.format", Error, "binaries are for the platform whose folder they are in", "2.3", Binaries(binaries::format)),
     rule("bin.symbols", Error, "all functions of the declared interfaces are exported: 25, 9 for Co-Simulation, 10 for Model Exchange", "2.1; FMPy, fmusim and OMSimulator refuse", Binaries(binaries::symbols)),
@@ -97,6 +110,7 @@ pub static RULES: &[Rule] = &[
 
     rule("host.silent", Warning, "nothing is printed; the logger is there for that", "hosts that read their own stdout", Calls(life::silent)),
     rule("host.untouched", Error, "floating-point control, locale, signal handlers, working directory, environment, threads and open files stay as they were", "the host's other models", Calls(life::untouched)),
+    rule("host.arrays", Error, "nothing is written beside an array that a call is given, nor into one that is only read", "2.1.7: the length is in the call; the host's memory", Calls(arrays::arrays)),
 
     rule("log.percent", Error, "percent signs arrive as they are: the text is no format", "2.1.5; five exporters get it wrong, hosts crash", Calls(log::percent)),
     rule("log.categories", Error, "messages have declared categories", "2.1.5, 2.2.4", Calls(log::categories)),
@@ -114,10 +128,16 @@ pub static RULES: &[Rule] = &[
     rule("values.fixed", Warning, "fixed parameters are refused after initialisation", "2.2.7, 4.2.4", Calls(values::fixed)),
     rule("values.computed", Warning, "what is calculated cannot be set", "2.1.7, 2.2.7", Calls(values::computed)),
     rule("values.limits", Warning, "min and max are accepted, values beyond them refused by the end of initialisation", "2.2.7", Calls(values::limits)),
+    rule("values.limits_exact", Warning, "a value just outside min or max is refused where one far outside is: the binary has no wider range", "2.2.7", Calls(ranges::limits_exact)),
+    rule("values.in_range", Error, "what the FMU computes in an ordinary run is within its min and max", "2.2.7", Calls(ranges::in_range)),
+    rule("values.items", Warning, "enumerations take and give the items of their type and no other value", "2.2.3, 2.2.7", Calls(ranges::items_known)),
+    rule("values.tunable", Error, "tunable parameters can be set after initialisation (in Model Exchange in event mode) and read again", "2.2.7, 3.2.3, 4.2.4", Calls(tunable::can_be_set)),
+    rule("values.tunable_effect", Warning, "a tunable parameter that acts when set before initialisation acts when set after it", "2.2.7", Calls(tunable::acts)),
     rule("values.not_a_number", Warning, "parameters that are NaN or infinite are refused", "2.1.3: never fmi2OK with rubbish", Calls(values::not_a_number)),
     rule("values.no_warning", Warning, "an ordinary run returns no fmi2Warning", "OMSimulator takes it for a failure", Calls(values::no_warning)),
 
     rule("steps.run", Error, "200 steps with changing inputs return fmi2OK and finite values", "4.2.2; two hosts repeat a discarded step for ever", Calls(steps::run)),
+    rule("steps.terminated", Warning, "the FMU does not ask for the end of the simulation before the suggested one; at its first step that is an error", "4.2.1, fmi2Terminated", Calls(steps::terminated)),
     rule("steps.size", Warning, "steps that are 0, negative or not finite are refused and change nothing", "4.2.2", Calls(steps::size)),
     rule("steps.point", Warning, "a step from a time that is not reached is refused", "4.2.2", Calls(steps::point)),
     rule("steps.wobble", Error, "communication points may be off by rounding", "every host: n·h against t + h", Calls(steps::wobble)),
@@ -125,8 +145,10 @@ pub static RULES: &[Rule] = &[
     rule("steps.stop_time", Warning, "the stop time is reached with rounding, and not passed", "2.1.6", Calls(steps::stop_time)),
     rule("steps.tolerance", Error, "a tolerance may be given or not", "2.1.6; OMSimulator gives one", Calls(steps::tolerance)),
     rule("steps.cut", Warning, "results do not depend on how time is cut, within the tolerance", "4.3.1, canHandleVariableCommunicationStepSize", Calls(steps::cut)),
+    rule("steps.small", Error, "many small steps (0.4 ms, 10 us) lead where few usual ones do", "4.3.1, canHandleVariableCommunicationStepSize", Calls(steps::small)),
     rule("steps.inputs", Warning, "inputs that are NaN are refused; derivatives of inputs are taken if declared", "4.2.1", Calls(steps::inputs)),
     rule("steps.output_derivatives", Warning, "derivatives of outputs are those of the outputs", "4.2.1, maxOutputDerivativeOrder", Calls(steps::output_derivatives)),
+    rule("steps.output_derivative_order", Error, "derivatives of outputs are there up to maxOutputDerivativeOrder", "4.2.1, 4.3.1", Calls(steps::output_derivative_order)),
 
     rule("states.rollback", Error, "after a state is set again, values and steps are the same to the last bit", "2.1.8", Calls(states::rollback)),
     rule("states.handle", Error, "a handle can be used again; freeing NULL is fine", "2.1.8", Calls(states::handle)),
@@ -137,9 +159,13 @@ pub static RULES: &[Rule] = &[
     rule("dependencies.running", Error, "outputs and derivatives change with no input or state that is not declared", "2.2.8; hosts solve in the wrong order", Calls(dependencies::running)),
     rule("dependencies.feedthrough", Warning, "outputs change with every input that is declared", "2.2.8; Simulink and OMSimulator see algebraic loops", Calls(dependencies::feedthrough)),
     rule("dependencies.initial", Error, "initial unknowns change with no input or parameter that is not declared", "2.2.8", Calls(dependencies::initial)),
+    rule("dependencies.kinds", Error, "where dependenciesKind is constant, fixed, tunable or discrete, the unknown follows the known by such a factor", "2.2.8", Calls(kinds::kinds)),
     rule("dependencies.directional", Error, "directional derivatives are those of differences", "2.1.9", Calls(dependencies::directional)),
 
-    rule("exchange.run", Error, "Euler's method with events stays alive; event iteration ends", "3.2.2", Calls(exchange::run)),
+    rule("exchange.run", Error, "the states can be integrated, by an adaptive and if need be implicit method, and stay finite", "3.2.2", Calls(exchange::run)),
+    rule("exchange.event_iteration", Error, "newDiscreteStatesNeeded becomes false: an event iteration ends within 100 calls", "3.2.2", Calls(exchange::event_iteration)),
+    rule("exchange.next_event_time", Error, "nextEventTime is not in the past", "3.2.2", Calls(exchange::next_event_time)),
+    rule("exchange.terminate_simulation", Warning, "the FMU does not ask for the end of the simulation before the suggested one; at the first event or step that is an error", "3.2.2", Calls(exchange::terminate_simulation)),
     rule("exchange.vectors", Error, "states, derivatives and indicators are finite, nominals above 0", "3.2.2", Calls(exchange::vectors)),
     rule("exchange.lengths", Warning, "vectors of the wrong length are refused", "3.2.2", Calls(exchange::lengths)),
     rule("exchange.variables", Error, "states and derivatives read as variables are those of the vectors, in ModelStructure's order", "2.2.8, 3.2.2", Calls(exchange::variables)),

@@ -3,9 +3,10 @@
 use anyhow::Result;
 
 use super::Findings;
+use super::description::Variable;
 use super::guest::{Guest, Interface, Reading, STEPS, Session};
 use super::life::expect_refusal;
-use host::fmi2::Status;
+use host::fmi2::{CallError, Status};
 
 /// A stepping instance, or the reason why there is none.
 fn stepping<'g>(guest: &'g Guest, findings: &mut Findings) -> Result<Option<Session<'g>>> {
@@ -30,17 +31,19 @@ pub fn run(guest: &Guest, findings: &mut Findings) -> Result<()> {
     const LONG: usize = 200;
     let Some(mut session) = stepping(guest, findings)? else { return Ok(()) };
     for _ in 0..LONG {
-        if let Err(error) = session.advance(1) {
-            if session.has_ended(&error) {
-                break;
-            }
-            let allowed = match error.status {
-                Status::Discard => " (without fmi2Terminated; two hosts try for ever)",
-                _ => "",
-            };
-            findings.add(guest.now(), format!("{error}{allowed}"));
-            return Ok(());
+        if session.is_ended() {
+            break;
         }
+        let done = session.stimulate().map_err(anyhow::Error::from);
+        let Err(error) = done.and_then(|()| session.go(session.step)) else { continue };
+        let discarded =
+            error.downcast_ref::<CallError>().is_some_and(|error| error.status == Status::Discard);
+        let allowed = match discarded {
+            true => " (allowed: fmi2Discard only with fmi2Terminated; two hosts try for ever)",
+            false => "",
+        };
+        findings.add(guest.now(), format!("{error}{allowed}"));
+        return Ok(());
     }
     let readings = session.readings()?;
     for (v, reading) in guest.variables().iter().zip(readings) {
@@ -107,7 +110,7 @@ pub fn wobble(guest: &Guest, findings: &mut Findings) -> Result<()> {
         session.stimulate()?;
         guest.doing(format!("fmi2DoStep from {wobbled:?} s, {product:?} s by {h:?} s being meant"));
         if let Err(error) = session.instance.do_step(wobbled, h) {
-            if session.has_ended(&error) {
+            if session.has_terminated(&error) {
                 break;
             }
             findings.add(guest.now(), format!("{error} (allowed: some ulps either way)"));
@@ -168,7 +171,7 @@ pub fn tolerance(guest: &Guest, findings: &mut Findings) -> Result<()> {
             let done = session
                 .initialise_at(start, None, tolerance)
                 .map_err(anyhow::Error::from)
-                .and_then(|()| Ok(session.advance(3)?));
+                .and_then(|()| session.advance(3));
             if let Err(error) = done {
                 let given = tolerance.map_or("none".into(), |x: f64| x.to_string());
                 fails.push((interface, format!("tolerance {given} ({})", interface.name()), error));
@@ -335,6 +338,148 @@ pub fn output_derivatives(guest: &Guest, findings: &mut Findings) -> Result<()> 
                 ),
             );
         }
+    }
+    Ok(())
+}
+
+/// `steps.small`
+pub fn small(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    /// Steps that are tried instead of the usual ones, s.
+    const SMALL: [f64; 2] = [4e-4, 1e-5];
+    /// At most so many of them.
+    const MOST: f64 = 5000.0;
+    let Some(session) = stepping(guest, findings)? else { return Ok(()) };
+    let usual = session.step;
+    drop(session);
+    if !variable_steps(guest, findings) {
+        return Ok(());
+    }
+    let experiment = guest.experiment();
+    let continuous = |v: &&Variable| v.is_continuous() && !v.is_set_by_hosts();
+    let all: Vec<&Variable> = guest.variables().iter().filter(continuous).collect();
+    // Where the values are before, and after `count` steps of `h` with the inputs held; none if a
+    // step is refused, which is honest.
+    let run = |h: f64, count: usize| -> Result<Option<(Vec<f64>, Vec<f64>)>> {
+        let mut session = guest.running(Interface::CoSimulation)?;
+        session.advance(3)?;
+        session.stimulate()?;
+        let read = |session: &mut Session| -> Result<Vec<f64>> {
+            let value = |v: &&Variable| match session.get(v)? {
+                Reading::Real(x) => Ok(x),
+                _ => Ok(f64::NAN),
+            };
+            all.iter().map(value).collect()
+        };
+        let before = read(&mut session)?;
+        let start = session.time;
+        for n in 1..=count {
+            let end = start + n as f64 * h;
+            if session.is_ended() || session.go(end - session.time).is_err() {
+                return Ok(None);
+            }
+            session.time = end;
+        }
+        Ok(Some((before, read(&mut session)?)))
+    };
+    for h in SMALL {
+        // the same time in usual steps and in small ones
+        let longest = (MOST * h).min(1.0);
+        let steps = (longest / usual).floor().clamp(1.0, STEPS as f64);
+        let time = (steps * usual).min(longest);
+        let h = h.min(time / 20.0);
+        let count = (time / h).round();
+        let Some((before, usually)) = run(time / steps, steps as usize)? else { continue };
+        let Some((_, small)) = run(time / count, count as usize)? else { continue };
+        for (n, v) in all.iter().enumerate() {
+            let moved = usually[n] - before[n];
+            let size = before[n].abs().max(usually[n].abs()).max(1e-3 * v.nominal());
+            let visible = 100.0 * experiment.tolerance.unwrap_or(1e-5).max(1e-9) * size;
+            if moved.abs() > visible && (small[n] - usually[n]).abs() > 0.5 * moved.abs() {
+                findings.add(
+                    v.place(),
+                    format!(
+                        "it goes from {} to {} in {steps} steps of {:.1e} s, but to {} in {count} \
+                         steps of {:.1e} s (allowed: steps of any length, since \
+                         canHandleVariableCommunicationStepSize is declared)",
+                        before[n],
+                        usually[n],
+                        time / steps,
+                        small[n],
+                        time / count
+                    ),
+                );
+            }
+        }
+        if !findings.list.is_empty() {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// `steps.output_derivative_order`
+pub fn output_derivative_order(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let Some(session) = stepping(guest, findings)? else { return Ok(()) };
+    drop(session);
+    let interface = guest.description().co_simulation.as_ref();
+    let most = interface.and_then(|i| i.number("maxOutputDerivativeOrder")).unwrap_or(0.0);
+    if most < 1.0 {
+        findings.skip("maxOutputDerivativeOrder is 0");
+        return Ok(());
+    }
+    let outputs: Vec<_> =
+        guest.variables().iter().filter(|v| v.causality == "output" && v.is_continuous()).collect();
+    for order in 1..=most.min(10.0) as i32 {
+        for v in &outputs {
+            // after an error an FMU may refuse everything: a new instance each time
+            let mut session = guest.running(Interface::CoSimulation)?;
+            session.advance(3)?;
+            let place = format!("derivative {order} of {}", v.name);
+            guest.doing(format!("fmi2GetRealOutputDerivatives, {place}"));
+            let mut value = [f64::NAN];
+            let answer =
+                session.instance.get_real_output_derivatives(&[v.reference], &[order], &mut value);
+            let fault = match answer {
+                Err(error) => error.to_string(),
+                Ok(()) if !value[0].is_finite() => format!("it is {}", value[0]),
+                Ok(()) => continue,
+            };
+            findings.add(
+                place,
+                format!("{fault} (allowed: fmi2OK up to maxOutputDerivativeOrder={most})"),
+            );
+        }
+    }
+    Ok(())
+}
+
+/// `steps.terminated`
+pub fn terminated(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let Some(mut session) = stepping(guest, findings)? else { return Ok(()) };
+    tell_end(&mut session, findings)
+}
+
+/// Runs until the FMU asks for the end, and tells that if it comes before the suggested one.
+pub fn tell_end(session: &mut Session, findings: &mut Findings) -> Result<()> {
+    let experiment = session.guest.experiment();
+    session.advance(2 * STEPS)?;
+    let Some((time, call)) = session.ended() else { return Ok(()) };
+    let place = format!("{call} at t = {time:?} s");
+    // where no end is suggested, the model may have reached its own
+    let suggested = match experiment.stop {
+        Some(stop) if time < stop - 1e-9 * stop.abs() => format!("stopTime={stop}"),
+        None => "no stopTime".into(),
+        Some(_) => return Ok(()),
+    };
+    let text = format!(
+        "it asks for the end of the simulation after {} steps (DefaultExperiment has {suggested}; \
+         allowed: only at the end, or for a reason that a user can see)",
+        session.count
+    );
+    if session.count <= 1 {
+        findings.fail(place, text);
+    } else if experiment.stop.is_some() {
+        findings.add(place, text);
     }
     Ok(())
 }

@@ -365,7 +365,7 @@ pub fn limits(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// Whether a text contains a name as a whole word.
-fn mentions(text: &str, name: &str) -> bool {
+pub fn mentions(text: &str, name: &str) -> bool {
     let part = |c: char| c.is_alphanumeric() || matches!(c, '_' | '.' | '[');
     text.match_indices(name).any(|(at, _)| {
         let (before, after) = (text[..at].chars().last(), text[at + name.len()..].chars().next());
@@ -386,8 +386,10 @@ pub fn not_a_number(guest: &Guest, findings: &mut Findings) -> Result<()> {
                 || session.initialise().is_err()
                 || session.go(session.step).is_err();
             if !refused {
-                findings
-                    .add(place, "nobody objects (allowed: fmi2Error at the step at the latest)");
+                findings.add(
+                    place,
+                    "it is accepted without error (allowed: fmi2Error at the step at the latest)",
+                );
                 break;
             }
         }

@@ -20,6 +20,8 @@ use libloading::Library;
 use crate::description::{ModelDescription, Type, Value};
 use crate::output::sha256;
 
+pub mod guarded;
+
 /// Folder of the binaries for the platform this program was built for (FMI 2.0, section 2.3).
 pub const PLATFORM: &str = if cfg!(target_os = "windows") {
     if cfg!(target_pointer_width = "64") { "win64" } else { "win32" }
@@ -314,6 +316,16 @@ impl Fmu {
     /// Loads the binary of an FMU that is unpacked in `directory`, for co-simulation, model exchange
     /// or both; errors speak of `path`. [`Fmu::hash`] is empty.
     pub fn load(directory: &Path, path: &Path) -> Result<Self> {
+        Fmu::load_binary(None, directory, path)
+    }
+
+    /// As [`Fmu::load`], but the binary of one interface, [`CO_SIMULATION`] or [`MODEL_EXCHANGE`]:
+    /// the two may name different ones.
+    pub fn load_for(kind: i32, directory: &Path, path: &Path) -> Result<Self> {
+        Fmu::load_binary(Some(kind), directory, path)
+    }
+
+    fn load_binary(kind: Option<i32>, directory: &Path, path: &Path) -> Result<Self> {
         let name = path.display();
         let xml = directory.join("modelDescription.xml");
         if !xml.exists() {
@@ -323,10 +335,14 @@ impl Fmu {
             .with_context(|| format!("modelDescription.xml in {name} cannot be read"))?;
         let description =
             ModelDescription::from_xml(&text).with_context(|| format!("{name} cannot be used"))?;
-        let interface = description.co_simulation.as_ref();
-        let identifier = interface
-            .map(|i| &i.model_identifier)
-            .or(description.model_exchange.as_ref().map(|i| &i.model_identifier))
+        let stepping = description.co_simulation.as_ref().map(|i| &i.model_identifier);
+        let exchange = description.model_exchange.as_ref().map(|i| &i.model_identifier);
+        let identifier = match kind {
+            None => stepping.or(exchange),
+            Some(CO_SIMULATION) => stepping,
+            Some(_) => exchange,
+        };
+        let identifier = identifier
             .with_context(|| format!("{name} offers neither co-simulation nor model exchange"))?;
         let binary = format!("binaries/{PLATFORM}/{identifier}{}", std::env::consts::DLL_SUFFIX);
         let binary_path = directory.join(&binary);
@@ -347,7 +363,7 @@ impl Fmu {
         let library = unsafe { Library::new(&binary_path) }
             .with_context(|| format!("{binary} in {name} cannot be loaded"))?;
         let mut needed = Functions::SYMBOLS.to_vec();
-        if description.co_simulation.is_some() {
+        if stepping == Some(identifier) {
             needed.extend(StepFunctions::SYMBOLS);
         }
         // SAFETY: only asked whether the symbol is there.

@@ -1,9 +1,31 @@
 //! An XML file as a tree of elements, each with the line it starts in: the one reading of XML here.
 
-use roxmltree::{Document, Node};
+use roxmltree::{Document, Error, Node, ParsingOptions};
 
 /// Levels of elements that are read; a model description has eight.
 pub const DEEPEST: usize = 256;
+/// Bytes that are read; half a million variables have a quarter of it.
+pub const LONGEST: usize = 512 << 20;
+/// Nodes that are read: elements, and the white space between them.
+pub const MOST: u32 = 20_000_000;
+
+/// Why a file is not read. The texts of all but `TooLarge` begin with line and column.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Fault {
+    /// It is not well-formed, or not UTF-8.
+    Malformed(String),
+    /// It is longer than [`LONGEST`], has more than [`MOST`] nodes or levels below [`DEEPEST`].
+    TooLarge(String),
+    /// It has a document type declaration, which can define entities and name other files.
+    Doctype(String),
+}
+
+impl std::fmt::Display for Fault {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let (Fault::Malformed(why) | Fault::TooLarge(why) | Fault::Doctype(why)) = self;
+        f.write_str(why)
+    }
+}
 
 /// An element with its attributes and what is inside it; text is left out.
 #[derive(Clone, Debug, Default)]
@@ -22,33 +44,53 @@ impl Element {
     /// Reads a file; the error begins with the line and the column where it is not well-formed, is not
     /// UTF-8, has a DOCTYPE, or nests elements deeper than [`DEEPEST`].
     pub fn parse(bytes: &[u8]) -> Result<Element, String> {
+        Element::read(bytes).map_err(|fault| fault.to_string())
+    }
+
+    /// As [`Element::parse`], with the kind of the fault.
+    pub fn read(bytes: &[u8]) -> Result<Element, Fault> {
+        if bytes.len() > LONGEST {
+            let length = bytes.len();
+            return Err(Fault::TooLarge(format!("it has {length} bytes (allowed: {LONGEST})")));
+        }
         let text = std::str::from_utf8(bytes).map_err(|error| {
             let before = &bytes[..error.valid_up_to()];
             let line = 1 + before.iter().filter(|byte| **byte == b'\n').count();
             let column = 1 + before.iter().rev().take_while(|byte| **byte != b'\n').count();
-            format!("{line}:{column} it is not UTF-8")
+            Fault::Malformed(format!("{line}:{column} it is not UTF-8"))
         })?;
-        let document = Document::parse(text).map_err(|error| {
+        let options = ParsingOptions { nodes_limit: MOST, ..ParsingOptions::default() };
+        let document = Document::parse_with_options(text, options).map_err(|error| {
             let (place, what) = (error.pos().to_string(), error.to_string());
-            format!("{place} {}", what.strip_suffix(&format!(" at {place}")).unwrap_or(&what))
+            let why =
+                format!("{place} {}", what.strip_suffix(&format!(" at {place}")).unwrap_or(&what));
+            match error {
+                Error::DtdDetected => Fault::Doctype(why),
+                Error::NodesLimitReached => {
+                    Fault::TooLarge(format!("it has more than {MOST} nodes (allowed: {MOST})"))
+                }
+                _ => Fault::Malformed(why),
+            }
         })?;
-        Element::of(document.root_element(), 1)
+        Element::of(document.root_element(), 1, &mut Lines { text, at: 0, line: 1 })
     }
 
-    fn of(node: Node, depth: usize) -> Result<Element, String> {
-        let place = node.document().text_pos_at(node.range().start);
+    fn of(node: Node, depth: usize, lines: &mut Lines) -> Result<Element, Fault> {
+        let line = lines.of(node.range().start);
         if depth > DEEPEST {
-            return Err(format!("{place} elements are nested deeper than {DEEPEST}"));
+            return Err(Fault::TooLarge(format!(
+                "line {line}: elements are nested deeper than allowed ({DEEPEST} levels)"
+            )));
         }
         let attribute = |a: roxmltree::Attribute| (a.name().to_string(), a.value().to_string());
         Ok(Element {
             name: node.tag_name().name().into(),
-            line: place.row.into(),
+            line,
             attributes: node.attributes().map(attribute).collect(),
             children: node
                 .children()
                 .filter(Node::is_element)
-                .map(|child| Element::of(child, depth + 1))
+                .map(|child| Element::of(child, depth + 1, lines))
                 .collect::<Result<_, _>>()?,
         })
     }
@@ -76,6 +118,23 @@ impl Element {
     /// All elements below `list`, if that is there.
     pub fn list<'a>(&'a self, list: &str) -> impl Iterator<Item = &'a Element> + use<'a> {
         self.child(list).into_iter().flat_map(|list| &list.children)
+    }
+}
+
+/// Counts lines forwards: finding each by itself would read the file from its beginning every time.
+struct Lines<'t> {
+    text: &'t str,
+    at: usize,
+    line: u64,
+}
+
+impl Lines<'_> {
+    /// The line of a byte, which is not before the last one that was asked for.
+    fn of(&mut self, byte: usize) -> u64 {
+        let passed = &self.text.as_bytes()[self.at..byte.max(self.at)];
+        self.line += passed.iter().filter(|b| **b == b'\n').count() as u64;
+        self.at = byte.max(self.at);
+        self.line
     }
 }
 
@@ -124,6 +183,18 @@ mod tests {
         let nested = |depth: usize| "<a>".repeat(depth) + &"</a>".repeat(depth);
         assert!(Element::parse(nested(DEEPEST).as_bytes()).is_ok());
         assert!(Element::parse(nested(200_000).as_bytes()).unwrap_err().contains("deeper than"));
+        let fault = Element::read(bomb.as_bytes()).unwrap_err();
+        assert!(matches!(fault, Fault::Doctype(_)));
+    }
+
+    #[test]
+    fn a_hundred_thousand_elements_are_read_in_a_moment() {
+        let lines = "<b c=\"0123456789\"/>\n".repeat(100_000);
+        let started = std::time::Instant::now();
+        let root = Element::parse(format!("<a>\n{lines}</a>").as_bytes()).unwrap();
+        assert_eq!(root.children.last().map(|b| b.line), Some(100_001));
+        // a line for each by itself took minutes
+        assert!(started.elapsed().as_secs_f64() < 5.0);
     }
 
     #[test]

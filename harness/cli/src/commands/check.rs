@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
-use check::{Options, Severity, check, junit, process, table};
+use check::{Options, Severity, check, json, junit, process, table};
 use host::output;
 
 use crate::progress;
@@ -23,6 +23,9 @@ pub struct CheckArgs {
     /// Writes the report as JUnit XML, one test case for each rule.
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
+    /// Writes the report as JSON, one object for each rule.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
     /// Rules (zip.names) or groups of rules (zip) to look at [default: all].
     #[arg(long, value_name = "RULE,…", value_delimiter = ',')]
     only: Vec<String>,
@@ -65,6 +68,9 @@ impl CheckArgs {
         print!("{}", report.text());
         if let Some(path) = &self.junit {
             output::atomically(path, |file| junit::write(&report, file))?;
+        }
+        if let Some(path) = &self.json {
+            output::atomically(path, |file| json::write(&report, file))?;
         }
         match report.count(Severity::Error) {
             0 => Ok(()),

@@ -36,10 +36,16 @@ static struct callbacks host;           /* a copy, as it should be */
 static const struct callbacks *kept;    /* the host's own struct, as it should not be */
 static int loads, instances, steps, terminated, initialised;
 static double reached, start_of;
+static double lag;                      /* time that swallowed steps lack */
+static double tuned;                    /* friction.b, set and not passed on */
+static int is_tuned;
 
 static int is(const char *name) { return strcmp(word, name) == 0; }
 
 static void *find(const char *name) { return dlsym(real, name); }
+
+/* Value reference of the tunable parameter friction.b. */
+enum { FRICTION_B = 129 };
 
 /* Calls the function of the same name in real.so. */
 #define REAL(type, name, parameters) ((type(*) parameters)find(#name))
@@ -117,7 +123,8 @@ Component fmi2Instantiate(String name, int type, String id, String resources,
     mine = *functions;
     mine.logger = functions->logger ? log_text : NULL;
     instances++;
-    steps = terminated = initialised = 0;
+    steps = terminated = initialised = is_tuned = 0;
+    lag = 0;
     made = REAL(Component, fmi2Instantiate,
                 (String, int, String, String, const struct callbacks *, int, int))(
         name, type, id, resources, &mine, visible, logging);
@@ -198,6 +205,12 @@ Status fmi2GetReal(Component c, References r, size_t n, double *x)
     if (is("wants_variables") && n == 0)
         return ERROR;
     status = REAL(Status, fmi2GetReal, (Component, References, size_t, double *))(c, r, n, x);
+    if (is("writes_past") && status == OK)
+        x[n] = 0;
+    if (is("ignores_tunables") && is_tuned)
+        for (i = 0; i < n; i++)
+            if (r[i] == FRICTION_B)
+                x[i] = tuned;
     if (is("crashes_on_unknown") && status == ERROR)
         abort();
     if (is("any_reference"))
@@ -251,6 +264,17 @@ Status fmi2SetReal(Component c, References r, size_t n, const double *x)
     Status status;
     if (is("any_number") && n && !isfinite(x[0]))
         return OK;
+    if (initialised && n == 1 && r[0] == FRICTION_B) {
+        if (is("refuses_tunables"))
+            return ERROR;
+        if (is("drops_tunables"))
+            return OK;
+        if (is("ignores_tunables")) {
+            is_tuned = 1;
+            tuned = x[0];
+            return OK;
+        }
+    }
     if (is("forgets_settings") && n && r[0] != 12)
         return OK;
     status = REAL(Status, fmi2SetReal, (Component, References, size_t, const double *))(c, r, n, x);
@@ -347,6 +371,15 @@ Status fmi2DoStep(Component c, double t, double h, int forget)
             sleep(1);
     if (is("any_step") && !(h > 0))
         return OK;
+    if (is("swallows_small_steps")) {
+        if (h > 0 && h < 1e-3 && initialised) {
+            lag += h;
+            return OK;
+        }
+        t -= lag;
+    }
+    if (is("terminates")) /* fmi2GetBooleanStatus tells */
+        return DISCARD;
     if (is("any_point"))
         t = reached;
     if (is("exact_time") && t != reached)
@@ -382,6 +415,10 @@ Status fmi2GetIntegerStatus(Component c, int kind, int *x)
 }
 Status fmi2GetBooleanStatus(Component c, int kind, int *x)
 {
+    if (is("terminates")) {
+        *x = 1;
+        return OK;
+    }
     return REAL(Status, fmi2GetBooleanStatus, (Component, int, int *))(c, kind, x);
 }
 Status fmi2GetStringStatus(Component c, int kind, String *x)
@@ -397,6 +434,12 @@ Status fmi2NewDiscreteStates(Component c, struct event_info *info)
         REAL(Status, fmi2NewDiscreteStates, (Component, struct event_info *))(c, info);
     if (is("endless_events"))
         info->needed = 1;
+    if (is("terminates"))
+        info->terminate = 1;
+    if (is("past_events")) {
+        info->defined = 1;
+        info->next = start_of - 1;
+    }
     return status;
 }
 Status fmi2CompletedIntegratorStep(Component c, int forget, int *enter, int *terminate)
@@ -426,6 +469,8 @@ Status fmi2GetDerivatives(Component c, double *x, size_t n)
         x[0] = x[1];
         x[1] = first;
     }
+    if (is("writes_past_vectors") && status == OK)
+        x[n] = 0;
     return status;
 }
 Status fmi2GetEventIndicators(Component c, double *x, size_t n)

@@ -1,0 +1,240 @@
+//! The integrator with which the check plays a host of Model Exchange.
+//!
+//! Any FMU must do: stiff or not, with or without Jacobian, at a step of a microsecond or of an hour.
+//! The method is the Rosenbrock pair of Shampine and Reichelt (The MATLAB ODE Suite, SIAM J. Sci.
+//! Comput. 18, 1997, "ode23s"), of second order whatever matrix stands for the Jacobian J:
+//!
+//! ```text
+//! W = I - h d J,   d = 1/(2 + √2),   e = 6 + √2
+//! k1 = W⁻¹ f(t, x)
+//! k2 = k1 + W⁻¹ (f(t + h/2, x + h/2 k1) - k1)
+//! x' = x + h k2
+//! k3 = W⁻¹ (f(t + h, x') - e (k2 - f(t + h/2, x + h/2 k1)) - 2 (k1 - f(t, x)))
+//! error = h/6 (k1 - 2 k2 + k3)
+//! ```
+//!
+//! With J = 0 it is the explicit midpoint rule, which is tried first and costs three evaluations a
+//! step. Where that needs many steps the FMU is stiff, and J is taken from differences; the method is
+//! then L-stable. How far it comes is bounded by a number of steps, not by time on the clock, so that
+//! the same run gives the same bits.
+
+use anyhow::Result;
+use nalgebra::{DMatrix, DVector, Dyn, LU};
+
+use super::guest::{Session, Unusable};
+use host::fmi2::{CallError, Status};
+
+/// Relative tolerance of a step; the FMU shall live, not be followed closely.
+const TOLERANCE: f64 = 1e-3;
+/// Steps of the explicit rule that are tried for one communication step before the FMU counts as
+/// stiff.
+const EXPLICIT_STEPS: usize = 40;
+/// Steps for one communication step. After them the host stays where it is, which a host may.
+const MOST_STEPS: usize = 100;
+/// States up to which a Jacobian is taken from differences.
+const MOST_STATES: usize = 200;
+/// Steps in which a communication step is begun.
+const PARTS: f64 = 8.0;
+/// A crossing of an event indicator is located to this share of the communication step.
+const LOCATED: f64 = 1e-3;
+/// A step is not divided further than to this share of the communication step.
+const SHORTEST: f64 = 1e-12;
+
+/// What came of a trial step.
+enum Trial {
+    /// The new states and the error relative to what is allowed.
+    Done(DVector<f64>, f64),
+    /// A stage left what the FMU can compute (fmi2Discard, or values that are not finite).
+    Impossible(String),
+}
+
+impl Session<'_> {
+    /// Integrates to `end`, or as far as the number of steps allows; events are handled.
+    ///
+    /// # Errors
+    /// If a call is refused, or the states cannot be followed further.
+    pub(super) fn integrate(&mut self, end: f64) -> Result<()> {
+        let (n, start) = (self.states(), self.time);
+        let whole = end - start;
+        let mut h = whole / PARTS;
+        let mut jacobian: Option<DMatrix<f64>> = None;
+        let mut z = self.read_indicators()?;
+        for step in 0..MOST_STEPS {
+            if self.time >= end || self.is_ended() {
+                break;
+            }
+            if step == EXPLICIT_STEPS && n <= MOST_STATES {
+                // from here on with a Jacobian, and with a fresh guess of the step
+                h = (end - self.time) / PARTS;
+            }
+            let (t, x) = (self.time, self.read_states(n)?);
+            if step >= EXPLICIT_STEPS && n <= MOST_STATES {
+                jacobian = Some(self.jacobian(t, &x)?);
+            }
+            // The smallest step that was tried last says why if none is possible.
+            let mut why = String::new();
+            loop {
+                // neither past the end nor past an event in time that the FMU has told
+                let limit = self.next_event().filter(|next| *next > t).unwrap_or(end).min(end);
+                let last = t + h * 1.01 >= limit;
+                let to = if last { limit } else { t + h };
+                let shortest = (SHORTEST * whole).max(4.0 * f64::EPSILON * t.abs());
+                if to - t < shortest && !last {
+                    return Err(self.diverges(t, &x, &why));
+                }
+                let (x_new, error) = match self.trial(t, &x, to - t, jacobian.as_ref())? {
+                    Trial::Impossible(reason) => {
+                        why = reason;
+                        self.go_to(t, &x)?;
+                        h = (to - t) / 4.0;
+                        continue;
+                    }
+                    Trial::Done(x_new, error) => (x_new, error),
+                };
+                let factor = (0.8 * error.powf(-1.0 / 3.0)).clamp(0.2, 5.0);
+                if error > 1.0 {
+                    why = format!("the error of the step is {error:.1e} times what is allowed");
+                    self.go_to(t, &x)?;
+                    h = (to - t) * factor;
+                    continue;
+                }
+                self.go_to(to, &x_new)?;
+                let z_new = self.read_indicators()?;
+                let crossed = z.iter().zip(&z_new).any(|(a, b)| (*a > 0.0) != (*b > 0.0));
+                if crossed && to - t > LOCATED * whole {
+                    self.go_to(t, &x)?;
+                    h = (to - t) / 2.0;
+                    continue;
+                }
+                self.time = to;
+                // a step that was cut at its end says nothing against longer ones
+                h = if last { h.max((to - t) * factor) } else { (to - t) * factor };
+                self.complete_step(crossed)?;
+                z = if crossed { self.read_indicators()? } else { z_new };
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// One step of the method from (t, x).
+    fn trial(
+        &mut self,
+        t: f64,
+        x: &DVector<f64>,
+        h: f64,
+        jacobian: Option<&DMatrix<f64>>,
+    ) -> Result<Trial> {
+        let d = 1.0 / (2.0 + 2f64.sqrt());
+        let e = 6.0 + 2f64.sqrt();
+        let n = x.len();
+        let w: Option<LU<f64, Dyn, Dyn>> =
+            jacobian.map(|jacobian| (DMatrix::identity(n, n) - jacobian * (h * d)).lu());
+        let solve = |b: DVector<f64>| match &w {
+            None => Some(b),
+            Some(w) => w.solve(&b),
+        };
+        let singular = || Trial::Impossible("the linearised system cannot be solved".into());
+        let f0 = match self.derivatives_at(t, x)? {
+            Ok(f) => f,
+            Err(why) => return Ok(Trial::Impossible(why)),
+        };
+        let Some(k1) = solve(f0.clone()) else { return Ok(singular()) };
+        let f1 = match self.derivatives_at(t + 0.5 * h, &(x + &k1 * (0.5 * h)))? {
+            Ok(f) => f,
+            Err(why) => return Ok(Trial::Impossible(why)),
+        };
+        let Some(k2) = solve(&f1 - &k1).map(|dk| dk + &k1) else { return Ok(singular()) };
+        let x_new = x + &k2 * h;
+        let f2 = match self.derivatives_at(t + h, &x_new)? {
+            Ok(f) => f,
+            Err(why) => return Ok(Trial::Impossible(why)),
+        };
+        let rest = f2 - (&k2 - &f1) * e - (&k1 - &f0) * 2.0;
+        let Some(k3) = solve(rest) else { return Ok(singular()) };
+        let error = (k1 - k2 * 2.0 + k3) * (h / 6.0);
+        let mut worst: f64 = 0.0;
+        for i in 0..n {
+            let scale = x[i].abs().max(x_new[i].abs()).max(self.nominal(i));
+            worst = worst.max(error[i].abs() / (TOLERANCE * scale));
+        }
+        Ok(Trial::Done(x_new, worst))
+    }
+
+    /// The derivatives at a point, or why there are none.
+    fn derivatives_at(&mut self, t: f64, x: &DVector<f64>) -> Result<Result<DVector<f64>, String>> {
+        if let Some(i) = x.iter().position(|x| !x.is_finite()) {
+            return Ok(Err(format!("state {} becomes {}", i + 1, x[i])));
+        }
+        let mut f = DVector::zeros(x.len());
+        let asked = self.try_go_to(t, x).and_then(|()| match x.len() {
+            0 => Ok(()),
+            _ => self.instance.derivatives(f.as_mut_slice()),
+        });
+        match asked {
+            Ok(()) => {}
+            // "the FMU cannot compute this": the host shall try a shorter step (section 2.1.3)
+            Err(error) if error.status == Status::Discard => return Ok(Err(error.to_string())),
+            Err(error) => return Err(error.into()),
+        }
+        Ok(match f.iter().position(|f| !f.is_finite()) {
+            Some(i) => Err(format!("derivative {} is {}", i + 1, f[i])),
+            None => Ok(f),
+        })
+    }
+
+    /// The Jacobian from differences; columns that cannot be had are 0, which the method forgives.
+    fn jacobian(&mut self, t: f64, x: &DVector<f64>) -> Result<DMatrix<f64>> {
+        let n = x.len();
+        let mut jacobian = DMatrix::zeros(n, n);
+        if let Ok(f) = self.derivatives_at(t, x)? {
+            for j in 0..n {
+                let mut moved = x.clone();
+                let dx = f64::EPSILON.sqrt() * x[j].abs().max(self.nominal(j));
+                moved[j] += dx;
+                if let Ok(there) = self.derivatives_at(t, &moved)? {
+                    jacobian.set_column(j, &((there - &f) / (moved[j] - x[j])));
+                }
+            }
+        }
+        self.go_to(t, x)?;
+        Ok(jacobian)
+    }
+
+    fn read_states(&mut self, n: usize) -> Result<DVector<f64>> {
+        let mut x = DVector::zeros(n);
+        if n > 0 {
+            self.instance.continuous_states(x.as_mut_slice())?;
+        }
+        Ok(x)
+    }
+
+    fn read_indicators(&mut self) -> Result<Vec<f64>> {
+        let mut z = vec![0.0; self.indicators()];
+        if !z.is_empty() {
+            self.instance.event_indicators(&mut z)?;
+        }
+        Ok(z)
+    }
+
+    fn try_go_to(&mut self, t: f64, x: &DVector<f64>) -> Result<(), CallError> {
+        self.instance.set_time(t)?;
+        match x.len() {
+            0 => Ok(()),
+            _ => self.instance.set_continuous_states(x.as_slice()),
+        }
+    }
+
+    fn go_to(&mut self, t: f64, x: &DVector<f64>) -> Result<()> {
+        Ok(self.try_go_to(t, x)?)
+    }
+
+    fn diverges(&self, t: f64, x: &DVector<f64>, why: &str) -> anyhow::Error {
+        let largest = x.iter().copied().fold(0.0f64, |a, b| a.max(b.abs()));
+        let why = format!(
+            "the states cannot be followed past t = {t:?} s however short the step: {why} (largest \
+             state {largest:.1e})"
+        );
+        Unusable { rule: "exchange.run", why }.into()
+    }
+}

@@ -1,0 +1,63 @@
+//! The report as JSON, for programs.
+
+use std::io::Write;
+
+use anyhow::Result;
+use serde::Serialize;
+
+use super::{Finding, Outcome, Report, Severity};
+
+/// The file as a whole.
+#[derive(Serialize)]
+struct File<'r> {
+    /// The FMU.
+    fmu: String,
+    /// How many findings are errors.
+    errors: usize,
+    /// How many are warnings.
+    warnings: usize,
+    /// One for each rule that was looked at or skipped, in the table's order.
+    rules: Vec<Rule<'r>>,
+}
+
+/// What came of a rule.
+#[derive(Serialize)]
+struct Rule<'r> {
+    rule: &'static str,
+    title: &'static str,
+    source: &'static str,
+    findings: &'r [Finding],
+    /// Why it was not looked at; null if it was.
+    skipped: Option<&'r str>,
+    seconds: f64,
+}
+
+impl<'r> Rule<'r> {
+    fn new(outcome: &'r Outcome) -> Rule<'r> {
+        Rule {
+            rule: outcome.rule.id,
+            title: outcome.rule.title,
+            source: outcome.rule.source,
+            findings: &outcome.findings.list,
+            skipped: outcome.findings.skipped.as_deref(),
+            seconds: outcome.time.as_secs_f64(),
+        }
+    }
+}
+
+/// Writes the report.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn write(report: &Report, out: &mut impl Write) -> Result<()> {
+    let rules = report.outcomes.iter().map(Rule::new).collect();
+    let file = File {
+        fmu: report.path.display().to_string(),
+        errors: report.count(Severity::Error),
+        warnings: report.count(Severity::Warning),
+        rules,
+    };
+    serde_json::to_writer_pretty(&mut *out, &file)?;
+    writeln!(out)?;
+    Ok(())
+}

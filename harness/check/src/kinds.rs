@@ -1,0 +1,218 @@
+//! The attribute dependenciesKind (FMI 2.0.5, section 2.2.8), against what the binary does.
+//!
+//! `dependent` says nothing. The other kinds say that the unknown is linear in the known, with a
+//! factor that is the same always (`constant`), after initialisation (`fixed`), until a tunable
+//! parameter is set (`tunable`) or between two events (`discrete`). The factor is measured by
+//! differences, small and large, at points that differ in the states, and at other parameters.
+
+use std::collections::BTreeSet;
+
+use anyhow::Result;
+
+use super::Findings;
+use super::dependencies::moved;
+use super::description::{Unknown, Variable};
+use super::exchange::states;
+use super::guest::{Guest, Interface, Reading, Session};
+use super::life::first;
+
+/// Starts at which factors are measured: the first as declared, then with other parameters.
+const STARTS: u64 = 12;
+/// How far two measured factors may differ, relative to the larger one.
+const AGREE: f64 = 1e-4;
+
+/// An unknown and a known that are declared to be linear in each other.
+struct Pair<'d> {
+    list: &'static str,
+    line: u64,
+    unknown: &'d Variable,
+    known: &'d Variable,
+    kind: &'d str,
+}
+
+impl Pair<'_> {
+    fn tell(&self, findings: &mut Findings, a: Factor, b: Factor, when: &str) {
+        findings.add(
+            format!("line {}, {}, {}", self.line, self.list, self.unknown.name),
+            format!(
+                "dependenciesKind of {} is {}, but the factor is {:.6e} and {:.6e} {when} (allowed: \
+                 one factor, or \"dependent\")",
+                self.known.name, self.kind, a.value, b.value
+            ),
+        );
+    }
+}
+
+fn pairs<'d>(guest: &'d Guest, list: &'static str, unknowns: &'d [Unknown]) -> Vec<Pair<'d>> {
+    let d = guest.description();
+    let mut pairs = Vec::new();
+    for u in unknowns {
+        let Some(unknown) = d.at(u.index).filter(|v| v.is_continuous()) else { continue };
+        let knowns = u.dependencies.iter().flatten().zip(u.kinds.iter().flatten());
+        for (known, kind) in knowns.filter(|(_, kind)| *kind != "dependent") {
+            let Some(known) = d.at(*known).filter(|v| v.is_real()) else { continue };
+            pairs.push(Pair { list, line: u.line, unknown, known, kind });
+        }
+    }
+    pairs
+}
+
+/// A measured factor and how much of it may be rounding.
+#[derive(Clone, Copy)]
+struct Factor {
+    value: f64,
+    rounding: f64,
+}
+
+impl Factor {
+    fn differs(&self, other: &Factor) -> bool {
+        let allowed = AGREE * self.value.abs().max(other.value.abs());
+        (self.value - other.value).abs() > allowed + self.rounding + other.rounding
+    }
+}
+
+/// Puts a known to a value; false if the FMU does not take it there.
+fn put(session: &mut Session, known: &Variable, x: f64) -> Result<bool> {
+    let guest = session.guest;
+    if session.interface == Interface::ModelExchange
+        && let Some(n) = states(guest).iter().position(|(_, state)| state.index == known.index)
+    {
+        let mut all = vec![0.0; session.states()];
+        session.instance.continuous_states(&mut all)?;
+        all[n] = x;
+        return Ok(session.instance.set_continuous_states(&all).is_ok());
+    }
+    Ok(session.set(known, &Reading::Real(x)).is_ok())
+}
+
+fn real(session: &mut Session, v: &Variable) -> Result<f64> {
+    match session.get(v)? {
+        Reading::Real(x) => Ok(x),
+        _ => Ok(f64::NAN),
+    }
+}
+
+/// The factors of a pair where the session stands, by differences of `share` of the known's size.
+fn factor(session: &mut Session, pair: &Pair, share: f64) -> Result<Option<Factor>> {
+    let here = real(session, pair.known)?;
+    let before = real(session, pair.unknown)?;
+    let (min, max) = pair.known.bounds();
+    let step = share * here.abs().max(0.1 * pair.known.nominal());
+    let there = if here + step <= max { here + step } else { here - step };
+    if there < min || there == here || !put(session, pair.known, there)? {
+        return Ok(None);
+    }
+    let after = real(session, pair.unknown)?;
+    put(session, pair.known, here)?;
+    let dx = there - here;
+    let size = before.abs().max(after.abs());
+    let value = (after - before) / dx;
+    Ok(value
+        .is_finite()
+        .then_some(Factor { value, rounding: 1e3 * f64::EPSILON * size / dx.abs() }))
+}
+
+/// Factors of all pairs at points of one session; the first that does not hold its factor is told.
+/// Returns the factors of the first point.
+fn at_points(
+    session: &mut Session,
+    pairs: &[Pair],
+    wrong: &mut BTreeSet<usize>,
+    findings: &mut Findings,
+) -> Result<Vec<Option<Factor>>> {
+    let guest = session.guest;
+    let mut first_factors = vec![None; pairs.len()];
+    let exchange = session.interface == Interface::ModelExchange;
+    let mut random = fastrand::Rng::with_seed(1);
+    for point in 0..3 {
+        if point > 0 && exchange {
+            // other states, between the same events
+            let states = states(guest);
+            let mut x = vec![0.0; states.len()];
+            session.instance.continuous_states(&mut x)?;
+            let here = x.clone();
+            for (x, (_, state)) in x.iter_mut().zip(&states) {
+                *x += 0.3 * (2.0 * random.f64() - 1.0) * x.abs().max(0.1 * state.nominal());
+            }
+            if session.instance.set_continuous_states(&x).is_err() {
+                session.instance.set_continuous_states(&here)?;
+            }
+        }
+        for (n, pair) in pairs.iter().enumerate() {
+            if wrong.contains(&n) {
+                continue;
+            }
+            for share in [1e-3, 0.1] {
+                let Some(now) = factor(session, pair, share)? else { continue };
+                match first_factors[n] {
+                    None => first_factors[n] = Some(now),
+                    Some(known) if now.differs(&known) => {
+                        wrong.insert(n);
+                        pair.tell(findings, known, now, "at two points between the same events");
+                        break;
+                    }
+                    Some(_) => {}
+                }
+            }
+        }
+    }
+    Ok(first_factors)
+}
+
+/// `dependencies.kinds`
+pub fn kinds(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let d = guest.description();
+    let initial = pairs(guest, "InitialUnknowns", &d.initial_unknowns);
+    let mut running = pairs(guest, "Outputs", &d.outputs);
+    running.extend(pairs(guest, "Derivatives", &d.derivatives));
+    if guest.interfaces().contains(&Interface::ModelExchange) && !running.is_empty() {
+        look(guest, findings, &running, Interface::ModelExchange, false)?;
+    }
+    if !initial.is_empty() {
+        look(guest, findings, &initial, first(guest)?, true)?;
+    }
+    Ok(())
+}
+
+fn look(
+    guest: &Guest,
+    findings: &mut Findings,
+    pairs: &[Pair],
+    interface: Interface,
+    initializing: bool,
+) -> Result<()> {
+    let mut wrong = BTreeSet::new();
+    let mut always: Vec<Option<Factor>> = vec![None; pairs.len()];
+    for start in 0..STARTS {
+        let mut session = moved(guest, interface, start)?;
+        guest.doing(format!("measuring how unknowns follow knowns, start {start}"));
+        let ready = if initializing {
+            session
+                .instance
+                .setup_experiment(None, session.time, None)
+                .and_then(|()| session.instance.enter_initialization_mode())
+                .is_ok()
+        } else {
+            // at rest every other time
+            session.initialise().is_ok()
+                && session.advance(if start % 2 == 0 { 3 } else { 0 }).is_ok()
+        };
+        // Parameters that do not go together are another start's luck.
+        if !ready || session.is_ended() {
+            continue;
+        }
+        let Ok(factors) = at_points(&mut session, pairs, &mut wrong, findings) else { continue };
+        for (n, (pair, now)) in pairs.iter().zip(factors).enumerate() {
+            let Some(now) = now.filter(|_| pair.kind == "constant") else { continue };
+            match always[n] {
+                None => always[n] = Some(now),
+                Some(known) if now.differs(&known) && !wrong.contains(&n) => {
+                    wrong.insert(n);
+                    pair.tell(findings, known, now, "with other parameters");
+                }
+                Some(_) => {}
+            }
+        }
+    }
+    Ok(())
+}

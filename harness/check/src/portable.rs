@@ -1,0 +1,211 @@
+//! Names that not every file system can hold: an FMU is unpacked on Windows, macOS and Linux.
+
+use std::collections::BTreeMap;
+
+use super::{Archive, Findings};
+
+/// Characters that Windows does not allow in names; `/` separates and control characters are a rule
+/// of their own.
+const FORBIDDEN: [char; 7] = ['<', '>', ':', '"', '|', '?', '*'];
+/// Devices of Windows: no file can be called so, whatever its extension.
+const DEVICES: [&str; 6] = ["CON", "PRN", "AUX", "NUL", "CONIN$", "CONOUT$"];
+/// Bytes that one part of a path may have on the usual file systems.
+const LONGEST_PART: usize = 255;
+/// Characters of a path on Windows without its terminating zero (MAX_PATH is 260).
+const LONGEST_PATH: usize = 259;
+/// Characters that a path inside an FMU may have: what MAX_PATH leaves after a temporary folder such
+/// as `C:\Users\a.long.user.name\AppData\Local\Temp\` and a folder in it named after the instance.
+const PORTABLE_PATH: usize = 160;
+
+/// What keeps Windows from writing a part of a path.
+fn windows_faults(part: &str) -> Vec<String> {
+    let mut faults = Vec::new();
+    let stem = part.split('.').next().unwrap_or(part).trim_end().to_uppercase();
+    let port = |kind: &str| {
+        let number = stem.strip_prefix(kind).map(|rest| rest.chars().collect::<Vec<_>>());
+        matches!(number.as_deref(), Some(['1'..='9' | '¹' | '²' | '³']))
+    };
+    if DEVICES.contains(&stem.as_str()) || port("COM") || port("LPT") {
+        faults.push(format!("\"{part}\" is the name of a device"));
+    }
+    if part.ends_with(['.', ' ']) && !matches!(part, "." | "..") {
+        faults.push(format!("\"{part}\" ends with a full stop or a space, which Windows drops"));
+    }
+    let odd: Vec<String> =
+        FORBIDDEN.iter().filter(|c| part.contains(**c)).map(char::to_string).collect();
+    if !odd.is_empty() {
+        faults.push(format!("\"{part}\" has {}", odd.join(" ")));
+    }
+    faults
+}
+
+/// The parts of a name, without the last, empty one of a folder.
+fn parts(name: &str) -> impl Iterator<Item = &str> {
+    name.split(['/', '\\']).filter(|part| !part.is_empty())
+}
+
+/// `zip.windows_names`
+pub fn windows_names(archive: &Archive, findings: &mut Findings) {
+    for entry in &archive.entries {
+        // a drive letter makes the name absolute, which is a rule of its own
+        let is_drive = |part: &str| part.len() == 2 && part.ends_with(':');
+        let faults: Vec<String> = parts(&entry.name)
+            .enumerate()
+            .filter(|(n, part)| !(*n == 0 && is_drive(part)))
+            .flat_map(|(_, part)| windows_faults(part))
+            .collect();
+        if !faults.is_empty() {
+            findings.add(
+                entry.name.escape_debug().to_string(),
+                format!(
+                    "{} (allowed: names without < > : \" | ? *, that end with another character \
+                     than a full stop or a space and are none of CON, PRN, AUX, NUL, COM1 to COM9 \
+                     and LPT1 to LPT9, with or without an extension)",
+                    faults.join(", ")
+                ),
+            );
+        }
+    }
+}
+
+/// `zip.path_length`
+pub fn path_length(archive: &Archive, findings: &mut Findings) {
+    for entry in &archive.entries {
+        let start: String = entry.name.chars().take(60).collect();
+        let place = format!("{}…", start.escape_debug());
+        let longest = parts(&entry.name).map(str::len).max().unwrap_or(0);
+        // Windows counts in UTF-16
+        let length = entry.name.encode_utf16().count();
+        if longest > LONGEST_PART {
+            findings.fail(
+                place,
+                format!("a part of the path has {longest} bytes (allowed: {LONGEST_PART})"),
+            );
+        } else if length > LONGEST_PATH {
+            findings.fail(
+                place,
+                format!(
+                    "the path has {length} characters, more than Windows opens at all \
+                     ({LONGEST_PATH}; allowed: {PORTABLE_PATH})"
+                ),
+            );
+        } else if length > PORTABLE_PATH {
+            findings.add(
+                place,
+                format!(
+                    "the path has {length} characters (allowed: {PORTABLE_PATH}; with the temporary \
+                     folder in front Windows opens {LONGEST_PATH})"
+                ),
+            );
+        }
+    }
+}
+
+/// `zip.file_and_folder`
+pub fn file_and_folder(archive: &Archive, findings: &mut Findings) {
+    // Windows and macOS do not tell capitals apart
+    let files: BTreeMap<String, &str> =
+        archive.below("").map(|name| (name.trim_end_matches('/').to_lowercase(), name)).collect();
+    let mut told = std::collections::BTreeSet::new();
+    for entry in &archive.entries {
+        let name = entry.name.to_lowercase();
+        let mut folders: Vec<&str> = name.match_indices('/').map(|(at, _)| &name[..at]).collect();
+        folders.dedup();
+        for folder in folders {
+            if let Some(file) = files.get(folder)
+                && told.insert(folder.to_string())
+            {
+                findings.add(
+                    *file,
+                    format!(
+                        "it is a file, and a folder that holds {} (allowed: one of the two)",
+                        entry.name
+                    ),
+                );
+            }
+        }
+    }
+}
+
+/// Names that the standard gives, as hosts on Linux look for them.
+const STANDARD_FOLDERS: [&str; 6] =
+    ["binaries", "documentation", "resources", "sources", "extra", "terminalsAndIcons"];
+const STANDARD_FILES: [&str; 3] = ["modelDescription.xml", "model.png", "documentation/index.html"];
+const PLATFORM_FOLDERS: [&str; 6] =
+    ["win32", "win64", "linux32", "linux64", "darwin32", "darwin64"];
+
+/// The name that the standard has for one that differs in capitals only.
+fn standard_spelling(name: &str) -> Option<String> {
+    let parts: Vec<&str> = name.split('/').collect();
+    let other = |written: &str, standard: &[&str]| -> Option<String> {
+        let same = standard.iter().find(|s| s.eq_ignore_ascii_case(written))?;
+        (*same != written).then(|| same.to_string())
+    };
+    if let Some(file) = other(name, &STANDARD_FILES) {
+        return Some(file);
+    }
+    let [first, rest @ ..] = &parts[..] else { return None };
+    let mut right: Vec<String> = parts.iter().map(|part| part.to_string()).collect();
+    let mut differs = false;
+    if !rest.is_empty()
+        && let Some(folder) = other(first, &STANDARD_FOLDERS)
+    {
+        right[0] = folder;
+        differs = true;
+    }
+    if first.eq_ignore_ascii_case("binaries")
+        && rest.len() > 1
+        && let Some(folder) = other(rest[0], &PLATFORM_FOLDERS)
+    {
+        right[1] = folder;
+        differs = true;
+    }
+    differs.then(|| right.join("/"))
+}
+
+/// `zip.capitals`
+pub fn capitals(archive: &Archive, findings: &mut Findings) {
+    for entry in &archive.entries {
+        // beside the right one it is a name twice
+        let is_there = |name: &String| archive.entries.iter().any(|e| e.name == *name);
+        if let Some(right) = standard_spelling(&entry.name).filter(|right| !is_there(right)) {
+            findings.add(
+                &entry.name,
+                format!(
+                    "hosts on Linux do not find it: FMI writes {right} (allowed: these capitals)"
+                ),
+            );
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn windows_cannot_hold_devices_trailing_dots_and_its_own_characters() {
+        for wrong in ["CON", "nul.txt", "com1", "LPT9.a.b", "a.", "a ", "a?b", "a:b", "aux .c"] {
+            assert!(!windows_faults(wrong).is_empty(), "{wrong}");
+        }
+        for right in ["CONE", "com", "com0", "com10", "a.b", ".a", "a b", "nulled.txt", "lptx"] {
+            assert_eq!(windows_faults(right), [""; 0], "{right}");
+        }
+    }
+
+    #[test]
+    fn names_of_the_standard_have_its_capitals() {
+        for (wrong, right) in [
+            ("Binaries/Linux64/a.so", "binaries/linux64/a.so"),
+            ("binaries/Win64/a.dll", "binaries/win64/a.dll"),
+            ("ModelDescription.xml", "modelDescription.xml"),
+            ("Resources/a", "resources/a"),
+        ] {
+            assert_eq!(standard_spelling(wrong).as_deref(), Some(right));
+        }
+        for right in ["binaries/linux64/A.so", "resources/Binaries/a", "Extras/a", "Documentation"]
+        {
+            assert_eq!(standard_spelling(right), None, "{right}");
+        }
+    }
+}

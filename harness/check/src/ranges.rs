@@ -1,0 +1,192 @@
+//! Whether the ranges and items in modelDescription.xml are those of the binary (FMI 2.0.5, sections
+//! 2.2.3 and 2.2.7).
+
+use std::collections::BTreeSet;
+
+use anyhow::Result;
+
+use super::Findings;
+use super::dependencies::moved;
+use super::description::Variable;
+use super::guest::{Guest, Reading, STEPS, start_value};
+use super::life::first;
+use super::values::{items, mentions};
+use host::description::Type;
+
+/// How far values may be outside min and max, relative to the bound or the nominal value: an
+/// integrator leaves a state a little beside where it belongs.
+const OVERSHOOT: f64 = 1e-3;
+
+/// `values.in_range`
+pub fn in_range(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let bounded =
+        |v: &&Variable| v.bounds() != (f64::NEG_INFINITY, f64::INFINITY) && !v.is_set_by_hosts();
+    let all: Vec<&Variable> = guest.variables().iter().filter(bounded).collect();
+    if all.is_empty() {
+        findings.skip("nothing that the FMU computes has a min or a max");
+        return Ok(());
+    }
+    let mut told = BTreeSet::new();
+    for interface in guest.interfaces() {
+        let mut session = guest.running(interface)?;
+        for step in 0..=2 * STEPS {
+            if step > 0 {
+                session.advance(1)?;
+            }
+            guest.doing(format!("reading what has a min or a max after {step} steps"));
+            for v in &all {
+                let x = match session.get(v) {
+                    Ok(Reading::Real(x)) => x,
+                    Ok(Reading::Integer(n)) => f64::from(n),
+                    _ => continue,
+                };
+                let (min, max) = v.bounds();
+                let slack = |bound: f64| match v.kind {
+                    Type::Real => OVERSHOOT * bound.abs().max(v.nominal()),
+                    _ => 0.0,
+                };
+                if (x < min - slack(min) || x > max + slack(max)) && told.insert(v.index) {
+                    findings.add(
+                        v.place(),
+                        format!(
+                            "it is {x} after {step} steps of an ordinary run ({}) (allowed by its min \
+                             and max: {min} to {max})",
+                            interface.name()
+                        ),
+                    );
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Sets a parameter or input before initialisation and initialises; why that was refused, if it was
+/// and no other variable is blamed for it.
+fn refusal(guest: &Guest, v: &Variable, value: &Reading) -> Result<Result<(), String>> {
+    let mut session = guest.session(first(guest)?)?;
+    guest.doing(format!("setting {} to {value} and initialising", v.name));
+    if let Err(error) = session.set(v, value) {
+        return Ok(Err(error.to_string()));
+    }
+    Ok(session.initialise().map_err(|error| error.to_string()))
+}
+
+/// `values.limits_exact`
+pub fn limits_exact(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    /// How far outside a bound is just outside, relative to it.
+    const JUST: f64 = 1e-6;
+    let mut any = false;
+    let settable = guest.variables().iter().filter(|v| v.is_set_by_hosts() && v.is_real());
+    for v in settable.filter(|v| start_value(v).is_some()) {
+        let (min, max) = v.bounds();
+        for (bound, outwards, name) in [(min, -1.0, "min"), (max, 1.0, "max")] {
+            if !bound.is_finite() {
+                continue;
+            }
+            any = true;
+            let size = bound.abs().max(1e-3 * v.nominal());
+            let far = bound + outwards * size;
+            let near = bound + outwards * JUST * size;
+            if !far.is_finite() || near == bound {
+                continue;
+            }
+            // An FMU that accepts anything breaks another rule, and has no range of its own.
+            if refusal(guest, v, &Reading::Real(far))?.is_ok() {
+                continue;
+            }
+            if refusal(guest, v, &Reading::Real(near))?.is_ok() {
+                findings.add(
+                    v.place(),
+                    format!(
+                        "{near:?} is accepted, and {far:?} refused: the binary's range is wider than \
+                         {name}={bound} says (allowed: the same range)"
+                    ),
+                );
+            }
+        }
+    }
+    if !any {
+        findings.skip("no Real that hosts set has a min or a max");
+    }
+    Ok(())
+}
+
+/// `values.items`
+pub fn items_known(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let all: Vec<&Variable> =
+        guest.variables().iter().filter(|v| v.kind == Type::Enumeration).collect();
+    if all.is_empty() {
+        findings.skip("it has no enumerations");
+        return Ok(());
+    }
+    for v in all.iter().filter(|v| v.is_set_by_hosts() && start_value(v).is_some()) {
+        let known = items(guest, v);
+        let (Some(first), Some(last)) = (known.iter().min(), known.iter().max()) else { continue };
+        let list = known.iter().map(i32::to_string).collect::<Vec<_>>().join(", ");
+        for item in &known {
+            if let Err(why) = refusal(guest, v, &Reading::Integer(*item))?
+                && !guest.variables().iter().any(|o| o.name != v.name && mentions(&why, &o.name))
+            {
+                findings
+                    .add(v.place(), format!("{item} is an item of its type, but refused: {why}"));
+            }
+        }
+        // A type with items beyond those; one that takes any number is another matter.
+        let beyond = last.saturating_add(1000);
+        let takes_any = refusal(guest, v, &Reading::Integer(beyond))?.is_ok();
+        if takes_any {
+            findings.add(
+                v.place(),
+                format!("{beyond} is accepted, and no item of its type (allowed: {list})"),
+            );
+            continue;
+        }
+        for other in first.saturating_sub(1)..=last.saturating_add(3) {
+            if !known.contains(&other) && refusal(guest, v, &Reading::Integer(other))?.is_ok() {
+                findings.fail(
+                    v.place(),
+                    format!(
+                        "{other} is accepted, and no item of its type in modelDescription.xml has \
+                         this value (items: {list})"
+                    ),
+                );
+            }
+        }
+    }
+    let computed: Vec<&&Variable> = all.iter().filter(|v| !v.is_set_by_hosts()).collect();
+    if computed.is_empty() {
+        return Ok(());
+    }
+    let mut told = BTreeSet::new();
+    for attempt in 0..STEPS as u64 {
+        let mut session = moved(guest, first(guest)?, attempt)?;
+        guest.doing(format!("initialising with other parameters, try {attempt}"));
+        if session.initialise().is_err() {
+            continue;
+        }
+        for _ in 0..5 {
+            for v in &computed {
+                let known = items(guest, v);
+                if let Ok(Reading::Integer(value)) = session.get(v)
+                    && !known.is_empty()
+                    && !known.contains(&value)
+                    && told.insert(v.index)
+                {
+                    let list = known.iter().map(i32::to_string).collect::<Vec<_>>().join(", ");
+                    findings.fail(
+                        v.place(),
+                        format!(
+                            "it is {value}, and no item of its type in modelDescription.xml has \
+                             this value (items: {list})"
+                        ),
+                    );
+                }
+            }
+            if session.advance(1).is_err() {
+                break;
+            }
+        }
+    }
+    Ok(())
+}

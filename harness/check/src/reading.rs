@@ -1,0 +1,105 @@
+//! What makes modelDescription.xml dangerous to read: a host parses it before it knows anything of
+//! the FMU.
+
+use host::xml::{Element, Fault};
+
+use super::{Archive, Findings};
+
+const NAME: &str = "modelDescription.xml";
+
+/// A document type declaration.
+pub struct Doctype {
+    /// Line of the file in which it begins.
+    pub line: usize,
+    /// As it is written.
+    pub text: String,
+}
+
+impl Doctype {
+    /// Finds the one of a file: only the XML declaration, comments, processing instructions and
+    /// white space may come before it. Looks at the bytes themselves, so that no parser has to
+    /// understand the rest.
+    pub fn find(bytes: &[u8]) -> Option<Doctype> {
+        let text = String::from_utf8_lossy(bytes);
+        let mut rest = text.trim_start_matches('\u{feff}');
+        loop {
+            rest = rest.trim_start();
+            if let Some(comment) = rest.strip_prefix("<!--") {
+                rest = comment.split_once("-->")?.1;
+            } else if let Some(instruction) = rest.strip_prefix("<?") {
+                rest = instruction.split_once("?>")?.1;
+            } else {
+                break;
+            }
+        }
+        if !rest.get(..9)?.eq_ignore_ascii_case("<!DOCTYPE") {
+            return None;
+        }
+        let line = text[..text.len() - rest.len()].matches('\n').count() + 1;
+        // to its end, which is after the internal subset if there is one
+        let end = match rest.find(['[', '>']) {
+            Some(at) if rest[at..].starts_with('[') => rest.find("]>").map(|at| at + 2),
+            at => at.map(|at| at + 1),
+        };
+        Some(Doctype { line, text: rest[..end.unwrap_or(rest.len())].to_string() })
+    }
+
+    /// What it could make a parser do.
+    pub fn danger(&self) -> &'static str {
+        if self.text.contains("SYSTEM") || self.text.contains("PUBLIC") {
+            "it makes a parser open another file or address"
+        } else if self.text.contains("<!ENTITY") {
+            "it defines entities, which can grow without bound"
+        } else {
+            "many parsers refuse it"
+        }
+    }
+}
+
+/// `xml.doctype`
+pub fn doctype(archive: &Archive, findings: &mut Findings) {
+    let Some(bytes) = archive.file(NAME) else {
+        return findings.skip("there is no modelDescription.xml that can be unpacked");
+    };
+    if let Some(doctype) = Doctype::find(bytes) {
+        let start: String = doctype.text.chars().take(80).collect();
+        let danger = doctype.danger();
+        findings.add(
+            format!("{NAME}, line {}", doctype.line),
+            format!(
+                "{:?}: {danger} (allowed: no document type declaration and no entities but &lt; \
+                 &gt; &amp; &quot; &apos; and character references)",
+                start
+            ),
+        );
+    }
+}
+
+/// `xml.size`
+pub fn size(archive: &Archive, findings: &mut Findings) {
+    let Some(bytes) = archive.file(NAME) else {
+        return findings.skip("there is no modelDescription.xml that can be unpacked");
+    };
+    if let Err(Fault::TooLarge(why)) = Element::read(bytes) {
+        findings.add(NAME, why);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_document_type_declaration_is_found_before_the_root_and_nowhere_else() {
+        let found = |text: &str| Doctype::find(text.as_bytes());
+        let simple = found("<?xml version=\"1.0\"?>\n<!-- a -->\n<!DOCTYPE a><a/>").unwrap();
+        assert_eq!((simple.line, simple.text.as_str(), simple.danger()), (3, "<!DOCTYPE a>", "many parsers refuse it"));
+        let bomb = found("<!DOCTYPE a [<!ENTITY b \"c>d\"> ]><a/>").unwrap();
+        assert!(bomb.text.ends_with("]>") && bomb.danger().contains("entities"));
+        let outside = found("<!doctype a SYSTEM \"file:///etc/passwd\"><a/>").unwrap();
+        assert!(outside.danger().contains("another file"));
+        for none in ["<a><!-- <!DOCTYPE a> --></a>", "<!-- <!DOCTYPE a> --><a/>", "", "<a/>"] {
+            assert!(found(none).is_none(), "{none}");
+        }
+    }
+}

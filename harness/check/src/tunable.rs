@@ -1,0 +1,146 @@
+//! Tunable parameters (FMI 2.0.5, sections 2.2.7, 3.2.3 and 4.2.4): they may be set between steps, in
+//! Model Exchange in event mode.
+
+use anyhow::Result;
+
+use super::Findings;
+use super::description::Variable;
+use super::guest::{Guest, Interface, Reading, STEPS, Session, start_value};
+use super::values::other_value;
+use host::fmi2::Called;
+
+fn tunables(guest: &Guest) -> impl Iterator<Item = (&Variable, Reading)> {
+    let all = guest.variables().iter();
+    let all = all.filter(|v| v.causality == "parameter" && v.variability == "tunable");
+    all.filter_map(|v| Some((v, start_value(v)?)))
+}
+
+/// Sets a value where the standard allows it after initialisation; `Err` if that mode cannot be
+/// entered or left, the inner result is the answer to the setting.
+fn set_between_steps(session: &mut Session, v: &Variable, value: &Reading) -> Result<Called> {
+    if session.interface == Interface::CoSimulation {
+        return Ok(session.set(v, value));
+    }
+    session.instance.enter_event_mode()?;
+    let answer = session.set(v, value);
+    if answer.is_ok() {
+        session.leave_event()?;
+    }
+    Ok(answer)
+}
+
+/// Whether a value is accepted before initialisation.
+fn is_allowed(guest: &Guest, interface: Interface, v: &Variable, value: &Reading) -> Result<bool> {
+    let mut session = guest.session(interface)?;
+    Ok(session.set(v, value).is_ok() && session.initialise().is_ok())
+}
+
+/// `values.tunable`
+pub fn can_be_set(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let mut any = false;
+    for interface in guest.interfaces() {
+        for (v, start) in tunables(guest) {
+            any = true;
+            let other = other_value(guest, v, &start);
+            for value in [Some(start.clone()), other].into_iter().flatten() {
+                let mut session = guest.running(interface)?;
+                session.advance(1)?;
+                if session.is_ended() {
+                    continue;
+                }
+                let place = format!(
+                    "setting the tunable parameter {} to {value} after a step ({})",
+                    v.name,
+                    interface.name()
+                );
+                guest.doing(&place);
+                if let Err(error) = set_between_steps(&mut session, v, &value)? {
+                    if value.is(&start) || is_allowed(guest, interface, v, &value)? {
+                        findings.add(place, format!("{error} (allowed: fmi2OK)"));
+                        break;
+                    }
+                    continue;
+                }
+                let read = session.get(v)?;
+                if !read.is(&value) {
+                    findings.add(place, format!("it reads {read} afterwards (allowed: {value})"));
+                    break;
+                }
+            }
+        }
+    }
+    if !any {
+        findings.skip("it has no tunable parameters");
+    }
+    Ok(())
+}
+
+/// All values after a short run, with a parameter changed before initialisation, after it or not at
+/// all; none if the change is refused, which is another rule's business.
+fn run(
+    guest: &Guest,
+    interface: Interface,
+    before: Option<(&Variable, &Reading)>,
+    after: Option<(&Variable, &Reading)>,
+) -> Result<Option<Vec<Reading>>> {
+    let mut session = guest.session(interface)?;
+    if let Some((v, value)) = before
+        && session.set(v, value).is_err()
+    {
+        return Ok(None);
+    }
+    if let Err(error) = session.initialise() {
+        return if before.is_some() { Ok(None) } else { Err(error) };
+    }
+    if let Some((v, value)) = after
+        && (session.is_ended() || set_between_steps(&mut session, v, value)?.is_err())
+    {
+        return Ok(None);
+    }
+    if let Err(error) = session.advance(STEPS) {
+        return if before.is_some() || after.is_some() { Ok(None) } else { Err(error) };
+    }
+    Ok(Some(session.readings()?))
+}
+
+/// `values.tunable_effect`
+pub fn acts(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let mut any = false;
+    for interface in guest.interfaces() {
+        let plain = run(guest, interface, None, None)?.unwrap_or_default();
+        for (v, start) in tunables(guest) {
+            any = true;
+            let Some(value) = other_value(guest, v, &start) else { continue };
+            guest.doing(format!("runs with {} = {value}, set before and after", v.name));
+            let change = Some((v, &value));
+            let runs = (run(guest, interface, change, None)?, run(guest, interface, None, change)?);
+            let (Some(before), Some(after)) = runs else { continue };
+            // what others than the parameter itself do
+            let differs = |readings: &[Reading]| {
+                guest
+                    .variables()
+                    .iter()
+                    .zip(readings.iter().zip(&plain))
+                    .find(|(o, (a, b))| (o.kind, o.reference) != (v.kind, v.reference) && !a.is(b))
+                    .map(|(o, _)| o.name.clone())
+            };
+            if let Some(name) = differs(&before)
+                && differs(&after).is_none()
+            {
+                findings.add(
+                    v.place(),
+                    format!(
+                        "set to {value} before initialisation it changes {name} within {STEPS} steps; \
+                         set after initialisation it changes nothing ({}) (allowed: a tunable \
+                         parameter that acts)",
+                        interface.name()
+                    ),
+                );
+            }
+        }
+    }
+    if !any {
+        findings.skip("it has no tunable parameters");
+    }
+    Ok(())
+}

@@ -1,0 +1,412 @@
+//! Units (FMI 2.0.5, section 2.2.2): whether what UnitDefinitions says of a unit is what its name
+//! says, and whether derivatives have the unit of their state per second.
+//!
+//! Names are read as Modelica writes them (Modelica 3.6, chapter 19): SI symbols with prefixes,
+//! `.` for products, one `/`, exponents after the symbol, as in `kg.m2/s2`. A name that does not
+//! read so says nothing here.
+
+use std::collections::BTreeMap;
+use std::f64::consts::PI;
+
+use host::xml::Element;
+use super::{Description, Findings};
+
+/// Base units of FMI 2.0 in the schema's order. The radian is the last: it has dimension 1, and
+/// authors write it or leave it out.
+const BASE: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
+const RADIAN: usize = 7;
+
+/// What `value · factor + offset` turns into base units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Unit {
+    exponents: [i32; 8],
+    factor: f64,
+    offset: f64,
+}
+
+impl Unit {
+    const ONE: Unit = Unit { exponents: [0; 8], factor: 1.0, offset: 0.0 };
+
+    /// This unit times a power of another one; an offset counts for a unit alone.
+    fn times(self, other: Unit, power: i32) -> Unit {
+        let mut exponents = self.exponents;
+        for (e, o) in exponents.iter_mut().zip(other.exponents) {
+            *e += power * o;
+        }
+        Unit { exponents, factor: self.factor * other.factor.powi(power), offset: 0.0 }
+    }
+
+    /// Whether it measures the same, radians aside.
+    fn measures_like(&self, other: &Unit) -> bool {
+        (0..RADIAN).all(|i| self.exponents[i] == other.exponents[i])
+    }
+
+    fn is_dimensionless(&self) -> bool {
+        self.measures_like(&Unit::ONE)
+    }
+
+    /// As UnitDefinitions writes it.
+    fn text(&self) -> String {
+        let mut text: Vec<String> = BASE
+            .iter()
+            .zip(self.exponents)
+            .filter(|(_, e)| *e != 0)
+            .map(|(name, e)| format!("{name}={e}"))
+            .collect();
+        if self.factor != 1.0 {
+            text.push(format!("factor={}", self.factor));
+        }
+        if self.offset != 0.0 {
+            text.push(format!("offset={}", self.offset));
+        }
+        if text.is_empty() { "no exponents".into() } else { text.join(" ") }
+    }
+}
+
+/// A symbol, whether prefixes go with it, exponents of kg, m, s, A, K, mol, cd and rad, factor and
+/// offset. A symbol that stands for several units is there several times.
+type Symbol = (&'static str, bool, [i32; 8], f64, f64);
+
+#[rustfmt::skip]
+const SYMBOLS: &[Symbol] = &[
+    ("m", true, [0, 1, 0, 0, 0, 0, 0, 0], 1.0, 0.0),
+    ("g", true, [1, 0, 0, 0, 0, 0, 0, 0], 1e-3, 0.0),
+    ("g", false, [0, 1, -2, 0, 0, 0, 0, 0], 9.80665, 0.0), // standard gravity
+    ("s", true, [0, 0, 1, 0, 0, 0, 0, 0], 1.0, 0.0),
+    ("A", true, [0, 0, 0, 1, 0, 0, 0, 0], 1.0, 0.0),
+    ("K", true, [0, 0, 0, 0, 1, 0, 0, 0], 1.0, 0.0),
+    ("mol", true, [0, 0, 0, 0, 0, 1, 0, 0], 1.0, 0.0),
+    ("cd", true, [0, 0, 0, 0, 0, 0, 1, 0], 1.0, 0.0),
+    ("rad", true, [0, 0, 0, 0, 0, 0, 0, 1], 1.0, 0.0),
+    ("sr", true, [0, 0, 0, 0, 0, 0, 0, 2], 1.0, 0.0),
+    ("Hz", true, [0, 0, -1, 0, 0, 0, 0, 0], 1.0, 0.0),
+    ("Hz", true, [0, 0, -1, 0, 0, 0, 0, 1], 2.0 * PI, 0.0), // a frequency shown for rad/s
+    ("N", true, [1, 1, -2, 0, 0, 0, 0, 0], 1.0, 0.0),
+    ("Pa", true, [1, -1, -2, 0, 0, 0, 0, 0], 1.0, 0.0),
+    ("bar", true, [1, -1, -2, 0, 0, 0, 0, 0], 1e5, 0.0),
+    ("J", true, [1, 2, -2, 0, 0, 0, 0, 0], 1.0, 0.0),
+    ("W", true, [1, 2, -3, 0, 0, 0, 0, 0], 1.0, 0.0),
+    ("Wh", true, [1, 2, -2, 0, 0, 0, 0, 0], 3600.0, 0.0),
+    ("C", true, [0, 0, 1, 1, 0, 0, 0, 0], 1.0, 0.0),
+    ("C", false, [0, 0, 0, 0, 1, 0, 0, 0], 1.0, 273.15),
+    ("V", true, [1, 2, -3, -1, 0, 0, 0, 0], 1.0, 0.0),
+    ("F", true, [-1, -2, 4, 2, 0, 0, 0, 0], 1.0, 0.0),
+    ("F", false, [0, 0, 0, 0, 1, 0, 0, 0], 5.0 / 9.0, 459.67 * 5.0 / 9.0),
+    ("Ohm", true, [1, 2, -3, -2, 0, 0, 0, 0], 1.0, 0.0),
+    ("ohm", true, [1, 2, -3, -2, 0, 0, 0, 0], 1.0, 0.0),
+    ("S", true, [-1, -2, 3, 2, 0, 0, 0, 0], 1.0, 0.0),
+    ("Wb", true, [1, 2, -2, -1, 0, 0, 0, 0], 1.0, 0.0),
+    ("T", true, [1, 0, -2, -1, 0, 0, 0, 0], 1.0, 0.0),
+    ("H", true, [1, 2, -2, -2, 0, 0, 0, 0], 1.0, 0.0),
+    ("min", false, [0, 0, 1, 0, 0, 0, 0, 0], 60.0, 0.0),
+    ("h", false, [0, 0, 1, 0, 0, 0, 0, 0], 3600.0, 0.0),
+    ("d", false, [0, 0, 1, 0, 0, 0, 0, 0], 86400.0, 0.0),
+    ("t", false, [1, 0, 0, 0, 0, 0, 0, 0], 1000.0, 0.0),
+    ("l", true, [0, 3, 0, 0, 0, 0, 0, 0], 1e-3, 0.0),
+    ("L", true, [0, 3, 0, 0, 0, 0, 0, 0], 1e-3, 0.0),
+    ("deg", false, [0, 0, 0, 0, 0, 0, 0, 1], PI / 180.0, 0.0),
+    ("rev", false, [0, 0, 0, 0, 0, 0, 0, 1], 2.0 * PI, 0.0),
+    ("rev", false, [0, 0, 0, 0, 0, 0, 0, 0], 1.0, 0.0),
+    ("r", false, [0, 0, 0, 0, 0, 0, 0, 1], 2.0 * PI, 0.0),
+    ("r", false, [0, 0, 0, 0, 0, 0, 0, 0], 1.0, 0.0),
+    ("rpm", false, [0, 0, -1, 0, 0, 0, 0, 1], PI / 30.0, 0.0),
+    ("rpm", false, [0, 0, -1, 0, 0, 0, 0, 0], 1.0 / 60.0, 0.0),
+    ("°", false, [0, 0, 0, 0, 0, 0, 0, 1], PI / 180.0, 0.0),
+    ("°C", false, [0, 0, 0, 0, 1, 0, 0, 0], 1.0, 273.15),
+    ("degC", false, [0, 0, 0, 0, 1, 0, 0, 0], 1.0, 273.15),
+    ("degF", false, [0, 0, 0, 0, 1, 0, 0, 0], 5.0 / 9.0, 459.67 * 5.0 / 9.0),
+    ("1", false, [0; 8], 1.0, 0.0),
+    ("%", false, [0; 8], 0.01, 0.0),
+];
+
+/// Prefixes in use; the rarest are left out, since "PS" is a horsepower.
+const PREFIXES: [(&str, f64); 12] = [
+    ("T", 1e12),
+    ("G", 1e9),
+    ("M", 1e6),
+    ("k", 1e3),
+    ("h", 1e2),
+    ("d", 1e-1),
+    ("c", 1e-2),
+    ("m", 1e-3),
+    ("u", 1e-6),
+    ("µ", 1e-6),
+    ("n", 1e-9),
+    ("p", 1e-12),
+];
+
+/// The units a symbol can stand for.
+fn symbol(text: &str) -> Vec<Unit> {
+    let unit = |(_, _, exponents, factor, offset): &Symbol, prefix: f64| Unit {
+        exponents: *exponents,
+        factor: factor * prefix,
+        offset: *offset,
+    };
+    let exact: Vec<Unit> = SYMBOLS.iter().filter(|s| s.0 == text).map(|s| unit(s, 1.0)).collect();
+    if !exact.is_empty() {
+        return exact;
+    }
+    let mut all = Vec::new();
+    for (prefix, size) in PREFIXES {
+        let Some(rest) = text.strip_prefix(prefix) else { continue };
+        all.extend(SYMBOLS.iter().filter(|s| s.1 && s.0 == rest).map(|s| unit(s, size)));
+    }
+    all
+}
+
+/// The units that a name can stand for; none if it is not read.
+fn read(name: &str) -> Vec<Unit> {
+    let mut rest = name.trim();
+    match quotient(&mut rest) {
+        Some(units) if rest.is_empty() => units,
+        _ => Vec::new(),
+    }
+}
+
+/// `product` or `product/factor`.
+fn quotient(rest: &mut &str) -> Option<Vec<Unit>> {
+    let above = product(rest)?;
+    let Some(after) = rest.strip_prefix('/') else { return Some(above) };
+    *rest = after;
+    let below = factor(rest)?;
+    // a/b.c and a/b/c are read in two ways by people
+    if rest.starts_with(['.', '*', '/']) {
+        return None;
+    }
+    Some(combine(&above, &below, -1))
+}
+
+fn product(rest: &mut &str) -> Option<Vec<Unit>> {
+    let mut all = factor(rest)?;
+    while let Some(after) = rest.strip_prefix(['.', '*']) {
+        *rest = after;
+        all = combine(&all, &factor(rest)?, 1);
+    }
+    Some(all)
+}
+
+fn combine(left: &[Unit], right: &[Unit], power: i32) -> Vec<Unit> {
+    left.iter().flat_map(|l| right.iter().map(move |r| l.times(*r, power))).collect()
+}
+
+/// A symbol or an expression in parentheses, and its exponent.
+fn factor(rest: &mut &str) -> Option<Vec<Unit>> {
+    let base = if let Some(inner) = rest.strip_prefix('(') {
+        *rest = inner;
+        let inner = quotient(rest)?;
+        *rest = rest.strip_prefix(')')?;
+        inner
+    } else if let Some(after) = rest.strip_prefix('1') {
+        *rest = after;
+        return Some(vec![Unit::ONE]);
+    } else {
+        let end = rest
+            .find(|c: char| !(c.is_alphabetic() || matches!(c, '%' | '°')))
+            .unwrap_or(rest.len());
+        let (name, after) = rest.split_at(end);
+        *rest = after;
+        symbol(name)
+    };
+    let after = rest.strip_prefix('^').unwrap_or(rest);
+    let sign = usize::from(after.starts_with(['+', '-']));
+    let digits = after[sign..].find(|c: char| !c.is_ascii_digit()).unwrap_or(after.len() - sign);
+    if digits == 0 {
+        return (!base.is_empty()).then_some(base);
+    }
+    let power: i32 = after[..sign + digits].parse().ok().filter(|p: &i32| p.abs() < 100)?;
+    *rest = &after[sign + digits..];
+    (!base.is_empty()).then(|| base.iter().map(|u| Unit::ONE.times(*u, power)).collect())
+}
+
+/// What an element BaseUnit says; none if a number in it is not one.
+fn declared(unit: &Element) -> Option<Unit> {
+    let base = unit.child("BaseUnit")?;
+    let mut exponents = [0; 8];
+    for (exponent, name) in exponents.iter_mut().zip(BASE) {
+        *exponent = match base.get(name) {
+            Some(text) => text.trim().parse().ok()?,
+            None => 0,
+        };
+    }
+    Some(Unit {
+        exponents,
+        factor: number(base, "factor", 1.0)?,
+        offset: number(base, "offset", 0.0)?,
+    })
+}
+
+fn number(element: &Element, attribute: &str, default: f64) -> Option<f64> {
+    match element.get(attribute) {
+        None => Some(default),
+        Some(_) => element.number(attribute).filter(|x| x.is_finite()),
+    }
+}
+
+/// Whether two factors are the same but for the digits that authors write.
+fn agree(a: f64, b: f64) -> bool {
+    (a - b).abs() <= 1e-3 * a.abs().max(b.abs())
+}
+
+/// `xml.unit_numbers`
+pub fn numbers(d: &Description, findings: &mut Findings) {
+    for unit in d.root.list("UnitDefinitions") {
+        for child in &unit.children {
+            let name = child.get("name").or(unit.get("name")).unwrap_or_default();
+            let place = format!("line {}, {} of \"{name}\"", child.line, child.name);
+            for (attribute, not_0) in [("factor", true), ("offset", false)] {
+                let Some(x) = child.number(attribute) else { continue };
+                if !x.is_finite() || (not_0 && x == 0.0) {
+                    let allowed = if not_0 { "finite, not 0" } else { "finite" };
+                    findings.add(&place, format!("{attribute}={x} (allowed: {allowed})"));
+                }
+            }
+        }
+    }
+}
+
+/// `xml.base_units`
+pub fn base_units(d: &Description, findings: &mut Findings) {
+    for unit in d.root.list("UnitDefinitions") {
+        let (Some(name), Some(written)) = (unit.get("name"), declared(unit)) else { continue };
+        let meant = read(name);
+        let fits = |m: &&Unit| {
+            written.measures_like(m)
+                // people write % with and without its factor
+                && (m.is_dimensionless()
+                    || agree(written.factor, m.factor)
+                        && (written.offset - m.offset).abs() <= 1e-3 * m.offset.abs())
+        };
+        if let Some(first) = meant.first()
+            && !meant.iter().any(|m| fits(&m))
+        {
+            findings.add(
+                format!("line {}, Unit \"{name}\"", unit.line),
+                format!(
+                    "BaseUnit says {}, but the unit of that name has {} (allowed: what the name says)",
+                    written.text(),
+                    first.text()
+                ),
+            );
+        }
+    }
+}
+
+/// `xml.display_units`
+pub fn display_units(d: &Description, findings: &mut Findings) {
+    for unit in d.root.list("UnitDefinitions") {
+        let Some(name) = unit.get("name") else { continue };
+        // without BaseUnit the name tells what is converted
+        let from = match declared(unit) {
+            Some(written) => vec![written],
+            None => read(name),
+        };
+        for shown in unit.children.iter().filter(|c| c.name == "DisplayUnit") {
+            let numbers = (number(shown, "factor", 1.0), number(shown, "offset", 0.0));
+            let (Some(shown_name), (Some(factor), Some(offset))) = (shown.get("name"), numbers)
+            else {
+                continue;
+            };
+            let to = read(shown_name);
+            if from.is_empty() || to.is_empty() || shown_name == name {
+                continue;
+            }
+            let place = format!("line {}, DisplayUnit \"{shown_name}\" of \"{name}\"", shown.line);
+            // shown = factor · value + offset, where from.factor · value + from.offset and
+            // to.factor · shown + to.offset are the same in base units
+            let expected: Vec<(f64, f64)> = from
+                .iter()
+                .flat_map(|f| to.iter().map(move |t| (f, t)))
+                .filter(|(f, t)| f.measures_like(t))
+                .map(|(f, t)| (f.factor / t.factor, (f.offset - t.offset) / t.factor))
+                .collect();
+            let Some((right, shift)) = expected.first().copied() else {
+                findings.add(
+                    place,
+                    format!(
+                        "\"{shown_name}\" does not measure what \"{name}\" does ({} against {})",
+                        to[0].text(),
+                        from[0].text()
+                    ),
+                );
+                continue;
+            };
+            let fits = |(f, o): &(f64, f64)| {
+                agree(factor, *f) && (offset - o).abs() <= 1e-3 * o.abs().max(1e-9)
+            };
+            if !expected.iter().any(fits) {
+                let inverted = agree(factor * right, 1.0);
+                let hint = if inverted { "; it is inverted" } else { "" };
+                findings.add(
+                    place,
+                    format!(
+                        "factor={factor} offset={offset}{hint} (allowed: factor={right} \
+                         offset={shift}, for shown = factor * value + offset)"
+                    ),
+                );
+            }
+        }
+    }
+}
+
+/// `xml.derivative_units`
+pub fn derivative_units(d: &Description, findings: &mut Findings) {
+    let units: BTreeMap<&str, &Element> =
+        d.root.list("UnitDefinitions").filter_map(|unit| Some((unit.get("name")?, unit))).collect();
+    let known = |name: &str| -> Vec<Unit> {
+        match units.get(name).and_then(|unit| declared(unit)) {
+            Some(unit) => vec![unit],
+            None => read(name),
+        }
+    };
+    let second = Unit { exponents: [0, 0, 1, 0, 0, 0, 0, 0], ..Unit::ONE };
+    for v in &d.variables {
+        let Some(state) = v.derivative_of().and_then(|index| d.at(index)) else { continue };
+        let (of_state, of_derivative) = (state.typed.get("unit"), v.typed.get("unit"));
+        let (Some(of_state), Some(of_derivative)) = (of_state, of_derivative) else { continue };
+        let (all, written) = (known(of_state), known(of_derivative));
+        if all.is_empty() || written.is_empty() {
+            continue;
+        }
+        let expected: Vec<Unit> = all.iter().map(|u| u.times(second, -1)).collect();
+        let fits =
+            |w: &Unit| expected.iter().any(|e| e.measures_like(w) && agree(e.factor, w.factor));
+        if !written.iter().any(fits) {
+            findings.add(
+                v.place(),
+                format!(
+                    "it is the derivative of {}, in \"{of_state}\", but has the unit \
+                     \"{of_derivative}\" (allowed: \"{of_state}\" per second: {})",
+                    state.name,
+                    expected[0].text()
+                ),
+            );
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn one(name: &str) -> Unit {
+        read(name).first().copied().unwrap_or_else(|| panic!("{name} is not read"))
+    }
+
+    #[test]
+    fn names_are_read_as_modelica_writes_them() {
+        assert_eq!(one("N.m").exponents, [1, 2, -2, 0, 0, 0, 0, 0]);
+        assert_eq!(one("kg.m2/s2"), one("J"));
+        assert_eq!(one("W/(m2.K)").exponents, [1, 0, -3, 0, -1, 0, 0, 0]);
+        assert_eq!(one("1/s").exponents[2], -1);
+        assert_eq!(one("s-1"), one("1/s"));
+        assert!(agree(one("km/h").factor, 1.0 / 3.6));
+        assert!(agree(one("deg/h").factor, PI / 180.0 / 3600.0));
+        assert!(agree(one("mm2").factor, 1e-6) && agree(one("cm3").factor, 1e-6));
+        assert!(agree(one("mbar").factor, 100.0) && agree(one("kWh").factor, 3.6e6));
+        assert_eq!(one("min").factor, 60.0); // not a thousandth of an inch
+        assert_eq!(one("kg").factor, 1.0);
+        for unread in ["", "foo", "W/m2.K", "m/s/s", "m2/", "(m", "m)", "m^", "N m", "m2x"] {
+            assert_eq!(read(unread), [], "{unread}");
+        }
+    }
+}

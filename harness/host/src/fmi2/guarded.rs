@@ -1,0 +1,310 @@
+//! Calls whose arrays lie between two margins: they show whether an FMU writes beside what it is
+//! given, or into what it shall only read.
+
+use super::*;
+
+/// Bytes on either side of an array.
+const MARGIN: usize = 1024;
+/// What the margins are filled with; no number of an FMU looks like it by chance.
+const FILL: u64 = 0xa5c3_5a3c_a53c_5ac3;
+
+/// An array between its margins, aligned for every type of FMI.
+struct Guarded {
+    words: Vec<u64>,
+    bytes: usize,
+    /// What it held when it was handed over, if the FMU shall only read it.
+    input: Option<Vec<u8>>,
+}
+
+impl Guarded {
+    /// Room for `count` values that the FMU writes.
+    fn output<T>(count: usize) -> Guarded {
+        let bytes = count * size_of::<T>();
+        let words = vec![FILL; 2 * MARGIN / 8 + bytes.div_ceil(8)];
+        Guarded { words, bytes, input: None }
+    }
+
+    /// A copy of values that the FMU reads.
+    fn input<T: Copy>(values: &[T]) -> Guarded {
+        let mut array = Guarded::output::<T>(values.len());
+        // SAFETY: there is room for them, and the two do not overlap.
+        unsafe { array.pointer::<T>().copy_from_nonoverlapping(values.as_ptr(), values.len()) };
+        array.input = Some(array.content());
+        array
+    }
+
+    fn pointer<T>(&mut self) -> *mut T {
+        self.words[MARGIN / 8..].as_mut_ptr().cast()
+    }
+
+    fn all_bytes(&self) -> Vec<u8> {
+        self.words.iter().flat_map(|word| word.to_ne_bytes()).collect()
+    }
+
+    fn content(&self) -> Vec<u8> {
+        self.all_bytes()[MARGIN..MARGIN + self.bytes].to_vec()
+    }
+
+    /// What was written where it must not be.
+    fn fault(&self) -> Option<String> {
+        let all = self.all_bytes();
+        let fill = FILL.to_ne_bytes();
+        let is_touched = |at: &usize| all[*at] != fill[at % 8];
+        let end = MARGIN + self.bytes;
+        let (before, after) = ((0..MARGIN).find(is_touched), (end..all.len()).rfind(is_touched));
+        match (before, after) {
+            (_, Some(last)) => {
+                Some(format!("it writes up to {} bytes past its end", last + 1 - end))
+            }
+            (Some(first), None) => {
+                Some(format!("it writes up to {} bytes before its beginning", MARGIN - first))
+            }
+            (None, None) if self.input.as_ref().is_some_and(|input| *input != self.content()) => {
+                Some("it changes what it shall only read".into())
+            }
+            (None, None) => None,
+        }
+    }
+}
+
+/// Something written beside an array.
+#[derive(Clone, Debug)]
+pub struct Beside {
+    /// The C function.
+    pub call: &'static str,
+    /// The array, by the name of the standard's argument, and how many values it has.
+    pub array: String,
+    /// What was written.
+    pub fault: String,
+}
+
+/// What the calls of [`Instance::writes_beside`] ask for.
+#[derive(Clone, Debug, Default)]
+pub struct Lists {
+    /// Value references of Reals to read.
+    pub reals: Vec<u32>,
+    /// Of Integers and Enumerations.
+    pub integers: Vec<u32>,
+    /// Of Booleans.
+    pub booleans: Vec<u32>,
+    /// Of Strings.
+    pub strings: Vec<u32>,
+    /// Of Reals that may be set now, with values.
+    pub inputs: Vec<(u32, f64)>,
+    /// Unknowns of directional derivatives; none if the FMU does not provide them.
+    pub unknowns: Vec<u32>,
+    /// Knowns of directional derivatives.
+    pub knowns: Vec<u32>,
+    /// Outputs whose derivatives the FMU gives.
+    pub outputs: Vec<u32>,
+    /// Continuous states, if they may be asked for now.
+    pub states: Option<usize>,
+    /// Event indicators, if they may be asked for now.
+    pub indicators: Option<usize>,
+    /// Whether states can be serialised.
+    pub serializes: bool,
+}
+
+/// Lengths at which a list is tried: one, some and all.
+fn lengths(all: usize) -> Vec<usize> {
+    let mut lengths = vec![1, all.div_ceil(2), all];
+    lengths.retain(|n| *n > 0 && *n <= all);
+    lengths.dedup();
+    lengths
+}
+
+impl Instance<'_> {
+    /// For tests: makes calls with margins around every array, and tells what was written there.
+    /// What the calls answer does not count.
+    pub fn writes_beside(&mut self, lists: &Lists) -> Vec<Beside> {
+        let mut found = Vec::new();
+        self.values_beside(lists, &mut found);
+        self.derivatives_beside(lists, &mut found);
+        self.vectors_beside(lists, &mut found);
+        if lists.serializes {
+            self.states_beside(&mut found);
+        }
+        self.take_messages();
+        found
+    }
+
+    fn values_beside(&mut self, lists: &Lists, found: &mut Vec<Beside>) {
+        let (f, c) = (&self.fmu.functions, self.component);
+        for n in lengths(lists.reals.len()) {
+            let (mut vr, mut x) = (Guarded::input(&lists.reals[..n]), Guarded::output::<Real>(n));
+            // SAFETY: arrays of n values each; so in all calls of this file.
+            unsafe { (f.get_real)(c, vr.pointer(), n, x.pointer()) };
+            note(found, "fmi2GetReal", n, &[("vr", &vr), ("value", &x)]);
+        }
+        for n in lengths(lists.integers.len()) {
+            let (mut vr, mut x) =
+                (Guarded::input(&lists.integers[..n]), Guarded::output::<c_int>(n));
+            // SAFETY: see above.
+            unsafe { (f.get_integer)(c, vr.pointer(), n, x.pointer()) };
+            note(found, "fmi2GetInteger", n, &[("vr", &vr), ("value", &x)]);
+        }
+        for n in lengths(lists.booleans.len()) {
+            let (mut vr, mut x) =
+                (Guarded::input(&lists.booleans[..n]), Guarded::output::<c_int>(n));
+            // SAFETY: see above.
+            unsafe { (f.get_boolean)(c, vr.pointer(), n, x.pointer()) };
+            note(found, "fmi2GetBoolean", n, &[("vr", &vr), ("value", &x)]);
+        }
+        for n in lengths(lists.strings.len()) {
+            let (mut vr, mut x) =
+                (Guarded::input(&lists.strings[..n]), Guarded::output::<*const c_char>(n));
+            // SAFETY: see above.
+            unsafe { (f.get_string)(c, vr.pointer(), n, x.pointer()) };
+            note(found, "fmi2GetString", n, &[("vr", &vr), ("value", &x)]);
+        }
+        let (references, values): (Vec<u32>, Vec<Real>) = lists.inputs.iter().copied().unzip();
+        for n in lengths(references.len()) {
+            let (mut vr, mut x) = (Guarded::input(&references[..n]), Guarded::input(&values[..n]));
+            // SAFETY: see above.
+            unsafe { (f.set_real)(c, vr.pointer(), n, x.pointer()) };
+            note(found, "fmi2SetReal", n, &[("vr", &vr), ("value", &x)]);
+        }
+    }
+
+    fn derivatives_beside(&mut self, lists: &Lists, found: &mut Vec<Beside>) {
+        let (f, c) = (&self.fmu.functions, self.component);
+        for n in lengths(lists.unknowns.len()) {
+            let m = lists.knowns.len();
+            let (mut unknown, mut known) =
+                (Guarded::input(&lists.unknowns[..n]), Guarded::input(&lists.knowns));
+            let (mut along, mut answer) =
+                (Guarded::input(&vec![1.0; m]), Guarded::output::<Real>(n));
+            // SAFETY: see values_beside.
+            unsafe {
+                (f.get_directional_derivative)(
+                    c,
+                    unknown.pointer(),
+                    n,
+                    known.pointer(),
+                    m,
+                    along.pointer(),
+                    answer.pointer(),
+                )
+            };
+            let arrays = [
+                ("vUnknown_ref", &unknown),
+                ("vKnown_ref", &known),
+                ("dvKnown", &along),
+                ("dvUnknown", &answer),
+            ];
+            note(found, "fmi2GetDirectionalDerivative", n, &arrays);
+        }
+        let Some(f) = &self.fmu.stepping else { return };
+        for n in lengths(lists.outputs.len()) {
+            let (mut vr, mut order) =
+                (Guarded::input(&lists.outputs[..n]), Guarded::input(&vec![1 as c_int; n]));
+            let mut x = Guarded::output::<Real>(n);
+            // SAFETY: see values_beside.
+            unsafe {
+                (f.get_real_output_derivatives)(c, vr.pointer(), n, order.pointer(), x.pointer())
+            };
+            let arrays = [("vr", &vr), ("order", &order), ("value", &x)];
+            note(found, "fmi2GetRealOutputDerivatives", n, &arrays);
+        }
+    }
+
+    fn vectors_beside(&mut self, lists: &Lists, found: &mut Vec<Beside>) {
+        let c = self.component;
+        let Some(f) = &self.fmu.exchange else { return };
+        let vectors: [(&'static str, GetVector, Option<usize>); 4] = [
+            ("fmi2GetContinuousStates", f.get_continuous_states, lists.states),
+            ("fmi2GetDerivatives", f.get_derivatives, lists.states),
+            ("fmi2GetNominalsOfContinuousStates", f.get_nominals, lists.states),
+            ("fmi2GetEventIndicators", f.get_event_indicators, lists.indicators),
+        ];
+        for (call, function, count) in vectors {
+            let Some(n) = count.filter(|n| *n > 0) else { continue };
+            let mut x = Guarded::output::<Real>(n);
+            // SAFETY: see values_beside.
+            unsafe { function(c, x.pointer(), n) };
+            note(found, call, n, &[("the vector", &x)]);
+        }
+        if let Some(n) = lists.states.filter(|n| *n > 0) {
+            let mut now = vec![0.0; n];
+            // SAFETY: see values_beside.
+            unsafe { (f.get_continuous_states)(c, now.as_mut_ptr(), n) };
+            let mut x = Guarded::input(&now);
+            // SAFETY: see values_beside.
+            unsafe { (f.set_continuous_states)(c, x.pointer(), n) };
+            note(found, "fmi2SetContinuousStates", n, &[("x", &x)]);
+        }
+        if lists.states.is_some() {
+            let (mut enter, mut end) = (Guarded::output::<c_int>(1), Guarded::output::<c_int>(1));
+            // SAFETY: see values_beside.
+            unsafe { (f.completed_integrator_step)(c, 1, enter.pointer(), end.pointer()) };
+            let arrays = [("enterEventMode", &enter), ("terminateSimulation", &end)];
+            note(found, "fmi2CompletedIntegratorStep", 1, &arrays);
+            let mut info = Guarded::output::<EventInfo>(1);
+            // SAFETY: see values_beside; the host goes back to continuous-time mode.
+            unsafe {
+                (f.enter_event_mode)(c);
+                (f.new_discrete_states)(c, info.pointer());
+                (f.enter_continuous_time_mode)(c);
+            }
+            note(found, "fmi2NewDiscreteStates", 1, &[("fmi2EventInfo", &info)]);
+        }
+    }
+
+    fn states_beside(&mut self, found: &mut Vec<Beside>) {
+        let (f, c) = (&self.fmu.functions, self.component);
+        let Ok(state) = self.get_state() else { return };
+        let mut size = Guarded::output::<usize>(1);
+        // SAFETY: see values_beside.
+        let status = unsafe { (f.serialized_fmu_state_size)(c, state.0, size.pointer()) };
+        note(found, "fmi2SerializedFMUstateSize", 1, &[("size", &size)]);
+        let n = size.words[MARGIN / 8] as usize;
+        if status == 0 && n < 1 << 30 {
+            let mut bytes = Guarded::output::<u8>(n);
+            // SAFETY: see values_beside.
+            let status = unsafe { (f.serialize_fmu_state)(c, state.0, bytes.pointer(), n) };
+            note(found, "fmi2SerializeFMUstate", n, &[("serializedState", &bytes)]);
+            if status == 0 {
+                let mut bytes = Guarded::input(&bytes.content());
+                let mut copy: State = null_mut();
+                // SAFETY: see values_beside.
+                unsafe { (f.deserialize_fmu_state)(c, bytes.pointer(), n, &mut copy) };
+                note(found, "fmi2DeSerializeFMUstate", n, &[("serializedState", &bytes)]);
+                let _ = self.free_state(FmuState(copy));
+            }
+        }
+        let _ = self.free_state(state);
+    }
+}
+
+/// Tells what was written beside the arrays of a call.
+fn note(found: &mut Vec<Beside>, call: &'static str, n: usize, arrays: &[(&str, &Guarded)]) {
+    for (name, array) in arrays {
+        if let Some(fault) = array.fault() {
+            found.push(Beside { call, array: format!("{name}, {n} long"), fault });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_byte_beside_an_array_is_seen_and_one_inside_is_not() {
+        let mut array = Guarded::output::<c_int>(3);
+        // SAFETY: inside the array.
+        unsafe { array.pointer::<c_int>().add(2).write(7) };
+        assert_eq!(array.fault(), None);
+        // SAFETY: inside the margin.
+        unsafe { array.pointer::<u8>().add(12).write(1) };
+        assert_eq!(array.fault().as_deref(), Some("it writes up to 1 bytes past its end"));
+        let mut array = Guarded::output::<Real>(1);
+        // SAFETY: inside the margin.
+        unsafe { array.pointer::<u8>().sub(8).write(1) };
+        assert_eq!(array.fault().as_deref(), Some("it writes up to 8 bytes before its beginning"));
+        let mut array = Guarded::input(&[1.0, 2.0]);
+        // SAFETY: inside the array.
+        unsafe { array.pointer::<Real>().write(3.0) };
+        assert_eq!(array.fault().as_deref(), Some("it changes what it shall only read"));
+    }
+}
