@@ -204,7 +204,7 @@ impl<M: Model> Instance<M> {
     }
 
     /// fmi2GetReal and its kin: one value.
-    #[inline]
+    #[inline(always)]
     pub fn get(&mut self, operation: &'static Operation, reference: u32) -> Result<Value, Fault> {
         let call = &self.check(operation)?;
         let scalar = scalar::<M>(call, reference)?;
@@ -314,7 +314,7 @@ impl<M: Model> Instance<M> {
         )
     }
 
-    #[inline]
+    #[inline(always)]
     fn check_set(
         &self,
         call: &Call,
@@ -569,49 +569,50 @@ impl<M: Model> Instance<M> {
             return Err(call
                 .error(format_args!("the step to {end:?} s would pass the stop time {stop:?} s")));
         }
-        let ramps = if self.sloped { Some(self.inputs_over(call, h)?) } else { None };
+        if self.sloped {
+            self.check_slopes(call, h)?;
+        }
         let Some(model) = &mut self.model else {
             return Err(call.error("the instance was never initialised"));
         };
-        let during = ramps.as_ref().map_or(&self.inputs, |(during, _)| during);
-        if let Err(why) = model.step(during, h) {
+        if let Err(why) = model.step(&self.inputs, h) {
             self.state = InstanceState::Failed;
             return Err(call.error(format_args!("step from {at:?} s to {end:?} s failed: {why}")));
         }
-        self.time = end;
-        if let Some((_, after)) = ramps {
-            self.inputs = after;
-            self.sloped = false;
+        if self.sloped {
+            self.move_inputs(h);
         }
+        self.time = end;
         self.outputs = None;
         Ok(())
     }
 
-    /// The inputs during a step of `h`, and where they stand after it.
-    #[inline]
-    fn inputs_over(&self, call: &Call, h: f64) -> Result<(M::Inputs, M::Inputs), Fault> {
-        let mut during = self.inputs;
-        let mut after = self.inputs;
+    /// Whether the inputs stay in their ranges while they run along their slopes for `h`.
+    fn check_slopes(&mut self, call: &Call, h: f64) -> Result<(), Fault> {
         for scalar in M::table().inputs() {
             let Access::Input(ramp) = scalar.access else { continue };
-            let [value, slope] = ramp(&mut during, scalar.element);
+            let [value, slope] = ramp(&mut self.inputs, scalar.element);
             if *slope == 0.0 {
                 continue;
             }
-            let mut end = *value + *slope * h;
-            let floor = scalar.variable.min().unwrap_or(f64::NEG_INFINITY);
-            // A ramp down to the smallest value may miss it by a rounding error.
-            if end < floor && end > floor - TIME_SLACK * (*value - floor) {
-                end = floor;
-                *slope = (floor - *value) / h;
-            }
+            let end = end_of_ramp(scalar, (*value, *slope), h);
             if let Some(problem) = scalar.problem(Value::Real(end)) {
                 return Err(call.error(format_args!("at the end of the step {problem}")));
             }
-            let [value, slope] = ramp(&mut after, scalar.element);
-            (*value, *slope) = (end, 0.0);
         }
-        Ok((during, after))
+        Ok(())
+    }
+
+    /// Puts the inputs where their slopes lead in `h`; from there on they are held.
+    fn move_inputs(&mut self, h: f64) {
+        for scalar in M::table().inputs() {
+            let Access::Input(ramp) = scalar.access else { continue };
+            let [value, slope] = ramp(&mut self.inputs, scalar.element);
+            if *slope != 0.0 {
+                (*value, *slope) = (end_of_ramp(scalar, (*value, *slope), h), 0.0);
+            }
+        }
+        self.sloped = false;
     }
 
     // ---- Model Exchange ----
@@ -832,6 +833,16 @@ impl<M: Model> Instance<M> {
     /// The last event, for the log.
     pub fn last_event(&self) -> String {
         self.model.as_ref().map_or(String::new(), M::last_event)
+    }
+}
+
+/// Where an input is after `h`. A ramp down to the smallest value may miss it by a rounding error.
+#[inline]
+fn end_of_ramp<M: Model>(scalar: &Scalar<M>, (value, slope): (f64, f64), h: f64) -> f64 {
+    let end = value + slope * h;
+    match scalar.variable.min() {
+        Some(floor) if end < floor && end > floor - TIME_SLACK * (value - floor) => floor,
+        _ => end,
     }
 }
 

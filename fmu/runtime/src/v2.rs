@@ -146,7 +146,7 @@ impl Log {
 
     /// Tells of the last event, if there was one since `before` were counted and if somebody wants
     /// to know.
-    #[inline]
+    #[inline(always)]
     fn report_event<M: Model>(
         &self,
         operation: &'static Operation,
@@ -154,15 +154,19 @@ impl Log {
         now: &Instance<M>,
     ) {
         let events = now.event_count().wrapping_sub(before);
-        if events == 0 || !self.filter.wants(Topic::Event) {
-            return;
+        if events != 0 && self.filter.wants(Topic::Event) {
+            self.write_event(operation, events, &now.last_event());
         }
+    }
+
+    #[cold]
+    fn write_event(&self, operation: &'static Operation, events: i32, last: &str) {
         let many = match events {
             1 => String::new(),
             n => format!(", the last of {n} events in this call"),
         };
         let name = operation.call(FMI2).name();
-        self.write(fmi2OK, Topic::Event, &format!("{name}: {}{many}", now.last_event()));
+        self.write(fmi2OK, Topic::Event, &format!("{name}: {last}{many}"));
     }
 
     fn write(&self, status: fmi2Status, topic: Topic, text: &str) {

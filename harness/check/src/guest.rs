@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 
 use super::description::{Description, Variable};
-use host::xml::Element;
 use super::process::Trace;
 use host::description::Type;
 use host::fmi2::{CO_SIMULATION, CallError, Called, Fmu, Instance, MODEL_EXCHANGE, Status};
+use host::xml::Element;
 
 /// Steps of a short run.
 pub const STEPS: usize = 20;

@@ -93,7 +93,10 @@ mod tests {
     fn a_document_type_declaration_is_found_before_the_root_and_nowhere_else() {
         let found = |text: &str| Doctype::find(text.as_bytes());
         let simple = found("<?xml version=\"1.0\"?>\n<!-- a -->\n<!DOCTYPE a><a/>").unwrap();
-        assert_eq!((simple.line, simple.text.as_str(), simple.danger()), (3, "<!DOCTYPE a>", "many parsers refuse it"));
+        assert_eq!(
+            (simple.line, simple.text.as_str(), simple.danger()),
+            (3, "<!DOCTYPE a>", "many parsers refuse it")
+        );
         let bomb = found("<!DOCTYPE a [<!ENTITY b \"c>d\"> ]><a/>").unwrap();
         assert!(bomb.text.ends_with("]>") && bomb.danger().contains("entities"));
         let outside = found("<!doctype a SYSTEM \"file:///etc/passwd\"><a/>").unwrap();

@@ -8,8 +8,8 @@
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use host::xml::Element;
 use super::{Description, Findings};
+use host::xml::Element;
 
 /// Base units of FMI 2.0 in the schema's order. The radian is the last: it has dimension 1, and
 /// authors write it or leave it out.
