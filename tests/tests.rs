@@ -5,6 +5,7 @@ mod abi {
     mod calls;
     mod model_exchange;
 }
+mod architecture;
 mod common;
 mod life {
     mod allocation;

@@ -1,0 +1,81 @@
+//! The invariants of ARCHITECTURE.md that the compiler does not enforce.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+
+use cargo_metadata::{DependencyKind, MetadataCommand};
+
+/// What each package of the workspace links, tests and build scripts left out.
+fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
+    let metadata =
+        MetadataCommand::new().current_dir(pack::root()).no_deps().exec().expect("cargo metadata");
+    let linked = |package: &cargo_metadata::Package| {
+        let normal = package.dependencies.iter().filter(|d| d.kind == DependencyKind::Normal);
+        normal.map(|d| d.name.clone()).collect()
+    };
+    metadata.packages.iter().map(|package| (package.name.to_string(), linked(package))).collect()
+}
+
+#[test]
+fn the_physics_knows_no_fmi_and_the_runtime_no_physics() {
+    let all = dependencies();
+    assert_eq!(all["plant"], BTreeSet::from(["libm".into()]));
+    assert_eq!(all["runtime"], BTreeSet::new());
+}
+
+#[test]
+fn the_harness_never_links_a_model_and_its_libraries_stand_side_by_side() {
+    let all = dependencies();
+    let models = ["plant", "runtime", "hubslosh-fmu", "spring-fmu", "model-description"];
+    let libraries = ["check", "pack", "bench"];
+    for (package, dependencies) in &all {
+        let in_harness = ["host", "hubslosh"].contains(&package.as_str())
+            || libraries.contains(&package.as_str());
+        for dependency in dependencies.iter().map(String::as_str).filter(|_| in_harness) {
+            assert!(!models.contains(&dependency), "{package} links {dependency}");
+            let beside = libraries.contains(&package.as_str()) && libraries.contains(&dependency);
+            assert!(!beside, "{package} depends on {dependency}");
+        }
+    }
+    assert!(all["host"].is_disjoint(&libraries.map(String::from).into()));
+}
+
+#[test]
+fn only_the_command_line_draws_progress() {
+    for (package, dependencies) in dependencies() {
+        assert!(package == "hubslosh" || !dependencies.contains("indicatif"), "{package}");
+    }
+}
+
+/// Files in which the workspace's `unsafe_code = "deny"` is lifted.
+#[test]
+fn unsafe_code_stands_in_the_files_of_the_c_interface() {
+    let mut found = BTreeSet::new();
+    let root = pack::root();
+    collect(&root, &root, &mut found);
+    let known = [
+        "fmu/fuzz/targets/calls.rs",
+        "fmu/runtime/src/v2.rs",
+        "harness/host/src/fmi2.rs", // and its submodules
+    ];
+    assert_eq!(found, known.map(String::from).into());
+}
+
+fn collect(root: &Path, folder: &Path, found: &mut BTreeSet<String>) {
+    for entry in fs::read_dir(folder).expect("a folder of the project").flatten() {
+        let path = entry.path();
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if path.is_dir() && name != "target" && !name.starts_with('.') {
+            collect(root, &path, found);
+        } else if name.ends_with(".rs") {
+            let text = fs::read_to_string(&path).expect("a source file");
+            let lifted = format!("allow({}", "unsafe_code)");
+            if text.lines().any(|line| line.trim_start().starts_with("#") && line.contains(&lifted))
+            {
+                let relative = path.strip_prefix(root).expect("below the root");
+                found.insert(relative.to_string_lossy().replace('\\', "/"));
+            }
+        }
+    }
+}
