@@ -10,7 +10,7 @@
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use bench::profile::{Profile, Torque};
+use bench::profile::Torque;
 use bench::run::Run;
 use host::fmi2::{Fmu, Instance};
 use ode_solvers::{Dopri5, SVector, System};
@@ -137,6 +137,7 @@ fn main() {
         let settings = settings.map(|(k, v)| (k.to_string(), v.to_string())).to_vec();
         let stop = DURATION;
         let run = Run {
+            input: Some(bench::run::TORQUE.into()),
             settings,
             torque: torque.clone(),
             step: STEP,

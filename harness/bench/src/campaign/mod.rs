@@ -25,6 +25,7 @@ use serde_json::json;
 
 pub use self::outcome::{Curve, Estimate, Figures, Outcome, Passing, Record, SloshPath};
 pub use self::rows::{FeatureRow, MadeFrom};
+use crate::analysis::features::Features;
 use crate::plan::{Case, Plan};
 use crate::progress::Progress;
 
@@ -62,8 +63,8 @@ const PARAMETERS: [&str; 8] = [
 
 /// Whether an FMU is the bench, as far as the analysis asks.
 fn is_bench(description: &ModelDescription) -> bool {
-    let has = |name: &&str| description.variables.iter().any(|v| v.name == **name);
-    STORED[1..].iter().all(|name| has(&name)) && PARAMETERS.iter().all(|name| has(&name))
+    let has = |name: &&str| description.variables.iter().any(|v| v.name == *name);
+    STORED[1..].iter().all(has) && PARAMETERS.iter().all(has)
 }
 
 /// What is stored of a run of an FMU: [`STORED`] of the bench; else time, the driven input and every
@@ -118,7 +119,7 @@ impl Results {
 /// What became of one run.
 enum Done {
     Analysed(Box<Outcome>),
-    Unanalysed(Unanalysed),
+    Unanalysed(Box<Unanalysed>),
 }
 
 /// All that a campaign found.
@@ -151,7 +152,7 @@ impl Campaign {
         for (case, result) in cases.into_iter().zip(results) {
             match result {
                 Ok(Done::Analysed(outcome)) => collected.outcomes.push(*outcome),
-                Ok(Done::Unanalysed(run)) => collected.unanalysed.push(run),
+                Ok(Done::Unanalysed(run)) => collected.unanalysed.push(*run),
                 Err(error) => {
                     collected.failures.push(Failure { case, reason: format!("{error:#}") })
                 }
@@ -266,7 +267,8 @@ impl Campaign {
             }
         };
         if !is_bench(fmu.description()) {
-            return Ok(Done::Unanalysed(Unanalysed { case: case.clone(), reused }));
+            let run = Unanalysed { case: case.clone(), reused };
+            return Ok(Done::Unanalysed(Box::new(run)));
         }
         let outcome = Outcome::of(case, &run, &mut instance, &table, reused)?;
         Ok(Done::Analysed(Box::new(outcome)))
@@ -284,19 +286,19 @@ impl Campaign {
             })
         };
         let header = rows::columns::<FeatureRow>()?;
-        let features: [(&str, fn(&Outcome) -> _); 3] = [
-            ("features.csv", Outcome::features),
-            ("features_spa.csv", Outcome::spa_features),
-            ("features_h1.csv", Outcome::h1_features),
-        ];
-        for (name, of) in features.into_iter().filter(|_| results.unanalysed.is_empty()) {
+        let features = |name: &str, of: &dyn Fn(&Outcome) -> Features| {
             write(name, &|writer| {
                 writer.write_record(&header)?;
                 for run in &results.outcomes {
                     writer.serialize(FeatureRow::of(run, of(run)))?;
                 }
                 Ok(())
-            })?;
+            })
+        };
+        if results.unanalysed.is_empty() {
+            features("features.csv", &Outcome::features)?;
+            features("features_spa.csv", &Outcome::spa_features)?;
+            features("features_h1.csv", &Outcome::h1_features)?;
         }
         write("runs.csv", &|writer| {
             let made_from = rows::columns::<MadeFrom>()?;

@@ -17,10 +17,13 @@ pub struct Kind {
     /// What can be chosen; one is called `duration`.
     pub parameters: &'static [Parameter],
     /// What must hold between several parameters, and the sentence that says so.
-    pub(super) demands: &'static [(fn(&Values) -> bool, &'static str)],
+    pub(super) demands: &'static [Demand],
     /// The torque; the values are allowed ones.
     pub(super) shape: fn(&Values) -> Arc<dyn Shape>,
 }
+
+/// What must hold, and the sentence that says so.
+pub(super) type Demand = (fn(&Values) -> bool, &'static str);
 
 /// A number that a profile is given.
 #[derive(Debug)]
@@ -96,8 +99,7 @@ const SWEEP: &[Parameter] = &[
     parameter("f1", 3.5, "Hz", Allowed::Positive),
     duration(2700.0),
 ];
-const SWEEPS: &[(fn(&Values) -> bool, &str)] =
-    &[(|v| v.of("f0") != v.of("f1"), "f0 and f1 are equal; use sine")];
+const SWEEPS: &[Demand] = &[(|v| v.of("f0") != v.of("f1"), "f0 and f1 are equal; use sine")];
 
 fn sweep(v: &Values, law: Law) -> Arc<dyn Shape> {
     let [amplitude, f0, f1, duration] = ["amplitude", "f0", "f1", "duration"].map(|n| v.of(n));

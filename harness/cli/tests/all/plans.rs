@@ -21,8 +21,9 @@ fn hubslosh(directory: &Path, arguments: &[&str]) -> Command {
 fn campaign(directory: &Path, plan: &str, out: &str, arguments: &[&str]) -> Command {
     std::fs::write(directory.join("plan.toml"), plan).unwrap();
     let fmu = packed_for_tests().to_str().unwrap();
-    let common = ["campaign", "--plan", "plan.toml", "--fmu", fmu, "--out", out];
-    hubslosh(directory, &[&common, arguments].concat())
+    let common = ["campaign", "--plan", "plan.toml", "--out", out];
+    let fmu = if arguments.contains(&"--fmu") { &[][..] } else { &["--fmu", fmu] };
+    hubslosh(directory, &[&common, fmu, arguments].concat())
 }
 
 fn successful(mut command: Command) -> Output {
@@ -155,7 +156,7 @@ fn runs_made_by_another_importer_from_the_list_give_the_same_tables() {
 }
 
 #[test]
-fn a_stored_run_of_another_recipe_is_made_again_and_why_is_said() {
+fn a_stored_run_of_another_recipe_is_simulated_again_and_why_is_said() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let plan = "profile = \"sine:duration=1\"\n[[run]]\nname = \"a\"\nhub.I = 0.3\n";
@@ -163,6 +164,11 @@ fn a_stored_run_of_another_recipe_is_made_again_and_why_is_said() {
     let changed = plan.replace("0.3", "0.4");
     let done = successful(campaign(directory, &changed, "c", &[]));
     assert!(String::from_utf8_lossy(&done.stdout).contains("1 runs simulated, 0 reused"));
+    assert_eq!(String::from_utf8_lossy(&done.stderr), "re-running a: hub.I was 0.3, is 0.4\n");
+    // the FMU's own value, written in another way: the same run
+    let same = changed.replace("hub.I = 0.4\n", "hub.I = 4e-1\ntank.h = 0.100\n");
+    let done = successful(campaign(directory, &same, "c", &[]));
+    assert!(String::from_utf8_lossy(&done.stdout).contains("0 runs simulated, 1 reused"));
     // without its columns for the tables it does not count either
     let run = directory.join("c/runs/a.parquet");
     let notes = bench::table::notes(&run).unwrap();
@@ -275,4 +281,36 @@ fn a_torque_is_written_with_its_slopes() {
         let said = String::from_utf8_lossy(&done.stderr);
         assert!(!done.status.success() && said.contains(word), "{said}");
     }
+}
+
+#[test]
+fn an_fmu_that_is_not_the_bench_is_driven_and_stored_without_analysis() {
+    // the bench under another name for one output that its analysis needs
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let unpacked = directory.join("unpacked");
+    let archive = std::fs::File::open(packed_for_tests()).unwrap();
+    zip::ZipArchive::new(archive).unwrap().extract(&unpacked).unwrap();
+    let xml = std::fs::read_to_string(unpacked.join("modelDescription.xml")).unwrap();
+    let xml = xml.replace("name=\"F_radial\"", "name=\"pull\"");
+    let name = format!("HubSlosh{}", std::env::consts::DLL_SUFFIX);
+    let binary = unpacked.join("binaries").join(host::fmi2::PLATFORM).join(name);
+    let fmu = directory.join("other.fmu");
+    pack::archive::plain(&xml, &binary, "HubSlosh", None, &fmu).unwrap();
+    let plan = "profile = \"sine:duration=1\"\n[vary]\nhub.I = [0.3, 0.4]\n";
+    let fmu = fmu.to_str().unwrap();
+    let done = successful(campaign(directory, plan, "c", &["--fmu", fmu]));
+    assert!(String::from_utf8_lossy(&done.stdout).contains("2 runs simulated, 0 reused"));
+    let run = Table::read(&directory.join("c/runs/I_0.3.parquet"), &["time", "tau_cmd", "pull"]);
+    assert_eq!(run.unwrap().rows(), 51);
+    let rows = rows(directory, "c/runs.csv");
+    assert_eq!(
+        (rows.len(), rows[1]["hub.I"].as_str(), rows[1]["f_res_hz"].as_str()),
+        (2, "0.4", "")
+    );
+    assert!(
+        !directory.join("c/features.csv").exists() && !directory.join("c/report.html").exists()
+    );
+    let done = successful(campaign(directory, plan, "c", &["--fmu", fmu]));
+    assert!(String::from_utf8_lossy(&done.stdout).contains("0 runs simulated, 2 reused"));
 }
