@@ -1,5 +1,5 @@
-//! The simulated gyro looked at as one on a bench: hours at rest, the Allan deviation, the noise that
-//! it shows beside the noise that was put in. What is computed: [`allan`].
+//! The simulated gyro looked at as one on a bench: hours at rest, the Allan deviation, its noise
+//! estimated and compared with the specified one. What is computed: [`allan`].
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -33,15 +33,15 @@ pub struct Recording {
     pub records: usize,
 }
 
-/// What was put in and what was found.
+/// Specified and estimated noise.
 #[derive(Clone, Debug)]
 pub struct Characteristics {
-    /// What was put in; N with the noise that rounding to `imu.lsb` adds, lsb/√(12 rate).
-    pub asked: Noise,
+    /// As specified; N with the noise that rounding to `imu.lsb` adds, lsb/√(12 rate).
+    pub specified: Noise,
     /// What the mean of the records' Allan variances shows.
-    pub found: Noise,
-    /// Standard errors of `found`, from the scatter of the single records; not numbers if there is
-    /// only one.
+    pub estimated: Noise,
+    /// Standard errors of `estimated`, from the scatter of the single records; NaN if there is only
+    /// one.
     pub error: Noise,
     /// The mean of the records' Allan variances, (rad/s)².
     pub points: Vec<Point>,
@@ -71,21 +71,21 @@ impl Recording {
         let mut instance = self.run(1, 1.0, 1.0)?.initialise(fmu)?;
         let mut real = |name: &str| instance.real(name);
         let (rate, lsb) = (real("imu.rate")?, real("imu.lsb")?);
-        let asked = Noise {
+        let specified = Noise {
             arw: real("imu.arw")?.hypot(lsb / (12.0 * rate).sqrt()),
             bias_instability: real("imu.bias_instability")?,
             bias_time: real("imu.bias_time")?,
         };
         drop(instance);
         ensure!(
-            asked.arw > 0.0 || asked.bias_instability > 0.0,
+            specified.arw > 0.0 || specified.bias_instability > 0.0,
             "the gyro has no noise: imu.arw, imu.bias_instability and imu.lsb are 0"
         );
         ensure!(
-            asked.bias_instability == 0.0 || seconds >= LEAST_TIMES * asked.bias_time,
+            specified.bias_instability == 0.0 || seconds >= LEAST_TIMES * specified.bias_time,
             "a bias of imu.bias_time = {} s needs records of {:.2} h or more, not {} h",
-            asked.bias_time,
-            LEAST_TIMES * asked.bias_time / 3600.0,
+            specified.bias_time,
+            LEAST_TIMES * specified.bias_time / 3600.0,
             self.hours
         );
         ensure!(
@@ -102,7 +102,7 @@ impl Recording {
         watch(Progress::Begins { runs: runs.len(), steps });
         let records: Vec<Vec<Point>> =
             runs.par_iter().map(|run| record(run, fmu, watch)).collect::<Result<_>>()?;
-        Characteristics::of(asked, &records)
+        Characteristics::of(specified, &records)
     }
 
     /// One record, sampled at the gyro's own instants.
@@ -137,7 +137,7 @@ fn record(run: &Run, fmu: &Fmu, watch: &(dyn Fn(Progress) + Sync)) -> Result<Vec
 }
 
 impl Characteristics {
-    fn of(asked: Noise, records: &[Vec<Point>]) -> Result<Self> {
+    fn of(specified: Noise, records: &[Vec<Point>]) -> Result<Self> {
         let count = records.len() as f64;
         let points: Vec<Point> = (0..records[0].len())
             .map(|i| Point {
@@ -146,7 +146,7 @@ impl Characteristics {
             })
             .collect();
         let why = "the gyro's readings do not change; is imu.lsb larger than its noise?";
-        let found = Noise::fitted(&points).context(why)?;
+        let estimated = Noise::fitted(&points).context(why)?;
         let each: Vec<Noise> = records.iter().filter_map(|record| Noise::fitted(record)).collect();
         let error = |of: fn(&Noise) -> f64| {
             let mean = each.iter().map(of).sum::<f64>() / count;
@@ -158,24 +158,25 @@ impl Characteristics {
             bias_instability: error(|noise| noise.bias_instability),
             bias_time: error(|noise| noise.bias_time),
         };
-        Ok(Characteristics { asked, found, error, points })
+        Ok(Characteristics { specified, estimated, error, points })
     }
 
-    /// What was asked for and what was found, as lines of text.
+    /// Specified and estimated values, as lines of text.
     pub fn text(&self) -> String {
         let mut text = format!(
             "{:22}{:>12}{:>12}{:>12}{:>16}\n",
-            "", "asked", "found", "deviation", "standard error"
+            "", "specified", "estimated", "deviation", "standard error"
         );
         for (name, of) in QUANTITIES {
-            let (asked, found, error) = (of(&self.asked), of(&self.found), of(&self.error));
-            let percent = |part: f64| match part / asked * 100.0 {
+            let (specified, estimated, error) =
+                (of(&self.specified), of(&self.estimated), of(&self.error));
+            let percent = |part: f64| match part / specified * 100.0 {
                 percent if percent.is_finite() => format!("{percent:.2} %"),
                 _ => "-".into(),
             };
             text.push_str(&format!(
-                "{name:22}{asked:>12.4e}{found:>12.4e}{:>12}{:>16}\n",
-                percent(found - asked),
+                "{name:22}{specified:>12.4e}{estimated:>12.4e}{:>12}{:>16}\n",
+                percent(estimated - specified),
                 percent(error)
             ));
         }
@@ -191,8 +192,8 @@ impl Characteristics {
         let columns = vec![
             self.points.iter().map(|point| point.tau).collect(),
             deviation(&|point| point.variance),
-            deviation(&|point| self.asked.variance(point.tau)),
-            deviation(&|point| self.found.variance(point.tau)),
+            deviation(&|point| self.specified.variance(point.tau)),
+            deviation(&|point| self.estimated.variance(point.tau)),
         ];
         let names = ["tau_s", "deviation", "asked", "fitted"].map(String::from).to_vec();
         Table::new(names, columns).write(&directory.join("allan.csv"), &BTreeMap::new())?;
@@ -220,17 +221,17 @@ impl Characteristics {
             y: Axis::decades("Allan deviation / (rad/s)", measured.iter().map(|p| p.1)),
             series: vec![
                 series(
-                    curve(&|point| self.asked.arw.powi(2) / point.tau),
+                    curve(&|point| self.specified.arw.powi(2) / point.tau),
                     "#888888",
                     Style::Dashed,
-                    "white noise asked for, slope −1/2",
+                    "specified white noise, slope −1/2",
                 ),
-                series(measured, "#0b6aa8", Style::Dots, "found"),
+                series(measured, "#0b6aa8", Style::Dots, "estimated"),
                 series(
-                    curve(&|point| self.asked.variance(point.tau)),
+                    curve(&|point| self.specified.variance(point.tau)),
                     "#b45309",
                     Style::Line,
-                    "noise and bias asked for",
+                    "specified noise and bias",
                 ),
             ],
             legend: true,

@@ -30,8 +30,8 @@ pub struct Run {
 /// The input that the torque drives, where an FMU has one of that name.
 pub const TORQUE: &str = "tau_cmd";
 
-/// The input of an FMU that is driven: the one `asked` for; else [`TORQUE`]; else its only Real input;
-/// else none, if it has none.
+/// The input of an FMU that is driven: the one `asked` for; else [`TORQUE`]; else its only Real
+/// input; else none, if it has none.
 ///
 /// # Errors
 /// If there is no such input, or if several could be meant.
@@ -147,8 +147,8 @@ impl Run {
         Ok(instance)
     }
 
-    /// Steps an initialised instance to the stop time. The table has `time`, the driven input and the
-    /// variables `columns` at every communication point. `progress` hears how many steps were
+    /// Steps an initialised instance to the stop time. The table has `time`, the driven input and
+    /// the variables `columns` at every communication point. `progress` hears how many steps were
     /// made since it was last called.
     pub fn drive(
         &self,

@@ -92,18 +92,22 @@ impl Table {
         .with_context(|| format!("{name} cannot be used"))?;
         for (column, values) in table.names.iter().zip(&table.columns) {
             if let Some(row) = values.iter().position(|v| !v.is_finite()) {
-                bail!("{name}, row {}: {column} is {}, not a number", row + 1, values[row]);
+                bail!(
+                    "{name}, row {}: {column} is {} (allowed: finite numbers)",
+                    row + 1,
+                    values[row]
+                );
             }
         }
         Ok(table)
     }
 
-    /// Writes the table; `notes` go into a Parquet file's key-value metadata.
-    pub fn write(&self, path: &Path, notes: &BTreeMap<String, String>) -> Result<()> {
+    /// Writes the table; `metadata` are a Parquet file's key-value pairs.
+    pub fn write(&self, path: &Path, metadata: &BTreeMap<String, String>) -> Result<()> {
         let format = format_of(path)?;
         atomically(path, |file| match format {
             Format::Csv => self.write_csv(file),
-            Format::Parquet => self.write_parquet(file, notes),
+            Format::Parquet => self.write_parquet(file, metadata),
         })
         .with_context(|| format!("{} was not written", path.display()))
     }
@@ -122,7 +126,7 @@ impl Table {
         Ok(())
     }
 
-    fn write_parquet(&self, file: &mut File, notes: &BTreeMap<String, String>) -> Result<()> {
+    fn write_parquet(&self, file: &mut File, metadata: &BTreeMap<String, String>) -> Result<()> {
         let fields = self
             .names
             .iter()
@@ -134,12 +138,12 @@ impl Table {
             })
             .collect::<Result<_, _>>()?;
         let schema = Type::group_type_builder("schema").with_fields(fields).build()?;
-        let notes = notes.iter().map(|(k, v)| KeyValue::new(k.clone(), v.clone())).collect();
+        let metadata = metadata.iter().map(|(k, v)| KeyValue::new(k.clone(), v.clone())).collect();
         let properties = WriterProperties::builder()
             .set_dictionary_enabled(false)
             .set_encoding(Encoding::BYTE_STREAM_SPLIT) // exponents beside exponents: they compress
             .set_compression(Compression::ZSTD(ZstdLevel::try_new(1)?))
-            .set_key_value_metadata(Some(notes))
+            .set_key_value_metadata(Some(metadata))
             .build();
         let mut writer = SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties))?;
         let mut group = writer.next_row_group()?;
@@ -155,7 +159,7 @@ impl Table {
 }
 
 /// The key-value metadata of a Parquet file; an error if the file is not complete.
-pub fn notes(path: &Path) -> Result<BTreeMap<String, String>> {
+pub fn metadata(path: &Path) -> Result<BTreeMap<String, String>> {
     let reader = SerializedFileReader::new(File::open(path)?)?;
     let pairs = reader.metadata().file_metadata().key_value_metadata();
     Ok(pairs
@@ -261,7 +265,7 @@ mod tests {
             let back = Table::read(&path, &["omega", "time"]).unwrap();
             assert_eq!(back, table().only(&["omega", "time"]));
         }
-        assert_eq!(notes(&directory.path().join("a.parquet")).unwrap()["k"], "v");
+        assert_eq!(metadata(&directory.path().join("a.parquet")).unwrap()["k"], "v");
     }
 
     #[test]

@@ -13,10 +13,10 @@ use clap::{Parser, Subcommand};
 use commands::*;
 use host::fmi2::Fmu;
 
-/// Packs the HubSlosh FMU, drives it and reports.
+/// Packs FMUs, checks them, simulates campaigns and reports.
 ///
-/// Without a subcommand: packs dist/HubSlosh.fmu, drives it through the thesis campaign and
-/// leaves dist/campaign/report.html and features.csv.
+/// Without a subcommand: packs dist/HubSlosh.fmu, simulates the 22 sine sweeps of Rubaga's thesis
+/// and leaves dist/campaign/report.html and features.csv.
 #[derive(Parser)]
 #[command(version)]
 struct Cli {

@@ -6,17 +6,17 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 /// A bar for steps of one run.
 pub fn of_steps() -> Result<ProgressBar> {
-    bar("{bar:40} {percent:>3} %  {elapsed} gone, {eta} to go")
+    bar("{bar:40} {percent:>3} %  {elapsed} elapsed, {eta} left")
 }
 
 /// A bar for the steps of many runs.
 pub fn of_runs() -> Result<ProgressBar> {
-    bar("{msg} {bar:40} {percent:>3} %  {elapsed} gone, {eta} to go")
+    bar("{msg} {bar:40} {percent:>3} %  {elapsed} elapsed, {eta} left")
 }
 
 /// A bar for the rules of a check.
 pub fn of_rules() -> Result<ProgressBar> {
-    bar("{bar:40} {pos} of {len} rules of calls  {elapsed} gone, {eta} to go")
+    bar("{bar:40} {pos} of {len} rules of calls  {elapsed} elapsed, {eta} left")
 }
 
 /// Not drawn where stderr is no terminal.

@@ -133,7 +133,7 @@ impl Binary {
         for library in &self.libraries {
             let name = if self.kind == Kind::Windows { &library.to_lowercase() } else { library };
             if !libraries.contains(&name.as_str()) {
-                faults.push(format!("it needs {library}, which is no part of every system"));
+                faults.push(format!("it needs {library}, which is not guaranteed on every system"));
             }
         }
         if let (Some((system, newest)), Some(needed)) = (newest, self.needs)
@@ -420,7 +420,7 @@ mod tests {
         assert_eq!(
             linux.faults(&["fmi2DoStep", "fmi2Reset"]),
             [
-                "it needs libgcc_s.so.1, which is no part of every system",
+                "it needs libgcc_s.so.1, which is not guaranteed on every system",
                 "it needs glibc 2.34; 2.17 must do",
                 "it has the loader search /opt/lib",
                 "it does not export fmi2Reset",

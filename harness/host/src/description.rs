@@ -1,5 +1,5 @@
-//! What an FMU says of itself: `modelDescription.xml` (FMI 2.0, section 2.2), as far as a host needs
-//! it to drive the FMU.
+//! What an FMU says of itself: `modelDescription.xml` (FMI 2.0, section 2.2), as far as a host
+//! needs it to drive the FMU.
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 

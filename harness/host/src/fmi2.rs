@@ -243,7 +243,8 @@ pub struct HostState {
 impl HostState {
     /// As it is now.
     pub fn now() -> Self {
-        // SAFETY: the three take nothing; the locale's name is a terminated string of the C library.
+        // SAFETY: the three take nothing; the locale's name is a terminated string of the C
+        // library.
         unsafe {
             HostState {
                 float_control: hubslosh_float_control(),
@@ -313,8 +314,8 @@ impl Fmu {
         Ok(fmu)
     }
 
-    /// Loads the binary of an FMU that is unpacked in `directory`, for co-simulation, model exchange
-    /// or both; errors speak of `path`. [`Fmu::hash`] is empty.
+    /// Loads the binary of an FMU that is unpacked in `directory`, for co-simulation, model
+    /// exchange or both; errors speak of `path`. [`Fmu::hash`] is empty.
     pub fn load(directory: &Path, path: &Path) -> Result<Self> {
         Fmu::load_binary(None, directory, path)
     }
@@ -1252,7 +1253,8 @@ impl<'fmu> Instance<'fmu> {
         self.check("fmi2SetReal", status)
     }
 
-    /// fmi2Get… and fmi2Set… of each type without variables and with NULL pointers, which must be fine.
+    /// fmi2Get… and fmi2Set… of each type without variables and with NULL pointers, which must be
+    /// fine.
     pub fn nothing_null(&mut self) -> [(&'static str, Status); 8] {
         let (f, c) = (&self.fmu.functions, self.component);
         // SAFETY: see get_real_null.

@@ -41,8 +41,8 @@ pub struct Element {
 }
 
 impl Element {
-    /// Reads a file; the error begins with the line and the column where it is not well-formed, is not
-    /// UTF-8, has a DOCTYPE, or nests elements deeper than [`DEEPEST`].
+    /// Reads a file; the error begins with the line and the column where it is not well-formed, is
+    /// not UTF-8, has a DOCTYPE, or nests elements deeper than [`DEEPEST`].
     pub fn parse(bytes: &[u8]) -> Result<Element, String> {
         Element::read(bytes).map_err(|fault| fault.to_string())
     }

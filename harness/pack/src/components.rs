@@ -102,8 +102,8 @@ const RUN_TIME: [RunTime; 4] = [
     },
 ];
 
-/// Everything that is linked into the `binaries` of a package. Fails if something is there whose licence is not
-/// known here.
+/// Everything that is linked into the `binaries` of a package. Fails if something is there whose
+/// licence is not known here.
 pub fn linked(package: &str, binaries: &[Packed]) -> Result<Vec<Component>> {
     let everywhere: BTreeSet<&str> = binaries.iter().map(|binary| binary.folder).collect();
     let mut all = crates(package, &everywhere)?;
@@ -280,8 +280,8 @@ pub fn licence_note(description: &ModelDescription, components: &[Component]) ->
     note
 }
 
-/// The software bill of materials (SBOM), CycloneDX 1.6. Neither a time nor a random number is in it, so
-/// the same binaries have the same SBOM.
+/// The software bill of materials (SBOM), CycloneDX 1.6. Neither a time nor a random number is in
+/// it, so the same binaries have the same SBOM.
 pub fn sbom(
     model: &Model,
     description: &ModelDescription,

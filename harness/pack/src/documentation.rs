@@ -1,5 +1,5 @@
-//! `documentation/index.html` of the FMU: the pages of modelDescription/HubSlosh/documentation, as one
-//! page with everything in it but its figures, which lie beside it.
+//! `documentation/index.html` of the FMU: the pages of modelDescription/HubSlosh/documentation, as
+//! one page with everything in it but its figures, which lie beside it.
 //!
 //! The order is that of the list in index.md; a page that is not in it comes after.
 

@@ -47,8 +47,8 @@ pub fn packed_for_tests() -> &'static Path {
 }
 
 /// A packed FMU for tests: built and packed once per process to `test-fmu/<name>.fmu` in the target
-/// directory. Processes do not disturb each other: each renames its own whole file there, and all of
-/// them hold the same bytes.
+/// directory. Processes do not disturb each other: each renames its own whole file there, and all
+/// of them hold the same bytes.
 ///
 /// # Panics
 /// If it cannot be built.

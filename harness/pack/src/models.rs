@@ -11,8 +11,8 @@ use crate::project::root;
 #[derive(Debug, PartialEq, Eq)]
 pub struct Model {
     /// Its `modelIdentifier`; the folder `modelDescription/<name>` has all that travels with the
-    /// binary: `modelDescription.xml`, `documentation/`, `terminalsAndIcons/icon.png`, and, if there
-    /// is one, `extra/`.
+    /// binary: `modelDescription.xml`, `documentation/`, `terminalsAndIcons/icon.png`, and, if
+    /// there is one, `extra/`.
     pub name: &'static str,
     /// Cargo package whose cdylib is the binary.
     pub package: &'static str,

@@ -114,8 +114,8 @@ pub struct Built {
     pub binary: Binary,
 }
 
-/// Builds and checks the binaries of an FMU for all platforms. Before anything is built, everything that is
-/// missing is named; after, every fault of every binary.
+/// Builds and checks the binaries of an FMU for all platforms. Before anything is built, everything
+/// that is missing is named; after, every fault of every binary.
 pub fn build(model: &Model) -> Result<Vec<Built>> {
     let bench = Bench::look()?;
     bench.check()?;

@@ -15,8 +15,8 @@ pub fn root() -> PathBuf {
 /// Cargo profile that binaries of FMUs are built with.
 const PROFILE: &str = "fmu";
 
-/// Builds the cdylib of a package of this workspace, as an FMU's binary for the platform this program
-/// runs on, and returns where Cargo put it. `quiet`: without Cargo's progress.
+/// Builds the cdylib of a package of this workspace, as an FMU's binary for the platform this
+/// program runs on, and returns where Cargo put it. `quiet`: without Cargo's progress.
 ///
 /// # Errors
 /// If there is no source or no Cargo, or if it does not compile.

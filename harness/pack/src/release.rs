@@ -24,9 +24,9 @@ pub fn path(model: &Model, folder: &Path) -> PathBuf {
     folder.join(format!("{}-{}.fmu", model.name, env!("CARGO_PKG_VERSION")))
 }
 
-/// Builds for all platforms, checks, and writes the release's files to `folder`: the FMU, `.sha256`,
-/// as `sha256sum --check` reads it, `.cdx.json`, and the report of the check, which `check` returns.
-/// Returns what was written; an FMU that `check` refuses is not released.
+/// Builds for all platforms, checks, and writes the release's files to `folder`: the FMU,
+/// `.sha256`, as `sha256sum --check` reads it, `.cdx.json`, and the report of the check, which
+/// `check` returns. Returns what was written; an FMU that `check` refuses is not released.
 pub fn write(
     model: &Model,
     folder: &Path,

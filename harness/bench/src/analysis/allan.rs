@@ -10,11 +10,11 @@
 //! sigma_A²(tau) = ½ E[(b2 − b1)²] = var b1 − cov(b1, b2) = sigma² (2x − 3 + 4 e^−x − e^−2x) / x²
 //! ```
 //!
-//! It rises with slope +1/2, has its peak 0.617 sigma at tau = 1.89 T, and falls with slope −1/2: there
-//! is no plateau. The *bias instability* B of data sheets is that of flicker noise, whose Allan
-//! deviation is flat at sqrt(2 ln 2/pi) B = 0.664 B. The FMU's bias has sigma = B/0.664 (thesis 5.5),
-//! so the peak stands at 0.617/0.664 B = 0.93 B, and B is read from it as 0.664/0.617 = 1.076 times
-//! the peak.
+//! It rises with slope +1/2, has its peak 0.617 sigma at tau = 1.89 T, and falls with slope −1/2:
+//! there is no plateau. The *bias instability* B of data sheets is that of flicker noise, whose
+//! Allan deviation is flat at sqrt(2 ln 2/pi) B = 0.664 B. The FMU's bias has sigma = B/0.664
+//! (thesis 5.5), so the peak stands at 0.617/0.664 B = 0.93 B, and B is read from it as 0.664/0.617
+//! = 1.076 times the peak.
 
 /// Flat part of the Allan deviation of flicker noise over B; the FMU's bias has sigma = B/0.664.
 pub const FLICKER: f64 = 0.664;
@@ -83,8 +83,8 @@ impl Noise {
     ///
     /// Misses are relative, squared, and weigh as many as the record has spans of that length, to
     /// which the variance of an Allan variance is inverse. For a given T the curve is linear in
-    /// N² and sigma²; T is searched between ten times the shortest averaging time (a shorter bias looks
-    /// like white noise) and the longest. Without a bias T means nothing, and B is scatter.
+    /// N² and sigma²; T is searched between ten times the shortest averaging time (a shorter bias
+    /// looks like white noise) and the longest. Without a bias T means nothing, and B is scatter.
     pub fn fitted(points: &[Point]) -> Option<Noise> {
         let (first, last) = (points.first()?, points.last()?);
         if points.iter().any(|point| point.variance <= 0.0 || !point.variance.is_finite()) {

@@ -1,4 +1,4 @@
-//! Dip and peak of a frequency response (thesis 6.3.1).
+//! Antiresonance and resonance of a frequency response (thesis 6.3.1).
 
 use super::FrequencyResponse;
 
@@ -9,29 +9,29 @@ pub struct Features {
     pub f_res: Option<f64>,
     /// Frequency of the local minimum of |H|, Hz.
     pub f_dip: Option<f64>,
-    /// Height of the peak over the dip, dB.
+    /// Height of the resonance over the antiresonance, dB.
     pub notch_db: Option<f64>,
 }
 
 impl Features {
-    /// Finds the dip and the peak: the two ends of the largest rise of |H| (in dB) as the frequency
-    /// grows.
+    /// Finds the antiresonance and the resonance: the two ends of the largest rise of |H| (in dB)
+    /// as the frequency grows.
     ///
     /// Where the thesis's definition holds, smallest and largest |H| in the band (its 6.9 and
-    /// 6.10), this is the same. It also holds where that one fails: a damped peak is lower than the
-    /// band's edge at 1.25 Hz, where the hub's inertia alone answers, and the ripple behind the peak
-    /// may go deeper than the dip. An end of the band is neither dip nor peak, and a rise of less
-    /// than [`LEAST`] is no slosh.
+    /// 6.10), this is the same. It also holds where that one fails: a damped resonance is lower than the
+    /// band's edge at 1.25 Hz, where the hub's inertia alone answers, and the ripple behind the
+    /// resonance may go deeper than the antiresonance. An end of the band is neither antiresonance
+    /// nor resonance, and a rise of less than [`LEAST`] is no slosh.
     pub fn of(response: &FrequencyResponse) -> Self {
         let level = response.decibels();
         let Some((low, high)) = largest_rise(&level) else { return Features::default() };
         let inner = |i: usize| i > 0 && i + 1 < level.len();
-        let dip = inner(low).then(|| vertex(response, &level, low));
-        let peak = inner(high).then(|| vertex(response, &level, high));
+        let antiresonance = inner(low).then(|| vertex(response, &level, low));
+        let resonance = inner(high).then(|| vertex(response, &level, high));
         Features {
-            f_res: peak.map(|(f, _)| f),
-            f_dip: dip.map(|(f, _)| f),
-            notch_db: peak.zip(dip).map(|((_, top), (_, bottom))| top - bottom),
+            f_res: resonance.map(|(f, _)| f),
+            f_dip: antiresonance.map(|(f, _)| f),
+            notch_db: resonance.zip(antiresonance).map(|((_, top), (_, bottom))| top - bottom),
         }
     }
 
@@ -41,7 +41,8 @@ impl Features {
     }
 }
 
-/// Least rise from dip to peak that counts, dB: a tank damped to ζ = 0.05 still rises by 3.9.
+/// Least rise from antiresonance to resonance that counts, dB: a tank damped to ζ = 0.05 still
+/// rises by 3.9.
 pub const LEAST: f64 = 1.0;
 
 /// Places of the lowest and the highest value between which a sequence rises most.
@@ -94,7 +95,7 @@ mod tests {
             Linear::bench_10_cm(0.0029757).frequency_response(&logarithmic_grid(BAND, 2000));
         let clean = Features::of(&response);
         for (f, h) in response.frequency.iter().zip(&mut response.response) {
-            // a trough of a beat, 60 mHz behind the peak, 5 dB deeper than the dip
+            // a trough of a beat, 60 mHz behind the resonance, 5 dB deeper than the antiresonance
             *h *= 1.0 - 0.994 * (-((f - 2.52) / 0.004_f64).powi(2)).exp();
         }
         let level = response.decibels();
@@ -108,7 +109,7 @@ mod tests {
         let hub = Linear { inertia: 0.4, friction: 0.04, arm: 0.2, modes: vec![] };
         let grid = logarithmic_grid(BAND, 2000);
         assert_eq!(Features::of(&hub.frequency_response(&grid)), Features::default());
-        // up to 2.4 Hz there is the dip, but the peak is not reached
+        // up to 2.4 Hz there is the antiresonance, but the resonance is not reached
         let early = logarithmic_grid((1.25, 2.4), 2000);
         let features = Features::of(&Linear::bench_10_cm(0.003).frequency_response(&early));
         assert!(features.f_dip.is_some() && features.f_res.is_none(), "{features:?}");
@@ -120,9 +121,9 @@ mod tests {
         let plant = Linear::bench_10_cm(0.05);
         let response = plant.frequency_response(&logarithmic_grid(BAND, 2000));
         let features = Features::of(&response);
-        let peak = features.f_res.unwrap();
-        assert!(response.response[0].norm() > plant.response(peak).norm());
-        assert!((peak - 2.5308065).abs() < 1e-4, "{features:?}");
+        let resonance = features.f_res.unwrap();
+        assert!(response.response[0].norm() > plant.response(resonance).norm());
+        assert!((resonance - 2.5308065).abs() < 1e-4, "{features:?}");
         assert!((features.f_dip.unwrap() - 2.2850539).abs() < 1e-4, "{features:?}");
     }
 }

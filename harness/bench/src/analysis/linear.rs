@@ -5,9 +5,9 @@
 //! ```
 //!
 //! from the hub's equation I0 ω' = τ − b ω + r Σ (m_i g α_i + c_i l_i α_i') and the
-//! pendulums' α_i'' + 2 ζ_i ω_i α_i' + ω_i² α_i = −(r/l_i) ω' (thesis 4.27 and 4.29 with the sign of
-//! the slosh torque corrected). Its zeros are the pendulums' own poles: the dip
-//! stands at the slosh frequency, the peak above it.
+//! pendulums' α_i'' + 2 ζ_i ω_i α_i' + ω_i² α_i = −(r/l_i) ω' (thesis 4.27 and 4.29 with the sign
+//! of the slosh torque corrected). Its zeros are the pendulums' own poles: the antiresonance stands
+//! at the slosh frequency, the resonance above it.
 
 use std::f64::consts::TAU;
 
@@ -151,8 +151,9 @@ mod tests {
             // the whole record knows no direction: the bounds of the upward sweep
             assert!((spa.f_dip.unwrap() - f_dip).abs() < 3e-4, "{sweep}: {spa:?}");
             assert!((spa.f_res.unwrap() - f_res).abs() < 3e-4, "{sweep}: {spa:?}");
-            // the peak was passed 125 s before the dip and still rings with exp(-0.0525 * 125) of
-            // its 2.2 (rad/s)/(N.m); near the dip |H| grows by 1.5 per hertz: 2 mHz
+            // the resonance was passed 125 s before the antiresonance and still rings with
+            // exp(-0.0525 * 125) of its 2.2 (rad/s)/(N.m); near the antiresonance |H| grows by 1.5
+            // per hertz: 2 mHz
             assert!((lock_in.f_dip.unwrap() - f_dip).abs() < 3e-3, "{sweep}: {lock_in:?}");
             // the shift of the upward sweep, with the other sign
             let shift = f_res - lock_in.f_res.unwrap();
@@ -179,13 +180,14 @@ mod tests {
                 );
                 let spa = spa::frequency_response(0.02, &tau, &omega, &grid, spa::LAG);
                 let (lock_in, spa) = (Features::of(&lock_in), Features::of(&spa));
-                // the acceptance figure for the dip is 2 mHz; both are several times better
+                // the acceptance figure for the antiresonance is 2 mHz; both are several times
+                // better
                 assert!((lock_in.f_dip.unwrap() - f_dip).abs() < 3e-4, "{sweep}: {lock_in:?}");
                 assert!((spa.f_dip.unwrap() - f_dip).abs() < 3e-4, "{sweep}: {spa:?}");
-                // the whole record knows no sweep rate: the peak stands where it should, to a
+                // the whole record knows no sweep rate: the resonance stands where it should, to a
                 // fraction of the 5 mHz resolution
                 assert!((spa.f_res.unwrap() - f_res).abs() < 3e-4, "{sweep}: {spa:?}");
-                // while the sweep passes, the peak comes late by about its half-power width,
+                // while the sweep passes, the resonance comes late by about its half-power width,
                 // 14 and 15 mHz
                 let shift = lock_in.f_res.unwrap() - f_res;
                 assert!((0.014..0.020).contains(&shift), "{sweep}: {lock_in:?}");

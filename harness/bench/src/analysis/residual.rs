@@ -14,7 +14,8 @@ pub struct ModelFit {
     pub fit_frequency: f64,
     /// Fit in the time domain, %.
     pub fit_time: f64,
-    /// Mean coherence of residual and torque between dip and peak, if there are such.
+    /// Mean coherence of residual and torque between antiresonance and resonance, if there are
+    /// such.
     pub coherence: Option<f64>,
     /// Skewness of the residual.
     pub skewness: f64,
@@ -49,7 +50,7 @@ impl ModelFit {
             coherence: features
                 .f_dip
                 .zip(features.f_res)
-                .map(|(dip, peak)| spectra.mean_coherence(dip, peak)),
+                .map(|(antiresonance, resonance)| spectra.mean_coherence(antiresonance, resonance)),
             skewness,
             kurtosis,
         };

@@ -1,4 +1,4 @@
-//! Does the liquid turn? From the radial and the tangential slosh angle, both demodulated
+//! Is the slosh rotary? From the radial and the tangential slosh angle, both demodulated
 //! at the sweep's phase: X, Y their Fourier coefficients, the *swirl number*
 //!
 //! ```text
@@ -20,11 +20,11 @@ pub const LEAST: f64 = 0.02;
 /// Rotary motion in a sweep.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Rotary {
-    /// First frequency at which the liquid turns, Hz.
+    /// First frequency with rotary slosh, Hz.
     pub from: Option<f64>,
-    /// Last frequency at which it does, Hz.
+    /// Last frequency with rotary slosh, Hz.
     pub to: Option<f64>,
-    /// How long it turns, s.
+    /// Time in rotary slosh, s.
     pub time: f64,
     /// Swirl of largest size in the sweep.
     pub swirl: f64,

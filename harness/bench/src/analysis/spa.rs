@@ -10,8 +10,8 @@ use realfft::RealFftPlanner;
 
 use super::{Complex64, FrequencyResponse};
 
-/// Longest lag, s. `spa` resolves about 1/lag: 10 mHz need 100 s. 200 s leave the dip, whose
-/// half-power width is 14 mHz, nearly its own shape.
+/// Longest lag, s. `spa` resolves about 1/lag: 10 mHz need 100 s. 200 s leave the antiresonance,
+/// whose half-power width is 14 mHz, nearly its own shape.
 pub const LAG: f64 = 200.0;
 
 /// Frequency response of `output` to `input`, sampled every `step` s, at `frequencies` (Hz), with

@@ -110,9 +110,9 @@ impl TransferFunction {
     /// to a signal sampled every `step` s.
     ///
     /// The measured band says little of the real pole: it may be fitted as slow as a minute or an
-    /// hour. From rest the torque's first half cycle would then leave an offset that the model keeps
-    /// all the time and the hub loses in seconds. MATLAB's `compare` estimates the initial state for
-    /// the same reason.
+    /// hour. From rest the torque's first half cycle would then leave an offset that the model
+    /// keeps all the time and the hub loses in seconds. MATLAB's `compare` estimates the initial
+    /// state for the same reason.
     pub fn free_answer(&self, step: f64, signal: &[f64]) -> Vec<f64> {
         let decay = self.pole_damping * self.pole_omega;
         let turn = self.pole_omega * (1.0 - self.pole_damping.powi(2)).max(0.0).sqrt();

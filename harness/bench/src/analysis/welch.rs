@@ -2,15 +2,15 @@
 //!
 //! The thesis does not say how long the segments are, and for a sweep everything hangs on that. A
 //! sweep is at one frequency only for a moment. If just one segment sees it pass there, nothing is
-//! averaged, and the coherence is 1 whatever the two signals are. The sweep stays within a segment's
-//! resolution 1/L for 1/(L · rate); half-overlapping segments follow each other by L/2: so
-//! 2/(rate · L²) of them see each frequency.
+//! averaged, and the coherence is 1 whatever the two signals are. The sweep stays within a
+//! segment's resolution 1/L for 1/(L · rate); half-overlapping segments follow each other by L/2:
+//! so 2/(rate · L²) of them see each frequency.
 //!
 //! * [`COHERENCE`], 20 s: six segments at the thesis's 1/1200 Hz/s. Coherence then asks whether the
 //!   ratio of the two signals stays the same while the sweep passes 50 mHz.
 //! * [`RESPONSE`], a ninth of twice the record (MATLAB's choice when it is not told): 600 s of the
-//!   thesis's sweep, which resolves the dip. For the H1 estimate, which needs no average there, and
-//!   for the signal-to-noise ratio: one segment has the sweep, the others the noise alone.
+//! thesis's sweep, which resolves the antiresonance. For the H1 estimate, which needs no average
+//! there, and for the signal-to-noise ratio: one segment has the sweep, the others the noise alone.
 
 use realfft::RealFftPlanner;
 
@@ -36,7 +36,7 @@ pub const COHERENCE: Segments = Segments::Seconds(20.0);
 pub const RESPONSE: Segments = Segments::Longest;
 
 /// Zeros are put behind each segment up to this many times its length, so that a band as narrow as
-/// that from dip to peak still holds several bins.
+/// that from antiresonance to resonance still holds several bins.
 const PADDING: usize = 4;
 
 /// Averaged auto- and cross-spectra of two signals, in arbitrary but common units.
@@ -116,7 +116,8 @@ impl Spectra {
         band.iter().sum::<f64>() / band.len() as f64
     }
 
-    /// Signal-to-noise ratio from the coherence γ²: 10 log10(γ²/(1 − γ²)), dB, per bin (thesis 6.19).
+    /// Signal-to-noise ratio from the coherence γ²: 10 log10(γ²/(1 − γ²)), dB, per bin (thesis
+    /// 6.19).
     pub fn snr_db(&self) -> Vec<f64> {
         self.coherence().into_iter().map(|c| 10.0 * (c / (1.0 - c)).log10()).collect()
     }

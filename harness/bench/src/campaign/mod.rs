@@ -31,8 +31,8 @@ use crate::progress::Progress;
 
 /// Columns of a stored run of the bench, SI units, at every communication point from the torque's
 /// start to the stop time; others may follow. The first six are what people look at; wave height,
-/// energy, work, dissipated energy, the time in stiction and the liquid's force on the tank are there
-/// for the tables.
+/// energy, work, dissipated energy, the time in stiction and the liquid's force on the tank are
+/// there for the tables.
 pub const STORED: [&str; 13] = [
     "time",
     "tau_cmd",
@@ -67,8 +67,8 @@ fn is_bench(description: &ModelDescription) -> bool {
     STORED[1..].iter().all(has) && PARAMETERS.iter().all(has)
 }
 
-/// What is stored of a run of an FMU: [`STORED`] of the bench; else time, the driven input and every
-/// output that is a number.
+/// What is stored of a run of an FMU: [`STORED`] of the bench; else time, the driven input and
+/// every output that is a number.
 pub fn stored_columns(description: &ModelDescription, input: Option<&str>) -> Vec<String> {
     if is_bench(description) {
         return STORED.map(String::from).to_vec();
@@ -274,9 +274,9 @@ impl Campaign {
         Ok(Done::Analysed(Box::new(outcome)))
     }
 
-    /// Writes `features.csv`, `features_spa.csv` and `features_h1.csv` with the same columns from the
-    /// `spa` and H1 responses, and `runs.csv`: every run, failed ones too, with what it was made from
-    /// and all features. Without a run of the bench there is `runs.csv` alone.
+    /// Writes `features.csv`, `features_spa.csv` and `features_h1.csv` with the same columns from
+    /// the `spa` and H1 responses, and `runs.csv`: every run, failed ones too, with what it was
+    /// made from and all features. Without a run of the bench there is `runs.csv` alone.
     pub fn write_tables(&self, fmu: &Fmu, results: &Results) -> Result<()> {
         let write = |name: &str, fill: &dyn Fn(&mut csv::Writer<&mut File>) -> Result<()>| {
             output::atomically(&self.out.join(name), |file| {

@@ -173,7 +173,9 @@ impl Record {
         let fit = ModelFit::of(step, tau, omega, &spa.response, &spa.features);
         Some(Record {
             h1: Estimate::of(spectra.h1(band)),
-            snr_db: extrema.map(|(res, dip)| [spectra.at(&snr, res), spectra.at(&snr, dip)]),
+            snr_db: extrema.map(|(res, antiresonance)| {
+                [spectra.at(&snr, res), spectra.at(&snr, antiresonance)]
+            }),
             snr_over_band: spectra.within(band, &snr),
             fit: fit.map(|(fit, spectra)| (fit, spectra.within(band, &spectra.coherence()))),
             spa,
@@ -239,7 +241,8 @@ impl Outcome {
     }
 
     /// Features that go into `features.csv`: those of the demodulated response, which say what the
-    /// hub did while the sweep passed, the sweep's shift of the resonance included (see the report).
+    /// hub did while the sweep passed, the sweep's shift of the resonance included (see the
+    /// report).
     pub fn features(&self) -> Features {
         self.passing.as_ref().map_or(Features::default(), |passing| passing.rate.features)
     }

@@ -13,8 +13,8 @@ use crate::table::{self, Table};
 /// Raised when stored runs of an older program mean something else.
 const FORMAT: &str = "1";
 
-/// What determines a run's numbers: two runs with the same recipe are the same run, whichever archive
-/// the FMU came in. It is the metadata of its Parquet file, which may hold more:
+/// What determines a run's numbers: two runs with the same recipe are the same run, whichever
+/// archive the FMU came in. It is the metadata of its Parquet file, which may hold more:
 ///
 /// * `model`, `binary_sha256`: the model's name and the binary that was loaded,
 /// * `parameters`: every parameter and input with its start value, as a JSON object,
@@ -48,8 +48,8 @@ pub fn recipe(fmu: &Fmu, case: &Case, columns: &[String]) -> BTreeMap<String, St
     recipe
 }
 
-/// Every parameter and input with the text of its start value: as the run sets it, or the FMU's own.
-/// Numbers are written in one way, enumerations by name.
+/// Every parameter and input with the text of its start value: as the run sets it, or the FMU's
+/// own. Numbers are written in one way, enumerations by name.
 fn parameters(fmu: &Fmu, case: &Case) -> BTreeMap<String, String> {
     let description = fmu.description();
     let settable = description.variables.iter().filter(|variable| {
@@ -83,7 +83,7 @@ pub fn stored(
     columns: &[String],
 ) -> Result<Table, String> {
     const INCOMPLETE: &str = "file incomplete";
-    let found = table::notes(path).map_err(|_| INCOMPLETE.to_string())?;
+    let found = table::metadata(path).map_err(|_| INCOMPLETE.to_string())?;
     if let Some(why) = difference(&found, recipe) {
         return Err(why);
     }

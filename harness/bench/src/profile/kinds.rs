@@ -1,5 +1,5 @@
-//! Every profile, one entry each: the parser, `--help`, the keys `profile.…` of plans, the page of the
-//! documentation and the torque itself come from here.
+//! Every profile, one entry each: the parser, `--help`, the keys `profile.…` of plans, the page of
+//! the documentation and the torque itself come from here.
 
 use std::sync::Arc;
 

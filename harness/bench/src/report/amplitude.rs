@@ -6,8 +6,8 @@ use super::*;
 type Feature = (&'static str, &'static str, fn(&Features) -> Option<f64>, f64, f64);
 
 const FEATURES: [Feature; 4] = [
-    ("Dip", "f_dip / Hz", |f| f.f_dip, 0.01, 1.0),
-    ("Peak", "f_res / Hz", |f| f.f_res, 0.03, 1.0),
+    ("Antiresonance", "f_dip / Hz", |f| f.f_dip, 0.01, 1.0),
+    ("Resonance", "f_res / Hz", |f| f.f_res, 0.03, 1.0),
     ("Distance", "Δf / mHz", |f| f.delta_f(), 20.0, 1e3),
     ("Notch depth", "notch / dB", |f| f.notch_db, 5.0, 1.0),
 ];
@@ -21,7 +21,7 @@ pub(super) fn models_over_each_other(groups: &[Group]) -> String {
     }
     let mut out = colors::model_legend(models.into_iter());
     for fill in fills {
-        let _ = writeln!(out, "<h3>{} cm fill: the models beside each other</h3>", cm(fill));
+        let _ = writeln!(out, "<h3>{} cm fill: models compared</h3>", cm(fill));
         out.push_str("<div class=\"four\">\n");
         let groups: Vec<&Group> = groups.iter().filter(|group| group.fill == Some(fill)).collect();
         for (title, label, get, span, scale) in FEATURES {
@@ -114,12 +114,12 @@ pub(super) fn bearing_and_liquid(groups: &[Group]) -> String {
         .map(|group| (group.runs[0].tank_radius / 4.0 * 1e3, "a quarter of the tank's radius"));
     let panel = |title, label, get, decades| Panel { title, label, get, decades, level: None };
     let mut out = String::from(
-        "<h2>Bearing, liquid, book-keeping</h2>\n<p>At small torque the bearing sticks for part of every cycle, most of all near the dip. The wave height is the linear formula's; beyond a quarter of the tank's radius (broken line) it says that linear slosh theory no longer holds, not how high the water stands. So a linear model's runs at the larger torques are computed faithfully, but they are not what a tank does.</p>\n",
+        "<h2>Stiction, slosh amplitude, energy balance</h2>\n<p>At small torque the bearing sticks for part of every cycle, most of all near the antiresonance. The wave height is the linear formula's; beyond a quarter of the tank's radius (dashed line) it says that linear slosh theory no longer holds, not how high the water stands. So a linear model's runs at the larger torques are computed faithfully, but they are not what a tank does.</p>\n",
     );
     out.push_str(&panels(
         groups,
         [
-            panel("Time stuck in the sweep", "stuck / s", |run| Some(run.figures.stuck), true),
+            panel("Time in stiction", "stiction / s", |run| Some(run.figures.stuck), true),
             panel(
                 "Largest slosh angle",
                 "angle / deg",
@@ -137,7 +137,7 @@ pub(super) fn bearing_and_liquid(groups: &[Group]) -> String {
             },
             panel(
                 "Energy residual",
-                "residual / energy turned over",
+                "residual / energy throughput",
                 |run| Some(run.figures.max_energy_residual),
                 true,
             ),
@@ -149,15 +149,15 @@ pub(super) fn bearing_and_liquid(groups: &[Group]) -> String {
 pub(super) fn linear_fit(groups: &[Group]) -> String {
     let panel = |title, label, get| Panel { title, label, get, decades: false, level: None };
     let mut out = String::from(
-        "<h2>How far one linear model reaches</h2>\n<p>A transfer function with three poles and two zeros is fitted to each run's <code>spa</code> response and driven with the run's own torque, as in the thesis. What it can't be is dry friction at small torque and, in the nonlinear models, a resonance that moves with the amplitude. Coherence: of what it leaves with the torque, between dip and peak (Welch, segments of 20 s). Signal over noise: from the coherence of rate and torque.</p>\n",
+        "<h2>Validity of a linear fit</h2>\n<p>A transfer function with three poles and two zeros is fitted to each run's <code>spa</code> response and driven with the run's own torque, as in the thesis. What it cannot represent is dry friction at small torque and, in the nonlinear models, a resonance that moves with the amplitude. Residual coherence: of its residual with the torque, between antiresonance and resonance (Welch, segments of 20 s). Signal-to-noise ratio: from the coherence of rate and torque.</p>\n",
     );
     out.push_str(&panels(
         groups,
         [
             panel("Fit, frequency domain", "fit / %", |run| Some(run.fit()?.fit_frequency)),
             panel("Fit, time domain", "fit / %", |run| Some(run.fit()?.fit_time)),
-            panel("Coherence of the rest", "mean coherence", |run| run.fit()?.coherence),
-            panel("Signal over noise, dip", "SNR / dB", |run| {
+            panel("Residual coherence", "mean coherence", |run| run.fit()?.coherence),
+            panel("Signal-to-noise ratio, antiresonance", "SNR / dB", |run| {
                 Some(run.record.as_ref()?.snr_db?[1])
             }),
         ],
@@ -165,11 +165,11 @@ pub(super) fn linear_fit(groups: &[Group]) -> String {
     out
 }
 
-/// Whether the liquid leaves its plane, and what the bearing feels of it.
+/// Whether the slosh leaves its plane, and the radial load on the bearing.
 pub(super) fn out_of_the_plane(groups: &[Group]) -> String {
     let panel = |title, label, get| Panel { title, label, get, decades: false, level: None };
     let mut out = String::from(
-        "<h2>Out of the plane</h2>\n<p>Swirl: 0 for motion in a plane, 1 for a circle; where it passes the broken line the liquid turns. Off-axis energy and leakage: the liquid's radial force, which only pulls at the bearing, beside the tangential one, and over the torque. A linear or planar liquid can't leave its plane.</p>\n",
+        "<h2>Out of the plane</h2>\n<p>Swirl: 0 for motion in a plane, 1 for a circle; above the dashed line the slosh is rotary. Off-axis energy and leakage: the liquid's radial force, which only loads the bearing, relative to the tangential one and to the torque. The linear and planar models cannot leave their plane.</p>\n",
     );
     out.push_str(&panels(
         groups,
@@ -178,7 +178,7 @@ pub(super) fn out_of_the_plane(groups: &[Group]) -> String {
                 level: Some((rotary::ROTARY, "counts as rotary")),
                 ..panel("Swirl", "largest |swirl|", |run| Some(run.rotary()?.swirl.abs()))
             },
-            panel("Time turning in the sweep", "turning / s", |run| Some(run.rotary()?.time)),
+            panel("Time in rotary slosh", "rotary slosh / s", |run| Some(run.rotary()?.time)),
             panel("Off-axis energy", "Σ F_r² / Σ (F_r² + F_t²)", |run| {
                 Some(run.off_axis()?.energy)
             }),

@@ -1,8 +1,8 @@
-//! Monte Carlo: how dip and peak are spread, and over what.
+//! Monte Carlo: the distribution of antiresonance and resonance, over every drawn parameter.
 
 use super::*;
 
-/// Dip and peak in all draws of a group.
+/// Antiresonance and resonance in all draws of a group.
 struct Figure {
     title: &'static str,
     label: &'static str,
@@ -11,10 +11,15 @@ struct Figure {
 }
 
 const FIGURES: [Figure; 4] = [
-    Figure { title: "Dip", label: "f_dip / Hz", unit: "Hz", of: |run| run.features().f_dip },
-    Figure { title: "Peak", label: "f_res / Hz", unit: "Hz", of: |run| run.features().f_res },
     Figure {
-        title: "Distance",
+        title: "Antiresonance",
+        label: "f_dip / Hz",
+        unit: "Hz",
+        of: |run| run.features().f_dip,
+    },
+    Figure { title: "Resonance", label: "f_res / Hz", unit: "Hz", of: |run| run.features().f_res },
+    Figure {
+        title: "Separation",
         label: "Δf / mHz",
         unit: "mHz",
         of: |run| run.features().delta_f().map(|f| f * 1e3),
@@ -27,7 +32,7 @@ const FIGURES: [Figure; 4] = [
     },
 ];
 
-/// Histograms of the features, and dip and peak over every drawn parameter.
+/// Histograms of the features, and antiresonance and resonance over every drawn parameter.
 pub(super) fn draws(plan: &Plan, fmu: &Fmu, groups: &[Group]) -> String {
     let grouping = plan.grouping();
     let drawn: Vec<(usize, &str)> = plan
@@ -37,7 +42,7 @@ pub(super) fn draws(plan: &Plan, fmu: &Fmu, groups: &[Group]) -> String {
         .filter(|(_, name)| !grouping.contains(name) && !name.ends_with("seed"))
         .collect();
     let mut out = String::from(
-        "<h2>How dip and peak are spread</h2>\n<p>Histograms over all draws, and every draw's dip (blue) and peak (orange) as its distance from the mean, over each parameter that was drawn. ρ is the coefficient of correlation: what stands near ±1 decides, what stands near 0 does not matter.</p>\n",
+        "<h2>Distribution of antiresonance and resonance</h2>\n<p>Histograms over all draws, and every draw's antiresonance (blue) and resonance (orange) as its deviation from the mean, over each parameter that was drawn. ρ is the coefficient of correlation: what stands near ±1 decides, what stands near 0 does not matter.</p>\n",
     );
     for group in groups {
         out.push_str(&group.heading());

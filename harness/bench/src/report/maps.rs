@@ -32,7 +32,7 @@ pub(super) fn maps(groups: &[Group]) -> String {
             ends: Some((0.0, 1.0)),
         },
         Quantity {
-            title: "Signal over noise",
+            title: "Signal-to-noise ratio",
             unit: "dB",
             of: |run| {
                 run.record.as_ref().map_or(Curve::new(), |record| record.snr_over_band.clone())
@@ -50,7 +50,7 @@ pub(super) fn maps(groups: &[Group]) -> String {
         },
     ];
     let mut out = String::from(
-        "<h2>Over frequency and torque</h2>\n<p>One row of cells for each torque. Coherence: of what the fitted linear model leaves with the torque; bright where the rest still follows the torque steadily, dark where the model is right, or where the rest does not stay the same while the sweep passes, as around the resonance of a liquid that turns. Leakage is the radial force times the tank's arm over the commanded torque, at the sweep's own frequency: dark while the wave stays in its plane, bright while it turns.</p>\n",
+        "<h2>Over frequency and torque</h2>\n<p>One row of cells for each torque. Coherence of the fitted linear model's residual with the torque: bright where the residual still follows the torque steadily, dark where the model is right, or where the residual changes while the sweep passes, as around the resonance in rotary slosh. Leakage is the radial force times the tank's arm over the commanded torque, at the sweep's own frequency: dark in planar slosh, bright in rotary slosh.</p>\n",
     );
     let scales: Vec<Axis> = quantities
         .iter()

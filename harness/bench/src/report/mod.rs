@@ -143,7 +143,7 @@ fn page(campaign: &Campaign, fmu: &Fmu, results: &Results) -> String {
         page.push_str(&thesis::statements(&groups));
     }
     if swept {
-        page.push_str("<h2>Frequency responses</h2>\n<p>Hub rate over commanded torque while the sweep passes each frequency, one curve per torque amplitude. The dip stands at the slosh frequency, where the liquid holds the hub still; the peak, where hub and liquid swing against each other, stands above it. Rest the pointer on a curve to see which run it is.</p>\n");
+        page.push_str("<h2>Frequency responses</h2>\n<p>Hub rate over commanded torque while the sweep passes each frequency, one curve per torque amplitude. The antiresonance stands at the slosh frequency, where the liquid holds the hub still; the resonance, where hub and liquid swing against each other, stands above it. Rest the pointer on a curve to see which run it is.</p>\n");
         page.push_str(&responses::models_over_each_other(&sweeps));
         page.push_str(&colors::amplitude_legend(&amplitudes));
         for group in &sweeps {
@@ -222,14 +222,15 @@ fn introduction(plan: &Plan, fmu: &Fmu, results: &Results, groups: &[Group]) -> 
                 None => "none".into(),
             }
         };
-        let [dip, peak] = [over(&|run| run.features().f_dip), over(&|run| run.features().f_res)];
+        let [antiresonance, resonance] =
+            [over(&|run| run.features().f_dip), over(&|run| run.features().f_res)];
         let exact = group.exact.f_dip.zip(group.exact.f_res).filter(|_| !plan.is_random());
         let _ = write!(
             out,
-            "<div class=\"card\"><b>{dip} Hz</b><b>{peak} Hz</b><span>dip and swept peak, {}{}</span></div>",
+            "<div class=\"card\"><b>{antiresonance} Hz</b><b>{resonance} Hz</b><span>antiresonance and swept resonance, {}{}</span></div>",
             escape(&group.title()),
-            exact.map_or(String::new(), |(dip, peak)| format!(
-                " (exact, linear: {dip:.4} and {peak:.4} Hz)"
+            exact.map_or(String::new(), |(antiresonance, resonance)| format!(
+                " (exact, linear: {antiresonance:.4} and {resonance:.4} Hz)"
             )),
         );
     }

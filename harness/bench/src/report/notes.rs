@@ -1,23 +1,23 @@
-//! The text at the end: how the figures are found, all of them, and what was run.
+//! The text at the end: methods, results table, and what was run.
 
 use super::*;
 
 pub(super) fn estimators(groups: &[Group]) -> String {
     let mut out = format!(
-        "<h2>How the figures are found</h2>\n\
+        "<h2>Methods</h2>\n\
          <p><b>Demodulation</b> (solid, in <code>features.csv</code>). Torque and rate are multiplied by e<sup>−jφ(t)</sup>, φ being the sweep's own known phase, and averaged over a Hann window of {cycles} cycles that slides with the sweep. Their ratio is the response the moment the sweep passes that frequency: what a lock-in amplifier would show. Both signals see the same window, so its effect on amplitude and phase cancels; harmonics that the bearing makes average out.</p>\n\
-         <p><b><code>spa</code></b> (broken). MATLAB's Blackman–Tukey estimate, which the thesis used: covariances of the whole record up to a lag of {lag} s, Hann lag window, Fourier transform, ratio of cross spectrum to input spectrum. It resolves about {resolution:.0} mHz, which fills a narrow dip a little.</p>\n\
+         <p><b><code>spa</code></b> (dashed). MATLAB's Blackman–Tukey estimate, which the thesis used: covariances of the whole record up to a lag of {lag} s, Hann lag window, Fourier transform, ratio of cross spectrum to input spectrum. It resolves about {resolution:.0} mHz, which fills a narrow antiresonance a little.</p>\n\
          <p><b>Welch, H1.</b> Eight half-overlapping Hamming segments, averaged cross spectrum over averaged input spectrum: what most tools call the transfer function of two records.</p>\n\
-         <p><b>Features.</b> f<sub>dip</sub> and f<sub>res</sub> are the two ends of the largest rise of |H| as the frequency grows, within the sweep's band, refined by a parabola through three points of log |H|; Δf is their distance, the notch depth their difference in dB. For a bench with little damping they are the smallest and the largest |H| in the band, as in the thesis; with strong damping the largest |H| is the band's lower edge, not the slosh peak, and the ripple behind the peak may go deeper than the dip.</p>\n\
+         <p><b>Features.</b> f<sub>dip</sub> and f<sub>res</sub> are the two ends of the largest rise of |H| as the frequency grows, within the sweep's band, refined by a parabola through three points of log |H|; Δf is their separation, the notch depth their difference in dB. For a bench with little damping they are the smallest and the largest |H| in the band, as in the thesis; with strong damping the largest |H| is the band's lower edge, not the slosh resonance, and the ripple behind the resonance may go deeper than the antiresonance.</p>\n\
          <p><b>Fit.</b> Three poles, two zeros, least squares on the complex <code>spa</code> response. In time it is driven with the run's torque from the initial state that fits best, as MATLAB's <code>compare</code> does: the band says little of a slow real pole, and from rest such a pole would keep the offset of the first half cycle for the whole run.</p>\n\
-         <p><b>Energy residual.</b> Largest |E(t) − E(0) − work + heat| of a run over the energy turned over, Σ|Δwork| + heat. It is the FMU's own book-keeping, checked at every sample.</p>\n\
-         <h2>Why the swept peak stands higher than the exact one</h2>\n\
-         <p>The sweep is not slow enough for the liquid. Bare-wall damping makes the peak so narrow that the sweep crosses its half-power width in less time than the slosh needs to decay: the oscillation is still growing when its best frequency has gone by, so an upward sweep sees the largest rate later, at a higher frequency, and a little lower than it would be in a dwell. The ripple behind the peak is the beat between that ringing and the torque that has moved on. A bench that sweeps at this rate and reads the envelope sees the same shift; it belongs to the experiment, not to the plant.</p>\n",
+         <p><b>Energy residual.</b> Largest |E(t) − E(0) − work + heat| of a run over the energy throughput, Σ|Δwork| + heat. It checks the FMU's energy balance at every sample.</p>\n\
+         <h2>Why the swept resonance lies above the exact one</h2>\n\
+         <p>The sweep is not slow enough for the liquid. Bare-wall damping makes the resonance so narrow that the sweep crosses its half-power width in less time than the slosh needs to decay: the oscillation is still growing when its best frequency has gone by, so an upward sweep sees the largest rate later, at a higher frequency, and a little lower than it would be in a dwell. The ripple behind the resonance is the beat between that ringing and the torque that has moved on. A bench that sweeps at this rate and reads the envelope sees the same shift; it belongs to the experiment, not to the plant.</p>\n",
         cycles = demodulation::CYCLES,
         lag = spa::LAG,
         resolution = 1e3 / spa::LAG,
     );
-    out.push_str("<div class=\"wide\"><table><thead><tr><th>runs</th><th>exact<br>peak</th><th>half-power<br>width 2ζf</th><th>sweep rate<br>there</th><th>time to<br>cross</th><th>slosh decays<br>in 1/(2πζf)</th><th>largest torque,<br>swept peak</th><th>its<br>shift</th><th>largest torque,<br><code>spa</code> peak</th><th>its<br>shift</th></tr></thead><tbody>\n");
+    out.push_str("<div class=\"wide\"><table><thead><tr><th>runs</th><th>exact<br>resonance</th><th>half-power<br>width 2ζf</th><th>sweep rate<br>there</th><th>time to<br>cross</th><th>slosh decays<br>in 1/(2πζf)</th><th>largest torque,<br>swept resonance</th><th>its<br>shift</th><th>largest torque,<br><code>spa</code> resonance</th><th>its<br>shift</th></tr></thead><tbody>\n");
     for group in groups {
         let (Some(mode), Some(exact), Some(run), Some(sweep)) =
             (group.runs[0].linear.modes.first(), group.exact.f_res, group.runs.last(), group.sweep)
@@ -42,7 +42,7 @@ pub(super) fn estimators(groups: &[Group]) -> String {
             shift(run.spa_features().f_res),
         );
     }
-    out.push_str("</tbody></table></div>\n<p>The second estimator is the proof. For a linear plant the ratio of whole-record spectra is the frequency response however fast the input swept, because the ringing after the peak is in the record too; and there the shift is gone. The dip hardly moves in either: there the hub stands nearly still, so there is little that could ring; only at the smallest torques, where the bearing sticks near the dip, does the sweep see it a few mHz late. When runs of a nonlinear model are compared, both views count: demodulation says what happened at that moment, <code>spa</code> gives the best linear summary of the whole.</p>\n");
+    out.push_str("</tbody></table></div>\n<p>The second estimator is the proof. For a linear plant the ratio of whole-record spectra is the frequency response however fast the input swept, because the ringing after the resonance is in the record too; and there the shift is gone. The antiresonance hardly moves in either: there the hub stands nearly still, so there is little that could ring; only at the smallest torques, where the bearing sticks near the antiresonance, does the sweep see it a few mHz late. When runs of a nonlinear model are compared, both views count: demodulation says what happened at that moment, <code>spa</code> gives the best linear summary of the whole.</p>\n");
     out
 }
 
@@ -56,9 +56,9 @@ pub(super) fn table(plan: &Plan, results: &Results) -> String {
     let heads: String =
         others.iter().map(|(_, name)| format!("<th>{}</th>", escape(name))).collect();
     let mut out = format!(
-        "<h2>All figures</h2>\n<div class=\"wide\"><table><thead>\n\
+        "<h2>Results table</h2>\n<div class=\"wide\"><table><thead>\n\
          <tr><th colspan=\"{}\">Run</th><th colspan=\"4\">While the sweep passes</th><th colspan=\"4\">Whole record (<code>spa</code>)</th><th colspan=\"4\">The run itself</th></tr>\n\
-         <tr><th>model</th><th>fill<br>cm</th><th>torque<br>mN·m</th>{heads}<th>f<sub>dip</sub><br>Hz</th><th>f<sub>res</sub><br>Hz</th><th>Δf<br>mHz</th><th>notch<br>dB</th><th>f<sub>dip</sub><br>Hz</th><th>f<sub>res</sub><br>Hz</th><th>Δf<br>mHz</th><th>notch<br>dB</th><th>peak slosh<br>angle, deg</th><th>peak wave<br>mm</th><th>stuck<br>s</th><th>energy<br>residual</th></tr>\n</thead><tbody>\n",
+         <tr><th>model</th><th>fill<br>cm</th><th>torque<br>mN·m</th>{heads}<th>f<sub>dip</sub><br>Hz</th><th>f<sub>res</sub><br>Hz</th><th>Δf<br>mHz</th><th>notch<br>dB</th><th>f<sub>dip</sub><br>Hz</th><th>f<sub>res</sub><br>Hz</th><th>Δf<br>mHz</th><th>notch<br>dB</th><th>largest slosh<br>angle, deg</th><th>largest wave<br>mm</th><th>stiction<br>s</th><th>energy<br>residual</th></tr>\n</thead><tbody>\n",
         3 + others.len()
     );
     for run in &results.outcomes {
@@ -141,7 +141,7 @@ pub(super) fn provenance(campaign: &Campaign, fmu: &Fmu, results: &Results) -> S
     }
     let _ = write!(
         out,
-        "</dl>\n<p>Each run lies in <code>runs/</code> as Parquet with its particulars in its metadata. <code>features.csv</code> holds the figures of the table above, <code>features_spa.csv</code> and <code>features_h1.csv</code> those of the other estimators in the same columns, <code>runs.csv</code> all of them with everything that was varied, <code>plan.toml</code> the plan. This makes everything here again:</p>\n<p><code>{}</code></p>\n",
+        "</dl>\n<p>Each run is in <code>runs/</code> as Parquet, with what it was made from in its metadata. <code>features.csv</code> holds the values of the table above, <code>features_spa.csv</code> and <code>features_h1.csv</code> those of the other estimators in the same columns, <code>runs.csv</code> all of them with everything that was varied, <code>plan.toml</code> the plan. This command reproduces everything here:</p>\n<p><code>{}</code></p>\n",
         escape(&campaign.command(fmu))
     );
     out

@@ -3,8 +3,8 @@
 use super::*;
 use crate::campaign::SloshPath;
 
-/// For each group whose liquid can leave its plane: the last run in which it does not turn, the
-/// beginning of turning in the first in which it does, and the largest wave of the last.
+/// For each group whose liquid can leave its plane: the last run with planar slosh, the
+/// onset of rotary slosh in the first in which it occurs, and the largest wave of the last.
 pub(super) fn paths<'a>(groups: &[Group<'a>]) -> String {
     let mut out = String::new();
     for group in groups {

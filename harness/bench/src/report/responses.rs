@@ -1,4 +1,4 @@
-//! Frequency responses: every torque of a group, and the models over each other.
+//! Frequency responses: every torque of a group, and models overlaid.
 
 use super::*;
 
@@ -14,7 +14,7 @@ pub(super) fn models_over_each_other<'a>(groups: &[&Group<'a>]) -> String {
         let models: Vec<&Group<'a>> =
             comparable.iter().copied().filter(|group| group.fill == fill).collect();
         let title = fill.map_or("Any fill".into(), |fill| format!("{} cm fill", cm(fill)));
-        let _ = writeln!(out, "<h3>{title}: the models over each other</h3>");
+        let _ = writeln!(out, "<h3>{title}: models overlaid</h3>");
         out.push_str(&colors::model_legend(models.iter().map(|group| group.model)));
         out.push_str("<div class=\"two\">\n");
         for largest in [false, true] {
@@ -76,9 +76,9 @@ pub(super) fn responses(group: &Group, amplitudes: &[f64]) -> String {
     let size = (560.0, 330.0);
     let (from, to) = group.sweep.map(Sweep::band).unwrap_or(BAND);
     let band = Axis::logarithmic("frequency / Hz", (from, to), &frequency_ticks(from, to));
-    let dip = group.exact.f_dip.unwrap_or(from);
-    let peak = group.exact.f_res.unwrap_or(to);
-    let around = Axis::linear("frequency / Hz", [dip - 0.08, peak + 0.12], 0.3, 6);
+    let antiresonance = group.exact.f_dip.unwrap_or(from);
+    let resonance = group.exact.f_res.unwrap_or(to);
+    let around = Axis::linear("frequency / Hz", [antiresonance - 0.08, resonance + 0.12], 0.3, 6);
     let decibels = Axis::linear("|H| / dB re 1 (rad/s)/(N·m)", levels(), 10.0, 6);
 
     let charts = [
@@ -91,7 +91,7 @@ pub(super) fn responses(group: &Group, amplitudes: &[f64]) -> String {
             legend: false,
         },
         Chart {
-            title: "Magnitude around dip and peak".into(),
+            title: "Magnitude around antiresonance and resonance".into(),
             size,
             x: around.clone(),
             y: decibels.clone(),
@@ -133,11 +133,11 @@ fn degrees_axis(series: &[Series]) -> Axis {
     }
 }
 
-/// The peak of the run with the largest torque, as each estimator sees it.
+/// The resonance of the run with the largest torque, as each estimator sees it.
 fn estimator_chart(group: &Group, size: (f64, f64)) -> Chart {
     let seen = group.runs.last().and_then(|run| run.spa_features().f_res);
-    let peak = seen.or(group.exact.f_res).unwrap_or(BAND.1);
-    let x = Axis::linear("frequency / Hz", [peak - 0.04, peak + 0.06], 0.1, 5);
+    let resonance = seen.or(group.exact.f_res).unwrap_or(BAND.1);
+    let x = Axis::linear("frequency / Hz", [resonance - 0.04, resonance + 0.06], 0.1, 5);
     let inside = |points: Vec<(f64, f64)>| -> Vec<(f64, f64)> {
         points.into_iter().filter(|(f, _)| (x.from..=x.to).contains(f)).collect()
     };
@@ -172,7 +172,7 @@ fn estimator_chart(group: &Group, size: (f64, f64)) -> Chart {
     let y = Axis::linear("|H| / (rad/s)/(N·m)", [0.0, top], 0.1, 5);
     let amplitude = group.runs.last().map_or(0.0, |run| thousandths(torque_of(run)));
     Chart {
-        title: format!("The peak at {amplitude} mN·m, as each estimator sees it"),
+        title: format!("The resonance at {amplitude} mN·m, as each estimator sees it"),
         size,
         x,
         y,

@@ -1,9 +1,9 @@
-//! What the thesis says its bench and its synthetic data did, beside what the campaign's runs do.
+//! What the thesis says its bench and its synthetic data did, compared with the campaign's runs.
 //!
 //! The thesis prints few numbers; its statements are quoted in our words, each with a rule that
 //! decides from the runs whether a model does the same. Statements on the bench are judged by the
 //! spherical model, those on the synthetic data, whose liquid is linear, by the linear one; the
-//! other model stands beside it for comparison. A rule must hold for every fill.
+//! other model is shown for comparison. A rule must hold for every fill.
 
 use super::*;
 
@@ -100,7 +100,7 @@ fn snr(run: &Outcome) -> Option<f64> {
     (!values.is_empty()).then(|| mean(&values))
 }
 
-/// The smallest torque at which the liquid turns, N·m.
+/// The smallest torque with rotary slosh, N·m.
 fn onset(group: &Group) -> Option<f64> {
     let turns = |run: &&&Outcome| run.rotary().is_some_and(|rotary| rotary.from.is_some());
     group.runs.iter().find(turns).map(|run| torque_of(run))
@@ -110,7 +110,7 @@ const STATEMENTS: &[Statement] = &[
     Statement {
         section: "7.1.1, fig. 7.1",
         who: Who::Bench,
-        says: "With growing torque peak and dip move apart: Δf grows.",
+        says: "With growing torque resonance and antiresonance move apart: Δf grows.",
         rule: "Δf (spa) grows by more than 20 mHz from 0.05 to 0.25 N·m",
         shows: |group| {
             let delta = |torque| at(group, torque)?.spa_features().delta_f();
@@ -122,20 +122,24 @@ const STATEMENTS: &[Statement] = &[
     Statement {
         section: "7.1.1, fig. 7.2",
         who: Who::Synthetic,
-        says: "Peak and dip hardly depend on the torque; Δf is constant beyond the smallest torques.",
+        says: "Resonance and antiresonance hardly depend on the torque; Δf is constant beyond the smallest torques.",
         rule: "both (spa) stay within 4 mHz from 0.05 N·m up",
         shows: |group| {
-            let peak = spread(&from(group, 0.05, |run| run.spa_features().f_res)?);
-            let dip = spread(&from(group, 0.05, |run| run.spa_features().f_dip)?);
-            let text = format!("dip {:.1}, peak {:.1} mHz", dip * 1e3, peak * 1e3);
-            Some((text, dip < 4e-3 && peak < 4e-3))
+            let resonance = spread(&from(group, 0.05, |run| run.spa_features().f_res)?);
+            let antiresonance = spread(&from(group, 0.05, |run| run.spa_features().f_dip)?);
+            let text = format!(
+                "antiresonance {:.1}, resonance {:.1} mHz",
+                antiresonance * 1e3,
+                resonance * 1e3
+            );
+            Some((text, antiresonance < 4e-3 && resonance < 4e-3))
         },
         why: "",
     },
     Statement {
         section: "7.1.1",
         who: Who::Bench,
-        says: "The peak starts higher at the smallest torques, then comes down.",
+        says: "The resonance starts higher at the smallest torques, then comes down.",
         rule: "f_res (spa) at 0.0125 lies above that at 0.05 N·m by more than 1 mHz",
         shows: softening,
         why: "",
@@ -151,16 +155,16 @@ const STATEMENTS: &[Statement] = &[
     Statement {
         section: "7.1.1",
         who: Who::Bench,
-        says: "At moderate and large torque the bench's peak and dip stay close to those of the linear synthetic model.",
+        says: "At moderate and large torque the bench's resonance and antiresonance stay close to those of the linear synthetic model.",
         rule: "|f_res − exact linear| (spa) stays below 0.1 Hz from 0.1 N·m up",
         shows: |group| {
             let exact = group.exact.f_res?;
-            let peaks = from(group, 0.1, |run| run.spa_features().f_res)?;
-            let away = peaks.iter().map(|f| f - exact);
+            let resonances = from(group, 0.1, |run| run.spa_features().f_res)?;
+            let away = resonances.iter().map(|f| f - exact);
             let most = away.fold(0.0, |m: f64, d| if d.abs() > m.abs() { d } else { m });
             Some((format!("up to {:+.1} mHz", most * 1e3), most.abs() < 0.1))
         },
-        why: "The conical pendulum hardens too much: once it turns it follows the sweep too far up.",
+        why: "The conical pendulum hardens too much: once in rotary slosh it follows the sweep too far up.",
     },
     Statement {
         section: "7.1.1, fig. 7.1",
@@ -168,7 +172,7 @@ const STATEMENTS: &[Statement] = &[
         says: "The notch becomes shallower with torque.",
         rule: "mean notch (spa; in brackets while the sweep passes) of the larger third of the torques is smaller by more than 0.5 dB",
         shows: |group| notch_trend(group, -1.0),
-        why: "The notch of a record with a jump in it says little: spa lays the dip, the jump and the ringing over each other. While the sweep passes (in brackets) it does become shallower.",
+        why: "The notch of a record with a jump in it says little: spa lays the antiresonance, the jump and the ringing over each other. While the sweep passes (in brackets) it does become shallower.",
     },
     Statement {
         section: "7.1.1, fig. 7.2",
@@ -281,7 +285,7 @@ const STATEMENTS: &[Statement] = &[
             let least = from(group, 0.075, coherence)?.into_iter().fold(f64::MAX, f64::min);
             Some((format!("{low:.2}; least {least:.2}"), low < 0.4 && least > 0.4))
         },
-        why: "Dry friction is coherent with the torque at the smallest torques; and the liquid turns later here than on the bench.",
+        why: "Dry friction is coherent with the torque at the smallest torques; and rotary slosh sets in later here than on the bench.",
     },
     Statement {
         section: "7.1.3, fig. 7.10",
@@ -300,9 +304,9 @@ const STATEMENTS: &[Statement] = &[
         section: "7.1.3, fig. 7.11",
         who: Who::Bench,
         says: "At middle and large torque a broad region of lower coherence stands around the resonance.",
-        rule: "at 0.25 N·m the mean within 0.2 Hz of the linear peak is more than 0.1 below the rest's",
+        rule: "at 0.25 N·m the mean within 0.2 Hz of the linear resonance is more than 0.1 below that elsewhere",
         shows: |group| {
-            let peak = group.exact.f_res?;
+            let resonance = group.exact.f_res?;
             let run = at(group, MOST)?;
             let (near, rest): (Vec<_>, Vec<_>) = run
                 .record
@@ -311,18 +315,18 @@ const STATEMENTS: &[Statement] = &[
                 .as_ref()?
                 .1
                 .iter()
-                .partition(|(f, _)| (f - peak).abs() < 0.2);
+                .partition(|(f, _)| (f - resonance).abs() < 0.2);
             let values =
                 |points: Vec<(f64, f64)>| points.iter().map(|(_, v)| *v).collect::<Vec<_>>();
             let (near, rest) = (mean(&values(near)), mean(&values(rest)));
-            Some((format!("{near:.2}, rest {rest:.2}"), rest - near > 0.1))
+            Some((format!("{near:.2}, elsewhere {rest:.2}"), rest - near > 0.1))
         },
         why: "",
     },
     Statement {
         section: "7.1.4, fig. 7.13",
         who: Who::Bench,
-        says: "Signal over noise is lowest at the smallest torque and soon better.",
+        says: "Signal-to-noise ratio is lowest at the smallest torque and soon better.",
         rule: "the band's mean is lowest at 0.0125 N·m, and 5 dB better at 0.1 N·m",
         shows: snr_grows,
         why: "",
@@ -351,16 +355,16 @@ const STATEMENTS: &[Statement] = &[
         section: "7.1.5, fig. 7.16",
         who: Who::Bench,
         says: "It stands in the resonance band, with nothing but noise beside it.",
-        rule: "at 0.25 N·m more than 90 % of its square lies within 0.3 Hz of the linear peak",
+        rule: "at 0.25 N·m more than 90 % of its square lies within 0.3 Hz of the linear resonance",
         shows: |group| {
             let run = at(group, MOST)?;
-            let peak = group.exact.f_res?;
+            let resonance = group.exact.f_res?;
             let (mut near, mut all) = (0.0, 0.0);
             let passing = run.passing.as_ref()?;
             for (f, l) in passing.rate.response.frequency.iter().zip(&passing.leakage) {
                 let square = l * l;
                 all += square;
-                near += if (f - peak).abs() < 0.3 { square } else { 0.0 };
+                near += if (f - resonance).abs() < 0.3 { square } else { 0.0 };
             }
             let share = if all > 0.0 { near / all } else { 0.0 };
             Some((format!("{:.0} %", 100.0 * share), share > 0.9))
@@ -370,8 +374,8 @@ const STATEMENTS: &[Statement] = &[
     Statement {
         section: "App. A",
         who: Who::Bench,
-        says: "Up to 0.05 N·m the liquid only swings from side to side.",
-        rule: "it does not turn at 0.05 N·m or below",
+        says: "Up to 0.05 N·m the slosh stays planar.",
+        rule: "no rotary slosh at 0.05 N·m or below",
         shows: |group| {
             at(group, 0.05)?;
             Some((turning_from(group), onset(group).is_none_or(|torque| torque > 0.05)))
@@ -381,29 +385,29 @@ const STATEMENTS: &[Statement] = &[
     Statement {
         section: "App. A, 8.1",
         who: Who::Bench,
-        says: "It visibly turns from 0.1 N·m on, weakly and now and then at 0.075.",
-        rule: "it turns from 0.075 or 0.1 N·m on",
+        says: "Rotary slosh is visible from 0.1 N·m on, weak and intermittent at 0.075.",
+        rule: "rotary slosh from 0.075 or 0.1 N·m on",
         shows: |group| {
             at(group, 0.1)?;
             let there = onset(group).is_some_and(|torque| (0.074..0.101).contains(&torque));
             Some((turning_from(group), there))
         },
-        why: "A sweep from perfect rest has no seed but the centripetal force; a dwell at resonance turns from 0.06 N·m on (plan t6_high_amplitude, and the tests).",
+        why: "A sweep from perfect rest has no seed but the centripetal force; a dwell at resonance becomes rotary from 0.06 N·m on (plan t6_high_amplitude, and the tests).",
     },
     Statement {
         section: "App. A",
         who: Who::Bench,
-        says: "It first swings from side to side, then turns, in every run from 0.1 N·m on in which it turns.",
-        rule: "turning begins above the dip",
+        says: "In every run from 0.1 N·m on with rotary slosh the motion is planar first, then rotary.",
+        rule: "rotary slosh begins above the antiresonance",
         shows: |group| {
             let turning = group
                 .runs
                 .iter()
                 .filter_map(|run| Some(run.rotary()?.from? - run.features().f_dip?));
             let least = turning.fold(f64::MAX, f64::min);
-            let never = "never turns".to_string();
+            let never = "no rotary slosh".to_string();
             Some(if least < f64::MAX {
-                (format!("from {:.0} mHz above the dip on", least * 1e3), least > 0.0)
+                (format!("from {:.0} mHz above the antiresonance on", least * 1e3), least > 0.0)
             } else {
                 (never, false)
             })
@@ -413,37 +417,37 @@ const STATEMENTS: &[Statement] = &[
     Statement {
         section: "App. A",
         who: Who::Bench,
-        says: "Turning comes and goes: intermittent at most torques, breaking down into plane swinging at 0.2 N·m, 10 cm.",
-        rule: "at 0.2 N·m it turns for less than 90 % of the time between first and last",
+        says: "Rotary slosh comes and goes: intermittent at most torques, breaking down into plane swinging at 0.2 N·m, 10 cm.",
+        rule: "at 0.2 N·m the slosh is rotary for less than 90 % of the time between first and last",
         shows: |group| {
             let run = at(group, 0.2)?;
             let rotary = run.rotary()?;
             let Some(between) = rotary.from.zip(rotary.to) else {
-                return Some(("never turns".into(), false));
+                return Some(("no rotary slosh".into(), false));
             };
             let sweep = group.sweep?;
             let whole = (sweep.time_of(between.1)? - sweep.time_of(between.0)?).abs();
             let share = rotary.time / whole;
             Some((format!("{:.0} s of {whole:.0} s", rotary.time), share < 0.9))
         },
-        why: "A pendulum loses no water: no breaking waves, no splashing, and so no reason to stop turning.",
+        why: "A pendulum loses no water: no breaking waves, no splashing, and so no reason for rotary slosh to stop.",
     },
     Statement {
         section: "5.1.4, 7.1",
         who: Who::Synthetic,
         says: "The sweep is slow enough to show the steady response.",
-        rule: "while the sweep passes, the peak at 0.25 N·m stands within 5 mHz of the exact linear one",
+        rule: "while the sweep passes, the resonance at 0.25 N·m stands within 5 mHz of the exact linear one",
         shows: |group| {
             let shift = at(group, MOST)?.features().f_res? - group.exact.f_res?;
             Some((format!("{:+.0} mHz", shift * 1e3), shift.abs() < 5e-3))
         },
-        why: "See below why the swept peak stands higher. The whole record (spa) is free of it.",
+        why: "See below why the swept resonance lies higher. The whole record (spa) is free of it.",
     },
 ];
 
 fn softening(group: &Group) -> Option<Shown> {
-    let peak = |torque| at(group, torque)?.spa_features().f_res;
-    let (low, high) = (peak(LEAST)?, peak(0.05)?);
+    let resonance = |torque| at(group, torque)?.spa_features().f_res;
+    let (low, high) = (resonance(LEAST)?, resonance(0.05)?);
     Some((format!("{:+.1} mHz", (high - low) * 1e3), low - high > 1e-3))
 }
 
@@ -463,8 +467,8 @@ fn snr_grows(group: &Group) -> Option<Shown> {
 
 fn turning_from(group: &Group) -> String {
     match onset(group) {
-        Some(torque) => format!("turns from {torque} N·m"),
-        None => "never turns".into(),
+        Some(torque) => format!("rotary from {torque} N·m"),
+        None => "no rotary slosh".into(),
     }
 }
 
@@ -507,7 +511,7 @@ pub(super) fn statements(groups: &[Group]) -> String {
         return rows;
     }
     format!(
-        "<h2>Beside the thesis</h2>\n<p>What the thesis says of its bench and of its synthetic data, in our words, and what these runs do: {agreed} of {judged} statements agree. ✓ and ✗ say whether a model does what the statement says, at every fill. Statements on the bench are judged by the spherical model, those on the synthetic data by the linear one. The thesis prints its features as figures only; where it names a number, the rule has it. Off-axis rates (7.1.5, first half) are not here: the hub of the FMU does not tilt.</p>\n<div class=\"wide\"><table class=\"statements\"><thead><tr><th>thesis</th><th>what it says</th><th>linear model</th><th>spherical model</th><th>verdict</th></tr></thead><tbody>\n{rows}</tbody></table></div>\n"
+        "<h2>Comparison with the thesis</h2>\n<p>What the thesis says of its bench and of its synthetic data, in our words, and what these runs do: {agreed} of {judged} statements agree. ✓ and ✗ say whether a model does what the statement says, at every fill. Statements on the bench are judged by the spherical model, those on the synthetic data by the linear one. The thesis prints its features as figures only; where it names a number, the rule has it. Off-axis rates (7.1.5, first half) are not here: the hub of the FMU does not tilt.</p>\n<div class=\"wide\"><table class=\"statements\"><thead><tr><th>thesis</th><th>what it says</th><th>linear model</th><th>spherical model</th><th>verdict</th></tr></thead><tbody>\n{rows}</tbody></table></div>\n"
     )
 }
 

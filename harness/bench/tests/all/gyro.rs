@@ -16,14 +16,14 @@ fn random_walk_and_bias_instability_come_back() {
     let bench = Noise { arw: 5.75e-5, bias_instability: 5.21e-5, bias_time: 100.0 };
     let other = Noise { arw: 2e-4, bias_instability: 3e-4, bias_time: 30.0 };
     let set = [("imu.arw", "2e-4"), ("imu.bias_instability", "3e-4"), ("imu.bias_time", "30")];
-    for (asked, settings, hours) in [(bench, &[][..], 2.0), (other, &set[..], 1.0)] {
+    for (specified, settings, hours) in [(bench, &[][..], 2.0), (other, &set[..], 1.0)] {
         let found = recording(hours, 4, settings).characterise(&fmu, &|_| {}).unwrap();
-        assert_eq!(found.asked, asked);
+        assert_eq!(found.specified, specified);
         // Standard errors: N 0.1 %; B sqrt(bias_time/(2 x 4 records x hours)) = 4 and 3 %.
-        // 5 and 20 % are what the gyro is asked to keep; the seeds are fixed.
-        let deviation = |found: f64, asked: f64| (found / asked - 1.0).abs();
-        assert!(deviation(found.found.arw, asked.arw) < 0.05, "{}", found.text());
-        let bias = deviation(found.found.bias_instability, asked.bias_instability);
+        // 5 and 20 % are what the gyro is specified to keep; the seeds are fixed.
+        let deviation = |found: f64, specified: f64| (found / specified - 1.0).abs();
+        assert!(deviation(found.estimated.arw, specified.arw) < 0.05, "{}", found.text());
+        let bias = deviation(found.estimated.bias_instability, specified.bias_instability);
         assert!(bias < 0.2, "{}", found.text());
     }
 }
@@ -33,17 +33,17 @@ fn white_noise_alone_has_no_bias_and_rounding_adds_to_it() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let quiet = ("imu.bias_instability", "0");
     let found = recording(0.5, 2, &[quiet]).characterise(&fmu, &|_| {}).unwrap();
-    assert!((found.found.arw / 5.75e-5 - 1.0).abs() < 0.05, "{}", found.text());
+    assert!((found.estimated.arw / 5.75e-5 - 1.0).abs() < 0.05, "{}", found.text());
     // what is found of a bias is scatter, below the white noise where its peak would stand
-    let peak = 0.93 * found.found.bias_instability;
-    let there = 1.89 * found.found.bias_time;
+    let peak = 0.93 * found.estimated.bias_instability;
+    let there = 1.89 * found.estimated.bias_time;
     assert!(peak < 5.75e-5 / there.sqrt(), "{}", found.text());
     // rounding to a step of about the noise is as if white noise of step/sqrt(12) were added
     let found =
         recording(0.5, 2, &[quiet, ("imu.lsb", "5e-4")]).characterise(&fmu, &|_| {}).unwrap();
     let rounding = 5e-4 / (12.0f64 * 50.0).sqrt();
-    assert_eq!(found.asked.arw, 5.75e-5f64.hypot(rounding));
-    assert!((found.found.arw / found.asked.arw - 1.0).abs() < 0.05, "{}", found.text());
+    assert_eq!(found.specified.arw, 5.75e-5f64.hypot(rounding));
+    assert!((found.estimated.arw / found.specified.arw - 1.0).abs() < 0.05, "{}", found.text());
 }
 
 #[test]

@@ -11,10 +11,10 @@ use host::fmi2::Fmu;
 use super::{DEFAULT_CAMPAIGN, DEFAULT_FMU, setting};
 use crate::progress;
 
-/// Drives the FMU through a plan's runs, or the thesis's sweeps at several fills and amplitudes,
-/// and reports.
+/// Simulates a plan's runs, or the sine sweeps of Rubaga's thesis at several fills and amplitudes,
+/// analyses them and reports.
 ///
-/// Runs that are there already (same FMU, parameters and profile) are not done again.
+/// Stored runs of the same model, binary, parameters and profile are reused.
 #[derive(clap::Args)]
 #[command(after_help = help())]
 pub struct CampaignArgs {
@@ -25,7 +25,7 @@ pub struct CampaignArgs {
         conflicts_with_all = ["model", "fills", "amplitudes", "sweep", "settings", "tolerance"]
     )]
     plan: Option<String>,
-    /// Print the runs as JSON for another program to make, and make none.
+    /// Print the runs as JSON for another program to simulate, and simulate none.
     #[arg(long)]
     list: bool,
     /// Slosh models, by name.
@@ -46,7 +46,7 @@ pub struct CampaignArgs {
     /// Relative tolerance of the FMU's solver [default: the FMU's own].
     #[arg(long, value_name = "NUMBER")]
     tolerance: Option<f64>,
-    /// Do runs again that are there already.
+    /// Simulate again what is stored already.
     #[arg(long)]
     force: bool,
     /// The FMU.
@@ -63,7 +63,7 @@ pub struct CampaignArgs {
 enum Sweep {
     /// Exponentially.
     Exponential,
-    /// Evenly.
+    /// Linearly in time.
     Linear,
 }
 

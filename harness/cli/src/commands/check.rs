@@ -11,8 +11,8 @@ use crate::progress;
 
 /// Checks an FMU 2.0 against the standard and against what hosts ask for.
 ///
-/// Looks at the archive, the description and the binaries, and calls the binary for this platform as
-/// hosts do. The exit code is 0 when there are no errors; warnings are told only.
+/// Looks at the archive, the description and the binaries, and calls the binary for this platform
+/// as hosts do. The exit code is 0 when there are no errors; warnings are only reported.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh check dist/HubSlosh.fmu\n  \
     hubslosh check other.fmu --only zip,xml --junit check.xml\n  hubslosh check --rules")]

@@ -8,7 +8,8 @@ use host::fmi2::Fmu;
 
 use super::DEFAULT_FMU;
 
-/// Writes the example that travels with the FMU (modelDescription/HubSlosh/extra): torque and answer.
+/// Writes the example that travels with the FMU (modelDescription/HubSlosh/extra): torque and
+/// answer.
 #[derive(clap::Args)]
 pub struct ExampleArgs {
     /// The FMU that answers.

@@ -12,8 +12,8 @@ use crate::progress;
 /// Where its files go.
 const DEFAULT_GYRO: &str = "dist/gyro";
 
-/// Records the gyro for hours at rest and compares the noise that its Allan deviation shows with
-/// the noise put in. Leaves allan.csv and allan.svg.
+/// Records the gyro for hours at rest, estimates its noise from the Allan deviation and compares it
+/// with the specified noise. Leaves allan.csv and allan.svg.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh gyro\n  \
     hubslosh gyro --set imu.arw=1e-4 --set imu.bias_time=300 --hours 12 --out dist/other_gyro")]

@@ -12,10 +12,11 @@ use crate::progress;
 /// Where the release goes.
 const DEFAULT_RELEASE: &str = "dist/release";
 
-/// Builds and checks the release for all platforms: the FMU, its hash, its software bill of materials (SBOM).
+/// Builds and checks the release for all platforms: the FMU, its hash, its software bill of
+/// materials (SBOM).
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  hubslosh release\n\n\
-    On a Debian machine harness/platforms/setup gets what building for all platforms takes.")]
+    On a Debian machine harness/platforms/setup gets what building for all platforms needs.")]
 pub struct ReleaseArgs {
     /// Which FMU.
     #[arg(long, value_name = "NAME", default_value = pack::HUBSLOSH.name, value_parser = pack::model)]

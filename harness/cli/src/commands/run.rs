@@ -13,7 +13,7 @@ use host::fmi2::Fmu;
 use super::{DEFAULT_FMU, setting};
 use crate::progress;
 
-/// Makes one run: a torque history in, signals out.
+/// Simulates one run: a torque history in, signals out.
 #[derive(clap::Args)]
 #[command(after_help = help())]
 pub struct RunArgs {
@@ -98,7 +98,8 @@ impl RunArgs {
     }
 }
 
-/// What people look at first: of the bench four signals, of another FMU all outputs that are numbers.
+/// What people look at first: of the bench four signals, of another FMU all outputs that are
+/// numbers.
 fn default_columns(description: &ModelDescription) -> Vec<String> {
     const BENCH: [&str; 4] = ["omega", "omega_imu", "slosh_angle", "slosh_angle_radial"];
     if BENCH.iter().all(|name| description.variable(name).is_ok()) {

@@ -4,7 +4,7 @@ use anyhow::Result;
 use bench::scaling::{self, Flight, Liquid};
 use clap::Subcommand;
 
-/// Says which tank in flight a bench stands for: Bond numbers, Froude's factors.
+/// Computes the flight tank that the bench represents (similarity): Bond numbers, Froude factors.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh scale thesis\n  \
     hubslosh scale bond --flight-radius 2.0425 --flight-density 1141 --flight-tension 0.0132\n  \
@@ -17,9 +17,9 @@ pub struct ScaleArgs {
 
 #[derive(Subcommand)]
 enum Scale {
-    /// The figures of the thesis's 7.2, printed and computed.
+    /// The numbers of the thesis's section 7.2, as printed and as computed.
     Thesis,
-    /// Bond number of an acceleration, and the tank in flight that has the same.
+    /// Bond number of an acceleration, and the flight tank that has the same.
     Bond {
         /// Density of the bench's liquid, kg/m3.
         #[arg(long, default_value_t = scaling::WATER.density)]
@@ -39,7 +39,7 @@ enum Scale {
         /// Surface tension of the liquid in flight, N/m [default: the bench's].
         #[arg(long)]
         flight_tension: Option<f64>,
-        /// Radius of the tank in flight, m: gives its acceleration.
+        /// Radius of the flight tank, m: gives its acceleration.
         #[arg(long, conflicts_with = "flight_acceleration")]
         flight_radius: Option<f64>,
         /// Acceleration in flight, m/s2: gives the tank's radius.
@@ -70,7 +70,7 @@ enum Scale {
         #[arg(long, default_value_t = 0.005)]
         flight_alpha: f64,
     },
-    /// What multiplies a model's figures to give the full size's.
+    /// Factors from the model's quantities to those of the full size.
     Froude {
         /// Length of the full size over the model's.
         #[arg(long)]

@@ -63,7 +63,7 @@ fn a_linear_liquid_keeps_dip_and_peak_from_0_05_newton_metres_on() {
     for table in [swept, spa] {
         for name in ["f_dip_hz", "f_res_hz"] {
             let values = figure(table, "linear", name);
-            // the acceptance figure; noise moves the dip by 2 mHz at 0.05
+            // the acceptance figure; noise moves the antiresonance by 2 mHz at 0.05
             assert!(spread(&values[1..]) < 4e-3, "{name}: {values:?}");
         }
     }
@@ -79,14 +79,17 @@ fn a_linear_liquid_keeps_dip_and_peak_from_0_05_newton_metres_on() {
 fn a_spherical_liquid_softens_in_its_plane_and_turns_from_0_15_newton_metres_on() {
     let (_, swept, spa) = &*TEN;
     let of = |name| figure(swept, "spherical", name);
-    let peak = of("f_res_hz");
+    let resonance = of("f_res_hz");
     // 2.473, 2.465, 2.446: the planar pendulum's -A²/16, far above the estimator's 1 mHz
-    assert!(peak[0] - peak[1] > 5e-3 && peak[1] - peak[2] > 10e-3, "{peak:?}");
+    assert!(
+        resonance[0] - resonance[1] > 5e-3 && resonance[1] - resonance[2] > 10e-3,
+        "{resonance:?}"
+    );
     let turning = of("rotary_s");
     assert_eq!(turning[..3], [0.0; 3], "planar up to 0.1");
     assert!(turning[3] > 60.0 && turning[4] > turning[3], "{turning:?}");
     assert!(of("swirl")[3].abs() > 0.9);
-    // once it turns, the peak follows the sweep by tenths of a hertz, in both estimates
+    // once it turns, the resonance follows the sweep by tenths of a hertz, in both estimates
     for table in [swept, spa] {
         let delta = figure(table, "spherical", "delta_f_hz");
         assert!(delta[3] > 0.25 && delta[4] > delta[3] + 0.2 && delta[2] < 0.12, "{delta:?}");
@@ -136,14 +139,14 @@ fn the_page_is_well_formed_and_has_every_panel() {
     let (page, ..) = &*TEN;
     well_formed(page);
     for words in [
-        "Beside the thesis",
+        "Comparison with the thesis",
         "Sweeps &amp; &lt;models&gt;",
-        "the models over each other",
-        "the models beside each other",
+        "models overlaid",
+        "models compared",
         "Fit, frequency domain",
         "Fit, time domain",
-        "Coherence of the rest",
-        "Signal over noise, dip",
+        "Residual coherence",
+        "Signal-to-noise ratio, antiresonance",
         "Off-axis energy",
         "Magnitude |H|",
         "Residual-input coherence",
@@ -172,18 +175,19 @@ fn the_page_is_well_formed_and_has_every_panel() {
 #[test]
 fn what_the_thesis_says_is_judged_by_the_runs() {
     let (page, ..) = &*TEN;
-    assert!(agrees(page, "With growing torque peak and dip move apart"));
-    assert!(agrees(page, "Peak and dip hardly depend on the torque"));
+    assert!(agrees(page, "With growing torque resonance and antiresonance move apart"));
+    assert!(agrees(page, "Resonance and antiresonance hardly depend on the torque"));
     assert!(
-        !agrees(page, "At moderate and large torque the bench's peak"),
+        !agrees(page, "At moderate and large torque the bench's resonance"),
         "the branch is too long"
     );
     assert!(!agrees(page, "The sweep is slow enough"));
     assert!(agrees(page, "So does the synthetic one"));
     // statements whose runs are not there (0.2 N.m) have no row
-    assert!(!page.contains("Turning comes and goes"));
+    assert!(!page.contains("Rotary slosh comes and goes"));
 
-    // without dry friction the linear peak has no reason to start higher: the verdict turns round
+    // without dry friction the linear resonance has no reason to start higher: the verdict turns
+    // round
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
     let plan = SWEEPS.replace("imu.enabled = true", "friction.model = \"viscous\"");
@@ -206,14 +210,15 @@ fn draws_have_histograms_and_scatter() {
     campaign(directory, plan);
     let page = page(directory);
     well_formed(&page);
-    for words in ["How dip and peak are spread", "draws</text>", "hub.I: ρ = "] {
+    for words in ["Distribution of antiresonance and resonance", "draws</text>", "hub.I: ρ = "] {
         assert!(page.contains(words), "{words}");
     }
     assert!(!page.contains("NaN"));
-    // more inertia, lower peak; the dip is the tank's own
+    // more inertia, lower resonance; the antiresonance is the tank's own
     let rho = page.split("hub.I: ρ = ").nth(1).unwrap().split('<').next().unwrap();
-    let peak: f64 = rho.split(", ").nth(1).unwrap().split('"').next().unwrap().parse().unwrap();
-    assert!(peak < -0.95, "{rho}");
+    let resonance: f64 =
+        rho.split(", ").nth(1).unwrap().split('"').next().unwrap().parse().unwrap();
+    assert!(resonance < -0.95, "{rho}");
 }
 
 /// Every element that is opened is closed, in order; attributes are quoted; no stray markup.
