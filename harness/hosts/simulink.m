@@ -19,16 +19,22 @@ add_block('simulink_extras/FMU Import/FMU', plant, 'FMUName', fmu);
 % The FMU offers both interfaces. If your release has taken Model Exchange, choose Co-Simulation in
 % the block's dialog, with 0.02 s as its step.
 
-% Parameters in SI units. Simulink shows their dots as levels of a structure; enumerations are
-% numbers: slosh.model 1 frozen, 2 linear, 3 planar, 4 spherical, 5 paraboloid.
+% Parameters in SI units. Simulink shows their dots as levels of a structure; an enumeration is set by
+% the name of its item, and where a release wants none, slosh.kind takes the item's number.
 mask = Simulink.Mask.get(plant);
-settings = {'slosh_model', '4'; 'tank_h', '0.05'; 'init_slosh_angle', '0.1'};
+settings = {'slosh_model', 'spherical'; 'tank_h', '0.05'; 'init_slosh_angle', '0.1'};
 names = {mask.Parameters.Name};
 for k = 1:size(settings, 1)
     % The name of a parameter's field is up to the release: dots may become underscores.
     here = find(strcmpi(regexprep(names, '[^A-Za-z0-9]', ''), strrep(settings{k, 1}, '_', '')), 1);
     assert(~isempty(here), 'no parameter %s among: %s', settings{k, 1}, strjoin(names, ', '));
-    set_param(plant, names{here}, settings{k, 2});
+    try
+        set_param(plant, names{here}, settings{k, 2});
+    catch refusal
+        if ~strcmp(settings{k, 1}, 'slosh_model'), rethrow(refusal); end
+        kind = find(strcmpi(regexprep(names, '[^A-Za-z0-9]', ''), 'sloshkind'), 1);
+        set_param(plant, names{kind}, '4'); % spherical
+    end
 end
 
 % Inputs in the order of the FMU: tau_cmd, tau_ext (N.m), g_axial (m/s2).

@@ -7,7 +7,7 @@ makes a virtual environment in the target directory and needs the network. It ta
 
 Basilisk's spacecraft is free in six degrees of freedom, ours turns about z alone. So Basilisk
 gets a hub of a very large mass M (and, about x and y, moments of inertia of M · 1 m²), with just
-our inertia about z: ``hub.I`` + m0 r², the frozen liquid's share included. Gravity along the
+our inertia about z: ``hub.I`` + m0 r², the rigid liquid's share included. Gravity along the
 tank's axis is a thrust (M + m) g along the body's z. What M leaves of the other five degrees of
 freedom goes to zero as 1/M, and the page shows it.
 """
@@ -78,7 +78,7 @@ class Case:
     zeta: float  # damping ratio
     m: float  # kg, pendulum
     length: float  # m, pendulum
-    inertia: float  # kg·m², hub and frozen liquid about z
+    inertia: float  # kg·m², hub and rigid liquid about z
 
     @property
     def omega_1(self) -> float:
@@ -246,7 +246,7 @@ def differences(a: Signals, b: Signals) -> list[float]:
 
 
 def timed(signals: Callable[[], Signals]) -> tuple[Signals, float]:
-    """Return what the call returns and the processor's time for it, s."""
+    """Return what the call returns and CPU time for it, s."""
     begin = time.process_time()
     return signals(), time.process_time() - begin
 
@@ -345,7 +345,7 @@ def page(
     described = "\n".join(f"* *{name}*: {start.text}." for name, start in starts(1.0).items())
     return "\n".join([
         "<!-- Written by harness/python/basilisk_comparison.py; do not edit. -->",
-        "# The spherical model beside Basilisk",
+        "# Comparison with Basilisk: the spherical model",
         "",
         f"Basilisk {version('bsk')} (AVS Lab, University of Colorado) has a spherical pendulum for",
         "slosh, `sphericalPendulum`, written apart from ours: angles where ours has the bob's",

@@ -5,14 +5,14 @@ use plant::{FrictionModel, Inputs, Outputs, Plant, Ramp, SloshModel};
 
 /// Tolerance of all runs here. The plant's errors come out two to three decades
 /// below the tolerance, so the bounds of 1e-8 below leave it room without hiding
-/// a wrong term, which shows as a part of the energy turned over.
+/// a wrong term, which shows as a part of the energy throughput.
 const TOLERANCE: f64 = 1e-9;
 
 fn plant(p: &plant::Parameters, inputs: &Inputs) -> Plant {
     Plant::new(p, inputs, 0.0, TOLERANCE).unwrap()
 }
 
-/// Energy turned over so far: work in either direction, and heat.
+/// Energy throughput so far: work in either direction, and heat.
 struct Turnover {
     first: Outputs,
     last: Outputs,
@@ -29,7 +29,7 @@ impl Turnover {
         self.last = now;
     }
 
-    /// |E(t) - E(0) - work + heat| against the energy turned over or present.
+    /// |E(t) - E(0) - work + heat| against the energy throughput or present.
     fn residual(&self) -> f64 {
         let gained = self.last.energy - self.first.energy;
         (gained - self.last.work + self.last.heat).abs() / (self.sum + self.first.energy)

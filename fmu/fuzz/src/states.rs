@@ -91,7 +91,7 @@ fn live(instance: &mut Instance) {
     survives_being_saved(instance);
 }
 
-/// Both interfaces, every model of the liquid, every state of life that can be reached without
+/// Both interfaces, every model of the liquid, every instance state that can be reached without
 /// an error.
 fn bases() -> &'static [Vec<u8>] {
     static BASES: OnceLock<Vec<Vec<u8>>> = OnceLock::new();

@@ -93,13 +93,13 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         "Torque of the bearing's friction on the hub, opposes omega; while stuck it balances all other torques")
         .display_unit("mN.m").nominal(0.01).depends_on(ALL_TORQUES).initial_depends_on(DYNAMICS),
     V::output("tau_fluid", |o, _| o.tau_fluid, "N.m",
-        "Torque of the whole liquid, its frozen part included, on the hub: hub.I omega_dot = tau_actuator + tau_ext + tau_friction + tau_fluid")
+        "Torque of the whole liquid, its rigid part included, on the hub: hub.I omega_dot = tau_actuator + tau_ext + tau_friction + tau_fluid")
         .display_unit("mN.m").nominal(0.1).depends_on(ALL_TORQUES).initial_depends_on(DYNAMICS),
     V::output("F_tangential", |o, _| o.f_tangential, "N",
-        "Force of the liquid, its frozen part included, on the tank, hub frame: tangential, positive towards +theta")
+        "Force of the liquid, its rigid part included, on the tank, hub frame: tangential, positive towards +theta")
         .depends_on(ALL_TORQUES).initial_depends_on(DYNAMICS),
     V::output("F_radial", |o, _| o.f_radial, "N",
-        "Force of the liquid, its frozen part included, on the tank, hub frame: radial, positive outwards")
+        "Force of the liquid, its rigid part included, on the tank, hub frame: radial, positive outwards")
         .depends_on(ALL_TORQUES).initial_depends_on(DYNAMICS),
     V::output("wave_height", |o, _| o.wave_height, "m",
         "Height of the wave at the tank's wall above the surface at rest, from linear theory; above a quarter of the tank's radius an indicator rather than a height")
@@ -137,7 +137,7 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         "Work done on the hub by tau_actuator and tau_ext since the start")
         .nominal(0.01).is_state(|_| x::WORK).depends_on(&["work"]),
     V::local("heat", |o, _| o.heat, "J",
-        "Heat made by bearing and liquid since the start")
+        "Energy dissipated by bearing and liquid since the start")
         .nominal(0.01).is_state(|_| x::HEAT).depends_on(&["heat"]),
     V::local("work_axial", |o, _| o.work_axial, "J",
         "Work done on the liquid through changes of g_axial since the start: energy - energy(0) = work + work_axial - heat. Co-Simulation: exact, also for jumps; Model Exchange: added up at accepted steps, to the fourth order of their length where g_axial is linear in time")

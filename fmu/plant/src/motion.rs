@@ -88,7 +88,7 @@ impl core::fmt::Display for StepError {
 /// J w' = tau + tau_f + T, J = I0 + sum of J_i, T = sum of T_i over the modes.
 #[derive(Clone, Debug)]
 pub(crate) struct Motion {
-    /// Inertia of hub and frozen liquid, kg m2.
+    /// Inertia of hub and rigid liquid, kg m2.
     pub i0: f64,
     pub law: Law,
     pub damping: Damping,

@@ -630,7 +630,7 @@ fn new_state<M: Model>(instance: Instance<M>) -> fmi2FMUstate {
     Box::into_raw(Box::new(SavedState { mark: STATE, instance })).cast()
 }
 
-/// Takes a saved state, this instance's or another's, in any state of life.
+/// Takes a saved state, this instance's or another's, in any instance state.
 pub unsafe fn fmi2SetFMUstate<M: Model>(c: fmi2Component, FMUstate: fmi2FMUstate) -> fmi2Status {
     let operation = &op::SET_FMU_STATE;
     unsafe {

@@ -3,7 +3,7 @@
 //! the unit is a fixed-step RK4 of 5 ms.
 //!
 //! All see the same torque, lines between knots 20 ms apart, from a sweep of
-//! 0.1 N·m from 2.2 to 2.6 Hz over dip and peak (10 cm fill).
+//! 0.1 N·m from 2.2 to 2.6 Hz over antiresonance and resonance (10 cm fill).
 //!
 //! `cargo bench -p bench`
 

@@ -20,7 +20,7 @@ impl Random {
         Random(generator)
     }
 
-    /// Evenly from 0 (can come) to 1 (cannot).
+    /// Uniformly from 0 (can come) to 1 (cannot).
     pub fn uniform(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }

@@ -1,4 +1,4 @@
-//! What a bench says of a tank in flight: Bond numbers, the tank that has the same ones,
+//! What a bench says of a flight tank: Bond numbers, the tank that has the same ones,
 //! Froude's factors (Rubaga's thesis 2.5, 2.6, 7.2, with its figures corrected).
 //!
 //! ```text
@@ -117,7 +117,7 @@ fn positive(values: &[(&str, f64)]) -> Result<()> {
     Ok(())
 }
 
-/// What is known of the tank in flight.
+/// What is known of the flight tank.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Flight {
     /// Its radius, m; wanted is the acceleration.
@@ -126,7 +126,7 @@ pub enum Flight {
     Acceleration(f64),
 }
 
-/// The bench's Bond number and the tank in flight that has the same, in words.
+/// The bench's Bond number and the flight tank that has the same, in words.
 pub fn bond_text(
     bench: Liquid,
     (a, radius): (f64, f64),

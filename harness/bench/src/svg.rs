@@ -88,11 +88,11 @@ fn round_step(step: f64) -> f64 {
 pub enum Style {
     /// A line.
     Line,
-    /// A broken line.
+    /// A dashed line.
     Dashed,
     /// A line with filled dots.
     Dots,
-    /// A broken line with open dots.
+    /// A dashed line with open dots.
     OpenDots,
     /// Small dots without a line.
     Cloud,

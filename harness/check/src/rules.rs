@@ -144,7 +144,7 @@ pub static RULES: &[Rule] = &[
     rule("steps.start_time", Error, "any start time works", "2.1.6", Calls(steps::start_time)),
     rule("steps.stop_time", Warning, "the stop time is reached with rounding, and not passed", "2.1.6", Calls(steps::stop_time)),
     rule("steps.tolerance", Error, "a tolerance may be given or not", "2.1.6; OMSimulator gives one", Calls(steps::tolerance)),
-    rule("steps.cut", Warning, "results do not depend on how time is cut, within the tolerance", "4.3.1, canHandleVariableCommunicationStepSize", Calls(steps::cut)),
+    rule("steps.cut", Warning, "results do not depend on the choice of communication step, within the tolerance", "4.3.1, canHandleVariableCommunicationStepSize", Calls(steps::cut)),
     rule("steps.small", Error, "many small steps (0.4 ms, 10 us) lead where few usual ones do", "4.3.1, canHandleVariableCommunicationStepSize", Calls(steps::small)),
     rule("steps.inputs", Warning, "inputs that are NaN are refused; derivatives of inputs are taken if declared", "4.2.1", Calls(steps::inputs)),
     rule("steps.output_derivatives", Warning, "derivatives of outputs are those of the outputs", "4.2.1, maxOutputDerivativeOrder", Calls(steps::output_derivatives)),

@@ -258,7 +258,7 @@ fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
         };
         findings.add(
             place(child),
-            format!("it does not belong into {} (allowed: {allowed})", element.name),
+            format!("it is not allowed in {} (allowed: {allowed})", element.name),
         );
     };
     match kind.children {

@@ -49,7 +49,7 @@ impl Model {
         format!("extra/{}", self.name)
     }
 
-    /// The software bill of materials (SBOM) in the FMU.
+    /// The software SBOM (SBOM) in the FMU.
     pub fn sbom(&self) -> String {
         format!("{}/{}.cdx.json", self.extra(), self.name)
     }

@@ -10,7 +10,7 @@ import pytest
 import check_analysis
 from check_analysis import TOLERANCES
 
-# Around dip and peak at about the thesis's rate; 0.16 N·m makes the spherical liquid turn.
+# Around antiresonance and resonance at about the thesis's rate; 0.16 N·m brings rotary slosh.
 PLAN = """
 title = "For the analysis"
 profile = "exp-sweep:f0=2.1,f1=2.8,duration=800"
@@ -52,7 +52,7 @@ def test_every_figure_is_found_again_from_the_definitions(campaign: Path) -> Non
 
 
 def test_a_wrong_figure_is_seen(campaign: Path) -> None:
-    """A dip 4 mHz off, and one that is missing."""
+    """An antiresonance 4 mHz off, and one that is missing."""
     path = campaign / "features_spa.csv"
     text = path.read_text(encoding="utf-8")
     rows = list(csv.DictReader(text.splitlines()))

@@ -65,7 +65,7 @@ def test_held_input_half_a_step_early_has_no_delay(fmu: Path) -> None:
     Held values are late by half a step: ωH/2 = 0.15 of the torque. Taken half a step early, what
     is left is of second order: (ωH)²/24 = 0.004 of the torque's fundamental is missing, and
     within a step the torque is off by up to ωH/2 both ways, which moves the rate by (ωH)²/8 =
-    0.011 of what it would be on the hub alone, a few times what it is near the dip.
+    0.011 of what it would be on the hub alone, a few times what it is near the antiresonance.
     """
     fine = np.arange(60001) * 0.001
     exact = drive(fmu, fine, tau(fine))["omega"][::20]

@@ -82,7 +82,7 @@ impl Liquid {
             calculated.pendulums(p).map(|pendulum| M::new(&pendulum)).collect()
         }
         match p.slosh.model {
-            // Frozen liquid is a linear model without modes.
+            // Rigid liquid is a linear model without modes.
             SloshModel::Frozen | SloshModel::Linear => Liquid::Linear(modes(p, calculated)),
             SloshModel::Planar => Liquid::Planar(modes(p, calculated)),
             SloshModel::Spherical => Liquid::Spherical(modes(p, calculated)),

@@ -16,7 +16,7 @@ use super::{Complex64, FrequencyResponse};
 /// Parameters of the linear model.
 #[derive(Clone, Debug, Default)]
 pub struct Linear {
-    /// I0, hub and frozen liquid about the axis, kg·m².
+    /// I0, hub and rigid liquid about the axis, kg·m².
     pub inertia: f64,
     /// b, viscous friction, N·m·s.
     pub friction: f64,

@@ -46,7 +46,7 @@ impl FrequencyResponse {
 /// The band the thesis looks at (6.3.1), Hz.
 pub const BAND: (f64, f64) = (1.25, 3.5);
 
-/// `points` frequencies from one end of the band to the other, evenly spaced in log f, Hz.
+/// `points` frequencies from one end of the band to the other, equally spaced in log f, Hz.
 pub fn logarithmic_grid((from, to): (f64, f64), points: usize) -> Vec<f64> {
     let step = (to / from).ln() / (points - 1) as f64;
     (0..points).map(|i| from * (i as f64 * step).exp()).collect()
