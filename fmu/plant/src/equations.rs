@@ -35,11 +35,8 @@ impl Plant {
     /// x'.
     pub fn derivatives(&mut self, inputs: &Inputs) -> [f64; STATES] {
         self.evaluate(inputs);
-        let stuck = self.state.contact == Contact::Stuck;
         let torque = self.wheel.torque(self.state.x[x::WHEEL_SPEED], inputs.tau_cmd);
-        let mut derivatives = self.coefficients::<0>(-torque.value / self.wheel.inertia);
-        derivatives[x::STUCK_TIME] = if stuck { 1.0 } else { 0.0 };
-        derivatives.map(unsigned_zero)
+        self.coefficients::<0>(-torque.value / self.wheel.inertia).map(unsigned_zero)
     }
 
     /// The derivative of x' in the direction (dx, du), du = [tau_cmd, tau_ext, g_axial]:
@@ -63,6 +60,7 @@ impl Plant {
             self.motion.derivatives::<0, true, _>(modes, contact);
             self.motion.hub.theta[1] = dx[x::THETA];
             self.motion.hub.omega[1] = dx[x::OMEGA];
+            self.motion.law.set_states::<1>(dx);
             for (mode, dq) in modes.iter_mut().zip(dx[x::SLOSH..].as_chunks::<4>().0) {
                 mode.seed_direction(dq, &self.motion.hub);
             }
@@ -80,6 +78,7 @@ impl Plant {
         derivatives[x::WORK] = motion.power[N];
         derivatives[x::HEAT] = motion.dissipation[N];
         derivatives[x::WHEEL_SPEED] = wheel;
+        motion.law.derivatives::<N>(self.state.contact, &mut derivatives);
         with_modes!(&self.liquid, modes => {
             let slosh = derivatives[x::SLOSH..].as_chunks_mut::<4>().0;
             for (mode, derivatives) in modes.iter().zip(slosh) {
@@ -142,7 +141,7 @@ impl Plant {
             *speed = speed.max(self.wheel.speed_min).min(self.wheel.speed_max);
         }
         if self.state.contact as i8 as f64 * self.omega() <= 0.0 {
-            if self.motion.law.switches_at_rest() {
+            if self.motion.law.sticks() {
                 self.state.x[x::OMEGA] = 0.0;
             }
             self.find_contact(inputs);
@@ -244,9 +243,6 @@ mod tests {
     use super::*;
     use crate::{FrictionModel, Outputs, Parameters, SloshModel};
 
-    const SLOSH: [SloshModel; 5] = SloshModel::ALL;
-    const FRICTION: [FrictionModel; 4] = FrictionModel::ALL;
-
     fn plant(slosh: SloshModel, friction: FrictionModel) -> (Plant, Inputs) {
         let mut p = Parameters::default();
         p.slosh.model = slosh;
@@ -272,8 +268,8 @@ mod tests {
 
     #[test]
     fn directional_derivatives_agree_with_finite_differences() {
-        for slosh in SLOSH {
-            for friction in FRICTION {
+        for slosh in SloshModel::ALL {
+            for friction in FrictionModel::ALL {
                 let (mut plant, inputs) = plant(slosh, friction);
                 let x = *plant.continuous_states();
                 let unit = |i: usize| -> ([f64; STATES], [f64; 3]) {
@@ -345,8 +341,8 @@ mod tests {
             |o| o.work,
             |o| o.heat,
         ];
-        for slosh in SLOSH {
-            for friction in FRICTION {
+        for slosh in SloshModel::ALL {
+            for friction in FrictionModel::ALL {
                 for stuck in [false, true] {
                     let (mut plant, inputs) = plant(slosh, friction);
                     if stuck {
@@ -454,7 +450,7 @@ mod tests {
 
     #[test]
     fn a_motion_whose_energy_overflows_is_refused() {
-        for slosh in SLOSH {
+        for slosh in SloshModel::ALL {
             // omega, and the tangential rate of the first mode
             let places = if slosh == SloshModel::Frozen {
                 &[x::OMEGA][..]
@@ -497,7 +493,7 @@ mod tests {
     #[test]
     fn a_host_that_integrates_itself_meets_the_plants_own_steps() {
         // Runge-Kutta 4 at 0.1 ms: (omega_2 h)^4 = 4e-11 a step's share; 1e-9 over 0.2 s.
-        for slosh in SLOSH {
+        for slosh in SloshModel::ALL {
             let (mut plant, inputs) = plant(slosh, FrictionModel::Viscous);
             let mut own = plant.clone();
             let h = 1e-4;

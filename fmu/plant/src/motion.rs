@@ -147,6 +147,7 @@ impl Motion {
             let factor = self.damping.expand(g, self.near_weightless, &mut self.hub);
             modes.iter_mut().for_each(|mode| mode.set_damping(factor));
         }
+        self.law.set_states::<0>(&state.x);
         self.tau = [tau.value, tau.slope];
         for (mode, q) in modes.iter_mut().zip(state.slosh()) {
             mode.start(q, &self.hub);
@@ -189,7 +190,7 @@ impl Motion {
         self.hub.theta[N + 1] = series::next::<N>(self.hub.omega[N]);
         self.hub.omega[N + 1] = series::next::<N>(self.hub.omega_dot[N]);
         self.power[N] = series::mul_ramp::<N>(&self.tau, &self.hub.omega);
-        self.dissipation[N] = -series::mul::<N>(&self.tau_f, &self.hub.omega);
+        self.dissipation[N] = self.law.dissipation::<N>(&self.tau_f, &self.hub.omega);
         for mode in modes.iter_mut() {
             mode.accelerate::<N, RAMP>(&self.hub);
             self.dissipation[N] += mode.dissipation::<N, RAMP>();
@@ -234,7 +235,8 @@ impl Motion {
                 if N + 2 >= MIN_ORDER {
                     let slosh = modes.iter().map(|m| m.coefficient_norm(N + 1)).fold(0.0, larger);
                     let is_negligible = self.hub.omega[N + 1].abs() * power <= hub_allowed
-                        && slosh * power <= slosh_allowed;
+                        && slosh * power <= slosh_allowed
+                        && self.law.coefficient_norm(N + 1) * power <= allowed;
                     negligible = if is_negligible { negligible + 1 } else { 0 };
                     if negligible >= negligible_terms {
                         return (N + 1, h);
@@ -246,6 +248,7 @@ impl Motion {
         let length = |n: usize| {
             let slosh = modes.iter().map(|m| m.coefficient_norm(n)).fold(0.0, f64::max);
             let term = f64::max(self.hub.omega[n].abs() / hub_allowed, slosh / slosh_allowed);
+            let term = f64::max(term, self.law.coefficient_norm(n) / allowed);
             if term > 0.0 { libm::exp(-libm::log(term) / n as f64) } else { h }
         };
         (highest, h.min(length(highest)).min(length(highest - 1)))
@@ -262,7 +265,12 @@ impl Motion {
             return Contact::Backward;
         }
         self.derivatives::<0, false, M>(modes, Contact::Stuck);
-        self.law.contact_at_rest(self.net[0], state.x[x::THETA], state.contact)
+        // A law that can't hold the hub needs to know where the torque goes from 0.
+        if !self.law.sticks() {
+            self.derivatives::<1, false, M>(modes, Contact::Stuck);
+        }
+        let net = [self.net[0], self.net[1]];
+        self.law.contact_at_rest(net, state.x[x::THETA], state.contact)
     }
 
     pub fn too_many_steps(&self, time: f64) -> StepError {
@@ -396,9 +404,7 @@ impl Motion {
                     return Err(StepError::OutOfRange { time, mode: i + 1, what });
                 }
             }
-            if stuck {
-                state.x[x::STUCK_TIME] += length;
-            }
+            self.law.advance(contact, n, length, &mut state.x);
             t = if length == left { h } else { t + length };
             let acting = (tau.after(t), g.after(t));
             match event {

@@ -121,9 +121,9 @@ impl Plant {
         let (w, wd) = (state.x[x::OMEGA], hub.omega_dot[0]);
         let mut force = [self.m_0 * self.r * w * w, -self.m_0 * self.r * wd];
         let mut tau_fluid = -self.i_0 * wd;
-        let mut energy = (self.hub_inertia + self.i_0) * w * w / 2.0;
+        let mut energy =
+            (self.hub_inertia + self.i_0) * w * w / 2.0 + self.motion.law.energy::<0>();
         let mut momentum = (self.hub_inertia + self.i_0) * w;
-        let mut dissipated = -self.motion.tau_f[0] * w;
         let mut wave = [0.0; 2];
         let mut mode1 = Angles::default();
         with_modes!(&mut self.liquid, modes => for (i, mode) in modes.iter_mut().enumerate() {
@@ -133,7 +133,6 @@ impl Plant {
             tau_fluid += mode.torque(hub);
             energy += mode.energy(hub);
             momentum += mode.momentum(hub);
-            dissipated += mode.dissipation::<0, false>();
             let angles = mode.angles();
             wave[0] += self.wave[i] * angles.angle[0];
             wave[1] += self.wave[i] * angles.angle[1];
@@ -159,7 +158,7 @@ impl Plant {
             omega_imu: if self.imu.enabled { state.gyro.held } else { w },
             energy,
             momentum: unsigned_zero(momentum),
-            power_dissipated: unsigned_zero(dissipated),
+            power_dissipated: unsigned_zero(self.motion.dissipation[0]),
             tau_actuator: unsigned_zero(tau_actuator),
             wheel_speed: state.x[x::WHEEL_SPEED],
             work: state.x[x::WORK],
@@ -194,7 +193,7 @@ impl Plant {
         let derivatives = self.directional_derivative(inputs, dx, du);
         let motion = &self.motion;
         let (friction, friction_d) = (motion.tau_f[0], motion.tau_f[1]);
-        let dissipation_d = motion.dissipation[1];
+        let (dissipation_d, stored_d) = (motion.dissipation[1], motion.law.energy::<1>());
         let command = Ramp { value: inputs.tau_cmd.value, slope: du[0] };
         let torque = self.wheel.torque(self.state.x[x::WHEEL_SPEED], command);
 
@@ -244,7 +243,7 @@ impl Plant {
             wave_height: if now.wave_height > 0.0 { wave_height / now.wave_height } else { 0.0 },
             wave,
             omega_imu: if self.imu.enabled { 0.0 } else { dx[x::OMEGA] },
-            energy: by_differences(|o| o.energy),
+            energy: by_differences(|o| o.energy) + stored_d,
             momentum: by_differences(|o| o.momentum),
             power_dissipated: dissipation_d,
             tau_actuator: torque.slope,

@@ -90,6 +90,14 @@ impl DirectionalFactor {
             .collect()
     }
 
+    /// Bounds of B over both directions and all angles.
+    pub fn bounds(&self) -> (f64, f64) {
+        let both = [self.forward, self.backward];
+        let mirrored = both.map(|b| OneWay { mean: -b.mean, harmonics: b.harmonics.map(|h| -h) });
+        let lowest = |of: [OneWay; 2]| of.iter().map(OneWay::lowest).fold(f64::INFINITY, f64::min);
+        (lowest(both), -lowest(mirrored))
+    }
+
     /// B- and B+ at an angle.
     pub fn at(&self, theta: f64) -> (f64, f64) {
         (self.backward.at(theta), self.forward.at(theta))

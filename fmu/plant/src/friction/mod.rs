@@ -10,56 +10,10 @@ mod stribeck_smooth;
 mod viscous;
 
 use crate::Friction;
-use crate::series::Series;
+use crate::series::{self, Series};
 use crate::slosh::HubMotion;
+use crate::state::STATES;
 use directional::DirectionalFactor;
-use stribeck::Stribeck;
-use stribeck_smooth::StribeckSmooth;
-use viscous::Viscous;
-
-/// The laws of the bearing's friction; when to choose which is said in their files.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum FrictionModel {
-    /// A free bearing.
-    None = 1,
-    /// b omega.
-    Viscous = 2,
-    /// Stribeck curve with sgn(omega) smoothed to tanh(omega / eps).
-    StribeckSmooth = 3,
-    /// Stribeck curve as a set-valued law: the hub can stick.
-    Stribeck = 4,
-}
-
-impl FrictionModel {
-    /// All of them, in the order of their numbers.
-    pub const ALL: [FrictionModel; 4] = [
-        FrictionModel::None,
-        FrictionModel::Viscous,
-        FrictionModel::StribeckSmooth,
-        FrictionModel::Stribeck,
-    ];
-}
-
-/// The law in use; the plant has one, in a box with all other series.
-#[derive(Clone, Debug)]
-#[allow(clippy::large_enum_variant)]
-pub enum Law {
-    Viscous(Viscous),
-    StribeckSmooth(StribeckSmooth),
-    Stribeck(Stribeck),
-}
-
-/// Does the same with whatever law is in use.
-macro_rules! with_law {
-    ($of:expr, $law:ident => $do:expr) => {
-        match $of {
-            Law::Viscous($law) => $do,
-            Law::StribeckSmooth($law) => $do,
-            Law::Stribeck($law) => $do,
-        }
-    };
-}
 
 /// How the hub stands to the bearing under a law that switches at rest.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,19 +27,57 @@ pub enum Contact {
     Forward = 1,
 }
 
-/// A law of friction as a set of power series in time.
+/// A law of friction as a set of power series in time. It may have states of its own among the
+/// plant's; w = 0 may be a place where it switches.
 pub trait FrictionLaw {
     /// Whether the law switches where w = 0, so that this instant has to be located; if not,
     /// the contact is always [`Contact::Forward`].
     const SWITCHES_AT_REST: bool = false;
 
+    /// Whether it can hold the hub exactly at rest.
+    const STICKS: bool = false;
+
     /// How many negligible terms in succession show that the series has converged. One term
     /// may vanish by symmetry.
     const NEGLIGIBLE_TERMS: usize = 2;
 
+    /// The law that the parameters describe.
+    fn new(p: &Friction) -> Self;
+
+    /// What is wrong with the law's parameters together.
+    fn problems(_p: &Friction) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// Sets the law's states, or with ORDER = 1 their direction for a partial derivative.
+    fn set_states<const ORDER: usize>(&mut self, _x: &[f64; STATES]) {}
+
     /// Coefficient N of tau_f while the hub is not stuck, from coefficients up to N of theta,
-    /// w and w^2.
+    /// w, w^2 and the law's states; and coefficient N + 1 of the latter.
     fn torque<const N: usize>(&mut self, contact: Contact, hub: &HubMotion) -> f64;
+
+    /// Coefficient N of the power that the bearing dissipates, W, after `torque`.
+    #[inline(always)]
+    fn dissipation<const N: usize>(&self, tau_f: &Series, omega: &Series) -> f64 {
+        -series::mul::<N>(tau_f, omega)
+    }
+
+    /// Coefficient N, 0 or 1, of the energy stored in the bearing, J.
+    fn energy<const N: usize>(&self) -> f64 {
+        0.0
+    }
+
+    /// Coefficient N, 0 or 1, of the derivatives of the law's states.
+    fn derivatives<const N: usize>(&self, _contact: Contact, _derivatives: &mut [f64; STATES]) {}
+
+    /// Moves the law's states on by `t`, from the series cut after order n.
+    fn advance(&self, _contact: Contact, _n: usize, _t: f64, _x: &mut [f64; STATES]) {}
+
+    /// Size of coefficient n of the law's states; the scale of its errors is 1.
+    #[inline(always)]
+    fn coefficient_norm(&self, _n: usize) -> f64 {
+        0.0
+    }
 
     /// How far ahead the series of tau_f can converge, s, from w, w' and w'', where its
     /// coefficients do not tell.
@@ -99,69 +91,170 @@ pub trait FrictionLaw {
         (0.0, 0.0)
     }
 
-    /// The contact of a hub with w = 0 on which the torque `net` acts besides friction; it
-    /// had the contact `before`.
-    fn contact_at_rest(&self, _net: f64, _theta: f64, _before: Contact) -> Contact {
+    /// The contact of a hub with w = 0 that had the contact `before`; `net` is the torque
+    /// besides friction and, unless the law sticks, its rate, with the hub held.
+    fn contact_at_rest(&self, _net: [f64; 2], _theta: f64, _before: Contact) -> Contact {
         Contact::Forward
     }
 }
 
+/// The one list of all laws: number, type, what it is.
+macro_rules! laws {
+    ($($(#[$doc:meta])* $name:ident = $number:literal, $law:ty;)*) => {
+        /// The laws of the bearing's friction; when to choose which is said in their files.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(u8)]
+        pub enum FrictionModel {
+            $($(#[$doc])* $name = $number,)*
+        }
+
+        impl FrictionModel {
+            /// All of them, in the order of their numbers.
+            pub const ALL: [FrictionModel; [$($number),*].len()] = [$(FrictionModel::$name,)*];
+        }
+
+        /// The law in use; the plant has one, in a box with all other series.
+        #[derive(Clone, Debug)]
+        #[allow(clippy::large_enum_variant)]
+        pub enum Law {
+            $($name($law),)*
+        }
+
+        impl Law {
+            /// The law that the parameters describe.
+            pub fn new(p: &Friction) -> Law {
+                match p.model {
+                    $(FrictionModel::$name => Law::$name(<$law>::new(p)),)*
+                }
+            }
+
+            /// What is wrong with the parameters together.
+            pub fn problems(p: &Friction) -> Vec<String> {
+                let mut problems = DirectionalFactor::problems(p);
+                problems.extend(match p.model {
+                    $(FrictionModel::$name => <$law>::problems(p),)*
+                });
+                problems
+            }
+
+            /// See [`FrictionLaw::SWITCHES_AT_REST`].
+            #[inline(always)]
+            pub fn switches_at_rest(&self) -> bool {
+                match self {
+                    $(Law::$name(_) => <$law>::SWITCHES_AT_REST,)*
+                }
+            }
+
+            /// See [`FrictionLaw::STICKS`].
+            pub fn sticks(&self) -> bool {
+                match self {
+                    $(Law::$name(_) => <$law>::STICKS,)*
+                }
+            }
+
+            /// See [`FrictionLaw::NEGLIGIBLE_TERMS`].
+            #[inline(always)]
+            pub fn negligible_terms(&self) -> usize {
+                match self {
+                    $(Law::$name(_) => <$law>::NEGLIGIBLE_TERMS,)*
+                }
+            }
+
+            /// See [`FrictionLaw::set_states`].
+            #[inline(always)]
+            pub fn set_states<const ORDER: usize>(&mut self, x: &[f64; STATES]) {
+                match self {
+                    $(Law::$name(law) => law.set_states::<ORDER>(x),)*
+                }
+            }
+
+            /// See [`FrictionLaw::torque`].
+            #[inline(always)]
+            pub fn torque<const N: usize>(&mut self, contact: Contact, hub: &HubMotion) -> f64 {
+                match self {
+                    $(Law::$name(law) => law.torque::<N>(contact, hub),)*
+                }
+            }
+
+            /// See [`FrictionLaw::dissipation`].
+            #[inline(always)]
+            pub fn dissipation<const N: usize>(&self, tau_f: &Series, omega: &Series) -> f64 {
+                match self {
+                    $(Law::$name(law) => law.dissipation::<N>(tau_f, omega),)*
+                }
+            }
+
+            /// See [`FrictionLaw::energy`].
+            pub fn energy<const N: usize>(&self) -> f64 {
+                match self {
+                    $(Law::$name(law) => law.energy::<N>(),)*
+                }
+            }
+
+            /// See [`FrictionLaw::derivatives`].
+            pub fn derivatives<const N: usize>(
+                &self,
+                contact: Contact,
+                derivatives: &mut [f64; STATES],
+            ) {
+                match self {
+                    $(Law::$name(law) => law.derivatives::<N>(contact, derivatives),)*
+                }
+            }
+
+            /// See [`FrictionLaw::advance`].
+            #[inline(always)]
+            pub fn advance(&self, contact: Contact, n: usize, t: f64, x: &mut [f64; STATES]) {
+                match self {
+                    $(Law::$name(law) => law.advance(contact, n, t, x),)*
+                }
+            }
+
+            /// See [`FrictionLaw::coefficient_norm`].
+            #[inline(always)]
+            pub fn coefficient_norm(&self, n: usize) -> f64 {
+                match self {
+                    $(Law::$name(law) => law.coefficient_norm(n),)*
+                }
+            }
+
+            /// See [`FrictionLaw::convergence_radius`].
+            #[inline(always)]
+            pub fn convergence_radius(&self, omega: &Series) -> f64 {
+                match self {
+                    $(Law::$name(law) => law.convergence_radius(omega),)*
+                }
+            }
+
+            /// See [`FrictionLaw::holds`].
+            pub fn holds(&self, theta: f64) -> (f64, f64) {
+                match self {
+                    $(Law::$name(law) => law.holds(theta),)*
+                }
+            }
+
+            /// See [`FrictionLaw::contact_at_rest`].
+            pub fn contact_at_rest(&self, net: [f64; 2], theta: f64, before: Contact) -> Contact {
+                match self {
+                    $(Law::$name(law) => law.contact_at_rest(net, theta, before),)*
+                }
+            }
+        }
+    };
+}
+
+laws! {
+    /// A free bearing.
+    None = 1, viscous::Free;
+    /// b omega.
+    Viscous = 2, viscous::Viscous;
+    /// Stribeck curve with sgn(omega) smoothed to tanh(omega / eps).
+    StribeckSmooth = 3, stribeck_smooth::StribeckSmooth;
+    /// Stribeck curve as a set-valued law: the hub can stick.
+    Stribeck = 4, stribeck::Stribeck;
+}
+
 impl Law {
     /// No friction.
-    pub const NONE: Law = Law::Viscous(Viscous { b: 0.0 });
-
-    /// The law that the parameters describe.
-    pub fn new(p: &Friction) -> Law {
-        match p.model {
-            FrictionModel::None => Law::NONE,
-            FrictionModel::Viscous => Law::Viscous(Viscous { b: p.b }),
-            FrictionModel::StribeckSmooth => Law::StribeckSmooth(StribeckSmooth::new(p)),
-            FrictionModel::Stribeck => Law::Stribeck(Stribeck::new(p)),
-        }
-    }
-
-    /// What is wrong with the parameters together.
-    pub fn problems(p: &Friction) -> Vec<String> {
-        DirectionalFactor::problems(p)
-    }
-
-    /// See [`FrictionLaw::SWITCHES_AT_REST`].
-    #[inline(always)]
-    pub fn switches_at_rest(&self) -> bool {
-        fn of<L: FrictionLaw>(_: &L) -> bool {
-            L::SWITCHES_AT_REST
-        }
-        with_law!(self, law => of(law))
-    }
-
-    /// See [`FrictionLaw::NEGLIGIBLE_TERMS`].
-    #[inline(always)]
-    pub fn negligible_terms(&self) -> usize {
-        fn of<L: FrictionLaw>(_: &L) -> usize {
-            L::NEGLIGIBLE_TERMS
-        }
-        with_law!(self, law => of(law))
-    }
-
-    /// See [`FrictionLaw::torque`].
-    #[inline(always)]
-    pub fn torque<const N: usize>(&mut self, contact: Contact, hub: &HubMotion) -> f64 {
-        with_law!(self, law => law.torque::<N>(contact, hub))
-    }
-
-    /// See [`FrictionLaw::convergence_radius`].
-    #[inline(always)]
-    pub fn convergence_radius(&self, omega: &Series) -> f64 {
-        with_law!(self, law => law.convergence_radius(omega))
-    }
-
-    /// See [`FrictionLaw::holds`].
-    pub fn holds(&self, theta: f64) -> (f64, f64) {
-        with_law!(self, law => law.holds(theta))
-    }
-
-    /// See [`FrictionLaw::contact_at_rest`].
-    pub fn contact_at_rest(&self, net: f64, theta: f64, before: Contact) -> Contact {
-        with_law!(self, law => law.contact_at_rest(net, theta, before))
-    }
+    pub const NONE: Law = Law::None(viscous::Free);
 }

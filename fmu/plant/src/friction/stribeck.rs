@@ -17,6 +17,7 @@ use super::{Contact, FrictionLaw};
 use crate::Friction;
 use crate::series::{self, Series, ZERO};
 use crate::slosh::HubMotion;
+use crate::state::{STATES, x};
 
 #[derive(Clone, Debug)]
 pub struct Stribeck {
@@ -28,11 +29,6 @@ pub struct Stribeck {
 }
 
 impl Stribeck {
-    pub fn new(p: &Friction) -> Stribeck {
-        let (curve, factor) = (StribeckCurve::new(p), DirectionalFactor::new(p));
-        Stribeck { b: p.b, curve, factor, present: ZERO }
-    }
-
     /// Coefficient N of sgn(w) T_C B where B depends on the angle.
     // Once for all slosh models.
     #[inline(never)]
@@ -45,6 +41,12 @@ impl Stribeck {
 
 impl FrictionLaw for Stribeck {
     const SWITCHES_AT_REST: bool = true;
+    const STICKS: bool = true;
+
+    fn new(p: &Friction) -> Stribeck {
+        let (curve, factor) = (StribeckCurve::new(p), DirectionalFactor::new(p));
+        Stribeck { b: p.b, curve, factor, present: ZERO }
+    }
 
     #[inline(always)]
     fn torque<const N: usize>(&mut self, contact: Contact, hub: &HubMotion) -> f64 {
@@ -60,12 +62,23 @@ impl FrictionLaw for Stribeck {
         -self.b * hub.omega[N] - dry
     }
 
+    fn derivatives<const N: usize>(&self, contact: Contact, derivatives: &mut [f64; STATES]) {
+        derivatives[x::STUCK_TIME] = if N == 0 && contact == Contact::Stuck { 1.0 } else { 0.0 };
+    }
+
+    #[inline(always)]
+    fn advance(&self, contact: Contact, _: usize, t: f64, x: &mut [f64; STATES]) {
+        if contact == Contact::Stuck {
+            x[x::STUCK_TIME] += t;
+        }
+    }
+
     fn holds(&self, theta: f64) -> (f64, f64) {
         let ((backward, forward), dry) = (self.factor.at(theta), self.curve.at_rest());
         (dry * backward, dry * forward)
     }
 
-    fn contact_at_rest(&self, net: f64, theta: f64, before: Contact) -> Contact {
+    fn contact_at_rest(&self, [net, _]: [f64; 2], theta: f64, before: Contact) -> Contact {
         let (against_backward, against_forward) = self.holds(theta);
         // A hub that has just broken away is at the limit, give or take rounding.
         let limit = |hold: f64, from: Contact| {

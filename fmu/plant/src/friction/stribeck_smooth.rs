@@ -35,8 +35,12 @@ pub struct StribeckSmooth {
     sign: Series,
 }
 
-impl StribeckSmooth {
-    pub fn new(p: &Friction) -> StribeckSmooth {
+impl FrictionLaw for StribeckSmooth {
+    /// One term may vanish by symmetry; of tanh(w/eps) from w = w' = 0 on, three in
+    /// succession do.
+    const NEGLIGIBLE_TERMS: usize = 4;
+
+    fn new(p: &Friction) -> StribeckSmooth {
         StribeckSmooth {
             b: p.b,
             eps: p.eps,
@@ -51,12 +55,6 @@ impl StribeckSmooth {
             sign: ZERO,
         }
     }
-}
-
-impl FrictionLaw for StribeckSmooth {
-    /// One term may vanish by symmetry; of tanh(w/eps) from w = w' = 0 on, three in
-    /// succession do.
-    const NEGLIGIBLE_TERMS: usize = 4;
 
     // Once for all slosh models.
     #[inline(never)]

@@ -1,17 +1,37 @@
-//! Viscous friction, tau_f = -b w; without b a free bearing.
+//! Viscous friction, tau_f = -b w, and none at all.
 //!
-//! When to choose it: an air or magnetic bearing, or a comparison with linear theory; the
+//! When to choose them: an air or magnetic bearing, or a comparison with linear theory; the
 //! plant with the linear slosh model is then linear in everything but the wheel.
 
 use super::{Contact, FrictionLaw};
+use crate::Friction;
 use crate::slosh::HubMotion;
+
+/// A free bearing.
+#[derive(Clone, Debug)]
+pub struct Free;
+
+impl FrictionLaw for Free {
+    fn new(_: &Friction) -> Free {
+        Free
+    }
+
+    #[inline(always)]
+    fn torque<const N: usize>(&mut self, _: Contact, _: &HubMotion) -> f64 {
+        0.0
+    }
+}
 
 #[derive(Clone, Debug)]
 pub struct Viscous {
-    pub b: f64,
+    b: f64,
 }
 
 impl FrictionLaw for Viscous {
+    fn new(p: &Friction) -> Viscous {
+        Viscous { b: p.b }
+    }
+
     #[inline(always)]
     fn torque<const N: usize>(&mut self, _: Contact, hub: &HubMotion) -> f64 {
         -self.b * hub.omega[N]
