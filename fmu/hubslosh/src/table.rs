@@ -39,7 +39,7 @@ static SCALARS: [Scalar<HubSlosh>; scalar_count(VARIABLES)] = scalars(VARIABLES)
 // and rate are in it through the friction, wheel_speed through the wheel's limits.
 #[rustfmt::skip]
 const ALL_TORQUES: &[&str] = &[
-    "theta", "omega", "wheel_speed",
+    "theta", "omega", "wheel_speed", "bristle",
     "slosh.q_radial", "slosh.q_tangential", "slosh.v_radial", "slosh.v_tangential",
     "tau_cmd", "tau_ext", "g_axial",
 ];
@@ -47,7 +47,7 @@ const HUB_AND_LIQUID: &[&str] =
     &["omega", "slosh.q_radial", "slosh.q_tangential", "slosh.v_radial", "slosh.v_tangential"];
 #[rustfmt::skip]
 const HEAT: &[&str] = &[
-    "theta", "omega",
+    "theta", "omega", "bristle",
     "slosh.q_radial", "slosh.q_tangential", "slosh.v_radial", "slosh.v_tangential",
     "g_axial",
 ];
@@ -168,6 +168,10 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         "Time spent stuck since the start")
         .is_state(|_| x::STUCK_TIME).depends_on(&["stuck_time"]),
 
+    V::state("bristle", |_| x::BRISTLE, "rad",
+        "Mean deflection of the bearing's bristles; 0 with other laws than lugre")
+        .nominal(1e-6).depends_on(&["bristle"]),
+
     // The slosh modes' coordinates: with theta, omega, work, heat, stuck_time and
     // wheel_speed the continuous states
     V::state("slosh.q_radial", |n| x::SLOSH + 4 * n + 0, "",
@@ -207,6 +211,9 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     V::derivative("der(wheel_speed)", |_| x::WHEEL_SPEED, "rad/s2",
         "Derivative of wheel_speed: -tau_actuator/wheel.I")
         .depends_on(&["wheel_speed", "tau_cmd"]).initial_depends_on(&["wheel."]),
+    V::derivative("der(bristle)", |_| x::BRISTLE, "rad/s",
+        "Derivative of bristle: omega - friction.sigma0 |omega| bristle over the dry friction")
+        .depends_on(&["theta", "omega", "bristle"]).initial_depends_on(&["init.theta", "init.omega", "friction."]),
     V::derivative("der(slosh.q_radial)", |n| x::SLOSH + 4 * n + 0, "",
         "Derivative of slosh.q_radial: slosh.v_radial")
         .shape(&[MODES])
@@ -292,6 +299,12 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     V::parameter("friction.eps", |p, _| &mut p.friction.eps, "rad/s",
         "Width of the smoothed sign, model stribeck_smooth only")
         .display_unit("deg/s").range(1e-7, 1e3).tunable(),
+    V::parameter("friction.sigma0", |p, _| &mut p.friction.sigma0, "N.m/rad",
+        "Stiffness of the bristles, model lugre only")
+        .range(1e-3, 1e9).tunable(),
+    V::parameter("friction.sigma1", |p, _| &mut p.friction.sigma1, "N.m.s/rad",
+        "Damping of the bristles, model lugre only; at most what keeps the bearing passive: friction.b over the relative range of dry friction")
+        .range(0.0, 1e6).tunable(),
     V::parameter("friction.asymmetry", |p, _| &mut p.friction.asymmetry, "1",
         "Dry friction is 1 + asymmetry times as strong forwards and 1 - asymmetry times backwards")
         .range(-0.999, 0.999).tunable(),
@@ -435,6 +448,7 @@ static FRICTION_MODEL: Enumeration = Enumeration {
             "Stribeck curve, its jump at rest smoothed: creeps, never sticks",
         ),
         Item::new("stribeck", "Stribeck curve as a set-valued law: sticks"),
+        Item::new("lugre", "Bristles that deflect before they slide (LuGre)"),
     ],
 };
 

@@ -249,6 +249,7 @@ mod tests {
         p.slosh.modes = 2;
         p.friction.model = friction;
         p.friction.eps = 0.05;
+        p.friction.sigma1 = 0.02;
         p.friction.asymmetry = 0.1;
         p.friction.harmonics_forward = [0.1, -0.05, 0.02, 0.1];
         p.init.omega = 0.07;
@@ -354,7 +355,8 @@ mod tests {
                     }
                     let x = *plant.continuous_states();
                     // Any direction at all; the models' own scatter of sizes is 0.01 to 1.
-                    let dx: [f64; STATES] = core::array::from_fn(|i| libm::sin(1.0 + i as f64));
+                    let mut dx: [f64; STATES] = core::array::from_fn(|i| libm::sin(1.0 + i as f64));
+                    dx[x::BRISTLE] *= 1e-4; // deflections are some µrad
                     let du = [0.3, -0.4, 0.7];
                     // Central differences leave the square of this times the third
                     // derivative, 1e-10 of what curves over 0.1, and round at 1e-16 / 1e-6.

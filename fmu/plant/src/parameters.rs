@@ -73,6 +73,8 @@ pub struct Friction {
     pub d: f64,
     pub omega_s: f64,
     pub eps: f64,
+    pub sigma0: f64,
+    pub sigma1: f64,
     pub asymmetry: f64,
     pub harmonics_forward: [f64; 4],
     pub harmonics_backward: [f64; 4],
@@ -165,6 +167,9 @@ impl Default for Friction {
             d: 0.002423,
             omega_s: 0.08581,
             eps: 1e-5,
+            // Not the thesis's: 6 µrad of deflection, and damping just within passivity.
+            sigma0: 1000.0,
+            sigma1: 0.05,
             asymmetry: 0.0,
             harmonics_forward: [0.0; 4],
             harmonics_backward: [0.0; 4],

@@ -21,9 +21,11 @@ pub mod x {
     pub const STUCK_TIME: usize = 4;
     /// Absolute rate of the wheel's rotor, rad/s.
     pub const WHEEL_SPEED: usize = 5;
+    /// Deflection of the bearing's bristles (LuGre friction), rad.
+    pub const BRISTLE: usize = 6;
     /// The first of the slosh coordinates: q_x, q_y, q_x', q_y' of mode 1, then of mode 2, …
     /// Their unit is the slosh model's; modes that are not used stay at 0.
-    pub const SLOSH: usize = 6;
+    pub const SLOSH: usize = 7;
     /// How many there are.
     pub const COUNT: usize = SLOSH + 4 * MODES;
 }

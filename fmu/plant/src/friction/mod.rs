@@ -5,6 +5,7 @@
 
 mod curve;
 mod directional;
+mod lugre;
 mod stribeck;
 mod stribeck_smooth;
 mod viscous;
@@ -252,6 +253,8 @@ laws! {
     StribeckSmooth = 3, stribeck_smooth::StribeckSmooth;
     /// Stribeck curve as a set-valued law: the hub can stick.
     Stribeck = 4, stribeck::Stribeck;
+    /// Bristles that deflect before they slide (LuGre).
+    Lugre = 5, lugre::Lugre;
 }
 
 impl Law {

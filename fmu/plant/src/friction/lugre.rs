@@ -1,0 +1,163 @@
+//! The LuGre law: the contact as bristles with the mean deflection z (rad), stiffness sigma_0
+//! and damping sigma_1 (Canudas de Wit, Olsson, Astrom, Lischinsky, IEEE Transactions on
+//! Automatic Control 40 (1995) 419-425):
+//!
+//! ```text
+//! z'    = w - sigma_0 |w| z/g,     g = T_C(w) B(theta)
+//! tau_f = -(sigma_0 z + sigma_1 z' + b w)
+//! ```
+//!
+//! with Stribeck's curve T_C and the directional factor B of the present sense of rotation. The
+//! bearing stores sigma_0 z^2/2 and dissipates the rest: with u = sigma_0 z/g and s = sgn w
+//!
+//! ```text
+//! D = -tau_f w - sigma_0 z z' = |w| [ g u^2 + |w| (b + sigma_1 (1 - s u)) ]
+//! ```
+//!
+//! |z| never exceeds g_max/sigma_0, so |u| <= g_max/g_min, and D >= 0 at every rate exactly if
+//!
+//! ```text
+//! sigma_1 (g_max - g_min) <= b g_min,     g_min = c B_min, g_max = (c + d) B_max
+//! ```
+//!
+//! (the condition of passivity of Barabanov and Ortega, IEEE Transactions on Automatic Control
+//! 45 (2000) 830-832). Larger sigma_1 are refused.
+//!
+//! |w| is not smooth: the contact says its sign, and w = 0 is located as an event. Nothing
+//! sticks: a hub under torque below g_max creeps to a deflection and stays.
+//!
+//! When to choose it: where motion before sliding, the frictional lag or a break-away that
+//! depends on the rate of the torque matter. While sliding, z follows w within
+//! g/(sigma_0 |w|) seconds; the integrator resolves that, so its steps are of that length. As
+//! sigma_0 grows the law approaches the set-valued one, at a rising price.
+
+use super::curve::StribeckCurve;
+use super::directional::DirectionalFactor;
+use super::{Contact, FrictionLaw};
+use crate::Friction;
+use crate::series::{self, Series, ZERO};
+use crate::slosh::HubMotion;
+use crate::state::{STATES, x};
+
+#[derive(Clone, Debug)]
+pub struct Lugre {
+    b: f64,
+    sigma0: f64,
+    sigma1: f64,
+    curve: StribeckCurve,
+    factor: DirectionalFactor,
+    /// sigma_0/g_min: what makes a deflection relative
+    inv_deflection: f64,
+    /// B, g, w/g, w z/g
+    present: Series,
+    g: Series,
+    rate_over_g: Series,
+    relaxation: Series,
+    z: Series,
+    z_d: Series,
+}
+
+impl FrictionLaw for Lugre {
+    const SWITCHES_AT_REST: bool = true;
+
+    fn new(p: &Friction) -> Lugre {
+        let (g_min, _) = bounds(p);
+        Lugre {
+            b: p.b,
+            sigma0: p.sigma0,
+            sigma1: p.sigma1,
+            curve: StribeckCurve::new(p),
+            factor: DirectionalFactor::new(p),
+            inv_deflection: if g_min > 0.0 { p.sigma0 / g_min } else { 0.0 },
+            present: ZERO,
+            g: ZERO,
+            rate_over_g: ZERO,
+            relaxation: ZERO,
+            z: ZERO,
+            z_d: ZERO,
+        }
+    }
+
+    fn problems(p: &Friction) -> Vec<String> {
+        if p.c <= 0.0 {
+            return vec![format!(
+                "friction.c = {} N.m: lugre needs dry friction at every rate, above 0",
+                p.c
+            )];
+        }
+        let (g_min, g_max) = bounds(p);
+        // A factor B <= 0 has been reported on its own.
+        let gives_energy = p.sigma1 * (g_max - g_min) > p.b * g_min * (1.0 + 1e-12);
+        if g_min <= 0.0 || !gives_energy {
+            return Vec::new();
+        }
+        vec![format!(
+            "friction.sigma1 = {} N.m.s/rad makes the lugre bearing give off energy at high \
+             rates; it must not exceed friction.b g_min/(g_max - g_min) = {:.6} N.m.s/rad, where \
+             dry friction lies between g_min = {:.6} N.m and g_max = {:.6} N.m",
+            p.sigma1,
+            p.b * g_min / (g_max - g_min),
+            g_min,
+            g_max
+        )]
+    }
+
+    fn set_states<const ORDER: usize>(&mut self, x: &[f64; STATES]) {
+        self.z[ORDER] = x[x::BRISTLE];
+    }
+
+    // Once for all slosh models.
+    #[inline(never)]
+    fn torque<const N: usize>(&mut self, contact: Contact, hub: &HubMotion) -> f64 {
+        self.curve.expand::<N>(&hub.omega2);
+        self.factor.expand::<N>(&hub.theta);
+        self.present[N] = self.factor.coefficient::<N>(contact);
+        self.g[N] = series::mul::<N>(&self.curve.torque, &self.present);
+        let rest = series::mul_tail::<N>(&self.g, &self.rate_over_g);
+        self.rate_over_g[N] = (hub.omega[N] - rest) / self.g[0];
+        self.relaxation[N] = series::mul::<N>(&self.rate_over_g, &self.z);
+        let sign = contact as i8 as f64;
+        self.z_d[N] = hub.omega[N] - sign * self.sigma0 * self.relaxation[N];
+        self.z[N + 1] = series::next::<N>(self.z_d[N]);
+        -(self.sigma0 * self.z[N] + self.sigma1 * self.z_d[N] + self.b * hub.omega[N])
+    }
+
+    #[inline(never)]
+    fn dissipation<const N: usize>(&self, tau_f: &Series, omega: &Series) -> f64 {
+        -series::mul::<N>(tau_f, omega) - self.sigma0 * series::mul::<N>(&self.z, &self.z_d)
+    }
+
+    fn energy<const N: usize>(&self) -> f64 {
+        self.sigma0 * series::square::<N>(&self.z) / 2.0
+    }
+
+    fn derivatives<const N: usize>(&self, _: Contact, derivatives: &mut [f64; STATES]) {
+        derivatives[x::BRISTLE] = self.z_d[N];
+    }
+
+    fn advance(&self, _: Contact, n: usize, t: f64, x: &mut [f64; STATES]) {
+        [x[x::BRISTLE]] = series::values([&self.z], n, t);
+    }
+
+    /// Torques within the tolerance of the dry friction.
+    fn coefficient_norm(&self, n: usize) -> f64 {
+        self.z[n].abs() * self.inv_deflection
+    }
+
+    /// The bristle's torque -sigma_0 z is there at rest too.
+    fn contact_at_rest(&self, [net, slope]: [f64; 2], _: f64, before: Contact) -> Contact {
+        let torque = net - self.sigma0 * self.z[0];
+        match if torque != 0.0 { torque } else { slope } {
+            to if to > 0.0 => Contact::Forward,
+            to if to < 0.0 => Contact::Backward,
+            _ if before == Contact::Stuck => Contact::Forward,
+            _ => before,
+        }
+    }
+}
+
+/// The least and the largest g at any rate and angle, N m.
+fn bounds(p: &Friction) -> (f64, f64) {
+    let (lowest, highest) = DirectionalFactor::new(p).bounds();
+    (p.c * lowest, (p.c + p.d) * highest)
+}
