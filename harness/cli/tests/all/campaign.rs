@@ -72,7 +72,9 @@ fn files_have_the_names_and_columns_others_build_on_and_a_second_start_finds_the
 
     // the page needs nothing from elsewhere
     let page = std::fs::read_to_string(directory.join("c/report.html")).unwrap();
-    assert!(page.contains("<svg") && page.contains("Why the swept resonance lies above the exact one"));
+    assert!(
+        page.contains("<svg") && page.contains("Why the swept resonance lies above the exact one")
+    );
     for word in ["http://", "https://", "<script", "src=", "NaN"] {
         assert!(!page.contains(word), "{word} is in the report");
     }
