@@ -8,7 +8,7 @@ type Feature = (&'static str, &'static str, fn(&Features) -> Option<f64>, f64, f
 const FEATURES: [Feature; 4] = [
     ("Antiresonance", "f_dip / Hz", |f| f.f_dip, 0.01, 1.0),
     ("Resonance", "f_res / Hz", |f| f.f_res, 0.03, 1.0),
-    ("Distance", "Δf / mHz", |f| f.delta_f(), 20.0, 1e3),
+    ("Separation", "Δf / mHz", |f| f.delta_f(), 20.0, 1e3),
     ("Notch depth", "notch / dB", |f| f.notch_db, 5.0, 1.0),
 ];
 
