@@ -1,0 +1,306 @@
+//! One slosh mode: a bob at the end of a rod that swings about a hinge on the tank's axis in
+//! every direction, upwards too.
+//!
+//! ```text
+//! m  mass, l  length, e  the tank's axis, P  the hinge from O, p  unit vector from hinge to bob
+//! c  drag -c l p' on the bob (its velocity against the tank), kg/s
+//! k  centring potential k l^2 |p_perp|^2/2, p_perp = p - e (e.p), N/m
+//! B = a + w' x P + w x (w x P)     specific force at the hinge
+//! T  pull of the rod, > 0 when it pulls the bob to the hinge
+//! ```
+//!
+//! The motion is expanded in p and in v = p' + w x p, the bob's velocity against the hinge over
+//! l, as seen without the rotation. In these Newton's law is a polynomial, and w' occurs at the
+//! hinge only:
+//!
+//! ```text
+//! p' = v - w x p
+//! v' = -w x v - B/l - T/(m l) p - (c/m) p' - (k/m) p_perp
+//! T  = m (l |v|^2 - p.B) - k l |p_perp|^2                        (keeps |p| = 1 and p.v = 0)
+//! ```
+//!
+//! On the craft act T p at the hinge, and phi = c l p' + k l p_perp at the bob, where drag and
+//! centring react:
+//!
+//! ```text
+//! F = T p + phi,   moment about O = P x F + l p x phi
+//! ```
+//!
+//! Source: Newton's second law with the constraint eliminated; every vector in body axes.
+//! Checked against the same law in p'' (tests/independent.rs).
+
+use crate::parameters::Tank;
+use crate::series::{self, Series, Vector, ZERO, ZERO_VECTOR, next};
+use crate::vector::{
+    Mat3, Number, Vec3, add, constant, cross, dot, largest, on_sphere, on_sphere_slope, rotation,
+    scale, sub, times, transposed_times, unit_quaternion,
+};
+
+/// One bob: its parameters and the power series of its motion.
+#[derive(Clone, Debug)]
+pub struct Bob {
+    /// Which tank it is in and which mode of it it is, from 0.
+    pub tank: usize,
+    pub mode: usize,
+    pub m: f64,
+    pub l: f64,
+    c: f64,
+    k: f64,
+    /// c/m, k/m, 1/l
+    c_m: f64,
+    k_m: f64,
+    inv_l: f64,
+    e: Vec3,
+    pub hinge: Vec3,
+    /// Tank axes to body axes.
+    axes: Mat3,
+    pub p: Vector,
+    pub v: Vector,
+    p_d: Vector,
+    v_d: Vector,
+    /// B
+    specific_force: Vector,
+    /// T/m
+    pull: Series,
+    /// p.e
+    height: Series,
+    /// Of the order at hand: what does not depend on [a; w'] of this order.
+    centripetal: Vec3,
+    p_perp: Vec3,
+    known_pull: f64,
+    known: Vec3,
+}
+
+impl Bob {
+    /// Mode `mode` of the tank that is number `index`, both from 0.
+    pub fn new(tank: &Tank, index: usize, mode: usize) -> Bob {
+        let axes = rotation(&unit_quaternion(tank.q));
+        let e = axes.map(|row| row[2]);
+        let (m, l, k, c) = (tank.mass[mode], tank.length[mode], tank.k[mode], tank.drag(mode));
+        Bob {
+            tank: index,
+            mode,
+            m,
+            l,
+            c,
+            k,
+            c_m: c / m,
+            k_m: k / m,
+            inv_l: 1.0 / l,
+            e,
+            hinge: add(tank.position, scale(tank.hinge[mode], e)),
+            axes,
+            p: ZERO_VECTOR,
+            v: ZERO_VECTOR,
+            p_d: ZERO_VECTOR,
+            v_d: ZERO_VECTOR,
+            specific_force: ZERO_VECTOR,
+            pull: ZERO,
+            height: ZERO,
+            centripetal: [0.0; 3],
+            p_perp: [0.0; 3],
+            known_pull: 0.0,
+            known: [0.0; 3],
+        }
+    }
+
+    /// Starts an expansion at direction and rate (tank axes, six numbers) while the craft turns
+    /// at `w`; both are normalised first.
+    #[inline(always)]
+    pub fn start(&mut self, x: &[f64; 6], w: Vec3) {
+        let p = times(&self.axes, [x[0], x[1], x[2]]);
+        let p_d = times(&self.axes, [x[3], x[4], x[5]]);
+        let [p, p_d] = on_sphere(p, p_d);
+        self.p[0] = p;
+        self.v[0] = add(p_d, cross(w, p));
+    }
+
+    /// Sets coefficient 1 of direction and velocity to their derivative in the direction `dx` of
+    /// the six numbers `x` and `dw` of the rate.
+    pub fn seed_direction(&mut self, x: &[f64; 6], dx: &[f64; 6], w: Vec3, dw: Vec3) {
+        let body = |x: &[f64], i: usize| times(&self.axes, [x[i], x[i + 1], x[i + 2]]);
+        let [dp, dp_d] = on_sphere_slope(body(x, 0), body(x, 3), body(dx, 0), body(dx, 3));
+        self.p[1] = dp;
+        self.v[1] = add(dp_d, add(cross(dw, self.p[0]), cross(w, dp)));
+    }
+
+    /// Direction and rate `t` after the start, from the series cut after order n, when the craft
+    /// turns at `w` by then; normalised, tank axes.
+    #[inline(always)]
+    pub fn at(&self, n: usize, t: f64, w: Vec3) -> [f64; 6] {
+        let (p, v) = (series::value(&self.p, n, t), series::value(&self.v, n, t));
+        let [p, p_d] = on_sphere(p, sub(v, cross(w, p)));
+        let (p, p_d) = (transposed_times(&self.axes, p), transposed_times(&self.axes, p_d));
+        [p[0], p[1], p[2], p_d[0], p_d[1], p_d[2]]
+    }
+
+    /// Coefficient N of what does not depend on [a; w'] of this order: force and torque about
+    /// O on the craft. `w2` is coefficient N of the matrix of y -> w x (w x y).
+    #[inline(always)]
+    pub fn load<const N: usize>(&mut self, w: &Vector, w2: &Mat3) -> [Vec3; 2] {
+        let Bob { m, l, c, k, .. } = *self;
+        let p_d = sub(self.v[N], series::cross::<N>(w, &self.p));
+        self.p_d[N] = p_d;
+        self.centripetal = times(w2, self.hinge);
+        let mut pull = l * series::square_vector::<N>(&self.v)
+            - series::dot_known::<N>(&self.p, &self.specific_force)
+            - dot(self.p[0], self.centripetal);
+        let (mut reaction, mut twist) = ([0.0; 3], [0.0; 3]);
+        if c > 0.0 {
+            reaction = scale(c * l, p_d);
+            twist = scale(c * l, series::cross::<N>(&self.p, &self.p_d));
+        }
+        if k > 0.0 {
+            self.height[N] = dot(self.e, self.p[N]);
+            self.p_perp = sub(self.p[N], scale(self.height[N], self.e));
+            // |p_perp|^2 = 1 - (p.e)^2, near rest without cancellation at order 0.
+            let off_axis_2 = if N == 0 {
+                dot(self.p_perp, self.p_perp)
+            } else {
+                -series::square::<N>(&self.height)
+            };
+            pull -= self.k_m * l * off_axis_2;
+            reaction = add(reaction, scale(k * l, self.p_perp));
+            let around = cross(self.e, series::scale::<N>(&self.height, &self.p));
+            twist = add(twist, scale(k * l, around));
+        }
+        self.known_pull = pull;
+        let pulled = series::scale_known::<N>(&self.pull, &self.p);
+        self.known = add(pulled, scale(pull, self.p[0]));
+        let force = add(scale(m, self.known), reaction);
+        [force, add(cross(self.hinge, force), scale(l, twist))]
+    }
+
+    /// Coefficient N of the rest, and N + 1 of direction and velocity, from coefficient N of
+    /// [a; w'].
+    #[inline(always)]
+    pub fn accelerate<const N: usize>(&mut self, w: &Vector, a: Vec3, w_d: Vec3) {
+        let at_hinge = add(a, cross(w_d, self.hinge));
+        self.specific_force[N] = add(at_hinge, self.centripetal);
+        let along = dot(self.p[0], at_hinge);
+        self.pull[N] = self.known_pull - along;
+        let pulled = sub(self.known, scale(along, self.p[0]));
+        let mut v_d = add(
+            series::cross::<N>(&self.v, w),
+            scale(-self.inv_l, add(self.specific_force[N], pulled)),
+        );
+        if self.c > 0.0 {
+            v_d = sub(v_d, scale(self.c_m, self.p_d[N]));
+        }
+        if self.k > 0.0 {
+            v_d = sub(v_d, scale(self.k_m, self.p_perp));
+        }
+        self.v_d[N] = v_d;
+        self.p[N + 1] = next::<N>(self.p_d[N]);
+        self.v[N + 1] = next::<N>(v_d);
+    }
+
+    /// Coefficient N of the power dissipated, c l^2 |p'|^2, W.
+    #[inline(always)]
+    pub fn dissipation<const N: usize>(&self) -> f64 {
+        if self.c > 0.0 {
+            self.c * self.l * self.l * series::square_vector::<N>(&self.p_d)
+        } else {
+            0.0
+        }
+    }
+
+    /// Coefficient N (0 or 1) of the rates of the six numbers (tank axes): p', and
+    /// p'' = v' - w' x p - w x p'.
+    pub fn rates<const N: usize>(&self, w: &Vector, w_d: &Vector) -> [f64; 6] {
+        let turned =
+            add(series::cross::<N>(w_d, &self.p), series::cross::<N>(w, &self.p_d));
+        let p_dd = sub(self.v_d[N], turned);
+        let p_d = transposed_times(&self.axes, self.p_d[N]);
+        let p_dd = transposed_times(&self.axes, p_dd);
+        [p_d[0], p_d[1], p_d[2], p_dd[0], p_dd[1], p_dd[2]]
+    }
+
+    /// The scale of v: speed of the swing and what gravity or centring would make of the angle,
+    /// 1/s.
+    #[inline(always)]
+    pub fn rate_scale(&self) -> f64 {
+        let stiffness = largest(self.specific_force[0]) * self.inv_l + self.k_m;
+        let off_axis = cross(self.e, self.p[0]);
+        largest(self.p_d[0]) + libm::sqrt(stiffness) * largest(off_axis)
+    }
+
+    /// Size of coefficient n of v.
+    #[inline(always)]
+    pub fn coefficient_norm(&self, n: usize) -> f64 {
+        largest(self.v[n])
+    }
+
+    /// p, p' and B as numbers of the wanted kind.
+    fn state<T: Number>(&self) -> [Vec3<T>; 3] {
+        let of = |a: &Vector| [0, 1, 2].map(|i| T::of(a[0][i], a[1][i]));
+        [of(&self.p), of(&self.p_d), of(&self.specific_force)]
+    }
+
+    /// Force on the craft and its torque about O.
+    pub fn wrench<T: Number>(&self) -> [Vec3<T>; 2] {
+        let [p, p_d, _] = self.state::<T>();
+        let pull = T::of(self.pull[0], self.pull[1]) * self.m;
+        self.at_hinge_and_bob(pull, p, p_d)
+    }
+
+    /// The wrench at a = 0 and w' = 0, that is with the pull
+    /// T_0 = m (l |v|^2 - p.(w x (w x P))) - k l |p_perp|^2.
+    pub fn bias<T: Number>(&self, w: Vec3<T>) -> [Vec3<T>; 2] {
+        let [p, p_d, _] = self.state::<T>();
+        let v = add(p_d, cross(w, p));
+        let p_perp = self.perpendicular(p);
+        let centripetal = cross(w, cross(w, constant(self.hinge)));
+        let pull = (dot(v, v) * self.l - dot(p, centripetal)) * self.m
+            - dot(p_perp, p_perp) * (self.k * self.l);
+        self.at_hinge_and_bob(pull, p, p_d)
+    }
+
+    fn perpendicular<T: Number>(&self, p: Vec3<T>) -> Vec3<T> {
+        let e = constant(self.e);
+        sub(p, scale(dot(e, p), e))
+    }
+
+    fn at_hinge_and_bob<T: Number>(&self, pull: T, p: Vec3<T>, p_d: Vec3<T>) -> [Vec3<T>; 2] {
+        let p_perp = self.perpendicular(p);
+        let phi = [0, 1, 2].map(|i| (p_d[i] * self.c + p_perp[i] * self.k) * self.l);
+        let force = add(scale(pull, p), phi);
+        let twist = cross(p, phi).map(|x| x * self.l);
+        [force, add(cross(constant(self.hinge), force), twist)]
+    }
+
+    /// The bob from O, m, and its velocity against the tank, m/s.
+    pub fn place<T: Number>(&self) -> [Vec3<T>; 2] {
+        let [p, p_d, _] = self.state::<T>();
+        [add(constant(self.hinge), p.map(|x| x * self.l)), p_d.map(|x| x * self.l)]
+    }
+
+    /// Energy of the centring stiffness, k l^2 |p_perp|^2/2.
+    pub fn centring_energy<T: Number>(&self) -> T {
+        let p_perp = self.perpendicular(self.state::<T>()[0]);
+        dot(p_perp, p_perp) * (0.5 * self.k * self.l * self.l)
+    }
+
+    /// p in tank axes.
+    pub fn direction_in_tank<T: Number>(&self) -> Vec3<T> {
+        let p = self.state::<T>()[0];
+        [0, 1, 2].map(|i| {
+            let column: Vec3 = self.axes.map(|row| row[i]);
+            dot(constant(column), p)
+        })
+    }
+
+    /// What an impulse of the craft does to the rate: the bob keeps its velocity across the rod,
+    /// l p' changes by -(1 - p p^T)(dV + dw x rho). `x` is the six numbers that the bob was
+    /// started with; dV of O and dw in body axes.
+    pub fn after_impulse(&self, x: &mut [f64; 6], dv: Vec3, dw: Vec3) {
+        let p = self.p[0];
+        let rho = add(self.hinge, scale(self.l, p));
+        let kick = add(dv, cross(dw, rho));
+        let across = sub(kick, scale(dot(p, kick), p));
+        let change = transposed_times(&self.axes, scale(-self.inv_l, across));
+        for i in 0..3 {
+            x[3 + i] += change[i];
+        }
+    }
+}

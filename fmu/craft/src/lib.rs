@@ -1,0 +1,35 @@
+//! The physics of a spacecraft in six degrees of freedom with sloshing tanks: a rigid body with
+//! up to four tanks of up to three spherical pendulums each, and one such tank alone, for
+//! somebody else's craft. No FMI, no I/O, no unsafe code, no allocation while stepping.
+//!
+//! Frames and signs: the inertial frame falls freely with the craft. The body frame is fixed
+//! in the dry craft, its origin is O. The attitude q (scalar first) maps body to inertial
+//! components. Specific force is what an accelerometer reads. A tank's z axis is its own
+//! axis; liquid at rest hangs towards -z. SI units.
+//!
+//! Where to look: `spacecraft.rs` and `slosh_tank.rs` are the two components as a host sees
+//! them; `motion.rs` has the craft's equations, `bob.rs` those of one slosh mode, `rigid.rs`
+//! the mass matrix, `outputs.rs` energy and momentum; `integrator.rs` steps through time with
+//! the arithmetic of `series.rs`.
+
+mod bob;
+mod integrator;
+mod motion;
+mod outputs;
+mod parameters;
+mod rigid;
+mod series;
+mod slosh_tank;
+mod spacecraft;
+mod state;
+mod vector;
+
+pub use integrator::StepError;
+pub use outputs::{Outputs, TankOutputs};
+pub use parameters::{Craft, Inertia, Init, MODES, Mount, Parameters, TANKS, Tank};
+pub use slosh_tank::{
+    Coupling, SloshTank, SloshTankOutputs, TANK_INPUTS, TANK_STATES, TRIANGLE, TankInputs,
+    TankParameters, TankState,
+};
+pub use spacecraft::Spacecraft;
+pub use state::{INPUTS, Inputs, Ramp, STATES, State, index};

@@ -1,0 +1,394 @@
+//! The craft's equations as power series: rigid body, wheels and bobs.
+//!
+//! ```text
+//! M [a; w'] = [ f - w x (w x S) + sum of F ; tau - h_w' - w x (I w + h_w) + sum of torque ]
+//! M = M_R + sum of m u u^T,   u = [p; P x p]        rigid part and bobs (rigid.rs, bob.rs)
+//! q' = q o (0, w)/2
+//! V' = C a,  r' = V                                  C: body to inertial axes
+//! work' = f.C^T V + (tau - h_w').w
+//! ```
+//!
+//! F and torque are what the bobs load O with, besides their added mass. M is factorised once
+//! per expansion: coefficient N of [a; w'] solves the same system at every order.
+//!
+//! Velocity and position are expanded from where the step begins, V_0 and r_0, in body axes:
+//!
+//! ```text
+//! V = V_0 + C gain,        gain' = a - w x gain
+//! r = r_0 + V_0 t + C path,  path' = gain - w x path
+//! C^T V_0 = drift,        drift' = -w x drift
+//! ```
+//!
+//! so that they round by what they gain in a step, however fast and far the craft is.
+//!
+//! With O on a pivot a = -C^T g is given, a' = -w x a; the lower half of the system is left.
+//!
+//! Source: Newton-Euler about O with the bobs' pulls eliminated.
+
+use crate::bob::Bob;
+use crate::integrator::{MAX_MAGNITUDE, Motion, RATE_FLOOR};
+use crate::parameters::{Mount, Parameters};
+use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod};
+use crate::series::{
+    self, ORDER, Series, Vector, ZERO, ZERO_VECTOR, cross, cross_ramp, dot_ramp, next, products,
+    quaternion_rate, ramp,
+};
+use crate::state::{Inputs, STATES, State, index};
+use crate::vector::{
+    self, Mat3, Vec3, add, largest, rotation, scale, sub, times, transposed_times,
+    unit_quaternion, unit_quaternion_slope,
+};
+
+/// Rates change within this time at most, s: a step much longer does not see how fast they are.
+const SCALE_TIME: f64 = 0.1;
+
+/// A vector out of an array.
+#[inline(always)]
+pub fn part(x: &[f64], at: usize) -> Vec3 {
+    [x[at], x[at + 1], x[at + 2]]
+}
+
+/// Coefficient N of the matrix of y -> w x (w x y) = (w w^T - |w|^2 1) y, from that of
+/// w w^T.
+#[inline(always)]
+pub fn twice_crossed([xx, yy, zz, xy, xz, yz]: [f64; 6]) -> Mat3 {
+    [[-yy - zz, xy, xz], [xy, -xx - zz, yz], [xz, yz, -xx - yy]]
+}
+
+/// w x (I w) from w w^T: its components are linear in those of w w^T.
+#[inline(always)]
+fn gyroscopic(inertia: &Mat3, [xx, yy, zz, xy, xz, yz]: [f64; 6]) -> Vec3 {
+    let columns = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
+    let element = |k: usize, j: usize| vector::dot(inertia[k], columns[j]);
+    [element(2, 1) - element(1, 2), element(0, 2) - element(2, 0), element(1, 0) - element(0, 1)]
+}
+
+/// The craft at its present state and the series of its motion.
+#[derive(Clone, Debug)]
+pub struct CraftMotion {
+    pub state: State,
+    pub inputs: Inputs,
+    pub mount: Mount,
+    gravity: Vec3,
+    /// Dry craft and rigid liquids, and each tank's rigid liquid.
+    pub rigid: Rigid,
+    mass_matrix: Mat6,
+    pub liquids: Vec<Rigid>,
+    pub bobs: Vec<Bob>,
+    /// M at the start of the expansion, and its factors.
+    matrix: Mat6,
+    factors: Factors,
+    pub force: [Vec3; 2],
+    pub torque: [Vec3; 2],
+    pub h: [Vec3; 2],
+    pub h_dot: [Vec3; 2],
+    pub q: [[f64; 4]; ORDER + 1],
+    pub w: Vector,
+    pub w_d: Vector,
+    pub a: Vector,
+    gain: Vector,
+    path: Vector,
+    pub drift: Vector,
+    pub work: Series,
+    pub dissipation: Series,
+    /// 1 over what is allowed of attitude, rate, the bobs' v, and velocity
+    inv_allowed: [f64; 4],
+    /// The longest pendulum, m.
+    longest: f64,
+}
+
+impl CraftMotion {
+    pub fn new(p: &Parameters, state: State) -> CraftMotion {
+        let tanks = &p.tank[..p.tanks];
+        let liquids: Vec<Rigid> = tanks.iter().map(Rigid::of_tank).collect();
+        let rigid = liquids.iter().fold(Rigid::of_craft(&p.craft), |sum, tank| sum.and(tank));
+        let bobs: Vec<Bob> = tanks
+            .iter()
+            .enumerate()
+            .flat_map(|(i, tank)| (0..tank.modes).map(move |n| Bob::new(tank, i, n)))
+            .collect();
+        let mass_matrix = rigid.mass_matrix();
+        CraftMotion {
+            state,
+            inputs: Inputs::default(),
+            mount: p.mount,
+            gravity: p.gravity,
+            rigid,
+            mass_matrix,
+            liquids,
+            matrix: mass_matrix,
+            factors: Factors::of(&mass_matrix),
+            force: [[0.0; 3]; 2],
+            torque: [[0.0; 3]; 2],
+            h: [[0.0; 3]; 2],
+            h_dot: [[0.0; 3]; 2],
+            q: [[0.0; 4]; ORDER + 1],
+            w: ZERO_VECTOR,
+            w_d: ZERO_VECTOR,
+            a: ZERO_VECTOR,
+            gain: ZERO_VECTOR,
+            path: ZERO_VECTOR,
+            drift: ZERO_VECTOR,
+            work: ZERO,
+            dissipation: ZERO,
+            inv_allowed: [0.0; 4],
+            longest: bobs.iter().fold(0.0, |longest, bob| bob.l.max(longest)),
+            bobs,
+        }
+    }
+
+    /// M at the present directions and its factors. On a pivot the upper rows hold a.
+    #[inline(always)]
+    fn factorise(&mut self) {
+        let mut matrix = self.mass_matrix;
+        for bob in &self.bobs {
+            add_rank_one(&mut matrix, bob.m, &along_rod(bob.p[0], bob.hinge));
+        }
+        self.matrix = matrix;
+        if self.mount == Mount::Pivot {
+            for i in 0..3 {
+                for j in 0..6 {
+                    let one = if i == j { 1.0 } else { 0.0 };
+                    (matrix[i][j], matrix[j][i]) = (one, one);
+                }
+            }
+        }
+        self.factors = Factors::of(&matrix);
+    }
+
+    /// [a; w'] from the right-hand side; on a pivot its upper half is a.
+    #[inline(always)]
+    fn solve(&self, [force, torque]: [Vec3; 2]) -> [Vec3; 2] {
+        let mut torque = torque;
+        if self.mount == Mount::Pivot {
+            for i in 0..3 {
+                torque[i] -= vector::dot(part(&self.matrix[3 + i], 0), force);
+            }
+        }
+        self.factors.solve([force, torque])
+    }
+
+    /// Takes account of the wheels' momentum being `h` from now on: what it jumps by turns the
+    /// craft by an impulse,
+    /// [dV; dw] = M^-1 [0; -dh], l dp' = -(1 - p p^T)(dV + dw x rho), work -dh.(w + dw/2).
+    /// Returns whether it jumps.
+    pub fn set_wheels(&mut self, h: Vec3) -> bool {
+        if h == self.state.h_wheels {
+            return false;
+        }
+        let jump = sub(h, self.state.h_wheels);
+        self.start(0.0);
+        self.factorise();
+        let [dv, dw] = self.factors.solve([[0.0; 3], scale(-1.0, jump)]);
+        let velocity_change = times(&rotation(&self.q[0]), dv);
+        let x = &mut self.state.x;
+        for i in 0..3 {
+            x[index::WORK] -= jump[i] * (x[index::OMEGA + i] + dw[i] / 2.0);
+            x[index::OMEGA + i] += dw[i];
+            x[index::VELOCITY + i] += velocity_change[i];
+        }
+        for bob in &self.bobs {
+            let at = index::bob(bob.tank, bob.mode);
+            bob.after_impulse((&mut x[at..at + 6]).try_into().unwrap(), dv, dw);
+        }
+        self.state.h_wheels = h;
+        true
+    }
+
+    /// Evaluates the equations at the present instant.
+    pub fn evaluate(&mut self, inputs: &Inputs) {
+        self.inputs = *inputs;
+        self.start(0.0);
+        self.rates::<0>();
+    }
+
+    /// Coefficients 0 and 1 of everything along the direction (dx, du).
+    pub fn evaluate_direction(
+        &mut self,
+        inputs: &Inputs,
+        dx: &[f64; STATES],
+        [df, dtau, dh]: [Vec3; 3],
+    ) {
+        self.evaluate(inputs);
+        let x = &self.state.x;
+        let [q, dq] = [x, dx].map(|x| [x[0], x[1], x[2], x[3]]);
+        self.q[1] = unit_quaternion_slope(&self.q[0], &q, &dq);
+        let turn = self.turn();
+        let dw = part(dx, index::OMEGA);
+        self.w[1] = dw;
+        (self.force[1], self.torque[1]) = (df, dtau);
+        (self.h[1], self.h_dot[1]) = (dh, [0.0; 3]);
+        self.gain[1] = [0.0; 3];
+        self.path[1] = [0.0; 3];
+        match self.mount {
+            Mount::Free => {
+                let dv = transposed_times(&rotation(&self.q[0]), part(dx, index::VELOCITY));
+                self.drift[1] = add(dv, vector::cross(self.drift[0], turn));
+            }
+            Mount::Pivot => self.a[1] = vector::cross(self.a[0], turn),
+        }
+        for bob in &mut self.bobs {
+            let at = index::bob(bob.tank, bob.mode);
+            let [x, dx] = [x, dx].map(|x| x[at..at + 6].try_into().unwrap());
+            bob.seed_direction(x, dx, self.w[0], dw);
+        }
+        self.rates::<1>();
+    }
+
+    /// The rotation, rad, body axes, that coefficient 1 of the attitude stands for:
+    /// q_1 = q_0 o (0, turn)/2.
+    fn turn(&self) -> Vec3 {
+        let [a, x, y, z] = self.q[0];
+        let [b, v @ ..] = self.q[1];
+        let u = [x, y, z];
+        let sum = add(sub(scale(a, v), scale(b, u)), scale(-1.0, vector::cross(u, v)));
+        scale(2.0, sum)
+    }
+
+    /// Coefficient N (0 or 1) of x'.
+    pub fn state_rates<const N: usize>(&self, x: &[f64; STATES]) -> [f64; STATES] {
+        let mut rate = [0.0; STATES];
+        let mut put = |at: usize, numbers: &[f64]| {
+            rate[at..at + numbers.len()].copy_from_slice(numbers);
+        };
+        put(index::Q, &self.q[N + 1].map(|q| q * (N + 1) as f64));
+        put(index::OMEGA, &self.w_d[N]);
+        if self.mount == Mount::Free {
+            let mut a = self.a[N];
+            if N == 1 {
+                a = add(a, vector::cross(self.turn(), self.a[0]));
+            }
+            put(index::POSITION, &part(x, index::VELOCITY));
+            put(index::VELOCITY, &times(&rotation(&self.q[0]), a));
+        }
+        put(index::WORK, &[self.work[N]]);
+        put(index::DISSIPATED, &[self.dissipation[N]]);
+        for bob in &self.bobs {
+            put(index::bob(bob.tank, bob.mode), &bob.rates::<N>(&self.w, &self.w_d));
+        }
+        rate
+    }
+}
+
+impl Motion for CraftMotion {
+    #[inline(always)]
+    fn start(&mut self, t: f64) {
+        let Inputs { force, torque, h_wheels } = &self.inputs;
+        self.force = [force.at(t), force.slope];
+        self.torque = [torque.at(t), torque.slope];
+        self.h = [h_wheels.at(t), h_wheels.slope];
+        self.h_dot = [h_wheels.slope, [0.0; 3]];
+        let x = &self.state.x;
+        self.q[0] = unit_quaternion([x[0], x[1], x[2], x[3]]);
+        self.w[0] = part(x, index::OMEGA);
+        let axes = rotation(&self.q[0]);
+        match self.mount {
+            Mount::Free => self.drift[0] = transposed_times(&axes, part(x, index::VELOCITY)),
+            Mount::Pivot => self.a[0] = scale(-1.0, transposed_times(&axes, self.gravity)),
+        }
+        for bob in &mut self.bobs {
+            let at = index::bob(bob.tank, bob.mode);
+            bob.start(x[at..at + 6].try_into().unwrap(), self.w[0]);
+        }
+    }
+
+    #[inline(always)]
+    fn rates<const N: usize>(&mut self) {
+        let ww = products::<N>(&self.w);
+        let w2 = twice_crossed(ww);
+        let mut force = sub(ramp::<N>(&self.force), times(&w2, self.rigid.moment));
+        let mut torque = sub(
+            sub(ramp::<N>(&self.torque), ramp::<N>(&self.h_dot)),
+            add(gyroscopic(&self.rigid.inertia, ww), cross_ramp::<N>(&self.w, &self.h)),
+        );
+        for bob in &mut self.bobs {
+            let [f, tau] = bob.load::<N>(&self.w, &w2);
+            force = add(force, f);
+            torque = add(torque, tau);
+        }
+        if N == 0 {
+            self.factorise();
+        }
+        if self.mount == Mount::Pivot {
+            force = self.a[N];
+        }
+        let [a, w_d] = self.solve([force, torque]);
+        self.w_d[N] = w_d;
+        self.q[N + 1] = quaternion_rate::<N>(&self.q, &self.w)
+            .map(|rate| rate * const { 1.0 / (N + 1) as f64 });
+        self.work[N] = dot_ramp::<N>(&self.torque, &self.w)
+            - dot_ramp::<N>(&self.h_dot, &self.w);
+        match self.mount {
+            Mount::Free => {
+                self.a[N] = a;
+                self.work[N] +=
+                    dot_ramp::<N>(&self.force, &self.drift) + dot_ramp::<N>(&self.force, &self.gain);
+                let gain_d = add(a, cross::<N>(&self.gain, &self.w));
+                let path_d = add(self.gain[N], cross::<N>(&self.path, &self.w));
+                let drift_d = cross::<N>(&self.drift, &self.w);
+                self.gain[N + 1] = next::<N>(gain_d);
+                self.path[N + 1] = next::<N>(path_d);
+                self.drift[N + 1] = next::<N>(drift_d);
+            }
+            Mount::Pivot => self.a[N + 1] = next::<N>(cross::<N>(&self.a, &self.w)),
+        }
+        self.w[N + 1] = next::<N>(w_d);
+        let mut dissipation = 0.0;
+        for bob in &mut self.bobs {
+            bob.accelerate::<N>(&self.w, self.a[N], w_d);
+            dissipation += bob.dissipation::<N>();
+        }
+        self.dissipation[N] = dissipation;
+    }
+
+    #[inline(always)]
+    fn set_error_scale(&mut self, h: f64, allowed: f64) {
+        let time = h.min(SCALE_TIME);
+        let rate = RATE_FLOOR + largest(self.w[0]) + largest(self.w[1]) * time;
+        let swing =
+            rate + self.bobs.iter().map(Bob::rate_scale).fold(0.0, |a, b| if b > a { b } else { a });
+        // Force passes zero, too.
+        let speed = largest(self.a[0]) * time + self.longest * swing + RATE_FLOOR;
+        self.inv_allowed = [1.0, rate, swing, speed].map(|scale| 1.0 / (allowed * scale));
+    }
+
+    #[inline(always)]
+    fn coefficient_norm(&self, n: usize) -> f64 {
+        let larger = |a: f64, b: f64| if b > a { b } else { a };
+        let [attitude, rate, swing, speed] = self.inv_allowed;
+        let [q_0, q @ ..] = self.q[n];
+        // The matrix C is quadratic in q: its coefficients are up to 2^n times those of q.
+        let q = larger(q_0.abs(), largest(q)) * (1_u64 << n) as f64;
+        let v = self.bobs.iter().map(|bob| bob.coefficient_norm(n)).fold(0.0, larger);
+        let body = larger(q * attitude, largest(self.w[n]) * rate);
+        larger(body, larger(v * swing, largest(self.gain[n]) * speed))
+    }
+
+    #[inline(always)]
+    fn take(&mut self, n: usize, h: f64) -> bool {
+        let q = unit_quaternion(series::value(&self.q, n, h));
+        let w = series::value(&self.w, n, h);
+        let x = &mut self.state.x;
+        x[index::Q..index::Q + 4].copy_from_slice(&q);
+        x[index::OMEGA..index::OMEGA + 3].copy_from_slice(&w);
+        if self.mount == Mount::Free {
+            let axes = rotation(&q);
+            let gain = times(&axes, series::value(&self.gain, n, h));
+            let path = times(&axes, series::value(&self.path, n, h));
+            for i in 0..3 {
+                x[index::POSITION + i] += x[index::VELOCITY + i] * h + path[i];
+                x[index::VELOCITY + i] += gain[i];
+            }
+        }
+        x[index::WORK] += series::integral(&self.work, n - 1, h);
+        x[index::DISSIPATED] += series::integral(&self.dissipation, n - 1, h);
+        let mut finite = x[..index::BOBS].iter().all(|x| x.abs() < MAX_MAGNITUDE);
+        for bob in &self.bobs {
+            let at = index::bob(bob.tank, bob.mode);
+            let moved = bob.at(n, h, w);
+            finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
+            x[at..at + 6].copy_from_slice(&moved);
+        }
+        finite
+    }
+}

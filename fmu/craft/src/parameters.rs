@@ -1,0 +1,345 @@
+//! What describes the craft, its tanks and the start of its motion, and what of it is refused.
+//!
+//! Names in the messages are those of the FMU's parameters. Indices count from 1 there.
+
+use crate::rigid::{Factors, Rigid};
+use crate::vector::{Quaternion, Vec3, norm};
+
+/// Tanks that a craft can have.
+pub const TANKS: usize = 4;
+
+/// Slosh modes that a tank can have.
+pub const MODES: usize = 3;
+
+/// Symmetric inertia tensor, kg m2: the matrix of J = integral of (|s|^2 1 - s s^T) dm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Inertia {
+    /// Moment about x.
+    pub xx: f64,
+    /// Moment about y.
+    pub yy: f64,
+    /// Moment about z.
+    pub zz: f64,
+    /// Element xy, -integral of x y dm.
+    pub xy: f64,
+    /// Element xz, -integral of x z dm.
+    pub xz: f64,
+    /// Element yz, -integral of y z dm.
+    pub yz: f64,
+}
+
+impl Inertia {
+    /// The matrix by rows.
+    pub fn matrix(&self) -> [[f64; 3]; 3] {
+        let Inertia { xx, yy, zz, xy, xz, yz } = *self;
+        [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+    }
+}
+
+/// The craft without its liquids; wheels are dead mass of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Craft {
+    /// Mass, kg, > 0.
+    pub mass: f64,
+    /// Centre of mass from O, m, body axes.
+    pub r: Vec3,
+    /// Inertia about the centre of mass, body axes.
+    pub j: Inertia,
+}
+
+/// How the craft is held.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Mount {
+    /// Not at all: it flies; gravity has no part in the motion, because position and velocity
+    /// are counted from a freely falling frame.
+    Free = 1,
+    /// O rests on an air bearing in uniform gravity; the craft turns about it.
+    Pivot = 2,
+}
+
+/// One tank: rigid liquid and pendulums, in the tank's own axes. Its z axis is the tank's
+/// axis; liquid at rest hangs towards -z.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tank {
+    /// The tank's origin from O, m, body axes.
+    pub position: Vec3,
+    /// Attitude of the tank: tank axes to body axes, scalar first; normalised on reading.
+    pub q: Quaternion,
+    /// Mass of the rigid liquid, kg.
+    pub m_0: f64,
+    /// Height of the rigid liquid's centre of mass on the tank's axis, m.
+    pub h_0: f64,
+    /// Its inertia across the axis about its own centre of mass, kg m2.
+    pub i_0: f64,
+    /// Its inertia about the axis, kg m2.
+    pub i_z: f64,
+    /// How many modes are kept, 0 to [`MODES`].
+    pub modes: usize,
+    /// Acceleration along the axis at which `zeta` holds, m/s2, > 0.
+    pub g_ref: f64,
+    /// Mass of the bob, kg.
+    pub mass: [f64; MODES],
+    /// Length of the pendulum, m.
+    pub length: [f64; MODES],
+    /// Height of the hinge on the tank's axis, m.
+    pub hinge: [f64; MODES],
+    /// Centring stiffness (capillarity, diaphragm), N/m.
+    pub k: [f64; MODES],
+    /// Damping ratio at `g_ref`.
+    pub zeta: [f64; MODES],
+    /// Direction from hinge to bob at the start, tank axes; normalised on reading.
+    pub p_0: [Vec3; MODES],
+    /// Its rate at the start, 1/s, tank axes; made tangential on reading.
+    pub p_dot_0: [Vec3; MODES],
+}
+
+impl Tank {
+    /// c = 2 zeta m sqrt(g_ref/l + k/m) of mode n (from 0), N s/m.
+    pub fn drag(&self, n: usize) -> f64 {
+        let (m, l) = (self.mass[n], self.length[n]);
+        2.0 * self.zeta[n] * m * libm::sqrt(self.g_ref / l + self.k[n] / m)
+    }
+}
+
+/// Where the motion starts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Init {
+    /// Attitude, body to inertial, scalar first; normalised on reading.
+    pub q: Quaternion,
+    /// Angular velocity against the inertial frame, rad/s, body axes.
+    pub omega: Vec3,
+    /// Position of O, m, inertial axes.
+    pub position: Vec3,
+    /// Velocity of O, m/s, inertial axes.
+    pub velocity: Vec3,
+}
+
+/// Everything that describes a [`Spacecraft`](crate::Spacecraft) before it moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameters {
+    /// The craft without its liquids.
+    pub craft: Craft,
+    /// How it is held.
+    pub mount: Mount,
+    /// Gravity of mount [`Mount::Pivot`], m/s2, inertial axes. Of no effect on a free craft.
+    pub gravity: Vec3,
+    /// How many tanks there are, 0 to [`TANKS`].
+    pub tanks: usize,
+    /// The tanks.
+    pub tank: [Tank; TANKS],
+    /// Where the motion starts.
+    pub init: Init,
+}
+
+// The 1180 kg craft of the reference records with the tank on its axis (record `axial_pulse`,
+// ../tests/six.json; the damping is bare-wall damping of a smooth metre-sized tank).
+impl Default for Craft {
+    fn default() -> Self {
+        let j = Inertia { xx: 910.0, yy: 860.0, zz: 640.0, xy: 0.0, xz: 0.0, yz: 0.0 };
+        Craft { mass: 1180.0, r: [0.0, 0.0, 0.21], j }
+    }
+}
+
+impl Default for Tank {
+    fn default() -> Self {
+        Tank {
+            position: [0.0, 0.0, -0.45],
+            q: [1.0, 0.0, 0.0, 0.0],
+            m_0: 253.493,
+            h_0: 0.0563967,
+            i_0: 3.67522,
+            i_z: 0.0,
+            modes: 1,
+            g_ref: 1.5,
+            mass: [128.211, 3.91595, 0.95],
+            length: [0.248039, 0.084405, 0.0525],
+            hinge: [0.136534, 0.215871, 0.25],
+            k: [0.0; MODES],
+            zeta: [0.005; MODES],
+            p_0: [[0.0, 0.0, -1.0]; MODES],
+            p_dot_0: [[0.0; 3]; MODES],
+        }
+    }
+}
+
+impl Default for Init {
+    fn default() -> Self {
+        let at_rest = [0.0; 3];
+        Init { q: [1.0, 0.0, 0.0, 0.0], omega: at_rest, position: at_rest, velocity: at_rest }
+    }
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Parameters {
+            craft: Craft::default(),
+            mount: Mount::Free,
+            gravity: [0.0, 0.0, -9.81],
+            tanks: 1,
+            tank: [Tank::default(); TANKS],
+            init: Init::default(),
+        }
+    }
+}
+
+/// No mass, inertia or stiffness is larger: squares and products stay far from overflow.
+const HEAVIEST: f64 = 1e12;
+/// No length, speed or acceleration is larger.
+const FARTHEST: f64 = 1e9;
+/// Shorter pendulums are too stiff, m.
+const SHORTEST: f64 = 1e-6;
+/// Lighter bobs have no effect, kg.
+const LIGHTEST: f64 = 1e-9;
+
+/// Problems found so far.
+struct Problems(Vec<String>);
+
+impl Problems {
+    fn number(&mut self, name: &str, value: f64, low: f64, high: f64, unit: &str) {
+        if !(low..=high).contains(&value) {
+            let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+            self.0.push(format!("{name} = {value:?} (allowed: {low:?} to {high:?}{unit})"));
+        }
+    }
+
+    fn vector(&mut self, name: &str, value: &[f64], unit: &str) {
+        for (i, &x) in value.iter().enumerate() {
+            self.number(&format!("{name}[{}]", i + 1), x, -FARTHEST, FARTHEST, unit);
+        }
+    }
+
+    /// A vector that is going to be normalised.
+    fn direction(&mut self, name: &str, value: &[f64]) {
+        let before = self.0.len();
+        self.vector(name, value, "");
+        let size = libm::sqrt(value.iter().map(|x| x * x).sum());
+        if self.0.len() == before && size < 1e-6 {
+            self.0.push(format!("{name} = {value:?} has no direction (allowed: length above 1e-6)"));
+        }
+    }
+}
+
+impl Tank {
+    fn find_problems(&self, name: &str, problems: &mut Problems) {
+        problems.vector(&format!("{name}.position"), &self.position, "m");
+        problems.direction(&format!("{name}.q"), &self.q);
+        problems.number(&format!("{name}.m_0"), self.m_0, 0.0, HEAVIEST, "kg");
+        problems.number(&format!("{name}.H_0"), self.h_0, -FARTHEST, FARTHEST, "m");
+        problems.number(&format!("{name}.I_0"), self.i_0, 0.0, HEAVIEST, "kg.m2");
+        problems.number(&format!("{name}.I_z"), self.i_z, 0.0, HEAVIEST, "kg.m2");
+        if self.modes > MODES {
+            problems.0.push(format!("{name}.modes = {} (allowed: 0 to {MODES})", self.modes));
+        }
+        problems.number(&format!("{name}.g_ref"), self.g_ref, 1e-9, 1e6, "m/s2");
+        for n in 0..self.modes.min(MODES) {
+            let i = n + 1;
+            problems.number(&format!("{name}.mass[{i}]"), self.mass[n], LIGHTEST, HEAVIEST, "kg");
+            let length = self.length[n];
+            problems.number(&format!("{name}.length[{i}]"), length, SHORTEST, FARTHEST, "m");
+            let hinge = self.hinge[n];
+            problems.number(&format!("{name}.hinge[{i}]"), hinge, -FARTHEST, FARTHEST, "m");
+            problems.number(&format!("{name}.k[{i}]"), self.k[n], 0.0, HEAVIEST, "N/m");
+            problems.number(&format!("{name}.zeta[{i}]"), self.zeta[n], 0.0, 10.0, "");
+            problems.direction(&format!("{name}.p_0[{i}]"), &self.p_0[n]);
+            problems.vector(&format!("{name}.p_dot_0[{i}]"), &self.p_dot_0[n], "1/s");
+        }
+    }
+
+    /// Everything that is wrong with a tank on somebody else's craft; `name` is `tank`.
+    pub(crate) fn problems(&self, name: &str) -> Vec<String> {
+        let mut problems = Problems(Vec::new());
+        self.find_problems(name, &mut problems);
+        problems.0
+    }
+}
+
+impl Craft {
+    fn find_problems(&self, name: &str, problems: &mut Problems) {
+        problems.number(&format!("{name}.mass"), self.mass, LIGHTEST, HEAVIEST, "kg");
+        problems.vector(&format!("{name}.r"), &self.r, "m");
+        let Inertia { xx, yy, zz, xy, xz, yz } = self.j;
+        for (element, value) in [("Jxx", xx), ("Jyy", yy), ("Jzz", zz)] {
+            problems.number(&format!("{name}.{element}"), value, 0.0, HEAVIEST, "kg.m2");
+        }
+        for (element, value) in [("Jxy", xy), ("Jxz", xz), ("Jyz", yz)] {
+            problems.number(&format!("{name}.{element}"), value, -HEAVIEST, HEAVIEST, "kg.m2");
+        }
+        // A principal moment below zero is one of the minors below zero.
+        let minors = [
+            ("Jxx", "Jyy", "Jxy", xx * yy, xy * xy),
+            ("Jxx", "Jzz", "Jxz", xx * zz, xz * xz),
+            ("Jyy", "Jzz", "Jyz", yy * zz, yz * yz),
+        ];
+        let mut indefinite = false;
+        for (a, b, c, of_moments, of_product) in minors {
+            if of_product > of_moments * (1.0 + 1e-12) {
+                indefinite = true;
+                problems.0.push(format!(
+                    "{name}.{c}^2 = {of_product:?} (allowed: up to {name}.{a} {name}.{b} = \
+                     {of_moments:?})"
+                ));
+            }
+        }
+        let determinant = xx * yy * zz + 2.0 * xy * xz * yz - xx * yz * yz - yy * xz * xz
+            - zz * xy * xy;
+        if !indefinite && determinant < -1e-12 * xx * yy * zz {
+            problems.0.push(format!(
+                "{name}.J has a negative principal moment: its determinant is {determinant:?} \
+                 kg3.m6 (allowed: 0 and above)"
+            ));
+        }
+    }
+
+    /// Everything that is wrong with a host's mass properties; `name` is `host`.
+    pub(crate) fn problems(&self, name: &str) -> Vec<String> {
+        let mut problems = Problems(Vec::new());
+        self.find_problems(name, &mut problems);
+        if problems.0.is_empty()
+            && Factors::of(&Rigid::of_craft(self).mass_matrix()).smallest_pivot() < 1e-12
+        {
+            problems.0.push(format!(
+                "{name}.J is singular: the inertia about every axis must be above 0"
+            ));
+        }
+        problems.0
+    }
+}
+
+impl Parameters {
+    /// Everything that is wrong with the parameters; empty when nothing is.
+    pub fn problems(&self) -> Vec<String> {
+        let mut problems = Problems(Vec::new());
+        self.craft.find_problems("craft", &mut problems);
+        problems.vector("gravity", &self.gravity, "m/s2");
+        if self.tanks > TANKS {
+            problems.0.push(format!("tanks = {} (allowed: 0 to {TANKS})", self.tanks));
+        }
+        for (i, tank) in self.tank[..self.tanks.min(TANKS)].iter().enumerate() {
+            tank.find_problems(&format!("tank[{}]", i + 1), &mut problems);
+        }
+        problems.direction("init.q", &self.init.q);
+        problems.vector("init.omega", &self.init.omega, "rad/s");
+        problems.vector("init.position", &self.init.position, "m");
+        problems.vector("init.velocity", &self.init.velocity, "m/s");
+        if self.mount == Mount::Pivot && norm(self.init.velocity) != 0.0 {
+            problems.0.push(format!(
+                "init.velocity = {:?} m/s (allowed with mount = pivot: 0, which holds O)",
+                self.init.velocity
+            ));
+        }
+        if problems.0.is_empty() {
+            let rigid = self.tank[..self.tanks]
+                .iter()
+                .fold(Rigid::of_craft(&self.craft), |sum, tank| sum.and(&Rigid::of_tank(tank)));
+            if Factors::of(&rigid.mass_matrix()).smallest_pivot() < 1e-12 {
+                problems.0.push(
+                    "craft.J with the tanks' m_0, I_0 and I_z is singular: the inertia of craft \
+                     and rigid liquid about every axis through their centre of mass must be above 0"
+                        .into(),
+                );
+            }
+        }
+        problems.0
+    }
+}

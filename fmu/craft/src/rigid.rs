@@ -1,0 +1,281 @@
+//! Rigid bodies seen from O, and the 6 x 6 system that the craft's motion solves:
+//!
+//! ```text
+//! M = [ m 1     -[S]x ]     S = sum of m s,  I = sum of J + m (|s|^2 1 - s s^T), both about O
+//!     [ [S]x      I   ]     M [a; w'] = [force; torque about O]
+//! ```
+//!
+//! Source: Newton and Euler about a point that is not the centre of mass.
+
+use crate::parameters::{Craft, Tank};
+use crate::vector::{Mat3, Number, Vec3, add, cross, dot, rotation, scale, times, unit_quaternion};
+
+/// A symmetric matrix of six rows.
+pub type Mat6 = [[f64; 6]; 6];
+
+/// Mass, first and second moment about O.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rigid {
+    /// kg
+    pub mass: f64,
+    /// S = m s, kg m
+    pub moment: Vec3,
+    /// I about O, kg m2
+    pub inertia: Mat3,
+}
+
+impl Rigid {
+    /// A body of mass m at s with the inertia `own` about its centre of mass.
+    pub fn new(m: f64, s: Vec3, own: &Mat3) -> Rigid {
+        let s2 = dot(s, s);
+        let mut inertia = *own;
+        for i in 0..3 {
+            for j in 0..3 {
+                inertia[i][j] += m * (if i == j { s2 } else { 0.0 } - s[i] * s[j]);
+            }
+        }
+        Rigid { mass: m, moment: scale(m, s), inertia }
+    }
+
+    /// The dry craft.
+    pub fn of_craft(craft: &Craft) -> Rigid {
+        Rigid::new(craft.mass, craft.r, &craft.j.matrix())
+    }
+
+    /// A tank's rigid liquid: m_0 on the axis at height H_0, J_0 = I_0 1 + (I_z - I_0) e e^T.
+    pub fn of_tank(tank: &Tank) -> Rigid {
+        let e = rotation(&unit_quaternion(tank.q)).map(|row| row[2]);
+        let mut own = [[0.0; 3]; 3];
+        for i in 0..3 {
+            for j in 0..3 {
+                let one = if i == j { tank.i_0 } else { 0.0 };
+                own[i][j] = one + (tank.i_z - tank.i_0) * e[i] * e[j];
+            }
+        }
+        Rigid::new(tank.m_0, add(tank.position, scale(tank.h_0, e)), &own)
+    }
+
+    /// Both bodies as one.
+    pub fn and(&self, b: &Rigid) -> Rigid {
+        let mut sum = *self;
+        sum.mass += b.mass;
+        sum.moment = add(sum.moment, b.moment);
+        for i in 0..3 {
+            sum.inertia[i] = add(sum.inertia[i], b.inertia[i]);
+        }
+        sum
+    }
+
+    /// M, unknowns a, w'.
+    pub fn mass_matrix(&self) -> Mat6 {
+        let [x, y, z] = self.moment;
+        let [i_x, i_y, i_z] = self.inertia;
+        let m = self.mass;
+        [
+            [m, 0.0, 0.0, 0.0, z, -y],
+            [0.0, m, 0.0, -z, 0.0, x],
+            [0.0, 0.0, m, y, -x, 0.0],
+            [0.0, -z, y, i_x[0], i_x[1], i_x[2]],
+            [z, 0.0, -x, i_y[0], i_y[1], i_y[2]],
+            [-y, x, 0.0, i_z[0], i_z[1], i_z[2]],
+        ]
+    }
+
+    /// Force and torque about O that the body's motion takes:
+    /// M [a; w'] + [w x (w x S); w x (I w)].
+    pub fn inertial_wrench<T: Number>(&self, a: Vec3<T>, w: Vec3<T>, w_d: Vec3<T>) -> [Vec3<T>; 2] {
+        let s = self.moment.map(T::constant);
+        let inertia = self.inertia.map(|row| row.map(T::constant));
+        let force = add(
+            a.map(|x| x * self.mass),
+            add(cross(w_d, s), cross(w, cross(w, s))),
+        );
+        let torque = add(
+            cross(s, a),
+            add(times(&inertia, w_d), cross(w, times(&inertia, w))),
+        );
+        [force, torque]
+    }
+}
+
+/// Adds m u u^T, u = [p; P x p]: the inertia that a bob at the end of its rod adds, which has
+/// inertia along its rod only.
+#[inline(always)]
+pub fn add_rank_one(matrix: &mut Mat6, m: f64, u: &[f64; 6]) {
+    for i in 0..6 {
+        for j in 0..=i {
+            let x = m * u[i] * u[j];
+            matrix[i][j] += x;
+            if i != j {
+                matrix[j][i] += x;
+            }
+        }
+    }
+}
+
+/// [p; P x p].
+#[inline(always)]
+pub fn along_rod(p: Vec3, hinge: Vec3) -> [f64; 6] {
+    let c = cross(hinge, p);
+    [p[0], p[1], p[2], c[0], c[1], c[2]]
+}
+
+/// A symmetric positive definite matrix as L D L^T, L with ones on its diagonal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Factors {
+    l: Mat6,
+    /// 1/D, and D over the matrix's own diagonal.
+    inverse: [f64; 6],
+    pivots: [f64; 6],
+}
+
+impl Factors {
+    /// Factors of a matrix of which the lower triangle is read.
+    #[inline(always)]
+    pub fn of(matrix: &Mat6) -> Factors {
+        let mut l = [[0.0; 6]; 6];
+        let (mut inverse, mut pivots) = ([0.0; 6], [0.0; 6]);
+        for j in 0..6 {
+            // Row j of L D, then of L.
+            let mut d = matrix[j][j];
+            for k in 0..j {
+                let mut x = matrix[j][k];
+                for i in 0..k {
+                    x -= l[j][i] * l[k][i];
+                }
+                l[j][k] = x;
+            }
+            for k in 0..j {
+                let x = l[j][k] * inverse[k];
+                d -= l[j][k] * x;
+                l[j][k] = x;
+            }
+            inverse[j] = 1.0 / d;
+            pivots[j] = d / matrix[j][j];
+        }
+        Factors { l, inverse, pivots }
+    }
+
+    /// Smallest pivot over its element of the diagonal: 0, below it or NaN for a matrix that is
+    /// not positive definite.
+    pub fn smallest_pivot(&self) -> f64 {
+        // NaN counts as 0.
+        self.pivots.iter().fold(1.0, |least, &x| if x >= least { least } else { x.max(0.0) })
+    }
+
+    /// The solution of matrix x = b.
+    #[inline(always)]
+    pub fn solve(&self, b: [Vec3; 2]) -> [Vec3; 2] {
+        let l = &self.l;
+        let mut x = [b[0][0], b[0][1], b[0][2], b[1][0], b[1][1], b[1][2]];
+        for i in 1..6 {
+            for j in 0..i {
+                x[i] -= l[i][j] * x[j];
+            }
+        }
+        for i in 0..6 {
+            x[i] *= self.inverse[i];
+        }
+        for i in (0..5).rev() {
+            for j in i + 1..6 {
+                x[i] -= l[j][i] * x[j];
+            }
+        }
+        [[x[0], x[1], x[2]], [x[3], x[4], x[5]]]
+    }
+
+    /// L^-1 times b, each row over the root of its pivot: with it M_a turns into the symmetric
+    /// matrix that has the eigenvalues of M^-1 M_a.
+    fn half_solve(&self, b: &[f64; 6]) -> [f64; 6] {
+        let mut x = *b;
+        for i in 1..6 {
+            for j in 0..i {
+                x[i] -= self.l[i][j] * x[j];
+            }
+        }
+        core::array::from_fn(|i| x[i] * libm::sqrt(self.inverse[i]))
+    }
+}
+
+/// The largest eigenvalue of M^-1 A, both symmetric, M with the given factors: Jacobi's
+/// rotations of the similar symmetric matrix.
+pub fn largest_eigenvalue(m: &Factors, a: &Mat6) -> f64 {
+    let rows = a.map(|row| m.half_solve(&row));
+    let mut b: Mat6 = core::array::from_fn(|i| m.half_solve(&rows.map(|row| row[i])));
+    // Quadratic convergence: six sweeps reach rounding, the rest is margin.
+    for _ in 0..12 {
+        for p in 0..5 {
+            for q in p + 1..6 {
+                if b[p][q] == 0.0 {
+                    continue;
+                }
+                let half = (b[q][q] - b[p][p]) / (2.0 * b[p][q]);
+                let sign = if half < 0.0 { -1.0 } else { 1.0 };
+                let t = sign / (half.abs() + libm::sqrt(half * half + 1.0));
+                let cos = 1.0 / libm::sqrt(t * t + 1.0);
+                let sin = t * cos;
+                for k in 0..6 {
+                    let (x, y) = (b[k][p], b[k][q]);
+                    (b[k][p], b[k][q]) = (cos * x - sin * y, sin * x + cos * y);
+                }
+                for k in 0..6 {
+                    let (x, y) = (b[p][k], b[q][k]);
+                    (b[p][k], b[q][k]) = (cos * x - sin * y, sin * x + cos * y);
+                }
+            }
+        }
+    }
+    (0..6).map(|i| b[i][i]).fold(f64::NEG_INFINITY, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A craft's matrix with a few bobs, and what it is multiplied with comes back.
+    #[test]
+    fn solving_undoes_multiplying() {
+        let mut rng = fastrand::Rng::with_seed(5);
+        let mut between = |low: f64, high: f64| low + rng.f64() * (high - low);
+        for _ in 0..100 {
+            let own = [[910.0, 14.0, -9.0], [14.0, 860.0, 6.0], [-9.0, 6.0, 640.0]];
+            let s = [between(-1.0, 1.0), between(-1.0, 1.0), between(-1.0, 1.0)];
+            let mut matrix = Rigid::new(1180.0, s, &own).mass_matrix();
+            for _ in 0..4 {
+                let p = [between(-1.0, 1.0), between(-1.0, 1.0), between(-1.0, 1.0)];
+                let hinge = [between(-1.0, 1.0), 0.3, -0.5];
+                add_rank_one(&mut matrix, 100.0, &along_rod(p, hinge));
+            }
+            let factors = Factors::of(&matrix);
+            assert!(factors.smallest_pivot() > 0.01);
+            let x: [f64; 6] = core::array::from_fn(|_| between(-1.0, 1.0));
+            let b = matrix.map(|row| (0..6).map(|i| row[i] * x[i]).sum::<f64>());
+            let [a, w_d] = factors.solve([[b[0], b[1], b[2]], [b[3], b[4], b[5]]]);
+            for (got, want) in a.iter().chain(&w_d).zip(x) {
+                // Rounding times the condition, below 100 with rows scaled to each other.
+                assert!((got - want).abs() < 1e-13, "{got} {want}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_matrix_with_no_inertia_about_an_axis_is_singular() {
+        let rod = [[5.0, 0.0, 0.0], [0.0, 5.0, 0.0], [0.0, 0.0, 0.0]];
+        let matrix = Rigid::new(10.0, [0.0, 0.0, 0.4], &rod).mass_matrix();
+        assert!(Factors::of(&matrix).smallest_pivot() < 1e-12);
+    }
+
+    /// The eigenvalues of M^-1 A for A = m u u^T: m u.M^-1 u and five times 0.
+    #[test]
+    fn the_largest_eigenvalue_of_a_rank_one_matrix_is_its_quadratic_form() {
+        let own = [[910.0, 14.0, -9.0], [14.0, 860.0, 6.0], [-9.0, 6.0, 640.0]];
+        let factors = Factors::of(&Rigid::new(310.0, [0.1, -0.3, 0.21], &own).mass_matrix());
+        let u = along_rod([0.36, 0.48, 0.8], [0.5, 0.7, -0.9]);
+        let mut a = [[0.0; 6]; 6];
+        add_rank_one(&mut a, 128.0, &u);
+        let [x, y] = factors.solve([[u[0], u[1], u[2]], [u[3], u[4], u[5]]]);
+        let expected = 128.0 * (dot([u[0], u[1], u[2]], x) + dot([u[3], u[4], u[5]], y));
+        let got = largest_eigenvalue(&factors, &a);
+        assert!((got / expected - 1.0).abs() < 1e-14, "{got} {expected}");
+    }
+}

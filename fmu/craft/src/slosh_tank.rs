@@ -1,0 +1,493 @@
+//! One tank on somebody else's craft.
+//!
+//! The host's motion is given: specific force a at O and rate w with its derivative w'. Out
+//! come the liquid's wrench on the host, and what of it depends on [a; w']:
+//!
+//! ```text
+//! [F; torque] = bias - M_a [a; w']
+//! M_a  = M_0 + sum of m u u^T,  u = [p; P x p]                 symmetric, of p alone
+//! bias = sum of (T_0 u + [phi; rho x phi]) - [m_0 w x (w x s); w x (I_s w)]
+//! ```
+//!
+//! M_0, I_s: the rigid liquid about O (`rigid.rs`); T_0: the pull at a = w' = 0 (`bob.rs`). A
+//! host that solves (M_host + M_a) [a; w'] = rest + bias has no algebraic loop, whatever the
+//! masses.
+//!
+//! [`Coupling::Lumped`] is for hosts that are plain rigid bodies: each whole bob counts as a
+//! point mass at its hinge,
+//!
+//! ```text
+//! M_a^ = M_0 + sum of m [1; [P]x] [1; [P]x]^T = const,  bias^ = [F; torque] + M_a^ [a; w']
+//! ```
+//!
+//! with the [a; w'] given to the tank. M_a^ - M_a is positive semidefinite for every p, so the
+//! loop that is left converges at any mass ratio.
+//!
+//! Within a step a and w' are linear in time, and w = w_n + w'_n t + w''_n t^2/2.
+
+use crate::bob::Bob;
+use crate::integrator::{MAX_MAGNITUDE, Motion, RATE_FLOOR, StepError, advance};
+use crate::motion::{part, twice_crossed};
+use crate::outputs::TankOutputs;
+use crate::parameters::{Craft, MODES, Tank};
+use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod, largest_eigenvalue};
+use crate::series::{self, Series, Vector, ZERO, ZERO_VECTOR, products};
+use crate::state::Ramp;
+use crate::vector::{Dual, Number, Vec3, add, constant, cross, largest, on_sphere, scale};
+
+/// Number of continuous states of a tank: p and p' of each mode, then the dissipated energy.
+pub const TANK_STATES: usize = 6 * MODES + 1;
+
+/// Number of a tank's inputs: a, omega, omega_dot.
+pub const TANK_INPUTS: usize = 9;
+
+/// Elements of a symmetric 6 x 6 matrix: the upper triangle by rows.
+pub const TRIANGLE: usize = 21;
+
+const DISSIPATED: usize = 6 * MODES;
+
+/// What `bias` and `added_mass` stand for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Coupling {
+    /// Wrench at a = w' = 0 and the added mass of the moment: for hosts that solve with them.
+    Split = 1,
+    /// Constant added mass with each bob at its hinge: for hosts that are plain rigid bodies.
+    Lumped = 2,
+}
+
+/// Everything that describes a [`SloshTank`] before it moves.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TankParameters {
+    /// The tank; position and attitude are against the host's O and axes.
+    pub tank: Tank,
+    /// What the host does with `bias` and `added_mass`.
+    pub coupling: Coupling,
+    /// The host's mass properties without this tank, for [`SloshTank::coupling_ratio`] alone.
+    pub host: Option<Craft>,
+}
+
+impl Default for TankParameters {
+    fn default() -> Self {
+        TankParameters { tank: Tank::default(), coupling: Coupling::Split, host: None }
+    }
+}
+
+impl TankParameters {
+    /// Everything that is wrong with the parameters; empty when nothing is.
+    pub fn problems(&self) -> Vec<String> {
+        let mut problems = self.tank.problems("tank");
+        if let Some(host) = &self.host {
+            problems.extend(host.problems("host"));
+        }
+        problems
+    }
+}
+
+/// The host's motion over one step; host axes.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct TankInputs {
+    /// Specific force at O, m/s2.
+    pub a: Ramp,
+    /// Angular velocity, rad/s, now. Its slope is omega_dot.
+    pub omega: Vec3,
+    /// Angular acceleration, rad/s2.
+    pub omega_dot: Ramp,
+}
+
+/// What the tank shows at one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SloshTankOutputs {
+    /// Force and torque about O on the host, and the modes.
+    pub tank: TankOutputs,
+    /// Bias, N and N m: see [`Coupling`].
+    pub bias: [f64; 6],
+    /// Added mass, kg, kg m, kg m2: upper triangle by rows; see [`Coupling`].
+    pub added_mass: [f64; TRIANGLE],
+    /// Energy dissipated by the liquid since the start, J.
+    pub dissipated: f64,
+}
+
+/// The tank's memory.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TankState {
+    time: f64,
+    x: [f64; TANK_STATES],
+}
+
+impl TankState {
+    /// Length of the flat form.
+    pub const WORDS: usize = 1 + TANK_STATES;
+
+    /// The state as plain words, for saving.
+    pub fn to_words(&self) -> [u64; Self::WORDS] {
+        let mut words = [self.time.to_bits(); Self::WORDS];
+        for (word, number) in words[1..].iter_mut().zip(self.x) {
+            *word = number.to_bits();
+        }
+        words
+    }
+
+    /// The reverse; `None` when the words are no state.
+    pub fn from_words(words: &[u64; Self::WORDS]) -> Option<TankState> {
+        let numbers = words.map(f64::from_bits);
+        let x: [f64; TANK_STATES] = core::array::from_fn(|i| numbers[1 + i]);
+        let bobs = (0..MODES).all(|n| part(&x, 6 * n) != [0.0; 3]);
+        let is_state = numbers.iter().all(|x| x.is_finite()) && bobs;
+        is_state.then_some(TankState { time: numbers[0], x })
+    }
+}
+
+/// The tank at its present state and the series of its motion.
+#[derive(Clone, Debug)]
+struct TankMotion {
+    state: TankState,
+    inputs: TankInputs,
+    rigid: Rigid,
+    bobs: Vec<Bob>,
+    a: Vector,
+    w: Vector,
+    w_d: Vector,
+    dissipation: Series,
+    /// 1 over what is allowed of v
+    inv_allowed: f64,
+}
+
+/// One tank on somebody else's craft.
+#[derive(Clone, Debug)]
+pub struct SloshTank {
+    motion: Box<TankMotion>,
+    coupling: Coupling,
+    host: Option<Craft>,
+    /// M_a of [`Coupling::Lumped`]
+    lumped: Mat6,
+    tolerance: f64,
+}
+
+impl Motion for TankMotion {
+    #[inline(always)]
+    fn start(&mut self, t: f64) {
+        let TankInputs { a, omega, omega_dot } = &self.inputs;
+        (self.a[0], self.a[1]) = (a.at(t), a.slope);
+        (self.w_d[0], self.w_d[1]) = (omega_dot.at(t), omega_dot.slope);
+        let turned = [0, 1, 2].map(|i| {
+            omega[i] + (omega_dot.value[i] + omega_dot.slope[i] * t / 2.0) * t
+        });
+        (self.w[0], self.w[1]) = (turned, self.w_d[0]);
+        self.w[2] = scale(0.5, omega_dot.slope);
+        for bob in &mut self.bobs {
+            let at = 6 * bob.mode;
+            bob.start(self.state.x[at..at + 6].try_into().unwrap(), turned);
+        }
+    }
+
+    #[inline(always)]
+    fn rates<const N: usize>(&mut self) {
+        let w2 = twice_crossed(products::<N>(&self.w));
+        let mut dissipation = 0.0;
+        for bob in &mut self.bobs {
+            bob.load::<N>(&self.w, &w2);
+            bob.accelerate::<N>(&self.w, self.a[N], self.w_d[N]);
+            dissipation += bob.dissipation::<N>();
+        }
+        self.dissipation[N] = dissipation;
+    }
+
+    #[inline(always)]
+    fn set_error_scale(&mut self, _: f64, allowed: f64) {
+        let swing = self.bobs.iter().map(Bob::rate_scale).fold(0.0, |a, b| if b > a { b } else { a });
+        self.inv_allowed = 1.0 / (allowed * (RATE_FLOOR + largest(self.w[0]) + swing));
+    }
+
+    #[inline(always)]
+    fn coefficient_norm(&self, n: usize) -> f64 {
+        let larger = |a: f64, b: f64| if b > a { b } else { a };
+        self.bobs.iter().map(|bob| bob.coefficient_norm(n)).fold(0.0, larger) * self.inv_allowed
+    }
+
+    #[inline(always)]
+    fn take(&mut self, n: usize, h: f64) -> bool {
+        let w = series::value(&self.w, 2, h);
+        let x = &mut self.state.x;
+        x[DISSIPATED] += series::integral(&self.dissipation, n - 1, h);
+        let mut finite = x[DISSIPATED].abs() < MAX_MAGNITUDE;
+        for bob in &self.bobs {
+            let moved = bob.at(n, h, w);
+            finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
+            x[6 * bob.mode..6 * bob.mode + 6].copy_from_slice(&moved);
+        }
+        finite
+    }
+}
+
+impl TankMotion {
+    fn evaluate(&mut self, inputs: &TankInputs) {
+        self.inputs = *inputs;
+        self.start(0.0);
+        self.rates::<0>();
+    }
+
+    fn evaluate_direction(
+        &mut self,
+        inputs: &TankInputs,
+        dx: &[f64; TANK_STATES],
+        du: &[f64; TANK_INPUTS],
+    ) {
+        self.evaluate(inputs);
+        let dw = part(du, 3);
+        (self.a[1], self.w[1], self.w_d[1]) = (part(du, 0), dw, part(du, 6));
+        for bob in &mut self.bobs {
+            let at = 6 * bob.mode;
+            let [x, dx] = [&self.state.x, dx].map(|x| x[at..at + 6].try_into().unwrap());
+            bob.seed_direction(x, dx, self.w[0], dw);
+        }
+        self.rates::<1>();
+    }
+
+    fn state_rates<const N: usize>(&self) -> [f64; TANK_STATES] {
+        let mut rate = [0.0; TANK_STATES];
+        for bob in &self.bobs {
+            let at = 6 * bob.mode;
+            rate[at..at + 6].copy_from_slice(&bob.rates::<N>(&self.w, &self.w_d));
+        }
+        rate[DISSIPATED] = self.dissipation[N];
+        rate
+    }
+}
+
+/// m u u^T into a matrix of any kind of numbers.
+fn add_added_mass<T: Number>(matrix: &mut [[T; 6]; 6], bob: &Bob) {
+    let p = [0, 1, 2].map(|i| T::of(bob.p[0][i], bob.p[1][i]));
+    let c = cross(constant(bob.hinge), p);
+    let u = [p[0], p[1], p[2], c[0], c[1], c[2]];
+    for i in 0..6 {
+        for j in 0..6 {
+            matrix[i][j] = matrix[i][j] + u[i] * u[j] * bob.m;
+        }
+    }
+}
+
+fn triangle<T: Number>(matrix: &[[T; 6]; 6]) -> [f64; TRIANGLE] {
+    let mut elements = [0.0; TRIANGLE];
+    let places = (0..6).flat_map(|i| (i..6).map(move |j| (i, j)));
+    for (element, (i, j)) in elements.iter_mut().zip(places) {
+        *element = matrix[i][j].result();
+    }
+    elements
+}
+
+impl SloshTank {
+    /// A tank at the start of its motion, at `start_time` (s); `tolerance` is the relative error
+    /// allowed in directions and rates. Refused parameters are returned with everything that is
+    /// wrong with them.
+    pub fn new(
+        p: &TankParameters,
+        _: &TankInputs,
+        start_time: f64,
+        tolerance: f64,
+    ) -> Result<SloshTank, Vec<String>> {
+        let problems = p.problems();
+        if !problems.is_empty() {
+            return Err(problems);
+        }
+        let mut x = [0.0; TANK_STATES];
+        for n in 0..MODES {
+            let [direction, rate] = if n < p.tank.modes {
+                on_sphere(p.tank.p_0[n], p.tank.p_dot_0[n])
+            } else {
+                [[0.0, 0.0, -1.0], [0.0; 3]]
+            };
+            x[6 * n..6 * n + 3].copy_from_slice(&direction);
+            x[6 * n + 3..6 * n + 6].copy_from_slice(&rate);
+        }
+        Ok(SloshTank::resume(p, &TankState { time: start_time, x }, tolerance))
+    }
+
+    /// A tank that continues from a saved state of one with the same parameters, which
+    /// [`SloshTank::new`] has accepted.
+    pub fn resume(p: &TankParameters, state: &TankState, tolerance: f64) -> SloshTank {
+        let rigid = Rigid::of_tank(&p.tank);
+        let bobs: Vec<Bob> = (0..p.tank.modes).map(|n| Bob::new(&p.tank, 0, n)).collect();
+        let lumped = bobs.iter().fold(rigid, |sum, bob| {
+            sum.and(&Rigid::new(bob.m, bob.hinge, &[[0.0; 3]; 3]))
+        });
+        let motion = TankMotion {
+            state: *state,
+            inputs: TankInputs::default(),
+            rigid,
+            bobs,
+            a: ZERO_VECTOR,
+            w: ZERO_VECTOR,
+            w_d: ZERO_VECTOR,
+            dissipation: ZERO,
+            inv_allowed: 0.0,
+        };
+        SloshTank {
+            motion: Box::new(motion),
+            coupling: p.coupling,
+            host: p.host,
+            lumped: lumped.mass_matrix(),
+            tolerance,
+        }
+    }
+
+    /// The present time, s.
+    pub fn time(&self) -> f64 {
+        self.motion.state.time
+    }
+
+    /// Takes the time from the host, s.
+    pub fn set_time(&mut self, time: f64) {
+        self.motion.state.time = time;
+    }
+
+    /// The state, for saving.
+    pub fn state(&self) -> &TankState {
+        &self.motion.state
+    }
+
+    /// Goes back to a saved state of this tank or of one with the same parameters.
+    pub fn set_state(&mut self, state: &TankState) {
+        self.motion.state = *state;
+    }
+
+    /// Moves on by exactly `h` > 0 seconds; the inputs run along their ramps. On an error the
+    /// tank is as before.
+    pub fn step(&mut self, inputs: &TankInputs, h: f64) -> Result<(), StepError> {
+        if !(h > 0.0 && h.is_finite()) {
+            return Err(StepError::Length { h });
+        }
+        let before = self.motion.state;
+        self.motion.inputs = *inputs;
+        let given = inputs.a.value.iter().chain(&inputs.a.slope).chain(&inputs.omega);
+        let given = given.chain(&inputs.omega_dot.value).chain(&inputs.omega_dot.slope);
+        let done = if given.fold(true, |so_far, x| so_far && x.is_finite()) {
+            advance(&mut *self.motion, before.time, h, self.tolerance)
+        } else {
+            Err(StepError::NotFinite { time: before.time })
+        };
+        match done {
+            Ok(()) => self.motion.state.time = before.time + h,
+            Err(_) => self.motion.state = before,
+        }
+        done
+    }
+
+    /// What the tank shows now, under the inputs' present values.
+    pub fn outputs(&mut self, inputs: &TankInputs) -> SloshTankOutputs {
+        self.motion.evaluate(inputs);
+        self.outputs_of::<f64>(&self.motion.state.x)
+    }
+
+    fn outputs_of<T: Number>(&self, x: &[f64; TANK_STATES]) -> SloshTankOutputs {
+        let motion = &self.motion;
+        let of = |a: &[Vec3]| -> Vec3<T> { [0, 1, 2].map(|i| T::of(a[0][i], a[1][i])) };
+        let (a, w, w_d) = (of(&motion.a), of(&motion.w), of(&motion.w_d));
+        let mut tank = TankOutputs::of_states(x);
+        let minus = |[f, tau]: [Vec3<T>; 2]| [f.map(|x| -x), tau.map(|x| -x)];
+        let zero = constant::<T>([0.0; 3]);
+        let mut wrench = minus(motion.rigid.inertial_wrench(a, w, w_d));
+        let mut bias = minus(motion.rigid.inertial_wrench(zero, w, zero));
+        let mut matrix = motion.rigid.mass_matrix().map(|row| row.map(T::constant));
+        let plus = |a: [Vec3<T>; 2], b: [Vec3<T>; 2]| [add(a[0], b[0]), add(a[1], b[1])];
+        for bob in &motion.bobs {
+            wrench = plus(wrench, bob.wrench());
+            bias = plus(bias, bob.bias(w));
+            add_added_mass(&mut matrix, bob);
+            tank.set_angles::<T>(bob);
+        }
+        if self.coupling == Coupling::Lumped {
+            matrix = self.lumped.map(|row| row.map(T::constant));
+            let x = [a[0], a[1], a[2], w_d[0], w_d[1], w_d[2]];
+            let given = matrix.map(|row| {
+                (1..6).fold(row[0] * x[0], |sum, i| sum + row[i] * x[i])
+            });
+            let [f, tau] = wrench;
+            let half = |at: usize| [given[at], given[at + 1], given[at + 2]];
+            bias = [add(f, half(0)), add(tau, half(3))];
+        }
+        (tank.force, tank.torque) = (wrench[0].map(T::result), wrench[1].map(T::result));
+        let [f, tau] = bias.map(|half| half.map(T::result));
+        SloshTankOutputs {
+            tank,
+            bias: [f[0], f[1], f[2], tau[0], tau[1], tau[2]],
+            added_mass: triangle(&matrix),
+            dissipated: x[DISSIPATED],
+        }
+    }
+
+    /// x: p and p' of each mode, tank axes, then the dissipated energy, J.
+    pub fn continuous_states(&self) -> [f64; TANK_STATES] {
+        self.motion.state.x
+    }
+
+    /// Takes x from the host. Directions need not be of unit length.
+    pub fn set_continuous_states(&mut self, x: &[f64; TANK_STATES]) {
+        self.motion.state.x = *x;
+    }
+
+    /// x'; directions and their rates are normalised first.
+    pub fn derivatives(&mut self, inputs: &TankInputs) -> [f64; TANK_STATES] {
+        self.motion.evaluate(inputs);
+        self.motion.state_rates::<0>()
+    }
+
+    /// The derivative of x' in the direction (dx, du), du of a, omega, omega_dot; exact.
+    pub fn directional_derivative(
+        &mut self,
+        inputs: &TankInputs,
+        dx: &[f64; TANK_STATES],
+        du: &[f64; TANK_INPUTS],
+    ) -> [f64; TANK_STATES] {
+        self.motion.evaluate_direction(inputs, dx, du);
+        self.motion.state_rates::<1>()
+    }
+
+    /// The derivative of the outputs in the direction (dx, du); exact.
+    pub fn output_derivatives(
+        &mut self,
+        inputs: &TankInputs,
+        dx: &[f64; TANK_STATES],
+        du: &[f64; TANK_INPUTS],
+    ) -> SloshTankOutputs {
+        self.motion.evaluate_direction(inputs, dx, du);
+        self.outputs_of::<Dual>(dx)
+    }
+
+    /// The derivative of the outputs with time, along the inputs' ramps: what a host needs to
+    /// extrapolate bias and added mass over its own step.
+    pub fn output_slopes(&mut self, inputs: &TankInputs) -> SloshTankOutputs {
+        let dx = self.derivatives(inputs);
+        let mut du = [0.0; TANK_INPUTS];
+        du[..3].copy_from_slice(&inputs.a.slope);
+        du[3..6].copy_from_slice(&inputs.omega_dot.value);
+        du[6..].copy_from_slice(&inputs.omega_dot.slope);
+        self.output_derivatives(inputs, &dx, &du)
+    }
+
+    /// What an impulse of the host does to the bobs, whose velocities across their rods stay: O
+    /// changes its velocity by `dv`, m/s, and the host its rate by `dw`, rad/s, host axes.
+    pub fn take_impulse(&mut self, dv: Vec3, dw: Vec3) {
+        self.motion.start(0.0);
+        let TankMotion { state, bobs, .. } = &mut *self.motion;
+        for bob in bobs {
+            let at = 6 * bob.mode;
+            bob.after_impulse((&mut state.x[at..at + 6]).try_into().unwrap(), dv, dw);
+        }
+    }
+
+    /// The largest eigenvalue lambda of M_host^-1 M_a at the present directions; `None` when
+    /// the host's mass properties are not known.
+    ///
+    /// A host that uses the total wrench a step late diverges, whatever the step, above 1 (held
+    /// values), 1/3 (Gauss-Seidel, linear) or 0.155 (Jacobi, linear).
+    pub fn coupling_ratio(&mut self) -> Option<f64> {
+        let host = self.host?;
+        self.motion.start(0.0);
+        let mut matrix = self.motion.rigid.mass_matrix();
+        for bob in &self.motion.bobs {
+            add_rank_one(&mut matrix, bob.m, &along_rod(bob.p[0], bob.hinge));
+        }
+        Some(largest_eigenvalue(&Factors::of(&Rigid::of_craft(&host).mass_matrix()), &matrix))
+    }
+}

@@ -1,0 +1,180 @@
+//! A free spacecraft with sloshing tanks: the whole, its steps, and its equations for hosts
+//! that integrate themselves.
+
+use crate::integrator::{StepError, advance};
+use crate::motion::CraftMotion;
+use crate::outputs::Outputs;
+use crate::parameters::{MODES, Parameters, TANKS};
+use crate::state::{INPUTS, Inputs, STATES, State, index};
+use crate::vector::{Dual, on_sphere, unit_quaternion};
+
+/// A rigid body with up to four tanks, free or on a pivot.
+#[derive(Clone, Debug)]
+pub struct Spacecraft {
+    motion: Box<CraftMotion>,
+    tolerance: f64,
+}
+
+impl Spacecraft {
+    /// A craft at the start of its motion, at `start_time` (s), with the inputs that act
+    /// then; `tolerance` is the relative error allowed in rates, directions and attitude.
+    ///
+    /// Refused parameters are returned with everything that is wrong with them.
+    pub fn new(
+        p: &Parameters,
+        inputs: &Inputs,
+        start_time: f64,
+        tolerance: f64,
+    ) -> Result<Spacecraft, Vec<String>> {
+        let problems = p.problems();
+        if !problems.is_empty() {
+            return Err(problems);
+        }
+        let mut x = [0.0; STATES];
+        let mut put = |at: usize, numbers: &[f64]| {
+            x[at..at + numbers.len()].copy_from_slice(numbers);
+        };
+        put(index::Q, &unit_quaternion(p.init.q));
+        put(index::OMEGA, &p.init.omega);
+        put(index::POSITION, &p.init.position);
+        put(index::VELOCITY, &p.init.velocity);
+        for i in 0..TANKS {
+            for n in 0..MODES {
+                let is_used = i < p.tanks && n < p.tank[i].modes;
+                let [direction, rate] = if is_used {
+                    on_sphere(p.tank[i].p_0[n], p.tank[i].p_dot_0[n])
+                } else {
+                    [[0.0, 0.0, -1.0], [0.0; 3]]
+                };
+                put(index::bob(i, n), &direction);
+                put(index::bob(i, n) + 3, &rate);
+            }
+        }
+        let state = State { time: start_time, x, h_wheels: inputs.h_wheels.value };
+        Ok(Spacecraft::resume(p, &state, tolerance))
+    }
+
+    /// A craft that continues from a saved state of one with the same parameters, which
+    /// [`Spacecraft::new`] has accepted.
+    pub fn resume(p: &Parameters, state: &State, tolerance: f64) -> Spacecraft {
+        Spacecraft { motion: Box::new(CraftMotion::new(p, *state)), tolerance }
+    }
+
+    /// The present time, s.
+    pub fn time(&self) -> f64 {
+        self.motion.state.time
+    }
+
+    /// Takes the time from the host, s.
+    pub fn set_time(&mut self, time: f64) {
+        self.motion.state.time = time;
+    }
+
+    /// The state, for saving.
+    pub fn state(&self) -> &State {
+        &self.motion.state
+    }
+
+    /// Goes back to a saved state of this craft or of one with the same parameters.
+    pub fn set_state(&mut self, state: &State) {
+        self.motion.state = *state;
+    }
+
+    /// Moves on by exactly `h` > 0 seconds; the inputs run along their ramps. A jump of
+    /// `h_wheels` since the last step acts as an impulse at the beginning. On an error the
+    /// craft is as before.
+    pub fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), StepError> {
+        if !(h > 0.0 && h.is_finite()) {
+            return Err(StepError::Length { h });
+        }
+        let before = self.motion.state;
+        self.motion.inputs = *inputs;
+        self.motion.set_wheels(inputs.h_wheels.value);
+        let done = advance(&mut *self.motion, before.time, h, self.tolerance);
+        let state = &mut self.motion.state;
+        match done {
+            Ok(()) => {
+                state.time = before.time + h;
+                state.h_wheels = inputs.h_wheels.at(h);
+            }
+            Err(_) => *state = before,
+        }
+        done
+    }
+
+    /// What the craft shows now, under the inputs' present values; a jump of `h_wheels` since
+    /// the last step has had its effect.
+    pub fn outputs(&mut self, inputs: &Inputs) -> Outputs {
+        let before = self.motion.state;
+        self.motion.set_wheels(inputs.h_wheels.value);
+        let outputs = self.outputs_held(inputs);
+        self.motion.state = before;
+        outputs
+    }
+
+    /// As [`Spacecraft::outputs`], with the states as the last step or event has left them.
+    pub fn outputs_held(&mut self, inputs: &Inputs) -> Outputs {
+        self.motion.evaluate(inputs);
+        self.motion.outputs::<f64>(&self.motion.state.x)
+    }
+
+    /// x; see [`index`].
+    pub fn continuous_states(&self) -> [f64; STATES] {
+        self.motion.state.x
+    }
+
+    /// Takes x from the host. Quaternion and directions need not be of unit length.
+    pub fn set_continuous_states(&mut self, x: &[f64; STATES]) {
+        self.motion.state.x = *x;
+    }
+
+    /// x'. Quaternion, directions and their rates are normalised first: those of x keep the
+    /// length they have.
+    ///
+    /// `h_wheels` acts by w x h_w and by its slope. Where the slope is not known, the
+    /// reaction -h_w' belongs into `torque`.
+    pub fn derivatives(&mut self, inputs: &Inputs) -> [f64; STATES] {
+        self.motion.evaluate(inputs);
+        self.motion.state_rates::<0>(&self.motion.state.x)
+    }
+
+    /// The derivative of x' in the direction (dx, du), du of force, torque, h_wheels: coefficient
+    /// 1 of x' along x + dx s, u + du s, exact. Slopes of the inputs are held.
+    pub fn directional_derivative(
+        &mut self,
+        inputs: &Inputs,
+        dx: &[f64; STATES],
+        du: &[f64; INPUTS],
+    ) -> [f64; STATES] {
+        self.motion.evaluate_direction(inputs, dx, split(du));
+        self.motion.state_rates::<1>(dx)
+    }
+
+    /// The derivative of the outputs in the direction (dx, du), exact. The slosh angles' is 0
+    /// where they have none, at 90 degrees.
+    pub fn output_derivatives(
+        &mut self,
+        inputs: &Inputs,
+        dx: &[f64; STATES],
+        du: &[f64; INPUTS],
+    ) -> Outputs {
+        self.motion.evaluate_direction(inputs, dx, split(du));
+        self.motion.outputs::<Dual>(dx)
+    }
+
+    /// Does what is due at an event: a jump of `h_wheels` acts as an impulse. Returns whether
+    /// continuous states have changed.
+    pub fn take_event(&mut self, inputs: &Inputs) -> bool {
+        self.motion.set_wheels(inputs.h_wheels.value)
+    }
+
+    /// Takes account of `h_wheels` having changed continuously: no impulse is due for it.
+    /// For hosts that integrate themselves, after each of their steps.
+    pub fn follow_wheels(&mut self, inputs: &Inputs) {
+        self.motion.state.h_wheels = inputs.h_wheels.value;
+    }
+}
+
+fn split(du: &[f64; INPUTS]) -> [[f64; 3]; 3] {
+    [[du[0], du[1], du[2]], [du[3], du[4], du[5]], [du[6], du[7], du[8]]]
+}

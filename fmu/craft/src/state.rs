@@ -1,0 +1,106 @@
+//! The craft's continuous states x in their order, its inputs, and its memory.
+
+use crate::parameters::{MODES, TANKS};
+use crate::vector::Vec3;
+
+/// Places in x. Units: 1, rad/s, m, m/s, J, J, then 1 and 1/s for each bob.
+pub mod index {
+    use super::MODES;
+
+    /// Attitude, body to inertial, four numbers, scalar first.
+    pub const Q: usize = 0;
+    /// Angular velocity, three numbers, body axes.
+    pub const OMEGA: usize = 4;
+    /// Position of O, three numbers, inertial axes.
+    pub const POSITION: usize = 7;
+    /// Velocity of O, three numbers, inertial axes.
+    pub const VELOCITY: usize = 10;
+    /// Work of force and torque since the start.
+    pub const WORK: usize = 13;
+    /// Energy dissipated by the liquids since the start.
+    pub const DISSIPATED: usize = 14;
+    /// The bobs: for each tank, for each of its [`MODES`] modes, direction p and rate p', tank
+    /// axes. Bobs that are not used stay at rest.
+    pub const BOBS: usize = 15;
+
+    /// Where direction and rate of a bob begin; tank and mode from 0.
+    pub const fn bob(tank: usize, mode: usize) -> usize {
+        BOBS + 6 * (tank * MODES + mode)
+    }
+}
+
+/// Number of continuous states.
+pub const STATES: usize = index::BOBS + 6 * TANKS * MODES;
+
+/// Number of inputs: force, torque, h_wheels.
+pub const INPUTS: usize = 9;
+
+/// A vector that is linear in time: `value + slope t`.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Ramp {
+    /// Value now.
+    pub value: Vec3,
+    /// Rate of change, 1/s.
+    pub slope: Vec3,
+}
+
+impl Ramp {
+    /// A vector that stays.
+    pub fn held(value: Vec3) -> Ramp {
+        Ramp { value, slope: [0.0; 3] }
+    }
+
+    /// The value after `t` seconds.
+    #[inline(always)]
+    pub fn at(&self, t: f64) -> Vec3 {
+        [0, 1, 2].map(|i| self.value[i] + self.slope[i] * t)
+    }
+}
+
+/// What acts on the craft from outside over one step; body axes.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Inputs {
+    /// Force at O, N.
+    pub force: Ramp,
+    /// Torque about O, N m.
+    pub torque: Ramp,
+    /// Angular momentum of the wheels relative to the body, N m s. Its slope turns the craft by
+    /// -h_w'; a jump from one step to the next does so by an impulse, so that the angular
+    /// momentum of everything is kept either way.
+    pub h_wheels: Ramp,
+}
+
+/// The craft's memory: all that a saved state needs besides parameters and inputs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct State {
+    pub(crate) time: f64,
+    pub(crate) x: [f64; STATES],
+    /// The wheels' momentum that the motion has taken account of.
+    pub(crate) h_wheels: Vec3,
+}
+
+impl State {
+    /// Length of the flat form.
+    pub const WORDS: usize = 4 + STATES;
+
+    /// The state as plain words, for saving.
+    pub fn to_words(&self) -> [u64; Self::WORDS] {
+        let mut words = [0; Self::WORDS];
+        let numbers = core::iter::once(&self.time).chain(&self.h_wheels).chain(&self.x);
+        for (word, number) in words.iter_mut().zip(numbers) {
+            *word = number.to_bits();
+        }
+        words
+    }
+
+    /// The reverse; `None` when the words are no state.
+    pub fn from_words(words: &[u64; Self::WORDS]) -> Option<State> {
+        let numbers = words.map(f64::from_bits);
+        let x: [f64; STATES] = core::array::from_fn(|i| numbers[4 + i]);
+        let has_length = |at: usize, n: usize| x[at..at + n].iter().any(|x| *x != 0.0);
+        let bobs = (0..TANKS * MODES).all(|i| has_length(index::bob(0, i), 3));
+        let is_state = numbers.iter().all(|x| x.is_finite()) && has_length(index::Q, 4) && bobs;
+        let h_wheels = [numbers[1], numbers[2], numbers[3]];
+        is_state.then_some(State { time: numbers[0], x, h_wheels })
+    }
+}

@@ -1,0 +1,220 @@
+//! Vectors of three components, rotations, and numbers that carry a derivative.
+
+use core::ops::{Add, Mul, Neg, Sub};
+
+/// A column of three components.
+pub type Vec3<T = f64> = [T; 3];
+
+/// A matrix by rows.
+pub type Mat3<T = f64> = [[T; 3]; 3];
+
+/// A unit quaternion, scalar first.
+pub type Quaternion<T = f64> = [T; 4];
+
+/// What the outputs' formulas are evaluated with: [`f64`] for their values, [`Dual`] for their
+/// derivatives along a direction.
+pub trait Number:
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Mul<f64, Output = Self>
+    + Neg<Output = Self>
+{
+    /// A quantity that depends on nothing.
+    fn constant(value: f64) -> Self;
+    /// A quantity from coefficients 0 and 1 of its series.
+    fn of(value: f64, slope: f64) -> Self;
+    /// What is looked for: the value or the derivative.
+    fn result(self) -> f64;
+    /// asin, its derivative 0 at +-1, where it has none.
+    fn asin(self) -> Self;
+}
+
+impl Number for f64 {
+    fn constant(value: f64) -> f64 {
+        value
+    }
+
+    fn of(value: f64, _: f64) -> f64 {
+        value
+    }
+
+    fn result(self) -> f64 {
+        self
+    }
+
+    fn asin(self) -> f64 {
+        libm::asin(self.clamp(-1.0, 1.0))
+    }
+}
+
+/// A value and its derivative along a direction: value + slope s + O(s^2).
+#[derive(Clone, Copy, Debug)]
+pub struct Dual {
+    value: f64,
+    slope: f64,
+}
+
+impl Add for Dual {
+    type Output = Dual;
+
+    fn add(self, b: Dual) -> Dual {
+        Dual { value: self.value + b.value, slope: self.slope + b.slope }
+    }
+}
+
+impl Sub for Dual {
+    type Output = Dual;
+
+    fn sub(self, b: Dual) -> Dual {
+        Dual { value: self.value - b.value, slope: self.slope - b.slope }
+    }
+}
+
+impl Mul for Dual {
+    type Output = Dual;
+
+    fn mul(self, b: Dual) -> Dual {
+        let slope = self.slope * b.value + self.value * b.slope;
+        Dual { value: self.value * b.value, slope }
+    }
+}
+
+impl Mul<f64> for Dual {
+    type Output = Dual;
+
+    fn mul(self, b: f64) -> Dual {
+        Dual { value: self.value * b, slope: self.slope * b }
+    }
+}
+
+impl Neg for Dual {
+    type Output = Dual;
+
+    fn neg(self) -> Dual {
+        Dual { value: -self.value, slope: -self.slope }
+    }
+}
+
+impl Number for Dual {
+    fn constant(value: f64) -> Dual {
+        Dual { value, slope: 0.0 }
+    }
+
+    fn of(value: f64, slope: f64) -> Dual {
+        Dual { value, slope }
+    }
+
+    fn result(self) -> f64 {
+        self.slope
+    }
+
+    fn asin(self) -> Dual {
+        let cos = libm::sqrt(f64::max((1.0 - self.value) * (1.0 + self.value), 0.0));
+        let slope = if cos > 0.0 { self.slope / cos } else { 0.0 };
+        Dual { value: self.value.asin(), slope }
+    }
+}
+
+#[inline(always)]
+pub fn add<T: Number>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+#[inline(always)]
+pub fn sub<T: Number>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// a b, b a vector.
+#[inline(always)]
+pub fn scale<T: Number>(a: T, b: Vec3<T>) -> Vec3<T> {
+    [a * b[0], a * b[1], a * b[2]]
+}
+
+#[inline(always)]
+pub fn dot<T: Number>(a: Vec3<T>, b: Vec3<T>) -> T {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline(always)]
+pub fn cross<T: Number>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// A b, b a column.
+#[inline(always)]
+pub fn times<T: Number>(a: &Mat3<T>, b: Vec3<T>) -> Vec3<T> {
+    [dot(a[0], b), dot(a[1], b), dot(a[2], b)]
+}
+
+/// A^T b.
+#[inline(always)]
+pub fn transposed_times<T: Number>(a: &Mat3<T>, b: Vec3<T>) -> Vec3<T> {
+    [0, 1, 2].map(|i| a[0][i] * b[0] + a[1][i] * b[1] + a[2][i] * b[2])
+}
+
+/// A vector that depends on nothing.
+pub fn constant<T: Number>(a: Vec3) -> Vec3<T> {
+    a.map(T::constant)
+}
+
+/// The largest component's size; unlike `f64::max` it lets a NaN by only to where it ends the
+/// step.
+#[inline(always)]
+pub fn largest(a: Vec3) -> f64 {
+    let larger = |a: f64, b: f64| if b > a { b } else { a };
+    larger(larger(a[0].abs(), a[1].abs()), a[2].abs())
+}
+
+/// Length of a vector.
+pub fn norm(a: Vec3) -> f64 {
+    libm::sqrt(dot(a, a))
+}
+
+/// A rotation's matrix: with q from frame B to frame A, columns of B components become
+/// columns of A components.
+#[inline(always)]
+pub fn rotation<T: Number>(q: &Quaternion<T>) -> Mat3<T> {
+    let [w, x, y, z] = *q;
+    let one = T::constant(1.0);
+    let (xx, yy, zz) = (x * x, y * y, z * z);
+    let (xy, xz, yz) = (x * y, x * z, y * z);
+    let (wx, wy, wz) = (w * x, w * y, w * z);
+    [
+        [one - (yy + zz) * 2.0, (xy - wz) * 2.0, (xz + wy) * 2.0],
+        [(xy + wz) * 2.0, one - (xx + zz) * 2.0, (yz - wx) * 2.0],
+        [(xz - wy) * 2.0, (yz + wx) * 2.0, one - (xx + yy) * 2.0],
+    ]
+}
+
+/// q/|q|.
+#[inline(always)]
+pub fn unit_quaternion(q: Quaternion) -> Quaternion {
+    let share = 1.0 / libm::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+    q.map(|x| x * share)
+}
+
+/// Derivative of q/|q| in the direction dq, for the unit quaternion `unit` = q/|q|.
+pub fn unit_quaternion_slope(unit: &Quaternion, q: &Quaternion, dq: &Quaternion) -> Quaternion {
+    let dot = |a: &Quaternion, b: &Quaternion| (0..4).map(|i| a[i] * b[i]).sum::<f64>();
+    let (along, size) = (dot(unit, dq), libm::sqrt(dot(q, q)));
+    core::array::from_fn(|i| (dq[i] - unit[i] * along) / size)
+}
+
+/// A direction p and its rate p', with |p| = 1 and p.p' = 0 made so.
+#[inline(always)]
+pub fn on_sphere(p: Vec3, p_d: Vec3) -> [Vec3; 2] {
+    let unit = scale(1.0 / norm(p), p);
+    [unit, sub(p_d, scale(dot(unit, p_d), unit))]
+}
+
+/// Derivative of [`on_sphere`] in the direction (dp, dp').
+pub fn on_sphere_slope(p: Vec3, p_d: Vec3, dp: Vec3, dp_d: Vec3) -> [Vec3; 2] {
+    let [unit, _] = on_sphere(p, p_d);
+    let d_unit = scale(1.0 / norm(p), sub(dp, scale(dot(unit, dp), unit)));
+    let along = dot(unit, p_d);
+    let d_along = dot(d_unit, p_d) + dot(unit, dp_d);
+    [d_unit, sub(dp_d, add(scale(d_along, unit), scale(along, d_unit)))]
+}
