@@ -30,7 +30,7 @@
 //! Checked against the same law in p'' (tests/independent.rs).
 
 use crate::parameters::Tank;
-use crate::series::{self, Series, Vector, ZERO, ZERO_VECTOR, next};
+use crate::series::{self, Pair, Series, Vector, ZERO, ZERO_PAIR, ZERO_VECTOR, next};
 use crate::vector::{
     Mat3, Number, Vec3, add, constant, cross, dot, largest, on_sphere, on_sphere_slope, rotation,
     scale, sub, times, transposed_times, unit_quaternion,
@@ -55,7 +55,9 @@ pub struct Bob {
     /// Tank axes to body axes.
     axes: Mat3,
     pub p: Vector,
-    pub v: Vector,
+    v: Vector,
+    /// p and v
+    both: Pair,
     p_d: Vector,
     v_d: Vector,
     /// B
@@ -65,6 +67,7 @@ pub struct Bob {
     /// p.e
     height: Series,
     /// Of the order at hand: what does not depend on [a; w'] of this order.
+    turned: Vec3,
     centripetal: Vec3,
     p_perp: Vec3,
     known_pull: f64,
@@ -92,11 +95,13 @@ impl Bob {
             axes,
             p: ZERO_VECTOR,
             v: ZERO_VECTOR,
+            both: ZERO_PAIR,
             p_d: ZERO_VECTOR,
             v_d: ZERO_VECTOR,
             specific_force: ZERO_VECTOR,
             pull: ZERO,
             height: ZERO,
+            turned: [0.0; 3],
             centripetal: [0.0; 3],
             p_perp: [0.0; 3],
             known_pull: 0.0,
@@ -124,13 +129,22 @@ impl Bob {
         self.v[1] = add(dp_d, add(cross(dw, self.p[0]), cross(w, dp)));
     }
 
-    /// Direction and rate `t` after the start, from the series cut after order n, when the craft
-    /// turns at `w` by then; normalised, tank axes.
+    /// Direction and rate `t` after the start at `x`, from the series cut after order n, when the
+    /// craft turns at `w` by then; normalised, tank axes.
+    ///
+    /// What is turned back into tank axes is the change alone: the matrix is orthogonal to
+    /// rounding only, and turning everything there and back would shear direction and rate by the
+    /// same 1e-16 in every step.
     #[inline(always)]
-    pub fn at(&self, n: usize, t: f64, w: Vec3) -> [f64; 6] {
+    pub fn at(&self, x: &[f64; 6], n: usize, t: f64, w: Vec3) -> [f64; 6] {
         let (p, v) = (series::value(&self.p, n, t), series::value(&self.v, n, t));
-        let [p, p_d] = on_sphere(p, sub(v, cross(w, p)));
-        let (p, p_d) = (transposed_times(&self.axes, p), transposed_times(&self.axes, p_d));
+        let p_d = sub(v, cross(w, p));
+        let dp = transposed_times(&self.axes, sub(p, self.p[0]));
+        let dp_d = transposed_times(&self.axes, sub(p_d, self.p_d[0]));
+        let [p, p_d] = on_sphere(
+            [x[0] + dp[0], x[1] + dp[1], x[2] + dp[2]],
+            [x[3] + dp_d[0], x[4] + dp_d[1], x[5] + dp_d[2]],
+        );
         [p[0], p[1], p[2], p_d[0], p_d[1], p_d[2]]
     }
 
@@ -139,7 +153,10 @@ impl Bob {
     #[inline(always)]
     pub fn load<const N: usize>(&mut self, w: &Vector, w2: &Mat3) -> [Vec3; 2] {
         let Bob { m, l, c, k, .. } = *self;
-        let p_d = sub(self.v[N], series::cross::<N>(w, &self.p));
+        self.both.set(N, self.p[N], self.v[N]);
+        let [p_turned, v_turned] = series::cross_pair::<N>(w, &self.both);
+        let p_d = sub(self.v[N], p_turned);
+        self.turned = v_turned;
         self.p_d[N] = p_d;
         self.centripetal = times(w2, self.hinge);
         let mut pull = l * series::square_vector::<N>(&self.v)
@@ -174,16 +191,14 @@ impl Bob {
     /// Coefficient N of the rest, and N + 1 of direction and velocity, from coefficient N of
     /// [a; w'].
     #[inline(always)]
-    pub fn accelerate<const N: usize>(&mut self, w: &Vector, a: Vec3, w_d: Vec3) {
+    pub fn accelerate<const N: usize>(&mut self, a: Vec3, w_d: Vec3) {
         let at_hinge = add(a, cross(w_d, self.hinge));
         self.specific_force[N] = add(at_hinge, self.centripetal);
         let along = dot(self.p[0], at_hinge);
         self.pull[N] = self.known_pull - along;
         let pulled = sub(self.known, scale(along, self.p[0]));
-        let mut v_d = add(
-            series::cross::<N>(&self.v, w),
-            scale(-self.inv_l, add(self.specific_force[N], pulled)),
-        );
+        let fall = scale(self.inv_l, add(self.specific_force[N], pulled));
+        let mut v_d = scale(-1.0, add(self.turned, fall));
         if self.c > 0.0 {
             v_d = sub(v_d, scale(self.c_m, self.p_d[N]));
         }

@@ -30,8 +30,8 @@ use crate::integrator::{MAX_MAGNITUDE, Motion, RATE_FLOOR};
 use crate::parameters::{Mount, Parameters};
 use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod};
 use crate::series::{
-    self, ORDER, Series, Vector, ZERO, ZERO_VECTOR, cross, cross_ramp, dot_ramp, next, products,
-    quaternion_rate, ramp,
+    self, ORDER, Pair, Series, Vector, ZERO, ZERO_PAIR, ZERO_VECTOR, cross, cross_pair, cross_ramp,
+    dot_ramp, next, products, quaternion_rate, ramp,
 };
 use crate::state::{Inputs, STATES, State, index};
 use crate::vector::{
@@ -87,7 +87,8 @@ pub struct CraftMotion {
     pub w_d: Vector,
     pub a: Vector,
     gain: Vector,
-    path: Vector,
+    /// gain and path
+    travel: Pair,
     pub drift: Vector,
     pub work: Series,
     pub dissipation: Series,
@@ -127,7 +128,7 @@ impl CraftMotion {
             w_d: ZERO_VECTOR,
             a: ZERO_VECTOR,
             gain: ZERO_VECTOR,
-            path: ZERO_VECTOR,
+            travel: ZERO_PAIR,
             drift: ZERO_VECTOR,
             work: ZERO,
             dissipation: ZERO,
@@ -219,7 +220,7 @@ impl CraftMotion {
         (self.force[1], self.torque[1]) = (df, dtau);
         (self.h[1], self.h_dot[1]) = (dh, [0.0; 3]);
         self.gain[1] = [0.0; 3];
-        self.path[1] = [0.0; 3];
+        self.travel.set(1, [0.0; 3], [0.0; 3]);
         match self.mount {
             Mount::Free => {
                 let dv = transposed_times(&rotation(&self.q[0]), part(dx, index::VELOCITY));
@@ -323,19 +324,19 @@ impl Motion for CraftMotion {
                 self.a[N] = a;
                 self.work[N] +=
                     dot_ramp::<N>(&self.force, &self.drift) + dot_ramp::<N>(&self.force, &self.gain);
-                let gain_d = add(a, cross::<N>(&self.gain, &self.w));
-                let path_d = add(self.gain[N], cross::<N>(&self.path, &self.w));
-                let drift_d = cross::<N>(&self.drift, &self.w);
-                self.gain[N + 1] = next::<N>(gain_d);
-                self.path[N + 1] = next::<N>(path_d);
-                self.drift[N + 1] = next::<N>(drift_d);
+                let [gain_turned, path_turned] = cross_pair::<N>(&self.w, &self.travel);
+                let gain = next::<N>(sub(a, gain_turned));
+                let path = next::<N>(sub(self.gain[N], path_turned));
+                self.gain[N + 1] = gain;
+                self.travel.set(N + 1, gain, path);
+                self.drift[N + 1] = next::<N>(cross::<N>(&self.drift, &self.w));
             }
             Mount::Pivot => self.a[N + 1] = next::<N>(cross::<N>(&self.a, &self.w)),
         }
         self.w[N + 1] = next::<N>(w_d);
         let mut dissipation = 0.0;
         for bob in &mut self.bobs {
-            bob.accelerate::<N>(&self.w, self.a[N], w_d);
+            bob.accelerate::<N>(self.a[N], w_d);
             dissipation += bob.dissipation::<N>();
         }
         self.dissipation[N] = dissipation;
@@ -373,8 +374,7 @@ impl Motion for CraftMotion {
         x[index::OMEGA..index::OMEGA + 3].copy_from_slice(&w);
         if self.mount == Mount::Free {
             let axes = rotation(&q);
-            let gain = times(&axes, series::value(&self.gain, n, h));
-            let path = times(&axes, series::value(&self.path, n, h));
+            let [gain, path] = self.travel.value(n, h).map(|x| times(&axes, x));
             for i in 0..3 {
                 x[index::POSITION + i] += x[index::VELOCITY + i] * h + path[i];
                 x[index::VELOCITY + i] += gain[i];
@@ -385,7 +385,7 @@ impl Motion for CraftMotion {
         let mut finite = x[..index::BOBS].iter().all(|x| x.abs() < MAX_MAGNITUDE);
         for bob in &self.bobs {
             let at = index::bob(bob.tank, bob.mode);
-            let moved = bob.at(n, h, w);
+            let moved = bob.at(x[at..at + 6].try_into().unwrap(), n, h, w);
             finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
             x[at..at + 6].copy_from_slice(&moved);
         }

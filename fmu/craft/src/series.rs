@@ -33,24 +33,33 @@ pub fn next<const N: usize>(rate: Vec3) -> Vec3 {
     vector::scale(const { 1.0 / (N + 1) as f64 }, rate)
 }
 
-/// Sum of `term(j)` over 0 <= j <= N, ends last.
-#[inline(always)]
-fn sum<const N: usize>(term: impl Fn(usize) -> f64) -> f64 {
-    match N {
-        0 => term(0),
-        1 => term(0) + term(1),
-        _ => (2..N).fold(term(1), |sum, j| sum + term(j)) + term(0) + term(N),
-    }
-}
+/// Coefficients of two vectors that most rules treat alike: `[n][i]` is component i of both,
+/// so that a processor does both at once, from memory aligned for it.
+#[derive(Clone, Debug)]
+#[repr(align(16))]
+pub struct Pair([[[f64; 2]; 3]; ORDER + 1]);
 
-/// As [`sum`], of vectors.
-#[inline(always)]
-fn sum_vector<const N: usize>(term: impl Fn(usize) -> Vec3) -> Vec3 {
-    let add = vector::add::<f64>;
-    match N {
-        0 => term(0),
-        1 => add(term(0), term(1)),
-        _ => add(add((2..N).fold(term(1), |sum, j| add(sum, term(j))), term(0)), term(N)),
+/// Both vectors zero.
+pub const ZERO_PAIR: Pair = Pair([[[0.0; 2]; 3]; ORDER + 1]);
+
+impl Pair {
+    /// Sets coefficient n of both.
+    #[inline(always)]
+    pub fn set(&mut self, n: usize, a: Vec3, b: Vec3) {
+        self.0[n] = [[a[0], b[0]], [a[1], b[1]], [a[2], b[2]]];
+    }
+
+    /// The values at t of both series cut after order n.
+    #[inline(always)]
+    pub fn value(&self, n: usize, t: f64) -> [Vec3; 2] {
+        let mut sum = [[0.0; 2]; 3];
+        for x in self.0[..=n].iter().rev() {
+            for i in 0..3 {
+                sum[i] = [sum[i][0] * t + x[i][0], sum[i][1] * t + x[i][1]];
+            }
+        }
+        let [x, y, z] = sum;
+        [[x[0], y[0], z[0]], [x[1], y[1], z[1]]]
     }
 }
 
@@ -67,51 +76,104 @@ pub fn square<const N: usize>(a: &Series) -> f64 {
 /// Coefficient N of a.a.
 #[inline(always)]
 pub fn square_vector<const N: usize>(a: &Vector) -> f64 {
-    let mut half = 0.0;
+    let mut half = [0.0; 3];
     for j in (0..N.div_ceil(2)).rev() {
-        half += vector::dot(a[j], a[N - j]);
+        for i in 0..3 {
+            half[i] += a[j][i] * a[N - j][i];
+        }
     }
-    2.0 * half + if N.is_multiple_of(2) { vector::dot(a[N / 2], a[N / 2]) } else { 0.0 }
+    let middle = if N.is_multiple_of(2) { vector::dot(a[N / 2], a[N / 2]) } else { 0.0 };
+    2.0 * (half[0] + half[1] + half[2]) + middle
 }
 
 /// Coefficient N of the six different products of components: xx, yy, zz, xy, xz, yz.
 #[inline(always)]
 pub fn products<const N: usize>(a: &Vector) -> [f64; 6] {
-    let mut half = [0.0; 3];
+    // Terms j and N - j together: 2 a_j b_(N-j) of a square, a_j b_(N-j) + a_(N-j) b_j of the rest.
+    let mut sum = [0.0; 6];
     for j in (0..N.div_ceil(2)).rev() {
-        half = [0, 1, 2].map(|i| half[i] + a[j][i] * a[N - j][i]);
-    }
-    let middle = if N.is_multiple_of(2) { a[N / 2].map(|x| x * x) } else { [0.0; 3] };
-    let [xx, yy, zz] = [0, 1, 2].map(|i| 2.0 * half[i] + middle[i]);
-    let [xy, xz, yz] = sum_vector::<N>(|j| {
         let (a, b) = (a[j], a[N - j]);
-        [a[0] * b[1], a[0] * b[2], a[1] * b[2]]
-    });
-    [xx, yy, zz, xy, xz, yz]
+        sum[0] += a[0] * b[0];
+        sum[1] += a[1] * b[1];
+        sum[2] += a[2] * b[2];
+        sum[3] += a[0] * b[1] + a[1] * b[0];
+        sum[4] += a[0] * b[2] + a[2] * b[0];
+        sum[5] += a[1] * b[2] + a[2] * b[1];
+    }
+    for square in &mut sum[..3] {
+        *square *= 2.0;
+    }
+    if N.is_multiple_of(2) {
+        let [x, y, z] = a[N / 2];
+        let middle = [x * x, y * y, z * z, x * y, x * z, y * z];
+        for (sum, middle) in sum.iter_mut().zip(middle) {
+            *sum += middle;
+        }
+    }
+    sum
 }
 
 /// Coefficient N of a b, b a vector.
 #[inline(always)]
 pub fn scale<const N: usize>(a: &Series, b: &Vector) -> Vec3 {
-    sum_vector::<N>(|j| vector::scale(a[j], b[N - j]))
+    let mut sum = scale_known::<N>(a, b);
+    for i in 0..3 {
+        sum[i] += a[N] * b[0][i];
+    }
+    sum
 }
 
 /// Coefficient N of a b, b a vector, without its term a_N b_0.
 #[inline(always)]
 pub fn scale_known<const N: usize>(a: &Series, b: &Vector) -> Vec3 {
-    (0..N).fold([0.0; 3], |sum, j| vector::add(sum, vector::scale(a[j], b[N - j])))
+    let mut sum = [0.0; 3];
+    for j in 0..N {
+        for i in 0..3 {
+            sum[i] += a[j] * b[N - j][i];
+        }
+    }
+    sum
 }
 
 /// Coefficient N of a.b without its term a_0.b_N.
 #[inline(always)]
 pub fn dot_known<const N: usize>(a: &Vector, b: &Vector) -> f64 {
-    (1..=N).fold(0.0, |sum, j| sum + vector::dot(a[j], b[N - j]))
+    let mut sum = [0.0; 3];
+    for j in 0..N {
+        for i in 0..3 {
+            sum[i] += a[N - j][i] * b[j][i];
+        }
+    }
+    sum[0] + sum[1] + sum[2]
 }
 
 /// Coefficient N of a x b.
 #[inline(always)]
 pub fn cross<const N: usize>(a: &Vector, b: &Vector) -> Vec3 {
-    sum_vector::<N>(|j| vector::cross(a[j], b[N - j]))
+    let mut sum = [0.0; 3];
+    for j in 0..N + 1 {
+        let ([ax, ay, az], [bx, by, bz]) = (a[j], b[N - j]);
+        sum[0] += ay * bz - az * by;
+        sum[1] += az * bx - ax * bz;
+        sum[2] += ax * by - ay * bx;
+    }
+    sum
+}
+
+/// Coefficient N of a x b and a x c.
+#[inline(always)]
+pub fn cross_pair<const N: usize>(a: &Vector, b: &Pair) -> [Vec3; 2] {
+    let mut sum = [[0.0; 2]; 3];
+    for j in 0..N + 1 {
+        let ([ax, ay, az], [bx, by, bz]) = (a[j], b.0[N - j]);
+        for k in 0..2 {
+            sum[0][k] += ay * bz[k] - az * by[k];
+            sum[1][k] += az * bx[k] - ax * bz[k];
+            sum[2][k] += ax * by[k] - ay * bx[k];
+        }
+    }
+    let [x, y, z] = sum;
+    [[x[0], y[0], z[0]], [x[1], y[1], z[1]]]
 }
 
 /// Coefficient N of a + a' t.
@@ -137,12 +199,15 @@ pub fn cross_ramp<const N: usize>(a: &Vector, ramp: &[Vec3; 2]) -> Vec3 {
 /// Coefficient N of q' = q o (0, w)/2 (Hamilton's product).
 #[inline(always)]
 pub fn quaternion_rate<const N: usize>(q: &[[f64; 4]; ORDER + 1], w: &Vector) -> [f64; 4] {
-    let scalar = sum::<N>(|j| vector::dot(w[j], [q[N - j][1], q[N - j][2], q[N - j][3]]));
-    let vector = sum_vector::<N>(|j| {
-        let [q0, x, y, z] = q[N - j];
-        vector::add(vector::scale(q0, w[j]), vector::cross([x, y, z], w[j]))
-    });
-    [-0.5 * scalar, 0.5 * vector[0], 0.5 * vector[1], 0.5 * vector[2]]
+    let mut sum = [0.0; 4];
+    for j in 0..N + 1 {
+        let ([a, b, c, d], [x, y, z]) = (q[N - j], w[j]);
+        sum[0] -= b * x + c * y + d * z;
+        sum[1] += a * x + c * z - d * y;
+        sum[2] += a * y + d * x - b * z;
+        sum[3] += a * z + b * y - c * x;
+    }
+    sum.map(|x| 0.5 * x)
 }
 
 /// The value at t of the series cut after order n.
@@ -226,6 +291,10 @@ mod tests {
         for j in 0..4 {
             (x[j], y[j], s[j]) = (a[j], b[j], b[j][1]);
         }
+        let mut both = ZERO_PAIR;
+        for j in 0..=ORDER {
+            both.set(j, y[j], x[j]);
+        }
         let plain = |n: usize, term: &dyn Fn(usize, usize) -> f64| -> f64 {
             (0..=n).filter(|&j| j < 4 && n - j < 4).map(|j| term(j, n - j)).sum()
         };
@@ -243,6 +312,8 @@ mod tests {
             for i in 0..3 {
                 let crossed = plain(N, &|j, k| vector::cross(a[j], b[k])[i]);
                 assert_eq!(cross::<N>(&x, &y)[i], crossed);
+                assert_eq!(cross_pair::<N>(&x, &both)[0][i], crossed);
+                assert_eq!(cross_pair::<N>(&x, &both)[1][i], 0.0);
                 let scaled = plain(N, &|j, k| b[j][1] * a[k][i]);
                 assert_eq!(scale::<N>(&s, &x)[i], scaled);
                 if N < 4 {

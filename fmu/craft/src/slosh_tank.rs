@@ -187,7 +187,7 @@ impl Motion for TankMotion {
         let mut dissipation = 0.0;
         for bob in &mut self.bobs {
             bob.load::<N>(&self.w, &w2);
-            bob.accelerate::<N>(&self.w, self.a[N], self.w_d[N]);
+            bob.accelerate::<N>(self.a[N], self.w_d[N]);
             dissipation += bob.dissipation::<N>();
         }
         self.dissipation[N] = dissipation;
@@ -212,9 +212,10 @@ impl Motion for TankMotion {
         x[DISSIPATED] += series::integral(&self.dissipation, n - 1, h);
         let mut finite = x[DISSIPATED].abs() < MAX_MAGNITUDE;
         for bob in &self.bobs {
-            let moved = bob.at(n, h, w);
+            let at = 6 * bob.mode;
+            let moved = bob.at(x[at..at + 6].try_into().unwrap(), n, h, w);
             finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
-            x[6 * bob.mode..6 * bob.mode + 6].copy_from_slice(&moved);
+            x[at..at + 6].copy_from_slice(&moved);
         }
         finite
     }

@@ -107,20 +107,24 @@ fn ramp(terms: &Value, port: &str, k: usize) -> Ramp {
     for term in terms.iter().filter(|term| term["port"] == port) {
         let (dir, get) = (numbers(&term["dir"]), |name: &str| term[name].as_f64().unwrap_or(0.0));
         let middle = knot(k) + STEP / 2.0;
-        let at = |t: f64| match term["shape"].as_str().unwrap() {
+        // Frequencies are multiples of 0.001 Hz, so the cycles at a knot are a fraction of whole
+        // numbers: far from t = 0 an angle of many turns would have lost digits.
+        let cycles = |k: usize| {
+            let per_knot = (get("freq") * 1000.0).round() as usize * 2;
+            (per_knot * k % 100_000) as f64 / 1e5
+        };
+        let at = |k: usize| match term["shape"].as_str().unwrap() {
             "constant" => get("amp"),
             "pulse" if get("t0") < middle && middle < get("t1") => get("amp"),
             "pulse" => 0.0,
-            "sine" => {
-                get("amp") * f64::sin(std::f64::consts::TAU * get("freq") * t + get("phase"))
-            }
+            "sine" => get("amp") * f64::sin(std::f64::consts::TAU * cycles(k) + get("phase")),
             "ramp" => {
-                let share = ((t - get("t0")) / (get("t1") - get("t0"))).clamp(0.0, 1.0);
+                let share = ((knot(k) - get("t0")) / (get("t1") - get("t0"))).clamp(0.0, 1.0);
                 get("v0") + (get("v1") - get("v0")) * share
             }
             other => panic!("shape {other}"),
         };
-        for (end, value) in ends.iter_mut().zip([at(knot(k)), at(knot(k + 1))]) {
+        for (end, value) in ends.iter_mut().zip([at(k), at(k + 1)]) {
             for i in 0..3 {
                 end[i] += dir[i] * value;
             }
