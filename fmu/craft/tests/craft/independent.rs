@@ -1,0 +1,413 @@
+//! The same physics written another way: Newton's law of every body with the rods' pulls as
+//! unknowns, bobs in p'' instead of v, no added mass, no expansion; solved as one dense system.
+
+use craft::{
+    Coupling, Inputs, MODES, Mount, Parameters, STATES, SloshTank, Spacecraft, Tank, TankInputs,
+    TankParameters, index,
+};
+use nalgebra::{DMatrix, DVector, Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
+
+use crate::random::Random;
+
+type V = Vector3<f64>;
+
+fn v(x: &[f64]) -> V {
+    V::new(x[0], x[1], x[2])
+}
+
+fn rotation(q: &[f64]) -> Rotation3<f64> {
+    UnitQuaternion::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3])).into()
+}
+
+/// What follows from the system's solution; body axes.
+struct Solution {
+    a: V,
+    w_d: V,
+    /// p'' of each bob, tank axes
+    p_dd: Vec<V>,
+    /// force and torque about O of each tank
+    wrench: Vec<[V; 2]>,
+}
+
+/// Mass, centre of mass and inertia about it of the dry craft and of each rigid liquid.
+fn bodies(p: &Parameters) -> Vec<(f64, V, Matrix3<f64>)> {
+    let own = |j: [[f64; 3]; 3]| Matrix3::from_fn(|i, k| j[i][k]);
+    let mut bodies = vec![(p.craft.mass, v(&p.craft.r), own(p.craft.j.matrix()))];
+    for tank in &p.tank[..p.tanks] {
+        let axes = rotation(&tank.q);
+        let local = Matrix3::from_diagonal(&V::new(tank.i_0, tank.i_0, tank.i_z));
+        let s = v(&tank.position) + axes * V::new(0.0, 0.0, tank.h_0);
+        bodies.push((tank.m_0, s, axes.matrix() * local * axes.matrix().transpose()));
+    }
+    bodies
+}
+
+fn solve(p: &Parameters, x: &[f64; STATES], u: &Inputs) -> Solution {
+    let w = v(&x[index::OMEGA..]);
+    let bobs: Vec<(usize, usize)> =
+        (0..p.tanks).flat_map(|i| (0..p.tank[i].modes).map(move |n| (i, n))).collect();
+    let size = 6 + 4 * bobs.len();
+    let mut m = DMatrix::<f64>::zeros(size, size);
+    let mut rhs = DVector::<f64>::zeros(size);
+    let put = |m: &mut DMatrix<f64>, i: usize, j: usize, block: Matrix3<f64>| {
+        let mut view = m.view_mut((i, j), (3, 3));
+        view += block;
+    };
+    let one = Matrix3::identity();
+    let h = v(&u.h_wheels.value);
+    let mut force = v(&u.force.value);
+    let mut torque = v(&u.torque.value) - v(&u.h_wheels.slope) - w.cross(&h);
+    let bodies = bodies(p);
+    for (mass, s, j) in &bodies {
+        let arm = s.cross_matrix();
+        put(&mut m, 0, 0, one * *mass);
+        put(&mut m, 0, 3, -arm * *mass);
+        put(&mut m, 3, 0, arm * *mass);
+        put(&mut m, 3, 3, j - arm * arm * *mass);
+        let centripetal = w.cross(&w.cross(s)) * *mass;
+        force -= centripetal;
+        torque -= s.cross(&centripetal) + w.cross(&(j * w));
+    }
+    let mut seen = Vec::new();
+    for (b, &(i, n)) in bobs.iter().enumerate() {
+        let tank = &p.tank[i];
+        let axes = rotation(&tank.q);
+        let at = index::bob(i, n);
+        let dir = (axes * v(&x[at..])).normalize();
+        let rate = axes * v(&x[at + 3..]);
+        let rate = rate - dir * dir.dot(&rate);
+        let (e, l, mass) = (axes * V::z(), tank.length[n], tank.mass[n]);
+        let rho = v(&tank.position) + e * tank.hinge[n] + dir * l;
+        let perp = dir - e * e.dot(&dir);
+        let phi = rate * (tank.drag(n) * l) + perp * (tank.k[n] * l);
+        let at = 6 + 4 * b;
+        // Newton's law of the bob.
+        put(&mut m, at, 0, one * mass);
+        put(&mut m, at, 3, -rho.cross_matrix() * mass);
+        put(&mut m, at, at, one * (mass * l));
+        for k in 0..3 {
+            m[(at + k, at + 3)] = dir[k];
+            // |p| = 1 twice differentiated.
+            m[(at + 3, at + k)] = dir[k];
+            // The pull on the craft.
+            m[(k, at + 3)] = -dir[k];
+            m[(3 + k, at + 3)] = -rho.cross(&dir)[k];
+        }
+        let inertial = w.cross(&w.cross(&rho)) + w.cross(&rate) * (2.0 * l);
+        rhs.rows_mut(at, 3).copy_from(&(-inertial * mass - phi));
+        rhs[at + 3] = -rate.norm_squared();
+        force += phi;
+        torque += rho.cross(&phi);
+        seen.push((i, axes, dir, rho, phi));
+    }
+    rhs.rows_mut(0, 3).copy_from(&force);
+    rhs.rows_mut(3, 3).copy_from(&torque);
+    if p.mount == Mount::Pivot {
+        for k in 0..3 {
+            m.row_mut(k).fill(0.0);
+            m[(k, k)] = 1.0;
+        }
+        let a = -(rotation(&x[..4]).inverse() * v(&p.gravity));
+        rhs.rows_mut(0, 3).copy_from(&a);
+    }
+    let y = m.full_piv_lu().solve(&rhs).unwrap();
+    let (a, w_d) = (v(&y.as_slice()[0..]), v(&y.as_slice()[3..]));
+    let mut wrench: Vec<[V; 2]> = bodies[1..]
+        .iter()
+        .map(|(mass, s, j)| {
+            let f = -(a + w_d.cross(s) + w.cross(&w.cross(s))) * *mass;
+            [f, s.cross(&f) - j * w_d - w.cross(&(j * w))]
+        })
+        .collect();
+    let mut p_dd = Vec::new();
+    for (b, (i, axes, dir, rho, phi)) in seen.iter().enumerate() {
+        let at = 6 + 4 * b;
+        p_dd.push(axes.inverse() * v(&y.as_slice()[at..]));
+        let f = dir * y[at + 3] + phi;
+        wrench[*i][0] += f;
+        wrench[*i][1] += rho.cross(&f);
+    }
+    Solution { a, w_d, p_dd, wrench }
+}
+
+/// A random craft at a random state with bobs anywhere on their spheres.
+fn anywhere(seed: u64) -> (Random, Parameters, [f64; STATES], Inputs) {
+    let mut random = Random::new(seed);
+    let mut p = random.parameters();
+    if seed.is_multiple_of(4) {
+        (p.mount, p.init.velocity) = (Mount::Pivot, [0.0; 3]);
+    }
+    let inputs = random.inputs();
+    let mut craft = Spacecraft::new(&p, &inputs, 0.0, 1e-9).unwrap();
+    let mut x = craft.continuous_states();
+    for i in 0..p.tanks {
+        for n in 0..p.tank[i].modes {
+            let at = index::bob(i, n);
+            x[at..at + 3].copy_from_slice(&random.vector::<3>(1.0));
+            x[at + 3..at + 6].copy_from_slice(&random.vector::<3>(3.0));
+        }
+    }
+    x[..4].copy_from_slice(&random.vector::<4>(1.0));
+    craft.set_continuous_states(&x);
+    (random, p, x, inputs)
+}
+
+/// Elements against elements, relative to the largest of them or of `size`.
+fn assert_close(got: &[f64], want: &[f64], size: f64, tolerance: f64, what: &str) {
+    let size = want.iter().fold(size, |size, x| size.max(x.abs()));
+    for (i, (got, want)) in got.iter().zip(want).enumerate() {
+        assert!((got - want).abs() <= tolerance * size, "{what} [{i}]: {got} {want} of {size}");
+    }
+}
+
+// Both solve a system whose condition is some 1e3: rounding leaves 1e-13 to 1e-12.
+const ROUNDING: f64 = 1e-11;
+
+#[test]
+fn accelerations_and_wrenches_are_those_of_newtons_law_with_the_pulls_as_unknowns() {
+    for seed in 0..300 {
+        let (_, p, x, u) = anywhere(seed);
+        let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap();
+        craft.set_continuous_states(&x);
+        let want = solve(&p, &x, &u);
+        let rate = craft.derivatives(&u);
+        let out = craft.outputs_held(&u);
+        let what = format!("seed {seed}");
+        let size = want.a.amax().max(want.w_d.amax());
+        assert_close(&out.specific_force, want.a.as_slice(), size, ROUNDING, &what);
+        assert_close(&out.omega_dot, want.w_d.as_slice(), size, ROUNDING, &what);
+        assert_close(&rate[index::OMEGA..][..3], want.w_d.as_slice(), size, ROUNDING, &what);
+        if p.mount == Mount::Free {
+            let v_d = rotation(&x[..4]) * want.a;
+            assert_close(&rate[index::VELOCITY..][..3], v_d.as_slice(), size, ROUNDING, &what);
+        }
+        let mut bobs = want.p_dd.iter();
+        for i in 0..p.tanks {
+            for n in 0..p.tank[i].modes {
+                let at = index::bob(i, n) + 3;
+                let p_dd = bobs.next().unwrap().as_slice();
+                assert_close(&rate[at..at + 3], p_dd, size / p.tank[i].length[n], ROUNDING, &what);
+            }
+            let [f, tau] = want.wrench[i];
+            let size = f.amax();
+            assert_close(&out.tank[i].force, f.as_slice(), size, ROUNDING, &what);
+            assert_close(&out.tank[i].torque, tau.as_slice(), size, ROUNDING, &what);
+        }
+    }
+}
+
+/// (dry craft's Newton-Euler) [a; w'] = inputs + sum of the tanks' wrenches.
+#[test]
+fn forces_on_the_dry_craft_balance() {
+    for seed in 0..300 {
+        let (_, mut p, x, u) = anywhere(seed);
+        p.mount = Mount::Free;
+        let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap();
+        craft.set_continuous_states(&x);
+        let out = craft.outputs_held(&u);
+        let (w, w_d, a) = (v(&out.omega), v(&out.omega_dot), v(&out.specific_force));
+        let (mass, s, j) = bodies(&p)[0];
+        let f = (a + w_d.cross(&s) + w.cross(&w.cross(&s))) * mass;
+        let h = v(&u.h_wheels.value);
+        let tau = s.cross(&f)
+            + j * w_d
+            + w.cross(&(j * w + h))
+            + v(&u.h_wheels.slope);
+        let f_in = v(&u.force.value) + v(&out.slosh_force);
+        let tau_in = v(&u.torque.value) + v(&out.slosh_torque);
+        let largest = out.tank.iter().flat_map(|tank| tank.force.iter().chain(&tank.torque));
+        let size = largest.fold(f.amax().max(tau.amax()), |size, x| size.max(x.abs()));
+        assert_close(f_in.as_slice(), f.as_slice(), size, 1e-12, "force");
+        assert_close(tau_in.as_slice(), tau.as_slice(), size, 1e-12, "torque");
+        for k in 0..3 {
+            let sum: f64 = out.tank.iter().map(|tank| tank.force[k]).sum();
+            assert!((sum - out.slosh_force[k]).abs() <= 1e-14 * size);
+        }
+    }
+}
+
+/// A random tank somewhere on its bobs' spheres, and the host's motion.
+fn tank_anywhere(seed: u64, coupling: Coupling) -> (TankParameters, SloshTank, TankInputs) {
+    let mut random = Random::new(seed);
+    let p = TankParameters { tank: random.tank(), coupling, host: None };
+    let mut tank = SloshTank::new(&p, &TankInputs::default(), 0.0, 1e-9).unwrap();
+    let mut x = tank.continuous_states();
+    for n in 0..p.tank.modes {
+        x[6 * n..6 * n + 3].copy_from_slice(&random.vector::<3>(1.0));
+        x[6 * n + 3..6 * n + 6].copy_from_slice(&random.vector::<3>(3.0));
+    }
+    tank.set_continuous_states(&x);
+    let ramp = |random: &mut Random| craft::Ramp { value: random.vector(2.0), slope: random.vector(1.0) };
+    let a = ramp(&mut random);
+    let u = TankInputs { a, omega: random.vector(1.0), omega_dot: ramp(&mut random) };
+    (p, tank, u)
+}
+
+/// The symmetric matrix whose upper triangle is given by rows.
+fn symmetric(triangle: &[f64]) -> DMatrix<f64> {
+    let mut m = DMatrix::zeros(6, 6);
+    let places = (0..6).flat_map(|i| (i..6).map(move |j| (i, j)));
+    for ((i, j), x) in places.zip(triangle) {
+        (m[(i, j)], m[(j, i)]) = (*x, *x);
+    }
+    m
+}
+
+fn acceleration(u: &TankInputs) -> DVector<f64> {
+    DVector::from_iterator(6, u.a.value.iter().chain(&u.omega_dot.value).copied())
+}
+
+#[test]
+fn wrench_is_bias_less_added_mass_times_acceleration() {
+    for coupling in [Coupling::Split, Coupling::Lumped] {
+        for seed in 0..200 {
+            let (_, mut tank, u) = tank_anywhere(seed, coupling);
+            let out = tank.outputs(&u);
+            let m = symmetric(&out.added_mass);
+            let left = DVector::from_column_slice(&out.bias) - &m * acceleration(&u);
+            let wrench = [out.tank.force, out.tank.torque].concat();
+            let size = m.amax() + out.bias.iter().fold(0.0, |a: f64, x| a.max(x.abs()));
+            assert_close(left.as_slice(), &wrench, size, 1e-14, "wrench");
+            // Both matrices are inertias.
+            assert!(m.symmetric_eigenvalues().min() > -1e-14 * m.amax());
+        }
+    }
+}
+
+/// M_a is what the wrench loses by [a; w'], column by column; so is it symmetric.
+#[test]
+fn added_mass_is_the_wrench_s_derivative_with_acceleration() {
+    for seed in 0..50 {
+        let (_, mut tank, u) = tank_anywhere(seed, Coupling::Split);
+        let m = symmetric(&tank.outputs(&u).added_mass);
+        for k in 0..6 {
+            let mut du = [0.0; craft::TANK_INPUTS];
+            du[if k < 3 { k } else { 3 + k }] = 1.0;
+            let d = tank.output_derivatives(&u, &[0.0; craft::TANK_STATES], &du);
+            let column: Vec<f64> =
+                d.tank.force.iter().chain(&d.tank.torque).map(|x| -x).collect();
+            assert_close(&column, m.column(k).as_slice(), m.amax(), 1e-14, "column");
+        }
+    }
+}
+
+/// With each bob lumped at its hinge the constant matrix exceeds M_a whatever the
+/// directions, so that the loop that is left is a contraction.
+#[test]
+fn lumped_matrix_is_constant_and_never_below_the_added_mass() {
+    for seed in 0..100 {
+        let (p, mut split, u) = tank_anywhere(seed, Coupling::Split);
+        let lumped = TankParameters { coupling: Coupling::Lumped, ..p };
+        let mut lumped = SloshTank::new(&lumped, &u, 0.0, 1e-9).unwrap();
+        let constant = lumped.outputs(&u).added_mass;
+        lumped.set_continuous_states(&split.continuous_states());
+        assert_eq!(lumped.outputs(&u).added_mass, constant);
+        let excess = symmetric(&constant) - symmetric(&split.outputs(&u).added_mass);
+        assert!(excess.clone().symmetric_eigenvalues().min() > -1e-13 * excess.amax());
+    }
+}
+
+/// The craft's own wrench of a tank is that of the tank alone under the craft's motion.
+#[test]
+fn a_tank_alone_under_the_crafts_motion_is_the_tank_in_the_craft() {
+    for seed in 0..100 {
+        let (_, p, x, u) = anywhere(seed);
+        let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap();
+        craft.set_continuous_states(&x);
+        let (out, rate) = (craft.outputs_held(&u), craft.derivatives(&u));
+        for i in 0..p.tanks {
+            let own = TankParameters { tank: p.tank[i], ..TankParameters::default() };
+            let motion = TankInputs {
+                a: craft::Ramp::held(out.specific_force),
+                omega: out.omega,
+                omega_dot: craft::Ramp::held(out.omega_dot),
+            };
+            let mut tank = SloshTank::new(&own, &motion, 0.0, 1e-9).unwrap();
+            let mut states = tank.continuous_states();
+            let at = index::bob(i, 0);
+            states[..6 * MODES].copy_from_slice(&x[at..at + 6 * MODES]);
+            tank.set_continuous_states(&states);
+            let alone = tank.outputs(&motion).tank;
+            let size = out.tank[i].force.iter().fold(0.0, |a: f64, x| a.max(x.abs()));
+            assert_close(&alone.force, &out.tank[i].force, size, 1e-13, "force");
+            assert_close(&alone.torque, &out.tank[i].torque, size, 1e-13, "torque");
+            for n in 0..p.tank[i].modes {
+                let (got, want) = (tank.derivatives(&motion), &rate[at + 6 * n..][..6]);
+                assert_close(&got[6 * n..6 * n + 6], want, 1.0, 1e-13, "bob");
+            }
+        }
+    }
+}
+
+/// Rigid liquid and bobs at the centre of a sphere: no torque about it under rotation.
+/// Without the bobs' drag and without own inertia a liquid in a sphere cannot be turned.
+#[test]
+fn a_sphere_s_wrench_about_its_centre_vanishes_under_rotation() {
+    for seed in 0..50 {
+        let mut random = Random::new(seed);
+        // Hinges and centre of mass at the centre, which is the tank's origin and O.
+        let tank = Tank {
+            position: [0.0; 3],
+            h_0: 0.0,
+            i_0: 0.0,
+            i_z: 0.0,
+            hinge: [0.0; MODES],
+            zeta: [0.0; MODES],
+            k: [0.0; MODES],
+            ..random.tank()
+        };
+        let p = TankParameters { tank, ..TankParameters::default() };
+        // Turned about its centre, which stays where it is (a = 0), from rest of the liquid
+        // in space: p' = -w x p in tank axes.
+        let w: [f64; 3] = random.vector(1.0);
+        let u = TankInputs {
+            omega: w,
+            omega_dot: craft::Ramp::held(random.vector(3.0)),
+            ..TankInputs::default()
+        };
+        let mut alone = SloshTank::new(&p, &u, 0.0, 1e-9).unwrap();
+        let mut x = alone.continuous_states();
+        let in_tank = rotation(&tank.q).inverse() * v(&w);
+        for n in 0..tank.modes {
+            let rate = -in_tank.cross(&v(&x[6 * n..]));
+            x[6 * n + 3..6 * n + 6].copy_from_slice(rate.as_slice());
+        }
+        alone.set_continuous_states(&x);
+        let out = alone.outputs(&u).tank;
+        let size: f64 = tank.mass.iter().sum::<f64>() + tank.m_0;
+        assert_close(&out.force, &[0.0; 3], size, 1e-14, "force");
+        assert_close(&out.torque, &[0.0; 3], size, 1e-14, "torque");
+        // And by the host's acceleration it gets a force, but no torque about the centre.
+        let pushed = TankInputs { a: craft::Ramp::held(random.vector(5.0)), ..u };
+        let out = alone.outputs(&pushed).tank;
+        assert!(v(&out.force).norm() > 1e-3);
+        assert_close(&out.torque, &[0.0; 3], size, 1e-14, "torque");
+    }
+}
+
+/// Jacobi's rotations against nalgebra's general eigenvalues of M_host^-1 M_a.
+#[test]
+fn coupling_ratio_is_the_largest_eigenvalue() {
+    for seed in 0..50 {
+        let mut random = Random::new(seed);
+        let host = random.parameters().craft;
+        let p = TankParameters { tank: random.tank(), host: Some(host), ..Default::default() };
+        let u = TankInputs::default();
+        let mut tank = SloshTank::new(&p, &u, 0.0, 1e-9).unwrap();
+        let m_a = symmetric(&tank.outputs(&u).added_mass);
+        let s = v(&host.r).cross_matrix() * host.mass;
+        let mut m_host = DMatrix::zeros(6, 6);
+        m_host.view_mut((0, 0), (3, 3)).copy_from(&(Matrix3::identity() * host.mass));
+        m_host.view_mut((0, 3), (3, 3)).copy_from(&-s);
+        m_host.view_mut((3, 0), (3, 3)).copy_from(&s);
+        let j = Matrix3::from_fn(|i, k| host.j.matrix()[i][k]);
+        m_host.view_mut((3, 3), (3, 3)).copy_from(&(j - s * s / host.mass));
+        let product = m_host.try_inverse().unwrap() * m_a;
+        let want = product.complex_eigenvalues().iter().map(|x| x.re).fold(0.0, f64::max);
+        let got = tank.coupling_ratio().unwrap();
+        assert!((got / want - 1.0).abs() < 1e-10, "{got} {want}");
+    }
+    let mut alone = SloshTank::new(
+        &TankParameters::default(), &TankInputs::default(), 0.0, 1e-9).unwrap();
+    assert_eq!(alone.coupling_ratio(), None);
+}

@@ -1,0 +1,92 @@
+//! Random craft, states and inputs, of the sizes that spacecraft have.
+
+use craft::{
+    Craft, INPUTS, Inertia, Init, Inputs, Mount, Parameters, Ramp, STATES, TANKS, Tank,
+};
+
+pub struct Random(fastrand::Rng);
+
+impl Random {
+    pub fn new(seed: u64) -> Random {
+        Random(fastrand::Rng::with_seed(seed))
+    }
+
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.0.f64()
+    }
+
+    /// Evenly in its logarithm.
+    pub fn magnitude(&mut self, low: f64, high: f64) -> f64 {
+        low * f64::powf(high / low, self.0.f64())
+    }
+
+    pub fn below(&mut self, n: usize) -> usize {
+        self.0.usize(..n)
+    }
+
+    pub fn vector<const N: usize>(&mut self, size: f64) -> [f64; N] {
+        [(); N].map(|()| self.between(-size, size))
+    }
+
+    /// Half the bobs have centring stiffness, a third no damping.
+    pub fn tank(&mut self) -> Tank {
+        let mut tank = Tank {
+            position: self.vector(0.8),
+            q: self.vector(1.0),
+            m_0: self.magnitude(10.0, 300.0),
+            h_0: self.between(-0.2, 0.2),
+            i_0: self.between(0.0, 5.0),
+            i_z: self.between(0.0, 2.0),
+            modes: 1 + self.below(3),
+            g_ref: 1.5,
+            ..Tank::default()
+        };
+        for n in 0..tank.modes {
+            tank.mass[n] = self.magnitude(0.5, 150.0);
+            tank.length[n] = self.magnitude(0.05, 0.5);
+            tank.hinge[n] = self.between(-0.3, 0.5);
+            tank.k[n] = [0.0, tank.mass[n] * self.between(0.1, 5.0)][self.below(2)];
+            tank.zeta[n] = [0.0, self.magnitude(0.001, 0.1), 0.02][self.below(3)];
+            let [x, y] = self.vector(0.7);
+            tank.p_0[n] = [x, y, -1.0];
+            tank.p_dot_0[n] = self.vector(1.0);
+        }
+        tank
+    }
+
+    pub fn parameters(&mut self) -> Parameters {
+        let mass = self.magnitude(150.0, 3000.0);
+        let size = mass * self.between(0.3, 1.0);
+        let j = Inertia {
+            xx: size * self.between(0.8, 1.2),
+            yy: size * self.between(0.8, 1.2),
+            zz: size * self.between(0.8, 1.2),
+            xy: size * self.between(-0.05, 0.05),
+            xz: size * self.between(-0.05, 0.05),
+            yz: size * self.between(-0.05, 0.05),
+        };
+        Parameters {
+            craft: Craft { mass, r: self.vector(0.3), j },
+            mount: Mount::Free,
+            gravity: [0.3, -0.2, -9.81],
+            tanks: self.below(TANKS + 1),
+            tank: [(); TANKS].map(|()| self.tank()),
+            init: Init {
+                q: self.vector(1.0),
+                omega: self.vector(0.4),
+                position: self.vector(10.0),
+                velocity: self.vector(2.0),
+            },
+        }
+    }
+
+    pub fn inputs(&mut self) -> Inputs {
+        let mut ramp = |size: f64| Ramp { value: self.vector(size), slope: self.vector(size) };
+        Inputs { force: ramp(1000.0), torque: ramp(100.0), h_wheels: ramp(20.0) }
+    }
+
+    /// A direction of states and inputs.
+    pub fn direction(&mut self) -> ([f64; STATES], [f64; INPUTS]) {
+        (self.vector(1.0), self.vector(100.0))
+    }
+}
