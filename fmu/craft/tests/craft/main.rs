@@ -1,6 +1,7 @@
 //! What must hold of the craft and of the tank alone.
 
 mod balances;
+mod equations;
 mod independent;
 mod random;
 mod records;
