@@ -6,3 +6,4 @@ mod independent;
 mod random;
 mod records;
 mod reference;
+mod small_motions;
