@@ -3,7 +3,9 @@
 mod balances;
 mod equations;
 mod independent;
+mod invariances;
 mod random;
 mod records;
 mod reference;
 mod small_motions;
+mod special_cases;
