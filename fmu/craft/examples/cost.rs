@@ -26,7 +26,8 @@ fn main() {
     p.init.omega = [0.01, -0.02, 0.03];
     let thrust: f64 = arguments.next().map_or(2400.0, |x| x.parse().unwrap());
     let force = Ramp::held([0.0, 0.0, thrust]);
-    let mut craft = Spacecraft::new(&p, &Inputs { force, ..Inputs::default() }, 0.0, tolerance).unwrap();
+    let mut craft =
+        Spacecraft::new(&p, &Inputs { force, ..Inputs::default() }, 0.0, tolerance).unwrap();
     for k in 0..steps {
         // A torque that swings at the slosh frequency keeps the liquid moving.
         let tau = |k: usize| 20.0 * f64::sin(0.05 * k as f64);

@@ -223,8 +223,7 @@ impl Bob {
     /// Coefficient N (0 or 1) of the rates of the six numbers (tank axes): p', and
     /// p'' = v' - w' x p - w x p'.
     pub fn rates<const N: usize>(&self, w: &Vector, w_d: &Vector) -> [f64; 6] {
-        let turned =
-            add(series::cross::<N>(w_d, &self.p), series::cross::<N>(w, &self.p_d));
+        let turned = add(series::cross::<N>(w_d, &self.p), series::cross::<N>(w, &self.p_d));
         let p_dd = sub(self.v_d[N], turned);
         let p_d = transposed_times(&self.axes, self.p_d[N]);
         let p_dd = transposed_times(&self.axes, p_dd);

@@ -97,16 +97,14 @@ pub trait Motion {
 /// which the terms left out are below the tolerance.
 #[inline(always)]
 fn expand<M: Motion>(motion: &mut M, h: f64, tolerance: f64) -> (usize, f64) {
-    let mut power = h; // h^(N+1)
+    let mut power = 1.0; // h^(N+1)
     let mut negligible = 0;
     for_each_order!(N => {
         motion.rates::<N>();
         if N == 1 {
             motion.set_error_scale(h, STEP_SHARE * tolerance);
         }
-        if N > 0 {
-            power *= h;
-        }
+        power *= h;
         if N + 2 >= MIN_ORDER {
             // NaN is not negligible; it ends the step below.
             let is_negligible = motion.coefficient_norm(N + 1) * power <= 1.0;

@@ -35,8 +35,8 @@ use crate::series::{
 };
 use crate::state::{Inputs, STATES, State, index};
 use crate::vector::{
-    self, Mat3, Vec3, add, largest, rotation, scale, sub, times, transposed_times,
-    unit_quaternion, unit_quaternion_slope,
+    self, Mat3, Vec3, add, largest, rotation, scale, sub, times, transposed_times, unit_quaternion,
+    unit_quaternion_slope,
 };
 
 /// Rates change within this time at most, s: a step much longer does not see how fast they are.
@@ -317,13 +317,12 @@ impl Motion for CraftMotion {
         self.w_d[N] = w_d;
         self.q[N + 1] = quaternion_rate::<N>(&self.q, &self.w)
             .map(|rate| rate * const { 1.0 / (N + 1) as f64 });
-        self.work[N] = dot_ramp::<N>(&self.torque, &self.w)
-            - dot_ramp::<N>(&self.h_dot, &self.w);
+        self.work[N] = dot_ramp::<N>(&self.torque, &self.w) - dot_ramp::<N>(&self.h_dot, &self.w);
         match self.mount {
             Mount::Free => {
                 self.a[N] = a;
-                self.work[N] +=
-                    dot_ramp::<N>(&self.force, &self.drift) + dot_ramp::<N>(&self.force, &self.gain);
+                self.work[N] += dot_ramp::<N>(&self.force, &self.drift)
+                    + dot_ramp::<N>(&self.force, &self.gain);
                 let [gain_turned, path_turned] = cross_pair::<N>(&self.w, &self.travel);
                 let gain = next::<N>(sub(a, gain_turned));
                 let path = next::<N>(sub(self.gain[N], path_turned));
@@ -346,8 +345,8 @@ impl Motion for CraftMotion {
     fn set_error_scale(&mut self, h: f64, allowed: f64) {
         let time = h.min(SCALE_TIME);
         let rate = RATE_FLOOR + largest(self.w[0]) + largest(self.w[1]) * time;
-        let swing =
-            rate + self.bobs.iter().map(Bob::rate_scale).fold(0.0, |a, b| if b > a { b } else { a });
+        let swing = rate
+            + self.bobs.iter().map(Bob::rate_scale).fold(0.0, |a, b| if b > a { b } else { a });
         // Force passes zero, too.
         let speed = largest(self.a[0]) * time + self.longest * swing + RATE_FLOOR;
         self.inv_allowed = [1.0, rate, swing, speed].map(|scale| 1.0 / (allowed * scale));

@@ -146,8 +146,8 @@ impl CraftMotion {
         let inner = cross(w, s);
         let (mut inner_momentum, mut inner_angular) = (inner, times(&inertia, w));
         let half = 0.5;
-        let mut energy = (dot(velocity, velocity) * m_r + dot(w, inner_angular)) * half
-            + dot(velocity, inner);
+        let mut energy =
+            (dot(velocity, velocity) * m_r + dot(w, inner_angular)) * half + dot(velocity, inner);
         for bob in &self.bobs {
             let [f, tau] = bob.wrench::<T>().map(result);
             let out = &mut tank[bob.tank];

@@ -86,14 +86,8 @@ impl Rigid {
     pub fn inertial_wrench<T: Number>(&self, a: Vec3<T>, w: Vec3<T>, w_d: Vec3<T>) -> [Vec3<T>; 2] {
         let s = self.moment.map(T::constant);
         let inertia = self.inertia.map(|row| row.map(T::constant));
-        let force = add(
-            a.map(|x| x * self.mass),
-            add(cross(w_d, s), cross(w, cross(w, s))),
-        );
-        let torque = add(
-            cross(s, a),
-            add(times(&inertia, w_d), cross(w, times(&inertia, w))),
-        );
+        let force = add(a.map(|x| x * self.mass), add(cross(w_d, s), cross(w, cross(w, s))));
+        let torque = add(cross(s, a), add(times(&inertia, w_d), cross(w, times(&inertia, w))));
         [force, torque]
     }
 }

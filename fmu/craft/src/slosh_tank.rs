@@ -170,9 +170,8 @@ impl Motion for TankMotion {
         let TankInputs { a, omega, omega_dot } = &self.inputs;
         (self.a[0], self.a[1]) = (a.at(t), a.slope);
         (self.w_d[0], self.w_d[1]) = (omega_dot.at(t), omega_dot.slope);
-        let turned = [0, 1, 2].map(|i| {
-            omega[i] + (omega_dot.value[i] + omega_dot.slope[i] * t / 2.0) * t
-        });
+        let turned =
+            [0, 1, 2].map(|i| omega[i] + (omega_dot.value[i] + omega_dot.slope[i] * t / 2.0) * t);
         (self.w[0], self.w[1]) = (turned, self.w_d[0]);
         self.w[2] = scale(0.5, omega_dot.slope);
         for bob in &mut self.bobs {
@@ -195,7 +194,8 @@ impl Motion for TankMotion {
 
     #[inline(always)]
     fn set_error_scale(&mut self, _: f64, allowed: f64) {
-        let swing = self.bobs.iter().map(Bob::rate_scale).fold(0.0, |a, b| if b > a { b } else { a });
+        let swing =
+            self.bobs.iter().map(Bob::rate_scale).fold(0.0, |a, b| if b > a { b } else { a });
         self.inv_allowed = 1.0 / (allowed * (RATE_FLOOR + largest(self.w[0]) + swing));
     }
 
@@ -309,9 +309,9 @@ impl SloshTank {
     pub fn resume(p: &TankParameters, state: &TankState, tolerance: f64) -> SloshTank {
         let rigid = Rigid::of_tank(&p.tank);
         let bobs: Vec<Bob> = (0..p.tank.modes).map(|n| Bob::new(&p.tank, 0, n)).collect();
-        let lumped = bobs.iter().fold(rigid, |sum, bob| {
-            sum.and(&Rigid::new(bob.m, bob.hinge, &[[0.0; 3]; 3]))
-        });
+        let lumped = bobs
+            .iter()
+            .fold(rigid, |sum, bob| sum.and(&Rigid::new(bob.m, bob.hinge, &[[0.0; 3]; 3])));
         let motion = TankMotion {
             state: *state,
             inputs: TankInputs::default(),
@@ -361,8 +361,8 @@ impl SloshTank {
         let before = self.motion.state;
         self.motion.inputs = *inputs;
         let given = inputs.a.value.iter().chain(&inputs.a.slope).chain(&inputs.omega);
-        let given = given.chain(&inputs.omega_dot.value).chain(&inputs.omega_dot.slope);
-        let done = if given.fold(true, |so_far, x| so_far && x.is_finite()) {
+        let mut given = given.chain(&inputs.omega_dot.value).chain(&inputs.omega_dot.slope);
+        let done = if given.all(|x| x.is_finite()) {
             advance(&mut *self.motion, before.time, h, self.tolerance)
         } else {
             Err(StepError::NotFinite { time: before.time })
@@ -400,9 +400,7 @@ impl SloshTank {
         if self.coupling == Coupling::Lumped {
             matrix = self.lumped.map(|row| row.map(T::constant));
             let x = [a[0], a[1], a[2], w_d[0], w_d[1], w_d[2]];
-            let given = matrix.map(|row| {
-                (1..6).fold(row[0] * x[0], |sum, i| sum + row[i] * x[i])
-            });
+            let given = matrix.map(|row| (1..6).fold(row[0] * x[0], |sum, i| sum + row[i] * x[i]));
             let [f, tau] = wrench;
             let half = |at: usize| [given[at], given[at + 1], given[at + 2]];
             bias = [add(f, half(0)), add(tau, half(3))];

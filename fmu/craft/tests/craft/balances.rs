@@ -58,8 +58,7 @@ impl Balance {
             [0, 1, 2].map(|i| now[i] - start[i] - came_in[i])
         };
         let momentum = residual(out.momentum, self.start.momentum, self.impulse);
-        let angular =
-            residual(out.angular_momentum, self.start.angular_momentum, self.angular);
+        let angular = residual(out.angular_momentum, self.start.angular_momentum, self.angular);
         let angular = if vertical_only {
             (0..3).map(|i| angular[i] * p.gravity[i]).sum::<f64>().abs() / norm(p.gravity)
         } else {
@@ -93,15 +92,10 @@ fn residuals(
     let mut craft = Spacecraft::new(p, &input(0), 0.0, 1e-13).unwrap();
     let start = craft.outputs(&input(0));
     let zero = [0.0; 3];
-    let mut balance =
-        Balance { start, impulse: zero, angular: zero, scale: zero, worst: zero };
+    let mut balance = Balance { start, impulse: zero, angular: zero, scale: zero, worst: zero };
     let at = |u: &Inputs, t: f64| {
         let moved = |ramp: &Ramp| Ramp { value: ramp.at(t), slope: ramp.slope };
-        Inputs {
-            force: moved(&u.force),
-            torque: moved(&u.torque),
-            h_wheels: moved(&u.h_wheels),
-        }
+        Inputs { force: moved(&u.force), torque: moved(&u.torque), h_wheels: moved(&u.h_wheels) }
     };
     let mut held = input(0);
     for k in 0..driven {

@@ -28,8 +28,16 @@ fn flat(out: &Outputs) -> Vec<f64> {
     let mut all = vec![out.energy, out.work, out.dissipated, out.mass];
     all.extend(out.q);
     let vectors = [
-        out.omega, out.omega_dot, out.specific_force, out.position, out.velocity, out.slosh_force,
-        out.slosh_torque, out.momentum, out.angular_momentum, out.center_of_mass,
+        out.omega,
+        out.omega_dot,
+        out.specific_force,
+        out.position,
+        out.velocity,
+        out.slosh_force,
+        out.slosh_torque,
+        out.momentum,
+        out.angular_momentum,
+        out.center_of_mass,
     ];
     all.extend(vectors.as_flattened());
     all.extend(out.inertia.as_flattened());

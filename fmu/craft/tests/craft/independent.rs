@@ -209,10 +209,7 @@ fn forces_on_the_dry_craft_balance() {
         let (mass, s, j) = bodies(&p)[0];
         let f = (a + w_d.cross(&s) + w.cross(&w.cross(&s))) * mass;
         let h = v(&u.h_wheels.value);
-        let tau = s.cross(&f)
-            + j * w_d
-            + w.cross(&(j * w + h))
-            + v(&u.h_wheels.slope);
+        let tau = s.cross(&f) + j * w_d + w.cross(&(j * w + h)) + v(&u.h_wheels.slope);
         let f_in = v(&u.force.value) + v(&out.slosh_force);
         let tau_in = v(&u.torque.value) + v(&out.slosh_torque);
         let largest = out.tank.iter().flat_map(|tank| tank.force.iter().chain(&tank.torque));
@@ -237,7 +234,8 @@ fn tank_anywhere(seed: u64, coupling: Coupling) -> (TankParameters, SloshTank, T
         x[6 * n + 3..6 * n + 6].copy_from_slice(&random.vector::<3>(3.0));
     }
     tank.set_continuous_states(&x);
-    let ramp = |random: &mut Random| craft::Ramp { value: random.vector(2.0), slope: random.vector(1.0) };
+    let ramp =
+        |random: &mut Random| craft::Ramp { value: random.vector(2.0), slope: random.vector(1.0) };
     let a = ramp(&mut random);
     let u = TankInputs { a, omega: random.vector(1.0), omega_dot: ramp(&mut random) };
     (p, tank, u)
@@ -284,8 +282,7 @@ fn added_mass_is_the_wrench_s_derivative_with_acceleration() {
             let mut du = [0.0; craft::TANK_INPUTS];
             du[if k < 3 { k } else { 3 + k }] = 1.0;
             let d = tank.output_derivatives(&u, &[0.0; craft::TANK_STATES], &du);
-            let column: Vec<f64> =
-                d.tank.force.iter().chain(&d.tank.torque).map(|x| -x).collect();
+            let column: Vec<f64> = d.tank.force.iter().chain(&d.tank.torque).map(|x| -x).collect();
             assert_close(&column, m.column(k).as_slice(), m.amax(), 1e-14, "column");
         }
     }
@@ -407,7 +404,7 @@ fn coupling_ratio_is_the_largest_eigenvalue() {
         let got = tank.coupling_ratio().unwrap();
         assert!((got / want - 1.0).abs() < 1e-10, "{got} {want}");
     }
-    let mut alone = SloshTank::new(
-        &TankParameters::default(), &TankInputs::default(), 0.0, 1e-9).unwrap();
+    let mut alone =
+        SloshTank::new(&TankParameters::default(), &TankInputs::default(), 0.0, 1e-9).unwrap();
     assert_eq!(alone.coupling_ratio(), None);
 }

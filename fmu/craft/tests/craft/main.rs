@@ -4,6 +4,7 @@ mod balances;
 mod equations;
 mod independent;
 mod invariances;
+mod life;
 mod random;
 mod records;
 mod reference;

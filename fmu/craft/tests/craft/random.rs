@@ -1,8 +1,6 @@
 //! Random craft, states and inputs, of the sizes that spacecraft have.
 
-use craft::{
-    Craft, INPUTS, Inertia, Init, Inputs, Mount, Parameters, Ramp, STATES, TANKS, Tank,
-};
+use craft::{Craft, INPUTS, Inertia, Init, Inputs, Mount, Parameters, Ramp, STATES, TANKS, Tank};
 
 pub struct Random(fastrand::Rng);
 

@@ -317,9 +317,8 @@ fn nutation_of_a_prolate_spinner_grows_at_the_given_rate() {
     // vanish; Newton's method with the exact derivatives.
     let bobs = [0, 1].map(|i| index::bob(i, 0));
     let free = [index::OMEGA, index::OMEGA + 1, bobs[0], bobs[0] + 1, bobs[1], bobs[1] + 1];
-    let rates = [
-        index::OMEGA, index::OMEGA + 1, bobs[0] + 3, bobs[0] + 4, bobs[1] + 3, bobs[1] + 4,
-    ];
+    let rates =
+        [index::OMEGA, index::OMEGA + 1, bobs[0] + 3, bobs[0] + 4, bobs[1] + 3, bobs[1] + 4];
     let mut x = start;
     for _ in 0..20 {
         craft.set_continuous_states(&x);

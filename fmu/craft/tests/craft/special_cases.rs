@@ -205,7 +205,8 @@ fn after_ten_seconds(p: &Parameters) -> [f64; STATES] {
     let force = Ramp::held([50.0, 0.0, 2400.0]);
     let input = |k: usize| {
         let (tau, slope) = torque_in_knot(2 * k);
-        let torque = Ramp { value: [50.0 * tau, 20.0 * tau, 0.0], slope: [50.0 * slope, 20.0 * slope, 0.0] };
+        let torque =
+            Ramp { value: [50.0 * tau, 20.0 * tau, 0.0], slope: [50.0 * slope, 20.0 * slope, 0.0] };
         Inputs { force, torque, ..Inputs::default() }
     };
     let mut craft = Spacecraft::new(p, &input(0), 0.0, 1e-12).unwrap();
@@ -364,7 +365,8 @@ fn a_pivot_is_a_free_craft_with_all_the_mass_of_the_world_at_o() {
         let m = p.craft.mass;
         let j = p.craft.j.matrix();
         let r2: f64 = r.iter().map(|x| x * x).sum();
-        let about_o = |i: usize, k: usize| j[i][k] + m * (if i == k { r2 } else { 0.0 } - r[i] * r[k]);
+        let about_o =
+            |i: usize, k: usize| j[i][k] + m * (if i == k { r2 } else { 0.0 } - r[i] * r[k]);
         // The mass at O leaves S = m r, I about O as they were.
         let share = m / (m + heavy);
         free.craft.mass = m + heavy;
@@ -374,7 +376,12 @@ fn a_pivot_is_a_free_craft_with_all_the_mass_of_the_world_at_o() {
             about_o(i, k) - (m + heavy) * (if i == k { r2 } else { 0.0 } - x * y)
         };
         free.craft.j = Inertia {
-            xx: own(0, 0), yy: own(1, 1), zz: own(2, 2), xy: own(0, 1), xz: own(0, 2), yz: own(1, 2),
+            xx: own(0, 0),
+            yy: own(1, 1),
+            zz: own(2, 2),
+            xy: own(0, 1),
+            xz: own(0, 2),
+            yz: own(1, 2),
         };
         let a = pivot.outputs(&u).specific_force;
         let push = Inputs { force: Ramp::held(a.map(|a| a * heavy)), ..u };

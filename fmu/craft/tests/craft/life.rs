@@ -1,0 +1,376 @@
+//! Steps, states and refusals: what a host may rely on.
+
+use craft::{
+    Coupling, Inputs, Mount, Parameters, Ramp, STATES, SloshTank, Spacecraft, State, StepError,
+    TANK_STATES, TankInputs, TankParameters, TankState, index,
+};
+
+use crate::random::Random;
+use crate::records::{STEP, at_end, inputs, record, spacecraft};
+
+fn later(u: &Inputs, t: f64) -> Inputs {
+    let at = |ramp: &Ramp| Ramp { value: ramp.at(t), slope: ramp.slope };
+    Inputs { force: at(&u.force), torque: at(&u.torque), h_wheels: at(&u.h_wheels) }
+}
+
+fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).abs() / (1.0 + a.abs().max(b.abs()))).fold(0.0, f64::max)
+}
+
+/// One step of two seconds, or random pieces of it.
+#[test]
+fn the_choice_of_communication_step_does_not_matter() {
+    for seed in 0..20 {
+        let mut random = Random::new(seed);
+        let (p, u) = (random.parameters(), random.inputs());
+        let mut whole = Spacecraft::new(&p, &u, 5.0, 1e-12).unwrap();
+        let mut cut = whole.clone();
+        whole.step(&u, 2.0).unwrap();
+        let mut t = 0.0;
+        while t < 2.0 {
+            let h = f64::min(random.magnitude(1e-4, 0.5), 2.0 - t);
+            cut.step(&later(&u, t), h).unwrap();
+            t += h;
+        }
+        // Both within the tolerance per step, grown by the liquids' motion.
+        let off = largest_difference(&whole.continuous_states(), &cut.continuous_states());
+        assert!(off < 1e-10, "{seed}: {off:e}");
+        assert_eq!(whole.time(), 7.0);
+    }
+}
+
+/// Against a run at 1e-13, over a record that swings at 60 degrees and one with everything.
+#[test]
+fn the_tolerance_is_kept() {
+    for name in ["conical", "four_tanks", "wheels", "rotary"] {
+        let record = record(name);
+        let run = |tolerance: f64| {
+            let mut craft = spacecraft(&record, tolerance);
+            for k in 0..1000 {
+                craft.step(&inputs(&record, k), STEP).unwrap();
+            }
+            let x = craft.continuous_states();
+            [&x[..index::POSITION], &x[index::BOBS..]].concat()
+        };
+        let exact = run(1e-13);
+        for tolerance in [1e-4, 1e-6, 1e-8, 1e-10] {
+            let off = largest_difference(&run(tolerance), &exact);
+            println!("{name} {tolerance:e}: {off:.1e}");
+            assert!(off < tolerance, "{name} at {tolerance:e}: {off:e}");
+        }
+    }
+}
+
+#[test]
+fn a_saved_state_continues_bit_for_bit() {
+    for seed in 0..10 {
+        let mut random = Random::new(seed);
+        let (p, u) = (random.parameters(), random.inputs());
+        let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap();
+        craft.step(&u, 0.3).unwrap();
+        let state = State::from_words(&craft.state().to_words()).unwrap();
+        assert_eq!(state, *craft.state());
+        let mut resumed = Spacecraft::resume(&p, &state, 1e-9);
+        let u = random.inputs();
+        craft.step(&u, 0.7).unwrap();
+        resumed.step(&u, 0.7).unwrap();
+        assert_eq!(resumed.state().to_words(), craft.state().to_words());
+        assert_eq!(resumed.outputs(&u), craft.outputs(&u));
+        resumed.set_state(&state);
+        assert_eq!(*resumed.state(), state);
+
+        let p = TankParameters { tank: p.tank[0], ..TankParameters::default() };
+        let u = TankInputs { a: Ramp::held([0.1, 0.2, 2.0]), ..TankInputs::default() };
+        let mut tank = SloshTank::new(&p, &u, 0.0, 1e-9).unwrap();
+        tank.step(&u, 0.3).unwrap();
+        let state = TankState::from_words(&tank.state().to_words()).unwrap();
+        let mut resumed = SloshTank::resume(&p, &state, 1e-9);
+        tank.step(&u, 0.7).unwrap();
+        resumed.step(&u, 0.7).unwrap();
+        assert_eq!(resumed.state().to_words(), tank.state().to_words());
+    }
+}
+
+#[test]
+fn words_that_are_no_state_are_refused() {
+    let craft = Spacecraft::new(&Parameters::default(), &Inputs::default(), 0.0, 1e-9).unwrap();
+    let good = craft.state().to_words();
+    for at in 0..State::WORDS {
+        let mut words = good;
+        words[at] = f64::NAN.to_bits();
+        assert_eq!(State::from_words(&words), None);
+        words[at] = f64::INFINITY.to_bits();
+        assert_eq!(State::from_words(&words), None);
+    }
+    assert_eq!(State::from_words(&[0; State::WORDS]), None);
+    assert_eq!(TankState::from_words(&[0; TankState::WORDS]), None);
+}
+
+/// The wheels' momentum jumps at the first step and again after a second, or rises within a step
+/// by as much; H is kept to rounding, energy is what the impulse worked.
+#[test]
+fn jumps_of_the_wheels_keep_angular_momentum_and_balance_energy() {
+    for seed in 0..20 {
+        let mut random = Random::new(seed);
+        let mut p = random.parameters();
+        let pivot = seed.is_multiple_of(5);
+        if pivot {
+            // Without gravity, so that H is kept.
+            (p.mount, p.init.velocity, p.gravity) = (Mount::Pivot, [0.0; 3], [0.0; 3]);
+        }
+        let wheels = |h: [f64; 3]| Inputs { h_wheels: Ramp::held(h), ..Inputs::default() };
+        let first = wheels(random.vector(10.0));
+        let mut craft = Spacecraft::new(&p, &first, 0.0, 1e-12).unwrap();
+        let start = craft.outputs(&first);
+        let mut held = first;
+        for _ in 0..4 {
+            held = wheels(random.vector(30.0));
+            // Shown before the step already.
+            let shown = craft.outputs(&held);
+            let mut event = craft.clone();
+            assert!(event.take_event(&held));
+            assert_eq!(event.outputs(&held), shown);
+            assert!(!event.take_event(&held));
+            for out in [shown, {
+                craft.step(&held, 0.5).unwrap();
+                craft.outputs(&held)
+            }] {
+                let size = 100.0;
+                for i in 0..3 {
+                    let off = out.angular_momentum[i] - start.angular_momentum[i];
+                    assert!(off.abs() < 1e-11 * size, "{seed}: H {off:e}");
+                }
+                let off = out.energy - start.energy - out.work + out.dissipated;
+                assert!(off.abs() < 1e-10 * size, "{seed}: E {off:e}");
+            }
+        }
+        // A jump is the limit of ever steeper ramps.
+        let jumped = wheels(random.vector(30.0));
+        let ramp = |h: f64| {
+            let (from, to) = (held.h_wheels.value, jumped.h_wheels.value);
+            let slope = [0, 1, 2].map(|i| (to[i] - from[i]) / h);
+            Inputs { h_wheels: Ramp { value: from, slope }, ..Inputs::default() }
+        };
+        let x = {
+            let mut craft = craft.clone();
+            craft.take_event(&jumped);
+            craft.continuous_states()
+        };
+        let off = [1e-3, 1e-4].map(|h| {
+            let mut craft = craft.clone();
+            craft.step(&ramp(h), h).unwrap();
+            largest_difference(&craft.continuous_states(), &x)
+        });
+        assert!(off[1] < 1e-2, "{off:?}");
+        assert!((off[0] / off[1] / 10.0 - 1.0).abs() < 0.2, "{off:?}");
+    }
+}
+
+/// What followed continuously is no jump.
+#[test]
+fn followed_wheels_give_no_impulse() {
+    let p = Parameters::default();
+    let mut craft = Spacecraft::new(&p, &Inputs::default(), 0.0, 1e-9).unwrap();
+    let before = craft.continuous_states();
+    let u = Inputs { h_wheels: Ramp::held([1.0, 2.0, 3.0]), ..Inputs::default() };
+    craft.follow_wheels(&u);
+    assert!(!craft.take_event(&u));
+    assert_eq!(craft.continuous_states(), before);
+}
+
+#[test]
+fn a_refused_step_leaves_the_craft_as_it_was_and_says_why() {
+    let mut random = Random::new(1);
+    let mut p = random.parameters();
+    p.tanks = 2;
+    let u = random.inputs();
+    let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap();
+    craft.step(&u, 0.1).unwrap();
+    let before = *craft.state();
+    let mut refused = |u: &Inputs, h: f64, kind: fn(&StepError) -> bool, text: &str| {
+        let error = craft.step(u, h).unwrap_err();
+        assert!(kind(&error), "{error:?}");
+        assert!(error.to_string().contains(text), "{error}");
+        assert_eq!(*craft.state(), before);
+    };
+    let is_length: fn(&StepError) -> bool = |e| matches!(e, StepError::Length { .. });
+    for h in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        refused(&u, h, is_length, "allowed: a finite length above 0");
+    }
+    let not_finite: fn(&StepError) -> bool = |e| matches!(e, StepError::NotFinite { .. });
+    for bad in [f64::NAN, f64::INFINITY, 1e200] {
+        let mut wrong = u;
+        wrong.force.value[1] = bad;
+        refused(&wrong, 0.1, not_finite, "no longer finite");
+        let mut wrong = u;
+        wrong.torque.slope[0] = bad;
+        refused(&wrong, 0.1, not_finite, "no longer finite");
+        let mut wrong = u;
+        wrong.h_wheels.value[2] = bad;
+        refused(&wrong, 0.1, not_finite, "no longer finite");
+    }
+    let too_many: fn(&StepError) -> bool = |e| matches!(e, StepError::TooManySteps { .. });
+    refused(&u, 1e7, too_many, "shorter communication steps");
+
+    let p = TankParameters { tank: p.tank[0], ..TankParameters::default() };
+    let u = TankInputs { a: Ramp::held([0.1, 0.2, 2.0]), ..TankInputs::default() };
+    let mut tank = SloshTank::new(&p, &u, 0.0, 1e-9).unwrap();
+    let before = *tank.state();
+    for (a, h) in [(f64::NAN, 0.1), (1e200, 0.1), (1.0, 0.0), (1.0, 1e9)] {
+        let u = TankInputs { a: Ramp::held([a; 3]), ..u };
+        assert!(tank.step(&u, h).is_err());
+        assert_eq!(*tank.state(), before);
+    }
+}
+
+/// Each is refused in a sentence that names parameter, value and range, all of them at once.
+#[test]
+fn every_problem_with_the_parameters_is_returned() {
+    let mut p = Parameters::default();
+    p.craft.mass = 0.0;
+    p.craft.j.xy = 1e4;
+    p.craft.r[1] = f64::NAN;
+    p.tanks = 2;
+    p.tank[1].modes = 4;
+    p.tank[1].length[0] = -0.1;
+    p.tank[1].mass[2] = f64::INFINITY;
+    p.tank[0].q = [0.0; 4];
+    p.tank[0].g_ref = 0.0;
+    p.tank[0].p_0[0] = [0.0; 3];
+    p.tank[3].m_0 = -1.0; // is not used
+    p.init.q[2] = f64::NAN;
+    p.init.velocity[0] = 1.0;
+    p.mount = Mount::Pivot;
+    let problems = Spacecraft::new(&p, &Inputs::default(), 0.0, 1e-9).unwrap_err();
+    let expected = [
+        "craft.mass = 0.0 (allowed: 1e-9 to 1000000000000.0 kg)",
+        "craft.r[2] = NaN (allowed: -1000000000.0 to 1000000000.0 m)",
+        "craft.Jxy^2 = 100000000.0 (allowed: up to craft.Jxx craft.Jyy = 782600.0)",
+        "tank[1].q = [0.0, 0.0, 0.0, 0.0] has no direction (allowed: length above 1e-6)",
+        "tank[1].g_ref = 0.0 (allowed: 1e-9 to 1000000.0 m/s2)",
+        "tank[1].p_0[1] = [0.0, 0.0, 0.0] has no direction (allowed: length above 1e-6)",
+        "tank[2].modes = 4 (allowed: 0 to 3)",
+        "tank[2].length[1] = -0.1 (allowed: 1e-6 to 1000000000.0 m)",
+        "tank[2].mass[3] = inf (allowed: 1e-9 to 1000000000000.0 kg)",
+        "init.q[3] = NaN (allowed: -1000000000.0 to 1000000000.0)",
+        "init.velocity = [1.0, 0.0, 0.0] m/s (allowed with mount = pivot: 0, which holds O)",
+    ];
+    assert_eq!(problems, expected);
+
+    // A craft with no inertia about its axis but for a tank's rigid liquid.
+    let mut p = Parameters::default();
+    p.craft.r = [0.0; 3];
+    (p.craft.j.xx, p.craft.j.yy, p.craft.j.zz) = (5.0, 5.0, 0.0);
+    let problems = p.problems();
+    assert_eq!(problems.len(), 1);
+    assert!(problems[0].contains("is singular"), "{problems:?}");
+    p.tank[0].i_z = 1.0;
+    assert!(p.problems().is_empty());
+    p.craft.j.zz = -1.0;
+    assert!(p.problems()[0].starts_with("craft.Jzz = -1.0 (allowed: 0.0 to"));
+
+    let mut p = TankParameters::default();
+    p.tank.k[0] = -1.0;
+    p.host = Some(craft::Craft { mass: -1.0, ..craft::Craft::default() });
+    let problems = SloshTank::new(&p, &TankInputs::default(), 0.0, 1e-9).unwrap_err();
+    assert_eq!(problems.len(), 2);
+    assert!(problems[0].starts_with("tank.k[1] = -1.0 (allowed: 0.0 to"));
+    assert!(problems[1].starts_with("host.mass = -1.0"));
+}
+
+/// Steps with anything at all: numbers, or an error and the old state.
+#[test]
+fn random_steps_end_in_numbers_or_an_error() {
+    let mut refused = 0;
+    let mut random = Random::new(7);
+    for _ in 0..200 {
+        let mut p = random.parameters();
+        p.init.omega = [(); 3].map(|()| random.magnitude(1e-6, 1e2));
+        let tolerance = random.magnitude(1e-14, 1e-1);
+        let mut craft = Spacecraft::new(&p, &Inputs::default(), 0.0, tolerance).unwrap();
+        for _ in 0..30 {
+            // One in twenty is beyond all sense.
+            let nonsense = random.below(20) == 0;
+            let size = if nonsense { 1e160 } else { random.magnitude(1e-6, 1e5) };
+            let ramp = |random: &mut Random| Ramp {
+                value: random.vector(size),
+                slope: random.vector(size),
+            };
+            let (force, torque) = (ramp(&mut random), ramp(&mut random));
+            let u = Inputs { force, torque, h_wheels: ramp(&mut random) };
+            let before = *craft.state();
+            let h = random.magnitude(1e-9, 0.1);
+            match craft.step(&u, h) {
+                Ok(()) => {
+                    assert!(craft.continuous_states().iter().all(|x| x.is_finite()));
+                    assert!(craft.outputs(&u).energy.is_finite());
+                }
+                Err(_) => {
+                    refused += 1;
+                    assert_eq!(*craft.state(), before);
+                }
+            }
+        }
+    }
+    assert!((100..600).contains(&refused), "{refused}");
+}
+
+/// Directions and quaternion stay of length 1 to rounding, rates tangential, however long.
+#[test]
+fn constraints_are_kept_to_rounding() {
+    let record = record("four_tanks");
+    let mut craft = spacecraft(&record, 1e-6);
+    for k in 0..1000 {
+        craft.step(&inputs(&record, k), STEP).unwrap();
+        let x = craft.continuous_states();
+        let size: f64 = x[..4].iter().map(|x| x * x).sum();
+        assert!((size - 1.0).abs() < 1e-15 * 4.0);
+        for bob in x[index::BOBS..].chunks_exact(6) {
+            let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+            assert!((dot(&bob[..3], &bob[..3]) - 1.0).abs() < 1e-15 * 4.0);
+            assert!(dot(&bob[..3], &bob[3..]).abs() < 1e-14);
+        }
+    }
+}
+
+#[test]
+fn bobs_that_are_not_used_stay_at_rest() {
+    let mut p = Parameters::default();
+    p.tank[0].p_dot_0[1] = [1.0, 0.0, 0.0];
+    let u = Inputs { force: Ramp::held([10.0, 0.0, 2000.0]), ..Inputs::default() };
+    let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap();
+    craft.step(&u, 1.0).unwrap();
+    let (x, rate) = (craft.continuous_states(), craft.derivatives(&u));
+    for at in (index::bob(0, 1)..STATES).step_by(6) {
+        assert_eq!(x[at..at + 6], [0.0, 0.0, -1.0, 0.0, 0.0, 0.0]);
+        assert_eq!(rate[at..at + 6], [0.0; 6]);
+    }
+    let out = craft.outputs(&u);
+    assert_eq!(out.tank[1].force, [0.0; 3]);
+    assert_eq!(out.tank[1].p[2], [0.0, 0.0, -1.0]);
+    assert_eq!(out.mass, 1180.0 + 253.493 + 128.211);
+}
+
+#[test]
+fn nothing_is_allocated_while_stepping() {
+    let record = record("four_tanks");
+    let mut craft = spacecraft(&record, 1e-9);
+    let inputs: Vec<Inputs> = (0..100).map(|k| inputs(&record, k)).collect();
+    let p = TankParameters { coupling: Coupling::Lumped, ..TankParameters::default() };
+    let u = TankInputs { a: Ramp::held([0.1, 0.2, 2.0]), ..TankInputs::default() };
+    let mut tank = SloshTank::new(&p, &u, 0.0, 1e-9).unwrap();
+    let counted = allocation_counter::measure(|| {
+        for u in &inputs {
+            craft.step(u, STEP).unwrap();
+            craft.outputs(&at_end(u));
+            craft.derivatives(u);
+            craft.directional_derivative(u, &[1.0; STATES], &[1.0; craft::INPUTS]);
+            craft.output_derivatives(u, &[1.0; STATES], &[1.0; craft::INPUTS]);
+        }
+        tank.step(&u, 1.0).unwrap();
+        tank.outputs(&u);
+        tank.output_slopes(&u);
+        tank.directional_derivative(&u, &[1.0; TANK_STATES], &[1.0; craft::TANK_INPUTS]);
+    });
+    assert_eq!(counted.count_total, 0);
+}
