@@ -8,6 +8,7 @@ use craft::{
 use nalgebra::{DMatrix, DVector, Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 
 use crate::random::Random;
+use crate::records;
 
 type V = Vector3<f64>;
 
@@ -42,7 +43,52 @@ fn bodies(p: &Parameters) -> Vec<(f64, V, Matrix3<f64>)> {
     bodies
 }
 
+/// What one gets wrong.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Mistake {
+    Nothing,
+    EulerSign,
+    EulerLeftOut,
+    CoriolisOnce,
+    DragWithoutReaction,
+    DragAtHinge,
+    CentringWithoutReaction,
+    CentringAtHinge,
+    CentringNotInPull,
+    HingeCentrifugalNotInPull,
+    RateForVelocityInPull,
+    PullAboutTank,
+    NoAddedMass,
+    RigidLiquidTwice,
+    BobsRigidAndSwinging,
+    OwnInertiaLeftOut,
+    HeightLeftOut,
+    DryInertiaAboutO,
+    StaticMomentSign,
+    GyroscopicWheelsLeftOut,
+    WheelTorqueLeftOut,
+    WheelsSign,
+}
+use Mistake::*;
+
 fn solve(p: &Parameters, x: &[f64; STATES], u: &Inputs) -> Solution {
+    solve_with(Nothing, p, x, u)
+}
+
+fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -> Solution {
+    let mut p = *p;
+    for tank in &mut p.tank[..p.tanks] {
+        match mistake {
+            RigidLiquidTwice => tank.m_0 *= 2.0,
+            BobsRigidAndSwinging => tank.m_0 += tank.mass[..tank.modes].iter().sum::<f64>(),
+            OwnInertiaLeftOut => (tank.i_0, tank.i_z) = (0.0, 0.0),
+            HeightLeftOut => tank.h_0 = 0.0,
+            _ => {}
+        }
+    }
+    let p = &p;
+    let wrong = |other: Mistake| mistake == other;
+    let unless = |other: Mistake| if mistake == other { 0.0 } else { 1.0 };
     let w = v(&x[index::OMEGA..]);
     let bobs: Vec<(usize, usize)> =
         (0..p.tanks).flat_map(|i| (0..p.tank[i].modes).map(move |n| (i, n))).collect();
@@ -54,16 +100,21 @@ fn solve(p: &Parameters, x: &[f64; STATES], u: &Inputs) -> Solution {
         view += block;
     };
     let one = Matrix3::identity();
-    let h = v(&u.h_wheels.value);
+    let sign = 1.0 - 2.0 * (1.0 - unless(WheelsSign));
+    let h = v(&u.h_wheels.value) * sign;
     let mut force = v(&u.force.value);
-    let mut torque = v(&u.torque.value) - v(&u.h_wheels.slope) - w.cross(&h);
+    let mut torque = v(&u.torque.value)
+        - v(&u.h_wheels.slope) * (sign * unless(WheelTorqueLeftOut))
+        - w.cross(&h) * unless(GyroscopicWheelsLeftOut);
     let bodies = bodies(p);
-    for (mass, s, j) in &bodies {
+    for (i, (mass, s, j)) in bodies.iter().enumerate() {
         let arm = s.cross_matrix();
+        let cross = if wrong(StaticMomentSign) { -arm } else { arm };
+        let steiner = if i == 0 { unless(DryInertiaAboutO) } else { 1.0 };
         put(&mut m, 0, 0, one * *mass);
-        put(&mut m, 0, 3, -arm * *mass);
-        put(&mut m, 3, 0, arm * *mass);
-        put(&mut m, 3, 3, j - arm * arm * *mass);
+        put(&mut m, 0, 3, -cross * *mass);
+        put(&mut m, 3, 0, cross * *mass);
+        put(&mut m, 3, 3, j - arm * arm * (*mass * steiner));
         let centripetal = w.cross(&w.cross(s)) * *mass;
         force -= centripetal;
         torque -= s.cross(&centripetal) + w.cross(&(j * w));
@@ -79,25 +130,47 @@ fn solve(p: &Parameters, x: &[f64; STATES], u: &Inputs) -> Solution {
         let (e, l, mass) = (axes * V::z(), tank.length[n], tank.mass[n]);
         let rho = v(&tank.position) + e * tank.hinge[n] + dir * l;
         let perp = dir - e * e.dot(&dir);
-        let phi = rate * (tank.drag(n) * l) + perp * (tank.k[n] * l);
+        let (drag, centring) = (rate * (tank.drag(n) * l), perp * (tank.k[n] * l));
+        let phi = drag + centring;
         let at = 6 + 4 * b;
         // Newton's law of the bob.
         put(&mut m, at, 0, one * mass);
-        put(&mut m, at, 3, -rho.cross_matrix() * mass);
+        let euler = if wrong(EulerSign) { -1.0 } else { unless(EulerLeftOut) };
+        put(&mut m, at, 3, -rho.cross_matrix() * (mass * euler));
         put(&mut m, at, at, one * (mass * l));
         for k in 0..3 {
             m[(at + k, at + 3)] = dir[k];
             // |p| = 1 twice differentiated.
             m[(at + 3, at + k)] = dir[k];
             // The pull on the craft.
-            m[(k, at + 3)] = -dir[k];
-            m[(3 + k, at + 3)] = -rho.cross(&dir)[k];
+            let arm = if wrong(PullAboutTank) { rho - v(&tank.position) } else { rho };
+            m[(k, at + 3)] = -dir[k] * unless(NoAddedMass);
+            m[(3 + k, at + 3)] = -arm.cross(&dir)[k] * unless(NoAddedMass);
         }
-        let inertial = w.cross(&w.cross(&rho)) + w.cross(&rate) * (2.0 * l);
+        let coriolis = if wrong(CoriolisOnce) { l } else { 2.0 * l };
+        let inertial = w.cross(&w.cross(&rho)) + w.cross(&rate) * coriolis;
         rhs.rows_mut(at, 3).copy_from(&(-inertial * mass - phi));
         rhs[at + 3] = -rate.norm_squared();
-        force += phi;
-        torque += rho.cross(&phi);
+        // The pull at a = w' = 0, which takes the place of the pull where there is no added
+        // mass, and what of the pull goes astray.
+        let hinge = rho - dir * l;
+        let velocity = rate + w.cross(&dir);
+        let centrifugal = mass * dir.dot(&w.cross(&w.cross(&hinge)));
+        let by_rate = mass * l * velocity.norm_squared();
+        let by_centring = tank.k[n] * l * perp.norm_squared();
+        let astray = match mistake {
+            CentringNotInPull => by_centring,
+            HingeCentrifugalNotInPull => centrifugal,
+            RateForVelocityInPull => mass * l * rate.norm_squared() - by_rate,
+            NoAddedMass => by_rate - centrifugal - by_centring,
+            _ => 0.0,
+        };
+        force += dir * astray;
+        torque += rho.cross(&dir) * astray;
+        force += drag * unless(DragWithoutReaction) + centring * unless(CentringWithoutReaction);
+        let arm = |at_hinge: Mistake| if wrong(at_hinge) { hinge } else { rho };
+        torque += arm(DragAtHinge).cross(&drag) * unless(DragWithoutReaction);
+        torque += arm(CentringAtHinge).cross(&centring) * unless(CentringWithoutReaction);
         seen.push((i, axes, dir, rho, phi));
     }
     rhs.rows_mut(0, 3).copy_from(&force);
@@ -407,4 +480,76 @@ fn coupling_ratio_is_the_largest_eigenvalue() {
     let mut alone =
         SloshTank::new(&TankParameters::default(), &TankInputs::default(), 0.0, 1e-9).unwrap();
     assert_eq!(alone.coupling_ratio(), None);
+}
+
+/// The largest deviation of a and w' from a record's, relative to their largest, when they are
+/// worked out from the record's own states.
+fn deviation(mistake: Mistake, record: &serde_json::Value) -> f64 {
+    let p = records::parameters(record);
+    let samples = &record["samples"];
+    let (_, every) = records::steps(record);
+    let at = |signal: &str, sample: usize| records::numbers(&samples[signal][sample]);
+    let largest = |signal: &str| records::number(&record["largest"][signal]);
+    let mut worst = 0.0_f64;
+    for sample in 0..samples["w"].as_array().unwrap().len() {
+        let mut x = [0.0; STATES];
+        x[..4].copy_from_slice(&at("q", sample));
+        x[index::OMEGA..][..3].copy_from_slice(&at("w", sample));
+        let bobs = (0..p.tanks).flat_map(|i| (0..p.tank[i].modes).map(move |n| (i, n)));
+        for (b, (i, n)) in bobs.enumerate() {
+            let place = index::bob(i, n);
+            x[place..place + 3].copy_from_slice(&at("p", sample)[3 * b..3 * b + 3]);
+            x[place + 3..place + 6].copy_from_slice(&at("p_dot", sample)[3 * b..3 * b + 3]);
+        }
+        let u = match sample {
+            0 => records::inputs(record, 0),
+            _ => records::at_end(&records::inputs(record, sample * every - 1)),
+        };
+        let got = solve_with(mistake, &p, &x, &u);
+        for (got, signal) in [(got.a, "a"), (got.w_d, "w_dot")] {
+            let off = (got - v(&at(signal, sample))).amax() / largest(signal);
+            worst = worst.max(if off.is_nan() { f64::INFINITY } else { off });
+        }
+    }
+    worst
+}
+
+/// The reference records tell right from wrong: each typical mistake shows in one of them, in
+/// the accelerations at the record's own states already.
+#[test]
+fn reference_records_catch_typical_mistakes() {
+    let all = records::records("craft");
+    for record in &all {
+        // States are printed with 14 digits; forces come from differences of theirs.
+        let right = deviation(Nothing, record);
+        assert!(right < 1e-11, "{} {right:e}", record["name"]);
+    }
+    for (mistake, name) in [
+        (EulerSign, "free_fall"),
+        (EulerLeftOut, "free_fall"),
+        (CoriolisOnce, "released"),
+        (DragWithoutReaction, "off_axis"),
+        (DragAtHinge, "off_axis"),
+        (CentringWithoutReaction, "free_fall"),
+        (CentringAtHinge, "free_fall"),
+        (CentringNotInPull, "free_fall"),
+        (HingeCentrifugalNotInPull, "wheels"),
+        (RateForVelocityInPull, "released"),
+        (PullAboutTank, "off_axis"),
+        (NoAddedMass, "axial_pulse"),
+        (RigidLiquidTwice, "axial_pulse"),
+        (BobsRigidAndSwinging, "axial_pulse"),
+        (OwnInertiaLeftOut, "wheels"),
+        (HeightLeftOut, "off_axis"),
+        (DryInertiaAboutO, "two_tanks"),
+        (StaticMomentSign, "no_tank"),
+        (GyroscopicWheelsLeftOut, "wheels"),
+        (WheelTorqueLeftOut, "wheels"),
+        (WheelsSign, "wheels"),
+    ] {
+        let record = all.iter().find(|record| record["name"] == name).unwrap();
+        let off = deviation(mistake, record);
+        println!("{mistake:?} in {name}: {off:.1e}");
+        assert!(off > 1e-4, "{mistake:?} in {name}: {off:e}");
+    }
 }
