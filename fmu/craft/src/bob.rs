@@ -30,7 +30,7 @@
 //! Checked against the same law in p'' (tests/independent.rs).
 
 use crate::parameters::Tank;
-use crate::series::{self, Pair, Series, Vector, ZERO, ZERO_PAIR, ZERO_VECTOR, next};
+use crate::series::{self, Pair, Series, Vector, ZERO, ZERO_PAIR, ZERO_VECTOR};
 use crate::vector::{
     Mat3, Number, Vec3, add, constant, cross, dot, largest, on_sphere, on_sphere_slope, rotation,
     scale, sub, times, transposed_times, unit_quaternion,
@@ -67,7 +67,7 @@ pub struct Bob {
     /// p.e
     height: Series,
     /// Of the order at hand: what does not depend on [a; w'] of this order.
-    turned: Vec3,
+    turned: [[f64; 2]; 3],
     centripetal: Vec3,
     p_perp: Vec3,
     known_pull: f64,
@@ -101,7 +101,7 @@ impl Bob {
             specific_force: ZERO_VECTOR,
             pull: ZERO,
             height: ZERO,
-            turned: [0.0; 3],
+            turned: [[0.0; 2]; 3],
             centripetal: [0.0; 3],
             p_perp: [0.0; 3],
             known_pull: 0.0,
@@ -118,6 +118,7 @@ impl Bob {
         let [p, p_d] = on_sphere(p, p_d);
         self.p[0] = p;
         self.v[0] = add(p_d, cross(w, p));
+        self.both.set(0, p, self.v[0]);
     }
 
     /// Sets coefficient 1 of direction and velocity to their derivative in the direction `dx` of
@@ -127,6 +128,7 @@ impl Bob {
         let [dp, dp_d] = on_sphere_slope(body(x, 0), body(x, 3), body(dx, 0), body(dx, 3));
         self.p[1] = dp;
         self.v[1] = add(dp_d, add(cross(dw, self.p[0]), cross(w, dp)));
+        self.both.set(1, dp, self.v[1]);
     }
 
     /// Direction and rate `t` after the start at `x`, from the series cut after order n, when the
@@ -149,14 +151,12 @@ impl Bob {
     }
 
     /// Coefficient N of what does not depend on [a; w'] of this order: force and torque about
-    /// O on the craft. `w2` is coefficient N of the matrix of y -> w x (w x y).
+    /// O on the craft. `w` is the pair (w, w), `w2` coefficient N of the matrix of y -> w x (w x y).
     #[inline(always)]
-    pub fn load<const N: usize>(&mut self, w: &Vector, w2: &Mat3) -> [Vec3; 2] {
+    pub fn load<const N: usize>(&mut self, w: &Pair, w2: &Mat3) -> [Vec3; 2] {
         let Bob { m, l, c, k, .. } = *self;
-        self.both.set(N, self.p[N], self.v[N]);
-        let [p_turned, v_turned] = series::cross_pair::<N>(w, &self.both);
-        let p_d = sub(self.v[N], p_turned);
-        self.turned = v_turned;
+        self.turned = series::cross_pair::<N>(w, &self.both);
+        let p_d = [0, 1, 2].map(|i| self.v[N][i] - self.turned[i][0]);
         self.p_d[N] = p_d;
         self.centripetal = times(w2, self.hinge);
         let mut pull = l * series::square_vector::<N>(&self.v)
@@ -198,7 +198,7 @@ impl Bob {
         self.pull[N] = self.known_pull - along;
         let pulled = sub(self.known, scale(along, self.p[0]));
         let fall = scale(self.inv_l, add(self.specific_force[N], pulled));
-        let mut v_d = scale(-1.0, add(self.turned, fall));
+        let mut v_d = [0, 1, 2].map(|i| -self.turned[i][1] - fall[i]);
         if self.c > 0.0 {
             v_d = sub(v_d, scale(self.c_m, self.p_d[N]));
         }
@@ -206,8 +206,8 @@ impl Bob {
             v_d = sub(v_d, scale(self.k_m, self.p_perp));
         }
         self.v_d[N] = v_d;
-        self.p[N + 1] = next::<N>(self.p_d[N]);
-        self.v[N + 1] = next::<N>(v_d);
+        self.both.set_next::<N>([0, 1, 2].map(|i| [self.p_d[N][i], v_d[i]]));
+        [self.p[N + 1], self.v[N + 1]] = self.both.get(N + 1);
     }
 
     /// Coefficient N of the power dissipated, c l^2 |p'|^2, W.

@@ -30,8 +30,8 @@ use crate::integrator::{MAX_MAGNITUDE, Motion, RATE_FLOOR};
 use crate::parameters::{Mount, Parameters};
 use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod};
 use crate::series::{
-    self, ORDER, Pair, Series, Vector, ZERO, ZERO_PAIR, ZERO_VECTOR, cross, cross_pair, cross_ramp,
-    dot_ramp, next, products, quaternion_rate, ramp,
+    self, Attitude, Pair, Series, Vector, ZERO, ZERO_ATTITUDE, ZERO_PAIR, ZERO_VECTOR, cross,
+    cross_pair, cross_ramp, dot_ramp, next, products, quaternion_rate, ramp,
 };
 use crate::state::{Inputs, STATES, State, index};
 use crate::vector::{
@@ -82,8 +82,10 @@ pub struct CraftMotion {
     pub torque: [Vec3; 2],
     pub h: [Vec3; 2],
     pub h_dot: [Vec3; 2],
-    pub q: [[f64; 4]; ORDER + 1],
+    pub q: Attitude,
     pub w: Vector,
+    /// (w, w)
+    w_both: Pair,
     pub w_d: Vector,
     pub a: Vector,
     gain: Vector,
@@ -123,8 +125,9 @@ impl CraftMotion {
             torque: [[0.0; 3]; 2],
             h: [[0.0; 3]; 2],
             h_dot: [[0.0; 3]; 2],
-            q: [[0.0; 4]; ORDER + 1],
+            q: ZERO_ATTITUDE,
             w: ZERO_VECTOR,
+            w_both: ZERO_PAIR,
             w_d: ZERO_VECTOR,
             a: ZERO_VECTOR,
             gain: ZERO_VECTOR,
@@ -181,7 +184,7 @@ impl CraftMotion {
         self.start(0.0);
         self.factorise();
         let [dv, dw] = self.factors.solve([[0.0; 3], scale(-1.0, jump)]);
-        let velocity_change = times(&rotation(&self.q[0]), dv);
+        let velocity_change = times(&rotation(&self.q.get(0)), dv);
         let x = &mut self.state.x;
         for i in 0..3 {
             x[index::WORK] -= jump[i] * (x[index::OMEGA + i] + dw[i] / 2.0);
@@ -213,7 +216,7 @@ impl CraftMotion {
         self.evaluate(inputs);
         let x = &self.state.x;
         let [q, dq] = [x, dx].map(|x| [x[0], x[1], x[2], x[3]]);
-        self.q[1] = unit_quaternion_slope(&self.q[0], &q, &dq);
+        self.q.set(1, unit_quaternion_slope(&self.q.get(0), &q, &dq));
         let turn = self.turn();
         let dw = part(dx, index::OMEGA);
         self.w[1] = dw;
@@ -223,7 +226,7 @@ impl CraftMotion {
         self.travel.set(1, [0.0; 3], [0.0; 3]);
         match self.mount {
             Mount::Free => {
-                let dv = transposed_times(&rotation(&self.q[0]), part(dx, index::VELOCITY));
+                let dv = transposed_times(&rotation(&self.q.get(0)), part(dx, index::VELOCITY));
                 self.drift[1] = add(dv, vector::cross(self.drift[0], turn));
             }
             Mount::Pivot => self.a[1] = vector::cross(self.a[0], turn),
@@ -239,8 +242,8 @@ impl CraftMotion {
     /// The rotation, rad, body axes, that coefficient 1 of the attitude stands for:
     /// q_1 = q_0 o (0, turn)/2.
     fn turn(&self) -> Vec3 {
-        let [a, x, y, z] = self.q[0];
-        let [b, v @ ..] = self.q[1];
+        let [a, x, y, z] = self.q.get(0);
+        let [b, v @ ..] = self.q.get(1);
         let u = [x, y, z];
         let sum = add(sub(scale(a, v), scale(b, u)), scale(-1.0, vector::cross(u, v)));
         scale(2.0, sum)
@@ -252,7 +255,7 @@ impl CraftMotion {
         let mut put = |at: usize, numbers: &[f64]| {
             rate[at..at + numbers.len()].copy_from_slice(numbers);
         };
-        put(index::Q, &self.q[N + 1].map(|q| q * (N + 1) as f64));
+        put(index::Q, &self.q.get(N + 1).map(|q| q * (N + 1) as f64));
         put(index::OMEGA, &self.w_d[N]);
         if self.mount == Mount::Free {
             let mut a = self.a[N];
@@ -260,7 +263,7 @@ impl CraftMotion {
                 a = add(a, vector::cross(self.turn(), self.a[0]));
             }
             put(index::POSITION, &part(x, index::VELOCITY));
-            put(index::VELOCITY, &times(&rotation(&self.q[0]), a));
+            put(index::VELOCITY, &times(&rotation(&self.q.get(0)), a));
         }
         put(index::WORK, &[self.work[N]]);
         put(index::DISSIPATED, &[self.dissipation[N]]);
@@ -280,9 +283,10 @@ impl Motion for CraftMotion {
         self.h = [h_wheels.at(t), h_wheels.slope];
         self.h_dot = [h_wheels.slope, [0.0; 3]];
         let x = &self.state.x;
-        self.q[0] = unit_quaternion([x[0], x[1], x[2], x[3]]);
+        let q = unit_quaternion([x[0], x[1], x[2], x[3]]);
+        self.q.set(0, q);
         self.w[0] = part(x, index::OMEGA);
-        let axes = rotation(&self.q[0]);
+        let axes = rotation(&q);
         match self.mount {
             Mount::Free => self.drift[0] = transposed_times(&axes, part(x, index::VELOCITY)),
             Mount::Pivot => self.a[0] = scale(-1.0, transposed_times(&axes, self.gravity)),
@@ -295,6 +299,7 @@ impl Motion for CraftMotion {
 
     #[inline(always)]
     fn rates<const N: usize>(&mut self) {
+        self.w_both.set(N, self.w[N], self.w[N]);
         let ww = products::<N>(&self.w);
         let w2 = twice_crossed(ww);
         let mut force = sub(ramp::<N>(&self.force), times(&w2, self.rigid.moment));
@@ -303,7 +308,7 @@ impl Motion for CraftMotion {
             add(gyroscopic(&self.rigid.inertia, ww), cross_ramp::<N>(&self.w, &self.h)),
         );
         for bob in &mut self.bobs {
-            let [f, tau] = bob.load::<N>(&self.w, &w2);
+            let [f, tau] = bob.load::<N>(&self.w_both, &w2);
             force = add(force, f);
             torque = add(torque, tau);
         }
@@ -315,19 +320,19 @@ impl Motion for CraftMotion {
         }
         let [a, w_d] = self.solve([force, torque]);
         self.w_d[N] = w_d;
-        self.q[N + 1] = quaternion_rate::<N>(&self.q, &self.w)
-            .map(|rate| rate * const { 1.0 / (N + 1) as f64 });
+        let q_d = quaternion_rate::<N>(&self.q, &self.w_both);
+        self.q.set(N + 1, q_d.map(|rate| rate * const { 1.0 / (N + 1) as f64 }));
         self.work[N] = dot_ramp::<N>(&self.torque, &self.w) - dot_ramp::<N>(&self.h_dot, &self.w);
         match self.mount {
             Mount::Free => {
                 self.a[N] = a;
                 self.work[N] += dot_ramp::<N>(&self.force, &self.drift)
                     + dot_ramp::<N>(&self.force, &self.gain);
-                let [gain_turned, path_turned] = cross_pair::<N>(&self.w, &self.travel);
-                let gain = next::<N>(sub(a, gain_turned));
-                let path = next::<N>(sub(self.gain[N], path_turned));
-                self.gain[N + 1] = gain;
-                self.travel.set(N + 1, gain, path);
+                let turned = cross_pair::<N>(&self.w_both, &self.travel);
+                let gain = self.gain[N];
+                let rates = [0, 1, 2].map(|i| [a[i] - turned[i][0], gain[i] - turned[i][1]]);
+                self.travel.set_next::<N>(rates);
+                self.gain[N + 1] = self.travel.get(N + 1)[0];
                 self.drift[N + 1] = next::<N>(cross::<N>(&self.drift, &self.w));
             }
             Mount::Pivot => self.a[N + 1] = next::<N>(cross::<N>(&self.a, &self.w)),
@@ -356,7 +361,7 @@ impl Motion for CraftMotion {
     fn coefficient_norm(&self, n: usize) -> f64 {
         let larger = |a: f64, b: f64| if b > a { b } else { a };
         let [attitude, rate, swing, speed] = self.inv_allowed;
-        let [q_0, q @ ..] = self.q[n];
+        let [q_0, q @ ..] = self.q.get(n);
         // The matrix C is quadratic in q: its coefficients are up to 2^n times those of q.
         let q = larger(q_0.abs(), largest(q)) * (1_u64 << n) as f64;
         let v = self.bobs.iter().map(|bob| bob.coefficient_norm(n)).fold(0.0, larger);
@@ -366,7 +371,7 @@ impl Motion for CraftMotion {
 
     #[inline(always)]
     fn take(&mut self, n: usize, h: f64) -> bool {
-        let q = unit_quaternion(series::value(&self.q, n, h));
+        let q = unit_quaternion(self.q.value(n, h));
         let w = series::value(&self.w, n, h);
         let x = &mut self.state.x;
         x[index::Q..index::Q + 4].copy_from_slice(&q);

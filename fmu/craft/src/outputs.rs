@@ -128,7 +128,8 @@ impl CraftMotion {
         let of = |a: &[Vec3]| -> Vec3<T> { [0, 1, 2].map(|i| T::of(a[0][i], a[1][i])) };
         let (a, w, w_d) = (of(&self.a), of(&self.w), of(&self.w_d));
         let (velocity, h) = (of(&self.drift), of(&self.h));
-        let axes = rotation(&[0, 1, 2, 3].map(|i| T::of(self.q[0][i], self.q[1][i])));
+        let [q, dq] = [self.q.get(0), self.q.get(1)];
+        let axes = rotation(&[0, 1, 2, 3].map(|i| T::of(q[i], dq[i])));
         let Rigid { mass: m_r, moment, inertia } = self.rigid;
         let (s, inertia) = (constant::<T>(moment), inertia.map(constant::<T>));
 

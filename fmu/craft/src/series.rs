@@ -49,6 +49,19 @@ impl Pair {
         self.0[n] = [[a[0], b[0]], [a[1], b[1]], [a[2], b[2]]];
     }
 
+    /// Coefficient n of the one and of the other.
+    #[inline(always)]
+    pub fn get(&self, n: usize) -> [Vec3; 2] {
+        let [x, y, z] = self.0[n];
+        [[x[0], y[0], z[0]], [x[1], y[1], z[1]]]
+    }
+
+    /// Sets coefficient N + 1 of both from coefficient N of their rates.
+    #[inline(always)]
+    pub fn set_next<const N: usize>(&mut self, rates: [[f64; 2]; 3]) {
+        self.0[N + 1] = rates.map(|pair| pair.map(|rate| rate * const { 1.0 / (N + 1) as f64 }));
+    }
+
     /// The values at t of both series cut after order n.
     #[inline(always)]
     pub fn value(&self, n: usize, t: f64) -> [Vec3; 2] {
@@ -160,20 +173,22 @@ pub fn cross<const N: usize>(a: &Vector, b: &Vector) -> Vec3 {
     sum
 }
 
-/// Coefficient N of a x b and a x c.
-#[inline(always)]
-pub fn cross_pair<const N: usize>(a: &Vector, b: &Pair) -> [Vec3; 2] {
+/// Coefficient N of a x b and of c x d as a pair, for the pairs (a, c) and (b, d). It stays a
+/// pair: taken apart at once, a compiler would rather vectorise across the components.
+// A function of its own: inlined, its lanes are regrouped with the code around it and a
+// tenth more instructions result.
+#[inline(never)]
+pub fn cross_pair<const N: usize>(a: &Pair, b: &Pair) -> [[f64; 2]; 3] {
     let mut sum = [[0.0; 2]; 3];
     for j in 0..N + 1 {
-        let ([ax, ay, az], [bx, by, bz]) = (a[j], b.0[N - j]);
+        let ([ax, ay, az], [bx, by, bz]) = (&a.0[j], &b.0[N - j]);
         for k in 0..2 {
-            sum[0][k] += ay * bz[k] - az * by[k];
-            sum[1][k] += az * bx[k] - ax * bz[k];
-            sum[2][k] += ax * by[k] - ay * bx[k];
+            sum[0][k] += ay[k] * bz[k] - az[k] * by[k];
+            sum[1][k] += az[k] * bx[k] - ax[k] * bz[k];
+            sum[2][k] += ax[k] * by[k] - ay[k] * bx[k];
         }
     }
-    let [x, y, z] = sum;
-    [[x[0], y[0], z[0]], [x[1], y[1], z[1]]]
+    sum
 }
 
 /// Coefficient N of a + a' t.
@@ -196,18 +211,57 @@ pub fn cross_ramp<const N: usize>(a: &Vector, ramp: &[Vec3; 2]) -> Vec3 {
     if N == 0 { first } else { vector::add(first, vector::cross(a[N - 1], ramp[1])) }
 }
 
-/// Coefficient N of q' = q o (0, w)/2 (Hamilton's product).
-#[inline(always)]
-pub fn quaternion_rate<const N: usize>(q: &[[f64; 4]; ORDER + 1], w: &Vector) -> [f64; 4] {
-    let mut sum = [0.0; 4];
-    for j in 0..N + 1 {
-        let ([a, b, c, d], [x, y, z]) = (q[N - j], w[j]);
-        sum[0] -= b * x + c * y + d * z;
-        sum[1] += a * x + c * z - d * y;
-        sum[2] += a * y + d * x - b * z;
-        sum[3] += a * z + b * y - c * x;
+/// Coefficients of a quaternion (a, b, c, d), as the pairs whose multiples by the components of
+/// w make its rate: (-b, a), (c, d), (-d, c), (a, b).
+#[derive(Clone, Debug)]
+#[repr(align(16))]
+pub struct Attitude([[[f64; 2]; 4]; ORDER + 1]);
+
+/// All coefficients zero.
+pub const ZERO_ATTITUDE: Attitude = Attitude([[[0.0; 2]; 4]; ORDER + 1]);
+
+impl Attitude {
+    /// Sets coefficient n.
+    #[inline(always)]
+    pub fn set(&mut self, n: usize, [a, b, c, d]: [f64; 4]) {
+        self.0[n] = [[-b, a], [c, d], [-d, c], [a, b]];
     }
-    sum.map(|x| 0.5 * x)
+
+    /// Coefficient n.
+    #[inline(always)]
+    pub fn get(&self, n: usize) -> [f64; 4] {
+        let [_, [c, d], _, [a, b]] = self.0[n];
+        [a, b, c, d]
+    }
+
+    /// The value at t of the series cut after order n.
+    #[inline(always)]
+    pub fn value(&self, n: usize, t: f64) -> [f64; 4] {
+        let mut sum = [0.0; 4];
+        for n in (0..=n).rev() {
+            let q = self.get(n);
+            for i in 0..4 {
+                sum[i] = sum[i] * t + q[i];
+            }
+        }
+        sum
+    }
+}
+
+/// Coefficient N of q' = q o (0, w)/2 (Hamilton's product), where `w` is the pair (w, w).
+// A function of its own: inlined, its lanes are regrouped with the code around it and a
+// tenth more instructions result.
+#[inline(never)]
+pub fn quaternion_rate<const N: usize>(q: &Attitude, w: &Pair) -> [f64; 4] {
+    let (mut ab, mut cd) = ([0.0; 2], [0.0; 2]);
+    for j in 0..N + 1 {
+        let (q, [x, y, z]) = (&q.0[N - j], &w.0[j]);
+        for k in 0..2 {
+            ab[k] += q[0][k] * x[k] - q[1][k] * y[k] + q[2][k] * z[k];
+            cd[k] += q[3][k] * y[k] - q[2][k] * x[k] + q[0][k] * z[k];
+        }
+    }
+    [0.5 * ab[0], 0.5 * ab[1], 0.5 * cd[0], 0.5 * cd[1]]
 }
 
 /// The value at t of the series cut after order n.
@@ -258,18 +312,19 @@ mod tests {
     #[test]
     fn a_constant_rate_turns_attitude_and_components_by_rodrigues_formula() {
         let rate = [0.3, -0.8, 0.5];
-        let mut w = ZERO_VECTOR;
+        let (mut w, mut both) = (ZERO_VECTOR, ZERO_PAIR);
         w[0] = rate;
-        let mut q = [[0.0; 4]; ORDER + 1];
-        q[0] = [1.0, 0.0, 0.0, 0.0];
+        both.set(0, rate, rate);
+        let mut q = ZERO_ATTITUDE;
+        q.set(0, [1.0, 0.0, 0.0, 0.0]);
         let mut y = ZERO_VECTOR;
         y[0] = [1.0, 2.0, -0.5];
         for_each_order!(N => {
-            q[N + 1] = quaternion_rate::<N>(&q, &w).map(|x| x / (N + 1) as f64);
+            q.set(N + 1, quaternion_rate::<N>(&q, &both).map(|x| x / (N + 1) as f64));
             y[N + 1] = next::<N>(cross::<N>(&y, &w));
         });
         let (t, size) = (0.4, vector::norm(rate));
-        let (q, y_t) = (value(&q, ORDER, t), value(&y, ORDER, t));
+        let (q, y_t) = (q.value(ORDER, t), value(&y, ORDER, t));
         let (sin, cos) = (f64::sin(size * t / 2.0), f64::cos(size * t / 2.0));
         let exact = [cos, rate[0] / size * sin, rate[1] / size * sin, rate[2] / size * sin];
         // |w| t = 0.4: what is cut off is below rounding, a few ulp remain.
@@ -291,9 +346,10 @@ mod tests {
         for j in 0..4 {
             (x[j], y[j], s[j]) = (a[j], b[j], b[j][1]);
         }
-        let mut both = ZERO_PAIR;
+        let (mut first, mut second) = (ZERO_PAIR, ZERO_PAIR);
         for j in 0..=ORDER {
-            both.set(j, y[j], x[j]);
+            first.set(j, x[j], y[j]);
+            second.set(j, y[j], x[j]);
         }
         let plain = |n: usize, term: &dyn Fn(usize, usize) -> f64| -> f64 {
             (0..=n).filter(|&j| j < 4 && n - j < 4).map(|j| term(j, n - j)).sum()
@@ -312,8 +368,8 @@ mod tests {
             for i in 0..3 {
                 let crossed = plain(N, &|j, k| vector::cross(a[j], b[k])[i]);
                 assert_eq!(cross::<N>(&x, &y)[i], crossed);
-                assert_eq!(cross_pair::<N>(&x, &both)[0][i], crossed);
-                assert_eq!(cross_pair::<N>(&x, &both)[1][i], 0.0);
+                assert_eq!(cross_pair::<N>(&first, &second)[i][0], crossed);
+                assert_eq!(cross_pair::<N>(&first, &second)[i][1], -crossed);
                 let scaled = plain(N, &|j, k| b[j][1] * a[k][i]);
                 assert_eq!(scale::<N>(&s, &x)[i], scaled);
                 if N < 4 {

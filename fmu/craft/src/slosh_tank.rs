@@ -31,7 +31,7 @@ use crate::motion::{part, twice_crossed};
 use crate::outputs::TankOutputs;
 use crate::parameters::{Craft, MODES, Tank};
 use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod, largest_eigenvalue};
-use crate::series::{self, Series, Vector, ZERO, ZERO_VECTOR, products};
+use crate::series::{self, Pair, Series, Vector, ZERO, ZERO_PAIR, ZERO_VECTOR, products};
 use crate::state::Ramp;
 use crate::vector::{Dual, Number, Vec3, add, constant, cross, largest, on_sphere, scale};
 
@@ -147,6 +147,8 @@ struct TankMotion {
     bobs: Vec<Bob>,
     a: Vector,
     w: Vector,
+    /// (w, w)
+    w_both: Pair,
     w_d: Vector,
     dissipation: Series,
     /// 1 over what is allowed of v
@@ -182,10 +184,11 @@ impl Motion for TankMotion {
 
     #[inline(always)]
     fn rates<const N: usize>(&mut self) {
+        self.w_both.set(N, self.w[N], self.w[N]);
         let w2 = twice_crossed(products::<N>(&self.w));
         let mut dissipation = 0.0;
         for bob in &mut self.bobs {
-            bob.load::<N>(&self.w, &w2);
+            bob.load::<N>(&self.w_both, &w2);
             bob.accelerate::<N>(self.a[N], self.w_d[N]);
             dissipation += bob.dissipation::<N>();
         }
@@ -319,6 +322,7 @@ impl SloshTank {
             bobs,
             a: ZERO_VECTOR,
             w: ZERO_VECTOR,
+            w_both: ZERO_PAIR,
             w_d: ZERO_VECTOR,
             dissipation: ZERO,
             inv_allowed: 0.0,

@@ -489,7 +489,6 @@ fn deviation(mistake: Mistake, record: &serde_json::Value) -> f64 {
     let samples = &record["samples"];
     let (_, every) = records::steps(record);
     let at = |signal: &str, sample: usize| records::numbers(&samples[signal][sample]);
-    let largest = |signal: &str| records::number(&record["largest"][signal]);
     let mut worst = 0.0_f64;
     for sample in 0..samples["w"].as_array().unwrap().len() {
         let mut x = [0.0; STATES];
@@ -507,7 +506,7 @@ fn deviation(mistake: Mistake, record: &serde_json::Value) -> f64 {
         };
         let got = solve_with(mistake, &p, &x, &u);
         for (got, signal) in [(got.a, "a"), (got.w_d, "w_dot")] {
-            let off = (got - v(&at(signal, sample))).amax() / largest(signal);
+            let off = (got - v(&at(signal, sample))).amax() / records::largest(record, signal);
             worst = worst.max(if off.is_nan() { f64::INFINITY } else { off });
         }
     }

@@ -1,6 +1,7 @@
 //! What must hold of the craft and of the tank alone.
 
 mod balances;
+mod cosimulation;
 mod equations;
 mod independent;
 mod invariances;

@@ -30,6 +30,13 @@ pub fn number(value: &Value) -> f64 {
     value.as_f64().unwrap()
 }
 
+/// A signal's largest value in the record: the excerpt tells that of the whole record.
+pub fn largest(record: &Value, signal: &str) -> f64 {
+    record["largest"][signal].as_f64().unwrap_or_else(|| {
+        numbers(&record["samples"][signal]).iter().fold(0.0, |a: f64, x| a.max(x.abs()))
+    })
+}
+
 /// Every number in nested lists.
 pub fn numbers(value: &Value) -> Vec<f64> {
     match value {

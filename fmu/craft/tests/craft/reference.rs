@@ -15,9 +15,7 @@ impl Deviations {
     fn add(&mut self, record: &Value, sample: usize, signal: &str, got: &[f64]) {
         let samples = &record["samples"][signal];
         let Some(list) = samples.as_array() else { return };
-        let largest = record["largest"][signal]
-            .as_f64()
-            .unwrap_or_else(|| numbers(samples).iter().fold(0.0, |a: f64, x| a.max(x.abs())));
+        let largest = largest(record, signal);
         let want = numbers(&list[sample]);
         assert_eq!(want.len(), got.len(), "{signal}");
         let (worst, scale) = self.0.entry(signal.into()).or_insert((0.0, largest));
