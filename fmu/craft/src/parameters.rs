@@ -193,6 +193,16 @@ const SHORTEST: f64 = 1e-6;
 /// Lighter bobs have no effect, kg.
 const LIGHTEST: f64 = 1e-9;
 
+/// Tolerances that can be kept: from rounding to where error control has no meaning.
+const TOLERANCES: core::ops::RangeInclusive<f64> = 1e-14..=1e-1;
+
+/// What is wrong with a tolerance, if anything.
+pub(crate) fn tolerance_problem(tolerance: f64) -> Option<String> {
+    let (low, high) = (TOLERANCES.start(), TOLERANCES.end());
+    let is_wrong = !TOLERANCES.contains(&tolerance);
+    is_wrong.then(|| format!("tolerance = {tolerance:?} (allowed: {low:?} to {high:?})"))
+}
+
 /// Problems found so far.
 struct Problems(Vec<String>);
 

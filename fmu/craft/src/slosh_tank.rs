@@ -29,7 +29,7 @@ use crate::bob::Bob;
 use crate::integrator::{MAX_MAGNITUDE, Motion, RATE_FLOOR, StepError, advance};
 use crate::motion::{part, twice_crossed};
 use crate::outputs::TankOutputs;
-use crate::parameters::{Craft, MODES, Tank};
+use crate::parameters::{Craft, MODES, Tank, tolerance_problem};
 use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod, largest_eigenvalue};
 use crate::series::{self, Pair, Series, Vector, ZERO, ZERO_PAIR, ZERO_VECTOR, products};
 use crate::state::Ramp;
@@ -282,7 +282,7 @@ fn triangle<T: Number>(matrix: &[[T; 6]; 6]) -> [f64; TRIANGLE] {
 
 impl SloshTank {
     /// A tank at the start of its motion, at `start_time` (s); `tolerance` is the relative error
-    /// allowed in directions and rates. Refused parameters are returned with everything that is
+    /// allowed in directions and rates, 1e-14 to 0.1. Refused parameters are returned with everything that is
     /// wrong with them.
     pub fn new(
         p: &TankParameters,
@@ -290,7 +290,8 @@ impl SloshTank {
         start_time: f64,
         tolerance: f64,
     ) -> Result<SloshTank, Vec<String>> {
-        let problems = p.problems();
+        let mut problems = p.problems();
+        problems.extend(tolerance_problem(tolerance));
         if !problems.is_empty() {
             return Err(problems);
         }

@@ -4,7 +4,7 @@
 use crate::integrator::{StepError, advance};
 use crate::motion::CraftMotion;
 use crate::outputs::Outputs;
-use crate::parameters::{MODES, Parameters, TANKS};
+use crate::parameters::{MODES, Parameters, TANKS, tolerance_problem};
 use crate::state::{INPUTS, Inputs, STATES, State, index};
 use crate::vector::{Dual, on_sphere, unit_quaternion};
 
@@ -17,7 +17,8 @@ pub struct Spacecraft {
 
 impl Spacecraft {
     /// A craft at the start of its motion, at `start_time` (s), with the inputs that act
-    /// then; `tolerance` is the relative error allowed in rates, directions and attitude.
+    /// then; `tolerance` is the relative error allowed in rates, directions and attitude,
+    /// 1e-14 to 0.1.
     ///
     /// Refused parameters are returned with everything that is wrong with them.
     pub fn new(
@@ -26,7 +27,8 @@ impl Spacecraft {
         start_time: f64,
         tolerance: f64,
     ) -> Result<Spacecraft, Vec<String>> {
-        let problems = p.problems();
+        let mut problems = p.problems();
+        problems.extend(tolerance_problem(tolerance));
         if !problems.is_empty() {
             return Err(problems);
         }

@@ -60,7 +60,7 @@ impl Ramp {
 /// What acts on the craft from outside over one step; body axes.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Inputs {
-    /// Force at O, N.
+    /// Force at O, N. On a pivot the bearing takes it.
     pub force: Ramp,
     /// Torque about O, N m.
     pub torque: Ramp,

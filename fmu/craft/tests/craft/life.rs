@@ -269,6 +269,12 @@ fn every_problem_with_the_parameters_is_returned() {
     p.craft.j.zz = -1.0;
     assert!(p.problems()[0].starts_with("craft.Jzz = -1.0 (allowed: 0.0 to"));
 
+    for tolerance in [0.0, 1.0, f64::NAN] {
+        let p = Parameters::default();
+        let problems = Spacecraft::new(&p, &Inputs::default(), 0.0, tolerance).unwrap_err();
+        assert_eq!(problems, [format!("tolerance = {tolerance:?} (allowed: 1e-14 to 0.1)")]);
+    }
+
     let mut p = TankParameters::default();
     p.tank.k[0] = -1.0;
     p.host = Some(craft::Craft { mass: -1.0, ..craft::Craft::default() });
