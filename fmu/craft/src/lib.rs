@@ -7,6 +7,20 @@
 //! components. Specific force is what an accelerometer reads. A tank's z axis is its own
 //! axis; liquid at rest hangs towards -z. SI units.
 //!
+//! ```
+//! use craft::{Inputs, Parameters, Ramp, Spacecraft};
+//!
+//! // 1180 kg, one tank with 382 kg of liquid on its axis, thrust along it.
+//! let thrust = Inputs { force: Ramp::held([0.0, 0.0, 2400.0]), ..Inputs::default() };
+//! let mut craft = Spacecraft::new(&Parameters::default(), &thrust, 0.0, 1e-8).unwrap();
+//! // A second with a lateral force that grows from 0 to 10 N.
+//! let ramp = Ramp { value: [0.0, 0.0, 2400.0], slope: [10.0, 0.0, 0.0] };
+//! craft.step(&Inputs { force: ramp, ..thrust }, 1.0).unwrap();
+//! let shown = craft.outputs(&thrust);
+//! assert!(shown.tank[0].angle_x[0] < 0.0); // the liquid falls behind
+//! assert!((shown.momentum[2] - 2400.0).abs() < 1e-3);
+//! ```
+//!
 //! Where to look: `spacecraft.rs` and `slosh_tank.rs` are the two components as a host sees
 //! them; `motion.rs` has the craft's equations, `bob.rs` those of one slosh mode, `rigid.rs`
 //! the mass matrix, `outputs.rs` energy and momentum; `integrator.rs` steps through time with

@@ -165,9 +165,15 @@ impl Spacecraft {
     }
 
     /// Does what is due at an event: a jump of `h_wheels` acts as an impulse. Returns whether
-    /// continuous states have changed.
-    pub fn take_event(&mut self, inputs: &Inputs) -> bool {
-        self.motion.set_wheels(inputs.h_wheels.value)
+    /// continuous states have changed. On an error nothing has.
+    pub fn take_event(&mut self, inputs: &Inputs) -> Result<bool, StepError> {
+        let before = self.motion.state;
+        let changed = self.motion.set_wheels(inputs.h_wheels.value);
+        if self.motion.state.x.iter().any(|x| !x.is_finite()) {
+            self.motion.state = before;
+            return Err(StepError::NotFinite { time: before.time });
+        }
+        Ok(changed)
     }
 
     /// Takes account of `h_wheels` having changed continuously: no impulse is due for it.

@@ -128,9 +128,9 @@ fn jumps_of_the_wheels_keep_angular_momentum_and_balance_energy() {
             // Shown before the step already.
             let shown = craft.outputs(&held);
             let mut event = craft.clone();
-            assert!(event.take_event(&held));
+            assert!(event.take_event(&held).unwrap());
             assert_eq!(event.outputs(&held), shown);
-            assert!(!event.take_event(&held));
+            assert!(!event.take_event(&held).unwrap());
             for out in [shown, {
                 craft.step(&held, 0.5).unwrap();
                 craft.outputs(&held)
@@ -153,7 +153,7 @@ fn jumps_of_the_wheels_keep_angular_momentum_and_balance_energy() {
         };
         let x = {
             let mut craft = craft.clone();
-            craft.take_event(&jumped);
+            craft.take_event(&jumped).unwrap();
             craft.continuous_states()
         };
         let off = [1e-3, 1e-4].map(|h| {
@@ -174,7 +174,7 @@ fn followed_wheels_give_no_impulse() {
     let before = craft.continuous_states();
     let u = Inputs { h_wheels: Ramp::held([1.0, 2.0, 3.0]), ..Inputs::default() };
     craft.follow_wheels(&u);
-    assert!(!craft.take_event(&u));
+    assert!(!craft.take_event(&u).unwrap());
     assert_eq!(craft.continuous_states(), before);
 }
 
@@ -209,6 +209,14 @@ fn a_refused_step_leaves_the_craft_as_it_was_and_says_why() {
         wrong.h_wheels.value[2] = bad;
         refused(&wrong, 0.1, not_finite, "no longer finite");
     }
+    let wheels = Inputs { h_wheels: Ramp::held([f64::NAN; 3]), ..u };
+    assert!(craft.take_event(&wheels).is_err());
+    assert_eq!(*craft.state(), before);
+    let mut refused = |u: &Inputs, h: f64, kind: fn(&StepError) -> bool, text: &str| {
+        let error = craft.step(u, h).unwrap_err();
+        assert!(kind(&error) && error.to_string().contains(text), "{error:?}");
+        assert_eq!(*craft.state(), before);
+    };
     let too_many: fn(&StepError) -> bool = |e| matches!(e, StepError::TooManySteps { .. });
     refused(&u, 1e7, too_many, "shorter communication steps");
 
