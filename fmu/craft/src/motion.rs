@@ -78,10 +78,10 @@ pub struct CraftMotion {
     /// M at the start of the expansion, and its factors.
     matrix: Mat6,
     factors: Factors,
-    pub force: [Vec3; 2],
-    pub torque: [Vec3; 2],
+    force: [Vec3; 2],
+    /// tau - h_w'
+    torque: [Vec3; 2],
     pub h: [Vec3; 2],
-    pub h_dot: [Vec3; 2],
     pub q: Attitude,
     pub w: Vector,
     /// (w, w)
@@ -124,7 +124,6 @@ impl CraftMotion {
             force: [[0.0; 3]; 2],
             torque: [[0.0; 3]; 2],
             h: [[0.0; 3]; 2],
-            h_dot: [[0.0; 3]; 2],
             q: ZERO_ATTITUDE,
             w: ZERO_VECTOR,
             w_both: ZERO_PAIR,
@@ -221,7 +220,7 @@ impl CraftMotion {
         let dw = part(dx, index::OMEGA);
         self.w[1] = dw;
         (self.force[1], self.torque[1]) = (df, dtau);
-        (self.h[1], self.h_dot[1]) = (dh, [0.0; 3]);
+        self.h[1] = dh;
         self.gain[1] = [0.0; 3];
         self.travel.set(1, [0.0; 3], [0.0; 3]);
         match self.mount {
@@ -279,9 +278,8 @@ impl Motion for CraftMotion {
     fn start(&mut self, t: f64) {
         let Inputs { force, torque, h_wheels } = &self.inputs;
         self.force = [force.at(t), force.slope];
-        self.torque = [torque.at(t), torque.slope];
+        self.torque = [sub(torque.at(t), h_wheels.slope), torque.slope];
         self.h = [h_wheels.at(t), h_wheels.slope];
-        self.h_dot = [h_wheels.slope, [0.0; 3]];
         let x = &self.state.x;
         let q = unit_quaternion([x[0], x[1], x[2], x[3]]);
         self.q.set(0, q);
@@ -304,7 +302,7 @@ impl Motion for CraftMotion {
         let w2 = twice_crossed(ww);
         let mut force = sub(ramp::<N>(&self.force), times(&w2, self.rigid.moment));
         let mut torque = sub(
-            sub(ramp::<N>(&self.torque), ramp::<N>(&self.h_dot)),
+            ramp::<N>(&self.torque),
             add(gyroscopic(&self.rigid.inertia, ww), cross_ramp::<N>(&self.w, &self.h)),
         );
         for bob in &mut self.bobs {
@@ -322,7 +320,7 @@ impl Motion for CraftMotion {
         self.w_d[N] = w_d;
         let q_d = quaternion_rate::<N>(&self.q, &self.w_both);
         self.q.set(N + 1, q_d.map(|rate| rate * const { 1.0 / (N + 1) as f64 }));
-        self.work[N] = dot_ramp::<N>(&self.torque, &self.w) - dot_ramp::<N>(&self.h_dot, &self.w);
+        self.work[N] = dot_ramp::<N>(&self.torque, &self.w);
         match self.mount {
             Mount::Free => {
                 self.a[N] = a;
