@@ -1,13 +1,12 @@
-//! The FMU's icon as pixels, drawn from `terminalsAndIcons/icon.svg`. Importers want a PNG;
+//! The FMU's icon as pixels, drawn from `modelDescription/icon/icon.svg`. Importers want a PNG;
 //! only few draw an SVG.
 
 use resvg::{tiny_skia, usvg};
 
 /// The drawing.
-pub const SOURCE: &str =
-    concat!(env!("CARGO_MANIFEST_DIR"), "/HubSlosh/terminalsAndIcons/icon.svg");
-/// Where the committed picture is; the FMU has it as `model.png` and as `terminalsAndIcons/icon.png`.
-pub const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/HubSlosh/terminalsAndIcons/icon.png");
+pub const SOURCE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/icon/icon.svg");
+/// Where the committed picture is; each FMU has it as `model.png`.
+pub const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/icon/icon.png");
 /// Width and height, px.
 pub const SIZE: u32 = 512;
 

@@ -6,6 +6,8 @@ use runtime::Model;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     write::<HubSlosh::HubSlosh>()?;
+    write::<Spacecraft::Model>()?;
+    write::<SloshTank::Model>()?;
     let picture = icon::draw(&std::fs::read_to_string(icon::SOURCE)?)?;
     std::fs::write(icon::PATH, picture.encode_png()?)?;
     println!("wrote {}", icon::PATH);

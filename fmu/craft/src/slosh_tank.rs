@@ -425,6 +425,11 @@ impl SloshTank {
         self.motion.state.x
     }
 
+    /// As [`SloshTank::continuous_states`], without a copy.
+    pub fn borrow_states(&self) -> &[f64; TANK_STATES] {
+        &self.motion.state.x
+    }
+
     /// Takes x from the host. Directions need not be of unit length.
     pub fn set_continuous_states(&mut self, x: &[f64; TANK_STATES]) {
         self.motion.state.x = *x;

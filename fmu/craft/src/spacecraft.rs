@@ -125,6 +125,11 @@ impl Spacecraft {
         self.motion.state.x
     }
 
+    /// As [`Spacecraft::continuous_states`], without a copy.
+    pub fn borrow_states(&self) -> &[f64; STATES] {
+        &self.motion.state.x
+    }
+
     /// Takes x from the host. Quaternion and directions need not be of unit length.
     pub fn set_continuous_states(&mut self, x: &[f64; STATES]) {
         self.motion.state.x = *x;

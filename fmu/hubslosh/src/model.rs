@@ -138,10 +138,11 @@ impl Model for HubSlosh {
     fn directional_derivative(
         &mut self,
         inputs: &Inputs,
+        along: &Inputs,
         dx: &[f64],
         dx_dot: &mut [f64],
     ) -> Outputs {
-        let du = [inputs.tau_cmd.slope, inputs.tau_ext.slope, inputs.g_axial.slope];
+        let du = [along.tau_cmd.slope, along.tau_ext.slope, along.g_axial.slope];
         let mut direction = [0.0; STATES];
         direction.copy_from_slice(dx);
         dx_dot.copy_from_slice(&self.plant.directional_derivative(inputs, &direction, &du));

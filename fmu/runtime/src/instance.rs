@@ -471,8 +471,9 @@ impl<M: Model> Instance<M> {
         answers: &mut [f64],
     ) -> Result<(), Fault> {
         let [dx, mut dx_dot] = std::mem::take(&mut self.scratch);
-        let found =
-            self.look(call, |model, _| model.directional_derivative(along, &dx, &mut dx_dot));
+        let found = self.look(call, |model, inputs| {
+            model.directional_derivative(inputs, along, &dx, &mut dx_dot)
+        });
         let done = found.and_then(|outputs| {
             for (reference, answer) in unknowns.iter().zip(answers) {
                 let scalar = scalar::<M>(call, *reference)?;

@@ -59,11 +59,13 @@ pub trait Model: Clone + Debug + Sized + 'static {
     /// The derivatives of the continuous states.
     fn derivatives(&mut self, inputs: &Self::Inputs, x_dot: &mut [f64]);
 
-    /// Derivatives in the direction of the states `dx` and of the inputs' slopes: of the states'
-    /// derivatives (into `dx_dot`), and of the outputs. What is discrete is held.
+    /// Derivatives in the direction of the states `dx` and of the slopes of `along`: of the states'
+    /// derivatives (into `dx_dot`), and of the outputs. What is discrete is held, and so are the
+    /// slopes of `inputs`.
     fn directional_derivative(
         &mut self,
         inputs: &Self::Inputs,
+        along: &Self::Inputs,
         dx: &[f64],
         dx_dot: &mut [f64],
     ) -> Self::Outputs;

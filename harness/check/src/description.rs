@@ -493,9 +493,12 @@ pub fn structured_names(d: &Description, findings: &mut Findings) {
 /// The grammar of section 2.2.9.
 fn is_structured(name: &str) -> bool {
     if let Some(inner) = name.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')')) {
+        // A comma after the last index is the order's, one between brackets the indices'.
         return match inner.rsplit_once(',') {
-            Some((path, order)) => is_structured(path) && order.trim().parse::<u32>().is_ok(),
-            None => is_structured(inner),
+            Some((path, order)) if !order.contains(']') => {
+                is_structured(path) && order.trim().parse::<u32>().is_ok()
+            }
+            _ => is_structured(inner),
         };
     }
     // An identifier, then indices, then a point and the next one.
@@ -930,7 +933,7 @@ mod tests {
 
     #[test]
     fn structured_names_are_paths() {
-        for right in ["a", "a.b_1[2,3].c", "der(a.b)", "der(a[1],2)", "a.'b c\\'d'.e", "_x"] {
+        for right in ["a", "a.b_1[2,3].c", "der(a.b)", "der(a[1],2)", "der(a[1].b[2,3])", "der(a[1,2],2)", "a.'b c\\'d'.e", "_x"] {
             assert!(is_structured(right), "{right}");
         }
         for wrong in ["", "a b", "1a", "a..b", "a.", "a[x]", "a[1", "der(a,b)", "a-b", "'a"] {

@@ -1,5 +1,5 @@
 //! What is linked into the FMU's binaries, found in the lock file and in the binaries themselves:
-//! as the note on licences and as a software SBOM (CycloneDX 1.6).
+//! as the note on licences and as a software bill of materials, SBOM (CycloneDX 1.6).
 //!
 //! Licence texts are committed in modelDescription/licenses; their sources are named in
 //! [`licence_note`].
@@ -280,7 +280,7 @@ pub fn licence_note(description: &ModelDescription, components: &[Component]) ->
     note
 }
 
-/// The software SBOM (SBOM), CycloneDX 1.6. Neither a time nor a random number is in
+/// The software bill of materials (SBOM), CycloneDX 1.6. Neither a time nor a random number is in
 /// it, so the same binaries have the same SBOM.
 pub fn sbom(
     model: &Model,

@@ -75,7 +75,7 @@ fn files(model: &Model, binaries: &[Packed]) -> Result<Files> {
     let source = model.folder();
     let xml = read(&source.join("modelDescription.xml"))?;
     let description = ModelDescription::from_xml(&String::from_utf8_lossy(&xml))?;
-    let icon = read(&source.join("terminalsAndIcons/icon.png"))?;
+    let icon = read(&root().join("modelDescription/icon/icon.png"))?;
     let mut files = vec![("modelDescription.xml".into(), xml), ("model.png".into(), icon)];
     for binary in binaries {
         files.push((binary.name(model.name), binary.bytes.clone()));

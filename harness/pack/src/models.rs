@@ -11,7 +11,7 @@ use crate::project::root;
 #[derive(Debug, PartialEq, Eq)]
 pub struct Model {
     /// Its `modelIdentifier`; the folder `modelDescription/<name>` has all that travels with the
-    /// binary: `modelDescription.xml`, `documentation/`, `terminalsAndIcons/icon.png`, and, if
+    /// binary: `modelDescription.xml`, `documentation/`, and, if
     /// there is one, `extra/`.
     pub name: &'static str,
     /// Cargo package whose cdylib is the binary.
@@ -19,7 +19,11 @@ pub struct Model {
 }
 
 /// All of them; the first is packed unless another is named.
-pub const MODELS: [Model; 1] = [Model { name: "HubSlosh", package: "hubslosh-fmu" }];
+pub const MODELS: [Model; 3] = [
+    Model { name: "HubSlosh", package: "hubslosh-fmu" },
+    Model { name: "Spacecraft", package: "spacecraft-fmu" },
+    Model { name: "SloshTank", package: "sloshtank-fmu" },
+];
 
 /// The FMU that is packed unless another is named.
 pub const HUBSLOSH: &Model = &MODELS[0];
@@ -49,7 +53,7 @@ impl Model {
         format!("extra/{}", self.name)
     }
 
-    /// The software SBOM (SBOM) in the FMU.
+    /// The software bill of materials (SBOM) in the FMU.
     pub fn sbom(&self) -> String {
         format!("{}/{}.cdx.json", self.extra(), self.name)
     }

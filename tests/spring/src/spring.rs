@@ -129,6 +129,7 @@ impl Model for Spring {
 
     fn directional_derivative(
         &mut self,
+        _: &[f64; 2],
         [_, slope]: &[f64; 2],
         dx: &[f64],
         dx_dot: &mut [f64],

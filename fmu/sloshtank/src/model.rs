@@ -1,0 +1,154 @@
+//! The tank as a model of the runtime.
+
+use std::ops::{Deref, DerefMut};
+
+use craft::{
+    Craft, SloshTank, SloshTankOutputs, TANK_INPUTS, TANK_STATES, TankInputs, TankParameters,
+    TankState,
+};
+use runtime::table::Table;
+
+use crate::table::TABLE;
+
+/// One tank.
+#[derive(Clone, Debug)]
+pub struct Model {
+    tank: SloshTank,
+    coupling_ratio: f64,
+}
+
+impl Model {
+    /// Largest eigenvalue of the host's inverse mass matrix times the added mass; 0 if the host's
+    /// mass is not known.
+    pub fn coupling_ratio(&self) -> f64 {
+        self.coupling_ratio
+    }
+}
+
+/// The tank's parameters; the number of modes is an integer here, and a host without mass is none.
+#[derive(Clone, Debug)]
+pub struct Parameters {
+    tank: TankParameters,
+    /// Number of slosh modes.
+    pub modes: i32,
+    /// The host's mass properties; mass 0: not known.
+    pub host: Craft,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        let tank = TankParameters::default();
+        let host = Craft { mass: 0.0, ..craft::Parameters::default().craft };
+        Parameters { modes: tank.tank.modes as i32, host, tank }
+    }
+}
+
+impl Deref for Parameters {
+    type Target = TankParameters;
+
+    fn deref(&self) -> &TankParameters {
+        &self.tank
+    }
+}
+
+impl DerefMut for Parameters {
+    fn deref_mut(&mut self) -> &mut TankParameters {
+        &mut self.tank
+    }
+}
+
+impl Parameters {
+    fn complete(&self) -> TankParameters {
+        let mut p = self.tank;
+        p.tank.modes = usize::try_from(self.modes).unwrap_or(0);
+        p.host = (self.host.mass > 0.0).then_some(self.host);
+        p
+    }
+}
+
+/// The host's motion. A slope that a host gives for omega is not used: it is omega_dot.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Inputs {
+    /// As the tank takes it.
+    pub tank: TankInputs,
+    /// The slope of omega, rad/s2.
+    pub omega_slope: [f64; 3],
+}
+
+impl runtime::Model for Model {
+    type Parameters = Parameters;
+    type Inputs = Inputs;
+    type Outputs = SloshTankOutputs;
+    type Discrete = ();
+
+    fn table() -> &'static Table<Self> {
+        &TABLE
+    }
+
+    fn new(
+        parameters: &Parameters,
+        inputs: &Inputs,
+        start_time: f64,
+        tolerance: f64,
+    ) -> Result<Self, Vec<String>> {
+        let mut tank = SloshTank::new(&parameters.complete(), &inputs.tank, start_time, tolerance)?;
+        let coupling_ratio = tank.coupling_ratio().unwrap_or(0.0);
+        Ok(Model { tank, coupling_ratio })
+    }
+
+    fn save(&self, words: &mut Vec<u64>) {
+        words.extend(self.tank.state().to_words());
+        words.push(self.coupling_ratio.to_bits());
+    }
+
+    fn resume(parameters: &Parameters, words: &[u64], tolerance: f64) -> Option<Self> {
+        let p = parameters.complete();
+        let (ratio, state) = words.split_last()?;
+        let state = TankState::from_words(state.try_into().ok()?)?;
+        let tank = p.problems().is_empty().then(|| SloshTank::resume(&p, &state, tolerance))?;
+        let coupling_ratio = f64::from_bits(*ratio);
+        coupling_ratio.is_finite().then_some(Model { tank, coupling_ratio })
+    }
+
+    fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), String> {
+        self.tank.step(&inputs.tank, h).map_err(|why| why.to_string())
+    }
+
+    fn outputs(&mut self, inputs: &Inputs) -> SloshTankOutputs {
+        self.tank.outputs(&inputs.tank)
+    }
+
+    fn continuous_states(&self) -> &[f64] {
+        self.tank.borrow_states()
+    }
+
+    fn set_continuous_states(&mut self, x: &[f64]) {
+        if let Some(x) = x.first_chunk::<TANK_STATES>() {
+            self.tank.set_continuous_states(x);
+        }
+    }
+
+    fn set_time(&mut self, time: f64) {
+        self.tank.set_time(time);
+    }
+
+    fn derivatives(&mut self, inputs: &Inputs, x_dot: &mut [f64]) {
+        x_dot.copy_from_slice(&self.tank.derivatives(&inputs.tank));
+    }
+
+    fn directional_derivative(
+        &mut self,
+        inputs: &Inputs,
+        along: &Inputs,
+        dx: &[f64],
+        dx_dot: &mut [f64],
+    ) -> SloshTankOutputs {
+        let mut direction = [0.0; TANK_STATES];
+        direction.copy_from_slice(dx);
+        let slopes = [along.tank.a.slope, along.omega_slope, along.tank.omega_dot.slope];
+        let mut du = [0.0; TANK_INPUTS];
+        du.copy_from_slice(slopes.as_flattened());
+        dx_dot.copy_from_slice(&self.tank.directional_derivative(&inputs.tank, &direction, &du));
+        self.tank.output_derivatives(&inputs.tank, &direction, &du)
+    }
+}

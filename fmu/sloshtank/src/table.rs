@@ -1,0 +1,165 @@
+//! Every variable of SloshTank.fmu, once. Start values are those of
+//! `craft::TankParameters::default()`.
+
+use craft::{Coupling, MODES, TANK_STATES, TRIANGLE, TankState};
+use runtime::table::{About, Scalar, Table, scalar_count, scalars};
+use runtime::variable::{Enumeration, Item, Variable};
+
+use crate::Model;
+
+/// All that is said about the FMU's variables.
+pub static TABLE: Table<Model> = Table::new(
+    About {
+        model: "SloshTank",
+        version: env!("CARGO_PKG_VERSION"),
+        description: "One tank of sloshing liquid on somebody else's spacecraft: its wrench, and the \
+                      added mass that breaks the algebraic loop",
+        events: "",
+        event_indicators: 0,
+        saved_words: TankState::WORDS + 1,
+    },
+    VARIABLES,
+    &SCALARS,
+);
+
+static SCALARS: [Scalar<Model>; scalar_count(VARIABLES)] = scalars(VARIABLES);
+
+// Bias and added mass contain neither a nor omega_dot: a host that solves with them has no
+// algebraic loop. Lumped, the bias contains both, as given in the step before.
+const WRENCH: &[&str] = &["tank.p", "tank.p_dot", "a", "omega", "omega_dot"];
+const EVERYTHING: &[&str] = &["tank.", "a", "omega", "omega_dot", "coupling"];
+const TANK: &[&str] = &["tank."];
+
+const VECTOR: &[usize] = &[3];
+const PER_MODE: &[usize] = &[MODES];
+const MODE_VECTOR: &[usize] = &[MODES, 3];
+
+/// Place among the continuous states of an element of the shape [`MODE_VECTOR`].
+fn bob(n: usize) -> usize {
+    6 * (n / 3) + n % 3
+}
+
+type V = Variable<Model>;
+
+/// The variables. Outputs come first, in reading order.
+#[rustfmt::skip]
+static VARIABLES: &[Variable<Model>] = &[
+    // Outputs
+    V::output("force", |o, n| o.tank.force[n], "N",
+        "Force of the whole liquid on the host, rigid liquid included, host axes")
+        .shape(VECTOR).depends_on(WRENCH).initial_depends_on(EVERYTHING),
+    V::output("torque", |o, n| o.tank.torque[n], "N.m",
+        "Torque of the whole liquid on the host about O, host axes")
+        .shape(VECTOR).depends_on(WRENCH).initial_depends_on(EVERYTHING),
+    V::output("bias", |o, n| o.bias[n], "",
+        "Force (1 to 3, N) and torque about O (4 to 6, N.m) that the host adds on its right side: force, torque = bias - added_mass [a; omega_dot]. With coupling = lumped it belongs to the constant added_mass and to the a, omega_dot given last")
+        .shape(&[6]).depends_on(WRENCH).initial_depends_on(EVERYTHING),
+    V::output("added_mass", |o, n| o.added_mass[n], "",
+        "Symmetric 6 x 6 added-mass matrix about O that the host adds on its left side, upper triangle by rows (kg, kg.m, kg.m2): it follows from tank.p alone; with coupling = lumped it is constant")
+        .shape(&[TRIANGLE]).depends_on(&["tank.p"]).initial_depends_on(EVERYTHING),
+
+    // Inputs
+    V::input("a", |i, n| [&mut i.tank.a.value[n], &mut i.tank.a.slope[n]], "m/s2",
+        "Specific force at O: what an accelerometer there reads, host axes; held over a step unless its derivative is set")
+        .shape(VECTOR),
+    V::input("omega", |i, n| [&mut i.tank.omega[n], &mut i.omega_slope[n]], "rad/s",
+        "Angular velocity of the host, host axes, at the start of the step; in the step it follows from omega_dot")
+        .display_unit("deg/s").shape(VECTOR),
+    V::input("omega_dot", |i, n| [&mut i.tank.omega_dot.value[n], &mut i.tank.omega_dot.slope[n]], "rad/s2",
+        "Angular acceleration of the host, host axes; held over a step unless its derivative is set")
+        .display_unit("deg/s2").shape(VECTOR),
+
+    // Locals
+    V::local("tank.angle_x", |o, n| o.tank.angle_x[n], "rad",
+        "Slosh angle of a mode: its sine is the bob's displacement along the tank's x axis over the pendulum's length")
+        .display_unit("deg").shape(PER_MODE).depends_on(&["tank.p"]),
+    V::local("tank.angle_y", |o, n| o.tank.angle_y[n], "rad",
+        "Slosh angle of a mode along the tank's y axis")
+        .display_unit("deg").shape(PER_MODE).depends_on(&["tank.p"]),
+    V::local("dissipated", |o, _| o.dissipated, "J",
+        "Energy dissipated by the liquid since the start")
+        .is_state(|_| TANK_STATES - 1).depends_on(&["dissipated"]),
+    V::state("tank.p", bob, "1",
+        "Direction from hinge to bob of a slosh mode, a unit vector in tank axes; at rest under thrust along the tank's axis (0, 0, -1)")
+        .shape(MODE_VECTOR).nominal(0.1).depends_on(&["tank.p[]"]).initial_depends_on(TANK),
+    V::state("tank.p_dot", |n| bob(n) + 3, "1/s",
+        "Rate of tank.p against the tank, tank axes")
+        .shape(MODE_VECTOR).nominal(0.1).depends_on(&["tank.p_dot[]"]).initial_depends_on(TANK),
+
+    // The derivatives of the continuous states
+    V::derivative("der(dissipated)", |_| TANK_STATES - 1, "W", "Derivative of dissipated")
+        .depends_on(&["tank.p", "tank.p_dot"]).initial_depends_on(TANK),
+    V::derivative("der(tank.p)", bob, "1/s", "Derivative of tank.p: tank.p_dot")
+        .shape(MODE_VECTOR).depends_on(&["tank.p", "tank.p_dot"]).initial_depends_on(TANK),
+    V::derivative("der(tank.p_dot)", |n| bob(n) + 3, "1/s2", "Derivative of tank.p_dot")
+        .shape(MODE_VECTOR).depends_on(WRENCH).initial_depends_on(EVERYTHING),
+
+    // The tank
+    V::choice("coupling", &COUPLING, |p| p.coupling as i32, |p, n| p.coupling = if n == 2 { Coupling::Lumped } else { Coupling::Split },
+        "What bias and added_mass stand for"),
+    V::parameter("tank.position", |p, n| &mut p.tank.position[n], "m",
+        "The tank's origin from O, host axes")
+        .shape(VECTOR).range(-1e4, 1e4),
+    V::parameter("tank.q", |p, n| &mut p.tank.q[n], "1",
+        "Attitude of the tank, tank to host axes, scalar first; normalised")
+        .shape(&[4]),
+    V::parameter("tank.m_0", |p, _| &mut p.tank.m_0, "kg", "Mass of the rigid liquid")
+        .range(0.0, 1e9),
+    V::parameter("tank.H_0", |p, _| &mut p.tank.h_0, "m", "Height of the rigid liquid's centre of mass on the tank's axis"),
+    V::parameter("tank.I_0", |p, _| &mut p.tank.i_0, "kg.m2", "Moment of inertia of the rigid liquid across the axis, about its centre of mass")
+        .range(0.0, 1e12),
+    V::parameter("tank.I_z", |p, _| &mut p.tank.i_z, "kg.m2", "Moment of inertia of the rigid liquid about the tank's axis")
+        .range(0.0, 1e12),
+    V::integer("tank.modes", |p, _| &mut p.modes, "Number of slosh modes of the tank")
+        .between(0, MODES as i32),
+    V::parameter("tank.g_ref", |p, _| &mut p.tank.g_ref, "m/s2", "Acceleration along the tank's axis at which zeta holds")
+        .range(1e-9, 1e6),
+    V::parameter("tank.mass", |p, n| &mut p.tank.mass[n], "kg", "Mass of a mode's bob")
+        .shape(PER_MODE).range(1e-9, 1e9),
+    V::parameter("tank.length", |p, n| &mut p.tank.length[n], "m", "Length of a mode's pendulum")
+        .shape(PER_MODE).range(1e-6, 1e4),
+    V::parameter("tank.hinge", |p, n| &mut p.tank.hinge[n], "m", "Height of a mode's hinge on the tank's axis")
+        .shape(PER_MODE),
+    V::parameter("tank.k", |p, n| &mut p.tank.k[n], "N/m", "Centring stiffness of a mode (capillarity, diaphragm)")
+        .shape(PER_MODE).range(0.0, 1e12),
+    V::parameter("tank.zeta", |p, n| &mut p.tank.zeta[n], "1", "Damping ratio of a mode at g_ref; the drag coefficient 2 zeta m sqrt(g_ref/l + k/m) is constant")
+        .shape(PER_MODE).range(0.0, 10.0),
+    V::parameter("tank.p_0", |p, n| &mut p.tank.p_0[n / 3][n % 3], "1",
+        "Direction from hinge to bob at the start, tank axes; normalised")
+        .shape(MODE_VECTOR),
+    V::parameter("tank.p_dot_0", |p, n| &mut p.tank.p_dot_0[n / 3][n % 3], "1/s",
+        "Its rate at the start, tank axes; made tangential")
+        .shape(MODE_VECTOR),
+
+    // The host, if it tells
+    V::parameter("host.mass", |p, _| &mut p.host.mass, "kg", "Mass of the host without this tank, for coupling_ratio alone; 0: not known")
+        .range(0.0, 1e9),
+    V::parameter("host.r", |p, n| &mut p.host.r[n], "m", "Its centre of mass from O, host axes")
+        .shape(VECTOR).range(-1e4, 1e4),
+    V::parameter("host.Jxx", |p, _| &mut p.host.j.xx, "kg.m2", "Its moment of inertia about its centre of mass").at_least(0.0),
+    V::parameter("host.Jyy", |p, _| &mut p.host.j.yy, "kg.m2", "Its moment of inertia about its centre of mass").at_least(0.0),
+    V::parameter("host.Jzz", |p, _| &mut p.host.j.zz, "kg.m2", "Its moment of inertia about its centre of mass").at_least(0.0),
+    V::parameter("host.Jxy", |p, _| &mut p.host.j.xy, "kg.m2", "Its product of inertia, minus the integral of x y dm"),
+    V::parameter("host.Jxz", |p, _| &mut p.host.j.xz, "kg.m2", "Its product of inertia, minus the integral of x z dm"),
+    V::parameter("host.Jyz", |p, _| &mut p.host.j.yz, "kg.m2", "Its product of inertia, minus the integral of y z dm"),
+
+    // What follows from the parameters
+    V::calculated("coupling_ratio", |m, _| m.coupling_ratio(), "1",
+        "Largest eigenvalue of the host's inverse mass matrix times the tank's added mass, 0 if host.mass is 0. A host that takes force and torque as they are diverges where it is too large, at any communication step: above 1 with held values, above 0.15 with extrapolated ones; use bias and added_mass")
+        .initial_depends_on(&["tank.", "host."]),
+];
+
+static COUPLING: Enumeration = Enumeration {
+    name: "Coupling",
+    description: "What bias and added_mass stand for",
+    items: &[
+        Item::new(
+            "split",
+            "Wrench at a = omega_dot = 0 and the added mass of the moment: for hosts that solve with them",
+        ),
+        Item::new(
+            "lumped",
+            "Constant added mass with each bob at its hinge: for hosts that are plain rigid bodies",
+        ),
+    ],
+};

@@ -1,0 +1,18 @@
+//! Spacecraft as an FMU: a free spacecraft with sloshing tanks. Its variables are in [`table`], its physics in the
+//! crate `craft`, what FMI demands in the crate `runtime`.
+
+// The library's name is the FMU's modelIdentifier.
+#![allow(non_snake_case)]
+
+pub mod model;
+pub mod table;
+
+pub use model::Model;
+
+/// The functions of FMI 2.0 that the binary exports.
+pub mod fmi2 {
+    // Their parameters are of the types of the standard's header.
+    pub use runtime::v2::*;
+
+    runtime::export_fmi2!(crate::Model);
+}

@@ -1,0 +1,243 @@
+//! Every variable of Spacecraft.fmu, once. Start values are those of `craft::Parameters::default()`.
+//!
+//! Arrays have FMI's structured names: `tank[].p` of the shape 4, 3, 3 is `tank[1].p[1,1]`, …: tank,
+//! mode, axis.
+
+use craft::{MODES, STATES, State, TANKS, index};
+use runtime::table::{About, Scalar, Table, scalar_count, scalars};
+use runtime::variable::{Enumeration, Item, Variable};
+
+use crate::Model;
+
+/// All that is said about the FMU's variables.
+pub static TABLE: Table<Model> = Table::new(
+    About {
+        model: "Spacecraft",
+        version: env!("CARGO_PKG_VERSION"),
+        description: "A rigid spacecraft in six degrees of freedom with up to four tanks of sloshing \
+                      liquid, free or on an air bearing",
+        events: "",
+        event_indicators: 0,
+        saved_words: State::WORDS,
+    },
+    VARIABLES,
+    &SCALARS,
+);
+
+static SCALARS: [Scalar<Model>; scalar_count(VARIABLES)] = scalars(VARIABLES);
+
+// The accelerations balance all forces: the pull of the liquids' pendulums, their drag and centring
+// follow from directions and rates, a pivot's gravity from the attitude.
+const MOTION: &[&str] = &["q", "omega", "tank[].p", "tank[].p_dot", "force", "torque", "h_wheels"];
+const MOMENTUM: &[&str] = &["q", "omega", "velocity", "tank[].p", "tank[].p_dot", "h_wheels"];
+const PLACES: &[&str] = &["tank[].p"];
+// Where they start.
+const EVERYTHING: &[&str] =
+    &["force", "torque", "h_wheels", "craft.", "mount", "gravity", "tanks", "tank[].", "init."];
+const BOBS: &[&str] = &["tanks", "tank[]."];
+
+const VECTOR: &[usize] = &[3];
+const PER_TANK: &[usize] = &[TANKS];
+const TANK_VECTOR: &[usize] = &[TANKS, 3];
+const PER_MODE: &[usize] = &[TANKS, MODES];
+const MODE_VECTOR: &[usize] = &[TANKS, MODES, 3];
+
+/// Tank, mode and axis of an element of the shape [`MODE_VECTOR`].
+const fn place(n: usize) -> (usize, usize, usize) {
+    (n / (3 * MODES), n / 3 % MODES, n % 3)
+}
+
+/// The same element's place among the continuous states.
+fn bob(n: usize) -> usize {
+    let (tank, mode, axis) = place(n);
+    index::bob(tank, mode) + axis
+}
+
+type V = Variable<Model>;
+
+/// The variables. Outputs come first, in reading order.
+#[rustfmt::skip]
+static VARIABLES: &[Variable<Model>] = &[
+    // Outputs
+    V::output("q", |o, n| o.q[n], "1",
+        "Attitude quaternion, scalar first, body to inertial axes")
+        .shape(&[4]).is_state(|n| index::Q + n).depends_on(&["q[]"]).initial_depends_on(&["init.q"]),
+    V::output("omega", |o, n| o.omega[n], "rad/s",
+        "Angular velocity against the inertial frame, body axes")
+        .display_unit("deg/s").shape(VECTOR).nominal(0.01).is_state(|n| index::OMEGA + n).reinit()
+        .depends_on(&["omega[]"]).initial_depends_on(&["init.omega"]),
+    V::output("omega_dot", |o, n| o.omega_dot[n], "rad/s2",
+        "Angular acceleration, body axes")
+        .display_unit("deg/s2").shape(VECTOR).depends_on(MOTION).initial_depends_on(EVERYTHING),
+    V::output("specific_force", |o, n| o.specific_force[n], "m/s2",
+        "What an accelerometer at O reads, body axes; on a pivot minus gravity")
+        .shape(VECTOR).depends_on(MOTION).initial_depends_on(EVERYTHING),
+    V::output("position", |o, n| o.position[n], "m",
+        "Position of O in the freely falling frame")
+        .shape(VECTOR).is_state(|n| index::POSITION + n).depends_on(&["position[]"]).initial_depends_on(&["init.position"]),
+    V::output("velocity", |o, n| o.velocity[n], "m/s",
+        "Velocity of O against the freely falling frame, inertial axes")
+        .shape(VECTOR).is_state(|n| index::VELOCITY + n).reinit().depends_on(&["velocity[]"]).initial_depends_on(&["init.velocity"]),
+    V::output("slosh_force", |o, n| o.slosh_force[n], "N",
+        "Force of all liquids on the craft, rigid liquid included, body axes")
+        .shape(VECTOR).depends_on(MOTION).initial_depends_on(EVERYTHING),
+    V::output("slosh_torque", |o, n| o.slosh_torque[n], "N.m",
+        "Torque of all liquids on the craft about O, body axes")
+        .shape(VECTOR).depends_on(MOTION).initial_depends_on(EVERYTHING),
+
+    // Inputs
+    V::input("force", |i, n| [&mut i.force.value[n], &mut i.force.slope[n]], "N",
+        "Applied force at O, body axes; held over a step unless its derivative is set")
+        .shape(VECTOR),
+    V::input("torque", |i, n| [&mut i.torque.value[n], &mut i.torque.slope[n]], "N.m",
+        "Applied torque about O, body axes; held over a step unless its derivative is set")
+        .shape(VECTOR),
+    V::input("h_wheels", |i, n| [&mut i.h_wheels.value[n], &mut i.h_wheels.slope[n]], "N.m.s",
+        "Angular momentum of the wheels relative to the body, body axes. Its derivative turns the craft; a jump does so by an impulse that keeps the total angular momentum. In Model Exchange, where no derivative is known, put the reaction into torque")
+        .shape(VECTOR),
+
+    // Locals
+    V::local("momentum", |o, n| o.momentum[n], "kg.m/s",
+        "Linear momentum of everything, inertial axes")
+        .shape(VECTOR).depends_on(MOMENTUM),
+    V::local("angular_momentum", |o, n| o.angular_momentum[n], "N.m.s",
+        "Angular momentum of everything about its centre of mass (on a pivot about O), wheels included, inertial axes")
+        .shape(VECTOR).depends_on(MOMENTUM),
+    V::local("energy", |o, _| o.energy, "J",
+        "Kinetic energy of everything, of the centring springs, and on a pivot of gravity; the wheels' spin left out")
+        .depends_on(&["q", "omega", "velocity", "tank[].p", "tank[].p_dot"]),
+    V::local("work", |o, _| o.work, "J",
+        "Work of force, torque and wheels on the craft since the start: energy - energy(0) = work - dissipated")
+        .is_state(|_| index::WORK).depends_on(&["work"]),
+    V::local("dissipated", |o, _| o.dissipated, "J",
+        "Energy dissipated by the liquids since the start")
+        .is_state(|_| index::DISSIPATED).depends_on(&["dissipated"]),
+    V::local("mass", |o, _| o.mass, "kg",
+        "Mass of everything"),
+    V::local("center_of_mass", |o, n| o.center_of_mass[n], "m",
+        "Centre of mass of everything from O, body axes")
+        .shape(VECTOR).depends_on(PLACES),
+    V::local("inertia", |o, n| o.inertia[n / 3][n % 3], "kg.m2",
+        "Inertia of everything about its centre of mass, each bob a point mass where it is, body axes")
+        .shape(&[3, 3]).depends_on(PLACES),
+    V::local("tank[].force", |o, n| o.tank[n / 3].force[n % 3], "N",
+        "Force of a tank's whole liquid on the craft, body axes")
+        .shape(TANK_VECTOR).depends_on(MOTION),
+    V::local("tank[].torque", |o, n| o.tank[n / 3].torque[n % 3], "N.m",
+        "Torque of a tank's whole liquid on the craft about O, body axes")
+        .shape(TANK_VECTOR).depends_on(MOTION),
+    V::local("tank[].angle_x", |o, n| o.tank[n / MODES].angle_x[n % MODES], "rad",
+        "Slosh angle of a mode: its sine is the bob's displacement along the tank's x axis over the pendulum's length")
+        .display_unit("deg").shape(PER_MODE).depends_on(PLACES),
+    V::local("tank[].angle_y", |o, n| o.tank[n / MODES].angle_y[n % MODES], "rad",
+        "Slosh angle of a mode along the tank's y axis")
+        .display_unit("deg").shape(PER_MODE).depends_on(PLACES),
+
+    // The modes' directions and rates
+    V::state("tank[].p", bob, "1",
+        "Direction from hinge to bob of a slosh mode, a unit vector in tank axes; at rest under thrust along the tank's axis (0, 0, -1)")
+        .shape(MODE_VECTOR).nominal(0.1).depends_on(&["tank[].p[]"]).initial_depends_on(BOBS),
+    V::state("tank[].p_dot", |n| bob(n) + 3, "1/s",
+        "Rate of tank[].p against the tank, tank axes")
+        .shape(MODE_VECTOR).nominal(0.1).reinit().depends_on(&["tank[].p_dot[]"]).initial_depends_on(BOBS),
+
+    // The derivatives of the continuous states
+    V::derivative("der(q)", |n| index::Q + n, "1/s", "Derivative of q")
+        .shape(&[4]).depends_on(&["q", "omega"]).initial_depends_on(&["init.q", "init.omega"]),
+    V::derivative("der(omega)", |n| index::OMEGA + n, "rad/s2", "Derivative of omega: omega_dot")
+        .shape(VECTOR).depends_on(MOTION).initial_depends_on(EVERYTHING),
+    V::derivative("der(position)", |n| index::POSITION + n, "m/s", "Derivative of position: velocity")
+        .shape(VECTOR).depends_on(&["velocity[]"]).initial_depends_on(&["init.velocity", "mount"]),
+    V::derivative("der(velocity)", |n| index::VELOCITY + n, "m/s2",
+        "Derivative of velocity: the specific force at O in inertial axes; 0 on a pivot")
+        .shape(VECTOR).depends_on(MOTION).initial_depends_on(EVERYTHING),
+    V::derivative("der(work)", |_| index::WORK, "W", "Derivative of work")
+        .depends_on(&["q", "omega", "velocity", "force", "torque", "h_wheels"]).initial_depends_on(EVERYTHING),
+    V::derivative("der(dissipated)", |_| index::DISSIPATED, "W", "Derivative of dissipated")
+        .depends_on(&["tank[].p", "tank[].p_dot"]).initial_depends_on(EVERYTHING),
+    V::derivative("der(tank[].p)", bob, "1/s", "Derivative of tank[].p: tank[].p_dot")
+        .shape(MODE_VECTOR).depends_on(&["tank[].p", "tank[].p_dot"]).initial_depends_on(BOBS),
+    V::derivative("der(tank[].p_dot)", |n| bob(n) + 3, "1/s2", "Derivative of tank[].p_dot")
+        .shape(MODE_VECTOR).depends_on(MOTION).initial_depends_on(EVERYTHING),
+
+    // The dry craft
+    V::parameter("craft.mass", |p, _| &mut p.craft.mass, "kg", "Mass of the dry craft, wheels included")
+        .range(1e-6, 1e9),
+    V::parameter("craft.r", |p, n| &mut p.craft.r[n], "m", "Centre of mass of the dry craft from O, body axes")
+        .shape(VECTOR).range(-1e4, 1e4),
+    V::parameter("craft.Jxx", |p, _| &mut p.craft.j.xx, "kg.m2", "Moment of inertia of the dry craft about its centre of mass")
+        .range(1e-9, 1e12),
+    V::parameter("craft.Jyy", |p, _| &mut p.craft.j.yy, "kg.m2", "Moment of inertia of the dry craft about its centre of mass")
+        .range(1e-9, 1e12),
+    V::parameter("craft.Jzz", |p, _| &mut p.craft.j.zz, "kg.m2", "Moment of inertia of the dry craft about its centre of mass")
+        .range(1e-9, 1e12),
+    V::parameter("craft.Jxy", |p, _| &mut p.craft.j.xy, "kg.m2", "Product of inertia, minus the integral of x y dm"),
+    V::parameter("craft.Jxz", |p, _| &mut p.craft.j.xz, "kg.m2", "Product of inertia, minus the integral of x z dm"),
+    V::parameter("craft.Jyz", |p, _| &mut p.craft.j.yz, "kg.m2", "Product of inertia, minus the integral of y z dm"),
+    V::choice("mount", &MOUNT, |p| p.mount as i32, |p, n| p.mount = if n == 2 { craft::Mount::Pivot } else { craft::Mount::Free },
+        "How the craft is held"),
+    V::parameter("gravity", |p, n| &mut p.gravity[n], "m/s2", "Uniform gravity, inertial axes: acts on a pivot alone")
+        .shape(VECTOR).range(-1e4, 1e4),
+    V::integer("tanks", |p, _| &mut p.tanks, "Number of tanks")
+        .between(0, TANKS as i32),
+
+    // Each tank
+    V::parameter("tank[].position", |p, n| &mut p.tank[n / 3].position[n % 3], "m",
+        "The tank's origin from O, body axes")
+        .shape(TANK_VECTOR).range(-1e4, 1e4),
+    V::parameter("tank[].q", |p, n| &mut p.tank[n / 4].q[n % 4], "1",
+        "Attitude of the tank, tank to body axes, scalar first; normalised")
+        .shape(&[TANKS, 4]),
+    V::parameter("tank[].m_0", |p, n| &mut p.tank[n].m_0, "kg", "Mass of the rigid liquid")
+        .shape(PER_TANK).range(0.0, 1e9),
+    V::parameter("tank[].H_0", |p, n| &mut p.tank[n].h_0, "m", "Height of the rigid liquid's centre of mass on the tank's axis")
+        .shape(PER_TANK),
+    V::parameter("tank[].I_0", |p, n| &mut p.tank[n].i_0, "kg.m2", "Moment of inertia of the rigid liquid across the axis, about its centre of mass")
+        .shape(PER_TANK).range(0.0, 1e12),
+    V::parameter("tank[].I_z", |p, n| &mut p.tank[n].i_z, "kg.m2", "Moment of inertia of the rigid liquid about the tank's axis")
+        .shape(PER_TANK).range(0.0, 1e12),
+    V::integer("tank[].modes", |p, n| &mut p.modes[n], "Number of slosh modes of the tank")
+        .between(0, MODES as i32).shape(PER_TANK),
+    V::parameter("tank[].g_ref", |p, n| &mut p.tank[n].g_ref, "m/s2", "Acceleration along the tank's axis at which zeta holds")
+        .shape(PER_TANK).range(1e-9, 1e6),
+    V::parameter("tank[].mass", |p, n| &mut p.tank[n / MODES].mass[n % MODES], "kg", "Mass of a mode's bob")
+        .shape(PER_MODE).range(1e-9, 1e9),
+    V::parameter("tank[].length", |p, n| &mut p.tank[n / MODES].length[n % MODES], "m", "Length of a mode's pendulum")
+        .shape(PER_MODE).range(1e-6, 1e4),
+    V::parameter("tank[].hinge", |p, n| &mut p.tank[n / MODES].hinge[n % MODES], "m", "Height of a mode's hinge on the tank's axis")
+        .shape(PER_MODE),
+    V::parameter("tank[].k", |p, n| &mut p.tank[n / MODES].k[n % MODES], "N/m", "Centring stiffness of a mode (capillarity, diaphragm)")
+        .shape(PER_MODE).range(0.0, 1e12),
+    V::parameter("tank[].zeta", |p, n| &mut p.tank[n / MODES].zeta[n % MODES], "1", "Damping ratio of a mode at g_ref; the drag coefficient 2 zeta m sqrt(g_ref/l + k/m) is constant")
+        .shape(PER_MODE).range(0.0, 10.0),
+    V::parameter("tank[].p_0", |p, n| { let (i, m, k) = place(n); &mut p.tank[i].p_0[m][k] }, "1",
+        "Direction from hinge to bob at the start, tank axes; normalised")
+        .shape(MODE_VECTOR),
+    V::parameter("tank[].p_dot_0", |p, n| { let (i, m, k) = place(n); &mut p.tank[i].p_dot_0[m][k] }, "1/s",
+        "Its rate at the start, tank axes; made tangential")
+        .shape(MODE_VECTOR),
+
+    // Where the motion starts
+    V::parameter("init.q", |p, n| &mut p.init.q[n], "1", "q at the start; normalised")
+        .shape(&[4]),
+    V::parameter("init.omega", |p, n| &mut p.init.omega[n], "rad/s", "omega at the start")
+        .display_unit("deg/s").shape(VECTOR).range(-1e3, 1e3),
+    V::parameter("init.position", |p, n| &mut p.init.position[n], "m", "position at the start")
+        .shape(VECTOR),
+    V::parameter("init.velocity", |p, n| &mut p.init.velocity[n], "m/s", "velocity at the start")
+        .shape(VECTOR),
+];
+
+static MOUNT: Enumeration = Enumeration {
+    name: "Mount",
+    description: "How the craft is held",
+    items: &[
+        Item::new("free", "It flies: position and velocity count from a freely falling frame"),
+        Item::new(
+            "pivot",
+            "O rests on an air bearing in uniform gravity; the craft turns about it",
+        ),
+    ],
+};
+
+const _: () = assert!(STATES == index::BOBS + 6 * TANKS * MODES);
