@@ -1,0 +1,277 @@
+//! One smooth piece of a tank's generating curve in the half plane (r, z).
+
+use core::f64::consts::TAU;
+
+/// A point or vector (r, z), m.
+pub type Point = [f64; 2];
+
+pub(crate) fn sub(a: Point, b: Point) -> Point {
+    [a[0] - b[0], a[1] - b[1]]
+}
+
+pub(crate) fn add(a: Point, b: Point) -> Point {
+    [a[0] + b[0], a[1] + b[1]]
+}
+
+pub(crate) fn norm(a: Point) -> f64 {
+    a[0].hypot(a[1])
+}
+
+pub(crate) fn dot(a: Point, b: Point) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}
+
+pub(crate) fn cross(a: Point, b: Point) -> f64 {
+    a[0] * b[1] - a[1] * b[0]
+}
+
+/// The shapes of a piece. Each has a parameter t of its own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Curve {
+    /// Straight from one point to the other, t = 0..1.
+    Line {
+        /// At t = 0.
+        from: Point,
+        /// At t = 1.
+        to: Point,
+    },
+    /// center + (a_r cos t, a_z sin t), t the eccentric angle in rad. A circle has a_r = a_z.
+    Ellipse {
+        /// Its centre.
+        center: Point,
+        /// Semi-axis along r, m.
+        a_r: f64,
+        /// Semi-axis along z, m.
+        a_z: f64,
+    },
+    /// Oval of Cassini about (0, zc): rho^2 = c^2 cos 2t + sqrt(a^4 - c^4 sin^2 2t) at the polar
+    /// angle t, rad; a > c.
+    Cassini {
+        /// Height of the centre, m.
+        zc: f64,
+        /// Root of the product of the distances to the foci, m.
+        a: f64,
+        /// Distance of the foci from the centre, m.
+        c: f64,
+    },
+    /// r = r0 + r1 cos(pi p), p and z linear in t = 0..1.
+    Cosine {
+        /// Mean radius, m.
+        r0: f64,
+        /// Amplitude, m.
+        r1: f64,
+        /// Heights at t = 0 and 1, m.
+        z: [f64; 2],
+        /// p at t = 0 and 1.
+        p: [f64; 2],
+    },
+    /// Cubic polynomial c_0 + c_1 t + c_2 t^2 + c_3 t^3, t = 0..1.
+    Cubic {
+        /// Coefficients.
+        c: [Point; 4],
+    },
+}
+
+/// Nodes and weights of the Gauss rule of 8 points on -1..1, positive half (DLMF 3.5.15).
+const GAUSS8: [(f64, f64); 4] = [
+    (0.183_434_642_495_649_8, 0.362_683_783_378_361_98),
+    (0.525_532_409_916_328_99, 0.313_706_645_877_887_29),
+    (0.796_666_477_413_626_74, 0.222_381_034_453_374_47),
+    (0.960_289_856_497_536_23, 0.101_228_536_290_376_26),
+];
+
+impl Curve {
+    /// Point at t.
+    pub fn at(&self, t: f64) -> Point {
+        match *self {
+            Curve::Line { from, to } => {
+                [from[0] + t * (to[0] - from[0]), from[1] + t * (to[1] - from[1])]
+            }
+            Curve::Ellipse { center, a_r, a_z } => {
+                [center[0] + a_r * t.cos(), center[1] + a_z * t.sin()]
+            }
+            Curve::Cassini { zc, a, c } => {
+                let rho = cassini(a, c, t).0;
+                [rho * t.cos(), zc + rho * t.sin()]
+            }
+            Curve::Cosine { r0, r1, z, p } => {
+                let phase = core::f64::consts::PI * (p[0] + t * (p[1] - p[0]));
+                [r0 + r1 * phase.cos(), z[0] + t * (z[1] - z[0])]
+            }
+            Curve::Cubic { c } => core::array::from_fn(|i| {
+                c[0][i] + t * (c[1][i] + t * (c[2][i] + t * c[3][i]))
+            }),
+        }
+    }
+
+    /// Derivative by t.
+    pub fn slope(&self, t: f64) -> Point {
+        match *self {
+            Curve::Line { from, to } => sub(to, from),
+            Curve::Ellipse { a_r, a_z, .. } => [-a_r * t.sin(), a_z * t.cos()],
+            Curve::Cassini { a, c, .. } => {
+                let (rho, slope) = cassini(a, c, t);
+                let (sin, cos) = t.sin_cos();
+                [slope * cos - rho * sin, slope * sin + rho * cos]
+            }
+            Curve::Cosine { r1, z, p, .. } => {
+                let rate = core::f64::consts::PI * (p[1] - p[0]);
+                let phase = core::f64::consts::PI * p[0] + t * rate;
+                [-r1 * rate * phase.sin(), z[1] - z[0]]
+            }
+            Curve::Cubic { c } => {
+                core::array::from_fn(|i| c[1][i] + t * (2.0 * c[2][i] + 3.0 * t * c[3][i]))
+            }
+        }
+    }
+
+    /// at(t + dt) - at(t), to full relative accuracy however small dt is. Both kernels of the
+    /// integral equation need it: differences of coordinates lose all digits near a corner.
+    pub fn chord(&self, t: f64, dt: f64) -> Point {
+        match *self {
+            Curve::Line { from, to } => [dt * (to[0] - from[0]), dt * (to[1] - from[1])],
+            Curve::Ellipse { a_r, a_z, .. } => {
+                let twice = 2.0 * (0.5 * dt).sin();
+                let (sin, cos) = (t + 0.5 * dt).sin_cos();
+                [-a_r * twice * sin, a_z * twice * cos]
+            }
+            Curve::Cubic { c } => {
+                let u = t + dt;
+                core::array::from_fn(|i| {
+                    dt * (c[1][i] + c[2][i] * (t + u) + c[3][i] * (t * t + t * u + u * u))
+                })
+            }
+            Curve::Cassini { .. } | Curve::Cosine { .. } if dt.abs() > 0.1 => {
+                sub(self.at(t + dt), self.at(t))
+            }
+            Curve::Cassini { .. } | Curve::Cosine { .. } => {
+                let mut sum = [0.0; 2];
+                for (x, w) in GAUSS8 {
+                    for side in [-x, x] {
+                        let slope = self.slope(t + 0.5 * dt * (1.0 + side));
+                        sum = add(sum, [w * slope[0], w * slope[1]]);
+                    }
+                }
+                [0.5 * dt * sum[0], 0.5 * dt * sum[1]]
+            }
+        }
+    }
+}
+
+/// Radius of the oval of Cassini and its derivative by the polar angle.
+fn cassini(a: f64, c: f64, t: f64) -> (f64, f64) {
+    let (sin, cos) = (2.0 * t).sin_cos();
+    let root = (a.powi(4) - c.powi(4) * sin * sin).sqrt();
+    let rho = (c * c * cos + root).sqrt();
+    let slope = -2.0 * c * c * sin - 2.0 * c.powi(4) * sin * cos / root;
+    (rho, slope / (2.0 * rho))
+}
+
+/// A curve between two values of its parameter, in the direction from the first to the second.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Segment {
+    /// The curve.
+    pub curve: Curve,
+    /// Parameter at the start.
+    pub from: f64,
+    /// Parameter at the end; may be less than `from`.
+    pub to: f64,
+}
+
+impl Segment {
+    /// Straight line.
+    pub fn line(from: Point, to: Point) -> Segment {
+        Segment { curve: Curve::Line { from, to }, from: 0.0, to: 1.0 }
+    }
+
+    /// Arc of an ellipse between two eccentric angles in degrees; a_r = a_z is a circle.
+    pub fn ellipse(center: Point, a_r: f64, a_z: f64, deg0: f64, deg1: f64) -> Segment {
+        let (from, to) = (deg0.to_radians(), deg1.to_radians());
+        Segment { curve: Curve::Ellipse { center, a_r, a_z }, from, to }
+    }
+
+    /// Arc of a circle between two angles in degrees.
+    pub fn arc(center: Point, radius: f64, deg0: f64, deg1: f64) -> Segment {
+        Segment::ellipse(center, radius, radius, deg0, deg1)
+    }
+
+    /// First point. Exactly on the axis where it is meant to be: cos(pi/2) is not 0 in a computer.
+    pub fn start(&self) -> Point {
+        self.settle(self.curve.at(self.from))
+    }
+
+    /// Last point.
+    pub fn end(&self) -> Point {
+        self.settle(self.curve.at(self.to))
+    }
+
+    fn settle(&self, p: Point) -> Point {
+        let size = self.size();
+        [if p[0].abs() < 1e-14 * size { 0.0 } else { p[0] }, p[1]]
+    }
+
+    /// A length of the order of the segment's, m.
+    pub fn size(&self) -> f64 {
+        match self.curve {
+            Curve::Line { from, to } => norm(sub(to, from)),
+            Curve::Ellipse { a_r, a_z, .. } => a_r.abs().max(a_z.abs()),
+            Curve::Cassini { a, .. } => a,
+            Curve::Cosine { z, .. } => (z[1] - z[0]).abs(),
+            Curve::Cubic { c } => norm(add(c[1], add(c[2], c[3]))),
+        }
+    }
+
+    /// Unit tangent in the direction of travel at the fraction `s` = 0..1 of the parameter.
+    pub fn tangent(&self, s: f64) -> Point {
+        let sign = if self.to > self.from { 1.0 } else { -1.0 };
+        let slope = self.curve.slope(self.from + s * (self.to - self.from));
+        let length = norm(slope);
+        [sign * slope[0] / length, sign * slope[1] / length]
+    }
+
+    /// Point at the fraction `s` of the parameter.
+    pub fn at(&self, s: f64) -> Point {
+        self.curve.at(self.from + s * (self.to - self.from))
+    }
+
+    /// Angle through which the tangent turns, rad (bound on it for ellipses).
+    pub(crate) fn turn(&self) -> f64 {
+        let count = 32;
+        let mut total = 0.0;
+        for i in 0..count {
+            let (a, b) = (self.tangent(i as f64 / count as f64), self.tangent((i + 1) as f64 / count as f64));
+            total += cross(a, b).atan2(dot(a, b)).abs();
+        }
+        total.min(TAU)
+    }
+
+    /// The part between two values of the curve's parameter.
+    pub(crate) fn part(&self, from: f64, to: f64) -> Segment {
+        Segment { curve: self.curve, from, to }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chord_is_the_difference_of_points_and_keeps_its_digits() {
+        let curves = [
+            Curve::Line { from: [0.1, 0.2], to: [1.0, -0.4] },
+            Curve::Ellipse { center: [0.3, 0.4], a_r: 1.2, a_z: 0.7 },
+            Curve::Cassini { zc: 0.8, a: 1.0, c: 0.6 },
+            Curve::Cosine { r0: 1.0, r1: 0.4, z: [0.0, 2.0], p: [0.2, 1.7] },
+            Curve::Cubic { c: [[0.1, 0.0], [1.0, 0.2], [-0.3, 0.5], [0.2, -0.1]] },
+        ];
+        for curve in curves {
+            for dt in [0.5, -0.09, 1e-3] {
+                let (chord, plain) = (curve.chord(0.4, dt), sub(curve.at(0.4 + dt), curve.at(0.4)));
+                assert!(norm(sub(chord, plain)) < 4e-16, "{curve:?} {dt}");
+            }
+            // at 1e-12 a difference of points would have four digits
+            let (chord, slope) = (curve.chord(0.4, 1e-12), curve.slope(0.4));
+            assert!(norm(sub(chord, [1e-12 * slope[0], 1e-12 * slope[1]])) < 1e-23, "{curve:?}");
+        }
+    }
+}
