@@ -1,6 +1,6 @@
 //! The boundary of the liquid cut into panels, and points on them.
 
-use crate::curve::{Point, Segment, add, dot, norm, sub};
+use crate::curve::{Point, Segment, add, cross, dot, norm, sub};
 
 /// A corner of the boundary, by the index of the segment that starts there.
 pub(crate) type Corner = usize;
@@ -17,6 +17,8 @@ pub(crate) struct Panel {
     s0: f64,
     length: f64,
     pub(crate) gamma: f64,
+    /// Exponent nu of rho^nu at the corner, if gamma > 1.
+    pub(crate) nu: f64,
 }
 
 /// A point of the boundary as the integral equation needs it.
@@ -43,8 +45,8 @@ pub(crate) struct Boundary {
     pub(crate) segments: Vec<Segment>,
     /// Starts and ends, exact on the axis.
     ends: Vec<[Point; 2]>,
-    /// gamma at the start and the end of every segment.
-    grading: Vec<[f64; 2]>,
+    /// (gamma, nu) at the start and the end of every segment.
+    grading: Vec<[(f64, f64); 2]>,
 }
 
 impl Boundary {
@@ -56,19 +58,19 @@ impl Boundary {
         segments.push(Segment::line(outer, [inner[0], outer[1]]));
         let ends: Vec<_> = segments.iter().map(|s| [s.start(), s.end()]).collect();
         let count = segments.len();
-        let mut grading = vec![[1.0; 2]; count];
+        let mut grading = vec![[(1.0, 1.0); 2]; count];
         for i in 0..count {
             let next = (i + 1) % count;
             let before = segments[i].tangent(1.0);
             let after = segments[next].tangent(0.0);
             if i + 1 == count && inner[0] == 0.0 {
                 // An apex on the axis is a corner; the middle of the surface is not.
-                grading[next][0] = if after[1].abs() < 1e-9 { 1.0 } else { APEX };
+                grading[next][0].0 = if after[1].abs() < 1e-9 { 1.0 } else { APEX };
                 continue;
             }
-            let gamma = grading_at(before, after);
-            grading[i][1] = gamma;
-            grading[next][0] = gamma;
+            let corner = grading_at(before, after);
+            grading[i][1] = corner;
+            grading[next][0] = corner;
         }
         Boundary { segments, ends, grading }
     }
@@ -136,15 +138,19 @@ impl Boundary {
 
     /// Cuts the boundary into panels over which the solution is smooth: none turns by more than
     /// 60 degrees, is long against the free surface or its distance from it, long against the
-    /// gap to another part of the boundary, or much longer than its neighbour.
-    pub(crate) fn panels(&self) -> Vec<Panel> {
+    /// gap to another part of the boundary, or much longer than its neighbour. `modes` modes are to
+    /// be resolved.
+    pub(crate) fn panels(&self, modes: usize) -> Vec<Panel> {
         let surface = self.surface();
         let width = norm(sub(self.ends[surface][0], self.ends[surface][1]));
+        // The n-th mode has n half waves on the surface.
+        let longest = WIDTH * width * (5.0 / modes as f64).min(1.0);
         let z_surface = self.ends[surface][0][1];
         let mut pieces: Vec<Piece> = Vec::new();
         for (i, segment) in self.segments.iter().enumerate() {
             let [start, end] = self.grading[i];
-            let count = (segment.turn() / 1.05).ceil().max(if start > 1.0 && end > 1.0 { 2.0 } else { 1.0 });
+            let both = start.0 > 1.0 && end.0 > 1.0;
+            let count = (segment.turn() / 1.05).ceil().max(if both { 2.0 } else { 1.0 });
             for j in 0..count as usize {
                 pieces.push(Piece::new(segment, i, j as f64 / count, (j + 1) as f64 / count));
             }
@@ -158,7 +164,7 @@ impl Boundary {
             let too_long = |k: usize| {
                 let piece = &pieces[k];
                 let depth = piece.points.iter().map(|p| z_surface - p[1]).fold(f64::MAX, f64::min);
-                if piece.length > WIDTH * width + 1.5 * depth.max(0.0) {
+                if piece.length > longest + 1.5 * depth.max(0.0) {
                     return true;
                 }
                 (0..count).any(|other| {
@@ -202,29 +208,31 @@ impl Boundary {
         let total = (segment.to - segment.from).abs();
         let [start, end] = self.grading[piece.segment];
         let (at_start, at_end) = (piece.from == 0.0, piece.to == 1.0);
-        let (gamma, from_end) = match (at_start && start > 1.0, at_end && end > 1.0) {
+        let ((gamma, nu), from_end) = match (at_start && start.0 > 1.0, at_end && end.0 > 1.0) {
             (true, _) => (start, false),
             (_, true) => (end, true),
-            _ => (1.0, 1.0 - piece.to < piece.from),
+            _ => ((1.0, 1.0), 1.0 - piece.to < piece.from),
         };
         let s0 = if from_end { (1.0 - piece.to) * total } else { piece.from * total };
         let length = (piece.to - piece.from) * total;
-        Panel { segment: piece.segment, end: from_end, s0, length, gamma }
+        Panel { segment: piece.segment, end: from_end, s0, length, gamma, nu }
     }
 }
 
 /// No contour needs more; a bad one must not fill the memory.
 const MOST_PANELS: usize = 150;
-/// Longest panel on the free surface over the surface's width.
+/// Longest panel on the free surface over the surface's width, for up to five modes.
 const WIDTH: f64 = 0.35;
 /// gamma at an apex on the axis: the exponents there are between 0.8 and 2 for all but needles.
 const APEX: f64 = 4.0;
 
-/// gamma at a corner between two directions of travel.
-fn grading_at(before: Point, after: Point) -> f64 {
-    let turn = crate::curve::cross(before, after).atan2(dot(before, after));
-    let exponent = core::f64::consts::PI / (core::f64::consts::PI - turn);
-    (6.0 / exponent).ceil().clamp(3.0, 9.0)
+/// gamma at a corner between two directions of travel, and nu = pi/al. gamma is a whole number, so
+/// that the curve is an analytic function of v, and gamma nu at least 6.
+fn grading_at(before: Point, after: Point) -> (f64, f64) {
+    let turn = cross(before, after).atan2(dot(before, after));
+    let nu = core::f64::consts::PI / (core::f64::consts::PI - turn);
+    let gamma = if turn.abs() < 1e-9 { 3.0 } else { (6.0 / nu).ceil().clamp(3.0, 9.0) };
+    (gamma, nu)
 }
 
 /// A candidate for a panel: fractions of a segment's parameter.

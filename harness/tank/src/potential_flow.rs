@@ -72,9 +72,24 @@ const OWN_POWER: i32 = 5;
 const OWN_LENGTH: f64 = 0.2;
 
 impl Discretisation {
-    pub(crate) fn new(wall: &[Segment], order: usize) -> Discretisation {
+    /// For `modes` modes of the liquid above a wall, given from the axis or the inner contact line to
+    /// the outer one.
+    pub(crate) fn new(wall: &[Segment], modes: usize, order: usize) -> Discretisation {
         let boundary = Boundary::new(wall);
-        let panels = boundary.panels();
+        let panels = boundary.panels(modes);
+        Discretisation::on_panels(boundary, panels, order)
+    }
+
+    /// The same panels with another number of points.
+    pub(crate) fn with_order(&self, order: usize) -> Discretisation {
+        Discretisation::on_panels(self.boundary.clone(), self.panels.clone(), order)
+    }
+
+    pub(crate) fn panel_count(&self) -> usize {
+        self.panels.len()
+    }
+
+    fn on_panels(boundary: Boundary, panels: Vec<Panel>, order: usize) -> Discretisation {
         let rule = Gauss::new(order);
         let mut points = Vec::with_capacity(panels.len() * order);
         for panel in &panels {
@@ -351,22 +366,63 @@ impl Discretisation {
         basis.iter().enumerate().map(|(k, value)| value * coefficient(k)).sum()
     }
 
-    /// du/ds at all points, u given there; the sign is that of the panel's own direction.
-    pub(crate) fn along(&self, u: &[f64]) -> Vec<f64> {
+    /// int_W [u_s^2 + u^2/r^2] r ds of a function given at all points. Next to a corner u_s goes as
+    /// rho^(nu - 1), and dividing du/dv by ds/dv loses all digits; the integral over the last 1e-6
+    /// of the panel follows from the exponent (1 where nu > 1: u_s has a limit there).
+    pub(crate) fn wall_gradient(&self, u: &[f64]) -> f64 {
+        let rule = Gauss::new(24);
         let mut slopes = vec![0.0; self.order];
-        let mut all = Vec::with_capacity(u.len());
-        for panel in 0..self.panels.len() {
-            for (j, &v) in self.rule.nodes.iter().enumerate() {
+        let mut total = 0.0;
+        for (index, panel) in self.panels[..self.surface / self.order].iter().enumerate() {
+            let v0 = if panel.gamma > 1.0 { 1e-6f64.powf(1.0 / panel.gamma) } else { 0.0 };
+            let mut along = |v: f64| {
                 legendre_slopes(v, &mut slopes);
-                let speed = self.points[panel * self.order + j].speed;
-                all.push(self.expand(u, panel, &slopes) / speed);
+                let x = self.boundary.point(panel, v);
+                (self.expand(u, index, &slopes) / x.speed, x)
+            };
+            for (v, w) in rule.nodes.iter().zip(&rule.weights) {
+                let (slope, x) = along(v0 + (1.0 - v0) * v);
+                total += w * (1.0 - v0) * x.speed * x.p[0] * slope * slope;
+            }
+            if v0 > 0.0 {
+                let (slope, x) = along(v0);
+                let rho = x.speed * v0 / panel.gamma;
+                total += slope * slope * x.p[0] * rho / (2.0 * panel.nu.min(1.0) - 1.0);
+            }
+            for j in 0..self.order {
+                let (i, w) = (index * self.order + j, self.rule.weights[j]);
+                total += w * self.points[i].speed * u[i] * u[i] / self.points[i].p[0];
             }
         }
-        all
+        total
+    }
+
+    /// Where on the free surface |u| is largest: (r, u).
+    pub(crate) fn surface_peak(&self, u: &[f64]) -> [f64; 2] {
+        let value = |panel: usize, v: f64| self.interpolate(u, panel, v.clamp(1e-300, 1.0)).abs();
+        let step = 1.0 / 16.0;
+        let samples = (self.surface / self.order..self.panels.len())
+            .flat_map(|panel| (0..=16).map(move |i| (panel, i as f64 * step)));
+        let Some((panel, v)) = samples.max_by(|a, b| value(a.0, a.1).total_cmp(&value(b.0, b.1))) else {
+            return [0.0; 2];
+        };
+        // golden section between the neighbouring samples
+        let (mut a, mut b) = ((v - step).max(0.0), (v + step).min(1.0));
+        for _ in 0..40 {
+            let (left, right) = (b - 0.618_034 * (b - a), a + 0.618_034 * (b - a));
+            if value(panel, left) > value(panel, right) {
+                b = right;
+            } else {
+                a = left;
+            }
+        }
+        let best = [a, b, v].into_iter().max_by(|x, y| value(panel, *x).total_cmp(&value(panel, *y)));
+        let v = best.unwrap_or(v).max(1e-300);
+        [self.boundary.point(&self.panels[panel], v).p[0], self.interpolate(u, panel, v)]
     }
 
     /// A function given at all points, along the free surface: (r, value), from the outer contact
-    /// line to the axis or inner contact line, both ends included; `dense` points per panel.
+    /// line to the axis or inner contact line, both ends included; `dense` intervals per panel.
     pub(crate) fn along_surface(&self, u: &[f64], dense: usize) -> Vec<[f64; 2]> {
         let first = self.surface / self.order;
         let mut all = Vec::new();
@@ -380,6 +436,9 @@ impl Discretisation {
                 .collect();
             if self.panels[panel].end {
                 own.reverse();
+            }
+            if !all.is_empty() {
+                own.remove(0);
             }
             all.extend(own);
         }

@@ -1,0 +1,488 @@
+//! The generating curve of a tank: checks, and the part that the liquid wets.
+
+use core::fmt;
+
+use crate::curve::{Curve, Point, Segment, cross, dot, norm, sub};
+use crate::gauss::Gauss;
+
+/// Everything that is wrong with an input, one sentence each.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Problems(pub Vec<String>);
+
+impl fmt::Display for Problems {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0.join("\n"))
+    }
+}
+
+impl std::error::Error for Problems {}
+
+impl From<String> for Problems {
+    fn from(problem: String) -> Problems {
+        Problems(vec![problem])
+    }
+}
+
+/// Larger tanks are taken for a drawing in millimetres, m.
+const LARGEST: f64 = 100.0;
+/// Ends of segments are joined if they are closer than this, over the tank's size.
+const JOINED: f64 = 1e-6;
+/// Heights this close, over the tank's size, are the same.
+const LEVEL: f64 = 1e-9;
+
+/// The generating curve of a whole tank in the half plane (r, z), lengths in m: from the axis, or
+/// from the top of an inner wall, along the bottom and up the outer wall to its top; with r to the
+/// right and z up, counter-clockwise around the liquid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Contour {
+    segments: Vec<Segment>,
+    bottom: f64,
+    top: f64,
+    size: f64,
+}
+
+/// The wetted part of a contour.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wall {
+    /// Segments from the axis or the inner contact line to the outer contact line.
+    pub segments: Vec<Segment>,
+    /// Outer radius of the free surface, m.
+    pub r_outer: f64,
+    /// Inner radius of the free surface, m; 0 if it reaches the axis.
+    pub r_inner: f64,
+    /// Height of the free surface, m, from the contour's own zero.
+    pub z_surface: f64,
+}
+
+/// Where a contour passes through a height.
+#[derive(Clone, Copy, Debug)]
+struct Crossing {
+    segment: usize,
+    t: f64,
+    up: bool,
+}
+
+impl Contour {
+    /// Checks the segments.
+    ///
+    /// # Errors
+    /// Every defect: values that are not finite, radii below 0, segments without length, gaps,
+    /// self-crossing, clockwise order, a size beyond 100 m.
+    pub fn new(segments: Vec<Segment>) -> Result<Contour, Problems> {
+        let mut problems = Vec::new();
+        if segments.is_empty() {
+            return Err("The contour has no segment: it needs at least one line or arc.".to_string().into());
+        }
+        for (i, segment) in segments.iter().enumerate() {
+            if let Some(problem) = defect(segment) {
+                problems.push(format!("Segment {}: {problem}.", i + 1));
+            }
+        }
+        if !problems.is_empty() {
+            return Err(Problems(problems)); // nothing below makes sense then
+        }
+        let outline = Outline::new(&segments);
+        let size = outline.size();
+        if size > LARGEST {
+            problems.push(format!(
+                "The contour is {size:.6} m large; lengths are in metres and at most {LARGEST} m \
+                 (is the drawing in millimetres?)."
+            ));
+        }
+        for i in 0..segments.len() {
+            let low = outline.points[i].iter().map(|p| p[0]).fold(f64::MAX, f64::min);
+            if low < -LEVEL * size {
+                problems.push(format!(
+                    "Segment {}: its radius falls to {low:.6} m; the contour lies in the half plane r >= 0.",
+                    i + 1
+                ));
+            }
+            if let Some(next) = segments.get(i + 1) {
+                let (end, start) = (segments[i].end(), next.start());
+                let gap = norm(sub(start, end));
+                if gap > JOINED * size {
+                    problems.push(format!(
+                        "The contour is open: segment {} ends at ({:.6}, {:.6}) m and segment {} \
+                         starts at ({:.6}, {:.6}) m, {gap:.3e} m apart.",
+                        i + 1,
+                        end[0],
+                        end[1],
+                        i + 2,
+                        start[0],
+                        start[1]
+                    ));
+                }
+            }
+        }
+        if let Some((i, j, p)) = outline.crossing() {
+            problems.push(format!(
+                "The contour crosses itself near ({:.6}, {:.6}) m (segments {} and {}).",
+                p[0],
+                p[1],
+                i + 1,
+                j + 1
+            ));
+        } else if outline.area() <= 0.0 {
+            problems.push(
+                "The contour is inside out (clockwise): list it from the axis or the inner wall \
+                 along the bottom to the outer wall, with r to the right and z up."
+                    .to_string(),
+            );
+        }
+        if !problems.is_empty() {
+            return Err(Problems(problems));
+        }
+        let heights = || outline.points.iter().flatten().map(|p| p[1]);
+        let coarse = (heights().fold(f64::MAX, f64::min), heights().fold(f64::MIN, f64::max));
+        let (bottom, top) = segments.iter().fold(coarse, |(low, high), s| {
+            (low.min(extreme(s, 1.0)), high.max(-extreme(s, -1.0)))
+        });
+        Ok(Contour { segments, bottom, top, size })
+    }
+
+    /// All segments.
+    pub fn segments(&self) -> &[Segment] {
+        &self.segments
+    }
+
+    /// Height of the lowest point, m, from the contour's own zero.
+    pub fn bottom(&self) -> f64 {
+        self.bottom
+    }
+
+    /// The largest fill, m above the lowest point: the end of the outer wall.
+    pub fn depth(&self) -> f64 {
+        let end = self.segments[self.segments.len() - 1].end();
+        let start = self.segments[0].start();
+        let brim = if start[0] > 0.0 { end[1].min(start[1]) } else { end[1] };
+        // A torus ends where it begins; a closed tank on the axis.
+        (if start == end { self.top } else { brim }) - self.bottom
+    }
+
+    /// The wetted wall at `fill`, m above the lowest point.
+    ///
+    /// # Errors
+    /// A fill that is not positive or above the top, separate pools, a free surface at a
+    /// horizontal part of the wall or of no width.
+    pub fn cut(&self, fill: f64) -> Result<Wall, Problems> {
+        if !fill.is_finite() {
+            return Err(format!("The fill is {fill}; it must be a height in metres.").into());
+        }
+        if fill <= 0.0 {
+            return Err(format!("The fill is {fill} m; it must be above 0, the lowest point of the tank.").into());
+        }
+        let depth = self.depth();
+        if fill > depth * (1.0 + LEVEL) {
+            return Err(format!(
+                "The fill of {fill} m is above the top of the tank, {depth:.6} m above its lowest point."
+            )
+            .into());
+        }
+        let mut z = self.bottom + fill;
+        // A contact line at a joint is at the joint.
+        for segment in &self.segments {
+            for end in [segment.start(), segment.end()] {
+                if (end[1] - z).abs() < LEVEL * self.size {
+                    z = end[1];
+                }
+            }
+        }
+        let (down, up) = self.contact_lines(z, fill)?;
+        let step = 1e-6 * self.size;
+        let last = self.segments[self.segments.len() - 1].end()[1];
+        for z in [z - step, z + step] {
+            if (z < last - LEVEL * self.size && z > self.bottom)
+                && self.contact_lines(z, fill).is_ok_and(|(d, _)| d.is_some()) != down.is_some()
+            {
+                return Err(shoulder(fill));
+            }
+        }
+        let mut wall = Vec::new();
+        let begin = down.map_or((0, self.segments[0].from), |c| (c.segment, c.t));
+        for i in begin.0..=up.segment {
+            let segment = self.segments[i];
+            let from = if i == begin.0 { begin.1 } else { segment.from };
+            let to = if i == up.segment { up.t } else { segment.to };
+            if from != to {
+                wall.push(segment.part(from, to));
+            }
+        }
+        let Some(end) = wall.last().map(Segment::end) else { return Err(shoulder(fill)) };
+        let start = wall[0].start();
+        let r_inner = if down.is_some() { start[0] } else { 0.0 };
+        if end[0] - r_inner < 1e-6 * self.size {
+            return Err(format!(
+                "At a fill of {fill} m the free surface is only {:.3e} m wide.",
+                end[0] - r_inner
+            )
+            .into());
+        }
+        let steep = |tangent: Point| tangent[1].abs() > 1e-3;
+        let outer = wall[wall.len() - 1].tangent(1.0);
+        if !steep(outer) || (down.is_some() && !steep(wall[0].tangent(0.0))) {
+            return Err(shoulder(fill));
+        }
+        Ok(Wall { segments: wall, r_outer: end[0], r_inner, z_surface: z })
+    }
+
+    /// The inner and the outer contact line at height z.
+    fn contact_lines(&self, z: f64, fill: f64) -> Result<(Option<Crossing>, Crossing), Problems> {
+        let mut crossings = self.crossings(z);
+        let start = self.segments[0].start();
+        let end = self.segments[self.segments.len() - 1].end();
+        let level = LEVEL * self.size;
+        let on_axis = start[0] <= level;
+        if start[1] < z - level && !on_axis {
+            return Err(format!(
+                "The contour is open: it starts at ({:.6}, {:.6}) m, below the free surface; it must \
+                 start on the axis or at the top of an inner wall.",
+                start[0], start[1]
+            )
+            .into());
+        }
+        if (end[1] - z).abs() <= level && end[0] > level && !crossings.last().is_some_and(|c| c.up) {
+            let segment = self.segments.len() - 1;
+            crossings.push(Crossing { segment, t: self.segments[segment].to, up: true });
+        }
+        if (start[1] - z).abs() <= level && !on_axis && !crossings.first().is_some_and(|c| !c.up) {
+            crossings.insert(0, Crossing { segment: 0, t: self.segments[0].from, up: false });
+        }
+        match crossings[..] {
+            [up] if up.up => Ok((None, up)),
+            [down, up] if !down.up && up.up => Ok((Some(down), up)),
+            [] => Err(shoulder(fill)),
+            _ => Err(format!(
+                "At a fill of {fill} m the height of the free surface passes through the contour {} times: \
+                 separate pools or trapped gas, which one set of modes does not describe.",
+                crossings.len()
+            )
+            .into()),
+        }
+    }
+
+    /// All places where the contour passes through the height z, in its order. A point exactly at z
+    /// counts as above.
+    fn crossings(&self, z: f64) -> Vec<Crossing> {
+        let mut found: Vec<Crossing> = Vec::new();
+        let level = LEVEL * self.size;
+        let mut above = self.segments[0].start()[1] >= z - level;
+        for (i, segment) in self.segments.iter().enumerate() {
+            let count = samples(segment);
+            let parameter = |k: usize| segment.from + (segment.to - segment.from) * k as f64 / count as f64;
+            for k in 0..count {
+                let (mut a, mut b) = (parameter(k), parameter(k + 1));
+                let next = match k + 1 == count {
+                    true => segment.end()[1],
+                    false => segment.curve.at(b)[1],
+                };
+                let next_above = next >= z - level;
+                if next_above == above {
+                    continue;
+                }
+                if (next - z).abs() <= level {
+                    a = b; // exactly at a sample, a joint above all
+                } else if (segment.curve.at(a)[1] - z).abs() <= level {
+                    b = a;
+                }
+                for _ in 0..80 {
+                    let middle = 0.5 * (a + b);
+                    if (segment.curve.at(middle)[1] >= z) == above {
+                        a = middle;
+                    } else {
+                        b = middle;
+                    }
+                }
+                let up = next_above;
+                found.push(Crossing { segment: i, t: if a == b { a } else { 0.5 * (a + b) }, up });
+                above = next_above;
+            }
+        }
+        found
+    }
+}
+
+fn shoulder(fill: f64) -> Problems {
+    format!(
+        "At a fill of {fill} m the free surface lies at a horizontal part of the wall, where the modes \
+         are not defined; take a slightly different fill."
+    )
+    .into()
+}
+
+/// What is wrong with one segment by itself.
+fn defect(segment: &Segment) -> Option<String> {
+    let numbers: Vec<f64> = match segment.curve {
+        Curve::Line { from, to } => vec![from[0], from[1], to[0], to[1]],
+        Curve::Ellipse { center, a_r, a_z } => vec![center[0], center[1], a_r, a_z],
+        Curve::Cassini { zc, a, c } => vec![zc, a, c],
+        Curve::Cosine { r0, r1, z, p } => vec![r0, r1, z[0], z[1], p[0], p[1]],
+        Curve::Cubic { c } => c.concat(),
+    };
+    if let Some(bad) = numbers.iter().chain([&segment.from, &segment.to]).find(|x| !x.is_finite()) {
+        return Some(format!("contains {bad}; every value must be a finite number"));
+    }
+    match segment.curve {
+        Curve::Ellipse { a_r, a_z, .. } if a_r <= 0.0 || a_z <= 0.0 => {
+            return Some(format!("radii {a_r} and {a_z} m must be above 0"));
+        }
+        Curve::Cassini { a, c, .. } if a <= c || c < 0.0 => {
+            return Some(format!("an oval of Cassini needs a > c >= 0, here {a} and {c} m"));
+        }
+        _ => {}
+    }
+    if !matches!(segment.curve, Curve::Line { .. }) && (segment.to - segment.from).abs() > 6.3 {
+        let degrees = (segment.to - segment.from).to_degrees().abs();
+        return Some(format!("an arc of {degrees} degrees goes round more than once"));
+    }
+    let outline: Vec<Point> = (0..=8).map(|k| segment.at(k as f64 / 8.0)).collect();
+    let length: f64 = outline.windows(2).map(|p| norm(sub(p[1], p[0]))).sum();
+    if length == 0.0 || !length.is_finite() {
+        return Some("has no length".to_string());
+    }
+    None
+}
+
+/// Number of intervals that a segment is sampled with.
+fn samples(segment: &Segment) -> usize {
+    match segment.curve {
+        Curve::Line { .. } => 1,
+        Curve::Cubic { .. } => 8,
+        _ => 128,
+    }
+}
+
+/// Smallest value of `sign` z on a segment, by golden section around the lowest sample.
+fn extreme(segment: &Segment, sign: f64) -> f64 {
+    let count = samples(segment);
+    let height = |s: f64| sign * segment.at(s.clamp(0.0, 1.0))[1];
+    let step = 1.0 / count as f64;
+    let lowest = (0..=count).min_by(|a, b| height(*a as f64 * step).total_cmp(&height(*b as f64 * step)));
+    let at = lowest.unwrap_or(0) as f64 * step;
+    let (mut a, mut b) = ((at - step).max(0.0), (at + step).min(1.0));
+    let golden = 0.618_033_988_749_894_8;
+    for _ in 0..60 {
+        let (left, right) = (b - golden * (b - a), a + golden * (b - a));
+        if height(left) < height(right) {
+            b = right;
+        } else {
+            a = left;
+        }
+    }
+    [a, b, at].into_iter().map(height).fold(f64::MAX, f64::min)
+}
+
+/// The contour as short straight lines, to find what does not depend on their bulge.
+struct Outline {
+    points: Vec<Vec<Point>>,
+}
+
+impl Outline {
+    fn new(segments: &[Segment]) -> Outline {
+        let sampled = |s: &Segment| {
+            let count = samples(s);
+            (0..=count).map(|k| s.at(k as f64 / count as f64)).collect()
+        };
+        Outline { points: segments.iter().map(sampled).collect() }
+    }
+
+    fn size(&self) -> f64 {
+        let range = |i: usize| {
+            let all = || self.points.iter().flatten().map(|p| p[i]);
+            (all().fold(f64::MAX, f64::min), all().fold(f64::MIN, f64::max))
+        };
+        let (r, z) = (range(0), range(1));
+        r.1.max(z.1 - z.0)
+    }
+
+    /// Area to the left of the contour, closed along the axis or straight from end to start.
+    fn area(&self) -> f64 {
+        let all: Vec<Point> = self.points.iter().flatten().copied().collect();
+        let (first, last) = (all[0], all[all.len() - 1]);
+        let mut sum: f64 = all.windows(2).map(|p| cross(p[0], p[1])).sum();
+        if first[0] <= 1e-9 * self.size() {
+            // up the outer wall's end, to the axis and down
+            let corner = [0.0, last[1]];
+            sum += cross(last, corner) + cross(corner, first);
+        } else {
+            sum += cross(last, first);
+        }
+        0.5 * sum
+    }
+
+    /// A crossing of two parts: segments and place.
+    fn crossing(&self) -> Option<(usize, usize, Point)> {
+        let lines: Vec<(usize, Point, Point)> = self
+            .points
+            .iter()
+            .enumerate()
+            .flat_map(|(i, points)| points.windows(2).map(move |p| (i, p[0], p[1])))
+            .collect();
+        for (a, &(i, p, q)) in lines.iter().enumerate() {
+            for (b, &(j, r, s)) in lines.iter().enumerate().skip(a + 2) {
+                let apart = p[0].max(q[0]) < r[0].min(s[0])
+                    || r[0].max(s[0]) < p[0].min(q[0])
+                    || p[1].max(q[1]) < r[1].min(s[1])
+                    || r[1].max(s[1]) < p[1].min(q[1]);
+                // a closed contour meets itself at its ends
+                if apart || (a == 0 && b + 1 == lines.len() && norm(sub(p, s)) < 1e-6) {
+                    continue;
+                }
+                let (d, e) = (sub(q, p), sub(s, r));
+                let area = cross(d, e);
+                let (u, v) = (cross(sub(r, p), e) / area, cross(sub(r, p), d) / area);
+                if area != 0.0 && (0.0..=1.0).contains(&u) && (0.0..=1.0).contains(&v) {
+                    return Some((i, j, [p[0] + u * d[0], p[1] + u * d[1]]));
+                }
+            }
+            // a joint that folds back on itself
+            if let Some(&(j, _, s)) = lines.get(a + 1) {
+                let (d, e) = (sub(q, p), sub(s, q));
+                if cross(d, e).abs() < 1e-9 * norm(d) * norm(e) && dot(d, e) < 0.0 {
+                    return Some((i, j, q));
+                }
+            }
+        }
+        None
+    }
+}
+
+/// Volume integrals of the liquid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Volume {
+    /// Volume, m3.
+    pub volume: f64,
+    /// Height of the centre, m, from the contour's own zero.
+    pub z_cg: f64,
+    /// int (x^2 + (z - z_cg)^2) dV, m5: rigid inertia across the axis per density.
+    pub across: f64,
+    /// int r^2 dV, m5: rigid inertia about the axis per density.
+    pub axial: f64,
+}
+
+impl Volume {
+    /// Of the liquid below the free surface, by Gauss' theorem along the wall: the volume is
+    /// pi int r^2 dz, and so on.
+    pub fn of(wall: &Wall) -> Volume {
+        let rule = Gauss::new(20);
+        let base = wall.z_surface;
+        let (mut volume, mut first, mut second, mut axial) = (0.0, 0.0, 0.0, 0.0);
+        for segment in &wall.segments {
+            let pieces = if matches!(segment.curve, Curve::Line { .. } | Curve::Cubic { .. }) { 1 } else { 8 };
+            let step = (segment.to - segment.from) / pieces as f64;
+            for k in 0..pieces {
+                for (v, w) in rule.nodes.iter().zip(&rule.weights) {
+                    let t = segment.from + step * (k as f64 + v);
+                    let ([r, z], dz) = (segment.curve.at(t), w * step * segment.curve.slope(t)[1]);
+                    let z = z - base;
+                    let disc = core::f64::consts::PI * r * r * dz;
+                    volume += disc;
+                    first += disc * z;
+                    second += disc * z * z;
+                    axial += 0.5 * disc * r * r;
+                }
+            }
+        }
+        let z_cg = first / volume;
+        Volume { volume, z_cg: base + z_cg, across: 0.5 * axial + second - first * z_cg, axial }
+    }
+}

@@ -1,0 +1,340 @@
+//! Modes of the liquid as equivalent pendulums or spring-masses, and what stays with the tank.
+//!
+//! With A_n = int_F phi_n r^2 dr, N_n = int_F phi_n^2 r dr and B_n = int_F psi phi_n r dr
+//! (Green: lambda_n B_n = int_W phi_n (z n_r - r n_z) r ds - A_n), the momenta of the liquid in a
+//! tank that moves by X along x and turns by alpha about y are
+//!
+//!   P = m_liq X' + m_liq z_cg alpha' + sum m_n s_n'
+//!   L = m_liq z_cg X' + I_eff alpha' + sum m_n H_n s_n',
+//!   s_n'' + g lambda_n s_n = -(X'' + H_n alpha'' - g alpha)
+//!
+//!   m_n = rho pi lambda_n A_n^2/N_n,   H_n = B_n/A_n,   I_eff = rho pi int psi dpsi/dn r ds
+//!
+//! (Lomen, NASA CR-230; Dodge 2000, chapter 3; signs and the rest derived anew.) A mode that
+//! carries hardly any mass can have any height H_n; m_n H_n and m_n H_n^2 always are finite. So
+//! A_n/sqrt(N_n) and B_n/sqrt(N_n) are kept, and H_n is given only where it means something.
+
+use serde::Serialize;
+
+use crate::contour::{Contour, Problems, Volume, Wall};
+use crate::potential_flow::{Discretisation, Solution};
+
+/// Below this part of the liquid's mass a mode has no height.
+const MASSLESS: f64 = 1e-9;
+
+/// One mode.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Mode {
+    /// Number, 1 for the lowest frequency.
+    pub n: usize,
+    /// lambda_n = omega_n^2/g, 1/m.
+    pub lambda: f64,
+    /// lambda_n times the outer radius of the free surface.
+    #[serde(rename = "lambda_R", skip_serializing_if = "Option::is_none")]
+    pub lambda_r: Option<f64>,
+    /// lambda_n times the length of the box.
+    #[serde(rename = "lambda_L", skip_serializing_if = "Option::is_none")]
+    pub lambda_l: Option<f64>,
+    /// Slosh mass, kg.
+    pub m: f64,
+    /// Slosh mass over the mass of the liquid.
+    pub m_ratio: f64,
+    /// Length of the pendulum, m: 1/lambda_n.
+    pub l: f64,
+    /// Height of the spring-mass, or of the pendulum's bob at rest, m from the contour's own zero;
+    /// none where m_n < 1e-9 m_liq.
+    #[serde(rename = "H")]
+    pub height: Option<f64>,
+    /// Height of the pendulum's hinge, m: H_n + l_n.
+    pub hinge: Option<f64>,
+    /// Elevation of the surface at the outer wall per angle of the pendulum, m/rad.
+    pub wave: f64,
+    /// The same at the inner wall.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wave_inner: Option<f64>,
+    /// beta_n = int_W |grad phi|^2 dS / int |grad phi|^2 dV, 1/m, for the damping by the laminar
+    /// layer at the wall.
+    pub beta: f64,
+    /// Largest elevation per angle anywhere on the surface, m/rad (first mode only).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wave_peak: Option<f64>,
+    /// Radius where that is, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub r_peak: Option<f64>,
+    /// m_n h_n with h_n = H_n - z_cg, kg m.
+    #[serde(skip)]
+    pub m_h: f64,
+    /// m_n h_n^2, kg m2.
+    #[serde(skip)]
+    pub m_h2: f64,
+    /// Elevation per angle along the surface: (r, m/rad), from the axis or inner wall outwards.
+    #[serde(skip)]
+    pub shape: Vec<[f64; 2]>,
+}
+
+/// What moves with the tank when the first `modes` modes are pendulums.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Rest {
+    /// Number of modes that are pendulums.
+    pub modes: usize,
+    /// Fixed mass, kg.
+    pub m_0: f64,
+    /// Its height, m from the contour's own zero. It can lie outside the tank.
+    #[serde(rename = "H_0")]
+    pub height: f64,
+    /// Its inertia across the axis about its own centre, kg m2.
+    #[serde(rename = "I_0")]
+    pub inertia: f64,
+}
+
+/// The liquid as seen along one horizontal axis of a box.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Axis {
+    /// Inertia of the rigid liquid about its centre of mass, kg m2.
+    #[serde(rename = "I_frozen_cg")]
+    pub i_frozen_cg: f64,
+    /// Effective inertia of the liquid under a lid about its centre of mass, kg m2.
+    #[serde(rename = "I_eff_cg")]
+    pub i_eff_cg: f64,
+    /// The modes.
+    pub modes: Vec<Mode>,
+    /// The rest after 1, 2, ... modes.
+    pub rest: Vec<Rest>,
+}
+
+/// Both horizontal axes of a box.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Axes {
+    /// Motion along the first length.
+    pub x: Axis,
+    /// Motion along the second length.
+    pub y: Axis,
+}
+
+/// Modal parameters of a tank at one fill.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ModalData {
+    /// The tank's name.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// `revolution` or `box`.
+    pub kind: &'static str,
+    /// Density, kg/m3.
+    pub rho: f64,
+    /// Height of the free surface above the lowest point, m.
+    pub fill: f64,
+    /// Outer radius of the free surface, m.
+    #[serde(rename = "R_surface", skip_serializing_if = "Option::is_none")]
+    pub r_surface: Option<f64>,
+    /// Inner radius of the free surface, m; 0 if it reaches the axis.
+    #[serde(rename = "R_inner", skip_serializing_if = "Option::is_none")]
+    pub r_inner: Option<f64>,
+    /// Lengths of a box, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub length_x: Option<f64>,
+    /// Second length, m.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub length_y: Option<f64>,
+    /// Mass of the liquid, kg.
+    pub m_liq: f64,
+    /// Height of its centre of mass, m from the contour's own zero.
+    pub z_cg: f64,
+    /// Inertia of the rigid liquid across the axis about its centre of mass, kg m2.
+    #[serde(rename = "I_frozen_cg")]
+    pub i_frozen_cg: f64,
+    /// Inertia of the rigid liquid about the axis, kg m2.
+    #[serde(rename = "I_frozen_axis")]
+    pub i_frozen_axis: f64,
+    /// Effective inertia about the axis: what a body that turns about it drags along (a box does, a
+    /// tank of revolution does not), kg m2.
+    #[serde(rename = "I_eff_axis", skip_serializing_if = "Option::is_none")]
+    pub i_eff_axis: Option<f64>,
+    /// Effective inertia of the liquid under a lid, across the axis, about its centre of mass, kg m2.
+    #[serde(rename = "I_eff_cg")]
+    pub i_eff_cg: f64,
+    /// The modes, in the order of their frequency. Of a box, those along its first length.
+    pub modes: Vec<Mode>,
+    /// What moves with the tank after 1, 2, ... modes.
+    pub rest: Vec<Rest>,
+    /// Both axes of a box.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub axes: Option<Axes>,
+    /// Estimated error of all values but beta: relative for lambda and l; of m_liq for masses; of
+    /// m_liq R for m_n H_n and m_0 H_0; of m_liq R^2 for inertias; of R for waves and z_cg (R the
+    /// outer radius of the free surface).
+    pub error: f64,
+    /// Estimated relative error of beta.
+    pub error_beta: f64,
+    /// The wetted wall.
+    #[serde(skip)]
+    pub wall: Option<Wall>,
+}
+
+impl ModalData {
+    /// What moves with the tank when the first `modes` modes are pendulums.
+    ///
+    /// # Panics
+    /// If there are not so many modes.
+    pub fn rest(&self, modes: usize) -> Rest {
+        rest(self.m_liq, self.z_cg, self.i_eff_cg, &self.modes[..modes])
+    }
+}
+
+/// m_0 = m_liq - sum m_n; m_0 H_0 = m_liq z_cg - sum m_n H_n; I_0 = I_eff - m_0 H_0^2 - sum m_n H_n^2,
+/// all heights from z_cg.
+pub(crate) fn rest(m_liq: f64, z_cg: f64, i_eff_cg: f64, modes: &[Mode]) -> Rest {
+    let m_0 = m_liq - modes.iter().map(|m| m.m).sum::<f64>();
+    let h_0 = -modes.iter().map(|m| m.m_h).sum::<f64>() / m_0;
+    let m_h2: f64 = modes.iter().map(|m| m.m_h2).sum();
+    Rest { modes: modes.len(), m_0, height: z_cg + h_0, inertia: i_eff_cg - m_0 * h_0 * h_0 - m_h2 }
+}
+
+/// Modes and effective inertia per density, heights from the centre of mass.
+struct Raw {
+    modes: Vec<Mode>,
+    i_eff: f64,
+}
+
+/// Orders of the discretisations that are compared: with `panels` of them the larger one has at
+/// most some 800 unknowns.
+fn orders(panels: usize) -> [usize; 3] {
+    match panels {
+        0..=24 => [16, 20, 24],
+        25..=40 => [12, 16, 20],
+        41..=70 => [8, 12, 14],
+        _ => [6, 8, 10],
+    }
+}
+
+/// The estimate beyond which a third, finer discretisation is tried.
+const WANTED: f64 = 1e-7;
+/// Rounding: no estimate is below.
+const ROUNDING: f64 = 2e-11;
+/// The same for beta, whose integrand is not smooth at corners.
+const ROUNDING_BETA: f64 = 1e-6;
+
+/// Solves for `modes` modes of a liquid of density `rho` at `fill`.
+///
+/// # Errors
+/// Those of [`Contour::cut`].
+pub(crate) fn solve(contour: &Contour, rho: f64, fill: f64, modes: usize) -> Result<ModalData, Problems> {
+    let wall = contour.cut(fill)?;
+    let volume = Volume::of(&wall);
+    let coarse = Discretisation::new(&wall.segments, modes, 16);
+    let [first, second, third] = orders(coarse.panel_count());
+    let mut known = raw(&coarse.with_order(first), &wall, &volume, modes);
+    let mut better = raw(&coarse.with_order(second), &wall, &volume, modes);
+    let (mut error, mut error_beta) = difference(&known, &better, &wall, &volume);
+    if error > WANTED {
+        known = better;
+        better = raw(&coarse.with_order(third), &wall, &volume, modes);
+        (error, error_beta) = difference(&known, &better, &wall, &volume);
+    }
+    let m_liq = rho * volume.volume;
+    for mode in &mut better.modes {
+        mode.m *= rho;
+        mode.m_h *= rho;
+        mode.m_h2 *= rho;
+        mode.m_ratio = mode.m / m_liq;
+        if mode.m >= MASSLESS * m_liq {
+            let height = volume.z_cg + mode.m_h / mode.m;
+            mode.height = Some(height);
+            mode.hinge = Some(height + mode.l);
+        }
+    }
+    let i_eff_cg = rho * better.i_eff;
+    let modes = better.modes;
+    Ok(ModalData {
+        name: None,
+        kind: "revolution",
+        rho,
+        fill,
+        r_surface: Some(wall.r_outer),
+        r_inner: Some(wall.r_inner),
+        length_x: None,
+        length_y: None,
+        m_liq,
+        z_cg: volume.z_cg,
+        i_frozen_cg: rho * volume.across,
+        i_frozen_axis: rho * volume.axial,
+        i_eff_axis: None,
+        i_eff_cg,
+        rest: (1..=modes.len()).map(|k| rest(m_liq, volume.z_cg, i_eff_cg, &modes[..k])).collect(),
+        modes,
+        axes: None,
+        error: error.max(ROUNDING),
+        error_beta: error_beta.max(ROUNDING_BETA),
+        wall: Some(wall),
+    })
+}
+
+/// Largest differences between two discretisations, as defined at [`ModalData::error`].
+fn difference(a: &Raw, b: &Raw, wall: &Wall, volume: &Volume) -> (f64, f64) {
+    let (v, r) = (volume.volume, wall.r_outer);
+    let mut error = (a.i_eff - b.i_eff).abs() / (v * r * r);
+    let mut error_beta: f64 = 0.0;
+    for (a, b) in a.modes.iter().zip(&b.modes) {
+        let waves = (a.wave - b.wave).abs().max((a.wave_inner.unwrap_or(0.0) - b.wave_inner.unwrap_or(0.0)).abs());
+        let all = [
+            (a.lambda / b.lambda - 1.0).abs(),
+            (a.m - b.m).abs() / v,
+            (a.m_h - b.m_h).abs() / (v * r),
+            (a.m_h2 - b.m_h2).abs() / (v * r * r),
+            waves / r,
+        ];
+        error = all.into_iter().fold(error, f64::max);
+        error_beta = error_beta.max((a.beta / b.beta - 1.0).abs());
+    }
+    (error, error_beta)
+}
+
+/// Modal parameters from the solution at one discretisation, for density 1.
+fn raw(mesh: &Discretisation, wall: &Wall, volume: &Volume, modes: usize) -> Raw {
+    let solution: Solution = mesh.solve(modes, volume.z_cg);
+    let weights = mesh.weights();
+    let points: Vec<_> = mesh.points().collect();
+    let surface = mesh.on_surface();
+    let pitch: Vec<f64> = points.iter().map(|(p, n)| (p[1] - solution.z0) * n[0] - p[0] * n[1]).collect();
+    let sum = |range: core::ops::Range<usize>, f: &dyn Fn(usize) -> f64| -> f64 {
+        range.map(|i| weights[i] * f(i)).sum()
+    };
+    let pi = core::f64::consts::PI;
+    let i_eff = pi * sum(0..points.len(), &|i| solution.psi[i] * pitch[i]);
+    let of_mode = |(k, (&lambda, phi)): (usize, (&f64, &Vec<f64>))| {
+        let big_n = sum(surface.clone(), &|i| phi[i] * phi[i]);
+        let a = sum(surface.clone(), &|i| phi[i] * points[i].0[0]);
+        let b = (sum(0..surface.start, &|i| phi[i] * pitch[i]) - a) / lambda;
+        // elevation per angle of the pendulum
+        let scale = a / big_n;
+        let mut shape: Vec<[f64; 2]> =
+            mesh.along_surface(phi, 24).iter().rev().map(|[r, u]| [*r, scale * u]).collect();
+        if let Some(first) = shape.first_mut().filter(|_| wall.r_inner == 0.0) {
+            *first = [0.0, 0.0];
+        }
+        let wave = shape.last().map_or(0.0, |p| p[1]);
+        let wave_inner = shape.first().filter(|_| wall.r_inner > 0.0).map(|p| p[1]);
+        let peak = if k == 0 { Some(mesh.surface_peak(phi)) } else { None };
+        Mode {
+            n: k + 1,
+            lambda,
+            lambda_r: Some(lambda * wall.r_outer),
+            lambda_l: None,
+            m: pi * lambda * a * a / big_n,
+            m_ratio: 0.0,
+            l: 1.0 / lambda,
+            height: None,
+            hinge: None,
+            wave,
+            wave_inner,
+            beta: mesh.wall_gradient(phi) / (lambda * big_n),
+            wave_peak: peak.map(|p| scale * p[1]),
+            r_peak: peak.map(|p| p[0]),
+            m_h: pi * lambda * a * b / big_n,
+            m_h2: pi * lambda * b * b / big_n,
+            shape,
+        }
+    };
+    let modes = solution.lambda.iter().zip(&solution.phi).enumerate().map(of_mode).collect();
+    Raw { modes, i_eff }
+}
+
