@@ -24,7 +24,7 @@ impl From<String> for Problems {
 }
 
 /// Larger tanks are taken for a drawing in millimetres, m.
-const LARGEST: f64 = 100.0;
+pub(crate) const LARGEST: f64 = 100.0;
 /// Ends of segments are joined if they are closer than this, over the tank's size.
 const JOINED: f64 = 1e-6;
 /// Heights this close, over the tank's size, are the same.

@@ -16,7 +16,7 @@
 
 use serde::Serialize;
 
-use crate::contour::{Contour, Problems, Volume, Wall};
+use crate::contour::{Volume, Wall};
 use crate::potential_flow::{Discretisation, Solution};
 
 /// Below this part of the liquid's mass a mode has no height.
@@ -170,7 +170,87 @@ pub struct ModalData {
     pub wall: Option<Wall>,
 }
 
+/// The free surface in one mode.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Surface {
+    /// (r, elevation per angle), from the axis or inner wall outwards.
+    pub(crate) shape: Vec<[f64; 2]>,
+    /// Largest elevation per angle: (r, m/rad).
+    pub(crate) peak: Option<[f64; 2]>,
+}
+
+impl Mode {
+    /// `mass` is m, m h, m h^2 with h from the centre of mass at `z_cg`.
+    pub(crate) fn new(
+        n: usize,
+        lambda: f64,
+        mass: [f64; 3],
+        z_cg: f64,
+        m_liq: f64,
+        surface: Surface,
+        beta: f64,
+    ) -> Mode {
+        let [m, m_h, m_h2] = mass;
+        let l = 1.0 / lambda;
+        let height = (m >= MASSLESS * m_liq).then_some(z_cg + m_h / m);
+        Mode {
+            n,
+            lambda,
+            lambda_r: None,
+            lambda_l: None,
+            m,
+            m_ratio: m / m_liq,
+            l,
+            height,
+            hinge: height.map(|height| height + l),
+            wave: surface.shape.last().map_or(0.0, |p| p[1]),
+            wave_inner: None,
+            beta,
+            wave_peak: surface.peak.map(|p| p[1]),
+            r_peak: surface.peak.map(|p| p[0]),
+            m_h,
+            m_h2,
+            shape: surface.shape,
+        }
+    }
+}
+
 impl ModalData {
+    /// `inertias`: rigid across the axis about the centre of mass, rigid about the axis, effective.
+    pub(crate) fn new(
+        kind: &'static str,
+        rho: f64,
+        fill: f64,
+        m_liq: f64,
+        z_cg: f64,
+        inertias: [f64; 3],
+        modes: Vec<Mode>,
+    ) -> ModalData {
+        let [i_frozen_cg, i_frozen_axis, i_eff_cg] = inertias;
+        ModalData {
+            name: None,
+            kind,
+            rho,
+            fill,
+            r_surface: None,
+            r_inner: None,
+            length_x: None,
+            length_y: None,
+            m_liq,
+            z_cg,
+            i_frozen_cg,
+            i_frozen_axis,
+            i_eff_axis: None,
+            i_eff_cg,
+            rest: (1..=modes.len()).map(|k| rest(m_liq, z_cg, i_eff_cg, &modes[..k])).collect(),
+            modes,
+            axes: None,
+            error: 0.0,
+            error_beta: 0.0,
+            wall: None,
+        }
+    }
+
     /// What moves with the tank when the first `modes` modes are pendulums.
     ///
     /// # Panics
@@ -189,8 +269,8 @@ pub(crate) fn rest(m_liq: f64, z_cg: f64, i_eff_cg: f64, modes: &[Mode]) -> Rest
     Rest { modes: modes.len(), m_0, height: z_cg + h_0, inertia: i_eff_cg - m_0 * h_0 * h_0 - m_h2 }
 }
 
-/// Modes and effective inertia per density, heights from the centre of mass.
-struct Raw {
+/// Modes and effective inertia from one discretisation.
+struct Approximation {
     modes: Vec<Mode>,
     i_eff: f64,
 }
@@ -213,73 +293,43 @@ const ROUNDING: f64 = 2e-11;
 /// The same for beta, whose integrand is not smooth at corners.
 const ROUNDING_BETA: f64 = 1e-6;
 
-/// Solves for `modes` modes of a liquid of density `rho` at `fill`.
-///
-/// # Errors
-/// Those of [`Contour::cut`].
-pub(crate) fn solve(contour: &Contour, rho: f64, fill: f64, modes: usize) -> Result<ModalData, Problems> {
-    let wall = contour.cut(fill)?;
+/// The first `modes` modes of a liquid of density `rho` above `wall`.
+pub(crate) fn solve(wall: Wall, rho: f64, fill: f64, modes: usize) -> ModalData {
     let volume = Volume::of(&wall);
     let coarse = Discretisation::new(&wall.segments, modes, 16);
     let [first, second, third] = orders(coarse.panel_count());
-    let mut known = raw(&coarse.with_order(first), &wall, &volume, modes);
-    let mut better = raw(&coarse.with_order(second), &wall, &volume, modes);
-    let (mut error, mut error_beta) = difference(&known, &better, &wall, &volume);
+    let approximate = |order| approximate(&coarse.with_order(order), &wall, &volume, rho, modes);
+    let mut known = approximate(first);
+    let mut better = approximate(second);
+    let (mut error, mut error_beta) = difference(&known, &better, &wall, rho * volume.volume);
     if error > WANTED {
         known = better;
-        better = raw(&coarse.with_order(third), &wall, &volume, modes);
-        (error, error_beta) = difference(&known, &better, &wall, &volume);
+        better = approximate(third);
+        (error, error_beta) = difference(&known, &better, &wall, rho * volume.volume);
     }
+    let inertias = [rho * volume.across, rho * volume.axial, better.i_eff];
     let m_liq = rho * volume.volume;
-    for mode in &mut better.modes {
-        mode.m *= rho;
-        mode.m_h *= rho;
-        mode.m_h2 *= rho;
-        mode.m_ratio = mode.m / m_liq;
-        if mode.m >= MASSLESS * m_liq {
-            let height = volume.z_cg + mode.m_h / mode.m;
-            mode.height = Some(height);
-            mode.hinge = Some(height + mode.l);
-        }
-    }
-    let i_eff_cg = rho * better.i_eff;
-    let modes = better.modes;
-    Ok(ModalData {
-        name: None,
-        kind: "revolution",
-        rho,
-        fill,
-        r_surface: Some(wall.r_outer),
-        r_inner: Some(wall.r_inner),
-        length_x: None,
-        length_y: None,
-        m_liq,
-        z_cg: volume.z_cg,
-        i_frozen_cg: rho * volume.across,
-        i_frozen_axis: rho * volume.axial,
-        i_eff_axis: None,
-        i_eff_cg,
-        rest: (1..=modes.len()).map(|k| rest(m_liq, volume.z_cg, i_eff_cg, &modes[..k])).collect(),
-        modes,
-        axes: None,
-        error: error.max(ROUNDING),
-        error_beta: error_beta.max(ROUNDING_BETA),
-        wall: Some(wall),
-    })
+    let mut data = ModalData::new("revolution", rho, fill, m_liq, volume.z_cg, inertias, better.modes);
+    data.r_surface = Some(wall.r_outer);
+    data.r_inner = Some(wall.r_inner);
+    data.error = error.max(ROUNDING);
+    data.error_beta = error_beta.max(ROUNDING_BETA);
+    data.wall = Some(wall);
+    data
 }
 
 /// Largest differences between two discretisations, as defined at [`ModalData::error`].
-fn difference(a: &Raw, b: &Raw, wall: &Wall, volume: &Volume) -> (f64, f64) {
-    let (v, r) = (volume.volume, wall.r_outer);
-    let mut error = (a.i_eff - b.i_eff).abs() / (v * r * r);
+fn difference(a: &Approximation, b: &Approximation, wall: &Wall, m_liq: f64) -> (f64, f64) {
+    let r = wall.r_outer;
+    let mut error = (a.i_eff - b.i_eff).abs() / (m_liq * r * r);
     let mut error_beta: f64 = 0.0;
     for (a, b) in a.modes.iter().zip(&b.modes) {
         let waves = (a.wave - b.wave).abs().max((a.wave_inner.unwrap_or(0.0) - b.wave_inner.unwrap_or(0.0)).abs());
         let all = [
             (a.lambda / b.lambda - 1.0).abs(),
-            (a.m - b.m).abs() / v,
-            (a.m_h - b.m_h).abs() / (v * r),
-            (a.m_h2 - b.m_h2).abs() / (v * r * r),
+            (a.m - b.m).abs() / m_liq,
+            (a.m_h - b.m_h).abs() / (m_liq * r),
+            (a.m_h2 - b.m_h2).abs() / (m_liq * r * r),
             waves / r,
         ];
         error = all.into_iter().fold(error, f64::max);
@@ -288,8 +338,14 @@ fn difference(a: &Raw, b: &Raw, wall: &Wall, volume: &Volume) -> (f64, f64) {
     (error, error_beta)
 }
 
-/// Modal parameters from the solution at one discretisation, for density 1.
-fn raw(mesh: &Discretisation, wall: &Wall, volume: &Volume, modes: usize) -> Raw {
+/// Modal parameters from the solution at one discretisation.
+fn approximate(
+    mesh: &Discretisation,
+    wall: &Wall,
+    volume: &Volume,
+    rho: f64,
+    modes: usize,
+) -> Approximation {
     let solution: Solution = mesh.solve(modes, volume.z_cg);
     let weights = mesh.weights();
     let points: Vec<_> = mesh.points().collect();
@@ -298,8 +354,8 @@ fn raw(mesh: &Discretisation, wall: &Wall, volume: &Volume, modes: usize) -> Raw
     let sum = |range: core::ops::Range<usize>, f: &dyn Fn(usize) -> f64| -> f64 {
         range.map(|i| weights[i] * f(i)).sum()
     };
-    let pi = core::f64::consts::PI;
-    let i_eff = pi * sum(0..points.len(), &|i| solution.psi[i] * pitch[i]);
+    let rho_pi = rho * core::f64::consts::PI;
+    let i_eff = rho_pi * sum(0..points.len(), &|i| solution.psi[i] * pitch[i]);
     let of_mode = |(k, (&lambda, phi)): (usize, (&f64, &Vec<f64>))| {
         let big_n = sum(surface.clone(), &|i| phi[i] * phi[i]);
         let a = sum(surface.clone(), &|i| phi[i] * points[i].0[0]);
@@ -311,30 +367,16 @@ fn raw(mesh: &Discretisation, wall: &Wall, volume: &Volume, modes: usize) -> Raw
         if let Some(first) = shape.first_mut().filter(|_| wall.r_inner == 0.0) {
             *first = [0.0, 0.0];
         }
-        let wave = shape.last().map_or(0.0, |p| p[1]);
-        let wave_inner = shape.first().filter(|_| wall.r_inner > 0.0).map(|p| p[1]);
-        let peak = if k == 0 { Some(mesh.surface_peak(phi)) } else { None };
-        Mode {
-            n: k + 1,
-            lambda,
-            lambda_r: Some(lambda * wall.r_outer),
-            lambda_l: None,
-            m: pi * lambda * a * a / big_n,
-            m_ratio: 0.0,
-            l: 1.0 / lambda,
-            height: None,
-            hinge: None,
-            wave,
-            wave_inner,
-            beta: mesh.wall_gradient(phi) / (lambda * big_n),
-            wave_peak: peak.map(|p| scale * p[1]),
-            r_peak: peak.map(|p| p[0]),
-            m_h: pi * lambda * a * b / big_n,
-            m_h2: pi * lambda * b * b / big_n,
-            shape,
-        }
+        let peak = (k == 0).then(|| mesh.surface_peak(phi)).map(|[r, u]| [r, scale * u]);
+        let mass = [a * a, a * b, b * b].map(|x| rho_pi * lambda * x / big_n);
+        let beta = mesh.wall_gradient(phi) / (lambda * big_n);
+        let surface = Surface { shape, peak };
+        let mut mode = Mode::new(k + 1, lambda, mass, volume.z_cg, rho * volume.volume, surface, beta);
+        mode.lambda_r = Some(lambda * wall.r_outer);
+        mode.wave_inner = mode.shape.first().filter(|_| wall.r_inner > 0.0).map(|p| p[1]);
+        mode
     };
     let modes = solution.lambda.iter().zip(&solution.phi).enumerate().map(of_mode).collect();
-    Raw { modes, i_eff }
+    Approximation { modes, i_eff }
 }
 

@@ -1,0 +1,275 @@
+//! Tanks whose modes are known in closed form: upright circular and annular cylinders, boxes.
+//!
+//! Heights in the formulas are above the flat bottom. Separation of variables; the cylinder as in
+//! Abramson, NASA SP-106, and Dodge (2000).
+
+use core::f64::consts::PI;
+
+use crate::contour::Wall;
+use crate::curve::Segment;
+use crate::modal::{Axes, Axis, ModalData, Mode, Surface, rest};
+
+/// Terms of the sums over all modes; they fall as the fifth power.
+const TERMS: usize = 400;
+/// Error of the closed forms: the tails of the sums and rounding.
+const ERROR: f64 = 1e-11;
+
+fn j1_slope(x: f64) -> f64 {
+    libm::j0(x) - libm::j1(x) / x
+}
+
+fn y1_slope(x: f64) -> f64 {
+    libm::y0(x) - libm::y1(x) / x
+}
+
+/// The first `count` zeros xi_n of J1', by Newton's method (J1'' = -J1'/x - (1 - 1/x^2) J1).
+pub fn zeros_of_j1_slope(count: usize) -> Vec<f64> {
+    let zero = |n: usize| {
+        // McMahon: b - (mu + 3)/(8 b), b = (n - 3/4) pi, mu = 4 (DLMF 10.21.20)
+        let b = (n as f64 - 0.75) * PI + if n == 1 { 1.15 } else { 0.0 };
+        let mut x = if n == 1 { 1.84 } else { b - 7.0 / (8.0 * b) };
+        for _ in 0..4 {
+            let slope = j1_slope(x);
+            x += slope / (slope / x + (1.0 - 1.0 / (x * x)) * libm::j1(x));
+        }
+        x
+    };
+    (1..=count).map(zero).collect()
+}
+
+/// lambda = k tanh(k h), bob at h - (2/k) tanh(k h/2): every tank with vertical walls and a flat
+/// bottom, k the wave number of its mode.
+fn upright_mode(n: usize, k: f64, h: f64, m: f64, m_liq: f64, surface: Surface, beta: f64) -> Mode {
+    let lambda = k * (k * h).tanh();
+    let height = h - 2.0 / k * (0.5 * k * h).tanh();
+    Mode::new(n, lambda, [m, m * (height - 0.5 * h), m * (height - 0.5 * h).powi(2)], 0.5 * h, m_liq, surface, beta)
+}
+
+/// Shape of a mode sampled over the surface, and its peak.
+fn sampled(inner: f64, outer: f64, elevation: impl Fn(f64) -> f64) -> Surface {
+    let count = 200;
+    let radius = |i: usize| inner + (outer - inner) * i as f64 / count as f64;
+    Surface { shape: (0..=count).map(|i| [radius(i), elevation(radius(i))]).collect(), peak: None }
+}
+
+/// sinh(x)/cosh(y) for 0 <= x <= 2 y without overflow, and the like: values over cosh(kh)^2.
+struct Hyperbolic {
+    /// 1/cosh(kh)^2
+    floor: f64,
+    /// sinh(2 kh)/(4 k cosh(kh)^2) = tanh(kh)/(2 k)
+    half_tanh: f64,
+    /// h/(2 cosh(kh)^2)
+    half_height: f64,
+}
+
+impl Hyperbolic {
+    fn new(k: f64, h: f64) -> Hyperbolic {
+        let sech = 1.0 / (k * h).cosh();
+        let floor = sech * sech;
+        Hyperbolic { floor, half_tanh: 0.5 * (k * h).tanh() / k, half_height: 0.5 * h * floor }
+    }
+}
+
+/// Upright circular cylinder of radius `radius` filled to `h`, m; `rho` in kg/m3.
+///
+///   m_n/m_liq = 2 R tanh(kh)/(xi (xi^2 - 1) h),  k = xi/R,  wave 2 R/(xi^2 - 1)
+///   I_eff/m_liq = h^2/12 - 3 R^2/4 + (16 R^3/h) sum tanh(k h/2)/(xi^3 (xi^2 - 1))
+///   beta R = (xi^2 + 1)/(xi^2 - 1) + 2 xi (1 - h/R)/sinh(2 xi h/R)   (Case and Parkinson 1957)
+pub fn cylinder(radius: f64, h: f64, rho: f64, modes: usize) -> ModalData {
+    let (r, m_liq) = (radius, rho * PI * radius * radius * h);
+    let xi = zeros_of_j1_slope(TERMS.max(modes));
+    let of_mode = |n: usize| {
+        let (xi, k) = (xi[n], xi[n] / r);
+        let square = xi * xi - 1.0;
+        let m = m_liq * 2.0 * r * (k * h).tanh() / (xi * square * h);
+        let wave = 2.0 * r / square;
+        let mut surface = sampled(0.0, r, |x| wave * libm::j1(k * x) / libm::j1(xi));
+        if n == 0 {
+            surface.peak = Some([r, wave]);
+        }
+        let shallow = if 2.0 * k * h > 700.0 { 0.0 } else { 2.0 * xi * (1.0 - h / r) / (2.0 * k * h).sinh() };
+        let beta = ((xi * xi + 1.0) / square + shallow) / r;
+        let mut mode = upright_mode(n + 1, k, h, m, m_liq, surface, beta);
+        mode.lambda_r = Some(mode.lambda * r);
+        mode
+    };
+    let sum: f64 = xi.iter().map(|x| (0.5 * x * h / r).tanh() / (x.powi(3) * (x * x - 1.0))).sum();
+    let i_eff = m_liq * (h * h / 12.0 - 0.75 * r * r + 16.0 * r.powi(3) / h * sum);
+    let wall = vec![Segment::line([0.0, 0.0], [r, 0.0]), Segment::line([r, 0.0], [r, h])];
+    let inertias = [m_liq * (0.25 * r * r + h * h / 12.0), 0.5 * m_liq * r * r, i_eff];
+    upright([0.0, r], h, rho, m_liq, inertias, (0..modes).map(of_mode).collect(), wall)
+}
+
+/// Zeros k of C'(R_i), C(r) = J1(k r) Y1'(k R) - Y1(k r) J1'(k R), 1/m.
+pub fn annular_wave_numbers(inner: f64, outer: f64, count: usize) -> Vec<f64> {
+    let slope = |k: f64| {
+        j1_slope(k * inner) * y1_slope(k * outer) - y1_slope(k * inner) * j1_slope(k * outer)
+    };
+    let step = (0.1 / outer).min(0.05 * PI / (outer - inner));
+    let mut found = Vec::with_capacity(count);
+    let mut k = 0.5 / outer;
+    let mut before = slope(k);
+    while found.len() < count {
+        let after = slope(k + step);
+        if (before > 0.0) != (after > 0.0) {
+            let (mut a, mut b) = (k, k + step);
+            for _ in 0..60 {
+                let middle = 0.5 * (a + b);
+                if (slope(middle) > 0.0) == (before > 0.0) {
+                    a = middle;
+                } else {
+                    b = middle;
+                }
+            }
+            found.push(0.5 * (a + b));
+        }
+        k += step;
+        before = after;
+    }
+    found
+}
+
+/// Upright annular cylinder between the radii `inner` and `outer`, filled to `h`, m.
+///
+///   A = [r C]/k^2,  N = [(r^2 - 1/k^2) C^2]/2  (from R_i to R),  m_n = rho pi lambda A^2/N
+///   I_eff = rho pi {(R^2 - R_i^2) h^3/12 - (3/4) h (R^4 - R_i^4) + sum (8 A^2/(N k)) tanh(k h/2)}
+pub fn annulus(inner: f64, outer: f64, h: f64, rho: f64, modes: usize) -> ModalData {
+    let (ri, ro) = (inner, outer);
+    let area = ro * ro - ri * ri;
+    let m_liq = rho * PI * area * h;
+    struct Radial {
+        k: f64,
+        a: f64,
+        n: f64,
+        at_inner: f64,
+        at_outer: f64,
+    }
+    let radial = |k: f64| {
+        let c = |r: f64| libm::j1(k * r) * y1_slope(k * ro) - libm::y1(k * r) * j1_slope(k * ro);
+        let (at_inner, at_outer) = (c(ri), c(ro));
+        let a = (ro * at_outer - ri * at_inner) / (k * k);
+        let part = |r: f64, c: f64| 0.5 * (r * r - 1.0 / (k * k)) * c * c;
+        Radial { k, a, n: part(ro, at_outer) - part(ri, at_inner), at_inner, at_outer }
+    };
+    let all: Vec<Radial> = annular_wave_numbers(ri, ro, 100.max(modes)).into_iter().map(radial).collect();
+    let of_mode = |i: usize| {
+        let Radial { k, a, n, at_inner, at_outer } = all[i];
+        let m = rho * PI * k * (k * h).tanh() * a * a / n;
+        let c = |r: f64| libm::j1(k * r) * y1_slope(k * ro) - libm::y1(k * r) * j1_slope(k * ro);
+        let mut surface = sampled(ri, ro, |r| a * c(r) / n);
+        if i == 0 {
+            let peak = surface.shape.iter().copied().max_by(|x, y| x[1].abs().total_cmp(&y[1].abs()));
+            surface.peak = peak;
+        }
+        // floor: k^2 N/cosh^2; a wall at R: R C^2 int (k^2 sinh^2 + cosh^2/R^2) dz/cosh^2
+        let t = Hyperbolic::new(k, h);
+        let at_wall = |r: f64, c: f64| {
+            r * c * c * (k * k * (t.half_tanh - t.half_height) + (t.half_tanh + t.half_height) / (r * r))
+        };
+        let layer = k * k * n * t.floor + at_wall(ri, at_inner) + at_wall(ro, at_outer);
+        let mut mode = upright_mode(i + 1, k, h, m, m_liq, surface, layer / (k * (k * h).tanh() * n));
+        mode.wave_inner = mode.shape.first().map(|p| p[1]);
+        mode.lambda_r = Some(mode.lambda * ro);
+        mode
+    };
+    let sum: f64 = all.iter().map(|x| 8.0 * x.a * x.a / (x.n * x.k) * (0.5 * x.k * h).tanh()).sum();
+    let rigid = area * h.powi(3) / 12.0 - 0.75 * h * (ro.powi(4) - ri.powi(4));
+    let axial = 0.5 * m_liq * (ro * ro + ri * ri);
+    let inertias = [0.5 * axial + m_liq * h * h / 12.0, axial, rho * PI * (rigid + sum)];
+    let wall = vec![
+        Segment::line([ri, h], [ri, 0.0]),
+        Segment::line([ri, 0.0], [ro, 0.0]),
+        Segment::line([ro, 0.0], [ro, h]),
+    ];
+    let mut data = upright([ri, ro], h, rho, m_liq, inertias, (0..modes).map(of_mode).collect(), wall);
+    data.error = 1e-10; // the sum's tail after 100 terms
+    data
+}
+
+/// Result for a tank of revolution with vertical walls; `inertias` rigid across and about the axis,
+/// effective.
+fn upright(
+    [r_inner, r_outer]: [f64; 2],
+    h: f64,
+    rho: f64,
+    m_liq: f64,
+    inertias: [f64; 3],
+    modes: Vec<Mode>,
+    segments: Vec<Segment>,
+) -> ModalData {
+    let wall = Wall { segments, r_outer, r_inner, z_surface: h };
+    let mut data = ModalData::new("revolution", rho, h, m_liq, 0.5 * h, inertias, modes);
+    data.r_surface = Some(r_outer);
+    data.r_inner = Some(r_inner);
+    data.error = ERROR;
+    data.error_beta = ERROR;
+    data.wall = Some(wall);
+    data
+}
+
+/// Box, `length` along the motion and `width` across it, filled to `h`, m: one axis.
+///
+///   k = (2 n - 1) pi/a,  m_n/m_liq = 8 tanh(kh)/(a^2 h k^3),  wave 4/(a k^2)
+///   I_eff/m_liq = h^2/12 - a^2/4 + (64/(a^2 h)) sum tanh(k h/2)/k^5
+///   beta = 2/a + 2/w + 2 k (1 - 2 h/a)/sinh(2 k h)                  (Keulegan 1959)
+pub fn box_axis(length: f64, width: f64, h: f64, rho: f64, modes: usize) -> Axis {
+    let a = length;
+    let m_liq = rho * a * width * h;
+    let wave_number = |n: usize| (2 * n + 1) as f64 * PI / a;
+    let of_mode = |n: usize| {
+        let k = wave_number(n);
+        let m = m_liq * 8.0 * (k * h).tanh() / (a * a * h * k.powi(3));
+        let wave = 4.0 / (a * k * k);
+        let sign = if n % 2 == 0 { 1.0 } else { -1.0 };
+        let surface = sampled(0.0, 0.5 * a, |x| sign * wave * (k * x).sin());
+        let shallow = if 2.0 * k * h > 700.0 { 0.0 } else { 2.0 * k * (1.0 - 2.0 * h / a) / (2.0 * k * h).sinh() };
+        let beta = 2.0 / a + 2.0 / width + shallow;
+        let mut mode = upright_mode(n + 1, k, h, m, m_liq, surface, beta);
+        mode.lambda_l = Some(mode.lambda * a);
+        mode
+    };
+    let modes: Vec<Mode> = (0..modes).map(of_mode).collect();
+    let i_eff_cg = m_liq * effective(a, h);
+    Axis {
+        i_frozen_cg: m_liq * (a * a + h * h) / 12.0,
+        i_eff_cg,
+        rest: (1..=modes.len()).map(|k| rest(m_liq, 0.5 * h, i_eff_cg, &modes[..k])).collect(),
+        modes,
+    }
+}
+
+/// Effective inertia per mass of a full rectangle a x b that turns in its plane about its centre:
+/// b^2/12 - a^2/4 + (64/(a^2 b)) sum tanh(k b/2)/k^5, k = (2 n - 1) pi/a. Symmetric in a and b.
+fn effective(a: f64, b: f64) -> f64 {
+    let sum: f64 = (0..TERMS)
+        .map(|n| {
+            let k = (2 * n + 1) as f64 * PI / a;
+            (0.5 * k * b).tanh() / k.powi(5)
+        })
+        .sum();
+    b * b / 12.0 - 0.25 * a * a + 64.0 / (a * a * b) * sum
+}
+
+/// Inertia of the liquid that a box of `length_x` x `length_y` drags along when it turns about its
+/// vertical axis, filled to `h`, kg m2: `tank.I_own` of a hub that turns. The twisting modes of the
+/// surface are counted as rigid.
+pub fn box_yaw_inertia(length_x: f64, length_y: f64, h: f64, rho: f64) -> f64 {
+    rho * length_x * length_y * h * effective(length_x, length_y)
+}
+
+/// Box of `length_x` x `length_y`, filled to `h`, m.
+pub fn rectangular(length_x: f64, length_y: f64, h: f64, rho: f64, modes: usize) -> ModalData {
+    let x = box_axis(length_x, length_y, h, rho, modes);
+    let y = box_axis(length_y, length_x, h, rho, modes);
+    let m_liq = rho * length_x * length_y * h;
+    let axial = m_liq * (length_x * length_x + length_y * length_y) / 12.0;
+    let inertias = [x.i_frozen_cg, axial, x.i_eff_cg];
+    let mut data = ModalData::new("box", rho, h, m_liq, 0.5 * h, inertias, x.modes.clone());
+    data.length_x = Some(length_x);
+    data.length_y = Some(length_y);
+    data.i_eff_axis = Some(box_yaw_inertia(length_x, length_y, h, rho));
+    data.axes = Some(Axes { x, y });
+    data.error = ERROR;
+    data.error_beta = ERROR;
+    data
+}

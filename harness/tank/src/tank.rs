@@ -1,0 +1,421 @@
+//! A tank from a TOML file, and its modal parameters at a fill.
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use crate::closed_form;
+use crate::contour::{Contour, Problems};
+use crate::curve::{Curve, Point, Segment};
+use crate::modal::{self, ModalData};
+use crate::spline::spline;
+
+/// The file as it is written.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    name: Option<String>,
+    density: Option<f64>,
+    profile: Option<Vec<Entry>>,
+    #[serde(rename = "box")]
+    lengths: Option<[f64; 2]>,
+    points: Option<PathBuf>,
+    spline: Option<bool>,
+    shape: Option<Shape>,
+}
+
+/// One entry of `profile`.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Entry {
+    Line([f64; 4]),
+    Arc([f64; 5]),
+    Ellipse([f64; 6]),
+    Cassini([f64; 5]),
+    Cosine([f64; 6]),
+}
+
+/// A tank given by its dimensions, m and degrees. Its lowest point is at z = 0.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Shape {
+    /// Upright circular cylinder with flat ends.
+    Cylinder {
+        /// Radius.
+        radius: f64,
+        /// Height.
+        height: f64,
+    },
+    /// Sphere.
+    Sphere {
+        /// Radius.
+        radius: f64,
+    },
+    /// Ellipsoid of revolution about the vertical axis.
+    Spheroid {
+        /// Radius of the equator.
+        radius: f64,
+        /// Half of its height.
+        half_height: f64,
+    },
+    /// Cone with its apex at the bottom, open at the top.
+    Cone {
+        /// Angle between axis and wall, degrees.
+        half_angle: f64,
+        /// Height.
+        height: f64,
+    },
+    /// Cylinder with elliptical domes.
+    DomedCylinder {
+        /// Radius.
+        radius: f64,
+        /// Height of the cylindrical part.
+        height: f64,
+        /// Depth of the bottom dome; 0 is flat, below 0 it bulges into the tank.
+        bottom: f64,
+        /// Height of the top dome; 0 is flat.
+        top: f64,
+    },
+    /// Cylinder with torispherical heads: a spherical crown and a toroidal knuckle.
+    Torispherical {
+        /// Radius of the cylinder.
+        radius: f64,
+        /// Height of the cylindrical part.
+        height: f64,
+        /// Radius of the crown.
+        crown_radius: f64,
+        /// Radius of the knuckle.
+        knuckle_radius: f64,
+    },
+    /// Upright annular cylinder with a flat bottom.
+    Annulus {
+        /// Radius of the inner wall.
+        inner_radius: f64,
+        /// Radius of the outer wall.
+        outer_radius: f64,
+        /// Height.
+        height: f64,
+    },
+    /// Ring with a circular section, its axis vertical.
+    Torus {
+        /// Radius of the ring's centre line.
+        ring_radius: f64,
+        /// Radius of the section.
+        tube_radius: f64,
+    },
+}
+
+impl Shape {
+    /// The generating curve.
+    ///
+    /// # Errors
+    /// Every dimension that is not allowed.
+    pub fn segments(&self) -> Result<Vec<Segment>, Problems> {
+        let mut problems = Vec::new();
+        let mut above = |name: &str, value: f64, limit: f64| {
+            if !(value > limit && value.is_finite()) {
+                problems.push(format!("shape: {name} is {value}; it must be a number above {limit}."));
+            }
+        };
+        let segments = match *self {
+            Shape::Cylinder { radius, height } => {
+                above("radius", radius, 0.0);
+                above("height", height, 0.0);
+                vec![Segment::line([0.0, 0.0], [radius, 0.0]), Segment::line([radius, 0.0], [radius, height])]
+            }
+            Shape::Sphere { radius } => {
+                above("radius", radius, 0.0);
+                vec![Segment::arc([0.0, radius], radius, -90.0, 90.0)]
+            }
+            Shape::Spheroid { radius, half_height } => {
+                above("radius", radius, 0.0);
+                above("half_height", half_height, 0.0);
+                vec![Segment::ellipse([0.0, half_height], radius, half_height, -90.0, 90.0)]
+            }
+            Shape::Cone { half_angle, height } => {
+                above("half_angle", half_angle, 0.0);
+                above("90 - half_angle", 90.0 - half_angle, 0.0);
+                above("height", height, 0.0);
+                vec![Segment::line([0.0, 0.0], [height * half_angle.to_radians().tan(), height])]
+            }
+            Shape::DomedCylinder { radius, height, bottom, top } => {
+                above("radius", radius, 0.0);
+                above("height", height, 0.0);
+                above("bottom", bottom, -height);
+                above("top", top, -f64::MIN_POSITIVE);
+                // the bottom edge of the cylindrical part
+                let z = bottom.max(0.0);
+                let mut segments = vec![if bottom == 0.0 {
+                    Segment::line([0.0, 0.0], [radius, 0.0])
+                } else {
+                    let from = if bottom > 0.0 { -90.0 } else { 90.0 };
+                    Segment::ellipse([0.0, z], radius, bottom.abs(), from, 0.0)
+                }];
+                segments.push(Segment::line([radius, z], [radius, z + height]));
+                if top > 0.0 {
+                    segments.push(Segment::ellipse([0.0, z + height], radius, top, 0.0, 90.0));
+                }
+                segments
+            }
+            Shape::Torispherical { radius, height, crown_radius, knuckle_radius } => {
+                above("radius", radius, 0.0);
+                above("height", height, 0.0);
+                above("knuckle_radius", knuckle_radius, 0.0);
+                above("radius - knuckle_radius", radius - knuckle_radius, 0.0);
+                above("crown_radius", crown_radius, radius);
+                // Crown and knuckle touch where the line between their centres meets them.
+                let (crown, knuckle) = (crown_radius, knuckle_radius);
+                let rise = ((crown - knuckle).powi(2) - (radius - knuckle).powi(2)).sqrt();
+                let depth = crown - rise;
+                let angle = rise.atan2(radius - knuckle).to_degrees();
+                vec![
+                    Segment::arc([0.0, crown], crown, -90.0, -angle),
+                    Segment::arc([radius - knuckle, depth], knuckle, -angle, 0.0),
+                    Segment::line([radius, depth], [radius, depth + height]),
+                    Segment::arc([radius - knuckle, depth + height], knuckle, 0.0, angle),
+                    Segment::arc([0.0, depth + height - rise], crown, angle, 90.0),
+                ]
+            }
+            Shape::Annulus { inner_radius, outer_radius, height } => {
+                above("inner_radius", inner_radius, 0.0);
+                above("outer_radius", outer_radius, inner_radius.max(0.0));
+                above("height", height, 0.0);
+                vec![
+                    Segment::line([inner_radius, height], [inner_radius, 0.0]),
+                    Segment::line([inner_radius, 0.0], [outer_radius, 0.0]),
+                    Segment::line([outer_radius, 0.0], [outer_radius, height]),
+                ]
+            }
+            Shape::Torus { ring_radius, tube_radius } => {
+                above("tube_radius", tube_radius, 0.0);
+                above("ring_radius", ring_radius, tube_radius.max(0.0));
+                vec![Segment::arc([ring_radius, tube_radius], tube_radius, -270.0, 90.0)]
+            }
+        };
+        if problems.is_empty() { Ok(segments) } else { Err(Problems(problems)) }
+    }
+}
+
+/// What a tank looks like.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Geometry {
+    /// A body of revolution; `closed_form` where the whole tank has one.
+    Revolution {
+        /// Generating curve.
+        contour: Contour,
+        /// The shape it was given by.
+        shape: Option<Shape>,
+    },
+    /// A box, lengths in m; open at the top.
+    Box {
+        /// Along x.
+        length_x: f64,
+        /// Along y.
+        length_y: f64,
+    },
+}
+
+/// A tank and its liquid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tank {
+    /// Its name, if it has one.
+    pub name: Option<String>,
+    /// Density of the liquid, kg/m3.
+    pub density: f64,
+    /// Its geometry.
+    pub geometry: Geometry,
+}
+
+/// The largest number of modes.
+pub const MOST_MODES: usize = 20;
+
+impl Tank {
+    /// Reads a file. Files that it names are sought next to it.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it.
+    pub fn read(path: &Path) -> Result<Tank, Problems> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|error| format!("Could not read {}: {error}.", path.display()))?;
+        Tank::parse(&text, path.parent().unwrap_or(Path::new("")))
+    }
+
+    /// From the text of a file; `folder` is where the files that it names are.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it.
+    pub fn parse(text: &str, folder: &Path) -> Result<Tank, Problems> {
+        let file: File = toml::from_str(text).map_err(|error| error.to_string().trim_end().to_string())?;
+        let mut problems = Vec::new();
+        let density = match file.density {
+            Some(density) if density > 0.0 && density.is_finite() => density,
+            Some(density) => {
+                problems.push(format!("density is {density}; it must be a number above 0, in kg/m3."));
+                1.0
+            }
+            None => {
+                problems.push("density is missing: the liquid's density in kg/m3.".to_string());
+                1.0
+            }
+        };
+        if file.spline.is_some() && file.points.is_none() {
+            problems.push("spline belongs to points, which is missing.".to_string());
+        }
+        let given = [
+            ("profile", file.profile.is_some()),
+            ("points", file.points.is_some()),
+            ("shape", file.shape.is_some()),
+            ("box", file.lengths.is_some()),
+        ];
+        let names: Vec<&str> = given.iter().filter(|g| g.1).map(|g| g.0).collect();
+        if names.len() > 1 {
+            problems.push(format!("{} exclude each other: give one of them.", names.join(" and ")));
+        }
+        let geometry = if let Some(entries) = &file.profile {
+            revolution(entries.iter().map(segment).collect(), None)
+        } else if let Some(points) = &file.points {
+            read_points(&folder.join(points))
+                .and_then(|points| if file.spline == Some(true) { spline(&points) } else { polyline(&points) })
+                .and_then(|segments| revolution(segments, None))
+        } else if let Some(shape) = file.shape {
+            shape.segments().and_then(|segments| revolution(segments, Some(shape)))
+        } else if let Some(lengths) = file.lengths {
+            rectangle(lengths)
+        } else {
+            Err("There is no tank: give profile, points, shape or box.".to_string().into())
+        };
+        match geometry {
+            Ok(geometry) if problems.is_empty() => Ok(Tank { name: file.name, density, geometry }),
+            Ok(_) => Err(Problems(problems)),
+            Err(more) => {
+                problems.extend(more.0);
+                Err(Problems(problems))
+            }
+        }
+    }
+
+    /// The largest fill, m above the lowest point; none for a box.
+    pub fn depth(&self) -> Option<f64> {
+        match &self.geometry {
+            Geometry::Revolution { contour, .. } => Some(contour.depth()),
+            Geometry::Box { .. } => None,
+        }
+    }
+
+    /// Modal parameters at `fill`, m above the lowest point, for `modes` modes.
+    ///
+    /// Cylinders and annuli given by their dimensions, and boxes, in closed form; all others by the
+    /// boundary integral equation.
+    ///
+    /// # Errors
+    /// A fill outside the tank, a number of modes that is not 1 to [`MOST_MODES`].
+    pub fn solve(&self, fill: f64, modes: usize) -> Result<ModalData, Problems> {
+        let mut problems = Vec::new();
+        if !(1..=MOST_MODES).contains(&modes) {
+            problems.push(format!("The number of modes is {modes}; it must be 1 to {MOST_MODES}."));
+        }
+        let rho = self.density;
+        let solved = match &self.geometry {
+            Geometry::Box { length_x, length_y } if fill > 0.0 && fill.is_finite() => {
+                Ok(closed_form::rectangular(*length_x, *length_y, fill, rho, modes))
+            }
+            Geometry::Box { .. } => {
+                Err(format!("The fill is {fill} m; it must be a height above 0.").into())
+            }
+            Geometry::Revolution { contour, shape } => contour.cut(fill).and_then(|wall| {
+                if !problems.is_empty() {
+                    return Err(Problems(Vec::new()));
+                }
+                Ok(match *shape {
+                    Some(Shape::Cylinder { radius, .. }) => closed_form::cylinder(radius, fill, rho, modes),
+                    Some(Shape::Annulus { inner_radius, outer_radius, .. }) => {
+                        closed_form::annulus(inner_radius, outer_radius, fill, rho, modes)
+                    }
+                    _ => modal::solve(wall, rho, fill, modes),
+                })
+            }),
+        };
+        match solved {
+            Ok(mut data) if problems.is_empty() => {
+                data.name.clone_from(&self.name);
+                Ok(data)
+            }
+            Ok(_) => Err(Problems(problems)),
+            Err(more) => {
+                problems.extend(more.0);
+                Err(Problems(problems))
+            }
+        }
+    }
+}
+
+fn revolution(segments: Vec<Segment>, shape: Option<Shape>) -> Result<Geometry, Problems> {
+    Ok(Geometry::Revolution { contour: Contour::new(segments)?, shape })
+}
+
+fn rectangle(lengths: [f64; 2]) -> Result<Geometry, Problems> {
+    let [length_x, length_y] = lengths;
+    if let Some(bad) = lengths.iter().find(|l| !(**l > 0.0 && l.is_finite())) {
+        return Err(format!("box: a length is {bad}; both must be above 0, in m.").into());
+    }
+    if let Some(long) = lengths.iter().find(|l| **l > crate::contour::LARGEST) {
+        return Err(format!(
+            "box: a length is {long} m; lengths are in metres and at most {} m (millimetres?).",
+            crate::contour::LARGEST
+        )
+        .into());
+    }
+    Ok(Geometry::Box { length_x, length_y })
+}
+
+fn segment(entry: &Entry) -> Segment {
+    match *entry {
+        Entry::Line([r0, z0, r1, z1]) => Segment::line([r0, z0], [r1, z1]),
+        Entry::Arc([rc, zc, radius, deg0, deg1]) => Segment::arc([rc, zc], radius, deg0, deg1),
+        Entry::Ellipse([rc, zc, a_r, a_z, deg0, deg1]) => Segment::ellipse([rc, zc], a_r, a_z, deg0, deg1),
+        Entry::Cassini([zc, a, c, deg0, deg1]) => {
+            Segment { curve: Curve::Cassini { zc, a, c }, from: deg0.to_radians(), to: deg1.to_radians() }
+        }
+        Entry::Cosine([r0, r1, z0, z1, p0, p1]) => {
+            Segment { curve: Curve::Cosine { r0, r1, z: [z0, z1], p: [p0, p1] }, from: 0.0, to: 1.0 }
+        }
+    }
+}
+
+/// Two columns r, z in m; a first line that is not numbers is a heading, `#` begins a comment.
+fn read_points(path: &Path) -> Result<Vec<Point>, Problems> {
+    let mut reader = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .comment(Some(b'#'))
+        .trim(csv::Trim::All)
+        .flexible(true)
+        .from_path(path)
+        .map_err(|error| format!("Could not read {}: {error}.", path.display()))?;
+    let (mut points, mut problems) = (Vec::new(), Vec::new());
+    for (index, record) in reader.records().enumerate() {
+        let record = record.map_err(|error| format!("Could not read {}: {error}.", path.display()))?;
+        let line = record.position().map_or(0, csv::Position::line);
+        let numbers: Vec<Option<f64>> = record.iter().map(|field| field.parse().ok()).collect();
+        match numbers[..] {
+            [Some(r), Some(z)] if f64::is_finite(r) && f64::is_finite(z) => points.push([r, z]),
+            _ if index == 0 && numbers.iter().all(Option::is_none) => {}
+            _ => problems.push(format!(
+                "{}, line {line}: expected two numbers r, z, found `{}`.",
+                path.display(),
+                record.iter().collect::<Vec<_>>().join(",")
+            )),
+        }
+    }
+    if points.len() < 2 && problems.is_empty() {
+        problems.push(format!(
+            "{} has {} point(s); a contour needs at least two.",
+            path.display(),
+            points.len()
+        ));
+    }
+    if problems.is_empty() { Ok(points) } else { Err(Problems(problems)) }
+}
+
+fn polyline(points: &[Point]) -> Result<Vec<Segment>, Problems> {
+    Ok(points.windows(2).map(|p| Segment::line(p[0], p[1])).collect())
+}
