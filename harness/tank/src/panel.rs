@@ -1,6 +1,6 @@
 //! The boundary of the liquid cut into panels, and points on them.
 
-use crate::curve::{Point, Segment, add, cross, dot, norm, sub};
+use crate::curve::{Curve, Point, Segment, add, cross, dot, norm, sub};
 
 /// A corner of the boundary, by the index of the segment that starts there.
 pub(crate) type Corner = usize;
@@ -68,7 +68,10 @@ impl Boundary {
                 grading[next][0].0 = if after[1].abs() < 1e-9 { 1.0 } else { APEX };
                 continue;
             }
-            let corner = grading_at(before, after);
+            // In a cusp the tangents do not tell the inside; the curves shortly before and after do.
+            let inner = cross(segments[i].tangent(0.999), segments[next].tangent(0.001));
+            let cusp = cross(before, after).atan2(dot(before, after)).abs() > 3.13 && inner > 0.0;
+            let corner = if cusp { (1.0, 1.0) } else { grading_at(before, after) };
             grading[i][1] = corner;
             grading[next][0] = corner;
         }
@@ -131,6 +134,29 @@ impl Boundary {
         }
     }
 
+    /// Fraction s of the panel (v^gamma, also outside 0..1) whose point is nearest to x, and the
+    /// distance over the panel's local ds; `w` = x - start of the panel.
+    pub(crate) fn foot(&self, panel: &Panel, w: Point) -> [f64; 2] {
+        let segment = &self.segments[panel.segment];
+        let sign = (segment.to - segment.from).signum() * if panel.end { -1.0 } else { 1.0 };
+        let t0 = if panel.end { segment.to } else { segment.from } + sign * panel.s0;
+        let step = sign * panel.length;
+        let whole = segment.curve.chord(t0, step);
+        let mut s = (dot(w, whole) / dot(whole, whole)).clamp(-1.0, 2.0);
+        let straight = matches!(segment.curve, Curve::Line { .. });
+        let (mut residual, mut slope) = (sub(w, [s * whole[0], s * whole[1]]), whole);
+        for _ in 0..if straight { 0 } else { 4 } {
+            residual = sub(w, segment.curve.chord(t0, s * step));
+            let d = segment.curve.slope(t0 + s * step);
+            slope = [d[0] * step, d[1] * step];
+            s = (s + dot(residual, slope) / dot(slope, slope)).clamp(-1.0, 2.0);
+        }
+        if straight && (-1.0..=2.0).contains(&s) {
+            return [s, norm(residual) / norm(whole)];
+        }
+        [s, norm(residual) / norm(slope)]
+    }
+
     /// Where the boundary begins and ends at the axis, the two ends are not one point.
     fn on_axis(&self, corner: Corner) -> bool {
         corner == 0 && self.ends[0][0][0] == 0.0
@@ -141,6 +167,18 @@ impl Boundary {
     /// gap to another part of the boundary, or much longer than its neighbour. `modes` modes are to
     /// be resolved.
     pub(crate) fn panels(&self, modes: usize) -> Vec<Panel> {
+        // A thin layer or a cusp would take panels without end: the gap counts less then.
+        for gap in [2.5, 10.0, 40.0] {
+            if let Some(panels) = self.panels_for(modes, gap) {
+                return panels;
+            }
+        }
+        self.panels_for(modes, f64::INFINITY).unwrap_or_default()
+    }
+
+    /// None if a panel at most `gap` times as long as its distance from another part takes more
+    /// than MANY panels.
+    fn panels_for(&self, modes: usize, gap: f64) -> Option<Vec<Panel>> {
         let surface = self.surface();
         let width = norm(sub(self.ends[surface][0], self.ends[surface][1]));
         // The n-th mode has n half waves on the surface.
@@ -157,10 +195,10 @@ impl Boundary {
         }
         let joined = self.ends[0][0][0] > 0.0; // the chain is closed
         for _ in 0..200 {
-            if pieces.len() > MOST_PANELS {
-                break;
-            }
             let count = pieces.len();
+            if gap.is_finite() && count > MANY.max(2 * self.segments.len()) {
+                return None;
+            }
             let too_long = |k: usize| {
                 let piece = &pieces[k];
                 let depth = piece.points.iter().map(|p| z_surface - p[1]).fold(f64::MAX, f64::min);
@@ -175,7 +213,7 @@ impl Boundary {
                     } else if neighbours {
                         piece.length > 3.0 * pieces[other].length
                     } else {
-                        piece.length > 2.5 * piece.distance(&pieces[other])
+                        gap.is_finite() && piece.length > gap * piece.distance(&pieces[other])
                     }
                 })
             };
@@ -200,7 +238,7 @@ impl Boundary {
                 })
                 .collect();
         }
-        pieces.iter().map(|piece| self.panel(piece)).collect()
+        Some(pieces.iter().map(|piece| self.panel(piece)).collect())
     }
 
     fn panel(&self, piece: &Piece) -> Panel {
@@ -219,8 +257,8 @@ impl Boundary {
     }
 }
 
-/// No contour needs more; a bad one must not fill the memory.
-const MOST_PANELS: usize = 150;
+/// More panels are made only if the contour has many segments.
+const MANY: usize = 36;
 /// Longest panel on the free surface over the surface's width, for up to five modes.
 const WIDTH: f64 = 0.35;
 /// gamma at an apex on the axis: the exponents there are between 0.8 and 2 for all but needles.
@@ -231,7 +269,7 @@ const APEX: f64 = 4.0;
 fn grading_at(before: Point, after: Point) -> (f64, f64) {
     let turn = cross(before, after).atan2(dot(before, after));
     let nu = core::f64::consts::PI / (core::f64::consts::PI - turn);
-    let gamma = if turn.abs() < 1e-9 { 3.0 } else { (6.0 / nu).ceil().clamp(3.0, 9.0) };
+    let gamma = if turn.abs() < 1e-9 { 3.0 } else { (6.0 / nu).ceil().clamp(1.0, 9.0) };
     (gamma, nu)
 }
 

@@ -288,18 +288,15 @@ impl Discretisation {
         length: f64,
         x: &BoundaryPoint,
     ) -> [Option<[f64; 2]>; 2] {
-        let along = self.boundary.difference(&ends[0], &ends[1]);
         let reach = if panel.gamma > 1.0 { 8.0 } else { 2.0 } * length;
         let find = |w: Point| {
-            let distance = norm(w);
-            if distance > reach {
+            if norm(w) > reach {
                 return None;
             }
-            // (w/along)^(1/gamma) as complex numbers
-            let re = (w[0] * along[0] + w[1] * along[1]) / (length * length);
-            let im = (w[1] * along[0] - w[0] * along[1]) / (length * length);
+            // s + i d: the foot of x on the panel's curve, and its distance, over the length
+            let [re, im] = self.boundary.foot(panel, w);
             let v = if panel.gamma > 1.0 {
-                let size = (distance / length).powf(1.0 / panel.gamma);
+                let size = re.hypot(im).powf(1.0 / panel.gamma);
                 let angle = im.atan2(re) / panel.gamma;
                 [size * angle.cos(), size * angle.sin()]
             } else {
