@@ -25,10 +25,10 @@ fn y1_slope(x: f64) -> f64 {
 /// The first `count` zeros xi_n of J1', by Newton's method (J1'' = -J1'/x - (1 - 1/x^2) J1).
 pub fn zeros_of_j1_slope(count: usize) -> Vec<f64> {
     let zero = |n: usize| {
-        // McMahon: b - (mu + 3)/(8 b), b = (n - 3/4) pi, mu = 4 (DLMF 10.21.20)
-        let b = (n as f64 - 0.75) * PI + if n == 1 { 1.15 } else { 0.0 };
-        let mut x = if n == 1 { 1.84 } else { b - 7.0 / (8.0 * b) };
-        for _ in 0..4 {
+        // McMahon: b - 7/(8 b), b = (n - 1/4) pi (DLMF 10.21.20)
+        let b = (n as f64 - 0.25) * PI;
+        let mut x = b - 7.0 / (8.0 * b);
+        for _ in 0..5 {
             let slope = j1_slope(x);
             x += slope / (slope / x + (1.0 - 1.0 / (x * x)) * libm::j1(x));
         }
@@ -42,7 +42,15 @@ pub fn zeros_of_j1_slope(count: usize) -> Vec<f64> {
 fn upright_mode(n: usize, k: f64, h: f64, m: f64, m_liq: f64, surface: Surface, beta: f64) -> Mode {
     let lambda = k * (k * h).tanh();
     let height = h - 2.0 / k * (0.5 * k * h).tanh();
-    Mode::new(n, lambda, [m, m * (height - 0.5 * h), m * (height - 0.5 * h).powi(2)], 0.5 * h, m_liq, surface, beta)
+    Mode::new(
+        n,
+        lambda,
+        [m, m * (height - 0.5 * h), m * (height - 0.5 * h).powi(2)],
+        0.5 * h,
+        m_liq,
+        surface,
+        beta,
+    )
 }
 
 /// Shape of a mode sampled over the surface, and its peak.
@@ -87,7 +95,8 @@ pub fn cylinder(radius: f64, h: f64, rho: f64, modes: usize) -> ModalData {
         if n == 0 {
             surface.peak = Some([r, wave]);
         }
-        let shallow = if 2.0 * k * h > 700.0 { 0.0 } else { 2.0 * xi * (1.0 - h / r) / (2.0 * k * h).sinh() };
+        let shallow =
+            if 2.0 * k * h > 700.0 { 0.0 } else { 2.0 * xi * (1.0 - h / r) / (2.0 * k * h).sinh() };
         let beta = ((xi * xi + 1.0) / square + shallow) / r;
         let mut mode = upright_mode(n + 1, k, h, m, m_liq, surface, beta);
         mode.lambda_r = Some(mode.lambda * r);
@@ -151,23 +160,28 @@ pub fn annulus(inner: f64, outer: f64, h: f64, rho: f64, modes: usize) -> ModalD
         let part = |r: f64, c: f64| 0.5 * (r * r - 1.0 / (k * k)) * c * c;
         Radial { k, a, n: part(ro, at_outer) - part(ri, at_inner), at_inner, at_outer }
     };
-    let all: Vec<Radial> = annular_wave_numbers(ri, ro, 100.max(modes)).into_iter().map(radial).collect();
+    let all: Vec<Radial> =
+        annular_wave_numbers(ri, ro, 100.max(modes)).into_iter().map(radial).collect();
     let of_mode = |i: usize| {
         let Radial { k, a, n, at_inner, at_outer } = all[i];
         let m = rho * PI * k * (k * h).tanh() * a * a / n;
         let c = |r: f64| libm::j1(k * r) * y1_slope(k * ro) - libm::y1(k * r) * j1_slope(k * ro);
         let mut surface = sampled(ri, ro, |r| a * c(r) / n);
         if i == 0 {
-            let peak = surface.shape.iter().copied().max_by(|x, y| x[1].abs().total_cmp(&y[1].abs()));
+            let peak =
+                surface.shape.iter().copied().max_by(|x, y| x[1].abs().total_cmp(&y[1].abs()));
             surface.peak = peak;
         }
         // floor: k^2 N/cosh^2; a wall at R: R C^2 int (k^2 sinh^2 + cosh^2/R^2) dz/cosh^2
         let t = Hyperbolic::new(k, h);
         let at_wall = |r: f64, c: f64| {
-            r * c * c * (k * k * (t.half_tanh - t.half_height) + (t.half_tanh + t.half_height) / (r * r))
+            r * c
+                * c
+                * (k * k * (t.half_tanh - t.half_height) + (t.half_tanh + t.half_height) / (r * r))
         };
         let layer = k * k * n * t.floor + at_wall(ri, at_inner) + at_wall(ro, at_outer);
-        let mut mode = upright_mode(i + 1, k, h, m, m_liq, surface, layer / (k * (k * h).tanh() * n));
+        let mut mode =
+            upright_mode(i + 1, k, h, m, m_liq, surface, layer / (k * (k * h).tanh() * n));
         mode.wave_inner = mode.shape.first().map(|p| p[1]);
         mode.lambda_r = Some(mode.lambda * ro);
         mode
@@ -181,7 +195,8 @@ pub fn annulus(inner: f64, outer: f64, h: f64, rho: f64, modes: usize) -> ModalD
         Segment::line([ri, 0.0], [ro, 0.0]),
         Segment::line([ro, 0.0], [ro, h]),
     ];
-    let mut data = upright([ri, ro], h, rho, m_liq, inertias, (0..modes).map(of_mode).collect(), wall);
+    let mut data =
+        upright([ri, ro], h, rho, m_liq, inertias, (0..modes).map(of_mode).collect(), wall);
     data.error = 1e-10; // the sum's tail after 100 terms
     data
 }
@@ -220,9 +235,13 @@ pub fn box_axis(length: f64, width: f64, h: f64, rho: f64, modes: usize) -> Axis
         let k = wave_number(n);
         let m = m_liq * 8.0 * (k * h).tanh() / (a * a * h * k.powi(3));
         let wave = 4.0 / (a * k * k);
-        let sign = if n % 2 == 0 { 1.0 } else { -1.0 };
+        let sign = if n.is_multiple_of(2) { 1.0 } else { -1.0 };
         let surface = sampled(0.0, 0.5 * a, |x| sign * wave * (k * x).sin());
-        let shallow = if 2.0 * k * h > 700.0 { 0.0 } else { 2.0 * k * (1.0 - 2.0 * h / a) / (2.0 * k * h).sinh() };
+        let shallow = if 2.0 * k * h > 700.0 {
+            0.0
+        } else {
+            2.0 * k * (1.0 - 2.0 * h / a) / (2.0 * k * h).sinh()
+        };
         let beta = 2.0 / a + 2.0 / width + shallow;
         let mut mode = upright_mode(n + 1, k, h, m, m_liq, surface, beta);
         mode.lambda_l = Some(mode.lambda * a);

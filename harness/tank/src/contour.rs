@@ -54,6 +54,11 @@ pub struct Wall {
     pub z_surface: f64,
 }
 
+/// A horizontal part of the wall this close to the free surface, over the tank's size, is refused.
+const SHOULDER: f64 = 1e-6;
+/// Least sine of the wall's angle with the free surface.
+const STEEP: f64 = 1e-3;
+
 /// Where a contour passes through a height.
 #[derive(Clone, Copy, Debug)]
 struct Crossing {
@@ -71,7 +76,9 @@ impl Contour {
     pub fn new(segments: Vec<Segment>) -> Result<Contour, Problems> {
         let mut problems = Vec::new();
         if segments.is_empty() {
-            return Err("The contour has no segment: it needs at least one line or arc.".to_string().into());
+            return Err("The contour has no segment: it needs at least one line or arc."
+                .to_string()
+                .into());
         }
         for (i, segment) in segments.iter().enumerate() {
             if let Some(problem) = defect(segment) {
@@ -122,7 +129,7 @@ impl Contour {
                 i + 1,
                 j + 1
             ));
-        } else if outline.area() <= 0.0 {
+        } else if problems.is_empty() && outline.area() <= 0.0 {
             problems.push(
                 "The contour is inside out (clockwise): list it from the axis or the inner wall \
                  along the bottom to the outer wall, with r to the right and z up."
@@ -134,9 +141,9 @@ impl Contour {
         }
         let heights = || outline.points.iter().flatten().map(|p| p[1]);
         let coarse = (heights().fold(f64::MAX, f64::min), heights().fold(f64::MIN, f64::max));
-        let (bottom, top) = segments.iter().fold(coarse, |(low, high), s| {
-            (low.min(extreme(s, 1.0)), high.max(-extreme(s, -1.0)))
-        });
+        let (bottom, top) = segments
+            .iter()
+            .fold(coarse, |(low, high), s| (low.min(extreme(s, 1.0)), high.max(-extreme(s, -1.0))));
         Ok(Contour { segments, bottom, top, size })
     }
 
@@ -169,7 +176,10 @@ impl Contour {
             return Err(format!("The fill is {fill}; it must be a height in metres.").into());
         }
         if fill <= 0.0 {
-            return Err(format!("The fill is {fill} m; it must be above 0, the lowest point of the tank.").into());
+            return Err(format!(
+                "The fill is {fill} m; it must be above 0, the lowest point of the tank."
+            )
+            .into());
         }
         let depth = self.depth();
         if fill > depth * (1.0 + LEVEL) {
@@ -188,13 +198,21 @@ impl Contour {
             }
         }
         let (down, up) = self.contact_lines(z, fill)?;
-        let step = 1e-6 * self.size;
-        let last = self.segments[self.segments.len() - 1].end()[1];
-        for z in [z - step, z + step] {
-            if (z < last - LEVEL * self.size && z > self.bottom)
-                && self.contact_lines(z, fill).is_ok_and(|(d, _)| d.is_some()) != down.is_some()
-            {
-                return Err(shoulder(fill));
+        // Next to a shoulder a little more liquid has another free surface.
+        let radius = |c: Crossing| self.segments[c.segment].curve.at(c.t)[0];
+        let radii =
+            |(down, up): (Option<Crossing>, Crossing)| [down.map_or(-1.0, radius), radius(up)];
+        let here = radii((down, up));
+        for z in [z - SHOULDER * self.size, z + SHOULDER * self.size] {
+            if let Ok(lines) = self.contact_lines(z, fill) {
+                let there = radii(lines);
+                if here
+                    .iter()
+                    .zip(there)
+                    .any(|(a, b)| (a - b).abs() > 2.0 * SHOULDER / STEEP * self.size)
+                {
+                    return Err(shoulder(fill));
+                }
             }
         }
         let mut wall = Vec::new();
@@ -217,7 +235,7 @@ impl Contour {
             )
             .into());
         }
-        let steep = |tangent: Point| tangent[1].abs() > 1e-3;
+        let steep = |tangent: Point| tangent[1].abs() > STEEP;
         let outer = wall[wall.len() - 1].tangent(1.0);
         if !steep(outer) || (down.is_some() && !steep(wall[0].tangent(0.0))) {
             return Err(shoulder(fill));
@@ -240,11 +258,12 @@ impl Contour {
             )
             .into());
         }
-        if (end[1] - z).abs() <= level && end[0] > level && !crossings.last().is_some_and(|c| c.up) {
+        if (end[1] - z).abs() <= level && end[0] > level && !crossings.last().is_some_and(|c| c.up)
+        {
             let segment = self.segments.len() - 1;
             crossings.push(Crossing { segment, t: self.segments[segment].to, up: true });
         }
-        if (start[1] - z).abs() <= level && !on_axis && !crossings.first().is_some_and(|c| !c.up) {
+        if (start[1] - z).abs() <= level && !on_axis && crossings.first().is_none_or(|c| c.up) {
             crossings.insert(0, Crossing { segment: 0, t: self.segments[0].from, up: false });
         }
         match crossings[..] {
@@ -268,7 +287,8 @@ impl Contour {
         let mut above = self.segments[0].start()[1] >= z - level;
         for (i, segment) in self.segments.iter().enumerate() {
             let count = samples(segment);
-            let parameter = |k: usize| segment.from + (segment.to - segment.from) * k as f64 / count as f64;
+            let parameter =
+                |k: usize| segment.from + (segment.to - segment.from) * k as f64 / count as f64;
             for k in 0..count {
                 let (mut a, mut b) = (parameter(k), parameter(k + 1));
                 let next = match k + 1 == count {
@@ -356,7 +376,8 @@ fn extreme(segment: &Segment, sign: f64) -> f64 {
     let count = samples(segment);
     let height = |s: f64| sign * segment.at(s.clamp(0.0, 1.0))[1];
     let step = 1.0 / count as f64;
-    let lowest = (0..=count).min_by(|a, b| height(*a as f64 * step).total_cmp(&height(*b as f64 * step)));
+    let lowest =
+        (0..=count).min_by(|a, b| height(*a as f64 * step).total_cmp(&height(*b as f64 * step)));
     let at = lowest.unwrap_or(0) as f64 * step;
     let (mut a, mut b) = ((at - step).max(0.0), (at + step).min(1.0));
     let golden = 0.618_033_988_749_894_8;
@@ -467,7 +488,11 @@ impl Volume {
         let base = wall.z_surface;
         let (mut volume, mut first, mut second, mut axial) = (0.0, 0.0, 0.0, 0.0);
         for segment in &wall.segments {
-            let pieces = if matches!(segment.curve, Curve::Line { .. } | Curve::Cubic { .. }) { 1 } else { 8 };
+            let pieces = if matches!(segment.curve, Curve::Line { .. } | Curve::Cubic { .. }) {
+                1
+            } else {
+                8
+            };
             let step = (segment.to - segment.from) / pieces as f64;
             for k in 0..pieces {
                 for (v, w) in rule.nodes.iter().zip(&rule.weights) {

@@ -74,10 +74,10 @@ pub enum Curve {
 
 /// Nodes and weights of the Gauss rule of 8 points on -1..1, positive half (DLMF 3.5.15).
 const GAUSS8: [(f64, f64); 4] = [
-    (0.183_434_642_495_649_8, 0.362_683_783_378_361_98),
-    (0.525_532_409_916_328_99, 0.313_706_645_877_887_29),
-    (0.796_666_477_413_626_74, 0.222_381_034_453_374_47),
-    (0.960_289_856_497_536_23, 0.101_228_536_290_376_26),
+    (0.183_434_642_495_649_8, 0.362_683_783_378_362),
+    (0.525_532_409_916_329, 0.313_706_645_877_887_29),
+    (0.796_666_477_413_626_7, 0.222_381_034_453_374_47),
+    (0.960_289_856_497_536_2, 0.101_228_536_290_376_26),
 ];
 
 impl Curve {
@@ -98,9 +98,9 @@ impl Curve {
                 let phase = core::f64::consts::PI * (p[0] + t * (p[1] - p[0]));
                 [r0 + r1 * phase.cos(), z[0] + t * (z[1] - z[0])]
             }
-            Curve::Cubic { c } => core::array::from_fn(|i| {
-                c[0][i] + t * (c[1][i] + t * (c[2][i] + t * c[3][i]))
-            }),
+            Curve::Cubic { c } => {
+                core::array::from_fn(|i| c[0][i] + t * (c[1][i] + t * (c[2][i] + t * c[3][i])))
+            }
         }
     }
 
@@ -239,7 +239,10 @@ impl Segment {
         let count = 32;
         let mut total = 0.0;
         for i in 0..count {
-            let (a, b) = (self.tangent(i as f64 / count as f64), self.tangent((i + 1) as f64 / count as f64));
+            let (a, b) = (
+                self.tangent(i as f64 / count as f64),
+                self.tangent((i + 1) as f64 / count as f64),
+            );
             total += cross(a, b).atan2(dot(a, b)).abs();
         }
         total.min(TAU)

@@ -1,4 +1,13 @@
-//! Tanks.
+//! Modal parameters of the liquid in a tank: a body of revolution of any contour, or a box.
+//!
+//! A [`Tank`] is read from a TOML file ([`Tank::read`]) and solved at a fill ([`Tank::solve`]): slosh
+//! masses, pendulum lengths, heights, wall waves and what stays with the tank, with their error. The
+//! theory, the file format and the measured accuracy are in the crate's `README.md`.
+//!
+//! * [`curve`], [`contour`], [`tank`]: geometry and the file
+//! * `ring`, `gauss`, `panel`, `potential_flow`: the boundary integral equation
+//! * [`modal`]: modes as pendulums; [`closed_form`]: cylinder, annulus, box
+
 pub mod closed_form;
 pub mod contour;
 pub mod curve;
@@ -9,7 +18,7 @@ mod potential_flow;
 mod ring;
 mod spline;
 pub mod tank;
-/// probe
-pub fn probe(wall: Vec<curve::Segment>, fill: f64, rho: f64) -> Result<modal::ModalData, contour::Problems> {
-    Ok(modal::solve(contour::Contour::new(wall)?.cut(fill)?, rho, fill, 5))
-}
+
+pub use contour::Problems;
+pub use modal::{ModalData, Mode, Rest};
+pub use tank::Tank;

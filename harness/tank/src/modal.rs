@@ -289,7 +289,7 @@ fn orders(panels: usize) -> [usize; 3] {
 /// The estimate beyond which a third, finer discretisation is tried.
 const WANTED: f64 = 1e-7;
 /// Rounding: no estimate is below.
-const ROUNDING: f64 = 2e-11;
+const ROUNDING: f64 = 1e-10;
 /// The same for beta, whose integrand is not smooth at corners.
 const ROUNDING_BETA: f64 = 1e-6;
 
@@ -309,7 +309,8 @@ pub(crate) fn solve(wall: Wall, rho: f64, fill: f64, modes: usize) -> ModalData 
     }
     let inertias = [rho * volume.across, rho * volume.axial, better.i_eff];
     let m_liq = rho * volume.volume;
-    let mut data = ModalData::new("revolution", rho, fill, m_liq, volume.z_cg, inertias, better.modes);
+    let mut data =
+        ModalData::new("revolution", rho, fill, m_liq, volume.z_cg, inertias, better.modes);
     data.r_surface = Some(wall.r_outer);
     data.r_inner = Some(wall.r_inner);
     data.error = error.max(ROUNDING);
@@ -324,7 +325,9 @@ fn difference(a: &Approximation, b: &Approximation, wall: &Wall, m_liq: f64) -> 
     let mut error = (a.i_eff - b.i_eff).abs() / (m_liq * r * r);
     let mut error_beta: f64 = 0.0;
     for (a, b) in a.modes.iter().zip(&b.modes) {
-        let waves = (a.wave - b.wave).abs().max((a.wave_inner.unwrap_or(0.0) - b.wave_inner.unwrap_or(0.0)).abs());
+        let waves = (a.wave - b.wave)
+            .abs()
+            .max((a.wave_inner.unwrap_or(0.0) - b.wave_inner.unwrap_or(0.0)).abs());
         let all = [
             (a.lambda / b.lambda - 1.0).abs(),
             (a.m - b.m).abs() / m_liq,
@@ -350,7 +353,8 @@ fn approximate(
     let weights = mesh.weights();
     let points: Vec<_> = mesh.points().collect();
     let surface = mesh.on_surface();
-    let pitch: Vec<f64> = points.iter().map(|(p, n)| (p[1] - solution.z0) * n[0] - p[0] * n[1]).collect();
+    let pitch: Vec<f64> =
+        points.iter().map(|(p, n)| (p[1] - solution.z0) * n[0] - p[0] * n[1]).collect();
     let sum = |range: core::ops::Range<usize>, f: &dyn Fn(usize) -> f64| -> f64 {
         range.map(|i| weights[i] * f(i)).sum()
     };
@@ -371,7 +375,8 @@ fn approximate(
         let mass = [a * a, a * b, b * b].map(|x| rho_pi * lambda * x / big_n);
         let beta = mesh.wall_gradient(phi) / (lambda * big_n);
         let surface = Surface { shape, peak };
-        let mut mode = Mode::new(k + 1, lambda, mass, volume.z_cg, rho * volume.volume, surface, beta);
+        let mut mode =
+            Mode::new(k + 1, lambda, mass, volume.z_cg, rho * volume.volume, surface, beta);
         mode.lambda_r = Some(lambda * wall.r_outer);
         mode.wave_inner = mode.shape.first().filter(|_| wall.r_inner > 0.0).map(|p| p[1]);
         mode
@@ -379,4 +384,3 @@ fn approximate(
     let modes = solution.lambda.iter().zip(&solution.phi).enumerate().map(of_mode).collect();
     Approximation { modes, i_eff }
 }
-

@@ -20,7 +20,9 @@ pub(crate) fn spline(points: &[Point]) -> Result<Vec<Segment>, Problems> {
         .windows(2)
         .enumerate()
         .filter(|(_, p)| p[0] == p[1])
-        .map(|(i, p)| format!("Points {} and {} are the same, ({}, {}) m.", i + 1, i + 2, p[0][0], p[0][1]))
+        .map(|(i, p)| {
+            format!("Points {} and {} are the same, ({}, {}) m.", i + 1, i + 2, p[0][0], p[0][1])
+        })
         .collect();
     if !same.is_empty() {
         return Err(Problems(same));

@@ -114,14 +114,18 @@ impl Shape {
         let mut problems = Vec::new();
         let mut above = |name: &str, value: f64, limit: f64| {
             if !(value > limit && value.is_finite()) {
-                problems.push(format!("shape: {name} is {value}; it must be a number above {limit}."));
+                problems
+                    .push(format!("shape: {name} is {value}; it must be a number above {limit}."));
             }
         };
         let segments = match *self {
             Shape::Cylinder { radius, height } => {
                 above("radius", radius, 0.0);
                 above("height", height, 0.0);
-                vec![Segment::line([0.0, 0.0], [radius, 0.0]), Segment::line([radius, 0.0], [radius, height])]
+                vec![
+                    Segment::line([0.0, 0.0], [radius, 0.0]),
+                    Segment::line([radius, 0.0], [radius, height]),
+                ]
             }
             Shape::Sphere { radius } => {
                 above("radius", radius, 0.0);
@@ -245,12 +249,14 @@ impl Tank {
     /// # Errors
     /// Everything that is wrong with it.
     pub fn parse(text: &str, folder: &Path) -> Result<Tank, Problems> {
-        let file: File = toml::from_str(text).map_err(|error| error.to_string().trim_end().to_string())?;
+        let file: File =
+            toml::from_str(text).map_err(|error| error.to_string().trim_end().to_string())?;
         let mut problems = Vec::new();
         let density = match file.density {
             Some(density) if density > 0.0 && density.is_finite() => density,
             Some(density) => {
-                problems.push(format!("density is {density}; it must be a number above 0, in kg/m3."));
+                problems
+                    .push(format!("density is {density}; it must be a number above 0, in kg/m3."));
                 1.0
             }
             None => {
@@ -275,7 +281,9 @@ impl Tank {
             revolution(entries.iter().map(segment).collect(), None)
         } else if let Some(points) = &file.points {
             read_points(&folder.join(points))
-                .and_then(|points| if file.spline == Some(true) { spline(&points) } else { polyline(&points) })
+                .and_then(|points| {
+                    if file.spline == Some(true) { spline(&points) } else { polyline(&points) }
+                })
                 .and_then(|segments| revolution(segments, None))
         } else if let Some(shape) = file.shape {
             shape.segments().and_then(|segments| revolution(segments, Some(shape)))
@@ -327,7 +335,9 @@ impl Tank {
                     return Err(Problems(Vec::new()));
                 }
                 Ok(match *shape {
-                    Some(Shape::Cylinder { radius, .. }) => closed_form::cylinder(radius, fill, rho, modes),
+                    Some(Shape::Cylinder { radius, .. }) => {
+                        closed_form::cylinder(radius, fill, rho, modes)
+                    }
                     Some(Shape::Annulus { inner_radius, outer_radius, .. }) => {
                         closed_form::annulus(inner_radius, outer_radius, fill, rho, modes)
                     }
@@ -372,13 +382,19 @@ fn segment(entry: &Entry) -> Segment {
     match *entry {
         Entry::Line([r0, z0, r1, z1]) => Segment::line([r0, z0], [r1, z1]),
         Entry::Arc([rc, zc, radius, deg0, deg1]) => Segment::arc([rc, zc], radius, deg0, deg1),
-        Entry::Ellipse([rc, zc, a_r, a_z, deg0, deg1]) => Segment::ellipse([rc, zc], a_r, a_z, deg0, deg1),
-        Entry::Cassini([zc, a, c, deg0, deg1]) => {
-            Segment { curve: Curve::Cassini { zc, a, c }, from: deg0.to_radians(), to: deg1.to_radians() }
+        Entry::Ellipse([rc, zc, a_r, a_z, deg0, deg1]) => {
+            Segment::ellipse([rc, zc], a_r, a_z, deg0, deg1)
         }
-        Entry::Cosine([r0, r1, z0, z1, p0, p1]) => {
-            Segment { curve: Curve::Cosine { r0, r1, z: [z0, z1], p: [p0, p1] }, from: 0.0, to: 1.0 }
-        }
+        Entry::Cassini([zc, a, c, deg0, deg1]) => Segment {
+            curve: Curve::Cassini { zc, a, c },
+            from: deg0.to_radians(),
+            to: deg1.to_radians(),
+        },
+        Entry::Cosine([r0, r1, z0, z1, p0, p1]) => Segment {
+            curve: Curve::Cosine { r0, r1, z: [z0, z1], p: [p0, p1] },
+            from: 0.0,
+            to: 1.0,
+        },
     }
 }
 
@@ -393,7 +409,8 @@ fn read_points(path: &Path) -> Result<Vec<Point>, Problems> {
         .map_err(|error| format!("Could not read {}: {error}.", path.display()))?;
     let (mut points, mut problems) = (Vec::new(), Vec::new());
     for (index, record) in reader.records().enumerate() {
-        let record = record.map_err(|error| format!("Could not read {}: {error}.", path.display()))?;
+        let record =
+            record.map_err(|error| format!("Could not read {}: {error}.", path.display()))?;
         let line = record.position().map_or(0, csv::Position::line);
         let numbers: Vec<Option<f64>> = record.iter().map(|field| field.parse().ok()).collect();
         match numbers[..] {

@@ -1,0 +1,46 @@
+//! Tanks of the reference as files.
+#![allow(dead_code)] // each test binary uses its own part
+
+use std::path::Path;
+
+use hubslosh_tank::{ModalData, Tank};
+use serde_json::Value;
+
+/// `tanks.json`: 23 cases of a boundary integral solver (12-point panels, graded dyadically, compared
+/// with a p-FEM) and of closed forms, kept by the authors of the theory in `README.md`; accurate to
+/// the case's `error`, 1e-12 to 1e-10, beta to `error_beta`. Twelve digits are written.
+pub fn reference() -> Vec<Value> {
+    let all: Value = serde_json::from_str(include_str!("tanks.json")).unwrap();
+    all["cases"].as_array().unwrap().clone()
+}
+
+/// A number.
+pub fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
+}
+
+/// The tank's file.
+pub fn toml(case: &Value) -> String {
+    let rho = number(&case["rho"]);
+    let shape = if case["kind"] == "box" {
+        format!("box = [{}, {}]", case["length_x"], case["length_y"])
+    } else {
+        let entries = case["profile"].as_array().unwrap().iter().map(|entry| {
+            let (kind, numbers) = entry.as_object().unwrap().iter().next().unwrap();
+            format!("{{ {kind} = {numbers} }}")
+        });
+        format!("profile = [{}]", entries.collect::<Vec<_>>().join(", "))
+    };
+    format!("name = {}\ndensity = {rho:?}\n{shape}\n", case["name"])
+}
+
+/// A tank from its text.
+pub fn tank(text: &str) -> Tank {
+    Tank::parse(text, Path::new("")).unwrap_or_else(|problems| panic!("{text}: {problems}"))
+}
+
+/// Modes of a tank given without its density.
+pub fn solve(text: &str, fill: f64, modes: usize) -> ModalData {
+    let tank = tank(&format!("density = 1000.0\n{text}"));
+    tank.solve(fill, modes).unwrap_or_else(|problems| panic!("{text}: {problems}"))
+}

@@ -1,0 +1,243 @@
+//! Tank files: what is accepted, and what is said of the rest.
+
+mod common;
+
+use std::path::Path;
+
+use common::{solve, tank};
+use hubslosh_tank::Tank;
+
+/// All problems of a file without its density.
+fn problems(text: &str) -> String {
+    match Tank::parse(&format!("density = 1000.0\n{text}"), Path::new("")) {
+        Ok(_) => panic!("accepted without error: {text}"),
+        Err(problems) => problems.to_string(),
+    }
+}
+
+/// Each defect is named in one clear sentence. The words tested are those a reader needs.
+#[test]
+fn bad_contours_are_described() {
+    let cases = [
+        ("profile = []", "no segment"),
+        (
+            "profile = [{ line = [0, 0, 1, 0] }, { line = [1, 0.1, 1, 1] }]",
+            "open: segment 1 ends at (1.000000, 0.000000) m and segment 2 starts at (1.000000, 0.100000)",
+        ),
+        (
+            "profile = [{ line = [0, 0, 1, 0] }, { line = [1, 0, 0.5, 1] }, { line = [0.5, 1, 0.5, -0.5] }]",
+            "crosses itself near (0.5",
+        ),
+        ("profile = [{ line = [1, 1, 1, 0] }, { line = [1, 0, 0, 0] }]", "inside out (clockwise)"),
+        (
+            "profile = [{ line = [0, 0, nan, 0] }]",
+            "Segment 1: contains NaN; every value must be a finite number",
+        ),
+        ("profile = [{ line = [0, 0, inf, 0] }]", "contains inf"),
+        ("profile = [{ line = [0.5, 0.5, 0.5, 0.5] }]", "Segment 1: has no length"),
+        (
+            "profile = [{ line = [0, 0, 500, 0] }, { line = [500, 0, 500, 800] }]",
+            "is the drawing in millimetres?",
+        ),
+        ("profile = [{ line = [0, 0, -1, 0] }, { line = [-1, 0, -1, 1] }]", "r >= 0"),
+        ("profile = [{ arc = [0, 1, -1, -90, 0] }]", "radii -1 and -1 m must be above 0"),
+        ("profile = [{ arc = [0, 1, 1, -90, 400] }]", "more than once"),
+        ("profile = [{ line = [0, 0, 1] }]", "expected an array of length 4"),
+        ("profile = [{ circle = [0, 0, 1] }]", "unknown variant `circle`"),
+        ("profile = [{ line = [0, 0, 1, 0] }]\ncolour = 3", "unknown field `colour`"),
+        ("shape = { sphere = { radius = 1.0, height = 2.0 } }", "height"),
+        ("shape = { sphere = { radius = -1.0 } }", "radius is -1; it must be a number above 0"),
+        (
+            "shape = { annulus = { inner_radius = 0.5, outer_radius = 0.4, height = 1.0 } }",
+            "outer_radius is 0.4",
+        ),
+        ("box = [0.8]", "expected an array of length 2"),
+        ("box = [0.8, 0.0]", "box: a length is 0"),
+        ("box = [800, 500]", "millimetres?"),
+        ("", "There is no tank: give profile, points, shape or box"),
+        (
+            "box = [1.0, 1.0]\nshape = { sphere = { radius = 1.0 } }",
+            "shape and box exclude each other",
+        ),
+        ("points = 'nowhere.csv'", "Could not read nowhere.csv"),
+        ("this is no TOML", "expected"),
+    ];
+    for (text, words) in cases {
+        let said = problems(text);
+        assert!(said.contains(words), "{text}\nsaid: {said}\nexpected: {words}");
+    }
+}
+
+#[test]
+fn all_problems_are_reported_at_once() {
+    let text = "profile = [{ line = [0, 0, 1, 0] }, { line = [1, 0.1, -2, 900] }]";
+    let said = Tank::parse(text, Path::new("")).unwrap_err().0;
+    assert_eq!(said.len(), 4, "{said:?}");
+    for words in ["density is missing", "millimetres?", "falls to -2", "open: segment 1"] {
+        assert!(said.iter().any(|s| s.contains(words)), "{words}: {said:?}");
+    }
+    let tank = tank("density = 1.0\nbox = [1.0, 1.0]");
+    assert_eq!(tank.solve(-1.0, 0).unwrap_err().0.len(), 2);
+}
+
+/// Fills that have no modes say why.
+#[test]
+fn impossible_fills_are_described() {
+    let cases = [
+        (
+            "shape = { cylinder = { radius = 1.0, height = 1.0 } }",
+            1.1,
+            "above the top of the tank, 1.000000 m",
+        ),
+        ("shape = { cylinder = { radius = 1.0, height = 1.0 } }", 0.0, "must be above 0"),
+        ("shape = { cylinder = { radius = 1.0, height = 1.0 } }", -1.0, "must be above 0"),
+        ("shape = { cylinder = { radius = 1.0, height = 1.0 } }", f64::NAN, "fill is NaN"),
+        ("shape = { sphere = { radius = 1.0 } }", 2.0, "0.000e0 m wide"),
+        // a shoulder at 0.5
+        (
+            "profile = [{ line = [0, 0, 1, 0] }, { line = [1, 0, 1, 0.5] }, { line = [1, 0.5, 2, 0.5] }, { line = [2, 0.5, 2, 1] }]",
+            0.5,
+            "horizontal part",
+        ),
+        // a ring-shaped sump around a dome, and a second one outside
+        (
+            "profile = [{ line = [0, 0, 1, 1] }, { line = [1, 1, 2, 0] }, { line = [2, 0, 3, 2] }]",
+            0.5,
+            "separate pools",
+        ),
+        // an inner wall that begins under the surface
+        (
+            "profile = [{ line = [0.5, 0.2, 0.5, 0] }, { line = [0.5, 0, 1, 0] }, { line = [1, 0, 1, 1] }]",
+            0.15,
+            "",
+        ),
+        (
+            "profile = [{ line = [0.5, 0.2, 0.5, 0] }, { line = [0.5, 0, 1, 0] }, { line = [1, 0, 1, 1] }]",
+            0.5,
+            "above the top",
+        ),
+        ("profile = [{ line = [0.5, 0, 1, 0] }, { line = [1, 0, 1, 1] }]", 0.5, "above the top"),
+    ];
+    for (text, fill, words) in cases {
+        let tank = tank(&format!("density = 1000.0\n{text}"));
+        match tank.solve(fill, 5) {
+            Ok(_) => assert!(words.is_empty(), "{text} {fill}"),
+            Err(problems) => {
+                let said = problems.to_string();
+                assert!(!words.is_empty() && said.contains(words), "{text} {fill}: {said}");
+            }
+        }
+    }
+}
+
+/// The whole tank is drawn once and cut at any fill; it equals the contour drawn to that fill.
+#[test]
+fn a_tank_is_cut_at_its_fill() {
+    let whole = solve("shape = { torus = { ring_radius = 1.0, tube_radius = 0.4 } }", 0.5, 3);
+    // asin(0.25) = 14.4775 degrees above the equator on both sides
+    let angle = 0.25f64.asin().to_degrees();
+    let drawn = solve(
+        &format!("profile = [{{ arc = [1, 0.4, 0.4, {}, {angle}] }}]", -180.0 - angle),
+        0.5,
+        3,
+    );
+    for (a, b) in whole.modes.iter().zip(&drawn.modes) {
+        assert!((a.lambda / b.lambda - 1.0).abs() < 1e-11 && (a.wave - b.wave).abs() < 1e-9);
+    }
+    // heights count from the contour's own zero, the fill from its lowest point
+    let dome =
+        "profile = [{ arc = [0, -1.05, 1.45, 90, 46.39718102729638] }, { line = [1, 0, 1, 2] }]";
+    let ring = solve(dome, 0.3, 1);
+    assert!((ring.r_inner.unwrap() - (1.45f64 * 1.45 - 1.35 * 1.35).sqrt()).abs() < 1e-12);
+    assert!(solve(dome, 0.7, 1).r_inner == Some(0.0));
+}
+
+/// Every built-in shape is a contour that the solver accepts, its volume that of the textbook.
+#[test]
+fn shapes_have_their_volumes() {
+    use core::f64::consts::PI;
+    let cap = |r: f64, h: f64| PI * h * h * (r - h / 3.0);
+    let cases = [
+        ("cylinder = { radius = 0.5, height = 1.0 }", 0.7, PI * 0.25 * 0.7),
+        ("sphere = { radius = 0.5 }", 0.7, cap(0.5, 0.7)),
+        ("spheroid = { radius = 1.0, half_height = 0.5 }", 0.7, 4.0 * cap(0.5, 0.7)),
+        ("cone = { half_angle = 30.0, height = 1.0 }", 0.6, PI * 0.072 / 3.0),
+        (
+            "domed_cylinder = { radius = 1.0, height = 1.0, bottom = 0.5, top = 0.5 }",
+            1.2,
+            PI * (2.0 * 0.5 / 3.0 + 0.7),
+        ),
+        (
+            "domed_cylinder = { radius = 1.0, height = 1.0, bottom = -0.5, top = 0.0 }",
+            0.8,
+            PI * (0.8 - 2.0 * 0.5 / 3.0),
+        ),
+        (
+            "annulus = { inner_radius = 0.5, outer_radius = 1.0, height = 1.0 }",
+            0.4,
+            PI * 0.75 * 0.4,
+        ),
+        ("torus = { ring_radius = 1.0, tube_radius = 0.3 }", 0.3, PI * PI * 0.09),
+    ];
+    for (shape, fill, volume) in cases {
+        let data = solve(&format!("shape = {{ {shape} }}"), fill, 2);
+        assert!((data.m_liq / (1000.0 * volume) - 1.0).abs() < 1e-12, "{shape}");
+    }
+    // heads as in the reference: crown 2, knuckle 0.2
+    let heads = "shape = { torispherical = { radius = 1.0, height = 1.0, crown_radius = 2.0, knuckle_radius = 0.2 } }";
+    let bottom = tank(&format!("density = 1.0\n{heads}"));
+    assert!((bottom.depth().unwrap() - 1.0 - 2.0 * 0.387_548_450_340_290_2).abs() < 1e-12);
+    assert!(bottom.solve(1.5, 2).is_ok());
+}
+
+/// Points are joined by straight lines; with `spline` a curve of the same points is far closer to
+/// what they were taken from: 25 points of a half circle, chord error 2e-3, spline 1e-6.
+#[test]
+fn points_are_straight_lines_or_a_spline() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = "r, z\n# half a circle\n".to_string();
+    for i in 0..=25 {
+        let angle = core::f64::consts::PI * (i as f64 / 25.0 - 0.5);
+        let r = if i == 0 || i == 25 { 0.0 } else { angle.cos() };
+        text += &format!("{r},{}\n", 1.0 + angle.sin());
+    }
+    std::fs::write(folder.path().join("sphere.csv"), text).unwrap();
+    let read = |extra: &str| {
+        let tank = Tank::parse(
+            &format!("density = 1000.0\npoints = 'sphere.csv'\n{extra}"),
+            folder.path(),
+        )
+        .unwrap();
+        tank.solve(1.0, 2).unwrap()
+    };
+    let (lines, spline) = (read(""), read("spline = true"));
+    let exact = 1.560_157_174;
+    assert!((lines.modes[0].lambda - exact).abs() > 1e-3);
+    assert!((spline.modes[0].lambda - exact).abs() < 1e-5, "{}", spline.modes[0].lambda);
+    // a file with a bad line names it
+    std::fs::write(folder.path().join("bad.csv"), "0,0\n1,zero\n1,1,1\n").unwrap();
+    let said =
+        Tank::parse("density = 1.0\npoints = 'bad.csv'", folder.path()).unwrap_err().to_string();
+    assert!(said.contains("line 2") && said.contains("line 3"), "{said}");
+    std::fs::write(folder.path().join("one.csv"), "0,0\n").unwrap();
+    let said =
+        Tank::parse("density = 1.0\npoints = 'one.csv'", folder.path()).unwrap_err().to_string();
+    assert!(said.contains("1 point(s); a contour needs at least two"), "{said}");
+}
+
+/// The examples in the folder are read and solved.
+#[test]
+fn example_files_work() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    let mut count = 0;
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "toml") {
+            let tank = Tank::read(&path).unwrap_or_else(|p| panic!("{}: {p}", path.display()));
+            let fill = tank.depth().map_or(0.2, |depth| 0.6 * depth);
+            assert!(tank.solve(fill, 5).unwrap().error < 1e-6, "{}", path.display());
+            count += 1;
+        }
+    }
+    assert!(count >= 6);
+}

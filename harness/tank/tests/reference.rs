@@ -1,0 +1,165 @@
+//! Against the reference of 23 tanks.
+
+mod common;
+
+use common::{number, reference, tank, toml};
+use hubslosh_tank::{Mode, Rest};
+use serde_json::Value;
+
+/// Largest deviations of modes and rest from the reference: lambda and l (relative), masses (of
+/// m_liq), m H (of m_liq R), inertias (of m_liq R^2), waves (of R).
+fn deviation(
+    case: &Value,
+    modes: &[Mode],
+    rest: &[Rest],
+    first: usize,
+    r: f64,
+    m_liq: f64,
+) -> [f64; 5] {
+    let mut worst = [0.0f64; 5];
+    let mut meet = |kind: usize, value: f64| {
+        assert!(value.is_finite());
+        worst[kind] = worst[kind].max(value);
+    };
+    let expected = case["modes"].as_array().unwrap();
+    assert_eq!(expected.len(), modes.len());
+    for (mode, expected) in modes.iter().zip(expected).take(first) {
+        meet(0, (mode.lambda / number(&expected["lambda"]) - 1.0).abs());
+        meet(0, (mode.l / number(&expected["l"]) - 1.0).abs());
+        meet(1, (mode.m - number(&expected["m"])).abs() / m_liq);
+        meet(1, (mode.m_ratio - number(&expected["m_ratio"])).abs());
+        if let (Some(height), Some(h)) = (mode.height, expected["H"].as_f64()) {
+            meet(2, mode.m * (height - h).abs() / (m_liq * r));
+            meet(
+                2,
+                mode.m * (mode.hinge.unwrap() - number(&expected["hinge"])).abs() / (m_liq * r),
+            );
+        }
+        meet(4, (mode.wave - number(&expected["wave"])).abs() / r);
+        for (value, key) in [(mode.wave_inner, "wave_inner"), (mode.wave_peak, "wave_peak")] {
+            if let Some(e) = expected.get(key) {
+                meet(4, (value.unwrap() - number(e)).abs() / r);
+            }
+        }
+    }
+    for (rest, expected) in rest.iter().zip(case["rest"].as_array().unwrap()).take(first) {
+        let (m_0, h_0) = (number(&expected["m_0"]), number(&expected["H_0"]));
+        assert_eq!(rest.modes as f64, number(&expected["modes"]));
+        meet(1, (rest.m_0 - m_0).abs() / m_liq);
+        meet(2, (rest.m_0 * rest.height - m_0 * h_0).abs() / (m_liq * r));
+        meet(3, (rest.inertia - number(&expected["I_0"])).abs() / (m_liq * r * r));
+    }
+    worst
+}
+
+/// The demand is 1e-6 for three modes and 1e-5 for five; the solver reaches 1e-9, which this
+/// test holds it to (waves, extrapolated to the contact line, 1e-8). And the error that it states
+/// must not be less than the true one.
+#[test]
+fn every_reference_tank_is_met_within_the_stated_error() {
+    for case in reference().iter().filter(|case| case["kind"] == "revolution") {
+        let name = &case["name"];
+        let data = tank(&toml(case)).solve(number(&case["fill"]), 5).unwrap();
+        let (r, m_liq) = (number(&case["R_surface"]), number(&case["m_liq"]));
+        assert!((data.r_surface.unwrap() - r).abs() < 1e-11, "{name}");
+        assert!((data.r_inner.unwrap() - number(&case["R_inner"])).abs() < 1e-11, "{name}");
+        // boundary quadrature is exact to rounding; twelve digits are written
+        let geometry = [
+            (data.m_liq - m_liq) / m_liq,
+            (data.z_cg - number(&case["z_cg"])) / r,
+            (data.i_frozen_cg - number(&case["I_frozen_cg"])) / (m_liq * r * r),
+            (data.i_frozen_axis - number(&case["I_frozen_axis"])) / (m_liq * r * r),
+        ];
+        assert!(geometry.iter().all(|e| e.abs() < 1e-11), "{name}: {geometry:?}");
+        let mut worst = deviation(case, &data.modes, &data.rest, 5, r, m_liq);
+        worst[3] =
+            worst[3].max((data.i_eff_cg - number(&case["I_eff_cg"])).abs() / (m_liq * r * r));
+        assert!(worst[..4].iter().all(|e| *e < 1e-9), "{name}: {worst:?}");
+        // the peak of a flat maximum is known to the root of that
+        assert!(worst[4] < 1e-7, "{name}: {worst:?}");
+        assert!(
+            worst[..4].iter().all(|e| *e <= data.error),
+            "{name}: {worst:?} > {:e}",
+            data.error
+        );
+        assert!(data.error < 1e-6, "{name}: {:e}", data.error);
+        for (mode, expected) in data.modes.iter().zip(case["modes"].as_array().unwrap()) {
+            let wave = (mode.wave - number(&expected["wave"])).abs() / r;
+            assert!(wave <= data.error, "{name}: {wave:e}");
+            let beta = (mode.beta / number(&expected["beta"]) - 1.0).abs();
+            let known = number(&case["error_beta"]);
+            assert!(
+                beta <= data.error_beta + known,
+                "{name}: beta {beta:e}, stated {:e}",
+                data.error_beta
+            );
+            assert!(beta < 1e-5 + known, "{name}: beta {beta:e}");
+        }
+    }
+}
+
+/// A light mode has no height below 1e-9 m_liq: cone of 45 degrees, modes 2 to 5.
+#[test]
+fn massless_modes_have_no_height_and_keep_their_moment() {
+    let cases = reference();
+    let case = cases.iter().find(|c| c["name"] == "cone_45").unwrap();
+    let data = tank(&toml(case)).solve(1.2, 5).unwrap();
+    for mode in &data.modes[1..] {
+        assert!(mode.m < 1e-9 * data.m_liq && mode.height.is_none() && mode.hinge.is_none());
+    }
+}
+
+/// Both axes of the box; closed forms, so 1e-11 is the digits written.
+#[test]
+fn the_reference_box_is_met_on_both_axes() {
+    let cases = reference();
+    let case = cases.iter().find(|c| c["kind"] == "box").unwrap();
+    let data = tank(&toml(case)).solve(number(&case["fill"]), 5).unwrap();
+    let m_liq = number(&case["m_liq"]);
+    let close = |a: f64, b: &Value| (a / number(b) - 1.0).abs() < 1e-11;
+    assert!(close(data.m_liq, &case["m_liq"]) && close(data.z_cg, &case["z_cg"]));
+    assert!(close(data.i_frozen_axis, &case["I_frozen_axis"]));
+    assert!(close(data.i_eff_axis.unwrap(), &case["I_eff_axis"]));
+    let axes = data.axes.unwrap();
+    for (axis, key) in [(&axes.x, "x"), (&axes.y, "y")] {
+        let expected = &case["axes"][key];
+        assert!(close(axis.i_frozen_cg, &expected["I_frozen_cg"]));
+        assert!(close(axis.i_eff_cg, &expected["I_eff_cg"]));
+        let worst = deviation(expected, &axis.modes, &axis.rest, 5, 0.4, m_liq);
+        assert!(worst.iter().all(|e| *e < 1e-11), "{key}: {worst:?}");
+        for (mode, expected) in axis.modes.iter().zip(expected["modes"].as_array().unwrap()) {
+            assert!(close(mode.beta, &expected["beta"]));
+        }
+    }
+    assert_eq!(data.modes, axes.x.modes);
+}
+
+/// The keys that other programs read.
+#[test]
+fn the_result_has_the_keys_of_the_reference() {
+    for case in reference() {
+        let data = tank(&toml(&case)).solve(number(&case["fill"]), 5).unwrap();
+        let written = serde_json::to_value(&data).unwrap();
+        let check = |written: &Value, expected: &Value, place: &str| {
+            for (key, value) in expected.as_object().unwrap() {
+                if !["note", "profile"].contains(&key.as_str()) {
+                    let own = written.get(key).unwrap_or_else(|| panic!("{place} lacks {key}"));
+                    let kind =
+                        |v: &Value| (v.is_number(), v.is_array(), v.is_object(), v.is_string());
+                    assert!(
+                        kind(own) == kind(value) || value.is_null() || own.is_null(),
+                        "{place}: {key}"
+                    );
+                }
+            }
+        };
+        check(&written, &case, "the result");
+        let both = [("", &written, &case), ("x", &written["axes"]["x"], &case["axes"]["x"])];
+        for (place, written, case) in both.into_iter().filter(|b| b.2.get("modes").is_some()) {
+            for i in 0..5 {
+                check(&written["modes"][i], &case["modes"][i], place);
+                check(&written["rest"][i], &case["rest"][i], place);
+            }
+        }
+    }
+}
