@@ -141,10 +141,10 @@ impl Contour {
         }
         let heights = || outline.points.iter().flatten().map(|p| p[1]);
         let coarse = (heights().fold(f64::MAX, f64::min), heights().fold(f64::MIN, f64::max));
-        let (bottom, top) = segments
-            .iter()
-            .fold(coarse, |(low, high), s| (low.min(extreme(s, 1.0)), high.max(-extreme(s, -1.0))));
-        Ok(Contour { segments, bottom, top, size })
+        let (bottom, top) = segments.iter().fold(coarse, |(low, high), s| {
+            (low.min(extreme(s, 1.0).1), high.max(-extreme(s, -1.0).1))
+        });
+        Ok(Contour { segments: from_the_top(segments, size), bottom, top, size })
     }
 
     /// All segments.
@@ -362,6 +362,25 @@ fn defect(segment: &Segment) -> Option<String> {
     None
 }
 
+/// A closed curve away from the axis (a torus) may begin anywhere; it is made to begin at its top.
+fn from_the_top(segments: Vec<Segment>, size: f64) -> Vec<Segment> {
+    let (start, end) = (segments[0].start(), segments[segments.len() - 1].end());
+    if norm(sub(start, end)) > JOINED * size || start[0] <= JOINED * size {
+        return segments;
+    }
+    let tops = segments.iter().map(|s| extreme(s, -1.0)).enumerate();
+    let Some((first, (s, _))) = tops.min_by(|a, b| a.1.1.total_cmp(&b.1.1)) else {
+        return segments;
+    };
+    let Segment { from, to, .. } = segments[first];
+    let t = from + s * (to - from);
+    let mut turned = vec![segments[first].part(t, to)];
+    turned.extend((1..segments.len()).map(|i| segments[(first + i) % segments.len()]));
+    turned.push(segments[first].part(from, t));
+    turned.retain(|s| s.from != s.to);
+    turned
+}
+
 /// Number of intervals that a segment is sampled with.
 fn samples(segment: &Segment) -> usize {
     match segment.curve {
@@ -371,8 +390,9 @@ fn samples(segment: &Segment) -> usize {
     }
 }
 
-/// Smallest value of `sign` z on a segment, by golden section around the lowest sample.
-fn extreme(segment: &Segment, sign: f64) -> f64 {
+/// Where `sign` z is smallest on a segment, and that value, by golden section around the lowest
+/// sample; the place as a fraction of the parameter.
+fn extreme(segment: &Segment, sign: f64) -> (f64, f64) {
     let count = samples(segment);
     let height = |s: f64| sign * segment.at(s.clamp(0.0, 1.0))[1];
     let step = 1.0 / count as f64;
@@ -389,7 +409,8 @@ fn extreme(segment: &Segment, sign: f64) -> f64 {
             a = left;
         }
     }
-    [a, b, at].into_iter().map(height).fold(f64::MAX, f64::min)
+    let places = [a, b, at].map(|s| (s.clamp(0.0, 1.0), height(s)));
+    places.into_iter().fold((at, f64::MAX), |low, x| if x.1 < low.1 { x } else { low })
 }
 
 /// The contour as short straight lines, to find what does not depend on their bulge.

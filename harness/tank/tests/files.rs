@@ -144,6 +144,8 @@ fn a_tank_is_cut_at_its_fill() {
     for (a, b) in whole.modes.iter().zip(&drawn.modes) {
         assert!((a.lambda / b.lambda - 1.0).abs() < 1e-11 && (a.wave - b.wave).abs() < 1e-9);
     }
+    let elsewhere = solve("profile = [{ arc = [1, 0.4, 0.4, -180, 180] }]", 0.5, 3);
+    assert!((whole.modes[0].lambda / elsewhere.modes[0].lambda - 1.0).abs() < 1e-11);
     // heights count from the contour's own zero, the fill from its lowest point
     let dome =
         "profile = [{ arc = [0, -1.05, 1.45, 90, 46.39718102729638] }, { line = [1, 0, 1, 2] }]";
