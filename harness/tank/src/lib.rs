@@ -7,11 +7,15 @@
 //! * [`curve`], [`contour`], [`tank`]: geometry and the file
 //! * `ring`, `gauss`, `panel`, `potential_flow`: the boundary integral equation
 //! * [`modal`]: modes as pendulums; [`closed_form`]: cylinder, annulus, box
+//! * [`damping`], [`low_gravity`]: what the modal parameters leave out
 
 pub mod closed_form;
 pub mod contour;
 pub mod curve;
+pub mod damping;
 mod gauss;
+pub mod interpolation;
+pub mod low_gravity;
 pub mod modal;
 mod panel;
 mod potential_flow;

@@ -70,6 +70,29 @@ pub struct Mode {
     /// Elevation per angle along the surface: (r, m/rad), from the axis or inner wall outwards.
     #[serde(skip)]
     pub shape: Vec<[f64; 2]>,
+    /// int_F (phi_r^2 + phi^2/r^2) r dr/N, 1/m2: what capillarity adds to the stiffness.
+    #[serde(skip)]
+    pub surface_gradient: f64,
+    /// The walls are vertical at the free surface.
+    #[serde(skip)]
+    pub vertical_wall: bool,
+    /// The tank has vertical walls and a flat bottom, so that capillarity does not change phi_n.
+    #[serde(skip)]
+    pub upright: bool,
+    /// Speed of the liquid along the outer wall over that of the surface at the wall.
+    #[serde(skip)]
+    pub wall: Vec<WallSpeed>,
+}
+
+/// Speed along the outer wall at one place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WallSpeed {
+    /// Radius, m.
+    pub r: f64,
+    /// Height, m from the contour's own zero.
+    pub z: f64,
+    /// |phi_s|/(lambda phi(R_F)).
+    pub ratio: f64,
 }
 
 /// What moves with the tank when the first `modes` modes are pendulums.
@@ -170,13 +193,18 @@ pub struct ModalData {
     pub wall: Option<Wall>,
 }
 
-/// The free surface in one mode.
-#[derive(Clone, Debug, PartialEq)]
+/// A mode at the free surface and the wall.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Surface {
     /// (r, elevation per angle), from the axis or inner wall outwards.
     pub(crate) shape: Vec<[f64; 2]>,
     /// Largest elevation per angle: (r, m/rad).
     pub(crate) peak: Option<[f64; 2]>,
+    /// As in [`Mode`].
+    pub(crate) gradient: f64,
+    pub(crate) vertical_wall: bool,
+    pub(crate) upright: bool,
+    pub(crate) wall: Vec<WallSpeed>,
 }
 
 impl Mode {
@@ -211,7 +239,21 @@ impl Mode {
             m_h,
             m_h2,
             shape: surface.shape,
+            surface_gradient: surface.gradient,
+            vertical_wall: surface.vertical_wall,
+            upright: surface.upright,
+            wall: surface.wall,
         }
+    }
+
+    /// Speed along the outer wall at the height z, m from the contour's own zero; the place nearest to
+    /// the surface if there are several, none if there is none.
+    pub fn wall_speed(&self, z: f64) -> Option<WallSpeed> {
+        let pair = self.wall.windows(2).find(|p| (p[0].z - z) * (p[1].z - z) <= 0.0)?;
+        let (a, b) = (pair[0], pair[1]);
+        let t = if a.z == b.z { 0.0 } else { (z - a.z) / (b.z - a.z) };
+        let between = |a: f64, b: f64| a + t * (b - a);
+        Some(WallSpeed { r: between(a.r, b.r), z, ratio: between(a.ratio, b.ratio) })
     }
 }
 
@@ -360,6 +402,10 @@ fn approximate(
     };
     let rho_pi = rho * core::f64::consts::PI;
     let i_eff = rho_pi * sum(0..points.len(), &|i| solution.psi[i] * pitch[i]);
+    let upright = |tangent: [f64; 2]| tangent[0].abs() < 1e-9;
+    let last = wall.segments.len() - 1;
+    let vertical = upright(wall.segments[last].tangent(1.0))
+        && (wall.r_inner == 0.0 || upright(wall.segments[0].tangent(0.0)));
     let of_mode = |(k, (&lambda, phi)): (usize, (&f64, &Vec<f64>))| {
         let big_n = sum(surface.clone(), &|i| phi[i] * phi[i]);
         let a = sum(surface.clone(), &|i| phi[i] * points[i].0[0]);
@@ -373,8 +419,26 @@ fn approximate(
         }
         let peak = (k == 0).then(|| mesh.surface_peak(phi)).map(|[r, u]| [r, scale * u]);
         let mass = [a * a, a * b, b * b].map(|x| rho_pi * lambda * x / big_n);
-        let beta = mesh.wall_gradient(phi) / (lambda * big_n);
-        let surface = Surface { shape, peak };
+        let beta = mesh.gradient(phi, false) / (lambda * big_n);
+        // at the contact line phi_s = lambda phi along a vertical wall
+        let contact = mesh.along_surface(phi, 1).first().map_or(0.0, |p| p[1]);
+        let mut along: Vec<WallSpeed> = Vec::new();
+        if vertical {
+            along.push(WallSpeed { r: wall.r_outer, z: wall.z_surface, ratio: 1.0 });
+        }
+        along.extend(mesh.along_wall(phi).iter().map(|[r, z, speed]| WallSpeed {
+            r: *r,
+            z: *z,
+            ratio: speed / (lambda * contact).abs(),
+        }));
+        let surface = Surface {
+            shape,
+            peak,
+            gradient: mesh.gradient(phi, true) / big_n,
+            vertical_wall: vertical,
+            upright: false,
+            wall: along,
+        };
         let mut mode =
             Mode::new(k + 1, lambda, mass, volume.z_cg, rho * volume.volume, surface, beta);
         mode.lambda_r = Some(lambda * wall.r_outer);

@@ -389,14 +389,17 @@ impl Discretisation {
         basis.iter().enumerate().map(|(k, value)| value * coefficient(k)).sum()
     }
 
-    /// int_W [u_s^2 + u^2/r^2] r ds of a function given at all points. Next to a corner u_s goes as
+    /// int [u_s^2 + u^2/r^2] r ds over the free surface or the wall, u given at all points. Next to a corner u_s goes as
     /// rho^(nu - 1), and dividing du/dv by ds/dv loses all digits; the integral over the last 1e-6
     /// of the panel follows from the exponent (1 where nu > 1: u_s has a limit there).
-    pub(crate) fn wall_gradient(&self, u: &[f64]) -> f64 {
+    pub(crate) fn gradient(&self, u: &[f64], on_surface: bool) -> f64 {
         let rule = Gauss::new(24);
         let mut slopes = vec![0.0; self.order];
         let mut total = 0.0;
-        for (index, panel) in self.panels[..self.surface / self.order].iter().enumerate() {
+        let first = self.surface / self.order;
+        let range = if on_surface { first..self.panels.len() } else { 0..first };
+        for index in range {
+            let panel = &self.panels[index];
             let v0 = if panel.gamma > 1.0 { 1e-6f64.powf(1.0 / panel.gamma) } else { 0.0 };
             let mut along = |v: f64| {
                 legendre_slopes(v, &mut slopes);
@@ -418,6 +421,30 @@ impl Discretisation {
             }
         }
         total
+    }
+
+    /// (r, z, |u_s|) along the wall from the outer contact line, u given at all points. Places next to
+    /// corners, where u_s has no limit or no digits, are left out.
+    pub(crate) fn along_wall(&self, u: &[f64]) -> Vec<[f64; 3]> {
+        let mut slopes = vec![0.0; self.order];
+        let mut all = Vec::new();
+        for panel_index in (0..self.surface / self.order).rev() {
+            let panel = &self.panels[panel_index];
+            let mut own: Vec<[f64; 3]> = (0..24)
+                .map(|i| (i as f64 + 0.5) / 24.0)
+                .filter(|v| panel.gamma == 1.0 || v.powf(panel.gamma) > 1e-6)
+                .map(|v| {
+                    legendre_slopes(v, &mut slopes);
+                    let x = self.boundary.point(panel, v);
+                    [x.p[0], x.p[1], (self.expand(u, panel_index, &slopes) / x.speed).abs()]
+                })
+                .collect();
+            if !panel.end {
+                own.reverse();
+            }
+            all.extend(own);
+        }
+        all
     }
 
     /// Where on the free surface |u| is largest: (r, u).

@@ -1,0 +1,218 @@
+//! Damping and low gravity.
+
+mod common;
+
+use common::solve;
+use hubslosh_tank::damping::{self, Ring};
+use hubslosh_tank::low_gravity::{self, Fluid};
+
+const BENCH: &str = "shape = { cylinder = { radius = 0.0815, height = 0.3 } }";
+
+/// Stephens is 1.493 times the laminar layer at every depth; its tanh(1.84 x)^(-1/4) is the layer's
+/// omega. 1.84 for 1.8412 makes 0.2 %.
+#[test]
+fn stephens_is_1_493_laminar_layers_at_every_depth() {
+    for fill in [0.02, 0.05, 0.0815, 0.15, 0.25] {
+        let mode = &solve(BENCH, fill, 1).modes[0];
+        let ratio = damping::stephens(0.0815, fill, 1e-6, 9.81).zeta
+            / damping::laminar(mode, 1e-6, 9.81).zeta;
+        assert!((ratio / 1.493 - 1.0).abs() < 2e-3, "{fill} {ratio}");
+    }
+}
+
+/// Mikishev and Dorozhkin: 1.39 to 1.54 laminar layers from h/R 0.5 on, 0.90 of one at 0.2 (flagged).
+#[test]
+fn mikishev_dorozhkin_leaves_its_range_in_shallow_liquid() {
+    let ratio = |x: f64| {
+        let mode = &solve(BENCH, 0.0815 * x, 1).modes[0];
+        let correlation = damping::mikishev_dorozhkin(0.0815, 0.0815 * x, 1e-6, 9.81);
+        (correlation.zeta / damping::laminar(mode, 1e-6, 9.81).zeta, correlation.outside.len())
+    };
+    for x in [0.5, 1.0, 2.0, 3.0] {
+        let (ratio, outside) = ratio(x);
+        assert!((1.38..1.55).contains(&ratio) && outside == 0, "{x} {ratio}");
+    }
+    let (shallow, outside) = ratio(0.2);
+    assert!((shallow - 0.90).abs() < 0.01 && outside == 1, "{shallow}");
+}
+
+/// beta of a cylinder in closed form, of its contour by the solver; of a box Keulegan's decrement in
+/// his own form: (sqrt(pi nu T)/w) [1 + w/a + (pi w/a)(1 - 2 h/a)/sinh(2 pi h/a)] = 2 pi zeta.
+#[test]
+fn laminar_layer_is_the_known_one_in_cylinder_and_box() {
+    let contour = "profile = [{ line = [0, 0, 0.5, 0] }, { line = [0.5, 0, 0.5, 1] }]";
+    for h in [0.1, 0.4, 0.9] {
+        let mode = &solve(contour, h, 1).modes[0];
+        let (xi, x) = (1.841_183_781_340_659_3f64, h / 0.5);
+        let beta = (xi * xi + 1.0) / (xi * xi - 1.0) + 2.0 * xi * (1.0 - x) / (2.0 * xi * x).sinh();
+        assert!((mode.beta * 0.5 / beta - 1.0).abs() < 1e-7, "{h}");
+        let (a, w, pi) = (0.8f64, 0.5, core::f64::consts::PI);
+        let omega = (9.81 * pi / a * (pi * h / a).tanh()).sqrt();
+        let period = 2.0 * pi / omega;
+        let bracket = 1.0 + w / a + pi * w / a * (1.0 - 2.0 * h / a) / (2.0 * pi * h / a).sinh();
+        let decrement = (pi * 1e-6 * period).sqrt() / w * bracket;
+        let zeta = damping::keulegan(a, w, h, 1e-6, 9.81).zeta;
+        assert!((zeta * 2.0 * pi / decrement - 1.0).abs() < 1e-12, "{h}");
+    }
+}
+
+/// Sphere: both branches meet at half full; 2 to 4.5 laminar layers up to there.
+#[test]
+fn sphere_is_continuous_and_flags_its_ends() {
+    let zeta = |x: f64| damping::sphere(0.1, 0.1 * x, 1e-6, 9.81);
+    assert!((zeta(1.0 - 1e-9).zeta / zeta(1.0 + 1e-9).zeta - 1.0).abs() < 1e-8);
+    for x in [0.3, 0.6, 1.0] {
+        let mode = &solve("shape = { sphere = { radius = 0.1 } }", 0.1 * x, 1).modes[0];
+        let ratio = zeta(x).zeta / damping::laminar(mode, 1e-6, 9.81).zeta;
+        assert!((1.9..4.6).contains(&ratio), "{x} {ratio}");
+    }
+    assert_eq!(zeta(0.5).outside.len(), 0);
+    assert_eq!(zeta(0.05).outside.len(), 1);
+    assert_eq!(damping::sphere(0.1, 0.1, 1e-12, 9.81).outside.len(), 1);
+}
+
+/// Values of the formulas worked by hand, and their flags.
+#[test]
+fn cone_and_torus_have_their_values_and_ranges() {
+    // b = 30: C5 = 1.3817, C4 = 0.638; Re = 1e-6/sqrt(9.81 0.125) = 9.0305e-7
+    let cone = damping::cone(0.5, 30.0, 1e-6, 9.81);
+    let by_hand = 4.964 / core::f64::consts::TAU * 1.3817 / 0.638f64.sqrt() * 9.0305e-7f64.sqrt();
+    assert!((cone.zeta / by_hand - 1.0).abs() < 1e-5 && cone.outside.is_empty());
+    assert_eq!(damping::cone(0.5, 60.0, 1e-6, 9.81).outside.len(), 1);
+    // the measured tank itself, half full: y = 0.5 gives the fit alone
+    let torus = damping::torus(0.0635, 0.0635, 3.3e-6, 9.81);
+    let fit = 1.6629 / 16.0 - 3.7955 / 8.0 + 3.5583 / 4.0 - 1.6759 / 2.0 + 0.3865;
+    assert!(
+        (torus.zeta * core::f64::consts::TAU / fit - 1.0).abs() < 1e-12 && torus.outside.is_empty()
+    );
+    assert_eq!(damping::torus(1.0, 1.95, 1e-9, 9.81).outside.len(), 2);
+}
+
+/// d/R = w/R = eta/R = 0.1 gives 0.0468.
+#[test]
+fn miles_ring_has_its_known_value_and_ranges() {
+    let ring = |d: f64, w: f64, eta: f64| {
+        damping::miles_ring(2.0, Ring { depth: 2.0 * d, width: 2.0 * w }, 2.0 * eta)
+    };
+    let damping = ring(0.1, 0.1, 0.1);
+    assert!((damping.zeta - 0.0468).abs() < 5e-5 && damping.outside.is_empty(), "{damping:?}");
+    // as the root of the amplitude
+    assert!((ring(0.1, 0.1, 0.08).zeta / damping.zeta - 0.8f64.sqrt()).abs() < 1e-12);
+    assert_eq!(ring(0.05, 0.1, 0.1).outside.len(), 1); // uncovered
+    assert_eq!(ring(0.2, 0.1, 0.05).outside.len(), 1); // too small a wave
+    assert_eq!(ring(0.1, 0.2, 0.1).outside.len(), 2); // covers 0.36, and the wave is small against it
+}
+
+/// The ring of any tank is scaled to Miles in the cylinder: 1.53 2 xi/(1 - 1/xi^2) against 2.83 2^(3/2),
+/// 0.2 %, but for 4.60 against 2.5 xi = 4.603 and alpha^(3/2) = (2 w/R)^(3/2) (1 - w/2R)^(3/2).
+#[test]
+fn ring_of_any_tank_is_miles_in_a_deep_cylinder() {
+    let exact = solve("shape = { cylinder = { radius = 1.0, height = 3.0 } }", 3.0, 1);
+    let solved = solve("profile = [{ line = [0, 0, 1, 0] }, { line = [1, 0, 1, 3] }]", 3.0, 1);
+    for d in [0.05, 0.1, 0.3] {
+        let baffle = Ring { depth: d, width: 1e-3 };
+        let miles = damping::miles_ring(1.0, baffle, 1e-3).zeta;
+        let cylinder = damping::ring(&exact, baffle, 1e-3).unwrap().zeta;
+        let contour = damping::ring(&solved, baffle, 1e-3).unwrap().zeta;
+        assert!((cylinder / miles - 1.0).abs() < 5e-3, "{d} {cylinder} {miles}");
+        assert!((contour / cylinder - 1.0).abs() < 2e-3, "{d} {contour} {cylinder}");
+    }
+    assert!(damping::ring(&exact, Ring { depth: 5.0, width: 0.1 }, 0.1).is_none());
+}
+
+/// Half a ring gives half; two 90 degree sectors on the slosh axis 0.855, across it 0.145.
+#[test]
+fn sectors_of_a_ring_add_up() {
+    let quarter = core::f64::consts::FRAC_PI_4;
+    // the 2.5th power of the cosine's zeros leaves Gauss 1e-8
+    assert!((damping::sector(0.0, 8.0 * quarter) - 1.0).abs() < 1e-7);
+    assert!((damping::sector(0.3, 0.3 + 4.0 * quarter) - 0.5).abs() < 1e-6);
+    assert!((2.0 * damping::sector(-quarter, quarter) - 0.855).abs() < 5e-4);
+    assert!((2.0 * damping::sector(quarter, 3.0 * quarter) - 0.145).abs() < 5e-4);
+}
+
+/// omega^2 = (g xi/R + sigma xi^3/(rho R^3)) tanh(xi h/R) exactly; the contour's own integral agrees;
+/// at g = 0 the spring alone is left.
+#[test]
+fn flat_surface_is_exact_in_a_cylinder() {
+    let (r, h) = (0.0815f64, 0.1);
+    let solved = solve(
+        &format!("profile = [{{ line = [0, 0, {r}, 0] }}, {{ line = [{r}, 0, {r}, {h}] }}]"),
+        h,
+        3,
+    );
+    let exact = solve(BENCH, h, 3);
+    let xi = [1.841_183_781_340_659_3, 5.331_442_773_525_033, 8.536_316_366_346_286];
+    for g in [0.0, 0.01, 9.81] {
+        let fluid = Fluid { rho: 997.0, sigma: 0.072, g };
+        for n in 0..3 {
+            let k = xi[n] / r;
+            let omega2 = (g * k + fluid.sigma / fluid.rho * k.powi(3)) * (k * h).tanh();
+            let [a, b] = [&exact, &solved].map(|data| low_gravity::flat(&data.modes[n], fluid));
+            assert!((a.omega2 / omega2 - 1.0).abs() < 1e-13);
+            assert!((b.omega2 / omega2 - 1.0).abs() < 1e-6, "{} {omega2}", b.omega2);
+            let spring = exact.modes[n].m * fluid.sigma * xi[n].powi(3) * (k * h).tanh()
+                / (fluid.rho * r.powi(3));
+            assert!((a.spring / spring - 1.0).abs() < 1e-12);
+            assert!(a.outside.is_empty());
+        }
+    }
+    // a leaning wall, and a bowl where the first order is not enough
+    let sphere = solve("shape = { sphere = { radius = 1.0 } }", 0.5, 1);
+    let fluid = Fluid { rho: 997.0, sigma: 0.072, g: 9.81 };
+    assert_eq!(low_gravity::flat(&sphere.modes[0], fluid).outside.len(), 1);
+    let half = solve("shape = { sphere = { radius = 1.0 } }", 1.0, 1);
+    assert!(low_gravity::flat(&half.modes[0], fluid).outside.is_empty());
+    assert_eq!(low_gravity::flat(&half.modes[0], Fluid { g: 1e-5, ..fluid }).outside.len(), 1);
+}
+
+/// The table to its digits, 90 degrees exactly, the limit of large Bond numbers, and nothing that
+/// jumps or turns between the values.
+#[test]
+fn curved_meniscus_follows_its_table_and_limits() {
+    let xi = 1.841_183_781_340_659_3f64;
+    let table = [
+        (0.0, 90.0, 6.2415),
+        (0.0, 5.0, 2.8263),
+        (1.0, 45.0, 6.2873),
+        (3.0, 15.0, 8.5985),
+        (10.0, 75.0, 23.7732),
+        (30.0, 60.0, 59.1301),
+        (100.0, 5.0, 184.4012),
+        (100.0, 30.0, 185.2381),
+    ];
+    for (bond, angle, value) in table {
+        assert!((low_gravity::cylinder_omega2(bond, angle) - value).abs() < 6e-5, "{bond} {angle}");
+    }
+    for bond in [0.0, 0.5, 5.0, 70.0, 500.0] {
+        let flat = xi * bond + xi.powi(3);
+        assert!((low_gravity::cylinder_omega2(bond, 90.0) / flat - 1.0).abs() < 1e-15);
+    }
+    // -6.76 cos at Bo = 3000
+    let shift = low_gravity::cylinder_omega2(3000.0, 0.0) - xi * 3000.0 - xi.powi(3);
+    assert!((shift + 6.76).abs() < 0.02, "{shift}");
+    let mut before = 0.0;
+    for i in 0..3000 {
+        let value = low_gravity::cylinder_omega2(0.1 * i as f64, 20.0);
+        assert!(value > before && value - before < 3.7);
+        before = value;
+    }
+    for i in 1..90 {
+        let angle = i as f64;
+        assert!(
+            low_gravity::cylinder_omega2(2.0, angle)
+                > low_gravity::cylinder_omega2(2.0, angle - 1.0)
+        );
+    }
+    // the published formula: 0.6 % at 100, 4 % at 10
+    for (bond, most) in [(30.0, 0.003), (100.0, 0.007), (10.0, 0.045)] {
+        let ratio =
+            low_gravity::satterlee_reynolds(bond, 5.0) / low_gravity::cylinder_omega2(bond, 5.0);
+        assert!((ratio - 1.0).abs() < most, "{bond} {ratio}");
+    }
+    let mode = &solve(BENCH, 0.2, 1).modes[0];
+    let fluid = Fluid { rho: 997.0, sigma: 0.072, g: 0.0 };
+    let zero = low_gravity::cylinder(mode, 0.0815, 0.2, 30.0, fluid);
+    assert!(zero.spring > 0.0 && zero.outside.is_empty() && zero.omega2 > 0.0);
+    assert_eq!(low_gravity::cylinder(mode, 0.0815, 0.2, 120.0, fluid).outside.len(), 1);
+}
