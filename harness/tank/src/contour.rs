@@ -166,6 +166,19 @@ impl Contour {
         (if start == end { self.top } else { brim }) - self.bottom
     }
 
+    /// The whole wall, if it ends at the axis or where it began: the tank can be full.
+    pub(crate) fn closed(&self) -> Option<Wall> {
+        let (start, end) = (self.segments[0].start(), self.segments[self.segments.len() - 1].end());
+        let on_axis = start[0] <= LEVEL * self.size && end[0] <= LEVEL * self.size;
+        let ring = norm(sub(start, end)) <= JOINED * self.size;
+        (on_axis || ring).then(|| Wall {
+            segments: self.segments.clone(),
+            r_outer: 0.0,
+            r_inner: 0.0,
+            z_surface: self.top,
+        })
+    }
+
     /// The wetted wall at `fill`, m above the lowest point.
     ///
     /// # Errors

@@ -31,28 +31,28 @@ impl Monotone {
             (slope[i], curvature[i]) = derivatives(x[i], &x[own.clone()], &y[own]);
         }
         let secant: Vec<f64> = (1..count).map(|i| (y[i] - y[i - 1]) / (x[i] - x[i - 1])).collect();
-        for i in 0..count {
-            let left = if i > 0 { Some(secant[i - 1]) } else { None };
-            let right = secant.get(i).copied();
-            let (a, b) = (left.or(right).unwrap_or(0.0), right.or(left).unwrap_or(0.0));
-            if a * b < 0.0 {
-                continue; // a turning point
+        let turning = |j: usize| j > 0 && j + 1 < count && secant[j - 1] * secant[j] < 0.0;
+        let limited = |j: usize| j + 1 < count && !turning(j) && !turning(j + 1);
+        // In the direction of the rise 0 <= d, and 2 (d_0 + d_1)/5 < secant on every interval.
+        for j in (0..count - 1).filter(|j| limited(*j)) {
+            let sign = if secant[j] < 0.0 { -1.0 } else { 1.0 };
+            for i in [j, j + 1] {
+                slope[i] = sign * (sign * slope[i]).clamp(0.0, 2.4 * secant[j].abs());
             }
-            // In the direction of the rise: 0 <= d <= 5/4 of either secant, so that two of them
-            // leave room between the middle Bernstein coefficients.
-            let sign = if a + b < 0.0 { -1.0 } else { 1.0 };
-            slope[i] = sign * (sign * slope[i]).clamp(0.0, 1.25 * a.abs().min(b.abs()));
+        }
+        for j in (0..count - 1).filter(|j| limited(*j)) {
+            let (sum, most) = (0.4 * (slope[j] + slope[j + 1]), 0.95 * secant[j]);
+            if sum.abs() > most.abs() {
+                slope[j] *= most / sum;
+                slope[j + 1] *= most / sum;
+            }
         }
         // b_2 - b_1 = h d/5 + h^2 s/20, b_4 - b_3 = h d/5 - h^2 s/20,
         // b_3 - b_2 = h [secant - 2 (d_0 + d_1)/5] + h^2 (s_1 - s_0)/20
         for i in 0..count {
             let mut limit = [f64::NEG_INFINITY, f64::INFINITY];
-            let turning = |j: usize| j > 0 && j + 1 < count && secant[j - 1] * secant[j] < 0.0;
             for (j, at_left) in [(i, true), (i.wrapping_sub(1), false)] {
-                let Some(&rise) = secant.get(j) else { continue };
-                if turning(j) || turning(j + 1) {
-                    continue;
-                }
+                let Some(&rise) = secant.get(j).filter(|_| limited(j)) else { continue };
                 let sign = if rise < 0.0 { -1.0 } else { 1.0 };
                 let h = x[j + 1] - x[j];
                 let room = (20.0 / h) * (rise - 0.4 * (slope[j] + slope[j + 1])).abs();

@@ -7,6 +7,7 @@
 //! * [`curve`], [`contour`], [`tank`]: geometry and the file
 //! * `ring`, `gauss`, `panel`, `potential_flow`: the boundary integral equation
 //! * [`modal`]: modes as pendulums; [`closed_form`]: cylinder, annulus, box
+//! * [`sweep`]: tables over the fill and their [`interpolation`]
 //! * [`damping`], [`low_gravity`]: what the modal parameters leave out
 
 pub mod closed_form;
@@ -21,6 +22,7 @@ mod panel;
 mod potential_flow;
 mod ring;
 mod spline;
+pub mod sweep;
 pub mod tank;
 
 pub use contour::Problems;

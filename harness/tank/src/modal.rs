@@ -246,6 +246,21 @@ impl Mode {
         }
     }
 
+    /// A mode between two of a table: without its shape.
+    pub(crate) fn interpolated(
+        n: usize,
+        l: f64,
+        mass: [f64; 3],
+        z_cg: f64,
+        m_liq: f64,
+        wave: f64,
+        beta: f64,
+    ) -> Mode {
+        let mut mode = Mode::new(n, 1.0 / l, mass, z_cg, m_liq, Surface::default(), beta);
+        mode.wave = wave;
+        mode
+    }
+
     /// Speed along the outer wall at the height z, m from the contour's own zero; the place nearest to
     /// the surface if there are several, none if there is none.
     pub fn wall_speed(&self, z: f64) -> Option<WallSpeed> {
@@ -306,7 +321,7 @@ impl ModalData {
 /// all heights from z_cg.
 pub(crate) fn rest(m_liq: f64, z_cg: f64, i_eff_cg: f64, modes: &[Mode]) -> Rest {
     let m_0 = m_liq - modes.iter().map(|m| m.m).sum::<f64>();
-    let h_0 = -modes.iter().map(|m| m.m_h).sum::<f64>() / m_0;
+    let h_0 = if m_0 == 0.0 { 0.0 } else { -modes.iter().map(|m| m.m_h).sum::<f64>() / m_0 };
     let m_h2: f64 = modes.iter().map(|m| m.m_h2).sum();
     Rest { modes: modes.len(), m_0, height: z_cg + h_0, inertia: i_eff_cg - m_0 * h_0 * h_0 - m_h2 }
 }
@@ -357,6 +372,24 @@ pub(crate) fn solve(wall: Wall, rho: f64, fill: f64, modes: usize) -> ModalData 
     data.r_inner = Some(wall.r_inner);
     data.error = error.max(ROUNDING);
     data.error_beta = error_beta.max(ROUNDING_BETA);
+    data.wall = Some(wall);
+    data
+}
+
+/// A full closed tank: no modes, and the effective inertia of a liquid without a free surface.
+pub(crate) fn full(wall: Wall, rho: f64, fill: f64) -> ModalData {
+    let volume = Volume::of(&wall);
+    let mesh = Discretisation::new(&wall.segments, 1, 16);
+    let [first, second, _] = orders(mesh.panel_count());
+    let [known, better] = [first, second]
+        .map(|order| approximate(&mesh.with_order(order), &wall, &volume, rho, 0).i_eff);
+    let m_liq = rho * volume.volume;
+    let inertias = [rho * volume.across, rho * volume.axial, better];
+    let mut data =
+        ModalData::new("revolution", rho, fill, m_liq, volume.z_cg, inertias, Vec::new());
+    data.r_surface = Some(0.0);
+    data.r_inner = Some(0.0);
+    data.error = ((known - better).abs() / inertias[1]).max(ROUNDING);
     data.wall = Some(wall);
     data
 }

@@ -43,6 +43,8 @@ pub(crate) struct BoundaryPoint {
 #[derive(Clone, Debug)]
 pub(crate) struct Boundary {
     pub(crate) segments: Vec<Segment>,
+    /// Index of the free surface among the segments; their number if there is none.
+    pub(crate) surface: usize,
     /// Starts and ends, exact on the axis.
     ends: Vec<[Point; 2]>,
     /// (gamma, nu) at the start and the end of every segment.
@@ -54,8 +56,13 @@ impl Boundary {
     pub(crate) fn new(wall: &[Segment]) -> Boundary {
         let mut segments = wall.to_vec();
         let (inner, outer) = (wall[0].start(), wall[wall.len() - 1].end());
-        let inner = if inner[0] > 0.0 { inner } else { [0.0, outer[1]] };
-        segments.push(Segment::line(outer, [inner[0], outer[1]]));
+        // A full tank has no surface: its wall ends on the axis or where it began.
+        let open = outer[0] > 0.0 && norm(sub(outer, inner)) > 1e-9 * outer[0];
+        if open {
+            let inner = if inner[0] > 0.0 { inner[0] } else { 0.0 };
+            segments.push(Segment::line(outer, [inner, outer[1]]));
+        }
+        let surface = wall.len();
         let ends: Vec<_> = segments.iter().map(|s| [s.start(), s.end()]).collect();
         let count = segments.len();
         let mut grading = vec![[(1.0, 1.0); 2]; count];
@@ -63,9 +70,10 @@ impl Boundary {
             let next = (i + 1) % count;
             let before = segments[i].tangent(1.0);
             let after = segments[next].tangent(0.0);
-            if i + 1 == count && inner[0] == 0.0 {
+            if i + 1 == count && inner[0] <= 0.0 {
                 // An apex on the axis is a corner; the middle of the surface is not.
-                grading[next][0].0 = if after[1].abs() < 1e-9 { 1.0 } else { APEX };
+                let apex = |tangent: Point| if tangent[1].abs() < 1e-9 { 1.0 } else { APEX };
+                (grading[i][1].0, grading[next][0].0) = (apex(before), apex(after));
                 continue;
             }
             // In a cusp the tangents do not tell the inside; the curves shortly before and after do.
@@ -75,12 +83,7 @@ impl Boundary {
             grading[i][1] = corner;
             grading[next][0] = corner;
         }
-        Boundary { segments, ends, grading }
-    }
-
-    /// Index of the free surface among the segments.
-    pub(crate) fn surface(&self) -> usize {
-        self.segments.len() - 1
+        Boundary { segments, surface, ends, grading }
     }
 
     /// The point at `v` of a panel.
@@ -179,11 +182,11 @@ impl Boundary {
     /// None if a panel at most `gap` times as long as its distance from another part takes more
     /// than MANY panels.
     fn panels_for(&self, modes: usize, gap: f64) -> Option<Vec<Panel>> {
-        let surface = self.surface();
-        let width = norm(sub(self.ends[surface][0], self.ends[surface][1]));
         // The n-th mode has n half waves on the surface.
-        let longest = WIDTH * width * (5.0 / modes as f64).min(1.0);
-        let z_surface = self.ends[surface][0][1];
+        let (longest, z_surface) = match self.ends.get(self.surface) {
+            Some([a, b]) => (WIDTH * norm(sub(*a, *b)) * (5.0 / modes as f64).min(1.0), a[1]),
+            None => (f64::INFINITY, 0.0),
+        };
         let mut pieces: Vec<Piece> = Vec::new();
         for (i, segment) in self.segments.iter().enumerate() {
             let [start, end] = self.grading[i];

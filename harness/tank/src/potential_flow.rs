@@ -97,7 +97,7 @@ impl Discretisation {
         for panel in &panels {
             points.extend(rule.nodes.iter().map(|&v| boundary.point(panel, v)));
         }
-        let on_wall = panels.iter().filter(|p| p.segment != boundary.surface()).count();
+        let on_wall = panels.iter().filter(|p| p.segment != boundary.surface).count();
         let mut projection = vec![0.0; order * order];
         let mut values = vec![0.0; order];
         for j in 0..order {
@@ -147,11 +147,15 @@ impl Discretisation {
             self.points.iter().map(|x| (x.p[1] - z0) * x.n[0] - x.p[0] * x.n[1]).collect();
         let (matrix, right) = self.assemble(&pitch);
         let solved = matrix.lu().solve(&right).expect("the integral operator is regular for m = 1");
+        let size = surface.len();
+        let psi = (0..count).map(|i| solved[(i, size)]).collect();
+        if size == 0 {
+            return Solution { lambda: Vec::new(), phi: Vec::new(), psi, z0 };
+        }
         // Subspace iteration; T is self-adjoint under the weight r ds, so its projection on an
         // orthonormal basis is symmetric but for the discretisation's error. (Symmetrising T
         // itself would divide the error by the tiny weights next to the contact line.)
         let weights = self.weights();
-        let size = surface.len();
         let t = solved.view((surface.start, 0), (size, size));
         let radius = self.points[surface.clone()].iter().map(|x| x.p[0]).fold(0.0, f64::max);
         let trial = (modes + 8).min(size);
@@ -182,7 +186,6 @@ impl Discretisation {
             lambda.push(value);
             phi.push((value * (solved.columns(0, size) * q)).as_slice().to_vec());
         }
-        let psi = (0..count).map(|i| solved[(i, size)]).collect();
         Solution { lambda, phi, psi, z0 }
     }
 

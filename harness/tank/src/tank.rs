@@ -359,6 +359,38 @@ impl Tank {
     }
 }
 
+impl Tank {
+    fn kind(&self) -> &'static str {
+        match self.geometry {
+            Geometry::Revolution { .. } => "revolution",
+            Geometry::Box { .. } => "box",
+        }
+    }
+
+    /// No liquid: every mass 0, no modes.
+    pub(crate) fn empty(&self) -> ModalData {
+        let bottom = match &self.geometry {
+            Geometry::Revolution { contour, .. } => contour.bottom(),
+            Geometry::Box { .. } => 0.0,
+        };
+        let mut data =
+            ModalData::new(self.kind(), self.density, 0.0, 0.0, bottom, [0.0; 3], Vec::new());
+        data.name.clone_from(&self.name);
+        data
+    }
+
+    /// The full closed tank: no free surface and no modes; none if `fill` is not that.
+    pub(crate) fn full(&self, fill: f64) -> Option<ModalData> {
+        let Geometry::Revolution { contour, .. } = &self.geometry else { return None };
+        if (fill / contour.depth() - 1.0).abs() > 1e-9 {
+            return None;
+        }
+        let mut data = modal::full(contour.closed()?, self.density, fill);
+        data.name.clone_from(&self.name);
+        Some(data)
+    }
+}
+
 fn revolution(segments: Vec<Segment>, shape: Option<Shape>) -> Result<Geometry, Problems> {
     Ok(Geometry::Revolution { contour: Contour::new(segments)?, shape })
 }

@@ -1,8 +1,6 @@
 //! Against the reference of 23 tanks.
 
-mod common;
-
-use common::{number, reference, tank, toml};
+use crate::common::{number, reference, tank, toml};
 use hubslosh_tank::{Mode, Rest};
 use serde_json::Value;
 

@@ -1,8 +1,6 @@
 //! Facts of potential flow that hold for every tank, and known solutions.
 
-mod common;
-
-use common::{reference, solve, tank, toml};
+use crate::common::{reference, solve, tank, toml};
 use hubslosh_tank::closed_form;
 
 /// Every mode's hinge is the sphere's centre: the wall does no work when the sphere turns about it.

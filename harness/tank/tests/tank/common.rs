@@ -1,5 +1,4 @@
 //! Tanks of the reference as files.
-#![allow(dead_code)] // each test binary uses its own part
 
 use std::path::Path;
 
@@ -10,7 +9,7 @@ use serde_json::Value;
 /// with a p-FEM) and of closed forms, kept by the authors of the theory in `README.md`; accurate to
 /// the case's `error`, 1e-12 to 1e-10, beta to `error_beta`. Twelve digits are written.
 pub fn reference() -> Vec<Value> {
-    let all: Value = serde_json::from_str(include_str!("tanks.json")).unwrap();
+    let all: Value = serde_json::from_str(include_str!("../tanks.json")).unwrap();
     all["cases"].as_array().unwrap().clone()
 }
 

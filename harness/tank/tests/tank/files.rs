@@ -1,10 +1,8 @@
 //! Tank files: what is accepted, and what is said of the rest.
 
-mod common;
-
 use std::path::Path;
 
-use common::{solve, tank};
+use crate::common::{solve, tank};
 use hubslosh_tank::Tank;
 
 /// All problems of a file without its density.

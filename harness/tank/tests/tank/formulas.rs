@@ -1,8 +1,6 @@
 //! Damping and low gravity.
 
-mod common;
-
-use common::solve;
+use crate::common::solve;
 use hubslosh_tank::damping::{self, Ring};
 use hubslosh_tank::low_gravity::{self, Fluid};
 

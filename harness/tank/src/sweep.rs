@@ -1,0 +1,215 @@
+//! Modal parameters over the fill: a table, and its interpolation for a tank that empties.
+
+use core::fmt::Write as _;
+
+use crate::contour::Problems;
+use crate::interpolation::Monotone;
+use crate::modal::{ModalData, Mode, Rest, rest};
+use crate::tank::Tank;
+
+/// Modal parameters at ascending fills.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sweep {
+    /// One for each fill. Without liquid, and without a free surface, there are no modes.
+    pub rows: Vec<ModalData>,
+}
+
+/// Solves at each of the `fills`, m above the lowest point, for `modes` modes.
+///
+/// A fill of 0, and that of a closed tank without a free surface, give a row without modes.
+///
+/// # Errors
+/// The problems of every fill that has one, and fills that do not ascend.
+pub fn sweep(tank: &Tank, fills: &[f64], modes: usize) -> Result<Sweep, Problems> {
+    let mut problems = Vec::new();
+    if fills.is_empty() {
+        problems.push("There is no fill to sweep over.".to_string());
+    }
+    if let Some(pair) = fills.windows(2).find(|p| p[1] <= p[0]) {
+        problems.push(format!("The fills must ascend: {} m comes before {} m.", pair[0], pair[1]));
+    }
+    let mut rows = Vec::with_capacity(fills.len());
+    for &fill in fills {
+        let solved = if fill == 0.0 { Ok(tank.empty()) } else { tank.solve(fill, modes) };
+        match solved.or_else(|problems| tank.full(fill).ok_or(problems)) {
+            Ok(data) => rows.push(data),
+            Err(more) => problems.extend(more.0),
+        }
+    }
+    if problems.is_empty() { Ok(Sweep { rows }) } else { Err(Problems(problems)) }
+}
+
+impl Sweep {
+    /// As comma-separated values with a heading; columns of modes that a row lacks are empty. Units SI;
+    /// H and hinge from the contour's own zero.
+    pub fn to_csv(&self) -> String {
+        let modes = self.rows.iter().map(|r| r.modes.len()).max().unwrap_or(0);
+        let mut text =
+            "fill,m_liq,z_cg,I_frozen_cg,I_frozen_axis,I_eff_cg,m_0,H_0,I_0,error".to_string();
+        for n in 1..=modes {
+            for name in ["lambda", "m", "l", "H", "hinge", "wave", "beta"] {
+                let _ = write!(text, ",{name}_{n}");
+            }
+        }
+        text.push('\n');
+        for row in &self.rows {
+            let rest = row.rest(row.modes.len());
+            let values = [
+                row.fill,
+                row.m_liq,
+                row.z_cg,
+                row.i_frozen_cg,
+                row.i_frozen_axis,
+                row.i_eff_cg,
+                rest.m_0,
+                rest.height,
+                rest.inertia,
+                row.error,
+            ];
+            let mut cells: Vec<String> = values.iter().map(|v| v.to_string()).collect();
+            for n in 0..modes {
+                let mode = row.modes.get(n);
+                let of = |f: &dyn Fn(&Mode) -> Option<f64>| {
+                    mode.and_then(f).map_or(String::new(), |v| v.to_string())
+                };
+                cells.extend([
+                    of(&|m| Some(m.lambda)),
+                    of(&|m| Some(m.m)),
+                    of(&|m| Some(m.l)),
+                    of(&|m| m.height),
+                    of(&|m| m.hinge),
+                    of(&|m| Some(m.wave)),
+                    of(&|m| Some(m.beta)),
+                ]);
+            }
+            text.push_str(&cells.join(","));
+            text.push('\n');
+        }
+        text
+    }
+}
+
+/// Modal parameters of a tank that empties, as functions of the fill with two continuous derivatives,
+/// monotone wherever the table is (see [`Monotone`]). Where the wall has a corner or a change of
+/// curvature the true functions are less smooth than that, and the error is that of the fills' spacing.
+///
+/// Interpolated are m_liq, z_cg, the pendulums' l_n, and, over m_liq, the masses m_n, m_n h_n (H is
+/// unbounded where m is small), the rigid inertias and the rest's inertia I_0. m_0, H_0 and I_eff follow
+/// from these, so that mass and moment are those of the liquid and I_0 stays positive.
+#[derive(Clone, Debug)]
+pub struct Depletion {
+    range: [f64; 2],
+    /// m_liq, z_cg, rigid inertias across and about the axis over m_liq, I_0 over m_liq.
+    liquid: [Monotone; 5],
+    modes: Vec<ModeTable>,
+}
+
+/// l, m, m h, m h^2 (over m_liq), wave, beta of one mode.
+#[derive(Clone, Debug)]
+struct ModeTable([Monotone; 6]);
+
+/// Modal parameters at one fill, interpolated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AtFill {
+    /// Height of the free surface above the lowest point, m.
+    pub fill: f64,
+    /// Mass of the liquid, kg.
+    pub m_liq: f64,
+    /// Height of its centre of mass, m.
+    pub z_cg: f64,
+    /// Rigid inertia across the axis about the centre of mass, kg m2.
+    pub i_frozen_cg: f64,
+    /// Rigid inertia about the axis, kg m2.
+    pub i_frozen_axis: f64,
+    /// Effective inertia across the axis about the centre of mass, kg m2.
+    pub i_eff_cg: f64,
+    /// The modes; their shapes are empty.
+    pub modes: Vec<Mode>,
+    /// What moves with the tank when all these modes are pendulums.
+    pub rest: Rest,
+}
+
+impl Depletion {
+    /// From the rows of a sweep that have modes.
+    ///
+    /// # Errors
+    /// If fewer than two have.
+    pub fn new(sweep: &Sweep) -> Result<Depletion, Problems> {
+        let rows: Vec<&ModalData> = sweep.rows.iter().filter(|r| !r.modes.is_empty()).collect();
+        if rows.len() < 2 {
+            return Err("A table of fills needs at least two that have modes.".to_string().into());
+        }
+        let fills: Vec<f64> = rows.iter().map(|r| r.fill).collect();
+        let table = |f: &dyn Fn(&ModalData) -> f64| {
+            Monotone::new(&fills, &rows.iter().map(|r| f(r)).collect::<Vec<_>>())
+        };
+        let modes = rows.iter().map(|r| r.modes.len()).min().unwrap_or(0);
+        let mode = |n: usize| {
+            let of = |f: fn(&Mode) -> f64| table(&move |r: &ModalData| f(&r.modes[n]));
+            let over = |f: fn(&Mode) -> f64| table(&move |r: &ModalData| f(&r.modes[n]) / r.m_liq);
+            ModeTable([
+                of(|m| m.l),
+                over(|m| m.m),
+                over(|m| m.m_h),
+                over(|m| m.m_h2),
+                of(|m| m.wave),
+                of(|m| m.beta),
+            ])
+        };
+        Ok(Depletion {
+            range: [fills[0], fills[fills.len() - 1]],
+            liquid: [
+                table(&|r| r.m_liq),
+                table(&|r| r.z_cg),
+                table(&|r| r.i_frozen_cg / r.m_liq),
+                table(&|r| r.i_frozen_axis / r.m_liq),
+                table(&|r| r.rest(modes).inertia / r.m_liq),
+            ],
+            modes: (0..modes).map(mode).collect(),
+        })
+    }
+
+    /// Least and largest fill of the table, m.
+    pub fn range(&self) -> [f64; 2] {
+        self.range
+    }
+
+    /// At a fill; outside the table's range at its nearest end.
+    pub fn at(&self, fill: f64) -> AtFill {
+        let fill = fill.clamp(self.range[0], self.range[1]);
+        let [m_liq, z_cg, across, axial, inertia] = self.liquid.each_ref().map(|t| t.at(fill));
+        let mode = |(i, table): (usize, &ModeTable)| {
+            let [l, m, m_h, m_h2, wave, beta] = table.0.each_ref().map(|t| t.at(fill));
+            // m h^2 belongs to m and m h, unless there is no mass to divide by
+            let m_h2 = if m > 1e-6 { m_h * m_h / m } else { m_h2 };
+            Mode::interpolated(i + 1, l, [m, m_h, m_h2].map(|x| x * m_liq), z_cg, m_liq, wave, beta)
+        };
+        let modes: Vec<Mode> = self.modes.iter().enumerate().map(mode).collect();
+        let i_0 = inertia * m_liq;
+        let without = rest(m_liq, z_cg, 0.0, &modes);
+        AtFill {
+            fill,
+            m_liq,
+            z_cg,
+            i_frozen_cg: across * m_liq,
+            i_frozen_axis: axial * m_liq,
+            i_eff_cg: i_0 - without.inertia,
+            rest: Rest { inertia: i_0, ..without },
+            modes,
+        }
+    }
+
+    /// The fill that holds a mass of liquid, kg, within the table's range.
+    pub fn fill_of(&self, m_liq: f64) -> f64 {
+        let [mut low, mut high] = self.range;
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if self.liquid[0].at(middle) < m_liq {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        0.5 * (low + high)
+    }
+}

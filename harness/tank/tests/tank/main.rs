@@ -1,0 +1,8 @@
+//! Tests of the tank's modal parameters, in one binary.
+
+mod common;
+mod files;
+mod formulas;
+mod physics;
+mod reference;
+mod sweeps;
