@@ -8,6 +8,7 @@
 //! * `ring`, `gauss`, `panel`, `potential_flow`: the boundary integral equation
 //! * [`modal`]: modes as pendulums; [`closed_form`]: cylinder, annulus, box
 //! * [`sweep`]: tables over the fill and their [`interpolation`]
+//! * [`table()`], [`picture`]: to read and to look at
 //! * [`damping`], [`low_gravity`]: what the modal parameters leave out
 
 pub mod closed_form;
@@ -19,12 +20,15 @@ pub mod interpolation;
 pub mod low_gravity;
 pub mod modal;
 mod panel;
+pub mod picture;
 mod potential_flow;
 mod ring;
 mod spline;
 pub mod sweep;
+mod table;
 pub mod tank;
 
 pub use contour::Problems;
 pub use modal::{ModalData, Mode, Rest};
+pub use table::table;
 pub use tank::Tank;

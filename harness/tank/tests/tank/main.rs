@@ -4,5 +4,6 @@ mod common;
 mod files;
 mod formulas;
 mod physics;
+mod pictures;
 mod reference;
 mod sweeps;

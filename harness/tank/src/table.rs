@@ -1,0 +1,92 @@
+//! Modal parameters as a table to read.
+
+use core::fmt::Write as _;
+
+use crate::modal::{Axis, ModalData, Mode, Rest};
+
+/// The result as text: liquid, modes, what stays with the tank, and the error. `gravity`, m/s2, gives the
+/// frequencies.
+pub fn table(data: &ModalData, gravity: f64) -> String {
+    let mut text = String::new();
+    let name = data.name.as_deref().unwrap_or("tank");
+    let _ = writeln!(text, "{name}: fill {} m, density {} kg/m3", data.fill, data.rho);
+    if let (Some(outer), Some(inner)) = (data.r_surface, data.r_inner) {
+        let _ = write!(text, "  free surface          radius {outer:.6} m");
+        let _ = writeln!(
+            text,
+            "{}",
+            if inner > 0.0 { format!(", inner radius {inner:.6} m") } else { String::new() }
+        );
+    }
+    let _ = writeln!(
+        text,
+        "  liquid                {:.6} kg, centre of mass at z = {:.6} m",
+        data.m_liq, data.z_cg
+    );
+    let _ =
+        writeln!(text, "  inertia about the axis, rigid          {:.6e} kg m2", data.i_frozen_axis);
+    if let Some(inertia) = data.i_eff_axis {
+        let _ = writeln!(text, "  inertia about the axis, effective      {inertia:.6e} kg m2");
+    }
+    if let Some(axes) = &data.axes {
+        for (name, axis) in [("x", &axes.x), ("y", &axes.y)] {
+            let Axis { i_frozen_cg, i_eff_cg, modes, rest } = axis;
+            let _ = writeln!(text, "\nmotion along {name}");
+            section(&mut text, *i_frozen_cg, *i_eff_cg, modes, rest, gravity);
+        }
+    } else {
+        section(&mut text, data.i_frozen_cg, data.i_eff_cg, &data.modes, &data.rest, gravity);
+    }
+    let _ = writeln!(
+        text,
+        "\nestimated error {:.0e}, of beta {:.0e} (relative to the result, the liquid's mass, R)",
+        data.error, data.error_beta
+    );
+    text
+}
+
+fn section(
+    text: &mut String,
+    rigid: f64,
+    effective: f64,
+    modes: &[Mode],
+    rest: &[Rest],
+    gravity: f64,
+) {
+    let _ = writeln!(text, "  inertia about the centre, rigid        {rigid:.6e} kg m2");
+    let _ = writeln!(text, "  inertia about the centre, effective    {effective:.6e} kg m2");
+    let _ = writeln!(
+        text,
+        "\n  n  f at {gravity} m/s2    lambda        m         m/m_liq    length       bob at      hinge at    wave        beta"
+    );
+    let _ = writeln!(
+        text,
+        "         Hz           1/m           kg                   m            z, m        z, m        m/rad       1/m"
+    );
+    for m in modes {
+        let height = |z: Option<f64>| z.map_or("-".to_string(), |z| format!("{z:.6}"));
+        let _ = writeln!(
+            text,
+            " {:2}  {:12.6} {:12.6} {:12.6} {:10.6} {:11.6} {:>11} {:>11} {:11.6} {:11.5}",
+            m.n,
+            (gravity * m.lambda).sqrt() / core::f64::consts::TAU,
+            m.lambda,
+            m.m,
+            m.m_ratio,
+            m.l,
+            height(m.height),
+            height(m.hinge),
+            m.wave,
+            m.beta
+        );
+    }
+    let _ = writeln!(text, "\n  fixed mass after       m_0, kg     H_0, m      I_0, kg m2");
+    for r in rest {
+        let modes = if r.modes == 1 { "mode " } else { "modes" };
+        let _ = writeln!(
+            text,
+            "   {:3} {modes}         {:12.6} {:11.6} {:14.6e}",
+            r.modes, r.m_0, r.height, r.inertia
+        );
+    }
+}

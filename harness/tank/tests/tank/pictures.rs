@@ -1,0 +1,36 @@
+//! What people look at.
+
+use std::path::Path;
+
+use hubslosh_tank::sweep::sweep;
+use hubslosh_tank::{Tank, picture, table};
+
+/// Every example: well-formed XML without anything that is not a number, the table with every mode.
+#[test]
+fn examples_can_be_drawn_and_tabulated() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_none_or(|e| e != "toml") {
+            continue;
+        }
+        let tank = Tank::read(&path).unwrap();
+        let depth = tank.depth().unwrap_or(0.5);
+        let data = tank.solve(0.55 * depth, 5).unwrap();
+        let swept = sweep(&tank, &[0.0, 0.3 * depth, 0.6 * depth, 0.9 * depth], 3).unwrap();
+        for svg in [picture::tank(&tank, &data, 9.80665), picture::sweep(&tank, &swept, 9.80665)] {
+            for event in xml::EventReader::from_str(&svg) {
+                event.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+            }
+            assert!(!svg.contains("NaN") && !svg.contains("inf"), "{}", path.display());
+            assert!(
+                svg.contains(">z, m<") && svg.contains("mode") == svg.contains("over the fill")
+            );
+        }
+        let text = table(&data, 9.80665);
+        assert!(!text.contains("NaN"), "{text}");
+        for mode in &data.modes {
+            assert!(text.contains(&format!("{:.6}", mode.lambda)), "{text}");
+        }
+    }
+}
