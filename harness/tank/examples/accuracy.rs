@@ -1,7 +1,7 @@
 //! Accuracy and time of every tank of `tests/tanks.json`: deviation from the reference over five modes
 //! beside the error that is stated, and the least time of some repetitions on one core.
 //!
-//! `cargo run --release -p hubslosh-tank --example accuracy [REPETITIONS]`
+//! `cargo run --release -p hubslosh-tank --example accuracy [REPETITIONS [NAME]]`
 
 use std::path::Path;
 use std::time::Instant;
@@ -15,12 +15,16 @@ fn number(value: &Value) -> f64 {
 
 fn main() {
     let repetitions: usize = std::env::args().nth(1).and_then(|a| a.parse().ok()).unwrap_or(5);
+    let only = std::env::args().nth(2);
     let all: Value = serde_json::from_str(include_str!("../tests/tanks.json")).unwrap();
     println!(
         "tank                  ms   lambda 1-3   lambda 4-5     m/m_liq  m H/(m R)  I/(m R^2)     wave/R |     stated"
     );
     for case in all["cases"].as_array().unwrap().iter().filter(|case| case["kind"] == "revolution")
     {
+        if only.as_ref().is_some_and(|name| case["name"] != name.as_str()) {
+            continue;
+        }
         let entries = case["profile"].as_array().unwrap().iter().map(|entry| {
             let (kind, numbers) = entry.as_object().unwrap().iter().next().unwrap();
             format!("{{ {kind} = {numbers} }}")

@@ -14,7 +14,7 @@ pub(crate) fn add(a: Point, b: Point) -> Point {
 }
 
 pub(crate) fn norm(a: Point) -> f64 {
-    a[0].hypot(a[1])
+    (a[0] * a[0] + a[1] * a[1]).sqrt()
 }
 
 pub(crate) fn dot(a: Point, b: Point) -> f64 {

@@ -98,9 +98,9 @@ pub fn cone(radius: f64, half_angle: f64, nu: f64, g: f64) -> Damping {
     )
 }
 
-/// Torus, `tube_radius` a of its section: sqrt(Re/Re_0) (1.6629 y^4 - 3.7955 y^3 + 3.5583 y^2
-/// - 1.6759 y + 0.3865)/2 pi, y = h/2a, Re_0 = 3.3e-6/sqrt(9.81 0.0635^3) (SLOSH-ML). One tank size
-/// was measured.
+/// Torus, `tube_radius` a of its section (SLOSH-ML; one tank size was measured): sqrt(Re/Re_0) times
+/// (1.6629 y^4 - 3.7955 y^3 + 3.5583 y^2 - 1.6759 y + 0.3865)/2 pi, with y = h/2a and
+/// Re_0 = 3.3e-6/sqrt(9.81 0.0635^3).
 pub fn torus(tube_radius: f64, fill: f64, nu: f64, g: f64) -> Damping {
     let y = 0.5 * fill / tube_radius;
     let fit = (((1.6629 * y - 3.7955) * y + 3.5583) * y - 1.6759) * y + 0.3865;

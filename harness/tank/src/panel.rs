@@ -79,7 +79,7 @@ impl Boundary {
             // In a cusp the tangents do not tell the inside; the curves shortly before and after do.
             let inner = cross(segments[i].tangent(0.999), segments[next].tangent(0.001));
             let cusp = cross(before, after).atan2(dot(before, after)).abs() > 3.13 && inner > 0.0;
-            let corner = if cusp { (1.0, 1.0) } else { grading_at(before, after) };
+            let corner = if cusp { (1.0, 1.0) } else { grading_at(before, after, count > FEW) };
             grading[i][1] = corner;
             grading[next][0] = corner;
         }
@@ -92,7 +92,7 @@ impl Boundary {
         let (power, slope) = if panel.gamma == 1.0 {
             (v, 1.0)
         } else {
-            let power = v.powf(panel.gamma);
+            let power = v.powi(panel.gamma as i32);
             (power, panel.gamma * power / v)
         };
         let s = panel.s0 + panel.length * power;
@@ -260,6 +260,8 @@ impl Boundary {
     }
 }
 
+/// Contours with more segments than this are taken for curves given point by point.
+const FEW: usize = 12;
 /// More panels are made only if the contour has many segments.
 const MANY: usize = 36;
 /// Longest panel on the free surface over the surface's width, for up to five modes.
@@ -268,11 +270,17 @@ const WIDTH: f64 = 0.35;
 const APEX: f64 = 4.0;
 
 /// gamma at a corner between two directions of travel, and nu = pi/al. gamma is a whole number, so
-/// that the curve is an analytic function of v, and gamma nu at least 6.
-fn grading_at(before: Point, after: Point) -> (f64, f64) {
+/// that the curve is an analytic function of v, and gamma nu at least 6. A contour of `many` short
+/// segments turns little at each: its corners are so weak that they need no panels of their own.
+fn grading_at(before: Point, after: Point, many: bool) -> (f64, f64) {
     let turn = cross(before, after).atan2(dot(before, after));
     let nu = core::f64::consts::PI / (core::f64::consts::PI - turn);
-    let gamma = if turn.abs() < 1e-9 { 3.0 } else { (6.0 / nu).ceil().clamp(1.0, 9.0) };
+    let gamma = match turn.abs() {
+        ..0.1 if many => 1.0,
+        ..0.3 if many => 2.0,
+        ..1e-9 => 3.0, // where the curvature jumps: rho^2 log rho
+        _ => (6.0 / nu).ceil().clamp(1.0, 9.0),
+    };
     (gamma, nu)
 }
 

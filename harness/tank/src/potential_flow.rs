@@ -139,18 +139,22 @@ impl Discretisation {
         self.surface..self.points.len()
     }
 
-    /// The first `modes` modes, and the pitch function about (0, `z0`).
-    pub(crate) fn solve(&self, modes: usize, z0: f64) -> Solution {
+    /// The first `modes` modes, and the pitch function about (0, `z0`). None if the matrix cannot be
+    /// solved: for m = 1 the operator is regular, so only if the panels are useless.
+    pub(crate) fn solve(&self, modes: usize, z0: f64) -> Option<Solution> {
         let count = self.len();
         let surface = self.on_surface();
         let pitch: Vec<f64> =
             self.points.iter().map(|x| (x.p[1] - z0) * x.n[0] - x.p[0] * x.n[1]).collect();
         let (matrix, right) = self.assemble(&pitch);
-        let solved = matrix.lu().solve(&right).expect("the integral operator is regular for m = 1");
+        let solved = matrix.lu().solve(&right)?;
+        if !solved.iter().all(|x| x.is_finite()) {
+            return None;
+        }
         let size = surface.len();
         let psi = (0..count).map(|i| solved[(i, size)]).collect();
         if size == 0 {
-            return Solution { lambda: Vec::new(), phi: Vec::new(), psi, z0 };
+            return Some(Solution { lambda: Vec::new(), phi: Vec::new(), psi, z0 });
         }
         // Subspace iteration; T is self-adjoint under the weight r ds, so its projection on an
         // orthonormal basis is symmetric but for the discretisation's error. (Symmetrising T
@@ -186,7 +190,7 @@ impl Discretisation {
             lambda.push(value);
             phi.push((value * (solved.columns(0, size) * q)).as_slice().to_vec());
         }
-        Solution { lambda, phi, psi, z0 }
+        Some(Solution { lambda, phi, psi, z0 })
     }
 
     /// 1/2 + D, and S for sources at each point of F and for `q` on the whole boundary.

@@ -8,6 +8,9 @@ use crate::curve::{Curve, Point, Segment, cross, dot, norm, sub};
 /// Between straight pieces that turn by more than this, rad, the curve keeps its corner.
 const CORNER: f64 = 0.7;
 
+/// More points are thinned out.
+const MANY: usize = 100;
+
 /// Cubic splines through the points, twice continuously differentiable between corners; a point
 /// where the polyline turns by more than 40 degrees is a corner. At the axis the curve is level,
 /// at its other ends and at corners its third derivative is constant over two intervals
@@ -36,11 +39,19 @@ pub(crate) fn spline(points: &[Point]) -> Result<Vec<Segment>, Problems> {
             cross(a, b).atan2(dot(a, b)).abs() > CORNER
         };
         if corner || last {
-            smooth(&points[first..=i], &mut segments);
+            smooth(&thinned(&points[first..=i], points.len()), &mut segments);
             first = i;
         }
     }
     Ok(segments)
+}
+
+/// Of very many points every k-th, both ends kept, so that all `total` points make some 100 segments.
+fn thinned(points: &[Point], total: usize) -> Vec<Point> {
+    let every = total.div_ceil(MANY);
+    let last = points.len() - 1;
+    let count = last.div_ceil(every);
+    (0..=count).map(|i| points[(i * last) / count]).collect()
 }
 
 /// One spline, its parameter the length of the polyline.

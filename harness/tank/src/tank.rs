@@ -230,6 +230,9 @@ pub struct Tank {
     pub geometry: Geometry,
 }
 
+/// The largest number of segments: each takes panels of its own.
+const MOST_SEGMENTS: usize = 200;
+
 /// The largest number of modes.
 pub const MOST_MODES: usize = 20;
 
@@ -334,15 +337,15 @@ impl Tank {
                 if !problems.is_empty() {
                     return Err(Problems(Vec::new()));
                 }
-                Ok(match *shape {
+                match *shape {
                     Some(Shape::Cylinder { radius, .. }) => {
-                        closed_form::cylinder(radius, fill, rho, modes)
+                        Ok(closed_form::cylinder(radius, fill, rho, modes))
                     }
                     Some(Shape::Annulus { inner_radius, outer_radius, .. }) => {
-                        closed_form::annulus(inner_radius, outer_radius, fill, rho, modes)
+                        Ok(closed_form::annulus(inner_radius, outer_radius, fill, rho, modes))
                     }
                     _ => modal::solve(wall, rho, fill, modes),
-                })
+                }
             }),
         };
         match solved {
@@ -385,13 +388,17 @@ impl Tank {
         if (fill / contour.depth() - 1.0).abs() > 1e-9 {
             return None;
         }
-        let mut data = modal::full(contour.closed()?, self.density, fill);
+        let mut data = modal::solve(contour.closed()?, self.density, fill, 0).ok()?;
         data.name.clone_from(&self.name);
         Some(data)
     }
 }
 
 fn revolution(segments: Vec<Segment>, shape: Option<Shape>) -> Result<Geometry, Problems> {
+    if segments.len() > MOST_SEGMENTS {
+        let count = segments.len();
+        return Err(format!("The contour has {count} segments, at most {MOST_SEGMENTS}.").into());
+    }
     Ok(Geometry::Revolution { contour: Contour::new(segments)?, shape })
 }
 
@@ -466,5 +473,13 @@ fn read_points(path: &Path) -> Result<Vec<Point>, Problems> {
 }
 
 fn polyline(points: &[Point]) -> Result<Vec<Segment>, Problems> {
+    if points.len() > MOST_SEGMENTS + 1 {
+        return Err(format!(
+            "{} points are joined by straight lines, at most {MOST_SEGMENTS}; spline = true takes any \
+             number of them.",
+            points.len()
+        )
+        .into());
+    }
     Ok(points.windows(2).map(|p| Segment::line(p[0], p[1])).collect())
 }
