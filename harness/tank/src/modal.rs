@@ -346,6 +346,8 @@ fn orders(panels: usize) -> [usize; 3] {
 
 /// The estimate beyond which a third, finer discretisation is tried.
 const WANTED: f64 = 2e-7;
+/// The estimate beyond which finer panels are tried.
+const ENOUGH: f64 = 1e-6;
 /// A larger estimated error is no result.
 const WORST: f64 = 1e-2;
 /// Rounding: no estimate is below.
@@ -360,8 +362,18 @@ struct Pair {
     error_beta: f64,
 }
 
+/// On the usual panels, and on finer ones where these do not do.
 fn pair(wall: &Wall, volume: &Volume, rho: f64, modes: usize) -> Option<Pair> {
-    let mesh = Discretisation::new(&wall.segments, modes.max(1), 16);
+    let usual = pair_on(wall, volume, rho, modes, false);
+    if usual.as_ref().is_some_and(|pair| pair.error < ENOUGH) {
+        return usual;
+    }
+    let fine = pair_on(wall, volume, rho, modes, true);
+    [usual, fine].into_iter().flatten().min_by(|a, b| a.error.total_cmp(&b.error))
+}
+
+fn pair_on(wall: &Wall, volume: &Volume, rho: f64, modes: usize, fine: bool) -> Option<Pair> {
+    let mesh = Discretisation::new(&wall.segments, modes.max(1), 16, fine);
     let [first, second, third] = orders(mesh.panel_count());
     let solve = |order| approximate(&mesh.with_order(order), wall, volume, rho, modes);
     let scale =

@@ -168,23 +168,25 @@ impl Boundary {
     /// Cuts the boundary into panels over which the solution is smooth: none turns by more than
     /// 60 degrees, is long against the free surface or its distance from it, long against the
     /// gap to another part of the boundary, or much longer than its neighbour. `modes` modes are to
-    /// be resolved.
-    pub(crate) fn panels(&self, modes: usize) -> Vec<Panel> {
+    /// be resolved. A `fine` cut is for contours whose details the usual one does not resolve.
+    pub(crate) fn panels(&self, modes: usize, fine: bool) -> Vec<Panel> {
         // A thin layer or a cusp would take panels without end: the gap counts less then.
-        for gap in [2.5, 10.0, 40.0] {
-            if let Some(panels) = self.panels_for(modes, gap) {
+        let (width, many) = if fine { (0.6 * WIDTH, 2 * MANY) } else { (WIDTH, MANY) };
+        let gaps = if fine { [1.0, 4.0, 16.0] } else { [2.5, 10.0, 40.0] };
+        for gap in gaps {
+            if let Some(panels) = self.panels_for(modes, gap, width, many) {
                 return panels;
             }
         }
-        self.panels_for(modes, f64::INFINITY).unwrap_or_default()
+        self.panels_for(modes, f64::INFINITY, width, many).unwrap_or_default()
     }
 
     /// None if a panel at most `gap` times as long as its distance from another part takes more
-    /// than MANY panels.
-    fn panels_for(&self, modes: usize, gap: f64) -> Option<Vec<Panel>> {
+    /// than `many` panels; those on the surface are at most `width` of its width.
+    fn panels_for(&self, modes: usize, gap: f64, width: f64, many: usize) -> Option<Vec<Panel>> {
         // The n-th mode has n half waves on the surface.
         let (longest, z_surface) = match self.ends.get(self.surface) {
-            Some([a, b]) => (WIDTH * norm(sub(*a, *b)) * (5.0 / modes as f64).min(1.0), a[1]),
+            Some([a, b]) => (width * norm(sub(*a, *b)) * (5.0 / modes as f64).min(1.0), a[1]),
             None => (f64::INFINITY, 0.0),
         };
         let mut pieces: Vec<Piece> = Vec::new();
@@ -199,7 +201,7 @@ impl Boundary {
         let joined = self.ends[0][0][0] > 0.0; // the chain is closed
         for _ in 0..200 {
             let count = pieces.len();
-            if gap.is_finite() && count > MANY.max(2 * self.segments.len()) {
+            if gap.is_finite() && count > many.max(2 * self.segments.len()) {
                 return None;
             }
             let too_long = |k: usize| {

@@ -75,10 +75,10 @@ const OWN_LENGTH: f64 = 0.2;
 
 impl Discretisation {
     /// For `modes` modes of the liquid above a wall, given from the axis or the inner contact line to
-    /// the outer one.
-    pub(crate) fn new(wall: &[Segment], modes: usize, order: usize) -> Discretisation {
+    /// the outer one; on more and shorter panels if `fine`.
+    pub(crate) fn new(wall: &[Segment], modes: usize, order: usize, fine: bool) -> Discretisation {
         let boundary = Boundary::new(wall);
-        let panels = boundary.panels(modes);
+        let panels = boundary.panels(modes, fine);
         Discretisation::on_panels(boundary, panels, order)
     }
 

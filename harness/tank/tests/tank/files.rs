@@ -214,6 +214,18 @@ fn points_are_straight_lines_or_a_spline() {
     let exact = 1.560_157_174;
     assert!((lines.modes[0].lambda - exact).abs() > 1e-3);
     assert!((spline.modes[0].lambda - exact).abs() < 1e-5, "{}", spline.modes[0].lambda);
+    // a curve measured at very many points is thinned out, straight lines through them are refused
+    let many: String = (0..=2000)
+        .map(|i| core::f64::consts::PI * (i as f64 / 2000.0 - 0.5))
+        .map(|a| format!("{:.12},{:.12}\n", a.cos().max(0.0), 1.0 + a.sin()))
+        .collect();
+    std::fs::write(folder.path().join("many.csv"), many).unwrap();
+    let text = "density = 1000.0\npoints = 'many.csv'";
+    let said = Tank::parse(text, folder.path()).unwrap_err().to_string();
+    assert!(said.contains("2001 points are joined by straight lines, at most 200"), "{said}");
+    let tank = Tank::parse(&format!("{text}\nspline = true"), folder.path()).unwrap();
+    let lambda = tank.solve(1.0, 2).unwrap().modes[0].lambda;
+    assert!((lambda - exact).abs() < 1e-7, "{lambda}");
     // a file with a bad line names it
     std::fs::write(folder.path().join("bad.csv"), "0,0\n1,zero\n1,1,1\n").unwrap();
     let said =
