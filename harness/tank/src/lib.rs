@@ -24,6 +24,7 @@ pub mod picture;
 mod potential_flow;
 mod ring;
 mod spline;
+mod svg;
 pub mod sweep;
 mod table;
 pub mod tank;

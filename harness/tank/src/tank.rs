@@ -21,6 +21,8 @@ struct File {
     lengths: Option<[f64; 2]>,
     points: Option<PathBuf>,
     spline: Option<bool>,
+    svg: Option<PathBuf>,
+    scale: Option<f64>,
     shape: Option<Shape>,
 }
 
@@ -270,7 +272,15 @@ impl Tank {
         if file.spline.is_some() && file.points.is_none() {
             problems.push("spline belongs to points, which is missing.".to_string());
         }
+        if file.scale.is_some() && file.svg.is_none() {
+            problems.push("scale belongs to svg, which is missing.".to_string());
+        }
+        let scale = file.scale.unwrap_or(1.0);
+        if !(scale > 0.0 && scale.is_finite()) {
+            problems.push(format!("scale is {scale}; it must be a number above 0, in m per unit."));
+        }
         let given = [
+            ("svg", file.svg.is_some()),
             ("profile", file.profile.is_some()),
             ("points", file.points.is_some()),
             ("shape", file.shape.is_some()),
@@ -288,12 +298,15 @@ impl Tank {
                     if file.spline == Some(true) { spline(&points) } else { polyline(&points) }
                 })
                 .and_then(|segments| revolution(segments, None))
+        } else if let Some(svg) = &file.svg {
+            crate::svg::read(&folder.join(svg), scale)
+                .and_then(|segments| revolution(segments, None))
         } else if let Some(shape) = file.shape {
             shape.segments().and_then(|segments| revolution(segments, Some(shape)))
         } else if let Some(lengths) = file.lengths {
             rectangle(lengths)
         } else {
-            Err("There is no tank: give profile, points, shape or box.".to_string().into())
+            Err("There is no tank: give profile, points, svg, shape or box.".to_string().into())
         };
         match geometry {
             Ok(geometry) if problems.is_empty() => Ok(Tank { name: file.name, density, geometry }),

@@ -52,7 +52,7 @@ fn bad_contours_are_described() {
         ("box = [0.8]", "expected an array of length 2"),
         ("box = [0.8, 0.0]", "box: a length is 0"),
         ("box = [800, 500]", "millimetres?"),
-        ("", "There is no tank: give profile, points, shape or box"),
+        ("", "There is no tank: give profile, points, svg, shape or box"),
         (
             "box = [1.0, 1.0]\nshape = { sphere = { radius = 1.0 } }",
             "shape and box exclude each other",
@@ -235,6 +235,53 @@ fn points_are_straight_lines_or_a_spline() {
     let said =
         Tank::parse("density = 1.0\npoints = 'one.csv'", folder.path()).unwrap_err().to_string();
     assert!(said.contains("1 point(s); a contour needs at least two"), "{said}");
+}
+
+/// A drawing in millimetres, y downwards: hemispherical bottom as an arc, wall, top dome as two curves
+/// (a quarter circle by a cubic to 3e-4), closed along the axis. Absolute and relative commands.
+#[test]
+fn a_contour_is_read_from_an_svg_drawing() {
+    let folder = tempfile::tempdir().unwrap();
+    let read = |path: &str, scale: f64| {
+        let svg = format!(
+            "<svg xmlns='http://www.w3.org/2000/svg'><g><path fill='none' d='{path}'/></g></svg>"
+        );
+        std::fs::write(folder.path().join("tank.svg"), svg).unwrap();
+        let text = format!("density = 1000.0\nsvg = 'tank.svg'\nscale = {scale:?}");
+        Tank::parse(&text, folder.path())
+    };
+    let drawn = "M 0 2000 A 500 500 0 0 0 500 1500 V 500 C 500 223.86 276.14 0 0 0 Z";
+    let same = "m 0 2000 a 500 500 0 0 0 500 -500 v -1000 c 0 -276.14 -223.86 -500 -500 -500 z";
+    let capsule = solve(
+        "profile = [{ arc = [0, 0.5, 0.5, -90, 0] }, { line = [0.5, 0.5, 0.5, 1.5] }, { arc = [0, 1.5, 0.5, 0, 90] }]",
+        1.2,
+        3,
+    );
+    for path in [drawn, same] {
+        let tank = read(path, 1e-3).unwrap();
+        assert!((tank.depth().unwrap() - 2.0).abs() < 1e-12);
+        let data = tank.solve(1.2, 3).unwrap();
+        for (a, b) in data.modes.iter().zip(&capsule.modes) {
+            assert!((a.lambda / b.lambda - 1.0).abs() < 1e-9, "{} {}", a.lambda, b.lambda);
+            // the drawing's zero is at its top
+            assert!((a.hinge.unwrap() + 2.0 - b.hinge.unwrap()).abs() < 1e-8);
+        }
+        assert!((tank.solve(1.8, 1).unwrap().modes[0].lambda / 5.445_194 - 1.0).abs() < 2e-3);
+    }
+    // arcs the long way round and the other sense: a whole sphere's section
+    let sphere = read("M 0 2 A 1 1 0 0 0 1 1 A 1 1 0 0 0 0 0", 1.0).unwrap();
+    assert!((sphere.solve(1.0, 1).unwrap().modes[0].lambda - 1.560_157_174).abs() < 1e-8);
+    let whole = read("M 0 2 A 1 1 0 1 0 0 0", 1.0).unwrap();
+    assert!((whole.solve(1.0, 1).unwrap().modes[0].lambda - 1.560_157_174).abs() < 1e-8);
+    for (path, words) in [
+        ("M 0 2 L 1 2 M 3 3 L 4 4", "several parts"),
+        ("M 0 2 A 1 2 30 0 0 1 1", "rotated axes"),
+        ("M 0 2 Q", "not valid"),
+        (drawn, "millimetres?"),
+    ] {
+        let said = read(path, 1.0).unwrap_err().to_string();
+        assert!(said.contains(words), "{path}: {said}");
+    }
 }
 
 /// The examples in the folder are read and solved.

@@ -1,0 +1,167 @@
+//! A contour from the first path of an SVG drawing.
+
+use std::path::Path;
+
+use svgtypes::{PathParser, PathSegment};
+
+use crate::contour::Problems;
+use crate::curve::{Curve, Point, Segment, cross, dot, sub};
+
+/// Reads the first `<path>` of a drawing: the axis at x = 0, y downwards, `scale` m per unit. Lines,
+/// cubic and quadratic curves, and arcs whose axes are not rotated. What closes the path along the axis
+/// is left out.
+///
+/// # Errors
+/// A file that cannot be read or has no path, a transform, rotated arcs, several subpaths.
+pub(crate) fn read(path: &Path, scale: f64) -> Result<Vec<Segment>, Problems> {
+    let text = std::fs::read_to_string(path)
+        .map_err(|error| format!("Could not read {}: {error}.", path.display()))?;
+    let data = first_path(&text).map_err(|problem| format!("{}: {problem}", path.display()))?;
+    segments(&data, scale)
+        .map_err(|problem| Problems::from(format!("{}: {problem}", path.display())))
+}
+
+/// The `d` of the first path.
+fn first_path(text: &str) -> Result<String, String> {
+    for event in xml::EventReader::from_str(text) {
+        let event = event.map_err(|error| format!("not well-formed: {error}."))?;
+        if let xml::reader::XmlEvent::StartElement { name, attributes, .. } = event {
+            let value = |key: &str| attributes.iter().find(|a| a.name.local_name == key);
+            if value("transform").is_some() {
+                return Err(format!(
+                    "the element `{}` has a transform; apply it in the drawing.",
+                    name.local_name
+                ));
+            }
+            if let ("path", Some(data)) = (name.local_name.as_str(), value("d")) {
+                return Ok(data.value.clone());
+            }
+        }
+    }
+    Err("contains no path.".to_string())
+}
+
+fn segments(data: &str, scale: f64) -> Result<Vec<Segment>, String> {
+    let mut segments: Vec<Segment> = Vec::new();
+    // in the drawing's own coordinates
+    let (mut here, mut start) = ([0.0, 0.0], [0.0, 0.0]);
+    let mut control: Option<(Point, bool)> = None; // last control point, of a cubic
+    let place = |p: Point| [scale * p[0], -scale * p[1]];
+    for part in PathParser::from(data) {
+        let part = part.map_err(|error| format!("the path is not valid: {error}."))?;
+        let to = |abs: bool, x: f64, y: f64| if abs { [x, y] } else { [here[0] + x, here[1] + y] };
+        // the last control point mirrored, for smooth curves
+        let mirrored = |cubic: bool| match control {
+            Some((c, kind)) if kind == cubic => [2.0 * here[0] - c[0], 2.0 * here[1] - c[1]],
+            _ => here,
+        };
+        let mut next = None;
+        let end = match part {
+            PathSegment::MoveTo { abs, x, y } => {
+                if !segments.is_empty() {
+                    return Err("the path has several parts; one is needed.".to_string());
+                }
+                start = to(abs, x, y);
+                here = start;
+                continue;
+            }
+            PathSegment::LineTo { abs, x, y } => to(abs, x, y),
+            PathSegment::HorizontalLineTo { abs, x } => [to(abs, x, 0.0)[0], here[1]],
+            PathSegment::VerticalLineTo { abs, y } => [here[0], to(abs, 0.0, y)[1]],
+            PathSegment::ClosePath { .. } => start,
+            PathSegment::CurveTo { abs, x1, y1, x2, y2, x, y } => {
+                let (b, c, d) = (to(abs, x1, y1), to(abs, x2, y2), to(abs, x, y));
+                next = Some((c, true));
+                segments.push(bezier([here, b, c, d].map(place)));
+                d
+            }
+            PathSegment::SmoothCurveTo { abs, x2, y2, x, y } => {
+                let (b, c, d) = (mirrored(true), to(abs, x2, y2), to(abs, x, y));
+                next = Some((c, true));
+                segments.push(bezier([here, b, c, d].map(place)));
+                d
+            }
+            PathSegment::Quadratic { abs, x1, y1, x, y } => {
+                let (c, d) = (to(abs, x1, y1), to(abs, x, y));
+                next = Some((c, false));
+                segments.push(raised([here, c, d].map(place)));
+                d
+            }
+            PathSegment::SmoothQuadratic { abs, x, y } => {
+                let (c, d) = (mirrored(false), to(abs, x, y));
+                next = Some((c, false));
+                segments.push(raised([here, c, d].map(place)));
+                d
+            }
+            PathSegment::EllipticalArc { abs, rx, ry, x_axis_rotation, large_arc, sweep, x, y } => {
+                if x_axis_rotation != 0.0 && rx != ry {
+                    return Err("an arc has rotated axes; draw it as a curve.".to_string());
+                }
+                let d = to(abs, x, y);
+                // y is mirrored, and with it the sense
+                segments.push(arc(
+                    place(here),
+                    place(d),
+                    scale * rx,
+                    scale * ry,
+                    large_arc,
+                    !sweep,
+                ));
+                d
+            }
+        };
+        let curved = next.is_some() || matches!(part, PathSegment::EllipticalArc { .. });
+        if !curved && end != here {
+            segments.push(Segment::line(place(here), place(end)));
+        }
+        control = next;
+        here = end;
+    }
+    segments.retain(|s| {
+        s.start()[0] != 0.0 || s.end()[0] != 0.0 || !matches!(s.curve, Curve::Line { .. })
+    });
+    Ok(segments)
+}
+
+fn bezier([a, b, c, d]: [Point; 4]) -> Segment {
+    let coefficients = core::array::from_fn(|k| {
+        core::array::from_fn(|i| match k {
+            0 => a[i],
+            1 => 3.0 * (b[i] - a[i]),
+            2 => 3.0 * (a[i] - 2.0 * b[i] + c[i]),
+            _ => d[i] - 3.0 * c[i] + 3.0 * b[i] - a[i],
+        })
+    });
+    Segment { curve: Curve::Cubic { c: coefficients }, from: 0.0, to: 1.0 }
+}
+
+/// A quadratic curve as a cubic one.
+fn raised([a, b, c]: [Point; 3]) -> Segment {
+    let third = |p: Point, q: Point| [(p[0] + 2.0 * q[0]) / 3.0, (p[1] + 2.0 * q[1]) / 3.0];
+    bezier([a, third(a, b), third(c, b), c])
+}
+
+/// Arc between two points of an ellipse, `up` counter-clockwise (SVG 2, appendix B.2.4).
+fn arc(p: Point, q: Point, rx: f64, ry: f64, large: bool, up: bool) -> Segment {
+    let (rx, ry) = (rx.abs(), ry.abs());
+    // on the unit circle
+    let (u, v) = ([p[0] / rx, p[1] / ry], [q[0] / rx, q[1] / ry]);
+    let half = [0.5 * (v[0] - u[0]), 0.5 * (v[1] - u[1])];
+    let square = dot(half, half);
+    let grow = square.max(1.0).sqrt(); // too small an ellipse grows
+    let rise = (grow * grow / square - 1.0).max(0.0).sqrt();
+    let side = if large == up { -1.0 } else { 1.0 };
+    let center =
+        [0.5 * (u[0] + v[0]) - side * rise * half[1], 0.5 * (u[1] + v[1]) + side * rise * half[0]];
+    let (a, b) = (sub(u, center), sub(v, center));
+    let from = a[1].atan2(a[0]);
+    let mut turn = cross(a, b).atan2(dot(a, b));
+    if up && turn < 0.0 {
+        turn += core::f64::consts::TAU;
+    } else if !up && turn > 0.0 {
+        turn -= core::f64::consts::TAU;
+    }
+    let curve =
+        Curve::Ellipse { center: [rx * center[0], ry * center[1]], a_r: grow * rx, a_z: grow * ry };
+    Segment { curve, from, to: from + turn }
+}
