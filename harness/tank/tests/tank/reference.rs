@@ -132,6 +132,21 @@ fn the_reference_box_is_met_on_both_axes() {
     assert_eq!(data.modes, axes.x.modes);
 }
 
+/// The closed form of the annular cylinder, its sum of 100 terms with the tail: 1e-11 of m R^2.
+#[test]
+fn the_reference_annulus_is_met_in_closed_form() {
+    let cases = reference();
+    let case = cases.iter().find(|c| c["name"] == "annulus_half").unwrap();
+    let shape = "shape = { annulus = { inner_radius = 0.5, outer_radius = 1.0, height = 1.0 } }";
+    let rho = number(&case["rho"]);
+    let data = tank(&format!("density = {rho:?}\n{shape}")).solve(0.8, 5).unwrap();
+    let m_liq = number(&case["m_liq"]);
+    assert!((data.i_eff_cg - number(&case["I_eff_cg"])).abs() < 1e-11 * m_liq);
+    let worst = deviation(case, &data.modes, &data.rest, 5, 1.0, m_liq);
+    // nine digits of the peak are written
+    assert!(worst[..4].iter().all(|e| *e < 1e-11) && worst[4] < 1e-9, "{worst:?}");
+}
+
 /// The keys that other programs read.
 #[test]
 fn the_result_has_the_keys_of_the_reference() {
