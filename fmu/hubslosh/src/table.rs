@@ -174,7 +174,7 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
 
     // The slosh modes' coordinates: with theta, omega, work, heat, stuck_time and
     // wheel_speed the continuous states
-    V::state("slosh.q_radial", |n| x::SLOSH + 4 * n + 0, "",
+    V::state("slosh.q_radial", |n| x::SLOSH + 4 * n, "",
         "Radial coordinate of a slosh mode, positive outwards. Models linear and planar: unused; spherical: stereographic, the tangent of half the pendulum's angle from the vertical times the direction's radial part (unit 1); paraboloid: displacement (m)")
         .shape(&[MODES])
         .nominal(1e-3).depends_on(&["slosh.q_radial[]"]).initial_depends_on(SLOSH_START),
@@ -214,7 +214,7 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     V::derivative("der(bristle)", |_| x::BRISTLE, "rad/s",
         "Derivative of bristle: omega - friction.sigma0 |omega| bristle over the dry friction")
         .depends_on(&["theta", "omega", "bristle"]).initial_depends_on(&["init.theta", "init.omega", "friction."]),
-    V::derivative("der(slosh.q_radial)", |n| x::SLOSH + 4 * n + 0, "",
+    V::derivative("der(slosh.q_radial)", |n| x::SLOSH + 4 * n, "",
         "Derivative of slosh.q_radial: slosh.v_radial")
         .shape(&[MODES])
         .depends_on(&["slosh.v_radial[]"]).initial_depends_on(SLOSH_START),

@@ -933,7 +933,16 @@ mod tests {
 
     #[test]
     fn structured_names_are_paths() {
-        for right in ["a", "a.b_1[2,3].c", "der(a.b)", "der(a[1],2)", "der(a[1].b[2,3])", "der(a[1,2],2)", "a.'b c\\'d'.e", "_x"] {
+        for right in [
+            "a",
+            "a.b_1[2,3].c",
+            "der(a.b)",
+            "der(a[1],2)",
+            "der(a[1].b[2,3])",
+            "der(a[1,2],2)",
+            "a.'b c\\'d'.e",
+            "_x",
+        ] {
             assert!(is_structured(right), "{right}");
         }
         for wrong in ["", "a b", "1a", "a..b", "a.", "a[x]", "a[1", "der(a,b)", "a-b", "'a"] {

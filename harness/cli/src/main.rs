@@ -35,6 +35,7 @@ enum Command {
     #[command(hide = true)]
     CheckCalls(check::CheckCallsArgs),
     Scale(scale::ScaleArgs),
+    Tank(tank::TankArgs),
     Gyro(gyro::GyroArgs),
     Example(example::ExampleArgs),
     Release(release::ReleaseArgs),
@@ -49,6 +50,7 @@ fn main() -> ExitCode {
         Some(Command::Check(args)) => args.run(),
         Some(Command::CheckCalls(args)) => args.run(),
         Some(Command::Scale(args)) => args.run(),
+        Some(Command::Tank(args)) => args.run(),
         Some(Command::Gyro(args)) => args.run(),
         Some(Command::Example(args)) => args.run(),
         Some(Command::Release(args)) => args.run(),

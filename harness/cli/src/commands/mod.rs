@@ -10,6 +10,7 @@ pub mod pack;
 pub mod release;
 pub mod run;
 pub mod scale;
+pub mod tank;
 pub mod torque;
 
 /// The FMU that commands drive unless another is named.

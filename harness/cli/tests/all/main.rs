@@ -5,3 +5,4 @@ mod check;
 mod command_line;
 mod plans;
 mod report;
+mod tank;
