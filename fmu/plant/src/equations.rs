@@ -249,7 +249,6 @@ mod tests {
         p.slosh.modes = 2;
         p.friction.model = friction;
         p.friction.eps = 0.05;
-        p.friction.sigma1 = 0.02;
         p.friction.asymmetry = 0.1;
         p.friction.harmonics_forward = [0.1, -0.05, 0.02, 0.1];
         p.init.omega = 0.07;

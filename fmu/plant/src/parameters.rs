@@ -167,9 +167,9 @@ impl Default for Friction {
             d: 0.002423,
             omega_s: 0.08581,
             eps: 1e-5,
-            // Not the thesis's: 6 µrad of deflection, and damping just within passivity.
+            // Not the thesis's: 6 µrad of deflection, and damping well within passivity.
             sigma0: 1000.0,
-            sigma1: 0.05,
+            sigma1: 0.01,
             asymmetry: 0.0,
             harmonics_forward: [0.0; 4],
             harmonics_backward: [0.0; 4],
