@@ -99,6 +99,26 @@ pub fn mul_part<const N: usize>(a: &Series, b: &Pair, i: usize) -> f64 {
     sum::<N>(|j| a[j] * b[N - j][i])
 }
 
+/// Coefficient N of a b, b a vector, without its term a_N b_0.
+#[inline(always)]
+pub fn scale_head<const N: usize>(a: &Series, b: &Pair) -> [f64; 2] {
+    let mut sum = [0.0; 2];
+    for j in 0..N {
+        sum = [sum[0] + a[j] * b[N - j][0], sum[1] + a[j] * b[N - j][1]];
+    }
+    sum
+}
+
+/// Coefficient N of a b_i, b a vector, without its term a_N b_0.
+#[inline(always)]
+pub fn mul_part_head<const N: usize>(a: &Series, b: &Pair, i: usize) -> f64 {
+    let mut sum = 0.0;
+    for j in 0..N {
+        sum += a[j] * b[N - j][i];
+    }
+    sum
+}
+
 /// Coefficient N of (a_1 b_1, a_2 b_2).
 #[inline(always)]
 pub fn each<const N: usize>(a: &Pair, b: &Pair) -> [f64; 2] {
@@ -158,7 +178,7 @@ pub fn square<const N: usize>(a: &Series) -> f64 {
         half += a[j] * a[N - j];
     }
     let middle = if N.is_multiple_of(2) { a[N / 2] * a[N / 2] } else { 0.0 };
-    2.0 * half + middle + 2.0 * a[0] * a[N]
+    2.0 * (half + a[0] * a[N]) + middle
 }
 
 /// Coefficient N of (ramp) a, where the ramp is `ramp[0] + ramp[1] t`.

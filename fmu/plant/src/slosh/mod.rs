@@ -164,7 +164,7 @@ pub struct Angles {
 
 /// One slosh mode as a set of power series in time.
 pub trait SloshMode {
-    /// Whether J changes as the mode moves.
+    /// Whether J has coefficients beyond order 0.
     const MOVES_INERTIA: bool = true;
     /// The mode at rest; `start` puts it somewhere.
     fn new(pendulum: &Pendulum) -> Self;

@@ -36,8 +36,8 @@
 use super::{Angles, HubMotion, HubReaction, SloshMode};
 use crate::Init;
 use crate::series::{
-    Pair, Series, ZERO, ZERO_PAIR, constant, dot, each, mul, mul_part, mul_tail, next, scale,
-    square, squares, values, values_pair,
+    Pair, Series, ZERO, ZERO_PAIR, constant, dot, each, mul, mul_part, mul_part_head, mul_tail,
+    next, scale, scale_head, square, squares, values, values_pair,
 };
 use crate::tank::Pendulum;
 
@@ -69,6 +69,8 @@ pub struct Spherical {
     /// L_0, L
     pull_0: Series,
     pull: Series,
+    /// Newest coefficient of L p without that of L
+    pulled: [f64; 2],
     omega_n: f64,
 }
 
@@ -123,6 +125,9 @@ impl Spherical {
 }
 
 impl SloshMode for Spherical {
+    // J is that at the start of the expansion; how it moves is in T.
+    const MOVES_INERTIA: bool = false;
+
     fn new(p: &Pendulum) -> Self {
         Spherical {
             p: *p,
@@ -144,6 +149,7 @@ impl SloshMode for Spherical {
             v_z2: ZERO,
             pull_0: ZERO,
             pull: ZERO,
+            pulled: [0.0; 2],
             omega_n: 0.0,
         }
     }
@@ -223,9 +229,13 @@ impl SloshMode for Spherical {
         self.pull_0[N] = v2_x + v2_y + self.v_z2[N] - inv_l * hub.weight::<N, RAMP>(&self.dir_z)
             + r_l * mul_part::<N>(&hub.omega2, &self.dir, 0);
         let [plus, minus] = each::<N>(&self.dir, &self.drag_swapped);
+        // L and L p without their share of the newest w', which J stands for.
+        let y_0 = self.dir[0][1];
+        self.pull[N] = self.pull_0[N] - r_l * mul_part_head::<N>(&hub.omega_dot, &self.dir, 1);
+        self.pulled = scale_head::<N>(&self.pull, &self.dir);
         HubReaction {
-            j: m * r * r * squares::<N>(&self.dir)[1],
-            t: m * r * l * mul_part::<N>(&self.pull_0, &self.dir, 1)
+            j: if N == 0 { m * r * r * y_0 * y_0 } else { 0.0 },
+            t: m * r * l * (self.pulled[1] + self.pull[N] * y_0)
                 + c * l * (r * drag_y + l * (plus - minus)),
         }
     }
@@ -233,9 +243,10 @@ impl SloshMode for Spherical {
     #[inline(always)]
     fn accelerate<const N: usize, const RAMP: bool>(&mut self, hub: &HubMotion) {
         let Pendulum { c_m, r_l, inv_l, .. } = self.p;
-        self.pull[N] = self.pull_0[N] - r_l * mul_part::<N>(&hub.omega_dot, &self.dir, 1);
+        let [x_0, y_0] = self.dir[0];
+        self.pull[N] -= r_l * hub.omega_dot[N] * y_0;
         let [w_x, w_y] = scale::<N>(&hub.omega, &self.v);
-        let pulled = scale::<N>(&self.pull, &self.dir);
+        let pulled = [self.pulled[0] + self.pull[N] * x_0, self.pulled[1] + self.pull[N] * y_0];
         let [drag_y, drag_x] = self.drag_swapped[N];
         let fall = inv_l * if N == 0 || (RAMP && N == 1) { hub.g[N] } else { 0.0 };
         self.v_d[N] = [
