@@ -52,6 +52,9 @@ pub fn anywhere(rng: &mut fastrand::Rng, slosh: SloshModel, friction: FrictionMo
     p.friction.d = torque * between(0.0, 0.1);
     p.friction.omega_s = between(0.01, 0.5);
     p.friction.eps = 10f64.powf(between(-4.0, -1.0));
+    // Bristles that deflect by 10 mrad, without damping of their own: passive with any friction.
+    p.friction.sigma0 = 100.0 * (p.friction.c + p.friction.d);
+    p.friction.sigma1 = 0.0;
     p.friction.asymmetry = between(-0.3, 0.3);
     p.friction.harmonics_forward = core::array::from_fn(|_| between(-0.15, 0.15));
     p.friction.harmonics_backward = core::array::from_fn(|_| between(-0.15, 0.15));

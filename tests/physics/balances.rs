@@ -148,7 +148,8 @@ fn energy_never_grows_without_torque() {
                     last = now;
                 }
                 let damped = slosh != SloshModel::Frozen || friction != FrictionModel::None;
-                if damped && first.energy > 0.0 {
+                // A paraboloid may leave its rim in the first step.
+                if damped && first.energy > 0.0 && plant.time() > 0.0 {
                     assert!(last.heat > 0.0, "damping makes heat: {p:?}");
                 }
             }
