@@ -39,6 +39,12 @@ fn lists(session: &mut Session) -> Result<Lists> {
         let unknowns = unknowns.filter(|v| v.is_continuous()).map(|v| v.reference);
         lists.unknowns = unknowns.collect();
         lists.knowns = lists.inputs.iter().map(|(reference, _)| *reference).collect();
+        if interface == Interface::ModelExchange {
+            for (derivative, state) in states(guest) {
+                lists.unknowns.push(derivative.reference);
+                lists.knowns.push(state.reference);
+            }
+        }
         if lists.knowns.is_empty() {
             lists.unknowns.clear();
         }
@@ -73,7 +79,11 @@ pub fn arrays(guest: &Guest, findings: &mut Findings) -> Result<()> {
         for beside in session.instance.writes_beside(&lists) {
             findings.add(
                 format!("{}, {} ({})", beside.call, beside.array, interface.name()),
-                format!("{} (allowed: exactly as many values as the call says)", beside.fault),
+                format!(
+                    "{} (allowed: to write as many values as the call says, into what is to be \
+                     written)",
+                    beside.fault
+                ),
             );
         }
     }

@@ -214,12 +214,13 @@ fn watch(
         let mut session = moved(guest, interface, attempt)?;
         guest.doing(format!("initialising with other parameters, try {attempt}"));
         // Parameters that do not go together are another try's luck.
-        if session.initialise().is_err() {
+        if session.initialise().is_err() || session.is_ended() {
             continue;
         }
         session.count = attempt as usize;
         // At rest with inputs as they are every other time.
-        if session.advance(if attempt % 2 == 0 { 0 } else { attempt as usize % 8 }).is_err() {
+        let steps = if attempt % 2 == 0 { 0 } else { attempt as usize % 8 };
+        if session.advance(steps).is_err() || session.is_ended() {
             continue;
         }
         // Small changes at two tries, large ones at the next two.

@@ -63,7 +63,12 @@ pub fn next_event_time(guest: &Guest, findings: &mut Findings) -> Result<()> {
 
 /// `exchange.terminate_simulation`
 pub fn terminate_simulation(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let Some(mut session) = continuous(guest, findings)? else { return Ok(()) };
+    if !guest.interfaces().contains(&Interface::ModelExchange) {
+        findings.skip("it offers no Model Exchange");
+        return Ok(());
+    }
+    let mut session = guest.session(Interface::ModelExchange)?;
+    session.initialise()?;
     super::steps::tell_end(&mut session, findings)
 }
 

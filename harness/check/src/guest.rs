@@ -2,19 +2,24 @@
 
 use std::cell::{Cell, RefCell};
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 
 use super::description::{Description, Variable};
 use super::process::Trace;
 use host::description::Type;
-use host::fmi2::{CO_SIMULATION, CallError, Called, Fmu, Instance, MODEL_EXCHANGE, Status};
+use host::fmi2::{
+    CO_SIMULATION, CallError, Called, Fmu, Instance, MODEL_EXCHANGE, PLATFORM, Status,
+};
 use host::xml::Element;
 
 /// Steps of a short run.
 pub const STEPS: usize = 20;
 /// Calls of fmi2NewDiscreteStates after which an event iteration counts as endless.
 const ITERATIONS: usize = 100;
+/// Events in succession after which an FMU that always wants the next one at once is told.
+const IMMEDIATE: usize = 3;
 /// Order of magnitude of a state that does not tell its own.
 const UNKNOWN_NOMINAL: f64 = 1e-3;
 
@@ -52,6 +57,7 @@ pub struct Guest {
     interfaces: Vec<(Interface, usize)>,
     /// Why a binary that is there cannot be loaded.
     broken: Option<String>,
+    deadline: Instant,
     description: Description,
     trace: Trace,
     doing: RefCell<String>,
@@ -112,7 +118,8 @@ pub struct Experiment {
 
 impl Guest {
     /// Loads the FMU that is unpacked in `directory`.
-    pub fn open(directory: &Path, path: &Path, trace: Trace) -> Result<Guest> {
+    /// Makes no instances after `deadline`.
+    pub fn open(directory: &Path, path: &Path, trace: Trace, deadline: Instant) -> Result<Guest> {
         let xml = std::fs::read(directory.join("modelDescription.xml"))?;
         let description = Description::read(&xml).map_err(anyhow::Error::msg)?;
         let identifier = |interface: &Option<Element>| {
@@ -123,7 +130,7 @@ impl Guest {
             (Interface::ModelExchange, identifier(&description.model_exchange)),
         ];
         let (mut binaries, mut interfaces) = (Vec::<Fmu>::new(), Vec::new());
-        let (mut broken, mut loaded) = (None, Vec::new());
+        let (mut broken, mut is_there, mut loaded) = (None, false, Vec::new());
         for (interface, identifier) in declared {
             let Some(identifier) = identifier else { continue };
             let at = match loaded.iter().position(|known| *known == identifier) {
@@ -134,8 +141,11 @@ impl Guest {
                         loaded.push(identifier);
                         binaries.len() - 1
                     }
-                    // that it is missing is a rule of its own
                     Err(error) => {
+                        let suffix = std::env::consts::DLL_SUFFIX;
+                        let file = format!("binaries/{PLATFORM}/{identifier}{suffix}");
+                        // that one of two is missing is a rule of its own
+                        is_there |= directory.join(file).exists();
                         broken.get_or_insert(format!("{error:#}"));
                         continue;
                     }
@@ -151,7 +161,8 @@ impl Guest {
         Ok(Guest {
             binaries,
             interfaces,
-            broken,
+            broken: broken.filter(|_| is_there),
+            deadline,
             description,
             trace,
             doing: RefCell::default(),
@@ -169,7 +180,7 @@ impl Guest {
     /// Copies the unpacked FMU to `directory` and loads the copy: a library of its own.
     pub fn copy(&self, directory: &Path) -> Result<Guest> {
         copy_files(&self.directory, directory)?;
-        Guest::open(directory, &self.path, self.trace.again()?)
+        Guest::open(directory, &self.path, self.trace.again()?, self.deadline)
     }
 
     /// Tells what comes next: the place of what goes wrong then.
@@ -246,6 +257,13 @@ impl Guest {
             let why = "it can be instantiated only once per process".into();
             return Err(Unusable { rule: "", why }.into());
         }
+        if Instant::now() > self.deadline {
+            let why = format!(
+                "the time for its calls is over after {} instances (--limit gives more)",
+                self.sessions.get()
+            );
+            return Err(Unusable { rule: "", why }.into());
+        }
         self.sessions.set(self.sessions.get() + 1);
         self.doing("fmi2Instantiate");
         let fmu = self.fmu(interface);
@@ -277,6 +295,7 @@ impl Guest {
             nominals: states.iter().map(nominal).collect(),
             ended: None,
             past_event: None,
+            immediate_events: 0,
         })
     }
 
@@ -294,10 +313,15 @@ impl Guest {
                 session.instance.setup_experiment(None, session.time, None)?;
                 session.instance.enter_initialization_mode()?;
             }
-            Stage::Initialised => session.initialise()?,
-            Stage::Terminated => {
+            Stage::Initialised | Stage::Terminated => {
                 session.initialise()?;
-                session.instance.terminate()?;
+                if session.is_ended() {
+                    let why = "it asks for the end of the simulation when it is initialised".into();
+                    return Err(Unusable { rule: "exchange.terminate_simulation", why }.into());
+                }
+                if stage == Stage::Terminated {
+                    session.instance.terminate()?;
+                }
             }
         }
         Ok(session)
@@ -368,6 +392,8 @@ pub struct Session<'g> {
     ended: Option<(f64, &'static str)>,
     /// The first time at which the FMU gave a nextEventTime that had passed, and that.
     past_event: Option<(f64, f64)>,
+    /// Events in succession after which the next one was to be at once.
+    immediate_events: usize,
 }
 
 /// How far a host is.
@@ -397,6 +423,7 @@ impl<'g> Session<'g> {
         stop: Option<f64>,
         tolerance: Option<f64>,
     ) -> Result<()> {
+        (self.ended, self.next_event) = (None, None);
         self.guest.doing(format!("fmi2SetupExperiment, startTime = {start}"));
         self.instance.setup_experiment(tolerance, start, stop)?;
         self.time = start;
@@ -437,8 +464,11 @@ impl<'g> Session<'g> {
             if info.new_discrete_states_needed == 0 || self.is_ended() {
                 self.next_event =
                     (info.next_event_time_defined != 0).then_some(info.next_event_time);
-                if let Some(next) =
-                    self.next_event.filter(|next| next.is_nan() || *next < self.time)
+                let now = self.next_event.is_some_and(|next| next == self.time);
+                self.immediate_events = if now { self.immediate_events + 1 } else { 0 };
+                let passed = |next: f64| next.is_nan() || next < self.time;
+                if let Some(next) = self.next_event
+                    && (passed(next) || self.immediate_events >= IMMEDIATE)
                 {
                     self.past_event.get_or_insert((self.time, next));
                 }
@@ -530,7 +560,7 @@ impl<'g> Session<'g> {
             let done = self.stimulate().map_err(anyhow::Error::from);
             done.and_then(|()| self.go(self.step)).map_err(|error| match error.downcast() {
                 Ok(unusable) => Unusable { ..unusable },
-                Err(error) => Unusable { rule, why: format!("{}: {error}", self.guest.now()) },
+                Err(error) => Unusable { rule, why: error.to_string() },
             })?;
         }
         Ok(())
@@ -616,11 +646,18 @@ impl<'g> Session<'g> {
         }
     }
 
+    /// One value of an ordinary run; that it cannot be read is a rule of its own.
+    pub fn read(&mut self, v: &Variable) -> Result<Reading> {
+        self.get(v).map_err(|error| {
+            let why = format!("{} cannot be read: {error}", v.name);
+            Unusable { rule: "values.readable", why }.into()
+        })
+    }
+
     /// Every value there is, one call each.
     pub fn readings(&mut self) -> Result<Vec<Reading>> {
         let guest = self.guest;
-        let read = |v| self.get(v).with_context(|| format!("{} cannot be read", v.name));
-        guest.variables().iter().map(read).collect()
+        guest.variables().iter().map(|v| self.read(v)).collect()
     }
 
     /// The first variable whose value is not the same to the last bit, as a sentence.
@@ -664,9 +701,14 @@ fn copy_files(from: &Path, to: &Path) -> Result<()> {
     std::fs::create_dir_all(to)?;
     for entry in std::fs::read_dir(from)? {
         let (path, name) = entry.map(|e| (e.path(), e.file_name()))?;
-        match path.is_dir() {
-            true => copy_files(&path, &to.join(name))?,
-            false => std::fs::copy(&path, to.join(name)).map(|_| ())?,
+        let copy = to.join(&name);
+        // A library must be a file of its own, or the loader takes it for the same one. Of the others
+        // a second name will do.
+        let is_library = path.extension().is_some_and(|e| e == std::env::consts::DLL_EXTENSION);
+        if path.is_dir() {
+            copy_files(&path, &copy)?;
+        } else if is_library || std::fs::hard_link(&path, &copy).is_err() {
+            std::fs::copy(&path, &copy)?;
         }
     }
     Ok(())

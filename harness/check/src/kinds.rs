@@ -86,7 +86,7 @@ fn put(session: &mut Session, known: &Variable, x: f64) -> Result<bool> {
 }
 
 fn real(session: &mut Session, v: &Variable) -> Result<f64> {
-    match session.get(v)? {
+    match session.read(v)? {
         Reading::Real(x) => Ok(x),
         _ => Ok(f64::NAN),
     }

@@ -95,6 +95,7 @@ fn run(
         .arg(directory)
         .arg(path)
         .arg(&answer)
+        .arg(options.limit.as_secs_f64().to_string())
         .stdin(Stdio::null())
         .stdout(output.try_clone()?)
         .stderr(output)
@@ -160,14 +161,22 @@ fn run(
 /// What the process does first.
 const LOADING: &str = "loading the binary";
 
-/// The other side: looks at the rule and writes what it finds to `answer`.
-pub fn answer(id: &str, directory: &Path, path: &Path, answer: &Path) -> Result<()> {
+/// The other side: looks at the rule and writes what it finds to `answer`; it is ended after `limit`.
+pub fn answer(
+    id: &str,
+    directory: &Path,
+    path: &Path,
+    answer: &Path,
+    limit: Duration,
+) -> Result<()> {
     let rule = RULES.iter().find(|rule| rule.id == id).context("no such rule")?;
     let Look::Calls(look) = rule.look else { anyhow::bail!("{id} makes no calls") };
     let trace = Trace(File::create(answer)?);
     trace.doing(LOADING);
     let mut findings = Findings::new(rule.severity);
-    match Guest::open(directory, path, trace) {
+    // a rule that is slow, and not hung, shall tell what it has found by then
+    let deadline = Instant::now() + limit.mul_f64(0.75);
+    match Guest::open(directory, path, trace, deadline) {
         Err(error) if rule.id == "load.opens" => findings.add("the binary", format!("{error:#}")),
         Err(error) => findings.skip(format!("it cannot be loaded: {error:#}")),
         Ok(guest) => {

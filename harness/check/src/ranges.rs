@@ -8,7 +8,7 @@ use anyhow::Result;
 use super::Findings;
 use super::dependencies::moved;
 use super::description::Variable;
-use super::guest::{Guest, Reading, STEPS, start_value};
+use super::guest::{Guest, Reading, STEPS, Session, start_value};
 use super::life::first;
 use super::values::{items, mentions};
 use host::description::Type;
@@ -159,6 +159,26 @@ pub fn items_known(guest: &Guest, findings: &mut Findings) -> Result<()> {
         return Ok(());
     }
     let mut told = BTreeSet::new();
+    let mut look = |session: &mut Session| {
+        for v in &computed {
+            let known = items(guest, v);
+            if let Ok(Reading::Integer(value)) = session.get(v)
+                && !known.is_empty()
+                && !known.contains(&value)
+                && told.insert(v.index)
+            {
+                let list = known.iter().map(i32::to_string).collect::<Vec<_>>().join(", ");
+                findings.fail(
+                    v.place(),
+                    format!(
+                        "it is {value}, and no item of its type in modelDescription.xml has this \
+                         value (items: {list})"
+                    ),
+                );
+            }
+        }
+    };
+    // Runs with other parameters, and starts with one parameter far from where it is.
     for attempt in 0..STEPS as u64 {
         let mut session = moved(guest, first(guest)?, attempt)?;
         guest.doing(format!("initialising with other parameters, try {attempt}"));
@@ -166,27 +186,39 @@ pub fn items_known(guest: &Guest, findings: &mut Findings) -> Result<()> {
             continue;
         }
         for _ in 0..5 {
-            for v in &computed {
-                let known = items(guest, v);
-                if let Ok(Reading::Integer(value)) = session.get(v)
-                    && !known.is_empty()
-                    && !known.contains(&value)
-                    && told.insert(v.index)
-                {
-                    let list = known.iter().map(i32::to_string).collect::<Vec<_>>().join(", ");
-                    findings.fail(
-                        v.place(),
-                        format!(
-                            "it is {value}, and no item of its type in modelDescription.xml has \
-                             this value (items: {list})"
-                        ),
-                    );
-                }
-            }
+            look(&mut session);
             if session.advance(1).is_err() {
                 break;
             }
         }
     }
+    for v in guest.variables().iter().filter(|v| v.is_set_by_hosts() && v.is_real()) {
+        for x in far_values(v) {
+            let mut session = guest.session(first(guest)?)?;
+            guest.doing(format!("initialising with {} = {x:?}", v.name));
+            if session.set(v, &Reading::Real(x)).is_ok() && session.initialise().is_ok() {
+                look(&mut session);
+                if session.advance(1).is_ok() {
+                    look(&mut session);
+                }
+            }
+        }
+    }
     Ok(())
+}
+
+/// Values of a parameter or input far from its start and within its bounds.
+fn far_values(v: &Variable) -> Vec<f64> {
+    let (min, max) = v.bounds();
+    let Some(Reading::Real(start)) = start_value(v) else { return Vec::new() };
+    let size = start.abs().max(v.nominal());
+    let mut values = vec![start + 0.3 * size, start + 3.0 * size, start - 3.0 * size];
+    if max.is_finite() {
+        values.extend([0.1, 0.2, 0.5, 1.0].map(|share| start + share * (max - start)));
+    }
+    if min.is_finite() {
+        values.push(0.5 * (start + min));
+    }
+    values.retain(|x| *x >= min && *x <= max && *x != start);
+    values
 }

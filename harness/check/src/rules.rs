@@ -37,7 +37,7 @@ pub static RULES: &[Rule] = &[
     rule("zip.folders", Warning, "only files and folders of FMI 2.0 at the top (and terminalsAndIcons, extra)", "2.3", Archive(archive::folders)),
 
     rule("xml.well_formed", Error, "modelDescription.xml is well-formed XML in UTF-8", "2.2", Archive(description::well_formed)),
-    rule("xml.size", Error, "modelDescription.xml has at most 256 levels of elements, 20 million nodes and 512 MiB", "hosts that read the tree by recursion", Archive(reading::size)),
+    rule("xml.size", Error, "modelDescription.xml has at most 256 levels, 10 million elements, 1000 attributes for each and 512 MiB", "hosts that read the tree by recursion", Archive(reading::size)),
     rule("xml.doctype", Error, "modelDescription.xml has no document type declaration and no entities of its own", "parsers refuse it, expand entities without bound or open other files", Archive(reading::doctype)),
     rule("xml.schema", Error, "elements and attributes are those of the schema, in its order, none missing", "2.2, fmi2ModelDescription.xsd", Description(schema::structure)),
     rule("xml.values", Error, "attributes are written as the schema says: whole numbers (exponents of BaseUnit too), decimal points, known words", "2.2, fmi2ModelDescription.xsd", Description(schema::values)),
@@ -97,7 +97,7 @@ pub static RULES: &[Rule] = &[
 
     rule("instantiate.guid", Error, "another GUID, or none, is refused with NULL and a message", "2.1.5", Calls(life::guid)),
     rule("instantiate.arguments", Warning, "a missing resource location is fine, a missing name is refused with a message", "2.1.5; hosts that pass NULL", Calls(life::arguments_null)),
-    rule("instantiate.callbacks", Warning, "callbacks may be NULL if canNotUseMemoryManagementFunctions is declared", "2.1.5; hosts without a logger", Calls(life::callbacks)),
+    rule("instantiate.callbacks", Warning, "memory functions may be NULL if canNotUseMemoryManagementFunctions is declared; without a logger nothing crashes", "2.1.5, 3.3.1, 4.3.1", Calls(life::callbacks)),
     rule("instantiate.copies", Error, "the callbacks' struct may go after fmi2Instantiate", "2.1.5, clarified in 2.0.5", Calls(life::copies)),
     rule("instantiate.null", Warning, "fmi2FreeInstance(NULL) does nothing, other calls with NULL return fmi2Error", "2.1.5; hosts that clean up after errors", Calls(life::null)),
 

@@ -4,7 +4,7 @@ use anyhow::Result;
 
 use super::Findings;
 use super::description::Variable;
-use super::guest::{Guest, Interface, Reading, STEPS, Session};
+use super::guest::{Guest, Interface, Reading, STEPS, Session, Unusable};
 use super::life::expect_refusal;
 use host::fmi2::{CallError, Status};
 
@@ -15,6 +15,18 @@ fn stepping<'g>(guest: &'g Guest, findings: &mut Findings) -> Result<Option<Sess
         return Ok(None);
     }
     guest.running(Interface::CoSimulation).map(Some)
+}
+
+/// As above, where a few ordinary steps are possible; where they are not, other rules tell.
+fn able<'g>(guest: &'g Guest, findings: &mut Findings) -> Result<Option<Session<'g>>> {
+    if let Some(mut session) = stepping(guest, findings)? {
+        session.advance(3)?;
+        if session.is_ended() {
+            let why = "it asks for the end of the simulation in its first steps".into();
+            return Err(Unusable { rule: "steps.terminated", why }.into());
+        }
+    }
+    stepping(guest, findings)
 }
 
 /// Whether steps may have any size.
@@ -61,7 +73,7 @@ pub fn run(guest: &Guest, findings: &mut Findings) -> Result<()> {
 pub fn size(guest: &Guest, findings: &mut Findings) -> Result<()> {
     for h in [0.0, -0.01, f64::NAN, f64::INFINITY] {
         // After an error an FMU may refuse everything: a new instance each time.
-        let Some(mut session) = stepping(guest, findings)? else { return Ok(()) };
+        let Some(mut session) = able(guest, findings)? else { return Ok(()) };
         session.advance(3)?;
         let before = session.readings()?;
         let place = format!("fmi2DoStep with communicationStepSize = {h:?}");
@@ -83,7 +95,7 @@ pub fn size(guest: &Guest, findings: &mut Findings) -> Result<()> {
 /// `steps.point`
 pub fn point(guest: &Guest, findings: &mut Findings) -> Result<()> {
     for off in [2.0, -1.0, f64::NAN] {
-        let Some(mut session) = stepping(guest, findings)? else { return Ok(()) };
+        let Some(mut session) = able(guest, findings)? else { return Ok(()) };
         session.advance(3)?;
         let wrong = session.time + off * session.step;
         let place = format!("fmi2DoStep from {wrong:?} s, {:?} s being reached", session.time);
@@ -97,7 +109,7 @@ pub fn point(guest: &Guest, findings: &mut Findings) -> Result<()> {
 /// `steps.wobble`
 pub fn wobble(guest: &Guest, findings: &mut Findings) -> Result<()> {
     const LONG: usize = 200;
-    let Some(mut session) = stepping(guest, findings)? else { return Ok(()) };
+    let Some(mut session) = able(guest, findings)? else { return Ok(()) };
     let (start, h) = (session.time, session.step);
     for n in 0..LONG {
         // n·h and t + h differ by ulps; some hosts take one, some the other
@@ -123,7 +135,8 @@ pub fn wobble(guest: &Guest, findings: &mut Findings) -> Result<()> {
 /// `steps.start_time`
 pub fn start_time(guest: &Guest, findings: &mut Findings) -> Result<()> {
     for interface in guest.interfaces() {
-        guest.running(interface)?; // if that fails, another rule tells
+        // if that fails, another rule tells
+        guest.running(interface)?.advance(STEPS)?;
         for start in [guest.experiment().start + 1000.0, guest.experiment().start - 3.0] {
             let mut session = guest.session(interface)?;
             let place = format!("start time {start} s ({})", interface.name());
@@ -139,7 +152,7 @@ pub fn start_time(guest: &Guest, findings: &mut Findings) -> Result<()> {
 
 /// `steps.stop_time`
 pub fn stop_time(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    if stepping(guest, findings)?.is_none() {
+    if able(guest, findings)?.is_none() {
         return Ok(());
     }
     let experiment = guest.experiment();
@@ -168,10 +181,8 @@ pub fn tolerance(guest: &Guest, findings: &mut Findings) -> Result<()> {
     for interface in guest.interfaces() {
         for tolerance in [None, Some(1e-4), Some(1e-6)] {
             let mut session = guest.session(interface)?;
-            let done = session
-                .initialise_at(start, None, tolerance)
-                .map_err(anyhow::Error::from)
-                .and_then(|()| session.advance(3));
+            let done =
+                session.initialise_at(start, None, tolerance).and_then(|()| session.advance(3));
             if let Err(error) = done {
                 let given = tolerance.map_or("none".into(), |x: f64| x.to_string());
                 fails.push((interface, format!("tolerance {given} ({})", interface.name()), error));
@@ -194,7 +205,7 @@ pub fn tolerance(guest: &Guest, findings: &mut Findings) -> Result<()> {
 pub fn cut(guest: &Guest, findings: &mut Findings) -> Result<()> {
     /// Errors of many steps add up, and the tolerance is a step's.
     const SLACK: f64 = 1e3;
-    let Some(session) = stepping(guest, findings)? else { return Ok(()) };
+    let Some(session) = able(guest, findings)? else { return Ok(()) };
     drop(session);
     if !variable_steps(guest, findings) {
         return Ok(());
@@ -223,7 +234,7 @@ pub fn cut(guest: &Guest, findings: &mut Findings) -> Result<()> {
                 session.time = end;
             }
             for (n, v) in outputs.iter().enumerate() {
-                if let Reading::Real(x) = session.get(v)? {
+                if let Reading::Real(x) = session.read(v)? {
                     scale[n] = scale[n].max(x.abs());
                     last[n] = x;
                 }
@@ -258,7 +269,7 @@ pub fn cut(guest: &Guest, findings: &mut Findings) -> Result<()> {
 
 /// `steps.inputs`
 pub fn inputs(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let Some(mut session) = stepping(guest, findings)? else { return Ok(()) };
+    let Some(mut session) = able(guest, findings)? else { return Ok(()) };
     let inputs: Vec<_> =
         guest.variables().iter().filter(|v| v.causality == "input" && v.is_real()).collect();
     if inputs.is_empty() {
@@ -289,7 +300,7 @@ pub fn inputs(guest: &Guest, findings: &mut Findings) -> Result<()> {
 
 /// `steps.output_derivatives`
 pub fn output_derivatives(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let Some(mut session) = stepping(guest, findings)? else { return Ok(()) };
+    let Some(mut session) = able(guest, findings)? else { return Ok(()) };
     let interface = guest.description().co_simulation.as_ref();
     let order = interface.and_then(|i| i.number("maxOutputDerivativeOrder")).unwrap_or(0.0);
     if order < 1.0 {
@@ -342,13 +353,15 @@ pub fn output_derivatives(guest: &Guest, findings: &mut Findings) -> Result<()> 
     Ok(())
 }
 
+const VARIABLE: &str = "canHandleVariableCommunicationStepSize is declared";
+
 /// `steps.small`
 pub fn small(guest: &Guest, findings: &mut Findings) -> Result<()> {
     /// Steps that are tried instead of the usual ones, s.
     const SMALL: [f64; 2] = [4e-4, 1e-5];
     /// At most so many of them.
     const MOST: f64 = 5000.0;
-    let Some(session) = stepping(guest, findings)? else { return Ok(()) };
+    let Some(session) = able(guest, findings)? else { return Ok(()) };
     let usual = session.step;
     drop(session);
     if !variable_steps(guest, findings) {
@@ -357,14 +370,15 @@ pub fn small(guest: &Guest, findings: &mut Findings) -> Result<()> {
     let experiment = guest.experiment();
     let continuous = |v: &&Variable| v.is_continuous() && !v.is_set_by_hosts();
     let all: Vec<&Variable> = guest.variables().iter().filter(continuous).collect();
-    // Where the values are before, and after `count` steps of `h` with the inputs held; none if a
-    // step is refused, which is honest.
-    let run = |h: f64, count: usize| -> Result<Option<(Vec<f64>, Vec<f64>)>> {
+    // Where the values are before, and after `count` steps of `h` with the inputs held, or what was
+    // said instead; none if the FMU asks for its end.
+    type Ends = Option<Result<(Vec<f64>, Vec<f64>), String>>;
+    let run = |h: f64, count: usize| -> Result<Ends> {
         let mut session = guest.running(Interface::CoSimulation)?;
         session.advance(3)?;
         session.stimulate()?;
         let read = |session: &mut Session| -> Result<Vec<f64>> {
-            let value = |v: &&Variable| match session.get(v)? {
+            let value = |v: &&Variable| match session.read(v)? {
                 Reading::Real(x) => Ok(x),
                 _ => Ok(f64::NAN),
             };
@@ -374,12 +388,15 @@ pub fn small(guest: &Guest, findings: &mut Findings) -> Result<()> {
         let start = session.time;
         for n in 1..=count {
             let end = start + n as f64 * h;
-            if session.is_ended() || session.go(end - session.time).is_err() {
+            if let Err(error) = session.go(end - session.time) {
+                return Ok(Some(Err(format!("step {n} of {h:.1e} s: {error}"))));
+            }
+            if session.is_ended() {
                 return Ok(None);
             }
             session.time = end;
         }
-        Ok(Some((before, read(&mut session)?)))
+        Ok(Some(Ok((before, read(&mut session)?))))
     };
     for h in SMALL {
         // the same time in usual steps and in small ones
@@ -388,8 +405,15 @@ pub fn small(guest: &Guest, findings: &mut Findings) -> Result<()> {
         let time = (steps * usual).min(longest);
         let h = h.min(time / 20.0);
         let count = (time / h).round();
-        let Some((before, usually)) = run(time / steps, steps as usize)? else { continue };
-        let Some((_, small)) = run(time / count, count as usize)? else { continue };
+        let Some(Ok((before, usually))) = run(time / steps, steps as usize)? else { continue };
+        let (_, small) = match run(time / count, count as usize)? {
+            Some(Ok(ends)) => ends,
+            Some(Err(why)) => {
+                findings.add("fmi2DoStep", format!("{why} (allowed: fmi2OK, since {VARIABLE})"));
+                break;
+            }
+            None => continue,
+        };
         for (n, v) in all.iter().enumerate() {
             let moved = usually[n] - before[n];
             let size = before[n].abs().max(usually[n].abs()).max(1e-3 * v.nominal());
@@ -399,8 +423,7 @@ pub fn small(guest: &Guest, findings: &mut Findings) -> Result<()> {
                     v.place(),
                     format!(
                         "it goes from {} to {} in {steps} steps of {:.1e} s, but to {} in {count} \
-                         steps of {:.1e} s (allowed: steps of any length, since \
-                         canHandleVariableCommunicationStepSize is declared)",
+                         steps of {:.1e} s (allowed: steps of any length, since {VARIABLE})",
                         before[n],
                         usually[n],
                         time / steps,
@@ -419,7 +442,7 @@ pub fn small(guest: &Guest, findings: &mut Findings) -> Result<()> {
 
 /// `steps.output_derivative_order`
 pub fn output_derivative_order(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let Some(session) = stepping(guest, findings)? else { return Ok(()) };
+    let Some(session) = able(guest, findings)? else { return Ok(()) };
     drop(session);
     let interface = guest.description().co_simulation.as_ref();
     let most = interface.and_then(|i| i.number("maxOutputDerivativeOrder")).unwrap_or(0.0);
@@ -471,10 +494,14 @@ pub fn tell_end(session: &mut Session, findings: &mut Findings) -> Result<()> {
         None => "no stopTime".into(),
         Some(_) => return Ok(()),
     };
+    let when = match session.count {
+        0 => "when it is initialised".into(),
+        1 => "in its first step".into(),
+        n => format!("in step {n}"),
+    };
     let text = format!(
-        "it asks for the end of the simulation after {} steps (DefaultExperiment has {suggested}; \
-         allowed: only at the end, or for a reason that a user can see)",
-        session.count
+        "it asks for the end of the simulation {when} (DefaultExperiment has {suggested}; allowed: \
+         at that time, or for a reason that a user can see)"
     );
     if session.count <= 1 {
         findings.fail(place, text);

@@ -75,14 +75,22 @@ pub fn can_be_set(guest: &Guest, findings: &mut Findings) -> Result<()> {
     Ok(())
 }
 
-/// All values after a short run, with a parameter changed before initialisation, after it or not at
-/// all; none if the change is refused, which is another rule's business.
+/// What a short run shows.
+struct Run {
+    /// All values after initialisation.
+    at_first: Vec<Reading>,
+    /// All values at its end.
+    at_last: Vec<Reading>,
+}
+
+/// A short run with a parameter changed before initialisation, after it or not at all; none if the
+/// change is refused, which is another rule's business.
 fn run(
     guest: &Guest,
     interface: Interface,
     before: Option<(&Variable, &Reading)>,
     after: Option<(&Variable, &Reading)>,
-) -> Result<Option<Vec<Reading>>> {
+) -> Result<Option<Run>> {
     let mut session = guest.session(interface)?;
     if let Some((v, value)) = before
         && session.set(v, value).is_err()
@@ -92,6 +100,7 @@ fn run(
     if let Err(error) = session.initialise() {
         return if before.is_some() { Ok(None) } else { Err(error) };
     }
+    let at_first = session.readings()?;
     if let Some((v, value)) = after
         && (session.is_ended() || set_between_steps(&mut session, v, value)?.is_err())
     {
@@ -100,14 +109,15 @@ fn run(
     if let Err(error) = session.advance(STEPS) {
         return if before.is_some() || after.is_some() { Ok(None) } else { Err(error) };
     }
-    Ok(Some(session.readings()?))
+    Ok(Some(Run { at_first, at_last: session.readings()? }))
 }
 
 /// `values.tunable_effect`
 pub fn acts(guest: &Guest, findings: &mut Findings) -> Result<()> {
+    let states = guest.description().states();
     let mut any = false;
     for interface in guest.interfaces() {
-        let plain = run(guest, interface, None, None)?.unwrap_or_default();
+        let Some(plain) = run(guest, interface, None, None)? else { continue };
         for (v, start) in tunables(guest) {
             any = true;
             let Some(value) = other_value(guest, v, &start) else { continue };
@@ -116,26 +126,26 @@ pub fn acts(guest: &Guest, findings: &mut Findings) -> Result<()> {
             let runs = (run(guest, interface, change, None)?, run(guest, interface, None, change)?);
             let (Some(before), Some(after)) = runs else { continue };
             // what others than the parameter itself do
-            let differs = |readings: &[Reading]| {
-                guest
-                    .variables()
-                    .iter()
-                    .zip(readings.iter().zip(&plain))
-                    .find(|(o, (a, b))| (o.kind, o.reference) != (v.kind, v.reference) && !a.is(b))
-                    .map(|(o, _)| o.name.clone())
+            let differing = |run: &Run| {
+                let mut all = guest.variables().iter().zip(run.at_last.iter().zip(&plain.at_last));
+                all.find(|(o, (a, b))| (o.kind, o.reference) != (v.kind, v.reference) && !a.is(b))
+                    .map(|(o, _)| o.name.as_str())
             };
-            if let Some(name) = differs(&before)
-                && differs(&after).is_none()
-            {
-                findings.add(
-                    v.place(),
-                    format!(
-                        "set to {value} before initialisation it changes {name} within {STEPS} steps; \
-                         set after initialisation it changes nothing ({}) (allowed: a tunable \
-                         parameter that acts)",
-                        interface.name()
-                    ),
-                );
+            let (Some(name), None) = (differing(&before), differing(&after)) else { continue };
+            // It might act on the state at the beginning alone, which is odd and no more.
+            let state_differs = |index: &usize| {
+                let at = |run: &Run| run.at_first.get(index.wrapping_sub(1)).cloned();
+                at(&before).zip(at(&plain)).is_none_or(|(a, b)| !a.is(&b))
+            };
+            let text = format!(
+                "set to {value} before initialisation it changes {name} within {STEPS} steps; set \
+                 after initialisation it changes nothing ({}) (allowed: a tunable parameter that \
+                 acts)",
+                interface.name()
+            );
+            match states.is_empty() || states.iter().any(state_differs) {
+                true => findings.add(v.place(), text),
+                false => findings.fail(v.place(), text),
             }
         }
     }

@@ -41,8 +41,9 @@ impl Unit {
         (0..RADIAN).all(|i| self.exponents[i] == other.exponents[i])
     }
 
-    fn is_dimensionless(&self) -> bool {
-        self.measures_like(&Unit::ONE)
+    /// Whether the radians are those of another unit, or left out.
+    fn has_radians_of(&self, other: &Unit) -> bool {
+        [0, other.exponents[RADIAN]].contains(&self.exponents[RADIAN])
     }
 
     /// As UnitDefinitions writes it.
@@ -271,8 +272,9 @@ pub fn base_units(d: &Description, findings: &mut Findings) {
         let meant = read(name);
         let fits = |m: &&Unit| {
             written.measures_like(m)
+                && written.has_radians_of(m)
                 // people write % with and without its factor
-                && (m.is_dimensionless()
+                && (m.exponents == [0; 8]
                     || agree(written.factor, m.factor)
                         && (written.offset - m.offset).abs() <= 1e-3 * m.offset.abs())
         };

@@ -472,12 +472,13 @@ impl Fmu {
         let pointer = |text: &Option<CString>| text.as_ref().map_or(null(), |t| t.as_ptr());
         let sink = Box::into_raw(Box::new(Sink { write, messages: Mutex::default() }));
         let full = matches!(with.callbacks, Callbacks::Full | Callbacks::Fleeting);
+        let logs = full || with.callbacks == Callbacks::Logger;
         let callbacks = Box::into_raw(Box::new(CallbackFunctions {
-            logger: full.then_some(hubslosh_logger as Logger),
+            logger: logs.then_some(hubslosh_logger as Logger),
             allocate_memory: full.then_some(calloc),
             free_memory: full.then_some(free),
             step_finished: None,
-            environment: if full { sink.cast() } else { null_mut() },
+            environment: if logs { sink.cast() } else { null_mut() },
         }));
         // SAFETY: strings and callbacks outlive the call; sink and callbacks outlive the instance.
         let component = unsafe {
@@ -626,6 +627,8 @@ pub enum Callbacks {
     /// As `Full`, and the struct is wiped once fmi2Instantiate has returned: it is valid during
     /// that call alone.
     Fleeting,
+    /// The logger alone; the memory functions are NULL.
+    Logger,
     /// A struct whose members are all NULL.
     Empty,
     /// No struct at all.

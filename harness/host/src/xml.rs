@@ -1,20 +1,23 @@
 //! An XML file as a tree of elements, each with the line it starts in: the one reading of XML here.
 
-use roxmltree::{Document, Error, Node, ParsingOptions};
+use roxmltree::{Document, Error, Node};
 
 /// Levels of elements that are read; a model description has eight.
 pub const DEEPEST: usize = 256;
 /// Bytes that are read; half a million variables have a quarter of it.
 pub const LONGEST: usize = 512 << 20;
-/// Nodes that are read: elements, and the white space between them.
-pub const MOST: u32 = 20_000_000;
+/// Elements that are read; half a million variables have two million.
+pub const MOST: usize = 10_000_000;
+/// Attributes that one element may have; those of FMI have 13 at most.
+pub const MOST_ATTRIBUTES: usize = 1000;
 
 /// Why a file is not read. The texts of all but `TooLarge` begin with line and column.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fault {
     /// It is not well-formed, or not UTF-8.
     Malformed(String),
-    /// It is longer than [`LONGEST`], has more than [`MOST`] nodes or levels below [`DEEPEST`].
+    /// It is longer than [`LONGEST`], has more than [`MOST`] elements, levels below [`DEEPEST`] or an
+    /// element with more than [`MOST_ATTRIBUTES`].
     TooLarge(String),
     /// It has a document type declaration, which can define entities and name other files.
     Doctype(String),
@@ -59,40 +62,34 @@ impl Element {
             let column = 1 + before.iter().rev().take_while(|byte| **byte != b'\n').count();
             Fault::Malformed(format!("{line}:{column} it is not UTF-8"))
         })?;
-        let options = ParsingOptions { nodes_limit: MOST, ..ParsingOptions::default() };
-        let document = Document::parse_with_options(text, options).map_err(|error| {
+        if let Some(excess) = excess(text) {
+            return Err(Fault::TooLarge(excess));
+        }
+        let document = Document::parse(text).map_err(|error| {
             let (place, what) = (error.pos().to_string(), error.to_string());
             let why =
                 format!("{place} {}", what.strip_suffix(&format!(" at {place}")).unwrap_or(&what));
             match error {
                 Error::DtdDetected => Fault::Doctype(why),
-                Error::NodesLimitReached => {
-                    Fault::TooLarge(format!("it has more than {MOST} nodes (allowed: {MOST})"))
-                }
                 _ => Fault::Malformed(why),
             }
         })?;
-        Element::of(document.root_element(), 1, &mut Lines { text, at: 0, line: 1 })
+        Ok(Element::of(document.root_element(), &mut Lines { text, at: 0, line: 1 }))
     }
 
-    fn of(node: Node, depth: usize, lines: &mut Lines) -> Result<Element, Fault> {
+    fn of(node: Node, lines: &mut Lines) -> Element {
         let line = lines.of(node.range().start);
-        if depth > DEEPEST {
-            return Err(Fault::TooLarge(format!(
-                "line {line}: elements are nested deeper than allowed ({DEEPEST} levels)"
-            )));
-        }
         let attribute = |a: roxmltree::Attribute| (a.name().to_string(), a.value().to_string());
-        Ok(Element {
+        Element {
             name: node.tag_name().name().into(),
             line,
             attributes: node.attributes().map(attribute).collect(),
             children: node
                 .children()
                 .filter(Node::is_element)
-                .map(|child| Element::of(child, depth + 1, lines))
-                .collect::<Result<_, _>>()?,
-        })
+                .map(|child| Element::of(child, lines))
+                .collect(),
+        }
     }
 
     /// The value of an attribute.
@@ -119,6 +116,57 @@ impl Element {
     pub fn list<'a>(&'a self, list: &str) -> impl Iterator<Item = &'a Element> + use<'a> {
         self.child(list).into_iter().flat_map(|list| &list.children)
     }
+}
+
+/// What of a file is more than is read, before a parser spends time and stack on it: some take time
+/// that grows with the square of the depth or of the number of attributes. The file need not be
+/// well-formed; that is the parser's business.
+fn excess(text: &str) -> Option<String> {
+    let (mut depth, mut elements, mut rest) = (0usize, 0, text);
+    while let Some(at) = rest.find('<') {
+        rest = &rest[at + 1..];
+        // what is not markup
+        let skipped = [("!--", "-->"), ("![CDATA[", "]]>"), ("?", "?>"), ("!", ">"), ("/", ">")]
+            .into_iter()
+            .find(|(start, _)| rest.starts_with(start));
+        if let Some((start, end)) = skipped {
+            if start == "/" {
+                depth = depth.saturating_sub(1);
+            }
+            rest = rest.split_once(end)?.1;
+            continue;
+        }
+        // a start tag, to its end, which is not in quotes
+        let (mut quote, mut attributes, mut empty) = (None, 0, false);
+        let end = rest.bytes().position(|byte| {
+            match (quote, byte) {
+                (Some(q), byte) if q == byte => quote = None,
+                (Some(_), _) => {}
+                (None, b'"' | b'\'') => quote = Some(byte),
+                (None, b'=') => attributes += 1,
+                (None, b'>') => return true,
+                (None, _) => {}
+            }
+            empty = byte == b'/';
+            false
+        })?;
+        depth += 1;
+        elements += 1;
+        let fault = if depth > DEEPEST {
+            format!("elements are nested deeper than allowed ({DEEPEST} levels)")
+        } else if elements > MOST {
+            format!("it has more elements than allowed ({MOST})")
+        } else if attributes > MOST_ATTRIBUTES {
+            format!("an element has {attributes} attributes (allowed: {MOST_ATTRIBUTES})")
+        } else {
+            depth -= usize::from(empty);
+            rest = &rest[end + 1..];
+            continue;
+        };
+        let line = 1 + text[..text.len() - rest.len()].matches('\n').count();
+        return Some(format!("line {line}: {fault}"));
+    }
+    None
 }
 
 /// Counts lines forwards: finding each by itself would read the file from its beginning every time.
@@ -182,7 +230,17 @@ mod tests {
         assert!(Element::parse(bomb.as_bytes()).unwrap_err().contains("DTD"));
         let nested = |depth: usize| "<a>".repeat(depth) + &"</a>".repeat(depth);
         assert!(Element::parse(nested(DEEPEST).as_bytes()).is_ok());
-        assert!(Element::parse(nested(200_000).as_bytes()).unwrap_err().contains("deeper than"));
+        for wrong in [nested(DEEPEST + 1), nested(200_000), "<a>".repeat(200_000)] {
+            let fault = Element::read(wrong.as_bytes()).unwrap_err();
+            assert!(matches!(&fault, Fault::TooLarge(why) if why.contains("deeper than")));
+        }
+        // neither comments nor texts nor empty elements are levels
+        let flat = ["<b/>", "<b c='>'/>", "<!-- <b> -->", "<![CDATA[<b>]]>", "<?b <b> ?>"];
+        let flat = format!("<a>{}</a>", flat.map(|one| one.repeat(300)).concat());
+        assert_eq!(Element::parse(flat.as_bytes()).unwrap().children.len(), 600);
+        let many: String = (0..=MOST_ATTRIBUTES).map(|n| format!(" b{n}='='")).collect();
+        let fault = Element::read(format!("<a{many}/>").as_bytes()).unwrap_err();
+        assert_eq!(fault.to_string(), "line 1: an element has 1001 attributes (allowed: 1000)");
         let fault = Element::read(bomb.as_bytes()).unwrap_err();
         assert!(matches!(fault, Fault::Doctype(_)));
     }

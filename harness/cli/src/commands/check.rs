@@ -44,6 +44,7 @@ pub struct CheckCallsArgs {
     directory: PathBuf,
     fmu: PathBuf,
     answer: PathBuf,
+    limit: f64,
 }
 
 impl CheckArgs {
@@ -82,6 +83,7 @@ impl CheckArgs {
 impl CheckCallsArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        process::answer(&self.rule, &self.directory, &self.fmu, &self.answer)
+        let limit = Duration::try_from_secs_f64(self.limit).context("no time limit")?;
+        process::answer(&self.rule, &self.directory, &self.fmu, &self.answer, limit)
     }
 }

@@ -218,7 +218,7 @@ impl Instance<'_> {
             ("fmi2GetEventIndicators", f.get_event_indicators, lists.indicators),
         ];
         for (call, function, count) in vectors {
-            let Some(n) = count.filter(|n| *n > 0) else { continue };
+            let Some(n) = count else { continue };
             let mut x = Guarded::output::<Real>(n);
             // SAFETY: see values_beside.
             unsafe { function(c, x.pointer(), n) };
