@@ -10,6 +10,7 @@ use std::process::Command;
 
 use crate::common::{python, run};
 use host::fmi2::Fmu;
+use host::xml::Element;
 use pack::{packed_for_tests, root};
 
 /// The unpacked binary, and what the C hosts need to know of the FMU.
@@ -130,6 +131,55 @@ fn no_calls_break_the_packed_binary() {
     print!("{said}");
     // Noise that reaches nothing would prove nothing.
     assert!(number(&said, " accepted") > 0.1 * number(&said, " calls"), "{said}");
+}
+
+/// A host that traps division by zero, invalid operations and overflow, as those do that look for the
+/// first NaN: none of them comes from any slosh model, friction law or gyro, in either interface.
+#[cfg(target_os = "linux")]
+#[test]
+fn no_model_raises_a_floating_point_exception() {
+    if under_valgrind() {
+        return; // which has no such traps
+    }
+    let fmu = Unpacked::new();
+    let file = std::fs::read(fmu.directory.path().join("modelDescription.xml")).unwrap();
+    let root = Element::parse(&file).unwrap();
+    let variables: Vec<&Element> = root.list("ModelVariables").collect();
+    let reals = |v: &&&Element| v.child("Real").is_some();
+    let states = variables.iter().filter_map(|v| v.child("Real")?.get("derivative")).count();
+    let items = |name: &str| {
+        let description = fmu.fmu.description();
+        description.items(description.variable(name).unwrap()).len().to_string()
+    };
+    let names = [
+        "slosh.model",
+        "friction.model",
+        "slosh.modes",
+        "imu.enabled",
+        "wheel.enabled",
+        "imu.lsb",
+        "init.omega",
+        "init.slosh_angle",
+        "tank.r",
+        "friction.c",
+        "friction.d",
+        "friction.b",
+        "tau_cmd",
+        "g_axial",
+    ];
+    let said = run(
+        fmu.host("traps", &["tests/abuse/traps.c"], &[])
+            .arg(&fmu.library)
+            .args([fmu.guid(), &states.to_string(), root.get("numberOfEventIndicators").unwrap()])
+            .args([items("slosh.model"), items("friction.model")])
+            .args(names.map(|name| format!("{name}={}", fmu.reference(name))))
+            .arg("--")
+            .args(variables.iter().filter(reals).filter_map(|v| v.get("valueReference"))),
+        "a floating-point exception was raised",
+    );
+    print!("{said}");
+    // 5 slosh models, 4 friction laws, 3 gyros, 8 scenes, 2 interfaces at the least
+    assert!(number(&said, " runs") >= 960.0, "{said}");
 }
 
 fn noise(rng: &mut fastrand::Rng, longest: usize) -> Vec<u8> {

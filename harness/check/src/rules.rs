@@ -24,7 +24,7 @@ pub static RULES: &[Rule] = &[
     rule("zip.readable", Error, "the file is a whole zip archive; every file unpacks, checksums and both headers of each agree", "2.3", Archive(archive::readable)),
     rule("zip.methods", Error, "files are stored or deflated, not encrypted", "2.3", Archive(archive::methods)),
     rule("zip.names", Error, "names are relative, with `/` between the parts, and stay inside", "2.3; hosts that unpack on Linux", Archive(archive::names)),
-    rule("zip.windows_names", Error, "names can be written on Windows: no devices (CON, NUL, COM1), none of < > : \" | ? *, no full stop or space at the end", "hosts that unpack on Windows", Archive(portable::windows_names)),
+    rule("zip.windows_names", Error, "names can be written on Windows: no devices (CON, NUL, COM1), no quotes, colons, bars, question marks, stars or angle brackets, no full stop or space at the end", "hosts that unpack on Windows", Archive(portable::windows_names)),
     rule("zip.path_length", Warning, "paths have at most 160 characters, their parts at most 255 bytes", "Windows opens 259 characters, temporary folder included", Archive(portable::path_length)),
     rule("zip.capitals", Error, "files and folders of FMI 2.0 are written with its capitals: binaries/linux64", "2.3; hosts on Linux", Archive(portable::capitals)),
     rule("zip.file_and_folder", Error, "no file is a folder as well", "no host can unpack both", Archive(portable::file_and_folder)),
