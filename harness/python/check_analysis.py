@@ -1,9 +1,9 @@
 """Computes the figures of a campaign of sweeps again, from its stored runs, with numpy and scipy.
 
-It is written from the definitions in modelDescription/HubSlosh/documentation/campaigns.md, not from the
-harness's code, and shares no part of it: another Fourier transform, another least-squares solver,
-another discretisation. Where the two differ by more than the tolerances below, one of them does
-not do what the documentation says.
+It is written from the definitions in modelDescription/HubSlosh/documentation/campaigns.md, not
+from the harness's code, and shares no part of it: another Fourier transform, another least-squares
+solver, another discretisation. Where the two differ by more than the tolerances below, one of them
+does not do what the documentation says.
 
     python check_analysis.py dist/campaign
 """

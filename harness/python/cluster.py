@@ -24,6 +24,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -34,6 +35,7 @@ import environment
 try:
     import cloudpickle
     import dask
+    import fmpy
     import numpy as np
     import pyarrow
     import pyarrow.parquet
@@ -152,8 +154,22 @@ def drive_here(
     return table, f"fmpy {version('fmpy')}, Dask, process {os.getpid()}"
 
 
+def write_package(path: Path) -> None:
+    """Write the package hubslosh as a zip that Python imports from; without FMUs.
+
+    The library for whole runs in one call is that of this platform; workers of another do without.
+    """
+    source = Path(hubslosh.__file__).parent
+    with zipfile.ZipFile(path, "w") as archive:
+        for file in source.glob("*.py"):
+            archive.write(file, f"hubslosh/{file.name}")
+        if library := hubslosh.batch.library():
+            file = Path(library._name)
+            archive.write(file, f"hubslosh/lib/{fmpy.platform}/{file.name}")
+
+
 def prepare(client: Client, fmu: Path, sha256: str) -> str:
-    """Give every worker, those that come later too, the FMU and hubslosh.py.
+    """Give every worker, those that come later too, the FMU and the package hubslosh.
 
     Returns the FMU's file name there. Workers that cannot host it are refused.
     """
@@ -172,7 +188,9 @@ def prepare(client: Client, fmu: Path, sha256: str) -> str:
     with tempfile.TemporaryDirectory() as directory:
         copy = Path(directory) / f"{sha256}.fmu"
         copy.write_bytes(data)
-        for file, load in ((copy, False), (Path(hubslosh.__file__), True)):
+        package = Path(directory) / "hubslosh.zip"
+        write_package(package)
+        for file, load in ((copy, False), (package, True)):
             try:
                 client.register_plugin(UploadFile(str(file), load=load), name=file.name)
             except ModuleNotFoundError as error:

@@ -25,7 +25,7 @@ profile = "pulse:amplitude=0.2,start=1,width=1,duration=60"
 [vary]
 slosh.model = ["linear", "spherical"]
 [count]
-imu.seed = 5
+imu.seed = 2
 """
 
 
@@ -48,6 +48,22 @@ def harness(request: pytest.FixtureRequest, fmu: Path, tmp_path: Path):
     return make
 
 
+@pytest.fixture
+def long_runs(monkeypatch) -> None:
+    """Let a run last half a second, so that a worker can be killed in the middle of one."""
+    right = cluster.drive_here
+
+    def drive_here(fmu, run, torque, columns):
+        """Take some time."""
+        import time
+
+        time.sleep(0.5)
+        return right(fmu, run, torque, columns)
+
+    monkeypatch.setattr(cluster, "drive_here", drive_here)
+
+
+@pytest.mark.usefixtures("long_runs")
 def test_with_a_worker_killed_on_the_way_every_column_is_the_harness_s(client, harness) -> None:
     """Same calls with the same numbers: same bits, in tables and signals."""
     theirs = harness(PLAN, "theirs")
@@ -59,6 +75,7 @@ def test_with_a_worker_killed_on_the_way_every_column_is_the_harness_s(client, h
     assert not again.endswith(f" {killer.process}"), "the run was not interrupted"
 
 
+@pytest.mark.usefixtures("long_runs")
 def test_when_the_only_worker_is_killed_its_successor_gets_all_it_needs(harness) -> None:
     """Nobody else has the FMU then, nor the torque."""
     plan = 'profile = "exp-sweep:duration=60"\n[vary]\nprofile.amplitude = [0.05, 0.1, 0.2]\n'

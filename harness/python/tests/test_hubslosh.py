@@ -1,4 +1,4 @@
-"""The script here speaks to people."""
+"""The package as a program, and its errors."""
 
 import subprocess
 import sys
@@ -9,7 +9,7 @@ import pytest
 
 from hubslosh import FmuError, Plant, drive, read_table, write_table
 
-SCRIPT = Path(__file__).resolve().parents[1] / "hubslosh.py"
+PACKAGE = Path(__file__).resolve().parents[1]
 
 
 def test_the_program_drives_the_fmu_and_writes_a_table(fmu: Path, tmp_path: Path) -> None:
@@ -17,9 +17,11 @@ def test_the_program_drives_the_fmu_and_writes_a_table(fmu: Path, tmp_path: Path
     time = np.arange(101) * 0.02
     torque, answer = tmp_path / "torque.csv", tmp_path / "answer.csv"
     write_table(torque, {"time": time, "tau_cmd": 0.1 * np.sin(15 * time)})
-    command = [sys.executable, SCRIPT, "--fmu", fmu, "--input", torque, "--out", answer]
+    command = [sys.executable, "-m", "hubslosh", "--fmu", fmu, "--input", torque, "--out", answer]
     options = ["--set", "slosh.model=spherical", "--set", "friction.model=none"]
-    done = subprocess.run([*command, *options], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [*command, *options], capture_output=True, text=True, check=False, cwd=PACKAGE
+    )
     assert done.returncode == 0, done.stderr
     table = read_table(answer, ["time", "omega"])
     settings = {"slosh.model": 4, "friction.model": 1}

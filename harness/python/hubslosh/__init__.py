@@ -1,0 +1,50 @@
+"""Propellant slosh as FMUs, from Python.
+
+    import hubslosh
+
+    start = {"tank.h": (50, "mm"), "init.slosh_angle": (10, "deg")}
+    run = hubslosh.simulate(parameters=start, stop=60)
+
+`simulate` returns a table of time histories, `linearize` a state-space model, `frequency_response`
+an estimate from a history; `campaign` and `identify` call the program ``hubslosh``. `plot` draws.
+`Plant` and `drive` are for those who step an instance themselves.
+"""
+
+from importlib.metadata import PackageNotFoundError, version
+
+from . import batch, plot
+from .fmu import Fmu, FmuError, Quantity, Value
+from .linearization import LinearModel, linearize
+from .plant import COLUMNS, TORQUE, Plant, RunError, drive
+from .program import campaign, identify
+from .simulation import simulate
+from .spectrum import frequency_response
+from .tables import read_table, setting, write_table
+
+try:
+    __version__ = version("hubslosh")
+except PackageNotFoundError:
+    __version__ = "source tree"
+
+__all__ = [
+    "COLUMNS",
+    "TORQUE",
+    "Fmu",
+    "FmuError",
+    "LinearModel",
+    "Plant",
+    "Quantity",
+    "RunError",
+    "Value",
+    "batch",
+    "campaign",
+    "drive",
+    "frequency_response",
+    "identify",
+    "linearize",
+    "plot",
+    "read_table",
+    "setting",
+    "simulate",
+    "write_table",
+]

@@ -1,0 +1,231 @@
+"""A whole run of a Co-Simulation instance in one call.
+
+The loop over the communication points is done by a small C library, ``hubslosh_batch``
+(``harness/batch``), which calls the FMU's functions itself. Where there is no such library for this
+platform, the same calls are made from here one by one: same numbers, some thirty times slower.
+"""
+
+import ctypes
+import os
+from collections.abc import Sequence
+from contextlib import ExitStack
+from ctypes import POINTER, Structure, c_double, c_int, c_size_t, c_uint32, c_void_p
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fmpy import platform, sharedLibraryExtension
+from fmpy.fmi1 import FMICallException
+
+from .fmu import FmuError, source_tree
+
+FUNCTIONS = (
+    "fmi2SetReal",
+    "fmi2SetInteger",
+    "fmi2SetBoolean",
+    "fmi2SetRealInputDerivatives",
+    "fmi2DoStep",
+    "fmi2GetReal",
+    "fmi2GetInteger",
+    "fmi2GetBoolean",
+)
+"""The functions of FMI that a run calls; the library knows them by their places here."""
+
+STATUS = ("fmi2OK", "fmi2Warning", "fmi2Discard", "fmi2Error", "fmi2Fatal", "fmi2Pending")
+
+
+class Signals:
+    """Variables of one type, with one row of values per communication point."""
+
+    def __init__(self, references: Sequence[int], values: np.ndarray) -> None:
+        """Take value references and as many columns of values."""
+        self.references = np.array(references, np.uint32)
+        self.values = np.ascontiguousarray(values)
+        assert self.values.shape[1] == len(self.references)
+
+
+@dataclass
+class Rows:
+    """A run: what goes in at each communication point, and the places for what comes out."""
+
+    time: np.ndarray
+    """s; the instance is at the first."""
+    reals: Signals
+    """Inputs, from each row to the next."""
+    slopes: np.ndarray | None
+    """Derivatives of the Real inputs from each row to the next; None: they are held."""
+    integers: Signals
+    """Inputs."""
+    booleans: Signals
+    """Inputs, 0 and 1."""
+    real_outputs: Signals
+    integer_outputs: Signals
+    boolean_outputs: Signals
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Where a run stopped."""
+
+    row: int
+    """Communication point, from 0; outputs are there for all rows before it, and for its own too
+    unless the function is one that gets."""
+    function: str
+    status: int
+
+
+class _Instance(Structure):
+    _fields_ = (("component", c_void_p), *((name, c_void_p) for name in FUNCTIONS))
+
+
+class _Signals(Structure):
+    _fields_ = (("count", c_size_t), ("references", c_void_p), ("values", c_void_p))
+
+    @classmethod
+    def of(cls, signals: Signals) -> "_Signals":
+        """Point to arrays, which must outlive this."""
+        values = signals.values.ctypes.data
+        return cls(len(signals.references), signals.references.ctypes.data, values)
+
+
+class _Run(Structure):
+    _fields_ = (
+        ("rows", c_size_t),
+        ("time", c_void_p),
+        ("reals", _Signals),
+        ("slopes", c_void_p),
+        ("integers", _Signals),
+        ("booleans", _Signals),
+        ("real_outputs", _Signals),
+        ("integer_outputs", _Signals),
+        ("boolean_outputs", _Signals),
+    )
+
+
+class _Stop(Structure):
+    _fields_ = (("row", c_size_t), ("function", c_int), ("status", c_int))
+
+
+@cache
+def library() -> ctypes.CDLL | None:
+    """Return the library for this platform, or None if there is none.
+
+    It is looked for at the environment variable HUBSLOSH_BATCH (empty: use none), in this package,
+    and, in the source tree, where Cargo puts it.
+    """
+    if (named := os.environ.get("HUBSLOSH_BATCH")) is not None:
+        return _load(Path(named)) if named else None
+    prefix = "" if os.name == "nt" else "lib"
+    name = f"{prefix}hubslosh_batch{sharedLibraryExtension}"
+    packed = resources.files(__package__) / "lib" / platform / name
+    if packed.is_file():
+        # the package may be in a zip; a library must be a file
+        return _load(_kept.enter_context(resources.as_file(packed)))
+    if root := source_tree():
+        target = root / os.environ.get("CARGO_TARGET_DIR", "target")
+        for path in (target / "fmu" / name, target / "release" / name):
+            if path.is_file():
+                return _load(path)
+    return None
+
+
+_kept = ExitStack()
+"""Files that live as long as the program."""
+
+_VERSION = 1
+"""Of the library's interface."""
+
+
+def _load(path: Path) -> ctypes.CDLL:
+    try:
+        loaded = ctypes.CDLL(str(path))
+        version = loaded.hubslosh_batch_version()
+    except (OSError, AttributeError) as error:
+        raise FmuError(f"the library {path} cannot be used: {error}") from None
+    if version != _VERSION:
+        raise FmuError(f"the library {path} has interface {version}, not {_VERSION}; build it anew")
+    loaded.hubslosh_batch_run.argtypes = (POINTER(_Instance), POINTER(_Run), POINTER(_Stop))
+    loaded.hubslosh_batch_run.restype = c_int
+    return loaded
+
+
+def run(fmu: Any, rows: Rows) -> Stop | None:
+    """Drive an instance of ``fmpy.fmi2.FMU2Slave`` through a run, by the library if there is one.
+
+    At every communication point the outputs are read, then the inputs set and the step made; after
+    the last step outputs are read once more. Returns None at the end, or where it stopped: at the
+    first call that answers neither fmi2OK nor fmi2Warning.
+    """
+    loaded = library()
+    if loaded is None:
+        return step_by_step(fmu, rows)
+    functions = (ctypes.cast(fmu._functions[name], c_void_p) for name in FUNCTIONS)
+    slopes = None if rows.slopes is None else rows.slopes.ctypes.data
+    arguments = _Run(
+        len(rows.time),
+        rows.time.ctypes.data,
+        _Signals.of(rows.reals),
+        slopes,
+        _Signals.of(rows.integers),
+        _Signals.of(rows.booleans),
+        _Signals.of(rows.real_outputs),
+        _Signals.of(rows.integer_outputs),
+        _Signals.of(rows.boolean_outputs),
+    )
+    stop = _Stop()
+    answer = loaded.hubslosh_batch_run(_Instance(fmu.component, *functions), arguments, stop)
+    if answer == 0:
+        return None
+    assert answer == 1, "the arrays of a run have the lengths that they say"
+    return Stop(stop.row, FUNCTIONS[stop.function], stop.status)
+
+
+def step_by_step(fmu: Any, rows: Rows) -> Stop | None:
+    """As `run`, each call from Python."""
+    c = fmu.component
+
+    def calls(name: str, signals: Signals, kind: Any, *more: Any, values: Any = None) -> Any:
+        """Return a function that calls one of fmpy's for a row."""
+        width = len(signals.references)
+        array = signals.values if values is None else values
+        start = array.ctypes.data
+        size = array.itemsize * width
+        references = signals.references.ctypes.data_as(POINTER(c_uint32))
+        function = getattr(fmu, name)
+
+        def call(k: int) -> None:
+            place = ctypes.cast(start + k * size, POINTER(kind))
+            function(c, references, width, *more, place)
+
+        return call if width else None
+
+    first = (c_int * len(rows.reals.references))(*([1] * len(rows.reals.references)))
+    gets = [
+        calls("fmi2GetReal", rows.real_outputs, c_double),
+        calls("fmi2GetInteger", rows.integer_outputs, c_int),
+        calls("fmi2GetBoolean", rows.boolean_outputs, c_int),
+    ]
+    sets = [
+        calls("fmi2SetReal", rows.reals, c_double),
+        calls("fmi2SetInteger", rows.integers, c_int),
+        calls("fmi2SetBoolean", rows.booleans, c_int),
+    ]
+    if rows.slopes is not None:
+        name = "fmi2SetRealInputDerivatives"
+        sets.append(calls(name, rows.reals, c_double, first, values=rows.slopes))
+    before = [call for call in (*gets, *sets) if call]
+    at_end = [call for call in gets if call]
+    time = rows.time.tolist()
+    last = len(time) - 1
+    for k, now in enumerate(time):
+        try:
+            for call in before if k < last else at_end:
+                call(k)
+            if k < last:
+                fmu.fmi2DoStep(c, now, time[k + 1] - now, 1)
+        except FMICallException as error:
+            return Stop(k, error.function, error.status)
+    return None

@@ -1,0 +1,180 @@
+"""A packed FMU 2.0: where it is, what it says of itself, values in the types of its variables."""
+
+import atexit
+import difflib
+import shutil
+from collections.abc import Iterable
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar
+
+from fmpy import extract, read_model_description
+from fmpy.model_description import ModelDescription, ScalarVariable
+
+Value = float | int | bool | str
+"""A value in SI units; of an enumeration also an item's name."""
+
+Quantity = Value | tuple[float, str]
+"""A value, or a number with its unit, such as ``(50, "mm")``."""
+
+
+class FmuError(Exception):
+    """What went wrong, in the FMU's own words where it has any."""
+
+
+def source_tree() -> Path | None:
+    """Return the project's root if this package lies in its source tree."""
+    root = Path(__file__).resolve().parents[3]
+    return root if (root / "harness" / "python").is_dir() else None
+
+
+def find(model: str | Path) -> Path:
+    """Return the FMU of a model: a file ``….fmu``, or the name of one that is in this package."""
+    if isinstance(model, Path) or model.endswith(".fmu"):
+        path = Path(model)
+        if not path.is_file():
+            raise FmuError(f"there is no FMU at {path}; cargo run --release -- pack makes it")
+        return path.resolve()
+    folders = [Path(__file__).with_name("fmus")]
+    if root := source_tree():
+        folders.append(root / "dist")
+    for folder in folders:
+        path = folder / f"{model}.fmu"
+        if path.is_file():
+            return path
+    names = sorted({path.stem for folder in folders for path in folder.glob("*.fmu")})
+    raise FmuError(
+        f'there is no FMU "{model}" here (there are: {", ".join(names) or "none"})'
+        f"{did_you_mean(model, names)}; for another FMU give its file, ….fmu"
+    )
+
+
+def did_you_mean(wrong: str, names: Iterable[str]) -> str:
+    """Return "; did you mean …?" with the most similar name, or nothing."""
+    close = difflib.get_close_matches(wrong, list(names), n=1)
+    return f"; did you mean {close[0]}?" if close else ""
+
+
+class Fmu:
+    """An FMU 2.0, unpacked when its binary is first wanted.
+
+    `open` reads a file once per program, as long as it does not change.
+    """
+
+    _opened: ClassVar[dict[tuple[Path, int, int], "Fmu"]] = {}
+
+    def __init__(self, path: Path) -> None:
+        """Read modelDescription.xml."""
+        self.path = path
+        try:
+            self.description: ModelDescription = read_model_description(str(path))
+        except Exception as error:  # fmpy has no class of its own for what is wrong with a file
+            raise FmuError(f"{path} is not an FMU that fmpy can read: {error}") from None
+        if self.description.fmiVersion != "2.0":
+            raise FmuError(f"{path} is of FMI {self.description.fmiVersion}; 2.0 is expected")
+        self.name: str = self.description.modelName
+        self.variables: dict[str, ScalarVariable] = {
+            v.name: v for v in self.description.modelVariables
+        }
+        self._units: dict[str, dict[str, Any]] = {
+            unit.name: {shown.name: shown for shown in unit.displayUnits}
+            for unit in self.description.unitDefinitions
+        }
+
+    @classmethod
+    def open(cls, model: str | Path) -> "Fmu":
+        """Return the FMU of a model; see `find`."""
+        path = find(model)
+        stat = path.stat()
+        key = (path, stat.st_mtime_ns, stat.st_size)
+        if key not in cls._opened:
+            cls._opened[key] = cls(path)
+        return cls._opened[key]
+
+    @cached_property
+    def directory(self) -> str:
+        """Where the FMU is unpacked until the program ends."""
+        directory = str(extract(str(self.path)))
+        atexit.register(shutil.rmtree, directory, ignore_errors=True)
+        return directory
+
+    def names(self, *causalities: str) -> list[str]:
+        """Return the names of the variables with these causalities ("output", "local", …)."""
+        return [v.name for v in self.variables.values() if v.causality in causalities]
+
+    def variable(self, name: str) -> ScalarVariable:
+        """Return a variable by its name."""
+        if name not in self.variables:
+            hint = did_you_mean(name, self.variables)
+            raise FmuError(f"the FMU has no variable {name}{hint}")
+        return self.variables[name]
+
+    def unit(self, name: str) -> str:
+        """Return the unit in which a variable is exchanged; empty if it has none."""
+        variable = self.variable(name)
+        declared = variable.declaredType.unit if variable.declaredType else None
+        return variable.unit or declared or ""
+
+    def convert(self, name: str, value: Quantity) -> Value:
+        """Return a value in the type and unit of a variable.
+
+        Enumerations take an item's name or number, Booleans also the texts true and false, Reals
+        also a number with its unit: the variable's own or one of its display units.
+        """
+        variable = self.variable(name)
+        convert = {
+            "Real": lambda v: self._real(name, v),
+            "Integer": _integer,
+            "Enumeration": lambda v: _item(variable, v),
+            "Boolean": _boolean,
+            "String": str,
+        }[variable.type]
+        try:
+            if isinstance(value, tuple) and variable.type != "Real":
+                raise ValueError(f"a value of type {variable.type} has no unit")
+            return convert(value)
+        except (TypeError, ValueError) as error:
+            raise FmuError(f"{name} cannot be {value!r}: {error}") from None
+
+    def _real(self, name: str, value: Quantity) -> float:
+        if not isinstance(value, tuple):
+            return float(value)
+        if len(value) != 2:
+            raise ValueError("a number and its unit are expected")
+        number, unit = float(value[0]), value[1]
+        base = self.unit(name)
+        if unit == base:
+            return number
+        shown = self._units.get(base, {})
+        if unit not in shown:
+            units = ", ".join(u for u in (base, *shown) if u)
+            raise ValueError(f"it has no unit {unit} (units: {units or 'none'})")
+        return (number - shown[unit].offset) / shown[unit].factor
+
+
+def _item(variable: ScalarVariable, value: Any) -> int:
+    """Return the number of an enumeration's item."""
+    items = {item.name: int(item.value) for item in variable.declaredType.items}
+    if value in items:
+        return items[value]
+    try:
+        return _integer(value)
+    except ValueError:
+        raise ValueError(f"there are {', '.join(items)}") from None
+
+
+def _integer(value: Any) -> int:
+    """Return a whole number."""
+    whole = int(value)
+    if whole != float(value):
+        raise ValueError("a whole number is expected")
+    return whole
+
+
+def _boolean(value: Any) -> bool:
+    """Return a truth value; texts are true or false."""
+    if not isinstance(value, str):
+        return bool(value)
+    if value not in ("true", "false"):
+        raise ValueError("there are true, false")
+    return value == "true"

@@ -1,0 +1,327 @@
+"""Instances of an FMU, and the HubSlosh FMU driven through a torque history.
+
+The torque comes as rows of time (s) and ``tau_cmd`` (N·m). At every row the FMU is given the
+torque and the slope of the chord to the next row, so that it sees straight lines; this is what
+``hubslosh run`` does. All variables have their FMU names and SI units.
+"""
+
+import contextlib
+from collections.abc import Mapping, Sequence
+from ctypes import byref
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from fmpy import calloc, fmi2, free
+from fmpy.fmi1 import FMICallException, printLogMessage
+from fmpy.logging import addLoggerProxy
+
+from . import batch
+from .batch import Rows, Signals
+from .fmu import Fmu, FmuError, Quantity
+
+TORQUE = "tau_cmd"
+"""The input that carries the torque, N·m."""
+
+COLUMNS = ("omega", "omega_imu", "slosh_angle", "slosh_angle_radial")
+"""What `drive` records beside time and torque, unless told otherwise."""
+
+_INSTANCE = "hubslosh"
+"""Name of our instances, by which the logger knows them."""
+
+_messages: list[str] = []
+"""What the FMU said during the present call."""
+
+
+def _log(environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
+    """Keep the messages of our instances; print those of others, as fmpy does."""
+    if name.decode() == _INSTANCE:
+        _messages.append(message.decode(errors="replace"))
+    else:
+        printLogMessage(environment, name, status, category, message)
+
+
+# fmpy fills in the messages' arguments with a C function that remembers one logger for all
+# instances, the last it was told of: that logger must live as long as the program.
+_CALLBACKS = fmi2.fmi2CallbackFunctions()
+_CALLBACKS.logger = fmi2.fmi2CallbackLoggerTYPE(_log)
+_CALLBACKS.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(calloc)
+_CALLBACKS.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
+addLoggerProxy(byref(_CALLBACKS))
+
+
+class RunError(FmuError):
+    """A run that stopped on its way."""
+
+    def __init__(self, sentence: str, time: float, columns: dict[str, np.ndarray]) -> None:
+        """Take what is said of it."""
+        super().__init__(sentence)
+        self.time = time
+        """Where the last step began, s."""
+        self.columns = columns
+        """What was recorded until then."""
+
+
+class Instance:
+    """An instance of an FMU 2.0, from fmi2Instantiate to fmi2FreeInstance; variables by name.
+
+    Use it in a ``with`` statement.
+    """
+
+    def __init__(self, fmu: Fmu, kind: type[fmi2.FMU2Slave] | type[fmi2.FMU2Model]) -> None:
+        """Instantiate for Co-Simulation (``FMU2Slave``) or Model Exchange (``FMU2Model``)."""
+        self._instance: Any = None
+        self.fmu = fmu
+        description = fmu.description
+        if kind is fmi2.FMU2Slave:
+            interface, name = description.coSimulation, "Co-Simulation"
+        else:
+            interface, name = description.modelExchange, "Model Exchange"
+        if interface is None:
+            raise FmuError(f"{fmu.path} offers no {name}")
+        try:
+            instance = kind(
+                guid=description.guid,
+                modelIdentifier=interface.modelIdentifier,
+                unzipDirectory=fmu.directory,
+                instanceName=_INSTANCE,
+            )
+        except Exception as error:  # fmpy raises nothing more special
+            raise FmuError(f"{fmu.path} cannot be loaded on this platform: {error}") from None
+        _messages.clear()
+        try:
+            instance.instantiate(callbacks=_CALLBACKS)
+        except Exception as error:
+            instance.freeLibrary()
+            raise FmuError(" ".join([str(error), *_messages])) from None
+        self._instance = instance
+
+    def __enter__(self) -> Self:
+        """Return the instance itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Free the instance."""
+        self.close()
+
+    def close(self) -> None:
+        """Free the instance."""
+        if self._instance is not None:
+            self._instance.freeInstance()
+            self._instance = None
+
+    def names(self, *causalities: str) -> list[str]:
+        """Return the names of the variables with these causalities ("output", "local", …)."""
+        return self.fmu.names(*causalities)
+
+    def set(self, name: str, value: Quantity) -> None:
+        """Set a parameter or an input: a value as `Fmu.convert` takes it."""
+        converted = self.fmu.convert(name, value)
+        variable = self.fmu.variable(name)
+        setter = "setInteger" if variable.type == "Enumeration" else f"set{variable.type}"
+        self._call(setter, [variable.valueReference], [converted])
+
+    def get(self, names: Sequence[str]) -> list[float]:
+        """Return the present values of numeric variables; booleans as 0 and 1."""
+        values: dict[str, float] = {}
+        for getter, some in self._by_type(names).items():
+            references = [self.fmu.variables[n].valueReference for n in some]
+            if some:
+                values.update(zip(some, self._call(getter, references), strict=True))
+        return [float(values[n]) for n in names]
+
+    def _by_type(self, names: Sequence[str]) -> dict[str, list[str]]:
+        """Return which of the variables are read by which function of fmpy's."""
+        by_type: dict[str, list[str]] = {"getReal": [], "getInteger": [], "getBoolean": []}
+        texts = []
+        for name in names:
+            kind = self.fmu.variable(name).type
+            if kind == "String":
+                texts.append(name)
+            else:
+                by_type["getInteger" if kind == "Enumeration" else f"get{kind}"].append(name)
+        if texts:
+            raise FmuError(f"{', '.join(texts)}: only numbers can be read")
+        return by_type
+
+    def _call(self, function: str, *args: Any, **kwargs: Any) -> Any:
+        """Call a function of fmpy's instance; an error carries what the FMU logged."""
+        _messages.clear()
+        try:
+            return getattr(self._instance, function)(*args, **kwargs)
+        except FMICallException as error:
+            raise FmuError(" ".join([str(error), *_messages])) from None
+
+
+class Plant(Instance):
+    """One Co-Simulation instance of an FMU, ready for its first step."""
+
+    def __init__(
+        self,
+        fmu: Path | str,
+        settings: Mapping[str, Quantity] | None = None,
+        *,
+        tolerance: float | None = None,
+        start: float = 0.0,
+        stop: float | None = None,
+        inputs: Mapping[str, float] | None = None,
+        torque: float | None = None,
+    ) -> None:
+        """Instantiate and initialise.
+
+        fmu: the packed FMU, or the name of one of this package's. settings: values of parameters
+        and inputs by name. tolerance: relative, for the FMU's solver; None: its own choice. start,
+        stop: s. inputs: values at the start. torque: ``tau_cmd`` among them, N·m.
+        """
+        super().__init__(Fmu.open(fmu), fmi2.FMU2Slave)
+        self.time = start
+        if torque is not None:
+            inputs = {TORQUE: torque, **(inputs or {})}
+        try:
+            for name, value in (settings or {}).items():
+                self.set(name, value)
+            self._call("setupExperiment", tolerance=tolerance, startTime=start, stopTime=stop)
+            self._call("enterInitializationMode")
+            for name, value in (inputs or {}).items():
+                self.set(name, value)
+            self._call("exitInitializationMode")
+        except BaseException:
+            self.close()
+            raise
+
+    def step(self, end: float, torque: float | None = None, slope: float | None = None) -> None:
+        """Go on to the time ``end`` (s).
+
+        torque: at the beginning of the step, N·m; None: as it is. slope: its derivative during
+        the step, N·m/s; None: the torque is held.
+        """
+        reference = [self.fmu.variable(TORQUE).valueReference]
+        if torque is not None:
+            self._call("setReal", reference, [torque])
+        if slope is not None:
+            self._call("setRealInputDerivatives", reference, [1], [slope])
+        self._call("doStep", self.time, end - self.time)
+        self.time = end
+
+    def run(
+        self,
+        time: np.ndarray,
+        inputs: Mapping[str, np.ndarray],
+        slopes: Mapping[str, np.ndarray] | None,
+        columns: Sequence[str],
+    ) -> dict[str, np.ndarray]:
+        """Step from row to row in one call and return ``columns`` at every row.
+
+        time: communication points, s, from the present one on, growing. inputs: by name, their
+        values from each row to the next. slopes: the derivatives of the Real ones, per s; None:
+        inputs are held. Returns an array per column: floats, integers (enumerations by number) or
+        bools. An output that follows an input at once shows its jump in the next row: rows are
+        read before inputs are set.
+        """
+        rows = len(time)
+        numbers: dict[str, list[str]] = {"Real": [], "Integer": [], "Boolean": []}
+        for name in inputs:
+            kind = self.fmu.variable(name).type
+            numbers["Integer" if kind == "Enumeration" else kind].append(name)
+
+        def signals(names: list[str], kind: type, given: Mapping[str, Any] | None) -> Signals:
+            values = np.empty((rows, len(names)), kind)
+            for j, name in enumerate(names if given is not None else []):
+                values[:, j] = given[name]
+            return Signals([self.fmu.variables[n].valueReference for n in names], values)
+
+        outputs = self._by_type(columns)
+        whole = np.intc
+        run = Rows(
+            time=np.ascontiguousarray(time, float),
+            reals=signals(numbers["Real"], float, inputs),
+            slopes=None if slopes is None else signals(numbers["Real"], float, slopes).values,
+            integers=signals(numbers["Integer"], whole, inputs),
+            booleans=signals(numbers["Boolean"], whole, inputs),
+            real_outputs=signals(outputs["getReal"], float, None),
+            integer_outputs=signals(outputs["getInteger"], whole, None),
+            boolean_outputs=signals(outputs["getBoolean"], whole, None),
+        )
+        _messages.clear()
+        stop = batch.run(self._instance, run)
+        recorded = dict(zip(outputs["getReal"], run.real_outputs.values.T, strict=True))
+        recorded |= zip(outputs["getInteger"], run.integer_outputs.values.T, strict=True)
+        recorded |= zip(outputs["getBoolean"], run.boolean_outputs.values.T != 0, strict=True)
+        result = {name: recorded[name] for name in columns}
+        if stop is None:
+            self.time = float(time[-1])
+            return result
+        self.time = float(time[stop.row])
+        said = " ".join(_messages)
+        sentence = f"the run stopped at t = {self.time} s: {stop.function} returned "
+        sentence += batch.STATUS[stop.status] if 0 <= stop.status < 6 else str(stop.status)
+        sentence += f": {said}" if said else " without a message"
+        if stop.function == "fmi2DoStep" and batch.STATUS[stop.status] == "fmi2Discard":
+            with contextlib.suppress(FmuError):
+                if self._call("getBooleanStatus", fmi2.fmi2Terminated):
+                    sentence += "; the FMU wants the simulation to end"
+        whole_rows = stop.row + (not stop.function.startswith("fmi2Get"))
+        before = {name: values[:whole_rows] for name, values in result.items()}
+        raise RunError(sentence, self.time, {"time": run.time[:whole_rows]} | before)
+
+    def save(self) -> tuple[float, bytes]:
+        """Return the time (s) and the serialized state, for `restore` of any instance."""
+        state = self._call("getFMUstate")
+        try:
+            return self.time, self._call("serializeFMUstate", state)
+        finally:
+            self._call("freeFMUstate", state)
+
+    def restore(self, saved: tuple[float, bytes]) -> None:
+        """Go back to what `save` returned, here or in another instance."""
+        state = self._call("deSerializeFMUstate", saved[1])
+        try:
+            self._call("setFMUstate", state)
+        finally:
+            self._call("freeFMUstate", state)
+        self.time = saved[0]
+
+
+def drive(
+    fmu: Path | str,
+    time: Sequence[float] | np.ndarray,
+    torque: Sequence[float] | np.ndarray,
+    settings: Mapping[str, Quantity] | None = None,
+    *,
+    slope: Sequence[float] | np.ndarray | None = None,
+    tolerance: float | None = None,
+    hold: bool = False,
+    columns: Sequence[str] = COLUMNS,
+) -> dict[str, np.ndarray]:
+    """Drive a new instance through a torque history, one step from row to row.
+
+    time: communication points, s, growing. torque: ``tau_cmd`` there, N·m. slope: its derivative
+    from each row to the next, N·m/s; None: straight lines between the rows. hold: the torque is
+    held from row to row, whatever the slope. settings, tolerance: as for `Plant`.
+
+    Returns the columns ``time``, ``tau_cmd`` and ``columns`` as floats, one row per communication
+    point.
+    """
+    t, tau = np.asarray(time, float), np.asarray(torque, float)
+    if len(t) != len(tau) or len(t) < 2:
+        raise FmuError(f"a torque history needs two rows or more, not {len(t)} and {len(tau)}")
+    if hold:
+        slopes = None
+    elif slope is None:
+        slopes = {TORQUE: np.append(np.diff(tau) / np.diff(t), 0.0)}
+    else:
+        slopes = {TORQUE: np.asarray(slope, float)}
+        if len(slopes[TORQUE]) != len(t):
+            raise FmuError(f"a slope for each of the {len(t)} rows is needed, not {len(slope)}")
+    start, stop = float(t[0]), float(t[-1])
+    with Plant(
+        fmu, settings, tolerance=tolerance, start=start, stop=stop, torque=float(tau[0])
+    ) as plant:
+        run = plant.run(t, {TORQUE: tau}, slopes, columns)
+    return {"time": t, TORQUE: tau} | {name: run[name].astype(float) for name in columns}

@@ -1,0 +1,116 @@
+"""What the program ``hubslosh`` does: campaigns and identification.
+
+It comes with the project's source (``cargo build --release``), not with this package.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from .fmu import FmuError, find, source_tree
+
+
+def find_program(path: str | Path | None = None) -> Path:
+    """Return where the program is: at ``path``, $HUBSLOSH, on PATH, or in the source tree."""
+    exe = "hubslosh.exe" if os.name == "nt" else "hubslosh"
+    named = path or os.environ.get("HUBSLOSH")
+    if named:
+        found = shutil.which(str(named))
+        if found is None:
+            raise FmuError(f"there is no program at {named}")
+        return Path(found)
+    if found := shutil.which(exe):
+        return Path(found)
+    if root := source_tree():
+        built = root / os.environ.get("CARGO_TARGET_DIR", "target") / "release" / exe
+        if built.is_file():
+            return built
+    raise FmuError(
+        "the program hubslosh was not found, which does this; build it from the project's source "
+        "(cargo build --release), then put it on PATH, name it in the environment variable "
+        "HUBSLOSH, or give program="
+    )
+
+
+def _run(program: Path, arguments: Sequence[str | Path]) -> str:
+    """Run the program and return what it prints."""
+    try:
+        done = subprocess.run([program, *arguments], capture_output=True, text=True, check=False)
+    except OSError as error:
+        raise FmuError(f"{program} cannot be started: {error}") from None
+    if done.returncode != 0:
+        said = (done.stderr or done.stdout).strip().removeprefix("error: ")
+        raise FmuError(f"hubslosh {arguments[0]}: {said}")
+    return done.stdout
+
+
+def campaign(
+    plan: str | Path,
+    out: str | Path | None = None,
+    *,
+    model: str | Path = "HubSlosh",
+    force: bool = False,
+    program: str | Path | None = None,
+) -> pd.DataFrame:
+    """Make a plan's runs with the program ``hubslosh`` and return its table of runs.
+
+    plan: a TOML file, the name of a built-in plan, or the TOML text itself (several lines).
+    out: directory for runs, tables and report.html; by default dist/ and the plan's name. Runs
+    that are there already are not made again, unless ``force``.
+
+    Returns ``runs.csv``: a row per run with what it was made from and its results.
+    ``.attrs["directory"]`` is where all of it is.
+    """
+    path = find_program(program)
+    with tempfile.TemporaryDirectory() as folder:
+        text = str(plan)
+        if "\n" in text:
+            if out is None:
+                raise FmuError("a plan given as text needs out=, a directory for its results")
+            plan = Path(folder) / "plan.toml"
+            plan.write_text(text, encoding="utf-8")
+        directory = Path(out) if out is not None else Path("dist") / Path(plan).stem
+        arguments: list[str | Path] = ["campaign", "--plan", plan, "--fmu", find(model)]
+        arguments += ["--out", directory, *(["--force"] if force else [])]
+        _run(path, arguments)
+    table = pd.read_csv(directory / "runs.csv")
+    table.attrs["directory"] = directory
+    return table
+
+
+def identify(
+    data: pd.DataFrame | str | Path,
+    model: str | None = None,
+    *arguments: str,
+    program: str | Path | None = None,
+) -> dict[str, Any]:
+    """Estimate the FMU's parameters from a measurement, with the program ``hubslosh identify``.
+
+    data: a table, or a .csv or .parquet file, with the columns ``time`` (s), ``tau_cmd`` (N·m) and
+    ``omega`` (rad/s). model: the slosh model. arguments: further flags of the command.
+
+    Returns its result: ``parameters`` by FMU name, each with ``value``, ``std``, ``unit``;
+    ``fit``; ``converged``.
+    """
+    path = find_program(program)
+    with tempfile.TemporaryDirectory() as folder:
+        file, result = Path(folder) / "data.parquet", Path(folder) / "result.json"
+        if isinstance(data, pd.DataFrame):
+            missing = [name for name in ("time", "tau_cmd", "omega") if name not in data.columns]
+            if missing:
+                raise FmuError(f"data has no column {', '.join(missing)}")
+            file = file.with_suffix(".csv")
+            data.to_csv(file, index=False)
+        else:
+            file = Path(data)
+        flags = ["--model", model] if model is not None else []
+        _run(path, ["identify", file, *flags, *arguments, "--out", result])
+        loaded: dict[str, Any] = json.loads(result.read_text(encoding="utf-8"))
+        return loaded

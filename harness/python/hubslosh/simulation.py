@@ -1,0 +1,253 @@
+"""A simulation in one function: parameters and input histories in, a table out."""
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from .fmu import Fmu, FmuError, Quantity, did_you_mean
+from .plant import TORQUE, Plant
+
+Real = NDArray[np.float64]
+
+SLOPES = {"tau_slope": TORQUE}
+"""Columns of a torque history (``hubslosh torque``) that are the slope of an input."""
+
+DEFAULT_STEP = 0.02
+"""s, where neither rows nor the FMU suggest another."""
+
+
+class History:
+    """An input over time: lines between rows, or steps. Two rows at one time are a jump."""
+
+    def __init__(self, time: Real, values: Real, slopes: Real | None, hold: bool) -> None:
+        """Take rows; slopes: from each to the next, None: of the chords."""
+        self.time, self.values = time, values
+        if hold:
+            self.slopes = np.zeros(len(time))
+        elif slopes is not None:
+            self.slopes = slopes
+        else:
+            lengths = np.diff(time)
+            rises = np.diff(values) / np.where(lengths > 0, lengths, np.inf)
+            self.slopes = np.append(rises, 0.0)
+
+    def after(self, t: Real) -> tuple[Real, Real]:
+        """Return value and slope at ``t`` and immediately after; held before the first row."""
+        k = np.searchsorted(self.time, t, side="right") - 1
+        at = np.maximum(k, 0)
+        slope = np.where(k < 0, 0.0, self.slopes[at])
+        return self.values[at] + slope * (t - self.time[at]), slope
+
+
+def simulate(
+    model: str | Path = "HubSlosh",
+    parameters: Mapping[str, Quantity] | None = None,
+    inputs: pd.DataFrame | None = None,
+    stop: float | None = None,
+    step: float | None = None,
+    outputs: Sequence[str] | None = None,
+    *,
+    start: float | None = None,
+    tolerance: float | None = None,
+    hold: bool = False,
+) -> pd.DataFrame:
+    """Simulate an FMU by its own solver (Co-Simulation) and return what it shows over time.
+
+    model: the name of an FMU of this package, or the file of any FMU 2.0 for Co-Simulation.
+    parameters: values of parameters and inputs by name, in SI units or with one of the variable's
+    own units, ``{"tank.h": (50, "mm")}``; enumerations by item or number.
+    inputs: a table with the column ``time`` (s, growing; two rows at one time are a jump) and one
+    column per input, SI; straight lines between the rows. ``tau_slope``, as ``hubslosh torque``
+    writes it, is the slope of ``tau_cmd``.
+    stop, start: s; by default those of the inputs, otherwise the FMU's suggestion.
+    step: between the rows of the result, s; by default the rows of the inputs, otherwise the FMU's
+    suggestion. The FMU steps to every row of the inputs whatever the step.
+    outputs: variables to record; by default all outputs.
+    tolerance: relative, for the FMU's solver; by default its own choice.
+    hold: inputs are held from row to row.
+
+    Returns a table with the columns ``time``, the inputs and ``outputs``; enumerations by number.
+    An output that follows an input at once shows a jump in the next row. Units are in
+    ``.attrs["units"]``.
+
+    Raises FmuError with everything that is wrong with the arguments, or with what the FMU says.
+    """
+    fmu = Fmu.open(model)
+    problems: list[str] = []
+    histories = _histories(fmu, inputs, hold, problems)
+    rows = next(iter(histories.values())).time if histories else None
+    if rows is None and inputs is not None and "time" in inputs and not problems:
+        rows = inputs["time"].to_numpy(float)
+    _check_parameters(fmu, parameters or {}, histories, problems)
+    columns = fmu.names("output") if outputs is None else list(outputs)
+    _check_outputs(fmu, columns, problems)
+    experiment = fmu.description.defaultExperiment
+
+    def suggested(name: str, otherwise: float) -> float:
+        text = getattr(experiment, name, None) if experiment else None
+        return otherwise if text is None else float(text)
+
+    if start is None:
+        start = suggested("startTime", 0.0) if rows is None else float(rows[0])
+    if stop is None:
+        stop = start + suggested("stopTime", 1.0) if rows is None else float(rows[-1])
+    if step is None and rows is None:
+        step = suggested("stepSize", DEFAULT_STEP)
+    if not (np.isfinite([start, stop]).all() and stop > start):
+        problems.append(f"stop must be later than start, {start} s, not {stop} s")
+    if step is not None and not (np.isfinite(step) and step > 0):
+        problems.append(f"step must be a positive number of seconds, not {step}")
+    if tolerance is not None and not (np.isfinite(tolerance) and tolerance > 0):
+        problems.append(f"tolerance must be a positive number, not {tolerance}")
+    if problems:
+        raise FmuError("; ".join(problems))
+
+    points, wanted = communication_points(start, stop, step, rows)
+    values = {name: history.after(points) for name, history in histories.items()}
+    given = {name: value for name, (value, _) in values.items()}
+    # without a slope the FMU has one call less to answer, and an FMU that cannot interpolate none
+    sloped = any(slope.any() for _, slope in values.values())
+    slopes = {name: slope for name, (_, slope) in values.items()} if sloped else None
+    if sloped and not fmu.description.coSimulation.canInterpolateInputs:
+        raise FmuError(f"{fmu.name} cannot interpolate its inputs; use hold=True")
+    asked = [name for name in columns if name not in given]
+    with Plant(
+        model,
+        parameters,
+        tolerance=tolerance,
+        start=start,
+        stop=stop,
+        inputs={name: value[0] for name, value in given.items()},
+    ) as plant:
+        recorded = plant.run(points, given, slopes, asked)
+    table = pd.DataFrame({"time": points} | given | recorded, copy=False)
+    if wanted is not None:
+        table = table[wanted].reset_index(drop=True)
+    units = {name: fmu.unit(name) for name in table.columns if name != "time"}
+    table.attrs["units"] = {"time": "s"} | units
+    return table
+
+
+def communication_points(
+    start: float, stop: float, step: float | None, rows: Real | None
+) -> tuple[Real, NDArray[np.bool_] | None]:
+    """Return the times to step to, s, and which of them are wanted (None: all).
+
+    They are start, stop, the multiples of ``step`` and the inputs' rows; a multiple within 1e-6 of
+    a step of a row or of the stop time is that time.
+    """
+    if rows is not None:
+        rows = np.unique(rows)
+        rows = rows[(rows > start) & (rows < stop)]
+    if step is None:
+        assert rows is not None
+        return np.concatenate([[start], rows, [stop]]), None
+    count = round((stop - start) / step)
+    grid = start + np.arange(max(count, 0) + 1) * step
+    grid = np.append(grid[grid < stop - 1e-6 * step], stop)
+    if rows is None or not len(rows):
+        return grid, None
+    nearest = np.clip(np.searchsorted(rows, grid), 1, max(len(rows) - 1, 1))
+    left, right = rows[nearest - 1], rows[np.minimum(nearest, len(rows) - 1)]
+    near = np.where(np.abs(grid - left) < np.abs(grid - right), left, right)
+    inner = slice(1, -1)
+    grid[inner] = np.where(np.abs(grid - near) <= 1e-6 * step, near, grid)[inner]
+    points = np.union1d(grid, rows)
+    wanted = np.isin(points, grid)
+    return points, None if wanted.all() else wanted
+
+
+def _histories(
+    fmu: Fmu, inputs: pd.DataFrame | None, hold: bool, problems: list[str]
+) -> dict[str, History]:
+    """Return the inputs' histories by name; what is wrong with the table goes to ``problems``."""
+    if inputs is None:
+        return {}
+    known = fmu.names("input")
+    slopes = {column: name for column, name in SLOPES.items() if name in known}
+    wrong = [str(c) for c in inputs.columns if c not in ("time", *known, *slopes)]
+    if wrong:
+        hints = ", ".join(f"{name}{_hint(name, known)}" for name in wrong)
+        problems.append(
+            f"inputs has columns that are no inputs of {fmu.name}: {hints}; "
+            f"inputs are {', '.join(known) or 'none'}"
+        )
+    columns: dict[str, Real] = {}
+    for name in inputs.columns:
+        if name in wrong:
+            continue
+        try:
+            values = inputs[name].to_numpy(float)
+        except (TypeError, ValueError) as error:
+            problems.append(f"the column {name} of inputs is not of numbers: {error}")
+            continue
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad):
+            problems.append(f"the column {name} of inputs is not finite in row {bad[0]}")
+        columns[name] = values
+    if "time" not in inputs.columns:
+        problems.append("inputs has no column time")
+    if len(inputs) < 2:
+        problems.append(f"inputs needs two rows or more, not {len(inputs)}")
+    time = columns.pop("time", None)
+    if time is not None:
+        back = np.flatnonzero(np.diff(time) < 0)
+        if len(back):
+            problems.append(f"time in inputs goes back after row {back[0]}, {time[back[0]]} s")
+    for column, name in slopes.items():
+        if column in columns and name not in columns:
+            problems.append(f"inputs has {column} but not {name}")
+    for name in columns:
+        kind = "Real" if name in slopes else fmu.variable(name).type
+        if kind == "String":
+            problems.append(f"the input {name} is a text; only numbers can be given over time")
+    if problems or time is None:
+        return {}
+    slope_of = {name: columns.pop(column) for column, name in slopes.items() if column in columns}
+    return {
+        name: History(time, values, slope_of.get(name), hold or fmu.variable(name).type != "Real")
+        for name, values in columns.items()
+    }
+
+
+def _hint(name: str, known: Sequence[str]) -> str:
+    hint = did_you_mean(name, known).removeprefix("; ")
+    return f" ({hint})" if hint else ""
+
+
+def _check_parameters(
+    fmu: Fmu,
+    parameters: Mapping[str, Quantity],
+    histories: Mapping[str, History],
+    problems: list[str],
+) -> None:
+    """Add to ``problems`` what is wrong with parameters."""
+    for name, value in parameters.items():
+        try:
+            variable = fmu.variable(name)
+            fmu.convert(name, value)
+        except FmuError as error:
+            problems.append(str(error))
+            continue
+        if variable.causality not in ("parameter", "input") or variable.variability == "constant":
+            problems.append(
+                f"{name} is computed by the FMU ({variable.causality}); it cannot be set"
+            )
+        elif name in histories:
+            problems.append(f"{name} is given twice, in parameters and in inputs")
+
+
+def _check_outputs(fmu: Fmu, columns: Sequence[str], problems: list[str]) -> None:
+    """Add to ``problems`` what is wrong with outputs."""
+    check: list[tuple[Callable[[str], bool], str]] = [
+        (lambda name: columns.count(name) > 1, "is wanted twice"),
+        (lambda name: fmu.variable(name).type == "String", "is a text; only numbers are recorded"),
+    ]
+    for name in dict.fromkeys(columns):
+        try:
+            problems += [f"{name} {why}" for wrong, why in check if wrong(name)]
+        except FmuError as error:
+            problems.append(str(error))

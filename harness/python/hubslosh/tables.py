@@ -1,0 +1,79 @@
+"""Tables of numbers as files: .csv or .parquet, by their names' endings."""
+
+import argparse
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from .fmu import FmuError
+
+
+def read_table(path: Path, columns: Sequence[str]) -> dict[str, np.ndarray]:
+    """Read columns of numbers from a .csv or .parquet file."""
+    import pyarrow.csv
+    import pyarrow.parquet
+
+    try:
+        if ending_of(path) == "csv":
+            table = pyarrow.csv.read_csv(path)
+        else:
+            table = pyarrow.parquet.read_table(path)
+    except (OSError, pyarrow.ArrowInvalid) as error:
+        raise FmuError(f"{path} cannot be read: {error}") from None
+    missing = [name for name in columns if name not in table.column_names]
+    if missing:
+        there = ", ".join(table.column_names)
+        raise FmuError(f"{path} has no column {', '.join(missing)} (columns in it: {there})")
+    return {name: table[name].to_numpy().astype(float) for name in columns}
+
+
+def write_table(
+    path: Path, table: Mapping[str, np.ndarray], notes: Mapping[str, str] | None = None
+) -> None:
+    """Write columns of numbers to a .csv or .parquet file; every digit comes back.
+
+    notes: for a Parquet file's key-value metadata. The file appears whole or not at all: it is
+    written beside its place under another name, then renamed.
+    """
+    import pyarrow.csv
+    import pyarrow.parquet
+
+    columns = pyarrow.table(dict(table)).replace_schema_metadata(dict(notes or {}))
+    ending = ending_of(path)
+    try:
+        handle, name = tempfile.mkstemp(prefix=".hubslosh-", dir=path.parent)
+        os.close(handle)
+        beside = Path(name)
+        try:
+            if ending == "csv":
+                pyarrow.csv.write_csv(columns, beside)
+            else:
+                pyarrow.parquet.write_table(columns, beside, compression="zstd")
+            # mkstemp's permissions are for secrets; give it those of any new file
+            mask = os.umask(0)
+            os.umask(mask)
+            beside.chmod(0o666 & ~mask)
+            beside.replace(path)
+        finally:
+            beside.unlink(missing_ok=True)
+    except OSError as error:
+        raise FmuError(f"{path} cannot be written: {error}") from None
+
+
+def ending_of(path: Path) -> str:
+    """Return csv or parquet."""
+    ending = path.suffix.lower().lstrip(".")
+    if ending not in ("csv", "parquet"):
+        raise FmuError(f"{path}: the name must end in .csv or .parquet")
+    return ending
+
+
+def setting(text: str) -> tuple[str, str]:
+    """Return name and value of an argument NAME=VALUE."""
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise argparse.ArgumentTypeError(f'"{text}" is not of the form name=value')
+    return name.strip(), value.strip()
