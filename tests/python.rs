@@ -9,12 +9,14 @@ use crate::common::{harness, python, run};
 #[test]
 fn fmpy_drives_the_fmu_as_the_harness_does() {
     let fmu = pack::packed_for_tests();
+    let wheel = pack::wheel::for_tests(&[fmu]);
     let scripts = pack::root().join("harness").join("python");
     let said = run(
         Command::new(python())
             .args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider"])
             .args([Path::new("--fmu"), fmu])
             .args([Path::new("--hubslosh"), &harness()])
+            .args([Path::new("--wheel"), &wheel])
             .arg(&scripts)
             // the source tree stays as it is
             .env("PYTHONDONTWRITEBYTECODE", "1"),

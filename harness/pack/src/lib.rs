@@ -8,6 +8,7 @@ pub mod models;
 pub mod platforms;
 mod project;
 pub mod release;
+pub mod wheel;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

@@ -13,7 +13,7 @@ from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
-from fmpy import calloc, fmi2, free
+from fmpy import calloc, fmi2, free, platform, sharedLibraryExtension
 from fmpy.fmi1 import FMICallException, printLogMessage
 from fmpy.logging import addLoggerProxy
 
@@ -80,6 +80,11 @@ class Instance:
             interface, name = description.modelExchange, "Model Exchange"
         if interface is None:
             raise FmuError(f"{fmu.path} offers no {name}")
+        folder = Path(fmu.directory) / "binaries"
+        binary = f"{interface.modelIdentifier}{sharedLibraryExtension}"
+        if not (folder / platform / binary).is_file():
+            there = ", ".join(sorted(path.name for path in folder.glob("*"))) or "none"
+            raise FmuError(f"{fmu.path} has no binary for {platform} (platforms in it: {there})")
         try:
             instance = kind(
                 guid=description.guid,
@@ -88,7 +93,7 @@ class Instance:
                 instanceName=_INSTANCE,
             )
         except Exception as error:  # fmpy raises nothing more special
-            raise FmuError(f"{fmu.path} cannot be loaded on this platform: {error}") from None
+            raise FmuError(f"{fmu.path} cannot be loaded: {error}") from None
         _messages.clear()
         try:
             instance.instantiate(callbacks=_CALLBACKS)

@@ -8,11 +8,11 @@ import pandas as pd
 
 from .fmu import FmuError, did_you_mean
 
-SEGMENTS = 8
-"""Into how many lengths a record is cut unless a resolution is given; they overlap by half."""
+BINS = 3
+"""Half the width of the smoothing in lines of the spectrum, unless a resolution is given."""
 
 INPUT_FLOOR = 1e-4
-"""Where the input's power density is below this part of its maximum there is no estimate."""
+"""Where the input's power is below this part of its maximum there is no estimate."""
 
 
 def frequency_response(
@@ -22,24 +22,30 @@ def frequency_response(
     *,
     resolution: float | None = None,
     band: tuple[float, float] | None = None,
+    hold: bool = False,
 ) -> pd.DataFrame:
     """Estimate the frequency response from one column of a time history to another.
 
     data: a table with the column ``time`` (s, in equal steps), as `simulate` returns it.
-    resolution: length of the segments' reciprocal, Hz; by default eight lengths in the record. A
-    resonance is met where it is several times as wide: ζ f > resolution.
+    resolution: half the width of the smoothing, Hz; by default three lines of the spectrum. Wider
+    averages more noise away, and flattens a resonance that is narrower: keep it below ζ f.
     band: lowest and highest frequency wanted, Hz; by default all.
+    hold: the input is held from row to row; otherwise it is straight lines between the rows.
 
-    The estimate is Welch's: H1 = S_uy / S_uu, averaged over Hann-windowed segments that overlap by
-    half (Bendat and Piersol, *Random Data*, chapter 6). Frequencies at which the input's power is
-    less than 1e-4 of its largest are left out.
+    The estimate is H1 = S_uy / S_uu with the spectra of the whole record smoothed over frequency by
+    a Hann window (Ljung, *System Identification*, section 6.4). It takes the record as all there
+    is: the motion should begin at rest, and end at rest or long after its start against the time
+    in which it decays. What the input does between two rows is divided out: sinc²(f Δt) for lines,
+    sinc(f Δt) and half a step's delay if it is held; what a held input's steps do above half the
+    sampling rate stays in the estimate, some f Δt of it. Frequencies at which the input has less
+    than 1e-4 of its largest power are left out.
 
     Returns a table with the columns ``frequency`` (Hz), ``real`` and ``imag`` (unit of the output
     per unit of the input), ``gain`` (their magnitude), ``phase`` (deg, unwrapped), ``coherence``
-    (0 to 1) and ``gain_std``, the gain's standard deviation gain·√((1 − γ²) / (2 n γ²)) for n
-    segments (Bendat and Piersol, chapter 9).
+    (0 to 1) and ``gain_std``, the gain's standard deviation gain·√((1 − γ²) / (2 n γ²)) for an
+    average over n lines (Bendat and Piersol, *Random Data*, chapter 9).
     """
-    from scipy import signal
+    from scipy import fft, signal
 
     problems = [
         f"data has no column {name}{did_you_mean(name, map(str, data.columns))}"
@@ -54,7 +60,7 @@ def frequency_response(
             raise FmuError(f"{name} is not finite in row {np.flatnonzero(~np.isfinite(values))[0]}")
     if len(time) < 16:
         raise FmuError(f"a frequency response needs 16 rows or more, not {len(time)}")
-    step = (time[-1] - time[0]) / (len(time) - 1)
+    step = float(np.median(np.diff(time)))
     # one row off by a thousandth of a step is what times rounded in a file may be
     uneven = np.flatnonzero(np.abs(np.diff(time) - step) > 1e-3 * step)
     if step <= 0 or len(uneven):
@@ -63,20 +69,22 @@ def frequency_response(
     if not np.ptp(u):
         raise FmuError(f"{input} does not change; nothing can be said about its effect")
 
-    duration = len(time) * step
+    line = 1 / (len(time) * step)
     if resolution is None:
-        resolution = SEGMENTS / duration
-    if not 1 / duration <= resolution <= 1 / (16 * step):
+        resolution = BINS * line
+    if not 1.5 * line <= resolution <= 0.1 / step:
         raise FmuError(
-            f"resolution must be from {1 / duration:.3g} Hz (one segment) to "
-            f"{1 / (16 * step):.3g} Hz (16 rows), not {resolution:.3g} Hz"
+            f"resolution must be from {1.5 * line:.3g} Hz (1.5 lines of the spectrum) to "
+            f"{0.1 / step:.3g} Hz (a tenth of the sampling rate), not {resolution:.3g} Hz"
         )
-    length = round(1 / (resolution * step))
-    options = {"fs": 1 / step, "nperseg": length, "noverlap": length // 2, "detrend": "constant"}
-    frequency, s_uu = signal.welch(u, **options)
-    _, s_yy = signal.welch(y, **options)
-    _, s_uy = signal.csd(u, y, **options)
-    segments = max(1, (len(u) - length // 2) // (length - length // 2))
+    window = signal.windows.hann(2 * round(resolution / line) + 1)
+    window /= window.sum()
+    spectrum_u, spectrum_y = fft.rfft(u - u.mean()), fft.rfft(y - y.mean())
+    frequency = np.arange(len(spectrum_u)) * line
+    s_uu, s_yy, s_uy = (
+        signal.fftconvolve(a, window, mode="same")
+        for a in (np.abs(spectrum_u) ** 2, np.abs(spectrum_y) ** 2, spectrum_u.conj() * spectrum_y)
+    )
 
     low, high = band or (0.0, np.inf)
     keep = (frequency > 0) & (frequency >= low) & (frequency <= high)
@@ -84,13 +92,13 @@ def frequency_response(
     if not keep.any():
         raise FmuError(f"{input} has no power between {low} and {high} Hz")
     frequency, s_uu, s_yy, s_uy = (a[keep] for a in (frequency, s_uu, s_yy, s_uy))
-    response = s_uy / s_uu
+    between = np.sinc(frequency * step)
+    between = between * np.exp(-1j * np.pi * frequency * step) if hold else between**2
+    response = s_uy / s_uu / between
     gain = np.abs(response)
     with np.errstate(divide="ignore", invalid="ignore"):
         coherence = np.clip(np.abs(s_uy) ** 2 / (s_uu * s_yy), 0.0, 1.0)
-        if segments == 1:
-            coherence[:] = np.nan  # of a single segment it is always 1
-        std = gain * np.sqrt((1 - coherence) / (2 * segments * coherence))
+        std = gain * np.sqrt((1 - coherence) * np.sum(window**2) / (2 * coherence))
     return pd.DataFrame(
         {
             "frequency": frequency,

@@ -1,8 +1,11 @@
-"""What the tests share: the packed FMU and the harness's binary.
+r"""What the tests share: the packed FMU and the harness's binary.
 
-    pytest harness/python --fmu dist/HubSlosh.fmu --hubslosh target/release/hubslosh
+    cargo run --release -- pack
+    cargo run --release -- pack --python
+    pytest harness/python --fmu dist/HubSlosh.fmu --hubslosh target/release/hubslosh \
+        --wheel dist/hubslosh-0.1.0-py3-none-any.whl
 
-``cargo test --release`` calls it so, with an FMU that it packs itself.
+``cargo test --release`` calls it so, with FMU and wheel that it packs itself.
 """
 
 import os
@@ -25,6 +28,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """Say where the FMU and the harness are."""
     exe = "hubslosh.exe" if os.name == "nt" else "hubslosh"
     parser.addoption("--fmu", type=Path, default=ROOT / "dist" / "HubSlosh.fmu")
+    wheels = sorted((ROOT / "dist").glob("hubslosh-*.whl"))
+    parser.addoption("--wheel", type=Path, default=wheels[-1] if wheels else ROOT / "dist" / "none")
     parser.addoption("--hubslosh", type=Path, default=TARGET / "release" / exe)
 
 

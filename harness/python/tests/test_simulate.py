@@ -1,0 +1,174 @@
+"""A simulation in one call: what fmpy finds, however it is called, and its errors."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from fmpy import simulate_fmu
+
+from hubslosh import FmuError, Plant, RunError, batch, drive, simulate
+
+STEP = 0.02  # s
+TIME = np.arange(3001) * STEP
+TORQUE = 0.05 * np.sin(2 * np.pi * 2.4 * TIME)  # N·m, near the slosh frequency
+TABLE = pd.DataFrame({"time": TIME, "tau_cmd": TORQUE})
+
+
+@pytest.fixture
+def library() -> None:
+    """Fail where the library for whole runs is missing: the tests would compare two loops alike."""
+    assert batch.library() is not None, "cargo build --release -p hubslosh-batch"
+
+
+@pytest.mark.usefixtures("library")
+def test_a_held_torque_gives_the_bits_of_fmpy(fmu: Path) -> None:
+    """Same times, same calls: outputs of all types, every one of 3001 rows."""
+    theirs = simulate_fmu(
+        str(fmu), stop_time=60, output_interval=STEP, start_values={"slosh.model": 4},
+        input=np.array(list(zip(TIME, TORQUE, strict=True)), [("time", float), ("tau_cmd", float)]),
+        output=["omega", "slosh_angle_radial", "omega_dot", "stuck", "regime", "event_count"],
+    )  # fmt: skip
+    columns = list(theirs.dtype.names)[1:]
+    ours = simulate(fmu, {"slosh.model": "spherical"}, TABLE, outputs=columns, hold=True)
+    assert list(ours) == ["time", "tau_cmd", *columns]
+    # fmpy's steps end where 0.02 k or the table's time is, which differ in the last digit
+    assert np.abs(theirs["time"] - ours["time"]).max() < 1e-12
+    assert ours["event_count"].iloc[-1] > 10 and ours["stuck"].dtype == bool
+    for name in columns:
+        assert np.array_equal(theirs[name], ours[name]), name
+
+
+@pytest.mark.usefixtures("library")
+@pytest.mark.parametrize("hold", [False, True])
+@pytest.mark.parametrize("model", ["linear", "spherical"])
+def test_one_call_gives_the_bits_of_single_calls(fmu: Path, model: str, hold: bool) -> None:
+    """Three inputs with slopes or held; outputs of all types, in a mixed order."""
+    inputs = TABLE.assign(tau_ext=0.01 * np.cos(3 * TIME), g_axial=9.81 + 0.5 * np.sin(TIME))
+    columns = ["stuck", "omega", "regime", "tau_fluid", "event_count", "theta"]
+    arguments = (fmu, {"slosh.model": model}, inputs[:1001], None, None, columns)
+    whole = simulate(*arguments, hold=hold)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(batch, "run", batch.step_by_step)
+        single = simulate(*arguments, hold=hold)
+    assert whole["stuck"].any() and not whole["stuck"].all()
+    pd.testing.assert_frame_equal(whole, single, check_exact=True)
+
+
+def test_steps_between_rows_and_rows_between_steps_change_nothing(fmu: Path) -> None:
+    """The torque is the same lines, whatever the step; 1e-9 is ten times the solver's tolerance.
+
+    50 ms is no multiple of the rows' 20 ms, 7 ms divides nothing.
+    """
+    rows = simulate(fmu, inputs=TABLE, tolerance=1e-10, outputs=["theta", "omega"])
+    for step in (0.05, 0.007):
+        run = simulate(fmu, inputs=TABLE, step=step, tolerance=1e-10, outputs=["theta", "omega"])
+        assert len(run) == np.ceil(60 / step - 1e-9) + 1
+        assert run["time"].iloc[-1] == 60
+        common = pd.merge_asof(run, rows, on="time", tolerance=1e-9, direction="nearest").dropna()
+        assert len(common) > 80
+        for name in ("theta", "omega"):
+            difference = np.abs(common[f"{name}_x"] - common[f"{name}_y"]).max()
+            assert difference <= 1e-9 * np.abs(rows[name]).max(), name
+
+
+def test_two_rows_at_one_time_are_a_jump(fmu: Path) -> None:
+    """A pulse by jumps is the pulse by held rows."""
+    jumps = pd.DataFrame(
+        {"time": [0.0, 1.003, 1.003, 2.007, 2.007, 10.0], "tau_cmd": [0, 0, 0.05, 0.05, 0, 0]}
+    )
+    run = simulate(fmu, inputs=jumps, step=STEP, outputs=["omega"])
+    time = np.union1d(run["time"], [1.003, 2.007])
+    torque = np.where((time >= 1.003) & (time < 2.007), 0.05, 0.0)
+    held = drive(fmu, time, torque, hold=True, columns=["omega"])["omega"]
+    assert np.abs(run["omega"]).max() > 0.01
+    assert np.array_equal(run["omega"], held[np.isin(time, run["time"])])
+
+
+def test_without_inputs_the_fmu_s_experiment_is_the_default(fmu: Path) -> None:
+    """Start, stop and step are those of its DefaultExperiment, columns its outputs."""
+    run = simulate(fmu, {"init.slosh_angle": (10, "deg"), "tank.h": (50, "mm")})
+    assert run["time"].iloc[-1] == 20 and len(run) == 1001
+    assert run["slosh_angle"][0] == pytest.approx(np.radians(10), rel=1e-15)
+    assert run.attrs["units"]["slosh_angle"] == "rad"
+    same = simulate(fmu, {"init.slosh_angle": np.radians(10), "tank.h": 0.05})
+    pd.testing.assert_frame_equal(run, same, rtol=1e-12, atol=1e-14)
+
+
+def test_the_slope_of_a_torque_history_is_used(fmu: Path) -> None:
+    """As ``hubslosh torque`` writes it; here it is not that of the chords."""
+    table = TABLE.assign(tau_slope=np.full(len(TIME), 0.25))[:501]
+    ours = simulate(fmu, inputs=table, outputs=["omega"])
+    theirs = drive(fmu, TIME[:501], TORQUE[:501], slope=table["tau_slope"], columns=["omega"])
+    assert np.array_equal(ours["omega"], theirs["omega"])
+
+
+def test_everything_wrong_is_said_at_once(fmu: Path) -> None:
+    """Columns by name, parameters, units, outputs, times."""
+    inputs = pd.DataFrame({"time": [0.0, 2.0, 1.0], "tau": [0.0, 0.0, 0.0], "g_axial": [9.0] * 3})
+    parameters = {"tank.height": 1, "tank.h": (5, "inch"), "theta": 1.0, "slosh.model": "conical"}
+    with pytest.raises(FmuError) as told:
+        simulate(fmu, parameters, inputs, outputs=["omga", "omega", "omega"], step=-1.0)
+    for words in (
+        "no inputs of HubSlosh: tau (did you mean tau_",
+        "inputs are tau_cmd, tau_ext, g_axial",
+        "time in inputs goes back after row 1, 2.0 s",
+        "no variable tank.height; did you mean tank.h",
+        "tank.h cannot be (5, 'inch'): it has no unit inch (units: m, mm)",
+        "theta is computed by the FMU (output)",
+        "there are frozen, linear, planar, spherical, paraboloid",
+        "no variable omga; did you mean omega",
+        "omega is wanted twice",
+        "step must be a positive number of seconds, not -1.0",
+    ):
+        assert words in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ({"inputs": pd.DataFrame({"tau_cmd": [0.0, 1.0]})}, "inputs has no column time"),
+        ({"inputs": TABLE[:1]}, "two rows or more, not 1"),
+        ({"inputs": TABLE.assign(tau_cmd=np.nan)}, "tau_cmd of inputs is not finite in row 0"),
+        ({"inputs": TABLE, "parameters": {"tau_cmd": 1.0}}, "tau_cmd is given twice"),
+        ({"stop": -1.0}, "stop must be later than start"),
+        ({"tolerance": 0.0}, "tolerance must be a positive number"),
+        ({"parameters": {"slosh.modes": 1.5}}, "a whole number is expected"),
+        ({"parameters": {"tank.h": 0.0}}, "tank.h"),
+    ],
+)
+def test_wrong_arguments_are_told_in_a_sentence(fmu: Path, arguments: dict, sentence: str) -> None:
+    """One at a time."""
+    with pytest.raises(FmuError) as told:
+        simulate(fmu, **arguments)
+    assert sentence in str(told.value)
+
+
+@pytest.mark.parametrize("loop", ["run", "step_by_step"])
+def test_a_run_that_stops_says_where_and_keeps_what_it_has(
+    fmu: Path, loop: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The FMU refuses NaN in row 500; 501 rows were read."""
+    monkeypatch.setattr(batch, "run", getattr(batch, loop))
+    torque = TORQUE.copy()
+    torque[500] = np.nan
+    with Plant(fmu, torque=0.0) as plant, pytest.raises(RunError) as told:
+        plant.run(TIME, {"tau_cmd": torque}, None, ["omega"])
+    error = told.value
+    assert str(error).startswith("the run stopped at t = 10.0 s: fmi2SetReal returned fmi2Error: ")
+    assert "tau_cmd" in str(error)
+    assert error.time == 10.0
+    assert len(error.columns["omega"]) == len(error.columns["time"]) == 501
+    good = drive(fmu, TIME[:501], TORQUE[:501], hold=True)["omega"]
+    assert np.array_equal(error.columns["omega"], good)
+
+
+def test_an_unknown_model_is_told(tmp_path: Path) -> None:
+    """By name, by file, and a file that is no FMU."""
+    with pytest.raises(FmuError, match='no FMU "HubSlush" here'):
+        simulate("HubSlush")
+    with pytest.raises(FmuError, match="pack makes it"):
+        simulate(tmp_path / "none.fmu")
+    (tmp_path / "text.fmu").write_text("no zip")
+    with pytest.raises(FmuError, match="is not an FMU that fmpy can read"):
+        simulate(tmp_path / "text.fmu")

@@ -1,0 +1,117 @@
+"""The wheel: installed where there is nothing else, it runs READMEs' Python and the notebooks."""
+
+import base64
+import csv
+import hashlib
+import re
+import subprocess
+import zipfile
+from pathlib import Path
+
+import nbformat
+import pytest
+from conftest import ROOT, TARGET, option
+from nbclient import NotebookClient
+
+import environment
+
+HERE = ROOT / "harness" / "python"
+NOTEBOOKS = sorted((HERE / "notebooks").glob("*.ipynb"))
+
+
+@pytest.fixture(scope="module")
+def wheel(request: pytest.FixtureRequest) -> Path:
+    """Return the wheel."""
+    return option(request, "--wheel")
+
+
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory) -> Path:
+    """Return the Python of an environment that pip filled with the wheel and what it asks for.
+
+    It begins empty whenever the wheel asks for something else; otherwise only the wheel is new.
+    """
+    with zipfile.ZipFile(wheel) as archive:
+        metadata = next(n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))
+        text = archive.read(metadata).decode()
+    needed = [line for line in text.splitlines() if "Requires-Dist" in line and "extra" not in line]
+    requirements = tmp_path_factory.mktemp("wheel") / "requirements.txt"
+    names = [line.removeprefix("Requires-Dist: ") for line in needed]
+    requirements.write_text("\n".join([*names, ""]))
+    python = environment.ensure(TARGET / "python" / "wheel", requirements)
+    pip = [python, "-m", "pip", "--disable-pip-version-check"]
+    for arguments in (["install", "--force-reinstall", "--no-deps", wheel], ["check"]):
+        done = subprocess.run([*pip, *arguments], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout + done.stderr
+    return python
+
+
+def test_the_record_has_every_file_and_its_hash(wheel: Path) -> None:
+    """As any installer may check."""
+    with zipfile.ZipFile(wheel) as archive:
+        names = archive.namelist()
+        record = names[-1]
+        rows = list(csv.reader(archive.read(record).decode().splitlines()))
+        assert [row[0] for row in rows] == names
+        for name, hashed, size in rows[:-1]:
+            data = archive.read(name)
+            digest = base64.urlsafe_b64encode(hashlib.sha256(data).digest()).decode().rstrip("=")
+            assert (hashed, int(size)) == (f"sha256={digest}", len(data)), name
+    assert rows[-1] == [record, "", ""]
+    assert "hubslosh/py.typed" in names and "hubslosh/fmus/HubSlosh.fmu" in names
+
+
+@pytest.mark.parametrize("readme", [ROOT / "README.md", HERE / "README.md"])
+def test_the_code_in_a_readme_runs(installed: Path, tmp_path: Path, readme: Path) -> None:
+    """With the wheel alone, in an empty directory."""
+    blocks = re.findall(r"^```python\n(.*?)^```", readme.read_text(), re.DOTALL | re.MULTILINE)
+    assert blocks, f"{readme} has no Python"
+    for code in blocks:
+        done = subprocess.run(
+            [installed, "-I", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, f"{code}\n{done.stderr}"
+
+
+def test_what_needs_another_package_says_which(installed: Path, tmp_path: Path) -> None:
+    """Plots and control are extras."""
+    code = (
+        "import hubslosh, pandas\n"
+        "run = hubslosh.simulate(stop=1)\n"
+        "assert hubslosh.batch.library() is not None\n"
+        "assert hubslosh.__version__[0].isdigit()\n"
+        "model = hubslosh.linearize(parameters={'friction.model': 'viscous'})\n"
+        "for call in (lambda: hubslosh.plot.time_histories(run), model.to_control):\n"
+        "    try: call()\n"
+        "    except hubslosh.FmuError as error: print(error)\n"
+    )
+    done = subprocess.run(
+        [installed, "-I", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert "pip install hubslosh[plot]" in done.stdout and "pip install control" in done.stdout
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=[path.stem for path in NOTEBOOKS])
+def test_a_notebook_runs(
+    wheel: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, path: Path
+) -> None:
+    """From top to bottom with the wheel's files, every cell, figures included."""
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(tmp_path / "wheel")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "wheel"))
+    monkeypatch.setenv("IPYTHONDIR", str(tmp_path / "ipython"))
+    notebook = nbformat.read(path, as_version=4)
+    assert all(not cell.get("outputs") for cell in notebook.cells), "outputs are not stored"
+    client = NotebookClient(
+        notebook, timeout=120, kernel_name="python3",
+        resources={"metadata": {"path": str(tmp_path)}},
+    )  # fmt: skip
+    client.execute()
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", ())]
+    assert any("image/png" in output.get("data", {}) for output in outputs), "it draws something"
+
+
+def test_there_are_notebooks() -> None:
+    """The list above is not empty by mistake."""
+    assert len(NOTEBOOKS) == 3
