@@ -3,7 +3,7 @@
 import atexit
 import difflib
 import shutil
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
@@ -122,17 +122,17 @@ class Fmu:
         also a number with its unit: the variable's own or one of its display units.
         """
         variable = self.variable(name)
-        convert = {
+        converters: dict[str, Callable[[Any], Value]] = {
             "Real": lambda v: self._real(name, v),
             "Integer": _integer,
             "Enumeration": lambda v: _item(variable, v),
             "Boolean": _boolean,
             "String": str,
-        }[variable.type]
+        }
         try:
             if isinstance(value, tuple) and variable.type != "Real":
                 raise ValueError(f"a value of type {variable.type} has no unit")
-            return convert(value)
+            return converters[variable.type](value)
         except (TypeError, ValueError) as error:
             raise FmuError(f"{name} cannot be {value!r}: {error}") from None
 
@@ -149,7 +149,7 @@ class Fmu:
         if unit not in shown:
             units = ", ".join(u for u in (base, *shown) if u)
             raise ValueError(f"it has no unit {unit} (units: {units or 'none'})")
-        return (number - shown[unit].offset) / shown[unit].factor
+        return float((number - shown[unit].offset) / shown[unit].factor)
 
 
 def _item(variable: ScalarVariable, value: Any) -> int:

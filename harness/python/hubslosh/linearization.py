@@ -46,12 +46,10 @@ class LinearModel:
 
     def response(self, frequency: ArrayLike) -> NDArray[np.complex128]:
         """Return C (jωI − A)⁻¹ B + D at frequencies in Hz: frequencies × outputs × inputs."""
-        s = 2j * np.pi * np.atleast_1d(np.asarray(frequency, float))
+        s: NDArray[np.complex128] = 2j * np.pi * np.atleast_1d(np.asarray(frequency, float))
         system = s[:, None, None] * np.eye(len(self.A)) - self.A
-        return (
-            self.C @ np.linalg.solve(system, np.broadcast_to(self.B, (len(s), *self.B.shape)))
-            + self.D
-        )
+        states = np.linalg.solve(system, np.broadcast_to(self.B, (len(s), *self.B.shape)))
+        return np.asarray(self.C @ states + self.D, np.complex128)
 
     def to_control(self) -> Any:
         """Return it as ``control.StateSpace``, with names; needs the package control."""
@@ -135,7 +133,7 @@ def linearize(
 
 def _seen(A: Matrix, C: Matrix) -> NDArray[np.bool_]:
     """Return which states an output depends on, directly or through other states."""
-    seen = (C != 0).any(axis=0)
+    seen: NDArray[np.bool_] = (C != 0).any(axis=0)
     while True:
         more = seen | (A[seen] != 0).any(axis=0)
         if (more == seen).all():

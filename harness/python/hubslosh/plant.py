@@ -236,9 +236,10 @@ class Plant(Instance):
             numbers["Integer" if kind == "Enumeration" else kind].append(name)
 
         def signals(names: list[str], kind: type, given: Mapping[str, Any] | None) -> Signals:
-            values = np.empty((rows, len(names)), kind)
-            for j, name in enumerate(names if given is not None else []):
-                values[:, j] = given[name]
+            values: np.ndarray = np.empty((rows, len(names)), kind)
+            if given is not None:
+                for j, name in enumerate(names):
+                    values[:, j] = given[name]
             return Signals([self.fmu.variables[n].valueReference for n in names], values)
 
         outputs = self._by_type(columns)

@@ -112,8 +112,10 @@ def bode(
             high = max(frame["frequency"].max() for frame in frames)
             line = np.geomspace(low, high, 2000)
             h = response.response(line)[:, 0, 0]
-            gain.plot(line, np.abs(h), color=color, linewidth=1, label=label)
-            phase.plot(line, np.degrees(np.unwrap(np.angle(h))), color=color, linewidth=1)
+            # above the dots, which would hide it
+            style: dict[str, Any] = {"color": color, "linewidth": 1.2, "zorder": 3}
+            gain.plot(line, np.abs(h), label=label, **style)
+            phase.plot(line, np.degrees(np.unwrap(np.angle(h))), **style)
     gain.set_yscale("log")
     gain.set_ylabel("gain")
     phase.set_ylabel("phase (deg)")

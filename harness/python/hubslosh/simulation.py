@@ -146,8 +146,8 @@ def communication_points(
         assert rows is not None
         return np.concatenate([[start], rows, [stop]]), None
     count = round((stop - start) / step)
-    grid = start + np.arange(max(count, 0) + 1) * step
-    grid = np.append(grid[grid < stop - 1e-6 * step], stop)
+    grid: Real = start + np.arange(max(count, 0) + 1, dtype=np.float64) * step
+    grid = np.append(grid[grid < stop - 1e-6 * step], np.float64(stop))
     if rows is None or not len(rows):
         return grid, None
     nearest = np.clip(np.searchsorted(rows, grid), 1, max(len(rows) - 1, 1))
