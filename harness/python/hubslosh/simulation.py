@@ -36,6 +36,8 @@ class History:
 
     def after(self, t: Real) -> tuple[Real, Real]:
         """Return value and slope at ``t`` and immediately after; held before the first row."""
+        if np.array_equal(t, self.time):  # the rows themselves, as most often
+            return self.values, self.slopes
         k = np.searchsorted(self.time, t, side="right") - 1
         at = np.maximum(k, 0)
         slope = np.where(k < 0, 0.0, self.slopes[at])
@@ -140,8 +142,8 @@ def communication_points(
     a step of a row or of the stop time is that time.
     """
     if rows is not None:
-        rows = np.unique(rows)
         rows = rows[(rows > start) & (rows < stop)]
+        rows = rows[np.append(np.diff(rows) > 0, True)] if len(rows) else rows
     if step is None:
         assert rows is not None
         return np.concatenate([[start], rows, [stop]]), None
