@@ -1,0 +1,9 @@
+//! From recordings of torque and hub rate to the FMU's parameters, with their uncertainty.
+
+pub mod fit;
+pub mod noise;
+pub mod recording;
+pub mod simulate;
+pub mod start;
+pub mod twin;
+pub mod unknown;

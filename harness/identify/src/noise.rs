@@ -1,0 +1,145 @@
+//! The noise of a rate gyro, and the filter that makes it white.
+//!
+//! ```text
+//! y_k = ω(t_k) + b_k + σ_w n_k,   b_{k+1} = φ b_k + σ_b sqrt(1 − φ²) m_k,   φ = exp(−Δt/T)
+//! ```
+//!
+//! White noise and a Gauss–Markov bias (IEEE Std 952). The Kalman filter of b turns a residual
+//! r into innovations e, which are white if the residual is this noise; the same linear filter
+//! turns sensitivities of the rate into sensitivities of the innovations. Least squares of the
+//! innovations is then maximum likelihood, and slow drift does not pass for a signal.
+
+/// White noise and a Gauss–Markov bias.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Noise {
+    /// σ_w, standard deviation of the white noise of one row, rad/s.
+    pub white: f64,
+    /// σ_b/σ_w.
+    pub drift: f64,
+    /// T, correlation time of the drift, s.
+    pub time: f64,
+}
+
+/// Gains of the filter for the rows of one recording.
+pub struct Whitening {
+    /// φ before each row, K and 1/sqrt(innovation variance) at each row.
+    rows: Vec<[f64; 3]>,
+    /// Σ ln(innovation variance).
+    log_variance: f64,
+}
+
+impl Noise {
+    /// White noise alone.
+    pub fn white(sigma: f64) -> Self {
+        Noise { white: sigma, drift: 0.0, time: 100.0 }
+    }
+
+    /// The filter for rows at these times, s.
+    pub fn whitening(&self, time: &[f64]) -> Whitening {
+        let (white, drift) = (self.white.powi(2), (self.white * self.drift).powi(2));
+        let mut variance = drift;
+        let mut log_variance = 0.0;
+        let mut rows = Vec::with_capacity(time.len());
+        let (mut last_step, mut keep) = (0.0, 1.0);
+        for k in 0..time.len() {
+            if k > 0 {
+                let step = time[k] - time[k - 1];
+                if k == 1 || (step - last_step).abs() > 1e-9 {
+                    (last_step, keep) = (step, (-step / self.time).exp());
+                }
+                variance = keep * keep * variance + drift * (1.0 - keep * keep);
+            }
+            let innovation = variance + white;
+            let gain = variance / innovation;
+            rows.push([keep, gain, innovation.sqrt().recip()]);
+            log_variance += innovation.ln();
+            variance *= 1.0 - gain;
+        }
+        Whitening { rows, log_variance }
+    }
+
+    /// The noise of maximum likelihood for a residual, rad/s, at these times.
+    pub fn of(time: &[f64], residual: &[f64]) -> Self {
+        let count = residual.len() as f64;
+        // σ_w follows from the rest; what is minimised is −2 ln L
+        let sized = |ln_drift: f64, ln_time: f64| {
+            let unit = Noise { white: 1.0, drift: ln_drift.exp(), time: ln_time.exp() };
+            let filter = unit.whitening(time);
+            let mut e = residual.to_vec();
+            filter.apply(&mut e);
+            let white = (e.iter().map(|v| v * v).sum::<f64>() / count).sqrt();
+            (2.0 * count * white.ln() + filter.log_variance, Noise { white, ..unit })
+        };
+        let longest = (time[time.len() - 1] - time[0]).ln();
+        let mut best = sized(-4.0, 4.6);
+        let (mut at, mut reach): ((f64, f64), _) = ((-4.0, 4.6f64.min(longest)), (1.5, 1.5));
+        // coordinate search: two smooth variables, a few tens of evaluations
+        for _ in 0..40 {
+            let mut moved = false;
+            for (dx, dt) in [(reach.0, 0.0), (-reach.0, 0.0), (0.0, reach.1), (0.0, -reach.1)] {
+                let to = ((at.0 + dx).clamp(-9.0, 4.0), (at.1 + dt).clamp(0.0, longest));
+                let there = sized(to.0, to.1);
+                if there.0 < best.0 {
+                    (best, at, moved) = (there, to, true);
+                }
+            }
+            if !moved {
+                reach = (reach.0 / 2.0, reach.1 / 2.0);
+                if reach.0 < 0.1 {
+                    break;
+                }
+            }
+        }
+        best.1
+    }
+}
+
+impl Whitening {
+    /// Turns a residual, or a sensitivity, into innovations over their standard deviation.
+    pub fn apply(&self, signal: &mut [f64]) {
+        let mut bias = 0.0;
+        for (value, [keep, gain, scale]) in signal.iter_mut().zip(&self.rows) {
+            bias *= keep;
+            let innovation = *value - bias;
+            bias += gain * innovation;
+            *value = innovation * scale;
+        }
+    }
+
+    /// Σ ln(innovation variance): with Σ e² it is −2 ln L but for a constant.
+    pub fn log_variance(&self) -> f64 {
+        self.log_variance
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_noise_put_in_is_estimated_and_its_innovations_are_white() {
+        let mut random = bench::random::Random::new(3, 1);
+        let time: Vec<f64> = (0..135_000).map(|k| 0.02 * f64::from(k)).collect();
+        let keep = (-0.02f64 / 100.0).exp();
+        let (white, drift) = (4.07e-4, 7.85e-5);
+        let mut bias = drift * random.normal();
+        let residual: Vec<f64> = time
+            .iter()
+            .map(|_| {
+                let y = bias + white * random.normal();
+                bias = keep * bias + drift * (1.0 - keep * keep).sqrt() * random.normal();
+                y
+            })
+            .collect();
+        let found = Noise::of(&time, &residual);
+        // 1/sqrt(2 N) = 0.2 %; the drift has 27 correlation times: 20 %, four of them
+        assert!((found.white / white - 1.0).abs() < 0.01, "{found:?}");
+        assert!((found.drift * found.white / drift).ln().abs() < 0.8, "{found:?}");
+        let mut e = residual.clone();
+        found.whitening(&time).apply(&mut e);
+        for lag in [1, 50, 500] {
+            let sum: f64 = e.iter().zip(&e[lag..]).map(|(a, b)| a * b).sum();
+            assert!((sum / e.len() as f64).abs() < 4.0 / (e.len() as f64).sqrt(), "lag {lag}");
+        }
+    }
+}

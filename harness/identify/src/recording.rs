@@ -1,0 +1,314 @@
+//! Recordings of a bench: reading them, and what must be true of them before anything is fitted.
+//!
+//! A recording is torque command and hub rate against time, in SI units. It is not resampled: the
+//! FMU is stepped to the very instants of the rows. Where rows are missing for longer than
+//! [`LONGEST_GAP`], nobody knows the torque in between; the recording is cut there and each part has
+//! a start of its own.
+
+use std::path::Path;
+
+use anyhow::{Context, Result, bail, ensure};
+use bench::table::Table;
+
+/// Longest time between two rows over which torque is joined by a line, s.
+pub const LONGEST_GAP: f64 = 0.25;
+
+/// Shortest recording, s. A bare tank's slosh decays within some 23 s (1/(ζω) of the thesis's tank);
+/// its half-power width of 14 mHz is resolved by 1/14 mHz = 70 s.
+pub const SHORTEST: f64 = 120.0;
+
+/// Longest mean time between rows, s: slosh at 2.4 Hz needs more than two rows a cycle.
+const COARSEST: f64 = 0.2;
+
+/// One uninterrupted recording.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    /// Where it is from.
+    pub name: String,
+    /// Times of the rows, s, growing.
+    pub time: Vec<f64>,
+    /// Torque command, N·m.
+    pub torque: Vec<f64>,
+    /// Hub rate as measured, rad/s.
+    pub rate: Vec<f64>,
+    /// Hub angle of an encoder, rad, if there is one.
+    pub angle: Option<Vec<f64>>,
+    /// It begins at rest (else the initial state is unknown).
+    pub from_rest: bool,
+}
+
+impl Recording {
+    /// Length, s.
+    pub fn duration(&self) -> f64 {
+        self.time[self.time.len() - 1] - self.time[0]
+    }
+
+    /// Mean time between rows, s.
+    pub fn step(&self) -> f64 {
+        self.duration() / (self.time.len() - 1) as f64
+    }
+
+    /// The rows `from..to`.
+    fn rows(&self, from: usize, to: usize) -> Recording {
+        Recording {
+            name: self.name.clone(),
+            time: self.time[from..to].to_vec(),
+            torque: self.torque[from..to].to_vec(),
+            rate: self.rate[from..to].to_vec(),
+            angle: self.angle.as_ref().map(|angle| angle[from..to].to_vec()),
+            from_rest: false,
+        }
+    }
+
+    /// The first part, `fraction` of the rows.
+    pub fn beginning(&self, fraction: f64) -> Recording {
+        let rows = ((self.time.len() as f64 * fraction) as usize).max(2);
+        let part = self.rows(0, rows.min(self.time.len()));
+        Recording { from_rest: self.from_rest, ..part }
+    }
+
+    /// Torque and rate on an even grid of the mean step, joined by lines: for spectra alone.
+    pub fn even(&self) -> (f64, Vec<f64>, Vec<f64>) {
+        let step = self.step();
+        let mut row = 0;
+        let (mut torque, mut rate) = (Vec::new(), Vec::new());
+        for k in 0..self.time.len() {
+            let t = self.time[0] + k as f64 * step;
+            while row + 2 < self.time.len() && self.time[row + 1] < t {
+                row += 1;
+            }
+            let part = (t - self.time[row]) / (self.time[row + 1] - self.time[row]);
+            let at = |x: &[f64]| x[row] + part.clamp(0.0, 1.0) * (x[row + 1] - x[row]);
+            torque.push(at(&self.torque));
+            rate.push(at(&self.rate));
+        }
+        (step, torque, rate)
+    }
+}
+
+/// Reads a file with the columns `time` (s), `tau_cmd` (N·m), `omega` (rad/s) and, if there is one,
+/// `theta` (rad). `done` hears what was done to it.
+pub fn read(path: &Path, done: &mut dyn FnMut(String)) -> Result<Vec<Recording>> {
+    let wanted = ["time", "tau_cmd", "omega"];
+    let table = Table::read(path, &wanted)?;
+    // an encoder is welcome, not required
+    let angle = Table::read(path, &["theta"]).ok().and_then(|t| Some(t.column("theta")?.to_vec()));
+    let column = |name: &str| table.column(name).context("a column that was read").map(<[f64]>::to_vec);
+    let all = Recording {
+        name: path.display().to_string(),
+        time: column("time")?,
+        torque: column("tau_cmd")?,
+        rate: column("omega")?,
+        angle,
+        from_rest: false,
+    };
+    prepare(all, done)
+}
+
+/// Checks a recording and cuts it at its gaps.
+pub fn prepare(all: Recording, done: &mut dyn FnMut(String)) -> Result<Vec<Recording>> {
+    let name = all.name.clone();
+    check_time(&all)?;
+    let mut cuts = vec![0];
+    for (row, pair) in all.time.windows(2).enumerate() {
+        if pair[1] - pair[0] > LONGEST_GAP.max(10.0 * all.step()) {
+            let gap = pair[1] - pair[0];
+            done(format!("{name}: cut at {:.2} s, where rows are missing for {gap:.2} s", pair[0]));
+            cuts.push(row + 1);
+        }
+    }
+    cuts.push(all.time.len());
+    let mut parts = Vec::new();
+    for (index, pair) in cuts.windows(2).enumerate() {
+        let mut part = all.rows(pair[0], pair[1]);
+        let seconds = if part.time.len() > 1 { part.duration() } else { 0.0 };
+        if seconds < SHORTEST {
+            ensure!(
+                cuts.len() > 2,
+                "{name}: {seconds:.0} s of data are too few. Slosh of a bare tank decays in some \
+                 23 s and its resonance is 14 mHz wide: at least {SHORTEST} s are needed to see it"
+            );
+            done(format!("{name}: {seconds:.1} s from {:.2} s on left out: too short", part.time[0]));
+            continue;
+        }
+        part.from_rest = starts_at_rest(&part);
+        if cuts.len() > 2 {
+            part.name = format!("{name}, part {}", index + 1);
+        }
+        done(describe(&part));
+        check_signals(&part)?;
+        parts.push(part);
+    }
+    ensure!(!parts.is_empty(), "{name}: no part between gaps is as long as {SHORTEST} s");
+    Ok(parts)
+}
+
+fn describe(part: &Recording) -> String {
+    let steps: Vec<f64> = part.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let step = part.step();
+    let uneven = steps.iter().fold(0.0, |worst: f64, s| worst.max((s - step).abs()));
+    let sampling = if uneven > 0.01 * step {
+        format!("uneven sampling ({:.1} ms on average, up to {:.1} ms off), used as it is", 1e3 * step, 1e3 * uneven)
+    } else {
+        format!("{:.4} Hz", 1.0 / step)
+    };
+    let start = if part.from_rest { "starts at rest" } else { "initial state unknown, estimated" };
+    format!("{}: {} rows, {:.1} s, {sampling}, {start}", part.name, part.time.len(), part.duration())
+}
+
+fn check_time(all: &Recording) -> Result<()> {
+    let name = &all.name;
+    ensure!(all.time.len() > 2, "{name}: {} rows are too few", all.time.len());
+    if let Some(row) = all.time.windows(2).position(|pair| pair[1] <= pair[0]) {
+        bail!(
+            "{name}, row {}: time must grow, but {} s follows {} s",
+            row + 2, all.time[row + 1], all.time[row]
+        );
+    }
+    let mut steps: Vec<f64> = all.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    steps.sort_by(f64::total_cmp);
+    let step = steps[steps.len() / 2];
+    ensure!(
+        step <= COARSEST,
+        "{name}: rows are {step} s apart, at most {COARSEST} s are allowed{}",
+        if step >= 1.0 { ". Is time in milliseconds? It must be in seconds" } else { "" }
+    );
+    ensure!(step >= 1e-4, "{name}: rows are {step} s apart. Time must be in seconds");
+    Ok(())
+}
+
+/// Whether rate and torque allow a start at rest: the first quarter of a second is no faster than
+/// the torque and the noise explain.
+fn starts_at_rest(part: &Recording) -> bool {
+    // noise from second differences: white noise has six times its variance there
+    let noise = noise_level(part);
+    let rows = ((0.1 / part.step()) as usize).clamp(3, part.rate.len());
+    let mean = part.rate[..rows].iter().sum::<f64>() / rows as f64;
+    let torque = part.torque[..rows].iter().fold(0.0, |m: f64, t| m.max(t.abs()));
+    let all = deviation(&part.torque);
+    // a gyro's bias is no motion: up to 3 % of the signal, or 5 times the noise
+    mean.abs() < 5.0 * noise + 0.03 * deviation(&part.rate) && torque < 0.75 * all
+}
+
+/// Standard deviation of the white noise of the rate, from its third differences (a signal of a few
+/// hertz has almost none), rad/s.
+pub fn noise_level(part: &Recording) -> f64 {
+    let third = part.rate.windows(4).map(|y| y[3] - 3.0 * y[2] + 3.0 * y[1] - y[0]);
+    let mut squares: Vec<f64> = third.map(|d| d * d).collect();
+    squares.sort_by(f64::total_cmp);
+    // the median of χ² with one degree of freedom is 0.4549; variance of third differences 20 σ²
+    (squares[squares.len() / 2] / 0.4549 / 20.0).sqrt()
+}
+
+fn deviation(x: &[f64]) -> f64 {
+    let mean = x.iter().sum::<f64>() / x.len() as f64;
+    (x.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / x.len() as f64).sqrt()
+}
+
+fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    let (ma, mb) = (a.iter().sum::<f64>() / a.len() as f64, b.iter().sum::<f64>() / b.len() as f64);
+    let product: f64 = a.iter().zip(b).map(|(x, y)| (x - ma) * (y - mb)).sum();
+    product / a.len() as f64 / (deviation(a) * deviation(b))
+}
+
+fn check_signals(part: &Recording) -> Result<()> {
+    let name = &part.name;
+    let largest = part.torque.iter().fold(0.0, |m: f64, t| m.max(t.abs()));
+    ensure!(
+        deviation(&part.torque) > 1e-9 * largest.max(1e-12),
+        "{name}: tau_cmd is constant ({} N.m). Without excitation nothing can be identified",
+        part.torque[0]
+    );
+    ensure!(deviation(&part.rate) > 0.0, "{name}: omega is constant ({} rad/s)", part.rate[0]);
+    // An inertia: torque goes with the rate's derivative, so torque leads the rate by 90 degrees.
+    let (torque, rate) = smoothed(part);
+    let slope = |x: &[f64]| -> Vec<f64> { (1..x.len() - 1).map(|k| x[k + 1] - x[k - 1]).collect() };
+    let inner = |x: &[f64]| x[1..x.len() - 1].to_vec();
+    let leading = correlation(&inner(&torque), &slope(&rate));
+    if leading < -0.3 {
+        // which one is the other's integral? The ratio of rate to torque falls with frequency
+        let rough = |x: &[f64]| deviation(&slope(x)) / deviation(x);
+        let swapped = rough(&torque) < rough(&rate);
+        let fault = if swapped {
+            "the columns tau_cmd and omega are swapped: omega leads tau_cmd"
+        } else {
+            "omega has the wrong sign, or tau_cmd and omega are swapped: the hub seems to turn against its torque"
+        };
+        bail!("{name}: {fault} (correlation of tau_cmd with the derivative of omega: {leading:.2})");
+    }
+    Ok(())
+}
+
+/// Torque and rate averaged over 0.1 s, to tame the noise of differences.
+fn smoothed(part: &Recording) -> (Vec<f64>, Vec<f64>) {
+    let (step, torque, rate) = part.even();
+    let width = ((0.1 / step) as usize).max(1);
+    let mean = |x: &[f64]| x.windows(width).map(|w| w.iter().sum::<f64>() / width as f64).collect();
+    (mean(&torque), mean(&rate))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    /// 300 s of a rigid body of 0.4 kg·m² under a sweep.
+    fn rigid() -> Recording {
+        let time: Vec<f64> = (0..15_000).map(|k| 0.02 * f64::from(k)).collect();
+        let phase = |t: f64| TAU * (1.0 + t / 300.0) * t;
+        let f = |t: f64| TAU * (1.0 + t / 150.0);
+        let torque = time.iter().map(|&t| 0.1 * phase(t).sin()).collect();
+        let rate = time.iter().map(|&t| -0.1 / 0.4 / f(t) * phase(t).cos()).collect();
+        Recording { name: "a.csv".into(), time, torque, rate, angle: None, from_rest: false }
+    }
+
+    fn refusal(change: impl Fn(&mut Recording)) -> String {
+        let mut bad = rigid();
+        change(&mut bad);
+        prepare(bad, &mut |_| {}).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_sound_recording_passes() {
+        assert_eq!(prepare(rigid(), &mut |_| {}).unwrap().len(), 1);
+    }
+
+    #[test]
+    fn each_fault_has_a_sentence_of_its_own() {
+        type Change = fn(&mut Recording);
+        let faults: [(Change, &str); 6] = [
+            (|r| r.torque.fill(0.1), "tau_cmd is constant (0.1 N.m)"),
+            (|r| *r = r.rows(0, 1500), "30 s of data are too few"),
+            (|r| std::mem::swap(&mut r.torque, &mut r.rate), "swapped"),
+            (|r| r.rate.iter_mut().for_each(|w| *w = -*w), "wrong sign"),
+            (|r| r.time.iter_mut().for_each(|t| *t *= 1e3), "Is time in milliseconds?"),
+            (|r| r.time[7] = r.time[6], "row 8: time must grow"),
+        ];
+        for (change, word) in faults {
+            let error = refusal(change);
+            assert!(error.contains(word), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_long_gap_cuts_the_recording_and_a_short_one_does_not() {
+        let mut gap = rigid();
+        for (k, t) in gap.time.iter_mut().enumerate() {
+            *t += if k >= 7_000 { 5.0 } else { 0.0 } + if k >= 3_000 { 0.1 } else { 0.0 };
+        }
+        let mut said = Vec::new();
+        let parts = prepare(gap, &mut |line| said.push(line)).unwrap();
+        assert_eq!(parts.iter().map(|p| p.time.len()).collect::<Vec<_>>(), [7_000, 8_000]);
+        assert!(said[0].contains("rows are missing for 5.02 s"), "{said:?}");
+        assert!(!parts[1].from_rest);
+    }
+
+    #[test]
+    fn the_noise_level_is_that_of_the_noise() {
+        let mut noisy = rigid();
+        let mut random = bench::random::Random::new(1, 0);
+        noisy.rate.iter_mut().for_each(|w| *w += 4e-4 * random.normal());
+        // relative standard error of the median of 15,000 squares: 2 %
+        assert!((noise_level(&noisy) / 4e-4 - 1.0).abs() < 0.08, "{}", noise_level(&noisy));
+    }
+}

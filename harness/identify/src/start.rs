@@ -1,0 +1,234 @@
+//! Starts from the data: frequency response, three poles and two zeros, and from these the tank, the
+//! inertia and the friction.
+//!
+//! ```text
+//! Ω/τ = (s² + 2ζω s + ω²)/(a3 s³ + a2 s² + a1 s + a0)
+//! a3 = I0, a2 = b + 2ζω J, a1 = 2ζω b + ω² J, a0 = b ω²,   J = I0 + m r²
+//! ```
+//!
+//! (thesis 6.7, corrected). An upright cylinder's first mode (Dodge 2000; Abramson, NASA SP-106),
+//! ξ = 1.841184, u = 2ξh/d:
+//!
+//! ```text
+//! l = g/ω² = d/(2ξ tanh u),   m = ρπd³ tanh u/(4ξ(ξ² − 1))
+//! ```
+//!
+//! so d⁴ = 8ξ²(ξ² − 1) l m/(ρπ) and tanh u = d/(2ξl).
+
+use std::f64::consts::{PI, TAU};
+
+use anyhow::{Context, Result, ensure};
+use bench::analysis::features::Features;
+use bench::analysis::transfer_function::TransferFunction;
+use bench::analysis::{FrequencyResponse, logarithmic_grid, spa, welch::{self, Spectra}};
+
+use crate::recording::Recording;
+
+/// First zero of J1'.
+const XI: f64 = 1.841_183_781_340_66;
+
+/// What is known of the bench without the recording.
+#[derive(Clone, Copy, Debug)]
+pub struct Bench {
+    /// tank.r, m.
+    pub arm: f64,
+    /// fluid.rho, kg/m³.
+    pub density: f64,
+    /// g_axial, m/s².
+    pub gravity: f64,
+}
+
+/// What a frequency response says of the bench.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Response {
+    /// Slosh frequency, Hz: of the zeros.
+    pub slosh_frequency: f64,
+    /// Slosh damping ratio: of the zeros.
+    pub slosh_damping: f64,
+    /// Resonance, Hz: of the pair of poles.
+    pub resonance_frequency: f64,
+    /// Slosh mass, kg.
+    pub slosh_mass: f64,
+    /// I0, inertia of hub and fixed mass, kg·m².
+    pub inertia: f64,
+    /// Fit of the transfer function, %.
+    pub fit: f64,
+}
+
+/// Starts for the time domain, SI units.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[allow(missing_docs)]
+pub struct Start {
+    pub d: f64,
+    pub h: f64,
+    pub zeta: f64,
+    pub hub_inertia: f64,
+    pub b: f64,
+    pub c: f64,
+    pub stribeck: f64,
+    pub omega_s: f64,
+}
+
+/// Frequencies between which the torque has its power, Hz.
+pub fn excited_band(step: f64, torque: &[f64], rate: &[f64]) -> Option<(f64, f64)> {
+    let spectra = Spectra::of(step, torque, rate, welch::Segments::Seconds(60.0));
+    let total: f64 = spectra.input.iter().skip(1).sum();
+    let reached = |part: f64| {
+        let mut sum = 0.0;
+        spectra.input.iter().enumerate().skip(1).position(|(_, power)| {
+            sum += power;
+            sum >= part * total
+        })
+    };
+    let (low, high) = (reached(0.01)? as f64, reached(0.99)? as f64);
+    Some(((low + 1.0) * spectra.resolution, (high + 1.0) * spectra.resolution))
+}
+
+/// Frequency response of torque to rate over the band that the torque excites.
+pub fn response(recording: &Recording) -> Result<FrequencyResponse> {
+    let (step, torque, rate) = recording.even();
+    let band = excited_band(step, &torque, &rate).context("the torque has no spectrum")?;
+    ensure!(
+        band.1 > 1.15 * band.0,
+        "{}: the torque excites {:.2} to {:.2} Hz alone. A frequency response needs a sweep, a multisine \
+         or noise around the slosh frequency",
+        recording.name, band.0, band.1
+    );
+    let lag = spa::LAG.min(recording.duration() / 4.0);
+    Ok(spa::frequency_response(step, &torque, &rate, &logarithmic_grid(band, 1200), lag))
+}
+
+/// Poles and zeros of a measured response, as slosh and inertia.
+pub fn translate(measured: &FrequencyResponse, bench: Bench) -> Option<Response> {
+    let model = TransferFunction::fit(measured)?;
+    let inertia = 1.0 / model.numerator[0];
+    let w = TAU * model.zero_frequency();
+    let (p, wp, zp) = (model.real_pole, model.pole_omega, model.pole_damping);
+    let b = p * wp * wp * inertia / (w * w);
+    let z = model.zero_damping();
+    let total = (inertia * (wp * wp + 2.0 * zp * wp * p) - 2.0 * z * w * b) / (w * w);
+    let found = Response {
+        slosh_frequency: w / TAU,
+        slosh_damping: z,
+        resonance_frequency: wp / TAU,
+        slosh_mass: (total - inertia) / bench.arm.powi(2),
+        inertia,
+        fit: model.fit_frequency(measured),
+    };
+    let (low, high) = (measured.frequency[0], *measured.frequency.last()?);
+    let within = found.slosh_frequency > low && found.resonance_frequency < high;
+    (inertia > 0.0 && found.slosh_mass > 0.0 && within).then_some(found)
+}
+
+/// The tank (d, h) whose first mode has this frequency (Hz) and mass (kg).
+pub fn tank(frequency: f64, mass: f64, bench: Bench) -> (f64, f64) {
+    let l = bench.gravity / (TAU * frequency).powi(2);
+    let d = (8.0 * XI * XI * (XI * XI - 1.0) * l * mass / (bench.density * PI)).powf(0.25);
+    // a deep tank's frequency says little of its fill
+    let d = d.min(2.0 * XI * l * 0.995);
+    let h = (d / (2.0 * XI * l)).atanh() * d / (2.0 * XI);
+    (d, h)
+}
+
+/// Starts from the recording whose response fits best.
+pub fn from_data(recordings: &[Recording], bench: Bench) -> Result<(Option<Response>, Start)> {
+    let mut best: Option<Response> = None;
+    for recording in recordings {
+        let measured = response(recording)?;
+        let candidates = [translate(&measured, bench), from_features(&measured, bench)];
+        for found in candidates.into_iter().flatten() {
+            if best.is_none_or(|b| found.fit > b.fit) {
+                best = Some(found);
+            }
+        }
+    }
+    let Some(found) = best else { return Ok((None, Start { d: 0.0, h: 0.0, ..friction(recordings) })) };
+    let (d, h) = tank(found.slosh_frequency, found.slosh_mass, bench);
+    let fixed = bench.density * PI / 4.0 * d * d * h - found.slosh_mass;
+    let hub_inertia = found.inertia - fixed.max(0.0) * bench.arm.powi(2);
+    let start = Start {
+        d,
+        h,
+        zeta: found.slosh_damping.clamp(1e-3, 0.1),
+        hub_inertia: hub_inertia.max(0.2 * found.inertia),
+        ..friction(recordings)
+    };
+    Ok((Some(found), start))
+}
+
+/// Where the transfer function does not fit (large amplitudes bend its peak): antiresonance,
+/// resonance and the inertia of the band's ends. For b = 0, ω_p² = ω²(1 + m r²/I0).
+fn from_features(measured: &FrequencyResponse, bench: Bench) -> Option<Response> {
+    let features = Features::of(measured);
+    let (f, fp) = (features.f_dip?, features.f_res?);
+    let ratio = (fp / f).powi(2) - 1.0;
+    // far from both, Ω/τ = (ω² − Ω²)/(jΩ I0 (ω_p² − Ω²))
+    let mut inertias: Vec<f64> = measured
+        .frequency
+        .iter()
+        .zip(&measured.response)
+        .filter(|(g, _)| **g < 0.9 * f || **g > 1.1 * fp)
+        .map(|(g, h)| ((f * f - g * g) / (fp * fp - g * g)).abs() / (TAU * g * h.norm()))
+        .collect();
+    inertias.sort_by(f64::total_cmp);
+    let inertia = *inertias.get(inertias.len() / 2)?;
+    Some(Response {
+        slosh_frequency: f,
+        slosh_damping: 0.005,
+        resonance_frequency: fp,
+        slosh_mass: ratio * inertia / bench.arm.powi(2),
+        inertia,
+        fit: 0.0,
+    })
+}
+
+/// Friction from the balance of mean power over windows of 20 s: ⟨τω⟩ = b⟨ω²⟩ + c⟨|ω|⟩, least
+/// squares. Rough (the liquid takes and gives as well), but of the right size.
+fn friction(recordings: &[Recording]) -> Start {
+    let (mut ss, mut sa, mut aa, mut sp, mut ap, mut squares, mut rows) = (0., 0., 0., 0., 0., 0., 0.);
+    for r in recordings {
+        let width = ((20.0 / r.step()) as usize).max(2);
+        for k in (0..r.rate.len().saturating_sub(width)).step_by(width) {
+            let mean = |f: &dyn Fn(usize) -> f64| (k..k + width).map(f).sum::<f64>() / width as f64;
+            let offset = mean(&|i| r.rate[i]);
+            let (s, a) = (mean(&|i| (r.rate[i] - offset).powi(2)), mean(&|i| (r.rate[i] - offset).abs()));
+            let p = mean(&|i| r.torque[i] * (r.rate[i] - offset));
+            ss += s * s;
+            sa += s * a;
+            aa += a * a;
+            sp += s * p;
+            ap += a * p;
+            squares += s;
+            rows += 1.0;
+        }
+    }
+    let determinant = ss * aa - sa * sa;
+    let (b, c) = ((sp * aa - ap * sa) / determinant, (ap * ss - sp * sa) / determinant);
+    let rms = (squares / rows).sqrt();
+    // neither may vanish: the power alone would then be the other's
+    let all = ap / aa;
+    let c = if c.is_finite() { c.clamp(0.1 * all, all) } else { all };
+    let b = if b.is_finite() { b.clamp(0.1 * all / rms, all / rms) } else { all / rms };
+    let omega_s = rms;
+    Start { d: 0.0, h: 0.0, zeta: 0.003, hub_inertia: 0.0, b, c, stribeck: 0.5 * c, omega_s }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bench::analysis::{BAND, linear::Linear};
+
+    const BENCH: Bench = Bench { arm: 0.225, density: 1000.0, gravity: 9.81 };
+
+    #[test]
+    fn poles_and_zeros_of_the_exact_response_give_the_bench_back() {
+        let measured = Linear::bench_10_cm(0.002_975_7).frequency_response(&logarithmic_grid(BAND, 1200));
+        let found = translate(&measured, BENCH).unwrap();
+        // the table of physics: 10 cm of water in a cylinder of 163 mm
+        assert!((found.slosh_frequency / 2.343_618_143_1 - 1.0).abs() < 1e-6, "{found:?}");
+        assert!((found.slosh_mass / 0.756_293_271_9 - 1.0).abs() < 1e-4, "{found:?}");
+        assert!((found.slosh_damping / 0.002_975_7 - 1.0).abs() < 1e-4, "{found:?}");
+        let (d, h) = tank(found.slosh_frequency, found.slosh_mass, BENCH);
+        assert!((d / 0.163 - 1.0).abs() < 1e-4 && (h / 0.1 - 1.0).abs() < 1e-3, "{d} {h}");
+    }
+}

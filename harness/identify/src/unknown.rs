@@ -1,0 +1,186 @@
+//! What is estimated: parameters of the FMU, and what stands between it and the recording.
+
+use serde::Serialize;
+
+/// One unknown number.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unknown {
+    /// What it is.
+    pub quantity: Quantity,
+    /// Unit, as in modelDescription.xml.
+    pub unit: String,
+    /// Where the search begins.
+    pub start: f64,
+    /// What is known of it beforehand: mean and standard deviation.
+    pub prior: Option<(f64, f64)>,
+    /// How it is made a variable without bounds.
+    pub scale: Scale,
+}
+
+/// Kinds of unknowns.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub enum Quantity {
+    /// A parameter of the FMU, the same in all recordings.
+    Parameter(String),
+    /// Delay from recorded torque to recorded rate, s. Torque's and gyro's own delays add up to it;
+    /// torque and rate alone cannot tell one from the other.
+    Delay,
+    /// Reading of the gyro over the rate.
+    GyroScale,
+    /// Reading of the gyro at rest, rad/s, one for each recording.
+    GyroBias(usize),
+    /// An `init.` parameter of a recording that does not start at rest.
+    Initial(usize, String),
+}
+
+impl Quantity {
+    /// Name in tables and files; that of the FMU where it is one of the FMU's.
+    pub fn name(&self) -> String {
+        match self {
+            Quantity::Parameter(name) => name.clone(),
+            Quantity::Delay => "delay".into(),
+            Quantity::GyroScale => "gyro_scale".into(),
+            Quantity::GyroBias(recording) => format!("gyro_bias[{}]", recording + 1),
+            Quantity::Initial(recording, name) => format!("{name}[{}]", recording + 1),
+        }
+    }
+
+    /// The parameter's name if it is one of the FMU's for all recordings.
+    pub fn parameter(&self) -> Option<&str> {
+        match self {
+            Quantity::Parameter(name) => Some(name),
+            _ => None,
+        }
+    }
+}
+
+/// From a value with bounds to a variable x without.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Scale {
+    /// x = ln value: positive.
+    Log,
+    /// x = ln((value − a)/(b − value)): between a and b.
+    Logit(f64, f64),
+    /// x = value/unit: free.
+    Linear(f64),
+}
+
+impl Scale {
+    /// The value for x.
+    pub fn value(self, x: f64) -> f64 {
+        match self {
+            Scale::Log => x.exp(),
+            Scale::Logit(a, b) => a + (b - a) / (1.0 + (-x).exp()),
+            Scale::Linear(unit) => x * unit,
+        }
+    }
+
+    /// The x for a value.
+    pub fn variable(self, value: f64) -> f64 {
+        match self {
+            Scale::Log => value.ln(),
+            Scale::Logit(a, b) => ((value - a) / (b - value)).ln(),
+            Scale::Linear(unit) => value / unit,
+        }
+    }
+
+    /// d value/d x.
+    pub fn slope(self, x: f64) -> f64 {
+        match self {
+            Scale::Log => x.exp(),
+            Scale::Logit(a, b) => (b - a) / (2.0 + x.exp() + (-x).exp()),
+            Scale::Linear(unit) => unit,
+        }
+    }
+}
+
+impl Unknown {
+    /// A positive parameter of the FMU.
+    pub fn positive(name: &str, unit: &str, start: f64) -> Self {
+        Unknown {
+            quantity: Quantity::Parameter(name.into()),
+            unit: unit.into(),
+            start,
+            prior: None,
+            scale: Scale::Log,
+        }
+    }
+
+    /// The same, known beforehand to be `mean` with standard deviation `deviation`.
+    pub fn known(self, mean: f64, deviation: f64) -> Self {
+        Unknown { prior: Some((mean, deviation)), ..self }
+    }
+
+    /// The direction-dependent part of dry friction, between −1 and 1.
+    pub fn asymmetry() -> Self {
+        Unknown {
+            quantity: Quantity::Parameter("friction.asymmetry".into()),
+            unit: "1".into(),
+            start: 0.0,
+            prior: None,
+            scale: Scale::Logit(-1.0, 1.0),
+        }
+    }
+
+    /// The delay from torque to rate.
+    pub fn delay() -> Self {
+        Unknown {
+            quantity: Quantity::Delay,
+            unit: "s".into(),
+            start: 0.0,
+            prior: None,
+            scale: Scale::Linear(1e-3),
+        }
+    }
+
+    /// The gyro's scale.
+    pub fn gyro_scale() -> Self {
+        Unknown {
+            quantity: Quantity::GyroScale,
+            unit: "1".into(),
+            start: 1.0,
+            prior: None,
+            scale: Scale::Log,
+        }
+    }
+
+    /// The gyro's bias in a recording.
+    pub fn gyro_bias(recording: usize) -> Self {
+        Unknown {
+            quantity: Quantity::GyroBias(recording),
+            unit: "rad/s".into(),
+            start: 0.0,
+            prior: None,
+            scale: Scale::Linear(1e-3),
+        }
+    }
+
+    /// The start of a recording that does not begin at rest: `init.omega`, `init.slosh_angle` or
+    /// `init.slosh_rate`, with what is typical of it.
+    pub fn initial(recording: usize, name: &str, unit: &str, typical: f64) -> Self {
+        Unknown {
+            quantity: Quantity::Initial(recording, name.into()),
+            unit: unit.into(),
+            start: 0.0,
+            prior: None,
+            scale: Scale::Linear(typical),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn variables_and_values_go_there_and_back() {
+        for (scale, value) in
+            [(Scale::Log, 0.163), (Scale::Logit(-1.0, 1.0), 0.1), (Scale::Linear(1e-3), -0.005)]
+        {
+            let x = scale.variable(value);
+            assert!((scale.value(x) - value).abs() < 1e-15);
+            let difference = (scale.value(x + 1e-6) - scale.value(x - 1e-6)) / 2e-6;
+            assert!((scale.slope(x) / difference - 1.0).abs() < 1e-8);
+        }
+    }
+}
