@@ -38,6 +38,7 @@ enum Command {
     Tank(tank::TankArgs),
     Gyro(gyro::GyroArgs),
     Example(example::ExampleArgs),
+    Identify(identify::IdentifyArgs),
     Release(release::ReleaseArgs),
 }
 
@@ -53,6 +54,7 @@ fn main() -> ExitCode {
         Some(Command::Tank(args)) => args.run(),
         Some(Command::Gyro(args)) => args.run(),
         Some(Command::Example(args)) => args.run(),
+        Some(Command::Identify(args)) => args.run(),
         Some(Command::Release(args)) => args.run(),
         None => everything(),
     };

@@ -75,7 +75,12 @@ pub enum Differences {
 
 impl<'a> Problem<'a> {
     /// Fits unknowns with white noise of the level that the recordings show.
-    pub fn new(fmu: &'a Fmu, setup: Setup, recordings: &'a [Recording], unknowns: Vec<Unknown>) -> Self {
+    pub fn new(
+        fmu: &'a Fmu,
+        setup: Setup,
+        recordings: &'a [Recording],
+        unknowns: Vec<Unknown>,
+    ) -> Self {
         let level = |r| Noise::white(recording::noise_level(r).max(1e-9));
         let noise = recordings.iter().map(level).collect();
         Problem { fmu, setup, recordings, unknowns, noise }
@@ -125,7 +130,12 @@ impl<'a> Problem<'a> {
             .map(|&i| {
                 let bias = self.value_of(x, &Quantity::GyroBias(i), 0.0);
                 let model = motion[i].rate.iter();
-                self.recordings[i].rate.iter().zip(model).map(|(y, w)| y - scale * w - bias).collect()
+                self.recordings[i]
+                    .rate
+                    .iter()
+                    .zip(model)
+                    .map(|(y, w)| y - scale * w - bias)
+                    .collect()
             })
             .collect();
         Ok(Answer { motion, residual })
@@ -158,7 +168,8 @@ impl<'a> Problem<'a> {
         self.noise = pairs.par_iter().map(|(r, residual)| Noise::of(&r.time, residual)).collect();
     }
 
-    fn stacked(&self, innovations: Vec<Vec<f64>>, x: &[f64]) -> DVector<f64> {
+    /// Innovations of all recordings, and how far the unknowns are from what is known of them.
+    pub fn stacked(&self, innovations: Vec<Vec<f64>>, x: &[f64]) -> DVector<f64> {
         let mut all = innovations.concat();
         for (unknown, &x) in self.unknowns.iter().zip(x) {
             if let Some((mean, deviation)) = unknown.prior {
@@ -170,7 +181,13 @@ impl<'a> Problem<'a> {
     }
 
     /// Derivatives of the stacked innovations and priors with respect to x.
-    pub fn jacobian(&self, x: &[f64], answer: &Answer, steps: &[f64], how: Differences) -> Result<DMatrix<f64>> {
+    pub fn jacobian(
+        &self,
+        x: &[f64],
+        answer: &Answer,
+        steps: &[f64],
+        how: Differences,
+    ) -> Result<DMatrix<f64>> {
         let filters = self.filters();
         let scale = self.value_of(x, &Quantity::GyroScale, 1.0);
         let rows: usize = self.recordings.iter().map(|r| r.time.len()).sum();
@@ -188,7 +205,9 @@ impl<'a> Problem<'a> {
                 let mut piece: Vec<f64> = match &unknown.quantity {
                     Quantity::GyroScale => motion.rate.iter().map(|w| -w * slope).collect(),
                     Quantity::GyroBias(of) => vec![if *of == i { -slope } else { 0.0 }; count],
-                    Quantity::Delay => motion.acceleration.iter().map(|a| scale * a * slope).collect(),
+                    Quantity::Delay => {
+                        motion.acceleration.iter().map(|a| scale * a * slope).collect()
+                    }
                     Quantity::Initial(of, _) if *of != i => vec![0.0; count],
                     Quantity::Parameter(_) | Quantity::Initial(..) => {
                         let moved = |by: f64| {
@@ -227,13 +246,14 @@ impl<'a> Problem<'a> {
 
     /// Steps of the differences that move the answer by [`MOVE`] at these sensitivities.
     pub fn steps(jacobian: &DMatrix<f64>) -> Vec<f64> {
-        let step = |norm: f64| if norm > 0.0 { (MOVE / norm).clamp(STEPS.0, STEPS.1) } else { STEPS.1 };
+        let step =
+            |norm: f64| if norm > 0.0 { (MOVE / norm).clamp(STEPS.0, STEPS.1) } else { STEPS.1 };
         jacobian.column_iter().map(|column| step(column.norm())).collect()
     }
 
     /// Searches the minimum from x.
     pub fn fit(&self, x: &[f64]) -> Result<Estimate> {
-        self.search(x, 1e-9)
+        self.search(x, 3e-8)
     }
 
     fn search(&self, x: &[f64], tolerance: f64) -> Result<Estimate> {
@@ -269,7 +289,8 @@ impl<'a> Problem<'a> {
         let (mut x, mut simulations) = (x.to_vec(), 0);
         let first = x.clone();
         for &fraction in windows {
-            let part: Vec<Recording> = self.recordings.iter().map(|r| r.beginning(fraction)).collect();
+            let part: Vec<Recording> =
+                self.recordings.iter().map(|r| r.beginning(fraction)).collect();
             let mut problem = Problem { recordings: &part, ..self.clone() };
             for (unknown, &x) in problem.unknowns.iter_mut().zip(&first) {
                 if unknown.prior.is_none() && unknown.quantity.parameter().is_some() {

@@ -93,7 +93,8 @@ pub fn read(path: &Path, done: &mut dyn FnMut(String)) -> Result<Vec<Recording>>
     let table = Table::read(path, &wanted)?;
     // an encoder is welcome, not required
     let angle = Table::read(path, &["theta"]).ok().and_then(|t| Some(t.column("theta")?.to_vec()));
-    let column = |name: &str| table.column(name).context("a column that was read").map(<[f64]>::to_vec);
+    let column =
+        |name: &str| table.column(name).context("a column that was read").map(<[f64]>::to_vec);
     let all = Recording {
         name: path.display().to_string(),
         time: column("time")?,
@@ -128,7 +129,10 @@ pub fn prepare(all: Recording, done: &mut dyn FnMut(String)) -> Result<Vec<Recor
                 "{name}: {seconds:.0} s of data are too few. Slosh of a bare tank decays in some \
                  23 s and its resonance is 14 mHz wide: at least {SHORTEST} s are needed to see it"
             );
-            done(format!("{name}: {seconds:.1} s from {:.2} s on left out: too short", part.time[0]));
+            done(format!(
+                "{name}: {seconds:.1} s from {:.2} s on left out: too short",
+                part.time[0]
+            ));
             continue;
         }
         part.from_rest = starts_at_rest(&part);
@@ -148,12 +152,21 @@ fn describe(part: &Recording) -> String {
     let step = part.step();
     let uneven = steps.iter().fold(0.0, |worst: f64, s| worst.max((s - step).abs()));
     let sampling = if uneven > 0.01 * step {
-        format!("uneven sampling ({:.1} ms on average, up to {:.1} ms off), used as it is", 1e3 * step, 1e3 * uneven)
+        format!(
+            "uneven sampling ({:.1} ms on average, up to {:.1} ms off), used as it is",
+            1e3 * step,
+            1e3 * uneven
+        )
     } else {
         format!("{:.4} Hz", 1.0 / step)
     };
     let start = if part.from_rest { "starts at rest" } else { "initial state unknown, estimated" };
-    format!("{}: {} rows, {:.1} s, {sampling}, {start}", part.name, part.time.len(), part.duration())
+    format!(
+        "{}: {} rows, {:.1} s, {sampling}, {start}",
+        part.name,
+        part.time.len(),
+        part.duration()
+    )
 }
 
 fn check_time(all: &Recording) -> Result<()> {
@@ -162,7 +175,9 @@ fn check_time(all: &Recording) -> Result<()> {
     if let Some(row) = all.time.windows(2).position(|pair| pair[1] <= pair[0]) {
         bail!(
             "{name}, row {}: time must grow, but {} s follows {} s",
-            row + 2, all.time[row + 1], all.time[row]
+            row + 2,
+            all.time[row + 1],
+            all.time[row]
         );
     }
     let mut steps: Vec<f64> = all.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -234,7 +249,9 @@ fn check_signals(part: &Recording) -> Result<()> {
         } else {
             "omega has the wrong sign, or tau_cmd and omega are swapped: the hub seems to turn against its torque"
         };
-        bail!("{name}: {fault} (correlation of tau_cmd with the derivative of omega: {leading:.2})");
+        bail!(
+            "{name}: {fault} (correlation of tau_cmd with the derivative of omega: {leading:.2})"
+        );
     }
     Ok(())
 }

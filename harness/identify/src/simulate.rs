@@ -37,7 +37,8 @@ impl Setup {
         recording: &Recording,
         delay: f64,
     ) -> Result<Motion> {
-        let reference = |name: &str| Ok::<_, anyhow::Error>(fmu.description().variable(name)?.reference);
+        let reference =
+            |name: &str| Ok::<_, anyhow::Error>(fmu.description().variable(name)?.reference);
         let mut instance = fmu.instantiate("identify")?;
         for (name, value) in &self.settings {
             instance.set(name, value)?;

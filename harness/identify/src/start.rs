@@ -20,7 +20,10 @@ use std::f64::consts::{PI, TAU};
 use anyhow::{Context, Result, ensure};
 use bench::analysis::features::Features;
 use bench::analysis::transfer_function::TransferFunction;
-use bench::analysis::{FrequencyResponse, logarithmic_grid, spa, welch::{self, Spectra}};
+use bench::analysis::{
+    FrequencyResponse, logarithmic_grid, spa,
+    welch::{self, Spectra},
+};
 
 use crate::recording::Recording;
 
@@ -92,7 +95,9 @@ pub fn response(recording: &Recording) -> Result<FrequencyResponse> {
         band.1 > 1.15 * band.0,
         "{}: the torque excites {:.2} to {:.2} Hz alone. A frequency response needs a sweep, a multisine \
          or noise around the slosh frequency",
-        recording.name, band.0, band.1
+        recording.name,
+        band.0,
+        band.1
     );
     let lag = spa::LAG.min(recording.duration() / 4.0);
     Ok(spa::frequency_response(step, &torque, &rate, &logarithmic_grid(band, 1200), lag))
@@ -142,7 +147,9 @@ pub fn from_data(recordings: &[Recording], bench: Bench) -> Result<(Option<Respo
             }
         }
     }
-    let Some(found) = best else { return Ok((None, Start { d: 0.0, h: 0.0, ..friction(recordings) })) };
+    let Some(found) = best else {
+        return Ok((None, Start { d: 0.0, h: 0.0, ..friction(recordings) }));
+    };
     let (d, h) = tank(found.slosh_frequency, found.slosh_mass, bench);
     let fixed = bench.density * PI / 4.0 * d * d * h - found.slosh_mass;
     let hub_inertia = found.inertia - fixed.max(0.0) * bench.arm.powi(2);
@@ -185,13 +192,15 @@ fn from_features(measured: &FrequencyResponse, bench: Bench) -> Option<Response>
 /// Friction from the balance of mean power over windows of 20 s: ⟨τω⟩ = b⟨ω²⟩ + c⟨|ω|⟩, least
 /// squares. Rough (the liquid takes and gives as well), but of the right size.
 fn friction(recordings: &[Recording]) -> Start {
-    let (mut ss, mut sa, mut aa, mut sp, mut ap, mut squares, mut rows) = (0., 0., 0., 0., 0., 0., 0.);
+    let (mut ss, mut sa, mut aa, mut sp, mut ap) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    let (mut squares, mut rows, mut fastest) = (0.0, 0.0, 0.0);
     for r in recordings {
         let width = ((20.0 / r.step()) as usize).max(2);
         for k in (0..r.rate.len().saturating_sub(width)).step_by(width) {
             let mean = |f: &dyn Fn(usize) -> f64| (k..k + width).map(f).sum::<f64>() / width as f64;
             let offset = mean(&|i| r.rate[i]);
-            let (s, a) = (mean(&|i| (r.rate[i] - offset).powi(2)), mean(&|i| (r.rate[i] - offset).abs()));
+            let (s, a) =
+                (mean(&|i| (r.rate[i] - offset).powi(2)), mean(&|i| (r.rate[i] - offset).abs()));
             let p = mean(&|i| r.torque[i] * (r.rate[i] - offset));
             ss += s * s;
             sa += s * a;
@@ -199,30 +208,38 @@ fn friction(recordings: &[Recording]) -> Start {
             sp += s * p;
             ap += a * p;
             squares += s;
+            fastest = f64::max(fastest, (2.0 * s).sqrt());
             rows += 1.0;
         }
     }
     let determinant = ss * aa - sa * sa;
-    let (b, c) = ((sp * aa - ap * sa) / determinant, (ap * ss - sp * sa) / determinant);
+    let c = (ap * ss - sp * sa) / determinant;
     let rms = (squares / rows).sqrt();
-    // neither may vanish: the power alone would then be the other's
+    // all losses as dry friction; the liquid's near resonance pass for viscous friction here
     let all = ap / aa;
-    let c = if c.is_finite() { c.clamp(0.1 * all, all) } else { all };
-    let b = if b.is_finite() { b.clamp(0.1 * all / rms, all / rms) } else { all / rms };
-    let omega_s = rms;
+    let c = if c.is_finite() { c.clamp(0.3 * all, 0.8 * all) } else { 0.5 * all };
+    let b = 0.3 * all / rms;
+    let omega_s = fastest / 2.0;
     Start { d: 0.0, h: 0.0, zeta: 0.003, hub_inertia: 0.0, b, c, stribeck: 0.5 * c, omega_s }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench::analysis::{BAND, linear::Linear};
+    use bench::analysis::BAND;
+    use bench::analysis::linear::{Linear, Mode};
 
     const BENCH: Bench = Bench { arm: 0.225, density: 1000.0, gravity: 9.81 };
 
+    fn bench_10_cm() -> Linear {
+        let mode = Mode { mass: 0.756_293_271_9, frequency: 2.343_618_143_1, damping: 0.002_975_7 };
+        let inertia = 0.322414 + 1.330_431_108_5 * 0.225f64.powi(2);
+        Linear { inertia, friction: 0.03793, arm: 0.225, modes: vec![mode] }
+    }
+
     #[test]
     fn poles_and_zeros_of_the_exact_response_give_the_bench_back() {
-        let measured = Linear::bench_10_cm(0.002_975_7).frequency_response(&logarithmic_grid(BAND, 1200));
+        let measured = bench_10_cm().frequency_response(&logarithmic_grid(BAND, 1200));
         let found = translate(&measured, BENCH).unwrap();
         // the table of physics: 10 cm of water in a cylinder of 163 mm
         assert!((found.slosh_frequency / 2.343_618_143_1 - 1.0).abs() < 1e-6, "{found:?}");

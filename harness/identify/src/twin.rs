@@ -54,7 +54,14 @@ pub fn record(
     };
     // steps that meet the knots
     let parts = if late == 0.0 { 1 } else { 4 };
-    let run = Run { settings: all, torque: heard, step: step / parts as f64, stop, tolerance: None, hold: false };
+    let run = Run {
+        settings: all,
+        torque: heard,
+        step: step / parts as f64,
+        stop,
+        tolerance: None,
+        hold: false,
+    };
     let mut instance = run.initialise(fmu)?;
     let table = run.drive(&mut instance, &["omega_imu"], |_| {})?;
     let rate = table.column("omega_imu").context("a column that was recorded")?;

@@ -6,6 +6,7 @@ pub mod campaign;
 pub mod check;
 pub mod example;
 pub mod gyro;
+pub mod identify;
 pub mod pack;
 pub mod release;
 pub mod run;

@@ -1,0 +1,124 @@
+//! `hubslosh identify`.
+
+use std::path::PathBuf;
+
+use anyhow::{Result, ensure};
+use host::fmi2::Fmu;
+use host::output::atomically;
+use identify::identification::{Identification, Options, identify};
+use identify::recording;
+use std::io::Write;
+
+use super::{DEFAULT_FMU, setting};
+
+/// Finds the FMU's parameters from recordings of a bench, and how sure they are.
+///
+/// Recordings have the columns time (s), tau_cmd (N.m) and omega (rad/s), and optionally theta (rad)
+/// of an encoder. Several are fitted together.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:\n  hubslosh identify sweep.parquet --out result.json\n  \
+    hubslosh identify up.csv down.csv --validate noise.csv --model linear,planar,spherical \\\n      \
+    --set tank.d=0.163 --out result.json")]
+pub struct IdentifyArgs {
+    /// Recordings, .csv or .parquet.
+    #[arg(value_name = "DATA", required = true)]
+    data: Vec<PathBuf>,
+    /// Slosh models to try.
+    #[arg(
+        long,
+        value_name = "NAME,…",
+        value_delimiter = ',',
+        default_value = "frozen,linear,planar,spherical",
+        value_parser = ["frozen", "linear", "planar", "spherical", "paraboloid"]
+    )]
+    model: Vec<String>,
+    /// Sets what is known of the bench by its FMU name; it is then not estimated.
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
+    settings: Vec<(String, String)>,
+    /// Starts from this value instead of one found in the data.
+    #[arg(long = "start", value_name = "NAME=VALUE", value_parser = start)]
+    starts: Vec<(String, f64)>,
+    /// Takes the measurement as perfect: no delay, gyro bias or friction asymmetry is estimated.
+    #[arg(long)]
+    perfect: bool,
+    /// Standard deviation of the gyro's scale about 1; 0: exactly 1.
+    #[arg(long, value_name = "NUMBER", default_value_t = 0.01)]
+    gyro_scale: f64,
+    /// The torque was held from row to row, instead of linear between them.
+    #[arg(long)]
+    hold: bool,
+    /// A recording that is simulated with the result, not fitted.
+    #[arg(long, value_name = "DATA")]
+    validate: Vec<PathBuf>,
+    /// The FMU.
+    #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
+    fmu: PathBuf,
+    /// Where to put the result, .json.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+fn start(text: &str) -> Result<(String, f64)> {
+    let (name, value) = setting(text)?;
+    let value: f64 = value.parse()?;
+    ensure!(value.is_finite() && value > 0.0, "{name} must be a positive number");
+    Ok((name, value))
+}
+
+impl IdentifyArgs {
+    /// Runs the command.
+    pub fn run(self) -> Result<()> {
+        let json = self.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+        ensure!(json, "{}: the name must end in .json", self.out.display());
+        ensure!(
+            (0.0..1.0).contains(&self.gyro_scale),
+            "--gyro-scale must be from 0 to 1, not {}",
+            self.gyro_scale
+        );
+        let mut done = Vec::new();
+        let mut read = |paths: &[PathBuf]| -> Result<Vec<_>> {
+            let mut all = Vec::new();
+            for path in paths {
+                all.extend(recording::read(path, &mut |line| {
+                    eprintln!("{line}");
+                    done.push(line);
+                })?);
+            }
+            Ok(all)
+        };
+        let recordings = read(&self.data)?;
+        let validation = read(&self.validate)?;
+        let options = Options {
+            models: self.model,
+            settings: self.settings,
+            starts: self.starts,
+            flaws: !self.perfect,
+            gyro_scale: self.gyro_scale,
+            held: self.hold,
+            validation,
+        };
+        let fmu = Fmu::open(&self.fmu)?;
+        let mut found = identify(&fmu, &recordings, &options, &mut |line| eprintln!("{line}"))?;
+        found.done.splice(0..0, done);
+        let text = found.json()?;
+        atomically(&self.out, |file| Ok(file.write_all(text.as_bytes())?))?;
+        print(&found);
+        println!("{}", self.out.display());
+        Ok(())
+    }
+}
+
+fn print(found: &Identification) {
+    println!("{:24} {:>14} {:>12} {:>9}  unit", "", "value", "std", "std %");
+    for (name, p) in found.parameters.iter().chain(&found.measurement) {
+        let percent = 100.0 * p.std / p.value.abs();
+        println!("{name:24} {:>14.7} {:>12.2e} {percent:>9.4}  {}", p.value, p.std, p.unit);
+    }
+    println!(
+        "fit {:.3} %, noise {:.2e} rad/s, condition number {:.0}, {} answers of the FMU in {:.1} s",
+        found.fit.fit_pct, found.fit.noise_white, found.condition, found.fit.simulations, found.seconds
+    );
+    for line in &found.verdict {
+        println!("{line}");
+    }
+}

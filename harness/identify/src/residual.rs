@@ -1,0 +1,176 @@
+//! Is what a model leaves the gyro's noise? Tests of the innovations (Ljung, System Identification,
+//! chapter 16), which are white with unit variance if it is.
+//!
+//! * whiteness: Ljung and Box's Q of the autocorrelations up to [`LAGS`];
+//! * in time: power in windows of [`WINDOW`] rows against the white noise level, which a burst or a clipped
+//!   stretch raises;
+//! * in frequency: power in bands of the periodogram;
+//! * cross-correlation with the torque and with its square: what is left of the input is
+//!   something the model does not do.
+//!
+//! Many rows make each test sensitive to effects of no importance; so the size of what is left
+//! is stated beside it, over the noise.
+
+use bench::analysis::Complex64;
+use realfft::RealFftPlanner;
+use serde::Serialize;
+
+/// Lags of the whiteness test.
+pub const LAGS: usize = 50;
+/// Rows of a window: 20 s at 50 Hz.
+pub const WINDOW: usize = 1000;
+/// Bands of the periodogram.
+const BANDS: usize = 100;
+/// A test fails beyond this many standard deviations: a chance of 1e-6 for one, and some 1e-4 for
+/// the hundred or so that are made.
+pub const LIMIT: f64 = 5.0;
+
+/// Test results, each in standard deviations of what chance does.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Tests {
+    /// Whiteness.
+    pub whiteness: f64,
+    /// Largest excess of a window in time, and when, s.
+    pub in_time: (f64, f64),
+    /// Largest excess of a band, and where, Hz.
+    pub in_frequency: (f64, f64),
+    /// Largest cross-correlation with the torque up to 2 s.
+    pub torque: f64,
+    /// Largest cross-correlation with the torque's square.
+    pub torque_squared: f64,
+    /// Root mean square of what is left in the worst band beyond the noise, rad/s.
+    pub left: f64,
+}
+
+impl Tests {
+    /// Whether all are passed.
+    pub fn passed(&self) -> bool {
+        self.worst() < LIMIT
+    }
+
+    /// The worst of them.
+    pub fn worst(&self) -> f64 {
+        [self.whiteness, self.in_time.0, self.in_frequency.0, self.torque, self.torque_squared]
+            .into_iter()
+            .fold(0.0, f64::max)
+    }
+
+    /// Tests innovations `e` at `time` (s) under `torque`; `white` is the noise's size, rad/s.
+    pub fn of(time: &[f64], torque: &[f64], e: &[f64], white: f64) -> Self {
+        let count = e.len() as f64;
+        let mean = e.iter().sum::<f64>() / count;
+        let e: Vec<f64> = e.iter().map(|v| v - mean).collect();
+        let power = e.iter().map(|v| v * v).sum::<f64>() / count;
+        let q: f64 = (1..=LAGS.min(e.len() - 1))
+            .map(|lag| {
+                let r = e.iter().zip(&e[lag..]).map(|(a, b)| a * b).sum::<f64>() / count / power;
+                count * (count + 2.0) * r * r / (count - lag as f64)
+            })
+            .sum();
+        let step = (time[time.len() - 1] - time[0]) / (count - 1.0);
+        let window = WINDOW.min(e.len());
+        // where the noise stands by itself; a window's power has the relative deviation √(2/n)
+        let mut windows: Vec<(f64, f64)> = e
+            .chunks_exact(window)
+            .enumerate()
+            .map(|(k, w)| (w.iter().map(|v| v * v).sum::<f64>() / window as f64, time[k * window]))
+            .collect();
+        let in_time = worst(&mut windows, (2.0 / window as f64).sqrt());
+        let (bands, width, per_band) = periodogram(&e, step);
+        let mut levels: Vec<(f64, f64)> =
+            bands.iter().enumerate().map(|(k, p)| (*p, (k as f64 + 0.5) * width)).collect();
+        let in_frequency = worst(&mut levels, (1.0 / per_band).sqrt());
+        let excess: f64 = bands.iter().map(|p| (p - median(&bands)).max(0.0)).fold(0.0, f64::max);
+        let left = white * (excess / bands.len() as f64).sqrt();
+        let squared: Vec<f64> = torque.iter().map(|t| t * t).collect();
+        Tests {
+            whiteness: normal(q, LAGS as f64),
+            in_time,
+            in_frequency,
+            torque: crossed(&e, torque, step),
+            torque_squared: crossed(&e, &squared, step),
+            left,
+        }
+    }
+}
+
+/// χ² with n degrees of freedom as a normal deviate (Wilson and Hilferty).
+fn normal(chi_squared: f64, n: f64) -> f64 {
+    let spread = 2.0 / (9.0 * n);
+    ((chi_squared / n).powf(1.0 / 3.0) - (1.0 - spread)) / spread.sqrt()
+}
+
+fn median(x: &[f64]) -> f64 {
+    let mut sorted = x.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted[sorted.len() / 2]
+}
+
+/// Largest excess over the median in standard deviations, and where; one of many is allowed as much
+/// more as the largest of them has by chance.
+fn worst(levels: &mut [(f64, f64)], deviation: f64) -> (f64, f64) {
+    let middle = median(&levels.iter().map(|(level, _)| *level).collect::<Vec<_>>());
+    let excess = |level: f64| (level / middle - 1.0) / deviation;
+    levels
+        .iter()
+        .map(|&(level, place)| (excess(level), place))
+        .fold((0.0, 0.0), |a, b| if b.0 > a.0 { b } else { a })
+}
+
+/// Mean periodogram in bands from 0 to half the sampling frequency, the bands' width (Hz) and how
+/// many lines are in each.
+fn periodogram(e: &[f64], step: f64) -> (Vec<f64>, f64, f64) {
+    let forward = RealFftPlanner::<f64>::new().plan_fft_forward(e.len());
+    let mut spectrum: Vec<Complex64> = forward.make_output_vec();
+    forward.process(&mut e.to_vec(), &mut spectrum).expect("lengths are the plan's");
+    let lines = (spectrum.len() - 1) / BANDS;
+    let power = |k: usize| spectrum[k].norm_sqr() / e.len() as f64;
+    let bands = (0..BANDS)
+        .map(|band| {
+            (1 + band * lines..1 + (band + 1) * lines).map(power).sum::<f64>() / lines as f64
+        })
+        .collect();
+    (bands, lines as f64 / (e.len() as f64 * step), lines as f64)
+}
+
+/// Largest cross-correlation of e with an input over lags from 0 to 2 s, in standard deviations if e
+/// is white, whatever the input.
+fn crossed(e: &[f64], input: &[f64], step: f64) -> f64 {
+    let mean = input.iter().sum::<f64>() / input.len() as f64;
+    let lags = ((2.0 / step) as usize).min(e.len() / 2);
+    let squares: f64 = input.iter().map(|u| (u - mean).powi(2)).sum();
+    if squares == 0.0 {
+        return 0.0;
+    }
+    (0..=lags)
+        .step_by((lags / 25).max(1))
+        .map(|lag| {
+            let sum: f64 = e[lag..].iter().zip(input).map(|(e, u)| e * (u - mean)).sum();
+            sum.abs() / squares.sqrt()
+        })
+        .fold(0.0, f64::max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn white_noise_passes_and_what_is_left_of_a_signal_does_not() {
+        let mut random = bench::random::Random::new(5, 0);
+        let time: Vec<f64> = (0..50_000).map(|k| 0.02 * f64::from(k)).collect();
+        let torque: Vec<f64> = time.iter().map(|t| 0.1 * (t * (8.0 + 0.005 * t)).sin()).collect();
+        let white: Vec<f64> = time.iter().map(|_| random.normal()).collect();
+        let tests = Tests::of(&time, &torque, &white, 1.0);
+        assert!(tests.passed(), "{tests:?}");
+        // a tenth of the noise, in the band of the torque alone
+        let leaking: Vec<f64> = white.iter().zip(&torque).map(|(e, t)| e + t).collect();
+        let tests = Tests::of(&time, &torque, &leaking, 1.0);
+        assert!(tests.torque > 10.0 && !tests.passed(), "{tests:?}");
+        // a burst of 20 s
+        let mut burst = white.clone();
+        burst[20_000..21_000].iter_mut().for_each(|e| *e *= 1.5);
+        let tests = Tests::of(&time, &torque, &burst, 1.0);
+        assert!(tests.in_time.0 > LIMIT && (tests.in_time.1 - 400.0).abs() < 1.0, "{tests:?}");
+    }
+}
