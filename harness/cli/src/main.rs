@@ -39,6 +39,7 @@ enum Command {
     Gyro(gyro::GyroArgs),
     Example(example::ExampleArgs),
     Identify(identify::IdentifyArgs),
+    Design(design::DesignArgs),
     Release(release::ReleaseArgs),
 }
 
@@ -55,6 +56,7 @@ fn main() -> ExitCode {
         Some(Command::Gyro(args)) => args.run(),
         Some(Command::Example(args)) => args.run(),
         Some(Command::Identify(args)) => args.run(),
+        Some(Command::Design(args)) => args.run(),
         Some(Command::Release(args)) => args.run(),
         None => everything(),
     };

@@ -21,10 +21,14 @@ use rayon::prelude::*;
 use crate::noise::{Noise, Whitening};
 use crate::recording::{self, Recording};
 use crate::simulate::{Motion, Setup};
+use crate::uncertainty::Covariance;
 use crate::unknown::{Quantity, Unknown};
 
 /// By how much a difference moves the answer, in units of the noise's norm of one degree of freedom.
 const MOVE: f64 = 1.0;
+/// Drift of a MEMS gyro (the thesis's LSM6DS3), until the recording's own is known. Without it the slow
+/// decay at a recording's start, where the drift is all the noise, would draw the friction after it.
+const TYPICAL: Noise = Noise { white: 1.0, drift: 0.2, time: 100.0 };
 /// Bounds of the differences' steps, in units of the variable x.
 const STEPS: (f64, f64) = (1e-6, 2e-4);
 
@@ -64,6 +68,22 @@ pub struct Estimate {
     pub simulations: usize,
 }
 
+/// A minimum with its sensitivities.
+pub struct Polished {
+    /// Variables x of the unknowns.
+    pub x: Vec<f64>,
+    /// Sensitivities there.
+    pub jacobian: DMatrix<f64>,
+    /// Covariance there.
+    pub covariance: Covariance,
+    /// The FMU's answer there.
+    pub answer: Answer,
+    /// The next step, in standard deviations of the unknown that it moves most.
+    pub remaining: f64,
+    /// Answers of the FMU that were needed.
+    pub simulations: usize,
+}
+
 /// How sensitivities are differenced.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Differences {
@@ -74,14 +94,14 @@ pub enum Differences {
 }
 
 impl<'a> Problem<'a> {
-    /// Fits unknowns with white noise of the level that the recordings show.
+    /// Fits unknowns with noise of the level that the recordings show and [`TYPICAL`] drift.
     pub fn new(
         fmu: &'a Fmu,
         setup: Setup,
         recordings: &'a [Recording],
         unknowns: Vec<Unknown>,
     ) -> Self {
-        let level = |r| Noise::white(recording::noise_level(r).max(1e-9));
+        let level = |r| Noise { white: recording::noise_level(r).max(1e-9), ..TYPICAL };
         let noise = recordings.iter().map(level).collect();
         Problem { fmu, setup, recordings, unknowns, noise }
     }
@@ -253,7 +273,48 @@ impl<'a> Problem<'a> {
 
     /// Searches the minimum from x.
     pub fn fit(&self, x: &[f64]) -> Result<Estimate> {
-        self.search(x, 3e-8)
+        self.search(x, 1e-6)
+    }
+
+    /// Gauss and Newton's steps from near a minimum, until one is shorter than a fiftieth of a
+    /// standard deviation or `rounds` are made; a step that makes it worse is not taken.
+    pub fn gauss_newton(&self, x: &[f64], how: Differences, rounds: usize) -> Result<Polished> {
+        let mut x = x.to_vec();
+        let mut answer = self.answer(&x)?;
+        let rough = self.jacobian(&x, &answer, &vec![1e-5; x.len()], Differences::Forward)?;
+        let steps = Problem::steps(&rough);
+        let mut simulations = 1 + x.len();
+        for round in 1.. {
+            let jacobian = self.jacobian(&x, &answer, &steps, how)?;
+            simulations += x.len() * if how == Differences::Central { 2 } else { 1 };
+            let names = || -> Vec<String> {
+                self.unknowns.iter().map(|unknown| unknown.quantity.name()).collect()
+            };
+            let covariance = Covariance::of(&jacobian).with_context(|| {
+                format!(
+                    "some combination of the unknowns ({}) has no influence on the recording: fewer must be \
+                     estimated",
+                    names().join(", ")
+                )
+            })?;
+            let e = self.stacked(self.innovations(&answer), &x);
+            let step = -(&covariance.x * jacobian.tr_mul(&e));
+            let size = |i: usize| step[i].abs() / covariance.x[(i, i)].sqrt();
+            let remaining = (0..x.len()).map(size).fold(0.0, f64::max);
+            let moved: Vec<f64> = x.iter().zip(step.iter()).map(|(x, step)| x + step).collect();
+            let taken =
+                (remaining > 0.02 && round < rounds).then(|| self.answer(&moved).ok()).flatten();
+            simulations += 1;
+            let better = taken.filter(|there| {
+                let there = self.stacked(self.innovations(there), &moved);
+                there.norm_squared() < e.norm_squared()
+            });
+            let Some(there) = better else {
+                return Ok(Polished { x, jacobian, covariance, answer, remaining, simulations });
+            };
+            (x, answer) = (moved, there);
+        }
+        unreachable!("the rounds end")
     }
 
     fn search(&self, x: &[f64], tolerance: f64) -> Result<Estimate> {
@@ -301,7 +362,7 @@ impl<'a> Problem<'a> {
             for noise in &mut problem.noise {
                 noise.white *= 10.0;
             }
-            let estimate = problem.search(&x, 1e-4)?;
+            let estimate = problem.search(&x, 1e-3)?;
             heard(format!("window of {:.0} %: {}", 100.0 * fraction, estimate.reason));
             simulations += estimate.simulations;
             x = estimate.x;

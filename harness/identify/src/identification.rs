@@ -148,6 +148,9 @@ struct Fitted<'a> {
     fit: ModelFit,
 }
 
+/// A search has ended if the next step is smaller than this part of a standard deviation.
+const SETTLED: f64 = 0.1;
+
 /// Least difference of the information criterion that decides (Kass and Raftery: very strong).
 const DECIDES: f64 = 10.0;
 
@@ -379,12 +382,13 @@ fn fit_model<'a>(
             (x, converged) = (best.x, best.converged);
         }
     }
-    // the noise from what is left, and once more with its filter
+    // the noise from what is left, and the minimum with its filter
     let answer = problem.answer(&x)?;
     problem.estimate_noise(&answer);
     let estimate = problem.fit(&x)?;
-    (x, converged) = (estimate.x, estimate.converged || converged);
     simulations += estimate.simulations;
+    converged |= estimate.converged;
+    x = estimate.x;
     let answer = problem.answer(&x)?;
     problem.estimate_noise(&answer);
     let deviance = problem.deviance(&answer);
@@ -458,44 +462,11 @@ fn finish(
         problem.unknowns.push(Unknown::gyro_scale().known(1.0, options.gyro_scale));
         x.push(0.0);
     }
-    let (mut jacobian, mut covariance, mut answer, mut steps);
-    let mut rounds = 0;
-    loop {
-        answer = problem.answer(&x)?;
-        // the last round's sensitivities tell how wide to difference
-        steps = vec![1e-5; x.len()];
-        if rounds == 0 {
-            let rough = problem.jacobian(&x, &answer, &steps, Differences::Forward)?;
-            steps = Problem::steps(&rough);
-            fit.simulations += x.len();
-        }
-        jacobian = problem.jacobian(&x, &answer, &steps, Differences::Central)?;
-        fit.simulations += 2 * x.len();
-        let Some(found) = Covariance::of(&jacobian) else {
-            bail!(
-                "some combination of the unknowns ({}) has no influence on the recording: fewer must be estimated",
-                problem.unknowns.iter().map(|u| u.quantity.name()).collect::<Vec<_>>().join(", ")
-            )
-        };
-        covariance = found;
-        let e = stacked(&problem, &answer, &x);
-        let step = -(&covariance.x * jacobian.tr_mul(&e));
-        let size =
-            (0..x.len()).map(|i| step[i].abs() / covariance.x[(i, i)].sqrt()).fold(0.0, f64::max);
-        rounds += 1;
-        if size < 0.02 || rounds == 3 {
-            break;
-        }
-        let moved: Vec<f64> = x.iter().zip(step.iter()).map(|(x, s)| x + s).collect();
-        let better = problem
-            .answer(&moved)
-            .ok()
-            .filter(|there| stacked(&problem, there, &moved).norm_squared() < e.norm_squared());
-        match better {
-            Some(_) => x = moved,
-            None => break,
-        }
-    }
+    let polished = problem.gauss_newton(&x, Differences::Central, 3)?;
+    fit.simulations += polished.simulations;
+    fit.converged = polished.remaining < SETTLED;
+    x = polished.x;
+    let (jacobian, covariance, answer) = (polished.jacobian, polished.covariance, polished.answer);
     let described = fit.tests.iter().all(Tests::passed);
     let e = stacked(&problem, &answer, &x);
     let mut full = covariance.x.clone();

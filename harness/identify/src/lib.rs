@@ -1,5 +1,6 @@
 //! From recordings of torque and hub rate to the FMU's parameters, with their uncertainty.
 
+pub mod design;
 pub mod fit;
 pub mod identification;
 pub mod noise;

@@ -41,6 +41,8 @@ impl Noise {
         let mut log_variance = 0.0;
         let mut rows = Vec::with_capacity(time.len());
         let (mut last_step, mut keep) = (0.0, 1.0);
+        // once the filter has settled, nothing has to be computed anew
+        let (mut last_innovation, mut settled) = (f64::NEG_INFINITY, ([1.0, 0.0, 1.0], 0.0));
         for k in 0..time.len() {
             if k > 0 {
                 let step = time[k] - time[k - 1];
@@ -50,10 +52,15 @@ impl Noise {
                 variance = keep * keep * variance + drift * (1.0 - keep * keep);
             }
             let innovation = variance + white;
-            let gain = variance / innovation;
-            rows.push([keep, gain, innovation.sqrt().recip()]);
-            log_variance += innovation.ln();
-            variance *= 1.0 - gain;
+            if (innovation - last_innovation).abs() > 1e-12 * innovation {
+                let gain = variance / innovation;
+                settled = ([keep, gain, innovation.sqrt().recip()], innovation.ln());
+                last_innovation = innovation;
+            }
+            settled.0[0] = keep;
+            rows.push(settled.0);
+            log_variance += settled.1;
+            variance *= 1.0 - settled.0[1];
         }
         Whitening { rows, log_variance }
     }
@@ -85,7 +92,7 @@ impl Noise {
             }
             if !moved {
                 reach = (reach.0 / 2.0, reach.1 / 2.0);
-                if reach.0 < 0.1 {
+                if reach.0 < 0.15 {
                     break;
                 }
             }

@@ -116,7 +116,11 @@ fn print(found: &Identification) {
     }
     println!(
         "fit {:.3} %, noise {:.2e} rad/s, condition number {:.0}, {} answers of the FMU in {:.1} s",
-        found.fit.fit_pct, found.fit.noise_white, found.condition, found.fit.simulations, found.seconds
+        found.fit.fit_pct,
+        found.fit.noise_white,
+        found.condition,
+        found.fit.simulations,
+        found.seconds
     );
     for line in &found.verdict {
         println!("{line}");

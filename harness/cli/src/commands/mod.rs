@@ -4,6 +4,7 @@ use anyhow::{Context, Result};
 
 pub mod campaign;
 pub mod check;
+pub mod design;
 pub mod example;
 pub mod gyro;
 pub mod identify;

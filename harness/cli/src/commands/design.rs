@@ -1,0 +1,132 @@
+//! `hubslosh design`.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use anyhow::{Result, bail};
+use bench::profile::Written;
+use bench::table::{self, Table};
+use host::fmi2::Fmu;
+use identify::design::{self, Multisine};
+use identify::noise::Noise;
+use identify::simulate::Setup;
+use identify::unknown::Unknown;
+
+use super::{DEFAULT_FMU, setting};
+
+/// Says beforehand what a planned experiment will tell about each parameter (Cramér–Rao bound).
+#[derive(clap::Args)]
+#[command(after_help = "Examples:\n  hubslosh design --profile lin-sweep:amplitude=0.1\n  \
+    hubslosh design --multisine 0.25 --duration 600 --out torque.csv")]
+pub struct DesignArgs {
+    /// Torque profile, as of `hubslosh run`.
+    #[arg(long, value_name = "PROFILE", conflicts_with = "multisine")]
+    profile: Option<String>,
+    /// An odd random-phase multisine with detection lines and this peak, N.m.
+    #[arg(long, value_name = "PEAK")]
+    multisine: Option<f64>,
+    /// Period of the multisine, s.
+    #[arg(long, value_name = "SECONDS", default_value_t = 100.0)]
+    period: f64,
+    /// Length of the multisine, s.
+    #[arg(long, value_name = "SECONDS", default_value_t = 600.0)]
+    duration: f64,
+    /// Band of the multisine, Hz.
+    #[arg(long, value_name = "HZ,HZ", value_delimiter = ',', default_value = "1.25,3.5")]
+    band: Vec<f64>,
+    /// Draw of the phases and the detection lines.
+    #[arg(long, value_name = "NUMBER", default_value_t = 1)]
+    seed: u64,
+    /// Sets a parameter to what is expected of the bench.
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
+    settings: Vec<(String, String)>,
+    /// Delay, gyro bias and friction asymmetry are to be estimated as well.
+    #[arg(long)]
+    flaws: bool,
+    /// The FMU.
+    #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
+    fmu: PathBuf,
+    /// Where to put the torque, .csv or .parquet.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Rows of the plan are this far apart, s.
+const STEP: f64 = 0.02;
+
+impl DesignArgs {
+    /// Runs the command.
+    pub fn run(self) -> Result<()> {
+        if let Some(out) = &self.out {
+            table::check_ending(out)?;
+        }
+        let (time, torque) = match (&self.profile, self.multisine) {
+            (Some(profile), _) => {
+                let torque = profile.parse::<Written>()?.torque()?;
+                let (start, stop) = torque.span();
+                let rows = ((stop - start) / STEP).round() as usize;
+                let time: Vec<f64> = (0..=rows).map(|k| start + k as f64 * STEP).collect();
+                let tau: Vec<f64> = time.iter().map(|&t| torque.at(t)).collect();
+                (time, tau)
+            }
+            (None, Some(peak)) => {
+                let [f0, f1] = self.band[..] else { bail!("--band needs two frequencies, Hz") };
+                let torque = Multisine::new(self.period, (f0, f1), peak, self.seed)?;
+                let rows = (self.duration / STEP).round() as usize;
+                let time: Vec<f64> = (0..=rows).map(|k| k as f64 * STEP).collect();
+                let tau: Vec<f64> = time.iter().map(|&t| torque.at(t)).collect();
+                (time, tau)
+            }
+            (None, None) => bail!("a plan needs --profile or --multisine"),
+        };
+        let fmu = Fmu::open(&self.fmu)?;
+        let mut instance = fmu.instantiate("design")?;
+        for (name, value) in &self.settings {
+            instance.set(name, value)?;
+        }
+        instance.setup_experiment(None, 0.0, None)?;
+        instance.enter_initialization_mode()?;
+        let mut real = |name: &str| instance.real(name);
+        let zeta = real("slosh.damping[1]")?;
+        let mut unknowns = Vec::new();
+        for name in [
+            "tank.d",
+            "tank.h",
+            "slosh.zeta",
+            "hub.I",
+            "friction.b",
+            "friction.c",
+            "friction.d",
+            "friction.omega_s",
+        ] {
+            let unit =
+                fmu.description().variable(name)?.attributes().unit.clone().unwrap_or_default();
+            let value = if name == "slosh.zeta" { zeta } else { real(name)? };
+            unknowns.push(Unknown::positive(name, &unit, value));
+        }
+        if self.flaws {
+            unknowns.extend([Unknown::asymmetry(), Unknown::delay(), Unknown::gyro_bias(0)]);
+        }
+        let (arw, rate) = (real("imu.arw")?, real("imu.rate")?);
+        let white = arw * rate.sqrt();
+        // Gauss–Markov bias of IEEE Std 952: its standard deviation is the instability over 0.664
+        let drift = real("imu.bias_instability")? / 0.664 / white;
+        let noise = Noise { white, drift, time: real("imu.bias_time")? };
+        let mut settings = self.settings;
+        settings.push(("slosh.zeta_from_correlation".into(), "false".into()));
+        let plan = (time.clone(), torque.clone());
+        let bounds =
+            design::cramer_rao(&fmu, Setup { settings, held: false }, plan, unknowns, noise)?;
+        println!("{:20} {:>12} {:>12} {:>9}", "", "expected", "std", "std %");
+        for (name, value, deviation) in bounds {
+            let percent = 100.0 * deviation / value.abs();
+            println!("{name:20} {value:>12.6} {deviation:>12.2e} {percent:>9.4}");
+        }
+        if let Some(out) = &self.out {
+            let names = ["time", "tau_cmd"].map(String::from).to_vec();
+            Table::new(names, vec![time, torque]).write(out, &BTreeMap::new())?;
+            println!("{}", out.display());
+        }
+        Ok(())
+    }
+}
