@@ -200,6 +200,12 @@ impl<'a> Problem<'a> {
         DVector::from_vec(all)
     }
 
+    /// The sum of squares that a fit minimises.
+    pub fn cost(&self, x: &[f64]) -> Result<f64> {
+        let answer = self.answer(x)?;
+        Ok(self.stacked(self.innovations(&answer), x).norm_squared())
+    }
+
     /// Derivatives of the stacked innovations and priors with respect to x.
     pub fn jacobian(
         &self,

@@ -382,6 +382,29 @@ fn fit_model<'a>(
             (x, converged) = (best.x, best.converged);
         }
     }
+    // A Stribeck speed far from the data's speeds is a minimum of its own: then once more, the tank as
+    // it was found and the friction from its start.
+    let speed = |x: &[f64]| {
+        let is = |u: &Unknown| u.quantity.parameter() == Some("friction.omega_s");
+        let place = problem.unknowns.iter().position(is)?;
+        Some(x[place] - problem.start()[place])
+    };
+    if model != "frozen" && speed(&x).is_some_and(|off| off.abs() > 1.5 || !converged) {
+        heard(format!("{model}: friction far from the data's speeds; again from its start"));
+        let starts = problem.start();
+        let mut other = x.clone();
+        for ((x, start), unknown) in other.iter_mut().zip(starts).zip(&problem.unknowns) {
+            if unknown.quantity.parameter().is_some_and(|name| name.starts_with("friction.")) {
+                *x = start;
+            }
+        }
+        let again =
+            problem.fit_growing(&other, &WHOLE, &mut |line| heard(format!("{model}: {line}")))?;
+        simulations += again.simulations;
+        if problem.cost(&again.x)? < problem.cost(&x)? {
+            (x, converged) = (again.x, again.converged);
+        }
+    }
     // the noise from what is left, and the minimum with its filter
     let answer = problem.answer(&x)?;
     problem.estimate_noise(&answer);
