@@ -685,7 +685,8 @@ fn words(
         ));
     }
     if !fit.converged {
-        lines.push("The search did not end at a minimum.".into());
+        lines.push("The search did not end at a minimum: values and standard deviations are not to be trusted, least of all \
+             those of the friction. More torque, a longer recording or --start may help.".into());
     }
     for c in combinations {
         lines.push(format!(
