@@ -107,10 +107,10 @@ pub fn response(recording: &Recording) -> Result<FrequencyResponse> {
 pub fn translate(measured: &FrequencyResponse, bench: Bench) -> Option<Response> {
     let model = TransferFunction::fit(measured)?;
     let inertia = 1.0 / model.numerator[0];
-    let w = TAU * model.zero_frequency();
+    let w = TAU * model.zero_frequency()?;
     let (p, wp, zp) = (model.real_pole, model.pole_omega, model.pole_damping);
     let b = p * wp * wp * inertia / (w * w);
-    let z = model.zero_damping();
+    let z = model.zero_damping()?;
     let total = (inertia * (wp * wp + 2.0 * zp * wp * p) - 2.0 * z * w * b) / (w * w);
     let found = Response {
         slosh_frequency: w / TAU,

@@ -56,6 +56,7 @@ pub fn record(
     let parts = if late == 0.0 { 1 } else { 4 };
     let run = Run {
         settings: all,
+        input: Some(bench::run::TORQUE.into()),
         torque: heard,
         step: step / parts as f64,
         stop,
