@@ -168,7 +168,7 @@ fn no_model_raises_a_floating_point_exception() {
         "g_axial",
     ];
     let said = run(
-        fmu.host("traps", &["tests/abuse/traps.c"], &[])
+        fmu.host("traps", &["tests/abi/traps.c"], &[])
             .arg(&fmu.library)
             .args([fmu.guid(), &states.to_string(), root.get("numberOfEventIndicators").unwrap()])
             .args([items("slosh.model"), items("friction.model")])

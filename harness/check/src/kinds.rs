@@ -119,13 +119,18 @@ fn at_points(
     pairs: &[Pair],
     wrong: &mut BTreeSet<usize>,
     findings: &mut Findings,
+    initializing: bool,
 ) -> Result<Vec<Option<Factor>>> {
     let guest = session.guest;
     let mut first_factors = vec![None; pairs.len()];
     let exchange = session.interface == Interface::ModelExchange;
+    let stepping = !exchange && !initializing;
     let mut random = fastrand::Rng::with_seed(1);
     for point in 0..3 {
-        if point > 0 && exchange {
+        if point > 0 && stepping {
+            session.advance(2)?;
+        }
+        if point > 0 && exchange && !initializing {
             // other states, between the same events
             let states = states(guest);
             let mut x = vec![0.0; states.len()];
@@ -148,7 +153,7 @@ fn at_points(
                     None => first_factors[n] = Some(now),
                     Some(known) if now.differs(&known) => {
                         wrong.insert(n);
-                        pair.tell(findings, known, now, "at two points between the same events");
+                        pair.tell(findings, known, now, "at two points of one run");
                         break;
                     }
                     Some(_) => {}
@@ -165,8 +170,14 @@ pub fn kinds(guest: &Guest, findings: &mut Findings) -> Result<()> {
     let initial = pairs(guest, "InitialUnknowns", &d.initial_unknowns);
     let mut running = pairs(guest, "Outputs", &d.outputs);
     running.extend(pairs(guest, "Derivatives", &d.derivatives));
-    if guest.interfaces().contains(&Interface::ModelExchange) && !running.is_empty() {
-        look(guest, findings, &running, Interface::ModelExchange, false)?;
+    let mut interface = Interface::ModelExchange;
+    if !guest.interfaces().contains(&interface) {
+        interface = Interface::CoSimulation;
+        // Between two steps there may be events.
+        running.retain(|pair| pair.kind != "discrete");
+    }
+    if !running.is_empty() && guest.interfaces().contains(&interface) {
+        look(guest, findings, &running, interface, false)?;
     }
     if !initial.is_empty() {
         look(guest, findings, &initial, first(guest)?, true)?;
@@ -201,7 +212,9 @@ fn look(
         if !ready || session.is_ended() {
             continue;
         }
-        let Ok(factors) = at_points(&mut session, pairs, &mut wrong, findings) else { continue };
+        let Ok(factors) = at_points(&mut session, pairs, &mut wrong, findings, initializing) else {
+            continue;
+        };
         for (n, (pair, now)) in pairs.iter().zip(factors).enumerate() {
             let Some(now) = now.filter(|_| pair.kind == "constant") else { continue };
             match always[n] {

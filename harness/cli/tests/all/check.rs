@@ -214,7 +214,7 @@ fn archives_that_hosts_stumble_over_are_told() {
             ),
             (
                 "capitals of a platform",
-                renamed(&binary(), &binary().replace("linux64", "Linux64")),
+                renamed(&binary(), &binary().replace(PLATFORM, &PLATFORM.to_uppercase())),
                 &["zip.capitals"],
             ),
             (
@@ -454,7 +454,7 @@ fn descriptions_that_break_a_rule_are_told() {
             ("200,000 levels", own(nested(200_000)), &["xml.size"]),
             (
                 "an item's value twice",
-                changed("<Item name=\"linear\"", "value=\"2\"", "value=\"1\""),
+                changed("<SimpleType name=\"SloshModel\"", "value=\"2\"", "value=\"1\""),
                 &["xml.unique", "xml.range"],
             ),
             (
@@ -660,7 +660,7 @@ fn binaries_that_no_host_can_use_are_told() {
             ),
             (
                 "in a platform's folder with other capitals",
-                renamed(&name.replace("linux64", "Linux64")),
+                renamed(&name.replace(PLATFORM, &PLATFORM.to_uppercase())),
                 &["bin.present", "bin.this_platform"],
             ),
         ],
@@ -703,7 +703,10 @@ fn misbehaving(word: &str) -> Vec<u8> {
     let text = xml();
     let guid = text.split("guid=\"").nth(1).unwrap().split('"').next().unwrap();
     files.push((format!("{folder}/real.so"), ours));
-    files.push((format!("{folder}/misbehaviour.txt"), format!("{word} {guid}\n").into_bytes()));
+    let tunable = text.split("name=\"friction.b\" valueReference=\"").nth(1).unwrap();
+    let tunable = tunable.split('"').next().unwrap();
+    let said = format!("{word} {guid} {tunable}\n");
+    files.push((format!("{folder}/misbehaviour.txt"), said.into_bytes()));
     zipped(&files, CompressionMethod::Stored)
 }
 

@@ -44,8 +44,7 @@ static int is(const char *name) { return strcmp(word, name) == 0; }
 
 static void *find(const char *name) { return dlsym(real, name); }
 
-/* Value reference of the tunable parameter friction.b. */
-enum { FRICTION_B = 129 };
+static unsigned friction_b; /* value reference of a tunable parameter */
 
 /* Calls the function of the same name in real.so. */
 #define REAL(type, name, parameters) ((type(*) parameters)find(#name))
@@ -60,7 +59,7 @@ __attribute__((constructor)) static void load(void)
     snprintf(path, sizeof path - 32, "%s", own.dli_fname);
     strcpy(strrchr(path, '/'), "/misbehaviour.txt");
     file = fopen(path, "r");
-    if (!file || fscanf(file, "%63s %63s", word, guid) != 2)
+    if (!file || fscanf(file, "%63s %63s %u", word, guid, &friction_b) != 3)
         abort();
     fclose(file);
     strcpy(strrchr(path, '/'), "/real.so");
@@ -209,7 +208,7 @@ Status fmi2GetReal(Component c, References r, size_t n, double *x)
         x[n] = 0;
     if (is("ignores_tunables") && is_tuned)
         for (i = 0; i < n; i++)
-            if (r[i] == FRICTION_B)
+            if (r[i] == friction_b)
                 x[i] = tuned;
     if (is("crashes_on_unknown") && status == ERROR)
         abort();
@@ -264,7 +263,7 @@ Status fmi2SetReal(Component c, References r, size_t n, const double *x)
     Status status;
     if (is("any_number") && n && !isfinite(x[0]))
         return OK;
-    if (initialised && n == 1 && r[0] == FRICTION_B) {
+    if (initialised && n == 1 && r[0] == friction_b) {
         if (is("refuses_tunables"))
             return ERROR;
         if (is("drops_tunables"))
