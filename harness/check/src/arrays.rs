@@ -6,41 +6,41 @@ use anyhow::Result;
 use super::Findings;
 use super::description::Variable;
 use super::exchange::states;
-use super::guest::{Guest, Interface, Reading, Session};
+use super::under_test::{FmuUnderTest, Interface, Reading, Session};
 use host::description::Type;
 use host::fmi2::guarded::Lists;
 
 /// Variables of some types, by value reference.
-fn references(guest: &Guest, kinds: &[Type]) -> Vec<u32> {
-    let all = guest.variables().iter().filter(|v| kinds.contains(&v.kind));
+fn references(fmu: &FmuUnderTest, kinds: &[Type]) -> Vec<u32> {
+    let all = fmu.variables().iter().filter(|v| kinds.contains(&v.kind));
     all.map(|v| v.reference).collect()
 }
 
 fn lists(session: &mut Session) -> Result<Lists> {
-    let guest = session.guest;
-    let d = guest.description();
+    let fmu = session.fmu;
+    let d = fmu.description();
     let interface = session.interface;
     let mut lists = Lists {
-        reals: references(guest, &[Type::Real]),
-        integers: references(guest, &[Type::Integer, Type::Enumeration]),
-        booleans: references(guest, &[Type::Boolean]),
-        strings: references(guest, &[Type::String]),
-        serializes: guest.can(interface, "canSerializeFMUstate"),
+        reals: references(fmu, &[Type::Real]),
+        integers: references(fmu, &[Type::Integer, Type::Enumeration]),
+        booleans: references(fmu, &[Type::Boolean]),
+        strings: references(fmu, &[Type::String]),
+        serializes: fmu.can(interface, "canSerializeFMUstate"),
         ..Lists::default()
     };
     let is_input = |v: &&Variable| v.causality == "input" && v.is_continuous();
-    for v in guest.variables().iter().filter(is_input) {
+    for v in fmu.variables().iter().filter(is_input) {
         if let Reading::Real(x) = session.get(v)? {
             lists.inputs.push((v.reference, x));
         }
     }
-    if guest.can(interface, "providesDirectionalDerivative") {
+    if fmu.can(interface, "providesDirectionalDerivative") {
         let unknowns = d.outputs.iter().filter_map(|u| d.at(u.index));
         let unknowns = unknowns.filter(|v| v.is_continuous()).map(|v| v.reference);
         lists.unknowns = unknowns.collect();
         lists.knowns = lists.inputs.iter().map(|(reference, _)| *reference).collect();
         if interface == Interface::ModelExchange {
-            for (derivative, state) in states(guest) {
+            for (derivative, state) in states(fmu) {
                 lists.unknowns.push(derivative.reference);
                 lists.knowns.push(state.reference);
             }
@@ -53,13 +53,13 @@ fn lists(session: &mut Session) -> Result<Lists> {
         Interface::CoSimulation => {
             let order = d.co_simulation.as_ref().and_then(|i| i.number("maxOutputDerivativeOrder"));
             if order.is_some_and(|order| order >= 1.0) {
-                let outputs = guest.variables().iter();
+                let outputs = fmu.variables().iter();
                 let outputs = outputs.filter(|v| v.causality == "output" && v.is_continuous());
                 lists.outputs = outputs.map(|v| v.reference).collect();
             }
         }
         Interface::ModelExchange => {
-            lists.states = Some(states(guest).len());
+            lists.states = Some(states(fmu).len());
             lists.indicators = Some(session.indicators());
         }
     }
@@ -67,15 +67,15 @@ fn lists(session: &mut Session) -> Result<Lists> {
 }
 
 /// `host.arrays`
-pub fn arrays(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    for interface in guest.interfaces() {
-        let mut session = guest.running(interface)?;
+pub fn arrays(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    for interface in fmu.interfaces() {
+        let mut session = fmu.running(interface)?;
         session.advance(3)?;
         if session.is_ended() {
             continue;
         }
         let lists = lists(&mut session)?;
-        guest.doing(format!("calls with margins around their arrays ({})", interface.name()));
+        fmu.doing(format!("calls with margins around their arrays ({})", interface.name()));
         for beside in session.instance.writes_beside(&lists) {
             findings.add(
                 format!("{}, {} ({})", beside.call, beside.array, interface.name()),

@@ -178,7 +178,8 @@ pub fn this_platform(binaries: &Binaries, findings: &mut Findings) {
         return findings.skip("without a description nobody knows what the binary is called");
     }
     if binaries.own().is_none() {
-        let calls = super::RULES.iter().filter(|r| matches!(r.look, super::Look::Calls(_))).count();
+        let calls =
+            super::RULES.iter().filter(|r| matches!(r.check, super::Check::Calls(_))).count();
         findings.add(
             format!("binaries/{PLATFORM}"),
             format!(

@@ -10,8 +10,8 @@ use anyhow::Result;
 use super::Findings;
 use super::description::{Unknown, Variable};
 use super::exchange::states;
-use super::guest::{Guest, Interface, Reading, Session, start_value};
 use super::life::first;
+use super::under_test::{FmuUnderTest, Interface, Reading, Session, start_value};
 use super::values::items;
 use host::description::Type;
 
@@ -23,13 +23,13 @@ const AT_LEAST: u64 = 40;
 const ROUNDING: f64 = 1e-9;
 
 /// An instance with parameters somewhere else; the 0th try leaves them as they are.
-pub fn moved<'g>(guest: &'g Guest, interface: Interface, attempt: u64) -> Result<Session<'g>> {
-    let mut session = guest.session(interface)?;
+pub fn moved<'f>(fmu: &'f FmuUnderTest, interface: Interface, attempt: u64) -> Result<Session<'f>> {
+    let mut session = fmu.session(interface)?;
     if attempt == 0 {
         return Ok(session);
     }
     let mut random = fastrand::Rng::with_seed(attempt);
-    let parameters = guest.variables().iter().filter(|v| v.is_set_by_hosts());
+    let parameters = fmu.variables().iter().filter(|v| v.is_set_by_hosts());
     for v in parameters {
         let Some(start) = start_value(v) else { continue };
         // Some things happen only where other numbers are as the author left them, zeros above all.
@@ -54,7 +54,7 @@ pub fn moved<'g>(guest: &'g Guest, interface: Interface, attempt: u64) -> Result
                 Reading::Real((x * (0.7 + 0.6 * random.f64())).max(min).min(max.max(min)))
             }
             Reading::Integer(_) if v.kind == Type::Enumeration => {
-                let items = items(guest, v);
+                let items = items(fmu, v);
                 match random.choice(&items) {
                     Some(item) => Reading::Integer(*item),
                     None => continue,
@@ -126,17 +126,17 @@ impl Seen {
 
     /// Tells what was seen and not declared. That a state which is an output moves with itself is
     /// nothing to tell.
-    fn tell(&self, guest: &Guest, lists: &[&Unknown], when: &str, findings: &mut Findings) {
+    fn tell(&self, fmu: &FmuUnderTest, lists: &[&Unknown], when: &str, findings: &mut Findings) {
         for unknown in lists {
             let Some(declared) = &unknown.dependencies else { continue };
             let missing = self
                 .pairs
                 .iter()
                 .filter(|(u, k)| *u == unknown.index && u != k && !declared.contains(k));
-            let missing: Vec<_> = missing.map(|(_, k)| name(guest, *k)).collect();
+            let missing: Vec<_> = missing.map(|(_, k)| name(fmu, *k)).collect();
             if !missing.is_empty() {
                 findings.add(
-                    format!("line {}, {}", unknown.line, name(guest, unknown.index)),
+                    format!("line {}, {}", unknown.line, name(fmu, unknown.index)),
                     format!("{when} it changes with {}, which is not declared", missing.join(", ")),
                 );
             }
@@ -144,8 +144,8 @@ impl Seen {
     }
 }
 
-fn name(guest: &Guest, index: usize) -> &str {
-    guest.description().at(index).map_or("?", |v| v.name.as_str())
+fn name(fmu: &FmuUnderTest, index: usize) -> &str {
+    fmu.description().at(index).map_or("?", |v| v.name.as_str())
 }
 
 fn read(session: &mut Session, variables: &[&Variable]) -> Result<Vec<Reading>> {
@@ -153,19 +153,19 @@ fn read(session: &mut Session, variables: &[&Variable]) -> Result<Vec<Reading>> 
 }
 
 /// `dependencies.running`
-pub fn running(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let d = guest.description();
+pub fn running(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let d = fmu.description();
     let lists: Vec<&Unknown> = d.outputs.iter().chain(&d.derivatives).collect();
-    if let Some(seen) = watch(guest, findings, &BTreeSet::new())? {
-        seen.tell(guest, &lists, "while running", findings);
+    if let Some(seen) = watch(fmu, findings, &BTreeSet::new())? {
+        seen.tell(fmu, &lists, "while running", findings);
     }
     Ok(())
 }
 
 /// `dependencies.feedthrough`
-pub fn feedthrough(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let d = guest.description();
-    if !guest.interfaces().contains(&Interface::ModelExchange) {
+pub fn feedthrough(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let d = fmu.description();
+    if !fmu.interfaces().contains(&Interface::ModelExchange) {
         findings.skip("in Co-Simulation an output may wait for the next step to follow its inputs");
         return Ok(());
     }
@@ -176,10 +176,10 @@ pub fn feedthrough(guest: &Guest, findings: &mut Findings) -> Result<()> {
         .flat_map(|u| u.dependencies.iter().flatten().map(|known| (u.index, *known)))
         .filter(|(_, known)| is_input(*known))
         .collect();
-    let Some(seen) = watch(guest, findings, &declared)? else { return Ok(()) };
+    let Some(seen) = watch(fmu, findings, &declared)? else { return Ok(()) };
     for (output, input) in declared.iter().filter(|pair| !seen.traces.contains(pair)) {
         if seen.moved.contains(input) {
-            let (output, input) = (name(guest, *output), name(guest, *input));
+            let (output, input) = (name(fmu, *output), name(fmu, *input));
             findings.add(
                 format!("Outputs, {output}"),
                 format!(
@@ -194,25 +194,25 @@ pub fn feedthrough(guest: &Guest, findings: &mut Findings) -> Result<()> {
 
 /// Moves inputs and states one by one at many starts, until what is wanted has been seen.
 fn watch(
-    guest: &Guest,
+    fmu: &FmuUnderTest,
     findings: &mut Findings,
     wanted: &BTreeSet<(usize, usize)>,
 ) -> Result<Option<Seen>> {
-    let d = guest.description();
+    let d = fmu.description();
     let lists: Vec<&Unknown> = d.outputs.iter().chain(&d.derivatives).collect();
     let unknowns: Vec<&Variable> = lists.iter().filter_map(|u| d.at(u.index)).collect();
     if unknowns.is_empty() {
         findings.skip("it has neither outputs nor derivatives");
         return Ok(None);
     }
-    let exchange = guest.interfaces().contains(&Interface::ModelExchange);
-    let interface = if exchange { Interface::ModelExchange } else { first(guest)? };
-    let inputs: Vec<_> = guest.variables().iter().filter(|v| v.causality == "input").collect();
-    let states = states(guest);
+    let exchange = fmu.interfaces().contains(&Interface::ModelExchange);
+    let interface = if exchange { Interface::ModelExchange } else { first(fmu)? };
+    let inputs: Vec<_> = fmu.variables().iter().filter(|v| v.causality == "input").collect();
+    let states = states(fmu);
     let mut seen = Seen::nothing();
     for attempt in 0..TRIES {
-        let mut session = moved(guest, interface, attempt)?;
-        guest.doing(format!("initialising with other parameters, try {attempt}"));
+        let mut session = moved(fmu, interface, attempt)?;
+        fmu.doing(format!("initialising with other parameters, try {attempt}"));
         // Parameters that do not go together are another try's luck.
         if session.initialise().is_err() || session.is_ended() {
             continue;
@@ -225,11 +225,11 @@ fn watch(
         }
         // Small changes at two tries, large ones at the next two.
         let share = if attempt / 2 % 2 == 0 { 1.0 / 1024.0 } else { 0.25 };
-        guest.doing(format!("moving inputs one by one, try {attempt}"));
+        fmu.doing(format!("moving inputs one by one, try {attempt}"));
         let before = read(&mut session, &unknowns)?;
         for v in &inputs {
             let start = session.get(v)?;
-            let Some(other) = elsewhere(guest, v, &start, share) else { continue };
+            let Some(other) = elsewhere(fmu, v, &start, share) else { continue };
             if session.set(v, &other).is_ok() {
                 let after = read(&mut session, &unknowns)?;
                 seen.compare(&unknowns, v, &before, &after);
@@ -237,7 +237,7 @@ fn watch(
             }
         }
         if exchange && !states.is_empty() {
-            guest.doing(format!("moving states one by one, try {attempt}"));
+            fmu.doing(format!("moving states one by one, try {attempt}"));
             let mut x = vec![0.0; states.len()];
             session.instance.continuous_states(&mut x)?;
             for (n, (_, state)) in states.iter().enumerate() {
@@ -260,8 +260,8 @@ fn watch(
 }
 
 /// Another value of a known, by about `share` of its size.
-fn elsewhere(guest: &Guest, v: &Variable, now: &Reading, share: f64) -> Option<Reading> {
-    let Reading::Real(x) = now else { return super::values::other_value(guest, v, now) };
+fn elsewhere(fmu: &FmuUnderTest, v: &Variable, now: &Reading, share: f64) -> Option<Reading> {
+    let Reading::Real(x) = now else { return super::values::other_value(fmu, v, now) };
     let (min, max) = v.bounds();
     let step = share * x.abs().max(0.1 * v.nominal().min(max.abs()));
     let there = if x + step <= max { x + step } else { x - step };
@@ -269,27 +269,27 @@ fn elsewhere(guest: &Guest, v: &Variable, now: &Reading, share: f64) -> Option<R
 }
 
 /// `dependencies.initial`
-pub fn initial(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let d = guest.description();
+pub fn initial(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let d = fmu.description();
     let lists: Vec<&Unknown> = d.initial_unknowns.iter().collect();
     let unknowns: Vec<&Variable> = lists.iter().filter_map(|u| d.at(u.index)).collect();
     if unknowns.is_empty() {
         findings.skip("it has no InitialUnknowns");
         return Ok(());
     }
-    let knowns: Vec<_> = guest.variables().iter().filter(|v| v.is_set_by_hosts()).collect();
-    let interface = first(guest)?;
+    let knowns: Vec<_> = fmu.variables().iter().filter(|v| v.is_set_by_hosts()).collect();
+    let interface = first(fmu)?;
     let mut seen = Seen::nothing();
     for attempt in 0..AT_LEAST {
-        let mut session = moved(guest, interface, attempt)?;
+        let mut session = moved(fmu, interface, attempt)?;
         session.instance.setup_experiment(None, session.time, None)?;
         session.instance.enter_initialization_mode()?;
-        guest.doing(format!("moving inputs and parameters in initialization mode, try {attempt}"));
+        fmu.doing(format!("moving inputs and parameters in initialization mode, try {attempt}"));
         let Ok(before) = read(&mut session, &unknowns) else { continue };
         let share = if attempt / 2 % 2 == 0 { 1.0 / 1024.0 } else { 0.25 };
         for v in &knowns {
             let start = session.get(v)?;
-            let Some(other) = elsewhere(guest, v, &start, share) else { continue };
+            let Some(other) = elsewhere(fmu, v, &start, share) else { continue };
             if session.set(v, &other).is_ok() {
                 if let Ok(after) = read(&mut session, &unknowns) {
                     seen.compare(&unknowns, v, &before, &after);
@@ -298,18 +298,18 @@ pub fn initial(guest: &Guest, findings: &mut Findings) -> Result<()> {
             }
         }
     }
-    seen.tell(guest, &lists, "in initialization mode", findings);
+    seen.tell(fmu, &lists, "in initialization mode", findings);
     Ok(())
 }
 
 /// `dependencies.directional`
-pub fn directional(guest: &Guest, findings: &mut Findings) -> Result<()> {
+pub fn directional(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     /// What differences and the FMU's own answer may differ by, relative to the largest derivative
     /// of the unknown: differences lose half of the digits, curvature takes more.
     const AGREE: f64 = 1e-3;
-    let d = guest.description();
-    if !guest.interfaces().contains(&Interface::ModelExchange)
-        || !guest.can(Interface::ModelExchange, "providesDirectionalDerivative")
+    let d = fmu.description();
+    if !fmu.interfaces().contains(&Interface::ModelExchange)
+        || !fmu.can(Interface::ModelExchange, "providesDirectionalDerivative")
     {
         findings.skip("providesDirectionalDerivative is not declared for Model Exchange, which alone gives access to the states");
         return Ok(());
@@ -322,10 +322,10 @@ pub fn directional(guest: &Guest, findings: &mut Findings) -> Result<()> {
         .filter(|v| v.is_continuous())
         .collect();
     let references: Vec<u32> = unknowns.iter().map(|v| v.reference).collect();
-    let states = states(guest);
+    let states = states(fmu);
     let inputs: Vec<_> =
-        guest.variables().iter().filter(|v| v.causality == "input" && v.is_continuous()).collect();
-    let mut session = guest.running(Interface::ModelExchange)?;
+        fmu.variables().iter().filter(|v| v.causality == "input" && v.is_continuous()).collect();
+    let mut session = fmu.running(Interface::ModelExchange)?;
     session.advance(3)?;
     let mut x = vec![0.0; states.len()];
     session.instance.continuous_states(&mut x)?;
@@ -334,7 +334,7 @@ pub fn directional(guest: &Guest, findings: &mut Findings) -> Result<()> {
         .map(|v| (*v, None))
         .chain(states.iter().enumerate().map(|(n, (_, state))| (*state, Some(n))));
     for (v, place) in knowns {
-        guest.doing(format!("fmi2GetDirectionalDerivative along {}", v.name));
+        fmu.doing(format!("fmi2GetDirectionalDerivative along {}", v.name));
         let given =
             session.instance.get_directional_derivative(&references, &[v.reference], &[1.0]);
         let given = match given {

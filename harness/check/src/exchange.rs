@@ -4,21 +4,21 @@ use anyhow::Result;
 
 use super::Findings;
 use super::description::Variable;
-use super::guest::{Guest, Interface, Reading, STEPS, Session};
 use super::life::expect_refusal;
+use super::under_test::{FmuUnderTest, Interface, Reading, STEPS, Session};
 
 /// An instance in continuous-time mode, or the reason why there is none.
-fn continuous<'g>(guest: &'g Guest, findings: &mut Findings) -> Result<Option<Session<'g>>> {
-    if !guest.interfaces().contains(&Interface::ModelExchange) {
+fn continuous<'f>(fmu: &'f FmuUnderTest, findings: &mut Findings) -> Result<Option<Session<'f>>> {
+    if !fmu.interfaces().contains(&Interface::ModelExchange) {
         findings.skip("it offers no Model Exchange");
         return Ok(None);
     }
-    guest.running(Interface::ModelExchange).map(Some)
+    fmu.running(Interface::ModelExchange).map(Some)
 }
 
 /// Each derivative with its state, in the order of ModelStructure: that of all state vectors.
-pub fn states(guest: &Guest) -> Vec<(&Variable, &Variable)> {
-    let d = guest.description();
+pub fn states(fmu: &FmuUnderTest) -> Vec<(&Variable, &Variable)> {
+    let d = fmu.description();
     let pair = |index| {
         let derivative: &Variable = d.at(index)?;
         Some((derivative, d.at(derivative.derivative_of()?)?))
@@ -27,11 +27,11 @@ pub fn states(guest: &Guest) -> Vec<(&Variable, &Variable)> {
 }
 
 /// `exchange.run`
-pub fn run(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let Some(mut session) = continuous(guest, findings)? else { return Ok(()) };
+pub fn run(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let Some(mut session) = continuous(fmu, findings)? else { return Ok(()) };
     session.advance(2 * STEPS)?;
     let readings = session.readings()?;
-    for (v, reading) in guest.variables().iter().zip(readings) {
+    for (v, reading) in fmu.variables().iter().zip(readings) {
         if let Reading::Real(x) = reading
             && !x.is_finite()
         {
@@ -42,15 +42,15 @@ pub fn run(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `exchange.event_iteration`
-pub fn event_iteration(guest: &Guest, findings: &mut Findings) -> Result<()> {
+pub fn event_iteration(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     // whatever else goes wrong is the business of other rules
-    let Some(mut session) = continuous(guest, findings)? else { return Ok(()) };
+    let Some(mut session) = continuous(fmu, findings)? else { return Ok(()) };
     session.advance(2 * STEPS)
 }
 
 /// `exchange.next_event_time`
-pub fn next_event_time(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let Some(mut session) = continuous(guest, findings)? else { return Ok(()) };
+pub fn next_event_time(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let Some(mut session) = continuous(fmu, findings)? else { return Ok(()) };
     session.advance(2 * STEPS)?;
     if let Some((time, next)) = session.past_event() {
         findings.add(
@@ -62,27 +62,27 @@ pub fn next_event_time(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `exchange.terminate_simulation`
-pub fn terminate_simulation(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    if !guest.interfaces().contains(&Interface::ModelExchange) {
+pub fn terminate_simulation(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    if !fmu.interfaces().contains(&Interface::ModelExchange) {
         findings.skip("it offers no Model Exchange");
         return Ok(());
     }
-    let mut session = guest.session(Interface::ModelExchange)?;
+    let mut session = fmu.session(Interface::ModelExchange)?;
     session.initialise()?;
     super::steps::tell_end(&mut session, findings)
 }
 
 /// `exchange.vectors`
-pub fn vectors(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let Some(mut session) = continuous(guest, findings)? else { return Ok(()) };
-    let (nx, ni) = (states(guest).len(), session.indicators());
+pub fn vectors(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let Some(mut session) = continuous(fmu, findings)? else { return Ok(()) };
+    let (nx, ni) = (states(fmu).len(), session.indicators());
     for moved in [false, true] {
         if moved {
             session.advance(3)?;
         }
         let (mut x, mut dx, mut nominals, mut z) =
             (vec![f64::NAN; nx], vec![f64::NAN; nx], vec![f64::NAN; nx], vec![f64::NAN; ni]);
-        guest.doing(format!("the vectors of {nx} states and {ni} event indicators"));
+        fmu.doing(format!("the vectors of {nx} states and {ni} event indicators"));
         session.instance.continuous_states(&mut x)?;
         session.instance.derivatives(&mut dx)?;
         session.instance.nominals(&mut nominals)?;
@@ -108,12 +108,12 @@ pub fn vectors(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `exchange.lengths`
-pub fn lengths(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let Some(mut session) = continuous(guest, findings)? else { return Ok(()) };
-    let (nx, ni) = (states(guest).len(), session.indicators());
+pub fn lengths(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let Some(mut session) = continuous(fmu, findings)? else { return Ok(()) };
+    let (nx, ni) = (states(fmu).len(), session.indicators());
     let place = |call: &str, n: usize, right: usize| {
         let place = format!("{call} with room for {n} numbers instead of {right}");
-        guest.doing(&place);
+        fmu.doing(&place);
         place
     };
     let (mut x, mut z) = (vec![0.0; nx + 1], vec![0.0; ni + 1]);
@@ -130,16 +130,16 @@ pub fn lengths(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `exchange.variables`
-pub fn variables(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let Some(mut session) = continuous(guest, findings)? else { return Ok(()) };
-    let states = states(guest);
+pub fn variables(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let Some(mut session) = continuous(fmu, findings)? else { return Ok(()) };
+    let states = states(fmu);
     if states.is_empty() {
         findings.skip("it has no continuous states");
         return Ok(());
     }
     session.advance(3)?;
     let (mut x, mut dx) = (vec![0.0; states.len()], vec![0.0; states.len()]);
-    guest.doing("fmi2GetContinuousStates and fmi2GetDerivatives");
+    fmu.doing("fmi2GetContinuousStates and fmi2GetDerivatives");
     session.instance.continuous_states(&mut x)?;
     session.instance.derivatives(&mut dx)?;
     for (n, (derivative, state)) in states.iter().enumerate() {

@@ -21,7 +21,7 @@
 use anyhow::Result;
 use nalgebra::{DMatrix, DVector, Dyn, LU};
 
-use super::guest::{Session, Unusable};
+use super::under_test::{Session, Unusable};
 use host::fmi2::{CallError, Status};
 
 /// Relative tolerance of a step; the FMU shall live, not be followed closely.

@@ -13,8 +13,8 @@ use super::Findings;
 use super::dependencies::moved;
 use super::description::{Unknown, Variable};
 use super::exchange::states;
-use super::guest::{Guest, Interface, Reading, Session};
 use super::life::first;
+use super::under_test::{FmuUnderTest, Interface, Reading, Session};
 
 /// Starts at which factors are measured: the first as declared, then with other parameters.
 const STARTS: u64 = 12;
@@ -43,8 +43,8 @@ impl Pair<'_> {
     }
 }
 
-fn pairs<'d>(guest: &'d Guest, list: &'static str, unknowns: &'d [Unknown]) -> Vec<Pair<'d>> {
-    let d = guest.description();
+fn pairs<'d>(fmu: &'d FmuUnderTest, list: &'static str, unknowns: &'d [Unknown]) -> Vec<Pair<'d>> {
+    let d = fmu.description();
     let mut pairs = Vec::new();
     for u in unknowns {
         let Some(unknown) = d.at(u.index).filter(|v| v.is_continuous()) else { continue };
@@ -73,9 +73,9 @@ impl Factor {
 
 /// Puts a known to a value; false if the FMU does not take it there.
 fn put(session: &mut Session, known: &Variable, x: f64) -> Result<bool> {
-    let guest = session.guest;
+    let fmu = session.fmu;
     if session.interface == Interface::ModelExchange
-        && let Some(n) = states(guest).iter().position(|(_, state)| state.index == known.index)
+        && let Some(n) = states(fmu).iter().position(|(_, state)| state.index == known.index)
     {
         let mut all = vec![0.0; session.states()];
         session.instance.continuous_states(&mut all)?;
@@ -121,7 +121,7 @@ fn at_points(
     findings: &mut Findings,
     initializing: bool,
 ) -> Result<Vec<Option<Factor>>> {
-    let guest = session.guest;
+    let fmu = session.fmu;
     let mut first_factors = vec![None; pairs.len()];
     let exchange = session.interface == Interface::ModelExchange;
     let stepping = !exchange && !initializing;
@@ -132,7 +132,7 @@ fn at_points(
         }
         if point > 0 && exchange && !initializing {
             // other states, between the same events
-            let states = states(guest);
+            let states = states(fmu);
             let mut x = vec![0.0; states.len()];
             session.instance.continuous_states(&mut x)?;
             let here = x.clone();
@@ -165,28 +165,28 @@ fn at_points(
 }
 
 /// `dependencies.kinds`
-pub fn kinds(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let d = guest.description();
-    let initial = pairs(guest, "InitialUnknowns", &d.initial_unknowns);
-    let mut running = pairs(guest, "Outputs", &d.outputs);
-    running.extend(pairs(guest, "Derivatives", &d.derivatives));
+pub fn kinds(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let d = fmu.description();
+    let initial = pairs(fmu, "InitialUnknowns", &d.initial_unknowns);
+    let mut running = pairs(fmu, "Outputs", &d.outputs);
+    running.extend(pairs(fmu, "Derivatives", &d.derivatives));
     let mut interface = Interface::ModelExchange;
-    if !guest.interfaces().contains(&interface) {
+    if !fmu.interfaces().contains(&interface) {
         interface = Interface::CoSimulation;
         // Between two steps there may be events.
         running.retain(|pair| pair.kind != "discrete");
     }
-    if !running.is_empty() && guest.interfaces().contains(&interface) {
-        look(guest, findings, &running, interface, false)?;
+    if !running.is_empty() && fmu.interfaces().contains(&interface) {
+        look(fmu, findings, &running, interface, false)?;
     }
     if !initial.is_empty() {
-        look(guest, findings, &initial, first(guest)?, true)?;
+        look(fmu, findings, &initial, first(fmu)?, true)?;
     }
     Ok(())
 }
 
 fn look(
-    guest: &Guest,
+    fmu: &FmuUnderTest,
     findings: &mut Findings,
     pairs: &[Pair],
     interface: Interface,
@@ -195,8 +195,8 @@ fn look(
     let mut wrong = BTreeSet::new();
     let mut always: Vec<Option<Factor>> = vec![None; pairs.len()];
     for start in 0..STARTS {
-        let mut session = moved(guest, interface, start)?;
-        guest.doing(format!("measuring how unknowns follow knowns, start {start}"));
+        let mut session = moved(fmu, interface, start)?;
+        fmu.doing(format!("measuring how unknowns follow knowns, start {start}"));
         let ready = if initializing {
             session
                 .instance

@@ -11,7 +11,6 @@ pub mod binaries;
 pub mod dependencies;
 pub mod description;
 pub mod exchange;
-pub mod guest;
 pub mod integrate;
 pub mod json;
 pub mod junit;
@@ -27,6 +26,7 @@ pub mod schema;
 pub mod states;
 pub mod steps;
 pub mod tunable;
+pub mod under_test;
 pub mod units;
 pub mod values;
 
@@ -42,8 +42,8 @@ use serde::{Deserialize, Serialize};
 pub use self::archive::Archive;
 pub use self::binaries::Binaries;
 pub use self::description::Description;
-pub use self::guest::Guest;
 pub use self::rules::RULES;
+pub use self::under_test::FmuUnderTest;
 
 /// How bad it is to break a rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -76,11 +76,11 @@ pub struct Rule {
     /// How bad it is to break it; a crash or an endless call is an error whatever is written here.
     pub severity: Severity,
     /// How to look.
-    pub look: Look,
+    pub check: Check,
 }
 
 /// The function behind a rule, by what it looks at.
-pub enum Look {
+pub enum Check {
     /// The zip archive.
     Archive(fn(&Archive, &mut Findings)),
     /// modelDescription.xml.
@@ -88,7 +88,7 @@ pub enum Look {
     /// The files under `binaries/`.
     Binaries(fn(&Binaries, &mut Findings)),
     /// The loaded FMU, in a process of its own. A call that fails although it must not is a finding.
-    Calls(fn(&Guest, &mut Findings) -> Result<()>),
+    Calls(fn(&FmuUnderTest, &mut Findings) -> Result<()>),
 }
 
 /// A rule that is broken.
@@ -180,7 +180,7 @@ pub struct Report {
 /// If the file cannot be read, a rule asked for is unknown, or there is no place to unpack. Whatever
 /// is wrong with the FMU is no error but a finding.
 pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) -> Result<Report> {
-    let known = |name: &str| RULES.iter().any(|rule| is_meant(rule, name));
+    let known = |name: &str| RULES.iter().any(|rule| is_selected(rule, name));
     let unknown: Vec<_> = options.only.iter().filter(|name| !known(name)).cloned().collect();
     if !unknown.is_empty() {
         let mut groups: Vec<_> =
@@ -204,11 +204,11 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
     let binaries = Binaries::new(&archive, description.as_ref().ok().copied());
     let directory = archive.unpack()?;
 
-    let meant: Vec<&'static Rule> = RULES
+    let selected: Vec<&'static Rule> = RULES
         .iter()
-        .filter(|rule| options.only.is_empty() || options.only.iter().any(|o| is_meant(rule, o)))
+        .filter(|rule| options.only.is_empty() || options.only.iter().any(|o| is_selected(rule, o)))
         .collect();
-    let calls = meant.iter().filter(|rule| matches!(rule.look, Look::Calls(_))).count();
+    let calls = selected.iter().filter(|rule| matches!(rule.check, Check::Calls(_))).count();
     let callable = match &description {
         Err(why) => Err(why.clone()),
         Ok(_) if binaries.own().is_none() => {
@@ -220,16 +220,16 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
     let one = |rule: &&'static Rule| {
         let started = std::time::Instant::now();
         let mut findings = Findings::new(rule.severity);
-        match (&rule.look, &description) {
-            (Look::Archive(look), _) => look(&archive, &mut findings),
-            (Look::Description(look), Ok(description)) => look(description, &mut findings),
+        match (&rule.check, &description) {
+            (Check::Archive(check), _) => check(&archive, &mut findings),
+            (Check::Description(check), Ok(description)) => check(description, &mut findings),
             // That it is missing or not well-formed is a rule of its own.
-            (Look::Description(_), Err(why)) => findings.skip(why.clone()),
-            (Look::Binaries(look), _) => look(&binaries, &mut findings),
-            (Look::Calls(_), _) => {
+            (Check::Description(_), Err(why)) => findings.skip(why.clone()),
+            (Check::Binaries(check), _) => check(&binaries, &mut findings),
+            (Check::Calls(_), _) => {
                 match &callable {
                     Ok(()) => {
-                        process::look(rule, directory.path(), path, options, &hung, &mut findings)
+                        process::check(rule, directory.path(), path, options, &hung, &mut findings)
                     }
                     Err(why) => findings.skip(why.clone()),
                 }
@@ -238,7 +238,7 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
         }
         Outcome { rule, findings, time: started.elapsed() }
     };
-    let mut outcomes: Vec<Outcome> = meant.par_iter().map(one).collect();
+    let mut outcomes: Vec<Outcome> = selected.par_iter().map(one).collect();
     tell_what_nobody_tells(&mut outcomes);
     Ok(Report { path: path.to_path_buf(), outcomes })
 }
@@ -260,7 +260,7 @@ fn tell_what_nobody_tells(outcomes: &mut [Outcome]) {
     }
 }
 
-fn is_meant(rule: &Rule, name: &str) -> bool {
+fn is_selected(rule: &Rule, name: &str) -> bool {
     rule.id == name || rule.id.strip_prefix(name).is_some_and(|rest| rest.starts_with('.'))
 }
 
@@ -370,9 +370,9 @@ mod tests {
     #[test]
     fn a_group_means_its_rules_and_no_others() {
         let rule = |id| RULES.iter().find(|rule| rule.id == id).unwrap();
-        assert!(is_meant(rule("zip.names"), "zip"));
-        assert!(is_meant(rule("zip.names"), "zip.names"));
-        assert!(!is_meant(rule("zip.names"), "zip.name"));
-        assert!(!is_meant(rule("zip.names"), "xml"));
+        assert!(is_selected(rule("zip.names"), "zip"));
+        assert!(is_selected(rule("zip.names"), "zip.names"));
+        assert!(!is_selected(rule("zip.names"), "zip.name"));
+        assert!(!is_selected(rule("zip.names"), "xml"));
     }
 }

@@ -4,22 +4,22 @@
 use anyhow::Result;
 
 use super::Findings;
-use super::guest::{Guest, Interface, Reading, STEPS, Session, Stage};
+use super::under_test::{FmuUnderTest, Interface, Reading, STEPS, Session, Stage};
 use host::fmi2::{CallError, Callbacks, HostState, Instance, Instantiation, Status};
 
 /// `load.opens`: what came before is the check, but for the second binary of two.
-pub fn opens(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    if let Some(why) = guest.broken() {
+pub fn opens(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    if let Some(why) = fmu.broken() {
         findings.add("the binary of one interface", why);
     }
     Ok(())
 }
 
 /// `load.types_platform`
-pub fn types_platform(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    guest.doing("fmi2GetTypesPlatform");
-    for fmu in guest.binaries() {
-        let answer = fmu.types_platform();
+pub fn types_platform(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    fmu.doing("fmi2GetTypesPlatform");
+    for binary in fmu.binaries() {
+        let answer = binary.types_platform();
         if answer != "default" {
             findings.add("fmi2GetTypesPlatform", format!("{answer:?} (allowed: \"default\")"));
         }
@@ -28,10 +28,10 @@ pub fn types_platform(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `load.version`
-pub fn version(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    guest.doing("fmi2GetVersion");
-    for fmu in guest.binaries() {
-        let answer = fmu.version();
+pub fn version(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    fmu.doing("fmi2GetVersion");
+    for binary in fmu.binaries() {
+        let answer = binary.version();
         if answer != "2.0" {
             findings.add("fmi2GetVersion", format!("{answer:?} (allowed: \"2.0\")"));
         }
@@ -40,40 +40,40 @@ pub fn version(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `load.instance`
-pub fn instance(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    for interface in guest.interfaces() {
-        guest.session(interface)?;
+pub fn instance(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    for interface in fmu.interfaces() {
+        fmu.session(interface)?;
     }
-    if guest.interfaces().is_empty() {
+    if fmu.interfaces().is_empty() {
         findings.add("fmi2Instantiate", "the binary lacks the functions of the declared interface");
     }
     Ok(())
 }
 
 /// `load.initialises`
-pub fn initialises(guest: &Guest, _: &mut Findings) -> Result<()> {
-    for interface in guest.interfaces() {
-        guest.running(interface)?;
+pub fn initialises(fmu: &FmuUnderTest, _: &mut Findings) -> Result<()> {
+    for interface in fmu.interfaces() {
+        fmu.running(interface)?;
     }
     Ok(())
 }
 
 /// `load.again`
-pub fn again(guest: &Guest, findings: &mut Findings) -> Result<()> {
+pub fn again(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut runs = Vec::new();
     for copy in ["one", "one", "two"] {
         let folder = tempfile::tempdir()?;
-        guest.doing(format!("loading copy {copy} of the binary"));
-        let copied = guest.copy(folder.path())?;
+        fmu.doing(format!("loading copy {copy} of the binary"));
+        let copied = fmu.copy(folder.path())?;
         let interface = first(&copied)?;
         let mut session = copied.running(interface)?;
         session.advance(STEPS)?;
         runs.push(session.readings()?);
         drop(session);
-        guest.doing(format!("unloading copy {copy} of the binary"));
+        fmu.doing(format!("unloading copy {copy} of the binary"));
     }
     for run in &runs[1..] {
-        if let Some(text) = guest.session(first(guest)?)?.difference(run, &runs[0]) {
+        if let Some(text) = fmu.session(first(fmu)?)?.difference(run, &runs[0]) {
             findings.add("loading it again", text);
         }
     }
@@ -81,44 +81,44 @@ pub fn again(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// The interface most rules use.
-pub fn first(guest: &Guest) -> Result<Interface> {
-    let why = || super::guest::Unusable {
+pub fn first(fmu: &FmuUnderTest) -> Result<Interface> {
+    let why = || super::under_test::Unusable {
         rule: "load.instance",
         why: "it offers no interface that can be called".into(),
     };
-    Ok(*guest.interfaces().first().ok_or_else(why)?)
+    Ok(*fmu.interfaces().first().ok_or_else(why)?)
 }
 
 /// `instantiate.guid`
-pub fn guid(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let interface = first(guest)?;
-    let wrong = format!("{}x", guest.fmu(interface).description().guid);
+pub fn guid(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let interface = first(fmu)?;
+    let wrong = format!("{}x", fmu.binary(interface).description().guid);
     for (what, guid) in [("another GUID", Some(wrong.as_str())), ("GUID NULL", None)] {
         refused(
-            guest,
+            fmu,
             interface,
             findings,
             what,
-            &Instantiation { guid, ..arguments(guest, interface) },
+            &Instantiation { guid, ..arguments(fmu, interface) },
         );
     }
     Ok(())
 }
 
-fn arguments(guest: &Guest, interface: Interface) -> Instantiation<'_> {
-    Instantiation { kind: interface.kind(), ..guest.fmu(interface).instantiation("check") }
+fn arguments(fmu: &FmuUnderTest, interface: Interface) -> Instantiation<'_> {
+    Instantiation { kind: interface.kind(), ..fmu.binary(interface).instantiation("check") }
 }
 
 fn refused(
-    guest: &Guest,
+    fmu: &FmuUnderTest,
     interface: Interface,
     findings: &mut Findings,
     what: &str,
     with: &Instantiation,
 ) {
     let place = format!("fmi2Instantiate with {what}");
-    guest.doing(&place);
-    match guest.fmu(interface).instantiate_with(with) {
+    fmu.doing(&place);
+    match fmu.binary(interface).instantiate_with(with) {
         Ok(_) => findings.add(place, "it gives an instance (allowed: NULL)"),
         Err(error) if error.messages.is_empty() => {
             findings
@@ -129,84 +129,83 @@ fn refused(
 }
 
 /// `instantiate.arguments`
-pub fn arguments_null(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let interface = first(guest)?;
+pub fn arguments_null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let interface = first(fmu)?;
     let place = "fmi2Instantiate with the resource location NULL";
-    guest.doing(place);
-    let with = Instantiation { resources: None, ..arguments(guest, interface) };
-    if let Err(error) = guest.fmu(interface).instantiate_with(&with)
-        && guest.description().co_simulation.is_some()
+    fmu.doing(place);
+    let with = Instantiation { resources: None, ..arguments(fmu, interface) };
+    if let Err(error) = fmu.binary(interface).instantiate_with(&with)
+        && fmu.description().co_simulation.is_some()
     {
         findings.add(place, error.to_string());
     }
     for (what, name) in [("instance name NULL", None), ("an empty instance name", Some(""))] {
-        let with = Instantiation { name, ..arguments(guest, interface) };
-        refused(guest, interface, findings, what, &with);
+        let with = Instantiation { name, ..arguments(fmu, interface) };
+        refused(fmu, interface, findings, what, &with);
     }
     Ok(())
 }
 
 /// `instantiate.callbacks`
-pub fn callbacks(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let interface = first(guest)?;
-    if !guest.can(interface, "canNotUseMemoryManagementFunctions") {
+pub fn callbacks(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let interface = first(fmu)?;
+    if !fmu.can(interface, "canNotUseMemoryManagementFunctions") {
         findings.skip("canNotUseMemoryManagementFunctions is not declared");
         return Ok(());
     }
     let place = "fmi2Instantiate with NULL for the memory functions";
-    guest.doing(place);
-    let with = Instantiation { callbacks: Callbacks::Logger, ..arguments(guest, interface) };
-    let made = guest.fmu(interface).instantiate_with(&with);
-    match made.map_err(anyhow::Error::from).and_then(|instance| live(guest, instance)) {
+    fmu.doing(place);
+    let with = Instantiation { callbacks: Callbacks::Logger, ..arguments(fmu, interface) };
+    let made = fmu.binary(interface).instantiate_with(&with);
+    match made.map_err(anyhow::Error::from).and_then(|instance| live(fmu, instance)) {
         Ok(()) => {}
         Err(error) => {
             findings.add(place, format!("{error} (allowed: an instance that initialises)"))
         }
     }
     // Without a logger it may refuse, and must not crash.
-    guest.doing("fmi2Instantiate with callbacks that are all NULL");
-    let with = Instantiation { callbacks: Callbacks::Empty, ..arguments(guest, interface) };
-    if let Ok(instance) = guest.fmu(interface).instantiate_with(&with)
-        && let Err(error) = live(guest, instance)
+    fmu.doing("fmi2Instantiate with callbacks that are all NULL");
+    let with = Instantiation { callbacks: Callbacks::Empty, ..arguments(fmu, interface) };
+    if let Ok(instance) = fmu.binary(interface).instantiate_with(&with)
+        && let Err(error) = live(fmu, instance)
     {
-        findings.add(guest.now(), format!("{error} (allowed: no instance, or one that works)"));
+        findings.add(fmu.now(), format!("{error} (allowed: no instance, or one that works)"));
     }
     Ok(())
 }
 
 /// A refused call and an initialisation.
-fn live(guest: &Guest, mut instance: Instance) -> Result<()> {
-    let experiment = guest.experiment();
-    guest.doing("fmi2SetupExperiment to fmi2ExitInitializationMode without callbacks");
+fn live(fmu: &FmuUnderTest, mut instance: Instance) -> Result<()> {
+    let experiment = fmu.experiment();
+    fmu.doing("fmi2SetupExperiment to fmi2ExitInitializationMode without callbacks");
     instance.setup_experiment(None, experiment.start, None)?;
     instance.enter_initialization_mode()?;
     instance.exit_initialization_mode()?;
-    guest.doing("a refused call without callbacks");
+    fmu.doing("a refused call without callbacks");
     let _ = instance.get_real(&[u32::MAX], &mut [0.0]);
     Ok(())
 }
 
 /// `instantiate.copies`
-pub fn copies(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let interface = first(guest)?;
-    guest.doing("fmi2Instantiate with callbacks that are wiped afterwards");
-    let with = Instantiation { callbacks: Callbacks::Fleeting, ..arguments(guest, interface) };
-    let mut instance = guest.fmu(interface).instantiate_with(&with)?;
-    guest.doing("a refused call after the callbacks' struct was wiped");
+pub fn copies(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let interface = first(fmu)?;
+    fmu.doing("fmi2Instantiate with callbacks that are wiped afterwards");
+    let with = Instantiation { callbacks: Callbacks::Fleeting, ..arguments(fmu, interface) };
+    let mut instance = fmu.binary(interface).instantiate_with(&with)?;
+    fmu.doing("a refused call after the callbacks' struct was wiped");
     if let Err(error) = instance.get_real(&[u32::MAX], &mut [0.0])
         && error.messages.is_empty()
     {
-        findings
-            .add(guest.now(), "no message reaches the logger (allowed: a copy of the callbacks)");
+        findings.add(fmu.now(), "no message reaches the logger (allowed: a copy of the callbacks)");
     }
     Ok(())
 }
 
 /// `instantiate.null`
-pub fn null(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    guest.doing("fmi2FreeInstance(NULL), or another call with the instance NULL");
-    for fmu in guest.binaries() {
-        for (call, status) in fmu.calls_with_null_instance() {
+pub fn null(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    fmu.doing("fmi2FreeInstance(NULL), or another call with the instance NULL");
+    for binary in fmu.binaries() {
+        for (call, status) in binary.calls_with_null_instance() {
             if !matches!(status, Status::Error | Status::Fatal) {
                 findings.add(
                     format!("{call} with the instance NULL"),
@@ -219,14 +218,14 @@ pub fn null(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `life.instances`
-pub fn instances(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    for interface in guest.interfaces() {
+pub fn instances(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    for interface in fmu.interfaces() {
         let alone = {
-            let mut session = guest.running(interface)?;
+            let mut session = fmu.running(interface)?;
             session.advance(STEPS)?;
             session.readings()?
         };
-        let (mut one, mut two) = (guest.running(interface)?, guest.running(interface)?);
+        let (mut one, mut two) = (fmu.running(interface)?, fmu.running(interface)?);
         two.advance(3)?;
         for _ in 0..STEPS {
             one.advance(1)?;
@@ -243,11 +242,11 @@ pub fn instances(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `life.deterministic`
-pub fn deterministic(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    for interface in guest.interfaces() {
+pub fn deterministic(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    for interface in fmu.interfaces() {
         let mut runs = Vec::new();
         for _ in 0..2 {
-            let mut session = guest.running(interface)?;
+            let mut session = fmu.running(interface)?;
             session.advance(STEPS)?;
             runs.push(session.readings()?);
             if let [first, second] = &runs[..]
@@ -261,18 +260,18 @@ pub fn deterministic(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `life.reset`
-pub fn reset(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    for interface in guest.interfaces() {
-        let fresh = history(&mut guest.session(interface)?)?;
-        let mut session = guest.session(interface)?;
+pub fn reset(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    for interface in fmu.interfaces() {
+        let fresh = history(&mut fmu.session(interface)?)?;
+        let mut session = fmu.session(interface)?;
         // Before the run that counts: another time, another tolerance, another history.
         perturb(&mut session);
-        let start = guest.experiment().start;
+        let start = fmu.experiment().start;
         if session.initialise_at(start + 1.0, None, Some(1e-3)).is_ok() {
             session.count = 7;
             session.advance(5)?;
         }
-        guest.doing("fmi2Reset after steps");
+        fmu.doing("fmi2Reset after steps");
         session.instance.reset()?;
         session.count = 0;
         let again = history(&mut session)
@@ -298,9 +297,9 @@ fn history(session: &mut Session) -> Result<Vec<Vec<Reading>>> {
 
 /// Changes parameters a little, those that let it.
 fn perturb(session: &mut Session) {
-    let guest = session.guest;
-    for v in guest.variables().iter().filter(|v| v.is_set_by_hosts() && v.is_real()) {
-        let Some(Reading::Real(start)) = super::guest::start_value(v) else { continue };
+    let fmu = session.fmu;
+    for v in fmu.variables().iter().filter(|v| v.is_set_by_hosts() && v.is_real()) {
+        let Some(Reading::Real(start)) = super::under_test::start_value(v) else { continue };
         let (min, max) = v.bounds();
         let moved = start * 1.01;
         if moved >= min && moved <= max {
@@ -311,21 +310,21 @@ fn perturb(session: &mut Session) {
 }
 
 /// `life.reset_anywhere`
-pub fn reset_anywhere(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    for interface in guest.interfaces() {
-        guest.running(interface)?; // if that fails, another rule tells
+pub fn reset_anywhere(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    for interface in fmu.interfaces() {
+        fmu.running(interface)?; // if that fails, another rule tells
         for (stage, from) in [
             (Stage::Instantiated, Stage::Instantiated.name()),
             (Stage::Initialization, Stage::Initialization.name()),
             (Stage::Terminated, Stage::Terminated.name()),
             (Stage::Initialised, "after an error"),
         ] {
-            let mut session = guest.session_in(interface, stage)?;
+            let mut session = fmu.session_in(interface, stage)?;
             if stage == Stage::Initialised {
                 let _ = session.instance.get_real(&[u32::MAX], &mut [0.0]);
             }
             let place = format!("fmi2Reset, {from} ({})", interface.name());
-            guest.doing(&place);
+            fmu.doing(&place);
             if let Err(error) = session.instance.reset() {
                 findings.add(place, error.to_string());
                 continue;
@@ -339,14 +338,14 @@ pub fn reset_anywhere(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `life.terminate`
-pub fn terminate(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    for interface in guest.interfaces() {
-        let mut session = guest.running(interface)?;
+pub fn terminate(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    for interface in fmu.interfaces() {
+        let mut session = fmu.running(interface)?;
         session.advance(3)?;
         let before = session.readings()?;
-        guest.doing("fmi2Terminate");
+        fmu.doing("fmi2Terminate");
         session.instance.terminate()?;
-        guest.doing("reading values after fmi2Terminate");
+        fmu.doing("reading values after fmi2Terminate");
         let after = session.readings()?;
         if let Some(text) = session.difference(&after, &before) {
             findings.add(format!("after fmi2Terminate ({})", interface.name()), text);
@@ -359,7 +358,7 @@ pub fn terminate(guest: &Guest, findings: &mut Findings) -> Result<()> {
 type Misplaced = (&'static str, fn(&mut Session) -> Result<(), CallError>);
 
 /// `life.order`
-pub fn order(guest: &Guest, findings: &mut Findings) -> Result<()> {
+pub fn order(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let setup: Misplaced =
         ("fmi2SetupExperiment", |s| s.instance.setup_experiment(None, s.time, None));
     let enter: Misplaced =
@@ -380,7 +379,7 @@ pub fn order(guest: &Guest, findings: &mut Findings) -> Result<()> {
         (Stage::Initialised, vec![setup, enter, exit]),
         (Stage::Terminated, vec![setup, enter, exit, terminate]),
     ];
-    for interface in guest.interfaces() {
+    for interface in fmu.interfaces() {
         let own = match interface {
             Interface::CoSimulation => vec![step],
             Interface::ModelExchange => vec![event, discrete, continuous, completed],
@@ -393,10 +392,10 @@ pub fn order(guest: &Guest, findings: &mut Findings) -> Result<()> {
                 _ => &own,
             };
             for (call, made) in calls.iter().chain(more) {
-                let mut session = guest.session_in(interface, *stage)?;
+                let mut session = fmu.session_in(interface, *stage)?;
                 let state = stage.name();
                 let place = format!("{call} in state \"{state}\" ({})", interface.name());
-                guest.doing(&place);
+                fmu.doing(&place);
                 expect_refusal(findings, place, made(&mut session));
             }
         }
@@ -422,22 +421,22 @@ pub fn expect_refusal(findings: &mut Findings, place: String, answer: Result<(),
 // ---------------------------------------------------------------- the host
 
 /// A life to its end, and one that an error ends.
-fn ordinary_lives(guest: &Guest, interface: Interface) -> Result<()> {
-    let mut session = guest.running(interface)?;
+fn ordinary_lives(fmu: &FmuUnderTest, interface: Interface) -> Result<()> {
+    let mut session = fmu.running(interface)?;
     session.advance(STEPS)?;
-    guest.doing("fmi2Terminate");
+    fmu.doing("fmi2Terminate");
     session.instance.terminate()?;
     drop(session);
-    let mut session = guest.running(interface)?;
-    guest.doing("fmi2GetReal of an unknown value reference");
+    let mut session = fmu.running(interface)?;
+    fmu.doing("fmi2GetReal of an unknown value reference");
     let _ = session.instance.get_real(&[u32::MAX], &mut [0.0]);
     Ok(())
 }
 
 /// `host.silent`: the process that runs this one looks at what is printed.
-pub fn silent(guest: &Guest, _: &mut Findings) -> Result<()> {
-    for interface in guest.interfaces() {
-        ordinary_lives(guest, interface)?;
+pub fn silent(fmu: &FmuUnderTest, _: &mut Findings) -> Result<()> {
+    for interface in fmu.interfaces() {
+        ordinary_lives(fmu, interface)?;
     }
     Ok(())
 }
@@ -463,10 +462,10 @@ fn surroundings() -> Vec<(&'static str, String)> {
 }
 
 /// `host.untouched`
-pub fn untouched(guest: &Guest, findings: &mut Findings) -> Result<()> {
+pub fn untouched(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let before = surroundings();
-    for interface in guest.interfaces() {
-        ordinary_lives(guest, interface)?;
+    for interface in fmu.interfaces() {
+        ordinary_lives(fmu, interface)?;
     }
     for ((name, before), (_, after)) in before.into_iter().zip(surroundings()) {
         if before != after {

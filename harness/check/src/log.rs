@@ -3,25 +3,25 @@
 use anyhow::Result;
 
 use super::Findings;
-use super::guest::{Guest, STEPS};
 use super::life::first;
+use super::under_test::{FmuUnderTest, STEPS};
 use host::fmi2::{Instantiation, Message};
 
 /// What an FMU says to several mistakes.
-fn complaints(guest: &Guest) -> Result<Vec<Message>> {
-    let interface = first(guest)?;
+fn complaints(fmu: &FmuUnderTest) -> Result<Vec<Message>> {
+    let interface = first(fmu)?;
     let mut all = Vec::new();
-    guest.doing("fmi2Instantiate with another GUID");
+    fmu.doing("fmi2Instantiate with another GUID");
     let with = Instantiation {
         kind: interface.kind(),
         guid: Some("another"),
-        ..guest.fmu(interface).instantiation("check")
+        ..fmu.binary(interface).instantiation("check")
     };
-    if let Err(error) = guest.fmu(interface).instantiate_with(&with) {
+    if let Err(error) = fmu.binary(interface).instantiate_with(&with) {
         all.extend(error.messages);
     }
-    let mut session = guest.session(interface)?;
-    guest.doing("fmi2SetDebugLogging");
+    let mut session = fmu.session(interface)?;
+    fmu.doing("fmi2SetDebugLogging");
     session.instance.set_debug_logging(true, &[])?;
     let _ = session.instance.exit_initialization_mode();
     if session.initialise().is_ok() {
@@ -33,22 +33,22 @@ fn complaints(guest: &Guest) -> Result<Vec<Message>> {
 }
 
 /// `log.percent`
-pub fn percent(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let interface = first(guest)?;
+pub fn percent(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let interface = first(fmu)?;
     // If the text becomes the format, %d prints some number and %% one sign; neither can crash.
     const TEXT: &str = "{a%db%%c}";
     let mut told = Vec::new();
     let place = format!("a message about {TEXT:?}");
-    guest.doing(&place);
+    fmu.doing(&place);
     let with = Instantiation {
         kind: interface.kind(),
         guid: Some(TEXT),
-        ..guest.fmu(interface).instantiation(TEXT)
+        ..fmu.binary(interface).instantiation(TEXT)
     };
-    if let Err(error) = guest.fmu(interface).instantiate_with(&with) {
+    if let Err(error) = fmu.binary(interface).instantiate_with(&with) {
         told.extend(error.messages);
     }
-    let mut session = guest.session(interface)?;
+    let mut session = fmu.session(interface)?;
     if let Err(error) = session.instance.set_debug_logging(true, &[TEXT]) {
         told.extend(error.messages);
     }
@@ -71,14 +71,14 @@ pub fn percent(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `log.categories`
-pub fn categories(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let root = &guest.description().root;
+pub fn categories(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let root = &fmu.description().root;
     let declared: Vec<&str> = root.list("LogCategories").filter_map(|c| c.get("name")).collect();
     if declared.is_empty() {
         findings.skip("no categories are declared");
         return Ok(());
     }
-    let mut unknown: Vec<String> = complaints(guest)?
+    let mut unknown: Vec<String> = complaints(fmu)?
         .into_iter()
         .map(|message| message.category)
         .filter(|category| !declared.contains(&category.as_str()))
@@ -93,8 +93,8 @@ pub fn categories(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `log.text`
-pub fn text(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let messages = complaints(guest)?;
+pub fn text(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let messages = complaints(fmu)?;
     if messages.is_empty() {
         findings.skip("it logs nothing");
     }
@@ -115,13 +115,15 @@ pub fn text(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `log.quiet`
-pub fn quiet(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    for interface in guest.interfaces() {
-        guest.doing("fmi2Instantiate, loggingOn");
-        let with =
-            Instantiation { kind: interface.kind(), ..guest.fmu(interface).instantiation("check") };
-        let mut session = guest.session(interface)?;
-        session.instance = guest.fmu(interface).instantiate_with(&with)?;
+pub fn quiet(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    for interface in fmu.interfaces() {
+        fmu.doing("fmi2Instantiate, loggingOn");
+        let with = Instantiation {
+            kind: interface.kind(),
+            ..fmu.binary(interface).instantiation("check")
+        };
+        let mut session = fmu.session(interface)?;
+        session.instance = fmu.binary(interface).instantiate_with(&with)?;
         session.initialise()?;
         session.advance(STEPS)?;
         session.instance.terminate()?;
@@ -137,14 +139,14 @@ pub fn quiet(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `log.switch`
-pub fn switch(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let mut session = guest.session(first(guest)?)?;
-    let root = &guest.description().root;
+pub fn switch(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let mut session = fmu.session(first(fmu)?)?;
+    let root = &fmu.description().root;
     let declared: Vec<&str> = root.list("LogCategories").filter_map(|c| c.get("name")).collect();
     let sets = declared.iter().map(std::slice::from_ref).chain([&[][..], &declared[..]]);
     for (set, on) in sets.flat_map(|set| [(set, true), (set, false)]) {
         let place = format!("fmi2SetDebugLogging({on}, {set:?})");
-        guest.doing(&place);
+        fmu.doing(&place);
         if let Err(error) = session.instance.set_debug_logging(on, set) {
             findings.add(place, error.to_string());
         }

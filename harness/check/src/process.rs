@@ -12,8 +12,8 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 
-use super::guest::{Guest, Unusable};
-use super::{Findings, Look, Options, RULES, Rule};
+use super::under_test::{FmuUnderTest, Unusable};
+use super::{Check, Findings, Options, RULES, Rule};
 
 /// The hidden subcommand of `hubslosh`.
 pub const SUBCOMMAND: &str = "check-calls";
@@ -57,7 +57,7 @@ impl Trace {
 
 /// Looks at one rule in a process of its own; `path` is what the FMU is called, `directory` where it
 /// is unpacked.
-pub fn look(
+pub fn check(
     rule: &'static Rule,
     directory: &Path,
     path: &Path,
@@ -170,26 +170,26 @@ pub fn answer(
     limit: Duration,
 ) -> Result<()> {
     let rule = RULES.iter().find(|rule| rule.id == id).context("no such rule")?;
-    let Look::Calls(look) = rule.look else { anyhow::bail!("{id} makes no calls") };
+    let Check::Calls(check) = rule.check else { anyhow::bail!("{id} makes no calls") };
     let trace = Trace(File::create(answer)?);
     trace.doing(LOADING);
     let mut findings = Findings::new(rule.severity);
     // a rule that is slow, and not hung, shall tell what it has found by then
     let deadline = Instant::now() + limit.mul_f64(0.75);
-    match Guest::open(directory, path, trace, deadline) {
+    match FmuUnderTest::open(directory, path, trace, deadline) {
         Err(error) if rule.id == "load.opens" => findings.add("the binary", format!("{error:#}")),
         Err(error) => findings.skip(format!("it cannot be loaded: {error:#}")),
-        Ok(guest) => {
-            if let Err(error) = look(&guest, &mut findings) {
+        Ok(fmu) => {
+            if let Err(error) = check(&fmu, &mut findings) {
                 match error.downcast_ref::<Unusable>() {
                     Some(unusable) if unusable.rule != rule.id => {
                         findings.skip_for(unusable.rule, unusable.to_string());
                     }
-                    _ => findings.add(guest.now(), format!("{error:#}")),
+                    _ => findings.add(fmu.now(), format!("{error:#}")),
                 }
             }
-            guest.doing("unloading the binary");
-            let trace = guest.close();
+            fmu.doing("unloading the binary");
+            let trace = fmu.close();
             return trace.write(&Line::Done(findings));
         }
     }

@@ -8,8 +8,8 @@ use anyhow::Result;
 use super::Findings;
 use super::dependencies::moved;
 use super::description::Variable;
-use super::guest::{Guest, Reading, STEPS, Session, start_value};
 use super::life::first;
+use super::under_test::{FmuUnderTest, Reading, STEPS, Session, start_value};
 use super::values::{items, mentions};
 use host::description::Type;
 
@@ -18,22 +18,22 @@ use host::description::Type;
 const OVERSHOOT: f64 = 1e-3;
 
 /// `values.in_range`
-pub fn in_range(guest: &Guest, findings: &mut Findings) -> Result<()> {
+pub fn in_range(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let bounded =
         |v: &&Variable| v.bounds() != (f64::NEG_INFINITY, f64::INFINITY) && !v.is_set_by_hosts();
-    let all: Vec<&Variable> = guest.variables().iter().filter(bounded).collect();
+    let all: Vec<&Variable> = fmu.variables().iter().filter(bounded).collect();
     if all.is_empty() {
         findings.skip("nothing that the FMU computes has a min or a max");
         return Ok(());
     }
     let mut told = BTreeSet::new();
-    for interface in guest.interfaces() {
-        let mut session = guest.running(interface)?;
+    for interface in fmu.interfaces() {
+        let mut session = fmu.running(interface)?;
         for step in 0..=2 * STEPS {
             if step > 0 {
                 session.advance(1)?;
             }
-            guest.doing(format!("reading what has a min or a max after {step} steps"));
+            fmu.doing(format!("reading what has a min or a max after {step} steps"));
             for v in &all {
                 let x = match session.get(v) {
                     Ok(Reading::Real(x)) => x,
@@ -63,9 +63,9 @@ pub fn in_range(guest: &Guest, findings: &mut Findings) -> Result<()> {
 
 /// Sets a parameter or input before initialisation and initialises; why that was refused, if it was
 /// and no other variable is blamed for it.
-fn refusal(guest: &Guest, v: &Variable, value: &Reading) -> Result<Result<(), String>> {
-    let mut session = guest.session(first(guest)?)?;
-    guest.doing(format!("setting {} to {value} and initialising", v.name));
+fn refusal(fmu: &FmuUnderTest, v: &Variable, value: &Reading) -> Result<Result<(), String>> {
+    let mut session = fmu.session(first(fmu)?)?;
+    fmu.doing(format!("setting {} to {value} and initialising", v.name));
     if let Err(error) = session.set(v, value) {
         return Ok(Err(error.to_string()));
     }
@@ -73,12 +73,15 @@ fn refusal(guest: &Guest, v: &Variable, value: &Reading) -> Result<Result<(), St
 }
 
 /// `values.limits_exact`
-pub fn limits_exact(guest: &Guest, findings: &mut Findings) -> Result<()> {
+pub fn limits_exact(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     /// How far outside a bound is just outside, relative to it.
     const JUST: f64 = 1e-6;
+    /// How far outside is an Integer that no range has that ends near the bound.
+    const FAR: f64 = 1000.0;
     let mut any = false;
-    let settable = guest.variables().iter().filter(|v| v.is_set_by_hosts() && v.is_real());
-    for v in settable.filter(|v| start_value(v).is_some()) {
+    let settable = fmu.variables().iter().filter(|v| v.is_set_by_hosts());
+    let numbers = settable.filter(|v| matches!(v.kind, Type::Real | Type::Integer));
+    for v in numbers.filter(|v| start_value(v).is_some()) {
         let (min, max) = v.bounds();
         for (bound, outwards, name) in [(min, -1.0, "min"), (max, 1.0, "max")] {
             if !bound.is_finite() {
@@ -86,20 +89,27 @@ pub fn limits_exact(guest: &Guest, findings: &mut Findings) -> Result<()> {
             }
             any = true;
             let size = bound.abs().max(1e-3 * v.nominal());
-            let far = bound + outwards * size;
-            let near = bound + outwards * JUST * size;
-            if !far.is_finite() || near == bound {
+            let (near, far) = match v.kind {
+                Type::Real => (bound + outwards * JUST * size, bound + outwards * size),
+                _ => (bound + outwards, bound + outwards * FAR),
+            };
+            let fits = |x: f64| x.is_finite() && (v.is_real() || f64::from(x as i32) == x);
+            if near == bound || !fits(near) || !fits(far) {
                 continue;
             }
+            let at = |x: f64| match v.kind {
+                Type::Real => Reading::Real(x),
+                _ => Reading::Integer(x as i32),
+            };
             // An FMU that accepts anything breaks another rule, and has no range of its own.
-            if refusal(guest, v, &Reading::Real(far))?.is_ok() {
+            if refusal(fmu, v, &at(far))?.is_ok() {
                 continue;
             }
-            if refusal(guest, v, &Reading::Real(near))?.is_ok() {
+            if refusal(fmu, v, &at(near))?.is_ok() {
                 findings.add(
                     v.place(),
                     format!(
-                        "{near:?} is accepted, and {far:?} refused: the binary's range is wider than \
+                        "{near} is accepted, and {far} refused: the binary's range is wider than \
                          {name}={bound} says (allowed: the same range)"
                     ),
                 );
@@ -107,26 +117,26 @@ pub fn limits_exact(guest: &Guest, findings: &mut Findings) -> Result<()> {
         }
     }
     if !any {
-        findings.skip("no Real that hosts set has a min or a max");
+        findings.skip("no number that hosts set has a min or a max");
     }
     Ok(())
 }
 
 /// `values.items`
-pub fn items_known(guest: &Guest, findings: &mut Findings) -> Result<()> {
+pub fn items_known(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let all: Vec<&Variable> =
-        guest.variables().iter().filter(|v| v.kind == Type::Enumeration).collect();
+        fmu.variables().iter().filter(|v| v.kind == Type::Enumeration).collect();
     if all.is_empty() {
         findings.skip("it has no enumerations");
         return Ok(());
     }
     for v in all.iter().filter(|v| v.is_set_by_hosts() && start_value(v).is_some()) {
-        let known = items(guest, v);
+        let known = items(fmu, v);
         let (Some(first), Some(last)) = (known.iter().min(), known.iter().max()) else { continue };
         let list = known.iter().map(i32::to_string).collect::<Vec<_>>().join(", ");
         for item in &known {
-            if let Err(why) = refusal(guest, v, &Reading::Integer(*item))?
-                && !guest.variables().iter().any(|o| o.name != v.name && mentions(&why, &o.name))
+            if let Err(why) = refusal(fmu, v, &Reading::Integer(*item))?
+                && !fmu.variables().iter().any(|o| o.name != v.name && mentions(&why, &o.name))
             {
                 findings
                     .add(v.place(), format!("{item} is an item of its type, but refused: {why}"));
@@ -134,7 +144,7 @@ pub fn items_known(guest: &Guest, findings: &mut Findings) -> Result<()> {
         }
         // A type with items beyond those; one that takes any number is another matter.
         let beyond = last.saturating_add(1000);
-        let takes_any = refusal(guest, v, &Reading::Integer(beyond))?.is_ok();
+        let takes_any = refusal(fmu, v, &Reading::Integer(beyond))?.is_ok();
         if takes_any {
             findings.add(
                 v.place(),
@@ -143,7 +153,7 @@ pub fn items_known(guest: &Guest, findings: &mut Findings) -> Result<()> {
             continue;
         }
         for other in first.saturating_sub(1)..=last.saturating_add(3) {
-            if !known.contains(&other) && refusal(guest, v, &Reading::Integer(other))?.is_ok() {
+            if !known.contains(&other) && refusal(fmu, v, &Reading::Integer(other))?.is_ok() {
                 findings.fail(
                     v.place(),
                     format!(
@@ -161,7 +171,7 @@ pub fn items_known(guest: &Guest, findings: &mut Findings) -> Result<()> {
     let mut told = BTreeSet::new();
     let mut look = |session: &mut Session| {
         for v in &computed {
-            let known = items(guest, v);
+            let known = items(fmu, v);
             if let Ok(Reading::Integer(value)) = session.get(v)
                 && !known.is_empty()
                 && !known.contains(&value)
@@ -180,8 +190,8 @@ pub fn items_known(guest: &Guest, findings: &mut Findings) -> Result<()> {
     };
     // Runs with other parameters, and starts with one parameter far from where it is.
     for attempt in 0..STEPS as u64 {
-        let mut session = moved(guest, first(guest)?, attempt)?;
-        guest.doing(format!("initialising with other parameters, try {attempt}"));
+        let mut session = moved(fmu, first(fmu)?, attempt)?;
+        fmu.doing(format!("initialising with other parameters, try {attempt}"));
         if session.initialise().is_err() {
             continue;
         }
@@ -192,10 +202,10 @@ pub fn items_known(guest: &Guest, findings: &mut Findings) -> Result<()> {
             }
         }
     }
-    for v in guest.variables().iter().filter(|v| v.is_set_by_hosts() && v.is_real()) {
+    for v in fmu.variables().iter().filter(|v| v.is_set_by_hosts() && v.is_real()) {
         for x in far_values(v) {
-            let mut session = guest.session(first(guest)?)?;
-            guest.doing(format!("initialising with {} = {x:?}", v.name));
+            let mut session = fmu.session(first(fmu)?)?;
+            fmu.doing(format!("initialising with {} = {x:?}", v.name));
             if session.set(v, &Reading::Real(x)).is_ok() && session.initialise().is_ok() {
                 look(&mut session);
                 if session.advance(1).is_ok() {

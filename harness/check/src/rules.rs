@@ -2,7 +2,7 @@
 
 use super::Severity::{Error, Warning};
 use super::{
-    Look, Rule, Severity, archive, arrays, binaries, dependencies, description, exchange, kinds,
+    Check, Rule, Severity, archive, arrays, binaries, dependencies, description, exchange, kinds,
     life, log, portable, ranges, reading, schema, states, steps, tunable, units, values,
 };
 
@@ -11,12 +11,12 @@ const fn rule(
     severity: Severity,
     title: &'static str,
     source: &'static str,
-    look: Look,
+    check: Check,
 ) -> Rule {
-    Rule { id, title, source, severity, look }
+    Rule { id, title, source, severity, check }
 }
 
-use Look::{Archive, Binaries, Calls, Description};
+use Check::{Archive, Binaries, Calls, Description};
 
 /// Every rule, group by group.
 #[rustfmt::skip]

@@ -3,12 +3,12 @@
 use anyhow::Result;
 
 use super::Findings;
-use super::guest::{Guest, Interface, Mark, Reading, STEPS, Session, Stage};
+use super::under_test::{FmuUnderTest, Interface, Mark, Reading, STEPS, Session, Stage};
 
 /// Interfaces that declare a capability; none is a reason to skip.
-fn with(guest: &Guest, flag: &str, findings: &mut Findings) -> Vec<Interface> {
-    let mut all = guest.interfaces();
-    all.retain(|interface| guest.can(*interface, flag));
+fn with(fmu: &FmuUnderTest, flag: &str, findings: &mut Findings) -> Vec<Interface> {
+    let mut all = fmu.interfaces();
+    all.retain(|interface| fmu.can(*interface, flag));
     if all.is_empty() {
         findings.skip(format!("{flag} is not declared"));
     }
@@ -26,16 +26,16 @@ fn go_on(session: &mut Session, from: &Mark) -> Result<Vec<Reading>> {
 }
 
 /// `states.rollback`
-pub fn rollback(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    for interface in with(guest, SAVE, findings) {
-        let mut session = guest.running(interface)?;
+pub fn rollback(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    for interface in with(fmu, SAVE, findings) {
+        let mut session = fmu.running(interface)?;
         session.advance(3)?;
-        guest.doing("fmi2GetFMUstate");
+        fmu.doing("fmi2GetFMUstate");
         let state = session.instance.get_state()?;
         let here = session.mark();
         let before = session.readings()?;
         let first = go_on(&mut session, &here)?;
-        guest.doing("fmi2SetFMUstate");
+        fmu.doing("fmi2SetFMUstate");
         session.instance.set_state(&state)?;
         let restored = session.readings()?;
         if let Some(text) = session.difference(&restored, &before) {
@@ -46,19 +46,19 @@ pub fn rollback(guest: &Guest, findings: &mut Findings) -> Result<()> {
             let place = format!("{STEPS} steps after fmi2SetFMUstate ({})", interface.name());
             findings.add(place, text);
         }
-        guest.doing("fmi2FreeFMUstate");
+        fmu.doing("fmi2FreeFMUstate");
         session.instance.free_state(state)?;
     }
     Ok(())
 }
 
 /// `states.handle`
-pub fn handle(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    for interface in with(guest, SAVE, findings) {
-        let mut session = guest.running(interface)?;
+pub fn handle(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    for interface in with(fmu, SAVE, findings) {
+        let mut session = fmu.running(interface)?;
         let mut state = session.instance.get_state()?;
         session.advance(3)?;
-        guest.doing("fmi2GetFMUstate into a handle that is there already");
+        fmu.doing("fmi2GetFMUstate into a handle that is there already");
         session.instance.get_state_into(&mut state)?;
         let here = session.mark();
         let first = go_on(&mut session, &here)?;
@@ -68,20 +68,20 @@ pub fn handle(guest: &Guest, findings: &mut Findings) -> Result<()> {
             findings.add(format!("a handle used again ({})", interface.name()), text);
         }
         session.instance.free_state(state)?;
-        guest.doing("fmi2FreeFMUstate of NULL");
+        fmu.doing("fmi2FreeFMUstate of NULL");
         session.instance.free_state_null()?;
     }
     Ok(())
 }
 
 /// `states.bytes`
-pub fn bytes(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    for interface in with(guest, SERIALIZE, findings) {
+pub fn bytes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    for interface in with(fmu, SERIALIZE, findings) {
         let (first, here, bytes) = {
-            let mut session = guest.running(interface)?;
+            let mut session = fmu.running(interface)?;
             session.advance(3)?;
             let state = session.instance.get_state()?;
-            guest.doing("fmi2SerializeFMUstate");
+            fmu.doing("fmi2SerializeFMUstate");
             let bytes = session.instance.serialize(&state)?;
             if session.instance.serialize(&state)? != bytes {
                 findings.add(
@@ -96,10 +96,10 @@ pub fn bytes(guest: &Guest, findings: &mut Findings) -> Result<()> {
         // One instance that has lived, one that was neither set up nor initialised.
         for lived in [true, false] {
             let mut other = match lived {
-                true => guest.running(interface)?,
-                false => guest.session(interface)?,
+                true => fmu.running(interface)?,
+                false => fmu.session(interface)?,
             };
-            guest.doing(match lived {
+            fmu.doing(match lived {
                 true => "fmi2DeSerializeFMUstate in another instance",
                 false => "fmi2DeSerializeFMUstate and fmi2SetFMUstate in an instance without setup",
             });
@@ -107,7 +107,7 @@ pub fn bytes(guest: &Guest, findings: &mut Findings) -> Result<()> {
             other.instance.set_state(&state)?;
             let second = go_on(&mut other, &here)?;
             if let Some(text) = other.difference(&second, &first) {
-                findings.add(format!("{} ({})", guest.now(), interface.name()), text);
+                findings.add(format!("{} ({})", fmu.now(), interface.name()), text);
             }
             other.instance.free_state(state)?;
         }
@@ -116,9 +116,9 @@ pub fn bytes(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `states.garbage`
-pub fn garbage(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    for interface in with(guest, SERIALIZE, findings) {
-        let mut session = guest.running(interface)?;
+pub fn garbage(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    for interface in with(fmu, SERIALIZE, findings) {
+        let mut session = fmu.running(interface)?;
         session.advance(3)?;
         let state = session.instance.get_state()?;
         let bytes = session.instance.serialize(&state)?;
@@ -138,10 +138,10 @@ pub fn garbage(guest: &Guest, findings: &mut Findings) -> Result<()> {
             ("one byte changed", flipped),
         ] {
             let place = format!("fmi2DeSerializeFMUstate with {what} ({})", interface.name());
-            let mut session = guest.running(interface)?;
+            let mut session = fmu.running(interface)?;
             session.advance(3)?;
             let before = session.readings()?;
-            guest.doing(&place);
+            fmu.doing(&place);
             let accepted = match session.instance.deserialize(&bytes) {
                 Err(_) => false,
                 Ok(state) => {
@@ -161,24 +161,24 @@ pub fn garbage(guest: &Guest, findings: &mut Findings) -> Result<()> {
                 findings.add(place, format!("it is refused, but {text}"));
             }
         }
-        let mut session = guest.running(interface)?;
-        guest.doing("fmi2SetFMUstate(NULL)");
+        let mut session = fmu.running(interface)?;
+        fmu.doing("fmi2SetFMUstate(NULL)");
         if session.instance.set_state_null().is_ok() {
-            findings.add(guest.now(), "it is accepted (allowed: fmi2Error)");
+            findings.add(fmu.now(), "it is accepted (allowed: fmi2Error)");
         }
     }
     Ok(())
 }
 
 /// `states.modes`
-pub fn modes(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    for interface in with(guest, SAVE, findings) {
+pub fn modes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    for interface in with(fmu, SAVE, findings) {
         for stage in [Stage::Instantiated, Stage::Initialization, Stage::Terminated] {
-            let mut session = guest.session_in(interface, stage)?;
+            let mut session = fmu.session_in(interface, stage)?;
             let mode = stage.name();
             let place =
                 format!("fmi2GetFMUstate and fmi2SetFMUstate, {mode} ({})", interface.name());
-            guest.doing(&place);
+            fmu.doing(&place);
             let done = session.instance.get_state().and_then(|state| {
                 let set = session.instance.set_state(&state);
                 session.instance.free_state(state).and(set)

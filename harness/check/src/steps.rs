@@ -4,34 +4,34 @@ use anyhow::Result;
 
 use super::Findings;
 use super::description::Variable;
-use super::guest::{Guest, Interface, Reading, STEPS, Session, Unusable};
 use super::life::expect_refusal;
+use super::under_test::{FmuUnderTest, Interface, Reading, STEPS, Session, Unusable};
 use host::fmi2::{CallError, Status};
 
 /// A stepping instance, or the reason why there is none.
-fn stepping<'g>(guest: &'g Guest, findings: &mut Findings) -> Result<Option<Session<'g>>> {
-    if !guest.interfaces().contains(&Interface::CoSimulation) {
+fn stepping<'f>(fmu: &'f FmuUnderTest, findings: &mut Findings) -> Result<Option<Session<'f>>> {
+    if !fmu.interfaces().contains(&Interface::CoSimulation) {
         findings.skip("it offers no Co-Simulation");
         return Ok(None);
     }
-    guest.running(Interface::CoSimulation).map(Some)
+    fmu.running(Interface::CoSimulation).map(Some)
 }
 
 /// As above, where a few ordinary steps are possible; where they are not, other rules tell.
-fn able<'g>(guest: &'g Guest, findings: &mut Findings) -> Result<Option<Session<'g>>> {
-    if let Some(mut session) = stepping(guest, findings)? {
+fn able<'f>(fmu: &'f FmuUnderTest, findings: &mut Findings) -> Result<Option<Session<'f>>> {
+    if let Some(mut session) = stepping(fmu, findings)? {
         session.advance(3)?;
         if session.is_ended() {
             let why = "it asks for the end of the simulation in its first steps".into();
             return Err(Unusable { rule: "steps.terminated", why }.into());
         }
     }
-    stepping(guest, findings)
+    stepping(fmu, findings)
 }
 
 /// Whether steps may have any size.
-fn variable_steps(guest: &Guest, findings: &mut Findings) -> bool {
-    let can = guest.can(Interface::CoSimulation, "canHandleVariableCommunicationStepSize");
+fn variable_steps(fmu: &FmuUnderTest, findings: &mut Findings) -> bool {
+    let can = fmu.can(Interface::CoSimulation, "canHandleVariableCommunicationStepSize");
     if !can {
         findings.skip("canHandleVariableCommunicationStepSize is not declared");
     }
@@ -39,9 +39,9 @@ fn variable_steps(guest: &Guest, findings: &mut Findings) -> bool {
 }
 
 /// `steps.run`
-pub fn run(guest: &Guest, findings: &mut Findings) -> Result<()> {
+pub fn run(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     const LONG: usize = 200;
-    let Some(mut session) = stepping(guest, findings)? else { return Ok(()) };
+    let Some(mut session) = stepping(fmu, findings)? else { return Ok(()) };
     for _ in 0..LONG {
         if session.is_ended() {
             break;
@@ -54,11 +54,11 @@ pub fn run(guest: &Guest, findings: &mut Findings) -> Result<()> {
             true => " (allowed: fmi2Discard only with fmi2Terminated; two hosts try for ever)",
             false => "",
         };
-        findings.add(guest.now(), format!("{error}{allowed}"));
+        findings.add(fmu.now(), format!("{error}{allowed}"));
         return Ok(());
     }
     let readings = session.readings()?;
-    for (v, reading) in guest.variables().iter().zip(readings) {
+    for (v, reading) in fmu.variables().iter().zip(readings) {
         if let Reading::Real(x) = reading
             && !x.is_finite()
         {
@@ -70,14 +70,14 @@ pub fn run(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `steps.size`
-pub fn size(guest: &Guest, findings: &mut Findings) -> Result<()> {
+pub fn size(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for h in [0.0, -0.01, f64::NAN, f64::INFINITY] {
         // After an error an FMU may refuse everything: a new instance each time.
-        let Some(mut session) = able(guest, findings)? else { return Ok(()) };
+        let Some(mut session) = able(fmu, findings)? else { return Ok(()) };
         session.advance(3)?;
         let before = session.readings()?;
         let place = format!("fmi2DoStep with communicationStepSize = {h:?}");
-        guest.doing(&place);
+        fmu.doing(&place);
         let time = session.time;
         let answer = session.instance.do_step(time, h);
         let is_refused = answer.is_err();
@@ -93,13 +93,13 @@ pub fn size(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `steps.point`
-pub fn point(guest: &Guest, findings: &mut Findings) -> Result<()> {
+pub fn point(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for off in [2.0, -1.0, f64::NAN] {
-        let Some(mut session) = able(guest, findings)? else { return Ok(()) };
+        let Some(mut session) = able(fmu, findings)? else { return Ok(()) };
         session.advance(3)?;
         let wrong = session.time + off * session.step;
         let place = format!("fmi2DoStep from {wrong:?} s, {:?} s being reached", session.time);
-        guest.doing(&place);
+        fmu.doing(&place);
         let answer = session.instance.do_step(wrong, session.step);
         expect_refusal(findings, place, answer);
     }
@@ -107,9 +107,9 @@ pub fn point(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `steps.wobble`
-pub fn wobble(guest: &Guest, findings: &mut Findings) -> Result<()> {
+pub fn wobble(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     const LONG: usize = 200;
-    let Some(mut session) = able(guest, findings)? else { return Ok(()) };
+    let Some(mut session) = able(fmu, findings)? else { return Ok(()) };
     let (start, h) = (session.time, session.step);
     for n in 0..LONG {
         // n·h and t + h differ by ulps; some hosts take one, some the other
@@ -120,12 +120,12 @@ pub fn wobble(guest: &Guest, findings: &mut Findings) -> Result<()> {
             _ => product.next_down(),
         };
         session.stimulate()?;
-        guest.doing(format!("fmi2DoStep from {wobbled:?} s, {product:?} s by {h:?} s being meant"));
+        fmu.doing(format!("fmi2DoStep from {wobbled:?} s, {product:?} s by {h:?} s being meant"));
         if let Err(error) = session.instance.do_step(wobbled, h) {
             if session.has_terminated(&error) {
                 break;
             }
-            findings.add(guest.now(), format!("{error} (allowed: some ulps either way)"));
+            findings.add(fmu.now(), format!("{error} (allowed: some ulps either way)"));
             return Ok(());
         }
     }
@@ -133,14 +133,14 @@ pub fn wobble(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `steps.start_time`
-pub fn start_time(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    for interface in guest.interfaces() {
+pub fn start_time(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    for interface in fmu.interfaces() {
         // if that fails, another rule tells
-        guest.running(interface)?.advance(STEPS)?;
-        for start in [guest.experiment().start + 1000.0, guest.experiment().start - 3.0] {
-            let mut session = guest.session(interface)?;
+        fmu.running(interface)?.advance(STEPS)?;
+        for start in [fmu.experiment().start + 1000.0, fmu.experiment().start - 3.0] {
+            let mut session = fmu.session(interface)?;
             let place = format!("start time {start} s ({})", interface.name());
-            if let Err(error) = session.initialise_at(start, None, guest.experiment().tolerance) {
+            if let Err(error) = session.initialise_at(start, None, fmu.experiment().tolerance) {
                 findings.add(place, error.to_string());
             } else if let Err(error) = session.advance(STEPS) {
                 findings.add(place, error.to_string());
@@ -151,36 +151,36 @@ pub fn start_time(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `steps.stop_time`
-pub fn stop_time(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    if able(guest, findings)?.is_none() {
+pub fn stop_time(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    if able(fmu, findings)?.is_none() {
         return Ok(());
     }
-    let experiment = guest.experiment();
+    let experiment = fmu.experiment();
     let stop = experiment.start + STEPS as f64 * experiment.step;
-    let mut session = guest.session(Interface::CoSimulation)?;
+    let mut session = fmu.session(Interface::CoSimulation)?;
     session.initialise_at(experiment.start, Some(stop), experiment.tolerance)?;
     // summing up leaves the last point some ulps beside the stop time
     if let Err(error) = session.advance(STEPS) {
         findings.add(
-            guest.now(),
+            fmu.now(),
             format!("{error} (the stop time is {stop:?} s; rounding must be forgiven)"),
         );
         return Ok(());
     }
     let place = format!("fmi2DoStep past the stop time {stop} s");
-    guest.doing(&place);
+    fmu.doing(&place);
     let answer = session.instance.do_step(session.time, session.step);
     expect_refusal(findings, place, answer);
     Ok(())
 }
 
 /// `steps.tolerance`
-pub fn tolerance(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let start = guest.experiment().start;
+pub fn tolerance(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let start = fmu.experiment().start;
     let mut fails = Vec::new();
-    for interface in guest.interfaces() {
+    for interface in fmu.interfaces() {
         for tolerance in [None, Some(1e-4), Some(1e-6)] {
-            let mut session = guest.session(interface)?;
+            let mut session = fmu.session(interface)?;
             let done =
                 session.initialise_at(start, None, tolerance).and_then(|()| session.advance(3));
             if let Err(error) = done {
@@ -190,7 +190,7 @@ pub fn tolerance(guest: &Guest, findings: &mut Findings) -> Result<()> {
         }
     }
     // Where none works, the tolerance is not to blame; another rule tells.
-    for interface in guest.interfaces() {
+    for interface in fmu.interfaces() {
         let of_this = fails.iter().filter(|(i, ..)| *i == interface);
         if of_this.clone().count() < 3 {
             for (_, place, error) in of_this {
@@ -202,22 +202,22 @@ pub fn tolerance(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `steps.cut`
-pub fn cut(guest: &Guest, findings: &mut Findings) -> Result<()> {
+pub fn cut(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     /// Errors of many steps add up, and the tolerance is a step's.
     const SLACK: f64 = 1e3;
-    let Some(session) = able(guest, findings)? else { return Ok(()) };
+    let Some(session) = able(fmu, findings)? else { return Ok(()) };
     drop(session);
-    if !variable_steps(guest, findings) {
+    if !variable_steps(fmu, findings) {
         return Ok(());
     }
-    let Some(tolerance) = guest.experiment().tolerance else {
+    let Some(tolerance) = fmu.experiment().tolerance else {
         findings.skip("no tolerance is suggested");
         return Ok(());
     };
     // The same inputs, held over each of the long steps.
     let run = |parts: usize| -> Result<(Vec<f64>, Vec<f64>)> {
-        let mut session = guest.running(Interface::CoSimulation)?;
-        let outputs: Vec<_> = guest
+        let mut session = fmu.running(Interface::CoSimulation)?;
+        let outputs: Vec<_> = fmu
             .variables()
             .iter()
             .filter(|v| v.causality == "output" && v.is_continuous())
@@ -246,7 +246,7 @@ pub fn cut(guest: &Guest, findings: &mut Findings) -> Result<()> {
     for parts in [2, 5] {
         let (cut, _) = run(parts)?;
         let outputs =
-            guest.variables().iter().filter(|v| v.causality == "output" && v.is_continuous());
+            fmu.variables().iter().filter(|v| v.causality == "output" && v.is_continuous());
         for (n, v) in outputs.enumerate() {
             let allowed = SLACK * tolerance * scale[n].max(1e-3 * v.nominal());
             let off = (whole[n] - cut[n]).abs();
@@ -268,28 +268,28 @@ pub fn cut(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `steps.inputs`
-pub fn inputs(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let Some(mut session) = able(guest, findings)? else { return Ok(()) };
+pub fn inputs(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let Some(mut session) = able(fmu, findings)? else { return Ok(()) };
     let inputs: Vec<_> =
-        guest.variables().iter().filter(|v| v.causality == "input" && v.is_real()).collect();
+        fmu.variables().iter().filter(|v| v.causality == "input" && v.is_real()).collect();
     if inputs.is_empty() {
         findings.skip("it has no Real inputs");
         return Ok(());
     }
     for v in &inputs {
-        let mut session = guest.running(Interface::CoSimulation)?;
+        let mut session = fmu.running(Interface::CoSimulation)?;
         let place = format!("{} = NaN, then a step", v.name);
-        guest.doing(&place);
+        fmu.doing(&place);
         let refused =
             session.set(v, &Reading::Real(f64::NAN)).is_err() || session.go(session.step).is_err();
         if !refused {
             findings.add(place, "fmi2OK (allowed: fmi2Error and a message)");
         }
     }
-    let can = guest.can(Interface::CoSimulation, "canInterpolateInputs");
+    let can = fmu.can(Interface::CoSimulation, "canInterpolateInputs");
     for v in inputs.iter().filter(|v| can && v.is_continuous()) {
         let place = format!("fmi2SetRealInputDerivatives of {}", v.name);
-        guest.doing(&place);
+        fmu.doing(&place);
         let set = session.instance.set_real_input_derivatives(&[v.reference], &[1], &[0.0]);
         if let Err(error) = set {
             findings.add(place, format!("{error}, but canInterpolateInputs is declared"));
@@ -299,26 +299,26 @@ pub fn inputs(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `steps.output_derivatives`
-pub fn output_derivatives(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let Some(mut session) = able(guest, findings)? else { return Ok(()) };
-    let interface = guest.description().co_simulation.as_ref();
+pub fn output_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let Some(mut session) = able(fmu, findings)? else { return Ok(()) };
+    let interface = fmu.description().co_simulation.as_ref();
     let order = interface.and_then(|i| i.number("maxOutputDerivativeOrder")).unwrap_or(0.0);
     if order < 1.0 {
         findings.skip("maxOutputDerivativeOrder is 0");
         return Ok(());
     }
     let outputs: Vec<_> =
-        guest.variables().iter().filter(|v| v.causality == "output" && v.is_continuous()).collect();
+        fmu.variables().iter().filter(|v| v.causality == "output" && v.is_continuous()).collect();
     let references: Vec<u32> = outputs.iter().map(|v| v.reference).collect();
     session.advance(STEPS)?;
     let mut declared = vec![f64::NAN; outputs.len()];
-    guest.doing("fmi2GetRealOutputDerivatives of every output");
+    fmu.doing("fmi2GetRealOutputDerivatives of every output");
     session.instance.get_real_output_derivatives(
         &references,
         &vec![1; outputs.len()],
         &mut declared,
     )?;
-    if !guest.can(Interface::CoSimulation, "canHandleVariableCommunicationStepSize") {
+    if !fmu.can(Interface::CoSimulation, "canHandleVariableCommunicationStepSize") {
         return Ok(());
     }
     // Differences over two short steps, held inputs; where they disagree the output is not smooth.
@@ -356,25 +356,25 @@ pub fn output_derivatives(guest: &Guest, findings: &mut Findings) -> Result<()> 
 const VARIABLE: &str = "canHandleVariableCommunicationStepSize is declared";
 
 /// `steps.small`
-pub fn small(guest: &Guest, findings: &mut Findings) -> Result<()> {
+pub fn small(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     /// Steps that are tried instead of the usual ones, s.
     const SMALL: [f64; 2] = [4e-4, 1e-5];
     /// At most so many of them.
     const MOST: f64 = 5000.0;
-    let Some(session) = able(guest, findings)? else { return Ok(()) };
+    let Some(session) = able(fmu, findings)? else { return Ok(()) };
     let usual = session.step;
     drop(session);
-    if !variable_steps(guest, findings) {
+    if !variable_steps(fmu, findings) {
         return Ok(());
     }
-    let experiment = guest.experiment();
+    let experiment = fmu.experiment();
     let continuous = |v: &&Variable| v.is_continuous() && !v.is_set_by_hosts();
-    let all: Vec<&Variable> = guest.variables().iter().filter(continuous).collect();
+    let all: Vec<&Variable> = fmu.variables().iter().filter(continuous).collect();
     // Where the values are before, and after `count` steps of `h` with the inputs held, or what was
     // said instead; none if the FMU asks for its end.
     type Ends = Option<Result<(Vec<f64>, Vec<f64>), String>>;
     let run = |h: f64, count: usize| -> Result<Ends> {
-        let mut session = guest.running(Interface::CoSimulation)?;
+        let mut session = fmu.running(Interface::CoSimulation)?;
         session.advance(3)?;
         session.stimulate()?;
         let read = |session: &mut Session| -> Result<Vec<f64>> {
@@ -443,24 +443,24 @@ pub fn small(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `steps.output_derivative_order`
-pub fn output_derivative_order(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let Some(session) = able(guest, findings)? else { return Ok(()) };
+pub fn output_derivative_order(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let Some(session) = able(fmu, findings)? else { return Ok(()) };
     drop(session);
-    let interface = guest.description().co_simulation.as_ref();
+    let interface = fmu.description().co_simulation.as_ref();
     let most = interface.and_then(|i| i.number("maxOutputDerivativeOrder")).unwrap_or(0.0);
     if most < 1.0 {
         findings.skip("maxOutputDerivativeOrder is 0");
         return Ok(());
     }
     let outputs: Vec<_> =
-        guest.variables().iter().filter(|v| v.causality == "output" && v.is_continuous()).collect();
+        fmu.variables().iter().filter(|v| v.causality == "output" && v.is_continuous()).collect();
     for order in 1..=most.min(10.0) as i32 {
         for v in &outputs {
             // after an error an FMU may refuse everything: a new instance each time
-            let mut session = guest.running(Interface::CoSimulation)?;
+            let mut session = fmu.running(Interface::CoSimulation)?;
             session.advance(3)?;
             let place = format!("derivative {order} of {}", v.name);
-            guest.doing(format!("fmi2GetRealOutputDerivatives, {place}"));
+            fmu.doing(format!("fmi2GetRealOutputDerivatives, {place}"));
             let mut value = [f64::NAN];
             let answer =
                 session.instance.get_real_output_derivatives(&[v.reference], &[order], &mut value);
@@ -479,14 +479,14 @@ pub fn output_derivative_order(guest: &Guest, findings: &mut Findings) -> Result
 }
 
 /// `steps.terminated`
-pub fn terminated(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let Some(mut session) = stepping(guest, findings)? else { return Ok(()) };
+pub fn terminated(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let Some(mut session) = stepping(fmu, findings)? else { return Ok(()) };
     tell_end(&mut session, findings)
 }
 
 /// Runs until the FMU asks for the end, and tells that if it comes before the suggested one.
 pub fn tell_end(session: &mut Session, findings: &mut Findings) -> Result<()> {
-    let experiment = session.guest.experiment();
+    let experiment = session.fmu.experiment();
     session.advance(2 * STEPS)?;
     let Some((time, call)) = session.ended() else { return Ok(()) };
     let place = format!("{call} at t = {time:?} s");

@@ -5,12 +5,12 @@ use anyhow::Result;
 
 use super::Findings;
 use super::description::Variable;
-use super::guest::{Guest, Interface, Reading, STEPS, Session, start_value};
+use super::under_test::{FmuUnderTest, Interface, Reading, STEPS, Session, start_value};
 use super::values::other_value;
 use host::fmi2::Called;
 
-fn tunables(guest: &Guest) -> impl Iterator<Item = (&Variable, Reading)> {
-    let all = guest.variables().iter();
+fn tunables(fmu: &FmuUnderTest) -> impl Iterator<Item = (&Variable, Reading)> {
+    let all = fmu.variables().iter();
     let all = all.filter(|v| v.causality == "parameter" && v.variability == "tunable");
     all.filter_map(|v| Some((v, start_value(v)?)))
 }
@@ -30,20 +30,25 @@ fn set_between_steps(session: &mut Session, v: &Variable, value: &Reading) -> Re
 }
 
 /// Whether a value is accepted before initialisation.
-fn is_allowed(guest: &Guest, interface: Interface, v: &Variable, value: &Reading) -> Result<bool> {
-    let mut session = guest.session(interface)?;
+fn is_allowed(
+    fmu: &FmuUnderTest,
+    interface: Interface,
+    v: &Variable,
+    value: &Reading,
+) -> Result<bool> {
+    let mut session = fmu.session(interface)?;
     Ok(session.set(v, value).is_ok() && session.initialise().is_ok())
 }
 
 /// `values.tunable`
-pub fn can_be_set(guest: &Guest, findings: &mut Findings) -> Result<()> {
+pub fn can_be_set(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut any = false;
-    for interface in guest.interfaces() {
-        for (v, start) in tunables(guest) {
+    for interface in fmu.interfaces() {
+        for (v, start) in tunables(fmu) {
             any = true;
-            let other = other_value(guest, v, &start);
+            let other = other_value(fmu, v, &start);
             for value in [Some(start.clone()), other].into_iter().flatten() {
-                let mut session = guest.running(interface)?;
+                let mut session = fmu.running(interface)?;
                 session.advance(1)?;
                 if session.is_ended() {
                     continue;
@@ -53,9 +58,9 @@ pub fn can_be_set(guest: &Guest, findings: &mut Findings) -> Result<()> {
                     v.name,
                     interface.name()
                 );
-                guest.doing(&place);
+                fmu.doing(&place);
                 if let Err(error) = set_between_steps(&mut session, v, &value)? {
-                    if value.is(&start) || is_allowed(guest, interface, v, &value)? {
+                    if value.is(&start) || is_allowed(fmu, interface, v, &value)? {
                         findings.add(place, format!("{error} (allowed: fmi2OK)"));
                         break;
                     }
@@ -86,12 +91,12 @@ struct Run {
 /// A short run with a parameter changed before initialisation, after it or not at all; none if the
 /// change is refused, which is another rule's business.
 fn run(
-    guest: &Guest,
+    fmu: &FmuUnderTest,
     interface: Interface,
     before: Option<(&Variable, &Reading)>,
     after: Option<(&Variable, &Reading)>,
 ) -> Result<Option<Run>> {
-    let mut session = guest.session(interface)?;
+    let mut session = fmu.session(interface)?;
     if let Some((v, value)) = before
         && session.set(v, value).is_err()
     {
@@ -113,21 +118,21 @@ fn run(
 }
 
 /// `values.tunable_effect`
-pub fn acts(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let states = guest.description().states();
+pub fn acts(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let states = fmu.description().states();
     let mut any = false;
-    for interface in guest.interfaces() {
-        let Some(plain) = run(guest, interface, None, None)? else { continue };
-        for (v, start) in tunables(guest) {
+    for interface in fmu.interfaces() {
+        let Some(plain) = run(fmu, interface, None, None)? else { continue };
+        for (v, start) in tunables(fmu) {
             any = true;
-            let Some(value) = other_value(guest, v, &start) else { continue };
-            guest.doing(format!("runs with {} = {value}, set before and after", v.name));
+            let Some(value) = other_value(fmu, v, &start) else { continue };
+            fmu.doing(format!("runs with {} = {value}, set before and after", v.name));
             let change = Some((v, &value));
-            let runs = (run(guest, interface, change, None)?, run(guest, interface, None, change)?);
+            let runs = (run(fmu, interface, change, None)?, run(fmu, interface, None, change)?);
             let (Some(before), Some(after)) = runs else { continue };
             // what others than the parameter itself do
             let differing = |run: &Run| {
-                let mut all = guest.variables().iter().zip(run.at_last.iter().zip(&plain.at_last));
+                let mut all = fmu.variables().iter().zip(run.at_last.iter().zip(&plain.at_last));
                 all.find(|(o, (a, b))| (o.kind, o.reference) != (v.kind, v.reference) && !a.is(b))
                     .map(|(o, _)| o.name.as_str())
             };

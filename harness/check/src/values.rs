@@ -6,29 +6,29 @@ use anyhow::Result;
 
 use super::Findings;
 use super::description::Variable;
-use super::guest::{Guest, Reading, STEPS, Session, start_value};
 use super::life::{expect_refusal, first};
+use super::under_test::{FmuUnderTest, Reading, STEPS, Session, start_value};
 use host::description::Type;
 use host::fmi2::{Called, Instance};
 
 /// Variables that hosts set, each with its start value.
-fn settable(guest: &Guest) -> impl Iterator<Item = (&Variable, Reading)> {
-    let all = guest.variables().iter().filter(|v| v.is_set_by_hosts());
+fn settable(fmu: &FmuUnderTest) -> impl Iterator<Item = (&Variable, Reading)> {
+    let all = fmu.variables().iter().filter(|v| v.is_set_by_hosts());
     all.filter_map(|v| Some((v, start_value(v)?)))
 }
 
-fn initializing<'g>(guest: &'g Guest) -> Result<Session<'g>> {
+fn initializing<'f>(fmu: &'f FmuUnderTest) -> Result<Session<'f>> {
     // if it does not initialise, another rule tells
-    guest.running(first(guest)?)?;
-    let mut session = guest.session(first(guest)?)?;
+    fmu.running(first(fmu)?)?;
+    let mut session = fmu.session(first(fmu)?)?;
     session.instance.setup_experiment(None, session.time, None)?;
     session.instance.enter_initialization_mode()?;
     Ok(session)
 }
 
 /// `values.start`
-pub fn start(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let starts: Vec<_> = guest
+pub fn start(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let starts: Vec<_> = fmu
         .variables()
         .iter()
         .filter(|v| v.initial.as_deref() != Some("approx"))
@@ -50,22 +50,22 @@ pub fn start(guest: &Guest, findings: &mut Findings) -> Result<()> {
             }
         }
     };
-    let mut session = initializing(guest)?;
-    guest.doing("reading start values in initialization mode");
+    let mut session = initializing(fmu)?;
+    fmu.doing("reading start values in initialization mode");
     look(&mut session, "before initialisation", false);
     session.leave_initialisation()?;
-    guest.doing("reading start values after initialisation");
+    fmu.doing("reading start values after initialisation");
     look(&mut session, "after initialisation", true);
     Ok(())
 }
 
 /// `values.readable`
-pub fn readable(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let mut session = initializing(guest)?;
+pub fn readable(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let mut session = initializing(fmu)?;
     let mut told = BTreeSet::new();
     let mut look = |session: &mut Session, when: &str| {
-        for v in guest.variables() {
-            guest.doing(format!("reading {} {when}", v.name));
+        for v in fmu.variables() {
+            fmu.doing(format!("reading {} {when}", v.name));
             let fault = match session.get(v) {
                 Err(error) => error.to_string(),
                 Ok(Reading::Real(x)) if !x.is_finite() => {
@@ -87,14 +87,14 @@ pub fn readable(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `values.booleans`
-pub fn booleans(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let mut session = initializing(guest)?;
-    let all: Vec<_> = guest.variables().iter().filter(|v| v.kind == Type::Boolean).collect();
+pub fn booleans(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let mut session = initializing(fmu)?;
+    let all: Vec<_> = fmu.variables().iter().filter(|v| v.kind == Type::Boolean).collect();
     if all.is_empty() {
         findings.skip("it has no Booleans");
     }
     for v in all {
-        guest.doing(format!("reading and setting {}", v.name));
+        fmu.doing(format!("reading and setting {}", v.name));
         if let Reading::Boolean(value @ (..=-1 | 2..)) = session.get(v)? {
             findings.add(v.place(), format!("it reads as {value} (allowed: 0 and 1)"));
         }
@@ -111,11 +111,11 @@ pub fn booleans(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `values.round_trip`
-pub fn round_trip(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let mut session = initializing(guest)?;
-    let mut fresh = guest.session(first(guest)?)?;
-    for (v, start) in settable(guest) {
-        guest.doing(format!("setting {} to {start}", v.name));
+pub fn round_trip(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let mut session = initializing(fmu)?;
+    let mut fresh = fmu.session(first(fmu)?)?;
+    for (v, start) in settable(fmu) {
+        fmu.doing(format!("setting {} to {start}", v.name));
         // as hosts do that set every start value before they set up
         if let Err(error) = fresh.set(v, &start) {
             findings.add(
@@ -124,10 +124,10 @@ pub fn round_trip(guest: &Guest, findings: &mut Findings) -> Result<()> {
             );
         }
         let mut tried = vec![start.clone()];
-        tried.extend(other_value(guest, v, &start));
+        tried.extend(other_value(fmu, v, &start));
         tried.push(start);
         for value in tried {
-            guest.doing(format!("setting {} to {value}", v.name));
+            fmu.doing(format!("setting {} to {value}", v.name));
             // another value than the start may be refused
             if session.set(v, &value).is_err() {
                 continue;
@@ -143,7 +143,7 @@ pub fn round_trip(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// A value near the start that is allowed.
-pub fn other_value(guest: &Guest, v: &Variable, start: &Reading) -> Option<Reading> {
+pub fn other_value(fmu: &FmuUnderTest, v: &Variable, start: &Reading) -> Option<Reading> {
     let (min, max) = v.bounds();
     match start {
         Reading::Real(x) => {
@@ -154,7 +154,7 @@ pub fn other_value(guest: &Guest, v: &Variable, start: &Reading) -> Option<Readi
         }
         Reading::Integer(n) => {
             let allowed: Vec<i32> = match v.kind {
-                Type::Enumeration => items(guest, v),
+                Type::Enumeration => items(fmu, v),
                 _ => vec![n.saturating_add(1), n.saturating_sub(1)],
             };
             let fits = |m: &i32| m != n && f64::from(*m) >= min && f64::from(*m) <= max;
@@ -166,18 +166,18 @@ pub fn other_value(guest: &Guest, v: &Variable, start: &Reading) -> Option<Readi
 }
 
 /// Values an enumeration can take.
-pub fn items(guest: &Guest, v: &Variable) -> Vec<i32> {
+pub fn items(fmu: &FmuUnderTest, v: &Variable) -> Vec<i32> {
     let declared = v.typed.get("declaredType");
-    let types = guest.description().root.list("TypeDefinitions");
+    let types = fmu.description().root.list("TypeDefinitions");
     let simple = types.filter(|t| t.get("name").is_some() && t.get("name") == declared);
     let items = simple.flat_map(|t| t.list("Enumeration"));
     items.filter_map(|item| item.get("value")?.trim().parse().ok()).collect()
 }
 
 /// `values.nothing`
-pub fn nothing(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let mut session = initializing(guest)?;
-    guest.doing("fmi2Get… and fmi2Set… with nvr = 0 and NULL pointers");
+pub fn nothing(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let mut session = initializing(fmu)?;
+    fmu.doing("fmi2Get… and fmi2Set… with nvr = 0 and NULL pointers");
     for (call, status) in session.instance.nothing_null() {
         if status != host::fmi2::Status::Ok {
             findings
@@ -188,8 +188,8 @@ pub fn nothing(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `values.unknown`
-pub fn unknown(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    let taken: BTreeSet<u32> = guest.variables().iter().map(|v| v.reference).collect();
+pub fn unknown(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    let taken: BTreeSet<u32> = fmu.variables().iter().map(|v| v.reference).collect();
     let largest = taken.last().copied().unwrap_or(0);
     let free = [u32::MAX, largest.saturating_add(1)];
     let calls: [Call; 8] = [
@@ -205,7 +205,7 @@ pub fn unknown(guest: &Guest, findings: &mut Findings) -> Result<()> {
     for reference in free.into_iter().filter(|r| !taken.contains(r)) {
         for call in calls {
             let what = format!("the unknown value reference {reference}");
-            refused(guest, findings, call, reference, &what)?;
+            refused(fmu, findings, call, reference, &what)?;
         }
     }
     Ok(())
@@ -216,25 +216,25 @@ type Call = (&'static str, fn(&mut Instance, u32) -> Called);
 
 /// The call must be refused. Each goes to an instance of its own: after an error some refuse all.
 fn refused(
-    guest: &Guest,
+    fmu: &FmuUnderTest,
     findings: &mut Findings,
     (name, call): Call,
     reference: u32,
     what: &str,
 ) -> Result<()> {
-    let mut session = guest.running(first(guest)?)?;
+    let mut session = fmu.running(first(fmu)?)?;
     let place = format!("{name} of {what}");
-    guest.doing(&place);
+    fmu.doing(&place);
     let answer = call(&mut session.instance, reference);
     expect_refusal(findings, place, answer);
     Ok(())
 }
 
 /// `values.wrong_type`
-pub fn wrong_type(guest: &Guest, findings: &mut Findings) -> Result<()> {
+pub fn wrong_type(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     // Value references count for each type by itself.
     let of = |kinds: &[Type]| -> BTreeSet<u32> {
-        let all = guest.variables().iter().filter(|v| kinds.contains(&v.kind));
+        let all = fmu.variables().iter().filter(|v| kinds.contains(&v.kind));
         all.map(|v| v.reference).collect()
     };
     let integers = of(&[Type::Integer, Type::Enumeration]);
@@ -249,14 +249,14 @@ pub fn wrong_type(guest: &Guest, findings: &mut Findings) -> Result<()> {
     for (call, others) in of_real {
         if let Some(reference) = reals.difference(others).next() {
             looked = true;
-            refused(guest, findings, call, *reference, "a Real")?;
+            refused(fmu, findings, call, *reference, "a Real")?;
         }
     }
     let get_real: Call = ("fmi2GetReal", |i, r| i.get_real(&[r], &mut [0.0]));
     for (others, what) in [(&integers, "an Integer"), (&booleans, "a Boolean")] {
         if let Some(reference) = others.difference(&reals).next() {
             looked = true;
-            refused(guest, findings, get_real, *reference, what)?;
+            refused(fmu, findings, get_real, *reference, what)?;
         }
     }
     if !looked {
@@ -266,16 +266,16 @@ pub fn wrong_type(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `values.fixed`
-pub fn fixed(guest: &Guest, findings: &mut Findings) -> Result<()> {
+pub fn fixed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let fixed =
-        settable(guest).filter(|(v, _)| v.causality == "parameter" && v.variability == "fixed");
+        settable(fmu).filter(|(v, _)| v.causality == "parameter" && v.variability == "fixed");
     let mut any = false;
     for (v, start) in fixed {
         any = true;
-        let mut session = guest.running(first(guest)?)?;
+        let mut session = fmu.running(first(fmu)?)?;
         session.advance(1)?;
         let place = format!("setting the fixed parameter {} after initialisation", v.name);
-        guest.doing(&place);
+        fmu.doing(&place);
         let answer = session.set(v, &start);
         expect_refusal(findings, place, answer);
     }
@@ -286,23 +286,23 @@ pub fn fixed(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `values.computed`
-pub fn computed(guest: &Guest, findings: &mut Findings) -> Result<()> {
+pub fn computed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let aliases: BTreeSet<_> =
-        settable(guest).map(|(v, _)| (v.kind == Type::Real, v.reference)).collect();
+        settable(fmu).map(|(v, _)| (v.kind == Type::Real, v.reference)).collect();
     let mut any = false;
     for causality in ["output", "local", "calculatedParameter"] {
         // Those with initial exact or approx can be set before initialisation, not later.
-        let v = guest.variables().iter().find(|v| {
+        let v = fmu.variables().iter().find(|v| {
             v.causality == causality
                 && v.initial.as_deref() == Some("calculated")
                 && !aliases.contains(&(v.kind == Type::Real, v.reference))
         });
         let Some(v) = v else { continue };
         any = true;
-        let mut session = guest.running(first(guest)?)?;
+        let mut session = fmu.running(first(fmu)?)?;
         let value = session.get(v)?;
         let place = format!("setting the {causality} {} after initialisation", v.name);
-        guest.doing(&place);
+        fmu.doing(&place);
         let answer = session.set(v, &value);
         expect_refusal(findings, place, answer);
     }
@@ -313,9 +313,9 @@ pub fn computed(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `values.limits`
-pub fn limits(guest: &Guest, findings: &mut Findings) -> Result<()> {
+pub fn limits(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let mut any = false;
-    for (v, _) in settable(guest).filter(|(v, _)| matches!(v.kind, Type::Real | Type::Integer)) {
+    for (v, _) in settable(fmu).filter(|(v, _)| matches!(v.kind, Type::Real | Type::Integer)) {
         let (min, max) = v.bounds();
         for (bound, outwards) in [(min, -1.0), (max, 1.0)] {
             if !bound.is_finite() {
@@ -327,8 +327,8 @@ pub fn limits(guest: &Guest, findings: &mut Findings) -> Result<()> {
                 _ => bound + outwards,
             };
             let try_at = |x: f64| -> Result<Option<String>> {
-                let mut session = guest.session(first(guest)?)?;
-                guest.doing(format!("setting {} to {x:?} and initialising", v.name));
+                let mut session = fmu.session(first(fmu)?)?;
+                fmu.doing(format!("setting {} to {x:?} and initialising", v.name));
                 let value = match v.kind {
                     Type::Real => Reading::Real(x),
                     _ => Reading::Integer(x as i32),
@@ -340,7 +340,7 @@ pub fn limits(guest: &Guest, findings: &mut Findings) -> Result<()> {
             };
             // Refused as contradicting another parameter is fine: that one is named as well.
             if let Some(why) = try_at(bound)?
-                && !settable(guest).any(|(o, _)| o.name != v.name && mentions(&why, &o.name))
+                && !settable(fmu).any(|(o, _)| o.name != v.name && mentions(&why, &o.name))
             {
                 findings.add(
                     v.place(),
@@ -374,14 +374,14 @@ pub fn mentions(text: &str, name: &str) -> bool {
 }
 
 /// `values.not_a_number`
-pub fn not_a_number(guest: &Guest, findings: &mut Findings) -> Result<()> {
+pub fn not_a_number(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     // inputs have a rule of their own
-    let reals = settable(guest).filter(|(v, _)| v.kind == Type::Real && v.causality != "input");
+    let reals = settable(fmu).filter(|(v, _)| v.kind == Type::Real && v.causality != "input");
     for (v, _) in reals {
         for x in [f64::NAN, f64::INFINITY] {
-            let mut session = guest.session(first(guest)?)?;
+            let mut session = fmu.session(first(fmu)?)?;
             let place = format!("{} = {x}, then a step", v.name);
-            guest.doing(&place);
+            fmu.doing(&place);
             let refused = session.set(v, &Reading::Real(x)).is_err()
                 || session.initialise().is_err()
                 || session.go(session.step).is_err();
@@ -398,9 +398,9 @@ pub fn not_a_number(guest: &Guest, findings: &mut Findings) -> Result<()> {
 }
 
 /// `values.no_warning`
-pub fn no_warning(guest: &Guest, findings: &mut Findings) -> Result<()> {
-    for interface in guest.interfaces() {
-        let mut session = guest.running(interface)?;
+pub fn no_warning(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    for interface in fmu.interfaces() {
+        let mut session = fmu.running(interface)?;
         session.advance(STEPS)?;
         session.readings()?;
         if let Some(call) = session.instance.take_warning() {

@@ -871,6 +871,11 @@ fn descriptions_that_do_not_fit_the_binary_are_told() {
             "values.limits_exact",
         ),
         (
+            "a max of an Integer narrower than the binary's",
+            changed("name=\"slosh.modes\"", "max=\"10\"", "max=\"9\""),
+            "values.limits_exact",
+        ),
+        (
             "an output beyond its max",
             changed("name=\"omega\"", "unit=\"rad/s\"", "unit=\"rad/s\" max=\"-1\""),
             "values.in_range",

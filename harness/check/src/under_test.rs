@@ -50,7 +50,7 @@ impl std::fmt::Display for Unusable {
 impl std::error::Error for Unusable {}
 
 /// The loaded FMU.
-pub struct Guest {
+pub struct FmuUnderTest {
     /// The binaries: one, or two where modelIdentifier differs between the interfaces.
     binaries: Vec<Fmu>,
     /// The interfaces that can be called, Co-Simulation first, and the binary of each.
@@ -116,10 +116,15 @@ pub struct Experiment {
     pub step: f64,
 }
 
-impl Guest {
+impl FmuUnderTest {
     /// Loads the FMU that is unpacked in `directory`.
     /// Makes no instances after `deadline`.
-    pub fn open(directory: &Path, path: &Path, trace: Trace, deadline: Instant) -> Result<Guest> {
+    pub fn open(
+        directory: &Path,
+        path: &Path,
+        trace: Trace,
+        deadline: Instant,
+    ) -> Result<FmuUnderTest> {
         let xml = std::fs::read(directory.join("modelDescription.xml"))?;
         let description = Description::read(&xml).map_err(anyhow::Error::msg)?;
         let identifier = |interface: &Option<Element>| {
@@ -136,8 +141,8 @@ impl Guest {
             let at = match loaded.iter().position(|known| *known == identifier) {
                 Some(at) => at,
                 None => match Fmu::load_for(interface.kind(), directory, path) {
-                    Ok(fmu) => {
-                        binaries.push(fmu);
+                    Ok(binary) => {
+                        binaries.push(binary);
                         loaded.push(identifier);
                         binaries.len() - 1
                     }
@@ -158,7 +163,7 @@ impl Guest {
         if binaries.is_empty() {
             bail!("{}", broken.unwrap_or_else(|| "it declares no interface".into()));
         }
-        Ok(Guest {
+        Ok(FmuUnderTest {
             binaries,
             interfaces,
             broken: broken.filter(|_| is_there),
@@ -178,9 +183,9 @@ impl Guest {
     }
 
     /// Copies the unpacked FMU to `directory` and loads the copy: a library of its own.
-    pub fn copy(&self, directory: &Path) -> Result<Guest> {
+    pub fn copy(&self, directory: &Path) -> Result<FmuUnderTest> {
         copy_files(&self.directory, directory)?;
-        Guest::open(directory, &self.path, self.trace.again()?, self.deadline)
+        FmuUnderTest::open(directory, &self.path, self.trace.again()?, self.deadline)
     }
 
     /// Tells what comes next: the place of what goes wrong then.
@@ -197,7 +202,7 @@ impl Guest {
     }
 
     /// The binary of an interface.
-    pub fn fmu(&self, interface: Interface) -> &Fmu {
+    pub fn binary(&self, interface: Interface) -> &Fmu {
         let of = self.interfaces.iter().find(|(i, _)| *i == interface);
         &self.binaries[of.map_or(0, |(_, at)| *at)]
     }
@@ -266,11 +271,11 @@ impl Guest {
         }
         self.sessions.set(self.sessions.get() + 1);
         self.doing("fmi2Instantiate");
-        let fmu = self.fmu(interface);
-        let mut with = fmu.instantiation("check");
+        let binary = self.binary(interface);
+        let mut with = binary.instantiation("check");
         with.kind = interface.kind();
         with.logging = false;
-        let instance = fmu
+        let instance = binary
             .instantiate_with(&with)
             .map_err(|error| Unusable { rule: "load.instance", why: error.to_string() })?;
         let Experiment { start, stop, step, .. } = self.experiment();
@@ -285,7 +290,7 @@ impl Guest {
             state.typed.number("nominal").map_or(UNKNOWN_NOMINAL, |_| state.nominal())
         };
         Ok(Session {
-            guest: self,
+            fmu: self,
             interface,
             instance,
             time: start,
@@ -372,13 +377,13 @@ impl Interface {
 }
 
 /// An instance and how far it is.
-pub struct Session<'g> {
+pub struct Session<'f> {
     /// The FMU.
-    pub guest: &'g Guest,
+    pub fmu: &'f FmuUnderTest,
     /// What it was made for.
     pub interface: Interface,
     /// The instance.
-    pub instance: Instance<'g>,
+    pub instance: Instance<'f>,
     /// Time reached, s.
     pub time: f64,
     /// Communication step, s.
@@ -405,11 +410,11 @@ pub struct Mark {
     ended: Option<(f64, &'static str)>,
 }
 
-impl<'g> Session<'g> {
+impl<'f> Session<'f> {
     /// fmi2SetupExperiment to fmi2ExitInitializationMode, and in Model Exchange on to
     /// continuous-time mode, with what the FMU suggests.
     pub fn initialise(&mut self) -> Result<()> {
-        let Experiment { start, tolerance, .. } = self.guest.experiment();
+        let Experiment { start, tolerance, .. } = self.fmu.experiment();
         self.initialise_at(start, None, tolerance).map_err(|error| match error.downcast() {
             Ok(unusable) => Unusable { ..unusable }.into(),
             Err(error) => Unusable { rule: "load.initialises", why: error.to_string() }.into(),
@@ -424,17 +429,17 @@ impl<'g> Session<'g> {
         tolerance: Option<f64>,
     ) -> Result<()> {
         (self.ended, self.next_event) = (None, None);
-        self.guest.doing(format!("fmi2SetupExperiment, startTime = {start}"));
+        self.fmu.doing(format!("fmi2SetupExperiment, startTime = {start}"));
         self.instance.setup_experiment(tolerance, start, stop)?;
         self.time = start;
-        self.guest.doing("fmi2EnterInitializationMode");
+        self.fmu.doing("fmi2EnterInitializationMode");
         self.instance.enter_initialization_mode()?;
         self.leave_initialisation()
     }
 
     /// fmi2ExitInitializationMode, and in Model Exchange on to continuous-time mode.
     pub fn leave_initialisation(&mut self) -> Result<()> {
-        self.guest.doing("fmi2ExitInitializationMode");
+        self.fmu.doing("fmi2ExitInitializationMode");
         self.instance.exit_initialization_mode()?;
         match self.interface {
             Interface::CoSimulation => Ok(()),
@@ -449,13 +454,13 @@ impl<'g> Session<'g> {
         if self.is_ended() {
             return Ok(());
         }
-        self.guest.doing("fmi2EnterContinuousTimeMode");
+        self.fmu.doing("fmi2EnterContinuousTimeMode");
         Ok(self.instance.enter_continuous_time_mode()?)
     }
 
     /// Calls fmi2NewDiscreteStates until nothing is new.
     fn iterate_events(&mut self) -> Result<()> {
-        self.guest.doing("fmi2NewDiscreteStates");
+        self.fmu.doing("fmi2NewDiscreteStates");
         for _ in 0..ITERATIONS {
             let info = self.instance.new_discrete_states()?;
             if info.terminate_simulation != 0 {
@@ -510,7 +515,7 @@ impl<'g> Session<'g> {
 
     /// How many continuous states there are.
     pub(super) fn states(&self) -> usize {
-        self.guest.description.states().len()
+        self.fmu.description.states().len()
     }
 
     /// Order of magnitude of a state.
@@ -534,9 +539,8 @@ impl<'g> Session<'g> {
 
     /// Sets all Real inputs to values that change from step to step.
     pub fn stimulate(&mut self) -> Called {
-        let guest = self.guest;
-        let inputs =
-            guest.variables().iter().filter(|v| v.causality == "input" && v.is_continuous());
+        let fmu = self.fmu;
+        let inputs = fmu.variables().iter().filter(|v| v.causality == "input" && v.is_continuous());
         for (n, v) in inputs.enumerate() {
             let x = stimulus(v, self.count, n);
             self.set(v, &Reading::Real(x))?;
@@ -587,7 +591,7 @@ impl<'g> Session<'g> {
     /// One step of any size, inputs as they are. In Model Exchange it may end earlier, if the states
     /// change fast.
     pub fn go(&mut self, h: f64) -> Result<()> {
-        self.guest.doing(format!(
+        self.fmu.doing(format!(
             "a step from {:?} s by {h:?} s ({})",
             self.time,
             self.interface.name()
@@ -606,7 +610,7 @@ impl<'g> Session<'g> {
 
     /// How many event indicators there are.
     pub fn indicators(&self) -> usize {
-        let root = &self.guest.description.root;
+        let root = &self.fmu.description.root;
         root.number("numberOfEventIndicators").unwrap_or(0.0) as usize
     }
 
@@ -656,13 +660,13 @@ impl<'g> Session<'g> {
 
     /// Every value there is, one call each.
     pub fn readings(&mut self) -> Result<Vec<Reading>> {
-        let guest = self.guest;
-        guest.variables().iter().map(|v| self.read(v)).collect()
+        let fmu = self.fmu;
+        fmu.variables().iter().map(|v| self.read(v)).collect()
     }
 
     /// The first variable whose value is not the same to the last bit, as a sentence.
     pub fn difference(&self, ours: &[Reading], theirs: &[Reading]) -> Option<String> {
-        let all = self.guest.variables().iter().zip(ours.iter().zip(theirs));
+        let all = self.fmu.variables().iter().zip(ours.iter().zip(theirs));
         let mut different = all.filter(|(_, (a, b))| !a.is(b));
         let (v, (a, b)) = different.next()?;
         let more = match different.count() {
