@@ -600,7 +600,9 @@ fn budget(
         instance.enter_initialization_mode()?;
         instance.real(name)
     };
-    let mut list: Vec<(String, Vec<(String, String)>, f64, bool)> = Vec::new();
+    // what is wrong, settings, gain of the torque, whether it is held the other way
+    type Wrong = (String, Vec<(String, String)>, f64, bool);
+    let mut list: Vec<Wrong> = Vec::new();
     let set = |name: &str, value: f64| vec![(name.to_string(), value.to_string())];
     if sloshing {
         list.push((

@@ -32,7 +32,7 @@ impl Covariance {
     /// From sensitivities; `None` if some combination of unknowns has no influence at all.
     pub fn of(jacobian: &DMatrix<f64>) -> Option<Self> {
         let norms: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
-        if norms.iter().any(|norm| !(*norm > 0.0)) {
+        if !norms.iter().all(|norm| *norm > 0.0) {
             return None;
         }
         let mut scaled = jacobian.clone();
@@ -42,7 +42,7 @@ impl Covariance {
         let r = scaled.qr().r();
         let svd = r.svd(false, true);
         let (largest, smallest) = (svd.singular_values.max(), svd.singular_values.min());
-        if !(smallest > 1e-9 * largest) {
+        if smallest.is_nan() || smallest <= 1e-9 * largest {
             return None;
         }
         let v = svd.v_t?.transpose();
