@@ -102,7 +102,7 @@ static fmi2ValueReference reference(void) {
 }
 
 static size_t length(void) {
-    static const size_t special[] = {0, 1, 1, 1, 2, 3, 8, 46};
+    static const size_t special[] = {0, 1, 1, 1, 2, 3, 8, 47};
     return special[byte() % 8];
 }
 
@@ -509,11 +509,11 @@ static void call(void) {
         CALL(fmi2SetTime, c, time);
         break;
     case 46:
-        n = one_in(8) ? length() : 46;
+        n = one_in(8) ? length() : 47;
         CALL(fmi2SetContinuousStates, c, reals(n), n);
         break;
     case 47:
-        n = one_in(8) ? length() : 46;
+        n = one_in(8) ? length() : 47;
         CALL(fmi2GetDerivatives, c, reals(n), n);
         break;
     case 48:
@@ -521,7 +521,7 @@ static void call(void) {
         CALL(fmi2GetEventIndicators, c, reals(n), n);
         break;
     default:
-        n = one_in(8) ? length() : 46;
+        n = one_in(8) ? length() : 47;
         CALL(fmi2GetContinuousStates, c, reals(n), n);
         CALL(fmi2GetNominalsOfContinuousStates, c, reals(n), n);
     }

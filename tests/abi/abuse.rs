@@ -43,7 +43,10 @@ impl Unpacked {
         let sources = sources.iter().map(|source| root().join(source));
         run(
             Command::new("cc")
-                .args(["-std=c11", "-O1", "-g", "-Wall", "-Wextra", "-Werror", "-I"])
+                .args(["-std=c11", "-O1", "-g", "-Wall", "-Wextra", "-Werror"])
+                .arg(format!("-DSTATES={}", plant::STATES))
+                .arg(format!("-DINDICATORS={}", plant::INDICATORS))
+                .arg("-I")
                 .arg(headers())
                 .args(sources)
                 .args(link)

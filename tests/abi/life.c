@@ -212,7 +212,7 @@ static void co_simulation(int model) {
 }
 
 static void model_exchange(int model) {
-    enum { STATES = 46, INDICATORS = 8 };
+    /* STATES and INDICATORS come from the compiler's command line. */
     fmi2Component c = begin(fmi2ModelExchange, model);
     fmi2EventInfo info;
     double x[STATES], rates[STATES], indicators[INDICATORS], before[INDICATORS];

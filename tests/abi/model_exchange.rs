@@ -362,7 +362,7 @@ fn calls_of_model_exchange_in_the_wrong_state_are_refused() {
         &format!("ni = {STATES}"),
         &plant::INDICATORS.to_string()
     );
-    refused!(instance.set_continuous_states(&x[1..]), "nx = 45");
+    refused!(instance.set_continuous_states(&x[1..]), &format!("nx = {}", STATES - 1));
     let before = x;
     x[3] = f64::NAN;
     let error = instance.set_continuous_states(&x).unwrap_err();
@@ -558,7 +558,7 @@ fn states_out_of_the_models_range_end_the_run() {
     let mut host = Host::new(&fmu, &[("slosh.model", "paraboloid")]);
     let mut x = host.x;
     // slosh.q_radial[1]; the length is 4.5 cm.
-    x[6] = 0.1;
+    x[plant::x::SLOSH] = 0.1;
     host.instance.set_continuous_states(&x).unwrap();
     let error = host.instance.completed_integrator_step().unwrap_err();
     assert!(error.text().contains("slosh mode 1 left its range"), "{error}");

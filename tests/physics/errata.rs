@@ -5,7 +5,7 @@
 use std::f64::consts::{PI, TAU};
 
 use crate::common::bench;
-use plant::{FrictionModel, Inputs, Plant, Ramp, STATES, SloshModel};
+use plant::{FrictionModel, Inputs, Plant, Ramp, STATES, SloshModel, x};
 
 /// The linear model's equations as the plant has them, by directional derivatives:
 /// rows theta'', al'' against theta, theta', al, al' and the torque.
@@ -16,7 +16,7 @@ fn linear_system(h: f64, b: bool) -> ([[f64; 4]; 4], [f64; 4]) {
     let inputs = Inputs::default();
     let mut plant = Plant::new(&p, &inputs, 0.0, 1e-9).unwrap();
     // x = [theta, omega, ..., q_x, q_y, q_x', q_y' of mode 1, ...]
-    let index = [0, 1, 7, 9];
+    let index = [x::THETA, x::OMEGA, x::SLOSH + 1, x::SLOSH + 3];
     let mut a = [[0.0; 4]; 4];
     for (column, &state) in index.iter().enumerate() {
         let mut dx = [0.0; STATES];

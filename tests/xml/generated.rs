@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use model_description::{icon, variables};
+use runtime::Model;
 
 const GENERATE: &str = "run `cargo run --release -p model-description`";
 
@@ -13,12 +14,20 @@ fn committed(path: impl AsRef<Path>) -> Vec<u8> {
 }
 
 #[test]
-fn page_of_variables_is_what_the_table_says() {
-    let page = String::from_utf8(committed(&variables::path::<HubSlosh::HubSlosh>())).unwrap();
-    assert!(
-        page == variables::page::<HubSlosh::HubSlosh>(),
-        "variables.md is out of date: {GENERATE}"
-    );
+fn description_and_page_of_variables_are_what_the_table_says() {
+    up_to_date::<HubSlosh::HubSlosh>();
+    up_to_date::<Spacecraft::Model>();
+    up_to_date::<SloshTank::Model>();
+}
+
+fn up_to_date<M: Model>() {
+    for (path, text) in [
+        (model_description::path::<M>(), model_description::xml::<M>().unwrap()),
+        (variables::path::<M>(), variables::page::<M>()),
+    ] {
+        let there = String::from_utf8(committed(&path)).unwrap();
+        assert!(there == text, "{} is out of date: {GENERATE}", path.display());
+    }
 }
 
 #[test]

@@ -50,7 +50,7 @@ fn co_simulation(data: &mut Unstructured) -> Result<()> {
             set_something(&mut instance, data)?;
         }
         if data.ratio(1, 3)? {
-            let input = data.choose(&TABLE.scalars)?.reference;
+            let input = data.choose(TABLE.scalars)?.reference;
             _ = instance.set_input_derivatives(&[input], &[1], &[real(data)?]);
         }
         let h = real(data)?.min(LONGEST);
@@ -77,7 +77,7 @@ fn co_simulation(data: &mut Unstructured) -> Result<()> {
 
 /// Sets a parameter or an input, mostly to something allowed; refusals change nothing.
 fn set_something(instance: &mut Instance, data: &mut Unstructured) -> Result<()> {
-    let scalar = data.choose(&TABLE.scalars)?;
+    let scalar = data.choose(TABLE.scalars)?;
     if !matches!(scalar.variable.causality, Causality::Parameter | Causality::Input) {
         return Ok(());
     }

@@ -93,8 +93,7 @@ impl Model for Spring {
 
     fn step(&mut self, [force, slope]: &[f64; 2], h: f64) -> Result<(), String> {
         let steps = (h / 1e-3).ceil();
-        let refusal = || format!("h = {h} s takes more than 1e6 internal steps");
-        (steps <= 1e6).then_some(()).ok_or_else(refusal)?;
+        (steps <= 1e6).then_some(()).ok_or("it takes more than 1e6 internal steps")?;
         let (dt, mut x) = (h / steps, self.x);
         for n in 0..steps as usize {
             let at = |s: f64| force + slope * (n as f64 + s) * dt;

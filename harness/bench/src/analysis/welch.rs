@@ -9,8 +9,8 @@
 //! * [`COHERENCE`], 20 s: six segments at the thesis's 1/1200 Hz/s. Coherence then asks whether the
 //!   ratio of the two signals stays the same while the sweep passes 50 mHz.
 //! * [`RESPONSE`], a ninth of twice the record (MATLAB's choice when it is not told): 600 s of the
-//! thesis's sweep, which resolves the antiresonance. For the H1 estimate, which needs no average
-//! there, and for the signal-to-noise ratio: one segment has the sweep, the others the noise alone.
+//!   thesis's sweep, which resolves the antiresonance. For the H1 estimate, which needs no average
+//!   there, and for the signal-to-noise ratio: one segment has the sweep, the others the noise alone.
 
 use realfft::RealFftPlanner;
 
