@@ -3,7 +3,8 @@
     python harness/hosts/ssp.py dist/HubSlosh.fmu dist/HubSlosh.ssp
     OMSimulatorPython3 harness/hosts/omsimulator.py        # from the project's root
     python harness/hosts/compare.py dist/omsimulator_ssp.csv dist/HubSlosh.fmu \
-        --prefix bench.plant. tank.h=0.05 slosh.modes=2 slosh.kind=4 init.slosh_angle=0.1 init.omega=0.02
+        --prefix bench.plant. tank.h=0.05 slosh.modes=2 slosh.kind=4 \
+        init.slosh_angle=0.1 init.omega=0.02
 
 The system is that of ssp/: the liquid is released, nothing drives the hub.
 """

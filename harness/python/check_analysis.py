@@ -117,7 +117,7 @@ def spa(step: float, torque: Real, output: Real, grid: Real) -> Complex:
 
 
 def features(grid: Real, response: Complex) -> Figures:
-    """Antiresonance and resonance: the ends of the largest rise of the level as the frequency grows."""
+    """Antiresonance and resonance: the ends of the level's largest rise with the frequency."""
     level = 20 * np.log10(np.abs(response))
     lowest = np.minimum.accumulate(level)
     high = int(np.argmax(level - lowest))

@@ -221,9 +221,7 @@ def make_runs(
             missing.append(run)
     fmu = prepare(client, harness.fmu, todo["fmu"]["sha256"])
     there = len(todo["runs"]) - len(missing)
-    print(
-        f"{len(missing)} runs to simulate, {there} reused; {len(client.nthreads())} workers"
-    )
+    print(f"{len(missing)} runs to simulate, {there} reused; {len(client.nthreads())} workers")
 
     failed: dict[str, str] = {}
     runs = {}  # by key, those that are under way
