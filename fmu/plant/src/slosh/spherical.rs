@@ -31,7 +31,7 @@
 //! ```
 //!
 //! Checked against Lagrange's equations for xi (below), against another way to the hub's
-//! acceleration (tests/rotary.rs) and against a pendulum in angles (Basilisk).
+//! acceleration (tests/physics/rotary.rs) and against a pendulum in angles (Basilisk).
 
 use super::{Angles, HubMotion, HubReaction, SloshMode};
 use crate::Init;
