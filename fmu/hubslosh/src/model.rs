@@ -181,7 +181,7 @@ impl Model for HubSlosh {
 
     fn accept_step(&mut self, inputs: &Inputs) -> Result<bool, String> {
         self.plant.check_range().map_err(|why| why.to_string())?;
-        self.plant.accept_step(inputs);
+        self.plant.accept_step(inputs).map_err(|why| why.to_string())?;
         Ok(self.plant.is_event_overdue(inputs))
     }
 

@@ -127,9 +127,9 @@ impl Plant {
     /// the gyro's samples, finds the regime. Returns whether continuous states have changed.
     ///
     /// # Errors
-    /// [`StepError::TooManySamples`]; nothing has changed.
+    /// [`StepError::TooManySamples`], [`StepError::NotFinite`]; nothing has changed.
     pub fn take_event(&mut self, inputs: &Inputs) -> Result<bool, StepError> {
-        let (before, time) = (self.state.x, self.state.time);
+        let (before, time) = (self.state, self.state.time);
         let period = 1.0 / self.imu.rate;
         // Too many, or so far from zero that the clock can't tell one sample from the next.
         let endless = |due| time - due > SAMPLES_AT_ONCE * period || time + period <= time;
@@ -163,8 +163,11 @@ impl Plant {
             self.imu.sample(&mut self.state.gyro, omega);
         }
         self.state.regime = self.present_regime(inputs);
-        self.accept_step(inputs);
-        Ok(self.state.x != before)
+        if let Err(why) = self.accept_step(inputs) {
+            self.state = before;
+            return Err(why);
+        }
+        Ok(self.state.x != before.x)
     }
 
     fn find_contact(&mut self, inputs: &Inputs) {
@@ -208,11 +211,19 @@ impl Plant {
     ///
     /// The inputs' derivatives are not known here. The rule is exact to the fourth order of the
     /// step where g_axial is linear in time, to the second where it is not.
-    pub fn accept_step(&mut self, inputs: &Inputs) {
+    ///
+    /// # Errors
+    /// [`StepError::NotFinite`]; then nothing has changed.
+    pub fn accept_step(&mut self, inputs: &Inputs) -> Result<(), StepError> {
         let work = self.work_axial(inputs);
         let [mass_height, rate] = self.mass_height(inputs);
         let (g, time) = (inputs.g_axial.value, self.state.time);
-        self.state.axial = Axial { work, g, time, mass_height, rate };
+        let axial = Axial { work, g, time, mass_height, rate };
+        if !axial.is_finite() {
+            return Err(StepError::NotFinite { time });
+        }
+        self.state.axial = axial;
+        Ok(())
     }
 
     /// Whether the states that the host has set are within the models' range.
@@ -468,6 +479,17 @@ mod tests {
                 assert_eq!(*plant.state(), before);
             }
         }
+    }
+
+    /// A damaged saved state may hold any work; what a step leaves can be saved again.
+    #[test]
+    fn work_through_g_axial_beyond_all_magnitudes_is_refused() {
+        let (mut plant, inputs) = plant(SloshModel::Linear, FrictionModel::Viscous);
+        plant.state.axial.work = 1e200;
+        let before = *plant.state();
+        assert!(matches!(plant.step(&inputs, 0.1), Err(StepError::NotFinite { .. })));
+        assert!(matches!(plant.take_event(&inputs), Err(StepError::NotFinite { .. })));
+        assert_eq!(*plant.state(), before);
     }
 
     #[test]

@@ -127,7 +127,7 @@ impl Plant {
         plant.state.regime = plant.present_regime(inputs);
         plant.state.axial.g = inputs.g_axial.value;
         plant.state.axial.time = start_time;
-        plant.accept_step(inputs);
+        plant.accept_step(inputs).map_err(|why| vec![why.to_string()])?;
         if plant.imu.enabled {
             let omega = plant.omega();
             plant.imu.sample(&mut plant.state.gyro, omega);
@@ -236,6 +236,9 @@ impl Plant {
         state.time = begin + h;
         state.axial.time = state.time;
         state.axial.g = inputs.g_axial.at(h);
+        if !state.axial.is_finite() {
+            return Err(StepError::NotFinite { time: state.time });
+        }
         Ok(())
     }
 

@@ -93,6 +93,14 @@ pub(crate) struct Axial {
     pub rate: f64,
 }
 
+impl Axial {
+    /// Whether all of it, and its squares, are finite.
+    pub(crate) fn is_finite(&self) -> bool {
+        let Axial { work, time, g, mass_height, rate } = *self;
+        [work, time, g, mass_height, rate].iter().all(|x| x.abs() < MAX_MAGNITUDE)
+    }
+}
+
 impl State {
     /// Length of the flat form.
     pub const WORDS: usize = 2 + Self::REALS;

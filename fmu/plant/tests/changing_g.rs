@@ -283,7 +283,7 @@ fn residual_of_a_host(p: &Parameters, h: f64, g: impl Fn(f64) -> f64) -> f64 {
         let k4 = derivatives(&k3, h);
         let mean = core::array::from_fn(|i| (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]) / 6.0);
         derivatives(&mean, h);
-        plant.accept_step(&at(g(t + h)));
+        plant.accept_step(&at(g(t + h))).unwrap();
     }
     let o = plant.outputs_held(&at(g(2.0)));
     // A jump at an instant: exact.
