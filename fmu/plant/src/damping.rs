@@ -71,7 +71,8 @@ impl Damping {
         Damping { tangent: Some(tangent), ..self.clone() }
     }
 
-    /// The damping ratios at g; 0 at g = 0, where they have no meaning.
+    /// The damping ratios at g; 0 at g = 0 and where they overflow next to it: there they have
+    /// no meaning.
     pub fn ratios(&self, g: f64) -> [f64; MODES] {
         match (g > 0.0, self.exponent == 0.25) {
             (false, _) => [0.0; MODES],
@@ -79,7 +80,7 @@ impl Damping {
             (_, true) if g == self.reference => self.zeta,
             (_, true) => {
                 let factor = self.factor(g);
-                self.zeta.map(|zeta| zeta / factor)
+                self.zeta.map(|zeta| finite_or_zero(zeta / factor))
             }
         }
     }
@@ -87,7 +88,7 @@ impl Damping {
     /// The derivatives of the damping ratios by g, s2/m.
     pub fn slopes_of_ratios(&self, g: f64) -> [f64; MODES] {
         if g > 0.0 && self.exponent == 0.25 {
-            self.ratios(g).map(|zeta| -zeta / (4.0 * g))
+            self.ratios(g).map(|zeta| finite_or_zero(-zeta / (4.0 * g)))
         } else {
             [0.0; MODES]
         }
@@ -141,4 +142,8 @@ impl Damping {
         let integral = |g: f64| f64::max(g, 0.0) * self.factor(g) / (1.0 + self.exponent);
         if a == b { self.factor(a) } else { (integral(b) - integral(a)) / (b - a) }
     }
+}
+
+fn finite_or_zero(x: f64) -> f64 {
+    if x.is_finite() { x } else { 0.0 }
 }
