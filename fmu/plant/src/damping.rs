@@ -2,17 +2,17 @@
 //!
 //! The viscous coefficient of a mode is c = 2 zeta omega_n m with omega_n = sqrt(g/l). A given
 //! damping ratio zeta makes c ~ g^(1/2); the correlation, zeta ~ g^(-1/4), makes c ~ g^(1/4).
-//! So all modes share one factor,
+//! A centring stiffness makes g larger by a_n (`tank.rs`). So
 //!
 //! ```text
-//! c(g) = c_0 (g/g_0)^p,   p = 1/2 or 1/4
+//! c(g) = c_0 [(g + a_n)/(g_0 + a_n)]^p,   p = 1/2 or 1/4
 //! ```
 //!
-//! with c_0 at a reference g_0 > 0; without specific force there is no damping.
+//! with c_0 at a reference g_0; without restoring force there is no damping.
 
-use crate::series::{ORDER, Series, ZERO};
-use crate::slosh::HubMotion;
-use crate::tank::Calculated;
+use crate::motion::RAMP_ORDER;
+use crate::series::{Series, ZERO};
+use crate::tank::{Calculated, Pendulum, SloshSource};
 use crate::{MODES, Parameters, Ramp};
 
 /// Below this share of the largest g on a ramp the factor is replaced by its mean: there its
@@ -23,7 +23,7 @@ const NEAR_ZERO: f64 = 1e-6;
 /// Share of the series' radius of convergence, the time to g = 0, that one step takes.
 const SHARE_OF_RADIUS: f64 = 0.5;
 
-/// c/c_0 as a function of g.
+/// c/c_0 of every mode as a function of g.
 #[derive(Clone, Debug)]
 pub struct Damping {
     /// g_0, m/s2
@@ -32,93 +32,91 @@ pub struct Damping {
     exponent: f64,
     /// Damping ratios at g_0.
     zeta: [f64; MODES],
-    /// The tangent that stands for the power, if one does.
-    tangent: Option<Tangent>,
-}
-
-/// c/c_0 close to g.
-#[derive(Clone, Copy, Debug)]
-struct Tangent {
-    g: f64,
-    value: f64,
-    slope: f64,
+    /// a_n, m/s2
+    centring: [f64; MODES],
+    /// The g whose tangents stand for the powers, if they do.
+    tangent_at: Option<f64>,
 }
 
 impl Damping {
-    /// `calculated` belongs to the specific force `reference` > 0.
+    /// `calculated` belongs to the specific force `reference`, at which every mode has a
+    /// restoring force.
     pub fn new(p: &Parameters, calculated: &Calculated, reference: f64) -> Damping {
-        let exponent = if p.slosh.zeta_from_correlation { 0.25 } else { 0.5 };
-        Damping { reference, exponent, zeta: calculated.damping, tangent: None }
+        let by_correlation =
+            p.slosh.zeta_from_correlation && p.slosh.source == SloshSource::Geometry;
+        let exponent = if by_correlation { 0.25 } else { 0.5 };
+        let Calculated { damping: zeta, centring, .. } = *calculated;
+        Damping { reference, exponent, zeta, centring, tangent_at: None }
     }
 
-    /// c/c_0
-    fn factor(&self, g: f64) -> f64 {
-        if let Some(tangent) = self.tangent {
-            return tangent.value + tangent.slope * (g - tangent.g);
-        }
-        let root = libm::sqrt(f64::max(g, 0.0) / self.reference);
+    /// (g + a)/(g_0 + a) to the power p
+    fn power(&self, g: f64, a: f64) -> f64 {
+        let root = libm::sqrt(f64::max(g + a, 0.0) / (self.reference + a));
         if self.exponent == 0.25 { libm::sqrt(root) } else { root }
     }
 
-    /// The derivative of c/c_0 by g, s2/m; 0 at g = 0, where there is none.
-    fn slope(&self, g: f64) -> f64 {
-        if g > 0.0 { self.exponent * self.factor(g) / g } else { 0.0 }
+    /// Its derivative by g, s2/m; 0 at g + a = 0, where there is none.
+    fn slope(&self, g: f64, a: f64) -> f64 {
+        if g + a > 0.0 { self.exponent * self.power(g, a) / (g + a) } else { 0.0 }
+    }
+
+    /// c/c_0
+    fn factor(&self, g: f64, a: f64) -> f64 {
+        match self.tangent_at {
+            Some(at) => self.power(at, a) + self.slope(at, a) * (g - at),
+            None => self.power(g, a),
+        }
     }
 
     /// The same close to g, but linear.
     pub fn tangent(&self, g: f64) -> Damping {
-        let tangent = Tangent { g, value: self.factor(g), slope: self.slope(g) };
-        Damping { tangent: Some(tangent), ..self.clone() }
+        Damping { tangent_at: Some(g), ..self.clone() }
     }
 
-    /// The damping ratios at g; 0 at g = 0 and where they overflow next to it: there they have
-    /// no meaning.
+    /// The damping ratios at g; 0 without restoring force and where they overflow next to it:
+    /// there they have no meaning.
     pub fn ratios(&self, g: f64) -> [f64; MODES] {
-        match (g > 0.0, self.exponent == 0.25) {
-            (false, _) => [0.0; MODES],
-            (_, false) => self.zeta,
-            (_, true) if g == self.reference => self.zeta,
-            (_, true) => {
-                let factor = self.factor(g);
-                self.zeta.map(|zeta| finite_or_zero(zeta / factor))
+        core::array::from_fn(|n| {
+            let (zeta, a) = (self.zeta[n], self.centring[n]);
+            match self.exponent == 0.25 {
+                _ if g + a <= 0.0 => 0.0,
+                true if g != self.reference => finite_or_zero(zeta / self.power(g, a)),
+                _ => zeta,
             }
-        }
+        })
     }
 
     /// The derivatives of the damping ratios by g, s2/m.
     pub fn slopes_of_ratios(&self, g: f64) -> [f64; MODES] {
-        if g > 0.0 && self.exponent == 0.25 {
-            self.ratios(g).map(|zeta| finite_or_zero(-zeta / (4.0 * g)))
-        } else {
-            [0.0; MODES]
-        }
+        let ratios = self.ratios(g);
+        core::array::from_fn(|n| {
+            let x = g + self.centring[n];
+            let changes = x > 0.0 && self.exponent == 0.25;
+            if changes { finite_or_zero(-ratios[n] / (4.0 * x)) } else { 0.0 }
+        })
     }
 
-    /// Puts g and the course of the damping from here on into the hub's motion; returns the
-    /// factor now. Where g is below `floor` the factor is its mean until g has reached 0 or
-    /// twice `floor`.
-    pub fn expand(&self, g: Ramp, floor: f64, hub: &mut HubMotion) -> f64 {
-        hub.g = [g.value, g.slope];
-        hub.damping = ZERO;
-        hub.damping[0] = 1.0;
-        hub.damping_reach = f64::INFINITY;
-        if !self.varies(g) {
-            self.factor(g.value)
-        } else if g.value > floor {
-            hub.damping_reach = SHARE_OF_RADIUS * g.value / g.slope.abs();
-            hub.damping = self.series(g);
-            self.factor(g.value)
+    /// Gives mode `n` its restoring specific force and the course of its damping from here on;
+    /// returns how long the latter holds, s. Where g + a is below `floor` the factor is its mean
+    /// until that has reached its end or twice `floor`.
+    pub fn expand(&self, n: usize, g: Ramp, floor: f64, pendulum: &mut Pendulum) -> f64 {
+        let a = self.centring[n];
+        let x = g.value + a;
+        pendulum.set_restoring([x, g.slope]);
+        let mut course = ZERO;
+        course[0] = 1.0;
+        let (factor, reach) = if g.slope == 0.0 || self.zeta[n] <= 0.0 {
+            (self.factor(g.value, a), f64::INFINITY)
+        } else if x > floor {
+            self.series(g.slope / x, &mut course);
+            (self.factor(g.value, a), SHARE_OF_RADIUS * x / g.slope.abs())
         } else if g.slope > 0.0 && floor > 0.0 {
-            hub.damping_reach = (2.0 * floor - g.value) / g.slope;
-            self.mean(g.value, 2.0 * floor)
+            (self.mean(g.value, 2.0 * floor - a, a), (2.0 * floor - x) / g.slope)
         } else {
-            self.mean(g.value, 0.0)
-        }
-    }
-
-    /// Whether there is damping and it changes along `g`.
-    pub fn varies(&self, g: Ramp) -> bool {
-        g.slope != 0.0 && self.zeta[0] > 0.0
+            (self.mean(g.value, 0.0, a), f64::INFINITY)
+        };
+        pendulum.set_damping(factor, course);
+        reach
     }
 
     /// The specific force below which a ramp's factor is held.
@@ -126,21 +124,22 @@ impl Damping {
         if g.slope == 0.0 { 0.0 } else { NEAR_ZERO * f64::max(g.value, g.at(h)) }
     }
 
-    /// Binomial series of the factor over its first value, along a ramp that starts above 0.
-    fn series(&self, g: Ramp) -> Series {
-        let mut c = ZERO;
-        let relative = g.slope / g.value;
-        c[0] = 1.0;
-        for n in 0..ORDER {
+    /// Binomial series of the factor over its first value, along a ramp whose slope over its first
+    /// value is `relative`.
+    fn series(&self, relative: f64, c: &mut Series) {
+        for n in 0..RAMP_ORDER {
             c[n + 1] = c[n] * relative * (self.exponent - n as f64) / (n + 1) as f64;
         }
-        c
     }
 
-    /// Mean of the factor over g from a to b.
-    fn mean(&self, a: f64, b: f64) -> f64 {
-        let integral = |g: f64| f64::max(g, 0.0) * self.factor(g) / (1.0 + self.exponent);
-        if a == b { self.factor(a) } else { (integral(b) - integral(a)) / (b - a) }
+    /// Mean of the factor over g from `from` to `to`.
+    fn mean(&self, from: f64, to: f64, a: f64) -> f64 {
+        let integral = |g: f64| f64::max(g + a, 0.0) * self.factor(g, a) / (1.0 + self.exponent);
+        if from == to {
+            self.factor(from, a)
+        } else {
+            (integral(to) - integral(from)) / (to - from)
+        }
     }
 }
 

@@ -36,7 +36,7 @@ impl Plant {
     pub fn derivatives(&mut self, inputs: &Inputs) -> [f64; STATES] {
         self.evaluate(inputs);
         let torque = self.wheel.torque(self.state.x[x::WHEEL_SPEED], inputs.tau_cmd);
-        self.coefficients::<0>(-torque.value / self.wheel.inertia).map(unsigned_zero)
+        self.coefficients(0, -torque.value / self.wheel.inertia).map(unsigned_zero)
     }
 
     /// The derivative of x' in the direction (dx, du), du = [tau_cmd, tau_ext, g_axial]:
@@ -57,32 +57,32 @@ impl Plant {
         with_modes!(&mut self.liquid, modes => {
             let acting = (tau, along(inputs.g_axial, du[2]));
             self.motion.start(modes, &self.state, acting);
-            self.motion.derivatives::<0, true, _>(modes, contact);
+            self.motion.derivatives(0, true, modes, contact);
             self.motion.hub.theta[1] = dx[x::THETA];
             self.motion.hub.omega[1] = dx[x::OMEGA];
-            self.motion.law.set_states::<1>(dx);
+            self.motion.law.set_states(1, dx);
             for (mode, dq) in modes.iter_mut().zip(dx[x::SLOSH..].as_chunks::<4>().0) {
                 mode.seed_direction(dq, &self.motion.hub);
             }
-            self.motion.derivatives::<1, true, _>(modes, contact);
+            self.motion.derivatives(1, true, modes, contact);
         });
-        self.coefficients::<1>(-torque.slope / self.wheel.inertia)
+        self.coefficients(1, -torque.slope / self.wheel.inertia)
     }
 
-    /// Coefficient N of x' as the series have it.
-    fn coefficients<const N: usize>(&self, wheel: f64) -> [f64; STATES] {
+    /// Coefficient n of x' as the series have it.
+    fn coefficients(&self, n: usize, wheel: f64) -> [f64; STATES] {
         let motion = &self.motion;
         let mut derivatives = [0.0; STATES];
-        derivatives[x::THETA] = motion.hub.omega[N];
-        derivatives[x::OMEGA] = motion.hub.omega_dot[N];
-        derivatives[x::WORK] = motion.power[N];
-        derivatives[x::HEAT] = motion.dissipation[N];
+        derivatives[x::THETA] = motion.hub.omega[n];
+        derivatives[x::OMEGA] = motion.hub.omega_dot[n];
+        derivatives[x::WORK] = motion.power[n];
+        derivatives[x::HEAT] = motion.dissipation[n];
         derivatives[x::WHEEL_SPEED] = wheel;
-        motion.law.derivatives::<N>(self.state.contact, &mut derivatives);
+        motion.law.derivatives(n, self.state.contact, &mut derivatives);
         with_modes!(&self.liquid, modes => {
             let slosh = derivatives[x::SLOSH..].as_chunks_mut::<4>().0;
             for (mode, derivatives) in modes.iter().zip(slosh) {
-                *derivatives = mode.derivatives::<N>(&motion.hub);
+                *derivatives = mode.derivatives(n, &motion.hub);
             }
         });
         derivatives
@@ -162,7 +162,7 @@ impl Plant {
             let omega = self.omega();
             self.imu.sample(&mut self.state.gyro, omega);
         }
-        self.state.regime = self.present_regime(inputs);
+        self.state.ranges = self.present_ranges(inputs);
         if let Err(why) = self.accept_step(inputs) {
             self.state = before;
             return Err(why);
@@ -183,7 +183,7 @@ impl Plant {
         let of_contact =
             [indicator::REST, indicator::BREAK_AWAY_FORWARD, indicator::BREAK_AWAY_BACKWARD];
         of_contact.iter().any(|place| z[*place] < 0.0)
-            || self.present_regime(inputs) != self.state.regime
+            || self.present_ranges(inputs) != self.state.ranges
     }
 
     /// How often the contact has changed since the start, when last, s, and what it is
@@ -254,8 +254,30 @@ mod tests {
     use super::*;
     use crate::{FrictionModel, Outputs, Parameters, SloshModel};
 
+    /// Whether the model's coordinates are lengths, not angles.
+    fn is_a_length(slosh: SloshModel) -> bool {
+        matches!(slosh, SloshModel::Paraboloid | SloshModel::Liquid)
+    }
+
     fn plant(slosh: SloshModel, friction: FrictionModel) -> (Plant, Inputs) {
+        plant_with(slosh, friction, |_| {})
+    }
+
+    /// A bench that leans, a ring baffle, surface tension a hundred times water's.
+    fn every_option(p: &mut Parameters) {
+        (p.bench.tilt, p.bench.tilt_azimuth) = (0.1, 0.7);
+        (p.hub.imbalance, p.hub.imbalance_angle) = (0.4, 2.0);
+        (p.baffle.width, p.baffle.depth) = (0.008, 0.01);
+        (p.slosh.capillarity, p.fluid.sigma) = (true, 7.0);
+    }
+
+    fn plant_with(
+        slosh: SloshModel,
+        friction: FrictionModel,
+        change: fn(&mut Parameters),
+    ) -> (Plant, Inputs) {
         let mut p = Parameters::default();
+        change(&mut p);
         p.slosh.model = slosh;
         p.slosh.modes = 2;
         p.friction.model = friction;
@@ -279,9 +301,14 @@ mod tests {
 
     #[test]
     fn directional_derivatives_agree_with_finite_differences() {
+        compare_directional_derivatives(|_| {});
+        compare_directional_derivatives(every_option);
+    }
+
+    fn compare_directional_derivatives(change: fn(&mut Parameters)) {
         for slosh in SloshModel::ALL {
             for friction in FrictionModel::ALL {
-                let (mut plant, inputs) = plant(slosh, friction);
+                let (mut plant, inputs) = plant_with(slosh, friction, change);
                 let x = *plant.continuous_states();
                 let unit = |i: usize| -> ([f64; STATES], [f64; 3]) {
                     let (mut dx, mut du) = ([0.0; STATES], [0.0; 3]);
@@ -296,7 +323,7 @@ mod tests {
                     let (dx, du) = unit(direction);
                     // Coordinates are 0.01 to 1: central differences over 2e-5 of that
                     // leave the square, 1e-10, times the third derivative.
-                    let eps = 1e-5 * if slosh == SloshModel::Paraboloid { 0.05 } else { 1.0 };
+                    let eps = 1e-5 * if is_a_length(slosh) { 0.05 } else { 1.0 };
                     let at = |sign: f64, plant: &mut Plant| {
                         let mut moved = x;
                         for (x, dx) in moved.iter_mut().zip(dx) {
@@ -329,8 +356,13 @@ mod tests {
 
     #[test]
     fn output_derivatives_agree_with_finite_differences() {
+        compare_output_derivatives(|_| {});
+        compare_output_derivatives(every_option);
+    }
+
+    fn compare_output_derivatives(change: fn(&mut Parameters)) {
         // Every continuous output.
-        let reals: [fn(&Outputs) -> f64; 20] = [
+        let reals: [fn(&Outputs) -> f64; 23] = [
             |o| o.theta,
             |o| o.omega,
             |o| o.omega_dot,
@@ -340,6 +372,9 @@ mod tests {
             |o| o.slosh_rate_radial,
             |o| o.tau_friction,
             |o| o.tau_fluid,
+            |o| o.tau_gravity,
+            |o| o.baffle_zeta,
+            |o| o.baffle_wave,
             |o| o.f_tangential,
             |o| o.f_radial,
             |o| o.wave_height,
@@ -355,7 +390,7 @@ mod tests {
         for slosh in SloshModel::ALL {
             for friction in FrictionModel::ALL {
                 for stuck in [false, true] {
-                    let (mut plant, inputs) = plant(slosh, friction);
+                    let (mut plant, inputs) = plant_with(slosh, friction, change);
                     if stuck {
                         if friction != FrictionModel::Stribeck {
                             continue;
@@ -370,7 +405,7 @@ mod tests {
                     let du = [0.3, -0.4, 0.7];
                     // Central differences leave the square of this times the third
                     // derivative, 1e-10 of what curves over 0.1, and round at 1e-16 / 1e-6.
-                    let eps = 1e-6 * if slosh == SloshModel::Paraboloid { 0.1 } else { 1.0 };
+                    let eps = 1e-6 * if is_a_length(slosh) { 0.1 } else { 1.0 };
                     let at = |sign: f64, plant: &mut Plant| {
                         let moved = core::array::from_fn(|i| x[i] + sign * eps * dx[i]);
                         let moved_input = |u: Ramp, du: f64| Ramp::held(u.value + sign * eps * du);

@@ -11,6 +11,7 @@
 //! and slip, `friction/`, `slosh/`, `damping.rs`, `tank.rs`, `wheel.rs`, `imu.rs` say what their names say,
 //! `series.rs` is the arithmetic.
 
+mod baffle;
 mod damping;
 mod equations;
 mod friction;
@@ -29,9 +30,11 @@ pub use friction::{Contact, FrictionModel};
 pub use motion::StepError;
 pub use outputs::{Discrete, Outputs, Regime};
 pub use parameters::{
-    Fluid, Friction, Hub, Imu, Init, MODES, Parameters, Slosh, Solver, Tank, Wheel,
+    Bench, Fluid, Friction, Hub, Imu, Init, MODES, ModeTable, Parameters, Ring, Slosh, Solver,
+    Tank, Wheel,
 };
 pub use plant::{Inputs, Plant, Ramp};
 pub use slosh::SloshModel;
+pub use slosh::liquid::coefficients as liquid_coefficients;
 pub use state::{INDICATORS, STATES, State, indicator, x};
-pub use tank::Calculated;
+pub use tank::{Calculated, SloshSource};

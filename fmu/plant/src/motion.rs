@@ -7,13 +7,13 @@
 //! the ends is as exact as at the ends: the instants at which the hub comes to rest
 //! or breaks away are roots of polynomials, found without stepping back.
 
-use crate::Imu;
 use crate::damping::Damping;
 use crate::friction::{Contact, Law};
 use crate::plant::Ramp;
 use crate::series::{self, ORDER, Series, ZERO, for_each_order};
 use crate::slosh::{HubMotion, SloshMode};
 use crate::state::{State, x};
+use crate::{Imu, Parameters, SloshModel};
 
 /// Error of one step against the tolerance asked for. A step's error is forgotten
 /// as the liquid's motion decays, within some thousand steps.
@@ -22,8 +22,11 @@ const STEP_SHARE: f64 = 1e-2;
 /// The floor of the error's scale, rad/s.
 const RATE_FLOOR: f64 = 1e-6;
 
-/// The highest order used where the specific force changes: rare, and each order is code.
-const RAMP_ORDER: usize = 10;
+/// The highest order used where the specific force changes.
+pub(crate) const RAMP_ORDER: usize = 10;
+
+/// The longest expansion, s: its powers up to the highest order do not overflow.
+const LONGEST: f64 = 1e9;
 
 /// The lowest order that is trusted to show that a series has converged.
 const MIN_ORDER: usize = 5;
@@ -84,6 +87,20 @@ impl core::fmt::Display for StepError {
     }
 }
 
+/// How far an expansion reaches.
+#[derive(Default)]
+struct Reach {
+    /// Its length, s.
+    h: f64,
+    /// h^(n + 1) after order n.
+    power: f64,
+    /// Errors allowed at that length, rad/s.
+    hub_allowed: f64,
+    slosh_allowed: f64,
+    /// How many of the last terms in succession were below them.
+    negligible: usize,
+}
+
 /// The hub's equation with the power series of its parts:
 /// J w' = tau + tau_f + T, J = I0 + sum of J_i, T = sum of T_i over the modes.
 #[derive(Clone, Debug)]
@@ -92,6 +109,15 @@ pub(crate) struct Motion {
     pub i0: f64,
     pub law: Law,
     pub damping: Damping,
+    /// Whether drag or weight change along an expansion though g is held: with a baffle, or on a
+    /// bench that leans.
+    pub varies: bool,
+    with_baffle: bool,
+    /// Mass moments of the dry hub, radially and tangentially, and of the rigid liquid, kg m.
+    imbalance: [f64; 2],
+    rigid_moment: f64,
+    /// The g and its rate that the modes know; NaN: none yet, or none for longer than an instant.
+    g: [f64; 2],
     /// The specific force below which damping is held, m/s2, see [`Damping::expand`].
     near_weightless: f64,
     tolerance: f64,
@@ -113,16 +139,25 @@ pub(crate) struct Motion {
 }
 
 impl Motion {
-    pub fn new(i0: f64, law: Law, damping: Damping, tolerance: f64, max_steps: usize) -> Motion {
+    pub fn new(p: &Parameters, i_0: f64, m_0: f64, damping: Damping, tolerance: f64) -> Motion {
+        let (sin, cos) = libm::sincos(p.hub.imbalance_angle);
+        let mut hub = HubMotion::REST;
+        hub.tilt.tangent = libm::tan(p.bench.tilt);
+        hub.tilt.azimuth = p.bench.tilt_azimuth;
+        let with_baffle = p.baffle.width > 0.0 && p.slosh.model != SloshModel::Frozen;
         Motion {
-            i0,
-            law,
+            i0: p.hub.inertia + i_0,
+            law: Law::new(&p.friction),
             damping,
+            varies: with_baffle || hub.tilt.tangent != 0.0,
+            with_baffle,
+            imbalance: [p.hub.imbalance * cos, p.hub.imbalance * sin],
+            rigid_moment: m_0 * p.tank.r,
+            g: [f64::NAN; 2],
             near_weightless: 0.0,
             tolerance,
-            max_steps,
-            // No g yet: the first one sets the damping.
-            hub: HubMotion { g: [f64::NAN; 2], ..HubMotion::REST },
+            max_steps: p.solver.max_steps,
+            hub,
             tau: [0.0; 2],
             inertia: ZERO,
             inv_inertia: 0.0,
@@ -135,7 +170,7 @@ impl Motion {
 
     /// Takes another law of slosh damping and returns the last one.
     pub fn set_damping(&mut self, damping: Damping) -> Damping {
-        self.hub.g = [f64::NAN; 2];
+        self.g = [f64::NAN; 2];
         std::mem::replace(&mut self.damping, damping)
     }
 
@@ -143,115 +178,193 @@ impl Motion {
     pub fn start<M: SloshMode>(&mut self, modes: &mut [M], state: &State, (tau, g): (Ramp, Ramp)) {
         self.hub.theta[0] = state.x[x::THETA];
         self.hub.omega[0] = state.x[x::OMEGA];
-        if self.hub.g != [g.value, g.slope] {
-            let factor = self.damping.expand(g, self.near_weightless, &mut self.hub);
-            modes.iter_mut().for_each(|mode| mode.set_damping(factor));
-        }
-        self.law.set_states::<0>(&state.x);
+        self.law.set_states(0, &state.x);
         self.tau = [tau.value, tau.slope];
         for (mode, q) in modes.iter_mut().zip(state.slosh()) {
             mode.start(q, &self.hub);
         }
+        if self.g != [g.value, g.slope] {
+            self.set_axial(modes, g);
+        }
     }
 
-    /// Coefficient N of every quantity from coefficients up to N of the state, and
-    /// coefficient N + 1 of the state.
+    /// Tells the modes of the specific force, and of the drag that it and their motion make.
+    #[cold]
+    fn set_axial<M: SloshMode>(&mut self, modes: &mut [M], g: Ramp) {
+        self.hub.g = [g.value, g.slope];
+        // The baffle's drag belongs to the motion at this instant alone.
+        self.g = if self.with_baffle { [f64::NAN; 2] } else { self.hub.g };
+        self.hub.damping_reach = f64::INFINITY;
+        for (n, mode) in modes.iter_mut().enumerate() {
+            let amplitude2 = mode.amplitude2();
+            let pendulum = mode.pendulum();
+            let reach = self.damping.expand(n, g, self.near_weightless, pendulum);
+            self.hub.damping_reach = self.hub.damping_reach.min(reach);
+            if pendulum.baffle.zeta > 0.0 {
+                pendulum.add_baffle(amplitude2);
+            }
+        }
+    }
+
+    /// Coefficient n of the torque of gravity on the dry hub of a bench that leans, N m.
+    fn gravity_torque(&self, n: usize) -> f64 {
+        let ([x, y], [e_x, e_y]) = (self.imbalance, &self.hub.tilt.e);
+        x * e_y[n] - y * e_x[n]
+    }
+
+    /// Torque of gravity on the dry hub, N m, on the rigid liquid's mass moment, kg m, at order 0.
+    pub fn gravity_torques(&self) -> [f64; 2] {
+        [self.gravity_torque(0), self.rigid_moment * self.hub.tilt.e[1][0]]
+    }
+
+    /// Potential energy of the dry hub and of the rigid liquid, J.
+    pub fn potential(&self) -> f64 {
+        let ([x, y], [e_x, e_y]) = (self.imbalance, self.hub.tilt.now());
+        -((x + self.rigid_moment) * e_x + y * e_y)
+    }
+
+    /// Coefficient n of mass times height of hub and liquid above rest, kg m: the potential energy
+    /// over g.
+    pub fn mass_height<M: SloshMode>(&self, n: usize, modes: &mut [M]) -> f64 {
+        let [x, y] = self.imbalance;
+        let moment = |j| [series::constant(j, x + self.rigid_moment), series::constant(j, y)];
+        modes.iter_mut().map(|mode| mode.mass_height(n, &self.hub)).sum::<f64>()
+            + self.hub.tilt.height(n, moment)
+    }
+
+    /// Coefficient n of every quantity from coefficients up to n of the state, and
+    /// coefficient n + 1 of the state; `ramp` says whether the specific force, the drag or the
+    /// weight changes.
     #[inline(always)]
-    pub fn derivatives<const N: usize, const RAMP: bool, M: SloshMode>(
+    pub fn derivatives<M: SloshMode>(
         &mut self,
+        n: usize,
+        ramp: bool,
         modes: &mut [M],
         contact: Contact,
     ) {
-        self.hub.omega2[N] = series::square::<N>(&self.hub.omega);
-        let (mut inertia, mut net) = (0.0, if N < 2 { self.tau[N] } else { 0.0 });
+        self.hub.omega2[n] = series::square(n, &self.hub.omega);
+        let (mut inertia, mut net) = (0.0, if n < 2 { self.tau[n] } else { 0.0 });
+        if ramp {
+            self.hub.tilt.expand(n, &self.hub.theta, &self.hub.g);
+            net += self.gravity_torque(n) + self.rigid_moment * self.hub.tilt.e[1][n];
+        }
         for mode in modes.iter_mut() {
-            let reaction = mode.hub_reaction::<N, RAMP>(&self.hub);
+            let reaction = mode.hub_reaction(n, ramp, &self.hub);
             inertia += reaction.j;
             net += reaction.t;
         }
-        self.inertia[N] = series::constant::<N>(self.i0) + inertia;
-        if N == 0 {
+        self.inertia[n] = series::constant(n, self.i0) + inertia;
+        if n == 0 {
             self.inv_inertia = 1.0 / self.inertia[0];
         }
-        self.net[N] = net;
-        self.hub.omega_dot[N] = if contact == Contact::Stuck {
-            self.tau_f[N] = -net;
+        self.net[n] = net;
+        self.hub.omega_dot[n] = if contact == Contact::Stuck {
+            self.tau_f[n] = -net;
             0.0
         } else {
-            self.tau_f[N] = self.law.torque::<N>(contact, &self.hub);
-            let torque = net + self.tau_f[N];
+            self.tau_f[n] = self.law.torque(n, contact, &self.hub);
+            let torque = net + self.tau_f[n];
             let rest = if M::MOVES_INERTIA {
-                series::mul_tail::<N>(&self.inertia, &self.hub.omega_dot)
+                series::mul_tail(n, &self.inertia, &self.hub.omega_dot)
             } else {
                 0.0
             };
             (torque - rest) * self.inv_inertia
         };
-        self.hub.theta[N + 1] = series::next::<N>(self.hub.omega[N]);
-        self.hub.omega[N + 1] = series::next::<N>(self.hub.omega_dot[N]);
-        self.power[N] = series::mul_ramp::<N>(&self.tau, &self.hub.omega);
-        self.dissipation[N] = self.law.dissipation::<N>(&self.tau_f, &self.hub.omega);
+        self.hub.theta[n + 1] = series::next(n, self.hub.omega[n]);
+        self.hub.omega[n + 1] = series::next(n, self.hub.omega_dot[n]);
+        self.power[n] = series::mul_ramp(n, &self.tau, &self.hub.omega);
+        self.dissipation[n] = self.law.dissipation(n, &self.tau_f, &self.hub.omega);
         for mode in modes.iter_mut() {
-            mode.accelerate::<N, RAMP>(&self.hub);
-            self.dissipation[N] += mode.dissipation::<N, RAMP>();
+            mode.accelerate(n, ramp, &self.hub);
+            self.dissipation[n] += mode.dissipation(n, ramp);
         }
     }
 
-    /// Expands the motion up to `h` ahead. Returns the order and the length, at most
-    /// `h`, at which the terms left out are below the tolerance.
+    /// Order 0 of the derivatives where drag or weight vary.
+    #[cold]
+    #[inline(never)]
+    pub fn derivatives_varying<M: SloshMode>(&mut self, modes: &mut [M], contact: Contact) {
+        self.derivatives(0, true, modes, contact);
+    }
+
+    /// Expands the motion up to `h` ahead; `ramp` says whether the specific force changes.
+    /// Returns the order and the length, at most `h`, at which the terms left out are below
+    /// the tolerance.
     #[inline(always)]
-    fn expand<const RAMP: bool, M: SloshMode>(
+    fn expand<const UNROLLED: bool, M: SloshMode>(
         &mut self,
+        ramp: bool,
         modes: &mut [M],
         h: f64,
         contact: Contact,
     ) -> (usize, f64) {
-        let allowed = STEP_SHARE * self.tolerance;
-        let negligible_terms = self.law.negligible_terms();
-        let mut h = h;
-        let (mut hub_allowed, mut slosh_allowed) = (0.0, 0.0);
-        let mut power = 1.0; // h^(N+1)
-        let mut negligible = 0;
-        let highest = const { if RAMP { RAMP_ORDER } else { ORDER } };
-        'orders: {
-            for_each_order!(N => {
-                if RAMP && N == RAMP_ORDER {
-                    break 'orders;
-                }
-                self.derivatives::<N, RAMP, M>(modes, contact);
-                if N == 1 {
-                    h = h.min(self.law.convergence_radius(&self.hub.omega));
-                    if RAMP {
-                        h = h.min(self.hub.damping_reach);
-                    }
-                    power = h;
-                    // The hub's rate passes zero many times; the scale of its error must not.
-                    let [w, w_d] = [self.hub.omega[0], self.hub.omega[1]].map(f64::abs);
-                    let hub_scale = RATE_FLOOR + w + w_d * h.min(0.1);
-                    let slosh_scale = hub_scale + modes.iter().map(SloshMode::error_scale).fold(0.0, f64::max);
-                    (hub_allowed, slosh_allowed) = (allowed * hub_scale, allowed * slosh_scale);
-                }
-                power *= h;
-                if N + 2 >= MIN_ORDER {
-                    let slosh = modes.iter().map(|m| m.coefficient_norm(N + 1)).fold(0.0, larger);
-                    let is_negligible = self.hub.omega[N + 1].abs() * power <= hub_allowed
-                        && slosh * power <= slosh_allowed
-                        && self.law.coefficient_norm(N + 1) * power <= allowed;
-                    negligible = if is_negligible { negligible + 1 } else { 0 };
-                    if negligible >= negligible_terms {
-                        return (N + 1, h);
-                    }
+        let mut reach = Reach { h: h.min(LONGEST), ..Reach::default() };
+        let highest = if ramp { RAMP_ORDER } else { ORDER };
+        if UNROLLED {
+            for_each_order!(n => {
+                if self.expand_order(n, ramp, modes, contact, &mut reach) {
+                    return (n + 1, reach.h);
                 }
             });
+        } else {
+            for n in 0..highest {
+                if self.expand_order(n, ramp, modes, contact, &mut reach) {
+                    return (n + 1, reach.h);
+                }
+            }
         }
+        let Reach { h, hub_allowed, slosh_allowed, .. } = reach;
         // The last two terms reach the tolerance at this length.
         let length = |n: usize| {
             let slosh = modes.iter().map(|m| m.coefficient_norm(n)).fold(0.0, f64::max);
             let term = f64::max(self.hub.omega[n].abs() / hub_allowed, slosh / slosh_allowed);
-            let term = f64::max(term, self.law.coefficient_norm(n) / allowed);
+            let term = f64::max(term, self.law.coefficient_norm(n) / self.allowed());
             if term > 0.0 { libm::exp(-libm::log(term) / n as f64) } else { h }
         };
         (highest, h.min(length(highest)).min(length(highest - 1)))
+    }
+
+    /// The error allowed to one step, relative to the motion's scale.
+    fn allowed(&self) -> f64 {
+        STEP_SHARE * self.tolerance
+    }
+
+    /// Order n of an expansion; returns whether the series has converged.
+    #[inline(always)]
+    fn expand_order<M: SloshMode>(
+        &mut self,
+        n: usize,
+        ramp: bool,
+        modes: &mut [M],
+        contact: Contact,
+        reach: &mut Reach,
+    ) -> bool {
+        self.derivatives(n, ramp, modes, contact);
+        let allowed = self.allowed();
+        if n == 1 {
+            let h = reach.h.min(self.law.convergence_radius(&self.hub.omega));
+            reach.h = if ramp { h.min(self.hub.damping_reach) } else { h };
+            reach.power = reach.h;
+            // The hub's rate passes zero many times; the scale of its error must not.
+            let [w, w_d] = [self.hub.omega[0], self.hub.omega[1]].map(f64::abs);
+            let hub_scale = RATE_FLOOR + w + w_d * reach.h.min(0.1);
+            let slosh_scale =
+                hub_scale + modes.iter().map(SloshMode::error_scale).fold(0.0, f64::max);
+            reach.hub_allowed = allowed * hub_scale;
+            reach.slosh_allowed = allowed * slosh_scale;
+        }
+        reach.power *= reach.h;
+        if n + 2 < MIN_ORDER {
+            return false;
+        }
+        let slosh = modes.iter().map(|m| m.coefficient_norm(n + 1)).fold(0.0, larger);
+        let is_negligible = self.hub.omega[n + 1].abs() * reach.power <= reach.hub_allowed
+            && slosh * reach.power <= reach.slosh_allowed
+            && self.law.coefficient_norm(n + 1) * reach.power <= allowed;
+        reach.negligible = if is_negligible { reach.negligible + 1 } else { 0 };
+        reach.negligible >= self.law.negligible_terms()
     }
 
     /// The sign that the hub's contact has by its rate or, at rest, by the torque
@@ -264,10 +377,10 @@ impl Motion {
         if omega < 0.0 {
             return Contact::Backward;
         }
-        self.derivatives::<0, false, M>(modes, Contact::Stuck);
+        self.derivatives(0, self.varies, modes, Contact::Stuck);
         // A law that can't hold the hub needs to know where the torque goes from 0.
         if !self.law.sticks() {
-            self.derivatives::<1, false, M>(modes, Contact::Stuck);
+            self.derivatives(1, self.varies, modes, Contact::Stuck);
         }
         let net = [self.net[0], self.net[1]];
         self.law.contact_at_rest(net, state.x[x::THETA], state.contact)
@@ -323,22 +436,19 @@ impl Motion {
         imu: &Imu,
         steps: &mut usize,
     ) -> Result<(), StepError> {
-        // The usual cases are compiled apart, without loops over modes.
+        // The usual case is compiled apart: one mode, no loops over modes and orders.
         match modes {
-            _ if acting.1.slope != 0.0 => {
-                self.advance_along::<true, M>(modes, state, acting, h, imu, steps)
-            }
-            [one] => {
+            [one] if M::UNROLLED && acting.1.slope == 0.0 && !self.varies => {
                 let one = core::slice::from_mut(one);
-                self.advance_along::<false, M>(one, state, acting, h, imu, steps)
+                self.advance_along::<true, M>(one, state, acting, h, imu, steps)
             }
-            many => self.advance_along::<false, M>(many, state, acting, h, imu, steps),
+            _ => self.advance_along::<false, M>(modes, state, acting, h, imu, steps),
         }
     }
 
-    /// As [`Motion::advance`]; `RAMP` says whether the specific force changes.
+    /// As [`Motion::advance`]; `UNROLLED` only where the specific force is held.
     #[inline(always)]
-    fn advance_along<const RAMP: bool, M: SloshMode>(
+    fn advance_along<const UNROLLED: bool, M: SloshMode>(
         &mut self,
         modes: &mut [M],
         state: &mut State,
@@ -347,6 +457,7 @@ impl Motion {
         imu: &Imu,
         steps: &mut usize,
     ) -> Result<(), StepError> {
+        let ramp = !UNROLLED && (g.slope != 0.0 || self.varies);
         let begin = state.time;
         let mut t = 0.0;
         self.near_weightless = Damping::floor(g, h);
@@ -362,7 +473,7 @@ impl Motion {
             }
             let left = h - t;
             let contact = state.contact;
-            let (n, mut length) = self.expand::<RAMP, M>(modes, left, contact);
+            let (n, mut length) = self.expand::<UNROLLED, M>(ramp, modes, left, contact);
             let mut event = None;
             if self.law.switches_at_rest() {
                 if contact == Contact::Stuck {
@@ -392,7 +503,7 @@ impl Motion {
             let [work, heat] = series::integrals([&self.power, &self.dissipation], n - 1, length);
             state.x[x::WORK] += work;
             state.x[x::HEAT] += heat;
-            if RAMP {
+            if !UNROLLED && g.slope != 0.0 {
                 state.axial.work += g.slope * self.integral_of_mass_height(modes, n, length);
             }
             state.x[x::THETA] = theta;
@@ -435,11 +546,9 @@ impl Motion {
     #[cold]
     fn integral_of_mass_height<M: SloshMode>(&self, modes: &mut [M], n: usize, length: f64) -> f64 {
         let mut sum = ZERO;
-        for_each_order!(N => {
-            if N < RAMP_ORDER && N < n {
-                sum[N] = modes.iter_mut().map(|mode| mode.mass_height::<N>()).sum();
-            }
-        });
+        for j in 0..n {
+            sum[j] = self.mass_height(j, modes);
+        }
         let [integral] = series::integrals([&sum], n - 1, length);
         integral
     }

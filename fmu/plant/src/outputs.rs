@@ -25,6 +25,13 @@ pub enum Regime {
     Nonlinear = 3,
 }
 
+/// The ranges of validity that the motion is in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Ranges {
+    pub regime: Regime,
+    pub baffle: bool,
+}
+
 /// The plant's outputs at one instant, or their derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Outputs {
@@ -46,6 +53,8 @@ pub struct Outputs {
     pub tau_friction: f64,
     /// Torque of all liquid, its rigid part included, on the hub, N m.
     pub tau_fluid: f64,
+    /// Torque of gravity on the dry hub, N m: only on a bench that leans.
+    pub tau_gravity: f64,
     /// Force of all liquid on the tank along +theta, N.
     pub f_tangential: f64,
     /// Force of all liquid on the tank outwards, N.
@@ -54,6 +63,8 @@ pub struct Outputs {
     pub wave_height: f64,
     /// Its radial and tangential part, m.
     pub wave: [f64; 2],
+    /// Amplitude at the wall of the first mode's oscillation, m; 0 without a baffle.
+    pub baffle_wave: f64,
     /// Reading of the gyro, rad/s.
     pub omega_imu: f64,
     /// Kinetic and potential energy of hub and liquid, J.
@@ -75,7 +86,9 @@ pub struct Outputs {
     pub heat: f64,
     /// Time spent stuck since the start, s.
     pub stuck_time: f64,
-    /// Damping ratio of each mode at the present g_axial; 0 for modes that are not used, and
+    /// Damping ratio of the first mode by the baffle, at the present motion.
+    pub baffle_zeta: f64,
+    /// Viscous damping ratio of each mode at the present g_axial; 0 for modes that are not used, and
     /// at g_axial = 0.
     pub damping: [f64; MODES],
     /// What changes at events alone.
@@ -89,6 +102,8 @@ pub struct Discrete {
     pub stuck: bool,
     /// Range of sloshing by wave height.
     pub regime: Regime,
+    /// Whether the law of the baffle's drag holds; true without a baffle.
+    pub baffle_in_range: bool,
     /// Set-valued friction: -1 turning backwards, 0 stuck, 1 forwards; else 1.
     pub friction_mode: i32,
     /// How often `friction_mode` has changed since the start.
@@ -106,10 +121,10 @@ impl Plant {
     /// The outputs now, under the inputs' present values.
     pub fn outputs(&mut self, inputs: &Inputs) -> Outputs {
         let before = self.apply_present_contact(inputs);
-        let outputs = self.outputs_held(inputs);
+        let mut outputs = self.outputs_held(inputs);
         self.revert_contact(before);
-        let regime = self.regime_of(outputs.wave_height);
-        Outputs { discrete: Discrete { regime, ..outputs.discrete }, ..outputs }
+        self.update_ranges(&mut outputs);
+        outputs
     }
 
     /// As [`Plant::outputs`], with contact and regime that the last event has left.
@@ -119,13 +134,18 @@ impl Plant {
         let state = &self.state;
         let hub = &self.motion.hub;
         let (w, wd) = (state.x[x::OMEGA], hub.omega_dot[0]);
-        let mut force = [self.m_0 * self.r * w * w, -self.m_0 * self.r * wd];
-        let mut tau_fluid = -self.i_0 * wd;
-        let mut energy =
-            (self.hub_inertia + self.i_0) * w * w / 2.0 + self.motion.law.energy::<0>();
+        let [e_x, e_y] = hub.tilt.now();
+        let mut force =
+            [self.m_0 * self.r * w * w + self.m_0 * e_x, -self.m_0 * self.r * wd + self.m_0 * e_y];
+        let [tau_gravity, on_rigid] = self.motion.gravity_torques();
+        let mut tau_fluid = -self.i_0 * wd + on_rigid;
+        let mut energy = (self.hub_inertia + self.i_0) * w * w / 2.0
+            + self.motion.law.energy(0)
+            + self.motion.potential();
         let mut momentum = (self.hub_inertia + self.i_0) * w;
         let mut wave = [0.0; 2];
-        let mut mode1 = Angles::default();
+        let (mut mode1, mut baffle_zeta) = (Angles::default(), 0.0);
+        let mut amplitude = 0.0;
         with_modes!(&mut self.liquid, modes => for (i, mode) in modes.iter_mut().enumerate() {
             let [f_x, f_y] = mode.force(hub);
             force[0] += f_x;
@@ -138,6 +158,11 @@ impl Plant {
             wave[1] += self.wave[i] * angles.angle[1];
             if i == 0 {
                 mode1 = angles;
+                if self.baffle.is_some() {
+                    let at = mode.amplitude2();
+                    let pendulum = mode.pendulum();
+                    (amplitude, baffle_zeta) = pendulum.baffle.present(pendulum, at);
+                }
             }
         });
         let tau_actuator = self.wheel.torque(state.x[x::WHEEL_SPEED], inputs.tau_cmd).value;
@@ -151,10 +176,12 @@ impl Plant {
             slosh_rate_radial: mode1.rate[0],
             tau_friction: unsigned_zero(self.motion.tau_f[0]),
             tau_fluid: unsigned_zero(tau_fluid),
+            tau_gravity: unsigned_zero(tau_gravity),
             f_tangential: unsigned_zero(force[1]),
             f_radial: unsigned_zero(force[0]),
             wave_height: libm::hypot(wave[0], wave[1]),
             wave,
+            baffle_wave: self.wave[0] * amplitude,
             omega_imu: if self.imu.enabled { state.gyro.held } else { w },
             energy,
             momentum: unsigned_zero(momentum),
@@ -165,10 +192,12 @@ impl Plant {
             work_axial,
             heat: state.x[x::HEAT],
             stuck_time: state.x[x::STUCK_TIME],
+            baffle_zeta,
             damping: self.motion.damping.ratios(inputs.g_axial.value),
             discrete: Discrete {
                 stuck: state.contact == Contact::Stuck,
-                regime: state.regime,
+                regime: state.ranges.regime,
+                baffle_in_range: state.ranges.baffle,
                 friction_mode: state.contact as i32,
                 event_count: state.event_count,
                 event_time: state.event_time,
@@ -193,7 +222,7 @@ impl Plant {
         let derivatives = self.directional_derivative(inputs, dx, du);
         let motion = &self.motion;
         let (friction, friction_d) = (motion.tau_f[0], motion.tau_f[1]);
-        let (dissipation_d, stored_d) = (motion.dissipation[1], motion.law.energy::<1>());
+        let (dissipation_d, stored_d) = (motion.dissipation[1], motion.law.energy(1));
         let command = Ramp { value: inputs.tau_cmd.value, slope: du[0] };
         let torque = self.wheel.torque(self.state.x[x::WHEEL_SPEED], command);
 
@@ -201,7 +230,7 @@ impl Plant {
         // damping is linear in g.
         let before = self.state.x;
         let size = self.size_of_direction(dx, du);
-        let step = if size > 0.0 { SHARE / size } else { 1.0 };
+        let step = if size >= f64::MIN_POSITIVE { SHARE / size } else { 1.0 };
         let with_wheel = std::mem::replace(&mut self.wheel.enabled, false);
         let law = std::mem::replace(&mut self.motion.law, Law::NONE);
         let g = inputs.g_axial.value;
@@ -225,6 +254,7 @@ impl Plant {
             (8.0 * (get(&p1) - get(&m1)) - (get(&p2) - get(&m2))) / (12.0 * step)
         };
         let wave = [by_differences(|o| o.wave[0]), by_differences(|o| o.wave[1])];
+        let tau_gravity = by_differences(|o| o.tau_gravity);
         let wave_height = now.wave[0] * wave[0] + now.wave[1] * wave[1];
         // Every field is named: an output without its derivative does not compile.
         Outputs {
@@ -236,12 +266,18 @@ impl Plant {
             slosh_angle_radial: by_differences(|o| o.slosh_angle_radial),
             slosh_rate_radial: by_differences(|o| o.slosh_rate_radial),
             tau_friction: friction_d,
-            tau_fluid: self.hub_inertia * derivatives[x::OMEGA] - torque.slope - du[1] - friction_d,
+            tau_fluid: self.hub_inertia * derivatives[x::OMEGA]
+                - torque.slope
+                - du[1]
+                - friction_d
+                - tau_gravity,
+            tau_gravity,
             f_tangential: by_differences(|o| o.f_tangential),
             f_radial: by_differences(|o| o.f_radial),
             // A cone: at its tip there is no derivative.
             wave_height: if now.wave_height > 0.0 { wave_height / now.wave_height } else { 0.0 },
             wave,
+            baffle_wave: by_differences(|o| o.baffle_wave),
             omega_imu: if self.imu.enabled { 0.0 } else { dx[x::OMEGA] },
             energy: by_differences(|o| o.energy) + stored_d,
             momentum: by_differences(|o| o.momentum),
@@ -252,6 +288,7 @@ impl Plant {
             work_axial: by_differences(|o| o.work_axial),
             heat: dx[x::HEAT],
             stuck_time: dx[x::STUCK_TIME],
+            baffle_zeta: by_differences(|o| o.baffle_zeta),
             damping: damping.slopes_of_ratios(g).map(|slope| slope * du[2]),
             discrete: now.discrete,
         }
@@ -263,6 +300,9 @@ impl Plant {
         let torque = 10.0 * self.motion.i0;
         let hub = [dx[x::OMEGA] / 10.0, du[0] / torque, du[1] / torque, du[2] / 10.0];
         let hub = hub.iter().fold(0.0, |size: f64, d| size.max(d.abs()));
+        // On a bench that leans the weight curves with the angle.
+        let angle = if self.motion.hub.tilt.tangent == 0.0 { 0.0 } else { dx[x::THETA].abs() };
+        let hub = f64::max(hub, angle);
         let slosh = dx[x::SLOSH..].as_chunks::<4>().0.iter().enumerate();
         with_modes!(&self.liquid, modes => {
             let modes = slosh.map(|(i, dq)| {
@@ -274,12 +314,21 @@ impl Plant {
         })
     }
 
-    /// The regime that belongs to a wave height in m.
-    pub(crate) fn regime_of(&self, wave_height: f64) -> Regime {
-        match wave_height / self.radius {
+    /// Brings the ranges among the outputs to what the outputs are now.
+    pub fn update_ranges(&self, outputs: &mut Outputs) {
+        let Ranges { regime, baffle } = self.ranges_of(outputs);
+        outputs.discrete.regime = regime;
+        outputs.discrete.baffle_in_range = baffle;
+    }
+
+    /// The ranges that the outputs are in.
+    pub(crate) fn ranges_of(&self, outputs: &Outputs) -> Ranges {
+        let regime = match outputs.wave_height / self.radius {
             ratio if ratio < 0.15 => Regime::Linear,
             ratio if ratio <= 0.25 => Regime::Transitional,
             _ => Regime::Nonlinear,
-        }
+        };
+        let baffle = self.baffle.is_none_or(|range| range.contains(outputs.baffle_wave));
+        Ranges { regime, baffle }
     }
 }

@@ -5,7 +5,7 @@
 //! and `wheel.inertia` are `hub.I` and `wheel.I`, `own_inertia` is `I_own`); what each means,
 //! its unit and its range stand in the FMU's variable table.
 
-use crate::{FrictionModel, SloshModel};
+use crate::{FrictionModel, SloshModel, SloshSource};
 
 /// All parameters of the plant.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -15,6 +15,8 @@ pub struct Parameters {
     pub tank: Tank,
     pub fluid: Fluid,
     pub slosh: Slosh,
+    pub baffle: Ring,
+    pub bench: Bench,
     pub friction: Friction,
     pub init: Init,
     pub wheel: Wheel,
@@ -27,6 +29,8 @@ pub struct Parameters {
 #[allow(missing_docs)]
 pub struct Hub {
     pub inertia: f64,
+    pub imbalance: f64,
+    pub imbalance_angle: f64,
 }
 
 /// An upright cylinder, its axis parallel to the bearing's.
@@ -56,10 +60,57 @@ pub const MODES: usize = 10;
 #[allow(missing_docs)]
 pub struct Slosh {
     pub model: SloshModel,
+    pub source: SloshSource,
     pub modes: usize,
+    pub capillarity: bool,
+    pub table: ModeTable,
     pub zeta_from_correlation: bool,
     pub zeta: f64,
     pub hardening: f64,
+}
+
+/// The modes of a tank of any shape; 0 for what is not given.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
+pub struct ModeTable {
+    pub m_liq: f64,
+    pub g_ref: f64,
+    pub mass: [f64; MODES],
+    pub length: [f64; MODES],
+    pub frequency: [f64; MODES],
+    pub hinge: [f64; MODES],
+    pub k: [f64; MODES],
+    pub zeta: [f64; MODES],
+    pub wave: [f64; MODES],
+}
+
+impl ModeTable {
+    /// Pendulum length, m: as given, or from the frequency f at g_ref and the centring stiffness,
+    /// (2 pi f)^2 = g_ref/l + k/m.
+    pub(crate) fn length_of(&self, n: usize) -> f64 {
+        if self.length[n] > 0.0 {
+            return self.length[n];
+        }
+        let omega = core::f64::consts::TAU * self.frequency[n];
+        self.g_ref / (omega * omega - self.k[n] / self.mass[n])
+    }
+}
+
+/// A flat ring at the tank's wall, `depth` below the surface; width 0: none.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[allow(missing_docs)]
+pub struct Ring {
+    pub width: f64,
+    pub depth: f64,
+}
+
+/// How the bench stands: its axis leans by `tilt`; gravity's part across the axis points to
+/// `tilt_azimuth`.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[allow(missing_docs)]
+pub struct Bench {
+    pub tilt: f64,
+    pub tilt_azimuth: f64,
 }
 
 /// The bearing; `harmonics_forward` and `harmonics_backward` are the coefficients of
@@ -130,7 +181,7 @@ const RPM: f64 = core::f64::consts::PI / 30.0;
 // inertia is an inference (a steel disc of 125 mm diameter).
 impl Default for Hub {
     fn default() -> Self {
-        Hub { inertia: 0.322414 }
+        Hub { inertia: 0.322414, imbalance: 0.0, imbalance_angle: 0.0 }
     }
 }
 
@@ -150,10 +201,30 @@ impl Default for Slosh {
     fn default() -> Self {
         Slosh {
             model: SloshModel::Linear,
+            source: SloshSource::Geometry,
             modes: 1,
+            capillarity: false,
+            table: ModeTable::default(),
             zeta_from_correlation: true,
             zeta: 0.003,
             hardening: 0.58,
+        }
+    }
+}
+
+impl Default for ModeTable {
+    fn default() -> Self {
+        let none = [0.0; MODES];
+        ModeTable {
+            m_liq: 0.0,
+            g_ref: 9.81,
+            mass: none,
+            length: none,
+            frequency: none,
+            hinge: none,
+            k: none,
+            zeta: none,
+            wave: none,
         }
     }
 }

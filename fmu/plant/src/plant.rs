@@ -4,13 +4,14 @@
 //! I_hub w' = tau_actuator + tau_ext + tau_friction + tau_fluid
 //! ```
 
+use crate::baffle::Range;
 use crate::damping::Damping;
 use crate::friction::{Contact, Law};
 use crate::motion::{Motion, StepError};
-use crate::outputs::Regime;
+use crate::outputs::{Ranges, Regime};
 use crate::slosh::{Angles, Liquid, SloshMode, with_modes};
 use crate::state::{Axial, STATES, State, x};
-use crate::{Calculated, Imu, MODES, Parameters, Wheel};
+use crate::{Calculated, Imu, MODES, Parameters, Wheel, tank};
 
 /// A quantity that is linear in time: `value + slope t`.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -72,6 +73,7 @@ pub struct Plant {
     /// Wall elevation per slosh angle of each mode, m/rad, and the tank's radius, m.
     pub(crate) wave: [f64; MODES],
     pub(crate) radius: f64,
+    pub(crate) baffle: Option<Range>,
     pub(crate) wheel: Wheel,
     pub(crate) imu: Imu,
     pub(crate) motion: Box<Motion>,
@@ -94,11 +96,12 @@ impl Plant {
     ) -> Result<Plant, Vec<String>> {
         let mut problems = Law::problems(&p.friction);
         problems.extend(p.wheel.problems());
+        problems.extend(tank::problems(p));
         let mut state = State {
             time: start_time,
             x: [0.0; STATES],
             contact: Contact::Forward,
-            regime: Regime::Linear,
+            ranges: Ranges { regime: Regime::Linear, baffle: true },
             event_count: 0,
             event_time: start_time,
             start_time,
@@ -123,8 +126,9 @@ impl Plant {
                 plant.state.slosh_mut()[0] = first.coordinates(&angles);
             }
         });
+        plant.check_range().map_err(|why| vec![why.to_string()])?;
         plant.state.contact = plant.present_contact(inputs);
-        plant.state.regime = plant.present_regime(inputs);
+        plant.state.ranges = plant.present_ranges(inputs);
         plant.state.axial.g = inputs.g_axial.value;
         plant.state.axial.time = start_time;
         plant.accept_step(inputs).map_err(|why| vec![why.to_string()])?;
@@ -133,6 +137,12 @@ impl Plant {
             plant.imu.sample(&mut plant.state.gyro, omega);
         }
         Ok(plant)
+    }
+
+    /// What parameters and specific force leave of the range in which the models are known, one
+    /// sentence each.
+    pub fn warnings(p: &Parameters, inputs: &Inputs) -> Vec<String> {
+        tank::warnings(p, inputs.g_axial.value)
     }
 
     /// A plant that continues from a saved state of one with the same parameters.
@@ -147,12 +157,14 @@ impl Plant {
         for (wave, pendulum) in wave.iter_mut().zip(calculated.pendulums(p)) {
             *wave = pendulum.wave;
         }
-        // Without specific force at the start the damping refers to 1 m/s2.
-        let reference = if state.start_g > 0.0 { state.start_g } else { 1.0 };
+        // Without restoring force at the start the damping refers to 1 m/s2.
+        let mut used = calculated.mass.iter().zip(&calculated.centring).filter(|(m, _)| **m > 0.0);
+        let restored =
+            state.start_g > 0.0 || used.clone().count() > 0 && used.all(|(_, a)| *a > 0.0);
+        let reference = if restored { state.start_g } else { 1.0 };
         let at_reference = Calculated::new(p, reference);
         let damping = Damping::new(p, &at_reference, reference);
-        let (law, max_steps) = (Law::new(&p.friction), p.solver.max_steps);
-        let motion = Motion::new(p.hub.inertia + i_0, law, damping, tolerance, max_steps);
+        let motion = Motion::new(p, i_0, calculated.m_0, damping, tolerance);
         Plant {
             hub_inertia: p.hub.inertia,
             m_0: calculated.m_0,
@@ -160,6 +172,7 @@ impl Plant {
             r: p.tank.r,
             wave,
             radius: p.tank.d / 2.0,
+            baffle: Range::new(p),
             wheel: p.wheel,
             imu: p.imu,
             motion: Box::new(motion),
@@ -267,10 +280,8 @@ impl Plant {
         self.evaluate(inputs);
         let contact = self.state.contact;
         with_modes!(&mut self.liquid, modes => {
-            self.motion.derivatives::<1, false, _>(modes, contact);
-            modes.iter_mut().fold([0.0; 2], |[height, rate], mode| {
-                [height + mode.mass_height::<0>(), rate + mode.mass_height::<1>()]
-            })
+            self.motion.derivatives(1, self.motion.varies, modes, contact);
+            [self.motion.mass_height(0, modes), self.motion.mass_height(1, modes)]
         })
     }
 
@@ -281,7 +292,11 @@ impl Plant {
         let contact = self.state.contact;
         with_modes!(&mut self.liquid, modes => {
             self.motion.start(modes, &self.state, (tau, Ramp::held(inputs.g_axial.value)));
-            self.motion.derivatives::<0, false, _>(modes, contact);
+            if self.motion.varies {
+                self.motion.derivatives_varying(modes, contact);
+            } else {
+                self.motion.derivatives(0, false, modes, contact);
+            }
         });
     }
 
@@ -291,10 +306,10 @@ impl Plant {
         with_modes!(&mut self.liquid, modes => self.motion.contact(modes, &self.state))
     }
 
-    /// The regime that the present wave height makes.
-    pub(crate) fn present_regime(&mut self, inputs: &Inputs) -> Regime {
-        let wave_height = self.outputs_held(inputs).wave_height;
-        self.regime_of(wave_height)
+    /// The ranges that the present motion is in.
+    pub(crate) fn present_ranges(&mut self, inputs: &Inputs) -> Ranges {
+        let outputs = self.outputs_held(inputs);
+        self.ranges_of(&outputs)
     }
 
     /// Gives the hub the contact that the present inputs make, and returns the one before, for

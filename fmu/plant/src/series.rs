@@ -18,48 +18,56 @@ pub type Series = [f64; ORDER + 1];
 /// All coefficients zero.
 pub const ZERO: Series = [0.0; ORDER + 1];
 
-// The order N is a constant of each rule, so that the compiler writes every sum out.
-
-/// Coefficient N of a constant: the constant itself at order 0, then nothing.
-#[inline(always)]
-pub fn constant<const N: usize>(a: f64) -> f64 {
-    if N == 0 { a } else { 0.0 }
-}
-
-/// Coefficient N + 1 of x from coefficient N of x'.
-#[inline(always)]
-pub fn next<const N: usize>(rate: f64) -> f64 {
-    rate * const { 1.0 / (N + 1) as f64 }
-}
-
-// Each sum has its newest coefficients, number N, last: they come out of other sums of this
-// order, and a processor adds up the rest while it waits for them.
-
-/// Sum of `term(j)` over 0 <= j <= N, ends last.
-#[inline(always)]
-fn sum<const N: usize>(term: impl Fn(usize) -> f64) -> f64 {
-    match N {
-        0 => term(0),
-        1 => term(0) + term(1),
-        _ => (2..N).fold(term(1), |sum, j| sum + term(j)) + term(0) + term(N),
+/// 1/n
+const RECIPROCAL: [f64; ORDER + 2] = {
+    let (mut table, mut n) = ([0.0; ORDER + 2], 1);
+    while n <= ORDER + 1 {
+        table[n] = 1.0 / n as f64;
+        n += 1;
     }
+    table
+};
+
+// The rules are always inlined: where the order n is a constant the compiler writes every sum
+// out (`for_each_order`), elsewhere they are loops.
+
+/// Coefficient n of a constant: the constant itself at order 0, then nothing.
+#[inline(always)]
+pub fn constant(n: usize, a: f64) -> f64 {
+    if n == 0 { a } else { 0.0 }
+}
+
+/// Coefficient n + 1 of x from coefficient n of x'.
+#[inline(always)]
+pub fn next(n: usize, rate: f64) -> f64 {
+    rate * RECIPROCAL[n + 1]
+}
+
+// Each sum has its newest coefficients, number n, last: they come out of other sums of this
+// order, and a processor adds up the rest while it waits for them. Where a rule is a loop, its
+// slices spare the processor a check of every index.
+
+/// Sum of `term(j)` over 0 <= j <= n, ends last.
+#[inline(always)]
+fn sum(n: usize, term: impl Fn(usize) -> f64) -> f64 {
+    // -0 is what no sum changes by.
+    let sum = (1..n).fold(-0.0, |sum, j| sum + term(j)) + term(0);
+    if n == 0 { sum } else { sum + term(n) }
 }
 
 /// As [`sum`], for vectors.
 #[inline(always)]
-fn sum_pair<const N: usize>(term: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
+fn sum_pair(n: usize, term: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
     let add = |a: [f64; 2], b: [f64; 2]| [a[0] + b[0], a[1] + b[1]];
-    match N {
-        0 => term(0),
-        1 => add(term(0), term(1)),
-        _ => add(add((2..N).fold(term(1), |sum, j| add(sum, term(j))), term(0)), term(N)),
-    }
+    let sum = add((1..n).fold([-0.0; 2], |sum, j| add(sum, term(j))), term(0));
+    if n == 0 { sum } else { add(sum, term(n)) }
 }
 
-/// Coefficient N of a b: sum of a_j b_(N-j).
+/// Coefficient n of a b: sum of a_j b_(n-j).
 #[inline(always)]
-pub fn mul<const N: usize>(a: &Series, b: &Series) -> f64 {
-    sum::<N>(|j| a[j] * b[N - j])
+pub fn mul(n: usize, a: &Series, b: &Series) -> f64 {
+    let (a, b) = (&a[..=n], &b[..=n]);
+    sum(n, |j| a[j] * b[n - j])
 }
 
 /// Coefficients of a vector in the plane: two series that most rules treat alike, so
@@ -87,59 +95,62 @@ impl core::ops::IndexMut<usize> for Pair {
     }
 }
 
-/// Coefficient N of a b, b a vector.
+/// Coefficient n of a b, b a vector.
 #[inline(always)]
-pub fn scale<const N: usize>(a: &Series, b: &Pair) -> [f64; 2] {
-    sum_pair::<N>(|j| [a[j] * b[N - j][0], a[j] * b[N - j][1]])
+pub fn scale(n: usize, a: &Series, b: &Pair) -> [f64; 2] {
+    let (a, b) = (&a[..=n], &b.0[..=n]);
+    sum_pair(n, |j| [a[j] * b[n - j][0], a[j] * b[n - j][1]])
 }
 
-/// Coefficient N of a b_i, b a vector.
+/// Coefficient n of a b_i, b a vector.
 #[inline(always)]
-pub fn mul_part<const N: usize>(a: &Series, b: &Pair, i: usize) -> f64 {
-    sum::<N>(|j| a[j] * b[N - j][i])
+pub fn mul_part(n: usize, a: &Series, b: &Pair, i: usize) -> f64 {
+    let (a, b) = (&a[..=n], &b.0[..=n]);
+    sum(n, |j| a[j] * b[n - j][i])
 }
 
-/// Coefficient N of a b, b a vector, without its term a_N b_0.
+/// Coefficient n of a b, b a vector, without its term a_n b_0.
 #[inline(always)]
-pub fn scale_head<const N: usize>(a: &Series, b: &Pair) -> [f64; 2] {
+pub fn scale_head(n: usize, a: &Series, b: &Pair) -> [f64; 2] {
     let mut sum = [0.0; 2];
-    for j in 0..N {
-        sum = [sum[0] + a[j] * b[N - j][0], sum[1] + a[j] * b[N - j][1]];
+    for (a, b) in a[..n].iter().zip(b.0[1..=n].iter().rev()) {
+        sum = [sum[0] + a * b[0], sum[1] + a * b[1]];
     }
     sum
 }
 
-/// Coefficient N of a b_i, b a vector, without its term a_N b_0.
+/// Coefficient n of a b_i, b a vector, without its term a_n b_0.
 #[inline(always)]
-pub fn mul_part_head<const N: usize>(a: &Series, b: &Pair, i: usize) -> f64 {
+pub fn mul_part_head(n: usize, a: &Series, b: &Pair, i: usize) -> f64 {
     let mut sum = 0.0;
-    for j in 0..N {
-        sum += a[j] * b[N - j][i];
+    for (a, b) in a[..n].iter().zip(b.0[1..=n].iter().rev()) {
+        sum += a * b[i];
     }
     sum
 }
 
-/// Coefficient N of (a_1 b_1, a_2 b_2).
+/// Coefficient n of (a_1 b_1, a_2 b_2).
 #[inline(always)]
-pub fn each<const N: usize>(a: &Pair, b: &Pair) -> [f64; 2] {
-    sum_pair::<N>(|j| [a[j][0] * b[N - j][0], a[j][1] * b[N - j][1]])
+pub fn each(n: usize, a: &Pair, b: &Pair) -> [f64; 2] {
+    let (a, b) = (&a.0[..=n], &b.0[..=n]);
+    sum_pair(n, |j| [a[j][0] * b[n - j][0], a[j][1] * b[n - j][1]])
 }
 
-/// Coefficient N of (a_1^2, a_2^2).
+/// Coefficient n of (a_1^2, a_2^2).
 #[inline(always)]
-pub fn squares<const N: usize>(a: &Pair) -> [f64; 2] {
+pub fn squares(n: usize, a: &Pair) -> [f64; 2] {
     let mut half = [0.0; 2];
-    for j in (0..N.div_ceil(2)).rev() {
-        half = [half[0] + a[j][0] * a[N - j][0], half[1] + a[j][1] * a[N - j][1]];
+    for j in (0..n.div_ceil(2)).rev() {
+        half = [half[0] + a[j][0] * a[n - j][0], half[1] + a[j][1] * a[n - j][1]];
     }
-    let middle = if N.is_multiple_of(2) { a[N / 2].map(|x| x * x) } else { [0.0; 2] };
+    let middle = if n.is_multiple_of(2) { a[n / 2].map(|x| x * x) } else { [0.0; 2] };
     [2.0 * half[0] + middle[0], 2.0 * half[1] + middle[1]]
 }
 
-/// Coefficient N of a.b.
+/// Coefficient n of a.b.
 #[inline(always)]
-pub fn dot<const N: usize>(a: &Pair, b: &Pair) -> f64 {
-    let [x, y] = each::<N>(a, b);
+pub fn dot(n: usize, a: &Pair, b: &Pair) -> f64 {
+    let [x, y] = each(n, a, b);
     x + y
 }
 
@@ -157,63 +168,63 @@ pub fn values_pair<const K: usize>(a: [&Pair; K], n: usize, t: f64) -> [[f64; 2]
     sums
 }
 
-/// Coefficient N of a b without its term a_0 b_N.
+/// Coefficient n of a b without its term a_0 b_n.
 #[inline(always)]
-pub fn mul_tail<const N: usize>(a: &Series, b: &Series) -> f64 {
+pub fn mul_tail(n: usize, a: &Series, b: &Series) -> f64 {
     let mut sum = 0.0;
-    for j in 1..=N {
-        sum += a[j] * b[N - j];
+    for (a, b) in a[1..=n].iter().zip(b[..n].iter().rev()) {
+        sum += a * b;
     }
     sum
 }
 
-/// Coefficient N of a^2.
+/// Coefficient n of a^2.
 #[inline(always)]
-pub fn square<const N: usize>(a: &Series) -> f64 {
-    if N == 0 {
+pub fn square(n: usize, a: &Series) -> f64 {
+    if n == 0 {
         return a[0] * a[0];
     }
     let mut half = 0.0;
-    for j in 1..N.div_ceil(2) {
-        half += a[j] * a[N - j];
+    for j in 1..n.div_ceil(2) {
+        half += a[j] * a[n - j];
     }
-    let middle = if N.is_multiple_of(2) { a[N / 2] * a[N / 2] } else { 0.0 };
-    2.0 * (half + a[0] * a[N]) + middle
+    let middle = if n.is_multiple_of(2) { a[n / 2] * a[n / 2] } else { 0.0 };
+    2.0 * (half + a[0] * a[n]) + middle
 }
 
-/// Coefficient N of (ramp) a, where the ramp is `ramp[0] + ramp[1] t`.
+/// Coefficient n of (ramp) a, where the ramp is `ramp[0] + ramp[1] t`.
 #[inline(always)]
-pub fn mul_ramp<const N: usize>(ramp: &[f64; 2], a: &Series) -> f64 {
-    if N == 0 { ramp[0] * a[0] } else { ramp[0] * a[N] + ramp[1] * a[N - 1] }
+pub fn mul_ramp(n: usize, ramp: &[f64; 2], a: &Series) -> f64 {
+    if n == 0 { ramp[0] * a[0] } else { ramp[0] * a[n] + ramp[1] * a[n - 1] }
 }
 
-/// Coefficient N >= 1 of f where f' = g u', from u's coefficient N and g's below N;
+/// Coefficient n >= 1 of f where f' = g u', from u's coefficient n and g's below n;
 /// `u_d` keeps the coefficients of u'.
 #[inline(always)]
-pub fn chain<const N: usize>(u: f64, u_d: &mut Series, g: &Series) -> f64 {
-    u_d[N - 1] = N as f64 * u;
+pub fn chain(n: usize, u: f64, u_d: &mut Series, g: &Series) -> f64 {
+    u_d[n - 1] = n as f64 * u;
     let mut before = 0.0;
-    for j in 0..N - 1 {
-        before += u_d[j] * g[N - 1 - j];
+    for (u_d, g) in u_d[..n - 1].iter().zip(g[1..n].iter().rev()) {
+        before += u_d * g;
     }
-    before * const { 1.0 / N as f64 } + u * g[0]
+    before * RECIPROCAL[n] + u * g[0]
 }
 
-/// Coefficient N of (sin a, cos a), from a's coefficient N and theirs below N; `a_d` keeps
+/// Coefficient n of (sin a, cos a), from a's coefficient n and theirs below n; `a_d` keeps
 /// the coefficients of a'.
 #[inline(always)]
-pub fn sin_cos<const N: usize>(a: f64, a_d: &mut Series, s: &Series, c: &Series) -> (f64, f64) {
-    if N == 0 { libm::sincos(a) } else { (chain::<N>(a, a_d, c), -chain::<N>(a, a_d, s)) }
+pub fn sin_cos(n: usize, a: f64, a_d: &mut Series, s: &Series, c: &Series) -> (f64, f64) {
+    if n == 0 { libm::sincos(a) } else { (chain(n, a, a_d, c), -chain(n, a, a_d, s)) }
 }
 
-/// Does something with `$N` as the constants 0, 1, ... [`ORDER`] - 1, in turn.
+/// Does something with `$n` as the constants 0, 1, ... [`ORDER`] - 1, in turn.
 macro_rules! for_each_order {
-    ($N:ident => $do:block) => {
-        for_each_order!($N => $do; 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17)
+    ($n:ident => $do:block) => {
+        for_each_order!($n => $do; 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17)
     };
-    ($N:ident => $do:block; $($n:literal)*) => {
+    ($n:ident => $do:block; $($order:literal)*) => {
         $({
-            const $N: usize = $n;
+            let $n = $order;
             $do
         })*
     };
@@ -236,19 +247,11 @@ pub fn values<const K: usize>(a: [&Series; K], n: usize, t: f64) -> [f64; K] {
 /// The integrals from 0 to t of several series cut after order n.
 #[inline(always)]
 pub fn integrals<const K: usize>(a: [&Series; K], n: usize, t: f64) -> [f64; K] {
-    const SHARES: Series = {
-        let (mut shares, mut j) = (ZERO, 0);
-        while j <= ORDER {
-            shares[j] = 1.0 / (j + 1) as f64;
-            j += 1;
-        }
-        shares
-    };
     let n = n.min(ORDER);
     let mut sums = [0.0; K];
     for j in (0..=n).rev() {
         for k in 0..K {
-            sums[k] = sums[k] * t + a[k][j] * SHARES[j];
+            sums[k] = sums[k] * t + a[k][j] * RECIPROCAL[j + 1];
         }
     }
     sums.map(|sum| sum * t)
@@ -318,20 +321,20 @@ mod tests {
     #[test]
     fn exp_of_a_series_is_the_series_of_exp() {
         let (mut e, mut u_d) = (ZERO, ZERO);
-        for_each_order!(N => {
-            e[N] = if N == 0 { f64::exp(u(0)) } else { chain::<N>(u(N), &mut u_d, &e) };
-        });
+        for n in 0..ORDER {
+            e[n] = if n == 0 { f64::exp(u(0)) } else { chain(n, u(n), &mut u_d, &e) };
+        }
         assert!((values([&e], ORDER, 0.1)[0] - f64::exp(0.395)).abs() < 4.0 * ULPS);
     }
 
     #[test]
     fn sin_and_cos_of_a_series_are_the_series_of_sin_and_cos() {
         let (mut s, mut c, mut u_d) = (ZERO, ZERO, ZERO);
-        for_each_order!(N => {
-            (s[N], c[N]) = sin_cos::<N>(u(N), &mut u_d, &s, &c);
-            let one = square::<N>(&s) + mul::<N>(&c, &c);
-            assert!((one - constant::<N>(1.0)).abs() < ULPS);
-        });
+        for n in 0..ORDER {
+            (s[n], c[n]) = sin_cos(n, u(n), &mut u_d, &s, &c);
+            let one = square(n, &s) + mul(n, &c, &c);
+            assert!((one - constant(n, 1.0)).abs() < ULPS);
+        }
         assert!((values([&s], ORDER, 0.1)[0] - f64::sin(0.395)).abs() < ULPS);
         assert!((values([&c], ORDER, 0.1)[0] - f64::cos(0.395)).abs() < ULPS);
     }

@@ -3,7 +3,7 @@
 
 use crate::friction::Contact;
 use crate::imu::Gyro;
-use crate::outputs::Regime;
+use crate::outputs::{Ranges, Regime};
 
 /// Places of the continuous states in x. A new one is a new constant before [`x::SLOSH`].
 pub mod x {
@@ -69,8 +69,8 @@ pub struct State {
     /// The continuous states, by the places in [`x`].
     pub(crate) x: [f64; STATES],
     pub(crate) contact: Contact,
-    /// Range of sloshing since the last event, for hosts that integrate themselves.
-    pub(crate) regime: Regime,
+    /// Ranges of the motion since the last event, for hosts that integrate themselves.
+    pub(crate) ranges: Ranges,
     pub(crate) event_count: i32,
     pub(crate) event_time: f64,
     pub(crate) start_time: f64,
@@ -111,10 +111,12 @@ impl State {
     /// The state as plain words, for saving.
     pub fn to_words(&self) -> [u64; Self::WORDS] {
         let mut words = [0; Self::WORDS];
-        let discrete = [self.contact as i8 as u8, self.regime as u8];
+        let discrete =
+            [self.contact as i8 as u8, self.ranges.regime as u8, self.ranges.baffle as u8];
         words[0] = u64::from(self.event_count as u32)
             | u64::from(discrete[0]) << 32
-            | u64::from(discrete[1]) << 40;
+            | u64::from(discrete[1]) << 40
+            | u64::from(discrete[2]) << 48;
         words[1] = self.gyro.next;
         let reals = [
             self.time,
@@ -143,10 +145,15 @@ impl State {
             1 => Contact::Forward,
             _ => return None,
         };
-        let regime = match words[0] >> 40 {
+        let regime = match (words[0] >> 40) as u8 {
             1 => Regime::Linear,
             2 => Regime::Transitional,
             3 => Regime::Nonlinear,
+            _ => return None,
+        };
+        let baffle = match words[0] >> 48 {
+            0 => false,
+            1 => true,
             _ => return None,
         };
         let mut reals = [0.0; Self::REALS];
@@ -174,7 +181,7 @@ impl State {
             time,
             x: x.try_into().ok()?,
             contact,
-            regime,
+            ranges: Ranges { regime, baffle },
             event_count: words[0] as u32 as i32,
             event_time,
             start_time,
@@ -222,7 +229,7 @@ mod tests {
             time: 1.5,
             x: core::array::from_fn(|i| i as f64 - 3.0),
             contact: Contact::Backward,
-            regime: Regime::Nonlinear,
+            ranges: Ranges { regime: Regime::Nonlinear, baffle: true },
             event_count: -1,
             event_time: 0.25,
             start_time: -7.0,
@@ -239,6 +246,7 @@ mod tests {
         };
         assert_eq!(with(0, 2 << 32 | 1 << 40), None, "no such contact");
         assert_eq!(with(0, 1 << 32), None, "no such regime");
+        assert_eq!(with(0, 1 << 40 | 2 << 48), None, "no such range");
         assert_eq!(with(1, u64::MAX), None, "samples that can't be counted");
         for place in 2..State::WORDS {
             assert_eq!(with(place, f64::NAN.to_bits()), None, "{place}");

@@ -1,26 +1,39 @@
-//! The liquid in an upright cylinder as pendulums.
+//! The liquid as pendulums: of an upright cylinder by its dimensions, of any tank by a table.
 //!
-//! Modal masses and lengths: thesis Table 4.1, the same as Abramson NASA SP-106
+//! Modal masses and lengths (crate `cylinder`): thesis Table 4.1, the same as Abramson NASA SP-106
 //! and Dodge (2000), with the exact zeros of J1'. Damping: Mikishev-Dorozhkin.
+//! Capillarity with a flat surface and a free contact line, exact in the cylinder: omega_n^2 =
+//! g/l_n + sigma xi_n^3 tanh(xi_n h/R)/(rho R^3). The lengths are geometry; capillarity acts as a
+//! centring stiffness k_n, and that as if g were larger by
+//!
+//! ```text
+//! a_n = k_n l_n/m_n = sigma xi_n^2/(rho R^2)
+//! ```
 
-use crate::{Fluid, MODES, Parameters, SloshModel, Tank};
+use crate::baffle::Baffle;
+use crate::series::{Series, ZERO, mul, mul_ramp};
+use crate::slosh::liquid;
+use crate::{Fluid, MODES, Parameters, SloshModel, Tank, baffle};
 
-/// Zeros xi_n of J1', the derivative of the Bessel function (17 digits).
-const XI: [f64; MODES] = [
-    1.841_183_781_340_659_5,
-    5.331_442_773_525_032_5,
-    8.536_316_366_346_286,
-    11.706_004_902_592_063,
-    14.863_588_633_909_034,
-    18.015_527_862_681_804,
-    21.164_369_859_188_792,
-    24.311_326_857_210_776,
-    27.457_050_571_059_245,
-    30.601_922_972_669_094,
-];
+/// Where the modal parameters come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum SloshSource {
+    /// An upright cylinder by its dimensions.
+    Geometry = 1,
+    /// A table of modes.
+    Table = 2,
+}
+
+impl SloshSource {
+    /// All of them, in the order of their numbers.
+    pub const ALL: [SloshSource; 2] = [SloshSource::Geometry, SloshSource::Table];
+}
+
+pub(crate) use cylinder::XI;
 
 /// One slosh mode as a pendulum that hangs at the tank's axis.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pendulum {
     /// Mass of the bob, kg.
     pub m: f64,
@@ -35,17 +48,78 @@ pub struct Pendulum {
     pub c_m: f64,
     pub r_l: f64,
     pub inv_l: f64,
-    /// Wall elevation per slosh angle, m/rad: a_n = 2 R / (xi_n^2 - 1).
+    /// Wall elevation per slosh angle, m/rad: a_n = 2 R / (xi_n^2 - 1) in a cylinder.
     pub wave: f64,
-    /// Coefficient of the quartic spring over R^2, 1/m2 (paraboloid only).
+    /// Coefficient of the quartic spring over R^2, 1/m2 (paraboloid and liquid only).
     pub hardening: f64,
+    /// Coefficient of the inertia that grows with the amplitude, l/s and l^2/s (the same).
+    pub s: f64,
+    pub l_s: f64,
+    pub l2_s: f64,
+    /// Restoring specific force g + a_n, m/s2, and its rate; sqrt((g + a_n)/l), rad/s.
+    pub g: [f64; 2],
+    pub omega_n: f64,
+    /// c over its value at the start of the expansion.
+    pub course: Series,
+    pub baffle: Baffle,
+}
+
+impl Default for Pendulum {
+    fn default() -> Self {
+        Pendulum {
+            m: 1.0,
+            l: 1.0,
+            c: 0.0,
+            c_0: 0.0,
+            r: 0.0,
+            c_m: 0.0,
+            r_l: 0.0,
+            inv_l: 1.0,
+            wave: 0.0,
+            hardening: 0.0,
+            s: 1.0,
+            l_s: 1.0,
+            l2_s: 1.0,
+            g: [0.0; 2],
+            omega_n: 0.0,
+            course: ZERO,
+            baffle: Baffle::default(),
+        }
+    }
 }
 
 impl Pendulum {
-    /// Sets the viscous coefficient, `factor` times that at the reference g.
-    pub fn set_damping(&mut self, factor: f64) {
+    /// Sets the restoring specific force and its rate.
+    pub fn set_restoring(&mut self, g: [f64; 2]) {
+        self.g = g;
+        self.omega_n = libm::sqrt(f64::max(g[0], 0.0) / self.l);
+    }
+
+    /// Sets the viscous coefficient, `factor` times that at the reference g, and how it goes on.
+    pub fn set_damping(&mut self, factor: f64, course: Series) {
         self.c = factor * self.c_0;
         self.c_m = self.c / self.m;
+        self.course = course;
+    }
+
+    /// Adds the drag of the baffle at [|q|^2, |q'|^2], squares of angle and rate.
+    pub fn add_baffle(&mut self, at: [f64; 2]) {
+        let w = self.g.map(|g| g * self.inv_l);
+        self.c = self.baffle.start(w, at, self.m, self.c, self.course);
+        self.c_m = self.c / self.m;
+        self.course[0] = 1.0;
+    }
+
+    /// Coefficient n of g a; `varies` says whether g changes.
+    #[inline(always)]
+    pub fn weight(&self, n: usize, varies: bool, a: &Series) -> f64 {
+        if varies { mul_ramp(n, &self.g, a) } else { self.g[0] * a[n] }
+    }
+
+    /// Coefficient n of a rate v of the liquid times the course of the drag.
+    #[inline(always)]
+    pub fn drag(&self, n: usize, varies: bool, v: &Series) -> f64 {
+        if varies { mul(n, &self.course, v) } else { v[n] }
     }
 }
 
@@ -62,10 +136,12 @@ pub struct Calculated {
     pub mass: [f64; MODES],
     /// Pendulum lengths, m.
     pub length: [f64; MODES],
-    /// Natural frequencies sqrt(g/l) / 2 pi, Hz.
+    /// Natural frequencies sqrt((g + a)/l) / 2 pi, Hz.
     pub frequency: [f64; MODES],
     /// Damping ratios.
     pub damping: [f64; MODES],
+    /// By how much the centring stiffness makes g look larger, a_n, m/s2.
+    pub centring: [f64; MODES],
 }
 
 /// Damping ratio of the first mode in a smooth upright cylinder:
@@ -83,30 +159,145 @@ fn mikishev_dorozhkin(tank: &Tank, fluid: &Fluid, g: f64) -> f64 {
     0.79 * libm::sqrt(re) * (1.0 + bottom)
 }
 
+/// What is wrong with a table of modes.
+pub(crate) fn problems(p: &Parameters) -> Vec<String> {
+    let (slosh, table) = (&p.slosh, &p.slosh.table);
+    let mut problems = baffle::problems(p);
+    if slosh.source != SloshSource::Table {
+        return problems;
+    }
+    if slosh.model == SloshModel::Liquid {
+        problems.push(
+            "slosh.model = liquid needs slosh.source = geometry: how the frequency depends on the \
+             amplitude is known for the upright cylinder alone"
+                .to_string(),
+        );
+    }
+    let positive = |name: &str, value: f64| {
+        (value.is_nan() || value <= 0.0)
+            .then(|| format!("slosh.table.{name} = {value} (allowed: greater than 0)"))
+    };
+    problems.extend(positive("m_liq", table.m_liq));
+    let modes = slosh.modes.min(MODES);
+    for n in 0..modes {
+        problems.extend(positive(&format!("mass[{}]", n + 1), table.mass[n]));
+        let (length, frequency, n) = (table.length[n], table.frequency[n], n + 1);
+        if (length > 0.0) == (frequency > 0.0) {
+            problems.push(format!(
+                "slosh.table.length[{n}] = {length} and slosh.table.frequency[{n}] = {frequency} \
+                 (allowed: one of them greater than 0, the other 0)"
+            ));
+        }
+    }
+    if !problems.is_empty() {
+        return problems;
+    }
+    let length = |n: usize| table.length_of(n);
+    for n in (0..modes).filter(|n| length(*n).is_nan() || length(*n) <= 0.0) {
+        problems.push(format!(
+            "slosh.table.frequency[{0}] = {1} is not above that of slosh.table.k[{0}] = {2} alone",
+            n + 1,
+            table.frequency[n],
+            table.k[n]
+        ));
+    }
+    let omega2 = |n: usize| table.g_ref / length(n) + table.k[n] / table.mass[n];
+    for n in (1..modes).filter(|n| omega2(*n) < omega2(n - 1)) {
+        problems.push(format!(
+            "the modes of slosh.table must stand in the order of their frequencies: mode {} has a \
+             lower one than mode {n}",
+            n + 1
+        ));
+    }
+    let sum: f64 = table.mass[..modes].iter().sum();
+    // A table written in decimals may leave the fixed mass below 0 by its last digit.
+    if sum > table.m_liq * (1.0 + 1e-9) {
+        problems.push(format!(
+            "the masses of slosh.table add up to {sum} kg, more than the liquid's slosh.table.m_liq = \
+             {} kg",
+            table.m_liq
+        ));
+    }
+    problems
+}
+
+/// What is to be said about the parameters at the specific force `g`, if anything.
+pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
+    let (slosh, radius) = (&p.slosh, p.tank.d / 2.0);
+    let geometry = slosh.source == SloshSource::Geometry;
+    let mut warnings = Vec::new();
+    if slosh.model == SloshModel::Frozen {
+        return warnings;
+    }
+    warnings.extend(baffle::warnings(p));
+    if slosh.model == SloshModel::Liquid && geometry {
+        warnings.extend(liquid::warning(p.tank.h / radius));
+    }
+    let calculated = Calculated::new(p, g);
+    let Calculated { bond, centring, .. } = calculated;
+    if centring[0] == 0.0 && bond < LOW_BOND {
+        warnings.push(format!(
+            "the Bond number is {bond:.3}: capillarity counts and is not in the model (set \
+             slosh.capillarity, or slosh.table.k)"
+        ));
+    }
+    if geometry && slosh.capillarity && bond < LOW_BOND {
+        warnings.push(format!(
+            "slosh.capillarity at the Bond number {bond:.3}: for a flat surface and a free contact \
+             line. For other contact angles give slosh.table.k; masses under a curved meniscus are \
+             not known"
+        ));
+    }
+    warnings
+}
+
+/// Below this Bond number capillarity adds more than 3 % to omega_1^2.
+const LOW_BOND: f64 = 100.0;
+
 impl Calculated {
     /// Modal parameters at the specific force `g` along the tank's axis, m/s2.
     ///
-    /// The correlation covers the first mode; higher modes take its ratio. At
-    /// g = 0 there is no restoring force and no frequency; the damping ratio,
-    /// which has no meaning there, is reported as 0.
+    /// The correlation covers the first mode; higher modes take its ratio. Without
+    /// restoring force (g = 0, no centring stiffness) there is no frequency; the damping
+    /// ratio, which has no meaning there, is reported as 0.
     pub fn new(p: &Parameters, g: f64) -> Calculated {
         let Parameters { tank, fluid, slosh, .. } = p;
         let radius = tank.d / 2.0;
-        let m_liq = fluid.rho * core::f64::consts::PI * radius * radius * tank.h;
+        let m_liq = match slosh.source {
+            SloshSource::Geometry => fluid.rho * core::f64::consts::PI * radius * radius * tank.h,
+            SloshSource::Table => slosh.table.m_liq,
+        };
         let bond = fluid.rho * g * radius * radius / fluid.sigma;
         let mut all = Calculated { m_liq, m_0: m_liq, bond, ..Default::default() };
         let modes = if slosh.model == SloshModel::Frozen { 0 } else { slosh.modes.min(MODES) };
-        for (n, &xi) in XI.iter().enumerate().take(modes) {
-            let tanh = libm::tanh(2.0 * xi * tank.h / tank.d);
-            all.mass[n] = m_liq * tank.d * tanh / (xi * (xi * xi - 1.0) * tank.h);
-            all.length[n] = tank.d / (2.0 * xi * tanh);
-            all.frequency[n] = libm::sqrt(g / all.length[n]) / core::f64::consts::TAU;
-            all.damping[n] = match (g > 0.0, slosh.zeta_from_correlation) {
-                (false, _) => 0.0,
-                (_, true) => mikishev_dorozhkin(tank, fluid, g),
+        for n in 0..modes {
+            match slosh.source {
+                SloshSource::Geometry => {
+                    let xi = XI[n];
+                    let pendulum = cylinder::pendulum(n, tank.d, tank.h, m_liq);
+                    (all.mass[n], all.length[n]) = (pendulum.mass, pendulum.length);
+                    if slosh.capillarity {
+                        all.centring[n] = fluid.sigma * xi * xi / (fluid.rho * radius * radius);
+                    }
+                }
+                SloshSource::Table => {
+                    all.mass[n] = slosh.table.mass[n];
+                    all.length[n] = slosh.table.length_of(n);
+                    all.centring[n] = slosh.table.k[n] * all.length[n] / all.mass[n];
+                }
+            }
+            let restoring = g + all.centring[n];
+            all.frequency[n] = libm::sqrt(restoring / all.length[n]) / core::f64::consts::TAU;
+            all.damping[n] = match (slosh.source, slosh.zeta_from_correlation) {
+                _ if restoring <= 0.0 => 0.0,
+                (SloshSource::Table, _) => slosh.table.zeta[n],
+                (_, true) => mikishev_dorozhkin(tank, fluid, g + all.centring[0]),
                 (_, false) => slosh.zeta,
             };
             all.m_0 -= all.mass[n];
+        }
+        if slosh.source == SloshSource::Table {
+            all.m_0 = f64::max(all.m_0, 0.0);
         }
         all
     }
@@ -115,12 +306,43 @@ impl Calculated {
     /// belong to the `g` of [`Calculated::new`]; `damping.rs` has them at another.
     pub fn pendulums(&self, p: &Parameters) -> impl Iterator<Item = Pendulum> {
         let radius = p.tank.d / 2.0;
-        let (r, hardening) = (p.tank.r, p.slosh.hardening / (radius * radius));
+        let (r, slosh, p) = (p.tank.r, p.slosh, *p);
+        let (s_1, kappa_1) = match slosh.model {
+            SloshModel::Liquid => liquid::coefficients(p.tank.h / radius),
+            _ => (1.0, 1.0),
+        };
         (0..MODES).take_while(|&n| self.mass[n] > 0.0).map(move |n| {
             let (m, l) = (self.mass[n], self.length[n]);
             let c = 2.0 * self.damping[n] * core::f64::consts::TAU * self.frequency[n] * m;
-            let wave = 2.0 * radius / (XI[n] * XI[n] - 1.0);
-            Pendulum { m, l, c, c_0: c, r, c_m: c / m, r_l: r / l, inv_l: 1.0 / l, wave, hardening }
+            let wave = match slosh.source {
+                SloshSource::Table if slosh.table.wave[n] > 0.0 => slosh.table.wave[n],
+                _ => 2.0 * radius / (XI[n] * XI[n] - 1.0),
+            };
+            let (s, kappa) = if n == 0 { (s_1, kappa_1) } else { (1.0, 1.0) };
+            let hardening = match slosh.model {
+                SloshModel::Liquid => kappa / (2.0 * l * l),
+                _ => slosh.hardening / (radius * radius),
+            };
+            Pendulum {
+                m,
+                l,
+                c,
+                c_0: c,
+                r,
+                c_m: c / m,
+                r_l: r / l,
+                inv_l: 1.0 / l,
+                wave,
+                hardening,
+                s,
+                l_s: l / s,
+                l2_s: l * l / s,
+                baffle: match n == 0 && p.baffle.width > 0.0 {
+                    true => Baffle::new(&p, wave, l),
+                    false => Baffle::default(),
+                },
+                ..Pendulum::default()
+            }
         })
     }
 }

@@ -8,8 +8,13 @@ use plant::{
 const TOLERANCE: f64 = 1e-9;
 
 /// The models with sloshing liquid.
-const SLOSHING: [SloshModel; 4] =
-    [SloshModel::Linear, SloshModel::Planar, SloshModel::Spherical, SloshModel::Paraboloid];
+const SLOSHING: [SloshModel; 5] = [
+    SloshModel::Linear,
+    SloshModel::Planar,
+    SloshModel::Spherical,
+    SloshModel::Paraboloid,
+    SloshModel::Liquid,
+];
 
 fn bench(slosh: SloshModel, friction: FrictionModel) -> Parameters {
     let mut p = Parameters::default();

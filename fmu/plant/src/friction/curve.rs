@@ -31,12 +31,11 @@ impl StribeckCurve {
         self.c + self.d
     }
 
-    /// Coefficient N of T_C from that of w^2.
+    /// Coefficient n of T_C from that of w^2.
     #[inline(always)]
-    pub fn expand<const N: usize>(&mut self, omega2: &Series) {
-        let u = -omega2[N] * self.inv_omega_s2;
-        self.e[N] =
-            if N == 0 { libm::exp(u) } else { series::chain::<N>(u, &mut self.u_d, &self.e) };
-        self.torque[N] = series::constant::<N>(self.c) + self.d * self.e[N];
+    pub fn expand(&mut self, n: usize, omega2: &Series) {
+        let u = -omega2[n] * self.inv_omega_s2;
+        self.e[n] = if n == 0 { libm::exp(u) } else { series::chain(n, u, &mut self.u_d, &self.e) };
+        self.torque[n] = series::constant(n, self.c) + self.d * self.e[n];
     }
 }

@@ -43,12 +43,12 @@ impl OneWay {
         lowest - bend * (angle(1) / 2.0) * (angle(1) / 2.0) / 2.0
     }
 
-    /// Coefficient N of B.
+    /// Coefficient n of B.
     #[inline(always)]
-    fn coefficient<const N: usize>(&self, trig: &[Series; 4]) -> f64 {
-        let mean = series::constant::<N>(self.mean);
+    fn coefficient(&self, n: usize, trig: &[Series; 4]) -> f64 {
+        let mean = series::constant(n, self.mean);
         let terms = self.harmonics.iter().zip(trig);
-        mean + terms.map(|(coefficient, series)| coefficient * series[N]).sum::<f64>()
+        mean + terms.map(|(coefficient, series)| coefficient * series[n]).sum::<f64>()
     }
 }
 
@@ -112,23 +112,23 @@ impl DirectionalFactor {
         self.one_way(contact).mean
     }
 
-    /// Coefficient N of cos and sin; comes before the coefficients of B.
-    pub fn expand<const N: usize>(&mut self, theta: &Series) {
+    /// Coefficient n of cos and sin; comes before the coefficients of B.
+    pub fn expand(&mut self, n: usize, theta: &Series) {
         let Some(trig) = &mut self.trig else { return };
         let [c1, s1, c2, s2] = &mut **trig;
         let [once_d, twice_d] = &mut self.angles_d;
-        (s1[N], c1[N]) = series::sin_cos::<N>(theta[N], once_d, s1, c1);
-        (s2[N], c2[N]) = series::sin_cos::<N>(2.0 * theta[N], twice_d, s2, c2);
+        (s1[n], c1[n]) = series::sin_cos(n, theta[n], once_d, s1, c1);
+        (s2[n], c2[n]) = series::sin_cos(n, 2.0 * theta[n], twice_d, s2, c2);
     }
 
-    /// Coefficient N of B in the direction in which the hub turns.
-    pub fn coefficient<const N: usize>(&self, contact: Contact) -> f64 {
-        self.of::<N>(self.one_way(contact))
+    /// Coefficient n of B in the direction in which the hub turns.
+    pub fn coefficient(&self, n: usize, contact: Contact) -> f64 {
+        self.of(n, self.one_way(contact))
     }
 
-    /// Coefficient N of (B+ + B-)/2 and (B+ - B-)/2.
-    pub fn even_odd<const N: usize>(&self) -> (f64, f64) {
-        let (forward, backward) = (self.of::<N>(&self.forward), self.of::<N>(&self.backward));
+    /// Coefficient n of (B+ + B-)/2 and (B+ - B-)/2.
+    pub fn even_odd(&self, n: usize) -> (f64, f64) {
+        let (forward, backward) = (self.of(n, &self.forward), self.of(n, &self.backward));
         ((forward + backward) / 2.0, (forward - backward) / 2.0)
     }
 
@@ -137,10 +137,10 @@ impl DirectionalFactor {
     }
 
     #[inline(always)]
-    fn of<const N: usize>(&self, one_way: &OneWay) -> f64 {
+    fn of(&self, n: usize, one_way: &OneWay) -> f64 {
         match &self.trig {
-            Some(trig) => one_way.coefficient::<N>(trig),
-            None => series::constant::<N>(one_way.mean),
+            Some(trig) => one_way.coefficient(n, trig),
+            None => series::constant(n, one_way.mean),
         }
     }
 }

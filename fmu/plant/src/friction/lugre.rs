@@ -102,37 +102,37 @@ impl FrictionLaw for Lugre {
         )]
     }
 
-    fn set_states<const ORDER: usize>(&mut self, x: &[f64; STATES]) {
-        self.z[ORDER] = x[x::BRISTLE];
+    fn set_states(&mut self, n: usize, x: &[f64; STATES]) {
+        self.z[n] = x[x::BRISTLE];
     }
 
     // Once for all slosh models.
     #[inline(never)]
-    fn torque<const N: usize>(&mut self, contact: Contact, hub: &HubMotion) -> f64 {
-        self.curve.expand::<N>(&hub.omega2);
-        self.factor.expand::<N>(&hub.theta);
-        self.present[N] = self.factor.coefficient::<N>(contact);
-        self.g[N] = series::mul::<N>(&self.curve.torque, &self.present);
-        let rest = series::mul_tail::<N>(&self.g, &self.rate_over_g);
-        self.rate_over_g[N] = (hub.omega[N] - rest) / self.g[0];
-        self.relaxation[N] = series::mul::<N>(&self.rate_over_g, &self.z);
+    fn torque(&mut self, n: usize, contact: Contact, hub: &HubMotion) -> f64 {
+        self.curve.expand(n, &hub.omega2);
+        self.factor.expand(n, &hub.theta);
+        self.present[n] = self.factor.coefficient(n, contact);
+        self.g[n] = series::mul(n, &self.curve.torque, &self.present);
+        let rest = series::mul_tail(n, &self.g, &self.rate_over_g);
+        self.rate_over_g[n] = (hub.omega[n] - rest) / self.g[0];
+        self.relaxation[n] = series::mul(n, &self.rate_over_g, &self.z);
         let sign = contact as i8 as f64;
-        self.z_d[N] = hub.omega[N] - sign * self.sigma0 * self.relaxation[N];
-        self.z[N + 1] = series::next::<N>(self.z_d[N]);
-        -(self.sigma0 * self.z[N] + self.sigma1 * self.z_d[N] + self.b * hub.omega[N])
+        self.z_d[n] = hub.omega[n] - sign * self.sigma0 * self.relaxation[n];
+        self.z[n + 1] = series::next(n, self.z_d[n]);
+        -(self.sigma0 * self.z[n] + self.sigma1 * self.z_d[n] + self.b * hub.omega[n])
     }
 
     #[inline(never)]
-    fn dissipation<const N: usize>(&self, tau_f: &Series, omega: &Series) -> f64 {
-        -series::mul::<N>(tau_f, omega) - self.sigma0 * series::mul::<N>(&self.z, &self.z_d)
+    fn dissipation(&self, n: usize, tau_f: &Series, omega: &Series) -> f64 {
+        -series::mul(n, tau_f, omega) - self.sigma0 * series::mul(n, &self.z, &self.z_d)
     }
 
-    fn energy<const N: usize>(&self) -> f64 {
-        self.sigma0 * series::square::<N>(&self.z) / 2.0
+    fn energy(&self, n: usize) -> f64 {
+        self.sigma0 * series::square(n, &self.z) / 2.0
     }
 
-    fn derivatives<const N: usize>(&self, _: Contact, derivatives: &mut [f64; STATES]) {
-        derivatives[x::BRISTLE] = self.z_d[N];
+    fn derivatives(&self, n: usize, _: Contact, derivatives: &mut [f64; STATES]) {
+        derivatives[x::BRISTLE] = self.z_d[n];
     }
 
     fn advance(&self, _: Contact, n: usize, t: f64, x: &mut [f64; STATES]) {

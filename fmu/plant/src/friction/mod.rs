@@ -50,26 +50,27 @@ pub trait FrictionLaw {
         Vec::new()
     }
 
-    /// Sets the law's states, or with ORDER = 1 their direction for a partial derivative.
-    fn set_states<const ORDER: usize>(&mut self, _x: &[f64; STATES]) {}
+    /// Sets coefficient n of the law's states: 0 the states, 1 their direction for a partial
+    /// derivative.
+    fn set_states(&mut self, _n: usize, _x: &[f64; STATES]) {}
 
-    /// Coefficient N of tau_f while the hub is not stuck, from coefficients up to N of theta,
-    /// w, w^2 and the law's states; and coefficient N + 1 of the latter.
-    fn torque<const N: usize>(&mut self, contact: Contact, hub: &HubMotion) -> f64;
+    /// Coefficient n of tau_f while the hub is not stuck, from coefficients up to n of theta,
+    /// w, w^2 and the law's states; and coefficient n + 1 of the latter.
+    fn torque(&mut self, n: usize, contact: Contact, hub: &HubMotion) -> f64;
 
-    /// Coefficient N of the power that the bearing dissipates, W, after `torque`.
+    /// Coefficient n of the power that the bearing dissipates, W, after `torque`.
     #[inline(always)]
-    fn dissipation<const N: usize>(&self, tau_f: &Series, omega: &Series) -> f64 {
-        -series::mul::<N>(tau_f, omega)
+    fn dissipation(&self, n: usize, tau_f: &Series, omega: &Series) -> f64 {
+        -series::mul(n, tau_f, omega)
     }
 
-    /// Coefficient N, 0 or 1, of the energy stored in the bearing, J.
-    fn energy<const N: usize>(&self) -> f64 {
+    /// Coefficient n, 0 or 1, of the energy stored in the bearing, J.
+    fn energy(&self, _n: usize) -> f64 {
         0.0
     }
 
-    /// Coefficient N, 0 or 1, of the derivatives of the law's states.
-    fn derivatives<const N: usize>(&self, _contact: Contact, _derivatives: &mut [f64; STATES]) {}
+    /// Coefficient n, 0 or 1, of the derivatives of the law's states.
+    fn derivatives(&self, _n: usize, _contact: Contact, _derivatives: &mut [f64; STATES]) {}
 
     /// Moves the law's states on by `t`, from the series cut after order n.
     fn advance(&self, _contact: Contact, _n: usize, _t: f64, _x: &mut [f64; STATES]) {}
@@ -163,43 +164,44 @@ macro_rules! laws {
 
             /// See [`FrictionLaw::set_states`].
             #[inline(always)]
-            pub fn set_states<const ORDER: usize>(&mut self, x: &[f64; STATES]) {
+            pub fn set_states(&mut self, n: usize, x: &[f64; STATES]) {
                 match self {
-                    $(Law::$name(law) => law.set_states::<ORDER>(x),)*
+                    $(Law::$name(law) => law.set_states(n, x),)*
                 }
             }
 
             /// See [`FrictionLaw::torque`].
             #[inline(always)]
-            pub fn torque<const N: usize>(&mut self, contact: Contact, hub: &HubMotion) -> f64 {
+            pub fn torque(&mut self, n: usize, contact: Contact, hub: &HubMotion) -> f64 {
                 match self {
-                    $(Law::$name(law) => law.torque::<N>(contact, hub),)*
+                    $(Law::$name(law) => law.torque(n, contact, hub),)*
                 }
             }
 
             /// See [`FrictionLaw::dissipation`].
             #[inline(always)]
-            pub fn dissipation<const N: usize>(&self, tau_f: &Series, omega: &Series) -> f64 {
+            pub fn dissipation(&self, n: usize, tau_f: &Series, omega: &Series) -> f64 {
                 match self {
-                    $(Law::$name(law) => law.dissipation::<N>(tau_f, omega),)*
+                    $(Law::$name(law) => law.dissipation(n, tau_f, omega),)*
                 }
             }
 
             /// See [`FrictionLaw::energy`].
-            pub fn energy<const N: usize>(&self) -> f64 {
+            pub fn energy(&self, n: usize) -> f64 {
                 match self {
-                    $(Law::$name(law) => law.energy::<N>(),)*
+                    $(Law::$name(law) => law.energy(n),)*
                 }
             }
 
             /// See [`FrictionLaw::derivatives`].
-            pub fn derivatives<const N: usize>(
+            pub fn derivatives(
                 &self,
+                n: usize,
                 contact: Contact,
                 derivatives: &mut [f64; STATES],
             ) {
                 match self {
-                    $(Law::$name(law) => law.derivatives::<N>(contact, derivatives),)*
+                    $(Law::$name(law) => law.derivatives(n, contact, derivatives),)*
                 }
             }
 

@@ -29,13 +29,13 @@ pub struct Stribeck {
 }
 
 impl Stribeck {
-    /// Coefficient N of sgn(w) T_C B where B depends on the angle.
+    /// Coefficient n of sgn(w) T_C B where B depends on the angle.
     // Once for all slosh models.
     #[inline(never)]
-    fn dry_by_angle<const N: usize>(&mut self, contact: Contact, theta: &Series) -> f64 {
-        self.factor.expand::<N>(theta);
-        self.present[N] = contact as i8 as f64 * self.factor.coefficient::<N>(contact);
-        series::mul::<N>(&self.curve.torque, &self.present)
+    fn dry_by_angle(&mut self, n: usize, contact: Contact, theta: &Series) -> f64 {
+        self.factor.expand(n, theta);
+        self.present[n] = contact as i8 as f64 * self.factor.coefficient(n, contact);
+        series::mul(n, &self.curve.torque, &self.present)
     }
 }
 
@@ -49,21 +49,21 @@ impl FrictionLaw for Stribeck {
     }
 
     #[inline(always)]
-    fn torque<const N: usize>(&mut self, contact: Contact, hub: &HubMotion) -> f64 {
-        self.curve.expand::<N>(&hub.omega2);
+    fn torque(&mut self, n: usize, contact: Contact, hub: &HubMotion) -> f64 {
+        self.curve.expand(n, &hub.omega2);
         let dry = if self.factor.depends_on_angle() {
-            self.dry_by_angle::<N>(contact, &hub.theta)
+            self.dry_by_angle(n, contact, &hub.theta)
         } else {
-            if N == 0 {
+            if n == 0 {
                 self.present[0] = contact as i8 as f64 * self.factor.mean(contact);
             }
-            self.present[0] * self.curve.torque[N]
+            self.present[0] * self.curve.torque[n]
         };
-        -self.b * hub.omega[N] - dry
+        -self.b * hub.omega[n] - dry
     }
 
-    fn derivatives<const N: usize>(&self, contact: Contact, derivatives: &mut [f64; STATES]) {
-        derivatives[x::STUCK_TIME] = if N == 0 && contact == Contact::Stuck { 1.0 } else { 0.0 };
+    fn derivatives(&self, n: usize, contact: Contact, derivatives: &mut [f64; STATES]) {
+        derivatives[x::STUCK_TIME] = if n == 0 && contact == Contact::Stuck { 1.0 } else { 0.0 };
     }
 
     #[inline(always)]

@@ -58,20 +58,20 @@ impl FrictionLaw for StribeckSmooth {
 
     // Once for all slosh models.
     #[inline(never)]
-    fn torque<const N: usize>(&mut self, _: Contact, hub: &HubMotion) -> f64 {
-        self.curve.expand::<N>(&hub.omega2);
-        self.t[N] = if N == 0 {
+    fn torque(&mut self, n: usize, _: Contact, hub: &HubMotion) -> f64 {
+        self.curve.expand(n, &hub.omega2);
+        self.t[n] = if n == 0 {
             libm::tanh(hub.omega[0] / self.eps)
         } else {
-            series::chain::<N>(hub.omega[N] / self.eps, &mut self.v_d, &self.sech2)
+            series::chain(n, hub.omega[n] / self.eps, &mut self.v_d, &self.sech2)
         };
-        let t2 = series::square::<N>(&self.t);
-        self.sech2[N] = if N == 0 { 1.0 - t2 } else { -t2 };
-        self.factor.expand::<N>(&hub.theta);
-        (self.even[N], self.odd[N]) = self.factor.even_odd::<N>();
-        self.blend[N] = self.even[N] + series::mul::<N>(&self.t, &self.odd);
-        self.sign[N] = series::mul::<N>(&self.t, &self.blend);
-        -self.b * hub.omega[N] - series::mul::<N>(&self.curve.torque, &self.sign)
+        let t2 = series::square(n, &self.t);
+        self.sech2[n] = if n == 0 { 1.0 - t2 } else { -t2 };
+        self.factor.expand(n, &hub.theta);
+        (self.even[n], self.odd[n]) = self.factor.even_odd(n);
+        self.blend[n] = self.even[n] + series::mul(n, &self.t, &self.odd);
+        self.sign[n] = series::mul(n, &self.t, &self.blend);
+        -self.b * hub.omega[n] - series::mul(n, &self.curve.torque, &self.sign)
     }
 
     /// tanh has its nearest poles at distance sqrt(v^2 + (pi/2)^2) from v = w/eps, and it is

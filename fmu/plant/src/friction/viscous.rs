@@ -17,7 +17,7 @@ impl FrictionLaw for Free {
     }
 
     #[inline(always)]
-    fn torque<const N: usize>(&mut self, _: Contact, _: &HubMotion) -> f64 {
+    fn torque(&mut self, _: usize, _: Contact, _: &HubMotion) -> f64 {
         0.0
     }
 }
@@ -33,7 +33,7 @@ impl FrictionLaw for Viscous {
     }
 
     #[inline(always)]
-    fn torque<const N: usize>(&mut self, _: Contact, hub: &HubMotion) -> f64 {
-        -self.b * hub.omega[N]
+    fn torque(&mut self, n: usize, _: Contact, hub: &HubMotion) -> f64 {
+        -self.b * hub.omega[n]
     }
 }

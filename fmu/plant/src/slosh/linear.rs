@@ -10,9 +10,11 @@
 //! ```text
 //! E = m (r w + l al')^2/2 + m g l al^2/2,  H = m r (r w + l al')
 //! ```
+//! On a bench that leans, gravity across the axis, e, adds e_y/l to al'', -m l e_x al to T and
+//! -m (e_x r + e_y l al) to E.
 
 use super::{Angles, HubMotion, HubReaction, SloshMode};
-use crate::series::{Series, ZERO, mul, next, square, values};
+use crate::series::{Series, ZERO, constant, mul, next, square, values};
 use crate::tank::Pendulum;
 
 #[derive(Clone, Debug)]
@@ -25,19 +27,22 @@ pub struct Linear {
     /// g al, and al' times the course of the damping
     g_al: Series,
     drag: Series,
-    /// sqrt(g/l) at the start of the expansion, rad/s
-    omega_n: f64,
 }
 
 impl SloshMode for Linear {
+    const UNROLLED: bool = true;
     const MOVES_INERTIA: bool = false;
 
     fn new(p: &Pendulum) -> Self {
-        Linear { p: *p, al: ZERO, al_d: ZERO, al_dd: ZERO, g_al: ZERO, drag: ZERO, omega_n: 0.0 }
+        Linear { p: *p, al: ZERO, al_d: ZERO, al_dd: ZERO, g_al: ZERO, drag: ZERO }
     }
 
-    fn set_damping(&mut self, factor: f64) {
-        self.p.set_damping(factor);
+    fn pendulum(&mut self) -> &mut Pendulum {
+        &mut self.p
+    }
+
+    fn amplitude2(&self) -> [f64; 2] {
+        [self.al[0] * self.al[0], self.al_d[0] * self.al_d[0]]
     }
 
     fn coordinates(&self, at: &Angles) -> [f64; 4] {
@@ -56,32 +61,40 @@ impl SloshMode for Linear {
         (self.al[1], self.al_d[1]) = (dq[1], dq[3]);
     }
 
-    fn derivatives<const N: usize>(&self, _: &HubMotion) -> [f64; 4] {
-        [0.0, self.al_d[N], 0.0, self.al_dd[N]]
+    fn derivatives(&self, n: usize, _: &HubMotion) -> [f64; 4] {
+        [0.0, self.al_d[n], 0.0, self.al_dd[n]]
     }
 
     #[inline(always)]
-    fn hub_reaction<const N: usize, const RAMP: bool>(&mut self, hub: &HubMotion) -> HubReaction {
+    fn hub_reaction(&mut self, n: usize, ramp: bool, hub: &HubMotion) -> HubReaction {
         let Pendulum { m, l, c, r, .. } = self.p;
-        if N == 0 {
-            self.omega_n = libm::sqrt(f64::max(hub.g[0], 0.0) / l);
+        if ramp && self.p.baffle.zeta > 0.0 {
+            let at = [square(n, &self.al), square(n, &self.al_d)];
+            self.p.course[n] = self.p.baffle.expand(n, at);
         }
-        self.g_al[N] = hub.weight::<N, RAMP>(&self.al);
-        self.drag[N] = hub.drag::<N, RAMP>(&self.al_d);
-        HubReaction { j: 0.0, t: r * (m * self.g_al[N] + c * l * self.drag[N]) }
+        self.g_al[n] = self.p.weight(n, ramp, &self.al);
+        self.drag[n] = self.p.drag(n, ramp, &self.al_d);
+        let mut t = r * (m * self.g_al[n] + c * l * self.drag[n]);
+        if ramp {
+            t -= m * l * mul(n, &hub.tilt.e[0], &self.al);
+        }
+        HubReaction { j: 0.0, t }
     }
 
     #[inline(always)]
-    fn accelerate<const N: usize, const RAMP: bool>(&mut self, hub: &HubMotion) {
+    fn accelerate(&mut self, n: usize, ramp: bool, hub: &HubMotion) {
         let Pendulum { c_m, r_l, inv_l, .. } = self.p;
-        self.al_dd[N] = -c_m * self.drag[N] - inv_l * self.g_al[N] - r_l * hub.omega_dot[N];
-        self.al[N + 1] = next::<N>(self.al_d[N]);
-        self.al_d[N + 1] = next::<N>(self.al_dd[N]);
+        self.al_dd[n] = -c_m * self.drag[n] - inv_l * self.g_al[n] - r_l * hub.omega_dot[n];
+        if ramp {
+            self.al_dd[n] += inv_l * hub.tilt.e[1][n];
+        }
+        self.al[n + 1] = next(n, self.al_d[n]);
+        self.al_d[n + 1] = next(n, self.al_dd[n]);
     }
 
     #[inline(always)]
     fn error_scale(&self) -> f64 {
-        self.al_d[0].abs() + self.omega_n * self.al[0].abs()
+        self.al_d[0].abs() + self.p.omega_n * self.al[0].abs()
     }
 
     #[inline(always)]
@@ -90,17 +103,19 @@ impl SloshMode for Linear {
     }
 
     #[inline(always)]
-    fn dissipation<const N: usize, const RAMP: bool>(&mut self) -> f64 {
+    fn dissipation(&mut self, n: usize, ramp: bool) -> f64 {
         self.p.c
             * self.p.l
             * self.p.l
-            * if RAMP { mul::<N>(&self.drag, &self.al_d) } else { square::<N>(&self.al_d) }
+            * if ramp { mul(n, &self.drag, &self.al_d) } else { square(n, &self.al_d) }
     }
 
     /// m l al^2/2
     #[inline(always)]
-    fn mass_height<const N: usize>(&mut self) -> f64 {
-        self.p.m * self.p.l * square::<N>(&self.al) / 2.0
+    fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64 {
+        let Pendulum { m, l, r, .. } = self.p;
+        let place = |j: usize| [constant(j, r), l * self.al[j]];
+        m * l * square(n, &self.al) / 2.0 + m * hub.tilt.height(n, place)
     }
 
     #[inline(always)]
@@ -115,18 +130,21 @@ impl SloshMode for Linear {
         let Pendulum { m, l, r, .. } = self.p;
         let (w, wd) = (hub.omega[0], hub.omega_dot[0]);
         let radial = m * (r * w * w + 2.0 * w * l * self.al_d[0] + wd * l * self.al[0]);
-        [radial, -m * (r * wd + l * self.al_dd[0])]
+        let [e_x, e_y] = hub.tilt.now();
+        [radial + m * e_x, -m * (r * wd + l * self.al_dd[0]) + m * e_y]
     }
 
-    /// r F_y: in the linear model the force acts at the hinge.
+    /// r F_y: in the linear model the force acts at the hinge; gravity of a leaning bench at the bob.
     fn torque(&self, hub: &HubMotion) -> f64 {
-        self.p.r * self.force(hub)[1]
+        self.p.r * self.force(hub)[1] - self.p.m * self.p.l * self.al[0] * hub.tilt.now()[0]
     }
 
     fn energy(&self, hub: &HubMotion) -> f64 {
         let Pendulum { m, l, r, .. } = self.p;
         let speed = r * hub.omega[0] + l * self.al_d[0];
-        (m * speed * speed + m * hub.g[0] * l * self.al[0] * self.al[0]) / 2.0
+        let [e_x, e_y] = hub.tilt.now();
+        (m * speed * speed + m * self.p.g[0] * l * self.al[0] * self.al[0]) / 2.0
+            - m * (e_x * r + e_y * l * self.al[0])
     }
 
     fn momentum(&self, hub: &HubMotion) -> f64 {

@@ -13,11 +13,12 @@
 //! where J, T, B and A do not contain w' (w the hub's rate).
 
 mod linear;
+pub(crate) mod liquid;
 mod paraboloid;
 mod planar;
 mod spherical;
 
-use crate::series::{Series, ZERO, mul, mul_ramp};
+use crate::series::{Series, ZERO, mul_ramp};
 use crate::tank::Pendulum;
 use crate::{Calculated, Init, Parameters};
 use linear::Linear;
@@ -39,16 +40,19 @@ pub enum SloshModel {
     Spherical = 4,
     /// Masses on a paraboloid with a quartic spring.
     Paraboloid = 5,
+    /// The first mode of an upright cylinder to third order in the amplitude.
+    Liquid = 6,
 }
 
 impl SloshModel {
     /// All of them, in the order of their numbers.
-    pub const ALL: [SloshModel; 5] = [
+    pub const ALL: [SloshModel; 6] = [
         SloshModel::Frozen,
         SloshModel::Linear,
         SloshModel::Planar,
         SloshModel::Spherical,
         SloshModel::Paraboloid,
+        SloshModel::Liquid,
     ];
 }
 
@@ -86,7 +90,7 @@ impl Liquid {
             SloshModel::Frozen | SloshModel::Linear => Liquid::Linear(modes(p, calculated)),
             SloshModel::Planar => Liquid::Planar(modes(p, calculated)),
             SloshModel::Spherical => Liquid::Spherical(modes(p, calculated)),
-            SloshModel::Paraboloid => Liquid::Paraboloid(modes(p, calculated)),
+            SloshModel::Paraboloid | SloshModel::Liquid => Liquid::Paraboloid(modes(p, calculated)),
         }
     }
 
@@ -112,10 +116,74 @@ pub struct HubMotion {
     pub omega_dot: Series,
     /// Specific force along the tank's axis, m/s2, and its rate.
     pub g: [f64; 2],
-    /// Slosh damping over that at the start of the expansion.
-    pub damping: Series,
-    /// How far ahead `damping` holds, s.
+    /// How far ahead the course of the damping holds, s.
     pub damping_reach: f64,
+    pub tilt: Tilt,
+}
+
+/// Gravity across the axis of a bench that leans. In the hub's frame, with the tangent t of the
+/// tilt and the azimuth phi that the lateral part points to,
+///
+/// ```text
+/// e = g d,   d = t (cos(phi - theta), sin(phi - theta))
+/// ```
+///
+/// g the specific force along the axis: a mass M at the place X has the energy -M e.X, and
+/// d' = w (d_y, -d_x).
+#[derive(Clone, Debug)]
+pub struct Tilt {
+    /// t
+    pub tangent: f64,
+    /// phi, rad
+    pub azimuth: f64,
+    /// d and e
+    pub direction: [Series; 2],
+    pub e: [Series; 2],
+}
+
+impl Tilt {
+    /// An upright bench.
+    const NONE: Tilt = Tilt { tangent: 0.0, azimuth: 0.0, direction: [ZERO; 2], e: [ZERO; 2] };
+
+    /// Coefficient n of d and e, from coefficients up to n of theta.
+    pub fn expand(&mut self, n: usize, theta: &Series, g: &[f64; 2]) {
+        if self.tangent == 0.0 {
+            return;
+        }
+        if n == 0 {
+            let (sin, cos) = libm::sincos(self.azimuth - theta[0]);
+            (self.direction[0][0], self.direction[1][0]) = (self.tangent * cos, self.tangent * sin);
+        } else {
+            // d' = theta' (d_y, -d_x)
+            let [x, y] = &self.direction;
+            let turned = |d: &Series| {
+                (1..=n).map(|j| j as f64 * theta[j] * d[n - j]).sum::<f64>() / n as f64
+            };
+            let (x_n, y_n) = (turned(y), -turned(x));
+            (self.direction[0][n], self.direction[1][n]) = (x_n, y_n);
+        }
+        for i in 0..2 {
+            self.e[i][n] = mul_ramp(n, g, &self.direction[i]);
+        }
+    }
+
+    /// Coefficient n of -d.X, the height of a place X in the hub's frame, m.
+    pub fn height(&self, n: usize, x: impl Fn(usize) -> [f64; 2]) -> f64 {
+        if self.tangent == 0.0 {
+            return 0.0;
+        }
+        let [d_x, d_y] = &self.direction;
+        let term = |j: usize| {
+            let [x, y] = x(j);
+            x * d_x[n - j] + y * d_y[n - j]
+        };
+        -(0..=n).map(term).sum::<f64>()
+    }
+
+    /// e at order 0, m/s2.
+    pub fn now(&self) -> [f64; 2] {
+        [self.e[0][0], self.e[1][0]]
+    }
 }
 
 impl HubMotion {
@@ -126,22 +194,9 @@ impl HubMotion {
         omega2: ZERO,
         omega_dot: ZERO,
         g: [0.0; 2],
-        damping: ZERO,
         damping_reach: f64::INFINITY,
+        tilt: Tilt::NONE,
     };
-
-    /// Coefficient N of g a; `RAMP` says whether g changes.
-    #[inline(always)]
-    pub fn weight<const N: usize, const RAMP: bool>(&self, a: &Series) -> f64 {
-        if RAMP { mul_ramp::<N>(&self.g, a) } else { self.g[0] * a[N] }
-    }
-
-    /// Coefficient N of a rate v of the liquid times the course of the damping, which changes
-    /// with g.
-    #[inline(always)]
-    pub fn drag<const N: usize, const RAMP: bool>(&self, v: &Series) -> f64 {
-        if RAMP { mul::<N>(&self.damping, v) } else { v[N] }
-    }
 }
 
 /// A mode's share of the hub's equation.
@@ -164,6 +219,9 @@ pub struct Angles {
 
 /// One slosh mode as a set of power series in time.
 pub trait SloshMode {
+    /// Whether steps with a single mode and g held are compiled with the sums of every order
+    /// written out: twice as fast, 40 to 100 KB of code.
+    const UNROLLED: bool = false;
     /// Whether J has coefficients beyond order 0.
     const MOVES_INERTIA: bool = true;
     /// The mode at rest; `start` puts it somewhere.
@@ -172,8 +230,10 @@ pub trait SloshMode {
     fn start_problem(_init: &Init) -> Option<String> {
         None
     }
-    /// Sets the viscous coefficient, `factor` times that at the reference g.
-    fn set_damping(&mut self, factor: f64);
+    /// The pendulum that it is made of.
+    fn pendulum(&mut self) -> &mut Pendulum;
+    /// Squares of displacement over length and of its rate, at order 0 after `start`, rad2, rad2/s2.
+    fn amplitude2(&self) -> [f64; 2];
     /// A displacement of the coordinates at which forces and energies curve, in their unit.
     fn coordinate_scale(&self) -> f64 {
         1.0
@@ -187,22 +247,22 @@ pub trait SloshMode {
     /// Sets the direction, coefficient 1 of the coordinates, for a partial derivative; w is
     /// known to order 1.
     fn seed_direction(&mut self, dq: &[f64; 4], hub: &HubMotion);
-    /// Coefficient N, 0 or 1, of q_x', q_y', q_x'', q_y''.
-    fn derivatives<const N: usize>(&self, hub: &HubMotion) -> [f64; 4];
-    /// Coefficient N of J and T, from coefficients up to N of q, q' and w; `RAMP` says whether
+    /// Coefficient n, 0 or 1, of q_x', q_y', q_x'', q_y''.
+    fn derivatives(&self, n: usize, hub: &HubMotion) -> [f64; 4];
+    /// Coefficient n of J and T, from coefficients up to n of q, q' and w; `ramp` says whether
     /// g changes along the expansion.
-    fn hub_reaction<const N: usize, const RAMP: bool>(&mut self, hub: &HubMotion) -> HubReaction;
-    /// Coefficient N of q'' and with it N + 1 of q and q', after `hub_reaction`, when w' is
-    /// known up to N.
-    fn accelerate<const N: usize, const RAMP: bool>(&mut self, hub: &HubMotion);
+    fn hub_reaction(&mut self, n: usize, ramp: bool, hub: &HubMotion) -> HubReaction;
+    /// Coefficient n of q'' and with it n + 1 of q and q', after `hub_reaction`, when w' is
+    /// known up to n.
+    fn accelerate(&mut self, n: usize, varies: bool, hub: &HubMotion);
     /// Size of the motion, rad/s: what the tolerance is relative to.
     fn error_scale(&self) -> f64;
     /// Size of coefficient `n` of the rates, rad/s.
     fn coefficient_norm(&self, n: usize) -> f64;
-    /// Coefficient N of the power that the mode dissipates, W, after `hub_reaction`.
-    fn dissipation<const N: usize, const RAMP: bool>(&mut self) -> f64;
-    /// Coefficient N of mass times height above rest, kg m: the potential energy over g.
-    fn mass_height<const N: usize>(&mut self) -> f64;
+    /// Coefficient n of the power that the mode dissipates, W, after `hub_reaction`.
+    fn dissipation(&mut self, n: usize, ramp: bool) -> f64;
+    /// Coefficient n of mass times height above rest, kg m: the potential energy over g.
+    fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64;
     /// Coordinates at t, where the hub turns with `omega`, from the series cut after order n.
     fn at(&self, n: usize, t: f64, omega: f64) -> [f64; 4];
     /// Force of the bob on the tank, N, radial and tangential, at order 0.

@@ -1,19 +1,21 @@
 //! A mass on the paraboloid z = |q|^2/(2 l) with a quartic spring: rotary motion
 //! hardens less than a pendulum's. q = (x, y) is the bob minus the hinge, m, in the
-//! hub's frame. With N = l^2 + |q|^2, h = hardening/R^2 and the hub's Coriolis and
+//! hub's frame. With N = l^2/s + |q|^2, h = hardening/R^2 and the hub's Coriolis and
 //! centrifugal forces a = (2 w y' + w^2 (r + x), -2 w x' + w^2 y):
 //!
 //! ```text
-//! mu   = [ q.a + |q'|^2 + g l (1 + h |q|^2) ] / N
+//! mu   = [ q.a + |q'|^2 + g (l/s) (1 + h |q|^2) ] / N
 //! q''  = -(c/m) q' + a - mu q + w' [ (y, -(r + x)) + (r y/N) q ]
 //! J    = m r^2 y^2 / N                 (beyond the hub's I0)
 //! T    = m r mu y + c [ (r + x) y' - y x' ]
-//! E = m [(x' - w y)^2 + (y' + w (r + x))^2 + z'^2]/2 + m (g/l) [|q|^2/2 + h |q|^4/4]
-//! heat c (|q'|^2 + z'^2),  z' = q.q'/l
+//! E = m [(x' - w y)^2 + (y' + w (r + x))^2 + s z'^2]/2 + m (g/l) [|q|^2/2 + h |q|^4/4]
+//! heat c (|q'|^2 + s z'^2),  z' = q.q'/l
 //! ```
 //!
-//! Lagrange's equations for this E and the Rayleigh function c (|q'|^2 + z'^2)/2.
-//! For small q a pendulum is the case h = 1/(2 l^2).
+//! Lagrange's equations for this E and the Rayleigh function c (|q'|^2 + s z'^2)/2.
+//! On a bench that leans, gravity across the axis, e, is added to a, and -m e.(r + x, y) to E.
+//! s = 1 on the paraboloid; the model `liquid` (`liquid.rs`) has another s and h = kappa/(2 l^2).
+//! For small q a pendulum is the case s = 1, h = 1/(2 l^2).
 
 use super::{Angles, HubMotion, HubReaction, SloshMode};
 use crate::series::{Series, ZERO, constant, mul, mul_tail, next, square, values};
@@ -43,7 +45,6 @@ pub struct Paraboloid {
     rise: Series,
     drag_rise: Series,
     q2: Series,
-    omega_n: f64,
 }
 
 impl SloshMode for Paraboloid {
@@ -65,12 +66,16 @@ impl SloshMode for Paraboloid {
             rise: ZERO,
             drag_rise: ZERO,
             q2: ZERO,
-            omega_n: 0.0,
         }
     }
 
-    fn set_damping(&mut self, factor: f64) {
-        self.p.set_damping(factor);
+    fn pendulum(&mut self) -> &mut Pendulum {
+        &mut self.p
+    }
+
+    fn amplitude2(&self) -> [f64; 2] {
+        let l2 = self.p.l * self.p.l;
+        [&self.q, &self.q_d].map(|[x, y]| (x[0] * x[0] + y[0] * y[0]) / l2)
     }
 
     /// A displacement is in m.
@@ -104,63 +109,70 @@ impl SloshMode for Paraboloid {
         (self.q_d[0][1], self.q_d[1][1]) = (dq[2], dq[3]);
     }
 
-    fn derivatives<const N: usize>(&self, _: &HubMotion) -> [f64; 4] {
-        [self.q_d[0][N], self.q_d[1][N], self.q_dd[0][N], self.q_dd[1][N]]
+    fn derivatives(&self, n: usize, _: &HubMotion) -> [f64; 4] {
+        [self.q_d[0][n], self.q_d[1][n], self.q_dd[0][n], self.q_dd[1][n]]
     }
 
     #[inline(always)]
-    fn hub_reaction<const N: usize, const RAMP: bool>(&mut self, hub: &HubMotion) -> HubReaction {
-        let Pendulum { m, l, c, r, c_m, hardening, .. } = self.p;
-        let one = constant::<N>(1.0);
-        if N == 0 {
-            self.omega_n = libm::sqrt(f64::max(hub.g[0], 0.0) / l);
+    fn hub_reaction(&mut self, n: usize, ramp: bool, hub: &HubMotion) -> HubReaction {
+        let Pendulum { m, c, r, c_m, hardening, l_s, l2_s, .. } = self.p;
+        let one = constant(n, 1.0);
+        if ramp && self.p.baffle.zeta > 0.0 {
+            let inv_l2 = self.p.inv_l * self.p.inv_l;
+            let at = [&self.q, &self.q_d].map(|[x, y]| inv_l2 * (square(n, x) + square(n, y)));
+            self.p.course[n] = self.p.baffle.expand(n, at);
         }
         for i in 0..2 {
-            self.drag[i][N] = hub.drag::<N, RAMP>(&self.q_d[i]);
+            self.drag[i][n] = self.p.drag(n, ramp, &self.q_d[i]);
         }
         let [x, y] = &self.q;
         let [x_d, y_d] = &self.q_d;
         let [drag_x, drag_y] = &self.drag;
-        self.arm[N] = one * r + x[N];
-        let q2 = square::<N>(x) + square::<N>(y);
-        self.n[N] = one * l * l + q2;
-        self.spring[N] = l * (one + hardening * q2);
-        self.a[0][N] = 2.0 * mul::<N>(&hub.omega, y_d) + mul::<N>(&hub.omega2, &self.arm);
-        self.a[1][N] = -2.0 * mul::<N>(&hub.omega, x_d) + mul::<N>(&hub.omega2, y);
-        let numerator = mul::<N>(x, &self.a[0])
-            + mul::<N>(y, &self.a[1])
-            + square::<N>(x_d)
-            + square::<N>(y_d)
-            + hub.weight::<N, RAMP>(&self.spring);
-        self.mu[N] = (numerator - mul_tail::<N>(&self.n, &self.mu)) / self.n[0];
-        self.lever[N] = (r * y[N] - mul_tail::<N>(&self.n, &self.lever)) / self.n[0];
-        let mu_q = [mul::<N>(&self.mu, x), mul::<N>(&self.mu, y)];
+        self.arm[n] = one * r + x[n];
+        let q2 = square(n, x) + square(n, y);
+        self.n[n] = one * l2_s + q2;
+        self.spring[n] = l_s * (one + hardening * q2);
+        self.a[0][n] = 2.0 * mul(n, &hub.omega, y_d) + mul(n, &hub.omega2, &self.arm);
+        self.a[1][n] = -2.0 * mul(n, &hub.omega, x_d) + mul(n, &hub.omega2, y);
+        if ramp {
+            for i in 0..2 {
+                self.a[i][n] += hub.tilt.e[i][n];
+            }
+        }
+        let numerator = mul(n, x, &self.a[0])
+            + mul(n, y, &self.a[1])
+            + square(n, x_d)
+            + square(n, y_d)
+            + self.p.weight(n, ramp, &self.spring);
+        self.mu[n] = (numerator - mul_tail(n, &self.n, &self.mu)) / self.n[0];
+        self.lever[n] = (r * y[n] - mul_tail(n, &self.n, &self.lever)) / self.n[0];
+        let mu_q = [mul(n, &self.mu, x), mul(n, &self.mu, y)];
         for i in 0..2 {
-            self.b[i][N] = -c_m * self.drag[i][N] + self.a[i][N] - mu_q[i];
+            self.b[i][n] = -c_m * self.drag[i][n] + self.a[i][n] - mu_q[i];
         }
         HubReaction {
-            j: m * r * mul::<N>(&self.lever, y),
-            t: m * r * mu_q[1] + c * (mul::<N>(&self.arm, drag_y) - mul::<N>(y, drag_x)),
+            j: m * r * mul(n, &self.lever, y),
+            t: m * r * mu_q[1] + c * (mul(n, &self.arm, drag_y) - mul(n, y, drag_x)),
         }
     }
 
     #[inline(always)]
-    fn accelerate<const N: usize, const RAMP: bool>(&mut self, hub: &HubMotion) {
+    fn accelerate(&mut self, n: usize, _: bool, hub: &HubMotion) {
         let [x, y] = &self.q;
         let wd = &hub.omega_dot;
-        self.push[N] = mul::<N>(&self.lever, wd);
-        self.q_dd[0][N] = self.b[0][N] + mul::<N>(wd, y) + mul::<N>(&self.push, x);
-        self.q_dd[1][N] = self.b[1][N] - mul::<N>(wd, &self.arm) + mul::<N>(&self.push, y);
+        self.push[n] = mul(n, &self.lever, wd);
+        self.q_dd[0][n] = self.b[0][n] + mul(n, wd, y) + mul(n, &self.push, x);
+        self.q_dd[1][n] = self.b[1][n] - mul(n, wd, &self.arm) + mul(n, &self.push, y);
         for i in 0..2 {
-            self.q[i][N + 1] = next::<N>(self.q_d[i][N]);
-            self.q_d[i][N + 1] = next::<N>(self.q_dd[i][N]);
+            self.q[i][n + 1] = next(n, self.q_d[i][n]);
+            self.q_d[i][n + 1] = next(n, self.q_dd[i][n]);
         }
     }
 
     #[inline(always)]
     fn error_scale(&self) -> f64 {
         let largest = |pair: &[Series; 2]| f64::max(pair[0][0].abs(), pair[1][0].abs());
-        (largest(&self.q_d) + self.omega_n * largest(&self.q)) / self.p.l
+        (largest(&self.q_d) + self.p.omega_n * largest(&self.q)) / self.p.l
     }
 
     #[inline(always)]
@@ -169,29 +181,31 @@ impl SloshMode for Paraboloid {
     }
 
     #[inline(always)]
-    fn dissipation<const N: usize, const RAMP: bool>(&mut self) -> f64 {
-        let Pendulum { l, c, .. } = self.p;
+    fn dissipation(&mut self, n: usize, ramp: bool) -> f64 {
+        let Pendulum { l, c, s, .. } = self.p;
         let ([x, y], [x_d, y_d]) = (&self.q, &self.q_d);
-        self.rise[N] = mul::<N>(x, x_d) + mul::<N>(y, y_d);
-        if RAMP {
+        self.rise[n] = mul(n, x, x_d) + mul(n, y, y_d);
+        if ramp {
             // q.(d q') = d (q.q')
-            self.drag_rise[N] = mul::<N>(x, &self.drag[0]) + mul::<N>(y, &self.drag[1]);
+            self.drag_rise[n] = mul(n, x, &self.drag[0]) + mul(n, y, &self.drag[1]);
         }
-        let power = if RAMP {
-            let horizontal = mul::<N>(&self.drag[0], x_d) + mul::<N>(&self.drag[1], y_d);
-            (horizontal, mul::<N>(&self.drag_rise, &self.rise))
+        let power = if ramp {
+            let horizontal = mul(n, &self.drag[0], x_d) + mul(n, &self.drag[1], y_d);
+            (horizontal, mul(n, &self.drag_rise, &self.rise))
         } else {
-            (square::<N>(x_d) + square::<N>(y_d), square::<N>(&self.rise))
+            (square(n, x_d) + square(n, y_d), square(n, &self.rise))
         };
-        c * (power.0 + power.1 / (l * l))
+        c * (power.0 + s * power.1 / (l * l))
     }
 
     /// m (|q|^2/2 + h |q|^4/4)/l
     #[inline(always)]
-    fn mass_height<const N: usize>(&mut self) -> f64 {
-        let Pendulum { m, l, hardening, .. } = self.p;
-        self.q2[N] = square::<N>(&self.q[0]) + square::<N>(&self.q[1]);
-        m / l * (self.q2[N] / 2.0 + hardening * square::<N>(&self.q2) / 4.0)
+    fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64 {
+        let Pendulum { m, l, r, hardening, .. } = self.p;
+        self.q2[n] = square(n, &self.q[0]) + square(n, &self.q[1]);
+        let place = |j: usize| [constant(j, r) + self.q[0][j], self.q[1][j]];
+        m / l * (self.q2[n] / 2.0 + hardening * square(n, &self.q2) / 4.0)
+            + m * hub.tilt.height(n, place)
     }
 
     #[inline(always)]
@@ -213,14 +227,15 @@ impl SloshMode for Paraboloid {
     }
 
     fn energy(&self, hub: &HubMotion) -> f64 {
-        let Pendulum { m, l, hardening, .. } = self.p;
+        let Pendulum { m, l, hardening, s, .. } = self.p;
         let (x, y, x_d, y_d) = (self.q[0][0], self.q[1][0], self.q_d[0][0], self.q_d[1][0]);
-        let w = hub.omega[0];
+        let (w, [e_x, e_y]) = (hub.omega[0], hub.tilt.now());
         let (v_x, v_y) = (x_d - w * y, y_d + w * self.arm[0]);
         let v_z = (x * x_d + y * y_d) / l;
         let q2 = x * x + y * y;
-        m * (v_x * v_x + v_y * v_y + v_z * v_z) / 2.0
-            + m * hub.g[0] / l * (q2 / 2.0 + hardening * q2 * q2 / 4.0)
+        m * (v_x * v_x + v_y * v_y + s * v_z * v_z) / 2.0
+            + m * self.p.g[0] / l * (q2 / 2.0 + hardening * q2 * q2 / 4.0)
+            - m * (e_x * self.arm[0] + e_y * y)
     }
 
     fn momentum(&self, hub: &HubMotion) -> f64 {
@@ -230,7 +245,14 @@ impl SloshMode for Paraboloid {
     }
 
     fn out_of_range(&self, q: &[f64; 4]) -> Option<&'static str> {
-        let out = q[0] * q[0] + q[1] * q[1] >= self.p.l * self.p.l;
-        out.then_some("its mass has moved by its length l, where the surface stands at 45 degrees")
+        let q2 = q[0] * q[0] + q[1] * q[1];
+        let Pendulum { l, hardening, l2_s, .. } = self.p;
+        if q2 >= l * l {
+            Some("its mass has moved by its length l, where the surface stands at 45 degrees")
+        } else if (l2_s < 0.0 && l2_s + q2 > 0.1 * l2_s) || hardening * q2 < -0.9 {
+            Some("its wave is too high for an inertia or a spring that falls with the amplitude")
+        } else {
+            None
+        }
     }
 }

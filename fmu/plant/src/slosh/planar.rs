@@ -11,10 +11,12 @@
 //! H = m [(r^2 + l^2 s^2) w + r l c_ al']
 //! ```
 //!
-//! Lagrange's equations for this bob on the hub; to first order the linear model.
+//! Lagrange's equations for this bob on the hub; to first order the linear model. On a bench
+//! that leans, gravity across the axis, e, adds -e_y c_ to p, m (r e_y - l s e_x) to T and
+//! -m (e_x r + e_y l s) to E.
 
 use super::{Angles, HubMotion, HubReaction, SloshMode};
-use crate::series::{Series, ZERO, mul, next, sin_cos, square, values};
+use crate::series::{Series, ZERO, constant, mul, next, sin_cos, square, values};
 use crate::tank::Pendulum;
 
 #[derive(Clone, Debug)]
@@ -34,7 +36,6 @@ pub struct Planar {
     w_al_d: Series,
     al_d2: Series,
     force: Series,
-    omega_n: f64,
 }
 
 impl SloshMode for Planar {
@@ -52,12 +53,15 @@ impl SloshMode for Planar {
             w_al_d: ZERO,
             al_d2: ZERO,
             force: ZERO,
-            omega_n: 0.0,
         }
     }
 
-    fn set_damping(&mut self, factor: f64) {
-        self.p.set_damping(factor);
+    fn pendulum(&mut self) -> &mut Pendulum {
+        &mut self.p
+    }
+
+    fn amplitude2(&self) -> [f64; 2] {
+        [self.al[0] * self.al[0], self.al_d[0] * self.al_d[0]]
     }
 
     fn coordinates(&self, at: &Angles) -> [f64; 4] {
@@ -76,42 +80,49 @@ impl SloshMode for Planar {
         (self.al[1], self.al_d[1]) = (dq[1], dq[3]);
     }
 
-    fn derivatives<const N: usize>(&self, _: &HubMotion) -> [f64; 4] {
-        [0.0, self.al_d[N], 0.0, self.al_dd[N]]
+    fn derivatives(&self, n: usize, _: &HubMotion) -> [f64; 4] {
+        [0.0, self.al_d[n], 0.0, self.al_dd[n]]
     }
 
     #[inline(always)]
-    fn hub_reaction<const N: usize, const RAMP: bool>(&mut self, hub: &HubMotion) -> HubReaction {
+    fn hub_reaction(&mut self, n: usize, ramp: bool, hub: &HubMotion) -> HubReaction {
         let Pendulum { m, l, c_m, r, .. } = self.p;
-        if N == 0 {
-            self.omega_n = libm::sqrt(f64::max(hub.g[0], 0.0) / l);
+        (self.s[n], self.c[n]) = sin_cos(n, self.al[n], &mut self.slope, &self.s, &self.c);
+        self.sc[n] = mul(n, &self.s, &self.c);
+        self.w_al_d[n] = mul(n, &hub.omega, &self.al_d);
+        self.al_d2[n] = square(n, &self.al_d);
+        if ramp && self.p.baffle.zeta > 0.0 {
+            let at = [square(n, &self.al), self.al_d2[n]];
+            self.p.course[n] = self.p.baffle.expand(n, at);
         }
-        (self.s[N], self.c[N]) = sin_cos::<N>(self.al[N], &mut self.slope, &self.s, &self.c);
-        self.sc[N] = mul::<N>(&self.s, &self.c);
-        self.w_al_d[N] = mul::<N>(&hub.omega, &self.al_d);
-        self.al_d2[N] = square::<N>(&self.al_d);
-        self.drag[N] = hub.drag::<N, RAMP>(&self.al_d);
-        self.force[N] = hub.weight::<N, RAMP>(&self.s) + c_m * l * self.drag[N]
-            - l * mul::<N>(&hub.omega2, &self.sc);
+        self.drag[n] = self.p.drag(n, ramp, &self.al_d);
+        self.force[n] = self.p.weight(n, ramp, &self.s) + c_m * l * self.drag[n]
+            - l * mul(n, &hub.omega2, &self.sc);
+        let mut t = 0.0;
+        if ramp {
+            self.force[n] -= mul(n, &hub.tilt.e[1], &self.c);
+            t = m * (r * hub.tilt.e[1][n] - l * mul(n, &hub.tilt.e[0], &self.s));
+        }
         HubReaction {
-            j: m * (r * r + l * l) * square::<N>(&self.s),
-            t: m * (-2.0 * l * l * mul::<N>(&self.sc, &self.w_al_d)
-                + r * l * mul::<N>(&self.s, &self.al_d2)
-                + r * mul::<N>(&self.c, &self.force)),
+            j: m * (r * r + l * l) * square(n, &self.s),
+            t: t + m
+                * (-2.0 * l * l * mul(n, &self.sc, &self.w_al_d)
+                    + r * l * mul(n, &self.s, &self.al_d2)
+                    + r * mul(n, &self.c, &self.force)),
         }
     }
 
     #[inline(always)]
-    fn accelerate<const N: usize, const RAMP: bool>(&mut self, hub: &HubMotion) {
+    fn accelerate(&mut self, n: usize, _: bool, hub: &HubMotion) {
         let Pendulum { r_l, inv_l, .. } = self.p;
-        self.al_dd[N] = -r_l * mul::<N>(&self.c, &hub.omega_dot) - inv_l * self.force[N];
-        self.al[N + 1] = next::<N>(self.al_d[N]);
-        self.al_d[N + 1] = next::<N>(self.al_dd[N]);
+        self.al_dd[n] = -r_l * mul(n, &self.c, &hub.omega_dot) - inv_l * self.force[n];
+        self.al[n + 1] = next(n, self.al_d[n]);
+        self.al_d[n + 1] = next(n, self.al_dd[n]);
     }
 
     #[inline(always)]
     fn error_scale(&self) -> f64 {
-        self.al_d[0].abs() + self.omega_n * f64::min(self.al[0].abs(), 1.0)
+        self.al_d[0].abs() + self.p.omega_n * f64::min(self.al[0].abs(), 1.0)
     }
 
     #[inline(always)]
@@ -120,19 +131,20 @@ impl SloshMode for Planar {
     }
 
     #[inline(always)]
-    fn dissipation<const N: usize, const RAMP: bool>(&mut self) -> f64 {
+    fn dissipation(&mut self, n: usize, ramp: bool) -> f64 {
         self.p.c
             * self.p.l
             * self.p.l
-            * if RAMP { mul::<N>(&self.drag, &self.al_d) } else { square::<N>(&self.al_d) }
+            * if ramp { mul(n, &self.drag, &self.al_d) } else { square(n, &self.al_d) }
     }
 
     /// 2 m l sin^2(al/2), whose rate is m l s al'
     #[inline(always)]
-    fn mass_height<const N: usize>(&mut self) -> f64 {
-        let Pendulum { m, l, .. } = self.p;
+    fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64 {
+        let Pendulum { m, l, r, .. } = self.p;
         let half = libm::sin(self.al[0] / 2.0);
-        m * l * if N == 0 { 2.0 * half * half } else { -self.c[N] }
+        let place = |j: usize| [constant(j, r), l * self.s[j]];
+        m * l * if n == 0 { 2.0 * half * half } else { -self.c[n] } + m * hub.tilt.height(n, place)
     }
 
     #[inline(always)]
@@ -148,7 +160,8 @@ impl SloshMode for Planar {
         let (s, c, ad) = (self.s[0], self.c[0], self.al_d[0]);
         let (w, wd) = (hub.omega[0], hub.omega_dot[0]);
         let (y, y_d, y_dd) = (l * s, l * c * ad, l * (c * self.al_dd[0] - s * ad * ad));
-        [m * (wd * y + 2.0 * w * y_d + w * w * r), -m * (y_dd + wd * r - w * w * y)]
+        let [e_x, e_y] = hub.tilt.now();
+        [m * (wd * y + 2.0 * w * y_d + w * w * r + e_x), -m * (y_dd + wd * r - w * w * y - e_y)]
     }
 
     fn torque(&self, hub: &HubMotion) -> f64 {
@@ -161,7 +174,10 @@ impl SloshMode for Planar {
         let (s, c, ad, w) = (self.s[0], self.c[0], self.al_d[0], hub.omega[0]);
         let (along, up, across) = (r * w + l * c * ad, l * s * ad, l * s * w);
         let half = libm::sin(self.al[0] / 2.0);
-        m * (along * along + up * up + across * across) / 2.0 + 2.0 * m * hub.g[0] * l * half * half
+        let [e_x, e_y] = hub.tilt.now();
+        m * (along * along + up * up + across * across) / 2.0
+            + 2.0 * m * self.p.g[0] * l * half * half
+            - m * (e_x * r + e_y * l * s)
     }
 
     fn momentum(&self, hub: &HubMotion) -> f64 {

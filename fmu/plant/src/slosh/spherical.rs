@@ -71,44 +71,43 @@ pub struct Spherical {
     pull: Series,
     /// Newest coefficient of L p without that of L
     pulled: [f64; 2],
-    omega_n: f64,
 }
 
 impl Spherical {
-    /// Coefficient N of direction and velocity from those of the coordinates:
+    /// Coefficient n of direction and velocity from those of the coordinates:
     /// p' = k xi' - v_z xi, v_z = k^2 xi.xi'.
     #[inline(always)]
-    fn place<const N: usize>(&mut self, hub: &HubMotion) {
-        let one = constant::<N>(1.0);
-        let [x2, y2] = squares::<N>(&self.xi);
-        self.sum[N] = one + x2 + y2;
-        self.k[N] = (2.0 * one - mul_tail::<N>(&self.sum, &self.k)) / self.sum[0];
-        self.dir[N] = scale::<N>(&self.k, &self.xi);
-        self.dir_z[N] = one - self.k[N];
-        self.rho[N] = dot::<N>(&self.xi, &self.xi_d);
-        self.k_rho[N] = mul::<N>(&self.k, &self.rho);
-        self.v_z[N] = mul::<N>(&self.k, &self.k_rho);
-        let (along, back) = (scale::<N>(&self.k, &self.xi_d), scale::<N>(&self.v_z, &self.xi));
-        let turned = scale::<N>(&hub.omega, &self.dir);
-        self.v[N] = [along[0] - back[0] - turned[1], along[1] - back[1] + turned[0]];
+    fn place(&mut self, n: usize, hub: &HubMotion) {
+        let one = constant(n, 1.0);
+        let [x2, y2] = squares(n, &self.xi);
+        self.sum[n] = one + x2 + y2;
+        self.k[n] = (2.0 * one - mul_tail(n, &self.sum, &self.k)) / self.sum[0];
+        self.dir[n] = scale(n, &self.k, &self.xi);
+        self.dir_z[n] = one - self.k[n];
+        self.rho[n] = dot(n, &self.xi, &self.xi_d);
+        self.k_rho[n] = mul(n, &self.k, &self.rho);
+        self.v_z[n] = mul(n, &self.k, &self.k_rho);
+        let (along, back) = (scale(n, &self.k, &self.xi_d), scale(n, &self.v_z, &self.xi));
+        let turned = scale(n, &hub.omega, &self.dir);
+        self.v[n] = [along[0] - back[0] - turned[1], along[1] - back[1] + turned[0]];
     }
 
-    /// Coefficient N of k xi'' = p'' + 2 v_z xi' + v_z' xi, p'' = v' - w' R p - w R p'.
-    fn k_xi_dd<const N: usize>(&self, hub: &HubMotion) -> [f64; 2] {
-        let [x, y] = scale::<N>(&hub.omega_dot, &self.dir);
-        let [x_d, y_d] = scale::<N>(&hub.omega, &self.dir_d);
-        let dir_dd = [self.v_d[N][0] + y + y_d, self.v_d[N][1] - x - x_d];
-        let twice = scale::<N>(&self.v_z, &self.xi_d);
-        let once = scale::<N>(&self.v_z_d, &self.xi);
+    /// Coefficient n of k xi'' = p'' + 2 v_z xi' + v_z' xi, p'' = v' - w' R p - w R p'.
+    fn k_xi_dd(&self, n: usize, hub: &HubMotion) -> [f64; 2] {
+        let [x, y] = scale(n, &hub.omega_dot, &self.dir);
+        let [x_d, y_d] = scale(n, &hub.omega, &self.dir_d);
+        let dir_dd = [self.v_d[n][0] + y + y_d, self.v_d[n][1] - x - x_d];
+        let twice = scale(n, &self.v_z, &self.xi_d);
+        let once = scale(n, &self.v_z_d, &self.xi);
         [0, 1].map(|i| dir_dd[i] + 2.0 * twice[i] + once[i])
     }
 
-    /// Coefficient N of |p'|^2 times the course of the damping.
-    fn drag_power<const N: usize>(&self) -> f64 {
+    /// Coefficient n of |p'|^2 times the course of the damping.
+    fn drag_power(&self, n: usize) -> f64 {
         let horizontal = |i: usize| {
-            (0..=N).map(|j| self.dir_d[j][i] * self.drag_swapped[N - j][1 - i]).sum::<f64>()
+            (0..=n).map(|j| self.dir_d[j][i] * self.drag_swapped[n - j][1 - i]).sum::<f64>()
         };
-        horizontal(0) + horizontal(1) + mul::<N>(&self.v_z, &self.drag_z)
+        horizontal(0) + horizontal(1) + mul(n, &self.v_z, &self.drag_z)
     }
 
     /// Bob in the hub's frame, horizontally, m: X, Y.
@@ -125,6 +124,7 @@ impl Spherical {
 }
 
 impl SloshMode for Spherical {
+    const UNROLLED: bool = true;
     // J is that at the start of the expansion; how it moves is in T.
     const MOVES_INERTIA: bool = false;
 
@@ -150,12 +150,17 @@ impl SloshMode for Spherical {
             pull_0: ZERO,
             pull: ZERO,
             pulled: [0.0; 2],
-            omega_n: 0.0,
         }
     }
 
-    fn set_damping(&mut self, factor: f64) {
-        self.p.set_damping(factor);
+    fn pendulum(&mut self) -> &mut Pendulum {
+        &mut self.p
+    }
+
+    fn amplitude2(&self) -> [f64; 2] {
+        let [x, y] = self.dir[0];
+        let [x_d, y_d] = self.xi_d[0].map(|rate| self.k[0] * rate);
+        [x * x + y * y, x_d * x_d + y_d * y_d]
     }
 
     fn start_problem(init: &Init) -> Option<String> {
@@ -191,78 +196,90 @@ impl SloshMode for Spherical {
 
     fn start(&mut self, q: &[f64; 4], hub: &HubMotion) {
         (self.xi[0], self.xi_d[0]) = ([q[0], q[1]], [q[2], q[3]]);
-        self.place::<0>(hub);
+        self.place(0, hub);
     }
 
     fn seed_direction(&mut self, dq: &[f64; 4], hub: &HubMotion) {
         (self.xi[1], self.xi_d[1]) = ([dq[0], dq[1]], [dq[2], dq[3]]);
-        self.place::<1>(hub);
+        self.place(1, hub);
     }
 
-    fn derivatives<const N: usize>(&self, hub: &HubMotion) -> [f64; 4] {
-        let at_once = self.k_xi_dd::<0>(hub).map(|a| a / self.k[0]);
-        let [x_dd, y_dd] = if N == 0 {
+    fn derivatives(&self, n: usize, hub: &HubMotion) -> [f64; 4] {
+        let at_once = self.k_xi_dd(0, hub).map(|a| a / self.k[0]);
+        let [x_dd, y_dd] = if n == 0 {
             at_once
         } else {
-            let k_xi_dd = self.k_xi_dd::<N>(hub);
-            [0, 1].map(|i| (k_xi_dd[i] - self.k[N] * at_once[i]) / self.k[0])
+            let k_xi_dd = self.k_xi_dd(n, hub);
+            [0, 1].map(|i| (k_xi_dd[i] - self.k[n] * at_once[i]) / self.k[0])
         };
-        let [x_d, y_d] = self.xi_d[N];
+        let [x_d, y_d] = self.xi_d[n];
         [x_d, y_d, x_dd, y_dd]
     }
 
     #[inline(always)]
-    fn hub_reaction<const N: usize, const RAMP: bool>(&mut self, hub: &HubMotion) -> HubReaction {
+    fn hub_reaction(&mut self, n: usize, ramp: bool, hub: &HubMotion) -> HubReaction {
         let Pendulum { m, l, c, r, r_l, inv_l, .. } = self.p;
-        if N == 0 {
-            self.omega_n = libm::sqrt(f64::max(hub.g[0], 0.0) / l);
+        let [w_x, w_y] = scale(n, &hub.omega, &self.dir);
+        let (x_d, y_d) = (self.v[n][0] + w_y, self.v[n][1] - w_x);
+        self.dir_d[n] = [x_d, y_d];
+        self.v_z2[n] = square(n, &self.v_z);
+        if ramp && self.p.baffle.zeta > 0.0 {
+            let ([x2, y2], [x2_d, y2_d]) = (squares(n, &self.dir), squares(n, &self.dir_d));
+            let at = [x2 + y2, x2_d + y2_d + self.v_z2[n]];
+            self.p.course[n] = self.p.baffle.expand(n, at);
         }
-        let [w_x, w_y] = scale::<N>(&hub.omega, &self.dir);
-        let (x_d, y_d) = (self.v[N][0] + w_y, self.v[N][1] - w_x);
-        self.dir_d[N] = [x_d, y_d];
         let [drag_x, drag_y] =
-            if RAMP { scale::<N>(&hub.damping, &self.dir_d) } else { [x_d, y_d] };
-        self.drag_swapped[N] = [drag_y, drag_x];
-        self.drag_z[N] = hub.drag::<N, RAMP>(&self.v_z);
-        let [v2_x, v2_y] = squares::<N>(&self.v);
-        self.v_z2[N] = square::<N>(&self.v_z);
-        self.pull_0[N] = v2_x + v2_y + self.v_z2[N] - inv_l * hub.weight::<N, RAMP>(&self.dir_z)
-            + r_l * mul_part::<N>(&hub.omega2, &self.dir, 0);
-        let [plus, minus] = each::<N>(&self.dir, &self.drag_swapped);
+            if ramp { scale(n, &self.p.course, &self.dir_d) } else { [x_d, y_d] };
+        self.drag_swapped[n] = [drag_y, drag_x];
+        self.drag_z[n] = self.p.drag(n, ramp, &self.v_z);
+        let [v2_x, v2_y] = squares(n, &self.v);
+        self.pull_0[n] = v2_x + v2_y + self.v_z2[n] - inv_l * self.p.weight(n, ramp, &self.dir_z)
+            + r_l * mul_part(n, &hub.omega2, &self.dir, 0);
+        if ramp {
+            let [e_x, e_y] = &hub.tilt.e;
+            self.pull_0[n] +=
+                inv_l * (mul_part(n, e_x, &self.dir, 0) + mul_part(n, e_y, &self.dir, 1));
+        }
+        let [plus, minus] = each(n, &self.dir, &self.drag_swapped);
         // L and L p without their share of the newest w', which J stands for.
         let y_0 = self.dir[0][1];
-        self.pull[N] = self.pull_0[N] - r_l * mul_part_head::<N>(&hub.omega_dot, &self.dir, 1);
-        self.pulled = scale_head::<N>(&self.pull, &self.dir);
+        self.pull[n] = self.pull_0[n] - r_l * mul_part_head(n, &hub.omega_dot, &self.dir, 1);
+        self.pulled = scale_head(n, &self.pull, &self.dir);
         HubReaction {
-            j: if N == 0 { m * r * r * y_0 * y_0 } else { 0.0 },
-            t: m * r * l * (self.pulled[1] + self.pull[N] * y_0)
+            j: if n == 0 { m * r * r * y_0 * y_0 } else { 0.0 },
+            t: m * r * l * (self.pulled[1] + self.pull[n] * y_0)
                 + c * l * (r * drag_y + l * (plus - minus)),
         }
     }
 
     #[inline(always)]
-    fn accelerate<const N: usize, const RAMP: bool>(&mut self, hub: &HubMotion) {
+    fn accelerate(&mut self, n: usize, ramp: bool, hub: &HubMotion) {
         let Pendulum { c_m, r_l, inv_l, .. } = self.p;
         let [x_0, y_0] = self.dir[0];
-        self.pull[N] -= r_l * hub.omega_dot[N] * y_0;
-        let [w_x, w_y] = scale::<N>(&hub.omega, &self.v);
-        let pulled = [self.pulled[0] + self.pull[N] * x_0, self.pulled[1] + self.pull[N] * y_0];
-        let [drag_y, drag_x] = self.drag_swapped[N];
-        let fall = inv_l * if N == 0 || (RAMP && N == 1) { hub.g[N] } else { 0.0 };
-        self.v_d[N] = [
-            w_y - pulled[0] - c_m * drag_x + r_l * hub.omega2[N],
-            -w_x - pulled[1] - c_m * drag_y - r_l * hub.omega_dot[N],
+        self.pull[n] -= r_l * hub.omega_dot[n] * y_0;
+        let [w_x, w_y] = scale(n, &hub.omega, &self.v);
+        let pulled = [self.pulled[0] + self.pull[n] * x_0, self.pulled[1] + self.pull[n] * y_0];
+        let [drag_y, drag_x] = self.drag_swapped[n];
+        let fall = inv_l * if n < 2 { self.p.g[n] } else { 0.0 };
+        self.v_d[n] = [
+            w_y - pulled[0] - c_m * drag_x + r_l * hub.omega2[n],
+            -w_x - pulled[1] - c_m * drag_y - r_l * hub.omega_dot[n],
         ];
-        self.v_z_d[N] = -mul::<N>(&self.pull, &self.dir_z) - fall - c_m * self.drag_z[N];
-        self.dir[N + 1] = self.dir_d[N].map(next::<N>);
-        self.dir_z[N + 1] = next::<N>(self.v_z[N]);
-        self.v[N + 1] = self.v_d[N].map(next::<N>);
-        self.v_z[N + 1] = next::<N>(self.v_z_d[N]);
+        if ramp {
+            for i in 0..2 {
+                self.v_d[n][i] += inv_l * hub.tilt.e[i][n];
+            }
+        }
+        self.v_z_d[n] = -mul(n, &self.pull, &self.dir_z) - fall - c_m * self.drag_z[n];
+        self.dir[n + 1] = self.dir_d[n].map(|rate| next(n, rate));
+        self.dir_z[n + 1] = next(n, self.v_z[n]);
+        self.v[n + 1] = self.v_d[n].map(|rate| next(n, rate));
+        self.v_z[n + 1] = next(n, self.v_z_d[n]);
     }
 
     #[inline(always)]
     fn error_scale(&self) -> f64 {
-        largest(self.dir_d[0]) + self.omega_n * largest(self.dir[0])
+        largest(self.dir_d[0]) + self.p.omega_n * largest(self.dir[0])
     }
 
     #[inline(always)]
@@ -272,22 +289,24 @@ impl SloshMode for Spherical {
 
     /// c l^2 |p'|^2
     #[inline(always)]
-    fn dissipation<const N: usize, const RAMP: bool>(&mut self) -> f64 {
-        let speed2 = if RAMP {
-            self.drag_power::<N>()
+    fn dissipation(&mut self, n: usize, ramp: bool) -> f64 {
+        let speed2 = if ramp {
+            self.drag_power(n)
         } else {
-            let [x, y] = squares::<N>(&self.dir_d);
-            x + y + self.v_z2[N]
+            let [x, y] = squares(n, &self.dir_d);
+            x + y + self.v_z2[n]
         };
         self.p.c * self.p.l * self.p.l * speed2
     }
 
     /// m l (1 + p_z), and 1 + p_z = |xi|^2 k without cancellation near rest
     #[inline(always)]
-    fn mass_height<const N: usize>(&mut self) -> f64 {
+    fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64 {
         let [xi_1, xi_2] = self.xi[0];
-        let Pendulum { m, l, .. } = self.p;
-        m * l * if N == 0 { self.k[0] * (xi_1 * xi_1 + xi_2 * xi_2) } else { self.dir_z[N] }
+        let Pendulum { m, l, r, .. } = self.p;
+        let place = |j: usize| [constant(j, r) + l * self.dir[j][0], l * self.dir[j][1]];
+        let height = if n == 0 { self.k[0] * (xi_1 * xi_1 + xi_2 * xi_2) } else { self.dir_z[n] };
+        m * l * height + m * hub.tilt.height(n, place)
     }
 
     /// xi = p/k and k xi' = p' + v_z xi; k = 1 - p_z, above the horizontal by |p| = 1.
@@ -320,7 +339,9 @@ impl SloshMode for Spherical {
         // 1 + p_z = |xi|^2 k, without cancellation near rest
         let [xi_1, xi_2] = self.xi[0];
         let height = l * self.k[0] * (xi_1 * xi_1 + xi_2 * xi_2);
-        m * (v_x * v_x + v_y * v_y + v_z * v_z) / 2.0 + m * hub.g[0] * height
+        let ([x, y], [e_x, e_y]) = (self.bob(), hub.tilt.now());
+        m * (v_x * v_x + v_y * v_y + v_z * v_z) / 2.0 + m * self.p.g[0] * height
+            - m * (e_x * x + e_y * y)
     }
 
     fn momentum(&self, hub: &HubMotion) -> f64 {
@@ -376,17 +397,18 @@ mod tests {
         for _ in 0..1000 {
             let (m, l, c, r) = (0.7, between(0.02, 0.2), between(0.0, 0.5), between(0.0, 0.4));
             let (c_m, r_l, inv_l) = (c / m, r / l, 1.0 / l);
-            let p = Pendulum { m, l, c, c_0: c, r, c_m, r_l, inv_l, wave: 0.0, hardening: 0.0 };
+            let p = Pendulum { m, l, c, c_0: c, r, c_m, r_l, inv_l, ..Pendulum::default() };
             let q = core::array::from_fn(|i| between(-4.0, 4.0) * if i < 2 { 1.0 } else { 5.0 });
             let (w, w_d, g) = (between(-2.0, 2.0), between(-9.0, 9.0), between(0.0, 20.0));
-            let mut hub = HubMotion { g: [g, 0.0], ..HubMotion::REST };
+            let mut hub = HubMotion::REST;
             (hub.omega[0], hub.omega2[0], hub.omega_dot[0]) = (w, w * w, w_d);
             let mut mode = Spherical::new(&p);
+            mode.pendulum().set_restoring([g, 0.0]);
             mode.start(&q, &hub);
-            mode.hub_reaction::<0, false>(&hub);
-            mode.accelerate::<0, false>(&hub);
+            mode.hub_reaction(0, false, &hub);
+            mode.accelerate(0, false, &hub);
             let expected = lagrange(&p, q, w, w_d, g);
-            let [.., x_dd, y_dd] = mode.derivatives::<0>(&hub);
+            let [.., x_dd, y_dd] = mode.derivatives(0, &hub);
             // The terms are up to k |v|^2 |xi|, 1e4, and half of them are taken as 1/k, 20, of
             // smaller ones.
             let size = 1.0 + expected[0].abs().max(expected[1].abs()) + 1e3;

@@ -1,0 +1,208 @@
+//! A flat ring at the wall below the surface: damping that grows with the wave.
+//!
+//! Miles (1958), first mode of an upright cylinder, for a ring of the width w at the depth d below
+//! the surface, covering alpha = (w/R)(2 - w/R) of the section, and a wave of the amplitude eta at
+//! the wall:
+//!
+//! ```text
+//! zeta = 2.83 exp(-4.60 d/R) alpha^(3/2) (eta/R)^(1/2)
+//! ```
+//!
+//! The ring separates the flow: the drag is 2 zeta omega m times the bob's velocity, with the
+//! amplitude that q and q' of the moment make, eta = (wave per angle) A, A^2 = |q|^2 + |q'|^2/omega^2.
+//! So it never drives, and in a free oscillation a' = -zeta(a) omega a. With W = omega^2 the drag is
+//!
+//! ```text
+//! c_b = 2 m Z u^(1/4),   u = W [W (|q|^2 + A_0^2) + |q'|^2],   zeta = Z A^(1/2)
+//! ```
+//!
+//! A_0, far below the law's range, keeps u away from 0.
+//!
+//! The law is that of Keulegan and Carpenter's plates: it holds where the liquid's stroke at the ring
+//! is 0.64 to 6.4 widths, the ring stays covered (d >= eta) and alpha < 0.25. Smaller waves keep more
+//! damping than it says.
+
+use crate::series::{Series, ZERO, mul_ramp};
+use crate::tank::Pendulum;
+use crate::{Parameters, Ring, SloshSource};
+
+/// What the ring's range begins with, over its width: the wave times exp(-1.84 d/R).
+const STROKE: core::ops::RangeInclusive<f64> = 0.64..=6.4;
+
+/// A_0 over the amplitude at which the range begins: makes 2e-4 of the damping there.
+const FLOOR: f64 = 0.03;
+
+/// W is kept from 0 by this part of 1/l times 1 m/s2: drag without restoring force is none.
+const WEIGHTLESS: f64 = 1e-6;
+
+/// A ring baffle and one mode's drag by it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Baffle {
+    /// Z, the damping ratio at a slosh angle of 1 rad; 0: there is none.
+    pub zeta: f64,
+    /// A_0^2
+    floor2: f64,
+    /// What is added to W, 1/s2.
+    w_floor: f64,
+    /// W and its rate.
+    w: [f64; 2],
+    /// |q|^2 + A_0^2, |q'|^2, the bracket, u, u^(1/4)
+    q2: Series,
+    v2: Series,
+    sum: Series,
+    u: Series,
+    root: Series,
+    /// Viscous drag over its value at the start of the expansion, and its share of the whole then.
+    viscous: Series,
+    share: f64,
+    /// 2 m Z over the whole drag coefficient at the start.
+    gain: f64,
+}
+
+impl Default for Baffle {
+    fn default() -> Self {
+        Baffle {
+            zeta: 0.0,
+            floor2: 0.0,
+            w_floor: 0.0,
+            w: [0.0; 2],
+            q2: ZERO,
+            v2: ZERO,
+            sum: ZERO,
+            u: ZERO,
+            root: ZERO,
+            viscous: ZERO,
+            share: 0.0,
+            gain: 0.0,
+        }
+    }
+}
+
+/// Part of the section that the ring covers.
+fn covered(p: &Parameters) -> f64 {
+    let w = p.baffle.width / (p.tank.d / 2.0);
+    w * (2.0 - w)
+}
+
+/// How much of the surface's motion is left at the ring: exp(-1.84 d/R).
+fn reach(p: &Parameters) -> f64 {
+    libm::exp(-1.84 * p.baffle.depth / (p.tank.d / 2.0))
+}
+
+/// What is wrong with the parameters of the baffle.
+pub(crate) fn problems(p: &Parameters) -> Vec<String> {
+    let (width, depth) = (p.baffle.width, p.baffle.depth);
+    let mut problems = Vec::new();
+    if width > 0.0 {
+        if width >= p.tank.d / 2.0 {
+            problems.push(format!(
+                "baffle.width = {width} (allowed: less than the radius tank.d/2 = {})",
+                p.tank.d / 2.0
+            ));
+        }
+        if p.slosh.source == SloshSource::Geometry && depth >= p.tank.h {
+            problems.push(format!(
+                "baffle.depth = {depth} (allowed: less than tank.h = {}, depths count from the \
+                 surface)",
+                p.tank.h
+            ));
+        }
+    }
+    problems
+}
+
+/// What is to be said about the baffle.
+pub(crate) fn warnings(p: &Parameters) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if p.baffle.width <= 0.0 {
+        return warnings;
+    }
+    let alpha = covered(p);
+    if alpha >= 0.25 {
+        warnings.push(format!(
+            "baffle.width: the ring covers {alpha:.3} of the section; Miles's formula is for less \
+             than 0.25"
+        ));
+    }
+    if p.slosh.source == SloshSource::Table {
+        warnings.push(
+            "baffle: Miles's formula is for an upright cylinder, here of the diameter tank.d"
+                .to_string(),
+        );
+    }
+    warnings
+}
+
+/// Where the ring's law holds.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Range {
+    /// Stroke over the ring's width per wave amplitude, 1/m.
+    stroke: f64,
+    depth: f64,
+    covers_little: bool,
+}
+
+impl Range {
+    /// `None` without a ring.
+    pub fn new(p: &Parameters) -> Option<Range> {
+        let Ring { width, depth } = p.baffle;
+        let range = || Range { stroke: reach(p) / width, depth, covers_little: covered(p) < 0.25 };
+        (width > 0.0).then(range)
+    }
+
+    /// Whether it holds for a wave of this amplitude at the wall, m.
+    pub fn contains(&self, amplitude: f64) -> bool {
+        STROKE.contains(&(amplitude * self.stroke))
+            // The case of d = eta is inside, however it is rounded.
+            && amplitude <= self.depth * (1.0 + 1e-9)
+            && self.covers_little
+    }
+}
+
+impl Baffle {
+    /// The ring's action on the first mode, whose wave at the wall is `wave` per angle, m/rad, and
+    /// whose length is `l`, m.
+    pub fn new(p: &Parameters, wave: f64, l: f64) -> Baffle {
+        let radius = p.tank.d / 2.0;
+        let alpha = covered(p);
+        let depth = libm::exp(-4.60 * p.baffle.depth / radius);
+        let zeta = 2.83 * depth * alpha * libm::sqrt(alpha) * libm::sqrt(wave / radius);
+        let floor = FLOOR * STROKE.start() * p.baffle.width / (reach(p) * wave);
+        Baffle { zeta, floor2: floor * floor, w_floor: WEIGHTLESS / l, ..Baffle::default() }
+    }
+
+    /// Amplitude of the motion, rad, and its damping ratio, at [|q|^2, |q'|^2].
+    pub fn present(&self, pendulum: &Pendulum, [q2, v2]: [f64; 2]) -> (f64, f64) {
+        let w = pendulum.g[0] * pendulum.inv_l + self.w_floor;
+        let amplitude = libm::sqrt(q2 + v2 / w);
+        (amplitude, self.zeta * libm::sqrt(amplitude))
+    }
+
+    /// Starts an expansion with W along `w`, at [|q|^2, |q'|^2] and the viscous drag coefficient `c`
+    /// that runs along `viscous`; returns the coefficient of both.
+    pub fn start(&mut self, w: [f64; 2], at: [f64; 2], m: f64, c: f64, viscous: Series) -> f64 {
+        self.w = [w[0] + self.w_floor, w[1]];
+        self.viscous = viscous;
+        (self.share, self.gain) = (1.0, 0.0);
+        self.expand(0, at);
+        let both = c + 2.0 * m * self.zeta * self.root[0];
+        (self.share, self.gain) = (c / both, 2.0 * m * self.zeta / both);
+        both
+    }
+
+    /// Coefficient n of the drag over its value at the start, from those of [|q|^2, |q'|^2].
+    pub fn expand(&mut self, n: usize, [q2, v2]: [f64; 2]) -> f64 {
+        self.q2[n] = q2 + if n == 0 { self.floor2 } else { 0.0 };
+        self.v2[n] = v2;
+        self.sum[n] = mul_ramp(n, &self.w, &self.q2) + v2;
+        self.u[n] = mul_ramp(n, &self.w, &self.sum);
+        // u y' = u' y/4
+        self.root[n] = if n == 0 {
+            libm::sqrt(libm::sqrt(self.u[0]))
+        } else {
+            let term = |j: usize| (j as f64 / 4.0 - (n - j) as f64) * self.u[j] * self.root[n - j];
+            (1..=n).map(term).sum::<f64>() / (n as f64 * self.u[0])
+        };
+        self.share * self.viscous[n] + self.gain * self.root[n]
+    }
+}

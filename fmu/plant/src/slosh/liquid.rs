@@ -1,0 +1,139 @@
+//! The first mode in an upright cylinder to third order in its amplitude, without tuned numbers:
+//! the mass of `paraboloid.rs` with its surface and its spring from the fill,
+//!
+//! ```text
+//! E = m [(x' - w y)^2 + (y' + w (r + x))^2 + s (q.q')^2/l^2]/2
+//!     + m (g/l) [|q|^2/2 + kappa |q|^4/(8 l^2)]
+//! ```
+//!
+//! omega^2 of a planar motion of the amplitude a l is changed by the factor 1 + (3 kappa/8 - s/2) a^2,
+//! of a circular one by 1 + (kappa/2) a^2. A pendulum is s = kappa = 1; here s and kappa are those
+//! for which both are the shifts of potential flow. `harness/tank/src/third_order.rs` derives them
+//! and computes them in another way; tests/physics/liquid.rs compares. In closed form, with
+//! R = g = 1, T = xi_1 tanh(xi_1 h) = omega_1^2, for the modes of the azimuthal numbers 0 and 2 that
+//! the first one's square excites (zero xi, overlap e, t = xi tanh(xi h)):
+//!
+//! ```text
+//! A = xi_1^2 - xi^2/2 - T^2,   F = xi^2/2 - T t
+//! static  = e A^2/(16 T^2),    carried = e T t/8
+//! driven  = e [t A^2/(16 T^2) - A F/(2 T) + F^2/(4 T)]/(t - 4 T)
+//! planar   = -8 B { 3 xi_1^2 M/64 + sum [1/2 at 0, 1/4 at 2] (static/2 + driven/4 - carried/2) }
+//! circular = -4 B { xi_1^2 M/8 + sum_0 static + sum_2 (driven/2 - carried) }
+//! ```
+//!
+//! At t = 4 T an excited mode has twice the frequency: a secondary resonance, where this order says
+//! nothing. Modes above the first are pendulums.
+
+use crate::tank::XI;
+
+/// M = int J1(xi_1 r)^4 r dr/int J1^2 r dr.
+const M: f64 = 0.278_821_981_660_245_8;
+
+/// B = (2/((xi_1^2 - 1) J1(xi_1)))^2: squared amplitude of the wave per squared slosh angle.
+const B: f64 = 2.068_401_064_148_324;
+
+/// xi and e = c^2/(n n_1) of the azimuthal numbers 0 and 2: c = int J1^2 J r dr, n = int J^2 r dr,
+/// n_1 = int J1^2 r dr. What is left out changes s and kappa by less than 1e-4 from h/R 0.2 on.
+const EXCITED: [[(f64, f64); 8]; 2] = [
+    [
+        (3.831_705_970_207_513, 4.011_801_530_216_258e-2),
+        (7.015_586_669_815_617, 9.983_631_665_561_973e-6),
+        (10.173_468_135_062_723, 3.566_979_610_968_818e-7),
+        (13.323_691_936_314_223, 3.643_211_995_115_537e-8),
+        (16.470_630_050_877_638, 6.306_722_350_678_291e-9),
+        (19.615_858_510_468_236, 1.509_751_792_891_224e-9),
+        (22.760_084_380_592_765, 4.508_374_747_463_396e-10),
+        (25.903_672_087_618_382, 1.581_445_076_794_43e-10),
+    ],
+    [
+        (3.054_236_928_227_14, 0.278_802_485_794_767),
+        (6.706_133_194_158_459, 1.898_033_807_567_907e-5),
+        (9.969_467_823_087_594, 4.640_713_362_506_481e-7),
+        (13.170_370_856_016_124, 4.216_216_667_062_283e-8),
+        (16.347_522_318_321_786, 6.924_523_932_097_042e-9),
+        (19.512_912_782_488_208, 1.611_276_124_487_231e-9),
+        (22.671_581_772_477_43, 4.729_971_111_991_247e-10),
+        (25.826_037_141_785_257, 1.640_829_759_017_726e-10),
+    ],
+];
+
+/// Where 2 omega_1 is closer than this to the frequency of an excited mode, relatively, the third
+/// order is not to be trusted.
+const DETUNING: f64 = 0.01;
+
+/// Below this h/R waves are shallow: s turns negative and both coefficients grow without bound.
+const SHALLOW: f64 = 0.4;
+
+/// s and kappa at h/R = `fill`.
+pub fn coefficients(fill: f64) -> (f64, f64) {
+    let t_1 = XI[0] * libm::tanh(XI[0] * fill);
+    let k2 = XI[0] * XI[0];
+    let mut planar = 3.0 / 64.0 * k2 * M;
+    let mut circular = k2 * M / 8.0;
+    for (azimuth, modes) in EXCITED.iter().enumerate() {
+        for (xi, e) in modes {
+            let t = xi * libm::tanh(xi * fill);
+            let (a, f) = (k2 - xi * xi / 2.0 - t_1 * t_1, xi * xi / 2.0 - t_1 * t);
+            let (of_static, carried) = (e * a * a / (16.0 * t_1 * t_1), e * t_1 * t / 8.0);
+            let forced = t * a * a / (16.0 * t_1 * t_1) - a * f / (2.0 * t_1) + f * f / (4.0 * t_1);
+            let driven = e * forced / (t - 4.0 * t_1);
+            let both = of_static / 2.0 + driven / 4.0 - carried / 2.0;
+            planar += if azimuth == 0 { both / 2.0 } else { both / 4.0 };
+            circular += if azimuth == 0 { of_static } else { driven / 2.0 - carried };
+        }
+    }
+    let (planar, circular) = (-8.0 * B * planar, -4.0 * B * circular);
+    (1.5 * circular - 2.0 * planar, 2.0 * circular)
+}
+
+/// What is to be said about the coefficients at h/R = `fill`, if anything.
+pub fn warning(fill: f64) -> Option<String> {
+    let t_1 = XI[0] * libm::tanh(XI[0] * fill);
+    let near = EXCITED.iter().enumerate().find_map(|(azimuth, modes)| {
+        let n = modes.iter().position(|(xi, _)| {
+            let ratio = libm::sqrt(4.0 * t_1 / (xi * libm::tanh(xi * fill)));
+            (ratio - 1.0).abs() < DETUNING
+        })?;
+        Some((2 * azimuth, n + 1))
+    });
+    let (s, kappa) = coefficients(fill);
+    if fill < SHALLOW {
+        Some(format!(
+            "slosh.model = liquid at h/R = {fill:.3}: below {SHALLOW} waves are shallow and the third \
+             order in the amplitude (s = {s:.3}, kappa = {kappa:.3}) holds for the smallest ones alone"
+        ))
+    } else {
+        near.map(|(azimuth, n)| {
+            format!(
+                "slosh.model = liquid at h/R = {fill:.3}: twice the frequency of mode 1 is within 1 % \
+                 of that of mode ({azimuth},{n}), a secondary resonance, next to which the dependence \
+                 on amplitude (s = {s:.3}, kappa = {kappa:.3}) is not known"
+            )
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The bench; the figures' last digit.
+    #[test]
+    fn shifts_of_the_bench_are_those_of_potential_flow() {
+        for (fill, planar, circular) in [(0.10, -0.429, 0.367), (0.05, -0.257, 0.421)] {
+            let (s, kappa) = coefficients(fill / 0.0815);
+            assert!((0.375 * kappa - 0.5 * s - planar).abs() < 6e-4, "{s} {kappa}");
+            assert!((0.5 * kappa - circular).abs() < 6e-4, "{kappa}");
+            assert_eq!(warning(fill / 0.0815), None);
+        }
+    }
+
+    #[test]
+    fn shallow_liquid_and_secondary_resonances_are_warned_of() {
+        assert!(warning(0.3).unwrap().contains("shallow"));
+        assert!(warning(0.831).unwrap().contains("mode (2,2)"));
+        assert!(warning(1.01).unwrap().contains("mode (0,2)"));
+        // Without bottom 2 omega_1 is 2.5 % above that of (0,2).
+        assert!(warning(5.0).is_none() && warning(1.3).is_none() && warning(0.6).is_none());
+    }
+}

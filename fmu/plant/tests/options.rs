@@ -1,0 +1,349 @@
+//! A bench that leans, a ring baffle, capillarity: with each of them energy, momentum, derivatives
+//! and the independence of the communication step hold for every model.
+
+use std::f64::consts::TAU;
+
+use plant::{FrictionModel, Inputs, Outputs, Parameters, Plant, Ramp, SloshModel};
+
+const TOLERANCE: f64 = 1e-9;
+
+/// The models with sloshing liquid.
+fn sloshing() -> impl Iterator<Item = SloshModel> {
+    SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Frozen)
+}
+
+fn bench(slosh: SloshModel, friction: FrictionModel) -> Parameters {
+    let mut p = Parameters::default();
+    (p.slosh.model, p.friction.model) = (slosh, friction);
+    (p.init.omega, p.init.slosh_angle, p.init.slosh_angle_radial) = (0.05, 0.2, 0.1);
+    p.friction.eps = 1e-3;
+    p
+}
+
+/// Leaning by 3 degrees, an unbalanced hub, a ring, surface tension a hundred times water's.
+fn everything(slosh: SloshModel, friction: FrictionModel) -> Parameters {
+    let mut p = bench(slosh, friction);
+    (p.bench.tilt, p.bench.tilt_azimuth) = (0.05, 0.7);
+    (p.hub.imbalance, p.hub.imbalance_angle) = (0.4, 2.0);
+    (p.baffle.width, p.baffle.depth) = (0.008, 0.01);
+    p.slosh.capillarity = true;
+    p.fluid.sigma = 7.0;
+    p
+}
+
+fn at(g: f64) -> Inputs {
+    Inputs { g_axial: Ramp::held(g), ..Inputs::default() }
+}
+
+fn plant(p: &Parameters) -> Plant {
+    Plant::new(p, &at(9.81), 0.0, TOLERANCE).unwrap()
+}
+
+/// Constant, falling to 0, none, rising again.
+const PIECES: [(Ramp, f64); 4] = [
+    (Ramp { value: 9.81, slope: 0.0 }, 1.0),
+    (Ramp { value: 9.81, slope: -9.81 }, 1.0),
+    (Ramp { value: 0.0, slope: 0.0 }, 0.5),
+    (Ramp { value: 0.0, slope: 6.0 }, 1.0),
+];
+
+/// Runs along [`PIECES`], each cut into steps of about `h`; the outputs after each step.
+fn run(p: &Parameters, h: f64) -> Vec<Outputs> {
+    let mut plant = plant(p);
+    let mut all = vec![plant.outputs(&at(9.81))];
+    for (g, length) in PIECES {
+        let steps = (length / h).ceil().max(1.0);
+        let h = length / steps;
+        for k in 0..steps as usize {
+            let t = k as f64 * h;
+            let inputs = Inputs {
+                g_axial: Ramp { value: g.at(t), slope: g.slope },
+                tau_cmd: Ramp { value: 0.03 - 0.1 * t, slope: -0.1 },
+                ..Inputs::default()
+            };
+            plant.step(&inputs, h).unwrap();
+            all.push(plant.outputs(&at(inputs.g_axial.at(h).max(0.0))));
+        }
+    }
+    all
+}
+
+#[test]
+fn energy_balances_on_a_leaning_bench_with_baffle_and_capillarity() {
+    for slosh in SloshModel::ALL {
+        for friction in FrictionModel::ALL {
+            for modes in [1, 3] {
+                let mut p = everything(slosh, friction);
+                p.slosh.modes = modes;
+                let all = run(&p, 0.05);
+                let (first, mut throughput) = (all[0], 0.0);
+                for pair in all.windows(2) {
+                    let [last, now] = [pair[0], pair[1]];
+                    throughput += (now.work - last.work).abs()
+                        + (now.heat - last.heat).abs()
+                        + (now.work_axial - last.work_axial).abs();
+                    assert!(now.heat >= last.heat && now.power_dissipated >= 0.0);
+                    let balance = now.energy - first.energy - now.work - now.work_axial + now.heat;
+                    // Ten times the integrator's tolerance; a missing term is a share of the whole.
+                    assert!(
+                        balance.abs() < 1e-8 * throughput,
+                        "{slosh:?} {friction:?} {balance:e} {throughput}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn motion_with_all_options_does_not_depend_on_how_time_is_cut() {
+    for slosh in SloshModel::ALL {
+        let p = everything(slosh, FrictionModel::Viscous);
+        let (coarse, fine) = (run(&p, 10.0), run(&p, 0.003));
+        let [a, b] = [coarse.last().unwrap(), fine.last().unwrap()];
+        // Rates of 1 rad/s and energies of 0.1 J at the tolerance.
+        assert!((a.omega - b.omega).abs() < 2e-9, "{slosh:?} {}", a.omega - b.omega);
+        assert!((a.slosh_rate - b.slosh_rate).abs() < 2e-9, "{slosh:?}");
+        assert!((a.work_axial - b.work_axial).abs() < 1e-9, "{slosh:?}");
+    }
+}
+
+/// d momentum/dt is the moment of gravity on every mass at its place, by Simpson's rule over 1 ms:
+/// (2 pi f h)^4/180 of the torque, 1e-10.
+#[test]
+fn momentum_on_a_leaning_bench_changes_by_the_moment_of_gravity() {
+    for slosh in SloshModel::ALL {
+        let mut p = everything(slosh, FrictionModel::None);
+        (p.init.slosh_rate, p.init.slosh_rate_radial) = (2.0, -1.0);
+        let mut plant = plant(&p);
+        let (known, inputs) = (*plant.calculated(), at(9.81));
+        let moment = |o: &Outputs| {
+            let (sin, cos) = (p.bench.tilt_azimuth - o.theta).sin_cos();
+            let e = [cos, sin].map(|part| 9.81 * p.bench.tilt.tan() * part);
+            let (y, x) = match slosh {
+                SloshModel::Linear => (known.length[0] * o.slosh_angle, 0.0),
+                _ => (
+                    known.length[0] * o.slosh_angle.sin(),
+                    known.length[0] * o.slosh_angle_radial.sin(),
+                ),
+            };
+            let (m, m_0, r) = (known.mass[0], known.m_0, p.tank.r);
+            let (s_u, c_u) = p.hub.imbalance_angle.sin_cos();
+            let first =
+                [p.hub.imbalance * c_u + m_0 * r + m * (r + x), p.hub.imbalance * s_u + m * y];
+            let on_hub = p.hub.imbalance * (c_u * e[1] - s_u * e[0]);
+            assert!((o.tau_gravity - on_hub).abs() < 1e-15, "{} {on_hub}", o.tau_gravity);
+            first[0] * e[1] - first[1] * e[0]
+        };
+        let first = plant.outputs(&inputs);
+        let (mut integral, mut last, h) = (0.0, moment(&first), 1e-3);
+        for _ in 0..2000 {
+            plant.step(&inputs, h / 2.0).unwrap();
+            let middle = moment(&plant.outputs(&inputs));
+            plant.step(&inputs, h / 2.0).unwrap();
+            let now = moment(&plant.outputs(&inputs));
+            integral += h / 6.0 * (last + 4.0 * middle + now);
+            last = now;
+        }
+        let now = plant.outputs(&inputs);
+        let change = now.momentum - first.momentum;
+        assert!(change.abs() > 0.01, "gravity acts");
+        assert!((change - integral).abs() < 1e-9, "{slosh:?} {change} {integral}");
+        let sum = now.tau_actuator + now.tau_friction + now.tau_fluid + now.tau_gravity;
+        assert!((p.hub.inertia * now.omega_dot - sum).abs() < 1e-12, "{slosh:?}");
+    }
+}
+
+/// Rigid liquid: a pendulum about the bearing, omega^2 = g tan(tilt) M/I with M the moment of all mass.
+#[test]
+fn a_leaning_bench_swings_at_the_frequency_of_its_imbalance() {
+    let mut p = bench(SloshModel::Frozen, FrictionModel::None);
+    p.bench.tilt = 0.1;
+    p.hub.imbalance = 0.3;
+    (p.init.omega, p.init.theta) = (0.0, 1e-3);
+    let mut plant = plant(&p);
+    let m_0 = plant.calculated().m_0;
+    let moment = 0.3 + m_0 * p.tank.r;
+    let inertia = p.hub.inertia + m_0 * p.tank.r * p.tank.r;
+    let omega = (9.81 * 0.1f64.tan() * moment / inertia).sqrt();
+    plant.step(&at(9.81), TAU / omega / 3.0).unwrap();
+    // cos(120 degrees); a pendulum's period at 1 mrad is longer by 6e-8.
+    let theta = plant.outputs(&at(9.81)).theta;
+    assert!((theta / 1e-3 + 0.5).abs() < 1e-6, "{theta}");
+}
+
+#[test]
+fn liquid_on_a_leaning_bench_comes_to_rest_along_gravity() {
+    for slosh in [SloshModel::Spherical, SloshModel::Paraboloid] {
+        let mut p = bench(slosh, FrictionModel::Viscous);
+        p.friction.b = 0.3;
+        p.bench.tilt = 0.02;
+        (p.slosh.zeta_from_correlation, p.slosh.zeta) = (false, 0.2);
+        let mut plant = plant(&p);
+        for _ in 0..200 {
+            plant.step(&at(9.81), 1.0).unwrap();
+        }
+        let o = plant.outputs(&at(9.81));
+        // Downhill is theta = 0, and the bob hangs along gravity. On the paraboloid (tangent of the
+        // slope, quartic spring) to the third order.
+        assert!(o.theta.abs() < 1e-9 && o.slosh_angle.abs() < 1e-9, "{slosh:?} {o:?}");
+        let allowed = if slosh == SloshModel::Spherical { 1e-9 } else { 2e-5 };
+        assert!((o.slosh_angle_radial - 0.02).abs() < allowed, "{slosh:?} {o:?}");
+        assert!(o.energy < 0.0, "below the upright bench's rest");
+    }
+}
+
+#[test]
+fn dry_friction_holds_a_leaning_hub() {
+    // 9.81 tan(0.001) (0.3 + 2.087 0.225) N m = 7.5 mN m sin(phi): more than 5.9 mN m at 90 degrees.
+    let mut p = bench(SloshModel::Linear, FrictionModel::Stribeck);
+    (p.bench.tilt, p.hub.imbalance) = (0.001, 0.3);
+    (p.init.omega, p.init.slosh_angle) = (0.0, 0.0);
+    let mut stuck = |azimuth: f64| {
+        p.bench.tilt_azimuth = azimuth;
+        plant(&p).outputs(&at(9.81)).discrete.stuck
+    };
+    assert!(stuck(0.0) && stuck(0.3));
+    p.init.slosh_angle = 0.001; // in equilibrium with the lateral part
+    let mut moved = plant(&p);
+    assert!(moved.outputs(&at(9.81)).discrete.stuck);
+    p.bench.tilt_azimuth = TAU / 4.0;
+    moved = plant(&p);
+    assert!(!moved.outputs(&at(9.81)).discrete.stuck);
+    moved.step(&at(9.81), 5.0).unwrap();
+    assert!(moved.outputs(&at(9.81)).theta > 0.01, "it turns downhill");
+}
+
+/// A hub that does not move, no viscous damping, a ring d/R = w/R = 0.1.
+fn ringed(slosh: SloshModel) -> Parameters {
+    let mut p = bench(slosh, FrictionModel::None);
+    p.hub.inertia = 1e9;
+    (p.init.omega, p.init.slosh_angle_radial) = (0.0, 0.0);
+    (p.slosh.zeta_from_correlation, p.slosh.zeta) = (false, 0.0);
+    (p.baffle.width, p.baffle.depth) = (0.00815, 0.00815);
+    p
+}
+
+/// Miles: 2.83 exp(-0.46) 0.19^1.5 0.1^0.5 = 0.0468 at a wave of 0.1 R, an angle of 0.1195 rad.
+#[test]
+fn ring_has_the_damping_of_miles_and_its_range() {
+    let mut p = ringed(SloshModel::Linear);
+    let wave = 2.0 / (1.841_183_781_340_66f64.powi(2) - 1.0);
+    let zeta = |p: &Parameters| {
+        let o = plant(p).outputs(&at(9.81));
+        (o.baffle_zeta, o.discrete.baffle_in_range)
+    };
+    p.init.slosh_angle = 0.1 / wave;
+    let (found, within) = zeta(&p);
+    assert!((found - 0.0468).abs() < 5e-5 && within, "{found}");
+    // A rate makes the same wave.
+    let omega = (9.81 / plant(&p).calculated().length[0]).sqrt();
+    (p.init.slosh_angle, p.init.slosh_rate) = (0.0, 0.1 / wave * omega);
+    assert!((zeta(&p).0 / found - 1.0).abs() < 1e-6);
+    // A wave of 0.07 R is too small, one of 0.12 R uncovers the ring, 0.2 R covers 0.36.
+    (p.init.slosh_angle, p.init.slosh_rate) = (0.07 / wave, 0.0);
+    assert!(!zeta(&p).1);
+    p.init.slosh_angle = 0.12 / wave;
+    assert!(!zeta(&p).1);
+    (p.init.slosh_angle, p.baffle.width) = (0.09 / wave, 0.2 * 0.0815);
+    assert!(!zeta(&p).1 && Plant::warnings(&p, &at(9.81))[0].contains("covers 0.360"));
+    (p.baffle.width, p.baffle.depth) = (0.1, 0.2);
+    assert_eq!(Plant::new(&p, &at(9.81), 0.0, 1e-9).err().map(|all| all.len()), Some(2));
+}
+
+/// a' = -zeta(a) omega a with zeta = Z a^(1/2): a^(-1/2) grows by Z omega/2 per time. Over ten periods,
+/// from 0.2 rad; 1 % of the decay, what the ring's own share in the frequency and the angle's cube make.
+#[test]
+fn free_oscillation_decays_by_the_damping_of_its_amplitude() {
+    for slosh in sloshing() {
+        let mut p = ringed(slosh);
+        p.init.slosh_angle = 0.1;
+        let mut plant = plant(&p);
+        let omega = (9.81 / plant.calculated().length[0]).sqrt();
+        let first = plant.outputs(&at(9.81));
+        let z = first.baffle_zeta / 0.1f64.sqrt();
+        let mut energy = first.energy;
+        let time = 10.0 * TAU / omega;
+        for _ in 0..1000 {
+            plant.step(&at(9.81), time / 1000.0).unwrap();
+            let now = plant.outputs(&at(9.81)).energy;
+            assert!(now <= energy * (1.0 + 1e-12), "{slosh:?}: a ring never drives");
+            energy = now;
+        }
+        let left = (energy / first.energy).sqrt();
+        let expected = (1.0 + 0.1f64.sqrt() * z * omega * time / 2.0).powi(-2);
+        println!("{slosh:?} {left} {expected}");
+        assert!(
+            ((1.0 - left) / (1.0 - expected) - 1.0).abs() < 0.01,
+            "{slosh:?} {left} {expected}"
+        );
+    }
+}
+
+/// omega_1^2 = (g xi/R + sigma xi^3/(rho R^3)) tanh(xi h/R), and the length stays geometry.
+#[test]
+fn capillarity_centres_the_liquid_down_to_weightlessness() {
+    let (xi, radius) = (1.841_183_781_340_66f64, 0.0815);
+    for slosh in sloshing() {
+        for g in [9.81, 0.01, 0.0] {
+            let mut p = bench(slosh, FrictionModel::None);
+            p.hub.inertia = 1e9;
+            (p.init.omega, p.init.slosh_angle, p.init.slosh_angle_radial) = (0.0, 1e-3, 0.0);
+            (p.slosh.zeta_from_correlation, p.slosh.zeta) = (false, 0.0);
+            let length = plant(&p).calculated().length[0];
+            p.slosh.capillarity = true;
+            let mut plant = Plant::new(&p, &at(g), 0.0, TOLERANCE).unwrap();
+            assert_eq!(plant.calculated().length[0], length);
+            let capillary = p.fluid.sigma * (xi / radius).powi(3) / p.fluid.rho;
+            let omega = ((g * xi / radius + capillary) * (xi * 0.1 / radius).tanh()).sqrt();
+            let frequency = plant.calculated().frequency[0];
+            assert!((frequency * TAU / omega - 1.0).abs() < 1e-12, "{g} {frequency}");
+            plant.step(&at(g), TAU / omega / 3.0).unwrap();
+            let angle = plant.outputs(&at(g)).slosh_angle;
+            // cos(120 degrees), and the third order in 1 mrad.
+            assert!((angle / 1e-3 + 0.5).abs() < 1e-5, "{slosh:?} {g} {angle}");
+        }
+    }
+}
+
+/// c = 2 zeta m omega at every g: with a given ratio the same, by the correlation as omega^(-1/2).
+#[test]
+fn damping_ratio_follows_the_restoring_force_down_to_weightlessness() {
+    let mut p = bench(SloshModel::Linear, FrictionModel::None);
+    p.hub.inertia = 1e9;
+    p.init.omega = 0.0;
+    (p.slosh.capillarity, p.slosh.modes) = (true, 2);
+    for correlation in [false, true] {
+        (p.slosh.zeta_from_correlation, p.slosh.zeta) = (correlation, 0.02);
+        let mut plant = plant(&p);
+        let first = plant.outputs(&at(9.81)).damping;
+        let down = Inputs { g_axial: Ramp { value: 9.81, slope: -9.81 }, ..Inputs::default() };
+        plant.step(&down, 1.0).unwrap();
+        let last = plant.outputs(&at(0.0)).damping;
+        let weightless = Plant::new(&p, &at(0.0), 0.0, TOLERANCE).unwrap();
+        for n in 0..2 {
+            let ratio = weightless.calculated().frequency[n]
+                / Plant::new(&p, &at(9.81), 0.0, 1e-9).unwrap().calculated().frequency[n];
+            let expected = if correlation { first[n] * ratio.powf(-0.5) } else { first[n] };
+            assert!((last[n] / expected - 1.0).abs() < 1e-12, "{correlation} {n} {last:?}");
+        }
+        // And it is the ratio of the motion: the envelope over a period.
+        let omega = TAU * weightless.calculated().frequency[0];
+        let before = plant.outputs(&at(0.0)).energy;
+        plant.step(&at(0.0), 2.0 * TAU / omega).unwrap();
+        let decay = (plant.outputs(&at(0.0)).energy / before).ln() / (2.0 * TAU);
+        let zeta = last[0];
+        assert!((decay / -(2.0 * zeta) - 1.0).abs() < 0.05, "{decay} {zeta}");
+    }
+}
+
+#[test]
+fn low_bond_numbers_are_warned_of() {
+    let p = bench(SloshModel::Linear, FrictionModel::None);
+    assert!(Plant::warnings(&p, &at(9.81)).is_empty());
+    assert!(Plant::warnings(&p, &at(0.1))[0].contains("Bond number is 9.209"));
+    let mut with = p;
+    with.slosh.capillarity = true;
+    assert!(Plant::warnings(&with, &at(0.1))[0].contains("contact angles"));
+    assert!(Plant::warnings(&with, &at(9.81)).is_empty());
+}
