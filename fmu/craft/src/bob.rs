@@ -29,6 +29,7 @@
 //! Source: Newton's second law with the constraint eliminated; every vector in body axes.
 //! Checked against the same law in p'' (tests/independent.rs).
 
+use crate::outputs::BobNow;
 use crate::parameters::Tank;
 use crate::series::{self, Pair, Series, Vector, ZERO, ZERO_PAIR, ZERO_VECTOR};
 use crate::vector::{
@@ -52,6 +53,8 @@ pub struct Bob {
     inv_l: f64,
     e: Vec3,
     pub hinge: Vec3,
+    /// Elevation at the wall per slosh angle, m/rad.
+    pub wave: f64,
     /// Tank axes to body axes.
     axes: Mat3,
     pub p: Vector,
@@ -92,6 +95,7 @@ impl Bob {
             inv_l: 1.0 / l,
             e,
             hinge: add(tank.position, scale(tank.hinge[mode], e)),
+            wave: tank.wave[mode],
             axes,
             p: ZERO_VECTOR,
             v: ZERO_VECTOR,
@@ -283,25 +287,18 @@ impl Bob {
         [force, add(cross(constant(self.hinge), force), twist)]
     }
 
-    /// The bob from O, m, and its velocity against the tank, m/s.
-    pub fn place<T: Number>(&self) -> [Vec3<T>; 2] {
+    /// What the outputs need.
+    pub fn now<T: Number>(&self) -> BobNow<T> {
         let [p, p_d, _] = self.state::<T>();
-        [add(constant(self.hinge), p.map(|x| x * self.l)), p_d.map(|x| x * self.l)]
-    }
-
-    /// Energy of the centring stiffness, k l^2 |p_perp|^2/2.
-    pub fn centring_energy<T: Number>(&self) -> T {
-        let p_perp = self.perpendicular(self.state::<T>()[0]);
-        dot(p_perp, p_perp) * (0.5 * self.k * self.l * self.l)
-    }
-
-    /// p in tank axes.
-    pub fn direction_in_tank<T: Number>(&self) -> Vec3<T> {
-        let p = self.state::<T>()[0];
-        [0, 1, 2].map(|i| {
-            let column: Vec3 = self.axes.map(|row| row[i]);
-            dot(constant(column), p)
-        })
+        let p_perp = self.perpendicular(p);
+        BobNow {
+            m: T::constant(self.m),
+            rho: add(constant(self.hinge), p.map(|x| x * self.l)),
+            rate: p_d.map(|x| x * self.l),
+            in_tank: transposed_times(&self.axes.map(constant), p),
+            wave: self.wave,
+            centring: dot(p_perp, p_perp) * (0.5 * self.k * self.l * self.l),
+        }
     }
 
     /// What an impulse of the craft does to the rate: the bob keeps its velocity across the rod,

@@ -24,9 +24,11 @@
 //! Where to look: `spacecraft.rs` and `slosh_tank.rs` are the two components as a host sees
 //! them; `motion.rs` has the craft's equations, `bob.rs` those of one slosh mode, `rigid.rs`
 //! the mass matrix, `outputs.rs` energy and momentum; `integrator.rs` steps through time with
-//! the arithmetic of `series.rs`.
+//! the arithmetic of `series.rs`. `draining.rs` is a craft whose tanks drain by a table
+//! (`table.rs`).
 
 mod bob;
+mod draining;
 mod integrator;
 mod motion;
 mod outputs;
@@ -36,6 +38,7 @@ mod series;
 mod slosh_tank;
 mod spacecraft;
 mod state;
+mod table;
 mod vector;
 
 pub use integrator::StepError;
@@ -46,4 +49,5 @@ pub use slosh_tank::{
     TankParameters, TankState,
 };
 pub use spacecraft::Spacecraft;
-pub use state::{INPUTS, Inputs, Ramp, STATES, State, index};
+pub use state::{INPUTS, Inputs, Line, Ramp, STATES, State, index};
+pub use table::{FillTable, POINTS};

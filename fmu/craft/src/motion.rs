@@ -27,7 +27,7 @@
 
 use crate::bob::Bob;
 use crate::integrator::{MAX_MAGNITUDE, Motion, RATE_FLOOR};
-use crate::parameters::{Mount, Parameters};
+use crate::parameters::{Mount, Parameters, Tank};
 use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod};
 use crate::series::{
     self, Attitude, Pair, Series, Vector, ZERO, ZERO_ATTITUDE, ZERO_PAIR, ZERO_VECTOR, cross,
@@ -40,7 +40,7 @@ use crate::vector::{
 };
 
 /// Rates change within this time at most, s: a step much longer does not see how fast they are.
-const SCALE_TIME: f64 = 0.1;
+pub const SCALE_TIME: f64 = 0.1;
 
 /// A vector out of an array.
 #[inline(always)]
@@ -70,7 +70,8 @@ pub struct CraftMotion {
     pub inputs: Inputs,
     pub mount: Mount,
     gravity: Vec3,
-    /// Dry craft and rigid liquids, and each tank's rigid liquid.
+    /// The dry craft, the same with the rigid liquids, and each tank's rigid liquid.
+    pub craft: Rigid,
     pub rigid: Rigid,
     mass_matrix: Mat6,
     pub liquids: Vec<Rigid>,
@@ -102,7 +103,8 @@ pub struct CraftMotion {
 
 impl CraftMotion {
     pub fn new(p: &Parameters, state: State) -> CraftMotion {
-        let tanks = &p.tank[..p.tanks];
+        let tanks = p.tank.map(|tank| tank.resolve());
+        let tanks = &tanks[..p.tanks];
         let liquids: Vec<Rigid> = tanks.iter().map(Rigid::of_tank).collect();
         let rigid = liquids.iter().fold(Rigid::of_craft(&p.craft), |sum, tank| sum.and(tank));
         let bobs: Vec<Bob> = tanks
@@ -116,6 +118,7 @@ impl CraftMotion {
             inputs: Inputs::default(),
             mount: p.mount,
             gravity: p.gravity,
+            craft: Rigid::of_craft(&p.craft),
             rigid,
             mass_matrix,
             liquids,
@@ -137,6 +140,21 @@ impl CraftMotion {
             inv_allowed: [0.0; 4],
             longest: bobs.iter().fold(0.0, |longest, bob| bob.l.max(longest)),
             bobs,
+        }
+    }
+
+    /// Takes other rigid liquids and bobs, of as many tanks and modes.
+    pub fn refill<'a>(&mut self, tanks: impl Iterator<Item = &'a Tank> + Clone) {
+        self.rigid = self.craft;
+        for (liquid, tank) in self.liquids.iter_mut().zip(tanks.clone()) {
+            *liquid = Rigid::of_tank(tank);
+            self.rigid = self.rigid.and(liquid);
+        }
+        self.mass_matrix = self.rigid.mass_matrix();
+        for bob in &mut self.bobs {
+            if let Some(tank) = tanks.clone().nth(bob.tank) {
+                *bob = Bob::new(tank, bob.tank, bob.mode);
+            }
         }
     }
 
@@ -276,7 +294,7 @@ impl CraftMotion {
 impl Motion for CraftMotion {
     #[inline(always)]
     fn start(&mut self, t: f64) {
-        let Inputs { force, torque, h_wheels } = &self.inputs;
+        let Inputs { force, torque, h_wheels, .. } = &self.inputs;
         self.force = [force.at(t), force.slope];
         self.torque = [sub(torque.at(t), h_wheels.slope), torque.slope];
         self.h = [h_wheels.at(t), h_wheels.slope];

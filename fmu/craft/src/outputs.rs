@@ -12,7 +12,6 @@
 //! everything from O; V in body axes. H is about r_c and does not contain V: after a long
 //! thrust nothing cancels. On a pivot H is about O, and E has the potential a.S with all masses.
 
-use crate::bob::Bob;
 use crate::motion::CraftMotion;
 use crate::parameters::{MODES, Mount, TANKS};
 use crate::rigid::Rigid;
@@ -36,6 +35,8 @@ pub struct TankOutputs {
     pub angle_x: [f64; MODES],
     /// Slosh angle of each mode, rad: sin(angle_y) = p_y, tank axes.
     pub angle_y: [f64; MODES],
+    /// Amplitude of the surface at the wall, all modes together, m.
+    pub wave_height: f64,
 }
 
 /// What the craft shows at one instant.
@@ -94,13 +95,55 @@ impl TankOutputs {
             p_dot: core::array::from_fn(|n| part(n, 3)),
             angle_x: [0.0; MODES],
             angle_y: [0.0; MODES],
+            wave_height: 0.0,
         }
     }
 
-    pub(crate) fn set_angles<T: Number>(&mut self, bob: &Bob) {
-        let [x, y, _] = bob.direction_in_tank::<T>();
-        self.angle_x[bob.mode] = x.asin().result();
-        self.angle_y[bob.mode] = y.asin().result();
+    pub(crate) fn set_angles<'a, T: Number + 'a>(
+        &mut self,
+        bobs: impl Iterator<Item = &'a BobNow<T>>,
+    ) {
+        let mut wave = [T::constant(0.0); 2];
+        for (n, bob) in bobs.enumerate() {
+            let [x, y] = [bob.in_tank[0].asin(), bob.in_tank[1].asin()];
+            self.angle_x[n] = x.result();
+            self.angle_y[n] = y.result();
+            wave = [wave[0] + x * bob.wave, wave[1] + y * bob.wave];
+        }
+        self.wave_height = wave[0].hypot(wave[1]).result();
+    }
+}
+
+/// Rigid liquid and bobs where they are: mass, first and second moment about O.
+pub(crate) struct MassProperties<T> {
+    pub mass: T,
+    moment: Vec3<T>,
+    inertia: Mat3<T>,
+}
+
+impl<T: Number> MassProperties<T> {
+    pub fn of(rigid: &Rigid<T>) -> MassProperties<T> {
+        let Rigid { mass, moment, inertia } = *rigid;
+        MassProperties { mass, moment, inertia }
+    }
+
+    /// Adds a point mass at rho.
+    pub fn add(&mut self, m: T, rho: Vec3<T>) {
+        self.mass = self.mass + m;
+        self.moment = add(self.moment, scale(m, rho));
+        self.inertia = add_matrices(self.inertia, point_inertia(m, rho));
+    }
+
+    /// From O; O for nothing at all.
+    pub fn center(&self) -> Vec3<T> {
+        let is_something = self.mass.value() > 0.0;
+        let share = if is_something { self.mass.recip() } else { T::constant(0.0) };
+        scale(share, self.moment)
+    }
+
+    /// About the centre of mass.
+    pub fn inertia(&self) -> Mat3 {
+        add_matrices(self.inertia, point_inertia(-self.mass, self.center())).map(result)
     }
 }
 
@@ -109,7 +152,7 @@ fn result<T: Number>(a: Vec3<T>) -> Vec3 {
 }
 
 /// m (|s|^2 1 - s s^T).
-fn point_inertia<T: Number>(m: f64, s: Vec3<T>) -> Mat3<T> {
+fn point_inertia<T: Number>(m: T, s: Vec3<T>) -> Mat3<T> {
     let s2 = dot(s, s);
     let row = |i: usize| {
         [0, 1, 2].map(|j| (if i == j { s2 } else { T::constant(0.0) } - s[i] * s[j]) * m)
@@ -121,81 +164,143 @@ fn add_matrices<T: Number>(a: Mat3<T>, b: Mat3<T>) -> Mat3<T> {
     [add(a[0], b[0]), add(a[1], b[1]), add(a[2], b[2])]
 }
 
+/// One bob, as the outputs need it.
+pub(crate) struct BobNow<T> {
+    pub m: T,
+    /// From O, and its velocity against the tank.
+    pub rho: Vec3<T>,
+    pub rate: Vec3<T>,
+    /// p in tank axes.
+    pub in_tank: Vec3<T>,
+    pub wave: f64,
+    /// Energy of the centring stiffness.
+    pub centring: T,
+}
+
+/// One tank.
+pub(crate) struct TankNow<T> {
+    /// The rigid liquid about O.
+    pub rigid: Rigid<T>,
+    /// Force and torque about O on the craft.
+    pub wrench: [Vec3<T>; 2],
+    /// Momentum and moment of momentum about O of the flow within (draining.rs).
+    pub stir: [Vec3<T>; 2],
+    pub bobs: [Option<BobNow<T>>; MODES],
+}
+
+/// The craft at an instant, or its derivative along a direction.
+pub(crate) struct Now<T> {
+    pub a: Vec3<T>,
+    pub w: Vec3<T>,
+    pub w_d: Vec3<T>,
+    /// Of O, body axes.
+    pub velocity: Vec3<T>,
+    pub h_wheels: Vec3<T>,
+    /// Body to inertial.
+    pub axes: Mat3<T>,
+    pub mount: Mount,
+    /// The dry craft.
+    pub craft: Rigid,
+    pub tanks: [Option<TankNow<T>>; TANKS],
+}
+
 impl CraftMotion {
-    /// The outputs from coefficient 0 of the motion, or their derivatives from coefficients 0
-    /// and 1; `x` is the states, or the direction.
-    pub fn outputs<T: Number>(&self, x: &[f64; STATES]) -> Outputs {
+    /// From coefficients 0 and 1 of the motion.
+    pub fn now<T: Number>(&self) -> Now<T> {
         let of = |a: &[Vec3]| -> Vec3<T> { [0, 1, 2].map(|i| T::of(a[0][i], a[1][i])) };
         let (a, w, w_d) = (of(&self.a), of(&self.w), of(&self.w_d));
-        let (velocity, h) = (of(&self.drift), of(&self.h));
         let [q, dq] = [self.q.get(0), self.q.get(1)];
-        let axes = rotation(&[0, 1, 2, 3].map(|i| T::of(q[i], dq[i])));
-        let Rigid { mass: m_r, moment, inertia } = self.rigid;
-        let (s, inertia) = (constant::<T>(moment), inertia.map(constant::<T>));
+        let mut tanks = [(); TANKS].map(|()| None);
+        for (i, liquid) in self.liquids.iter().enumerate() {
+            let rigid = liquid.lift::<T>();
+            let mut wrench = rigid.inertial_wrench(a, w, w_d).map(|half| half.map(|x| -x));
+            let mut bobs = [(); MODES].map(|()| None);
+            for bob in self.bobs.iter().filter(|bob| bob.tank == i) {
+                let [f, tau] = bob.wrench::<T>();
+                wrench = [add(wrench[0], f), add(wrench[1], tau)];
+                bobs[bob.mode] = Some(bob.now());
+            }
+            let stir = [constant([0.0; 3]); 2];
+            tanks[i] = Some(TankNow { rigid, wrench, stir, bobs });
+        }
+        Now {
+            a,
+            w,
+            w_d,
+            velocity: of(&self.drift),
+            h_wheels: of(&self.h),
+            axes: rotation(&[0, 1, 2, 3].map(|i| T::of(q[i], dq[i]))),
+            mount: self.mount,
+            craft: self.craft,
+            tanks,
+        }
+    }
+}
+
+impl<T: Number> Now<T> {
+    /// The outputs; `x` is the states, or the direction.
+    pub fn outputs(&self, x: &[f64; STATES]) -> Outputs {
+        let Now { w, velocity, .. } = *self;
+        let tanks = || self.tanks.iter().flatten();
+        let bobs = || tanks().flat_map(|tank| tank.bobs.iter().flatten());
+        let lifted = self.craft.lift::<T>();
+        let rigid = tanks().fold(lifted, |sum, tank| sum.and(&tank.rigid));
 
         let mut tank: [TankOutputs; TANKS] =
             core::array::from_fn(|i| TankOutputs::of_states(&x[index::bob(i, 0)..]));
         let (mut slosh_force, mut slosh_torque) = ([0.0; 3], [0.0; 3]);
-        for (tank, liquid) in tank.iter_mut().zip(&self.liquids) {
-            let [f, tau] = liquid.inertial_wrench(a, w, w_d);
-            (tank.force, tank.torque) = (scale(-1.0, result(f)), scale(-1.0, result(tau)));
+        for (out, now) in tank.iter_mut().zip(tanks()) {
+            [out.force, out.torque] = now.wrench.map(result);
+            out.set_angles(now.bobs.iter().flatten());
+            slosh_force = add(slosh_force, out.force);
+            slosh_torque = add(slosh_torque, out.torque);
         }
-        let mut mass = m_r;
-        let mut all_moment = s;
-        let mut all_inertia = inertia;
         // m times what O does not share of the velocity, and its moment about O.
-        let inner = cross(w, s);
-        let (mut inner_momentum, mut inner_angular) = (inner, times(&inertia, w));
+        let inner = cross(w, rigid.moment);
+        let (mut inner_momentum, mut inner_angular) = (inner, times(&rigid.inertia, w));
         let half = 0.5;
-        let mut energy =
-            (dot(velocity, velocity) * m_r + dot(w, inner_angular)) * half + dot(velocity, inner);
-        for bob in &self.bobs {
-            let [f, tau] = bob.wrench::<T>().map(result);
-            let out = &mut tank[bob.tank];
-            (out.force, out.torque) = (add(out.force, f), add(out.torque, tau));
-            out.set_angles::<T>(bob);
-            let [rho, rate] = bob.place::<T>();
-            let against_o = add(cross(w, rho), rate);
-            mass += bob.m;
-            all_moment = add(all_moment, rho.map(|x| x * bob.m));
-            all_inertia = add_matrices(all_inertia, point_inertia(bob.m, rho));
-            inner_momentum = add(inner_momentum, against_o.map(|x| x * bob.m));
-            inner_angular = add(inner_angular, cross(rho, against_o).map(|x| x * bob.m));
+        let mut energy = (dot(velocity, velocity) * rigid.mass + dot(w, inner_angular)) * half
+            + dot(velocity, inner);
+        let mut all = MassProperties::of(&rigid);
+        for bob in bobs() {
+            let against_o = add(cross(w, bob.rho), bob.rate);
+            all.add(bob.m, bob.rho);
+            inner_momentum = add(inner_momentum, scale(bob.m, against_o));
+            inner_angular = add(inner_angular, scale(bob.m, cross(bob.rho, against_o)));
             let speed = add(velocity, against_o);
-            energy = energy + dot(speed, speed) * (half * bob.m) + bob.centring_energy::<T>();
+            energy = energy + dot(speed, speed) * bob.m * half + bob.centring;
         }
-        for tank in &tank {
-            slosh_force = add(slosh_force, tank.force);
-            slosh_torque = add(slosh_torque, tank.torque);
+        for tank in tanks() {
+            inner_momentum = add(inner_momentum, tank.stir[0]);
+            inner_angular = add(inner_angular, tank.stir[1]);
         }
-        let center = all_moment.map(|x| x * (1.0 / mass));
-        let momentum = add(velocity.map(|x| x * mass), inner_momentum);
-        let about_o = add(inner_angular, h);
+        let center = all.center();
+        let momentum = add(scale(all.mass, velocity), inner_momentum);
+        let about_o = add(inner_angular, self.h_wheels);
         let angular_momentum = match self.mount {
             Mount::Free => sub(about_o, cross(center, inner_momentum)),
             Mount::Pivot => about_o,
         };
         if self.mount == Mount::Pivot {
-            energy = energy + dot(a, all_moment);
+            energy = energy + dot(self.a, all.moment);
         }
-        let own = add_matrices(all_inertia, point_inertia(-mass, center));
         Outputs {
             q: [x[index::Q], x[index::Q + 1], x[index::Q + 2], x[index::Q + 3]],
             omega: crate::motion::part(x, index::OMEGA),
-            omega_dot: result(w_d),
-            specific_force: result(a),
+            omega_dot: result(self.w_d),
+            specific_force: result(self.a),
             position: crate::motion::part(x, index::POSITION),
             velocity: crate::motion::part(x, index::VELOCITY),
             slosh_force,
             slosh_torque,
-            momentum: result(times(&axes, momentum)),
-            angular_momentum: result(times(&axes, angular_momentum)),
+            momentum: result(times(&self.axes, momentum)),
+            angular_momentum: result(times(&self.axes, angular_momentum)),
             energy: energy.result(),
             work: x[index::WORK],
             dissipated: x[index::DISSIPATED],
-            mass: T::constant(mass).result(),
+            mass: all.mass.result(),
             center_of_mass: result(center),
-            inertia: own.map(result),
+            inertia: all.inertia(),
             tank,
         }
     }

@@ -3,6 +3,7 @@
 //! Names in the messages are those of the FMU's parameters. Indices count from 1 there.
 
 use crate::rigid::{Factors, Rigid};
+use crate::table::{FillTable, POINTS};
 use crate::vector::{Quaternion, Vec3, norm};
 
 /// Tanks that a craft can have.
@@ -66,6 +67,14 @@ pub struct Tank {
     pub position: Vec3,
     /// Attitude of the tank: tank axes to body axes, scalar first; normalised on reading.
     pub q: Quaternion,
+    /// Diameter of an upright cylinder, m. Above 0 it makes, with `depth` and `density`, the rigid
+    /// liquid's m_0, H_0, I_0 and each mode's mass, length, hinge and wave by potential flow; the
+    /// tank's origin is then the centre of its bottom.
+    pub diameter: f64,
+    /// Depth of the liquid in it, m.
+    pub depth: f64,
+    /// Density of the liquid, kg/m3.
+    pub density: f64,
     /// Mass of the rigid liquid, kg.
     pub m_0: f64,
     /// Height of the rigid liquid's centre of mass on the tank's axis, m.
@@ -82,12 +91,24 @@ pub struct Tank {
     pub mass: [f64; MODES],
     /// Length of the pendulum, m.
     pub length: [f64; MODES],
+    /// Natural frequency with the tank held, Hz, at `g_ref`; where it is above 0 it stands in place
+    /// of the length: (2 pi f)^2 = g_ref/l + k/m.
+    pub frequency: [f64; MODES],
     /// Height of the hinge on the tank's axis, m.
     pub hinge: [f64; MODES],
     /// Centring stiffness (capillarity, diaphragm), N/m.
     pub k: [f64; MODES],
     /// Damping ratio at `g_ref`.
     pub zeta: [f64; MODES],
+    /// Elevation of the surface at the wall per slosh angle, m/rad.
+    pub wave: [f64; MODES],
+    /// How modes and rigid liquid follow the mass of liquid. With points in it the tank can drain, and
+    /// m_0, h_0, i_0, i_z, mass, length and hinge are the table's.
+    pub fill: FillTable,
+    /// Mass of liquid at the start, kg, in a tank that can drain.
+    pub liquid_0: f64,
+    /// Height of the outlet on the tank's axis, m.
+    pub outlet: f64,
     /// Direction from hinge to bob at the start, tank axes; normalised on reading.
     pub p_0: [Vec3; MODES],
     /// Its rate at the start, 1/s, tank axes; made tangential on reading.
@@ -95,6 +116,43 @@ pub struct Tank {
 }
 
 impl Tank {
+    /// The tank with modes and rigid liquid by its diameter, and lengths by its frequencies, if given.
+    pub(crate) fn resolve(&self) -> Tank {
+        let mut tank = *self;
+        let modes = self.modes.min(MODES);
+        if self.diameter > 0.0 {
+            let (d, h) = (self.diameter, self.depth);
+            let m_liq = self.density * core::f64::consts::PI * d * d / 4.0 * h;
+            let pendulums: [_; MODES] =
+                core::array::from_fn(|n| cylinder::pendulum(n, d, h, m_liq));
+            for (n, pendulum) in pendulums.iter().enumerate() {
+                (tank.mass[n], tank.length[n]) = (pendulum.mass, pendulum.length);
+                (tank.hinge[n], tank.wave[n]) = (pendulum.hinge, pendulum.wave);
+            }
+            [tank.m_0, tank.h_0, tank.i_0] = cylinder::rest(d, h, m_liq, &pendulums[..modes]);
+        }
+        if (2..=POINTS).contains(&self.fill.points) {
+            let at = |y: &[f64; POINTS]| self.fill.at(y, self.liquid_0)[0];
+            tank.m_0 = self.liquid_0;
+            for n in 0..modes {
+                tank.mass[n] = at(&self.fill.mass[n]);
+                tank.length[n] = at(&self.fill.length[n]);
+                tank.hinge[n] = at(&self.fill.hinge[n]);
+                tank.m_0 -= tank.mass[n];
+            }
+            (tank.h_0, tank.i_0) = (at(&self.fill.h_0), at(&self.fill.i_0));
+            tank.i_z = at(&self.fill.i_z);
+            return tank;
+        }
+        for n in 0..modes {
+            if self.frequency[n] > 0.0 {
+                let w = core::f64::consts::TAU * self.frequency[n];
+                tank.length[n] = self.g_ref / (w * w - self.k[n] / tank.mass[n]);
+            }
+        }
+        tank
+    }
+
     /// c = 2 zeta m sqrt(g_ref/l + k/m) of mode n (from 0), N s/m.
     pub fn drag(&self, n: usize) -> f64 {
         let (m, l) = (self.mass[n], self.length[n]);
@@ -142,11 +200,40 @@ impl Default for Craft {
     }
 }
 
+/// The default tank, an upright cylinder of R = 0.45 m with its bottom at -0.3 m, filled with water
+/// 0.1, 0.2, ... 0.8 m deep, one mode kept: numbers of `cylinder::pendulum` and `cylinder::rest`.
+#[rustfmt::skip]
+const CYLINDER: FillTable = FillTable {
+    points: 8,
+    liquid: [63.6173, 127.235, 190.852, 254.469, 318.086, 381.704, 445.321, 508.938],
+    h_0: [-0.0636349, -0.00124903, 0.00795427, 0.0167251, 0.0330603, 0.0563967, 0.0852024, 0.118179],
+    i_0: [2.50041, 3.15786, 3.14549, 3.06287, 3.15717, 3.67522, 4.92169, 7.24793],
+    i_z: [0.0; POINTS],
+    mass: [
+        [50.4527, 87.717, 109.537, 120.617, 125.838, 128.211, 129.272, 129.743],
+        [3.24612, 3.84804, 3.90955, 3.91535, 3.9159, 3.91595, 3.91595, 3.91595],
+        [0.892184, 0.932325, 0.933248, 0.933269, 0.93327, 0.93327, 0.93327, 0.93327],
+    ],
+    length: [
+        [0.63032, 0.362545, 0.290326, 0.263656, 0.252717, 0.248039, 0.246003, 0.245111],
+        [0.101822, 0.0858945, 0.0845431, 0.0844178, 0.0844061, 0.084405, 0.0844049, 0.0844049],
+        [0.0551436, 0.0527694, 0.0527171, 0.052716, 0.0527159, 0.0527159, 0.0527159, 0.0527159],
+    ],
+    hinge: [
+        [0.331692, 0.0730052, 0.0230679, 0.0341225, 0.0758217, 0.136534, 0.209939, 0.29198],
+        [-0.187919, -0.15404, -0.0748788, 0.0185355, 0.116497, 0.215871, 0.31568, 0.415621],
+        [-0.222781, -0.148021, -0.0520051, 0.0473908, 0.1473, 0.247286, 0.347284, 0.447284],
+    ],
+};
+
 impl Default for Tank {
     fn default() -> Self {
         Tank {
             position: [0.0, 0.0, -0.45],
             q: [1.0, 0.0, 0.0, 0.0],
+            diameter: 0.0,
+            depth: 0.6,
+            density: 1000.0,
             m_0: 253.493,
             h_0: 0.0563967,
             i_0: 3.67522,
@@ -155,9 +242,14 @@ impl Default for Tank {
             g_ref: 1.5,
             mass: [128.211, 3.91595, 0.93327],
             length: [0.248039, 0.084405, 0.0527159],
+            frequency: [0.0; MODES],
             hinge: [0.136534, 0.215871, 0.247286],
             k: [0.0; MODES],
             zeta: [0.005; MODES],
+            wave: [0.376618, 0.0328144, 0.0125218],
+            fill: FillTable { points: 0, ..CYLINDER },
+            liquid_0: 381.704,
+            outlet: -0.3,
             p_0: [[0.0, 0.0, -1.0]; MODES],
             p_dot_0: [[0.0; 3]; MODES],
         }
@@ -234,6 +326,79 @@ impl Problems {
 
 impl Tank {
     fn find_problems(&self, name: &str, problems: &mut Problems) {
+        let before = problems.0.len();
+        problems.number(&format!("{name}.diameter"), self.diameter, 0.0, 1e3, "m");
+        if self.diameter > 0.0 {
+            problems.number(&format!("{name}.depth"), self.depth, 1e-3, 1e3, "m");
+            problems.number(&format!("{name}.density"), self.density, 1e-3, 1e5, "kg/m3");
+        }
+        self.find_table_problems(name, problems);
+        for (n, f) in self.frequency.iter().enumerate().take(self.modes) {
+            problems.number(&format!("{name}.frequency[{}]", n + 1), *f, 0.0, 1e6, "Hz");
+        }
+        if problems.0.len() == before {
+            self.resolve().find_resolved_problems(name, problems);
+        }
+    }
+
+    fn find_table_problems(&self, name: &str, problems: &mut Problems) {
+        let table = &self.fill;
+        if table.points == 0 {
+            return;
+        }
+        if !(2..=POINTS).contains(&table.points) {
+            problems.0.push(format!(
+                "{name}.fill.points = {} (allowed: 0, or 2 to {POINTS})",
+                table.points
+            ));
+            return;
+        }
+        problems.number(&format!("{name}.outlet"), self.outlet, -FARTHEST, FARTHEST, "m");
+        let masses = table.masses();
+        for i in 0..table.points {
+            let at = i + 1;
+            let low = if i == 0 { LIGHTEST } else { masses[i - 1] };
+            let name_of = |what: &str| format!("{name}.fill.{what}[{at}]");
+            problems.number(&name_of("liquid"), masses[i], low, HEAVIEST, "kg");
+            if i > 0 && masses[i] == low {
+                problems.0.push(format!(
+                    "{} = {low:?} kg (allowed: more than at the point before)",
+                    name_of("liquid")
+                ));
+            }
+            problems.number(&name_of("H_0"), table.h_0[i], -FARTHEST, FARTHEST, "m");
+            problems.number(&name_of("I_0"), table.i_0[i], 0.0, HEAVIEST, "kg.m2");
+            problems.number(&name_of("I_z"), table.i_z[i], 0.0, HEAVIEST, "kg.m2");
+            let mut sum = 0.0;
+            for n in 0..self.modes.min(MODES) {
+                let name_of = |what: &str| format!("{name}.fill.{what}[{},{at}]", n + 1);
+                let (mass, length) = (table.mass[n][i], table.length[n][i]);
+                problems.number(&name_of("mass"), mass, LIGHTEST, HEAVIEST, "kg");
+                problems.number(&name_of("length"), length, SHORTEST, FARTHEST, "m");
+                problems.number(&name_of("hinge"), table.hinge[n][i], -FARTHEST, FARTHEST, "m");
+                sum += mass;
+            }
+            if sum > masses[i] {
+                problems.0.push(format!(
+                    "{name}.fill.mass at point {at} adds up to {sum:?} kg (allowed: up to the {:?} kg of \
+                     {name}.fill.liquid[{at}])",
+                    masses[i]
+                ));
+            }
+        }
+        let (first, last) = (masses[0], masses[table.points - 1]);
+        problems.number(&format!("{name}.liquid_0"), self.liquid_0, first, last, "kg");
+        for (what, is_set) in [
+            ("diameter", self.diameter > 0.0),
+            ("frequency", self.frequency.iter().any(|f| *f > 0.0)),
+        ] {
+            if is_set {
+                problems.0.push(format!("{name}.{what} with {name}.fill (allowed: 0 then)"));
+            }
+        }
+    }
+
+    fn find_resolved_problems(&self, name: &str, problems: &mut Problems) {
         problems.vector(&format!("{name}.position"), &self.position, "m");
         problems.direction(&format!("{name}.q"), &self.q);
         problems.number(&format!("{name}.m_0"), self.m_0, 0.0, HEAVIEST, "kg");
@@ -247,12 +412,22 @@ impl Tank {
         for n in 0..self.modes.min(MODES) {
             let i = n + 1;
             problems.number(&format!("{name}.mass[{i}]"), self.mass[n], LIGHTEST, HEAVIEST, "kg");
-            let length = self.length[n];
-            problems.number(&format!("{name}.length[{i}]"), length, SHORTEST, FARTHEST, "m");
+            let (length, f) = (self.length[n], self.frequency[n]);
+            if f > 0.0 && !(SHORTEST..=FARTHEST).contains(&length) {
+                let by_k = libm::sqrt(self.k[n] / self.mass[n]) / core::f64::consts::TAU;
+                let most = libm::sqrt(self.g_ref / SHORTEST) / core::f64::consts::TAU;
+                problems.0.push(format!(
+                    "{name}.frequency[{i}] = {f:?} Hz (allowed: above the {by_k:?} Hz that {name}.k[{i}] makes \
+                     without acceleration, and below {most:?} Hz)"
+                ));
+            } else {
+                problems.number(&format!("{name}.length[{i}]"), length, SHORTEST, FARTHEST, "m");
+            }
             let hinge = self.hinge[n];
             problems.number(&format!("{name}.hinge[{i}]"), hinge, -FARTHEST, FARTHEST, "m");
             problems.number(&format!("{name}.k[{i}]"), self.k[n], 0.0, HEAVIEST, "N/m");
             problems.number(&format!("{name}.zeta[{i}]"), self.zeta[n], 0.0, 10.0, "");
+            problems.number(&format!("{name}.wave[{i}]"), self.wave[n], 0.0, FARTHEST, "m/rad");
             problems.direction(&format!("{name}.p_0[{i}]"), &self.p_0[n]);
             problems.vector(&format!("{name}.p_dot_0[{i}]"), &self.p_dot_0[n], "1/s");
         }
@@ -341,9 +516,10 @@ impl Parameters {
             ));
         }
         if problems.0.is_empty() {
-            let rigid = self.tank[..self.tanks]
-                .iter()
-                .fold(Rigid::of_craft(&self.craft), |sum, tank| sum.and(&Rigid::of_tank(tank)));
+            let rigid =
+                self.tank[..self.tanks].iter().fold(Rigid::of_craft(&self.craft), |sum, tank| {
+                    sum.and(&Rigid::of_tank(&tank.resolve()))
+                });
             if Factors::of(&rigid.mass_matrix()).smallest_pivot() < 1e-12 {
                 problems.0.push(
                     "craft.J with the tanks' m_0, I_0 and I_z is singular: the inertia of craft \

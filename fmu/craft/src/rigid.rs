@@ -8,20 +8,22 @@
 //! Source: Newton and Euler about a point that is not the centre of mass.
 
 use crate::parameters::{Craft, Tank};
-use crate::vector::{Mat3, Number, Vec3, add, cross, dot, rotation, scale, times, unit_quaternion};
+use crate::vector::{
+    Mat3, Number, Vec3, add, constant, cross, dot, rotation, scale, times, unit_quaternion,
+};
 
 /// A symmetric matrix of six rows.
-pub type Mat6 = [[f64; 6]; 6];
+pub type Mat6<T = f64> = [[T; 6]; 6];
 
 /// Mass, first and second moment about O.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rigid {
+pub struct Rigid<T = f64> {
     /// kg
-    pub mass: f64,
+    pub mass: T,
     /// S = m s, kg m
-    pub moment: Vec3,
+    pub moment: Vec3<T>,
     /// I about O, kg m2
-    pub inertia: Mat3,
+    pub inertia: Mat3<T>,
 }
 
 impl Rigid {
@@ -55,10 +57,33 @@ impl Rigid {
         Rigid::new(tank.m_0, add(tank.position, scale(tank.h_0, e)), &own)
     }
 
+    /// The same as numbers of another kind.
+    pub fn lift<T: Number>(&self) -> Rigid<T> {
+        Rigid {
+            mass: T::constant(self.mass),
+            moment: constant(self.moment),
+            inertia: self.inertia.map(constant),
+        }
+    }
+}
+
+impl<T: Number> Rigid<T> {
+    /// A body of mass m at s with the inertia i_0 across and i_z about the axis e, about its centre
+    /// of mass.
+    pub fn axial(m: T, s: Vec3<T>, i_0: T, i_z: T, e: Vec3<T>) -> Rigid<T> {
+        let s2 = dot(s, s);
+        let element = |i: usize, j: usize| {
+            let one = if i == j { i_0 + m * s2 } else { T::constant(0.0) };
+            one + (i_z - i_0) * e[i] * e[j] - m * s[i] * s[j]
+        };
+        let inertia = [0, 1, 2].map(|i| [0, 1, 2].map(|j| element(i, j)));
+        Rigid { mass: m, moment: scale(m, s), inertia }
+    }
+
     /// Both bodies as one.
-    pub fn and(&self, b: &Rigid) -> Rigid {
+    pub fn and(&self, b: &Rigid<T>) -> Rigid<T> {
         let mut sum = *self;
-        sum.mass += b.mass;
+        sum.mass = sum.mass + b.mass;
         sum.moment = add(sum.moment, b.moment);
         for i in 0..3 {
             sum.inertia[i] = add(sum.inertia[i], b.inertia[i]);
@@ -67,26 +92,25 @@ impl Rigid {
     }
 
     /// M, unknowns a, w'.
-    pub fn mass_matrix(&self) -> Mat6 {
+    pub fn mass_matrix(&self) -> Mat6<T> {
         let [x, y, z] = self.moment;
         let [i_x, i_y, i_z] = self.inertia;
-        let m = self.mass;
+        let (m, o) = (self.mass, T::constant(0.0));
         [
-            [m, 0.0, 0.0, 0.0, z, -y],
-            [0.0, m, 0.0, -z, 0.0, x],
-            [0.0, 0.0, m, y, -x, 0.0],
-            [0.0, -z, y, i_x[0], i_x[1], i_x[2]],
-            [z, 0.0, -x, i_y[0], i_y[1], i_y[2]],
-            [-y, x, 0.0, i_z[0], i_z[1], i_z[2]],
+            [m, o, o, o, z, -y],
+            [o, m, o, -z, o, x],
+            [o, o, m, y, -x, o],
+            [o, -z, y, i_x[0], i_x[1], i_x[2]],
+            [z, o, -x, i_y[0], i_y[1], i_y[2]],
+            [-y, x, o, i_z[0], i_z[1], i_z[2]],
         ]
     }
 
     /// Force and torque about O that the body's motion takes:
     /// M [a; w'] + [w x (w x S); w x (I w)].
-    pub fn inertial_wrench<T: Number>(&self, a: Vec3<T>, w: Vec3<T>, w_d: Vec3<T>) -> [Vec3<T>; 2] {
-        let s = self.moment.map(T::constant);
-        let inertia = self.inertia.map(|row| row.map(T::constant));
-        let force = add(a.map(|x| x * self.mass), add(cross(w_d, s), cross(w, cross(w, s))));
+    pub fn inertial_wrench(&self, a: Vec3<T>, w: Vec3<T>, w_d: Vec3<T>) -> [Vec3<T>; 2] {
+        let Rigid { mass, moment: s, inertia } = *self;
+        let force = add(a.map(|x| x * mass), add(cross(w_d, s), cross(w, cross(w, s))));
         let torque = add(cross(s, a), add(times(&inertia, w_d), cross(w, times(&inertia, w))));
         [force, torque]
     }
@@ -116,36 +140,37 @@ pub fn along_rod(p: Vec3, hinge: Vec3) -> [f64; 6] {
 
 /// A symmetric positive definite matrix as L D L^T, L with ones on its diagonal.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Factors {
-    l: Mat6,
+pub struct Factors<T = f64> {
+    l: Mat6<T>,
     /// 1/D, and D over the matrix's own diagonal.
-    inverse: [f64; 6],
+    inverse: [T; 6],
     pivots: [f64; 6],
 }
 
-impl Factors {
+impl<T: Number> Factors<T> {
     /// Factors of a matrix of which the lower triangle is read.
     #[inline(always)]
-    pub fn of(matrix: &Mat6) -> Factors {
-        let mut l = [[0.0; 6]; 6];
-        let (mut inverse, mut pivots) = ([0.0; 6], [0.0; 6]);
+    pub fn of(matrix: &Mat6<T>) -> Factors<T> {
+        let zero = T::constant(0.0);
+        let mut l = [[zero; 6]; 6];
+        let (mut inverse, mut pivots) = ([zero; 6], [0.0; 6]);
         for j in 0..6 {
             // Row j of L D, then of L.
             let mut d = matrix[j][j];
             for k in 0..j {
                 let mut x = matrix[j][k];
                 for i in 0..k {
-                    x -= l[j][i] * l[k][i];
+                    x = x - l[j][i] * l[k][i];
                 }
                 l[j][k] = x;
             }
             for k in 0..j {
                 let x = l[j][k] * inverse[k];
-                d -= l[j][k] * x;
+                d = d - l[j][k] * x;
                 l[j][k] = x;
             }
-            inverse[j] = 1.0 / d;
-            pivots[j] = d / matrix[j][j];
+            inverse[j] = d.recip();
+            pivots[j] = d.value() / matrix[j][j].value();
         }
         Factors { l, inverse, pivots }
     }
@@ -159,25 +184,27 @@ impl Factors {
 
     /// The solution of matrix x = b.
     #[inline(always)]
-    pub fn solve(&self, b: [Vec3; 2]) -> [Vec3; 2] {
+    pub fn solve(&self, b: [Vec3<T>; 2]) -> [Vec3<T>; 2] {
         let l = &self.l;
         let mut x = [b[0][0], b[0][1], b[0][2], b[1][0], b[1][1], b[1][2]];
         for i in 1..6 {
             for j in 0..i {
-                x[i] -= l[i][j] * x[j];
+                x[i] = x[i] - l[i][j] * x[j];
             }
         }
         for i in 0..6 {
-            x[i] *= self.inverse[i];
+            x[i] = x[i] * self.inverse[i];
         }
         for i in (0..5).rev() {
             for j in i + 1..6 {
-                x[i] -= l[j][i] * x[j];
+                x[i] = x[i] - l[j][i] * x[j];
             }
         }
         [[x[0], x[1], x[2]], [x[3], x[4], x[5]]]
     }
+}
 
+impl Factors {
     /// L^-1 times b, each row over the root of its pivot: with it M_a turns into the symmetric
     /// matrix that has the eigenvalues of M^-1 M_a.
     fn half_solve(&self, b: &[f64; 6]) -> [f64; 6] {
@@ -200,7 +227,8 @@ pub fn largest_eigenvalue(m: &Factors, a: &Mat6) -> f64 {
     for _ in 0..12 {
         for p in 0..5 {
             for q in p + 1..6 {
-                if b[p][q] == 0.0 {
+                // So small that it counts for nothing, and what follows would overflow.
+                if b[p][q].abs() <= 1e-150 * (b[q][q] - b[p][p]).abs() {
                     continue;
                 }
                 let half = (b[q][q] - b[p][p]) / (2.0 * b[p][q]);

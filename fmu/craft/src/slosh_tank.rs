@@ -28,12 +28,12 @@
 use crate::bob::Bob;
 use crate::integrator::{MAX_MAGNITUDE, Motion, RATE_FLOOR, StepError, advance};
 use crate::motion::{part, twice_crossed};
-use crate::outputs::TankOutputs;
+use crate::outputs::{MassProperties, TankOutputs};
 use crate::parameters::{Craft, MODES, Tank, tolerance_problem};
-use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod, largest_eigenvalue};
+use crate::rigid::{Factors, Rigid, add_rank_one, along_rod, largest_eigenvalue};
 use crate::series::{self, Pair, Series, Vector, ZERO, ZERO_PAIR, ZERO_VECTOR, products};
-use crate::state::Ramp;
-use crate::vector::{Dual, Number, Vec3, add, constant, cross, largest, on_sphere, scale};
+use crate::state::{Ramp, has_direction};
+use crate::vector::{Dual, Mat3, Number, Vec3, add, constant, cross, largest, on_sphere, scale};
 
 /// Number of continuous states of a tank: p and p' of each mode, then the dissipated energy.
 pub const TANK_STATES: usize = 6 * MODES + 1;
@@ -52,7 +52,9 @@ const DISSIPATED: usize = 6 * MODES;
 pub enum Coupling {
     /// Wrench at a = w' = 0 and the added mass of the moment: for hosts that solve with them.
     Split = 1,
-    /// Constant added mass with each bob at its hinge: for hosts that are plain rigid bodies.
+    /// For hosts that are plain rigid bodies: they include the rigid liquid and each bob at its hinge,
+    /// the constant added mass; bias is the wrench and what the motion of that mass takes,
+    /// M [a; w'] + [w x (w x S); w x (I w)].
     Lumped = 2,
 }
 
@@ -106,6 +108,12 @@ pub struct SloshTankOutputs {
     pub added_mass: [f64; TRIANGLE],
     /// Energy dissipated by the liquid since the start, J.
     pub dissipated: f64,
+    /// Mass of the whole liquid, kg.
+    pub mass: f64,
+    /// Its centre of mass from O, m, host axes.
+    pub center_of_mass: Vec3,
+    /// Its inertia about it with the bobs as point masses where they are, kg m2, host axes.
+    pub inertia: Mat3,
 }
 
 /// The tank's memory.
@@ -132,8 +140,8 @@ impl TankState {
     pub fn from_words(words: &[u64; Self::WORDS]) -> Option<TankState> {
         let numbers = words.map(f64::from_bits);
         let x: [f64; TANK_STATES] = core::array::from_fn(|i| numbers[1 + i]);
-        let bobs = (0..MODES).all(|n| part(&x, 6 * n) != [0.0; 3]);
-        let is_state = numbers.iter().all(|x| x.is_finite()) && bobs;
+        let bobs = (0..MODES).all(|n| has_direction(&part(&x, 6 * n)));
+        let is_state = numbers[0].is_finite() && x.iter().all(|x| x.abs() < MAX_MAGNITUDE) && bobs;
         is_state.then_some(TankState { time: numbers[0], x })
     }
 }
@@ -161,8 +169,8 @@ pub struct SloshTank {
     motion: Box<TankMotion>,
     coupling: Coupling,
     host: Option<Craft>,
-    /// M_a of [`Coupling::Lumped`]
-    lumped: Mat6,
+    /// What the host's rigid body includes with [`Coupling::Lumped`].
+    lumped: Rigid,
     tolerance: f64,
 }
 
@@ -213,7 +221,7 @@ impl Motion for TankMotion {
         let w = series::value(&self.w, 2, h);
         let x = &mut self.state.x;
         x[DISSIPATED] += series::integral(&self.dissipation, n - 1, h);
-        let mut finite = x[DISSIPATED].abs() < MAX_MAGNITUDE;
+        let mut finite = x[DISSIPATED].abs() < MAX_MAGNITUDE && largest(w) < MAX_MAGNITUDE;
         for bob in &self.bobs {
             let at = 6 * bob.mode;
             let moved = bob.at(x[at..at + 6].try_into().unwrap(), n, h, w);
@@ -311,8 +319,9 @@ impl SloshTank {
     /// A tank that continues from a saved state of one with the same parameters, which
     /// [`SloshTank::new`] has accepted.
     pub fn resume(p: &TankParameters, state: &TankState, tolerance: f64) -> SloshTank {
-        let rigid = Rigid::of_tank(&p.tank);
-        let bobs: Vec<Bob> = (0..p.tank.modes).map(|n| Bob::new(&p.tank, 0, n)).collect();
+        let tank = p.tank.resolve();
+        let rigid = Rigid::of_tank(&tank);
+        let bobs: Vec<Bob> = (0..tank.modes).map(|n| Bob::new(&tank, 0, n)).collect();
         let lumped = bobs
             .iter()
             .fold(rigid, |sum, bob| sum.and(&Rigid::new(bob.m, bob.hinge, &[[0.0; 3]; 3])));
@@ -332,7 +341,7 @@ impl SloshTank {
             motion: Box::new(motion),
             coupling: p.coupling,
             host: p.host,
-            lumped: lumped.mass_matrix(),
+            lumped,
             tolerance,
         }
     }
@@ -390,25 +399,26 @@ impl SloshTank {
         let of = |a: &[Vec3]| -> Vec3<T> { [0, 1, 2].map(|i| T::of(a[0][i], a[1][i])) };
         let (a, w, w_d) = (of(&motion.a), of(&motion.w), of(&motion.w_d));
         let mut tank = TankOutputs::of_states(x);
+        let mut bobs = [(); MODES].map(|()| None);
         let minus = |[f, tau]: [Vec3<T>; 2]| [f.map(|x| -x), tau.map(|x| -x)];
         let zero = constant::<T>([0.0; 3]);
-        let mut wrench = minus(motion.rigid.inertial_wrench(a, w, w_d));
-        let mut bias = minus(motion.rigid.inertial_wrench(zero, w, zero));
+        let mut wrench = minus(motion.rigid.lift::<T>().inertial_wrench(a, w, w_d));
+        let mut bias = minus(motion.rigid.lift::<T>().inertial_wrench(zero, w, zero));
         let mut matrix = motion.rigid.mass_matrix().map(|row| row.map(T::constant));
+        let mut all = MassProperties::of(&motion.rigid.lift::<T>());
         let plus = |a: [Vec3<T>; 2], b: [Vec3<T>; 2]| [add(a[0], b[0]), add(a[1], b[1])];
         for bob in &motion.bobs {
             wrench = plus(wrench, bob.wrench());
             bias = plus(bias, bob.bias(w));
             add_added_mass(&mut matrix, bob);
-            tank.set_angles::<T>(bob);
+            let now = bob.now::<T>();
+            all.add(now.m, now.rho);
+            bobs[bob.mode] = Some(now);
         }
+        tank.set_angles(bobs.iter().flatten());
         if self.coupling == Coupling::Lumped {
-            matrix = self.lumped.map(|row| row.map(T::constant));
-            let x = [a[0], a[1], a[2], w_d[0], w_d[1], w_d[2]];
-            let given = matrix.map(|row| (1..6).fold(row[0] * x[0], |sum, i| sum + row[i] * x[i]));
-            let [f, tau] = wrench;
-            let half = |at: usize| [given[at], given[at + 1], given[at + 2]];
-            bias = [add(f, half(0)), add(tau, half(3))];
+            matrix = self.lumped.mass_matrix().map(|row| row.map(T::constant));
+            bias = plus(wrench, self.lumped.lift::<T>().inertial_wrench(a, w, w_d));
         }
         (tank.force, tank.torque) = (wrench[0].map(T::result), wrench[1].map(T::result));
         let [f, tau] = bias.map(|half| half.map(T::result));
@@ -417,6 +427,9 @@ impl SloshTank {
             bias: [f[0], f[1], f[2], tau[0], tau[1], tau[2]],
             added_mass: triangle(&matrix),
             dissipated: x[DISSIPATED],
+            mass: all.mass.result(),
+            center_of_mass: all.center().map(T::result),
+            inertia: all.inertia(),
         }
     }
 

@@ -1,17 +1,20 @@
 //! A free spacecraft with sloshing tanks: the whole, its steps, and its equations for hosts
 //! that integrate themselves.
 
+use crate::draining::{Acting, Draining};
 use crate::integrator::{StepError, advance};
 use crate::motion::CraftMotion;
-use crate::outputs::Outputs;
+use crate::outputs::{Now, Outputs};
 use crate::parameters::{MODES, Parameters, TANKS, tolerance_problem};
 use crate::state::{INPUTS, Inputs, STATES, State, index};
-use crate::vector::{Dual, on_sphere, unit_quaternion};
+use crate::vector::{Dual, Number, on_sphere, unit_quaternion};
 
 /// A rigid body with up to four tanks, free or on a pivot.
 #[derive(Clone, Debug)]
 pub struct Spacecraft {
     motion: Box<CraftMotion>,
+    /// Equations with draining tanks, if there are any.
+    draining: Option<Box<Draining>>,
     tolerance: f64,
 }
 
@@ -41,6 +44,11 @@ impl Spacecraft {
         put(index::POSITION, &p.init.position);
         put(index::VELOCITY, &p.init.velocity);
         for i in 0..TANKS {
+            if i < p.tanks {
+                let tank = p.tank[i].resolve();
+                let bobs: f64 = tank.mass[..tank.modes].iter().sum();
+                put(index::LIQUID + i, &[tank.m_0 + bobs]);
+            }
             for n in 0..MODES {
                 let is_used = i < p.tanks && n < p.tank[i].modes;
                 let [direction, rate] = if is_used {
@@ -59,7 +67,8 @@ impl Spacecraft {
     /// A craft that continues from a saved state of one with the same parameters, which
     /// [`Spacecraft::new`] has accepted.
     pub fn resume(p: &Parameters, state: &State, tolerance: f64) -> Spacecraft {
-        Spacecraft { motion: Box::new(CraftMotion::new(p, *state)), tolerance }
+        let draining = Draining::new(p).map(Box::new);
+        Spacecraft { motion: Box::new(CraftMotion::new(p, *state)), draining, tolerance }
     }
 
     /// The present time, s.
@@ -91,8 +100,11 @@ impl Spacecraft {
         }
         let before = self.motion.state;
         self.motion.inputs = *inputs;
-        self.motion.set_wheels(inputs.h_wheels.value);
-        let done = advance(&mut *self.motion, before.time, h, self.tolerance);
+        self.set_wheels(inputs);
+        let done = match &self.draining {
+            None => advance(&mut *self.motion, before.time, h, self.tolerance),
+            Some(draining) => draining.advance(&mut self.motion.state.x, inputs, h, self.tolerance),
+        };
         let state = &mut self.motion.state;
         match done {
             Ok(()) => {
@@ -108,7 +120,7 @@ impl Spacecraft {
     /// the last step has had its effect.
     pub fn outputs(&mut self, inputs: &Inputs) -> Outputs {
         let before = self.motion.state;
-        self.motion.set_wheels(inputs.h_wheels.value);
+        self.set_wheels(inputs);
         let outputs = self.outputs_held(inputs);
         self.motion.state = before;
         outputs
@@ -116,8 +128,12 @@ impl Spacecraft {
 
     /// As [`Spacecraft::outputs`], with the states as the last step or event has left them.
     pub fn outputs_held(&mut self, inputs: &Inputs) -> Outputs {
+        let x = &self.motion.state.x;
+        if let Some(draining) = &self.draining {
+            return draining.evaluate(x, &Acting::of(inputs, 0.0)).1.outputs(x);
+        }
         self.motion.evaluate(inputs);
-        self.motion.outputs::<f64>(&self.motion.state.x)
+        self.motion.now::<f64>().outputs(&self.motion.state.x)
     }
 
     /// x; see [`index`].
@@ -141,6 +157,9 @@ impl Spacecraft {
     /// `h_wheels` acts by w x h_w and by its slope. Where the slope is not known, the
     /// reaction -h_w' belongs into `torque`.
     pub fn derivatives(&mut self, inputs: &Inputs) -> [f64; STATES] {
+        if let Some(draining) = &self.draining {
+            return draining.evaluate(&self.motion.state.x, &Acting::of(inputs, 0.0)).0;
+        }
         self.motion.evaluate(inputs);
         self.motion.state_rates::<0>(&self.motion.state.x)
     }
@@ -153,6 +172,9 @@ impl Spacecraft {
         dx: &[f64; STATES],
         du: &[f64; INPUTS],
     ) -> [f64; STATES] {
+        if let Some((rates, _)) = self.along(inputs, dx, du) {
+            return rates.map(Number::result);
+        }
         self.motion.evaluate_direction(inputs, dx, split(du));
         self.motion.state_rates::<1>(dx)
     }
@@ -165,20 +187,52 @@ impl Spacecraft {
         dx: &[f64; STATES],
         du: &[f64; INPUTS],
     ) -> Outputs {
+        if let Some((_, now)) = self.along(inputs, dx, du) {
+            return now.outputs(dx);
+        }
         self.motion.evaluate_direction(inputs, dx, split(du));
-        self.motion.outputs::<Dual>(dx)
+        self.motion.now::<Dual>().outputs(dx)
+    }
+
+    /// Of a craft that drains.
+    fn along(
+        &self,
+        inputs: &Inputs,
+        dx: &[f64; STATES],
+        du: &[f64; INPUTS],
+    ) -> Option<([Dual; STATES], Now<Dual>)> {
+        let x = &self.motion.state.x;
+        let along = core::array::from_fn(|i| Dual::of(x[i], dx[i]));
+        let draining = self.draining.as_ref()?;
+        Some(draining.evaluate(&along, &Acting::along(inputs, du)))
+    }
+
+    fn set_wheels(&mut self, inputs: &Inputs) -> bool {
+        if let Some(draining) = &self.draining
+            && inputs.h_wheels.value != self.motion.state.h_wheels
+        {
+            let tanks = draining.tanks(&self.motion.state.x);
+            self.motion.refill(tanks.iter());
+        }
+        self.motion.set_wheels(inputs.h_wheels.value)
     }
 
     /// Does what is due at an event: a jump of `h_wheels` acts as an impulse. Returns whether
     /// continuous states have changed. On an error nothing has.
     pub fn take_event(&mut self, inputs: &Inputs) -> Result<bool, StepError> {
         let before = self.motion.state;
-        let changed = self.motion.set_wheels(inputs.h_wheels.value);
+        let changed = self.set_wheels(inputs);
         if self.motion.state.x.iter().any(|x| !x.is_finite()) {
             self.motion.state = before;
             return Err(StepError::NotFinite { time: before.time });
         }
         Ok(changed)
+    }
+
+    /// Whether the mass of liquid that the host has integrated is within the tanks' tables.
+    pub fn check_liquids(&self) -> Result<(), StepError> {
+        let x = &self.motion.state.x;
+        self.draining.as_ref().map_or(Ok(()), |it| it.check(x, &Default::default(), 0.0))
     }
 
     /// Takes account of `h_wheels` having changed continuously: no impulse is due for it.

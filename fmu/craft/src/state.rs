@@ -1,11 +1,12 @@
 //! The craft's continuous states x in their order, its inputs, and its memory.
 
+use crate::integrator::MAX_MAGNITUDE;
 use crate::parameters::{MODES, TANKS};
 use crate::vector::Vec3;
 
 /// Places in x. Units: 1, rad/s, m, m/s, J, J, then 1 and 1/s for each bob.
 pub mod index {
-    use super::MODES;
+    use super::{MODES, TANKS};
 
     /// Attitude, body to inertial, four numbers, scalar first.
     pub const Q: usize = 0;
@@ -23,6 +24,9 @@ pub mod index {
     /// axes. Bobs that are not used stay at rest.
     pub const BOBS: usize = 15;
 
+    /// The mass of liquid in each tank, kg; of effect in tanks that can drain.
+    pub const LIQUID: usize = BOBS + 6 * TANKS * MODES;
+
     /// Where direction and rate of a bob begin; tank and mode from 0.
     pub const fn bob(tank: usize, mode: usize) -> usize {
         BOBS + 6 * (tank * MODES + mode)
@@ -30,10 +34,10 @@ pub mod index {
 }
 
 /// Number of continuous states.
-pub const STATES: usize = index::BOBS + 6 * TANKS * MODES;
+pub const STATES: usize = index::LIQUID + TANKS;
 
-/// Number of inputs: force, torque, h_wheels.
-pub const INPUTS: usize = 9;
+/// Number of inputs: force, torque, h_wheels, mass flows.
+pub const INPUTS: usize = 9 + TANKS;
 
 /// A vector that is linear in time: `value + slope t`.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -57,6 +61,27 @@ impl Ramp {
     }
 }
 
+/// A number that is linear in time: `value + slope t`.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Line {
+    /// Value now.
+    pub value: f64,
+    /// Rate of change, 1/s.
+    pub slope: f64,
+}
+
+impl Line {
+    /// The value after `t` seconds.
+    pub fn at(&self, t: f64) -> f64 {
+        self.value + self.slope * t
+    }
+
+    /// The integral from 0 to `t`.
+    pub fn integral(&self, t: f64) -> f64 {
+        (self.value + self.slope * t / 2.0) * t
+    }
+}
+
 /// What acts on the craft from outside over one step; body axes.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Inputs {
@@ -68,6 +93,9 @@ pub struct Inputs {
     /// -h_w'; a jump from one step to the next does so by an impulse, so that the angular
     /// momentum of everything is kept either way.
     pub h_wheels: Ramp,
+    /// Mass that flows out of each tank, kg/s; in where below 0. Of no effect in a tank without a table
+    /// over its fill.
+    pub mass_flow: [Line; TANKS],
 }
 
 /// The craft's memory: all that a saved state needs besides parameters and inputs.
@@ -97,10 +125,44 @@ impl State {
     pub fn from_words(words: &[u64; Self::WORDS]) -> Option<State> {
         let numbers = words.map(f64::from_bits);
         let x: [f64; STATES] = core::array::from_fn(|i| numbers[4 + i]);
-        let has_length = |at: usize, n: usize| x[at..at + n].iter().any(|x| *x != 0.0);
-        let bobs = (0..TANKS * MODES).all(|i| has_length(index::bob(0, i), 3));
-        let is_state = numbers.iter().all(|x| x.is_finite()) && has_length(index::Q, 4) && bobs;
+        let bobs = (0..TANKS * MODES).all(|i| has_direction(&x[index::bob(0, i)..][..3]));
+        let is_state = numbers[0].is_finite()
+            && numbers[1..].iter().all(|x| x.abs() < MAX_MAGNITUDE)
+            && has_direction(&x[index::Q..][..4])
+            && bobs;
         let h_wheels = [numbers[1], numbers[2], numbers[3]];
         is_state.then_some(State { time: numbers[0], x, h_wheels })
+    }
+}
+
+/// Whether a quaternion or a vector can be normalised.
+pub(crate) fn has_direction(x: &[f64]) -> bool {
+    x.iter().any(|x| x.abs() > 1.0 / MAX_MAGNITUDE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Parameters, Spacecraft};
+
+    #[test]
+    fn words_are_the_state_unless_a_number_is_too_large_or_a_direction_has_no_length() {
+        let inputs = Inputs::default();
+        let craft = Spacecraft::new(&Parameters::default(), &inputs, 0.0, 1e-8).unwrap();
+        let words = craft.state().to_words();
+        assert_eq!(State::from_words(&words), Some(*craft.state()));
+        let with = |place: usize, number: f64| {
+            let mut words = words;
+            words[place] = number.to_bits();
+            State::from_words(&words)
+        };
+        for place in 0..State::WORDS {
+            assert_eq!(with(place, f64::NAN), None);
+            // The time is the only one without squares.
+            assert_eq!(with(place, 1e100).is_none(), place > 0, "{place}");
+        }
+        // q = (1, 0, 0, 0), p = (0, 0, -1)
+        assert_eq!(with(4 + index::Q, 1e-101), None);
+        assert_eq!(with(4 + index::bob(3, 2) + 2, 1e-101), None);
     }
 }

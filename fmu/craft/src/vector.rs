@@ -27,8 +27,16 @@ pub trait Number:
     fn of(value: f64, slope: f64) -> Self;
     /// What is looked for: the value or the derivative.
     fn result(self) -> f64;
+    /// The value.
+    fn value(self) -> f64;
+    /// 1/self
+    fn recip(self) -> Self;
+    /// Of a quantity above 0.
+    fn sqrt(self) -> Self;
     /// asin, its derivative 0 at +-1, where it has none.
     fn asin(self) -> Self;
+    /// sqrt(self^2 + b^2), its derivative 0 at 0, where it has none.
+    fn hypot(self, b: Self) -> Self;
 }
 
 impl Number for f64 {
@@ -44,8 +52,24 @@ impl Number for f64 {
         self
     }
 
+    fn value(self) -> f64 {
+        self
+    }
+
+    fn recip(self) -> f64 {
+        1.0 / self
+    }
+
+    fn sqrt(self) -> f64 {
+        libm::sqrt(self)
+    }
+
     fn asin(self) -> f64 {
         libm::asin(self.clamp(-1.0, 1.0))
+    }
+
+    fn hypot(self, b: f64) -> f64 {
+        libm::hypot(self, b)
     }
 }
 
@@ -110,10 +134,30 @@ impl Number for Dual {
         self.slope
     }
 
+    fn value(self) -> f64 {
+        self.value
+    }
+
+    fn recip(self) -> Dual {
+        let value = 1.0 / self.value;
+        Dual { value, slope: -self.slope * value * value }
+    }
+
+    fn sqrt(self) -> Dual {
+        let value = libm::sqrt(self.value);
+        Dual { value, slope: 0.5 * self.slope / value }
+    }
+
     fn asin(self) -> Dual {
         let cos = libm::sqrt(f64::max((1.0 - self.value) * (1.0 + self.value), 0.0));
         let slope = if cos > 0.0 { self.slope / cos } else { 0.0 };
         Dual { value: self.value.asin(), slope }
+    }
+
+    fn hypot(self, b: Dual) -> Dual {
+        let value = libm::hypot(self.value, b.value);
+        let along = self.slope * self.value + b.slope * b.value;
+        Dual { value, slope: if value > 0.0 { along / value } else { 0.0 } }
     }
 }
 
@@ -169,8 +213,9 @@ pub fn largest(a: Vec3) -> f64 {
 }
 
 /// Length of a vector.
-pub fn norm(a: Vec3) -> f64 {
-    libm::sqrt(dot(a, a))
+#[inline(always)]
+pub fn norm<T: Number>(a: Vec3<T>) -> T {
+    dot(a, a).sqrt()
 }
 
 /// A rotation's matrix: with q from frame B to frame A, columns of B components become
@@ -191,8 +236,8 @@ pub fn rotation<T: Number>(q: &Quaternion<T>) -> Mat3<T> {
 
 /// q/|q|.
 #[inline(always)]
-pub fn unit_quaternion(q: Quaternion) -> Quaternion {
-    let share = 1.0 / libm::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+pub fn unit_quaternion<T: Number>(q: Quaternion<T>) -> Quaternion<T> {
+    let share = (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt().recip();
     q.map(|x| x * share)
 }
 
@@ -205,8 +250,8 @@ pub fn unit_quaternion_slope(unit: &Quaternion, q: &Quaternion, dq: &Quaternion)
 
 /// A direction p and its rate p', with |p| = 1 and p.p' = 0 made so.
 #[inline(always)]
-pub fn on_sphere(p: Vec3, p_d: Vec3) -> [Vec3; 2] {
-    let unit = scale(1.0 / norm(p), p);
+pub fn on_sphere<T: Number>(p: Vec3<T>, p_d: Vec3<T>) -> [Vec3<T>; 2] {
+    let unit = scale(norm(p).recip(), p);
     [unit, sub(p_d, scale(dot(unit, p_d), unit))]
 }
 

@@ -3,12 +3,15 @@
 use std::ops::{Deref, DerefMut};
 
 use craft::{
-    Craft, SloshTank, SloshTankOutputs, TANK_INPUTS, TANK_STATES, TankInputs, TankParameters,
-    TankState,
+    Coupling, Craft, SloshTank, SloshTankOutputs, TANK_INPUTS, TANK_STATES, TankInputs,
+    TankParameters, TankState,
 };
 use runtime::table::Table;
 
 use crate::table::TABLE;
+
+/// Coupling by the total wrench, both sides extrapolated, is stable up to 2/sqrt(3) - 1 = 0.155.
+const LIMIT: f64 = 0.15;
 
 /// One tank.
 #[derive(Clone, Debug)]
@@ -29,6 +32,8 @@ impl Model {
 #[derive(Clone, Debug)]
 pub struct Parameters {
     tank: TankParameters,
+    /// The coupling's number if it is not 0, for hosts that set no enumerations.
+    pub coupling_kind: i32,
     /// Number of slosh modes.
     pub modes: i32,
     /// The host's mass properties; mass 0: not known.
@@ -39,7 +44,7 @@ impl Default for Parameters {
     fn default() -> Self {
         let tank = TankParameters::default();
         let host = Craft { mass: 0.0, ..craft::Parameters::default().craft };
-        Parameters { modes: tank.tank.modes as i32, host, tank }
+        Parameters { coupling_kind: 0, modes: tank.tank.modes as i32, host, tank }
     }
 }
 
@@ -60,13 +65,18 @@ impl DerefMut for Parameters {
 impl Parameters {
     fn complete(&self) -> TankParameters {
         let mut p = self.tank;
+        match self.coupling_kind {
+            1 => p.coupling = craft::Coupling::Split,
+            2 => p.coupling = craft::Coupling::Lumped,
+            _ => {}
+        }
         p.tank.modes = usize::try_from(self.modes).unwrap_or(0);
         p.host = (self.host.mass > 0.0).then_some(self.host);
         p
     }
 }
 
-/// The host's motion. A slope that a host gives for omega is not used: it is omega_dot.
+/// The host's motion. A slope that a host gives for omega is not used: it follows from omega_dot.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Inputs {
     /// As the tank takes it.
@@ -81,6 +91,8 @@ impl runtime::Model for Model {
     type Outputs = SloshTankOutputs;
     type Discrete = ();
 
+    const OUTPUTS_USE_SLOPES: bool = true;
+
     fn table() -> &'static Table<Self> {
         &TABLE
     }
@@ -94,6 +106,19 @@ impl runtime::Model for Model {
         let mut tank = SloshTank::new(&parameters.complete(), &inputs.tank, start_time, tolerance)?;
         let coupling_ratio = tank.coupling_ratio().unwrap_or(0.0);
         Ok(Model { tank, coupling_ratio })
+    }
+
+    fn warnings(parameters: &Parameters, inputs: &Inputs) -> Vec<String> {
+        let model = <Model as runtime::Model>::new(parameters, inputs, 0.0, 1e-6);
+        let ratio = model.map_or(0.0, |model| model.coupling_ratio);
+        if parameters.tank.coupling == Coupling::Lumped || ratio <= LIMIT {
+            return Vec::new();
+        }
+        vec![format!(
+            "coupling_ratio = {ratio:.3}: a host that takes force and torque as they are diverges above 1 \
+             (values held), 1/3 or {LIMIT} (extrapolated), at any communication step; use bias and \
+             added_mass instead, and leave host.mass at 0 if you do"
+        )]
     }
 
     fn save(&self, words: &mut Vec<u64>) {
@@ -116,6 +141,15 @@ impl runtime::Model for Model {
 
     fn outputs(&mut self, inputs: &Inputs) -> SloshTankOutputs {
         self.tank.outputs(&inputs.tank)
+    }
+
+    fn set_dependent_slopes(inputs: &mut Inputs, h: f64) -> bool {
+        // omega at the step's end is then omega + omega_dot h + omega_dot' h^2/2. Where that
+        // overflows the step is refused.
+        let rate = &inputs.tank.omega_dot;
+        let slope = [0, 1, 2].map(|i| rate.value[i] + rate.slope[i] * h / 2.0);
+        inputs.omega_slope = slope.map(|x| if x.is_finite() { x } else { 0.0 });
+        true
     }
 
     fn continuous_states(&self) -> &[f64] {

@@ -27,7 +27,7 @@ static SCALARS: [Scalar<Model>; scalar_count(VARIABLES)] = scalars(VARIABLES);
 // Bias and added mass contain neither a nor omega_dot: a host that solves with them has no
 // algebraic loop. Lumped, the bias contains both, as given in the step before.
 const WRENCH: &[&str] = &["tank.p", "tank.p_dot", "a", "omega", "omega_dot"];
-const EVERYTHING: &[&str] = &["tank.", "a", "omega", "omega_dot", "coupling"];
+const EVERYTHING: &[&str] = &["tank.", "a", "omega", "omega_dot", "coupling", "coupling_kind"];
 const TANK: &[&str] = &["tank."];
 
 const VECTOR: &[usize] = &[3];
@@ -52,7 +52,7 @@ static VARIABLES: &[Variable<Model>] = &[
         "Torque of the whole liquid on the host about O, host axes")
         .shape(VECTOR).depends_on(WRENCH).initial_depends_on(EVERYTHING),
     V::output("bias", |o, n| o.bias[n], "",
-        "Force (1 to 3, N) and torque about O (4 to 6, N.m) that the host adds on its right side: force, torque = bias - added_mass [a; omega_dot]. With coupling = lumped it belongs to the constant added_mass and to the a, omega_dot given last")
+        "Force (1 to 3, N) and torque about O (4 to 6, N.m) that the host adds on its right side: force, torque = bias - added_mass [a; omega_dot]. With coupling = lumped it is for a rigid body that includes the constant added_mass, at the motion given last")
         .shape(&[6]).depends_on(WRENCH).initial_depends_on(EVERYTHING),
     V::output("added_mass", |o, n| o.added_mass[n], "",
         "Symmetric 6 x 6 added-mass matrix about O that the host adds on its left side, upper triangle by rows (kg, kg.m, kg.m2): it follows from tank.p alone; with coupling = lumped it is constant")
@@ -61,15 +61,26 @@ static VARIABLES: &[Variable<Model>] = &[
     // Inputs
     V::input("a", |i, n| [&mut i.tank.a.value[n], &mut i.tank.a.slope[n]], "m/s2",
         "Specific force at O: what an accelerometer there reads, host axes; held over a step unless its derivative is set")
-        .shape(VECTOR),
+        .shape(VECTOR).range(-1e9, 1e9),
     V::input("omega", |i, n| [&mut i.tank.omega[n], &mut i.omega_slope[n]], "rad/s",
-        "Angular velocity of the host, host axes, at the start of the step; in the step it follows from omega_dot")
-        .display_unit("deg/s").shape(VECTOR),
+        "Angular velocity of the host, host axes, at the start of the step; in the step it follows from omega_dot, and unless it is set anew it goes on from there")
+        .display_unit("deg/s").shape(VECTOR).range(-1e9, 1e9),
     V::input("omega_dot", |i, n| [&mut i.tank.omega_dot.value[n], &mut i.tank.omega_dot.slope[n]], "rad/s2",
         "Angular acceleration of the host, host axes; held over a step unless its derivative is set")
-        .display_unit("deg/s2").shape(VECTOR),
+        .display_unit("deg/s2").shape(VECTOR).range(-1e9, 1e9),
 
     // Locals
+    V::local("tank.wave_height", |o, _| o.tank.wave_height, "m",
+        "Amplitude of the surface at the wall, all modes together: wave times slosh angle")
+        .display_unit("mm").depends_on(&["tank.p"]),
+    V::local("mass", |o, _| o.mass, "kg",
+        "Mass of the whole liquid"),
+    V::local("center_of_mass", |o, n| o.center_of_mass[n], "m",
+        "Centre of mass of the whole liquid from O, host axes")
+        .shape(VECTOR).depends_on(&["tank.p"]),
+    V::local("inertia", |o, n| o.inertia[n / 3][n % 3], "kg.m2",
+        "Inertia of the whole liquid about its centre of mass, each bob a point mass where it is, host axes")
+        .shape(&[3, 3]).depends_on(&["tank.p"]),
     V::local("tank.angle_x", |o, n| o.tank.angle_x[n], "rad",
         "Slosh angle of a mode: its sine is the bob's displacement along the tank's x axis over the pendulum's length")
         .display_unit("deg").shape(PER_MODE).depends_on(&["tank.p"]),
@@ -97,12 +108,21 @@ static VARIABLES: &[Variable<Model>] = &[
     // The tank
     V::choice("coupling", &COUPLING, |p| p.coupling as i32, |p, n| p.coupling = if n == 2 { Coupling::Lumped } else { Coupling::Split },
         "What bias and added_mass stand for"),
+    V::integer("coupling_kind", |p, _| &mut p.coupling_kind,
+        "The coupling's number, for hosts that set no enumerations (ecos, libcosim): 1 split, 2 lumped; 0: as coupling says")
+        .between(0, 2),
     V::parameter("tank.position", |p, n| &mut p.tank.position[n], "m",
         "The tank's origin from O, host axes")
         .shape(VECTOR).range(-1e4, 1e4),
     V::parameter("tank.q", |p, n| &mut p.tank.q[n], "1",
         "Attitude of the tank, tank to host axes, scalar first; normalised")
         .shape(&[4]),
+    V::parameter("tank.diameter", |p, _| &mut p.tank.diameter, "m", "Diameter of an upright cylinder; above 0 it makes with depth and density m_0, H_0, I_0 and each mode's mass, length, hinge and wave by potential flow, and the tank's origin is the centre of its bottom")
+        .display_unit("mm").range(0.0, 1e3),
+    V::parameter("tank.depth", |p, _| &mut p.tank.depth, "m", "Depth of the liquid in the cylinder, used where diameter is above 0")
+        .display_unit("mm").range(1e-3, 1e3),
+    V::parameter("tank.density", |p, _| &mut p.tank.density, "kg/m3", "Density of the liquid, used where diameter is above 0")
+        .range(1e-3, 1e5),
     V::parameter("tank.m_0", |p, _| &mut p.tank.m_0, "kg", "Mass of the rigid liquid")
         .range(0.0, 1e9),
     V::parameter("tank.H_0", |p, _| &mut p.tank.h_0, "m", "Height of the rigid liquid's centre of mass on the tank's axis"),
@@ -118,12 +138,17 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(PER_MODE).range(1e-9, 1e9),
     V::parameter("tank.length", |p, n| &mut p.tank.length[n], "m", "Length of a mode's pendulum")
         .shape(PER_MODE).range(1e-6, 1e4),
+    V::parameter("tank.frequency", |p, n| &mut p.tank.frequency[n], "Hz",
+        "Natural frequency of a mode with the tank held, at g_ref; above 0 it stands in place of length: (2 pi f)^2 = g_ref/l + k/m")
+        .shape(PER_MODE).range(0.0, 1e6),
     V::parameter("tank.hinge", |p, n| &mut p.tank.hinge[n], "m", "Height of a mode's hinge on the tank's axis")
         .shape(PER_MODE),
     V::parameter("tank.k", |p, n| &mut p.tank.k[n], "N/m", "Centring stiffness of a mode (capillarity, diaphragm)")
         .shape(PER_MODE).range(0.0, 1e12),
     V::parameter("tank.zeta", |p, n| &mut p.tank.zeta[n], "1", "Damping ratio of a mode at g_ref; the drag coefficient 2 zeta m sqrt(g_ref/l + k/m) is constant")
         .shape(PER_MODE).range(0.0, 10.0),
+    V::parameter("tank.wave", |p, n| &mut p.tank.wave[n], "m", "Elevation of the surface at the wall per slosh angle of a mode, for wave_height alone")
+        .shape(PER_MODE).range(0.0, 1e9),
     V::parameter("tank.p_0", |p, n| &mut p.tank.p_0[n / 3][n % 3], "1",
         "Direction from hinge to bob at the start, tank axes; normalised")
         .shape(MODE_VECTOR),
@@ -132,7 +157,7 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(MODE_VECTOR),
 
     // The host, if it tells
-    V::parameter("host.mass", |p, _| &mut p.host.mass, "kg", "Mass of the host without this tank, for coupling_ratio alone; 0: not known")
+    V::parameter("host.mass", |p, _| &mut p.host.mass, "kg", "Mass of the host without this tank, for coupling_ratio and its warning alone; 0: not known")
         .range(0.0, 1e9),
     V::parameter("host.r", |p, n| &mut p.host.r[n], "m", "Its centre of mass from O, host axes")
         .shape(VECTOR).range(-1e4, 1e4),

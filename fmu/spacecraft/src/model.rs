@@ -24,13 +24,16 @@ pub struct Parameters {
     pub tanks: i32,
     /// Number of slosh modes of each tank.
     pub modes: [i32; TANKS],
+    /// Number of points of each tank's table.
+    pub points: [i32; TANKS],
 }
 
 impl Default for Parameters {
     fn default() -> Self {
         let craft = craft::Parameters::default();
         let modes = craft.tank.map(|tank| tank.modes as i32);
-        Parameters { tanks: craft.tanks as i32, modes, craft }
+        let points = craft.tank.map(|tank| tank.fill.points as i32);
+        Parameters { tanks: craft.tanks as i32, modes, points, craft }
     }
 }
 
@@ -52,8 +55,9 @@ impl Parameters {
     fn counted(&self) -> craft::Parameters {
         let mut p = self.craft;
         p.tanks = usize::try_from(self.tanks).unwrap_or(0);
-        for (tank, modes) in p.tank.iter_mut().zip(self.modes) {
-            tank.modes = usize::try_from(modes).unwrap_or(0);
+        for (i, tank) in p.tank.iter_mut().enumerate() {
+            tank.modes = usize::try_from(self.modes[i]).unwrap_or(0);
+            tank.fill.points = usize::try_from(self.points[i]).unwrap_or(0);
         }
         p
     }
@@ -64,6 +68,9 @@ impl runtime::Model for Model {
     type Inputs = Inputs;
     type Outputs = Outputs;
     type Discrete = ();
+
+    // h_wheels turns the craft by its slope.
+    const OUTPUTS_USE_SLOPES: bool = true;
 
     fn table() -> &'static Table<Self> {
         &TABLE
@@ -127,7 +134,10 @@ impl runtime::Model for Model {
         direction.copy_from_slice(dx);
         let slopes = [along.force.slope, along.torque.slope, along.h_wheels.slope];
         let mut du = [0.0; INPUTS];
-        du.copy_from_slice(slopes.as_flattened());
+        du[..9].copy_from_slice(slopes.as_flattened());
+        for (du, flow) in du[9..].iter_mut().zip(&along.mass_flow) {
+            *du = flow.slope;
+        }
         dx_dot.copy_from_slice(&self.craft.directional_derivative(inputs, &direction, &du));
         self.craft.output_derivatives(inputs, &direction, &du)
     }
@@ -146,6 +156,6 @@ impl runtime::Model for Model {
 
     fn accept_step(&mut self, inputs: &Inputs) -> Result<bool, String> {
         self.craft.follow_wheels(inputs);
-        Ok(false)
+        self.craft.check_liquids().map(|()| false).map_err(|why| why.to_string())
     }
 }

@@ -3,7 +3,7 @@
 //! Arrays have FMI's structured names: `tank[].p` of the shape 4, 3, 3 is `tank[1].p[1,1]`, …: tank,
 //! mode, axis.
 
-use craft::{MODES, STATES, State, TANKS, index};
+use craft::{MODES, POINTS, STATES, State, TANKS, index};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::{Enumeration, Item, Variable};
 
@@ -28,12 +28,42 @@ static SCALARS: [Scalar<Model>; scalar_count(VARIABLES)] = scalars(VARIABLES);
 
 // The accelerations balance all forces: the pull of the liquids' pendulums, their drag and centring
 // follow from directions and rates, a pivot's gravity from the attitude.
-const MOTION: &[&str] = &["q", "omega", "tank[].p", "tank[].p_dot", "force", "torque", "h_wheels"];
-const MOMENTUM: &[&str] = &["q", "omega", "velocity", "tank[].p", "tank[].p_dot", "h_wheels"];
-const PLACES: &[&str] = &["tank[].p"];
+const MOTION: &[&str] = &[
+    "q",
+    "omega",
+    "tank[].p",
+    "tank[].p_dot",
+    "tank[].liquid",
+    "force",
+    "torque",
+    "h_wheels",
+    "mass_flow",
+];
+const MOMENTUM: &[&str] = &[
+    "q",
+    "omega",
+    "velocity",
+    "tank[].p",
+    "tank[].p_dot",
+    "tank[].liquid",
+    "h_wheels",
+    "mass_flow",
+];
+const PLACES: &[&str] = &["tank[].p", "tank[].liquid"];
+const ANGLES: &[&str] = &["tank[].p"];
 // Where they start.
-const EVERYTHING: &[&str] =
-    &["force", "torque", "h_wheels", "craft.", "mount", "gravity", "tanks", "tank[].", "init."];
+const EVERYTHING: &[&str] = &[
+    "force",
+    "torque",
+    "h_wheels",
+    "mass_flow",
+    "craft.",
+    "mount",
+    "gravity",
+    "tanks",
+    "tank[].",
+    "init.",
+];
 const BOBS: &[&str] = &["tanks", "tank[]."];
 
 const VECTOR: &[usize] = &[3];
@@ -41,6 +71,14 @@ const PER_TANK: &[usize] = &[TANKS];
 const TANK_VECTOR: &[usize] = &[TANKS, 3];
 const PER_MODE: &[usize] = &[TANKS, MODES];
 const MODE_VECTOR: &[usize] = &[TANKS, MODES, 3];
+
+const TABLE_OF_TANK: &[usize] = &[TANKS, POINTS];
+const TABLE_OF_MODE: &[usize] = &[TANKS, MODES, POINTS];
+
+/// Tank, mode and point of an element of the shape [`TABLE_OF_MODE`].
+const fn point(n: usize) -> (usize, usize, usize) {
+    (n / (POINTS * MODES), n / POINTS % MODES, n % POINTS)
+}
 
 /// Tank, mode and axis of an element of the shape [`MODE_VECTOR`].
 const fn place(n: usize) -> (usize, usize, usize) {
@@ -88,13 +126,17 @@ static VARIABLES: &[Variable<Model>] = &[
     // Inputs
     V::input("force", |i, n| [&mut i.force.value[n], &mut i.force.slope[n]], "N",
         "Applied force at O, body axes; held over a step unless its derivative is set")
-        .shape(VECTOR),
+        .shape(VECTOR).range(-1e12, 1e12),
     V::input("torque", |i, n| [&mut i.torque.value[n], &mut i.torque.slope[n]], "N.m",
         "Applied torque about O, body axes; held over a step unless its derivative is set")
-        .shape(VECTOR),
+        .shape(VECTOR).range(-1e12, 1e12),
     V::input("h_wheels", |i, n| [&mut i.h_wheels.value[n], &mut i.h_wheels.slope[n]], "N.m.s",
         "Angular momentum of the wheels relative to the body, body axes. Its derivative turns the craft; a jump does so by an impulse that keeps the total angular momentum. In Model Exchange, where no derivative is known, put the reaction into torque")
-        .shape(VECTOR),
+        .shape(VECTOR).range(-1e12, 1e12),
+
+    V::input("mass_flow", |i, n| [&mut i.mass_flow[n].value, &mut i.mass_flow[n].slope], "kg/s",
+        "Mass that flows out of each tank, with the tank's velocity at the outlet (its thrust is a part of force); in where negative. Of no effect in a tank with fill.points = 0")
+        .shape(PER_TANK),
 
     // Locals
     V::local("momentum", |o, n| o.momentum[n], "kg.m/s",
@@ -104,16 +146,17 @@ static VARIABLES: &[Variable<Model>] = &[
         "Angular momentum of everything about its centre of mass (on a pivot about O), wheels included, inertial axes")
         .shape(VECTOR).depends_on(MOMENTUM),
     V::local("energy", |o, _| o.energy, "J",
-        "Kinetic energy of everything, of the centring springs, and on a pivot of gravity; the wheels' spin left out")
-        .depends_on(&["q", "omega", "velocity", "tank[].p", "tank[].p_dot"]),
+        "Kinetic energy of everything, of the centring springs, and on a pivot of gravity; the wheels' spin and the flow towards an outlet left out")
+        .depends_on(&["q", "omega", "velocity", "tank[].p", "tank[].p_dot", "tank[].liquid", "mass_flow"]),
     V::local("work", |o, _| o.work, "J",
-        "Work of force, torque and wheels on the craft since the start: energy - energy(0) = work - dissipated")
+        "Work of force, torque and wheels on the craft since the start: energy - energy(0) = work - dissipated while nothing drains")
         .is_state(|_| index::WORK).depends_on(&["work"]),
     V::local("dissipated", |o, _| o.dissipated, "J",
         "Energy dissipated by the liquids since the start")
         .is_state(|_| index::DISSIPATED).depends_on(&["dissipated"]),
     V::local("mass", |o, _| o.mass, "kg",
-        "Mass of everything"),
+        "Mass of everything")
+        .depends_on(&["tank[].liquid"]),
     V::local("center_of_mass", |o, n| o.center_of_mass[n], "m",
         "Centre of mass of everything from O, body axes")
         .shape(VECTOR).depends_on(PLACES),
@@ -126,12 +169,15 @@ static VARIABLES: &[Variable<Model>] = &[
     V::local("tank[].torque", |o, n| o.tank[n / 3].torque[n % 3], "N.m",
         "Torque of a tank's whole liquid on the craft about O, body axes")
         .shape(TANK_VECTOR).depends_on(MOTION),
+    V::local("tank[].wave_height", |o, n| o.tank[n].wave_height, "m",
+        "Amplitude of a tank's surface at the wall, all modes together: wave times slosh angle")
+        .display_unit("mm").shape(PER_TANK).depends_on(ANGLES),
     V::local("tank[].angle_x", |o, n| o.tank[n / MODES].angle_x[n % MODES], "rad",
         "Slosh angle of a mode: its sine is the bob's displacement along the tank's x axis over the pendulum's length")
-        .display_unit("deg").shape(PER_MODE).depends_on(PLACES),
+        .display_unit("deg").shape(PER_MODE).depends_on(ANGLES),
     V::local("tank[].angle_y", |o, n| o.tank[n / MODES].angle_y[n % MODES], "rad",
         "Slosh angle of a mode along the tank's y axis")
-        .display_unit("deg").shape(PER_MODE).depends_on(PLACES),
+        .display_unit("deg").shape(PER_MODE).depends_on(ANGLES),
 
     // The modes' directions and rates
     V::state("tank[].p", bob, "1",
@@ -140,6 +186,10 @@ static VARIABLES: &[Variable<Model>] = &[
     V::state("tank[].p_dot", |n| bob(n) + 3, "1/s",
         "Rate of tank[].p against the tank, tank axes")
         .shape(MODE_VECTOR).nominal(0.1).reinit().depends_on(&["tank[].p_dot[]"]).initial_depends_on(BOBS),
+
+    V::state("tank[].liquid", |n| index::LIQUID + n, "kg",
+        "Mass of the whole liquid in a tank")
+        .shape(PER_TANK).nominal(100.0).depends_on(&["tank[].liquid[]"]).initial_depends_on(BOBS),
 
     // The derivatives of the continuous states
     V::derivative("der(q)", |n| index::Q + n, "1/s", "Derivative of q")
@@ -154,7 +204,9 @@ static VARIABLES: &[Variable<Model>] = &[
     V::derivative("der(work)", |_| index::WORK, "W", "Derivative of work")
         .depends_on(&["q", "omega", "velocity", "force", "torque", "h_wheels"]).initial_depends_on(EVERYTHING),
     V::derivative("der(dissipated)", |_| index::DISSIPATED, "W", "Derivative of dissipated")
-        .depends_on(&["tank[].p", "tank[].p_dot"]).initial_depends_on(EVERYTHING),
+        .depends_on(&["tank[].p", "tank[].p_dot", "tank[].liquid"]).initial_depends_on(EVERYTHING),
+    V::derivative("der(tank[].liquid)", |n| index::LIQUID + n, "kg/s", "Derivative of tank[].liquid: minus mass_flow")
+        .shape(PER_TANK).depends_on(&["mass_flow[]"]).initial_depends_on(&["mass_flow", "tanks", "tank[]."]),
     V::derivative("der(tank[].p)", bob, "1/s", "Derivative of tank[].p: tank[].p_dot")
         .shape(MODE_VECTOR).depends_on(&["tank[].p", "tank[].p_dot"]).initial_depends_on(BOBS),
     V::derivative("der(tank[].p_dot)", |n| bob(n) + 3, "1/s2", "Derivative of tank[].p_dot")
@@ -162,7 +214,7 @@ static VARIABLES: &[Variable<Model>] = &[
 
     // The dry craft
     V::parameter("craft.mass", |p, _| &mut p.craft.mass, "kg", "Mass of the dry craft, wheels included")
-        .range(1e-6, 1e9),
+        .range(1e-6, 1e12),
     V::parameter("craft.r", |p, n| &mut p.craft.r[n], "m", "Centre of mass of the dry craft from O, body axes")
         .shape(VECTOR).range(-1e4, 1e4),
     V::parameter("craft.Jxx", |p, _| &mut p.craft.j.xx, "kg.m2", "Moment of inertia of the dry craft about its centre of mass")
@@ -188,6 +240,12 @@ static VARIABLES: &[Variable<Model>] = &[
     V::parameter("tank[].q", |p, n| &mut p.tank[n / 4].q[n % 4], "1",
         "Attitude of the tank, tank to body axes, scalar first; normalised")
         .shape(&[TANKS, 4]),
+    V::parameter("tank[].diameter", |p, n| &mut p.tank[n].diameter, "m", "Diameter of an upright cylinder; above 0 it makes with depth and density m_0, H_0, I_0 and each mode's mass, length, hinge and wave by potential flow, and the tank's origin is the centre of its bottom")
+        .display_unit("mm").shape(PER_TANK).range(0.0, 1e3),
+    V::parameter("tank[].depth", |p, n| &mut p.tank[n].depth, "m", "Depth of the liquid in the cylinder, used where diameter is above 0")
+        .display_unit("mm").shape(PER_TANK).range(1e-3, 1e3),
+    V::parameter("tank[].density", |p, n| &mut p.tank[n].density, "kg/m3", "Density of the liquid, used where diameter is above 0")
+        .shape(PER_TANK).range(1e-3, 1e5),
     V::parameter("tank[].m_0", |p, n| &mut p.tank[n].m_0, "kg", "Mass of the rigid liquid")
         .shape(PER_TANK).range(0.0, 1e9),
     V::parameter("tank[].H_0", |p, n| &mut p.tank[n].h_0, "m", "Height of the rigid liquid's centre of mass on the tank's axis")
@@ -204,12 +262,37 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(PER_MODE).range(1e-9, 1e9),
     V::parameter("tank[].length", |p, n| &mut p.tank[n / MODES].length[n % MODES], "m", "Length of a mode's pendulum")
         .shape(PER_MODE).range(1e-6, 1e4),
+    V::parameter("tank[].frequency", |p, n| &mut p.tank[n / MODES].frequency[n % MODES], "Hz",
+        "Natural frequency of a mode with the tank held, at g_ref; above 0 it stands in place of length: (2 pi f)^2 = g_ref/l + k/m")
+        .shape(PER_MODE).range(0.0, 1e6),
     V::parameter("tank[].hinge", |p, n| &mut p.tank[n / MODES].hinge[n % MODES], "m", "Height of a mode's hinge on the tank's axis")
         .shape(PER_MODE),
     V::parameter("tank[].k", |p, n| &mut p.tank[n / MODES].k[n % MODES], "N/m", "Centring stiffness of a mode (capillarity, diaphragm)")
         .shape(PER_MODE).range(0.0, 1e12),
     V::parameter("tank[].zeta", |p, n| &mut p.tank[n / MODES].zeta[n % MODES], "1", "Damping ratio of a mode at g_ref; the drag coefficient 2 zeta m sqrt(g_ref/l + k/m) is constant")
         .shape(PER_MODE).range(0.0, 10.0),
+    V::parameter("tank[].wave", |p, n| &mut p.tank[n / MODES].wave[n % MODES], "m", "Elevation of the surface at the wall per slosh angle of a mode, for wave_height alone")
+        .shape(PER_MODE).range(0.0, 1e9),
+    V::integer("tank[].fill.points", |p, n| &mut p.points[n], "Points of the tank's table: 0 for a tank whose liquid stays; with 2 or more the tank can drain, and modes and rigid liquid are the table's, interpolated monotonely with two continuous derivatives; as they start, the default tank at depths of 0.1 to 0.8 m")
+        .between(0, POINTS as i32).shape(PER_TANK),
+    V::parameter("tank[].liquid_0", |p, n| &mut p.tank[n].liquid_0, "kg", "Mass of liquid at the start, used with fill.points > 0")
+        .shape(PER_TANK).range(0.0, 1e9),
+    V::parameter("tank[].outlet", |p, n| &mut p.tank[n].outlet, "m", "Height of the outlet on the tank's axis, used with fill.points > 0")
+        .shape(PER_TANK).range(-1e4, 1e4),
+    V::parameter("tank[].fill.liquid", |p, n| &mut p.tank[n / POINTS].fill.liquid[n % POINTS], "kg", "Mass of liquid at a point of the table, rising")
+        .shape(TABLE_OF_TANK).range(0.0, 1e9),
+    V::parameter("tank[].fill.H_0", |p, n| &mut p.tank[n / POINTS].fill.h_0[n % POINTS], "m", "H_0 at a point of the table")
+        .shape(TABLE_OF_TANK),
+    V::parameter("tank[].fill.I_0", |p, n| &mut p.tank[n / POINTS].fill.i_0[n % POINTS], "kg.m2", "I_0 at a point of the table")
+        .shape(TABLE_OF_TANK).range(0.0, 1e12),
+    V::parameter("tank[].fill.I_z", |p, n| &mut p.tank[n / POINTS].fill.i_z[n % POINTS], "kg.m2", "I_z at a point of the table")
+        .shape(TABLE_OF_TANK).range(0.0, 1e12),
+    V::parameter("tank[].fill.mass", |p, n| { let (i, m, k) = point(n); &mut p.tank[i].fill.mass[m][k] }, "kg", "Mass of a mode's bob at a point of the table")
+        .shape(TABLE_OF_MODE).range(0.0, 1e9),
+    V::parameter("tank[].fill.length", |p, n| { let (i, m, k) = point(n); &mut p.tank[i].fill.length[m][k] }, "m", "Length of a mode's pendulum at a point of the table")
+        .shape(TABLE_OF_MODE).range(0.0, 1e4),
+    V::parameter("tank[].fill.hinge", |p, n| { let (i, m, k) = point(n); &mut p.tank[i].fill.hinge[m][k] }, "m", "Height of a mode's hinge at a point of the table")
+        .shape(TABLE_OF_MODE),
     V::parameter("tank[].p_0", |p, n| { let (i, m, k) = place(n); &mut p.tank[i].p_0[m][k] }, "1",
         "Direction from hinge to bob at the start, tank axes; normalised")
         .shape(MODE_VECTOR),
@@ -240,4 +323,4 @@ static MOUNT: Enumeration = Enumeration {
     ],
 };
 
-const _: () = assert!(STATES == index::BOBS + 6 * TANKS * MODES);
+const _: () = assert!(STATES == index::LIQUID + TANKS);

@@ -1,16 +1,21 @@
 //! Steps, states and refusals: what a host may rely on.
 
 use craft::{
-    Coupling, Inputs, Mount, Parameters, Ramp, STATES, SloshTank, Spacecraft, State, StepError,
-    TANK_STATES, TankInputs, TankParameters, TankState, index,
+    Coupling, Inputs, Line, Mount, Parameters, Ramp, STATES, SloshTank, Spacecraft, State,
+    StepError, TANK_STATES, TankInputs, TankParameters, TankState, index,
 };
 
-use crate::random::Random;
-use crate::records::{STEP, at_end, inputs, record, spacecraft};
+use super::random::Random;
+use super::records::{STEP, at_end, inputs, record, spacecraft};
 
 fn later(u: &Inputs, t: f64) -> Inputs {
     let at = |ramp: &Ramp| Ramp { value: ramp.at(t), slope: ramp.slope };
-    Inputs { force: at(&u.force), torque: at(&u.torque), h_wheels: at(&u.h_wheels) }
+    Inputs {
+        force: at(&u.force),
+        torque: at(&u.torque),
+        h_wheels: at(&u.h_wheels),
+        ..Inputs::default()
+    }
 }
 
 fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
@@ -311,7 +316,7 @@ fn random_steps_end_in_numbers_or_an_error() {
                 slope: random.vector(size),
             };
             let (force, torque) = (ramp(&mut random), ramp(&mut random));
-            let u = Inputs { force, torque, h_wheels: ramp(&mut random) };
+            let u = Inputs { force, torque, h_wheels: ramp(&mut random), ..Inputs::default() };
             let before = *craft.state();
             let h = random.magnitude(1e-9, 0.1);
             match craft.step(&u, h) {
@@ -355,7 +360,7 @@ fn bobs_that_are_not_used_stay_at_rest() {
     let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap();
     craft.step(&u, 1.0).unwrap();
     let (x, rate) = (craft.continuous_states(), craft.derivatives(&u));
-    for at in (index::bob(0, 1)..STATES).step_by(6) {
+    for at in (index::bob(0, 1)..index::LIQUID).step_by(6) {
         assert_eq!(x[at..at + 6], [0.0, 0.0, -1.0, 0.0, 0.0, 0.0]);
         assert_eq!(rate[at..at + 6], [0.0; 6]);
     }
@@ -387,4 +392,36 @@ fn nothing_is_allocated_while_stepping() {
         tank.directional_derivative(&u, &[1.0; TANK_STATES], &[1.0; craft::TANK_INPUTS]);
     });
     assert_eq!(counted.count_total, 0);
+}
+
+#[test]
+fn a_flow_that_cannot_be_is_refused() {
+    let (mut p, mut u) = (Parameters::default(), Inputs::default());
+    let flow = |value: f64| [value, 0.0, 0.0, 0.0].map(|value| Line { value, slope: 0.0 });
+    // A tank without a table stays as it is.
+    u.mass_flow = flow(0.1);
+    let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap();
+    let mass = craft.outputs(&u).mass;
+    craft.step(&u, 1.0).unwrap();
+    assert_eq!(craft.outputs(&u).mass, mass);
+
+    let tank = &mut p.tank[0];
+    (tank.modes, tank.fill.points, tank.liquid_0) = (0, 2, 15.0);
+    (tank.fill.liquid[0], tank.fill.liquid[1]) = (10.0, 20.0);
+    let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap();
+    for value in [5.1, -5.1] {
+        u.mass_flow = flow(value);
+        let error = craft.step(&u, 1.0).unwrap_err();
+        let message = error.to_string();
+        assert!(matches!(error, StepError::BeyondTable { tank: 1, .. }), "{message}");
+        assert!(message.contains("(allowed: 10 to 20 kg"), "{message}");
+    }
+    u.mass_flow = flow(5.0);
+    craft.step(&u, 1.0).unwrap();
+
+    p.tank[0].fill.liquid[1] = 9.0;
+    p.tank[0].liquid_0 = 30.0;
+    let problems = Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap_err();
+    assert!(problems[0].starts_with("tank[1].fill.liquid[2] = 9.0"), "{problems:?}");
+    assert!(problems[1].starts_with("tank[1].liquid_0 = 30.0"), "{problems:?}");
 }

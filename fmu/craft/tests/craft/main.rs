@@ -1,8 +1,12 @@
 //! What must hold of the craft and of the tank alone.
+//!
+//! `tests/six`, at the root of the project, runs most of these once more through the packed FMUs,
+//! and has the balances over 1000 s and the coupling by co-simulation.
 
-mod balances;
-mod cosimulation;
+mod component;
+mod draining;
 mod equations;
+mod exchange;
 mod independent;
 mod invariances;
 mod life;

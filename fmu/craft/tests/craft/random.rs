@@ -1,6 +1,6 @@
 //! Random craft, states and inputs, of the sizes that spacecraft have.
 
-use craft::{Craft, INPUTS, Inertia, Init, Inputs, Mount, Parameters, Ramp, STATES, TANKS, Tank};
+use craft::{Craft, Inertia, Init, Inputs, Mount, Parameters, Ramp, TANKS, Tank};
 
 pub struct Random(fastrand::Rng);
 
@@ -80,11 +80,11 @@ impl Random {
 
     pub fn inputs(&mut self) -> Inputs {
         let mut ramp = |size: f64| Ramp { value: self.vector(size), slope: self.vector(size) };
-        Inputs { force: ramp(1000.0), torque: ramp(100.0), h_wheels: ramp(20.0) }
-    }
-
-    /// A direction of states and inputs.
-    pub fn direction(&mut self) -> ([f64; STATES], [f64; INPUTS]) {
-        (self.vector(1.0), self.vector(100.0))
+        Inputs {
+            force: ramp(1000.0),
+            torque: ramp(100.0),
+            h_wheels: ramp(20.0),
+            ..Inputs::default()
+        }
     }
 }

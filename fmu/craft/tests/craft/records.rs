@@ -2,10 +2,11 @@
 //! written twice more, once in 113-bit arithmetic; what its signals are stands in its `about`.
 
 use craft::{
-    Craft, Inertia, Init, Inputs, Mount, Parameters, Ramp, SloshTank, Spacecraft, TANKS, Tank,
-    TankInputs, TankParameters,
+    Craft, Inertia, Init, Inputs, Mount, Parameters, Ramp, TANKS, Tank, TankInputs, TankParameters,
 };
 use serde_json::Value;
+
+use super::component::{SloshTank, Spacecraft};
 
 /// Communication step of the records, s: inputs are linear between its multiples.
 pub const STEP: f64 = 0.02;
@@ -13,9 +14,11 @@ pub const STEP: f64 = 0.02;
 /// The records: of the kind `craft`, and of the kind `tank`. The variable SIX_JSON names another
 /// file of the same form, such as the whole one.
 pub fn records(kind: &str) -> Vec<Value> {
-    let file = std::env::var("SIX_JSON")
-        .unwrap_or_else(|_| concat!(env!("CARGO_MANIFEST_DIR"), "/tests/six.json").into());
-    let mut all: Value = serde_json::from_str(&std::fs::read_to_string(file).unwrap()).unwrap();
+    let text = match std::env::var("SIX_JSON") {
+        Ok(file) => std::fs::read_to_string(file).unwrap(),
+        Err(_) => include_str!("../six.json").into(),
+    };
+    let mut all: Value = serde_json::from_str(&text).unwrap();
     let Value::Array(records) = all["records"].take() else { panic!("no records") };
     records.into_iter().filter(|record| record["kind"] == kind).collect()
 }
@@ -147,6 +150,7 @@ pub fn inputs(record: &Value, k: usize) -> Inputs {
         force: ramp(terms, "f", k),
         torque: ramp(terms, "tau", k),
         h_wheels: ramp(terms, "h_w", k),
+        ..Inputs::default()
     }
 }
 
@@ -157,6 +161,7 @@ pub fn at_end(inputs: &Inputs) -> Inputs {
         force: end(&inputs.force),
         torque: end(&inputs.torque),
         h_wheels: end(&inputs.h_wheels),
+        ..Inputs::default()
     }
 }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use craft::{Outputs, SloshTankOutputs};
 use serde_json::Value;
 
-use crate::records::*;
+use super::records::*;
 
 /// Largest deviation of each signal over the record, relative to its largest value.
 #[derive(Default)]

@@ -13,10 +13,11 @@
 //!
 //! Source: Lagrange's equations of lateral and pitch motion with one pendulum.
 
-use craft::{INPUTS, Inertia, Inputs, Parameters, Ramp, STATES, Spacecraft, Tank, index};
+use craft::{INPUTS, Inertia, Inputs, Parameters, Ramp, STATES, Tank, index};
 use nalgebra::{Complex, DMatrix, Matrix4, Vector4};
 
-use crate::records::{parameters, record};
+use super::component::Spacecraft;
+use super::records::{parameters, record};
 
 const PITCH_RATE: usize = index::OMEGA + 1;
 const SLOSH: usize = index::bob(0, 0);
@@ -160,6 +161,42 @@ fn damped_pole_is_the_closed_form() {
     // -0.14324119 +- 2.63885131 i: nine digits are given.
     assert_close(damping / 2.0, 0.14324119, 1e-7);
     assert_close(f64::sqrt(w_2 - damping * damping / 4.0), 2.63885131, 1e-8);
+}
+
+/// -p_x''/p_x of a mode whose craft is too heavy to move and accelerates by g.
+fn frequency_2(tank: Tank, g: f64) -> f64 {
+    let mut p = Parameters::default();
+    let heavy = 1e11;
+    p.craft.mass = heavy;
+    p.craft.j = Inertia { xx: heavy, yy: heavy, zz: heavy, xy: 0.0, xz: 0.0, yz: 0.0 };
+    p.tank[0] = tank;
+    let force = Ramp::held([0.0, 0.0, heavy * g]);
+    let u = Inputs { force, ..Inputs::default() };
+    let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap();
+    let mut dx = [0.0; STATES];
+    dx[SLOSH] = 1.0;
+    -craft.directional_derivative(&u, &dx, &[0.0; INPUTS])[SLOSH_RATE]
+}
+
+/// The liquid's 382 kg leave 4e-9 of 1e11 kg.
+#[test]
+fn a_mode_has_the_frequency_that_it_is_given() {
+    for k in [0.0, 60.0] {
+        let mut tank = Tank { g_ref: 2.0, ..Tank::default() };
+        (tank.k[0], tank.frequency[0]) = (k, 0.5);
+        let w_2 = f64::powi(std::f64::consts::TAU * 0.5, 2);
+        assert_close(frequency_2(tank, 2.0), w_2, 1e-8);
+        // Of it k/m stays the same at any acceleration.
+        let m = tank.mass[0];
+        assert_close(frequency_2(tank, 4.0), 2.0 * (w_2 - k / m) + k / m, 1e-8);
+    }
+}
+
+#[test]
+fn centring_stiffness_restores_in_weightlessness() {
+    let mut tank = Tank::default();
+    tank.k[0] = 60.0;
+    assert_close(frequency_2(tank, 0.0), 60.0 / tank.mass[0], 1e-8);
 }
 
 /// Two equal tanks at +-r, torque about e: zero w_0^2, pole w_0^2 (1 + 2 m r^2/I_z), whatever k.

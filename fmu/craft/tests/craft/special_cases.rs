@@ -1,36 +1,11 @@
 //! Cases with another, simpler description: one axis, degenerate parameters.
 
-use craft::{
-    Inertia, Inputs, Mount, Parameters, Ramp, STATES, SloshTank, Spacecraft, Tank, TankInputs,
-    TankParameters, index,
-};
+use craft::{Inertia, Inputs, Mount, Parameters, Ramp, STATES, TankInputs, TankParameters, index};
 
-use crate::random::Random;
+use super::component::{SloshTank, Spacecraft};
+use super::random::Random;
 
-/// The bench: a hub of I_hub that turns about z, a tank at r on its x axis, one mode.
-struct Bench {
-    i_hub: f64,
-    i_z: f64,
-    m_0: f64,
-    m: f64,
-    l: f64,
-    c: f64,
-    r: f64,
-    g: f64,
-}
-
-const BENCH: Bench = Bench {
-    i_hub: 0.322414,
-    i_z: 2e-3,
-    m_0: 1.3304,
-    m: 0.7563,
-    l: 0.0546,
-    c: 0.05,
-    r: 0.225,
-    g: 9.81,
-};
-
-/// Torque on the hub, N m, that swings the liquid to some 30 degrees, in both directions.
+/// A torque that swings, N m.
 fn torque(t: f64) -> f64 {
     0.6 * f64::sin(13.0 * t)
 }
@@ -41,163 +16,6 @@ const KNOT: f64 = 0.01;
 fn torque_in_knot(k: usize) -> (f64, f64) {
     let (from, to) = (torque(k as f64 * KNOT), torque((k + 1) as f64 * KNOT));
     (from, (to - from) / KNOT)
-}
-
-const START: [f64; 6] = [0.2, -0.1, 0.0, 0.3, 0.5, 0.0];
-
-/// w, p, p' by HubSlosh's spherical model: v = p' + w R p, R the quarter turn about z,
-///
-/// ```text
-/// p' = v - w R p,   v' = -w R v - L p + (r/l) (w^2 e_x - w' e_y) - (g/l) e_z - (c/m) p'
-/// L = L_0 - (r/l) w' p_y,   L_0 = |v|^2 - (g/l) p_z + (r/l) w^2 p_x
-/// (I_hub + m_0 r^2 + I_z + m r^2 p_y^2) w' = tau + m r l p_y L_0
-///                                            + c l [r p_y' + l (p_x p_y' - p_y p_x')]
-/// ```
-fn one_axis(x: &[f64; 7], tau: f64) -> [f64; 7] {
-    let Bench { i_hub, i_z, m_0, m, l, c, r, g } = BENCH;
-    let (w, p, v) = (x[0], [x[1], x[2], x[3]], [x[4], x[5], x[6]]);
-    let p_d = [v[0] + w * p[1], v[1] - w * p[0], v[2]];
-    let v2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2];
-    let pull_0 = v2 - g / l * p[2] + r / l * w * w * p[0];
-    let inertia = i_hub + m_0 * r * r + i_z + m * r * r * p[1] * p[1];
-    let drag = c * l * (r * p_d[1] + l * (p[0] * p_d[1] - p[1] * p_d[0]));
-    let w_d = (tau + m * r * l * p[1] * pull_0 + drag) / inertia;
-    let pull = pull_0 - r / l * w_d * p[1];
-    let v_d = [
-        w * v[1] - pull * p[0] + r / l * w * w - c / m * p_d[0],
-        -w * v[0] - pull * p[1] - r / l * w_d - c / m * p_d[1],
-        -pull * p[2] - g / l - c / m * p_d[2],
-    ];
-    [w_d, p_d[0], p_d[1], p_d[2], v_d[0], v_d[1], v_d[2]]
-}
-
-/// Classical Runge-Kutta from 0 to 20 s, so many steps a knot.
-fn runge_kutta<const N: usize>(
-    mut f: impl FnMut(&[f64; N], f64) -> [f64; N],
-    x: &mut [f64; N],
-    knots: usize,
-    steps: usize,
-) {
-    let h = KNOT / steps as f64;
-    for k in 0..knots {
-        let (from, slope) = torque_in_knot(k);
-        for j in 0..steps {
-            let tau = |share: f64| from + slope * (j as f64 + share) * h;
-            let at = |x: &[f64; N], d: &[f64; N], h: f64| -> [f64; N] {
-                std::array::from_fn(|i| x[i] + h * d[i])
-            };
-            let k1 = f(x, tau(0.0));
-            let k2 = f(&at(x, &k1, h / 2.0), tau(0.5));
-            let k3 = f(&at(x, &k2, h / 2.0), tau(0.5));
-            let k4 = f(&at(x, &k3, h), tau(1.0));
-            for i in 0..N {
-                x[i] += h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i]);
-            }
-        }
-    }
-}
-
-fn bench_tank() -> Tank {
-    let Bench { i_z, m_0, m, l, c, r, g, .. } = BENCH;
-    let mut tank = Tank {
-        position: [r, 0.0, 0.3],
-        q: [1.0, 0.0, 0.0, 0.0],
-        m_0,
-        // Heights and I_0 drop out.
-        h_0: -0.04,
-        i_0: 0.01,
-        i_z,
-        modes: 1,
-        g_ref: g,
-        ..Tank::default()
-    };
-    (tank.mass[0], tank.length[0], tank.hinge[0]) = (m, l, 0.02);
-    tank.zeta[0] = 0.5;
-    tank.zeta[0] *= c / tank.drag(0);
-    let [x, y, z] = [START[0], START[1], -1.0];
-    tank.p_0[0] = [x, y, z];
-    tank.p_dot_0[0] = [START[3], START[4], START[5]];
-    tank
-}
-
-/// w, p, v of the one-axis equations after `knots`, from the tank's start. 1 ms steps leave
-/// (15 h)^4/120 of the motion a radian: 1e-9 in 20 s would need 0.5 ms; 0.25 ms has 1e-11.
-fn one_axis_after(knots: usize) -> [f64; 7] {
-    let tank = TankParameters { tank: bench_tank(), ..TankParameters::default() };
-    let x = SloshTank::new(&tank, &TankInputs::default(), 0.0, 1e-9).unwrap().continuous_states();
-    let mut x = [0.0, x[0], x[1], x[2], x[3], x[4], x[5]];
-    runge_kutta(one_axis, &mut x, knots, 40);
-    x
-}
-
-#[test]
-fn a_craft_too_heavy_to_move_but_about_one_axis_is_hubslosh_s_spherical_model() {
-    let Bench { i_hub, m, g, m_0, .. } = BENCH;
-    let knots = 2000;
-    let want = one_axis_after(knots);
-    // What is left of the craft's motion goes as 1/M.
-    for (mass, allowed) in [(1e9, 1e-7), (1e11, 1e-9)] {
-        let mut p = Parameters { tanks: 1, ..Parameters::default() };
-        p.craft.mass = mass;
-        p.craft.r = [0.0; 3];
-        p.craft.j = Inertia { xx: mass, yy: mass, zz: i_hub, xy: 0.0, xz: 0.0, yz: 0.0 };
-        p.tank[0] = bench_tank();
-        let force = Ramp::held([0.0, 0.0, (mass + m + m_0) * g]);
-        let input = |k: usize| {
-            let (tau, slope) = torque_in_knot(k);
-            let torque = Ramp { value: [0.0, 0.0, tau], slope: [0.0, 0.0, slope] };
-            Inputs { force, torque, ..Inputs::default() }
-        };
-        let mut craft = Spacecraft::new(&p, &input(0), 0.0, 1e-12).unwrap();
-        let mut most = 0.0_f64;
-        for k in 0..knots {
-            craft.step(&input(k), KNOT).unwrap();
-            most = most.max(craft.continuous_states()[index::bob(0, 0)].abs());
-        }
-        // Nonlinear enough to mean something.
-        assert!(most > 0.3, "{most}");
-        let x = craft.continuous_states();
-        let w = x[index::OMEGA + 2];
-        assert!((w - want[0]).abs() < allowed, "{mass:e}: {w} {}", want[0]);
-        for i in 0..3 {
-            let got = x[index::bob(0, 0) + i];
-            assert!((got - want[1 + i]).abs() < allowed, "{mass:e}: {got} {}", want[1 + i]);
-        }
-    }
-}
-
-/// I_hub w' = tau + bias_6 - M_a,6. [0, 0, g, 0, 0, w'] in every stage of the host's integrator:
-/// nothing but rounding and Runge-Kutta's error between.
-#[test]
-fn a_tank_on_a_hub_is_hubslosh_s_spherical_model() {
-    let Bench { i_hub, g, .. } = BENCH;
-    let knots = 1000;
-    let want = one_axis_after(knots);
-    let p = TankParameters { tank: bench_tank(), ..TankParameters::default() };
-    let mut tank = SloshTank::new(&p, &TankInputs::default(), 0.0, 1e-9).unwrap();
-    let start = tank.continuous_states();
-    let mut x = [0.0; 7];
-    x[1..].copy_from_slice(&start[..6]);
-    let a = Ramp::held([0.0, 0.0, g]);
-    let rates = |x: &[f64; 7], tau: f64| {
-        let mut states = tank.continuous_states();
-        states[..6].copy_from_slice(&x[1..]);
-        tank.set_continuous_states(&states);
-        let mut u = TankInputs { a, omega: [0.0, 0.0, x[0]], ..TankInputs::default() };
-        let out = tank.outputs(&u);
-        // Elements 36 and 66 of the upper triangle by rows.
-        let (m_36, m_66) = (out.added_mass[14], out.added_mass[20]);
-        let w_d = (tau + out.bias[5] - m_36 * g) / (i_hub + m_66);
-        u.omega_dot = Ramp::held([0.0, 0.0, w_d]);
-        let d = tank.derivatives(&u);
-        [w_d, d[0], d[1], d[2], d[3], d[4], d[5]]
-    };
-    runge_kutta(rates, &mut x, knots, 40);
-    let w = x[0];
-    assert!((w - want[0]).abs() < 1e-9, "{w} {}", want[0]);
-    for i in 0..3 {
-        assert!((x[1 + i] - want[1 + i]).abs() < 1e-9, "{} {}", x[1 + i], want[1 + i]);
-    }
 }
 
 /// The states after ten seconds of thrust and a swinging torque.
@@ -218,6 +36,49 @@ fn after_ten_seconds(p: &Parameters) -> [f64; STATES] {
 
 fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+}
+
+/// The given numbers have six digits.
+#[test]
+fn a_cylinder_is_the_tank_of_its_modes() {
+    let given = Parameters::default();
+    let mut cylinder = given;
+    let tank = &mut cylinder.tank[0];
+    (tank.diameter, tank.depth, tank.density) = (0.9, 0.6, 1000.0);
+    // Those count from mid-depth.
+    tank.position[2] -= 0.3;
+    let (got, want) = (after_ten_seconds(&cylinder), after_ten_seconds(&given));
+    let off = largest_difference(&got[..index::POSITION], &want[..index::POSITION]);
+    assert!(off < 1e-5, "{off}");
+    let bobs = index::BOBS..index::LIQUID;
+    assert!(largest_difference(&got[bobs.clone()], &want[bobs]) < 1e-5);
+}
+
+/// Mass, centre of mass and inertia of craft and liquid at rest do not depend on how many modes
+/// are kept: the liquid under a lid.
+#[test]
+fn mass_centre_of_mass_and_inertia_are_right_whatever_the_modes() {
+    let of = |modes: usize| {
+        let mut p = Parameters::default();
+        p.tank[0].diameter = 0.9;
+        p.tank[0].modes = modes;
+        let u = Inputs::default();
+        Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap().outputs(&u)
+    };
+    let rigid = of(0);
+    let m_liq = 1000.0 * std::f64::consts::PI * 0.45 * 0.45 * 0.6;
+    assert!((rigid.mass / (1180.0 + m_liq) - 1.0).abs() < 1e-14);
+    let z = (1180.0 * 0.21 + m_liq * (-0.45 + 0.3)) / (1180.0 + m_liq);
+    assert!((rigid.center_of_mass[2] - z).abs() < 1e-14);
+    for modes in 1..=3 {
+        let out = of(modes);
+        assert!((out.mass / rigid.mass - 1.0).abs() < 1e-14);
+        assert!(largest_difference(&out.center_of_mass, &rigid.center_of_mass) < 1e-14);
+        for i in 0..3 {
+            let off = largest_difference(&out.inertia[i], &rigid.inertia[i]);
+            assert!(off < 1e-11, "{modes} {off}");
+        }
+    }
 }
 
 /// m, c, k to 0 in proportion: the rest of the craft moves as without, with an error in

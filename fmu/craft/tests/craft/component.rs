@@ -1,0 +1,3 @@
+//! What is under test. `tests/six` has the packed FMUs in its place.
+
+pub use craft::{SloshTank, Spacecraft};
