@@ -3,7 +3,8 @@
 use std::ops::{Deref, DerefMut};
 
 use plant::{
-    Calculated, Contact, FrictionModel, Inputs, Outputs, Plant, STATES, SloshModel, State,
+    Calculated, Contact, FrictionModel, Inputs, Outputs, Plant, STATES, SloshModel, SloshSource,
+    State,
 };
 use runtime::Model;
 use runtime::table::Table;
@@ -31,6 +32,8 @@ pub struct Parameters {
     plant: plant::Parameters,
     /// The number of the slosh model, 0: as the enumeration says.
     pub slosh_kind: i32,
+    /// The number of the source of the modes, 0: as the enumeration says.
+    pub slosh_source_kind: i32,
     /// The number of the friction law, 0: as the enumeration says.
     pub friction_kind: i32,
 }
@@ -55,22 +58,31 @@ impl Parameters {
         let mut p = self.plant;
         let start = plant::Parameters::default();
         let mut problems = Vec::new();
-        let mut conflict = |name: &str, model: i32, start: i32, kind: i32| {
+        let mut conflict = |(name, model): (&str, i32), start: i32, (number, kind): (&str, i32)| {
             if kind != 0 && model != start && model != kind {
                 problems.push(format!(
-                    "{name}.kind = {kind} contradicts {name}.model = {model} (allowed: 0, or the \
-                     same number, or {name}.model left at its start value {start})"
+                    "{number} = {kind} contradicts {name} = {model} (allowed: 0, or the same \
+                     number, or {name} left at its start value {start})"
                 ));
             }
         };
-        conflict("slosh", p.slosh.model as i32, start.slosh.model as i32, self.slosh_kind);
         conflict(
-            "friction",
-            p.friction.model as i32,
+            ("slosh.model", p.slosh.model as i32),
+            start.slosh.model as i32,
+            ("slosh.kind", self.slosh_kind),
+        );
+        conflict(
+            ("slosh.source", p.slosh.source as i32),
+            start.slosh.source as i32,
+            ("slosh.source_kind", self.slosh_source_kind),
+        );
+        conflict(
+            ("friction.model", p.friction.model as i32),
             start.friction.model as i32,
-            self.friction_kind,
+            ("friction.kind", self.friction_kind),
         );
         table::set_item(&mut p.slosh.model, &SloshModel::ALL, self.slosh_kind);
+        table::set_item(&mut p.slosh.source, &SloshSource::ALL, self.slosh_source_kind);
         table::set_item(&mut p.friction.model, &FrictionModel::ALL, self.friction_kind);
         if problems.is_empty() { Ok(p) } else { Err(problems) }
     }
@@ -96,6 +108,10 @@ impl Model for HubSlosh {
         Ok(HubSlosh { plant, present: false })
     }
 
+    fn warnings(parameters: &Parameters, inputs: &Inputs) -> Vec<String> {
+        parameters.resolved().map_or(Vec::new(), |p| Plant::warnings(&p, inputs))
+    }
+
     fn save(&self, words: &mut Vec<u64>) {
         words.extend(self.plant.state().to_words());
     }
@@ -113,7 +129,11 @@ impl Model for HubSlosh {
 
     #[inline]
     fn outputs(&mut self, inputs: &Inputs) -> Outputs {
-        if self.present { self.plant.outputs(inputs) } else { self.plant.outputs_held(inputs) }
+        let mut outputs = self.plant.outputs_held(inputs);
+        if self.present {
+            self.plant.update_ranges(&mut outputs);
+        }
+        outputs
     }
 
     #[inline]

@@ -10,7 +10,7 @@
 //! sampling rate that can be stepped) and are wide otherwise; what parameters
 //! mean together is for the plant to judge.
 
-use plant::{FrictionModel, INDICATORS, MODES, Ramp, SloshModel, State, x};
+use plant::{FrictionModel, INDICATORS, MODES, Ramp, SloshModel, SloshSource, State, x};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::{Enumeration, Item, Variable};
 
@@ -54,11 +54,18 @@ const HEAT: &[&str] = &[
 const MODE_1: &[&str] = &["slosh.q_radial[1]", "slosh.q_tangential[1]"];
 const MODE_1_MOVING: &[&str] =
     &["slosh.q_radial[1]", "slosh.q_tangential[1]", "slosh.v_radial[1]", "slosh.v_tangential[1]"];
+const WAVE_1: &[&str] = &[
+    "slosh.q_radial[1]",
+    "slosh.q_tangential[1]",
+    "slosh.v_radial[1]",
+    "slosh.v_tangential[1]",
+    "g_axial",
+];
 // Where they start. The damping belongs to the g_axial at the start.
 #[rustfmt::skip]
 const DYNAMICS: &[&str] = &[
     "tau_cmd", "tau_ext", "g_axial",
-    "hub.", "tank.", "fluid.", "slosh.", "friction.", "init.", "wheel.",
+    "hub.", "tank.", "fluid.", "slosh.", "baffle.", "bench.", "friction.", "init.", "wheel.",
 ];
 const LIQUID: &[&str] = &["tank.", "fluid.", "slosh."];
 // The plant keeps positions and velocities in space, not angles: going there and
@@ -93,7 +100,7 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         "Torque of the bearing's friction on the hub, opposes omega; while stuck it balances all other torques")
         .display_unit("mN.m").nominal(0.01).depends_on(ALL_TORQUES).initial_depends_on(DYNAMICS),
     V::output("tau_fluid", |o, _| o.tau_fluid, "N.m",
-        "Torque of the whole liquid, its rigid part included, on the hub: hub.I omega_dot = tau_actuator + tau_ext + tau_friction + tau_fluid")
+        "Torque of the whole liquid, its rigid part included, on the hub: hub.I omega_dot = tau_actuator + tau_ext + tau_friction + tau_fluid (+ tau_gravity)")
         .display_unit("mN.m").nominal(0.1).depends_on(ALL_TORQUES).initial_depends_on(DYNAMICS),
     V::output("F_tangential", |o, _| o.f_tangential, "N",
         "Force of the liquid, its rigid part included, on the tank, hub frame: tangential, positive towards +theta")
@@ -124,14 +131,17 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     V::local("slosh_rate_radial", |o, _| o.slosh_rate_radial, "rad/s",
         "Derivative of slosh_angle_radial")
         .display_unit("deg/s").depends_on(MODE_1_MOVING),
+    V::local("tau_gravity", |o, _| o.tau_gravity, "N.m",
+        "Torque of gravity on the dry hub of a bench that leans, to be added to the other torques on the hub; 0 while bench.tilt or hub.imbalance is 0. That on the liquid is part of tau_fluid")
+        .display_unit("mN.m").depends_on(&["theta", "g_axial"]).initial_depends_on(&["hub.", "bench.", "init.theta"]),
     V::local("energy", |o, _| o.energy, "J",
-        "Kinetic and potential energy of hub and liquid, 0 at rest")
+        "Kinetic and potential energy of hub and liquid, 0 at rest on an upright bench")
         .nominal(0.01).depends_on(ALL_TORQUES),
     V::local("momentum", |o, _| o.momentum, "kg.m2/s",
         "Angular momentum of hub and liquid about the bearing axis")
         .depends_on(HUB_AND_LIQUID),
     V::local("power_dissipated", |o, _| o.power_dissipated, "W",
-        "Power turned into heat by bearing and liquid together, never negative")
+        "Power dissipated by bearing and liquid together, never negative")
         .depends_on(HEAT),
     V::local("work", |o, _| o.work, "J",
         "Work done on the hub by tau_actuator and tau_ext since the start")
@@ -141,10 +151,17 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         .nominal(0.01).is_state(|_| x::HEAT).depends_on(&["heat"]),
     V::local("work_axial", |o, _| o.work_axial, "J",
         "Work done on the liquid through changes of g_axial since the start: energy - energy(0) = work + work_axial - heat. Co-Simulation: exact, also for jumps; Model Exchange: added up at accepted steps, to the fourth order of their length where g_axial is linear in time")
-        .nominal(0.01).depends_on(&["slosh.q_radial", "slosh.q_tangential", "g_axial"]),
+        .nominal(0.01).depends_on(&["theta", "slosh.q_radial", "slosh.q_tangential", "g_axial"]),
     V::local("slosh.damping", |o, n| o.damping[n], "1",
-        "Damping ratio of a mode at the present g_axial; 0 for modes that are not used")
+        "Damping ratio of a mode at the present g_axial, without a baffle's; 0 for modes that are not used")
         .shape(&[MODES]).depends_on(&["g_axial"]).initial_depends_on(LIQUID),
+    V::local("baffle.zeta", |o, _| o.baffle_zeta, "1",
+        "Damping ratio of mode 1 by the ring baffle at the amplitude of the moment, besides slosh.damping[1]; 0 without one")
+        .depends_on(WAVE_1).initial_depends_on(&["baffle.", "tank.", "fluid.", "slosh.", "init."]),
+    V::local("baffle.wave", |o, _| o.baffle_wave, "m",
+        "Amplitude at the wall of the oscillation of mode 1, from its angle and its rate, that baffle.zeta belongs to; 0 without a baffle")
+        .display_unit("mm").nominal(0.01)
+        .depends_on(WAVE_1).initial_depends_on(&["baffle.", "tank.", "fluid.", "slosh.", "init."]),
     V::local("tau_actuator", |o, _| o.tau_actuator, "N.m",
         "Torque of the actuator on the hub, positive towards +theta: tau_cmd after the wheel's limits")
         .display_unit("mN.m").depends_on(&["tau_cmd", "wheel_speed"]),
@@ -157,6 +174,9 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     V::local_enumeration("regime", &REGIME, |o| o.discrete.regime as i32,
         "How far wave_height is inside the range of linear theory")
         .depends_on(&["slosh.q_radial", "slosh.q_tangential"]),
+    V::local_boolean("baffle.in_range", |o| o.discrete.baffle_in_range,
+        "The law of the ring baffle holds: the liquid's stroke at the ring is 0.64 to 6.4 of its width, the wave does not uncover it, and it covers less than a quarter of the section; true without a baffle")
+        .depends_on(WAVE_1),
     V::local_integer("friction_mode", |o| o.discrete.friction_mode,
         "Branch of the set-valued friction law: -1 turning backwards, 0 stuck, 1 turning forwards; 1 with other laws")
         .depends_on(ALL_TORQUES),
@@ -175,11 +195,11 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     // The slosh modes' coordinates: with theta, omega, work, heat, stuck_time and
     // wheel_speed the continuous states
     V::state("slosh.q_radial", |n| x::SLOSH + 4 * n, "",
-        "Radial coordinate of a slosh mode, positive outwards. Models linear and planar: unused; spherical: stereographic, the tangent of half the pendulum's angle from the vertical times the direction's radial part (unit 1); paraboloid: displacement (m)")
+        "Radial coordinate of a slosh mode, positive outwards. Models linear and planar: unused; spherical: stereographic, the tangent of half the pendulum's angle from the vertical times the direction's radial part (unit 1); paraboloid and liquid: displacement (m)")
         .shape(&[MODES])
         .nominal(1e-3).depends_on(&["slosh.q_radial[]"]).initial_depends_on(SLOSH_START),
     V::state("slosh.q_tangential", |n| x::SLOSH + 4 * n + 1, "",
-        "Tangential coordinate of a slosh mode, positive towards +theta. Models linear and planar: slosh angle (rad); spherical: stereographic, as slosh.q_radial (unit 1); paraboloid: displacement (m)")
+        "Tangential coordinate of a slosh mode, positive towards +theta. Models linear and planar: slosh angle (rad); spherical: stereographic, as slosh.q_radial (unit 1); paraboloid and liquid: displacement (m)")
         .shape(&[MODES])
         .nominal(1e-3).depends_on(&["slosh.q_tangential[]"]).initial_depends_on(SLOSH_START),
     V::state("slosh.v_radial", |n| x::SLOSH + 4 * n + 2, "",
@@ -235,6 +255,18 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     V::parameter("hub.I", |p, _| &mut p.hub.inertia, "kg.m2",
         "Moment of inertia of hub and dry tank about the bearing axis, without the wheel's rotor")
         .range(1e-6, 1e12),
+    V::parameter("hub.imbalance", |p, _| &mut p.hub.imbalance, "kg.m",
+        "Mass of hub and dry tank times the distance of its centre from the bearing axis; acts where bench.tilt is not 0")
+        .range(0.0, 1e6),
+    V::parameter("hub.imbalance_angle", |p, _| &mut p.hub.imbalance_angle, "rad",
+        "Direction of that centre in the hub's frame, from radial towards tangential")
+        .display_unit("deg").range(-7.0, 7.0),
+    V::parameter("bench.tilt", |p, _| &mut p.bench.tilt, "rad",
+        "By how much the bearing's axis leans. g_axial is the part of gravity along the axis; g_axial tan(bench.tilt) across it acts on hub and liquid")
+        .display_unit("deg").range(0.0, 1.5),
+    V::parameter("bench.tilt_azimuth", |p, _| &mut p.bench.tilt_azimuth, "rad",
+        "The theta at which the tank is on the lowest side: where gravity's part across the axis points to")
+        .display_unit("deg").range(-7.0, 7.0),
     V::parameter("tank.d", |p, _| &mut p.tank.d, "m",
         "Inner diameter of the upright cylindrical tank")
         .display_unit("mm").range(1e-3, 100.0),
@@ -264,6 +296,12 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     V::integer("slosh.kind", |p, _| &mut p.slosh_kind,
         "For hosts that set no enumerations: 0: as slosh.model says; otherwise the number of slosh.model's item. An error if slosh.model has been set to another one")
         .between(0, SLOSH_MODEL.items.len() as i32),
+    V::choice("slosh.source", &SLOSH_SOURCE, |p| p.slosh.source as i32,
+        |p, n| set_item(&mut p.slosh.source, &SloshSource::ALL, n),
+        "Where the modes' masses, lengths and damping come from"),
+    V::integer("slosh.source_kind", |p, _| &mut p.slosh_source_kind,
+        "For hosts that set no enumerations: 0: as slosh.source says; otherwise the number of slosh.source's item. An error if slosh.source has been set to another one")
+        .between(0, SLOSH_SOURCE.items.len() as i32),
     V::count("slosh.modes", |p| p.slosh.modes as i32, |p, n| p.slosh.modes = n.max(0) as usize,
         "How many slosh modes are kept; the mass of the others moves with the tank")
         .between(1, MODES as i32),
@@ -275,6 +313,45 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     V::parameter("slosh.hardening", |p, _| &mut p.slosh.hardening, "1",
         "Coefficient of the quartic spring, model paraboloid only")
         .range(0.0, 100.0),
+    V::switch("slosh.capillarity", |p| &mut p.slosh.capillarity,
+        "Capillarity of a flat surface with a free contact line centres the liquid; source geometry only"),
+
+    // The modes of a tank of any shape
+    V::parameter("slosh.table.m_liq", |p, _| &mut p.slosh.table.m_liq, "kg",
+        "Mass of the liquid, source table: what exceeds the modes' masses moves with the tank. tank.d is then the diameter of the free surface and tank.h is not used")
+        .range(0.0, 1e9),
+    V::parameter("slosh.table.g_ref", |p, _| &mut p.slosh.table.g_ref, "m/s2",
+        "Specific force along the tank's axis at which slosh.table.frequency holds and modes are ordered")
+        .range(1e-9, 1e4),
+    V::parameter("slosh.table.mass", |p, n| &mut p.slosh.table.mass[n], "kg",
+        "Sloshing mass of a mode, source table; the first slosh.modes modes are used, in the order of their frequencies")
+        .shape(&[MODES]).range(0.0, 1e9),
+    V::parameter("slosh.table.length", |p, n| &mut p.slosh.table.length[n], "m",
+        "Pendulum length of a mode, source table; 0: from slosh.table.frequency")
+        .shape(&[MODES]).display_unit("mm").range(0.0, 1e4),
+    V::parameter("slosh.table.frequency", |p, n| &mut p.slosh.table.frequency[n], "Hz",
+        "Natural frequency of a mode at slosh.table.g_ref, source table, if slosh.table.length is 0")
+        .shape(&[MODES]).range(0.0, 1e4),
+    V::parameter("slosh.table.hinge", |p, n| &mut p.slosh.table.hinge[n], "m",
+        "Height of a mode's hinge on the tank's axis, source table; the motion about the bearing's axis does not depend on it")
+        .shape(&[MODES]).range(-1e6, 1e6),
+    V::parameter("slosh.table.k", |p, n| &mut p.slosh.table.k[n], "N/m",
+        "Centring stiffness of a mode at the bob (capillarity, diaphragm), source table")
+        .shape(&[MODES]).range(0.0, 1e9),
+    V::parameter("slosh.table.zeta", |p, n| &mut p.slosh.table.zeta[n], "1",
+        "Damping ratio of a mode, source table")
+        .shape(&[MODES]).range(0.0, 0.999),
+    V::parameter("slosh.table.wave", |p, n| &mut p.slosh.table.wave[n], "m/rad",
+        "Elevation of the surface at the wall per slosh angle, source table; 0: that of an upright cylinder of the diameter tank.d")
+        .shape(&[MODES]).range(0.0, 1e4),
+
+    // Ring baffle
+    V::parameter("baffle.width", |p, _| &mut p.baffle.width, "m",
+        "Width of a flat ring at the tank's wall, which damps mode 1 as the root of the wave's amplitude (Miles 1958); 0: none")
+        .display_unit("mm").range(0.0, 100.0),
+    V::parameter("baffle.depth", |p, _| &mut p.baffle.depth, "m",
+        "Depth of the ring below the surface at rest")
+        .display_unit("mm").range(0.0, 100.0),
 
     // Bearing
     V::choice("friction.model", &FRICTION_MODEL, |p| p.friction.model as i32,
@@ -402,7 +479,7 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     // What follows from the parameters
     V::calculated("tank.m_liq", |m, _| m.calculated().m_liq, "kg",
         "Mass of the liquid")
-        .initial_depends_on(&["tank.", "fluid."]),
+        .initial_depends_on(LIQUID),
     V::calculated("tank.m_0", |m, _| m.calculated().m_0, "kg",
         "Part of the liquid's mass that moves with the tank")
         .initial_depends_on(LIQUID),
@@ -433,6 +510,20 @@ static SLOSH_MODEL: Enumeration = Enumeration {
         Item::new("planar", "Nonlinear planar pendulums"),
         Item::new("spherical", "Spherical pendulums: the liquid can rotate"),
         Item::new("paraboloid", "Masses on a paraboloid with a quartic spring"),
+        Item::new(
+            "liquid",
+            "The first mode of an upright cylinder to third order in its amplitude, from potential flow",
+        ),
+    ],
+};
+
+/// Where the modal parameters come from.
+static SLOSH_SOURCE: Enumeration = Enumeration {
+    name: "SloshSource",
+    description: "Sources of the modal parameters",
+    items: &[
+        Item::new("geometry", "An upright cylinder by tank.d, tank.h and fluid.rho"),
+        Item::new("table", "slosh.table, for a tank of any shape"),
     ],
 };
 

@@ -17,6 +17,8 @@ use crate::variable::{Access, Causality, Value};
 pub const DEFAULT_TOLERANCE: f64 = 1e-8;
 /// The tolerances that a host can ask for.
 pub const TOLERANCES: std::ops::RangeInclusive<f64> = 1e-14..=1e-1;
+/// The size that a continuous state may not reach.
+pub const MAX_STATE: f64 = 1e100;
 /// What two times may differ by, relative to the larger of time and step: hosts
 /// add up steps in their own way and are off by a few ulps.
 const TIME_SLACK: f64 = 1e-9;
@@ -39,6 +41,9 @@ pub struct Instance<M: Model> {
     pub(crate) inputs: M::Inputs,
     /// Whether an input has a slope for the next step.
     pub(crate) sloped: bool,
+    /// Whether the inputs still have the slopes of the step that has just ended: until an input is
+    /// set, outputs are limits from the left.
+    pub(crate) past_slopes: bool,
     /// There from the first look at it in initialization mode; gone when a parameter or an
     /// input is set before the instance runs.
     pub(crate) model: Option<M>,
@@ -94,6 +99,7 @@ impl<M: Model> Instance<M> {
             parameters: M::table().starts(),
             inputs: M::Inputs::default(),
             sloped: false,
+            past_slopes: false,
             model: None,
             outputs: None,
             scratch: [vec![0.0; states], vec![0.0; states]],
@@ -179,6 +185,11 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
+    /// What there is to be warned of, see [`Model::warnings`].
+    pub fn warnings(&self) -> Vec<String> {
+        self.model_parameters().map_or(Vec::new(), |p| M::warnings(&p, &self.inputs))
+    }
+
     /// Model Exchange goes on from initialization: parameters are what they are now.
     fn leave_initialized(&mut self, call: &Call) -> Result<(), Fault> {
         if self.state == InstanceState::Initialized {
@@ -204,10 +215,16 @@ impl<M: Model> Instance<M> {
     }
 
     /// fmi2GetReal and its kin: one value.
-    #[inline(always)]
     pub fn get(&mut self, operation: &'static Operation, reference: u32) -> Result<Value, Fault> {
         let call = &self.check(operation)?;
+        self.value(call, reference)
+    }
+
+    /// One value, for a call that [`Instance::check`] allows.
+    #[inline(always)]
+    pub fn value(&mut self, call: &Call, reference: u32) -> Result<Value, Fault> {
         let scalar = scalar::<M>(call, reference)?;
+        // A state is never looked up among the outputs.
         match (scalar.state, scalar.access, &self.model, &self.outputs) {
             (Some(place), _, Some(model), _) => {
                 Ok(Value::Real(model.continuous_states()[place(scalar.element)]))
@@ -290,7 +307,10 @@ impl<M: Model> Instance<M> {
     #[inline]
     fn put(&mut self, scalar: &Scalar<M>, value: Value) {
         match (scalar.access, value) {
-            (Access::Input(ramp), Value::Real(x)) => *ramp(&mut self.inputs, scalar.element)[0] = x,
+            (Access::Input(ramp), Value::Real(x)) => {
+                self.drop_past_slopes();
+                *ramp(&mut self.inputs, scalar.element)[0] = x;
+            }
             (_, value) => {
                 if let Some(slot) = self.parameters.get_mut(scalar.slot) {
                     *slot = value;
@@ -393,6 +413,7 @@ impl<M: Model> Instance<M> {
         for ((reference, order), slope) in references.iter().zip(orders).zip(values) {
             check_slope(call, scalar::<M>(call, *reference)?, *order, *slope)?;
         }
+        self.drop_past_slopes();
         for (reference, slope) in references.iter().zip(values) {
             let scalar = scalar::<M>(call, *reference)?;
             if let Access::Input(ramp) = scalar.access {
@@ -415,12 +436,26 @@ impl<M: Model> Instance<M> {
         for (reference, order) in references.iter().zip(orders) {
             check_order(call, scalar::<M>(call, *reference)?, *order)?;
         }
+        let (inputs, past_slopes) = (self.inputs, self.past_slopes);
+        self.drop_past_slopes();
+        let done = self.slopes_of_outputs(call, references, answers);
+        (self.inputs, self.past_slopes) = (inputs, past_slopes);
+        done
+    }
+
+    fn slopes_of_outputs(
+        &mut self,
+        call: &Call,
+        references: &[u32],
+        answers: &mut [f64],
+    ) -> Result<(), Fault> {
         let mut x_dot = std::mem::take(&mut self.scratch[0]);
         let done = self.look(call, |model, inputs| model.derivatives(inputs, &mut x_dot));
         self.scratch[0] = x_dot;
         done?;
-        let inputs = self.inputs;
-        self.derivatives_along(call, references, &inputs, answers)
+        let mut along = self.inputs;
+        M::set_dependent_slopes(&mut along, 0.0);
+        self.derivatives_along(call, references, &along, answers)
     }
 
     /// fmi2GetDirectionalDerivative: the derivative of the unknowns in a direction of the
@@ -526,7 +561,7 @@ impl<M: Model> Instance<M> {
             size = size.max(d.abs() / unit);
             start.push(value);
         }
-        let step = if size > 0.0 { SHARE / size } else { 1.0 };
+        let step = if size >= f64::MIN_POSITIVE { SHARE / size } else { 1.0 };
         let at = |s: f64| -> Result<Vec<f64>, Fault> {
             let mut moved = self.clone();
             for ((reference, x), d) in knowns.iter().zip(&start).zip(direction) {
@@ -570,9 +605,13 @@ impl<M: Model> Instance<M> {
             return Err(call
                 .error(format_args!("the step to {end:?} s would pass the stop time {stop:?} s")));
         }
-        if self.sloped {
-            self.check_slopes(call, h)?;
-        }
+        let before = (self.inputs, self.sloped, self.past_slopes);
+        self.drop_past_slopes();
+        self.sloped |= M::set_dependent_slopes(&mut self.inputs, h);
+        let after = if self.sloped { self.inputs_after(call, h) } else { Ok(self.inputs) };
+        let after = after.inspect_err(|_| {
+            (self.inputs, self.sloped, self.past_slopes) = before;
+        })?;
         let Some(model) = &mut self.model else {
             return Err(call.error("the instance was never initialised"));
         };
@@ -580,40 +619,45 @@ impl<M: Model> Instance<M> {
             self.state = InstanceState::Failed;
             return Err(call.error(format_args!("step from {at:?} s to {end:?} s failed: {why}")));
         }
-        if self.sloped {
-            self.move_inputs(h);
-        }
+        self.inputs = after;
+        self.past_slopes = M::OUTPUTS_USE_SLOPES && self.sloped;
+        self.sloped = false;
         self.time = end;
         self.outputs = None;
         Ok(())
     }
 
-    /// Whether the inputs stay in their ranges while they run along their slopes for `h`.
-    fn check_slopes(&mut self, call: &Call, h: f64) -> Result<(), Fault> {
+    /// The inputs where their slopes lead in `h`, which is in their ranges.
+    fn inputs_after(&self, call: &Call, h: f64) -> Result<M::Inputs, Fault> {
+        let mut after = self.inputs;
         for scalar in M::table().inputs() {
             let Access::Input(ramp) = scalar.access else { continue };
-            let [value, slope] = ramp(&mut self.inputs, scalar.element);
+            let [value, slope] = ramp(&mut after, scalar.element);
             if *slope == 0.0 {
                 continue;
             }
-            let end = end_of_ramp(scalar, (*value, *slope), h);
-            if let Some(problem) = scalar.problem(Value::Real(end)) {
+            *value = end_of_ramp(scalar, (*value, *slope), h);
+            if let Some(problem) = scalar.problem(Value::Real(*value)) {
                 return Err(call.error(format_args!("at the end of the step {problem}")));
             }
-        }
-        Ok(())
-    }
-
-    /// Puts the inputs where their slopes lead in `h`; from there on they are held.
-    fn move_inputs(&mut self, h: f64) {
-        for scalar in M::table().inputs() {
-            let Access::Input(ramp) = scalar.access else { continue };
-            let [value, slope] = ramp(&mut self.inputs, scalar.element);
-            if *slope != 0.0 {
-                (*value, *slope) = (end_of_ramp(scalar, (*value, *slope), h), 0.0);
+            if !M::OUTPUTS_USE_SLOPES {
+                *slope = 0.0;
             }
         }
-        self.sloped = false;
+        Ok(after)
+    }
+
+    /// From here on the inputs are held, unless slopes are set.
+    #[inline]
+    fn drop_past_slopes(&mut self) {
+        if M::OUTPUTS_USE_SLOPES && self.past_slopes {
+            self.past_slopes = false;
+            for scalar in M::table().inputs() {
+                if let Access::Input(ramp) = scalar.access {
+                    *ramp(&mut self.inputs, scalar.element)[1] = 0.0;
+                }
+            }
+        }
     }
 
     // ---- Model Exchange ----
@@ -677,18 +721,19 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// fmi2SetContinuousStates. NaN and infinity are discarded: the integrator
-    /// should try a shorter step.
+    /// fmi2SetContinuousStates. States that are not finite, or whose squares and products may not be, are
+    /// discarded: the integrator should try a shorter step.
     pub fn set_continuous_states(&mut self, states: &[f64]) -> Result<(), Fault> {
         let call = &self.check(&op::SET_CONTINUOUS_STATES)?;
         let places = M::table().places();
         check_length(call, "nx", states.len(), places.len())?;
         for (place, x) in places.zip(states) {
-            if !x.is_finite() {
+            let is_state = x.abs() < MAX_STATE; // NaN is not
+            if !is_state {
                 let name = M::table().state_at(place).map_or("a state".into(), Scalar::name);
-                return Err(
-                    call.discard(format_args!("{name} = {x:?} (allowed: any finite number)"))
-                );
+                return Err(call.discard(format_args!(
+                    "{name} = {x:?} (allowed: magnitudes below {MAX_STATE:e})"
+                )));
             }
             self.scratch[0][place] = *x;
         }
@@ -798,31 +843,21 @@ impl<M: Model> Instance<M> {
 
     /// The outputs now; they are computed when they are first asked for.
     fn outputs(&mut self, call: &Call) -> Result<&M::Outputs, Fault> {
-        if self.outputs.is_none() {
-            self.outputs = Some(self.look(call, |model, inputs| model.outputs(inputs))?);
-        }
-        self.outputs.as_ref().ok_or_else(|| call.error("the outputs were not computed"))
+        self.model(call)?;
+        let Instance { interface, model: Some(model), inputs, outputs, .. } = self else {
+            return Err(call.error("the instance was never initialised"));
+        };
+        Ok(outputs.get_or_insert_with(|| seen(*interface, model, inputs, M::outputs)))
     }
 
-    /// Looks at the model: in Co-Simulation as the present inputs leave it; in Model Exchange,
-    /// where discrete changes happen at events alone, as it is.
+    /// What is [`seen`] of the model.
     fn look<T>(
         &mut self,
         call: &Call,
         look: impl FnOnce(&mut M, &M::Inputs) -> T,
     ) -> Result<T, Fault> {
-        let inputs = self.inputs;
-        let interface = self.interface;
-        let model = self.model(call)?;
-        Ok(match interface {
-            Interface::CoSimulation => {
-                let before = model.apply_present_inputs(&inputs);
-                let seen = look(model, &inputs);
-                model.revert(before);
-                seen
-            }
-            Interface::ModelExchange => look(model, &inputs),
-        })
+        let (interface, inputs) = (self.interface, self.inputs);
+        Ok(seen(interface, self.model(call)?, &inputs, look))
     }
 
     /// How many events have happened since the start.
@@ -834,6 +869,26 @@ impl<M: Model> Instance<M> {
     /// The last event, for the log.
     pub fn last_event(&self) -> String {
         self.model.as_ref().map_or(String::new(), M::last_event)
+    }
+}
+
+/// What `look` sees of the model: in Co-Simulation as the present inputs leave it; in Model
+/// Exchange, where discrete changes happen at events alone, as it is.
+#[inline(always)]
+fn seen<M: Model, T>(
+    interface: Interface,
+    model: &mut M,
+    inputs: &M::Inputs,
+    look: impl FnOnce(&mut M, &M::Inputs) -> T,
+) -> T {
+    match interface {
+        Interface::CoSimulation => {
+            let before = model.apply_present_inputs(inputs);
+            let seen = look(model, inputs);
+            model.revert(before);
+            seen
+        }
+        Interface::ModelExchange => look(model, inputs),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Which messages go to the host's logger.
 //!
-//! Calls that fail, and, for those who ask, the model's events. A host that asks for
+//! Calls that fail, what to be warned of when initialization ends, and, for those who ask, the
+//! model's events. A host that asks for
 //! nothing gets no chatter: `loggingOn` of fmi2Instantiate switches nothing, because
 //! failures are reported either way (a status without a reason helps nobody) and
 //! events only on an explicit wish. fmi2SetDebugLogging is one and is obeyed: off means
@@ -15,6 +16,8 @@ use crate::table::Table;
 pub enum Topic {
     /// An event of the model.
     Event,
+    /// The parameters leave the range in which the model is known.
+    Warning,
     /// A call has failed.
     Failure(Severity),
 }
@@ -30,7 +33,12 @@ pub struct Category {
     pub topic: Option<Topic>,
 }
 
-const FAILURES: [Category; 4] = [
+const FAILURES: [Category; 5] = [
+    Category {
+        name: "logStatusWarning",
+        description: "What the parameters leave of the range in which the model is known",
+        topic: Some(Topic::Warning),
+    },
     Category {
         name: "logStatusDiscard",
         description: "Why a call returned fmi2Discard",
@@ -62,7 +70,7 @@ pub fn categories<M: Model>(table: &Table<M>) -> Vec<Category> {
 pub fn category(topic: Topic) -> &'static str {
     match topic {
         Topic::Event => EVENTS,
-        Topic::Failure(_) => {
+        Topic::Warning | Topic::Failure(_) => {
             FAILURES.iter().find(|c| c.topic == Some(topic)).map_or("logAll", |c| c.name)
         }
     }
@@ -72,18 +80,21 @@ pub fn category(topic: Topic) -> &'static str {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Filter {
     events: bool,
+    warning: bool,
     discard: bool,
     error: bool,
     fatal: bool,
 }
 
 impl Filter {
-    /// Every failure; this is how an instance starts.
-    pub const FAILURES: Filter = Filter { events: false, discard: true, error: true, fatal: true };
+    /// Every failure and warning; this is how an instance starts.
+    pub const FAILURES: Filter =
+        Filter { events: false, warning: true, discard: true, error: true, fatal: true };
     /// Everything.
     pub const ALL: Filter = Filter { events: true, ..Filter::FAILURES };
     /// Silence.
-    pub const NONE: Filter = Filter { events: false, discard: false, error: false, fatal: false };
+    pub const NONE: Filter =
+        Filter { events: false, warning: false, discard: false, error: false, fatal: false };
 
     /// Only these categories; none given means all. Unknown names are an error
     /// that lists them and the known ones.
@@ -116,6 +127,7 @@ impl Filter {
     fn switch(&mut self, topic: Topic) -> &mut bool {
         match topic {
             Topic::Event => &mut self.events,
+            Topic::Warning => &mut self.warning,
             Topic::Failure(Severity::Discard) => &mut self.discard,
             Topic::Failure(Severity::Error) => &mut self.error,
             Topic::Failure(Severity::Fatal) => &mut self.fatal,
@@ -160,6 +172,7 @@ mod tests {
     #[test]
     fn every_topic_has_its_category() {
         assert_eq!(category(Topic::Event), "logEvents");
+        assert_eq!(category(Topic::Warning), "logStatusWarning");
         assert_eq!(category(Topic::Failure(Severity::Discard)), "logStatusDiscard");
         assert_eq!(category(Topic::Failure(Severity::Error)), "logStatusError");
         assert_eq!(category(Topic::Failure(Severity::Fatal)), "logStatusFatal");

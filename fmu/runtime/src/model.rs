@@ -20,6 +20,9 @@ pub trait Model: Clone + Debug + Sized + 'static {
     /// What inputs can change at once of what is discrete; `()` for a model without events.
     type Discrete: Default;
 
+    /// Whether outputs depend on how the inputs move, not only on where they are.
+    const OUTPUTS_USE_SLOPES: bool = false;
+
     /// The variables and what else the model description says.
     fn table() -> &'static Table<Self>;
 
@@ -32,6 +35,13 @@ pub trait Model: Clone + Debug + Sized + 'static {
         start_time: f64,
         tolerance: f64,
     ) -> Result<Self, Vec<String>>;
+
+    /// What parameters and inputs at the start leave of the range in which the model is known, one
+    /// sentence each.
+    fn warnings(parameters: &Self::Parameters, inputs: &Self::Inputs) -> Vec<String> {
+        let _ = (parameters, inputs);
+        Vec::new()
+    }
 
     /// What else there is to save besides parameters and inputs, as plain words: always
     /// [`About::saved_words`](crate::table::About::saved_words) of them.
@@ -46,6 +56,13 @@ pub trait Model: Clone + Debug + Sized + 'static {
 
     /// What there is to see now.
     fn outputs(&mut self, inputs: &Self::Inputs) -> Self::Outputs;
+
+    /// Sets the slopes, over a step of length `h`, of inputs that follow from others during it, such
+    /// as a rate from its derivative. Returns whether there are any.
+    fn set_dependent_slopes(inputs: &mut Self::Inputs, h: f64) -> bool {
+        let _ = (inputs, h);
+        false
+    }
 
     /// The continuous states, in an order of the model's own (see `Variable::state`).
     fn continuous_states(&self) -> &[f64];

@@ -31,6 +31,7 @@ const FORMAT: u32 = 3;
 const HAS_STOP: u8 = 1;
 const HAS_MODEL: u8 = 2;
 const HAS_SLOPES: u8 = 4;
+const HAS_PAST_SLOPES: u8 = 8;
 
 /// The number of bytes; the same for every state of a model.
 pub fn size<M: Model>() -> usize {
@@ -51,7 +52,8 @@ pub fn to_bytes<M: Model>(saved: &Instance<M>) -> Vec<u8> {
     let flag = |is: bool, flag: u8| if is { flag } else { 0 };
     let flags = flag(saved.stop.is_some(), HAS_STOP)
         | flag(saved.model.is_some(), HAS_MODEL)
-        | flag(saved.sloped, HAS_SLOPES);
+        | flag(saved.sloped, HAS_SLOPES)
+        | flag(saved.past_slopes, HAS_PAST_SLOPES);
     bytes.extend([saved.state as u8, flags, saved.interface as u8, 0]);
     for time in [saved.start, saved.stop.unwrap_or(0.0), saved.tolerance, saved.time] {
         bytes.extend(time.to_le_bytes());
@@ -129,6 +131,7 @@ pub fn from_bytes<M: Model>(version: Version, bytes: &[u8]) -> Result<Instance<M
     let mut saved = Instance::new(version, interface);
     saved.state = state;
     saved.sloped = flags & HAS_SLOPES != 0;
+    saved.past_slopes = flags & HAS_PAST_SLOPES != 0;
     saved.start = rest.finite("start time")?;
     saved.stop = Some(rest.finite("stop time")?).filter(|_| flags & HAS_STOP != 0);
     saved.tolerance = rest.finite("tolerance")?;
@@ -143,6 +146,10 @@ pub fn from_bytes<M: Model>(version: Version, bytes: &[u8]) -> Result<Instance<M
         if let Access::Input(ramp) = scalar.access {
             for number in ramp(&mut saved.inputs, scalar.element) {
                 *number = rest.finite(scalar.variable.name)?;
+            }
+            let [value, _] = ramp(&mut saved.inputs, scalar.element);
+            if let Some(problem) = scalar.problem(Value::Real(*value)) {
+                return Err(format!("the saved state is damaged: {problem}"));
             }
         }
     }

@@ -30,6 +30,7 @@ pub static UNITS: &[Unit] = &[
     unit("kg",      [ 1,  0,  0, 0], &[]),
     unit("kg/s",    [ 1,  0, -1, 0], &[]),
     unit("m",       [ 0,  1,  0, 0], &[("mm", 1e3)]),
+    unit("m/rad",   [ 0,  1,  0, -1], &[("mm/rad", 1e3)]),
     unit("s",       [ 0,  0,  1, 0], &[]),
     unit("Hz",      [ 0,  0, -1, 0], &[]),
     unit("1/s",     [ 0,  0, -1, 0], &[]),
@@ -48,6 +49,7 @@ pub static UNITS: &[Unit] = &[
     unit("N.s",     [ 1,  1, -1, 0], &[]),
     unit("N.m",     [ 1,  2, -2, 0], &[("mN.m", 1e3)]),
     unit("N.m.s",   [ 1,  2, -1, 0], &[]),
+    unit("N.m/s",   [ 1,  2, -3, 0], &[]),
     // The radian of a torsional stiffness or damping is what the torque is proportional to.
     unit("N.m/rad", [ 1,  2, -2, -1], &[]),
     unit("N.m.s/rad", [ 1, 2, -1, -1], &[]),

@@ -454,7 +454,13 @@ pub unsafe fn fmi2EnterInitializationMode<M: Model>(c: fmi2Component) -> fmi2Sta
 pub unsafe fn fmi2ExitInitializationMode<M: Model>(c: fmi2Component) -> fmi2Status {
     unsafe {
         on::<M>(c, &op::EXIT_INITIALIZATION, |component| {
-            component.instance.exit_initialization_mode()
+            component.instance.exit_initialization_mode()?;
+            if component.log.filter.wants(Topic::Warning) {
+                for warning in component.instance.warnings() {
+                    component.log.write(fmi2Warning, Topic::Warning, &warning);
+                }
+            }
+            Ok(())
         })
     }
 }
@@ -485,7 +491,7 @@ unsafe fn get<M: Model, T>(
             let references = array(call, "vr", vr, nvr)?;
             let places = array_mut(call, "value", value, nvr)?;
             for (reference, place) in references.iter().zip(places) {
-                let value = as_c(component.instance.get(operation, *reference)?);
+                let value = as_c(component.instance.value(call, *reference)?);
                 *place = value.ok_or_else(|| call.error("wrong type"))?;
             }
             Ok(())
