@@ -5,13 +5,15 @@
  *
  * What must hold whatever it does: no crash, no fmi2Warning, fmi2Fatal or fmi2Pending, no call
  * that works longer than `host_slowest_allowed`, log messages that are text, finite outputs after
- * a step that succeeded, and the same state after going back and stepping again.
+ * a step that succeeded, no division by zero, invalid operation or overflow in a call that succeeded
+ * (some hosts trap these), and the same state after going back and stepping again.
  *
- * `calls.rs` gives it to a fuzzer, `replay.c` to a packed FMU. The functions' types are the
+ * `src/calls.rs` gives it to a fuzzer, `replay.c` to a packed FMU. The functions' types are the
  * official headers'. */
 #define _POSIX_C_SOURCE 200809L
 #include "host.h"
 
+#include <fenv.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -26,17 +28,23 @@
 /* Simulated seconds per input in steps of more than one second: they are slow, not bad. */
 #define LONG_STEPS 1
 #define SLOTS 4
-/* Outputs are the first variables. */
-#define OUTPUTS 12
+#define MAX_OUTPUTS 64
+/* What a host may trap. */
+#define EXCEPTIONS (FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW)
+/* Numbers of such size are judged: products of ten of them do not overflow on the way to an answer. */
+#define MODERATE(x) ((x) == 0.0 || (fabs(x) > 1e-30 && fabs(x) < 1e30))
 
 /* For a fuzzer: under its sanitizer a call takes some ten times as long. replay.c is told its own. */
 double host_slowest_allowed = 100.0;
 struct host_report host_report;
 
-static const char *guid;
+static const struct host_fmu *fmu;
 static const uint8_t *bytes;
 static size_t left;
 static const char *at = "start";
+/* Whether other numbers are among the arguments of the call at hand; whether the FMU has taken any
+ * since this input began. */
+static int offers_extreme, has_extreme;
 static int long_steps;
 
 /* What the host has. */
@@ -75,18 +83,19 @@ static double real(void) {
     static const double special[] = {0.0, -0.0, 1.0, -1.0, 0.01, 0.1, 0.5, 1e-3, 1e-9, 9.81, 1e3,
                                      1e9, 1e300, -1e300, 5e-324, 1.7976931348623157e308};
     unsigned kind = byte();
-    if (kind < 32)
-        return special[kind % 16];
-    if (kind < 36)
-        return kind % 2 ? NAN : kind % 4 ? INFINITY : -INFINITY;
-    if (kind < 60) {
+    double y;
+    if (kind < 32) {
+        y = special[kind % 16];
+    } else if (kind < 36) {
+        y = kind % 2 ? NAN : kind % 4 ? INFINITY : -INFINITY;
+    } else if (kind < 60) {
         uint64_t x = word();
-        double y;
         memcpy(&y, &x, sizeof y);
-        return y;
+    } else { /* something of everyday size */
+        y = ((int)byte() - 128) * pow(10.0, (int)(kind % 8) - 6);
     }
-    /* something of everyday size */
-    return ((int)byte() - 128) * pow(10.0, (int)(kind % 8) - 6);
+    offers_extreme |= !MODERATE(y);
+    return y;
 }
 
 static int integer(void) {
@@ -98,11 +107,11 @@ static fmi2ValueReference reference(void) {
     unsigned kind = byte();
     if (kind < 4)
         return (fmi2ValueReference)word();
-    return kind < 60 ? kind % 30 : (kind * 5u + byte()) % 400;
+    return kind < 60 ? kind % 30 : (kind << 8 | byte()) % (fmu->variables + 8);
 }
 
 static size_t length(void) {
-    static const size_t special[] = {0, 1, 1, 1, 2, 3, 8, 47};
+    const size_t special[] = {0, 1, 1, 1, 2, 3, fmu->indicators, fmu->states};
     return special[byte() % 8];
 }
 
@@ -193,6 +202,7 @@ static struct timespec begun;
 static void begin(const char *name) {
     at = name;
     clock_gettime(CLOCK_THREAD_CPUTIME_ID, &begun);
+    feclearexcept(EXCEPTIONS);
 }
 
 static void timed(void) {
@@ -209,9 +219,14 @@ static void timed(void) {
 }
 
 static fmi2Status done(fmi2Status status) {
+    int raised = fetestexcept(EXCEPTIONS);
     timed();
     if (status != fmi2OK && status != fmi2Discard && status != fmi2Error)
         fail("returned neither fmi2OK nor fmi2Discard nor fmi2Error");
+    has_extreme |= offers_extreme && status == fmi2OK;
+    offers_extreme = 0;
+    if (status == fmi2OK && raised && !has_extreme)
+        fail("raised a floating-point exception, which a host may trap");
     if (status == fmi2OK)
         host_report.accepted++;
     while (arrays_count)
@@ -265,7 +280,7 @@ static void instantiate(void) {
     int well = kind < 224;
     fmi2Type type = well ? (kind % 2 ? fmi2CoSimulation : fmi2ModelExchange) : (fmi2Type)integer();
     const char *name = well ? "hostile" : text();
-    const char *id = well || one_in(2) ? guid : text();
+    const char *id = well || one_in(2) ? fmu->guid : text();
     const char *resources = one_in(2) ? text() : "file:///nowhere";
     int passes_callbacks = well || !one_in(4);
     begin("fmi2Instantiate");
@@ -277,7 +292,7 @@ static void instantiate(void) {
         fail("no instance");
 }
 
-/* To where the plant moves, so that not all inputs have to find the way. */
+/* To where the model moves, so that not all inputs have to find the way. */
 static void initialise(void) {
     fmi2Component c = instance();
     CALL(fmi2SetupExperiment, c, fmi2False, 0.0, 0.0, fmi2False, 0.0);
@@ -287,13 +302,15 @@ static void initialise(void) {
 
 /* After a step that succeeded every output is a number. */
 static void check_outputs(fmi2Component c) {
-    fmi2ValueReference all[OUTPUTS];
-    double values[OUTPUTS];
-    for (unsigned i = 0; i < OUTPUTS; i++)
+    fmi2ValueReference all[MAX_OUTPUTS];
+    double values[MAX_OUTPUTS];
+    if (fmu->outputs > MAX_OUTPUTS)
+        fail("has more outputs than MAX_OUTPUTS");
+    for (unsigned i = 0; i < fmu->outputs; i++)
         all[i] = i;
-    if (CALL(fmi2GetReal, c, all, OUTPUTS, values) != fmi2OK)
+    if (CALL(fmi2GetReal, c, all, fmu->outputs, values) != fmi2OK)
         fail("no outputs after a step that succeeded");
-    for (unsigned i = 0; i < OUTPUTS; i++) {
+    for (unsigned i = 0; i < fmu->outputs; i++) {
         if (!isfinite(values[i])) {
             fprintf(stderr, "output %u is %g\n", i, values[i]);
             fail("outputs are no numbers after a step that succeeded");
@@ -302,7 +319,7 @@ static void check_outputs(fmi2Component c) {
 }
 
 static fmi2Status do_step(fmi2Component c, double t, double h) {
-    /* Long steps are bounded by the plant's number of steps; one is enough for a while. */
+    /* Long steps are bounded by the model's number of steps; one is enough for a while. */
     if (h > 1.0 && isfinite(h) && long_steps++ >= LONG_STEPS)
         h = 1.0;
     fmi2Status status = CALL(fmi2DoStep, c, t, h, fmi2True);
@@ -474,7 +491,7 @@ static void call(void) {
         break;
     case 28: CALL(fmi2SerializedFMUstateSize, c, state(), array(1, sizeof(size_t))); break;
     case 29:
-        n = one_in(4) ? byte() : 4000;
+        n = one_in(4) ? byte() : 1 << 14;
         CALL(fmi2SerializeFMUstate, c, state(), array(n, 1), n);
         break;
     case 30: case 31:
@@ -509,29 +526,29 @@ static void call(void) {
         CALL(fmi2SetTime, c, time);
         break;
     case 46:
-        n = one_in(8) ? length() : 47;
+        n = one_in(8) ? length() : fmu->states;
         CALL(fmi2SetContinuousStates, c, reals(n), n);
         break;
     case 47:
-        n = one_in(8) ? length() : 47;
+        n = one_in(8) ? length() : fmu->states;
         CALL(fmi2GetDerivatives, c, reals(n), n);
         break;
     case 48:
-        n = one_in(8) ? length() : 8;
+        n = one_in(8) ? length() : fmu->indicators;
         CALL(fmi2GetEventIndicators, c, reals(n), n);
         break;
     default:
-        n = one_in(8) ? length() : 47;
+        n = one_in(8) ? length() : fmu->states;
         CALL(fmi2GetContinuousStates, c, reals(n), n);
         CALL(fmi2GetNominalsOfContinuousStates, c, reals(n), n);
     }
 }
 
-void host_run(const char *the_guid, const uint8_t *data, size_t size) {
-    guid = the_guid;
+void host_run(const struct host_fmu *the_fmu, const uint8_t *data, size_t size) {
+    fmu = the_fmu;
     bytes = data;
     left = size;
-    long_steps = 0;
+    long_steps = offers_extreme = has_extreme = 0;
     if (strcmp(fmi2GetVersion(), "2.0") || strcmp(fmi2GetTypesPlatform(), "default"))
         fail("version or platform");
     instantiate();

@@ -14,6 +14,14 @@ extern struct host_report {
     const char *slowest_call;
 } host_report;
 
-/* Turns the bytes into calls of the FMU with this GUID; aborts with a sentence on what must not
+/* What the host knows of the FMU that it is linked with. */
+struct host_fmu {
+    const char *guid;
+    /* scalar variables; the first of them are the outputs, reals */
+    size_t variables, outputs;
+    size_t states, indicators;
+};
+
+/* Turns the bytes into calls of the FMU; aborts with a sentence on what must not
  * happen. */
-void host_run(const char *guid, const uint8_t *data, size_t size);
+void host_run(const struct host_fmu *fmu, const uint8_t *data, size_t size);

@@ -1,8 +1,10 @@
 /* Lets the hostile host of host.c loose on the FMU's binary that this program is linked with: with
  * files (a fuzzer's corpus), or with noise of a seed.
  *
- *   replay GUID SLOWEST FILE…            # SLOWEST: seconds that one call may take
- *   replay GUID SLOWEST --noise COUNT SEED */
+ *   replay FMU… SLOWEST FILE…            # SLOWEST: seconds that one call may take
+ *   replay FMU… SLOWEST --noise COUNT SEED
+ *
+ * FMU…: what `struct host_fmu` has, in its order: the GUID and four numbers. */
 #include "host.h"
 
 #include <stdio.h>
@@ -20,21 +22,26 @@ static uint64_t next(uint64_t *state) {
 }
 
 int main(int count, char **arguments) {
-    if (count < 4) {
-        fprintf(stderr, "usage: replay GUID SLOWEST FILE… | --noise COUNT SEED\n");
+    if (count < 8) {
+        fprintf(stderr, "usage: replay GUID VARIABLES OUTPUTS STATES INDICATORS SLOWEST "
+                        "FILE… | --noise COUNT SEED\n");
         return 2;
     }
-    host_slowest_allowed = atof(arguments[2]);
-    if (!strcmp(arguments[3], "--noise") && count == 6) {
-        uint64_t seed = strtoull(arguments[5], NULL, 10);
-        for (long n = atol(arguments[4]); n > 0; n--) {
+    size_t sizes[4];
+    for (int n = 0; n < 4; n++)
+        sizes[n] = (size_t)atol(arguments[2 + n]);
+    struct host_fmu fmu = {arguments[1], sizes[0], sizes[1], sizes[2], sizes[3]};
+    host_slowest_allowed = atof(arguments[6]);
+    if (!strcmp(arguments[7], "--noise") && count == 10) {
+        uint64_t seed = strtoull(arguments[9], NULL, 10);
+        for (long n = atol(arguments[8]); n > 0; n--) {
             size_t size = next(&seed) % 1000;
             for (size_t i = 0; i < size; i++)
                 bytes[i] = (uint8_t)next(&seed);
-            host_run(arguments[1], bytes, size);
+            host_run(&fmu, bytes, size);
         }
     } else {
-        for (int n = 3; n < count; n++) {
+        for (int n = 7; n < count; n++) {
             FILE *file = fopen(arguments[n], "rb");
             if (!file) {
                 perror(arguments[n]);
@@ -42,7 +49,7 @@ int main(int count, char **arguments) {
             }
             size_t size = fread(bytes, 1, sizeof bytes, file);
             fclose(file);
-            host_run(arguments[1], bytes, size);
+            host_run(&fmu, bytes, size);
         }
     }
     printf("%lu inputs, %lu calls, %lu accepted, %lu messages, slowest %.3f s (%s)\n",

@@ -1,15 +1,15 @@
 //! Saved states that somebody has changed and given a new checksum: reading them is refused or
 //! gives an instance that lives as any other, and never panics.
 
-use std::sync::OnceLock;
+use std::collections::BTreeMap;
+use std::sync::Mutex;
 
-use HubSlosh::Instance;
-use HubSlosh::from_bytes;
-use HubSlosh::table::TABLE;
+use runtime::Model;
 use runtime::hash::Hash;
-use runtime::operation::{self as op, InstanceState, Interface};
-use runtime::snapshot::to_bytes;
-use runtime::variable::Value;
+use runtime::instance::Instance;
+use runtime::operation::{self as op, InstanceState, Interface, Version};
+use runtime::snapshot::{from_bytes, to_bytes};
+use runtime::variable::Value::{self, Boolean, Integer, Real};
 
 use crate::{everything_is_a_number, setter, survives_being_saved};
 
@@ -19,13 +19,13 @@ const CHECKSUM: usize = 16;
 /// The bytes are: which state to start from; then patches, each a place (two bytes), a length
 /// (one byte) and that many bytes of new content. What is left over, or an odd first byte, is
 /// taken as a saved state by itself.
-pub fn run(data: &[u8]) {
+pub fn run<M: Model>(data: &[u8]) {
     let Some((which, mut patches)) = data.split_first() else { return };
     if *which == u8::MAX {
-        _ = from_bytes(patches);
+        _ = from_bytes::<M>(Version::Fmi2, patches);
         return;
     }
-    let bases = bases();
+    let bases = bases::<M>();
     let mut bytes = bases[usize::from(*which) % bases.len()].clone();
     let body = bytes.len() - CHECKSUM;
     while let [low, high, length, rest @ ..] = patches {
@@ -38,25 +38,27 @@ pub fn run(data: &[u8]) {
     }
     let checksum = Hash::new().bytes(&bytes[..body]).value().to_le_bytes();
     bytes[body..].copy_from_slice(&checksum);
-    let Ok(read) = from_bytes(&bytes) else { return };
+    let Ok(read) = from_bytes::<M>(Version::Fmi2, &bytes) else { return };
     let read = survives_being_saved(&read);
-    let mut instance = HubSlosh::instance(read.interface());
+    let mut instance = Instance::new(Version::Fmi2, read.interface());
     instance.restore(&read).expect("a state that could be read can be restored");
     live(&mut instance);
 }
 
 /// What a host may do next. Calls may be refused; after a step that succeeded everything is a
 /// number.
-fn live(instance: &mut Instance) {
-    let torque = TABLE.find("tau_cmd").expect("there is a tau_cmd");
-    _ = instance.set(setter(Value::Real(0.1)), &[torque], |_| Value::Real(0.1));
+fn live<M: Model>(instance: &mut Instance<M>) {
+    let table = M::table();
+    for input in table.inputs() {
+        _ = instance.set(&op::SET_REAL, &[input.reference], |_| Real(0.1));
+    }
     if instance.state() == InstanceState::Instantiated {
         _ = instance.enter_initialization_mode();
     }
     if instance.state() == InstanceState::Initialization {
         _ = instance.exit_initialization_mode();
     }
-    for n in 0..TABLE.scalars.len() as u32 {
+    for n in 0..table.scalars.len() as u32 {
         _ = instance.get(&op::GET_REAL, n);
         _ = instance.output_derivatives(&[n], &[1], &mut [0.0]);
     }
@@ -69,9 +71,9 @@ fn live(instance: &mut Instance) {
             }
         }
         Interface::ModelExchange => {
-            let nx = TABLE.places().len();
+            let nx = table.places().len();
             let (mut x, mut rates, mut indicators) =
-                (vec![0.0; nx], vec![0.0; nx], vec![0.0; TABLE.about.event_indicators]);
+                (vec![0.0; nx], vec![0.0; nx], vec![0.0; table.about.event_indicators]);
             for _ in 0..3 {
                 _ = instance.new_discrete_states();
                 _ = instance.enter_continuous_time_mode();
@@ -91,44 +93,96 @@ fn live(instance: &mut Instance) {
     survives_being_saved(instance);
 }
 
-/// Both interfaces, every model of the liquid, every instance state that can be reached without
-/// an error.
-fn bases() -> &'static [Vec<u8>] {
-    static BASES: OnceLock<Vec<Vec<u8>>> = OnceLock::new();
-    BASES.get_or_init(|| {
+/// Both interfaces, every one of the model's [`settings`], every instance state that can be reached
+/// without an error.
+fn bases<M: Model>() -> &'static [Vec<u8>] {
+    static BASES: Mutex<BTreeMap<&str, &[Vec<u8>]>> = Mutex::new(BTreeMap::new());
+    let mut bases = BASES.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    bases.entry(M::table().about.model).or_insert_with(|| {
         let mut all = Vec::new();
         for interface in [Interface::CoSimulation, Interface::ModelExchange] {
-            for model in 1..=5 {
-                let mut instance = HubSlosh::instance(interface);
-                let settings = [
-                    ("slosh.model", Value::Integer(model)),
-                    ("slosh.modes", Value::Integer(2)),
-                    ("init.omega", Value::Real(0.3)),
-                    ("init.slosh_angle", Value::Real(0.2)),
-                    ("wheel.enabled", Value::Boolean(true)),
-                    ("imu.enabled", Value::Boolean(true)),
-                ];
-                for (name, value) in settings {
-                    let reference = TABLE.find(name).expect("the table has the variable");
-                    instance.set(setter(value), &[reference], |_| value).expect("a good value");
-                }
-                all.push(to_bytes(&instance));
-                instance.setup_experiment(Some(1e-6), 1.0, Some(9.0)).expect("a good experiment");
-                instance.enter_initialization_mode().expect("allowed");
-                all.push(to_bytes(&instance));
-                instance.exit_initialization_mode().expect("good parameters");
-                all.push(to_bytes(&instance));
-                match interface {
-                    Interface::CoSimulation => instance.do_step(1.0, 0.5).expect("a good step"),
-                    Interface::ModelExchange => {
-                        instance.enter_continuous_time_mode().expect("allowed");
-                    }
-                }
-                all.push(to_bytes(&instance));
-                instance.terminate().expect("allowed");
-                all.push(to_bytes(&instance));
+            for settings in settings(M::table().about.model) {
+                life_of::<M>(interface, &settings, &mut all);
             }
         }
-        all
+        all.leak()
     })
+}
+
+/// The saved states of one life.
+fn life_of<M: Model>(interface: Interface, settings: &[(&str, Value)], all: &mut Vec<Vec<u8>>) {
+    let mut instance = Instance::<M>::new(Version::Fmi2, interface);
+    for (name, value) in settings {
+        let reference = M::table().find(name).expect("the table has the variable");
+        instance.set(setter(*value), &[reference], |_| *value).expect("a good value");
+    }
+    all.push(to_bytes(&instance));
+    instance.setup_experiment(Some(1e-6), 1.0, Some(9.0)).expect("a good experiment");
+    instance.enter_initialization_mode().expect("allowed");
+    all.push(to_bytes(&instance));
+    instance.exit_initialization_mode().expect("good parameters");
+    all.push(to_bytes(&instance));
+    match interface {
+        Interface::CoSimulation => instance.do_step(1.0, 0.5).expect("a good step"),
+        Interface::ModelExchange => {
+            instance.enter_continuous_time_mode().expect("allowed");
+        }
+    }
+    all.push(to_bytes(&instance));
+    instance.terminate().expect("allowed");
+    all.push(to_bytes(&instance));
+}
+
+/// Settings whose states are damaged, by the FMU's name: together they have every part of the
+/// model in use, in motion.
+///
+/// # Panics
+/// If there are none for the model.
+fn settings(model: &str) -> Vec<Vec<(&'static str, Value)>> {
+    match model {
+        "HubSlosh" => (1..=5)
+            .map(|liquid| {
+                vec![
+                    ("slosh.model", Integer(liquid)),
+                    ("slosh.modes", Integer(2)),
+                    ("init.omega", Real(0.3)),
+                    ("init.slosh_angle", Real(0.2)),
+                    ("wheel.enabled", Boolean(true)),
+                    ("imu.enabled", Boolean(true)),
+                ]
+            })
+            .collect(),
+        // free, on a pivot (2)
+        "Spacecraft" => [(1, 0), (1, 1), (1, 4), (2, 2)]
+            .map(|(mount, tanks)| {
+                vec![
+                    ("mount", Integer(mount)),
+                    ("gravity[3]", Real(-9.81)),
+                    ("tanks", Integer(tanks)),
+                    ("tank[1].modes", Integer(3)),
+                    ("tank[1].p_0[1,1]", Real(0.3)),
+                    ("tank[2].k[1]", Real(20.0)),
+                    ("tank[2].position[1]", Real(0.8)),
+                    ("tank[4].modes", Integer(0)),
+                    ("init.omega[2]", Real(0.2)),
+                    ("h_wheels[1]", Real(3.0)),
+                ]
+            })
+            .into(),
+        // split, lumped (2)
+        "SloshTank" => [(1, 0), (1, 1), (1, 3), (2, 2)]
+            .map(|(coupling, modes)| {
+                vec![
+                    ("coupling", Integer(coupling)),
+                    ("tank.modes", Integer(modes)),
+                    ("tank.k[1]", Real(20.0)),
+                    ("tank.p_0[1,1]", Real(0.3)),
+                    ("host.mass", Real(1000.0)),
+                    ("a[3]", Real(2.0)),
+                    ("omega_dot[1]", Real(0.1)),
+                ]
+            })
+            .into(),
+        _ => panic!("nobody has said what to damage in {model}"),
+    }
 }

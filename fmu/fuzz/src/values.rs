@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 
 use arbitrary::{Result, Unstructured};
 
-use HubSlosh::Instance;
-use HubSlosh::table::TABLE;
-use runtime::operation::{InstanceState, Interface};
+use runtime::Model;
+use runtime::instance::Instance;
+use runtime::operation::{InstanceState, Interface, Version};
 use runtime::snapshot::to_bytes;
 use runtime::variable::{Causality, Kind, Quantity, Value};
 
@@ -15,19 +15,19 @@ use crate::{everything_is_a_number, setter, survives_being_saved};
 
 /// Steps of one run.
 const STEPS: usize = 12;
-/// The longest step, s. A step's work is bounded by the plant; this keeps the fuzzer fast.
+/// The longest step, s. A step's work is bounded by the model; this keeps the fuzzer fast.
 const LONGEST: f64 = 2.0;
-/// A run that was this slow ends: stiff plants may use up the steps they are allowed each time.
+/// A run that was this slow ends: stiff models may use up the steps they are allowed each time.
 const SLOW: Duration = Duration::from_secs(1);
 
 /// Makes an instance, sets some values, runs it.
-pub fn run(data: &[u8]) {
+pub fn run<M: Model>(data: &[u8]) {
     // Bytes that run out end the run.
-    _ = co_simulation(&mut Unstructured::new(data));
+    _ = co_simulation::<M>(&mut Unstructured::new(data));
 }
 
-fn co_simulation(data: &mut Unstructured) -> Result<()> {
-    let mut instance = HubSlosh::instance(Interface::CoSimulation);
+fn co_simulation<M: Model>(data: &mut Unstructured) -> Result<()> {
+    let mut instance = Instance::<M>::new(Version::Fmi2, Interface::CoSimulation);
     for _ in 0..data.int_in_range(0..=12)? {
         set_something(&mut instance, data)?;
     }
@@ -50,7 +50,7 @@ fn co_simulation(data: &mut Unstructured) -> Result<()> {
             set_something(&mut instance, data)?;
         }
         if data.ratio(1, 3)? {
-            let input = data.choose(TABLE.scalars)?.reference;
+            let input = data.choose(M::table().scalars)?.reference;
             _ = instance.set_input_derivatives(&[input], &[1], &[real(data)?]);
         }
         let h = real(data)?.min(LONGEST);
@@ -76,8 +76,8 @@ fn co_simulation(data: &mut Unstructured) -> Result<()> {
 }
 
 /// Sets a parameter or an input, mostly to something allowed; refusals change nothing.
-fn set_something(instance: &mut Instance, data: &mut Unstructured) -> Result<()> {
-    let scalar = data.choose(TABLE.scalars)?;
+fn set_something<M: Model>(instance: &mut Instance<M>, data: &mut Unstructured) -> Result<()> {
+    let scalar = data.choose(M::table().scalars)?;
     if !matches!(scalar.variable.causality, Causality::Parameter | Causality::Input) {
         return Ok(());
     }

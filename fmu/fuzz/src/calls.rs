@@ -1,0 +1,29 @@
+//! Any calls of the C interface with any arguments: bytes to the hostile host of `host.c`.
+
+// One call of a C function.
+#![allow(unsafe_code)]
+
+use std::ffi::{CString, c_char};
+
+use runtime::Model;
+
+use crate::sizes;
+
+/// As in `host.h`.
+#[repr(C)]
+struct HostFmu {
+    guid: *const c_char,
+    sizes: [usize; 4],
+}
+
+unsafe extern "C" {
+    /// Needs a description whose GUID ends with NUL, and as many bytes as said.
+    fn host_run(fmu: *const HostFmu, data: *const u8, size: usize);
+}
+
+/// The FMU that this program is linked with must be that of the model.
+pub fn run<M: Model>(data: &[u8]) {
+    let guid = CString::new(M::table().guid()).expect("a GUID has no NUL");
+    let fmu = HostFmu { guid: guid.as_ptr(), sizes: sizes::<M>() };
+    unsafe { host_run(&fmu, data.as_ptr(), data.len()) }
+}
