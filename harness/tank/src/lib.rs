@@ -8,8 +8,8 @@
 //! * `ring`, `gauss`, `panel`, `potential_flow`: the boundary integral equation
 //! * [`modal`]: modes as pendulums; [`closed_form`]: cylinder, annulus, box
 //! * [`sweep`]: tables over the fill and their [`interpolation`]
-//! * [`table()`], [`picture`]: to read and to look at
-//! * [`damping`], [`low_gravity`]: what the modal parameters leave out
+//! * [`table()`], [`picture`]: to read and to look at; [`parameters`]: files for the FMUs
+//! * [`damping`], [`low_gravity`], [`third_order`]: what the modal parameters leave out
 
 pub mod closed_form;
 pub mod contour;
@@ -20,6 +20,7 @@ pub mod interpolation;
 pub mod low_gravity;
 pub mod modal;
 mod panel;
+pub mod parameters;
 pub mod picture;
 mod potential_flow;
 mod ring;
@@ -28,6 +29,7 @@ mod svg;
 pub mod sweep;
 mod table;
 pub mod tank;
+pub mod third_order;
 
 pub use contour::Problems;
 pub use modal::{ModalData, Mode, Rest};

@@ -76,19 +76,28 @@ const TABLE: [[f64; 7]; 6] = [
 ];
 
 /// Omega_1^2 = omega_1^2 rho R^3/sigma of a deep upright cylinder, contact angle in degrees.
-///
-/// The difference to the flat surface, xi Bo + xi^3, is interpolated between the values of the table:
-/// in cos(angle) and ln(1 + Bo), so that 90 degrees is exact; beyond Bo = 100 it goes as 1/Bo to its
-/// limit -2 xi^2 cos(angle) (shape derivative of the eigenvalue).
 pub fn cylinder_omega2(bond: f64, contact_angle: f64) -> f64 {
-    let cos = contact_angle.to_radians().cos();
-    let flat = |bond: f64| XI * bond + XI.powi(3);
+    flat_omega2(bond) + meniscus_shift(bond, contact_angle)
+}
+
+/// Omega_1^2 under a flat surface, contact angle 90 degrees.
+fn flat_omega2(bond: f64) -> f64 {
+    XI * bond + XI.powi(3)
+}
+
+/// What the curved meniscus adds to Omega_1^2 of the flat surface.
+///
+/// Interpolated between the values of the table in cos(angle) and ln(1 + Bo), so that 90 degrees is exact;
+/// beyond Bo = 100 it goes as 1/Bo to its limit -2 xi^2 cos(angle) (shape derivative of the eigenvalue).
+fn meniscus_shift(bond: f64, contact_angle: f64) -> f64 {
+    let cosine = |angle: f64| if angle == 90.0 { 0.0 } else { angle.to_radians().cos() };
+    let cos = cosine(contact_angle);
     // cos rises with falling angle; at 90 degrees the difference is 0 exactly
-    let cosines: Vec<f64> =
-        ANGLE.iter().map(|a| if *a == 90.0 { 0.0 } else { a.to_radians().cos() }).collect();
+    let cosines = ANGLE.map(cosine);
     let at_row = |row: usize| {
-        let difference: Vec<f64> =
-            (0..7).map(|k| if k == 0 { 0.0 } else { TABLE[row][k] - flat(BOND[row]) }).collect();
+        let difference: Vec<f64> = (0..7)
+            .map(|k| if k == 0 { 0.0 } else { TABLE[row][k] - flat_omega2(BOND[row]) })
+            .collect();
         let [c5, c6] = [cosines[5], cosines[6]];
         // the last 5 degrees are 0.4 % of the cosine: straight on
         if cos > c6 {
@@ -98,11 +107,11 @@ pub fn cylinder_omega2(bond: f64, contact_angle: f64) -> f64 {
     };
     if bond > BOND[5] {
         let limit = -2.0 * XI * XI * cos;
-        return flat(bond) + limit + (at_row(5) - limit) * BOND[5] / bond;
+        return limit + (at_row(5) - limit) * BOND[5] / bond;
     }
     let places: Vec<f64> = BOND.iter().map(|b| b.ln_1p()).collect();
     let values: Vec<f64> = (0..6).map(at_row).collect();
-    flat(bond) + Monotone::new(&places, &values).at(bond.ln_1p())
+    Monotone::new(&places, &values).at(bond.ln_1p())
 }
 
 /// The published formula for 10 < Bo < 100 (NASA SP-106, chapter 11, after Satterlee and Reynolds 1964):
@@ -112,8 +121,9 @@ pub fn satterlee_reynolds(bond: f64, contact_angle: f64) -> f64 {
     6.26 + 1.84 * bond - 4.76 * contact_angle.to_radians().cos()
 }
 
-/// First mode of an upright cylinder filled to `fill`, m, with a curved meniscus: the deep cylinder's
-/// Omega_1^2 times tanh(xi h/R).
+/// First mode of an upright cylinder filled to `fill`, m, with a curved meniscus: what the deep cylinder's
+/// meniscus adds to Omega_1^2, times tanh(xi h/R), on top of [`flat`]. 90 degrees is [`flat`] exactly, and so is
+/// no surface tension. Beyond 0 to 90 degrees the nearer end is taken.
 pub fn cylinder(
     mode: &Mode,
     radius: f64,
@@ -121,18 +131,22 @@ pub fn cylinder(
     contact_angle: f64,
     fluid: Fluid,
 ) -> Capillary {
+    // 0/0 without gravity and surface tension: whatever it is, it counts 0 times below.
     let bond = fluid.bond(radius);
-    let mut outside = Vec::new();
+    let Capillary { omega2, spring, mut outside } = flat(mode, fluid);
     if !(0.0..=90.0).contains(&contact_angle) {
-        outside.push(format!("the contact angle of {contact_angle} degrees is outside 0 to 90"));
+        let taken = contact_angle.clamp(0.0, 90.0);
+        outside.push(format!(
+            "nothing is known at a contact angle of {contact_angle} degrees; {taken} is taken"
+        ));
     }
-    if bond < 0.0 || !bond.is_finite() {
-        outside.push(format!("the Bond number {bond:.3e} is outside 0 and above"));
+    if bond < 0.0 {
+        outside.push(format!("the Bond number {bond:.3e} is below 0; 0 is taken"));
     }
     if fill < radius && contact_angle < 90.0 && bond < 100.0 {
         outside.push("the meniscus was computed over deep liquid, h/R of 1 and more".to_string());
     }
     let scale = fluid.sigma / (fluid.rho * radius.powi(3)) * (XI * fill / radius).tanh();
-    let omega2 = scale * cylinder_omega2(bond.max(0.0), contact_angle.clamp(0.0, 90.0));
-    Capillary { omega2, spring: mode.m * (omega2 - fluid.g * mode.lambda), outside }
+    let curved = scale * meniscus_shift(bond.max(0.0), contact_angle.clamp(0.0, 90.0));
+    Capillary { omega2: omega2 + curved, spring: spring + mode.m * curved, outside }
 }

@@ -7,6 +7,7 @@ use crate::curve::{Curve, Point, Segment};
 use crate::modal::{ModalData, Mode};
 use crate::sweep::Sweep;
 use crate::tank::{Geometry, Tank};
+use crate::third_order::Overlaps;
 
 /// Colours of the modes, distinct also for colour-blind readers (Okabe and Ito).
 const COLOURS: [&str; 5] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8a6d00"];
@@ -399,4 +400,64 @@ pub fn sweep(tank: &Tank, sweep: &Sweep, gravity: f64) -> String {
         x += 100.0;
     }
     page(left, 70.0 + chart_height + 60.0, &title, &svg)
+}
+
+/// How the frequency of an upright cylinder's first mode depends on its amplitude, over the depth: the shifts of
+/// omega^2 per squared slosh angle, planar and circular, those of a pendulum, and the secondary resonances, where the
+/// third order has poles. Points mark the bench's fills, 5 and 10 cm.
+pub fn third_order(overlaps: &Overlaps) -> String {
+    let frame =
+        Frame { left: 80.0, top: 96.0, width: 620.0, height: 360.0, x: [0.1, 2.0], y: [-1.0, 1.0] };
+    let mut svg = String::new();
+    frame.axes(&mut svg, "h/R", Some("shift of ω² per squared slosh angle"));
+    frame.curve(&mut svg, &[[frame.x[0], 0.0], [frame.x[1], 0.0]], &format!("stroke=\"{FAINT}\""));
+    for (depth, azimuth, number) in overlaps.resonances() {
+        let dashed = format!("stroke=\"{FAINT}\" stroke-dasharray=\"5 4\"");
+        frame.curve(&mut svg, &[[depth, frame.y[0]], [depth, frame.y[1]]], &dashed);
+        let (x, y) = frame.place(depth, frame.y[1]);
+        text(&mut svg, x, y - 6.0, "middle", &format!("({azimuth},{number})"));
+    }
+    // Between the poles, closer and closer to them.
+    let mut ends = vec![frame.x[0]];
+    ends.extend(
+        overlaps.resonant_depths().into_iter().filter(|d| (frame.x[0]..frame.x[1]).contains(d)),
+    );
+    ends.push(frame.x[1]);
+    let depth = |ends: &[f64], i: i32| {
+        let part = 0.5 - 0.5 * (core::f64::consts::PI * f64::from(i) / 300.0).cos();
+        ends[0] + (ends[1] - ends[0]) * part
+    };
+    for (kind, name) in ["planar", "circular"].into_iter().enumerate() {
+        let colour = COLOURS[kind];
+        let style = format!("stroke=\"{colour}\" stroke-width=\"2\"");
+        for ends in ends.windows(2) {
+            let points: Vec<Point> = (1..300)
+                .map(|i| depth(ends, i))
+                .map(|depth| [depth, overlaps.shifts(depth)[kind]])
+                .collect();
+            for piece in points.split(|p| p[1] < frame.y[0] || p[1] > frame.y[1]) {
+                if piece.len() > 1 {
+                    frame.curve(&mut svg, piece, &style);
+                }
+            }
+        }
+        let pendulum = [-0.125, 0.5][kind];
+        frame.curve(
+            &mut svg,
+            &[[frame.x[0], pendulum], [frame.x[1], pendulum]],
+            &format!("stroke=\"{colour}\" stroke-dasharray=\"1 4\" stroke-width=\"1.6\""),
+        );
+        for fill in [0.05, 0.10] {
+            let depth = fill / 0.0815;
+            let (x, y) = frame.place(depth, overlaps.shifts(depth)[kind]);
+            let _ =
+                writeln!(svg, "<circle cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"4\" fill=\"{colour}\"/>");
+        }
+        let x = frame.left + 260.0 * kind as f64;
+        let _ = writeln!(svg, "<path d=\"M{x} 50h24\" stroke=\"{colour}\" stroke-width=\"2\"/>");
+        text(&mut svg, x + 30.0, 54.0, "start", &format!("{name}; dotted: of a pendulum"));
+    }
+    let title = "First mode of an upright cylinder: frequency and amplitude, third order";
+    text(&mut svg, frame.left, 26.0, "start", title);
+    page(720.0, frame.top + frame.height + 50.0, title, &svg)
 }

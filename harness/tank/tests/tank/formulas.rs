@@ -1,8 +1,11 @@
 //! Damping and low gravity.
 
 use crate::common::solve;
+use hubslosh_tank::Tank;
 use hubslosh_tank::damping::{self, Ring};
 use hubslosh_tank::low_gravity::{self, Fluid};
+use hubslosh_tank::parameters::{Liquid, ParameterSet, Target, Value};
+use std::path::Path;
 
 const BENCH: &str = "shape = { cylinder = { radius = 0.0815, height = 0.3 } }";
 
@@ -164,24 +167,87 @@ fn flat_surface_is_exact_in_a_cylinder() {
     assert_eq!(low_gravity::flat(&half.modes[0], Fluid { g: 1e-5, ..fluid }).outside.len(), 1);
 }
 
-/// The table to its digits, 90 degrees exactly, the limit of large Bond numbers, and nothing that
-/// jumps or turns between the values.
-#[test]
-fn curved_meniscus_follows_its_table_and_limits() {
-    let xi = 1.841_183_781_340_659_3f64;
-    let table = [
-        (0.0, 90.0, 6.2415),
-        (0.0, 5.0, 2.8263),
-        (1.0, 45.0, 6.2873),
-        (3.0, 15.0, 8.5985),
-        (10.0, 75.0, 23.7732),
-        (30.0, 60.0, 59.1301),
-        (100.0, 5.0, 184.4012),
-        (100.0, 30.0, 185.2381),
-    ];
-    for (bond, angle, value) in table {
-        assert!((low_gravity::cylinder_omega2(bond, angle) - value).abs() < 6e-5, "{bond} {angle}");
+/// Omega_1^2 = omega_1^2 rho R^3/sigma, deep cylinder: Bond numbers down, contact angles along.
+const ANGLES: [f64; 7] = [90.0, 75.0, 60.0, 45.0, 30.0, 15.0, 5.0];
+const MENISCUS: [(f64, [f64; 7]); 6] = [
+    (0.0, [6.2415, 5.7952, 5.2173, 4.5463, 3.8352, 3.1642, 2.8263]),
+    (1.0, [8.0827, 7.5726, 6.9609, 6.2873, 5.6101, 5.0195, 4.7587]),
+    (3.0, [11.7651, 11.1455, 10.4694, 9.7758, 9.1234, 8.5985, 8.3903]),
+    (10.0, [24.6534, 23.7732, 22.9150, 22.1195, 21.4397, 20.9474, 20.7733]),
+    (30.0, [61.4770, 60.2668, 59.1301, 58.1264, 57.3171, 56.7705, 56.5911]),
+    (100.0, [190.3599, 188.8619, 187.4498, 186.2136, 185.2381, 184.6017, 184.4012]),
+];
+
+/// The parameters of two modes of a deep cylinder of 0.1 m, h/R = 20, at a Bond number.
+fn deep(bond: f64, contact_angle: f64, sigma: f64) -> ParameterSet {
+    let (radius, fill) = (0.1, 2.0);
+    let text =
+        format!("density = 1000\nshape = {{ cylinder = {{ radius = {radius}, height = 3 }} }}");
+    let tank = Tank::parse(&text, Path::new("")).unwrap();
+    let data = tank.solve(fill, 2).unwrap();
+    let gravity = if bond.is_finite() { bond * sigma / (1000.0 * radius * radius) } else { 9.81 };
+    let liquid = Liquid { gravity, nu: None, sigma: Some(sigma), contact_angle };
+    ParameterSet::new(&tank, &data, Target::HubSlosh, liquid).unwrap()
+}
+
+fn real(set: &ParameterSet, name: &str) -> f64 {
+    match set.values.iter().find(|(n, _)| n == name) {
+        Some((_, Value::Real(x))) => *x,
+        other => panic!("{name}: {other:?}"),
     }
+}
+
+/// omega_1^2 = g/l + k/m of the file for the FMU, as rho R^3 omega_1^2/sigma: every value of the table to its
+/// last digit; tanh(20 xi) is 1.
+#[test]
+fn parameters_of_a_deep_cylinder_have_every_frequency_of_the_table() {
+    let sigma = 0.072;
+    for (bond, row) in MENISCUS {
+        for (angle, expected) in ANGLES.into_iter().zip(row) {
+            let set = deep(bond, angle, sigma);
+            let value = |name: &str| real(&set, &format!("slosh.table.{name}"));
+            let omega2 = value("g_ref") / value("length[1]") + value("k[1]") / value("mass[1]");
+            let found = omega2 * 1000.0 * 0.1f64.powi(3) / sigma;
+            assert!((found - expected).abs() < 5.1e-5, "{bond} {angle}: {found}");
+            assert_eq!(set.warnings.len(), usize::from(angle != 90.0), "{:?}", set.warnings);
+        }
+    }
+}
+
+/// 90 degrees is the flat surface to the last bit; Bo -> infinity is xi^3 - 2 xi^2 cos(angle) over rho R^3/sigma
+/// (1e-9 of the way at Bo = 1e12), where below some 23 degrees 0 stands in its place and is told; no surface
+/// tension is no stiffness.
+#[test]
+fn stiffnesses_have_the_limits_of_a_flat_surface_and_of_large_bond_numbers() {
+    let (xi, sigma) = (1.841_183_781_340_659_3f64, 0.072);
+    let k = |set: &ParameterSet| real(set, "slosh.table.k[1]");
+    let cylinder = "shape = { cylinder = { radius = 0.1, height = 3 } }";
+    let mode = &solve(cylinder, 2.0, 1).modes[0];
+    for bond in [0.0, 0.5, 12.0, 100.0, 700.0] {
+        let fluid = Fluid { rho: 1000.0, sigma, g: bond * sigma / 10.0 };
+        let flat = low_gravity::flat(mode, fluid);
+        assert_eq!(low_gravity::cylinder(mode, 0.1, 2.0, 90.0, fluid), flat);
+        assert_eq!(k(&deep(bond, 90.0, sigma)), flat.spring);
+    }
+    for angle in [60.0, 30.0, 5.0] {
+        let fluid = Fluid { rho: 1000.0, sigma, g: 1e12 * sigma / 10.0 };
+        let cos = f64::to_radians(angle).cos();
+        let limit = mode.m * sigma * (xi.powi(3) - 2.0 * xi * xi * cos);
+        let spring = low_gravity::cylinder(mode, 0.1, 2.0, angle, fluid).spring;
+        assert!((spring / limit - 1.0).abs() < 1e-9, "{angle}: {spring} {limit}");
+        let set = deep(1e12, angle, sigma);
+        let told = set.warnings.iter().any(|warning| warning.contains("none below 0"));
+        assert_eq!(told, angle < 23.0);
+        assert_eq!(k(&set), if told { 0.0 } else { spring });
+    }
+    let none = deep(f64::INFINITY, 5.0, 0.0);
+    assert_eq!([k(&none), real(&none, "slosh.table.k[2]")], [0.0, 0.0]);
+}
+
+/// Nothing that jumps or turns between the values; the published formula's distance.
+#[test]
+fn curved_meniscus_is_smooth_between_its_values() {
+    let xi = 1.841_183_781_340_659_3f64;
     for bond in [0.0, 0.5, 5.0, 70.0, 500.0] {
         let flat = xi * bond + xi.powi(3);
         assert!((low_gravity::cylinder_omega2(bond, 90.0) / flat - 1.0).abs() < 1e-15);

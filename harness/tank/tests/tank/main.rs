@@ -7,3 +7,4 @@ mod physics;
 mod pictures;
 mod reference;
 mod sweeps;
+mod third_order;

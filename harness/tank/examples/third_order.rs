@@ -1,0 +1,11 @@
+//! Draws how frequency depends on amplitude in an upright cylinder, the figure of HubSlosh's documentation.
+//!
+//! `cargo run --release -p hubslosh-tank --example third_order -- modelDescription/HubSlosh/documentation/liquid.svg`
+
+use hubslosh_tank::{picture, third_order::Overlaps};
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let path = std::env::args().nth(1).ok_or("usage: third_order FILE.svg")?;
+    std::fs::write(path, picture::third_order(&Overlaps::new(40)))?;
+    Ok(())
+}

@@ -1,0 +1,309 @@
+//! A tank's modal parameters under the names of the FMUs' variables, and files of them.
+//!
+//! A set file holds `"name" = value`, TOML with quoted names; the same as SSV is SSP 1.0's parameter
+//! set. `hubslosh run --set-file`, the Python package and SSP tools read them.
+
+use core::fmt::Write as _;
+
+use crate::contour::Problems;
+use crate::low_gravity::{self, Capillary, Fluid};
+use crate::modal::ModalData;
+use crate::tank::{Geometry, Shape, Tank};
+use crate::{damping, modal};
+
+/// The FMU that the parameters are for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// `HubSlosh.fmu`: a table of modes (`slosh.source = table`). The tank's place on the hub,
+    /// `tank.r`, stays as it is.
+    HubSlosh,
+    /// `SloshTank.fmu`.
+    SloshTank,
+    /// `Spacecraft.fmu`, tank 1 to 4.
+    Spacecraft {
+        /// Its number.
+        tank: usize,
+    },
+}
+
+/// What is known of the liquid besides its density.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Liquid {
+    /// Specific force along the axis at which damping ratios hold, m/s2.
+    pub gravity: f64,
+    /// Kinematic viscosity, m2/s; without it the damping ratios stay as they are in the FMU.
+    pub nu: Option<f64>,
+    /// Surface tension, N/m; without it there is no centring stiffness.
+    pub sigma: Option<f64>,
+    /// Angle between surface and wall in the liquid, degrees; 90 is a flat surface.
+    pub contact_angle: f64,
+}
+
+/// A parameter's value.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// A quantity in SI units.
+    Real(f64),
+    /// A number of something.
+    Integer(i64),
+    /// An item of an enumeration.
+    Item(&'static str),
+}
+
+/// Parameters under the names of an FMU's variables.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParameterSet {
+    /// Where they come from, and how good they are: one line each.
+    pub notes: Vec<String>,
+    /// What is left out or not known: one line each.
+    pub warnings: Vec<String>,
+    /// Names and values.
+    pub values: Vec<(String, Value)>,
+}
+
+/// Damping ratios of the modes: of the first by the published correlation of the shape, where there is
+/// one, and 1.45 laminar layers otherwise; of the others of a cylinder the first one's, as HubSlosh has
+/// it, else 1.45 laminar layers.
+fn damping_ratios(
+    tank: &Tank,
+    data: &ModalData,
+    nu: f64,
+    g: f64,
+    notes: &mut Vec<String>,
+    warnings: &mut Vec<String>,
+) -> Vec<f64> {
+    let fill = data.fill;
+    let estimate = |mode: &modal::Mode| damping::estimate(mode, nu, g);
+    let (first, source) = match &tank.geometry {
+        Geometry::Box { length_x, length_y } => {
+            (damping::keulegan(*length_x, *length_y, fill, nu, g), "Keulegan (laminar layer)")
+        }
+        Geometry::Revolution { shape: Some(shape), .. } => match *shape {
+            Shape::Cylinder { radius, .. } => (
+                damping::mikishev_dorozhkin(radius, fill, nu, g),
+                "Mikishev and Dorozhkin, all modes",
+            ),
+            Shape::Sphere { radius } => (damping::sphere(radius, fill, nu, g), "sphere (SP-106)"),
+            Shape::Torus { tube_radius, .. } => {
+                (damping::torus(tube_radius, fill, nu, g), "torus (one tank measured)")
+            }
+            _ => (estimate(&data.modes[0]), "1.45 laminar layers"),
+        },
+        Geometry::Revolution { .. } => (estimate(&data.modes[0]), "1.45 laminar layers"),
+    };
+    notes.push(format!("damping ratio of mode 1: {source}; measured tanks scatter by 30 %"));
+    warnings.extend(first.outside.iter().map(|why| format!("damping: {why}")));
+    let cylinder =
+        matches!(&tank.geometry, Geometry::Revolution { shape: Some(Shape::Cylinder { .. }), .. });
+    let others = data.modes.iter().skip(1);
+    let others = others.map(|mode| if cylinder { first.zeta } else { estimate(mode).zeta });
+    core::iter::once(first.zeta).chain(others).collect()
+}
+
+/// Centring stiffnesses of the modes, N/m: of a flat surface, and of the first mode of an upright cylinder
+/// of the meniscus that the contact angle makes. The FMUs take none below 0.
+fn springs(
+    tank: &Tank,
+    data: &ModalData,
+    modes: &[modal::Mode],
+    liquid: Liquid,
+    notes: &mut Vec<String>,
+    warnings: &mut Vec<String>,
+) -> Vec<f64> {
+    let Some(sigma) = liquid.sigma else { return vec![0.0; modes.len()] };
+    let (fluid, angle) = (Fluid { rho: data.rho, sigma, g: liquid.gravity }, liquid.contact_angle);
+    let mut all: Vec<Capillary> = modes.iter().map(|mode| low_gravity::flat(mode, fluid)).collect();
+    if angle != 90.0 {
+        if let Geometry::Revolution { shape: Some(Shape::Cylinder { radius, .. }), .. } =
+            &tank.geometry
+        {
+            all[0] = low_gravity::cylinder(&modes[0], *radius, data.fill, angle, fluid);
+            let bond = fluid.bond(*radius);
+            notes.push(format!(
+                "k of mode 1: meniscus of a deep cylinder at a contact angle of {angle} degrees and the Bond \
+                 number {bond:.4}, free contact line (table); it holds at {} m/s2",
+                liquid.gravity
+            ));
+            warnings.push(
+                "capillarity: under a curved meniscus masses and heights, and the stiffnesses of the modes \
+                 after the first, are not known; they are those of a flat surface"
+                    .to_string(),
+            );
+        } else {
+            warnings.push(format!(
+                "capillarity: the meniscus of a contact angle of {angle} degrees is known for an upright \
+                 cylinder (shape = {{ cylinder = … }}) alone; k is that of a flat surface, 90 degrees"
+            ));
+        }
+    }
+    for (n, (mode, capillary)) in modes.iter().zip(&mut all).enumerate() {
+        warnings.extend(capillary.outside.iter().map(|why| format!("capillarity: {why}")));
+        let (k, gravity) = (capillary.spring, liquid.gravity * mode.lambda);
+        if k < 0.0 {
+            warnings.push(format!(
+                "capillarity: k of mode {} is {k:.3e} N/m, and the FMUs take none below 0; 0 is written, which \
+                 leaves the frequency {:.1e} of itself too high",
+                n + 1,
+                1.0 - (capillary.omega2 / gravity).sqrt()
+            ));
+            capillary.spring = 0.0;
+        }
+    }
+    all.iter().map(|capillary| capillary.spring).collect()
+}
+
+impl ParameterSet {
+    /// The parameters of a tank that was solved for `data`, as many modes as both have.
+    ///
+    /// # Errors
+    /// A tank that the FMU cannot have: more than four of them, or a box with unequal sides in six axes.
+    pub fn new(
+        tank: &Tank,
+        data: &ModalData,
+        target: Target,
+        liquid: Liquid,
+    ) -> Result<ParameterSet, Problems> {
+        let name = data.name.as_deref().unwrap_or("tank");
+        let mut notes = vec![format!(
+            "{name}, fill {} m: modal parameters with an error of {:.0e}",
+            data.fill, data.error
+        )];
+        let most = if target == Target::HubSlosh { 10 } else { 3 };
+        let modes = &data.modes[..data.modes.len().min(most)];
+        let Some(first) = modes.first() else {
+            return Err("There are no modes: the tank is empty or full.".to_string().into());
+        };
+        if let Geometry::Box { length_x, length_y } = &tank.geometry
+            && target != Target::HubSlosh
+            && length_x != length_y
+        {
+            return Err(format!(
+                "A box of {length_x} m by {length_y} m has other modes along x than along y; the six-axis FMUs have the \
+                 same along both: a square box, or a body of revolution."
+            )
+            .into());
+        }
+        let mut warnings = Vec::new();
+        let ratios = match liquid.nu {
+            Some(nu) => damping_ratios(tank, data, nu, liquid.gravity, &mut notes, &mut warnings),
+            None => {
+                notes.push("no viscosity was given: the damping ratios are 0".to_string());
+                vec![0.0; data.modes.len()]
+            }
+        };
+        let springs = springs(tank, data, modes, liquid, &mut notes, &mut warnings);
+        let mut values = Vec::new();
+        let mut real = |name: String, value: f64| values.push((name, Value::Real(value)));
+        match target {
+            Target::HubSlosh => {
+                real("slosh.table.m_liq".into(), data.m_liq);
+                real("slosh.table.g_ref".into(), liquid.gravity);
+                real("fluid.rho".into(), data.rho);
+                // The free surface's width along the first length of a box.
+                real(
+                    "tank.d".into(),
+                    2.0 * data.r_surface.unwrap_or(data.length_x.unwrap_or(0.0) / 2.0),
+                );
+                real("tank.I_own".into(), data.i_eff_axis.unwrap_or(0.0));
+                for (n, mode) in modes.iter().enumerate() {
+                    let mut of_mode =
+                        |what: &str, value| real(format!("slosh.table.{what}[{}]", n + 1), value);
+                    of_mode("mass", mode.m);
+                    of_mode("length", mode.l);
+                    of_mode("hinge", mode.hinge.unwrap_or(0.0));
+                    of_mode("k", springs[n]);
+                    of_mode("zeta", ratios[n]);
+                    of_mode("wave", mode.wave);
+                }
+                values.push(("slosh.source".into(), Value::Item("table")));
+                values.push(("slosh.modes".into(), Value::Integer(modes.len() as i64)));
+            }
+            Target::SloshTank | Target::Spacecraft { .. } => {
+                let prefix = match target {
+                    Target::Spacecraft { tank: number @ 1..=4 } => format!("tank[{number}]"),
+                    Target::Spacecraft { tank: number } => {
+                        return Err(format!(
+                            "The tank's number is {number}; Spacecraft has 1 to 4."
+                        )
+                        .into());
+                    }
+                    _ => "tank".to_string(),
+                };
+                let rest = data.rest(modes.len());
+                real(format!("{prefix}.m_0"), rest.m_0);
+                real(format!("{prefix}.H_0"), rest.height);
+                // The largest number of modes may leave it below 0 by rounding.
+                real(format!("{prefix}.I_0"), rest.inertia.max(0.0));
+                real(format!("{prefix}.I_z"), data.i_eff_axis.unwrap_or(0.0));
+                real(format!("{prefix}.g_ref"), liquid.gravity);
+                for (n, mode) in modes.iter().enumerate() {
+                    let mut of_mode =
+                        |what: &str, value| real(format!("{prefix}.{what}[{}]", n + 1), value);
+                    of_mode("mass", mode.m);
+                    of_mode("length", mode.l);
+                    of_mode("hinge", mode.hinge.unwrap_or(0.0));
+                    of_mode("k", springs[n]);
+                    of_mode("zeta", ratios[n]);
+                }
+                values.push((format!("{prefix}.modes"), Value::Integer(modes.len() as i64)));
+                if prefix != "tank" {
+                    notes.push("set tanks to the number of tanks".to_string());
+                }
+            }
+        }
+        if modes.len() < data.modes.len() {
+            notes.push(format!("the first {} of {} modes", modes.len(), data.modes.len()));
+        }
+        if first.height.is_none() {
+            warnings.push("mode 1 carries hardly any mass: its hinge has no meaning".to_string());
+        }
+        warnings.dedup();
+        Ok(ParameterSet { notes, warnings, values })
+    }
+
+    /// Notes and warnings, as they stand at the head of a file.
+    fn comments(&self) -> impl Iterator<Item = String> {
+        let warnings = self.warnings.iter().map(|warning| format!("warning: {warning}"));
+        self.notes.iter().cloned().chain(warnings)
+    }
+
+    /// As TOML.
+    pub fn to_toml(&self) -> String {
+        let mut text = String::new();
+        for note in self.comments() {
+            let _ = writeln!(text, "# {}", note.replace('\n', " "));
+        }
+        for (name, value) in &self.values {
+            let _ = match value {
+                Value::Real(x) => writeln!(text, "\"{name}\" = {x:?}"),
+                Value::Integer(n) => writeln!(text, "\"{name}\" = {n}"),
+                Value::Item(item) => writeln!(text, "\"{name}\" = \"{item}\""),
+            };
+        }
+        text
+    }
+
+    /// As SSV, the parameter set of SSP 1.0.
+    pub fn to_ssv(&self) -> String {
+        let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<!--\n");
+        for note in self.comments() {
+            // Two hyphens end a comment.
+            let _ = writeln!(text, "  {}", note.replace("--", "- -"));
+        }
+        text.push_str(
+            "-->\n<ssv:ParameterSet \
+             xmlns:ssv=\"http://ssp-standard.org/SSP1/SystemStructureParameterValues\" \
+             version=\"1.0\" name=\"tank\">\n  <ssv:Parameters>\n",
+        );
+        for (name, value) in &self.values {
+            let value = match value {
+                Value::Real(x) => format!("<ssv:Real value=\"{x:?}\"/>"),
+                Value::Integer(n) => format!("<ssv:Integer value=\"{n}\"/>"),
+                Value::Item(item) => format!("<ssv:Enumeration value=\"{item}\"/>"),
+            };
+            let _ = writeln!(text, "    <ssv:Parameter name=\"{name}\">{value}</ssv:Parameter>");
+        }
+        text.push_str("  </ssv:Parameters>\n</ssv:ParameterSet>\n");
+        text
+    }
+}
