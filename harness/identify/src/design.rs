@@ -7,7 +7,7 @@ use anyhow::{Result, ensure};
 use bench::random::Random;
 use host::fmi2::Fmu;
 
-use crate::fit::{Differences, Problem};
+use crate::fit::Problem;
 use crate::noise::Noise;
 use crate::recording::Recording;
 use crate::simulate::Setup;
@@ -93,13 +93,12 @@ pub fn cramer_rao(
     noise: Noise,
 ) -> Result<Vec<(String, f64, f64)>> {
     let rate = vec![0.0; time.len()];
-    let recording =
-        [Recording { name: "plan".into(), time, torque, rate, angle: None, from_rest: true }];
+    let recording = [Recording::of("plan", time, torque, rate)];
     let mut problem = Problem::new(fmu, setup, &recording, unknowns);
-    problem.noise = vec![noise];
+    problem.channels[0].noise = noise;
     let x = problem.start();
-    let polished = problem.gauss_newton(&x, Differences::Central, 1)?;
-    let deviation = |i: usize| polished.covariance.x[(i, i)].sqrt();
+    let covariance = problem.information(&x)?;
+    let deviation = |i: usize| covariance.x[(i, i)].sqrt();
     Ok(problem
         .unknowns
         .iter()

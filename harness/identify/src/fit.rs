@@ -6,11 +6,24 @@
 //!
 //! ω is the FMU's answer (see [`crate::simulate`]), s, b and δ the gyro's scale and bias and the delay,
 //! the second sum what is known of some parameters beforehand, the whitening filter that of
-//! [`crate::noise`]. Levenberg and Marquardt's method as MINPACK has it.
+//! [`crate::noise`]. Where an encoder was recorded, its angle less an offset is a second such sum, which
+//! knows nothing of the gyro's scale.
+//!
+//! Two searches. From afar, Levenberg and Marquardt's method as MINPACK has it. Near the minimum, Gauss
+//! and Newton's, with sensitivities that are kept as long as they serve: the FMU answers once a step
+//! instead of once an unknown. It ends by the Newton decrement
+//!
+//! ```text
+//! λ = sqrt(gᵀ (JᵀJ)⁻¹ g),   g = Jᵀe
+//! ```
+//!
+//! which is the distance to the minimum in standard deviations, whatever the units (Boyd & Vandenberghe,
+//! Convex Optimization, 9.5).
 //!
 //! Sensitivities to s, b and δ are exact: −ω, −1 and s ω'. Those to the FMU's parameters are
-//! differences. The step moves the whole answer by about [`MOVE`] standard deviations of its noise:
-//! small against curvature and large against the integrator's tolerance.
+//! differences. The step moves the whole answer by [`MOVE`] standard deviations of its noise:
+//! small against curvature and large against the integrator's tolerance
+//! (`sensitivities_are_those_of_smaller_and_larger_steps` in tests/twin.rs).
 
 use anyhow::{Context, Result};
 use host::fmi2::Fmu;
@@ -18,19 +31,42 @@ use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::{DMatrix, DVector, Dyn, storage::Owned};
 use rayon::prelude::*;
 
-use crate::noise::{Noise, Whitening};
+use crate::friction;
+use crate::noise::{FLOOR, Noise, Whitening};
 use crate::recording::{self, Recording};
-use crate::simulate::{Motion, Setup};
+use crate::simulate::{Instants, Motion, Setup};
 use crate::uncertainty::Covariance;
-use crate::unknown::{Quantity, Unknown};
+use crate::unknown::{Quantity, Scale, Unknown};
 
 /// By how much a difference moves the answer, in units of the noise's norm of one degree of freedom.
-const MOVE: f64 = 1.0;
+pub const MOVE: f64 = 0.3;
 /// Drift of a MEMS gyro (the thesis's LSM6DS3), until the recording's own is known. Without it the slow
 /// decay at a recording's start, where the drift is all the noise, would draw the friction after it.
 const TYPICAL: Noise = Noise { white: 1.0, drift: 0.2, time: 100.0 };
 /// Bounds of the differences' steps, in units of the variable x.
-const STEPS: (f64, f64) = (1e-6, 2e-4);
+const STEPS: (f64, f64) = (1e-6, 2e-2);
+/// A search has ended where the Newton decrement is below this: a hundredth of a standard deviation.
+pub const DECREMENT: f64 = 0.01;
+
+/// What is compared with the FMU's answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Signal {
+    /// Rate of the hub by the gyro.
+    Rate,
+    /// Angle of the hub by the encoder.
+    Angle,
+}
+
+/// A signal of a recording with its noise.
+#[derive(Clone, Copy, Debug)]
+pub struct Channel {
+    /// Number of the recording.
+    pub recording: usize,
+    /// Which of its signals.
+    pub signal: Signal,
+    /// Its noise.
+    pub noise: Noise,
+}
 
 /// Recordings, a set-up of the FMU, and the unknowns.
 #[derive(Clone)]
@@ -43,15 +79,18 @@ pub struct Problem<'a> {
     pub recordings: &'a [Recording],
     /// What is estimated.
     pub unknowns: Vec<Unknown>,
-    /// The gyro's noise in each recording.
-    pub noise: Vec<Noise>,
+    /// What is fitted.
+    pub channels: Vec<Channel>,
+    /// How sensitivities are differenced.
+    pub differences: (Differences, Instants),
 }
 
 /// What an answer looks like for given unknowns.
+#[derive(Clone)]
 pub struct Answer {
     /// The FMU's motion, for each recording.
     pub motion: Vec<Motion>,
-    /// Measured less modelled rate, rad/s, for each recording.
+    /// Measured less modelled signal, rad/s or rad, for each channel.
     pub residual: Vec<Vec<f64>>,
 }
 
@@ -60,28 +99,43 @@ pub struct Answer {
 pub struct Estimate {
     /// Variables x of the unknowns.
     pub x: Vec<f64>,
-    /// Whether the search ended at a minimum.
-    pub converged: bool,
-    /// Why it ended.
+    /// Why the search ended.
     pub reason: String,
+    /// Steps of the differences there.
+    pub steps: Vec<f64>,
     /// Answers of the FMU that were needed, all recordings together being one.
     pub simulations: usize,
 }
 
 /// A minimum with its sensitivities.
+#[derive(Clone)]
 pub struct Polished {
     /// Variables x of the unknowns.
     pub x: Vec<f64>,
-    /// Sensitivities there.
+    /// Sensitivities there or, if a step went from there, very near.
     pub jacobian: DMatrix<f64>,
     /// Covariance there.
     pub covariance: Covariance,
     /// The FMU's answer there.
     pub answer: Answer,
-    /// The next step, in standard deviations of the unknown that it moves most.
-    pub remaining: f64,
+    /// Sum of squares there.
+    pub cost: f64,
+    /// Newton decrement: the distance to the minimum, in standard deviations.
+    pub decrement: f64,
     /// Answers of the FMU that were needed.
     pub simulations: usize,
+}
+
+impl Polished {
+    /// Steps of the differences for sensitivities near it.
+    pub fn steps(&self) -> Vec<f64> {
+        Problem::steps(&self.jacobian)
+    }
+
+    /// Whether it is a minimum.
+    pub fn converged(&self) -> bool {
+        self.decrement < 10.0 * DECREMENT
+    }
 }
 
 /// How sensitivities are differenced.
@@ -101,9 +155,19 @@ impl<'a> Problem<'a> {
         recordings: &'a [Recording],
         unknowns: Vec<Unknown>,
     ) -> Self {
-        let level = |r| Noise { white: recording::noise_level(r).max(1e-9), ..TYPICAL };
-        let noise = recordings.iter().map(level).collect();
-        Problem { fmu, setup, recordings, unknowns, noise }
+        let mut channels = Vec::new();
+        for (index, recording) in recordings.iter().enumerate() {
+            let level = |signal| recording::noise_level(signal).max(FLOOR);
+            let noise = Noise { white: level(&recording.rate), ..TYPICAL };
+            channels.push(Channel { recording: index, signal: Signal::Rate, noise });
+            if let Some(angle) = &recording.angle {
+                // the angle adds up what the rate leaves: much drift
+                let noise = Noise { white: level(angle), drift: 30.0, time: 100.0 };
+                channels.push(Channel { recording: index, signal: Signal::Angle, noise });
+            }
+        }
+        let differences = (Differences::Forward, Instants::Knots);
+        Problem { fmu, setup, recordings, unknowns, channels, differences }
     }
 
     /// Values of the unknowns for variables x.
@@ -116,13 +180,18 @@ impl<'a> Problem<'a> {
         self.unknowns.iter().map(|unknown| unknown.scale.variable(unknown.start)).collect()
     }
 
+    /// Place of a parameter of the FMU among the unknowns.
+    pub fn place(&self, parameter: &str) -> Option<usize> {
+        self.unknowns.iter().position(|u| u.quantity.parameter() == Some(parameter))
+    }
+
     /// Value of an unknown, or what it is if it is not unknown.
     fn value_of(&self, x: &[f64], quantity: &Quantity, otherwise: f64) -> f64 {
         let place = self.unknowns.iter().position(|unknown| unknown.quantity == *quantity);
         place.map_or(otherwise, |i| self.unknowns[i].scale.value(x[i]))
     }
 
-    fn motion(&self, x: &[f64], recording: usize) -> Result<Motion> {
+    fn motion(&self, x: &[f64], recording: usize, instants: Instants) -> Result<Motion> {
         let values: Vec<(&str, f64)> = self
             .unknowns
             .iter()
@@ -136,37 +205,44 @@ impl<'a> Problem<'a> {
             })
             .collect();
         let delay = self.value_of(x, &Quantity::Delay, 0.0);
-        self.setup.run(self.fmu, &values, &self.recordings[recording], delay)
+        self.setup.run(self.fmu, &values, &self.recordings[recording], delay, instants)
+    }
+
+    fn motions(&self, x: &[f64], instants: Instants) -> Result<Vec<Motion>> {
+        (0..self.recordings.len()).into_par_iter().map(|i| self.motion(x, i, instants)).collect()
     }
 
     /// The FMU's answer and what it leaves of the recordings.
-    pub fn answer(&self, x: &[f64]) -> Result<Answer> {
-        let numbers: Vec<usize> = (0..self.recordings.len()).collect();
-        let motion: Vec<Motion> =
-            numbers.par_iter().map(|&i| self.motion(x, i)).collect::<Result<_>>()?;
-        let scale = self.value_of(x, &Quantity::GyroScale, 1.0);
-        let residual = numbers
-            .iter()
-            .map(|&i| {
-                let bias = self.value_of(x, &Quantity::GyroBias(i), 0.0);
-                let model = motion[i].rate.iter();
-                self.recordings[i]
-                    .rate
-                    .iter()
-                    .zip(model)
-                    .map(|(y, w)| y - scale * w - bias)
-                    .collect()
-            })
-            .collect();
+    pub fn answer(&self, x: &[f64], instants: Instants) -> Result<Answer> {
+        let motion = self.motions(x, instants)?;
+        let residual = self.channels.iter().map(|c| self.residual(x, *c, &motion)).collect();
         Ok(Answer { motion, residual })
     }
 
-    fn filters(&self) -> Vec<Whitening> {
-        let pairs = self.recordings.iter().zip(&self.noise);
-        pairs.map(|(recording, noise)| noise.whitening(&recording.time)).collect()
+    fn residual(&self, x: &[f64], channel: Channel, motion: &[Motion]) -> Vec<f64> {
+        let i = channel.recording;
+        let (recording, motion) = (&self.recordings[i], &motion[i]);
+        match channel.signal {
+            Signal::Rate => {
+                let scale = self.value_of(x, &Quantity::GyroScale, 1.0);
+                let bias = self.value_of(x, &Quantity::GyroBias(i), 0.0);
+                let pairs = recording.rate.iter().zip(&motion.rate);
+                pairs.map(|(y, w)| y - scale * w - bias).collect()
+            }
+            Signal::Angle => {
+                let offset = self.value_of(x, &Quantity::AngleOffset(i), 0.0);
+                let pairs = recording.angle.iter().flatten().zip(&motion.angle);
+                pairs.map(|(y, theta)| y - theta - offset).collect()
+            }
+        }
     }
 
-    /// Innovations over their standard deviation, one vector a recording.
+    fn filters(&self) -> Vec<Whitening> {
+        let filter = |c: &Channel| c.noise.whitening(&self.recordings[c.recording].time);
+        self.channels.iter().map(filter).collect()
+    }
+
+    /// Innovations over their standard deviation, one vector a channel.
     pub fn innovations(&self, answer: &Answer) -> Vec<Vec<f64>> {
         let whitened = |(residual, filter): (&Vec<f64>, &Whitening)| {
             let mut e = residual.clone();
@@ -182,15 +258,17 @@ impl<'a> Problem<'a> {
         squares + self.filters().iter().map(Whitening::log_variance).sum::<f64>()
     }
 
-    /// Estimates each recording's noise from what an answer leaves.
+    /// Estimates each channel's noise from what an answer leaves.
     pub fn estimate_noise(&mut self, answer: &Answer) {
-        let pairs: Vec<_> = self.recordings.iter().zip(&answer.residual).collect();
-        self.noise = pairs.par_iter().map(|(r, residual)| Noise::of(&r.time, residual)).collect();
+        let recordings = self.recordings;
+        self.channels.par_iter_mut().zip(&answer.residual).for_each(|(channel, residual)| {
+            channel.noise = Noise::of(&recordings[channel.recording].time, residual);
+        });
     }
 
-    /// Innovations of all recordings, and how far the unknowns are from what is known of them.
-    pub fn stacked(&self, innovations: Vec<Vec<f64>>, x: &[f64]) -> DVector<f64> {
-        let mut all = innovations.concat();
+    /// Innovations of all channels, and how far the unknowns are from what is known of them.
+    pub fn stacked(&self, answer: &Answer, x: &[f64]) -> DVector<f64> {
+        let mut all = self.innovations(answer).concat();
         for (unknown, &x) in self.unknowns.iter().zip(x) {
             if let Some((mean, deviation)) = unknown.prior {
                 let middle = unknown.scale.variable(mean);
@@ -202,72 +280,111 @@ impl<'a> Problem<'a> {
 
     /// The sum of squares that a fit minimises.
     pub fn cost(&self, x: &[f64]) -> Result<f64> {
-        let answer = self.answer(x)?;
-        Ok(self.stacked(self.innovations(&answer), x).norm_squared())
+        Ok(self.stacked(&self.answer(x, Instants::All)?, x).norm_squared())
     }
 
-    /// Derivatives of the stacked innovations and priors with respect to x.
+    /// Derivatives of the stacked innovations and priors with respect to the variables `which` of x.
+    /// `base` is the motion at x.
     pub fn jacobian(
         &self,
         x: &[f64],
-        answer: &Answer,
+        which: &[usize],
+        base: &[Motion],
         steps: &[f64],
-        how: Differences,
+        (how, instants): (Differences, Instants),
     ) -> Result<DMatrix<f64>> {
         let filters = self.filters();
-        let scale = self.value_of(x, &Quantity::GyroScale, 1.0);
-        let rows: usize = self.recordings.iter().map(|r| r.time.len()).sum();
-        let priors = self.unknowns.iter().filter(|unknown| unknown.prior.is_some()).count();
-        let recordings = 0..self.recordings.len();
-        let tasks: Vec<(usize, usize)> =
-            (0..x.len()).flat_map(|j| recordings.clone().map(move |i| (j, i))).collect();
-        let pieces: Vec<Vec<f64>> = tasks
+        let rows: Vec<usize> =
+            self.channels.iter().map(|c| self.recordings[c.recording].time.len()).collect();
+        let priors: Vec<usize> =
+            (0..x.len()).filter(|&j| self.unknowns[j].prior.is_some()).collect();
+        let columns: Vec<Vec<f64>> = which
             .par_iter()
-            .map(|&(j, i)| -> Result<Vec<f64>> {
-                let unknown = &self.unknowns[j];
-                let slope = unknown.scale.slope(x[j]);
-                let motion = &answer.motion[i];
-                let count = motion.rate.len();
-                let mut piece: Vec<f64> = match &unknown.quantity {
-                    Quantity::GyroScale => motion.rate.iter().map(|w| -w * slope).collect(),
-                    Quantity::GyroBias(of) => vec![if *of == i { -slope } else { 0.0 }; count],
-                    Quantity::Delay => {
-                        motion.acceleration.iter().map(|a| scale * a * slope).collect()
-                    }
-                    Quantity::Initial(of, _) if *of != i => vec![0.0; count],
-                    Quantity::Parameter(_) | Quantity::Initial(..) => {
-                        let moved = |by: f64| {
-                            let mut moved = x.to_vec();
-                            moved[j] += by;
-                            self.motion(&moved, i)
-                        };
-                        let h = steps[j];
-                        let ahead = moved(h)?;
-                        let (behind, width) = match how {
-                            Differences::Forward => (motion.rate.clone(), h),
-                            Differences::Central => (moved(-h)?.rate, 2.0 * h),
-                        };
-                        let pairs = ahead.rate.iter().zip(&behind);
-                        pairs.map(|(a, b)| -scale * (a - b) / width).collect()
-                    }
-                };
-                filters[i].apply(&mut piece);
-                Ok(piece)
+            .map(|&j| -> Result<Vec<f64>> {
+                let mut column = self.column(x, j, base, steps[j], (how, instants))?;
+                for (piece, filter) in column.iter_mut().zip(&filters) {
+                    filter.apply(piece);
+                }
+                let mut column = column.concat();
+                column.extend(priors.iter().map(|&i| {
+                    let unknown = &self.unknowns[i];
+                    let (mean, deviation) = unknown.prior.unwrap_or((1.0, 1.0));
+                    let slope = unknown.scale.slope(unknown.scale.variable(mean));
+                    if i == j { slope / deviation } else { 0.0 }
+                }));
+                Ok(column)
             })
             .collect::<Result<_>>()?;
-        let mut jacobian = DMatrix::zeros(rows + priors, x.len());
-        for ((j, i), piece) in tasks.into_iter().zip(pieces) {
-            let from: usize = self.recordings[..i].iter().map(|r| r.time.len()).sum();
-            jacobian.view_mut((from, j), (piece.len(), 1)).copy_from_slice(&piece);
-        }
-        let mut row = rows;
-        for (j, unknown) in self.unknowns.iter().enumerate() {
-            if let Some((mean, deviation)) = unknown.prior {
-                jacobian[(row, j)] = unknown.scale.slope(unknown.scale.variable(mean)) / deviation;
-                row += 1;
+        let height = rows.iter().sum::<usize>() + priors.len();
+        Ok(DMatrix::from_vec(height, which.len(), columns.concat()))
+    }
+
+    /// Derivative of the residuals with respect to one variable, for each channel.
+    fn column(
+        &self,
+        x: &[f64],
+        j: usize,
+        base: &[Motion],
+        step: f64,
+        (how, instants): (Differences, Instants),
+    ) -> Result<Vec<Vec<f64>>> {
+        let unknown = &self.unknowns[j];
+        let slope = unknown.scale.slope(x[j]);
+        let scale = self.value_of(x, &Quantity::GyroScale, 1.0);
+        let zero = |c: &Channel| vec![0.0; self.recordings[c.recording].time.len()];
+        let per_channel =
+            |of: &dyn Fn(&Channel) -> Vec<f64>| self.channels.iter().map(of).collect();
+        Ok(match &unknown.quantity {
+            Quantity::GyroScale => per_channel(&|c| match c.signal {
+                Signal::Rate => base[c.recording].rate.iter().map(|w| -w * slope).collect(),
+                Signal::Angle => zero(c),
+            }),
+            Quantity::GyroBias(of) => per_channel(&|c| match c.signal {
+                Signal::Rate if c.recording == *of => zero(c).iter().map(|_| -slope).collect(),
+                _ => zero(c),
+            }),
+            Quantity::AngleOffset(of) => per_channel(&|c| match c.signal {
+                Signal::Angle if c.recording == *of => zero(c).iter().map(|_| -slope).collect(),
+                _ => zero(c),
+            }),
+            Quantity::Delay => per_channel(&|c| {
+                let motion = &base[c.recording];
+                match c.signal {
+                    Signal::Rate => motion.acceleration.iter().map(|a| scale * a * slope).collect(),
+                    Signal::Angle => motion.rate.iter().map(|w| w * slope).collect(),
+                }
+            }),
+            Quantity::Parameter(_) | Quantity::Initial(..) => {
+                let affected =
+                    |i: usize| !matches!(&unknown.quantity, Quantity::Initial(of, _) if *of != i);
+                let moved = |by: f64| -> Result<Vec<Motion>> {
+                    let mut moved = x.to_vec();
+                    moved[j] += by;
+                    let each = (0..self.recordings.len()).into_par_iter();
+                    each.map(|i| match affected(i) {
+                        true => self.motion(&moved, i, instants),
+                        false => Ok(base[i].clone()),
+                    })
+                    .collect()
+                };
+                let ahead = moved(step)?;
+                let (behind, width) = match how {
+                    Differences::Forward => (None, step),
+                    Differences::Central => (Some(moved(-step)?), 2.0 * step),
+                };
+                let behind = behind.as_deref().unwrap_or(base);
+                let difference = |a: &[f64], b: &[f64], factor: f64| -> Vec<f64> {
+                    a.iter().zip(b).map(|(a, b)| -factor * (a - b) / width).collect()
+                };
+                per_channel(&|c| {
+                    let (a, b) = (&ahead[c.recording], &behind[c.recording]);
+                    match c.signal {
+                        Signal::Rate => difference(&a.rate, &b.rate, scale),
+                        Signal::Angle => difference(&a.angle, &b.angle, 1.0),
+                    }
+                })
             }
-        }
-        Ok(jacobian)
+        })
     }
 
     /// Steps of the differences that move the answer by [`MOVE`] at these sensitivities.
@@ -277,64 +394,146 @@ impl<'a> Problem<'a> {
         jacobian.column_iter().map(|column| step(column.norm())).collect()
     }
 
-    /// Searches the minimum from x.
-    pub fn fit(&self, x: &[f64]) -> Result<Estimate> {
-        self.search(x, 1e-6)
-    }
-
-    /// Gauss and Newton's steps from near a minimum, until one is shorter than a fiftieth of a
-    /// standard deviation or `rounds` are made; a step that makes it worse is not taken.
-    pub fn gauss_newton(&self, x: &[f64], how: Differences, rounds: usize) -> Result<Polished> {
-        let mut x = x.to_vec();
-        let mut answer = self.answer(&x)?;
-        let rough = self.jacobian(&x, &answer, &vec![1e-5; x.len()], Differences::Forward)?;
-        let steps = Problem::steps(&rough);
-        let mut simulations = 1 + x.len();
-        for round in 1.. {
-            let jacobian = self.jacobian(&x, &answer, &steps, how)?;
-            simulations += x.len() * if how == Differences::Central { 2 } else { 1 };
-            let names = || -> Vec<String> {
-                self.unknowns.iter().map(|unknown| unknown.quantity.name()).collect()
-            };
-            let covariance = Covariance::of(&jacobian).with_context(|| {
-                format!(
-                    "some combination of the unknowns ({}) has no influence on the recording: fewer must be \
-                     estimated",
-                    names().join(", ")
-                )
-            })?;
-            let e = self.stacked(self.innovations(&answer), &x);
-            let step = -(&covariance.x * jacobian.tr_mul(&e));
-            let size = |i: usize| step[i].abs() / covariance.x[(i, i)].sqrt();
-            let remaining = (0..x.len()).map(size).fold(0.0, f64::max);
-            let moved: Vec<f64> = x.iter().zip(step.iter()).map(|(x, step)| x + step).collect();
-            let taken =
-                (remaining > 0.02 && round < rounds).then(|| self.answer(&moved).ok()).flatten();
-            simulations += 1;
-            let better = taken.filter(|there| {
-                let there = self.stacked(self.innovations(there), &moved);
-                there.norm_squared() < e.norm_squared()
-            });
-            let Some(there) = better else {
-                return Ok(Polished { x, jacobian, covariance, answer, remaining, simulations });
-            };
-            (x, answer) = (moved, there);
+    /// All sensitivities at x. The differences' steps are those given or, if there are none, found by rough sensitivities
+    /// first.
+    fn sensitivities(
+        &self,
+        x: &[f64],
+        free: &[usize],
+        at_knots: &[Motion],
+        steps: Option<&[f64]>,
+    ) -> Result<(DMatrix<f64>, usize)> {
+        let jacobian = |steps: &[f64]| self.jacobian(x, free, at_knots, steps, self.differences);
+        let each = if self.differences.0 == Differences::Central { 2 } else { 1 };
+        match steps {
+            Some(steps) => Ok((jacobian(steps)?, each * free.len())),
+            None => {
+                let rough = jacobian(&vec![1e-5; x.len()])?;
+                let mut steps = vec![0.0; x.len()];
+                free.iter().zip(Problem::steps(&rough)).for_each(|(&j, step)| steps[j] = step);
+                Ok((jacobian(&steps)?, 2 * each * free.len()))
+            }
         }
-        unreachable!("the rounds end")
     }
 
-    fn search(&self, x: &[f64], tolerance: f64) -> Result<Estimate> {
-        self.answer(x).context("the FMU refuses the start of the search")?;
-        let search = Search::new(self, x);
+    /// Whether answers at all instants differ from those at knots.
+    fn is_late(&self, x: &[f64]) -> bool {
+        self.value_of(x, &Quantity::Delay, 0.0) != 0.0
+    }
+
+    /// Gauss and Newton's steps from near a minimum, until the Newton decrement is below [`DECREMENT`], with
+    /// at most `rounds` sets of sensitivities. A step that makes it worse is shortened.
+    pub fn polish(&self, x: &[f64], steps: Option<&[f64]>, rounds: usize) -> Result<Polished> {
+        let all: Vec<usize> = (0..x.len()).collect();
+        self.polish_some(x, &all, steps, (rounds, DECREMENT))
+    }
+
+    /// The same in the variables `free` alone, until the decrement is below `enough`. Sensitivities and covariance are those of
+    /// these variables.
+    pub fn polish_some(
+        &self,
+        x: &[f64],
+        free: &[usize],
+        steps: Option<&[f64]>,
+        (rounds, enough): (usize, f64),
+    ) -> Result<Polished> {
+        let mut x = x.to_vec();
+        let mut answer = self.answer(&x, Instants::All)?;
+        let mut e = self.stacked(&answer, &x);
+        let mut simulations = 1;
+        let fastest = fastest(&answer.motion);
+        let mut steps = steps.map(<[f64]>::to_vec);
+        for round in 1.. {
+            let at_knots = if self.is_late(&x) && self.differences.1 == Instants::Knots {
+                simulations += 1;
+                self.motions(&x, Instants::Knots)?
+            } else {
+                answer.motion.clone()
+            };
+            let (jacobian, needed) = self.sensitivities(&x, free, &at_knots, steps.as_deref())?;
+            simulations += needed;
+            let covariance = self.covariance(&jacobian)?;
+            let mut before = f64::INFINITY;
+            let decrement = loop {
+                let gradient = jacobian.tr_mul(&e);
+                let step = -(&covariance.x * &gradient);
+                let decrement = (-gradient.dot(&step)).max(0.0).sqrt();
+                // the same sensitivities serve as long as they come much closer
+                if decrement < enough || decrement > 0.5 * before {
+                    break decrement;
+                }
+                before = decrement;
+                let (mut part, mut taken) = (1.0, false);
+                while part > 1e-3 && !taken {
+                    let mut part_of_step = vec![0.0; x.len()];
+                    free.iter()
+                        .zip(step.iter())
+                        .for_each(|(&j, step)| part_of_step[j] = part * step);
+                    let moved = friction::moved(self, &x, &part_of_step, fastest);
+                    simulations += 1;
+                    if let Ok(there) = self.answer(&moved, Instants::All) {
+                        let new = self.stacked(&there, &moved);
+                        if new.norm_squared() < e.norm_squared() {
+                            (x, answer, e, taken) = (moved, there, new, true);
+                        }
+                    }
+                    part *= 0.3;
+                }
+                if !taken || part < 0.2 {
+                    break decrement;
+                }
+            };
+            if decrement < enough || round >= rounds {
+                let cost = e.norm_squared();
+                return Ok(Polished {
+                    x,
+                    jacobian,
+                    covariance,
+                    answer,
+                    cost,
+                    decrement,
+                    simulations,
+                });
+            }
+            let steps = steps.get_or_insert_with(|| vec![0.0; x.len()]);
+            free.iter().zip(Problem::steps(&jacobian)).for_each(|(&j, step)| steps[j] = step);
+        }
+        unreachable!("the rounds are counted")
+    }
+
+    /// The covariance of estimates at x, where the recordings are what the FMU does: the Cramér–Rao bound.
+    pub fn information(&self, x: &[f64]) -> Result<Covariance> {
+        let motion = self.motions(x, Instants::Knots)?;
+        let all: Vec<usize> = (0..x.len()).collect();
+        let (jacobian, _) = self.sensitivities(x, &all, &motion, None)?;
+        self.covariance(&jacobian)
+    }
+
+    /// The covariance for sensitivities.
+    pub fn covariance(&self, jacobian: &DMatrix<f64>) -> Result<Covariance> {
+        Covariance::of(jacobian).with_context(|| {
+            let names: Vec<String> =
+                self.unknowns.iter().map(|unknown| unknown.quantity.name()).collect();
+            format!(
+                "some combination of the unknowns ({}) has no influence on the recording: fewer must be \
+                 estimated",
+                names.join(", ")
+            )
+        })
+    }
+
+    /// Levenberg and Marquardt's search; ends when the sum of squares falls by less than `tolerance`, relatively.
+    pub fn search(&self, x: &[f64], tolerance: f64) -> Result<Estimate> {
+        self.answer(x, Instants::Knots).context("the FMU refuses the start of the search")?;
         let (search, report) = LevenbergMarquardt::new()
             .with_ftol(tolerance)
             .with_xtol(1e-8)
             .with_gtol(0.0)
-            .with_patience(30)
-            .minimize(search);
+            .with_patience(4)
+            .minimize(Search::new(self, x));
         Ok(Estimate {
             x: search.x.clone(),
-            converged: report.termination.was_successful(),
+            steps: search.steps.borrow().clone(),
             reason: format!("{:?}", report.termination),
             simulations: search.simulations.get(),
         })
@@ -346,44 +545,65 @@ impl<'a> Problem<'a> {
     /// recording its error has as many minima as there are cycles. Over the beginning it has one,
     /// and as the window grows the estimate stays within its reach. In a window each parameter is
     /// also held near its start ([`LOOSE`]), for a short window does not say everything, and what the
-    /// model cannot follow yet counts as noise of ten times the gyro's.
-    pub fn fit_growing(
+    /// model cannot follow yet counts as noise of [`BLUNT`] times the gyro's.
+    pub fn search_growing(
         &self,
         x: &[f64],
         windows: &[f64],
         heard: &mut dyn FnMut(String),
     ) -> Result<Estimate> {
-        let (mut x, mut simulations) = (x.to_vec(), 0);
+        let (mut x, mut simulations, mut steps) = (x.to_vec(), 0, Vec::new());
         let first = x.clone();
         for &fraction in windows {
             let part: Vec<Recording> =
                 self.recordings.iter().map(|r| r.beginning(fraction)).collect();
             let mut problem = Problem { recordings: &part, ..self.clone() };
             for (unknown, &x) in problem.unknowns.iter_mut().zip(&first) {
-                if unknown.prior.is_none() && unknown.quantity.parameter().is_some() {
-                    let loose = LOOSE * unknown.scale.slope(x).abs();
-                    unknown.prior = Some((unknown.scale.value(x), loose));
+                if let Some(name) = unknown.quantity.parameter() {
+                    // the friction's shape is left to the search that knows of its valleys
+                    let shape = matches!(name, "friction.d" | "friction.omega_s");
+                    let loose = if shape { 0.4 * LOOSE } else { LOOSE };
+                    let value = unknown.scale.value(x);
+                    let size = match unknown.scale {
+                        Scale::Log | Scale::Softplus(_) => value,
+                        Scale::Logit(..) | Scale::Linear(_) => unknown.scale.slope(x).abs(),
+                    };
+                    unknown.prior = Some((value, loose * size));
                 }
             }
-            for noise in &mut problem.noise {
-                noise.white *= 10.0;
+            for channel in &mut problem.channels {
+                channel.noise.white *= BLUNT;
             }
             let estimate = problem.search(&x, 1e-3)?;
-            heard(format!("window of {:.0} %: {}", 100.0 * fraction, estimate.reason));
+            heard(format!(
+                "window of {:.0} %: {}, {} simulations",
+                100.0 * fraction,
+                estimate.reason,
+                estimate.simulations
+            ));
             simulations += estimate.simulations;
             x = estimate.x;
+            steps = estimate.steps.iter().map(|step| step / BLUNT).collect();
         }
-        let mut last = self.fit(&x)?;
-        last.simulations += simulations;
-        Ok(last)
+        Ok(Estimate { x, simulations, steps, reason: String::new() })
     }
+}
+
+/// The speed that 1 % of the rows exceed, rad/s.
+pub fn fastest(motion: &[Motion]) -> f64 {
+    let mut speeds: Vec<f64> =
+        motion.iter().flat_map(|m| &m.rate).step_by(7).map(|w| w.abs()).collect();
+    speeds.sort_by(f64::total_cmp);
+    speeds[speeds.len() * 99 / 100]
 }
 
 /// Windows for starts that are far off, as fractions of the recordings.
 pub const WINDOWS: [f64; 7] = [0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0];
 /// Windows for starts from the frequency response.
 pub const WHOLE: [f64; 1] = [1.0];
-/// How far a logarithm may be from its start in a window.
+/// By how much the noise of a window is taken for larger than the gyro's.
+const BLUNT: f64 = 10.0;
+/// How far a parameter may be from its start in a window, relatively.
 const LOOSE: f64 = 0.5;
 
 /// The problem as the crate wants it.
@@ -400,7 +620,7 @@ impl<'p, 'a> Search<'p, 'a> {
         Search {
             problem,
             x: x.to_vec(),
-            answer: problem.answer(x).ok(),
+            answer: problem.answer(x, Instants::Knots).ok(),
             steps: vec![1e-5; x.len()].into(),
             simulations: 1.into(),
         }
@@ -414,7 +634,7 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Search<'_, '_> {
 
     fn set_params(&mut self, x: &DVector<f64>) {
         self.x = x.as_slice().to_vec();
-        self.answer = self.problem.answer(&self.x).ok();
+        self.answer = self.problem.answer(&self.x, Instants::Knots).ok();
         self.simulations.set(self.simulations.get() + 1);
     }
 
@@ -423,19 +643,21 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Search<'_, '_> {
     }
 
     fn residuals(&self) -> Option<DVector<f64>> {
-        let Some(answer) = &self.answer else {
+        let refused = || {
             // a parameter the FMU refuses: worse than anything, so that the step is taken back
-            let rows: usize = self.problem.recordings.iter().map(|r| r.time.len()).sum();
-            let far = vec![vec![1e6; rows]];
-            return Some(self.problem.stacked(far, &self.x));
+            let far = |c: &Channel| vec![1e6; self.problem.recordings[c.recording].time.len()];
+            let residual = self.problem.channels.iter().map(far).collect();
+            Answer { motion: Vec::new(), residual }
         };
-        Some(self.problem.stacked(self.problem.innovations(answer), &self.x))
+        let answer = self.answer.clone().unwrap_or_else(refused);
+        Some(self.problem.stacked(&answer, &self.x))
     }
 
     fn jacobian(&self) -> Option<DMatrix<f64>> {
-        let steps = self.steps.borrow().clone();
-        let answer = self.answer.as_ref()?;
-        let jacobian = self.problem.jacobian(&self.x, answer, &steps, Differences::Forward).ok()?;
+        let (steps, answer) = (self.steps.borrow().clone(), self.answer.as_ref()?);
+        let all: Vec<usize> = (0..self.x.len()).collect();
+        let how = self.problem.differences;
+        let jacobian = self.problem.jacobian(&self.x, &all, &answer.motion, &steps, how).ok()?;
         self.simulations.set(self.simulations.get() + self.x.len());
         *self.steps.borrow_mut() = Problem::steps(&jacobian);
         Some(jacobian)

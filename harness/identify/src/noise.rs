@@ -9,6 +9,10 @@
 //! turns sensitivities of the rate into sensitivities of the innovations. Least squares of the
 //! innovations is then maximum likelihood, and slow drift does not pass for a signal.
 
+/// Least white noise, rad/s or rad. Recordings made by a simulation have less, but then it is the solvers'
+/// errors that differ, and these are not random.
+pub const FLOOR: f64 = 1e-6;
+
 /// White noise and a Gauss–Markov bias.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
@@ -74,7 +78,7 @@ impl Noise {
             let filter = unit.whitening(time);
             let mut e = residual.to_vec();
             filter.apply(&mut e);
-            let white = (e.iter().map(|v| v * v).sum::<f64>() / count).sqrt();
+            let white = (e.iter().map(|v| v * v).sum::<f64>() / count).sqrt().max(FLOOR);
             (2.0 * count * white.ln() + filter.log_variance, Noise { white, ..unit })
         };
         let longest = (time[time.len() - 1] - time[0]).ln();

@@ -8,7 +8,7 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
-use bench::table::Table;
+use bench::table::{self, Table};
 
 /// Longest time between two rows over which torque is joined by a line, s.
 pub const LONGEST_GAP: f64 = 0.25;
@@ -31,8 +31,14 @@ pub struct Recording {
     pub torque: Vec<f64>,
     /// Hub rate as measured, rad/s.
     pub rate: Vec<f64>,
-    /// Hub angle of an encoder, rad, if there is one.
+    /// Hub angle of an encoder, rad, if there is one. It is fitted beside the rate.
     pub angle: Option<Vec<f64>>,
+    /// Specific force along the tank's axis, m/s², if it was recorded: an input like the torque.
+    pub gravity: Option<Vec<f64>>,
+    /// Speed of the reaction wheel, rad/s: what the torque really was.
+    pub wheel_speed: Option<Vec<f64>>,
+    /// Rates about the hub's x and y axes, rad/s: what the model leaves out.
+    pub off_axis: [Option<Vec<f64>>; 2],
     /// It begins at rest (else the initial state is unknown).
     pub from_rest: bool,
 }
@@ -55,9 +61,34 @@ impl Recording {
             time: self.time[from..to].to_vec(),
             torque: self.torque[from..to].to_vec(),
             rate: self.rate[from..to].to_vec(),
-            angle: self.angle.as_ref().map(|angle| angle[from..to].to_vec()),
+            angle: self.angle.as_ref().map(|x| x[from..to].to_vec()),
+            gravity: self.gravity.as_ref().map(|x| x[from..to].to_vec()),
+            wheel_speed: self.wheel_speed.as_ref().map(|x| x[from..to].to_vec()),
+            off_axis: self.off_axis.clone().map(|axis| axis.map(|x| x[from..to].to_vec())),
             from_rest: false,
         }
+    }
+
+    /// A recording of torque and rate alone.
+    pub fn of(name: &str, time: Vec<f64>, torque: Vec<f64>, rate: Vec<f64>) -> Self {
+        Recording {
+            name: name.into(),
+            time,
+            torque,
+            rate,
+            angle: None,
+            gravity: None,
+            wheel_speed: None,
+            off_axis: [None, None],
+            from_rest: true,
+        }
+    }
+
+    /// The rows from one time to another, s.
+    pub fn between(&self, from: f64, to: f64) -> Recording {
+        let first = self.time.partition_point(|t| *t < from);
+        let last = self.time.partition_point(|t| *t <= to);
+        self.rows(first, last.max(first))
     }
 
     /// The first part, `fraction` of the rows.
@@ -86,23 +117,39 @@ impl Recording {
     }
 }
 
-/// Reads a file with the columns `time` (s), `tau_cmd` (N·m), `omega` (rad/s) and, if there is one,
-/// `theta` (rad). `done` hears what was done to it.
-pub fn read(path: &Path, done: &mut dyn FnMut(String)) -> Result<Vec<Recording>> {
-    let wanted = ["time", "tau_cmd", "omega"];
+/// Columns that a recording must have.
+pub const REQUIRED: [&str; 3] = ["time", "tau_cmd", "omega"];
+/// Columns that are used if they are there.
+pub const OPTIONAL: [&str; 5] = ["theta", "g_axial", "wheel_speed", "omega_x", "omega_y"];
+
+/// Reads a file with the columns [`REQUIRED`] and [`OPTIONAL`], in SI units; others are not looked at. Rows
+/// outside `trim` (s) are left out. `done` hears what was done to it.
+pub fn read(
+    path: &Path,
+    trim: Option<(f64, f64)>,
+    done: &mut dyn FnMut(String),
+) -> Result<Vec<Recording>> {
+    let there = table::names(path)?;
+    let optional = OPTIONAL.iter().copied().filter(|name| there.iter().any(|n| n == name));
+    let wanted: Vec<&str> = REQUIRED.iter().copied().chain(optional).collect();
     let table = Table::read(path, &wanted)?;
-    // an encoder is welcome, not required
-    let angle = Table::read(path, &["theta"]).ok().and_then(|t| Some(t.column("theta")?.to_vec()));
-    let column =
-        |name: &str| table.column(name).context("a column that was read").map(<[f64]>::to_vec);
-    let all = Recording {
-        name: path.display().to_string(),
-        time: column("time")?,
-        torque: column("tau_cmd")?,
-        rate: column("omega")?,
-        angle,
+    let maybe = |name: &str| table.column(name).map(<[f64]>::to_vec);
+    let column = |name: &str| maybe(name).context("a column that was read");
+    let name = path.display().to_string();
+    let mut all = Recording {
+        angle: maybe("theta"),
+        gravity: maybe("g_axial"),
+        wheel_speed: maybe("wheel_speed"),
+        off_axis: [maybe("omega_x"), maybe("omega_y")],
         from_rest: false,
+        ..Recording::of(&name, column("time")?, column("tau_cmd")?, column("omega")?)
     };
+    done(format!("{name}: columns used: {}", wanted.join(", ")));
+    if let Some((from, to)) = trim {
+        let before = all.time.len();
+        all = all.between(from, to);
+        done(format!("{name}: {} rows outside {from} to {to} s left out", before - all.time.len()));
+    }
     prepare(all, done)
 }
 
@@ -198,18 +245,22 @@ fn check_time(all: &Recording) -> Result<()> {
 fn starts_at_rest(part: &Recording) -> bool {
     let rate = (part.rate[0] + part.rate[1]) / 2.0;
     // a gyro's bias is no motion: up to 3 % of the signal, or 5 times the noise
-    let slow = rate.abs() < 5.0 * noise_level(part) + 0.03 * deviation(&part.rate);
+    let slow = rate.abs() < 5.0 * noise_level(&part.rate) + 0.03 * deviation(&part.rate);
     slow && part.torque[0].abs() < 0.1 * deviation(&part.torque)
 }
 
-/// Standard deviation of the white noise of the rate, from its third differences (a signal of a few
-/// hertz has almost none), rad/s.
-pub fn noise_level(part: &Recording) -> f64 {
-    let third = part.rate.windows(4).map(|y| y[3] - 3.0 * y[2] + 3.0 * y[1] - y[0]);
+/// Standard deviation of the white noise of a signal, from its third differences (a motion of a few
+/// hertz has almost none), and at least that of rounding to the smallest step it ever makes, step/√12.
+pub fn noise_level(signal: &[f64]) -> f64 {
+    let third = signal.windows(4).map(|y| y[3] - 3.0 * y[2] + 3.0 * y[1] - y[0]);
     let mut squares: Vec<f64> = third.map(|d| d * d).collect();
     squares.sort_by(f64::total_cmp);
+    let steps = signal.windows(2).map(|y| (y[1] - y[0]).abs()).filter(|step| *step > 0.0);
+    let smallest = steps.fold(f64::INFINITY, f64::min);
+    let rounding = if smallest.is_finite() { smallest / 12f64.sqrt() } else { 0.0 };
     // the median of χ² with one degree of freedom is 0.4549; variance of third differences 20 σ²
-    (squares[squares.len() / 2] / 0.4549 / 20.0).sqrt()
+    let white = squares.get(squares.len() / 2).map_or(0.0, |s| (s / 0.4549 / 20.0).sqrt());
+    white.max(rounding)
 }
 
 fn deviation(x: &[f64]) -> f64 {
@@ -273,7 +324,7 @@ mod tests {
         let f = |t: f64| TAU * (1.0 + t / 150.0);
         let torque = time.iter().map(|&t| 0.1 * phase(t).sin()).collect();
         let rate = time.iter().map(|&t| -0.1 / 0.4 / f(t) * phase(t).cos()).collect();
-        Recording { name: "a.csv".into(), time, torque, rate, angle: None, from_rest: false }
+        Recording { from_rest: false, ..Recording::of("a.csv", time, torque, rate) }
     }
 
     fn refusal(change: impl Fn(&mut Recording)) -> String {
@@ -323,6 +374,10 @@ mod tests {
         let mut random = bench::random::Random::new(1, 0);
         noisy.rate.iter_mut().for_each(|w| *w += 4e-4 * random.normal());
         // relative standard error of the median of 15,000 squares: 2 %
-        assert!((noise_level(&noisy) / 4e-4 - 1.0).abs() < 0.08, "{}", noise_level(&noisy));
+        assert!(
+            (noise_level(&noisy.rate) / 4e-4 - 1.0).abs() < 0.08,
+            "{}",
+            noise_level(&noisy.rate)
+        );
     }
 }

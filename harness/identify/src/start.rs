@@ -189,38 +189,35 @@ fn from_features(measured: &FrequencyResponse, bench: Bench) -> Option<Response>
     })
 }
 
-/// Friction from the balance of mean power over windows of 20 s: ⟨τω⟩ = b⟨ω²⟩ + c⟨|ω|⟩, least
-/// squares. Rough (the liquid takes and gives as well), but of the right size.
+/// Friction from the balance of mean power over windows of 20 s, ⟨τω⟩ = T⟨|ω|⟩: the median torque T (in most
+/// windows the liquid takes as much as it gives), shared among b, c and d at the speeds of the recording. Rough, but of
+/// the right size and shape.
 fn friction(recordings: &[Recording]) -> Start {
-    let (mut ss, mut sa, mut aa, mut sp, mut ap) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    let (mut squares, mut rows, mut fastest) = (0.0, 0.0, 0.0);
+    let (mut torques, mut speeds) = (Vec::new(), Vec::new());
     for r in recordings {
         let width = ((20.0 / r.step()) as usize).max(2);
         for k in (0..r.rate.len().saturating_sub(width)).step_by(width) {
             let mean = |f: &dyn Fn(usize) -> f64| (k..k + width).map(f).sum::<f64>() / width as f64;
             let offset = mean(&|i| r.rate[i]);
-            let (s, a) =
-                (mean(&|i| (r.rate[i] - offset).powi(2)), mean(&|i| (r.rate[i] - offset).abs()));
-            let p = mean(&|i| r.torque[i] * (r.rate[i] - offset));
-            ss += s * s;
-            sa += s * a;
-            aa += a * a;
-            sp += s * p;
-            ap += a * p;
-            squares += s;
-            fastest = f64::max(fastest, (2.0 * s).sqrt());
-            rows += 1.0;
+            let speed = mean(&|i| (r.rate[i] - offset).abs());
+            let power = mean(&|i| r.torque[i] * (r.rate[i] - offset));
+            if speed > 0.0 && power > 0.0 {
+                torques.push(power / speed);
+                speeds.push(speed);
+            }
         }
     }
-    let determinant = ss * aa - sa * sa;
-    let c = (ap * ss - sp * sa) / determinant;
-    let rms = (squares / rows).sqrt();
-    // all losses as dry friction; the liquid's near resonance pass for viscous friction here
-    let all = ap / aa;
-    let c = if c.is_finite() { c.clamp(0.3 * all, 0.8 * all) } else { 0.5 * all };
-    let b = 0.3 * all / rms;
-    let omega_s = fastest / 2.0;
-    Start { d: 0.0, h: 0.0, zeta: 0.003, hub_inertia: 0.0, b, c, stribeck: 0.5 * c, omega_s }
+    let at = |x: &mut Vec<f64>, part: f64| {
+        x.sort_by(f64::total_cmp);
+        x.get((x.len() as f64 * part) as usize).copied()
+    };
+    let torque = at(&mut torques, 0.5).unwrap_or(1e-3);
+    let (middle, fastest) =
+        (at(&mut speeds, 0.5).unwrap_or(1e-2), at(&mut speeds, 0.99).unwrap_or(1e-2));
+    // the peak of a sine is π/2 times its mean
+    let (b, omega_s) = (0.1 * torque / middle, 0.5 * PI * fastest);
+    let (c, stribeck) = (0.55 * torque, 0.35 * torque);
+    Start { d: 0.0, h: 0.0, zeta: 0.003, hub_inertia: 0.0, b, c, stribeck, omega_s }
 }
 
 #[cfg(test)]

@@ -58,6 +58,7 @@ pub fn record(
         settings: all,
         input: Some(bench::run::TORQUE.into()),
         torque: heard,
+        others: Vec::new(),
         step: step / parts as f64,
         stop,
         tolerance: None,
@@ -67,12 +68,6 @@ pub fn record(
     let table = run.drive(&mut instance, &["omega_imu"], |_| {})?;
     let rate = table.column("omega_imu").context("a column that was recorded")?;
     let measured = |w: &f64| flaws.gyro_scale * w + flaws.gyro_bias;
-    Ok(Recording {
-        name: "twin".into(),
-        rate: rate.iter().step_by(parts).map(measured).collect(),
-        time,
-        torque: tau,
-        angle: None,
-        from_rest: true,
-    })
+    let rate = rate.iter().step_by(parts).map(measured).collect();
+    Ok(Recording::of("twin", time, tau, rate))
 }

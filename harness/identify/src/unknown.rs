@@ -29,6 +29,8 @@ pub enum Quantity {
     GyroScale,
     /// Reading of the gyro at rest, rad/s, one for each recording.
     GyroBias(usize),
+    /// Reading of the encoder at angle 0, rad, one for each recording.
+    AngleOffset(usize),
     /// An `init.` parameter of a recording that does not start at rest.
     Initial(usize, String),
 }
@@ -41,6 +43,7 @@ impl Quantity {
             Quantity::Delay => "delay".into(),
             Quantity::GyroScale => "gyro_scale".into(),
             Quantity::GyroBias(recording) => format!("gyro_bias[{}]", recording + 1),
+            Quantity::AngleOffset(recording) => format!("angle_offset[{}]", recording + 1),
             Quantity::Initial(recording, name) => format!("{name}[{}]", recording + 1),
         }
     }
@@ -59,6 +62,9 @@ impl Quantity {
 pub enum Scale {
     /// x = ln value: positive.
     Log,
+    /// value = unit ln(1 + eˣ): positive, and linear where it is much more than the unit. For parameters
+    /// whose sums are known better than they are themselves: valleys along such sums stay straight.
+    Softplus(f64),
     /// x = ln((value − a)/(b − value)): between a and b.
     Logit(f64, f64),
     /// x = value/unit: free.
@@ -70,6 +76,7 @@ impl Scale {
     pub fn value(self, x: f64) -> f64 {
         match self {
             Scale::Log => x.exp(),
+            Scale::Softplus(unit) => unit * (x.max(0.0) + (-x.abs()).exp().ln_1p()),
             Scale::Logit(a, b) => a + (b - a) / (1.0 + (-x).exp()),
             Scale::Linear(unit) => x * unit,
         }
@@ -79,6 +86,7 @@ impl Scale {
     pub fn variable(self, value: f64) -> f64 {
         match self {
             Scale::Log => value.ln(),
+            Scale::Softplus(unit) => value / unit + (-(-value / unit).exp_m1()).ln(),
             Scale::Logit(a, b) => ((value - a) / (b - value)).ln(),
             Scale::Linear(unit) => value / unit,
         }
@@ -88,6 +96,7 @@ impl Scale {
     pub fn slope(self, x: f64) -> f64 {
         match self {
             Scale::Log => x.exp(),
+            Scale::Softplus(unit) => unit / (1.0 + (-x).exp()),
             Scale::Logit(a, b) => (b - a) / (2.0 + x.exp() + (-x).exp()),
             Scale::Linear(unit) => unit,
         }
@@ -104,6 +113,11 @@ impl Unknown {
             prior: None,
             scale: Scale::Log,
         }
+    }
+
+    /// Whether its value must be positive.
+    pub fn is_positive(&self) -> bool {
+        matches!(self.scale, Scale::Log | Scale::Softplus(_))
     }
 
     /// The same, known beforehand to be `mean` with standard deviation `deviation`.
@@ -155,6 +169,17 @@ impl Unknown {
         }
     }
 
+    /// The encoder's zero in a recording.
+    pub fn angle_offset(recording: usize, start: f64) -> Self {
+        Unknown {
+            quantity: Quantity::AngleOffset(recording),
+            unit: "rad".into(),
+            start,
+            prior: None,
+            scale: Scale::Linear(1e-3),
+        }
+    }
+
     /// The start of a recording that does not begin at rest: `init.omega`, `init.slosh_angle` or
     /// `init.slosh_rate`, with what is typical of it.
     pub fn initial(recording: usize, name: &str, unit: &str, typical: f64) -> Self {
@@ -174,9 +199,13 @@ mod tests {
 
     #[test]
     fn variables_and_values_go_there_and_back() {
-        for (scale, value) in
-            [(Scale::Log, 0.163), (Scale::Logit(-1.0, 1.0), 0.1), (Scale::Linear(1e-3), -0.005)]
-        {
+        for (scale, value) in [
+            (Scale::Log, 0.163),
+            (Scale::Softplus(1e-3), 0.0035),
+            (Scale::Softplus(1e-3), 0.0001),
+            (Scale::Logit(-1.0, 1.0), 0.1),
+            (Scale::Linear(1e-3), -0.005),
+        ] {
             let x = scale.variable(value);
             assert!((scale.value(x) - value).abs() < 1e-15);
             let difference = (scale.value(x + 1e-6) - scale.value(x - 1e-6)) / 2e-6;

@@ -2,9 +2,12 @@
 
 use bench::profile::{Profile, Torque};
 use host::fmi2::Fmu;
+use identify::fit::{Differences, Problem};
 use identify::identification::{Options, identify};
 use identify::recording::Recording;
+use identify::simulate::{Instants, Setup};
 use identify::twin::{self, Flaws};
+use identify::unknown::Unknown;
 use pack::packed_for_tests;
 
 /// The thesis's sweep of 2700 s.
@@ -44,6 +47,54 @@ fn parameters_come_back_and_coulomb_and_stribeck_friction_as_their_sum() {
     let sum = found.combinations.iter().find(|c| c.name == "friction.c + friction.d").unwrap();
     assert!((sum.value - 0.005921).abs() < 4.0 * sum.std, "{sum:?}");
     assert!(found.verdict.iter().any(|line| line.contains("cannot be told apart")));
+}
+
+#[test]
+fn an_encoder_shows_the_gyros_scale() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let flaws = Flaws { gyro_scale: 1.01, ..Flaws::default() };
+    let torque = Torque::Profile(SHORT.parse().unwrap());
+    let mut recording = twin::record(&fmu, &[], &torque, Some(2), flaws).unwrap();
+    // an encoder of 17 bits on the same motion, whose angle is that of a run without noise
+    let setup = Setup { settings: Vec::new(), held: false };
+    let motion = setup.run(&fmu, &[], &recording, 0.0, Instants::All).unwrap();
+    let count = std::f64::consts::TAU / f64::from(1 << 17);
+    recording.angle = Some(motion.angle.iter().map(|a| (a / count).round() * count).collect());
+    let options = Options { gyro_scale: 0.05, ..options() };
+    let found = identify(&fmu, &[recording], &options, &mut |_| {}).unwrap();
+    let scale = &found.measurement["gyro_scale"];
+    // without the encoder it would be known to 5 %
+    assert!(scale.std < 0.002, "{scale:?}");
+    assert!((scale.value - 1.01).abs() < 4.0 * scale.std, "{scale:?}");
+}
+
+#[test]
+fn sensitivities_are_those_of_smaller_and_larger_steps() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let recordings = [sweep(&fmu, SHORT, &[])];
+    let names = [("tank.d", "m", 0.163), ("slosh.zeta", "1", 0.003), ("friction.c", "N.m", 0.0035)];
+    let unknowns = names.map(|(name, unit, value)| Unknown::positive(name, unit, value)).to_vec();
+    let setup = Setup {
+        settings: vec![("slosh.zeta_from_correlation".into(), "false".into())],
+        held: false,
+    };
+    let problem = Problem::new(&fmu, setup, &recordings, unknowns);
+    let (x, all) = (problem.start(), [0, 1, 2]);
+    let motion = problem.answer(&x, Instants::All).unwrap().motion;
+    let of = |steps: &[f64], how| {
+        problem.jacobian(&x, &all, &motion, steps, (how, Instants::All)).unwrap()
+    };
+    let steps = Problem::steps(&of(&[1e-5; 3], Differences::Forward));
+    let forward = of(&steps, Differences::Forward);
+    for part in [0.3, 3.0] {
+        let other: Vec<f64> = steps.iter().map(|step| part * step).collect();
+        let central = of(&other, Differences::Central);
+        for j in 0..3 {
+            let off = (forward.column(j) - central.column(j)).norm() / central.column(j).norm();
+            // 1 % of a sensitivity is 1 % of a standard deviation, and no shift of the minimum that is seen
+            assert!(off < 0.01, "unknown {j}: {off}");
+        }
+    }
 }
 
 #[test]

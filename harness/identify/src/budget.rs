@@ -1,0 +1,85 @@
+//! The error budget: what an error of something that is not estimated does to the estimates.
+
+use std::collections::BTreeMap;
+
+use anyhow::Result;
+use nalgebra::DMatrix;
+use serde::Serialize;
+
+use crate::fit::{Answer, Problem};
+use crate::simulate::Instants;
+use crate::uncertainty::Covariance;
+
+/// What an error of something that is not estimated does to the estimates.
+#[derive(Clone, Debug, Serialize)]
+pub struct Effect {
+    /// What is wrong, and by how much.
+    pub source: String,
+    /// Change of each parameter, SI.
+    pub change: BTreeMap<String, f64>,
+}
+
+/// What may be wrong.
+struct Wrong {
+    source: &'static str,
+    settings: Vec<(String, String)>,
+    /// Factor of the torque.
+    gain: f64,
+    /// The torque is held between rows where it was taken as linear, or the reverse.
+    swap: bool,
+}
+
+/// The linearised shift of the estimates, −(JᵀJ)⁻¹ Jᵀ Δe, with Δe the innovations' change.
+pub fn of(
+    problem: &Problem,
+    x: &[f64],
+    answer: &Answer,
+    jacobian: &DMatrix<f64>,
+    covariance: &Covariance,
+    slopes: &[f64],
+) -> Result<Vec<Effect>> {
+    let base = problem.stacked(answer, x);
+    let mut effects = Vec::new();
+    for wrong in list(problem)? {
+        let mut recordings = problem.recordings.to_vec();
+        recordings.iter_mut().flat_map(|r| &mut r.torque).for_each(|t| *t *= wrong.gain);
+        let mut other = Problem { recordings: &recordings, ..problem.clone() };
+        other.setup.settings.extend(wrong.settings);
+        other.setup.held ^= wrong.swap;
+        let Ok(there) = other.answer(x, Instants::All) else { continue };
+        let change = other.stacked(&there, x) - &base;
+        let shift = -(&covariance.x * jacobian.tr_mul(&change));
+        let change = problem.unknowns.iter().enumerate();
+        let change = change.map(|(i, u)| (u.quantity.name(), shift[i] * slopes[i])).collect();
+        effects.push(Effect { source: wrong.source.into(), change });
+    }
+    Ok(effects)
+}
+
+fn list(problem: &Problem) -> Result<Vec<Wrong>> {
+    let mut instance = problem.fmu.instantiate("identify")?;
+    for (name, value) in &problem.setup.settings {
+        instance.set(name, value)?;
+    }
+    instance.setup_experiment(None, 0.0, None)?;
+    instance.enter_initialization_mode()?;
+    let exact = |source, settings| Wrong { source, settings, gain: 1.0, swap: false };
+    let mut list = Vec::new();
+    if problem.place("slosh.zeta").is_some() {
+        let mut set = |name: &str, change: &dyn Fn(f64) -> f64| -> Result<_> {
+            Ok(vec![(name.to_string(), change(instance.real(name)?).to_string())])
+        };
+        let modes = vec![("slosh.modes".to_string(), "4".to_string())];
+        list.push(exact("slosh modes 2 to 4, left out", modes));
+        list.push(exact("tank.r wrong by 1 mm", set("tank.r", &|r| r + 1e-3)?));
+        list.push(exact("fluid.rho wrong by 0.3 %", set("fluid.rho", &|rho| rho * 1.003)?));
+        let measured = problem.recordings.iter().any(|r| r.gravity.is_some());
+        if !measured {
+            list.push(exact("g_axial wrong by 0.1 %", set("g_axial", &|g| g * 1.001)?));
+        }
+    }
+    list.push(Wrong { gain: 1.01, ..exact("torque wrong by 1 %", vec![]) });
+    let held = "torque held between rows instead of linear, or the reverse";
+    list.push(Wrong { swap: true, ..exact(held, vec![]) });
+    Ok(list)
+}

@@ -1,0 +1,439 @@
+//! One model that may explain the recordings: a slosh model with a friction law, fitted.
+
+use anyhow::{Result, ensure};
+use host::fmi2::Fmu;
+use nalgebra::DMatrix;
+use serde::Serialize;
+
+use crate::fit::{Answer, Polished, Problem, Signal, WHOLE, WINDOWS};
+use crate::friction;
+use crate::identification::Options;
+use crate::recording::Recording;
+use crate::residual::Tests;
+use crate::simulate::{Instants, Setup};
+use crate::start::Start;
+use crate::unknown::{Scale, Unknown};
+
+/// One model's fit.
+#[derive(Clone, Debug, Serialize)]
+pub struct ModelFit {
+    /// slosh.model.
+    pub model: String,
+    /// friction.model.
+    pub friction: String,
+    /// −2 ln L.
+    pub deviance: f64,
+    /// Bayesian information criterion; the smallest is the best.
+    pub bic: f64,
+    /// Fit in the time domain, %: 100 (1 − |y − ŷ|/|y − mean y|).
+    pub fit_pct: f64,
+    /// The search ended at a minimum.
+    pub converged: bool,
+    /// Distance to the minimum in standard deviations.
+    pub newton_decrement: f64,
+    /// Residual tests, for each recording.
+    pub tests: Vec<Tests>,
+    /// Fit of the recordings held back, %.
+    pub validation_pct: Vec<f64>,
+    /// The gyro's noise: white, rad/s.
+    pub noise_white: f64,
+    /// Answers of the FMU that were needed.
+    pub simulations: usize,
+}
+
+impl ModelFit {
+    /// What it is in one line.
+    pub fn line(&self) -> String {
+        format!(
+            "{} with {} friction: fit {:.3} %, BIC {:.1}, worst residual test {:.1} standard deviations, {} \
+             simulations",
+            self.model,
+            self.friction,
+            self.fit_pct,
+            self.bic,
+            self.tests.iter().map(Tests::worst).fold(0.0, f64::max),
+            self.simulations
+        )
+    }
+}
+
+/// A fitted model with what is needed afterwards.
+pub struct Fitted<'a> {
+    /// What was solved.
+    pub problem: Problem<'a>,
+    /// The minimum.
+    pub polished: Polished,
+    /// In numbers for the reader.
+    pub fit: ModelFit,
+    /// Covariance of the values if several friction curves explain the recording ([`friction::spread`]).
+    pub spread: Option<DMatrix<f64>>,
+}
+
+/// Fit of a rate below which a minimum is taken for a wrong one at first, %.
+const POOR: f64 = 90.0;
+
+/// Fits a slosh model with a friction law, from the data's starts or from the fit of another model.
+pub fn fit<'a>(
+    fmu: &'a Fmu,
+    recordings: &'a [Recording],
+    options: &Options,
+    (model, law): (&str, &str),
+    start: &Start,
+    from: Option<&Fitted<'a>>,
+    heard: &mut dyn FnMut(String),
+) -> Result<Fitted<'a>> {
+    let problem = problem(fmu, recordings, options, (model, law), start)?;
+    let mut search = Search {
+        problem,
+        // starts that a user gives may be far off
+        far: !options.starts.is_empty(),
+        alone: options.models.iter().filter(|m| *m != "frozen").count() == 1,
+        label: model.to_string(),
+        simulations: 0,
+        heard,
+    };
+    let (polished, spread) = match from {
+        Some(other) => search.near(other, model)?,
+        None => search.begin(model != "frozen")?,
+    };
+    let (mut problem, simulations) = (search.problem, search.simulations);
+    problem.estimate_noise(&polished.answer);
+    let fit = summary(&problem, &polished, options, (model, law), simulations)?;
+    Ok(Fitted { problem, polished, fit, spread })
+}
+
+/// A minimum, and the values' covariance if several friction curves explain the recording.
+type Found = (Polished, Option<DMatrix<f64>>);
+
+struct Search<'a, 'h> {
+    problem: Problem<'a>,
+    far: bool,
+    /// No other model of the slosh is tried, which may fit where this one does not.
+    alone: bool,
+    label: String,
+    simulations: usize,
+    heard: &'h mut dyn FnMut(String),
+}
+
+impl<'a> Search<'a, '_> {
+    fn polish(&mut self, x: &[f64], steps: Option<&[f64]>) -> Result<Polished> {
+        let polished = self.problem.polish(x, steps, 6)?;
+        self.simulations += polished.simulations;
+        (self.heard)(format!(
+            "{}: {:.4} standard deviations from the minimum after {} simulations",
+            self.label, polished.decrement, polished.simulations
+        ));
+        Ok(polished)
+    }
+
+    /// From variables x, over windows; the noise is estimated on the way.
+    fn windows(&mut self, x: &[f64], windows: &[f64]) -> Result<Found> {
+        let (label, heard) = (&self.label, &mut *self.heard);
+        let rough = self
+            .problem
+            .search_growing(x, windows, &mut |line| heard(format!("{label}: {line}")))?;
+        self.simulations += rough.simulations;
+        let answer = self.problem.answer(&rough.x, Instants::All)?;
+        self.problem.estimate_noise(&answer);
+        let near = self.polish(&rough.x, Some(&rough.steps))?;
+        let (mut best, spread) = self.friction(near)?;
+        // a model that does not fit has no minimum worth the search, if there are others
+        if !best.converged() && (self.alone || !poor(&self.problem, &best.answer)) {
+            let again = self.problem.search(&best.x, 1e-4)?;
+            self.simulations += again.simulations;
+            let other = self.polish(&again.x, Some(&again.steps))?;
+            if other.cost < best.cost {
+                best = other;
+            }
+        }
+        Ok((best, spread))
+    }
+
+    fn begin(&mut self, slosh: bool) -> Result<Found> {
+        let x = self.problem.start();
+        let first: &[f64] = if self.far { &WINDOWS } else { &WHOLE };
+        let mut best = self.windows(&x, first)?;
+        if slosh && self.alone && !self.far && poor(&self.problem, &best.0.answer) {
+            (self.heard)(format!(
+                "{}: poor fit from there; again with windows that grow",
+                self.label
+            ));
+            let noise = self.problem.channels.clone();
+            let other = self.windows(&x, &WINDOWS)?;
+            if fit_pct(&self.problem, &other.0.answer) > fit_pct(&self.problem, &best.0.answer) {
+                best = other;
+            } else {
+                self.problem.channels = noise;
+            }
+        }
+        // the noise from what is left and, if it is another one, the minimum with its filter
+        let before = self.problem.channels.clone();
+        self.problem.estimate_noise(&best.0.answer);
+        let pairs = before.iter().zip(&self.problem.channels);
+        if pairs.into_iter().any(|(a, b)| (a.noise.white / b.noise.white - 1.0).abs() > 0.05) {
+            let again = self.polish(&best.0.x, Some(&best.0.steps()))?;
+            best = self.friction(again)?;
+        }
+        Ok(best)
+    }
+
+    /// Other friction curves, if a minimum may be one of several, and the lowest.
+    fn friction(&mut self, near: Polished) -> Result<Found> {
+        let places = friction::Places::of(&self.problem);
+        let Some(places) = places.filter(|p| friction::is_vague(&self.problem, &near, *p)) else {
+            return Ok((near, None));
+        };
+        let points = friction::profile(&self.problem, &near, places)?;
+        self.simulations += points.iter().map(|p| p.simulations).sum::<usize>();
+        let lowest = points.iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
+        let mut best = near;
+        if let Some(point) = lowest.filter(|p| p.cost < best.cost) {
+            let other = self.polish(&point.x, Some(&best.steps()))?;
+            if other.cost < best.cost {
+                best = other;
+            }
+        }
+        let spread = friction::spread(&self.problem, &points, &best);
+        if spread.is_some() {
+            (self.heard)(format!("{}: several Stribeck speeds explain the recording", self.label));
+        }
+        Ok((best, spread))
+    }
+
+    fn near(&mut self, other: &Fitted<'a>, model: &str) -> Result<Found> {
+        // what both have, from there
+        let mut x = self.problem.start();
+        let known = &other.problem.unknowns;
+        for (x, unknown) in x.iter_mut().zip(&self.problem.unknowns) {
+            if let Some(place) = known.iter().position(|u| u.quantity == unknown.quantity) {
+                *x = other.polished.x[place];
+            }
+        }
+        if model == "frozen"
+            && let Some(hub) = self.problem.place("hub.I")
+        {
+            // all the liquid turns with the hub: the inertia above the resonance and more
+            x[hub] += 0.1;
+        }
+        self.problem.channels.clone_from(&other.problem.channels);
+        let same = self.problem.unknowns.len() == known.len();
+        let steps = same.then(|| other.polished.steps());
+        let polished = self.problem.polish(&x, steps.as_deref(), 3)?;
+        self.simulations += polished.simulations;
+        let mut best = polished;
+        // Where the other leaves only noise, this one is as good near there or not at all. Else its minimum may be
+        // anywhere.
+        if other.fit.tests.iter().all(Tests::passed) || model == "frozen" {
+            return Ok((best, if same { other.spread.clone() } else { None }));
+        }
+        if !best.converged() && !poor(&self.problem, &best.answer) {
+            let rough = self.problem.search(&best.x, 1e-3)?;
+            self.simulations += rough.simulations;
+            let again = self.polish(&rough.x, Some(&rough.steps))?;
+            if again.cost < best.cost {
+                best = again;
+            }
+        }
+        if poor(&self.problem, &best.answer) {
+            // so nonlinear that the other model's estimate leads nowhere
+            let start = self.problem.start();
+            for windows in [&WHOLE[..], &WINDOWS[..]] {
+                let other = self.windows(&start, windows)?;
+                if !poor(&self.problem, &other.0.answer) {
+                    return Ok(other);
+                }
+            }
+        }
+        Ok((best, if same { other.spread.clone() } else { None }))
+    }
+}
+
+fn problem<'a>(
+    fmu: &'a Fmu,
+    recordings: &'a [Recording],
+    options: &Options,
+    (model, law): (&str, &str),
+    start: &Start,
+) -> Result<Problem<'a>> {
+    let unknowns = unknowns(fmu, recordings, options, (model, law), start)?;
+    let mut settings = vec![
+        ("slosh.model".to_string(), model.to_string()),
+        ("slosh.zeta_from_correlation".to_string(), "false".to_string()),
+        ("friction.model".to_string(), law.to_string()),
+    ];
+    if law == "lugre" {
+        // the bristles' damping is no more than a bearing with little viscous friction allows
+        settings.push(("friction.sigma1".into(), "0".into()));
+    }
+    let chosen = |name: &str| matches!(name, "slosh.model" | "friction.model");
+    settings.extend(options.settings.iter().filter(|(name, _)| !chosen(name)).cloned());
+    let setup = Setup { settings, held: options.held };
+    Ok(Problem::new(fmu, setup, recordings, unknowns))
+}
+
+fn unknowns(
+    fmu: &Fmu,
+    recordings: &[Recording],
+    options: &Options,
+    (model, law): (&str, &str),
+    start: &Start,
+) -> Result<Vec<Unknown>> {
+    let setting = |name: &str| options.settings.iter().any(|(n, _)| n == name);
+    let frozen = model == "frozen";
+    let (viscous, dry) = (law != "none", !matches!(law, "none" | "viscous"));
+    let inertia = if start.hub_inertia > 0.0 { start.hub_inertia } else { 0.3 };
+    let all = [
+        ("tank.d", start.d, !frozen),
+        ("tank.h", start.h, !frozen),
+        ("slosh.zeta", start.zeta, !frozen),
+        ("hub.I", inertia, true),
+        ("friction.b", start.b, viscous),
+        ("friction.c", start.c, dry),
+        ("friction.d", start.stribeck, dry),
+        ("friction.omega_s", start.omega_s, dry),
+    ];
+    let given = |name: &str| options.starts.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
+    let unit = |name: &str| -> Result<String> {
+        let variable = fmu.description().variable(name)?;
+        Ok(variable.attributes().unit.clone().unwrap_or_default())
+    };
+    let mut list = Vec::new();
+    for (name, value, used) in all {
+        if !used || setting(name) {
+            continue;
+        }
+        let mut unknown = Unknown::positive(name, &unit(name)?, given(name).unwrap_or(value));
+        if matches!(name, "friction.b" | "friction.c" | "friction.d") {
+            unknown.scale = Scale::Softplus(0.1 * value);
+        }
+        // Of the right size, give or take a factor of some ten: without that, a model that does not fit may drive
+        // what it does not need to nothing, and its influence with it.
+        let vague = match name {
+            "friction.b" => 3.0,
+            "friction.c" | "friction.d" | "friction.omega_s" => 1.5,
+            _ => 0.0,
+        };
+        if vague > 0.0 {
+            unknown = unknown.known(value, vague * value);
+        }
+        list.push(unknown);
+    }
+    // parameters that are estimated because a start or something known of them is given
+    for name in options.starts.iter().map(|s| &s.0).chain(options.known.iter().map(|k| &k.0)) {
+        let there = list.iter().any(|u| u.quantity.parameter() == Some(name));
+        if there || setting(name) || name == "friction.asymmetry" {
+            continue;
+        }
+        let variable = fmu.description().variable(name)?;
+        ensure!(
+            variable.causality == "parameter" && variable.kind() == host::description::Type::Real,
+            "{name} cannot be estimated: it is no parameter with a real value"
+        );
+        if !all.iter().any(|(n, _, used)| n == name && !used) {
+            let known = options.known.iter().find(|k| k.0 == *name).map(|k| k.1);
+            let start = given(name).or(known).unwrap_or(1.0);
+            ensure!(start > 0.0, "{name}: only positive parameters can be estimated");
+            list.push(Unknown::positive(name, &unit(name)?, start));
+        }
+    }
+    if law == "lugre" && !setting("friction.sigma0") {
+        // stiffer than the upper end, bristles move less than 1/100 of what a gyro of this kind sees
+        let mut stiffness = Unknown::positive("friction.sigma0", &unit("friction.sigma0")?, 100.0);
+        stiffness.scale = Scale::Logit(0.0, 1000.0);
+        list.push(stiffness);
+    }
+    for (name, mean, deviation) in &options.known {
+        if let Some(unknown) = list.iter_mut().find(|u| u.quantity.parameter() == Some(name)) {
+            unknown.prior = Some((*mean, *deviation));
+        }
+    }
+    if options.flaws {
+        if !setting("friction.asymmetry") && dry {
+            list.push(Unknown::asymmetry());
+        }
+        list.push(Unknown::delay());
+        list.extend((0..recordings.len()).map(Unknown::gyro_bias));
+    }
+    for (i, recording) in recordings.iter().enumerate() {
+        if let Some(angle) = &recording.angle {
+            list.push(Unknown::angle_offset(i, angle[0]));
+        }
+    }
+    for (i, _) in recordings.iter().enumerate().filter(|(_, r)| !r.from_rest) {
+        list.push(Unknown::initial(i, "init.omega", "rad/s", 1e-2));
+        if !frozen {
+            list.push(Unknown::initial(i, "init.slosh_angle", "rad", 0.1));
+            list.push(Unknown::initial(i, "init.slosh_rate", "rad/s", 1.0));
+        }
+    }
+    Ok(list)
+}
+
+fn summary(
+    problem: &Problem,
+    polished: &Polished,
+    options: &Options,
+    (model, law): (&str, &str),
+    simulations: usize,
+) -> Result<ModelFit> {
+    let answer = &polished.answer;
+    let deviance = problem.deviance(answer);
+    let innovations = problem.innovations(answer);
+    let channels = problem.channels.iter().zip(&innovations);
+    let tests = channels
+        .map(|(channel, e)| {
+            let recording = &problem.recordings[channel.recording];
+            Tests::of(&recording.time, &recording.torque, e, channel.noise.white)
+        })
+        .collect();
+    let rows: usize = innovations.iter().map(Vec::len).sum();
+    Ok(ModelFit {
+        model: model.into(),
+        friction: law.into(),
+        deviance,
+        bic: deviance + problem.unknowns.len() as f64 * (rows as f64).ln(),
+        fit_pct: fit_pct(problem, answer),
+        converged: polished.converged(),
+        newton_decrement: polished.decrement,
+        tests,
+        validation_pct: validate(problem, &polished.x, options)?,
+        noise_white: problem.channels[0].noise.white,
+        simulations,
+    })
+}
+
+/// Fit of the rates, %: 100 (1 − |y − ŷ|/|y − mean y|).
+fn fit_pct(problem: &Problem, answer: &Answer) -> f64 {
+    let spread: f64 = problem
+        .recordings
+        .iter()
+        .map(|r| {
+            let mean = r.rate.iter().sum::<f64>() / r.rate.len() as f64;
+            r.rate.iter().map(|y| (y - mean).powi(2)).sum::<f64>()
+        })
+        .sum();
+    let rates = problem.channels.iter().zip(&answer.residual);
+    let rates = rates.filter(|(channel, _)| channel.signal == Signal::Rate);
+    let miss: f64 = rates.flat_map(|(_, residual)| residual).map(|e| e * e).sum();
+    100.0 * (1.0 - (miss / spread).sqrt())
+}
+
+/// A fit that noise does not explain, nor a small signal.
+fn poor(problem: &Problem, answer: &Answer) -> bool {
+    let noise = crate::recording::noise_level(&problem.recordings[0].rate);
+    let rows = answer.residual[0].len() as f64;
+    let rms = (answer.residual[0].iter().map(|e| e * e).sum::<f64>() / rows).sqrt();
+    fit_pct(problem, answer) < POOR && rms > 2.0 * noise
+}
+
+/// Fit of the recordings held back: the model is simulated through them.
+fn validate(problem: &Problem, x: &[f64], options: &Options) -> Result<Vec<f64>> {
+    let mut fits = Vec::new();
+    for recording in &options.validation {
+        let one = [recording.clone()];
+        let there =
+            Problem::new(problem.fmu, problem.setup.clone(), &one, problem.unknowns.clone());
+        fits.push(fit_pct(&there, &there.answer(x, Instants::All)?));
+    }
+    Ok(fits)
+}

@@ -1,0 +1,284 @@
+//! One self-contained page on an identification.
+
+use std::fmt::Write as _;
+
+use bench::analysis::welch::{Segments, Spectra};
+use bench::svg::{Axis, Chart, Series, Style};
+use host::html::escape;
+
+use crate::candidate::ModelFit;
+use crate::identification::{Estimated, Identification, Signals};
+
+/// Points of a curve: more than a screen has pixels are not seen.
+const POINTS: usize = 700;
+/// Length of the stretch that is drawn row by row, s.
+const STRETCH: f64 = 8.0;
+
+const STYLE: &str = "
+:root{color-scheme:light dark;--ink:#1c1c1e;--paper:#fff;--soft:#6b6b70;--rule:#d8d8dc;--a:#0b62c4;--b:#c2410c;--warn:#fde8d7}
+@media(prefers-color-scheme:dark){:root{--ink:#e8e8ea;--paper:#16171a;--soft:#a0a0a8;--rule:#3a3b40;--a:#6cb1ff;--b:#ff9a5c;--warn:#4a2a12}}
+body{font:15px/1.5 system-ui,sans-serif;color:var(--ink);background:var(--paper);max-width:62rem;margin:2rem auto;padding:0 1rem}
+h1{font-size:1.5rem}h2{font-size:1.15rem;margin-top:2rem}
+.scroll{overflow-x:auto}table{border-collapse:collapse;font-variant-numeric:tabular-nums}
+th,td{padding:.2rem .7rem;border-bottom:1px solid var(--rule);text-align:right;white-space:nowrap}
+th:first-child,td:first-child{text-align:left}td.text{white-space:normal;text-align:left}
+th{color:var(--soft);font-weight:500}.doubt{background:var(--warn);padding:.5rem .8rem;border-radius:4px}
+svg{width:100%;height:auto;display:block;margin:.6rem 0}
+svg text{fill:var(--ink);font:12px system-ui,sans-serif}svg .tick,svg .label{fill:var(--soft);font-size:11px}
+svg .title{font-weight:600}svg .grid{stroke:var(--rule);stroke-width:.6;fill:none}svg .frame{stroke:var(--soft);fill:none}svg .curve path{fill:none;stroke-width:1.4}
+details{margin:.6rem 0}summary{cursor:pointer}
+";
+
+/// The page.
+pub fn page(found: &Identification) -> String {
+    let mut out = String::new();
+    let _ = write!(
+        out,
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
+         <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\
+         <title>Identification</title><style>{STYLE}</style></head><body>\n<h1>Identification</h1>\n"
+    );
+    verdict(&mut out, found);
+    parameters(&mut out, found);
+    for signals in &found.signals {
+        let _ = writeln!(out, "<h2>{}</h2>", escape(&signals.name));
+        out.push_str(&envelope(signals).svg());
+        out.push_str(&stretch(signals).svg());
+        out.push_str(&spectrum(signals, found.fit.noise_white).svg());
+    }
+    models(&mut out, &found.models);
+    correlations(&mut out, found);
+    budget(&mut out, found);
+    let _ = write!(out, "<h2>What was done</h2>\n<ol>");
+    for line in &found.done {
+        let _ = write!(out, "<li>{}</li>", escape(line));
+    }
+    out.push_str("</ol>\n</body></html>\n");
+    out
+}
+
+fn verdict(out: &mut String, found: &Identification) {
+    let fine = found.described && found.converged;
+    if fine {
+        let _ = writeln!(
+            out,
+            "<p>The model {} with {} friction leaves the gyro's noise alone, {:.2e} rad/s a row.</p>",
+            escape(&found.fit.model),
+            escape(&found.fit.friction),
+            found.fit.noise_white
+        );
+    }
+    for line in &found.verdict {
+        let doubt = line.starts_with("NOT DESCRIBED") || line.starts_with("The search did not");
+        let class = if doubt { " class=\"doubt\"" } else { "" };
+        let _ = writeln!(out, "<p{class}>{}</p>", escape(line));
+    }
+}
+
+/// With as many digits as the standard deviation has a meaning for.
+fn digits(value: f64, deviation: f64) -> String {
+    let places = if deviation > 0.0 { 1.0 - deviation.log10().floor() } else { 6.0 };
+    format!("{value:.*}", places.clamp(0.0, 12.0) as usize)
+}
+
+fn parameters(out: &mut String, found: &Identification) {
+    out.push_str(
+        "<h2>Parameters</h2>\n<div class=\"scroll\"><table><tr><th>name</th><th>value</th>\
+         <th>standard deviation</th><th>%</th><th>by noise alone</th><th>95 % interval</th><th>unit</th></tr>\n",
+    );
+    let row = |out: &mut String, name: &str, p: &Estimated| {
+        let _ = writeln!(
+            out,
+            "<tr><td>{}</td><td>{}</td><td>{:.1e}</td><td>{:.3}</td><td>{:.1e}</td><td>{} to {}</td><td>{}</td></tr>",
+            escape(name),
+            digits(p.value, p.std),
+            p.std,
+            100.0 * p.std / p.value.abs(),
+            p.std_noise,
+            digits(p.interval[0], p.std),
+            digits(p.interval[1], p.std),
+            escape(&p.unit)
+        );
+    };
+    for (name, p) in found.parameters.iter().chain(&found.measurement) {
+        row(out, name, p);
+    }
+    for c in &found.combinations {
+        let ends = [c.value - 1.96 * c.std, c.value + 1.96 * c.std];
+        let p = Estimated {
+            value: c.value,
+            std: c.std,
+            std_noise: c.std,
+            interval: ends,
+            unit: c.unit.clone(),
+        };
+        row(out, &c.name, &p);
+    }
+    out.push_str("</table></div>\n");
+}
+
+fn axis_chart(title: &str, x: &str, y: &str, series: Vec<Series>, logarithmic: bool) -> Chart {
+    let points = || series.iter().flat_map(|s| &s.points);
+    Chart {
+        title: title.into(),
+        size: (900.0, 260.0),
+        x: Axis::linear(x, points().map(|p| p.0), 0.0, 8),
+        y: match logarithmic {
+            true => Axis::decades(y, points().map(|p| p.1)),
+            false => Axis::linear(y, points().map(|p| p.1), 0.0, 5),
+        },
+        series,
+        legend: true,
+    }
+}
+
+fn series(points: Vec<(f64, f64)>, color: &str, style: Style, title: &str) -> Series {
+    Series { points, color: format!("var(--{color})"), style, title: title.into() }
+}
+
+/// Largest rate in each of [`POINTS`] windows, measured and simulated, and the residual's root mean square.
+fn envelope(signals: &Signals) -> Chart {
+    let width = (signals.time.len() / POINTS).max(1);
+    let windows = |of: &dyn Fn(usize) -> f64, mean: bool| -> Vec<(f64, f64)> {
+        (0..signals.time.len() / width)
+            .map(|k| {
+                let rows = k * width..(k + 1) * width;
+                let value = match mean {
+                    true => (rows.map(|i| of(i).powi(2)).sum::<f64>() / width as f64).sqrt(),
+                    false => rows.map(|i| of(i).abs()).fold(0.0, f64::max),
+                };
+                (signals.time[k * width], value.max(1e-9))
+            })
+            .collect()
+    };
+    let simulated = |i: usize| signals.measured[i] - signals.residual[i];
+    let lines = vec![
+        series(windows(&|i| signals.measured[i], false), "soft", Style::Line, "measured, peak"),
+        series(windows(&simulated, false), "a", Style::Dashed, "simulated, peak"),
+        series(windows(&|i| signals.residual[i], true), "b", Style::Line, "residual, rms"),
+    ];
+    axis_chart("Rate of the hub and what the model leaves", "time, s", "rad/s", lines, true)
+}
+
+/// The stretch around the fastest motion, row by row.
+fn stretch(signals: &Signals) -> Chart {
+    let fastest = (0..signals.measured.len())
+        .max_by(|a, b| signals.measured[*a].abs().total_cmp(&signals.measured[*b].abs()))
+        .unwrap_or(0);
+    let middle = signals.time[fastest];
+    let rows: Vec<usize> = (0..signals.time.len())
+        .filter(|&i| (signals.time[i] - middle).abs() < STRETCH / 2.0)
+        .collect();
+    let of =
+        |value: &dyn Fn(usize) -> f64| rows.iter().map(|&i| (signals.time[i], value(i))).collect();
+    let lines = vec![
+        series(of(&|i| signals.measured[i]), "soft", Style::Cloud, "measured"),
+        series(of(&|i| signals.measured[i] - signals.residual[i]), "a", Style::Line, "simulated"),
+    ];
+    axis_chart("Where the motion is fastest", "time, s", "rad/s", lines, false)
+}
+
+/// One-sided amplitude density of residual and measured rate.
+fn spectrum(signals: &Signals, white: f64) -> Chart {
+    let count = signals.time.len();
+    let step = (signals.time[count - 1] - signals.time[0]) / (count - 1) as f64;
+    let spectra = Spectra::of(step, &signals.residual, &signals.measured, Segments::Seconds(20.0));
+    // the spectra's unit is arbitrary: Parseval's theorem fixes it
+    let power = |x: &[f64]| {
+        let mean = x.iter().sum::<f64>() / count as f64;
+        x.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count as f64
+    };
+    let density = |bins: &[f64], total: f64| -> Vec<(f64, f64)> {
+        let sum = bins.iter().sum::<f64>() * spectra.resolution;
+        let each = bins.iter().enumerate().skip(1).step_by((bins.len() / POINTS).max(1));
+        each.map(|(k, p)| (k as f64 * spectra.resolution, (p * total / sum).sqrt().max(1e-12)))
+            .collect()
+    };
+    let half = 0.5 / step;
+    let level = white / half.sqrt();
+    let lines = vec![
+        series(
+            density(&spectra.output, power(&signals.measured)),
+            "soft",
+            Style::Line,
+            "measured rate",
+        ),
+        series(density(&spectra.input, power(&signals.residual)), "b", Style::Line, "residual"),
+        series(vec![(0.0, level), (half, level)], "a", Style::Dashed, "white noise of the gyro"),
+    ];
+    axis_chart("Amplitude density", "frequency, Hz", "rad/s/√Hz", lines, true)
+}
+
+fn models(out: &mut String, models: &[ModelFit]) {
+    out.push_str(
+        "<h2>Models</h2>\n<div class=\"scroll\"><table><tr><th>slosh</th><th>friction</th><th>fit, %</th><th>BIC less the best</th>\
+         <th>worst residual test</th><th>of recordings held back, %</th><th>simulations</th></tr>\n",
+    );
+    let best = models.iter().map(|m| m.bic).fold(f64::INFINITY, f64::min);
+    for m in models {
+        let worst = m.tests.iter().map(|t| t.worst()).fold(0.0, f64::max);
+        let held: Vec<String> = m.validation_pct.iter().map(|v| format!("{v:.3}")).collect();
+        let _ = writeln!(
+            out,
+            "<tr><td>{}</td><td>{}</td><td>{:.3}</td><td>{:.1}</td><td>{worst:.1}</td><td>{}</td><td>{}</td></tr>",
+            escape(&m.model),
+            escape(&m.friction),
+            m.fit_pct,
+            m.bic - best,
+            held.join(", "),
+            m.simulations
+        );
+    }
+    out.push_str("</table></div>\n");
+}
+
+fn correlations(out: &mut String, found: &Identification) {
+    let (names, matrix) = &found.correlations;
+    let _ = write!(
+        out,
+        "<h2>Correlations</h2>\n<p>Condition number of the sensitivities: {:.0}.</p>\n\
+         <div class=\"scroll\"><table><tr><th></th>",
+        found.condition
+    );
+    for name in names {
+        let _ = write!(out, "<th>{}</th>", escape(name));
+    }
+    out.push_str("</tr>\n");
+    for (name, row) in names.iter().zip(matrix) {
+        let _ = write!(out, "<tr><td>{}</td>", escape(name));
+        for value in row {
+            // the ink grows with the correlation
+            let share = (value.abs() * 60.0) as i32;
+            let color = if *value < 0.0 { "b" } else { "a" };
+            let _ = write!(
+                out,
+                "<td style=\"background:color-mix(in srgb,var(--{color}) {share}%,transparent)\">{value:.3}</td>"
+            );
+        }
+        out.push_str("</tr>\n");
+    }
+    out.push_str("</table></div>\n");
+}
+
+fn budget(out: &mut String, found: &Identification) {
+    out.push_str(
+        "<h2>Error budget</h2>\n<p>What an error of something that is not estimated would do to each estimate, in %.</p>\n\
+         <div class=\"scroll\"><table><tr><th>wrong</th>",
+    );
+    for name in found.parameters.keys() {
+        let _ = write!(out, "<th>{}</th>", escape(name));
+    }
+    out.push_str("</tr>\n");
+    for effect in &found.error_budget {
+        let _ = write!(out, "<tr><td>{}</td>", escape(&effect.source));
+        for (name, p) in &found.parameters {
+            let change = effect.change.get(name).copied().unwrap_or(0.0);
+            let _ = match name.as_str() {
+                "friction.asymmetry" => write!(out, "<td>{change:+.4} abs.</td>"),
+                _ => write!(out, "<td>{:+.3}</td>", 100.0 * change / p.value),
+            };
+        }
+        out.push_str("</tr>\n");
+    }
+    out.push_str("</table></div>\n");
+}

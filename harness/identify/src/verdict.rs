@@ -1,0 +1,168 @@
+//! The answer in words.
+
+use std::collections::BTreeMap;
+
+use crate::budget::Effect;
+use crate::candidate::ModelFit;
+use crate::identification::{DECIDES, Estimated};
+use crate::residual::{self, Tests};
+use crate::uncertainty::Combination;
+
+/// What there was to choose from.
+pub struct Question<'a> {
+    /// Slosh models, those that cannot be told from the best first.
+    pub slosh: &'a [ModelFit],
+    /// How many those are.
+    pub near: usize,
+    /// Friction laws, with one slosh model.
+    pub laws: &'a [ModelFit],
+    /// What makes the recordings doubtful before any fit.
+    pub doubts: &'a [String],
+}
+
+/// Each sentence answers one question: which model, which friction, described or not, what is known and what not.
+pub fn words(
+    question: &Question,
+    described: bool,
+    fit: &ModelFit,
+    combinations: &[Combination],
+    parameters: &BTreeMap<String, Estimated>,
+    budget: &[Effect],
+) -> Vec<String> {
+    let mut lines = Vec::new();
+    lines.extend(slosh(question));
+    lines.extend(friction(question.laws));
+    if !described {
+        let mut reasons: Vec<String> =
+            fit.tests.iter().map(reasons).filter(|t| !t.is_empty()).collect();
+        reasons.extend(question.doubts.iter().cloned());
+        lines.push(format!(
+            "NOT DESCRIBED: no model tried leaves only the gyro's noise ({}). Values and intervals are those of \
+             the nearest model and are not to be trusted: something acts on the bench that the model does not have.",
+            reasons.join("; ")
+        ));
+    }
+    if !fit.converged {
+        lines.push(format!(
+            "The search did not end at a minimum (it is {:.2} standard deviations away): values and standard \
+             deviations are not to be trusted. More torque, a longer recording or --start may help.",
+            fit.newton_decrement
+        ));
+    }
+    for c in combinations {
+        lines.push(format!(
+            "{} and {} cannot be told apart (correlation {:.4}); known is {} = {:.6} ± {:.6} {}.",
+            c.of[0], c.of[1], c.correlation, c.name, c.value, c.std, c.unit
+        ));
+    }
+    for (name, p) in parameters {
+        if p.value != 0.0 && p.std > 0.5 * p.value.abs() && name != "friction.asymmetry" {
+            lines.push(format!(
+                "{name} is not determined by these data ({:.3e} ± {:.1e} {}).",
+                p.value, p.std, p.unit
+            ));
+        }
+    }
+    lines.extend(modes(parameters, budget));
+    lines
+}
+
+fn slosh(question: &Question) -> Option<String> {
+    let best = question.slosh.first()?;
+    if question.slosh.len() == 1 {
+        return None;
+    }
+    if question.near > 1 {
+        let alike: Vec<&str> =
+            question.slosh[..question.near].iter().map(|m| m.model.as_str()).collect();
+        return Some(format!(
+            "Cannot tell which slosh model it is: {} explain the data equally well (BIC within {DECIDES}). The \
+             parameters below are those of the simplest, {}.",
+            alike.join(", "),
+            best.model
+        ));
+    }
+    let second = &question.slosh[1];
+    Some(format!(
+        "The slosh model is {}: its BIC is {:.0} below that of the next, {}.",
+        best.model,
+        second.bic - best.bic,
+        second.model
+    ))
+}
+
+fn friction(laws: &[ModelFit]) -> Vec<String> {
+    let Some(first) = laws.first() else { return Vec::new() };
+    let one = |other: &ModelFit| {
+        let gain = first.bic - other.bic;
+        match gain {
+            g if g > DECIDES => {
+                format!(
+                    "The friction is {}: its BIC is {g:.0} below that of {}.",
+                    other.friction, first.friction
+                )
+            }
+            // what the other has more counts ln N a parameter; without that they are alike
+            _ if first.deviance - other.deviance > -DECIDES => format!(
+                "Cannot tell the friction's law: {} explains the data as well as {}, which has fewer unknowns and is kept.",
+                other.friction, first.friction
+            ),
+            g => format!(
+                "The friction is {}: its BIC is {:.0} below that of {}.",
+                first.friction, -g, other.friction
+            ),
+        }
+    };
+    laws[1..].iter().map(one).collect()
+}
+
+fn modes(parameters: &BTreeMap<String, Estimated>, budget: &[Effect]) -> Option<String> {
+    let modes = budget.iter().find(|e| e.source.starts_with("slosh modes"))?;
+    let large: Vec<String> = parameters
+        .iter()
+        .filter_map(|(name, p)| {
+            let change = modes.change.get(name)?;
+            (change.abs() > p.std).then(|| format!("{name} {:+.2} %", 100.0 * change / p.value))
+        })
+        .collect();
+    (!large.is_empty()).then(|| {
+        format!(
+            "Slosh modes 2 to 4 are left out; with them the estimates would change by more than their \
+             standard deviation: {}. Set slosh.modes to include them.",
+            large.join(", ")
+        )
+    })
+}
+
+fn reasons(tests: &Tests) -> String {
+    let limit = residual::LIMIT;
+    let mut list = Vec::new();
+    if tests.whiteness > limit {
+        list.push(format!(
+            "its residual is correlated, {:.0} standard deviations",
+            tests.whiteness
+        ));
+    }
+    if tests.in_time.0 > limit {
+        list.push(format!(
+            "it is too large around {:.0} s ({:.0})",
+            tests.in_time.1, tests.in_time.0
+        ));
+    }
+    if tests.in_frequency.0 > limit {
+        list.push(format!(
+            "it is too large around {:.2} Hz ({:.0})",
+            tests.in_frequency.1, tests.in_frequency.0
+        ));
+    }
+    if tests.torque > limit {
+        list.push(format!("it is correlated with the torque ({:.0})", tests.torque));
+    }
+    if tests.torque_squared > limit {
+        list.push(format!(
+            "it is correlated with the torque's square ({:.0})",
+            tests.torque_squared
+        ));
+    }
+    list.join(", ")
+}
