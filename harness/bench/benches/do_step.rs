@@ -140,6 +140,7 @@ fn main() {
             input: Some(bench::run::TORQUE.into()),
             settings,
             torque: torque.clone(),
+            others: Vec::new(),
             step: STEP,
             stop,
             tolerance: None,

@@ -53,6 +53,7 @@ pub fn replay(fmu: &Fmu, input: &Path, tolerance: Option<f64>, hold: bool) -> Re
         settings: vec![],
         input: driven(fmu.description(), None)?,
         torque,
+        others: Vec::new(),
         step: STEP,
         stop,
         tolerance,

@@ -115,6 +115,7 @@ impl Recording {
             settings,
             input: Some(TORQUE.into()),
             torque,
+            others: Vec::new(),
             step,
             stop,
             tolerance: None,

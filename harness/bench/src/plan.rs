@@ -1,5 +1,5 @@
 //! A campaign's plan: a TOML file, read, checked and expanded into runs. The format by example:
-//! `modelDescription/HubSlosh/documentation/campaigns.md`.
+//! `book/campaigns.md`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -13,6 +13,9 @@ use crate::run::{Run, driven};
 use host::description::{self, ModelDescription, Type, did_you_mean};
 use host::output::sha256;
 
+/// Slosh models of the default campaign: what the thesis's synthetic data have, and what its bench
+/// does.
+pub const MODELS: [&str; 2] = ["linear", "spherical"];
 /// The thesis's fills, m.
 pub const FILLS: [f64; 2] = [0.05, 0.10];
 /// The thesis's amplitudes, N·m (its Table 5.2 and chapter 7).
@@ -33,6 +36,8 @@ pub const BUILT_IN: &[(&str, &str)] = &[
     ("fills", include_str!("../../campaigns/fills.toml")),
     ("amplitudes", include_str!("../../campaigns/amplitudes.toml")),
     ("monte_carlo", include_str!("../../campaigns/monte_carlo.toml")),
+    ("low_thrust", include_str!("../../campaigns/low_thrust.toml")),
+    ("slew", include_str!("../../campaigns/slew.toml")),
 ];
 
 /// The most runs a plan may have.
@@ -166,6 +171,7 @@ impl Case {
             settings: self.settings.clone(),
             input: self.input.clone(),
             torque: Torque::clone(&self.torque),
+            others: Vec::new(),
             step: self.step,
             stop: self.stop,
             tolerance: self.tolerance,
@@ -393,6 +399,15 @@ impl Plan {
             }
         }
         names
+    }
+
+    /// The number that the plan varies most, along which its runs are drawn; of several with as many
+    /// values the last. None if there is none, or if values are drawn at random.
+    pub fn axis(&self) -> Option<&str> {
+        let numbers = |values: &[String]| values.iter().all(|v| v.parse::<f64>().is_ok());
+        let along = self.vary.iter().filter(|(_, values)| values.len() > 1 && numbers(values));
+        let most = along.max_by_key(|(_, values)| values.len());
+        most.map(|(name, _)| name.as_str()).filter(|_| !self.is_random())
     }
 
     /// What is set in every run, by FMU name.
@@ -955,7 +970,7 @@ mod tests {
             })
             .collect();
         let expected = [
-            ("thesis", 22),
+            ("thesis", 44),
             ("thesis_models", 66),
             ("t1_resonance", 6),
             ("t2_mass", 5),
@@ -967,6 +982,8 @@ mod tests {
             ("fills", 20),
             ("amplitudes", 30),
             ("monte_carlo", 200),
+            ("low_thrust", 8),
+            ("slew", 6),
         ];
         assert_eq!(counts, expected);
     }
@@ -1005,13 +1022,20 @@ mod tests {
     }
 
     #[test]
-    fn the_thesis_campaign_has_22_runs_with_plain_names() {
+    fn the_thesis_campaign_has_22_runs_of_each_model_with_plain_names() {
         let plan = Plan::read("thesis").unwrap();
         let cases = plan.cases(&description()).unwrap();
         assert_eq!(cases[0].name, "linear_50mm_12.5");
         assert_eq!(cases[21].name, "linear_100mm_250");
-        let swept = |case: &Case| (case.fill.unwrap(), case.amplitude.unwrap());
-        let all = FILLS.iter().flat_map(|h| AMPLITUDES.iter().map(move |a| (*h, *a)));
+        assert_eq!(cases[43].name, "spherical_100mm_250");
+        let swept = |case: &Case| {
+            (case.model.clone().unwrap(), case.fill.unwrap(), case.amplitude.unwrap())
+        };
+        let of = |model: &'static str| {
+            let at = move |h: f64| AMPLITUDES.map(|a| (model.to_string(), h, a));
+            FILLS.into_iter().flat_map(at)
+        };
+        let all = MODELS.into_iter().flat_map(of);
         assert!(cases.iter().map(swept).eq(all), "the command line's defaults are the same");
         let dusty = cases_of(
             "profile = \"sine\"\n[vary]\nslosh.model = [\"planar\"]\ntank.h = [0.07]\nprofile.amplitude = [0.30000000000000004]",

@@ -1,10 +1,12 @@
 //! One run: a torque history through one instance of the FMU.
 
+use std::path::Path;
+
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::profile::Torque;
-use crate::table::Table;
-use host::description::{ModelDescription, Type};
+use crate::table::{self, Table};
+use host::description::{ModelDescription, Type, Variable};
 use host::fmi2::{Fmu, Instance};
 
 /// What is to be run.
@@ -16,6 +18,8 @@ pub struct Run {
     pub input: Option<String>,
     /// The torque command.
     pub torque: Torque,
+    /// Further Real inputs by FMU name, each with its history in the input's unit.
+    pub others: Vec<(String, Torque)>,
     /// Communication step H, s.
     pub step: f64,
     /// Stop time, s.
@@ -53,6 +57,76 @@ pub fn driven(description: &ModelDescription, asked: Option<&str>) -> Result<Opt
         [only] => Ok(Some(only.into())),
         _ => bail!("the FMU has several inputs ({}): name the one to drive", names.join(", ")),
     }
+}
+
+/// Column of a torque history that is no input: the derivative of [`TORQUE`] until the next row.
+pub const SLOPE: &str = "tau_slope";
+
+/// Reads a file's histories of inputs: every column that is a Real input of the FMU, and
+/// [`SLOPE`] with [`TORQUE`]. Other columns than these and `time` are refused by name, or passed
+/// over if `ignore`. The first is the input `asked` for, else [`TORQUE`], else the file's first.
+///
+/// # Errors
+/// If the file has no such column, or others; all that is wrong with its columns is said at once.
+pub fn histories(
+    description: &ModelDescription,
+    path: &Path,
+    asked: Option<&str>,
+    held: bool,
+    ignore: bool,
+) -> Result<Vec<(String, Torque)>> {
+    let is_input = |name: &str| {
+        let named = |v: &&Variable| v.name == name && v.causality == "input";
+        description.variables.iter().find(named).is_some_and(|v| v.kind() == Type::Real)
+    };
+    let file = path.display();
+    let there = table::names(path)?;
+    let columns: Vec<&str> = there.iter().map(String::as_str).collect();
+    let (inputs, rest): (Vec<&str>, Vec<&str>) = columns.iter().partition(|name| is_input(name));
+    let slope = rest.contains(&SLOPE) && inputs.contains(&TORQUE);
+    let known = |name: &str| name == "time" || (slope && name == SLOPE);
+    let wrong: Vec<&str> = rest.iter().copied().filter(|name| !known(name)).collect();
+    let all: Vec<&str> =
+        description.variables.iter().map(|v| v.name.as_str()).filter(|n| is_input(n)).collect();
+    let mut problems = Vec::new();
+    if !columns.contains(&"time") {
+        problems.push("it has no column time".to_string());
+    }
+    if inputs.is_empty() {
+        problems.push("none of its columns is an input".to_string());
+    }
+    if !wrong.is_empty() && !ignore {
+        problems.push(format!(
+            "{} {} no input (--ignore-columns passes over such columns)",
+            wrong.join(", "),
+            if wrong.len() == 1 { "is" } else { "are" }
+        ));
+    }
+    if let Some(asked) = asked.filter(|asked| !inputs.contains(asked)) {
+        problems.push(format!("it has no column {asked}, which is to be driven"));
+    }
+    ensure!(
+        problems.is_empty(),
+        "{file} cannot be used: {}; the FMU's inputs: {}; columns in the file: {}",
+        problems.join("; "),
+        all.join(", "),
+        columns.join(", ")
+    );
+    let first = asked.or_else(|| inputs.contains(&TORQUE).then_some(TORQUE)).unwrap_or(inputs[0]);
+    let rest = inputs.iter().copied().filter(|name| *name != first);
+    let ordered: Vec<&str> = [first].into_iter().chain(rest).collect();
+    let wanted: Vec<&str> =
+        ["time"].into_iter().chain(ordered.iter().copied()).chain(slope.then_some(SLOPE)).collect();
+    let table = Table::read(path, &wanted)?;
+    let column = |name| table.column(name).unwrap_or_default();
+    ordered
+        .into_iter()
+        .map(|name| {
+            let slopes = (slope && name == TORQUE && !held).then(|| column(SLOPE));
+            let history = Torque::rows(column("time"), column(name), slopes, held);
+            Ok((name.to_string(), history.with_context(|| format!("{file} cannot be used"))?))
+        })
+        .collect()
 }
 
 /// Steps between two reports of progress.
@@ -99,6 +173,12 @@ impl Run {
         Table::new(["time", TORQUE, "tau_slope"].map(String::from).to_vec(), columns)
     }
 
+    /// Every driven input with its history, that of the torque first.
+    fn driven(&self) -> Vec<(&str, &Torque)> {
+        let first = self.input.iter().map(|name| (name.as_str(), &self.torque));
+        first.chain(self.others.iter().map(|(name, history)| (name.as_str(), history))).collect()
+    }
+
     /// Fails with one sentence if the numbers make no sense.
     pub fn check(&self) -> Result<()> {
         ensure!(
@@ -128,7 +208,7 @@ impl Run {
         for (name, value) in &self.settings {
             let variable = fmu.description().variable(name)?;
             match variable.causality.as_str() {
-                "input" if self.input.as_ref() == Some(name) => {
+                "input" if self.driven().iter().any(|(driven, _)| driven == name) => {
                     bail!("{name} comes from the profile or the file")
                 }
                 "parameter" | "input" => instance.set(name, value)?,
@@ -139,15 +219,15 @@ impl Run {
         }
         instance.setup_experiment(self.tolerance, self.start(), Some(self.stop))?;
         instance.enter_initialization_mode()?;
-        if let Some(input) = &self.input {
+        for (input, history) in self.driven() {
             let reference = [fmu.description().variable(input)?.reference];
-            instance.set_real(&reference, &[self.torque.at(self.start())])?;
+            instance.set_real(&reference, &[history.at(self.start())])?;
         }
         instance.exit_initialization_mode()?;
         Ok(instance)
     }
 
-    /// Steps an initialised instance to the stop time. The table has `time`, the driven input and
+    /// Steps an initialised instance to the stop time. The table has `time`, the driven inputs and
     /// the variables `columns` at every communication point. `progress` hears how many steps were
     /// made since it was last called.
     pub fn drive(
@@ -159,27 +239,36 @@ impl Run {
         let steps = self.steps();
         let mut recorder = Recorder::new(instance, columns, steps + 1)?;
         let description = instance.fmu().description();
-        let input = match &self.input {
-            Some(name) => Some([description.variable(name)?.reference]),
-            None => None,
-        };
+        let driven = self.driven();
+        let references: Vec<u32> = driven
+            .iter()
+            .map(|(name, _)| Ok(description.variable(name)?.reference))
+            .collect::<Result<_>>()?;
+        let orders = vec![1; driven.len()];
         let slopes = !self.hold
             && description.co_simulation.as_ref().is_some_and(|cs| cs.can_interpolate_inputs);
         let points = steps + 1;
-        let (mut time, mut tau_cmd) = (Vec::with_capacity(points), Vec::with_capacity(points));
+        let mut time = Vec::with_capacity(points);
+        let mut inputs: Vec<Vec<f64>> = driven.iter().map(|_| Vec::with_capacity(points)).collect();
+        let (mut values, mut rises) = (vec![0.0; driven.len()], vec![0.0; driven.len()]);
         let mut t = self.start();
         for step in 1..=steps {
             let next = self.time(step);
-            let (tau, slope) = self.torque.chord(t, next - t);
             time.push(t);
-            tau_cmd.push(tau);
+            for (i, (_, history)) in driven.iter().enumerate() {
+                (values[i], rises[i]) = history.chord(t, next - t);
+                inputs[i].push(values[i]);
+            }
             recorder.record(instance)?;
-            let set = |instance: &mut Instance| match &input {
-                None => Ok(()),
-                Some(input) => instance.set_real(input, &[tau]).and_then(|()| match slopes {
-                    true => instance.set_real_input_derivatives(input, &[1], &[slope]),
+            let set = |instance: &mut Instance| {
+                if driven.is_empty() {
+                    return Ok(());
+                }
+                instance.set_real(&references, &values)?;
+                match slopes {
+                    true => instance.set_real_input_derivatives(&references, &orders, &rises),
                     false => Ok(()),
-                }),
+                }
             };
             set(instance)
                 .and_then(|()| instance.do_step(t, next - t))
@@ -191,11 +280,13 @@ impl Run {
         }
         progress((steps % REPORT_EVERY) as u64);
         time.push(t);
-        tau_cmd.push(self.torque.at(t));
+        for (input, (_, history)) in inputs.iter_mut().zip(&driven) {
+            input.push(history.at(t));
+        }
         recorder.record(instance)?;
 
-        let driven = self.input.clone().map(|input| (input, tau_cmd));
-        let head = [("time".to_string(), time)].into_iter().chain(driven);
+        let names = driven.iter().map(|(name, _)| name.to_string());
+        let head = [("time".to_string(), time)].into_iter().chain(names.zip(inputs));
         let recorded = columns.iter().map(|name| name.to_string()).zip(recorder.columns());
         let (names, columns) = head.chain(recorded).unzip();
         Ok(Table::new(names, columns))

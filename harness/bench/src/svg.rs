@@ -1,4 +1,4 @@
-//! Charts and heat maps as inline SVG. Colours are CSS values, so that a page can change
+//! Charts as inline SVG. Colours are CSS values, so that a page can change
 //! them with the reader's light or dark scheme.
 
 use std::fmt::Write as _;
@@ -216,146 +216,9 @@ fn opening(title: &str, (width, height): (f64, f64)) -> String {
     )
 }
 
-/// A heat map: one row of cells for each of several values of something, over a common axis.
-#[derive(Clone, Debug)]
-pub struct HeatMap {
-    /// What it shows.
-    pub title: String,
-    /// Width and height of the drawing, px.
-    pub size: (f64, f64),
-    /// Horizontal axis.
-    pub x: Axis,
-    /// What tells the rows apart, with its unit.
-    pub rows_label: String,
-    /// The rows, the first one lowest: what is written beside it, and points along the axis with
-    /// their values.
-    pub rows: Vec<(String, Vec<(f64, f64)>)>,
-    /// The scale of the values; what is beyond its ends has their colours.
-    pub scale: Axis,
-    /// CSS colour of a place on the scale, 0 to 1.
-    pub color: fn(f64) -> String,
-}
-
-/// Cells in a row of a heat map, and steps of its colour scale.
-const CELLS: usize = 150;
-const SHADES: usize = 32;
-
-impl HeatMap {
-    /// The `<svg>` element. A cell has the mean of the values in it; without any it has its left
-    /// neighbour's, and stays empty before the first value and behind the last.
-    pub fn svg(&self) -> String {
-        let (width, height) = self.size;
-        let bar = width - 46.0; // the scale stands right of it
-        let (left, right, top, bottom) = (MARGIN.0, bar - 10.0, MARGIN.2, height - MARGIN.3);
-        let row_height = (bottom - top) / self.rows.len().max(1) as f64;
-        let cell = (right - left) / CELLS as f64;
-        let mut shades: Vec<String> = vec![String::new(); SHADES];
-        let mut out = opening(&self.title, self.size);
-        for (k, (label, points)) in self.rows.iter().enumerate() {
-            let middle = bottom - (k as f64 + 0.5) * row_height;
-            let mut sums = vec![(0.0, 0usize); CELLS];
-            for (x, value) in points.iter().filter(|(_, v)| v.is_finite()) {
-                let place = self.x.place(*x) * CELLS as f64;
-                if (0.0..=CELLS as f64).contains(&place) {
-                    let sum = &mut sums[(place as usize).min(CELLS - 1)];
-                    *sum = (sum.0 + value, sum.1 + 1);
-                }
-            }
-            let shade = |(sum, count): (f64, usize)| {
-                let place = self.scale.place(sum / count.max(1) as f64).clamp(0.0, 1.0);
-                (count > 0).then_some(((place * SHADES as f64) as usize).min(SHADES - 1))
-            };
-            // between two values there is no gap, however narrow the cells
-            let filled = |sums: &[(f64, usize)]| {
-                let places =
-                    || sums.iter().enumerate().filter(|(_, sum)| sum.1 > 0).map(|(i, _)| i);
-                places().next().zip(places().next_back())
-            };
-            if let Some((first, last)) = filled(&sums) {
-                for i in first + 1..last {
-                    if sums[i].1 == 0 {
-                        sums[i] = sums[i - 1];
-                    }
-                }
-            }
-            // neighbours of one shade are one stroke
-            let mut from = 0;
-            while from < CELLS {
-                let this = shade(sums[from]);
-                let run = sums[from..].iter().take_while(|sum| shade(**sum) == this).count();
-                if let Some(this) = this {
-                    let (x, length) = (left + from as f64 * cell, run as f64 * cell + 0.2);
-                    let _ = write!(shades[this], "M{x:.1} {middle:.1}h{length:.1}");
-                }
-                from += run;
-            }
-            let _ = write!(
-                out,
-                "<text class=\"tick\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
-                left - 6.0,
-                middle + 3.5,
-                escape(label)
-            );
-        }
-        let color = |i: usize| (self.color)((i as f64 + 0.5) / SHADES as f64);
-        for (i, path) in shades.iter().enumerate().filter(|(_, path)| !path.is_empty()) {
-            let _ = write!(
-                out,
-                "<path class=\"cells\" d=\"{path}\" stroke=\"{}\" stroke-width=\"{:.1}\"/>",
-                color(i),
-                row_height + 0.3
-            );
-        }
-        for &tick in &self.x.ticks {
-            let at = left + (right - left) * self.x.place(tick);
-            let _ = write!(
-                out,
-                "<path class=\"frame\" d=\"M{at:.1} {bottom}v4\"/>\
-                 <text class=\"tick\" x=\"{at:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>",
-                bottom + 15.0,
-                number(tick, &self.x)
-            );
-        }
-        let step = (bottom - top) / SHADES as f64;
-        for i in 0..SHADES {
-            let _ = write!(
-                out,
-                "<path class=\"cells\" d=\"M{bar} {:.1}h9\" stroke=\"{}\" stroke-width=\"{:.1}\"/>",
-                bottom - (i as f64 + 0.5) * step,
-                color(i),
-                step + 0.3
-            );
-        }
-        for &tick in &self.scale.ticks {
-            let _ = write!(
-                out,
-                "<text class=\"tick\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
-                bar + 12.0,
-                bottom - (bottom - top) * self.scale.place(tick) + 3.5,
-                number(tick, &self.scale)
-            );
-        }
-        let _ = writeln!(
-            out,
-            "<text class=\"label\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>\
-             <text class=\"label\" transform=\"translate(13 {:.1}) rotate(-90)\" text-anchor=\"middle\">{}</text>\
-             <text class=\"label\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text></svg>",
-            (left + right) / 2.0,
-            height - 7.0,
-            escape(&self.x.label),
-            (top + bottom) / 2.0,
-            escape(&self.rows_label),
-            width - 2.0,
-            height - 7.0,
-            escape(&self.scale.label)
-        );
-        out
-    }
-}
-
 fn curve(points: &[(f64, f64)], series: &Series) -> String {
     let mut path = String::new();
-    let line = if series.style == Style::Cloud { Vec::new() } else { simplified(points) };
+    let line = if series.style == Style::Cloud { Vec::new() } else { simplified(points, 0.1) };
     for (i, (x, y)) in line.into_iter().enumerate() {
         let _ = write!(path, "{}{x:.1} {y:.1}", if i == 0 { "M" } else { "L" });
     }
@@ -386,9 +249,9 @@ fn curve(points: &[(f64, f64)], series: &Series) -> String {
     out
 }
 
-/// Leaves out the points that lie within a tenth of a pixel of the line through the others
-/// (Ramer, Douglas and Peucker).
-fn simplified(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+/// Leaves out the points that lie within `tolerance` of the line through the others (Ramer, Douglas
+/// and Peucker).
+pub(crate) fn simplified(points: &[(f64, f64)], tolerance: f64) -> Vec<(f64, f64)> {
     if points.len() < 3 {
         return points.to_vec();
     }
@@ -403,7 +266,7 @@ fn simplified(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
             ((bx - ax) * (py - ay) - (by - ay) * (px - ax)).abs() / length
         };
         let farthest = (from + 1..to).max_by(|&a, &b| away(a).total_cmp(&away(b)));
-        if let Some(middle) = farthest.filter(|&i| away(i) > 0.1) {
+        if let Some(middle) = farthest.filter(|&i| away(i) > tolerance) {
             spans.extend([(from, middle), (middle, to)]);
         }
     }
@@ -450,35 +313,8 @@ mod tests {
     #[test]
     fn a_straight_line_keeps_its_ends_and_a_corner_stays() {
         let line: Vec<_> = (0..100).map(|i| (i as f64, 2.0 * i as f64)).collect();
-        assert_eq!(simplified(&line), [line[0], line[99]]);
+        assert_eq!(simplified(&line, 0.1), [line[0], line[99]]);
         let corner = [(0.0, 0.0), (1.0, 0.0), (1.0, 5.0)];
-        assert_eq!(simplified(&corner), corner);
-    }
-
-    #[test]
-    fn a_heat_map_has_the_mean_of_each_cell_and_nothing_where_there_is_nothing() {
-        let map = HeatMap {
-            title: "t".into(),
-            size: (330.0, 260.0),
-            x: Axis::linear("x", [0.0, 1.0], 1.0, 5),
-            rows_label: "r".into(),
-            // -1 and 1 fall into one cell, 7 lies beyond the scale
-            rows: vec![(
-                "a".into(),
-                vec![(0.001, -1.0), (0.002, 1.0), (0.9999, f64::NAN), (0.998, 7.0)],
-            )],
-            scale: Axis::linear("v", [-1.0, 1.0], 2.0, 4),
-            color: |place| format!("shade{}", (place * SHADES as f64) as usize),
-        };
-        let svg = map.svg();
-        let cells = |shade: &str| {
-            svg.split("<path class=\"cells\" d=\"")
-                .skip(1)
-                .filter(|path| path.contains(&format!("stroke=\"{shade}\"")))
-                .count()
-        };
-        // every shade stands once in the scale; mean 0 is the middle one, 7 the last
-        assert_eq!((cells("shade16"), cells("shade31"), cells("shade0")), (2, 2, 1));
-        assert!(!svg.contains("NaN"));
+        assert_eq!(simplified(&corner, 0.1), corner);
     }
 }

@@ -112,7 +112,8 @@ impl Table {
         .with_context(|| format!("{} was not written", path.display()))
     }
 
-    fn write_csv(&self, file: &mut File) -> Result<()> {
+    /// Writes the table as CSV.
+    pub fn write_csv(&self, file: impl Write) -> Result<()> {
         let mut out = BufWriter::new(file);
         writeln!(out, "{}", self.names.join(","))?;
         for row in 0..self.rows() {
@@ -167,6 +168,29 @@ pub fn metadata(path: &Path) -> Result<BTreeMap<String, String>> {
         .flatten()
         .map(|pair| (pair.key.clone(), pair.value.clone().unwrap_or_default()))
         .collect())
+}
+
+/// Names of the columns of a file.
+pub fn names(path: &Path) -> Result<Vec<String>> {
+    let name = path.display();
+    let format = format_of(path)?;
+    let file = File::open(path).with_context(|| format!("{name} cannot be opened"))?;
+    let names = || -> Result<Vec<String>> {
+        match format {
+            Format::Csv => {
+                let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(file);
+                let header = reader.headers().context("it has no header row")?;
+                Ok(header.iter().map(|h| h.trim_start_matches('\u{feff}').to_string()).collect())
+            }
+            Format::Parquet => {
+                let reader =
+                    SerializedFileReader::new(file).context("it is not a complete Parquet file")?;
+                let schema = reader.metadata().file_metadata().schema_descr();
+                Ok(schema.columns().iter().map(|c| c.name().to_string()).collect())
+            }
+        }
+    };
+    names().with_context(|| format!("{name} cannot be used"))
 }
 
 /// Where each wanted column stands, or which are missing.

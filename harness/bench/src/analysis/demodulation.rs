@@ -5,15 +5,20 @@
 //! Y(t) = Σ w(t' − t) y(t') e^{−jφ(t')},   H(f(t)) = Y(t) / U(t)
 //! ```
 //!
-//! φ is the known phase of the sweep (it is not estimated), w a Hann window of a
-//! fixed number of cycles. U is formed with the same window, so whatever the
+//! φ is the known phase of the sweep (it is not estimated), w a Hann window of
+//! [so many cycles](super::lengths::cycles). U is formed with the same window, so whatever the
 //! window does to amplitude and phase cancels in H. Harmonics that friction makes
 //! turn by many cycles within the window and drop out.
 
+use super::lengths::cycles;
 use super::{Complex64, FrequencyResponse};
 use crate::profile::Sweep;
 
-/// Length of the window in cycles of the sweep. 24 cycles are 10 s at 2.4 Hz, in which the thesis's
+/// Fewest cycles that a window has: in three of them a Hann window tells a sweep from what does not
+/// turn with it.
+pub const LEAST_CYCLES: f64 = 3.0;
+
+/// Length of the window in cycles of a sweep that is slow enough. 24 cycles are 10 s at 2.4 Hz, in which the thesis's
 /// sweep moves by 9 mHz: little against the 14 mHz half-power width of the slosh at 10 cm, and long
 /// enough to tell the harmonics of a sticking bearing from the sweep.
 pub const CYCLES: f64 = 24.0;
@@ -32,7 +37,7 @@ pub fn frequency_responses<const N: usize>(
     let mut results: [FrequencyResponse; N] = std::array::from_fn(|_| Default::default());
     for &frequency in frequencies {
         let Some(centre) = sweep.time_of(frequency) else { continue };
-        let half = CYCLES / frequency / 2.0;
+        let half = cycles(sweep, frequency) / frequency / 2.0;
         let from = time.partition_point(|&t| t < centre - half);
         let to = time.partition_point(|&t| t <= centre + half);
         let mut u = Complex64::default();

@@ -23,9 +23,19 @@ impl Features {
     /// resonance may go deeper than the antiresonance. An end of the band is neither antiresonance
     /// nor resonance, and a rise of less than [`LEAST`] is no slosh.
     pub fn of(response: &FrequencyResponse) -> Self {
+        Features::within(response, (f64::NEG_INFINITY, f64::INFINITY))
+    }
+
+    /// The same of the frequencies from one to the other, Hz.
+    pub fn within(response: &FrequencyResponse, (from, to): (f64, f64)) -> Self {
         let level = response.decibels();
-        let Some((low, high)) = largest_rise(&level) else { return Features::default() };
-        let inner = |i: usize| i > 0 && i + 1 < level.len();
+        let first = response.frequency.partition_point(|f| *f < from);
+        let end = response.frequency.partition_point(|f| *f <= to).max(first);
+        let Some((low, high)) = largest_rise(&level[first..end]) else {
+            return Features::default();
+        };
+        let (low, high) = (first + low, first + high);
+        let inner = |i: usize| i > first && i + 1 < end;
         let antiresonance = inner(low).then(|| vertex(response, &level, low));
         let resonance = inner(high).then(|| vertex(response, &level, high));
         Features {
@@ -33,6 +43,11 @@ impl Features {
             f_dip: antiresonance.map(|(f, _)| f),
             notch_db: resonance.zip(antiresonance).map(|((_, top), (_, bottom))| top - bottom),
         }
+    }
+
+    /// Whether there is an antiresonance or a resonance.
+    pub fn any(&self) -> bool {
+        self.f_dip.is_some() || self.f_res.is_some()
     }
 
     /// f_res − f_dip, Hz.

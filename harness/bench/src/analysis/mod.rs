@@ -1,19 +1,23 @@
 //! From a run's signals to the frequency response of torque to hub rate, and
 //! from that to its features.
 //!
-//! Three estimators, which answer different questions:
+//! Three estimators, which answer different questions, and a fourth for records that are too short
+//! for them:
 //! * [`demodulation`]: what the hub does while the sweep passes a frequency, as
 //!   a lock-in amplifier shows it. It feeds `features.csv`.
 //! * [`spa`]: MATLAB's Blackman–Tukey estimate over the whole record, as the
 //!   thesis used it. It stands beside the first in the report.
 //! * [`welch`]: the H1 estimate from averaged segments, which most tools call
 //!   the transfer function of two records.
+//! * [`rational`]: a transfer function fitted to the spectra of the whole record.
 
 pub mod allan;
 pub mod demodulation;
 pub mod features;
+pub mod lengths;
 pub mod linear;
 pub mod off_axis;
+pub mod rational;
 pub mod residual;
 pub mod rotary;
 pub mod spa;

@@ -3,7 +3,7 @@
 use super::FrequencyResponse;
 use super::features::Features;
 use super::transfer_function::{TransferFunction, fit_time};
-use super::welch::{self, Spectra};
+use super::welch::{Segments, Spectra};
 
 /// A transfer function fitted to a run, and what it leaves of the run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,9 +26,10 @@ pub struct ModelFit {
 impl ModelFit {
     /// Fits the model to the measured response and drives it with the run's own torque.
     /// Signals are sampled every `step` s; `None` where there is no response to fit. Also returns
-    /// the spectra of torque and residual, in segments for [`welch::COHERENCE`].
+    /// the spectra of torque and residual, in segments of `segment` s.
     pub fn of(
         step: f64,
+        segment: f64,
         torque: &[f64],
         rate: &[f64],
         measured: &FrequencyResponse,
@@ -42,7 +43,7 @@ impl ModelFit {
         let residual: Vec<f64> = missing.iter().zip(&free).map(|(e, f)| e - f).collect();
         let answer: Vec<f64> = forced.iter().zip(&free).map(|(m, f)| mean + m + f).collect();
         let (skewness, kurtosis) = skewness_and_kurtosis(&residual);
-        let spectra = Spectra::of(step, torque, &residual, welch::COHERENCE);
+        let spectra = Spectra::of(step, torque, &residual, Segments::Seconds(segment));
         let fit = ModelFit {
             model,
             fit_frequency: model.fit_frequency(measured),

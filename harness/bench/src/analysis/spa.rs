@@ -10,7 +10,7 @@ use realfft::RealFftPlanner;
 
 use super::{Complex64, FrequencyResponse};
 
-/// Longest lag, s. `spa` resolves about 1/lag: 10 mHz need 100 s. 200 s leave the antiresonance,
+/// Longest lag for the thesis's band, s. `spa` resolves about 1/lag: 10 mHz need 100 s. 200 s leave the antiresonance,
 /// whose half-power width is 14 mHz, nearly its own shape.
 pub const LAG: f64 = 200.0;
 

@@ -6,7 +6,7 @@
 //! segment's resolution 1/L for 1/(L · rate); half-overlapping segments follow each other by L/2:
 //! so 2/(rate · L²) of them see each frequency.
 //!
-//! * [`COHERENCE`], 20 s: six segments at the thesis's 1/1200 Hz/s. Coherence then asks whether the
+//! * for coherence [`SEGMENT`], 20 s: six segments at the thesis's 1/1200 Hz/s. Coherence then asks whether the
 //!   ratio of the two signals stays the same while the sweep passes 50 mHz.
 //! * [`RESPONSE`], a ninth of twice the record (MATLAB's choice when it is not told): 600 s of the
 //!   thesis's sweep, which resolves the antiresonance. For the H1 estimate, which needs no average
@@ -29,8 +29,8 @@ pub enum Segments {
     Longest,
 }
 
-/// Segments for coherence, 20 s.
-pub const COHERENCE: Segments = Segments::Seconds(20.0);
+/// Length of segments for coherence in the thesis's band, s.
+pub const SEGMENT: f64 = 20.0;
 
 /// Segments for the H1 estimate and the signal-to-noise ratio.
 pub const RESPONSE: Segments = Segments::Longest;
@@ -43,6 +43,8 @@ const PADDING: usize = 4;
 pub struct Spectra {
     /// Distance of the bins, Hz.
     pub resolution: f64,
+    /// Length of a segment, s.
+    pub length: f64,
     /// |U|² per bin.
     pub input: Vec<f64>,
     /// |Y|² per bin.
@@ -71,6 +73,7 @@ impl Spectra {
         let bins = padded / 2 + 1;
         let mut all = Spectra {
             resolution: 1.0 / (step * padded as f64),
+            length: step * length as f64,
             input: vec![0.0; bins],
             output: vec![0.0; bins],
             cross: vec![Complex64::default(); bins],
@@ -197,7 +200,7 @@ mod tests {
         // its phase goes on by half a turn every 10 s against the sweep's: nothing in common
         let other = sine(|t| 1.05 * t + t * t / 2400.0);
         let mean = |segments| Spectra::of(0.02, &sweep, &other, segments).mean_coherence(1.2, 1.8);
-        let (short, long) = (mean(COHERENCE), mean(RESPONSE));
+        let (short, long) = (mean(Segments::Seconds(SEGMENT)), mean(RESPONSE));
         assert!(short < 0.01 && long > 0.5, "{short}, {long}");
     }
 }

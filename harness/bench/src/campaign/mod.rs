@@ -23,9 +23,10 @@ use host::output;
 use rayon::prelude::*;
 use serde_json::json;
 
-pub use self::outcome::{Curve, Estimate, Figures, Outcome, Passing, Record, SloshPath};
+pub use self::outcome::{
+    Curve, Doubt, Estimate, Figures, History, Outcome, Passing, Range, Record, SloshPath, WAVE,
+};
 pub use self::rows::{FeatureRow, MadeFrom};
-use crate::analysis::features::Features;
 use crate::plan::{Case, Plan};
 use crate::progress::Progress;
 
@@ -67,13 +68,20 @@ fn is_bench(description: &ModelDescription) -> bool {
     STORED[1..].iter().all(has) && PARAMETERS.iter().all(has)
 }
 
+/// Whether a variable is the slosh angle of a mode of a tank, `tank[1].angle_x[1]`.
+pub fn is_slosh_angle(name: &str) -> bool {
+    name.starts_with("tank") && (name.contains(".angle_x[") || name.contains(".angle_y["))
+}
+
 /// What is stored of a run of an FMU: [`STORED`] of the bench; else time, the driven input and
 /// every output that is a number.
 pub fn stored_columns(description: &ModelDescription, input: Option<&str>) -> Vec<String> {
     if is_bench(description) {
         return STORED.map(String::from).to_vec();
     }
-    let outputs = description.variables.iter().filter(|v| v.causality == "output");
+    // and the slosh angles of an FMU in six axes, which are local variables
+    let outputs =
+        description.variables.iter().filter(|v| v.causality == "output" || is_slosh_angle(&v.name));
     let outputs = outputs.filter(|v| v.kind() != Type::String).map(|v| v.name.clone());
     ["time".to_string()].into_iter().chain(input.map(String::from)).chain(outputs).collect()
 }
@@ -85,6 +93,10 @@ pub struct Campaign {
     pub plan: Plan,
     /// Simulate again what is stored already.
     pub force: bool,
+    /// Runs simulated and analysed at once; 0: as many as the machine has cores.
+    pub jobs: usize,
+    /// Directory of another campaign that the report compares with.
+    pub compare: Option<PathBuf>,
     /// Directory for runs, tables and report.
     pub out: PathBuf,
 }
@@ -103,6 +115,10 @@ pub struct Failure {
 pub struct Unanalysed {
     /// Which run.
     pub case: Case,
+    /// What is stored of it, thinned.
+    pub history: History,
+    /// Its last rows, as they are.
+    pub tail: History,
     /// It was not simulated but read.
     pub reused: bool,
 }
@@ -145,8 +161,9 @@ impl Campaign {
         })?;
         let steps: u64 = cases.iter().map(|case| case.run().steps() as u64).sum();
         watch(Progress::Begins { runs: cases.len(), steps });
-        let results: Vec<Result<Done>> =
-            cases.par_iter().map(|case| self.done(fmu, case, &runs, watch)).collect();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(self.jobs).build()?;
+        let results: Vec<Result<Done>> = pool
+            .install(|| cases.par_iter().map(|case| self.done(fmu, case, &runs, watch)).collect());
 
         let mut collected = Results::default();
         for (case, result) in cases.into_iter().zip(results) {
@@ -161,8 +178,13 @@ impl Campaign {
         Ok(collected)
     }
 
+    /// Whether the directory holds the results of another plan.
+    pub fn holds_another(&self) -> bool {
+        std::fs::read_to_string(self.plan_file()).is_ok_and(|text| text != self.plan.text)
+    }
+
     /// The copy of the plan beside the results.
-    fn plan_file(&self) -> PathBuf {
+    pub fn plan_file(&self) -> PathBuf {
         self.out.join("plan.toml")
     }
 
@@ -267,7 +289,16 @@ impl Campaign {
             }
         };
         if !is_bench(fmu.description()) {
-            let run = Unanalysed { case: case.clone(), reused };
+            let columns: Vec<(&str, &[f64])> = columns[1..]
+                .iter()
+                .filter_map(|name| Some((name.as_str(), table.column(name)?)))
+                .collect();
+            let time = table.column("time").unwrap_or_default();
+            let history = History::of(time, &columns);
+            let from = time.len().saturating_sub(2 * History::STRETCHES);
+            let last: Vec<(&str, &[f64])> = columns.iter().map(|(n, v)| (*n, &v[from..])).collect();
+            let tail = History::of(&time[from..], &last);
+            let run = Unanalysed { case: case.clone(), history, tail, reused };
             return Ok(Done::Unanalysed(Box::new(run)));
         }
         let outcome = Outcome::of(case, &run, &mut instance, &table, reused)?;
@@ -286,7 +317,8 @@ impl Campaign {
             })
         };
         let header = rows::columns::<FeatureRow>()?;
-        let features = |name: &str, of: &dyn Fn(&Outcome) -> Features| {
+        type Of = dyn Fn(&Outcome) -> Option<(&Estimate, &'static str)>;
+        let features = |name: &str, of: &Of| {
             write(name, &|writer| {
                 writer.write_record(&header)?;
                 for run in &results.outcomes {
@@ -296,16 +328,16 @@ impl Campaign {
             })
         };
         if results.unanalysed.is_empty() {
-            features("features.csv", &Outcome::features)?;
-            features("features_spa.csv", &Outcome::spa_features)?;
-            features("features_h1.csv", &Outcome::h1_features)?;
+            features("features.csv", &Outcome::estimate)?;
+            features("features_spa.csv", &|run| Some((&run.record.as_ref()?.spa, "spa")))?;
+            features("features_h1.csv", &|run| Some((&run.record.as_ref()?.h1, "h1")))?;
         }
         write("runs.csv", &|writer| {
             let made_from = rows::columns::<MadeFrom>()?;
             let varied = self.plan.varied().into_iter().map(String::from);
             writer.write_record(made_from.into_iter().chain(varied).chain(header.clone()))?;
             for run in &results.outcomes {
-                let row = FeatureRow::of(run, run.features());
+                let row = FeatureRow::of(run, run.estimate());
                 writer.serialize((MadeFrom::of(&run.case, None, fmu), &run.case.varied, row))?;
             }
             for case in results.unanalysed.iter().map(|run| &run.case) {

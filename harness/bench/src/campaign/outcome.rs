@@ -1,13 +1,18 @@
 //! What a run of the bench shows: figures of the run as a whole, and, where its torque allows, its
 //! frequency response by three estimators, a fitted model, and how the liquid moved.
 
-use anyhow::Result;
+use std::borrow::Cow;
+
+use anyhow::{Context, Result};
+use host::description::ModelDescription;
 use host::fmi2::Instance;
 
 use super::Case;
 use crate::analysis::features::Features;
+use crate::analysis::lengths::{self, Lengths};
 use crate::analysis::linear::{Linear, Mode};
 use crate::analysis::off_axis::{self, OffAxis};
+use crate::analysis::rational::Rational;
 use crate::analysis::residual::ModelFit;
 use crate::analysis::rotary::{self, Rotary};
 use crate::analysis::welch::{self, Spectra};
@@ -19,6 +24,18 @@ use crate::table::Table;
 /// Frequencies at which responses are evaluated: 1.2 mHz apart at the antiresonance of the thesis's
 /// sweep.
 const GRID_POINTS: usize = 2000;
+
+/// Separation of antiresonance and resonance that counts as resolved, in units of what is resolved.
+const RESOLVED: f64 = 3.0;
+/// Most misfit of a fitted transfer function that is trusted: what does not follow from the torque
+/// has a tenth of the rate's power.
+const MOST_MISFIT: f64 = 0.3;
+/// Part of the separation by which a passing sweep may shift the resonance. The shift is 0.6 times
+/// the root of the sweep's rate where the resonance is narrower than that.
+const MOST_SHIFT: f64 = 0.25;
+
+/// Least signal-to-noise ratio at a resonance that is trusted, dB.
+const LEAST_SNR: f64 = 0.0;
 
 /// Figures of a run as a whole.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -55,31 +72,81 @@ impl Figures {
     }
 }
 
-/// The path of the liquid surface's crest seen from above, in two short stretches of a run.
+/// Signals of a run, thinned for drawing: of each of at most [`History::STRETCHES`] stretches the
+/// smallest and the largest value, in the order in which they come.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct History {
+    /// Times, s.
+    pub time: Vec<f64>,
+    /// Names and values.
+    pub signals: Vec<(String, Vec<f64>)>,
+}
+
+impl History {
+    /// Stretches of a run that are told apart.
+    pub const STRETCHES: usize = 300;
+
+    /// Of columns of equal length.
+    pub fn of(time: &[f64], columns: &[(&str, &[f64])]) -> History {
+        let length = time.len().div_ceil(Self::STRETCHES);
+        if length <= 2 {
+            let copy = |(name, values): &(&str, &[f64])| (name.to_string(), values.to_vec());
+            return History { time: time.to_vec(), signals: columns.iter().map(copy).collect() };
+        }
+        let ends = |values: &[f64]| -> Vec<f64> {
+            let pair = |chunk: &[f64]| {
+                let by = |a: &usize, b: &usize| chunk[*a].total_cmp(&chunk[*b]);
+                let (low, high) = ((0..chunk.len()).min_by(by), (0..chunk.len()).max_by(by));
+                let (low, high) = (low.unwrap_or(0), high.unwrap_or(0));
+                [chunk[low.min(high)], chunk[low.max(high)]]
+            };
+            values.chunks(length).flat_map(pair).collect()
+        };
+        let step = (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64;
+        let half = length as f64 * step / 2.0;
+        let points = 2 * time.len().div_ceil(length);
+        History {
+            time: (0..points).map(|i| time[0] + i as f64 * half).collect(),
+            signals: columns
+                .iter()
+                .map(|(name, values)| (name.to_string(), ends(values)))
+                .collect(),
+        }
+    }
+
+    /// A signal over time.
+    pub fn curve(&self, name: &str) -> Curve {
+        let values = self.signals.iter().find(|(n, _)| n == name).map(|(_, values)| values);
+        values.map_or(Curve::new(), |v| self.time.iter().copied().zip(v.iter().copied()).collect())
+    }
+}
+
+/// The path of the liquid surface's crest seen from above, in two short stretches of a run: time, s,
+/// and angles outwards and towards +θ, rad.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SloshPath {
-    /// Where the wave is largest: angles outwards and towards +θ, rad.
-    pub largest: Vec<(f64, f64)>,
+    /// Where the wave is largest.
+    pub largest: Vec<[f64; 3]>,
     /// Around the onset of rotary slosh, if there is any.
-    pub onset: Option<Vec<(f64, f64)>>,
+    pub onset: Option<Vec<[f64; 3]>>,
 }
 
 impl SloshPath {
-    /// Length of the stretch around the largest wave, s.
-    pub const LARGEST: f64 = 3.0;
-    /// Length of the stretch around the onset, s.
-    pub const ONSET: f64 = 16.0;
+    /// Length of the stretch around the largest wave in periods of the slosh.
+    pub const LARGEST: f64 = 7.0;
+    /// Length of the stretch around the onset in periods of the slosh.
+    pub const ONSET: f64 = 38.0;
 
-    fn of(table: &Table, onset: Option<f64>) -> Self {
+    fn of(table: &Table, onset: Option<f64>, frequency: f64) -> Self {
         let column = |name| table.column(name).unwrap_or_default();
         let (time, radial, tangential) =
             (column("time"), column("slosh_angle_radial"), column("slosh_angle"));
         let size = |i: usize| radial[i].hypot(tangential[i]);
         let top = (0..time.len()).max_by(|&a, &b| size(a).total_cmp(&size(b))).map(|i| time[i]);
-        let stretch = |centre: f64, length: f64| {
+        let stretch = |centre: f64, periods: f64| {
             (0..time.len())
-                .filter(|&i| (time[i] - centre).abs() <= length / 2.0)
-                .map(|i| (radial[i], tangential[i]))
+                .filter(|&i| (time[i] - centre).abs() * frequency <= periods / 2.0)
+                .map(|i| [time[i], radial[i], tangential[i]])
                 .collect()
         };
         SloshPath {
@@ -94,12 +161,8 @@ impl SloshPath {
 pub struct Outcome {
     /// Which run.
     pub case: Case,
-    /// Value of `slosh.model`, by name.
-    pub model: String,
-    /// Fill (`tank.h`), m.
-    pub fill: f64,
-    /// Radius of the tank, m.
-    pub tank_radius: f64,
+    /// Model, tank and fill.
+    pub range: Range,
     /// Its exact linear counterpart with viscous friction, from the FMU's calculated parameters.
     pub linear: Linear,
     /// Of the run as a whole.
@@ -108,6 +171,11 @@ pub struct Outcome {
     pub record: Option<Record>,
     /// What is seen while a sweep passes; `None` if the torque is no sweep.
     pub passing: Option<Passing>,
+    /// Torque, rate, slosh angles, and the residual: the rate less that of the exact linear
+    /// counterpart under the same torque.
+    pub history: History,
+    /// The crest's path seen from above.
+    pub path: SloshPath,
     /// It was not simulated but read.
     pub reused: bool,
 }
@@ -117,14 +185,64 @@ pub struct Outcome {
 pub struct Estimate {
     /// Rate over torque.
     pub response: FrequencyResponse,
-    /// Its antiresonance and resonance.
+    /// Its antiresonance and resonance; none if they are not to be trusted.
     pub features: Features,
+    /// What it resolves at the resonance, Hz.
+    pub resolution: f64,
+    /// Why its features are not to be trusted, if they are not.
+    pub doubt: Option<Doubt>,
+}
+
+/// Why a response shows an antiresonance and a resonance that are not to be trusted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Doubt {
+    /// The sweep shifts the resonance by more than a quarter of its distance to the antiresonance.
+    TooFast,
+    /// The record, or its lags or segments, is too short to tell one from the other.
+    TooShort,
+    /// At the resonance there is more noise than signal.
+    Noise,
+}
+
+impl std::fmt::Display for Doubt {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(match self {
+            Doubt::TooFast => "the sweep is too fast",
+            Doubt::TooShort => "the record is too short",
+            Doubt::Noise => "too much noise",
+        })
+    }
 }
 
 impl Estimate {
-    fn of(response: FrequencyResponse) -> Self {
-        Estimate { features: Features::of(&response), response }
+    /// From a response whose features are looked for between two frequencies, Hz; `doubt` says what
+    /// speaks against them.
+    fn of(
+        response: FrequencyResponse,
+        inner: (f64, f64),
+        resolution: f64,
+        doubt: impl Fn(&Features) -> Option<Doubt>,
+    ) -> Self {
+        let found = Features::within(&response, inner);
+        let doubt = if found.any() { doubt(&found) } else { None };
+        let features = if doubt.is_some() { Features::default() } else { found };
+        Estimate { response, features, resolution, doubt }
     }
+}
+
+/// Whether a separation of antiresonance and resonance is less than can be told apart, Hz; of one of
+/// the two alone nothing is said.
+fn closer(features: &Features, than: f64) -> bool {
+    features.delta_f().is_some_and(|delta| delta < than)
+}
+
+/// Means of `count` neighbours; what is left over at the end is left out.
+fn means(signal: &[f64], count: usize) -> Cow<'_, [f64]> {
+    if count == 1 {
+        return signal.into();
+    }
+    let mean = |chunk: &[f64]| chunk.iter().sum::<f64>() / count as f64;
+    signal.chunks_exact(count).map(mean).collect::<Vec<_>>().into()
 }
 
 /// Values over the frequency, Hz.
@@ -142,6 +260,8 @@ pub struct Record {
     pub snr_db: Option<[f64; 2]>,
     /// The same, dB, over the band.
     pub snr_over_band: Curve,
+    /// A fitted transfer function, if neither `spa` nor H1 nor the passing sweep is to be trusted.
+    pub rational: Option<Estimate>,
     /// The thesis's linear model, fitted to the `spa` response, and over the band the coherence of
     /// its residual with the torque; `None` if nothing can be fitted.
     pub fit: Option<(ModelFit, Curve)>,
@@ -158,25 +278,60 @@ pub struct Passing {
     pub off_axis: OffAxis,
     /// The leakage at the frequencies of `rate`.
     pub leakage: Vec<f64>,
-    /// The crest's path seen from above.
-    pub path: SloshPath,
 }
 
 impl Record {
-    fn of(profile: &Profile, step: f64, tau: &[f64], omega: &[f64]) -> Option<Record> {
+    /// `enough`: there is an estimate to be trusted already.
+    fn of(
+        profile: &Profile,
+        step: f64,
+        tau: &[f64],
+        omega: &[f64],
+        enough: bool,
+    ) -> Option<Record> {
         let band = profile.band()?;
+        let duration = step * tau.len() as f64;
+        let lengths = Lengths::of(band, profile.sweep(), duration, step);
+        let (tau, omega) = (means(tau, lengths.decimation), means(omega, lengths.decimation));
+        let step = step * lengths.decimation as f64;
         let frequencies = logarithmic_grid(band, GRID_POINTS);
-        let spa = Estimate::of(spa::frequency_response(step, tau, omega, &frequencies, spa::LAG));
-        let spectra = Spectra::of(step, tau, omega, welch::RESPONSE);
+        let spectra = Spectra::of(step, &tau, &omega, welch::RESPONSE);
         let snr = spectra.snr_db();
+        let noisy = |features: &Features| {
+            // what the segments do not resolve looks like noise
+            let resolved = !closer(features, RESOLVED / spectra.length);
+            resolved && features.f_res.is_some_and(|f| spectra.at(&snr, f) < LEAST_SNR)
+        };
+        let estimate = |response: FrequencyResponse, length: f64| {
+            let resolution = 1.0 / length;
+            // at its ends the band is cut off, which rings
+            let inner = (band.0 + resolution, band.1 - resolution);
+            Estimate::of(response, inner, resolution, |features| match features {
+                features if closer(features, RESOLVED * resolution) => Some(Doubt::TooShort),
+                features if noisy(features) => Some(Doubt::Noise),
+                _ => None,
+            })
+        };
+        let spa = spa::frequency_response(step, &tau, &omega, &frequencies, lengths.lag);
+        let spa = estimate(spa, lengths.lag);
+        let rational = (!enough && !spa.features.any())
+            .then(|| Rational::fit(step, &tau, &omega, band))
+            .flatten()
+            .map(|fitted| {
+                let response = fitted.frequency_response(&frequencies);
+                Estimate::of(response, band, 1.0 / duration, |_| {
+                    (fitted.misfit > MOST_MISFIT).then_some(Doubt::Noise)
+                })
+            });
         let extrema = spa.features.f_res.zip(spa.features.f_dip);
-        let fit = ModelFit::of(step, tau, omega, &spa.response, &spa.features);
+        let fit = ModelFit::of(step, lengths.segment, &tau, &omega, &spa.response, &spa.features);
         Some(Record {
-            h1: Estimate::of(spectra.h1(band)),
+            h1: estimate(spectra.h1(band), spectra.length),
             snr_db: extrema.map(|(res, antiresonance)| {
                 [spectra.at(&snr, res), spectra.at(&snr, antiresonance)]
             }),
             snr_over_band: spectra.within(band, &snr),
+            rational,
             fit: fit.map(|(fit, spectra)| (fit, spectra.within(band, &spectra.coherence()))),
             spa,
         })
@@ -199,9 +354,26 @@ impl Passing {
         let times: Vec<f64> = passed.iter().filter_map(|f| sweep.time_of(*f)).collect();
         let rotary = Rotary::of(passed, &times, &swirl);
         let leakage = off_axis::leakage(&force, arm);
+        // where a window would begin before the sweep or end after it
+        let whole = |f: f64| {
+            let half = lengths::cycles(sweep, f) / f / 2.0;
+            sweep.time_of(f).is_some_and(|t| t - half >= 0.0 && t + half <= sweep.duration)
+        };
+        let mut inner = rate.frequency.iter().copied().filter(|f| whole(*f));
+        let inner = (
+            inner.clone().next().unwrap_or(f64::INFINITY),
+            inner.next_back().unwrap_or(f64::NEG_INFINITY),
+        );
+        let moves = |f: f64| sweep.rate_at(f).abs() * lengths::cycles(sweep, f) / f;
+        let middle = sweep.band();
+        let mut rate = Estimate::of(rate, inner, 0.0, |features| {
+            let shift = |f: f64| 0.6 * sweep.rate_at(f).abs().sqrt();
+            let fast = features.f_res.is_some_and(|f| closer(features, shift(f) / MOST_SHIFT));
+            fast.then_some(Doubt::TooFast)
+        });
+        rate.resolution = moves(rate.features.f_res.unwrap_or((middle.0 * middle.1).sqrt()));
         Passing {
-            rate: Estimate::of(rate),
-            path: SloshPath::of(table, rotary.from.and_then(|f| sweep.time_of(f))),
+            rate,
             rotary,
             off_axis: OffAxis::of(column("F_radial"), column("F_tangential"), &leakage),
             leakage,
@@ -219,19 +391,34 @@ impl Outcome {
         reused: bool,
     ) -> Result<Outcome> {
         let linear = exact_linear(instance)?;
+        let range = Range::of(instance.fmu().description(), instance)?.context("not the bench")?;
         let column = |name| table.column(name).unwrap_or_default();
         let (record, passing) = match &run.torque {
             Torque::Rows { .. } => (None, None),
-            Torque::Profile(profile) => (
-                Record::of(profile, run.step, column("tau_cmd"), column("omega_imu")),
-                profile.sweep().map(|sweep| Passing::of(sweep, table, linear.arm)),
-            ),
+            Torque::Profile(profile) => {
+                let passing = profile.sweep().map(|sweep| Passing::of(sweep, table, linear.arm));
+                let enough = passing.as_ref().is_some_and(|passing| passing.rate.doubt.is_none());
+                let (tau, omega) = (column("tau_cmd"), column("omega_imu"));
+                (Record::of(profile, run.step, tau, omega, enough), passing)
+            }
         };
+        let (rate, start) = (column("omega_imu"), column("omega").first().copied());
+        let modelled = linear.simulate(run.step, column("tau_cmd"), start.unwrap_or(0.0));
+        let residual: Vec<f64> = rate.iter().zip(&modelled).map(|(y, m)| y - m).collect();
+        let signals = ["tau_cmd", "omega_imu", "slosh_angle", "slosh_angle_radial"];
+        let signals = signals.map(|name| (name, column(name)));
+        let all: Vec<(&str, &[f64])> =
+            signals.into_iter().chain([("residual", &residual[..])]).collect();
+        let onset = passing.as_ref().and_then(|passing| {
+            let Torque::Profile(profile) = &run.torque else { return None };
+            profile.sweep()?.time_of(passing.rotary.from?)
+        });
+        let frequency = linear.modes.first().map_or(1.0, |mode| mode.frequency);
         Ok(Outcome {
+            history: History::of(column("time"), &all),
+            path: SloshPath::of(table, onset, frequency),
             case: case.clone(),
-            model: case.model.clone().unwrap_or_default(),
-            fill: instance.real("tank.h")?,
-            tank_radius: instance.real("tank.d")? / 2.0,
+            range,
             linear,
             figures: Figures::of(table),
             record,
@@ -240,11 +427,29 @@ impl Outcome {
         })
     }
 
-    /// Features that go into `features.csv`: those of the demodulated response, which say what the
-    /// hub did while the sweep passed, the sweep's shift of the resonance included (see the
-    /// report).
+    /// The estimate of a sweep that goes into `features.csv`, and its name: that of the demodulated
+    /// response, which says what the hub did while the sweep passed, the sweep's shift of the
+    /// resonance included (see the report); if that is not to be trusted, `spa`'s, and
+    /// else that of a fitted transfer function.
+    pub fn estimate(&self) -> Option<(&Estimate, &'static str)> {
+        let passing = self.passing.as_ref()?;
+        match (&passing.rate.doubt, &self.record) {
+            (Some(_), Some(record)) if record.spa.features.any() => Some((&record.spa, "spa")),
+            (Some(_), Some(Record { rational: Some(fitted), .. })) if fitted.features.any() => {
+                Some((fitted, "transfer function"))
+            }
+            _ => Some((&passing.rate, "demodulation")),
+        }
+    }
+
+    /// Features of [`Outcome::estimate`].
     pub fn features(&self) -> Features {
-        self.passing.as_ref().map_or(Features::default(), |passing| passing.rate.features)
+        self.estimate().map_or(Features::default(), |(estimate, _)| estimate.features)
+    }
+
+    /// How the run left the range of its model, if it did.
+    pub fn beyond_model(&self) -> Option<String> {
+        self.range.left(&[self.figures.peak_wave_height])
     }
 
     /// Features of the `spa` response.
@@ -275,11 +480,61 @@ impl Outcome {
     /// The liquid's regime at its largest wave, from the wave height over the tank's radius (thesis
     /// 2.3.5): linear below 0.15, nonlinear above 0.25.
     pub fn regime(&self) -> &'static str {
-        match self.figures.peak_wave_height / self.tank_radius {
+        match self.figures.peak_wave_height / self.range.radius {
             ratio if ratio < 0.15 => "linear",
             ratio if ratio <= 0.25 => "transitional",
             _ => "nonlinear",
         }
+    }
+}
+
+/// The variable that tells whether the liquid is in its model's range.
+pub const WAVE: &str = "wave_height";
+
+/// The range in which a model of the liquid means something.
+#[derive(Clone, Debug)]
+pub struct Range {
+    /// Value of `slosh.model`, by name.
+    pub model: String,
+    /// Radius of the tank, m.
+    pub radius: f64,
+    /// Fill, m.
+    pub fill: f64,
+}
+
+impl Range {
+    /// Of an initialised instance; `None` if the FMU is not the bench.
+    pub fn of(description: &ModelDescription, instance: &mut Instance) -> Result<Option<Range>> {
+        if !super::is_bench(description) {
+            return Ok(None);
+        }
+        let variable = description.variable("slosh.model")?;
+        let mut number = [0];
+        instance.get_integer(&[variable.reference], &mut number)?;
+        let items = description.items(variable);
+        let model = items.iter().find(|item| item.value == number[0]);
+        Ok(Some(Range {
+            model: model.map_or(String::new(), |item| item.name.clone()),
+            radius: instance.real("tank.d")? / 2.0,
+            fill: instance.real("tank.h")?,
+        }))
+    }
+
+    /// How a run with these wave heights, m, left it: a linear liquid in waves beyond a quarter of
+    /// the tank's radius (thesis 2.3.5), or any whose trough would lie below the tank's bottom.
+    pub fn left(&self, waves: &[f64]) -> Option<String> {
+        let wave = waves.iter().fold(0.0, |most: f64, wave| most.max(wave.abs()));
+        let mm = |length: f64| format!("{:.1} mm", length * 1e3);
+        let linear = self.radius / 4.0;
+        if self.model == "linear" && wave > linear {
+            let (wave, most) = (mm(wave), mm(linear));
+            return Some(format!(
+                "a wave of {wave}; linear slosh theory holds up to a quarter of the tank's radius, {most}"
+            ));
+        }
+        (self.model != "frozen" && wave > self.fill).then(|| {
+            format!("a wave of {}, more than the liquid is deep, {}", mm(wave), mm(self.fill))
+        })
     }
 }
 

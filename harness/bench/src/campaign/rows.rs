@@ -3,7 +3,7 @@
 use anyhow::{Context, Result};
 use serde::Serialize;
 
-use super::outcome::Outcome;
+use super::outcome::{Estimate, Outcome};
 use super::{Case, Failure};
 use crate::analysis::features::Features;
 
@@ -41,6 +41,9 @@ pub struct FeatureRow {
     off_axis_energy: Option<f64>,
     leakage: Option<f64>,
     regime: Option<&'static str>,
+    estimator: Option<&'static str>,
+    not_trusted: Option<String>,
+    beyond_model: Option<String>,
 }
 
 impl FeatureRow {
@@ -54,8 +57,9 @@ impl FeatureRow {
         }
     }
 
-    /// Of a run, with the features of one of its estimators.
-    pub fn of(run: &Outcome, features: Features) -> FeatureRow {
+    /// Of a run, with one of its estimates and the estimator's name.
+    pub fn of(run: &Outcome, estimate: Option<(&Estimate, &'static str)>) -> FeatureRow {
+        let features = estimate.map_or(Features::default(), |(estimate, _)| estimate.features);
         let figures = &run.figures;
         let (fit, rotary, off_axis) = (run.fit(), run.rotary(), run.off_axis());
         let snr_db = run.record.as_ref().and_then(|record| record.snr_db);
@@ -88,6 +92,9 @@ impl FeatureRow {
             off_axis_energy: off_axis.map(|off_axis| off_axis.energy),
             leakage: off_axis.map(|off_axis| off_axis.leakage),
             regime: Some(run.regime()),
+            estimator: estimate.map(|(_, name)| name),
+            not_trusted: estimate.and_then(|(estimate, _)| Some(estimate.doubt?.to_string())),
+            beyond_model: run.beyond_model(),
             ..FeatureRow::unanalysed(&run.case)
         }
     }

@@ -34,6 +34,8 @@ pub struct Parameter {
     pub default: f64,
     /// Its unit; empty if it has none.
     pub unit: &'static str,
+    /// What it is, for axes.
+    pub label: &'static str,
     /// Which values make sense.
     pub allowed: Allowed,
 }
@@ -79,24 +81,25 @@ const fn parameter(
     name: &'static str,
     default: f64,
     unit: &'static str,
+    label: &'static str,
     allowed: Allowed,
 ) -> Parameter {
-    Parameter { name, default, unit, allowed }
+    Parameter { name, default, unit, label, allowed }
 }
 
 const fn duration(default: f64) -> Parameter {
-    parameter("duration", default, "s", Allowed::Positive)
+    parameter("duration", default, "s", "duration", Allowed::Positive)
 }
 
-const fn time(name: &'static str, default: f64) -> Parameter {
-    parameter(name, default, "s", Allowed::NotNegative)
+const fn time(name: &'static str, default: f64, label: &'static str) -> Parameter {
+    parameter(name, default, "s", label, Allowed::NotNegative)
 }
 
 /// Both sweeps: those of the thesis, its wheel's 0.1 N·m.
 const SWEEP: &[Parameter] = &[
-    parameter("amplitude", 0.1, "N.m", Allowed::NotZero),
-    parameter("f0", 1.25, "Hz", Allowed::Positive),
-    parameter("f1", 3.5, "Hz", Allowed::Positive),
+    parameter("amplitude", 0.1, "N.m", "torque amplitude", Allowed::NotZero),
+    parameter("f0", 1.25, "Hz", "first frequency", Allowed::Positive),
+    parameter("f1", 3.5, "Hz", "last frequency", Allowed::Positive),
     duration(2700.0),
 ];
 const SWEEPS: &[Demand] = &[(|v| v.of("f0") != v.of("f1"), "f0 and f1 are equal; use sine")];
@@ -130,8 +133,8 @@ pub const KINDS: &[Kind] = &[
         name: "sine",
         says: "A sin 2πft: a dwell",
         parameters: &[
-            parameter("amplitude", 0.1, "N.m", Allowed::Any),
-            parameter("frequency", 2.4, "Hz", Allowed::Any),
+            parameter("amplitude", 0.1, "N.m", "torque amplitude", Allowed::Any),
+            parameter("frequency", 2.4, "Hz", "frequency", Allowed::Any),
             duration(60.0),
         ],
         demands: &[],
@@ -140,7 +143,10 @@ pub const KINDS: &[Kind] = &[
     Kind {
         name: "constant",
         says: "always the same torque",
-        parameters: &[parameter("amplitude", 0.1, "N.m", Allowed::Any), duration(20.0)],
+        parameters: &[
+            parameter("amplitude", 0.1, "N.m", "torque amplitude", Allowed::Any),
+            duration(20.0),
+        ],
         demands: &[],
         shape: |v| pieces([Piece::always(v.of("amplitude"))]),
     },
@@ -148,9 +154,9 @@ pub const KINDS: &[Kind] = &[
         name: "pulse",
         says: "the amplitude from `start` for `width` seconds",
         parameters: &[
-            parameter("amplitude", 0.05, "N.m", Allowed::Any),
-            time("start", 0.0),
-            time("width", 1.0),
+            parameter("amplitude", 0.05, "N.m", "torque amplitude", Allowed::Any),
+            time("start", 0.0, "start of the torque"),
+            time("width", 1.0, "length of the pulse"),
             duration(20.0),
         ],
         demands: &[],
@@ -160,10 +166,10 @@ pub const KINDS: &[Kind] = &[
         name: "bang-stop-bang",
         says: "+amplitude for `bang` seconds from `start` on, none for `stop` seconds, -amplitude for `bang` seconds, then none: the hub is spun up, coasts and is brought to rest (thesis 2.7.1)",
         parameters: &[
-            parameter("amplitude", 0.1, "N.m", Allowed::Any),
-            time("start", 0.0),
-            time("bang", 1.0),
-            time("stop", 10.0),
+            parameter("amplitude", 0.1, "N.m", "torque amplitude", Allowed::Any),
+            time("start", 0.0, "start of the torque"),
+            time("bang", 1.0, "length of each pulse"),
+            time("stop", 10.0, "time between the pulses"),
             duration(60.0),
         ],
         demands: &[],
@@ -180,11 +186,11 @@ pub const KINDS: &[Kind] = &[
         name: "acceleration-step",
         says: "inertia × acceleration from `start` for `width` seconds: what a wheel makes whose speed is ramped linearly (thesis 2.7.1)",
         parameters: &[
-            parameter("acceleration", 0.1, "rad/s2", Allowed::Any),
+            parameter("acceleration", 0.1, "rad/s2", "acceleration", Allowed::Any),
             // hub.I + tank.m_liq tank.r² at the FMU's start values
-            parameter("inertia", 0.428054, "kg.m2", Allowed::Positive),
-            time("start", 1.0),
-            time("width", 5.0),
+            parameter("inertia", 0.428054, "kg.m2", "inertia", Allowed::Positive),
+            time("start", 1.0, "start of the torque"),
+            time("width", 5.0, "length of the pulse"),
             duration(60.0),
         ],
         demands: &[],
@@ -197,12 +203,12 @@ pub const KINDS: &[Kind] = &[
         name: "noise",
         says: "band-limited noise with power density ~ f^exponent (0 white, -1 pink, -2 brown), clipped at ±limit",
         parameters: &[
-            parameter("rms", 0.05, "N.m", Allowed::Positive),
-            parameter("f0", 1.25, "Hz", Allowed::Positive),
-            parameter("f1", 3.5, "Hz", Allowed::Positive),
-            parameter("exponent", 0.0, "", Allowed::Within(10.0)),
-            parameter("seed", 1.0, "", Allowed::Whole(9e15)),
-            parameter("limit", 0.26, "N.m", Allowed::Positive), // the wheel's (thesis 5.1.3)
+            parameter("rms", 0.05, "N.m", "torque, rms", Allowed::Positive),
+            parameter("f0", 1.25, "Hz", "lowest frequency", Allowed::Positive),
+            parameter("f1", 3.5, "Hz", "highest frequency", Allowed::Positive),
+            parameter("exponent", 0.0, "", "spectral exponent", Allowed::Within(10.0)),
+            parameter("seed", 1.0, "", "seed", Allowed::Whole(9e15)),
+            parameter("limit", 0.26, "N.m", "torque limit", Allowed::Positive), // the wheel's (thesis 5.1.3)
             duration(600.0),
         ],
         demands: &[

@@ -219,6 +219,11 @@ impl Profile {
         Values { kind: self.kind, values: &self.values }.get(name)
     }
 
+    /// What its kind says of a parameter.
+    pub(crate) fn parameter(&self, name: &str) -> Option<&'static Parameter> {
+        self.kind.parameters.iter().find(|parameter| parameter.name == name)
+    }
+
     /// Length, s.
     pub fn duration(&self) -> f64 {
         self.get("duration").unwrap_or(0.0)
@@ -246,7 +251,7 @@ impl Profile {
 pub enum Torque {
     /// A formula.
     Profile(Profile),
-    /// The rows of a file: `time` (s, growing) and torque (N·m).
+    /// The rows of a file: `time` (s, growing; two at one time are a jump) and torque (N·m).
     Rows {
         /// Times, s.
         time: Vec<f64>,
@@ -261,19 +266,39 @@ impl Torque {
     /// Reads the columns `time,tau_cmd` of a CSV or Parquet file.
     pub fn read(path: &Path, held: bool) -> Result<Self> {
         let table = Table::read(path, &["time", "tau_cmd"])?;
-        let column = |name| table.column(name).unwrap_or_default().to_vec();
-        let (time, tau) = (column("time"), column("tau_cmd"));
-        let name = path.display();
-        ensure!(time.len() >= 2, "{name} has {} rows; a torque history needs two", time.len());
+        let column = |name| table.column(name).unwrap_or_default();
+        Torque::rows(column("time"), column("tau_cmd"), None, held)
+            .with_context(|| format!("{} cannot be used", path.display()))
+    }
+
+    /// From rows; with `slopes` the torque runs on from each row with its own slope until the next,
+    /// and jumps there if the two do not meet.
+    pub fn rows(time: &[f64], tau: &[f64], slopes: Option<&[f64]>, held: bool) -> Result<Self> {
+        ensure!(time.len() >= 2, "it has {} rows; a history needs two", time.len());
         if let Some(row) = time.windows(2).position(|pair| pair[1] <= pair[0]) {
             bail!(
-                "{name}, row {}: time goes from {} to {} s; it must grow",
+                "row {}: time goes from {} to {} s; it must grow",
                 row + 2,
                 time[row],
                 time[row + 1]
             );
         }
-        Ok(Torque::Rows { time, tau, held })
+        let Some(slopes) = slopes else {
+            return Ok(Torque::Rows { time: time.to_vec(), tau: tau.to_vec(), held });
+        };
+        let (mut times, mut torques) = (Vec::new(), Vec::new());
+        for (k, slope) in slopes.iter().enumerate() {
+            times.push(time[k]);
+            torques.push(tau[k]);
+            let Some(next) = time.get(k + 1) else { break };
+            let end = tau[k] + slope * (next - time[k]);
+            // rounding of the slope is no jump
+            if (end - tau[k + 1]).abs() > 1e-12 * (tau[k].abs() + tau[k + 1].abs()) {
+                times.push(*next);
+                torques.push(end);
+            }
+        }
+        Ok(Torque::Rows { time: times, tau: torques, held })
     }
 
     /// First and last time, s.
@@ -310,7 +335,17 @@ impl Torque {
         let end = match self {
             Torque::Profile(profile) => profile.shape.before(t + step),
             Torque::Rows { held: true, .. } => begin,
-            Torque::Rows { .. } => self.at(t + step),
+            Torque::Rows { time, tau, .. } => {
+                let end = t + step;
+                let slack = 1e-9 * (1.0 + end.abs());
+                match time.partition_point(|row| *row <= end + slack) {
+                    // just before a jump at the step's end
+                    n if n > 1 && time[n - 1] == time[n - 2] && time[n - 1] > end - slack => {
+                        tau[n - 2]
+                    }
+                    _ => self.at(end),
+                }
+            }
         };
         (begin, (end - begin) / step)
     }
@@ -324,10 +359,7 @@ mod tests {
 
     #[test]
     fn documentation_lists_the_profiles() {
-        let page = concat!(
-            env!("CARGO_MANIFEST_DIR"),
-            "/../../modelDescription/HubSlosh/documentation/campaigns.md"
-        );
+        let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../book/campaigns.md");
         let page = std::fs::read_to_string(page).unwrap();
         assert!(
             page.contains(&table()),

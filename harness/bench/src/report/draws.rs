@@ -1,67 +1,120 @@
-//! Monte Carlo: the distribution of antiresonance and resonance, over every drawn parameter.
+//! Monte Carlo: which of the drawn parameters decide, and the distribution of what they make.
 
+use super::figure::{Panel, numbers};
 use super::*;
 
-/// Antiresonance and resonance in all draws of a group.
-struct Figure {
-    title: &'static str,
-    label: &'static str,
-    unit: &'static str,
-    of: fn(&Outcome) -> Option<f64>,
-}
+/// Name, unit, and what it is of a run.
+type Figures = (&'static str, &'static str, fn(&Outcome) -> Option<f64>);
 
-const FIGURES: [Figure; 4] = [
-    Figure {
-        title: "Antiresonance",
-        label: "f_dip / Hz",
-        unit: "Hz",
-        of: |run| run.features().f_dip,
-    },
-    Figure { title: "Resonance", label: "f_res / Hz", unit: "Hz", of: |run| run.features().f_res },
-    Figure {
-        title: "Separation",
-        label: "Δf / mHz",
-        unit: "mHz",
-        of: |run| run.features().delta_f().map(|f| f * 1e3),
-    },
-    Figure {
-        title: "Notch depth",
-        label: "notch / dB",
-        unit: "dB",
-        of: |run| run.features().notch_db,
-    },
+const QUANTITIES: [Figures; 4] = [
+    ("antiresonance", "mHz", |run| Some(1e3 * best(run)?.0.features.f_dip?)),
+    ("resonance", "mHz", |run| Some(1e3 * best(run)?.0.features.f_res?)),
+    ("separation Δf", "mHz", |run| Some(1e3 * best(run)?.0.features.delta_f()?)),
+    ("notch depth", "dB", |run| best(run)?.0.features.notch_db),
 ];
 
-/// Histograms of the features, and antiresonance and resonance over every drawn parameter.
-pub(super) fn draws(plan: &Plan, fmu: &Fmu, groups: &[Group]) -> String {
-    let grouping = plan.grouping();
-    let drawn: Vec<(usize, &str)> = plan
-        .varied()
-        .into_iter()
-        .enumerate()
-        .filter(|(_, name)| !grouping.contains(name) && !name.ends_with("seed"))
+/// Ranked sensitivities and histograms of a group.
+pub(super) fn draws(page: &Page, group: &Group) -> Vec<Figure> {
+    let grouping = page.plan.grouping();
+    let drawn = page.plan.varied().into_iter().enumerate();
+    let drawn: Vec<(usize, &str)> =
+        drawn.filter(|(_, n)| !grouping.contains(n) && !n.ends_with("seed")).collect();
+    let effect = |place: usize, of: fn(&Outcome) -> Option<f64>| {
+        let point = |run: &&Outcome| Some((run.case.varied[place].parse().ok()?, of(run)?));
+        let points: Vec<(f64, f64)> = group.runs.iter().filter_map(point).collect();
+        let (_, deviation) = moments(&points.iter().map(|p| p.1).collect::<Vec<_>>());
+        (correlation(&points), deviation)
+    };
+    // one standard deviation of the parameter moves the quantity by ρ of its own deviation
+    let mut ranked: Vec<(&str, [f64; 2], [f64; 2])> = drawn
+        .iter()
+        .map(|(place, name)| {
+            let each = [0, 1].map(|i| effect(*place, QUANTITIES[i].2));
+            (*name, each.map(|(rho, s)| rho * s), each.map(|(rho, _)| rho))
+        })
         .collect();
-    let mut out = String::from(
-        "<h2>Distribution of antiresonance and resonance</h2>\n<p>Histograms over all draws, and every draw's antiresonance (blue) and resonance (orange) as its deviation from the mean, over each parameter that was drawn. ρ is the coefficient of correlation: what stands near ±1 decides, what stands near 0 does not matter.</p>\n",
-    );
-    for group in groups {
-        out.push_str(&group.heading());
-        out.push_str("<div class=\"four\">\n");
-        for figure in &FIGURES {
-            let values: Vec<f64> = group.runs.iter().filter_map(|run| (figure.of)(run)).collect();
-            if !values.is_empty() {
-                out.push_str(&histogram(figure, &values).svg());
-            }
-        }
-        for (place, name) in &drawn {
-            let unit =
-                fmu.description().variable(name).ok().and_then(|v| v.attributes().unit.clone());
-            let label = unit.map_or(name.to_string(), |unit| format!("{name} / {unit}"));
-            out.push_str(&scatter(group, *place, name, &label).svg());
-        }
-        out.push_str("</div>\n");
+    let size = |row: &(&str, [f64; 2], [f64; 2])| row.1[0].abs().max(row.1[1].abs());
+    ranked.sort_by(|a, b| size(a).total_cmp(&size(b)));
+    let names: Vec<&str> = ranked.iter().map(|row| row.0).collect();
+    let bars = [0, 1].map(|i| {
+        let text: Vec<String> = ranked.iter().map(|row| format!("ρ = {:.2}", row.2[i])).collect();
+        serde_json::json!({
+            "type": "bar", "orientation": "h", "panel": 0, "name": QUANTITIES[i].0, "y": names,
+            "x": numbers(ranked.iter().map(|row| row.1[i])), "text": text, "textposition": "none",
+            "marker": {"color": colors::category(i)},
+            "hovertemplate": "%{y}: %{x:.3g} mHz, %{text}",
+        })
+    });
+    let count = group.runs.len();
+    let by_chance = 2.0 / (count.max(1) as f64).sqrt();
+    let first = Figure {
+        title: "Ranked sensitivities".into(),
+        caption: format!(
+            "How far antiresonance and resonance move when a drawn parameter grows by one standard deviation, the others at random: the largest effect on top. ρ is the coefficient of correlation; in {count} draws what is below {by_chance:.2} may be chance."
+        ),
+        height: 110 + 30 * ranked.len(),
+        panels: vec![Panel::new("change for one standard deviation / mHz", "")],
+        traces: bars.to_vec(),
+        ..Figure::default()
+    };
+    let (mut panels, mut traces, mut says) = (Vec::new(), Vec::new(), Vec::new());
+    for (p, (name, unit, of)) in QUANTITIES.into_iter().enumerate() {
+        let values: Vec<f64> = group.runs.iter().filter_map(|run| of(run)).collect();
+        let (mean, deviation) = moments(&values);
+        says.push(format!("{name} {mean:.1} ± {deviation:.1} {unit}"));
+        panels.push(Panel::new(&format!("{name} / {unit}"), "draws"));
+        let (x, counts) = histogram(&values);
+        traces.push(serde_json::json!({
+            "type": "bar", "panel": p, "name": name, "showlegend": false,
+            "x": numbers(x), "y": counts, "marker": {"color": colors::category(p)},
+        }));
     }
-    out
+    let second = Figure {
+        title: "Distribution over the draws".into(),
+        caption: format!("Mean and standard deviation of {count} draws: {}.", says.join(", ")),
+        columns: 4,
+        height: 270,
+        panels,
+        traces,
+        ..Figure::default()
+    };
+    let (mut panels, mut traces) = (Vec::new(), Vec::new());
+    for (p, row) in ranked.iter().rev().take(4).enumerate() {
+        let Some((place, _)) = drawn.iter().find(|(_, name)| *name == row.0) else { continue };
+        panels.push(Panel::new(row.0, "frequency / mHz"));
+        for (i, (name, _, of)) in QUANTITIES.into_iter().take(2).enumerate() {
+            let point =
+                |run: &&Outcome| Some((run.case.varied[*place].parse::<f64>().ok()?, of(run)?));
+            let points: Vec<(f64, f64)> = group.runs.iter().filter_map(point).collect();
+            traces.push(serde_json::json!({
+                "type": "scatter", "mode": "markers", "panel": p, "name": name, "legendgroup": name,
+                "x": numbers(points.iter().map(|p| p.0)), "y": numbers(points.iter().map(|p| p.1)),
+                "marker": {"color": colors::category(i), "size": 4},
+            }));
+        }
+    }
+    let third = Figure {
+        title: "Every draw over the parameters that decide".into(),
+        caption: "Antiresonance and resonance of each draw over the four parameters with the largest effect.".into(),
+        columns: 4,
+        height: 270,
+        panels,
+        traces,
+        ..Figure::default()
+    };
+    vec![first, second, third]
+}
+
+/// Middles of bins and how many values are in each.
+fn histogram(values: &[f64]) -> (Vec<f64>, Vec<usize>) {
+    const BINS: usize = 24;
+    let (low, high) = values.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
+    let width = ((high - low) / BINS as f64).max(1e-9);
+    let mut counts = vec![0; BINS];
+    for value in values {
+        counts[(((value - low) / width) as usize).min(BINS - 1)] += 1;
+    }
+    ((0..BINS).map(|i| low + (i as f64 + 0.5) * width).collect(), counts)
 }
 
 /// Mean and standard deviation.
@@ -80,71 +133,6 @@ fn correlation(points: &[(f64, f64)]) -> f64 {
     if sx * sy > 0.0 { mean / (sx * sy) } else { 0.0 }
 }
 
-fn histogram(figure: &Figure, values: &[f64]) -> Chart {
-    let x = Axis::linear(figure.label, values.iter().copied(), 1e-6, 4);
-    let bins = 24;
-    let width = (x.to - x.from) / bins as f64;
-    let mut counts = vec![0.0; bins];
-    for value in values {
-        counts[(((value - x.from) / width) as usize).min(bins - 1)] += 1.0;
-    }
-    let mut points = vec![(x.from, 0.0)];
-    for (i, &count) in counts.iter().enumerate() {
-        let left = x.from + i as f64 * width;
-        points.extend([(left, count), (left + width, count)]);
-    }
-    points.push((x.to, 0.0));
-    let (mean, deviation) = moments(values);
-    let digits = if mean > 20.0 { 1 } else { 4 };
-    Chart {
-        title: format!("{}: {mean:.digits$} ± {deviation:.digits$} {}", figure.title, figure.unit),
-        size: (330.0, 260.0),
-        x,
-        y: Axis::linear("draws", counts.iter().copied().chain([0.0]), 1.0, 5),
-        series: vec![Series {
-            points,
-            color: "var(--e0)".into(),
-            style: Style::Line,
-            title: format!("{} draws", values.len()),
-        }],
-        legend: false,
-    }
-}
-
-fn scatter(group: &Group, place: usize, name: &str, label: &str) -> Chart {
-    let figures = [(&FIGURES[0], "var(--e0)"), (&FIGURES[1], "var(--e1)")];
-    let mut correlations = Vec::new();
-    let mut series = Vec::new();
-    for (figure, color) in figures {
-        let mut points: Vec<(f64, f64)> = group
-            .runs
-            .iter()
-            .filter_map(|run| Some((run.case.varied[place].parse().ok()?, (figure.of)(run)?)))
-            .collect();
-        let values: Vec<f64> = points.iter().map(|(_, y)| *y).collect();
-        let (mean, _) = moments(&values);
-        points.iter_mut().for_each(|(_, y)| *y = (*y - mean) * 1e3);
-        correlations.push(correlation(&points));
-        series.push(Series {
-            points,
-            color: color.into(),
-            style: Style::Cloud,
-            title: figure.title.into(),
-        });
-    }
-    let all = |pick: fn(&(f64, f64)) -> f64| {
-        series.iter().flat_map(|s| &s.points).map(pick).collect::<Vec<f64>>()
-    };
-    Chart {
-        title: format!("{name}: ρ = {:.2}, {:.2}", correlations[0], correlations[1]),
-        size: (330.0, 260.0),
-        x: Axis::linear(label, all(|p| p.0), 1e-9, 4),
-        y: Axis::linear("from the mean / mHz", all(|p| p.1), 1.0, 5),
-        series,
-        legend: false,
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -158,10 +146,8 @@ mod tests {
 
     #[test]
     fn a_histogram_counts_every_value_once() {
-        let values = [1.0, 1.1, 1.5, 2.0];
-        let chart = histogram(&FIGURES[0], &values);
-        // each bin is drawn by two points
-        let sum: f64 = chart.series[0].points.iter().map(|(_, y)| y / 2.0).sum();
-        assert_eq!(sum, 4.0);
+        let (x, counts) = histogram(&[1.0, 1.1, 1.5, 2.0]);
+        assert_eq!(counts.iter().sum::<usize>(), 4);
+        assert!(x[0] > 1.0 && x[23] < 2.0);
     }
 }

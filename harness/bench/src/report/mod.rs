@@ -1,11 +1,13 @@
 //! `report.html`: one self-contained page on a campaign.
 
-mod amplitude;
+mod along;
 mod colors;
+mod compare;
 mod draws;
-mod maps;
+mod figure;
+mod general;
+mod histories;
 mod notes;
-mod paths;
 mod responses;
 mod thesis;
 
@@ -16,11 +18,11 @@ use std::path::Path;
 use anyhow::Result;
 
 use crate::analysis::features::Features;
-use crate::analysis::{BAND, FrequencyResponse, demodulation, logarithmic_grid, rotary, spa};
-use crate::campaign::{Campaign, Curve, Outcome, Results};
+use crate::analysis::{BAND, FrequencyResponse, demodulation, logarithmic_grid, rotary};
+use crate::campaign::{Campaign, Curve, Estimate, Outcome, Results, SloshPath};
 use crate::plan::{Plan, thousandths};
 use crate::profile::{Sweep, Torque};
-use crate::svg::{Axis, Chart, Series, Style};
+use figure::{Figure, Figures};
 use host::fmi2::Fmu;
 use host::html::escape;
 use host::output;
@@ -31,24 +33,25 @@ pub fn write(path: &Path, campaign: &Campaign, fmu: &Fmu, results: &Results) -> 
     output::atomically(path, |file| Ok(std::io::Write::write_all(file, page.as_bytes())?))
 }
 
-/// Runs that differ in nothing but the torque's amplitude (and what is drawn at random).
+/// Runs that differ in nothing but the number along which they are drawn (and what is drawn at
+/// random).
 struct Group<'a> {
     model: &'a str,
-    /// m; `None` if it is drawn at random.
+    /// m; `None` if it is drawn at random, or what the runs are drawn along.
     fill: Option<f64>,
     /// What else tells it from the other groups, such as `tank.d = 0.111`.
     others: Vec<String>,
     runs: Vec<&'a Outcome>,
     /// The sweep of its first run.
     sweep: Option<&'a Sweep>,
-    /// Features of the exact linear response on the same grid.
+    /// Features of the first run's exact linear response on the same grid.
     exact: Features,
     exact_response: FrequencyResponse,
 }
 
 impl Group<'_> {
     fn title(&self) -> String {
-        let mut title = format!("{} model", self.model);
+        let mut title = self.model.to_string();
         if let Some(fill) = self.fill {
             let _ = write!(title, ", {} cm fill", cm(fill));
         }
@@ -58,9 +61,57 @@ impl Group<'_> {
         title
     }
 
-    fn heading(&self) -> String {
-        format!("<h3>{}</h3>\n", escape(&self.title()))
+    fn band(&self) -> Option<(f64, f64)> {
+        band(self.runs[0])
     }
+}
+
+/// The number along which runs are drawn.
+struct Axis {
+    /// Its place among what is varied.
+    place: usize,
+    name: String,
+    /// With its unit.
+    label: String,
+    /// What a value is multiplied by.
+    scale: f64,
+}
+
+impl Axis {
+    fn of(&self, run: &Outcome) -> Option<f64> {
+        let value: f64 = run.case.varied[self.place].parse().ok()?;
+        Some((value * self.scale * 1e9).round() / 1e9)
+    }
+}
+
+/// What every figure may look at.
+struct Page<'a> {
+    plan: &'a Plan,
+    groups: Vec<Group<'a>>,
+    axis: Option<Axis>,
+}
+
+impl Page<'_> {
+    /// A run's name within its group.
+    fn name(&self, run: &Outcome) -> String {
+        let value = self.axis.as_ref().and_then(|axis| Some((axis, axis.of(run)?)));
+        match value {
+            Some((axis, x)) => match axis.label.split_once(" / ") {
+                Some((_, unit)) => format!("{x} {unit}"),
+                None => format!("{} {x}", axis.label),
+            },
+            None => run.case.name.clone(),
+        }
+    }
+}
+
+/// Most curves in one figure of responses.
+const MOST_CURVES: usize = 24;
+
+/// The estimate that a run's headline is taken from, and its name: of a sweep that of
+/// `features.csv`, else `spa`'s.
+fn best(run: &Outcome) -> Option<(&Estimate, &'static str)> {
+    run.estimate().or_else(|| Some((&run.record.as_ref()?.spa, "spa")))
 }
 
 /// Level in dB over the frequency while the sweep passes.
@@ -77,37 +128,91 @@ fn sweep(run: &Outcome) -> Option<&Sweep> {
     }
 }
 
+/// The band in which a run has a frequency response, Hz.
+fn band(run: &Outcome) -> Option<(f64, f64)> {
+    match &*run.case.torque {
+        Torque::Profile(profile) => profile.band(),
+        _ => None,
+    }
+}
+
+/// Features of a run's exact linear response.
+fn exact_features(run: &Outcome) -> Features {
+    let grid = logarithmic_grid(band(run).unwrap_or(BAND), 2000);
+    Features::of(&run.linear.frequency_response(&grid))
+}
+
+/// The unit of a variable, as it is printed.
+fn unit(fmu: &Fmu, name: &str) -> Option<String> {
+    let unit = fmu.description().variable(name).ok()?.attributes().unit.clone()?;
+    Some(printed(&unit))
+}
+
+/// A unit in FMI's spelling, as it is printed: N.m, kg.m2, rad/s2.
+fn printed(unit: &str) -> String {
+    unit.replace('.', "·").replace("m2", "m²").replace("s2", "s²")
+}
+
+fn axis(plan: &Plan, fmu: &Fmu, runs: &[Outcome]) -> Option<Axis> {
+    let variable = plan.axis()?;
+    let place = plan.varied().iter().position(|n| *n == variable)?;
+    let (name, unit) = match variable.strip_prefix("profile.") {
+        Some(name) => {
+            let parameter = runs.iter().find_map(|run| match &*run.case.torque {
+                Torque::Profile(profile) => profile.parameter(name),
+                Torque::Rows { .. } => None,
+            })?;
+            let unit = Some(parameter.unit).filter(|unit| !unit.is_empty());
+            (parameter.label, unit.map(printed))
+        }
+        None => (variable, unit(fmu, variable)),
+    };
+    let (unit, scale) = match unit.as_deref() {
+        Some("N·m") if variable == "profile.amplitude" => (Some("mN·m".into()), 1e3),
+        Some("m") => (Some("mm".into()), 1e3),
+        _ => (unit, 1.0),
+    };
+    let label = unit.map_or(name.to_string(), |unit: String| format!("{name} / {unit}"));
+    Some(Axis { place, name: name.into(), label, scale })
+}
+
 fn groups<'a>(plan: &Plan, results: &'a Results) -> Vec<Group<'a>> {
+    let axis = plan.axis().unwrap_or("");
     // the places, among all that is varied, of what tells groups apart beside model and fill
     let grouping = plan.grouping();
     let others: Vec<(usize, &str)> = plan
         .varied()
         .into_iter()
         .enumerate()
-        .filter(|(_, name)| grouping.contains(name))
-        .filter(|(_, name)| !["slosh.model", "tank.h", "profile.amplitude"].contains(name))
+        .filter(|(_, name)| grouping.contains(name) && *name != axis)
+        .filter(|(_, name)| !["slosh.model", "tank.h"].contains(name))
         .collect();
-    let drawn_fill = plan.is_random() && !grouping.contains(&"tank.h");
+    let one_fill = axis != "tank.h" && (!plan.is_random() || grouping.contains(&"tank.h"));
     let mut groups: Vec<Group> = Vec::new();
     for run in &results.outcomes {
         let values = others.iter().filter(|(i, _)| !run.case.varied[*i].is_empty());
-        let key: Vec<String> =
-            values.map(|(i, name)| format!("{name} = {}", run.case.varied[*i])).collect();
+        let key: Vec<String> = values
+            .map(|(i, name)| {
+                let name = name.strip_prefix("profile.").unwrap_or(name);
+                format!("{name} = {}", run.case.varied[*i])
+            })
+            .collect();
         let same = |g: &&mut Group| {
-            g.model == run.model && g.fill.is_none_or(|fill| fill == run.fill) && g.others == key
+            g.model == run.range.model
+                && g.fill.is_none_or(|fill| fill == run.range.fill)
+                && g.others == key
         };
         match groups.iter_mut().find(same) {
             Some(group) => group.runs.push(run),
             None => {
-                let sweep = sweep(run);
-                let band = sweep.map(Sweep::band).unwrap_or(BAND);
-                let exact_response = run.linear.frequency_response(&logarithmic_grid(band, 2000));
+                let grid = logarithmic_grid(band(run).unwrap_or(BAND), 2000);
+                let exact_response = run.linear.frequency_response(&grid);
                 groups.push(Group {
-                    model: &run.model,
-                    fill: (!drawn_fill).then_some(run.fill),
+                    model: &run.range.model,
+                    fill: one_fill.then_some(run.range.fill),
                     others: key,
                     runs: vec![run],
-                    sweep,
+                    sweep: sweep(run),
                     exact: Features::of(&exact_response),
                     exact_response,
                 });
@@ -117,78 +222,167 @@ fn groups<'a>(plan: &Plan, results: &'a Results) -> Vec<Group<'a>> {
     groups
 }
 
+/// Most groups that get figures of their own; more would be a book.
+const MOST_GROUPS: usize = 6;
+
 fn page(campaign: &Campaign, fmu: &Fmu, results: &Results) -> String {
     let plan = &campaign.plan;
-    let groups = groups(plan, results);
-    let mut amplitudes: Vec<f64> =
-        results.outcomes.iter().filter_map(|run| run.case.amplitude).collect();
-    amplitudes.sort_by(f64::total_cmp);
-    amplitudes.dedup();
-    // each panel only where it says something: draws have no order along an axis
-    let swept = groups.iter().any(|group| group.sweep.is_some()) && !plan.is_random();
-    let along = amplitudes.len() > 1 && !plan.is_random();
-    let mut page = String::new();
+    let page =
+        Page { plan, groups: groups(plan, results), axis: axis(plan, fmu, &results.outcomes) };
+    let mut figures = Figures::default();
+    let sections = match results.unanalysed.is_empty() {
+        true => bench_sections(&page, campaign, results, &mut figures),
+        false => general_sections(fmu, results, &mut figures),
+    };
+    let mut out = String::new();
     let _ = write!(
-        page,
+        out,
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>HubSlosh: {}</title>\n<style>\n{}{}</style>\n</head>\n<body><main>\n",
+         <title>HubSlosh: {}</title>\n<style>\n{}</style>\n</head>\n<body><main>\n",
         escape(&plan.title),
         include_str!("page.css"),
-        colors::amplitude_colors(amplitudes.len())
     );
-    page.push_str(&introduction(plan, fmu, results, &groups));
-    let sweeps: Vec<&Group> = groups.iter().filter(|group| group.sweep.is_some()).collect();
-    if swept && along {
-        page.push_str(&thesis::statements(&groups));
+    out.push_str(&introduction(&page, fmu, results));
+    out.push_str("<nav aria-label=\"Contents\"><b>Contents</b><ul>");
+    let sections: Vec<(&str, String)> =
+        sections.into_iter().filter(|(_, html)| !html.is_empty()).collect();
+    for (title, _) in &sections {
+        let _ = write!(out, "<li><a href=\"#{}\">{}</a></li>", anchor(title), escape(title));
     }
-    if swept {
-        page.push_str("<h2>Frequency responses</h2>\n<p>Hub rate over commanded torque while the sweep passes each frequency, one curve per torque amplitude. The antiresonance stands at the slosh frequency, where the liquid holds the hub still; the resonance, where hub and liquid swing against each other, stands above it. Rest the pointer on a curve to see which run it is.</p>\n");
-        page.push_str(&responses::models_over_each_other(&sweeps));
-        page.push_str(&colors::amplitude_legend(&amplitudes));
-        for group in &sweeps {
-            page.push_str(&responses::responses(group, &amplitudes));
-        }
+    let _ = writeln!(
+        out,
+        "</ul><details><summary>All figures</summary><ol>{}</ol></details></nav>\n\
+         <noscript><p class=\"warning\">The figures need JavaScript; the numbers are in the results table and the files beside this page.</p></noscript>",
+        figures.list()
+    );
+    for (title, html) in &sections {
+        let _ = writeln!(out, "<h2 id=\"{}\">{}</h2>\n{html}", anchor(title), escape(title));
     }
-    if swept && along {
-        page.push_str("<h2>Features against torque amplitude</h2>\n<p>For a linear plant with linear friction these would be horizontal lines. What bends them at small torque is the bearing: dry friction counts most when the torque is small. A nonlinear liquid bends them at large torque.</p>\n");
-        page.push_str(&amplitude::models_over_each_other(&groups));
-        page.push_str("<div class=\"legend\"><span><i style=\"color:var(--e0)\"></i>while the sweep passes (demodulation; in <code>features.csv</code>)</span><span><i class=\"dash\" style=\"color:var(--e1)\"></i>over the whole record (<code>spa</code>)</span><span><i class=\"dash\" style=\"color:var(--e2)\"></i>over the whole record (Welch, H1)</span><span><i class=\"dash\" style=\"color:var(--exact)\"></i>exact, linear with viscous friction</span></div>\n");
-        for group in &sweeps {
-            page.push_str(&amplitude::features(group));
-        }
-    }
-    if along {
-        page.push_str(&amplitude::bearing_and_liquid(&groups));
-    }
-    if swept && along {
-        page.push_str(&amplitude::linear_fit(&groups));
-        page.push_str(&amplitude::out_of_the_plane(&groups));
-        page.push_str(&maps::maps(&groups));
-    }
-    if swept {
-        page.push_str(&paths::paths(&groups));
-    }
-    if plan.is_random() && groups.iter().any(|group| group.sweep.is_some()) {
-        page.push_str(&draws::draws(plan, fmu, &groups));
-    }
-    if swept {
-        page.push_str(&notes::estimators(&groups));
-    }
-    page.push_str(&notes::table(plan, results));
-    page.push_str(&notes::provenance(campaign, fmu, results));
-    page.push_str("</main></body>\n</html>\n");
-    page
+    out.push_str(&notes::provenance(campaign, fmu, results));
+    let _ = write!(
+        out,
+        "</main>\n<script type=\"application/json\" id=\"figures\">{}</script>\n\
+         <script>\n/* {} */\n{}</script>\n<script>\n{}</script>\n</body>\n</html>\n",
+        figures.json(),
+        include_str!("plotly/LICENSE").replace("*/", "* /"),
+        include_str!("plotly/plotly-cartesian.min.js"),
+        include_str!("report.js"),
+    );
+    out
 }
 
-fn introduction(plan: &Plan, fmu: &Fmu, results: &Results, groups: &[Group]) -> String {
+/// An element's name in a link.
+fn anchor(title: &str) -> String {
+    title.to_lowercase().replace(|c: char| !c.is_ascii_alphanumeric(), "-")
+}
+
+/// Titles and contents of the sections on runs of the bench; empty ones are left out.
+fn bench_sections<'a>(
+    page: &Page,
+    campaign: &Campaign,
+    results: &Results,
+    figures: &mut Figures,
+) -> Vec<(&'a str, String)> {
+    let (groups, plan) = (&page.groups, page.plan);
+    let random = plan.is_random();
+    let has_response = groups.iter().any(|group| group.band().is_some());
+    let swept = groups.iter().any(|group| group.sweep.is_some());
+    let axis = page.axis.as_ref();
+    let few = &groups[..groups.len().min(MOST_GROUPS)];
+    let mut sections: Vec<(&str, String)> = Vec::new();
+    let mut add = |all: Vec<Figure>| all.into_iter().map(|f| figures.add(f)).collect::<String>();
+
+    // the plan's question first
+    let mut first = Vec::new();
+    if random && has_response {
+        first.extend(groups.iter().flat_map(|group| draws::draws(page, group)));
+    } else if let (Some(axis), true) = (axis, has_response) {
+        first.push(along::extrema(page, axis));
+    } else if let Some(axis) = axis {
+        first.push(along::slosh_angles(page, axis));
+    }
+    sections.push((if random { "What decides" } else { "In short" }, add(first)));
+    let histories =
+        |few: &[Group]| few.iter().map(|group| histories::history(page, group)).collect::<Vec<_>>();
+    if has_response {
+        let responses = few.iter().filter(|g| g.band().is_some());
+        let mut all: Vec<Figure> = responses.map(|g| responses::responses(page, g)).collect();
+        if axis.is_some() {
+            all.extend(responses::models(page));
+        }
+        sections.push(("Frequency responses", add(all)));
+    }
+    sections.push(("Time histories", add(histories(few))));
+    if !random {
+        let paths = few.iter().flat_map(|group| histories::paths(page, group));
+        sections.push(("Rotary slosh", add(paths.collect())));
+    }
+    if let Some(axis) = axis {
+        let title = "Against what is varied";
+        let mut all = Vec::new();
+        if has_response {
+            all.push(along::features(page, axis));
+        }
+        all.push(along::bearing_and_liquid(page, axis));
+        if has_response {
+            all.push(along::linear_fit(page, axis));
+        }
+        if swept {
+            all.push(along::out_of_the_plane(page, axis));
+        }
+        sections.push((title, add(all)));
+        if swept && groups.iter().any(|group| group.runs.len() > 2) {
+            let maps = few.iter().map(|group| responses::maps(group, axis)).collect();
+            sections.push(("Over the frequency", add(maps)));
+        }
+    }
+    if let Some(other) = &campaign.compare {
+        sections.push((
+            "Comparison of two campaigns",
+            compare::compare(other, page, results, &mut add),
+        ));
+    }
+    let thesis = groups.iter().all(|group| group.band() == Some(BAND));
+    if thesis && axis.is_some_and(|axis| axis.name == "torque amplitude") {
+        sections.push(("Comparison with the thesis", thesis::statements(groups)));
+    }
+    sections.push(("Results table", notes::table(plan, results)));
+    if swept {
+        sections.push(("Methods", notes::estimators(groups)));
+    }
+    sections
+}
+
+/// Sections on runs of another FMU.
+fn general_sections<'a>(
+    fmu: &Fmu,
+    results: &Results,
+    figures: &mut Figures,
+) -> Vec<(&'a str, String)> {
+    let mut out = String::new();
+    for run in results.unanalysed.iter().take(MOST_GROUPS) {
+        for figure in general::run(fmu, &run.case.name, &run.history, &run.tail) {
+            out.push_str(&figures.add(figure));
+        }
+    }
+    if results.unanalysed.len() > MOST_GROUPS {
+        let _ = write!(out, "<p>The first {MOST_GROUPS} of {} runs.</p>", results.unanalysed.len());
+    }
+    vec![("Time histories", out)]
+}
+
+fn introduction(page: &Page, fmu: &Fmu, results: &Results) -> String {
+    let plan = page.plan;
+    let first = results.outcomes.first().map(|run| &run.case);
+    let first = first.or_else(|| results.unanalysed.first().map(|run| &run.case));
+    let count = results.outcomes.len() + results.unanalysed.len();
     let mut out = format!(
-        "<h1>A hub, a sloshing tank and a sticking bearing</h1>\n\
-         <p class=\"lead\">{}. {} runs of the HubSlosh FMU (version {}), sampled at {:.0} Hz: {}.</p>\n",
+        "<h1>{}</h1>\n<p class=\"lead\">{count} runs of the FMU {} (version {}), sampled at {} Hz: {}.</p>\n",
         escape(if plan.title.is_empty() { "A campaign" } else { &plan.title }),
-        results.outcomes.len(),
+        escape(&fmu.description().model_name),
         escape(&fmu.description().version),
-        results.outcomes.first().map_or(0.0, |run| 1.0 / run.case.step),
+        first.map_or(0.0, |case| thousandths(1e3 / case.step) / 1e6),
         escape(&torques(results)),
     );
     if !results.failures.is_empty() {
@@ -207,41 +401,80 @@ fn introduction(plan: &Plan, fmu: &Fmu, results: &Results, groups: &[Group]) -> 
         }
         out.push_str("</ul></div>\n");
     }
+    let beyond: Vec<String> = results
+        .outcomes
+        .iter()
+        .filter_map(|run| Some(format!("{} ({})", run.case.name, run.beyond_model()?)))
+        .collect();
+    if let Some(one) = beyond.first() {
+        let _ = writeln!(
+            out,
+            "<p class=\"warning\"><b>{} of {count} runs left the range of their model</b>, such as {}. They are computed faithfully, but they are not what a tank does. The results table marks them.</p>",
+            beyond.len(),
+            escape(one)
+        );
+    }
     out.push_str("<div class=\"cards\">");
-    for group in groups.iter().filter(|group| group.sweep.is_some()) {
-        let over = |get: &dyn Fn(&Outcome) -> Option<f64>| {
-            let values: Vec<f64> = group.runs.iter().filter_map(|run| get(run)).collect();
-            match values
+    let groups = page.groups.iter().filter(|group| group.band().is_some());
+    for group in groups.take(2 * MOST_GROUPS) {
+        let over = |get: &dyn Fn(&Features) -> Option<f64>| {
+            let found = group.runs.iter().filter_map(|run| get(&best(run)?.0.features));
+            let values: Vec<f64> = found.collect();
+            let ends = values
                 .iter()
                 .copied()
                 .reduce(f64::min)
-                .zip(values.iter().copied().reduce(f64::max))
-            {
-                Some((low, high)) if high - low < 5e-5 => format!("{low:.4}"),
-                Some((low, high)) => format!("{low:.3}–{high:.3}"),
-                None => "none".into(),
+                .zip(values.iter().copied().reduce(f64::max));
+            match ends {
+                Some((low, high)) if high - low < 2e-5 * high => format!("{low:.4} Hz"),
+                Some((low, high)) => format!("{}–{} Hz", digits(low, high), digits(high, low)),
+                None => {
+                    let doubt = group.runs.iter().find_map(|run| best(run)?.0.doubt);
+                    doubt.map_or("none".into(), |doubt| format!("not to be trusted: {doubt}"))
+                }
             }
         };
-        let [antiresonance, resonance] =
-            [over(&|run| run.features().f_dip), over(&|run| run.features().f_res)];
-        let exact = group.exact.f_dip.zip(group.exact.f_res).filter(|_| !plan.is_random());
+        let [antiresonance, resonance] = [over(&|f| f.f_dip), over(&|f| f.f_res)];
+        let exact = group.exact.f_dip.zip(group.exact.f_res);
+        let exact =
+            exact.filter(|_| page.axis.as_ref().is_none_or(|a| a.name == "torque amplitude"));
         let _ = write!(
             out,
-            "<div class=\"card\"><b>{antiresonance} Hz</b><b>{resonance} Hz</b><span>antiresonance and swept resonance, {}{}</span></div>",
+            "<div class=\"card\"><b>{antiresonance}</b><b>{resonance}</b><span>antiresonance and resonance ({}), {}{}</span></div>",
+            best(group.runs[0]).map_or("", |(_, name)| name),
             escape(&group.title()),
-            exact.map_or(String::new(), |(antiresonance, resonance)| format!(
-                " (exact, linear: {antiresonance:.4} and {resonance:.4} Hz)"
-            )),
+            exact.filter(|_| !plan.is_random()).map_or(
+                String::new(),
+                |(antiresonance, resonance)| format!(
+                    " (exact, linear: {antiresonance:.4} and {resonance:.4} Hz)"
+                )
+            ),
         );
     }
     out.push_str("</div>\n");
     out
 }
 
+/// A frequency with the digits that tell it from another.
+fn digits(value: f64, other: f64) -> String {
+    let places = (1.5 - (value - other).abs().max(1e-6).log10()).ceil().clamp(3.0, 4.0) as usize;
+    format!("{value:.places$}")
+}
+
+/// A sentence that lists at most four of several things; nothing if there are none.
+fn list_of(what: &str, things: &[String]) -> String {
+    match things {
+        [] => String::new(),
+        few if few.len() <= 4 => format!(" {what}: {}.", escape(&few.join(", "))),
+        many => format!(" {what}: {} and {} more.", escape(&many[..3].join(", ")), many.len() - 3),
+    }
+}
+
 /// The profiles of the runs, without what is varied along them.
 fn torques(results: &Results) -> String {
-    let mut profiles: Vec<&str> =
-        results.outcomes.iter().map(|run| run.case.profile.as_str()).collect();
+    let analysed = results.outcomes.iter().map(|run| &run.case);
+    let cases = analysed.chain(results.unanalysed.iter().map(|run| &run.case));
+    let mut profiles: Vec<&str> = cases.map(|case| case.profile.as_str()).collect();
     profiles.sort_unstable();
     profiles.dedup();
     match profiles[..] {
@@ -276,25 +509,9 @@ fn distinct<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
     found
 }
 
-/// The groups' fills, m, from small to large.
-fn fills(groups: &[Group]) -> Vec<f64> {
-    let mut fills = distinct(groups.iter().filter_map(|group| group.fill));
-    fills.sort_by(f64::total_cmp);
-    fills
-}
-
 /// Amplitude of a run's torque, N·m; 0 where there is none.
 fn torque_of(run: &Outcome) -> f64 {
     run.case.amplitude.unwrap_or(0.0)
-}
-
-fn exact(points: Vec<(f64, f64)>) -> Series {
-    Series {
-        points,
-        color: "var(--exact)".into(),
-        style: Style::Dashed,
-        title: "exact, linear and viscous".into(),
-    }
 }
 
 fn zip(x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {

@@ -1,21 +1,28 @@
 //! The text at the end: methods, results table, and what was run.
 
 use super::*;
+use crate::analysis::lengths::Lengths;
+use crate::campaign::Doubt;
 
 pub(super) fn estimators(groups: &[Group]) -> String {
+    let run = &groups[0].runs[0];
+    let duration = run.case.run().steps() as f64 * run.case.step;
+    let band = groups[0].band().unwrap_or(BAND);
+    let lag = Lengths::of(band, groups[0].sweep, duration, run.case.step).lag;
     let mut out = format!(
-        "<h2>Methods</h2>\n\
-         <p><b>Demodulation</b> (solid, in <code>features.csv</code>). Torque and rate are multiplied by e<sup>−jφ(t)</sup>, φ being the sweep's own known phase, and averaged over a Hann window of {cycles} cycles that slides with the sweep. Their ratio is the response the moment the sweep passes that frequency: what a lock-in amplifier would show. Both signals see the same window, so its effect on amplitude and phase cancels; harmonics that the bearing makes average out.</p>\n\
-         <p><b><code>spa</code></b> (dashed). MATLAB's Blackman–Tukey estimate, which the thesis used: covariances of the whole record up to a lag of {lag} s, Hann lag window, Fourier transform, ratio of cross spectrum to input spectrum. It resolves about {resolution:.0} mHz, which fills a narrow antiresonance a little.</p>\n\
+        "<p><b>Demodulation</b> (solid, in <code>features.csv</code>). Torque and rate are multiplied by e<sup>−jφ(t)</sup>, φ being the sweep's own known phase, and averaged over a Hann window of {cycles} cycles (fewer if the sweep is fast, at least 3) that slides with the sweep. Their ratio is the response the moment the sweep passes that frequency: what a lock-in amplifier would show. Both signals see the same window, so its effect on amplitude and phase cancels; harmonics that the bearing makes average out.</p>\n\
+         <p><b><code>spa</code></b> (dashed). MATLAB's Blackman–Tukey estimate, which the thesis used: covariances of the whole record up to a lag of {lag:.0} s, Hann lag window, Fourier transform, ratio of cross spectrum to input spectrum. It resolves about {resolution:.2} mHz, which fills a narrow antiresonance a little.</p>\n\
          <p><b>Welch, H1.</b> Eight half-overlapping Hamming segments, averaged cross spectrum over averaged input spectrum: what most tools call the transfer function of two records.</p>\n\
+         <p><b>Transfer function.</b> Where none of these resolves antiresonance and resonance: three poles and two zeros, fitted to the spectra of the whole record together with what its ends leave in them; exact for a linear plant, however short the record.</p>\n\
+         <p><b>What is trusted.</b> The response of the passing sweep, unless the sweep shifts the resonance by more than a quarter of the separation (0.6 √rate); then <code>spa</code>, if the separation is three times what it resolves and the signal-to-noise ratio at the resonance is above 1; then the transfer function, if it leaves less than 30 % of the rate. Else there is no number. <code>estimator</code> and <code>not_trusted</code> in the tables say which.</p>\n\
          <p><b>Features.</b> f<sub>dip</sub> and f<sub>res</sub> are the two ends of the largest rise of |H| as the frequency grows, within the sweep's band, refined by a parabola through three points of log |H|; Δf is their separation, the notch depth their difference in dB. For a bench with little damping they are the smallest and the largest |H| in the band, as in the thesis; with strong damping the largest |H| is the band's lower edge, not the slosh resonance, and the ripple behind the resonance may go deeper than the antiresonance.</p>\n\
          <p><b>Fit.</b> Three poles, two zeros, least squares on the complex <code>spa</code> response. In time it is driven with the run's torque from the initial state that fits best, as MATLAB's <code>compare</code> does: the band says little of a slow real pole, and from rest such a pole would keep the offset of the first half cycle for the whole run.</p>\n\
          <p><b>Energy residual.</b> Largest |E(t) − E(0) − work + heat| of a run over the energy throughput, Σ|Δwork| + heat. It checks the FMU's energy balance at every sample.</p>\n\
-         <h2>Why the swept resonance lies above the exact one</h2>\n\
+         <h3>Why the swept resonance lies above the exact one</h3>\n\
          <p>The sweep is not slow enough for the liquid. Bare-wall damping makes the resonance so narrow that the sweep crosses its half-power width in less time than the slosh needs to decay: the oscillation is still growing when its best frequency has gone by, so an upward sweep sees the largest rate later, at a higher frequency, and a little lower than it would be in a dwell. The ripple behind the resonance is the beat between that ringing and the torque that has moved on. A bench that sweeps at this rate and reads the envelope sees the same shift; it belongs to the experiment, not to the plant.</p>\n",
         cycles = demodulation::CYCLES,
-        lag = spa::LAG,
-        resolution = 1e3 / spa::LAG,
+        lag = lag,
+        resolution = 1e3 / lag,
     );
     out.push_str("<div class=\"wide\"><table><thead><tr><th>runs</th><th>exact<br>resonance</th><th>half-power<br>width 2ζf</th><th>sweep rate<br>there</th><th>time to<br>cross</th><th>slosh decays<br>in 1/(2πζf)</th><th>largest torque,<br>swept resonance</th><th>its<br>shift</th><th>largest torque,<br><code>spa</code> resonance</th><th>its<br>shift</th></tr></thead><tbody>\n");
     for group in groups {
@@ -56,28 +63,33 @@ pub(super) fn table(plan: &Plan, results: &Results) -> String {
     let heads: String =
         others.iter().map(|(_, name)| format!("<th>{}</th>", escape(name))).collect();
     let mut out = format!(
-        "<h2>Results table</h2>\n<div class=\"wide\"><table><thead>\n\
-         <tr><th colspan=\"{}\">Run</th><th colspan=\"4\">While the sweep passes</th><th colspan=\"4\">Whole record (<code>spa</code>)</th><th colspan=\"4\">The run itself</th></tr>\n\
-         <tr><th>model</th><th>fill<br>cm</th><th>torque<br>mN·m</th>{heads}<th>f<sub>dip</sub><br>Hz</th><th>f<sub>res</sub><br>Hz</th><th>Δf<br>mHz</th><th>notch<br>dB</th><th>f<sub>dip</sub><br>Hz</th><th>f<sub>res</sub><br>Hz</th><th>Δf<br>mHz</th><th>notch<br>dB</th><th>largest slosh<br>angle, deg</th><th>largest wave<br>mm</th><th>stiction<br>s</th><th>energy<br>residual</th></tr>\n</thead><tbody>\n",
+        "<div class=\"wide\"><table><thead>\n\
+         <tr><th colspan=\"{}\">Run</th><th colspan=\"4\">While the sweep passes</th><th colspan=\"4\">Whole record (<code>spa</code>)</th><th colspan=\"5\">The run itself</th></tr>\n\
+         <tr><th>model</th><th>fill<br>cm</th><th>torque<br>mN·m</th>{heads}<th>f<sub>dip</sub><br>Hz</th><th>f<sub>res</sub><br>Hz</th><th>Δf<br>mHz</th><th>notch<br>dB</th><th>f<sub>dip</sub><br>Hz</th><th>f<sub>res</sub><br>Hz</th><th>Δf<br>mHz</th><th>notch<br>dB</th><th>largest slosh<br>angle, deg</th><th>largest wave<br>mm</th><th>stiction<br>s</th><th>energy<br>residual</th><th>range of<br>the model</th></tr>\n</thead><tbody>\n",
         3 + others.len()
     );
     for run in &results.outcomes {
         let _ = write!(
             out,
             "<tr><td>{}</td><td>{}</td><td>{}</td>",
-            escape(&run.model),
-            cm(run.fill),
+            escape(&run.range.model),
+            cm(run.range.fill),
             run.case.amplitude.map_or(String::new(), |a| thousandths(a).to_string())
         );
         for (place, _) in &others {
             let _ = write!(out, "<td>{}</td>", escape(&shortened(&run.case.varied[*place])));
         }
-        for (features, looked) in
-            [(run.features(), run.passing.is_some()), (run.spa_features(), run.record.is_some())]
-        {
+        let passing = run.passing.as_ref().map(|passing| &passing.rate);
+        let spa = run.record.as_ref().map(|record| &record.spa);
+        for estimate in [passing, spa] {
+            let features = estimate.map_or(Features::default(), |estimate| estimate.features);
+            let doubt = estimate.and_then(|estimate| estimate.doubt);
             let cell = |value: Option<f64>, digits: usize| match value {
                 Some(value) => format!("<td>{value:.digits$}</td>"),
-                None if !looked => "<td></td>".into(),
+                None if estimate.is_none() => "<td></td>".into(),
+                None if doubt.is_some() => {
+                    format!("<td class=\"warn\" title=\"{}\">?</td>", doubt.unwrap_or(Doubt::Noise))
+                }
                 None => "<td>none</td>".into(),
             };
             out.push_str(&cell(features.f_dip, 4));
@@ -88,11 +100,15 @@ pub(super) fn table(plan: &Plan, results: &Results) -> String {
         let figures = &run.figures;
         let _ = writeln!(
             out,
-            "<td>{:.1}</td><td>{:.1}</td><td>{:.3}</td><td>{:.1e}</td></tr>",
+            "<td>{:.1}</td><td>{:.1}</td><td>{:.3}</td><td>{:.1e}</td><td>{}</td></tr>",
             figures.peak_slosh_angle.to_degrees(),
             figures.peak_wave_height * 1e3,
             figures.stuck,
-            figures.max_energy_residual
+            figures.max_energy_residual,
+            run.beyond_model().map_or("within".into(), |how| format!(
+                "<span class=\"warn\" title=\"{}\">left</span>",
+                escape(&how)
+            ))
         );
     }
     out.push_str("</tbody></table></div>\n");
@@ -109,7 +125,9 @@ fn shortened(text: &str) -> String {
 
 pub(super) fn provenance(campaign: &Campaign, fmu: &Fmu, results: &Results) -> String {
     let description = fmu.description();
-    let (plan, first) = (&campaign.plan, results.outcomes.first().map(|run| &run.case));
+    let analysed = results.outcomes.first().map(|run| &run.case);
+    let first = analysed.or_else(|| results.unanalysed.first().map(|run| &run.case));
+    let plan = &campaign.plan;
     let settings: Vec<_> = plan.set().iter().map(|(k, v)| format!("{k} = {v}")).collect();
     let tolerance =
         match (first.and_then(|c| c.tolerance), description.default_experiment.tolerance) {

@@ -1,193 +1,191 @@
-//! Frequency responses: every torque of a group, and models overlaid.
+//! Frequency responses, and heat maps over frequency and what the plan varies.
 
+use super::figure::{Panel, line, number, thinned};
 use super::*;
+
+/// Magnitude and phase of every run of a group.
+pub(super) fn responses(page: &Page, group: &Group) -> Figure {
+    let mut traces = Vec::new();
+    let runs = group.runs.iter().filter_map(|run| Some((run, best(run)?)));
+    let runs: Vec<_> = runs.take(MOST_CURVES).collect();
+    let mut names = Vec::new();
+    for (i, (run, (estimate, name))) in runs.iter().enumerate() {
+        let color = colors::ordered(i, runs.len());
+        if !names.contains(name) {
+            names.push(*name);
+        }
+        traces.extend(bode(&page.name(run), &color, "solid", &estimate.response));
+    }
+    if !page.plan.is_random() {
+        traces.extend(bode("exact, linear and viscous", colors::INK, "dot", &group.exact_response));
+    }
+    let (from, to) = group.band().unwrap_or(BAND);
+    // around the two, at their own distance, if they are close together
+    let near = group.exact.f_dip.zip(group.exact.f_res).map(|(dip, resonance)| {
+        let delta = resonance - dip;
+        ((dip - 2.5 * delta).max(from), (resonance + 4.0 * delta).min(to))
+    });
+    let panel = |y: &str| Panel { log_x: true, range: near, ..Panel::new("frequency / Hz", y) };
+    Figure {
+        title: format!("Frequency response, {}", group.title()),
+        caption: format!(
+            "Hub rate over torque ({}). The response falls to the antiresonance at the slosh frequency and rises to the resonance above it. At first around the two: a double click shows the whole band.",
+            names.join(", ")
+        ),
+        height: 235,
+        half: true,
+        shared: true,
+        panels: vec![panel("|H| / dB"), panel("phase / deg")],
+        traces,
+        ..Figure::default()
+    }
+}
+
+fn bode(
+    name: &str,
+    color: &str,
+    dash: &str,
+    response: &FrequencyResponse,
+) -> [serde_json::Value; 2] {
+    let curve = |values: Vec<f64>| thinned(&zip(&response.frequency, &values), true);
+    [
+        line(0, name, color, dash, &curve(response.decibels())),
+        line(1, name, color, dash, &curve(response.degrees())),
+    ]
+}
 
 /// For each fill, the responses of all models at the smallest and at the largest torque (thesis
 /// figures 7.5 and 7.6); nothing where there is one model only.
-pub(super) fn models_over_each_other<'a>(groups: &[&Group<'a>]) -> String {
-    let comparable: Vec<&Group<'a>> =
-        groups.iter().copied().filter(|group| group.others.is_empty()).collect();
+pub(super) fn models(page: &Page) -> Vec<Figure> {
+    let comparable: Vec<&Group> = page.groups.iter().filter(|g| g.others.is_empty()).collect();
     let mut fills = distinct(comparable.iter().map(|group| group.fill));
     fills.retain(|fill| comparable.iter().filter(|group| group.fill == *fill).count() > 1);
-    let mut out = String::new();
-    for fill in fills {
-        let models: Vec<&Group<'a>> =
-            comparable.iter().copied().filter(|group| group.fill == fill).collect();
-        let title = fill.map_or("Any fill".into(), |fill| format!("{} cm fill", cm(fill)));
-        let _ = writeln!(out, "<h3>{title}: models overlaid</h3>");
-        out.push_str(&colors::model_legend(models.iter().map(|group| group.model)));
-        out.push_str("<div class=\"two\">\n");
-        for largest in [false, true] {
-            let end = |group: &Group<'a>| {
-                let runs = &group.runs;
-                if largest { runs.last().copied() } else { runs.first().copied() }
-            };
-            let mut series: Vec<Series> = models
-                .iter()
-                .filter_map(|group| {
-                    let run = end(group)?;
-                    Some(Series {
-                        points: passing(run),
-                        color: colors::model_color(group.model),
-                        style: Style::Line,
-                        title: group.model.into(),
-                    })
-                })
-                .collect();
-            let exact_response = &models[0].exact_response;
-            series.push(exact(zip(&exact_response.frequency, &exact_response.decibels())));
-            let (from, to) = models[0].sweep.map(Sweep::band).unwrap_or(BAND);
-            let levels = series.iter().flat_map(|s| &s.points).map(|(_, y)| *y);
-            let y = Axis::linear("|H| / dB re 1 (rad/s)/(N·m)", levels, 10.0, 6);
-            let torque = end(models[0]).map_or(0.0, |run| thousandths(torque_of(run)));
-            let chart = Chart {
-                title: format!("{title}, {torque} mN·m"),
-                size: (560.0, 330.0),
-                x: Axis::logarithmic("frequency / Hz", (from, to), &frequency_ticks(from, to)),
-                y,
-                series,
-                legend: false,
-            };
-            out.push_str(&chart.svg());
-        }
-        out.push_str("</div>\n");
-    }
-    out
-}
-
-pub(super) fn responses(group: &Group, amplitudes: &[f64]) -> String {
-    let level = |r: &FrequencyResponse| zip(&r.frequency, &r.decibels());
-    let phase = |r: &FrequencyResponse| zip(&r.frequency, &r.degrees());
-    let curves = |of: &dyn Fn(&FrequencyResponse) -> Vec<(f64, f64)>| {
-        let mut series: Vec<Series> = group
-            .runs
-            .iter()
-            .map(|run| Series {
-                points: run.passing.as_ref().map_or(Curve::new(), |p| of(&p.rate.response)),
-                color: colors::amplitude_color(amplitudes, torque_of(run)),
-                style: Style::Line,
-                title: format!("{} mN·m", thousandths(torque_of(run))),
-            })
-            .collect();
-        series.push(exact(of(&group.exact_response)));
-        series
-    };
-    let levels = || curves(&level).into_iter().flat_map(|s| s.points).map(|(_, y)| y);
-    let size = (560.0, 330.0);
-    let (from, to) = group.sweep.map(Sweep::band).unwrap_or(BAND);
-    let band = Axis::logarithmic("frequency / Hz", (from, to), &frequency_ticks(from, to));
-    let antiresonance = group.exact.f_dip.unwrap_or(from);
-    let resonance = group.exact.f_res.unwrap_or(to);
-    let around = Axis::linear("frequency / Hz", [antiresonance - 0.08, resonance + 0.12], 0.3, 6);
-    let decibels = Axis::linear("|H| / dB re 1 (rad/s)/(N·m)", levels(), 10.0, 6);
-
-    let charts = [
-        Chart {
-            title: format!("Magnitude, {}", group.title()),
-            size,
-            x: band.clone(),
-            y: decibels.clone(),
-            series: curves(&level),
-            legend: false,
-        },
-        Chart {
-            title: "Magnitude around antiresonance and resonance".into(),
-            size,
-            x: around.clone(),
-            y: decibels.clone(),
-            series: curves(&level),
-            legend: false,
-        },
-        Chart {
-            title: format!("Phase, {}", group.title()),
-            size,
-            x: band,
-            y: degrees_axis(&curves(&phase)),
-            series: curves(&phase),
-            legend: false,
-        },
-        estimator_chart(group, size),
-    ];
-    let mut out = format!("{}<div class=\"two\">\n", group.heading());
-    for chart in charts {
-        out.push_str(&chart.svg());
-    }
-    out.push_str("</div>\n");
-    out
-}
-
-/// Phases in steps of 45 degrees.
-fn degrees_axis(series: &[Series]) -> Axis {
-    let places = |pick: fn(f64) -> f64, fold: fn(f64, f64) -> f64| {
-        let phases = series.iter().flat_map(|s| &s.points).map(|(_, y)| pick(*y / 45.0));
-        phases.reduce(fold).unwrap_or(0.0)
-    };
-    let (low, high) = (places(f64::floor, f64::min), places(f64::ceil, f64::max));
-    let ticks = (low as i32..=high as i32).map(|i| f64::from(i) * 45.0).collect();
-    Axis {
-        label: "phase / deg".into(),
-        from: low * 45.0,
-        to: high * 45.0,
-        logarithmic: false,
-        ticks,
-    }
-}
-
-/// The resonance of the run with the largest torque, as each estimator sees it.
-fn estimator_chart(group: &Group, size: (f64, f64)) -> Chart {
-    let seen = group.runs.last().and_then(|run| run.spa_features().f_res);
-    let resonance = seen.or(group.exact.f_res).unwrap_or(BAND.1);
-    let x = Axis::linear("frequency / Hz", [resonance - 0.04, resonance + 0.06], 0.1, 5);
-    let inside = |points: Vec<(f64, f64)>| -> Vec<(f64, f64)> {
-        points.into_iter().filter(|(f, _)| (x.from..=x.to).contains(f)).collect()
-    };
-    let magnitude = |r: &FrequencyResponse| {
-        inside(r.frequency.iter().zip(&r.response).map(|(f, h)| (*f, h.norm())).collect())
-    };
-    let mut series = Vec::new();
-    let last = group.runs.last();
-    let both = last.and_then(|run| Some((run.passing.as_ref()?, run.record.as_ref()?)));
-    if let Some((passing, record)) = both {
-        series.push(Series {
-            points: magnitude(&passing.rate.response),
-            color: "var(--e0)".into(),
-            style: Style::Line,
-            title: "while the sweep passes".into(),
-        });
-        series.push(Series {
-            points: magnitude(&record.spa.response),
-            color: "var(--e1)".into(),
-            style: Style::Dashed,
-            title: "whole record (spa)".into(),
-        });
-        series.push(Series {
-            points: magnitude(&record.h1.response),
-            color: "var(--e2)".into(),
-            style: Style::Dashed,
-            title: "whole record (Welch, H1)".into(),
-        });
-    }
-    series.push(exact(magnitude(&group.exact_response)));
-    let top = series.iter().flat_map(|s| &s.points).map(|(_, y)| *y).fold(0.0, f64::max);
-    let y = Axis::linear("|H| / (rad/s)/(N·m)", [0.0, top], 0.1, 5);
-    let amplitude = group.runs.last().map_or(0.0, |run| thousandths(torque_of(run)));
-    Chart {
-        title: format!("The resonance at {amplitude} mN·m, as each estimator sees it"),
-        size,
-        x,
-        y,
-        series,
-        legend: true,
-    }
-}
-
-pub(super) fn frequency_ticks(from: f64, to: f64) -> Vec<f64> {
-    if (from, to) == BAND {
-        return vec![1.25, 1.5, 2.0, 2.5, 3.0, 3.5];
-    }
-    Axis::linear("", [from, to], 0.0, 6)
-        .ticks
+    fills
         .into_iter()
-        .filter(|f| (from..=to).contains(f))
+        .map(|fill| {
+            let groups: Vec<&&Group> = comparable.iter().filter(|g| g.fill == fill).collect();
+            let mut traces = Vec::new();
+            for (i, group) in groups.iter().enumerate() {
+                let ends = distinct([group.runs.first(), group.runs.last()].into_iter().flatten().map(|r| r.case.name.as_str()));
+                for (k, name) in ends.iter().enumerate() {
+                    let run = group.runs.iter().find(|run| run.case.name == **name);
+                    let Some((run, (estimate, _))) = run.and_then(|run| Some((run, best(run)?))) else { continue };
+                    let name = format!("{}, {}", group.model, page.name(run));
+                    let dash = ["dash", "solid"][k];
+                    traces.push(line(0, &name, colors::category(i), dash, &thinned(&zip(&estimate.response.frequency, &estimate.response.decibels()), true)));
+                }
+            }
+            let exact = &groups[0].exact_response;
+            let exact = thinned(&zip(&exact.frequency, &exact.decibels()), true);
+            traces.push(line(0, "exact, linear and viscous", colors::INK, "dot", &exact));
+            let what = fill.map_or("any fill".into(), |fill| format!("{} cm fill", cm(fill)));
+            Figure {
+                title: format!("Models overlaid, {what}"),
+                caption: "The smallest (dashed) and the largest (solid) of the runs of each model: what nonlinear slosh changes, and what dry friction does to all models alike.".into(),
+                height: 340,
+                half: true,
+                panels: vec![Panel { log_x: true, ..Panel::new("frequency / Hz", "|H| / dB") }],
+                traces,
+                ..Figure::default()
+            }
+        })
         .collect()
+}
+
+/// One quantity: its name, what it is of a run, and the ends of its scale if they are not those of
+/// the values.
+struct Quantity {
+    label: &'static str,
+    of: fn(&Outcome) -> Curve,
+    ends: Option<(f64, f64)>,
+}
+
+/// Cells along the frequency.
+const CELLS: usize = 120;
+
+/// Heat maps over frequency and what the plan varies (thesis figures 7.11 to 7.16).
+pub(super) fn maps(group: &Group, axis: &Axis) -> Figure {
+    let quantities = [
+        Quantity { label: "magnitude |H| / dB", of: passing, ends: Some((-40.0, 10.0)) },
+        Quantity {
+            label: "residual coherence γ²",
+            of: |run| {
+                let fit = run.record.as_ref().and_then(|record| record.fit.as_ref());
+                fit.map_or(Curve::new(), |(_, coherence)| coherence.clone())
+            },
+            ends: Some((0.0, 1.0)),
+        },
+        Quantity {
+            label: "signal-to-noise ratio / dB",
+            of: |run| {
+                run.record.as_ref().map_or(Curve::new(), |record| record.snr_over_band.clone())
+            },
+            ends: Some((-10.0, 60.0)),
+        },
+        Quantity {
+            label: "leakage r|F_r|/|τ|",
+            of: |run| {
+                let passing = run.passing.as_ref();
+                passing.map_or(Curve::new(), |p| zip(&p.rate.response.frequency, &p.leakage))
+            },
+            ends: None,
+        },
+    ];
+    let (from, to) = group.band().unwrap_or(BAND);
+    let grid = logarithmic_grid((from, to), CELLS);
+    let (mut panels, mut traces) = (Vec::new(), Vec::new());
+    for (p, quantity) in quantities.iter().enumerate() {
+        let rows: Vec<Vec<serde_json::Value>> =
+            group.runs.iter().map(|run| cells(&(quantity.of)(run), (from, to))).collect();
+        let y: Vec<String> =
+            group.runs.iter().filter_map(|run| axis.of(run)).map(|x| x.to_string()).collect();
+        let mut trace = serde_json::json!({
+            "type": "heatmap", "panel": p, "colorscale": "Viridis", "name": quantity.label,
+            "x": figure::numbers(grid.iter().copied()), "y": y, "z": rows, "hoverongaps": false,
+            "hovertemplate": format!("%{{x:.4g}} Hz, %{{y}}: %{{z:.3g}}<extra>{}</extra>", quantity.label),
+        });
+        if let Some((low, high)) = quantity.ends {
+            (trace["zmin"], trace["zmax"]) = (number(low), number(high));
+        }
+        traces.push(trace);
+        panels.push(Panel {
+            log_x: true,
+            ..Panel::new(
+                &format!("{}, f / Hz", quantity.label),
+                if p == 0 { &axis.label } else { "" },
+            )
+        });
+    }
+    Figure {
+        title: format!("Over frequency and {}, {}", axis.name, group.title()),
+        caption: "One row of cells for each run. Residual coherence: bright where what the linear fit leaves still follows the torque steadily. Leakage: the radial force times the tank's arm over the torque; bright in rotary slosh.".into(),
+        columns: 4,
+        height: 250,
+        panels,
+        traces,
+        ..Figure::default()
+    }
+}
+
+/// Means of a curve's values in cells even in the logarithm; an empty cell between others has its
+/// left neighbour's.
+fn cells(curve: &Curve, (from, to): (f64, f64)) -> Vec<serde_json::Value> {
+    let mut sums = vec![(0.0, 0usize); CELLS];
+    for (f, value) in curve.iter().filter(|(_, v)| v.is_finite()) {
+        let place = (f / from).ln() / (to / from).ln() * CELLS as f64;
+        if (0.0..=CELLS as f64).contains(&place) {
+            let sum = &mut sums[(place as usize).min(CELLS - 1)];
+            *sum = (sum.0 + value, sum.1 + 1);
+        }
+    }
+    let last = sums.iter().rposition(|sum| sum.1 > 0).unwrap_or(0);
+    for i in 1..last {
+        if sums[i].1 == 0 {
+            sums[i] = sums[i - 1];
+        }
+    }
+    let mean = |(sum, count): &(f64, usize)| {
+        if *count == 0 { f64::NAN } else { 1e-3 * (1e3 * sum / *count as f64).round() }
+    };
+    sums.iter().map(|sum| number(mean(sum))).collect()
 }

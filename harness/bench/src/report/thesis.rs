@@ -147,7 +147,7 @@ const STATEMENTS: &[Statement] = &[
     Statement {
         section: "7.1.1",
         who: Who::Synthetic,
-        says: "So does the synthetic one, whose liquid is linear (the thesis suspects noise; it is dry friction).",
+        says: "The synthetic data's resonance, whose liquid is linear, starts higher at the smallest torques too (the thesis suspects noise; it is dry friction).",
         rule: "the same",
         shows: softening,
         why: "",
@@ -231,7 +231,7 @@ const STATEMENTS: &[Statement] = &[
     Statement {
         section: "7.1.2, fig. 7.7",
         who: Who::Bench,
-        says: "It is best at the smallest torque.",
+        says: "Fit in frequency is best at the smallest torque.",
         rule: "no other torque is better by more than 1.5 points",
         shows: |group| {
             let (low, best, _) = ends(group, fit_frequency)?;
@@ -242,7 +242,7 @@ const STATEMENTS: &[Statement] = &[
     Statement {
         section: "7.1.2, fig. 7.8",
         who: Who::Synthetic,
-        says: "Fit in frequency is lowest at the smallest torque, then stable.",
+        says: "Fit in frequency of the synthetic data is lowest at the smallest torque, then stable.",
         rule: "lowest at 0.0125 N·m; within 5 points from 0.1 N·m up",
         shows: |group| {
             let (low, _, high) = ends(group, fit_frequency)?;
@@ -267,7 +267,7 @@ const STATEMENTS: &[Statement] = &[
     Statement {
         section: "7.1.3, fig. 7.9",
         who: Who::Bench,
-        says: "It lies between 0.45 and 0.65 at middle and large torque.",
+        says: "The residual coherence lies between 0.45 and 0.65 at middle and large torque.",
         rule: "the mean from 0.15 N·m up lies there, to 0.05",
         shows: |group| {
             let plateau = mean(&from(group, 0.15, coherence)?);
@@ -278,7 +278,7 @@ const STATEMENTS: &[Statement] = &[
     Statement {
         section: "7.1.3, fig. 7.9",
         who: Who::Bench,
-        says: "It is low at the smallest torques and levels off above about 0.05 N·m.",
+        says: "The residual coherence is low at the smallest torques and levels off above about 0.05 N·m.",
         rule: "below 0.4 at 0.0125 N·m, and above 0.4 from 0.075 N·m up",
         shows: |group| {
             let low = coherence(at(group, LEAST)?)?;
@@ -290,7 +290,7 @@ const STATEMENTS: &[Statement] = &[
     Statement {
         section: "7.1.3, fig. 7.10",
         who: Who::Synthetic,
-        says: "The synthetic coherence starts high and falls to a plateau of 0.25 to 0.35.",
+        says: "The residual coherence of the synthetic data starts high and falls to a plateau of 0.25 to 0.35.",
         rule: "at 0.0125 N·m more than 0.2 above the mean from 0.125 N·m up, which lies there to 0.05; the level hangs on the segments' length, 20 s here and unknown there",
         shows: |group| {
             let low = coherence(at(group, LEAST)?)?;
@@ -334,7 +334,7 @@ const STATEMENTS: &[Statement] = &[
     Statement {
         section: "7.1.4, fig. 7.14",
         who: Who::Synthetic,
-        says: "The same of the synthetic data.",
+        says: "The synthetic data's signal-to-noise ratio is lowest at the smallest torque and soon better.",
         rule: "the same",
         shows: snr_grows,
         why: "",
@@ -354,7 +354,7 @@ const STATEMENTS: &[Statement] = &[
     Statement {
         section: "7.1.5, fig. 7.16",
         who: Who::Bench,
-        says: "It stands in the resonance band, with nothing but noise beside it.",
+        says: "The leakage stands in the resonance band, with nothing but noise beside it.",
         rule: "at 0.25 N·m more than 90 % of its square lies within 0.3 Hz of the linear resonance",
         shows: |group| {
             let run = at(group, MOST)?;
@@ -495,23 +495,23 @@ pub(super) fn statements(groups: &[Group]) -> String {
         };
         let _ = writeln!(
             rows,
-            "<tr><td>{}<span class=\"note\">{}</span></td><td>{}{}</td><td>{}</td><td>{}</td><td><span class=\"{}\">{}</span>{}</td></tr>",
-            statement.section,
-            if statement.who == Who::Bench { "bench" } else { "synthetic data" },
-            escape(statement.says),
-            note(&format!("Rule: {}.", statement.rule)),
-            cell(&linear),
-            cell(&spherical),
+            "<tr><td><span class=\"{}\">{}</span></td><td>{}<span class=\"note\">Thesis {}, {}.</span>{}{}</td><td>{}</td><td>{}</td></tr>",
             if *holds { "yes" } else { "no" },
             if *holds { "agrees" } else { "does not agree" },
+            escape(statement.says),
+            statement.section,
+            if statement.who == Who::Bench { "bench" } else { "synthetic data" },
+            note(&format!("Rule: {}.", statement.rule)),
             note(if *holds { "" } else { statement.why }),
+            cell(&linear),
+            cell(&spherical),
         );
     }
     if rows.is_empty() {
         return rows;
     }
     format!(
-        "<h2>Comparison with the thesis</h2>\n<p>What the thesis says of its bench and of its synthetic data, in our words, and what these runs do: {agreed} of {judged} statements agree. ✓ and ✗ say whether a model does what the statement says, at every fill. Statements on the bench are judged by the spherical model, those on the synthetic data by the linear one. The thesis prints its features as figures only; where it names a number, the rule has it. Off-axis rates (7.1.5, first half) are not here: the hub of the FMU does not tilt.</p>\n<div class=\"wide\"><table class=\"statements\"><thead><tr><th>thesis</th><th>what it says</th><th>linear model</th><th>spherical model</th><th>verdict</th></tr></thead><tbody>\n{rows}</tbody></table></div>\n"
+        "<p>{agreed} of {judged} statements of Rubaga's thesis agree with these runs. What the thesis says of its bench and of its synthetic data, in our words, and what these runs do. ✓ and ✗ say whether a model does what the statement says, at every fill. Statements on the bench are judged by the spherical model, those on the synthetic data by the linear one. The thesis prints its features as figures only; where it names a number, the rule has it. Off-axis rates (7.1.5, first half) are not here: the hub of the FMU does not tilt.</p>\n<div class=\"wide\"><table class=\"statements\"><thead><tr><th>verdict</th><th>what the thesis says</th><th>linear model</th><th>spherical model</th></tr></thead><tbody>\n{rows}</tbody></table></div>\n"
     )
 }
 
