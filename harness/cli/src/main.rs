@@ -1,8 +1,22 @@
 //! The command line `hubslosh`.
 
+/// `println!` of the standard library panics when its reader is gone (`hubslosh variables | head`);
+/// this one ends the program.
+macro_rules! println {
+    () => { crate::say("\n".into()) };
+    ($($arguments:tt)*) => { crate::say(format!("{}\n", format_args!($($arguments)*))) };
+}
+
+/// The same of `print!`.
+macro_rules! print {
+    ($($arguments:tt)*) => { crate::say(format!($($arguments)*)) };
+}
+
 mod commands;
 mod progress;
+mod set_file;
 
+use std::io::{ErrorKind, Write};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -16,18 +30,26 @@ use host::fmi2::Fmu;
 /// Packs FMUs, checks them, simulates campaigns and reports.
 ///
 /// Without a subcommand: packs dist/HubSlosh.fmu, simulates the 22 sine sweeps of Rubaga's thesis
-/// and leaves dist/campaign/report.html and features.csv.
+/// with a linear and a spherical liquid and leaves dist/campaign/report.html and features.csv.
 #[derive(Parser)]
-#[command(version)]
+#[command(version, after_help = EXIT_CODES)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
 }
 
+/// What the program's exit code says.
+const EXIT_CODES: &str = "Exit codes:\n  \
+    0  done, or the reader of its output has closed the pipe\n  \
+    1  it failed; stderr says what was wrong, where, and what is allowed (of check: something was \
+    found)\n  \
+    2  the command line was not understood";
+
 #[derive(Subcommand)]
 enum Command {
     Pack(pack::PackArgs),
     Run(run::RunArgs),
+    Variables(variables::VariablesArgs),
     Torque(torque::TorqueArgs),
     Campaign(campaign::CampaignArgs),
     Check(check::CheckArgs),
@@ -41,12 +63,16 @@ enum Command {
     Identify(identify::IdentifyArgs),
     Design(design::DesignArgs),
     Release(release::ReleaseArgs),
+    Completions(completions::CompletionsArgs),
+    Book(book::BookArgs),
 }
 
 fn main() -> ExitCode {
     let done = match Cli::parse().command {
         Some(Command::Pack(args)) => args.run(),
         Some(Command::Run(args)) => args.run(),
+        Some(Command::Variables(args)) => args.run(),
+        Some(Command::Completions(args)) => args.run(),
         Some(Command::Torque(args)) => args.run(),
         Some(Command::Campaign(args)) => args.run(),
         Some(Command::Check(args)) => args.run(),
@@ -58,6 +84,7 @@ fn main() -> ExitCode {
         Some(Command::Identify(args)) => args.run(),
         Some(Command::Design(args)) => args.run(),
         Some(Command::Release(args)) => args.run(),
+        Some(Command::Book(args)) => args.run(),
         None => everything(),
     };
     match done {
@@ -69,10 +96,31 @@ fn main() -> ExitCode {
     }
 }
 
+/// Prints a text to stdout.
+fn say(text: String) {
+    if let Err(error) = quiet_if_closed(std::io::stdout().write_all(text.as_bytes())) {
+        eprintln!("error: could not write to stdout: {error}");
+        std::process::exit(1);
+    }
+}
+
+/// Ends the program, as done, if what was written to has no reader any more.
+fn quiet_if_closed<T, E: Into<anyhow::Error>>(written: Result<T, E>) -> Result<T> {
+    written.map_err(|error| {
+        let error = error.into();
+        let io = error.downcast_ref::<std::io::Error>();
+        if io.is_some_and(|io| io.kind() == ErrorKind::BrokenPipe) {
+            std::process::exit(0);
+        }
+        error
+    })
+}
+
 /// What `cargo run --release` does.
 fn everything() -> Result<()> {
     pack::native(::pack::HUBSLOSH, Path::new(DEFAULT_FMU))?;
-    let campaign =
-        Campaign { plan: Plan::read("thesis")?, force: false, out: DEFAULT_CAMPAIGN.into() };
+    let plan = Plan::read("thesis")?;
+    let out = DEFAULT_CAMPAIGN.into();
+    let campaign = Campaign { plan, force: false, jobs: 0, compare: None, out };
     campaign::drive(&Fmu::open(DEFAULT_FMU)?, &campaign)
 }

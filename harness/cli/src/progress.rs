@@ -19,6 +19,24 @@ pub fn of_rules() -> Result<ProgressBar> {
     bar("{bar:40} {pos} of {len} rules of calls  {elapsed} elapsed, {eta} left")
 }
 
+/// A spinner for a search whose length nobody knows.
+pub fn of_search() -> Result<ProgressBar> {
+    let spinner = bar("{spinner} {elapsed}  {msg}")?;
+    spinner.enable_steady_tick(std::time::Duration::from_millis(200));
+    Ok(spinner)
+}
+
+/// A line that stays above a bar, and the bar's message.
+pub fn tell(bar: &ProgressBar, line: &str) {
+    // where no bar is drawn, indicatif would swallow the line
+    if bar.is_hidden() {
+        eprintln!("{line}");
+    } else {
+        bar.println(line);
+        bar.set_message(line.to_string());
+    }
+}
+
 /// Not drawn where stderr is no terminal.
 fn bar(template: &str) -> Result<ProgressBar> {
     Ok(ProgressBar::new(0).with_style(ProgressStyle::with_template(template)?))

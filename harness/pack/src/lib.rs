@@ -83,7 +83,8 @@ fn files(model: &Model, binaries: &[Packed]) -> Result<Files> {
     }
 
     let title = format!("{} {}", description.model_name, description.version);
-    let pages = documentation::render(&source.join("documentation"), &title)?;
+    let introduction = format!("modelDescription/{}/documentation/index.md", model.name);
+    let pages = documentation::fmu::render(&root(), &introduction, &title)?;
     files.push(("documentation/index.html".into(), pages.page.into_bytes()));
     for (name, figure) in pages.figures {
         files.push((format!("documentation/{name}"), figure));

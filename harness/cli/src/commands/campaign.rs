@@ -29,7 +29,7 @@ pub struct CampaignArgs {
     #[arg(long)]
     list: bool,
     /// Slosh models, by name.
-    #[arg(long, value_name = "NAME,…", value_delimiter = ',', default_value = "linear")]
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', default_values = plan::MODELS)]
     model: Vec<String>,
     /// Fills, m.
     #[arg(long, value_name = "M,…", value_delimiter = ',', default_values_t = plan::FILLS)]
@@ -49,14 +49,26 @@ pub struct CampaignArgs {
     /// Simulate again what is stored already.
     #[arg(long)]
     force: bool,
+    /// Runs at once [default: as many as the machine has cores].
+    #[arg(long, value_name = "NUMBER", default_value_t = 0, hide_default_value = true)]
+    jobs: usize,
     /// The FMU.
     #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
     fmu: PathBuf,
-    /// Directory for runs, tables and report.html [default: dist/campaign, or dist/ and the plan's
-    /// name].
+    /// Directory for runs, tables and report.html [default: dist/campaign, with flags that change
+    /// the campaign dist/campaign_ and these flags, with --plan dist/ and the plan's name].
     #[arg(long, value_name = "DIRECTORY")]
     out: Option<PathBuf>,
+    /// Directory of another campaign, with which the report compares this one run by run.
+    #[arg(long, value_name = "DIRECTORY")]
+    compare: Option<PathBuf>,
+    /// Replace the tables and the report of another plan in the default directory.
+    #[arg(long)]
+    replace: bool,
 }
+
+/// Length of a directory's name, beyond which it has a hash of the flags.
+const LONGEST: usize = 100;
 
 /// How the frequency of `campaign`'s sweep grows.
 #[derive(Clone, Copy, clap::ValueEnum)]
@@ -75,16 +87,61 @@ impl CampaignArgs {
                 let stem = Path::new(file).file_stem().unwrap_or_default();
                 (Plan::read(file)?, Path::new("dist").join(stem))
             }
-            None => (self.flags_as_plan()?, DEFAULT_CAMPAIGN.into()),
+            None => (self.flags_as_plan()?, self.directory()),
         };
+        let named = self.out.is_some();
         let out = self.out.clone().unwrap_or(out);
-        let campaign = Campaign { plan, force: self.force, out };
+        let compare = self.compare.clone();
+        let campaign = Campaign { plan, force: self.force, jobs: self.jobs, compare, out };
         let fmu = Fmu::open(&self.fmu)?;
         if self.list {
             println!("{:#}", campaign.list(&fmu)?);
             return Ok(());
         }
+        // the directory without flags belongs to the campaign without flags
+        let own = campaign.out == Path::new(DEFAULT_CAMPAIGN);
+        if campaign.holds_another() && !own && !self.replace {
+            let (out, file) = (campaign.out.display(), campaign.plan_file());
+            ensure!(
+                named,
+                "{out} holds the campaign of another plan ({}): --out DIRECTORY puts this one \
+                 elsewhere, --replace replaces tables and report (equal runs are reused)",
+                file.display()
+            );
+            eprintln!(
+                "{out} held the campaign of another plan; its tables and report are replaced"
+            );
+        }
         drive(&fmu, &campaign)
+    }
+
+    /// The directory for these flags: that of the default campaign, or one named by what differs.
+    fn directory(&self) -> PathBuf {
+        let numbers =
+            |values: &[f64]| values.iter().map(f64::to_string).collect::<Vec<_>>().join("-");
+        let mut parts = Vec::new();
+        if self.model != plan::MODELS {
+            parts.push(self.model.join("-"));
+        }
+        if self.fills != plan::FILLS {
+            parts.push(format!("fills_{}", numbers(&self.fills)));
+        }
+        if self.amplitudes != plan::AMPLITUDES {
+            parts.push(format!("amplitudes_{}", numbers(&self.amplitudes)));
+        }
+        if let Sweep::Linear = self.sweep {
+            parts.push("lin-sweep".into());
+        }
+        parts.extend(self.settings.iter().map(|(name, value)| format!("{name}_{value}")));
+        parts.extend(self.tolerance.map(|tolerance| format!("tolerance_{tolerance:e}")));
+        let name: String =
+            [DEFAULT_CAMPAIGN.into()].into_iter().chain(parts).collect::<Vec<_>>().join("_");
+        let plain = |c: char| if c.is_alphanumeric() || "/._-".contains(c) { c } else { '_' };
+        let name: String = name.chars().map(plain).collect();
+        if name.len() <= LONGEST {
+            return name.into();
+        }
+        format!("{DEFAULT_CAMPAIGN}_{}", &host::output::sha256(name.as_bytes())[..12]).into()
     }
 
     /// The plan that the flags without `--plan` stand for.
@@ -118,15 +175,22 @@ pub fn drive(fmu: &Fmu, campaign: &Campaign) -> Result<()> {
     let (all, reused) = results.counts();
     println!("{} runs simulated, {reused} reused", all - reused);
     let file = |name: &str| campaign.out.join(name);
+    let page = file("report.html");
+    report::write(&page, campaign, fmu, &results)?;
     if results.unanalysed.is_empty() {
-        let page = file("report.html");
-        report::write(&page, campaign, fmu, &results)?;
         println!("features: {}", file("features.csv").display());
-        println!("runs:     {}\nreport:   {}", file("runs.csv").display(), page.display());
-    } else {
+    }
+    println!("runs:     {}\nreport:   {}", file("runs.csv").display(), page.display());
+    let beyond: Vec<&str> = results
+        .outcomes
+        .iter()
+        .filter(|run| run.beyond_model().is_some())
+        .map(|run| run.case.name.as_str())
+        .collect();
+    if let Some(first) = beyond.first() {
         println!(
-            "runs:     {} (the FMU is not the bench: no analysis)",
-            file("runs.csv").display()
+            "{} of {all} runs left the range of their model, such as {first}; the report says how",
+            beyond.len()
         );
     }
     for failure in &results.failures {
@@ -149,6 +213,6 @@ fn help() -> String {
          Examples:\n  hubslosh campaign\n  \
          hubslosh campaign --plan thesis_models\n  \
          hubslosh campaign --plan mine.toml --out dist/mine\n  \
-         hubslosh campaign --fills 0.05,0.1 --amplitudes 0.1 --set friction.model=viscous --out dist/viscous"
+         hubslosh campaign --amplitudes 0.1 --set friction.model=viscous --jobs 1"
     )
 }

@@ -2,19 +2,20 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Result, ensure};
+use anyhow::{Result, bail, ensure};
 use host::fmi2::Fmu;
 use host::output::atomically;
 use identify::identification::{Identification, Options, identify};
-use identify::recording;
+use identify::{recording, report};
 use std::io::Write;
 
 use super::{DEFAULT_FMU, setting};
+use crate::progress;
 
 /// Finds the FMU's parameters from recordings of a bench, and how sure they are.
 ///
-/// Recordings have the columns time (s), tau_cmd (N.m) and omega (rad/s), and optionally theta (rad)
-/// of an encoder. Several are fitted together.
+/// Recordings have the columns time (s), tau_cmd (N.m) and omega (rad/s), and optionally theta (rad) of an
+/// encoder, g_axial (m/s2), wheel_speed, omega_x and omega_y (rad/s). Several are fitted together.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh identify sweep.parquet --out result.json\n  \
     hubslosh identify up.csv down.csv --validate noise.csv --model linear,planar,spherical \\\n      \
@@ -32,6 +33,18 @@ pub struct IdentifyArgs {
         value_parser = ["frozen", "linear", "planar", "spherical", "paraboloid"]
     )]
     model: Vec<String>,
+    /// Friction laws to try, the first with all slosh models, the others with the one that is chosen.
+    #[arg(
+        long,
+        value_name = "NAME,…",
+        value_delimiter = ',',
+        default_value = "stribeck",
+        value_parser = ["none", "viscous", "stribeck_smooth", "stribeck", "lugre"]
+    )]
+    friction: Vec<String>,
+    /// What is known of a parameter that is estimated: value and standard deviation.
+    #[arg(long, value_name = "NAME=VALUE:STD", value_parser = known)]
+    known: Vec<(String, f64, f64)>,
     /// Sets what is known of the bench by its FMU name; it is then not estimated.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
@@ -47,6 +60,9 @@ pub struct IdentifyArgs {
     /// The torque was held from row to row, instead of linear between them.
     #[arg(long)]
     hold: bool,
+    /// Uses the rows between two times alone.
+    #[arg(long, value_name = "S,S", value_delimiter = ',', allow_hyphen_values = true)]
+    trim: Vec<f64>,
     /// A recording that is simulated with the result, not fitted.
     #[arg(long, value_name = "DATA")]
     validate: Vec<PathBuf>,
@@ -56,6 +72,9 @@ pub struct IdentifyArgs {
     /// Where to put the result, .json.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+    /// Where to put a report, .html.
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
 }
 
 fn start(text: &str) -> Result<(String, f64)> {
@@ -63,6 +82,19 @@ fn start(text: &str) -> Result<(String, f64)> {
     let value: f64 = value.parse()?;
     ensure!(value.is_finite() && value > 0.0, "{name} must be a positive number");
     Ok((name, value))
+}
+
+fn known(text: &str) -> Result<(String, f64, f64)> {
+    let (name, value) = setting(text)?;
+    let parts = value.split_once(':').and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
+    let Some((mean, deviation)) = parts else {
+        bail!("{name} must be VALUE:STD, two numbers, not {value}")
+    };
+    ensure!(
+        f64::is_finite(mean) && mean > 0.0 && f64::is_finite(deviation) && deviation > 0.0,
+        "{name}: value and standard deviation must be positive numbers"
+    );
+    Ok((name, mean, deviation))
 }
 
 impl IdentifyArgs {
@@ -75,21 +107,32 @@ impl IdentifyArgs {
             "--gyro-scale must be from 0 to 1, not {}",
             self.gyro_scale
         );
+        let trim = match self.trim[..] {
+            [] => None,
+            [from, to] if from < to => Some((from, to)),
+            _ => bail!("--trim needs two times, the first less than the second, s"),
+        };
         let mut done = Vec::new();
         let mut read = |paths: &[PathBuf]| -> Result<Vec<_>> {
             let mut all = Vec::new();
             for path in paths {
-                all.extend(recording::read(path, &mut |line| {
+                all.extend(recording::read(path, trim, &mut |line| {
                     eprintln!("{line}");
                     done.push(line);
                 })?);
             }
             Ok(all)
         };
+        if let Some(path) = &self.report {
+            let html = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("html"));
+            ensure!(html, "{}: the name must end in .html", path.display());
+        }
         let recordings = read(&self.data)?;
         let validation = read(&self.validate)?;
         let options = Options {
             models: self.model,
+            friction: self.friction,
+            known: self.known,
             settings: self.settings,
             starts: self.starts,
             flaws: !self.perfect,
@@ -98,11 +141,20 @@ impl IdentifyArgs {
             validation,
         };
         let fmu = Fmu::open(&self.fmu)?;
-        let mut found = identify(&fmu, &recordings, &options, &mut |line| eprintln!("{line}"))?;
+        let spinner = progress::of_search()?;
+        let found =
+            identify(&fmu, &recordings, &options, &mut |line| progress::tell(&spinner, line));
+        spinner.finish_and_clear();
+        let mut found = found?;
         found.done.splice(0..0, done);
         let text = found.json()?;
         atomically(&self.out, |file| Ok(file.write_all(text.as_bytes())?))?;
         print(&found);
+        if let Some(path) = &self.report {
+            let page = report::page(&found);
+            atomically(path, |file| Ok(file.write_all(page.as_bytes())?))?;
+            println!("{}", path.display());
+        }
         println!("{}", self.out.display());
         Ok(())
     }

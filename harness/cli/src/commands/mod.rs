@@ -1,9 +1,15 @@
 //! The commands, one file each.
 
-use anyhow::{Context, Result};
+use std::collections::BTreeMap;
+use std::path::Path;
 
+use anyhow::{Context, Result};
+use bench::table::{self, Table};
+
+pub mod book;
 pub mod campaign;
 pub mod check;
+pub mod completions;
 pub mod design;
 pub mod example;
 pub mod gyro;
@@ -14,6 +20,7 @@ pub mod run;
 pub mod scale;
 pub mod tank;
 pub mod torque;
+pub mod variables;
 
 /// The FMU that commands drive unless another is named.
 pub const DEFAULT_FMU: &str = "dist/HubSlosh.fmu";
@@ -26,4 +33,19 @@ fn setting(text: &str) -> Result<(String, String)> {
         .split_once('=')
         .with_context(|| format!("\"{text}\" is not of the form name=value"))?;
     Ok((name.trim().into(), value.trim().into()))
+}
+
+/// Fails unless a table can be written to `out`: a name ending in .csv or .parquet, or `-`.
+fn check_out(out: &Path) -> Result<()> {
+    if out == Path::new("-") { Ok(()) } else { table::check_ending(out) }
+}
+
+/// Writes a table and says where; to `-` it prints CSV.
+fn write_out(table: &Table, out: &Path, metadata: &BTreeMap<String, String>) -> Result<()> {
+    if out == Path::new("-") {
+        return crate::quiet_if_closed(table.write_csv(std::io::stdout().lock()));
+    }
+    table.write(out, metadata)?;
+    println!("{} rows in {}", table.rows(), out.display());
+    Ok(())
 }

@@ -12,15 +12,15 @@ use crate::progress;
 /// Where the release goes.
 const DEFAULT_RELEASE: &str = "dist/release";
 
-/// Builds and checks the release for all platforms: the FMU, its hash, its software bill of
+/// Builds and checks the release for all platforms: each FMU, its hash, its software bill of
 /// materials (SBOM).
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  hubslosh release\n\n\
     On a Debian machine harness/platforms/setup gets what building for all platforms needs.")]
 pub struct ReleaseArgs {
-    /// Which FMU.
-    #[arg(long, value_name = "NAME", default_value = pack::HUBSLOSH.name, value_parser = pack::model)]
-    model: &'static Model,
+    /// Which FMU; without it, every one.
+    #[arg(long, value_name = "NAME", value_parser = pack::model)]
+    model: Option<&'static Model>,
     /// Directory for the release's files.
     #[arg(long, value_name = "DIRECTORY", default_value = DEFAULT_RELEASE)]
     out: PathBuf,
@@ -29,8 +29,11 @@ pub struct ReleaseArgs {
 impl ReleaseArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        for path in release::write(self.model, &self.out, checked)? {
-            println!("{} ({} bytes)", path.display(), path.metadata()?.len());
+        let models = self.model.map_or(&pack::MODELS[..], std::slice::from_ref);
+        for model in models {
+            for path in release::write(model, &self.out, checked)? {
+                println!("{} ({} bytes)", path.display(), path.metadata()?.len());
+            }
         }
         Ok(())
     }

@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use anyhow::{Result, bail};
-use bench::profile::{self, Torque, Written};
-use bench::run::{Run, driven};
-use bench::table;
-use host::description::{ModelDescription, Type};
+use bench::campaign::{Range, WAVE, stored_columns};
+use bench::profile::{self, Written};
+use bench::run::{Run, driven, histories};
+use host::description::ModelDescription;
 use host::fmi2::Fmu;
 
-use super::{DEFAULT_FMU, setting};
-use crate::progress;
+use super::{DEFAULT_FMU, check_out, setting, write_out};
+use crate::{progress, set_file};
 
 /// Simulates one run: a torque history in, signals out.
 #[derive(clap::Args)]
@@ -25,9 +25,16 @@ pub struct RunArgs {
         required_unless_present = "input"
     )]
     profile: Option<String>,
-    /// Torque history with the columns time (s) and tau_cmd (N.m), .csv or .parquet.
+    /// Histories of inputs, .csv or .parquet: time (s), and every column that is an input of the
+    /// FMU, such as tau_cmd, tau_ext, g_axial; tau_slope is tau_cmd's derivative until the next row.
     #[arg(long, value_name = "FILE")]
     input: Option<PathBuf>,
+    /// Pass over columns of --input that are no inputs, instead of refusing them.
+    #[arg(long, requires = "input")]
+    ignore_columns: bool,
+    /// Sets the parameters of a file, `"name" = value` as TOML or SSP's .ssv, before those of --set.
+    #[arg(long, value_name = "FILE")]
+    set_file: Option<PathBuf>,
     /// Sets a parameter or an input by its FMU name; enumerations by name or number.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
@@ -43,17 +50,18 @@ pub struct RunArgs {
     /// Hold the torque between rows and over each step, instead of joining by lines.
     #[arg(long)]
     hold: bool,
-    /// Input that the torque drives [default: tau_cmd, or the FMU's only Real input].
+    /// Input that the profile drives [default: tau_cmd, or the FMU's only Real input].
     #[arg(long, value_name = "NAME")]
     drive: Option<String>,
-    /// Variables to record beside time and the driven input [default:
-    /// omega,omega_imu,slosh_angle,slosh_angle_radial; all outputs of an FMU without these].
+    /// Variables to record beside time and the driven inputs [default:
+    /// omega,omega_imu,slosh_angle,slosh_angle_radial; of an FMU without these all outputs and slosh
+    /// angles].
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     columns: Vec<String>,
     /// The FMU.
     #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
     fmu: PathBuf,
-    /// Where to put the signals, .csv or .parquet.
+    /// Where to put the signals, .csv or .parquet; - prints them as CSV.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 }
@@ -61,28 +69,50 @@ pub struct RunArgs {
 impl RunArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        table::check_ending(&self.out)?;
+        check_out(&self.out)?;
         let fmu = Fmu::open(&self.fmu)?;
-        let torque = match (&self.profile, &self.input) {
-            (Some(profile), _) => profile.parse::<Written>()?.torque()?,
-            (None, Some(path)) => Torque::read(path, self.hold)?,
+        let description = fmu.description();
+        let drive = self.drive.as_deref();
+        let (input, torque, others) = match (&self.profile, &self.input) {
+            (Some(profile), _) => {
+                let torque = profile.parse::<Written>()?.torque()?;
+                (driven(description, drive)?, torque, Vec::new())
+            }
+            (None, Some(path)) => {
+                let all = histories(description, path, drive, self.hold, self.ignore_columns)?;
+                let mut all = all.into_iter();
+                let Some((input, history)) = all.next() else { bail!("nothing is driven") };
+                (Some(input), history, all.collect())
+            }
             (None, None) => bail!("a run needs --profile or --input"),
         };
+        let mut settings = match &self.set_file {
+            Some(path) => set_file::read(path)?,
+            None => Vec::new(),
+        };
+        settings.extend(self.settings);
         let run = Run {
-            settings: self.settings,
-            input: driven(fmu.description(), self.drive.as_deref())?,
+            settings,
+            input,
             stop: self.stop.unwrap_or(torque.span().1),
             torque,
+            others,
             step: self.step,
             tolerance: self.tolerance,
             hold: self.hold,
         };
         let mut instance = run.initialise(&fmu)?;
         let columns = match self.columns.is_empty() {
-            true => default_columns(fmu.description()),
+            // what is driven stands in the table anyway
+            true => default_columns(description),
             false => self.columns,
         };
         let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
+        let asked = columns.len();
+        // read along, to say at the end whether the model still meant something
+        let range = Range::of(description, &mut instance)?;
+        let extra = range.as_ref().map(|_| WAVE).filter(|wave| !columns.contains(wave));
+        let columns: Vec<&str> = columns.into_iter().chain(extra).collect();
         let bar = progress::of_steps()?;
         bar.set_length(run.steps() as u64);
         let table = run.drive(&mut instance, &columns, |steps| bar.inc(steps))?;
@@ -92,21 +122,25 @@ impl RunArgs {
             ("guid".into(), fmu.description().guid.clone()),
             ("version".into(), fmu.description().version.clone()),
         ]);
-        table.write(&self.out, &notes)?;
-        println!("{} rows in {}", table.rows(), self.out.display());
+        let beyond = range.and_then(|range| range.left(table.column(WAVE)?));
+        let driven = table.names().len() - columns.len();
+        let kept: Vec<&str> = table.names()[..driven + asked].iter().map(String::as_str).collect();
+        write_out(&table.only(&kept), &self.out, &notes)?;
+        if let Some(how) = beyond {
+            eprintln!("the run left the range of its model: {how}");
+        }
         Ok(())
     }
 }
 
-/// What people look at first: of the bench four signals, of another FMU all outputs that are
-/// numbers.
+/// What people look at first: of the bench four signals, of another FMU what a campaign stores: all
+/// outputs that are numbers, and the slosh angles.
 fn default_columns(description: &ModelDescription) -> Vec<String> {
     const BENCH: [&str; 4] = ["omega", "omega_imu", "slosh_angle", "slosh_angle_radial"];
     if BENCH.iter().all(|name| description.variable(name).is_ok()) {
         return BENCH.map(String::from).into();
     }
-    let outputs = description.variables.iter().filter(|v| v.causality == "output");
-    outputs.filter(|v| v.kind() != Type::String).map(|v| v.name.clone()).collect()
+    stored_columns(description, None).split_off(1) // without time
 }
 
 fn help() -> String {
@@ -115,7 +149,8 @@ fn help() -> String {
          Examples:\n  hubslosh run --profile exp-sweep:amplitude=0.1 --out sweep.parquet\n  \
          hubslosh run --profile sine:amplitude=0.05,frequency=2.344 --set friction.model=none \\\n      \
          --set tank.h=0.05 --step 0.005 --columns theta,omega,slosh_angle --out dwell.csv\n  \
-         hubslosh run --input torque.csv --out answer.csv",
+         hubslosh run --input torque.csv --out answer.csv\n  \
+         hubslosh run --profile zero --set init.slosh_angle=0.1 --out - | head",
         profile::help()
     )
 }

@@ -3,9 +3,10 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use host::output::atomically;
-use hubslosh_tank::{Tank, picture, sweep, table};
+use hubslosh_tank::parameters::{Liquid, ParameterSet, Target};
+use hubslosh_tank::{ModalData, Tank, picture, sweep, table};
 
 /// Modal parameters of a tank: from a drawing and a fill to slosh masses, pendulum lengths, hinge
 /// heights, the rigid liquid and the error of all of them.
@@ -16,7 +17,10 @@ use hubslosh_tank::{Tank, picture, sweep, table};
 #[command(after_help = "Examples:\n  \
     hubslosh tank harness/tank/examples/capsule.toml --fill 1.2\n  \
     hubslosh tank tank.toml --fill 1.2 --modes 3 --out result.json --picture tank.svg\n  \
-    hubslosh tank tank.toml --sweep 0.2,0.4,0.6,0.8 --out sweep.csv --picture sweep.svg\n\n\
+    hubslosh tank tank.toml --sweep 0.2,0.4,0.6,0.8 --out sweep.csv --picture sweep.svg\n  \
+    hubslosh tank tank.toml --fill 1.2 --modes 3 --nu 1e-6 --parameters tank-1.2.toml\n  \
+    hubslosh tank tank.toml --fill 1.2 --gravity 0.001 --sigma 0.013 --contact-angle 5 --parameters coast.toml\n  \
+    hubslosh run --set-file tank-1.2.toml --profile exp-sweep:amplitude=0.1 --out sweep.parquet\n\n\
     The format of TANK.toml is described in harness/tank/README.md.")]
 pub struct TankArgs {
     /// The tank: density, and contour or box.
@@ -40,6 +44,38 @@ pub struct TankArgs {
     /// Where to put a drawing of tank, free surface and mode shapes, SVG.
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
+    /// Where to put the parameters under the names of an FMU's variables, .toml (for `hubslosh run
+    /// --set-file` and Python) or .ssv (SSP 1.0).
+    #[arg(long, value_name = "FILE", conflicts_with = "sweep")]
+    parameters: Option<PathBuf>,
+    /// The FMU that --parameters are for.
+    #[arg(long, value_name = "MODEL", default_value = "HubSlosh", requires = "parameters")]
+    model: Model,
+    /// The tank of Spacecraft that --parameters are for, 1 to 4.
+    #[arg(long, value_name = "NUMBER", default_value_t = 1, requires = "parameters")]
+    tank_number: usize,
+    /// Kinematic viscosity of the liquid, m2/s, for the damping ratios of --parameters, at --gravity
+    /// [default: none, the ratios are 0].
+    #[arg(long, value_name = "NUMBER", requires = "parameters")]
+    nu: Option<f64>,
+    /// Surface tension, N/m, for the centring stiffness of --parameters [default: none].
+    #[arg(long, value_name = "NUMBER", requires = "parameters")]
+    sigma: Option<f64>,
+    /// Contact angle between surface and wall, degrees: the centring stiffness of an upright cylinder's first mode is
+    /// then that of the meniscus that --gravity and --sigma make. 90 is a flat surface.
+    #[arg(long, value_name = "DEGREES", default_value_t = 90.0, requires = "sigma")]
+    contact_angle: f64,
+}
+
+/// The FMUs that take a tank's parameters.
+#[derive(Clone, Copy, clap::ValueEnum)]
+enum Model {
+    #[value(name = "HubSlosh")]
+    HubSlosh,
+    #[value(name = "SloshTank")]
+    SloshTank,
+    #[value(name = "Spacecraft")]
+    Spacecraft,
 }
 
 impl TankArgs {
@@ -50,11 +86,22 @@ impl TankArgs {
             "--gravity {} (allowed: greater than 0, finite)",
             self.gravity
         );
+        for (flag, value) in [("--nu", self.nu), ("--sigma", self.sigma)] {
+            let allowed = value.is_none_or(|value| value.is_finite() && value >= 0.0);
+            ensure!(allowed, "{flag} {} (allowed: 0 or more, finite)", value.unwrap_or_default());
+        }
+        ensure!(
+            (0.0..=180.0).contains(&self.contact_angle),
+            "--contact-angle {} (allowed: 0 to 180)",
+            self.contact_angle
+        );
         let read = || self.tank.display().to_string();
         let tank = Tank::read(&self.tank).with_context(read)?;
+        let mut parameters = None;
         let (text, picture, as_table) = match self.fill {
             Some(fill) => {
                 let data = tank.solve(fill, self.modes).with_context(read)?;
+                parameters = self.set_file(&tank, &data)?;
                 let json = serde_json::to_string_pretty(&data)? + "\n";
                 let drawn = picture::tank(&tank, &data, self.gravity);
                 (json, drawn, table(&data, self.gravity))
@@ -72,10 +119,46 @@ impl TankArgs {
             }
             None => print!("{as_table}"),
         }
+        if let Some((path, text)) = &parameters {
+            atomically(path, |file| Ok(file.write_all(text.as_bytes())?))?;
+            println!("{}", path.display());
+        }
         if let Some(path) = &self.picture {
             atomically(path, |file| Ok(file.write_all(picture.as_bytes())?))?;
             println!("{}", path.display());
         }
         Ok(())
+    }
+
+    /// The file of --parameters and what stands in it.
+    fn set_file(&self, tank: &Tank, data: &ModalData) -> Result<Option<(PathBuf, String)>> {
+        let Some(path) = &self.parameters else { return Ok(None) };
+        ensure!(
+            self.gravity >= 1e-9,
+            "--gravity {:e}: for --parameters 1e-9 or more, which the FMUs take as g_ref",
+            self.gravity
+        );
+        let target = match self.model {
+            Model::HubSlosh => Target::HubSlosh,
+            Model::SloshTank => Target::SloshTank,
+            Model::Spacecraft => Target::Spacecraft { tank: self.tank_number },
+        };
+        let liquid = Liquid {
+            gravity: self.gravity,
+            nu: self.nu,
+            sigma: self.sigma,
+            contact_angle: self.contact_angle,
+        };
+        let set = ParameterSet::new(tank, data, target, liquid)
+            .with_context(|| self.tank.display().to_string())?;
+        for warning in &set.warnings {
+            eprintln!("warning: {warning}");
+        }
+        let text = match path.extension().and_then(|ending| ending.to_str()) {
+            Some("toml") => set.to_toml(),
+            Some("ssv") => set.to_ssv(),
+            _ => bail!("--parameters {}: the name must end in .toml or .ssv", path.display()),
+        };
+        Ok(Some((path.clone(), text)))
     }
 }

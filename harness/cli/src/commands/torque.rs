@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use anyhow::{Context, Result};
 use bench::profile::{self, Written};
 use bench::run::Run;
-use bench::table;
+
+use super::{check_out, write_out};
 
 /// Writes a profile's torque alone: time (s), tau_cmd (N.m), and tau_slope (N.m/s), which is the
 /// torque's derivative until the next row.
@@ -25,7 +26,7 @@ pub struct TorqueArgs {
     /// Time of the last row, s [default: the end of the profile].
     #[arg(long, value_name = "SECONDS")]
     stop: Option<f64>,
-    /// Where to put the torque, .csv or .parquet.
+    /// Where to put the torque, .csv or .parquet; - prints it as CSV.
     #[arg(long, value_name = "FILE", required_unless_present = "profiles")]
     out: Option<PathBuf>,
     /// Lists the profiles as a Markdown table and writes nothing.
@@ -41,22 +42,21 @@ impl TorqueArgs {
             return Ok(());
         }
         let (profile, out) = self.profile.zip(self.out).context("nothing to write")?;
-        table::check_ending(&out)?;
+        check_out(&out)?;
         let torque = profile.parse::<Written>()?.torque()?;
         let run = Run {
             settings: Vec::new(),
             input: None,
             stop: self.stop.unwrap_or(torque.span().1),
             torque,
+            others: Vec::new(),
             step: self.step,
             tolerance: None,
             hold: false,
         };
         run.check()?;
         let table = run.torque_table();
-        table.write(&out, &BTreeMap::from([("profile".into(), profile)]))?;
-        println!("{} rows in {}", table.rows(), out.display());
-        Ok(())
+        write_out(&table, &out, &BTreeMap::from([("profile".into(), profile)]))
     }
 }
 

@@ -1192,10 +1192,7 @@ fn the_command_tells_people_by_text_and_machines_by_exit_code_and_junit() {
 
 #[test]
 fn documentation_lists_the_rules() {
-    let page = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../modelDescription/HubSlosh/documentation/check.md"
-    );
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../book/check.md");
     let page = std::fs::read_to_string(page).unwrap();
     assert!(
         page.contains(&check::table()),

@@ -165,7 +165,13 @@ fn a_torque_file_without_the_columns_names_those_missing_and_those_there() {
     refuses(
         directory,
         || short_run(directory, &["--input", "in.csv"]),
-        &["in.csv", "no column tau_cmd", "columns in it: time, torque"],
+        &[
+            "in.csv",
+            "none of its columns is an input",
+            "torque is no input",
+            "the FMU's inputs: tau_cmd, tau_ext, g_axial",
+            "columns in the file: time, torque",
+        ],
     );
 }
 
@@ -238,7 +244,7 @@ fn an_fmu_whose_description_and_binary_do_not_belong_together_is_refused() {
 
 #[test]
 fn the_scaling_page_shows_what_its_commands_print() {
-    let page = pack::root().join("modelDescription/HubSlosh/documentation/scaling.md");
+    let page = pack::root().join("book/scaling.md");
     let page = std::fs::read_to_string(page).unwrap();
     let mut commands = 0;
     for block in page.split("\n\n") {
@@ -254,4 +260,117 @@ fn the_scaling_page_shows_what_its_commands_print() {
         commands += 1;
     }
     assert_eq!(commands, 4);
+}
+
+#[test]
+fn every_column_that_is_an_input_drives_and_others_are_refused_by_name() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let run = |text: &str, more: &[&str]| {
+        std::fs::write(directory.join("in.csv"), text).unwrap();
+        let columns = ["--input", "in.csv", "--columns", "theta,tau_actuator,wave_height"];
+        let set = ["--set", "friction.model=none", "--set", "slosh.model=frozen"];
+        short_run(directory, &[&columns[..], &set, more].concat())
+    };
+    let read = |names: &[&str]| Table::read(&directory.join("out.csv"), names).unwrap();
+    // tau_ext alone turns the hub as tau_cmd does: theta = tau t²/2 over the same inertia
+    let done = run("time,tau_ext,g_axial\n0,0.1,2\n0.2,0.1,4\n", &[]);
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let both = read(&["time", "tau_ext", "g_axial", "theta"]);
+    assert_eq!(both.column("g_axial").unwrap()[5], 3.0, "joined by lines");
+    assert!(run("time,tau_cmd\n0,0.1\n0.2,0.1\n", &[]).status.success());
+    let (ext, cmd) =
+        (both.column("theta").unwrap()[10], read(&["theta"]).column("theta").unwrap()[10]);
+    // one torque, two ways in: the same to rounding
+    assert!((ext / cmd - 1.0).abs() < 1e-12 && ext > 1e-3, "{ext} {cmd}");
+
+    // the slope makes an edge an edge: 0.1 N.m for 0.1 s, then none; joined by lines it would
+    // fall during a step
+    let edge = "time,tau_cmd,tau_slope\n0,0.1,0\n0.1,0,0\n0.2,0,0\n";
+    assert!(run(edge, &[]).status.success());
+    let table = read(&["theta", "tau_cmd"]);
+    assert_eq!(table.column("tau_cmd").unwrap()[4..6], [0.1, 0.0]);
+    let (theta, steady) = (table.column("theta").unwrap()[10], cmd);
+    // tau/I (t1²/2 + t1 t1) against tau/I (2 t1)²/2
+    assert!((theta / steady - 0.75).abs() < 1e-9, "{theta} {steady}");
+
+    refuses(
+        directory,
+        || run("time,tau_cmd,oil,omega\n0,0,0,0\n1,0,0,0\n", &[]),
+        &["oil, omega are no input", "--ignore-columns"],
+    );
+    let passed = run("time,tau_cmd,oil\n0,0,0\n1,0,0\n", &["--ignore-columns"]);
+    assert!(passed.status.success());
+    refuses(
+        directory,
+        || run("time,tau_cmd,g_axial\n0,0,9\n1,0,9\n", &["--set", "g_axial=3"]),
+        &["g_axial comes from the profile or the file"],
+    );
+}
+
+#[test]
+fn a_table_goes_to_stdout_and_a_closed_pipe_ends_the_program_quietly() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let fmu = packed_for_tests().to_str().unwrap();
+    let arguments = ["run", "--fmu", fmu, "--profile", "zero:duration=400", "--out", "-"];
+    let done = hubslosh(directory, &arguments);
+    let said = String::from_utf8_lossy(&done.stdout);
+    assert!(said.starts_with("time,tau_cmd,omega") && said.lines().count() == 20_002);
+    assert_eq!(files(directory), Vec::<String>::new());
+    for arguments in [&arguments[..], &["variables", "--fmu", fmu]] {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_hubslosh"))
+            .args(arguments)
+            .stdout(std::process::Stdio::piped())
+            .stderr(std::process::Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take()); // the reader goes
+        let done = child.wait_with_output().unwrap();
+        let error = String::from_utf8_lossy(&done.stderr);
+        assert!(done.status.success() && error.is_empty(), "{}: {error}", done.status);
+    }
+}
+
+#[test]
+fn variables_are_listed_with_what_one_needs_to_set_them() {
+    let fmu = packed_for_tests().to_str().unwrap();
+    let list = |arguments: &[&str]| {
+        let done = hubslosh(Path::new("."), &[&["variables", "--fmu", fmu], arguments].concat());
+        (done.status.success(), String::from_utf8_lossy(&done.stdout).into_owned())
+    };
+    let (_, all) = list(&["friction", "--causality", "parameter"]);
+    let line =
+        |name: &str| all.lines().find(|l| l.starts_with(name)).unwrap_or_default().to_string();
+    for word in ["parameter", "stribeck", "none|viscous|"] {
+        assert!(line("friction.model ").contains(word), "{word}: {all}");
+    }
+    for word in ["0.003498", "N.m", "0.0 to 1000000.0"] {
+        assert!(line("friction.c ").contains(word), "{word}: {all}");
+    }
+    let (_, inputs) = list(&["--causality", "input"]);
+    assert_eq!(inputs.lines().count(), 4, "a head and three inputs: {inputs}");
+    assert!(!list(&["no such thing"]).0);
+}
+
+#[test]
+fn shells_get_completions_with_every_command() {
+    for shell in ["bash", "zsh", "fish", "powershell"] {
+        let done = hubslosh(Path::new("."), &["completions", shell]);
+        let script = String::from_utf8_lossy(&done.stdout).into_owned();
+        for word in ["campaign", "variables", "ignore-columns"] {
+            assert!(done.status.success() && script.contains(word), "{shell}: {word}");
+        }
+    }
+}
+
+#[test]
+fn exit_codes_tell_a_failure_from_a_wrong_command_line() {
+    for (arguments, code) in [
+        (&["variables", "--fmu", "none.fmu"][..], 1),
+        (&["run", "--no-such-flag"], 2),
+        (&["--help"], 0),
+    ] {
+        assert_eq!(hubslosh(Path::new("."), arguments).status.code(), Some(code), "{arguments:?}");
+    }
 }

@@ -6,3 +6,4 @@ mod command_line;
 mod plans;
 mod report;
 mod tank;
+mod words;

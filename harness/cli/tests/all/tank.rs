@@ -43,3 +43,183 @@ fn a_bad_tank_is_refused_in_a_sentence_and_leaves_no_file() {
     assert!(!ok && error.contains("bad.toml") && !error.contains("panicked"), "{error}");
     assert!(!out.exists());
 }
+
+/// The cylinder of the bench from its drawing through a set file and an SSV, against its dimensions:
+/// the same motion. Masses and lengths agree to 1e-11; 1e-9 rad/s is some 1e-8 of the rates.
+#[test]
+fn a_tanks_parameters_drive_the_fmu_as_its_dimensions_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    let text = "density = 1000\nshape = { cylinder = { radius = 0.0815, height = 0.3 } }\n";
+    std::fs::write(path("tank.toml"), text).unwrap();
+    for file in ["set.toml", "set.ssv"] {
+        let (ok, _, error) = tank(&[
+            &path("tank.toml"),
+            "--fill=0.1",
+            "--modes=2",
+            "--nu=9.1312e-7",
+            "--gravity=9.81",
+            "--out",
+            &path("result.json"),
+            "--parameters",
+            &path(file),
+        ]);
+        assert!(ok, "{error}");
+    }
+    let run = |more: &[&str]| {
+        let out = path("out.csv");
+        let done = Command::new(env!("CARGO_BIN_EXE_hubslosh"))
+            .args(["run", "--fmu", pack::packed_for_tests().to_str().unwrap(), "--stop=5"])
+            .args(["--profile", "sine:amplitude=0.1,frequency=2.3", "--set", "slosh.model=planar"])
+            .args(["--columns", "omega,wave_height", "--out", &out])
+            .args(more)
+            .output()
+            .unwrap();
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        bench::table::Table::read(std::path::Path::new(&out), &["omega", "wave_height"]).unwrap()
+    };
+    let geometry = run(&["--set", "slosh.modes=2"]);
+    let toml = run(&["--set-file", &path("set.toml")]);
+    let ssv = run(&["--set-file", &path("set.ssv")]);
+    for column in ["omega", "wave_height"] {
+        let [a, b, c] = [&geometry, &toml, &ssv].map(|table| table.column(column).unwrap());
+        assert!(a.iter().any(|x| x.abs() > 1e-3), "it moves");
+        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-9), "{column}");
+        assert_eq!(b, c, "{column}: both files hold the same numbers");
+    }
+    // What --set says comes after the file.
+    let other = run(&["--set-file", &path("set.toml"), "--set", "slosh.table.m_liq=3"]);
+    assert_ne!(other.column("omega").unwrap(), toml.column("omega").unwrap());
+}
+
+/// m_0, H_0, I_0 and the modes of SloshTank and of a tank of Spacecraft are those of the result.
+#[test]
+fn parameters_of_the_six_axis_fmus_have_their_names() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    std::fs::write(path("tank.toml"), "density = 1000\nshape = { sphere = { radius = 0.3 } }\n")
+        .unwrap();
+    for (model, prefix) in [("SloshTank", "tank"), ("Spacecraft", "tank[2]")] {
+        let set = path("set.toml");
+        let (ok, _, error) = tank(&[
+            &path("tank.toml"),
+            "--fill=0.3",
+            "--out",
+            &path("result.json"),
+            "--parameters",
+            &set,
+            "--model",
+            model,
+            "--tank-number=2",
+            "--sigma=0.07",
+        ]);
+        assert!(ok, "{error}");
+        let set: toml::Table = std::fs::read_to_string(set).unwrap().parse().unwrap();
+        let text = std::fs::read_to_string(path("result.json")).unwrap();
+        let result: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let fmu = host::fmi2::Fmu::open(pack::packed_model_for_tests(pack::model(model).unwrap()))
+            .unwrap();
+        for name in set.keys() {
+            fmu.description().variable(name).unwrap();
+        }
+        for (name, pointer) in [
+            ("m_0", "/rest/2/m_0"),
+            ("H_0", "/rest/2/H_0"),
+            ("I_0", "/rest/2/I_0"),
+            ("mass[3]", "/modes/2/m"),
+            ("length[1]", "/modes/0/l"),
+            ("hinge[2]", "/modes/1/hinge"),
+        ] {
+            let found = set[&format!("{prefix}.{name}")].as_float().unwrap();
+            assert_eq!(found, result.pointer(pointer).unwrap().as_f64().unwrap(), "{name}");
+        }
+        assert_eq!(set[&format!("{prefix}.modes")].as_integer(), Some(3));
+    }
+}
+
+/// Omega_1^2 = 21.4397 at Bo = 10 and 30 degrees (the table's value), as the frequency that the FMU computes from the
+/// file; on the bench the same wetting liquid softens its surface, and what the FMU cannot take is told.
+#[test]
+fn a_curved_meniscus_reaches_the_fmu_and_what_it_cannot_take_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    let text = "density = 1000\nshape = { cylinder = { radius = 0.1, height = 3 } }\n";
+    std::fs::write(path("tank.toml"), text).unwrap();
+    let written = |gravity: &str, angle: &str| {
+        let (ok, _, said) = tank(&[
+            &path("tank.toml"),
+            "--fill=2",
+            "--modes=2",
+            "--sigma=0.072",
+            "--gravity",
+            gravity,
+            "--contact-angle",
+            angle,
+            "--out",
+            &path("result.json"),
+            "--parameters",
+            &path("set.toml"),
+        ]);
+        (ok, said)
+    };
+    let frequency = |gravity: &str| {
+        let out = path("out.csv");
+        let done = Command::new(env!("CARGO_BIN_EXE_hubslosh"))
+            .args(["run", "--fmu", pack::packed_for_tests().to_str().unwrap(), "--stop=0.1"])
+            .args(["--profile", "zero", "--columns", "slosh.frequency[1]", "--out", &out])
+            .args(["--set-file", &path("set.toml"), "--set", &format!("g_axial={gravity}")])
+            .output()
+            .unwrap();
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        let column = ["slosh.frequency[1]"];
+        let table = bench::table::Table::read(std::path::Path::new(&out), &column).unwrap();
+        table.column(column[0]).unwrap()[0]
+    };
+    let (ok, said) = written("0.072", "30");
+    assert!(ok && said.contains("warning: capillarity: under a curved meniscus"), "{said}");
+    // rho R^3/sigma = 1/0.072; 21.4397 is given to 2.4e-6.
+    let omega2 = (core::f64::consts::TAU * frequency("0.072")).powi(2);
+    assert!((omega2 / 0.072 - 21.4397).abs() < 6e-5, "{}", omega2 / 0.072);
+    let (ok, said) = written("9.81", "5");
+    assert!(ok && said.contains("none below 0; 0 is written"), "{said}");
+    assert!(frequency("9.81") > 2.0, "the FMU takes the file");
+    for (gravity, angle, words) in [
+        ("9.81", "200", "--contact-angle 200 (allowed: 0 to 180)"),
+        ("1e-10", "30", "1e-9 or more"),
+    ] {
+        std::fs::remove_file(path("set.toml")).unwrap_or_default();
+        let (ok, said) = written(gravity, angle);
+        assert!(!ok && said.contains(words) && !folder.path().join("set.toml").exists(), "{said}");
+    }
+}
+
+#[test]
+fn set_files_that_are_none_are_refused_in_a_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text, words) in [
+        ("set.txt", "a = 1", "must end in .toml or .ssv"),
+        ("set.toml", "a = [1]", "a is a array"),
+        ("set.toml", "", "sets nothing"),
+        ("set.toml", "\"tank.q\" = 1", "tank.q"),
+        ("set.ssv", "<a/>", "its root is a, not ParameterSet"),
+        (
+            "set.ssv",
+            "<ParameterSet><Parameters><Parameter name='x'/></Parameters></ParameterSet>",
+            "x has no value",
+        ),
+        ("set.ssv", "<ParameterSet>", "could not be read"),
+    ] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        let done = Command::new(env!("CARGO_BIN_EXE_hubslosh"))
+            .current_dir(folder.path())
+            .args(["run", "--fmu", pack::packed_for_tests().to_str().unwrap()])
+            .args(["--profile", "zero", "--out", "out.csv", "--set-file", path.to_str().unwrap()])
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&done.stderr);
+        assert!(!done.status.success() && said.trim().lines().count() == 1, "{said}");
+        assert!(said.contains(words) || words == "could not be read", "{words}: {said}");
+        assert!(!folder.path().join("out.csv").exists());
+    }
+}

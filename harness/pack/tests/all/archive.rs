@@ -48,18 +48,6 @@ fn every_link_and_figure_of_the_documentation_is_in_the_fmu() {
 }
 
 #[test]
-fn every_page_is_listed_in_the_introduction() {
-    let folder = HUBSLOSH.folder().join("documentation");
-    let introduction = std::fs::read_to_string(folder.join("index.md")).unwrap();
-    for file in folder.read_dir().unwrap().flatten() {
-        let name = file.file_name().to_string_lossy().into_owned();
-        if name.ends_with(".md") && name != "index.md" {
-            assert!(introduction.contains(&format!("]({name})")), "{name} is not listed");
-        }
-    }
-}
-
-#[test]
 fn every_licence_named_has_its_text() {
     let files = files();
     let note = text(&files, "documentation/licenses/license.txt");

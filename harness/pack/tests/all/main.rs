@@ -1,4 +1,5 @@
-//! The packed FMU and the release as files.
+//! The packed FMU, the documentation and the release as files.
 
 mod archive;
+mod documentation;
 mod release;

@@ -1,69 +1,84 @@
-//! The release that lies in dist/release is whole, and of this source as long as it bears this
+//! The FMUs released in dist/release are whole, and of this source as long as they bear this
 //! version.
 
 use std::path::PathBuf;
 
 use host::output::sha256;
-use pack::{HUBSLOSH, release};
+use pack::{MODELS, Model, release};
 
-/// The committed release of this version. There is none between a new version's number and its
+/// The committed FMUs of this version. There are none between a new version's number and its
 /// release; then an older one must be there.
-fn released() -> Option<PathBuf> {
+fn released() -> Vec<(&'static Model, PathBuf)> {
     let folder = pack::root().join("dist").join("release");
-    let fmu = release::path(HUBSLOSH, &folder);
-    if fmu.exists() {
-        return Some(fmu);
+    let fmus = MODELS.each_ref().map(|model| (model, release::path(model, &folder)));
+    let there = fmus.iter().filter(|(_, fmu)| fmu.exists()).count();
+    if there > 0 {
+        assert_eq!(
+            there,
+            MODELS.len(),
+            "some FMUs of this version are not in {}",
+            folder.display()
+        );
+        return fmus.into();
     }
     let older = folder.read_dir().unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
     let ends = |name: &str| name.ends_with(".fmu");
     assert!(older.flatten().any(|file| ends(&file.file_name().to_string_lossy())), "no release");
-    None
+    vec![]
 }
 
 #[test]
 fn release_of_this_version_has_this_interface() {
-    let Some(fmu) = released() else { return };
-    let source = HUBSLOSH.folder().join("modelDescription.xml");
-    let there = release::read(&fmu, "modelDescription.xml").unwrap();
-    assert!(
-        there == std::fs::read(source).unwrap(),
-        "{} has another modelDescription.xml than the source of the same version: raise the \
+    for (model, fmu) in released() {
+        let source = model.folder().join("modelDescription.xml");
+        let there = release::read(&fmu, "modelDescription.xml").unwrap();
+        assert!(
+            there == std::fs::read(source).unwrap(),
+            "{} has another modelDescription.xml than the source of the same version: raise the \
          version in Cargo.toml, or, if that release has gone to nobody yet, make it again by \
          `hubslosh release`",
-        fmu.display()
-    );
+            fmu.display()
+        );
+    }
 }
 
 #[test]
 fn hash_and_sbom_beside_the_release_are_its_own() {
-    let Some(fmu) = released() else { return };
-    let name = fmu.file_name().unwrap().to_string_lossy();
-    let written = std::fs::read_to_string(fmu.with_extension("fmu.sha256")).unwrap();
-    assert_eq!(written, format!("{}  {name}\n", sha256(&std::fs::read(&fmu).unwrap())));
-    let beside = std::fs::read(fmu.with_extension("cdx.json")).unwrap();
-    assert!(beside == release::read(&fmu, &HUBSLOSH.sbom()).unwrap());
-    let sbom: serde_json::Value = serde_json::from_slice(&beside).unwrap();
-    for file in sbom["metadata"]["component"]["components"].as_array().unwrap() {
-        let binary = release::read(&fmu, file["name"].as_str().unwrap()).unwrap();
-        assert_eq!(file["hashes"][0]["content"], sha256(&binary));
+    for (model, fmu) in released() {
+        let name = fmu.file_name().unwrap().to_string_lossy();
+        let written = std::fs::read_to_string(fmu.with_extension("fmu.sha256")).unwrap();
+        assert_eq!(written, format!("{}  {name}\n", sha256(&std::fs::read(&fmu).unwrap())));
+        let beside = std::fs::read(fmu.with_extension("cdx.json")).unwrap();
+        assert!(beside == release::read(&fmu, &model.sbom()).unwrap());
+        let sbom: serde_json::Value = serde_json::from_slice(&beside).unwrap();
+        for file in sbom["metadata"]["component"]["components"].as_array().unwrap() {
+            let binary = release::read(&fmu, file["name"].as_str().unwrap()).unwrap();
+            assert_eq!(file["hashes"][0]["content"], sha256(&binary));
+        }
     }
 }
 
 #[test]
 fn release_passed_the_check() {
-    let Some(fmu) = released() else { return };
-    let report = std::fs::read_to_string(fmu.with_extension("check.txt")).unwrap();
-    let sum = report.lines().last().unwrap();
-    let name = fmu.file_name().unwrap().to_string_lossy();
-    assert!(sum.starts_with(&format!("{name}: 0 errors, ")), "{report}");
+    for (_, fmu) in released() {
+        let report = std::fs::read_to_string(fmu.with_extension("check.txt")).unwrap();
+        let sum = report.lines().last().unwrap();
+        let name = fmu.file_name().unwrap().to_string_lossy();
+        assert!(sum.starts_with(&format!("{name}: 0 errors, ")), "{report}");
+    }
 }
 
 #[test]
 fn release_is_small_and_for_three_platforms() {
-    let Some(fmu) = released() else { return };
-    for binary in ["darwin64/HubSlosh.dylib", "linux64/HubSlosh.so", "win64/HubSlosh.dll"] {
-        assert!(!release::read(&fmu, &format!("binaries/{binary}")).unwrap().is_empty());
+    for (Model { name, .. }, fmu) in released() {
+        for binary in [
+            format!("darwin64/{name}.dylib"),
+            format!("linux64/{name}.so"),
+            format!("win64/{name}.dll"),
+        ] {
+            assert!(!release::read(&fmu, &format!("binaries/{binary}")).unwrap().is_empty());
+        }
+        let size = fmu.metadata().unwrap().len();
+        assert!(size < 2_000_000, "{}: {size} bytes", fmu.display()); // what people still send by mail
     }
-    let size = fmu.metadata().unwrap().len();
-    assert!(size < 2_000_000, "{size} bytes"); // what people still send by mail
 }

@@ -1,0 +1,111 @@
+//! `documentation/index.html` of an FMU: its introduction and the pages that its introduction lists,
+//! as one file with everything in it but the figures, which are beside it.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::Path;
+
+use anyhow::Result;
+use host::html::escape;
+
+use super::page::{Gathered, Layout, Page};
+
+/// What the FMU holds below `documentation/`.
+pub struct Documentation {
+    /// `index.html`.
+    pub page: String,
+    /// The figures it shows: name and content.
+    pub figures: BTreeMap<String, Vec<u8>>,
+}
+
+/// Renders an introduction and the pages in its lists under a title. Paths are from `root`.
+///
+/// # Errors
+/// With every link that leads nowhere, every missing figure and every equation that is not LaTeX.
+pub fn render(root: &Path, introduction: &str, title: &str) -> Result<Documentation> {
+    let first = Page::read(root, introduction)?;
+    let listed = first.listed();
+    let mut pages = vec![first];
+    for path in listed {
+        pages.push(Page::read(root, &path)?);
+    }
+    let mut all = Gathered::default();
+    let page = one_file(root, &pages, title, &mut all);
+    Ok(Documentation { page, figures: all.figures()? })
+}
+
+/// All pages as one file.
+pub(super) fn one_file(root: &Path, pages: &[Page], title: &str, all: &mut Gathered) -> String {
+    let layout = Layout::OneFile;
+    let (mut navigation, mut body) = (String::new(), String::new());
+    for page in pages {
+        contents(page, &mut navigation);
+        let html = page.html(root, pages, layout, all);
+        let _ = writeln!(body, "<section id=\"{}\">\n{html}</section>", layout.id(page, ""));
+    }
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
+         <meta name=\"viewport\" content=\"width=device-width\">\n<title>{title}</title>\n\
+         <style>\n{css}</style></head><body>\n<nav><p>{title}</p>\n<ul>\n{navigation}</ul></nav>\n\
+         <main>\n{body}</main></body></html>\n",
+        title = escape(title),
+        css = super::CSS,
+    )
+}
+
+/// A page's entries in the list of contents.
+fn contents(page: &Page, list: &mut String) {
+    let address = |slug| escape(&Layout::OneFile.address(page, slug));
+    let _ = write!(list, "<li><a href=\"{}\">{}</a><ul>", address(""), escape(&page.title));
+    for heading in page.headings.iter().filter(|heading| heading.level == 2) {
+        let (address, title) = (address(&heading.slug), escape(&heading.title));
+        let _ = write!(list, "<li><a href=\"{address}\">{title}</a></li>");
+    }
+    list.push_str("</ul></li>\n");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder(files: &[(&str, &str)]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, text) in files {
+            let path = folder.path().join(name);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, text).unwrap();
+        }
+        folder
+    }
+
+    #[test]
+    fn links_between_pages_become_links_within_the_page() {
+        let folder = folder(&[
+            ("m/index.md", "# All\n\nSee [b](b.md#two-words).\n\n* [c](../c.md)\n* [b](b.md)\n"),
+            ("m/b.md", "# B\n\n## Two `words`\n\n[up](#b) and [out](../README.md)\n"),
+            ("c.md", "# C\n\n<!-- no one reads this -->\n![x](m/x.svg)\n"),
+            ("m/x.svg", "<svg/>"),
+            ("README.md", "# Not listed\n"),
+        ]);
+        let made = render(folder.path(), "m/index.md", "T").unwrap();
+        assert!(made.page.contains("<a href=\"#m-b--two-words\">b</a>"), "{}", made.page);
+        assert!(made.page.contains("<h2 id=\"m-b--two-words\">"));
+        assert!(made.page.contains("<a href=\"#m-b--b\">up</a> and out<"));
+        assert!(!made.page.contains("no one reads this"));
+        assert!(made.page.find("id=\"c\"") < made.page.find("id=\"m-b\""), "the order of the list");
+        assert_eq!(made.figures["x.svg"], b"<svg/>");
+    }
+
+    #[test]
+    fn every_dead_link_and_missing_figure_is_named() {
+        let folder = folder(&[(
+            "index.md",
+            "# A\n\n[1](gone.md) [2](#nothing) ![3](none.svg) [4](index.md#a)\n",
+        )]);
+        let error = render(folder.path(), "index.md", "T").err().unwrap().to_string();
+        for word in ["gone.md", "#nothing", "none.svg"] {
+            assert!(error.contains(word), "{word}: {error}");
+        }
+        assert!(!error.contains("index.md#a"), "{error}");
+    }
+}

@@ -1,0 +1,378 @@
+//! One Markdown file: its headings, links, figures and equations.
+
+use std::collections::BTreeMap;
+use std::convert::Infallible;
+use std::path::Path;
+
+use anyhow::{Context, Result, bail};
+use pulldown_cmark::{CowStr, Event, Options, Parser, Tag, TagEnd, html};
+use pulldown_latex::config::{DisplayMode, RenderConfig};
+
+/// One Markdown file.
+#[derive(Debug)]
+pub struct Page {
+    /// Where it is, from the project's root, with `/`.
+    pub path: String,
+    /// Its name in addresses, such as `hubslosh-model` for
+    /// `modelDescription/HubSlosh/documentation/model.md`.
+    pub name: String,
+    /// The title: its first heading.
+    pub title: String,
+    /// All headings.
+    pub headings: Vec<Heading>,
+    text: String,
+}
+
+/// A heading.
+#[derive(Debug)]
+pub struct Heading {
+    /// 1 for the page's title.
+    pub level: usize,
+    /// Its text.
+    pub title: String,
+    /// What GitHub makes of it in an address.
+    pub slug: String,
+}
+
+/// How a link of an output is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Layout {
+    /// All pages in one file.
+    OneFile,
+    /// A file for each page.
+    Site,
+}
+
+impl Layout {
+    /// The `id` of a heading, or of the page itself if `slug` is empty.
+    pub fn id(self, page: &Page, slug: &str) -> String {
+        match (self, slug) {
+            (Layout::Site, slug) => slug.into(),
+            (Layout::OneFile, "") => page.name.clone(),
+            (Layout::OneFile, slug) => format!("{}--{slug}", page.name),
+        }
+    }
+
+    /// The address of a heading, or of the page itself if `slug` is empty.
+    pub fn address(self, page: &Page, slug: &str) -> String {
+        match (self, slug) {
+            (Layout::OneFile, slug) => format!("#{}", self.id(page, slug)),
+            (Layout::Site, "") => format!("{}.html", page.name),
+            (Layout::Site, slug) => format!("{}.html#{slug}", page.name),
+        }
+    }
+}
+
+/// What pages need and what is wrong with them, gathered while they are written.
+#[derive(Debug, Default)]
+pub struct Gathered {
+    /// File name and content of each figure.
+    pub figures: BTreeMap<String, Vec<u8>>,
+    /// Dead links, missing figures, equations that cannot be read.
+    pub faults: Vec<String>,
+}
+
+impl Gathered {
+    /// The figures.
+    ///
+    /// # Errors
+    /// If there are faults: all of them.
+    pub fn figures(mut self) -> Result<BTreeMap<String, Vec<u8>>> {
+        self.faults.sort();
+        self.faults.dedup(); // pages are rendered more than once
+        if !self.faults.is_empty() {
+            bail!("the documentation has faults: {}", self.faults.join("; "));
+        }
+        Ok(self.figures)
+    }
+}
+
+/// The words of one heading and what is below it, for a search.
+pub struct Section {
+    /// Empty before the first heading.
+    pub slug: String,
+    /// The heading.
+    pub title: String,
+    /// All words below it.
+    pub words: String,
+}
+
+impl Page {
+    /// Reads a file of the project.
+    pub fn read(root: &Path, path: &str) -> Result<Self> {
+        let text = std::fs::read_to_string(root.join(path))
+            .with_context(|| format!("the documentation's page {path} cannot be read"))?;
+        let mut page = Page {
+            path: path.into(),
+            name: name(path),
+            title: String::new(),
+            headings: headings(&text),
+            text,
+        };
+        page.title = page.headings.first().map_or_else(|| page.name.clone(), |h| h.title.clone());
+        Ok(page)
+    }
+
+    /// The paths of the pages in this one's lists, from the project's root, in their order.
+    pub fn listed(&self) -> Vec<String> {
+        let (mut items, mut paths) = (0, Vec::new());
+        for event in events(&self.text) {
+            match event {
+                Event::Start(Tag::Item) => items += 1,
+                Event::End(TagEnd::Item) => items -= 1,
+                Event::Start(Tag::Link { dest_url, .. })
+                    if items > 0 && dest_url.ends_with(".md") && !dest_url.contains("://") =>
+                {
+                    paths.push(resolve(&self.path, &dest_url));
+                }
+                _ => {}
+            }
+        }
+        paths
+    }
+
+    /// The page as HTML. A link to one of `pages` leads there; of another link that leads to a file of
+    /// the project only the text is left.
+    pub fn html(&self, root: &Path, pages: &[Page], layout: Layout, all: &mut Gathered) -> String {
+        let mut headings = self.headings.iter();
+        let mut dropped = false; // inside a link that leads out of the documentation
+        let events = events(&self.text).filter_map(|event| match event {
+            Event::Start(Tag::Heading { level, classes, attrs, .. }) => {
+                let id = headings.next().map(|h| CowStr::from(layout.id(self, &h.slug)));
+                Some(Event::Start(Tag::Heading { level, id, classes, attrs }))
+            }
+            Event::Start(Tag::Link { link_type, dest_url, title, id }) => {
+                match self.address(root, pages, layout, &dest_url) {
+                    Ok(Some(address)) => {
+                        let dest_url = address.into();
+                        return Some(Event::Start(Tag::Link { link_type, dest_url, title, id }));
+                    }
+                    Ok(None) => {}
+                    Err(fault) => all.faults.push(fault),
+                }
+                dropped = true;
+                None
+            }
+            Event::End(TagEnd::Link) if std::mem::take(&mut dropped) => None,
+            Event::Start(Tag::Image { link_type, dest_url, title, id }) => {
+                let path = resolve(&self.path, &dest_url);
+                let name = path.rsplit('/').next().unwrap_or_default().to_string();
+                match std::fs::read(root.join(&path)) {
+                    Ok(bytes) => {
+                        let other = all.figures.insert(name.clone(), bytes.clone());
+                        if other.is_some_and(|other| other != bytes) {
+                            all.faults.push(format!("two figures have the name {name}"));
+                        }
+                    }
+                    Err(e) => all.faults.push(format!("{}: figure {dest_url}: {e}", self.path)),
+                }
+                Some(Event::Start(Tag::Image { link_type, dest_url: name.into(), title, id }))
+            }
+            Event::Start(Tag::Table(_)) => Some(Event::Html("<div class=\"wide\"><table>".into())),
+            Event::End(TagEnd::Table) => Some(Event::Html("</tbody></table></div>\n".into())),
+            Event::InlineMath(latex) => Some(Event::InlineHtml(self.equation(&latex, false, all))),
+            Event::DisplayMath(latex) => Some(Event::InlineHtml(self.equation(&latex, true, all))),
+            // remarks for those who edit the page
+            Event::Html(text) if text.trim_start().starts_with("<!--") => None,
+            other => Some(other),
+        });
+        let mut page = String::new();
+        html::push_html(&mut page, events);
+        page
+    }
+
+    /// Where a link leads; `None` out of the documentation.
+    fn address(
+        &self,
+        root: &Path,
+        pages: &[Page],
+        layout: Layout,
+        link: &str,
+    ) -> Result<Option<String>, String> {
+        if link.contains("://") {
+            return Ok(None);
+        }
+        let dead = || format!("{}: the link {link} leads nowhere", self.path);
+        let (file, slug) = link.split_once('#').unwrap_or((link, ""));
+        let path = if file.is_empty() { self.path.clone() } else { resolve(&self.path, file) };
+        let Some(page) = pages.iter().find(|page| page.path == path) else {
+            return if root.join(&path).exists() { Ok(None) } else { Err(dead()) };
+        };
+        if !slug.is_empty() && !page.headings.iter().any(|heading| heading.slug == slug) {
+            return Err(dead());
+        }
+        Ok(Some(layout.address(page, slug)))
+    }
+
+    /// An equation as MathML.
+    fn equation<'a>(&self, latex: &str, block: bool, all: &mut Gathered) -> CowStr<'a> {
+        let storage = pulldown_latex::Storage::new();
+        let parsed: Result<Vec<_>, _> = pulldown_latex::Parser::new(latex, &storage).collect();
+        let events = match parsed {
+            Ok(events) => events,
+            Err(error) => {
+                all.faults.push(format!("{}: the equation {latex}: {error}", self.path));
+                return CowStr::from("");
+            }
+        };
+        let display_mode = if block { DisplayMode::Block } else { DisplayMode::Inline };
+        let config = RenderConfig { display_mode, ..RenderConfig::default() };
+        let mut mathml = String::new();
+        let events = events.into_iter().map(Ok::<_, Infallible>);
+        // writing to a String does not fail
+        let _ = pulldown_latex::push_mathml(&mut mathml, events, config);
+        // what pulldown-latex 0.8.0 gets wrong: a space counts as the base of a script
+        if ["<msup><mspace", "<msub><mspace", "&amp;nbsp;"]
+            .iter()
+            .any(|wrong| mathml.contains(wrong))
+        {
+            all.faults.push(format!(
+                "{}: the equation {latex}: write {{\\sin}}^2 for \\sin^2, \\; for a backslash and a space",
+                self.path
+            ));
+        }
+        if block {
+            mathml = format!("<span class=\"equation\">{mathml}</span>");
+        }
+        mathml.into()
+    }
+
+    /// The page's words by headings of the first and second level.
+    pub fn sections(&self) -> Vec<Section> {
+        let first = Section { slug: String::new(), title: String::new(), words: String::new() };
+        let mut all = vec![first];
+        let mut headings = self.headings.iter();
+        let mut level = 0;
+        for event in events(&self.text) {
+            let last = all.len() - 1;
+            match event {
+                Event::Start(Tag::Heading { .. }) => {
+                    let Some(heading) = headings.next() else { continue };
+                    level = heading.level;
+                    if level <= 2 {
+                        let (slug, title) = (heading.slug.clone(), heading.title.clone());
+                        all.push(Section { slug, title, words: String::new() });
+                    }
+                }
+                Event::End(TagEnd::Heading(_)) => level = 0,
+                Event::Text(text) | Event::Code(text) if level == 0 || level > 2 => {
+                    let words = &mut all[last].words;
+                    words.push_str(&text);
+                    words.push(' ');
+                }
+                _ => {}
+            }
+        }
+        all.retain(|section| !section.title.is_empty() || !section.words.trim().is_empty());
+        all
+    }
+}
+
+/// What the Markdown says.
+fn events(text: &str) -> impl Iterator<Item = Event<'_>> {
+    Parser::new_ext(text, Options::ENABLE_TABLES | Options::ENABLE_MATH)
+}
+
+/// The headings of a page.
+fn headings(text: &str) -> Vec<Heading> {
+    let mut all: Vec<Heading> = Vec::new();
+    let mut open = false;
+    for event in events(text) {
+        match event {
+            Event::Start(Tag::Heading { level, .. }) => {
+                open = true;
+                let (title, slug) = (String::new(), String::new());
+                all.push(Heading { level: level as usize, title, slug });
+            }
+            Event::End(TagEnd::Heading(_)) => open = false,
+            Event::Text(text) | Event::Code(text) if open => {
+                if let Some(heading) = all.last_mut() {
+                    heading.title.push_str(&text);
+                }
+            }
+            _ => {}
+        }
+    }
+    let mut seen = BTreeMap::<String, usize>::new();
+    for heading in &mut all {
+        let slug = slug(&heading.title);
+        let before = seen.entry(slug.clone()).or_default();
+        heading.slug = if *before == 0 { slug } else { format!("{slug}-{before}") };
+        *before += 1;
+    }
+    all
+}
+
+/// A heading as GitHub writes it into an address.
+fn slug(title: &str) -> String {
+    let kept = title.to_lowercase();
+    let kept = kept.chars().filter(|c| c.is_alphanumeric() || " -_".contains(*c));
+    kept.map(|c| if c == ' ' { '-' } else { c }).collect()
+}
+
+/// The name of a page: its path without what all pages have.
+fn name(path: &str) -> String {
+    let common = ["modelDescription", "documentation", "book", "README"];
+    let path = path.strip_suffix(".md").unwrap_or(path);
+    let kept: Vec<_> = path.split('/').filter(|part| !common.contains(part)).collect();
+    kept.join("-").to_lowercase()
+}
+
+/// The path of a link in a file, from the project's root.
+pub(super) fn resolve(from: &str, link: &str) -> String {
+    let mut parts: Vec<&str> = from.split('/').collect();
+    parts.pop();
+    for part in link.split('/') {
+        match part {
+            "." | "" => {}
+            ".." => _ = parts.pop(),
+            part => parts.push(part),
+        }
+    }
+    parts.join("/")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn links_are_resolved_from_the_page_that_has_them() {
+        assert_eq!(resolve("a/b/c.md", "d.md"), "a/b/d.md");
+        assert_eq!(resolve("a/b/c.md", "../../d.md"), "d.md");
+        assert_eq!(resolve("c.md", "./a/d.md"), "a/d.md");
+    }
+
+    #[test]
+    fn names_are_short_and_tell_the_fmus_apart() {
+        assert_eq!(name("modelDescription/HubSlosh/documentation/model.md"), "hubslosh-model");
+        assert_eq!(name("modelDescription/Spacecraft/documentation/model.md"), "spacecraft-model");
+        assert_eq!(name("book/campaigns.md"), "campaigns");
+        assert_eq!(name("harness/tank/README.md"), "harness-tank");
+        assert_eq!(name("ARCHITECTURE.md"), "architecture");
+    }
+
+    #[test]
+    fn equal_headings_have_addresses_of_their_own() {
+        let slugs: Vec<_> =
+            headings("# A b\n\n## C\n\n## C\n").into_iter().map(|h| h.slug).collect();
+        assert_eq!(slugs, ["a-b", "c", "c-1"]);
+    }
+
+    #[test]
+    fn equations_become_mathml_and_a_broken_one_is_reported() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(
+            folder.path().join("a.md"),
+            "$\\xi_1$ and\n\n$$\\frac{1}{2}$$\n\n$\\nosuch$\n",
+        )
+        .unwrap();
+        let page = Page::read(folder.path(), "a.md").unwrap();
+        let mut all = Gathered::default();
+        let html = page.html(folder.path(), &[], Layout::Site, &mut all);
+        assert!(html.contains("<msub><mi>ξ</mi><mn>1</mn></msub>"), "{html}");
+        assert!(html.contains("display=\"block\"") && html.contains("<mfrac>"), "{html}");
+        assert_eq!(all.faults.len(), 1);
+        assert!(all.faults[0].contains("a.md: the equation \\nosuch"), "{:?}", all.faults);
+    }
+}
