@@ -13,7 +13,6 @@ freedom goes to zero as 1/M, and the page shows it.
 """
 
 import argparse
-import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -32,15 +31,10 @@ try:
 
     from hubslosh import FmuError, Plant
 except ModuleNotFoundError as missing:
-    here = environment.target() / "python" / "basilisk"
-    if Path(sys.prefix) == here:
-        sys.exit(f"error: {here} is damaged ({missing}); delete it and try again")
-    requirements = Path(__file__).with_name("requirements-basilisk.txt")
-    python = environment.ensure(here, requirements)
-    sys.exit(subprocess.run([python, *sys.argv]).returncode)
+    environment.run_again_in("basilisk", missing)
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "modelDescription" / "documentation" / "basilisk.md"
+PAGE = ROOT / "book" / "basilisk.md"
 
 DURATION = 20.0  # s
 EVERY = 0.02  # s, between samples
@@ -309,7 +303,7 @@ def integrators_table(fmu: Path) -> list[str]:
             rows.append((f"Basilisk's {integrator}", str(step), differences(got, own), seconds))
     unit = rows[1][-1]
     lines = [
-        "| integrator | step, ms | largest difference | processor time, ours at 1e-8 = 1 |",
+        "| integrator | step, ms | largest difference | CPU time, ours at 1e-8 = 1 |",
         "| --- | --- | --- | --- |",
     ]
     for name, step, found, seconds in rows:
@@ -392,7 +386,7 @@ def page(
         "## What each integrator leaves",
         "",
         f"*release far*, 10 cm, zeta 0.003, M = {MASS:.0e} kg, against ours at {TOLERANCE:.0e}.",
-        "Processor time of the whole run, Python's part every 20 ms included on both sides: an",
+        "CPU time of the whole run, Python's part every 20 ms included on both sides: an",
         "order of magnitude, not a benchmark. Basilisk's hub has five degrees of freedom more.",
         "",
         *integrators,

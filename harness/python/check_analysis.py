@@ -1,6 +1,6 @@
 """Computes the figures of a campaign of sweeps again, from its stored runs, with numpy and scipy.
 
-It is written from the definitions in modelDescription/HubSlosh/documentation/campaigns.md, not
+It is written from the definitions in book/campaigns.md, not
 from the harness's code, and shares no part of it: another Fourier transform, another least-squares
 solver, another discretisation. Where the two differ by more than the tolerances below, one of them
 does not do what the documentation says.
@@ -79,6 +79,23 @@ class Sweep:
             return np.log(f / self.f0) / np.log(self.f1 / self.f0) * self.duration
         return (f - self.f0) / (self.f1 - self.f0) * self.duration
 
+    def rate(self, f: float) -> float:
+        """How fast the frequency changes at ``f``, Hz/s."""
+        if self.exponential:
+            return abs(f * np.log(self.f1 / self.f0) / self.duration)
+        return self.mean_rate
+
+    @property
+    def mean_rate(self) -> float:
+        """How fast the frequency changes on average, Hz/s."""
+        return abs(self.f1 - self.f0) / self.duration
+
+    @property
+    def lag(self) -> float:
+        """Longest lag of ``spa``, s: 200 for the thesis's band, at most half of the record."""
+        slower = np.sqrt(1.25 * 3.5 / (self.f0 * self.f1))
+        return min(200 * slower, self.duration / 2)
+
     @property
     def band(self) -> tuple[float, float]:
         """Its lowest and its highest frequency, Hz."""
@@ -86,20 +103,21 @@ class Sweep:
 
 
 def demodulate(sweep: Sweep, time: Real, torque: Real, output: Real, grid: Real) -> Complex:
-    """Fourier coefficients at the sweep's phase, in a Hann window of 24 cycles."""
+    """Fourier coefficients at the sweep's phase, in a Hann window of 24 cycles or fewer."""
     carrier = np.exp(-1j * sweep.phase(time))
     response = np.empty(len(grid), complex)
     for i, (f, centre) in enumerate(zip(grid, sweep.time_of(grid), strict=True)):
-        near = np.abs(time - centre) <= 12 / f
-        window = np.cos(np.pi / 24 * f * (time[near] - centre)) ** 2 * carrier[near]
+        cycles = np.clip(0.015 * f**2 / sweep.rate(f), 3, 24)
+        near = np.abs(time - centre) <= cycles / 2 / f
+        window = np.cos(np.pi / cycles * f * (time[near] - centre)) ** 2 * carrier[near]
         response[i] = window @ output[near] / (window @ torque[near])
     return response
 
 
-def spa(step: float, torque: Real, output: Real, grid: Real) -> Complex:
-    """Blackman and Tukey's estimate, lags up to 200 s, transformed at the very frequencies."""
+def spa(step: float, torque: Real, output: Real, grid: Real, lag: float) -> Complex:
+    """Blackman and Tukey's estimate, lags up to ``lag`` s, transformed at the very frequencies."""
     u, y = torque - torque.mean(), output - output.mean()
-    last = min(round(200 / step), len(u) - 1)
+    last = min(round(lag / step), len(u) - 1)
     lags = np.arange(-last, last + 1)
     taper = (1 + np.cos(np.pi * lags / last)) / 2
     middle = len(u) - 1
@@ -235,7 +253,7 @@ def analyse(path: Path) -> tuple[Figures, Figures]:
     longest = 2 * len(time) // 9
     figures: Figures = {}
 
-    whole = spa(step, torque, rate, grid)
+    whole = spa(step, torque, rate, grid, sweep.lag)
     spa_features = features(grid, whole)
     model = fit(grid, whole)
     miss = np.linalg.norm(whole - model.response(grid))
@@ -247,7 +265,8 @@ def analyse(path: Path) -> tuple[Figures, Figures]:
     figures["kurtosis"] = float(stats.kurtosis(residual, fisher=False))
     dip, peak = spa_features.get("f_dip_hz"), spa_features.get("f_res_hz")
     if dip and peak:
-        f, gamma = coherence(step, torque, residual, min(round(20 / step), longest))
+        segment = np.sqrt(1 / (3 * sweep.mean_rate))
+        f, gamma = coherence(step, torque, residual, min(round(segment / step), longest))
         figures["coherence"] = float(gamma[(f >= dip) & (f <= peak)].mean())
         f, gamma = coherence(step, torque, rate, longest)
         snr = 10 * np.log10(gamma / (1 - gamma))

@@ -46,11 +46,7 @@ try:
 
     import hubslosh
 except ModuleNotFoundError as missing:
-    here = environment.target() / "python" / "cluster"
-    if Path(sys.prefix) == here:
-        sys.exit(f"error: {here} is damaged ({missing}); delete it and try again")
-    requirements = Path(__file__).with_name("requirements-cluster.txt")
-    sys.exit(subprocess.run([environment.ensure(here, requirements), *sys.argv]).returncode)
+    environment.run_again_in("cluster", missing)
 
 # workers have no file of ours but those that `prepare` sends: what they call travels with the call
 cloudpickle.register_pickle_by_value(sys.modules[__name__])

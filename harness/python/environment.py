@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NoReturn
 
 OLDEST = (3, 11)
 """Oldest Python that the scripts here run on."""
@@ -31,6 +32,19 @@ def ensure(directory: Path, requirements: Path) -> Path:
     """
     with _alone(directory.with_name(directory.name + ".lock")):
         return _ensure(directory, requirements)
+
+
+def run_again_in(name: str, missing: ModuleNotFoundError) -> NoReturn:
+    """Run the script that is running again, in the environment of ``requirements-<name>.txt``.
+
+    ``missing`` is what it could not import; where it is in that environment already, the
+    environment is damaged, and the script ends with that.
+    """
+    here = target() / "python" / name
+    if Path(sys.prefix) == here:
+        sys.exit(f"error: {here} is damaged ({missing}); delete it and try again")
+    python = ensure(here, Path(__file__).with_name(f"requirements-{name}.txt"))
+    sys.exit(subprocess.run([python, *sys.argv]).returncode)
 
 
 def _ensure(directory: Path, requirements: Path) -> Path:

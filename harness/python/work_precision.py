@@ -30,17 +30,13 @@ try:
     import numpy as np
     from scipy.integrate import solve_ivp
 except ModuleNotFoundError as missing:
-    here = environment.target() / "python" / "work-precision"
-    if Path(sys.prefix) == here:
-        sys.exit(f"error: {here} is damaged ({missing}); delete it and try again")
-    requirements = Path(__file__).with_name("requirements-work-precision.txt")
-    sys.exit(subprocess.run([environment.ensure(here, requirements), *sys.argv]).returncode)
+    environment.run_again_in("work-precision", missing)
 
 matplotlib.use("svg")
 import matplotlib.pyplot as plt  # the backend is chosen first
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = ROOT / "modelDescription" / "documentation"
+PAGES = ROOT / "book"
 SWEEP = 2700.0  # s
 STEP = 0.02  # s
 COUNTED = (10.0, 30.0)  # s of sweep between which instructions are counted
@@ -261,7 +257,7 @@ def main() -> None:
         "Basilisk has no dry friction, so it cannot run this sweep. Quoted from "
         "[its own comparison](basilisk.md) (20 s of release, no friction, ours spherical):",
         "",
-        "| Basilisk's RK4, step in ms | largest difference | processor time, ours at 1e-8 = 1 |",
+        "| Basilisk's RK4, step in ms | largest difference | CPU time, ours at 1e-8 = 1 |",
         "| --- | --- | --- |",
         *(f"| {step} | {error:.1e} | {cost:.1f} |" for step, cost, error in basilisk()),
         "",

@@ -5,9 +5,10 @@
     start = {"tank.h": (50, "mm"), "init.slosh_angle": (10, "deg")}
     run = hubslosh.simulate(parameters=start, stop=60)
 
-`simulate` returns a table of time histories, `linearize` a state-space model, `frequency_response`
-an estimate from a history; `campaign` and `identify` call the program ``hubslosh``. `plot` draws.
-`Plant` and `drive` are for those who step an instance themselves.
+`simulate` returns a table of time histories, `closed_loop` one under a sampled controller,
+`linearize` a state-space model, `frequency_response` an estimate from a history; `campaign` and
+`identify` call the program ``hubslosh``. `plot` draws. `Plant` and `drive` are for those who step
+an instance themselves.
 """
 
 from importlib.metadata import PackageNotFoundError, version
@@ -15,11 +16,12 @@ from importlib.metadata import PackageNotFoundError, version
 from . import batch, plot
 from .fmu import Fmu, FmuError, Quantity, Value
 from .linearization import LinearModel, linearize
+from .loop import Law, closed_loop
 from .plant import COLUMNS, TORQUE, Plant, RunError, drive
-from .program import campaign, identify
+from .program import Estimated, Identification, campaign, identify
 from .simulation import simulate
 from .spectrum import frequency_response
-from .tables import read_table, setting, write_table
+from .tables import read_parameters, read_table, setting, write_table
 
 try:
     __version__ = version("hubslosh")
@@ -29,8 +31,11 @@ except PackageNotFoundError:
 __all__ = [
     "COLUMNS",
     "TORQUE",
+    "Estimated",
     "Fmu",
     "FmuError",
+    "Identification",
+    "Law",
     "LinearModel",
     "Plant",
     "Quantity",
@@ -38,11 +43,13 @@ __all__ = [
     "Value",
     "batch",
     "campaign",
+    "closed_loop",
     "drive",
     "frequency_response",
     "identify",
     "linearize",
     "plot",
+    "read_parameters",
     "read_table",
     "setting",
     "simulate",

@@ -20,7 +20,8 @@ Matrix = NDArray[np.float64]
 class LinearModel:
     """x' = A x + B u, y = C x + D u: deviations from the point of linearisation, SI units.
 
-    ``A, B, C, D = model`` works as well.
+    With a ``period``, x_{k+1} = A x_k + B u_k instead: see `sampled`. ``A, B, C, D = model`` works
+    as well.
     """
 
     A: Matrix
@@ -33,6 +34,8 @@ class LinearModel:
     """Names of u."""
     outputs: tuple[str, ...]
     """Names of y."""
+    period: float | None = None
+    """Sampling period, s; None: continuous time."""
 
     def __iter__(self) -> Iterator[Matrix]:
         """Yield A, B, C, D."""
@@ -40,16 +43,45 @@ class LinearModel:
 
     @property
     def poles(self) -> NDArray[np.complex128]:
-        """Eigenvalues of A, rad/s, slowest first."""
+        """Eigenvalues of A by magnitude: rad/s in continuous time, otherwise in the z plane."""
         poles = np.linalg.eigvals(self.A).astype(complex)
         return poles[np.argsort(np.abs(poles))]
 
     def response(self, frequency: ArrayLike) -> NDArray[np.complex128]:
-        """Return C (jωI − A)⁻¹ B + D at frequencies in Hz: frequencies × outputs × inputs."""
+        """Return C (sI − A)⁻¹ B + D at frequencies in Hz: frequencies × outputs × inputs.
+
+        s = jω, or z = exp(jωT) in its place if the model is sampled.
+        """
         s: NDArray[np.complex128] = 2j * np.pi * np.atleast_1d(np.asarray(frequency, float))
+        if self.period is not None:
+            s = np.exp(s * self.period)
         system = s[:, None, None] * np.eye(len(self.A)) - self.A
         states = np.linalg.solve(system, np.broadcast_to(self.B, (len(s), *self.B.shape)))
         return np.asarray(self.C @ states + self.D, np.complex128)
+
+    def sampled(self, period: float, latency: int = 0) -> "LinearModel":
+        """Return the model as a controller sees it that works in cycles of ``period`` seconds.
+
+        The inputs are held for a cycle, ``latency`` cycles after the controller gave them; those on
+        the way are further states. The result is exact at the sampling instants.
+        """
+        from scipy.signal import cont2discrete
+
+        if self.period is not None:
+            raise FmuError("the model is sampled already")
+        if not (np.isfinite(period) and period > 0):
+            raise FmuError(f"period must be a positive number of seconds, not {period}")
+        if latency < 0 or latency != int(latency):
+            raise FmuError(f"latency must be a whole number of cycles, not {latency}")
+        A, B, C, D, _ = cont2discrete((*self,), period, "zoh")
+        states = list(self.states)
+        for cycle in range(latency):  # the oldest command first: it reaches the plant next
+            n, m = B.shape
+            A = np.block([[A, B], [np.zeros((m, n + m))]])
+            B = np.vstack([np.zeros((n, m)), np.eye(m)])
+            C, D = np.hstack([C, D]), np.zeros_like(D)
+            states += [f"{name}[-{latency - cycle}]" for name in self.inputs]
+        return LinearModel(A, B, C, D, tuple(states), self.inputs, self.outputs, period)
 
     def to_control(self) -> Any:
         """Return it as ``control.StateSpace``, with names; needs the package control."""
@@ -58,7 +90,11 @@ class LinearModel:
         except ModuleNotFoundError:
             raise FmuError("to_control needs the package control: pip install control") from None
         return control.StateSpace(
-            *self, states=list(self.states), inputs=list(self.inputs), outputs=list(self.outputs)
+            *self,
+            0 if self.period is None else self.period,
+            states=list(self.states),
+            inputs=list(self.inputs),
+            outputs=list(self.outputs),
         )
 
 

@@ -206,13 +206,18 @@ class Plant(Instance):
         torque: at the beginning of the step, N·m; None: as it is. slope: its derivative during
         the step, N·m/s; None: the torque is held.
         """
-        reference = [self.fmu.variable(TORQUE).valueReference]
         if torque is not None:
-            self._call("setReal", reference, [torque])
+            self.set(TORQUE, torque)
         if slope is not None:
-            self._call("setRealInputDerivatives", reference, [1], [slope])
+            self.set_slope(TORQUE, slope)
         self._call("doStep", self.time, end - self.time)
         self.time = end
+
+    def set_slope(self, name: str, slope: float) -> None:
+        """Set the derivative of a Real input for the next step, per s."""
+        self._call(
+            "setRealInputDerivatives", [self.fmu.variable(name).valueReference], [1], [slope]
+        )
 
     def run(
         self,

@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -85,19 +86,56 @@ def campaign(
     return table
 
 
+@dataclass(frozen=True)
+class Estimated:
+    """An estimated number, in SI units."""
+
+    value: float
+    std: float
+    """Standard deviation, everything in it."""
+    std_noise: float
+    """Standard deviation from the noise alone."""
+    interval: tuple[float, float]
+    """95 % interval."""
+    unit: str
+
+
+@dataclass(frozen=True)
+class Identification:
+    """What ``hubslosh identify`` finds; `all` is its result.json as it is."""
+
+    parameters: dict[str, Estimated]
+    """Of the FMU, by name."""
+    measurement: dict[str, Estimated]
+    """Delay, gyro scale and bias."""
+    model: str
+    """The chosen slosh model."""
+    settings: dict[str, str]
+    """Settings of the FMU that belong to the parameters."""
+    converged: bool
+    """The search ended at a minimum."""
+    described: bool
+    """The residual is the gyro's noise; if not, no interval is to be trusted."""
+    verdict: tuple[str, ...]
+    """The answer in words."""
+    all: dict[str, Any]
+
+
 def identify(
     data: pd.DataFrame | str | Path,
     model: str | None = None,
     *arguments: str,
+    fmu: str | Path = "HubSlosh",
     program: str | Path | None = None,
-) -> dict[str, Any]:
+) -> Identification:
     """Estimate the FMU's parameters from a measurement, with the program ``hubslosh identify``.
 
     data: a table, or a .csv or .parquet file, with the columns ``time`` (s), ``tau_cmd`` (N·m) and
-    ``omega`` (rad/s). model: the slosh model. arguments: further flags of the command.
+    ``omega`` (rad/s). model: the slosh model. arguments: further flags of the command. fmu: the
+    name of an FMU of this package, or the file of a HubSlosh.
 
-    Returns its result: ``parameters`` by FMU name, each with ``value``, ``std``, ``unit``;
-    ``fit``; ``converged``.
+    The parameters with ``settings`` simulate the bench:
+    ``{n: e.value for n, e in found.parameters.items()} | found.settings``.
     """
     path = find_program(program)
     with tempfile.TemporaryDirectory() as folder:
@@ -111,6 +149,22 @@ def identify(
         else:
             file = Path(data)
         flags = ["--model", model] if model is not None else []
+        flags += ["--fmu", str(find(fmu))]
         _run(path, ["identify", file, *flags, *arguments, "--out", result])
         loaded: dict[str, Any] = json.loads(result.read_text(encoding="utf-8"))
-        return loaded
+    estimates = {
+        kind: {
+            name: Estimated(**e | {"interval": tuple(e["interval"])})
+            for name, e in loaded[kind].items()
+        }
+        for kind in ("parameters", "measurement")
+    }
+    return Identification(
+        **estimates,
+        model=loaded["fit"]["model"],
+        settings=loaded["settings"],
+        converged=loaded["converged"],
+        described=loaded["described"],
+        verdict=tuple(loaded["verdict"]),
+        all=loaded,
+    )

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from .fmu import Fmu, FmuError, Quantity, did_you_mean
 from .plant import TORQUE, Plant
+from .tables import read_parameters
 
 Real = NDArray[np.float64]
 
@@ -46,7 +47,7 @@ class History:
 
 def simulate(
     model: str | Path = "HubSlosh",
-    parameters: Mapping[str, Quantity] | None = None,
+    parameters: Mapping[str, Quantity] | str | Path | None = None,
     inputs: pd.DataFrame | None = None,
     stop: float | None = None,
     step: float | None = None,
@@ -60,7 +61,8 @@ def simulate(
 
     model: the name of an FMU of this package, or the file of any FMU 2.0 for Co-Simulation.
     parameters: values of parameters and inputs by name, in SI units or with one of the variable's
-    own units, ``{"tank.h": (50, "mm")}``; enumerations by item or number.
+    own units, ``{"tank.h": (50, "mm")}``; enumerations by item or number. Or a file of them, as
+    ``hubslosh tank --parameters`` writes it, see ``read_parameters``.
     inputs: a table with the column ``time`` (s, growing; two rows at one time are a jump) and one
     column per input, SI; straight lines between the rows. ``tau_slope``, as ``hubslosh torque``
     writes it, is the slope of ``tau_cmd``.
@@ -78,14 +80,16 @@ def simulate(
     Raises FmuError with everything that is wrong with the arguments, or with what the FMU says.
     """
     fmu = Fmu.open(model)
+    if isinstance(parameters, str | Path):
+        parameters = read_parameters(Path(parameters))
     problems: list[str] = []
-    histories = _histories(fmu, inputs, hold, problems)
+    histories = histories_of(fmu, inputs, hold, problems)
     rows = next(iter(histories.values())).time if histories else None
     if rows is None and inputs is not None and "time" in inputs and not problems:
         rows = inputs["time"].to_numpy(float)
-    _check_parameters(fmu, parameters or {}, histories, problems)
+    check_parameters(fmu, parameters or {}, histories, problems)
     columns = fmu.names("output") if outputs is None else list(outputs)
-    _check_outputs(fmu, columns, problems)
+    check_outputs(fmu, columns, problems)
     experiment = fmu.description.defaultExperiment
 
     def suggested(name: str, otherwise: float) -> float:
@@ -162,7 +166,7 @@ def communication_points(
     return points, None if wanted.all() else wanted
 
 
-def _histories(
+def histories_of(
     fmu: Fmu, inputs: pd.DataFrame | None, hold: bool, problems: list[str]
 ) -> dict[str, History]:
     """Return the inputs' histories by name; what is wrong with the table goes to ``problems``."""
@@ -220,7 +224,7 @@ def _hint(name: str, known: Sequence[str]) -> str:
     return f" ({hint})" if hint else ""
 
 
-def _check_parameters(
+def check_parameters(
     fmu: Fmu,
     parameters: Mapping[str, Quantity],
     histories: Mapping[str, History],
@@ -242,7 +246,7 @@ def _check_parameters(
             problems.append(f"{name} is given twice, in parameters and in inputs")
 
 
-def _check_outputs(fmu: Fmu, columns: Sequence[str], problems: list[str]) -> None:
+def check_outputs(fmu: Fmu, columns: Sequence[str], problems: list[str]) -> None:
     """Add to ``problems`` what is wrong with outputs."""
     check: list[tuple[Callable[[str], bool], str]] = [
         (lambda name: columns.count(name) > 1, "is wanted twice"),

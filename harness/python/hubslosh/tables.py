@@ -1,14 +1,16 @@
-"""Tables of numbers as files: .csv or .parquet, by their names' endings."""
+"""Tables of numbers as files, .csv or .parquet by their names' endings, and files of parameters."""
 
 import argparse
 import os
 import tempfile
-from collections.abc import Mapping, Sequence
+import tomllib
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from .fmu import FmuError
+from .fmu import FmuError, Value
 
 
 def read_table(path: Path, columns: Sequence[str]) -> dict[str, np.ndarray]:
@@ -28,6 +30,48 @@ def read_table(path: Path, columns: Sequence[str]) -> dict[str, np.ndarray]:
         there = ", ".join(table.column_names)
         raise FmuError(f"{path} has no column {', '.join(missing)} (columns in it: {there})")
     return {name: table[name].to_numpy().astype(float) for name in columns}
+
+
+def read_parameters(path: Path) -> dict[str, Value]:
+    """Read a file of parameters: ``"name" = value`` as .toml, or SSP 1.0's parameter set, .ssv.
+
+    ``hubslosh tank --parameters`` writes both. Nested TOML tables are names with dots.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+        if path.suffix == ".toml":
+            found = dict(_flatten("", tomllib.loads(text)))
+        elif path.suffix == ".ssv":
+            found = dict(_parameters_of(ET.fromstring(text)))
+        else:
+            raise FmuError(f"{path}: the name must end in .toml or .ssv")
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, ET.ParseError) as error:
+        raise FmuError(f"{path} cannot be read: {error}") from None
+    wrong = [n for n, value in found.items() if not isinstance(value, bool | int | float | str)]
+    if wrong or not found:
+        what = f"{', '.join(wrong)} must be numbers, true, false or texts" if wrong else "is empty"
+        raise FmuError(f"{path}: {what}")
+    return found
+
+
+def _flatten(prefix: str, table: Mapping[str, object]) -> Iterator[tuple[str, object]]:
+    for key, value in table.items():
+        name = f"{prefix}.{key}" if prefix else key
+        if isinstance(value, Mapping):
+            yield from _flatten(name, value)
+        else:
+            yield name, value
+
+
+def _parameters_of(root: ET.Element) -> Iterator[tuple[str, Value]]:
+    convert = {"Real": float, "Integer": int, "Boolean": lambda text: text in ("true", "1")}
+    space = root.tag[: root.tag.find("}") + 1]
+    for parameter in root.iterfind(f"{space}Parameters/{space}Parameter"):
+        value = next(iter(parameter), None)
+        if value is None or "value" not in value.attrib or "name" not in parameter.attrib:
+            raise FmuError("a Parameter without name or value")
+        kind = value.tag.removeprefix(space)
+        yield parameter.attrib["name"], convert.get(kind, str)(value.attrib["value"])
 
 
 def write_table(

@@ -7,7 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hubslosh import FmuError, Plant, drive, read_table, write_table
+from hubslosh import (
+    FmuError,
+    Plant,
+    drive,
+    read_parameters,
+    read_table,
+    simulate,
+    write_table,
+)
 
 PACKAGE = Path(__file__).resolve().parents[1]
 
@@ -58,3 +66,29 @@ def test_a_missing_fmu_is_told(tmp_path: Path) -> None:
     """With the command that makes it."""
     with pytest.raises(FmuError, match="pack makes it"):
         Plant(tmp_path / "none.fmu")
+
+
+def test_a_file_of_parameters_is_as_good_as_a_mapping(fmu: Path, tmp_path: Path) -> None:
+    """TOML and SSV, as ``hubslosh tank --parameters`` writes them: the same run to the last bit."""
+    start = {"slosh.table.m_liq": 2.0, "slosh.table.mass[1]": 0.5, "slosh.table.length[1]": 0.05}
+    start |= {"slosh.source": "table", "init.slosh_angle": 0.1}
+    toml, ssv = tmp_path / "tank.toml", tmp_path / "tank.ssv"
+    toml.write_text("\n".join(f'"{name}" = {value!r}' for name, value in start.items()))
+    kinds = {float: "Real", str: "Enumeration"}
+    rows = (
+        f'<p:Parameter name="{name}"><p:{kinds[type(value)]} value="{value}"/></p:Parameter>'
+        for name, value in start.items()
+    )
+    space = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
+    ssv.write_text(
+        f'<p:ParameterSet xmlns:p="{space}" version="1.0" name="tank"><p:Parameters>'
+        f"{''.join(rows)}</p:Parameters></p:ParameterSet>"
+    )
+    assert read_parameters(toml) == start == read_parameters(ssv)
+    expected = simulate(fmu, start, stop=1)
+    assert expected["omega"].abs().max() > 0.01
+    for file in (toml, str(ssv)):
+        assert simulate(fmu, file, stop=1).equals(expected)
+    toml.write_text("a = [1]")
+    with pytest.raises(FmuError, match="a must be numbers"):
+        read_parameters(toml)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fmpy import simulate_fmu, simulation
+from fmpy import read_model_description, simulate_fmu, simulation
 
 from hubslosh import drive
 
@@ -121,3 +121,27 @@ def test_the_example_runs(fmu: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     assert "largest rate 0.0" in done.stdout
+
+
+def heard_by_omsimulator(name: str) -> str:
+    """Return what is left of a variable's name below ``model.root.fmu`` in OMSimulator 3.
+
+    It splits names at points and takes away a part that is in its own path.
+    """
+    return ".".join(part for part in name.split(".") if part not in ("model", "root", "fmu"))
+
+
+def test_names_that_omsimulator_hears_choose_the_spherical_model(fmu: Path) -> None:
+    """Only `slosh.model` and `friction.model` are lost there, and kinds choose the same."""
+    variables = read_model_description(str(fmu)).modelVariables
+    lost = {v.name for v in variables if heard_by_omsimulator(v.name) != v.name}
+    assert lost == {"slosh.model", "friction.model"}
+    items = next(v for v in variables if v.name == "slosh.model").declaredType.items
+    spherical = next(int(item.value) for item in items if item.name == "spherical")
+
+    def run(**start: float) -> np.ndarray:
+        return simulate(fmu, start_values={"init.slosh_angle": 0.3, **start})
+
+    by_kind = run(**{"slosh.kind": spherical, "friction.kind": 2})
+    assert np.array_equal(by_kind, run(**{"slosh.model": spherical, "friction.model": 2}))
+    assert difference(by_kind, run()) > 1e-3

@@ -1,10 +1,12 @@
-"""The wheel: installed where there is nothing else, it runs READMEs' Python and the notebooks."""
+"""The wheel: installed where there is nothing else, it runs READMEs' Python; also notebooks."""
 
 import base64
 import csv
 import hashlib
+import os
 import re
 import subprocess
+import sys
 import zipfile
 from pathlib import Path
 
@@ -58,19 +60,70 @@ def test_the_record_has_every_file_and_its_hash(wheel: Path) -> None:
             digest = base64.urlsafe_b64encode(hashlib.sha256(data).digest()).decode().rstrip("=")
             assert (hashed, int(size)) == (f"sha256={digest}", len(data)), name
     assert rows[-1] == [record, "", ""]
-    assert "hubslosh/py.typed" in names and "hubslosh/fmus/HubSlosh.fmu" in names
+    fmus = {f"hubslosh/fmus/{model}.fmu" for model in ("HubSlosh", "Spacecraft", "SloshTank")}
+    assert {"hubslosh/py.typed", *fmus} <= set(names)
+
+
+def python_in(page: Path) -> list[str]:
+    """Return the blocks of Python in a page of Markdown."""
+    blocks = re.findall(r"^```python\n(.*?)^```", page.read_text(), re.DOTALL | re.MULTILINE)
+    assert blocks, f"{page} has no Python"
+    return blocks
 
 
 @pytest.mark.parametrize("readme", [ROOT / "README.md", HERE / "README.md"])
 def test_the_code_in_a_readme_runs(installed: Path, tmp_path: Path, readme: Path) -> None:
     """With the wheel alone, in an empty directory."""
-    blocks = re.findall(r"^```python\n(.*?)^```", readme.read_text(), re.DOTALL | re.MULTILINE)
-    assert blocks, f"{readme} has no Python"
-    for code in blocks:
+    for code in python_in(readme):
         done = subprocess.run(
             [installed, "-I", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
         )
         assert done.returncode == 0, f"{code}\n{done.stderr}"
+
+
+def test_the_books_page_for_python_runs(wheel: Path, tmp_path: Path, request) -> None:
+    """All its blocks as one program, with the wheel, matplotlib and the harness's binary."""
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(tmp_path / "wheel")
+    code = "\n".join(python_in(ROOT / "book" / "python.md"))
+    surroundings = os.environ | {
+        "PYTHONPATH": str(tmp_path / "wheel"),
+        "HUBSLOSH": str(option(request, "--hubslosh")),
+        "MPLBACKEND": "agg",
+        "MPLCONFIGDIR": str(tmp_path),
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=tmp_path, env=surroundings, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert "there are frozen, linear, planar, spherical" in done.stdout
+    for file in ("loop.png", "bode.png", "path.png", "slew/report.html"):
+        assert (tmp_path / file).stat().st_size > 1000, file
+
+
+@pytest.mark.parametrize(
+    ("model", "parameters", "moves"),
+    [
+        ("HubSlosh", {"init.slosh_angle": (10, "deg")}, "omega"),
+        ("Spacecraft", {"tank[1].p_dot_0[1,1]": 0.3}, "omega[2]"),
+        ("SloshTank", {"tank.p_dot_0[1,1]": 0.3}, "force[1]"),
+    ],
+)
+def test_every_fmu_of_the_wheel_runs(
+    installed: Path, tmp_path: Path, model: str, parameters: dict, moves: str
+) -> None:
+    """By its name, for a second, from where pip has put it: what swings at the start moves it."""
+    code = (
+        "import hubslosh\n"
+        f"run = hubslosh.simulate({model!r}, {parameters!r}, stop=1)\n"
+        "assert run['time'].iloc[-1] == 1 and run.notna().all(axis=None)\n"
+        f"assert abs(run[{moves!r}]).max() > 1e-6\n"
+    )
+    done = subprocess.run(
+        [installed, "-I", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
 
 
 def test_what_needs_another_package_says_which(installed: Path, tmp_path: Path) -> None:

@@ -1,0 +1,120 @@
+"""Click through a campaign's report in a browser and say what does not work.
+
+Needs Playwright (``requirements-browser.txt``) and Debian's Chromium; ``.ci/browser`` gets both.
+"""
+
+import argparse
+import re
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+from playwright.sync_api import Browser, Page, sync_playwright
+
+
+def opened(browser: Browser, report: Path, width: int, scheme: str = "light") -> Page:
+    """Open the report and wait until every figure is drawn; anything fetched is an error."""
+    page = browser.new_page(viewport={"width": width, "height": 900}, color_scheme=scheme)
+    faults: list[str] = []
+    page.on("pageerror", lambda error: faults.append(str(error)))
+    page.on(
+        "request",
+        lambda r: None if r.url.startswith(("file:", "data:", "blob:")) else faults.append(r.url),
+    )
+    page.goto(report.absolute().as_uri())
+    page.wait_for_function("document.documentElement.dataset.drawn === 'yes'", timeout=180_000)
+    assert not faults, f"faults or fetched: {faults[:3]}"
+    return page
+
+
+RANGE = "document.querySelector('.plot').layout.xaxis.range.map(Number)"
+
+
+def clicks(page: Page) -> None:
+    """Hover, legend, zoom and reset in the first figure; the contents list."""
+    plot = page.locator(".plot").first
+    plot.scroll_into_view_if_needed()
+    point = plot.locator(".points path, .point path").first
+    box = point.bounding_box()
+    assert box, "the first figure has no points"
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    label = plot.locator(".hoverlayer .hovertext")
+    label.first.wait_for(timeout=10_000)
+    text = label.first.text_content() or ""
+    assert re.search(r"\d", text), f"the pointer shows no value: {text!r}"
+
+    shown = "document.querySelector('.plot').data[0].visible"
+    assert page.evaluate(shown) in (None, True)
+    plot.locator(".legendtoggle").first.click()
+    page.wait_for_function(f"{shown} === 'legendonly'", timeout=10_000)
+    page.wait_for_timeout(600)  # two quick clicks would be a double click, which shows one alone
+    plot.locator(".legendtoggle").first.click()
+    page.wait_for_function(f"{shown} === true", timeout=10_000)
+
+    before = page.evaluate(RANGE)
+    area = plot.locator(".nsewdrag").first.bounding_box()
+    assert area
+    left, top = area["x"] + area["width"] * 0.3, area["y"] + area["height"] * 0.3
+    page.mouse.move(left, top)
+    page.mouse.down()
+    page.mouse.move(left + area["width"] * 0.3, top + area["height"] * 0.3, steps=8)
+    page.mouse.up()
+    page.wait_for_timeout(500)
+    zoomed = page.evaluate(RANGE)
+    assert zoomed[1] - zoomed[0] < 0.5 * (before[1] - before[0]), f"no zoom: {before}, {zoomed}"
+    page.mouse.dblclick(left, top)
+    page.wait_for_timeout(700)
+    reset = page.evaluate(RANGE)
+    span = before[1] - before[0]
+    assert all(abs(a - b) < 1e-6 * span for a, b in zip(before, reset, strict=True)), reset
+
+    link = page.locator("nav a").last
+    target = link.get_attribute("href") or ""
+    page.locator("nav summary").click()
+    link.click()
+    page.wait_for_timeout(1500)
+    assert page.evaluate("location.hash") == target
+    assert page.locator(target).bounding_box()["y"] < 900, f"{target} is not in view"
+
+
+def background(page: Page) -> int:
+    """Return how light the page is, 0 to 765."""
+    color = page.evaluate("getComputedStyle(document.body).backgroundColor")
+    return sum(int(part) for part in re.findall(r"\d+", color)[:3])
+
+
+def main() -> None:
+    """Check one report; exit with 1 and a sentence if something does not work."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser.add_argument("report", type=Path)
+    parser.add_argument("--pages", type=int, help="most pages of paper")
+    arguments = parser.parse_args()
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        sys.exit("no chromium: .ci/browser installs it")
+    with sync_playwright() as playwright, tempfile.TemporaryDirectory() as directory:
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        page = opened(browser, arguments.report, 1400)
+        clicks(page)
+        assert background(page) > 700
+        pdf = Path(directory) / "report.pdf"
+        page.pdf(path=pdf, prefer_css_page_size=True)
+        pages = len(re.findall(rb"/Type\s*/Page[^s]", pdf.read_bytes()))
+        if arguments.pages:
+            assert pages <= arguments.pages, f"{pages} pages of paper"
+        page.close()
+        dark = opened(browser, arguments.report, 1400, "dark")
+        assert background(dark) < 150, "the page stays light in the dark"
+        ink = "document.querySelector('.plot').layout.font.color"
+        assert dark.evaluate(ink) == "#e6eaee", "the figures stay dark in the dark"
+        dark.close()
+        phone = opened(browser, arguments.report, 400)
+        width = phone.evaluate("document.documentElement.scrollWidth")
+        assert width <= 400, f"text {width} px wide on a phone of 400 px"
+        browser.close()
+    print(f"{arguments.report}: hover, legend, zoom, reset, contents, dark, phone; {pages} pages")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,113 @@
+"""The sampled linear model and the closed loop: exact, and late by as much as they say."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from hubslosh import FmuError, closed_loop, drive, linearize
+
+VISCOUS = {"friction.model": "viscous"}
+PERIOD = 0.1  # s
+OUTPUTS = ["theta", "omega", "slosh_angle"]
+
+
+def command(time: float) -> float:
+    """Return something that steps at every cycle, N·m."""
+    return 0.05 * np.sin(3.0 * time) + 0.02 * np.cos(17.0 * time)
+
+
+def test_the_sampled_model_is_exact_at_the_sampling_instants(fmu: Path) -> None:
+    """100 cycles of a held torque, two cycles late, with the FMU's linear slosh model.
+
+    Its tolerance is 1e-9 in this run.
+    """
+    run = closed_loop(
+        lambda time, _: command(time), PERIOD, 10, fmu, VISCOUS,
+        latency=2, outputs=OUTPUTS, tolerance=1e-9,
+    )  # fmt: skip
+    model = linearize(fmu, VISCOUS, ["tau_cmd"], OUTPUTS).sampled(PERIOD, latency=2)
+    assert model.states[-2:] == ("tau_cmd[-2]", "tau_cmd[-1]") and model.period == PERIOD
+    A, B, C, D = model
+    x = np.zeros(len(A))
+    for k, row in enumerate(run[OUTPUTS].to_numpy()):
+        assert np.abs(C @ x - row).max() < 1e-9
+        x = A @ x + B[:, 0] * command(k * PERIOD)
+    assert not D.any() and np.abs(run["omega"]).max() > 0.01
+    # the same as from the powers of A, at a frequency; and control's, if it reads the period
+    f = np.array([0.5, 2.4])
+    z = np.exp(2j * np.pi * f * PERIOD)
+    assert np.allclose(model.to_control()(z)[1, 0], model.response(f)[:, 1, 0], rtol=1e-9)
+
+
+def test_the_loop_is_a_drive_with_a_held_torque(fmu: Path) -> None:
+    """The same calls as a run with the torque that the law gave: same bits, whatever the model."""
+    parameters = {"slosh.model": "spherical", "init.slosh_angle": (5, "deg")}
+    seen = []
+
+    def law(time: float, measured: np.ndarray) -> float:
+        seen.append((time, *measured))
+        return -0.5 * measured[0] - 0.6 * measured[1]
+
+    run = closed_loop(
+        law, 0.02, 20, fmu, parameters, latency=1, outputs=["omega", "theta", "stuck"]
+    )
+    again = drive(
+        fmu, run["time"], run["tau_cmd"], parameters, hold=True, columns=["omega", "theta"]
+    )
+    assert list(run) == ["time", "tau_cmd", "omega", "theta", "stuck"]
+    assert run.attrs["units"]["tau_cmd"] == "N.m"
+    for name in ("omega", "theta"):
+        assert np.array_equal(run[name], again[name])
+    # measured at the beginning of each cycle; commanded one cycle later
+    assert np.array_equal(np.array(seen), run[["time", "theta", "omega"]][:-1])
+    commands = -0.5 * run["theta"] - 0.6 * run["omega"]
+    assert run["tau_cmd"][0] == 0
+    assert np.array_equal(run["tau_cmd"][1:-1], commands[:-2])
+
+
+def test_substeps_add_rows_and_inputs_run_along_their_lines(fmu: Path) -> None:
+    """A ramp of g_axial and a torque from outside, in rows of their own; 1e-7 is the tolerance."""
+    inputs = pd.DataFrame(
+        {"time": [0, 1.0, 3, 5], "tau_ext": [0, 0.02, -0.02, 0], "g_axial": [9.81, 9.81, 5, 5]}
+    )
+
+    def law(time: float, measured: np.ndarray) -> float:
+        return -0.5 * measured[0] - 0.6 * measured[1]
+
+    coarse, fine = (
+        closed_loop(
+            law, 0.1, 5, fmu, VISCOUS,
+            inputs=inputs, substeps=substeps, outputs=["omega"], tolerance=1e-9,
+        )
+        for substeps in (1, 10)
+    )  # fmt: skip
+    assert len(coarse) == 51 and len(fine) == 501
+    assert np.abs(fine["omega"][::10].to_numpy() - coarse["omega"].to_numpy()).max() < 1e-9
+    assert fine["g_axial"].iloc[200] == pytest.approx((9.81 + 5) / 2, abs=1e-12)
+    assert coarse["omega"].abs().max() > 1e-3
+
+
+def test_all_that_is_wrong_is_told_at_once(fmu: Path) -> None:
+    """Names, signs, and what has no meaning."""
+    inputs = pd.DataFrame({"time": [0.0, 1.0], "tau_cmd": [0.0, 0.0]})
+    with pytest.raises(FmuError) as error:
+        closed_loop(
+            lambda time, measured: 0.0, -1, 10, fmu, {"friction.modal": "viscous"},
+            latency=-1, substeps=0, outputs=["thta"], measured=["omga"], inputs=inputs,
+        )  # fmt: skip
+    for part in (
+        "period must be a positive number", "latency must be", "substeps must be",
+        "did you mean friction.model?", "did you mean theta?", "did you mean omega?", "tau_cmd is",
+    ):  # fmt: skip
+        assert part in str(error.value), part
+    with pytest.raises(FmuError, match="no input of HubSlosh"):
+        closed_loop(lambda time, measured: 0.0, 1, 10, fmu, command="omega")
+    model = linearize(fmu, VISCOUS, ["tau_cmd"], ["omega"])
+    with pytest.raises(FmuError, match="period must be"):
+        model.sampled(0)
+    with pytest.raises(FmuError, match="whole number of cycles"):
+        model.sampled(0.1, -1)
+    with pytest.raises(FmuError, match="sampled already"):
+        model.sampled(0.1).sampled(0.1)
