@@ -1,0 +1,13 @@
+"""What README says of the manoeuvre."""
+
+from my_tank import MY_TANK, compare
+
+
+def test_rigid_liquid_ends_at_rest_and_sloshing_liquid_does_not(fmu: str) -> None:
+    """A rest-to-rest torque leaves a rigid craft at rest, to rounding; the rest is README's."""
+    runs = compare(fmu)
+    last = {liquid: run["omega"].iloc[-500:].abs().max() for liquid, run in runs.items()}
+    assert last["frozen"] < 1e-12
+    assert round(last["spherical"], 4) == 0.008
+    assert runs["frozen"]["slosh_angle"].abs().max() == 0.0
+    assert MY_TANK["friction.model"] == "none"

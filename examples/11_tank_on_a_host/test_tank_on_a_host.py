@@ -1,0 +1,39 @@
+"""The numbers of README for the two FMUs in Python, and the SSP's form.
+
+libcosim and Basilisk need packages of their own.
+"""
+
+import zipfile
+from pathlib import Path
+
+import pytest
+from fmpy.ssp.ssd import read_ssd
+from tank_on_a_host import STEPS, coupled, error, pack_ssp, whole
+
+
+@pytest.fixture
+def both(spacecraft: str) -> Path | None:
+    """Return the folder of the FMUs, or nothing if they are the package's."""
+    return Path(spacecraft).parent if spacecraft.endswith(".fmu") else None
+
+
+def test_the_lumped_coupling_converges_with_the_step(both: Path | None) -> None:
+    """First order, on a tumbling host that is lighter than its tank."""
+    reference = whole(both)
+    errors = [error(coupled(both, step), reference) for step in STEPS[:3]]
+    assert errors == pytest.approx([4.5e-4, 2.2e-4, 1.1e-4], rel=0.03)
+
+
+def test_the_wrench_as_it_is_diverges(both: Path | None) -> None:
+    """Within a second at 20 ms."""
+    assert coupled(both, STEPS[1], wrench=True)["time"].iloc[-1] < 1.0
+
+
+def test_the_ssp_is_valid_and_has_both_fmus(both: Path | None, tmp_path: Path) -> None:
+    """By fmpy's copy of the schema; nine signals there, six back."""
+    archive = tmp_path / "TankOnHost.ssp"
+    pack_ssp(both, archive, 0.02)
+    system = read_ssd(str(archive), validate=True).system
+    assert len(system.connections) == 15
+    names = zipfile.ZipFile(archive).namelist()
+    assert {"resources/Spacecraft.fmu", "resources/SloshTank.fmu"} <= set(names)

@@ -1,0 +1,48 @@
+"""The first torque: a pulse on the hub, with sloshing and with frozen liquid.
+
+python examples/1_first_torque/first_torque.py
+"""
+
+import argparse
+from pathlib import Path
+
+import pandas as pd
+
+import hubslosh
+
+PULSE = pd.DataFrame(
+    {"time": [0, 1, 1, 2, 2, 40], "tau_cmd": [0, 0, 0.1, 0.1, 0, 0]}  # s, N·m
+)
+"""Straight lines between the rows; two rows at one time are a jump."""
+
+
+def run(fmu: str | Path, model: str) -> pd.DataFrame:
+    """Return the answer to the pulse, on the bench's sticking bearing."""
+    outputs = ["omega", "omega_dot", "slosh_angle", "stuck"]
+    return hubslosh.simulate(fmu, {"slosh.model": model}, PULSE, step=0.01, outputs=outputs)
+
+
+def main() -> None:
+    """Print what the liquid does, draw the figure."""
+    parser = argparse.ArgumentParser(description="A pulse of torque on the hub.")
+    parser.add_argument("--fmu", default="HubSlosh", help="file, or the name of a packed one")
+    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".png"))
+    args = parser.parse_args()
+    axes = None
+    for model in ("frozen", "spherical"):
+        table = run(args.fmu, model)
+        stopped = table["time"][~table["stuck"]].max()
+        print(
+            f"{model:9}: rate up to {table['omega'].max():.4f} rad/s, slosh angle up to "
+            f"{table['slosh_angle'].abs().max():.4f} rad, hub at rest for good from {stopped:.2f} s"
+        )
+        names = ("tau_cmd", "omega", "omega_dot", "slosh_angle")
+        axes = hubslosh.plot.time_histories(
+            table.query("time < 18"), *names, axes=axes, label=model
+        )
+    axes[0].figure.savefig(args.out, dpi=80)
+    print(args.out)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,25 @@
+"""The numbers of README."""
+
+import pytest
+from first_torque import run
+
+
+@pytest.mark.parametrize(
+    ("model", "rate", "angle", "stopped"),
+    [("frozen", 0.2139, 0.0, 13.24), ("spherical", 0.2142, 0.0105, 17.89)],
+)
+def test_the_pulse_gives_the_numbers_of_readme(
+    fmu: str, model: str, rate: float, angle: float, stopped: float
+) -> None:
+    """To the digits that are there."""
+    table = run(fmu, model)
+    assert round(table["omega"].max(), 4) == rate
+    assert round(table["slosh_angle"].abs().max(), 4) == angle
+    assert round(table["time"][~table["stuck"]].max(), 2) == stopped
+
+
+def test_the_liquid_leans_back_under_constant_torque(fmu: str) -> None:
+    """Quasi-static: tan(angle) = -r omega_dot/g, the mean over two periods, to 5 %."""
+    table = run(fmu, "spherical").query("1 <= time < 1.83")
+    lean = -0.225 * table["omega_dot"].mean() / 9.81
+    assert table["slosh_angle"].mean() == pytest.approx(lean, rel=0.05)

@@ -1,0 +1,157 @@
+"""Rest-to-rest slew by 90 degrees: what bang-stop-bang and a smoothed profile leave of slosh.
+
+python examples/2_slew/slew.py
+"""
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+
+import hubslosh
+from hubslosh.plot import COLORS
+
+ANGLE = np.pi / 2
+"""rad."""
+PERIOD, LATENCY = 0.02, 1
+"""Of the controller: s, cycles."""
+BANDWIDTH, ZETA = 0.3, 0.7
+"""Of the PD, for a rigid body: Hz, damping ratio."""
+TOLERANCE = np.radians(0.001)
+"""The slew is over when the pointing error stays below this, rad."""
+STOP = 40.0  # s
+FREE = {"friction.model": "none"}
+"""A spacecraft has no bearing."""
+
+Profile = Callable[[float], tuple[float, float, float]]
+"""Angle (rad), rate (rad/s) and acceleration (rad/s²) that are wanted at a time (s)."""
+
+
+def bang_stop_bang(time: float, push: float = 1.2, coast: float = 1.2) -> tuple[float, ...]:
+    """Return the profile with constant acceleration, none, and constant deceleration."""
+    a = ANGLE / (push * (push + coast))
+    end = 2 * push + coast
+    if time < push:
+        return a * time**2 / 2, a * time, a
+    if time < push + coast:
+        return a * push * (time - push / 2), a * push, 0.0
+    if time < end:
+        left = end - time
+        return ANGLE - a * left**2 / 2, a * left, -a
+    return ANGLE, 0.0, 0.0
+
+
+def smoothed(time: float, push: float = 2.4) -> tuple[float, ...]:
+    """Return the profile of the same largest rate and torque with accelerations 1 - cos.
+
+    A rest-to-rest slew of this angle is then two pulses, without coasting between them.
+    """
+    a = ANGLE / (1.2 * (1.2 + 1.2)) / 2  # half of the largest acceleration
+    w = 2 * np.pi / push
+
+    def pulse(t: float) -> tuple[float, float, float]:
+        """Return angle, rate and acceleration during the first pulse."""
+        angle = a * (t**2 / 2 - (1 - np.cos(w * t)) / w**2)
+        return angle, a * (t - np.sin(w * t) / w), a * (1 - np.cos(w * t))
+
+    if time < push:
+        return pulse(time)
+    if time < 2 * push:
+        angle, rate, acceleration = pulse(2 * push - time)
+        return ANGLE - angle, rate, -acceleration
+    return ANGLE, 0.0, 0.0
+
+
+PROFILES = {"bang-stop-bang": bang_stop_bang, "smoothed": smoothed}
+DURATION = {"bang-stop-bang": 3.6, "smoothed": 4.8}
+"""s."""
+
+
+def inertia(fmu: str | Path) -> float:
+    """Return the moment of inertia of hub and frozen liquid, kg·m²."""
+    frozen = hubslosh.linearize(fmu, FREE | {"slosh.model": "frozen"}, ["tau_cmd"], ["omega"])
+    return 1 / frozen.B[0, 0]
+
+
+def slew(fmu: str | Path, profile: Profile, model: str) -> pd.DataFrame:
+    """Simulate the slew; the column ``error`` is theta less what the profile wants, rad."""
+    I, w = inertia(fmu), 2 * np.pi * BANDWIDTH
+
+    def law(time: float, measured: np.ndarray) -> float:
+        angle, rate, _ = profile(time)
+        # the command acts between one and two cycles from now
+        _, _, acceleration = profile(time + (LATENCY + 0.5) * PERIOD)
+        error = w**2 * (angle - measured[0]) + 2 * ZETA * w * (rate - measured[1])
+        return I * (acceleration + error)
+
+    run = hubslosh.closed_loop(
+        law, PERIOD, STOP, fmu, FREE | {"slosh.model": model}, latency=LATENCY,
+        outputs=["theta", "omega", "slosh_angle", "slosh_angle_radial"],
+    )  # fmt: skip
+    run["error"] = run["theta"] - [profile(t)[0] for t in run["time"]]
+    return run
+
+
+def settling_time(run: pd.DataFrame, profile: str) -> float:
+    """Return when the slew is over and the pointing error below `TOLERANCE` for good, s."""
+    outside = run["time"][run["error"].abs() >= TOLERANCE]
+    return max(DURATION[profile], outside.max() + PERIOD)
+
+
+def results(fmu: str | Path) -> dict[tuple[str, str], pd.DataFrame]:
+    """Return the runs by profile and model."""
+    models = ("frozen", "linear", "spherical")
+    return {(p, m): slew(fmu, PROFILES[p], m) for p in PROFILES for m in models}
+
+
+def figure(runs: dict[tuple[str, str], pd.DataFrame], path: Path) -> None:
+    """Draw what README explains."""
+    figure, axes = plt.subplots(3, 2, figsize=(10, 9), layout="constrained")
+    for column, profile in zip(axes.T, PROFILES, strict=True):
+        torque, error, path_of = column
+        for (name, model), color in zip(runs, COLORS[:3] * 2, strict=True):
+            if name != profile:
+                continue
+            run = runs[name, model]
+            start = run[run["time"] < 8]
+            torque.step(start["time"], start["tau_cmd"], color=color, where="post", label=model)
+            early = run[run["time"] < 25]
+            error.semilogy(
+                early["time"], np.degrees(early["error"].abs()), color=color, linewidth=0.8
+            )
+            x, y = (np.degrees(run[f"slosh_angle{s}"]) for s in ("_radial", ""))
+            if model != "frozen":
+                path_of.plot(x, y, color=color, linewidth=0.8)
+        error.axhline(np.degrees(TOLERANCE), color="black", linestyle="--", linewidth=0.8)
+        error.axvline(DURATION[profile], color="black", linestyle=":", linewidth=0.8)
+        torque.set(title=profile, xlabel="time (s)", ylabel="torque (N·m)")
+        torque.legend()
+        error.set(xlabel="time (s)", ylabel="|pointing error| (deg)", ylim=(1e-5, 1))
+        path_of.set(xlabel="slosh angle, radial (deg)", ylabel="tangential (deg)", aspect="equal")
+        path_of.set(xlim=(-2, 2), ylim=(-2, 2))
+        for ax in column:
+            ax.grid(alpha=0.3)
+    figure.savefig(path, dpi=80)
+
+
+def main() -> None:
+    """Print the settling times, draw the figure."""
+    parser = argparse.ArgumentParser(description="A slew with slosh, two profiles.")
+    parser.add_argument("--fmu", default="HubSlosh", help="file, or the name of a packed one")
+    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".png"))
+    args = parser.parse_args()
+    runs = results(args.fmu)
+    print("profile         model      largest error after the slew (deg)  settled at (s)")
+    for (profile, model), run in runs.items():
+        after = run[run["time"] > DURATION[profile]]
+        largest = np.degrees(after["error"].abs().max())
+        print(f"{profile:15} {model:10} {largest:34.4f}  {settling_time(run, profile):14.1f}")
+    figure(runs, args.out)
+    print(args.out)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,123 @@
+"""What a wheel's limits and a sticking bearing do to a PID, and how far a smoothed law hides it.
+
+python examples/4_saturation_and_stiction/stiction.py
+"""
+
+import argparse
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+
+import hubslosh
+from hubslosh.plot import COLORS
+
+PERIOD, LATENCY = 0.02, 1
+"""Of the controller: s, cycles."""
+BANDWIDTH, ZETA = 0.3, 0.7
+"""Of the PD part, for a rigid body of `INERTIA`: Hz, damping ratio."""
+INERTIA = 0.428
+"""kg·m², hub and frozen liquid."""
+INTEGRAL = 0.4
+"""Of the integral part, per s: its gain is this times the proportional one."""
+WIDTHS = (1e-2, 1e-3, 1e-5)
+"""Of the smoothed sign (``friction.eps``), rad/s."""
+
+
+def run(
+    fmu: str | Path, angle: float, stop: float, parameters: dict, integral: float = 0.0
+) -> pd.DataFrame:
+    """Simulate a step of the wanted angle (rad) under a PID, spherical pendulums."""
+    w, area = 2 * np.pi * BANDWIDTH, 0.0
+
+    def law(time: float, measured: np.ndarray) -> float:
+        nonlocal area
+        error = angle - measured[0]
+        area += error * PERIOD
+        return INERTIA * (w**2 * (error + integral * area) - 2 * ZETA * w * measured[1])
+
+    outputs = ["theta", "omega", "tau_actuator", "wheel_speed", "stuck", "event_count"]
+    return hubslosh.closed_loop(
+        law, PERIOD, stop, fmu, {"slosh.model": "spherical"} | parameters,
+        latency=LATENCY, outputs=outputs,
+    )  # fmt: skip
+
+
+def saturation(fmu: str | Path) -> dict[str, pd.DataFrame]:
+    """Return steps of 90 degrees on a free bearing: any torque, and the wheel's."""
+    free = {"friction.model": "none"}
+    return {
+        "any torque": run(fmu, np.pi / 2, 20, free),
+        "wheel": run(fmu, np.pi / 2, 20, free | {"wheel.enabled": True}),
+    }
+
+
+def friction_laws() -> dict[str, dict]:
+    """Return the settings of the friction laws by name."""
+    smooth = {"friction.model": "stribeck_smooth"}
+    laws = {f"smoothed, {width:g} rad/s": smooth | {"friction.eps": width} for width in WIDTHS}
+    return {"set-valued": {"friction.model": "stribeck"}} | laws
+
+
+def stiction(fmu: str | Path, integral: float, stop: float) -> dict[str, pd.DataFrame]:
+    """Return steps of 1 degree by friction law."""
+    angle = np.radians(1)
+    return {name: run(fmu, angle, stop, law, integral) for name, law in friction_laws().items()}
+
+
+def summary(fmu: str | Path) -> pd.DataFrame:
+    """Return the pointing error (deg) some times after the step, by controller and law."""
+    rows = {}
+    for controller, integral in (("PD", 0.0), ("PID", INTEGRAL)):
+        for name, table in stiction(fmu, integral, 60).items():
+            error = np.degrees(table["theta"]) - 1
+            rows[controller, name] = {f"{t} s": error[round(t / PERIOD)] for t in (10, 20, 60)}
+            rows[controller, name]["stuck (%)"] = 100 * table["stuck"].mean()
+    return pd.DataFrame.from_dict(rows, orient="index")
+
+
+def figure(fmu: str | Path, path: Path) -> None:
+    """Draw what README explains."""
+    whole, axes = plt.subplots(2, 2, figsize=(10, 7), layout="constrained")
+    (angle, speed), (pd_error, pid_error) = axes
+    for (name, table), color in zip(saturation(fmu).items(), COLORS, strict=False):
+        angle.plot(table["time"], np.degrees(table["theta"]), color=color, label=name)
+        speed.plot(table["time"], table["wheel_speed"] * 30 / np.pi, color=color, label=name)
+    speed.axhspan(200, 3000, color="gray", alpha=0.15, label="the wheel's range")
+    angle.set(xlabel="time (s)", ylabel="theta (deg)", title="90° step, free bearing")
+    speed.set(xlabel="time (s)", ylabel="wheel speed (rpm)", title="Wheel: torque and speed end")
+    for ax, integral, title in ((pd_error, 0.0, "PD"), (pid_error, INTEGRAL, "PID")):
+        for (name, table), color in zip(stiction(fmu, integral, 60).items(), COLORS, strict=False):
+            error = np.degrees(table["theta"]) - 1
+            ax.plot(table["time"], error, color=color, linewidth=1.1, label=name)
+        ax.set(xlabel="time (s)", ylabel="pointing error (deg)", ylim=(-0.3, 0.3))
+        ax.set_title(f"{title}, 1° step: friction's laws")
+    for ax in axes.flat:
+        ax.grid(alpha=0.3)
+        ax.legend(fontsize=8)
+    whole.savefig(path, dpi=80)
+
+
+def main() -> None:
+    """Print the numbers, draw the figure."""
+    parser = argparse.ArgumentParser(description="A wheel's limits, a bearing's stiction.")
+    parser.add_argument("--fmu", default="HubSlosh", help="file, or the name of a packed one")
+    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".png"))
+    args = parser.parse_args()
+    for name, table in saturation(args.fmu).items():
+        error = np.degrees((table["theta"] - np.pi / 2).abs())
+        late = table["time"][error > 0.1].max()
+        print(
+            f"90° with {name}: torque up to {table['tau_actuator'].abs().max():.2f} N·m, "
+            f"rate up to {table['omega'].max():.2f} rad/s, within 0.1° after {late:.1f} s"
+        )
+    print("pointing error after a step of 1° (deg)")
+    with pd.option_context("display.width", 200):
+        print(summary(args.fmu).round(4))
+    figure(args.fmu, args.out)
+    print(args.out)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,41 @@
+"""The numbers of README."""
+
+import numpy as np
+import pytest
+from stiction import saturation, summary
+
+
+def test_the_wheel_gives_its_torque_until_it_has_no_more_speed(fmu: str) -> None:
+    """0.26 N·m; 0.77 rad/s is 1400 rpm of the rotor on hub and liquid."""
+    runs = saturation(fmu)
+    for name, torque, rate, late in (("any torque", 2.39, 1.44, 5.2), ("wheel", 0.26, 0.77, 6.4)):
+        table = runs[name]
+        error = np.degrees((table["theta"] - np.pi / 2).abs())
+        assert round(table["tau_actuator"].abs().max(), 2) == torque
+        assert round(table["omega"].max(), 2) == rate
+        assert round(table["time"][error > 0.1].max(), 1) == late
+    rpm = runs["wheel"]["wheel_speed"] * 30 / np.pi
+    assert rpm.min() == pytest.approx(200, abs=1e-9) and rpm.max() <= 3000
+
+
+def test_what_holds_leaves_an_error_and_what_is_smoothed_creeps(fmu: str) -> None:
+    """README's table, to its digits."""
+    table = summary(fmu).round(4)
+    errors = table.drop(columns="stuck (%)").to_numpy()
+    assert np.abs(errors - EXPECTED).max() < 1.5e-4
+    stuck = table["stuck (%)"]
+    assert stuck.loc["PD", "set-valued"] == pytest.approx(93.9, abs=0.2)
+    assert (stuck.drop("set-valued", level=1) == 0).all()
+
+
+EXPECTED = [
+    [-0.1917, -0.1917, -0.1917],
+    [0.0001, 0.0, 0.0],
+    [-0.0315, -0.0035, 0.0],
+    [-0.1860, -0.1793, -0.1569],
+    [0.1338, -0.0006, -0.0007],
+    [-0.0076, 0.0001, 0.0],
+    [0.0353, -0.0217, -0.0004],
+    [0.1328, -0.0035, -0.0186],
+]
+"""deg; rows: PD, then PID, each with the laws from set-valued to the narrowest smoothed one."""

@@ -1,0 +1,34 @@
+"""The numbers of README."""
+
+import numpy as np
+import pytest
+from thrust import BANDWIDTHS, CRAFT, THRUST, decay, linear, run, slosh_pole
+
+import hubslosh
+
+
+def test_the_craft_is_what_readme_says(fmu: str) -> None:
+    """Mass, frequencies, damping, Bond number, from the FMU."""
+    names = ["tank.m_liq", "slosh.frequency[1]", "slosh.damping[1]", "tank.bond"]
+    with hubslosh.Plant(fmu, CRAFT | {"g_axial": THRUST}) as plant:
+        mass, frequency, damping, bond = plant.get(names)
+    assert mass == pytest.approx(4301, abs=1)
+    assert frequency == pytest.approx(0.01067, abs=5e-6)
+    assert damping == pytest.approx(0.00156, abs=5e-6)
+    assert bond / 10 == pytest.approx(21.6, abs=0.05)
+    assert linear(fmu).poles.imag.max() / (2 * np.pi) == pytest.approx(0.01091, abs=5e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "error", "rate"),
+    [("below", 0.310, 9.70e-4), ("near", 0.142, 1.04e-3), ("above", 0.028, 1.75e-4)],
+)
+def test_the_linear_model_under_thrust_predicts_the_decay(
+    fmu: str, name: str, error: float, rate: float
+) -> None:
+    """To 3 %: in nonlinear pendulums of 5° at the start, from windows of five periods."""
+    predicted = -slosh_pole(fmu, BANDWIDTHS[name]).real
+    assert predicted == pytest.approx(rate, rel=5e-3)
+    table = run(fmu, BANDWIDTHS[name])
+    assert decay(table) == pytest.approx(predicted, rel=0.03)
+    assert round(np.degrees(table["theta"].abs().max()), 3) == error

@@ -1,0 +1,23 @@
+"""The study on dask gives what the draws give one by one; README runs it with 400."""
+
+import pandas as pd
+from distributed import Client
+from monte_carlo import STOP, draws, one, study
+
+
+def test_dask_gives_what_single_runs_give(fmu: str) -> None:
+    """16 draws, bit for bit; both outcomes of each question are among them."""
+    with Client(
+        processes=False, n_workers=1, threads_per_worker=1, dashboard_address=None
+    ) as client:
+        table = study(client, 16, 1, fmu)
+    pd.testing.assert_frame_equal(table.iloc[:, :4], draws(16, 1))
+    for k in (0, 7):
+        found = one(table.iloc[k, :4].to_dict(), fmu)
+        assert found == table.iloc[k, 4:].to_dict()
+    assert 0 < (table["largest_pole"] < 1).sum() < 16
+    # damping decides stability, dry friction the settling time
+    correlation = table.corr(method="spearman")
+    assert correlation.loc["slosh.zeta", "largest_pole"] < -0.8
+    assert correlation.loc["friction.c", "settling_time"] < -0.6
+    assert table["settling_time"].between(5, STOP).all()

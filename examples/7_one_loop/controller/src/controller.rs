@@ -1,0 +1,133 @@
+//! A PD controller that rolls off, t_f tau' = -k_p theta - k_d omega - tau.
+//!
+//! Its output is a state: nothing passes through it at once, so that a loop with it has the same
+//! answer in whatever order a master reads and sets.
+
+use runtime::Model;
+use runtime::table::{About, Scalar, Table, scalar_count, scalars};
+use runtime::variable::Variable;
+
+/// Parameters: gains (N m/rad, N m s/rad) and time constant of the roll-off (s).
+#[derive(Clone, Copy, Debug)]
+pub struct Parameters {
+    k_p: f64,
+    k_d: f64,
+    t_f: f64,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        // 0.5 Hz and a damping ratio of 0.7 on 0.428 kg m2
+        Parameters { k_p: 4.22, k_d: 1.88, t_f: 0.02 }
+    }
+}
+
+/// The error's angle (rad) and rate (rad/s), each with its slope.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Inputs {
+    theta: [f64; 2],
+    omega: [f64; 2],
+}
+
+/// The torque, N m, and the parameters.
+#[derive(Clone, Debug)]
+pub struct Controller {
+    p: Parameters,
+    tau: [f64; 1],
+}
+
+type V = Variable<Controller>;
+
+#[rustfmt::skip]
+static VARIABLES: &[Variable<Controller>] = &[
+    V::output("tau", |_, _| 0.0, "N.m", "Torque command").is_state(|_| 0)
+        .depends_on(&["tau"]),
+    V::input("theta", |i, _| i.theta.each_mut(), "rad", "Angle less the wanted one"),
+    V::input("omega", |i, _| i.omega.each_mut(), "rad/s", "Rate less the wanted one"),
+    V::derivative("der(tau)", |_| 0, "N.m/s", "Derivative of tau")
+        .depends_on(&["tau", "theta", "omega"]).initial_depends_on(&["k_p", "k_d", "t_f"]),
+    V::parameter("k_p", |p, _| &mut p.k_p, "N.m/rad", "Gain of the angle").at_least(0.0),
+    V::parameter("k_d", |p, _| &mut p.k_d, "N.m.s/rad", "Gain of the rate").at_least(0.0),
+    V::parameter("t_f", |p, _| &mut p.t_f, "s", "Time constant of the roll-off").range(1e-6, 1e3),
+];
+
+static SCALARS: [Scalar<Controller>; scalar_count(VARIABLES)] = scalars(VARIABLES);
+
+static TABLE: Table<Controller> = Table::new(
+    About {
+        model: "Controller",
+        version: env!("CARGO_PKG_VERSION"),
+        description: "A PD controller that rolls off",
+        events: "",
+        event_indicators: 0,
+        saved_words: 1,
+    },
+    VARIABLES,
+    &SCALARS,
+);
+
+impl Controller {
+    /// Where tau tends to.
+    fn wanted(&self, theta: f64, omega: f64) -> f64 {
+        -self.p.k_p * theta - self.p.k_d * omega
+    }
+}
+
+impl Model for Controller {
+    type Parameters = Parameters;
+    type Inputs = Inputs;
+    type Outputs = ();
+    type Discrete = ();
+
+    fn table() -> &'static Table<Self> {
+        &TABLE
+    }
+
+    fn new(p: &Parameters, _: &Inputs, _: f64, _: f64) -> Result<Self, Vec<String>> {
+        Ok(Controller { p: *p, tau: [0.0] })
+    }
+
+    fn save(&self, words: &mut Vec<u64>) {
+        words.extend(self.tau.map(f64::to_bits));
+    }
+
+    fn resume(p: &Parameters, words: &[u64], _: f64) -> Option<Self> {
+        let tau = <[u64; 1]>::try_from(words).ok()?.map(f64::from_bits);
+        tau[0].is_finite().then_some(Controller { p: *p, tau })
+    }
+
+    /// With inputs along straight lines, v = v0 + v1 t, the exact solution is
+    /// tau(h) = v(h) - t_f v1 + (tau(0) - v0 + t_f v1) exp(-h/t_f).
+    fn step(&mut self, Inputs { theta, omega }: &Inputs, h: f64) -> Result<(), String> {
+        let [v0, v1] = [0, 1].map(|k| self.wanted(theta[k], omega[k]));
+        let lag = self.p.t_f * v1;
+        self.tau[0] = v0 + v1 * h - lag + (self.tau[0] - v0 + lag) * (-h / self.p.t_f).exp();
+        Ok(())
+    }
+
+    fn outputs(&mut self, _: &Inputs) {}
+
+    fn continuous_states(&self) -> &[f64] {
+        &self.tau
+    }
+
+    fn set_continuous_states(&mut self, x: &[f64]) {
+        self.tau.copy_from_slice(x);
+    }
+
+    fn set_time(&mut self, _: f64) {}
+
+    fn derivatives(&mut self, inputs: &Inputs, x_dot: &mut [f64]) {
+        x_dot[0] = (self.wanted(inputs.theta[0], inputs.omega[0]) - self.tau[0]) / self.p.t_f;
+    }
+
+    fn directional_derivative(
+        &mut self,
+        _: &Inputs,
+        Inputs { theta, omega }: &Inputs,
+        dx: &[f64],
+        dx_dot: &mut [f64],
+    ) {
+        dx_dot[0] = (self.wanted(theta[1], omega[1]) - dx[0]) / self.p.t_f;
+    }
+}

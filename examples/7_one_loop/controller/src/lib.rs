@@ -1,0 +1,11 @@
+//! A PD controller as an FMU.
+#![allow(non_snake_case)]
+
+pub mod controller;
+
+/// The functions of FMI 2.0.
+pub mod fmi2 {
+    pub use runtime::v2::*;
+
+    runtime::export_fmi2!(crate::controller::Controller);
+}

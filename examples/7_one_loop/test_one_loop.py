@@ -1,0 +1,55 @@
+"""Hosts agree, and the master that goes back keeps its tolerance.
+
+libcosim, which needs a package of its own, is compared by .ci/importers.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from one_loop import RECORDED, STEPS, TOLERANCE, adaptive, difference, exact, fixed, in_fmpy
+
+
+@pytest.fixture(scope="module")
+def folder(request: pytest.FixtureRequest) -> Path:
+    """Return where `cargo run -p one-loop` wrote."""
+    path: Path = request.config.getoption("--folder")
+    assert (path / "Controller.fmu").is_file(), "cargo run --release -p one-loop -- FMU dist"
+    return path
+
+
+@pytest.mark.parametrize(("name", "slopes"), [("held", False), ("slopes", True)])
+def test_fmpy_and_the_harness_give_one_answer(
+    fmu: str, folder: Path, name: str, slopes: bool
+) -> None:
+    """The promise is 1e-9; with the same calls it is the same bits."""
+    theirs = pd.read_csv(folder / f"loop_{name}.csv")
+    assert len(theirs) == STEPS + 1 and list(theirs) == ["time", "tau", *RECORDED]
+    assert theirs["omega"].abs().max() > 0.02
+    assert difference(in_fmpy(folder, fmu, slopes), theirs) <= TOLERANCE
+
+
+def test_slopes_make_another_loop(folder: Path) -> None:
+    """So a host that sets slopes can't be compared with one that does not: they differ by 20 %."""
+    held, slopes = (pd.read_csv(folder / f"loop_{name}.csv") for name in ("held", "slopes"))
+    assert difference(held, slopes) > 0.1
+
+
+def test_the_error_goes_with_the_square_of_a_fixed_step(fmu: str, folder: Path) -> None:
+    """README's errors; halving the step divides it by 3.5 at 10 ms, by 3.8 at 5 ms."""
+    errors = []
+    for step in (0.02, 0.01):
+        rows, steps = fixed(fmu, folder, step)
+        errors.append(np.abs(rows[:, 1:] - exact(fmu, rows[:, 0])).max())
+        assert steps == round(80 / step)
+    assert errors == pytest.approx([6.6e-4, 1.9e-4], rel=0.02)
+
+
+def test_the_master_that_goes_back_makes_half_the_steps(fmu: str, folder: Path) -> None:
+    """4,416 steps, two thirds of them rolled back or halves, at the error of 8,000 fixed ones."""
+    rows, steps = adaptive(fmu, folder, 1e-5)
+    error = np.abs(rows[:, 1:] - exact(fmu, rows[:, 0])).max()
+    assert error < 1.9e-4 and steps < 5000
+    lengths = np.diff(rows[:, 0])
+    assert lengths.max() > 8 * lengths.min() and rows[-1, 0] == 80

@@ -1,0 +1,39 @@
+"""The numbers of README: the zone, growth in it and beside it, the damping that closes it."""
+
+import pytest
+from danger_zone import Craft, growth, predicted_zone, simulated_growth, zone
+
+# From an independent formulation of the craft in six axes, to all digits.
+GROWTH = {
+    -1.60: -3.1726e-2, -0.45: -7.9994e-3, 0.14: 7.6250e-4, 0.20: 1.1911e-3, 0.50: 1.8675e-3,
+    0.80: 4.5618e-4, 1.20: -3.2389e-3,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("z", "expected"), GROWTH.items())
+def test_poles_from_the_fmus_derivatives_are_those_of_the_closed_form(
+    spacecraft: str, z: float, expected: float
+) -> None:
+    """Five digits are known; first order in the gains leaves 0.2 %."""
+    craft = Craft(z)
+    assert growth(spacecraft, craft) == pytest.approx(expected, rel=2e-5, abs=5e-8)
+    assert craft.predicted_growth == pytest.approx(expected, rel=2.5e-3)
+
+
+def test_the_zone_ends_where_the_closed_form_says(spacecraft: str) -> None:
+    """To 1 mm: the two ends move with the second order of the gains."""
+    assert zone(spacecraft) == pytest.approx(predicted_zone(), abs=1e-3)
+
+
+@pytest.mark.parametrize("z", [-0.45, 0.5])
+def test_the_simulated_loop_grows_as_its_poles_say(spacecraft: str, z: float) -> None:
+    """The cycle of 10 ms delays by 5 ms: 0.3 % of the growth, as measured."""
+    found = simulated_growth(spacecraft, Craft(z))
+    assert found == pytest.approx(growth(spacecraft, Craft(z)), rel=0.01)
+
+
+def test_the_damping_needed_is_the_predicted_one(spacecraft: str) -> None:
+    """5 % beside it the loop is stable or not."""
+    needed = Craft(0.5).damping_needed
+    assert growth(spacecraft, Craft(0.5, zeta=0.95 * needed)) > 0
+    assert growth(spacecraft, Craft(0.5, zeta=1.05 * needed)) < 0

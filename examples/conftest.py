@@ -1,0 +1,31 @@
+"""What the examples' tests share: the packed FMU.
+
+    cargo run --release -- pack
+    cargo run --release -p one-loop -- dist/HubSlosh.fmu dist
+    pytest -c harness/python/pyproject.toml examples
+
+``cargo test --release`` runs them with the FMU that it packs.
+"""
+
+from pathlib import Path
+
+import pytest
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Say where the FMU is, and what example 7 made in the harness."""
+    parser.addoption("--fmu", default="HubSlosh", help="file, or the name of a packed one")
+    parser.addoption("--folder", type=Path, default=Path("dist"))
+
+
+@pytest.fixture(scope="session")
+def fmu(request: pytest.FixtureRequest) -> str:
+    """Return the FMU."""
+    name: str = request.config.getoption("--fmu")
+    return str(Path(name).absolute()) if name.endswith(".fmu") else name
+
+
+@pytest.fixture(scope="session")
+def spacecraft(fmu: str) -> str:
+    """Return Spacecraft.fmu; SloshTank.fmu is beside it."""
+    return str(Path(fmu).with_name("Spacecraft.fmu")) if fmu.endswith(".fmu") else "Spacecraft"
