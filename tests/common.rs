@@ -10,6 +10,11 @@ use runtime::variable::Kind;
 /// Every slosh model.
 pub const SLOSH: [SloshModel; SloshModel::ALL.len()] = SloshModel::ALL;
 
+/// Whether the model ends at a rim, which a violent motion reaches.
+pub fn has_rim(slosh: SloshModel) -> bool {
+    matches!(slosh, SloshModel::Paraboloid | SloshModel::Liquid)
+}
+
 /// Every friction law.
 pub const FRICTION: [FrictionModel; FrictionModel::ALL.len()] = FrictionModel::ALL;
 
@@ -40,6 +45,11 @@ pub fn anywhere(rng: &mut fastrand::Rng, slosh: SloshModel, friction: FrictionMo
     let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();
     p.tank.d = 10f64.powf(between(-1.5, 0.5));
     p.tank.h = p.tank.d * 10f64.powf(between(-1.5, 0.5));
+    if slosh == SloshModel::Liquid {
+        // Neither shallow nor next to a secondary resonance, where it warns.
+        p.tank.h = p.tank.d
+            * if between(0.0, 1.0) < 0.5 { between(0.22, 0.37) } else { between(0.6, 3.0) };
+    }
     p.tank.r = p.tank.d * between(0.0, 5.0);
     let m_liq = 1000.0 * 0.785 * p.tank.d * p.tank.d * p.tank.h;
     p.hub.inertia = m_liq * p.tank.d * p.tank.d * 10f64.powf(between(-1.0, 2.0));
@@ -107,14 +117,23 @@ pub fn python() -> PathBuf {
 /// The binary `hubslosh`, of the profile that this test was built with; it is
 /// another package's, so Cargo does not say where it is.
 pub fn harness() -> PathBuf {
+    binary("hubslosh", &[])
+}
+
+/// A binary of the workspace by its name, of the profile that this test was built with; `package`
+/// says where it is if not in one of the default members.
+///
+/// # Panics
+/// If it does not build.
+pub fn binary(name: &str, package: &[&str]) -> PathBuf {
     let mut build = Command::new(env!("CARGO"));
-    build.current_dir(pack::root()).args(["build", "--quiet", "--bin", "hubslosh"]);
+    build.current_dir(pack::root()).args(["build", "--quiet", "--bin", name]).args(package);
     let profile = if cfg!(debug_assertions) { "debug" } else { "release" };
     if profile == "release" {
         build.arg("--release");
     }
-    run(&mut build, "the binary hubslosh did not build");
+    run(&mut build, "a binary of the workspace did not build");
     let target =
         pack::packed_for_tests().ancestors().nth(2).expect("<target>/test-fmu/HubSlosh.fmu");
-    target.join(profile).join("hubslosh").with_extension(std::env::consts::EXE_EXTENSION)
+    target.join(profile).join(name).with_extension(std::env::consts::EXE_EXTENSION)
 }

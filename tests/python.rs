@@ -4,27 +4,58 @@
 use std::path::Path;
 use std::process::Command;
 
-use crate::common::{harness, python, run};
+use crate::common::{binary, harness, python, run};
 
-#[test]
-fn fmpy_drives_the_fmu_as_the_harness_does() {
-    let fmu = pack::packed_for_tests();
-    let wheel = pack::wheel::for_tests(&[fmu]);
-    let scripts = pack::root().join("harness").join("python");
+/// Runs pytest in the tests' environment, and says how many passed.
+///
+/// # Panics
+/// If a test fails, or is not run.
+fn pytest(arguments: &mut Command, sentence: &str) {
+    let settings = pack::root().join("harness/python/pyproject.toml");
     let said = run(
-        Command::new(python())
-            .args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider"])
-            .args([Path::new("--fmu"), fmu])
-            .args([Path::new("--hubslosh"), &harness()])
-            .args([Path::new("--wheel"), &wheel])
-            .arg(&scripts)
+        arguments
+            .args(["--quiet", "-p", "no:cacheprovider"])
+            .args([Path::new("-c"), &settings])
             // the source tree stays as it is
             .env("PYTHONDONTWRITEBYTECODE", "1"),
-        "the tests in Python failed",
+        sentence,
     );
     // pytest's last line, "61 passed in 20.07s"
     let last = said.trim_end().lines().last().unwrap_or_default();
     let left_out = ["skipped", "deselected", "xfailed"].iter().any(|word| last.contains(word));
     assert!(last.contains(" passed") && !left_out, "pytest did not run every test:\n{said}");
     println!("{last}");
+}
+
+#[test]
+fn fmpy_drives_the_fmu_as_the_harness_does() {
+    let fmu = pack::packed_for_tests();
+    let wheel = pack::wheel::for_tests(&pack::MODELS.each_ref().map(pack::packed_model_for_tests));
+    pytest(
+        Command::new(python())
+            .args(["-m", "pytest"])
+            .args([Path::new("--fmu"), fmu])
+            .args([Path::new("--hubslosh"), &harness()])
+            .args([Path::new("--wheel"), &wheel])
+            .arg(pack::root().join("harness/python")),
+        "the tests in Python failed",
+    );
+}
+
+#[test]
+fn the_examples_give_what_their_readmes_say() {
+    // all in one folder
+    let [fmu, ..] = pack::MODELS.each_ref().map(pack::packed_model_for_tests);
+    let folder = fmu.with_file_name("one-loop");
+    std::fs::create_dir_all(&folder).expect("a folder in the target directory");
+    let one_loop = binary("one-loop", &["-p", "one-loop"]);
+    run(Command::new(one_loop).arg(fmu).arg(&folder), "the loop in the harness failed");
+    pytest(
+        Command::new(python())
+            .args(["-m", "pytest"])
+            .args([Path::new("--fmu"), fmu])
+            .args([Path::new("--folder"), &folder])
+            .arg(pack::root().join("examples")),
+        "an example failed",
+    );
 }

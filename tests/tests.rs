@@ -14,11 +14,37 @@ mod life {
 mod physics {
     mod balances;
     mod errata;
+    mod liquid;
     mod rotary;
+    mod tanks;
     mod trajectories;
 }
 mod python;
 mod second;
+mod six {
+    mod balances;
+    mod component;
+    mod cosimulation;
+    mod hubslosh;
+    mod steps;
+    // Tests of the crate `craft`, here with the packed FMUs as `component`.
+    #[path = "../../fmu/craft/tests/craft/draining.rs"]
+    mod draining;
+    #[path = "../../fmu/craft/tests/craft/exchange.rs"]
+    mod exchange;
+    #[path = "../../fmu/craft/tests/craft/invariances.rs"]
+    mod invariances;
+    #[path = "../../fmu/craft/tests/craft/random.rs"]
+    mod random;
+    #[path = "../../fmu/craft/tests/craft/records.rs"]
+    mod records;
+    #[path = "../../fmu/craft/tests/craft/reference.rs"]
+    mod reference;
+    #[path = "../../fmu/craft/tests/craft/small_motions.rs"]
+    mod small_motions;
+    #[path = "../../fmu/craft/tests/craft/special_cases.rs"]
+    mod special_cases;
+}
 mod xml {
     mod checklist;
     mod generated;

@@ -5,6 +5,7 @@ use crate::common::items;
 use HubSlosh::table::TABLE;
 use HubSlosh::{Instance, Scalar, from_bytes};
 use plant::STATES;
+use runtime::hash::Hash;
 use runtime::instance::DEFAULT_TOLERANCE;
 use runtime::operation::{
     CType, Fault, GET_BOOLEAN, GET_INTEGER, GET_REAL, InstanceState, Interface, SET_BOOLEAN,
@@ -558,6 +559,21 @@ fn bytes_that_are_no_state_are_refused() {
     assert!(from_bytes(b"HubSlosh").is_err());
 }
 
+#[test]
+fn an_input_out_of_range_in_saved_bytes_is_refused() {
+    let mut instance = lively(4, 4);
+    let g: f64 = 9.123456;
+    set(&mut instance, &[("g_axial", Value::Real(g))]);
+    let mut bytes = to_bytes(&instance);
+    let place = bytes.windows(8).position(|bytes| bytes == g.to_le_bytes()).unwrap();
+    bytes[place..place + 8].copy_from_slice(&(-g).to_le_bytes());
+    let body = bytes.len() - 16;
+    let checksum = Hash::new().bytes(&bytes[..body]).value().to_le_bytes();
+    bytes[body..].copy_from_slice(&checksum);
+    let why = from_bytes(&bytes).unwrap_err();
+    assert!(why.contains("g_axial = -9.123456"), "{why}");
+}
+
 /// One step of 1 us shows the derivative to (1 us)^2 of the third derivative, at most
 /// 1e3/s^3 of a signal's size here, and to the rounding of 1e-16 / 1e-6.
 #[test]
@@ -636,8 +652,8 @@ fn check_directional_derivatives(rng: &mut fastrand::Rng, slosh_model: i32, fric
     instance.enter_initialization_mode().unwrap();
     instance.exit_initialization_mode().unwrap();
     instance.enter_continuous_time_mode().unwrap();
-    // Of an angle; with the paraboloid of a length, the third mode's pendulum's being 9 mm.
-    let unit = if slosh_model == 5 { 0.009 } else { 1.0 };
+    // Of an angle; with paraboloid and liquid of a length, the third mode's pendulum's being 9 mm.
+    let unit = if slosh_model >= 5 { 0.009 } else { 1.0 };
     let mut states = [0.0; STATES];
     for (n, x) in states.iter_mut().enumerate() {
         *x = match n {
@@ -849,15 +865,41 @@ fn no_variable_starts_from_a_parameter_that_it_does_not_list() {
         ("wheel.enabled", Value::Boolean(true)),
         ("imu.enabled", Value::Boolean(true)),
         ("tau_cmd", Value::Real(0.05)),
+        ("bench.tilt", Value::Real(0.02)),
+        ("hub.imbalance", Value::Real(0.1)),
+        ("baffle.width", Value::Real(0.005)),
+        ("baffle.depth", Value::Real(0.01)),
+        ("slosh.table.m_liq", Value::Real(2.0)),
+        ("slosh.table.mass[1]", Value::Real(0.7)),
+        ("slosh.table.mass[2]", Value::Real(0.02)),
+        ("slosh.table.length[1]", Value::Real(0.05)),
+        ("slosh.table.length[2]", Value::Real(0.015)),
+        ("slosh.table.zeta[1]", Value::Real(0.01)),
     ];
     let reference_of_model = |group: &str| reference(&format!("{group}.model"));
-    for slosh_model in items("slosh.model") {
+    let models = items("slosh.model").map(|model| (model, 1));
+    // From a table, of which all models but the liquid are made.
+    for (slosh_model, source) in models.chain((1..=5).map(|model| (model, 2))) {
         let mut instance = fresh();
         set(&mut instance, base);
         set(&mut instance, &[("slosh.model", number(slosh_model))]);
+        set(&mut instance, &[("slosh.source", number(source))]);
         instance.enter_initialization_mode().unwrap();
         let before = all(&mut instance);
         for parameter in TABLE.parameters() {
+            let refused = match (slosh_model, source) {
+                (6, _) => parameter.name() == "slosh.source",
+                (_, 1) => false,
+                (_, _) => {
+                    // A length is given; number 1 is not the table, model 6 is the liquid.
+                    ["slosh.table.frequency[1]", "slosh.source_kind"]
+                        .contains(&parameter.name().as_str())
+                        || slosh_model == 5 && parameter.name() == "slosh.model"
+                }
+            };
+            if refused {
+                continue;
+            }
             let mut other = instance.clone();
             let reference = reference(&parameter.name());
             let value =

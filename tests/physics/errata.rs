@@ -1,6 +1,6 @@
 //! The thesis's errors that would change the model, each pinned by a test that fails
 //! with the printed form. The entries are explained in
-//! `modelDescription/HubSlosh/documentation/errata.md`.
+//! `book/errata.md`.
 
 use std::f64::consts::{PI, TAU};
 

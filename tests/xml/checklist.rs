@@ -19,9 +19,7 @@ fn sources(directory: &Path, all: &mut String) {
 #[test]
 fn every_test_that_the_checklist_names_is_there() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let page =
-        fs::read_to_string(root.join("modelDescription/HubSlosh/documentation/checklist.md"))
-            .expect("the page");
+    let page = fs::read_to_string(root.join("book/checklist.md")).expect("the page");
     let mut code = String::new();
     for part in ["fmu", "modelDescription", "harness", "tests"] {
         sources(&root.join(part), &mut code);

@@ -1,0 +1,152 @@
+//! Tanks of any shape through a table of modes.
+
+use crate::common::bench;
+use hubslosh_tank::Tank;
+use plant::{FrictionModel, Inputs, Outputs, Parameters, Plant, Ramp, SloshModel, SloshSource};
+
+/// A tank's modes as the plant's table, damping ratios those of the plant's correlation.
+fn with_table(p: &Parameters, tank: &str, modes: usize) -> Parameters {
+    let tank = Tank::parse(tank, std::path::Path::new("")).unwrap();
+    let data = tank.solve(p.tank.h, modes).unwrap();
+    let known = *plant(p).calculated();
+    let mut p = *p;
+    p.slosh.source = SloshSource::Table;
+    p.slosh.modes = modes;
+    p.slosh.table.m_liq = data.m_liq;
+    for (n, mode) in data.modes.iter().enumerate() {
+        p.slosh.table.mass[n] = mode.m;
+        p.slosh.table.length[n] = mode.l;
+        p.slosh.table.wave[n] = mode.wave;
+        p.slosh.table.zeta[n] = known.damping[n];
+    }
+    p
+}
+
+fn plant(p: &Parameters) -> Plant {
+    Plant::new(p, &Inputs::default(), 0.0, 1e-10).unwrap()
+}
+
+fn run(p: &Parameters) -> Vec<Outputs> {
+    let mut plant = plant(p);
+    let mut inputs = Inputs { tau_cmd: Ramp { value: 0.1, slope: -0.02 }, ..Inputs::default() };
+    (0..500)
+        .map(|_| {
+            plant.step(&inputs, 0.02).unwrap();
+            inputs.tau_cmd.value += 0.02 * inputs.tau_cmd.slope;
+            plant.outputs(&inputs)
+        })
+        .collect()
+}
+
+/// The cylinder of the bench by its dimensions, by the closed form of `hubslosh tank`, and by its
+/// contour through the boundary integral equation: masses and lengths agree to 1e-11, and the motion
+/// over 10 s to the integrator's tolerance times what rotary motion makes of a small change.
+#[test]
+fn table_of_the_old_cylinder_gives_the_old_motion() {
+    for model in
+        [SloshModel::Linear, SloshModel::Planar, SloshModel::Spherical, SloshModel::Paraboloid]
+    {
+        let mut p = bench(model, FrictionModel::Stribeck);
+        p.slosh.modes = 3;
+        let expected = run(&p);
+        for tank in [
+            "density = 1000\nshape = { cylinder = { radius = 0.0815, height = 0.2 } }",
+            "density = 1000\nprofile = [{ line = [0, 0, 0.0815, 0] }, { line = [0.0815, 0, 0.0815, 0.2] }]",
+        ] {
+            let found = run(&with_table(&p, tank, 3));
+            for (a, b) in expected.iter().zip(&found) {
+                assert!((a.omega - b.omega).abs() < 1e-9, "{model:?} {} {}", a.omega, b.omega);
+                assert!((a.slosh_angle - b.slosh_angle).abs() < 1e-8, "{model:?}");
+                assert!((a.wave_height - b.wave_height).abs() < 1e-9, "{model:?}");
+                assert!((a.f_tangential - b.f_tangential).abs() < 1e-7, "{model:?}");
+                assert_eq!(a.discrete.event_count, b.discrete.event_count, "{model:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_frequency_stands_for_a_length() {
+    let mut p = with_table(
+        &bench(SloshModel::Linear, FrictionModel::Viscous),
+        "density = 1000\nshape = { sphere = { radius = 0.1 } }",
+        3,
+    );
+    p.slosh.table.k = [0.0; plant::MODES];
+    p.slosh.table.k[0] = 2.0;
+    let lengths = plant(&p).calculated().length;
+    for n in 0..3 {
+        let table = &mut p.slosh.table;
+        let omega2 = table.g_ref / lengths[n] + table.k[n] / table.mass[n];
+        table.frequency[n] = omega2.sqrt() / std::f64::consts::TAU;
+        table.length[n] = 0.0;
+    }
+    for (a, b) in plant(&p).calculated().length.iter().zip(lengths).take(3) {
+        assert!((a / b - 1.0).abs() < 1e-14, "{a} {b}");
+    }
+}
+
+#[test]
+fn a_table_that_is_no_tank_is_refused_with_everything_that_is_wrong() {
+    let good = with_table(
+        &bench(SloshModel::Linear, FrictionModel::Viscous),
+        "density = 1000\nshape = { sphere = { radius = 0.1 } }",
+        3,
+    );
+    let refused = |change: fn(&mut Parameters)| {
+        let mut p = good;
+        change(&mut p);
+        Plant::new(&p, &Inputs::default(), 0.0, 1e-9).err().unwrap_or_default()
+    };
+    assert!(refused(|_| {}).is_empty());
+    let all = refused(|p| {
+        p.slosh.table.m_liq = 0.0;
+        p.slosh.table.mass[1] = 0.0;
+        p.slosh.table.length[2] = 0.0;
+        p.slosh.model = SloshModel::Liquid;
+    });
+    assert_eq!(all.len(), 4, "{all:?}");
+    for (what, place) in
+        [("liquid", 0), ("slosh.table.m_liq", 1), ("slosh.table.mass[2]", 2), ("length[3]", 3)]
+    {
+        assert!(all[place].contains(what), "{all:?}");
+    }
+    let one = |change: fn(&mut Parameters), what: &str| {
+        let problems = refused(change);
+        assert!(problems.len() == 1 && problems[0].contains(what), "{problems:?}");
+    };
+    one(|p| p.slosh.table.frequency[0] = 1.0, "one of them greater than 0");
+    one(|p| p.slosh.table.length.swap(0, 1), "order of their frequencies");
+    one(|p| p.slosh.table.m_liq *= 0.1, "add up to");
+    one(
+        |p| {
+            p.slosh.table.length[0] = 0.0;
+            (p.slosh.table.frequency[0], p.slosh.table.k[0]) = (0.1, 1e3);
+        },
+        "not above that of slosh.table.k[1]",
+    );
+}
+
+/// A box is dragged along about its vertical axis (`tank.I_own`): with the rigid liquid it is that much
+/// harder to turn, and a square of 0.1 m has 0.1565 of its rigid inertia.
+#[test]
+fn a_box_drags_liquid_about_its_axis() {
+    let tank = Tank::parse("density = 1000\nbox = [0.1, 0.1]", std::path::Path::new("")).unwrap();
+    let data = tank.solve(0.1, 1).unwrap();
+    let own = data.i_eff_axis.unwrap();
+    assert!((own / data.i_frozen_axis - 0.1565).abs() < 5e-5, "{}", own / data.i_frozen_axis);
+    let mut p = bench(SloshModel::Linear, FrictionModel::None);
+    p.slosh.source = SloshSource::Table;
+    (p.tank.r, p.hub.inertia) = (0.0, 1e-3);
+    p.slosh.table.m_liq = data.m_liq;
+    (p.slosh.table.mass[0], p.slosh.table.length[0]) = (data.modes[0].m, data.modes[0].l);
+    let acceleration = |own: f64| {
+        p.tank.own_inertia = own;
+        let inputs = Inputs { tau_cmd: Ramp::held(1e-3), ..Inputs::default() };
+        Plant::new(&p, &inputs, 0.0, 1e-9).unwrap().outputs(&inputs).omega_dot
+    };
+    // On the axis itself only the liquid's own inertia counts.
+    let [without, with] = [0.0, own].map(acceleration);
+    assert!((without - 1.0).abs() < 1e-12, "{without}");
+    assert!((with * (1e-3 + own) / 1e-3 - 1.0).abs() < 1e-12, "{with}");
+}

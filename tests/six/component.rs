@@ -1,0 +1,538 @@
+//! Spacecraft.fmu and SloshTank.fmu with the face of the crate `craft`: that crate's tests, which use
+//! nothing else, run through the packed FMUs as well.
+//!
+//! All is done by calls of the C interface: parameters and inputs by name, input derivatives for the
+//! slopes, fmi2DoStep, fmi2GetReal of whatever is looked at, fmi2GetDirectionalDerivative. The first
+//! time that states are set the instance gives way to one for Model Exchange.
+
+use std::fs::File;
+use std::sync::LazyLock;
+
+use craft::{
+    Craft, INPUTS, Inputs, MODES, Outputs, POINTS, Parameters, Ramp, STATES, SloshTankOutputs,
+    TANK_INPUTS, TANK_STATES, TANKS, TRIANGLE, Tank, TankInputs, TankOutputs, TankParameters,
+};
+use host::fmi2::{CO_SIMULATION, CallError, Fmu, FmuState, Instance, MODEL_EXCHANGE, Status};
+use pack::models::model;
+use pack::packed_model_for_tests;
+use runtime::table::Table;
+
+/// A packed FMU, loaded. What it was unpacked to is deleted at once.
+pub fn load(name: &str) -> Fmu {
+    let packed = packed_model_for_tests(model(name).unwrap());
+    let directory = tempfile::tempdir().unwrap();
+    zip::ZipArchive::new(File::open(packed).unwrap()).unwrap().extract(directory.path()).unwrap();
+    Fmu::load(directory.path(), packed).unwrap()
+}
+
+static SPACECRAFT: LazyLock<Fmu> = LazyLock::new(|| load("Spacecraft"));
+static SLOSH_TANK: LazyLock<Fmu> = LazyLock::new(|| load("SloshTank"));
+
+/// Names of the elements of an array.
+pub fn elements(name: &str, n: usize) -> impl Iterator<Item = String> {
+    (1..=n).map(move |i| format!("{name}[{i}]"))
+}
+
+/// Names of the elements of an array of two dimensions, by rows.
+fn rows(name: &str, (n, m): (usize, usize)) -> impl Iterator<Item = String> {
+    (1..=n).flat_map(move |i| (1..=m).map(move |j| format!("{name}[{i},{j}]")))
+}
+
+/// Parameters by name; whole numbers are Integers.
+#[derive(Clone, Default)]
+struct Settings {
+    reals: Vec<(String, f64)>,
+    integers: Vec<(String, i32)>,
+}
+
+impl Settings {
+    fn real(&mut self, name: impl Into<String>, value: f64) {
+        self.reals.push((name.into(), value));
+    }
+
+    fn reals(&mut self, names: impl Iterator<Item = String>, values: &[f64]) {
+        self.reals.extend(names.zip(values.iter().copied()));
+    }
+
+    fn integer(&mut self, name: impl Into<String>, value: i32) {
+        self.integers.push((name.into(), value));
+    }
+
+    fn craft(&mut self, name: &str, craft: &Craft) {
+        let j = &craft.j;
+        self.real(format!("{name}.mass"), craft.mass);
+        self.reals(elements(&format!("{name}.r"), 3), &craft.r);
+        let moments = [("xx", j.xx), ("yy", j.yy), ("zz", j.zz)];
+        let products = [("xy", j.xy), ("xz", j.xz), ("yz", j.yz)];
+        for (axes, value) in moments.into_iter().chain(products) {
+            self.real(format!("{name}.J{axes}"), value);
+        }
+    }
+
+    fn tank(&mut self, name: &str, tank: &Tank) {
+        let of = |what: &str| format!("{name}.{what}");
+        self.reals(elements(&of("position"), 3), &tank.position);
+        self.reals(elements(&of("q"), 4), &tank.q);
+        for (what, value) in [
+            ("m_0", tank.m_0),
+            ("H_0", tank.h_0),
+            ("I_0", tank.i_0),
+            ("I_z", tank.i_z),
+            ("g_ref", tank.g_ref),
+            ("diameter", tank.diameter),
+            ("depth", tank.depth),
+            ("density", tank.density),
+        ] {
+            self.real(of(what), value);
+        }
+        self.integer(of("modes"), tank.modes as i32);
+        if tank.fill.points > 0 {
+            self.fill(name, tank);
+        }
+        for (what, values) in [
+            ("mass", &tank.mass),
+            ("length", &tank.length),
+            ("frequency", &tank.frequency),
+            ("hinge", &tank.hinge),
+            ("k", &tank.k),
+            ("zeta", &tank.zeta),
+            ("wave", &tank.wave),
+        ] {
+            self.reals(elements(&of(what), MODES), values);
+        }
+        self.reals(rows(&of("p_0"), (MODES, 3)), tank.p_0.as_flattened());
+        self.reals(rows(&of("p_dot_0"), (MODES, 3)), tank.p_dot_0.as_flattened());
+    }
+}
+
+impl Settings {
+    fn fill(&mut self, name: &str, tank: &Tank) {
+        let of = |what: &str| format!("{name}.fill.{what}");
+        let table = &tank.fill;
+        self.integer(of("points"), table.points as i32);
+        self.real(format!("{name}.liquid_0"), tank.liquid_0);
+        self.real(format!("{name}.outlet"), tank.outlet);
+        for (what, values) in [
+            ("liquid", &table.liquid),
+            ("H_0", &table.h_0),
+            ("I_0", &table.i_0),
+            ("I_z", &table.i_z),
+        ] {
+            self.reals(elements(&of(what), POINTS), values);
+        }
+        for (what, values) in
+            [("mass", &table.mass), ("length", &table.length), ("hinge", &table.hinge)]
+        {
+            self.reals(rows(&of(what), (MODES, POINTS)), values.as_flattened());
+        }
+    }
+}
+
+/// An instance, and the references of what is asked of it.
+struct Bound {
+    instance: Instance<'static>,
+    settings: Settings,
+    tolerance: f64,
+    start: f64,
+    time: f64,
+    kind: i32,
+    inputs: Vec<u32>,
+    outputs: Vec<u32>,
+    /// States and their derivatives in the order of the crate `craft`.
+    states: Vec<u32>,
+    derivatives: Vec<u32>,
+    /// Where each state in FMI's order stands there.
+    places: Vec<usize>,
+}
+
+impl Bound {
+    fn new<M: runtime::Model>(
+        (fmu, table): (&'static Fmu, &'static Table<M>),
+        settings: Settings,
+        names: [Vec<String>; 2],
+        inputs: &[f64],
+        (start, tolerance): (f64, f64),
+    ) -> Result<Bound, CallError> {
+        let reference = |name: &String| fmu.description().variable(name).unwrap().reference;
+        let [inputs_named, outputs] = names.map(|names| names.iter().map(reference).collect());
+        let places: Vec<usize> = table.places().collect();
+        let (mut states, mut derivatives) = (vec![0; places.len()], vec![0; places.len()]);
+        for (place, derivative) in places.iter().zip(table.derivatives()) {
+            states[*place] = reference(&table.state_at(*place).unwrap().name());
+            derivatives[*place] = reference(&derivative.name());
+        }
+        let mut bound = Bound {
+            instance: fmu.instantiate("six")?,
+            settings,
+            tolerance,
+            start,
+            time: start,
+            kind: CO_SIMULATION,
+            inputs: inputs_named,
+            outputs,
+            states,
+            derivatives,
+            places,
+        };
+        bound.set_up(inputs)?;
+        Ok(bound)
+    }
+
+    fn set_up(&mut self, inputs: &[f64]) -> Result<(), CallError> {
+        let Bound { instance, settings, .. } = self;
+        let description = instance.fmu().description();
+        for (name, value) in &settings.reals {
+            instance.set_real(&[description.variable(name).unwrap().reference], &[*value])?;
+        }
+        for (name, value) in &settings.integers {
+            instance.set_integer(&[description.variable(name).unwrap().reference], &[*value])?;
+        }
+        instance.set_real(&self.inputs, inputs)?;
+        instance.setup_experiment(Some(self.tolerance), self.start, None)?;
+        instance.enter_initialization_mode()?;
+        instance.exit_initialization_mode()
+    }
+
+    /// Sets the inputs and, in Co-Simulation, their slopes over the next step.
+    fn set(&mut self, values: &[f64], slopes: &[f64]) -> Result<(), CallError> {
+        self.instance.set_real(&self.inputs, values)?;
+        if self.kind == CO_SIMULATION {
+            let orders = vec![1; slopes.len()];
+            self.instance.set_real_input_derivatives(&self.inputs, &orders, slopes)?;
+        }
+        Ok(())
+    }
+
+    fn step(&mut self, values: &[f64], slopes: &[f64], h: f64) -> Result<(), CallError> {
+        self.set(values, slopes)?;
+        self.instance.do_step(self.time, h)?;
+        self.time += h;
+        Ok(())
+    }
+
+    fn outputs(&mut self) -> Vec<f64> {
+        let mut values = vec![0.0; self.outputs.len()];
+        self.instance.get_real(&self.outputs, &mut values).unwrap();
+        values
+    }
+
+    fn states(&mut self) -> Vec<f64> {
+        let mut values = vec![0.0; self.states.len()];
+        self.instance.get_real(&self.states, &mut values).unwrap();
+        values
+    }
+
+    fn set_states(&mut self, x: &[f64]) {
+        if self.kind == CO_SIMULATION {
+            let mut inputs = vec![0.0; self.inputs.len()];
+            self.instance.get_real(&self.inputs, &mut inputs).unwrap();
+            let mut with = self.instance.fmu().instantiation("six");
+            with.kind = MODEL_EXCHANGE;
+            self.instance = self.instance.fmu().instantiate_with(&with).unwrap();
+            self.kind = MODEL_EXCHANGE;
+            self.set_up(&inputs).unwrap();
+            self.instance.new_discrete_states().unwrap();
+            self.instance.enter_continuous_time_mode().unwrap();
+        }
+        let ordered: Vec<f64> = self.places.iter().map(|place| x[*place]).collect();
+        self.instance.set_continuous_states(&ordered).unwrap();
+    }
+
+    fn derivatives(&mut self) -> Vec<f64> {
+        let mut values = vec![0.0; self.derivatives.len()];
+        self.instance.get_real(&self.derivatives, &mut values).unwrap();
+        values
+    }
+
+    fn directional(&mut self, dx: &[f64], du: &[f64]) -> Vec<f64> {
+        let knowns = [&self.states[..], &self.inputs[..]].concat();
+        let change = [dx, du].concat();
+        self.instance.get_directional_derivative(&self.derivatives, &knowns, &change).unwrap()
+    }
+}
+
+/// Takes numbers off a list, one after the other.
+struct Numbers<'a>(std::slice::Iter<'a, f64>);
+
+impl Numbers<'_> {
+    fn one(&mut self) -> f64 {
+        *self.0.next().unwrap()
+    }
+
+    fn array<const N: usize>(&mut self) -> [f64; N] {
+        [(); N].map(|()| self.one())
+    }
+
+    fn matrix<const N: usize>(&mut self) -> [[f64; 3]; N] {
+        [(); N].map(|()| self.array())
+    }
+}
+
+fn tank_outputs(name: &str) -> Vec<String> {
+    let of = |what: &str| format!("{name}{what}");
+    rows(&of("p"), (MODES, 3))
+        .chain(rows(&of("p_dot"), (MODES, 3)))
+        .chain(elements(&of("angle_x"), MODES))
+        .chain(elements(&of("angle_y"), MODES))
+        .chain([of("wave_height")])
+        .collect()
+}
+
+fn read_tank(force: [f64; 3], torque: [f64; 3], next: &mut Numbers) -> TankOutputs {
+    TankOutputs {
+        force,
+        torque,
+        p: next.matrix(),
+        p_dot: next.matrix(),
+        angle_x: next.array(),
+        angle_y: next.array(),
+        wave_height: next.one(),
+    }
+}
+
+/// Value and slope of three vectors, one after the other.
+fn flat(ramps: [&Ramp; 3]) -> [[f64; 9]; 2] {
+    [|ramp: &Ramp| ramp.value, |ramp: &Ramp| ramp.slope].map(|part| {
+        let vectors = ramps.map(part);
+        std::array::from_fn(|i| vectors[i / 3][i % 3])
+    })
+}
+
+/// Spacecraft.fmu.
+pub struct Spacecraft(Bound);
+
+impl Spacecraft {
+    pub fn new(
+        p: &Parameters,
+        inputs: &Inputs,
+        start: f64,
+        tolerance: f64,
+    ) -> Result<Spacecraft, CallError> {
+        let mut settings = Settings::default();
+        settings.craft("craft", &p.craft);
+        settings.integer("mount", p.mount as i32);
+        settings.reals(elements("gravity", 3), &p.gravity);
+        settings.integer("tanks", p.tanks as i32);
+        for (i, tank) in p.tank.iter().enumerate() {
+            settings.tank(&format!("tank[{}]", i + 1), tank);
+        }
+        settings.reals(elements("init.q", 4), &p.init.q);
+        settings.reals(elements("init.omega", 3), &p.init.omega);
+        settings.reals(elements("init.position", 3), &p.init.position);
+        settings.reals(elements("init.velocity", 3), &p.init.velocity);
+        let vectors = |names: &[&str]| -> Vec<String> {
+            names.iter().flat_map(|name| elements(name, 3)).collect()
+        };
+        let mut outputs: Vec<String> = elements("q", 4).collect();
+        outputs.extend(vectors(&[
+            "omega",
+            "omega_dot",
+            "specific_force",
+            "position",
+            "velocity",
+            "slosh_force",
+            "slosh_torque",
+            "momentum",
+            "angular_momentum",
+            "center_of_mass",
+        ]));
+        outputs.extend(["energy", "work", "dissipated", "mass"].map(String::from));
+        outputs.extend(rows("inertia", (3, 3)));
+        for name in elements("tank", TANKS) {
+            outputs.extend(vectors(&[&format!("{name}.force"), &format!("{name}.torque")]));
+            outputs.extend(tank_outputs(&format!("{name}.")));
+        }
+        let mut inputs_named = vectors(&["force", "torque", "h_wheels"]);
+        inputs_named.extend(elements("mass_flow", TANKS));
+        let names = [inputs_named, outputs];
+        let fmu = (&*SPACECRAFT, &::Spacecraft::table::TABLE);
+        let [values, _] = Spacecraft::flat(inputs);
+        Bound::new(fmu, settings, names, &values, (start, tolerance)).map(Spacecraft)
+    }
+
+    fn flat(inputs: &Inputs) -> [[f64; INPUTS]; 2] {
+        let [values, slopes] = flat([&inputs.force, &inputs.torque, &inputs.h_wheels]);
+        let flow = &inputs.mass_flow;
+        [
+            std::array::from_fn(|i| if i < 9 { values[i] } else { flow[i - 9].value }),
+            std::array::from_fn(|i| if i < 9 { slopes[i] } else { flow[i - 9].slope }),
+        ]
+    }
+
+    pub fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), CallError> {
+        let [values, slopes] = Spacecraft::flat(inputs);
+        self.0.step(&values, &slopes, h)
+    }
+
+    pub fn outputs(&mut self, inputs: &Inputs) -> Outputs {
+        let [values, slopes] = Spacecraft::flat(inputs);
+        self.0.set(&values, &slopes).unwrap();
+        self.outputs_after_step()
+    }
+
+    /// Outputs and locals.
+    pub fn all(&mut self) -> Vec<f64> {
+        self.0.outputs()
+    }
+
+    /// As a host finds the outputs that has just made a step.
+    pub fn outputs_after_step(&mut self) -> Outputs {
+        let numbers = self.0.outputs();
+        let next = &mut Numbers(numbers.iter());
+        let q = next.array();
+        let [omega, omega_dot, specific_force, position, velocity] = next.matrix();
+        let [slosh_force, slosh_torque, momentum, angular_momentum, center_of_mass] = next.matrix();
+        Outputs {
+            q,
+            omega,
+            omega_dot,
+            specific_force,
+            position,
+            velocity,
+            slosh_force,
+            slosh_torque,
+            momentum,
+            angular_momentum,
+            center_of_mass,
+            energy: next.one(),
+            work: next.one(),
+            dissipated: next.one(),
+            mass: next.one(),
+            inertia: next.matrix(),
+            tank: [(); TANKS].map(|()| {
+                let (force, torque) = (next.array(), next.array());
+                read_tank(force, torque, next)
+            }),
+        }
+    }
+
+    pub fn continuous_states(&mut self) -> [f64; STATES] {
+        self.0.states().try_into().unwrap()
+    }
+
+    pub fn set_continuous_states(&mut self, x: &[f64; STATES]) {
+        self.0.set_states(x);
+    }
+
+    pub fn derivatives(&mut self, inputs: &Inputs) -> [f64; STATES] {
+        let [values, slopes] = Spacecraft::flat(inputs);
+        self.0.set(&values, &slopes).unwrap();
+        self.0.derivatives().try_into().unwrap()
+    }
+
+    pub fn directional_derivative(
+        &mut self,
+        inputs: &Inputs,
+        dx: &[f64; STATES],
+        du: &[f64; INPUTS],
+    ) -> [f64; STATES] {
+        let [values, slopes] = Spacecraft::flat(inputs);
+        self.0.set(&values, &slopes).unwrap();
+        self.0.directional(dx, du).try_into().unwrap()
+    }
+}
+
+/// SloshTank.fmu.
+pub struct SloshTank(Bound);
+
+impl SloshTank {
+    pub fn new(
+        p: &TankParameters,
+        inputs: &TankInputs,
+        start: f64,
+        tolerance: f64,
+    ) -> Result<SloshTank, CallError> {
+        let mut settings = Settings::default();
+        settings.tank("tank", &p.tank);
+        settings.integer("coupling", p.coupling as i32);
+        if let Some(host) = &p.host {
+            settings.craft("host", host);
+        }
+        let inputs_named = ["a", "omega", "omega_dot"].iter().flat_map(|name| elements(name, 3));
+        let mut outputs: Vec<String> = elements("force", 3).chain(elements("torque", 3)).collect();
+        outputs.extend(elements("bias", 6).chain(elements("added_mass", TRIANGLE)));
+        outputs.extend(["dissipated", "mass"].map(String::from));
+        outputs.extend(elements("center_of_mass", 3).chain(rows("inertia", (3, 3))));
+        outputs.extend(tank_outputs("tank."));
+        let names = [inputs_named.collect(), outputs];
+        let fmu = (&*SLOSH_TANK, &::SloshTank::table::TABLE);
+        let [values, _] = SloshTank::flat(inputs);
+        Bound::new(fmu, settings, names, &values, (start, tolerance)).map(SloshTank)
+    }
+
+    fn flat(inputs: &TankInputs) -> [[f64; TANK_INPUTS]; 2] {
+        flat([&inputs.a, &Ramp::held(inputs.omega), &inputs.omega_dot])
+    }
+
+    pub fn step(&mut self, inputs: &TankInputs, h: f64) -> Result<(), CallError> {
+        let [values, slopes] = SloshTank::flat(inputs);
+        self.0.step(&values, &slopes, h)
+    }
+
+    pub fn outputs(&mut self, inputs: &TankInputs) -> SloshTankOutputs {
+        let [values, slopes] = SloshTank::flat(inputs);
+        self.0.set(&values, &slopes).unwrap();
+        self.outputs_after_step()
+    }
+
+    /// Outputs and locals.
+    pub fn all(&mut self) -> Vec<f64> {
+        self.0.outputs()
+    }
+
+    /// As a host finds the outputs that has just made a step.
+    pub fn outputs_after_step(&mut self) -> SloshTankOutputs {
+        let numbers = self.0.outputs();
+        let next = &mut Numbers(numbers.iter());
+        let (force, torque) = (next.array(), next.array());
+        SloshTankOutputs {
+            bias: next.array(),
+            added_mass: next.array(),
+            dissipated: next.one(),
+            mass: next.one(),
+            center_of_mass: next.array(),
+            inertia: next.matrix(),
+            tank: read_tank(force, torque, next),
+        }
+    }
+
+    /// What the instance has warned of.
+    pub fn warning(&mut self) -> Option<String> {
+        let mut messages = self.0.instance.take_messages();
+        assert!(messages.len() < 2, "{messages:?}");
+        let message = messages.pop()?;
+        assert_eq!((message.status, &*message.category), (Status::Warning, "logStatusWarning"));
+        Some(message.text)
+    }
+
+    /// All there is to the instance.
+    pub fn save(&mut self) -> (FmuState, f64) {
+        (self.0.instance.get_state().unwrap(), self.0.time)
+    }
+
+    /// Goes back to what was saved.
+    pub fn restore(&mut self, (state, time): (FmuState, f64)) {
+        self.0.instance.set_state(&state).unwrap();
+        self.0.instance.free_state(state).unwrap();
+        self.0.time = time;
+    }
+
+    pub fn coupling_ratio(&mut self) -> Option<f64> {
+        let ratio = self.0.instance.real("coupling_ratio").unwrap();
+        (ratio > 0.0).then_some(ratio)
+    }
+
+    pub fn continuous_states(&mut self) -> [f64; TANK_STATES] {
+        self.0.states().try_into().unwrap()
+    }
+
+    pub fn set_continuous_states(&mut self, x: &[f64; TANK_STATES]) {
+        self.0.set_states(x);
+    }
+
+    pub fn derivatives(&mut self, inputs: &TankInputs) -> [f64; TANK_STATES] {
+        let [values, slopes] = SloshTank::flat(inputs);
+        self.0.set(&values, &slopes).unwrap();
+        self.0.derivatives().try_into().unwrap()
+    }
+}
