@@ -1,4 +1,5 @@
-//! Files of parameters: `"name" = value` as TOML, or SSP 1.0's parameter set (.ssv).
+//! Files of parameters: `"name" = value` as TOML, SSP 1.0's parameter set (.ssv), or the result of
+//! `hubslosh identify` (.json).
 
 use std::path::Path;
 
@@ -12,7 +13,8 @@ pub fn read(path: &Path) -> Result<Vec<(String, String)>> {
     let parse = match path.extension().and_then(|ending| ending.to_str()) {
         Some("toml") => from_toml,
         Some("ssv") => from_ssv,
-        _ => bail!("{shown}: the name must end in .toml or .ssv"),
+        Some("json") => from_json,
+        _ => bail!("{shown}: the name must end in .toml, .ssv or .json"),
     };
     let settings = parse(&text).with_context(|| shown.to_string())?;
     ensure!(!settings.is_empty(), "{shown} sets nothing");
@@ -50,6 +52,26 @@ fn from_toml(text: &str) -> Result<Vec<(String, String)>> {
     let (mut settings, mut wrong) = (Vec::new(), Vec::new());
     flatten("", &table, &mut settings, &mut wrong);
     ensure!(wrong.is_empty(), "{} (allowed: numbers, true and false, texts)", wrong.join("; "));
+    Ok(settings)
+}
+
+/// What was identified: `settings`, then the estimates of `parameters`. Another initial state of each recording
+/// is not a parameter of the bench and stands elsewhere in the file.
+fn from_json(text: &str) -> Result<Vec<(String, String)>> {
+    let root: serde_json::Value = serde_json::from_str(text)?;
+    let table = |key: &str| root.get(key).and_then(serde_json::Value::as_object);
+    let parameters = table("parameters")
+        .context("it has no \"parameters\": it is not a result of hubslosh identify")?;
+    let mut settings = Vec::new();
+    for (name, value) in table("settings").into_iter().flatten() {
+        let text = value.as_str().with_context(|| format!("settings: {name} is not a text"))?;
+        settings.push((name.clone(), text.to_string()));
+    }
+    for (name, estimate) in parameters {
+        let value = estimate.get("value").and_then(serde_json::Value::as_f64);
+        let value = value.with_context(|| format!("parameters: {name} has no number \"value\""))?;
+        settings.push((name.clone(), format!("{value:?}")));
+    }
     Ok(settings)
 }
 

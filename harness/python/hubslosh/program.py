@@ -126,20 +126,23 @@ def identify(
     model: str | None = None,
     *arguments: str,
     fmu: str | Path = "HubSlosh",
+    out: str | Path | None = None,
     program: str | Path | None = None,
 ) -> Identification:
     """Estimate the FMU's parameters from a measurement, with the program ``hubslosh identify``.
 
     data: a table, or a .csv or .parquet file, with the columns ``time`` (s), ``tau_cmd`` (N·m) and
     ``omega`` (rad/s). model: the slosh model. arguments: further flags of the command. fmu: the
-    name of an FMU of this package, or the file of a HubSlosh.
+    name of an FMU of this package, or the file of a HubSlosh. out: where to keep the result, .json.
 
     The parameters with ``settings`` simulate the bench:
-    ``{n: e.value for n, e in found.parameters.items()} | found.settings``.
+    ``{n: e.value for n, e in found.parameters.items()} | found.settings``, and so does the file:
+    ``simulate(parameters="result.json")``.
     """
     path = find_program(program)
     with tempfile.TemporaryDirectory() as folder:
         file, result = Path(folder) / "data.parquet", Path(folder) / "result.json"
+        result = result if out is None else Path(out)
         if isinstance(data, pd.DataFrame):
             missing = [name for name in ("time", "tau_cmd", "omega") if name not in data.columns]
             if missing:

@@ -1,6 +1,7 @@
 """Tables of numbers as files, .csv or .parquet by their names' endings, and files of parameters."""
 
 import argparse
+import json
 import os
 import tempfile
 import tomllib
@@ -33,9 +34,10 @@ def read_table(path: Path, columns: Sequence[str]) -> dict[str, np.ndarray]:
 
 
 def read_parameters(path: Path) -> dict[str, Value]:
-    """Read a file of parameters: ``"name" = value`` as .toml, or SSP 1.0's parameter set, .ssv.
+    """Read a file of parameters: .toml, .ssv or .json.
 
-    ``hubslosh tank --parameters`` writes both. Nested TOML tables are names with dots.
+    ``"name" = value`` as TOML (nested tables are names with dots), SSP 1.0's parameter set
+    (``hubslosh tank --parameters`` writes both), or what ``hubslosh identify --out`` writes.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -43,15 +45,26 @@ def read_parameters(path: Path) -> dict[str, Value]:
             found = dict(_flatten("", tomllib.loads(text)))
         elif path.suffix == ".ssv":
             found = dict(_parameters_of(ET.fromstring(text)))
+        elif path.suffix == ".json":
+            found = _identified(json.loads(text), path)
         else:
-            raise FmuError(f"{path}: the name must end in .toml or .ssv")
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, ET.ParseError) as error:
+            raise FmuError(f"{path}: the name must end in .toml, .ssv or .json")
+    except (OSError, ValueError, ET.ParseError) as error:
         raise FmuError(f"{path} cannot be read: {error}") from None
     wrong = [n for n, value in found.items() if not isinstance(value, bool | int | float | str)]
     if wrong or not found:
         what = f"{', '.join(wrong)} must be numbers, true, false or texts" if wrong else "is empty"
         raise FmuError(f"{path}: {what}")
     return found
+
+
+def _identified(result: object, path: Path) -> dict[str, Value]:
+    """Return settings and estimates of a result of ``hubslosh identify``."""
+    try:
+        estimates = {name: e["value"] for name, e in result["parameters"].items()}
+        return dict(result.get("settings", {})) | estimates
+    except (KeyError, TypeError, AttributeError):
+        raise FmuError(f"{path} is not a result of hubslosh identify") from None
 
 
 def _flatten(prefix: str, table: Mapping[str, object]) -> Iterator[tuple[str, object]]:

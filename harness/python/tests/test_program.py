@@ -45,7 +45,9 @@ def test_a_missing_program_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
         hubslosh.campaign("thesis", program="elsewhere")
 
 
-def test_identification_gives_typed_estimates(fmu: Path, request: pytest.FixtureRequest) -> None:
+def test_identification_gives_typed_estimates(
+    fmu: Path, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
     """From three minutes of sweep by the FMU itself: a rigid body, dry friction, white noise.
 
     The truth lies within four standard deviations of the estimate, which is 1 part in 16,000.
@@ -54,11 +56,12 @@ def test_identification_gives_typed_estimates(fmu: Path, request: pytest.Fixture
     torque = 0.05 * np.sin(2 * np.pi * (0.3 * time + 0.008 * time**2))
     bench = {"slosh.model": "frozen"}
     inputs = pd.DataFrame({"time": time, "tau_cmd": torque})
-    run = hubslosh.simulate(fmu, bench, inputs, outputs=["omega"])
+    clean = hubslosh.simulate(fmu, bench, inputs, outputs=["omega"])
+    run = clean.copy()
     random = np.random.default_rng(1)
     run["omega"] += 1e-4 * random.standard_normal(len(run))
     found = hubslosh.identify(
-        run, "frozen", "--perfect", fmu=fmu,
+        run, "frozen", "--perfect", fmu=fmu, out=tmp_path / "result.json",
         program=option(request, "--hubslosh"),
     )  # fmt: skip
     assert found.model == "frozen" and found.converged
@@ -69,3 +72,9 @@ def test_identification_gives_typed_estimates(fmu: Path, request: pytest.Fixture
     viscous = found.parameters["friction.b"]
     assert viscous.unit == "N.m.s" and 0 < viscous.std < 0.05 * viscous.value
     assert abs(viscous.value - 0.03793) < 4 * viscous.std
+    # the file simulates the bench: what differs is far below one row's noise of 1e-4 rad/s
+    twin = hubslosh.simulate(fmu, tmp_path / "result.json", inputs, outputs=["omega"])
+    assert np.std(twin["omega"] - clean["omega"]) < 3e-5
+    (tmp_path / "other.json").write_text("[]")
+    with pytest.raises(FmuError, match="not a result of hubslosh identify"):
+        hubslosh.simulate(fmu, tmp_path / "other.json", inputs)

@@ -32,9 +32,10 @@ pub struct RunArgs {
     /// Pass over columns of --input that are no inputs, instead of refusing them.
     #[arg(long, requires = "input")]
     ignore_columns: bool,
-    /// Sets the parameters of a file, `"name" = value` as TOML or SSP's .ssv, before those of --set.
-    #[arg(long, value_name = "FILE")]
-    set_file: Option<PathBuf>,
+    /// Sets the parameters of a file before those of --set: `"name" = value` as TOML, SSP's .ssv, or
+    /// the .json that `hubslosh identify` writes.
+    #[arg(long, visible_alias = "set-file", value_name = "FILE")]
+    parameters: Option<PathBuf>,
     /// Sets a parameter or an input by its FMU name; enumerations by name or number.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
@@ -86,7 +87,7 @@ impl RunArgs {
             }
             (None, None) => bail!("a run needs --profile or --input"),
         };
-        let mut settings = match &self.set_file {
+        let mut settings = match &self.parameters {
             Some(path) => set_file::read(path)?,
             None => Vec::new(),
         };
@@ -150,6 +151,7 @@ fn help() -> String {
          hubslosh run --profile sine:amplitude=0.05,frequency=2.344 --set friction.model=none \\\n      \
          --set tank.h=0.05 --step 0.005 --columns theta,omega,slosh_angle --out dwell.csv\n  \
          hubslosh run --input torque.csv --out answer.csv\n  \
+         hubslosh run --parameters result.json --input bench.csv --ignore-columns --out twin.csv\n  \
          hubslosh run --profile zero --set init.slosh_angle=0.1 --out - | head",
         profile::help()
     )

@@ -197,7 +197,7 @@ fn a_curved_meniscus_reaches_the_fmu_and_what_it_cannot_take_is_told() {
 fn set_files_that_are_none_are_refused_in_a_sentence() {
     let folder = tempfile::tempdir().unwrap();
     for (name, text, words) in [
-        ("set.txt", "a = 1", "must end in .toml or .ssv"),
+        ("set.txt", "a = 1", "must end in .toml, .ssv or .json"),
         ("set.toml", "a = [1]", "a is a array"),
         ("set.toml", "", "sets nothing"),
         ("set.toml", "\"tank.q\" = 1", "tank.q"),
@@ -208,6 +208,8 @@ fn set_files_that_are_none_are_refused_in_a_sentence() {
             "x has no value",
         ),
         ("set.ssv", "<ParameterSet>", "could not be read"),
+        ("set.json", "{}", "it is not a result of hubslosh identify"),
+        ("set.json", r#"{"parameters": {"hub.I": 1}}"#, "hub.I has no number"),
     ] {
         let path = folder.path().join(name);
         std::fs::write(&path, text).unwrap();

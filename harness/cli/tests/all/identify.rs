@@ -1,0 +1,53 @@
+//! `hubslosh identify` from outside, and what is done with its result.
+
+use std::path::Path;
+use std::process::Command;
+
+use bench::table::Table;
+
+/// Runs the program in a folder and returns what it prints; stderr if it fails.
+fn hubslosh(folder: &Path, arguments: &[&str]) -> Result<String, String> {
+    let done = Command::new(env!("CARGO_BIN_EXE_hubslosh"))
+        .current_dir(folder)
+        .args(arguments)
+        .args(["--fmu", pack::packed_for_tests().to_str().unwrap()])
+        .output()
+        .unwrap();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    if done.status.success() { Ok(text(&done.stdout)) } else { Err(text(&done.stderr)) }
+}
+
+/// Three minutes of a bench without slosh, its gyro's noise in `omega`.
+fn record(folder: &Path, name: &str, settings: &[&str]) {
+    let torque = "lin-sweep:amplitude=0.05,f0=0.3,f1=3,duration=180";
+    let mut arguments = vec!["run", "--profile", torque, "--columns", "omega,omega_imu"];
+    for setting in ["slosh.model=frozen", "imu.enabled=true"].iter().chain(settings) {
+        arguments.extend(["--set", setting]);
+    }
+    hubslosh(folder, &[&arguments[..], &["--out", "clean.csv"]].concat()).unwrap();
+    let all = ["time", "tau_cmd", "omega_imu"];
+    let clean = Table::read(&folder.join("clean.csv"), &all).unwrap();
+    let columns = all.map(|column| clean.column(column).unwrap().to_vec()).to_vec();
+    let names = ["time", "tau_cmd", "omega"].map(String::from).to_vec();
+    Table::new(names, columns).write(&folder.join(name), &Default::default()).unwrap();
+}
+
+#[test]
+fn what_was_identified_is_fed_back_to_a_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    record(folder, "data.csv", &["hub.I=0.5"]);
+    let asked = ["identify", "data.csv", "--model", "frozen", "--perfect", "--out", "result.json"];
+    hubslosh(folder, &asked).unwrap();
+    let asked = ["run", "--parameters", "result.json", "--input", "data.csv", "--ignore-columns"];
+    hubslosh(folder, &[&asked[..], &["--columns", "omega", "--out", "twin.csv"]].concat()).unwrap();
+    let column = |name: &str| {
+        let table = Table::read(&folder.join(name), &["omega"]).unwrap();
+        table.column("omega").unwrap().to_vec()
+    };
+    let (clean, twin) = (column("clean.csv"), column("twin.csv"));
+    let off: f64 = clean.iter().zip(&twin).map(|(a, b)| (a - b).powi(2)).sum();
+    // rows of noise of 4e-4 rad/s and some parameters: far below one row's noise, and far below the 0.03 rad/s that
+    // another inertia would make
+    assert!((off / clean.len() as f64).sqrt() < 1e-4, "{off}");
+}
