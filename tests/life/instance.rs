@@ -559,19 +559,36 @@ fn bytes_that_are_no_state_are_refused() {
     assert!(from_bytes(b"HubSlosh").is_err());
 }
 
+/// Saved bytes with another number in the place of one that occurs once, and their checksum made anew.
+fn with_number(mut bytes: Vec<u8>, old: f64, new: f64) -> Vec<u8> {
+    let place = bytes.windows(8).position(|bytes| bytes == old.to_le_bytes()).unwrap();
+    bytes[place..place + 8].copy_from_slice(&new.to_le_bytes());
+    let body = bytes.len() - 16;
+    let checksum = Hash::new().bytes(&bytes[..body]).value().to_le_bytes();
+    bytes[body..].copy_from_slice(&checksum);
+    bytes
+}
+
 #[test]
 fn an_input_out_of_range_in_saved_bytes_is_refused() {
     let mut instance = lively(4, 4);
     let g: f64 = 9.123456;
     set(&mut instance, &[("g_axial", Value::Real(g))]);
-    let mut bytes = to_bytes(&instance);
-    let place = bytes.windows(8).position(|bytes| bytes == g.to_le_bytes()).unwrap();
-    bytes[place..place + 8].copy_from_slice(&(-g).to_le_bytes());
-    let body = bytes.len() - 16;
-    let checksum = Hash::new().bytes(&bytes[..body]).value().to_le_bytes();
-    bytes[body..].copy_from_slice(&checksum);
-    let why = from_bytes(&bytes).unwrap_err();
+    let why = from_bytes(&with_number(to_bytes(&instance), g, -g)).unwrap_err();
     assert!(why.contains("g_axial = -9.123456"), "{why}");
+}
+
+/// A ring wider than the tank's radius is in the range of its variable alone.
+#[test]
+fn parameters_in_saved_bytes_that_do_not_go_together_are_refused() {
+    let width = 0.0123456;
+    let mut instance = fresh();
+    set(&mut instance, &[("baffle.width", Value::Real(width))]);
+    instance.enter_initialization_mode().unwrap();
+    instance.exit_initialization_mode().unwrap();
+    let bytes = to_bytes(&instance);
+    assert!(from_bytes(&with_number(bytes.clone(), width, 0.012)).is_ok());
+    assert!(from_bytes(&with_number(bytes, width, 1.9)).is_err());
 }
 
 /// One step of 1 us shows the derivative to (1 us)^2 of the third derivative, at most

@@ -138,6 +138,10 @@ pub fn along_rod(p: Vec3, hinge: Vec3) -> [f64; 6] {
     [p[0], p[1], p[2], c[0], c[1], c[2]]
 }
 
+/// Inverses of mass (1/kg) and inertia (1/(kg m2)) stay below this: what is made of them, with masses
+/// up to 1e12 kg and arms up to 1e9 m, is far from overflow.
+const LARGEST_INVERSE: f64 = 1e30;
+
 /// A symmetric positive definite matrix as L D L^T, L with ones on its diagonal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Factors<T = f64> {
@@ -175,9 +179,13 @@ impl<T: Number> Factors<T> {
         Factors { l, inverse, pivots }
     }
 
-    /// Smallest pivot over its element of the diagonal: 0, below it or NaN for a matrix that is
-    /// not positive definite.
+    /// Smallest pivot over its element of the diagonal; 0 for a matrix that is not positive definite,
+    /// or so nearly singular that its inverse passes [`LARGEST_INVERSE`].
     pub fn smallest_pivot(&self) -> f64 {
+        let bounded = |x: &T| (0.0..=LARGEST_INVERSE).contains(&x.value());
+        if !self.inverse.iter().all(bounded) {
+            return 0.0;
+        }
         // NaN counts as 0.
         self.pivots.iter().fold(1.0, |least, &x| if x >= least { least } else { x.max(0.0) })
     }

@@ -140,10 +140,16 @@ fn life_of<M: Model>(interface: Interface, settings: &[(&str, Value)], all: &mut
 /// If there are none for the model.
 fn settings(model: &str) -> Vec<Vec<(&'static str, Value)>> {
     match model {
-        "HubSlosh" => (1..=5)
-            .map(|liquid| {
+        // each slosh model, each with a friction law; linear ones with a baffle
+        "HubSlosh" => [(1, 2), (2, 3), (3, 4), (4, 5), (5, 3), (6, 5), (2, 5)]
+            .map(|(liquid, friction)| {
                 vec![
                     ("slosh.model", Integer(liquid)),
+                    ("friction.model", Integer(friction)),
+                    ("friction.asymmetry", Real(0.1)),
+                    ("bench.tilt", Real(0.01)),
+                    ("hub.imbalance", Real(0.02)),
+                    ("baffle.width", Real(if liquid == 2 { 0.01 } else { 0.0 })),
                     ("slosh.modes", Integer(2)),
                     ("init.omega", Real(0.3)),
                     ("init.slosh_angle", Real(0.2)),
@@ -151,7 +157,7 @@ fn settings(model: &str) -> Vec<Vec<(&'static str, Value)>> {
                     ("imu.enabled", Boolean(true)),
                 ]
             })
-            .collect(),
+            .into(),
         // free, on a pivot (2)
         "Spacecraft" => [(1, 0), (1, 1), (1, 4), (2, 2)]
             .map(|(mount, tanks)| {
@@ -166,6 +172,8 @@ fn settings(model: &str) -> Vec<Vec<(&'static str, Value)>> {
                     ("tank[4].modes", Integer(0)),
                     ("init.omega[2]", Real(0.2)),
                     ("h_wheels[1]", Real(3.0)),
+                    ("tank[1].fill.points", Integer(if tanks == 1 { 8 } else { 0 })),
+                    ("mass_flow[1]", Real(0.5)),
                 ]
             })
             .into(),

@@ -118,7 +118,8 @@ impl Model for HubSlosh {
 
     fn resume(parameters: &Parameters, words: &[u64], tolerance: f64) -> Option<Self> {
         let state = State::from_words(words.try_into().ok()?)?;
-        let plant = Plant::resume(&parameters.resolved().ok()?, &state, tolerance);
+        let p = parameters.resolved().ok()?;
+        let plant = Plant::problems(&p).is_empty().then(|| Plant::resume(&p, &state, tolerance))?;
         Some(HubSlosh { plant, present: false })
     }
 

@@ -82,6 +82,14 @@ pub struct Plant {
 }
 
 impl Plant {
+    /// Everything that is wrong with how the parameters go together, wherever the motion starts.
+    pub fn problems(p: &Parameters) -> Vec<String> {
+        let mut problems = Law::problems(&p.friction);
+        problems.extend(p.wheel.problems());
+        problems.extend(tank::problems(p));
+        problems
+    }
+
     /// A plant at the start of its motion, at `start_time` (s), with the inputs that
     /// act then; `tolerance` is the relative error allowed in rates and angles.
     ///
@@ -94,9 +102,7 @@ impl Plant {
         start_time: f64,
         tolerance: f64,
     ) -> Result<Plant, Vec<String>> {
-        let mut problems = Law::problems(&p.friction);
-        problems.extend(p.wheel.problems());
-        problems.extend(tank::problems(p));
+        let mut problems = Plant::problems(p);
         let mut state = State {
             time: start_time,
             x: [0.0; STATES],
@@ -145,7 +151,8 @@ impl Plant {
         tank::warnings(p, inputs.g_axial.value)
     }
 
-    /// A plant that continues from a saved state of one with the same parameters.
+    /// A plant that continues from a saved state of one with the same parameters, in which
+    /// [`Plant::problems`] finds nothing.
     pub fn resume(p: &Parameters, state: &State, tolerance: f64) -> Plant {
         Plant::of_parameters(p, *state, tolerance)
     }

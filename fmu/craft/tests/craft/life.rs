@@ -279,6 +279,9 @@ fn every_problem_with_the_parameters_is_returned() {
     assert!(problems[0].contains("is singular"), "{problems:?}");
     p.tank[0].i_z = 1.0;
     assert!(p.problems().is_empty());
+    // So little that what is divided by it overflows.
+    p.tank[0].i_z = 1e-200;
+    assert!(p.problems()[0].contains("is singular"));
     p.craft.j.zz = -1.0;
     assert!(p.problems()[0].starts_with("craft.Jzz = -1.0 (allowed: 0.0 to"));
 
