@@ -24,6 +24,11 @@ impl HubSlosh {
     pub fn calculated(&self) -> &Calculated {
         self.plant.calculated()
     }
+
+    /// See [`Plant::damping_ratio`].
+    pub fn damping_ratio(&self, n: usize, inputs: &Inputs) -> [f64; 2] {
+        self.plant.damping_ratio(n, inputs)
+    }
 }
 
 /// The plant's parameters, and the ways round enumerations for hosts that set none.

@@ -152,7 +152,7 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     V::local("work_axial", |o, _| o.work_axial, "J",
         "Work done on the liquid through changes of g_axial since the start: energy - energy(0) = work + work_axial - heat. Co-Simulation: exact, also for jumps; Model Exchange: added up at accepted steps, to the fourth order of their length where g_axial is linear in time")
         .nominal(0.01).depends_on(&["theta", "slosh.q_radial", "slosh.q_tangential", "g_axial"]),
-    V::local("slosh.damping", |o, n| o.damping[n], "1",
+    V::local_of_inputs("slosh.damping", |model, inputs, n| model.damping_ratio(n, inputs), "1",
         "Damping ratio of a mode at the present g_axial, without a baffle's; 0 for modes that are not used")
         .shape(&[MODES]).depends_on(&["g_axial"]).initial_depends_on(LIQUID),
     V::local("baffle.zeta", |o, _| o.baffle_zeta, "1",

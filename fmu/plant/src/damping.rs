@@ -73,27 +73,22 @@ impl Damping {
         Damping { tangent_at: Some(g), ..self.clone() }
     }
 
-    /// The damping ratios at g; 0 without restoring force and where they overflow next to it:
-    /// there they have no meaning.
-    pub fn ratios(&self, g: f64) -> [f64; MODES] {
-        core::array::from_fn(|n| {
-            let (zeta, a) = (self.zeta[n], self.centring[n]);
-            match self.exponent == 0.25 {
-                _ if g + a <= 0.0 => 0.0,
-                true if g != self.reference => finite_or_zero(zeta / self.power(g, a)),
-                _ => zeta,
-            }
-        })
+    /// The damping ratio of mode `n` at g; 0 without restoring force and where it overflows next to
+    /// it: there it has no meaning.
+    pub fn ratio(&self, n: usize, g: f64) -> f64 {
+        let (zeta, a) = (self.zeta[n], self.centring[n]);
+        match self.exponent == 0.25 {
+            _ if g + a <= 0.0 => 0.0,
+            true if g != self.reference => finite_or_zero(zeta / self.power(g, a)),
+            _ => zeta,
+        }
     }
 
-    /// The derivatives of the damping ratios by g, s2/m.
-    pub fn slopes_of_ratios(&self, g: f64) -> [f64; MODES] {
-        let ratios = self.ratios(g);
-        core::array::from_fn(|n| {
-            let x = g + self.centring[n];
-            let changes = x > 0.0 && self.exponent == 0.25;
-            if changes { finite_or_zero(-ratios[n] / (4.0 * x)) } else { 0.0 }
-        })
+    /// Its derivative by g, s2/m.
+    pub fn slope_of_ratio(&self, n: usize, g: f64) -> f64 {
+        let x = g + self.centring[n];
+        let changes = x > 0.0 && self.exponent == 0.25;
+        if changes { finite_or_zero(-self.ratio(n, g) / (4.0 * x)) } else { 0.0 }
     }
 
     /// Gives mode `n` its restoring specific force and the course of its damping from here on;

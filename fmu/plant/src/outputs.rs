@@ -1,6 +1,5 @@
 //! What can be read of the plant at an instant, and its time derivatives along a direction.
 
-use crate::MODES;
 use crate::friction::{Contact, Law};
 use crate::plant::{Inputs, Plant, Ramp};
 use crate::slosh::{Angles, SloshMode, with_modes};
@@ -88,9 +87,6 @@ pub struct Outputs {
     pub stuck_time: f64,
     /// Damping ratio of the first mode by the baffle, at the present motion.
     pub baffle_zeta: f64,
-    /// Viscous damping ratio of each mode at the present g_axial; 0 for modes that are not used, and
-    /// at g_axial = 0.
-    pub damping: [f64; MODES],
     /// What changes at events alone.
     pub discrete: Discrete,
 }
@@ -193,7 +189,6 @@ impl Plant {
             heat: state.x[x::HEAT],
             stuck_time: state.x[x::STUCK_TIME],
             baffle_zeta,
-            damping: self.motion.damping.ratios(inputs.g_axial.value),
             discrete: Discrete {
                 stuck: state.contact == Contact::Stuck,
                 regime: state.ranges.regime,
@@ -203,6 +198,13 @@ impl Plant {
                 event_time: state.event_time,
             },
         }
+    }
+
+    /// Viscous damping ratio of mode `n` at the present g_axial, and its rate along g_axial's slope,
+    /// 1/s; 0 for modes that are not used, and at g_axial = 0.
+    pub fn damping_ratio(&self, n: usize, inputs: &Inputs) -> [f64; 2] {
+        let (damping, g) = (&self.motion.damping, inputs.g_axial);
+        [damping.ratio(n, g.value), damping.slope_of_ratio(n, g.value) * g.slope]
     }
 
     /// The derivative of the outputs in the direction (dx, du); what is discrete in them
@@ -233,8 +235,7 @@ impl Plant {
         let step = if size >= f64::MIN_POSITIVE { SHARE / size } else { 1.0 };
         let with_wheel = std::mem::replace(&mut self.wheel.enabled, false);
         let law = std::mem::replace(&mut self.motion.law, Law::NONE);
-        let g = inputs.g_axial.value;
-        let tangent = self.motion.damping.tangent(g);
+        let tangent = self.motion.damping.tangent(inputs.g_axial.value);
         let damping = self.motion.set_damping(tangent);
         let [p2, p1, m1, m2] = [2.0, 1.0, -1.0, -2.0].map(|steps| {
             let s = steps * step;
@@ -247,7 +248,7 @@ impl Plant {
         });
         self.wheel.enabled = with_wheel;
         self.motion.law = law;
-        self.motion.set_damping(damping.clone());
+        self.motion.set_damping(damping);
         self.state.x = before;
 
         let by_differences = |get: fn(&Outputs) -> f64| {
@@ -289,7 +290,6 @@ impl Plant {
             heat: dx[x::HEAT],
             stuck_time: dx[x::STUCK_TIME],
             baffle_zeta: by_differences(|o| o.baffle_zeta),
-            damping: damping.slopes_of_ratios(g).map(|slope| slope * du[2]),
             discrete: now.discrete,
         }
     }

@@ -232,6 +232,9 @@ impl<M: Model> Instance<M> {
             (None, Access::Output(get), _, Some(outputs)) => {
                 Ok(Value::Real(get(outputs, scalar.element)))
             }
+            (None, Access::Output(get), Some(_), None) => {
+                Ok(Value::Real(get(self.outputs(call)?, scalar.element)))
+            }
             _ => self.get_any(call, scalar),
         }
     }
@@ -265,6 +268,10 @@ impl<M: Model> Instance<M> {
                 self.scratch[0] = x_dot;
                 done?;
                 Value::Real(value)
+            }
+            Access::OfInputs(get) => {
+                let inputs = self.inputs;
+                Value::Real(get(self.model(call)?, &inputs, element)[0])
             }
             Access::Output(get) => Value::Real(get(self.outputs(call)?, element)),
             Access::OutputInteger(get) => Value::Integer(get(self.outputs(call)?)),
@@ -516,6 +523,7 @@ impl<M: Model> Instance<M> {
                     (Access::Derivative(place), _) => dx_dot[place(scalar.element)],
                     (_, Some(place)) => dx[place],
                     (Access::Output(get), _) => get(&outputs, scalar.element),
+                    (Access::OfInputs(get), _) => get(self.model(call)?, along, scalar.element)[1],
                     _ => {
                         return Err(call.error(format_args!(
                             "{} is not computed from states and inputs",
@@ -842,12 +850,17 @@ impl<M: Model> Instance<M> {
     }
 
     /// The outputs now; they are computed when they are first asked for.
+    #[inline(always)]
     fn outputs(&mut self, call: &Call) -> Result<&M::Outputs, Fault> {
-        self.model(call)?;
-        let Instance { interface, model: Some(model), inputs, outputs, .. } = self else {
-            return Err(call.error("the instance was never initialised"));
-        };
-        Ok(outputs.get_or_insert_with(|| seen(*interface, model, inputs, M::outputs)))
+        if self.outputs.is_none() {
+            self.evaluate(call)?;
+        }
+        self.outputs.as_ref().ok_or_else(|| call.error("the instance was never initialised"))
+    }
+
+    fn evaluate(&mut self, call: &Call) -> Result<(), Fault> {
+        self.outputs = Some(self.look(call, M::outputs)?);
+        Ok(())
     }
 
     /// What is [`seen`] of the model.
@@ -856,8 +869,11 @@ impl<M: Model> Instance<M> {
         call: &Call,
         look: impl FnOnce(&mut M, &M::Inputs) -> T,
     ) -> Result<T, Fault> {
-        let (interface, inputs) = (self.interface, self.inputs);
-        Ok(seen(interface, self.model(call)?, &inputs, look))
+        self.model(call)?;
+        let Instance { interface, model: Some(model), inputs, .. } = self else {
+            return Err(call.error("the instance was never initialised"));
+        };
+        Ok(seen(*interface, model, inputs, look))
     }
 
     /// How many events have happened since the start.

@@ -104,6 +104,8 @@ pub enum Access<M: Model> {
     Output(fn(&M::Outputs, usize) -> f64),
     OutputInteger(fn(&M::Outputs) -> i32),
     OutputBoolean(fn(&M::Outputs) -> bool),
+    /// Of parameters and present inputs alone: its value, and its rate along the inputs' slopes.
+    OfInputs(fn(&M, &M::Inputs, usize) -> [f64; 2]),
     Real(fn(&mut M::Parameters, usize) -> &mut f64),
     Boolean(fn(&mut M::Parameters) -> &mut bool),
     Integer(fn(&mut M::Parameters, usize) -> &mut i32),
@@ -220,6 +222,17 @@ impl<M: Model> Variable<M> {
         description: &'static str,
     ) -> Self {
         variable(name, Causality::Local, quantity(unit), Access::Output(get), description)
+    }
+
+    /// A real quantity to look at that follows from parameters and present inputs alone; with its
+    /// rate along the inputs' slopes.
+    pub const fn local_of_inputs(
+        name: &'static str,
+        get: fn(&M, &M::Inputs, usize) -> [f64; 2],
+        unit: &'static str,
+        description: &'static str,
+    ) -> Self {
+        variable(name, Causality::Local, quantity(unit), Access::OfInputs(get), description)
     }
 
     /// A continuous state that is not among the outputs.

@@ -8,7 +8,8 @@
 //!
 //! * `linear`, `spherical`: the packed FMU (`dist/HubSlosh.fmu`), slosh model of that
 //!   name, set-valued friction; without REFERENCE it writes its rates there to compare
-//!   with later (`work_precision linear 1e-13 2700 1 --write FILE`).
+//!   with later (`work_precision linear 1e-13 2700 1 --write FILE`). `linear/12` reads the first
+//!   12 outputs after every step, in one call, instead of omega alone.
 //! * `dopri5`, `dop853`: ode_solvers on the linear model with sgn(omega) smoothed to
 //!   tanh(omega/1e-5), over the whole sweep in one call; `dopri5@1e-8` with another scale
 //!   than 1e-5 rad/s.
@@ -40,7 +41,7 @@ fn torque(seconds: f64) -> Vec<f64> {
 /// Rates at the knots, rad/s, and what each piece took, s.
 type Solution = (Vec<f64>, Vec<f64>);
 
-fn fmu(model: &str, tolerance: f64, torque: &[f64]) -> Result<Solution> {
+fn fmu(model: &str, outputs: usize, tolerance: f64, torque: &[f64]) -> Result<Solution> {
     let fmu = Fmu::open(Path::new("dist/HubSlosh.fmu"))?;
     let mut instance = fmu.instantiate("work_precision")?;
     instance.set("slosh.model", model)?;
@@ -50,6 +51,11 @@ fn fmu(model: &str, tolerance: f64, torque: &[f64]) -> Result<Solution> {
     let reference =
         |name: &str| Ok::<u32, anyhow::Error>(fmu.description().variable(name)?.reference);
     let (tau, omega) = (reference("tau_cmd")?, reference("omega")?);
+    let all = fmu.description().variables.iter().filter(|v| v.causality == "output");
+    let others = all.map(|v| v.reference).filter(|reference| *reference != omega);
+    let read: Vec<u32> = std::iter::once(omega).chain(others).take(outputs).collect();
+    ensure!(read.len() == outputs, "{outputs} outputs (allowed: 1 to {})", read.len());
+    let mut values = vec![0.0; read.len()];
     let (mut rates, mut took) = (vec![0.0; torque.len()], Vec::new());
     for begin in (0..torque.len() - 1).step_by(PIECE) {
         let start = Instant::now();
@@ -58,7 +64,8 @@ fn fmu(model: &str, tolerance: f64, torque: &[f64]) -> Result<Solution> {
             instance.set_real(&[tau], &torque[k..k + 1])?;
             instance.set_real_input_derivatives(&[tau], &[1], &[slope])?;
             instance.do_step(k as f64 * STEP, STEP)?;
-            instance.get_real(&[omega], &mut rates[k + 1..k + 2])?;
+            instance.get_real(&read, &mut values)?;
+            rates[k + 1] = values[0];
         }
         took.push(start.elapsed().as_secs_f64());
     }
@@ -180,9 +187,11 @@ fn main() -> Result<()> {
             (at_knots(solver.x_out(), solver.y_out(), torque.len())?, took)
         }};
     }
+    let (method, outputs) = method.split_once('/').unwrap_or((method, "1"));
+    let outputs: usize = outputs.parse()?;
     let solve = || -> Result<Solution> {
         Ok(match method {
-            "linear" | "spherical" => fmu(method, tolerance, &torque)?,
+            "linear" | "spherical" => fmu(method, outputs, tolerance, &torque)?,
             "dopri5" => whole_sweep!(Dopri5, 10.0, 0.2, 0.04),
             "dop853" => whole_sweep!(Dop853, 6.0, 0.333, 0.0),
             "rk4" => rk4(&torque, eps, tolerance),
