@@ -1,11 +1,14 @@
 //! From recordings of torque and hub rate to the FMU's parameters, with their uncertainty.
 
+pub mod acceleration;
 pub mod budget;
 pub mod candidate;
 pub mod design;
 pub mod fit;
+pub mod frequency;
 pub mod friction;
 pub mod identification;
+pub mod least_squares;
 pub mod noise;
 pub mod plausible;
 pub mod recording;

@@ -1,0 +1,668 @@
+//! Friction and inertia by nonlinear least squares of the acceleration (thesis 5.2, corrected).
+//!
+//! ```text
+//! r_k = sqrt(w_k) [ I y_k − τ_k − τ_f(ω_k) ],   y_k = (ω_{k+1} − ω_{k−1})/(t_{k+1} − t_{k−1})
+//! τ_f = −[ b ω + sgn(ω) B±(θ) (c + d exp(−(ω/ω_s)²)) ],   B± = 1 ± asymmetry + harmonics of θ
+//! ```
+//!
+//! (5.1 and 5.3 to 5.6; the difference as printed, ω_{k+1} − ω_k over two steps, is half of the acceleration).
+//! It needs no simulation and no start, and no liquid that moves: its torque is not in the equation.
+//! Three things make it biased, and here each is dealt with:
+//!
+//! * y_k is the mean of the acceleration from t_{k−1} to t_{k+1}, less than its value at t_k by (Ωh)²/6:
+//!   3.2 % at 3.5 Hz and 50 Hz sampling, which goes into I. [`Form::Averaged`] takes the mean of the
+//!   torques over the same interval: of a torque joined by lines, and of the friction at the rates of the
+//!   parabola through three rows, whose sign may change within it.
+//! * The gyro's noise is in y_k, and I multiplies it: I comes out too small by the noise's share of the
+//!   power of y. That share is known from the noise, and so is that of b; the estimate is
+//!   p + (JᵀJ − N)⁻¹ N p, N the noise's expected part of JᵀJ (Söderström, Errors-in-Variables
+//!   Methods, 2018, chapter 4).
+//! * Near ω = 0 the measured sign is not that of ω. Expected is the mean over the noise, erf(ω/σ√2) ≈ tanh(ω/1.25σ).
+
+use std::collections::BTreeMap;
+
+use anyhow::{Result, bail, ensure};
+use host::fmi2::Fmu;
+use nalgebra::{DMatrix, DVector};
+use serde::Serialize;
+
+use crate::identification::Estimated;
+use crate::least_squares::{Minimum, minimise};
+use crate::recording::{self, Recording};
+use crate::uncertainty::Covariance;
+use crate::unknown::Scale;
+
+/// How rows are weighted (thesis 5.2.3).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Weights {
+    /// All rows alike.
+    Uniform,
+    /// Each row by the time it stands for: unevenly sampled rows.
+    Time,
+    /// Each recording alike, so that a long sweep does not outweigh a short manoeuvre.
+    Run,
+    /// Each recording alike, and each row in it by its time.
+    RunTime,
+}
+
+/// Which torques are set against the difference of rates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// Those at t_k (5.4).
+    AtRow,
+    /// Their means from t_{k−1} to t_{k+1}.
+    Averaged,
+}
+
+/// What is asked for.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Weights.
+    pub weights: Weights,
+    /// Bounds in place of the usual ones, by FMU name (`hub.I` stands for the whole inertia).
+    pub bounds: Vec<(String, f64, f64)>,
+    /// Harmonics of the hub's angle in the friction, 0 to 2; more than 0 needs the column theta.
+    pub harmonics: usize,
+    /// What is known of the bench, by FMU name.
+    pub settings: Vec<(String, String)>,
+}
+
+/// The result.
+#[derive(Clone, Debug, Serialize)]
+pub struct Found {
+    /// The FMU's parameters.
+    pub parameters: BTreeMap<String, Estimated>,
+    /// Inertia of hub and all the liquid, and each recording's gyro bias.
+    pub measurement: BTreeMap<String, Estimated>,
+    /// Settings of the FMU that belong to the parameters.
+    pub settings: BTreeMap<String, String>,
+    /// Sizes.
+    pub fit: Fit,
+    /// The search ended at a minimum.
+    pub converged: bool,
+    /// The residual is what the gyro's noise makes.
+    pub described: bool,
+    /// The same without any of the corrections above: 5.4 to 5.6 as they stand.
+    pub uncorrected: BTreeMap<String, f64>,
+    /// Unknowns that ended at a bound; they have no standard deviation.
+    pub at_bound: Vec<String>,
+    /// Names and matrix of the correlations.
+    pub correlations: (Vec<String>, Vec<Vec<f64>>),
+    /// Condition number of the sensitivities with columns of unit length.
+    pub condition: f64,
+    /// cond₂(J) in SI units, as the thesis states it.
+    pub condition_si: f64,
+    /// Braking against the angle in free decay (5.4), clockwise and counter-clockwise.
+    pub braking: Vec<Braking>,
+    /// In words.
+    pub verdict: Vec<String>,
+}
+
+/// Sizes of a fit.
+#[derive(Clone, Debug, Serialize)]
+pub struct Fit {
+    /// Rows that were used.
+    pub rows: usize,
+    /// Root mean square of the residual over I, rad/s².
+    pub rmse: f64,
+    /// What the gyro's noise makes of it, rad/s².
+    pub expected: f64,
+    /// The gyro's noise of one row, rad/s, for each recording.
+    pub noise: Vec<f64>,
+    /// Weights.
+    pub weights: Weights,
+}
+
+/// α(θ) = β_0 + Σ β_h^s sin hθ + β_h^c cos hθ of one direction, where no torque acts (thesis 5.4).
+#[derive(Clone, Debug, Serialize)]
+pub struct Braking {
+    /// `counter-clockwise` (forwards) or `clockwise`.
+    pub direction: &'static str,
+    /// β_0, then β_1^c, β_1^s, β_2^c, …, rad/s².
+    pub coefficients: Vec<f64>,
+    /// Their standard deviations, rad/s².
+    pub std: Vec<f64>,
+    /// Root mean square of what is left, rad/s².
+    pub rmse: f64,
+    /// Coefficient of determination.
+    pub r_squared: f64,
+    /// Rows.
+    pub rows: usize,
+}
+
+/// Length of the windows over which the residual's scores are summed, s: the difference makes neighbouring rows
+/// correlated.
+const WINDOW: f64 = 2.0;
+/// Residual over that of the gyro's noise, beyond which something else acts.
+const MISFIT: f64 = 1.1;
+/// Instants in an interval where the friction is taken.
+const PARTS: usize = 8;
+/// ω_s over the fastest speed, where searches begin.
+const SPEEDS: [f64; 3] = [0.1, 0.4, 1.2];
+/// Names of the first unknowns.
+const FIRST: [&str; 6] =
+    ["hub.I", "friction.b", "friction.c", "friction.d", "friction.omega_s", "friction.asymmetry"];
+
+/// A recording's rows 1 to n − 2 and what is differenced.
+struct Rows<'a> {
+    recording: &'a Recording,
+    /// Standard deviation of the gyro's noise, rad/s.
+    noise: f64,
+    /// sqrt(w_k).
+    weight: Vec<f64>,
+}
+
+impl Rows<'_> {
+    fn inner(&self) -> std::ops::Range<usize> {
+        1..self.recording.time.len() - 1
+    }
+
+    /// Weights of the rows k − 1, k, k + 1 in the torque's mean.
+    fn mean(&self, form: Form, k: usize) -> [f64; 3] {
+        let t = &self.recording.time;
+        match form {
+            Form::AtRow => [0.0, 1.0, 0.0],
+            Form::Averaged => {
+                let whole = 2.0 * (t[k + 1] - t[k - 1]);
+                [(t[k] - t[k - 1]) / whole, 0.5, (t[k + 1] - t[k]) / whole]
+            }
+        }
+    }
+
+    /// Instants within the interval where the friction is taken, and the weights of the three rows in the parabola through
+    /// them (Lagrange).
+    fn instants(&self, form: Form, k: usize) -> ([[f64; 3]; PARTS], usize) {
+        let t = &self.recording.time;
+        let mut weights = [[0.0, 1.0, 0.0]; PARTS];
+        if form == Form::AtRow {
+            return (weights, 1);
+        }
+        let (a, b, c) = (t[k - 1], t[k], t[k + 1]);
+        for (part, weight) in weights.iter_mut().enumerate() {
+            let at = a + (part as f64 + 0.5) / PARTS as f64 * (c - a);
+            *weight = [
+                (at - b) * (at - c) / ((a - b) * (a - c)),
+                (at - a) * (at - c) / ((b - a) * (b - c)),
+                (at - a) * (at - b) / ((c - a) * (c - b)),
+            ];
+        }
+        (weights, PARTS)
+    }
+
+    /// y_k.
+    fn acceleration(&self, k: usize) -> f64 {
+        let (t, w) = (&self.recording.time, &self.recording.rate);
+        (w[k + 1] - w[k - 1]) / (t[k + 1] - t[k - 1])
+    }
+}
+
+struct Problem<'a> {
+    rows: Vec<Rows<'a>>,
+    harmonics: usize,
+    form: Form,
+    scales: Vec<Scale>,
+    names: Vec<String>,
+}
+
+impl<'a> Problem<'a> {
+    fn new(recordings: &'a [Recording], options: &Options, form: Form) -> Result<Self> {
+        let count: usize = recordings.iter().map(|r| r.time.len() - 2).sum();
+        let rows: Vec<Rows> = recordings
+            .iter()
+            .map(|recording| {
+                let t = &recording.time;
+                let n = t.len() - 2;
+                let each = match options.weights {
+                    Weights::Uniform | Weights::Time => 1.0,
+                    Weights::Run | Weights::RunTime => {
+                        count as f64 / n as f64 / recordings.len() as f64
+                    }
+                };
+                let timed = matches!(options.weights, Weights::Time | Weights::RunTime);
+                let weight = (1..=n).map(|k| match timed {
+                    true => each * (t[k + 1] - t[k - 1]) / (2.0 * recording.step()),
+                    false => each,
+                });
+                Rows {
+                    recording,
+                    noise: recording::noise_level(&recording.rate).max(crate::noise::FLOOR),
+                    weight: weight.map(f64::sqrt).collect(),
+                }
+            })
+            .collect();
+        let largest = |of: &dyn Fn(&Rows) -> f64| rows.iter().map(of).fold(0.0, f64::max);
+        let torque = largest(&|r| r.recording.torque.iter().fold(0.0, |m, t| m.max(t.abs())));
+        let speed = largest(&|r| r.recording.rate.iter().fold(0.0, |m, w| m.max(w.abs())));
+        let size = |of: &dyn Fn(&Rows, usize) -> f64| {
+            rows.iter().flat_map(|r| r.inner().map(|k| of(r, k).powi(2))).sum::<f64>().sqrt()
+        };
+        let inertia = size(&|r, k| r.recording.torque[k]) / size(&|r, k| r.acceleration(k));
+        let mut names: Vec<String> = FIRST.map(String::from).to_vec();
+        let mut bounds = vec![
+            (0.0, 30.0 * inertia),
+            (0.0, 10.0 * torque / speed),
+            (0.0, torque),
+            (0.0, torque),
+            (1e-3 * speed, 10.0 * speed),
+            (-1.0, 1.0),
+        ];
+        for way in ["forward", "backward"] {
+            for h in 1..=options.harmonics {
+                for trig in ["cos", "sin"] {
+                    names.push(format!("friction.{way}_{trig}{h}"));
+                    bounds.push((-1.0, 1.0));
+                }
+            }
+        }
+        for i in 0..rows.len() {
+            names.push(format!("gyro_bias[{}]", i + 1));
+            bounds.push((-0.2 * speed, 0.2 * speed));
+        }
+        for (name, low, high) in &options.bounds {
+            let Some(place) = names.iter().position(|n| n == name) else {
+                bail!("there is no bound to set for {name} (there are {})", names.join(", "))
+            };
+            ensure!(low < high, "{name}: the lower bound {low} is not below the upper one {high}");
+            bounds[place] = (*low, *high);
+        }
+        let scales = bounds.into_iter().map(|(a, b)| Scale::Logit(a, b)).collect();
+        Ok(Problem { rows, harmonics: options.harmonics, form, scales, names })
+    }
+
+    fn values(&self, x: &[f64]) -> Vec<f64> {
+        self.scales.iter().zip(x).map(|(scale, x)| scale.value(*x)).collect()
+    }
+
+    /// Starts at a Stribeck speed over the fastest speed; friction is some hundredths of the torque, as in a bearing.
+    fn start(&self, part: f64) -> Vec<f64> {
+        let middle = |place: usize, part: f64| match self.scales[place] {
+            Scale::Logit(a, b) => self.scales[place].variable(a + part * (b - a)),
+            _ => 0.0,
+        };
+        let mut x: Vec<f64> = (0..self.names.len()).map(|place| middle(place, 0.5)).collect();
+        (x[0], x[1]) = (middle(0, 1.0 / 30.0), middle(1, 0.01));
+        (x[2], x[3], x[4]) = (middle(2, 0.03), middle(3, 0.02), middle(4, part / 10.0));
+        x
+    }
+
+    /// −τ_f at a measured rate near row i; its derivatives with respect to the values p are added to `slope`.
+    fn friction(
+        &self,
+        p: &[f64],
+        rows: &Rows,
+        (bias, i, rate): (usize, usize, f64),
+        slope: &mut [f64],
+    ) -> f64 {
+        let [_, b, c, d, speed, asymmetry] = [p[0], p[1], p[2], p[3], p[4], p[5]];
+        let w = rate - p[bias];
+        let width = 1.25 * rows.noise;
+        let sign = (w / width).tanh();
+        let shape = (-(w / speed).powi(2)).exp();
+        let dry = c + d * shape;
+        let mut factor = 1.0 + asymmetry * sign;
+        let mut factor_by_sign = asymmetry;
+        let per_way = 2 * self.harmonics;
+        if let (Some(angle), true) = (&rows.recording.angle, self.harmonics > 0) {
+            for h in 0..self.harmonics {
+                let (sin, cos) = (angle[i] * (h + 1) as f64).sin_cos();
+                for (k, trig) in [cos, sin].into_iter().enumerate() {
+                    let (ahead, back) = (6 + 2 * h + k, 6 + per_way + 2 * h + k);
+                    let (forwards, backwards) = ((1.0 + sign) / 2.0, (1.0 - sign) / 2.0);
+                    factor += trig * (p[ahead] * forwards + p[back] * backwards);
+                    factor_by_sign += trig * (p[ahead] - p[back]) / 2.0;
+                    slope[ahead] += sign * dry * trig * forwards;
+                    slope[back] += sign * dry * trig * backwards;
+                }
+            }
+        }
+        let sign_slope = (1.0 - sign * sign) / width;
+        slope[1] += w;
+        slope[2] += sign * factor;
+        slope[3] += sign * factor * shape;
+        slope[4] += sign * factor * d * shape * 2.0 * w * w / speed.powi(3);
+        slope[5] += sign * sign * dry;
+        slope[bias] += -(b + sign_slope * dry * (factor + sign * factor_by_sign)
+            - sign * factor * d * shape * 2.0 * w / (speed * speed));
+        b * w + sign * factor * dry
+    }
+
+    /// Residuals and, with values p, their derivatives.
+    fn evaluate(&self, p: &[f64], mut jacobian: Option<&mut DMatrix<f64>>) -> Vec<f64> {
+        let n = p.len();
+        let (mut residuals, mut slopes) = (Vec::new(), vec![0.0; n]);
+        for (index, rows) in self.rows.iter().enumerate() {
+            let bias = n - self.rows.len() + index;
+            for k in rows.inner() {
+                let mean = rows.mean(self.form, k);
+                let around = |signal: &[f64], weights: [f64; 3]| -> f64 {
+                    (0..3).map(|j| weights[j] * signal[k - 1 + j]).sum()
+                };
+                let (instants, parts) = rows.instants(self.form, k);
+                slopes.fill(0.0);
+                let mut friction = 0.0;
+                for weights in &instants[..parts] {
+                    let rate = around(&rows.recording.rate, *weights);
+                    friction += self.friction(p, rows, (bias, k, rate), &mut slopes);
+                }
+                let (weight, y) = (rows.weight[k - 1], rows.acceleration(k));
+                let torque = around(&rows.recording.torque, mean);
+                if let Some(jacobian) = jacobian.as_deref_mut() {
+                    let row = residuals.len();
+                    jacobian[(row, 0)] = weight * y;
+                    for j in 1..n {
+                        jacobian[(row, j)] = weight * slopes[j] / parts as f64;
+                    }
+                }
+                residuals.push(weight * (p[0] * y - torque + friction / parts as f64));
+            }
+        }
+        residuals
+    }
+
+    fn count(&self) -> usize {
+        self.rows.iter().map(|r| r.inner().len()).sum()
+    }
+
+    /// Derivatives with respect to the values.
+    fn jacobian(&self, p: &[f64]) -> DMatrix<f64> {
+        let mut jacobian = DMatrix::zeros(self.count(), p.len());
+        self.evaluate(p, Some(&mut jacobian));
+        jacobian
+    }
+
+    /// The best of the minima from these starts.
+    fn solve(&self, starts: &[Vec<f64>]) -> Minimum {
+        let residuals = |x: &[f64]| self.evaluate(&self.values(x), None);
+        let derivatives = |x: &[f64]| {
+            let mut jacobian = self.jacobian(&self.values(x));
+            for (j, mut column) in jacobian.column_iter_mut().enumerate() {
+                column *= self.scales[j].slope(x[j]);
+            }
+            jacobian
+        };
+        let minima = starts.iter().map(|start| minimise(&residuals, &derivatives, start));
+        let best = minima.min_by(|a, b| a.cost.total_cmp(&b.cost));
+        best.expect("there is a start")
+    }
+
+    /// What the noise adds to JᵀJ on average, in I and b.
+    fn of_noise(&self) -> DMatrix<f64> {
+        let mut part = DMatrix::zeros(self.names.len(), self.names.len());
+        for rows in &self.rows {
+            let t = &rows.recording.time;
+            for k in rows.inner() {
+                let scale = (rows.weight[k - 1] * rows.noise).powi(2);
+                let step = t[k + 1] - t[k - 1];
+                let (instants, parts) = rows.instants(self.form, k);
+                let mean: [f64; 3] = std::array::from_fn(|j| {
+                    instants[..parts].iter().map(|w| w[j]).sum::<f64>() / parts as f64
+                });
+                part[(0, 0)] += 2.0 * scale / (step * step);
+                part[(1, 1)] += scale * mean.iter().map(|m| m * m).sum::<f64>();
+                part[(0, 1)] += scale * (mean[2] - mean[0]) / step;
+                part[(1, 0)] = part[(0, 1)];
+            }
+        }
+        part
+    }
+}
+
+/// Estimates friction and inertia from recordings whose liquid does not move.
+pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Result<Found> {
+    ensure!(!recordings.is_empty(), "there is no recording");
+    ensure!(
+        options.harmonics <= 2,
+        "the FMU has 2 harmonics of the angle, not {}",
+        options.harmonics
+    );
+    if let (true, Some(without)) =
+        (options.harmonics > 0, recordings.iter().find(|r| r.angle.is_none()))
+    {
+        bail!("{}: harmonics of the angle need the column theta (rad)", without.name);
+    }
+    let liquid = inertia_of_liquid(fmu, &options.settings)?;
+    let plain = Problem::new(recordings, options, Form::AtRow)?;
+    let near = plain.solve(&SPEEDS.map(|part| plain.start(part)));
+    let uncorrected = plain.values(&near.x);
+    let problem = Problem::new(recordings, options, Form::Averaged)?;
+    let minimum = problem.solve(&[near.x]);
+    let p = problem.values(&minimum.x);
+    let n = p.len();
+    let at_bound: Vec<bool> = (0..n)
+        .map(|j| match problem.scales[j] {
+            Scale::Logit(a, b) => (p[j] - a).min(b - p[j]) < 1e-5 * (b - a),
+            _ => false,
+        })
+        .collect();
+    let free: Vec<usize> = (0..n).filter(|&j| !at_bound[j]).collect();
+    let jacobian = problem.jacobian(&p).select_columns(&free);
+    let Some(covariance) = Covariance::of(&jacobian) else {
+        bail!("some combination of inertia and friction has no influence on the recording")
+    };
+    let e = problem.evaluate(&p, None);
+    let of_noise = problem.of_noise().select_rows(&free).select_columns(&free);
+    // p + (JᵀJ − N)⁻¹ N p
+    let p_free = DVector::from_iterator(free.len(), free.iter().map(|&j| p[j]));
+    let normal = jacobian.tr_mul(&jacobian);
+    let corrected_normal = (&normal - &of_noise).try_inverse().filter(|m| m[(0, 0)] > 0.0);
+    let moved = corrected_normal.as_ref().map(|inverse| inverse * (&of_noise * &p_free));
+    let sandwich = covariance.sandwich(&jacobian, &e, &windows(&problem));
+    let mut of_values = DMatrix::zeros(n, n);
+    let mut values = p.clone();
+    for (i, &row) in free.iter().enumerate() {
+        values[row] += moved.as_ref().map_or(0.0, |m| m[i]);
+        for (j, &column) in free.iter().enumerate() {
+            of_values[(row, column)] = sandwich[(i, j)];
+        }
+    }
+    // the correction multiplies the noise's scatter as it does the estimate
+    if let Some(inverse) = &corrected_normal {
+        let widened = inverse * &normal;
+        let wide = &widened * &sandwich * widened.transpose();
+        for (i, &row) in free.iter().enumerate() {
+            for (j, &column) in free.iter().enumerate() {
+                of_values[(row, column)] = wide[(i, j)];
+            }
+        }
+    }
+    let rms = (e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64).sqrt();
+    let expected = p[0] * (problem.of_noise()[(0, 0)] / e.len() as f64).sqrt();
+    let described = rms < MISFIT * expected && corrected_normal.is_some();
+    let estimated = |j: usize, less: f64| {
+        let std = of_values[(j, j)].sqrt();
+        let value = values[j] - less;
+        Estimated {
+            value,
+            std,
+            std_noise: std,
+            interval: [value - 1.96 * std, value + 1.96 * std],
+            unit: unit(&problem.names[j]).into(),
+        }
+    };
+    let (mut parameters, mut measurement) = (BTreeMap::new(), BTreeMap::new());
+    for (j, name) in problem.names.iter().enumerate() {
+        if name.starts_with("gyro_bias") {
+            measurement.insert(name.clone(), estimated(j, 0.0));
+        } else {
+            parameters.insert(name.clone(), estimated(j, if j == 0 { liquid } else { 0.0 }));
+        }
+    }
+    measurement.insert("inertia".into(), estimated(0, 0.0));
+    let named = |keep: &dyn Fn(usize) -> bool| -> Vec<String> {
+        (0..n).filter(|&j| keep(j)).map(|j| problem.names[j].clone()).collect()
+    };
+    let correlations = Covariance::correlations(&sandwich);
+    let names = named(&|j| !at_bound[j]);
+    let si = jacobian.clone().qr().r().svd(false, false).singular_values;
+    let mut settings: BTreeMap<String, String> = options.settings.iter().cloned().collect();
+    settings.insert("slosh.model".into(), "frozen".into());
+    settings.insert("friction.model".into(), "stribeck".into());
+    let mut uncorrected: BTreeMap<String, f64> =
+        problem.names.iter().cloned().zip(uncorrected).collect();
+    uncorrected.entry("hub.I".into()).and_modify(|inertia| *inertia -= liquid);
+    let braking: Vec<Braking> =
+        [1.0, -1.0].into_iter().filter_map(|way| braking(recordings, way, 2)).collect();
+    let mut found = Found {
+        parameters,
+        measurement,
+        settings,
+        fit: Fit {
+            rows: e.len(),
+            rmse: rms / p[0],
+            expected: expected / p[0],
+            noise: problem.rows.iter().map(|r| r.noise).collect(),
+            weights: options.weights,
+        },
+        converged: minimum.converged,
+        described,
+        uncorrected,
+        at_bound: named(&|j| at_bound[j]),
+        correlations: (
+            names,
+            correlations.row_iter().map(|row| row.iter().copied().collect()).collect(),
+        ),
+        condition: covariance.condition,
+        condition_si: si.max() / si.min(),
+        braking,
+        verdict: Vec::new(),
+    };
+    found.verdict = words(&found);
+    Ok(found)
+}
+
+fn unit(name: &str) -> &'static str {
+    match name {
+        "hub.I" => "kg.m2",
+        "friction.b" => "N.m.s",
+        "friction.c" | "friction.d" => "N.m",
+        "friction.omega_s" => "rad/s",
+        _ if name.starts_with("gyro_bias") => "rad/s",
+        _ => "1",
+    }
+}
+
+/// Rows of the windows, over all recordings.
+fn windows(problem: &Problem) -> Vec<(usize, usize)> {
+    let (mut windows, mut first) = (Vec::new(), 0);
+    for rows in &problem.rows {
+        let count = rows.inner().len();
+        let width = ((WINDOW / rows.recording.step()) as usize).clamp(1, count);
+        let ends = (0..count).step_by(width).map(|k| (first + k, first + (k + width).min(count)));
+        windows.extend(ends);
+        first += count;
+    }
+    windows
+}
+
+/// Mass of the liquid times r², from the FMU with these settings.
+fn inertia_of_liquid(fmu: &Fmu, settings: &[(String, String)]) -> Result<f64> {
+    let mut instance = fmu.instantiate("identify")?;
+    for (name, value) in settings {
+        instance.set(name, value)?;
+    }
+    instance.setup_experiment(None, 0.0, None)?;
+    instance.enter_initialization_mode()?;
+    Ok(instance.real("tank.m_liq")? * instance.real("tank.r")?.powi(2))
+}
+
+/// Torque below which nothing drives the hub, over the largest torque.
+const FREE: f64 = 1e-3;
+/// Speeds of free decay: above this part of the fastest, or the sign is not sure.
+const MOVING: f64 = 0.05;
+
+/// The braking of free decay in one direction against the angle, ordinary least squares (thesis 5.4);
+/// `None` without angle or free decay.
+fn braking(recordings: &[Recording], way: f64, harmonics: usize) -> Option<Braking> {
+    let largest = |signal: &[f64]| signal.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+    let (mut rows, mut accelerations) = (Vec::new(), Vec::new());
+    for recording in recordings {
+        let angle = recording.angle.as_ref()?;
+        let (torque, rate, t) = (&recording.torque, &recording.rate, &recording.time);
+        let (still, slow) = (FREE * largest(torque), MOVING * largest(rate));
+        for k in 1..t.len() - 1 {
+            let free = (k - 1..=k + 1).all(|i| torque[i].abs() <= still && way * rate[i] > slow);
+            if free {
+                let mut row = vec![1.0];
+                for h in 1..=harmonics {
+                    let (sin, cos) = (angle[k] * h as f64).sin_cos();
+                    row.extend([cos, sin]);
+                }
+                rows.extend(row);
+                accelerations.push((rate[k + 1] - rate[k - 1]) / (t[k + 1] - t[k - 1]));
+            }
+        }
+    }
+    let (count, width) = (accelerations.len(), 2 * harmonics + 1);
+    if count < 20 * width {
+        return None;
+    }
+    let a = DMatrix::from_row_slice(count, width, &rows);
+    let y = DVector::from_vec(accelerations);
+    let inverse = a.tr_mul(&a).try_inverse()?;
+    let found = &inverse * a.tr_mul(&y);
+    let left = &y - &a * &found;
+    let variance = left.norm_squared() / (count - width) as f64;
+    let mean = y.mean();
+    Some(Braking {
+        direction: if way > 0.0 { "counter-clockwise" } else { "clockwise" },
+        std: (0..width).map(|j| (variance * inverse[(j, j)]).sqrt()).collect(),
+        coefficients: found.as_slice().to_vec(),
+        rmse: (left.norm_squared() / count as f64).sqrt(),
+        r_squared: 1.0 - left.norm_squared() / y.iter().map(|v| (v - mean).powi(2)).sum::<f64>(),
+        rows: count,
+    })
+}
+
+fn words(found: &Found) -> Vec<String> {
+    let mut words = Vec::new();
+    let ratio = found.fit.rmse / found.fit.expected;
+    if found.described {
+        words.push(format!(
+            "The residual is that of the gyro's noise: {:.2e} rad/s2, {ratio:.3} times what is expected.",
+            found.fit.rmse
+        ));
+    } else {
+        words.push(format!(
+            "NOT DESCRIBED: the residual is {:.2e} rad/s2, {ratio:.2} times what the gyro's noise makes. Something acts \
+             that inertia and friction do not explain (a liquid that moves, a delay); no number here is to be \
+             trusted. With a liquid: hubslosh identify without --method.",
+            found.fit.rmse
+        ));
+    }
+    for name in &found.at_bound {
+        words.push(format!("{name} ended at a bound; its value is the bound's."));
+    }
+    let (names, matrix) = &found.correlations;
+    for i in 0..names.len() {
+        for j in 0..i {
+            if matrix[i][j].abs() > 0.95 {
+                words.push(format!(
+                    "{} and {} have the correlation {:.3}: they are known together, not each.",
+                    names[j], names[i], matrix[i][j]
+                ));
+            }
+        }
+    }
+    if let Some(asymmetry) = found.parameters.get("friction.asymmetry") {
+        let strong = asymmetry.value.abs() > 3.0 * asymmetry.std && found.described;
+        if strong {
+            let (harder, easier) = if asymmetry.value > 0.0 {
+                ("counter-clockwise", "clockwise")
+            } else {
+                ("clockwise", "counter-clockwise")
+            };
+            words.push(format!(
+                "Preferential direction {easier}: {harder} the dry friction is {:.1} % stronger than the mean of both.",
+                100.0 * asymmetry.value.abs()
+            ));
+        }
+    }
+    if let [ahead, back] = &found.braking[..] {
+        words.push(format!(
+            "Free decay: counter-clockwise {:.4} rad/s2, clockwise {:.4} rad/s2 on average over the angle.",
+            ahead.coefficients[0], back.coefficients[0]
+        ));
+    }
+    words
+}

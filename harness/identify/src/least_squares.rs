@@ -1,0 +1,89 @@
+//! Levenberg and Marquardt's method for closures.
+
+use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
+use nalgebra::{DMatrix, DVector, Dyn, storage::Owned};
+
+/// Residuals at x.
+pub type Residuals<'a> = &'a dyn Fn(&[f64]) -> Vec<f64>;
+/// Their derivatives at x, a row for each residual.
+pub type Derivatives<'a> = &'a dyn Fn(&[f64]) -> DMatrix<f64>;
+
+/// Where the sum of squares is least.
+#[derive(Clone, Debug)]
+pub struct Minimum {
+    /// The variables.
+    pub x: Vec<f64>,
+    /// Sum of squares.
+    pub cost: f64,
+    /// Why the search ended is a minimum, not the end of patience.
+    pub converged: bool,
+}
+
+/// The minimum of the sum of squares near `x`.
+pub fn minimise(residuals: Residuals, derivatives: Derivatives, x: &[f64]) -> Minimum {
+    let search = Search { residuals, derivatives, x: DVector::from_column_slice(x) };
+    let (search, report) =
+        LevenbergMarquardt::new().with_ftol(1e-9).with_xtol(1e-9).minimize(search);
+    Minimum {
+        x: search.x.as_slice().to_vec(),
+        cost: 2.0 * report.objective_function,
+        converged: report.termination.was_successful(),
+    }
+}
+
+/// Derivatives by central differences with these steps.
+pub fn differences(residuals: Residuals, x: &[f64], steps: &[f64]) -> DMatrix<f64> {
+    let columns: Vec<DVector<f64>> = (0..x.len())
+        .map(|j| {
+            let at = |by: f64| {
+                let mut moved = x.to_vec();
+                moved[j] += by;
+                DVector::from_vec(residuals(&moved))
+            };
+            (at(steps[j]) - at(-steps[j])) / (2.0 * steps[j])
+        })
+        .collect();
+    DMatrix::from_columns(&columns)
+}
+
+struct Search<'a> {
+    residuals: Residuals<'a>,
+    derivatives: Derivatives<'a>,
+    x: DVector<f64>,
+}
+
+impl LeastSquaresProblem<f64, Dyn, Dyn> for Search<'_> {
+    type ParameterStorage = Owned<f64, Dyn>;
+    type ResidualStorage = Owned<f64, Dyn>;
+    type JacobianStorage = Owned<f64, Dyn, Dyn>;
+
+    fn set_params(&mut self, x: &DVector<f64>) {
+        self.x = x.clone();
+    }
+
+    fn params(&self) -> DVector<f64> {
+        self.x.clone()
+    }
+
+    fn residuals(&self) -> Option<DVector<f64>> {
+        Some(DVector::from_vec((self.residuals)(self.x.as_slice())))
+    }
+
+    fn jacobian(&self) -> Option<DMatrix<f64>> {
+        Some((self.derivatives)(self.x.as_slice()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rosenbrocks_valley_ends_at_one_and_one() {
+        let residuals = |x: &[f64]| vec![10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]];
+        let found =
+            minimise(&residuals, &|x| differences(&residuals, x, &[1e-5, 1e-5]), &[-1.2, 1.0]);
+        // no residual is left there: the last step is quadratic in the one before, of 1e-9 of x
+        assert!(found.converged && (found.x[0] - 1.0).abs() + (found.x[1] - 1.0).abs() < 1e-8);
+    }
+}

@@ -1,0 +1,119 @@
+//! The methods beside the output-error fit, on recordings of the FMU itself.
+
+use bench::profile::Torque;
+use host::fmi2::Fmu;
+use identify::acceleration::{self, Weights};
+use identify::recording::Recording;
+use identify::simulate::{Instants, Setup};
+use identify::twin::{self, Flaws};
+use pack::packed_for_tests;
+
+/// A sweep of a bench with a rigid liquid, and the encoder's angle.
+fn rigid(fmu: &Fmu, settings: &[(&str, &str)], torque: &str) -> Recording {
+    let torque = Torque::Profile(torque.parse().unwrap());
+    let settings = [&[("slosh.model", "frozen")], settings].concat();
+    let mut one = twin::record(fmu, &settings, &torque, Some(3), Flaws::default()).unwrap();
+    let text = |(name, value): &(&str, &str)| (name.to_string(), value.to_string());
+    let setup = Setup { settings: settings.iter().map(text).collect(), held: false };
+    one.angle = Some(setup.run(fmu, &[], &one, 0.0, Instants::All).unwrap().angle);
+    one
+}
+
+fn options() -> acceleration::Options {
+    acceleration::Options {
+        weights: Weights::Uniform,
+        bounds: Vec::new(),
+        harmonics: 0,
+        settings: Vec::new(),
+    }
+}
+
+#[test]
+fn the_accelerations_least_squares_find_friction_and_inertia_without_its_biases() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let torque = "lin-sweep:amplitude=0.1,f0=1.25,f1=3.5,duration=300";
+    let recordings = [rigid(&fmu, &[("friction.asymmetry", "0.1")], torque)];
+    let found = acceleration::identify(&fmu, &recordings, &options()).unwrap();
+    assert!(found.converged && found.described, "{:?}", found.verdict);
+    for (name, truth) in [
+        ("hub.I", 0.322414),
+        ("friction.b", 0.03793),
+        ("friction.c", 0.003498),
+        ("friction.d", 0.002423),
+        ("friction.asymmetry", 0.1),
+    ] {
+        let p = &found.parameters[name];
+        // four standard deviations: one false alarm in 3000 draws, and the seed is fixed
+        assert!((p.value - truth).abs() < 4.0 * p.std, "{name}: {p:?}");
+    }
+    let inertia = &found.parameters["hub.I"];
+    assert!(inertia.std < 3e-3 * inertia.value, "{inertia:?}");
+    // without the corrections: the difference makes it (Ωh)²/6 = 0.4 to 3.2 % too large, the noise (0.0144
+    // rad/s² of 0.17) 0.7 % too small
+    let off = found.uncorrected["hub.I"] / 0.322414 - 1.0;
+    assert!(off.abs() > 4.0 * inertia.std / inertia.value, "{off}");
+}
+
+#[test]
+fn liquid_that_moves_is_flagged_by_the_accelerations_least_squares() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let torque = "lin-sweep:amplitude=0.1,f0=1.8,f1=3,duration=150";
+    let recordings = [rigid(&fmu, &[("slosh.model", "linear")], torque)];
+    let found = acceleration::identify(&fmu, &recordings, &options()).unwrap();
+    assert!(!found.described && found.verdict[0].starts_with("NOT DESCRIBED"));
+}
+
+#[test]
+fn the_preferential_direction_shows_in_free_decay_and_in_the_harmonics() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let bench = [
+        ("friction.asymmetry", "0.15"),
+        ("friction.forward_cos1", "0.2"),
+        ("friction.backward_sin2", "-0.1"),
+    ];
+    // pulses in turn, and 5 s of decay after each
+    let (mut time, mut tau) = (Vec::new(), Vec::new());
+    for k in 0..7_500 {
+        let t = 0.02 * f64::from(k);
+        let (number, within) = ((t / 10.0) as usize, t % 10.0);
+        // 0.8 rad/s turns the hub by radians, so that all angles come by
+        let sign =
+            if (number / 2).is_multiple_of(2) == number.is_multiple_of(2) { 1.0 } else { -1.0 };
+        time.push(t);
+        tau.push(if within < 1.5 { 0.2 * sign } else { 0.0 });
+    }
+    let torque = Torque::Rows { time, tau, held: false };
+    let settings = [&[("slosh.model", "frozen")], &bench[..]].concat();
+    let mut one = twin::record(&fmu, &settings, &torque, Some(3), Flaws::default()).unwrap();
+    let text = |(name, value): &(&str, &str)| (name.to_string(), value.to_string());
+    let setup = Setup { settings: settings.iter().map(text).collect(), held: false };
+    one.angle = Some(setup.run(&fmu, &[], &one, 0.0, Instants::All).unwrap().angle);
+    let asked = acceleration::Options { harmonics: 2, weights: Weights::RunTime, ..options() };
+    let found = acceleration::identify(&fmu, &[one], &asked).unwrap();
+    for (name, truth) in [
+        ("friction.asymmetry", 0.15),
+        ("friction.forward_cos1", 0.2),
+        ("friction.forward_sin1", 0.0),
+        ("friction.backward_sin2", -0.1),
+    ] {
+        let p = &found.parameters[name];
+        assert!((p.value - truth).abs() < 4.0 * p.std && p.std < 0.05, "{name}: {p:?}");
+    }
+    let [ahead, back] = &found.braking[..] else { panic!("{:?}", found.braking) };
+    // forwards it brakes harder: the preferential direction is backwards
+    assert!(-ahead.coefficients[0] > back.coefficients[0], "{ahead:?} {back:?}");
+}
+
+#[test]
+fn bounds_hold_and_are_told() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let recordings = [rigid(&fmu, &[], "lin-sweep:amplitude=0.1,f0=1.25,f1=3.5,duration=150")];
+    let bounds = vec![("friction.c".into(), 0.0, 0.002)];
+    let asked = acceleration::Options { bounds, ..options() };
+    let found = acceleration::identify(&fmu, &recordings, &asked).unwrap();
+    assert!(found.parameters["friction.c"].value <= 0.002);
+    let wrong = vec![("friction.e".into(), 0.0, 1.0)];
+    let asked = acceleration::Options { bounds: wrong, ..options() };
+    let error = acceleration::identify(&fmu, &recordings, &asked).unwrap_err().to_string();
+    assert!(error.contains("no bound to set for friction.e"), "{error}");
+}
