@@ -14,7 +14,7 @@
 //!   torques over the same interval: of a torque joined by lines, and of the friction at the rates of the
 //!   parabola through three rows, whose sign may change within it.
 //! * The gyro's noise is in y_k, and I multiplies it: I comes out too small by the noise's share of the
-//!   power of y. That share is known from the noise, and so is that of b; the estimate is
+//!   power of y. That share is known from the noise; the estimate is
 //!   p + (JᵀJ − N)⁻¹ N p, N the noise's expected part of JᵀJ (Söderström, Errors-in-Variables
 //!   Methods, 2018, chapter 4).
 //! * Near ω = 0 the measured sign is not that of ω. Expected is the mean over the noise, erf(ω/σ√2) ≈ tanh(ω/1.25σ).
@@ -274,6 +274,14 @@ impl<'a> Problem<'a> {
         self.scales.iter().zip(x).map(|(scale, x)| scale.value(*x)).collect()
     }
 
+    /// A value within its bounds.
+    fn bounded(&self, place: usize, value: f64) -> f64 {
+        match self.scales[place] {
+            Scale::Logit(a, b) => value.clamp(a, b),
+            _ => value,
+        }
+    }
+
     /// Starts at a Stribeck speed over the fastest speed; friction is some hundredths of the torque, as in a bearing.
     fn start(&self, part: f64) -> Vec<f64> {
         let middle = |place: usize, part: f64| match self.scales[place] {
@@ -386,22 +394,14 @@ impl<'a> Problem<'a> {
         best.expect("there is a start")
     }
 
-    /// What the noise adds to JᵀJ on average, in I and b.
+    /// What the noise adds to JᵀJ on average. It is in I alone: in b it is (σ/ω)², below a thousandth.
     fn of_noise(&self) -> DMatrix<f64> {
         let mut part = DMatrix::zeros(self.names.len(), self.names.len());
         for rows in &self.rows {
             let t = &rows.recording.time;
             for k in rows.inner() {
-                let scale = (rows.weight[k - 1] * rows.noise).powi(2);
                 let step = t[k + 1] - t[k - 1];
-                let (instants, parts) = rows.instants(self.form, k);
-                let mean: [f64; 3] = std::array::from_fn(|j| {
-                    instants[..parts].iter().map(|w| w[j]).sum::<f64>() / parts as f64
-                });
-                part[(0, 0)] += 2.0 * scale / (step * step);
-                part[(1, 1)] += scale * mean.iter().map(|m| m * m).sum::<f64>();
-                part[(0, 1)] += scale * (mean[2] - mean[0]) / step;
-                part[(1, 0)] = part[(0, 1)];
+                part[(0, 0)] += 2.0 * (rows.weight[k - 1] * rows.noise / step).powi(2);
             }
         }
         part
@@ -451,7 +451,7 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     let mut of_values = DMatrix::zeros(n, n);
     let mut values = p.clone();
     for (i, &row) in free.iter().enumerate() {
-        values[row] += moved.as_ref().map_or(0.0, |m| m[i]);
+        values[row] = problem.bounded(row, p[row] + moved.as_ref().map_or(0.0, |m| m[i]));
         for (j, &column) in free.iter().enumerate() {
             of_values[(row, column)] = sandwich[(i, j)];
         }
@@ -471,12 +471,13 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     let described = rms < MISFIT * expected && corrected_normal.is_some();
     let estimated = |j: usize, less: f64| {
         let std = of_values[(j, j)].sqrt();
+        let end = |side: f64| problem.bounded(j, values[j] + side * 1.96 * std) - less;
         let value = values[j] - less;
         Estimated {
             value,
             std,
             std_noise: std,
-            interval: [value - 1.96 * std, value + 1.96 * std],
+            interval: [end(-1.0), end(1.0)],
             unit: unit(&problem.names[j]).into(),
         }
     };

@@ -250,8 +250,7 @@ pub fn identify(recording: &Recording, bench: Bench, held: bool) -> Result<Found
         parameters.insert(name.into(), response[of].clone());
     }
     let floor = noise * noise * count as f64;
-    let over_noise =
-        (sigma.iter().map(|s| s * s / floor).sum::<f64>() / sigma.len() as f64).sqrt();
+    let over_noise = (sigma.iter().map(|s| s * s / floor).sum::<f64>() / sigma.len() as f64).sqrt();
     let setting = |(name, value): (&str, &str)| (name.to_string(), value.to_string());
     let fit = Fit {
         lines: problem.s.len(),

@@ -5,8 +5,12 @@ use std::path::PathBuf;
 use anyhow::{Result, bail, ensure};
 use host::fmi2::Fmu;
 use host::output::atomically;
-use identify::identification::{Identification, Options, identify};
-use identify::{recording, report};
+use identify::acceleration::{self, Weights};
+use identify::identification::{Estimated, Identification, Options, identify};
+use identify::recording::Recording;
+use identify::start::Bench;
+use identify::{frequency, recording, report};
+use std::collections::BTreeMap;
 use std::io::Write;
 
 use super::{DEFAULT_FMU, setting};
@@ -19,11 +23,26 @@ use crate::progress;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh identify sweep.parquet --out result.json\n  \
     hubslosh identify up.csv down.csv --validate noise.csv --model linear,planar,spherical \\\n      \
-    --set tank.d=0.163 --out result.json")]
+    --set tank.d=0.163 --out result.json\n  \
+    hubslosh identify empty.csv --method acceleration --weights run --out friction.json\n  \
+    hubslosh identify multisine.csv --method frequency --out poles.json")]
 pub struct IdentifyArgs {
     /// Recordings, .csv or .parquet.
     #[arg(value_name = "DATA", required = true)]
     data: Vec<PathBuf>,
+    /// How: `output-error` fits all of the FMU's parameters in time; `acceleration` friction and inertia
+    /// without a simulation, of a bench whose liquid does not move; `frequency` three poles and two zeros.
+    #[arg(long, value_name = "NAME", default_value = "output-error")]
+    method: Method,
+    /// Weights of the rows, of --method acceleration.
+    #[arg(long, value_name = "NAME", default_value = "uniform")]
+    weights: Weighting,
+    /// Bounds of an unknown, of --method acceleration.
+    #[arg(long = "bound", value_name = "NAME=LOW:HIGH", value_parser = bound)]
+    bounds: Vec<(String, f64, f64)>,
+    /// Harmonics of the angle in the friction, 0 to 2, of --method acceleration.
+    #[arg(long, value_name = "NUMBER", default_value_t = 0)]
+    harmonics: usize,
     /// Slosh models to try.
     #[arg(
         long,
@@ -75,6 +94,43 @@ pub struct IdentifyArgs {
     /// Where to put a report, .html.
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
+}
+
+/// Ways to parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Method {
+    OutputError,
+    Acceleration,
+    Frequency,
+}
+
+/// Weights of the rows.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Weighting {
+    Uniform,
+    Time,
+    Run,
+    RunTime,
+}
+
+impl From<Weighting> for Weights {
+    fn from(weighting: Weighting) -> Self {
+        match weighting {
+            Weighting::Uniform => Weights::Uniform,
+            Weighting::Time => Weights::Time,
+            Weighting::Run => Weights::Run,
+            Weighting::RunTime => Weights::RunTime,
+        }
+    }
+}
+
+fn bound(text: &str) -> Result<(String, f64, f64)> {
+    let (name, value) = setting(text)?;
+    let ends = value.split_once(':').and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
+    let Some((low, high)) = ends else {
+        bail!("{name} must be LOW:HIGH, two numbers, not {value}")
+    };
+    Ok((name, low, high))
 }
 
 fn start(text: &str) -> Result<(String, f64)> {
@@ -129,6 +185,9 @@ impl IdentifyArgs {
         }
         let recordings = read(&self.data)?;
         let validation = read(&self.validate)?;
+        if self.method != Method::OutputError {
+            return self.quickly(&recordings);
+        }
         let options = Options {
             models: self.model,
             friction: self.friction,
@@ -160,12 +219,88 @@ impl IdentifyArgs {
     }
 }
 
-fn print(found: &Identification) {
+impl IdentifyArgs {
+    /// The methods that need no simulation.
+    fn quickly(&self, recordings: &[Recording]) -> Result<()> {
+        ensure!(
+            self.report.is_none() && self.validate.is_empty(),
+            "--report and --validate are for --method output-error alone"
+        );
+        let fmu = Fmu::open(&self.fmu)?;
+        match self.method {
+            Method::Frequency => {
+                let [one] = recordings else {
+                    bail!(
+                        "--method frequency takes one uninterrupted recording, not {}",
+                        recordings.len()
+                    )
+                };
+                let found = frequency::identify(one, bench_of(&fmu, &self.settings)?, self.hold)?;
+                estimates(&[&found.parameters, &found.response]);
+                println!(
+                    "{} lines from {:.3} to {:.3} Hz, condition number {:.0}",
+                    found.fit.lines, found.fit.band.0, found.fit.band.1, found.fit.condition
+                );
+                self.finish(&serde_json::to_string_pretty(&found)?, &found.verdict)
+            }
+            _ => {
+                let options = acceleration::Options {
+                    weights: self.weights.into(),
+                    bounds: self.bounds.clone(),
+                    harmonics: self.harmonics,
+                    settings: self.settings.clone(),
+                };
+                let found = acceleration::identify(&fmu, recordings, &options)?;
+                estimates(&[&found.parameters, &found.measurement]);
+                println!(
+                    "residual {:.2e} rad/s2 (the gyro's noise makes {:.2e}), condition number {:.0} ({:.0} in SI \
+                     units)",
+                    found.fit.rmse, found.fit.expected, found.condition, found.condition_si
+                );
+                println!("correlations:");
+                for (name, row) in found.correlations.0.iter().zip(&found.correlations.1) {
+                    let row: Vec<String> = row.iter().map(|r| format!("{r:>6.2}")).collect();
+                    println!("{name:24} {}", row.join(" "));
+                }
+                self.finish(&serde_json::to_string_pretty(&found)?, &found.verdict)
+            }
+        }
+    }
+
+    fn finish(&self, json: &str, verdict: &[String]) -> Result<()> {
+        let text = format!("{json}\n");
+        atomically(&self.out, |file| Ok(file.write_all(text.as_bytes())?))?;
+        for line in verdict {
+            println!("{line}");
+        }
+        println!("{}", self.out.display());
+        Ok(())
+    }
+}
+
+/// tank.r, fluid.rho and g_axial of the FMU with these settings.
+fn bench_of(fmu: &Fmu, settings: &[(String, String)]) -> Result<Bench> {
+    let mut instance = fmu.instantiate("identify")?;
+    for (name, value) in settings {
+        instance.set(name, value)?;
+    }
+    instance.setup_experiment(None, 0.0, None)?;
+    instance.enter_initialization_mode()?;
+    let mut real = |name: &str| instance.real(name);
+    Ok(Bench { arm: real("tank.r")?, density: real("fluid.rho")?, gravity: real("g_axial")? })
+}
+
+/// A table of estimates.
+fn estimates(tables: &[&BTreeMap<String, Estimated>]) {
     println!("{:24} {:>14} {:>12} {:>9}  unit", "", "value", "std", "std %");
-    for (name, p) in found.parameters.iter().chain(&found.measurement) {
+    for (name, p) in tables.iter().flat_map(|table| table.iter()) {
         let percent = 100.0 * p.std / p.value.abs();
         println!("{name:24} {:>14.7} {:>12.2e} {percent:>9.4}  {}", p.value, p.std, p.unit);
     }
+}
+
+fn print(found: &Identification) {
+    estimates(&[&found.parameters, &found.measurement]);
     println!(
         "fit {:.3} %, noise {:.2e} rad/s, condition number {:.0}, {} answers of the FMU in {:.1} s",
         found.fit.fit_pct,

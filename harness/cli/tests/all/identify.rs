@@ -51,3 +51,26 @@ fn what_was_identified_is_fed_back_to_a_run() {
     // another inertia would make
     assert!((off / clean.len() as f64).sqrt() < 1e-4, "{off}");
 }
+
+#[test]
+fn friction_by_the_accelerations_least_squares_is_fed_back_to_a_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    record(folder, "data.csv", &[]);
+    let method = ["--method", "acceleration", "--bound", "friction.omega_s=0.02:0.5"];
+    let asked = [&["identify", "data.csv"][..], &method, &["--out", "friction.json"]].concat();
+    let said = hubslosh(folder, &asked).unwrap();
+    assert!(said.contains("correlations:") && said.contains("that of the gyro's noise"), "{said}");
+    let asked = ["run", "--parameters", "friction.json", "--input", "data.csv", "--ignore-columns"];
+    hubslosh(folder, &[&asked[..], &["--out", "twin.csv"]].concat()).unwrap();
+    // what a method does not do is said
+    let asked = ["identify", "data.csv", "--method", "acceleration", "--harmonics", "1"];
+    let said = hubslosh(folder, &[&asked[..], &["--out", "a.json"]].concat()).unwrap_err();
+    assert!(said.contains("harmonics of the angle need the column theta"), "{said}");
+    let asked = ["identify", "data.csv", "--method", "frequency", "--out", "a.json"];
+    let said = hubslosh(folder, &asked).unwrap_err();
+    assert!(
+        said.contains("not those of a hub with slosh") || said.contains("not determined"),
+        "{said}"
+    );
+}
