@@ -97,7 +97,7 @@ impl Pair {
     fn new(p: &Parameters, exchange: Exchange, order: Order) -> Pair {
         let coupling =
             if exchange == Exchange::Lumped { Coupling::Lumped } else { Coupling::Split };
-        let own = TankParameters { tank: p.tank[0], coupling, host: None };
+        let own = TankParameters { tank: p.tank[0], coupling, ..TankParameters::default() };
         let tank = SloshTank::new(&own, &TankInputs::default(), 0.0, 1e-10).unwrap();
         let (mass, r) = (p.craft.mass, Vector3::from(p.craft.r));
         let arm = r.cross_matrix();
@@ -138,7 +138,7 @@ impl Pair {
             value: [from[at], from[at + 1], from[at + 2]],
             slope: [0, 1, 2].map(|i| (to[at + i] - from[at + i]) / h),
         };
-        TankInputs { a: ramp(0), omega: self.w.into(), omega_dot: ramp(3) }
+        TankInputs { a: ramp(0), omega: self.w.into(), omega_dot: ramp(3), ..TankInputs::default() }
     }
 
     /// What the body solves with: (M_body + matrix) x = rest + right-hand side.
@@ -278,7 +278,7 @@ fn a_host_that_would_diverge_is_warned() {
     let tank = Tank::default();
     let warning = |lambda: f64, coupling: Coupling| {
         let host = Some(parameters(ratio(tank) / lambda, tank).craft);
-        let p = TankParameters { tank, coupling, host };
+        let p = TankParameters { tank, coupling, host, ..TankParameters::default() };
         SloshTank::new(&p, &TankInputs::default(), 0.0, 1e-9).unwrap().warning()
     };
     let text = warning(0.151, Coupling::Split).unwrap();

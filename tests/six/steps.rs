@@ -27,7 +27,12 @@ fn outputs_after_a_step_are_those_at_its_end() {
 
         let p = TankParameters { tank: random.tank(), ..TankParameters::default() };
         let mut ramp = |size: f64| Ramp { value: random.vector(size), slope: random.vector(size) };
-        let u = TankInputs { a: ramp(2.0), omega: ramp(0.5).value, omega_dot: ramp(0.5) };
+        let u = TankInputs {
+            a: ramp(2.0),
+            omega: ramp(0.5).value,
+            omega_dot: ramp(0.5),
+            ..TankInputs::default()
+        };
         let mut tank = SloshTank::new(&p, &u, 0.0, 1e-9).unwrap();
         tank.step(&u, STEP).unwrap();
         let after = tank.outputs_after_step();
@@ -57,7 +62,12 @@ fn random_steps(count: usize, seed: u64) -> usize {
             let u = Inputs { force: ramp(), torque: ramp(), h_wheels: ramp(), ..Inputs::default() };
             let size = if nonsense { 1e160 } else { random.magnitude(1e-6, 1e2) };
             let mut ramp = || Ramp { value: random.vector(size), slope: random.vector(size) };
-            let motion = TankInputs { a: ramp(), omega: ramp().value, omega_dot: ramp() };
+            let motion = TankInputs {
+                a: ramp(),
+                omega: ramp().value,
+                omega_dot: ramp(),
+                ..TankInputs::default()
+            };
             let h = random.magnitude(1e-9, 0.1);
             let mut check = |done: Result<Vec<f64>, CallError>| {
                 steps += 1;

@@ -19,9 +19,28 @@ pub const RATE_FLOOR: f64 = 1e-6;
 /// From here on energies and forces may not be finite, though the states still are.
 pub const MAX_MAGNITUDE: f64 = 1e100;
 
-/// The integrator's steps that one call may take: twelve modes need some seconds for them, under a
-/// fuzzer's sanitizer a minute.
-pub const MAX_STEPS: usize = if cfg!(fuzzing) { 200 } else { 100_000 };
+/// The integrator's steps that one call may take, unless a parameter says otherwise: twelve modes need
+/// some seconds for them.
+pub const MAX_STEPS: usize = 100_000;
+
+/// What one call may take.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Relative error.
+    pub tolerance: f64,
+    /// Steps of the integrator.
+    pub max_steps: usize,
+}
+
+impl Limits {
+    /// Counts a step that starts at `time`, unless there have been too many.
+    fn count(&self, steps: &mut usize, time: f64) -> Result<(), StepError> {
+        // A fuzzer's sanitizer makes each step dear.
+        let max_steps = if cfg!(fuzzing) { self.max_steps.min(200) } else { self.max_steps };
+        *steps += 1;
+        if *steps > max_steps { Err(StepError::TooManySteps { time, max_steps }) } else { Ok(()) }
+    }
+}
 
 /// The lowest order that is trusted to show that a series has converged.
 const MIN_ORDER: usize = 5;
@@ -45,7 +64,7 @@ pub enum StepError {
     },
     /// A tank drains or fills beyond the ends of its table.
     BeyondTable {
-        /// Which, from 1.
+        /// Which, from 1; 0: there is one only.
         tank: usize,
         /// The mass of liquid that it would reach, kg.
         liquid: f64,
@@ -56,6 +75,8 @@ pub enum StepError {
     TooManySteps {
         /// How far the integrator came, s.
         time: f64,
+        /// `solver.max_steps`.
+        max_steps: usize,
     },
 }
 
@@ -70,22 +91,35 @@ impl core::fmt::Display for StepError {
                 "the motion is no longer finite at t = {time} s; check that inputs and their \
                  derivatives are finite and of sensible size"
             ),
-            StepError::BeyondTable { tank, liquid, ends: [low, high] } => write!(
+            StepError::BeyondTable { tank, liquid, ends: [low, high] } => {
+                let index = if *tank > 0 { format!("[{tank}]") } else { String::new() };
+                write!(
+                    f,
+                    "mass_flow{index} would leave {liquid} kg in tank{index} (allowed: {low} to {high} kg, \
+                     the ends of its table fill.liquid)"
+                )
+            }
+            StepError::TooManySteps { time, max_steps } => write!(
                 f,
-                "mass_flow[{tank}] would leave {liquid} kg in tank[{tank}] (allowed: {low} to {high} kg, \
-                 the ends of its table fill.liquid)"
-            ),
-            StepError::TooManySteps { time } => write!(
-                f,
-                "the integrator used up its {MAX_STEPS} steps at t = {time} s; take shorter \
-                 communication steps or a looser tolerance, or check for a very short pendulum \
-                 (length) or a very stiff one (k)"
+                "the step was stopped at t = {time} s after solver.max_steps = {max_steps} internal \
+                 steps; use shorter communication steps, a looser tolerance or a larger \
+                 solver.max_steps, or check for a very short pendulum (length) or a very stiff one (k)"
             ),
         }
     }
 }
 
 impl core::error::Error for StepError {}
+
+impl StepError {
+    /// The same with its time counted from `begin` instead of from there.
+    pub(crate) fn after(mut self, begin: f64) -> StepError {
+        if let StepError::NotFinite { time } | StepError::TooManySteps { time, .. } = &mut self {
+            *time += begin;
+        }
+        self
+    }
+}
 
 /// A motion that can be expanded in a power series.
 pub trait Motion {
@@ -188,7 +222,8 @@ fn extrapolate<const D: usize>(
     None
 }
 
-/// Moves x from `begin` to `end` by extrapolation, in as many steps as the tolerance needs.
+/// Moves x from `begin` to `end` by extrapolation, in as many steps as the tolerance needs. `steps`: how many
+/// the call has taken.
 ///
 /// Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.9.
 pub fn advance_by_extrapolation<const D: usize>(
@@ -196,11 +231,13 @@ pub fn advance_by_extrapolation<const D: usize>(
     x: &mut [f64; D],
     (begin, end): (f64, f64),
     scale: &[f64; D],
-    tolerance: f64,
+    limits: Limits,
+    steps: &mut usize,
 ) -> Result<(), StepError> {
-    let allowed = f64::max(STEP_SHARE * tolerance, ROUNDING);
+    let allowed = f64::max(STEP_SHARE * limits.tolerance, ROUNDING);
     let (mut t, mut h) = (begin, end - begin);
-    for _ in 0..MAX_STEPS {
+    loop {
+        limits.count(steps, t)?;
         let is_last = t + h >= end;
         let length = if is_last { end - t } else { h };
         match extrapolate(rates, x, (t, length), scale, allowed) {
@@ -220,7 +257,6 @@ pub fn advance_by_extrapolation<const D: usize>(
             return Err(StepError::NotFinite { time: t });
         }
     }
-    Err(StepError::TooManySteps { time: t })
 }
 
 /// Moves the motion on by exactly `h` > 0 from the time `begin`. On an error its states are
@@ -229,17 +265,14 @@ pub fn advance<M: Motion>(
     motion: &mut M,
     begin: f64,
     h: f64,
-    tolerance: f64,
+    limits: Limits,
 ) -> Result<(), StepError> {
     let (mut t, mut steps) = (0.0, 0);
     while t < h {
-        steps += 1;
-        if steps > MAX_STEPS {
-            return Err(StepError::TooManySteps { time: begin + t });
-        }
+        limits.count(&mut steps, begin + t)?;
         motion.start(t);
         let left = h - t;
-        let (n, length) = expand(motion, left, tolerance);
+        let (n, length) = expand(motion, left, limits.tolerance);
         t = if length == left { h } else { t + length };
         let is_step = length > 0.0 && length.is_finite();
         if !is_step || !motion.take(n, length) {

@@ -24,10 +24,11 @@
 //! Where to look: `spacecraft.rs` and `slosh_tank.rs` are the two components as a host sees
 //! them; `motion.rs` has the craft's equations, `bob.rs` those of one slosh mode, `rigid.rs`
 //! the mass matrix, `outputs.rs` energy and momentum; `integrator.rs` steps through time with
-//! the arithmetic of `series.rs`. `draining.rs` is a craft whose tanks drain by a table
-//! (`table.rs`).
+//! the arithmetic of `series.rs`. `contents.rs` is what is in a tank that drains by a table (`table.rs`),
+//! `draining.rs` a craft with such tanks.
 
 mod bob;
+mod contents;
 mod draining;
 mod integrator;
 mod motion;

@@ -5,12 +5,12 @@
 //! H = C [ I w + sum of m rho x (w x rho + l p') + h_w - r_c x (C^T P - m_all V) ]
 //!                                                                    H' = C (tau - r_c x f)
 //! E = m |V|^2/2 + V.(w x S) + w.(I w)/2 + sum of m |V + w x rho + l p'|^2/2
-//!     + sum of k l^2 |p_perp|^2/2                      E' = f.V + (tau - h_w').w - dissipation
+//!     + sum of k l^2 |p_perp|^2/2           E' = f.V + (tau - h_w').w - dissipation - drained'
 //! ```
 //!
 //! m, S, I: dry craft and rigid liquids about O; sums over the bobs; r_c: centre of mass of
 //! everything from O; V in body axes. H is about r_c and does not contain V: after a long
-//! thrust nothing cancels. On a pivot H is about O, and E has the potential a.S with all masses.
+//! thrust nothing cancels. drained': `contents.rs`. On a pivot H is about O, and E has the potential a.S with all masses.
 
 use crate::motion::CraftMotion;
 use crate::parameters::{MODES, Mount, TANKS};
@@ -70,6 +70,8 @@ pub struct Outputs {
     pub work: f64,
     /// Energy dissipated by the liquids since the start, J.
     pub dissipated: f64,
+    /// Energy that has gone with the outflow since the start, J.
+    pub drained: f64,
     /// Mass of everything, kg.
     pub mass: f64,
     /// Centre of mass of everything from O, m, body axes.
@@ -298,6 +300,7 @@ impl<T: Number> Now<T> {
             energy: energy.result(),
             work: x[index::WORK],
             dissipated: x[index::DISSIPATED],
+            drained: x[index::DRAINED],
             mass: all.mass.result(),
             center_of_mass: result(center),
             inertia: all.inertia(),

@@ -2,6 +2,7 @@
 //!
 //! Names in the messages are those of the FMU's parameters. Indices count from 1 there.
 
+use crate::integrator::MAX_STEPS;
 use crate::rigid::{Factors, Rigid};
 use crate::table::{FillTable, POINTS};
 use crate::vector::{Quaternion, Vec3, norm};
@@ -57,6 +58,11 @@ pub enum Mount {
     Free = 1,
     /// O rests on an air bearing in uniform gravity; the craft turns about it.
     Pivot = 2,
+}
+
+impl Mount {
+    /// All, by their numbers.
+    pub const ALL: [Mount; 2] = [Mount::Free, Mount::Pivot];
 }
 
 /// One tank: rigid liquid and pendulums, in the tank's own axes. Its z axis is the tank's
@@ -188,6 +194,8 @@ pub struct Parameters {
     pub tank: [Tank; TANKS],
     /// Where the motion starts.
     pub init: Init,
+    /// The integrator's steps that one step may take, at least 1.
+    pub max_steps: usize,
 }
 
 // The 1180 kg craft of the reference record `axial_pulse` (../tests/six.json) with a tank on its
@@ -272,6 +280,7 @@ impl Default for Parameters {
             tanks: 1,
             tank: [Tank::default(); TANKS],
             init: Init::default(),
+            max_steps: MAX_STEPS,
         }
     }
 }
@@ -293,6 +302,11 @@ pub(crate) fn tolerance_problem(tolerance: f64) -> Option<String> {
     let (low, high) = (TOLERANCES.start(), TOLERANCES.end());
     let is_wrong = !TOLERANCES.contains(&tolerance);
     is_wrong.then(|| format!("tolerance = {tolerance:?} (allowed: {low:?} to {high:?})"))
+}
+
+/// What is wrong with a bound on steps, if anything.
+pub(crate) fn steps_problem(max_steps: usize) -> Option<String> {
+    (max_steps == 0).then(|| "solver.max_steps = 0 (allowed: 1 and above)".into())
 }
 
 /// Problems found so far.
@@ -499,6 +513,7 @@ impl Parameters {
         let mut problems = Problems(Vec::new());
         self.craft.find_problems("craft", &mut problems);
         problems.vector("gravity", &self.gravity, "m/s2");
+        problems.0.extend(steps_problem(self.max_steps));
         if self.tanks > TANKS {
             problems.0.push(format!("tanks = {} (allowed: 0 to {TANKS})", self.tanks));
         }

@@ -13,7 +13,7 @@
 //! host that solves (M_host + M_a) [a; w'] = rest + bias has no algebraic loop, whatever the
 //! masses.
 //!
-//! [`Coupling::Lumped`] is for hosts that are plain rigid bodies: each whole bob counts as a
+//! [`Coupling::Lumped`] is for hosts that solve with a constant matrix: each whole bob counts as a
 //! point mass at its hinge,
 //!
 //! ```text
@@ -21,30 +21,44 @@
 //! ```
 //!
 //! with the [a; w'] given to the tank. M_a^ - M_a is positive semidefinite for every p, so the
-//! loop that is left converges at any mass ratio.
+//! loop that is left converges at any mass ratio. In a tank that drains M_a^ is that of the start: what is less
+//! of it later makes the loop converge the faster.
+//!
+//! [`Coupling::RigidBody`] is for hosts that are plain rigid bodies of M_host + M_a^. These have the centrifugal and
+//! gyroscopic terms of M_a^ (mass m^, moment S^, inertia I^) in their own equations, so that
+//!
+//! ```text
+//! bias^ = [F; torque] + M_a^ [a; w'] + [w x (w x S^); w x (I^ w)]
+//! ```
 //!
 //! Within a step a and w' are linear in time, and w = w_n + w'_n t + w''_n t^2/2.
+//!
+//! A tank that drains (`contents.rs`) moves by extrapolation instead of power series, as a craft does. A jump of its
+//! flow is an impulse on the host, which a force cannot be; it is left out, here and in the bobs.
 
 use crate::bob::Bob;
-use crate::integrator::{MAX_MAGNITUDE, Motion, RATE_FLOOR, StepError, advance};
-use crate::motion::{part, twice_crossed};
-use crate::outputs::{MassProperties, TankOutputs};
-use crate::parameters::{Craft, MODES, Tank, tolerance_problem};
-use crate::rigid::{Factors, Rigid, add_rank_one, along_rod, largest_eigenvalue};
+use crate::contents::{Drains, Outflow, Place, normalise_bobs, vec_of};
+use crate::integrator::{Limits, MAX_MAGNITUDE, MAX_STEPS, Motion, RATE_FLOOR, StepError, advance};
+use crate::motion::{SCALE_TIME, part, twice_crossed};
+use crate::outputs::{BobNow, MassProperties, TankOutputs};
+use crate::parameters::{Craft, MODES, Tank, steps_problem, tolerance_problem};
+use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod, largest_eigenvalue};
 use crate::series::{self, Pair, Series, Vector, ZERO, ZERO_PAIR, ZERO_VECTOR, products};
-use crate::state::{Ramp, has_direction};
+use crate::state::{Line, Ramp, has_direction};
 use crate::vector::{Dual, Mat3, Number, Vec3, add, constant, cross, largest, on_sphere, scale};
 
-/// Number of continuous states of a tank: p and p' of each mode, then the dissipated energy.
-pub const TANK_STATES: usize = 6 * MODES + 1;
+/// Number of continuous states of a tank: p and p' of each mode, then the dissipated energy and the
+/// mass of liquid.
+pub const TANK_STATES: usize = 6 * MODES + 2;
 
-/// Number of a tank's inputs: a, omega, omega_dot.
-pub const TANK_INPUTS: usize = 9;
+/// Number of a tank's inputs: a, omega, omega_dot, mass_flow.
+pub const TANK_INPUTS: usize = 10;
 
 /// Elements of a symmetric 6 x 6 matrix: the upper triangle by rows.
 pub const TRIANGLE: usize = 21;
 
 const DISSIPATED: usize = 6 * MODES;
+const LIQUID: usize = DISSIPATED + 1;
 
 /// What `bias` and `added_mass` stand for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,10 +66,17 @@ const DISSIPATED: usize = 6 * MODES;
 pub enum Coupling {
     /// Wrench at a = w' = 0 and the added mass of the moment: for hosts that solve with them.
     Split = 1,
-    /// For hosts that are plain rigid bodies: they include the rigid liquid and each bob at its hinge,
-    /// the constant added mass; bias is the wrench and what the motion of that mass takes,
-    /// M [a; w'] + [w x (w x S); w x (I w)].
+    /// The constant matrix M of the rigid liquid and each bob at its hinge, and the wrench + M [a; w'] at
+    /// the a, w' given: for hosts that add a constant matrix to the one they solve with.
     Lumped = 2,
+    /// The same for hosts that are plain rigid bodies with M in their mass, centre of mass and inertia:
+    /// bias has what their centrifugal and gyroscopic terms take of M, too, w x (w x S) and w x (I w).
+    RigidBody = 3,
+}
+
+impl Coupling {
+    /// All, by their numbers.
+    pub const ALL: [Coupling; 3] = [Coupling::Split, Coupling::Lumped, Coupling::RigidBody];
 }
 
 /// Everything that describes a [`SloshTank`] before it moves.
@@ -67,11 +88,18 @@ pub struct TankParameters {
     pub coupling: Coupling,
     /// The host's mass properties without this tank, for [`SloshTank::coupling_ratio`] alone.
     pub host: Option<Craft>,
+    /// The integrator's steps that one step may take, at least 1.
+    pub max_steps: usize,
 }
 
 impl Default for TankParameters {
     fn default() -> Self {
-        TankParameters { tank: Tank::default(), coupling: Coupling::Split, host: None }
+        TankParameters {
+            tank: Tank::default(),
+            coupling: Coupling::Split,
+            host: None,
+            max_steps: MAX_STEPS,
+        }
     }
 }
 
@@ -82,6 +110,7 @@ impl TankParameters {
         if let Some(host) = &self.host {
             problems.extend(host.problems("host"));
         }
+        problems.extend(steps_problem(self.max_steps));
         problems
     }
 }
@@ -95,6 +124,17 @@ pub struct TankInputs {
     pub omega: Vec3,
     /// Angular acceleration, rad/s2.
     pub omega_dot: Ramp,
+    /// Mass that flows out of the tank, kg/s; in where below 0. Of no effect in a tank without a table
+    /// over its fill.
+    pub mass_flow: Line,
+}
+
+impl TankInputs {
+    /// omega after `t` seconds.
+    fn omega_at(&self, t: f64) -> Vec3 {
+        let TankInputs { omega, omega_dot, .. } = self;
+        [0, 1, 2].map(|i| omega[i] + (omega_dot.value[i] + omega_dot.slope[i] * t / 2.0) * t)
+    }
 }
 
 /// What the tank shows at one instant.
@@ -108,6 +148,8 @@ pub struct SloshTankOutputs {
     pub added_mass: [f64; TRIANGLE],
     /// Energy dissipated by the liquid since the start, J.
     pub dissipated: f64,
+    /// The state it is in a tank that drains, kg.
+    pub liquid: f64,
     /// Mass of the whole liquid, kg.
     pub mass: f64,
     /// Its centre of mass from O, m, host axes.
@@ -169,19 +211,95 @@ pub struct SloshTank {
     motion: Box<TankMotion>,
     coupling: Coupling,
     host: Option<Craft>,
-    /// What the host's rigid body includes with [`Coupling::Lumped`].
+    /// M of [`Coupling::Lumped`].
     lumped: Rigid,
-    tolerance: f64,
+    /// If the tank can drain.
+    draining: Option<Box<Place>>,
+    limits: Limits,
+}
+
+/// The motion of a tank that drains over one step.
+struct Run<'a> {
+    place: &'a Place,
+    inputs: &'a TankInputs,
+}
+
+/// a, w, w', outflow.
+type Acting<T> = ([Vec3<T>; 3], T);
+
+impl Drains<TANK_STATES> for Run<'_> {
+    fn rates(&self, t: f64, x: &[f64; TANK_STATES]) -> [f64; TANK_STATES] {
+        let TankInputs { a, omega_dot, mass_flow, .. } = self.inputs;
+        let moved = [a.at(t), self.inputs.omega_at(t), omega_dot.at(t)];
+        draining_rates(self.place, x, &(moved, mass_flow.at(t)), mass_flow.slope)
+    }
+
+    fn error_scale(
+        &self,
+        x: &[f64; TANK_STATES],
+        rate: &[f64; TANK_STATES],
+        h: f64,
+    ) -> [f64; TANK_STATES] {
+        let turn = RATE_FLOOR + largest(self.inputs.omega);
+        // The dissipated energy and the liquid follow from the rest.
+        let mut scale = [f64::INFINITY; TANK_STATES];
+        for at in (0..DISSIPATED).step_by(6) {
+            let swing =
+                largest(vec_of(x, at + 3)) + largest(vec_of(rate, at + 3)) * h.min(SCALE_TIME);
+            scale[at..at + 3].fill(1.0);
+            scale[at + 3..at + 6].fill(turn + swing);
+        }
+        scale
+    }
+
+    fn normalise(&self, x: &mut [f64; TANK_STATES], _: f64) {
+        normalise_bobs(&mut x[..DISSIPATED]);
+    }
+
+    fn outflows(&self) -> impl Iterator<Item = Outflow<'_>> {
+        let Run { place, inputs } = *self;
+        core::iter::once(Outflow { place, flow: inputs.mass_flow, at: LIQUID, tank: 0 })
+    }
+}
+
+fn draining_rates<T: Number>(
+    place: &Place,
+    x: &[T; TANK_STATES],
+    acting: &Acting<T>,
+    slope: f64,
+) -> [T; TANK_STATES] {
+    let ([a, w, w_d], flow) = *acting;
+    let contents = place.contents(x, w, x[LIQUID], flow, slope);
+    let mut rate = [T::constant(0.0); TANK_STATES];
+    place.put_rates(&contents, [a, w_d], |at, numbers| {
+        rate[at..at + numbers.len()].copy_from_slice(numbers);
+    });
+    rate[DISSIPATED] = contents.dissipation;
+    rate[LIQUID] = -flow;
+    rate
+}
+
+/// Values and derivatives along (dx, du).
+fn along(
+    x: &[f64; TANK_STATES],
+    inputs: &TankInputs,
+    dx: &[f64; TANK_STATES],
+    du: &[f64; TANK_INPUTS],
+) -> ([Dual; TANK_STATES], Acting<Dual>) {
+    let TankInputs { a, omega, omega_dot, mass_flow } = inputs;
+    let with = |x: Vec3, at: usize| [0, 1, 2].map(|i| Dual::of(x[i], du[at + i]));
+    let motion = [with(a.value, 0), with(*omega, 3), with(omega_dot.value, 6)];
+    let x = core::array::from_fn(|i| Dual::of(x[i], dx[i]));
+    (x, (motion, Dual::of(mass_flow.value, du[9])))
 }
 
 impl Motion for TankMotion {
     #[inline(always)]
     fn start(&mut self, t: f64) {
-        let TankInputs { a, omega, omega_dot } = &self.inputs;
+        let TankInputs { a, omega_dot, .. } = &self.inputs;
         (self.a[0], self.a[1]) = (a.at(t), a.slope);
         (self.w_d[0], self.w_d[1]) = (omega_dot.at(t), omega_dot.slope);
-        let turned =
-            [0, 1, 2].map(|i| omega[i] + (omega_dot.value[i] + omega_dot.slope[i] * t / 2.0) * t);
+        let turned = self.inputs.omega_at(t);
         (self.w[0], self.w[1]) = (turned, self.w_d[0]);
         self.w[2] = scale(0.5, omega_dot.slope);
         for bob in &mut self.bobs {
@@ -267,6 +385,25 @@ impl TankMotion {
     }
 }
 
+/// What the outputs follow from.
+struct Parts<T> {
+    /// a, w, w'
+    motion: [Vec3<T>; 3],
+    /// The rigid liquid.
+    rigid: Rigid<T>,
+    /// On the host about O.
+    wrench: [Vec3<T>; 2],
+    /// The same at a = w' = 0, without the rigid liquid.
+    loads: [Vec3<T>; 2],
+    /// M_a
+    matrix: Mat6<T>,
+    bobs: [Option<BobNow<T>>; MODES],
+}
+
+fn plus<T: Number>(a: [Vec3<T>; 2], b: [Vec3<T>; 2]) -> [Vec3<T>; 2] {
+    [add(a[0], b[0]), add(a[1], b[1])]
+}
+
 /// m u u^T into a matrix of any kind of numbers.
 fn add_added_mass<T: Number>(matrix: &mut [[T; 6]; 6], bob: &Bob) {
     let p = [0, 1, 2].map(|i| T::of(bob.p[0][i], bob.p[1][i]));
@@ -313,6 +450,8 @@ impl SloshTank {
             x[6 * n..6 * n + 3].copy_from_slice(&direction);
             x[6 * n + 3..6 * n + 6].copy_from_slice(&rate);
         }
+        let tank = p.tank.resolve();
+        x[LIQUID] = tank.mass[..tank.modes].iter().fold(tank.m_0, |sum, m| sum + m);
         Ok(SloshTank::resume(p, &TankState { time: start_time, x }, tolerance))
     }
 
@@ -342,7 +481,8 @@ impl SloshTank {
             coupling: p.coupling,
             host: p.host,
             lumped,
-            tolerance,
+            draining: (tank.fill.points > 0).then(|| Box::new(Place::new(&tank))),
+            limits: Limits { tolerance, max_steps: p.max_steps },
         }
     }
 
@@ -376,10 +516,13 @@ impl SloshTank {
         self.motion.inputs = *inputs;
         let given = inputs.a.value.iter().chain(&inputs.a.slope).chain(&inputs.omega);
         let mut given = given.chain(&inputs.omega_dot.value).chain(&inputs.omega_dot.slope);
-        let done = if given.all(|x| x.is_finite()) {
-            advance(&mut *self.motion, before.time, h, self.tolerance)
-        } else {
+        let done = if !given.all(|x| x.is_finite()) {
             Err(StepError::NotFinite { time: before.time })
+        } else if let Some(place) = &self.draining {
+            let x = &mut self.motion.state.x;
+            Run { place, inputs }.advance(x, before.time, h, self.limits)
+        } else {
+            advance(&mut *self.motion, before.time, h, self.limits)
         };
         match done {
             Ok(()) => self.motion.state.time = before.time + h,
@@ -390,35 +533,86 @@ impl SloshTank {
 
     /// What the tank shows now, under the inputs' present values.
     pub fn outputs(&mut self, inputs: &TankInputs) -> SloshTankOutputs {
+        let x = self.motion.state.x;
+        if let Some(place) = &self.draining {
+            let TankInputs { a, omega, omega_dot, mass_flow } = *inputs;
+            let motion = [a.value, omega, omega_dot.value];
+            return self.draining_outputs(
+                place,
+                &x,
+                &x,
+                &(motion, mass_flow.value),
+                mass_flow.slope,
+            );
+        }
         self.motion.evaluate(inputs);
-        self.outputs_of::<f64>(&self.motion.state.x)
+        self.outputs_of::<f64>(&x)
+    }
+
+    fn draining_outputs<T: Number>(
+        &self,
+        place: &Place,
+        shown: &[f64; TANK_STATES],
+        x: &[T; TANK_STATES],
+        ([a, w, w_d], flow): &Acting<T>,
+        slope: f64,
+    ) -> SloshTankOutputs {
+        let contents = place.contents(x, *w, x[LIQUID], *flow, slope);
+        let mut matrix = contents.rigid.mass_matrix();
+        contents.add_rods(&mut matrix);
+        let parts = Parts {
+            motion: [*a, *w, *w_d],
+            rigid: contents.rigid,
+            wrench: contents.wrench(*a, *w, *w_d),
+            loads: contents.loads(),
+            matrix,
+            bobs: place.bobs_now(&contents),
+        };
+        self.outputs_from(shown, parts)
     }
 
     fn outputs_of<T: Number>(&self, x: &[f64; TANK_STATES]) -> SloshTankOutputs {
         let motion = &self.motion;
         let of = |a: &[Vec3]| -> Vec3<T> { [0, 1, 2].map(|i| T::of(a[0][i], a[1][i])) };
         let (a, w, w_d) = (of(&motion.a), of(&motion.w), of(&motion.w_d));
-        let mut tank = TankOutputs::of_states(x);
-        let mut bobs = [(); MODES].map(|()| None);
-        let minus = |[f, tau]: [Vec3<T>; 2]| [f.map(|x| -x), tau.map(|x| -x)];
         let zero = constant::<T>([0.0; 3]);
-        let mut wrench = minus(motion.rigid.lift::<T>().inertial_wrench(a, w, w_d));
-        let mut bias = minus(motion.rigid.lift::<T>().inertial_wrench(zero, w, zero));
-        let mut matrix = motion.rigid.mass_matrix().map(|row| row.map(T::constant));
-        let mut all = MassProperties::of(&motion.rigid.lift::<T>());
-        let plus = |a: [Vec3<T>; 2], b: [Vec3<T>; 2]| [add(a[0], b[0]), add(a[1], b[1])];
+        let rigid = motion.rigid.lift::<T>();
+        let mut parts = Parts {
+            motion: [a, w, w_d],
+            wrench: rigid.inertial_wrench(a, w, w_d).map(|half| half.map(|x| -x)),
+            loads: [zero; 2],
+            matrix: motion.rigid.mass_matrix().map(|row| row.map(T::constant)),
+            rigid,
+            bobs: [(); MODES].map(|()| None),
+        };
         for bob in &motion.bobs {
-            wrench = plus(wrench, bob.wrench());
-            bias = plus(bias, bob.bias(w));
-            add_added_mass(&mut matrix, bob);
-            let now = bob.now::<T>();
-            all.add(now.m, now.rho);
-            bobs[bob.mode] = Some(now);
+            parts.wrench = plus(parts.wrench, bob.wrench());
+            parts.loads = plus(parts.loads, bob.bias(w));
+            add_added_mass(&mut parts.matrix, bob);
+            parts.bobs[bob.mode] = Some(bob.now::<T>());
+        }
+        self.outputs_from(x, parts)
+    }
+
+    fn outputs_from<T: Number>(&self, x: &[f64; TANK_STATES], parts: Parts<T>) -> SloshTankOutputs {
+        let Parts { motion: [a, w, w_d], rigid, wrench, loads, mut matrix, bobs } = parts;
+        let mut tank = TankOutputs::of_states(x);
+        let mut all = MassProperties::of(&rigid);
+        for bob in bobs.iter().flatten() {
+            all.add(bob.m, bob.rho);
         }
         tank.set_angles(bobs.iter().flatten());
-        if self.coupling == Coupling::Lumped {
-            matrix = self.lumped.mass_matrix().map(|row| row.map(T::constant));
-            bias = plus(wrench, self.lumped.lift::<T>().inertial_wrench(a, w, w_d));
+        let zero = constant::<T>([0.0; 3]);
+        let lumped = self.lumped.lift::<T>();
+        let bias = match self.coupling {
+            Coupling::Split => {
+                plus(loads, rigid.inertial_wrench(zero, w, zero).map(|half| half.map(|x| -x)))
+            }
+            Coupling::Lumped => plus(wrench, lumped.inertial_wrench(a, zero, w_d)),
+            Coupling::RigidBody => plus(wrench, lumped.inertial_wrench(a, w, w_d)),
+        };
+        if self.coupling != Coupling::Split {
+            matrix = lumped.mass_matrix();
         }
         (tank.force, tank.torque) = (wrench[0].map(T::result), wrench[1].map(T::result));
         let [f, tau] = bias.map(|half| half.map(T::result));
@@ -427,13 +621,14 @@ impl SloshTank {
             bias: [f[0], f[1], f[2], tau[0], tau[1], tau[2]],
             added_mass: triangle(&matrix),
             dissipated: x[DISSIPATED],
+            liquid: x[LIQUID],
             mass: all.mass.result(),
             center_of_mass: all.center().map(T::result),
             inertia: all.inertia(),
         }
     }
 
-    /// x: p and p' of each mode, tank axes, then the dissipated energy, J.
+    /// x: p and p' of each mode, tank axes, then the dissipated energy, J, and the mass of liquid, kg.
     pub fn continuous_states(&self) -> [f64; TANK_STATES] {
         self.motion.state.x
     }
@@ -450,17 +645,26 @@ impl SloshTank {
 
     /// x'; directions and their rates are normalised first.
     pub fn derivatives(&mut self, inputs: &TankInputs) -> [f64; TANK_STATES] {
+        if let Some(place) = &self.draining {
+            return Run { place, inputs }.rates(0.0, &self.motion.state.x);
+        }
         self.motion.evaluate(inputs);
         self.motion.state_rates::<0>()
     }
 
-    /// The derivative of x' in the direction (dx, du), du of a, omega, omega_dot; exact.
+    /// The derivative of x' in the direction (dx, du), du of a, omega, omega_dot, mass_flow; exact. The
+    /// slope of mass_flow is held.
     pub fn directional_derivative(
         &mut self,
         inputs: &TankInputs,
         dx: &[f64; TANK_STATES],
         du: &[f64; TANK_INPUTS],
     ) -> [f64; TANK_STATES] {
+        if let Some(place) = &self.draining {
+            let (x, acting) = along(&self.motion.state.x, inputs, dx, du);
+            let slope = inputs.mass_flow.slope;
+            return draining_rates(place, &x, &acting, slope).map(Number::result);
+        }
         self.motion.evaluate_direction(inputs, dx, du);
         self.motion.state_rates::<1>()
     }
@@ -472,6 +676,10 @@ impl SloshTank {
         dx: &[f64; TANK_STATES],
         du: &[f64; TANK_INPUTS],
     ) -> SloshTankOutputs {
+        if let Some(place) = &self.draining {
+            let (x, acting) = along(&self.motion.state.x, inputs, dx, du);
+            return self.draining_outputs(place, dx, &x, &acting, inputs.mass_flow.slope);
+        }
         self.motion.evaluate_direction(inputs, dx, du);
         self.outputs_of::<Dual>(dx)
     }
@@ -483,13 +691,19 @@ impl SloshTank {
         let mut du = [0.0; TANK_INPUTS];
         du[..3].copy_from_slice(&inputs.a.slope);
         du[3..6].copy_from_slice(&inputs.omega_dot.value);
-        du[6..].copy_from_slice(&inputs.omega_dot.slope);
+        du[6..9].copy_from_slice(&inputs.omega_dot.slope);
+        du[9] = inputs.mass_flow.slope;
         self.output_derivatives(inputs, &dx, &du)
     }
 
     /// What an impulse of the host does to the bobs, whose velocities across their rods stay: O
     /// changes its velocity by `dv`, m/s, and the host its rate by `dw`, rad/s, host axes.
     pub fn take_impulse(&mut self, dv: Vec3, dw: Vec3) {
+        let TankMotion { state, bobs, .. } = &mut *self.motion;
+        if let Some(place) = &self.draining {
+            let tank = Tank { liquid_0: state.x[LIQUID], ..place.tank }.resolve();
+            bobs.iter_mut().for_each(|bob| *bob = Bob::new(&tank, 0, bob.mode));
+        }
         self.motion.start(0.0);
         let TankMotion { state, bobs, .. } = &mut *self.motion;
         for bob in bobs {

@@ -1,8 +1,9 @@
 //! A free spacecraft with sloshing tanks: the whole, its steps, and its equations for hosts
 //! that integrate themselves.
 
-use crate::draining::{Acting, Draining};
-use crate::integrator::{StepError, advance};
+use crate::contents::Drains;
+use crate::draining::{Acting, Draining, Run};
+use crate::integrator::{Limits, StepError, advance};
 use crate::motion::CraftMotion;
 use crate::outputs::{Now, Outputs};
 use crate::parameters::{MODES, Parameters, TANKS, tolerance_problem};
@@ -15,7 +16,7 @@ pub struct Spacecraft {
     motion: Box<CraftMotion>,
     /// Equations with draining tanks, if there are any.
     draining: Option<Box<Draining>>,
-    tolerance: f64,
+    limits: Limits,
 }
 
 impl Spacecraft {
@@ -60,7 +61,8 @@ impl Spacecraft {
                 put(index::bob(i, n) + 3, &rate);
             }
         }
-        let state = State { time: start_time, x, h_wheels: inputs.h_wheels.value };
+        let flow = inputs.mass_flow.map(|flow| flow.value);
+        let state = State { time: start_time, x, h_wheels: inputs.h_wheels.value, flow };
         Ok(Spacecraft::resume(p, &state, tolerance))
     }
 
@@ -68,7 +70,8 @@ impl Spacecraft {
     /// [`Spacecraft::new`] has accepted.
     pub fn resume(p: &Parameters, state: &State, tolerance: f64) -> Spacecraft {
         let draining = Draining::new(p).map(Box::new);
-        Spacecraft { motion: Box::new(CraftMotion::new(p, *state)), draining, tolerance }
+        let limits = Limits { tolerance, max_steps: p.max_steps };
+        Spacecraft { motion: Box::new(CraftMotion::new(p, *state)), draining, limits }
     }
 
     /// The present time, s.
@@ -92,35 +95,39 @@ impl Spacecraft {
     }
 
     /// Moves on by exactly `h` > 0 seconds; the inputs run along their ramps. A jump of
-    /// `h_wheels` since the last step acts as an impulse at the beginning. On an error the
-    /// craft is as before.
+    /// `h_wheels` or `mass_flow` since the last step acts as an impulse at the beginning. On an error
+    /// the craft is as before.
     pub fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), StepError> {
         if !(h > 0.0 && h.is_finite()) {
             return Err(StepError::Length { h });
         }
         let before = self.motion.state;
         self.motion.inputs = *inputs;
-        self.set_wheels(inputs);
+        self.take_jumps(inputs);
         let done = match &self.draining {
-            None => advance(&mut *self.motion, before.time, h, self.tolerance),
-            Some(draining) => draining.advance(&mut self.motion.state.x, inputs, h, self.tolerance),
+            None => advance(&mut *self.motion, before.time, h, self.limits),
+            Some(craft) => {
+                let x = &mut self.motion.state.x;
+                Run { craft, inputs }.advance(x, before.time, h, self.limits)
+            }
         };
         let state = &mut self.motion.state;
         match done {
             Ok(()) => {
                 state.time = before.time + h;
                 state.h_wheels = inputs.h_wheels.at(h);
+                state.flow = inputs.mass_flow.map(|flow| flow.at(h));
             }
             Err(_) => *state = before,
         }
         done
     }
 
-    /// What the craft shows now, under the inputs' present values; a jump of `h_wheels` since
-    /// the last step has had its effect.
+    /// What the craft shows now, under the inputs' present values; a jump of `h_wheels` or
+    /// `mass_flow` since the last step has had its effect.
     pub fn outputs(&mut self, inputs: &Inputs) -> Outputs {
         let before = self.motion.state;
-        self.set_wheels(inputs);
+        self.take_jumps(inputs);
         let outputs = self.outputs_held(inputs);
         self.motion.state = before;
         outputs
@@ -207,21 +214,24 @@ impl Spacecraft {
         Some(draining.evaluate(&along, &Acting::along(inputs, du)))
     }
 
-    fn set_wheels(&mut self, inputs: &Inputs) -> bool {
-        if let Some(draining) = &self.draining
-            && inputs.h_wheels.value != self.motion.state.h_wheels
-        {
+    /// The impulses of what has jumped. Returns whether anything has.
+    fn take_jumps(&mut self, inputs: &Inputs) -> bool {
+        let Some(draining) = &self.draining else {
+            return self.motion.set_wheels(inputs.h_wheels.value);
+        };
+        if inputs.h_wheels.value != self.motion.state.h_wheels {
             let tanks = draining.tanks(&self.motion.state.x);
             self.motion.refill(tanks.iter());
         }
-        self.motion.set_wheels(inputs.h_wheels.value)
+        let turned = self.motion.set_wheels(inputs.h_wheels.value);
+        draining.set_flow(&mut self.motion.state, &inputs.mass_flow) || turned
     }
 
-    /// Does what is due at an event: a jump of `h_wheels` acts as an impulse. Returns whether
-    /// continuous states have changed. On an error nothing has.
+    /// Does what is due at an event: a jump of `h_wheels` or `mass_flow` acts as an impulse. Returns
+    /// whether continuous states have changed. On an error nothing has.
     pub fn take_event(&mut self, inputs: &Inputs) -> Result<bool, StepError> {
         let before = self.motion.state;
-        let changed = self.set_wheels(inputs);
+        let changed = self.take_jumps(inputs);
         if self.motion.state.x.iter().any(|x| !x.is_finite()) {
             self.motion.state = before;
             return Err(StepError::NotFinite { time: before.time });
@@ -232,13 +242,14 @@ impl Spacecraft {
     /// Whether the mass of liquid that the host has integrated is within the tanks' tables.
     pub fn check_liquids(&self) -> Result<(), StepError> {
         let x = &self.motion.state.x;
-        self.draining.as_ref().map_or(Ok(()), |it| it.check(x, &Default::default(), 0.0))
+        self.draining.as_ref().map_or(Ok(()), |it| it.check(x))
     }
 
-    /// Takes account of `h_wheels` having changed continuously: no impulse is due for it.
-    /// For hosts that integrate themselves, after each of their steps.
-    pub fn follow_wheels(&mut self, inputs: &Inputs) {
+    /// Takes account of `h_wheels` and `mass_flow` having changed continuously: no impulse is due
+    /// for it. For hosts that integrate themselves, after each of their steps.
+    pub fn follow_inputs(&mut self, inputs: &Inputs) {
         self.motion.state.h_wheels = inputs.h_wheels.value;
+        self.motion.state.flow = inputs.mass_flow.map(|flow| flow.value);
     }
 }
 

@@ -26,6 +26,8 @@ pub mod index {
 
     /// The mass of liquid in each tank, kg; of effect in tanks that can drain.
     pub const LIQUID: usize = BOBS + 6 * TANKS * MODES;
+    /// Energy that has gone with the outflow since the start, J.
+    pub const DRAINED: usize = LIQUID + TANKS;
 
     /// Where direction and rate of a bob begin; tank and mode from 0.
     pub const fn bob(tank: usize, mode: usize) -> usize {
@@ -34,7 +36,7 @@ pub mod index {
 }
 
 /// Number of continuous states.
-pub const STATES: usize = index::LIQUID + TANKS;
+pub const STATES: usize = index::DRAINED + 1;
 
 /// Number of inputs: force, torque, h_wheels, mass flows.
 pub const INPUTS: usize = 9 + TANKS;
@@ -94,7 +96,7 @@ pub struct Inputs {
     /// momentum of everything is kept either way.
     pub h_wheels: Ramp,
     /// Mass that flows out of each tank, kg/s; in where below 0. Of no effect in a tank without a table
-    /// over its fill.
+    /// over its fill. A jump from one step to the next sets what flows within in motion by an impulse.
     pub mass_flow: [Line; TANKS],
 }
 
@@ -103,18 +105,20 @@ pub struct Inputs {
 pub struct State {
     pub(crate) time: f64,
     pub(crate) x: [f64; STATES],
-    /// The wheels' momentum that the motion has taken account of.
+    /// The wheels' momentum and the outflows that the motion has taken account of.
     pub(crate) h_wheels: Vec3,
+    pub(crate) flow: [f64; TANKS],
 }
 
 impl State {
     /// Length of the flat form.
-    pub const WORDS: usize = 4 + STATES;
+    pub const WORDS: usize = 4 + TANKS + STATES;
 
     /// The state as plain words, for saving.
     pub fn to_words(&self) -> [u64; Self::WORDS] {
         let mut words = [0; Self::WORDS];
-        let numbers = core::iter::once(&self.time).chain(&self.h_wheels).chain(&self.x);
+        let held = self.h_wheels.iter().chain(&self.flow);
+        let numbers = core::iter::once(&self.time).chain(held).chain(&self.x);
         for (word, number) in words.iter_mut().zip(numbers) {
             *word = number.to_bits();
         }
@@ -124,14 +128,15 @@ impl State {
     /// The reverse; `None` when the words are no state.
     pub fn from_words(words: &[u64; Self::WORDS]) -> Option<State> {
         let numbers = words.map(f64::from_bits);
-        let x: [f64; STATES] = core::array::from_fn(|i| numbers[4 + i]);
+        let x: [f64; STATES] = core::array::from_fn(|i| numbers[4 + TANKS + i]);
         let bobs = (0..TANKS * MODES).all(|i| has_direction(&x[index::bob(0, i)..][..3]));
         let is_state = numbers[0].is_finite()
             && numbers[1..].iter().all(|x| x.abs() < MAX_MAGNITUDE)
             && has_direction(&x[index::Q..][..4])
             && bobs;
         let h_wheels = [numbers[1], numbers[2], numbers[3]];
-        is_state.then_some(State { time: numbers[0], x, h_wheels })
+        let flow = core::array::from_fn(|i| numbers[4 + i]);
+        is_state.then_some(State { time: numbers[0], x, h_wheels, flow })
     }
 }
 
@@ -162,7 +167,7 @@ mod tests {
             assert_eq!(with(place, 1e100).is_none(), place > 0, "{place}");
         }
         // q = (1, 0, 0, 0), p = (0, 0, -1)
-        assert_eq!(with(4 + index::Q, 1e-101), None);
-        assert_eq!(with(4 + index::bob(3, 2) + 2, 1e-101), None);
+        assert_eq!(with(4 + TANKS + index::Q, 1e-101), None);
+        assert_eq!(with(4 + TANKS + index::bob(3, 2) + 2, 1e-101), None);
     }
 }

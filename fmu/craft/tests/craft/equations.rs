@@ -1,10 +1,11 @@
 //! The derivatives of rates and outputs that hosts get.
 
 use craft::{
-    INPUTS, Inputs, MODES, Mount, Outputs, Parameters, Ramp, STATES, SloshTank, SloshTankOutputs,
-    Spacecraft, TANK_INPUTS, TANK_STATES, TankInputs, TankParameters, index,
+    Coupling, INPUTS, Inputs, Line, MODES, Mount, Outputs, Parameters, Ramp, STATES, SloshTank,
+    SloshTankOutputs, Spacecraft, TANK_INPUTS, TANK_STATES, TankInputs, TankParameters, index,
 };
 
+use super::draining;
 use super::random::Random;
 
 fn ramps(u: &Inputs) -> [Ramp; 3] {
@@ -142,12 +143,15 @@ fn a_tank_s_directional_derivatives_are_those_by_differences() {
     for seed in 0..60 {
         let mut random = Random::new(seed);
         let mut p = TankParameters { tank: random.tank(), ..TankParameters::default() };
-        if seed.is_multiple_of(2) {
-            p.coupling = craft::Coupling::Lumped;
-        }
+        p.coupling = Coupling::ALL[seed as usize % 3];
         let mut ramp = || Ramp { value: random.vector(1.0), slope: random.vector(1.0) };
         let (a, omega_dot) = (ramp(), ramp());
-        let u = TankInputs { a, omega: random.vector(1.0), omega_dot };
+        let mut u = TankInputs { a, omega: random.vector(1.0), omega_dot, ..TankInputs::default() };
+        if seed.is_multiple_of(5) {
+            p.tank = draining::tank(&mut random, 1 + seed as usize % 3);
+            u.mass_flow =
+                Line { value: random.between(1.0, 9.0), slope: random.between(-2.0, 2.0) };
+        }
         let tank = SloshTank::new(&p, &u, 0.0, 1e-9).unwrap();
         let (dx, du): ([f64; TANK_STATES], [f64; TANK_INPUTS]) =
             (random.vector(1.0), random.vector(1.0));
@@ -160,7 +164,9 @@ fn a_tank_s_directional_derivatives_are_those_by_differences() {
                 slope: ramp.slope,
             };
             let omega = [0, 1, 2].map(|i| u.omega[i] + s * du[3 + i]);
-            let u = TankInputs { a: by(u.a, 0), omega, omega_dot: by(u.omega_dot, 6) };
+            let flow = Line { value: u.mass_flow.value + s * du[9], slope: u.mass_flow.slope };
+            let u =
+                TankInputs { a: by(u.a, 0), omega, omega_dot: by(u.omega_dot, 6), mass_flow: flow };
             (tank, u)
         };
         let rates = difference(|s| {
@@ -193,7 +199,9 @@ fn a_tank_s_directional_derivatives_are_those_by_differences() {
             moved.set_continuous_states(&std::array::from_fn(|i| x[i] + t * dx[i]));
             let omega = [0, 1, 2].map(|i| u.omega[i] + t * u.omega_dot.value[i]);
             let ramp = |ramp: &Ramp| Ramp { value: ramp.at(t), slope: ramp.slope };
-            let u = TankInputs { a: ramp(&u.a), omega, omega_dot: ramp(&u.omega_dot) };
+            let flow = Line { value: u.mass_flow.at(t), slope: u.mass_flow.slope };
+            let u =
+                TankInputs { a: ramp(&u.a), omega, omega_dot: ramp(&u.omega_dot), mass_flow: flow };
             flat_tank(&moved.outputs(&u))
         };
         let slopes = difference(along);

@@ -131,7 +131,7 @@ impl HostWithTanks {
         rate[10..13].copy_from_slice(v_d.as_slice());
         for (i, tank) in self.tanks.iter_mut().enumerate() {
             let (a, omega_dot) = (Ramp::held(a), Ramp::held(w_d));
-            let d = tank.derivatives(&TankInputs { a, omega, omega_dot });
+            let d = tank.derivatives(&TankInputs { a, omega, omega_dot, ..TankInputs::default() });
             let at = index::bob(i, 0);
             rate[at..at + 18].copy_from_slice(&d[..18]);
         }

@@ -299,7 +299,7 @@ fn forces_on_the_dry_craft_balance() {
 /// A random tank somewhere on its bobs' spheres, and the host's motion.
 fn tank_anywhere(seed: u64, coupling: Coupling) -> (TankParameters, SloshTank, TankInputs) {
     let mut random = Random::new(seed);
-    let p = TankParameters { tank: random.tank(), coupling, host: None };
+    let p = TankParameters { tank: random.tank(), coupling, ..TankParameters::default() };
     let mut tank = SloshTank::new(&p, &TankInputs::default(), 0.0, 1e-9).unwrap();
     let mut x = tank.continuous_states();
     for n in 0..p.tank.modes {
@@ -310,7 +310,12 @@ fn tank_anywhere(seed: u64, coupling: Coupling) -> (TankParameters, SloshTank, T
     let ramp =
         |random: &mut Random| craft::Ramp { value: random.vector(2.0), slope: random.vector(1.0) };
     let a = ramp(&mut random);
-    let u = TankInputs { a, omega: random.vector(1.0), omega_dot: ramp(&mut random) };
+    let u = TankInputs {
+        a,
+        omega: random.vector(1.0),
+        omega_dot: ramp(&mut random),
+        ..TankInputs::default()
+    };
     (p, tank, u)
 }
 
@@ -330,13 +335,13 @@ fn acceleration(u: &TankInputs) -> DVector<f64> {
 
 #[test]
 fn wrench_is_bias_less_added_mass_times_acceleration() {
-    for coupling in [Coupling::Split, Coupling::Lumped] {
+    for coupling in Coupling::ALL {
         for seed in 0..200 {
             let (_, mut tank, u) = tank_anywhere(seed, coupling);
             let out = tank.outputs(&u);
             let m = symmetric(&out.added_mass);
             let mut left = DVector::from_column_slice(&out.bias) - &m * acceleration(&u);
-            if coupling == Coupling::Lumped {
+            if coupling == Coupling::RigidBody {
                 // A body that includes the mass has w x (w x S), w x (I w) in its own equations.
                 let (w, s) = (v(&u.omega), v(&[m[(5, 1)], m[(3, 2)], m[(4, 0)]]));
                 let inertia = m.fixed_view::<3, 3>(3, 3);
@@ -401,6 +406,7 @@ fn a_tank_alone_under_the_crafts_motion_is_the_tank_in_the_craft() {
                 a: craft::Ramp::held(out.specific_force),
                 omega: out.omega,
                 omega_dot: craft::Ramp::held(out.omega_dot),
+                ..TankInputs::default()
             };
             let mut tank = SloshTank::new(&own, &motion, 0.0, 1e-9).unwrap();
             let mut states = tank.continuous_states();

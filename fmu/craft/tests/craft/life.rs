@@ -178,7 +178,7 @@ fn followed_wheels_give_no_impulse() {
     let mut craft = Spacecraft::new(&p, &Inputs::default(), 0.0, 1e-9).unwrap();
     let before = craft.continuous_states();
     let u = Inputs { h_wheels: Ramp::held([1.0, 2.0, 3.0]), ..Inputs::default() };
-    craft.follow_wheels(&u);
+    craft.follow_inputs(&u);
     assert!(!craft.take_event(&u).unwrap());
     assert_eq!(craft.continuous_states(), before);
 }
@@ -224,6 +224,14 @@ fn a_refused_step_leaves_the_craft_as_it_was_and_says_why() {
     };
     let too_many: fn(&StepError) -> bool = |e| matches!(e, StepError::TooManySteps { .. });
     refused(&u, 1e7, too_many, "shorter communication steps");
+    let few = Parameters { max_steps: 3, ..p };
+    let mut bounded = Spacecraft::new(&few, &Inputs::default(), 0.0, 1e-9).unwrap();
+    let error = bounded.step(&u, 10.0).unwrap_err();
+    assert!(matches!(error, StepError::TooManySteps { max_steps: 3, .. }), "{error:?}");
+    assert!(error.to_string().contains("solver.max_steps = 3"), "{error}");
+    let none = Parameters { max_steps: 0, ..p };
+    let problems = Spacecraft::new(&none, &Inputs::default(), 0.0, 1e-9).unwrap_err();
+    assert_eq!(problems, ["solver.max_steps = 0 (allowed: 1 and above)"]);
 
     let p = TankParameters { tank: p.tank[0], ..TankParameters::default() };
     let u = TankInputs { a: Ramp::held([0.1, 0.2, 2.0]), ..TankInputs::default() };

@@ -75,6 +75,7 @@ impl Random {
                 position: self.vector(10.0),
                 velocity: self.vector(2.0),
             },
+            ..Parameters::default()
         }
     }
 

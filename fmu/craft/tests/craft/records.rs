@@ -102,6 +102,7 @@ pub fn parameters(record: &Value) -> Parameters {
             position: array(&init["r"], [0.0; 3]),
             velocity: array(&init["v"], [0.0; 3]),
         },
+        ..Parameters::default()
     }
 }
 
@@ -168,7 +169,12 @@ pub fn at_end(inputs: &Inputs) -> Inputs {
 /// The host's motion from knot k to the next, where its rate is `omega` at the knot.
 pub fn motion(record: &Value, k: usize, omega: [f64; 3]) -> TankInputs {
     let terms = &record["motion"];
-    TankInputs { a: ramp(terms, "a", k), omega, omega_dot: ramp(terms, "w_dot", k) }
+    TankInputs {
+        a: ramp(terms, "a", k),
+        omega,
+        omega_dot: ramp(terms, "w_dot", k),
+        ..TankInputs::default()
+    }
 }
 
 /// The host's motion at the end of a step.
@@ -180,6 +186,7 @@ pub fn motion_at_end(inputs: &TankInputs) -> TankInputs {
         a: end(&inputs.a),
         omega: [0, 1, 2].map(|i| inputs.omega[i] + turned[i]),
         omega_dot: end(w_d),
+        ..*inputs
     }
 }
 

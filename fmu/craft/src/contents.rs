@@ -1,0 +1,461 @@
+//! What is in a tank that may drain: masses, lengths and heights follow the liquid that is left.
+//!
+//! ```text
+//! f  outflow, kg/s: m_liq' = -f;  m_0 = m_liq - sum of m_n   every quantity of the tank's table by m_liq
+//! rho = P + l p,  P = d + h e                                a bob from O; h, l, m change
+//! m [a + w' x rho + w x (w x rho) + 2 w x rho' + rho''] = -T p - phi       Newton for what stays in the bob
+//! T = T_0 - m u.[a; w'],   u = [p; P x p]
+//! T_0 = m (l |p'|^2 - p.(w x (w x rho) + 2 w x rho' + P'') - l'') - k l |p_perp|^2
+//! p'' = -(1 - p p^T) G/l - |p'|^2 p
+//! G = a + w' x rho + w x (w x rho) + 2 w x rho' + P'' + 2 l' p' + (c l/m) p' + (k l/m) p_perp
+//! ```
+//!
+//! Mass leaves a bob with the bob's velocity and the craft with the velocity of the tank at the outlet,
+//! r_out = d + z_out e. On its way, along the tank's axis and level to it from the bobs, it has the
+//! momentum K against the tank, and the moment of momentum L about O:
+//!
+//! ```text
+//! K = j e + sum of m_n' l p_perp,   j = (m_0 H_0)' + sum of m_n' b_n + f z_out,   b_n = h + l e.p
+//! L = d x j e + sum of (d + b_n e) x (m_n' l p_perp)
+//! ```
+//!
+//! What bobs and rigid liquid do to the craft beyond their forces at constant mass keeps the momentum of
+//! everything, with the flow that leaves, to the letter:
+//!
+//! ```text
+//! force  = -2 w x K - K' - sum of m_n' rho_n'
+//! torque = -I_0' w - sum of m_n' (rho x (w x rho) + rho x rho') - f r_out x (w x r_out) - w x L - L'
+//! ```
+//!
+//! The energy of everything (outputs.rs) loses by it, besides what is dissipated,
+//!
+//! ```text
+//! drained' = -(force.V + torque.w + m_0' |V|^2/2 + V.(w x S_0') + w.I_0' w/2)
+//!     - sum of (m' |V + w x rho + rho'|^2/2 - T (h' e.p + l') - phi.(h' e + l' p) + k l l' |p_perp|^2)
+//! ```
+//!
+//! the power of force and torque, what the masses have that go from bobs and rigid liquid, and the work of rods whose
+//! ends move. S_0, I_0: the rigid liquid's moments about O; V: velocity of O.
+//!
+//! Source: momentum and moment of momentum of a volume fixed in the craft, with d(m s)/dt = K - f r_out;
+//! the energy is that of `outputs.rs`, differentiated along the motion.
+
+use crate::integrator::{Limits, StepError, advance_by_extrapolation};
+use crate::outputs::BobNow;
+use crate::parameters::{MODES, Tank};
+use crate::rigid::{Mat6, Rigid};
+use crate::state::Line;
+use crate::table::POINTS;
+use crate::vector::{
+    Mat3, Number, Vec3, add, constant, cross, dot, on_sphere, rotation, scale, sub, times,
+    transposed_times, unit_quaternion,
+};
+
+/// A tank in its place.
+#[derive(Clone, Debug)]
+pub struct Place {
+    pub tank: Tank,
+    axes: Mat3,
+    e: Vec3,
+    d: Vec3,
+}
+
+/// A quantity and its first two derivatives by time.
+type Jet<T> = [T; 3];
+
+fn jet<T: Number>(x: f64) -> Jet<T> {
+    [x, 0.0, 0.0].map(T::constant)
+}
+
+/// A bob, with what its equation has besides [a; w'].
+pub struct Swing<T> {
+    m: T,
+    l: T,
+    p: Vec3<T>,
+    p_d: Vec3<T>,
+    rho: Vec3<T>,
+    rho_d: Vec3<T>,
+    /// [p; P x p]
+    u: [T; 6],
+    t_0: T,
+    /// phi, and G without a + w' x rho
+    phi: Vec3<T>,
+    known: Vec3<T>,
+    /// Energy of the centring stiffness.
+    centring: T,
+    /// m', and the velocity of the rod's far end for a bob at rest on it, h' e + l' p.
+    m_d: T,
+    reel: Vec3<T>,
+    /// k l l' |p_perp|^2
+    centring_d: T,
+}
+
+/// A tank's contents at an instant.
+pub struct Contents<T> {
+    pub rigid: Rigid<T>,
+    /// Force and torque about O that the flow within makes.
+    stirring: [Vec3<T>; 2],
+    /// K and L.
+    pub stir: [Vec3<T>; 2],
+    bobs: [Option<Swing<T>>; MODES],
+    /// Power dissipated, W.
+    pub dissipation: T,
+    /// m_0', S_0' and I_0' w of the rigid liquid.
+    shrinking: (T, [Vec3<T>; 2]),
+}
+
+pub fn vec_of<T: Number>(x: &[T], at: usize) -> Vec3<T> {
+    [x[at], x[at + 1], x[at + 2]]
+}
+
+impl Place {
+    pub fn new(tank: &Tank) -> Place {
+        let axes = rotation(&unit_quaternion(tank.q));
+        Place { tank: *tank, axes, e: axes.map(|row| row[2]), d: tank.position }
+    }
+
+    /// x: p and p' of each mode, tank axes; `liquid`, `flow` and its `slope` count for tanks with a table.
+    pub fn contents<T: Number>(
+        &self,
+        x: &[T],
+        w: Vec3<T>,
+        liquid: T,
+        flow: T,
+        slope: f64,
+    ) -> Contents<T> {
+        let Place { tank, axes, .. } = self;
+        let table = &tank.fill;
+        let drains = table.points > 0;
+        let c = T::constant;
+        let flow = if drains { flow } else { c(0.0) };
+        let slope = if drains { slope } else { 0.0 };
+        // By the mass of liquid, m' = -f, m'' = -f'.
+        let follow = |y: &[f64; POINTS], constant: f64| -> Jet<T> {
+            if !drains {
+                return jet(constant);
+            }
+            let [value, first, second] = table.at(y, liquid);
+            [value, -(first * flow), second * flow * flow - first * slope]
+        };
+        let (e, d) = (constant::<T>(self.e), constant::<T>(self.d));
+        let outlet = add(d, e.map(|x| x * tank.outlet));
+        let mut m_0 = if drains { [liquid, -flow, c(-slope)] } else { jet(tank.m_0) };
+        let axes: Mat3<T> = axes.map(constant);
+        let zero = constant::<T>([0.0; 3]);
+        let mut bobs = [(); MODES].map(|()| None);
+        // K and L without the axial part, with their derivatives; sum of m_n' b_n and its derivative.
+        let (mut level, mut level_d) = ([zero; 2], [zero; 2]);
+        let mut sinking = [c(0.0); 2];
+        let mut stirring = [zero; 2];
+        let mut dissipation = c(0.0);
+        for n in 0..tank.modes {
+            let m = follow(&table.mass[n], tank.mass[n]);
+            let l = follow(&table.length[n], tank.length[n]);
+            let h = follow(&table.hinge[n], tank.hinge[n]);
+            let k = tank.k[n];
+            if drains {
+                m_0 = [m_0[0] - m[0], m_0[1] - m[1], m_0[2] - m[2]];
+            }
+            let p = times(&axes, vec_of(x, 6 * n));
+            let p_d = times(&axes, vec_of(x, 6 * n + 3));
+            let [p, p_d] = on_sphere(p, p_d);
+            let hinge = add(d, scale(h[0], e));
+            let rho = add(hinge, scale(l[0], p));
+            let rho_d = add(add(scale(h[1], e), scale(l[1], p)), scale(l[0], p_d));
+            let (height, height_d) = (dot(e, p), dot(e, p_d));
+            let p_perp = sub(p, scale(height, e));
+            let p_perp_d = sub(p_d, scale(height_d, e));
+            // c = 2 zeta m sqrt(g_ref/l + k/m)
+            let stiffness = l[0].recip() * tank.g_ref + m[0].recip() * k;
+            let drag = m[0] * stiffness.sqrt() * (2.0 * tank.zeta[n]);
+            let phi = add(scale(drag * l[0], p_d), scale(l[0] * k, p_perp));
+            let centripetal = add(cross(w, cross(w, rho)), cross(w, rho_d).map(|x| x * 2.0));
+            let settling = add(centripetal, scale(h[2], e));
+            let t_0 = m[0] * (l[0] * dot(p_d, p_d) - dot(p, settling) - l[2])
+                - l[0] * dot(p_perp, p_perp) * k;
+            let known = add(add(settling, scale(l[1] * 2.0, p_d)), scale(m[0].recip(), phi));
+            let turned = cross(hinge, p);
+            // What leaves the bob.
+            let b = h[0] + l[0] * height;
+            let b_d = h[1] + l[1] * height + l[0] * height_d;
+            let lost = scale(m[1] * l[0], p_perp);
+            let lost_d =
+                add(scale(m[2] * l[0] + m[1] * l[1], p_perp), scale(m[1] * l[0], p_perp_d));
+            let foot = add(d, scale(b, e));
+            sinking = [sinking[0] + m[1] * b, sinking[1] + m[2] * b + m[1] * b_d];
+            level = [add(level[0], lost), add(level[1], cross(foot, lost))];
+            level_d = [
+                add(level_d[0], lost_d),
+                add(level_d[1], add(cross(foot, lost_d), cross(scale(b_d, e), lost))),
+            ];
+            let speed = add(cross(w, rho), rho_d);
+            stirring = [
+                sub(stirring[0], scale(m[1], rho_d)),
+                sub(stirring[1], scale(m[1], cross(rho, speed))),
+            ];
+            dissipation = dissipation + drag * l[0] * l[0] * dot(p_d, p_d);
+            bobs[n] = Some(Swing {
+                m: m[0],
+                l: l[0],
+                p,
+                p_d,
+                rho,
+                rho_d,
+                u: [p[0], p[1], p[2], turned[0], turned[1], turned[2]],
+                t_0,
+                phi,
+                known,
+                centring: l[0] * l[0] * dot(p_perp, p_perp) * (0.5 * k),
+                m_d: m[1],
+                reel: add(scale(h[1], e), scale(l[1], p)),
+                centring_d: l[0] * l[1] * dot(p_perp, p_perp) * k,
+            });
+        }
+        let h_0 = follow(&table.h_0, tank.h_0);
+        let [i_0, i_z] = [follow(&table.i_0, tank.i_0), follow(&table.i_z, tank.i_z)];
+        // The rigid liquid about O.
+        let s = add(d, scale(h_0[0], e));
+        let s_d = scale(h_0[1], e);
+        let rigid = Rigid::axial(m_0[0], s, i_0[0], i_z[0], e);
+        let mut shrinking = (m_0[1], [zero; 2]);
+        if drains {
+            let moment = m_0[1] * h_0[0] + m_0[0] * h_0[1];
+            let moment_d = m_0[2] * h_0[0] + m_0[1] * h_0[1] * 2.0 + m_0[0] * h_0[2];
+            let j = moment + sinking[0] + flow * tank.outlet;
+            let j_d = moment_d + sinking[1] + c(slope * tank.outlet);
+            let axial = scale(j, e);
+            let axial_d = scale(j_d, e);
+            level = [add(level[0], axial), add(level[1], cross(d, axial))];
+            level_d = [add(level_d[0], axial_d), add(level_d[1], cross(d, axial_d))];
+            let [k, l] = level;
+            let force = add(cross(w, k).map(|x| x * 2.0), level_d[0]);
+            // I_0' w
+            let along = dot(e, w);
+            let own = add(scale(i_0[1], w), scale((i_z[1] - i_0[1]) * along, e));
+            let lighter = scale(m_0[1], cross(s, cross(w, s)));
+            let moving = scale(m_0[0], add(cross(s_d, cross(w, s)), cross(s, cross(w, s_d))));
+            let turning = add(own, add(lighter, moving));
+            shrinking.1 = [add(scale(m_0[1], s), scale(m_0[0], s_d)), turning];
+            let leaving = scale(flow, cross(outlet, cross(w, outlet)));
+            let torque = [turning, leaving, cross(w, l), level_d[1]];
+            stirring = [
+                sub(stirring[0], force),
+                torque.into_iter().fold(stirring[1], |sum, part| sub(sum, part)),
+            ];
+        }
+        Contents { rigid, stirring, stir: level, bobs, dissipation, shrinking }
+    }
+
+    /// The bobs' p' and p'' in tank axes, as six numbers each, under [a; w'].
+    pub fn put_rates<T: Number>(
+        &self,
+        contents: &Contents<T>,
+        [a, w_d]: [Vec3<T>; 2],
+        mut put: impl FnMut(usize, &[T]),
+    ) {
+        let axes: Mat3<T> = self.axes.map(constant);
+        for (n, bob) in contents.bobs.iter().flatten().enumerate() {
+            let g = add(add(a, cross(w_d, bob.rho)), bob.known);
+            let across = sub(g, scale(dot(bob.p, g), bob.p));
+            let p_dd = add(scale(bob.l.recip(), across), scale(dot(bob.p_d, bob.p_d), bob.p));
+            put(6 * n, &transposed_times(&axes, bob.p_d));
+            put(6 * n + 3, &transposed_times(&axes, p_dd).map(|x| -x));
+        }
+    }
+
+    /// What the outputs need of the bobs.
+    pub fn bobs_now<T: Number>(&self, contents: &Contents<T>) -> [Option<BobNow<T>>; MODES] {
+        let axes: Mat3<T> = self.axes.map(constant);
+        let mut bobs = [(); MODES].map(|()| None);
+        for (n, bob) in contents.bobs.iter().flatten().enumerate() {
+            bobs[n] = Some(BobNow {
+                m: bob.m,
+                rho: bob.rho,
+                rate: bob.rho_d,
+                in_tank: transposed_times(&axes, bob.p),
+                wave: self.tank.wave[n],
+                centring: bob.centring,
+            });
+        }
+        bobs
+    }
+
+    /// Whether its liquid follows a table.
+    pub fn drains(&self) -> bool {
+        self.tank.fill.points > 0
+    }
+}
+
+impl<T: Number> Swing<T> {
+    /// T under [a; w'].
+    fn pull(&self, a: Vec3<T>, w_d: Vec3<T>) -> T {
+        let u = self.u;
+        self.t_0 - self.m * (dot([u[0], u[1], u[2]], a) + dot([u[3], u[4], u[5]], w_d))
+    }
+
+    /// Force and torque about O on the craft at the pull T.
+    fn wrench(&self, pull: T) -> [Vec3<T>; 2] {
+        let force = add(scale(pull, self.p), self.phi);
+        [force, cross(self.rho, force)]
+    }
+}
+
+impl<T: Number> Contents<T> {
+    /// Adds the bobs' inertia along their rods, m u u^T.
+    pub fn add_rods(&self, matrix: &mut Mat6<T>) {
+        for bob in self.bobs.iter().flatten() {
+            for i in 0..6 {
+                for k in 0..6 {
+                    matrix[i][k] = matrix[i][k] + bob.m * bob.u[i] * bob.u[k];
+                }
+            }
+        }
+    }
+
+    /// Force and torque about O on the craft at a = w' = 0, the rigid liquid's inertia left out.
+    pub fn loads(&self) -> [Vec3<T>; 2] {
+        let bobs = self.bobs.iter().flatten().map(|bob| bob.wrench(bob.t_0));
+        bobs.fold(self.stirring, |sum, load| [add(sum[0], load[0]), add(sum[1], load[1])])
+    }
+
+    /// Force and torque about O on the craft.
+    pub fn wrench(&self, a: Vec3<T>, w: Vec3<T>, w_d: Vec3<T>) -> [Vec3<T>; 2] {
+        let rigid = self.rigid.inertial_wrench(a, w, w_d);
+        let bobs = self.bobs.iter().flatten().map(|bob| bob.wrench(bob.pull(a, w_d)));
+        let sum =
+            bobs.fold(self.stirring, |sum, load| [add(sum[0], load[0]), add(sum[1], load[1])]);
+        [sub(sum[0], rigid[0]), sub(sum[1], rigid[1])]
+    }
+
+    /// drained', W, at the velocity `v` of O. On a pivot, where the energy has the potential a.S, v is 0.
+    pub fn drained(&self, v: Vec3<T>, w: Vec3<T>, [a, w_d]: [Vec3<T>; 2], on_pivot: bool) -> T {
+        let half = 0.5;
+        let (m_0_d, [s_d, turning]) = self.shrinking;
+        let [force, torque] = self.stirring;
+        let mut power = dot(force, v)
+            + dot(torque, w)
+            + dot(v, v) * m_0_d * half
+            + dot(v, cross(w, s_d))
+            + dot(w, turning) * half;
+        let mut moment_d = s_d;
+        for bob in self.bobs.iter().flatten() {
+            let speed = add(v, add(cross(w, bob.rho), bob.rho_d));
+            let pull = add(scale(bob.pull(a, w_d), bob.p), bob.phi);
+            power =
+                power + dot(speed, speed) * bob.m_d * half - dot(pull, bob.reel) + bob.centring_d;
+            moment_d = add(moment_d, scale(bob.m_d, bob.rho));
+        }
+        if on_pivot {
+            power = power + dot(a, moment_d);
+        }
+        -power
+    }
+}
+
+/// The outflow of a tank over one step.
+#[derive(Clone, Copy)]
+pub struct Outflow<'a> {
+    pub place: &'a Place,
+    pub flow: Line,
+    /// Where the mass of liquid stands in the states.
+    pub at: usize,
+    /// Number of the tank, from 1; 0: there is only one.
+    pub tank: usize,
+}
+
+impl Outflow<'_> {
+    fn left(&self, liquid: f64, t: f64) -> f64 {
+        liquid - self.flow.integral(t)
+    }
+
+    /// Whether the flow can go on for `h`.
+    pub fn check(&self, liquid: f64, h: f64) -> Result<(), StepError> {
+        let Outflow { place, flow, tank, .. } = *self;
+        let [Some(low), Some(high)] =
+            [place.tank.fill.masses().first(), place.tank.fill.masses().last()]
+        else {
+            return Ok(());
+        };
+        let ends = [*low, *high];
+        // Where the flow turns, and at the end.
+        let turn = (-flow.value / flow.slope).clamp(0.0, h);
+        for t in [if turn.is_finite() { turn } else { h }, h] {
+            let liquid = self.left(liquid, t);
+            let slack = 1e-12 * high;
+            // NaN is beyond, too.
+            if !(low - slack..=high + slack).contains(&liquid) {
+                return Err(StepError::BeyondTable { tank, liquid, ends });
+            }
+        }
+        Ok(())
+    }
+
+    /// The first time after `t` at which the tank passes a point of its table, or `h`.
+    fn next_point(&self, liquid: f64, t: f64, h: f64) -> f64 {
+        let (flow, mut next) = (self.flow, h);
+        for point in self.place.tank.fill.masses() {
+            // f t + f' t^2/2 = gone
+            let gone = liquid - point;
+            let root = libm::sqrt(flow.value * flow.value + 2.0 * flow.slope * gone);
+            let sum = flow.value + if flow.value < 0.0 { -root } else { root };
+            for at in [2.0 * gone / sum, sum / flow.slope] {
+                if at > t + 1e-9 * h && at < next {
+                    next = at;
+                }
+            }
+        }
+        next
+    }
+}
+
+/// A system with tanks that drain.
+pub trait Drains<const D: usize> {
+    /// The rates of the states, `t` after the start of the step.
+    fn rates(&self, t: f64, x: &[f64; D]) -> [f64; D];
+
+    /// What the errors of a step of length `h` are compared with, from states and rates.
+    fn error_scale(&self, x: &[f64; D], rate: &[f64; D], h: f64) -> [f64; D];
+
+    /// Makes quaternions and directions what they are.
+    fn normalise(&self, x: &mut [f64; D], t: f64);
+
+    /// The flows of its tanks.
+    fn outflows(&self) -> impl Iterator<Item = Outflow<'_>>;
+
+    /// Moves the states on by `h` from the time `begin`.
+    fn advance(
+        &self,
+        x: &mut [f64; D],
+        begin: f64,
+        h: f64,
+        limits: Limits,
+    ) -> Result<(), StepError> {
+        for flow in self.outflows() {
+            flow.check(x[flow.at], h)?;
+        }
+        let start = *x;
+        let (mut t, mut steps) = (0.0, 0);
+        while t < h {
+            let end = self.outflows().fold(h, |end, flow| flow.next_point(start[flow.at], t, end));
+            let scale = self.error_scale(x, &self.rates(t, x), end - t);
+            let mut rates = |t: f64, x: &[f64; D]| self.rates(t, x);
+            advance_by_extrapolation(&mut rates, x, (t, end), &scale, limits, &mut steps)
+                .map_err(|why| why.after(begin))?;
+            self.normalise(x, end);
+            for flow in self.outflows() {
+                x[flow.at] = flow.left(start[flow.at], end);
+            }
+            t = end;
+        }
+        Ok(())
+    }
+}
+
+/// Directions and rates of bobs made so, from the first to the last place of the states.
+pub fn normalise_bobs(x: &mut [f64]) {
+    for bob in x.chunks_exact_mut(6) {
+        let [p, p_d] = on_sphere(vec_of(bob, 0), vec_of(bob, 3));
+        bob[..3].copy_from_slice(&p);
+        bob[3..].copy_from_slice(&p_d);
+    }
+}
