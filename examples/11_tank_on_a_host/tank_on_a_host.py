@@ -70,7 +70,7 @@ def tank(name: str) -> Values:
 def lumped() -> tuple[float, np.ndarray, np.ndarray]:
     """Return mass, centre of mass and inertia of the host with rigid liquid and bob at its hinge.
 
-    That is what coupling = lumped expects of a host that is a plain rigid body.
+    That is what coupling = rigid_body expects of the host.
     """
     e = np.array([0.0, 0.0, 1.0])
     parts = [
@@ -109,7 +109,7 @@ def coupled(folder: Path | None, step: float, wrench: bool = False) -> pd.DataFr
     else:
         host_settings, loads = body(*lumped()), LOADS
     host_settings |= {"tanks": 0} | START
-    tank_settings = tank("tank") | {"coupling_kind": 2}
+    tank_settings = tank("tank") | {"coupling_kind": 3}
     with (
         hubslosh.Plant(str(fmu(folder, "Spacecraft")), host_settings) as host,
         hubslosh.Plant(str(fmu(folder, "SloshTank")), tank_settings) as liquid,
@@ -162,7 +162,7 @@ def pack_ssp(folder: Path | None, archive: Path, step: float) -> None:
     host = component("host", "Spacecraft", {b: b for b in LOADS.values()}, list(SIGNALS),
                      body(*lumped()) | {"tanks": 0} | START)  # fmt: skip
     liquid = component("liquid", "SloshTank", {b: b for b in SIGNALS.values()}, list(LOADS),
-                       tank("tank") | {"coupling_kind": 2})  # fmt: skip
+                       tank("tank") | {"coupling_kind": 3})  # fmt: skip
     text = f"""<?xml version="1.0" encoding="UTF-8"?>
 <ssd:SystemStructureDescription name="TankOnHost" version="1.0"
     xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon"
@@ -235,7 +235,7 @@ def on_basilisk(folder: Path | None, step: float) -> pd.DataFrame:
     for model in (craft, loads):
         simulation.AddModelToTask("task", model)
     simulation.InitializeSimulation()
-    settings = tank("tank") | {"coupling_kind": 2}
+    settings = tank("tank") | {"coupling_kind": 3}
     with hubslosh.Plant(str(fmu(folder, "SloshTank")), settings) as liquid:
         rows = [[0.0, *START.values()]]
         for n in range(1, round(STOP / step) + 1):

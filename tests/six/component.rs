@@ -313,6 +313,7 @@ impl Spacecraft {
         settings.integer("mount", p.mount as i32);
         settings.reals(elements("gravity", 3), &p.gravity);
         settings.integer("tanks", p.tanks as i32);
+        settings.integer("solver.max_steps", p.max_steps as i32);
         for (i, tank) in p.tank.iter().enumerate() {
             settings.tank(&format!("tank[{}]", i + 1), tank);
         }
@@ -336,7 +337,7 @@ impl Spacecraft {
             "angular_momentum",
             "center_of_mass",
         ]));
-        outputs.extend(["energy", "work", "dissipated", "mass"].map(String::from));
+        outputs.extend(["energy", "work", "dissipated", "drained", "mass"].map(String::from));
         outputs.extend(rows("inertia", (3, 3)));
         for name in elements("tank", TANKS) {
             outputs.extend(vectors(&[&format!("{name}.force"), &format!("{name}.torque")]));
@@ -397,6 +398,7 @@ impl Spacecraft {
             energy: next.one(),
             work: next.one(),
             dissipated: next.one(),
+            drained: next.one(),
             mass: next.one(),
             inertia: next.matrix(),
             tank: [(); TANKS].map(|()| {
@@ -445,23 +447,29 @@ impl SloshTank {
         let mut settings = Settings::default();
         settings.tank("tank", &p.tank);
         settings.integer("coupling", p.coupling as i32);
+        settings.integer("solver.max_steps", p.max_steps as i32);
         if let Some(host) = &p.host {
             settings.craft("host", host);
         }
-        let inputs_named = ["a", "omega", "omega_dot"].iter().flat_map(|name| elements(name, 3));
+        let mut inputs_named: Vec<String> =
+            ["a", "omega", "omega_dot"].iter().flat_map(|name| elements(name, 3)).collect();
+        inputs_named.push("mass_flow".into());
         let mut outputs: Vec<String> = elements("force", 3).chain(elements("torque", 3)).collect();
         outputs.extend(elements("bias", 6).chain(elements("added_mass", TRIANGLE)));
-        outputs.extend(["dissipated", "mass"].map(String::from));
+        outputs.extend(["dissipated", "tank.liquid", "mass"].map(String::from));
         outputs.extend(elements("center_of_mass", 3).chain(rows("inertia", (3, 3))));
         outputs.extend(tank_outputs("tank."));
-        let names = [inputs_named.collect(), outputs];
+        let names = [inputs_named, outputs];
         let fmu = (&*SLOSH_TANK, &::SloshTank::table::TABLE);
         let [values, _] = SloshTank::flat(inputs);
         Bound::new(fmu, settings, names, &values, (start, tolerance)).map(SloshTank)
     }
 
     fn flat(inputs: &TankInputs) -> [[f64; TANK_INPUTS]; 2] {
-        flat([&inputs.a, &Ramp::held(inputs.omega), &inputs.omega_dot])
+        let [values, slopes] = flat([&inputs.a, &Ramp::held(inputs.omega), &inputs.omega_dot]);
+        let flow = &inputs.mass_flow;
+        [(values, flow.value), (slopes, flow.slope)]
+            .map(|(nine, flow)| std::array::from_fn(|i| if i < 9 { nine[i] } else { flow }))
     }
 
     pub fn step(&mut self, inputs: &TankInputs, h: f64) -> Result<(), CallError> {
@@ -489,6 +497,7 @@ impl SloshTank {
             bias: next.array(),
             added_mass: next.array(),
             dissipated: next.one(),
+            liquid: next.one(),
             mass: next.one(),
             center_of_mass: next.array(),
             inertia: next.matrix(),

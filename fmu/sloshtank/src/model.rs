@@ -36,6 +36,8 @@ pub struct Parameters {
     pub coupling_kind: i32,
     /// Number of slosh modes.
     pub modes: i32,
+    /// Number of points of the tank's table.
+    pub points: i32,
     /// The host's mass properties; mass 0: not known.
     pub host: Craft,
 }
@@ -44,7 +46,8 @@ impl Default for Parameters {
     fn default() -> Self {
         let tank = TankParameters::default();
         let host = Craft { mass: 0.0, ..craft::Parameters::default().craft };
-        Parameters { coupling_kind: 0, modes: tank.tank.modes as i32, host, tank }
+        let (modes, points) = (tank.tank.modes as i32, tank.tank.fill.points as i32);
+        Parameters { coupling_kind: 0, modes, points, host, tank }
     }
 }
 
@@ -63,16 +66,23 @@ impl DerefMut for Parameters {
 }
 
 impl Parameters {
-    fn complete(&self) -> TankParameters {
+    /// What the tank is made of. `coupling_kind` may not contradict a `coupling` that has been set.
+    fn resolved(&self) -> Result<TankParameters, Vec<String>> {
         let mut p = self.tank;
-        match self.coupling_kind {
-            1 => p.coupling = craft::Coupling::Split,
-            2 => p.coupling = craft::Coupling::Lumped,
-            _ => {}
+        let (coupling, kind) = (p.coupling as i32, self.coupling_kind);
+        if kind != 0 && p.coupling != TankParameters::default().coupling && coupling != kind {
+            return Err(vec![format!(
+                "coupling_kind = {kind} contradicts coupling = {coupling} (allowed: 0, or the same number; coupling \
+                 left at its start value)"
+            )]);
+        }
+        if let Some(coupling) = usize::try_from(kind - 1).ok().and_then(|i| Coupling::ALL.get(i)) {
+            p.coupling = *coupling;
         }
         p.tank.modes = usize::try_from(self.modes).unwrap_or(0);
+        p.tank.fill.points = usize::try_from(self.points).unwrap_or(0);
         p.host = (self.host.mass > 0.0).then_some(self.host);
-        p
+        Ok(p)
     }
 }
 
@@ -103,7 +113,8 @@ impl runtime::Model for Model {
         start_time: f64,
         tolerance: f64,
     ) -> Result<Self, Vec<String>> {
-        let mut tank = SloshTank::new(&parameters.complete(), &inputs.tank, start_time, tolerance)?;
+        let p = parameters.resolved()?;
+        let mut tank = SloshTank::new(&p, &inputs.tank, start_time, tolerance)?;
         let coupling_ratio = tank.coupling_ratio().unwrap_or(0.0);
         Ok(Model { tank, coupling_ratio })
     }
@@ -111,7 +122,8 @@ impl runtime::Model for Model {
     fn warnings(parameters: &Parameters, inputs: &Inputs) -> Vec<String> {
         let model = <Model as runtime::Model>::new(parameters, inputs, 0.0, 1e-6);
         let ratio = model.map_or(0.0, |model| model.coupling_ratio);
-        if parameters.tank.coupling == Coupling::Lumped || ratio <= LIMIT {
+        let is_split = parameters.resolved().is_ok_and(|p| p.coupling == Coupling::Split);
+        if !is_split || ratio <= LIMIT {
             return Vec::new();
         }
         vec![format!(
@@ -127,7 +139,7 @@ impl runtime::Model for Model {
     }
 
     fn resume(parameters: &Parameters, words: &[u64], tolerance: f64) -> Option<Self> {
-        let p = parameters.complete();
+        let p = parameters.resolved().ok()?;
         let (ratio, state) = words.split_last()?;
         let state = TankState::from_words(state.try_into().ok()?)?;
         let tank = p.problems().is_empty().then(|| SloshTank::resume(&p, &state, tolerance))?;
@@ -181,7 +193,8 @@ impl runtime::Model for Model {
         direction.copy_from_slice(dx);
         let slopes = [along.tank.a.slope, along.omega_slope, along.tank.omega_dot.slope];
         let mut du = [0.0; TANK_INPUTS];
-        du.copy_from_slice(slopes.as_flattened());
+        du[..9].copy_from_slice(slopes.as_flattened());
+        du[9] = along.tank.mass_flow.slope;
         dx_dot.copy_from_slice(&self.tank.directional_derivative(&inputs.tank, &direction, &du));
         self.tank.output_derivatives(&inputs.tank, &direction, &du)
     }

@@ -1,11 +1,12 @@
 //! Every variable of SloshTank.fmu, once. Start values are those of
 //! `craft::TankParameters::default()`.
 
-use craft::{Coupling, MODES, TANK_STATES, TRIANGLE, TankState};
+use craft::{Coupling, MODES, POINTS, TANK_STATES, TRIANGLE, TankState};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::{Enumeration, Item, Variable};
 
 use crate::Model;
+use crate::model::Parameters;
 
 /// All that is said about the FMU's variables.
 pub static TABLE: Table<Model> = Table::new(
@@ -25,18 +26,32 @@ pub static TABLE: Table<Model> = Table::new(
 static SCALARS: [Scalar<Model>; scalar_count(VARIABLES)] = scalars(VARIABLES);
 
 // Bias and added mass contain neither a nor omega_dot: a host that solves with them has no
-// algebraic loop. Lumped, the bias contains both, as given in the step before.
-const WRENCH: &[&str] = &["tank.p", "tank.p_dot", "a", "omega", "omega_dot"];
-const EVERYTHING: &[&str] = &["tank.", "a", "omega", "omega_dot", "coupling", "coupling_kind"];
+// algebraic loop. With the other couplings the bias contains both, as given in the step before.
+const WRENCH: &[&str] =
+    &["tank.p", "tank.p_dot", "tank.liquid", "a", "omega", "omega_dot", "mass_flow"];
+const EVERYTHING: &[&str] =
+    &["tank.", "a", "omega", "omega_dot", "mass_flow", "coupling", "coupling_kind"];
 const TANK: &[&str] = &["tank."];
+const PLACES: &[&str] = &["tank.p", "tank.liquid"];
 
 const VECTOR: &[usize] = &[3];
 const PER_MODE: &[usize] = &[MODES];
 const MODE_VECTOR: &[usize] = &[MODES, 3];
+const TABLE_OF_TANK: &[usize] = &[POINTS];
+const TABLE_OF_MODE: &[usize] = &[MODES, POINTS];
 
 /// Place among the continuous states of an element of the shape [`MODE_VECTOR`].
 fn bob(n: usize) -> usize {
     6 * (n / 3) + n % 3
+}
+
+const DISSIPATED: usize = TANK_STATES - 2;
+const LIQUID: usize = TANK_STATES - 1;
+
+fn set_coupling(p: &mut Parameters, number: i32) {
+    if let Some(coupling) = usize::try_from(number - 1).ok().and_then(|i| Coupling::ALL.get(i)) {
+        p.coupling = *coupling;
+    }
 }
 
 type V = Variable<Model>;
@@ -52,11 +67,11 @@ static VARIABLES: &[Variable<Model>] = &[
         "Torque of the whole liquid on the host about O, host axes")
         .shape(VECTOR).depends_on(WRENCH).initial_depends_on(EVERYTHING),
     V::output("bias", |o, n| o.bias[n], "",
-        "Force (1 to 3, N) and torque about O (4 to 6, N.m) that the host adds on its right side: force, torque = bias - added_mass [a; omega_dot]. With coupling = lumped it is for a rigid body that includes the constant added_mass, at the motion given last")
+        "Force (1 to 3, N) and torque about O (4 to 6, N.m) that the host adds on its right side: force, torque = bias - added_mass [a; omega_dot]. Split, it contains neither a nor omega_dot. With coupling = rigid_body it is for a body that has the constant added_mass in its own mass, centre of mass and inertia, centrifugal and gyroscopic terms included")
         .shape(&[6]).depends_on(WRENCH).initial_depends_on(EVERYTHING),
     V::output("added_mass", |o, n| o.added_mass[n], "",
-        "Symmetric 6 x 6 added-mass matrix about O that the host adds on its left side, upper triangle by rows (kg, kg.m, kg.m2): it follows from tank.p alone; with coupling = lumped it is constant")
-        .shape(&[TRIANGLE]).depends_on(&["tank.p"]).initial_depends_on(EVERYTHING),
+        "Symmetric 6 x 6 added-mass matrix about O that the host adds on its left side, upper triangle by rows (kg, kg.m, kg.m2): it follows from tank.p and tank.liquid alone; with coupling = lumped or rigid_body it is that of rigid liquid and each bob at its hinge at the start, constant")
+        .shape(&[TRIANGLE]).depends_on(PLACES).initial_depends_on(EVERYTHING),
 
     // Inputs
     V::input("a", |i, n| [&mut i.tank.a.value[n], &mut i.tank.a.slope[n]], "m/s2",
@@ -68,19 +83,22 @@ static VARIABLES: &[Variable<Model>] = &[
     V::input("omega_dot", |i, n| [&mut i.tank.omega_dot.value[n], &mut i.tank.omega_dot.slope[n]], "rad/s2",
         "Angular acceleration of the host, host axes; held over a step unless its derivative is set")
         .display_unit("deg/s2").shape(VECTOR).range(-1e9, 1e9),
+    V::input("mass_flow", |i, _| [&mut i.tank.mass_flow.value, &mut i.tank.mass_flow.slope], "kg/s",
+        "Mass that flows out of the tank, with the tank's velocity at the outlet (its thrust is the host's); in where negative. A jump's impulse on the host is left out: ramp it. Of no effect with tank.fill.points = 0")
+        .range(-1e9, 1e9),
 
     // Locals
     V::local("tank.wave_height", |o, _| o.tank.wave_height, "m",
         "Amplitude of the surface at the wall, all modes together: wave times slosh angle")
         .display_unit("mm").depends_on(&["tank.p"]),
     V::local("mass", |o, _| o.mass, "kg",
-        "Mass of the whole liquid"),
+        "Mass of the whole liquid").depends_on(&["tank.liquid"]),
     V::local("center_of_mass", |o, n| o.center_of_mass[n], "m",
         "Centre of mass of the whole liquid from O, host axes")
-        .shape(VECTOR).depends_on(&["tank.p"]),
+        .shape(VECTOR).depends_on(PLACES),
     V::local("inertia", |o, n| o.inertia[n / 3][n % 3], "kg.m2",
         "Inertia of the whole liquid about its centre of mass, each bob a point mass where it is, host axes")
-        .shape(&[3, 3]).depends_on(&["tank.p"]),
+        .shape(&[3, 3]).depends_on(PLACES),
     V::local("tank.angle_x", |o, n| o.tank.angle_x[n], "rad",
         "Slosh angle of a mode: its sine is the bob's displacement along the tank's x axis over the pendulum's length")
         .display_unit("deg").shape(PER_MODE).depends_on(&["tank.p"]),
@@ -89,7 +107,7 @@ static VARIABLES: &[Variable<Model>] = &[
         .display_unit("deg").shape(PER_MODE).depends_on(&["tank.p"]),
     V::local("dissipated", |o, _| o.dissipated, "J",
         "Energy dissipated by the liquid since the start")
-        .is_state(|_| TANK_STATES - 1).depends_on(&["dissipated"]),
+        .is_state(|_| DISSIPATED).depends_on(&["dissipated"]),
     V::state("tank.p", bob, "1",
         "Direction from hinge to bob of a slosh mode, a unit vector in tank axes; at rest under thrust along the tank's axis (0, 0, -1)")
         .shape(MODE_VECTOR).nominal(0.1).depends_on(&["tank.p[]"]).initial_depends_on(TANK),
@@ -97,20 +115,26 @@ static VARIABLES: &[Variable<Model>] = &[
         "Rate of tank.p against the tank, tank axes")
         .shape(MODE_VECTOR).nominal(0.1).depends_on(&["tank.p_dot[]"]).initial_depends_on(TANK),
 
+    V::state("tank.liquid", |_| LIQUID, "kg",
+        "Mass of the whole liquid")
+        .nominal(100.0).depends_on(&["tank.liquid"]).initial_depends_on(TANK),
+
     // The derivatives of the continuous states
-    V::derivative("der(dissipated)", |_| TANK_STATES - 1, "W", "Derivative of dissipated")
-        .depends_on(&["tank.p", "tank.p_dot"]).initial_depends_on(TANK),
+    V::derivative("der(dissipated)", |_| DISSIPATED, "W", "Derivative of dissipated")
+        .depends_on(&["tank.p", "tank.p_dot", "tank.liquid"]).initial_depends_on(TANK),
+    V::derivative("der(tank.liquid)", |_| LIQUID, "kg/s", "Derivative of tank.liquid: minus mass_flow")
+        .depends_on(&["mass_flow"]).initial_depends_on(&["mass_flow", "tank."]),
     V::derivative("der(tank.p)", bob, "1/s", "Derivative of tank.p: tank.p_dot")
         .shape(MODE_VECTOR).depends_on(&["tank.p", "tank.p_dot"]).initial_depends_on(TANK),
     V::derivative("der(tank.p_dot)", |n| bob(n) + 3, "1/s2", "Derivative of tank.p_dot")
         .shape(MODE_VECTOR).depends_on(WRENCH).initial_depends_on(EVERYTHING),
 
     // The tank
-    V::choice("coupling", &COUPLING, |p| p.coupling as i32, |p, n| p.coupling = if n == 2 { Coupling::Lumped } else { Coupling::Split },
+    V::choice("coupling", &COUPLING, |p| p.coupling as i32, set_coupling,
         "What bias and added_mass stand for"),
     V::integer("coupling_kind", |p, _| &mut p.coupling_kind,
-        "The coupling's number, for hosts that set no enumerations (ecos, libcosim): 1 split, 2 lumped; 0: as coupling says")
-        .between(0, 2),
+        "For hosts that set no enumerations (ecos, libcosim): 0: as coupling says; 1 split, 2 lumped, 3 rigid_body. An error if coupling has been set to another one")
+        .between(0, COUPLING.items.len() as i32),
     V::parameter("tank.position", |p, n| &mut p.tank.position[n], "m",
         "The tank's origin from O, host axes")
         .shape(VECTOR).range(-1e4, 1e4),
@@ -149,6 +173,26 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(PER_MODE).range(0.0, 10.0),
     V::parameter("tank.wave", |p, n| &mut p.tank.wave[n], "m", "Elevation of the surface at the wall per slosh angle of a mode, for wave_height alone")
         .shape(PER_MODE).range(0.0, 1e9),
+    V::integer("tank.fill.points", |p, _| &mut p.points, "Points of the tank's table: 0 for a tank whose liquid stays; with 2 or more the tank can drain, and modes and rigid liquid are the table's, interpolated monotonely with two continuous derivatives; as they start, the default tank at depths of 0.1 to 0.8 m")
+        .between(0, POINTS as i32),
+    V::parameter("tank.liquid_0", |p, _| &mut p.tank.liquid_0, "kg", "Mass of liquid at the start, used with fill.points > 0")
+        .range(0.0, 1e9),
+    V::parameter("tank.outlet", |p, _| &mut p.tank.outlet, "m", "Height of the outlet on the tank's axis, used with fill.points > 0")
+        .range(-1e4, 1e4),
+    V::parameter("tank.fill.liquid", |p, n| &mut p.tank.fill.liquid[n], "kg", "Mass of liquid at a point of the table, rising")
+        .shape(TABLE_OF_TANK).range(0.0, 1e9),
+    V::parameter("tank.fill.H_0", |p, n| &mut p.tank.fill.h_0[n], "m", "H_0 at a point of the table")
+        .shape(TABLE_OF_TANK),
+    V::parameter("tank.fill.I_0", |p, n| &mut p.tank.fill.i_0[n], "kg.m2", "I_0 at a point of the table")
+        .shape(TABLE_OF_TANK).range(0.0, 1e12),
+    V::parameter("tank.fill.I_z", |p, n| &mut p.tank.fill.i_z[n], "kg.m2", "I_z at a point of the table")
+        .shape(TABLE_OF_TANK).range(0.0, 1e12),
+    V::parameter("tank.fill.mass", |p, n| &mut p.tank.fill.mass[n / POINTS][n % POINTS], "kg", "Mass of a mode's bob at a point of the table")
+        .shape(TABLE_OF_MODE).range(0.0, 1e9),
+    V::parameter("tank.fill.length", |p, n| &mut p.tank.fill.length[n / POINTS][n % POINTS], "m", "Length of a mode's pendulum at a point of the table")
+        .shape(TABLE_OF_MODE).range(0.0, 1e4),
+    V::parameter("tank.fill.hinge", |p, n| &mut p.tank.fill.hinge[n / POINTS][n % POINTS], "m", "Height of a mode's hinge at a point of the table")
+        .shape(TABLE_OF_MODE),
     V::parameter("tank.p_0", |p, n| &mut p.tank.p_0[n / 3][n % 3], "1",
         "Direction from hinge to bob at the start, tank axes; normalised")
         .shape(MODE_VECTOR),
@@ -168,6 +212,11 @@ static VARIABLES: &[Variable<Model>] = &[
     V::parameter("host.Jxz", |p, _| &mut p.host.j.xz, "kg.m2", "Its product of inertia, minus the integral of x z dm"),
     V::parameter("host.Jyz", |p, _| &mut p.host.j.yz, "kg.m2", "Its product of inertia, minus the integral of y z dm"),
 
+    // Solver
+    V::count("solver.max_steps", |p| p.max_steps as i32, |p, n| p.max_steps = n.max(0) as usize,
+        "Internal steps that one communication step may take: a step that needs more is refused")
+        .between(1, 1_000_000_000),
+
     // What follows from the parameters
     V::calculated("coupling_ratio", |m, _| m.coupling_ratio(), "1",
         "Largest eigenvalue of the host's inverse mass matrix times the tank's added mass, 0 if host.mass is 0. A host that takes force and torque as they are diverges where it is too large, at any communication step: above 1 with held values, above 0.15 with extrapolated ones; use bias and added_mass")
@@ -184,7 +233,11 @@ static COUPLING: Enumeration = Enumeration {
         ),
         Item::new(
             "lumped",
-            "Constant added mass with each bob at its hinge: for hosts that are plain rigid bodies",
+            "Constant added mass with each bob at its hinge, bias at the a and omega_dot given: for hosts that add it to the matrix they solve with",
+        ),
+        Item::new(
+            "rigid_body",
+            "The same for hosts that are plain rigid bodies with this mass and inertia in all their equations",
         ),
     ],
 };

@@ -2,7 +2,7 @@
 
 use std::ops::{Deref, DerefMut};
 
-use craft::{INPUTS, Inputs, Outputs, STATES, Spacecraft, State, TANKS};
+use craft::{INPUTS, Inputs, Mount, Outputs, STATES, Spacecraft, State, TANKS};
 use runtime::table::Table;
 
 use crate::table::TABLE;
@@ -11,8 +11,8 @@ use crate::table::TABLE;
 #[derive(Clone, Debug)]
 pub struct Model {
     craft: Spacecraft,
-    /// Whether the present inputs are applied: a jump of the wheels' momentum acts at once in
-    /// Co-Simulation.
+    /// Whether the present inputs are applied: a jump of the wheels' momentum or of an outflow acts
+    /// at once in Co-Simulation.
     present: bool,
 }
 
@@ -20,6 +20,8 @@ pub struct Model {
 #[derive(Clone, Debug)]
 pub struct Parameters {
     craft: craft::Parameters,
+    /// The mount's number if it is not 0, for hosts that set no enumerations.
+    pub mount_kind: i32,
     /// Number of tanks.
     pub tanks: i32,
     /// Number of slosh modes of each tank.
@@ -33,7 +35,7 @@ impl Default for Parameters {
         let craft = craft::Parameters::default();
         let modes = craft.tank.map(|tank| tank.modes as i32);
         let points = craft.tank.map(|tank| tank.fill.points as i32);
-        Parameters { tanks: craft.tanks as i32, modes, points, craft }
+        Parameters { mount_kind: 0, tanks: craft.tanks as i32, modes, points, craft }
     }
 }
 
@@ -52,14 +54,25 @@ impl DerefMut for Parameters {
 }
 
 impl Parameters {
-    fn counted(&self) -> craft::Parameters {
+    /// What the craft is made of. `mount_kind` may not contradict a `mount` that has been set.
+    fn resolved(&self) -> Result<craft::Parameters, Vec<String>> {
         let mut p = self.craft;
+        let (mount, kind) = (p.mount as i32, self.mount_kind);
+        if kind != 0 && p.mount != craft::Parameters::default().mount && mount != kind {
+            return Err(vec![format!(
+                "mount_kind = {kind} contradicts mount = {mount} (allowed: 0, or the same number; mount left at its \
+                 start value)"
+            )]);
+        }
+        if let Some(mount) = usize::try_from(kind - 1).ok().and_then(|i| Mount::ALL.get(i)) {
+            p.mount = *mount;
+        }
         p.tanks = usize::try_from(self.tanks).unwrap_or(0);
         for (i, tank) in p.tank.iter_mut().enumerate() {
             tank.modes = usize::try_from(self.modes[i]).unwrap_or(0);
             tank.fill.points = usize::try_from(self.points[i]).unwrap_or(0);
         }
-        p
+        Ok(p)
     }
 }
 
@@ -82,7 +95,7 @@ impl runtime::Model for Model {
         start_time: f64,
         tolerance: f64,
     ) -> Result<Self, Vec<String>> {
-        let craft = Spacecraft::new(&parameters.counted(), inputs, start_time, tolerance)?;
+        let craft = Spacecraft::new(&parameters.resolved()?, inputs, start_time, tolerance)?;
         Ok(Model { craft, present: false })
     }
 
@@ -91,7 +104,7 @@ impl runtime::Model for Model {
     }
 
     fn resume(parameters: &Parameters, words: &[u64], tolerance: f64) -> Option<Self> {
-        let p = parameters.counted();
+        let p = parameters.resolved().ok()?;
         let state = State::from_words(words.try_into().ok()?)?;
         let craft = p.problems().is_empty().then(|| Spacecraft::resume(&p, &state, tolerance))?;
         Some(Model { craft, present: false })
@@ -155,7 +168,7 @@ impl runtime::Model for Model {
     }
 
     fn accept_step(&mut self, inputs: &Inputs) -> Result<bool, String> {
-        self.craft.follow_wheels(inputs);
+        self.craft.follow_inputs(inputs);
         self.craft.check_liquids().map(|()| false).map_err(|why| why.to_string())
     }
 }

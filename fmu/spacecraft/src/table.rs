@@ -49,6 +49,18 @@ const MOMENTUM: &[&str] = &[
     "h_wheels",
     "mass_flow",
 ];
+const ENERGIES: &[&str] = &[
+    "q",
+    "omega",
+    "velocity",
+    "tank[].p",
+    "tank[].p_dot",
+    "tank[].liquid",
+    "force",
+    "torque",
+    "h_wheels",
+    "mass_flow",
+];
 const PLACES: &[&str] = &["tank[].p", "tank[].liquid"];
 const ANGLES: &[&str] = &["tank[].p"];
 // Where they start.
@@ -59,6 +71,7 @@ const EVERYTHING: &[&str] = &[
     "mass_flow",
     "craft.",
     "mount",
+    "mount_kind",
     "gravity",
     "tanks",
     "tank[].",
@@ -135,8 +148,8 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(VECTOR).range(-1e12, 1e12),
 
     V::input("mass_flow", |i, n| [&mut i.mass_flow[n].value, &mut i.mass_flow[n].slope], "kg/s",
-        "Mass that flows out of each tank, with the tank's velocity at the outlet (its thrust is a part of force); in where negative. Of no effect in a tank with fill.points = 0")
-        .shape(PER_TANK),
+        "Mass that flows out of each tank, with the tank's velocity at the outlet (its thrust is a part of force); in where negative. A jump sets what flows within in motion by an impulse that keeps the momentum. Of no effect in a tank with fill.points = 0")
+        .shape(PER_TANK).range(-1e9, 1e9),
 
     // Locals
     V::local("momentum", |o, n| o.momentum[n], "kg.m/s",
@@ -149,11 +162,14 @@ static VARIABLES: &[Variable<Model>] = &[
         "Kinetic energy of everything, of the centring springs, and on a pivot of gravity; the wheels' spin and the flow towards an outlet left out")
         .depends_on(&["q", "omega", "velocity", "tank[].p", "tank[].p_dot", "tank[].liquid", "mass_flow"]),
     V::local("work", |o, _| o.work, "J",
-        "Work of force, torque and wheels on the craft since the start: energy - energy(0) = work - dissipated while nothing drains")
+        "Work of force, torque and wheels on the craft since the start: energy - energy(0) = work - dissipated - drained")
         .is_state(|_| index::WORK).depends_on(&["work"]),
     V::local("dissipated", |o, _| o.dissipated, "J",
         "Energy dissipated by the liquids since the start")
         .is_state(|_| index::DISSIPATED).depends_on(&["dissipated"]),
+    V::local("drained", |o, _| o.drained, "J",
+        "Energy that has gone with the outflow since the start: the kinetic energy of what has left, and what the flow within the tanks has taken")
+        .is_state(|_| index::DRAINED).depends_on(&["drained"]),
     V::local("mass", |o, _| o.mass, "kg",
         "Mass of everything")
         .depends_on(&["tank[].liquid"]),
@@ -205,6 +221,8 @@ static VARIABLES: &[Variable<Model>] = &[
         .depends_on(&["q", "omega", "velocity", "force", "torque", "h_wheels"]).initial_depends_on(EVERYTHING),
     V::derivative("der(dissipated)", |_| index::DISSIPATED, "W", "Derivative of dissipated")
         .depends_on(&["tank[].p", "tank[].p_dot", "tank[].liquid"]).initial_depends_on(EVERYTHING),
+    V::derivative("der(drained)", |_| index::DRAINED, "W", "Derivative of drained")
+        .depends_on(ENERGIES).initial_depends_on(EVERYTHING),
     V::derivative("der(tank[].liquid)", |n| index::LIQUID + n, "kg/s", "Derivative of tank[].liquid: minus mass_flow")
         .shape(PER_TANK).depends_on(&["mass_flow[]"]).initial_depends_on(&["mass_flow", "tanks", "tank[]."]),
     V::derivative("der(tank[].p)", bob, "1/s", "Derivative of tank[].p: tank[].p_dot")
@@ -228,6 +246,9 @@ static VARIABLES: &[Variable<Model>] = &[
     V::parameter("craft.Jyz", |p, _| &mut p.craft.j.yz, "kg.m2", "Product of inertia, minus the integral of y z dm"),
     V::choice("mount", &MOUNT, |p| p.mount as i32, |p, n| p.mount = if n == 2 { craft::Mount::Pivot } else { craft::Mount::Free },
         "How the craft is held"),
+    V::integer("mount_kind", |p, _| &mut p.mount_kind,
+        "For hosts that set no enumerations: 0: as mount says; 1 free, 2 pivot. An error if mount has been set to another one")
+        .between(0, MOUNT.items.len() as i32),
     V::parameter("gravity", |p, n| &mut p.gravity[n], "m/s2", "Uniform gravity, inertial axes: acts on a pivot alone")
         .shape(VECTOR).range(-1e4, 1e4),
     V::integer("tanks", |p, _| &mut p.tanks, "Number of tanks")
@@ -309,6 +330,11 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(VECTOR),
     V::parameter("init.velocity", |p, n| &mut p.init.velocity[n], "m/s", "velocity at the start")
         .shape(VECTOR),
+
+    // Solver
+    V::count("solver.max_steps", |p| p.max_steps as i32, |p, n| p.max_steps = n.max(0) as usize,
+        "Internal steps that one communication step may take: a step that needs more is refused")
+        .between(1, 1_000_000_000),
 ];
 
 static MOUNT: Enumeration = Enumeration {
@@ -323,4 +349,4 @@ static MOUNT: Enumeration = Enumeration {
     ],
 };
 
-const _: () = assert!(STATES == index::LIQUID + TANKS);
+const _: () = assert!(STATES == index::DRAINED + 1);

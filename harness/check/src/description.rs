@@ -545,11 +545,61 @@ pub fn parameter_names(d: &Description, findings: &mut Findings) {
 }
 
 /// `xml.flat_ports`
+///
+/// A point makes a member of a structure of the name, and importers that know such names make one port of all its
+/// members. An index makes an element of an array (2.2.9), of which importers make a vector or leave the elements
+/// alone: both can be wired, if the array is whole.
 pub fn flat_ports(d: &Description, findings: &mut Findings) {
+    let is_structured = d.root.get("variableNamingConvention") == Some("structured");
+    let is_port = |v: &&Variable| matches!(v.causality.as_str(), "input" | "output");
+    // Elements of each array by name, in the order of the variables.
+    let mut arrays: BTreeMap<(&str, &str), Vec<Vec<u32>>> = BTreeMap::new();
+    for v in d.variables.iter().filter(is_port) {
+        if let Some((array, index)) = indexed(&v.name) {
+            arrays.entry((&v.causality, array)).or_default().push(index);
+        }
+    }
     d.each(findings, |v| {
-        (matches!(v.causality.as_str(), "input" | "output") && v.name.contains(['.', '[']))
-            .then(|| "the name of a port has a point or a bracket".to_string())
+        if !is_port(&v) {
+            return None;
+        }
+        if v.name.contains('.') {
+            return Some("the name of a port has a point".to_string());
+        }
+        if !v.name.contains(['[', ']']) {
+            return None;
+        }
+        if !is_structured {
+            return Some("the name of a port has a bracket, and names are not structured".to_string());
+        }
+        let whole = indexed(&v.name)
+            .and_then(|(array, _)| arrays.get(&(v.causality.as_str(), array)))
+            .is_some_and(|indices| is_whole(indices));
+        (!whole).then(|| {
+            "the port is an element of an array that is not whole (allowed: every index from 1 to the \
+             last, each once, all inputs or all outputs)"
+                .to_string()
+        })
     });
+}
+
+/// Array and indices of `array[1,2]`.
+fn indexed(name: &str) -> Option<(&str, Vec<u32>)> {
+    let (array, indices) = name.strip_suffix(']')?.split_once('[')?;
+    let indices: Option<Vec<u32>> = indices.split(',').map(|i| i.trim().parse().ok()).collect();
+    Some((array, indices?))
+}
+
+/// Whether these are all indices of an array, each once.
+fn is_whole(indices: &[Vec<u32>]) -> bool {
+    let dimensions = indices[0].len();
+    if indices.iter().any(|index| index.len() != dimensions || index.contains(&0)) {
+        return false;
+    }
+    let last = |k: usize| indices.iter().map(|index| index[k] as usize).max().unwrap_or(0);
+    let count = (0..dimensions).try_fold(1_usize, |count, k| count.checked_mul(last(k)));
+    let different: BTreeSet<_> = indices.iter().collect();
+    count == Some(indices.len()) && different.len() == indices.len()
 }
 
 /// `xml.causality`
@@ -948,6 +998,28 @@ mod tests {
         for wrong in ["", "a b", "1a", "a..b", "a.", "a[x]", "a[1", "der(a,b)", "a-b", "'a"] {
             assert!(!is_structured(wrong), "{wrong}");
         }
+    }
+
+    #[test]
+    fn arrays_are_whole_from_index_1_to_the_last() {
+        let whole = |names: &[&str]| {
+            is_whole(&names.iter().map(|name| indexed(name).unwrap().1).collect::<Vec<_>>())
+        };
+        assert!(whole(&["a[1]"]) && whole(&["a[2]", "a[1]"]));
+        assert!(whole(&["a[1,1]", "a[1,2]", "a[2,1]", "a[2,2]"]));
+        for broken in [
+            &["a[0]"][..],
+            &["a[2]"],
+            &["a[1]", "a[3]"],
+            &["a[1]", "a[1]"],
+            &["a[1,1]", "a[2,2]"],
+            &["a[1]", "a[1,2]"],
+            &["a[4294967295,4294967295,4294967295]"],
+        ] {
+            assert!(!whole(broken), "{broken:?}");
+        }
+        assert_eq!(indexed("a"), None);
+        assert_eq!(indexed("a[x]"), None);
     }
 
     #[test]

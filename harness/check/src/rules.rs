@@ -60,7 +60,7 @@ pub static RULES: &[Rule] = &[
     rule("xml.names", Error, "variables have names, each its own", "2.2.7", Description(description::names)),
     rule("xml.structured_names", Error, "names follow the declared naming convention", "2.2.9", Description(description::structured_names)),
     rule("xml.parameter_names", Warning, "names of parameters have at most 55 characters", "Simulink cuts them", Description(description::parameter_names)),
-    rule("xml.flat_ports", Warning, "names of inputs and outputs have no points or brackets", "Simulink makes buses of them", Description(description::flat_ports)),
+    rule("xml.flat_ports", Warning, "names of inputs and outputs have no points; with brackets they are the elements of whole arrays, indices from 1, names declared as structured", "2.2.9; Simulink makes buses of names with points", Description(description::flat_ports)),
     rule("xml.causality", Error, "causality, variability and type go together", "2.2.7, table of variability and causality", Description(description::causality)),
     rule("xml.variability", Warning, "variability is written for all that is no Real", "2.2.7; the schema's default is continuous", Description(description::variability)),
     rule("xml.initial", Error, "initial is allowed with the causality and variability", "2.2.7, table of initial", Description(description::initial)),

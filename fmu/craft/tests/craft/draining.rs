@@ -351,11 +351,10 @@ fn a_valve_that_opens_or_shuts_keeps_momentum_and_energy() {
             // A few roundings of numbers of this size.
             assert!((p_1 - p_0).norm() < 1e-14 * p_0.norm(), "{seed} {p_0} {p_1}");
             assert!((h_1 - h_0).norm() < 1e-13 * h_0.norm(), "{seed} {h_0} {h_1}");
-            let off = (energy(&now) - energy(&before)).abs();
+            assert!(now.energy != before.energy, "{seed}");
+            craft.step(&opened, 1e-3).unwrap();
+            let off = (energy(&craft.outputs(&after(&opened, 1e-3))) - energy(&before)).abs();
             assert!(off < 1e-13 * before.energy, "{seed} {off:e}");
-            if k == 0 {
-                assert!((v(&now.omega) - v(&before.omega)).norm() > 1e-6, "{seed}");
-            }
         }
     }
 }
@@ -431,7 +430,12 @@ fn tanks_that_drain_on_a_rigid_body_are_the_craft() {
         let (p, u) = craft(seed, seed as usize % 4);
         let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-10).unwrap();
         craft.step(&u, 0.5).unwrap();
-        let u = after(&u, 0.5);
+        // As a host that integrates itself gives them: without slopes.
+        let mut u = after(&u, 0.5);
+        for ramp in [&mut u.force, &mut u.torque, &mut u.h_wheels] {
+            ramp.slope = [0.0; 3];
+        }
+        u.mass_flow.iter_mut().for_each(|flow| flow.slope = 0.0);
         let (out, rate) = (craft.outputs(&u), craft.derivatives(&u));
         let x = craft.continuous_states();
         let w = v(&out.omega);
@@ -440,7 +444,7 @@ fn tanks_that_drain_on_a_rigid_body_are_the_craft() {
         let [centrifugal, gyroscopic] = dry.turning(w);
         let h = v(&u.h_wheels.value);
         let force = v(&u.force.value) - centrifugal;
-        let torque = v(&u.torque.value) - v(&u.h_wheels.slope) - gyroscopic - w.cross(&h);
+        let torque = v(&u.torque.value) - gyroscopic - w.cross(&h);
         let mut rest = Vector6::from_fn(|i, _| if i < 3 { force[i] } else { torque[i - 3] });
         let mut matrix = dry.matrix();
         let mut tanks = Vec::new();
@@ -457,7 +461,6 @@ fn tanks_that_drain_on_a_rigid_body_are_the_craft() {
             states[..6 * MODES].copy_from_slice(&x[index::bob(i, 0)..][..6 * MODES]);
             states[6 * MODES + 1] = x[index::LIQUID + i];
             tank.set_continuous_states(&states);
-            // In Model Exchange the flow's slope is not known; it is known here, to both.
             let shown = tank.outputs(&motion);
             let places = (0..6).flat_map(|i| (i..6).map(move |j| (i, j)));
             for ((i, j), x) in places.zip(shown.added_mass) {

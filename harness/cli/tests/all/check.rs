@@ -498,6 +498,11 @@ fn descriptions_that_break_a_rule_are_told() {
                 &["xml.flat_ports"],
             ),
             (
+                "half an array of ports",
+                changed(theta, "name=\"theta\"", "name=\"theta[2]\""),
+                &["xml.flat_ports"],
+            ),
+            (
                 "a continuous parameter",
                 changed(hub, "variability=\"fixed\"", "variability=\"continuous\""),
                 &["xml.causality"],
