@@ -177,9 +177,9 @@ fn settings(model: &str) -> Vec<Vec<(&'static str, Value)>> {
                 ]
             })
             .into(),
-        // split, lumped (2)
-        "SloshTank" => [(1, 0), (1, 1), (1, 3), (2, 2)]
-            .map(|(coupling, modes)| {
+        // split, lumped (2), rigid_body (3); the last two drain
+        "SloshTank" => [(1, 0, 0), (1, 1, 0), (1, 3, 0), (2, 2, 0), (3, 1, 8), (1, 2, 8)]
+            .map(|(coupling, modes, points)| {
                 vec![
                     ("coupling", Integer(coupling)),
                     ("tank.modes", Integer(modes)),
@@ -188,6 +188,8 @@ fn settings(model: &str) -> Vec<Vec<(&'static str, Value)>> {
                     ("host.mass", Real(1000.0)),
                     ("a[3]", Real(2.0)),
                     ("omega_dot[1]", Real(0.1)),
+                    ("tank.fill.points", Integer(points)),
+                    ("mass_flow", Real(0.5)),
                 ]
             })
             .into(),
