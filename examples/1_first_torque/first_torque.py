@@ -1,4 +1,4 @@
-"""The first torque: a pulse on the hub, with sloshing and with frozen liquid.
+"""The first torque: a pulse on the hub, with sloshing and with rigid liquid.
 
 python examples/1_first_torque/first_torque.py
 """

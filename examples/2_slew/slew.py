@@ -71,7 +71,7 @@ DURATION = {"bang-stop-bang": 3.6, "smoothed": 4.8}
 
 
 def inertia(fmu: str | Path) -> float:
-    """Return the moment of inertia of hub and frozen liquid, kg·m²."""
+    """Return the moment of inertia of hub and rigid liquid, kg·m²."""
     frozen = hubslosh.linearize(fmu, FREE | {"slosh.model": "frozen"}, ["tau_cmd"], ["omega"])
     return 1 / frozen.B[0, 0]
 

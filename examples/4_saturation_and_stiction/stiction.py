@@ -18,7 +18,7 @@ PERIOD, LATENCY = 0.02, 1
 BANDWIDTH, ZETA = 0.3, 0.7
 """Of the PD part, for a rigid body of `INERTIA`: Hz, damping ratio."""
 INERTIA = 0.428
-"""kg·m², hub and frozen liquid."""
+"""kg·m², hub and rigid liquid."""
 INTEGRAL = 0.4
 """Of the integral part, per s: its gain is this times the proportional one."""
 WIDTHS = (1e-2, 1e-3, 1e-5)

@@ -52,7 +52,7 @@ def linear(fmu: str | Path, model: str = "linear") -> hubslosh.LinearModel:
 
 
 def gains(fmu: str | Path, bandwidth: float) -> np.ndarray:
-    """Return [kp, kd] of a PD for hub and frozen liquid."""
+    """Return [kp, kd] of a PD for hub and rigid liquid."""
     w = 2 * np.pi * bandwidth
     return np.array([w**2, 2 * ZETA * w]) / linear(fmu, "frozen").B[1, 0]
 

@@ -20,7 +20,7 @@ PERIOD, LATENCY = 0.1, 1
 BANDWIDTH, ZETA = 0.15, 0.7
 """Of the PD that is designed for the bench as it should be: Hz, damping ratio."""
 INERTIA = 0.428
-"""kg·m², hub and frozen liquid at 10 cm."""
+"""kg·m², hub and rigid liquid at 10 cm."""
 STOP = 90.0  # s
 PUSH = np.radians(4)
 """Of the liquid at the start, rad."""

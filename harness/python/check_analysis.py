@@ -150,10 +150,13 @@ def features(grid: Real, response: Complex) -> Figures:
         top = curve.deriv().roots()[0].real
         return float(np.exp(top)), float(curve(top))
 
-    dip, peak = vertex(low), vertex(high)
-    found = {"f_dip_hz": dip and dip[0], "f_res_hz": peak and peak[0]}
-    if dip and peak:
-        found |= {"delta_f_hz": peak[0] - dip[0], "notch_db": peak[1] - dip[1]}
+    antiresonance, resonance = vertex(low), vertex(high)
+    found = {"f_dip_hz": antiresonance and antiresonance[0], "f_res_hz": resonance and resonance[0]}
+    if antiresonance and resonance:
+        found |= {
+            "delta_f_hz": resonance[0] - antiresonance[0],
+            "notch_db": resonance[1] - antiresonance[1],
+        }
     return found
 
 
@@ -190,8 +193,8 @@ def fit(grid: Real, measured: Complex) -> Model:
         numerator = np.linalg.lstsq(matrix, target)[0]
         return numerator, matrix @ numerator - target
 
-    peak = grid[np.argmax(np.abs(measured))] * 2 * np.pi / unit
-    starts = [(0.05, peak * shift, zeta) for shift in (1, 0.97) for zeta in (0.005, 0.05)]
+    resonance = grid[np.argmax(np.abs(measured))] * 2 * np.pi / unit
+    starts = [(0.05, resonance * shift, zeta) for shift in (1, 0.97) for zeta in (0.005, 0.05)]
     bounds = ([-18, np.log(0.1), -12], [5, np.log(10), 3])
     best = min(
         (
@@ -263,15 +266,15 @@ def analyse(path: Path) -> tuple[Figures, Figures]:
     figures["fit_time_pct"] = 100 * (1 - lost)
     figures["skewness"] = float(stats.skew(residual))
     figures["kurtosis"] = float(stats.kurtosis(residual, fisher=False))
-    dip, peak = spa_features.get("f_dip_hz"), spa_features.get("f_res_hz")
-    if dip and peak:
+    antiresonance, resonance = spa_features.get("f_dip_hz"), spa_features.get("f_res_hz")
+    if antiresonance and resonance:
         segment = np.sqrt(1 / (3 * sweep.mean_rate))
         f, gamma = coherence(step, torque, residual, min(round(segment / step), longest))
-        figures["coherence"] = float(gamma[(f >= dip) & (f <= peak)].mean())
+        figures["coherence"] = float(gamma[(f >= antiresonance) & (f <= resonance)].mean())
         f, gamma = coherence(step, torque, rate, longest)
         snr = 10 * np.log10(gamma / (1 - gamma))
-        figures["snr_res_db"] = float(snr[np.argmin(np.abs(f - peak))])
-        figures["snr_dip_db"] = float(snr[np.argmin(np.abs(f - dip))])
+        figures["snr_res_db"] = float(snr[np.argmin(np.abs(f - resonance))])
+        figures["snr_dip_db"] = float(snr[np.argmin(np.abs(f - antiresonance))])
 
     amplitude = abs(float(notes["profile"].split("amplitude=")[1].split(",")[0]))
     x, y, force = (demodulate(sweep, time, torque, s, grid) for s in (radial, tangential, force_r))

@@ -242,8 +242,8 @@ def main() -> None:
         "![work-precision diagram](work_precision.svg)",
         "",
         f"One RK4 step of 5 ms on the same equations took {unit:.0f} ns; it is the unit of cost. "
-        "Instructions are callgrind's and repeat on any machine; times are CPU times, the least of ten "
-        "runs, piece by piece of 10 s, of three whole runs for ode_solvers, of one for SciPy. "
+        "Instructions are callgrind's and repeat on any machine; times are CPU times, the least of "
+        "ten runs, piece by piece of 10 s, of three whole runs for ode_solvers, of one for SciPy. "
         "The FMU's cost is that of the whole round through its C interface: two sets, "
         "fmi2DoStep, one get.",
         "",

@@ -820,7 +820,7 @@ fn compare(
         let place = format!("line {}, {list}, {}", unknown.line, d.name_of(unknown.index));
         // An index out of range is another rule's business.
         if d.at(unknown.index).is_some() && !expected.contains(&unknown.index) {
-            findings.add(&place, format!("it does not belong here (allowed: {why})"));
+            findings.add(&place, format!("it is not allowed here (allowed: {why})"));
         }
         if !seen.insert(unknown.index) {
             findings.add(&place, "it is listed already");

@@ -31,8 +31,8 @@ pub struct Point {
     pub variance: f64,
 }
 
-/// The overlapping Allan variance of samples that lie `step` (s) apart, at averaging times evenly
-/// spread in the logarithm from one sample to a tenth of the record.
+/// The overlapping Allan variance of samples that lie `step` (s) apart, at averaging times
+/// equally spaced in the logarithm from one sample to a tenth of the record.
 pub fn variances(step: f64, samples: &[f64]) -> Vec<Point> {
     // sums[k]: of the first k samples
     let mut sums = vec![0.0; samples.len() + 1];

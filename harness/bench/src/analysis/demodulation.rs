@@ -23,7 +23,7 @@ pub const LEAST_CYCLES: f64 = 3.0;
 /// enough to tell the harmonics of a sticking bearing from the sweep.
 pub const CYCLES: f64 = 24.0;
 
-/// Frequency responses of `outputs` to `input`, sampled at `time` (s, evenly), while `sweep` passes
+/// Frequency responses of `outputs` to `input`, sampled at `time` (s, equal steps), while `sweep` passes
 /// each of `frequencies` (Hz). Frequencies it does not pass are left out.
 pub fn frequency_responses<const N: usize>(
     sweep: &Sweep,

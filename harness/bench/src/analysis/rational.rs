@@ -21,7 +21,7 @@ use super::{Complex64, FrequencyResponse};
 
 /// Iterations; ten settle it.
 const ITERATIONS: usize = 20;
-/// The most frequencies that are fitted; of more, evenly some.
+/// The most frequencies that are fitted; of more, some at equal distances.
 const POINTS: usize = 1500;
 
 /// The fitted function.

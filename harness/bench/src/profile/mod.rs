@@ -239,7 +239,7 @@ impl Profile {
         self.shape.sweep()
     }
 
-    /// The frequencies it excites evenly enough for a frequency response, from and to, Hz; `None`
+    /// The frequencies it excites uniformly enough for a frequency response, from and to, Hz; `None`
     /// if there are none.
     pub fn band(&self) -> Option<(f64, f64)> {
         self.shape.band()

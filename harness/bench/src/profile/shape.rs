@@ -13,7 +13,7 @@ pub trait Shape: Debug + Send + Sync {
         self.after(t)
     }
 
-    /// The frequencies it excites evenly enough for a frequency response, from and to, Hz; `None`
+    /// The frequencies it excites uniformly enough for a frequency response, from and to, Hz; `None`
     /// if there are none.
     fn band(&self) -> Option<(f64, f64)> {
         None

@@ -1,4 +1,4 @@
-//! The gyro gives back the noise that is put in.
+//! The gyro gives back the specified noise.
 
 use bench::analysis::allan::Noise;
 use bench::gyro::Recording;

@@ -422,17 +422,17 @@ fn descriptions_that_break_a_rule_are_told() {
                 &["xml.derivative_units"],
             ),
             (
-                "a start that is no number",
+                "a start that is not a number",
                 changed(hub, "start=\"0.322414\"", "start=\"0.3x\""),
                 &["xml.values"],
             ),
             (
-                "a max that is no number",
+                "a max that is not a number",
                 changed(hub, "max=\"1000000000000.0\"", "max=\"1e\""),
                 &["xml.values"],
             ),
             (
-                "a min that is no number",
+                "a min that is not a number",
                 changed(hub, "min=\"1e-6\"", "min=\"-inf\""),
                 &["xml.values"],
             ),

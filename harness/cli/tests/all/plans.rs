@@ -1,4 +1,4 @@
-//! Campaigns from plan files, from outside: kill and start again, runs made by another importer,
+//! Campaigns from plan files, from outside: kill and start again, runs simulated by another importer,
 //! what the tables say where there is nothing to say.
 
 use std::collections::{BTreeMap, HashMap};
