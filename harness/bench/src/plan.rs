@@ -135,6 +135,8 @@ enum Kind {
 pub struct Case {
     /// Its name, unique in the plan; its file is `runs/<name>.parquet`.
     pub name: String,
+    /// The name of its `[[run]]`, if the plan gives one.
+    pub listed: Option<String>,
     /// The values of what the plan varies, in the order of [`Plan::varied`]; empty where a
     /// `[[run]]` does not name one.
     pub varied: Vec<String>,
@@ -471,6 +473,7 @@ impl Plan {
                     continue;
                 };
                 case.name = self.name(run, &case, draw, &mut names);
+                case.listed.clone_from(&run.name);
                 cases.push(case);
             }
             if problems.0.len() > 20 {
@@ -530,6 +533,7 @@ impl Plan {
         };
         let case = Case {
             name: String::new(),
+            listed: None,
             varied: self
                 .varied()
                 .iter()
@@ -983,7 +987,7 @@ mod tests {
             ("amplitudes", 30),
             ("monte_carlo", 200),
             ("low_thrust", 8),
-            ("slew", 6),
+            ("slew", 27),
         ];
         assert_eq!(counts, expected);
     }

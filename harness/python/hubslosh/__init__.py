@@ -6,14 +6,15 @@
     run = hubslosh.simulate(parameters=start, stop=60)
 
 `simulate` returns a table of time histories, `closed_loop` one under a sampled controller,
-`linearize` a state-space model, `frequency_response` an estimate from a history; `campaign` and
-`identify` call the program ``hubslosh``. `plot` draws. `Plant` and `drive` are for those who step
+`linearize` a state-space model, `frequency_response` an estimate from a history, `fit` a transfer
+function through such an estimate; `campaign` and `identify` call the program ``hubslosh``. `plot` draws. `Plant` and `drive` are for those who step
 an instance themselves.
 """
 
 from importlib.metadata import PackageNotFoundError, version
 
 from . import batch, plot
+from .fitting import TransferFunction, fit
 from .fmu import Fmu, FmuError, Quantity, Value
 from .linearization import LinearModel, linearize
 from .loop import Law, closed_loop
@@ -40,11 +41,13 @@ __all__ = [
     "Plant",
     "Quantity",
     "RunError",
+    "TransferFunction",
     "Value",
     "batch",
     "campaign",
     "closed_loop",
     "drive",
+    "fit",
     "frequency_response",
     "identify",
     "linearize",

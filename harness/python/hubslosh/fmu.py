@@ -141,15 +141,19 @@ class Fmu:
             return float(value)
         if len(value) != 2:
             raise ValueError("a number and its unit are expected")
-        number, unit = float(value[0]), value[1]
+        factor, offset = self.scale(name, value[1])
+        return (float(value[0]) - offset) / factor
+
+    def scale(self, name: str, unit: str) -> tuple[float, float]:
+        """Return (factor, offset) of a unit: a number in it is factor · value + offset."""
         base = self.unit(name)
         if unit == base:
-            return number
+            return 1.0, 0.0
         shown = self._units.get(base, {})
         if unit not in shown:
             units = ", ".join(u for u in (base, *shown) if u)
             raise ValueError(f"it has no unit {unit} (units: {units or 'none'})")
-        return float((number - shown[unit].offset) / shown[unit].factor)
+        return float(shown[unit].factor), float(shown[unit].offset)
 
 
 def _item(variable: ScalarVariable, value: Any) -> int:

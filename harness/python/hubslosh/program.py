@@ -64,7 +64,7 @@ def campaign(
 
     plan: a TOML file, the name of a built-in plan, or the TOML text itself (several lines).
     out: directory for runs, tables and report.html; by default dist/ and the plan's name. Runs
-    that are there already are not made again, unless ``force``.
+    that are there already are reused, unless ``force``.
 
     Returns ``runs.csv``: a row per run with what it was made from and its results.
     ``.attrs["directory"]`` is where all of it is.

@@ -64,8 +64,9 @@ def simulate(
     own units, ``{"tank.h": (50, "mm")}``; enumerations by item or number. Or a file of them, as
     ``hubslosh tank --parameters`` writes it, see ``read_parameters``.
     inputs: a table with the column ``time`` (s, growing; two rows at one time are a jump) and one
-    column per input, SI; straight lines between the rows. ``tau_slope``, as ``hubslosh torque``
-    writes it, is the slope of ``tau_cmd``.
+    column per input; straight lines between the rows. SI, or with the units of
+    ``inputs.attrs["units"]``, such as ``{"wheel_speed": "rpm"}``, each one of the input's own.
+    ``tau_slope``, as ``hubslosh torque`` writes it, is the slope of ``tau_cmd``.
     stop, start: s; by default those of the inputs, otherwise the FMU's suggestion.
     step: between the rows of the result, s; by default the rows of the inputs, otherwise the FMU's
     suggestion. The FMU steps to every row of the inputs whatever the step.
@@ -198,6 +199,15 @@ def histories_of(
         problems.append("inputs has no column time")
     if len(inputs) < 2:
         problems.append(f"inputs needs two rows or more, not {len(inputs)}")
+    for name, unit in dict(inputs.attrs.get("units", {})).items():
+        if name in columns and name not in slopes:
+            try:
+                base = (1.0, 0.0) if (name, unit) == ("time", "s") else fmu.scale(name, unit)
+                columns[name] = (columns[name] - base[1]) / base[0]
+                for column in (c for c, of in slopes.items() if of == name and c in columns):
+                    columns[column] = columns[column] / base[0]
+            except (FmuError, ValueError) as error:
+                problems.append(f"the unit of {name} in inputs: {error}")
     time = columns.pop("time", None)
     if time is not None:
         back = np.flatnonzero(np.diff(time) < 0)

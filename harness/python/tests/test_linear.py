@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from hubslosh import FmuError, Plant, frequency_response, linearize, simulate
+from hubslosh import FmuError, Plant, fit, frequency_response, linearize, simulate
 
 VISCOUS = {"friction.model": "viscous"}
 FRICTION_B = 0.03793  # N·m·s/rad, the default of friction.b
@@ -119,3 +119,40 @@ def test_what_cannot_be_estimated_is_told(sweep, change, arguments: dict, senten
     with pytest.raises(FmuError) as told:
         frequency_response(change(sweep), **arguments)
     assert sentence in str(told.value)
+
+
+def test_a_fit_of_the_exact_response_has_the_models_poles_and_zeros(fmu: Path) -> None:
+    """1e-6: the real pole, 0.09 rad/s, lies two decades below the band."""
+    model = linearize(fmu, VISCOUS, ["tau_cmd"], ["omega"])
+    frequency = np.geomspace(1.25, 3.5, 400)
+    exact = model.response(frequency)[:, 0, 0]
+    data = pd.DataFrame({"frequency": frequency, "real": exact.real, "imag": exact.imag})
+    found = fit(data)
+    assert found.fit > 99.9999
+    assert found.poles == pytest.approx(model.poles, rel=1e-6)
+    with Plant(fmu, VISCOUS) as plant:
+        (antiresonance,) = plant.get(["slosh.frequency[1]"])
+    assert np.abs(found.zeros) == pytest.approx([2 * np.pi * antiresonance] * 2, rel=1e-6)
+    assert np.allclose(found.response(frequency), exact, rtol=1e-6)
+    assert np.allclose(found.to_control()(2j * np.pi * frequency), exact, rtol=1e-6)
+
+
+def test_a_fit_of_a_sweep_finds_antiresonance_and_resonance(fmu: Path) -> None:
+    """50 mN·m in 15 minutes with a viscous bearing; 2 mHz is what the estimate resolves."""
+    time = np.arange(45001) * 0.02
+    rate = np.log(2.8 / 2.0) / time[-1]
+    torque = 0.05 * np.sin(2 * np.pi * 2.0 * np.expm1(rate * time) / rate)
+    inputs = pd.DataFrame({"time": time, "tau_cmd": torque})
+    sweep = simulate(fmu, VISCOUS, inputs, outputs=["omega"])
+    found = fit(frequency_response(sweep, band=(2.05, 2.75)))
+    poles = linearize(fmu, VISCOUS, ["tau_cmd"], ["omega"]).poles
+    assert found.fit > 95
+    hertz = np.abs([found.zeros[0], found.poles[-1], poles[-1]]) / (2 * np.pi)
+    assert hertz[0] == pytest.approx(2.3436, abs=2e-3)
+    assert hertz[1] == pytest.approx(hertz[2], abs=2e-3)
+
+
+def test_a_fit_says_what_is_wrong_with_it(fmu: Path) -> None:
+    """Everything at once."""
+    with pytest.raises(FmuError, match=r"no column real; .*no column imag; poles must be"):
+        fit(pd.DataFrame({"frequency": [1.0]}), poles=1, zeros=2)

@@ -172,3 +172,21 @@ def test_an_unknown_model_is_told(tmp_path: Path) -> None:
     (tmp_path / "text.fmu").write_text("no zip")
     with pytest.raises(FmuError, match="is not an FMU that fmpy can read"):
         simulate(tmp_path / "text.fmu")
+
+
+def test_inputs_may_be_in_their_display_units(fmu: Path) -> None:
+    """In mN·m the torque, in units that it has; the slope goes with it; a result is an input."""
+    short = TABLE[:501].assign(tau_slope=np.append(np.diff(TORQUE[:501]) / STEP, 0.0))
+    scaled = short.assign(tau_cmd=1e3 * short["tau_cmd"], tau_slope=1e3 * short["tau_slope"])
+    scaled.attrs["units"] = {"time": "s", "tau_cmd": "mN.m"}
+    ours = simulate(fmu, inputs=short, outputs=["omega"])
+    # the division by 1000 rounds
+    assert (
+        np.abs(simulate(fmu, inputs=scaled, outputs=["omega"])["omega"] - ours["omega"]).max()
+        < 1e-14
+    )
+    again = simulate(fmu, inputs=ours[["time", "tau_cmd"]], outputs=["omega"])
+    assert np.abs(again["omega"] - ours["omega"]).max() < 1e-12
+    scaled.attrs["units"] = {"tau_cmd": "lbf.ft"}
+    with pytest.raises(FmuError, match=r"unit of tau_cmd in inputs: it has no unit lbf.ft .*mN.m"):
+        simulate(fmu, inputs=scaled)

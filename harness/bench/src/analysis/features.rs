@@ -13,7 +13,38 @@ pub struct Features {
     pub notch_db: Option<f64>,
 }
 
+/// Standard deviations of [`Features`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Deviations {
+    /// Of the resonance, Hz.
+    pub f_res: Option<f64>,
+    /// Of the antiresonance, Hz.
+    pub f_dip: Option<f64>,
+}
+
 impl Features {
+    /// How uncertain they are, from the response that they were found in, its relative standard
+    /// deviation at each frequency, and how fast its error changes along a frequency, in units of
+    /// itself per Hz. An error ε of ln |H| moves an extremum by −ε'/(ln |H|)''.
+    pub fn deviations(
+        &self,
+        response: &FrequencyResponse,
+        relative: &[f64],
+        slope: impl Fn(f64) -> f64,
+    ) -> Deviations {
+        let f = &response.frequency;
+        let of = |found: Option<f64>| {
+            let i = f.partition_point(|f| *f < found.unwrap_or(f64::NAN)).clamp(1, f.len() - 2);
+            let i = if f[i] - found? > found? - f[i - 1] { (i - 1).max(1) } else { i };
+            let level = |i: usize| response.response[i].norm().ln();
+            let rise = |i: usize| (level(i + 1) - level(i)) / (f[i + 1] - f[i]);
+            let curvature = 2.0 * (rise(i) - rise(i - 1)) / (f[i + 1] - f[i - 1]);
+            let std = slope(f[i]) * relative.get(i)? / curvature.abs();
+            std.is_finite().then_some(std)
+        };
+        Deviations { f_res: of(self.f_res), f_dip: of(self.f_dip) }
+    }
+
     /// Finds the antiresonance and the resonance: the two ends of the largest rise of |H| (in dB)
     /// as the frequency grows.
     ///

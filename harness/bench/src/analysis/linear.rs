@@ -198,7 +198,8 @@ mod tests {
                 &tau,
                 [&omega],
                 &grid,
-            );
+            )
+            .responses;
             assert_eq!(lock_in.frequency.len(), grid.len());
             let spa = spa::frequency_response(0.02, &tau, &omega, &grid, spa::LAG);
             let (lock_in, spa) = (Features::of(&lock_in), Features::of(&spa));
@@ -231,7 +232,8 @@ mod tests {
                     &tau,
                     [&omega],
                     &grid,
-                );
+                )
+                .responses;
                 let spa = spa::frequency_response(0.02, &tau, &omega, &grid, spa::LAG);
                 let (lock_in, spa) = (Features::of(&lock_in), Features::of(&spa));
                 // the acceptance figure for the antiresonance is 2 mHz; both are several times

@@ -16,6 +16,7 @@ pub mod demodulation;
 pub mod features;
 pub mod lengths;
 pub mod linear;
+pub mod noise;
 pub mod off_axis;
 pub mod rational;
 pub mod residual;

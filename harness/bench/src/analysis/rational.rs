@@ -17,6 +17,7 @@ use std::f64::consts::TAU;
 use nalgebra::{DMatrix, DVector};
 use realfft::RealFftPlanner;
 
+use super::features::{Deviations, Features};
 use super::{Complex64, FrequencyResponse};
 
 /// Iterations; ten settle it.
@@ -35,6 +36,8 @@ pub struct Rational {
     denominator: [f64; 3],
     /// Root mean square of what the fit leaves, relative to |Y|.
     pub misfit: f64,
+    /// A root of the covariance of numerator and denominator, one column for each unknown of the fit.
+    spread: [[f64; 6]; 9],
 }
 
 impl Rational {
@@ -62,8 +65,13 @@ impl Rational {
         if points.len() < 20 {
             return None;
         }
-        let mut found =
-            Rational { unit, numerator: [0.0; 3], denominator: [0.0; 3], misfit: f64::INFINITY };
+        let mut found = Rational {
+            unit,
+            numerator: [0.0; 3],
+            denominator: [0.0; 3],
+            misfit: f64::INFINITY,
+            spread: [[0.0; 6]; 9],
+        };
         for _ in 0..ITERATIONS {
             let (mut a, mut b) =
                 (DMatrix::zeros(2 * points.len(), 9), DVector::zeros(2 * points.len()));
@@ -90,8 +98,43 @@ impl Rational {
             found.numerator = [x[0], x[1], x[2]];
             found.denominator = [x[6], x[7], x[8]];
             found.misfit = left;
+            // the covariance of x is left² (RᵀR)⁻¹
+            let root = qr.r().try_inverse()?;
+            let scale = left * (b.len() as f64 / (b.len() as f64 - 9.0)).sqrt();
+            found.spread = std::array::from_fn(|j| {
+                [0, 1, 2, 6, 7, 8].map(|i| scale * root[(i, j)] / sizes[i])
+            });
         }
         found.misfit.is_finite().then_some(found)
+    }
+
+    /// Relative standard deviation of the response on a grid of frequencies (Hz), and that of its
+    /// antiresonance and resonance: each column of the covariance's root moves the coefficients.
+    pub fn deviations(&self, frequencies: &[f64]) -> (Vec<f64>, Deviations) {
+        let nominal = self.frequency_response(frequencies);
+        let found = Features::of(&nominal);
+        let mut squares = vec![0.0; frequencies.len()];
+        let mut moved = [Some(0.0), Some(0.0)];
+        for column in &self.spread {
+            let mut other = *self;
+            for i in 0..3 {
+                other.numerator[i] += column[i];
+                other.denominator[i] += column[i + 3];
+            }
+            let response = other.frequency_response(frequencies);
+            for (i, square) in squares.iter_mut().enumerate() {
+                let (h, nominal) = (response.response[i].norm(), nominal.response[i].norm());
+                *square += (h / nominal).ln().powi(2);
+            }
+            let features = Features::of(&response);
+            for (sum, (new, old)) in
+                moved.iter_mut().zip([(features.f_res, found.f_res), (features.f_dip, found.f_dip)])
+            {
+                *sum = (|| Some((*sum)? + (new? - old?).powi(2)))();
+            }
+        }
+        let [f_res, f_dip] = moved.map(|sum| sum.map(f64::sqrt));
+        (squares.into_iter().map(f64::sqrt).collect(), Deviations { f_res, f_dip })
     }
 
     fn denominator_at(&self, s: Complex64) -> Complex64 {
@@ -113,7 +156,6 @@ impl Rational {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::analysis::features::Features;
     use crate::analysis::logarithmic_grid;
     use crate::analysis::transfer_function::TransferFunction;
     use crate::profile::{Profile, Torque};

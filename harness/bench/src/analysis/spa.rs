@@ -14,6 +14,54 @@ use super::{Complex64, FrequencyResponse};
 /// whose half-power width is 14 mHz, nearly its own shape.
 pub const LAG: f64 = 200.0;
 
+/// A frequency response, and what tells how uncertain it is.
+pub struct Estimate {
+    /// Output over input.
+    pub response: FrequencyResponse,
+    /// Two-sided power spectral density of the input at the response's frequencies, its unit
+    /// squared times s.
+    pub input: Vec<f64>,
+    /// Longest lag, s.
+    lag: f64,
+    /// Length of the record, s.
+    duration: f64,
+}
+
+impl Estimate {
+    /// As [`frequency_response`].
+    pub fn of(step: f64, input: &[f64], output: &[f64], frequencies: &[f64], lag: f64) -> Estimate {
+        let (response, power) = estimate(step, input, output, frequencies, lag);
+        let duration = step * input.len() as f64;
+        Estimate {
+            response: FrequencyResponse { response, frequency: frequencies.to_vec() },
+            input: power,
+            lag,
+            duration,
+        }
+    }
+
+    /// Standard deviation of |H| relative to |H| (and of the phase, rad), from the power of what the
+    /// response does not explain: the window averages T/∫w² = T/(3M/4) independent lines,
+    ///
+    /// ```text
+    /// var |H| / |H|² = Φ_v / (2 n |H|² Φ_uu),   n = 4 T / (3 M)
+    /// ```
+    ///
+    /// (Ljung, *System Identification*, 2nd ed., 1999, equations 6.59 and 6.60).
+    pub fn deviation(&self, unexplained: &[f64]) -> Vec<f64> {
+        let average = 4.0 * self.duration / (3.0 * self.lag);
+        let each = self.response.response.iter().zip(unexplained).zip(&self.input);
+        each.map(|((h, v), u)| (v / (2.0 * average * h.norm_sqr() * u)).sqrt()).collect()
+    }
+
+    /// How fast the error changes along the frequency, in units of itself per Hz: 2π times the root
+    /// mean square of the lag under the squared window, (1/2 − 15/(4π²)) 2/3 M² for Hann's.
+    pub fn slope(&self) -> f64 {
+        let pi = std::f64::consts::PI;
+        2.0 * pi * self.lag * ((0.5 - 3.75 / (pi * pi)) * 2.0 / 3.0).sqrt()
+    }
+}
+
 /// Frequency response of `output` to `input`, sampled every `step` s, at `frequencies` (Hz), with
 /// lags up to `lag` s. Means are taken off first.
 pub fn frequency_response(
@@ -23,6 +71,18 @@ pub fn frequency_response(
     frequencies: &[f64],
     lag: f64,
 ) -> FrequencyResponse {
+    let (response, _) = estimate(step, input, output, frequencies, lag);
+    FrequencyResponse { response, frequency: frequencies.to_vec() }
+}
+
+/// The response, and the power spectral density of the input.
+fn estimate(
+    step: f64,
+    input: &[f64],
+    output: &[f64],
+    frequencies: &[f64],
+    lag: f64,
+) -> (Vec<Complex64>, Vec<f64>) {
     let lags = ((lag / step).round() as usize).min(input.len() - 1);
     // zeros behind the record, so that covariances up to `lags` do not wrap around
     let length = (input.len() + lags).next_power_of_two();
@@ -68,16 +128,18 @@ pub fn frequency_response(
         }
         transformed(&lags, angles).into_iter().take(chunk.len())
     });
-    FrequencyResponse { response: response.collect(), frequency: frequencies.to_vec() }
+    // the transforms are not normalised
+    let unit = step / (length as f64 * input.len() as f64);
+    response.map(|(h, power)| (h, power * unit)).unzip()
 }
 
 /// Frequencies that are summed at once. Each sum waits for the one before it; sixteen that do not
 /// wait for each other keep the processor busy, six times as fast.
 const TOGETHER: usize = 16;
 
-/// Σ even cos kφ + j odd sin kφ over Σ auto cos kφ at each angle φ per lag, rad. Summed at the very
+/// Σ even cos kφ + j odd sin kφ over Σ auto cos kφ, and the latter, at each angle φ per lag, rad. Summed at the very
 /// frequencies: a line between a transform's bins misses deep antiresonances.
-fn transformed(lags: &[[f64; 3]], angles: [f64; TOGETHER]) -> [Complex64; TOGETHER] {
+fn transformed(lags: &[[f64; 3]], angles: [f64; TOGETHER]) -> [(Complex64, f64); TOGETHER] {
     let turn = angles.map(Complex64::cis);
     let (turn_re, turn_im) = (turn.map(|t| t.re), turn.map(|t| t.im));
     let (mut re, mut im) = ([1.0; TOGETHER], [0.0; TOGETHER]);
@@ -92,7 +154,7 @@ fn transformed(lags: &[[f64; 3]], angles: [f64; TOGETHER]) -> [Complex64; TOGETH
             re[j] = next;
         }
     }
-    std::array::from_fn(|j| Complex64::new(cross_re[j], cross_im[j]) / auto[j])
+    std::array::from_fn(|j| (Complex64::new(cross_re[j], cross_im[j]) / auto[j], auto[j]))
 }
 
 #[cfg(test)]

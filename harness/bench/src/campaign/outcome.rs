@@ -8,7 +8,7 @@ use host::description::ModelDescription;
 use host::fmi2::Instance;
 
 use super::Case;
-use crate::analysis::features::Features;
+use crate::analysis::features::{Deviations, Features};
 use crate::analysis::lengths::{self, Lengths};
 use crate::analysis::linear::{Linear, Mode};
 use crate::analysis::off_axis::{self, OffAxis};
@@ -16,7 +16,7 @@ use crate::analysis::rational::Rational;
 use crate::analysis::residual::ModelFit;
 use crate::analysis::rotary::{self, Rotary};
 use crate::analysis::welch::{self, Spectra};
-use crate::analysis::{FrequencyResponse, demodulation, logarithmic_grid, spa};
+use crate::analysis::{FrequencyResponse, demodulation, logarithmic_grid, noise, spa};
 use crate::profile::{Profile, Sweep, Torque};
 use crate::run::Run;
 use crate::table::Table;
@@ -30,7 +30,8 @@ const RESOLVED: f64 = 3.0;
 /// Most misfit of a fitted transfer function that is trusted: what does not follow from the torque
 /// has a tenth of the rate's power.
 const MOST_MISFIT: f64 = 0.3;
-/// Part of the separation by which a passing sweep may shift the resonance. The shift is 0.6 times
+/// Part of the separation by which a passing sweep may shift the resonance, and by which two
+/// estimates from a whole record may differ. The shift is 0.6 times
 /// the root of the sweep's rate where the resonance is narrower than that.
 const MOST_SHIFT: f64 = 0.25;
 
@@ -189,6 +190,11 @@ pub struct Estimate {
     pub features: Features,
     /// What it resolves at the resonance, Hz.
     pub resolution: f64,
+    /// Standard deviation of its magnitude, relative, and of its phase, rad, from what of the rate
+    /// no linear response explains; empty if that is not known.
+    pub deviation: Vec<f64>,
+    /// Standard deviations of the features.
+    pub deviations: Deviations,
     /// Why its features are not to be trusted, if they are not.
     pub doubt: Option<Doubt>,
 }
@@ -202,6 +208,10 @@ pub enum Doubt {
     TooShort,
     /// At the resonance there is more noise than signal.
     Noise,
+    /// Two estimates of one linear response differ by more than a quarter of the separation: after
+    /// a fast sweep a nonlinear liquid swings freely, at a frequency that follows its amplitude, and
+    /// no linear response makes that of the torque.
+    Nonlinear,
 }
 
 impl std::fmt::Display for Doubt {
@@ -210,6 +220,7 @@ impl std::fmt::Display for Doubt {
             Doubt::TooFast => "the sweep is too fast",
             Doubt::TooShort => "the record is too short",
             Doubt::Noise => "too much noise",
+            Doubt::Nonlinear => "no single linear response: it depends on the amplitude",
         })
     }
 }
@@ -226,7 +237,19 @@ impl Estimate {
         let found = Features::within(&response, inner);
         let doubt = if found.any() { doubt(&found) } else { None };
         let features = if doubt.is_some() { Features::default() } else { found };
-        Estimate { response, features, resolution, doubt }
+        let (deviation, deviations) = (Vec::new(), Deviations::default());
+        Estimate { response, features, resolution, deviation, deviations, doubt }
+    }
+
+    /// The same with uncertainties: `slope` is how fast the error changes along a frequency.
+    fn with(self, deviation: Vec<f64>, slope: impl Fn(f64) -> f64) -> Self {
+        let deviations = self.features.deviations(&self.response, &deviation, slope);
+        Estimate { deviation, deviations, ..self }
+    }
+
+    fn doubted(&mut self, doubt: Doubt) {
+        (self.features, self.deviations) = Default::default();
+        self.doubt = Some(doubt);
     }
 }
 
@@ -281,12 +304,14 @@ pub struct Passing {
 }
 
 impl Record {
-    /// `enough`: there is an estimate to be trusted already.
+    /// `enough`: there is an estimate to be trusted already. `unexplained`: power of what no linear
+    /// response explains, at the frequencies of the responses.
     fn of(
         profile: &Profile,
         step: f64,
         tau: &[f64],
         omega: &[f64],
+        unexplained: &[f64],
         enough: bool,
     ) -> Option<Record> {
         let band = profile.band()?;
@@ -312,17 +337,32 @@ impl Record {
                 _ => None,
             })
         };
-        let spa = spa::frequency_response(step, &tau, &omega, &frequencies, lengths.lag);
-        let spa = estimate(spa, lengths.lag);
-        let rational = (!enough && !spa.features.any())
+        let spa = spa::Estimate::of(step, &tau, &omega, &frequencies, lengths.lag);
+        let (deviation, slope) = (spa.deviation(unexplained), spa.slope());
+        let mut spa = estimate(spa.response, lengths.lag).with(deviation, |_| slope);
+        // after a sweep that was too fast to see anything while it passed, a second opinion
+        let fast = profile.sweep().is_some() && !enough;
+        let mut rational = (fast || !enough && !spa.features.any())
             .then(|| Rational::fit(step, &tau, &omega, band))
             .flatten()
             .map(|fitted| {
                 let response = fitted.frequency_response(&frequencies);
-                Estimate::of(response, band, 1.0 / duration, |_| {
+                let estimate = Estimate::of(response, band, 1.0 / duration, |_| {
                     (fitted.misfit > MOST_MISFIT).then_some(Doubt::Noise)
-                })
+                });
+                let (deviation, deviations) = fitted.deviations(&frequencies);
+                Estimate { deviation, deviations, ..estimate }
             });
+        if let (true, Some(fitted), Some(delta)) = (fast, &mut rational, spa.features.delta_f()) {
+            let apart = |get: fn(&Features) -> Option<f64>| {
+                let pair = get(&spa.features).zip(get(&fitted.features));
+                pair.is_some_and(|(a, b)| (a - b).abs() > MOST_SHIFT * delta)
+            };
+            if apart(|f| f.f_dip) || apart(|f| f.f_res) {
+                spa.doubted(Doubt::Nonlinear);
+                fitted.doubted(Doubt::Nonlinear);
+            }
+        }
         let extrema = spa.features.f_res.zip(spa.features.f_dip);
         let fit = ModelFit::of(step, lengths.segment, &tau, &omega, &spa.response, &spa.features);
         Some(Record {
@@ -339,16 +379,24 @@ impl Record {
 }
 
 impl Passing {
-    fn of(sweep: &Sweep, table: &Table, arm: f64) -> Passing {
+    /// `unexplained`: as for [`Record`].
+    fn of(sweep: &Sweep, table: &Table, arm: f64, unexplained: &[f64]) -> Passing {
         let column = |name| table.column(name).unwrap_or_default();
         let signals = ["omega_imu", "slosh_angle_radial", "slosh_angle", "F_radial"];
-        let [rate, radial, tangential, force] = demodulation::frequency_responses(
+        let grid = logarithmic_grid(sweep.band(), GRID_POINTS);
+        let demodulation::Demodulated { responses, noise_gain } = demodulation::frequency_responses(
             sweep,
             column("time"),
             column("tau_cmd"),
             signals.map(column),
-            &logarithmic_grid(sweep.band(), GRID_POINTS),
+            &grid,
         );
+        let [rate, radial, tangential, force] = responses;
+        // of the frequencies that the sweep passes
+        let unexplained: Vec<f64> = (rate.frequency.iter())
+            .map(|f| unexplained.get(grid.partition_point(|g| g < f)).copied().unwrap_or(f64::NAN))
+            .collect();
+        let deviation = demodulation::deviation(&rate, &unexplained, &noise_gain);
         let swirl = rotary::swirl(&radial, &tangential, sweep.amplitude.abs());
         let passed = &radial.frequency;
         let times: Vec<f64> = passed.iter().filter_map(|f| sweep.time_of(*f)).collect();
@@ -370,7 +418,8 @@ impl Passing {
             let shift = |f: f64| 0.6 * sweep.rate_at(f).abs().sqrt();
             let fast = features.f_res.is_some_and(|f| closer(features, shift(f) / MOST_SHIFT));
             fast.then_some(Doubt::TooFast)
-        });
+        })
+        .with(deviation, |f| demodulation::slope(sweep, f));
         rate.resolution = moves(rate.features.f_res.unwrap_or((middle.0 * middle.1).sqrt()));
         Passing {
             rate,
@@ -396,10 +445,15 @@ impl Outcome {
         let (record, passing) = match &run.torque {
             Torque::Rows { .. } => (None, None),
             Torque::Profile(profile) => {
-                let passing = profile.sweep().map(|sweep| Passing::of(sweep, table, linear.arm));
-                let enough = passing.as_ref().is_some_and(|passing| passing.rate.doubt.is_none());
                 let (tau, omega) = (column("tau_cmd"), column("omega_imu"));
-                (Record::of(profile, run.step, tau, omega, enough), passing)
+                let unexplained = profile.band().map_or(Vec::new(), |band| {
+                    noise::power(run.step, tau, omega, &logarithmic_grid(band, GRID_POINTS))
+                });
+                let passing = profile
+                    .sweep()
+                    .map(|sweep| Passing::of(sweep, table, linear.arm, &unexplained));
+                let enough = passing.as_ref().is_some_and(|passing| passing.rate.doubt.is_none());
+                (Record::of(profile, run.step, tau, omega, &unexplained, enough), passing)
             }
         };
         let (rate, start) = (column("omega_imu"), column("omega").first().copied());
@@ -437,6 +491,9 @@ impl Outcome {
             (Some(_), Some(record)) if record.spa.features.any() => Some((&record.spa, "spa")),
             (Some(_), Some(Record { rational: Some(fitted), .. })) if fitted.features.any() => {
                 Some((fitted, "transfer function"))
+            }
+            (Some(_), Some(record)) if record.spa.doubt == Some(Doubt::Nonlinear) => {
+                Some((&record.spa, "spa"))
             }
             _ => Some((&passing.rate, "demodulation")),
         }

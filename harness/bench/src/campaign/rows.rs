@@ -44,6 +44,8 @@ pub struct FeatureRow {
     estimator: Option<&'static str>,
     not_trusted: Option<String>,
     beyond_model: Option<String>,
+    f_res_std_hz: Option<f64>,
+    f_dip_std_hz: Option<f64>,
 }
 
 impl FeatureRow {
@@ -95,6 +97,8 @@ impl FeatureRow {
             estimator: estimate.map(|(_, name)| name),
             not_trusted: estimate.and_then(|(estimate, _)| Some(estimate.doubt?.to_string())),
             beyond_model: run.beyond_model(),
+            f_res_std_hz: estimate.and_then(|(estimate, _)| estimate.deviations.f_res),
+            f_dip_std_hz: estimate.and_then(|(estimate, _)| estimate.deviations.f_dip),
             ..FeatureRow::unanalysed(&run.case)
         }
     }

@@ -2,6 +2,7 @@
 
 use super::figure::{Panel, dots, line};
 use super::*;
+use crate::analysis::features::Deviations;
 
 /// A quantity of a run: label, what it is, whether its axis is logarithmic, and a level to compare
 /// with.
@@ -22,10 +23,17 @@ pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
     let mut traces = Vec::new();
     let mut untrusted = Vec::new();
     for (i, group) in page.groups.iter().enumerate() {
-        type Side = (&'static str, &'static str, fn(&Features) -> Option<f64>);
-        let sides: [Side; 2] =
-            [("antiresonance", "circle", |f| f.f_dip), ("resonance", "diamond", |f| f.f_res)];
-        for (k, (what, symbol, get)) in sides.into_iter().enumerate() {
+        type Side = (
+            &'static str,
+            &'static str,
+            fn(&Features) -> Option<f64>,
+            fn(&Deviations) -> Option<f64>,
+        );
+        let sides: [Side; 2] = [
+            ("antiresonance", "circle", |f| f.f_dip, |s| s.f_dip),
+            ("resonance", "diamond", |f| f.f_res, |s| s.f_res),
+        ];
+        for (k, (what, symbol, get, std)) in sides.into_iter().enumerate() {
             let color = colors::category(2 * i + k);
             let points: Vec<(f64, f64, Option<f64>)> = group
                 .runs
@@ -33,7 +41,7 @@ pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
                 .filter_map(|run| {
                     let (estimate, _) = best(run)?;
                     let value = get(&estimate.features)?;
-                    Some((axis.of(run)?, value, Some(estimate.resolution / 2.0)))
+                    Some((axis.of(run)?, value, std(&estimate.deviations).map(|std| 2.0 * std)))
                 })
                 .collect();
             traces.push(dots(0, &format!("{what}, {}", group.title()), color, symbol, &points));
@@ -61,7 +69,7 @@ pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
     Figure {
         title: format!("Antiresonance and resonance against {}", axis.name),
         caption: format!(
-            "Circles: antiresonance, where the liquid holds the hub still; diamonds: resonance, where hub and liquid swing against each other; dotted: both of the exact linear plant with viscous friction. Bars: what the estimator resolves. An upward sweep shows a narrow resonance late, so above the exact one (Methods).{}",
+            "Circles: antiresonance, where the liquid holds the hub still; diamonds: resonance, where hub and liquid swing against each other; dotted: both of the exact linear plant with viscous friction. Bars: 95 % intervals, from what of the rate no linear response explains: gyro noise, dry friction, a nonlinear liquid (Methods). An upward sweep shows a narrow resonance late, so above the exact one (Methods).{}",
             list_of("Not to be trusted, and not drawn", &untrusted)
         ),
         height: 460,
@@ -71,27 +79,42 @@ pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
     }
 }
 
-/// The largest of a signal in the last fifth of a run.
-fn left_behind(run: &Outcome, signal: &str) -> Option<f64> {
+/// The largest of a signal at the end: after a manoeuvre, or in the last fifth of a run.
+fn at_the_end(run: &Outcome, signal: &str) -> Option<f64> {
     let curve = run.history.curve(signal);
     let (first, last) = (curve.first()?.0, curve.last()?.0);
-    let from = first + 0.8 * (last - first);
-    let late = curve.iter().filter(|(t, _)| *t >= from);
+    let from = manoeuvre(run).unwrap_or(first + 0.8 * (last - first));
+    let late = curve.iter().filter(|(t, _)| *t > from);
     Some(late.fold(0.0, |most: f64, (_, value)| most.max(value.abs())))
+}
+
+/// What a manoeuvre leaves behind: rate and slosh angle after its torque.
+pub(super) fn left_behind(page: &Page, axis: &Axis) -> Figure {
+    let rate = |run: &Outcome| Some(1e3 * at_the_end(run, "omega_imu")?);
+    let angle = |run: &Outcome| Some(at_the_end(run, "slosh_angle")?.to_degrees());
+    let title = format!("What is left after the manoeuvre, against {}", axis.name);
+    let figure = small(
+        page,
+        axis,
+        &title,
+        "The largest rate of the hub and the largest slosh angle after the torque has ended. A rigid craft that the torque brings to rest has none of either; what bearing friction leaves is the same for all models.",
+        [quantity("largest rate / (mrad/s)", &rate), quantity("largest slosh angle / deg", &angle)],
+    );
+    Figure { columns: 2, height: 340, ..figure }
 }
 
 /// The largest slosh angles, and what is left at the end, for torques without a frequency response.
 pub(super) fn slosh_angles(page: &Page, axis: &Axis) -> Figure {
     let radial = |run: &Outcome| Some(run.figures.peak_radial_angle.to_degrees());
     let tangential = |run: &Outcome| Some(run.figures.peak_slosh_angle.to_degrees());
-    let angle = |run: &Outcome| Some(left_behind(run, "slosh_angle")?.to_degrees());
-    let rate = |run: &Outcome| left_behind(run, "omega_imu");
+    let angle = |run: &Outcome| Some(at_the_end(run, "slosh_angle")?.to_degrees());
+    let rate = |run: &Outcome| at_the_end(run, "omega_imu");
     let title = format!("Slosh angles against {}", axis.name);
     let figure = small(
         page,
         axis,
         &title,
-        "The largest slosh angle along the hub's turn and across it, which only rotary slosh makes; and in the last fifth of the run: a dwell's steady state, or what a manoeuvre leaves behind.",
+        "The largest slosh angle along the hub's turn and across it, which only rotary slosh makes; and in the last fifth of the run, a dwell's steady state.",
         [
             quantity("largest tangential / deg", &tangential),
             quantity("largest radial / deg", &radial),

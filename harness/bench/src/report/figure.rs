@@ -1,5 +1,6 @@
 //! Figures: what `report.js` draws with plotly, and the HTML around it.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use host::html::escape;
@@ -70,18 +71,24 @@ impl Figures {
     pub fn add(&mut self, figure: Figure) -> String {
         let none = |axis: &Value| axis.as_array().is_some_and(Vec::is_empty);
         let empty = |trace: &Value| none(&trace["x"]) || none(&trace["y"]);
-        if figure.traces.iter().all(empty) {
+        let mut traces: Vec<Value> = figure.traces.into_iter().filter(|t| !empty(t)).collect();
+        // a panel without a trace would be a blank
+        let drawn: BTreeSet<u64> = traces.iter().filter_map(|t| t["panel"].as_u64()).collect();
+        if drawn.is_empty() {
             return String::new();
         }
-        let panels: Vec<Value> = figure
-            .panels
+        for trace in &mut traces {
+            let place = drawn.iter().position(|p| trace["panel"] == *p);
+            trace["panel"] = json!(place);
+        }
+        let panels: Vec<Value> = drawn
             .iter()
+            .map(|p| &figure.panels[*p as usize])
             .map(|p| {
                 json!({"x": p.x, "y": p.y, "logx": p.log_x, "logy": p.log_y, "equal": p.equal,
                        "range": p.range.map(|(from, to)| [number(from), number(to)])})
             })
             .collect();
-        let traces: Vec<&Value> = figure.traces.iter().filter(|trace| !empty(trace)).collect();
         self.specifications.push(json!({
             "columns": figure.columns, "height": figure.height, "shared": figure.shared,
             "panels": panels, "traces": traces,

@@ -40,7 +40,7 @@ pub(super) fn history(page: &Page, group: &Group) -> Figure {
         caption: format!(
             "Torque, measured rate, slosh angles along and across the hub's turn, and the residual: the rate less that of the exact linear plant with viscous friction under the same torque; it is what friction and nonlinear slosh do.{}{}",
             if runs.len() < group.runs.len() {
-                format!(" {} of {} runs.", runs.len(), group.runs.len())
+                format!(" {} of {}.", runs.len(), super::runs(group.runs.len()))
             } else {
                 String::new()
             },
@@ -57,6 +57,85 @@ pub(super) fn history(page: &Page, group: &Group) -> Figure {
         half: page.groups.len() > 1,
         shared: true,
         panels: panels.map(|y| Panel::new("time / s", y)).to_vec(),
+        traces,
+        ..Figure::default()
+    }
+}
+
+/// Rate and slosh angle after a manoeuvre, one colour for each group: the run of each whose value
+/// of the axis is in the middle.
+pub(super) fn after(page: &Page) -> Figure {
+    let mut traces = Vec::new();
+    let mut from = f64::INFINITY;
+    for (i, group) in page.groups.iter().enumerate() {
+        let run = group.runs[group.runs.len() / 2];
+        from = from.min(manoeuvre(run).unwrap_or(f64::INFINITY));
+        let name = format!("{}, {}", group.title(), page.name(run));
+        for (p, (signal, scale)) in
+            [("omega_imu", 1e3), ("slosh_angle", 1f64.to_degrees())].iter().enumerate()
+        {
+            let late = run.history.curve(signal).into_iter().filter(|(t, _)| *t >= from);
+            let curve: Vec<(f64, f64)> = late.map(|(t, value)| (t, scale * value)).collect();
+            traces.push(line(p, &name, colors::category(i), "solid", &curve));
+        }
+    }
+    Figure {
+        title: "Rate and slosh angle after the manoeuvre".into(),
+        caption: "From the end of the torque on. With a rigid liquid the hub is at rest then; a sloshing liquid goes on pushing it at the slosh frequency.".into(),
+        columns: 2,
+        height: 300,
+        panels: vec![
+            Panel::new("time / s", "rate / (mrad/s)"),
+            Panel::new("time / s", "tangential slosh angle / deg"),
+        ],
+        traces,
+        ..Figure::default()
+    }
+}
+
+/// All runs of a plan over each other, if it has no axis to draw them along.
+pub(super) fn compared(page: &Page) -> Figure {
+    let runs =
+        || page.groups.iter().flat_map(|group| group.runs.iter().map(move |run| (group, run)));
+    let signals = [
+        ("omega_imu", "rate / (rad/s)", 1.0),
+        ("slosh_angle", "tangential / deg", 1f64.to_degrees()),
+        ("slosh_angle_radial", "radial / deg", 1f64.to_degrees()),
+    ];
+    let mut traces = Vec::new();
+    for (i, (group, run)) in runs().enumerate() {
+        let name = match group.runs.len() {
+            1 => group.title(),
+            _ => format!("{}, {}", group.title(), page.name(run)),
+        };
+        for (p, (signal, _, scale)) in signals.iter().enumerate() {
+            let curve = run.history.curve(signal).into_iter();
+            let curve: Vec<(f64, f64)> = curve.map(|(t, value)| (t, scale * value)).collect();
+            let (color, dash) = (colors::category(i), ["solid", "dash", "dot"][i % 3]);
+            traces.push(line(p, &name, color, dash, &curve));
+        }
+    }
+    // smallest and largest rate of each stretch of a run's history
+    let envelope = |run: &Outcome| -> Vec<[f64; 2]> {
+        let rate = run.history.curve("omega_imu");
+        rate.chunks_exact(2).map(|p| [p[0].1.min(p[1].1), p[0].1.max(p[1].1)]).collect()
+    };
+    let rates: Vec<_> = runs().map(|(_, run)| envelope(run)).collect();
+    let apart = match rates.iter().all(|rate| rate.len() == rates[0].len()) {
+        true => {
+            let pairs =
+                rates.iter().flat_map(|rate| rate.iter().flatten().zip(rates[0].iter().flatten()));
+            let most = pairs.fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+            format!(" The envelopes of the rates differ by at most {most:.1e} rad/s.")
+        }
+        false => String::new(),
+    };
+    Figure {
+        title: "The runs compared".into(),
+        caption: format!("Measured rate, slosh angles along and across the hub's turn.{apart}"),
+        height: 190,
+        shared: true,
+        panels: signals.iter().map(|(_, label, _)| Panel::new("time / s", label)).collect(),
         traces,
         ..Figure::default()
     }

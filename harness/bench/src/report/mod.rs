@@ -39,7 +39,7 @@ struct Group<'a> {
     model: &'a str,
     /// m; `None` if it is drawn at random, or what the runs are drawn along.
     fill: Option<f64>,
-    /// What else tells it from the other groups, such as `tank.d = 0.111`.
+    /// What else tells it from the other groups, such as `tank.d 111 mm`.
     others: Vec<String>,
     runs: Vec<&'a Outcome>,
     /// The sweep of its first run.
@@ -89,6 +89,8 @@ struct Page<'a> {
     plan: &'a Plan,
     groups: Vec<Group<'a>>,
     axis: Option<Axis>,
+    /// All that is varied, in the plan's order.
+    varied: Vec<Option<Varied>>,
 }
 
 impl Page<'_> {
@@ -153,50 +155,82 @@ fn printed(unit: &str) -> String {
     unit.replace('.', "·").replace("m2", "m²").replace("s2", "s²")
 }
 
+/// What a plan varies, for readers: a profile's parameter by what it is, a variable by its name.
+struct Varied {
+    name: String,
+    /// As it is printed; empty if it has none.
+    unit: String,
+    /// What a value is multiplied by.
+    scale: f64,
+}
+
+impl Varied {
+    fn of(variable: &str, fmu: &Fmu, runs: &[Outcome]) -> Option<Varied> {
+        let (name, unit) = match variable.strip_prefix("profile.") {
+            Some(name) => {
+                let parameter = runs.iter().find_map(|run| match &*run.case.torque {
+                    Torque::Profile(profile) => profile.parameter(name),
+                    Torque::Rows { .. } => None,
+                })?;
+                (parameter.label, printed(parameter.unit))
+            }
+            None => (variable, unit(fmu, variable).unwrap_or_default()),
+        };
+        let (unit, scale) = match &*unit {
+            "N·m" if variable == "profile.amplitude" => ("mN·m".into(), 1e3),
+            "m" => ("mm".into(), 1e3),
+            _ => (unit, 1.0),
+        };
+        Some(Varied { name: name.into(), unit, scale })
+    }
+
+    /// One of its values: `tank.d 111 mm`, `slosh.model planar`.
+    fn value(&self, text: &str) -> String {
+        let number = text.parse::<f64>().ok().map(|value| {
+            // without the dust of binary fractions
+            let value = (value * self.scale * 1e9).round() / 1e9;
+            format!("{value} {}", self.unit).trim_end().to_string()
+        });
+        format!("{} {}", self.name, number.as_deref().unwrap_or(text))
+    }
+
+    /// Name and unit.
+    fn label(&self) -> String {
+        match &*self.unit {
+            "" => self.name.clone(),
+            unit => format!("{} / {unit}", self.name),
+        }
+    }
+}
+
 fn axis(plan: &Plan, fmu: &Fmu, runs: &[Outcome]) -> Option<Axis> {
     let variable = plan.axis()?;
     let place = plan.varied().iter().position(|n| *n == variable)?;
-    let (name, unit) = match variable.strip_prefix("profile.") {
-        Some(name) => {
-            let parameter = runs.iter().find_map(|run| match &*run.case.torque {
-                Torque::Profile(profile) => profile.parameter(name),
-                Torque::Rows { .. } => None,
-            })?;
-            let unit = Some(parameter.unit).filter(|unit| !unit.is_empty());
-            (parameter.label, unit.map(printed))
-        }
-        None => (variable, unit(fmu, variable)),
-    };
-    let (unit, scale) = match unit.as_deref() {
-        Some("N·m") if variable == "profile.amplitude" => (Some("mN·m".into()), 1e3),
-        Some("m") => (Some("mm".into()), 1e3),
-        _ => (unit, 1.0),
-    };
-    let label = unit.map_or(name.to_string(), |unit: String| format!("{name} / {unit}"));
-    Some(Axis { place, name: name.into(), label, scale })
+    let varied = Varied::of(variable, fmu, runs)?;
+    Some(Axis { place, label: varied.label(), name: varied.name, scale: varied.scale })
 }
 
-fn groups<'a>(plan: &Plan, results: &'a Results) -> Vec<Group<'a>> {
+fn groups<'a>(plan: &Plan, fmu: &Fmu, results: &'a Results) -> Vec<Group<'a>> {
     let axis = plan.axis().unwrap_or("");
     // the places, among all that is varied, of what tells groups apart beside model and fill
     let grouping = plan.grouping();
-    let others: Vec<(usize, &str)> = plan
+    let others: Vec<(usize, Varied)> = plan
         .varied()
         .into_iter()
         .enumerate()
         .filter(|(_, name)| grouping.contains(name) && *name != axis)
         .filter(|(_, name)| !["slosh.model", "tank.h"].contains(name))
+        .filter_map(|(i, name)| Some((i, Varied::of(name, fmu, &results.outcomes)?)))
         .collect();
     let one_fill = axis != "tank.h" && (!plan.is_random() || grouping.contains(&"tank.h"));
     let mut groups: Vec<Group> = Vec::new();
     for run in &results.outcomes {
         let values = others.iter().filter(|(i, _)| !run.case.varied[*i].is_empty());
-        let key: Vec<String> = values
-            .map(|(i, name)| {
-                let name = name.strip_prefix("profile.").unwrap_or(name);
-                format!("{name} = {}", run.case.varied[*i])
-            })
-            .collect();
+        let key: Vec<String> = match &run.case.listed {
+            // what the plan calls it says more than the values that make it
+            Some(name) => vec![name.replace('_', " ")],
+            None => values.map(|(i, varied)| varied.value(&run.case.varied[*i])).collect(),
+        };
         let same = |g: &&mut Group| {
             g.model == run.range.model
                 && g.fill.is_none_or(|fill| fill == run.range.fill)
@@ -227,8 +261,12 @@ const MOST_GROUPS: usize = 6;
 
 fn page(campaign: &Campaign, fmu: &Fmu, results: &Results) -> String {
     let plan = &campaign.plan;
-    let page =
-        Page { plan, groups: groups(plan, results), axis: axis(plan, fmu, &results.outcomes) };
+    let page = Page {
+        plan,
+        groups: groups(plan, fmu, results),
+        axis: axis(plan, fmu, &results.outcomes),
+        varied: plan.varied().iter().map(|n| Varied::of(n, fmu, &results.outcomes)).collect(),
+    };
     let mut figures = Figures::default();
     let sections = match results.unanalysed.is_empty() {
         true => bench_sections(&page, campaign, results, &mut figures),
@@ -299,8 +337,15 @@ fn bench_sections<'a>(
         first.extend(groups.iter().flat_map(|group| draws::draws(page, group)));
     } else if let (Some(axis), true) = (axis, has_response) {
         first.push(along::extrema(page, axis));
+    } else if let (Some(axis), false) =
+        (axis, groups.iter().all(|g| manoeuvre(g.runs[0]).is_none()))
+    {
+        first.push(along::left_behind(page, axis));
+        first.push(histories::after(page));
     } else if let Some(axis) = axis {
         first.push(along::slosh_angles(page, axis));
+    } else if results.outcomes.len() > 1 {
+        first.push(histories::compared(page));
     }
     sections.push((if random { "What decides" } else { "In short" }, add(first)));
     let histories =
@@ -347,7 +392,7 @@ fn bench_sections<'a>(
     if thesis && axis.is_some_and(|axis| axis.name == "torque amplitude") {
         sections.push(("Comparison with the thesis", thesis::statements(groups)));
     }
-    sections.push(("Results table", notes::table(plan, results)));
+    sections.push(("Results table", notes::table(page, results)));
     if swept {
         sections.push(("Methods", notes::estimators(groups)));
     }
@@ -378,8 +423,9 @@ fn introduction(page: &Page, fmu: &Fmu, results: &Results) -> String {
     let first = first.or_else(|| results.unanalysed.first().map(|run| &run.case));
     let count = results.outcomes.len() + results.unanalysed.len();
     let mut out = format!(
-        "<h1>{}</h1>\n<p class=\"lead\">{count} runs of the FMU {} (version {}), sampled at {} Hz: {}.</p>\n",
+        "<h1>{}</h1>\n<p class=\"lead\">{} of the FMU {} (version {}), sampled at {} Hz: {}.</p>\n",
         escape(if plan.title.is_empty() { "A campaign" } else { &plan.title }),
+        runs(count),
         escape(&fmu.description().model_name),
         escape(&fmu.description().version),
         first.map_or(0.0, |case| thousandths(1e3 / case.step) / 1e6),
@@ -388,8 +434,8 @@ fn introduction(page: &Page, fmu: &Fmu, results: &Results) -> String {
     if !results.failures.is_empty() {
         let _ = write!(
             out,
-            "<div class=\"failed\"><p><b>{} runs failed:</b></p><ul>",
-            results.failures.len()
+            "<div class=\"failed\"><p><b>{} failed:</b></p><ul>",
+            runs(results.failures.len())
         );
         for failure in &results.failures {
             let _ = write!(
@@ -409,8 +455,11 @@ fn introduction(page: &Page, fmu: &Fmu, results: &Results) -> String {
     if let Some(one) = beyond.first() {
         let _ = writeln!(
             out,
-            "<p class=\"warning\"><b>{} of {count} runs left the range of their model</b>, such as {}. They are computed faithfully, but they are not what a tank does. The results table marks them.</p>",
+            "<p class=\"warning\"><b>{} of {} left the range of {} model</b>{} {}. Computed faithfully, but not what a tank does. The results table marks it.</p>",
             beyond.len(),
+            runs(count),
+            if beyond.len() == 1 { "its" } else { "their" },
+            if beyond.len() == 1 { ":" } else { ", such as" },
             escape(one)
         );
     }
@@ -453,6 +502,19 @@ fn introduction(page: &Page, fmu: &Fmu, results: &Results) -> String {
     }
     out.push_str("</div>\n");
     out
+}
+
+/// "1 run", "2 runs".
+fn runs(count: usize) -> String {
+    format!("{count} run{}", if count == 1 { "" } else { "s" })
+}
+
+/// When the torque of a run ends for good, s, if the run goes on after that: a manoeuvre.
+fn manoeuvre(run: &Outcome) -> Option<f64> {
+    let torque = run.history.curve("tau_cmd");
+    let last = torque.iter().rposition(|(_, torque)| *torque != 0.0)?;
+    let (end, whole) = (torque.get(last + 1)?.0, torque.last()?.0);
+    (end < 0.9 * whole).then_some(end)
 }
 
 /// A frequency with the digits that tell it from another.

@@ -14,7 +14,8 @@ pub(super) fn estimators(groups: &[Group]) -> String {
          <p><b><code>spa</code></b> (dashed). MATLAB's Blackman–Tukey estimate, which the thesis used: covariances of the whole record up to a lag of {lag:.0} s, Hann lag window, Fourier transform, ratio of cross spectrum to input spectrum. It resolves about {resolution:.2} mHz, which fills a narrow antiresonance a little.</p>\n\
          <p><b>Welch, H1.</b> Eight half-overlapping Hamming segments, averaged cross spectrum over averaged input spectrum: what most tools call the transfer function of two records.</p>\n\
          <p><b>Transfer function.</b> Where none of these resolves antiresonance and resonance: three poles and two zeros, fitted to the spectra of the whole record together with what its ends leave in them; exact for a linear plant, however short the record.</p>\n\
-         <p><b>What is trusted.</b> The response of the passing sweep, unless the sweep shifts the resonance by more than a quarter of the separation (0.6 √rate); then <code>spa</code>, if the separation is three times what it resolves and the signal-to-noise ratio at the resonance is above 1; then the transfer function, if it leaves less than 30 % of the rate. Else there is no number. <code>estimator</code> and <code>not_trusted</code> in the tables say which.</p>\n\
+         <p><b>What is trusted.</b> The response of the passing sweep, unless the sweep shifts the resonance by more than a quarter of the separation (0.6 √rate); then <code>spa</code>, if the separation is three times what it resolves and the signal-to-noise ratio at the resonance is above 1; then the transfer function, if it leaves less than 30 % of the rate. Where these two, after a fast sweep, differ by more than a quarter of the separation, neither is: the liquid then rings at a frequency that follows its amplitude, and no single linear response describes the record. Else there is no number. <code>estimator</code> and <code>not_trusted</code> in the tables say which.</p>\n\
+         <p><b>Uncertainty.</b> What of the rate no linear response explains is estimated by the local rational method: around each line of the whole record's spectra a rational function of the torque's spectrum and a polynomial for the record's ends are fitted, and what is left is gyro noise, dry friction and nonlinear slosh. From its power spectral density Φ<sub>v</sub> follow the standard deviations of |H|, √(Φ<sub>v</sub>/(2nΦ<sub>uu</sub>)) over n averaged lines, and of an extremum of ln |H|, that of its slope over its curvature. Intervals are two standard deviations to either side. A shift that the sweep itself makes (below) is not in them.</p>\n\
          <p><b>Features.</b> f<sub>dip</sub> and f<sub>res</sub> are the two ends of the largest rise of |H| as the frequency grows, within the sweep's band, refined by a parabola through three points of log |H|; Δf is their separation, the notch depth their difference in dB. For a bench with little damping they are the smallest and the largest |H| in the band, as in the thesis; with strong damping the largest |H| is the band's lower edge, not the slosh resonance, and the ripple behind the resonance may go deeper than the antiresonance.</p>\n\
          <p><b>Fit.</b> Three poles, two zeros, least squares on the complex <code>spa</code> response. In time it is driven with the run's torque from the initial state that fits best, as MATLAB's <code>compare</code> does: the band says little of a slow real pole, and from rest such a pole would keep the offset of the first half cycle for the whole run.</p>\n\
          <p><b>Energy residual.</b> Largest |E(t) − E(0) − work + heat| of a run over the energy throughput, Σ|Δwork| + heat. It checks the FMU's energy balance at every sample.</p>\n\
@@ -53,19 +54,31 @@ pub(super) fn estimators(groups: &[Group]) -> String {
     out
 }
 
-pub(super) fn table(plan: &Plan, results: &Results) -> String {
-    let varied = plan.varied();
-    let others: Vec<(usize, &str)> = varied
+pub(super) fn table(page: &Page, results: &Results) -> String {
+    let others: Vec<usize> = page
+        .plan
+        .varied()
         .into_iter()
         .enumerate()
         .filter(|(_, name)| !["slosh.model", "tank.h", "profile.amplitude"].contains(name))
+        .map(|(place, _)| place)
         .collect();
-    let heads: String =
-        others.iter().map(|(_, name)| format!("<th>{}</th>", escape(name))).collect();
+    let head = |place: &usize| {
+        let label = page.varied[*place].as_ref().map_or(String::new(), Varied::label);
+        format!("<th>{}</th>", escape(&label).replace(" / ", "<br>"))
+    };
+    let heads: String = others.iter().map(head).collect();
+    // columns that no run has
+    let swept = results.outcomes.iter().any(|run| run.passing.is_some());
+    let recorded = results.outcomes.iter().any(|run| run.record.is_some());
+    let kinds = [(swept, "While the sweep passes"), (recorded, "Whole record (<code>spa</code>)")];
+    let kinds: Vec<&str> = kinds.into_iter().filter(|(is, _)| *is).map(|(_, name)| name).collect();
+    let over: String = kinds.iter().map(|name| format!("<th colspan=\"4\">{name}</th>")).collect();
+    let columns = "<th>f<sub>dip</sub><br>Hz</th><th>f<sub>res</sub><br>Hz</th><th>Δf<br>mHz</th><th>notch<br>dB</th>".repeat(kinds.len());
     let mut out = format!(
         "<div class=\"wide\"><table><thead>\n\
-         <tr><th colspan=\"{}\">Run</th><th colspan=\"4\">While the sweep passes</th><th colspan=\"4\">Whole record (<code>spa</code>)</th><th colspan=\"5\">The run itself</th></tr>\n\
-         <tr><th>model</th><th>fill<br>cm</th><th>torque<br>mN·m</th>{heads}<th>f<sub>dip</sub><br>Hz</th><th>f<sub>res</sub><br>Hz</th><th>Δf<br>mHz</th><th>notch<br>dB</th><th>f<sub>dip</sub><br>Hz</th><th>f<sub>res</sub><br>Hz</th><th>Δf<br>mHz</th><th>notch<br>dB</th><th>largest slosh<br>angle, deg</th><th>largest wave<br>mm</th><th>stiction<br>s</th><th>energy<br>residual</th><th>range of<br>the model</th></tr>\n</thead><tbody>\n",
+         <tr><th colspan=\"{}\">Run</th>{over}<th colspan=\"5\">The run itself</th></tr>\n\
+         <tr><th>model</th><th>fill<br>cm</th><th>torque<br>mN·m</th>{heads}{columns}<th>largest slosh<br>angle, deg</th><th>largest wave<br>mm</th><th>stiction<br>s</th><th>energy<br>residual</th><th>range of<br>the model</th></tr>\n</thead><tbody>\n",
         3 + others.len()
     );
     for run in &results.outcomes {
@@ -76,12 +89,15 @@ pub(super) fn table(plan: &Plan, results: &Results) -> String {
             cm(run.range.fill),
             run.case.amplitude.map_or(String::new(), |a| thousandths(a).to_string())
         );
-        for (place, _) in &others {
-            let _ = write!(out, "<td>{}</td>", escape(&shortened(&run.case.varied[*place])));
+        for place in &others {
+            let scale = page.varied[*place].as_ref().map_or(1.0, |varied| varied.scale);
+            let cell = shortened(&run.case.varied[*place], scale);
+            let _ = write!(out, "<td>{}</td>", escape(&cell));
         }
         let passing = run.passing.as_ref().map(|passing| &passing.rate);
         let spa = run.record.as_ref().map(|record| &record.spa);
-        for estimate in [passing, spa] {
+        let shown = [(swept, passing), (recorded, spa)].into_iter().filter(|(is, _)| *is);
+        for (_, estimate) in shown {
             let features = estimate.map_or(Features::default(), |estimate| estimate.features);
             let doubt = estimate.and_then(|estimate| estimate.doubt);
             let cell = |value: Option<f64>, digits: usize| match value {
@@ -115,10 +131,11 @@ pub(super) fn table(plan: &Plan, results: &Results) -> String {
     out
 }
 
-/// A drawn number to six digits; any other text as it is.
-fn shortened(text: &str) -> String {
+/// A number times `scale`, a drawn one to six digits; any other text as it is.
+fn shortened(text: &str, scale: f64) -> String {
     match text.parse::<f64>() {
-        Ok(value) if text.len() > 8 => format!("{value:.5e}"),
+        Ok(value) if text.len() > 8 => format!("{:.5e}", value * scale),
+        Ok(value) => ((value * scale * 1e9).round() / 1e9).to_string(),
         _ => text.to_string(),
     }
 }

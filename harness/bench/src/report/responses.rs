@@ -15,21 +15,17 @@ pub(super) fn responses(page: &Page, group: &Group) -> Figure {
             names.push(*name);
         }
         traces.extend(bode(&page.name(run), &color, "solid", &estimate.response));
+        traces.extend(intervals(&page.name(run), &color, estimate));
     }
     if !page.plan.is_random() {
         traces.extend(bode("exact, linear and viscous", colors::INK, "dot", &group.exact_response));
     }
-    let (from, to) = group.band().unwrap_or(BAND);
-    // around the two, at their own distance, if they are close together
-    let near = group.exact.f_dip.zip(group.exact.f_res).map(|(dip, resonance)| {
-        let delta = resonance - dip;
-        ((dip - 2.5 * delta).max(from), (resonance + 4.0 * delta).min(to))
-    });
+    let near = near(group);
     let panel = |y: &str| Panel { log_x: true, range: near, ..Panel::new("frequency / Hz", y) };
     Figure {
         title: format!("Frequency response, {}", group.title()),
         caption: format!(
-            "Hub rate over torque ({}). The response falls to the antiresonance at the slosh frequency and rises to the resonance above it. At first around the two: a double click shows the whole band.",
+            "Hub rate over torque ({}). The response falls to the antiresonance at the slosh frequency and rises to the resonance above it. Shaded: 95 % intervals, where they are wider than the line. At first around the two: a double click shows the whole band.",
             names.join(", ")
         ),
         height: 235,
@@ -39,6 +35,14 @@ pub(super) fn responses(page: &Page, group: &Group) -> Figure {
         traces,
         ..Figure::default()
     }
+}
+
+/// The band around antiresonance and resonance, at their own distance, Hz.
+fn near(group: &Group) -> Option<(f64, f64)> {
+    let (from, to) = group.band().unwrap_or(BAND);
+    let (dip, resonance) = group.exact.f_dip.zip(group.exact.f_res)?;
+    let delta = resonance - dip;
+    Some(((dip - 2.5 * delta).max(from), (resonance + 4.0 * delta).min(to)))
 }
 
 fn bode(
@@ -52,6 +56,37 @@ fn bode(
         line(0, name, color, dash, &curve(response.decibels())),
         line(1, name, color, dash, &curve(response.degrees())),
     ]
+}
+
+/// The area within two standard deviations of a response; nothing where it is no wider than a line.
+fn intervals(name: &str, color: &str, estimate: &Estimate) -> Vec<serde_json::Value> {
+    /// Half-widths that are seen, dB, and the widest that is drawn, in standard deviations of ln |H|.
+    const SEEN: f64 = 0.2;
+    const WIDEST: f64 = 0.5;
+    let decibel = 20.0 / std::f64::consts::LN_10;
+    let response = &estimate.response;
+    let wide = |s: &f64| 2.0 * s * decibel > SEEN;
+    if !estimate.deviation.iter().any(wide) {
+        return Vec::new();
+    }
+    let width: Vec<f64> = estimate.deviation.iter().map(|s| 2.0 * s.min(WIDEST)).collect();
+    let sides = [(response.decibels(), decibel), (response.degrees(), 1f64.to_degrees())];
+    let area = |(panel, (middle, scale)): (usize, (Vec<f64>, f64))| {
+        let side = |sign: f64| {
+            let edge = middle.iter().zip(&width).map(|(y, w)| y + sign * scale * w);
+            thinned(&zip(&response.frequency, &edge.collect::<Vec<_>>()), true)
+        };
+        let around: Vec<(f64, f64)> =
+            side(1.0).into_iter().chain(side(-1.0).into_iter().rev()).collect();
+        serde_json::json!({
+            "type": "scatter", "mode": "lines", "name": name, "legendgroup": name, "panel": panel,
+            "x": figure::numbers(around.iter().map(|p| p.0)),
+            "y": figure::numbers(around.iter().map(|p| p.1)),
+            "fill": "toself", "fillcolor": color.replace("rgb(", "rgba(").replace(')', ",0.18)"),
+            "line": {"width": 0, "color": color}, "hoverinfo": "skip", "showlegend": false,
+        })
+    };
+    sides.into_iter().enumerate().map(area).collect()
 }
 
 /// For each fill, the responses of all models at the smallest and at the largest torque (thesis
@@ -81,10 +116,10 @@ pub(super) fn models(page: &Page) -> Vec<Figure> {
             let what = fill.map_or("any fill".into(), |fill| format!("{} cm fill", cm(fill)));
             Figure {
                 title: format!("Models overlaid, {what}"),
-                caption: "The smallest (dashed) and the largest (solid) of the runs of each model: what nonlinear slosh changes, and what dry friction does to all models alike.".into(),
+                caption: "The smallest (dashed) and the largest (solid) of the runs of each model: what nonlinear slosh changes, and what dry friction does to all models alike. At first around the two: a double click shows the whole band.".into(),
                 height: 340,
                 half: true,
-                panels: vec![Panel { log_x: true, ..Panel::new("frequency / Hz", "|H| / dB") }],
+                panels: vec![Panel { log_x: true, range: near(groups[0]), ..Panel::new("frequency / Hz", "|H| / dB") }],
                 traces,
                 ..Figure::default()
             }

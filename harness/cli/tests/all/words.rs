@@ -1,5 +1,5 @@
-//! The words of README, documentation, command line, descriptions of variables and report: those of
-//! textbooks, standards and well-known tools.
+//! The words of README, documentation, command line, messages, descriptions of variables, report,
+//! plans, Python and notebooks: those of textbooks, standards and well-known tools.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -14,6 +14,8 @@ const WORDS: &[(&str, &str)] = &[
     ("dip and peak", "antiresonance and resonance"),
     ("distance of the two", "separation"),
     // slosh: NASA SP-106 and Dodge (2000); `slosh.model = frozen` keeps its name
+    ("liquid turns", "rotary slosh (swirl)"),
+    ("make the liquid turn", "make the slosh rotary"),
     ("liquid turns round", "rotary slosh (swirl)"),
     ("liquid goes round", "rotary slosh (swirl)"),
     ("time turning", "time in rotary slosh"),
@@ -127,12 +129,63 @@ fn descriptions(texts: &mut Vec<Text>) {
     }
 }
 
-/// String literals of the report's source: what stands between two quotation marks in a line.
-fn report(texts: &mut Vec<Text>) {
-    let folder = pack::root().join("harness/bench/src/report");
-    let files: Vec<PathBuf> = folder.read_dir().unwrap().flatten().map(|e| e.path()).collect();
-    for path in files.iter().filter(|path| path.extension().is_some_and(|e| e == "rs")) {
-        let source = std::fs::read_to_string(path).unwrap();
+/// Files with this ending below a folder, without hidden folders, built things and tests of Rust.
+fn files(folder: &Path, ending: &str) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for path in folder.read_dir().unwrap().flatten().map(|entry| entry.path()) {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        if path.is_dir() && !name.starts_with('.') && !["target", "tests"].contains(&&*name) {
+            found.extend(files(&path, ending));
+        } else if name.ends_with(ending) {
+            found.push(path);
+        }
+    }
+    found
+}
+
+/// Plans, notebooks, and text in drawings.
+fn whole_files(texts: &mut Vec<Text>) {
+    let root = pack::root();
+    for (folder, ending) in [
+        ("harness", ".toml"),
+        ("harness", ".ipynb"),
+        ("book", ".svg"),
+        ("modelDescription", ".svg"),
+    ] {
+        for path in files(&root.join(folder), ending) {
+            let text = std::fs::read_to_string(&path).unwrap();
+            // a comment goes on in the next line; of a drawing what stands between its tags
+            let text = match ending {
+                ".svg" => text
+                    .split('<')
+                    .filter_map(|part| part.split_once('>'))
+                    .map(|(_, t)| t)
+                    .collect::<Vec<_>>()
+                    .join(" | "),
+                _ => text.replace("\n# ", "\n"),
+            };
+            texts.push((path.display().to_string(), text));
+        }
+    }
+}
+
+/// Docstrings of Python, without what stands in ``double backquotes``, which are names.
+fn docstrings(texts: &mut Vec<Text>) {
+    let root = pack::root();
+    for path in ["harness", "examples"].iter().flat_map(|folder| files(&root.join(folder), ".py")) {
+        let source = std::fs::read_to_string(&path).unwrap();
+        let strings: Vec<_> = source.split("\"\"\"").skip(1).step_by(2).collect();
+        let prose: Vec<_> = strings.iter().flat_map(|text| text.split('`').step_by(2)).collect();
+        texts.push((path.display().to_string(), prose.join(" | ")));
+    }
+}
+
+/// String literals of the source: what stands between two quotation marks in a line.
+fn literals(texts: &mut Vec<Text>) {
+    let root = pack::root();
+    let paths = ["harness", "fmu", "modelDescription"].iter();
+    for path in paths.flat_map(|folder| files(&root.join(folder), ".rs")) {
+        let source = std::fs::read_to_string(&path).unwrap();
         // comments are for developers, and test code too
         let source = source.split("#[cfg(test)]").next().unwrap();
         let lines = source.lines().filter(|line| !line.trim_start().starts_with("//"));
@@ -156,8 +209,19 @@ fn texts_use_the_words_of_the_field() {
     markdown(&pack::root(), &mut texts);
     help(&[], &mut texts);
     descriptions(&mut texts);
-    report(&mut texts);
-    for (kind, count) in [(".md", 20), ("--help", 10), ("HubSlosh ", 100), (".rs", 5)] {
+    literals(&mut texts);
+    docstrings(&mut texts);
+    whole_files(&mut texts);
+    for (kind, count) in [
+        (".md", 20),
+        ("--help", 10),
+        ("HubSlosh ", 100),
+        (".rs", 100),
+        (".py", 40),
+        (".toml", 14),
+        (".ipynb", 3),
+        (".svg", 3),
+    ] {
         let found = texts.iter().filter(|(from, _)| from.contains(kind)).count();
         assert!(found >= count, "{found} texts of {kind}");
     }
