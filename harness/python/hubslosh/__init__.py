@@ -7,8 +7,8 @@
 
 `simulate` returns a table of time histories, `closed_loop` one under a sampled controller,
 `linearize` a state-space model, `frequency_response` an estimate from a history, `fit` a transfer
-function through such an estimate; `campaign` and `identify` call the program ``hubslosh``. `plot` draws. `Plant` and `drive` are for those who step
-an instance themselves.
+function through such an estimate; `campaign` and `identify` call the program ``hubslosh``. `plot`
+draws. `Plant` and `drive` are for those who step an instance themselves.
 """
 
 from importlib.metadata import PackageNotFoundError, version

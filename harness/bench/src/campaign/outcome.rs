@@ -353,6 +353,8 @@ impl Record {
                 let (deviation, deviations) = fitted.deviations(&frequencies);
                 Estimate { deviation, deviations, ..estimate }
             });
+        let extrema = spa.features.f_res.zip(spa.features.f_dip);
+        let fit = ModelFit::of(step, lengths.segment, &tau, &omega, &spa.response, &spa.features);
         if let (true, Some(fitted), Some(delta)) = (fast, &mut rational, spa.features.delta_f()) {
             let apart = |get: fn(&Features) -> Option<f64>| {
                 let pair = get(&spa.features).zip(get(&fitted.features));
@@ -363,8 +365,6 @@ impl Record {
                 fitted.doubted(Doubt::Nonlinear);
             }
         }
-        let extrema = spa.features.f_res.zip(spa.features.f_dip);
-        let fit = ModelFit::of(step, lengths.segment, &tau, &omega, &spa.response, &spa.features);
         Some(Record {
             h1: estimate(spectra.h1(band), spectra.length),
             snr_db: extrema.map(|(res, antiresonance)| {
@@ -446,8 +446,12 @@ impl Outcome {
             Torque::Rows { .. } => (None, None),
             Torque::Profile(profile) => {
                 let (tau, omega) = (column("tau_cmd"), column("omega_imu"));
+                // in every fourth of the frequencies: it changes little between them
                 let unexplained = profile.band().map_or(Vec::new(), |band| {
-                    noise::power(run.step, tau, omega, &logarithmic_grid(band, GRID_POINTS))
+                    let grid = logarithmic_grid(band, GRID_POINTS);
+                    let some: Vec<f64> = grid.into_iter().skip(1).step_by(4).collect();
+                    let power = noise::power(run.step, tau, omega, &some);
+                    power.into_iter().flat_map(|power| [power; 4]).collect()
                 });
                 let passing = profile
                     .sweep()
@@ -595,7 +599,8 @@ impl Range {
     }
 }
 
-/// The linear model with viscous friction that has the FMU's own (calculated) parameters.
+/// The linear model that has the FMU's own (calculated) parameters, with viscous friction unless the
+/// FMU has none.
 pub(super) fn exact_linear(instance: &mut Instance) -> Result<Linear> {
     let mut real = |name: &str| instance.real(name);
     let arm = real("tank.r")?;
@@ -611,5 +616,14 @@ pub(super) fn exact_linear(instance: &mut Instance) -> Result<Linear> {
         }
     }
     let inertia = real("hub.I")? + real("tank.m_0")? * arm * arm;
-    Ok(Linear { inertia, friction: real("friction.b")?, arm, modes })
+    let viscous = real("friction.b")?;
+    // the item `none` of friction.model; friction.kind goes before it if it is not 0
+    let mut numbers = [0; 2];
+    let references = ["friction.model", "friction.kind"]
+        .map(|name| Ok(instance.fmu().description().variable(name)?.reference));
+    let [model, kind]: [Result<u32>; 2] = references;
+    instance.get_integer(&[model?, kind?], &mut numbers)?;
+    let number = if numbers[1] != 0 { numbers[1] } else { numbers[0] };
+    let friction = if number == 1 { 0.0 } else { viscous };
+    Ok(Linear { inertia, friction, arm, modes })
 }

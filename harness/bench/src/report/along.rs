@@ -97,7 +97,7 @@ pub(super) fn left_behind(page: &Page, axis: &Axis) -> Figure {
         page,
         axis,
         &title,
-        "The largest rate of the hub and the largest slosh angle after the torque has ended. A rigid craft that the torque brings to rest has none of either; what bearing friction leaves is the same for all models.",
+        "The largest rate of the hub and the largest slosh angle after the torque has ended. A rigid craft that the torque brings to rest has none of either; what bearing friction leaves is the same for all models. In a slew by more than some tens of degrees linear and planar models turn the plane of the swing with the hub; spherical pendulums keep it in space.",
         [quantity("largest rate / (mrad/s)", &rate), quantity("largest slosh angle / deg", &angle)],
     );
     Figure { columns: 2, height: 340, ..figure }

@@ -38,7 +38,7 @@ pub(super) fn history(page: &Page, group: &Group) -> Figure {
     Figure {
         title: format!("Time histories, {}", group.title()),
         caption: format!(
-            "Torque, measured rate, slosh angles along and across the hub's turn, and the residual: the rate less that of the exact linear plant with viscous friction under the same torque; it is what friction and nonlinear slosh do.{}{}",
+            "Torque, measured rate, slosh angles along and across the hub's turn, and the residual: the rate less that of the exact linear plant, with viscous friction at most, under the same torque; it is what dry friction and nonlinear slosh do.{}{}",
             if runs.len() < group.runs.len() {
                 format!(" {} of {}.", runs.len(), super::runs(group.runs.len()))
             } else {

@@ -14,8 +14,15 @@ pub(super) fn responses(page: &Page, group: &Group) -> Figure {
         if !names.contains(name) {
             names.push(*name);
         }
-        traces.extend(bode(&page.name(run), &color, "solid", &estimate.response));
-        traces.extend(intervals(&page.name(run), &color, estimate));
+        let (name, dash) = match estimate.doubt {
+            Some(_) => (format!("{} (not trusted)", page.name(run)), "dash"),
+            None => (page.name(run), "solid"),
+        };
+        traces.extend(bode(&name, &color, dash, &estimate.response));
+        // of all of them they would hide each other
+        if i == 0 || i + 1 == runs.len() {
+            traces.extend(intervals(&name, &color, estimate));
+        }
     }
     if !page.plan.is_random() {
         traces.extend(bode("exact, linear and viscous", colors::INK, "dot", &group.exact_response));
@@ -25,7 +32,7 @@ pub(super) fn responses(page: &Page, group: &Group) -> Figure {
     Figure {
         title: format!("Frequency response, {}", group.title()),
         caption: format!(
-            "Hub rate over torque ({}). The response falls to the antiresonance at the slosh frequency and rises to the resonance above it. Shaded: 95 % intervals, where they are wider than the line. At first around the two: a double click shows the whole band.",
+            "Hub rate over torque ({}). The response falls to the antiresonance at the slosh frequency and rises to the resonance above it. Shaded: 95 % intervals of the first and the last run, where they are wider than a line. At first around the two: a double click shows the whole band.",
             names.join(", ")
         ),
         height: 235,
@@ -74,7 +81,8 @@ fn intervals(name: &str, color: &str, estimate: &Estimate) -> Vec<serde_json::Va
     let area = |(panel, (middle, scale)): (usize, (Vec<f64>, f64))| {
         let side = |sign: f64| {
             let edge = middle.iter().zip(&width).map(|(y, w)| y + sign * scale * w);
-            thinned(&zip(&response.frequency, &edge.collect::<Vec<_>>()), true)
+            let edge: Vec<(f64, f64)> = response.frequency.iter().copied().zip(edge).collect();
+            thinned(&edge.iter().step_by(4).copied().collect::<Vec<_>>(), true)
         };
         let around: Vec<(f64, f64)> =
             side(1.0).into_iter().chain(side(-1.0).into_iter().rev()).collect();
@@ -105,7 +113,8 @@ pub(super) fn models(page: &Page) -> Vec<Figure> {
                 for (k, name) in ends.iter().enumerate() {
                     let run = group.runs.iter().find(|run| run.case.name == **name);
                     let Some((run, (estimate, _))) = run.and_then(|run| Some((run, best(run)?))) else { continue };
-                    let name = format!("{}, {}", group.model, page.name(run));
+                    let doubted = if estimate.doubt.is_some() { " (not trusted)" } else { "" };
+                    let name = format!("{}, {}{doubted}", group.model, page.name(run));
                     let dash = ["dash", "solid"][k];
                     traces.push(line(0, &name, colors::category(i), dash, &thinned(&zip(&estimate.response.frequency, &estimate.response.decibels()), true)));
                 }
