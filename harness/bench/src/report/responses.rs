@@ -82,7 +82,7 @@ fn intervals(name: &str, color: &str, estimate: &Estimate) -> Vec<serde_json::Va
         let side = |sign: f64| {
             let edge = middle.iter().zip(&width).map(|(y, w)| y + sign * scale * w);
             let edge: Vec<(f64, f64)> = response.frequency.iter().copied().zip(edge).collect();
-            thinned(&edge.iter().step_by(4).copied().collect::<Vec<_>>(), true)
+            thinned(&edge.iter().step_by(8).copied().collect::<Vec<_>>(), true)
         };
         let around: Vec<(f64, f64)> =
             side(1.0).into_iter().chain(side(-1.0).into_iter().rev()).collect();
