@@ -35,9 +35,11 @@ def clicks(page: Page) -> None:
     """Hover, legend, zoom and reset in the first figure; the contents list."""
     plot = page.locator(".plot").first
     plot.scroll_into_view_if_needed()
-    point = plot.locator(".points path, .point path").first
-    box = point.bounding_box()
-    assert box, "the first figure has no points"
+    point = plot.locator(".points path, .point path")
+    # a figure of lines alone: somewhere in its middle one is near
+    target = point.first if point.count() else plot.locator(".nsewdrag").first
+    box = target.bounding_box()
+    assert box, "the first figure has neither points nor lines"
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     label = plot.locator(".hoverlayer .hovertext")
     label.first.wait_for(timeout=10_000)
