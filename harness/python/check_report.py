@@ -36,12 +36,16 @@ def clicks(page: Page) -> None:
     plot = page.locator(".plot").first
     plot.scroll_into_view_if_needed()
     point = plot.locator(".points path, .point path")
-    # a figure of lines alone: somewhere in its middle one is near
     target = point.first if point.count() else plot.locator(".nsewdrag").first
     box = target.bounding_box()
     assert box, "the first figure has neither points nor lines"
-    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     label = plot.locator(".hoverlayer .hovertext")
+    # in a figure of lines alone up and down its middle, until one is near
+    for part in (0.5,) if point.count() else (k / 20 for k in range(1, 20)):
+        page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] * part)
+        page.wait_for_timeout(200)
+        if label.count():
+            break
     label.first.wait_for(timeout=10_000)
     text = label.first.text_content() or ""
     assert re.search(r"\d", text), f"the pointer shows no value: {text!r}"
