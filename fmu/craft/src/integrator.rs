@@ -1,9 +1,10 @@
 //! Steps through time: a Taylor-series integrator.
 //!
 //! Over one step the whole motion is a power series in time (`series.rs`). The order grows
-//! until two terms in succession, at the step's end, are below what the tolerance allows; where
-//! the highest order does not get there, the step is cut to the length at which it does. So
-//! short steps are cheap, nothing is ever rejected, and a step ends exactly where it should.
+//! until two terms in succession, at the step's end, are below what the tolerance allows, the second
+//! of them as the decay of the terms before foretells; where the highest order does not get there,
+//! the step is cut to the length at which it does. So short steps are cheap, nothing is ever
+//! rejected, and a step ends exactly where it should.
 //!
 //! Source: Jorba & Zou, Experimental Mathematics 14 (2005).
 
@@ -45,9 +46,23 @@ impl Limits {
 /// The lowest order that is trusted to show that a series has converged.
 const MIN_ORDER: usize = 5;
 
-/// Terms in succession that must be negligible: a motion that starts at rest is even in time,
-/// every second term of it is zero.
-const NEGLIGIBLE_TERMS: usize = 2;
+/// What two orders must take off a term for its decay to be relied on.
+const DECAY: f64 = 0.1;
+
+/// What is allowed of a term that is foretold, of what is allowed of one that is known.
+const FORETOLD: f64 = 0.25;
+
+/// Whether term n and those after it are negligible, for terms n, n - 1, n - 2, n - 3 over what is allowed.
+///
+/// A motion that starts at rest is even in time, every second term of it is zero: two in succession must be. The
+/// second, n + 1, is foretold from n - 1 by what two orders have taken off n - 2 and n - 3:
+/// t_(n+1) = t_(n-1) max(t_n/t_(n-2), t_(n-1)/t_(n-3)).
+fn are_negligible([now, one, two, three]: [f64; 4]) -> bool {
+    let decays = now <= DECAY * two && one <= DECAY * three;
+    let foretold = one * now <= FORETOLD * two && one * one <= FORETOLD * three;
+    // NaN is not negligible; it ends the step.
+    now <= 1.0 && (one <= 1.0 || decays && foretold)
+}
 
 /// Why a step was refused; its text is for the user. The state is as before the step.
 #[derive(Clone, Debug, PartialEq)]
@@ -147,18 +162,17 @@ pub trait Motion {
 #[inline(always)]
 fn expand<M: Motion>(motion: &mut M, h: f64, tolerance: f64) -> (usize, f64) {
     let mut power = 1.0; // h^(N+1)
-    let mut negligible = 0;
+    let mut terms = [f64::INFINITY; 4];
     for_each_order!(N => {
         motion.rates::<N>();
         if N == 1 {
             motion.set_error_scale(h, STEP_SHARE * tolerance);
         }
         power *= h;
-        if N + 2 >= MIN_ORDER {
-            // NaN is not negligible; it ends the step below.
-            let is_negligible = motion.coefficient_norm(N + 1) * power <= 1.0;
-            negligible = if is_negligible { negligible + 1 } else { 0 };
-            if negligible >= NEGLIGIBLE_TERMS {
+        if N + 4 >= MIN_ORDER {
+            let [now, one, two, _] = terms;
+            terms = [motion.coefficient_norm(N + 1) * power, now, one, two];
+            if N + 1 >= MIN_ORDER && are_negligible(terms) {
                 return (N + 1, h);
             }
         }

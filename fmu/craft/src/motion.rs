@@ -93,6 +93,8 @@ pub struct CraftMotion {
     /// gain and path
     travel: Pair,
     pub drift: Vector,
+    /// drift + gain
+    speed: Vector,
     pub work: Series,
     pub dissipation: Series,
     /// 1 over what is allowed of attitude, rate, the bobs' v, and velocity
@@ -135,6 +137,7 @@ impl CraftMotion {
             gain: ZERO_VECTOR,
             travel: ZERO_PAIR,
             drift: ZERO_VECTOR,
+            speed: ZERO_VECTOR,
             work: ZERO,
             dissipation: ZERO,
             inv_allowed: [0.0; 4],
@@ -342,8 +345,8 @@ impl Motion for CraftMotion {
         match self.mount {
             Mount::Free => {
                 self.a[N] = a;
-                self.work[N] += dot_ramp::<N>(&self.force, &self.drift)
-                    + dot_ramp::<N>(&self.force, &self.gain);
+                self.speed[N] = add(self.drift[N], self.gain[N]);
+                self.work[N] += dot_ramp::<N>(&self.force, &self.speed);
                 let turned = cross_pair::<N>(&self.w_both, &self.travel);
                 let gain = self.gain[N];
                 let rates = [0, 1, 2].map(|i| [a[i] - turned[i][0], gain[i] - turned[i][1]]);
