@@ -1,14 +1,15 @@
 //! Communication steps of both FMUs: what is shown after one, and that how many there are does not
 //! matter.
 
-use craft::{Inputs, Ramp, TankInputs, TankParameters};
+use craft::{Inputs, Line, Ramp, TankInputs, TankParameters};
 use host::fmi2::{CallError, Status};
 use runtime::instance::Instance;
-use runtime::operation::{Interface, SET_REAL, Version};
+use runtime::operation::{GET_REAL, Interface, SET_INTEGER, SET_REAL, Version};
 use runtime::snapshot::to_bytes;
 use runtime::variable::Value;
 
 use super::component::{SloshTank, Spacecraft};
+use super::draining::tank;
 use super::random::Random;
 use super::records::{STEP, at_end, motion_at_end};
 
@@ -49,6 +50,10 @@ fn random_steps(count: usize, seed: u64) -> usize {
     while steps < count {
         let mut p = random.parameters();
         p.init.omega = [(); 3].map(|()| random.magnitude(1e-6, 1e2));
+        // Every third drains.
+        if random.below(3) == 0 {
+            p.tank[0] = tank(&mut random, 2);
+        }
         let alone = TankParameters { tank: p.tank[0], ..TankParameters::default() };
         let tolerance = random.magnitude(1e-14, 1e-1);
         let mut craft = Spacecraft::new(&p, &Inputs::default(), 0.0, tolerance).unwrap();
@@ -59,7 +64,7 @@ fn random_steps(count: usize, seed: u64) -> usize {
             let nonsense = random.below(20) == 0;
             let size = if nonsense { 1e160 } else { random.magnitude(1e-6, 1e5) };
             let mut ramp = || Ramp { value: random.vector(size), slope: random.vector(size) };
-            let u = Inputs { force: ramp(), torque: ramp(), h_wheels: ramp(), ..Inputs::default() };
+            let [force, torque, h_wheels] = [ramp(), ramp(), ramp()];
             let size = if nonsense { 1e160 } else { random.magnitude(1e-6, 1e2) };
             let mut ramp = || Ramp { value: random.vector(size), slope: random.vector(size) };
             let motion = TankInputs {
@@ -68,6 +73,12 @@ fn random_steps(count: usize, seed: u64) -> usize {
                 omega_dot: ramp(),
                 ..TankInputs::default()
             };
+            let mass_flow = [(); 4].map(|()| Line {
+                value: random.between(-1.0, 1.0),
+                slope: random.between(-1.0, 1.0),
+            });
+            let u = Inputs { force, torque, h_wheels, mass_flow };
+            let motion = TankInputs { mass_flow: mass_flow[0], ..motion };
             let h = random.magnitude(1e-9, 0.1);
             let mut check = |done: Result<Vec<f64>, CallError>| {
                 steps += 1;
@@ -122,4 +133,41 @@ fn a_step_refused_for_where_an_input_would_end_leaves_the_tank_as_it_was() {
     let why = tank.do_step(0.0, 2.0).unwrap_err();
     assert!(why.text.contains("omega[1] = 1600000000.0"), "{}", why.text);
     assert!(to_bytes(&tank) == before);
+}
+
+/// What is shown of an instance whose enumeration and its kind have been set, or why there is none.
+fn with_kind<M: runtime::Model>(
+    settings: &[(&str, i32)],
+    shown: &str,
+) -> Result<Value, runtime::operation::Fault> {
+    let mut instance = Instance::<M>::new(Version::Fmi2, Interface::CoSimulation);
+    for (name, number) in settings {
+        let reference = M::table().find(name).unwrap();
+        instance.set(&SET_INTEGER, &[reference], |_| Value::Integer(*number))?;
+    }
+    instance.setup_experiment(None, 0.0, None)?;
+    instance.enter_initialization_mode()?;
+    instance.exit_initialization_mode()?;
+    instance.get(&GET_REAL, M::table().find(shown).unwrap())
+}
+
+#[test]
+fn a_kind_is_its_enumeration_for_hosts_that_set_none() {
+    type Craft = ::Spacecraft::Model;
+    type Tank = ::SloshTank::Model;
+    // On a pivot an accelerometer reads minus gravity.
+    let a = |settings: &[(&str, i32)]| with_kind::<Craft>(settings, "specific_force[3]");
+    assert_eq!(a(&[("mount_kind", 2)]).unwrap(), Value::Real(9.81));
+    assert_eq!(a(&[("mount", 2), ("mount_kind", 2)]).unwrap(), Value::Real(9.81));
+    assert_eq!(a(&[("mount_kind", 1)]).unwrap(), Value::Real(0.0));
+    let why = a(&[("mount", 2), ("mount_kind", 1)]).unwrap_err().text;
+    assert!(why.contains("mount_kind = 1 contradicts mount = 2"), "{why}");
+    // At rest, the bob straight down: its mass is in the added mass along z only, lumped along x, too.
+    let m = |settings: &[(&str, i32)]| with_kind::<Tank>(settings, "added_mass[1]");
+    assert_eq!(m(&[("coupling_kind", 1)]).unwrap(), Value::Real(253.493));
+    for kind in [2, 3] {
+        assert_eq!(m(&[("coupling_kind", kind)]).unwrap(), Value::Real(253.493 + 128.211));
+    }
+    let why = m(&[("coupling", 2), ("coupling_kind", 3)]).unwrap_err().text;
+    assert!(why.contains("coupling_kind = 3 contradicts coupling = 2"), "{why}");
 }
