@@ -1,0 +1,40 @@
+"""The numbers of README: pointing with rigid liquid, with sloshing, with the observer."""
+
+import numpy as np
+import pytest
+from agile_slew import DURATION, FREQUENCY, RIGID, Observer, parameters, slew, tranquillisation
+
+import hubslosh
+
+
+def after(run) -> float:
+    """Return the largest pointing error after the slew, degrees."""
+    return float(np.degrees(run.loc[run["time"] >= DURATION, "error"].abs().max()))
+
+
+def test_inertias_are_those_of_all_liquid_and_of_the_rigid_part(spacecraft: str) -> None:
+    """Closed forms; the pendulums hang on the roll axis' side and take no part at first."""
+    rigid = hubslosh.linearize(spacecraft, parameters(False), ["torque[1]"], ["omega[1]"])
+    assert 1 / rigid.B[0, 0] == pytest.approx(RIGID, rel=1e-12)
+    assert Observer(spacecraft, FREQUENCY).inertia == pytest.approx(RIGID - 17.5, rel=1e-12)
+
+
+def test_the_observer_gives_back_what_slosh_takes(spacecraft: str) -> None:
+    """The noise of the gyro, the same each time, is a tenth of what is left."""
+    rigid, sloshing = slew(spacecraft, slosh=False, stop=100), slew(spacecraft)
+    observed = slew(spacecraft, observe=True, stop=100)
+    assert after(rigid) < 3e-4
+    assert after(sloshing) == pytest.approx(0.1315, rel=0.01)
+    assert after(observed) == pytest.approx(9.4e-4, rel=0.1)
+    assert tranquillisation(sloshing) == pytest.approx(351, abs=5)
+    assert tranquillisation(rigid) == tranquillisation(observed) == 0
+    wrong = (observed["slosh"] - observed["estimate"]).abs().max()
+    assert wrong < 0.025 * observed["slosh"].abs().max()
+
+
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_a_mistuned_observer_still_helps(spacecraft: str, share: float) -> None:
+    """Thirty times better than none, where the image would wait six minutes."""
+    run = slew(spacecraft, observe=True, frequency=share * FREQUENCY, stop=200)
+    assert after(run) < 0.1315 / 30
+    assert tranquillisation(run) < 150
