@@ -41,8 +41,8 @@ fn torque(seconds: f64) -> Vec<f64> {
 /// CPU time of this thread.
 #[cfg(unix)]
 fn cpu_time() -> Duration {
-    let now = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    now.try_into().unwrap_or_default()
+    let now = nix::time::clock_gettime(nix::time::ClockId::CLOCK_THREAD_CPUTIME_ID);
+    now.map_or(Duration::ZERO, Duration::from)
 }
 
 /// Time since the first call.
