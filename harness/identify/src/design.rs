@@ -4,8 +4,10 @@
 use std::f64::consts::TAU;
 
 use anyhow::{Result, ensure};
+use bench::analysis::linear::Linear;
 use bench::random::Random;
 use host::fmi2::Fmu;
+use nalgebra::Matrix5;
 
 use crate::fit::Problem;
 use crate::noise::Noise;
@@ -26,8 +28,8 @@ pub struct Multisine {
     pub lines: Vec<u32>,
     /// Odd lines of the band without power.
     pub detection: Vec<u32>,
-    /// a, N·m, the same for all lines.
-    amplitude: f64,
+    /// a_k, N·m.
+    amplitudes: Vec<f64>,
     phases: Vec<f64>,
 }
 
@@ -54,32 +56,135 @@ impl Multisine {
                 if k == left_out { detection.push(*line) } else { lines.push(*line) }
             }
         }
+        let amplitudes = vec![1.0; lines.len()];
+        let phases = vec![0.0; lines.len()];
+        let flat = Multisine { period, lines, detection, amplitudes, phases };
+        Ok(flat.drawn(peak, &mut random))
+    }
+
+    /// The same lines with these shares of the power and new phases.
+    pub fn shaped(&self, shares: &[f64], peak: f64, seed: u64) -> Self {
+        let amplitudes = shares.iter().map(|p| p.sqrt()).collect();
+        Multisine { amplitudes, ..self.clone() }.drawn(peak, &mut Random::new(seed, 1))
+    }
+
+    /// The phases with the smallest crest factor of 20 draws, and the largest torque `peak`.
+    fn drawn(self, peak: f64, random: &mut Random) -> Self {
         let mut best: Option<(f64, Self)> = None;
         for _ in 0..20 {
-            let phases = lines.iter().map(|_| TAU * random.uniform()).collect();
-            let one = Multisine {
-                period,
-                lines: lines.clone(),
-                detection: detection.clone(),
-                amplitude: 1.0,
-                phases,
-            };
-            let largest =
-                (0..2000).map(|k| one.at(period * f64::from(k) / 2000.0).abs()).fold(0.0, f64::max);
+            let phases = self.lines.iter().map(|_| TAU * random.uniform()).collect();
+            let one = Multisine { phases, ..self.clone() };
+            let largest = (0..2000)
+                .map(|k| one.at(self.period * f64::from(k) / 2000.0).abs())
+                .fold(0.0, f64::max);
             if best.as_ref().is_none_or(|(other, _)| largest < *other) {
                 best = Some((largest, one));
             }
         }
         let (largest, one) = best.expect("twenty draws");
-        Ok(Multisine { amplitude: peak / largest, ..one })
+        one.scaled(peak / largest)
+    }
+
+    /// The same with all torques times a factor.
+    pub fn scaled(&self, factor: f64) -> Self {
+        let amplitudes = self.amplitudes.iter().map(|a| a * factor).collect();
+        Multisine { amplitudes, ..self.clone() }
+    }
+
+    /// Frequencies of the lines with power, Hz.
+    pub fn frequencies(&self) -> Vec<f64> {
+        self.lines.iter().map(|&k| f64::from(k) / self.period).collect()
     }
 
     /// Torque at `t` (s), N·m.
     pub fn at(&self, t: f64) -> f64 {
-        let tones = self.lines.iter().zip(&self.phases);
         let turn = (t / self.period).fract();
-        self.amplitude
-            * tones.map(|(&k, phase)| (TAU * f64::from(k) * turn + phase).sin()).sum::<f64>()
+        let tones = self.lines.iter().zip(&self.amplitudes).zip(&self.phases);
+        tones.map(|((&k, a), phase)| a * (TAU * f64::from(k) * turn + phase).sin()).sum()
+    }
+}
+
+/// Part of the power that is spread over all lines whatever the design says: a plant that is a little different
+/// must still be excited where it resonates, and distortion must be seen everywhere.
+const SPREAD: f64 = 0.25;
+
+/// Shares of the power on lines at these frequencies (Hz) that make the determinant of the information on a linear
+/// bench's five parameters largest (D-optimal), with [`SPREAD`] spread evenly.
+///
+/// ```text
+/// maximise ln det Σ p_k A_k,  A_k = Re(J_kᴴ J_k),  J_k = ∂H(f_k)/∂ ln(f, ζ, m, I0, b):
+/// p_k ← p_k tr(M⁻¹ A_k)/5
+/// ```
+///
+/// (Titterington's iteration, which never makes it worse; Goodwin & Payne, Dynamic System Identification, 1977, chapter 6.)
+pub fn d_optimal(plant: &Linear, frequencies: &[f64]) -> Vec<f64> {
+    let moved = |which: usize, by: f64| {
+        let mut moved = plant.clone();
+        let mode = &mut moved.modes[0];
+        let value = match which {
+            0 => &mut mode.frequency,
+            1 => &mut mode.damping,
+            2 => &mut mode.mass,
+            3 => &mut moved.inertia,
+            _ => &mut moved.friction,
+        };
+        *value *= 1.0 + by;
+        moved
+    };
+    let step = 1e-5;
+    let pairs: Vec<(Linear, Linear)> = (0..5).map(|i| (moved(i, step), moved(i, -step))).collect();
+    let information: Vec<Matrix5<f64>> = frequencies
+        .iter()
+        .map(|&f| {
+            let slope: Vec<_> =
+                pairs.iter().map(|(a, b)| (a.response(f) - b.response(f)) / (2.0 * step)).collect();
+            Matrix5::from_fn(|i, j| (slope[i].conj() * slope[j]).re)
+        })
+        .collect();
+    let count = frequencies.len() as f64;
+    let mut shares = vec![1.0 / count; frequencies.len()];
+    for _ in 0..300 {
+        let total: Matrix5<f64> = information.iter().zip(&shares).map(|(a, p)| a * *p).sum();
+        let Some(inverse) = total.try_inverse() else { break };
+        for (share, a) in shares.iter_mut().zip(&information) {
+            *share *= (inverse * a).trace() / 5.0;
+        }
+    }
+    shares.iter().map(|p| (1.0 - SPREAD) * p + SPREAD / count).collect()
+}
+
+/// A reaction wheel's limits.
+#[derive(Clone, Copy, Debug)]
+pub struct Wheel {
+    /// Largest torque, N·m.
+    pub torque: f64,
+    /// Moment of inertia, kg·m².
+    pub inertia: f64,
+    /// Speed at the start, and the least and the largest that are allowed, rad/s.
+    pub speeds: [f64; 3],
+}
+
+impl Wheel {
+    /// The wheel's least and largest speed under a torque on the hub, rad/s: I_w W' = −τ.
+    pub fn range(&self, time: &[f64], torque: &[f64]) -> (f64, f64) {
+        let mut speed = self.speeds[0];
+        let (mut least, mut largest) = (speed, speed);
+        for (t, tau) in time.windows(2).zip(torque.windows(2)) {
+            speed -= (tau[0] + tau[1]) / 2.0 * (t[1] - t[0]) / self.inertia;
+            (least, largest) = (least.min(speed), largest.max(speed));
+        }
+        (least, largest)
+    }
+
+    /// The largest factor (at most 1) by which a torque can be multiplied within the limits.
+    pub fn factor(&self, time: &[f64], torque: &[f64]) -> f64 {
+        let peak = torque.iter().fold(0.0, |m: f64, t| m.max(t.abs()));
+        let (least, largest) = self.range(time, torque);
+        let [start, low, high] = self.speeds;
+        [self.torque / peak, (start - low) / (start - least), (high - start) / (largest - start)]
+            .into_iter()
+            .filter(|f| f.is_finite())
+            .fold(1.0, f64::min)
     }
 }
 
@@ -110,6 +215,7 @@ pub fn cramer_rao(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bench::analysis::linear::Mode;
 
     #[test]
     fn a_multisine_has_odd_lines_alone_and_its_peak() {
@@ -122,5 +228,39 @@ mod tests {
         assert!((0.2499..0.29).contains(&largest), "{largest}");
         // odd lines alone: the second half of a period is the first with the other sign
         assert!((torque.at(13.7) + torque.at(63.7)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn d_optimal_power_stands_around_the_slosh_and_tells_more() {
+        let mode = Mode { mass: 0.756_293_271_9, frequency: 2.343_618_143_1, damping: 0.003 };
+        let plant = Linear { inertia: 0.39, friction: 0.1, arm: 0.225, modes: vec![mode] };
+        let frequencies: Vec<f64> = (125..350).step_by(2).map(|k| f64::from(k) / 100.0).collect();
+        let shares = d_optimal(&plant, &frequencies);
+        assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+        let near: f64 = frequencies
+            .iter()
+            .zip(&shares)
+            .filter(|(f, _)| (2.25..2.55).contains(*f))
+            .map(|(_, p)| p)
+            .sum();
+        // 13 % of the lines; the antiresonance and the resonance are there
+        assert!(near > 0.3, "{near}");
+    }
+
+    #[test]
+    fn a_wheels_limits_bound_the_torque() {
+        let rpm = std::f64::consts::TAU / 60.0;
+        let wheel = Wheel {
+            torque: 0.26,
+            inertia: 2.25e-3,
+            speeds: [1600.0 * rpm, 200.0 * rpm, 3000.0 * rpm],
+        };
+        let time: Vec<f64> = (0..1000).map(|k| 0.01 * f64::from(k)).collect();
+        // 0.1 N·m for 10 s is 444 rad/s; 146.6 rad/s are there
+        let factor = wheel.factor(&time, &vec![0.1; 1000]);
+        assert!((factor - 146.6 / 444.0).abs() < 1e-3, "{factor}");
+        let fast: Vec<f64> = time.iter().map(|t| 0.52 * (TAU * 3.0 * t).sin()).collect();
+        // the sine's crests lie between rows: (π 3 0.01)²/2 = 0.4 %
+        assert!((wheel.factor(&time, &fast) - 0.5).abs() < 3e-3);
     }
 }

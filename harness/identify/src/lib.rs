@@ -1,9 +1,12 @@
 //! From recordings of torque and hub rate to the FMU's parameters, with their uncertainty.
 
 pub mod acceleration;
+pub mod black_box;
 pub mod budget;
 pub mod candidate;
+pub mod compensation;
 pub mod design;
+pub mod distortion;
 pub mod fit;
 pub mod frequency;
 pub mod friction;

@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use anyhow::{Result, bail};
+use bench::analysis::linear::{Linear, Mode};
 use bench::profile::Written;
 use bench::table::{self, Table};
 use host::fmi2::Fmu;
-use identify::design::{self, Multisine};
+use identify::design::{self, Multisine, Wheel};
 use identify::noise::Noise;
 use identify::simulate::Setup;
 use identify::unknown::Unknown;
@@ -17,7 +18,8 @@ use super::{DEFAULT_FMU, setting};
 /// Says beforehand what a planned experiment will tell about each parameter (Cramér–Rao bound).
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh design --profile lin-sweep:amplitude=0.1\n  \
-    hubslosh design --multisine 0.25 --duration 600 --out torque.csv")]
+    hubslosh design --multisine 0.25 --duration 600 --out torque.csv\n  \
+    hubslosh design --multisine 0.25 --optimal --set friction.b=0.04 --out torque.csv")]
 pub struct DesignArgs {
     /// Torque profile, as of `hubslosh run`.
     #[arg(long, value_name = "PROFILE", conflicts_with = "multisine")]
@@ -34,6 +36,10 @@ pub struct DesignArgs {
     /// Band of the multisine, Hz.
     #[arg(long, value_name = "HZ,HZ", value_delimiter = ',', default_value = "1.25,3.5")]
     band: Vec<f64>,
+    /// Gives the lines the power that tells most of a linear bench as expected (D-optimal), a quarter of it spread
+    /// evenly.
+    #[arg(long, requires = "multisine")]
+    optimal: bool,
     /// Draw of the phases and the detection lines.
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     seed: u64,
@@ -60,25 +66,6 @@ impl DesignArgs {
         if let Some(out) = &self.out {
             table::check_ending(out)?;
         }
-        let (time, torque) = match (&self.profile, self.multisine) {
-            (Some(profile), _) => {
-                let torque = profile.parse::<Written>()?.torque()?;
-                let (start, stop) = torque.span();
-                let rows = ((stop - start) / STEP).round() as usize;
-                let time: Vec<f64> = (0..=rows).map(|k| start + k as f64 * STEP).collect();
-                let tau: Vec<f64> = time.iter().map(|&t| torque.at(t)).collect();
-                (time, tau)
-            }
-            (None, Some(peak)) => {
-                let [f0, f1] = self.band[..] else { bail!("--band needs two frequencies, Hz") };
-                let torque = Multisine::new(self.period, (f0, f1), peak, self.seed)?;
-                let rows = (self.duration / STEP).round() as usize;
-                let time: Vec<f64> = (0..=rows).map(|k| k as f64 * STEP).collect();
-                let tau: Vec<f64> = time.iter().map(|&t| torque.at(t)).collect();
-                (time, tau)
-            }
-            (None, None) => bail!("a plan needs --profile or --multisine"),
-        };
         let fmu = Fmu::open(&self.fmu)?;
         let mut instance = fmu.instantiate("design")?;
         for (name, value) in &self.settings {
@@ -87,6 +74,52 @@ impl DesignArgs {
         instance.setup_experiment(None, 0.0, None)?;
         instance.enter_initialization_mode()?;
         let mut real = |name: &str| instance.real(name);
+        let wheel = Wheel {
+            torque: real("wheel.tau_max")?,
+            inertia: real("wheel.I")?,
+            speeds: [real("wheel.speed_0")?, real("wheel.speed_min")?, real("wheel.speed_max")?],
+        };
+        let sampled = |stop: f64, at: &dyn Fn(f64) -> f64| -> (Vec<f64>, Vec<f64>) {
+            let rows = (stop / STEP).round() as usize;
+            let time: Vec<f64> = (0..=rows).map(|k| k as f64 * STEP).collect();
+            let tau = time.iter().map(|&t| at(t)).collect();
+            (time, tau)
+        };
+        let (time, torque) = match (&self.profile, self.multisine) {
+            (Some(profile), _) => {
+                let torque = profile.parse::<Written>()?.torque()?;
+                sampled(torque.span().1, &|t| torque.at(t))
+            }
+            (None, Some(peak)) => {
+                let [f0, f1] = self.band[..] else { bail!("--band needs two frequencies, Hz") };
+                let mut torque = Multisine::new(self.period, (f0, f1), peak, self.seed)?;
+                if self.optimal {
+                    let plant = expected(&mut real, peak)?;
+                    let shares = design::d_optimal(&plant, &torque.frequencies());
+                    torque = torque.shaped(&shares, peak, self.seed);
+                }
+                let (time, tau) = sampled(self.duration, &|t| torque.at(t));
+                let factor = wheel.factor(&time, &tau);
+                if factor < 1.0 {
+                    println!("torques times {factor:.4}, within the wheel's limits");
+                    torque = torque.scaled(factor);
+                }
+                sampled(self.duration, &|t| torque.at(t))
+            }
+            (None, None) => bail!("a plan needs --profile or --multisine"),
+        };
+        let (least, largest) = wheel.range(&time, &torque);
+        let peak = torque.iter().fold(0.0, |m: f64, t| m.max(t.abs()));
+        let rpm = std::f64::consts::TAU / 60.0;
+        let [_, low, high] = wheel.speeds;
+        println!(
+            "peak {peak:.3} N.m (the wheel gives {:.3}), wheel from {:.0} to {:.0} rpm (allowed {:.0} to {:.0})",
+            wheel.torque,
+            least / rpm,
+            largest / rpm,
+            low / rpm,
+            high / rpm
+        );
         let zeta = real("slosh.damping[1]")?;
         let mut unknowns = Vec::new();
         for name in [
@@ -129,4 +162,21 @@ impl DesignArgs {
         }
         Ok(())
     }
+}
+
+/// The linear bench that is expected: dry friction as the viscous friction that takes the same power at the
+/// rate of a torque with this peak (crest factor 3) far from resonance.
+fn expected(real: &mut dyn FnMut(&str) -> Result<f64>, peak: f64) -> Result<Linear> {
+    let arm = real("tank.r")?;
+    let mode = Mode {
+        mass: real("slosh.mass[1]")?,
+        frequency: real("slosh.frequency[1]")?,
+        damping: real("slosh.damping[1]")?,
+    };
+    let inertia = real("hub.I")? + real("tank.m_0")? * arm * arm;
+    let rate = peak / 3.0 / (inertia * std::f64::consts::TAU * mode.frequency);
+    // ⟨|ω|⟩ of a normal distribution is sqrt(2/π) σ
+    let dry = real("friction.c")? + real("friction.d")?;
+    let friction = real("friction.b")? + dry * (2.0 / std::f64::consts::PI).sqrt() / rate;
+    Ok(Linear { inertia, friction, arm, modes: vec![mode] })
 }

@@ -9,7 +9,7 @@ use identify::acceleration::{self, Weights};
 use identify::identification::{Estimated, Identification, Options, identify};
 use identify::recording::Recording;
 use identify::start::Bench;
-use identify::{frequency, recording, report};
+use identify::{black_box, distortion, frequency, recording, report};
 use std::collections::BTreeMap;
 use std::io::Write;
 
@@ -31,7 +31,8 @@ pub struct IdentifyArgs {
     #[arg(value_name = "DATA", required = true)]
     data: Vec<PathBuf>,
     /// How: `output-error` fits all of the FMU's parameters in time; `acceleration` friction and inertia
-    /// without a simulation, of a bench whose liquid does not move; `frequency` three poles and two zeros.
+    /// without a simulation, of a bench whose liquid does not move; `frequency` three poles and two zeros;
+    /// `multisine` tells noise from nonlinear distortion; `black-box` fits ARX and ARMAX.
     #[arg(long, value_name = "NAME", default_value = "output-error")]
     method: Method,
     /// Weights of the rows, of --method acceleration.
@@ -43,6 +44,9 @@ pub struct IdentifyArgs {
     /// Harmonics of the angle in the friction, 0 to 2, of --method acceleration.
     #[arg(long, value_name = "NUMBER", default_value_t = 0)]
     harmonics: usize,
+    /// Period of the torque, s, of --method multisine.
+    #[arg(long, value_name = "SECONDS", default_value_t = 100.0)]
+    period: f64,
     /// Slosh models to try.
     #[arg(
         long,
@@ -102,6 +106,8 @@ enum Method {
     OutputError,
     Acceleration,
     Frequency,
+    Multisine,
+    BlackBox,
 }
 
 /// Weights of the rows.
@@ -186,7 +192,7 @@ impl IdentifyArgs {
         let recordings = read(&self.data)?;
         let validation = read(&self.validate)?;
         if self.method != Method::OutputError {
-            return self.quickly(&recordings);
+            return self.quickly(&recordings, &validation);
         }
         let options = Options {
             models: self.model,
@@ -221,20 +227,48 @@ impl IdentifyArgs {
 
 impl IdentifyArgs {
     /// The methods that need no simulation.
-    fn quickly(&self, recordings: &[Recording]) -> Result<()> {
+    fn quickly(&self, recordings: &[Recording], held_out: &[Recording]) -> Result<()> {
+        ensure!(self.report.is_none(), "--report is for --method output-error alone");
         ensure!(
-            self.report.is_none() && self.validate.is_empty(),
-            "--report and --validate are for --method output-error alone"
+            held_out.is_empty() || self.method == Method::BlackBox,
+            "--validate is for --method output-error and black-box alone"
         );
-        let fmu = Fmu::open(&self.fmu)?;
+        let one = || match recordings {
+            [one] => Ok(one),
+            _ => bail!("this method takes one uninterrupted recording, not {}", recordings.len()),
+        };
         match self.method {
+            Method::Multisine => {
+                let found = distortion::analyse(one()?, self.period)?;
+                println!(
+                    "{} periods, {} lines; a line's rms: response {:.2e} rad/s, noise {:.2e}, odd distortion \
+                     {:.2e}, even distortion {:.2e}",
+                    found.periods,
+                    found.lines.len(),
+                    found.levels.linear,
+                    found.levels.noise,
+                    found.levels.odd,
+                    found.levels.even
+                );
+                self.finish(&serde_json::to_string_pretty(&found)?, &found.verdict)
+            }
+            Method::BlackBox => {
+                let found = black_box::identify(one()?, held_out.first())?;
+                println!(
+                    "{:6} {:>5} {:>12} {:>12} {:>12}  poles",
+                    "", "order", "one step %", "simulated %", "held back %"
+                );
+                for (m, poles) in found.models.iter().zip(&found.poles) {
+                    let poles = poles.map_or(String::new(), |(f, z)| format!("{f:.4} Hz, {z:.4}"));
+                    println!(
+                        "{:6} {:>5} {:>12.2} {:>12.2} {:>12.2}  {poles}",
+                        m.kind, m.order, m.one_step_pct, m.simulated_pct, m.held_out_pct
+                    );
+                }
+                self.finish(&serde_json::to_string_pretty(&found)?, &found.verdict)
+            }
             Method::Frequency => {
-                let [one] = recordings else {
-                    bail!(
-                        "--method frequency takes one uninterrupted recording, not {}",
-                        recordings.len()
-                    )
-                };
+                let (one, fmu) = (one()?, Fmu::open(&self.fmu)?);
                 let found = frequency::identify(one, bench_of(&fmu, &self.settings)?, self.hold)?;
                 estimates(&[&found.parameters, &found.response]);
                 println!(
@@ -243,7 +277,8 @@ impl IdentifyArgs {
                 );
                 self.finish(&serde_json::to_string_pretty(&found)?, &found.verdict)
             }
-            _ => {
+            Method::Acceleration | Method::OutputError => {
+                let fmu = Fmu::open(&self.fmu)?;
                 let options = acceleration::Options {
                     weights: self.weights.into(),
                     bounds: self.bounds.clone(),

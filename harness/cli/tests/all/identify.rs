@@ -74,3 +74,29 @@ fn friction_by_the_accelerations_least_squares_is_fed_back_to_a_run() {
         "{said}"
     );
 }
+
+#[test]
+fn a_designed_multisine_is_within_the_wheels_limits_and_its_distortion_is_seen() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let asked = ["design", "--multisine", "0.5", "--duration", "400", "--optimal"];
+    let said = hubslosh(folder, &[&asked[..], &["--out", "torque.csv"]].concat()).unwrap();
+    // 0.5 N.m is more than the wheel's 0.26
+    assert!(
+        said.contains("within the wheel's limits") && said.contains("peak 0.260 N.m"),
+        "{said}"
+    );
+    let bench = ["--set", "imu.enabled=true", "--columns", "omega_imu"];
+    let asked = [&["run", "--input", "torque.csv"][..], &bench, &["--out", "clean.csv"]].concat();
+    hubslosh(folder, &asked).unwrap();
+    let all = ["time", "tau_cmd", "omega_imu"];
+    let clean = Table::read(&folder.join("clean.csv"), &all).unwrap();
+    let columns = all.map(|column| clean.column(column).unwrap().to_vec()).to_vec();
+    let names = ["time", "tau_cmd", "omega"].map(String::from).to_vec();
+    Table::new(names, columns).write(&folder.join("data.csv"), &Default::default()).unwrap();
+    let asked = ["identify", "data.csv", "--method", "multisine", "--out", "levels.json"];
+    let said = hubslosh(folder, &asked).unwrap();
+    // dry friction is odd; the linear liquid adds nothing
+    assert!(said.contains("Odd nonlinear distortion is"), "{said}");
+    assert!(said.contains("Even nonlinear distortion is not seen"), "{said}");
+}

@@ -1,0 +1,103 @@
+//! The thesis's own way in the time domain (6.1.1 and 6.1.2), to be compared with ours: friction, known from
+//! elsewhere, is computed from the *measured* rate and added to the torque; a linear model without friction is
+//! fitted to the answer.
+//!
+//! ```text
+//! τ_act = τ_cmd + τ_f(ω_measured),   ω ≈ linear bench(d, h, ζ) driven by τ_act
+//! ```
+//!
+//! It fails, and why can be seen in the equations: nothing in the model loses energy but the slosh. Every error of
+//! τ_act, by noise near ω = 0, by a gyro's bias, by friction that is a little different, is integrated by a hub that no longer
+//! has friction, and the simulated rate drifts off; in the FMU the same error dies out within seconds.
+
+use std::f64::consts::PI;
+
+use anyhow::{Result, ensure};
+use bench::analysis::linear::{Linear, Mode};
+use bench::analysis::transfer_function::fit_time;
+use serde::Serialize;
+
+use crate::least_squares::{differences, minimise};
+use crate::recording::Recording;
+use crate::start::Bench;
+
+/// First zero of J1'.
+const XI: f64 = 1.841_183_781_340_66;
+
+/// Friction as it is known beforehand, SI.
+#[derive(Clone, Copy, Debug)]
+#[allow(missing_docs)]
+pub struct Friction {
+    pub b: f64,
+    pub c: f64,
+    pub d: f64,
+    pub omega_s: f64,
+    /// Speed below which the dry part is left out, rad/s (the thesis's dead band); 0: none.
+    pub dead_band: f64,
+}
+
+impl Friction {
+    /// τ_f, N·m.
+    pub fn torque(&self, w: f64) -> f64 {
+        let dry = self.c + self.d * (-(w / self.omega_s).powi(2)).exp();
+        let sign = if w.abs() <= self.dead_band { 0.0 } else { w.signum() };
+        -(self.b * w + sign * dry)
+    }
+}
+
+/// The result.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Found {
+    /// tank.d, m.
+    pub d: f64,
+    /// tank.h, m.
+    pub h: f64,
+    /// slosh.zeta.
+    pub zeta: f64,
+    /// Fit of the rate, %: 100 (1 − |y − ŷ|/|y − mean y|).
+    pub fit_pct: f64,
+    /// Fit with the start's d, h and ζ, %.
+    pub fit_of_start_pct: f64,
+}
+
+/// The linear bench without friction.
+fn bench_of(hub_inertia: f64, (d, h, zeta): (f64, f64, f64), bench: Bench) -> Linear {
+    let u = 2.0 * XI * h / d;
+    let liquid = bench.density * PI / 4.0 * d * d * h;
+    let mass = liquid * d * u.tanh() / (XI * (XI * XI - 1.0) * h);
+    let frequency = (bench.gravity * 2.0 * XI / d * u.tanh()).sqrt() / (2.0 * PI);
+    let inertia = hub_inertia + (liquid - mass) * bench.arm.powi(2);
+    let modes = vec![Mode { mass, frequency, damping: zeta }];
+    Linear { inertia, friction: 0.0, arm: bench.arm, modes }
+}
+
+/// Fits d, h and ζ from a start, the hub's inertia and the friction being known.
+pub fn identify(
+    recording: &Recording,
+    friction: Friction,
+    hub_inertia: f64,
+    start: (f64, f64, f64),
+    bench: Bench,
+) -> Result<Found> {
+    let (step, torque, rate) = recording.even();
+    let actual: Vec<f64> =
+        torque.iter().zip(&rate).map(|(tau, w)| tau + friction.torque(*w)).collect();
+    let simulated = |x: &[f64]| {
+        let tank = (x[0].exp(), x[1].exp(), x[2].exp());
+        bench_of(hub_inertia, tank, bench).simulate(step, &actual, 0.0)
+    };
+    let residuals = |x: &[f64]| -> Vec<f64> {
+        simulated(x).iter().zip(&rate).map(|(model, w)| model - w).collect()
+    };
+    let x = [start.0.ln(), start.1.ln(), start.2.ln()];
+    let derivatives = |x: &[f64]| differences(&residuals, x, &[1e-5; 3]);
+    let found = minimise(&residuals, &derivatives, &x).x;
+    ensure!(found.iter().all(|x| x.is_finite()), "{}: the search failed", recording.name);
+    Ok(Found {
+        d: found[0].exp(),
+        h: found[1].exp(),
+        zeta: found[2].exp(),
+        fit_pct: fit_time(&rate, &simulated(&found)),
+        fit_of_start_pct: fit_time(&rate, &simulated(&x)),
+    })
+}
