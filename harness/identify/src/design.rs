@@ -109,7 +109,7 @@ impl Multisine {
 const SPREAD: f64 = 0.25;
 
 /// Shares of the power on lines at these frequencies (Hz) that make the determinant of the information on a linear
-/// bench's five parameters largest (D-optimal), with [`SPREAD`] spread evenly.
+/// bench's five parameters largest (D-optimal), with [`SPREAD`] of it the same on all lines.
 ///
 /// ```text
 /// maximise ln det Σ p_k A_k,  A_k = Re(J_kᴴ J_k),  J_k = ∂H(f_k)/∂ ln(f, ζ, m, I0, b):

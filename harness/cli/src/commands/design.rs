@@ -37,7 +37,7 @@ pub struct DesignArgs {
     #[arg(long, value_name = "HZ,HZ", value_delimiter = ',', default_value = "1.25,3.5")]
     band: Vec<f64>,
     /// Gives the lines the power that tells most of a linear bench as expected (D-optimal), a quarter of it spread
-    /// evenly.
+    /// over all of them.
     #[arg(long, requires = "multisine")]
     optimal: bool,
     /// Draw of the phases and the detection lines.
