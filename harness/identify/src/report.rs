@@ -23,7 +23,7 @@ h1{font-size:1.5rem}h2{font-size:1.15rem;margin-top:2rem}
 th,td{padding:.2rem .7rem;border-bottom:1px solid var(--rule);text-align:right;white-space:nowrap}
 th:first-child,td:first-child{text-align:left}td.text{white-space:normal;text-align:left}
 th{color:var(--soft);font-weight:500}.doubt{background:var(--warn);padding:.5rem .8rem;border-radius:4px}
-svg{width:100%;height:auto;display:block;margin:.6rem 0}
+svg{width:100%;min-width:40rem;height:auto;display:block;margin:.6rem 0}
 svg text{fill:var(--ink);font:12px system-ui,sans-serif}svg .tick,svg .label{fill:var(--soft);font-size:11px}
 svg .title{font-weight:600}svg .grid{stroke:var(--rule);stroke-width:.6;fill:none}svg .frame{stroke:var(--soft);fill:none}svg .curve path{fill:none;stroke-width:1.4}
 details{margin:.6rem 0}summary{cursor:pointer}
@@ -42,9 +42,11 @@ pub fn page(found: &Identification) -> String {
     parameters(&mut out, found);
     for signals in &found.signals {
         let _ = writeln!(out, "<h2>{}</h2>", escape(&signals.name));
-        out.push_str(&envelope(signals).svg());
-        out.push_str(&stretch(signals).svg());
-        out.push_str(&spectrum(signals, found.fit.noise_white).svg());
+        // on a narrow screen a figure scrolls, as a table does, instead of having letters that nobody can read
+        for chart in [envelope(signals), stretch(signals), spectrum(signals, found.fit.noise_white)]
+        {
+            let _ = writeln!(out, "<div class=\"scroll\">{}</div>", chart.svg());
+        }
     }
     models(&mut out, &found.models);
     correlations(&mut out, found);
