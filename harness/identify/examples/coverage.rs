@@ -1,118 +1,240 @@
 //! Do the estimates keep what they state? Many recordings of the FMU with different gyro noise, each
-//! identified with nothing told; prints the root-mean-square error over the Cramér–Rao bound and how
-//! often the 95 % interval holds the truth.
+//! identified with nothing told; prints the root-mean-square error over the stated standard deviation, how
+//! often the 95 % interval holds the truth, which models were chosen, and how often a recording was called
+//! not described.
 //!
 //! ```text
-//! cargo run --release -p identify --example coverage -- [seeds] [amplitude N.m] [models] [starts] [flaws]
+//! cargo run --release -p identify --example coverage -- [KEY=VALUE ...]
+//!   seeds=1-50          gyro noises
+//!   torque=PROFILE      as for hubslosh run, or multisine:PEAK,SECONDS
+//!   twin=linear         slosh model of the twin
+//!   set=NAME:VALUE      a setting of the twin (repeatedly); its truth is what the estimates are compared with
+//!   told=NAME:VALUE     a setting of the fit (repeatedly)
+//!   models=linear,…     as for hubslosh identify --model
+//!   friction=stribeck,… as for hubslosh identify --friction
+//!   starts=data         or far: all starts 40 % off, up or down by the seed's bits
+//!   perfect=true        no delay, bias, asymmetry, gyro scale is estimated (false: all are)
+//!   flaws=false         true: 5 ms delay, gyro scale 1.01, bias 2 mrad/s, asymmetry 0.1 in the twin
+//!   blind=              tilt, nutation, warming, clipping, with + between several
+//!   rate=50             rows a second
+//!   say=false           true: the verdict of every seed
 //! ```
-//!
-//! `models` as for `hubslosh identify --model`; `starts`: `data`, or `far` for all starts 40 % off, up
-//! or down by the seed's bits; `flaws`: 5 ms delay, gyro scale 1.01, bias 2 mrad/s and friction asymmetry 0.1
-//! in the twin, estimated as well.
 
 use std::collections::BTreeMap;
 
-use bench::profile::{Profile, Torque};
+use anyhow::{Context, Result, bail};
 use host::fmi2::Fmu;
 use identify::identification::{Identification, Options, identify};
-use identify::twin::{self, Flaws};
+use identify::residual::Tests;
+use identify::twin::{self, Blind, Flaws, Twin};
 
-const TRUTH: [(&str, f64); 8] = [
-    ("tank.d", 0.163),
-    ("tank.h", 0.1),
-    ("slosh.zeta", 0.0029757),
-    ("hub.I", 0.322414),
-    ("friction.b", 0.03793),
-    ("friction.c", 0.003498),
-    ("friction.d", 0.002423),
-    ("friction.omega_s", 0.08581),
+const PARAMETERS: [&str; 8] = [
+    "tank.d",
+    "tank.h",
+    "slosh.zeta",
+    "hub.I",
+    "friction.b",
+    "friction.c",
+    "friction.d",
+    "friction.omega_s",
 ];
 
-fn main() -> anyhow::Result<()> {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let text = |k: usize, otherwise: &str| arguments.get(k).cloned().unwrap_or(otherwise.into());
-    let seeds: u32 = text(0, "50").parse()?;
-    let (amplitude, model) = (text(1, "0.1"), text(2, "linear"));
-    let (far, flawed) = (text(3, "data") == "far", text(4, "perfect") == "flaws");
-    let twin_model = text(5, "linear");
+struct Asked {
+    seeds: std::ops::RangeInclusive<u32>,
+    torque: String,
+    twin: Twin,
+    options: Options,
+    far: bool,
+    say: bool,
+}
 
-    let fmu = Fmu::open(pack::packed_for_tests())?;
-    let sweep: Profile = format!("lin-sweep:amplitude={amplitude}").parse()?;
-    let torque = Torque::Profile(sweep);
-    let mut settings = vec![
-        ("slosh.model", twin_model.as_str()),
-        ("slosh.zeta_from_correlation", "false"),
-        ("slosh.zeta", "0.0029757"),
-    ];
-    let mut flaws = Flaws::default();
-    if flawed {
-        settings.push(("friction.asymmetry", "0.1"));
-        flaws = Flaws { delay: 0.005, gyro_scale: 1.01, gyro_bias: 2e-3 };
-    }
-    let mut rows: BTreeMap<String, Vec<(f64, f64, f64)>> = BTreeMap::new();
-    let (mut chosen, mut undescribed, mut slow): (BTreeMap<String, u32>, u32, f64) =
-        Default::default();
-    for seed in 1..=seeds {
-        let recording = twin::record(&fmu, &settings, &torque, Some(seed), flaws)?;
-        let off = |(i, (name, value)): (usize, &(&str, f64))| {
-            let up = (seed.wrapping_mul(2_654_435_761) >> (8 + i)) & 1 == 1;
-            (name.to_string(), if up { 1.4 * value } else { 0.6 * value })
-        };
-        let options = Options {
-            models: model.split(',').map(String::from).collect(),
-            starts: if far { TRUTH.iter().enumerate().map(off).collect() } else { vec![] },
-            flaws: flawed,
-            gyro_scale: if flawed { 0.01 } else { 0.0 },
+fn asked() -> Result<Asked> {
+    let mut twin = Twin::default();
+    let mut set = |name: &str, value: &str| twin.settings.push((name.into(), value.into()));
+    set("slosh.zeta_from_correlation", "false");
+    set("slosh.zeta", "0.0029757");
+    let mut asked = Asked {
+        seeds: 1..=50,
+        torque: "lin-sweep:amplitude=0.1".into(),
+        twin,
+        options: Options {
+            models: vec!["linear".into()],
+            flaws: false,
+            gyro_scale: 0.0,
             ..Options::default()
+        },
+        far: false,
+        say: false,
+    };
+    let list = |value: &str| value.split(',').map(String::from).collect::<Vec<String>>();
+    for argument in std::env::args().skip(1) {
+        let (key, value) =
+            argument.split_once('=').with_context(|| format!("{argument}: KEY=VALUE"))?;
+        let pair = || {
+            let (name, value) = value.split_once(':').context("NAME:VALUE")?;
+            Ok::<_, anyhow::Error>((name.to_string(), value.to_string()))
         };
-        let found: Identification = match identify(&fmu, &[recording], &options, &mut |_| {}) {
-            Ok(found) => found,
-            Err(error) => {
-                println!("seed {seed}: {error:#}");
-                continue;
+        match key {
+            "seeds" => {
+                let (from, to) = value.split_once('-').unwrap_or(("1", value));
+                asked.seeds = from.parse()?..=to.parse()?;
             }
-        };
-        slow = slow.max(found.seconds);
+            "torque" => asked.torque = value.into(),
+            "twin" => asked.twin.settings.push(("slosh.model".into(), value.into())),
+            "set" => asked.twin.settings.push(pair()?),
+            "told" => asked.options.settings.push(pair()?),
+            "models" => asked.options.models = list(value),
+            "friction" => asked.options.friction = list(value),
+            "starts" => asked.far = value == "far",
+            "perfect" => {
+                let flaws = value != "true";
+                (asked.options.flaws, asked.options.gyro_scale) =
+                    (flaws, if flaws { 0.01 } else { 0.0 });
+            }
+            "flaws" if value == "true" => {
+                asked.twin.settings.push(("friction.asymmetry".into(), "0.1".into()));
+                asked.twin.flaws = Flaws { delay: 0.005, gyro_scale: 1.01, gyro_bias: 2e-3 };
+                (asked.options.flaws, asked.options.gyro_scale) = (true, 0.01);
+            }
+            "flaws" => {}
+            "blind" => {
+                asked.twin.blind = value.split('+').map(Blind::named).collect::<Result<_>>()?
+            }
+            "rate" => asked.twin.rate = value.parse()?,
+            "say" => asked.say = value == "true",
+            _ => bail!("{key} is not asked for; see the head of examples/coverage.rs"),
+        }
+    }
+    Ok(asked)
+}
+
+/// What the twin is, by the names of the estimates.
+fn truths(fmu: &Fmu, twin: &Twin) -> Result<BTreeMap<String, f64>> {
+    let mut instance = fmu.instantiate("truth")?;
+    for (name, value) in &twin.settings {
+        instance.set(name, value)?;
+    }
+    let mut truths = BTreeMap::new();
+    for name in PARAMETERS.into_iter().chain(["friction.asymmetry"]) {
+        truths.insert(name.to_string(), instance.real(name)?);
+    }
+    truths.insert("delay".into(), twin.flaws.delay);
+    truths.insert("gyro_scale".into(), twin.flaws.gyro_scale);
+    truths.insert("friction.c + friction.d".into(), truths["friction.c"] + truths["friction.d"]);
+    Ok(truths)
+}
+
+#[derive(Default)]
+struct Tally {
+    rows: BTreeMap<String, Vec<(f64, f64, bool)>>,
+    chosen: BTreeMap<String, u32>,
+    not_described: u32,
+    not_converged: u32,
+    refused: u32,
+    seconds: Vec<f64>,
+}
+
+impl Tally {
+    fn add(&mut self, seed: u32, found: &Identification, truths: &BTreeMap<String, f64>) {
+        self.seconds.push(found.seconds);
         let verdict = match found.verdict.first() {
             Some(line) if line.starts_with("Cannot tell") => "cannot tell".to_string(),
-            _ => found.fit.model.clone(),
+            _ => format!("{} with {}", found.fit.model, found.fit.friction),
         };
-        *chosen.entry(verdict).or_default() += 1;
-        undescribed += u32::from(!found.described);
-        let truth = TRUTH.iter().copied().chain([
-            ("friction.asymmetry", 0.1),
-            ("delay", flaws.delay),
-            ("gyro_scale", flaws.gyro_scale),
-        ]);
-        let mut worst: (f64, &str) = (0.0, "");
-        for (name, value) in truth {
-            let Some(p) = found.parameters.get(name).or(found.measurement.get(name)) else {
-                continue;
+        *self.chosen.entry(verdict).or_default() += 1;
+        self.not_described += u32::from(!found.described);
+        self.not_converged += u32::from(!found.converged);
+        let mut worst = (0.0, String::new());
+        for (name, truth) in truths {
+            let single = found.parameters.get(name).or(found.measurement.get(name));
+            let sum = found.combinations.iter().find(|c| c.name == *name);
+            let (value, std, inside) = match (single, sum) {
+                (Some(p), _) => (p.value, p.std, (p.interval[0]..=p.interval[1]).contains(truth)),
+                (_, Some(c)) => (c.value, c.std, (c.value - truth).abs() < 1.96 * c.std),
+                _ => continue,
             };
-            let inside = f64::from(p.interval[0] <= value && value <= p.interval[1]);
-            rows.entry(name.into()).or_default().push((p.value - value, p.std, inside));
-            let off = (p.value - value).abs() / p.std;
-            worst = if off > worst.0 { (off, name) } else { worst };
+            self.rows.entry(name.clone()).or_default().push((value - truth, std, inside));
+            let off = (value - truth).abs() / std;
+            if off > worst.0 {
+                worst = (off, name.clone());
+            }
         }
+        let tests = found.fit.tests.iter().map(Tests::worst).fold(0.0, f64::max);
         println!(
-            "seed {seed}: {} {:.1} s, {} answers, worst {} {:.1} std, tests {:.1}, converged {}",
+            "seed {seed}: {} {:.1} s, {} answers, worst {} {:.1} std, tests {tests:.1}, decrement {:.3}{}",
             found.fit.model,
             found.seconds,
             found.fit.simulations,
             worst.1,
             worst.0,
-            found.fit.tests[0].worst(),
-            found.converged
+            found.fit.newton_decrement,
+            if found.described { "" } else { ", NOT DESCRIBED" },
         );
     }
-    println!("\nlongest {slow:.1} s; chosen {chosen:?}; not described {undescribed}");
-    println!("{:20} {:>12} {:>12} {:>8} {:>10}", "", "rms error", "bound", "ratio", "in 95 %");
-    for (name, values) in rows {
-        let n = values.len() as f64;
-        let rms = (values.iter().map(|v| v.0 * v.0).sum::<f64>() / n).sqrt();
-        let bound = (values.iter().map(|v| v.1 * v.1).sum::<f64>() / n).sqrt();
-        let inside: f64 = values.iter().map(|v| v.2).sum();
-        println!("{name:20} {rms:>12.3e} {bound:>12.3e} {:>8.2} {inside:>6} of {n}", rms / bound);
+
+    fn print(&self, truths: &BTreeMap<String, f64>) {
+        let mean = self.seconds.iter().sum::<f64>() / self.seconds.len().max(1) as f64;
+        let longest = self.seconds.iter().copied().fold(0.0, f64::max);
+        println!(
+            "\n{} identified in {mean:.1} s on average, {longest:.1} s at most; refused {}; chosen {:?}; not described {}; \
+             not at a minimum {}",
+            self.seconds.len(),
+            self.refused,
+            self.chosen,
+            self.not_described,
+            self.not_converged
+        );
+        println!(
+            "{:24} {:>12} {:>12} {:>10} {:>9} {:>8} {:>10}",
+            "", "truth", "rms error", "std", "std %", "ratio", "in 95 %"
+        );
+        for (name, values) in &self.rows {
+            let n = values.len() as f64;
+            let rms = (values.iter().map(|v| v.0 * v.0).sum::<f64>() / n).sqrt();
+            let std = (values.iter().map(|v| v.1 * v.1).sum::<f64>() / n).sqrt();
+            let inside = values.iter().filter(|v| v.2).count();
+            println!(
+                "{name:24} {:>12.6} {rms:>12.3e} {std:>10.2e} {:>9.4} {:>8.2} {inside:>6} of {n}",
+                truths[name],
+                100.0 * std / truths[name].abs(),
+                rms / std
+            );
+        }
     }
+}
+
+fn main() -> Result<()> {
+    let asked = asked()?;
+    let fmu = Fmu::open(pack::packed_for_tests())?;
+    let torque = twin::torque(&asked.torque)?;
+    let truths = truths(&fmu, &asked.twin)?;
+    let mut tally = Tally::default();
+    for seed in asked.seeds.clone() {
+        let recording = asked.twin.record(&fmu, &torque, Some(seed))?;
+        let mut options = asked.options.clone();
+        if asked.far {
+            for (i, name) in PARAMETERS.iter().enumerate() {
+                let up = (seed.wrapping_mul(2_654_435_761) >> (8 + i)) & 1 == 1;
+                options.starts.push((name.to_string(), if up { 1.4 } else { 0.6 } * truths[*name]));
+            }
+        }
+        match identify(&fmu, &[recording], &options, &mut |line| {
+            if asked.say {
+                println!("  {line}");
+            }
+        }) {
+            Ok(found) => {
+                tally.add(seed, &found, &truths);
+                if asked.say {
+                    found.verdict.iter().for_each(|line| println!("  > {line}"));
+                }
+            }
+            Err(error) => {
+                tally.refused += 1;
+                println!("seed {seed}: {error:#}");
+            }
+        }
+    }
+    tally.print(&truths);
     Ok(())
 }

@@ -1,11 +1,12 @@
 //! Recordings of the FMU in place of a bench, with its gyro's noise: what identification is tried on,
 //! and what a planned experiment would record.
 
-use anyhow::{Context, Result};
-use bench::profile::Torque;
+use anyhow::{Result, bail, ensure};
+use bench::profile::{Profile, Torque};
 use bench::run::Run;
 use host::fmi2::Fmu;
 
+use crate::design::Multisine;
 use crate::recording::Recording;
 
 /// What the gyro and the data link add to the FMU's own noise.
@@ -25,6 +26,191 @@ impl Default for Flaws {
     }
 }
 
+/// What a bench may do and no model that is tried does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Blind {
+    /// The bearing's axis leans by 1°: gravity turns hub and liquid back to where they began.
+    Tilt,
+    /// The hub rocks at [`ROCKING`] under the wheel's torque, and the gyro sees some of it.
+    Nutation,
+    /// The bearing warms up: its friction falls by [`WARM`] with a time constant of 600 s.
+    Warming,
+    /// The wheel gives nine tenths of the largest torque at most.
+    Clipping,
+}
+
+/// Frequency of rocking, Hz.
+const ROCKING: f64 = 4.1;
+/// Its damping ratio.
+const ROCKING_DAMPING: f64 = 0.01;
+/// Rate that the gyro sees of it far below resonance, over the hub's.
+const ROCKING_SEEN: f64 = 0.01;
+/// Part of the friction that a warm bearing lacks.
+const WARM: f64 = 0.3;
+/// Time constant of warming up, s.
+const WARMING: f64 = 600.0;
+
+impl Blind {
+    /// All of them.
+    pub const ALL: [Blind; 4] = [Blind::Tilt, Blind::Nutation, Blind::Warming, Blind::Clipping];
+
+    /// By its name: tilt, nutation, warming or clipping.
+    pub fn named(name: &str) -> Result<Self> {
+        Ok(match name {
+            "tilt" => Blind::Tilt,
+            "nutation" => Blind::Nutation,
+            "warming" => Blind::Warming,
+            "clipping" => Blind::Clipping,
+            _ => bail!("{name} is none of tilt, nutation, warming, clipping"),
+        })
+    }
+}
+
+/// A torque by name: `multisine:PEAK,SECONDS` (1.25 to 3.5 Hz, periods of 100 s) or a profile of
+/// `hubslosh run`.
+pub fn torque(text: &str) -> Result<Torque> {
+    let Some(numbers) = text.strip_prefix("multisine:") else {
+        return Ok(Torque::Profile(text.parse::<Profile>()?));
+    };
+    let numbers: Vec<f64> = numbers.split(',').map(str::parse).collect::<Result<_, _>>()?;
+    ensure!(numbers.len() == 2, "a multisine is multisine:PEAK,SECONDS, not {text}");
+    let sine = Multisine::new(100.0, (1.25, 3.5), numbers[0], 1)?;
+    // rows close enough that lines between them are the curve: (2π 3.5 Hz 5 ms)²/8 = 0.15 %
+    let time: Vec<f64> = (0..=(numbers[1] / 0.005) as u32).map(|k| 0.005 * f64::from(k)).collect();
+    let tau = time.iter().map(|t| sine.at(*t)).collect();
+    Ok(Torque::Rows { time, tau, held: false })
+}
+
+/// A bench that is the FMU.
+#[derive(Clone, Debug)]
+pub struct Twin {
+    /// Settings of the FMU by name.
+    pub settings: Vec<(String, String)>,
+    /// Rows a second.
+    pub rate: f64,
+    /// What gyro and data link add.
+    pub flaws: Flaws,
+    /// What the models do not have.
+    pub blind: Vec<Blind>,
+}
+
+impl Default for Twin {
+    fn default() -> Self {
+        Twin { settings: Vec::new(), rate: 50.0, flaws: Flaws::default(), blind: Vec::new() }
+    }
+}
+
+impl Twin {
+    /// Its settings and that of what the models do not have.
+    fn settings(&self, torque: &[f64], seed: Option<u32>) -> Vec<(String, String)> {
+        let mut all = self.settings.clone();
+        let mut set = |name: &str, value: String| all.push((name.into(), value));
+        if let Some(seed) = seed {
+            set("imu.enabled", "true".into());
+            set("imu.rate", self.rate.to_string());
+            set("imu.seed", seed.to_string());
+        }
+        if self.blind.contains(&Blind::Tilt) {
+            set("bench.tilt", 1f64.to_radians().to_string());
+        }
+        if self.blind.contains(&Blind::Clipping) {
+            let largest = torque.iter().fold(0.0, |m: f64, t| m.max(t.abs()));
+            set("wheel.enabled", "true".into());
+            set("wheel.tau_max", (0.9 * largest).to_string());
+        }
+        all
+    }
+
+    /// Records it under a torque; `seed` is that of the gyro's noise, none without noise.
+    pub fn record(&self, fmu: &Fmu, torque: &Torque, seed: Option<u32>) -> Result<Recording> {
+        let (start, stop) = torque.span();
+        let (step, late) = (1.0 / self.rate, self.flaws.delay);
+        let rows = ((stop - start) * self.rate).round() as usize;
+        let time: Vec<f64> = (0..=rows).map(|k| start + k as f64 * step).collect();
+        let tau: Vec<f64> = time.iter().map(|&t| torque.at(t)).collect();
+        // the FMU hears the recorded torque late: its knots are shifted, before them is no torque
+        let heard = if late == 0.0 {
+            Torque::Rows { time: time.clone(), tau: tau.clone(), held: false }
+        } else {
+            let knots = std::iter::once(start).chain(time.iter().map(|t| t + late)).collect();
+            let values = std::iter::once(tau[0]).chain(tau.iter().copied()).collect();
+            Torque::Rows { time: knots, tau: values, held: false }
+        };
+        // steps that meet the knots
+        let parts = if late == 0.0 { 1 } else { 4 };
+        let run = Run {
+            settings: self.settings(&tau, seed),
+            input: Some(bench::run::TORQUE.into()),
+            torque: heard.clone(),
+            others: Vec::new(),
+            step: step / f64::from(parts),
+            stop,
+            tolerance: None,
+            hold: false,
+        };
+        let mut instance = run.initialise(fmu)?;
+        let reference =
+            |name: &str| Ok::<_, anyhow::Error>(fmu.description().variable(name)?.reference);
+        let friction = ["friction.b", "friction.c", "friction.d"];
+        let friction = friction.map(reference).into_iter().collect::<Result<Vec<u32>>>()?;
+        let mut cold = vec![0.0; friction.len()];
+        instance.get_real(&friction, &mut cold)?;
+        let (input, read) =
+            (reference(bench::run::TORQUE)?, [reference("omega_imu")?, reference("omega_dot")?]);
+        let (mut rate, mut rocking) = (Vec::with_capacity(time.len()), Rocking::default());
+        for row in 0..=rows {
+            let mut now = [0.0; 2];
+            instance.get_real(&read, &mut now)?;
+            let seen = match self.blind.contains(&Blind::Nutation) {
+                true => ROCKING_SEEN * rocking.step(now[1], step),
+                false => 0.0,
+            };
+            rate.push(self.flaws.gyro_scale * (now[0] + seen) + self.flaws.gyro_bias);
+            if row == rows {
+                break;
+            }
+            if self.blind.contains(&Blind::Warming) && row % 50 == 0 {
+                let part = 1.0 - WARM * (1.0 - (-(time[row] - start) / WARMING).exp());
+                let warm: Vec<f64> = cold.iter().map(|value| value * part).collect();
+                instance.set_real(&friction, &warm)?;
+            }
+            for part in 0..parts {
+                let t = time[row] + f64::from(part) * run.step;
+                let next = if part + 1 == parts { time[row + 1] } else { t + run.step };
+                let (value, slope) = heard.chord(t, next - t);
+                instance.set_real(&[input], &[value])?;
+                instance.set_real_input_derivatives(&[input], &[1], &[slope])?;
+                instance.do_step(t, next - t)?;
+            }
+        }
+        Ok(Recording::of("twin", time, tau, rate))
+    }
+}
+
+/// φ'' + 2ζΩφ' + Ω²φ = Ω² ∫a dt: far below Ω φ follows the hub's rate.
+#[derive(Default)]
+struct Rocking {
+    phi: f64,
+    phi_dot: f64,
+    rate: f64,
+}
+
+impl Rocking {
+    /// φ after a step under acceleration a (rad/s²), in parts of 1 ms or less, semi-implicitly.
+    fn step(&mut self, a: f64, step: f64) -> f64 {
+        let w = std::f64::consts::TAU * ROCKING;
+        let parts = (step / 1e-3).ceil();
+        let h = step / parts;
+        for _ in 0..parts as usize {
+            self.rate += h * a;
+            let force = w * w * (self.rate - self.phi) - 2.0 * ROCKING_DAMPING * w * self.phi_dot;
+            self.phi_dot += h * force;
+            self.phi += h * self.phi_dot;
+        }
+        self.phi
+    }
+}
+
 /// Records the FMU under a torque at 50 Hz; `seed` is that of the gyro's noise, none without noise.
 pub fn record(
     fmu: &Fmu,
@@ -34,40 +220,6 @@ pub fn record(
     flaws: Flaws,
 ) -> Result<Recording> {
     let pair = |(name, value): &(&str, &str)| (name.to_string(), value.to_string());
-    let mut all: Vec<(String, String)> = settings.iter().map(pair).collect();
-    if let Some(seed) = seed {
-        all.extend([("imu.enabled", "true"), ("imu.seed", &seed.to_string())].iter().map(pair));
-    }
-    let (start, stop) = torque.span();
-    // the FMU hears the torque late: a profile is shifted by the delay, its beginning is no torque
-    let (step, late) = (0.02, flaws.delay);
-    let rows = ((stop - start) / step).round() as usize;
-    let time: Vec<f64> = (0..=rows).map(|k| start + k as f64 * step).collect();
-    let tau: Vec<f64> = time.iter().map(|&t| torque.at(t)).collect();
-    let heard = if late == 0.0 {
-        Torque::Rows { time: time.clone(), tau: tau.clone(), held: false }
-    } else {
-        // knots of the recorded torque, late
-        let knots = std::iter::once(start).chain(time.iter().map(|t| t + late)).collect();
-        let values = std::iter::once(tau[0]).chain(tau.iter().copied()).collect();
-        Torque::Rows { time: knots, tau: values, held: false }
-    };
-    // steps that meet the knots
-    let parts = if late == 0.0 { 1 } else { 4 };
-    let run = Run {
-        settings: all,
-        input: Some(bench::run::TORQUE.into()),
-        torque: heard,
-        others: Vec::new(),
-        step: step / parts as f64,
-        stop,
-        tolerance: None,
-        hold: false,
-    };
-    let mut instance = run.initialise(fmu)?;
-    let table = run.drive(&mut instance, &["omega_imu"], |_| {})?;
-    let rate = table.column("omega_imu").context("a column that was recorded")?;
-    let measured = |w: &f64| flaws.gyro_scale * w + flaws.gyro_bias;
-    let rate = rate.iter().step_by(parts).map(measured).collect();
-    Ok(Recording::of("twin", time, tau, rate))
+    let settings = settings.iter().map(pair).collect();
+    Twin { settings, flaws, ..Twin::default() }.record(fmu, torque, seed)
 }
