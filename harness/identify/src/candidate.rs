@@ -116,8 +116,8 @@ struct Search<'a, 'h> {
 }
 
 impl<'a> Search<'a, '_> {
-    fn polish(&mut self, x: &[f64], steps: Option<&[f64]>) -> Result<Polished> {
-        let polished = self.problem.polish(x, steps, 6)?;
+    fn polish(&mut self, x: &[f64], known: Option<&DMatrix<f64>>) -> Result<Polished> {
+        let polished = self.problem.polish(x, known, 6)?;
         self.simulations += polished.simulations;
         (self.heard)(format!(
             "{}: {:.4} standard deviations from the minimum after {} simulations",
@@ -135,13 +135,13 @@ impl<'a> Search<'a, '_> {
         self.simulations += rough.simulations;
         let answer = self.problem.answer(&rough.x, Instants::All)?;
         self.problem.estimate_noise(&answer);
-        let near = self.polish(&rough.x, Some(&rough.steps))?;
+        let near = self.polish(&rough.x, rough.jacobian.as_ref())?;
         let (mut best, spread) = self.friction(near)?;
         // a model that does not fit has no minimum worth the search, if there are others
         if !best.converged() && (self.alone || !poor(&self.problem, &best.answer)) {
             let again = self.problem.search(&best.x, 1e-4)?;
             self.simulations += again.simulations;
-            let other = self.polish(&again.x, Some(&again.steps))?;
+            let other = self.polish(&again.x, again.jacobian.as_ref())?;
             if other.cost < best.cost {
                 best = other;
             }
@@ -171,7 +171,7 @@ impl<'a> Search<'a, '_> {
         self.problem.estimate_noise(&best.0.answer);
         let pairs = before.iter().zip(&self.problem.channels);
         if pairs.into_iter().any(|(a, b)| (a.noise.white / b.noise.white - 1.0).abs() > 0.05) {
-            let again = self.polish(&best.0.x, Some(&best.0.steps()))?;
+            let again = self.polish(&best.0.x, Some(&best.0.jacobian))?;
             best = self.friction(again)?;
         }
         Ok(best)
@@ -188,7 +188,7 @@ impl<'a> Search<'a, '_> {
         let lowest = points.iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
         let mut best = near;
         if let Some(point) = lowest.filter(|p| p.cost < best.cost) {
-            let other = self.polish(&point.x, Some(&best.steps()))?;
+            let other = self.polish(&point.x, Some(&best.jacobian))?;
             if other.cost < best.cost {
                 best = other;
             }
@@ -217,8 +217,8 @@ impl<'a> Search<'a, '_> {
         }
         self.problem.channels.clone_from(&other.problem.channels);
         let same = self.problem.unknowns.len() == known.len();
-        let steps = same.then(|| other.polished.steps());
-        let polished = self.problem.polish(&x, steps.as_deref(), 3)?;
+        let known = same.then_some(&other.polished.jacobian);
+        let polished = self.problem.polish(&x, known, 3)?;
         self.simulations += polished.simulations;
         let mut best = polished;
         // Where the other leaves only noise, this one is as good near there or not at all. Else its minimum may be
@@ -229,7 +229,7 @@ impl<'a> Search<'a, '_> {
         if !best.converged() && !poor(&self.problem, &best.answer) {
             let rough = self.problem.search(&best.x, 1e-3)?;
             self.simulations += rough.simulations;
-            let again = self.polish(&rough.x, Some(&rough.steps))?;
+            let again = self.polish(&rough.x, rough.jacobian.as_ref())?;
             if again.cost < best.cost {
                 best = again;
             }

@@ -202,7 +202,7 @@ pub fn cramer_rao(
     let mut problem = Problem::new(fmu, setup, &recording, unknowns);
     problem.channels[0].noise = noise;
     let x = problem.start();
-    let covariance = problem.information(&x)?;
+    let (covariance, _) = problem.information(&x)?;
     let deviation = |i: usize| covariance.x[(i, i)].sqrt();
     Ok(problem
         .unknowns

@@ -24,6 +24,11 @@
 //! differences. The step moves the whole answer by [`MOVE`] standard deviations of its noise:
 //! small against curvature and large against the integrator's tolerance
 //! (`sensitivities_are_those_of_smaller_and_larger_steps` in tests/twin.rs).
+//!
+//! Along a valley large sensitivities cancel: c and d of the friction are 0.9999 correlated, and differences of each
+//! that are good to 1 % say nothing of c − d. So differences are taken along directions L from sensitivities
+//! known before, L = V S⁻¹ of their J = U S Vᵀ, which move the answer by one standard deviation
+//! each and at right angles to one another; then J = D L⁻¹ is as good along the valley as across it.
 
 use anyhow::{Context, Result};
 use host::fmi2::Fmu;
@@ -45,6 +50,8 @@ pub const MOVE: f64 = 0.3;
 const TYPICAL: Noise = Noise { white: 1.0, drift: 0.2, time: 100.0 };
 /// Bounds of the differences' steps, in units of the variable x.
 const STEPS: (f64, f64) = (1e-6, 2e-2);
+/// Longest step of a difference along a direction, in units of x.
+const LONGEST_STEP: f64 = 0.05;
 /// A search has ended where the Newton decrement is below this: a hundredth of a standard deviation.
 pub const DECREMENT: f64 = 0.01;
 
@@ -101,8 +108,8 @@ pub struct Estimate {
     pub x: Vec<f64>,
     /// Why the search ended.
     pub reason: String,
-    /// Steps of the differences there.
-    pub steps: Vec<f64>,
+    /// Sensitivities near there.
+    pub jacobian: Option<DMatrix<f64>>,
     /// Answers of the FMU that were needed, all recordings together being one.
     pub simulations: usize,
 }
@@ -127,11 +134,6 @@ pub struct Polished {
 }
 
 impl Polished {
-    /// Steps of the differences for sensitivities near it.
-    pub fn steps(&self) -> Vec<f64> {
-        Problem::steps(&self.jacobian)
-    }
-
     /// Whether it is a minimum.
     pub fn converged(&self) -> bool {
         self.decrement < 10.0 * DECREMENT
@@ -296,8 +298,7 @@ impl<'a> Problem<'a> {
         let filters = self.filters();
         let rows: Vec<usize> =
             self.channels.iter().map(|c| self.recordings[c.recording].time.len()).collect();
-        let priors: Vec<usize> =
-            (0..x.len()).filter(|&j| self.unknowns[j].prior.is_some()).collect();
+        let priors = self.priors();
         let columns: Vec<Vec<f64>> = which
             .par_iter()
             .map(|&j| -> Result<Vec<f64>> {
@@ -306,12 +307,8 @@ impl<'a> Problem<'a> {
                     filter.apply(piece);
                 }
                 let mut column = column.concat();
-                column.extend(priors.iter().map(|&i| {
-                    let unknown = &self.unknowns[i];
-                    let (mean, deviation) = unknown.prior.unwrap_or((1.0, 1.0));
-                    let slope = unknown.scale.slope(unknown.scale.variable(mean));
-                    if i == j { slope / deviation } else { 0.0 }
-                }));
+                column
+                    .extend(priors.iter().map(|&i| if i == j { self.prior_slope(i) } else { 0.0 }));
                 Ok(column)
             })
             .collect::<Result<_>>()?;
@@ -394,26 +391,112 @@ impl<'a> Problem<'a> {
         jacobian.column_iter().map(|column| step(column.norm())).collect()
     }
 
-    /// All sensitivities at x. The differences' steps are those given or, if there are none, found by rough sensitivities
-    /// first.
+    /// Sensitivities at x to the variables `free`. The differences' directions come from sensitivities `known` to all
+    /// variables, of this or a similar problem; if there are none, rough ones are found first.
     fn sensitivities(
         &self,
         x: &[f64],
         free: &[usize],
         at_knots: &[Motion],
-        steps: Option<&[f64]>,
+        known: Option<&DMatrix<f64>>,
     ) -> Result<(DMatrix<f64>, usize)> {
-        let jacobian = |steps: &[f64]| self.jacobian(x, free, at_knots, steps, self.differences);
         let each = if self.differences.0 == Differences::Central { 2 } else { 1 };
-        match steps {
-            Some(steps) => Ok((jacobian(steps)?, each * free.len())),
-            None => {
-                let rough = jacobian(&vec![1e-5; x.len()])?;
-                let mut steps = vec![0.0; x.len()];
-                free.iter().zip(Problem::steps(&rough)).for_each(|(&j, step)| steps[j] = step);
-                Ok((jacobian(&steps)?, 2 * each * free.len()))
+        let Some(known) = known else {
+            let axes = vec![1e-5; x.len()];
+            let rough = self.jacobian(x, free, at_knots, &axes, self.differences)?;
+            let mut known = DMatrix::zeros(rough.nrows(), x.len());
+            free.iter().enumerate().for_each(|(k, &j)| known.set_column(j, &rough.column(k)));
+            let (found, needed) = self.sensitivities(x, free, at_knots, Some(&known))?;
+            return Ok((found, needed + each * free.len()));
+        };
+        let is_parameter = |j: &usize| matches!(self.unknowns[*j].quantity, Quantity::Parameter(_));
+        let (mixed, single): (Vec<usize>, Vec<usize>) =
+            free.iter().copied().partition(is_parameter);
+        let steps = Problem::steps(known);
+        let along_axes = self.jacobian(x, &single, at_knots, &steps, self.differences)?;
+        let mixture = self.along(x, &mixed, at_knots, known)?;
+        let height = along_axes.nrows();
+        let mut all = DMatrix::zeros(height, free.len());
+        for (k, j) in free.iter().enumerate() {
+            match mixed.iter().position(|m| m == j) {
+                Some(place) => all.set_column(k, &mixture.column(place)),
+                None => {
+                    let place = single.iter().position(|s| s == j);
+                    all.set_column(k, &along_axes.column(place.context("a free variable")?));
+                }
             }
         }
+        Ok((all, each * free.len()))
+    }
+
+    /// Sensitivities to the parameters `mixed`, differenced along the directions that `known` ones give.
+    fn along(
+        &self,
+        x: &[f64],
+        mixed: &[usize],
+        base: &[Motion],
+        known: &DMatrix<f64>,
+    ) -> Result<DMatrix<f64>> {
+        let (how, instants) = self.differences;
+        let directions = directions(&known.select_columns(mixed));
+        let scale = self.value_of(x, &Quantity::GyroScale, 1.0);
+        let fastest = fastest(base);
+        let filters = self.filters();
+        let columns: Vec<Vec<f64>> = (0..mixed.len())
+            .into_par_iter()
+            .map(|k| -> Result<Vec<f64>> {
+                let direction = directions.column(k);
+                let step = MOVE.min(LONGEST_STEP / direction.amax());
+                let moved = |by: f64| {
+                    let mut part = vec![0.0; x.len()];
+                    mixed.iter().zip(&direction).for_each(|(&j, d)| part[j] = by * d);
+                    self.motions(&friction::moved(self, x, &part, fastest), instants)
+                };
+                let ahead = moved(step)?;
+                let (behind, width) = match how {
+                    Differences::Forward => (None, step),
+                    Differences::Central => (Some(moved(-step)?), 2.0 * step),
+                };
+                let behind = behind.as_deref().unwrap_or(base);
+                let mut column = Vec::new();
+                for (c, filter) in self.channels.iter().zip(&filters) {
+                    let (a, b) = (&ahead[c.recording], &behind[c.recording]);
+                    let (a, b, factor) = match c.signal {
+                        Signal::Rate => (&a.rate, &b.rate, scale / width),
+                        Signal::Angle => (&a.angle, &b.angle, 1.0 / width),
+                    };
+                    let mut piece: Vec<f64> =
+                        a.iter().zip(b).map(|(a, b)| -factor * (a - b)).collect();
+                    filter.apply(&mut piece);
+                    column.extend(piece);
+                }
+                Ok(column)
+            })
+            .collect::<Result<_>>()?;
+        let rows = columns.first().map_or(0, Vec::len);
+        let differences = DMatrix::from_vec(rows, mixed.len(), columns.concat());
+        let inverse = directions.try_inverse().context("sensitivities without a direction")?;
+        let found = differences * inverse;
+        let priors = self.priors();
+        let mut all = found.resize_vertically(rows + priors.len(), 0.0);
+        for (row, &i) in priors.iter().enumerate() {
+            if let Some(column) = mixed.iter().position(|&j| j == i) {
+                all[(rows + row, column)] = self.prior_slope(i);
+            }
+        }
+        Ok(all)
+    }
+
+    /// Unknowns of which something is known.
+    fn priors(&self) -> Vec<usize> {
+        (0..self.unknowns.len()).filter(|&j| self.unknowns[j].prior.is_some()).collect()
+    }
+
+    /// Derivative of what is known of an unknown with respect to its x: 1 over its standard deviation.
+    fn prior_slope(&self, i: usize) -> f64 {
+        let unknown = &self.unknowns[i];
+        let (mean, deviation) = unknown.prior.unwrap_or((1.0, 1.0));
+        unknown.scale.slope(unknown.scale.variable(mean)) / deviation
     }
 
     /// Whether answers at all instants differ from those at knots.
@@ -423,9 +506,14 @@ impl<'a> Problem<'a> {
 
     /// Gauss and Newton's steps from near a minimum, until the Newton decrement is below [`DECREMENT`], with
     /// at most `rounds` sets of sensitivities. A step that makes it worse is shortened.
-    pub fn polish(&self, x: &[f64], steps: Option<&[f64]>, rounds: usize) -> Result<Polished> {
+    pub fn polish(
+        &self,
+        x: &[f64],
+        known: Option<&DMatrix<f64>>,
+        rounds: usize,
+    ) -> Result<Polished> {
         let all: Vec<usize> = (0..x.len()).collect();
-        self.polish_some(x, &all, steps, (rounds, DECREMENT))
+        self.polish_some(x, &all, known, (rounds, DECREMENT))
     }
 
     /// The same in the variables `free` alone, until the decrement is below `enough`. Sensitivities and covariance are those of
@@ -434,7 +522,7 @@ impl<'a> Problem<'a> {
         &self,
         x: &[f64],
         free: &[usize],
-        steps: Option<&[f64]>,
+        known: Option<&DMatrix<f64>>,
         (rounds, enough): (usize, f64),
     ) -> Result<Polished> {
         let mut x = x.to_vec();
@@ -442,7 +530,7 @@ impl<'a> Problem<'a> {
         let mut e = self.stacked(&answer, &x);
         let mut simulations = 1;
         let fastest = fastest(&answer.motion);
-        let mut steps = steps.map(<[f64]>::to_vec);
+        let mut known = known.cloned();
         for round in 1.. {
             let at_knots = if self.is_late(&x) && self.differences.1 == Instants::Knots {
                 simulations += 1;
@@ -450,7 +538,7 @@ impl<'a> Problem<'a> {
             } else {
                 answer.motion.clone()
             };
-            let (jacobian, needed) = self.sensitivities(&x, free, &at_knots, steps.as_deref())?;
+            let (jacobian, needed) = self.sensitivities(&x, free, &at_knots, known.as_ref())?;
             simulations += needed;
             let covariance = self.covariance(&jacobian)?;
             let mut before = f64::INFINITY;
@@ -495,18 +583,20 @@ impl<'a> Problem<'a> {
                     simulations,
                 });
             }
-            let steps = steps.get_or_insert_with(|| vec![0.0; x.len()]);
-            free.iter().zip(Problem::steps(&jacobian)).for_each(|(&j, step)| steps[j] = step);
+            let mut all = DMatrix::zeros(jacobian.nrows(), x.len());
+            free.iter().enumerate().for_each(|(k, &j)| all.set_column(j, &jacobian.column(k)));
+            known = Some(all);
         }
         unreachable!("the rounds are counted")
     }
 
-    /// The covariance of estimates at x, where the recordings are what the FMU does: the Cramér–Rao bound.
-    pub fn information(&self, x: &[f64]) -> Result<Covariance> {
-        let motion = self.motions(x, Instants::Knots)?;
+    /// The covariance of estimates at x, where the recordings are what the FMU does: the Cramér–Rao bound; and the
+    /// sensitivities.
+    pub fn information(&self, x: &[f64]) -> Result<(Covariance, DMatrix<f64>)> {
+        let motion = self.motions(x, self.differences.1)?;
         let all: Vec<usize> = (0..x.len()).collect();
         let (jacobian, _) = self.sensitivities(x, &all, &motion, None)?;
-        self.covariance(&jacobian)
+        Ok((self.covariance(&jacobian)?, jacobian))
     }
 
     /// The covariance for sensitivities.
@@ -533,7 +623,7 @@ impl<'a> Problem<'a> {
             .minimize(Search::new(self, x));
         Ok(Estimate {
             x: search.x.clone(),
-            steps: search.steps.borrow().clone(),
+            jacobian: search.last.borrow().clone(),
             reason: format!("{:?}", report.termination),
             simulations: search.simulations.get(),
         })
@@ -552,7 +642,7 @@ impl<'a> Problem<'a> {
         windows: &[f64],
         heard: &mut dyn FnMut(String),
     ) -> Result<Estimate> {
-        let (mut x, mut simulations, mut steps) = (x.to_vec(), 0, Vec::new());
+        let (mut x, mut simulations, mut jacobian) = (x.to_vec(), 0, None);
         let first = x.clone();
         for &fraction in windows {
             let part: Vec<Recording> =
@@ -583,10 +673,28 @@ impl<'a> Problem<'a> {
             ));
             simulations += estimate.simulations;
             x = estimate.x;
-            steps = estimate.steps.iter().map(|step| step / BLUNT).collect();
+            jacobian = estimate.jacobian.map(|jacobian| jacobian * BLUNT);
         }
-        Ok(Estimate { x, simulations, steps, reason: String::new() })
+        Ok(Estimate { x, simulations, jacobian, reason: String::new() })
     }
+}
+
+/// L = V S⁻¹ of sensitivities U S Vᵀ, from columns of unit length: each column moves the answer by one standard
+/// deviation, at right angles to the others.
+fn directions(jacobian: &DMatrix<f64>) -> DMatrix<f64> {
+    let norms: Vec<f64> = jacobian.column_iter().map(|c| c.norm().max(1e-9)).collect();
+    let mut scaled = jacobian.clone();
+    scaled.column_iter_mut().zip(&norms).for_each(|(mut column, norm)| column /= *norm);
+    let svd = scaled.qr().r().svd(false, true);
+    let mut l = svd.v_t.map_or_else(DMatrix::default, |v| v.transpose());
+    let least = 1e-9 * svd.singular_values.max();
+    for (mut column, value) in l.column_iter_mut().zip(&svd.singular_values) {
+        column /= value.max(least);
+    }
+    for (mut row, norm) in l.row_iter_mut().zip(&norms) {
+        row /= *norm;
+    }
+    l
 }
 
 /// The speed that 1 % of the rows exceed, rad/s.
@@ -612,6 +720,7 @@ struct Search<'p, 'a> {
     x: Vec<f64>,
     answer: Option<Answer>,
     steps: std::cell::RefCell<Vec<f64>>,
+    last: std::cell::RefCell<Option<DMatrix<f64>>>,
     simulations: std::cell::Cell<usize>,
 }
 
@@ -622,6 +731,7 @@ impl<'p, 'a> Search<'p, 'a> {
             x: x.to_vec(),
             answer: problem.answer(x, Instants::Knots).ok(),
             steps: vec![1e-5; x.len()].into(),
+            last: None.into(),
             simulations: 1.into(),
         }
     }
@@ -660,6 +770,7 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Search<'_, '_> {
         let jacobian = self.problem.jacobian(&self.x, &all, &answer.motion, &steps, how).ok()?;
         self.simulations.set(self.simulations.get() + self.x.len());
         *self.steps.borrow_mut() = Problem::steps(&jacobian);
+        *self.last.borrow_mut() = Some(jacobian.clone());
         Some(jacobian)
     }
 }

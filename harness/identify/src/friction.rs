@@ -135,7 +135,7 @@ fn point(
         x[place] = problem.unknowns[place].scale.variable(value);
     }
     let others: Vec<usize> = (0..x.len()).filter(|j| *j != places.speed).collect();
-    let found = problem.polish_some(&x, &others, Some(&from.steps()), (3, 0.3))?;
+    let found = problem.polish_some(&x, &others, Some(&from.jacobian), (3, 0.3))?;
     let mut covariance = DMatrix::zeros(x.len(), x.len());
     for (i, &row) in others.iter().enumerate() {
         for (j, &column) in others.iter().enumerate() {

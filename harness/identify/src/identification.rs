@@ -288,18 +288,18 @@ fn bench(fmu: &Fmu, options: &Options) -> Result<(Bench, f64)> {
 /// The last steps with the gyro's scale as an unknown, covariance, error budget and words.
 fn finish(best: Fitted, question: &verdict::Question, options: &Options) -> Result<Identification> {
     let Fitted { mut problem, polished, mut fit, spread } = best;
-    let (mut x, mut steps) = (polished.x.clone(), polished.steps());
+    let (mut x, mut known) = (polished.x.clone(), polished.jacobian.clone());
     let scale_is_unknown = options.gyro_scale > 0.0;
     if scale_is_unknown {
-        let known = Unknown::gyro_scale().known(1.0, options.gyro_scale);
-        problem.unknowns.push(known);
+        problem.unknowns.push(Unknown::gyro_scale().known(1.0, options.gyro_scale));
         x.push(0.0);
-        // sensitivities to the scale are exact and need no step
-        steps.push(0.0);
+        // sensitivities to the scale are exact: no direction is needed for them
+        let place = known.ncols();
+        known = known.insert_column(place, 0.0);
     }
     // the gyro's scale is nearly a combination of the others: only exact sensitivities tell it from them
     problem.differences = (Differences::Central, Instants::All);
-    let polished = problem.polish(&x, Some(&steps), 3)?;
+    let polished = problem.polish(&x, Some(&known), 3)?;
     fit.simulations += polished.simulations;
     fit.converged = polished.converged();
     fit.newton_decrement = polished.decrement;
