@@ -2,7 +2,7 @@
 //! drift as well, for eight unknowns and for those that `hubslosh identify` adds.
 //!
 //! ```text
-//! cargo run --release -p identify --example bounds -- [slosh model]
+//! cargo run --release -p identify --example bounds -- [NAME:VALUE ...]
 //! ```
 
 use anyhow::Result;
@@ -10,7 +10,7 @@ use host::fmi2::Fmu;
 use identify::fit::{Differences, Problem};
 use identify::noise::Noise;
 use identify::recording::Recording;
-use identify::simulate::{Instants, Setup};
+use identify::simulate::{Between, Instants, Setup};
 use identify::twin;
 use identify::unknown::Unknown;
 
@@ -30,7 +30,6 @@ const WHITE: f64 = 4.066e-4;
 const DRIFT: f64 = 7.85e-5;
 
 fn main() -> Result<()> {
-    let model = std::env::args().nth(1).unwrap_or("linear".into());
     let fmu = Fmu::open(pack::packed_for_tests())?;
     let noises = [
         ("white", Noise::white(WHITE)),
@@ -50,10 +49,11 @@ fn main() -> Result<()> {
         ("8, asymmetry, delay and bias", (0..11).collect()),
     ];
     let setup = Setup {
-        settings: [("slosh.zeta_from_correlation", "false"), ("slosh.model", &model)]
-            .map(|(name, value)| (name.to_string(), value.to_string()))
-            .to_vec(),
-        held: false,
+        settings: std::iter::once("slosh.zeta_from_correlation:false".to_string())
+            .chain(std::env::args().skip(1))
+            .filter_map(|pair| pair.split_once(':').map(|(n, v)| (n.to_string(), v.to_string())))
+            .collect(),
+        between: Between::Lines,
     };
     for torque in ["lin-sweep:amplitude=0.1", "lin-sweep:amplitude=0.25", "multisine:0.25,600"] {
         let torque_text = torque;

@@ -17,6 +17,8 @@
 //!   flaws=false         true: 5 ms delay, gyro scale 1.01, bias 2 mrad/s, asymmetry 0.1 in the twin
 //!   blind=              tilt, nutation, warming, clipping, with + between several
 //!   rate=50             rows a second
+//!   gyro=50             values of the gyro a second, where it is slower than the rows
+//!   between=lines       what the twin's torque does between rows: lines, held, smooth
 //!   say=false           true: the verdict of every seed
 //! ```
 
@@ -25,7 +27,9 @@ use std::collections::BTreeMap;
 use anyhow::{Context, Result, bail};
 use host::fmi2::Fmu;
 use identify::identification::{Identification, Options, identify};
+use identify::recording;
 use identify::residual::Tests;
+use identify::simulate::Between;
 use identify::twin::{self, Blind, Flaws, Twin};
 
 const PARAMETERS: [&str; 8] = [
@@ -101,6 +105,14 @@ fn asked() -> Result<Asked> {
                 asked.twin.blind = value.split('+').map(Blind::named).collect::<Result<_>>()?
             }
             "rate" => asked.twin.rate = value.parse()?,
+            "gyro" => asked.twin.gyro = Some(value.parse()?),
+            "between" => {
+                asked.twin.between = match value {
+                    "held" => Between::Held,
+                    "smooth" => Between::Smooth,
+                    _ => Between::Lines,
+                }
+            }
             "say" => asked.say = value == "true",
             _ => bail!("{key} is not asked for; see the head of examples/coverage.rs"),
         }
@@ -211,6 +223,12 @@ fn main() -> Result<()> {
     let mut tally = Tally::default();
     for seed in asked.seeds.clone() {
         let recording = asked.twin.record(&fmu, &torque, Some(seed))?;
+        let mut hear = |line: String| {
+            if asked.say {
+                println!("  {line}");
+            }
+        };
+        let recordings = recording::prepare(recording, &mut hear)?;
         let mut options = asked.options.clone();
         if asked.far {
             for (i, name) in PARAMETERS.iter().enumerate() {
@@ -218,7 +236,7 @@ fn main() -> Result<()> {
                 options.starts.push((name.to_string(), if up { 1.4 } else { 0.6 } * truths[*name]));
             }
         }
-        match identify(&fmu, &[recording], &options, &mut |line| {
+        match identify(&fmu, &recordings, &options, &mut |line| {
             if asked.say {
                 println!("  {line}");
             }

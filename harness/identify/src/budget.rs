@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use crate::fit::{Answer, Problem};
-use crate::simulate::Instants;
+use crate::simulate::{Between, Instants};
 use crate::uncertainty::Covariance;
 
 /// What an error of something that is not estimated does to the estimates.
@@ -45,7 +45,12 @@ pub fn of(
         recordings.iter_mut().flat_map(|r| &mut r.torque).for_each(|t| *t *= wrong.gain);
         let mut other = Problem { recordings: &recordings, ..problem.clone() };
         other.setup.settings.extend(wrong.settings);
-        other.setup.held ^= wrong.swap;
+        if wrong.swap {
+            other.setup.between = match problem.setup.between {
+                Between::Held => Between::Lines,
+                Between::Lines | Between::Smooth => Between::Held,
+            };
+        }
         let Ok(there) = other.answer(x, Instants::All) else { continue };
         let change = other.stacked(&there, x) - &base;
         let shift = -(&covariance.x * jacobian.tr_mul(&change));

@@ -5,14 +5,14 @@ use host::fmi2::Fmu;
 use nalgebra::DMatrix;
 use serde::Serialize;
 
-use crate::fit::{Answer, Polished, Problem, Signal, WHOLE, WINDOWS};
+use crate::fit::{Answer, Channel, Polished, Problem, Signal, WHOLE, WINDOWS};
 use crate::friction;
 use crate::identification::Options;
 use crate::recording::Recording;
 use crate::residual::Tests;
-use crate::simulate::{Instants, Setup};
+use crate::simulate::{Between, Instants, Setup};
 use crate::start::Start;
-use crate::unknown::{Scale, Unknown};
+use crate::unknown::{Quantity, Scale, Unknown};
 
 /// One model's fit.
 #[derive(Clone, Debug, Serialize)]
@@ -72,6 +72,16 @@ pub struct Fitted<'a> {
 /// Fit of a rate below which a minimum is taken for a wrong one at first, %.
 const POOR: f64 = 90.0;
 
+/// By how much less the sum of squares must be for another torque between rows.
+const JOINS: f64 = 20.0;
+
+/// Whether it matters what the torque does between rows: where it changes a lot from one to the next.
+fn varies_fast(recording: &Recording) -> bool {
+    let square = |x: f64| x * x;
+    let changes: f64 = recording.torque.windows(2).map(|t| square(t[1] - t[0])).sum();
+    changes > 1e-4 * recording.torque.iter().map(|t| square(*t)).sum::<f64>()
+}
+
 /// Fits a slosh model with a friction law, from the data's starts or from the fit of another model.
 pub fn fit<'a>(
     fmu: &'a Fmu,
@@ -87,6 +97,7 @@ pub fn fit<'a>(
         problem,
         // starts that a user gives may be far off
         far: !options.starts.is_empty(),
+        between: options.between,
         alone: options.models.iter().filter(|m| *m != "frozen").count() == 1,
         label: model.to_string(),
         simulations: 0,
@@ -108,6 +119,8 @@ type Found = (Polished, Option<DMatrix<f64>>);
 struct Search<'a, 'h> {
     problem: Problem<'a>,
     far: bool,
+    /// What the torque does between rows; `None`: not known.
+    between: Option<Between>,
     /// No other model of the slosh is tried, which may fit where this one does not.
     alone: bool,
     label: String,
@@ -135,7 +148,12 @@ impl<'a> Search<'a, '_> {
         self.simulations += rough.simulations;
         let answer = self.problem.answer(&rough.x, Instants::All)?;
         self.problem.estimate_noise(&answer);
-        let near = self.polish(&rough.x, rough.jacobian.as_ref())?;
+        let mut near = self.polish(&rough.x, rough.jacobian.as_ref())?;
+        if self.join(&near)? {
+            let answer = self.problem.answer(&near.x, Instants::All)?;
+            self.problem.estimate_noise(&answer);
+            near = self.polish(&near.x, Some(&near.jacobian))?;
+        }
         let (mut best, spread) = self.friction(near)?;
         // a model that does not fit has no minimum worth the search, if there are others
         if !best.converged() && (self.alone || !poor(&self.problem, &best.answer)) {
@@ -147,6 +165,44 @@ impl<'a> Search<'a, '_> {
             }
         }
         Ok((best, spread))
+    }
+
+    /// Tries what else the torque may do between rows: the sum of squares that is left after the best step from
+    /// here, to first order. Returns whether another one was better and is set.
+    fn join(&mut self, near: &Polished) -> Result<bool> {
+        if self.between.is_some() || !self.problem.recordings.iter().any(varies_fast) {
+            return Ok(false);
+        }
+        let now = self.problem.setup.between;
+        let mut best = (near.cost - JOINS, now);
+        for other in Between::ALL.into_iter().filter(|b| *b != now) {
+            let mut problem = self.problem.clone();
+            problem.setup.between = other;
+            // held torque is late by half a row
+            let mut x = near.x.clone();
+            let late = |b: Between| if b == Between::Held { 0.5 } else { 0.0 };
+            if let Some(place) = problem.unknowns.iter().position(|u| u.quantity == Quantity::Delay)
+            {
+                let scale = problem.unknowns[place].scale;
+                let rows = late(now) - late(other);
+                let delay = scale.value(x[place]) + rows * problem.recordings[0].step();
+                x[place] = scale.variable(delay);
+            }
+            self.simulations += 1;
+            let Ok(answer) = problem.answer(&x, Instants::All) else { continue };
+            let e = problem.stacked(&answer, &x);
+            let gradient = near.jacobian.tr_mul(&e);
+            let cost = e.norm_squared() - gradient.dot(&(&near.covariance.x * &gradient));
+            if cost < best.0 {
+                best = (cost, other);
+            }
+        }
+        if best.1 == now {
+            return Ok(false);
+        }
+        self.problem.setup.between = best.1;
+        (self.heard)(format!("{}: the torque is {}", self.label, best.1.words()));
+        Ok(true)
     }
 
     fn begin(&mut self, slosh: bool) -> Result<Found> {
@@ -216,6 +272,7 @@ impl<'a> Search<'a, '_> {
             x[hub] += 0.1;
         }
         self.problem.channels.clone_from(&other.problem.channels);
+        self.problem.setup.between = other.problem.setup.between;
         let same = self.problem.unknowns.len() == known.len();
         let known = same.then_some(&other.polished.jacobian);
         let polished = self.problem.polish(&x, known, 3)?;
@@ -267,7 +324,7 @@ fn problem<'a>(
     }
     let chosen = |name: &str| matches!(name, "slosh.model" | "friction.model");
     settings.extend(options.settings.iter().filter(|(name, _)| !chosen(name)).cloned());
-    let setup = Setup { settings, held: options.held };
+    let setup = Setup { settings, between: options.between.unwrap_or(Between::Lines) };
     Ok(Problem::new(fmu, setup, recordings, unknowns))
 }
 
@@ -383,10 +440,15 @@ fn summary(
     let tests = channels
         .map(|(channel, e)| {
             let recording = &problem.recordings[channel.recording];
-            Tests::of(&recording.time, &recording.torque, e, channel.noise.white)
+            let of = |x: &[f64]| match channel.signal {
+                Signal::Rate => recording.of_fresh(x),
+                Signal::Angle => x.to_vec(),
+            };
+            Tests::of(&of(&recording.time), &of(&recording.torque), &of(e), channel.noise.white)
         })
         .collect();
-    let rows: usize = innovations.iter().map(Vec::len).sum();
+    // rows that say nothing have no innovation
+    let rows = innovations.iter().flatten().filter(|e| **e != 0.0).count();
     Ok(ModelFit {
         model: model.into(),
         friction: law.into(),
@@ -408,21 +470,24 @@ fn fit_pct(problem: &Problem, answer: &Answer) -> f64 {
         .recordings
         .iter()
         .map(|r| {
-            let mean = r.rate.iter().sum::<f64>() / r.rate.len() as f64;
-            r.rate.iter().map(|y| (y - mean).powi(2)).sum::<f64>()
+            let rate = r.of_fresh(&r.rate);
+            let mean = rate.iter().sum::<f64>() / rate.len() as f64;
+            rate.iter().map(|y| (y - mean).powi(2)).sum::<f64>()
         })
         .sum();
     let rates = problem.channels.iter().zip(&answer.residual);
     let rates = rates.filter(|(channel, _)| channel.signal == Signal::Rate);
-    let miss: f64 = rates.flat_map(|(_, residual)| residual).map(|e| e * e).sum();
-    100.0 * (1.0 - (miss / spread).sqrt())
+    let fresh = |(c, residual): (&Channel, &Vec<f64>)| {
+        problem.recordings[c.recording].of_fresh(residual).iter().map(|e| e * e).sum::<f64>()
+    };
+    100.0 * (1.0 - (rates.map(fresh).sum::<f64>() / spread).sqrt())
 }
 
 /// A fit that noise does not explain, nor a small signal.
 fn poor(problem: &Problem, answer: &Answer) -> bool {
-    let noise = crate::recording::noise_level(&problem.recordings[0].rate);
-    let rows = answer.residual[0].len() as f64;
-    let rms = (answer.residual[0].iter().map(|e| e * e).sum::<f64>() / rows).sqrt();
+    let noise = problem.recordings[0].rate_noise();
+    let residual = problem.recordings[0].of_fresh(&answer.residual[0]);
+    let rms = (residual.iter().map(|e| e * e).sum::<f64>() / residual.len() as f64).sqrt();
     fit_pct(problem, answer) < POOR && rms > 2.0 * noise
 }
 

@@ -159,12 +159,12 @@ impl<'a> Problem<'a> {
     ) -> Self {
         let mut channels = Vec::new();
         for (index, recording) in recordings.iter().enumerate() {
-            let level = |signal| recording::noise_level(signal).max(FLOOR);
-            let noise = Noise { white: level(&recording.rate), ..TYPICAL };
+            let noise = Noise { white: recording.rate_noise().max(FLOOR), ..TYPICAL };
             channels.push(Channel { recording: index, signal: Signal::Rate, noise });
             if let Some(angle) = &recording.angle {
                 // the angle adds up what the rate leaves: much drift
-                let noise = Noise { white: level(angle), drift: 30.0, time: 100.0 };
+                let white = recording::noise_level(angle).max(FLOOR);
+                let noise = Noise { white, drift: 30.0, time: 100.0 };
                 channels.push(Channel { recording: index, signal: Signal::Angle, noise });
             }
         }
@@ -239,8 +239,17 @@ impl<'a> Problem<'a> {
         }
     }
 
+    /// Which rows of a channel hold new values; `None`: all.
+    fn fresh(&self, channel: &Channel) -> Option<&'a [bool]> {
+        match channel.signal {
+            Signal::Rate => self.recordings[channel.recording].fresh.as_deref(),
+            Signal::Angle => None,
+        }
+    }
+
     fn filters(&self) -> Vec<Whitening> {
-        let filter = |c: &Channel| c.noise.whitening(&self.recordings[c.recording].time);
+        let filter =
+            |c: &Channel| c.noise.whitening(&self.recordings[c.recording].time, self.fresh(c));
         self.channels.iter().map(filter).collect()
     }
 
@@ -262,10 +271,11 @@ impl<'a> Problem<'a> {
 
     /// Estimates each channel's noise from what an answer leaves.
     pub fn estimate_noise(&mut self, answer: &Answer) {
-        let recordings = self.recordings;
-        self.channels.par_iter_mut().zip(&answer.residual).for_each(|(channel, residual)| {
-            channel.noise = Noise::of(&recordings[channel.recording].time, residual);
-        });
+        let of = |(channel, residual): (&Channel, &Vec<f64>)| {
+            Noise::of(&self.recordings[channel.recording].time, residual, self.fresh(channel))
+        };
+        let noises: Vec<Noise> = self.channels.par_iter().zip(&answer.residual).map(of).collect();
+        self.channels.iter_mut().zip(noises).for_each(|(channel, noise)| channel.noise = noise);
     }
 
     /// Innovations of all channels, and how far the unknowns are from what is known of them.

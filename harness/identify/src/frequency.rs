@@ -142,8 +142,8 @@ fn spectrum(signal: &[f64], bins: &std::ops::RangeInclusive<usize>) -> Vec<Compl
     output[bins.clone()].to_vec()
 }
 
-/// Fits a recording of a hub with slosh. `held`: the torque was held from row to row.
-pub fn identify(recording: &Recording, bench: Bench, held: bool) -> Result<Found> {
+/// Fits a recording of a hub with slosh. `between`: what the torque did between rows.
+pub fn identify(recording: &Recording, bench: Bench, between: Between) -> Result<Found> {
     let measured = start::response(recording)?;
     let rough = TransferFunction::fit(&measured).context("no transfer function fits")?;
     let (step, torque, rate) = recording.even();
@@ -166,7 +166,11 @@ pub fn identify(recording: &Recording, bench: Bench, held: bool) -> Result<Found
     let between = |s: &f64| {
         let half = s * unit * step / 2.0;
         let sinc = half.sin() / half;
-        if held { Complex64::from_polar(sinc, -half) } else { Complex64::from(sinc * sinc) }
+        match between {
+            Between::Held => Complex64::from_polar(sinc, -half),
+            Between::Lines => Complex64::from(sinc * sinc),
+            Between::Smooth => Complex64::from(1.0),
+        }
     };
     let u = spectrum(&torque, &bins).iter().zip(&s).map(|(u, s)| u * between(s)).collect();
     let y = spectrum(&rate, &bins);

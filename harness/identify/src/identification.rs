@@ -14,7 +14,7 @@ use crate::fit::{Answer, Differences, Problem};
 use crate::plausible;
 use crate::recording::Recording;
 use crate::residual::Tests;
-use crate::simulate::Instants;
+use crate::simulate::{Between, Instants};
 use crate::start::{self, Bench, Response, Start};
 use crate::uncertainty::{self, Combination, Covariance};
 use crate::unknown::{Quantity, Unknown};
@@ -37,8 +37,8 @@ pub struct Options {
     pub flaws: bool,
     /// Standard deviation of the gyro's scale about 1, as its data sheet has it; 0: exactly 1.
     pub gyro_scale: f64,
-    /// Torque is held from row to row.
-    pub held: bool,
+    /// What the torque does between rows; `None`: what fits best.
+    pub between: Option<Between>,
     /// Recordings that are simulated, not fitted.
     pub validation: Vec<Recording>,
 }
@@ -53,7 +53,7 @@ impl Default for Options {
             starts: Vec::new(),
             flaws: true,
             gyro_scale: 0.01,
-            held: false,
+            between: None,
             validation: Vec::new(),
         }
     }

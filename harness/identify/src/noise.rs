@@ -38,8 +38,8 @@ impl Noise {
         Noise { white: sigma, drift: 0.0, time: 100.0 }
     }
 
-    /// The filter for rows at these times, s.
-    pub fn whitening(&self, time: &[f64]) -> Whitening {
+    /// The filter for rows at these times, s. Rows that are not `fresh` say nothing: their innovation is 0.
+    pub fn whitening(&self, time: &[f64], fresh: Option<&[bool]>) -> Whitening {
         let (white, drift) = (self.white.powi(2), (self.white * self.drift).powi(2));
         let mut variance = drift;
         let mut log_variance = 0.0;
@@ -54,6 +54,10 @@ impl Noise {
                     (last_step, keep) = (step, (-step / self.time).exp());
                 }
                 variance = keep * keep * variance + drift * (1.0 - keep * keep);
+            }
+            if fresh.is_some_and(|fresh| !fresh[k]) {
+                rows.push([keep, 0.0, 0.0]);
+                continue;
             }
             let innovation = variance + white;
             if (innovation - last_innovation).abs() > 1e-12 * innovation {
@@ -70,12 +74,13 @@ impl Noise {
     }
 
     /// The noise of maximum likelihood for a residual, rad/s, at these times.
-    pub fn of(time: &[f64], residual: &[f64]) -> Self {
-        let count = residual.len() as f64;
+    pub fn of(time: &[f64], residual: &[f64], fresh: Option<&[bool]>) -> Self {
+        let new = |fresh: &[bool]| fresh.iter().filter(|new| **new).count();
+        let count = fresh.map_or(residual.len(), new) as f64;
         // σ_w follows from the rest; what is minimised is −2 ln L
         let sized = |ln_drift: f64, ln_time: f64| {
             let unit = Noise { white: 1.0, drift: ln_drift.exp(), time: ln_time.exp() };
-            let filter = unit.whitening(time);
+            let filter = unit.whitening(time, fresh);
             let mut e = residual.to_vec();
             filter.apply(&mut e);
             let white = (e.iter().map(|v| v * v).sum::<f64>() / count).sqrt().max(FLOOR);
@@ -142,12 +147,12 @@ mod tests {
                 y
             })
             .collect();
-        let found = Noise::of(&time, &residual);
+        let found = Noise::of(&time, &residual, None);
         // 1/sqrt(2 N) = 0.2 %; the drift has 27 correlation times: 20 %, four of them
         assert!((found.white / white - 1.0).abs() < 0.01, "{found:?}");
         assert!((found.drift * found.white / drift).ln().abs() < 0.8, "{found:?}");
         let mut e = residual.clone();
-        found.whitening(&time).apply(&mut e);
+        found.whitening(&time, None).apply(&mut e);
         for lag in [1, 50, 500] {
             let sum: f64 = e.iter().zip(&e[lag..]).map(|(a, b)| a * b).sum();
             assert!((sum / e.len() as f64).abs() < 4.0 / (e.len() as f64).sqrt(), "lag {lag}");

@@ -41,6 +41,8 @@ pub struct Recording {
     pub off_axis: [Option<Vec<f64>>; 2],
     /// It begins at rest (else the initial state is unknown).
     pub from_rest: bool,
+    /// Which rows hold a new value of the gyro, where it is slower than the rows; the others are not fitted.
+    pub fresh: Option<Vec<bool>>,
 }
 
 impl Recording {
@@ -66,7 +68,23 @@ impl Recording {
             wheel_speed: self.wheel_speed.as_ref().map(|x| x[from..to].to_vec()),
             off_axis: self.off_axis.clone().map(|axis| axis.map(|x| x[from..to].to_vec())),
             from_rest: false,
+            fresh: self.fresh.as_ref().map(|x| x[from..to].to_vec()),
         }
+    }
+
+    /// Of a value for each row, those of the rows with a new value of the gyro.
+    pub fn of_fresh(&self, values: &[f64]) -> Vec<f64> {
+        match &self.fresh {
+            None => values.to_vec(),
+            Some(fresh) => {
+                values.iter().zip(fresh).filter(|(_, new)| **new).map(|(v, _)| *v).collect()
+            }
+        }
+    }
+
+    /// Standard deviation of the gyro's white noise, rad/s.
+    pub fn rate_noise(&self) -> f64 {
+        noise_level(&self.of_fresh(&self.rate))
     }
 
     /// A recording of torque and rate alone.
@@ -81,6 +99,7 @@ impl Recording {
             wheel_speed: None,
             off_axis: [None, None],
             from_rest: true,
+            fresh: None,
         }
     }
 
@@ -182,11 +201,20 @@ pub fn prepare(all: Recording, done: &mut dyn FnMut(String)) -> Result<Vec<Recor
             ));
             continue;
         }
+        part.fresh = fresh(&part.rate);
         part.from_rest = starts_at_rest(&part);
         if cuts.len() > 2 {
             part.name = format!("{name}, part {}", index + 1);
         }
         done(describe(&part));
+        if let Some(fresh) = &part.fresh {
+            let new = fresh.iter().filter(|new| **new).count();
+            done(format!(
+                "{}: omega has a new value in {new} of {} rows; those are fitted",
+                part.name,
+                fresh.len()
+            ));
+        }
         check_signals(&part)?;
         parts.push(part);
     }
@@ -245,8 +273,36 @@ fn check_time(all: &Recording) -> Result<()> {
 fn starts_at_rest(part: &Recording) -> bool {
     let rate = (part.rate[0] + part.rate[1]) / 2.0;
     // a gyro's bias is no motion: up to 3 % of the signal, or 5 times the noise
-    let slow = rate.abs() < 5.0 * noise_level(&part.rate) + 0.03 * deviation(&part.rate);
+    let slow = rate.abs() < 5.0 * part.rate_noise() + 0.03 * deviation(&part.rate);
     slow && part.torque[0].abs() < 0.1 * deviation(&part.torque)
+}
+
+/// Part of the changes of a held gyro that fall on the rows of its own clock.
+const ON_CLOCK: f64 = 0.98;
+/// Slowest gyro that is looked for, in rows a value.
+const SLOWEST: usize = 100;
+
+/// Which rows hold a new value, where most only repeat the one before: a gyro that is slower than the recording. A
+/// coarse gyro may repeat values by chance as well; so the changes must come every n-th row or, if the gyro is
+/// fine (two values are seldom the same), the repeats are taken as such.
+fn fresh(rate: &[f64]) -> Option<Vec<bool>> {
+    let changes: Vec<usize> = (1..rate.len()).filter(|&k| rate[k] != rate[k - 1]).collect();
+    if changes.len() < 10 || changes.len() > 9 * rate.len() / 10 {
+        return None;
+    }
+    for n in (2..=SLOWEST.min(rate.len() / 10)).rev() {
+        let mut hits = vec![0; n];
+        changes.iter().for_each(|k| hits[k % n] += 1);
+        let (phase, most) = hits.iter().enumerate().max_by_key(|(_, count)| **count)?;
+        if *most as f64 > ON_CLOCK * changes.len() as f64 {
+            return Some((0..rate.len()).map(|k| k % n == phase).collect());
+        }
+    }
+    let mut values: Vec<f64> = changes.iter().map(|&k| rate[k]).collect();
+    values.sort_by(f64::total_cmp);
+    values.dedup();
+    let fine = values.len() > 9 * changes.len() / 10;
+    fine.then(|| (0..rate.len()).map(|k| k == 0 || rate[k] != rate[k - 1]).collect())
 }
 
 /// Standard deviation of the white noise of a signal, from its third differences (a motion of a few
@@ -366,6 +422,27 @@ mod tests {
         assert_eq!(parts.iter().map(|p| p.time.len()).collect::<Vec<_>>(), [7_000, 8_000]);
         assert!(said[0].contains("rows are missing for 5.02 s"), "{said:?}");
         assert!(!parts[1].from_rest);
+    }
+
+    #[test]
+    fn a_gyro_slower_than_the_rows_is_seen_by_its_repeats() {
+        let mut random = bench::random::Random::new(1, 0);
+        let mut noisy = rigid();
+        noisy.rate.iter_mut().for_each(|w| *w += 4e-4 * random.normal());
+        assert!(fresh(&noisy.rate).is_none());
+        // every third row new, from row 2 on
+        let held: Vec<f64> = (0..noisy.rate.len()).map(|k| noisy.rate[(k + 1) / 3 * 3]).collect();
+        let found = fresh(&held).unwrap();
+        assert_eq!(found.iter().filter(|new| **new).count(), held.len() / 3);
+        assert!(found[2] && !found[3] && !found[4]);
+        // a coarse gyro repeats itself by chance
+        let coarse: Vec<f64> = noisy.rate.iter().map(|w| (w / 1e-3).round() * 1e-3).collect();
+        assert!(fresh(&coarse).is_none());
+        // one with a clock of its own
+        let other: Vec<f64> =
+            (0..noisy.rate.len()).map(|k| noisy.rate[(k as f64 / 1.37) as usize]).collect();
+        let new = fresh(&other).unwrap().iter().filter(|new| **new).count();
+        assert!((new as f64 * 1.37 / other.len() as f64 - 1.0).abs() < 0.01, "{new}");
     }
 
     #[test]

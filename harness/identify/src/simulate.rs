@@ -30,13 +30,65 @@ pub enum Instants {
     Knots,
 }
 
+/// What the torque does between the rows of a recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Between {
+    /// A line.
+    Lines,
+    /// It is held from row to row.
+    Held,
+    /// What a band-limited signal does, which was sampled: see [`smooth`].
+    Smooth,
+}
+
+impl Between {
+    /// All, the likeliest first.
+    pub const ALL: [Between; 3] = [Between::Lines, Between::Smooth, Between::Held];
+
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Between::Lines => "linear between rows",
+            Between::Held => "held from row to row",
+            Between::Smooth => "smooth between rows",
+        }
+    }
+}
+
+/// Values that, joined by lines, act as the smooth signal does whose samples these are. Lines make sinc²(Ωh/2) of a sine at
+/// Ω, h the time between rows: 0.8 % less at 2.4 Hz and 50 Hz sampling. With δ² the second difference, which makes
+/// −(Ωh)² + (Ωh)⁴/12 of it,
+///
+/// ```text
+/// 1/sinc²(Ωh/2) = 1 + (Ωh)²/12 + (Ωh)⁴/240 + … ≈ 1 − δ²/12 + δ⁴/90
+/// ```
+///
+/// Where rows are unevenly spaced, δ² alone.
+pub fn smooth(time: &[f64], signal: &[f64]) -> Vec<f64> {
+    let n = signal.len();
+    let mean = (time[n - 1] - time[0]) / (n - 1) as f64;
+    let even = time.windows(2).all(|t| (t[1] - t[0] - mean).abs() < 0.01 * mean);
+    let second = |x: &[f64]| -> Vec<f64> {
+        let mut d = vec![0.0; n];
+        for k in 1..n - 1 {
+            let (a, b) = (time[k] - time[k - 1], time[k + 1] - time[k]);
+            d[k] = 2.0 * ((x[k + 1] - x[k]) / b - (x[k] - x[k - 1]) / a) / (a + b) * a * b;
+        }
+        d
+    };
+    let two = second(signal);
+    let mut four = if even { second(&two) } else { vec![0.0; n] };
+    (four[0], four[1], four[n - 2], four[n - 1]) = (0.0, 0.0, 0.0, 0.0);
+    (0..n).map(|k| signal[k] - two[k] / 12.0 + four[k] / 90.0).collect()
+}
+
 /// How the FMU is set up and driven.
 #[derive(Clone, Debug)]
 pub struct Setup {
     /// Values by FMU name, as text, set first.
     pub settings: Vec<(String, String)>,
-    /// Torque is held from row to row (else it is linear between them).
-    pub held: bool,
+    /// What the torque does between rows.
+    pub between: Between,
 }
 
 impl Setup {
@@ -59,7 +111,15 @@ impl Setup {
         for (name, value) in values {
             instance.set_real(&[reference(name)?], &[*value])?;
         }
-        let mut inputs = vec![(reference("tau_cmd")?, &recording.torque)];
+        let smoothed;
+        let torque = match self.between {
+            Between::Smooth => {
+                smoothed = smooth(&recording.time, &recording.torque);
+                &smoothed
+            }
+            Between::Lines | Between::Held => &recording.torque,
+        };
+        let mut inputs = vec![(reference("tau_cmd")?, torque)];
         if let Some(gravity) = &recording.gravity {
             inputs.push((reference("g_axial")?, gravity));
         }
@@ -68,7 +128,7 @@ impl Setup {
             signals: inputs.iter().map(|(_, signal)| signal.as_slice()).collect(),
             outputs: [reference("theta")?, reference("omega")?, reference("omega_dot")?],
             time: &recording.time,
-            held: self.held,
+            held: self.between == Between::Held,
             instance: &mut instance,
         };
         drive.begin()?;
@@ -180,6 +240,26 @@ fn late(time: &[f64], at_rows: &Motion, delay: f64) -> Motion {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn lines_through_smoothed_values_are_the_sine_that_was_sampled() {
+        let h = 0.02;
+        for f in [1.25, 2.4, 3.5] {
+            let w = std::f64::consts::TAU * f;
+            let time: Vec<f64> = (0..5000).map(|k| h * f64::from(k)).collect();
+            let sine: Vec<f64> = time.iter().map(|t| (w * t).sin()).collect();
+            let amplitude = |x: &[f64]| {
+                // of the lines through x at f: that of x times sinc²
+                let half: f64 = 0.5 * w * h;
+                let tone = time.iter().zip(x).map(|(t, x)| x * (w * t).sin()).sum::<f64>();
+                let whole = sine.iter().map(|s| s * s).sum::<f64>();
+                tone / whole * (half.sin() / half).powi(2)
+            };
+            assert!(amplitude(&sine) < 0.998);
+            // the next term of the series, (Ωh)⁶/1600: 5e-6 at 3.5 Hz, and the two ends
+            assert!((amplitude(&smooth(&time, &sine)) - 1.0).abs() < 2e-5, "{f}");
+        }
+    }
 
     #[test]
     fn a_cubic_is_late_exactly() {

@@ -8,6 +8,7 @@ use host::fmi2::Fmu;
 
 use crate::design::Multisine;
 use crate::recording::Recording;
+use crate::simulate::Between;
 
 /// What the gyro and the data link add to the FMU's own noise.
 #[derive(Clone, Copy, Debug)]
@@ -88,6 +89,10 @@ pub struct Twin {
     pub settings: Vec<(String, String)>,
     /// Rows a second.
     pub rate: f64,
+    /// Values of the gyro a second; `None`: as many as rows.
+    pub gyro: Option<f64>,
+    /// What the torque does between rows.
+    pub between: Between,
     /// What gyro and data link add.
     pub flaws: Flaws,
     /// What the models do not have.
@@ -96,7 +101,14 @@ pub struct Twin {
 
 impl Default for Twin {
     fn default() -> Self {
-        Twin { settings: Vec::new(), rate: 50.0, flaws: Flaws::default(), blind: Vec::new() }
+        Twin {
+            settings: Vec::new(),
+            rate: 50.0,
+            gyro: None,
+            between: Between::Lines,
+            flaws: Flaws::default(),
+            blind: Vec::new(),
+        }
     }
 }
 
@@ -107,7 +119,7 @@ impl Twin {
         let mut set = |name: &str, value: String| all.push((name.into(), value));
         if let Some(seed) = seed {
             set("imu.enabled", "true".into());
-            set("imu.rate", self.rate.to_string());
+            set("imu.rate", self.gyro.unwrap_or(self.rate).to_string());
             set("imu.seed", seed.to_string());
         }
         if self.blind.contains(&Blind::Tilt) {
@@ -129,15 +141,22 @@ impl Twin {
         let time: Vec<f64> = (0..=rows).map(|k| start + k as f64 * step).collect();
         let tau: Vec<f64> = time.iter().map(|&t| torque.at(t)).collect();
         // the FMU hears the recorded torque late: its knots are shifted, before them is no torque
-        let heard = if late == 0.0 {
-            Torque::Rows { time: time.clone(), tau: tau.clone(), held: false }
+        let held = self.between == Between::Held;
+        let heard = if self.between == Between::Smooth {
+            torque.clone()
+        } else if late == 0.0 {
+            Torque::Rows { time: time.clone(), tau: tau.clone(), held }
         } else {
             let knots = std::iter::once(start).chain(time.iter().map(|t| t + late)).collect();
             let values = std::iter::once(tau[0]).chain(tau.iter().copied()).collect();
-            Torque::Rows { time: knots, tau: values, held: false }
+            Torque::Rows { time: knots, tau: values, held }
         };
-        // steps that meet the knots
-        let parts = if late == 0.0 { 1 } else { 4 };
+        // steps that meet the knots, or are short against a smooth torque's cycle
+        let parts = match (self.between, late == 0.0) {
+            (Between::Smooth, _) => (step / 1e-3).ceil() as u32,
+            (_, true) => 1,
+            (_, false) => 4,
+        };
         let run = Run {
             settings: self.settings(&tau, seed),
             input: Some(bench::run::TORQUE.into()),
@@ -177,7 +196,11 @@ impl Twin {
             for part in 0..parts {
                 let t = time[row] + f64::from(part) * run.step;
                 let next = if part + 1 == parts { time[row + 1] } else { t + run.step };
-                let (value, slope) = heard.chord(t, next - t);
+                let shift = if self.between == Between::Smooth { late } else { 0.0 };
+                let (value, slope) = match held {
+                    true => (heard.at(t), 0.0),
+                    false => heard.chord((t - shift).max(start), next - t),
+                };
                 instance.set_real(&[input], &[value])?;
                 instance.set_real_input_derivatives(&[input], &[1], &[slope])?;
                 instance.do_step(t, next - t)?;

@@ -5,7 +5,7 @@ use host::fmi2::Fmu;
 use identify::fit::{Differences, Problem};
 use identify::identification::{Options, identify};
 use identify::recording::Recording;
-use identify::simulate::{Instants, Setup};
+use identify::simulate::{Between, Instants, Setup};
 use identify::twin::{self, Flaws};
 use identify::unknown::Unknown;
 use pack::packed_for_tests;
@@ -56,7 +56,7 @@ fn an_encoder_shows_the_gyros_scale() {
     let torque = Torque::Profile(SHORT.parse().unwrap());
     let mut recording = twin::record(&fmu, &[], &torque, Some(2), flaws).unwrap();
     // an encoder of 17 bits on the same motion, whose angle is that of a run without noise
-    let setup = Setup { settings: Vec::new(), held: false };
+    let setup = Setup { settings: Vec::new(), between: Between::Lines };
     let motion = setup.run(&fmu, &[], &recording, 0.0, Instants::All).unwrap();
     let count = std::f64::consts::TAU / f64::from(1 << 17);
     recording.angle = Some(motion.angle.iter().map(|a| (a / count).round() * count).collect());
@@ -76,7 +76,7 @@ fn sensitivities_are_those_of_smaller_and_larger_steps() {
     let unknowns = names.map(|(name, unit, value)| Unknown::positive(name, unit, value)).to_vec();
     let setup = Setup {
         settings: vec![("slosh.zeta_from_correlation".into(), "false".into())],
-        held: false,
+        between: Between::Lines,
     };
     let problem = Problem::new(&fmu, setup, &recordings, unknowns);
     let (x, all) = (problem.start(), [0, 1, 2]);

@@ -148,8 +148,13 @@ impl DesignArgs {
         let mut settings = self.settings;
         settings.push(("slosh.zeta_from_correlation".into(), "false".into()));
         let plan = (time.clone(), torque.clone());
-        let bounds =
-            design::cramer_rao(&fmu, Setup { settings, held: false }, plan, unknowns, noise)?;
+        let bounds = design::cramer_rao(
+            &fmu,
+            Setup { settings, between: identify::simulate::Between::Lines },
+            plan,
+            unknowns,
+            noise,
+        )?;
         println!("{:20} {:>12} {:>12} {:>9}", "", "expected", "std", "std %");
         for (name, value, deviation) in bounds {
             let percent = 100.0 * deviation / value.abs();

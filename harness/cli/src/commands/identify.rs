@@ -8,6 +8,7 @@ use host::output::atomically;
 use identify::acceleration::{self, Weights};
 use identify::identification::{Estimated, Identification, Options, identify};
 use identify::recording::Recording;
+use identify::simulate::Between;
 use identify::start::Bench;
 use identify::{black_box, distortion, frequency, recording, report};
 use std::collections::BTreeMap;
@@ -80,9 +81,10 @@ pub struct IdentifyArgs {
     /// Standard deviation of the gyro's scale about 1; 0: exactly 1.
     #[arg(long, value_name = "NUMBER", default_value_t = 0.01)]
     gyro_scale: f64,
-    /// The torque was held from row to row, instead of linear between them.
-    #[arg(long)]
-    hold: bool,
+    /// What the torque did between rows: linear, held (a sampled controller's) or smooth (a sampled recording of a
+    /// smooth torque). Else what fits best is taken.
+    #[arg(long, value_name = "HOW", value_parser = ["linear", "held", "smooth"])]
+    torque: Option<String>,
     /// Uses the rows between two times alone.
     #[arg(long, value_name = "S,S", value_delimiter = ',', allow_hyphen_values = true)]
     trim: Vec<f64>,
@@ -202,7 +204,11 @@ impl IdentifyArgs {
             starts: self.starts,
             flaws: !self.perfect,
             gyro_scale: self.gyro_scale,
-            held: self.hold,
+            between: self.torque.as_deref().map(|how| match how {
+                "held" => Between::Held,
+                "smooth" => Between::Smooth,
+                _ => Between::Lines,
+            }),
             validation,
         };
         let fmu = Fmu::open(&self.fmu)?;
@@ -269,7 +275,9 @@ impl IdentifyArgs {
             }
             Method::Frequency => {
                 let (one, fmu) = (one()?, Fmu::open(&self.fmu)?);
-                let found = frequency::identify(one, bench_of(&fmu, &self.settings)?, self.hold)?;
+                let bench = bench_of(&fmu, &self.settings)?;
+                let between = self.between().unwrap_or(Between::Lines);
+                let found = frequency::identify(one, bench, between)?;
                 estimates(&[&found.parameters, &found.response]);
                 println!(
                     "{} lines from {:.3} to {:.3} Hz, condition number {:.0}",
