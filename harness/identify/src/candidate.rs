@@ -72,6 +72,9 @@ pub struct Fitted<'a> {
 /// Fit of a rate below which a minimum is taken for a wrong one at first, %.
 const POOR: f64 = 90.0;
 
+/// Sum of squares over the rows beyond which a model near another one, which leaves only noise, is given up.
+const HOPELESS: f64 = 1.5;
+
 /// By how much less the sum of squares must be for another torque between rows.
 const JOINS: f64 = 20.0;
 
@@ -154,7 +157,8 @@ impl<'a> Search<'a, '_> {
             self.problem.estimate_noise(&answer);
             near = self.polish(&near.x, Some(&near.jacobian))?;
         }
-        let (mut best, spread) = self.friction(near)?;
+        let none = !self.alone && poor(&self.problem, &near.answer);
+        let (mut best, spread) = if none { (near, None) } else { self.friction(near)? };
         // a model that does not fit has no minimum worth the search, if there are others
         if !best.converged() && (self.alone || !poor(&self.problem, &best.answer)) {
             let again = self.problem.search(&best.x, 1e-4)?;
@@ -228,7 +232,8 @@ impl<'a> Search<'a, '_> {
         let pairs = before.iter().zip(&self.problem.channels);
         if pairs.into_iter().any(|(a, b)| (a.noise.white / b.noise.white - 1.0).abs() > 0.05) {
             let again = self.polish(&best.0.x, Some(&best.0.jacobian))?;
-            best = self.friction(again)?;
+            let none = !self.alone && poor(&self.problem, &again.answer);
+            best = if none { (again, None) } else { self.friction(again)? };
         }
         Ok(best)
     }
@@ -280,7 +285,14 @@ impl<'a> Search<'a, '_> {
         let mut best = polished;
         // Where the other leaves only noise, this one is as good near there or not at all. Else its minimum may be
         // anywhere.
-        if other.fit.tests.iter().all(Tests::passed) || model == "frozen" {
+        let hopeless = poor(&self.problem, &best.answer)
+            || best.cost > HOPELESS * best.answer.residual.concat().len() as f64;
+        if !best.converged() && !hopeless && model != "frozen" {
+            best = self.polish(&best.x.clone(), Some(&best.jacobian.clone()))?;
+        }
+        if other.fit.tests.iter().all(Tests::passed) && (best.converged() || hopeless)
+            || model == "frozen"
+        {
             return Ok((best, if same { other.spread.clone() } else { None }));
         }
         if !best.converged() && !poor(&self.problem, &best.answer) {

@@ -180,6 +180,13 @@ pub fn identify(
         say("frequency response: no slosh in it".into(), &mut done);
     }
 
+    say(
+        format!(
+            "starts: d {:.4} m, h {:.4} m, damping ratio {:.4}, hub.I {:.4} kg.m2",
+            start.d, start.h, start.zeta, start.hub_inertia
+        ),
+        &mut done,
+    );
     let (mut fitted, mut failed): (Vec<Fitted>, _) = (Vec::new(), None);
     let order = ["linear", "planar", "spherical", "paraboloid", "frozen"];
     let wanted = |model: &&str| options.models.iter().any(|m| m == model);

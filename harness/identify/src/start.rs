@@ -21,7 +21,7 @@ use anyhow::{Context, Result, ensure};
 use bench::analysis::features::Features;
 use bench::analysis::transfer_function::TransferFunction;
 use bench::analysis::{
-    FrequencyResponse, logarithmic_grid, spa,
+    Complex64, FrequencyResponse, logarithmic_grid, spa,
     welch::{self, Spectra},
 };
 
@@ -147,20 +147,159 @@ pub fn from_data(recordings: &[Recording], bench: Bench) -> Result<(Option<Respo
             }
         }
     }
-    let Some(found) = best else {
-        return Ok((None, Start { d: 0.0, h: 0.0, ..friction(recordings) }));
+    let rough = friction(recordings);
+    let mut balanced: Option<Balance> = None;
+    for recording in recordings {
+        let found = balance(recording, bench);
+        let left = |b: &Option<Balance>| b.map_or(f64::INFINITY, |b| b.left);
+        if left(&found) < left(&balanced) {
+            balanced = found;
+        }
+    }
+    let (frequency, mass, damping, inertia) = match (balanced, best) {
+        (Some(b), _) => (b.frequency, b.mass, b.damping, b.inertia),
+        (None, Some(r)) => (r.slosh_frequency, r.slosh_mass, r.slosh_damping, r.inertia),
+        (None, None) => return Ok((None, rough)),
     };
-    let (d, h) = tank(found.slosh_frequency, found.slosh_mass, bench);
-    let fixed = bench.density * PI / 4.0 * d * d * h - found.slosh_mass;
-    let hub_inertia = found.inertia - fixed.max(0.0) * bench.arm.powi(2);
+    let (d, h) = tank(frequency, mass, bench);
+    let fixed = bench.density * PI / 4.0 * d * d * h - mass;
+    let hub_inertia = inertia - fixed.max(0.0) * bench.arm.powi(2);
     let start = Start {
         d,
         h,
-        zeta: found.slosh_damping.clamp(1e-3, 0.1),
-        hub_inertia: hub_inertia.max(0.2 * found.inertia),
-        ..friction(recordings)
+        zeta: damping.clamp(1e-3, 0.1),
+        hub_inertia: hub_inertia.max(0.2 * inertia),
+        ..rough
     };
-    Ok((Some(found), start))
+    let response = best.or(balanced.map(|b| Response {
+        slosh_frequency: b.frequency,
+        slosh_damping: b.damping,
+        resonance_frequency: b.frequency * (1.0 + b.mass * bench.arm.powi(2) / b.inertia).sqrt(),
+        slosh_mass: b.mass,
+        inertia: b.inertia,
+        fit: 0.0,
+    }));
+    Ok((response, start))
+}
+
+/// What the balance of torques says of the bench.
+#[derive(Clone, Copy, Debug)]
+pub struct Balance {
+    /// Slosh frequency, Hz, and damping ratio.
+    pub frequency: f64,
+    /// Slosh damping ratio.
+    pub damping: f64,
+    /// Slosh mass, kg.
+    pub mass: f64,
+    /// I0, kg·m².
+    pub inertia: f64,
+    /// Part of the hub's motion that is left unexplained.
+    pub left: f64,
+}
+
+/// Damping ratios that are tried.
+const DAMPINGS: [f64; 5] = [0.0015, 0.003, 0.006, 0.015, 0.04];
+/// Steps of the slosh frequency over the band, relatively: half the half-power width of the least damping.
+const FINENESS: f64 = 1e-3;
+
+/// The slosh mode from the balance of torques in the frequency domain, with the *measured* rate W in it:
+///
+/// ```text
+/// T = jΩ I0 W + jΩ m r² G(Ω) W + b W + c S − δ jΩ T,   G = (ω² + 2jζωΩ)/(ω² − Ω² + 2jζωΩ)
+/// ```
+///
+/// S is the spectrum of sgn ω, δ a delay (which stands for what dry friction does to the phase as well, and is not used). All but ω and ζ are linear; these stand on a grid. What is left counts as
+/// motion: it is divided by |jΩ(I0 + m r² G)|. Since nothing is simulated, a multisine's lines make no wrong minima, and
+/// since dry friction is in it, small amplitudes do not pass for damping.
+pub fn balance(recording: &Recording, bench: Bench) -> Option<Balance> {
+    let (step, torque, rate) = recording.even();
+    let band = excited_band(step, &torque, &rate)?;
+    let n = rate.len();
+    let mean = rate.iter().sum::<f64>() / n as f64;
+    let noise = recording.rate_noise();
+    let signs: Vec<f64> = rate.iter().map(|w| ((w - mean) / (3.0 * noise)).tanh()).collect();
+    let spectrum = |x: &[f64]| {
+        let forward = realfft::RealFftPlanner::<f64>::new().plan_fft_forward(n);
+        // Hann's window: what happened before the record and after it does not leak
+        let mut windowed: Vec<f64> =
+            (0..n).map(|k| x[k] * (1.0 - (TAU * k as f64 / n as f64).cos())).collect();
+        let mut found = forward.make_output_vec();
+        forward.process(&mut windowed, &mut found).ok()?;
+        Some(found)
+    };
+    let (t, w, s) = (spectrum(&torque)?, spectrum(&rate)?, spectrum(&signs)?);
+    let width = 1.0 / (n as f64 * step);
+    let (first, last) = ((0.9 * band.0 / width) as usize, (1.1 * band.1 / width) as usize);
+    // lines with more than noise in them
+    let floor = 9.0 * noise.powi(2) * 1.5 * n as f64;
+    let lines: Vec<usize> =
+        (first.max(1)..last.min(w.len() - 1)).filter(|&k| w[k].norm_sqr() > floor).collect();
+    if lines.len() < 30 {
+        return None;
+    }
+    // some 1500 of them say it as well
+    let lines: Vec<usize> = lines.iter().copied().step_by((lines.len() / 1500).max(1)).collect();
+    let all: f64 = lines.iter().map(|&k| w[k].norm_sqr()).sum();
+    let try_mode = |frequency: f64, damping: f64, before: (f64, f64)| {
+        let natural = TAU * frequency;
+        let mut normal = nalgebra::Matrix5::<f64>::zeros();
+        let mut right = nalgebra::Vector5::<f64>::zeros();
+        let mut total = 0.0;
+        for &k in &lines {
+            let omega = TAU * width * k as f64;
+            let j = Complex64::new(0.0, omega);
+            let stiff = Complex64::new(natural * natural, 2.0 * damping * natural * omega);
+            let g = stiff / (stiff - omega * omega);
+            let weight = 1.0 / (j * (before.0 + before.1 * g)).norm_sqr();
+            let terms = [j * w[k], j * g * w[k], w[k], s[k], -j * t[k]];
+            for a in 0..5 {
+                right[a] += weight * (terms[a].conj() * t[k]).re;
+                for b in 0..5 {
+                    normal[(a, b)] += weight * (terms[a].conj() * terms[b]).re;
+                }
+            }
+            total += weight * t[k].norm_sqr();
+        }
+        let scale = normal.diagonal().map(|d| 1.0 / d.sqrt());
+        let scaled = nalgebra::Matrix5::from_fn(|a, b| normal[(a, b)] * scale[a] * scale[b]);
+        let found = scaled.cholesky()?.solve(&right.component_mul(&scale)).component_mul(&scale);
+        let left = ((total - found.dot(&right)).max(0.0) / all).sqrt();
+        let plausible = found[0] > 0.0 && found[1] > 0.0;
+        plausible.then_some(Balance {
+            frequency,
+            damping,
+            mass: found[1] / bench.arm.powi(2),
+            inertia: found[0],
+            left,
+        })
+    };
+    let steps = ((band.1 / band.0).ln() / FINENESS) as u32;
+    let grid = |damping: f64, low: f64, fineness: f64, count: u32| {
+        (0..count).map(move |k| (low * (fineness * f64::from(k)).exp(), damping))
+    };
+    let mut weights = (1.0, 0.1);
+    let mut best: Option<Balance> = None;
+    for _ in 0..3 {
+        let candidates: Vec<(f64, f64)> = match best {
+            None => DAMPINGS
+                .iter()
+                .flat_map(|&z| grid(z, band.0, (10.0 * z * FINENESS).sqrt().max(FINENESS), steps))
+                .filter(|(f, _)| *f < band.1)
+                .collect(),
+            Some(near) => [0.5, 0.7, 1.0, 1.4, 2.0]
+                .iter()
+                .flat_map(|z| grid(z * near.damping, near.frequency * 0.99, 2e-4, 100))
+                .collect(),
+        };
+        let found = candidates
+            .into_iter()
+            .filter_map(|(f, z)| try_mode(f, z, weights))
+            .min_by(|a, b| a.left.total_cmp(&b.left));
+        let Some(found) = found else { break };
+        weights = (found.inertia, found.mass * bench.arm.powi(2));
+        best = Some(found);
+    }
+    best.filter(|b| b.left < 0.3)
 }
 
 /// Where the transfer function does not fit (large amplitudes bend its peak): antiresonance,

@@ -194,8 +194,12 @@ impl Twin {
                 instance.set_real(&friction, &warm)?;
             }
             for part in 0..parts {
-                let t = time[row] + f64::from(part) * run.step;
-                let next = if part + 1 == parts { time[row + 1] } else { t + run.step };
+                // each step ends where the next begins, to the last bit: the FMU's clock adds them up
+                let at = |part: u32| match part {
+                    part if part == parts => time[row + 1],
+                    part => time[row] + f64::from(part) * run.step,
+                };
+                let (t, next) = (at(part), at(part + 1));
                 let shift = if self.between == Between::Smooth { late } else { 0.0 };
                 let (value, slope) = match held {
                     true => (heard.at(t), 0.0),

@@ -188,7 +188,11 @@ impl Unknown {
             unit: unit.into(),
             start: 0.0,
             prior: None,
-            scale: Scale::Linear(typical),
+            scale: match name {
+                // the FMU allows 1.5 rad
+                "init.slosh_angle" => Scale::Logit(-1.4, 1.4),
+                _ => Scale::Linear(typical),
+            },
         }
     }
 }

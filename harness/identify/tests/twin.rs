@@ -6,7 +6,7 @@ use identify::fit::{Differences, Problem};
 use identify::identification::{Options, identify};
 use identify::recording::Recording;
 use identify::simulate::{Between, Instants, Setup};
-use identify::twin::{self, Flaws};
+use identify::twin::{self, Flaws, Twin};
 use identify::unknown::Unknown;
 use pack::packed_for_tests;
 
@@ -117,4 +117,30 @@ fn degrees_per_second_are_refused_by_name() {
     degrees.rate.iter_mut().for_each(|w| *w = w.to_degrees());
     let error = identify(&fmu, &[degrees], &options(), &mut |_| {}).unwrap_err().to_string();
     assert!(error.contains("omega looks like degrees per second"), "{error}");
+}
+
+#[test]
+fn a_twin_with_a_delay_or_a_smooth_torque_is_what_the_fit_simulates() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let torque = Torque::Profile("lin-sweep:amplitude=0.1,duration=130,f0=2,f1=3".parse().unwrap());
+    for (between, delay) in [
+        (Between::Lines, 0.0),
+        (Between::Held, 0.0),
+        (Between::Smooth, 0.0),
+        (Between::Lines, 0.005),
+        (Between::Smooth, 0.005),
+    ] {
+        let flaws = Flaws { delay, ..Flaws::default() };
+        // the gyro's clock without its noise
+        let settings = ["imu.arw", "imu.bias_instability"].map(|name| (name.into(), "0".into()));
+        let twin = Twin { between, flaws, settings: settings.to_vec(), ..Twin::default() };
+        let recording = twin.record(&fmu, &torque, Some(1)).unwrap();
+        let setup = Setup { settings: Vec::new(), between };
+        let motion = setup.run(&fmu, &[], &recording, delay, Instants::All).unwrap();
+        let off = recording.rate.iter().zip(&motion.rate).map(|(a, b)| (a - b).abs());
+        let off = off.fold(0.0, f64::max);
+        let largest = recording.rate.iter().fold(0.0, |m: f64, w| m.max(w.abs()));
+        // friction where the hub turns round is the steepest: a thousandth of it is some 1e-5 rad/s
+        assert!(off < 1e-3 * largest, "{between:?}, {delay} s late: off by {off} of {largest}");
+    }
 }

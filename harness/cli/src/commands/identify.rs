@@ -204,11 +204,7 @@ impl IdentifyArgs {
             starts: self.starts,
             flaws: !self.perfect,
             gyro_scale: self.gyro_scale,
-            between: self.torque.as_deref().map(|how| match how {
-                "held" => Between::Held,
-                "smooth" => Between::Smooth,
-                _ => Between::Lines,
-            }),
+            between: self.between(),
             validation,
         };
         let fmu = Fmu::open(&self.fmu)?;
@@ -232,6 +228,15 @@ impl IdentifyArgs {
 }
 
 impl IdentifyArgs {
+    /// What the torque did between rows, if it is said.
+    fn between(&self) -> Option<Between> {
+        self.torque.as_deref().map(|how| match how {
+            "held" => Between::Held,
+            "smooth" => Between::Smooth,
+            _ => Between::Lines,
+        })
+    }
+
     /// The methods that need no simulation.
     fn quickly(&self, recordings: &[Recording], held_out: &[Recording]) -> Result<()> {
         ensure!(self.report.is_none(), "--report is for --method output-error alone");
