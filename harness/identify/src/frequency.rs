@@ -34,6 +34,7 @@ use serde::Serialize;
 use crate::identification::Estimated;
 use crate::least_squares::{differences, minimise};
 use crate::recording::{self, Recording};
+use crate::simulate::Between;
 use crate::start::{self, Bench};
 use crate::uncertainty::Covariance;
 
@@ -386,7 +387,7 @@ mod tests {
             let mut random = Random::new(seed, 5);
             let mut one = clean.clone();
             one.rate.iter_mut().for_each(|w| *w += 4.07e-4 * random.normal());
-            let found = identify(&one, BENCH, false).unwrap();
+            let found = identify(&one, BENCH, Between::Lines).unwrap();
             assert!(found.converged && found.described, "{seed}: {:?}", found.verdict);
             for (k, (name, value)) in truth.iter().enumerate() {
                 let p = found.response.get(*name).or(found.parameters.get(*name)).unwrap();
