@@ -196,6 +196,7 @@ impl IdentifyArgs {
         if self.method != Method::OutputError {
             return self.quickly(&recordings, &validation);
         }
+        let between = self.between();
         let options = Options {
             models: self.model,
             friction: self.friction,
@@ -204,7 +205,7 @@ impl IdentifyArgs {
             starts: self.starts,
             flaws: !self.perfect,
             gyro_scale: self.gyro_scale,
-            between: self.between(),
+            between,
             validation,
         };
         let fmu = Fmu::open(&self.fmu)?;
