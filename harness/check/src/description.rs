@@ -576,8 +576,8 @@ pub fn flat_ports(d: &Description, findings: &mut Findings) {
             .and_then(|(array, _)| arrays.get(&(v.causality.as_str(), array)))
             .is_some_and(|indices| is_whole(indices));
         (!whole).then(|| {
-            "the port is an element of an array that is not whole (allowed: every index from 1 to the \
-             last, each once, all inputs or all outputs)"
+            "the port is an element of an array some of whose elements are missing (allowed: every index \
+             from 1 to the last, each once, all inputs or all outputs)"
                 .to_string()
         })
     });
