@@ -6,6 +6,7 @@
 
 use crate::Friction;
 use crate::friction::{Contact, Law};
+use crate::imu::SLACK;
 use crate::motion::StepError;
 use crate::outputs::unsigned_zero;
 use crate::plant::{Inputs, Plant, Ramp};
@@ -157,7 +158,7 @@ impl Plant {
             }
         }
         // Hosts land on a time event exactly, or on it but for rounding.
-        let slack = 1e-9 / self.imu.rate;
+        let slack = SLACK / self.imu.rate;
         while self.next_time_event().is_some_and(|due| due <= time + slack) {
             let omega = self.omega();
             self.imu.sample(&mut self.state.gyro, omega);

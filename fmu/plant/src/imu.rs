@@ -8,6 +8,10 @@
 
 use crate::Imu;
 
+/// Communication points and time events meet sampling instants only to the rounding of the host's
+/// clock: a sample is taken early by up to this part of its period.
+pub(crate) const SLACK: f64 = 1e-6;
+
 /// The gyro's memory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Gyro {
@@ -39,8 +43,7 @@ impl Imu {
     ) -> usize {
         for taken in 0..=allowed {
             let due = gyro.next as f64 / self.rate - since_start;
-            // Communication points meet sampling instants only to rounding.
-            if due > length + 1e-9 / self.rate {
+            if due > length + SLACK / self.rate {
                 return taken;
             }
             self.sample(gyro, omega(due.max(0.0).min(length)));

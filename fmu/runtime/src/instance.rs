@@ -623,6 +623,8 @@ impl<M: Model> Instance<M> {
         let Some(model) = &mut self.model else {
             return Err(call.error("the instance was never initialised"));
         };
+        // Steps added up drift from the host's clock, on which things may be due.
+        model.set_time(at);
         if let Err(why) = model.step(&self.inputs, h) {
             self.state = InstanceState::Failed;
             return Err(call.error(format_args!("step from {at:?} s to {end:?} s failed: {why}")));
