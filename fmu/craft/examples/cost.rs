@@ -5,6 +5,7 @@
 //! | `hubslosh` | HubSlosh's bench, spherical model, no friction |
 //! | `bench` | a craft with the same liquid, one tank and one mode, under 1 g, held to one axis by its mass |
 //! | `one` | 1180 kg under 2400 N, one tank, one mode |
+//! | `two` | the same, two tanks of one mode, as in the comparison with Basilisk |
 //! | `four` | the same, four tanks of three modes each |
 //!
 //! `valgrind --tool=callgrind --toggle-collect='*Spacecraft*step*' cost bench 1000 1e-6` counts the
@@ -49,6 +50,12 @@ fn spacecraft(kind: &str, steps: usize, tolerance: f64) {
             (tank.position, tank.g_ref) = ([0.225, 0.0, 0.0], 9.81);
             (tank.diameter, tank.depth) = (0.163, 0.10);
             (thrust, size, w) = (mass * 9.81, 0.05, 13.0);
+        }
+        "two" => {
+            p.tanks = 2;
+            p.tank[1].p_0[0] = [-0.02, 0.05, -0.99];
+            (p.tank[0].position, p.tank[1].position) = ([0.6, 0.0, 0.0], [-0.6, 0.0, 0.0]);
+            p.init.omega = [0.01, -0.02, 0.03];
         }
         "four" => {
             p.tanks = 4;
