@@ -12,7 +12,8 @@ of Rubaga's thesis, 2700 s each, linear and spherical. Of every output and every
 both builds have the largest difference is taken over the signal's maximum. It is to be 1e-13 at
 most, or no more than SENSITIVE times what the older build itself makes of one of its parameters
 changed in the last bit: a motion that multiplies a last bit by so much has no more digits.
-Ends with 1 where neither holds.
+Ends with 1 where neither holds. ``omega_imu`` is left out: 0.1.0 took samples a step late from some
+50 s on.
 """
 
 import argparse
@@ -69,9 +70,9 @@ def runs(seconds: float) -> list[tuple[str, Parameters, pd.DataFrame]]:
 
 
 def signals(*fmus: Path) -> list[str]:
-    """Return outputs and locals, no arrays, that all builds have."""
+    """Return outputs and locals, no arrays, that all builds have; not the gyro's reading."""
     names = [Fmu.open(fmu).names("output", "local") for fmu in fmus]
-    common = set(names[0]).intersection(*names)
+    common = set(names[0]).intersection(*names) - {"omega_imu"}
     return [name for name in names[0] if name in common and "[" not in name and "(" not in name]
 
 

@@ -570,6 +570,7 @@ fn gyro_samples_are_on_time_after_many_steps_whether_the_host_adds_or_multiplies
             ("slosh.model", number(1)),
             ("friction.model", number(1)),
             ("imu.enabled", Value::Boolean(true)),
+            ("imu.rate", Value::Real(1.0 / h)),
             ("imu.arw", Value::Real(0.0)),
             ("imu.bias_instability", Value::Real(0.0)),
             ("imu.lsb", Value::Real(0.0)),
