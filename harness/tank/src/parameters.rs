@@ -192,6 +192,21 @@ impl ParameterSet {
             }
         };
         let springs = springs(tank, data, modes, liquid, &mut notes, &mut warnings);
+        // The same of every FMU, under the name of its tank.
+        let of_modes = |prefix: &str, values: &mut Vec<(String, Value)>| {
+            for (n, mode) in modes.iter().enumerate() {
+                for (what, value) in [
+                    ("mass", mode.m),
+                    ("length", mode.l),
+                    ("hinge", mode.hinge.unwrap_or(0.0)),
+                    ("k", springs[n]),
+                    ("zeta", ratios[n]),
+                    ("wave", mode.wave),
+                ] {
+                    values.push((format!("{prefix}.{what}[{}]", n + 1), Value::Real(value)));
+                }
+            }
+        };
         let mut values = Vec::new();
         let mut real = |name: String, value: f64| values.push((name, Value::Real(value)));
         match target {
@@ -205,16 +220,7 @@ impl ParameterSet {
                     2.0 * data.r_surface.unwrap_or(data.length_x.unwrap_or(0.0) / 2.0),
                 );
                 real("tank.I_own".into(), data.i_eff_axis.unwrap_or(0.0));
-                for (n, mode) in modes.iter().enumerate() {
-                    let mut of_mode =
-                        |what: &str, value| real(format!("slosh.table.{what}[{}]", n + 1), value);
-                    of_mode("mass", mode.m);
-                    of_mode("length", mode.l);
-                    of_mode("hinge", mode.hinge.unwrap_or(0.0));
-                    of_mode("k", springs[n]);
-                    of_mode("zeta", ratios[n]);
-                    of_mode("wave", mode.wave);
-                }
+                of_modes("slosh.table", &mut values);
                 values.push(("slosh.source".into(), Value::Item("table")));
                 values.push(("slosh.modes".into(), Value::Integer(modes.len() as i64)));
             }
@@ -236,15 +242,7 @@ impl ParameterSet {
                 real(format!("{prefix}.I_0"), rest.inertia.max(0.0));
                 real(format!("{prefix}.I_z"), data.i_eff_axis.unwrap_or(0.0));
                 real(format!("{prefix}.g_ref"), liquid.gravity);
-                for (n, mode) in modes.iter().enumerate() {
-                    let mut of_mode =
-                        |what: &str, value| real(format!("{prefix}.{what}[{}]", n + 1), value);
-                    of_mode("mass", mode.m);
-                    of_mode("length", mode.l);
-                    of_mode("hinge", mode.hinge.unwrap_or(0.0));
-                    of_mode("k", springs[n]);
-                    of_mode("zeta", ratios[n]);
-                }
+                of_modes(&prefix, &mut values);
                 values.push((format!("{prefix}.modes"), Value::Integer(modes.len() as i64)));
                 if prefix != "tank" {
                     notes.push("set tanks to the number of tanks".to_string());

@@ -129,6 +129,7 @@ fn parameters_of_the_six_axis_fmus_have_their_names() {
             ("mass[3]", "/modes/2/m"),
             ("length[1]", "/modes/0/l"),
             ("hinge[2]", "/modes/1/hinge"),
+            ("wave[2]", "/modes/1/wave"),
         ] {
             let found = set[&format!("{prefix}.{name}")].as_float().unwrap();
             assert_eq!(found, result.pointer(pointer).unwrap().as_f64().unwrap(), "{name}");
