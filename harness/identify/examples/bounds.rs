@@ -10,7 +10,7 @@ use host::fmi2::Fmu;
 use identify::fit::{Differences, Problem};
 use identify::noise::Noise;
 use identify::recording::Recording;
-use identify::simulate::{Between, Instants, Setup};
+use identify::simulate::{Between, Setup};
 use identify::twin;
 use identify::unknown::Unknown;
 
@@ -71,7 +71,7 @@ fn main() -> Result<()> {
         for (name, noise) in noises {
             let mut problem = Problem::new(&fmu, setup.clone(), &recording, all.clone());
             problem.channels[0].noise = noise;
-            problem.differences = (Differences::Central, Instants::All);
+            problem.differences = Differences::Central;
             let (_, jacobian) = problem.information(&problem.start())?;
             for (unknowns, set) in &sets {
                 let covariance = problem.covariance(&jacobian.select_columns(set))?.x;

@@ -30,18 +30,8 @@ use identify::identification::{Identification, Options, identify};
 use identify::recording;
 use identify::residual::Tests;
 use identify::simulate::Between;
+use identify::start::PARAMETERS;
 use identify::twin::{self, Blind, Flaws, Twin};
-
-const PARAMETERS: [&str; 8] = [
-    "tank.d",
-    "tank.h",
-    "slosh.zeta",
-    "hub.I",
-    "friction.b",
-    "friction.c",
-    "friction.d",
-    "friction.omega_s",
-];
 
 struct Asked {
     seeds: std::ops::RangeInclusive<u32>,
@@ -150,7 +140,9 @@ impl Tally {
     fn add(&mut self, seed: u32, found: &Identification, truths: &BTreeMap<String, f64>) {
         self.seconds.push(found.seconds);
         let verdict = match found.verdict.first() {
-            Some(line) if line.starts_with("Cannot tell") => "cannot tell".to_string(),
+            Some(line) if line.starts_with("Cannot tell") => {
+                format!("cannot tell, {} first", found.fit.model)
+            }
             _ => format!("{} with {}", found.fit.model, found.fit.friction),
         };
         *self.chosen.entry(verdict).or_default() += 1;

@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use crate::fit::{Answer, Problem};
-use crate::simulate::{Between, Instants};
+use crate::simulate::Between;
 use crate::uncertainty::Covariance;
 
 /// What an error of something that is not estimated does to the estimates.
@@ -51,7 +51,7 @@ pub fn of(
                 Between::Lines | Between::Smooth => Between::Held,
             };
         }
-        let Ok(there) = other.answer(x, Instants::All) else { continue };
+        let Ok(there) = other.answer(x) else { continue };
         let change = other.stacked(&there, x) - &base;
         let shift = -(&covariance.x * jacobian.tr_mul(&change));
         let change = problem.unknowns.iter().enumerate();

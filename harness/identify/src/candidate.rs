@@ -10,8 +10,8 @@ use crate::friction;
 use crate::identification::Options;
 use crate::recording::Recording;
 use crate::residual::Tests;
-use crate::simulate::{Between, Instants, Setup};
-use crate::start::Start;
+use crate::simulate::{Between, Setup};
+use crate::start::{self, Start};
 use crate::unknown::{Quantity, Scale, Unknown};
 
 /// One model's fit.
@@ -95,11 +95,15 @@ pub fn fit<'a>(
     from: Option<&Fitted<'a>>,
     heard: &mut dyn FnMut(String),
 ) -> Result<Fitted<'a>> {
+    let mut told = options.clone();
+    told.starts.retain(|(name, _)| !start::PARAMETERS.contains(&name.as_str()));
+    let from_data = problem(fmu, recordings, &told, (model, law), start)?.start();
     let problem = problem(fmu, recordings, options, (model, law), start)?;
     let mut search = Search {
         problem,
         // starts that a user gives may be far off
         far: !options.starts.is_empty(),
+        from_data,
         between: options.between,
         alone: options.models.iter().filter(|m| *m != "frozen").count() == 1,
         label: model.to_string(),
@@ -122,6 +126,8 @@ type Found = (Polished, Option<DMatrix<f64>>);
 struct Search<'a, 'h> {
     problem: Problem<'a>,
     far: bool,
+    /// Starts from the data, and for what is not in them from the user.
+    from_data: Vec<f64>,
     /// What the torque does between rows; `None`: not known.
     between: Option<Between>,
     /// No other model of the slosh is tried, which may fit where this one does not.
@@ -149,26 +155,41 @@ impl<'a> Search<'a, '_> {
             .problem
             .search_growing(x, windows, &mut |line| heard(format!("{label}: {line}")))?;
         self.simulations += rough.simulations;
-        let answer = self.problem.answer(&rough.x, Instants::All)?;
+        let answer = self.problem.answer(&rough.x)?;
         self.problem.estimate_noise(&answer);
-        let mut near = self.polish(&rough.x, rough.jacobian.as_ref())?;
-        if self.join(&near)? {
-            let answer = self.problem.answer(&near.x, Instants::All)?;
-            self.problem.estimate_noise(&answer);
-            near = self.polish(&near.x, Some(&near.jacobian))?;
+        if !self.alone && poor(&self.problem, &answer) {
+            // a model that does not fit has no minimum worth the search, if there are others
+            let near = self.problem.polish(&rough.x, rough.jacobian.as_ref(), 1)?;
+            self.simulations += near.simulations;
+            return Ok((near, None));
         }
-        let none = !self.alone && poor(&self.problem, &near.answer);
-        let (mut best, spread) = if none { (near, None) } else { self.friction(near)? };
-        // a model that does not fit has no minimum worth the search, if there are others
-        if !best.converged() && (self.alone || !poor(&self.problem, &best.answer)) {
+        let near = self.polish(&rough.x, rough.jacobian.as_ref())?;
+        let near = self.joined(near)?;
+        let (mut best, mut spread) = self.friction(near)?;
+        if !best.converged() {
             let again = self.problem.search(&best.x, 1e-4)?;
             self.simulations += again.simulations;
             let other = self.polish(&again.x, again.jacobian.as_ref())?;
             if other.cost < best.cost {
                 best = other;
             }
+            let before = self.problem.setup.between;
+            best = self.joined(best)?;
+            if self.problem.setup.between != before {
+                (best, spread) = self.friction(best)?;
+            }
         }
         Ok((best, spread))
+    }
+
+    /// The minimum with what the torque does between rows, which only a minimum can tell.
+    fn joined(&mut self, near: Polished) -> Result<Polished> {
+        if !near.converged() || !self.join(&near)? {
+            return Ok(near);
+        }
+        let answer = self.problem.answer(&near.x)?;
+        self.problem.estimate_noise(&answer);
+        self.polish(&near.x, Some(&near.jacobian))
     }
 
     /// Tries what else the torque may do between rows: the sum of squares that is left after the best step from
@@ -193,7 +214,7 @@ impl<'a> Search<'a, '_> {
                 x[place] = scale.variable(delay);
             }
             self.simulations += 1;
-            let Ok(answer) = problem.answer(&x, Instants::All) else { continue };
+            let Ok(answer) = problem.answer(&x) else { continue };
             let e = problem.stacked(&answer, &x);
             let gradient = near.jacobian.tr_mul(&e);
             let cost = e.norm_squared() - gradient.dot(&(&near.covariance.x * &gradient));
@@ -212,19 +233,27 @@ impl<'a> Search<'a, '_> {
     fn begin(&mut self, slosh: bool) -> Result<Found> {
         let x = self.problem.start();
         let first: &[f64] = if self.far { &WINDOWS } else { &WHOLE };
-        let mut best = self.windows(&x, first)?;
-        if slosh && self.alone && !self.far && poor(&self.problem, &best.0.answer) {
+        let mut best = self.windows(&x, first);
+        let known = self.from_data.iter().all(|x| x.is_finite());
+        if self.far && known && !best.as_ref().is_ok_and(|found| self.explains(&found.0)) {
+            (self.heard)(format!("{}: no minimum from there; from the data's starts", self.label));
+            let noise = self.problem.channels.clone();
+            let other = self.windows(&self.from_data.clone(), &WHOLE);
+            best = self.better(best, other, noise);
+        } else if let (Ok(found), true) = (&best, slosh && self.alone && !self.far)
+            && poor(&self.problem, &found.0.answer)
+        {
             (self.heard)(format!(
                 "{}: poor fit from there; again with windows that grow",
                 self.label
             ));
             let noise = self.problem.channels.clone();
-            let other = self.windows(&x, &WINDOWS)?;
-            if fit_pct(&self.problem, &other.0.answer) > fit_pct(&self.problem, &best.0.answer) {
-                best = other;
-            } else {
-                self.problem.channels = noise;
-            }
+            let other = self.windows(&x, &WINDOWS);
+            best = self.better(best, other, noise);
+        }
+        let mut best = best?;
+        if !self.alone && poor(&self.problem, &best.0.answer) {
+            return Ok(best);
         }
         // the noise from what is left and, if it is another one, the minimum with its filter
         let before = self.problem.channels.clone();
@@ -232,10 +261,31 @@ impl<'a> Search<'a, '_> {
         let pairs = before.iter().zip(&self.problem.channels);
         if pairs.into_iter().any(|(a, b)| (a.noise.white / b.noise.white - 1.0).abs() > 0.05) {
             let again = self.polish(&best.0.x, Some(&best.0.jacobian))?;
-            let none = !self.alone && poor(&self.problem, &again.answer);
-            best = if none { (again, None) } else { self.friction(again)? };
+            best = self.friction(again)?;
         }
         Ok(best)
+    }
+
+    /// Whether it is a minimum that leaves only noise.
+    fn explains(&self, found: &Polished) -> bool {
+        found.converged() && tests(&self.problem, &found.answer).iter().all(Tests::passed)
+    }
+
+    /// The one of two searches that leaves less; `noise` is that of the first.
+    fn better(
+        &mut self,
+        one: Result<Found>,
+        other: Result<Found>,
+        noise: Vec<Channel>,
+    ) -> Result<Found> {
+        let fit = |found: &Result<Found>| {
+            found.as_ref().map_or(f64::NEG_INFINITY, |f| fit_pct(&self.problem, &f.0.answer))
+        };
+        if fit(&other) > fit(&one) {
+            return other;
+        }
+        self.problem.channels = noise;
+        one
     }
 
     /// Other friction curves, if a minimum may be one of several, and the lowest.
@@ -262,6 +312,10 @@ impl<'a> Search<'a, '_> {
     }
 
     fn near(&mut self, other: &Fitted<'a>, model: &str) -> Result<Found> {
+        if model != "frozen" && poor(&other.problem, &other.polished.answer) {
+            // so nonlinear that the other model's estimate leads nowhere
+            return self.from_the_start();
+        }
         // what both have, from there
         let mut x = self.problem.start();
         let known = &other.problem.unknowns;
@@ -304,16 +358,21 @@ impl<'a> Search<'a, '_> {
             }
         }
         if poor(&self.problem, &best.answer) {
-            // so nonlinear that the other model's estimate leads nowhere
-            let start = self.problem.start();
-            for windows in [&WHOLE[..], &WINDOWS[..]] {
-                let other = self.windows(&start, windows)?;
-                if !poor(&self.problem, &other.0.answer) {
-                    return Ok(other);
-                }
-            }
+            return self.from_the_start();
         }
         Ok((best, if same { other.spread.clone() } else { None }))
+    }
+
+    /// From the starts, first over the whole, then over windows that grow.
+    fn from_the_start(&mut self) -> Result<Found> {
+        let start = self.problem.start();
+        let whole = self.windows(&start, &WHOLE)?;
+        if !poor(&self.problem, &whole.0.answer) {
+            return Ok(whole);
+        }
+        let noise = self.problem.channels.clone();
+        let grown = self.windows(&start, &WINDOWS);
+        self.better(Ok(whole), grown, noise)
     }
 }
 
@@ -448,17 +507,6 @@ fn summary(
     let answer = &polished.answer;
     let deviance = problem.deviance(answer);
     let innovations = problem.innovations(answer);
-    let channels = problem.channels.iter().zip(&innovations);
-    let tests = channels
-        .map(|(channel, e)| {
-            let recording = &problem.recordings[channel.recording];
-            let of = |x: &[f64]| match channel.signal {
-                Signal::Rate => recording.of_fresh(x),
-                Signal::Angle => x.to_vec(),
-            };
-            Tests::of(&of(&recording.time), &of(&recording.torque), &of(e), channel.noise.white)
-        })
-        .collect();
     // rows that say nothing have no innovation
     let rows = innovations.iter().flatten().filter(|e| **e != 0.0).count();
     Ok(ModelFit {
@@ -469,11 +517,24 @@ fn summary(
         fit_pct: fit_pct(problem, answer),
         converged: polished.converged(),
         newton_decrement: polished.decrement,
-        tests,
+        tests: tests(problem, answer),
         validation_pct: validate(problem, &polished.x, options)?,
         noise_white: problem.channels[0].noise.white,
         simulations,
     })
+}
+
+/// Whether what an answer leaves is noise, for each channel.
+fn tests(problem: &Problem, answer: &Answer) -> Vec<Tests> {
+    let one = |(channel, e): (&Channel, &Vec<f64>)| {
+        let recording = &problem.recordings[channel.recording];
+        let of = |x: &[f64]| match channel.signal {
+            Signal::Rate => recording.of_fresh(x),
+            Signal::Angle => x.to_vec(),
+        };
+        Tests::of(&of(&recording.time), &of(&recording.torque), &of(e), channel.noise.white)
+    };
+    problem.channels.iter().zip(&problem.innovations(answer)).map(one).collect()
 }
 
 /// Fit of the rates, %: 100 (1 − |y − ŷ|/|y − mean y|).
@@ -510,7 +571,7 @@ fn validate(problem: &Problem, x: &[f64], options: &Options) -> Result<Vec<f64>>
         let one = [recording.clone()];
         let there =
             Problem::new(problem.fmu, problem.setup.clone(), &one, problem.unknowns.clone());
-        fits.push(fit_pct(&there, &there.answer(x, Instants::All)?));
+        fits.push(fit_pct(&there, &there.answer(x)?));
     }
     Ok(fits)
 }

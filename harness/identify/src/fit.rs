@@ -39,7 +39,7 @@ use rayon::prelude::*;
 use crate::friction;
 use crate::noise::{FLOOR, Noise, Whitening};
 use crate::recording::{self, Recording};
-use crate::simulate::{Instants, Motion, Setup};
+use crate::simulate::{Motion, Setup};
 use crate::uncertainty::Covariance;
 use crate::unknown::{Quantity, Scale, Unknown};
 
@@ -89,7 +89,7 @@ pub struct Problem<'a> {
     /// What is fitted.
     pub channels: Vec<Channel>,
     /// How sensitivities are differenced.
-    pub differences: (Differences, Instants),
+    pub differences: Differences,
 }
 
 /// What an answer looks like for given unknowns.
@@ -168,7 +168,7 @@ impl<'a> Problem<'a> {
                 channels.push(Channel { recording: index, signal: Signal::Angle, noise });
             }
         }
-        let differences = (Differences::Forward, Instants::Knots);
+        let differences = Differences::Forward;
         Problem { fmu, setup, recordings, unknowns, channels, differences }
     }
 
@@ -193,7 +193,7 @@ impl<'a> Problem<'a> {
         place.map_or(otherwise, |i| self.unknowns[i].scale.value(x[i]))
     }
 
-    fn motion(&self, x: &[f64], recording: usize, instants: Instants) -> Result<Motion> {
+    fn motion(&self, x: &[f64], recording: usize) -> Result<Motion> {
         let values: Vec<(&str, f64)> = self
             .unknowns
             .iter()
@@ -207,16 +207,16 @@ impl<'a> Problem<'a> {
             })
             .collect();
         let delay = self.value_of(x, &Quantity::Delay, 0.0);
-        self.setup.run(self.fmu, &values, &self.recordings[recording], delay, instants)
+        self.setup.run(self.fmu, &values, &self.recordings[recording], delay)
     }
 
-    fn motions(&self, x: &[f64], instants: Instants) -> Result<Vec<Motion>> {
-        (0..self.recordings.len()).into_par_iter().map(|i| self.motion(x, i, instants)).collect()
+    fn motions(&self, x: &[f64]) -> Result<Vec<Motion>> {
+        (0..self.recordings.len()).into_par_iter().map(|i| self.motion(x, i)).collect()
     }
 
     /// The FMU's answer and what it leaves of the recordings.
-    pub fn answer(&self, x: &[f64], instants: Instants) -> Result<Answer> {
-        let motion = self.motions(x, instants)?;
+    pub fn answer(&self, x: &[f64]) -> Result<Answer> {
+        let motion = self.motions(x)?;
         let residual = self.channels.iter().map(|c| self.residual(x, *c, &motion)).collect();
         Ok(Answer { motion, residual })
     }
@@ -292,7 +292,7 @@ impl<'a> Problem<'a> {
 
     /// The sum of squares that a fit minimises.
     pub fn cost(&self, x: &[f64]) -> Result<f64> {
-        Ok(self.stacked(&self.answer(x, Instants::All)?, x).norm_squared())
+        Ok(self.stacked(&self.answer(x)?, x).norm_squared())
     }
 
     /// Derivatives of the stacked innovations and priors with respect to the variables `which` of x.
@@ -303,7 +303,7 @@ impl<'a> Problem<'a> {
         which: &[usize],
         base: &[Motion],
         steps: &[f64],
-        (how, instants): (Differences, Instants),
+        how: Differences,
     ) -> Result<DMatrix<f64>> {
         let filters = self.filters();
         let rows: Vec<usize> =
@@ -312,7 +312,7 @@ impl<'a> Problem<'a> {
         let columns: Vec<Vec<f64>> = which
             .par_iter()
             .map(|&j| -> Result<Vec<f64>> {
-                let mut column = self.column(x, j, base, steps[j], (how, instants))?;
+                let mut column = self.column(x, j, base, steps[j], how)?;
                 for (piece, filter) in column.iter_mut().zip(&filters) {
                     filter.apply(piece);
                 }
@@ -333,7 +333,7 @@ impl<'a> Problem<'a> {
         j: usize,
         base: &[Motion],
         step: f64,
-        (how, instants): (Differences, Instants),
+        how: Differences,
     ) -> Result<Vec<Vec<f64>>> {
         let unknown = &self.unknowns[j];
         let slope = unknown.scale.slope(x[j]);
@@ -369,7 +369,7 @@ impl<'a> Problem<'a> {
                     moved[j] += by;
                     let each = (0..self.recordings.len()).into_par_iter();
                     each.map(|i| match affected(i) {
-                        true => self.motion(&moved, i, instants),
+                        true => self.motion(&moved, i),
                         false => Ok(base[i].clone()),
                     })
                     .collect()
@@ -407,24 +407,24 @@ impl<'a> Problem<'a> {
         &self,
         x: &[f64],
         free: &[usize],
-        at_knots: &[Motion],
+        base: &[Motion],
         known: Option<&DMatrix<f64>>,
     ) -> Result<(DMatrix<f64>, usize)> {
-        let each = if self.differences.0 == Differences::Central { 2 } else { 1 };
+        let each = if self.differences == Differences::Central { 2 } else { 1 };
         let Some(known) = known else {
             let axes = vec![1e-5; x.len()];
-            let rough = self.jacobian(x, free, at_knots, &axes, self.differences)?;
+            let rough = self.jacobian(x, free, base, &axes, self.differences)?;
             let mut known = DMatrix::zeros(rough.nrows(), x.len());
             free.iter().enumerate().for_each(|(k, &j)| known.set_column(j, &rough.column(k)));
-            let (found, needed) = self.sensitivities(x, free, at_knots, Some(&known))?;
+            let (found, needed) = self.sensitivities(x, free, base, Some(&known))?;
             return Ok((found, needed + each * free.len()));
         };
         let is_parameter = |j: &usize| matches!(self.unknowns[*j].quantity, Quantity::Parameter(_));
         let (mixed, single): (Vec<usize>, Vec<usize>) =
             free.iter().copied().partition(is_parameter);
         let steps = Problem::steps(known);
-        let along_axes = self.jacobian(x, &single, at_knots, &steps, self.differences)?;
-        let mixture = self.along(x, &mixed, at_knots, known)?;
+        let along_axes = self.jacobian(x, &single, base, &steps, self.differences)?;
+        let mixture = self.along(x, &mixed, base, known)?;
         let height = along_axes.nrows();
         let mut all = DMatrix::zeros(height, free.len());
         for (k, j) in free.iter().enumerate() {
@@ -447,7 +447,7 @@ impl<'a> Problem<'a> {
         base: &[Motion],
         known: &DMatrix<f64>,
     ) -> Result<DMatrix<f64>> {
-        let (how, instants) = self.differences;
+        let how = self.differences;
         let directions = directions(&known.select_columns(mixed));
         let scale = self.value_of(x, &Quantity::GyroScale, 1.0);
         let fastest = fastest(base);
@@ -460,7 +460,7 @@ impl<'a> Problem<'a> {
                 let moved = |by: f64| {
                     let mut part = vec![0.0; x.len()];
                     mixed.iter().zip(&direction).for_each(|(&j, d)| part[j] = by * d);
-                    self.motions(&friction::moved(self, x, &part, fastest), instants)
+                    self.motions(&friction::moved(self, x, &part, fastest))
                 };
                 let ahead = moved(step)?;
                 let (behind, width) = match how {
@@ -509,11 +509,6 @@ impl<'a> Problem<'a> {
         unknown.scale.slope(unknown.scale.variable(mean)) / deviation
     }
 
-    /// Whether answers at all instants differ from those at knots.
-    fn is_late(&self, x: &[f64]) -> bool {
-        self.value_of(x, &Quantity::Delay, 0.0) != 0.0
-    }
-
     /// Gauss and Newton's steps from near a minimum, until the Newton decrement is below [`DECREMENT`], with
     /// at most `rounds` sets of sensitivities. A step that makes it worse is shortened.
     pub fn polish(
@@ -536,19 +531,14 @@ impl<'a> Problem<'a> {
         (rounds, enough): (usize, f64),
     ) -> Result<Polished> {
         let mut x = x.to_vec();
-        let mut answer = self.answer(&x, Instants::All)?;
+        let mut answer = self.answer(&x)?;
         let mut e = self.stacked(&answer, &x);
         let mut simulations = 1;
         let fastest = fastest(&answer.motion);
         let mut known = known.cloned();
         for round in 1.. {
-            let at_knots = if self.is_late(&x) && self.differences.1 == Instants::Knots {
-                simulations += 1;
-                self.motions(&x, Instants::Knots)?
-            } else {
-                answer.motion.clone()
-            };
-            let (jacobian, needed) = self.sensitivities(&x, free, &at_knots, known.as_ref())?;
+            let (jacobian, needed) =
+                self.sensitivities(&x, free, &answer.motion, known.as_ref())?;
             simulations += needed;
             let covariance = self.covariance(&jacobian)?;
             let mut before = f64::INFINITY;
@@ -569,7 +559,7 @@ impl<'a> Problem<'a> {
                         .for_each(|(&j, step)| part_of_step[j] = part * step);
                     let moved = friction::moved(self, &x, &part_of_step, fastest);
                     simulations += 1;
-                    if let Ok(there) = self.answer(&moved, Instants::All) {
+                    if let Ok(there) = self.answer(&moved) {
                         let new = self.stacked(&there, &moved);
                         if new.norm_squared() < e.norm_squared() {
                             (x, answer, e, taken) = (moved, there, new, true);
@@ -603,7 +593,7 @@ impl<'a> Problem<'a> {
     /// The covariance of estimates at x, where the recordings are what the FMU does: the Cramér–Rao bound; and the
     /// sensitivities.
     pub fn information(&self, x: &[f64]) -> Result<(Covariance, DMatrix<f64>)> {
-        let motion = self.motions(x, self.differences.1)?;
+        let motion = self.motions(x)?;
         let all: Vec<usize> = (0..x.len()).collect();
         let (jacobian, _) = self.sensitivities(x, &all, &motion, None)?;
         Ok((self.covariance(&jacobian)?, jacobian))
@@ -624,7 +614,7 @@ impl<'a> Problem<'a> {
 
     /// Levenberg and Marquardt's search; ends when the sum of squares falls by less than `tolerance`, relatively.
     pub fn search(&self, x: &[f64], tolerance: f64) -> Result<Estimate> {
-        self.answer(x, Instants::Knots).context("the FMU refuses the start of the search")?;
+        self.answer(x).context("the FMU refuses the start of the search")?;
         let (search, report) = LevenbergMarquardt::new()
             .with_ftol(tolerance)
             .with_xtol(1e-8)
@@ -739,7 +729,7 @@ impl<'p, 'a> Search<'p, 'a> {
         Search {
             problem,
             x: x.to_vec(),
-            answer: problem.answer(x, Instants::Knots).ok(),
+            answer: problem.answer(x).ok(),
             steps: vec![1e-5; x.len()].into(),
             last: None.into(),
             simulations: 1.into(),
@@ -754,7 +744,7 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Search<'_, '_> {
 
     fn set_params(&mut self, x: &DVector<f64>) {
         self.x = x.as_slice().to_vec();
-        self.answer = self.problem.answer(&self.x, Instants::Knots).ok();
+        self.answer = self.problem.answer(&self.x).ok();
         self.simulations.set(self.simulations.get() + 1);
     }
 

@@ -14,7 +14,7 @@ use crate::fit::{Answer, Differences, Problem};
 use crate::plausible;
 use crate::recording::Recording;
 use crate::residual::Tests;
-use crate::simulate::{Between, Instants};
+use crate::simulate::Between;
 use crate::start::{self, Bench, Response, Start};
 use crate::uncertainty::{self, Combination, Covariance};
 use crate::unknown::{Quantity, Unknown};
@@ -305,7 +305,7 @@ fn finish(best: Fitted, question: &verdict::Question, options: &Options) -> Resu
         known = known.insert_column(place, 0.0);
     }
     // the gyro's scale is nearly a combination of the others: only exact sensitivities tell it from them
-    problem.differences = (Differences::Central, Instants::All);
+    problem.differences = Differences::Central;
     let polished = problem.polish(&x, Some(&known), 3)?;
     fit.simulations += polished.simulations;
     fit.converged = polished.converged();

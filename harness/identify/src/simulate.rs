@@ -19,17 +19,6 @@ pub struct Motion {
     pub acceleration: Vec<f64>,
 }
 
-/// Which instants the FMU is stepped to if there is a delay between torque and rate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Instants {
-    /// Those of the rows less the delay and those where the torque changes: nothing is interpolated.
-    All,
-    /// Those where the torque changes: half as many steps. In between, angle and rate are cubics
-    /// through values and derivatives at both ends. Their error is at most (Ωh)⁴/384 of the rate, 1e-4 at 3.5 Hz
-    /// and 50 Hz sampling: good for sensitivities, not for residuals.
-    Knots,
-}
-
 /// What the torque does between the rows of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Between {
@@ -100,7 +89,6 @@ impl Setup {
         values: &[(&str, f64)],
         recording: &Recording,
         delay: f64,
-        instants: Instants,
     ) -> Result<Motion> {
         let reference =
             |name: &str| Ok::<_, anyhow::Error>(fmu.description().variable(name)?.reference);
@@ -132,11 +120,7 @@ impl Setup {
             instance: &mut instance,
         };
         drive.begin()?;
-        if instants == Instants::All || delay == 0.0 {
-            drive.exactly(delay)
-        } else {
-            Ok(late(&recording.time, &drive.exactly(0.0)?, delay))
-        }
+        drive.through(delay)
     }
 }
 
@@ -160,7 +144,7 @@ impl Drive<'_, '_> {
         Ok(())
     }
 
-    fn exactly(&mut self, delay: f64) -> Result<Motion> {
+    fn through(&mut self, delay: f64) -> Result<Motion> {
         let (time, count) = (self.time, self.references.len());
         let orders = vec![1; count];
         let (mut values, mut slopes) = (vec![0.0; count], vec![0.0; count]);
@@ -206,37 +190,6 @@ impl Drive<'_, '_> {
     }
 }
 
-/// A motion that is known at the rows, at the rows less a delay: cubics (Hermite) between them, the first
-/// value before, the last one after.
-fn late(time: &[f64], at_rows: &Motion, delay: f64) -> Motion {
-    let mut motion = Motion::default();
-    let last = time.len() - 1;
-    let mut k = 0;
-    for &row in time {
-        let t = (row - delay).clamp(time[0], time[last]);
-        while k + 1 < last && time[k + 1] <= t {
-            k += 1;
-        }
-        while k > 0 && time[k] > t {
-            k -= 1;
-        }
-        let h = time[k + 1] - time[k];
-        let u = (t - time[k]) / h;
-        // value and derivative of the cubic through (y0, d0) and (y1, d1)
-        let cubic = |y: &[f64], d: &[f64]| {
-            let (y0, y1, d0, d1) = (y[k], y[k + 1], h * d[k], h * d[k + 1]);
-            let (second, third) = (3.0 * (y1 - y0) - 2.0 * d0 - d1, 2.0 * (y0 - y1) + d0 + d1);
-            let value = y0 + u * (d0 + u * (second + u * third));
-            (value, (d0 + u * (2.0 * second + 3.0 * u * third)) / h)
-        };
-        let (rate, acceleration) = cubic(&at_rows.rate, &at_rows.acceleration);
-        motion.angle.push(cubic(&at_rows.angle, &at_rows.rate).0);
-        motion.rate.push(rate);
-        motion.acceleration.push(acceleration);
-    }
-    motion
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -258,26 +211,6 @@ mod tests {
             assert!(amplitude(&sine) < 0.998);
             // the next term of the series, (Ωh)⁶/1600: 5e-6 at 3.5 Hz, and the two ends
             assert!((amplitude(&smooth(&time, &sine)) - 1.0).abs() < 2e-5, "{f}");
-        }
-    }
-
-    #[test]
-    fn a_cubic_is_late_exactly() {
-        let time: Vec<f64> = (0..20).map(|k| 0.02 * f64::from(k)).collect();
-        let of = |f: fn(f64) -> f64| time.iter().map(|t| f(*t)).collect::<Vec<f64>>();
-        let at_rows = Motion {
-            angle: of(|t| t * t * t),
-            rate: of(|t| 3.0 * t * t),
-            acceleration: of(|t| 6.0 * t),
-        };
-        for delay in [0.007, -0.007, 0.031] {
-            let found = late(&time, &at_rows, delay);
-            for k in 3..17 {
-                let t = time[k] - delay;
-                assert!((found.angle[k] - t * t * t).abs() < 1e-14);
-                assert!((found.rate[k] - 3.0 * t * t).abs() < 1e-14);
-                assert!((found.acceleration[k] - 6.0 * t).abs() < 1e-12);
-            }
         }
     }
 }

@@ -58,6 +58,18 @@ pub struct Response {
     pub fit: f64,
 }
 
+/// Parameters of the FMU that have a start from the data, in the order of [`Start`].
+pub const PARAMETERS: [&str; 8] = [
+    "tank.d",
+    "tank.h",
+    "slosh.zeta",
+    "hub.I",
+    "friction.b",
+    "friction.c",
+    "friction.d",
+    "friction.omega_s",
+];
+
 /// Starts for the time domain, SI units.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 #[allow(missing_docs)]

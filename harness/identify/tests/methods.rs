@@ -4,7 +4,7 @@ use bench::profile::Torque;
 use host::fmi2::Fmu;
 use identify::acceleration::{self, Weights};
 use identify::recording::Recording;
-use identify::simulate::{Between, Instants, Setup};
+use identify::simulate::{Between, Setup};
 use identify::twin::{self, Flaws};
 use pack::packed_for_tests;
 
@@ -15,7 +15,7 @@ fn rigid(fmu: &Fmu, settings: &[(&str, &str)], torque: &str) -> Recording {
     let mut one = twin::record(fmu, &settings, &torque, Some(3), Flaws::default()).unwrap();
     let text = |(name, value): &(&str, &str)| (name.to_string(), value.to_string());
     let setup = Setup { settings: settings.iter().map(text).collect(), between: Between::Lines };
-    one.angle = Some(setup.run(fmu, &[], &one, 0.0, Instants::All).unwrap().angle);
+    one.angle = Some(setup.run(fmu, &[], &one, 0.0).unwrap().angle);
     one
 }
 
@@ -87,7 +87,7 @@ fn the_preferential_direction_shows_in_free_decay_and_in_the_harmonics() {
     let mut one = twin::record(&fmu, &settings, &torque, Some(3), Flaws::default()).unwrap();
     let text = |(name, value): &(&str, &str)| (name.to_string(), value.to_string());
     let setup = Setup { settings: settings.iter().map(text).collect(), between: Between::Lines };
-    one.angle = Some(setup.run(&fmu, &[], &one, 0.0, Instants::All).unwrap().angle);
+    one.angle = Some(setup.run(&fmu, &[], &one, 0.0).unwrap().angle);
     let asked = acceleration::Options { harmonics: 2, weights: Weights::RunTime, ..options() };
     let found = acceleration::identify(&fmu, &[one], &asked).unwrap();
     for (name, truth) in [

@@ -5,7 +5,7 @@ use host::fmi2::Fmu;
 use identify::fit::{Differences, Problem};
 use identify::identification::{Options, identify};
 use identify::recording::Recording;
-use identify::simulate::{Between, Instants, Setup};
+use identify::simulate::{Between, Setup};
 use identify::twin::{self, Flaws, Twin};
 use identify::unknown::Unknown;
 use pack::packed_for_tests;
@@ -57,7 +57,7 @@ fn an_encoder_shows_the_gyros_scale() {
     let mut recording = twin::record(&fmu, &[], &torque, Some(2), flaws).unwrap();
     // an encoder of 17 bits on the same motion, whose angle is that of a run without noise
     let setup = Setup { settings: Vec::new(), between: Between::Lines };
-    let motion = setup.run(&fmu, &[], &recording, 0.0, Instants::All).unwrap();
+    let motion = setup.run(&fmu, &[], &recording, 0.0).unwrap();
     let count = std::f64::consts::TAU / f64::from(1 << 17);
     recording.angle = Some(motion.angle.iter().map(|a| (a / count).round() * count).collect());
     let options = Options { gyro_scale: 0.05, ..options() };
@@ -80,10 +80,8 @@ fn sensitivities_are_those_of_smaller_and_larger_steps() {
     };
     let problem = Problem::new(&fmu, setup, &recordings, unknowns);
     let (x, all) = (problem.start(), [0, 1, 2]);
-    let motion = problem.answer(&x, Instants::All).unwrap().motion;
-    let of = |steps: &[f64], how| {
-        problem.jacobian(&x, &all, &motion, steps, (how, Instants::All)).unwrap()
-    };
+    let motion = problem.answer(&x).unwrap().motion;
+    let of = |steps: &[f64], how| problem.jacobian(&x, &all, &motion, steps, how).unwrap();
     let steps = Problem::steps(&of(&[1e-5; 3], Differences::Forward));
     let forward = of(&steps, Differences::Forward);
     for part in [0.3, 3.0] {
@@ -136,7 +134,7 @@ fn a_twin_with_a_delay_or_a_smooth_torque_is_what_the_fit_simulates() {
         let twin = Twin { between, flaws, settings: settings.to_vec(), ..Twin::default() };
         let recording = twin.record(&fmu, &torque, Some(1)).unwrap();
         let setup = Setup { settings: Vec::new(), between };
-        let motion = setup.run(&fmu, &[], &recording, delay, Instants::All).unwrap();
+        let motion = setup.run(&fmu, &[], &recording, delay).unwrap();
         let off = recording.rate.iter().zip(&motion.rate).map(|(a, b)| (a - b).abs());
         let off = off.fold(0.0, f64::max);
         let largest = recording.rate.iter().fold(0.0, |m: f64, w| m.max(w.abs()));

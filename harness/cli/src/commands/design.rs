@@ -122,16 +122,7 @@ impl DesignArgs {
         );
         let zeta = real("slosh.damping[1]")?;
         let mut unknowns = Vec::new();
-        for name in [
-            "tank.d",
-            "tank.h",
-            "slosh.zeta",
-            "hub.I",
-            "friction.b",
-            "friction.c",
-            "friction.d",
-            "friction.omega_s",
-        ] {
+        for name in identify::start::PARAMETERS {
             let unit =
                 fmu.description().variable(name)?.attributes().unit.clone().unwrap_or_default();
             let value = if name == "slosh.zeta" { zeta } else { real(name)? };
