@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::{Result, ensure};
 use host::fmi2::Fmu;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use crate::budget::{self, Effect};
@@ -137,6 +137,9 @@ impl Identification {
 /// Least difference of the information criterion that decides (Kass and Raftery: very strong).
 pub const DECIDES: f64 = 10.0;
 
+/// Difference below which the simpler model is taken (not worth more than a bare mention, ibid.).
+const ALIKE: f64 = 2.0;
+
 /// From the simplest slosh model to the richest.
 const SIMPLEST: [&str; 5] = ["frozen", "linear", "planar", "spherical", "paraboloid"];
 
@@ -240,9 +243,12 @@ pub fn identify(
     models.extend(friction.iter().map(|f| f.fit.clone()));
     // a law must be better than the first by what decides
     let least = friction.iter().position(|f| f.fit.bic < fitted[0].fit.bic - DECIDES);
-    let best = match least {
-        Some(place) => friction.swap_remove(place),
-        None => fitted.swap_remove(0),
+    let (best, of_models) = match least {
+        Some(place) => (friction.swap_remove(place), None),
+        None => {
+            let gained = of_models(&fitted[..alike.0]);
+            (fitted.swap_remove(0), Some(gained))
+        }
     };
     let question = verdict::Question {
         slosh: &models[..alike.1],
@@ -250,7 +256,7 @@ pub fn identify(
         laws: &laws,
         doubts: &doubts,
     };
-    let mut found = finish(best, &question, options)?;
+    let mut found = finish(best, of_models, &question, options)?;
     let chosen =
         models.iter().position(|m| *m.model == found.fit.model && m.friction == found.fit.friction);
     models.swap(0, chosen.unwrap_or(0));
@@ -262,13 +268,32 @@ pub fn identify(
     Ok(found)
 }
 
-/// Sorts by the information criterion; those that cannot be told from the best come first, the simplest of them leading.
-/// Returns how many they are, and how many there are in all.
+/// Sorts by the information criterion, the simplest first among those that it does not tell apart at all. Returns how
+/// many cannot be told from the first with certainty, and how many there are in all.
 fn sort(fitted: &mut [Fitted], rank: &dyn Fn(&Fitted) -> Option<usize>) -> (usize, usize) {
     fitted.sort_by(|a, b| a.fit.bic.total_cmp(&b.fit.bic));
-    let near = fitted.iter().filter(|f| f.fit.bic < fitted[0].fit.bic + DECIDES).count();
-    fitted[..near].sort_by_key(rank);
+    let within = |of: f64| fitted.iter().filter(|f| f.fit.bic < fitted[0].fit.bic + of).count();
+    let (near, alike) = (within(DECIDES), within(ALIKE));
+    fitted[..alike].sort_by_key(rank);
     (near, fitted.len())
+}
+
+/// What the covariance of the first model's unknowns x gains because it may be one of the others: Σ p_k δ_k δ_kᵀ, with p_k
+/// the probability of model k and δ_k how far its estimate is from the first's.
+fn of_models(near: &[Fitted]) -> DMatrix<f64> {
+    let probabilities = verdict::probabilities(near.iter().map(|f| f.fit.bic));
+    let (first, unknowns) = (&near[0].polished.x, &near[0].problem.unknowns);
+    let mut gained = DMatrix::zeros(first.len(), first.len());
+    for (other, probability) in near.iter().zip(probabilities).skip(1) {
+        let difference = unknowns.iter().zip(first).map(|(unknown, x)| {
+            let same = |u: &Unknown| u.quantity == unknown.quantity;
+            let place = other.problem.unknowns.iter().position(same);
+            place.map_or(0.0, |place| other.polished.x[place] - x)
+        });
+        let difference = DVector::from_iterator(first.len(), difference);
+        gained += &difference * difference.transpose() * probability;
+    }
+    gained
 }
 
 /// tank.r, fluid.rho and g_axial of the FMU with the settings, and the inertia of all.
@@ -293,7 +318,12 @@ fn bench(fmu: &Fmu, options: &Options) -> Result<(Bench, f64)> {
 }
 
 /// The last steps with the gyro's scale as an unknown, covariance, error budget and words.
-fn finish(best: Fitted, question: &verdict::Question, options: &Options) -> Result<Identification> {
+fn finish(
+    best: Fitted,
+    of_models: Option<DMatrix<f64>>,
+    question: &verdict::Question,
+    options: &Options,
+) -> Result<Identification> {
     let Fitted { mut problem, polished, mut fit, spread } = best;
     let (mut x, mut known) = (polished.x.clone(), polished.jacobian.clone());
     let scale_is_unknown = options.gyro_scale > 0.0;
@@ -331,6 +361,11 @@ fn finish(best: Fitted, question: &verdict::Question, options: &Options) -> Resu
         if scale_is_unknown {
             full[(n, n)] = covariance.x[(n, n)];
         }
+    }
+    if let Some(gained) = &of_models {
+        let n = gained.nrows();
+        let with = full.view((0, 0), (n, n)) + gained;
+        full.view_mut((0, 0), (n, n)).copy_from(&with);
     }
     if !described {
         let e = problem.stacked(&answer, &x);

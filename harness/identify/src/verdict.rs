@@ -67,19 +67,31 @@ pub fn words(
     lines
 }
 
+/// Probabilities of models by their information criterion, all equally probable beforehand (Kass and Raftery 1995):
+/// exp(−BIC/2) over the sum.
+pub fn probabilities(bic: impl Iterator<Item = f64> + Clone) -> Vec<f64> {
+    let least = bic.clone().fold(f64::INFINITY, f64::min);
+    let weights: Vec<f64> = bic.map(|b| (-(b - least) / 2.0).exp()).collect();
+    let sum: f64 = weights.iter().sum();
+    weights.iter().map(|w| w / sum).collect()
+}
+
 fn slosh(question: &Question) -> Option<String> {
     let best = question.slosh.first()?;
     if question.slosh.len() == 1 {
         return None;
     }
     if question.near > 1 {
-        let alike: Vec<&str> =
-            question.slosh[..question.near].iter().map(|m| m.model.as_str()).collect();
+        let near = &question.slosh[..question.near];
+        let each: Vec<String> = near
+            .iter()
+            .zip(probabilities(near.iter().map(|m| m.bic)))
+            .map(|(model, p)| format!("{} (probability {p:.2})", model.model))
+            .collect();
         return Some(format!(
-            "Cannot tell which slosh model it is: {} explain the data equally well (BIC within {DECIDES}). The \
-             parameters below are those of the simplest, {}.",
-            alike.join(", "),
-            best.model
+            "Cannot tell which slosh model it is: {}. The parameters below are those of the first; their \
+             standard deviations hold that it may be another.",
+            each.join(", ")
         ));
     }
     let second = &question.slosh[1];
@@ -165,4 +177,16 @@ fn reasons(tests: &Tests) -> String {
         ));
     }
     list.join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_difference_of_ten_in_the_criterion_is_a_probability_of_99_percent() {
+        let found = probabilities([-1000.0, -990.0].into_iter());
+        assert!((found[0] - 1.0 / (1.0 + (-5f64).exp())).abs() < 1e-15 && found[0] > 0.99);
+        assert!((found[0] + found[1] - 1.0).abs() < 1e-15);
+    }
 }
