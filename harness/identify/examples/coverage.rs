@@ -27,6 +27,7 @@ use std::collections::BTreeMap;
 use anyhow::{Context, Result, bail};
 use host::fmi2::Fmu;
 use identify::identification::{Identification, Options, identify};
+use identify::nominal::COARSEST;
 use identify::recording;
 use identify::residual::Tests;
 use identify::simulate::Between;
@@ -220,7 +221,7 @@ fn main() -> Result<()> {
                 println!("  {line}");
             }
         };
-        let recordings = recording::prepare(recording, &mut hear)?;
+        let recordings = recording::prepare(recording, COARSEST, &mut hear)?;
         let mut options = asked.options.clone();
         if asked.far {
             for (i, name) in PARAMETERS.iter().enumerate() {

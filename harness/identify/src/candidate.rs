@@ -85,25 +85,30 @@ fn varies_fast(recording: &Recording) -> bool {
     changes > 1e-4 * recording.torque.iter().map(|t| square(*t)).sum::<f64>()
 }
 
-/// Fits a slosh model with a friction law, from the data's starts or from the fit of another model.
+/// Fits a slosh model with a friction law, from the data's starts, the likeliest first, or from the fit of another model.
 pub fn fit<'a>(
     fmu: &'a Fmu,
     recordings: &'a [Recording],
     options: &Options,
     (model, law): (&str, &str),
-    start: &Start,
+    starts: &[Start],
     from: Option<&Fitted<'a>>,
     heard: &mut dyn FnMut(String),
 ) -> Result<Fitted<'a>> {
+    let of = |start: &Start, options: &Options| problem(fmu, recordings, options, (model, law), start);
+    // starts that a user gives may be far off
+    let far = !options.starts.is_empty();
     let mut told = options.clone();
     told.starts.retain(|(name, _)| !start::PARAMETERS.contains(&name.as_str()));
-    let from_data = problem(fmu, recordings, &told, (model, law), start)?.start();
-    let problem = problem(fmu, recordings, options, (model, law), start)?;
+    let mut others = Vec::new();
+    for start in &starts[if far { 0 } else { 1 }..] {
+        others.push(of(start, &told)?.start());
+    }
+    others.retain(|x| x.iter().all(|x| x.is_finite()));
     let mut search = Search {
-        problem,
-        // starts that a user gives may be far off
-        far: !options.starts.is_empty(),
-        from_data,
+        problem: of(&starts[0], options)?,
+        far,
+        others,
         between: options.between,
         alone: options.models.iter().filter(|m| *m != "frozen").count() == 1,
         label: model.to_string(),
@@ -126,8 +131,8 @@ type Found = (Polished, Option<DMatrix<f64>>);
 struct Search<'a, 'h> {
     problem: Problem<'a>,
     far: bool,
-    /// Starts from the data, and for what is not in them from the user.
-    from_data: Vec<f64>,
+    /// Further starts from the data, and for what is not in them from the user.
+    others: Vec<Vec<f64>>,
     /// What the torque does between rows; `None`: not known.
     between: Option<Between>,
     /// No other model of the slosh is tried, which may fit where this one does not.
@@ -157,8 +162,8 @@ impl<'a> Search<'a, '_> {
         self.simulations += rough.simulations;
         let answer = self.problem.answer(&rough.x)?;
         self.problem.estimate_noise(&answer);
-        if !self.alone && poor(&self.problem, &answer) {
-            // a model that does not fit has no minimum worth the search, if there are others
+        if poor(&self.problem, &answer) {
+            // a model that does not fit has no minimum worth the search
             let near = self.problem.polish(&rough.x, rough.jacobian.as_ref(), 1)?;
             self.simulations += near.simulations;
             return Ok((near, None));
@@ -178,6 +183,14 @@ impl<'a> Search<'a, '_> {
             if self.problem.setup.between != before {
                 (best, spread) = self.friction(best)?;
             }
+        }
+        // the noise from what is left and, if it is another one, the minimum with its filter
+        let before = self.problem.channels.clone();
+        self.problem.estimate_noise(&best.answer);
+        let pairs = before.iter().zip(&self.problem.channels);
+        if pairs.into_iter().any(|(a, b)| (a.noise.white / b.noise.white - 1.0).abs() > 0.05) {
+            let again = self.polish(&best.x, Some(&best.jacobian))?;
+            (best, spread) = self.friction(again)?;
         }
         Ok((best, spread))
     }
@@ -232,38 +245,29 @@ impl<'a> Search<'a, '_> {
 
     fn begin(&mut self, slosh: bool) -> Result<Found> {
         let x = self.problem.start();
-        let first: &[f64] = if self.far { &WINDOWS } else { &WHOLE };
-        let mut best = self.windows(&x, first);
-        let known = self.from_data.iter().all(|x| x.is_finite());
-        if self.far && known && !best.as_ref().is_ok_and(|found| self.explains(&found.0)) {
-            (self.heard)(format!("{}: no minimum from there; from the data's starts", self.label));
-            let noise = self.problem.channels.clone();
-            let other = self.windows(&self.from_data.clone(), &WHOLE);
-            best = self.better(best, other, noise);
-        } else if let (Ok(found), true) = (&best, slosh && self.alone && !self.far)
-            && poor(&self.problem, &found.0.answer)
-        {
+        let mut best = self.windows(&x, if self.far { &WINDOWS } else { &WHOLE });
+        for start in self.others.clone() {
+            let found = best.as_ref().ok().map(|found| &found.0);
+            let explained = found.is_some_and(|f| self.explains(f));
+            // where other models are tried, one of them may fit where this one does not
+            let left_to_others =
+                found.is_some_and(|f| poor(&self.problem, &f.answer)) && !self.alone && !self.far;
+            if !slosh || explained || left_to_others {
+                break;
+            }
+            (self.heard)(format!("{}: noise does not explain it; from another start", self.label));
+            best = self.better(best, |search| search.windows(&start, &WHOLE));
+        }
+        let found = best.as_ref().ok().map(|found| &found.0);
+        let nowhere = found.is_none_or(|f| poor(&self.problem, &f.answer));
+        if slosh && self.alone && !self.far && nowhere {
             (self.heard)(format!(
                 "{}: poor fit from there; again with windows that grow",
                 self.label
             ));
-            let noise = self.problem.channels.clone();
-            let other = self.windows(&x, &WINDOWS);
-            best = self.better(best, other, noise);
+            best = self.better(best, |search| search.windows(&x, &WINDOWS));
         }
-        let mut best = best?;
-        if !self.alone && poor(&self.problem, &best.0.answer) {
-            return Ok(best);
-        }
-        // the noise from what is left and, if it is another one, the minimum with its filter
-        let before = self.problem.channels.clone();
-        self.problem.estimate_noise(&best.0.answer);
-        let pairs = before.iter().zip(&self.problem.channels);
-        if pairs.into_iter().any(|(a, b)| (a.noise.white / b.noise.white - 1.0).abs() > 0.05) {
-            let again = self.polish(&best.0.x, Some(&best.0.jacobian))?;
-            best = self.friction(again)?;
-        }
-        Ok(best)
+        best
     }
 
     /// Whether it is a minimum that leaves only noise.
@@ -271,21 +275,22 @@ impl<'a> Search<'a, '_> {
         found.converged() && tests(&self.problem, &found.answer).iter().all(Tests::passed)
     }
 
-    /// The one of two searches that leaves less; `noise` is that of the first.
+    /// What was found or what `another` search finds, whichever leaves less.
     fn better(
         &mut self,
-        one: Result<Found>,
-        other: Result<Found>,
-        noise: Vec<Channel>,
+        found: Result<Found>,
+        another: impl FnOnce(&mut Self) -> Result<Found>,
     ) -> Result<Found> {
-        let fit = |found: &Result<Found>| {
-            found.as_ref().map_or(f64::NEG_INFINITY, |f| fit_pct(&self.problem, &f.0.answer))
+        let before = self.problem.clone();
+        let other = another(self);
+        let fit = |problem: &Problem, found: &Result<Found>| {
+            found.as_ref().map_or(f64::NEG_INFINITY, |f| fit_pct(problem, &f.0.answer))
         };
-        if fit(&other) > fit(&one) {
+        if fit(&self.problem, &other) > fit(&before, &found) {
             return other;
         }
-        self.problem.channels = noise;
-        one
+        self.problem = before;
+        found
     }
 
     /// Other friction curves, if a minimum may be one of several, and the lowest.
@@ -370,9 +375,7 @@ impl<'a> Search<'a, '_> {
         if !poor(&self.problem, &whole.0.answer) {
             return Ok(whole);
         }
-        let noise = self.problem.channels.clone();
-        let grown = self.windows(&start, &WINDOWS);
-        self.better(Ok(whole), grown, noise)
+        self.better(Ok(whole), |search| search.windows(&start, &WINDOWS))
     }
 }
 

@@ -11,11 +11,12 @@ use serde::Serialize;
 use crate::budget::{self, Effect};
 use crate::candidate::{self, Fitted, ModelFit};
 use crate::fit::{Answer, Differences, Problem};
+use crate::nominal::Nominal;
 use crate::plausible;
 use crate::recording::Recording;
 use crate::residual::Tests;
 use crate::simulate::Between;
-use crate::start::{self, Bench, Response, Start};
+use crate::start::{self, Response, Start};
 use crate::uncertainty::{self, Combination, Covariance};
 use crate::unknown::{Quantity, Unknown};
 use crate::verdict;
@@ -56,6 +57,15 @@ impl Default for Options {
             between: None,
             validation: Vec::new(),
         }
+    }
+}
+
+impl Options {
+    /// The bench as the FMU is set up with these options.
+    pub fn nominal(&self, fmu: &Fmu) -> Result<Nominal> {
+        let known = self.known.iter().map(|(name, mean, _)| (name.clone(), *mean));
+        let expected: Vec<(String, f64)> = known.chain(self.starts.iter().cloned()).collect();
+        Nominal::of(fmu, &self.settings, &expected)
     }
 }
 
@@ -157,16 +167,17 @@ pub fn identify(
         heard(&line);
         done.push(line);
     };
-    let (bench, nominal_inertia) = bench(fmu, options)?;
+    let nominal = options.nominal(fmu)?;
     let mut doubts = Vec::new();
     for recording in recordings {
         let (notes, found) = plausible::columns(recording);
         notes.into_iter().for_each(|line| say(line, &mut done));
         doubts.extend(found);
     }
-    let (response, start) = start::from_data(recordings, bench)?;
+    let (response, starts) = start::from_data(recordings, &nominal)?;
+    let start = starts[0];
     if let Some(found) = &response {
-        plausible::check_size(found, nominal_inertia)?;
+        plausible::check_size(found, nominal.inertia)?;
         say(
             format!(
                 "frequency response: slosh at {:.4} Hz, damping ratio {:.4}, resonance at {:.4} Hz, \
@@ -201,7 +212,7 @@ pub fn identify(
         let law = options.friction.first().map_or("stribeck", String::as_str);
         let from = fitted.iter().min_by(|a, b| a.fit.bic.total_cmp(&b.fit.bic));
         let one =
-            candidate::fit(fmu, recordings, options, (model, law), &start, from, &mut |line| {
+            candidate::fit(fmu, recordings, options, (model, law), &starts, from, &mut |line| {
                 say(line, &mut done);
             });
         match one {
@@ -231,7 +242,7 @@ pub fn identify(
         let model = fitted[0].fit.model.clone();
         let from = fitted.first();
         let one =
-            candidate::fit(fmu, recordings, options, (&model, law), &start, from, &mut |line| {
+            candidate::fit(fmu, recordings, options, (&model, law), &starts, from, &mut |line| {
                 say(line, &mut done);
             })?;
         say(one.fit.line(), &mut done);
@@ -294,27 +305,6 @@ fn of_models(near: &[Fitted]) -> DMatrix<f64> {
         gained += &difference * difference.transpose() * probability;
     }
     gained
-}
-
-/// tank.r, fluid.rho and g_axial of the FMU with the settings, and the inertia of all.
-fn bench(fmu: &Fmu, options: &Options) -> Result<(Bench, f64)> {
-    let mut instance = fmu.instantiate("identify")?;
-    for (name, value) in &options.settings {
-        let variable = fmu.description().variable(name)?;
-        ensure!(
-            matches!(variable.causality.as_str(), "parameter" | "input") && name != "tau_cmd",
-            "{name} cannot be set: it is no parameter"
-        );
-        instance.set(name, value)?;
-    }
-    instance.setup_experiment(None, 0.0, None)?;
-    instance.enter_initialization_mode()?;
-    let mut real = |name: &str| instance.real(name);
-    let bench =
-        Bench { arm: real("tank.r")?, density: real("fluid.rho")?, gravity: real("g_axial")? };
-    let (inertia, d, h) = (real("hub.I")?, real("tank.d")?, real("tank.h")?);
-    let liquid = bench.density * std::f64::consts::PI / 4.0 * d * d * h;
-    Ok((bench, inertia + liquid * bench.arm.powi(2)))
 }
 
 /// The last steps with the gyro's scale as an unknown, covariance, error budget and words.

@@ -13,6 +13,7 @@ pub mod friction;
 pub mod identification;
 pub mod least_squares;
 pub mod noise;
+pub mod nominal;
 pub mod plausible;
 pub mod recording;
 pub mod report;

@@ -22,12 +22,15 @@ pub fn check_size(found: &Response, nominal: f64) -> Result<()> {
         }
         r if (300.0..3000.0).contains(&(1.0 / r)) => "tau_cmd looks like mN.m; it must be in N.m",
         r if r > 1.0 => "omega looks like rpm; it must be in rad/s",
-        _ => "tau_cmd must be in N.m and omega in rad/s",
+        _ => "tau_cmd must be in N.m, omega in rad/s and time in s",
     };
     bail!(
         "the recording shows an inertia of {:.3e} kg.m2, the FMU with its settings has {nominal:.3e} kg.m2: \
-         {guess}. (If the bench really is that different, set hub.I to what is expected of it.)",
-        found.inertia
+         {guess}. If the bench really is that different, say what is expected of it: --known hub.I={:.2}:{:.2} estimates \
+         it all the same.",
+        found.inertia,
+        0.8 * found.inertia,
+        0.4 * found.inertia
     )
 }
 

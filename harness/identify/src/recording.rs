@@ -17,9 +17,6 @@ pub const LONGEST_GAP: f64 = 0.25;
 /// its half-power width of 14 mHz is resolved by 1/14 mHz = 70 s.
 pub const SHORTEST: f64 = 120.0;
 
-/// Longest mean time between rows, s: slosh at 2.4 Hz needs more than two rows a cycle.
-const COARSEST: f64 = 0.2;
-
 /// One uninterrupted recording.
 #[derive(Clone, Debug)]
 pub struct Recording {
@@ -142,10 +139,11 @@ pub const REQUIRED: [&str; 3] = ["time", "tau_cmd", "omega"];
 pub const OPTIONAL: [&str; 5] = ["theta", "g_axial", "wheel_speed", "omega_x", "omega_y"];
 
 /// Reads a file with the columns [`REQUIRED`] and [`OPTIONAL`], in SI units; others are not looked at. Rows
-/// outside `trim` (s) are left out. `done` hears what was done to it.
+/// outside `trim` (s) are left out. Rows may be `coarsest` (s) apart. `done` hears what was done to it.
 pub fn read(
     path: &Path,
     trim: Option<(f64, f64)>,
+    coarsest: f64,
     done: &mut dyn FnMut(String),
 ) -> Result<Vec<Recording>> {
     let there = table::names(path)?;
@@ -169,13 +167,17 @@ pub fn read(
         all = all.between(from, to);
         done(format!("{name}: {} rows outside {from} to {to} s left out", before - all.time.len()));
     }
-    prepare(all, done)
+    prepare(all, coarsest, done)
 }
 
-/// Checks a recording and cuts it at its gaps.
-pub fn prepare(all: Recording, done: &mut dyn FnMut(String)) -> Result<Vec<Recording>> {
+/// Checks a recording, whose rows may be `coarsest` (s) apart, and cuts it at its gaps.
+pub fn prepare(
+    all: Recording,
+    coarsest: f64,
+    done: &mut dyn FnMut(String),
+) -> Result<Vec<Recording>> {
     let name = all.name.clone();
-    check_time(&all)?;
+    check_time(&all, coarsest)?;
     let mut cuts = vec![0];
     for (row, pair) in all.time.windows(2).enumerate() {
         if pair[1] - pair[0] > LONGEST_GAP.max(10.0 * all.step()) {
@@ -244,7 +246,7 @@ fn describe(part: &Recording) -> String {
     )
 }
 
-fn check_time(all: &Recording) -> Result<()> {
+fn check_time(all: &Recording, coarsest: f64) -> Result<()> {
     let name = &all.name;
     ensure!(all.time.len() > 2, "{name}: {} rows are too few", all.time.len());
     if let Some(row) = all.time.windows(2).position(|pair| pair[1] <= pair[0]) {
@@ -259,9 +261,14 @@ fn check_time(all: &Recording) -> Result<()> {
     steps.sort_by(f64::total_cmp);
     let step = steps[steps.len() / 2];
     ensure!(
-        step <= COARSEST,
-        "{name}: rows are {step} s apart, at most {COARSEST} s are allowed{}",
-        if step >= 1.0 { ". Is time in milliseconds? It must be in seconds" } else { "" }
+        step <= coarsest,
+        "{name}: rows are {step} s apart, at most {coarsest:.3} s are allowed, a fifth of the slosh's expected period{}",
+        if step >= 1.0 {
+            ". Is time in milliseconds? It must be in seconds. (If the slosh really is that slow, --set g_axial, or \
+             --known tank.d and tank.h)"
+        } else {
+            ""
+        }
     );
     ensure!(step >= 1e-4, "{name}: rows are {step} s apart. Time must be in seconds");
     Ok(())
@@ -371,6 +378,7 @@ fn smoothed(part: &Recording) -> (Vec<f64>, Vec<f64>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::nominal::COARSEST;
     use std::f64::consts::TAU;
 
     /// 300 s of a rigid body of 0.4 kg·m² under a sweep.
@@ -386,12 +394,12 @@ mod tests {
     fn refusal(change: impl Fn(&mut Recording)) -> String {
         let mut bad = rigid();
         change(&mut bad);
-        prepare(bad, &mut |_| {}).unwrap_err().to_string()
+        prepare(bad, COARSEST, &mut |_| {}).unwrap_err().to_string()
     }
 
     #[test]
     fn a_sound_recording_passes() {
-        assert_eq!(prepare(rigid(), &mut |_| {}).unwrap().len(), 1);
+        assert_eq!(prepare(rigid(), COARSEST, &mut |_| {}).unwrap().len(), 1);
     }
 
     #[test]
@@ -418,7 +426,7 @@ mod tests {
             *t += if k >= 7_000 { 5.0 } else { 0.0 } + if k >= 3_000 { 0.1 } else { 0.0 };
         }
         let mut said = Vec::new();
-        let parts = prepare(gap, &mut |line| said.push(line)).unwrap();
+        let parts = prepare(gap, COARSEST, &mut |line| said.push(line)).unwrap();
         assert_eq!(parts.iter().map(|p| p.time.len()).collect::<Vec<_>>(), [7_000, 8_000]);
         assert!(said[0].contains("rows are missing for 5.02 s"), "{said:?}");
         assert!(!parts[1].from_rest);

@@ -25,6 +25,7 @@ use bench::analysis::{
     welch::{self, Spectra},
 };
 
+use crate::nominal::Nominal;
 use crate::recording::Recording;
 
 /// First zero of J1'.
@@ -147,51 +148,89 @@ pub fn tank(frequency: f64, mass: f64, bench: Bench) -> (f64, f64) {
     (d, h)
 }
 
-/// Starts from the recording whose response fits best.
-pub fn from_data(recordings: &[Recording], bench: Bench) -> Result<(Option<Response>, Start)> {
-    let mut best: Option<Response> = None;
+/// Starts from the data, the likeliest first, and what the response says of the bench: nothing if there is no slosh in it,
+/// and one start then. Others than the first are for recordings where the first leads to no minimum: responses of other
+/// kinds, the balance of torques in parts of the band (a slew's torque has its power far below the slosh), and the FMU as
+/// it is set up.
+pub fn from_data(
+    recordings: &[Recording],
+    nominal: &Nominal,
+) -> Result<(Option<Response>, Vec<Start>)> {
+    let bench = nominal.bench;
+    let mut responses: Vec<Response> = Vec::new();
     for recording in recordings {
         let measured = response(recording)?;
-        let candidates = [translate(&measured, bench), from_features(&measured, bench)];
-        for found in candidates.into_iter().flatten() {
-            if best.is_none_or(|b| found.fit > b.fit) {
-                best = Some(found);
-            }
-        }
+        let found = [translate(&measured, bench), from_features(&measured, bench)];
+        responses.extend(found.into_iter().flatten());
     }
+    responses.sort_by(|a, b| b.fit.total_cmp(&a.fit));
     let rough = friction(recordings);
-    let mut balanced: Option<Balance> = None;
+    let whole = balances(recordings, bench, &|r| excited(r).into_iter().collect());
+    let Some(first) = whole.into_iter().chain(responses.first().copied()).next() else {
+        return Ok((None, vec![rough]));
+    };
+    let parts = balances(recordings, bench, &|r| {
+        excited(r).map_or(Vec::new(), |band| octaves(band.0, 0.4 / r.step()))
+    });
+    let modes = [first].into_iter().chain(responses.iter().copied());
+    let mut modes: Vec<Response> = modes.chain(parts).collect();
+    let mut all = Vec::new();
+    while !modes.is_empty() {
+        let mode = modes.remove(0);
+        all.push(mode.start(bench, rough));
+        modes.retain(|other| !other.is_near(&mode));
+    }
+    all.push(Start { b: rough.b, c: rough.c, stribeck: rough.stribeck, omega_s: rough.omega_s, ..nominal.start });
+    Ok((responses.first().copied().or(Some(first)), all))
+}
+
+/// What the balance of torques says in bands of the recordings, what leaves least first.
+fn balances(
+    recordings: &[Recording],
+    bench: Bench,
+    bands: &dyn Fn(&Recording) -> Vec<(f64, f64)>,
+) -> Vec<Response> {
+    let mut found: Vec<Balance> = Vec::new();
     for recording in recordings {
-        let found = balance(recording, bench);
-        let left = |b: &Option<Balance>| b.map_or(f64::INFINITY, |b| b.left);
-        if left(&found) < left(&balanced) {
-            balanced = found;
+        found.extend(bands(recording).into_iter().filter_map(|b| balance(recording, bench, b)));
+    }
+    found.sort_by(|a, b| a.left.total_cmp(&b.left));
+    found.iter().map(|b| b.response(bench)).collect()
+}
+
+/// Frequencies between which the torque of a recording has its power, Hz.
+fn excited(recording: &Recording) -> Option<(f64, f64)> {
+    let (step, torque, rate) = recording.even();
+    excited_band(step, &torque, &rate)
+}
+
+/// Pairs of octaves from a frequency to another one, Hz, each half over the one before.
+fn octaves(low: f64, high: f64) -> Vec<(f64, f64)> {
+    let count = ((high / low).log2() as u32).saturating_sub(1);
+    (0..count).map(|k| low * f64::from(1u32 << k)).map(|f| (f, 4.0 * f)).collect()
+}
+
+impl Response {
+    /// Whether a search from another one would lead to the same minimum.
+    fn is_near(&self, other: &Response) -> bool {
+        let ratio = |a: f64, b: f64| (a / b).ln().abs();
+        ratio(self.slosh_frequency, other.slosh_frequency) < 0.05
+            && ratio(self.slosh_mass, other.slosh_mass) < 0.5
+            && ratio(self.inertia, other.inertia) < 0.5
+    }
+
+    fn start(&self, bench: Bench, friction: Start) -> Start {
+        let (d, h) = tank(self.slosh_frequency, self.slosh_mass, bench);
+        let fixed = bench.density * PI / 4.0 * d * d * h - self.slosh_mass;
+        let hub_inertia = self.inertia - fixed.max(0.0) * bench.arm.powi(2);
+        Start {
+            d,
+            h,
+            zeta: self.slosh_damping.clamp(1e-3, 0.1),
+            hub_inertia: hub_inertia.max(0.2 * self.inertia),
+            ..friction
         }
     }
-    let (frequency, mass, damping, inertia) = match (balanced, best) {
-        (Some(b), _) => (b.frequency, b.mass, b.damping, b.inertia),
-        (None, Some(r)) => (r.slosh_frequency, r.slosh_mass, r.slosh_damping, r.inertia),
-        (None, None) => return Ok((None, rough)),
-    };
-    let (d, h) = tank(frequency, mass, bench);
-    let fixed = bench.density * PI / 4.0 * d * d * h - mass;
-    let hub_inertia = inertia - fixed.max(0.0) * bench.arm.powi(2);
-    let start = Start {
-        d,
-        h,
-        zeta: damping.clamp(1e-3, 0.1),
-        hub_inertia: hub_inertia.max(0.2 * inertia),
-        ..rough
-    };
-    let response = best.or(balanced.map(|b| Response {
-        slosh_frequency: b.frequency,
-        slosh_damping: b.damping,
-        resonance_frequency: b.frequency * (1.0 + b.mass * bench.arm.powi(2) / b.inertia).sqrt(),
-        slosh_mass: b.mass,
-        inertia: b.inertia,
-        fit: 0.0,
-    }));
-    Ok((response, start))
 }
 
 /// What the balance of torques says of the bench.
@@ -209,6 +248,20 @@ pub struct Balance {
     pub left: f64,
 }
 
+impl Balance {
+    fn response(&self, bench: Bench) -> Response {
+        let ratio = self.mass * bench.arm.powi(2) / self.inertia;
+        Response {
+            slosh_frequency: self.frequency,
+            slosh_damping: self.damping,
+            resonance_frequency: self.frequency * (1.0 + ratio).sqrt(),
+            slosh_mass: self.mass,
+            inertia: self.inertia,
+            fit: 0.0,
+        }
+    }
+}
+
 /// Damping ratios that are tried.
 const DAMPINGS: [f64; 5] = [0.0015, 0.003, 0.006, 0.015, 0.04];
 /// Steps of the slosh frequency over the band, relatively: half the half-power width of the least damping.
@@ -223,9 +276,8 @@ const FINENESS: f64 = 1e-3;
 /// S is the spectrum of sgn ω, δ a delay (which stands for what dry friction does to the phase as well, and is not used). All but ω and ζ are linear; these stand on a grid. What is left counts as
 /// motion: it is divided by |jΩ(I0 + m r² G)|. Since nothing is simulated, a multisine's lines make no wrong minima, and
 /// since dry friction is in it, small amplitudes do not pass for damping.
-pub fn balance(recording: &Recording, bench: Bench) -> Option<Balance> {
+pub fn balance(recording: &Recording, bench: Bench, band: (f64, f64)) -> Option<Balance> {
     let (step, torque, rate) = recording.even();
-    let band = excited_band(step, &torque, &rate)?;
     let n = rate.len();
     let mean = rate.iter().sum::<f64>() / n as f64;
     let noise = recording.rate_noise();

@@ -9,7 +9,7 @@ use identify::acceleration::{self, Weights};
 use identify::identification::{Estimated, Identification, Options, identify};
 use identify::recording::Recording;
 use identify::simulate::Between;
-use identify::start::Bench;
+use identify::nominal::Nominal;
 use identify::{black_box, distortion, frequency, recording, report};
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -176,38 +176,42 @@ impl IdentifyArgs {
             [from, to] if from < to => Some((from, to)),
             _ => bail!("--trim needs two times, the first less than the second, s"),
         };
+        if let Some(path) = &self.report {
+            let html = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("html"));
+            ensure!(html, "{}: the name must end in .html", path.display());
+        }
+        let options = Options {
+            between: self.between(),
+            models: self.model.clone(),
+            friction: self.friction.clone(),
+            known: self.known.clone(),
+            settings: self.settings.clone(),
+            starts: self.starts.clone(),
+            flaws: !self.perfect,
+            gyro_scale: self.gyro_scale,
+            validation: Vec::new(),
+        };
+        let coarsest = match self.method {
+            Method::Multisine | Method::BlackBox => f64::INFINITY,
+            _ => options.nominal(&Fmu::open(&self.fmu)?)?.coarsest(),
+        };
         let mut done = Vec::new();
         let mut read = |paths: &[PathBuf]| -> Result<Vec<_>> {
             let mut all = Vec::new();
             for path in paths {
-                all.extend(recording::read(path, trim, &mut |line| {
+                all.extend(recording::read(path, trim, coarsest, &mut |line| {
                     eprintln!("{line}");
                     done.push(line);
                 })?);
             }
             Ok(all)
         };
-        if let Some(path) = &self.report {
-            let html = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("html"));
-            ensure!(html, "{}: the name must end in .html", path.display());
-        }
         let recordings = read(&self.data)?;
         let validation = read(&self.validate)?;
         if self.method != Method::OutputError {
             return self.quickly(&recordings, &validation);
         }
-        let between = self.between();
-        let options = Options {
-            models: self.model,
-            friction: self.friction,
-            known: self.known,
-            settings: self.settings,
-            starts: self.starts,
-            flaws: !self.perfect,
-            gyro_scale: self.gyro_scale,
-            between,
-            validation,
-        };
+        let options = Options { validation, ..options };
         let fmu = Fmu::open(&self.fmu)?;
         let spinner = progress::of_search()?;
         let found =
@@ -281,7 +285,7 @@ impl IdentifyArgs {
             }
             Method::Frequency => {
                 let (one, fmu) = (one()?, Fmu::open(&self.fmu)?);
-                let bench = bench_of(&fmu, &self.settings)?;
+                let bench = Nominal::of(&fmu, &self.settings, &[])?.bench;
                 let between = self.between().unwrap_or(Between::Lines);
                 let found = frequency::identify(one, bench, between)?;
                 estimates(&[&found.parameters, &found.response]);
@@ -325,18 +329,6 @@ impl IdentifyArgs {
         println!("{}", self.out.display());
         Ok(())
     }
-}
-
-/// tank.r, fluid.rho and g_axial of the FMU with these settings.
-fn bench_of(fmu: &Fmu, settings: &[(String, String)]) -> Result<Bench> {
-    let mut instance = fmu.instantiate("identify")?;
-    for (name, value) in settings {
-        instance.set(name, value)?;
-    }
-    instance.setup_experiment(None, 0.0, None)?;
-    instance.enter_initialization_mode()?;
-    let mut real = |name: &str| instance.real(name);
-    Ok(Bench { arm: real("tank.r")?, density: real("fluid.rho")?, gravity: real("g_axial")? })
 }
 
 /// A table of estimates.
