@@ -95,7 +95,8 @@ pub fn fit<'a>(
     from: Option<&Fitted<'a>>,
     heard: &mut dyn FnMut(String),
 ) -> Result<Fitted<'a>> {
-    let of = |start: &Start, options: &Options| problem(fmu, recordings, options, (model, law), start);
+    let of =
+        |start: &Start, options: &Options| problem(fmu, recordings, options, (model, law), start);
     // starts that a user gives may be far off
     let far = !options.starts.is_empty();
     let mut told = options.clone();
@@ -200,8 +201,6 @@ impl<'a> Search<'a, '_> {
         if !near.converged() || !self.join(&near)? {
             return Ok(near);
         }
-        let answer = self.problem.answer(&near.x)?;
-        self.problem.estimate_noise(&answer);
         self.polish(&near.x, Some(&near.jacobian))
     }
 
@@ -256,7 +255,16 @@ impl<'a> Search<'a, '_> {
                 break;
             }
             (self.heard)(format!("{}: noise does not explain it; from another start", self.label));
+            let before = found.map(|f| f.x.clone());
             best = self.better(best, |search| search.windows(&start, &WHOLE));
+            if let Ok((found, _)) = &best
+                && before.is_none_or(|x| x != found.x)
+                && !self.explains(found)
+            {
+                // such a torque has more minima than one; the lowest shows from the beginning on
+                let near = found.x.clone();
+                best = self.better(best, |search| search.windows(&near, &WINDOWS));
+            }
         }
         let found = best.as_ref().ok().map(|found| &found.0);
         let nowhere = found.is_none_or(|f| poor(&self.problem, &f.answer));

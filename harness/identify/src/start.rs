@@ -180,7 +180,13 @@ pub fn from_data(
         all.push(mode.start(bench, rough));
         modes.retain(|other| !other.is_near(&mode));
     }
-    all.push(Start { b: rough.b, c: rough.c, stribeck: rough.stribeck, omega_s: rough.omega_s, ..nominal.start });
+    all.push(Start {
+        b: rough.b,
+        c: rough.c,
+        stribeck: rough.stribeck,
+        omega_s: rough.omega_s,
+        ..nominal.start
+    });
     Ok((responses.first().copied().or(Some(first)), all))
 }
 
