@@ -57,6 +57,13 @@ impl ModelFit {
     }
 }
 
+impl ModelFit {
+    /// A fit that no small effect explains.
+    pub fn is_poor(&self) -> bool {
+        self.fit_pct < POOR && self.tests.iter().any(|t| t.worst() > 100.0)
+    }
+}
+
 /// A fitted model with what is needed afterwards.
 pub struct Fitted<'a> {
     /// What was solved.

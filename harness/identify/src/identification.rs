@@ -13,7 +13,7 @@ use crate::candidate::{self, Fitted, ModelFit};
 use crate::fit::{Answer, Differences, Problem};
 use crate::nominal::Nominal;
 use crate::plausible;
-use crate::recording::Recording;
+use crate::recording::{self, Recording};
 use crate::residual::Tests;
 use crate::simulate::Between;
 use crate::start::{self, Response, Start};
@@ -153,8 +153,52 @@ const ALIKE: f64 = 2.0;
 /// From the simplest slosh model to the richest.
 const SIMPLEST: [&str; 5] = ["frozen", "linear", "planar", "spherical", "paraboloid"];
 
+/// Beginnings that are tried where the whole recording is not described, as fractions of its rows.
+const BEGINNINGS: [f64; 2] = [0.35, 0.5];
+
 /// Identifies the FMU from recordings. `heard` is told what happens.
 pub fn identify(
+    fmu: &Fmu,
+    recordings: &[Recording],
+    options: &Options,
+    heard: &mut dyn FnMut(&str),
+) -> Result<Identification> {
+    let mut found = identify_whole(fmu, recordings, options, heard)?;
+    if let ([recording], false, true) = (recordings, found.described, found.fit.is_poor()) {
+        found.verdict.extend(described_beginning(fmu, recording, options, heard));
+    }
+    Ok(found)
+}
+
+/// The longest beginning of a recording that a model describes, in words.
+fn described_beginning(
+    fmu: &Fmu,
+    recording: &Recording,
+    options: &Options,
+    heard: &mut dyn FnMut(&str),
+) -> Option<String> {
+    let options = Options { validation: Vec::new(), ..options.clone() };
+    let mut longest = None;
+    for part in BEGINNINGS.map(|fraction| recording.beginning(fraction)) {
+        let end = part.time[part.time.len() - 1];
+        if part.duration() < recording::SHORTEST {
+            continue;
+        }
+        heard(&format!("no model describes the whole recording; the rows until {end:.0} s"));
+        match identify_whole(fmu, &[part], &options, &mut |_| {}) {
+            Ok(found) if found.described && found.converged => longest = Some((end, found)),
+            _ => break,
+        }
+    }
+    let (end, found) = longest?;
+    Some(format!(
+        "Until {end:.0} s the {} model describes the recording, and leaves noise alone: --trim {:.0},{end:.0} gives parameters \
+         that can be trusted. (Where slosh begins to rotate it is chaotic, and no fit follows it from there on.)",
+        found.fit.model, recording.time[0]
+    ))
+}
+
+fn identify_whole(
     fmu: &Fmu,
     recordings: &[Recording],
     options: &Options,

@@ -30,7 +30,7 @@ pub fn words(
     budget: &[Effect],
 ) -> Vec<String> {
     let mut lines = Vec::new();
-    lines.extend(slosh(question));
+    lines.extend(slosh(question, described));
     lines.extend(friction(question.laws));
     if !described {
         let mut reasons: Vec<String> =
@@ -76,7 +76,7 @@ pub fn probabilities(bic: impl Iterator<Item = f64> + Clone) -> Vec<f64> {
     weights.iter().map(|w| w / sum).collect()
 }
 
-fn slosh(question: &Question) -> Option<String> {
+fn slosh(question: &Question, described: bool) -> Option<String> {
     let best = question.slosh.first()?;
     if question.slosh.len() == 1 {
         return None;
@@ -95,8 +95,9 @@ fn slosh(question: &Question) -> Option<String> {
         ));
     }
     let second = &question.slosh[1];
+    let is = if described { "The slosh model is" } else { "The nearest slosh model is" };
     Some(format!(
-        "The slosh model is {}: its BIC is {:.0} below that of the next, {}.",
+        "{is} {}: its BIC is {:.0} below that of the next, {}.",
         best.model,
         second.bic - best.bic,
         second.model

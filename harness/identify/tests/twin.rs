@@ -50,6 +50,43 @@ fn parameters_come_back_and_coulomb_and_stribeck_friction_as_their_sum() {
 }
 
 #[test]
+fn starts_forty_percent_off_end_at_the_minimum_of_the_datas_own() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let recordings = [sweep(&fmu, SHORT, &[])];
+    let own = identify(&fmu, &recordings, &options(), &mut |_| {}).unwrap();
+    // all the wrong way for the slosh frequency
+    let far = [("tank.d", 1.4), ("tank.h", 0.6), ("slosh.zeta", 0.6), ("hub.I", 1.4)];
+    let truth = |name: &str| own.parameters[name].value;
+    let starts = far.map(|(name, off)| (name.to_string(), off * truth(name))).to_vec();
+    let there = identify(&fmu, &recordings, &Options { starts, ..options() }, &mut |_| {}).unwrap();
+    assert!(there.converged && there.described, "{:?}", there.verdict);
+    for (name, p) in &own.parameters {
+        // both searches end within a hundredth of a standard deviation, along the friction's valleys a tenth
+        let off = (there.parameters[name].value - p.value).abs() / p.std;
+        assert!(off < 0.2, "{name}: {off} standard deviations");
+    }
+}
+
+#[test]
+fn a_bench_of_another_size_is_estimated_if_it_is_said_to_be_one() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let settings = [("hub.I", "5"), ("tank.d", "0.4"), ("tank.h", "0.3"), ("tank.r", "0.5")];
+    let large = sweep(&fmu, "lin-sweep:amplitude=2,f0=0.8,f1=3,duration=300", &settings);
+    let arm = ("tank.r".to_string(), "0.5".to_string());
+    let told = Options { settings: vec![arm], ..options() };
+    let recordings = [large];
+    let error = identify(&fmu, &recordings, &told, &mut |_| {}).unwrap_err().to_string();
+    assert!(error.contains("--known hub.I="), "{error}");
+    let told = Options { known: vec![("hub.I".into(), 9.0, 4.0)], ..told };
+    let found = identify(&fmu, &recordings, &told, &mut |_| {}).unwrap();
+    for (name, truth) in [("tank.d", 0.4), ("tank.h", 0.3), ("hub.I", 5.0)] {
+        let p = &found.parameters[name];
+        // four standard deviations: one false alarm in 3000 draws, and the seed is fixed
+        assert!((p.value - truth).abs() < 4.0 * p.std, "{name}: {p:?}");
+    }
+}
+
+#[test]
 fn an_encoder_shows_the_gyros_scale() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let flaws = Flaws { gyro_scale: 1.01, ..Flaws::default() };
