@@ -334,7 +334,7 @@ impl<'a> Search<'a, '_> {
     fn near(&mut self, other: &Fitted<'a>, model: &str) -> Result<Found> {
         if model != "frozen" && poor(&other.problem, &other.polished.answer) {
             // so nonlinear that the other model's estimate leads nowhere
-            return self.from_the_start();
+            return self.anew();
         }
         // what both have, from there
         let mut x = self.problem.start();
@@ -378,13 +378,13 @@ impl<'a> Search<'a, '_> {
             }
         }
         if poor(&self.problem, &best.answer) {
-            return self.from_the_start();
+            return self.anew();
         }
         Ok((best, if same { other.spread.clone() } else { None }))
     }
 
-    /// From the starts, first over the whole, then over windows that grow.
-    fn from_the_start(&mut self) -> Result<Found> {
+    /// Without the other model: from the starts, first over the whole, then over windows that grow.
+    fn anew(&mut self) -> Result<Found> {
         let start = self.problem.start();
         let whole = self.windows(&start, &WHOLE)?;
         if !poor(&self.problem, &whole.0.answer) {
