@@ -26,7 +26,7 @@ pub fn check_size(found: &Response, nominal: f64) -> Result<()> {
     };
     bail!(
         "the recording shows an inertia of {:.3e} kg.m2, the FMU with its settings has {nominal:.3e} kg.m2: \
-         {guess}. If the bench really is that different, say what is expected of it: --known hub.I={:.2}:{:.2} estimates \
+         {guess}. If the bench really is that different, say what is expected of it: --known hub.I={:.1e}:{:.1e} estimates \
          it all the same.",
         found.inertia,
         0.8 * found.inertia,
