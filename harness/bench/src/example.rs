@@ -9,10 +9,10 @@ use anyhow::{Context, Result};
 
 use crate::profile::Torque;
 use crate::run::{Run, driven};
-use crate::table::Table;
 use host::description::ModelDescription;
 use host::fmi2::Fmu;
 use host::output;
+use signals::table::Table;
 
 /// The torque: `time` (s), `tau_cmd` (N.m).
 pub const INPUT: &str = "HubSlosh_in.csv";

@@ -12,9 +12,9 @@ use crate::profile::{Torque, Written};
 use crate::progress::Progress;
 use crate::run::{Run, TORQUE};
 use crate::svg::{Axis, Chart, Series, Style};
-use crate::table::Table;
 use host::fmi2::Fmu;
 use host::output;
+use signals::table::Table;
 
 /// The longest record in steps, about 0.3 GB.
 const MOST_STEPS: f64 = 1e7;

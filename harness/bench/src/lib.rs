@@ -13,4 +13,3 @@ pub mod report;
 pub mod run;
 pub mod scaling;
 pub mod svg;
-pub mod table;

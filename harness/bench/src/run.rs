@@ -5,9 +5,9 @@ use std::path::Path;
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::profile::Torque;
-use crate::table::{self, Table};
 use host::description::{ModelDescription, Type, Variable};
 use host::fmi2::{Fmu, Instance};
+use signals::table::{self, Table};
 
 /// What is to be run.
 #[derive(Clone, Debug)]

@@ -12,8 +12,8 @@
 
 use anyhow::{Result, ensure};
 use bench::analysis::Complex64;
-use realfft::RealFftPlanner;
 use serde::Serialize;
+use signals::fourier::Forward;
 
 use crate::recording::Recording;
 
@@ -84,16 +84,13 @@ pub fn analyse(recording: &Recording, period: f64) -> Result<Found> {
     );
     let periods = all - settling;
     let first = torque.len() - periods * rows;
-    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(rows);
+    let transform = Forward::new(rows);
     let spectra = |signal: &[f64]| -> Vec<Vec<Complex64>> {
         signal[first..]
             .chunks_exact(rows)
             .map(|chunk| {
-                let mut input = chunk.to_vec();
-                let mut output = transform.make_output_vec();
-                transform.process(&mut input, &mut output).expect("lengths are the plan's");
                 // amplitudes
-                output.iter().map(|v| v * (2.0 / rows as f64)).collect()
+                transform.of(chunk.to_vec()).iter().map(|v| v * (2.0 / rows as f64)).collect()
             })
             .collect()
     };

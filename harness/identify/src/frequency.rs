@@ -28,8 +28,8 @@ use anyhow::{Context, Result, ensure};
 use bench::analysis::Complex64;
 use bench::analysis::transfer_function::TransferFunction;
 use nalgebra::DMatrix;
-use realfft::RealFftPlanner;
 use serde::Serialize;
+use signals::fourier::Forward;
 
 use crate::identification::Estimated;
 use crate::least_squares::{differences, minimise};
@@ -135,12 +135,9 @@ fn variances(left: &[Complex64], unknowns: usize) -> Vec<f64> {
 
 /// Spectra of a signal at the lines `bins`.
 fn spectrum(signal: &[f64], bins: &std::ops::RangeInclusive<usize>) -> Vec<Complex64> {
-    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(signal.len());
     let mean = signal.iter().sum::<f64>() / signal.len() as f64;
-    let mut input: Vec<f64> = signal.iter().map(|v| v - mean).collect();
-    let mut output = transform.make_output_vec();
-    transform.process(&mut input, &mut output).expect("lengths are the plan's");
-    output[bins.clone()].to_vec()
+    let spectrum = Forward::new(signal.len()).of(signal.iter().map(|v| v - mean).collect());
+    spectrum[bins.clone()].to_vec()
 }
 
 /// Fits a recording of a hub with slosh. `between`: what the torque did between rows.

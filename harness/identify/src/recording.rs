@@ -8,7 +8,7 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
-use bench::table::{self, Table};
+use signals::table::{self, Table};
 
 /// Longest time between two rows over which torque is joined by a line, s.
 pub const LONGEST_GAP: f64 = 0.25;

@@ -11,9 +11,8 @@
 //! Many rows make each test sensitive to effects of no importance; so the size of what is left
 //! is stated beside it, over the noise.
 
-use bench::analysis::Complex64;
-use realfft::RealFftPlanner;
 use serde::Serialize;
+use signals::fourier::Forward;
 
 /// Lags of the whiteness test.
 pub const LAGS: usize = 50;
@@ -124,9 +123,7 @@ fn worst(levels: &mut [(f64, f64)], deviation: f64) -> (f64, f64) {
 /// Mean periodogram in bands from 0 to half the sampling frequency, the bands' width (Hz) and how
 /// many lines are in each.
 fn periodogram(e: &[f64], step: f64) -> (Vec<f64>, f64, f64) {
-    let forward = RealFftPlanner::<f64>::new().plan_fft_forward(e.len());
-    let mut spectrum: Vec<Complex64> = forward.make_output_vec();
-    forward.process(&mut e.to_vec(), &mut spectrum).expect("lengths are the plan's");
+    let spectrum = Forward::new(e.len()).of(e.to_vec());
     let lines = (spectrum.len() - 1) / BANDS;
     let power = |k: usize| spectrum[k].norm_sqr() / e.len() as f64;
     let bands = (0..BANDS)

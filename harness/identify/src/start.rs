@@ -25,6 +25,8 @@ use bench::analysis::{
     welch::{self, Spectra},
 };
 
+use signals::fourier::Forward;
+
 use crate::nominal::Nominal;
 use crate::recording::Recording;
 
@@ -288,16 +290,11 @@ pub fn balance(recording: &Recording, bench: Bench, band: (f64, f64)) -> Option<
     let mean = rate.iter().sum::<f64>() / n as f64;
     let noise = recording.rate_noise();
     let signs: Vec<f64> = rate.iter().map(|w| ((w - mean) / (3.0 * noise)).tanh()).collect();
-    let spectrum = |x: &[f64]| {
-        let forward = realfft::RealFftPlanner::<f64>::new().plan_fft_forward(n);
-        // Hann's window: what happened before the record and after it does not leak
-        let mut windowed: Vec<f64> =
-            (0..n).map(|k| x[k] * (1.0 - (TAU * k as f64 / n as f64).cos())).collect();
-        let mut found = forward.make_output_vec();
-        forward.process(&mut windowed, &mut found).ok()?;
-        Some(found)
-    };
-    let (t, w, s) = (spectrum(&torque)?, spectrum(&rate)?, spectrum(&signs)?);
+    let transform = Forward::new(n);
+    // Hann's window: what happened before the record and after it does not leak
+    let window = |k: usize| 1.0 - (TAU * k as f64 / n as f64).cos();
+    let spectrum = |x: &[f64]| transform.of((0..n).map(|k| x[k] * window(k)).collect());
+    let (t, w, s) = (spectrum(&torque), spectrum(&rate), spectrum(&signs));
     let width = 1.0 / (n as f64 * step);
     let (first, last) = ((0.9 * band.0 / width) as usize, (1.1 * band.1 / width) as usize);
     // lines with more than noise in them

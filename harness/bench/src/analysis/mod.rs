@@ -25,7 +25,7 @@ pub mod spa;
 pub mod transfer_function;
 pub mod welch;
 
-pub use realfft::num_complex::Complex64;
+pub use signals::fourier::Complex64;
 
 /// A complex frequency response on a grid of frequencies.
 #[derive(Clone, Debug, Default)]

@@ -14,7 +14,7 @@
 //! polynomial in t what the record's ends leave in the spectra. What is left is V.
 
 use nalgebra::{SMatrix, SVector};
-use realfft::RealFftPlanner;
+use signals::fourier::Forward;
 
 use super::Complex64;
 
@@ -28,13 +28,8 @@ const UNKNOWNS: usize = 7;
 /// of signals sampled every `step` s; NaN where nothing can be said.
 pub fn power(step: f64, input: &[f64], output: &[f64], frequencies: &[f64]) -> Vec<f64> {
     let count = input.len();
-    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(count);
-    let spectrum = |signal: &[f64]| {
-        let mut spectrum = transform.make_output_vec();
-        transform.process(&mut signal.to_vec(), &mut spectrum).expect("lengths are the plan's");
-        spectrum
-    };
-    let (u, y) = (spectrum(input), spectrum(output));
+    let transform = Forward::new(count);
+    let (u, y) = (transform.of(input.to_vec()), transform.of(output.to_vec()));
     let mut last: Option<(usize, f64)> = None;
     let at = |frequency: &f64| {
         let k = (frequency * step * count as f64).round() as usize;

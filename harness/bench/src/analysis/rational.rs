@@ -15,7 +15,7 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
-use realfft::RealFftPlanner;
+use signals::fourier::Forward;
 
 use super::features::{Deviations, Features};
 use super::{Complex64, FrequencyResponse};
@@ -48,13 +48,9 @@ impl Rational {
         let bin = 1.0 / (step * count as f64);
         let bins = (from / bin).ceil() as usize..=((to / bin) as usize).min(count / 2);
         let every = (bins.clone().count() / POINTS).max(1);
-        let transform = RealFftPlanner::<f64>::new().plan_fft_forward(count);
-        let spectrum = |signal: &[f64]| {
-            let mut spectrum = transform.make_output_vec();
-            let mut signal: Vec<f64> = signal.iter().map(|x| x / count as f64).collect();
-            transform.process(&mut signal, &mut spectrum).expect("lengths are the plan's");
-            spectrum
-        };
+        let transform = Forward::new(count);
+        let spectrum =
+            |signal: &[f64]| transform.of(signal.iter().map(|x| x / count as f64).collect());
         let (u, y) = (spectrum(torque), spectrum(rate));
         let unit = TAU * (from * to).sqrt();
         let points: Vec<(Complex64, Complex64, Complex64)> = bins

@@ -6,7 +6,7 @@
 //! H = Φ_yu / Φ_uu,   w(τ) = (1 + cos(πτ/M)) / 2
 //! ```
 
-use realfft::RealFftPlanner;
+use signals::fourier::{Forward, Inverse};
 
 use super::{Complex64, FrequencyResponse};
 
@@ -86,25 +86,18 @@ fn estimate(
     let lags = ((lag / step).round() as usize).min(input.len() - 1);
     // zeros behind the record, so that covariances up to `lags` do not wrap around
     let length = (input.len() + lags).next_power_of_two();
-    let mut planner = RealFftPlanner::<f64>::new();
-    let (forward, backward) = (planner.plan_fft_forward(length), planner.plan_fft_inverse(length));
+    let (forward, inverse) = (Forward::new(length), Inverse::new(length));
 
     let spectrum = |signal: &[f64]| {
         let mean = signal.iter().sum::<f64>() / signal.len() as f64;
         let mut padded: Vec<f64> = signal.iter().map(|v| v - mean).collect();
         padded.resize(length, 0.0);
-        let mut spectrum = forward.make_output_vec();
-        forward.process(&mut padded, &mut spectrum).expect("lengths are the plan's");
-        spectrum
+        forward.of(padded)
     };
     // sum and difference of the covariances at +k and -k steps under the Hann lag window: what
     // multiplies cosine and sine; at 0 there is one covariance
-    let tapered = |mut cross: Vec<Complex64>| -> Vec<(f64, f64)> {
-        for end in [0, cross.len() - 1] {
-            cross[end].im = 0.0; // real by symmetry; the inverse insists on it exactly
-        }
-        let mut covariance = backward.make_output_vec();
-        backward.process(&mut cross, &mut covariance).expect("lengths are the plan's");
+    let tapered = |cross: Vec<Complex64>| -> Vec<(f64, f64)> {
+        let covariance = inverse.of(cross);
         let weight = |k: usize| (1.0 + (std::f64::consts::PI * k as f64 / lags as f64).cos()) / 2.0;
         let pair = |k: usize| match k {
             0 => (covariance[0], covariance[0]),

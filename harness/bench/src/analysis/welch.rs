@@ -12,7 +12,7 @@
 //!   thesis's sweep, which resolves the antiresonance. For the H1 estimate, which needs no average
 //!   there, and for the signal-to-noise ratio: one segment has the sweep, the others the noise alone.
 
-use realfft::RealFftPlanner;
+use signals::fourier::Forward;
 
 use super::{Complex64, FrequencyResponse};
 
@@ -63,7 +63,7 @@ impl Spectra {
             Segments::Longest => longest,
         };
         let padded = PADDING * length;
-        let fft = RealFftPlanner::<f64>::new().plan_fft_forward(padded);
+        let transform = Forward::new(padded);
         let window: Vec<f64> = (0..length)
             .map(|i| {
                 let turn = std::f64::consts::TAU * i as f64 / (length - 1) as f64;
@@ -83,9 +83,7 @@ impl Spectra {
             let mut windowed: Vec<f64> =
                 signal.iter().zip(&window).map(|(x, w)| (x - mean) * w).collect();
             windowed.resize(padded, 0.0);
-            let mut spectrum = fft.make_output_vec();
-            fft.process(&mut windowed, &mut spectrum).expect("lengths are the plan's");
-            spectrum
+            transform.of(windowed)
         };
         let mut from = 0;
         while from + length <= input.len() {

@@ -19,7 +19,7 @@ use crate::analysis::welch::{self, Spectra};
 use crate::analysis::{FrequencyResponse, demodulation, logarithmic_grid, noise, spa};
 use crate::profile::{Profile, Sweep, Torque};
 use crate::run::Run;
-use crate::table::Table;
+use signals::table::Table;
 
 /// Frequencies at which responses are evaluated: 1.2 mHz apart at the antiresonance of the thesis's
 /// sweep.

@@ -8,7 +8,7 @@ use host::fmi2::Fmu;
 
 use super::Case;
 use crate::run::Run;
-use crate::table::{self, Table};
+use signals::table::{self, Table};
 
 /// Raised when stored runs of an older program mean something else.
 const FORMAT: &str = "1";

@@ -15,7 +15,7 @@ use host::description::did_you_mean;
 pub use self::kinds::{Allowed, FILE, KINDS, Kind, Parameter};
 pub use self::noise::TONES;
 pub use self::shape::{Law, Shape, Sweep};
-use crate::table::Table;
+use signals::table::Table;
 
 /// A torque history with a formula: an entry of [`KINDS`] with values for its parameters.
 #[derive(Clone, Debug)]

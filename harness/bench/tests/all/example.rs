@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use bench::example;
-use bench::table::Table;
 use host::fmi2::Fmu;
 use pack::packed_for_tests;
+use signals::table::Table;
 
 /// Largest difference of each column over the column's largest value, at the reference's rows.
 fn differences(answer: &Table, reference: &Table) -> Vec<(String, f64)> {

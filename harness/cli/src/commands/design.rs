@@ -6,12 +6,12 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use bench::analysis::linear::{Linear, Mode};
 use bench::profile::Written;
-use bench::table::{self, Table};
 use host::fmi2::Fmu;
 use identify::design::{self, Multisine, Wheel};
 use identify::noise::Noise;
 use identify::simulate::Setup;
 use identify::unknown::Unknown;
+use signals::table::{self, Table};
 
 use super::{DEFAULT_FMU, setting};
 

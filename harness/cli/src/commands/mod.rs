@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use bench::table::{self, Table};
+use signals::table::{self, Table};
 
 pub mod book;
 pub mod campaign;

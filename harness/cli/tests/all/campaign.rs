@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
-use bench::table::Table;
 use pack::packed_for_tests;
+use signals::table::Table;
 
 /// Header of features.csv, on which others build.
 const HEADER: &str = "model,fill_m,amplitude_nm,f_res_hz,f_dip_hz,delta_f_hz,notch_db,fit_freq_pct,fit_time_pct,coherence,snr_res_db,snr_dip_db,skewness,kurtosis,peak_slosh_angle_deg,peak_radial_angle_deg,peak_wave_height_m,max_energy_residual,stuck_s";

@@ -4,8 +4,8 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use bench::table::Table;
 use pack::packed_for_tests;
+use signals::table::Table;
 
 /// Runs `hubslosh` in `directory`.
 fn hubslosh(directory: &Path, arguments: &[&str]) -> Output {

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use bench::table::Table;
+use signals::table::Table;
 
 /// Runs the program in a folder and returns what it prints; stderr if it fails.
 fn hubslosh(folder: &Path, arguments: &[&str]) -> Result<String, String> {

@@ -6,9 +6,9 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use bench::table::Table;
 use host::fmi2::Fmu;
 use pack::packed_for_tests;
+use signals::table::Table;
 
 /// `hubslosh` with these arguments.
 fn hubslosh(directory: &Path, arguments: &[&str]) -> Command {
@@ -174,7 +174,7 @@ fn a_stored_run_of_another_recipe_is_simulated_again_and_why_is_said() {
     assert!(String::from_utf8_lossy(&done.stdout).contains("0 runs simulated, 1 reused"));
     // without its columns for the tables it does not count either
     let run = directory.join("c/runs/a.parquet");
-    let notes = bench::table::metadata(&run).unwrap();
+    let notes = signals::table::metadata(&run).unwrap();
     Table::read(&run, &["time", "omega"]).unwrap().write(&run, &notes).unwrap();
     let done = successful(campaign(directory, &changed, "c", &[]));
     assert!(String::from_utf8_lossy(&done.stdout).contains("1 runs simulated, 0 reused"));

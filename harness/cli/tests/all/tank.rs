@@ -76,7 +76,7 @@ fn a_tanks_parameters_drive_the_fmu_as_its_dimensions_do() {
             .output()
             .unwrap();
         assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
-        bench::table::Table::read(std::path::Path::new(&out), &["omega", "wave_height"]).unwrap()
+        signals::table::Table::read(std::path::Path::new(&out), &["omega", "wave_height"]).unwrap()
     };
     let geometry = run(&["--set", "slosh.modes=2"]);
     let toml = run(&["--set-file", &path("set.toml")]);
@@ -173,7 +173,7 @@ fn a_curved_meniscus_reaches_the_fmu_and_what_it_cannot_take_is_told() {
             .unwrap();
         assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
         let column = ["slosh.frequency[1]"];
-        let table = bench::table::Table::read(std::path::Path::new(&out), &column).unwrap();
+        let table = signals::table::Table::read(std::path::Path::new(&out), &column).unwrap();
         table.column(column[0]).unwrap()[0]
     };
     let (ok, said) = written("0.072", "30");

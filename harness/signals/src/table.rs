@@ -270,37 +270,3 @@ fn read_values<T: DataType>(
     }
     Ok(())
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn table() -> Table {
-        let names = ["time", "tau_cmd", "omega"].map(String::from).to_vec();
-        Table::new(names, vec![vec![0.0, 0.02], vec![0.1, 1.0 / 3.0], vec![-1e-300, 2e17]])
-    }
-
-    #[test]
-    fn numbers_come_back_bit_for_bit_from_both_formats() {
-        let directory = tempfile::tempdir().unwrap();
-        for name in ["a.csv", "a.parquet"] {
-            let path = directory.path().join(name);
-            table().write(&path, &BTreeMap::from([("k".into(), "v".into())])).unwrap();
-            let back = Table::read(&path, &["omega", "time"]).unwrap();
-            assert_eq!(back, table().only(&["omega", "time"]));
-        }
-        assert_eq!(metadata(&directory.path().join("a.parquet")).unwrap()["k"], "v");
-    }
-
-    #[test]
-    fn a_missing_column_and_a_nan_are_named() {
-        let directory = tempfile::tempdir().unwrap();
-        let path = directory.path().join("a.csv");
-        std::fs::write(&path, "time,torque\n0,1\n").unwrap();
-        let error = format!("{:#}", Table::read(&path, &["time", "tau_cmd"]).unwrap_err());
-        assert!(error.contains("no column tau_cmd (columns in it: time, torque)"), "{error}");
-        std::fs::write(&path, "time,tau_cmd\n0,1\n1,NaN\n").unwrap();
-        let error = format!("{:#}", Table::read(&path, &["time", "tau_cmd"]).unwrap_err());
-        assert!(error.contains("a.csv, row 2: tau_cmd is NaN"), "{error}");
-    }
-}

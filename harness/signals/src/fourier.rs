@@ -1,0 +1,57 @@
+//! Discrete Fourier transforms of real signals of one length N, not normalised:
+//!
+//! ```text
+//! X_k = Σ_n x_n e^{−j2πkn/N},   k = 0 … N/2
+//! ```
+
+use std::sync::Arc;
+
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
+
+pub use realfft::num_complex::Complex64;
+
+/// From a signal to its spectrum.
+pub struct Forward(Arc<dyn RealToComplex<f64>>);
+
+impl Forward {
+    /// For signals of `length` samples.
+    pub fn new(length: usize) -> Self {
+        Forward(RealFftPlanner::new().plan_fft_forward(length))
+    }
+
+    /// The spectrum of a signal, N/2 + 1 lines.
+    ///
+    /// # Panics
+    /// If the signal has another length.
+    pub fn of(&self, mut signal: Vec<f64>) -> Vec<Complex64> {
+        let mut spectrum = self.0.make_output_vec();
+        self.0.process(&mut signal, &mut spectrum).expect("a signal of the transform's length");
+        spectrum
+    }
+}
+
+/// From a spectrum to N times its signal.
+pub struct Inverse(Arc<dyn ComplexToReal<f64>>);
+
+impl Inverse {
+    /// For signals of `length` samples.
+    pub fn new(length: usize) -> Self {
+        Inverse(RealFftPlanner::new().plan_fft_inverse(length))
+    }
+
+    /// N times the signal of a spectrum of N/2 + 1 lines. Line 0 and, if N is even, the last are
+    /// taken as real.
+    ///
+    /// # Panics
+    /// If the spectrum has another length.
+    pub fn of(&self, mut spectrum: Vec<Complex64>) -> Vec<f64> {
+        let last = spectrum.len() - 1;
+        spectrum[0].im = 0.0;
+        if self.0.len().is_multiple_of(2) {
+            spectrum[last].im = 0.0;
+        }
+        let mut signal = self.0.make_output_vec();
+        self.0.process(&mut spectrum, &mut signal).expect("a spectrum of the transform's length");
+        signal
+    }
+}

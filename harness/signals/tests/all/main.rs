@@ -1,0 +1,4 @@
+//! Tests of `signals`, outside the library: its generic crates are compiled once.
+
+mod fourier;
+mod table;
