@@ -251,7 +251,9 @@ impl<'a> Search<'a, '_> {
 
     fn begin(&mut self, slosh: bool) -> Result<Found> {
         let x = self.problem.start();
-        let mut best = self.windows(&x, if self.far { &WINDOWS } else { &WHOLE });
+        // The response that starts come from is linear: a model that is not may be far from it.
+        let nonlinear = slosh && self.label != "linear";
+        let mut best = self.windows(&x, if self.far || nonlinear { &WINDOWS } else { &WHOLE });
         for start in self.others.clone() {
             let found = best.as_ref().ok().map(|found| &found.0);
             let explained = found.is_some_and(|f| self.explains(f));
@@ -275,7 +277,7 @@ impl<'a> Search<'a, '_> {
         }
         let found = best.as_ref().ok().map(|found| &found.0);
         let nowhere = found.is_none_or(|f| poor(&self.problem, &f.answer));
-        if slosh && self.alone && !self.far && nowhere {
+        if slosh && !nonlinear && self.alone && !self.far && nowhere {
             (self.heard)(format!(
                 "{}: poor fit from there; again with windows that grow",
                 self.label
@@ -383,14 +385,14 @@ impl<'a> Search<'a, '_> {
         Ok((best, if same { other.spread.clone() } else { None }))
     }
 
-    /// Without the other model: from the starts, first over the whole, then over windows that grow.
+    /// Without the other model: from the start over windows that grow, and over the whole where that leads nowhere.
     fn anew(&mut self) -> Result<Found> {
         let start = self.problem.start();
-        let whole = self.windows(&start, &WHOLE)?;
-        if !poor(&self.problem, &whole.0.answer) {
-            return Ok(whole);
+        let grown = self.windows(&start, &WINDOWS)?;
+        if !poor(&self.problem, &grown.0.answer) {
+            return Ok(grown);
         }
-        self.better(Ok(whole), |search| search.windows(&start, &WINDOWS))
+        self.better(Ok(grown), |search| search.windows(&start, &WHOLE))
     }
 }
 

@@ -633,49 +633,72 @@ impl<'a> Problem<'a> {
     ///
     /// A start whose slosh frequency is 20 % off is out of phase after a few cycles; over a whole
     /// recording its error has as many minima as there are cycles. Over the beginning it has one,
-    /// and as the window grows the estimate stays within its reach. In a window each parameter is
-    /// also held near its start ([`LOOSE`]), for a short window does not say everything, and what the
-    /// model cannot follow yet counts as noise of [`BLUNT`] times the gyro's.
+    /// and as the window grows the estimate stays within its reach. Where a window leaves [`LEAP`] times as
+    /// much as the one before (a resonance or rotary slosh has come into it), it is reached in smaller steps.
     pub fn search_growing(
         &self,
         x: &[f64],
         windows: &[f64],
         heard: &mut dyn FnMut(String),
     ) -> Result<Estimate> {
-        let (mut x, mut simulations, mut jacobian) = (x.to_vec(), 0, None);
-        let first = x.clone();
-        for &fraction in windows {
-            let part: Vec<Recording> =
-                self.recordings.iter().map(|r| r.beginning(fraction)).collect();
-            let mut problem = Problem { recordings: &part, ..self.clone() };
-            for (unknown, &x) in problem.unknowns.iter_mut().zip(&first) {
-                if let Some(name) = unknown.quantity.parameter() {
-                    // the friction's shape is left to the search that knows of its valleys
-                    let shape = matches!(name, "friction.d" | "friction.omega_s");
-                    let loose = if shape { 0.4 * LOOSE } else { LOOSE };
-                    let value = unknown.scale.value(x);
-                    let size = match unknown.scale {
-                        Scale::Log | Scale::Softplus(_) => value,
-                        Scale::Logit(..) | Scale::Linear(_) => unknown.scale.slope(x).abs(),
-                    };
-                    unknown.prior = Some((value, loose * size));
-                }
-            }
-            for channel in &mut problem.channels {
-                channel.noise.white *= BLUNT;
-            }
-            let estimate = problem.search(&x, 1e-3)?;
+        let mut to_come: Vec<f64> = windows.iter().rev().copied().collect();
+        let (mut from, mut jacobian, mut simulations) = (x.to_vec(), None, 0);
+        // the last window, what it left, its estimate; none once a leap was taken all the same
+        let mut before: Option<(f64, f64, Vec<f64>)> = None;
+        let mut careful = true;
+        while let Some(window) = to_come.pop() {
+            let (estimate, left) = self.search_window(x, &from, window)?;
             heard(format!(
                 "window of {:.0} %: {}, {} simulations",
-                100.0 * fraction,
+                100.0 * window,
                 estimate.reason,
                 estimate.simulations
             ));
             simulations += estimate.simulations;
-            x = estimate.x;
+            if let Some((reached, less, estimate)) = before.take_if(|b| left > LEAP * b.1) {
+                if window - reached > SHORTEST {
+                    to_come.extend([window, 0.5 * (reached + window)]);
+                    from.clone_from(&estimate);
+                    before = Some((reached, less, estimate));
+                    continue;
+                }
+                careful = false;
+            }
+            if careful {
+                before = Some((window, left, estimate.x.clone()));
+            }
+            from = estimate.x;
             jacobian = estimate.jacobian.map(|jacobian| jacobian * BLUNT);
         }
-        Ok(Estimate { x, simulations, jacobian, reason: String::new() })
+        Ok(Estimate { x: from, simulations, jacobian, reason: String::new() })
+    }
+
+    /// The search over a window of the recordings from x, and the mean square of what it leaves. Each parameter is
+    /// also held near its first start ([`LOOSE`]), for a short window does not say everything, and what the
+    /// model cannot follow yet counts as noise of [`BLUNT`] times the gyro's.
+    fn search_window(&self, first: &[f64], x: &[f64], fraction: f64) -> Result<(Estimate, f64)> {
+        let part: Vec<Recording> = self.recordings.iter().map(|r| r.beginning(fraction)).collect();
+        let mut problem = Problem { recordings: &part, ..self.clone() };
+        for (unknown, &x) in problem.unknowns.iter_mut().zip(first) {
+            if let Some(name) = unknown.quantity.parameter() {
+                // the friction's shape is left to the search that knows of its valleys
+                let shape = matches!(name, "friction.d" | "friction.omega_s");
+                let loose = if shape { 0.4 * LOOSE } else { LOOSE };
+                let value = unknown.scale.value(x);
+                let size = match unknown.scale {
+                    Scale::Log | Scale::Softplus(_) => value,
+                    Scale::Logit(..) | Scale::Linear(_) => unknown.scale.slope(x).abs(),
+                };
+                unknown.prior = Some((value, loose * size));
+            }
+        }
+        for channel in &mut problem.channels {
+            channel.noise.white *= BLUNT;
+        }
+        let estimate = problem.search(x, 1e-3)?;
+        let left = problem.stacked(&problem.answer(&estimate.x)?, &estimate.x);
+        let left = left.norm_squared() / left.len() as f64;
+        Ok((estimate, left))
     }
 }
 
@@ -711,6 +734,10 @@ pub const WINDOWS: [f64; 7] = [0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0];
 pub const WHOLE: [f64; 1] = [1.0];
 /// By how much the noise of a window is taken for larger than the gyro's.
 const BLUNT: f64 = 10.0;
+/// By how much more a window must leave than the one before to be reached in smaller steps.
+const LEAP: f64 = 3.0;
+/// Shortest step from one window to the next, as a fraction of the recordings.
+const SHORTEST: f64 = 0.05;
 /// How far a parameter may be from its start in a window, relatively.
 const LOOSE: f64 = 0.5;
 

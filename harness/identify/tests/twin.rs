@@ -86,6 +86,24 @@ fn a_bench_of_another_size_is_estimated_if_it_is_said_to_be_one() {
     }
 }
 
+/// Downwards a sweep meets the softening resonance from above; where slosh begins to rotate, windows must grow slowly.
+#[test]
+fn a_downward_sweep_shows_that_slosh_rotates() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let torque = "lin-sweep:amplitude=0.1,duration=900,f0=3,f1=1.7";
+    let recording = sweep(&fmu, torque, &[("slosh.model", "spherical")]);
+    let models = ["linear", "spherical"].map(String::from).to_vec();
+    let found =
+        identify(&fmu, &[recording], &Options { models, ..options() }, &mut |_| {}).unwrap();
+    assert!(found.converged && found.described, "{:?}", found.verdict);
+    assert_eq!(found.fit.model, "spherical");
+    for (name, truth) in [("tank.d", 0.163), ("tank.h", 0.1), ("slosh.zeta", 0.003)] {
+        let p = &found.parameters[name];
+        // four standard deviations, as above
+        assert!((p.value - truth).abs() < 4.0 * p.std, "{name}: {p:?}");
+    }
+}
+
 #[test]
 fn an_encoder_shows_the_gyros_scale() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
