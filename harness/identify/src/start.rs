@@ -24,7 +24,6 @@ use bench::analysis::{
     Complex64, FrequencyResponse, logarithmic_grid, spa,
     welch::{self, Spectra},
 };
-
 use signals::fourier::Forward;
 
 use crate::nominal::Nominal;
