@@ -4,11 +4,17 @@
 //! X_k = Σ_n x_n e^{−j2πkn/N},   k = 0 … N/2
 //! ```
 
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError};
 
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 
 pub use realfft::num_complex::Complex64;
+
+/// Keeps what was prepared for each length: preparing a transform takes longer than one takes.
+fn planner() -> MutexGuard<'static, RealFftPlanner<f64>> {
+    static PLANNER: LazyLock<Mutex<RealFftPlanner<f64>>> = LazyLock::new(Default::default);
+    PLANNER.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// From a signal to its spectrum.
 pub struct Forward(Arc<dyn RealToComplex<f64>>);
@@ -16,7 +22,7 @@ pub struct Forward(Arc<dyn RealToComplex<f64>>);
 impl Forward {
     /// For signals of `length` samples.
     pub fn new(length: usize) -> Self {
-        Forward(RealFftPlanner::new().plan_fft_forward(length))
+        Forward(planner().plan_fft_forward(length))
     }
 
     /// The spectrum of a signal, N/2 + 1 lines.
@@ -36,7 +42,7 @@ pub struct Inverse(Arc<dyn ComplexToReal<f64>>);
 impl Inverse {
     /// For signals of `length` samples.
     pub fn new(length: usize) -> Self {
-        Inverse(RealFftPlanner::new().plan_fft_inverse(length))
+        Inverse(planner().plan_fft_inverse(length))
     }
 
     /// N times the signal of a spectrum of N/2 + 1 lines. Line 0 and, if N is even, the last are
