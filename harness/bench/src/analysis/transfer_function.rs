@@ -116,23 +116,32 @@ impl TransferFunction {
     pub fn free_answer(&self, step: f64, signal: &[f64]) -> Vec<f64> {
         let decay = self.pole_damping * self.pole_omega;
         let turn = self.pole_omega * (1.0 - self.pole_damping.powi(2)).max(0.0).sqrt();
-        // the pair's second answer is t e^(-decay t) where it is not oscillating; a pair of
-        // real poles is taken as that
-        let answers = |k: usize| {
-            let t = k as f64 * step;
-            let (pair, second) =
-                ((-decay * t).exp(), if turn > 0.0 { (turn * t).sin() } else { t });
-            Vector3::new((-self.real_pole * t).exp(), pair * (turn * t).cos(), pair * second)
+        // from sample to sample an answer decays and turns by the same factor; over a million of
+        // them that is exact to 1e-10, and costs a tenth of asking for each
+        let (slower, turned) = (
+            (-self.real_pole * step).exp(),
+            Complex64::from_polar((-decay * step).exp(), turn * step),
+        );
+        let answers = || {
+            let (mut slow, mut pair) = (1.0, Complex64::ONE);
+            (0..signal.len()).map(move |k| {
+                // the pair's second answer is t e^(-decay t) where it is not oscillating; a pair of
+                // real poles is taken as that
+                let second = if turn > 0.0 { pair.im } else { k as f64 * step * pair.re };
+                let row = Vector3::new(slow, pair.re, second);
+                slow *= slower;
+                pair *= turned;
+                row
+            })
         };
         let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
-        for (k, value) in signal.iter().enumerate() {
-            let row = answers(k);
+        for (row, value) in answers().zip(signal) {
             normal += row * row.transpose();
             right += row * *value;
         }
         let Some(inverse) = normal.try_inverse() else { return vec![0.0; signal.len()] };
         let weights = inverse * right;
-        (0..signal.len()).map(|k| weights.dot(&answers(k))).collect()
+        answers().map(|row| weights.dot(&row)).collect()
     }
 }
 
@@ -308,6 +317,32 @@ mod tests {
         // Chords of the sine: (w h)²/12 = 1.3e-5; the start has decayed by e^(-27); the
         // peak falls between samples by (w h)²/8.
         assert!((largest / tf.response(f).norm() - 1.0).abs() < 5e-5);
+    }
+
+    #[test]
+    fn a_free_answer_is_found_again_from_the_whole_signal() {
+        // 2700 s of a slowly turning pair with a slow real pole; and a pair of equal real poles
+        for (pole_damping, real_pole) in [(2e-5, 1e-4), (1.0, 0.1)] {
+            let tf = TransferFunction {
+                numerator: [1.0, 2.0, 3.0],
+                real_pole,
+                pole_omega: 15.0,
+                pole_damping,
+            };
+            let (decay, turn) =
+                (pole_damping * 15.0, 15.0 * f64::sqrt(1.0 - pole_damping * pole_damping));
+            let free = |k: i32| {
+                let t = f64::from(k) * 0.02;
+                let second = if turn > 0.0 { (turn * t).sin() } else { t };
+                0.3 * (-real_pole * t).exp()
+                    + (-decay * t).exp() * (0.5 * (turn * t).cos() - 0.2 * second)
+            };
+            let signal: Vec<f64> = (0..135_001).map(free).collect();
+            // 135,000 roundings of 1e-16 each, all the same way
+            for (found, given) in tf.free_answer(0.02, &signal).iter().zip(&signal) {
+                assert!((found - given).abs() < 2e-11, "{found} instead of {given}");
+            }
+        }
     }
 
     #[test]
