@@ -3,8 +3,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use HubSlosh::table::TABLE;
+use plant::{FrictionModel, SloshModel, SloshSource};
 use runtime::operation::{GET_BOOLEAN, GET_INTEGER, GET_REAL, Interface};
-use runtime::variable::{Causality, Value, Variable};
+use runtime::variable::{Causality, Kind, Value, Variable};
 
 /// An element of the XML with its attributes.
 struct Element {
@@ -225,6 +226,21 @@ fn enumerations_are_declared() {
             assert!(types.contains(declared), "{}", variable.get("name").unwrap());
         }
     }
+}
+
+/// The items stand at the numbers of the physics' own, by which they are set.
+#[test]
+fn enumerations_name_the_physics_own_items_in_their_order() {
+    fn compare<T: std::fmt::Debug>(variable: &str, all: &[T]) {
+        let variable = TABLE.variables.iter().find(|v| v.name == variable).unwrap();
+        let Kind::Enumeration(of) = variable.kind else { panic!("{} is none", variable.name) };
+        let items: Vec<String> = of.items.iter().map(|item| item.name.replace('_', "")).collect();
+        let own: Vec<String> = all.iter().map(|item| format!("{item:?}").to_lowercase()).collect();
+        assert_eq!(items, own, "{}", variable.name);
+    }
+    compare("slosh.model", &SloshModel::ALL);
+    compare("slosh.source", &SloshSource::ALL);
+    compare("friction.model", &FrictionModel::ALL);
 }
 
 #[test]

@@ -361,33 +361,45 @@ mod tests {
         compare_output_derivatives(every_option);
     }
 
+    /// Every continuous output, with its name.
+    fn continuous(outputs: &Outputs) -> Vec<(&'static str, f64)> {
+        macro_rules! all {
+            ($($name:ident),*) => {{
+                // whoever adds an output adds it here
+                let Outputs { $($name,)* wave: [radial, tangential], discrete: _ } = *outputs;
+                vec![$((stringify!($name), $name),)* ("wave", radial), ("wave", tangential)]
+            }};
+        }
+        all!(
+            theta,
+            omega,
+            omega_dot,
+            slosh_angle,
+            slosh_rate,
+            slosh_angle_radial,
+            slosh_rate_radial,
+            tau_friction,
+            tau_fluid,
+            tau_gravity,
+            f_tangential,
+            f_radial,
+            wave_height,
+            baffle_wave,
+            omega_imu,
+            energy,
+            momentum,
+            power_dissipated,
+            tau_actuator,
+            wheel_speed,
+            work,
+            work_axial,
+            heat,
+            stuck_time,
+            baffle_zeta
+        )
+    }
+
     fn compare_output_derivatives(change: fn(&mut Parameters)) {
-        // Every continuous output.
-        let reals: [fn(&Outputs) -> f64; 23] = [
-            |o| o.theta,
-            |o| o.omega,
-            |o| o.omega_dot,
-            |o| o.slosh_angle,
-            |o| o.slosh_rate,
-            |o| o.slosh_angle_radial,
-            |o| o.slosh_rate_radial,
-            |o| o.tau_friction,
-            |o| o.tau_fluid,
-            |o| o.tau_gravity,
-            |o| o.baffle_zeta,
-            |o| o.baffle_wave,
-            |o| o.f_tangential,
-            |o| o.f_radial,
-            |o| o.wave_height,
-            |o| o.omega_imu,
-            |o| o.energy,
-            |o| o.momentum,
-            |o| o.power_dissipated,
-            |o| o.tau_actuator,
-            |o| o.wheel_speed,
-            |o| o.work,
-            |o| o.heat,
-        ];
         for slosh in SloshModel::ALL {
             for friction in FrictionModel::ALL {
                 for stuck in [false, true] {
@@ -422,13 +434,14 @@ mod tests {
                     let before = plant.outputs_held(&inputs);
                     let derivatives = plant.output_derivatives(&inputs, &dx, &du);
                     assert_eq!(plant.outputs_held(&inputs), before, "nothing has moved");
-                    for (n, get) in reals.iter().enumerate() {
-                        let difference = (get(&plus) - get(&minus)) / (2.0 * eps);
-                        let got = get(&derivatives);
-                        let size = difference.abs().max(get(&before).abs()).max(0.1);
+                    let [plus, minus, before, derivatives] =
+                        [plus, minus, before, derivatives].map(|o| continuous(&o));
+                    for (n, (name, got)) in derivatives.into_iter().enumerate() {
+                        let difference = (plus[n].1 - minus[n].1) / (2.0 * eps);
+                        let size = difference.abs().max(before[n].1.abs()).max(0.1);
                         assert!(
                             (difference - got).abs() < 1e-7 * size,
-                            "{slosh:?} {friction:?} output {n}: {got} {difference}"
+                            "{slosh:?} {friction:?} {name}: {got} {difference}"
                         );
                     }
                 }
