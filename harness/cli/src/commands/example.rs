@@ -11,6 +11,7 @@ use super::DEFAULT_FMU;
 /// Writes the example that travels with the FMU (modelDescription/HubSlosh/extra): torque and
 /// answer.
 #[derive(clap::Args)]
+#[command(after_help = "Example:\n  hubslosh pack && hubslosh example")]
 pub struct ExampleArgs {
     /// The FMU that answers.
     #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
