@@ -397,8 +397,8 @@ impl<M: Model> Instance<M> {
         references: &[u32],
         value: &impl Fn(usize) -> Value,
     ) -> Result<(), Fault> {
-        let mut parameters =
-            self.model_parameters().map_err(|problems| call.error(problems.join("; ")))?;
+        // All of them are in their ranges: so it was when the motion began, and since.
+        let mut parameters = self.given_parameters();
         for (n, reference) in references.iter().enumerate() {
             let scalar = scalar::<M>(call, *reference)?;
             scalar.variable.set_parameter(&mut parameters, scalar.element, value(n));
@@ -842,13 +842,19 @@ impl<M: Model> Instance<M> {
 
     /// The parameters as the model takes them, or all that is wrong with them.
     pub(crate) fn model_parameters(&self) -> Result<M::Parameters, Vec<String>> {
+        let all = M::table().parameters().iter().zip(&self.parameters);
+        let problems: Vec<String> =
+            all.filter_map(|(scalar, value)| scalar.problem(*value)).collect();
+        if problems.is_empty() { Ok(self.given_parameters()) } else { Err(problems) }
+    }
+
+    /// The parameters as they were set, in their ranges or not.
+    fn given_parameters(&self) -> M::Parameters {
         let mut parameters = M::Parameters::default();
-        let mut problems = Vec::new();
         for (scalar, value) in M::table().parameters().iter().zip(&self.parameters) {
             scalar.variable.set_parameter(&mut parameters, scalar.element, *value);
-            problems.extend(scalar.problem(*value));
         }
-        if problems.is_empty() { Ok(parameters) } else { Err(problems) }
+        parameters
     }
 
     /// The outputs now; they are computed when they are first asked for.
