@@ -2,14 +2,14 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* A call that takes more of the processor's time is a failure, s. Time on the clock would accuse calls
+/* A call that takes more CPU time than this is a failure, s. Time on the clock would accuse calls
  * that only waited for their turn on a busy machine. */
 extern double host_slowest_allowed;
 
 /* What happened so far, over all inputs. */
 extern struct host_report {
     unsigned long inputs, calls, accepted, messages;
-    /* of a single call, processor's time, s */
+    /* of a single call, CPU time, s */
     double slowest;
     const char *slowest_call;
 } host_report;

@@ -148,8 +148,8 @@ def main() -> None:
     except (cluster.CampaignError, hubslosh.FmuError) as error:
         sys.exit(f"error: {error}")
     again = maker(theirs.out / "runs" / f"{killer.interrupted}.parquet")
-    print(f"process {killer.process} was killed while it made {killer.interrupted},")
-    print(f"which was made again by {again}")
+    print(f"process {killer.process} was killed while it simulated {killer.interrupted},")
+    print(f"which was simulated again by {again}")
     column = max(worst, key=lambda name: worst[name])
     print(f"worst of {len(worst)} columns: {worst[column]:.1e} ({column})")
     sys.exit(0 if worst[column] <= MOST else f"error: more than {MOST:.0e}")

@@ -149,7 +149,7 @@ fn energy_never_grows_without_torque() {
                 let damped = slosh != SloshModel::Frozen || friction != FrictionModel::None;
                 // A paraboloid may leave its rim in the first step.
                 if damped && first.energy > 0.0 && plant.time() > 0.0 {
-                    assert!(last.heat > 0.0, "damping makes heat: {p:?}");
+                    assert!(last.heat > 0.0, "damping dissipates energy: {p:?}");
                 }
             }
         }

@@ -70,11 +70,19 @@ fn extremum(system: &([[f64; 4]; 4], [f64; 4]), low: f64, high: f64, sign: f64) 
 fn a1_a2_peak_lies_above_the_dip() {
     // Exact transfer function of the corrected equations (17-digit roots of its slope).
     // With the printed sign of 4.29 the resonance lies below the antiresonance (2.2255, 2.0326 Hz).
-    for (h, dip, peak) in [(0.10, 2.3431981124, 2.4566022092), (0.05, 2.1329468189, 2.2306922246)] {
+    for (h, antiresonance, resonance) in
+        [(0.10, 2.3431981124, 2.4566022092), (0.05, 2.1329468189, 2.2306922246)]
+    {
         let system = linear_system(h, true);
         // A golden section on a smooth extremum finds it to the root of rounding.
-        assert!((extremum(&system, dip - 0.05, dip + 0.05, -1.0) - dip).abs() < 1e-6);
-        assert!((extremum(&system, peak - 0.05, peak + 0.05, 1.0) - peak).abs() < 1e-6);
+        assert!(
+            (extremum(&system, antiresonance - 0.05, antiresonance + 0.05, -1.0) - antiresonance)
+                .abs()
+                < 1e-6
+        );
+        assert!(
+            (extremum(&system, resonance - 0.05, resonance + 0.05, 1.0) - resonance).abs() < 1e-6
+        );
     }
 }
 

@@ -157,7 +157,7 @@ impl Bob {
     /// Coefficient N of what does not depend on [a; w'] of this order: force and torque about
     /// O on the craft. `w` is the pair (w, w), `w2` coefficient N of the matrix of y -> w x (w x y).
     #[inline(always)]
-    pub fn load<const N: usize>(&mut self, w: &Pair, w2: &Mat3) -> [Vec3; 2] {
+    pub fn reaction<const N: usize>(&mut self, w: &Pair, w2: &Mat3) -> [Vec3; 2] {
         let Bob { m, l, c, k, .. } = *self;
         self.turned = series::cross_pair::<N>(w, &self.both);
         let p_d = [0, 1, 2].map(|i| self.v[N][i] - self.turned[i][0]);

@@ -315,15 +315,14 @@ impl<T: Number> Contents<T> {
     /// Force and torque about O on the craft at a = w' = 0, the rigid liquid's inertia left out.
     pub fn loads(&self) -> [Vec3<T>; 2] {
         let bobs = self.bobs.iter().flatten().map(|bob| bob.wrench(bob.t_0));
-        bobs.fold(self.stirring, |sum, load| [add(sum[0], load[0]), add(sum[1], load[1])])
+        bobs.fold(self.stirring, |sum, bob| [add(sum[0], bob[0]), add(sum[1], bob[1])])
     }
 
     /// Force and torque about O on the craft.
     pub fn wrench(&self, a: Vec3<T>, w: Vec3<T>, w_d: Vec3<T>) -> [Vec3<T>; 2] {
         let rigid = self.rigid.inertial_wrench(a, w, w_d);
         let bobs = self.bobs.iter().flatten().map(|bob| bob.wrench(bob.pull(a, w_d)));
-        let sum =
-            bobs.fold(self.stirring, |sum, load| [add(sum[0], load[0]), add(sum[1], load[1])]);
+        let sum = bobs.fold(self.stirring, |sum, bob| [add(sum[0], bob[0]), add(sum[1], bob[1])]);
         [sub(sum[0], rigid[0]), sub(sum[1], rigid[1])]
     }
 

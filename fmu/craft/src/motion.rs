@@ -327,7 +327,7 @@ impl Motion for CraftMotion {
             add(gyroscopic(&self.rigid.inertia, ww), cross_ramp::<N>(&self.w, &self.h)),
         );
         for bob in &mut self.bobs {
-            let [f, tau] = bob.load::<N>(&self.w_both, &w2);
+            let [f, tau] = bob.reaction::<N>(&self.w_both, &w2);
             force = add(force, f);
             torque = add(torque, tau);
         }

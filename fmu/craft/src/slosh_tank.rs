@@ -314,7 +314,7 @@ impl Motion for TankMotion {
         let w2 = twice_crossed(products::<N>(&self.w));
         let mut dissipation = 0.0;
         for bob in &mut self.bobs {
-            bob.load::<N>(&self.w_both, &w2);
+            bob.reaction::<N>(&self.w_both, &w2);
             bob.accelerate::<N>(self.a[N], self.w_d[N]);
             dissipation += bob.dissipation::<N>();
         }

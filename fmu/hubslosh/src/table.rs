@@ -156,7 +156,7 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         "Damping ratio of a mode at the present g_axial, without a baffle's; 0 for modes that are not used")
         .shape(&[MODES]).depends_on(&["g_axial"]).initial_depends_on(LIQUID),
     V::local("baffle.zeta", |o, _| o.baffle_zeta, "1",
-        "Damping ratio of mode 1 by the ring baffle at the amplitude of the moment, besides slosh.damping[1]; 0 without one")
+        "Damping ratio of mode 1 by the ring baffle at the present amplitude, in addition to slosh.damping[1]; 0 without one")
         .depends_on(WAVE_1).initial_depends_on(&["baffle.", "tank.", "fluid.", "slosh.", "init."]),
     V::local("baffle.wave", |o, _| o.baffle_wave, "m",
         "Amplitude at the wall of the oscillation of mode 1, from its angle and its rate, that baffle.zeta belongs to; 0 without a baffle")
@@ -347,7 +347,7 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
 
     // Ring baffle
     V::parameter("baffle.width", |p, _| &mut p.baffle.width, "m",
-        "Width of a flat ring at the tank's wall, which damps mode 1 as the root of the wave's amplitude (Miles 1958); 0: none")
+        "Width of a flat ring at the tank's wall, whose damping of mode 1 grows with the square root of the wave's amplitude (Miles 1958); 0: none")
         .display_unit("mm").range(0.0, 100.0),
     V::parameter("baffle.depth", |p, _| &mut p.baffle.depth, "m",
         "Depth of the ring below the surface at rest")

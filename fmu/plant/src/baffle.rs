@@ -85,7 +85,7 @@ fn covered(p: &Parameters) -> f64 {
 }
 
 /// How much of the surface's motion is left at the ring: exp(-1.84 d/R).
-fn reach(p: &Parameters) -> f64 {
+fn motion_at_ring(p: &Parameters) -> f64 {
     libm::exp(-1.84 * p.baffle.depth / (p.tank.d / 2.0))
 }
 
@@ -146,7 +146,8 @@ impl Range {
     /// `None` without a ring.
     pub fn new(p: &Parameters) -> Option<Range> {
         let Ring { width, depth } = p.baffle;
-        let range = || Range { stroke: reach(p) / width, depth, covers_little: covered(p) < 0.25 };
+        let range =
+            || Range { stroke: motion_at_ring(p) / width, depth, covers_little: covered(p) < 0.25 };
         (width > 0.0).then(range)
     }
 
@@ -167,7 +168,7 @@ impl Baffle {
         let alpha = covered(p);
         let depth = libm::exp(-4.60 * p.baffle.depth / radius);
         let zeta = 2.83 * depth * alpha * libm::sqrt(alpha) * libm::sqrt(wave / radius);
-        let floor = FLOOR * STROKE.start() * p.baffle.width / (reach(p) * wave);
+        let floor = FLOOR * STROKE.start() * p.baffle.width / (motion_at_ring(p) * wave);
         Baffle { zeta, floor2: floor * floor, w_floor: WEIGHTLESS / l, ..Baffle::default() }
     }
 

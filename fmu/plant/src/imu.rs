@@ -53,14 +53,14 @@ impl Imu {
 
     /// Takes the next sample of the rate `omega`.
     pub(crate) fn sample(&self, gyro: &mut Gyro, omega: f64) {
-        let (white, wander) = normals(self.seed, gyro.next);
+        let (white, drift) = normals(self.seed, gyro.next);
         let reading = omega + gyro.bias + self.arw * libm::sqrt(self.rate) * white;
         // Steps too small to be seen change nothing.
         let seen = reading.abs() < 1e16 * self.lsb;
         gyro.held = if seen { libm::rint(reading / self.lsb) * self.lsb } else { reading };
         let keep = libm::exp(-1.0 / (self.rate * self.bias_time));
         let spread = self.bias_instability / 0.664 * libm::sqrt(1.0 - keep * keep);
-        gyro.bias = keep * gyro.bias + spread * wander;
+        gyro.bias = keep * gyro.bias + spread * drift;
         gyro.next += 1;
     }
 }
@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn bias_wanders_with_its_stationary_spread() {
+    fn bias_drifts_with_its_stationary_spread() {
         let imu = Imu { bias_time: 1.0, arw: 0.0, ..Imu::default() };
         let mut gyro = imu.start();
         let mut sum = 0.0;

@@ -263,7 +263,7 @@ impl<M: Model> Instance<M> {
             Access::Calculated(get) => Value::Real(get(self.model(call)?, element)),
             Access::Derivative(place) => {
                 let mut x_dot = std::mem::take(&mut self.scratch[0]);
-                let done = self.look(call, |model, inputs| model.derivatives(inputs, &mut x_dot));
+                let done = self.query(call, |model, inputs| model.derivatives(inputs, &mut x_dot));
                 let value = x_dot[place(element)];
                 self.scratch[0] = x_dot;
                 done?;
@@ -457,7 +457,7 @@ impl<M: Model> Instance<M> {
         answers: &mut [f64],
     ) -> Result<(), Fault> {
         let mut x_dot = std::mem::take(&mut self.scratch[0]);
-        let done = self.look(call, |model, inputs| model.derivatives(inputs, &mut x_dot));
+        let done = self.query(call, |model, inputs| model.derivatives(inputs, &mut x_dot));
         self.scratch[0] = x_dot;
         done?;
         let mut along = self.inputs;
@@ -513,7 +513,7 @@ impl<M: Model> Instance<M> {
         answers: &mut [f64],
     ) -> Result<(), Fault> {
         let [dx, mut dx_dot] = std::mem::take(&mut self.scratch);
-        let found = self.look(call, |model, inputs| {
+        let found = self.query(call, |model, inputs| {
             model.directional_derivative(inputs, along, &dx, &mut dx_dot)
         });
         let done = found.and_then(|outputs| {
@@ -684,7 +684,7 @@ impl<M: Model> Instance<M> {
     /// again, after other inputs, does no harm.
     pub fn new_discrete_states(&mut self) -> Result<EventInfo, Fault> {
         let call = &self.check(&op::NEW_DISCRETE_STATES)?;
-        let event = self.look(call, |model, inputs| model.handle_event(inputs))?;
+        let event = self.query(call, |model, inputs| model.handle_event(inputs))?;
         let states_changed = event.map_err(|why| call.error(why))?;
         self.state = InstanceState::Event;
         self.outputs = None;
@@ -710,7 +710,7 @@ impl<M: Model> Instance<M> {
                 "the step to {time:?} s has passed the stop time {stop:?} s"
             )));
         }
-        let accepted = self.look(call, |model, inputs| model.accept_step(inputs))?;
+        let accepted = self.query(call, |model, inputs| model.accept_step(inputs))?;
         self.outputs = None;
         accepted.map_err(|why| {
             self.state = InstanceState::Failed;
@@ -774,7 +774,7 @@ impl<M: Model> Instance<M> {
         let places = M::table().places();
         check_length(call, "nx", derivatives.len(), places.len())?;
         let mut x_dot = std::mem::take(&mut self.scratch[0]);
-        let done = self.look(call, |model, inputs| model.derivatives(inputs, &mut x_dot));
+        let done = self.query(call, |model, inputs| model.derivatives(inputs, &mut x_dot));
         for (place, x) in places.zip(&mut *derivatives) {
             *x = x_dot[place];
         }
@@ -792,7 +792,7 @@ impl<M: Model> Instance<M> {
     pub fn event_indicators(&mut self, indicators: &mut [f64]) -> Result<(), Fault> {
         let call = &self.check(&op::GET_EVENT_INDICATORS)?;
         check_length(call, "ni", indicators.len(), M::table().about.event_indicators)?;
-        self.look(call, |model, inputs| model.event_indicators(inputs, indicators))
+        self.query(call, |model, inputs| model.event_indicators(inputs, indicators))
     }
 
     /// fmi2GetNominalsOfContinuousStates
@@ -867,21 +867,21 @@ impl<M: Model> Instance<M> {
     }
 
     fn evaluate(&mut self, call: &Call) -> Result<(), Fault> {
-        self.outputs = Some(self.look(call, M::outputs)?);
+        self.outputs = Some(self.query(call, M::outputs)?);
         Ok(())
     }
 
-    /// What is [`seen`] of the model.
-    fn look<T>(
+    /// Asks the model, as [`answer`] does.
+    fn query<T>(
         &mut self,
         call: &Call,
-        look: impl FnOnce(&mut M, &M::Inputs) -> T,
+        question: impl FnOnce(&mut M, &M::Inputs) -> T,
     ) -> Result<T, Fault> {
         self.model(call)?;
         let Instance { interface, model: Some(model), inputs, .. } = self else {
             return Err(call.error("the instance was never initialised"));
         };
-        Ok(seen(*interface, model, inputs, look))
+        Ok(answer(*interface, model, inputs, question))
     }
 
     /// How many events have happened since the start.
@@ -896,23 +896,23 @@ impl<M: Model> Instance<M> {
     }
 }
 
-/// What `look` sees of the model: in Co-Simulation as the present inputs leave it; in Model
+/// What the model answers to a question: in Co-Simulation as the present inputs leave it; in Model
 /// Exchange, where discrete changes happen at events alone, as it is.
 #[inline(always)]
-fn seen<M: Model, T>(
+fn answer<M: Model, T>(
     interface: Interface,
     model: &mut M,
     inputs: &M::Inputs,
-    look: impl FnOnce(&mut M, &M::Inputs) -> T,
+    question: impl FnOnce(&mut M, &M::Inputs) -> T,
 ) -> T {
     match interface {
         Interface::CoSimulation => {
             let before = model.apply_present_inputs(inputs);
-            let seen = look(model, inputs);
+            let answer = question(model, inputs);
             model.revert(before);
-            seen
+            answer
         }
-        Interface::ModelExchange => look(model, inputs),
+        Interface::ModelExchange => question(model, inputs),
     }
 }
 

@@ -147,7 +147,11 @@ pub fn bond_text(
         Some(Flight::Radius(r)) => {
             positive(&[("flight radius", r)])?;
             let same = liquid.acceleration(bond, r);
-            writeln!(text, "a tank of radius {r} m has it at an acceleration of {same:.6e} m/s2")?;
+            writeln!(
+                text,
+                "a tank of radius {r} m has it at an acceleration of {} m/s2",
+                digits(same)
+            )?;
         }
         Some(Flight::Acceleration(g)) => {
             positive(&[("flight acceleration", g)])?;
@@ -197,12 +201,17 @@ pub fn rotation_text(
     Ok(text)
 }
 
+/// Seven significant digits.
+fn digits(value: f64) -> f64 {
+    format!("{value:.6e}").parse().unwrap_or(value)
+}
+
 /// Table 2.3 for a scale, in words.
 pub fn froude_text(lambda: f64, density: f64, gravity: f64) -> Result<String> {
     positive(&[("lambda", lambda), ("density ratio", density), ("gravity ratio", gravity)])?;
     let mut text = String::from("full size = factor x model\n");
     for (name, unit, factor) in froude(lambda, density, gravity) {
-        writeln!(text, "{name:22}{unit:8}{factor:.6e}")?;
+        writeln!(text, "{name:22}{unit:8}{}", digits(factor))?;
     }
     writeln!(
         text,

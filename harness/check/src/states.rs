@@ -19,7 +19,7 @@ const SAVE: &str = "canGetAndSetFMUstate";
 const SERIALIZE: &str = "canSerializeFMUstate";
 
 /// Goes on by some steps from where the host was when it saved the state.
-fn go_on(session: &mut Session, from: &Mark) -> Result<Vec<Reading>> {
+fn continued(session: &mut Session, from: &Mark) -> Result<Vec<Reading>> {
     session.go_back(from);
     session.advance(STEPS)?;
     session.readings()
@@ -34,14 +34,14 @@ pub fn rollback(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let state = session.instance.get_state()?;
         let here = session.mark();
         let before = session.readings()?;
-        let first = go_on(&mut session, &here)?;
+        let first = continued(&mut session, &here)?;
         fmu.doing("fmi2SetFMUstate");
         session.instance.set_state(&state)?;
         let restored = session.readings()?;
         if let Some(text) = session.difference(&restored, &before) {
             findings.add(format!("right after fmi2SetFMUstate ({})", interface.name()), text);
         }
-        let second = go_on(&mut session, &here)?;
+        let second = continued(&mut session, &here)?;
         if let Some(text) = session.difference(&second, &first) {
             let place = format!("{STEPS} steps after fmi2SetFMUstate ({})", interface.name());
             findings.add(place, text);
@@ -61,9 +61,9 @@ pub fn handle(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         fmu.doing("fmi2GetFMUstate into a handle that is there already");
         session.instance.get_state_into(&mut state)?;
         let here = session.mark();
-        let first = go_on(&mut session, &here)?;
+        let first = continued(&mut session, &here)?;
         session.instance.set_state(&state)?;
-        let second = go_on(&mut session, &here)?;
+        let second = continued(&mut session, &here)?;
         if let Some(text) = session.difference(&second, &first) {
             findings.add(format!("a handle used again ({})", interface.name()), text);
         }
@@ -91,7 +91,7 @@ pub fn bytes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             }
             session.instance.free_state(state)?;
             let here = session.mark();
-            (go_on(&mut session, &here)?, here, bytes)
+            (continued(&mut session, &here)?, here, bytes)
         };
         // One instance that has lived, one that was neither set up nor initialised.
         for lived in [true, false] {
@@ -105,7 +105,7 @@ pub fn bytes(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
             });
             let state = other.instance.deserialize(&bytes)?;
             other.instance.set_state(&state)?;
-            let second = go_on(&mut other, &here)?;
+            let second = continued(&mut other, &here)?;
             if let Some(text) = other.difference(&second, &first) {
                 findings.add(format!("{} ({})", fmu.now(), interface.name()), text);
             }

@@ -41,7 +41,7 @@ struct Cli {
 /// What the program's exit code says.
 const EXIT_CODES: &str = "Exit codes:\n  \
     0  done, or the reader of its output has closed the pipe\n  \
-    1  it failed; stderr says what was wrong, where, and what is allowed (of check: something was \
+    1  it failed; stderr says what was wrong, where, and what is allowed (of check: errors were \
     found)\n  \
     2  the command line was not understood";
 

@@ -34,7 +34,8 @@ use identify::simulate::Between;
 use identify::start::PARAMETERS;
 use identify::twin::{self, Blind, Flaws, Twin};
 
-struct Asked {
+/// What the command line asks for.
+struct Arguments {
     seeds: std::ops::RangeInclusive<u32>,
     torque: String,
     twin: Twin,
@@ -43,12 +44,12 @@ struct Asked {
     say: bool,
 }
 
-fn asked() -> Result<Asked> {
+fn arguments() -> Result<Arguments> {
     let mut twin = Twin::default();
     let mut set = |name: &str, value: &str| twin.settings.push((name.into(), value.into()));
     set("slosh.zeta_from_correlation", "false");
     set("slosh.zeta", "0.0029757");
-    let mut asked = Asked {
+    let mut asked = Arguments {
         seeds: 1..=50,
         torque: "lin-sweep:amplitude=0.1".into(),
         twin,
@@ -209,7 +210,7 @@ impl Tally {
 }
 
 fn main() -> Result<()> {
-    let asked = asked()?;
+    let asked = arguments()?;
     let fmu = Fmu::open(pack::packed_for_tests())?;
     let torque = twin::torque(&asked.torque)?;
     let truths = truths(&fmu, &asked.twin)?;

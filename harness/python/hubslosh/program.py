@@ -137,8 +137,14 @@ def identify(
 
     The parameters with ``settings`` simulate the bench:
     ``{n: e.value for n, e in found.parameters.items()} | found.settings``, and so does the file:
-    ``simulate(parameters="result.json")``.
+    ``simulate(parameters="result.json")``. The program's other methods (``--method``) have results
+    of other kinds; they are not for this function.
     """
+    if any(argument.split("=")[0] == "--method" for argument in arguments):
+        raise FmuError(
+            "identify() estimates by simulation; run `hubslosh identify DATA --method …` for the "
+            "other methods, whose results are of other kinds"
+        )
     path = find_program(program)
     with tempfile.TemporaryDirectory() as folder:
         file, result = Path(folder) / "data.parquet", Path(folder) / "result.json"

@@ -41,7 +41,7 @@ def campaign(request: pytest.FixtureRequest, fmu: Path, tmp_path_factory) -> Pat
 
 
 def test_every_figure_is_found_again_from_the_definitions(campaign: Path) -> None:
-    """Within the tolerances of ``check_analysis``, for a linear and for a turning liquid."""
+    """Within the tolerances of ``check_analysis``, for linear and for rotary slosh."""
     assert check_analysis.compare(campaign, analyse) == []
     with (campaign / "features.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))

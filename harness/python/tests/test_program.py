@@ -45,6 +45,13 @@ def test_a_missing_program_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
         hubslosh.campaign("thesis", program="elsewhere")
 
 
+def test_identification_by_another_method_is_the_program_s() -> None:
+    """Their results are no parameters of a simulated bench."""
+    for flags in (["--method", "multisine"], ["--method=frequency"]):
+        with pytest.raises(FmuError, match="hubslosh identify DATA --method"):
+            hubslosh.identify("data.csv", None, *flags)
+
+
 def test_identification_gives_typed_estimates(
     fmu: Path, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:

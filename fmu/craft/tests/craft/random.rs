@@ -13,7 +13,7 @@ impl Random {
         low + (high - low) * self.0.f64()
     }
 
-    /// Evenly in its logarithm.
+    /// Uniform in its logarithm.
     pub fn magnitude(&mut self, low: f64, high: f64) -> f64 {
         low * f64::powf(high / low, self.0.f64())
     }

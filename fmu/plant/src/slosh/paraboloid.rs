@@ -9,7 +9,7 @@
 //! J    = m r^2 y^2 / N                 (beyond the hub's I0)
 //! T    = m r mu y + c [ (r + x) y' - y x' ]
 //! E = m [(x' - w y)^2 + (y' + w (r + x))^2 + s z'^2]/2 + m (g/l) [|q|^2/2 + h |q|^4/4]
-//! heat c (|q'|^2 + s z'^2),  z' = q.q'/l
+//! dissipated power c (|q'|^2 + s z'^2),  z' = q.q'/l
 //! ```
 //!
 //! Lagrange's equations for this E and the Rayleigh function c (|q'|^2 + s z'^2)/2.

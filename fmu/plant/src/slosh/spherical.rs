@@ -26,7 +26,7 @@
 //! ```text
 //! J = m r^2 p_y^2     (beyond the hub's I0)
 //! T = m r l p_y L_0 + c l [ r p_y' + l (p_x p_y' - p_y p_x') ]
-//! E = m |l v + r w e_y|^2/2 + m g l (1 + p_z),  heat c l^2 |p'|^2
+//! E = m |l v + r w e_y|^2/2 + m g l (1 + p_z),  dissipated power c l^2 |p'|^2
 //! H = m [ (r + l p_x) (l v_y + r w) - l p_y l v_x ]
 //! ```
 //!

@@ -173,10 +173,10 @@ mod tests {
         let band = (0.01, 0.3);
         let found = Rational::fit(step, &torque, &rate, band).unwrap();
         let features = Features::of(&found.frequency_response(&logarithmic_grid(band, 2000)));
-        let (dip, resonance) = (0.2752 / TAU, 0.2827 / TAU);
+        let (antiresonance, resonance) = (0.2752 / TAU, 0.2827 / TAU);
         // 1.1 mHz of a record have little more than one period; a thousandth of the frequency is
         // what sampling leaves
-        assert!((features.f_dip.unwrap() / dip - 1.0).abs() < 2e-3, "{features:?}");
+        assert!((features.f_dip.unwrap() / antiresonance - 1.0).abs() < 2e-3, "{features:?}");
         assert!((features.f_res.unwrap() / resonance - 1.0).abs() < 2e-3, "{features:?}");
         assert!(found.misfit < 0.2, "{}", found.misfit);
     }

@@ -47,9 +47,9 @@ pub(super) fn responses(page: &Page, group: &Group) -> Figure {
 /// The band around antiresonance and resonance, at their own distance, Hz.
 fn near(group: &Group) -> Option<(f64, f64)> {
     let (from, to) = group.band().unwrap_or(BAND);
-    let (dip, resonance) = group.exact.f_dip.zip(group.exact.f_res)?;
-    let delta = resonance - dip;
-    Some(((dip - 2.5 * delta).max(from), (resonance + 4.0 * delta).min(to)))
+    let (antiresonance, resonance) = group.exact.f_dip.zip(group.exact.f_res)?;
+    let delta = resonance - antiresonance;
+    Some(((antiresonance - 2.5 * delta).max(from), (resonance + 4.0 * delta).min(to)))
 }
 
 fn bode(
