@@ -14,6 +14,7 @@
 //!   tanh(omega/1e-5), over the whole sweep in one call; `dopri5@1e-8` with another scale
 //!   than 1e-5 rad/s.
 //! * `rk4`: classical fixed-step Runge-Kutta on the same, TOLERANCE is the step in s.
+//! * `torque`: only makes the torque, whose instructions are no method's.
 //!
 //! All see the same torque: straight lines between knots 20 ms apart.
 
@@ -214,7 +215,8 @@ fn main() -> Result<()> {
             "dopri5" => whole_sweep!(Dopri5, 10.0, 0.2, 0.04),
             "dop853" => whole_sweep!(Dop853, 6.0, 0.333, 0.0),
             "rk4" => rk4(&torque, eps, tolerance),
-            _ => bail!("{method} is none of linear, spherical, dopri5, dop853, rk4"),
+            "torque" => (vec![0.0; torque.len()], Vec::new()),
+            _ => bail!("{method} is none of linear, spherical, dopri5, dop853, rk4, torque"),
         })
     };
     let (rates, mut least) = solve()?;
