@@ -39,6 +39,9 @@ pub struct ModelFit {
     pub noise_white: f64,
     /// Answers of the FMU that were needed.
     pub simulations: usize,
+    /// Neither noise nor a small effect explains what the fit leaves.
+    #[serde(skip)]
+    pub poor: bool,
 }
 
 impl ModelFit {
@@ -54,13 +57,6 @@ impl ModelFit {
             self.tests.iter().map(Tests::worst).fold(0.0, f64::max),
             self.simulations
         )
-    }
-}
-
-impl ModelFit {
-    /// A fit that no small effect explains.
-    pub fn is_poor(&self) -> bool {
-        self.fit_pct < POOR && self.tests.iter().any(|t| t.worst() > 100.0)
     }
 }
 
@@ -541,6 +537,7 @@ fn summary(
         validation_pct: validate(problem, &polished.x, options)?,
         noise_white: problem.channels[0].noise.white,
         simulations,
+        poor: poor(problem, answer),
     })
 }
 
@@ -576,7 +573,7 @@ fn fit_pct(problem: &Problem, answer: &Answer) -> f64 {
     100.0 * (1.0 - (rates.map(fresh).sum::<f64>() / spread).sqrt())
 }
 
-/// A fit that noise does not explain, nor a small signal.
+/// A fit that neither noise nor a small effect explains.
 fn poor(problem: &Problem, answer: &Answer) -> bool {
     let noise = problem.recordings[0].rate_noise();
     let residual = problem.recordings[0].of_fresh(&answer.residual[0]);

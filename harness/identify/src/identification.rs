@@ -164,7 +164,7 @@ pub fn identify(
     heard: &mut dyn FnMut(&str),
 ) -> Result<Identification> {
     let mut found = identify_whole(fmu, recordings, options, heard)?;
-    if let ([recording], false, true) = (recordings, found.described, found.fit.is_poor()) {
+    if let ([recording], false, true) = (recordings, found.described, found.fit.poor) {
         found.verdict.extend(described_beginning(fmu, recording, options, heard));
     }
     Ok(found)
