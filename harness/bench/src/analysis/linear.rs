@@ -56,9 +56,23 @@ impl Linear {
     }
 
     /// The rate, rad/s, that a torque (N·m) makes that is linear between samples `step` s apart, from
-    /// a rate and a liquid at rest: exact, by the matrix exponential of the state and the input's
-    /// value and slope. The state is ω and, for each mode, y = l α and y'.
+    /// a rate and a liquid at rest.
     pub fn simulate(&self, step: f64, torque: &[f64], start: f64) -> Vec<f64> {
+        let slope = |pair: &[f64]| (pair[1] - pair[0]) / step;
+        let slopes: Vec<f64> = torque.windows(2).map(slope).chain([0.0]).collect();
+        self.simulate_ramps(step, torque, &slopes, start)
+    }
+
+    /// The same of a torque that has at the begin of each step of `step` s a value (N·m) and over it
+    /// a slope (N·m/s): exact, by the matrix exponential of the state and the input's
+    /// value and slope. The state is ω and, for each mode, y = l α and y'.
+    pub fn simulate_ramps(
+        &self,
+        step: f64,
+        torque: &[f64],
+        slopes: &[f64],
+        start: f64,
+    ) -> Vec<f64> {
         let n = 1 + 2 * self.modes.len();
         let mut flow = DMatrix::<f64>::zeros(n + 2, n + 2);
         (flow[(0, 0)], flow[(0, n)]) = (-self.friction / self.inertia, 1.0 / self.inertia);
@@ -84,9 +98,8 @@ impl Linear {
         x[0] = start;
         let mut next = x.clone();
         let mut rates = Vec::with_capacity(torque.len());
-        for (k, tau) in torque.iter().enumerate() {
+        for (tau, slope) in torque.iter().zip(slopes) {
             rates.push(x[0]);
-            let slope = (torque.get(k + 1).unwrap_or(tau) - tau) / step;
             for (i, value) in next.iter_mut().enumerate() {
                 let state: f64 = x.iter().enumerate().map(|(j, x)| flow[(i, j)] * x).sum();
                 *value = state + flow[(i, n)] * tau + flow[(i, n + 1)] * slope;
@@ -134,6 +147,23 @@ mod tests {
     use crate::analysis::features::Features;
     use crate::analysis::{BAND, demodulation, logarithmic_grid, spa};
     use crate::profile::{Profile, Torque};
+
+    #[test]
+    fn a_torque_that_jumps_between_steps_is_no_slope() {
+        // a free hub: 0.2 N·m for a second, none, -0.2 for another; edges between samples 0.1 s apart
+        let hub = Linear { inertia: 0.4, friction: 0.0, arm: 0.2, modes: vec![] };
+        let torque: Vec<f64> = (0..40)
+            .map(|k| match k {
+                0..10 => 0.2,
+                20..30 => -0.2,
+                _ => 0.0,
+            })
+            .collect();
+        let rates = hub.simulate_ramps(0.1, &torque, &[0.0; 40], 0.0);
+        for (k, expected) in [(5, 0.25), (10, 0.5), (20, 0.5), (25, 0.25), (30, 0.0), (39, 0.0)] {
+            assert!((rates[k] - expected).abs() < 1e-14, "{k}: {}", rates[k]);
+        }
+    }
 
     #[test]
     fn the_exact_simulation_answers_a_sine_with_the_gain_of_the_response() {

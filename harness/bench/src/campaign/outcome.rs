@@ -18,7 +18,7 @@ use crate::analysis::rotary::{self, Rotary};
 use crate::analysis::welch::{self, Spectra};
 use crate::analysis::{FrequencyResponse, demodulation, logarithmic_grid, noise, spa};
 use crate::profile::{Profile, Sweep, Torque};
-use crate::run::Run;
+use crate::run::{Run, TORQUE};
 use signals::table::Table;
 
 /// Frequencies at which responses are evaluated: 1.2 mHz apart at the antiresonance of the thesis's
@@ -461,7 +461,18 @@ impl Outcome {
             }
         };
         let (rate, start) = (column("omega_imu"), column("omega").first().copied());
-        let modelled = linear.simulate(run.step, column("tau_cmd"), start.unwrap_or(0.0));
+        let start = start.unwrap_or(0.0);
+        let modelled = match &run.torque {
+            Torque::Profile(profile) if profile.sweep().is_some() && !run.hold => {
+                linear.simulate(run.step, column("tau_cmd"), start)
+            }
+            // edges of the torque stand at the steps' ends, and are no slopes
+            _ => {
+                let torque = run.torque_table();
+                let column = |name| torque.column(name).unwrap_or_default();
+                linear.simulate_ramps(run.step, column(TORQUE), column("tau_slope"), start)
+            }
+        };
         let residual: Vec<f64> = rate.iter().zip(&modelled).map(|(y, m)| y - m).collect();
         let signals = ["tau_cmd", "omega_imu", "slosh_angle", "slosh_angle_radial"];
         let signals = signals.map(|name| (name, column(name)));
@@ -559,8 +570,8 @@ pub struct Range {
     pub model: String,
     /// Radius of the tank, m.
     pub radius: f64,
-    /// Fill, m.
-    pub fill: f64,
+    /// Fill, m; `None` if the modes come from a table, which knows of none.
+    pub fill: Option<f64>,
 }
 
 impl Range {
@@ -569,15 +580,13 @@ impl Range {
         if !super::is_bench(description) {
             return Ok(None);
         }
-        let variable = description.variable("slosh.model")?;
-        let mut number = [0];
-        instance.get_integer(&[variable.reference], &mut number)?;
-        let items = description.items(variable);
-        let model = items.iter().find(|item| item.value == number[0]);
+        let model = item(instance, "slosh.model", "slosh.kind")?.unwrap_or_default();
+        let source = item(instance, "slosh.source", "slosh.source_kind")?;
+        let fill = instance.real("tank.h")?;
         Ok(Some(Range {
-            model: model.map_or(String::new(), |item| item.name.clone()),
+            model,
             radius: instance.real("tank.d")? / 2.0,
-            fill: instance.real("tank.h")?,
+            fill: (source.as_deref() != Some("table")).then_some(fill),
         }))
     }
 
@@ -593,10 +602,25 @@ impl Range {
                 "a wave of {wave}; linear slosh theory holds up to a quarter of the tank's radius, {most}"
             ));
         }
-        (self.model != "frozen" && wave > self.fill).then(|| {
-            format!("a wave of {}, more than the liquid is deep, {}", mm(wave), mm(self.fill))
-        })
+        let fill = self.fill.filter(|fill| self.model != "frozen" && wave > *fill)?;
+        Some(format!("a wave of {}, more than the liquid is deep, {}", mm(wave), mm(fill)))
     }
+}
+
+/// Name of the item that an enumeration of an initialised instance has, or the integer `kind` beside
+/// it if that is not 0; `None` if the FMU, as one of an older version, has no such enumeration.
+fn item(instance: &mut Instance, name: &str, kind: &str) -> Result<Option<String>> {
+    let description = instance.fmu().description();
+    let Ok(variable) = description.variable(name) else { return Ok(None) };
+    let mut number = [0];
+    instance.get_integer(&[variable.reference], &mut number)?;
+    if let Ok(kind) = description.variable(kind) {
+        let mut instead = [0];
+        instance.get_integer(&[kind.reference], &mut instead)?;
+        number = if instead[0] != 0 { instead } else { number };
+    }
+    let found = description.items(variable).iter().find(|item| item.value == number[0]);
+    Ok(found.map(|item| item.name.clone()))
 }
 
 /// The linear model that has the FMU's own (calculated) parameters, with viscous friction unless the
@@ -617,13 +641,7 @@ pub(super) fn exact_linear(instance: &mut Instance) -> Result<Linear> {
     }
     let inertia = real("hub.I")? + real("tank.m_0")? * arm * arm;
     let viscous = real("friction.b")?;
-    // the item `none` of friction.model; friction.kind goes before it if it is not 0
-    let mut numbers = [0; 2];
-    let references = ["friction.model", "friction.kind"]
-        .map(|name| Ok(instance.fmu().description().variable(name)?.reference));
-    let [model, kind]: [Result<u32>; 2] = references;
-    instance.get_integer(&[model?, kind?], &mut numbers)?;
-    let number = if numbers[1] != 0 { numbers[1] } else { numbers[0] };
-    let friction = if number == 1 { 0.0 } else { viscous };
+    let law = item(instance, "friction.model", "friction.kind")?;
+    let friction = if law.as_deref() == Some("none") { 0.0 } else { viscous };
     Ok(Linear { inertia, friction, arm, modes })
 }

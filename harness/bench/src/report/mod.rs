@@ -46,6 +46,8 @@ struct Group<'a> {
     sweep: Option<&'a Sweep>,
     /// Features of the first run's exact linear response on the same grid.
     exact: Features,
+    /// The same of every run.
+    exact_of_runs: Vec<Features>,
     exact_response: FrequencyResponse,
 }
 
@@ -179,6 +181,7 @@ impl Varied {
         let (unit, scale) = match &*unit {
             "N·m" if variable == "profile.amplitude" => ("mN·m".into(), 1e3),
             "m" => ("mm".into(), 1e3),
+            "1" => (String::new(), 1.0),
             _ => (unit, 1.0),
         };
         Some(Varied { name: name.into(), unit, scale })
@@ -232,22 +235,25 @@ fn groups<'a>(plan: &Plan, fmu: &Fmu, results: &'a Results) -> Vec<Group<'a>> {
             None => values.map(|(i, varied)| varied.value(&run.case.varied[*i])).collect(),
         };
         let same = |g: &&mut Group| {
-            g.model == run.range.model
-                && g.fill.is_none_or(|fill| fill == run.range.fill)
-                && g.others == key
+            g.model == run.range.model && (!one_fill || g.fill == run.range.fill) && g.others == key
         };
+        let grid = logarithmic_grid(band(run).unwrap_or(BAND), 2000);
+        let exact_response = run.linear.frequency_response(&grid);
+        let exact = Features::of(&exact_response);
         match groups.iter_mut().find(same) {
-            Some(group) => group.runs.push(run),
+            Some(group) => {
+                group.runs.push(run);
+                group.exact_of_runs.push(exact);
+            }
             None => {
-                let grid = logarithmic_grid(band(run).unwrap_or(BAND), 2000);
-                let exact_response = run.linear.frequency_response(&grid);
                 groups.push(Group {
                     model: &run.range.model,
-                    fill: one_fill.then_some(run.range.fill),
+                    fill: run.range.fill.filter(|_| one_fill),
                     others: key,
                     runs: vec![run],
                     sweep: sweep(run),
-                    exact: Features::of(&exact_response),
+                    exact,
+                    exact_of_runs: vec![exact],
                     exact_response,
                 });
             }

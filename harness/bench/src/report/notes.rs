@@ -18,40 +18,45 @@ pub(super) fn estimators(groups: &[Group]) -> String {
          <p><b>Uncertainty.</b> What of the rate no linear response explains is estimated by the local rational method: around each line of the whole record's spectra a rational function of the torque's spectrum and a polynomial for the record's ends are fitted, and what is left is gyro noise, dry friction and nonlinear slosh. From its power spectral density Φ<sub>v</sub> follow the standard deviations of |H|, √(Φ<sub>v</sub>/(2nΦ<sub>uu</sub>)) over n averaged lines, and of an extremum of ln |H|, that of its slope over its curvature. Intervals are two standard deviations to either side. A shift that the sweep itself makes (below) is not in them.</p>\n\
          <p><b>Features.</b> f<sub>dip</sub> and f<sub>res</sub> are the two ends of the largest rise of |H| as the frequency grows, within the sweep's band, refined by a parabola through three points of log |H|; Δf is their separation, the notch depth their difference in dB. For a bench with little damping they are the smallest and the largest |H| in the band, as in the thesis; with strong damping the largest |H| is the band's lower edge, not the slosh resonance, and the ripple behind the resonance may go deeper than the antiresonance.</p>\n\
          <p><b>Fit.</b> Three poles, two zeros, least squares on the complex <code>spa</code> response. In time it is driven with the run's torque from the initial state that fits best, as MATLAB's <code>compare</code> does: the band says little of a slow real pole, and from rest such a pole would keep the offset of the first half cycle for the whole run.</p>\n\
-         <p><b>Energy residual.</b> Largest |E(t) − E(0) − work + heat| of a run over the energy throughput, Σ|Δwork| + heat. It checks the FMU's energy balance at every sample.</p>\n\
-         <h3>Why the swept resonance lies above the exact one</h3>\n\
-         <p>The sweep is not slow enough for the liquid. Bare-wall damping makes the resonance so narrow that the sweep crosses its half-power width in less time than the slosh needs to decay: the oscillation is still growing when its best frequency has gone by, so an upward sweep sees the largest rate later, at a higher frequency, and a little lower than it would be in a dwell. The ripple behind the resonance is the beat between that ringing and the torque that has moved on. A bench that sweeps at this rate and reads the envelope sees the same shift; it belongs to the experiment, not to the plant.</p>\n",
+         <p><b>Energy residual.</b> Largest |E(t) − E(0) − work + heat| of a run over the energy throughput, Σ|Δwork| + heat. It checks the FMU's energy balance at every sample.</p>\n",
         cycles = demodulation::CYCLES,
         lag = lag,
         resolution = 1e3 / lag,
     );
-    out.push_str("<div class=\"wide\"><table><thead><tr><th>runs</th><th>exact<br>resonance</th><th>half-power<br>width 2ζf</th><th>sweep rate<br>there</th><th>time to<br>cross</th><th>slosh decays<br>in 1/(2πζf)</th><th>largest torque,<br>swept resonance</th><th>its<br>shift</th><th>largest torque,<br><code>spa</code> resonance</th><th>its<br>shift</th></tr></thead><tbody>\n");
-    for group in groups {
-        let (Some(mode), Some(exact), Some(run), Some(sweep)) =
-            (group.runs[0].linear.modes.first(), group.exact.f_res, group.runs.last(), group.sweep)
-        else {
-            continue;
-        };
-        let width = 2.0 * mode.damping * mode.frequency;
-        let rate = sweep.rate_at(exact).abs();
-        let shift =
-            |f: Option<f64>| f.map_or(String::new(), |f| format!("{:+.1} mHz", (f - exact) * 1e3));
-        let _ = writeln!(
-            out,
-            "<tr><td>{}</td><td>{exact:.4} Hz</td><td>{:.1} mHz</td><td>{:.2} mHz/s</td><td>{:.1} s</td><td>{:.1} s</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
-            escape(&group.title()),
-            width * 1e3,
-            rate * 1e3,
-            width / rate,
-            1.0 / (TAU * mode.damping * mode.frequency),
-            hertz(run.features().f_res),
-            shift(run.features().f_res),
-            hertz(run.spa_features().f_res),
-            shift(run.spa_features().f_res),
-        );
+    let rows: String = groups.iter().filter_map(swept_row).collect();
+    if rows.is_empty() {
+        return out;
     }
+    out.push_str("<h3>Why the swept resonance lies above the exact one</h3>\n<p>The sweep is not slow enough for the liquid. Bare-wall damping makes the resonance so narrow that the sweep crosses its half-power width in less time than the slosh needs to decay: the oscillation is still growing when its best frequency has gone by, so an upward sweep sees the largest rate later, at a higher frequency, and a little lower than it would be in a dwell. The ripple behind the resonance is the beat between that ringing and the torque that has moved on. A bench that sweeps at this rate and reads the envelope sees the same shift; it belongs to the experiment, not to the plant.</p>\n<div class=\"wide\"><table><thead><tr><th>run</th><th>exact<br>resonance</th><th>half-power<br>width 2ζf</th><th>sweep rate<br>there</th><th>time to<br>cross</th><th>slosh decays<br>in 1/(2πζf)</th><th>swept<br>resonance</th><th>its<br>shift</th><th><code>spa</code><br>resonance</th><th>its<br>shift</th></tr></thead><tbody>\n");
+    out.push_str(&rows);
     out.push_str("</tbody></table></div>\n<p>The second estimator is the proof. For a linear plant the ratio of whole-record spectra is the frequency response however fast the input swept, because the ringing after the resonance is in the record too; and there the shift is gone. The antiresonance hardly moves in either: there the hub stands nearly still, so there is little that could ring; only at the smallest torques, where the bearing sticks near the antiresonance, does the sweep see it a few mHz late. When runs of a nonlinear model are compared, both views count: demodulation says what happened at that moment, <code>spa</code> gives the best linear summary of the whole.</p>\n");
     out
+}
+
+/// What the last run of a group, that with the largest torque where runs differ in it, shows of the
+/// sweep's shift; `None` if no resonance is seen.
+fn swept_row(group: &Group) -> Option<String> {
+    let run = group.runs.last()?;
+    let (mode, exact) = (run.linear.modes.first()?, group.exact_of_runs.last()?.f_res?);
+    let rate = sweep(run)?.rate_at(exact).abs();
+    let swept = run.passing.as_ref().and_then(|passing| passing.rate.features.f_res);
+    let whole = run.spa_features().f_res;
+    swept.or(whole)?;
+    let width = 2.0 * mode.damping * mode.frequency;
+    let shift =
+        |f: Option<f64>| f.map_or(String::new(), |f| format!("{:+.1} mHz", (f - exact) * 1e3));
+    Some(format!(
+        "<tr><td><code>{}</code></td><td>{exact:.4} Hz</td><td>{:.1} mHz</td><td>{:.2} mHz/s</td><td>{:.1} s</td><td>{:.1} s</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+        escape(&run.case.name),
+        width * 1e3,
+        rate * 1e3,
+        width / rate,
+        1.0 / (TAU * mode.damping * mode.frequency),
+        hertz(swept),
+        shift(swept),
+        hertz(whole),
+        shift(whole),
+    ))
 }
 
 pub(super) fn table(page: &Page, results: &Results) -> String {
@@ -86,7 +91,7 @@ pub(super) fn table(page: &Page, results: &Results) -> String {
             out,
             "<tr><td>{}</td><td>{}</td><td>{}</td>",
             escape(&run.range.model),
-            cm(run.range.fill),
+            run.range.fill.map_or(String::new(), |fill| cm(fill).to_string()),
             run.case.amplitude.map_or(String::new(), |a| thousandths(a).to_string())
         );
         for place in &others {

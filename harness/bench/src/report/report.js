@@ -13,6 +13,12 @@
     toImageButtonOptions: { format: "svg" },
   };
 
+  // How many powers of ten the values of a panel span.
+  function decades(spec, panel) {
+    const logs = spec.traces.filter((t) => t.panel === panel).flatMap((t) => t.y).filter((y) => y > 0).map(Math.log10);
+    return logs.reduce((a, b) => Math.max(a, b), -Infinity) - logs.reduce((a, b) => Math.min(a, b), Infinity);
+  }
+
   function draw(place, spec) {
     const night = dark.matches && !printing;
     const ink = night ? "#e6eaee" : "#1b1f24";
@@ -63,7 +69,8 @@
       if (spec.shared && i) layout["xaxis" + suffix].matches = "x";
       layout["yaxis" + suffix] = { ...common, domain: domain.y, anchor: "x" + suffix, title: { text: panel.y, standoff: 2, font: { size: printing ? 8 : 11 } }, type: panel.logy ? "log" : "-", nticks: 6 };
       if (bars) Object.assign(layout["yaxis" + suffix], { type: "category", dtick: 1, tickfont: { size: printing ? 7 : 10 } });
-      if (panel.logy) layout["yaxis" + suffix].dtick = 1;
+      // at powers of ten; where there are less than two of them, where plotly puts them
+      if (panel.logy && decades(spec, i) >= 2) layout["yaxis" + suffix].dtick = 1;
       if (panel.equal) Object.assign(layout["yaxis" + suffix], { scaleanchor: "x" + suffix, constrain: "domain" });
     });
     const seen = new Set();

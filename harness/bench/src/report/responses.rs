@@ -44,12 +44,15 @@ pub(super) fn responses(page: &Page, group: &Group) -> Figure {
     }
 }
 
-/// The band around antiresonance and resonance, at their own distance, Hz.
+/// The band around antiresonance and resonance of all runs, at their own distance, Hz.
 fn near(group: &Group) -> Option<(f64, f64)> {
     let (from, to) = group.band().unwrap_or(BAND);
-    let (antiresonance, resonance) = group.exact.f_dip.zip(group.exact.f_res)?;
-    let delta = resonance - antiresonance;
-    Some(((antiresonance - 2.5 * delta).max(from), (resonance + 4.0 * delta).min(to)))
+    let bands = group.exact_of_runs.iter().filter_map(|exact| {
+        let (antiresonance, resonance) = exact.f_dip.zip(exact.f_res)?;
+        let delta = resonance - antiresonance;
+        Some(((antiresonance - 2.5 * delta).max(from), (resonance + 4.0 * delta).min(to)))
+    });
+    bands.reduce(|all, one| (all.0.min(one.0), all.1.max(one.1)))
 }
 
 fn bode(
@@ -150,7 +153,7 @@ const CELLS: usize = 120;
 /// Heat maps over frequency and what the plan varies (thesis figures 7.11 to 7.16).
 pub(super) fn maps(group: &Group, axis: &Axis) -> Figure {
     let quantities = [
-        Quantity { label: "magnitude |H| / dB", of: passing, ends: Some((-40.0, 10.0)) },
+        Quantity { label: "magnitude |H| / dB", of: passing, ends: None },
         Quantity {
             label: "residual coherence γ²",
             of: |run| {
