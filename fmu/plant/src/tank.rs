@@ -230,6 +230,24 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
         return warnings;
     }
     warnings.extend(baffle::warnings(p));
+    let start = Parameters::default();
+    let unused: Vec<&str> = [
+        ("tank.h", p.tank.h != start.tank.h),
+        ("slosh.zeta", slosh.zeta != start.slosh.zeta),
+        (
+            "slosh.zeta_from_correlation",
+            slosh.zeta_from_correlation != start.slosh.zeta_from_correlation,
+        ),
+    ]
+    .into_iter()
+    .filter_map(|(name, set)| (set && !geometry).then_some(name))
+    .collect();
+    if !unused.is_empty() {
+        warnings.push(format!(
+            "slosh.source = table: {} without effect; slosh.table says what the liquid is",
+            unused.join(", ")
+        ));
+    }
     if slosh.model == SloshModel::Liquid && geometry {
         warnings.extend(liquid::warning(p.tank.h / radius));
     }

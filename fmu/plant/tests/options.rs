@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use plant::{FrictionModel, Inputs, Outputs, Parameters, Plant, Ramp, SloshModel};
+use plant::{FrictionModel, Inputs, Outputs, Parameters, Plant, Ramp, SloshModel, SloshSource};
 
 const TOLERANCE: f64 = 1e-9;
 
@@ -335,6 +335,21 @@ fn damping_ratio_follows_the_restoring_force_down_to_weightlessness() {
         let zeta = last[0];
         assert!((decay / -(2.0 * zeta) - 1.0).abs() < 0.05, "{decay} {zeta}");
     }
+}
+
+#[test]
+fn dimensions_that_a_table_does_not_use_are_warned_of() {
+    let mut p = Parameters::default();
+    p.tank.h = 0.06;
+    p.slosh.zeta = 0.01;
+    assert!(Plant::warnings(&p, &at(9.81)).is_empty());
+    p.slosh.source = SloshSource::Table;
+    p.slosh.table.m_liq = 2.0;
+    p.slosh.table.mass[0] = 0.7;
+    p.slosh.table.length[0] = 0.05;
+    assert!(Plant::warnings(&p, &at(9.81))[0].contains("tank.h, slosh.zeta without effect"));
+    (p.tank.h, p.slosh.zeta) = (Parameters::default().tank.h, Parameters::default().slosh.zeta);
+    assert!(Plant::warnings(&p, &at(9.81)).is_empty());
 }
 
 #[test]

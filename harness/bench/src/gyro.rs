@@ -18,6 +18,10 @@ use signals::table::Table;
 
 /// The longest record in steps, about 0.3 GB.
 const MOST_STEPS: f64 = 1e7;
+/// Fewest records whose scatter is a standard error: that of four is uncertain by 40 %.
+const LEAST_RECORDS: usize = 4;
+/// More records would take days.
+const MOST_RECORDS: usize = 10_000;
 /// The shortest record in correlation times of the bias, for its peak (at 1.89) to be seen: the
 /// longest averaging time is a tenth of the record.
 const LEAST_TIMES: f64 = 30.0;
@@ -40,8 +44,8 @@ pub struct Characteristics {
     pub specified: Noise,
     /// What the mean of the records' Allan variances shows.
     pub estimated: Noise,
-    /// Standard errors of `estimated`, from the scatter of the single records; NaN if there is only
-    /// one.
+    /// Standard errors of `estimated`, from the scatter of the single records; NaN if those that can
+    /// be fitted are fewer than [`LEAST_RECORDS`].
     pub error: Noise,
     /// The mean of the records' Allan variances, (rad/s)².
     pub points: Vec<Point>,
@@ -55,7 +59,11 @@ impl Recording {
         fmu: &Fmu,
         watch: &(dyn Fn(Progress) + Sync),
     ) -> Result<Characteristics> {
-        ensure!(self.records > 0, "at least one record is needed");
+        ensure!(
+            (1..=MOST_RECORDS).contains(&self.records),
+            "{} records (allowed: 1 to {MOST_RECORDS})",
+            self.records
+        );
         ensure!(
             self.hours > 0.0 && self.hours.is_finite(),
             "a record must last a positive number of hours, not {}",
@@ -150,6 +158,10 @@ impl Characteristics {
         let estimated = Noise::fitted(&points).context(why)?;
         let each: Vec<Noise> = records.iter().filter_map(|record| Noise::fitted(record)).collect();
         let error = |of: fn(&Noise) -> f64| {
+            if each.len() < LEAST_RECORDS {
+                return f64::NAN;
+            }
+            let count = each.len() as f64;
             let mean = each.iter().map(of).sum::<f64>() / count;
             let squares: f64 = each.iter().map(|noise| (of(noise) - mean).powi(2)).sum();
             (squares / (count - 1.0) / count).sqrt()

@@ -454,7 +454,7 @@ impl Plan {
 
         let mut problems = Problems::default();
         let input = driven(description, self.input.as_deref());
-        let input = input.context("no input = \"…\" in the plan")?;
+        let input = input.context("the plan's input")?;
         let mut torques = BTreeMap::new();
         let mut names = BTreeSet::new();
         let mut cases = Vec::with_capacity(count);
@@ -531,6 +531,15 @@ impl Plan {
             let item = description.items(variable).iter().find(|i| i.value.to_string() == text);
             Some(item.map_or(text, |item| item.name.clone()))
         };
+        // a table of modes knows of no dimensions
+        let from_table = value("slosh.source").as_deref() == Some("table")
+            || value("slosh.source_kind").as_deref() == Some("2");
+        for name in ["tank.h", "slosh.zeta"] {
+            if from_table && values.iter().any(|(n, _)| n == name) {
+                problems
+                    .add(format!("{name} is varied, but has no effect with slosh.source = table"));
+            }
+        }
         let case = Case {
             name: String::new(),
             listed: None,
@@ -544,7 +553,7 @@ impl Plan {
                 .collect(),
             model: value("slosh.model"),
             input: input.clone(),
-            fill: value("tank.h").and_then(|h| h.parse().ok()),
+            fill: value("tank.h").filter(|_| !from_table).and_then(|h| h.parse().ok()),
             amplitude: match &*torque {
                 Torque::Profile(profile) => profile.amplitude(),
                 Torque::Rows { .. } => None,

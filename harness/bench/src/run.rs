@@ -129,6 +129,9 @@ pub fn histories(
         .collect()
 }
 
+/// Most steps of a run: the table of each of its signals takes 160 MB.
+pub const MOST_STEPS: f64 = 2e7;
+
 /// Steps between two reports of progress.
 const REPORT_EVERY: usize = 1024;
 
@@ -191,6 +194,13 @@ impl Run {
             "the stop time must be later than {} s, not {} s",
             self.start(),
             self.stop
+        );
+        let steps = (self.stop - self.start()) / self.step;
+        ensure!(
+            steps <= MOST_STEPS,
+            "{:?} s in steps of {:?} s are {steps:.3e} steps (allowed: at most {MOST_STEPS:.0e})",
+            self.stop - self.start(),
+            self.step
         );
         if let Some(tolerance) = self.tolerance {
             ensure!(

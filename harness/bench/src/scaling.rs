@@ -209,8 +209,14 @@ fn digits(value: f64) -> f64 {
 /// Table 2.3 for a scale, in words.
 pub fn froude_text(lambda: f64, density: f64, gravity: f64) -> Result<String> {
     positive(&[("lambda", lambda), ("density ratio", density), ("gravity ratio", gravity)])?;
+    let factors = froude(lambda, density, gravity);
+    ensure!(
+        factors.iter().all(|(_, _, factor)| factor.is_finite() && *factor > 0.0),
+        "lambda = {lambda:?}, density ratio = {density:?}, gravity ratio = {gravity:?}: some factors are \
+         beyond the range of numbers"
+    );
     let mut text = String::from("full size = factor x model\n");
-    for (name, unit, factor) in froude(lambda, density, gravity) {
+    for (name, unit, factor) in factors {
         writeln!(text, "{name:22}{unit:8}{}", digits(factor))?;
     }
     writeln!(

@@ -23,7 +23,7 @@ use std::process::ExitCode;
 use anyhow::Result;
 use bench::campaign::Campaign;
 use bench::plan::Plan;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use commands::*;
 use host::fmi2::Fmu;
 
@@ -67,8 +67,21 @@ enum Command {
     Book(book::BookArgs),
 }
 
+/// The command line, in which `--fill -1` is a value, to be refused with what is allowed.
+fn command_line() -> clap::Command {
+    fn with_negative_numbers(command: clap::Command) -> clap::Command {
+        let of = |arg: clap::Arg| match arg.get_action().takes_values() {
+            true => arg.allow_negative_numbers(true),
+            false => arg,
+        };
+        command.mut_args(of).mut_subcommands(with_negative_numbers)
+    }
+    with_negative_numbers(Cli::command())
+}
+
 fn main() -> ExitCode {
-    let done = match Cli::parse().command {
+    let cli = Cli::from_arg_matches(&command_line().get_matches()).unwrap_or_else(|e| e.exit());
+    let done = match cli.command {
         Some(Command::Pack(args)) => args.run(),
         Some(Command::Run(args)) => args.run(),
         Some(Command::Variables(args)) => args.run(),

@@ -203,6 +203,9 @@ fn positions<'a>(there: impl Iterator<Item = &'a str>, wanted: &[&str]) -> Resul
         missing.join(", "),
         there.join(", ")
     );
+    let twice: Vec<_> =
+        wanted.iter().filter(|w| there.iter().filter(|t| t == w).count() > 1).copied().collect();
+    ensure!(twice.is_empty(), "more than one of its columns is called {}", twice.join(", "));
     Ok(wanted.iter().flat_map(|w| there.iter().position(|t| t == w)).collect())
 }
 

@@ -98,6 +98,11 @@ impl CampaignArgs {
             println!("{:#}", campaign.list(&fmu)?);
             return Ok(());
         }
+        if let Some(other) = &campaign.compare {
+            let table = other.join("runs.csv");
+            ensure!(table.is_file(), "--compare {}: it has no runs.csv", other.display());
+        }
+        campaign.plan.cases(fmu.description())?; // a wrong plan replaces nothing
         // the directory without flags belongs to the campaign without flags
         let own = campaign.out == Path::new(DEFAULT_CAMPAIGN);
         if campaign.holds_another() && !own && !self.replace {

@@ -109,6 +109,9 @@ impl RunArgs {
             false => self.columns,
         };
         let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
+        if let Some(i) = (1..columns.len()).find(|i| columns[..*i].contains(&columns[*i])) {
+            bail!("--columns names {} twice", columns[i]);
+        }
         let asked = columns.len();
         // read along, to say at the end whether the model still meant something
         let range = Range::of(description, &mut instance)?;

@@ -95,6 +95,17 @@ impl TankArgs {
             "--contact-angle {} (allowed: 0 to 180)",
             self.contact_angle
         );
+        let files: Vec<&PathBuf> =
+            [&self.out, &self.parameters, &self.picture].into_iter().flatten().collect();
+        if let Some(twice) = (1..files.len())
+            .map(|i| files[i])
+            .find(|f| files.iter().filter(|other| other == &f).count() > 1)
+        {
+            bail!(
+                "{} is to be two files at once (--out, --parameters, --picture)",
+                twice.display()
+            );
+        }
         let read = || self.tank.display().to_string();
         let tank = Tank::read(&self.tank).with_context(read)?;
         let mut parameters = None;

@@ -1,5 +1,6 @@
 //! `hubslosh variables`.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use anyhow::{Result, bail};
@@ -38,8 +39,18 @@ impl VariablesArgs {
         let rows: Vec<[String; 6]> =
             description.variables.iter().filter(wanted).map(|v| row(description, v)).collect();
         if rows.is_empty() {
-            let asked = self.causality.map_or(String::new(), |c| format!(" of causality {c}"));
-            bail!("{} has no variable{asked} with \"{filter}\"", self.fmu.display());
+            let mut asked = self.causality.map_or(String::new(), |c| format!(" of causality {c}"));
+            if !filter.is_empty() {
+                asked.push_str(&format!(" with \"{filter}\" in its name or meaning"));
+            }
+            let there: BTreeSet<&str> =
+                description.variables.iter().map(|v| v.causality.as_str()).collect();
+            let there: Vec<&str> = there.into_iter().collect();
+            bail!(
+                "{} has no variable{asked} (causalities in it: {})",
+                self.fmu.display(),
+                there.join(", ")
+            );
         }
         let head = ["name", "causality", "start", "unit", "range", "meaning"].map(String::from);
         let width = |i: usize| {

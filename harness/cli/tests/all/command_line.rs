@@ -158,6 +158,45 @@ fn a_tank_without_liquid_is_refused_in_the_fmus_own_words() {
 }
 
 #[test]
+fn what_no_machine_can_hold_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let fmu = packed_for_tests().to_str().unwrap();
+    for (arguments, words) in [
+        (
+            &["run", "--fmu", fmu, "--profile", "sine:duration=1e12", "--out", "x.csv"][..],
+            &["5.000e13 steps"][..],
+        ),
+        (&["torque", "--profile", "zero", "--step", "1e-9", "--out", "x.csv"], &["at most 2e7"]),
+        (&["gyro", "--fmu", fmu, "--records", "99999999999", "--out", "g"], &["1 to 10000"]),
+        (&["scale", "froude", "--lambda", "1e308"], &["lambda = 1e308"]),
+        // a negative number is a value, not a flag
+        (&["scale", "froude", "--lambda", "-1"], &["lambda = -1", "positive"]),
+        (
+            &["run", "--fmu", fmu, "--profile", "zero", "--step", "-0.1", "--out", "x.csv"],
+            &["not -0.1"],
+        ),
+    ] {
+        refuses(directory, || hubslosh(directory, arguments), words);
+    }
+}
+
+#[test]
+fn what_stands_twice_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    std::fs::write(directory.join("in.csv"), "time,tau_cmd,tau_cmd\n0,1,2\n1,1,2\n").unwrap();
+    let run = || short_run(directory, &["--input", "in.csv"]);
+    refuses(directory, run, &["in.csv", "more than one of its columns is called tau_cmd"]);
+    let twice = || short_run(directory, &["--profile", "zero", "--columns", "omega,omega"]);
+    refuses(directory, twice, &["omega twice"]);
+    let tank = pack::root().join("harness/tank/examples/capsule.toml");
+    let flags = ["tank", tank.to_str().unwrap(), "--fill", "0.5", "--out", "t.toml"];
+    let same = || hubslosh(directory, &[&flags[..], &["--parameters", "t.toml"]].concat());
+    refuses(directory, same, &["t.toml is to be two files at once"]);
+}
+
+#[test]
 fn a_torque_file_without_the_columns_names_those_missing_and_those_there() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
