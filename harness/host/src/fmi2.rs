@@ -716,6 +716,13 @@ impl<'fmu> Instance<'fmu> {
         std::mem::take(&mut *sink.messages.lock().unwrap_or_else(|poisoned| poisoned.into_inner()))
     }
 
+    /// What the FMU has warned of, of everything logged since the last time somebody asked.
+    pub fn take_warnings(&self) -> Vec<String> {
+        let messages = self.take_messages().into_iter();
+        let warnings = messages.filter(|message| message.status == Status::Warning);
+        warnings.map(|message| message.text.trim().to_string()).collect()
+    }
+
     /// The last call that returned fmi2Warning since somebody asked.
     pub fn take_warning(&self) -> Option<&'static str> {
         self.warned.take()

@@ -12,9 +12,10 @@ mod outcome;
 mod rows;
 mod store;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, Result};
 use host::description::{ModelDescription, Type, Value};
@@ -162,8 +163,17 @@ impl Campaign {
         let steps: u64 = cases.iter().map(|case| case.run().steps() as u64).sum();
         watch(Progress::Begins { runs: cases.len(), steps });
         let pool = rayon::ThreadPoolBuilder::new().num_threads(self.jobs).build()?;
-        let results: Vec<Result<Done>> = pool
-            .install(|| cases.par_iter().map(|case| self.done(fmu, case, &runs, watch)).collect());
+        let warned = Mutex::new(BTreeSet::new());
+        // once of many runs, whose warnings differ in numbers at most
+        let warn = |case: &Case, warning: String| {
+            let words: String = warning.chars().filter(|c| !c.is_ascii_digit()).collect();
+            let mut warned = warned.lock().unwrap_or_else(PoisonError::into_inner);
+            if warned.insert(words) {
+                watch(Progress::Note(format!("warning of run {}: {warning}", case.name)));
+            }
+        };
+        let done = |case| self.done(fmu, case, &runs, watch, &warn);
+        let results: Vec<Result<Done>> = pool.install(|| cases.par_iter().map(done).collect());
 
         let mut collected = Results::default();
         for (case, result) in cases.into_iter().zip(results) {
@@ -260,12 +270,14 @@ impl Campaign {
         case: &Case,
         runs: &Path,
         watch: &(dyn Fn(Progress) + Sync),
+        warn: &(dyn Fn(&Case, String) + Sync),
     ) -> Result<Done> {
         let run = case.run();
         let path = runs.join(format!("{}.parquet", case.name));
         let columns = stored_columns(fmu.description(), run.input.as_deref());
         let recipe = store::recipe(fmu, case, &columns);
         let mut instance = run.initialise(fmu)?;
+        instance.take_warnings().into_iter().for_each(|warning| warn(case, warning));
         let there = match self.force || !path.exists() {
             true => None,
             false => store::stored(&path, &run, &recipe, &columns)

@@ -103,6 +103,9 @@ impl RunArgs {
             hold: self.hold,
         };
         let mut instance = run.initialise(&fmu)?;
+        for warning in instance.take_warnings() {
+            eprintln!("warning: {warning}");
+        }
         let columns = match self.columns.is_empty() {
             // what is driven stands in the table anyway
             true => default_columns(description),

@@ -182,6 +182,19 @@ fn what_no_machine_can_hold_is_refused() {
 }
 
 #[test]
+fn what_the_fmu_warns_of_is_told() {
+    let directory = tempfile::tempdir().unwrap();
+    let said = |arguments: &[&str]| {
+        let done = short_run(directory.path(), arguments);
+        assert!(done.status.success());
+        String::from_utf8_lossy(&done.stderr).into_owned()
+    };
+    let warning = said(&["--profile", "zero", "--set", "g_axial=0.1"]);
+    assert!(warning.starts_with("warning: the Bond number is 9.2"), "{warning}");
+    assert_eq!(said(&["--profile", "zero"]), "");
+}
+
+#[test]
 fn what_stands_twice_is_refused() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
