@@ -15,7 +15,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 from . import batch, plot
 from .fitting import TransferFunction, fit
-from .fmu import Fmu, FmuError, Quantity, Value
+from .fmu import Fmu, FmuError, FmuWarning, Quantity, Value
 from .linearization import LinearModel, linearize
 from .loop import Law, closed_loop
 from .plant import COLUMNS, TORQUE, Plant, RunError, drive
@@ -35,6 +35,7 @@ __all__ = [
     "Estimated",
     "Fmu",
     "FmuError",
+    "FmuWarning",
     "Identification",
     "Law",
     "LinearModel",

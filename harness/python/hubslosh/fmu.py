@@ -22,6 +22,10 @@ class FmuError(Exception):
     """What went wrong, in the FMU's own words where it has any."""
 
 
+class FmuWarning(UserWarning):
+    """What an FMU warns of, such as parameters beyond the range in which its model is known."""
+
+
 def source_tree() -> Path | None:
     """Return the project's root if this package lies in its source tree."""
     root = Path(__file__).resolve().parents[3]

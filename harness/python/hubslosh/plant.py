@@ -6,6 +6,7 @@ torque and the slope of the chord to the next row, so that it sees straight line
 """
 
 import contextlib
+import warnings
 from collections.abc import Mapping, Sequence
 from ctypes import byref
 from pathlib import Path
@@ -19,7 +20,7 @@ from fmpy.logging import addLoggerProxy
 
 from . import batch
 from .batch import Rows, Signals
-from .fmu import Fmu, FmuError, Quantity
+from .fmu import Fmu, FmuError, FmuWarning, Quantity
 
 TORQUE = "tau_cmd"
 """The input that carries the torque, N·m."""
@@ -156,12 +157,15 @@ class Instance:
         return by_type
 
     def _call(self, function: str, *args: Any, **kwargs: Any) -> Any:
-        """Call a function of fmpy's instance; an error carries what the FMU logged."""
+        """Call a function of fmpy's instance; an error or a warning carries what the FMU logged."""
         _messages.clear()
         try:
-            return getattr(self._instance, function)(*args, **kwargs)
+            result = getattr(self._instance, function)(*args, **kwargs)
         except FMICallException as error:
             raise FmuError(" ".join([str(error), *_messages])) from None
+        for message in _messages:
+            warnings.warn(message, FmuWarning, stacklevel=5)
+        return result
 
 
 class Plant(Instance):

@@ -1,5 +1,6 @@
 """A simulation in one call: what fmpy finds, however it is called, and its errors."""
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -7,7 +8,7 @@ import pandas as pd
 import pytest
 from fmpy import simulate_fmu
 
-from hubslosh import FmuError, Plant, RunError, batch, drive, simulate
+from hubslosh import FmuError, FmuWarning, Plant, RunError, batch, drive, simulate
 
 STEP = 0.02  # s
 TIME = np.arange(3001) * STEP
@@ -19,6 +20,15 @@ TABLE = pd.DataFrame({"time": TIME, "tau_cmd": TORQUE})
 def library() -> None:
     """Fail where the library for whole runs is missing: the tests would compare two loops alike."""
     assert batch.library() is not None, "cargo build --release -p hubslosh-batch"
+
+
+def test_what_the_fmu_warns_of_is_a_warning(fmu: Path) -> None:
+    """At a hundredth of g capillarity counts; on the ground it does not."""
+    with pytest.warns(FmuWarning, match="the Bond number is 9.2"):
+        simulate(fmu, {"g_axial": 0.1}, stop=0.1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        simulate(fmu, stop=0.1)
 
 
 @pytest.mark.usefixtures("library")
