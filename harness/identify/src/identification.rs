@@ -439,7 +439,7 @@ fn finish(
         };
     }
     let combinations = uncertainty::combinations(&problem.unknowns, &values, &of_values);
-    let error_budget = budget::of(&problem, &x, &answer, &jacobian, &covariance, &slopes)?;
+    let error_budget = budget::of(&problem, &x, &answer, &jacobian, &covariance)?;
     let matrix = Covariance::correlations(&full);
     let names = problem.unknowns.iter().map(|u| u.quantity.name()).collect();
     let correlations = matrix.row_iter().map(|row| row.iter().copied().collect()).collect();
