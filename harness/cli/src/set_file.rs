@@ -61,7 +61,13 @@ fn from_json(text: &str) -> Result<Vec<(String, String)>> {
     let root: serde_json::Value = serde_json::from_str(text)?;
     let table = |key: &str| root.get(key).and_then(serde_json::Value::as_object);
     let parameters = table("parameters")
-        .context("it has no \"parameters\": it is not a result of hubslosh identify")?;
+        .context("it has no \"parameters\": it is not a result of hubslosh identify, or one of a --method without any")?;
+    let no = |key: &str| root.get(key).and_then(serde_json::Value::as_bool) == Some(false);
+    if no("described") || no("converged") {
+        eprintln!(
+            "warning: these parameters do not describe the recording that they are from; see its verdict"
+        );
+    }
     let mut settings = Vec::new();
     for (name, value) in table("settings").into_iter().flatten() {
         let text = value.as_str().with_context(|| format!("settings: {name} is not a text"))?;

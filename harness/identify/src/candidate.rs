@@ -120,7 +120,22 @@ pub fn fit<'a>(
         heard,
     };
     let (polished, spread) = match from {
-        Some(other) => search.near(other, model)?,
+        Some(other) => {
+            let found = search.near(other, model)?;
+            // a sibling that describes the recording, or nearly, leaves no room for a poor fit of this one, unless its
+            // search went astray; then it is tried as if it were alone
+            let sibling = matches!(
+                (&*other.fit.model, model),
+                ("planar", "spherical" | "paraboloid") | ("spherical", "paraboloid")
+            );
+            match sibling && !other.fit.poor && poor(&search.problem, &found.0.answer) {
+                true => {
+                    search.alone = true;
+                    search.better(Ok(found), |search| search.begin(true))?
+                }
+                false => found,
+            }
+        }
         None => search.begin(model != "frozen")?,
     };
     let (mut problem, simulations) = (search.problem, search.simulations);

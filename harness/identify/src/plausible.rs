@@ -10,7 +10,8 @@ use crate::start::Response;
 /// Refuses what is off by a factor that only a wrong unit makes.
 pub fn check_size(found: &Response, nominal: f64) -> Result<()> {
     let ratio = nominal / found.inertia;
-    if (0.1..10.0).contains(&ratio) {
+    // revolutions per minute are a factor of 9.5
+    if (0.125..8.0).contains(&ratio) {
         return Ok(());
     }
     let guess = match ratio {

@@ -1,6 +1,6 @@
 //! `hubslosh identify`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail, ensure};
 use host::fmi2::Fmu;
@@ -10,7 +10,7 @@ use identify::identification::{Estimated, Identification, Options, identify};
 use identify::nominal::Nominal;
 use identify::recording::Recording;
 use identify::simulate::Between;
-use identify::{black_box, distortion, frequency, recording, report};
+use identify::{black_box, distortion, frequency, plausible, recording, report, start};
 use std::collections::BTreeMap;
 use std::io::Write;
 
@@ -73,7 +73,7 @@ pub struct IdentifyArgs {
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
     /// Starts from this value instead of one found in the data.
-    #[arg(long = "start", value_name = "NAME=VALUE", value_parser = start)]
+    #[arg(long = "start", value_name = "NAME=VALUE", value_parser = start_value)]
     starts: Vec<(String, f64)>,
     /// Takes the measurement as perfect: no delay, gyro bias or friction asymmetry is estimated.
     #[arg(long)]
@@ -141,7 +141,7 @@ fn bound(text: &str) -> Result<(String, f64, f64)> {
     Ok((name, low, high))
 }
 
-fn start(text: &str) -> Result<(String, f64)> {
+fn start_value(text: &str) -> Result<(String, f64)> {
     let (name, value) = setting(text)?;
     let value: f64 = value.parse()?;
     ensure!(value.is_finite() && value > 0.0, "{name} must be a positive number");
@@ -171,6 +171,20 @@ impl IdentifyArgs {
             "--gyro-scale must be from 0 to 1, not {}",
             self.gyro_scale
         );
+        // before a search that may take minutes
+        for path in [Some(&self.out), self.report.as_ref()].into_iter().flatten() {
+            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+            let there = folder.is_none_or(Path::is_dir);
+            ensure!(there, "{} cannot be written: there is no such directory", path.display());
+        }
+        ensure!(
+            self.bounds.is_empty() || self.method == Method::Acceleration,
+            "--bound is for --method acceleration alone"
+        );
+        ensure!(
+            self.starts.is_empty() || self.method == Method::OutputError,
+            "--start is for --method output-error alone: the other methods need none"
+        );
         let trim = match self.trim[..] {
             [] => None,
             [from, to] if from < to => Some((from, to)),
@@ -191,10 +205,11 @@ impl IdentifyArgs {
             gyro_scale: self.gyro_scale,
             validation: Vec::new(),
         };
-        let coarsest = match self.method {
-            Method::Multisine | Method::BlackBox => f64::INFINITY,
-            _ => options.nominal(&Fmu::open(&self.fmu)?)?.coarsest(),
+        let nominal = match self.method {
+            Method::Multisine | Method::BlackBox => None,
+            _ => Some(options.nominal(&Fmu::open(&self.fmu)?)?),
         };
+        let coarsest = nominal.as_ref().map_or(f64::INFINITY, Nominal::coarsest);
         let mut done = Vec::new();
         let mut read = |paths: &[PathBuf]| -> Result<Vec<_>> {
             let mut all = Vec::new();
@@ -209,6 +224,11 @@ impl IdentifyArgs {
         let recordings = read(&self.data)?;
         let validation = read(&self.validate)?;
         if self.method != Method::OutputError {
+            if let Some(nominal) = &nominal
+                && let (Some(found), _) = start::from_data(&recordings, nominal)?
+            {
+                plausible::check_size(&found, nominal.inertia)?;
+            }
             return self.quickly(&recordings, &validation);
         }
         let options = Options { validation, ..options };
