@@ -50,6 +50,27 @@ fn parameters_come_back_and_coulomb_and_stribeck_friction_as_their_sum() {
 }
 
 #[test]
+fn the_error_budget_is_what_a_new_fit_gives() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let recordings = [sweep(&fmu, SHORT, &[])];
+    let found = identify(&fmu, &recordings, &options(), &mut |_| {}).unwrap();
+    let heavier = vec![("g_axial".to_string(), (9.81 * 1.001).to_string())];
+    let options = Options { settings: heavier, ..options() };
+    let again = identify(&fmu, &recordings, &options, &mut |_| {}).unwrap();
+    let budget = found.error_budget.iter().find(|e| e.source.starts_with("g_axial")).unwrap();
+    for (name, p) in &found.parameters {
+        let (said, seen) = (budget.change[name], again.parameters[name].value - p.value);
+        // both searches end within a hundredth of a standard deviation, along the friction's valleys a tenth; the
+        // budget takes a tenth of the change, and the change as proportional
+        let allowed = 0.2 * p.std + 0.03 * seen.abs();
+        assert!((said - seen).abs() < allowed, "{name}: {said} said, {seen} seen, {p:?}");
+    }
+    // d goes with a quarter of g, by far more than its standard deviation
+    let d = budget.change["tank.d"] / found.parameters["tank.d"].value;
+    assert!((d / 0.25e-3 - 1.0).abs() < 0.1, "{d}");
+}
+
+#[test]
 fn starts_forty_percent_off_end_at_the_minimum_of_the_datas_own() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let recordings = [sweep(&fmu, SHORT, &[])];

@@ -53,6 +53,42 @@ fn what_was_identified_is_fed_back_to_a_run() {
 }
 
 #[test]
+fn what_cannot_be_written_or_means_nothing_is_refused_before_the_search() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    record(folder, "data.csv", &[]);
+    for (flags, word) in [
+        (&["--out", "nowhere/result.json"][..], "nowhere/result.json cannot be written"),
+        (&["--report", "nowhere/page.html"], "nowhere/page.html cannot be written"),
+        (&["--bound", "friction.c=0:1"], "--bound is for --method acceleration"),
+        (
+            &["--method", "frequency", "--start", "tank.d=0.2"],
+            "--start is for --method output-error",
+        ),
+    ] {
+        let arguments = [&["identify", "data.csv", "--out", "result.json"][..], flags].concat();
+        let arguments = match flags[0] {
+            "--out" => [&["identify", "data.csv"][..], flags].concat(),
+            _ => arguments,
+        };
+        let error = hubslosh(folder, &arguments).unwrap_err();
+        assert!(error.contains(word), "{error}");
+    }
+    // a fit that does not describe its recording says so when it is used
+    let result = r#"{"described":false,"settings":{},"parameters":{"hub.I":{"value":0.4}}}"#;
+    std::fs::write(folder.join("poor.json"), result).unwrap();
+    let run = ["run", "--parameters", "poor.json", "--profile", "zero", "--out", "out.csv"];
+    let done = Command::new(env!("CARGO_BIN_EXE_hubslosh"))
+        .current_dir(folder)
+        .args(run)
+        .args(["--fmu", pack::packed_for_tests().to_str().unwrap()])
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&done.stderr);
+    assert!(done.status.success() && said.contains("do not describe the recording"), "{said}");
+}
+
+#[test]
 fn friction_by_the_accelerations_least_squares_is_fed_back_to_a_run() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
