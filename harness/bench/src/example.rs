@@ -7,6 +7,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 
+use crate::plan::significant;
 use crate::profile::Torque;
 use crate::run::{Run, driven};
 use host::description::ModelDescription;
@@ -84,7 +85,7 @@ fn thinned(answer: &Table) -> Table {
     let names: Vec<String> = answer.names().iter().filter(|n| *n != "tau_cmd").cloned().collect();
     let column = |name: &String| {
         let values = answer.column(name).unwrap_or_default();
-        values.iter().step_by(EVERY).map(|&x| significant(x)).collect()
+        values.iter().step_by(EVERY).map(|&x| significant(x, 9)).collect()
     };
     let columns = names.iter().map(column).collect();
     Table::new(names, columns)
@@ -94,9 +95,4 @@ fn thinned(answer: &Table) -> Table {
 fn round(x: f64, decimals: i32) -> f64 {
     let unit = 10f64.powi(decimals);
     (x * unit).round() / unit
-}
-
-/// `x` with nine significant digits, and no sign at zero.
-fn significant(x: f64) -> f64 {
-    format!("{x:.8e}").parse().unwrap_or(x) + 0.0
 }

@@ -187,6 +187,11 @@ pub fn thousandths(value: f64) -> f64 {
     (value * 1e9).round() / 1e6
 }
 
+/// A value rounded to so many significant digits, and no sign at zero.
+pub fn significant(value: f64, digits: usize) -> f64 {
+    format!("{value:.*e}", digits - 1).parse().unwrap_or(value) + 0.0
+}
+
 /// What is wrong, each once, in the order found.
 #[derive(Default)]
 struct Problems(Vec<String>);

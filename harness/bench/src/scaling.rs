@@ -15,6 +15,8 @@ use std::fmt::Write;
 
 use anyhow::{Result, ensure};
 
+use crate::plan::significant;
+
 /// A liquid's properties.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Liquid {
@@ -150,7 +152,7 @@ pub fn bond_text(
             writeln!(
                 text,
                 "a tank of radius {r} m has it at an acceleration of {} m/s2",
-                digits(same)
+                significant(same, 7)
             )?;
         }
         Some(Flight::Acceleration(g)) => {
@@ -201,11 +203,6 @@ pub fn rotation_text(
     Ok(text)
 }
 
-/// Seven significant digits.
-fn digits(value: f64) -> f64 {
-    format!("{value:.6e}").parse().unwrap_or(value)
-}
-
 /// Table 2.3 for a scale, in words.
 pub fn froude_text(lambda: f64, density: f64, gravity: f64) -> Result<String> {
     positive(&[("lambda", lambda), ("density ratio", density), ("gravity ratio", gravity)])?;
@@ -217,7 +214,7 @@ pub fn froude_text(lambda: f64, density: f64, gravity: f64) -> Result<String> {
     );
     let mut text = String::from("full size = factor x model\n");
     for (name, unit, factor) in factors {
-        writeln!(text, "{name:22}{unit:8}{}", digits(factor))?;
+        writeln!(text, "{name:22}{unit:8}{}", significant(factor, 7))?;
     }
     writeln!(
         text,

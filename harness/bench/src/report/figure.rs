@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 use host::html::escape;
 use serde_json::{Value, json};
 
+use crate::plan::significant;
 use crate::svg::simplified;
 
 /// A figure of one or more panels with a common legend.
@@ -121,7 +122,7 @@ impl Figures {
 
 /// A number with five digits; null if it is none.
 pub(super) fn number(value: f64) -> Value {
-    let rounded: f64 = format!("{value:.4e}").parse().unwrap_or(f64::NAN);
+    let rounded = significant(value, 5);
     if rounded.is_finite() && rounded == rounded.trunc() && rounded.abs() < 1e15 {
         return json!(rounded as i64); // shorter
     }

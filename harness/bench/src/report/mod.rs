@@ -44,10 +44,9 @@ struct Group<'a> {
     runs: Vec<&'a Outcome>,
     /// The sweep of its first run.
     sweep: Option<&'a Sweep>,
-    /// Features of the first run's exact linear response on the same grid.
-    exact: Features,
-    /// The same of every run.
-    exact_of_runs: Vec<Features>,
+    /// Features of each run's exact linear response on the grid of its band.
+    exact: Vec<Features>,
+    /// That response of the first run.
     exact_response: FrequencyResponse,
 }
 
@@ -243,7 +242,7 @@ fn groups<'a>(plan: &Plan, fmu: &Fmu, results: &'a Results) -> Vec<Group<'a>> {
         match groups.iter_mut().find(same) {
             Some(group) => {
                 group.runs.push(run);
-                group.exact_of_runs.push(exact);
+                group.exact.push(exact);
             }
             None => {
                 groups.push(Group {
@@ -252,8 +251,7 @@ fn groups<'a>(plan: &Plan, fmu: &Fmu, results: &'a Results) -> Vec<Group<'a>> {
                     others: key,
                     runs: vec![run],
                     sweep: sweep(run),
-                    exact,
-                    exact_of_runs: vec![exact],
+                    exact: vec![exact],
                     exact_response,
                 });
             }
@@ -490,7 +488,7 @@ fn introduction(page: &Page, fmu: &Fmu, results: &Results) -> String {
             }
         };
         let [antiresonance, resonance] = [over(&|f| f.f_dip), over(&|f| f.f_res)];
-        let exact = group.exact.f_dip.zip(group.exact.f_res);
+        let exact = group.exact[0].f_dip.zip(group.exact[0].f_res);
         let exact =
             exact.filter(|_| page.axis.as_ref().is_none_or(|a| a.name == "torque amplitude"));
         let _ = write!(

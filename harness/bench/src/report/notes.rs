@@ -37,7 +37,7 @@ pub(super) fn estimators(groups: &[Group]) -> String {
 /// sweep's shift; `None` if no resonance is seen.
 fn swept_row(group: &Group) -> Option<String> {
     let run = group.runs.last()?;
-    let (mode, exact) = (run.linear.modes.first()?, group.exact_of_runs.last()?.f_res?);
+    let (mode, exact) = (run.linear.modes.first()?, group.exact.last()?.f_res?);
     let rate = sweep(run)?.rate_at(exact).abs();
     let swept = run.passing.as_ref().and_then(|passing| passing.rate.features.f_res);
     let whole = run.spa_features().f_res;

@@ -47,7 +47,7 @@ pub(super) fn responses(page: &Page, group: &Group) -> Figure {
 /// The band around antiresonance and resonance of all runs, at their own distance, Hz.
 fn near(group: &Group) -> Option<(f64, f64)> {
     let (from, to) = group.band().unwrap_or(BAND);
-    let bands = group.exact_of_runs.iter().filter_map(|exact| {
+    let bands = group.exact.iter().filter_map(|exact| {
         let (antiresonance, resonance) = exact.f_dip.zip(exact.f_res)?;
         let delta = resonance - antiresonance;
         Some(((antiresonance - 2.5 * delta).max(from), (resonance + 4.0 * delta).min(to)))

@@ -158,7 +158,7 @@ const STATEMENTS: &[Statement] = &[
         says: "At moderate and large torque the bench's resonance and antiresonance stay close to those of the linear synthetic model.",
         rule: "|f_res − exact linear| (spa) stays below 0.1 Hz from 0.1 N·m up",
         shows: |group| {
-            let exact = group.exact.f_res?;
+            let exact = group.exact[0].f_res?;
             let resonances = from(group, 0.1, |run| run.spa_features().f_res)?;
             let away = resonances.iter().map(|f| f - exact);
             let most = away.fold(0.0, |m: f64, d| if d.abs() > m.abs() { d } else { m });
@@ -189,7 +189,7 @@ const STATEMENTS: &[Statement] = &[
         rule: "at 0.0125 N·m the notch (spa) is deeper than the exact linear one by more than 3 dB",
         shows: |group| {
             let here = notch(at(group, LEAST)?)?;
-            let exact = group.exact.notch_db?;
+            let exact = group.exact[0].notch_db?;
             Some((format!("{here:.1} (exact {exact:.1}) dB"), here - exact > 3.0))
         },
         why: "At small torque the same friction acts on every model; the bench's bearing must have been freer than the fitted law.",
@@ -306,7 +306,7 @@ const STATEMENTS: &[Statement] = &[
         says: "At middle and large torque a broad region of lower coherence stands around the resonance.",
         rule: "at 0.25 N·m the mean within 0.2 Hz of the linear resonance is more than 0.1 below that elsewhere",
         shows: |group| {
-            let resonance = group.exact.f_res?;
+            let resonance = group.exact[0].f_res?;
             let run = at(group, MOST)?;
             let (near, rest): (Vec<_>, Vec<_>) = run
                 .record
@@ -358,7 +358,7 @@ const STATEMENTS: &[Statement] = &[
         rule: "at 0.25 N·m more than 90 % of its square lies within 0.3 Hz of the linear resonance",
         shows: |group| {
             let run = at(group, MOST)?;
-            let resonance = group.exact.f_res?;
+            let resonance = group.exact[0].f_res?;
             let (mut near, mut all) = (0.0, 0.0);
             let passing = run.passing.as_ref()?;
             for (f, l) in passing.rate.response.frequency.iter().zip(&passing.leakage) {
@@ -438,7 +438,7 @@ const STATEMENTS: &[Statement] = &[
         says: "The sweep is slow enough to show the steady response.",
         rule: "while the sweep passes, the resonance at 0.25 N·m stands within 5 mHz of the exact linear one",
         shows: |group| {
-            let shift = at(group, MOST)?.features().f_res? - group.exact.f_res?;
+            let shift = at(group, MOST)?.features().f_res? - group.exact[0].f_res?;
             Some((format!("{:+.0} mHz", shift * 1e3), shift.abs() < 5e-3))
         },
         why: "See below why the swept resonance lies higher. The whole record (spa) is free of it.",

@@ -97,13 +97,10 @@ impl TankArgs {
         );
         let files: Vec<&PathBuf> =
             [&self.out, &self.parameters, &self.picture].into_iter().flatten().collect();
-        if let Some(twice) = (1..files.len())
-            .map(|i| files[i])
-            .find(|f| files.iter().filter(|other| other == &f).count() > 1)
-        {
+        if let Some(i) = (1..files.len()).find(|i| files[..*i].contains(&files[*i])) {
             bail!(
                 "{} is to be two files at once (--out, --parameters, --picture)",
-                twice.display()
+                files[i].display()
             );
         }
         let read = || self.tank.display().to_string();

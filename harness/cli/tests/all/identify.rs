@@ -1,18 +1,23 @@
 //! `hubslosh identify` from outside, and what is done with its result.
 
 use std::path::Path;
-use std::process::Command;
+use std::process::{Command, Output};
 
 use signals::table::Table;
 
-/// Runs the program in a folder and returns what it prints; stderr if it fails.
-fn hubslosh(folder: &Path, arguments: &[&str]) -> Result<String, String> {
-    let done = Command::new(env!("CARGO_BIN_EXE_hubslosh"))
+/// Runs the program in a folder.
+fn run(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_hubslosh"))
         .current_dir(folder)
         .args(arguments)
         .args(["--fmu", pack::packed_for_tests().to_str().unwrap()])
         .output()
-        .unwrap();
+        .unwrap()
+}
+
+/// What the program prints; stderr if it fails.
+fn hubslosh(folder: &Path, arguments: &[&str]) -> Result<String, String> {
+    let done = run(folder, arguments);
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     if done.status.success() { Ok(text(&done.stdout)) } else { Err(text(&done.stderr)) }
 }
@@ -57,33 +62,25 @@ fn what_cannot_be_written_or_means_nothing_is_refused_before_the_search() {
     let folder = tempfile::tempdir().unwrap();
     let folder = folder.path();
     record(folder, "data.csv", &[]);
+    let report = ["--out", "result.json", "--report", "nowhere/page.html"];
+    let start = ["--out", "result.json", "--method", "frequency", "--start", "tank.d=0.2"];
     for (flags, word) in [
         (&["--out", "nowhere/result.json"][..], "nowhere/result.json cannot be written"),
-        (&["--report", "nowhere/page.html"], "nowhere/page.html cannot be written"),
-        (&["--bound", "friction.c=0:1"], "--bound is for --method acceleration"),
+        (&report, "nowhere/page.html cannot be written"),
         (
-            &["--method", "frequency", "--start", "tank.d=0.2"],
-            "--start is for --method output-error",
+            &["--out", "result.json", "--bound", "friction.c=0:1"],
+            "--bound is for --method acceleration",
         ),
+        (&start, "--start is for --method output-error"),
     ] {
-        let arguments = [&["identify", "data.csv", "--out", "result.json"][..], flags].concat();
-        let arguments = match flags[0] {
-            "--out" => [&["identify", "data.csv"][..], flags].concat(),
-            _ => arguments,
-        };
-        let error = hubslosh(folder, &arguments).unwrap_err();
+        let error = hubslosh(folder, &[&["identify", "data.csv"], flags].concat()).unwrap_err();
         assert!(error.contains(word), "{error}");
     }
     // a fit that does not describe its recording says so when it is used
     let result = r#"{"described":false,"settings":{},"parameters":{"hub.I":{"value":0.4}}}"#;
     std::fs::write(folder.join("poor.json"), result).unwrap();
-    let run = ["run", "--parameters", "poor.json", "--profile", "zero", "--out", "out.csv"];
-    let done = Command::new(env!("CARGO_BIN_EXE_hubslosh"))
-        .current_dir(folder)
-        .args(run)
-        .args(["--fmu", pack::packed_for_tests().to_str().unwrap()])
-        .output()
-        .unwrap();
+    let flags = ["--parameters", "poor.json", "--profile", "zero", "--out", "out.csv"];
+    let done = run(folder, &[&["run"][..], &flags].concat());
     let said = String::from_utf8_lossy(&done.stderr);
     assert!(done.status.success() && said.contains("do not describe the recording"), "{said}");
 }
