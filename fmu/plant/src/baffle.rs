@@ -22,9 +22,8 @@
 //! is 0.64 to 6.4 widths, the ring stays covered (d >= eta) and alpha < 0.25. Smaller waves keep more
 //! damping than it says.
 
+use crate::parameters::{Parameters, Ring, SloshSource};
 use crate::series::{Series, ZERO, mul_ramp};
-use crate::tank::Pendulum;
-use crate::{Parameters, Ring, SloshSource};
 
 /// What the ring's range begins with, over its width: the wave times exp(-1.84 d/R).
 const STROKE: core::ops::RangeInclusive<f64> = 0.64..=6.4;
@@ -172,9 +171,9 @@ impl Baffle {
         Baffle { zeta, floor2: floor * floor, w_floor: WEIGHTLESS / l, ..Baffle::default() }
     }
 
-    /// Amplitude of the motion, rad, and its damping ratio, at [|q|^2, |q'|^2].
-    pub fn present(&self, pendulum: &Pendulum, [q2, v2]: [f64; 2]) -> (f64, f64) {
-        let w = pendulum.g[0] * pendulum.inv_l + self.w_floor;
+    /// Amplitude of the motion, rad, and its damping ratio, at W = `w` and [|q|^2, |q'|^2].
+    pub fn present(&self, w: f64, [q2, v2]: [f64; 2]) -> (f64, f64) {
+        let w = w + self.w_floor;
         let amplitude = libm::sqrt(q2 + v2 / w);
         (amplitude, self.zeta * libm::sqrt(amplitude))
     }

@@ -10,10 +10,11 @@
 //!
 //! with c_0 at a reference g_0; without restoring force there is no damping.
 
-use crate::motion::RAMP_ORDER;
-use crate::series::{Series, ZERO};
-use crate::tank::{Calculated, Pendulum, SloshSource};
-use crate::{MODES, Parameters, Ramp};
+use crate::inputs::Ramp;
+use crate::parameters::{MODES, Parameters, SloshSource};
+use crate::pendulum::Pendulum;
+use crate::series::{RAMP_ORDER, Series, ZERO};
+use crate::tank::Calculated;
 
 /// Below this share of the largest g on a ramp the factor is replaced by its mean: there its
 /// power series reach no further than g = 0. The time is so short that what the mean leaves

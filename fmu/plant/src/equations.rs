@@ -4,12 +4,14 @@
 //! x is declared in `state.rs`. The friction's contact and the regime are discrete states:
 //! they change in [`Plant::take_event`] alone, when an indicator has crossed zero.
 
-use crate::Friction;
-use crate::friction::{Contact, Law};
+use crate::contact::Contact;
+use crate::friction::Law;
 use crate::imu::SLACK;
+use crate::inputs::{Inputs, Ramp};
 use crate::motion::StepError;
 use crate::outputs::unsigned_zero;
-use crate::plant::{Inputs, Plant, Ramp};
+use crate::parameters::Friction;
+use crate::plant::Plant;
 use crate::slosh::{SloshMode, with_modes};
 use crate::state::{Axial, INDICATORS, STATES, indicator, x};
 
@@ -61,7 +63,7 @@ impl Plant {
             self.motion.derivatives(0, true, modes, contact);
             self.motion.hub.theta[1] = dx[x::THETA];
             self.motion.hub.omega[1] = dx[x::OMEGA];
-            self.motion.law.set_states(1, dx);
+            self.motion.law.set_state(1, dx[x::BRISTLE]);
             for (mode, dq) in modes.iter_mut().zip(dx[x::SLOSH..].as_chunks::<4>().0) {
                 mode.seed_direction(dq, &self.motion.hub);
             }
@@ -79,7 +81,10 @@ impl Plant {
         derivatives[x::WORK] = motion.power[n];
         derivatives[x::HEAT] = motion.dissipation[n];
         derivatives[x::WHEEL_SPEED] = wheel;
-        motion.law.derivatives(n, self.state.contact, &mut derivatives);
+        if n == 0 && self.state.contact == Contact::Stuck {
+            derivatives[x::STUCK_TIME] = 1.0;
+        }
+        derivatives[x::BRISTLE] = motion.law.derivative(n);
         with_modes!(&self.liquid, modes => {
             let slosh = derivatives[x::SLOSH..].as_chunks_mut::<4>().0;
             for (mode, derivatives) in modes.iter().zip(slosh) {
@@ -253,7 +258,8 @@ impl Plant {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{FrictionModel, Outputs, Parameters, SloshModel};
+    use crate::outputs::Outputs;
+    use crate::parameters::{FrictionModel, Parameters, SloshModel};
 
     /// Whether the model's coordinates are lengths, not angles.
     fn is_a_length(slosh: SloshModel) -> bool {

@@ -6,7 +6,7 @@
 //! `bias_time` (thesis 5.5; IEEE Std 952). The noise of sample k is a function of
 //! the seed and k alone, so a restored state continues with the same noise.
 
-use crate::Imu;
+use crate::parameters::Imu;
 
 /// Communication points and time events meet sampling instants only to the rounding of the host's
 /// clock: a sample is taken early by up to this part of its period.

@@ -12,13 +12,18 @@
 //! `series.rs` is the arithmetic.
 
 mod baffle;
+mod contact;
 mod damping;
 mod equations;
 mod friction;
+mod hub;
 mod imu;
+mod inputs;
+mod liquid;
 mod motion;
 mod outputs;
 mod parameters;
+mod pendulum;
 mod plant;
 mod series;
 mod slosh;
@@ -26,15 +31,15 @@ mod state;
 mod tank;
 mod wheel;
 
-pub use friction::{Contact, FrictionModel};
+pub use contact::Contact;
+pub use inputs::{Inputs, Ramp};
+pub use liquid::coefficients as liquid_coefficients;
 pub use motion::StepError;
-pub use outputs::{Discrete, Outputs, Regime};
+pub use outputs::{Discrete, Outputs};
 pub use parameters::{
-    Bench, Fluid, Friction, Hub, Imu, Init, MODES, ModeTable, Parameters, Ring, Slosh, Solver,
-    Tank, Wheel,
+    Bench, Fluid, Friction, FrictionModel, Hub, Imu, Init, MODES, ModeTable, Parameters, Ring,
+    Slosh, SloshModel, SloshSource, Solver, Tank, Wheel,
 };
-pub use plant::{Inputs, Plant, Ramp};
-pub use slosh::SloshModel;
-pub use slosh::liquid::coefficients as liquid_coefficients;
-pub use state::{INDICATORS, STATES, State, indicator, x};
-pub use tank::{Calculated, SloshSource};
+pub use plant::Plant;
+pub use state::{INDICATORS, Regime, STATES, State, indicator, x};
+pub use tank::Calculated;

@@ -7,13 +7,15 @@
 //! the ends is as exact as at the ends: the instants at which the hub comes to rest
 //! or breaks away are roots of polynomials, found without stepping back.
 
+use crate::contact::Contact;
 use crate::damping::Damping;
-use crate::friction::{Contact, Law};
-use crate::plant::Ramp;
-use crate::series::{self, ORDER, Series, ZERO, for_each_order};
-use crate::slosh::{HubMotion, SloshMode};
+use crate::friction::Law;
+use crate::hub::HubMotion;
+use crate::inputs::Ramp;
+use crate::parameters::{Imu, Parameters, SloshModel};
+use crate::series::{self, ORDER, RAMP_ORDER, Series, ZERO, for_each_order};
+use crate::slosh::SloshMode;
 use crate::state::{State, x};
-use crate::{Imu, Parameters, SloshModel};
 
 /// Error of one step against the tolerance asked for. A step's error is forgotten
 /// as the liquid's motion decays, within some thousand steps.
@@ -21,9 +23,6 @@ const STEP_SHARE: f64 = 1e-2;
 
 /// The floor of the error's scale, rad/s.
 const RATE_FLOOR: f64 = 1e-6;
-
-/// The highest order used where the specific force changes.
-pub(crate) const RAMP_ORDER: usize = 10;
 
 /// The longest expansion, s: its powers up to the highest order do not overflow.
 const LONGEST: f64 = 1e9;
@@ -178,7 +177,7 @@ impl Motion {
     pub fn start<M: SloshMode>(&mut self, modes: &mut [M], state: &State, (tau, g): (Ramp, Ramp)) {
         self.hub.theta[0] = state.x[x::THETA];
         self.hub.omega[0] = state.x[x::OMEGA];
-        self.law.set_states(0, &state.x);
+        self.law.set_state(0, state.x[x::BRISTLE]);
         self.tau = [tau.value, tau.slope];
         for (mode, q) in modes.iter_mut().zip(state.slosh()) {
             mode.start(q, &self.hub);
@@ -515,7 +514,10 @@ impl Motion {
                     return Err(StepError::OutOfRange { time, mode: i + 1, what });
                 }
             }
-            self.law.advance(contact, n, length, &mut state.x);
+            self.law.advance(n, length, &mut state.x[x::BRISTLE]);
+            if stuck {
+                state.x[x::STUCK_TIME] += length;
+            }
             t = if length == left { h } else { t + length };
             let acting = (tau.after(t), g.after(t));
             match event {

@@ -1,35 +1,17 @@
 //! What can be read of the plant at an instant, and its time derivatives along a direction.
 
-use crate::friction::{Contact, Law};
-use crate::plant::{Inputs, Plant, Ramp};
+use crate::contact::Contact;
+use crate::friction::Law;
+use crate::inputs::{Inputs, Ramp};
+use crate::plant::Plant;
 use crate::slosh::{Angles, SloshMode, with_modes};
-use crate::state::{STATES, x};
+use crate::state::{Ranges, Regime, STATES, x};
 
 /// By how much the coordinates move to either side for a derivative by differences, as
 /// a share of the size at which they curve (1 rad, or a pendulum's length). What is left
 /// out, SHARE^4/30 of the fifth derivative, and the rounding, 1e-16/SHARE, are both
 /// about 1e-13.
 const SHARE: f64 = 1.0 / 512.0;
-
-/// How far the linear range of sloshing reaches, by the wave's height at the wall:
-/// below 0.15 R, up to 0.25 R, above (thesis 2.3.5).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Regime {
-    /// Below 0.15 R.
-    Linear = 1,
-    /// From 0.15 R to 0.25 R.
-    Transitional = 2,
-    /// Above 0.25 R.
-    Nonlinear = 3,
-}
-
-/// The ranges of validity that the motion is in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Ranges {
-    pub regime: Regime,
-    pub baffle: bool,
-}
 
 /// The plant's outputs at one instant, or their derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -157,7 +139,8 @@ impl Plant {
                 if self.baffle.is_some() {
                     let at = mode.amplitude2();
                     let pendulum = mode.pendulum();
-                    (amplitude, baffle_zeta) = pendulum.baffle.present(pendulum, at);
+                    let w = pendulum.g[0] * pendulum.inv_l;
+                    (amplitude, baffle_zeta) = pendulum.baffle.present(w, at);
                 }
             }
         });

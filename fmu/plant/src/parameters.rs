@@ -5,8 +5,6 @@
 //! and `wheel.inertia` are `hub.I` and `wheel.I`, `own_inertia` is `I_own`); what each means,
 //! its unit and its range stand in the FMU's variable table.
 
-use crate::{FrictionModel, SloshModel, SloshSource};
-
 /// All parameters of the plant.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[allow(missing_docs)]
@@ -50,6 +48,51 @@ pub struct Fluid {
     pub rho: f64,
     pub nu: f64,
     pub sigma: f64,
+}
+
+/// The mechanical models of the liquid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum SloshModel {
+    /// The liquid is a rigid body.
+    Frozen = 1,
+    /// Linear planar pendulums.
+    Linear = 2,
+    /// Nonlinear planar pendulums.
+    Planar = 3,
+    /// Spherical pendulums: the liquid can rotate.
+    Spherical = 4,
+    /// Masses on a paraboloid with a quartic spring.
+    Paraboloid = 5,
+    /// The first mode of an upright cylinder to third order in the amplitude.
+    Liquid = 6,
+}
+
+impl SloshModel {
+    /// All of them, in the order of their numbers.
+    pub const ALL: [SloshModel; 6] = [
+        SloshModel::Frozen,
+        SloshModel::Linear,
+        SloshModel::Planar,
+        SloshModel::Spherical,
+        SloshModel::Paraboloid,
+        SloshModel::Liquid,
+    ];
+}
+
+/// Where the modal parameters come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum SloshSource {
+    /// An upright cylinder by its dimensions.
+    Geometry = 1,
+    /// A table of modes.
+    Table = 2,
+}
+
+impl SloshSource {
+    /// All of them, in the order of their numbers.
+    pub const ALL: [SloshSource; 2] = [SloshSource::Geometry, SloshSource::Table];
 }
 
 /// The largest number of slosh modes.
@@ -111,6 +154,33 @@ pub struct Ring {
 pub struct Bench {
     pub tilt: f64,
     pub tilt_azimuth: f64,
+}
+
+/// The laws of the bearing's friction; when to choose which is said in their files.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum FrictionModel {
+    /// A free bearing.
+    None = 1,
+    /// b omega.
+    Viscous = 2,
+    /// Stribeck curve with sgn(omega) smoothed to tanh(omega / eps).
+    StribeckSmooth = 3,
+    /// Stribeck curve as a set-valued law: the hub can stick.
+    Stribeck = 4,
+    /// Bristles that deflect before they slide (LuGre).
+    Lugre = 5,
+}
+
+impl FrictionModel {
+    /// All of them, in the order of their numbers.
+    pub const ALL: [FrictionModel; 5] = [
+        FrictionModel::None,
+        FrictionModel::Viscous,
+        FrictionModel::StribeckSmooth,
+        FrictionModel::Stribeck,
+        FrictionModel::Lugre,
+    ];
 }
 
 /// The bearing; `harmonics_forward` and `harmonics_backward` are the coefficients of

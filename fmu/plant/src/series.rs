@@ -12,6 +12,9 @@
 /// The highest order kept.
 pub const ORDER: usize = 18;
 
+/// The highest order used where the specific force changes.
+pub const RAMP_ORDER: usize = 10;
+
 /// Coefficients 0 to [`ORDER`].
 pub type Series = [f64; ORDER + 1];
 

@@ -1,13 +1,12 @@
 //! The plant's state, and the names of its parts: the continuous states and the event
 //! indicators are declared here and nowhere else.
 
-use crate::friction::Contact;
+use crate::contact::Contact;
 use crate::imu::Gyro;
-use crate::outputs::{Ranges, Regime};
 
 /// Places of the continuous states in x. A new one is a new constant before [`x::SLOSH`].
 pub mod x {
-    use crate::MODES;
+    use crate::parameters::MODES;
 
     /// Hub angle, rad.
     pub const THETA: usize = 0;
@@ -61,6 +60,26 @@ pub const INDICATORS: usize = indicator::COUNT;
 
 /// From here on energies and forces may overflow, though angles and rates do not yet.
 const MAX_MAGNITUDE: f64 = 1e100;
+
+/// How far the linear range of sloshing reaches, by the wave's height at the wall:
+/// below 0.15 R, up to 0.25 R, above (thesis 2.3.5).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Regime {
+    /// Below 0.15 R.
+    Linear = 1,
+    /// From 0.15 R to 0.25 R.
+    Transitional = 2,
+    /// Above 0.25 R.
+    Nonlinear = 3,
+}
+
+/// The ranges of validity that the motion is in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Ranges {
+    pub regime: Regime,
+    pub baffle: bool,
+}
 
 /// The plant's memory: all that a saved state needs besides parameters and inputs.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -10,118 +10,12 @@
 //! a_n = k_n l_n/m_n = sigma xi_n^2/(rho R^2)
 //! ```
 
-use crate::baffle::Baffle;
-use crate::series::{Series, ZERO, mul, mul_ramp};
-use crate::slosh::liquid;
-use crate::{Fluid, MODES, Parameters, SloshModel, Tank, baffle};
+use cylinder::XI;
 
-/// Where the modal parameters come from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum SloshSource {
-    /// An upright cylinder by its dimensions.
-    Geometry = 1,
-    /// A table of modes.
-    Table = 2,
-}
-
-impl SloshSource {
-    /// All of them, in the order of their numbers.
-    pub const ALL: [SloshSource; 2] = [SloshSource::Geometry, SloshSource::Table];
-}
-
-pub(crate) use cylinder::XI;
-
-/// One slosh mode as a pendulum that hangs at the tank's axis.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pendulum {
-    /// Mass of the bob, kg.
-    pub m: f64,
-    /// Length, m.
-    pub l: f64,
-    /// Viscous coefficient of the bob against the tank, N s/m, now and at the reference g.
-    pub c: f64,
-    pub c_0: f64,
-    /// Distance of the hinge from the bearing's axis, m.
-    pub r: f64,
-    /// c/m, r/l and 1/l: quotients that every order of every step needs.
-    pub c_m: f64,
-    pub r_l: f64,
-    pub inv_l: f64,
-    /// Wall elevation per slosh angle, m/rad: a_n = 2 R / (xi_n^2 - 1) in a cylinder.
-    pub wave: f64,
-    /// Coefficient of the quartic spring over R^2, 1/m2 (paraboloid and liquid only).
-    pub hardening: f64,
-    /// Coefficient of the inertia that grows with the amplitude, l/s and l^2/s (the same).
-    pub s: f64,
-    pub l_s: f64,
-    pub l2_s: f64,
-    /// Restoring specific force g + a_n, m/s2, and its rate; sqrt((g + a_n)/l), rad/s.
-    pub g: [f64; 2],
-    pub omega_n: f64,
-    /// c over its value at the start of the expansion.
-    pub course: Series,
-    pub baffle: Baffle,
-}
-
-impl Default for Pendulum {
-    fn default() -> Self {
-        Pendulum {
-            m: 1.0,
-            l: 1.0,
-            c: 0.0,
-            c_0: 0.0,
-            r: 0.0,
-            c_m: 0.0,
-            r_l: 0.0,
-            inv_l: 1.0,
-            wave: 0.0,
-            hardening: 0.0,
-            s: 1.0,
-            l_s: 1.0,
-            l2_s: 1.0,
-            g: [0.0; 2],
-            omega_n: 0.0,
-            course: ZERO,
-            baffle: Baffle::default(),
-        }
-    }
-}
-
-impl Pendulum {
-    /// Sets the restoring specific force and its rate.
-    pub fn set_restoring(&mut self, g: [f64; 2]) {
-        self.g = g;
-        self.omega_n = libm::sqrt(f64::max(g[0], 0.0) / self.l);
-    }
-
-    /// Sets the viscous coefficient, `factor` times that at the reference g, and how it goes on.
-    pub fn set_damping(&mut self, factor: f64, course: Series) {
-        self.c = factor * self.c_0;
-        self.c_m = self.c / self.m;
-        self.course = course;
-    }
-
-    /// Adds the drag of the baffle at [|q|^2, |q'|^2], squares of angle and rate.
-    pub fn add_baffle(&mut self, at: [f64; 2]) {
-        let w = self.g.map(|g| g * self.inv_l);
-        self.c = self.baffle.start(w, at, self.m, self.c, self.course);
-        self.c_m = self.c / self.m;
-        self.course[0] = 1.0;
-    }
-
-    /// Coefficient n of g a; `varies` says whether g changes.
-    #[inline(always)]
-    pub fn weight(&self, n: usize, varies: bool, a: &Series) -> f64 {
-        if varies { mul_ramp(n, &self.g, a) } else { self.g[0] * a[n] }
-    }
-
-    /// Coefficient n of a rate v of the liquid times the course of the drag.
-    #[inline(always)]
-    pub fn drag(&self, n: usize, varies: bool, v: &Series) -> f64 {
-        if varies { mul(n, &self.course, v) } else { v[n] }
-    }
-}
+use crate::baffle::{self, Baffle};
+use crate::liquid;
+use crate::parameters::{Fluid, MODES, Parameters, SloshModel, SloshSource, Tank};
+use crate::pendulum::Pendulum;
 
 /// What follows from the parameters; 0 for modes that are not used.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]

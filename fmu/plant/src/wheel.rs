@@ -5,7 +5,8 @@
 //! (thesis Table 5.4). W follows from the command alone, so a step with a linear
 //! command is cut into pieces with linear torque before the hub's motion is known.
 
-use crate::{Ramp, Wheel};
+use crate::inputs::Ramp;
+use crate::parameters::Wheel;
 
 impl Wheel {
     /// What is wrong with the parameters together.

@@ -4,7 +4,7 @@
 //! T_C(w) = c + d exp(-(w/w_s)^2)
 //! ```
 
-use crate::Friction;
+use crate::parameters::Friction;
 use crate::series::{self, Series, ZERO};
 
 #[derive(Clone, Debug)]

@@ -6,8 +6,8 @@
 //!
 //! with + while the hub turns forwards, - backwards.
 
-use super::Contact;
-use crate::Friction;
+use crate::contact::Contact;
+use crate::parameters::Friction;
 use crate::series::{self, Series, ZERO};
 
 /// B+-(theta) of one direction.

@@ -31,13 +31,13 @@
 //! g/(sigma_0 |w|) seconds; the integrator resolves that, so its steps are of that length. As
 //! sigma_0 grows the law approaches the set-valued one, at a rising price.
 
+use super::FrictionLaw;
 use super::curve::StribeckCurve;
 use super::directional::DirectionalFactor;
-use super::{Contact, FrictionLaw};
-use crate::Friction;
+use crate::contact::Contact;
+use crate::hub::HubMotion;
+use crate::parameters::Friction;
 use crate::series::{self, Series, ZERO};
-use crate::slosh::HubMotion;
-use crate::state::{STATES, x};
 
 #[derive(Clone, Debug)]
 pub struct Lugre {
@@ -102,8 +102,8 @@ impl FrictionLaw for Lugre {
         )]
     }
 
-    fn set_states(&mut self, n: usize, x: &[f64; STATES]) {
-        self.z[n] = x[x::BRISTLE];
+    fn set_state(&mut self, n: usize, z: f64) {
+        self.z[n] = z;
     }
 
     // Once for all slosh models.
@@ -131,12 +131,12 @@ impl FrictionLaw for Lugre {
         self.sigma0 * series::square(n, &self.z) / 2.0
     }
 
-    fn derivatives(&self, n: usize, _: Contact, derivatives: &mut [f64; STATES]) {
-        derivatives[x::BRISTLE] = self.z_d[n];
+    fn derivative(&self, n: usize) -> f64 {
+        self.z_d[n]
     }
 
-    fn advance(&self, _: Contact, n: usize, t: f64, x: &mut [f64; STATES]) {
-        [x[x::BRISTLE]] = series::values([&self.z], n, t);
+    fn advance(&self, n: usize, t: f64, z: &mut f64) {
+        [*z] = series::values([&self.z], n, t);
     }
 
     /// Torques within the tolerance of the dry friction.

@@ -10,26 +10,14 @@ mod stribeck;
 mod stribeck_smooth;
 mod viscous;
 
-use crate::Friction;
+use crate::contact::Contact;
+use crate::hub::HubMotion;
+use crate::parameters::{Friction, FrictionModel};
 use crate::series::{self, Series};
-use crate::slosh::HubMotion;
-use crate::state::STATES;
 use directional::DirectionalFactor;
 
-/// How the hub stands to the bearing under a law that switches at rest.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(i8)]
-pub enum Contact {
-    /// Turning backwards, w < 0.
-    Backward = -1,
-    /// At rest, held by dry friction.
-    Stuck = 0,
-    /// Turning forwards, w > 0.
-    Forward = 1,
-}
-
-/// A law of friction as a set of power series in time. It may have states of its own among the
-/// plant's; w = 0 may be a place where it switches.
+/// A law of friction as a set of power series in time. It may have one state of its own; w = 0 may be a
+/// place where it switches.
 pub trait FrictionLaw {
     /// Whether the law switches where w = 0, so that this instant has to be located; if not,
     /// the contact is always [`Contact::Forward`].
@@ -50,12 +38,12 @@ pub trait FrictionLaw {
         Vec::new()
     }
 
-    /// Sets coefficient n of the law's states: 0 the states, 1 their direction for a partial
+    /// Sets coefficient n of the law's own state: 0 its value, 1 its direction for a partial
     /// derivative.
-    fn set_states(&mut self, _n: usize, _x: &[f64; STATES]) {}
+    fn set_state(&mut self, _n: usize, _z: f64) {}
 
     /// Coefficient n of tau_f while the hub is not stuck, from coefficients up to n of theta,
-    /// w, w^2 and the law's states; and coefficient n + 1 of the latter.
+    /// w, w^2 and the law's own state; and coefficient n + 1 of the latter.
     fn torque(&mut self, n: usize, contact: Contact, hub: &HubMotion) -> f64;
 
     /// Coefficient n of the power that the bearing dissipates, W, after `torque`.
@@ -69,13 +57,15 @@ pub trait FrictionLaw {
         0.0
     }
 
-    /// Coefficient n, 0 or 1, of the derivatives of the law's states.
-    fn derivatives(&self, _n: usize, _contact: Contact, _derivatives: &mut [f64; STATES]) {}
+    /// Coefficient n, 0 or 1, of the derivative of the law's own state.
+    fn derivative(&self, _n: usize) -> f64 {
+        0.0
+    }
 
-    /// Moves the law's states on by `t`, from the series cut after order n.
-    fn advance(&self, _contact: Contact, _n: usize, _t: f64, _x: &mut [f64; STATES]) {}
+    /// Moves the law's own state z on by `t`, from the series cut after order n.
+    fn advance(&self, _n: usize, _t: f64, _z: &mut f64) {}
 
-    /// Size of coefficient n of the law's states; the scale of its errors is 1.
+    /// Size of coefficient n of the law's own state; the scale of its errors is 1.
     #[inline(always)]
     fn coefficient_norm(&self, _n: usize) -> f64 {
         0.0
@@ -100,21 +90,9 @@ pub trait FrictionLaw {
     }
 }
 
-/// The one list of all laws: number, type, what it is.
+/// The law of every [`FrictionModel`]; the compiler misses one that is left out.
 macro_rules! laws {
-    ($($(#[$doc:meta])* $name:ident = $number:literal, $law:ty;)*) => {
-        /// The laws of the bearing's friction; when to choose which is said in their files.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        #[repr(u8)]
-        pub enum FrictionModel {
-            $($(#[$doc])* $name = $number,)*
-        }
-
-        impl FrictionModel {
-            /// All of them, in the order of their numbers.
-            pub const ALL: [FrictionModel; [$($number),*].len()] = [$(FrictionModel::$name,)*];
-        }
-
+    ($($name:ident => $law:ty;)*) => {
         /// The law in use; the plant has one, in a box with all other series.
         #[derive(Clone, Debug)]
         #[allow(clippy::large_enum_variant)]
@@ -162,11 +140,11 @@ macro_rules! laws {
                 }
             }
 
-            /// See [`FrictionLaw::set_states`].
+            /// See [`FrictionLaw::set_state`].
             #[inline(always)]
-            pub fn set_states(&mut self, n: usize, x: &[f64; STATES]) {
+            pub fn set_state(&mut self, n: usize, z: f64) {
                 match self {
-                    $(Law::$name(law) => law.set_states(n, x),)*
+                    $(Law::$name(law) => law.set_state(n, z),)*
                 }
             }
 
@@ -193,23 +171,18 @@ macro_rules! laws {
                 }
             }
 
-            /// See [`FrictionLaw::derivatives`].
-            pub fn derivatives(
-                &self,
-                n: usize,
-                contact: Contact,
-                derivatives: &mut [f64; STATES],
-            ) {
+            /// See [`FrictionLaw::derivative`].
+            pub fn derivative(&self, n: usize) -> f64 {
                 match self {
-                    $(Law::$name(law) => law.derivatives(n, contact, derivatives),)*
+                    $(Law::$name(law) => law.derivative(n),)*
                 }
             }
 
             /// See [`FrictionLaw::advance`].
             #[inline(always)]
-            pub fn advance(&self, contact: Contact, n: usize, t: f64, x: &mut [f64; STATES]) {
+            pub fn advance(&self, n: usize, t: f64, z: &mut f64) {
                 match self {
-                    $(Law::$name(law) => law.advance(contact, n, t, x),)*
+                    $(Law::$name(law) => law.advance(n, t, z),)*
                 }
             }
 
@@ -247,16 +220,11 @@ macro_rules! laws {
 }
 
 laws! {
-    /// A free bearing.
-    None = 1, viscous::Free;
-    /// b omega.
-    Viscous = 2, viscous::Viscous;
-    /// Stribeck curve with sgn(omega) smoothed to tanh(omega / eps).
-    StribeckSmooth = 3, stribeck_smooth::StribeckSmooth;
-    /// Stribeck curve as a set-valued law: the hub can stick.
-    Stribeck = 4, stribeck::Stribeck;
-    /// Bristles that deflect before they slide (LuGre).
-    Lugre = 5, lugre::Lugre;
+    None => viscous::Free;
+    Viscous => viscous::Viscous;
+    StribeckSmooth => stribeck_smooth::StribeckSmooth;
+    Stribeck => stribeck::Stribeck;
+    Lugre => lugre::Lugre;
 }
 
 impl Law {

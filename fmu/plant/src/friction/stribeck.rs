@@ -11,13 +11,13 @@
 //! reverse. Stick and slip are located as events, so it is exact and fast. Its hub does not
 //! move at all while stuck; for motion before sliding a law with a bristle is needed.
 
+use super::FrictionLaw;
 use super::curve::StribeckCurve;
 use super::directional::DirectionalFactor;
-use super::{Contact, FrictionLaw};
-use crate::Friction;
+use crate::contact::Contact;
+use crate::hub::HubMotion;
+use crate::parameters::Friction;
 use crate::series::{self, Series, ZERO};
-use crate::slosh::HubMotion;
-use crate::state::{STATES, x};
 
 #[derive(Clone, Debug)]
 pub struct Stribeck {
@@ -60,17 +60,6 @@ impl FrictionLaw for Stribeck {
             self.present[0] * self.curve.torque[n]
         };
         -self.b * hub.omega[n] - dry
-    }
-
-    fn derivatives(&self, n: usize, contact: Contact, derivatives: &mut [f64; STATES]) {
-        derivatives[x::STUCK_TIME] = if n == 0 && contact == Contact::Stuck { 1.0 } else { 0.0 };
-    }
-
-    #[inline(always)]
-    fn advance(&self, contact: Contact, _: usize, t: f64, x: &mut [f64; STATES]) {
-        if contact == Contact::Stuck {
-            x[x::STUCK_TIME] += t;
-        }
     }
 
     fn holds(&self, theta: f64) -> (f64, f64) {

@@ -3,9 +3,10 @@
 //! When to choose them: an air or magnetic bearing, or a comparison with linear theory; the
 //! plant with the linear slosh model is then linear in everything but the wheel.
 
-use super::{Contact, FrictionLaw};
-use crate::Friction;
-use crate::slosh::HubMotion;
+use super::FrictionLaw;
+use crate::contact::Contact;
+use crate::hub::HubMotion;
+use crate::parameters::Friction;
 
 /// A free bearing.
 #[derive(Clone, Debug)]

@@ -13,9 +13,10 @@
 //! On a bench that leans, gravity across the axis, e, adds e_y/l to al'', -m l e_x al to T and
 //! -m (e_x r + e_y l al) to E.
 
-use super::{Angles, HubMotion, HubReaction, SloshMode};
+use super::{Angles, HubReaction, SloshMode};
+use crate::hub::HubMotion;
+use crate::pendulum::Pendulum;
 use crate::series::{Series, ZERO, constant, mul, next, square, values};
-use crate::tank::Pendulum;
 
 #[derive(Clone, Debug)]
 pub struct Linear {

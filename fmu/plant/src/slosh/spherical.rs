@@ -33,13 +33,14 @@
 //! Checked against Lagrange's equations for xi (below), against another way to the hub's
 //! acceleration (tests/physics/rotary.rs) and against a pendulum in angles (Basilisk).
 
-use super::{Angles, HubMotion, HubReaction, SloshMode};
-use crate::Init;
+use super::{Angles, HubReaction, SloshMode};
+use crate::hub::HubMotion;
+use crate::parameters::Init;
+use crate::pendulum::Pendulum;
 use crate::series::{
     Pair, Series, ZERO, ZERO_PAIR, constant, dot, each, mul, mul_part, mul_part_head, mul_tail,
     next, scale, scale_head, square, squares, values, values_pair,
 };
-use crate::tank::Pendulum;
 
 #[derive(Clone, Debug)]
 pub struct Spherical {

@@ -24,7 +24,7 @@
 //! At t = 4 T an excited mode has twice the frequency: a secondary resonance, where this order says
 //! nothing. Modes above the first are pendulums.
 
-use crate::tank::XI;
+use cylinder::XI;
 
 /// M = int J1(xi_1 r)^4 r dr/int J1^2 r dr.
 const M: f64 = 0.278_821_981_660_245_8;

@@ -1,0 +1,13 @@
+//! Stick and slip.
+
+/// How the hub stands to the bearing under a law that switches at rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(i8)]
+pub enum Contact {
+    /// Turning backwards, w < 0.
+    Backward = -1,
+    /// At rest, held by dry friction.
+    Stuck = 0,
+    /// Turning forwards, w > 0.
+    Forward = 1,
+}

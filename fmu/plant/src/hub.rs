@@ -1,0 +1,99 @@
+//! The hub's motion as power series, and gravity across the axis of a bench that leans.
+
+use crate::series::{Series, ZERO, mul_ramp};
+
+/// The hub's motion as liquid and bearing see it.
+#[derive(Clone, Debug)]
+pub struct HubMotion {
+    /// theta, rad
+    pub theta: Series,
+    /// w, rad/s
+    pub omega: Series,
+    /// w^2
+    pub omega2: Series,
+    /// w', rad/s2
+    pub omega_dot: Series,
+    /// Specific force along the tank's axis, m/s2, and its rate.
+    pub g: [f64; 2],
+    /// How far ahead the course of the damping holds, s.
+    pub damping_reach: f64,
+    pub tilt: Tilt,
+}
+
+/// Gravity across the axis of a bench that leans. In the hub's frame, with the tangent t of the
+/// tilt and the azimuth phi that the lateral part points to,
+///
+/// ```text
+/// e = g d,   d = t (cos(phi - theta), sin(phi - theta))
+/// ```
+///
+/// g the specific force along the axis: a mass M at the place X has the energy -M e.X, and
+/// d' = w (d_y, -d_x).
+#[derive(Clone, Debug)]
+pub struct Tilt {
+    /// t
+    pub tangent: f64,
+    /// phi, rad
+    pub azimuth: f64,
+    /// d and e
+    pub direction: [Series; 2],
+    pub e: [Series; 2],
+}
+
+impl Tilt {
+    /// An upright bench.
+    const NONE: Tilt = Tilt { tangent: 0.0, azimuth: 0.0, direction: [ZERO; 2], e: [ZERO; 2] };
+
+    /// Coefficient n of d and e, from coefficients up to n of theta.
+    pub fn expand(&mut self, n: usize, theta: &Series, g: &[f64; 2]) {
+        if self.tangent == 0.0 {
+            return;
+        }
+        if n == 0 {
+            let (sin, cos) = libm::sincos(self.azimuth - theta[0]);
+            (self.direction[0][0], self.direction[1][0]) = (self.tangent * cos, self.tangent * sin);
+        } else {
+            // d' = theta' (d_y, -d_x)
+            let [x, y] = &self.direction;
+            let turned = |d: &Series| {
+                (1..=n).map(|j| j as f64 * theta[j] * d[n - j]).sum::<f64>() / n as f64
+            };
+            let (x_n, y_n) = (turned(y), -turned(x));
+            (self.direction[0][n], self.direction[1][n]) = (x_n, y_n);
+        }
+        for i in 0..2 {
+            self.e[i][n] = mul_ramp(n, g, &self.direction[i]);
+        }
+    }
+
+    /// Coefficient n of -d.X, the height of a place X in the hub's frame, m.
+    pub fn height(&self, n: usize, x: impl Fn(usize) -> [f64; 2]) -> f64 {
+        if self.tangent == 0.0 {
+            return 0.0;
+        }
+        let [d_x, d_y] = &self.direction;
+        let term = |j: usize| {
+            let [x, y] = x(j);
+            x * d_x[n - j] + y * d_y[n - j]
+        };
+        -(0..=n).map(term).sum::<f64>()
+    }
+
+    /// e at order 0, m/s2.
+    pub fn now(&self) -> [f64; 2] {
+        [self.e[0][0], self.e[1][0]]
+    }
+}
+
+impl HubMotion {
+    /// At rest, weightless.
+    pub const REST: HubMotion = HubMotion {
+        theta: ZERO,
+        omega: ZERO,
+        omega2: ZERO,
+        omega_dot: ZERO,
+        g: [0.0; 2],
+        damping_reach: f64::INFINITY,
+        tilt: Tilt::NONE,
+    };
+}
