@@ -29,13 +29,25 @@
 //! Source: Newton's second law with the constraint eliminated; every vector in body axes.
 //! Checked against the same law in p'' (tests/independent.rs).
 
-use crate::outputs::BobNow;
 use crate::parameters::Tank;
 use crate::series::{self, Pair, Series, Vector, ZERO, ZERO_PAIR, ZERO_VECTOR};
 use crate::vector::{
     Mat3, Number, Vec3, add, constant, cross, dot, largest, on_sphere, on_sphere_slope, rotation,
     scale, sub, times, transposed_times, unit_quaternion,
 };
+
+/// One bob, as the outputs need it.
+pub(crate) struct BobNow<T> {
+    pub m: T,
+    /// From O, and its velocity against the tank.
+    pub rho: Vec3<T>,
+    pub rate: Vec3<T>,
+    /// p in tank axes.
+    pub in_tank: Vec3<T>,
+    pub wave: f64,
+    /// Energy of the centring stiffness.
+    pub centring: T,
+}
 
 /// One bob: its parameters and the power series of its motion.
 #[derive(Clone, Debug)]

@@ -40,12 +40,12 @@
 //! Source: momentum and moment of momentum of a volume fixed in the craft, with d(m s)/dt = K - f r_out;
 //! the energy is that of `outputs.rs`, differentiated along the motion.
 
+use crate::bob::BobNow;
 use crate::integrator::{Limits, StepError, advance_by_extrapolation};
-use crate::outputs::BobNow;
-use crate::parameters::{MODES, Tank};
+use crate::parameters::Tank;
 use crate::rigid::{Mat6, Rigid};
+use crate::sizes::{MODES, POINTS};
 use crate::state::Line;
-use crate::table::POINTS;
 use crate::vector::{
     Mat3, Number, Vec3, add, constant, cross, dot, on_sphere, rotation, scale, sub, times,
     transposed_times, unit_quaternion,

@@ -12,8 +12,9 @@ use crate::contents::{Contents, Drains, Outflow, Place, normalise_bobs, vec_of};
 use crate::integrator::{RATE_FLOOR, StepError};
 use crate::motion::SCALE_TIME;
 use crate::outputs::{Now, TankNow};
-use crate::parameters::{MODES, Mount, Parameters, TANKS, Tank};
+use crate::parameters::{Mount, Parameters, Tank};
 use crate::rigid::{Factors, Rigid};
+use crate::sizes::{MODES, TANKS};
 use crate::state::{INPUTS, Inputs, Line, STATES, State, index};
 use crate::vector::{
     Dual, Number, Vec3, add, constant, cross, dot, largest, rotation, scale, sub, times,

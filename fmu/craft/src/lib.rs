@@ -36,6 +36,7 @@ mod outputs;
 mod parameters;
 mod rigid;
 mod series;
+mod sizes;
 mod slosh_tank;
 mod spacecraft;
 mod state;
@@ -44,11 +45,12 @@ mod vector;
 
 pub use integrator::StepError;
 pub use outputs::{Outputs, TankOutputs};
-pub use parameters::{Craft, Inertia, Init, MODES, Mount, Parameters, TANKS, Tank};
+pub use parameters::{Craft, Inertia, Init, Mount, Parameters, Tank};
+pub use sizes::{MODES, POINTS, TANKS};
 pub use slosh_tank::{
     Coupling, SloshTank, SloshTankOutputs, TANK_INPUTS, TANK_STATES, TRIANGLE, TankInputs,
     TankParameters, TankState,
 };
 pub use spacecraft::Spacecraft;
 pub use state::{INPUTS, Inputs, Line, Ramp, STATES, State, index};
-pub use table::{FillTable, POINTS};
+pub use table::FillTable;

@@ -35,18 +35,12 @@ use crate::series::{
 };
 use crate::state::{Inputs, STATES, State, index};
 use crate::vector::{
-    self, Mat3, Vec3, add, largest, rotation, scale, sub, times, transposed_times, unit_quaternion,
-    unit_quaternion_slope,
+    self, Mat3, Vec3, add, largest, part, rotation, scale, sub, times, transposed_times,
+    unit_quaternion, unit_quaternion_slope,
 };
 
 /// Rates change within this time at most, s: a step much longer does not see how fast they are.
 pub const SCALE_TIME: f64 = 0.1;
-
-/// A vector out of an array.
-#[inline(always)]
-pub fn part(x: &[f64], at: usize) -> Vec3 {
-    [x[at], x[at + 1], x[at + 2]]
-}
 
 /// Coefficient N of the matrix of y -> w x (w x y) = (w w^T - |w|^2 1) y, from that of
 /// w w^T.

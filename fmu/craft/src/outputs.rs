@@ -12,12 +12,14 @@
 //! everything from O; V in body axes. H is about r_c and does not contain V: after a long
 //! thrust nothing cancels. drained': `contents.rs`. On a pivot H is about O, and E has the potential a.S with all masses.
 
+use crate::bob::BobNow;
 use crate::motion::CraftMotion;
-use crate::parameters::{MODES, Mount, TANKS};
+use crate::parameters::Mount;
 use crate::rigid::Rigid;
+use crate::sizes::{MODES, TANKS};
 use crate::state::{STATES, index};
 use crate::vector::{
-    Mat3, Number, Quaternion, Vec3, add, constant, cross, dot, rotation, scale, sub, times,
+    Mat3, Number, Quaternion, Vec3, add, constant, cross, dot, part, rotation, scale, sub, times,
 };
 
 /// What one tank shows.
@@ -166,19 +168,6 @@ fn add_matrices<T: Number>(a: Mat3<T>, b: Mat3<T>) -> Mat3<T> {
     [add(a[0], b[0]), add(a[1], b[1]), add(a[2], b[2])]
 }
 
-/// One bob, as the outputs need it.
-pub(crate) struct BobNow<T> {
-    pub m: T,
-    /// From O, and its velocity against the tank.
-    pub rho: Vec3<T>,
-    pub rate: Vec3<T>,
-    /// p in tank axes.
-    pub in_tank: Vec3<T>,
-    pub wave: f64,
-    /// Energy of the centring stiffness.
-    pub centring: T,
-}
-
 /// One tank.
 pub(crate) struct TankNow<T> {
     /// The rigid liquid about O.
@@ -288,11 +277,11 @@ impl<T: Number> Now<T> {
         }
         Outputs {
             q: [x[index::Q], x[index::Q + 1], x[index::Q + 2], x[index::Q + 3]],
-            omega: crate::motion::part(x, index::OMEGA),
+            omega: part(x, index::OMEGA),
             omega_dot: result(self.w_d),
             specific_force: result(self.a),
-            position: crate::motion::part(x, index::POSITION),
-            velocity: crate::motion::part(x, index::VELOCITY),
+            position: part(x, index::POSITION),
+            velocity: part(x, index::VELOCITY),
             slosh_force,
             slosh_torque,
             momentum: result(times(&self.axes, momentum)),

@@ -4,14 +4,9 @@
 
 use crate::integrator::MAX_STEPS;
 use crate::rigid::{Factors, Rigid};
-use crate::table::{FillTable, POINTS};
+use crate::sizes::{MODES, POINTS, TANKS};
+use crate::table::FillTable;
 use crate::vector::{Quaternion, Vec3, norm};
-
-/// Tanks that a craft can have.
-pub const TANKS: usize = 4;
-
-/// Slosh modes that a tank can have.
-pub const MODES: usize = 3;
 
 /// Symmetric inertia tensor, kg m2: the matrix of J = integral of (|s|^2 1 - s s^T) dm.
 #[derive(Clone, Copy, Debug, PartialEq)]

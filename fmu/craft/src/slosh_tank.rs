@@ -36,16 +36,19 @@
 //! A tank that drains (`contents.rs`) moves by extrapolation instead of power series, as a craft does. A jump of its
 //! flow is an impulse on the host, which a force cannot be; it is left out, here and in the bobs.
 
-use crate::bob::Bob;
+use crate::bob::{Bob, BobNow};
 use crate::contents::{Drains, Outflow, Place, normalise_bobs, vec_of};
 use crate::integrator::{Limits, MAX_MAGNITUDE, MAX_STEPS, Motion, RATE_FLOOR, StepError, advance};
-use crate::motion::{SCALE_TIME, part, twice_crossed};
-use crate::outputs::{BobNow, MassProperties, TankOutputs};
-use crate::parameters::{Craft, MODES, Tank, steps_problem, tolerance_problem};
+use crate::motion::{SCALE_TIME, twice_crossed};
+use crate::outputs::{MassProperties, TankOutputs};
+use crate::parameters::{Craft, Tank, steps_problem, tolerance_problem};
 use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod, largest_eigenvalue};
 use crate::series::{self, Pair, Series, Vector, ZERO, ZERO_PAIR, ZERO_VECTOR, products};
+use crate::sizes::MODES;
 use crate::state::{Line, Ramp, has_direction};
-use crate::vector::{Dual, Mat3, Number, Vec3, add, constant, cross, largest, on_sphere, scale};
+use crate::vector::{
+    Dual, Mat3, Number, Vec3, add, constant, cross, largest, on_sphere, part, scale,
+};
 
 /// Number of continuous states of a tank: p and p' of each mode, then the dissipated energy and the
 /// mass of liquid.

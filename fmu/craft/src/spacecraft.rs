@@ -6,7 +6,8 @@ use crate::draining::{Acting, Draining, Run};
 use crate::integrator::{Limits, StepError, advance};
 use crate::motion::CraftMotion;
 use crate::outputs::{Now, Outputs};
-use crate::parameters::{MODES, Parameters, TANKS, tolerance_problem};
+use crate::parameters::{Parameters, tolerance_problem};
+use crate::sizes::{MODES, TANKS};
 use crate::state::{INPUTS, Inputs, STATES, State, index};
 use crate::vector::{Dual, Number, on_sphere, unit_quaternion};
 

@@ -1,7 +1,7 @@
 //! The craft's continuous states x in their order, its inputs, and its memory.
 
 use crate::integrator::MAX_MAGNITUDE;
-use crate::parameters::{MODES, TANKS};
+use crate::sizes::{MODES, TANKS};
 use crate::vector::Vec3;
 
 /// Places in x. Units: 1, rad/s, m, m/s, J, J, then 1 and 1/s for each bob.

@@ -15,11 +15,8 @@
 //! Source: the region of monotonicity as in Fritsch and Carlson, SIAM J. Numer. Anal. 17 (1980), here
 //! for quintics.
 
-use crate::parameters::MODES;
+use crate::sizes::{MODES, POINTS};
 use crate::vector::Number;
-
-/// Points that a table can have.
-pub const POINTS: usize = 8;
 
 /// Modes and rigid liquid at some masses of the liquid.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -161,6 +161,12 @@ impl Number for Dual {
     }
 }
 
+/// Three components of an array from `at` on.
+#[inline(always)]
+pub fn part(x: &[f64], at: usize) -> Vec3 {
+    [x[at], x[at + 1], x[at + 2]]
+}
+
 #[inline(always)]
 pub fn add<T: Number>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
