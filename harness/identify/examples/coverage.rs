@@ -26,8 +26,9 @@ use std::collections::BTreeMap;
 
 use anyhow::{Context, Result, bail};
 use host::fmi2::Fmu;
-use identify::identification::{Identification, Options, identify};
+use identify::identification::{Identification, identify};
 use identify::nominal::COARSEST;
+use identify::options::Options;
 use identify::recording;
 use identify::residual::Tests;
 use identify::simulate::Between;

@@ -14,8 +14,9 @@
 use bench::profile::Torque;
 use host::fmi2::Fmu;
 use identify::compensation::{self, Friction};
-use identify::identification::{Options, identify};
-use identify::start::Bench;
+use identify::identification::identify;
+use identify::nominal::Bench;
+use identify::options::Options;
 use identify::twin::{self, Flaws};
 
 fn main() -> anyhow::Result<()> {

@@ -26,7 +26,7 @@ use host::fmi2::Fmu;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
-use crate::identification::Estimated;
+use crate::estimate::Estimated;
 use crate::least_squares::{Minimum, minimise};
 use crate::recording::{self, Recording};
 use crate::uncertainty::Covariance;

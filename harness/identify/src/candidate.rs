@@ -7,11 +7,13 @@ use serde::Serialize;
 
 use crate::fit::{Answer, Channel, Polished, Problem, Signal, WHOLE, WINDOWS};
 use crate::friction;
-use crate::identification::Options;
+use crate::nominal::Start;
+use crate::options::Options;
 use crate::recording::Recording;
 use crate::residual::Tests;
 use crate::simulate::{Between, Setup};
-use crate::start::{self, Start};
+use crate::start;
+use crate::stribeck::Places;
 use crate::unknown::{Quantity, Scale, Unknown};
 
 /// One model's fit.
@@ -323,7 +325,7 @@ impl<'a> Search<'a, '_> {
 
     /// Other friction curves, if a minimum may be one of several, and the lowest.
     fn friction(&mut self, near: Polished) -> Result<Found> {
-        let places = friction::Places::of(&self.problem);
+        let places = Places::of(&self.problem.unknowns);
         let Some(places) = places.filter(|p| friction::is_vague(&self.problem, &near, *p)) else {
             return Ok((near, None));
         };

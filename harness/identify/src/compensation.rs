@@ -18,8 +18,8 @@ use bench::analysis::transfer_function::fit_time;
 use serde::Serialize;
 
 use crate::least_squares::{differences, minimise};
+use crate::nominal::Bench;
 use crate::recording::Recording;
-use crate::start::Bench;
 
 /// First zero of J1'.
 const XI: f64 = 1.841_183_781_340_66;

@@ -36,10 +36,10 @@ use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::{DMatrix, DVector, Dyn, storage::Owned};
 use rayon::prelude::*;
 
-use crate::friction;
 use crate::noise::{FLOOR, Noise, Whitening};
 use crate::recording::{self, Recording};
 use crate::simulate::{Motion, Setup};
+use crate::stribeck;
 use crate::uncertainty::Covariance;
 use crate::unknown::{Quantity, Scale, Unknown};
 
@@ -460,7 +460,7 @@ impl<'a> Problem<'a> {
                 let moved = |by: f64| {
                     let mut part = vec![0.0; x.len()];
                     mixed.iter().zip(&direction).for_each(|(&j, d)| part[j] = by * d);
-                    self.motions(&friction::moved(self, x, &part, fastest))
+                    self.motions(&stribeck::moved(&self.unknowns, x, &part, fastest))
                 };
                 let ahead = moved(step)?;
                 let (behind, width) = match how {
@@ -557,7 +557,7 @@ impl<'a> Problem<'a> {
                     free.iter()
                         .zip(step.iter())
                         .for_each(|(&j, step)| part_of_step[j] = part * step);
-                    let moved = friction::moved(self, &x, &part_of_step, fastest);
+                    let moved = stribeck::moved(&self.unknowns, &x, &part_of_step, fastest);
                     simulations += 1;
                     if let Ok(there) = self.answer(&moved) {
                         let new = self.stacked(&there, &moved);

@@ -31,11 +31,12 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 use signals::fourier::Forward;
 
-use crate::identification::Estimated;
+use crate::estimate::Estimated;
 use crate::least_squares::{differences, minimise};
+use crate::nominal::Bench;
 use crate::recording::{self, Recording};
 use crate::simulate::Between;
-use crate::start::{self, Bench};
+use crate::start;
 use crate::uncertainty::Covariance;
 
 /// Degree of T. Two are the plant's own; two more take what sampling folds back.

@@ -15,29 +15,13 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
 use crate::fit::{self, Polished, Problem};
+use crate::stribeck::Places;
 
 /// ω_s over the fastest speed of the recording.
 const GRID: [f64; 6] = [0.1, 0.3, 0.7, 1.5, 4.0, 15.0];
 
 /// Relative standard deviation of d or ω_s beyond which a minimum may be one of several.
 const VAGUE: f64 = 0.2;
-
-/// Unknowns of the friction law: places of b, c, d and ω_s.
-#[derive(Clone, Copy, Debug)]
-pub struct Places {
-    b: usize,
-    c: usize,
-    d: usize,
-    speed: usize,
-}
-
-impl Places {
-    /// `None` unless all four are unknown.
-    pub fn of(problem: &Problem) -> Option<Self> {
-        let place = |name: &str| problem.place(&format!("friction.{name}"));
-        Some(Places { b: place("b")?, c: place("c")?, d: place("d")?, speed: place("omega_s")? })
-    }
-}
 
 /// Whether a minimum may be one of several: none at all, or one whose Stribeck excess the recording hardly shows.
 pub fn is_vague(problem: &Problem, found: &Polished, places: Places) -> bool {
@@ -62,45 +46,6 @@ pub struct Point {
     pub covariance: DMatrix<f64>,
     /// Answers of the FMU that were needed.
     pub simulations: usize,
-}
-
-/// x with a step added, so that the friction torque at three speeds changes as the step's first order says, even where ω_s
-/// moves far. The recording determines the torques, and along ω_s at fixed torques the valley is straight; at fixed b, c and d it
-/// is bent. Where that needs a negative b, c or d, the step is plainly added.
-pub fn moved(problem: &Problem, x: &[f64], step: &[f64], fastest: f64) -> Vec<f64> {
-    let plain: Vec<f64> = x.iter().zip(step).map(|(x, step)| x + step).collect();
-    let Some(places) = Places::of(problem) else { return plain };
-    let scale = |place: usize| problem.unknowns[place].scale;
-    let value = |place: usize, x: &[f64]| scale(place).value(x[place]);
-    let (d, speed) = (value(places.d, x), value(places.speed, x));
-    let change = |place: usize| scale(place).slope(x[place]) * step[place];
-    let new_speed = value(places.speed, &plain);
-    let (mut matrix, mut torque) = (Matrix3::zeros(), Vector3::zeros());
-    for (row, w) in [0.0, 0.4 * fastest, 0.9 * fastest].into_iter().enumerate() {
-        let shape = (-(w / speed).powi(2)).exp();
-        // T and its first-order change
-        let now = value(places.b, x) * w + value(places.c, x) + d * shape;
-        let slope = 2.0 * d * shape * w * w / speed.powi(3);
-        torque[row] = now
-            + change(places.b) * w
-            + change(places.c)
-            + change(places.d) * shape
-            + change(places.speed) * slope;
-        let new_shape = (-(w / new_speed).powi(2)).exp();
-        matrix.set_row(row, &Vector3::new(w, 1.0, new_shape).transpose());
-    }
-    let Some(inverse) = matrix.try_inverse() else { return plain };
-    let found = inverse * torque;
-    let mut moved = plain.clone();
-    for (place, new) in [(places.b, found[0]), (places.c, found[1]), (places.d, found[2])] {
-        // no further from the plain step than a factor, and positive
-        let near = new / value(place, &plain);
-        if !(0.05..20.0).contains(&near) {
-            return plain;
-        }
-        moved[place] = scale(place).variable(new);
-    }
-    moved
 }
 
 /// Fits at the Stribeck speeds of a grid over the recording's speeds, near the fit `from`.

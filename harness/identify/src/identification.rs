@@ -10,79 +10,17 @@ use serde::Serialize;
 
 use crate::budget::{self, Effect};
 use crate::candidate::{self, Fitted, ModelFit};
+use crate::estimate::Estimated;
 use crate::fit::{Answer, Differences, Problem};
-use crate::nominal::Nominal;
+use crate::nominal::Start;
+use crate::options::Options;
 use crate::plausible;
 use crate::recording::{self, Recording};
 use crate::residual::Tests;
-use crate::simulate::Between;
-use crate::start::{self, Response, Start};
+use crate::start::{self, Response};
 use crate::uncertainty::{self, Combination, Covariance};
 use crate::unknown::{Quantity, Unknown};
-use crate::verdict;
-
-/// What is asked for.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// Slosh models to be tried, by the names of `slosh.model`'s items.
-    pub models: Vec<String>,
-    /// Friction laws to be tried, by the names of `friction.model`'s items.
-    pub friction: Vec<String>,
-    /// What is known of the bench, by FMU name; these are not estimated.
-    pub settings: Vec<(String, String)>,
-    /// What is known of a parameter that is estimated: name, mean and standard deviation.
-    pub known: Vec<(String, f64, f64)>,
-    /// Starts in place of those from the data, by FMU name.
-    pub starts: Vec<(String, f64)>,
-    /// Whether delay, gyro bias and friction asymmetry are estimated as well.
-    pub flaws: bool,
-    /// Standard deviation of the gyro's scale about 1, as its data sheet has it; 0: exactly 1.
-    pub gyro_scale: f64,
-    /// What the torque does between rows; `None`: what fits best.
-    pub between: Option<Between>,
-    /// Recordings that are simulated, not fitted.
-    pub validation: Vec<Recording>,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Options {
-            models: ["frozen", "linear", "planar", "spherical"].map(String::from).to_vec(),
-            friction: vec!["stribeck".into()],
-            settings: Vec::new(),
-            known: Vec::new(),
-            starts: Vec::new(),
-            flaws: true,
-            gyro_scale: 0.01,
-            between: None,
-            validation: Vec::new(),
-        }
-    }
-}
-
-impl Options {
-    /// The bench as the FMU is set up with these options.
-    pub fn nominal(&self, fmu: &Fmu) -> Result<Nominal> {
-        let known = self.known.iter().map(|(name, mean, _)| (name.clone(), *mean));
-        let expected: Vec<(String, f64)> = known.chain(self.starts.iter().cloned()).collect();
-        Nominal::of(fmu, &self.settings, &expected)
-    }
-}
-
-/// An estimated number.
-#[derive(Clone, Debug, Serialize)]
-pub struct Estimated {
-    /// SI.
-    pub value: f64,
-    /// Standard deviation, everything in it.
-    pub std: f64,
-    /// Standard deviation from the noise alone.
-    pub std_noise: f64,
-    /// 95 % interval.
-    pub interval: [f64; 2],
-    /// As in modelDescription.xml.
-    pub unit: String,
-}
+use crate::verdict::{self, DECIDES};
 
 /// The result.
 #[derive(Clone, Debug, Serialize)]
@@ -143,9 +81,6 @@ impl Identification {
         Ok(serde_json::to_string_pretty(self)? + "\n")
     }
 }
-
-/// Least difference of the information criterion that decides (Kass and Raftery: very strong).
-pub const DECIDES: f64 = 10.0;
 
 /// Difference below which the simpler model is taken (not worth more than a bare mention, ibid.).
 const ALIKE: f64 = 2.0;

@@ -3,7 +3,30 @@
 use anyhow::{Result, ensure};
 use host::fmi2::Fmu;
 
-use crate::start::{Bench, Start};
+/// What is known of the bench without the recording.
+#[derive(Clone, Copy, Debug)]
+pub struct Bench {
+    /// tank.r, m.
+    pub arm: f64,
+    /// fluid.rho, kg/m³.
+    pub density: f64,
+    /// g_axial, m/s².
+    pub gravity: f64,
+}
+
+/// What is estimated of the bench in the time domain, where a search starts; SI units.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[allow(missing_docs)]
+pub struct Start {
+    pub d: f64,
+    pub h: f64,
+    pub zeta: f64,
+    pub hub_inertia: f64,
+    pub b: f64,
+    pub c: f64,
+    pub stribeck: f64,
+    pub omega_s: f64,
+}
 
 /// What the FMU says of the bench.
 #[derive(Clone, Copy, Debug)]

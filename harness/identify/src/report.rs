@@ -7,7 +7,8 @@ use bench::svg::{Axis, Chart, Series, Style};
 use host::html::escape;
 
 use crate::candidate::ModelFit;
-use crate::identification::{Estimated, Identification, Signals};
+use crate::estimate::Estimated;
+use crate::identification::{Identification, Signals};
 
 /// Points of a curve: more than a screen has pixels are not seen.
 const POINTS: usize = 700;

@@ -26,22 +26,11 @@ use bench::analysis::{
 };
 use signals::fourier::Forward;
 
-use crate::nominal::Nominal;
+use crate::nominal::{Bench, Nominal, Start};
 use crate::recording::Recording;
 
 /// First zero of J1'.
 const XI: f64 = 1.841_183_781_340_66;
-
-/// What is known of the bench without the recording.
-#[derive(Clone, Copy, Debug)]
-pub struct Bench {
-    /// tank.r, m.
-    pub arm: f64,
-    /// fluid.rho, kg/m³.
-    pub density: f64,
-    /// g_axial, m/s².
-    pub gravity: f64,
-}
 
 /// What a frequency response says of the bench.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -71,20 +60,6 @@ pub const PARAMETERS: [&str; 8] = [
     "friction.d",
     "friction.omega_s",
 ];
-
-/// Starts for the time domain, SI units.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-#[allow(missing_docs)]
-pub struct Start {
-    pub d: f64,
-    pub h: f64,
-    pub zeta: f64,
-    pub hub_inertia: f64,
-    pub b: f64,
-    pub c: f64,
-    pub stribeck: f64,
-    pub omega_s: f64,
-}
 
 /// Frequencies between which the torque has its power, Hz.
 pub fn excited_band(step: f64, torque: &[f64], rate: &[f64]) -> Option<(f64, f64)> {

@@ -4,9 +4,12 @@ use std::collections::BTreeMap;
 
 use crate::budget::Effect;
 use crate::candidate::ModelFit;
-use crate::identification::{DECIDES, Estimated};
+use crate::estimate::Estimated;
 use crate::residual::{self, Tests};
 use crate::uncertainty::Combination;
+
+/// Least difference of the information criterion that decides (Kass and Raftery: very strong).
+pub const DECIDES: f64 = 10.0;
 
 /// What there was to choose from.
 pub struct Question<'a> {

@@ -3,7 +3,8 @@
 use bench::profile::{Profile, Torque};
 use host::fmi2::Fmu;
 use identify::fit::{Differences, Problem};
-use identify::identification::{Options, identify};
+use identify::identification::identify;
+use identify::options::Options;
 use identify::recording::Recording;
 use identify::simulate::{Between, Setup};
 use identify::twin::{self, Flaws, Twin};

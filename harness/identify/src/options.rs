@@ -1,0 +1,56 @@
+//! What is asked of an identification.
+
+use anyhow::Result;
+use host::fmi2::Fmu;
+
+use crate::nominal::Nominal;
+use crate::recording::Recording;
+use crate::simulate::Between;
+
+/// What is asked for.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Slosh models to be tried, by the names of `slosh.model`'s items.
+    pub models: Vec<String>,
+    /// Friction laws to be tried, by the names of `friction.model`'s items.
+    pub friction: Vec<String>,
+    /// What is known of the bench, by FMU name; these are not estimated.
+    pub settings: Vec<(String, String)>,
+    /// What is known of a parameter that is estimated: name, mean and standard deviation.
+    pub known: Vec<(String, f64, f64)>,
+    /// Starts in place of those from the data, by FMU name.
+    pub starts: Vec<(String, f64)>,
+    /// Whether delay, gyro bias and friction asymmetry are estimated as well.
+    pub flaws: bool,
+    /// Standard deviation of the gyro's scale about 1, as its data sheet has it; 0: exactly 1.
+    pub gyro_scale: f64,
+    /// What the torque does between rows; `None`: what fits best.
+    pub between: Option<Between>,
+    /// Recordings that are simulated, not fitted.
+    pub validation: Vec<Recording>,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Options {
+            models: ["frozen", "linear", "planar", "spherical"].map(String::from).to_vec(),
+            friction: vec!["stribeck".into()],
+            settings: Vec::new(),
+            known: Vec::new(),
+            starts: Vec::new(),
+            flaws: true,
+            gyro_scale: 0.01,
+            between: None,
+            validation: Vec::new(),
+        }
+    }
+}
+
+impl Options {
+    /// The bench as the FMU is set up with these options.
+    pub fn nominal(&self, fmu: &Fmu) -> Result<Nominal> {
+        let known = self.known.iter().map(|(name, mean, _)| (name.clone(), *mean));
+        let expected: Vec<(String, f64)> = known.chain(self.starts.iter().cloned()).collect();
+        Nominal::of(fmu, &self.settings, &expected)
+    }
+}
