@@ -3,6 +3,7 @@
 mod campaign;
 mod check;
 mod command_line;
+mod documents;
 mod identify;
 mod plans;
 mod report;
