@@ -4,8 +4,9 @@
 use std::f64::consts::TAU;
 
 use crate::common::bench;
+use formulas::third_order::coefficients;
 use hubslosh_tank::third_order::Overlaps;
-use plant::{FrictionModel, Inputs, Parameters, Plant, SloshModel, liquid_coefficients};
+use plant::{FrictionModel, Inputs, Parameters, Plant, SloshModel};
 
 /// Ten times the plant's eight excited modes of each azimuthal number change s and kappa by less than
 /// 1e-4 of themselves; next to a secondary resonance both grow without bound, and with them that.
@@ -14,7 +15,7 @@ fn coefficients_of_the_model_are_those_of_potential_flow() {
     let all = Overlaps::new(60);
     for i in 0..290 {
         let fill = 0.2 + 0.02 * f64::from(i);
-        let (s, kappa) = liquid_coefficients(fill);
+        let (s, kappa) = coefficients(fill);
         let expected = all.equivalent(fill);
         for (found, expected) in [(s, expected[0]), (kappa, expected[1])] {
             assert!(

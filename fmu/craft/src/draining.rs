@@ -121,7 +121,7 @@ impl Draining {
     pub fn new(p: &Parameters) -> Option<Draining> {
         let tanks = &p.tank[..p.tanks];
         tanks.iter().any(|tank| tank.fill.points > 0).then(|| Draining {
-            craft: Rigid::of_craft(&p.craft),
+            craft: p.craft.rigid(),
             mount: p.mount,
             gravity: p.gravity,
             tanks: tanks.iter().map(|tank| Place::new(&tank.resolve())).collect(),

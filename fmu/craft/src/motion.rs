@@ -101,8 +101,8 @@ impl CraftMotion {
     pub fn new(p: &Parameters, state: State) -> CraftMotion {
         let tanks = p.tank.map(|tank| tank.resolve());
         let tanks = &tanks[..p.tanks];
-        let liquids: Vec<Rigid> = tanks.iter().map(Rigid::of_tank).collect();
-        let rigid = liquids.iter().fold(Rigid::of_craft(&p.craft), |sum, tank| sum.and(tank));
+        let liquids: Vec<Rigid> = tanks.iter().map(Tank::rigid).collect();
+        let rigid = liquids.iter().fold(p.craft.rigid(), |sum, tank| sum.and(tank));
         let bobs: Vec<Bob> = tanks
             .iter()
             .enumerate()
@@ -114,7 +114,7 @@ impl CraftMotion {
             inputs: Inputs::default(),
             mount: p.mount,
             gravity: p.gravity,
-            craft: Rigid::of_craft(&p.craft),
+            craft: p.craft.rigid(),
             rigid,
             mass_matrix,
             liquids,
@@ -144,7 +144,7 @@ impl CraftMotion {
     pub fn refill<'a>(&mut self, tanks: impl Iterator<Item = &'a Tank> + Clone) {
         self.rigid = self.craft;
         for (liquid, tank) in self.liquids.iter_mut().zip(tanks.clone()) {
-            *liquid = Rigid::of_tank(tank);
+            *liquid = tank.rigid();
             self.rigid = self.rigid.and(liquid);
         }
         self.mass_matrix = self.rigid.mass_matrix();

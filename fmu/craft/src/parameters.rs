@@ -2,11 +2,13 @@
 //!
 //! Names in the messages are those of the FMU's parameters. Indices count from 1 there.
 
+use formulas::cylinder;
+
 use crate::integrator::MAX_STEPS;
 use crate::rigid::{Factors, Rigid};
 use crate::sizes::{MODES, POINTS, TANKS};
 use crate::table::FillTable;
-use crate::vector::{Quaternion, Vec3, norm};
+use crate::vector::{Quaternion, Vec3, add, norm, rotation, scale, unit_quaternion};
 
 /// Symmetric inertia tensor, kg m2: the matrix of J = integral of (|s|^2 1 - s s^T) dm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,6 +44,13 @@ pub struct Craft {
     pub r: Vec3,
     /// Inertia about the centre of mass, body axes.
     pub j: Inertia,
+}
+
+impl Craft {
+    /// The rigid body that it is.
+    pub(crate) fn rigid(&self) -> Rigid {
+        Rigid::new(self.mass, self.r, &self.j.matrix())
+    }
 }
 
 /// How the craft is held.
@@ -154,6 +163,19 @@ impl Tank {
         tank
     }
 
+    /// The rigid liquid: m_0 on the axis at height H_0, J_0 = I_0 1 + (I_z - I_0) e e^T.
+    pub(crate) fn rigid(&self) -> Rigid {
+        let e = rotation(&unit_quaternion(self.q)).map(|row| row[2]);
+        let mut own = [[0.0; 3]; 3];
+        for i in 0..3 {
+            for j in 0..3 {
+                let one = if i == j { self.i_0 } else { 0.0 };
+                own[i][j] = one + (self.i_z - self.i_0) * e[i] * e[j];
+            }
+        }
+        Rigid::new(self.m_0, add(self.position, scale(self.h_0, e)), &own)
+    }
+
     /// c = 2 zeta m sqrt(g_ref/l + k/m) of mode n (from 0), N s/m.
     pub fn drag(&self, n: usize) -> f64 {
         let (m, l) = (self.mass[n], self.length[n]);
@@ -204,7 +226,7 @@ impl Default for Craft {
 }
 
 /// The default tank, an upright cylinder of R = 0.45 m with its bottom at -0.3 m, filled with water
-/// 0.1, 0.2, ... 0.8 m deep, one mode kept: numbers of `cylinder::pendulum` and `cylinder::rest`.
+/// 0.1, 0.2, ... 0.8 m deep, one mode kept: numbers of `formulas::cylinder`.
 #[rustfmt::skip]
 const CYLINDER: FillTable = FillTable {
     points: 8,
@@ -492,7 +514,7 @@ impl Craft {
         let mut problems = Problems(Vec::new());
         self.find_problems(name, &mut problems);
         if problems.0.is_empty()
-            && Factors::of(&Rigid::of_craft(self).mass_matrix()).smallest_pivot() < 1e-12
+            && Factors::of(&self.rigid().mass_matrix()).smallest_pivot() < 1e-12
         {
             problems.0.push(format!(
                 "{name}.J is singular: the inertia about every axis must be above 0"
@@ -526,10 +548,9 @@ impl Parameters {
             ));
         }
         if problems.0.is_empty() {
-            let rigid =
-                self.tank[..self.tanks].iter().fold(Rigid::of_craft(&self.craft), |sum, tank| {
-                    sum.and(&Rigid::of_tank(&tank.resolve()))
-                });
+            let rigid = self.tank[..self.tanks]
+                .iter()
+                .fold(self.craft.rigid(), |sum, tank| sum.and(&tank.resolve().rigid()));
             if Factors::of(&rigid.mass_matrix()).smallest_pivot() < 1e-12 {
                 problems.0.push(
                     "craft.J with the tanks' m_0, I_0 and I_z is singular: the inertia of craft \

@@ -7,10 +7,7 @@
 //!
 //! Source: Newton and Euler about a point that is not the centre of mass.
 
-use crate::parameters::{Craft, Tank};
-use crate::vector::{
-    Mat3, Number, Vec3, add, constant, cross, dot, rotation, scale, times, unit_quaternion,
-};
+use crate::vector::{Mat3, Number, Vec3, add, constant, cross, dot, scale, times};
 
 /// A symmetric matrix of six rows.
 pub type Mat6<T = f64> = [[T; 6]; 6];
@@ -37,24 +34,6 @@ impl Rigid {
             }
         }
         Rigid { mass: m, moment: scale(m, s), inertia }
-    }
-
-    /// The dry craft.
-    pub fn of_craft(craft: &Craft) -> Rigid {
-        Rigid::new(craft.mass, craft.r, &craft.j.matrix())
-    }
-
-    /// A tank's rigid liquid: m_0 on the axis at height H_0, J_0 = I_0 1 + (I_z - I_0) e e^T.
-    pub fn of_tank(tank: &Tank) -> Rigid {
-        let e = rotation(&unit_quaternion(tank.q)).map(|row| row[2]);
-        let mut own = [[0.0; 3]; 3];
-        for i in 0..3 {
-            for j in 0..3 {
-                let one = if i == j { tank.i_0 } else { 0.0 };
-                own[i][j] = one + (tank.i_z - tank.i_0) * e[i] * e[j];
-            }
-        }
-        Rigid::new(tank.m_0, add(tank.position, scale(tank.h_0, e)), &own)
     }
 
     /// The same as numbers of another kind.

@@ -462,7 +462,7 @@ impl SloshTank {
     /// [`SloshTank::new`] has accepted.
     pub fn resume(p: &TankParameters, state: &TankState, tolerance: f64) -> SloshTank {
         let tank = p.tank.resolve();
-        let rigid = Rigid::of_tank(&tank);
+        let rigid = tank.rigid();
         let bobs: Vec<Bob> = (0..tank.modes).map(|n| Bob::new(&tank, 0, n)).collect();
         let lumped = bobs
             .iter()
@@ -727,6 +727,6 @@ impl SloshTank {
         for bob in &self.motion.bobs {
             add_rank_one(&mut matrix, bob.m, &along_rod(bob.p[0], bob.hinge));
         }
-        Some(largest_eigenvalue(&Factors::of(&Rigid::of_craft(&host).mass_matrix()), &matrix))
+        Some(largest_eigenvalue(&Factors::of(&host.rigid().mass_matrix()), &matrix))
     }
 }

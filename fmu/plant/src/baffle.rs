@@ -22,6 +22,8 @@
 //! is 0.64 to 6.4 widths, the ring stays covered (d >= eta) and alpha < 0.25. Smaller waves keep more
 //! damping than it says.
 
+use formulas::damping::{covered, miles_ring, motion_at_ring};
+
 use crate::parameters::{Parameters, Ring, SloshSource};
 use crate::series::{Series, ZERO, mul_ramp};
 
@@ -77,17 +79,6 @@ impl Default for Baffle {
     }
 }
 
-/// Part of the section that the ring covers.
-fn covered(p: &Parameters) -> f64 {
-    let w = p.baffle.width / (p.tank.d / 2.0);
-    w * (2.0 - w)
-}
-
-/// How much of the surface's motion is left at the ring: exp(-1.84 d/R).
-fn motion_at_ring(p: &Parameters) -> f64 {
-    libm::exp(-1.84 * p.baffle.depth / (p.tank.d / 2.0))
-}
-
 /// What is wrong with the parameters of the baffle.
 pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     let (width, depth) = (p.baffle.width, p.baffle.depth);
@@ -116,7 +107,7 @@ pub(crate) fn warnings(p: &Parameters) -> Vec<String> {
     if p.baffle.width <= 0.0 {
         return warnings;
     }
-    let alpha = covered(p);
+    let alpha = covered(p.tank.d / 2.0, p.baffle.width);
     if alpha >= 0.25 {
         warnings.push(format!(
             "baffle.width: the ring covers {alpha:.3} of the section; Miles's formula is for less \
@@ -145,8 +136,12 @@ impl Range {
     /// `None` without a ring.
     pub fn new(p: &Parameters) -> Option<Range> {
         let Ring { width, depth } = p.baffle;
-        let range =
-            || Range { stroke: motion_at_ring(p) / width, depth, covers_little: covered(p) < 0.25 };
+        let radius = p.tank.d / 2.0;
+        let range = || Range {
+            stroke: motion_at_ring(radius, depth) / width,
+            depth,
+            covers_little: covered(radius, width) < 0.25,
+        };
         (width > 0.0).then(range)
     }
 
@@ -163,11 +158,9 @@ impl Baffle {
     /// The ring's action on the first mode, whose wave at the wall is `wave` per angle, m/rad, and
     /// whose length is `l`, m.
     pub fn new(p: &Parameters, wave: f64, l: f64) -> Baffle {
-        let radius = p.tank.d / 2.0;
-        let alpha = covered(p);
-        let depth = libm::exp(-4.60 * p.baffle.depth / radius);
-        let zeta = 2.83 * depth * alpha * libm::sqrt(alpha) * libm::sqrt(wave / radius);
-        let floor = FLOOR * STROKE.start() * p.baffle.width / (motion_at_ring(p) * wave);
+        let (radius, Ring { width, depth }) = (p.tank.d / 2.0, p.baffle);
+        let zeta = miles_ring(radius, depth, width, wave);
+        let floor = FLOOR * STROKE.start() * width / (motion_at_ring(radius, depth) * wave);
         Baffle { zeta, floor2: floor * floor, w_floor: WEIGHTLESS / l, ..Baffle::default() }
     }
 

@@ -19,7 +19,6 @@ mod friction;
 mod hub;
 mod imu;
 mod inputs;
-mod liquid;
 mod motion;
 mod outputs;
 mod parameters;
@@ -33,7 +32,6 @@ mod wheel;
 
 pub use contact::Contact;
 pub use inputs::{Inputs, Ramp};
-pub use liquid::coefficients as liquid_coefficients;
 pub use motion::StepError;
 pub use outputs::{Discrete, Outputs};
 pub use parameters::{

@@ -1,6 +1,6 @@
 //! The liquid as pendulums: of an upright cylinder by its dimensions, of any tank by a table.
 //!
-//! Modal masses and lengths (crate `cylinder`): thesis Table 4.1, the same as Abramson NASA SP-106
+//! Modal masses and lengths (`formulas::cylinder`): thesis Table 4.1, the same as Abramson NASA SP-106
 //! and Dodge (2000), with the exact zeros of J1'. Damping: Mikishev-Dorozhkin.
 //! Capillarity with a flat surface and a free contact line, exact in the cylinder: omega_n^2 =
 //! g/l_n + sigma xi_n^3 tanh(xi_n h/R)/(rho R^3). The lengths are geometry; capillarity acts as a
@@ -10,11 +10,13 @@
 //! a_n = k_n l_n/m_n = sigma xi_n^2/(rho R^2)
 //! ```
 
-use cylinder::XI;
+use formulas::cylinder::{self, XI};
+use formulas::damping::mikishev_dorozhkin;
+use formulas::similarity;
+use formulas::third_order::{coefficients, secondary_resonance};
 
 use crate::baffle::{self, Baffle};
-use crate::liquid;
-use crate::parameters::{Fluid, MODES, Parameters, SloshModel, SloshSource, Tank};
+use crate::parameters::{MODES, Parameters, SloshModel, SloshSource};
 use crate::pendulum::Pendulum;
 
 /// What follows from the parameters; 0 for modes that are not used.
@@ -36,21 +38,6 @@ pub struct Calculated {
     pub damping: [f64; MODES],
     /// By how much the centring stiffness makes g look larger, a_n, m/s2.
     pub centring: [f64; MODES],
-}
-
-/// Damping ratio of the first mode in a smooth upright cylinder:
-/// zeta = 0.79 sqrt(Re) [1 + (0.318/sinh(1.84 h/R)) (1 + (1 - h/R)/cosh(1.84 h/R))],
-/// Re = nu/sqrt(g R^3), R the tank's radius (Mikishev and Dorozhkin; Dodge 2000).
-/// Measured tanks scatter by about 30 % around it.
-#[allow(clippy::approx_constant)] // 0.318 is the correlation's, not 1/pi
-fn mikishev_dorozhkin(tank: &Tank, fluid: &Fluid, g: f64) -> f64 {
-    let radius = tank.d / 2.0;
-    let fill = tank.h / radius;
-    let re = fluid.nu / libm::sqrt(g * radius * radius * radius);
-    // Where sinh would overflow the bottom is out of reach anyway.
-    let depth = f64::min(1.84 * fill, 300.0);
-    let bottom = 0.318 / libm::sinh(depth) * (1.0 + (1.0 - fill) / libm::cosh(depth));
-    0.79 * libm::sqrt(re) * (1.0 + bottom)
 }
 
 /// What is wrong with a table of modes.
@@ -143,7 +130,7 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
         ));
     }
     if slosh.model == SloshModel::Liquid && geometry {
-        warnings.extend(liquid::warning(p.tank.h / radius));
+        warnings.extend(third_order_warning(p.tank.h / radius));
     }
     let calculated = Calculated::new(p, g);
     let Calculated { bond, centring, .. } = calculated;
@@ -163,6 +150,27 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
     warnings
 }
 
+/// Below this h/R waves are shallow: s turns negative and both coefficients grow without bound.
+const SHALLOW: f64 = 0.4;
+
+/// Where the coefficients of the third order at h/R = `fill` are not to be trusted, if there.
+fn third_order_warning(fill: f64) -> Option<String> {
+    let (s, kappa) = coefficients(fill);
+    if fill < SHALLOW {
+        return Some(format!(
+            "slosh.model = liquid at h/R = {fill:.3}: below {SHALLOW} waves are shallow and the third \
+             order in the amplitude (s = {s:.3}, kappa = {kappa:.3}) holds for the smallest ones alone"
+        ));
+    }
+    secondary_resonance(fill).map(|(azimuth, n)| {
+        format!(
+            "slosh.model = liquid at h/R = {fill:.3}: twice the frequency of mode 1 is within 1 % \
+             of that of mode ({azimuth},{n}), a secondary resonance, next to which the dependence \
+             on amplitude (s = {s:.3}, kappa = {kappa:.3}) is not known"
+        )
+    })
+}
+
 /// Below this Bond number capillarity adds more than 3 % to omega_1^2.
 const LOW_BOND: f64 = 100.0;
 
@@ -179,7 +187,8 @@ impl Calculated {
             SloshSource::Geometry => fluid.rho * core::f64::consts::PI * radius * radius * tank.h,
             SloshSource::Table => slosh.table.m_liq,
         };
-        let bond = fluid.rho * g * radius * radius / fluid.sigma;
+        let liquid = similarity::Liquid { density: fluid.rho, tension: fluid.sigma };
+        let bond = liquid.bond(g, radius);
         let mut all = Calculated { m_liq, m_0: m_liq, bond, ..Default::default() };
         let modes = if slosh.model == SloshModel::Frozen { 0 } else { slosh.modes.min(MODES) };
         for n in 0..modes {
@@ -203,7 +212,7 @@ impl Calculated {
             all.damping[n] = match (slosh.source, slosh.zeta_from_correlation) {
                 _ if restoring <= 0.0 => 0.0,
                 (SloshSource::Table, _) => slosh.table.zeta[n],
-                (_, true) => mikishev_dorozhkin(tank, fluid, g + all.centring[0]),
+                (_, true) => mikishev_dorozhkin(radius, tank.h, fluid.nu, g + all.centring[0]),
                 (_, false) => slosh.zeta,
             };
             all.m_0 -= all.mass[n];
@@ -220,7 +229,7 @@ impl Calculated {
         let radius = p.tank.d / 2.0;
         let (r, slosh, p) = (p.tank.r, p.slosh, *p);
         let (s_1, kappa_1) = match slosh.model {
-            SloshModel::Liquid => liquid::coefficients(p.tank.h / radius),
+            SloshModel::Liquid => coefficients(p.tank.h / radius),
             _ => (1.0, 1.0),
         };
         (0..MODES).take_while(|&n| self.mass[n] > 0.0).map(move |n| {
@@ -256,5 +265,18 @@ impl Calculated {
                 ..Pendulum::default()
             }
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shallow_liquid_and_secondary_resonances_are_warned_of() {
+        assert!(third_order_warning(0.3).is_some_and(|text| text.contains("shallow")));
+        assert!(third_order_warning(0.831).is_some_and(|text| text.contains("mode (2,2)")));
+        assert!(third_order_warning(1.01).is_some_and(|text| text.contains("mode (0,2)")));
+        assert!([5.0, 1.3, 0.6].iter().all(|fill| third_order_warning(*fill).is_none()));
     }
 }

@@ -1,12 +1,5 @@
-//! What a bench says of a flight tank: Bond numbers, the tank that has the same ones,
-//! Froude's factors (Rubaga's thesis 2.5, 2.6, 7.2, with its figures corrected).
-//!
-//! ```text
-//! Bo   = rho a R^2 / sigma          gravity or thrust against surface tension   (2.22, 2.27, 7.1)
-//! Bo_i = rho alpha R^2 L / sigma    angular acceleration, tank at distance L    (2.25)
-//! Bo_c = rho omega^2 R^2 L / sigma  angular rate                                (2.26)
-//! Bo_r = rho alpha R^3 / sigma      angular acceleration, R for L               (7.3)
-//! ```
+//! What a bench says of a flight tank, in words: Bond numbers, the tank that has the same ones,
+//! Froude's factors (`formulas::similarity`; Rubaga's thesis 2.5, 2.6, 7.2, with its figures corrected).
 //!
 //! The two numbers of an angular acceleration are not the same: the thesis's 45.87 is Bo_i of
 //! its bench, and the equivalent tank it prints beside it follows from Bo_r.
@@ -15,16 +8,9 @@ use std::fmt::Write;
 
 use anyhow::{Result, ensure};
 
-use crate::plan::significant;
+use formulas::similarity::{Liquid, agility, froude, froude_viscosity, regime};
 
-/// A liquid's properties.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Liquid {
-    /// Density rho, kg/m3.
-    pub density: f64,
-    /// Surface tension sigma, N/m.
-    pub tension: f64,
-}
+use crate::plan::significant;
 
 /// Water at 25 degC as the thesis's 7.2.1 has it.
 pub const WATER: Liquid = Liquid { density: 997.0, tension: 0.072 };
@@ -34,79 +20,6 @@ pub const ROUND_WATER: Liquid = Liquid { density: 1000.0, tension: 0.072 };
 pub const OXYGEN: Liquid = Liquid { density: 1141.0, tension: 0.0132 };
 /// The bench's tank: its radius and its distance from the axis, m.
 pub const BENCH: (f64, f64) = (0.0815, 0.225);
-
-impl Liquid {
-    /// Bo of an acceleration `a`, m/s2, in a tank of radius `radius`, m.
-    pub fn bond(&self, a: f64, radius: f64) -> f64 {
-        self.density * a * radius * radius / self.tension
-    }
-
-    /// Bo_i of an angular acceleration, rad/s2, in a tank at the distance `arm`, m, from the
-    /// axis; with the square of an angular rate instead, Bo_c; with the radius as arm, Bo_r.
-    pub fn rotational_bond(&self, alpha: f64, radius: f64, arm: f64) -> f64 {
-        self.bond(alpha * arm, radius)
-    }
-
-    /// The acceleration, m/s2, that has this Bond number in a tank of this radius, m.
-    pub fn acceleration(&self, bond: f64, radius: f64) -> f64 {
-        bond * self.tension / (self.density * radius * radius)
-    }
-
-    /// The radius, m, that has this Bond number at this acceleration, m/s2 (7.2).
-    pub fn radius(&self, bond: f64, a: f64) -> f64 {
-        (bond * self.tension / (self.density * a)).sqrt()
-    }
-
-    /// The radius, m, that has this Bo_r at this angular acceleration, rad/s2.
-    pub fn radius_by_cube(&self, bond: f64, alpha: f64) -> f64 {
-        (bond * self.tension / (self.density * alpha)).cbrt()
-    }
-}
-
-/// How a liquid behaves at a Bond number; the thesis's 2.5, its limits are no sharp ones.
-pub fn regime(bond: f64) -> &'static str {
-    match bond {
-        b if b > 1000.0 => "high g: flat surface, linear and weakly nonlinear models hold",
-        b if b > 30.0 => "low g: curved surface, frequency and damping shift",
-        b if b > 1.0 => "microgravity: strongly nonlinear, place of the liquid uncertain",
-        _ => "capillary: surface tension rules",
-    }
-}
-
-/// Agility of a spacecraft by its angular acceleration, rad/s2 (the thesis's Table 2.2).
-pub fn agility(alpha: f64) -> &'static str {
-    match alpha {
-        a if a < 5e-5 => "low agility",
-        a if a <= 5e-4 => "medium agility",
-        _ => "high agility",
-    }
-}
-
-/// What multiplies a model's figure to give the full size's: name, unit, factor. `lambda` is
-/// full size over model, `density` the ratio of the densities in the same sense, `gravity` that of
-/// the accelerations; the thesis's Table 2.3 with gravity = 1, where accelerations are equal.
-pub fn froude(lambda: f64, density: f64, gravity: f64) -> [(&'static str, &'static str, f64); 10] {
-    let force = lambda.powi(3) * density * gravity;
-    let time = (lambda / gravity).sqrt();
-    [
-        ("length", "m", lambda),
-        ("time", "s", time),
-        ("frequency", "Hz", 1.0 / time),
-        ("velocity", "m/s", (lambda * gravity).sqrt()),
-        ("acceleration", "m/s2", gravity),
-        ("angular acceleration", "rad/s2", gravity / lambda),
-        ("mass", "kg", lambda.powi(3) * density),
-        ("force", "N", force),
-        ("moment", "N.m", force * lambda),
-        ("pressure", "Pa", force / (lambda * lambda)),
-    ]
-}
-
-/// The viscosity nu, m2/s, that the full size's liquid must have for the same Reynolds number, over
-/// the model's: what Froude's scaling alone does not keep.
-pub fn froude_viscosity(lambda: f64, gravity: f64) -> f64 {
-    lambda * (lambda * gravity).sqrt()
-}
 
 /// All of these must be positive numbers; names all that are not.
 fn positive(values: &[(&str, f64)]) -> Result<()> {

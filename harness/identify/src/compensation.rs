@@ -15,14 +15,12 @@ use std::f64::consts::PI;
 use anyhow::{Result, ensure};
 use bench::analysis::linear::{Linear, Mode};
 use bench::analysis::transfer_function::fit_time;
+use formulas::cylinder::{Pendulum, pendulum};
 use serde::Serialize;
 
 use crate::least_squares::{differences, minimise};
 use crate::nominal::Bench;
 use crate::recording::Recording;
-
-/// First zero of J1'.
-const XI: f64 = 1.841_183_781_340_66;
 
 /// Friction as it is known beforehand, SI.
 #[derive(Clone, Copy, Debug)]
@@ -62,10 +60,9 @@ pub struct Found {
 
 /// The linear bench without friction.
 fn bench_of(hub_inertia: f64, (d, h, zeta): (f64, f64, f64), bench: Bench) -> Linear {
-    let u = 2.0 * XI * h / d;
     let liquid = bench.density * PI / 4.0 * d * d * h;
-    let mass = liquid * d * u.tanh() / (XI * (XI * XI - 1.0) * h);
-    let frequency = (bench.gravity * 2.0 * XI / d * u.tanh()).sqrt() / (2.0 * PI);
+    let Pendulum { mass, length, .. } = pendulum(0, d, h, liquid);
+    let frequency = (bench.gravity / length).sqrt() / (2.0 * PI);
     let inertia = hub_inertia + (liquid - mass) * bench.arm.powi(2);
     let modes = vec![Mode { mass, frequency, damping: zeta }];
     Linear { inertia, friction: 0.0, arm: bench.arm, modes }

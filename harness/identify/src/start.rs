@@ -6,14 +6,7 @@
 //! a3 = I0, a2 = b + 2ζω J, a1 = 2ζω b + ω² J, a0 = b ω²,   J = I0 + m r²
 //! ```
 //!
-//! (thesis 6.7, corrected). An upright cylinder's first mode (Dodge 2000; Abramson, NASA SP-106),
-//! ξ = 1.841184, u = 2ξh/d:
-//!
-//! ```text
-//! l = g/ω² = d/(2ξ tanh u),   m = ρπd³ tanh u/(4ξ(ξ² − 1))
-//! ```
-//!
-//! so d⁴ = 8ξ²(ξ² − 1) l m/(ρπ) and tanh u = d/(2ξl).
+//! (thesis 6.7, corrected). The tank is the upright cylinder whose first mode has this frequency and mass.
 
 use std::f64::consts::{PI, TAU};
 
@@ -24,13 +17,11 @@ use bench::analysis::{
     Complex64, FrequencyResponse, logarithmic_grid, spa,
     welch::{self, Spectra},
 };
+use formulas::cylinder::tank_of_first_mode;
 use signals::fourier::Forward;
 
 use crate::nominal::{Bench, Nominal, Start};
 use crate::recording::Recording;
-
-/// First zero of J1'.
-const XI: f64 = 1.841_183_781_340_66;
 
 /// What a frequency response says of the bench.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -116,12 +107,8 @@ pub fn translate(measured: &FrequencyResponse, bench: Bench) -> Option<Response>
 
 /// The tank (d, h) whose first mode has this frequency (Hz) and mass (kg).
 pub fn tank(frequency: f64, mass: f64, bench: Bench) -> (f64, f64) {
-    let l = bench.gravity / (TAU * frequency).powi(2);
-    let d = (8.0 * XI * XI * (XI * XI - 1.0) * l * mass / (bench.density * PI)).powf(0.25);
-    // a deep tank's frequency says little of its fill
-    let d = d.min(2.0 * XI * l * 0.995);
-    let h = (d / (2.0 * XI * l)).atanh() * d / (2.0 * XI);
-    (d, h)
+    let length = bench.gravity / (TAU * frequency).powi(2);
+    tank_of_first_mode(length, mass, bench.density)
 }
 
 /// Starts from the data, the likeliest first, and what the response says of the bench: nothing if there is no slosh in it,

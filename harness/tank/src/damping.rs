@@ -3,7 +3,9 @@
 //! Re = nu/sqrt(g R^3) throughout (an inverse Reynolds number), x = h/R the fill; zeta is the
 //! logarithmic decrement over 2 pi. Measured tanks scatter by some 30 % around any of these.
 
-use core::f64::consts::{PI, TAU};
+use core::f64::consts::PI;
+
+use formulas::damping as formula;
 
 use crate::modal::{ModalData, Mode};
 
@@ -23,11 +25,6 @@ impl Damping {
     }
 }
 
-/// Re = nu/sqrt(g R^3).
-fn inverse_reynolds(radius: f64, nu: f64, g: f64) -> f64 {
-    nu / (g * radius.powi(3)).sqrt()
-}
-
 /// Laminar layer at the wetted wall of any tank, mode by mode: zeta_n = beta_n sqrt(nu/(8 omega_n)),
 /// omega_n^2 = g lambda_n (Case and Parkinson 1957 for the cylinder, Keulegan 1959 for the box).
 ///
@@ -38,7 +35,7 @@ pub fn laminar(mode: &Mode, nu: f64, g: f64) -> Damping {
     let layer = (2.0 * nu / omega).sqrt();
     let thin = layer < 0.1 * mode.l;
     let text = format!("the layer of {layer:.3e} m is not thin against the wave");
-    Damping::new(mode.beta * (nu / (8.0 * omega)).sqrt(), &[(thin, text)])
+    Damping::new(formula::laminar(mode.beta, nu, omega), &[(thin, text)])
 }
 
 /// The best one can offer for a shape without measurements: 1.45 times the laminar layer, the factor
@@ -48,65 +45,44 @@ pub fn estimate(mode: &Mode, nu: f64, g: f64) -> Damping {
     Damping { zeta: 1.45 * laminar.zeta, ..laminar }
 }
 
-/// Upright cylinder, Mikishev and Dorozhkin: 0.79 sqrt(Re) [1 + (0.318/sinh 1.84 x)
-/// (1 + (1 - x)/cosh 1.84 x)]. In shallow liquid it falls below the laminar layer, where
+/// Upright cylinder, Mikishev and Dorozhkin. In shallow liquid it falls below the laminar layer, where
 /// [`stephens`] is sounder.
-#[allow(clippy::approx_constant)] // 0.318 is the correlation's, not 1/pi
 pub fn mikishev_dorozhkin(radius: f64, fill: f64, nu: f64, g: f64) -> Damping {
     let x = fill / radius;
-    let bracket = 1.0 + 0.318 / (1.84 * x).sinh() * (1.0 + (1.0 - x) / (1.84 * x).cosh());
     let text =
         format!("h/R = {x:.3} is below 0.5, where the formula falls below the laminar layer");
-    Damping::new(0.79 * inverse_reynolds(radius, nu, g).sqrt() * bracket, &[(x >= 0.5, text)])
+    Damping::new(formula::mikishev_dorozhkin(radius, fill, nu, g), &[(x >= 0.5, text)])
 }
 
-/// Upright cylinder, Stephens, Leonard and Perry (NASA TN D-1367): (5.23/2 pi) sqrt(Re)
-/// tanh(1.84 x)^(-1/4) [1 + 2 (1 - x)/sinh 3.68 x]; 1.493 times the laminar layer at every depth.
+/// Upright cylinder, Stephens, Leonard and Perry: 1.493 times the laminar layer at every depth.
 pub fn stephens(radius: f64, fill: f64, nu: f64, g: f64) -> Damping {
-    let x = fill / radius;
-    let bracket = 1.0 + if x > 100.0 { 0.0 } else { 2.0 * (1.0 - x) / (3.68 * x).sinh() };
-    let zeta = 5.23 / TAU * inverse_reynolds(radius, nu, g).sqrt() * bracket;
-    Damping::new(zeta / (1.84 * x).tanh().powf(0.25), &[])
+    Damping::new(formula::stephens(radius, fill, nu, g), &[])
 }
 
-/// Sphere (after Mikishev and Dorozhkin, power of Sumner and Stofan, NASA TN D-1991):
-/// (0.131/2 pi) B^0.359/x up to half full, times x (1 + 0.46 (2 - x))/(1.46 (2 - x)) above;
-/// B = 1e4 nu/sqrt(g D^3). Without bound at both ends: x is kept within 0.1 and 1.9.
+/// Sphere, see [`formula::sphere`].
 pub fn sphere(radius: f64, fill: f64, nu: f64, g: f64) -> Damping {
-    let b = 1e4 * inverse_reynolds(2.0 * radius, nu, g);
-    let x = (fill / radius).clamp(0.1, 1.9);
-    let depth = if x <= 1.0 { 1.0 / x } else { (1.0 + 0.46 * (2.0 - x)) / (1.46 * (2.0 - x)) };
+    let (x, b) = (fill / radius, formula::sphere_number(radius, nu, g));
     Damping::new(
-        0.131 / TAU * b.powf(0.359) * depth,
+        formula::sphere(radius, fill, nu, g),
         &[
-            (x == fill / radius, format!("h/R = {:.3} is outside 0.1 to 1.9", fill / radius)),
+            ((0.1..=1.9).contains(&x), format!("h/R = {x:.3} is outside 0.1 to 1.9")),
             ((1e-2..=1.0).contains(&b), format!("B = {b:.3e} is outside the measured 0.01 to 1")),
         ],
     )
 }
 
-/// Cone with its apex down, `radius` of the free surface, `half_angle` b in degrees:
-/// (4.964/2 pi) C5 C4^(-1/2) sqrt(Re), C5 = 1.0037 + 0.0126 b, C4 = 1.001 - 0.0031 b - 0.0003 b^2
-/// (fit of a figure by SLOSH-ML). C4 falls to 0 at 53 degrees: b is kept within 0 and 45.
+/// Cone with its apex down, `radius` of the free surface, `half_angle` in degrees.
 pub fn cone(radius: f64, half_angle: f64, nu: f64, g: f64) -> Damping {
-    let b = half_angle.clamp(0.0, 45.0);
-    let (c5, c4) = (1.0037 + 0.0126 * b, 1.001 - 0.0031 * b - 0.0003 * b * b);
-    let zeta = 4.964 / TAU * c5 / c4.sqrt() * inverse_reynolds(radius, nu, g).sqrt();
-    Damping::new(
-        zeta,
-        &[(b == half_angle, format!("the half angle of {half_angle} degrees is outside 0 to 45"))],
-    )
+    let known = (0.0..=45.0).contains(&half_angle);
+    let text = format!("the half angle of {half_angle} degrees is outside 0 to 45");
+    Damping::new(formula::cone(radius, half_angle, nu, g), &[(known, text)])
 }
 
-/// Torus, `tube_radius` a of its section (SLOSH-ML; one tank size was measured): sqrt(Re/Re_0) times
-/// (1.6629 y^4 - 3.7955 y^3 + 3.5583 y^2 - 1.6759 y + 0.3865)/2 pi, with y = h/2a and
-/// Re_0 = 3.3e-6/sqrt(9.81 0.0635^3).
+/// Torus, `tube_radius` of its section.
 pub fn torus(tube_radius: f64, fill: f64, nu: f64, g: f64) -> Damping {
-    let y = 0.5 * fill / tube_radius;
-    let fit = (((1.6629 * y - 3.7955) * y + 3.5583) * y - 1.6759) * y + 0.3865;
-    let scale = inverse_reynolds(tube_radius, nu, g) / inverse_reynolds(0.0635, 3.3e-6, 9.81);
+    let (y, scale) = (0.5 * fill / tube_radius, formula::torus_number(tube_radius, nu, g));
     Damping::new(
-        scale.sqrt() * fit / TAU,
+        formula::torus(tube_radius, fill, nu, g),
         &[
             ((0.1..=0.9).contains(&y), format!("h/2a = {y:.3} is outside 0.1 to 0.9")),
             (
@@ -153,15 +129,15 @@ fn ring_ranges(ring: Ring, amplitude: f64, reach: f64, covered: f64) -> Vec<(boo
     ]
 }
 
-/// Ring baffle in an upright cylinder (Miles 1958): zeta = 2.83 exp(-4.60 d/R) alpha^(3/2)
-/// (eta/R)^(1/2), alpha = (w/R)(2 - w/R) the covered area, `amplitude` eta of the wave at the wall.
-///
-/// It grows as the root of the amplitude; a constant damping ratio holds at one amplitude only.
+/// Ring baffle in an upright cylinder, `amplitude` of the wave at the wall: see [`formula::miles_ring`].
 pub fn miles_ring(radius: f64, ring: Ring, amplitude: f64) -> Damping {
-    let (d, w) = (ring.depth / radius, ring.width / radius);
-    let alpha = w * (2.0 - w);
-    let zeta = 2.83 * (-4.60 * d).exp() * alpha.powf(1.5) * (amplitude / radius).sqrt();
-    Damping::new(zeta, &ring_ranges(ring, amplitude, (-1.84 * d).exp(), alpha))
+    let Ring { depth, width } = ring;
+    let (reach, covered) =
+        (formula::motion_at_ring(radius, depth), formula::covered(radius, width));
+    Damping::new(
+        formula::miles_ring(radius, depth, width, amplitude),
+        &ring_ranges(ring, amplitude, reach, covered),
+    )
 }
 
 /// Ring baffle at the outer wall of any tank of revolution, first mode: zeta = 1.53 lambda w^(3/2)

@@ -58,7 +58,7 @@ pub fn flat(mode: &Mode, fluid: Fluid) -> Capillary {
 }
 
 /// First zero of J1'.
-const XI: f64 = 1.841_183_781_340_659_3;
+const XI: f64 = formulas::cylinder::XI[0];
 /// Bond numbers of the table's rows.
 const BOND: [f64; 6] = [0.0, 1.0, 3.0, 10.0, 30.0, 100.0];
 /// Contact angles of its columns, degrees.

@@ -1,8 +1,9 @@
 //! `hubslosh scale`.
 
 use anyhow::Result;
-use bench::scaling::{self, Flight, Liquid};
+use bench::scaling::{self, Flight};
 use clap::Subcommand;
+use formulas::similarity::Liquid;
 
 /// Computes the flight tank that the bench represents (similarity): Bond numbers, Froude factors.
 #[derive(clap::Args)]

@@ -54,6 +54,17 @@ pub fn pendulum(n: usize, d: f64, h: f64, m_liq: f64) -> Pendulum {
     }
 }
 
+/// The tank (d, h) whose first mode has this length and mass, with liquid of `density`: from l and m above,
+/// d^4 = 8 xi^2 (xi^2 - 1) l m/(rho pi) and tanh(2 xi h/d) = d/(2 xi l). A deep tank's length says little of
+/// its fill: tanh is taken as 0.995 at most.
+pub fn tank_of_first_mode(length: f64, mass: f64, density: f64) -> (f64, f64) {
+    let xi = XI[0];
+    let d4 = 8.0 * xi * xi * (xi * xi - 1.0) * length * mass / (density * core::f64::consts::PI);
+    let d = libm::sqrt(libm::sqrt(d4)).min(2.0 * xi * length * 0.995);
+    let h = libm::atanh(d / (2.0 * xi * length)) * d / (2.0 * xi);
+    (d, h)
+}
+
 /// Transverse inertia of the liquid under a lid about its centre, over its mass, m2.
 pub fn capped_inertia(d: f64, h: f64) -> f64 {
     /// Zeros that are summed; the rest is an integral.
@@ -116,6 +127,23 @@ mod tests {
         ] {
             assert!((got / want - 1.0).abs() < 5e-6, "{got} {want}");
         }
+    }
+
+    /// The fourth root of a product of order 1 loses some ulp, atanh near 1 some 1/(1 - tanh^2) = 20 more.
+    #[test]
+    fn a_tank_is_found_again_from_its_first_mode() {
+        for (d, h) in [(0.163, 0.1), (0.163, 0.05), (0.9, 0.3)] {
+            let m_liq = 700.0 * core::f64::consts::PI * d * d / 4.0 * h;
+            let Pendulum { mass, length, .. } = pendulum(0, d, h, m_liq);
+            let (d_found, h_found) = tank_of_first_mode(length, mass, 700.0);
+            assert!((d_found / d - 1.0).abs() < 1e-14 && (h_found / h - 1.0).abs() < 1e-13);
+        }
+    }
+
+    /// The wave at the wall, R = 0.0815 m: 2 R/(xi^2 - 1) = 0.163/2.38996.
+    #[test]
+    fn the_wave_of_the_first_mode_is_two_thirds_of_the_diameter_an_angle() {
+        assert!((pendulum(0, 0.163, 0.1, 1.0).wave / 0.068202 - 1.0).abs() < 1e-5);
     }
 
     /// A film has no height: the liquid turns like a disk, R^2/4. A column is one: h^2/12 - 3 R^2/4

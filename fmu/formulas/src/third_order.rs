@@ -1,5 +1,5 @@
 //! The first mode in an upright cylinder to third order in its amplitude, without tuned numbers:
-//! the mass of `paraboloid.rs` with its surface and its spring from the fill,
+//! a mass m on a paraboloid with a quartic spring, both from the fill,
 //!
 //! ```text
 //! E = m [(x' - w y)^2 + (y' + w (r + x))^2 + s (q.q')^2/l^2]/2
@@ -22,9 +22,9 @@
 //! ```
 //!
 //! At t = 4 T an excited mode has twice the frequency: a secondary resonance, where this order says
-//! nothing. Modes above the first are pendulums.
+//! nothing.
 
-use cylinder::XI;
+use crate::cylinder::XI;
 
 /// M = int J1(xi_1 r)^4 r dr/int J1^2 r dr.
 const M: f64 = 0.278_821_981_660_245_8;
@@ -61,9 +61,6 @@ const EXCITED: [[(f64, f64); 8]; 2] = [
 /// order is not to be trusted.
 const DETUNING: f64 = 0.01;
 
-/// Below this h/R waves are shallow: s turns negative and both coefficients grow without bound.
-const SHALLOW: f64 = 0.4;
-
 /// s and kappa at h/R = `fill`.
 pub fn coefficients(fill: f64) -> (f64, f64) {
     let t_1 = XI[0] * libm::tanh(XI[0] * fill);
@@ -86,31 +83,17 @@ pub fn coefficients(fill: f64) -> (f64, f64) {
     (1.5 * circular - 2.0 * planar, 2.0 * circular)
 }
 
-/// What is to be said about the coefficients at h/R = `fill`, if anything.
-pub fn warning(fill: f64) -> Option<String> {
+/// Azimuthal number and number of the excited mode, from 1, whose frequency is twice the first mode's
+/// within [`DETUNING`] at h/R = `fill`, if there is one.
+pub fn secondary_resonance(fill: f64) -> Option<(usize, usize)> {
     let t_1 = XI[0] * libm::tanh(XI[0] * fill);
-    let near = EXCITED.iter().enumerate().find_map(|(azimuth, modes)| {
+    EXCITED.iter().enumerate().find_map(|(azimuth, modes)| {
         let n = modes.iter().position(|(xi, _)| {
             let ratio = libm::sqrt(4.0 * t_1 / (xi * libm::tanh(xi * fill)));
             (ratio - 1.0).abs() < DETUNING
         })?;
         Some((2 * azimuth, n + 1))
-    });
-    let (s, kappa) = coefficients(fill);
-    if fill < SHALLOW {
-        Some(format!(
-            "slosh.model = liquid at h/R = {fill:.3}: below {SHALLOW} waves are shallow and the third \
-             order in the amplitude (s = {s:.3}, kappa = {kappa:.3}) holds for the smallest ones alone"
-        ))
-    } else {
-        near.map(|(azimuth, n)| {
-            format!(
-                "slosh.model = liquid at h/R = {fill:.3}: twice the frequency of mode 1 is within 1 % \
-                 of that of mode ({azimuth},{n}), a secondary resonance, next to which the dependence \
-                 on amplitude (s = {s:.3}, kappa = {kappa:.3}) is not known"
-            )
-        })
-    }
+    })
 }
 
 #[cfg(test)]
@@ -124,16 +107,15 @@ mod tests {
             let (s, kappa) = coefficients(fill / 0.0815);
             assert!((0.375 * kappa - 0.5 * s - planar).abs() < 6e-4, "{s} {kappa}");
             assert!((0.5 * kappa - circular).abs() < 6e-4, "{kappa}");
-            assert_eq!(warning(fill / 0.0815), None);
+            assert_eq!(secondary_resonance(fill / 0.0815), None);
         }
     }
 
     #[test]
-    fn shallow_liquid_and_secondary_resonances_are_warned_of() {
-        assert!(warning(0.3).unwrap().contains("shallow"));
-        assert!(warning(0.831).unwrap().contains("mode (2,2)"));
-        assert!(warning(1.01).unwrap().contains("mode (0,2)"));
+    fn secondary_resonances_are_known_by_their_mode() {
+        assert_eq!(secondary_resonance(0.831), Some((2, 2)));
+        assert_eq!(secondary_resonance(1.01), Some((0, 2)));
         // Without bottom 2 omega_1 is 2.5 % above that of (0,2).
-        assert!(warning(5.0).is_none() && warning(1.3).is_none() && warning(0.6).is_none());
+        assert!([5.0, 1.3, 0.6].iter().all(|fill| secondary_resonance(*fill).is_none()));
     }
 }

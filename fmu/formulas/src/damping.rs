@@ -1,0 +1,143 @@
+//! Damping ratios of the first mode: published correlations, the laminar layer at the wall, ring
+//! baffles.
+//!
+//! Re = nu/sqrt(g R^3) throughout (an inverse Reynolds number), x = h/R the fill; zeta is the
+//! logarithmic decrement over 2 pi. Measured tanks scatter by some 30 % around any of these. Where a
+//! formula leaves its range is said by who calls it.
+
+use core::f64::consts::TAU;
+
+use libm::{cosh, exp, pow, sinh, sqrt, tanh};
+
+/// Re = nu/sqrt(g R^3).
+pub fn inverse_reynolds(radius: f64, nu: f64, g: f64) -> f64 {
+    nu / sqrt(g * radius * radius * radius)
+}
+
+/// Laminar layer at the wetted wall of any tank: beta sqrt(nu/(8 omega)), with `beta`, 1/m, by the mode's
+/// shape (Case and Parkinson 1957 for the cylinder, Keulegan 1959 for the box).
+pub fn laminar(beta: f64, nu: f64, omega: f64) -> f64 {
+    beta * sqrt(nu / (8.0 * omega))
+}
+
+/// Upright cylinder, Mikishev and Dorozhkin (Dodge 2000): 0.79 sqrt(Re) [1 + (0.318/sinh 1.84 x)
+/// (1 + (1 - x)/cosh 1.84 x)]. Below x = 0.5 it falls below the laminar layer.
+#[allow(clippy::approx_constant)] // 0.318 is the correlation's, not 1/pi
+pub fn mikishev_dorozhkin(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
+    let x = depth / radius;
+    // Where sinh would overflow the bottom is out of reach anyway.
+    let u = f64::min(1.84 * x, 300.0);
+    let bottom = 0.318 / sinh(u) * (1.0 + (1.0 - x) / cosh(u));
+    0.79 * sqrt(inverse_reynolds(radius, nu, g)) * (1.0 + bottom)
+}
+
+/// Upright cylinder, Stephens, Leonard and Perry (NASA TN D-1367): (5.23/2 pi) sqrt(Re)
+/// tanh(1.84 x)^(-1/4) [1 + 2 (1 - x)/sinh 3.68 x]; 1.493 times the laminar layer at every depth.
+pub fn stephens(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
+    let x = depth / radius;
+    let bracket = 1.0 + if x > 100.0 { 0.0 } else { 2.0 * (1.0 - x) / sinh(3.68 * x) };
+    let zeta = 5.23 / TAU * sqrt(inverse_reynolds(radius, nu, g)) * bracket;
+    zeta / pow(tanh(1.84 * x), 0.25)
+}
+
+/// B = 1e4 nu/sqrt(g D^3) of a sphere.
+pub fn sphere_number(radius: f64, nu: f64, g: f64) -> f64 {
+    1e4 * inverse_reynolds(2.0 * radius, nu, g)
+}
+
+/// Sphere (after Mikishev and Dorozhkin, power of Sumner and Stofan, NASA TN D-1991):
+/// (0.131/2 pi) B^0.359/x up to half full, times x (1 + 0.46 (2 - x))/(1.46 (2 - x)) above.
+/// Without bound at both ends: x is kept within 0.1 and 1.9.
+pub fn sphere(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
+    let x = (depth / radius).clamp(0.1, 1.9);
+    let by_fill = if x <= 1.0 { 1.0 / x } else { (1.0 + 0.46 * (2.0 - x)) / (1.46 * (2.0 - x)) };
+    0.131 / TAU * pow(sphere_number(radius, nu, g), 0.359) * by_fill
+}
+
+/// Cone with its apex down, `radius` of the free surface, `half_angle` b in degrees:
+/// (4.964/2 pi) C5 C4^(-1/2) sqrt(Re), C5 = 1.0037 + 0.0126 b, C4 = 1.001 - 0.0031 b - 0.0003 b^2
+/// (fit of a figure by SLOSH-ML). C4 falls to 0 at 53 degrees: b is kept within 0 and 45.
+pub fn cone(radius: f64, half_angle: f64, nu: f64, g: f64) -> f64 {
+    let b = half_angle.clamp(0.0, 45.0);
+    let (c5, c4) = (1.0037 + 0.0126 * b, 1.001 - 0.0031 * b - 0.0003 * b * b);
+    4.964 / TAU * c5 / sqrt(c4) * sqrt(inverse_reynolds(radius, nu, g))
+}
+
+/// Re of a torus over that of the one tank that was measured.
+pub fn torus_number(tube_radius: f64, nu: f64, g: f64) -> f64 {
+    inverse_reynolds(tube_radius, nu, g) / inverse_reynolds(0.0635, 3.3e-6, 9.81)
+}
+
+/// Torus, `tube_radius` a of its section (SLOSH-ML; one tank size was measured): sqrt(Re/Re_0) times
+/// (1.6629 y^4 - 3.7955 y^3 + 3.5583 y^2 - 1.6759 y + 0.3865)/2 pi, with y = h/2a and
+/// Re_0 = 3.3e-6/sqrt(9.81 0.0635^3).
+pub fn torus(tube_radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
+    let y = 0.5 * depth / tube_radius;
+    let fit = (((1.6629 * y - 3.7955) * y + 3.5583) * y - 1.6759) * y + 0.3865;
+    sqrt(torus_number(tube_radius, nu, g)) * fit / TAU
+}
+
+/// Part of an upright cylinder's section that a flat ring of `width` at the wall covers.
+pub fn covered(radius: f64, width: f64) -> f64 {
+    let w = width / radius;
+    w * (2.0 - w)
+}
+
+/// How much of the surface's motion is left at a ring `depth` below it in an upright cylinder.
+pub fn motion_at_ring(radius: f64, depth: f64) -> f64 {
+    exp(-1.84 * depth / radius)
+}
+
+/// Ring baffle in an upright cylinder (Miles 1958): 2.83 exp(-4.60 d/R) alpha^(3/2) (eta/R)^(1/2), alpha
+/// the covered area, `amplitude` eta of the wave at the wall.
+///
+/// It grows as the root of the amplitude; a constant damping ratio holds at one amplitude only.
+pub fn miles_ring(radius: f64, depth: f64, width: f64, amplitude: f64) -> f64 {
+    let alpha = covered(radius, width);
+    2.83 * exp(-4.60 * depth / radius) * alpha * sqrt(alpha) * sqrt(amplitude / radius)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Water in the bench's tank, R = 0.0815 m: Re = 9.1312e-7/sqrt(9.81 R^3); by hand, four digits.
+    #[test]
+    fn correlations_have_their_published_coefficients() {
+        let (r, nu, g) = (0.0815, 9.1312e-7, 9.81);
+        let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-3, "{a} {b}");
+        near(inverse_reynolds(r, nu, g), 1.2530e-5);
+        // Deep: no bottom.
+        near(mikishev_dorozhkin(r, 5.0 * r, nu, g), 0.79 * 3.5398e-3);
+        // x = 1/2: 0.318/sinh 0.92 (1 + 0.5/cosh 0.92) = 0.3018 (1 + 0.3444)
+        near(mikishev_dorozhkin(r, 0.5 * r, nu, g), 0.79 * 3.5398e-3 * 1.4057);
+        near(stephens(r, 5.0 * r, nu, g), 5.23 / TAU * 3.5398e-3);
+        // x = 1: nothing of the bracket, tanh(1.84) = 0.95080
+        near(stephens(r, r, nu, g), 5.23 / TAU * 3.5398e-3 * 1.01269);
+        // Half full, B = 1e4 Re/8^(1/2)
+        near(sphere_number(r, nu, g), 4.4300e-2);
+        near(sphere(r, r, nu, g), 0.131 / TAU * 0.32660);
+        near(sphere(r, 1.5 * r, nu, g), 0.131 / TAU * 0.32660 * 1.23 / 0.73);
+        near(cone(r, 30.0, nu, g), 4.964 / TAU * 1.3817 / 0.79875 * 3.5398e-3);
+        near(
+            torus(0.0635, 0.0635, 3.3e-6, 9.81),
+            (((0.83145 - 3.7955) * 0.5 + 3.5583) * 0.25 - 0.83795 + 0.3865) / TAU,
+        );
+    }
+
+    /// alpha = 0.19 at w/R = 0.1; by hand, four digits.
+    #[test]
+    fn the_ring_has_the_damping_of_miles() {
+        let zeta = miles_ring(1.0, 0.1, 0.1, 0.04);
+        assert!((zeta / (2.83 * 0.63128 * 0.082819 * 0.2) - 1.0).abs() < 1e-4, "{zeta}");
+        assert!((motion_at_ring(2.0, 0.2) / 0.83194 - 1.0).abs() < 1e-4);
+        // Four times the wave has twice the damping.
+        assert!((miles_ring(1.0, 0.1, 0.1, 0.16) / zeta - 2.0).abs() < 1e-14);
+    }
+
+    /// beta = 10/m, nu = 8e-6 m2/s, omega = 4 rad/s: 10 sqrt(2.5e-7).
+    #[test]
+    fn the_laminar_layer_grows_with_the_root_of_viscosity() {
+        assert!((laminar(10.0, 8e-6, 4.0) - 5e-3).abs() < 1e-17);
+    }
+}

@@ -1,0 +1,10 @@
+//! Closed formulas of slosh, for the models and for the harness alike: liquid in an upright cylinder
+//! (`cylinder.rs`, to third order in the amplitude `third_order.rs`), damping by published correlations
+//! (`damping.rs`), similarity numbers (`similarity.rs`). SI units. No model is in here.
+
+#![no_std]
+
+pub mod cylinder;
+pub mod damping;
+pub mod similarity;
+pub mod third_order;
