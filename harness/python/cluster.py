@@ -35,7 +35,6 @@ import environment
 try:
     import cloudpickle
     import dask
-    import fmpy
     import numpy as np
     import pyarrow
     import pyarrow.parquet
@@ -161,7 +160,7 @@ def write_package(path: Path) -> None:
             archive.write(file, f"hubslosh/{file.name}")
         if library := hubslosh.batch.library():
             file = Path(library._name)
-            archive.write(file, f"hubslosh/lib/{fmpy.platform}/{file.name}")
+            archive.write(file, f"hubslosh/lib/{hubslosh.fmu.PLATFORM}/{file.name}")
 
 
 def prepare(client: Client, fmu: Path, sha256: str) -> str:

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::common::{python, run};
-use host::fmi2::Fmu;
+use host::fmi2::{Fmu, PLATFORM};
 use host::xml::Element;
 use pack::{HUBSLOSH, packed_model_for_tests, root};
 
@@ -26,8 +26,8 @@ impl Unpacked {
         let packed = packed_model_for_tests(model);
         let file = std::fs::File::open(packed).unwrap();
         zip::ZipArchive::new(file).unwrap().extract(directory.path()).unwrap();
-        let library =
-            directory.path().join("binaries/linux64").join(model.name).with_extension("so");
+        let folder = directory.path().join("binaries").join(PLATFORM);
+        let library = folder.join(model.name).with_extension("so");
         Unpacked { directory, library, fmu: Fmu::open(packed).unwrap() }
     }
 

@@ -5,14 +5,16 @@ use super::{Archive, Description, Findings};
 use host::binary::{Binary, Kind};
 use host::fmi2::{Fmu, PLATFORM};
 
-/// Folders of FMI 2.0, the ending of the binary in each, and what can be read of it here.
-const PLATFORMS: [(&str, &str, Option<Kind>); 6] = [
+/// Folders of FMI 2.0, the ending of the binary in each, and what can be read of it here. Names with 32
+/// and 64 are for x86; a tuple of FMI 3.0 names any other processor.
+pub const PLATFORMS: [(&str, &str, Option<Kind>); 7] = [
     ("win32", ".dll", None),
     ("win64", ".dll", Some(Kind::Windows)),
     ("linux32", ".so", None),
     ("linux64", ".so", Some(Kind::Linux)),
     ("darwin32", ".dylib", None),
     ("darwin64", ".dylib", Some(Kind::MacOs)),
+    ("aarch64-linux", ".so", Some(Kind::LinuxArm)),
 ];
 
 /// An interface that the description declares, and what its binary must be.
@@ -217,7 +219,7 @@ pub fn format(binaries: &Binaries, findings: &mut Findings) {
             Err(why) => findings.add(&placed.name, why.clone()),
             Ok(binary) if binary.kind != kind => findings.add(
                 &placed.name,
-                format!("it is for {:?} (allowed in {}: {kind:?})", binary.kind, placed.folder),
+                format!("it is for {} (allowed in {}: {kind})", binary.kind, placed.folder),
             ),
             Ok(_) => {}
         }

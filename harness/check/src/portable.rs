@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use super::binaries::PLATFORMS;
 use super::{Archive, Findings};
 
 /// Characters that Windows does not allow in names; `/` separates and control characters are a rule
@@ -131,8 +132,6 @@ pub fn file_and_folder(archive: &Archive, findings: &mut Findings) {
 const STANDARD_FOLDERS: [&str; 6] =
     ["binaries", "documentation", "resources", "sources", "extra", "terminalsAndIcons"];
 const STANDARD_FILES: [&str; 3] = ["modelDescription.xml", "model.png", "documentation/index.html"];
-const PLATFORM_FOLDERS: [&str; 6] =
-    ["win32", "win64", "linux32", "linux64", "darwin32", "darwin64"];
 
 /// The name that the standard has for one that differs in capitals only.
 fn standard_spelling(name: &str) -> Option<String> {
@@ -155,7 +154,7 @@ fn standard_spelling(name: &str) -> Option<String> {
     }
     if first.eq_ignore_ascii_case("binaries")
         && rest.len() > 1
-        && let Some(folder) = other(rest[0], &PLATFORM_FOLDERS)
+        && let Some(folder) = other(rest[0], &PLATFORMS.map(|(folder, ..)| folder))
     {
         right[1] = folder;
         differs = true;
@@ -198,6 +197,7 @@ mod tests {
         for (wrong, right) in [
             ("Binaries/Linux64/a.so", "binaries/linux64/a.so"),
             ("binaries/Win64/a.dll", "binaries/win64/a.dll"),
+            ("binaries/AArch64-linux/a.so", "binaries/aarch64-linux/a.so"),
             ("ModelDescription.xml", "modelDescription.xml"),
             ("Resources/a", "resources/a"),
         ] {

@@ -21,7 +21,8 @@ pub const GLIBC: Version = Version(2, 17);
 pub const MACOS: Version = Version(11, 0);
 
 /// Libraries that are part of glibc.
-const LINUX_LIBRARIES: [&str; 7] = [
+const LINUX_LIBRARIES: [&str; 8] = [
+    "ld-linux-aarch64.so.1",
     "ld-linux-x86-64.so.2",
     "libc.so.6",
     "libdl.so.2",
@@ -59,21 +60,34 @@ impl fmt::Display for Version {
     }
 }
 
-/// Kind of a binary, by the operating system it is for.
+/// Kind of a binary, by the platform it is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// ELF, x86-64.
     Linux,
+    /// ELF, 64-bit ARM.
+    LinuxArm,
     /// PE, x86-64.
     Windows,
     /// Mach-O, one or several architectures.
     MacOs,
 }
 
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(match self {
+            Kind::Linux => "Linux on x86-64",
+            Kind::LinuxArm => "Linux on 64-bit ARM",
+            Kind::Windows => "Windows",
+            Kind::MacOs => "macOS",
+        })
+    }
+}
+
 /// A binary, seen from outside.
 #[derive(Clone, Debug)]
 pub struct Binary {
-    /// Operating system.
+    /// Platform.
     pub kind: Kind,
     /// Size of the file, bytes.
     pub size: usize,
@@ -124,6 +138,7 @@ impl Binary {
         let mut faults = Vec::new();
         let (architectures, libraries, newest): (&[_], &[&str], _) = match self.kind {
             Kind::Linux => (&["x86_64"], &LINUX_LIBRARIES, Some(("glibc", GLIBC))),
+            Kind::LinuxArm => (&["arm64"], &LINUX_LIBRARIES, Some(("glibc", GLIBC))),
             Kind::Windows => (&["x86_64"], &WINDOWS_LIBRARIES, None),
             Kind::MacOs => (&["x86_64", "arm64"], &MACOS_LIBRARIES, Some(("macOS", MACOS))),
         };
@@ -210,7 +225,11 @@ fn linux(bytes: &[u8]) -> Result<Binary> {
     let file = ElfFile64::<Endianness>::parse(bytes)?;
     let endian = file.endian();
     let sections = file.elf_section_table();
-    let mut binary = common(Kind::Linux, &file)?;
+    let kind = match file.architecture() {
+        Architecture::Aarch64 => Kind::LinuxArm,
+        _ => Kind::Linux,
+    };
+    let mut binary = common(kind, &file)?;
     if let Some((dynamic, link)) = sections.dynamic(endian, bytes)? {
         let strings = sections.strings(endian, bytes, link)?;
         for entry in dynamic {
@@ -388,6 +407,7 @@ mod tests {
     fn good(kind: Kind) -> Binary {
         let (architectures, library, needs) = match kind {
             Kind::Linux => (vec!["x86_64"], "libc.so.6", Some(GLIBC)),
+            Kind::LinuxArm => (vec!["arm64"], "ld-linux-aarch64.so.1", Some(GLIBC)),
             Kind::Windows => (vec!["x86_64"], "KERNEL32.dll", None),
             Kind::MacOs => (vec!["x86_64", "arm64"], MACOS_LIBRARIES[0], Some(MACOS)),
         };
@@ -405,7 +425,7 @@ mod tests {
 
     #[test]
     fn a_binary_that_needs_only_the_system_has_no_fault() {
-        for kind in [Kind::Linux, Kind::Windows, Kind::MacOs] {
+        for kind in [Kind::Linux, Kind::LinuxArm, Kind::Windows, Kind::MacOs] {
             assert_eq!(good(kind).faults(&["fmi2DoStep"]), [""; 0], "{kind:?}");
         }
     }

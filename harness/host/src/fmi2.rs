@@ -22,11 +22,17 @@ use crate::output::sha256;
 
 pub mod guarded;
 
-/// Folder of the binaries for the platform this program was built for (FMI 2.0, section 2.3).
-pub const PLATFORM: &str = if cfg!(target_os = "windows") {
+/// Folder of the binaries for the platform this program was built for (FMI 2.0.5, section 2.3): 32 and
+/// 64 stand for x86, other processors have the platform tuples of FMI 3.0. On macOS darwin64 is for
+/// both processors, for hosts look there on both and one universal binary serves them.
+pub const PLATFORM: &str = if cfg!(all(target_os = "windows", target_arch = "aarch64")) {
+    "aarch64-windows"
+} else if cfg!(target_os = "windows") {
     if cfg!(target_pointer_width = "64") { "win64" } else { "win32" }
 } else if cfg!(target_os = "macos") {
     "darwin64"
+} else if cfg!(target_arch = "aarch64") {
+    "aarch64-linux"
 } else if cfg!(target_pointer_width = "64") {
     "linux64"
 } else {

@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from fmpy import platform, sharedLibraryExtension
+from fmpy import sharedLibraryExtension
 from fmpy.fmi1 import FMICallException
 
-from .fmu import FmuError, source_tree
+from .fmu import PLATFORM, FmuError, source_tree
 
 FUNCTIONS = (
     "fmi2SetReal",
@@ -120,7 +120,7 @@ def library() -> ctypes.CDLL | None:
         return _load(Path(named)) if named else None
     prefix = "" if os.name == "nt" else "lib"
     name = f"{prefix}hubslosh_batch{sharedLibraryExtension}"
-    packed = resources.files(__package__) / "lib" / platform / name
+    packed = resources.files(__package__) / "lib" / PLATFORM / name
     if packed.is_file():
         # the package may be in a zip; a library must be a file
         return _load(_kept.enter_context(resources.as_file(packed)))

@@ -8,8 +8,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
-from fmpy import extract, read_model_description
+from fmpy import extract, platform, platform_tuple, read_model_description
 from fmpy.model_description import ModelDescription, ScalarVariable
+
+PLATFORM = platform_tuple if platform_tuple == "aarch64-linux" else platform
+"""Folder of the binaries for this platform, as the program ``hubslosh`` names it.
+
+FMI 2.0's linux64 is for x86-64, but fmpy looks there on ARM too.
+"""
 
 Value = float | int | bool | str
 """A value in SI units; of an enumeration also an item's name."""

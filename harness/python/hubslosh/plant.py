@@ -14,13 +14,13 @@ from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
-from fmpy import calloc, fmi2, free, platform, sharedLibraryExtension
+from fmpy import calloc, fmi2, free, sharedLibraryExtension
 from fmpy.fmi1 import FMICallException, printLogMessage
 from fmpy.logging import addLoggerProxy
 
 from . import batch
 from .batch import Rows, Signals
-from .fmu import Fmu, FmuError, FmuWarning, Quantity
+from .fmu import PLATFORM, Fmu, FmuError, FmuWarning, Quantity
 
 TORQUE = "tau_cmd"
 """The input that carries the torque, N·m."""
@@ -82,16 +82,17 @@ class Instance:
         if interface is None:
             raise FmuError(f"{fmu.path} offers no {name}")
         folder = Path(fmu.directory) / "binaries"
-        binary = f"{interface.modelIdentifier}{sharedLibraryExtension}"
-        if not (folder / platform / binary).is_file():
+        binary = folder / PLATFORM / f"{interface.modelIdentifier}{sharedLibraryExtension}"
+        if not binary.is_file():
             there = ", ".join(sorted(path.name for path in folder.glob("*"))) or "none"
-            raise FmuError(f"{fmu.path} has no binary for {platform} (platforms in it: {there})")
+            raise FmuError(f"{fmu.path} has no binary for {PLATFORM} (platforms in it: {there})")
         try:
             instance = kind(
                 guid=description.guid,
                 modelIdentifier=interface.modelIdentifier,
                 unzipDirectory=fmu.directory,
                 instanceName=_INSTANCE,
+                libraryPath=str(binary),
             )
         except Exception as error:  # fmpy raises nothing more special
             raise FmuError(f"{fmu.path} cannot be loaded: {error}") from None

@@ -92,3 +92,18 @@ def test_a_file_of_parameters_is_as_good_as_a_mapping(fmu: Path, tmp_path: Path)
     toml.write_text("a = [1]")
     with pytest.raises(FmuError, match="a must be numbers"):
         read_parameters(toml)
+
+
+@pytest.mark.parametrize(
+    ("system", "machine", "folder"),
+    [("linux", "x86_64", "linux64"), ("linux", "aarch64", "aarch64-linux")],
+)
+def test_each_processor_has_its_folder(system: str, machine: str, folder: str) -> None:
+    """FMI 2.0.5, section 2.3: linux64 is for x86-64, ARM has a platform tuple."""
+    program = (
+        f"import platform, sys; sys.platform = {system!r}; platform.machine = lambda: {machine!r}; "
+        "import hubslosh; print(hubslosh.fmu.PLATFORM)"
+    )
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.stdout.split() == [folder], done.stderr

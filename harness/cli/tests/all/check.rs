@@ -625,6 +625,20 @@ fn binaries_that_no_host_can_use_are_told() {
         files.iter_mut().find(|(n, _)| *n == name).unwrap().0 = to.into();
         zipped(&files, CompressionMethod::Stored)
     };
+    // linux64 is for x86-64, aarch64-linux for ARM, whatever the processor of this machine
+    let machine = |number: u8| {
+        let mut bytes = ours.clone();
+        bytes[18] = number; // e_machine
+        bytes
+    };
+    let (x86, arm) = (machine(62), machine(183)); // EM_X86_64, EM_AARCH64
+    let both = |x86_64: &[u8], aarch64: &[u8]| {
+        let mut files = self::ours().clone();
+        files.retain(|(n, _)| *n != name);
+        files.push(("binaries/linux64/HubSlosh.so".into(), x86_64.into()));
+        files.push(("binaries/aarch64-linux/HubSlosh.so".into(), aarch64.into()));
+        zipped(&files, CompressionMethod::Stored)
+    };
     // A plain build's need of a newer glibc is left out: the groups are looked at one by one.
     breaks(
         vec![
@@ -643,6 +657,9 @@ fn binaries_that_no_host_can_use_are_told() {
                 zipped(&with(&name, b"text".to_vec()), CompressionMethod::Stored),
                 &["bin.format"],
             ),
+            ("of two processors, each in its folder", both(&x86, &arm), &[]),
+            ("of ARM in both folders", both(&arm, &arm), &["bin.format"]),
+            ("of x86-64 in both folders", both(&x86, &x86), &["bin.format"]),
             (
                 "of another platform",
                 renamed("binaries/win64/HubSlosh.dll"),
