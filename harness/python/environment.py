@@ -1,6 +1,11 @@
 """Makes a virtual environment, or finds it as it should be; needs nothing but Python.
 
 As a program: ``python3 environment.py DIRECTORY REQUIREMENTS`` prints the interpreter's path.
+
+``requirements*.in`` say what the scripts here ask for. ``requirements*.txt`` follow from them: all
+packages with version and SHA-256, those for other systems and Pythons too, so that an index
+cannot hand out anything else. After a change of the former run the command that stands in the
+first lines of the latter (PyPI's uv), from the project's root.
 """
 
 import contextlib
@@ -23,15 +28,18 @@ def target() -> Path:
     return root / os.environ.get("CARGO_TARGET_DIR", "target")
 
 
-def ensure(directory: Path, requirements: Path) -> Path:
+def ensure(directory: Path, requirements: Path, *, hashes: bool = True) -> Path:
     """Return the interpreter of the virtual environment in ``directory``.
+
+    Packages are installed only with the SHA-256 that ``requirements`` has of them, unless
+    ``hashes`` is false.
 
     The environment is made anew when the requirements file or the Python that makes it is not
     the one it was made with. One process makes it; others that want it meanwhile wait. Leaves
     the program with a sentence when it cannot be made.
     """
     with _alone(directory.with_name(directory.name + ".lock")):
-        return _ensure(directory, requirements)
+        return _ensure(directory, requirements, hashes)
 
 
 def run_again_in(name: str, missing: ModuleNotFoundError) -> NoReturn:
@@ -47,7 +55,7 @@ def run_again_in(name: str, missing: ModuleNotFoundError) -> NoReturn:
     sys.exit(subprocess.run([python, *sys.argv]).returncode)
 
 
-def _ensure(directory: Path, requirements: Path) -> Path:
+def _ensure(directory: Path, requirements: Path, hashes: bool) -> Path:
     python = directory / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
     stamp = directory / "made-from.txt"
     made_from = f"{sys.executable} {sys.version}\n{requirements.read_text()}"
@@ -69,10 +77,11 @@ def _ensure(directory: Path, requirements: Path) -> Path:
             "pip",
             "install",
             "--disable-pip-version-check",
+            *(["--require-hashes"] if hashes else []),
             "-r",
             str(requirements),
         ],
-        f"the packages of {requirements} could not be installed; is there a network?",
+        f"the packages of {requirements} could not be installed; what pip says stands above",
     )
     stamp.write_text(made_from)
     return python

@@ -1,11 +1,16 @@
 """The virtual environment that the scripts and the tests run in."""
 
+import re
 import subprocess
 import sys
 import time
 from pathlib import Path
 
+import pytest
+
 import environment
+
+REQUIREMENTS = sorted(Path(environment.__file__).parent.glob("requirements*.in"))
 
 
 def test_those_who_want_one_environment_at_once_get_one_that_works(tmp_path: Path) -> None:
@@ -22,3 +27,28 @@ def test_those_who_want_one_environment_at_once_get_one_that_works(tmp_path: Pat
     assert len(set(said)) == 1
     # a maker who came in between would have left a half-made one
     subprocess.run([said[0], "-m", "pip", "check"], check=True)
+
+
+def test_a_package_without_its_hash_is_refused(tmp_path: Path) -> None:
+    """A wheel that is there, and nothing else wrong with it."""
+    wheel = tmp_path / "thing-1-py3-none-any.whl"
+    wheel.touch()
+    requirements = tmp_path / "requirements.txt"
+    requirements.write_text(f"thing @ {wheel.as_uri()}\n")
+    command = [sys.executable, environment.__file__, tmp_path / "made", requirements]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "--require-hashes" in done.stderr, done.stderr
+
+
+@pytest.mark.parametrize("asked", REQUIREMENTS, ids=lambda path: path.stem)
+def test_every_package_has_a_hash_and_those_asked_for_have_their_version(asked: Path) -> None:
+    """The .txt follows from the .in."""
+    locked = asked.with_suffix(".txt").read_text()
+    pinned = re.findall(
+        r"^([\w.-]+==[\w.]+)(?: ;[^\\]*)? \\\n    --hash=sha256:[0-9a-f]{64}", locked, re.M
+    )
+    lines = [line for line in locked.splitlines() if line and not line.startswith((" ", "#"))]
+    assert len(pinned) == len(lines) > 0
+    wanted = [line for line in asked.read_text().splitlines() if not line.startswith("#")]
+    assert set(wanted) <= set(pinned)

@@ -40,7 +40,7 @@ def installed(wheel: Path, tmp_path_factory) -> Path:
     requirements = tmp_path_factory.mktemp("wheel") / "requirements.txt"
     names = [line.removeprefix("Requires-Dist: ") for line in needed]
     requirements.write_text("\n".join([*names, ""]))
-    python = environment.ensure(TARGET / "python" / "wheel", requirements)
+    python = environment.ensure(TARGET / "python" / "wheel", requirements, hashes=False)
     pip = [python, "-m", "pip", "--disable-pip-version-check"]
     for arguments in (["install", "--force-reinstall", "--no-deps", wheel], ["check"]):
         done = subprocess.run([*pip, *arguments], capture_output=True, text=True, check=False)
