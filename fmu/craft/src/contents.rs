@@ -41,7 +41,7 @@
 //! the energy is that of `outputs.rs`, differentiated along the motion.
 
 use crate::bob::BobNow;
-use crate::integrator::{Limits, StepError, advance_by_extrapolation};
+use crate::integrator::{Limits, Pace, StepError, System, advance_by_extrapolation};
 use crate::parameters::Tank;
 use crate::rigid::{Mat6, Rigid};
 use crate::sizes::{MODES, POINTS};
@@ -408,13 +408,7 @@ impl Outflow<'_> {
 }
 
 /// A system with tanks that drain.
-pub trait Drains<const D: usize> {
-    /// The rates of the states, `t` after the start of the step.
-    fn rates(&self, t: f64, x: &[f64; D]) -> [f64; D];
-
-    /// What the errors of a step of length `h` are compared with, from states and rates.
-    fn error_scale(&self, x: &[f64; D], rate: &[f64; D], h: f64) -> [f64; D];
-
+pub trait Drains<const D: usize>: System<D> + Sized {
     /// Makes quaternions and directions what they are.
     fn normalise(&self, x: &mut [f64; D], t: f64);
 
@@ -433,12 +427,10 @@ pub trait Drains<const D: usize> {
             flow.check(x[flow.at], h)?;
         }
         let start = *x;
-        let (mut t, mut steps) = (0.0, 0);
+        let (mut t, mut pace) = (0.0, Pace::new(h));
         while t < h {
             let end = self.outflows().fold(h, |end, flow| flow.next_point(start[flow.at], t, end));
-            let scale = self.error_scale(x, &self.rates(t, x), end - t);
-            let mut rates = |t: f64, x: &[f64; D]| self.rates(t, x);
-            advance_by_extrapolation(&mut rates, x, (t, end), &scale, limits, &mut steps)
+            advance_by_extrapolation(self, x, (t, end), limits, &mut pace)
                 .map_err(|why| why.after(begin))?;
             self.normalise(x, end);
             for flow in self.outflows() {

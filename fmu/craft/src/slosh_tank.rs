@@ -38,7 +38,9 @@
 
 use crate::bob::{Bob, BobNow};
 use crate::contents::{Drains, Outflow, Place, normalise_bobs, vec_of};
-use crate::integrator::{Limits, MAX_MAGNITUDE, MAX_STEPS, Motion, RATE_FLOOR, StepError, advance};
+use crate::integrator::{
+    Limits, MAX_MAGNITUDE, MAX_STEPS, Motion, RATE_FLOOR, StepError, System, advance,
+};
 use crate::motion::{SCALE_TIME, twice_crossed};
 use crate::outputs::{MassProperties, TankOutputs};
 use crate::parameters::{Craft, Tank, steps_problem, tolerance_problem};
@@ -230,7 +232,18 @@ struct Run<'a> {
 /// a, w, w', outflow.
 type Acting<T> = ([Vec3<T>; 3], T);
 
-impl Drains<TANK_STATES> for Run<'_> {
+/// Scales of directions, which are 1, and of the bobs' rates, from where these stand in the states.
+fn scales(swing: impl Fn(usize) -> f64) -> [f64; TANK_STATES] {
+    // The dissipated energy and the liquid follow from the rest.
+    let mut scale = [f64::INFINITY; TANK_STATES];
+    for at in (0..DISSIPATED).step_by(6) {
+        scale[at..at + 3].fill(1.0);
+        scale[at + 3..at + 6].fill(swing(at + 3));
+    }
+    scale
+}
+
+impl System<TANK_STATES> for Run<'_> {
     fn rates(&self, t: f64, x: &[f64; TANK_STATES]) -> [f64; TANK_STATES] {
         let TankInputs { a, omega_dot, mass_flow, .. } = self.inputs;
         let moved = [a.at(t), self.inputs.omega_at(t), omega_dot.at(t)];
@@ -239,22 +252,18 @@ impl Drains<TANK_STATES> for Run<'_> {
 
     fn error_scale(
         &self,
+        t: f64,
         x: &[f64; TANK_STATES],
         rate: &[f64; TANK_STATES],
         h: f64,
     ) -> [f64; TANK_STATES] {
-        let turn = RATE_FLOOR + largest(self.inputs.omega);
-        // The dissipated energy and the liquid follow from the rest.
-        let mut scale = [f64::INFINITY; TANK_STATES];
-        for at in (0..DISSIPATED).step_by(6) {
-            let swing =
-                largest(vec_of(x, at + 3)) + largest(vec_of(rate, at + 3)) * h.min(SCALE_TIME);
-            scale[at..at + 3].fill(1.0);
-            scale[at + 3..at + 6].fill(turn + swing);
-        }
-        scale
+        let turn = RATE_FLOOR + largest(self.inputs.omega_at(t));
+        let time = h.min(SCALE_TIME);
+        scales(|at| turn + largest(vec_of(x, at)) + largest(vec_of(rate, at)) * time)
     }
+}
 
+impl Drains<TANK_STATES> for Run<'_> {
     fn normalise(&self, x: &mut [f64; TANK_STATES], _: f64) {
         normalise_bobs(&mut x[..DISSIPATED]);
     }

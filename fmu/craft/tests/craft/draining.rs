@@ -207,6 +207,64 @@ fn outflow_is_the_integral_of_the_flow_for_any_communication_step() {
     }
 }
 
+/// Position and velocity begin at 0 and end at some 100 m and 30 m/s: what a step's errors are compared with grows along
+/// with them.
+#[test]
+fn a_draining_craft_that_starts_at_the_origin_takes_long_steps() {
+    for seed in 0..6 {
+        let (mut p, u) = craft(seed, seed as usize % 4);
+        (p.init.position, p.init.velocity) = ([0.0; 3], [0.0; 3]);
+        for tolerance in [1e-6, 1e-12] {
+            let [short, ends @ ..] = [0.02, 1.0, 5.0].map(|h| {
+                let mut craft = Spacecraft::new(&p, &u, 0.0, tolerance).unwrap();
+                for k in 0..(5.0_f64 / h).round() as usize {
+                    craft.step(&after(&u, k as f64 * h), h).unwrap();
+                }
+                craft.continuous_states()
+            });
+            for x in ends {
+                for i in 0..index::WORK {
+                    // Five seconds of tumbling; rounding of 250 steps.
+                    let off = (x[i] - short[i]).abs() / (1.0 + short[i].abs());
+                    assert!(off < tolerance.max(1e-11), "{seed} {tolerance}: x[{i}] {off:e}");
+                }
+            }
+        }
+    }
+}
+
+/// A rotated tank whose axis is the thrust's, its liquid at rest: the terms cancel in the rates, what is left of them is
+/// rounding.
+#[test]
+fn a_tank_that_drains_at_rest_takes_long_steps() {
+    for modes in [0, 3] {
+        let mut p = Parameters::default();
+        let q = UnitQuaternion::from_quaternion(Quaternion::new(0.9, 0.2, -0.3, 0.4));
+        p.craft.r = [0.0; 3];
+        let tank = &mut p.tank[0];
+        (tank.position, tank.q) = ([0.0; 3], [q.w, q.i, q.j, q.k]);
+        (tank.fill.points, tank.modes) = (POINTS, modes);
+        let mass_flow = Line { value: 5.0, slope: 0.0 };
+        let mut u = Inputs { force: Ramp::held((q * V::z() * 1e4).into()), ..Inputs::default() };
+        u.mass_flow[0] = mass_flow;
+        let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-14).unwrap();
+        craft.step(&u, 60.0).unwrap();
+        let liquid = craft.continuous_states()[index::LIQUID];
+        assert!((liquid - (p.tank[0].liquid_0 - 300.0)).abs() < 1e-10);
+
+        let tank = TankParameters { tank: p.tank[0], ..TankParameters::default() };
+        let a = Ramp::held((q * V::z() * 8.0).into());
+        let u = TankInputs { a, mass_flow, ..TankInputs::default() };
+        let mut tank = SloshTank::new(&tank, &u, 0.0, 1e-14).unwrap();
+        tank.step(&u, 60.0).unwrap();
+        let out = tank.outputs(&u);
+        assert!((out.liquid - liquid).abs() < 1e-10);
+        for p in &out.tank.p[..modes] {
+            assert!((v(p) + V::z()).norm() < 1e-12, "{p:?}");
+        }
+    }
+}
+
 /// Without flow the second formulation is the first.
 #[test]
 fn a_tank_with_a_table_that_does_not_drain_is_a_tank_without() {
