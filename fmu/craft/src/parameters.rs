@@ -33,6 +33,27 @@ impl Inertia {
         let Inertia { xx, yy, zz, xy, xz, yz } = *self;
         [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
     }
+
+    /// The principal moments, kg m2, rising: eigenvalues of a symmetric matrix by the roots of its cubic.
+    ///
+    /// Source: Smith, Communications of the ACM 4 (1961).
+    fn principal_moments(&self) -> [f64; 3] {
+        let Inertia { xx, yy, zz, xy, xz, yz } = *self;
+        let mean = (xx + yy + zz) / 3.0;
+        let [x, y, z] = [xx - mean, yy - mean, zz - mean];
+        let square = (x * x + y * y + z * z + 2.0 * (xy * xy + xz * xz + yz * yz)) / 6.0;
+        let p = libm::sqrt(square);
+        if p <= 1e-15 * mean {
+            return [mean; 3];
+        }
+        let [x, y, z, xy, xz, yz] = [x, y, z, xy, xz, yz].map(|element| element / p);
+        let determinant = x * (y * z - yz * yz) - xy * (xy * z - yz * xz) + xz * (xy * yz - y * xz);
+        let angle = libm::acos((determinant / 2.0).clamp(-1.0, 1.0)) / 3.0;
+        let third = core::f64::consts::TAU / 3.0;
+        let largest = mean + 2.0 * p * libm::cos(angle);
+        let smallest = mean + 2.0 * p * libm::cos(angle + third);
+        [smallest, 3.0 * mean - largest - smallest, largest]
+    }
 }
 
 /// The craft without its liquids; wheels are dead mass of it.
@@ -311,6 +332,9 @@ const SHORTEST: f64 = 1e-6;
 /// Lighter bobs have no effect, kg.
 const LIGHTEST: f64 = 1e-9;
 
+/// What a principal moment may exceed the sum of the others by: a plate's, rounded to four digits.
+const PLATE: f64 = 1.0 + 1e-3;
+
 /// Tolerances that can be kept: from rounding to where error control has no meaning.
 const TOLERANCES: core::ops::RangeInclusive<f64> = 1e-14..=1e-1;
 
@@ -501,10 +525,23 @@ impl Craft {
         }
         let determinant =
             xx * yy * zz + 2.0 * xy * xz * yz - xx * yz * yz - yy * xz * xz - zz * xy * xy;
-        if !indefinite && determinant < -1e-12 * xx * yy * zz {
+        let negative = determinant < -1e-12 * xx * yy * zz;
+        if !indefinite && negative {
             problems.0.push(format!(
                 "{name}.J has a negative principal moment: its determinant is {determinant:?} \
                  kg3.m6 (allowed: 0 and above)"
+            ));
+        }
+        // Of the integrals of y^2 + z^2, x^2 + z^2 and x^2 + y^2 none exceeds the sum of the others.
+        let [small, middle, large] = self.j.principal_moments();
+        let sum = small + middle;
+        if !indefinite && !negative && large > PLATE * sum {
+            // Six digits of each.
+            let [small, middle, large, sum] = [small, middle, large, sum]
+                .map(|moment| format!("{moment:.5e}").parse().unwrap_or(moment));
+            problems.0.push(format!(
+                "{name}.J has the principal moments {small:?}, {middle:?} and {large:?} kg.m2: the largest exceeds {sum:?}, \
+                 the sum of the others (allowed: up to that sum, as no body has more)"
             ));
         }
     }

@@ -1,7 +1,7 @@
 //! Steps, states and refusals: what a host may rely on.
 
 use craft::{
-    Coupling, Inputs, Line, Mount, Parameters, Ramp, STATES, SloshTank, Spacecraft, State,
+    Coupling, Inertia, Inputs, Line, Mount, Parameters, Ramp, STATES, SloshTank, Spacecraft, State,
     StepError, TANK_STATES, TankInputs, TankParameters, TankState, index,
 };
 
@@ -306,6 +306,47 @@ fn every_problem_with_the_parameters_is_returned() {
     assert_eq!(problems.len(), 2);
     assert!(problems[0].starts_with("tank.k[1] = -1.0 (allowed: 0.0 to"));
     assert!(problems[1].starts_with("host.mass = -1.0"));
+}
+
+/// Of the principal moments of a body none exceeds the sum of the others: neither one that stands in the diagonal nor one
+/// that rotated axes hide. A plate has the sum itself, and numbers of four digits.
+#[test]
+fn principal_moments_that_no_body_has_are_refused() {
+    let with = |[xx, yy, zz, xy, xz, yz]: [f64; 6]| {
+        let mut p = Parameters::default();
+        p.craft.j = Inertia { xx, yy, zz, xy, xz, yz };
+        p.problems()
+    };
+    let message = |[small, middle, large, sum]: [&str; 4]| {
+        format!(
+            "craft.J has the principal moments {small}, {middle} and {large} kg.m2: the largest exceeds {sum}, the sum of \
+             the others (allowed: up to that sum, as no body has more)"
+        )
+    };
+    let wanted = message(["100.0", "200.0", "400.0", "300.0"]);
+    assert_eq!(with([100.0, 400.0, 200.0, 0.0, 0.0, 0.0]), std::slice::from_ref(&wanted));
+    // The same by 30 degrees about x.
+    let (c, s) = (f64::sqrt(0.75), 0.5);
+    let (yy, zz) = (c * c * 400.0 + s * s * 200.0, s * s * 400.0 + c * c * 200.0);
+    assert_eq!(with([100.0, yy, zz, 0.0, 0.0, c * s * 200.0]), [wanted]);
+    // Positive definite, every diagonal element within the sum of the others.
+    let wanted = message(["10.0", "10.0", "280.0", "20.0"]);
+    assert_eq!(with([100.0, 100.0, 100.0, 90.0, 90.0, 90.0]), [wanted]);
+    let fits: [[f64; 6]; 3] = [
+        [1.3333, 1.3333, 2.6667, 0.0, 0.0, 0.0],
+        [100.0, 100.0, 100.0, 0.0, 0.0, 0.0],
+        [100.0, 300.0, 399.9, 0.0, 0.0, 0.0],
+    ];
+    for j in fits {
+        assert_eq!(with(j), [""; 0], "{j:?}");
+    }
+    let mut tank =
+        TankParameters { host: Some(Parameters::default().craft), ..TankParameters::default() };
+    tank.host.as_mut().unwrap().j.zz = 5000.0;
+    assert!(
+        tank.problems()[0]
+            .starts_with("host.J has the principal moments 860.0, 910.0 and 5000.0 kg.m2: ")
+    );
 }
 
 /// Steps with anything at all: numbers, or an error and the old state.
