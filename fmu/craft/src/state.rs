@@ -114,6 +114,11 @@ impl State {
     /// Length of the flat form.
     pub const WORDS: usize = 4 + TANKS + STATES;
 
+    /// The wheels' momentum that the motion has taken account of, N m s.
+    pub fn h_wheels(&self) -> Vec3 {
+        self.h_wheels
+    }
+
     /// The state as plain words, for saving.
     pub fn to_words(&self) -> [u64; Self::WORDS] {
         let mut words = [0; Self::WORDS];

@@ -884,6 +884,11 @@ impl<M: Model> Instance<M> {
         Ok(answer(*interface, model, inputs, question))
     }
 
+    /// What there is to be warned of in how the host drives the model, see [`Model::step_warning`].
+    pub fn step_warning(&self) -> Option<&'static str> {
+        self.model.as_ref().and_then(M::step_warning)
+    }
+
     /// How many events have happened since the start.
     #[inline]
     pub fn event_count(&self) -> i32 {

@@ -134,6 +134,12 @@ pub trait Model: Clone + Debug + Sized + 'static {
         Ok(false)
     }
 
+    /// Model Exchange: what there is to be warned of in how the host has driven the model so far; looked at after each
+    /// step that it has accepted, until there is something.
+    fn step_warning(&self) -> Option<&'static str> {
+        None
+    }
+
     /// How many events have happened since the start.
     fn event_count(&self) -> i32 {
         0

@@ -134,6 +134,8 @@ struct Log {
     callbacks: fmi2CallbackFunctions,
     instance_name: CString,
     filter: Filter,
+    /// Whether the host was warned of how it drives the model: once is enough.
+    step_warned: bool,
 }
 
 impl Log {
@@ -366,6 +368,7 @@ pub unsafe fn fmi2Instantiate<M: Model>(
             callbacks: *functions,
             instance_name: c_string(name.as_deref().unwrap_or("")),
             filter: Filter::FAILURES,
+            step_warned: false,
         };
         match interface::<M>(name, fmuType, text(fmuGUID)) {
             Ok(interface) => {
@@ -830,6 +833,13 @@ pub unsafe fn fmi2CompletedIntegratorStep<M: Model>(
             let terminate = place(call, "terminateSimulation", terminateSimulation)?;
             *enter = component.instance.completed_integrator_step()?.into();
             *terminate = 0;
+            if !component.log.step_warned
+                && component.log.filter.wants(Topic::Warning)
+                && let Some(warning) = component.instance.step_warning()
+            {
+                component.log.step_warned = true;
+                component.log.write(fmi2Warning, Topic::Warning, warning);
+            }
             Ok(())
         })
     }

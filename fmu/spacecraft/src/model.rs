@@ -14,6 +14,39 @@ pub struct Model {
     /// Whether the present inputs are applied: a jump of the wheels' momentum or of an outflow acts
     /// at once in Co-Simulation.
     present: bool,
+    wheels: Wheels,
+}
+
+/// Whether a host that integrates itself, and from whom no slope of h_wheels is known, leaves the wheels' reaction
+/// -h_w' out of the torque: on an axis on which h_wheels moves and torque has never been other than 0.
+#[derive(Clone, Copy, Debug, Default)]
+struct Wheels {
+    /// The torque that there has been, by axis.
+    torque: [bool; 3],
+    /// How many steps h_wheels has moved in without. One alone may be the end of a ramp whose torque has ended.
+    moved: [u8; 3],
+}
+
+impl Wheels {
+    fn see_torque(&mut self, inputs: &Inputs) {
+        for i in 0..3 {
+            self.torque[i] |= inputs.torque.value[i] != 0.0;
+        }
+    }
+
+    /// Over a step from `before` to the present inputs.
+    fn see_step(&mut self, before: [f64; 3], inputs: &Inputs) {
+        self.see_torque(inputs);
+        for i in 0..3 {
+            if inputs.h_wheels.value[i] != before[i] && !self.torque[i] {
+                self.moved[i] = self.moved[i].saturating_add(1);
+            }
+        }
+    }
+
+    fn lack_reaction(&self) -> bool {
+        (0..3).any(|i| self.moved[i] >= 2 && !self.torque[i])
+    }
 }
 
 /// The craft's parameters; counts are integers here.
@@ -96,7 +129,7 @@ impl runtime::Model for Model {
         tolerance: f64,
     ) -> Result<Self, Vec<String>> {
         let craft = Spacecraft::new(&parameters.resolved()?, inputs, start_time, tolerance)?;
-        Ok(Model { craft, present: false })
+        Ok(Model { craft, present: false, wheels: Wheels::default() })
     }
 
     fn save(&self, words: &mut Vec<u64>) {
@@ -107,7 +140,7 @@ impl runtime::Model for Model {
         let p = parameters.resolved().ok()?;
         let state = State::from_words(words.try_into().ok()?)?;
         let craft = p.problems().is_empty().then(|| Spacecraft::resume(&p, &state, tolerance))?;
-        Some(Model { craft, present: false })
+        Some(Model { craft, present: false, wheels: Wheels::default() })
     }
 
     fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), String> {
@@ -133,6 +166,7 @@ impl runtime::Model for Model {
     }
 
     fn derivatives(&mut self, inputs: &Inputs, x_dot: &mut [f64]) {
+        self.wheels.see_torque(inputs);
         x_dot.copy_from_slice(&self.craft.derivatives(inputs));
     }
 
@@ -168,7 +202,69 @@ impl runtime::Model for Model {
     }
 
     fn accept_step(&mut self, inputs: &Inputs) -> Result<bool, String> {
+        self.wheels.see_step(self.craft.state().h_wheels(), inputs);
         self.craft.follow_inputs(inputs);
         self.craft.check_liquids().map(|()| false).map_err(|why| why.to_string())
+    }
+
+    fn step_warning(&self) -> Option<&'static str> {
+        self.wheels.lack_reaction().then_some(
+            "h_wheels moves on an axis on which torque has always been 0: in Model Exchange the slope of an input is not \
+             known, and without the wheels' reaction momentum and angular_momentum are wrong; add -d(h_wheels)/dt \
+             to torque",
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use runtime::Model as _;
+
+    use super::*;
+
+    const STEP: f64 = 0.01;
+
+    /// A host's Euler steps over a second, with h_wheels[2] and the torque about y as functions of the time; whether it is
+    /// warned.
+    fn is_warned(h_wheels: fn(f64) -> f64, torque: fn(f64) -> f64, with_events: bool) -> bool {
+        let inputs = |t: f64| {
+            let mut inputs = Inputs::default();
+            inputs.h_wheels.value[1] = h_wheels(t);
+            inputs.torque.value = [1.0, torque(t), 0.0];
+            inputs
+        };
+        let mut model = Model::new(&Parameters::default(), &inputs(0.0), 0.0, 1e-6).unwrap();
+        let (mut x, mut x_dot) = ([0.0; STATES], [0.0; STATES]);
+        for k in 0..100 {
+            let t = k as f64 * STEP;
+            if with_events {
+                model.handle_event(&inputs(t)).unwrap();
+            }
+            x.copy_from_slice(model.continuous_states());
+            model.derivatives(&inputs(t), &mut x_dot);
+            for (x, x_dot) in x.iter_mut().zip(x_dot) {
+                *x += STEP * x_dot;
+            }
+            model.set_time(t + STEP);
+            model.set_continuous_states(&x);
+            // Where inputs jump at events they are held in between.
+            model.accept_step(&inputs(if with_events { t } else { t + STEP })).unwrap();
+        }
+        model.step_warning().is_some()
+    }
+
+    #[test]
+    fn wheels_that_move_without_a_torque_are_warned_of_and_no_others() {
+        let sine = |t: f64| f64::sin(3.0 * t);
+        let reaction = |t: f64| -3.0 * f64::cos(3.0 * t);
+        assert!(is_warned(sine, |_| 0.0, false));
+        assert!(!is_warned(sine, reaction, false));
+        assert!(!is_warned(sine, |_| 0.0, true), "jumps at events turn the craft by impulses");
+        assert!(!is_warned(|_| 5.0, |_| 0.0, false), "wheels that hold their momentum");
+        // A ramp between two knots, whose reaction is there within it alone.
+        let ramp = |t: f64| (10.0 * (t - 0.5)).clamp(0.0, 1.0);
+        let reaction = |t: f64| if (0.5..0.6).contains(&t) { -10.0 } else { 0.0 };
+        assert!(!is_warned(ramp, reaction, false));
+        assert!(is_warned(ramp, |_| 0.0, false));
     }
 }
