@@ -101,7 +101,7 @@ fn zip(out: &mut (impl Write + Seek), files: &[(String, Vec<u8>)]) -> Result<()>
         let mode = if name.starts_with("binaries/") { 0o755 } else { 0o644 };
         let options = SimpleFileOptions::default()
             .compression_method(CompressionMethod::Deflated)
-            .compression_level(Some(9)) // the release must stay below 2 MB
+            .compression_level(Some(9)) // tests/all/release.rs bounds the size
             .last_modified_time(DateTime::default()) // 1980-01-01, the oldest a zip can say
             .unix_permissions(mode);
         archive.start_file(name.as_str(), options)?;

@@ -1,5 +1,5 @@
-//! The three platforms an FMU for everybody is built for, and what building
-//! for each takes.
+//! The platforms an FMU for everybody is built for, and what building for each
+//! takes.
 //!
 //! Rust's compiler writes code for all of them; what has to be had besides is
 //! Rust's standard library for the target and a linker. `harness/platforms/setup`
@@ -19,7 +19,7 @@ use host::fmi2::Fmu;
 use crate::models::Model;
 use crate::project;
 
-/// A platform of FMI 2.0, section 2.3.
+/// A platform of FMI 2.0.5, section 2.3.
 pub struct Platform {
     /// Folder under `binaries/` of the FMU.
     pub folder: &'static str,
@@ -69,7 +69,16 @@ const MINGW: Tool = Tool {
 };
 
 /// All platforms, in the order of the archive.
-pub const PLATFORMS: [Platform; 3] = [
+pub const PLATFORMS: [Platform; 4] = [
+    Platform {
+        // FMI 2.0's own names are for x86; for other processors it takes the tuples of FMI 3.0.
+        folder: "aarch64-linux",
+        ending: ".so",
+        targets: &[Target { triple: "aarch64-unknown-linux-gnu", suffix: ".2.17" }],
+        tools: &[CARGO_ZIGBUILD, ZIG],
+        cargo: Cargo::Zig,
+        link: &[],
+    },
     Platform {
         folder: "darwin64",
         ending: ".dylib",
