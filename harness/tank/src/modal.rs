@@ -162,6 +162,9 @@ pub struct ModalData {
     pub m_liq: f64,
     /// Height of its centre of mass, m from the contour's own zero.
     pub z_cg: f64,
+    /// Height of the tank's lowest point, m from the contour's own zero; 0 for shapes and boxes, whose
+    /// heights count from there.
+    pub z_lowest: f64,
     /// Inertia of the rigid liquid across the axis about its centre of mass, kg m2.
     #[serde(rename = "I_frozen_cg")]
     pub i_frozen_cg: f64,
@@ -182,10 +185,14 @@ pub struct ModalData {
     /// Both axes of a box.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub axes: Option<Axes>,
-    /// Estimated error of all values but beta: relative for lambda and l; of m_liq for masses; of
+    /// Estimated error of all values but beta and I_0: relative for lambda and l; of m_liq for masses; of
     /// m_liq R for m_n H_n and m_0 H_0; of m_liq R^2 for inertias; of R for waves and z_cg (R the
     /// outer radius of the free surface).
     pub error: f64,
+    /// Estimated error of I_0, of m_liq R^2. The fixed mass of a shallow dish stands far above it, and its
+    /// lever multiplies what is wrong with m_0.
+    #[serde(rename = "error_I_0")]
+    pub error_i_0: f64,
     /// Estimated relative error of beta.
     pub error_beta: f64,
     /// The wetted wall.
@@ -295,6 +302,7 @@ impl ModalData {
             length_y: None,
             m_liq,
             z_cg,
+            z_lowest: 0.0,
             i_frozen_cg,
             i_frozen_axis,
             i_eff_axis: None,
@@ -303,9 +311,37 @@ impl ModalData {
             modes,
             axes: None,
             error: 0.0,
+            error_i_0: 0.0,
             error_beta: 0.0,
             wall: None,
         }
+    }
+
+    /// States the errors. That of I_0 = I_eff - (sum m_n h_n)^2/m_0 - sum m_n h_n^2 follows by propagation: its
+    /// derivatives by I_eff, sum m_n h_n and m_0 are 1, 2 h_0 and h_0^2.
+    pub(crate) fn set_error(&mut self, error: f64, error_beta: f64) {
+        (self.error, self.error_beta) = (error, error_beta);
+        let axes = self.axes.iter().flat_map(|axes| axes.x.rest.iter().chain(&axes.y.rest));
+        let height = |rest: &Rest| (rest.height - self.z_cg).abs();
+        let highest = self.rest.iter().chain(axes).map(height).fold(0.0, f64::max);
+        let r = match (self.r_surface, self.length_x, self.length_y) {
+            (None, Some(x), Some(y)) => 0.5 * x.min(y),
+            (r, ..) => r.unwrap_or(0.0),
+        };
+        // a full tank has no rest and no R
+        let lever = if highest > 0.0 { highest / r } else { 0.0 };
+        self.error_i_0 = error * (1.0 + lever).powi(2);
+    }
+
+    /// Where heights count from, in words.
+    pub fn origin(&self) -> String {
+        if self.z_lowest.abs() < 1e-9 {
+            return "z = 0 is the tank's lowest point, z up".to_string();
+        }
+        format!(
+            "z = 0 is the contour's own zero, z up; the tank's lowest point is at z = {:.6} m",
+            self.z_lowest
+        )
     }
 
     /// What moves with the tank when the first `modes` modes are pendulums.
@@ -411,8 +447,7 @@ pub(crate) fn solve(wall: Wall, rho: f64, fill: f64, modes: usize) -> Result<Mod
         ModalData::new("revolution", rho, fill, m_liq, volume.z_cg, inertias, better.modes);
     data.r_surface = Some(wall.r_outer);
     data.r_inner = Some(wall.r_inner);
-    data.error = error;
-    data.error_beta = error_beta;
+    data.set_error(error, error_beta);
     data.wall = Some(wall);
     Ok(data)
 }
