@@ -34,4 +34,4 @@ pub mod third_order;
 pub use contour::Problems;
 pub use modal::{ModalData, Mode, Rest};
 pub use table::table;
-pub use tank::Tank;
+pub use tank::{Fill, Tank};

@@ -36,6 +36,8 @@ pub struct Capillary {
     pub spring: f64,
     /// One sentence for each range that is left; empty inside.
     pub outside: Vec<String>,
+    /// The formula says nothing about this tank, and what it adds is more than 10 % of omega^2.
+    pub unknown: bool,
 }
 
 /// Flat surface (contact angle 90 degrees), contact line free to slide, at a vertical wall:
@@ -45,16 +47,22 @@ pub struct Capillary {
 pub fn flat(mode: &Mode, fluid: Fluid) -> Capillary {
     let added = fluid.sigma / fluid.rho * mode.lambda * mode.surface_gradient;
     let gravity = fluid.g * mode.lambda;
+    let unknown = !mode.upright && added > 0.1 * gravity;
     let mut outside = Vec::new();
     if !mode.vertical_wall {
         outside.push("the wall is not vertical at the free surface; nothing is known for a free contact line there".to_string());
-    } else if !mode.upright && added > 0.1 * gravity {
+    }
+    if unknown && fluid.g > 0.0 {
         outside.push(format!(
-            "capillarity adds {:.0} % to omega^2, too much for the first order in it",
+            "it adds {:.0} % to omega^2, too much for the first order in it",
             100.0 * added / gravity
         ));
+    } else if unknown {
+        outside.push(
+            "without gravity it is all of omega^2, too much for the first order in it".into(),
+        );
     }
-    Capillary { omega2: gravity + added, spring: mode.m * added, outside }
+    Capillary { omega2: gravity + added, spring: mode.m * added, outside, unknown }
 }
 
 /// First zero of J1'.
@@ -133,7 +141,7 @@ pub fn cylinder(
 ) -> Capillary {
     // 0/0 without gravity and surface tension: whatever it is, it counts 0 times below.
     let bond = fluid.bond(radius);
-    let Capillary { omega2, spring, mut outside } = flat(mode, fluid);
+    let Capillary { omega2, spring, mut outside, unknown } = flat(mode, fluid);
     if !(0.0..=90.0).contains(&contact_angle) {
         let taken = contact_angle.clamp(0.0, 90.0);
         outside.push(format!(
@@ -148,5 +156,5 @@ pub fn cylinder(
     }
     let scale = fluid.sigma / (fluid.rho * radius.powi(3)) * (XI * fill / radius).tanh();
     let curved = scale * meniscus_shift(bond.max(0.0), contact_angle.clamp(0.0, 90.0));
-    Capillary { omega2: omega2 + curved, spring: spring + mode.m * curved, outside }
+    Capillary { omega2: omega2 + curved, spring: spring + mode.m * curved, outside, unknown }
 }

@@ -8,6 +8,7 @@ use core::fmt::Write as _;
 use crate::contour::Problems;
 use crate::low_gravity::{self, Capillary, Fluid};
 use crate::modal::ModalData;
+use crate::table::short;
 use crate::tank::{Geometry, Shape, Tank};
 use crate::{damping, modal};
 
@@ -29,7 +30,7 @@ pub enum Target {
 /// What is known of the liquid besides its density.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Liquid {
-    /// Specific force along the axis at which damping ratios hold, m/s2.
+    /// Specific force along the axis at which damping ratios and stiffnesses hold, m/s2; 0 or more.
     pub gravity: f64,
     /// Kinematic viscosity, m2/s; without it the damping ratios stay as they are in the FMU.
     pub nu: Option<f64>,
@@ -57,6 +58,8 @@ pub struct ParameterSet {
     pub notes: Vec<String>,
     /// What is left out or not known: one line each.
     pub warnings: Vec<String>,
+    /// Values far outside of what their formula holds for, which nobody should use unseen: one line each.
+    pub unknown: Vec<String>,
     /// Names and values.
     pub values: Vec<(String, Value)>,
 }
@@ -109,8 +112,15 @@ fn springs(
     liquid: Liquid,
     notes: &mut Vec<String>,
     warnings: &mut Vec<String>,
+    unknown: &mut Vec<String>,
 ) -> Vec<f64> {
-    let Some(sigma) = liquid.sigma else { return vec![0.0; modes.len()] };
+    let Some(sigma) = liquid.sigma else {
+        if liquid.gravity == 0.0 {
+            warnings
+                .push("nothing centres the liquid at 0 m/s2 without surface tension".to_string());
+        }
+        return vec![0.0; modes.len()];
+    };
     let (fluid, angle) = (Fluid { rho: data.rho, sigma, g: liquid.gravity }, liquid.contact_angle);
     let mut all: Vec<Capillary> = modes.iter().map(|mode| low_gravity::flat(mode, fluid)).collect();
     if angle != 90.0 {
@@ -137,7 +147,12 @@ fn springs(
         }
     }
     for (n, (mode, capillary)) in modes.iter().zip(&mut all).enumerate() {
-        warnings.extend(capillary.outside.iter().map(|why| format!("capillarity: {why}")));
+        let outside = capillary.outside.iter().map(|why| format!("capillarity: {why}"));
+        warnings.extend(outside);
+        if capillary.unknown {
+            let why = capillary.outside.join("; ");
+            unknown.push(format!("k of mode {} is not known: {why}", n + 1));
+        }
         let (k, gravity) = (capillary.spring, liquid.gravity * mode.lambda);
         if k < 0.0 {
             warnings.push(format!(
@@ -156,7 +171,8 @@ impl ParameterSet {
     /// The parameters of a tank that was solved for `data`, as many modes as both have.
     ///
     /// # Errors
-    /// A tank that the FMU cannot have: more than four of them, or a box with unequal sides in six axes.
+    /// A tank that the FMU cannot have: more than four of them, a box with unequal sides in six axes, a full one;
+    /// damping ratios without a specific force.
     pub fn new(
         tank: &Tank,
         data: &ModalData,
@@ -164,15 +180,35 @@ impl ParameterSet {
         liquid: Liquid,
     ) -> Result<ParameterSet, Problems> {
         let name = data.name.as_deref().unwrap_or("tank");
-        let mut notes = vec![format!(
-            "{name}, fill {} m: modal parameters with an error of {:.0e}",
-            data.fill, data.error
-        )];
+        let mut notes = vec![
+            format!(
+                "{name}, fill {} m: modal parameters with an error of {:.0e}, of I_0 {:.0e} m R^2",
+                short(data.fill),
+                data.error,
+                data.error_i_0
+            ),
+            format!("heights (hinge, H_0): {}", data.origin()),
+        ];
         let most = if target == Target::HubSlosh { 10 } else { 3 };
         let modes = &data.modes[..data.modes.len().min(most)];
         let Some(first) = modes.first() else {
-            return Err("There are no modes: the tank is empty or full.".to_string().into());
+            return Err(format!(
+                "There are no modes: the tank is full and does not slosh. Its liquid is a rigid body: {:.6} kg at \
+                 z = {:.6} m ({}), inertia {:.6e} kg m2 across the axis and {:.6e} kg m2 about it.",
+                data.m_liq,
+                data.z_cg,
+                data.origin(),
+                data.i_eff_cg,
+                data.i_eff_axis.unwrap_or(0.0)
+            )
+            .into());
         };
+        if liquid.gravity == 0.0 && liquid.nu.is_some() {
+            return Err("A damping ratio holds at a specific force, and at 0 m/s2 there is none: give the one that it \
+                        is to hold at, or no viscosity."
+                .to_string()
+                .into());
+        }
         if let Geometry::Box { length_x, length_y } = &tank.geometry
             && target != Target::HubSlosh
             && length_x != length_y
@@ -183,7 +219,7 @@ impl ParameterSet {
             )
             .into());
         }
-        let mut warnings = Vec::new();
+        let (mut warnings, mut unknown) = (Vec::new(), Vec::new());
         let ratios = match liquid.nu {
             Some(nu) => damping_ratios(tank, data, nu, liquid.gravity, &mut notes, &mut warnings),
             None => {
@@ -191,7 +227,7 @@ impl ParameterSet {
                 vec![0.0; data.modes.len()]
             }
         };
-        let springs = springs(tank, data, modes, liquid, &mut notes, &mut warnings);
+        let springs = springs(tank, data, modes, liquid, &mut notes, &mut warnings, &mut unknown);
         // The same of every FMU, under the name of its tank.
         let of_modes = |prefix: &str, values: &mut Vec<(String, Value)>| {
             for (n, mode) in modes.iter().enumerate() {
@@ -212,7 +248,10 @@ impl ParameterSet {
         match target {
             Target::HubSlosh => {
                 real("slosh.table.m_liq".into(), data.m_liq);
-                real("slosh.table.g_ref".into(), liquid.gravity);
+                // where the damping ratios hold: there are none at 0
+                if liquid.gravity > 0.0 {
+                    real("slosh.table.g_ref".into(), liquid.gravity);
+                }
                 real("fluid.rho".into(), data.rho);
                 // The free surface's width along the first length of a box.
                 real(
@@ -241,7 +280,9 @@ impl ParameterSet {
                 // The largest number of modes may leave it below 0 by rounding.
                 real(format!("{prefix}.I_0"), rest.inertia.max(0.0));
                 real(format!("{prefix}.I_z"), data.i_eff_axis.unwrap_or(0.0));
-                real(format!("{prefix}.g_ref"), liquid.gravity);
+                if liquid.gravity > 0.0 {
+                    real(format!("{prefix}.g_ref"), liquid.gravity);
+                }
                 of_modes(&prefix, &mut values);
                 values.push((format!("{prefix}.modes"), Value::Integer(modes.len() as i64)));
                 if prefix != "tank" {
@@ -256,7 +297,7 @@ impl ParameterSet {
             warnings.push("mode 1 carries hardly any mass: its hinge has no meaning".to_string());
         }
         warnings.dedup();
-        Ok(ParameterSet { notes, warnings, values })
+        Ok(ParameterSet { notes, warnings, unknown, values })
     }
 
     /// Notes and warnings, as they stand at the head of a file.

@@ -357,6 +357,10 @@ pub fn sweep(tank: &Tank, sweep: &Sweep, gravity: f64) -> String {
         if k < 2 {
             low = 0.0;
         }
+        // all frequencies are 0 without gravity, all hinges where a sphere is drawn around its centre
+        if high - low < 1e-9 {
+            (low, high) = (low - 0.5, high + 0.5);
+        }
         let pad = 0.04 * (high - low).max(1e-3 * high.abs());
         (low, high) = (if k < 2 { 0.0 } else { low - pad }, high + pad);
         let chart = Frame {

@@ -31,7 +31,7 @@ pub fn sweep(tank: &Tank, fills: &[f64], modes: usize) -> Result<Sweep, Problems
     let mut rows = Vec::with_capacity(fills.len());
     for &fill in fills {
         let solved = if fill == 0.0 { Ok(tank.empty()) } else { tank.solve(fill, modes) };
-        match solved.or_else(|problems| tank.full(fill).ok_or(problems)) {
+        match solved {
             Ok(data) => rows.push(data),
             Err(more) => problems.extend(more.0),
         }

@@ -4,13 +4,21 @@ use core::fmt::Write as _;
 
 use crate::modal::{Axis, ModalData, Mode, Rest};
 
+/// A length in m to 1e-9 m, without zeros at its end: fills found from a volume have 17 digits.
+pub(crate) fn short(length: f64) -> String {
+    format!("{length:.9}").trim_end_matches('0').trim_end_matches('.').to_string()
+}
+
 /// The result as text: liquid, modes, what stays with the tank, and the error. `gravity`, m/s2, gives the
 /// frequencies.
 pub fn table(data: &ModalData, gravity: f64) -> String {
     let mut text = String::new();
     let name = data.name.as_deref().unwrap_or("tank");
-    let _ = writeln!(text, "{name}: fill {} m, density {} kg/m3", data.fill, data.rho);
-    if let (Some(outer), Some(inner)) = (data.r_surface, data.r_inner) {
+    let _ = writeln!(text, "{name}: fill {} m, density {} kg/m3", short(data.fill), data.rho);
+    let _ = writeln!(text, "  heights               {}", data.origin());
+    if data.modes.is_empty() {
+        let _ = writeln!(text, "  free surface          none: the tank is full and does not slosh");
+    } else if let (Some(outer), Some(inner)) = (data.r_surface, data.r_inner) {
         let _ = write!(text, "  free surface          radius {outer:.6} m");
         let _ = writeln!(
             text,
@@ -37,10 +45,16 @@ pub fn table(data: &ModalData, gravity: f64) -> String {
     } else {
         section(&mut text, data.i_frozen_cg, data.i_eff_cg, &data.modes, &data.rest, gravity);
     }
+    if gravity == 0.0 && !data.modes.is_empty() {
+        let _ = writeln!(
+            text,
+            "\nat 0 m/s2 only capillarity brings the liquid back, which is not in this table: f is 0"
+        );
+    }
     let _ = writeln!(
         text,
-        "\nestimated error {:.0e}, of beta {:.0e} (relative to the result, the liquid's mass, R)",
-        data.error, data.error_beta
+        "\nestimated error {:.0e}, of I_0 {:.0e}, of beta {:.0e} (relative to the result, the liquid's mass, R)",
+        data.error, data.error_i_0, data.error_beta
     );
     text
 }
@@ -55,6 +69,9 @@ fn section(
 ) {
     let _ = writeln!(text, "  inertia about the centre, rigid        {rigid:.6e} kg m2");
     let _ = writeln!(text, "  inertia about the centre, effective    {effective:.6e} kg m2");
+    if modes.is_empty() {
+        return;
+    }
     let _ = writeln!(
         text,
         "\n  n  f at {gravity} m/s2    lambda        m         m/m_liq    length       bob at      hinge at    wave        beta"

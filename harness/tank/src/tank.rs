@@ -232,6 +232,34 @@ pub struct Tank {
     pub geometry: Geometry,
 }
 
+/// How full a tank is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Fill {
+    /// Height of the free surface above the tank's lowest point, m.
+    Height(f64),
+    /// Part of the tank's volume, 1 for a full tank.
+    Share(f64),
+    /// Mass of the liquid, kg.
+    Mass(f64),
+}
+
+/// A height in m, or per cent of the volume: `1.2`, `60%`.
+impl core::str::FromStr for Fill {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Fill, String> {
+        let number = |text: &str| {
+            text.trim().parse().map_err(|_| {
+                format!("`{text}` is neither a height in m (1.2) nor per cent of the volume (60%)")
+            })
+        };
+        match text.trim().strip_suffix('%') {
+            Some(percent) => Ok(Fill::Share(number(percent)? / 100.0)),
+            None => Ok(Fill::Height(number(text)?)),
+        }
+    }
+}
+
 /// The largest number of segments: each takes panels of its own.
 const MOST_SEGMENTS: usize = 200;
 
@@ -326,7 +354,54 @@ impl Tank {
         }
     }
 
-    /// Modal parameters at `fill`, m above the lowest point, for `modes` modes.
+    /// The height of the free surface above the lowest point, m, at a fill. A part of the volume and a mass
+    /// may be 0 or all that the tank holds; a height is returned as it is.
+    ///
+    /// # Errors
+    /// More than the tank holds, less than nothing, or a part of a box, which is open at the top.
+    pub fn height_of(&self, fill: Fill) -> Result<f64, Problems> {
+        let capacity = match &self.geometry {
+            Geometry::Revolution { contour, .. } => Some(contour.capacity()),
+            Geometry::Box { .. } => None,
+        };
+        let volume = match (fill, capacity) {
+            (Fill::Height(height), _) => return Ok(height),
+            (Fill::Share(share), _) if !(0.0..=1.0).contains(&share) => {
+                return Err(format!(
+                    "The fill is {} %; it must be 0 to 100 % of the tank's volume.",
+                    100.0 * share
+                )
+                .into());
+            }
+            (Fill::Share(share), Some(capacity)) => share * capacity,
+            (Fill::Share(_), None) => {
+                return Err("A box is open at the top and has no volume to take per cent of: give the fill as \
+                            a height or a mass."
+                    .to_string()
+                    .into());
+            }
+            (Fill::Mass(mass), _) if !(mass >= 0.0 && mass.is_finite()) => {
+                return Err(format!("The liquid's mass is {mass} kg; it must be 0 or more.").into());
+            }
+            (Fill::Mass(mass), _) => mass / self.density,
+        };
+        if let Some(capacity) = capacity.filter(|c| volume > c * (1.0 + 1e-9)) {
+            return Err(format!(
+                "{} kg are more than the tank holds: {:.6} kg ({capacity:.6} m3 at {} kg/m3).",
+                volume * self.density,
+                capacity * self.density,
+                self.density
+            )
+            .into());
+        }
+        Ok(match &self.geometry {
+            Geometry::Revolution { contour, .. } => contour.fill_of(volume),
+            Geometry::Box { length_x, length_y } => volume / (length_x * length_y),
+        })
+    }
+
+    /// Modal parameters at `fill`, m above the lowest point, for `modes` modes. A full closed tank has no
+    /// free surface and no modes.
     ///
     /// Cylinders and annuli given by their dimensions, and boxes, in closed form; all others by the
     /// boundary integral equation.
@@ -361,11 +436,9 @@ impl Tank {
                 }
             }),
         };
-        match solved {
-            Ok(mut data) if problems.is_empty() => {
-                data.name.clone_from(&self.name);
-                Ok(data)
-            }
+        let full = if problems.is_empty() && solved.is_err() { self.full(fill) } else { None };
+        match full.map_or(solved, Ok) {
+            Ok(data) if problems.is_empty() => Ok(self.described(data)),
             Ok(_) => Err(Problems(problems)),
             Err(more) => {
                 problems.extend(more.0);
@@ -389,21 +462,27 @@ impl Tank {
             Geometry::Revolution { contour, .. } => contour.bottom(),
             Geometry::Box { .. } => 0.0,
         };
-        let mut data =
+        let data =
             ModalData::new(self.kind(), self.density, 0.0, 0.0, bottom, [0.0; 3], Vec::new());
+        self.described(data)
+    }
+
+    /// With what the tank knows of itself: its name, and where its lowest point is.
+    fn described(&self, mut data: ModalData) -> ModalData {
         data.name.clone_from(&self.name);
+        if let Geometry::Revolution { contour, shape: None } = &self.geometry {
+            data.z_lowest = contour.bottom();
+        }
         data
     }
 
     /// The full closed tank: no free surface and no modes; none if `fill` is not that.
-    pub(crate) fn full(&self, fill: f64) -> Option<ModalData> {
+    fn full(&self, fill: f64) -> Option<ModalData> {
         let Geometry::Revolution { contour, .. } = &self.geometry else { return None };
         if (fill / contour.depth() - 1.0).abs() > 1e-9 {
             return None;
         }
-        let mut data = modal::solve(contour.closed()?, self.density, fill, 0).ok()?;
-        data.name.clone_from(&self.name);
-        Some(data)
+        modal::solve(contour.closed()?, self.density, fill, 0).ok()
     }
 }
 

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, bail, ensure};
 use host::output::atomically;
 use hubslosh_tank::parameters::{Liquid, ParameterSet, Target};
-use hubslosh_tank::{ModalData, Tank, picture, sweep, table};
+use hubslosh_tank::{Fill, ModalData, Tank, picture, sweep, table};
 
 /// Modal parameters of a tank: from a drawing and a fill to slosh masses, pendulum lengths, hinge
 /// heights, the rigid liquid and the error of all of them.
@@ -16,8 +16,8 @@ use hubslosh_tank::{ModalData, Tank, picture, sweep, table};
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  \
     hubslosh tank harness/tank/examples/capsule.toml --fill 1.2\n  \
-    hubslosh tank tank.toml --fill 1.2 --modes 3 --out result.json --picture tank.svg\n  \
-    hubslosh tank tank.toml --sweep 0.2,0.4,0.6,0.8 --out sweep.csv --picture sweep.svg\n  \
+    hubslosh tank tank.toml --fill 60% --modes 3 --out result.json --picture tank.svg\n  \
+    hubslosh tank tank.toml --sweep 20%,40%,60%,80% --out sweep.csv --picture sweep.svg\n  \
     hubslosh tank tank.toml --fill 1.2 --modes 3 --nu 1e-6 --parameters tank-1.2.toml\n  \
     hubslosh tank tank.toml --fill 1.2 --gravity 0.001 --sigma 0.013 --contact-angle 5 --parameters coast.toml\n  \
     hubslosh run --set-file tank-1.2.toml --profile exp-sweep:amplitude=0.1 --out sweep.parquet\n\n\
@@ -26,16 +26,21 @@ pub struct TankArgs {
     /// The tank: density, and contour or box.
     #[arg(value_name = "TANK.toml")]
     tank: PathBuf,
-    /// Height of the free surface above the tank's lowest point, m.
-    #[arg(long, value_name = "METRES", required_unless_present = "sweep")]
-    fill: Option<f64>,
-    /// Several fills, m: a table of them (CSV).
-    #[arg(long, value_name = "METRES,…", value_delimiter = ',', conflicts_with = "fill")]
-    sweep: Vec<f64>,
+    /// Height of the free surface above the tank's lowest point, m; or, with a % sign, per cent of the tank's volume
+    /// (of a tank that is open at the top up to the end of its wall). A full tank has no free surface and no modes.
+    #[arg(long, value_name = "METRES|PERCENT%", required_unless_present_any = ["sweep", "fill_mass"])]
+    fill: Option<Fill>,
+    /// In place of --fill: mass of the liquid, kg, at the tank's density.
+    #[arg(long, value_name = "KG", conflicts_with = "fill")]
+    fill_mass: Option<f64>,
+    /// Several fills, m or %: a table of them (CSV).
+    #[arg(long, value_name = "METRES|PERCENT%,…", value_delimiter = ',', conflicts_with_all = ["fill", "fill_mass"])]
+    sweep: Vec<Fill>,
     /// How many lateral modes, 1 to 20.
     #[arg(long, value_name = "NUMBER", default_value_t = 5)]
     modes: usize,
-    /// Acceleration along the tank's axis for the frequencies in table and picture, m/s2.
+    /// Acceleration along the tank's axis for the frequencies in table and picture, m/s2. At 0 they are 0: only
+    /// capillarity (--sigma) brings the liquid back.
     #[arg(long, value_name = "NUMBER", default_value_t = 9.80665)]
     gravity: f64,
     /// Where to put the result, JSON (of --sweep CSV).
@@ -65,6 +70,9 @@ pub struct TankArgs {
     /// then that of the meniscus that --gravity and --sigma make. 90 is a flat surface.
     #[arg(long, value_name = "DEGREES", default_value_t = 90.0, requires = "sigma")]
     contact_angle: f64,
+    /// Write --parameters although a centring stiffness is far outside of what its formula holds for.
+    #[arg(long, requires = "parameters")]
+    force: bool,
 }
 
 /// The FMUs that take a tank's parameters.
@@ -82,8 +90,8 @@ impl TankArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
         ensure!(
-            self.gravity.is_finite() && self.gravity > 0.0,
-            "--gravity {} (allowed: greater than 0, finite)",
+            self.gravity.is_finite() && self.gravity >= 0.0,
+            "--gravity {} (allowed: 0 or more, finite)",
             self.gravity
         );
         for (flag, value) in [("--nu", self.nu), ("--sigma", self.sigma)] {
@@ -106,8 +114,9 @@ impl TankArgs {
         let read = || self.tank.display().to_string();
         let tank = Tank::read(&self.tank).with_context(read)?;
         let mut parameters = None;
-        let (text, picture, as_table) = match self.fill {
+        let (text, picture, as_table) = match self.fill.or(self.fill_mass.map(Fill::Mass)) {
             Some(fill) => {
+                let fill = tank.height_of(fill).with_context(read)?;
                 let data = tank.solve(fill, self.modes).with_context(read)?;
                 parameters = self.set_file(&tank, &data)?;
                 let json = serde_json::to_string_pretty(&data)? + "\n";
@@ -115,7 +124,10 @@ impl TankArgs {
                 (json, drawn, table(&data, self.gravity))
             }
             None => {
-                let swept = sweep::sweep(&tank, &self.sweep, self.modes).with_context(read)?;
+                let fills: Result<Vec<f64>, _> =
+                    self.sweep.iter().map(|fill| tank.height_of(*fill)).collect();
+                let swept = sweep::sweep(&tank, &fills.with_context(read)?, self.modes)
+                    .with_context(read)?;
                 let csv = swept.to_csv();
                 (csv.clone(), picture::sweep(&tank, &swept, self.gravity), csv)
             }
@@ -142,8 +154,8 @@ impl TankArgs {
     fn set_file(&self, tank: &Tank, data: &ModalData) -> Result<Option<(PathBuf, String)>> {
         let Some(path) = &self.parameters else { return Ok(None) };
         ensure!(
-            self.gravity >= 1e-9,
-            "--gravity {:e}: for --parameters 1e-9 or more, which the FMUs take as g_ref",
+            self.gravity == 0.0 || self.gravity >= 1e-9,
+            "--gravity {:e}: for --parameters 0, or 1e-9 or more, which the FMUs take as g_ref",
             self.gravity
         );
         let target = match self.model {
@@ -162,6 +174,12 @@ impl TankArgs {
         for warning in &set.warnings {
             eprintln!("warning: {warning}");
         }
+        ensure!(
+            self.force || set.unknown.is_empty(),
+            "--parameters {}: {} (--force writes the file nevertheless, without --sigma k is 0)",
+            path.display(),
+            set.unknown.join("; ")
+        );
         let text = match path.extension().and_then(|ending| ending.to_str()) {
             Some("toml") => set.to_toml(),
             Some("ssv") => set.to_ssv(),

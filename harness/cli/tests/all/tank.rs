@@ -194,6 +194,85 @@ fn a_curved_meniscus_reaches_the_fmu_and_what_it_cannot_take_is_told() {
     }
 }
 
+/// Half a sphere of 1 m is its volume's half and 2094.395 kg of water; --sweep takes both, too.
+#[test]
+fn a_fill_is_given_in_metres_in_per_cent_or_by_mass() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("sphere.toml");
+    std::fs::write(&file, "density = 1000\nshape = { sphere = { radius = 1 } }\n").unwrap();
+    let file = file.to_str().unwrap();
+    let (ok, metres, error) = tank(&[file, "--fill=1"]);
+    assert!(ok && metres.contains("fill 1 m, density"), "{metres}{error}");
+    for fill in ["--fill=50%", "--fill-mass=2094.3951023931954"] {
+        let (ok, same, error) = tank(&[file, fill]);
+        assert!(ok && same == metres, "{fill}: {same}{error}");
+    }
+    let (ok, swept, error) = tank(&[file, "--sweep=0.5,50%,100%"]);
+    assert!(ok && swept.lines().count() == 4, "{swept}{error}");
+    let (ok, full, error) = tank(&[file, "--fill=2.0"]);
+    assert!(ok && full.contains("none: the tank is full and does not slosh"), "{full}{error}");
+    for (arguments, words) in [
+        (&["--fill=120%"][..], "0 to 100 %"),
+        (&["--fill=0%"], "must be above 0"),
+        (&["--fill=60 percent"], "neither a height in m (1.2) nor per cent"),
+        (&["--fill-mass=5000"], "more than the tank holds: 4188.790205 kg"),
+        (&["--fill=1", "--fill-mass=5000"], "cannot be used with"),
+        (&[], "--fill"),
+    ] {
+        let (ok, _, said) = tank(&[&[file], arguments].concat());
+        assert!(!ok && said.contains(words), "{said}");
+    }
+}
+
+/// Without gravity the table's frequencies are 0; a file holds what capillarity leaves, and no damping ratio, which
+/// would hold at no specific force.
+#[test]
+fn at_no_gravity_only_capillarity_is_left() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    let text = "density = 1000\nshape = { cylinder = { radius = 0.1, height = 3 } }\n";
+    std::fs::write(path("tank.toml"), text).unwrap();
+    let (file, set) = (path("tank.toml"), path("set.toml"));
+    let base = [&file[..], "--fill=2", "--gravity=0"];
+    let (ok, said, error) = tank(&base);
+    assert!(ok && said.contains("only capillarity brings the liquid back"), "{said}{error}");
+    assert!(!said.contains("NaN") && !said.contains("inf"), "{said}");
+    let (ok, _, said) = tank(&[&base[..], &["--parameters", &set]].concat());
+    assert!(ok && said.contains("nothing centres the liquid at 0 m/s2"), "{said}");
+    let (ok, _, said) = tank(&[&base[..], &["--parameters", &set, "--sigma=0.072"]].concat());
+    assert!(ok, "{said}");
+    let written = std::fs::read_to_string(&set).unwrap();
+    let k = written.lines().find_map(|l| l.strip_prefix("\"slosh.table.k[1]\" = ")).unwrap();
+    assert!(k.parse::<f64>().unwrap() > 0.0 && !written.contains("g_ref"), "{written}");
+    for (more, words) in [
+        (&["--parameters", &set, "--nu=1e-6"][..], "damping ratio holds at a specific force"),
+        (&["--gravity=-1"], "--gravity -1 (allowed: 0 or more"),
+    ] {
+        let given: Vec<&str> = base[..2].iter().chain(more).copied().collect();
+        let given = if words.starts_with("--") { given } else { [&given[..], &base[2..]].concat() };
+        let (ok, _, said) = tank(&given);
+        assert!(!ok && said.contains(words), "{said}");
+    }
+}
+
+/// In a sphere of 1 m at 1e-6 m/s2 the first order in capillarity is a multiple of what it corrects.
+#[test]
+fn a_stiffness_far_outside_of_its_formula_is_written_with_force_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_string();
+    std::fs::write(path("a.toml"), "density = 1000\nshape = { sphere = { radius = 1 } }\n")
+        .unwrap();
+    let (file, set) = (path("a.toml"), path("set.toml"));
+    let given = [&file, "--fill=1", "--gravity=1e-6", "--sigma=0.072", "--parameters", &set]
+        .map(|s| &s[..]);
+    let (ok, _, said) = tank(&given);
+    assert!(!ok && said.contains("k of mode 1 is not known: it adds"), "{said}");
+    assert!(said.contains("--force") && !std::fs::exists(&set).unwrap(), "{said}");
+    let (ok, _, said) = tank(&[&given[..], &["--force"]].concat());
+    assert!(ok && said.contains("too much for the first order"), "{said}");
+    assert!(std::fs::read_to_string(&set).unwrap().contains("# warning: capillarity: it adds"));
+}
+
 #[test]
 fn set_files_that_are_none_are_refused_in_a_sentence() {
     let folder = tempfile::tempdir().unwrap();

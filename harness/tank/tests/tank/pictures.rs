@@ -5,6 +5,18 @@ use std::path::Path;
 use hubslosh_tank::sweep::sweep;
 use hubslosh_tank::{Tank, picture, table};
 
+/// An axis has some length where all its values are the same: frequencies without gravity, hinges at a sphere's centre.
+#[test]
+fn a_sweep_whose_values_are_all_the_same_can_be_drawn() {
+    let text = "density = 1.0\nprofile = [{ arc = [0, 0, 1, -90, 90] }]";
+    let tank = Tank::parse(text, Path::new("")).unwrap();
+    let swept = sweep(&tank, &[0.5, 1.0, 2.0], 2).unwrap();
+    let svg = picture::sweep(&tank, &swept, 0.0);
+    assert!(!svg.contains("NaN") && !svg.contains("inf"));
+    // ticks of 0.1 and 0.2 over a width of 1
+    assert!(svg.matches("<text").count() < 80, "{}", svg.matches("<text").count());
+}
+
 /// Every example: well-formed XML without anything that is not a number, the table with every mode.
 #[test]
 fn examples_can_be_drawn_and_tabulated() {
