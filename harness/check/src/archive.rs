@@ -85,6 +85,7 @@ impl Archive {
             let (name, method) =
                 (String::from_utf8_lossy(entry.name_raw()).into_owned(), entry.compression());
             let (encrypted, link) = (entry.encrypted(), entry.is_symlink());
+            let written = entry.size();
             let mut content = Vec::new();
             let most = LARGEST.min(left);
             let unpacked = entry
@@ -97,6 +98,10 @@ impl Archive {
                 Ok(size) if size as u64 > LARGEST => Err("it unpacks to more than 1 GiB".into()),
                 Ok(size) if size as u64 > left => {
                     Err("with it the archive unpacks to more than 2 GiB".into())
+                }
+                Ok(size) if size as u64 != written => {
+                    left -= size as u64;
+                    Err(format!("it unpacks to {size} bytes, its headers say {written}"))
                 }
                 Ok(size) => {
                     left -= size as u64;

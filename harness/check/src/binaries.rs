@@ -17,6 +17,38 @@ pub const PLATFORMS: [(&str, &str, Option<Kind>); 7] = [
     ("aarch64-linux", ".so", Some(Kind::LinuxArm)),
 ];
 
+/// Architectures of the platform tuples of FMI 3.0 (section 2.5.1.4.1), which FMI 2.0.4 takes over for
+/// all platforms but those with 32 and 64.
+const ARCHITECTURES: [&str; 8] =
+    ["aarch32", "aarch64", "riscv32", "riscv64", "x86", "x86_64", "ppc32", "ppc64"];
+
+/// The ending of the binary in a folder, and what can be read of it here; none of a folder that a
+/// vendor has named.
+fn platform(folder: &str) -> Option<(&'static str, Option<Kind>)> {
+    if let Some((_, ending, kind)) = PLATFORMS.iter().find(|(known, ..)| *known == folder) {
+        return Some((ending, *kind));
+    }
+    // arch-sys or arch-sys-abi
+    let mut parts = folder.splitn(3, '-');
+    let (architecture, system) = (parts.next()?, parts.next()?);
+    if !ARCHITECTURES.contains(&architecture) {
+        return None;
+    }
+    let kind = match (architecture, system) {
+        ("x86_64", "linux") => Some(Kind::Linux),
+        ("aarch64", "linux") => Some(Kind::LinuxArm),
+        ("x86_64", "windows") => Some(Kind::Windows),
+        ("x86_64" | "aarch64", "darwin") => Some(Kind::MacOs),
+        _ => None,
+    };
+    match system {
+        "windows" => Some((".dll", kind)),
+        "linux" => Some((".so", kind)),
+        "darwin" => Some((".dylib", kind)),
+        _ => None,
+    }
+}
+
 /// An interface that the description declares, and what its binary must be.
 struct Declared {
     /// The element, ModelExchange or CoSimulation.
@@ -31,7 +63,7 @@ struct Placed {
     name: String,
     /// Its name without the ending.
     identifier: String,
-    folder: &'static str,
+    folder: String,
     kind: Option<Kind>,
     binary: Result<Binary, String>,
 }
@@ -40,8 +72,8 @@ struct Placed {
 pub struct Binaries {
     /// Those where hosts look for them.
     placed: Vec<Placed>,
-    /// Folders under `binaries/`, without repetition.
-    folders: Vec<String>,
+    /// Those of the model's name in folders that vendors have named.
+    of_vendors: usize,
     /// Files in folders of FMI 2.0 that no host will find, each with the names it looks for.
     elsewhere: Vec<(String, String)>,
     /// The interfaces that are declared and name a binary.
@@ -75,7 +107,7 @@ impl Binaries {
         let identifiers: Vec<String> = identifiers.into_iter().map(str::to_string).collect();
         let mut all = Binaries {
             placed: Vec::new(),
-            folders: Vec::new(),
+            of_vendors: 0,
             elsewhere: Vec::new(),
             declared,
             has_sources: archive.below("sources/").next().is_some(),
@@ -84,12 +116,12 @@ impl Binaries {
         for name in archive.below("binaries/") {
             let parts: Vec<&str> = name.split('/').collect();
             let [_, folder, file] = parts[..] else { continue };
-            if !all.folders.iter().any(|known| known == folder) {
-                all.folders.push(folder.to_string());
-            }
-            let Some((folder, ending, kind)) =
-                PLATFORMS.into_iter().find(|(known, ..)| *known == folder)
-            else {
+            let Some((ending, kind)) = platform(folder) else {
+                let stem = file.rsplit_once('.').map_or(file, |(stem, _)| stem);
+                // that of a standard folder in other capitals is no name of a vendor
+                let is_vendors = platform(&folder.to_lowercase()).is_none();
+                let is_named = identifiers.iter().any(|name| name == stem);
+                all.of_vendors += usize::from(is_vendors && is_named);
                 continue;
             };
             let names: Vec<String> =
@@ -98,6 +130,7 @@ impl Binaries {
                 let bytes = archive.file(name).unwrap_or_default();
                 let binary = Binary::read(bytes).map_err(|error| format!("{error:#}"));
                 let identifier = identifiers[n].clone();
+                let folder = folder.to_string();
                 all.placed.push(Placed { name: name.into(), identifier, folder, kind, binary });
             } else if file.ends_with(ending) {
                 all.elsewhere.push((name.into(), names.join(", ")));
@@ -132,33 +165,27 @@ pub fn present(binaries: &Binaries, findings: &mut Findings) {
     if !binaries.described {
         return findings.skip("without a description nobody knows what the binary is called");
     }
-    for folder in &binaries.folders {
-        let known: Vec<_> = PLATFORMS.iter().map(|(known, ..)| *known).collect();
-        if !known.contains(&folder.as_str()) {
-            let known = known.join(", ");
-            findings.add(
-                format!("binaries/{folder}"),
-                format!("FMI 2.0 has no such platform (allowed: {known})"),
-            );
-        }
-    }
-    if binaries.placed.is_empty() && !binaries.has_sources {
+    if binaries.placed.is_empty() && binaries.of_vendors == 0 && !binaries.has_sources {
+        let known = PLATFORMS.map(|(known, ..)| known).join(", ");
         findings.add(
             "binaries/",
-            "no platform has a binary of the model's name, and there are no sources",
+            format!(
+                "no platform has a binary of the model's name, and there are no sources (platforms: \
+                 {known}, other platform tuples, names of vendors)"
+            ),
         );
     }
 }
 
 /// `bin.each_interface`
 pub fn each_interface(binaries: &Binaries, findings: &mut Findings) {
-    let mut folders: Vec<&str> = binaries.placed.iter().map(|p| p.folder).collect();
+    let mut folders: Vec<&str> = binaries.placed.iter().map(|p| p.folder.as_str()).collect();
     folders.dedup();
     if folders.is_empty() {
         findings.skip("no platform has a binary of the model's name");
     }
     for folder in folders {
-        let ending = PLATFORMS.iter().find(|(known, ..)| *known == folder).map_or("", |p| p.1);
+        let ending = platform(folder).map_or("", |(ending, _)| ending);
         for Declared { interface, identifier, .. } in &binaries.declared {
             let mut here = binaries.placed.iter().filter(|p| p.folder == folder);
             if !here.any(|p| p.identifier == *identifier) {
@@ -260,4 +287,26 @@ pub fn system(binaries: &Binaries, findings: &mut Findings) {
             findings.add(name, fault);
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folders_are_platforms_tuples_or_a_vendors_own() {
+        for (folder, ending, kind) in [
+            ("linux64", ".so", Some(Kind::Linux)),
+            ("win32", ".dll", None),
+            ("aarch64-linux-gnu", ".so", Some(Kind::LinuxArm)),
+            ("aarch64-darwin", ".dylib", Some(Kind::MacOs)),
+            ("x86_64-windows-msvc143", ".dll", Some(Kind::Windows)),
+            ("aarch32-linux-gnueabihf", ".so", None),
+        ] {
+            assert_eq!(platform(folder), Some((ending, kind)), "{folder}");
+        }
+        for vendors in ["VisualStudio8", "gcc4", "arm-linux-gnueabihf", "linux-64", "x86_64"] {
+            assert_eq!(platform(vendors), None, "{vendors}");
+        }
+    }
 }

@@ -260,7 +260,7 @@ fn watch(
 }
 
 /// Another value of a known, by about `share` of its size.
-fn elsewhere(fmu: &FmuUnderTest, v: &Variable, now: &Reading, share: f64) -> Option<Reading> {
+pub fn elsewhere(fmu: &FmuUnderTest, v: &Variable, now: &Reading, share: f64) -> Option<Reading> {
     let Reading::Real(x) = now else { return super::values::other_value(fmu, v, now) };
     let (min, max) = v.bounds();
     let step = share * x.abs().max(0.1 * v.nominal().min(max.abs()));

@@ -149,6 +149,12 @@ impl Description {
         })
     }
 
+    /// The version of FMI, 1.0 or 3.0, that it is of in place of 2.0.
+    pub fn other_version(&self) -> Option<&str> {
+        let version = self.root.get("fmiVersion").map(str::trim);
+        version.filter(|version| version.starts_with("1.") || version.starts_with("3."))
+    }
+
     /// The variable at a place counted from 1.
     pub fn at(&self, index: usize) -> Option<&Variable> {
         self.variables.get(index.checked_sub(1)?)
@@ -250,6 +256,14 @@ pub fn well_formed(archive: &super::Archive, findings: &mut Findings) {
 
 /// `xml.fmi_version`
 pub fn fmi_version(d: &Description, findings: &mut Findings) {
+    if let Some(other) = d.other_version() {
+        return findings.add(
+            "fmiVersion",
+            format!(
+                "\"{other}\": it is no FMU 2.0, and no other rule is looked at (allowed: \"2.0\")"
+            ),
+        );
+    }
     match d.root.get("fmiVersion") {
         Some("2.0") => {}
         Some(other) => findings.add("fmiVersion", format!("\"{other}\" (allowed: \"2.0\")")),

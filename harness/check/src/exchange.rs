@@ -8,7 +8,10 @@ use super::life::expect_refusal;
 use super::under_test::{FmuUnderTest, Interface, Reading, STEPS, Session};
 
 /// An instance in continuous-time mode, or the reason why there is none.
-fn continuous<'f>(fmu: &'f FmuUnderTest, findings: &mut Findings) -> Result<Option<Session<'f>>> {
+pub fn continuous<'f>(
+    fmu: &'f FmuUnderTest,
+    findings: &mut Findings,
+) -> Result<Option<Session<'f>>> {
     if !fmu.interfaces().contains(&Interface::ModelExchange) {
         findings.skip("it offers no Model Exchange");
         return Ok(None);
@@ -83,10 +86,15 @@ pub fn vectors(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         let (mut x, mut dx, mut nominals, mut z) =
             (vec![f64::NAN; nx], vec![f64::NAN; nx], vec![f64::NAN; nx], vec![f64::NAN; ni]);
         fmu.doing(format!("the vectors of {nx} states and {ni} event indicators"));
-        session.instance.continuous_states(&mut x)?;
-        session.instance.derivatives(&mut dx)?;
-        session.instance.nominals(&mut nominals)?;
-        session.instance.event_indicators(&mut z)?;
+        // hosts do not ask for what is not there
+        if nx > 0 {
+            session.instance.continuous_states(&mut x)?;
+            session.instance.derivatives(&mut dx)?;
+            session.instance.nominals(&mut nominals)?;
+        }
+        if ni > 0 {
+            session.instance.event_indicators(&mut z)?;
+        }
         for (call, values, above_0) in [
             ("fmi2GetContinuousStates", x, false),
             ("fmi2GetDerivatives", dx, false),

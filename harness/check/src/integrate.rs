@@ -201,7 +201,7 @@ impl Session<'_> {
         Ok(jacobian)
     }
 
-    fn read_states(&mut self, n: usize) -> Result<DVector<f64>> {
+    pub(super) fn read_states(&mut self, n: usize) -> Result<DVector<f64>> {
         let mut x = DVector::zeros(n);
         if n > 0 {
             self.instance.continuous_states(x.as_mut_slice())?;
@@ -209,7 +209,7 @@ impl Session<'_> {
         Ok(x)
     }
 
-    fn read_indicators(&mut self) -> Result<Vec<f64>> {
+    pub(super) fn read_indicators(&mut self) -> Result<Vec<f64>> {
         let mut z = vec![0.0; self.indicators()];
         if !z.is_empty() {
             self.instance.event_indicators(&mut z)?;

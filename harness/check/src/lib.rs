@@ -10,6 +10,7 @@ pub mod arrays;
 pub mod binaries;
 pub mod dependencies;
 pub mod description;
+pub mod events;
 pub mod exchange;
 pub mod integrate;
 pub mod json;
@@ -17,6 +18,7 @@ pub mod junit;
 pub mod kinds;
 pub mod life;
 pub mod log;
+pub mod memory;
 pub mod portable;
 pub mod process;
 pub mod ranges;
@@ -133,6 +135,14 @@ impl Findings {
         }
     }
 
+    /// The rule is bent: a warning, whatever the rule says.
+    pub fn warn(&mut self, place: impl Into<String>, text: impl Into<String>) {
+        self.add(place, text);
+        if let Some(last) = self.list.last_mut() {
+            last.severity = Severity::Warning;
+        }
+    }
+
     /// The rule does not apply.
     pub fn skip(&mut self, why: impl Into<String>) {
         self.skipped = Some(why.into());
@@ -204,10 +214,13 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
     let binaries = Binaries::new(&archive, description.as_ref().ok().copied());
     let directory = archive.unpack()?;
 
-    let selected: Vec<&'static Rule> = RULES
-        .iter()
-        .filter(|rule| options.only.is_empty() || options.only.iter().any(|o| is_selected(rule, o)))
-        .collect();
+    // An FMU of another version of FMI keeps other rules: one tells it.
+    let is_foreign = description.as_ref().is_ok_and(|d| d.other_version().is_some());
+    let is_wanted = |rule: &&'static Rule| match is_foreign {
+        true => rule.id == "xml.fmi_version",
+        false => options.only.is_empty() || options.only.iter().any(|o| is_selected(rule, o)),
+    };
+    let selected: Vec<&'static Rule> = RULES.iter().filter(is_wanted).collect();
     let calls = selected.iter().filter(|rule| matches!(rule.check, Check::Calls(_))).count();
     let callable = match &description {
         Err(why) => Err(why.clone()),

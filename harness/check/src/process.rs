@@ -22,11 +22,22 @@ const HANGS: usize = 3;
 /// Bytes shown of what an FMU prints.
 const PRINTED: usize = 200;
 
+/// What it is if the process ends, or does not end, during what comes next.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub enum Crash {
+    /// An error, whatever the rule.
+    Error,
+    /// As bad as the rule: the standard does not say what such a call does.
+    Open,
+    /// What this rule tells.
+    ToldBy(String),
+}
+
 /// One line of the file.
 #[derive(Serialize, Deserialize)]
 enum Line {
     /// What comes next.
-    Doing(String),
+    Doing(String, Crash),
     /// All that was found; the last line.
     Done(Findings),
 }
@@ -49,9 +60,14 @@ impl Trace {
     }
 
     /// Tells what comes next.
-    pub fn doing(&self, what: &str) {
+    pub fn doing(&self, what: &str, crash: Crash) {
         // Without it a crash is told less well; that is all.
-        let _ = self.write(&Line::Doing(what.into()));
+        let _ = self.write(&Line::Doing(what.into(), crash));
+    }
+
+    /// Tells what was found; nothing comes after it.
+    pub fn done(&self, findings: Findings) -> Result<()> {
+        self.write(&Line::Done(findings))
     }
 }
 
@@ -87,8 +103,7 @@ fn run(
 ) -> Result<bool> {
     let folder = tempfile::tempdir().context("no temporary directory")?;
     let answer = folder.path().join("answer");
-    let printed = folder.path().join("printed");
-    let output = File::create(&printed)?;
+    let (stdout, stderr) = (folder.path().join("stdout"), folder.path().join("stderr"));
     let mut child = Command::new(&options.program)
         .arg(SUBCOMMAND)
         .arg(rule.id)
@@ -97,8 +112,8 @@ fn run(
         .arg(&answer)
         .arg(options.limit.as_secs_f64().to_string())
         .stdin(Stdio::null())
-        .stdout(output.try_clone()?)
-        .stderr(output)
+        .stdout(File::create(&stdout)?)
+        .stderr(File::create(&stderr)?)
         .spawn()
         .with_context(|| format!("{} cannot be run", options.program.display()))?;
     let started = Instant::now();
@@ -115,23 +130,30 @@ fn run(
         std::thread::sleep(Duration::from_millis(2));
     };
     let lines = std::fs::read_to_string(&answer).unwrap_or_default();
-    let mut doing = "loading the binary".to_string();
+    let (mut doing, mut crash) = (LOADING.to_string(), Crash::Error);
     let mut done = None;
     for line in lines.lines() {
         match serde_json::from_str(line) {
-            Ok(Line::Doing(what)) => doing = what,
+            Ok(Line::Doing(what, then)) => (doing, crash) = (what, then),
             Ok(Line::Done(found)) => done = Some(found),
             Err(_) => {} // cut off by the crash
         }
     }
-    let printed = std::fs::read(&printed).unwrap_or_default();
+    let read = |file| std::fs::read(file).unwrap_or_default();
+    let (stdout, stderr) = (read(&stdout), read(&stderr));
     match (done, ended) {
         (Some(found), _) => {
             *findings = found;
-            if rule.id == "host.silent" && !printed.is_empty() {
-                let text = String::from_utf8_lossy(&printed);
-                let start: String = text.chars().take(PRINTED).collect();
-                findings.add("stdout or stderr", format!("it prints {start:?}"));
+            if rule.id == "host.silent" {
+                let start = |bytes| -> String {
+                    String::from_utf8_lossy(bytes).chars().take(PRINTED).collect()
+                };
+                if !stdout.is_empty() {
+                    findings.fail("stdout", format!("it prints {:?}", start(&stdout)));
+                }
+                if !stderr.is_empty() {
+                    findings.add("stderr", format!("it prints {:?}", start(&stderr)));
+                }
             }
         }
         // One rule tells it; the others would say the same.
@@ -139,23 +161,30 @@ fn run(
             findings.skip(format!("the process ended while {doing} ({status})"));
         }
         (None, Some(status)) => {
+            let printed = [stdout, stderr].concat();
             let text = String::from_utf8_lossy(&printed);
             let last = text.lines().rfind(|line| !line.trim().is_empty());
             let last = last.map(|line| format!("; it printed {line:?}")).unwrap_or_default();
-            findings.fail(
-                doing,
-                format!("the process ended ({status}{last}); allowed: every call returns"),
-            );
+            let text = format!("the process ended ({status}{last}); allowed: every call returns");
+            tell_crash(findings, doing, text, crash);
         }
-        (None, None) => findings.fail(
-            doing,
-            format!(
+        (None, None) => {
+            let text = format!(
                 "no end after {:.0} s (allowed: every call returns; --limit gives more time)",
                 options.limit.as_secs_f64()
-            ),
-        ),
+            );
+            tell_crash(findings, doing, text, crash);
+        }
     }
     Ok(ended.is_none())
+}
+
+fn tell_crash(findings: &mut Findings, doing: String, text: String, crash: Crash) {
+    match crash {
+        Crash::Error => findings.fail(doing, text),
+        Crash::Open => findings.add(doing, text),
+        Crash::ToldBy(rule) => findings.skip_for(&rule, format!("{doing}: {text}")),
+    }
 }
 
 /// What the process does first.
@@ -172,7 +201,7 @@ pub fn answer(
     let rule = RULES.iter().find(|rule| rule.id == id).context("no such rule")?;
     let Check::Calls(check) = rule.check else { anyhow::bail!("{id} makes no calls") };
     let trace = Trace(File::create(answer)?);
-    trace.doing(LOADING);
+    trace.doing(LOADING, Crash::Error);
     let mut findings = Findings::new(rule.severity);
     // a rule that is slow, and not hung, shall tell what it has found by then
     let deadline = Instant::now() + limit.mul_f64(0.75);
@@ -190,8 +219,8 @@ pub fn answer(
             }
             fmu.doing("unloading the binary");
             let trace = fmu.close();
-            return trace.write(&Line::Done(findings));
+            return trace.done(findings);
         }
     }
-    Trace(File::options().append(true).open(answer)?).write(&Line::Done(findings))
+    Trace(File::options().append(true).open(answer)?).done(findings)
 }

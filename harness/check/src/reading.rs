@@ -56,6 +56,33 @@ impl Doctype {
     }
 }
 
+/// The encoding that the XML declaration names, if it names one.
+fn encoding(bytes: &[u8]) -> Option<String> {
+    let text = String::from_utf8_lossy(&bytes[..bytes.len().min(1000)]);
+    let declaration = text.trim_start_matches('\u{feff}').strip_prefix("<?xml")?;
+    let (declaration, _) = declaration.split_once("?>")?;
+    let (_, value) = declaration.split_once("encoding")?;
+    let value = value.trim_start().strip_prefix('=')?.trim_start();
+    let quote = value.chars().next().filter(|quote| matches!(quote, '"' | '\''))?;
+    Some(value[1..].split_once(quote)?.0.to_string())
+}
+
+/// `xml.encoding`
+pub fn utf8(archive: &Archive, findings: &mut Findings) {
+    let Some(bytes) = archive.file(NAME) else {
+        return findings.skip("there is no modelDescription.xml that can be unpacked");
+    };
+    match encoding(bytes) {
+        Some(encoding) if encoding.eq_ignore_ascii_case("UTF-8") => {}
+        Some(other) => findings
+            .fail(format!("{NAME}, line 1"), format!("encoding=\"{other}\" (allowed: \"UTF-8\")")),
+        None => findings.warn(
+            format!("{NAME}, line 1"),
+            "no encoding is declared (allowed: <?xml version=\"1.0\" encoding=\"UTF-8\"?>)",
+        ),
+    }
+}
+
 /// `xml.doctype`
 pub fn doctype(archive: &Archive, findings: &mut Findings) {
     let Some(bytes) = archive.file(NAME) else {
@@ -88,6 +115,17 @@ pub fn size(archive: &Archive, findings: &mut Findings) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_encoding_is_that_of_the_declaration() {
+        let found = |text: &str| encoding(text.as_bytes());
+        assert_eq!(found("<?xml version='1.0' encoding = 'ISO-8859-1' ?>").unwrap(), "ISO-8859-1");
+        assert_eq!(found("\u{feff}<?xml encoding=\"UTF-8\"?><a/>").unwrap(), "UTF-8");
+        for none in ["", "<a encoding=\"x\"/>", "<?xml version=\"1.0\"?><a/>", "<?xml encoding=\"x"]
+        {
+            assert_eq!(found(none), None, "{none}");
+        }
+    }
 
     #[test]
     fn a_document_type_declaration_is_found_before_the_root_and_nowhere_else() {

@@ -2,8 +2,9 @@
 
 use super::Severity::{Error, Warning};
 use super::{
-    Check, Rule, Severity, archive, arrays, binaries, dependencies, description, exchange, kinds,
-    life, log, portable, ranges, reading, schema, states, steps, tunable, units, values,
+    Check, Rule, Severity, archive, arrays, binaries, dependencies, description, events, exchange,
+    kinds, life, log, memory, portable, ranges, reading, schema, states, steps, tunable, units,
+    values,
 };
 
 const fn rule(
@@ -21,7 +22,7 @@ use Check::{Archive, Binaries, Calls, Description};
 /// Every rule, group by group.
 #[rustfmt::skip]
 pub static RULES: &[Rule] = &[
-    rule("zip.readable", Error, "the file is a whole zip archive; every file unpacks, checksums and both headers of each agree", "2.3", Archive(archive::readable)),
+    rule("zip.readable", Error, "the file is a whole zip archive; every file unpacks, checksums, sizes and both headers of each agree", "2.3", Archive(archive::readable)),
     rule("zip.methods", Error, "files are stored or deflated, not encrypted", "2.3", Archive(archive::methods)),
     rule("zip.names", Error, "names are relative, with `/` between the parts, and stay inside", "2.3; hosts that unpack on Linux", Archive(archive::names)),
     rule("zip.windows_names", Error, "names can be written on Windows: no devices (CON, NUL, COM1), no quotes, colons, bars, question marks, stars or angle brackets, no full stop or space at the end", "hosts that unpack on Windows", Archive(portable::windows_names)),
@@ -37,11 +38,12 @@ pub static RULES: &[Rule] = &[
     rule("zip.folders", Warning, "only files and folders of FMI 2.0 at the top (and terminalsAndIcons, extra)", "2.3", Archive(archive::folders)),
 
     rule("xml.well_formed", Error, "modelDescription.xml is well-formed XML in UTF-8", "2.2", Archive(description::well_formed)),
+    rule("xml.encoding", Error, "the first line of modelDescription.xml declares UTF-8", "2.2", Archive(reading::utf8)),
     rule("xml.size", Error, "modelDescription.xml has at most 256 levels, 10 million elements, 1000 attributes for each and 512 MiB", "hosts that read the tree by recursion", Archive(reading::size)),
     rule("xml.doctype", Error, "modelDescription.xml has no document type declaration and no entities of its own", "parsers refuse it, expand entities without bound or open other files", Archive(reading::doctype)),
     rule("xml.schema", Error, "elements and attributes are those of the schema, in its order, none missing", "2.2, fmi2ModelDescription.xsd", Description(schema::structure)),
     rule("xml.values", Error, "attributes are written as the schema says: whole numbers (exponents of BaseUnit too), decimal points, known words", "2.2, fmi2ModelDescription.xsd", Description(schema::values)),
-    rule("xml.fmi_version", Error, "fmiVersion is exactly 2.0", "2.2.1", Description(description::fmi_version)),
+    rule("xml.fmi_version", Error, "fmiVersion is exactly 2.0; on an FMU of FMI 1.0 or 3.0 no other rule is looked at", "2.2.1", Description(description::fmi_version)),
     rule("xml.guid", Error, "there is a GUID", "2.2.1", Description(description::guid)),
     rule("xml.date", Warning, "generationDateAndTime is in UTC, like 2026-01-31T12:00:00Z", "2.2.1", Description(description::date)),
     rule("xml.interfaces", Error, "ModelExchange or CoSimulation is there", "2.2.1", Description(description::interfaces)),
@@ -79,7 +81,7 @@ pub static RULES: &[Rule] = &[
     rule("xml.dependencies_known", Warning, "dependencies are on inputs and states; of initial unknowns on inputs and what has initial=exact", "2.2.8", Description(description::dependencies_known)),
     rule("xml.dependencies_written", Warning, "every output says what it depends on", "Simulink and OMSimulator see algebraic loops else", Description(description::dependencies_written)),
 
-    rule("bin.present", Error, "there is a binary of the model's name for a platform of FMI 2.0, or sources", "2.3", Binaries(binaries::present)),
+    rule("bin.present", Error, "there is a binary of the model's name for a platform of FMI 2.0, for a platform tuple (aarch64-linux) or in a vendor's folder, or sources", "2.3", Binaries(binaries::present)),
     rule("bin.each_interface", Error, "on every platform each interface has the binary that its modelIdentifier names", "2.3, 3.3.1, 4.3.1", Binaries(binaries::each_interface)),
     rule("bin.this_platform", Warning, "there is a binary for the platform of the check; without it no calls are made", "what is not called is not checked", Binaries(binaries::this_platform)),
     rule("bin.name", Error, "binaries are called modelIdentifier and the platform's ending", "2.3", Binaries(binaries::name)),
@@ -95,11 +97,12 @@ pub static RULES: &[Rule] = &[
     rule("load.initialises", Error, "an instance initialises with the declared start values", "2.1.6", Calls(life::initialises)),
     rule("load.again", Error, "copies of the binary, loaded, unloaded and loaded again, run alike", "hosts that reload a model", Calls(life::again)),
 
-    rule("instantiate.guid", Error, "another GUID, or none, is refused with NULL and a message", "2.1.5", Calls(life::guid)),
-    rule("instantiate.arguments", Warning, "a missing resource location is fine, a missing name is refused with a message", "2.1.5; hosts that pass NULL", Calls(life::arguments_null)),
+    rule("instantiate.guid", Error, "another GUID is refused with NULL and a message", "2.1.5", Calls(life::guid)),
+    rule("instantiate.arguments", Warning, "a missing resource location is fine, a missing name or GUID is refused with a message", "2.1.5; hosts that pass NULL", Calls(life::arguments_null)),
     rule("instantiate.callbacks", Warning, "memory functions may be NULL if canNotUseMemoryManagementFunctions is declared; without a logger nothing crashes", "2.1.5, 3.3.1, 4.3.1", Calls(life::callbacks)),
     rule("instantiate.copies", Error, "the callbacks' struct may go after fmi2Instantiate", "2.1.5, clarified in 2.0.5", Calls(life::copies)),
-    rule("instantiate.null", Warning, "fmi2FreeInstance(NULL) does nothing, other calls with NULL return fmi2Error", "2.1.5; hosts that clean up after errors", Calls(life::null)),
+    rule("instantiate.free_null", Error, "fmi2FreeInstance(NULL) does nothing", "2.1.5", Calls(life::free_null)),
+    rule("instantiate.null", Warning, "calls other than fmi2FreeInstance with the instance NULL return fmi2Error", "hosts that clean up after errors", Calls(life::null)),
 
     rule("life.instances", Error, "instances in turn do what they do alone", "2.1.5", Calls(life::instances)),
     rule("life.deterministic", Error, "the same run gives the same bits", "hosts that compare with a reference", Calls(life::deterministic)),
@@ -108,8 +111,9 @@ pub static RULES: &[Rule] = &[
     rule("life.terminate", Error, "fmi2Terminate returns fmi2OK, and values can be read after it", "2.1.6, 4.2.4", Calls(life::terminate)),
     rule("life.order", Warning, "calls in the wrong state return fmi2Error and say so", "3.2.3, 4.2.4", Calls(life::order)),
 
-    rule("host.silent", Warning, "nothing is printed; the logger is there for that", "hosts that read their own stdout", Calls(life::silent)),
+    rule("host.silent", Warning, "nothing is printed, to stdout above all, where it is an error; the logger is there for that", "2.1.5; hosts that read their own stdout", Calls(life::silent)),
     rule("host.untouched", Error, "floating-point control, locale, signal handlers, working directory, environment, threads and open files stay as they were", "the host's other models", Calls(life::untouched)),
+    rule("host.memory", Error, "fmi2FreeInstance and fmi2FreeFMUstate give back all memory; steps take less than 1 kB each", "2.1.5, 2.1.8; the host's memory", Calls(memory::memory)),
     rule("host.arrays", Error, "nothing is written beside an array that a call is given, nor into one that is only read", "2.1.7: the length is in the call; the host's memory", Calls(arrays::arrays)),
 
     rule("log.percent", Error, "percent signs arrive as they are: the text is no format", "2.1.5; five exporters get it wrong, hosts crash", Calls(log::percent)),
@@ -118,14 +122,14 @@ pub static RULES: &[Rule] = &[
     rule("log.quiet", Warning, "an ordinary run logs nothing", "OMSimulator switches logging on for everybody", Calls(log::quiet)),
     rule("log.switch", Error, "fmi2SetDebugLogging takes no categories, for all, and each declared one", "2.1.5", Calls(log::switch)),
 
-    rule("values.start", Error, "start values are the binary's, before and after initialisation", "2.2.7; Simulink writes those of the XML", Calls(values::start)),
+    rule("values.start", Error, "start values are the binary's to 15 digits, before and after initialisation", "2.2.7; Simulink writes those of the XML", Calls(values::start)),
     rule("values.readable", Error, "every variable can be read, one at a time, from initialization mode on, and is finite", "2.1.7, 4.2.4", Calls(values::readable)),
-    rule("values.booleans", Warning, "Booleans read as 0 and 1; all but 0 is true", "2.1.7", Calls(values::booleans)),
+    rule("values.booleans", Warning, "Booleans read as 0 and 1, anything else is an error; all but 0 is true", "2.1.2, 2.1.7", Calls(values::booleans)),
     rule("values.round_trip", Error, "what is set can be read again; start values can be set when instantiated", "2.1.7, 4.2.4", Calls(values::round_trip)),
     rule("values.nothing", Error, "no variables and NULL pointers are fine", "2.1.7; hosts with empty lists", Calls(values::nothing)),
     rule("values.unknown", Error, "unknown value references are refused with a message", "2.1.7", Calls(values::unknown)),
     rule("values.wrong_type", Error, "value references of another type are refused with a message", "2.1.7", Calls(values::wrong_type)),
-    rule("values.fixed", Warning, "fixed parameters are refused after initialisation", "2.2.7, 4.2.4", Calls(values::fixed)),
+    rule("values.fixed", Warning, "fixed parameters are refused after initialisation; where the binary takes some and refuses others, those that it takes are tunable, and that is an error", "2.2.7, 4.2.4", Calls(values::fixed)),
     rule("values.computed", Warning, "what is calculated cannot be set", "2.1.7, 2.2.7", Calls(values::computed)),
     rule("values.limits", Warning, "min and max are accepted, values beyond them refused by the end of initialisation", "2.2.7", Calls(values::limits)),
     rule("values.limits_exact", Warning, "a value just outside min or max is refused where one far outside is: the binary has no wider range", "2.2.7", Calls(ranges::limits_exact)),
@@ -147,7 +151,8 @@ pub static RULES: &[Rule] = &[
     rule("steps.cut", Warning, "results do not depend on the choice of communication step, within the tolerance", "4.3.1, canHandleVariableCommunicationStepSize", Calls(steps::cut)),
     rule("steps.small", Error, "many small steps (0.4 ms, 10 us) lead where few usual ones do", "4.3.1, canHandleVariableCommunicationStepSize", Calls(steps::small)),
     rule("steps.inputs", Warning, "inputs that are NaN are refused; derivatives of inputs are taken if declared", "4.2.1", Calls(steps::inputs)),
-    rule("steps.output_derivatives", Warning, "derivatives of outputs are those of the outputs", "4.2.1, maxOutputDerivativeOrder", Calls(steps::output_derivatives)),
+    rule("steps.input_derivatives", Error, "derivatives of inputs act on the step", "4.3.1, canInterpolateInputs", Calls(steps::input_derivatives)),
+    rule("steps.output_derivatives", Warning, "derivatives of outputs are those of the outputs; a wrong sign is an error", "4.2.1, maxOutputDerivativeOrder", Calls(steps::output_derivatives)),
     rule("steps.output_derivative_order", Error, "derivatives of outputs are there up to maxOutputDerivativeOrder", "4.2.1, 4.3.1", Calls(steps::output_derivative_order)),
 
     rule("states.rollback", Error, "after a state is set again, values and steps are the same to the last bit", "2.1.8", Calls(states::rollback)),
@@ -164,6 +169,9 @@ pub static RULES: &[Rule] = &[
 
     rule("exchange.run", Error, "the states can be integrated, by an adaptive and if need be implicit method, and stay finite", "3.2.2", Calls(exchange::run)),
     rule("exchange.event_iteration", Error, "newDiscreteStatesNeeded becomes false: an event iteration ends within 100 calls", "3.2.2", Calls(exchange::event_iteration)),
+    rule("exchange.events", Error, "event mode changes nothing where no event indicator has changed its sign, no time event is due and fmi2CompletedIntegratorStep has not asked for it", "3.1.1, 3.2.2; hosts miss the event", Calls(events::told)),
+    rule("exchange.values_changed", Error, "valuesOfContinuousStatesChanged is true where an event changes a state", "3.2.2; hosts go on from their own states", Calls(events::values_changed)),
+    rule("exchange.nominals", Warning, "nominals of states are those of modelDescription.xml", "2.2.7, 3.2.2; hosts take the one or the other for their tolerance", Calls(events::nominals)),
     rule("exchange.next_event_time", Error, "nextEventTime is not in the past", "3.2.2", Calls(exchange::next_event_time)),
     rule("exchange.terminate_simulation", Warning, "the FMU does not ask for the end of the simulation before the suggested one; at the first event or step that is an error", "3.2.2", Calls(exchange::terminate_simulation)),
     rule("exchange.vectors", Error, "states, derivatives and indicators are finite, nominals above 0", "3.2.2", Calls(exchange::vectors)),

@@ -3,6 +3,7 @@
 use anyhow::Result;
 
 use super::Findings;
+use super::dependencies::elsewhere;
 use super::description::Variable;
 use super::life::expect_refusal;
 use super::under_test::{FmuUnderTest, Interface, Reading, STEPS, Session, Unusable};
@@ -71,15 +72,19 @@ pub fn run(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 
 /// `steps.size`
 pub fn size(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    for h in [0.0, -0.01, f64::NAN, f64::INFINITY] {
+    for h in [0.0, -0.01, f64::INFINITY, f64::NAN] {
         // After an error an FMU may refuse everything: a new instance each time.
         let Some(mut session) = able(fmu, findings)? else { return Ok(()) };
         session.advance(3)?;
         let before = session.readings()?;
         let place = format!("fmi2DoStep with communicationStepSize = {h:?}");
-        fmu.doing(&place);
         let time = session.time;
-        let answer = session.instance.do_step(time, h);
+        let answer = if h.is_finite() {
+            fmu.doing(&place);
+            session.instance.do_step(time, h)
+        } else {
+            fmu.left_open(&place, findings, || session.instance.do_step(time, h))?
+        };
         let is_refused = answer.is_err();
         expect_refusal(findings, place.clone(), answer);
         if is_refused
@@ -99,8 +104,8 @@ pub fn point(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         session.advance(3)?;
         let wrong = session.time + off * session.step;
         let place = format!("fmi2DoStep from {wrong:?} s, {:?} s being reached", session.time);
-        fmu.doing(&place);
-        let answer = session.instance.do_step(wrong, session.step);
+        let step = session.step;
+        let answer = fmu.left_open(&place, findings, || session.instance.do_step(wrong, step))?;
         expect_refusal(findings, place, answer);
     }
     Ok(())
@@ -279,9 +284,9 @@ pub fn inputs(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     for v in &inputs {
         let mut session = fmu.running(Interface::CoSimulation)?;
         let place = format!("{} = NaN, then a step", v.name);
-        fmu.doing(&place);
-        let refused =
-            session.set(v, &Reading::Real(f64::NAN)).is_err() || session.go(session.step).is_err();
+        let refused = fmu.left_open(&place, findings, || {
+            session.set(v, &Reading::Real(f64::NAN)).is_err() || session.go(session.step).is_err()
+        })?;
         if !refused {
             findings.add(place, "fmi2OK (allowed: fmi2Error and a message)");
         }
@@ -294,6 +299,83 @@ pub fn inputs(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         if let Err(error) = set {
             findings.add(place, format!("{error}, but canInterpolateInputs is declared"));
         }
+    }
+    Ok(())
+}
+
+/// `steps.input_derivatives`
+pub fn input_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
+    /// How far the input is moved in a step, of its size.
+    const SHARE: f64 = 0.3;
+    /// What a held input changes and a slope does not, of the former, if the slope is ignored.
+    const IGNORED: f64 = 0.05;
+    if able(fmu, findings)?.is_none() {
+        return Ok(());
+    }
+    if !fmu.can(Interface::CoSimulation, "canInterpolateInputs") {
+        findings.skip("canInterpolateInputs is not declared");
+        return Ok(());
+    }
+    let inputs = fmu.variables().iter().filter(|v| v.causality == "input" && v.is_continuous());
+    let computed = |v: &&Variable| v.is_continuous() && !v.is_set_by_hosts();
+    let computed: Vec<&Variable> = fmu.variables().iter().filter(computed).collect();
+    let mut any = false;
+    for input in inputs {
+        let running = || -> Result<(Session, Reading)> {
+            let mut session = fmu.running(Interface::CoSimulation)?;
+            session.advance(3)?;
+            let now = session.read(input)?;
+            Ok((session, now))
+        };
+        let (_, now) = running()?;
+        let (Reading::Real(here), Some(Reading::Real(there))) =
+            (&now, elsewhere(fmu, input, &now, SHARE))
+        else {
+            continue;
+        };
+        any = true;
+        // where a step leads with the input held somewhere, or on a slope from there
+        let end = |value: f64, slope: Option<f64>| -> Result<Vec<f64>> {
+            let (mut session, _) = running()?;
+            fmu.doing(format!("a step with {} = {value:?}, its slope {slope:?}", input.name));
+            session.set(input, &Reading::Real(value))?;
+            if let Some(slope) = slope {
+                let reference = [input.reference];
+                session.instance.set_real_input_derivatives(&reference, &[1], &[slope])?;
+            }
+            session.go(session.step)?;
+            let read = |v: &&Variable| match session.read(v)? {
+                Reading::Real(x) => Ok(x),
+                _ => Ok(f64::NAN),
+            };
+            computed.iter().map(read).collect()
+        };
+        let step = fmu.session(Interface::CoSimulation)?.step;
+        let held = end(*here, None)?;
+        let on_average = end(0.5 * (here + there), None)?;
+        let on_slope = end(*here, Some((there - here) / step))?;
+        // the variables that the input visibly changes within a step, and how much of it the slope does
+        let followed = |n: usize| {
+            let (whole, part) = (on_average[n] - held[n], on_slope[n] - held[n]);
+            let size = held[n].abs().max(1e-3 * computed[n].nominal());
+            (whole.abs() > 1e-9 * size).then(|| (computed[n], part / whole))
+        };
+        let shares: Vec<_> = (0..computed.len()).filter_map(followed).collect();
+        if let Some((first, _)) = shares.first()
+            && shares.iter().all(|(_, share)| share.abs() < IGNORED)
+        {
+            findings.add(
+                format!("fmi2SetRealInputDerivatives of {}", input.name),
+                format!(
+                    "fmi2OK, but {} and what else follows this input within a step do not follow its \
+                     slope (allowed: a derivative that acts, since canInterpolateInputs is declared)",
+                    first.name
+                ),
+            );
+        }
+    }
+    if !any {
+        findings.skip("it has no continuous inputs that can be moved");
     }
     Ok(())
 }
@@ -341,13 +423,14 @@ pub fn output_derivatives(fmu: &FmuUnderTest, findings: &mut Findings) -> Result
         let rounding = 1e-9 * points[0][n].abs().max(1e-3 * v.nominal()) / h;
         let off = (declared[n] - at_start).abs();
         if declared[n].is_nan() || (smooth && off > 1e-2 * at_start.abs() + rounding) {
-            findings.add(
-                v.place(),
-                format!(
-                    "the derivative is given as {}, but the output changes by {at_start} per s",
-                    declared[n]
-                ),
+            let text = format!(
+                "the derivative is given as {}, but the output changes by {at_start} per s",
+                declared[n]
             );
+            match declared[n] * at_start < 0.0 && at_start.abs() > rounding {
+                true => findings.fail(v.place(), format!("{text}: the sign is wrong")),
+                false => findings.add(v.place(), text),
+            }
         }
     }
     Ok(())

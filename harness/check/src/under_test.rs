@@ -2,12 +2,15 @@
 
 use std::cell::{Cell, RefCell};
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail};
 
+use super::Findings;
 use super::description::{Description, Variable};
-use super::process::Trace;
+use super::events::Sight;
+use super::process::{Crash, Trace};
 use host::description::Type;
 use host::fmi2::{
     CO_SIMULATION, CallError, Called, Fmu, Instance, MODEL_EXCHANGE, PLATFORM, Status,
@@ -20,6 +23,12 @@ pub const STEPS: usize = 20;
 const ITERATIONS: usize = 100;
 /// Events in succession after which an FMU that always wants the next one at once is told.
 const IMMEDIATE: usize = 3;
+/// Events for which only fmi2CompletedIntegratorStep asks that are looked at.
+const ASKED: usize = 20;
+/// Share of a state below which its change at an event is rounding.
+const JUMP: f64 = 1e-9;
+/// Time for a call that the standard leaves open and that need not return.
+const PATIENCE: Duration = Duration::from_secs(3);
 /// Order of magnitude of a state that does not tell its own.
 const UNKNOWN_NOMINAL: f64 = 1e-3;
 
@@ -61,6 +70,7 @@ pub struct FmuUnderTest {
     description: Description,
     trace: Trace,
     doing: RefCell<String>,
+    crash: RefCell<Crash>,
     sessions: Cell<usize>,
     directory: PathBuf,
     path: PathBuf,
@@ -171,6 +181,7 @@ impl FmuUnderTest {
             description,
             trace,
             doing: RefCell::default(),
+            crash: RefCell::new(Crash::Error),
             sessions: Cell::new(0),
             directory: directory.to_path_buf(),
             path: path.to_path_buf(),
@@ -191,8 +202,52 @@ impl FmuUnderTest {
     /// Tells what comes next: the place of what goes wrong then.
     pub fn doing(&self, what: impl Into<String>) {
         let what = what.into();
-        self.trace.doing(&what);
+        self.trace.doing(&what, self.crash.borrow().clone());
         *self.doing.borrow_mut() = what;
+    }
+
+    /// Makes calls whose crash is told by another rule, which makes them as well.
+    pub fn told_by<T>(&self, rule: &str, calls: impl FnOnce() -> T) -> T {
+        self.with_crash(Crash::ToldBy(rule.into()), calls)
+    }
+
+    /// Makes calls of which the standard does not say what they do: a crash is as bad as the rule.
+    /// After [`PATIENCE`] the process tells what was found so far and that they do not return, and
+    /// ends.
+    pub fn left_open<T>(
+        &self,
+        what: impl Into<String>,
+        findings: &Findings,
+        calls: impl FnOnce() -> T,
+    ) -> Result<T> {
+        let what = what.into();
+        let (trace, mut found) = (self.trace.again()?, findings.clone());
+        let place = what.clone();
+        let (returned, waiting) = mpsc::channel::<()>();
+        std::thread::spawn(move || {
+            if waiting.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout) {
+                found
+                    .add(place, format!("no end after {PATIENCE:?} (allowed: every call returns)"));
+                // if that cannot be written, the time limit tells
+                let _ = trace.done(found);
+                std::process::exit(0);
+            }
+        });
+        let answer = self.with_crash(Crash::Open, || {
+            self.doing(what);
+            calls()
+        });
+        drop(returned);
+        Ok(answer)
+    }
+
+    fn with_crash<T>(&self, crash: Crash, calls: impl FnOnce() -> T) -> T {
+        let before = self.crash.replace(crash);
+        let answer = calls();
+        self.crash.replace(before);
+        // what comes next is no longer that
+        self.doing(self.now());
+        answer
     }
 
     /// What it was told last.
@@ -301,6 +356,11 @@ impl FmuUnderTest {
             ended: None,
             past_event: None,
             immediate_events: 0,
+            values_changed: false,
+            nominals_changed: false,
+            hidden_jump: None,
+            asked: 0,
+            step_event: None,
         })
     }
 
@@ -399,6 +459,16 @@ pub struct Session<'f> {
     past_event: Option<(f64, f64)>,
     /// Events in succession after which the next one was to be at once.
     immediate_events: usize,
+    /// What the last event iteration told of states and of their nominals.
+    values_changed: bool,
+    nominals_changed: bool,
+    /// The first state that an event has changed although the FMU told of no change: when, which,
+    /// and both values.
+    hidden_jump: Option<(f64, usize, f64, f64)>,
+    /// Events for which only fmi2CompletedIntegratorStep has asked, those that were looked at.
+    asked: usize,
+    /// The first of them that has changed something: when, what, and both values.
+    step_event: Option<(f64, String, String)>,
 }
 
 /// How far a host is.
@@ -461,8 +531,11 @@ impl<'f> Session<'f> {
     /// Calls fmi2NewDiscreteStates until nothing is new.
     fn iterate_events(&mut self) -> Result<()> {
         self.fmu.doing("fmi2NewDiscreteStates");
+        (self.values_changed, self.nominals_changed) = (false, false);
         for _ in 0..ITERATIONS {
             let info = self.instance.new_discrete_states()?;
+            self.values_changed |= info.values_changed != 0;
+            self.nominals_changed |= info.nominals_changed != 0;
             if info.terminate_simulation != 0 {
                 self.end("fmi2NewDiscreteStates");
             }
@@ -530,11 +603,59 @@ impl<'f> Session<'f> {
             self.end("fmi2CompletedIntegratorStep");
         }
         let due = self.next_event.is_some_and(|next| self.time >= next);
-        if enter || crossed || due {
-            self.instance.enter_event_mode()?;
-            self.leave_event()?;
+        if !(enter || crossed || due) {
+            return Ok(());
+        }
+        let is_asked = !crossed && !due && self.asked < ASKED && self.step_event.is_none();
+        if !is_asked {
+            return self.event();
+        }
+        self.asked += 1;
+        let before = Sight::of(self)?;
+        self.event()?;
+        if !self.is_ended()
+            && let Some((name, change)) = before.change(&Sight::of(self)?, self.fmu)
+        {
+            self.step_event = Some((self.time, name.to_string(), change));
         }
         Ok(())
+    }
+
+    /// The first event for which only fmi2CompletedIntegratorStep has asked and that has changed
+    /// something: when, what, and both values.
+    pub(super) fn step_event(&self) -> Option<(f64, String, String)> {
+        self.step_event.clone()
+    }
+
+    /// Event mode and back.
+    pub(super) fn event(&mut self) -> Result<()> {
+        let n = self.states();
+        let before = self.read_states(n)?;
+        self.instance.enter_event_mode()?;
+        self.leave_event()?;
+        if self.values_changed || self.is_ended() {
+            return Ok(());
+        }
+        let after = self.read_states(n)?;
+        let jumps = |i: &usize| {
+            let size = before[*i].abs().max(after[*i].abs()).max(1e-3 * self.nominal(*i));
+            (before[*i] - after[*i]).abs() > JUMP * size
+        };
+        if let Some(i) = (0..n).find(jumps) {
+            self.hidden_jump.get_or_insert((self.time, i, before[i], after[i]));
+        }
+        Ok(())
+    }
+
+    /// The first state that an event has changed although the FMU told of no change: when, which,
+    /// and both values.
+    pub(super) fn hidden_jump(&self) -> Option<(f64, usize, f64, f64)> {
+        self.hidden_jump
+    }
+
+    /// Whether the last event changed the nominals of states.
+    pub(super) fn nominals_changed(&self) -> bool {
+        self.nominals_changed
     }
 
     /// Sets all Real inputs to values that change from step to step.

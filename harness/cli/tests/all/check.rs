@@ -141,6 +141,8 @@ fn archives_that_hosts_stumble_over_are_told() {
         bytes
     };
     let wrong_checksum = patched(14, whole[14] ^ 1);
+    // the size once unpacked, in both headers
+    let wrong_size = patched(22, whole[22] ^ 1);
     let encrypted = patched(6, whole[6] | 1);
     let bzip2 = patched(8, 12);
     let twice = {
@@ -169,6 +171,7 @@ fn archives_that_hosts_stumble_over_are_told() {
                 &["zip.readable", "zip.description", "zip.documentation", "zip.licenses"][..],
             ),
             ("wrong checksum", wrong_checksum, &["zip.readable"]),
+            ("another size", wrong_size, &["zip.readable"]),
             ("encrypted", encrypted, &["zip.methods"]),
             ("bzip2", bzip2, &["zip.methods"]),
             (
@@ -316,6 +319,12 @@ fn descriptions_that_break_a_rule_are_told() {
                 changed("</ModelVariables>", "</ModelVariables>", ""),
                 &["xml.well_formed"][..],
             ),
+            (
+                "Latin-1",
+                changed("<?xml", "encoding=\"UTF-8\"", "encoding=\"ISO-8859-1\""),
+                &["xml.encoding"],
+            ),
+            ("no encoding", changed("<?xml", " encoding=\"UTF-8\"", ""), &["xml.encoding"]),
             (
                 "fmiVersion 2.1",
                 changed(root, "fmiVersion=\"2.0\"", "fmiVersion=\"2.1\""),
@@ -666,8 +675,23 @@ fn binaries_that_no_host_can_use_are_told() {
                 &["bin.format", "bin.this_platform"],
             ),
             (
-                "in an unknown folder",
+                "in the folder of a platform tuple",
                 renamed("binaries/x86_64-linux/HubSlosh.so"),
+                &["bin.this_platform"],
+            ),
+            (
+                "in the folder of a tuple for another system",
+                renamed("binaries/aarch64-darwin/HubSlosh.dylib"),
+                &["bin.format", "bin.this_platform"],
+            ),
+            (
+                "in a folder that a vendor has named",
+                renamed("binaries/gcc4/HubSlosh.so"),
+                &["bin.this_platform"],
+            ),
+            (
+                "of another name in such a folder",
+                renamed("binaries/gcc4/Other.so"),
                 &["bin.present", "bin.this_platform"],
             ),
             (
@@ -754,7 +778,8 @@ const MISBEHAVIOURS: &[(&str, &str)] = &[
     ("needs_resources", "instantiate.arguments"),
     ("needs_callbacks", "instantiate.callbacks"),
     ("keeps_callbacks", "instantiate.copies"),
-    ("free_null_crashes", "instantiate.null"),
+    ("free_null_crashes", "instantiate.free_null"),
+    ("null_crashes", "instantiate.null"),
     ("counts_steps", "life.instances"),
     ("counts_instances", "life.deterministic"),
     ("resets_not_all", "life.reset"),
@@ -766,6 +791,9 @@ const MISBEHAVIOURS: &[(&str, &str)] = &[
     ("rounds_up", "host.untouched"),
     ("changes_directory", "host.untouched"),
     ("leaks_files", "host.untouched"),
+    ("frees_nothing", "host.memory"),
+    ("leaks_in_steps", "host.memory"),
+    ("keeps_states", "host.memory"),
     ("text_as_format", "log.percent"),
     ("odd_category", "log.categories"),
     ("line_break", "log.text"),
@@ -795,7 +823,9 @@ const MISBEHAVIOURS: &[(&str, &str)] = &[
     ("counts_steps", "steps.cut"),
     ("any_number", "steps.inputs"),
     ("no_slopes", "steps.inputs"),
+    ("ignores_slopes", "steps.input_derivatives"),
     ("wrong_slopes", "steps.output_derivatives"),
+    ("opposite_slopes", "steps.output_derivatives"),
     ("restores_nothing", "states.rollback"),
     ("one_handle_only", "states.handle"),
     ("reads_no_bytes", "states.bytes"),
@@ -803,6 +833,9 @@ const MISBEHAVIOURS: &[(&str, &str)] = &[
     ("reads_garbage", "states.garbage"),
     ("saves_only_running", "states.modes"),
     ("wrong_directions", "dependencies.directional"),
+    ("frozen_indicators", "exchange.events"),
+    ("hides_jumps", "exchange.values_changed"),
+    ("other_nominals", "exchange.nominals"),
     ("zero_nominals", "exchange.vectors"),
     ("any_length", "exchange.lengths"),
     ("other_order", "exchange.variables"),
@@ -824,6 +857,64 @@ fn binaries_that_misbehave_are_told_by_the_rule_that_is_meant() {
         }
     }
     assert!(untold.is_empty(), "{}", untold.join("\n"));
+}
+
+/// Findings of one rule by whether they are errors, of our FMU with one misbehaviour.
+#[cfg(target_os = "linux")]
+fn severities(word: &str, rule: &str) -> (Vec<Severity>, String) {
+    let report = look(&misbehaving(word), &[rule]);
+    (report.all().map(|(_, finding)| finding.severity).collect(), report.text())
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn what_the_standard_forbids_is_an_error_and_what_it_leaves_open_is_none() {
+    for (word, rule, meant) in [
+        ("opposite_slopes", "steps.output_derivatives", Severity::Error),
+        ("true_is_two", "values.booleans", Severity::Error),
+        ("prints", "host.silent", Severity::Error),
+        ("free_null_crashes", "instantiate.free_null", Severity::Error),
+        // a crash, and a call without end, with arguments of which the standard says nothing
+        ("null_crashes", "instantiate.null", Severity::Warning),
+        ("hangs_at_nan", "steps.size", Severity::Warning),
+    ] {
+        let (found, text) = severities(word, rule);
+        // a Boolean that reads as 2 keeps a 2 as well, which is a warning
+        let worst = found.iter().min();
+        assert_eq!(worst, Some(&meant), "{word}: {text}");
+    }
+    // start values that differ from the file's in the last bit alone
+    let (found, text) = severities("last_bit_of_start", "values.start");
+    assert!(found.is_empty(), "{text}");
+    // a tunable parameter that is declared as fixed
+    let fixed = changed("name=\"friction.b\"", "tunable", "fixed");
+    let report = look(&fixed, &["values.fixed"]);
+    let all: Vec<_> = report.all().collect();
+    let [(_, finding)] = &all[..] else { panic!("{}", report.text()) };
+    assert_eq!(finding.severity, Severity::Error);
+    assert!(finding.place.contains("friction.b"), "{}", report.text());
+    // where all are taken, it is the binary that is lax
+    let (found, text) = severities("sets_anything", "values.fixed");
+    assert!(!found.is_empty() && found.iter().all(|s| *s == Severity::Warning), "{text}");
+}
+
+#[test]
+fn an_fmu_of_another_version_of_fmi_gets_one_finding() {
+    for version in ["1.0", "3.0"] {
+        let fmu = changed(
+            "<fmiModelDescription",
+            "fmiVersion=\"2.0\"",
+            &format!("fmiVersion=\"{version}\" odd=\"\""),
+        );
+        for only in [&[][..], &["zip"]] {
+            let report = look(&fmu, only);
+            let all: Vec<_> = report.all().collect();
+            let [(rule, finding)] = &all[..] else { panic!("{}", report.text()) };
+            assert_eq!((rule.id, finding.severity), ("xml.fmi_version", Severity::Error));
+            assert!(finding.text.contains(version), "{}", finding.text);
+            assert_eq!(report.outcomes.len(), 1);
+        }
+    }
 }
 
 #[cfg(target_os = "linux")]

@@ -134,6 +134,8 @@ void fmi2FreeInstance(Component c)
 {
     if (is("free_null_crashes") && !c)
         abort();
+    if (is("frees_nothing"))
+        return;
     REAL(void, fmi2FreeInstance, (Component))(c);
 }
 
@@ -161,7 +163,12 @@ Status fmi2SetupExperiment(Component c, int tolerant, double tolerance, double s
     return is("any_order") ? OK : status;
 }
 
-static Status plain(const char *name, Component c) { return ((Status(*)(Component))find(name))(c); }
+static Status plain(const char *name, Component c)
+{
+    if (is("null_crashes") && !c)
+        abort();
+    return ((Status(*)(Component))find(name))(c);
+}
 
 Status fmi2EnterInitializationMode(Component c) { return plain("fmi2EnterInitializationMode", c); }
 
@@ -217,6 +224,10 @@ Status fmi2GetReal(Component c, References r, size_t n, double *x)
     if (is("warns") && status == OK)
         return WARNING;
     if (is("other_start"))
+        for (i = 0; i < n; i++)
+            if (r[i] == 14)
+                x[i] *= 1 + 2e-14; /* the 14th digit */
+    if (is("last_bit_of_start"))
         for (i = 0; i < n; i++)
             if (r[i] == 14)
                 x[i] = nextafter(x[i], 100);
@@ -309,6 +320,10 @@ Status fmi2SetFMUstate(Component c, void *state)
 }
 Status fmi2FreeFMUstate(Component c, void **state)
 {
+    if (is("keeps_states") && c && state) {
+        *state = NULL;
+        return OK;
+    }
     return REAL(Status, fmi2FreeFMUstate, (Component, void **))(c, state);
 }
 Status fmi2SerializedFMUstateSize(Component c, void *state, size_t *size)
@@ -349,6 +364,8 @@ Status fmi2SetRealInputDerivatives(Component c, References r, size_t n, const in
 {
     if (is("no_slopes"))
         return ERROR;
+    if (is("ignores_slopes"))
+        return OK;
     return REAL(Status, fmi2SetRealInputDerivatives,
                 (Component, References, size_t, const int *, const double *))(c, r, n, order, x);
 }
@@ -359,6 +376,8 @@ Status fmi2GetRealOutputDerivatives(Component c, References r, size_t n, const i
                          (Component, References, size_t, const int *, double *))(c, r, n, order, x);
     for (i = 0; i < n && is("wrong_slopes"); i++)
         x[i] = 1.5 * x[i] + 1;
+    for (i = 0; i < n && is("opposite_slopes"); i++)
+        x[i] = -x[i];
     return status;
 }
 
@@ -368,8 +387,13 @@ Status fmi2DoStep(Component c, double t, double h, int forget)
     if (is("hangs_at_zero") && !(h > 0))
         for (;;)
             sleep(1);
+    if (is("hangs_at_nan") && isnan(h))
+        for (;;)
+            sleep(1);
     if (is("any_step") && !(h > 0))
         return OK;
+    if (is("leaks_in_steps") && !malloc(65536))
+        return ERROR;
     if (is("swallows_small_steps")) {
         if (h > 0 && h < 1e-3 && initialised) {
             lag += h;
@@ -435,6 +459,8 @@ Status fmi2NewDiscreteStates(Component c, struct event_info *info)
         info->needed = 1;
     if (is("terminates"))
         info->terminate = 1;
+    if (is("hides_jumps"))
+        info->values = 0;
     if (is("past_events")) {
         info->defined = 1;
         info->next = start_of - 1;
@@ -474,7 +500,11 @@ Status fmi2GetDerivatives(Component c, double *x, size_t n)
 }
 Status fmi2GetEventIndicators(Component c, double *x, size_t n)
 {
-    return vector("fmi2GetEventIndicators", c, x, n);
+    Status status = vector("fmi2GetEventIndicators", c, x, n);
+    size_t i;
+    for (i = 0; i < n && is("frozen_indicators"); i++)
+        x[i] = 1;
+    return status;
 }
 Status fmi2GetContinuousStates(Component c, double *x, size_t n)
 {
@@ -485,5 +515,7 @@ Status fmi2GetNominalsOfContinuousStates(Component c, double *x, size_t n)
     Status status = vector("fmi2GetNominalsOfContinuousStates", c, x, n);
     if (is("zero_nominals") && n)
         x[0] = 0;
+    if (is("other_nominals") && n)
+        x[n - 1] *= 2;
     return status;
 }
