@@ -263,8 +263,8 @@ fn a_stiffness_far_outside_of_its_formula_is_written_with_force_alone() {
     std::fs::write(path("a.toml"), "density = 1000\nshape = { sphere = { radius = 1 } }\n")
         .unwrap();
     let (file, set) = (path("a.toml"), path("set.toml"));
-    let given = [&file, "--fill=1", "--gravity=1e-6", "--sigma=0.072", "--parameters", &set]
-        .map(|s| &s[..]);
+    let given: [&str; 6] =
+        [&file, "--fill=1", "--gravity=1e-6", "--sigma=0.072", "--parameters", &set];
     let (ok, _, said) = tank(&given);
     assert!(!ok && said.contains("k of mode 1 is not known: it adds"), "{said}");
     assert!(said.contains("--force") && !std::fs::exists(&set).unwrap(), "{said}");
