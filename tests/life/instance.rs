@@ -346,10 +346,10 @@ fn reset_is_a_fresh_instance() {
     assert_eq!(to_bytes(&failed), expected);
 }
 
-/// A torque that no number can hold the effect of.
+/// A torque for so long that no number can hold the angle.
 fn diverged() -> Instance {
-    let mut instance = stepping(&[("tau_cmd", Value::Real(1e308))]);
-    instance.do_step(0.0, 10.0).unwrap_err();
+    let mut instance = stepping(&[("slosh.model", number(1)), ("tau_cmd", Value::Real(1e12))]);
+    instance.do_step(0.0, 1e200).unwrap_err();
     instance
 }
 

@@ -119,13 +119,13 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     // Inputs
     V::input("tau_cmd", |i, _| parts(&mut i.tau_cmd), "N.m",
         "Torque command to the actuator, positive turns the hub towards +theta; held over a step unless its derivative is set, which holds for one step")
-        .display_unit("mN.m").nominal(0.1),
+        .display_unit("mN.m").range(-1e12, 1e12).nominal(0.1),
     V::input("tau_ext", |i, _| parts(&mut i.tau_ext), "N.m",
         "Any other torque on the hub, positive towards +theta; held over a step unless its derivative is set, which holds for one step")
-        .display_unit("mN.m").nominal(0.1),
+        .display_unit("mN.m").range(-1e12, 1e12).nominal(0.1),
     V::input("g_axial", |i, _| parts(&mut i.g_axial), "m/s2",
         "Specific force along the tank's axis, pressing the liquid to the bottom: gravity on a bench, thrust acceleration in flight; held over a step unless its derivative is set, which holds for one step")
-        .at_least(0.0).nominal(10.0),
+        .range(0.0, 1e9).nominal(10.0),
 
     // Locals
     V::local("slosh_rate_radial", |o, _| o.slosh_rate_radial, "rad/s",

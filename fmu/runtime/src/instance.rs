@@ -11,7 +11,7 @@
 use crate::model::Model;
 use crate::operation::{self as op, Call, Fault, InstanceState, Interface, Operation, Version};
 use crate::table::Scalar;
-use crate::variable::{Access, Causality, Value};
+use crate::variable::{Access, Causality, Value, is_finite, text};
 
 /// The tolerance when the host names none.
 pub const DEFAULT_TOLERANCE: f64 = 1e-8;
@@ -143,19 +143,21 @@ impl<M: Model> Instance<M> {
     ) -> Result<(), Fault> {
         let call = &self.check(&op::SETUP_EXPERIMENT)?;
         let mut problems = Vec::new();
-        if !start.is_finite() {
-            problems.push(format!("startTime = {start:?} (allowed: any finite number)"));
+        if !is_finite(start) {
+            problems.push(format!("startTime = {} (allowed: any finite number)", text(start)));
         }
         if let Some(stop) = stop
-            && !(stop.is_finite() && stop >= start)
+            && !(is_finite(stop) && stop >= start)
         {
-            problems.push(format!("stopTime = {stop:?} (allowed: startTime {start:?} or later)"));
+            let (stop, start) = (text(stop), text(start));
+            problems.push(format!("stopTime = {stop} (allowed: startTime {start} or later)"));
         }
         if let Some(tolerance) = tolerance
             && !TOLERANCES.contains(&tolerance)
         {
             let (low, high) = (TOLERANCES.start(), TOLERANCES.end());
-            problems.push(format!("tolerance = {tolerance:?} (allowed: {low:?} to {high:?})"));
+            let tolerance = text(tolerance);
+            problems.push(format!("tolerance = {tolerance} (allowed: {low:?} to {high:?})"));
         }
         if !problems.is_empty() {
             return Err(call.error(problems.join("; ")));
@@ -593,16 +595,18 @@ impl<M: Model> Instance<M> {
     /// fmi2DoStep: from `at` on by `h`. Does not allocate unless it fails.
     pub fn do_step(&mut self, at: f64, h: f64) -> Result<(), Fault> {
         let call = &self.check(&op::DO_STEP)?;
-        if !(h.is_finite() && h > 0.0) {
+        if !(is_finite(h) && h > 0.0) {
             return Err(call.error(format_args!(
-                "communicationStepSize = {h:?} s (allowed: greater than 0, finite)"
+                "communicationStepSize = {} s (allowed: greater than 0, finite)",
+                text(h)
             )));
         }
         // Written so that NaN does not pass.
         let close = (at - self.time).abs() <= TIME_SLACK * self.time.abs().max(h);
         if !close {
             return Err(call.error(format_args!(
-                "currentCommunicationPoint = {at:?} s, but the last step ended at {:?} s",
+                "currentCommunicationPoint = {} s, but the last step ended at {:?} s",
+                text(at),
                 self.time
             )));
         }
@@ -721,8 +725,9 @@ impl<M: Model> Instance<M> {
     /// fmi2SetTime
     pub fn set_time(&mut self, time: f64) -> Result<(), Fault> {
         let call = &self.check(&op::SET_TIME)?;
-        if !time.is_finite() {
-            return Err(call.error(format_args!("time = {time:?} s (allowed: any finite number)")));
+        if !is_finite(time) {
+            let time = text(time);
+            return Err(call.error(format_args!("time = {time} s (allowed: any finite number)")));
         }
         self.leave_initialized(call)?;
         self.model(call)?.set_time(time);
@@ -742,7 +747,8 @@ impl<M: Model> Instance<M> {
             if !is_state {
                 let name = M::table().state_at(place).map_or("a state".into(), Scalar::name);
                 return Err(call.discard(format_args!(
-                    "{name} = {x:?} (allowed: magnitudes below {MAX_STATE:e})"
+                    "{name} = {} (allowed: magnitudes below {MAX_STATE:e})",
+                    text(*x)
                 )));
             }
             self.scratch[0][place] = *x;
@@ -782,7 +788,7 @@ impl<M: Model> Instance<M> {
         done?;
         for (x, scalar) in derivatives.iter().zip(M::table().derivatives()) {
             if !x.is_finite() {
-                return Err(call.discard(format_args!("{} = {x:?}", scalar.name())));
+                return Err(call.discard(format_args!("{} = {}", scalar.name(), text(*x))));
             }
         }
         Ok(())
@@ -945,17 +951,21 @@ fn check_slope<M: Model>(
     slope: f64,
 ) -> Result<(), Fault> {
     let is_input = matches!(scalar.access, Access::Input(_));
-    if is_input && order == 1 && slope.is_finite() {
+    let fastest = scalar.variable.fastest();
+    if is_input && order == 1 && is_finite(slope) && slope.abs() <= fastest {
         return Ok(());
     }
     if !is_input {
         return Err(call.error(format_args!("{} is not an input", scalar.name())));
     }
     check_order(call, scalar, order)?;
-    Err(call.error(format_args!(
-        "derivative of {} = {slope} (allowed: any finite number)",
-        scalar.name()
-    )))
+    let (name, unit) = (scalar.name(), scalar.variable.unit());
+    let allowed = match fastest.is_finite() {
+        true => format!("-{fastest:?} to {fastest:?} {unit}/s"),
+        false => "any finite number".into(),
+    };
+    let slope = text(slope);
+    Err(call.error(format_args!("derivative of {name} = {slope} (allowed: {allowed})")))
 }
 
 fn check_order<M: Model>(call: &Call, scalar: &Scalar<M>, order: i32) -> Result<(), Fault> {
@@ -966,10 +976,10 @@ fn check_order<M: Model>(call: &Call, scalar: &Scalar<M>, order: i32) -> Result<
 }
 
 fn check_direction<M: Model>(call: &Call, scalar: &Scalar<M>, d: f64) -> Result<(), Fault> {
-    if d.is_finite() {
+    if is_finite(d) {
         return Ok(());
     }
-    let name = scalar.name();
+    let (name, d) = (scalar.name(), text(d));
     Err(call.error(format_args!("direction of {name} = {d} (allowed: any finite number)")))
 }
 

@@ -167,6 +167,23 @@ impl<M: Model> Clone for Variable<M> {
 }
 impl<M: Model> Copy for Variable<M> {}
 
+/// No input goes through its range in less, s: what follows from faster ones may overflow.
+const CROSSING: f64 = 1e-9;
+
+/// Whether x is a finite number. It looks at the bits, as what is done with numbers from the host does until
+/// then: comparing with NaN ends the process of a host that traps invalid operations.
+#[inline]
+pub const fn is_finite(x: f64) -> bool {
+    const EXPONENT: u64 = f64::INFINITY.to_bits();
+    x.to_bits() & EXPONENT != EXPONENT
+}
+
+/// A number in a message. Printing compares it with others, which NaN must not be: see [`is_finite`].
+pub fn text(x: f64) -> String {
+    let is_nan = x.to_bits() << 1 > f64::INFINITY.to_bits() << 1;
+    if is_nan { "NaN".into() } else { format!("{x:?}") }
+}
+
 const fn variable<M: Model>(
     name: &'static str,
     causality: Causality,
@@ -519,6 +536,24 @@ impl<M: Model> Variable<M> {
         }
     }
 
+    /// The largest rate of an input: the size of its range in [`CROSSING`] seconds; any if it has none.
+    pub fn fastest(&self) -> f64 {
+        match self.kind {
+            Kind::Real(Quantity { min: Some(min), max: Some(max), .. }) => {
+                f64::max(min.abs(), max.abs()) / CROSSING
+            }
+            _ => f64::INFINITY,
+        }
+    }
+
+    /// The unit of a quantity.
+    pub const fn unit(&self) -> &'static str {
+        match self.kind {
+            Kind::Real(quantity) => quantity.unit,
+            _ => "",
+        }
+    }
+
     /// The order of magnitude of a quantity; 1 if nothing else is said.
     pub const fn nominal_value(&self) -> f64 {
         match self.kind {
@@ -547,7 +582,11 @@ impl<M: Model> Variable<M> {
     fn allows(&self, value: Value) -> bool {
         match (&self.kind, value) {
             (Kind::Real(Quantity { min, max, .. }), Value::Real(x)) => {
-                x.is_finite() && min.is_none_or(|m| x >= m) && max.is_none_or(|m| x <= m)
+                // -0 is 0
+                let x = if x.to_bits() == (-0.0_f64).to_bits() { 0.0 } else { x };
+                is_finite(x)
+                    && min.is_none_or(|m| x.total_cmp(&m).is_ge())
+                    && max.is_none_or(|m| x.total_cmp(&m).is_le())
             }
             (Kind::Integer { min, max }, Value::Integer(n)) => {
                 min.is_none_or(|m| n >= m) && max.is_none_or(|m| n <= m)
@@ -603,11 +642,12 @@ impl<M: Model> Variable<M> {
     }
 
     fn with_unit(&self, x: f64) -> String {
+        let x = text(x);
         match self.kind {
             Kind::Real(Quantity { unit, .. }) if !["", "1"].contains(&unit) => {
-                format!("{x:?} {unit}")
+                format!("{x} {unit}")
             }
-            _ => format!("{x:?}"),
+            _ => x,
         }
     }
 }
