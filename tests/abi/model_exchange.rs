@@ -386,15 +386,28 @@ fn calls_of_model_exchange_in_the_wrong_state_are_refused() {
     refused!(instance.enter_event_mode(), "\"instantiated\"");
 }
 
+/// What OpenModelica up to 1.27 makes of Booleans: its array of bytes is read as one of fmi2Boolean, which has four
+/// bytes each; what is behind it is taken to be 0 (fmi2SetBoolean_OMC in its FMI2Common.c).
+fn misread(booleans: &[i32]) -> Vec<i32> {
+    let mut bytes: Vec<u8> = booleans.iter().map(|b| *b as u8).collect();
+    bytes.resize(4 * booleans.len(), 0);
+    bytes.chunks_exact(4).map(|four| i32::from_le_bytes(four.try_into().unwrap())).collect()
+}
+
 /// OpenModelica 1.21 to 1.27 ends the initialization first and then sets all parameters but
 /// enumerations; it sets states, and enters event mode, in the event mode that it is in already
 /// (issue 12893 of its tracker; the template importFMU2ModelExchange of its CodegenFMU.tpl).
+/// Booleans arrive as noise: their integers, as those of enumerations, decide.
 #[test]
 fn openmodelica_up_to_1_27_gets_the_motion_of_the_parameters_it_sets() {
     let settings = [
         ("tank.h", "0.05"),
         ("slosh.modes", "2"),
-        ("slosh.zeta_from_correlation", "false"),
+        ("slosh.kind", "3"),
+        ("slosh.zeta_from_correlation_kind", "1"),
+        ("slosh.capillarity_kind", "2"),
+        ("wheel.enabled_kind", "2"),
+        ("imu.enabled_kind", "2"),
         ("friction.d", "0.004"),
         ("init.slosh_angle", "0.3"),
         ("init.omega", "0.08"),
@@ -426,7 +439,9 @@ fn openmodelica_up_to_1_27_gets_the_motion_of_the_parameters_it_sets() {
     let (references, given): (Vec<_>, Vec<_>) = integers.into_iter().unzip();
     instance.set_integer(&references, &given).unwrap();
     let (references, given): (Vec<_>, Vec<_>) = booleans.into_iter().unzip();
-    instance.set_boolean(&references, &given).unwrap();
+    instance.set_boolean(&references, &misread(&given)).unwrap();
+    // slosh.zeta_from_correlation is true, its integer says false.
+    assert!(misread(&given)[0] != 0, "the first Boolean arrives as any of the first four");
 
     // Which comes first, states or inputs, is up to how it sorts equations.
     let mut host =
@@ -440,12 +455,26 @@ fn openmodelica_up_to_1_27_gets_the_motion_of_the_parameters_it_sets() {
     host.indicators(0.0, &host.x.clone());
     host.instance.enter_event_mode().unwrap();
     host.event_iteration();
-    host.run(5.0, 5e-4);
+    // Not at an instant of the gyro's samples.
+    host.run(5.01, 5e-4);
 
-    let all: Vec<_> = settings.into_iter().chain(inputs).collect();
+    let meant = [
+        ("slosh.model", "planar"),
+        ("slosh.zeta_from_correlation", "false"),
+        ("slosh.capillarity", "true"),
+        ("wheel.enabled", "true"),
+        ("imu.enabled", "true"),
+    ];
+    let reals = settings.into_iter().filter(|(name, _)| !name.contains("kind"));
+    let all: Vec<_> = reals.chain(meant).chain(inputs).collect();
     let mut own = set_up(&fmu, host::fmi2::CO_SIMULATION, &all);
-    own.do_step(0.0, 5.0).unwrap();
+    own.do_step(0.0, 5.01).unwrap();
     let exchanged = values(&mut host.instance);
+    for (boolean, twin) in [("stuck", "stuck_kind"), ("baffle.in_range", "baffle.in_range_kind")] {
+        let as_boolean = host.instance.get(boolean).unwrap() == Value::Boolean(true);
+        let as_integer = host.instance.get(twin).unwrap();
+        assert_eq!(as_integer, Value::Integer(i32::from(as_boolean)), "{twin}");
+    }
     for (name, expected) in values(&mut own) {
         let got = exchanged[&name];
         // as with stick and slip above

@@ -1065,6 +1065,30 @@ fn kinds_choose_what_the_enumerations_choose() {
     }
 }
 
+/// What OpenModelica up to 1.27 sets as Booleans is noise.
+#[test]
+fn kinds_decide_whatever_the_booleans_say() {
+    for name in ["slosh.zeta_from_correlation", "slosh.capillarity", "wheel.enabled", "imu.enabled"]
+    {
+        let kind = format!("{name}_kind");
+        let motion = |settings: &[(&str, Value)]| {
+            let mut all =
+                vec![("init.slosh_angle", Value::Real(0.2)), ("tau_cmd", Value::Real(0.4))];
+            all.extend(settings);
+            let mut instance = stepping(&all);
+            instance.do_step(0.0, 1.0).unwrap();
+            ["omega", "omega_imu", "heat"].map(|name| real(&mut instance, name).to_bits())
+        };
+        let [no, yes] = [false, true].map(|b| motion(&[(name, Value::Boolean(b))]));
+        assert_ne!(no, yes, "{name} shows");
+        for said in [false, true] {
+            let with = |n| motion(&[(name, Value::Boolean(said)), (kind.as_str(), number(n))]);
+            assert_eq!(with(0), if said { yes } else { no }, "{name} = {said}");
+            assert_eq!((with(1), with(2)), (no, yes), "{kind} with {name} = {said}");
+        }
+    }
+}
+
 #[test]
 fn kinds_that_contradict_the_enumerations_are_all_reported() {
     let mut instance = fresh();

@@ -31,7 +31,8 @@ impl HubSlosh {
     }
 }
 
-/// The plant's parameters, and the ways round enumerations for hosts that set none.
+/// The plant's parameters, and the ways round enumerations for hosts that set none, and round Booleans for
+/// hosts that misread them.
 #[derive(Clone, Debug, Default)]
 pub struct Parameters {
     plant: plant::Parameters,
@@ -41,6 +42,14 @@ pub struct Parameters {
     pub slosh_source_kind: i32,
     /// The number of the friction law, 0: as the enumeration says.
     pub friction_kind: i32,
+    /// 1 for false, 2 for true, 0: as the Boolean says; likewise below.
+    pub zeta_from_correlation_kind: i32,
+    /// Of `slosh.capillarity`.
+    pub capillarity_kind: i32,
+    /// Of `wheel.enabled`.
+    pub wheel_enabled_kind: i32,
+    /// Of `imu.enabled`.
+    pub imu_enabled_kind: i32,
 }
 
 impl Deref for Parameters {
@@ -58,7 +67,8 @@ impl DerefMut for Parameters {
 }
 
 impl Parameters {
-    /// What the plant is made of: the enumerations with `slosh.kind` and `friction.kind` applied.
+    /// What the plant is made of: the enumerations and Booleans with their `…kind` applied. An enumeration that
+    /// contradicts its kind is refused; a Boolean is not, for it is noise in the hosts that its kind is for.
     fn resolved(&self) -> Result<plant::Parameters, Vec<String>> {
         let mut p = self.plant;
         let start = plant::Parameters::default();
@@ -89,6 +99,16 @@ impl Parameters {
         table::set_item(&mut p.slosh.model, &SloshModel::ALL, self.slosh_kind);
         table::set_item(&mut p.slosh.source, &SloshSource::ALL, self.slosh_source_kind);
         table::set_item(&mut p.friction.model, &FrictionModel::ALL, self.friction_kind);
+        for (flag, kind) in [
+            (&mut p.slosh.zeta_from_correlation, self.zeta_from_correlation_kind),
+            (&mut p.slosh.capillarity, self.capillarity_kind),
+            (&mut p.wheel.enabled, self.wheel_enabled_kind),
+            (&mut p.imu.enabled, self.imu_enabled_kind),
+        ] {
+            if kind != 0 {
+                *flag = kind == 2;
+            }
+        }
         if problems.is_empty() { Ok(p) } else { Err(problems) }
     }
 }

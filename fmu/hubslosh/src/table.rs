@@ -171,11 +171,17 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     V::local_boolean("stuck", |o| o.discrete.stuck,
         "The hub is held by dry friction")
         .depends_on(ALL_TORQUES),
+    V::local_integer("stuck_kind", |o| i32::from(o.discrete.stuck),
+        "stuck for hosts that misread Booleans (OpenModelica up to 1.27): 0 false, 1 true")
+        .depends_on(ALL_TORQUES),
     V::local_enumeration("regime", &REGIME, |o| o.discrete.regime as i32,
         "How far wave_height is inside the range of linear theory")
         .depends_on(&["slosh.q_radial", "slosh.q_tangential"]),
     V::local_boolean("baffle.in_range", |o| o.discrete.baffle_in_range,
         "The law of the ring baffle holds: the liquid's stroke at the ring is 0.64 to 6.4 of its width, the wave does not uncover it, and it covers less than a quarter of the section; true without a baffle")
+        .depends_on(WAVE_1),
+    V::local_integer("baffle.in_range_kind", |o| i32::from(o.discrete.baffle_in_range),
+        "baffle.in_range for hosts that misread Booleans (OpenModelica up to 1.27): 0 false, 1 true")
         .depends_on(WAVE_1),
     V::local_integer("friction_mode", |o| o.discrete.friction_mode,
         "Branch of the set-valued friction law: -1 turning backwards, 0 stuck, 1 turning forwards; 1 with other laws")
@@ -307,6 +313,9 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         .between(1, MODES as i32),
     V::switch("slosh.zeta_from_correlation", |p| &mut p.slosh.zeta_from_correlation,
         "Damping ratio from the correlation of Mikishev and Dorozhkin; if false it is slosh.zeta"),
+    V::integer("slosh.zeta_from_correlation_kind", |p, _| &mut p.zeta_from_correlation_kind,
+        "For hosts that misread Booleans (OpenModelica up to 1.27): 0: as slosh.zeta_from_correlation says; 1 false, 2 true, whatever it says")
+        .between(0, 2),
     V::parameter("slosh.zeta", |p, _| &mut p.slosh.zeta, "1",
         "Damping ratio of every mode when slosh.zeta_from_correlation is false")
         .range(0.0, 0.999),
@@ -315,6 +324,9 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         .range(0.0, 100.0),
     V::switch("slosh.capillarity", |p| &mut p.slosh.capillarity,
         "Capillarity of a flat surface with a free contact line centres the liquid; source geometry only"),
+    V::integer("slosh.capillarity_kind", |p, _| &mut p.capillarity_kind,
+        "For hosts that misread Booleans (OpenModelica up to 1.27): 0: as slosh.capillarity says; 1 false, 2 true, whatever it says")
+        .between(0, 2),
 
     // The modes of a tank of any shape
     V::parameter("slosh.table.m_liq", |p, _| &mut p.slosh.table.m_liq, "kg",
@@ -433,6 +445,9 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     // Reaction wheel
     V::switch("wheel.enabled", |p| &mut p.wheel.enabled,
         "The actuator is a reaction wheel with limits; if false its torque is the command"),
+    V::integer("wheel.enabled_kind", |p, _| &mut p.wheel_enabled_kind,
+        "For hosts that misread Booleans (OpenModelica up to 1.27): 0: as wheel.enabled says; 1 false, 2 true, whatever it says")
+        .between(0, 2),
     V::parameter("wheel.I", |p, _| &mut p.wheel.inertia, "kg.m2",
         "Moment of inertia of the rotor; hub.I does not contain it")
         .range(1e-9, 1e6),
@@ -452,6 +467,9 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     // Rate gyro
     V::switch("imu.enabled", |p| &mut p.imu.enabled,
         "omega_imu is sampled, noisy and quantised; if false it equals omega"),
+    V::integer("imu.enabled_kind", |p, _| &mut p.imu_enabled_kind,
+        "For hosts that misread Booleans (OpenModelica up to 1.27): 0: as imu.enabled says; 1 false, 2 true, whatever it says")
+        .between(0, 2),
     V::parameter("imu.rate", |p, _| &mut p.imu.rate, "Hz",
         "Sampling rate")
         .range(0.1, 1e4),
