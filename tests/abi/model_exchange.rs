@@ -483,6 +483,56 @@ fn openmodelica_up_to_1_27_gets_the_motion_of_the_parameters_it_sets() {
     }
 }
 
+/// A host that leaves out the start value of an input sets 0, OpenModelica after the initialization.
+#[test]
+fn a_weightless_tank_that_nothing_restores_is_warned_of_when_the_motion_begins() {
+    let fmu = open();
+    let said = |instance: &mut Instance| {
+        let texts = instance.take_messages().into_iter().map(|message| message.text);
+        texts.filter(|text| text.contains("g_axial = 0")).collect::<Vec<_>>()
+    };
+    let started = |settings: &[(&str, &str)]| {
+        said(&mut set_up(&fmu, host::fmi2::CO_SIMULATION, settings)).concat()
+    };
+    let weightless = ("g_axial", "0");
+    assert!(started(&[weightless]).contains("nothing restores or damps slosh mode 1"));
+    let table = [
+        weightless,
+        ("slosh.source", "table"),
+        ("slosh.modes", "2"),
+        ("slosh.table.m_liq", "2"),
+        ("slosh.table.mass[1]", "0.5"),
+        ("slosh.table.mass[2]", "0.1"),
+        ("slosh.table.length[1]", "0.05"),
+        ("slosh.table.length[2]", "0.02"),
+        ("slosh.table.k[1]", "2"),
+    ];
+    assert!(started(&table).contains("slosh mode 2"));
+    for restored in [
+        &[][..],
+        &[weightless, ("slosh.model", "frozen")],
+        &[weightless, ("slosh.capillarity", "true")],
+        &[weightless, ("slosh.capillarity_kind", "2")],
+        &[("g_axial", "1e-9")],
+        &[table.as_slice(), &[("slosh.table.k[2]", "1")]].concat(),
+    ] {
+        assert_eq!(started(restored), "", "{restored:?}");
+    }
+
+    // Set late: the warning is of what the motion begins with, and comes once.
+    let mut late = set_up(&fmu, MODEL_EXCHANGE, &[]);
+    late.set("g_axial", "0").unwrap();
+    assert_eq!(said(&mut late).len(), 0);
+    late.new_discrete_states().unwrap();
+    assert_eq!(said(&mut late).len(), 1);
+    late.enter_continuous_time_mode().unwrap();
+    assert_eq!(said(&mut late).len(), 0);
+    let mut set_right = set_up(&fmu, MODEL_EXCHANGE, &[weightless]);
+    set_right.set("g_axial", "9.81").unwrap();
+    set_right.new_discrete_states().unwrap();
+    assert_eq!(said(&mut set_right).len(), 0);
+}
+
 #[test]
 fn parameters_set_after_initialization_are_as_good_as_before_and_bad_ones_are_refused() {
     let fmu = open();

@@ -133,8 +133,15 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
         warnings.extend(third_order_warning(p.tank.h / radius));
     }
     let calculated = Calculated::new(p, g);
-    let Calculated { bond, centring, .. } = calculated;
-    if centring[0] == 0.0 && bond < LOW_BOND {
+    let Calculated { bond, mass, centring, .. } = calculated;
+    let mut used = mass.iter().zip(centring).take_while(|(mass, _)| **mass > 0.0);
+    if let Some(n) = used.position(|(_, a)| g + a <= 0.0) {
+        warnings.push(format!(
+            "g_axial = 0 at the start: the tank is weightless, nothing restores or damps slosh mode {} \
+             (set the input g_axial, or slosh.capillarity or slosh.table.k)",
+            n + 1
+        ));
+    } else if centring[0] == 0.0 && bond < LOW_BOND {
         warnings.push(format!(
             "the Bond number is {bond:.3}: capillarity counts and is not in the model (set \
              slosh.capillarity, or slosh.table.k)"

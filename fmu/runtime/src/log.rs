@@ -1,6 +1,6 @@
 //! Which messages go to the host's logger.
 //!
-//! Calls that fail, what to be warned of when initialization ends, and, for those who ask, the
+//! Calls that fail, what to be warned of when the motion begins, and, for those who ask, the
 //! model's events. A host that asks for
 //! nothing gets no chatter: `loggingOn` of fmi2Instantiate switches nothing, because
 //! failures are reported either way (a status without a reason helps nobody) and

@@ -146,6 +146,15 @@ impl Log {
         }
     }
 
+    #[cold]
+    fn report_warnings<M: Model>(&self, instance: &Instance<M>) {
+        if self.filter.wants(Topic::Warning) {
+            for warning in instance.warnings() {
+                self.write(fmi2Warning, Topic::Warning, &warning);
+            }
+        }
+    }
+
     /// Tells of the last event, if there was one since `before` were counted and if somebody wants
     /// to know.
     #[inline(always)]
@@ -293,6 +302,24 @@ unsafe fn on<M: Model>(
     };
     component.log.report(&fault);
     status(fault.severity)
+}
+
+/// As [`on`], for the calls with which the motion can begin: then warnings are logged, of the parameters and
+/// inputs that it begins with.
+unsafe fn on_start<M: Model>(
+    handle: fmi2Component,
+    operation: &'static Operation,
+    body: impl FnOnce(&mut Component<M>) -> Result<(), Fault>,
+) -> fmi2Status {
+    let with_warnings = |component: &mut Component<M>| {
+        let was_running = component.instance.is_running();
+        body(component)?;
+        if !was_running && component.instance.is_running() {
+            component.log.report_warnings(&component.instance);
+        }
+        Ok(())
+    };
+    unsafe { on(handle, operation, with_warnings) }
 }
 
 fn panic_text(payload: &(dyn Any + Send)) -> &str {
@@ -456,21 +483,15 @@ pub unsafe fn fmi2EnterInitializationMode<M: Model>(c: fmi2Component) -> fmi2Sta
 /// steps can be made.
 pub unsafe fn fmi2ExitInitializationMode<M: Model>(c: fmi2Component) -> fmi2Status {
     unsafe {
-        on::<M>(c, &op::EXIT_INITIALIZATION, |component| {
-            component.instance.exit_initialization_mode()?;
-            if component.log.filter.wants(Topic::Warning) {
-                for warning in component.instance.warnings() {
-                    component.log.write(fmi2Warning, Topic::Warning, &warning);
-                }
-            }
-            Ok(())
+        on_start::<M>(c, &op::EXIT_INITIALIZATION, |component| {
+            component.instance.exit_initialization_mode()
         })
     }
 }
 
 /// Ends the simulation; values can still be read.
 pub unsafe fn fmi2Terminate<M: Model>(c: fmi2Component) -> fmi2Status {
-    unsafe { on::<M>(c, &op::TERMINATE, |component| component.instance.terminate()) }
+    unsafe { on_start::<M>(c, &op::TERMINATE, |component| component.instance.terminate()) }
 }
 
 /// As new.
@@ -781,7 +802,7 @@ pub struct fmi2EventInfo {
 
 /// At an event.
 pub unsafe fn fmi2EnterEventMode<M: Model>(c: fmi2Component) -> fmi2Status {
-    unsafe { on::<M>(c, &op::ENTER_EVENT, |component| component.instance.enter_event_mode()) }
+    unsafe { on_start::<M>(c, &op::ENTER_EVENT, |component| component.instance.enter_event_mode()) }
 }
 
 /// Does what is due at the event.
@@ -791,7 +812,7 @@ pub unsafe fn fmi2NewDiscreteStates<M: Model>(
 ) -> fmi2Status {
     let operation = &op::NEW_DISCRETE_STATES;
     unsafe {
-        on::<M>(c, operation, |component| {
+        on_start::<M>(c, operation, |component| {
             let call = &component.instance.check(operation)?;
             let place = place(call, "eventInfo", eventInfo)?;
             let before = component.instance.event_count();
@@ -811,7 +832,7 @@ pub unsafe fn fmi2NewDiscreteStates<M: Model>(
 /// Between events.
 pub unsafe fn fmi2EnterContinuousTimeMode<M: Model>(c: fmi2Component) -> fmi2Status {
     unsafe {
-        on::<M>(c, &op::ENTER_CONTINUOUS_TIME, |component| {
+        on_start::<M>(c, &op::ENTER_CONTINUOUS_TIME, |component| {
             component.instance.enter_continuous_time_mode()
         })
     }
@@ -847,7 +868,7 @@ pub unsafe fn fmi2CompletedIntegratorStep<M: Model>(
 
 /// The present time.
 pub unsafe fn fmi2SetTime<M: Model>(c: fmi2Component, time: fmi2Real) -> fmi2Status {
-    unsafe { on::<M>(c, &op::SET_TIME, |component| component.instance.set_time(time)) }
+    unsafe { on_start::<M>(c, &op::SET_TIME, |component| component.instance.set_time(time)) }
 }
 
 /// The states as the host has integrated them.
@@ -858,7 +879,7 @@ pub unsafe fn fmi2SetContinuousStates<M: Model>(
 ) -> fmi2Status {
     let operation = &op::SET_CONTINUOUS_STATES;
     unsafe {
-        on::<M>(c, operation, |component| {
+        on_start::<M>(c, operation, |component| {
             let call = &component.instance.check(operation)?;
             component.instance.set_continuous_states(array(call, "x", x, nx)?)
         })
