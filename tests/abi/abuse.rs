@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::common::{python, run};
+use host::description::{Type, Variable};
 use host::fmi2::{Fmu, PLATFORM};
 use host::xml::Element;
 use pack::{HUBSLOSH, packed_model_for_tests, root};
@@ -205,6 +206,201 @@ fn no_model_raises_a_floating_point_exception() {
     assert!(number(&said, " runs") >= 960.0, "{said}");
     // LuGre refuses the one scene without dry friction
     assert!(number(&said, " refused") <= 0.03 * number(&said, " runs"), "{said}");
+}
+
+/// What else a host sets, by name, before it tries a parameter.
+type Scene<'a> = &'a [(&'a str, &'a str)];
+
+/// The file that `ranges.c` reads: each variable with what its description allows, and the scenes.
+fn ranges(fmu: &Fmu, scenes: &[Scene]) -> String {
+    let description = fmu.description();
+    let number = |text: &str| match text {
+        "true" => "1".to_string(),
+        "false" => "0".to_string(),
+        _ => text.to_string(),
+    };
+    let kind = |v: &Variable| match v.kind() {
+        Type::Real => 'R',
+        Type::Boolean => 'B',
+        _ => 'I',
+    };
+    let mut lines = Vec::new();
+    for v in &description.variables {
+        let causality = match v.causality.as_str() {
+            "parameter" => 'p',
+            "input" => 'i',
+            _ => '-',
+        };
+        let [min, max] = match v.kind() {
+            Type::Real => [f64::MIN, f64::MAX].map(|x| format!("{x:?}")),
+            Type::Boolean => [0, 1].map(|n| n.to_string()),
+            Type::Enumeration => [1, description.items(v).len()].map(|n| n.to_string()),
+            _ => [i32::MIN, i32::MAX].map(|n| n.to_string()),
+        };
+        let of = v.attributes();
+        let min = of.min.clone().unwrap_or(min);
+        let max = of.max.clone().unwrap_or(max);
+        let start = number(of.start.as_deref().unwrap_or("0"));
+        let (reference, name) = (v.reference, &v.name);
+        lines.push(format!("v {causality} {} {reference} {min} {start} {max} {name}", kind(v)));
+    }
+    for (n, scene) in scenes.iter().enumerate() {
+        for (name, value) in *scene {
+            let v = description.variable(name).unwrap();
+            lines.push(format!("s {n} {} {} {}", kind(v), v.reference, number(value)));
+        }
+    }
+    lines.join("\n") + "\n"
+}
+
+/// Every parameter and input at min, start and max in every scene, and 2,000 random pairs, under traps, in
+/// both interfaces; each Real as NaN and infinity besides. Scenes bound the integrator's steps: what is tried is
+/// whether numbers hold, not for how long.
+#[cfg(target_os = "linux")]
+fn no_allowed_value_traps(model: &str, scenes: &[Scene]) {
+    if under_valgrind() {
+        return; // which has no such traps
+    }
+    let fmu = Unpacked::new(pack::model(model).unwrap());
+    let file = std::fs::read(fmu.directory.path().join("modelDescription.xml")).unwrap();
+    let root = Element::parse(&file).unwrap();
+    let variables = root.list("ModelVariables");
+    let states = variables.filter_map(|v| v.child("Real")?.get("derivative")).count();
+    let path = fmu.directory.path().join("ranges.txt");
+    std::fs::write(&path, ranges(&fmu.fmu, scenes)).unwrap();
+    let indicators = root.get("numberOfEventIndicators").unwrap_or("0");
+    let said = run(
+        fmu.host("ranges", &["tests/abi/ranges.c"], &[])
+            .arg(&fmu.library)
+            .args([fmu.guid(), &states.to_string(), indicators])
+            .arg(&path)
+            .args(["2000", "7"]),
+        "an allowed value raised a floating-point exception, or one that is none was accepted",
+    );
+    print!("{model}: {said}");
+    let settable = fmu.fmu.description().variables.iter();
+    let settable = settable.filter(|v| ["parameter", "input"].contains(&v.causality.as_str()));
+    let expected = 2 * (3 * scenes.len() * settable.count() + 2000);
+    assert!(number(&said, " runs") >= expected as f64, "{said}");
+    // Refusals are of what a model does not take together; more would prove less.
+    assert!(number(&said, " refused") <= 0.5 * number(&said, " runs"), "{said}");
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn no_allowed_value_of_hubslosh_raises_a_floating_point_exception() {
+    let few = ("solver.max_steps", "300");
+    no_allowed_value_traps(
+        "HubSlosh",
+        &[
+            &[few],
+            &[
+                few,
+                ("slosh.model", "4"),
+                ("slosh.modes", "10"),
+                ("friction.model", "5"),
+                ("wheel.enabled", "true"),
+                ("imu.enabled", "true"),
+                ("imu.lsb", "1e-4"),
+                ("slosh.capillarity", "true"),
+                ("init.omega", "0.3"),
+                ("init.slosh_angle", "0.2"),
+                ("init.slosh_angle_radial", "0.1"),
+                ("tau_cmd", "0.01"),
+            ],
+            &[
+                few,
+                ("slosh.model", "3"),
+                ("slosh.source", "2"),
+                ("slosh.modes", "2"),
+                ("slosh.table.m_liq", "2"),
+                ("slosh.table.mass[1]", "0.8"),
+                ("slosh.table.mass[2]", "0.05"),
+                ("slosh.table.length[1]", "0.05"),
+                ("slosh.table.frequency[2]", "4"),
+                ("slosh.table.zeta[1]", "0.01"),
+                ("baffle.width", "0.01"),
+                ("baffle.depth", "0.02"),
+                ("init.omega", "0.1"),
+                ("friction.model", "3"),
+            ],
+            &[
+                few,
+                ("slosh.model", "6"),
+                ("slosh.modes", "2"),
+                ("baffle.width", "0.01"),
+                ("baffle.depth", "0.02"),
+                ("bench.tilt", "0.02"),
+                ("hub.imbalance", "0.1"),
+                ("init.slosh_angle", "0.1"),
+            ],
+            &[
+                few,
+                ("slosh.model", "5"),
+                ("slosh.modes", "3"),
+                ("init.slosh_angle", "0.1"),
+                ("init.omega", "0.2"),
+                ("friction.asymmetry", "0.1"),
+            ],
+        ],
+    );
+}
+
+/// Four tanks: one constant, one by its dimensions, one that drains, one by its frequency.
+#[cfg(target_os = "linux")]
+const FOUR_TANKS: Scene = &[
+    ("solver.max_steps", "300"),
+    ("tanks", "4"),
+    ("init.omega[1]", "0.1"),
+    ("init.omega[3]", "0.2"),
+    ("tank[1].modes", "3"),
+    ("tank[2].modes", "3"),
+    ("tank[3].modes", "3"),
+    ("tank[4].modes", "3"),
+    ("tank[2].diameter", "0.9"),
+    ("tank[2].position[1]", "1"),
+    ("tank[3].fill.points", "8"),
+    ("tank[3].position[1]", "-1"),
+    ("mass_flow[3]", "0.1"),
+    ("tank[4].frequency[1]", "0.5"),
+    ("tank[4].k[1]", "1"),
+    ("tank[1].p_dot_0[1,1]", "0.1"),
+    ("force[1]", "10"),
+];
+
+#[cfg(target_os = "linux")]
+#[test]
+fn no_allowed_value_of_spacecraft_raises_a_floating_point_exception() {
+    let on_a_pivot = [FOUR_TANKS, &[("mount", "2")]].concat();
+    no_allowed_value_traps(
+        "Spacecraft",
+        &[&[("solver.max_steps", "300")], FOUR_TANKS, &on_a_pivot],
+    );
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn no_allowed_value_of_sloshtank_raises_a_floating_point_exception() {
+    let few = ("solver.max_steps", "300");
+    let by_dimensions = [
+        few,
+        ("tank.modes", "3"),
+        ("tank.diameter", "0.9"),
+        ("a[1]", "1"),
+        ("omega[1]", "0.2"),
+        ("host.mass", "1000"),
+        ("coupling", "3"),
+        ("tank.p_dot_0[1,1]", "0.1"),
+    ];
+    let draining = [
+        few,
+        ("tank.modes", "3"),
+        ("tank.fill.points", "8"),
+        ("mass_flow", "0.1"),
+        ("a[3]", "1"),
+        ("omega[3]", "0.2"),
+    ];
+    no_allowed_value_traps("SloshTank", &[&[few], &by_dimensions, &draining]);
 }
 
 fn noise(rng: &mut fastrand::Rng, longest: usize) -> Vec<u8> {

@@ -377,8 +377,9 @@ impl Outflow<'_> {
         };
         let ends = [*low, *high];
         // Where the flow turns, and at the end.
-        let turn = (-flow.value / flow.slope).clamp(0.0, h);
-        for t in [if turn.is_finite() { turn } else { h }, h] {
+        let turns = flow.value * flow.slope < 0.0 && flow.value.abs() < flow.slope.abs() * h;
+        let turn = if turns { -flow.value / flow.slope } else { h };
+        for t in [turn, h] {
             let liquid = self.left(liquid, t);
             let slack = 1e-12 * high;
             // NaN is beyond, too.
@@ -395,9 +396,18 @@ impl Outflow<'_> {
         for point in self.place.tank.fill.masses() {
             // f t + f' t^2/2 = gone
             let gone = liquid - point;
-            let root = libm::sqrt(flow.value * flow.value + 2.0 * flow.slope * gone);
+            let square = flow.value * flow.value + 2.0 * flow.slope * gone;
+            if square < 0.0 {
+                continue; // the flow turns before
+            }
+            let root = libm::sqrt(square);
             let sum = flow.value + if flow.value < 0.0 { -root } else { root };
-            for at in [2.0 * gone / sum, sum / flow.slope] {
+            for (over, under) in [(2.0 * gone, sum), (sum, flow.slope)] {
+                // Never, and where the division overflows after h.
+                if over.abs() >= under.abs() * h {
+                    continue;
+                }
+                let at = over / under;
                 if at > t + 1e-9 * h && at < next {
                     next = at;
                 }
@@ -440,6 +450,12 @@ pub trait Drains<const D: usize>: System<D> + Sized {
         }
         Ok(())
     }
+}
+
+/// Whether a trial step of an extrapolation, too long for it, has left all that can be: rates would overflow. They
+/// need not go on for the step to be rejected.
+pub fn has_diverged(x: &[f64]) -> bool {
+    x.iter().any(|x| x.abs() > 1e50)
 }
 
 /// Directions and rates of bobs made so, from the first to the last place of the states.

@@ -8,7 +8,7 @@
 //! as in `motion.rs`, with the loads of what flows within. When a flow jumps, its K and L do: an impulse, the same
 //! equations with the flow's slope alone.
 
-use crate::contents::{Contents, Drains, Outflow, Place, normalise_bobs, vec_of};
+use crate::contents::{Contents, Drains, Outflow, Place, has_diverged, normalise_bobs, vec_of};
 use crate::integrator::{RATE_FLOOR, StepError, System};
 use crate::motion::SCALE_TIME;
 use crate::outputs::{Now, TankNow};
@@ -101,6 +101,9 @@ fn scales(turn: f64, position: f64, velocity: f64, swing: impl Fn(usize) -> f64)
 
 impl System<STATES> for Run<'_> {
     fn rates(&self, t: f64, x: &[f64; STATES]) -> [f64; STATES] {
+        if has_diverged(x) {
+            return [0.0; STATES];
+        }
         self.craft.evaluate(x, &Acting::of(self.inputs, t)).0
     }
 

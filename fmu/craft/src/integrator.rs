@@ -208,6 +208,10 @@ const ROUNDING: f64 = 2e-14;
 const LONGER: f64 = 4.0;
 const SHORTER: f64 = 0.1;
 
+/// Errors below this, which make no step longer than [`LONGER`] allows, count as this: 1/0 and powers of numbers near
+/// the largest end the process of a host that traps them.
+const LEAST_ERROR: f64 = 1e-30;
+
 /// Evaluations of the rates up to column k (from 0).
 fn work(k: usize) -> f64 {
     (1 + (k + 1) * (k + 2)) as f64
@@ -265,7 +269,8 @@ fn extrapolate<const D: usize>(
                 if error <= largest { largest } else { f64::min(error, f64::MAX) }
             });
             // Error of column k - 1: h^(2k + 1).
-            let change = 0.94 * libm::pow(0.65 / error, 1.0 / (2 * k + 1) as f64);
+            let change =
+                0.94 * libm::pow(0.65 / f64::max(error, LEAST_ERROR), 1.0 / (2 * k + 1) as f64);
             let length = h * change.clamp(SHORTER, LONGER);
             let is_best = work(k) / length < least;
             if is_best {

@@ -8,7 +8,7 @@ use crate::integrator::MAX_STEPS;
 use crate::rigid::{Factors, Rigid};
 use crate::sizes::{MODES, POINTS, TANKS};
 use crate::table::FillTable;
-use crate::vector::{Quaternion, Vec3, add, norm, rotation, scale, unit_quaternion};
+use crate::vector::{Quaternion, Vec3, add, rotation, scale, unit_quaternion};
 
 /// Symmetric inertia tensor, kg m2: the matrix of J = integral of (|s|^2 1 - s s^T) dm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -371,8 +371,11 @@ impl Problems {
     fn direction(&mut self, name: &str, value: &[f64]) {
         let before = self.0.len();
         self.vector(name, value, "");
+        if self.0.len() > before {
+            return;
+        }
         let size = libm::sqrt(value.iter().map(|x| x * x).sum());
-        if self.0.len() == before && size < 1e-6 {
+        if size < 1e-6 {
             self.0
                 .push(format!("{name} = {value:?} has no direction (allowed: length above 1e-6)"));
         }
@@ -500,12 +503,16 @@ impl Craft {
     fn find_problems(&self, name: &str, problems: &mut Problems) {
         problems.number(&format!("{name}.mass"), self.mass, LIGHTEST, HEAVIEST, "kg");
         problems.vector(&format!("{name}.r"), &self.r, "m");
+        let before = problems.0.len();
         let Inertia { xx, yy, zz, xy, xz, yz } = self.j;
         for (element, value) in [("Jxx", xx), ("Jyy", yy), ("Jzz", zz)] {
             problems.number(&format!("{name}.{element}"), value, 0.0, HEAVIEST, "kg.m2");
         }
         for (element, value) in [("Jxy", xy), ("Jxz", xz), ("Jyz", yz)] {
             problems.number(&format!("{name}.{element}"), value, -HEAVIEST, HEAVIEST, "kg.m2");
+        }
+        if problems.0.len() > before {
+            return;
         }
         // A principal moment below zero is one of the minors below zero.
         let minors = [
@@ -578,7 +585,7 @@ impl Parameters {
         problems.vector("init.omega", &self.init.omega, "rad/s");
         problems.vector("init.position", &self.init.position, "m");
         problems.vector("init.velocity", &self.init.velocity, "m/s");
-        if self.mount == Mount::Pivot && norm(self.init.velocity) != 0.0 {
+        if self.mount == Mount::Pivot && self.init.velocity != [0.0; 3] {
             problems.0.push(format!(
                 "init.velocity = {:?} m/s (allowed with mount = pivot: 0, which holds O)",
                 self.init.velocity

@@ -121,6 +121,10 @@ pub fn along_rod(p: Vec3, hinge: Vec3) -> [f64; 6] {
 /// up to 1e12 kg and arms up to 1e9 m, is far from overflow.
 const LARGEST_INVERSE: f64 = 1e30;
 
+/// What is divided by at least, so that the factors of any matrix are finite. Its inverse is above
+/// [`LARGEST_INVERSE`].
+const SMALLEST_DIVISOR: f64 = 0.5 / LARGEST_INVERSE;
+
 /// A symmetric positive definite matrix as L D L^T, L with ones on its diagonal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Factors<T = f64> {
@@ -152,8 +156,8 @@ impl<T: Number> Factors<T> {
                 d = d - l[j][k] * x;
                 l[j][k] = x;
             }
-            inverse[j] = d.recip();
-            pivots[j] = d.value() / matrix[j][j].value();
+            inverse[j] = d.at_least(SMALLEST_DIVISOR).recip();
+            pivots[j] = d.value() / f64::max(matrix[j][j].value(), SMALLEST_DIVISOR);
         }
         Factors { l, inverse, pivots }
     }

@@ -37,7 +37,7 @@
 //! flow is an impulse on the host, which a force cannot be; it is left out, here and in the bobs.
 
 use crate::bob::{Bob, BobNow};
-use crate::contents::{Drains, Outflow, Place, normalise_bobs, vec_of};
+use crate::contents::{Drains, Outflow, Place, has_diverged, normalise_bobs, vec_of};
 use crate::integrator::{
     Limits, MAX_MAGNITUDE, MAX_STEPS, Motion, RATE_FLOOR, StepError, System, advance,
 };
@@ -245,6 +245,9 @@ fn scales(swing: impl Fn(usize) -> f64) -> [f64; TANK_STATES] {
 
 impl System<TANK_STATES> for Run<'_> {
     fn rates(&self, t: f64, x: &[f64; TANK_STATES]) -> [f64; TANK_STATES] {
+        if has_diverged(x) {
+            return [0.0; TANK_STATES];
+        }
         let TankInputs { a, omega_dot, mass_flow, .. } = self.inputs;
         let moved = [a.at(t), self.inputs.omega_at(t), omega_dot.at(t)];
         draining_rates(self.place, x, &(moved, mass_flow.at(t)), mass_flow.slope)

@@ -29,6 +29,10 @@ pub trait Number:
     fn result(self) -> f64;
     /// The value.
     fn value(self) -> f64;
+    /// The larger of itself and a constant.
+    fn at_least(self, floor: f64) -> Self {
+        if self.value() < floor { Self::constant(floor) } else { self }
+    }
     /// 1/self
     fn recip(self) -> Self;
     /// Of a quantity above 0.

@@ -45,7 +45,8 @@ pub struct Pendulum {
 pub fn pendulum(n: usize, d: f64, h: f64, m_liq: f64) -> Pendulum {
     let (xi, radius) = (XI[n], d / 2.0);
     let tanh = libm::tanh(2.0 * xi * h / d);
-    let u = xi * h / radius;
+    // Deeper, the bottom is out of reach: beyond 700 sinh overflows.
+    let u = f64::min(xi * h / radius, 700.0);
     Pendulum {
         mass: m_liq * d * tanh / (xi * (xi * xi - 1.0) * h),
         length: d / (2.0 * xi * tanh),

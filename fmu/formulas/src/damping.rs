@@ -85,7 +85,8 @@ pub fn covered(radius: f64, width: f64) -> f64 {
 
 /// How much of the surface's motion is left at a ring `depth` below it in an upright cylinder.
 pub fn motion_at_ring(radius: f64, depth: f64) -> f64 {
-    exp(-1.84 * depth / radius)
+    // Deeper there is none; what is divided by it stays finite.
+    exp(-f64::min(1.84 * depth / radius, 100.0))
 }
 
 /// Ring baffle in an upright cylinder (Miles 1958): 2.83 exp(-4.60 d/R) alpha^(3/2) (eta/R)^(1/2), alpha

@@ -57,7 +57,10 @@ impl Plant {
         start_time: f64,
         tolerance: f64,
     ) -> Result<Plant, Vec<String>> {
-        let mut problems = Plant::problems(p);
+        let problems = Plant::problems(p);
+        if !problems.is_empty() {
+            return Err(problems);
+        }
         let mut state = State {
             time: start_time,
             x: [0.0; STATES],
@@ -74,9 +77,8 @@ impl Plant {
         state.x[x::OMEGA] = p.init.omega;
         state.x[x::WHEEL_SPEED] = p.wheel.speed_0;
         let mut plant = Plant::of_parameters(p, state, tolerance);
-        problems.extend(plant.liquid.start_problem(&p.init));
-        if !problems.is_empty() {
-            return Err(problems);
+        if let Some(problem) = plant.liquid.start_problem(&p.init) {
+            return Err(vec![problem]);
         }
         let angles = Angles {
             angle: [p.init.slosh_angle_radial, p.init.slosh_angle],
