@@ -403,6 +403,88 @@ fn no_allowed_value_of_sloshtank_raises_a_floating_point_exception() {
     no_allowed_value_traps("SloshTank", &[&[few], &by_dimensions, &draining]);
 }
 
+/// What a host's floating-point environment does to 10 s of a motion: the bits of all Reals, ten times.
+#[cfg(all(target_os = "linux", target_arch = "x86_64"))]
+fn rounding_shows_in_the_last_digits_alone(model: &str, settings: Scene) {
+    if under_valgrind() {
+        return; // which rounds to nearest and flushes nothing
+    }
+    let fmu = Unpacked::new(pack::model(model).unwrap());
+    let description = fmu.fmu.description();
+    let settings = settings.iter().map(|(name, value)| {
+        let v = description.variable(name).unwrap();
+        let (kind, value) = match (v.kind(), *value) {
+            (Type::Real, value) => ('R', value),
+            (Type::Boolean, value) => ('B', if value == "true" { "1" } else { "0" }),
+            (_, value) => ('I', value),
+        };
+        format!("{kind}:{}={value}", v.reference)
+    });
+    let settings: Vec<String> = settings.collect();
+    let is_motion = |v: &&Variable| {
+        v.kind() == Type::Real && ["output", "local"].contains(&v.causality.as_str())
+    };
+    let reals: Vec<String> =
+        description.variables.iter().filter(is_motion).map(|v| v.reference.to_string()).collect();
+    let motion = |mode: &str| -> Vec<f64> {
+        let said = run(
+            fmu.host("rounding", &["tests/abi/rounding.c"], &[])
+                .arg(&fmu.library)
+                .args([fmu.guid(), mode])
+                .args(&settings)
+                .arg("--")
+                .args(&reals),
+            "a host with another rounding mode met an error",
+        );
+        said.lines().map(|line| f64::from_bits(u64::from_str_radix(line, 16).unwrap())).collect()
+    };
+    let nearest = motion("nearest");
+    assert_eq!(nearest.len(), 10 * reals.len());
+    let peak =
+        |i: usize| nearest.iter().skip(i).step_by(reals.len()).fold(0.0, |p, x| x.abs().max(p));
+    assert_eq!(motion("flush"), nearest, "{model}: subnormal numbers taken for 0");
+    for mode in ["up", "down", "zero"] {
+        let other = motion(mode);
+        assert_ne!(other, nearest, "{model}: the mode is in effect");
+        for (i, (x, y)) in nearest.iter().zip(&other).enumerate() {
+            // Some 1e5 operations, each off by up to 2e-16 in the same direction, make 2e-11; 1e-12 is seen.
+            let allowed = 1e-10 * f64::max(peak(i % reals.len()), f64::MIN_POSITIVE);
+            assert!((x - y).abs() <= allowed, "{model}, {mode}, Real {i}: {x} {y}");
+        }
+    }
+}
+
+#[cfg(all(target_os = "linux", target_arch = "x86_64"))]
+#[test]
+fn rounding_modes_change_last_digits_and_flushing_of_subnormal_numbers_nothing() {
+    rounding_shows_in_the_last_digits_alone(
+        "HubSlosh",
+        &[
+            ("slosh.model", "4"),
+            ("slosh.modes", "3"),
+            ("init.omega", "0.3"),
+            ("init.slosh_angle", "0.2"),
+            ("init.slosh_angle_radial", "0.1"),
+            ("imu.enabled", "true"),
+            ("tau_cmd", "0.002"),
+        ],
+    );
+    rounding_shows_in_the_last_digits_alone(
+        "Spacecraft",
+        &[
+            ("tanks", "2"),
+            ("tank[1].modes", "3"),
+            ("tank[2].fill.points", "8"),
+            ("tank[2].position[1]", "1"),
+            ("mass_flow[2]", "0.1"),
+            ("init.omega[1]", "0.1"),
+            ("init.omega[3]", "0.2"),
+            ("tank[1].p_dot_0[1,1]", "0.5"),
+            ("force[3]", "100"),
+        ],
+    );
+}
+
 fn noise(rng: &mut fastrand::Rng, longest: usize) -> Vec<u8> {
     let length = rng.usize(..longest);
     std::iter::repeat_with(|| rng.u8(..)).take(length).collect()
