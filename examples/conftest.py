@@ -12,6 +12,11 @@ from pathlib import Path
 import pytest
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Let no example leave the range in which its model is known."""
+    config.addinivalue_line("filterwarnings", "error::hubslosh.FmuWarning")
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
     """Say where the FMU is, and what example 7 made in the harness."""
     parser.addoption("--fmu", default="HubSlosh", help="file, or the name of a packed one")

@@ -1,4 +1,4 @@
-"""Thrust phase of a spacecraft with a 2 m tank of liquid oxygen at 0.0025 m/s².
+"""Thrust phase of a spacecraft with a 2 m tank of liquid oxygen at 0.012 m/s².
 
 python examples/5_thrust_phase/thrust.py
 """
@@ -24,16 +24,16 @@ CRAFT = {
     "friction.model": "none",
 }
 """Dry craft with the tank half a metre off the axis, free; liquid oxygen at 90 K."""
-THRUST = 0.0025
+THRUST = 0.012
 """Specific force of the engine, m/s²."""
 COAST = THRUST / 10
-"""In coast (Bond number 22; with far less the surface's tension shapes the liquid), m/s²."""
-START, END, STOP = 200.0, 2200.0, 3000.0  # s
-RAMP = 10.0  # s
-PERIOD, LATENCY = 1.0, 1
+"""In coast (Bond number 104; below 100 surface tension counts, and is not in the model), m/s²."""
+START, END, STOP = 100.0, 1200.0, 1600.0  # s
+RAMP = 5.0  # s
+PERIOD, LATENCY = 0.5, 1
 """Of the controller: s, cycles."""
 ZETA = 0.7
-BANDWIDTHS = {"below": 0.004, "near": 0.012, "above": 0.03}
+BANDWIDTHS = {"below": 0.009, "near": 0.026, "above": 0.066}
 """Hz, by where they are seen from the slosh frequency."""
 DISPLACED = np.radians(10)
 """Slosh angle at the start, left by a manoeuvre before, rad."""
@@ -79,7 +79,7 @@ def run(fmu: str | Path, bandwidth: float, model: str = "spherical") -> pd.DataF
 
 def decay(table: pd.DataFrame) -> float:
     """Return the rate at which slosh decays under thrust, from 10 and 90 % of it, 1/s."""
-    thrust = table.query("@START + 300 <= time < @END")
+    thrust = table.query("@START + 150 <= time < @END")
     n = len(thrust) // 4
     first, last = (np.std(thrust["slosh_angle"].iloc[s]) for s in (slice(0, n), slice(-n, None)))
     return np.log(first / last) / (3 * n * PERIOD)
@@ -96,7 +96,7 @@ def figure(fmu: str | Path, runs: dict[str, pd.DataFrame], path: Path) -> None:
         slosh.plot(table["time"], np.degrees(table["slosh_angle"]), color=color, linewidth=0.8)
         rate = decay(table) / abs(slosh_pole(fmu, BANDWIDTHS[name]))
         damping.plot(BANDWIDTHS[name], 100 * rate, "o", color=color, label=f"simulated, {label}")
-    bandwidth = np.geomspace(0.001, 0.06, 60)
+    bandwidth = np.geomspace(0.002, 0.13, 60)
     poles = np.array([slosh_pole(fmu, f) for f in bandwidth])
     damping.semilogx(bandwidth, -100 * poles.real / np.abs(poles), color="black", label="predicted")
     for ax in (error, slosh):
