@@ -12,12 +12,11 @@ use crate::profile::{Torque, Written};
 use crate::progress::Progress;
 use crate::run::{Run, TORQUE};
 use crate::svg::{Axis, Chart, Series, Style};
+use host::budget;
 use host::fmi2::Fmu;
 use host::output;
 use signals::table::Table;
 
-/// The longest record in steps, about 0.3 GB.
-const MOST_STEPS: f64 = 1e7;
 /// Fewest records whose scatter is a standard error: that of four is uncertain by 40 %.
 const LEAST_RECORDS: usize = 4;
 /// More records would take days.
@@ -97,10 +96,11 @@ impl Recording {
             self.hours
         );
         ensure!(
-            (100.0..=MOST_STEPS).contains(&(seconds * rate)),
-            "{} h at imu.rate = {rate} Hz are {:.0} samples; 100 to {MOST_STEPS:.0} are allowed",
+            (100.0..=budget::ROWS as f64).contains(&(seconds * rate)),
+            "{} h at imu.rate = {rate} Hz are {:.0} samples (allowed: 100 to {})",
             self.hours,
-            seconds * rate
+            seconds * rate,
+            budget::ROWS
         );
 
         let runs = (1..=self.records)

@@ -5,6 +5,7 @@ use std::path::Path;
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::profile::Torque;
+use host::budget;
 use host::description::{ModelDescription, Type, Variable};
 use host::fmi2::{Fmu, Instance};
 use signals::table::{self, Table};
@@ -129,9 +130,6 @@ pub fn histories(
         .collect()
 }
 
-/// Most steps of a run: the table of each of its signals takes 160 MB.
-pub const MOST_STEPS: f64 = 2e7;
-
 /// Steps between two reports of progress.
 const REPORT_EVERY: usize = 1024;
 
@@ -141,15 +139,9 @@ impl Run {
         self.torque.span().0
     }
 
-    /// Number of communication steps; the last may be shorter than H.
+    /// Number of communication steps; the last may be shorter than H. None if [`Run::check`] fails.
     pub fn steps(&self) -> usize {
-        let exact = (self.stop - self.start()) / self.step;
-        // 2700 s / 0.02 s is 135000 steps, however the quotient rounds
-        if (exact - exact.round()).abs() < 1e-6 {
-            exact.round() as usize
-        } else {
-            exact.ceil() as usize
-        }
+        budget::steps(self.stop - self.start(), self.step).unwrap_or(0)
     }
 
     /// Communication point `k`, s; the last is the stop time.
@@ -185,23 +177,12 @@ impl Run {
     /// Fails with one sentence if the numbers make no sense.
     pub fn check(&self) -> Result<()> {
         ensure!(
-            self.step > 0.0 && self.step.is_finite(),
-            "the step must be a positive number of seconds, not {}",
-            self.step
-        );
-        ensure!(
             self.stop > self.start() && self.stop.is_finite(),
             "the stop time must be later than {} s, not {} s",
             self.start(),
             self.stop
         );
-        let steps = (self.stop - self.start()) / self.step;
-        ensure!(
-            steps <= MOST_STEPS,
-            "{:?} s in steps of {:?} s are {steps:.3e} steps (allowed: at most {MOST_STEPS:.0e})",
-            self.stop - self.start(),
-            self.step
-        );
+        budget::steps(self.stop - self.start(), self.step)?;
         if let Some(tolerance) = self.tolerance {
             ensure!(
                 tolerance > 0.0 && tolerance.is_finite(),
@@ -246,7 +227,9 @@ impl Run {
         columns: &[&str],
         progress: impl Fn(u64),
     ) -> Result<Table> {
+        self.check()?;
         let steps = self.steps();
+        budget::table(steps + 1, 1 + self.driven().len() + columns.len())?;
         let mut recorder = Recorder::new(instance, columns, steps + 1)?;
         let description = instance.fmu().description();
         let driven = self.driven();

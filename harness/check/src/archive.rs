@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::io::{Cursor, Read};
 
 use anyhow::{Context, Result};
+use host::temporary;
 use zip::read::Config;
 // Unstable by its own word, and the one reader that shows repeated names; the lock file pins it.
 use zip::unstable::read::ZipIterable;
@@ -128,11 +129,8 @@ impl Archive {
 
     /// Puts the files that hosts would find into a temporary directory; names that lead out of it
     /// and links are left out, and found by the rules.
-    pub fn unpack(&self) -> Result<tempfile::TempDir> {
-        let directory = tempfile::Builder::new()
-            .prefix("hubslosh-check-")
-            .tempdir()
-            .context("no temporary directory")?;
+    pub fn unpack(&self) -> Result<temporary::Folder> {
+        let directory = temporary::Folder::new()?;
         for entry in &self.entries {
             let Ok(content) = &entry.content else { continue };
             if entry.link || entry.name.ends_with('/') || !name_faults(&entry.name).is_empty() {

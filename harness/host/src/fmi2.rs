@@ -19,6 +19,7 @@ use libloading::Library;
 
 use crate::description::{ModelDescription, Type, Value};
 use crate::output::sha256;
+use crate::temporary;
 
 pub mod guarded;
 
@@ -285,7 +286,7 @@ pub struct Fmu {
     path: PathBuf,
     // dropped in this order: first the code, then the files
     _library: Library,
-    _directory: Option<tempfile::TempDir>,
+    _directory: Option<temporary::Folder>,
 }
 
 impl Fmu {
@@ -299,10 +300,7 @@ impl Fmu {
         let hash = sha256(&bytes);
         let mut archive = zip::ZipArchive::new(std::io::Cursor::new(bytes))
             .with_context(|| format!("{name} is not an FMU: it is not a zip archive"))?;
-        let directory = tempfile::Builder::new()
-            .prefix("hubslosh-")
-            .tempdir()
-            .context("no temporary directory")?;
+        let directory = temporary::Folder::new()?;
         archive.extract(directory.path()).with_context(|| {
             format!("{name} cannot be unpacked to {}", directory.path().display())
         })?;

@@ -2,11 +2,14 @@
 //!
 //! The rest of the harness meets an FMU only through this crate; no code is shared with a model.
 //! Whatever check, pack and bench need alike is here too: reading binaries of any platform, writing
-//! files so that they appear whole or not at all.
+//! files so that they appear whole or not at all, temporary folders, and what a command may take of
+//! a machine.
 
 pub mod binary;
+pub mod budget;
 pub mod description;
 pub mod fmi2;
 pub mod html;
 pub mod output;
+pub mod temporary;
 pub mod xml;

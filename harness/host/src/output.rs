@@ -7,7 +7,10 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use sha2::{Digest, Sha256};
 
+use crate::temporary;
+
 /// Writes `path` through `write`; if that fails, nothing is left and an older file stays as it was.
+/// The file is on the disk before it gets its name, so that a power cut leaves no empty one.
 pub fn atomically<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T>) -> Result<T> {
     let name = path.display();
     let directory = match path.parent() {
@@ -23,7 +26,9 @@ pub fn atomically<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T>) ->
     if path.is_dir() {
         anyhow::bail!("{name} cannot be written: it is a directory");
     }
-    let result = write(file.as_file_mut())?;
+    let _registered = temporary::register(file.path());
+    let result = write(file.as_file_mut()).with_context(|| format!("{name} cannot be written"))?;
+    file.as_file().sync_all().with_context(|| format!("{name} cannot be written"))?;
     file.persist(path).with_context(|| format!("{name} cannot be written"))?;
     Ok(result)
 }
@@ -61,7 +66,8 @@ mod tests {
             file.write_all(b"half")?;
             anyhow::bail!("no more")
         });
-        assert_eq!(failed.unwrap_err().to_string(), "no more");
+        let error = format!("{:#}", failed.unwrap_err());
+        assert_eq!(error, format!("{} cannot be written: no more", path.display()));
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
         assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 1);
     }

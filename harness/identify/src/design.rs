@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 use anyhow::{Result, ensure};
 use bench::analysis::linear::Linear;
 use bench::random::Random;
+use host::budget;
 use host::fmi2::Fmu;
 use nalgebra::Matrix5;
 
@@ -41,7 +42,19 @@ impl Multisine {
     /// smallest crest factor of 20 draws are taken.
     pub fn new(period: f64, band: (f64, f64), peak: f64, seed: u64) -> Result<Self> {
         ensure!(0.0 < band.0 && band.0 < band.1, "a multisine's band must be 0 < f0 < f1");
-        ensure!(peak > 0.0 && period > 0.0, "peak torque and period must be positive");
+        ensure!(
+            peak > 0.0 && period > 0.0 && peak.is_finite() && period.is_finite(),
+            "peak torque and period must be positive numbers"
+        );
+        let lines = (band.1 - band.0) * period / 2.0;
+        ensure!(
+            lines <= budget::LINES as f64 && band.1 * period <= f64::from(u32::MAX),
+            "a band from {} to {} Hz has {lines:.1e} odd lines at a period of {period} s (allowed: at \
+             most {})",
+            band.0,
+            band.1,
+            budget::LINES
+        );
         let mut random = Random::new(seed, 0);
         let first = (band.0 * period).ceil() as u32 | 1;
         let odd: Vec<u32> = (first..=(band.1 * period).floor() as u32).step_by(2).collect();
@@ -89,6 +102,20 @@ impl Multisine {
     pub fn scaled(&self, factor: f64) -> Self {
         let amplitudes = self.amplitudes.iter().map(|a| a * factor).collect();
         Multisine { amplitudes, ..self.clone() }
+    }
+
+    /// Fails if it is too much work to compute that many rows.
+    pub fn check_rows(&self, rows: usize) -> Result<()> {
+        let sines = (rows as u64).saturating_mul(self.lines.len() as u64);
+        ensure!(
+            sines <= budget::SINES,
+            "{rows} rows of {} lines are {:.1e} sines (allowed: at most {:.0e}); a shorter record, a \
+             narrower band or a shorter period has fewer",
+            self.lines.len(),
+            sines as f64,
+            budget::SINES as f64
+        );
+        Ok(())
     }
 
     /// Frequencies of the lines with power, Hz.

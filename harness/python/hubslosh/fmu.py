@@ -2,6 +2,7 @@
 
 import atexit
 import difflib
+import math
 import shutil
 from collections.abc import Callable, Iterable
 from functools import cached_property
@@ -19,6 +20,9 @@ FMI 2.0's linux64 is for x86-64, but fmpy looks there on ARM too.
 
 Value = float | int | bool | str
 """A value in SI units; of an enumeration also an item's name."""
+
+INTEGERS = range(-(2**31), 2**31)
+"""Numbers that fmi2Integer has."""
 
 Quantity = Value | tuple[float, str]
 """A value, or a number with its unit, such as ``(50, "mm")``."""
@@ -143,16 +147,16 @@ class Fmu:
             if isinstance(value, tuple) and variable.type != "Real":
                 raise ValueError(f"a value of type {variable.type} has no unit")
             return converters[variable.type](value)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise FmuError(f"{name} cannot be {value!r}: {error}") from None
 
     def _real(self, name: str, value: Quantity) -> float:
         if not isinstance(value, tuple):
-            return float(value)
+            return _finite(value)
         if len(value) != 2:
             raise ValueError("a number and its unit are expected")
         factor, offset = self.scale(name, value[1])
-        return (float(value[0]) - offset) / factor
+        return _finite((float(value[0]) - offset) / factor)
 
     def scale(self, name: str, unit: str) -> tuple[float, float]:
         """Return (factor, offset) of a unit: a number in it is factor · value + offset."""
@@ -177,11 +181,21 @@ def _item(variable: ScalarVariable, value: Any) -> int:
         raise ValueError(f"there are {', '.join(items)}") from None
 
 
+def _finite(value: Any) -> float:
+    """Return a number that is neither NaN nor infinite."""
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError("a finite number is expected")
+    return number
+
+
 def _integer(value: Any) -> int:
-    """Return a whole number."""
+    """Return a whole number that FMI can hand over; C would wrap another one silently."""
     whole = int(value)
     if whole != float(value):
         raise ValueError("a whole number is expected")
+    if whole not in INTEGERS:
+        raise ValueError(f"whole numbers from {INTEGERS[0]} to {INTEGERS[-1]} are expected")
     return whole
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from .fmu import Fmu, FmuError, Quantity
 from .plant import TORQUE, Plant
-from .simulation import check_outputs, check_parameters, histories_of
+from .simulation import check_outputs, check_parameters, histories_of, too_many_rows
 
 Law = Callable[[float, NDArray[np.float64]], float]
 """What a controller computes in a cycle: the command from time (s) and measurements."""
@@ -68,6 +68,8 @@ def closed_loop(
     columns = fmu.names("output") if outputs is None else list(outputs)
     check_outputs(fmu, columns, problems)
     check_outputs(fmu, list(measured), problems)
+    if not problems:
+        problems += too_many_rows(0.0, stop, period / substeps)
     if problems:
         raise FmuError("; ".join(problems))
 

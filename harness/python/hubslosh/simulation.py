@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from .fmu import Fmu, FmuError, Quantity, did_you_mean
+from .fmu import INTEGERS, Fmu, FmuError, Quantity, did_you_mean
 from .plant import TORQUE, Plant
 from .tables import read_parameters
 
@@ -18,6 +18,9 @@ SLOPES = {"tau_slope": TORQUE}
 
 DEFAULT_STEP = 0.02
 """s, where neither rows nor the FMU suggest another."""
+
+MOST_ROWS = 20_000_000
+"""Of a table; the same as in ``harness/host/src/budget.rs``."""
 
 
 class History:
@@ -109,6 +112,8 @@ def simulate(
         problems.append(f"step must be a positive number of seconds, not {step}")
     if tolerance is not None and not (np.isfinite(tolerance) and tolerance > 0):
         problems.append(f"tolerance must be a positive number, not {tolerance}")
+    if not problems and step is not None:
+        problems += too_many_rows(start, stop, step)
     if problems:
         raise FmuError("; ".join(problems))
 
@@ -136,6 +141,15 @@ def simulate(
     units = {name: fmu.unit(name) for name in table.columns if name != "time"}
     table.attrs["units"] = {"time": "s"} | units
     return table
+
+
+def too_many_rows(start: float, stop: float, step: float) -> list[str]:
+    """Return what is wrong with that many rows, if they are more than a computer should hold."""
+    rows = (stop - start) / step
+    if rows <= MOST_ROWS:
+        return []
+    span = f"{stop - start:g} s in steps of {step:g} s"
+    return [f"{span} are {rows:.3e} rows (allowed: at most {MOST_ROWS})"]
 
 
 def communication_points(
@@ -216,10 +230,18 @@ def histories_of(
     for column, name in slopes.items():
         if column in columns and name not in columns:
             problems.append(f"inputs has {column} but not {name}")
-    for name in columns:
+    for name, values in columns.items():
         kind = "Real" if name in slopes else fmu.variable(name).type
         if kind == "String":
             problems.append(f"the input {name} is a text; only numbers can be given over time")
+        if kind in ("Integer", "Enumeration"):
+            whole = (values == np.round(values)) & (abs(values) <= INTEGERS[-1])
+            if not whole.all():
+                row = np.flatnonzero(~whole)[0]
+                problems.append(
+                    f"the column {name} of inputs is {values[row]} in row {row} (allowed: whole "
+                    f"numbers up to ±{INTEGERS[-1]})"
+                )
     if problems or time is None:
         return {}
     slope_of = {name: columns.pop(column) for column, name in slopes.items() if column in columns}

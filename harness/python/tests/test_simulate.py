@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from fmpy import simulate_fmu
 
-from hubslosh import FmuError, FmuWarning, Plant, RunError, batch, drive, simulate
+from hubslosh import FmuError, FmuWarning, Plant, RunError, batch, drive, simulate, simulation
 
 STEP = 0.02  # s
 TIME = np.arange(3001) * STEP
@@ -144,6 +144,14 @@ def test_everything_wrong_is_said_at_once(fmu: Path) -> None:
         ({"stop": -1.0}, "stop must be later than start"),
         ({"tolerance": 0.0}, "tolerance must be a positive number"),
         ({"parameters": {"slosh.modes": 1.5}}, "a whole number is expected"),
+        # C would take their last 32 bits: 1, and a seed
+        ({"parameters": {"slosh.modes": 2**32 + 1}}, "from -2147483648 to 2147483647"),
+        ({"parameters": {"imu.seed": 2**31}}, "from -2147483648 to 2147483647"),
+        ({"parameters": {"slosh.modes": float("inf")}}, "slosh.modes cannot be inf"),
+        ({"parameters": {"slosh.model": 2**32 + 2}}, "there are frozen, linear"),
+        ({"parameters": {"tank.h": float("nan")}}, "a finite number is expected"),
+        ({"stop": 1e12}, "rows (allowed: at most 20000000)"),
+        ({"step": 1e-300}, "rows (allowed: at most 20000000)"),
         ({"parameters": {"tank.h": 0.0}}, "tank.h"),
     ],
 )
@@ -152,6 +160,12 @@ def test_wrong_arguments_are_told_in_a_sentence(fmu: Path, arguments: dict, sent
     with pytest.raises(FmuError) as told:
         simulate(fmu, **arguments)
     assert sentence in str(told.value)
+
+
+def test_the_most_rows_are_those_of_the_command_line() -> None:
+    """One number for both."""
+    budget = Path(__file__).parents[2] / "host" / "src" / "budget.rs"
+    assert f"pub const ROWS: usize = {simulation.MOST_ROWS:_};" in budget.read_text()
 
 
 @pytest.mark.parametrize("loop", ["run", "step_by_step"])

@@ -17,6 +17,7 @@ use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
 
+use host::budget;
 use host::output::atomically;
 
 /// Columns of equal length.
@@ -90,30 +91,34 @@ impl Table {
             Format::Parquet => read_parquet(file, wanted),
         }
         .with_context(|| format!("{name} cannot be used"))?;
-        for (column, values) in table.names.iter().zip(&table.columns) {
-            if let Some(row) = values.iter().position(|v| !v.is_finite()) {
-                bail!(
-                    "{name}, row {}: {column} is {} (allowed: finite numbers)",
-                    row + 1,
-                    values[row]
-                );
-            }
-        }
+        table.all_finite().map_err(|error| anyhow!("{name}, {error}"))?;
         Ok(table)
     }
 
-    /// Writes the table; `metadata` are a Parquet file's key-value pairs.
+    /// Fails with the first value that is not finite.
+    pub fn all_finite(&self) -> Result<()> {
+        for (column, values) in self.names.iter().zip(&self.columns) {
+            if let Some(row) = values.iter().position(|value| !value.is_finite()) {
+                let value = values[row];
+                bail!("row {}: {column} is {value} (allowed: finite numbers)", row + 1);
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the table, if all its values are finite; `metadata` are a Parquet file's key-value
+    /// pairs.
     pub fn write(&self, path: &Path, metadata: &BTreeMap<String, String>) -> Result<()> {
         let format = format_of(path)?;
         atomically(path, |file| match format {
             Format::Csv => self.write_csv(file),
             Format::Parquet => self.write_parquet(file, metadata),
         })
-        .with_context(|| format!("{} was not written", path.display()))
     }
 
-    /// Writes the table as CSV.
+    /// Writes the table as CSV, if all its values are finite.
     pub fn write_csv(&self, file: impl Write) -> Result<()> {
+        self.all_finite()?;
         let mut out = BufWriter::new(file);
         writeln!(out, "{}", self.names.join(","))?;
         for row in 0..self.rows() {
@@ -128,6 +133,7 @@ impl Table {
     }
 
     fn write_parquet(&self, file: &mut File, metadata: &BTreeMap<String, String>) -> Result<()> {
+        self.all_finite()?;
         let fields = self
             .names
             .iter()
@@ -215,6 +221,7 @@ fn read_csv(file: File, wanted: &[&str]) -> Result<Table> {
     let positions = positions(header.iter().map(|h| h.trim_start_matches('\u{feff}')), wanted)?;
     let mut columns = vec![Vec::new(); wanted.len()];
     for (row, record) in reader.records().enumerate() {
+        budget::table(row + 1, wanted.len())?;
         let record = record.with_context(|| format!("row {}", row + 1))?;
         for (column, &position) in columns.iter_mut().zip(&positions) {
             let text = &record[position];
@@ -231,10 +238,12 @@ fn read_parquet(file: File, wanted: &[&str]) -> Result<Table> {
     let metadata = reader.metadata();
     let schema = metadata.file_metadata().schema_descr();
     let positions = positions(schema.columns().iter().map(|c| c.name()), wanted)?;
+    let rows = metadata.row_groups().iter().map(|group| group.num_rows().max(0) as usize);
+    budget::table(rows.fold(0, usize::saturating_add), wanted.len())?;
     let mut columns = vec![Vec::new(); wanted.len()];
     for group in 0..metadata.num_row_groups() {
         let group = reader.get_row_group(group)?;
-        let rows = group.metadata().num_rows() as usize;
+        let rows = group.metadata().num_rows().max(0) as usize;
         for (&position, (name, values)) in positions.iter().zip(wanted.iter().zip(&mut columns)) {
             match group.get_column_reader(position)? {
                 ColumnReader::DoubleColumnReader(r) => read_values(r, rows, values, |v| v),

@@ -3,6 +3,8 @@
 
 use std::sync::Arc;
 
+use host::budget::FREQUENCY;
+
 use super::Values;
 use super::noise::Noise;
 use super::shape::{Dwell, Law, Piece, Pieces, Shape, Sweep};
@@ -102,7 +104,12 @@ const SWEEP: &[Parameter] = &[
     parameter("f1", 3.5, "Hz", "last frequency", Allowed::Positive),
     duration(2700.0),
 ];
-const SWEEPS: &[Demand] = &[(|v| v.of("f0") != v.of("f1"), "f0 and f1 are equal; use sine")];
+const SWEEPS: &[Demand] = &[(|v| v.of("f0") != v.of("f1"), "f0 and f1 are equal; use sine"), BAND];
+/// Beyond it a phase is no number that has a sine.
+const BAND: Demand = (
+    |v| ["f0", "f1"].iter().all(|name| (1.0 / FREQUENCY..=FREQUENCY).contains(&v.of(name))),
+    "f0 and f1 must be from 1e-9 to 1e9 Hz",
+);
 
 fn sweep(v: &Values, law: Law) -> Arc<dyn Shape> {
     let [amplitude, f0, f1, duration] = ["amplitude", "f0", "f1", "duration"].map(|n| v.of(n));
@@ -134,7 +141,7 @@ pub const KINDS: &[Kind] = &[
         says: "A sin 2πft: a dwell",
         parameters: &[
             parameter("amplitude", 0.1, "N.m", "torque amplitude", Allowed::Any),
-            parameter("frequency", 2.4, "Hz", "frequency", Allowed::Any),
+            parameter("frequency", 2.4, "Hz", "frequency", Allowed::Within(FREQUENCY)),
             duration(60.0),
         ],
         demands: &[],
@@ -213,6 +220,7 @@ pub const KINDS: &[Kind] = &[
         ],
         demands: &[
             (|v| v.of("f0") < v.of("f1"), "it expects 0 < f0 < f1"),
+            BAND,
             (
                 |v| v.of("rms") <= v.of("limit") / 2.0,
                 "rms must be at most half of limit (else too much of it is clipped)",

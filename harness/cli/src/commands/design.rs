@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use anyhow::{Result, bail};
+use anyhow::{Result, bail, ensure};
 use bench::analysis::linear::{Linear, Mode};
 use bench::profile::Written;
+use host::budget;
 use host::fmi2::Fmu;
 use identify::design::{self, Multisine, Wheel};
 use identify::noise::Noise;
@@ -59,6 +60,8 @@ pub struct DesignArgs {
 
 /// Rows of the plan are this far apart, s.
 const STEP: f64 = 0.02;
+/// Columns of numbers that the bound is computed from.
+const COLUMNS: usize = 20;
 
 impl DesignArgs {
     /// Runs the command.
@@ -79,32 +82,40 @@ impl DesignArgs {
             inertia: real("wheel.I")?,
             speeds: [real("wheel.speed_0")?, real("wheel.speed_min")?, real("wheel.speed_max")?],
         };
-        let sampled = |stop: f64, at: &dyn Fn(f64) -> f64| -> (Vec<f64>, Vec<f64>) {
+        let sampled = |stop: f64, at: &dyn Fn(f64) -> f64| -> Result<(Vec<f64>, Vec<f64>)> {
+            // time, torque, rate and its derivative with respect to every unknown
+            budget::table(budget::steps(stop, STEP)? + 1, COLUMNS)?;
             let rows = (stop / STEP).round() as usize;
             let time: Vec<f64> = (0..=rows).map(|k| k as f64 * STEP).collect();
             let tau = time.iter().map(|&t| at(t)).collect();
-            (time, tau)
+            Ok((time, tau))
         };
         let (time, torque) = match (&self.profile, self.multisine) {
             (Some(profile), _) => {
                 let torque = profile.parse::<Written>()?.torque()?;
-                sampled(torque.span().1, &|t| torque.at(t))
+                sampled(torque.span().1, &|t| torque.at(t))?
             }
             (None, Some(peak)) => {
                 let [f0, f1] = self.band[..] else { bail!("--band needs two frequencies, Hz") };
+                ensure!(
+                    f1 <= 0.5 / STEP,
+                    "--band ends at {f1} Hz (allowed: up to {} Hz, half of what rows {STEP} s apart show)",
+                    0.5 / STEP
+                );
                 let mut torque = Multisine::new(self.period, (f0, f1), peak, self.seed)?;
                 if self.optimal {
                     let plant = expected(&mut real, peak)?;
                     let shares = design::d_optimal(&plant, &torque.frequencies());
                     torque = torque.shaped(&shares, peak, self.seed);
                 }
-                let (time, tau) = sampled(self.duration, &|t| torque.at(t));
+                torque.check_rows(budget::steps(self.duration, STEP)?)?;
+                let (time, tau) = sampled(self.duration, &|t| torque.at(t))?;
                 let factor = wheel.factor(&time, &tau);
                 if factor < 1.0 {
                     println!("torques times {factor:.4}, within the wheel's limits");
                     torque = torque.scaled(factor);
                 }
-                sampled(self.duration, &|t| torque.at(t))
+                sampled(self.duration, &|t| torque.at(t))?
             }
             (None, None) => bail!("a plan needs --profile or --multisine"),
         };

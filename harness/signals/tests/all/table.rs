@@ -32,3 +32,18 @@ fn a_missing_column_and_a_nan_are_named() {
     let error = format!("{:#}", Table::read(&path, &["time", "tau_cmd"]).unwrap_err());
     assert!(error.contains("a.csv, row 2: tau_cmd is NaN"), "{error}");
 }
+
+#[test]
+fn a_table_with_a_value_that_is_not_finite_is_not_written() {
+    let directory = tempfile::tempdir().unwrap();
+    let names = ["time", "omega"].map(String::from).to_vec();
+    let table = Table::new(names, vec![vec![0.0, 1.0], vec![0.5, f64::NAN]]);
+    for name in ["a.csv", "a.parquet"] {
+        let path = directory.path().join(name);
+        let error = format!("{:#}", table.write(&path, &BTreeMap::new()).unwrap_err());
+        let why = "cannot be written: row 2: omega is NaN (allowed: finite numbers)";
+        assert!(error.contains(why) && error.contains(name), "{error}");
+        assert!(!path.exists());
+    }
+    assert!(table.write_csv(Vec::new()).is_err());
+}

@@ -1,0 +1,102 @@
+//! What one command may take of a machine. Stated here alone, and checked before anything is
+//! allocated or started: a number that was mistyped is answered by a sentence.
+
+use anyhow::{Result, ensure};
+
+/// Rows of a table, steps of a run: 111 hours at 50 Hz.
+pub const ROWS: usize = 20_000_000;
+/// Bytes of the numbers that are held at once: the bench's columns of the longest run, twice.
+pub const BYTES: u64 = 4 << 30;
+/// Runs of a plan.
+pub const RUNS: usize = 100_000;
+/// Threads that work at once.
+pub const JOBS: usize = 512;
+/// Lines of a multisine.
+pub const LINES: usize = 20_000;
+/// Sines of a multisine, all lines in all rows: half a minute.
+pub const SINES: u64 = 2_000_000_000;
+/// Largest frequency of a torque, and the inverse of the least, Hz.
+pub const FREQUENCY: f64 = 1e9;
+/// Bytes of a run's name: file systems take 255 with an ending.
+pub const NAME: usize = 200;
+
+/// Steps of length `step` (s) in `span` (s), the last perhaps shorter.
+///
+/// # Errors
+/// If there are more than [`ROWS`], or if the numbers make none.
+pub fn steps(span: f64, step: f64) -> Result<usize> {
+    ensure!(
+        step > 0.0 && step.is_finite(),
+        "the step must be a positive number of seconds, not {step}"
+    );
+    ensure!(span > 0.0 && span.is_finite(), "{span} s is no span of time (allowed: more than 0 s)");
+    let exact = span / step;
+    ensure!(
+        exact <= ROWS as f64,
+        "{span:?} s in steps of {step:?} s are {exact:.3e} steps (allowed: at most {ROWS})"
+    );
+    // 2700 s / 0.02 s is 135000 steps, however the quotient rounds
+    let whole = (exact - exact.round()).abs() < 1e-6;
+    Ok(if whole { exact.round() } else { exact.ceil() } as usize)
+}
+
+/// Bytes of a table of numbers.
+///
+/// # Errors
+/// If it has more than [`ROWS`], or takes more than [`BYTES`].
+pub fn table(rows: usize, columns: usize) -> Result<u64> {
+    ensure!(rows <= ROWS + 1, "{rows} rows (allowed: at most {ROWS})");
+    let bytes = (rows as u64).saturating_mul(columns as u64).saturating_mul(8);
+    ensure!(
+        bytes <= BYTES,
+        "{rows} rows of {columns} columns take {:.1} GB (allowed: at most {:.1} GB); larger steps or \
+         fewer columns take less",
+        bytes as f64 / 1e9,
+        BYTES as f64 / 1e9
+    );
+    Ok(bytes)
+}
+
+/// Threads for `wanted` jobs at once (0: as many as the machine has cores) that hold `bytes` each.
+///
+/// # Errors
+/// If more than [`JOBS`] are wanted.
+pub fn jobs(wanted: usize, bytes: u64) -> Result<usize> {
+    ensure!(wanted <= JOBS, "{wanted} runs at once (allowed: 1 to {JOBS})");
+    let cores = std::thread::available_parallelism().map_or(1, usize::from).min(JOBS);
+    let fitting = usize::try_from(BYTES / bytes.max(1)).unwrap_or(usize::MAX);
+    Ok(if wanted == 0 { cores } else { wanted }.min(fitting).max(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_too_much_is_refused_with_what_is_allowed() {
+        assert_eq!(steps(2700.0, 0.02).unwrap(), 135_000);
+        assert_eq!(steps(1.0, 0.3).unwrap(), 4);
+        for (refused, words) in [
+            (steps(1e12, 0.02).map(drop), "5.000e13 steps (allowed: at most 20000000)"),
+            (steps(1.0, 1e-300).map(drop), "1.000e300 steps"),
+            (steps(1.0, 0.0).map(drop), "must be a positive number of seconds, not 0"),
+            (steps(f64::NAN, 0.1).map(drop), "NaN s is no span"),
+            (steps(f64::INFINITY, 0.1).map(drop), "inf s is no span"),
+            (table(ROWS + 2, 1).map(drop), "rows (allowed: at most 20000000)"),
+            (table(ROWS, 100).map(drop), "take 16.0 GB (allowed: at most 4.3 GB)"),
+            (table(usize::MAX, usize::MAX).map(drop), "allowed"),
+            (jobs(100_000, 1).map(drop), "100000 runs at once (allowed: 1 to 512)"),
+        ] {
+            let error = refused.unwrap_err().to_string();
+            assert!(error.contains(words), "{error}");
+        }
+    }
+
+    #[test]
+    fn jobs_hold_no_more_than_the_budget_together() {
+        assert_eq!(jobs(8, BYTES / 3).unwrap(), 3);
+        assert_eq!(jobs(8, BYTES * 2).unwrap(), 1);
+        assert_eq!(jobs(8, 0).unwrap(), 8);
+        assert!(jobs(0, 1).unwrap() >= 1);
+    }
+}

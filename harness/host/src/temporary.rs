@@ -1,0 +1,148 @@
+//! What a program does not leave behind, however it ends: its temporary folders and half-written
+//! files go when they are dropped, on a signal ([`remove_all`]), and after a kill when the next
+//! program needs a folder.
+
+use std::collections::BTreeSet;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, Once, PoisonError};
+
+use anyhow::{Context, Result};
+use tempfile::TempDir;
+
+/// What a signal removes.
+static PATHS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn paths() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    PATHS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A file or folder that a signal removes as long as this lives.
+#[derive(Debug)]
+pub struct Registered(PathBuf);
+
+/// Has a signal remove a file or folder.
+pub fn register(path: &Path) -> Registered {
+    paths().insert(path.to_path_buf());
+    Registered(path.to_path_buf())
+}
+
+impl Drop for Registered {
+    fn drop(&mut self) {
+        paths().remove(&self.0);
+    }
+}
+
+/// Removes what is registered, for a program that a signal ends now: whoever registers something
+/// from here on waits for that end.
+pub fn remove_all() {
+    let paths = paths();
+    for path in paths.iter() {
+        match path.is_dir() {
+            true => drop(fs::remove_dir_all(path)),
+            false => drop(fs::remove_file(path)),
+        }
+    }
+    std::mem::forget(paths);
+}
+
+/// Lets no signal end the program meanwhile. `work` must not register anything.
+pub fn uninterrupted<T>(work: impl FnOnce() -> T) -> T {
+    let _held = paths();
+    work()
+}
+
+/// How the names of our temporary folders begin.
+const PREFIX: &str = "hubslosh-";
+/// The file in such a folder that is locked as long as its program lives.
+const ALIVE: &str = "alive";
+/// Where in such a folder the files are.
+const FILES: &str = "files";
+
+/// A folder for temporary files.
+#[derive(Debug)]
+pub struct Folder {
+    files: PathBuf,
+    // dropped in this order: Windows removes no file that is open
+    _alive: File,
+    _directory: TempDir,
+    _registered: Registered,
+}
+
+impl Folder {
+    /// Makes one in the system's folder for temporary files. The first of a program removes those of
+    /// programs that were killed.
+    pub fn new() -> Result<Folder> {
+        static SWEPT: Once = Once::new();
+        SWEPT.call_once(|| sweep(&std::env::temp_dir()));
+        let make = || -> std::io::Result<Folder> {
+            let directory = tempfile::Builder::new().prefix(PREFIX).tempdir()?;
+            let registered = register(directory.path());
+            // locked before it has its name, so that nobody finds it unlocked
+            let draft = directory.path().join("draft");
+            let alive = File::create(&draft)?;
+            // where there are no locks, nobody can take it for dead either
+            let _ = alive.try_lock();
+            fs::rename(&draft, directory.path().join(ALIVE))?;
+            let files = directory.path().join(FILES);
+            fs::create_dir(&files)?;
+            Ok(Folder { files, _alive: alive, _directory: directory, _registered: registered })
+        };
+        make().with_context(|| {
+            format!("no temporary folder can be made in {}", std::env::temp_dir().display())
+        })
+    }
+
+    /// Where to put files.
+    pub fn path(&self) -> &Path {
+        &self.files
+    }
+}
+
+/// Removes the folders of programs that no longer live.
+fn sweep(parent: &Path) {
+    for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
+        let ours = entry.file_name().to_string_lossy().starts_with(PREFIX);
+        let alive = entry.path().join(ALIVE);
+        // of anything but a plain file, opening it could take for ever
+        let is_file = || fs::symlink_metadata(&alive).is_ok_and(|found| found.is_file());
+        if ours && entry.file_type().is_ok_and(|kind| kind.is_dir()) && is_file() {
+            let locked = File::open(&alive).map(|file| file.try_lock().is_ok());
+            if let Ok(true) = locked {
+                let _ = fs::remove_dir_all(entry.path());
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_of_a_dead_program_is_swept_and_that_of_a_living_one_is_not() {
+        let parent = tempfile::tempdir().unwrap();
+        let [dead, living, other] = ["hubslosh-dead", "hubslosh-living", "hubslosh-other"]
+            .map(|name| parent.path().join(name));
+        for folder in [&dead, &living, &other] {
+            fs::create_dir_all(folder.join(FILES)).unwrap();
+        }
+        File::create(dead.join(ALIVE)).unwrap();
+        let held = File::create(living.join(ALIVE)).unwrap();
+        held.lock().unwrap();
+        sweep(parent.path());
+        assert!(!dead.exists() && living.exists());
+        assert!(other.exists(), "without the file it is not one of ours");
+    }
+
+    #[test]
+    fn a_dropped_folder_is_gone() {
+        let folder = Folder::new().unwrap();
+        let path = folder.path().to_path_buf();
+        fs::write(path.join("a"), "a").unwrap();
+        assert!(paths().iter().any(|registered| path.starts_with(registered)));
+        drop(folder);
+        assert!(!path.parent().unwrap().exists());
+        assert!(!paths().iter().any(|registered| path.starts_with(registered)));
+    }
+}
