@@ -28,9 +28,14 @@ import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import environment
+
+try:
+    import fcntl
+except ModuleNotFoundError:  # Windows: nothing is locked there
+    fcntl = None  # type: ignore[assignment]
 
 try:
     import cloudpickle
@@ -122,6 +127,52 @@ def why_not_stored(path: Path, run: Run, columns: list[str]) -> str | None:
     return None
 
 
+class Folder:
+    """A campaign's directory, held as ``hubslosh campaign`` holds it; use it in ``with``.
+
+    ``manifest.sha256`` has the SHA-256 of every stored run, the last line of a name counts.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Make it if it is not there, and hold it."""
+        self.manifest = path / "manifest.sha256"
+        (path / "runs").mkdir(parents=True, exist_ok=True)
+        self._lock = (path / ".lock").open("a+")
+        if fcntl is not None:
+            try:
+                fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                self._lock.seek(0)
+                who = self._lock.read()
+                self._lock.close()
+                raise CampaignError(f"{path} is held by another campaign: {who}") from None
+        self._lock.truncate(0)
+        self._lock.write(f"process {os.getpid()}, cluster.py")
+        self._lock.flush()
+        lines = self.manifest.read_text().splitlines() if self.manifest.is_file() else []
+        self._sums = {name: sum_ for sum_, _, name in (line.partition("  ") for line in lines)}
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Let go of it."""
+        self._lock.close()
+
+    def is_damaged(self, file: str) -> bool:
+        """Return whether a stored run is not what was stored."""
+        data = (self.manifest.parent / file).read_bytes()
+        return self._sums.get(file) not in (None, hashlib.sha256(data).hexdigest())
+
+    def add(self, file: str) -> None:
+        """Say of a run what was stored."""
+        sum_ = hashlib.sha256((self.manifest.parent / file).read_bytes()).hexdigest()
+        with self.manifest.open("a", newline="\n") as manifest:
+            manifest.write(f"{sum_}  {file}\n")
+        self._sums[file] = sum_
+
+
 def drive_here(
     fmu: str, run: Run, torque: list[np.ndarray], columns: list[str]
 ) -> tuple[dict[str, np.ndarray] | None, str]:
@@ -203,13 +254,22 @@ def make_runs(
 
     A run is written as soon as it comes back; then `made` hears of it.
     """
+    with Folder(harness.out) as folder:
+        return make_runs_in(folder, client, harness, made)
+
+
+def make_runs_in(
+    folder: Folder, client: Client, harness: Harness, made: Callable[[Run], None]
+) -> dict[str, str]:
+    """As `make_runs`, in a directory that is held."""
     todo = harness.listing()
     columns = todo["columns"]
-    (harness.out / "runs").mkdir(parents=True, exist_ok=True)
     missing = []
     for run in todo["runs"]:
         path = harness.out / run["file"]
         why = why_not_stored(path, run, columns) if path.exists() else ""
+        if why is None and folder.is_damaged(run["file"]):
+            why = f"its SHA-256 is not that in {folder.manifest.name}"
         if why:
             print(f"re-running {run['name']}: {why}")
         if why is not None:
@@ -265,6 +325,7 @@ def make_runs(
                 notes = run["notes"] | {"made_by": said}
                 whole = {name: table[name] for name in columns}
                 hubslosh.write_table(harness.out / run["file"], whole, notes)
+                folder.add(run["file"])
                 made(run)
             bar.update(run["steps"])
     return failed

@@ -10,6 +10,7 @@ use toml::Value;
 use crate::profile::{Torque, Written};
 use crate::random::Random;
 use crate::run::{Run, driven};
+use host::budget;
 use host::description::{self, ModelDescription, Type, did_you_mean};
 use host::output::sha256;
 
@@ -40,8 +41,6 @@ pub const BUILT_IN: &[(&str, &str)] = &[
     ("slew", include_str!("../../campaigns/slew.toml")),
 ];
 
-/// The most runs a plan may have.
-const MOST_RUNS: usize = 100_000;
 /// The communication step of a plan that names none: the thesis's IMU at 50 Hz, s.
 const STEP: f64 = 0.02;
 /// What the interface's file names `<model>_<fill>mm_<amplitude>` are made of.
@@ -438,8 +437,8 @@ impl Plan {
             .map(|(_, values)| values.len())
             .chain([self.listed.len().max(1), draws])
             .try_fold(1_usize, usize::checked_mul)
-            .filter(|count| *count <= MOST_RUNS)
-            .with_context(|| format!("a plan may have {MOST_RUNS} runs; this has more"))?;
+            .filter(|count| *count <= budget::RUNS)
+            .with_context(|| format!("a plan may have {} runs; this has more", budget::RUNS))?;
 
         let mut combinations = match &self.listed[..] {
             [] => vec![Listed::default()],
@@ -624,7 +623,13 @@ impl Plan {
             parts.push("run".into());
         }
         let plain = |c: char| if c.is_alphanumeric() || "._-".contains(c) { c } else { '_' };
-        let base: String = parts.join("_").chars().map(plain).collect();
+        let mut base: String = parts.join("_").chars().map(plain).collect();
+        if base.len() > budget::NAME {
+            // as many letters as fit, and what tells it from others that begin so
+            let fits = |(i, c): &(usize, char)| i + c.len_utf8() <= budget::NAME - 17;
+            let begin: String = base.char_indices().take_while(fits).map(|(_, c)| c).collect();
+            base = format!("{begin}_{}", &sha256(base.as_bytes())[..16]);
+        }
         // some file systems do not tell A from a
         let mut name = base.clone();
         let mut number = 1;
@@ -798,6 +803,12 @@ fn listed(problems: &mut Problems, table: &toml::Table) -> Vec<Listed> {
         };
         let mut run = run.clone();
         let name = text_at(problems, &run, "name");
+        if name.as_ref().is_some_and(|name| !(1..=budget::NAME).contains(&name.len())) {
+            let most = budget::NAME;
+            problems.add(format!(
+                "{place} its name must have 1 to {most} bytes; without one leave it out"
+            ));
+        }
         run.remove("name");
         listed.push(Listed { name, values: values(problems, &place, &run) });
     }

@@ -79,7 +79,23 @@ fn command_line() -> clap::Command {
     with_negative_numbers(Cli::command())
 }
 
+/// Has SIGINT and SIGTERM remove what is temporary before they end the program. SIGHUP stays as it
+/// was, for nohup.
+#[cfg(unix)]
+fn clean_up_on_signals() {
+    use signal_hook::consts::{SIGINT, SIGTERM};
+    let Ok(mut signals) = signal_hook::iterator::Signals::new([SIGINT, SIGTERM]) else { return };
+    std::thread::spawn(move || {
+        for signal in signals.forever() {
+            host::temporary::remove_all();
+            let _ = signal_hook::low_level::emulate_default_handler(signal);
+        }
+    });
+}
+
 fn main() -> ExitCode {
+    #[cfg(unix)]
+    clean_up_on_signals();
     let cli = Cli::from_arg_matches(&command_line().get_matches()).unwrap_or_else(|e| e.exit());
     let done = match cli.command {
         Some(Command::Pack(args)) => args.run(),
@@ -135,5 +151,5 @@ fn everything() -> Result<()> {
     let plan = Plan::read("thesis")?;
     let out = DEFAULT_CAMPAIGN.into();
     let campaign = Campaign { plan, force: false, jobs: 0, compare: None, out };
-    campaign::drive(&Fmu::open(DEFAULT_FMU)?, &campaign)
+    campaign::drive(&Fmu::open(DEFAULT_FMU)?, &campaign, campaign.take()?)
 }

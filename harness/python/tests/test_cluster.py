@@ -115,9 +115,14 @@ def test_a_refused_run_and_one_that_kills_its_workers_leave_the_others_alone(
 
     whole = ours.out / "runs" / "linear_50mm_100.parquet"
     whole.write_bytes(whole.read_bytes()[:-100])
+    flipped = ours.out / "runs" / "linear_90mm_100.parquet"
+    right_data = flipped.read_bytes()
+    flipped.write_bytes(right_data[:500] + bytes([right_data[500] ^ 1]) + right_data[501:])
     made.clear()
     failed = cluster.make_runs(client, ours, lambda run: made.append(run["name"]))
-    assert sorted(made) == ["linear_50mm_100", "linear_70mm_100"]
+    assert sorted(made) == ["linear_50mm_100", "linear_70mm_100", "linear_90mm_100"]
+    with cluster.Folder(ours.out), pytest.raises(cluster.CampaignError, match="is held by"):
+        cluster.make_runs(client, ours)
     assert list(failed) == ["linear_-1000mm_100"]
     assert not list(ours.out.rglob(".hubslosh-*"))
     changed = harness(plan.replace("duration=2", "duration=3"), "c")

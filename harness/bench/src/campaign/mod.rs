@@ -1,29 +1,32 @@
 //! A campaign: the runs of a plan, simulated in parallel, each stored and analysed.
 //!
-//! A stored run is reused, whoever made it, if `runs/<name>.parquet` is complete and its metadata
-//! (Parquet key-value pairs) hold the run's [recipe](store::recipe). Everything in the tables comes
+//! A stored run is reused, whoever made it, if `runs/<name>.parquet` is complete, its metadata
+//! (Parquet key-value pairs) hold the run's [recipe](store::recipe), and its hash is the manifest's
+//! ([`Folder`]). Everything in the tables comes
 //! from the run's [columns](STORED); so another importer that writes the columns and the metadata
 //! given by [`Campaign::list`] gets the same tables.
 //!
 //! The analysis is that of the thesis's bench. Of an FMU without the bench's variables all outputs
 //! are stored, and `runs.csv` says what each run was made from.
 
+mod folder;
 mod outcome;
 mod rows;
 mod store;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
+use host::budget;
 use host::description::{ModelDescription, Type, Value};
 use host::fmi2::Fmu;
-use host::output;
+use host::output::sha256;
 use rayon::prelude::*;
 use serde_json::json;
 
+pub use self::folder::{Folder, MANIFEST};
 pub use self::outcome::{
     Curve, Doubt, Estimate, Figures, History, Outcome, Passing, Range, Record, SloshPath, WAVE,
 };
@@ -137,6 +140,7 @@ impl Results {
 enum Done {
     Analysed(Box<Outcome>),
     Unanalysed(Box<Unanalysed>),
+    Failed(anyhow::Error),
 }
 
 /// All that a campaign found.
@@ -151,18 +155,33 @@ pub struct Results {
 }
 
 impl Campaign {
-    /// Simulates all runs that are not stored yet and analyses all of them. Leaves the runs and the
-    /// plan's text in the directory; tables are written by [`Campaign::write_tables`].
-    pub fn execute(&self, fmu: &Fmu, watch: &(dyn Fn(Progress) + Sync)) -> Result<Results> {
+    /// Holds the directory for this campaign.
+    pub fn take(&self) -> Result<Folder> {
+        Folder::take(&self.out, &format!("the plan \"{}\"", self.plan.title))
+    }
+
+    /// Simulates all runs that are not stored yet and analyses all of them. Leaves the runs in the
+    /// directory; [`Campaign::tables`] gives the tables.
+    ///
+    /// # Errors
+    /// If there are no runs, or one cannot be stored. A run that cannot be simulated is a failure
+    /// among the results.
+    pub fn execute(
+        &self,
+        fmu: &Fmu,
+        folder: &Folder,
+        watch: &(dyn Fn(Progress) + Sync),
+    ) -> Result<Results> {
         let cases = self.plan.cases(fmu.description())?;
-        let runs = self.out.join("runs");
-        output::directory(&runs)?;
-        output::atomically(&self.plan_file(), |file| {
-            Ok(std::io::Write::write_all(file, self.plan.text.as_bytes())?)
-        })?;
         let steps: u64 = cases.iter().map(|case| case.run().steps() as u64).sum();
+        let bytes = cases.iter().map(|case| {
+            let run = case.run();
+            let columns = stored_columns(fmu.description(), run.input.as_deref()).len();
+            (run.steps() as u64 + 1).saturating_mul(8 * columns as u64)
+        });
+        let jobs = budget::jobs(self.jobs, bytes.max().unwrap_or(0))?;
         watch(Progress::Begins { runs: cases.len(), steps });
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(self.jobs).build()?;
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build()?;
         let warned = Mutex::new(BTreeSet::new());
         // once of many runs, whose warnings differ in numbers at most
         let warn = |case: &Case, warning: String| {
@@ -172,15 +191,15 @@ impl Campaign {
                 watch(Progress::Note(format!("warning of run {}: {warning}", case.name)));
             }
         };
-        let done = |case| self.done(fmu, case, &runs, watch, &warn);
-        let results: Vec<Result<Done>> = pool.install(|| cases.par_iter().map(done).collect());
+        let done = |case| self.done(fmu, case, folder, watch, &warn);
+        let results: Result<Vec<Done>> = pool.install(|| cases.par_iter().map(done).collect());
 
         let mut collected = Results::default();
-        for (case, result) in cases.into_iter().zip(results) {
-            match result {
-                Ok(Done::Analysed(outcome)) => collected.outcomes.push(*outcome),
-                Ok(Done::Unanalysed(run)) => collected.unanalysed.push(*run),
-                Err(error) => {
+        for (case, done) in cases.into_iter().zip(results?) {
+            match done {
+                Done::Analysed(outcome) => collected.outcomes.push(*outcome),
+                Done::Unanalysed(run) => collected.unanalysed.push(*run),
+                Done::Failed(error) => {
                     collected.failures.push(Failure { case, reason: format!("{error:#}") })
                 }
             }
@@ -198,11 +217,11 @@ impl Campaign {
         self.out.join("plan.toml")
     }
 
-    /// The command that reproduces everything in the directory.
+    /// The command that reproduces everything in the directory, for a POSIX shell.
     pub fn command(&self, fmu: &Fmu) -> String {
         let word = |path: &Path| {
             let text = path.display().to_string();
-            if text.contains(' ') { format!("\"{text}\"") } else { text }
+            shlex::try_quote(&text).map_or(text.clone(), |quoted| quoted.into_owned())
         };
         format!(
             "hubslosh campaign --plan {} --fmu {} --out {}",
@@ -236,7 +255,7 @@ impl Campaign {
             }
             runs.push(json!({
                 "name": case.name,
-                "file": format!("runs/{}.parquet", case.name),
+                "file": folder::file_of(&case.name),
                 "varied": self.plan.varied().into_iter().zip(&case.varied).collect::<BTreeMap<_, _>>(),
                 "settings": settings,
                 "profile": case.profile,
@@ -264,39 +283,53 @@ impl Campaign {
         }))
     }
 
+    /// One run.
+    ///
+    /// # Errors
+    /// If it cannot be stored: then none can.
     fn done(
         &self,
         fmu: &Fmu,
         case: &Case,
-        runs: &Path,
+        folder: &Folder,
         watch: &(dyn Fn(Progress) + Sync),
         warn: &(dyn Fn(&Case, String) + Sync),
     ) -> Result<Done> {
         let run = case.run();
-        let path = runs.join(format!("{}.parquet", case.name));
         let columns = stored_columns(fmu.description(), run.input.as_deref());
         let recipe = store::recipe(fmu, case, &columns);
-        let mut instance = run.initialise(fmu)?;
+        let mut instance = match run.initialise(fmu) {
+            Ok(instance) => instance,
+            Err(error) => return Ok(Done::Failed(error)),
+        };
         instance.take_warnings().into_iter().for_each(|warning| warn(case, warning));
+        let path = folder.path().join(folder::file_of(&case.name));
         let there = match self.force || !path.exists() {
             true => None,
-            false => store::stored(&path, &run, &recipe, &columns)
+            false => folder
+                .check(&case.name)
+                .and_then(|sum| Ok((store::stored(&path, &run, &recipe, &columns)?, sum)))
                 .map_err(|why| watch(Progress::Note(store::because(case, &why))))
                 .ok(),
         };
         let reused = there.is_some();
         let table = match there {
-            Some(table) => {
+            Some((table, sum)) => {
                 watch(Progress::Steps(run.steps() as u64));
+                folder.adopt(&case.name, sum)?;
                 table
             }
             None => {
                 // time and the driven input are there anyway
                 let others = columns[1 + usize::from(run.input.is_some())..].iter();
                 let others: Vec<&str> = others.map(String::as_str).collect();
-                let table =
-                    run.drive(&mut instance, &others, |steps| watch(Progress::Steps(steps)))?;
-                table.write(&path, &recipe)?;
+                let driven =
+                    run.drive(&mut instance, &others, |steps| watch(Progress::Steps(steps)));
+                let table = match driven.and_then(|table| table.all_finite().map(|()| table)) {
+                    Ok(table) => table,
+                    Err(error) => return Ok(Done::Failed(error)),
+                };
+                folder.store(&case.name, &table, &recipe)?;
                 table
             }
         };
@@ -313,55 +346,54 @@ impl Campaign {
             let run = Unanalysed { case: case.clone(), history, tail, reused };
             return Ok(Done::Unanalysed(Box::new(run)));
         }
-        let outcome = Outcome::of(case, &run, &mut instance, &table, reused)?;
-        Ok(Done::Analysed(Box::new(outcome)))
+        Ok(match Outcome::of(case, &run, &mut instance, &table, reused) {
+            Ok(outcome) => Done::Analysed(Box::new(outcome)),
+            Err(error) => Done::Failed(error),
+        })
     }
 
-    /// Writes `features.csv`, `features_spa.csv` and `features_h1.csv` with the same columns from
-    /// the `spa` and H1 responses, and `runs.csv`: every run, failed ones too, with what it was
-    /// made from and all features. Without a run of the bench there is `runs.csv` alone.
-    pub fn write_tables(&self, fmu: &Fmu, results: &Results) -> Result<()> {
-        let write = |name: &str, fill: &dyn Fn(&mut csv::Writer<&mut File>) -> Result<()>| {
-            output::atomically(&self.out.join(name), |file| {
-                let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(file);
-                fill(&mut writer)?;
-                writer.flush().context("could not write")
-            })
+    /// The tables with their names: `features.csv`, `features_spa.csv` and `features_h1.csv` with the
+    /// same columns from the `spa` and H1 responses, and `runs.csv`: every run, failed ones too, with
+    /// what it was made from and all features. Without a run of the bench there is `runs.csv` alone.
+    pub fn tables(&self, fmu: &Fmu, results: &Results) -> Result<Vec<(&'static str, Vec<u8>)>> {
+        let plan = sha256(self.plan.text.as_bytes());
+        let written = |header: Vec<String>, rows: Vec<Vec<String>>| -> Result<Vec<u8>> {
+            let mut writer = csv::Writer::from_writer(Vec::new());
+            writer.write_record(&header)?;
+            rows.iter().try_for_each(|row| writer.write_record(row))?;
+            writer.into_inner().map_err(|error| error.into_error().into())
         };
         let header = rows::columns::<FeatureRow>()?;
+        let mut tables = Vec::new();
         type Of = dyn Fn(&Outcome) -> Option<(&Estimate, &'static str)>;
-        let features = |name: &str, of: &Of| {
-            write(name, &|writer| {
-                writer.write_record(&header)?;
-                for run in &results.outcomes {
-                    writer.serialize(FeatureRow::of(run, of(run)))?;
-                }
-                Ok(())
-            })
+        let mut features = |name: &'static str, of: &Of| -> Result<()> {
+            let row = |run| rows::record(&FeatureRow::of(run, of(run), &plan));
+            let rows = results.outcomes.iter().map(row).collect::<Result<_>>()?;
+            tables.push((name, written(header.clone(), rows)?));
+            Ok(())
         };
         if results.unanalysed.is_empty() {
             features("features.csv", &Outcome::estimate)?;
             features("features_spa.csv", &|run| Some((&run.record.as_ref()?.spa, "spa")))?;
             features("features_h1.csv", &|run| Some((&run.record.as_ref()?.h1, "h1")))?;
         }
-        write("runs.csv", &|writer| {
-            let made_from = rows::columns::<MadeFrom>()?;
-            let varied = self.plan.varied().into_iter().map(String::from);
-            writer.write_record(made_from.into_iter().chain(varied).chain(header.clone()))?;
-            for run in &results.outcomes {
-                let row = FeatureRow::of(run, run.estimate());
-                writer.serialize((MadeFrom::of(&run.case, None, fmu), &run.case.varied, row))?;
-            }
-            for case in results.unanalysed.iter().map(|run| &run.case) {
-                let row = FeatureRow::unanalysed(case);
-                writer.serialize((MadeFrom::of(case, None, fmu), &case.varied, row))?;
-            }
-            for failure in &results.failures {
-                let case = &failure.case;
-                let row = FeatureRow::unanalysed(case);
-                writer.serialize((MadeFrom::of(case, Some(failure), fmu), &case.varied, row))?;
-            }
-            Ok(())
-        })
+        let analysed = results.outcomes.iter().map(|run| {
+            let row = FeatureRow::of(run, run.estimate(), &plan);
+            (&run.case, None, row)
+        });
+        let unanalysed = results.unanalysed.iter().map(|run| (&run.case, None));
+        let failed = results.failures.iter().map(|failure| (&failure.case, Some(failure)));
+        let others = unanalysed
+            .chain(failed)
+            .map(|(case, failure)| (case, failure, FeatureRow::unanalysed(case, &plan)));
+        let rows = analysed.chain(others).map(|(case, failure, row)| {
+            let made_from = rows::record(&MadeFrom::of(case, failure, fmu))?;
+            Ok([made_from, case.varied.clone(), rows::record(&row)?].concat())
+        });
+        let made_from = rows::columns::<MadeFrom>()?;
+        let varied = self.plan.varied().into_iter().map(String::from).collect();
+        let header = [made_from, varied, header.clone()].concat();
+        tables.push(("runs.csv", written(header, rows.collect::<Result<_>>()?)?));
+        Ok(tables)
     }
 }

@@ -46,21 +46,27 @@ pub struct FeatureRow {
     beyond_model: Option<String>,
     f_res_std_hz: Option<f64>,
     f_dip_std_hz: Option<f64>,
+    plan_sha256: String,
 }
 
 impl FeatureRow {
     /// Of a run that was not analysed: which it is.
-    pub fn unanalysed(case: &Case) -> FeatureRow {
+    pub fn unanalysed(case: &Case, plan_sha256: &str) -> FeatureRow {
         FeatureRow {
             model: case.model.clone(),
             fill_m: case.fill,
             amplitude_nm: case.amplitude,
+            plan_sha256: plan_sha256.into(),
             ..Default::default()
         }
     }
 
     /// Of a run, with one of its estimates and the estimator's name.
-    pub fn of(run: &Outcome, estimate: Option<(&Estimate, &'static str)>) -> FeatureRow {
+    pub fn of(
+        run: &Outcome,
+        estimate: Option<(&Estimate, &'static str)>,
+        plan_sha256: &str,
+    ) -> FeatureRow {
         let features = estimate.map_or(Features::default(), |(estimate, _)| estimate.features);
         let figures = &run.figures;
         let (fit, rotary, off_axis) = (run.fit(), run.rotary(), run.off_axis());
@@ -99,7 +105,7 @@ impl FeatureRow {
             beyond_model: run.beyond_model(),
             f_res_std_hz: estimate.and_then(|(estimate, _)| estimate.deviations.f_res),
             f_dip_std_hz: estimate.and_then(|(estimate, _)| estimate.deviations.f_dip),
-            ..FeatureRow::unanalysed(&run.case)
+            ..FeatureRow::unanalysed(&run.case, plan_sha256)
         }
     }
 }
@@ -135,9 +141,27 @@ impl MadeFrom {
 
 /// Names of a row's columns.
 pub fn columns<Row: Serialize + Default>() -> Result<Vec<String>> {
+    let [names, _] = names_and_values(&Row::default())?;
+    Ok(names)
+}
+
+/// A row's values as text; a number that is not finite is none.
+pub fn record<Row: Serialize>(row: &Row) -> Result<Vec<String>> {
+    let [_, mut values] = names_and_values(row)?;
+    let finite = |value: &&mut String| value.parse::<f64>().is_ok_and(|number| !number.is_finite());
+    values.iter_mut().filter(finite).for_each(String::clear);
+    Ok(values)
+}
+
+fn names_and_values<Row: Serialize>(row: &Row) -> Result<[Vec<String>; 2]> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    writer.serialize(Row::default())?;
+    writer.serialize(row)?;
     let text = writer.into_inner().map_err(|error| error.into_error())?;
-    let mut reader = csv::Reader::from_reader(&text[..]);
-    Ok(reader.headers().context("a row without columns")?.iter().map(String::from).collect())
+    let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(&text[..]);
+    let mut records = reader.records();
+    let mut next = || -> Result<Vec<String>> {
+        let record = records.next().context("a row without columns")??;
+        Ok(record.iter().map(String::from).collect())
+    };
+    Ok([next()?, next()?])
 }

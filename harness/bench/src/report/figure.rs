@@ -114,9 +114,10 @@ impl Figures {
         out
     }
 
-    /// The specifications, as they stand in a script element.
+    /// The specifications, as they stand in a script element: without `<`, since `</script` ends it
+    /// and `<!--<script` keeps its end from being seen (HTML, 13.2.5.20).
     pub fn json(&self) -> String {
-        Value::Array(self.specifications.clone()).to_string().replace("</", "<\\/")
+        Value::Array(self.specifications.clone()).to_string().replace('<', "\\u003c")
     }
 }
 

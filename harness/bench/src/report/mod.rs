@@ -13,9 +13,6 @@ mod thesis;
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
-use std::path::Path;
-
-use anyhow::Result;
 
 use crate::analysis::features::Features;
 use crate::analysis::{BAND, FrequencyResponse, demodulation, logarithmic_grid, rotary};
@@ -25,13 +22,6 @@ use crate::profile::{Sweep, Torque};
 use figure::{Figure, Figures};
 use host::fmi2::Fmu;
 use host::html::escape;
-use host::output;
-
-/// Writes the report.
-pub fn write(path: &Path, campaign: &Campaign, fmu: &Fmu, results: &Results) -> Result<()> {
-    let page = page(campaign, fmu, results);
-    output::atomically(path, |file| Ok(std::io::Write::write_all(file, page.as_bytes())?))
-}
 
 /// Runs that differ in nothing but the number along which they are drawn (and what is drawn at
 /// random).
@@ -263,7 +253,8 @@ fn groups<'a>(plan: &Plan, fmu: &Fmu, results: &'a Results) -> Vec<Group<'a>> {
 /// Most groups that get figures of their own; more would be a book.
 const MOST_GROUPS: usize = 6;
 
-fn page(campaign: &Campaign, fmu: &Fmu, results: &Results) -> String {
+/// The report.
+pub fn page(campaign: &Campaign, fmu: &Fmu, results: &Results) -> String {
     let plan = &campaign.plan;
     let page = Page {
         plan,

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail, ensure};
-use bench::campaign::Campaign;
+use bench::campaign::{Campaign, Folder};
 use bench::plan::{self, Plan, Sweeps};
 use bench::report;
 use host::fmi2::Fmu;
@@ -103,6 +103,7 @@ impl CampaignArgs {
             ensure!(table.is_file(), "--compare {}: it has no runs.csv", other.display());
         }
         campaign.plan.cases(fmu.description())?; // a wrong plan replaces nothing
+        let folder = campaign.take()?;
         // the directory without flags belongs to the campaign without flags
         let own = campaign.out == Path::new(DEFAULT_CAMPAIGN);
         if campaign.holds_another() && !own && !self.replace {
@@ -117,7 +118,7 @@ impl CampaignArgs {
                 "{out} held the campaign of another plan; its tables and report are replaced"
             );
         }
-        drive(&fmu, &campaign)
+        drive(&fmu, &campaign, folder)
     }
 
     /// The directory for these flags: that of the default campaign, or one named by what differs.
@@ -172,20 +173,25 @@ impl CampaignArgs {
 }
 
 /// Carries a campaign out and leaves tables and report.
-pub fn drive(fmu: &Fmu, campaign: &Campaign) -> Result<()> {
+pub fn drive(fmu: &Fmu, campaign: &Campaign, folder: Folder) -> Result<()> {
     let bar = progress::of_runs()?;
-    let results = campaign.execute(fmu, &|news| progress::show(&bar, news))?;
+    let results = campaign.execute(fmu, &folder, &|news| progress::show(&bar, news))?;
     bar.finish_and_clear();
-    campaign.write_tables(fmu, &results)?;
+    let mut files = campaign.tables(fmu, &results)?;
+    files.push(("plan.toml", campaign.plan.text.clone().into_bytes()));
+    files.push(("report.html", report::page(campaign, fmu, &results).into_bytes()));
+    folder.publish(files)?;
     let (all, reused) = results.counts();
     println!("{} runs simulated, {reused} reused", all - reused);
     let file = |name: &str| campaign.out.join(name);
-    let page = file("report.html");
-    report::write(&page, campaign, fmu, &results)?;
     if results.unanalysed.is_empty() {
         println!("features: {}", file("features.csv").display());
     }
-    println!("runs:     {}\nreport:   {}", file("runs.csv").display(), page.display());
+    println!(
+        "runs:     {}\nreport:   {}",
+        file("runs.csv").display(),
+        file("report.html").display()
+    );
     let beyond: Vec<&str> = results
         .outcomes
         .iter()

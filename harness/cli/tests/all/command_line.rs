@@ -167,7 +167,10 @@ fn what_no_machine_can_hold_is_refused() {
             &["run", "--fmu", fmu, "--profile", "sine:duration=1e12", "--out", "x.csv"][..],
             &["5.000e13 steps"][..],
         ),
-        (&["torque", "--profile", "zero", "--step", "1e-9", "--out", "x.csv"], &["at most 2e7"]),
+        (
+            &["torque", "--profile", "zero", "--step", "1e-9", "--out", "x.csv"],
+            &["at most 20000000"],
+        ),
         (&["gyro", "--fmu", fmu, "--records", "99999999999", "--out", "g"], &["1 to 10000"]),
         (&["scale", "froude", "--lambda", "1e308"], &["lambda = 1e308"]),
         // a negative number is a value, not a flag
@@ -179,6 +182,73 @@ fn what_no_machine_can_hold_is_refused() {
     ] {
         refuses(directory, || hubslosh(directory, arguments), words);
     }
+}
+
+#[test]
+fn a_number_that_no_machine_can_hold_is_refused_before_anything_is_allocated() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let fmu = packed_for_tests().to_str().unwrap();
+    std::fs::write(
+        directory.join("plan.toml"),
+        "profile = \"sine:duration=1\"\n[random]\nruns = 9000000000000000000\nseed = 1\n[random.draw]\n\
+         hub.I = { distribution = \"uniform\", from = 0.3, to = 0.4 }\n",
+    )
+    .unwrap();
+    let steps = "steps (allowed: at most 20000000)";
+    for (arguments, words) in [
+        (&["run", "--fmu", fmu, "--profile", "zero:duration=1e12", "--out", "a.csv"][..], steps),
+        (&["run", "--fmu", fmu, "--profile", "zero", "--step", "1e-300", "--out", "a.csv"], steps),
+        (&["torque", "--profile", "zero:duration=1e12", "--out", "a.csv"], steps),
+        (&["torque", "--profile", "zero", "--stop", "1e300", "--out", "a.csv"], steps),
+        (&["torque", "--profile", "exp-sweep:f0=1e-320", "--out", "a.csv"], "from 1e-9 to 1e9 Hz"),
+        // between two rows 1e-300 s apart a torque of 1e300 N.m has no finite slope
+        (
+            &[
+                "torque",
+                "--profile",
+                "sine:amplitude=1e300,duration=1e-299,frequency=1e9",
+                "--step",
+                "1e-300",
+                "--out",
+                "a.csv",
+            ],
+            "a.csv cannot be written: row ",
+        ),
+        (&["design", "--fmu", fmu, "--multisine", "0.2", "--duration", "1e12"], steps),
+        (&["design", "--fmu", fmu, "--profile", "zero:duration=1e12"], steps),
+        (
+            &["design", "--fmu", fmu, "--multisine", "0.2", "--band", "1,1e9"],
+            "allowed: up to 25 Hz",
+        ),
+        (&["design", "--fmu", fmu, "--multisine", "0.2", "--period", "1e9"], "odd lines"),
+        (&["design", "--fmu", fmu, "--multisine", "inf"], "must be positive numbers"),
+        (
+            &[
+                "design",
+                "--fmu",
+                fmu,
+                "--multisine",
+                "0.2",
+                "--duration",
+                "200000",
+                "--period",
+                "10000",
+            ],
+            "are 8.4e10 sines (allowed: at most 2e9)",
+        ),
+        (&["gyro", "--fmu", fmu, "--hours", "1e9"], "samples (allowed: 100 to 20000000)"),
+        (
+            &["campaign", "--fmu", fmu, "--plan", "plan.toml", "--out", "c"],
+            "a plan may have 100000 runs",
+        ),
+    ] {
+        refuses(directory, || hubslosh(directory, arguments), &[words]);
+    }
+    let jobs = ["campaign", "--fmu", fmu, "--jobs", "100000", "--out", "c"];
+    let done = hubslosh(directory, &jobs);
+    let said = String::from_utf8_lossy(&done.stderr);
+    assert!(said.contains("100000 runs at once (allowed: 1 to 512)"), "{said}");
 }
 
 #[test]

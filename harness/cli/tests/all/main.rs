@@ -4,6 +4,7 @@ mod campaign;
 mod check;
 mod command_line;
 mod documents;
+mod folder;
 mod identify;
 mod plans;
 mod report;

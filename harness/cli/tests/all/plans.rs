@@ -240,6 +240,72 @@ fn a_wrong_plan_makes_nothing_and_says_everything() {
 }
 
 #[test]
+fn the_command_in_the_report_is_quoted_for_the_shell() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let out = "it's $(touch here) `touch there` \"c\"";
+    let plan = "profile = \"sine:duration=0.2\"\n";
+    successful(campaign(directory, plan, out, &[]));
+    let page = text(directory, &format!("{out}/report.html"));
+    let command = page.split("<code>hubslosh campaign ").nth(1).unwrap();
+    let command = command.split("</code>").next().unwrap();
+    let command = [("&quot;", "\""), ("&#39;", "'"), ("&lt;", "<"), ("&gt;", ">"), ("&amp;", "&")]
+        .iter()
+        .fold(command.to_string(), |text, (escaped, plain)| text.replace(escaped, plain));
+    let words = shlex::split(&command).unwrap();
+    let value = |flag: &str| &words[words.iter().position(|word| word == flag).unwrap() + 1];
+    assert_eq!(value("--out"), out);
+    assert_eq!(*value("--plan"), format!("{out}/plan.toml"));
+    if cfg!(unix) {
+        let program = env!("CARGO_BIN_EXE_hubslosh");
+        let done = Command::new("sh")
+            .current_dir(directory)
+            .args(["-c", &format!("{program} campaign {command}")])
+            .output()
+            .unwrap();
+        assert!(String::from_utf8_lossy(&done.stdout).contains("0 runs simulated, 1 reused"));
+        assert!(!directory.join("here").exists() && !directory.join("there").exists());
+    }
+}
+
+#[test]
+fn a_runs_name_may_be_any_text_but_none_or_one_too_long_for_a_file() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let plan = "profile = \"exp-sweep:f0=2,f1=2.8,duration=60\"\n\
+        [[run]]\nname = \"<!--<script>\"\n[[run]]\nname = \"</script>\"\nhub.I = 0.3\n";
+    successful(campaign(directory, plan, "c", &[]));
+    let page = text(directory, "c/report.html");
+    let figures = page.split("id=\"figures\">").nth(1).unwrap().split("</script>").next().unwrap();
+    assert!(!figures.contains('<'), "nothing in the data starts or ends an element");
+    let figures: serde_json::Value = serde_json::from_str(figures).unwrap();
+    let names = figures.to_string();
+    assert!(names.contains("<!--<script>") && names.contains("</script>"), "the figures name them");
+    assert!(!page.contains("<!--<script>"));
+    for name in ["", &"x".repeat(201)] {
+        let plan = format!("profile = \"sine:duration=1\"\n[[run]]\nname = \"{name}\"\n");
+        let done = campaign(directory, &plan, "d", &[]).output().unwrap();
+        let said = String::from_utf8_lossy(&done.stderr);
+        assert!(!done.status.success() && said.contains("must have 1 to 200 bytes"), "{said}");
+    }
+    assert!(!directory.join("d").exists());
+    // a name that is put together is cut
+    let long = "long".repeat(50);
+    let plan = format!(
+        "profile = \"sine:duration=0.2\"\n[[run]]\nname = \"{long}\"\n[vary]\nhub.I = [0.3, 0.4]\n"
+    );
+    let said = successful(campaign(directory, &plan, "e", &[])).stdout;
+    assert!(String::from_utf8_lossy(&said).contains("2 runs simulated"));
+    let names: Vec<String> =
+        rows(directory, "e/runs.csv").iter().map(|row| row["name"].clone()).collect();
+    assert!(
+        names.iter().all(|name| name.len() == 200 && name.starts_with("longlong")),
+        "{names:?}"
+    );
+    assert_ne!(names[0], names[1]);
+}
+
+#[test]
 fn the_command_in_the_report_makes_the_same_tables_again() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();

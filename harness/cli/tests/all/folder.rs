@@ -1,0 +1,223 @@
+//! A campaign's directory from outside: damaged runs, two campaigns at once, kills, full disks.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use bench::campaign::{Folder, MANIFEST};
+use bench::random::Random;
+use host::output::sha256;
+use pack::packed_for_tests;
+
+/// `hubslosh campaign` on a plan of this text, into `directory`/c; what is temporary goes to
+/// `directory`/tmp.
+fn campaign(directory: &Path, plan: &str) -> Command {
+    std::fs::write(directory.join("given.toml"), plan).unwrap();
+    std::fs::create_dir_all(directory.join("tmp")).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hubslosh"));
+    command.current_dir(directory).env("TMPDIR", directory.join("tmp"));
+    command.args(["campaign", "--plan", "given.toml", "--out", "c", "--fmu"]);
+    command.arg(packed_for_tests());
+    command
+}
+
+fn said(output: &Output) -> (String, String) {
+    let [said, error] = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text));
+    (said.into_owned(), error.into_owned())
+}
+
+fn successful(mut command: Command) -> (String, String) {
+    let done = command.output().expect("the program runs");
+    assert!(done.status.success(), "{}", said(&done).1);
+    said(&done)
+}
+
+/// Names in a directory, sorted.
+fn names(directory: &Path) -> Vec<String> {
+    let names = std::fs::read_dir(directory).unwrap().map(|entry| entry.unwrap().file_name());
+    let mut names: Vec<String> = names.map(|name| name.to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+/// Files of the campaign as name → bytes, those of runs left out.
+fn published(directory: &Path) -> BTreeMap<String, Vec<u8>> {
+    let files = names(&directory.join("c")).into_iter().filter(|name| name.contains('.'));
+    let files = files.filter(|name| !name.starts_with('.'));
+    files
+        .map(|name| (name.clone(), std::fs::read(directory.join("c").join(name)).unwrap()))
+        .collect()
+}
+
+/// Every file in the manifest is what it says, and tables and plan belong together.
+fn is_consistent(directory: &Path) {
+    let folder = directory.join("c");
+    let manifest = std::fs::read_to_string(folder.join(MANIFEST)).unwrap();
+    // the last line of a name counts
+    let sums: BTreeMap<&str, &str> =
+        manifest.lines().map(|line| line.split_once("  ").unwrap()).map(|(s, n)| (n, s)).collect();
+    for (name, sum) in sums {
+        if let Ok(bytes) = std::fs::read(folder.join(name)) {
+            assert_eq!(sha256(&bytes), sum, "{name}");
+        }
+    }
+    let plan = sha256(&std::fs::read(folder.join("plan.toml")).unwrap());
+    for table in ["features.csv", "features_spa.csv", "features_h1.csv", "runs.csv"] {
+        let mut reader = csv::Reader::from_path(folder.join(table)).unwrap();
+        let last = reader.headers().unwrap().len() - 1;
+        assert_eq!(&reader.headers().unwrap()[last], "plan_sha256", "{table}");
+        for row in reader.records() {
+            assert_eq!(&row.unwrap()[last], plan, "{table}");
+        }
+    }
+}
+
+#[test]
+fn every_flipped_bit_in_a_stored_run_is_noticed() {
+    const RUNS: usize = 50;
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let inertias: Vec<f64> = (0..RUNS).map(|i| 0.3 + i as f64 / 1000.0).collect();
+    let plan = format!("profile = \"sine:duration=0.2\"\n[vary]\nhub.I = {inertias:?}\n");
+    successful(campaign(directory, &plan));
+    is_consistent(directory);
+    let before = published(directory);
+    let runs: Vec<PathBuf> =
+        names(&directory.join("c/runs")).iter().map(|n| directory.join("c/runs").join(n)).collect();
+    assert_eq!(runs.len(), RUNS);
+    let whole: Vec<Vec<u8>> = runs.iter().map(|run| std::fs::read(run).unwrap()).collect();
+    let mut random = Random::new(1, 0);
+    let mut draw = |below: usize| (random.uniform() * below as f64) as usize;
+    // 200 bits
+    for _ in 0..4 {
+        for (run, bytes) in runs.iter().zip(&whole) {
+            let mut bytes = bytes.clone();
+            let (byte, bit) = (draw(bytes.len()), draw(8));
+            bytes[byte] ^= 1 << bit;
+            std::fs::write(run, bytes).unwrap();
+        }
+        let (said, error) = successful(campaign(directory, &plan));
+        assert!(said.contains("50 runs simulated, 0 reused"), "{said}");
+        assert_eq!(error.matches("its SHA-256 is not that in manifest.sha256").count(), RUNS);
+        for (run, bytes) in runs.iter().zip(&whole) {
+            assert!(std::fs::read(run).unwrap() == *bytes, "{} is as it was", run.display());
+        }
+        assert!(
+            published(directory) == before,
+            "tables, plan, report and manifest are as they were"
+        );
+    }
+}
+
+#[test]
+fn a_second_campaign_in_a_directory_hears_who_holds_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let plan = "title = \"Second\"\nprofile = \"sine:duration=0.2\"\n";
+    let first = Folder::take(&directory.join("c"), "the plan \"First\"").unwrap();
+    let done = campaign(directory, plan).output().unwrap();
+    let (_, error) = said(&done);
+    assert_eq!(done.status.code(), Some(1), "{error}");
+    for words in ["c is held by another campaign", "the plan \"First\"", "--out DIRECTORY"] {
+        assert!(error.contains(words), "\"{words}\" is not in: {error}");
+    }
+    assert!(error.contains(&format!("process {}", std::process::id())), "{error}");
+    assert!(names(&directory.join("c/runs")).is_empty(), "it made no run");
+    drop(first);
+    successful(campaign(directory, plan));
+}
+
+/// Long enough to be stopped on its way: a run of an hour after a run of a second.
+#[cfg(unix)]
+const INTERRUPTED: &str = "profile = \"zero\"\n[vary]\nprofile = [\"sine:duration=1\", \
+    \"exp-sweep:duration=40000,amplitude=0.05\", \"exp-sweep:duration=40000,amplitude=0.06\", \
+    \"exp-sweep:duration=40000,amplitude=0.04\", \"exp-sweep:duration=40000,amplitude=0.03\"]\n";
+
+#[cfg(unix)]
+#[test]
+fn a_stopped_campaign_leaves_what_was_there_and_nothing_temporary() {
+    use std::os::unix::process::ExitStatusExt;
+    use std::process::Stdio;
+    for (signal, number) in [("TERM", 15), ("INT", 2), ("KILL", 9)] {
+        let directory = tempfile::tempdir().unwrap();
+        let directory = directory.path();
+        let plan = "title = \"A\"\nprofile = \"sine:duration=0.2\"\n";
+        successful(campaign(directory, plan));
+        let before = published(directory);
+        let mut other = campaign(directory, INTERRUPTED);
+        let mut child = other.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        // it stands in the manifest and under its name
+        while !directory.join("c/runs/sine.parquet").exists() {
+            assert!(child.try_wait().unwrap().is_none(), "it ended before its first run");
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        assert!(!names(&directory.join("tmp")).is_empty(), "the FMU is unpacked there");
+        let kill =
+            Command::new("kill").args([format!("-{signal}"), child.id().to_string()]).status();
+        assert!(kill.unwrap().success());
+        assert_eq!(child.wait().unwrap().signal(), Some(number), "it dies of the signal");
+        is_consistent(directory);
+        let after = published(directory);
+        for (name, bytes) in &before {
+            assert!(name == MANIFEST || after[name] == *bytes, "{name} is as it was");
+        }
+        assert_eq!(before.len(), after.len());
+        if signal != "KILL" {
+            assert_eq!(names(&directory.join("tmp")), [""; 0], "SIG{signal}");
+            assert!(!directory.join("c/.unfinished").exists(), "SIG{signal}");
+        }
+        // the next start sweeps, and reuses what was finished
+        successful(campaign(directory, plan));
+        assert_eq!(names(&directory.join("tmp")), [""; 0], "SIG{signal}");
+        assert!(!directory.join("c/.unfinished").exists(), "SIG{signal}");
+        is_consistent(directory);
+        let first = "profile = \"zero\"\n[vary]\nprofile = [\"sine:duration=1\"]\n";
+        let (said, _) = successful(campaign(directory, first));
+        assert!(said.contains("0 runs simulated, 1 reused"), "{said}");
+        is_consistent(directory);
+    }
+}
+
+/// A disk with room for files of 1.35 MB: more than the FMU's binary, less than the report or a run
+/// of a sweep.
+#[cfg(unix)]
+fn limited(command: &Command) -> Command {
+    let mut shell = Command::new("sh");
+    // POSIX counts blocks of 512 bytes; with the signal ignored, a write beyond fails as on a full disk
+    shell.args(["-c", "trap '' XFSZ; ulimit -f 2640; exec \"$0\" \"$@\""]);
+    shell.arg(command.get_program()).args(command.get_args());
+    shell.current_dir(command.get_current_dir().unwrap());
+    shell.envs(command.get_envs().filter_map(|(name, value)| Some((name, value?))));
+    shell
+}
+
+#[cfg(unix)]
+#[test]
+fn a_full_disk_names_the_file_and_leaves_what_was_there() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let plan = "title = \"A\"\nprofile = \"sine:duration=0.2\"\n";
+    successful(campaign(directory, plan));
+    let before = published(directory);
+    let sweep = "title = \"B\"\nprofile = \"exp-sweep:duration=2700\"\n";
+    let short = "title = \"C\"\nprofile = \"sine:duration=0.3\"\n";
+    for (plan, file) in [(sweep, "c/runs/linear_100mm_100.parquet"), (short, "c/report.html")] {
+        let done = limited(&campaign(directory, plan)).output().unwrap();
+        let (_, error) = said(&done);
+        assert_eq!(done.status.code(), Some(1), "{error}");
+        assert!(error.contains(file), "{file} is not in: {error}");
+        let after = published(directory);
+        for (name, bytes) in &before {
+            assert!(name == MANIFEST || after[name] == *bytes, "{name} is as it was");
+        }
+        is_consistent(directory);
+        assert!(!directory.join("c/.unfinished").exists());
+        assert_eq!(names(&directory.join("tmp")), [""; 0]);
+    }
+    let mut torque = Command::new(env!("CARGO_BIN_EXE_hubslosh"));
+    torque.current_dir(directory).args(["torque", "--profile", "exp-sweep", "--out", "t.csv"]);
+    let done = limited(&torque).output().unwrap();
+    let (_, error) = said(&done);
+    assert!(!done.status.success() && error.contains("t.csv cannot be written"), "{error}");
+    assert!(!directory.join("t.csv").exists());
+}
