@@ -1,23 +1,14 @@
 //! The file itself: a zip archive (FMI 2.0.5, section 2.3).
 
 use std::collections::BTreeMap;
-use std::io::{Cursor, Read};
+use std::fs::File;
+use std::path::Path;
 
 use anyhow::{Context, Result};
 use host::temporary;
-use zip::read::Config;
-// Unstable by its own word, and the one reader that shows repeated names; the lock file pins it.
-use zip::unstable::read::ZipIterable;
-use zip::{CompressionMethod, ZipReadOptions};
+use zip::CompressionMethod;
 
 use super::Findings;
-
-/// Most bytes that one file of an archive may unpack to: a guard against zip bombs.
-const LARGEST: u64 = 1 << 30;
-/// Most bytes that all files of an archive together may unpack to.
-const LARGEST_SUM: u64 = 2 << 30;
-/// Most entries of an archive.
-const MOST_ENTRIES: usize = 200_000;
 
 /// What stands at the top of an FMU.
 const AT_THE_TOP: [&str; 9] = [
@@ -39,86 +30,88 @@ pub struct Entry {
     method: CompressionMethod,
     encrypted: bool,
     link: bool,
-    /// What is in it, or why it cannot be unpacked.
-    content: Result<Vec<u8>, String>,
+    /// What is in it, if a rule asks for that.
+    content: Vec<u8>,
+    /// Why it cannot be unpacked.
+    fault: Option<String>,
 }
 
-/// An archive, all of it unpacked in memory.
+/// An archive, unpacked.
 pub struct Archive {
     /// In the order of its directory, repeated names included.
     pub entries: Vec<Entry>,
-    /// Why the directory could not be read to its end.
+    /// Why the directory could not be read to its end, or is beyond what anybody should unpack.
     broken: Option<String>,
+    directory: temporary::Folder,
 }
 
+/// Whether a rule asks for what is in a file.
+fn is_read(name: &str) -> bool {
+    name == host::archive::DESCRIPTION || name == INDEX || name.starts_with("binaries/")
+}
+
+/// The first page of the documentation.
+const INDEX: &str = "documentation/index.html";
+
 impl Archive {
-    /// Reads as much as can be read.
-    pub fn read(bytes: &[u8]) -> Archive {
-        let mut archive = Archive { entries: Vec::new(), broken: None };
-        let mut directory = match ZipIterable::try_new(Cursor::new(bytes), Config::default()) {
-            Ok(directory) => directory.enforce_header_consistency(true),
-            Err(error) => {
-                archive.broken = Some(error.to_string());
-                return archive;
-            }
-        };
-        let files = match directory.files() {
-            Ok(files) => files,
-            Err(error) => {
-                archive.broken = Some(error.to_string());
-                return archive;
-            }
-        };
-        let mut body = Cursor::new(bytes);
-        let mut left = LARGEST_SUM;
-        for entry in files {
-            if archive.entries.len() >= MOST_ENTRIES {
-                archive.broken = Some(format!("it has more than {MOST_ENTRIES} entries"));
-                break;
-            }
-            let entry = match entry {
-                Ok(entry) => entry,
-                Err(error) => {
-                    archive.broken = Some(error.to_string());
-                    break;
-                }
+    /// Reads as much as can be read, and puts the files that hosts would find into a temporary
+    /// directory; names that lead out of it and links are left out, and found by the rules.
+    pub fn read(path: &Path) -> Result<Archive> {
+        let from = host::archive::Archive::open(path)?;
+        let directory = temporary::Folder::new()?;
+        let mut archive = Archive { entries: Vec::new(), broken: from.fault.clone(), directory };
+        for entry in &from.entries {
+            let mut unpacked = Entry {
+                name: entry.name.clone(),
+                method: entry.method,
+                encrypted: entry.encrypted,
+                link: entry.link,
+                content: Vec::new(),
+                fault: None,
             };
-            let (name, method) =
-                (String::from_utf8_lossy(entry.name_raw()).into_owned(), entry.compression());
-            let (encrypted, link) = (entry.encrypted(), entry.is_symlink());
-            let written = entry.size();
-            let mut content = Vec::new();
-            let most = LARGEST.min(left);
-            let unpacked = entry
-                .with_reader(&mut body, ZipReadOptions::new())
-                .map_err(|error| error.to_string())
-                .and_then(|file| {
-                    file.take(most + 1).read_to_end(&mut content).map_err(|error| error.to_string())
-                });
-            let content = match unpacked {
-                Ok(size) if size as u64 > LARGEST => Err("it unpacks to more than 1 GiB".into()),
-                Ok(size) if size as u64 > left => {
-                    Err("with it the archive unpacks to more than 2 GiB".into())
+            if from.fault.is_some() {
+                unpacked.fault = Some("nothing of this archive is unpacked".into());
+            } else if let Err(why) = archive.unpack(&from, entry, &mut unpacked.content) {
+                let error = why.downcast_ref::<std::io::Error>();
+                if error.is_some_and(|e| e.kind() == std::io::ErrorKind::StorageFull) {
+                    return Err(why).context("no room to unpack the FMU");
                 }
-                Ok(size) if size as u64 != written => {
-                    left -= size as u64;
-                    Err(format!("it unpacks to {size} bytes, its headers say {written}"))
-                }
-                Ok(size) => {
-                    left -= size as u64;
-                    Ok(content)
-                }
-                Err(why) => Err(why),
-            };
-            archive.entries.push(Entry { name, method, encrypted, link, content });
+                unpacked.fault = Some(format!("{why:#}"));
+            }
+            archive.entries.push(unpacked);
         }
-        archive
+        Ok(archive)
     }
 
-    /// What is in a file, if it is there and could be unpacked.
+    /// Unpacks an entry: to its place if it has one, to `content` if a rule asks for it, and in any
+    /// case to the end, where its size and checksum show.
+    fn unpack(
+        &self,
+        from: &host::archive::Archive,
+        entry: &host::archive::Entry,
+        content: &mut Vec<u8>,
+    ) -> Result<()> {
+        if is_read(&entry.name) {
+            *content = from.content(entry)?;
+        }
+        let is_placed = !entry.link && !entry.is_folder() && name_faults(&entry.name).is_empty();
+        let path = self.directory.path().join(&entry.name);
+        let folder = path.parent().unwrap_or(self.directory.path());
+        // A file where another entry wants a folder: hosts could not unpack it either.
+        let place = match is_placed && std::fs::create_dir_all(folder).is_ok() {
+            true => File::create(&path).ok(),
+            false => None,
+        };
+        match place {
+            Some(mut file) => from.copy(entry, &mut file),
+            None => from.copy(entry, &mut std::io::sink()),
+        }
+    }
+
+    /// What is in a file that rules read, if it is there and could be unpacked.
     pub fn file(&self, name: &str) -> Option<&[u8]> {
-        let entry = self.entries.iter().find(|entry| entry.name == name)?;
-        entry.content.as_deref().ok()
+        let entry = self.entries.iter().find(|entry| entry.name == name && is_read(name))?;
+        entry.fault.is_none().then_some(entry.content.as_slice())
     }
 
     /// Names of the files below a folder (`binaries/`), without the folder's own entries.
@@ -127,27 +120,9 @@ impl Archive {
         files.map(|entry| entry.name.as_str()).filter(move |name| name.starts_with(folder))
     }
 
-    /// Puts the files that hosts would find into a temporary directory; names that lead out of it
-    /// and links are left out, and found by the rules.
-    pub fn unpack(&self) -> Result<temporary::Folder> {
-        let directory = temporary::Folder::new()?;
-        for entry in &self.entries {
-            let Ok(content) = &entry.content else { continue };
-            if entry.link || entry.name.ends_with('/') || !name_faults(&entry.name).is_empty() {
-                continue;
-            }
-            let path = directory.path().join(&entry.name);
-            let folder = path.parent().unwrap_or(directory.path());
-            // A file where another entry wants a folder: hosts could not unpack it either.
-            let written =
-                std::fs::create_dir_all(folder).and_then(|()| std::fs::write(&path, content));
-            if let Err(error) = written
-                && error.kind() == std::io::ErrorKind::StorageFull
-            {
-                return Err(error).context("no room to unpack the FMU");
-            }
-        }
-        Ok(directory)
+    /// Where it is unpacked.
+    pub fn directory(&self) -> &Path {
+        self.directory.path()
     }
 }
 
@@ -181,7 +156,8 @@ pub fn readable(archive: &Archive, findings: &mut Findings) {
         findings.add("the archive", format!("its directory cannot be read: {why}"));
     }
     for entry in &archive.entries {
-        if let Err(why) = &entry.content
+        if let Some(why) = &entry.fault
+            && archive.broken.is_none()
             && !entry.encrypted
             && is_common(entry.method)
         {
@@ -282,10 +258,13 @@ pub fn description_first(archive: &Archive, findings: &mut Findings) {
 
 /// `zip.documentation`
 pub fn documentation(archive: &Archive, findings: &mut Findings) {
-    match archive.file("documentation/index.html") {
-        None => findings.add("documentation/index.html", "it is missing"),
+    match archive.file(INDEX) {
+        None if archive.entries.iter().any(|entry| entry.name == INDEX) => {
+            findings.skip("it cannot be unpacked");
+        }
+        None => findings.add(INDEX, "it is missing"),
         Some(page) if page.iter().all(u8::is_ascii_whitespace) => {
-            findings.add("documentation/index.html", "it is empty");
+            findings.add(INDEX, "it is empty");
         }
         Some(_) => {}
     }

@@ -36,7 +36,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use host::fmi2::PLATFORM;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -108,8 +108,10 @@ pub struct Finding {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Findings {
     severity: Severity,
-    /// All that is wrong; empty if nothing is.
+    /// What is wrong, the first [`KEPT`]; empty if nothing is.
     pub list: Vec<Finding>,
+    /// How many more there are.
+    pub more: usize,
     /// Why the rule does not apply, or could not be looked at.
     pub skipped: Option<String>,
     /// The rule that must tell the fault for which this one could not be looked at.
@@ -119,26 +121,33 @@ pub struct Findings {
 impl Findings {
     /// Nothing found yet; what will be found is this bad.
     pub fn new(severity: Severity) -> Findings {
-        Findings { severity, list: Vec::new(), skipped: None, told_by: None }
+        Findings { severity, list: Vec::new(), more: 0, skipped: None, told_by: None }
     }
 
     /// The rule is broken.
     pub fn add(&mut self, place: impl Into<String>, text: impl Into<String>) {
+        if self.list.len() >= KEPT {
+            self.more += 1;
+            return;
+        }
         self.list.push(Finding { severity: self.severity, place: place.into(), text: text.into() });
     }
 
     /// The rule is broken, and that is an error whatever the rule says.
     pub fn fail(&mut self, place: impl Into<String>, text: impl Into<String>) {
-        self.add(place, text);
-        if let Some(last) = self.list.last_mut() {
-            last.severity = Severity::Error;
+        let finding = Finding { severity: Severity::Error, place: place.into(), text: text.into() };
+        if self.list.len() >= KEPT {
+            self.list.pop(); // an error shows, however many warnings there are
+            self.more += 1;
         }
+        self.list.push(finding);
     }
 
     /// The rule is bent: a warning, whatever the rule says.
     pub fn warn(&mut self, place: impl Into<String>, text: impl Into<String>) {
+        let kept = self.list.len();
         self.add(place, text);
-        if let Some(last) = self.list.last_mut() {
+        if let Some(last) = self.list.get_mut(kept) {
             last.severity = Severity::Warning;
         }
     }
@@ -202,17 +211,14 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
             groups.join(", ")
         );
     }
-    let bytes =
-        std::fs::read(path).with_context(|| format!("{} cannot be read", path.display()))?;
-    let archive = Archive::read(&bytes);
+    let archive = Archive::read(path)?;
     let description = archive.file("modelDescription.xml").map(Description::read);
     let description = match &description {
         Some(Ok(description)) => Ok(description),
         Some(Err(why)) => Err(format!("modelDescription.xml cannot be read: {why}")),
-        None => Err("there is no modelDescription.xml".to_string()),
+        None => Err("there is no modelDescription.xml that can be unpacked".to_string()),
     };
     let binaries = Binaries::new(&archive, description.as_ref().ok().copied());
-    let directory = archive.unpack()?;
 
     // An FMU of another version of FMI keeps other rules: one tells it.
     let is_foreign = description.as_ref().is_ok_and(|d| d.other_version().is_some());
@@ -229,7 +235,7 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
         }
         Ok(_) => Ok(()),
     };
-    let hung = std::sync::atomic::AtomicUsize::new(0);
+    let so_far = process::SoFar::default();
     let one = |rule: &&'static Rule| {
         let started = std::time::Instant::now();
         let mut findings = Findings::new(rule.severity);
@@ -241,9 +247,14 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
             (Check::Binaries(check), _) => check(&binaries, &mut findings),
             (Check::Calls(_), _) => {
                 match &callable {
-                    Ok(()) => {
-                        process::check(rule, directory.path(), path, options, &hung, &mut findings)
-                    }
+                    Ok(()) => process::check(
+                        rule,
+                        archive.directory(),
+                        path,
+                        options,
+                        &so_far,
+                        &mut findings,
+                    ),
                     Err(why) => findings.skip(why.clone()),
                 }
                 progress(calls);
@@ -277,13 +288,18 @@ fn is_selected(rule: &Rule, name: &str) -> bool {
     rule.id == name || rule.id.strip_prefix(name).is_some_and(|rest| rest.starts_with('.'))
 }
 
-/// Findings of one rule that a person is shown; all of them are in the JUnit file.
+/// Findings of one rule that are kept: a file with a hundred thousand variables, all of them wrong,
+/// shall not fill the memory with sentences.
+const KEPT: usize = 1000;
+/// Findings of one rule that a person is shown; those kept are in the JUnit file.
 const SHOWN: usize = 8;
 
 impl Report {
     /// How many findings are as bad as this.
     pub fn count(&self, severity: Severity) -> usize {
-        self.all().filter(|(_, finding)| finding.severity == severity).count()
+        let more = self.outcomes.iter().map(|outcome| &outcome.findings);
+        let more = more.filter(|f| f.severity == severity).map(|f| f.more).sum::<usize>();
+        more + self.all().filter(|(_, finding)| finding.severity == severity).count()
     }
 
     /// All findings, each with its rule.
@@ -306,8 +322,9 @@ impl Report {
                     finding.text
                 );
             }
-            if findings.list.len() > SHOWN {
-                let _ = writeln!(text, "  and {} more like these", findings.list.len() - SHOWN);
+            let more = findings.more + findings.list.len().saturating_sub(SHOWN);
+            if more > 0 {
+                let _ = writeln!(text, "  and {more} more like these");
             }
             if !findings.list.is_empty() {
                 let _ = writeln!(text, "  rule: {} [{}]", rule.title, rule.source);

@@ -450,7 +450,7 @@ pub fn silent(fmu: &FmuUnderTest, _: &mut Findings) -> Result<()> {
 }
 
 /// What of the process is looked at, with its name.
-fn surroundings() -> Vec<(&'static str, String)> {
+pub fn surroundings() -> Vec<(&'static str, String)> {
     let state = HostState::now();
     let count = |folder: &str| {
         std::fs::read_dir(folder).map_or(String::new(), |entries| entries.count().to_string())
@@ -471,13 +471,13 @@ fn surroundings() -> Vec<(&'static str, String)> {
 
 /// `host.untouched`
 pub fn untouched(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
-    let before = surroundings();
     for interface in fmu.interfaces() {
         ordinary_lives(fmu, interface)?;
     }
-    for ((name, before), (_, after)) in before.into_iter().zip(surroundings()) {
-        if before != after {
-            let values = match name {
+    // from before it was loaded: what its constructors change counts as well
+    for ((name, before), (_, after)) in fmu.before.iter().zip(surroundings()) {
+        if *before != after {
+            let values = match *name {
                 "environment variables" => String::new(),
                 _ => format!(": {before} before, {after} after"),
             };

@@ -1,24 +1,31 @@
-//! Rules of calls run in a process of their own: an FMU that crashes, hangs or ends the process is
-//! a finding. What the process is about to do and what it found go through a file, because the FMU
-//! may write to stdout.
+//! Rules of calls run in a process of their own, guarded by `host::guard`: an FMU that crashes, hangs
+//! or ends the process is a finding. What the process is about to do and what it found go through a
+//! file, because the FMU may write to stdout.
 
 use std::fs::File;
 use std::io::Write;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
+use host::guard::{self, Cause, Limits, Output};
 use serde::{Deserialize, Serialize};
 
 use super::under_test::{FmuUnderTest, Unusable};
-use super::{Check, Findings, Options, RULES, Rule};
+use super::{Check, Findings, Options, RULES, Rule, life};
 
 /// The hidden subcommand of `hubslosh`.
 pub const SUBCOMMAND: &str = "check-calls";
 /// After so many endless calls no more are made: the check would take for ever as well.
-const HANGS: usize = 3;
+const HANGS: usize = 2;
+/// Least time that one call may take if the rule has so much.
+const CALL: Duration = Duration::from_secs(5);
+/// Bytes that a file of an FMU may have: rules run side by side.
+const FILE: u64 = 8 << 20;
+/// The rule that tells what is wrong with loading.
+const OPENS: &str = "load.opens";
 /// Bytes shown of what an FMU prints.
 const PRINTED: usize = 200;
 
@@ -71,6 +78,15 @@ impl Trace {
     }
 }
 
+/// What the rules that were looked at say of the others.
+#[derive(Default)]
+pub struct SoFar {
+    /// Rules whose process had to be ended.
+    hung: AtomicUsize,
+    /// Why the binary cannot be loaded by any of them.
+    lost: OnceLock<String>,
+}
+
 /// Looks at one rule in a process of its own; `path` is what the FMU is called, `directory` where it
 /// is unpacked.
 pub fn check(
@@ -78,15 +94,18 @@ pub fn check(
     directory: &Path,
     path: &Path,
     options: &Options,
-    hung: &AtomicUsize,
+    so_far: &SoFar,
     findings: &mut Findings,
 ) {
-    if hung.load(Ordering::Relaxed) >= HANGS {
+    if so_far.hung.load(Ordering::Relaxed) >= HANGS {
         return findings.skip(format!("{HANGS} rules have ended in endless calls already"));
     }
-    match run(rule, directory, path, options, findings) {
+    if let Some(why) = so_far.lost.get().filter(|_| rule.id != OPENS) {
+        return findings.skip(why);
+    }
+    match run(rule, directory, path, options, so_far, findings) {
         Ok(true) => {
-            hung.fetch_add(1, Ordering::Relaxed);
+            so_far.hung.fetch_add(1, Ordering::Relaxed);
         }
         Ok(false) => {}
         Err(error) => findings.fail("hubslosh", format!("the calls could not be made: {error:#}")),
@@ -99,36 +118,27 @@ fn run(
     directory: &Path,
     path: &Path,
     options: &Options,
+    so_far: &SoFar,
     findings: &mut Findings,
 ) -> Result<bool> {
     let folder = tempfile::tempdir().context("no temporary directory")?;
     let answer = folder.path().join("answer");
-    let (stdout, stderr) = (folder.path().join("stdout"), folder.path().join("stderr"));
-    let mut child = Command::new(&options.program)
-        .arg(SUBCOMMAND)
-        .arg(rule.id)
-        .arg(directory)
-        .arg(path)
-        .arg(&answer)
-        .arg(options.limit.as_secs_f64().to_string())
-        .stdin(Stdio::null())
-        .stdout(File::create(&stdout)?)
-        .stderr(File::create(&stderr)?)
-        .spawn()
-        .with_context(|| format!("{} cannot be run", options.program.display()))?;
-    let started = Instant::now();
-    let ended = loop {
-        if let Some(status) = child.try_wait()? {
-            break Some(status);
-        }
-        if started.elapsed() > options.limit {
-            // It may have ended just now; either is fine.
-            let _ = child.kill();
-            child.wait()?;
-            break None;
-        }
-        std::thread::sleep(Duration::from_millis(2));
+    let seconds = options.limit.as_secs_f64().to_string();
+    let arguments = [
+        SUBCOMMAND.as_ref(),
+        rule.id.as_ref(),
+        directory.as_os_str(),
+        path.as_os_str(),
+        answer.as_os_str(),
+        seconds.as_ref(),
+    ];
+    let limits = Limits {
+        call: options.limit.div_f64(10.0).max(CALL).min(options.limit),
+        total: Some(options.limit),
+        memory: guard::MEMORY,
+        file: FILE,
     };
+    let ended = guard::run(&options.program, arguments, &limits, Output::Kept)?;
     let lines = std::fs::read_to_string(&answer).unwrap_or_default();
     let (mut doing, mut crash) = (LOADING.to_string(), Crash::Error);
     let mut done = None;
@@ -139,44 +149,51 @@ fn run(
             Err(_) => {} // cut off by the crash
         }
     }
-    let read = |file| std::fs::read(file).unwrap_or_default();
-    let (stdout, stderr) = (read(&stdout), read(&stderr));
-    match (done, ended) {
-        (Some(found), _) => {
+    let [stdout, stderr] = &ended.printed;
+    let last = ended.last_line().map(|line| format!("; it printed {line:?}")).unwrap_or_default();
+    let endless = |limit: Duration| {
+        let seconds = limit.as_secs_f64();
+        format!(
+            "no end after {seconds:.0} s (allowed: every call returns; --limit gives more time)"
+        )
+    };
+    let (why, was_ended) = match &ended.cause {
+        Cause::Done(_) => ("the process ended without a result".into(), false),
+        Cause::Ended(status) => {
+            (format!("the process ended ({status}{last}); allowed: every call returns"), false)
+        }
+        Cause::EndlessCall => (endless(limits.call), true),
+        Cause::TooLong => (endless(options.limit), true),
+        Cause::Flood => {
+            (format!("it prints more than {} bytes (allowed: nothing)", guard::FLOOD), true)
+        }
+    };
+    let is_lost = done.is_none() && doing == LOADING;
+    if is_lost {
+        let _ = so_far.lost.set(format!("the process ended while {LOADING}: {why}"));
+    }
+    match done {
+        Some(found) => {
             *findings = found;
             if rule.id == "host.silent" {
                 let start = |bytes| -> String {
                     String::from_utf8_lossy(bytes).chars().take(PRINTED).collect()
                 };
                 if !stdout.is_empty() {
-                    findings.fail("stdout", format!("it prints {:?}", start(&stdout)));
+                    findings.fail("stdout", format!("it prints {:?}", start(stdout)));
                 }
                 if !stderr.is_empty() {
-                    findings.add("stderr", format!("it prints {:?}", start(&stderr)));
+                    findings.add("stderr", format!("it prints {:?}", start(stderr)));
                 }
             }
         }
         // One rule tells it; the others would say the same.
-        (None, Some(status)) if doing == LOADING && rule.id != "load.opens" => {
-            findings.skip(format!("the process ended while {doing} ({status})"));
+        None if is_lost && rule.id != OPENS => {
+            findings.skip(format!("the process ended while {doing}: {why}"));
         }
-        (None, Some(status)) => {
-            let printed = [stdout, stderr].concat();
-            let text = String::from_utf8_lossy(&printed);
-            let last = text.lines().rfind(|line| !line.trim().is_empty());
-            let last = last.map(|line| format!("; it printed {line:?}")).unwrap_or_default();
-            let text = format!("the process ended ({status}{last}); allowed: every call returns");
-            tell_crash(findings, doing, text, crash);
-        }
-        (None, None) => {
-            let text = format!(
-                "no end after {:.0} s (allowed: every call returns; --limit gives more time)",
-                options.limit.as_secs_f64()
-            );
-            tell_crash(findings, doing, text, crash);
-        }
+        None => tell_crash(findings, doing, why, crash),
     }
-    Ok(ended.is_none())
+    Ok(was_ended)
 }
 
 fn tell_crash(findings: &mut Findings, doing: String, text: String, crash: Crash) {
@@ -202,13 +219,15 @@ pub fn answer(
     let Check::Calls(check) = rule.check else { anyhow::bail!("{id} makes no calls") };
     let trace = Trace(File::create(answer)?);
     trace.doing(LOADING, Crash::Error);
+    let before = life::surroundings();
     let mut findings = Findings::new(rule.severity);
     // a rule that is slow, and not hung, shall tell what it has found by then
     let deadline = Instant::now() + limit.mul_f64(0.75);
     match FmuUnderTest::open(directory, path, trace, deadline) {
         Err(error) if rule.id == "load.opens" => findings.add("the binary", format!("{error:#}")),
         Err(error) => findings.skip(format!("it cannot be loaded: {error:#}")),
-        Ok(fmu) => {
+        Ok(mut fmu) => {
+            fmu.before = before;
             if let Err(error) = check(&fmu, &mut findings) {
                 match error.downcast_ref::<Unusable>() {
                     Some(unusable) if unusable.rule != rule.id => {

@@ -74,6 +74,8 @@ pub struct FmuUnderTest {
     sessions: Cell<usize>,
     directory: PathBuf,
     path: PathBuf,
+    /// What the process was like before the binary was loaded.
+    pub before: Vec<(&'static str, String)>,
 }
 
 /// A value as it was read.
@@ -185,6 +187,7 @@ impl FmuUnderTest {
             sessions: Cell::new(0),
             directory: directory.to_path_buf(),
             path: path.to_path_buf(),
+            before: Vec::new(),
         })
     }
 

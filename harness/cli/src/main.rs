@@ -12,6 +12,11 @@ macro_rules! print {
     ($($arguments:tt)*) => { crate::say(format!($($arguments)*)) };
 }
 
+/// `eprintln!` of the standard library writes to where a guarded FMU does.
+macro_rules! eprintln {
+    ($($arguments:tt)*) => { crate::complain(format!("{}\n", format_args!($($arguments)*))) };
+}
+
 mod commands;
 mod progress;
 mod set_file;
@@ -19,13 +24,14 @@ mod set_file;
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 use std::process::ExitCode;
+use std::time::Duration;
 
-use anyhow::Result;
+use anyhow::{Context, Result, bail};
 use bench::campaign::Campaign;
 use bench::plan::Plan;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use commands::*;
-use host::fmi2::Fmu;
+use host::guard::{self, Cause, Limits, Output};
 
 /// Packs FMUs, checks them, simulates campaigns and reports.
 ///
@@ -34,8 +40,43 @@ use host::fmi2::Fmu;
 #[derive(Parser)]
 #[command(version, after_help = EXIT_CODES)]
 struct Cli {
+    /// Time that one call of an FMU may take, s (of check: see its --limit).
+    #[arg(long, global = true, hide_short_help = true, value_name = "SECONDS", default_value_t = guard::CALL.as_secs_f64())]
+    call_limit: f64,
+    /// Memory that an FMU may take in run and campaign, MiB.
+    #[arg(long, global = true, hide_short_help = true, value_name = "MIB", default_value_t = guard::MEMORY >> 20)]
+    memory: u64,
+    /// How a process that runs FMUs is started.
+    #[arg(long, hide = true)]
+    guarded: Option<String>,
     #[command(subcommand)]
     command: Option<Command>,
+}
+
+impl Cli {
+    /// Whether the command loads an FMU into its own process.
+    fn loads(&self) -> bool {
+        use Command::*;
+        let of = |command: &Command| {
+            matches!(command, Run(_) | Campaign(_) | Gyro(_) | Example(_) | Identify(_) | Design(_))
+        };
+        self.command.as_ref().is_none_or(of)
+    }
+
+    /// What the process that does it may take.
+    fn limits(&self) -> Result<Limits> {
+        let call = Duration::try_from_secs_f64(self.call_limit).ok().filter(|time| !time.is_zero());
+        let call =
+            call.with_context(|| format!("--call-limit {} (allowed: above 0 s)", self.call_limit))?;
+        let (memory, file) = match self.command {
+            None | Some(Command::Run(_) | Command::Campaign(_)) => {
+                (self.memory.saturating_mul(1 << 20), guard::FILE)
+            }
+            // fits and records take what they need
+            _ => (1 << 40, 1 << 40),
+        };
+        Ok(Limits { call, total: None, memory, file })
+    }
 }
 
 /// What the program's exit code says.
@@ -79,7 +120,7 @@ fn command_line() -> clap::Command {
     with_negative_numbers(Cli::command())
 }
 
-/// Has SIGINT and SIGTERM remove what is temporary before they end the program. SIGHUP stays as it
+/// Has SIGINT and SIGTERM end guarded processes and remove what is temporary before they end the program. SIGHUP stays as it
 /// was, for nohup.
 #[cfg(unix)]
 fn clean_up_on_signals() {
@@ -87,6 +128,7 @@ fn clean_up_on_signals() {
     let Ok(mut signals) = signal_hook::iterator::Signals::new([SIGINT, SIGTERM]) else { return };
     std::thread::spawn(move || {
         for signal in signals.forever() {
+            guard::end_all();
             host::temporary::remove_all();
             let _ = signal_hook::low_level::emulate_default_handler(signal);
         }
@@ -97,6 +139,48 @@ fn main() -> ExitCode {
     #[cfg(unix)]
     clean_up_on_signals();
     let cli = Cli::from_arg_matches(&command_line().get_matches()).unwrap_or_else(|e| e.exit());
+    let code = match (&cli.guarded, cli.loads()) {
+        (None, true) => guarded(&cli),
+        (Some(spec), _) => guard::enter(spec).map(|()| carry_out(cli)),
+        (None, false) => Ok(carry_out(cli)),
+    };
+    let code = code.unwrap_or_else(|error| {
+        eprintln!("error: {error:#}");
+        1
+    });
+    guard::done(code);
+    code.into()
+}
+
+/// Has a guarded process carry the command out.
+fn guarded(cli: &Cli) -> Result<u8> {
+    if cli.command.is_none() {
+        pack::native(::pack::HUBSLOSH, Path::new(DEFAULT_FMU))?;
+    }
+    let limits = cli.limits()?;
+    let program = std::env::current_exe().context("this program cannot find itself")?;
+    let outcome = guard::run(&program, std::env::args_os().skip(1), &limits, Output::Shown)?;
+    match outcome.cause {
+        Cause::Done(code) => Ok(code),
+        Cause::Ended(status) => {
+            let last = outcome.last_line().map(|line| format!("; it printed {line:?}"));
+            bail!(
+                "the FMU has ended the process that ran it ({status}{}), before the command was done \
+                 (allowed: every call returns, in {} MiB of memory and files of {} MiB)",
+                last.unwrap_or_default(),
+                cli.memory,
+                guard::FILE >> 20
+            )
+        }
+        _ => bail!(
+            "a call of the FMU has not returned within {} s (--call-limit gives more time)",
+            cli.call_limit
+        ),
+    }
+}
+
+/// Carries the command out in this process and returns the exit code.
+fn carry_out(cli: Cli) -> u8 {
     let done = match cli.command {
         Some(Command::Pack(args)) => args.run(),
         Some(Command::Run(args)) => args.run(),
@@ -117,20 +201,43 @@ fn main() -> ExitCode {
         None => everything(),
     };
     match done {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(error) => {
             eprintln!("error: {error:#}");
-            ExitCode::FAILURE
+            1
         }
     }
 }
 
 /// Prints a text to stdout.
 fn say(text: String) {
-    if let Err(error) = quiet_if_closed(std::io::stdout().write_all(text.as_bytes())) {
+    if let Err(error) = quiet_if_closed(stdout().write_all(text.as_bytes())) {
         eprintln!("error: could not write to stdout: {error}");
-        std::process::exit(1);
+        exit(1);
     }
+}
+
+/// stdout, out of the reach of a guarded FMU.
+fn stdout() -> Box<dyn Write> {
+    match guard::streams() {
+        Some((stdout, _)) => Box::new(stdout),
+        None => Box::new(std::io::stdout().lock()),
+    }
+}
+
+/// Prints a text to stderr.
+fn complain(text: String) {
+    // who has closed it does not want to know
+    let _ = match guard::streams() {
+        Some((_, mut stderr)) => stderr.write_all(text.as_bytes()),
+        None => std::io::stderr().write_all(text.as_bytes()),
+    };
+}
+
+/// Ends the program on purpose.
+fn exit(code: u8) -> ! {
+    guard::done(code);
+    std::process::exit(code.into())
 }
 
 /// Ends the program, as done, if what was written to has no reader any more.
@@ -139,17 +246,16 @@ fn quiet_if_closed<T, E: Into<anyhow::Error>>(written: Result<T, E>) -> Result<T
         let error = error.into();
         let io = error.downcast_ref::<std::io::Error>();
         if io.is_some_and(|io| io.kind() == ErrorKind::BrokenPipe) {
-            std::process::exit(0);
+            exit(0);
         }
         error
     })
 }
 
-/// What `cargo run --release` does.
+/// What `cargo run --release` does with the FMU that it has packed.
 fn everything() -> Result<()> {
-    pack::native(::pack::HUBSLOSH, Path::new(DEFAULT_FMU))?;
     let plan = Plan::read("thesis")?;
     let out = DEFAULT_CAMPAIGN.into();
     let campaign = Campaign { plan, force: false, jobs: 0, compare: None, out };
-    campaign::drive(&Fmu::open(DEFAULT_FMU)?, &campaign, campaign.take()?)
+    campaign::drive(&open(Path::new(DEFAULT_FMU))?, &campaign, campaign.take()?)
 }

@@ -39,7 +39,13 @@ pub fn tell(bar: &ProgressBar, line: &str) {
 
 /// Not drawn where stderr is no terminal.
 fn bar(template: &str) -> Result<ProgressBar> {
-    Ok(ProgressBar::new(0).with_style(ProgressStyle::with_template(template)?))
+    let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template(template)?);
+    #[cfg(unix)]
+    if let Some((_, stderr)) = host::guard::streams() {
+        let terminal = console::Term::read_write_pair(stderr.try_clone()?, stderr.try_clone()?);
+        bar.set_draw_target(indicatif::ProgressDrawTarget::term(terminal, 20));
+    }
+    Ok(bar)
 }
 
 /// Shows a piece of news of the bench.

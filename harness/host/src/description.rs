@@ -1,8 +1,11 @@
 //! What an FMU says of itself: `modelDescription.xml` (FMI 2.0, section 2.2), as far as a host
 //! needs it to drive the FMU.
 
+use std::path::Path;
+
 use anyhow::{Context, Result, anyhow, bail, ensure};
 
+use crate::archive::Archive;
 use crate::xml::Element;
 
 /// The root element `fmiModelDescription`.
@@ -146,13 +149,32 @@ impl Variable {
     }
 }
 
+/// A text in quotes, or its beginning and its length.
+fn short(text: &str) -> String {
+    match text.char_indices().nth(60) {
+        None => format!("\"{text}\""),
+        Some((at, _)) => format!("\"{}…\", {} bytes long", &text[..at], text.len()),
+    }
+}
+
 /// Reads elements and keeps all that is wrong with them.
 #[derive(Default)]
 struct Reader {
     problems: Vec<String>,
+    more: usize,
 }
 
 impl Reader {
+    /// Of many problems the first are kept.
+    fn problem(&mut self, element: &Element, what: &str) {
+        match self.problems.len() < NAMED {
+            true => {
+                self.problems.push(format!("line {}, {}: {what}", element.line, element.name));
+            }
+            false => self.more += 1,
+        }
+    }
+
     /// An attribute that must be there and that `read` understands.
     fn must<T: Default>(
         &mut self,
@@ -162,9 +184,8 @@ impl Reader {
     ) -> T {
         let text = element.get(attribute);
         text.and_then(read).unwrap_or_else(|| {
-            let why = text.map_or("is missing".into(), |text| format!("cannot be \"{text}\""));
-            self.problems
-                .push(format!("line {}, {}: {attribute} {why}", element.line, element.name));
+            let why = text.map_or("is missing".into(), |text| format!("cannot be {}", short(text)));
+            self.problem(element, &format!("{attribute} {why}"));
             T::default()
         })
     }
@@ -203,11 +224,11 @@ impl Reader {
         ];
         let typed = TYPES.iter().find_map(|(name, kind)| Some((*kind, element.child(name)?)));
         if typed.is_none() {
-            self.problems.push(format!("line {}, {}: it has no type", element.line, element.name));
+            self.problem(element, "it has no type");
         }
         let of = |name: &str| typed.and_then(|(_, typed)| typed.get(name)).map(String::from);
         Variable {
-            name: self.text(element, "name"),
+            name: self.must(element, "name", |n| (n.len() <= LONGEST_NAME).then(|| n.into())),
             reference: self.must(element, "valueReference", |text| text.trim().parse().ok()),
             causality: element.get("causality").unwrap_or("local").into(),
             variability: element.get("variability").unwrap_or_default().into(),
@@ -225,15 +246,56 @@ impl Reader {
     }
 }
 
+/// Bytes that the name of a variable may have.
+const LONGEST_NAME: usize = 1024;
+/// Types that a description may have, and items of one: what a variable is declared as is looked up
+/// among all of them.
+const MOST_TYPES: usize = 5000;
+/// What is missing is named so many times.
+const NAMED: usize = 20;
+
 impl ModelDescription {
+    /// Reads the description of a packed FMU; nothing is unpacked or loaded.
+    pub fn of_packed(path: &Path) -> Result<Self> {
+        let name = path.display();
+        let text = Archive::open(path)?.description();
+        let text = text.with_context(|| format!("{name} is not an FMU"))?;
+        let description = ModelDescription::from_xml(&text);
+        let description = description.with_context(|| format!("{name} cannot be used"))?;
+        description.check_version().with_context(|| format!("{name} cannot be used"))?;
+        Ok(description)
+    }
+
+    /// Fails unless it is of FMI 2.0.
+    pub fn check_version(&self) -> Result<()> {
+        let version = short(&self.fmi_version).replace('"', "");
+        ensure!(self.fmi_version == "2.0", "it is of FMI version {version}; this host drives 2.0");
+        Ok(())
+    }
+
     /// Reads the XML text.
     ///
     /// # Errors
-    /// If it is not well-formed, or without what a host needs; all that is missing is named.
+    /// If it is not well-formed, of FMI 1 or 3, or without what a host needs; what is missing is
+    /// named.
     pub fn from_xml(text: &str) -> Result<Self> {
         let root = Element::parse(text.as_bytes())
             .map_err(|why| anyhow!("modelDescription.xml, line and column {why}"))?;
+        // what other versions have is not missing here
+        if let Some(version) = root.get("fmiVersion").filter(|version| !version.starts_with("2.")) {
+            let version = short(version).replace('"', "");
+            bail!("it is of FMI version {version}; this host drives 2.0");
+        }
         let mut reader = Reader::default();
+        for list in root.children.iter().filter(|child| child.name == "TypeDefinitions") {
+            let enumerations = list.children.iter().flat_map(|simple| &simple.children);
+            let counts = enumerations.map(|of| of.children.len()).chain([list.children.len()]);
+            if let Some(count) = counts.max().filter(|count| *count > MOST_TYPES) {
+                bail!(
+                    "modelDescription.xml: {count} types, or items of one (allowed: {MOST_TYPES})"
+                );
+            }
+        }
         let optional = |name: &str| root.get(name).unwrap_or_default().to_string();
         let description = ModelDescription {
             fmi_version: reader.text(&root, "fmiVersion"),
@@ -256,7 +318,8 @@ impl ModelDescription {
             },
             variables: root.list("ModelVariables").map(|e| reader.variable(e)).collect(),
         };
-        let problems = reader.problems;
+        let Reader { mut problems, more } = reader;
+        problems.extend((more > 0).then(|| format!("and {more} more like these")));
         ensure!(problems.is_empty(), "modelDescription.xml: {}", problems.join("; "));
         Ok(description)
     }

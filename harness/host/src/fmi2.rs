@@ -7,8 +7,6 @@
 
 use std::cell::Cell;
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
-use std::fs::File;
-use std::io::Read;
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 use std::ptr::{null, null_mut};
@@ -17,7 +15,9 @@ use std::sync::Mutex;
 use anyhow::{Context, Result, bail};
 use libloading::Library;
 
+use crate::archive::Archive;
 use crate::description::{ModelDescription, Type, Value};
+use crate::guard::{self, Calls};
 use crate::output::sha256;
 use crate::temporary;
 
@@ -245,6 +245,8 @@ pub struct HostState {
     pub locale: String,
     /// A fingerprint of the signal handlers; 0 where there are none.
     pub signal_handlers: u64,
+    /// The working directory.
+    pub directory: Option<PathBuf>,
 }
 
 impl HostState {
@@ -257,8 +259,24 @@ impl HostState {
                 float_control: hubslosh_float_control(),
                 locale: CStr::from_ptr(hubslosh_locale()).to_string_lossy().into_owned(),
                 signal_handlers: hubslosh_signal_handlers(),
+                directory: std::env::current_dir().ok(),
             }
         }
+    }
+
+    /// What is other now.
+    fn changed(&self) -> Vec<&'static str> {
+        let now = HostState::now();
+        let parts = [
+            (
+                "floating-point control (rounding, flushing, traps)",
+                self.float_control == now.float_control,
+            ),
+            ("locale", self.locale == now.locale),
+            ("signal handlers", self.signal_handlers == now.signal_handlers),
+            ("working directory", self.directory == now.directory),
+        ];
+        parts.into_iter().filter(|(_, same)| !same).map(|(part, _)| part).collect()
     }
 }
 
@@ -284,36 +302,35 @@ pub struct Fmu {
     hash: String,
     binary_hash: String,
     path: PathBuf,
+    changed: Vec<&'static str>,
     // dropped in this order: first the code, then the files
-    _library: Library,
+    library: Option<Library>,
     _directory: Option<temporary::Folder>,
+}
+
+impl Drop for Fmu {
+    fn drop(&mut self) {
+        let _calls = Calls::one();
+        self.library = None;
+    }
 }
 
 impl Fmu {
     /// Opens a packed FMU and loads the binary for this platform.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
-        let path = path.as_ref().to_path_buf();
+        let path = path.as_ref();
         let name = path.display();
-        let mut file = File::open(&path).with_context(|| format!("{name} cannot be opened"))?;
-        let mut bytes = Vec::new();
-        file.read_to_end(&mut bytes).with_context(|| format!("{name} cannot be read"))?;
-        let hash = sha256(&bytes);
-        let mut archive = zip::ZipArchive::new(std::io::Cursor::new(bytes))
-            .with_context(|| format!("{name} is not an FMU: it is not a zip archive"))?;
+        let archive = Archive::open(path)?;
         let directory = temporary::Folder::new()?;
-        archive.extract(directory.path()).with_context(|| {
-            format!("{name} cannot be unpacked to {}", directory.path().display())
-        })?;
+        archive.unpack(directory.path()).with_context(|| format!("{name} is not an FMU"))?;
 
-        let mut fmu = Fmu::load(directory.path(), &path)?;
+        let mut fmu = Fmu::load(directory.path(), path)?;
         let description = &fmu.description;
-        if description.fmi_version != "2.0" {
-            bail!("{name} is of FMI version {}; this host drives 2.0", description.fmi_version);
-        }
+        description.check_version().with_context(|| format!("{name} cannot be used"))?;
         if description.co_simulation.is_none() {
             bail!("{name} offers no co-simulation; this host drives nothing else");
         }
-        fmu.hash = hash;
+        fmu.hash = archive.hash().with_context(|| format!("{name} cannot be read"))?;
         fmu._directory = Some(directory);
         Ok(fmu)
     }
@@ -340,6 +357,7 @@ impl Fmu {
             .with_context(|| format!("modelDescription.xml in {name} cannot be read"))?;
         let description =
             ModelDescription::from_xml(&text).with_context(|| format!("{name} cannot be used"))?;
+        drop(text);
         let stepping = description.co_simulation.as_ref().map(|i| &i.model_identifier);
         let exchange = description.model_exchange.as_ref().map(|i| &i.model_identifier);
         let identifier = match kind {
@@ -349,6 +367,13 @@ impl Fmu {
         };
         let identifier = identifier
             .with_context(|| format!("{name} offers neither co-simulation nor model exchange"))?;
+        // a library outside the archive is not the FMU's
+        if identifier.contains(['/', '\\', ':', '\0']) {
+            bail!(
+                "{name} cannot be used: modelIdentifier {identifier:?} leads out of the folder of its \
+                 binary (allowed: letters, digits, underscores)"
+            );
+        }
         let binary = format!("binaries/{PLATFORM}/{identifier}{}", std::env::consts::DLL_SUFFIX);
         let binary_path = directory.join(&binary);
         if !binary_path.exists() {
@@ -364,9 +389,13 @@ impl Fmu {
         let bytes = std::fs::read(&binary_path)
             .with_context(|| format!("{binary} in {name} cannot be read"))?;
         let binary_hash = sha256(&bytes);
+        guard::before_loading();
+        let (before, calls) = (HostState::now(), Calls::one());
         // SAFETY: loading runs the library's initialisers; that is what opening an FMU means.
         let library = unsafe { Library::new(&binary_path) }
             .with_context(|| format!("{binary} in {name} cannot be loaded"))?;
+        drop(calls);
+        let changed = before.changed();
         let mut needed = Functions::SYMBOLS.to_vec();
         if stepping == Some(identifier) {
             needed.extend(StepFunctions::SYMBOLS);
@@ -391,7 +420,8 @@ impl Fmu {
             hash: String::new(),
             binary_hash,
             path: path.to_path_buf(),
-            _library: library,
+            changed,
+            library: Some(library),
             _directory: None,
         })
     }
@@ -409,6 +439,11 @@ impl Fmu {
     /// SHA-256 of the binary that is loaded, in hexadecimal digits.
     pub fn binary_hash(&self) -> &str {
         &self.binary_hash
+    }
+
+    /// What loading its binary has changed for this whole process, such as how numbers are rounded.
+    pub fn changed(&self) -> &[&'static str] {
+        &self.changed
     }
 
     /// Whether its binary has all functions of model exchange.
@@ -484,6 +519,7 @@ impl Fmu {
             step_finished: None,
             environment: if logs { sink.cast() } else { null_mut() },
         }));
+        let calls = Calls::one();
         // SAFETY: strings and callbacks outlive the call; sink and callbacks outlive the instance.
         let component = unsafe {
             (self.functions.instantiate)(
@@ -496,6 +532,7 @@ impl Fmu {
                 with.logging.into(),
             )
         };
+        calls.end();
         if with.callbacks == Callbacks::Fleeting {
             // SAFETY: made above, read by nobody any more.
             unsafe { callbacks.write_bytes(0, 1) };
@@ -507,6 +544,7 @@ impl Fmu {
             sink,
             callbacks,
             warned: Cell::new(None),
+            calls,
             one_thread: PhantomData,
         };
         if component.is_null() {
@@ -687,6 +725,7 @@ pub struct Instance<'fmu> {
     sink: *mut Sink,
     callbacks: *mut CallbackFunctions,
     warned: Cell<Option<&'static str>>,
+    calls: Calls,
     one_thread: PhantomData<*mut ()>,
 }
 
@@ -696,7 +735,7 @@ impl Drop for Instance<'_> {
         // first, because it may still log.
         unsafe {
             if !self.component.is_null() {
-                (self.fmu.functions.free_instance)(self.component);
+                (self.functions().free_instance)(self.component);
             }
             drop(Box::from_raw(self.callbacks));
             drop(Box::from_raw(self.sink));
@@ -737,6 +776,7 @@ impl<'fmu> Instance<'fmu> {
     }
 
     fn check(&self, call: &'static str, status: c_int) -> Called {
+        self.calls.end();
         match Status::from(status) {
             Status::Ok => Ok(()),
             Status::Warning => {
@@ -754,7 +794,7 @@ impl<'fmu> Instance<'fmu> {
         let pointers: Vec<*const c_char> = categories.iter().map(|c| c.as_ptr()).collect();
         // SAFETY: pointers to strings that outlive the call.
         let status = unsafe {
-            (self.fmu.functions.set_debug_logging)(
+            (self.functions().set_debug_logging)(
                 self.component,
                 on.into(),
                 pointers.len(),
@@ -773,7 +813,7 @@ impl<'fmu> Instance<'fmu> {
     ) -> Called {
         // SAFETY: plain values.
         let status = unsafe {
-            (self.fmu.functions.setup_experiment)(
+            (self.functions().setup_experiment)(
                 self.component,
                 tolerance.is_some().into(),
                 tolerance.unwrap_or(0.0),
@@ -788,28 +828,28 @@ impl<'fmu> Instance<'fmu> {
     /// fmi2EnterInitializationMode.
     pub fn enter_initialization_mode(&mut self) -> Called {
         // SAFETY: plain call on a live instance; so are the next four.
-        let status = unsafe { (self.fmu.functions.enter_initialization_mode)(self.component) };
+        let status = unsafe { (self.functions().enter_initialization_mode)(self.component) };
         self.check("fmi2EnterInitializationMode", status)
     }
 
     /// fmi2ExitInitializationMode.
     pub fn exit_initialization_mode(&mut self) -> Called {
         // SAFETY: see above.
-        let status = unsafe { (self.fmu.functions.exit_initialization_mode)(self.component) };
+        let status = unsafe { (self.functions().exit_initialization_mode)(self.component) };
         self.check("fmi2ExitInitializationMode", status)
     }
 
     /// fmi2Terminate.
     pub fn terminate(&mut self) -> Called {
         // SAFETY: see above.
-        let status = unsafe { (self.fmu.functions.terminate)(self.component) };
+        let status = unsafe { (self.functions().terminate)(self.component) };
         self.check("fmi2Terminate", status)
     }
 
     /// fmi2Reset.
     pub fn reset(&mut self) -> Called {
         // SAFETY: see above.
-        let status = unsafe { (self.fmu.functions.reset)(self.component) };
+        let status = unsafe { (self.functions().reset)(self.component) };
         self.check("fmi2Reset", status)
     }
 
@@ -974,7 +1014,7 @@ impl<'fmu> Instance<'fmu> {
         let mut answer = vec![0.0; unknowns.len()];
         // SAFETY: slices of the lengths given.
         let status = unsafe {
-            (self.fmu.functions.get_directional_derivative)(
+            (self.functions().get_directional_derivative)(
                 self.component,
                 unknowns.as_ptr(),
                 unknowns.len(),
@@ -1049,21 +1089,21 @@ impl<'fmu> Instance<'fmu> {
     /// fmi2GetFMUstate into a snapshot that is there already.
     pub fn get_state_into(&mut self, state: &mut FmuState) -> Called {
         // SAFETY: NULL or a handle from this FMU.
-        let status = unsafe { (self.fmu.functions.get_fmu_state)(self.component, &mut state.0) };
+        let status = unsafe { (self.functions().get_fmu_state)(self.component, &mut state.0) };
         self.check("fmi2GetFMUstate", status)
     }
 
     /// fmi2SetFMUstate.
     pub fn set_state(&mut self, state: &FmuState) -> Called {
         // SAFETY: a handle from this FMU.
-        let status = unsafe { (self.fmu.functions.set_fmu_state)(self.component, state.0) };
+        let status = unsafe { (self.functions().set_fmu_state)(self.component, state.0) };
         self.check("fmi2SetFMUstate", status)
     }
 
     /// fmi2FreeFMUstate.
     pub fn free_state(&mut self, mut state: FmuState) -> Called {
         // SAFETY: a handle from this FMU, gone after this call.
-        let status = unsafe { (self.fmu.functions.free_fmu_state)(self.component, &mut state.0) };
+        let status = unsafe { (self.functions().free_fmu_state)(self.component, &mut state.0) };
         self.check("fmi2FreeFMUstate", status)
     }
 
@@ -1072,13 +1112,13 @@ impl<'fmu> Instance<'fmu> {
         let mut size = 0;
         // SAFETY: a handle from this FMU, a place for the size.
         let status = unsafe {
-            (self.fmu.functions.serialized_fmu_state_size)(self.component, state.0, &mut size)
+            (self.functions().serialized_fmu_state_size)(self.component, state.0, &mut size)
         };
         self.check("fmi2SerializedFMUstateSize", status)?;
         let mut bytes = vec![0u8; size];
         // SAFETY: `size` bytes are there.
         let status = unsafe {
-            (self.fmu.functions.serialize_fmu_state)(
+            (self.functions().serialize_fmu_state)(
                 self.component,
                 state.0,
                 bytes.as_mut_ptr().cast(),
@@ -1094,7 +1134,7 @@ impl<'fmu> Instance<'fmu> {
         let mut state = FmuState(null_mut());
         // SAFETY: `bytes.len()` bytes are there.
         let status = unsafe {
-            (self.fmu.functions.deserialize_fmu_state)(
+            (self.functions().deserialize_fmu_state)(
                 self.component,
                 bytes.as_ptr().cast(),
                 bytes.len(),
@@ -1157,12 +1197,20 @@ impl<'fmu> Instance<'fmu> {
 
     // ------------------------------------------------ model exchange
 
+    /// The functions that every FMU has, for a call.
+    fn functions(&self) -> &'fmu Functions {
+        self.calls.begin();
+        &self.fmu.functions
+    }
+
     fn stepping(&self) -> &'fmu StepFunctions {
+        self.calls.begin();
         let functions = self.fmu.stepping.as_ref();
         functions.expect("the FMU exports the functions of co-simulation")
     }
 
     fn exchange(&self) -> &'fmu ExchangeFunctions {
+        self.calls.begin();
         let functions = self.fmu.exchange.as_ref();
         functions.expect("the FMU exports the functions of model exchange")
     }
@@ -1259,15 +1307,14 @@ impl<'fmu> Instance<'fmu> {
     pub fn get_real_null(&mut self, count: usize) -> Called {
         // SAFETY: the point of the call is that the FMU looks before it leaps; so in the next four.
         let status =
-            unsafe { (self.fmu.functions.get_real)(self.component, null(), count, null_mut()) };
+            unsafe { (self.functions().get_real)(self.component, null(), count, null_mut()) };
         self.check("fmi2GetReal", status)
     }
 
     /// fmi2SetReal with `count` and NULL pointers.
     pub fn set_real_null(&mut self, count: usize) -> Called {
         // SAFETY: see get_real_null.
-        let status =
-            unsafe { (self.fmu.functions.set_real)(self.component, null(), count, null()) };
+        let status = unsafe { (self.functions().set_real)(self.component, null(), count, null()) };
         self.check("fmi2SetReal", status)
     }
 
@@ -1295,7 +1342,7 @@ impl<'fmu> Instance<'fmu> {
     pub fn set_string_null(&mut self, reference: u32) -> Called {
         // SAFETY: see get_real_null.
         let status = unsafe {
-            (self.fmu.functions.set_string)(self.component, &reference, 1, &null::<c_char>())
+            (self.functions().set_string)(self.component, &reference, 1, &null::<c_char>())
         };
         self.check("fmi2SetString", status)
     }
@@ -1308,14 +1355,14 @@ impl<'fmu> Instance<'fmu> {
     /// fmi2FreeFMUstate with the state itself in place of its address, as fmusim calls it.
     pub fn free_state_itself(&mut self, state: FmuState) -> Called {
         // SAFETY: a handle from this FMU, gone after this call; it points to more than a pointer.
-        let status = unsafe { (self.fmu.functions.free_fmu_state)(self.component, state.0.cast()) };
+        let status = unsafe { (self.functions().free_fmu_state)(self.component, state.0.cast()) };
         self.check("fmi2FreeFMUstate", status)
     }
 
     /// fmi2FreeFMUstate with NULL and with a pointer to NULL, which must both be fine.
     pub fn free_state_null(&mut self) -> Called {
         // SAFETY: see get_real_null.
-        let status = unsafe { (self.fmu.functions.free_fmu_state)(self.component, null_mut()) };
+        let status = unsafe { (self.functions().free_fmu_state)(self.component, null_mut()) };
         self.check("fmi2FreeFMUstate", status)?;
         self.free_state(FmuState(null_mut()))
     }

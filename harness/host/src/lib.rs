@@ -5,10 +5,12 @@
 //! files so that they appear whole or not at all, temporary folders, and what a command may take of
 //! a machine.
 
+pub mod archive;
 pub mod binary;
 pub mod budget;
 pub mod description;
 pub mod fmi2;
+pub mod guard;
 pub mod html;
 pub mod output;
 pub mod temporary;

@@ -2,6 +2,7 @@
 //! renamed. And what is in one, as a hash.
 
 use std::fs::File;
+use std::io::Read;
 use std::path::Path;
 
 use anyhow::{Context, Result};
@@ -44,6 +45,17 @@ pub fn sha256(bytes: &[u8]) -> String {
     base16ct::lower::encode_string(&Sha256::digest(bytes))
 }
 
+/// The same of all that can be read from `from`, which need not fit into memory.
+pub fn sha256_of(mut from: impl Read) -> Result<String> {
+    let (mut hash, mut buffer) = (Sha256::new(), vec![0; 1 << 16]);
+    loop {
+        match from.read(&mut buffer)? {
+            0 => return Ok(base16ct::lower::encode_string(&hash.finalize())),
+            read => hash.update(&buffer[..read]),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::io::Write;
@@ -55,6 +67,7 @@ mod tests {
         // FIPS 180-4, the example of one block
         let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
         assert_eq!(sha256(b"abc"), expected);
+        assert_eq!(sha256_of(&b"abc"[..]).unwrap(), expected);
     }
 
     #[test]

@@ -4,20 +4,28 @@ use roxmltree::{Document, Error, Node};
 
 /// Levels of elements that are read; a model description has eight.
 pub const DEEPEST: usize = 256;
-/// Bytes that are read; half a million variables have a quarter of it.
-pub const LONGEST: usize = 512 << 20;
-/// Elements that are read; half a million variables have two million.
-pub const MOST: usize = 10_000_000;
+/// Bytes that are read. This and the next two are what seventy thousand variables need, and take
+/// 500 MB of memory at most.
+pub const LONGEST: usize = 24 << 20;
+/// Elements that are read.
+pub const MOST: usize = 300_000;
+/// Attributes that all elements together may have.
+pub const MOST_ATTRIBUTES: usize = 700_000;
 /// Attributes that one element may have; those of FMI have 13 at most.
-pub const MOST_ATTRIBUTES: usize = 1000;
+pub const MOST_OF_ONE: usize = 200;
+/// Bytes that the name of an element or an attribute may have.
+pub const LONGEST_NAME: usize = 1000;
+/// Bytes that the value of an attribute may have; those of FMI are longest where they list dependencies.
+pub const LONGEST_VALUE: usize = 1 << 20;
+/// Namespaces that may be declared: looking one up takes longer the more there are.
+pub const MOST_NAMESPACES: usize = 100;
 
 /// Why a file is not read. The texts of all but `TooLarge` begin with line and column.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fault {
     /// It is not well-formed, or not UTF-8.
     Malformed(String),
-    /// It is longer than [`LONGEST`], has more than [`MOST`] elements, levels below [`DEEPEST`] or an
-    /// element with more than [`MOST_ATTRIBUTES`].
+    /// It goes beyond one of the budgets above.
     TooLarge(String),
     /// It has a document type declaration, which can define entities and name other files.
     Doctype(String),
@@ -122,7 +130,11 @@ impl Element {
 /// that grows with the square of the depth or of the number of attributes. The file need not be
 /// well-formed; that is the parser's business.
 fn excess(text: &str) -> Option<String> {
-    let (mut depth, mut elements, mut rest) = (0usize, 0, text);
+    let namespaces = text.matches("xmlns").count();
+    if namespaces > MOST_NAMESPACES {
+        return Some(format!("it declares {namespaces} namespaces (allowed: {MOST_NAMESPACES})"));
+    }
+    let (mut depth, mut elements, mut all_attributes, mut rest) = (0usize, 0, 0, text);
     while let Some(at) = rest.find('<') {
         rest = &rest[at + 1..];
         // what is not markup
@@ -138,6 +150,7 @@ fn excess(text: &str) -> Option<String> {
         }
         // a start tag, to its end, which is not in quotes
         let (mut quote, mut attributes, mut empty) = (None, 0, false);
+        let (mut name, mut longest_name, mut value, mut longest_value) = (0usize, 0, 0usize, 0);
         let end = rest.bytes().position(|byte| {
             match (quote, byte) {
                 (Some(q), byte) if q == byte => quote = None,
@@ -148,19 +161,33 @@ fn excess(text: &str) -> Option<String> {
                 (None, _) => {}
             }
             empty = byte == b'/';
+            let in_name = quote.is_none() && byte != b'=' && !byte.is_ascii_whitespace();
+            name = if in_name { name + 1 } else { 0 };
+            longest_name = longest_name.max(name);
+            value = if quote.is_some() { value + 1 } else { 0 };
+            longest_value = longest_value.max(value);
             false
-        })?;
+        });
+        // a tag without an end is the parser's business, but not its names
+        let end = end.unwrap_or(rest.len().saturating_sub(1));
         depth += 1;
         elements += 1;
+        all_attributes += attributes;
         let fault = if depth > DEEPEST {
             format!("elements are nested deeper than allowed ({DEEPEST} levels)")
         } else if elements > MOST {
             format!("it has more elements than allowed ({MOST})")
-        } else if attributes > MOST_ATTRIBUTES {
-            format!("an element has {attributes} attributes (allowed: {MOST_ATTRIBUTES})")
+        } else if all_attributes > MOST_ATTRIBUTES {
+            format!("it has more attributes than allowed ({MOST_ATTRIBUTES})")
+        } else if attributes > MOST_OF_ONE {
+            format!("an element has {attributes} attributes (allowed: {MOST_OF_ONE})")
+        } else if longest_name > LONGEST_NAME {
+            format!("a name has {longest_name} bytes (allowed: {LONGEST_NAME})")
+        } else if longest_value > LONGEST_VALUE {
+            format!("an attribute has {longest_value} bytes (allowed: {LONGEST_VALUE})")
         } else {
             depth -= usize::from(empty);
-            rest = &rest[end + 1..];
+            rest = rest.get(end + 1..).unwrap_or_default();
             continue;
         };
         let line = 1 + text[..text.len() - rest.len()].matches('\n').count();
@@ -238,9 +265,22 @@ mod tests {
         let flat = ["<b/>", "<b c='>'/>", "<!-- <b> -->", "<![CDATA[<b>]]>", "<?b <b> ?>"];
         let flat = format!("<a>{}</a>", flat.map(|one| one.repeat(300)).concat());
         assert_eq!(Element::parse(flat.as_bytes()).unwrap().children.len(), 600);
-        let many: String = (0..=MOST_ATTRIBUTES).map(|n| format!(" b{n}='='")).collect();
+        let many: String = (0..=MOST_OF_ONE).map(|n| format!(" b{n}='='")).collect();
         let fault = Element::read(format!("<a{many}/>").as_bytes()).unwrap_err();
-        assert_eq!(fault.to_string(), "line 1: an element has 1001 attributes (allowed: 1000)");
+        assert_eq!(fault.to_string(), "line 1: an element has 201 attributes (allowed: 200)");
+        for name in ["a".repeat(70_000), format!("a {}=''", "b".repeat(70_000))] {
+            for text in [format!("<{name}/>"), format!("<{name}"), format!("<c>\n<{name}></c>")] {
+                let fault = Element::read(text.as_bytes()).unwrap_err().to_string();
+                assert!(fault.contains("a name has 7000"), "{fault}");
+            }
+        }
+        let long = "9".repeat(LONGEST_VALUE);
+        let fault = Element::read(format!("<a b='{long}'/>").as_bytes()).unwrap_err();
+        assert_eq!(fault.to_string(), "line 1: an attribute has 1048577 bytes (allowed: 1048576)");
+        let spaces: String =
+            (0..=MOST_NAMESPACES).map(|n| format!("<b xmlns:c{n}='d'/>")).collect();
+        let fault = Element::read(format!("<a>{spaces}</a>").as_bytes()).unwrap_err();
+        assert_eq!(fault.to_string(), "it declares 101 namespaces (allowed: 100)");
         let fault = Element::read(bomb.as_bytes()).unwrap_err();
         assert!(matches!(fault, Fault::Doctype(_)));
     }

@@ -12,6 +12,8 @@ from typing import Any, ClassVar
 from fmpy import extract, platform, platform_tuple, read_model_description
 from fmpy.model_description import ModelDescription, ScalarVariable
 
+from .opening import faults, is_file_name
+
 PLATFORM = platform_tuple if platform_tuple == "aarch64-linux" else platform
 """Folder of the binaries for this platform, as the program ``hubslosh`` names it.
 
@@ -80,12 +82,20 @@ class Fmu:
     def __init__(self, path: Path) -> None:
         """Read modelDescription.xml."""
         self.path = path
+        if why := next(faults(path), None):
+            raise FmuError(f"{path} is not an FMU: {why}")
         try:
             self.description: ModelDescription = read_model_description(str(path))
         except Exception as error:  # fmpy has no class of its own for what is wrong with a file
             raise FmuError(f"{path} is not an FMU that fmpy can read: {error}") from None
         if self.description.fmiVersion != "2.0":
             raise FmuError(f"{path} is of FMI {self.description.fmiVersion}; 2.0 is expected")
+        for interface in (self.description.coSimulation, self.description.modelExchange):
+            if interface is not None and not is_file_name(interface.modelIdentifier):
+                raise FmuError(
+                    f"{path}: modelIdentifier {interface.modelIdentifier!r} leads out of its "
+                    "folder (allowed: letters, digits, underscores)"
+                )
         self.name: str = self.description.modelName
         self.variables: dict[str, ScalarVariable] = {
             v.name: v for v in self.description.modelVariables
@@ -108,7 +118,10 @@ class Fmu:
     @cached_property
     def directory(self) -> str:
         """Where the FMU is unpacked until the program ends."""
-        directory = str(extract(str(self.path)))
+        try:
+            directory = str(extract(str(self.path)))
+        except Exception as error:  # as in reading
+            raise FmuError(f"{self.path} cannot be unpacked: {error}") from None
         atexit.register(shutil.rmtree, directory, ignore_errors=True)
         return directory
 

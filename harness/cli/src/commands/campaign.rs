@@ -7,8 +7,9 @@ use bench::campaign::{Campaign, Folder};
 use bench::plan::{self, Plan, Sweeps};
 use bench::report;
 use host::fmi2::Fmu;
+use host::{budget, guard};
 
-use super::{DEFAULT_CAMPAIGN, DEFAULT_FMU, setting};
+use super::{DEFAULT_CAMPAIGN, DEFAULT_FMU, open, setting};
 use crate::progress;
 
 /// Simulates a plan's runs, or the sine sweeps of Rubaga's thesis at several fills and amplitudes,
@@ -93,7 +94,7 @@ impl CampaignArgs {
         let out = self.out.clone().unwrap_or(out);
         let compare = self.compare.clone();
         let campaign = Campaign { plan, force: self.force, jobs: self.jobs, compare, out };
-        let fmu = Fmu::open(&self.fmu)?;
+        let fmu = open(&self.fmu)?;
         if self.list {
             println!("{:#}", campaign.list(&fmu)?);
             return Ok(());
@@ -174,6 +175,13 @@ impl CampaignArgs {
 
 /// Carries a campaign out and leaves tables and report.
 pub fn drive(fmu: &Fmu, campaign: &Campaign, folder: Folder) -> Result<()> {
+    let cases = campaign.plan.cases(fmu.description())?;
+    let rows: Vec<usize> = cases.iter().map(|case| case.run().steps()).collect();
+    let columns = fmu.description().variables.iter().filter(|v| v.causality == "output").count();
+    let jobs = budget::jobs(campaign.jobs, 0)?;
+    let largest = rows.iter().max().copied().unwrap_or(0) * (columns + 20) * 8;
+    // tables and the spectra made of them; what the report keeps of each run
+    guard::allow((jobs.min(rows.len()) * largest * 4 + rows.len() * (4 << 20)) as u64);
     let bar = progress::of_runs()?;
     let results = campaign.execute(fmu, &folder, &|news| progress::show(&bar, news))?;
     bar.finish_and_clear();

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::{Context, Result};
+use host::fmi2::Fmu;
 use signals::table::{self, Table};
 
 pub mod book;
@@ -27,6 +28,15 @@ pub const DEFAULT_FMU: &str = "dist/HubSlosh.fmu";
 /// Where a campaign goes.
 pub const DEFAULT_CAMPAIGN: &str = "dist/campaign";
 
+/// Opens an FMU, and says what that has changed.
+pub fn open(path: &Path) -> Result<Fmu> {
+    let fmu = Fmu::open(path)?;
+    for what in fmu.changed() {
+        eprintln!("warning: loading {} has changed this process's {what}", path.display());
+    }
+    Ok(fmu)
+}
+
 /// The value of a flag `--set`.
 fn setting(text: &str) -> Result<(String, String)> {
     let (name, value) = text
@@ -43,7 +53,7 @@ fn check_out(out: &Path) -> Result<()> {
 /// Writes a table and says where; to `-` it prints CSV.
 fn write_out(table: &Table, out: &Path, metadata: &BTreeMap<String, String>) -> Result<()> {
     if out == Path::new("-") {
-        return crate::quiet_if_closed(table.write_csv(std::io::stdout().lock()));
+        return crate::quiet_if_closed(table.write_csv(crate::stdout()));
     }
     table.write(out, metadata)?;
     println!("{} rows in {}", table.rows(), out.display());

@@ -8,9 +8,9 @@ use bench::campaign::{Range, WAVE, stored_columns};
 use bench::profile::{self, Written};
 use bench::run::{Run, driven, histories};
 use host::description::ModelDescription;
-use host::fmi2::Fmu;
+use host::guard;
 
-use super::{DEFAULT_FMU, check_out, setting, write_out};
+use super::{DEFAULT_FMU, check_out, open, setting, write_out};
 use crate::{progress, set_file};
 
 /// Simulates one run: a torque history in, signals out.
@@ -71,7 +71,7 @@ impl RunArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
         check_out(&self.out)?;
-        let fmu = Fmu::open(&self.fmu)?;
+        let fmu = open(&self.fmu)?;
         let description = fmu.description();
         let drive = self.drive.as_deref();
         let (input, torque, others) = match (&self.profile, &self.input) {
@@ -120,6 +120,8 @@ impl RunArgs {
         let range = Range::of(description, &mut instance)?;
         let extra = range.as_ref().map(|_| WAVE).filter(|wave| !columns.contains(wave));
         let columns: Vec<&str> = columns.into_iter().chain(extra).collect();
+        // the table, its copy for --columns, and what is written: 25 characters for a number
+        guard::allow((run.steps() * (columns.len() + 3) * 50) as u64);
         let bar = progress::of_steps()?;
         bar.set_length(run.steps() as u64);
         let table = run.drive(&mut instance, &columns, |steps| bar.inc(steps))?;

@@ -5,7 +5,6 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use host::description::{ModelDescription, Variable};
-use host::fmi2::Fmu;
 
 use super::DEFAULT_FMU;
 
@@ -25,11 +24,16 @@ pub struct VariablesArgs {
     fmu: PathBuf,
 }
 
+/// Characters to which a column is filled; longer cells push the next ones to the right.
+const WIDEST: usize = 80;
+
+/// Items of an enumeration that are listed.
+const ITEMS: usize = 50;
+
 impl VariablesArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        let fmu = Fmu::open(&self.fmu)?;
-        let description = fmu.description();
+        let description = &ModelDescription::of_packed(&self.fmu)?;
         let filter = self.filter.unwrap_or_default().to_lowercase();
         let wanted = |v: &&Variable| {
             let named = v.name.to_lowercase().contains(&filter);
@@ -55,7 +59,7 @@ impl VariablesArgs {
         let head = ["name", "causality", "start", "unit", "range", "meaning"].map(String::from);
         let width = |i: usize| {
             let all = rows.iter().chain([&head]).map(|row| row[i].chars().count());
-            all.max().unwrap_or(0)
+            all.max().unwrap_or(0).min(WIDEST)
         };
         let widths: [usize; 5] = std::array::from_fn(width);
         for row in [&head].into_iter().chain(&rows) {
@@ -73,13 +77,16 @@ fn row(description: &ModelDescription, variable: &Variable) -> [String; 6] {
     let items = description.items(variable);
     let text = |value: &Option<String>| value.clone().unwrap_or_default();
     let start = text(&attributes.start);
-    let start = match items.iter().find(|item| item.value.to_string() == start) {
+    let number = start.trim().parse::<i32>().ok();
+    let start = match items.iter().find(|item| Some(item.value) == number) {
         Some(item) => item.name.clone(),
         None => start,
     };
     let range = match (&attributes.min, &attributes.max) {
         _ if !items.is_empty() => {
-            items.iter().map(|item| item.name.as_str()).collect::<Vec<_>>().join("|")
+            let more = (items.len() > ITEMS).then_some("…");
+            let names = items.iter().take(ITEMS).map(|item| item.name.as_str());
+            names.chain(more).collect::<Vec<_>>().join("|")
         }
         (None, None) => String::new(),
         (Some(min), None) => format!(">= {min}"),

@@ -124,12 +124,13 @@ impl Instance<'_> {
         if lists.serializes {
             self.states_beside(&mut found);
         }
+        self.calls.end();
         self.take_messages();
         found
     }
 
     fn values_beside(&mut self, lists: &Lists, found: &mut Vec<Beside>) {
-        let (f, c) = (&self.fmu.functions, self.component);
+        let (f, c) = (self.functions(), self.component);
         for n in lengths(lists.reals.len()) {
             let (mut vr, mut x) = (Guarded::input(&lists.reals[..n]), Guarded::output::<Real>(n));
             // SAFETY: arrays of n values each; so in all calls of this file.
@@ -167,7 +168,7 @@ impl Instance<'_> {
     }
 
     fn derivatives_beside(&mut self, lists: &Lists, found: &mut Vec<Beside>) {
-        let (f, c) = (&self.fmu.functions, self.component);
+        let (f, c) = (self.functions(), self.component);
         for n in lengths(lists.unknowns.len()) {
             let m = lists.knowns.len();
             let (mut unknown, mut known) =
@@ -251,7 +252,7 @@ impl Instance<'_> {
     }
 
     fn states_beside(&mut self, found: &mut Vec<Beside>) {
-        let (f, c) = (&self.fmu.functions, self.component);
+        let (f, c) = (self.functions(), self.component);
         let Ok(state) = self.get_state() else { return };
         let mut size = Guarded::output::<usize>(1);
         // SAFETY: see values_beside.

@@ -1,0 +1,95 @@
+/* The FMU of model.c with a fault that harms its host, when it is loaded (-DAT_LOAD) or in its first
+ * step (-DAT_STEP). -DHARM=… says which. */
+#define _GNU_SOURCE
+#include <signal.h>
+#include <unistd.h>
+#include <sys/mman.h>
+#if defined(__x86_64__)
+#include <xmmintrin.h>
+#endif
+
+#define fmi2DoStep step_of_model
+#include "../all/model.c"
+#undef fmi2DoStep
+
+enum { EXIT = 1, ABORT, CRASH, LOOP, SLEEP, MEMORY, SHARED, STACK, DISK, PRINT, CHILDREN, STOP, FLUSH };
+
+static int deeper(int n)
+{
+    volatile char page[4096];
+    page[n % 4096] = (char)n;
+    return n < 0 ? 0 : deeper(n + 1) + page[0];
+}
+
+static void harm(void)
+{
+    static char block[1 << 20];
+    memset(block, 'x', sizeof block);
+    switch (HARM) {
+    case EXIT:
+        exit(0);
+    case ABORT:
+        abort();
+    case CRASH:
+        *(volatile int *)NULL = 1;
+        break;
+    case LOOP:
+        for (volatile int go = 1; go;) {}
+        break;
+    case SLEEP:
+        for (;;)
+            pause();
+    case MEMORY:
+        for (char *p; (p = malloc(1 << 20));)
+            memset(p, 1, 1 << 20);
+        abort();
+    case SHARED:
+        for (char *p; (p = mmap(NULL, 1 << 30, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0)) != MAP_FAILED;)
+            memset(p, 1, 1 << 30);
+        abort();
+    case STACK:
+        deeper(0);
+        break;
+    case DISK: {
+        char name[1000];
+        const char *folder = getenv("TMPDIR");
+        snprintf(name, sizeof name, "%s/endless", folder ? folder : "/tmp");
+        FILE *file = fopen(name, "w");
+        while (file && fwrite(block, 1, sizeof block, file)) {}
+        abort();
+    }
+    case PRINT: /* ends, after 1 GB */
+        for (int n = 0; n < 1024; n++)
+            fwrite(block, 1, sizeof block, n % 2 ? stdout : stderr);
+        break;
+    case CHILDREN:
+        for (int n = 0; n < 4; n++)
+            if (fork() == 0) {
+                if (n % 2)
+                    setsid();
+                for (;;)
+                    pause();
+            }
+        exit(0);
+    case STOP:
+        raise(SIGSTOP);
+        break;
+    case FLUSH:
+#if defined(__x86_64__)
+        _mm_setcsr(_mm_getcsr() | 0x8040);
+#endif
+        break;
+    }
+}
+
+#ifdef AT_LOAD
+__attribute__((constructor)) static void at_load(void) { harm(); }
+#endif
+
+Status fmi2DoStep(Component m, double t, double h, int forget)
+{
+#ifdef AT_STEP
+    harm();
+#endif
+    return step_of_model(m, t, h, forget);
+}

@@ -1,0 +1,262 @@
+//! The file itself: a zip archive (FMI 2.0.5, section 2.3), opened so that no archive can fill the
+//! disk or the memory, or lead out of the folder that it is unpacked to.
+//!
+//! Everything that opens an FMU does it here; `book/foreign.md` lists the budgets for users, and
+//! `harness/python/hubslosh/opening.py` has the same for Python.
+
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::{BufReader, Read, Seek, SeekFrom, Write};
+use std::path::Path;
+
+use anyhow::{Context, Result, anyhow, bail, ensure};
+use zip::read::Config;
+// Unstable by its own word, and the one reader that shows repeated names; the lock file pins it.
+use zip::unstable::read::ZipIterable;
+use zip::{CompressionMethod, ZipReadOptions, read::OwnedZipFileEntry};
+
+use crate::xml;
+
+/// Most entries of an archive.
+pub const MOST_ENTRIES: usize = 20_000;
+/// Bytes that a name may have; Windows opens paths of 259 characters.
+pub const LONGEST_NAME: usize = 1024;
+/// Bytes that all files of an archive together may unpack to, whatever its size.
+pub const UNPACKED: u64 = 64 << 20;
+/// Further bytes that they may unpack to for each byte of the archive; binaries compress to a third,
+/// descriptions to a twentieth.
+pub const UNPACKED_PER_BYTE: u64 = 8;
+/// The description of the model.
+pub const DESCRIPTION: &str = "modelDescription.xml";
+
+/// An entry of the archive's directory.
+pub struct Entry {
+    /// Name as written, invalid characters replaced.
+    pub name: String,
+    /// How it is compressed.
+    pub method: CompressionMethod,
+    /// Whether it is encrypted.
+    pub encrypted: bool,
+    /// Whether it is a symbolic link.
+    pub link: bool,
+    zip: OwnedZipFileEntry,
+}
+
+impl Entry {
+    /// Whether it is a folder's own entry.
+    pub fn is_folder(&self) -> bool {
+        self.name.ends_with('/')
+    }
+
+    /// Why a host that unpacks it would write elsewhere, if it would.
+    fn way_out(&self) -> Option<&'static str> {
+        let name = &self.name;
+        if name.starts_with('/') || name.get(1..2) == Some(":") {
+            Some("its name is absolute")
+        } else if name.split('/').any(|part| part == "..") {
+            Some("its name leads out of the archive by \"..\"")
+        } else if name.is_empty() || name.contains(['\\', '\0']) {
+            Some("its name is empty, or has a backslash or a zero")
+        } else if self.link {
+            Some("it is a symbolic link")
+        } else {
+            None
+        }
+    }
+}
+
+/// An archive whose directory was read.
+pub struct Archive {
+    file: File,
+    /// In the order of its directory, repeated names included; those up to the fault if there is one.
+    pub entries: Vec<Entry>,
+    /// Why its directory cannot be read to the end, or goes beyond the budgets: nothing of it should
+    /// be unpacked then.
+    pub fault: Option<String>,
+}
+
+impl Archive {
+    /// Reads the directory of an archive.
+    ///
+    /// # Errors
+    /// If the file cannot be read. What is wrong with it as an archive is in [`Archive::fault`].
+    pub fn open(path: &Path) -> Result<Archive> {
+        let name = path.display();
+        let about = path.metadata().with_context(|| format!("{name} cannot be opened"))?;
+        ensure!(about.is_file(), "{name} cannot be opened: it is not a file");
+        let file = File::open(path).with_context(|| format!("{name} cannot be opened"))?;
+        let mut archive = Archive { file, entries: Vec::new(), fault: None };
+        archive.fault = archive.read_directory(about.len()).err().map(|why| format!("{why:#}"));
+        Ok(archive)
+    }
+
+    fn read_directory(&mut self, size: u64) -> Result<()> {
+        let mut directory = ZipIterable::try_new(BufReader::new(&self.file), Config::default())?
+            .enforce_header_consistency(true);
+        let count = directory.len();
+        ensure!(count <= MOST_ENTRIES, "it has {count} entries (allowed: {MOST_ENTRIES})");
+        let most = UNPACKED.saturating_add(size.saturating_mul(UNPACKED_PER_BYTE));
+        let mut sum = 0u64;
+        for zip in directory.files()? {
+            let zip = OwnedZipFileEntry::from(zip?);
+            let length = zip.name_raw().len();
+            ensure!(
+                length <= LONGEST_NAME,
+                "a name in it has {length} bytes (allowed: {LONGEST_NAME})"
+            );
+            let name = String::from_utf8_lossy(zip.name_raw()).into_owned();
+            sum = sum.saturating_add(zip.size());
+            ensure!(
+                sum <= most,
+                "with {name}, which has {} bytes by its header, it unpacks to {sum} bytes (allowed \
+                 for an archive of {size} bytes: {most})",
+                zip.size()
+            );
+            let (method, encrypted, link) = (zip.compression(), zip.encrypted(), zip.is_symlink());
+            self.entries.push(Entry { name, method, encrypted, link, zip });
+        }
+        Ok(())
+    }
+
+    /// Fails unless the archive can be unpacked: whole, within the budgets, every name once and
+    /// inside.
+    pub fn check(&self) -> Result<()> {
+        if let Some(why) = &self.fault {
+            bail!("it is not a zip archive that can be unpacked: {why}");
+        }
+        let mut names = BTreeSet::new();
+        for entry in &self.entries {
+            let name = entry.name.escape_debug();
+            if let Some(why) = entry.way_out() {
+                bail!("{name}: {why} (allowed: files and folders with relative names)");
+            }
+            ensure!(names.insert(&entry.name), "two entries are called {name} (allowed: one)");
+        }
+        Ok(())
+    }
+
+    /// Unpacks a file to `to`, and fails unless its size and checksum are those of its header.
+    pub fn copy(&self, entry: &Entry, to: &mut impl Write) -> Result<()> {
+        let said = entry.zip.size();
+        if entry.name == DESCRIPTION {
+            let most = xml::LONGEST as u64;
+            ensure!(said <= most, "it has {said} bytes (allowed for a description: {most})");
+        }
+        let mut reader = BufReader::new(&self.file);
+        let file = entry.zip.as_ref().with_reader(&mut reader, ZipReadOptions::new())?;
+        // one more than there should be, which shows that there is more
+        let size = std::io::copy(&mut file.take(said.saturating_add(1)), to)?;
+        let relation = if size > said { "more" } else { "fewer" };
+        ensure!(size == said, "it has {relation} bytes than its header says ({said})");
+        Ok(())
+    }
+
+    /// What is in a file.
+    pub fn content(&self, entry: &Entry) -> Result<Vec<u8>> {
+        let mut content = Vec::new();
+        self.copy(entry, &mut content)?;
+        Ok(content)
+    }
+
+    /// Unpacks the whole archive into a folder.
+    pub fn unpack(&self, directory: &Path) -> Result<()> {
+        self.check()?;
+        for entry in &self.entries {
+            let path = directory.join(&entry.name);
+            let folder = if entry.is_folder() { Some(path.as_path()) } else { path.parent() };
+            let made = folder.map_or(Ok(()), std::fs::create_dir_all);
+            made.map_err(anyhow::Error::from)
+                .and_then(|()| match entry.is_folder() {
+                    true => Ok(()),
+                    false => self.copy(entry, &mut File::create(&path)?),
+                })
+                .with_context(|| format!("{} cannot be unpacked", entry.name.escape_debug()))?;
+        }
+        Ok(())
+    }
+
+    /// SHA-256 of the archive, in hexadecimal digits.
+    pub fn hash(&self) -> Result<String> {
+        let mut file = &self.file;
+        file.seek(SeekFrom::Start(0))?;
+        crate::output::sha256_of(file)
+    }
+
+    /// The text of modelDescription.xml.
+    pub fn description(&self) -> Result<String> {
+        self.check()?;
+        let entry = self.entries.iter().find(|entry| entry.name == DESCRIPTION);
+        let entry = entry.with_context(|| format!("it has no {DESCRIPTION}"))?;
+        let bytes = self.content(entry).with_context(|| format!("{DESCRIPTION} cannot be read"))?;
+        String::from_utf8(bytes).map_err(|_| anyhow!("{DESCRIPTION} is not UTF-8"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use zip::ZipWriter;
+    use zip::write::SimpleFileOptions;
+
+    use super::*;
+
+    /// An archive of files with that content, their sizes in the headers changed by `lie`.
+    fn archive(files: &[(&str, &[u8])], lie: i64) -> tempfile::NamedTempFile {
+        let mut to = ZipWriter::new(std::io::Cursor::new(Vec::new()));
+        for (name, content) in files {
+            to.start_file(*name, SimpleFileOptions::default()).unwrap();
+            to.write_all(content).unwrap();
+        }
+        let mut bytes = to.finish().unwrap().into_inner();
+        for (signature, at) in [(b"PK\x03\x04", 22), (b"PK\x01\x02", 24)] {
+            let starts = bytes.windows(4).enumerate().filter(|(_, four)| four == signature);
+            for start in starts.map(|(start, _)| start).collect::<Vec<_>>() {
+                let field = &mut bytes[start + at..start + at + 4];
+                let size = u32::from_le_bytes(field.try_into().unwrap());
+                field.copy_from_slice(&((i64::from(size) + lie) as u32).to_le_bytes());
+            }
+        }
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        file.write_all(&bytes).unwrap();
+        file
+    }
+
+    /// What unpacking says; the folder holds nothing from outside.
+    fn unpacked(files: &[(&str, &[u8])], lie: i64) -> Result<(), String> {
+        let folder = tempfile::tempdir().unwrap();
+        let inner = folder.path().join("inner");
+        std::fs::create_dir(&inner).unwrap();
+        let file = archive(files, lie);
+        let done = Archive::open(file.path()).unwrap().unpack(&inner);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        done.map_err(|error| format!("{error:#}"))
+    }
+
+    #[test]
+    fn an_ordinary_archive_is_unpacked() {
+        assert_eq!(unpacked(&[("a", b"1"), ("b/", b""), ("b/c", b"2")], 0), Ok(()));
+    }
+
+    #[test]
+    fn archives_beyond_the_budgets_or_with_ways_out_are_refused_before_anything_is_written() {
+        let zeros = vec![0; (UNPACKED + (1 << 20)) as usize];
+        let many: Vec<String> = (0..=MOST_ENTRIES).map(|n| n.to_string()).collect();
+        let many: Vec<(&str, &[u8])> = many.iter().map(|name| (name.as_str(), &[][..])).collect();
+        let long = "n".repeat(LONGEST_NAME + 1);
+        for (files, lie, words) in [
+            (&[("zeros", zeros.as_slice())][..], 0, "it unpacks to 68157440 bytes (allowed"),
+            (&many, 0, "it has 20001 entries (allowed: 20000)"),
+            (&[(long.as_str(), b"")], 0, "a name in it has 1025 bytes (allowed: 1024)"),
+            (&[("../out", b"")], 0, "leads out of the archive"),
+            (&[("b/../../out", b"")], 0, "leads out of the archive"),
+            (&[("/out", b"")], 0, "its name is absolute"),
+            (&[("c:out", b"")], 0, "its name is absolute"),
+            (&[("..\\out", b"")], 0, "backslash"),
+            (&[("a", b"17000 bytes")], 4_000_000_000, "which has 4000000011 bytes by its header"),
+            (&[("a", b"17000 bytes")], 3, "it has fewer bytes than its header says (14)"),
+            (&[("a", b"17000 bytes")], -3, "larger than its declared uncompressed size"),
+        ] {
+            let why = unpacked(files, lie).unwrap_err();
+            assert!(why.contains(words), "{words}: {why}");
+        }
+    }
+}

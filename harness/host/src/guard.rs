@@ -1,0 +1,581 @@
+//! Foreign code in a process of its own, with limits: what an FMU's binary does there ends with that
+//! process, and is told.
+//!
+//! The parent ([`run`]) starts the process in a group of its own, with a folder for temporary files,
+//! reads what it prints up to a limit, and ends it, and whatever it started, when it takes too long.
+//! The child calls [`enter`] first and [`done`] last: without the latter it did not succeed,
+//! whatever its exit code. It limits its own memory and files when the first binary is loaded, and
+//! keeps stdout and stderr for itself then; what the binary prints goes to the parent.
+//!
+//! Everything works on Linux; elsewhere on Unix the memory is not limited and processes that leave
+//! the group are not found; on Windows the process itself is ended, and nothing else.
+//!
+//! This is a guard against faults, and no sandbox: whoever is out for harm gets round it.
+
+use std::collections::BTreeSet;
+use std::ffi::OsStr;
+use std::fs::File;
+use std::io::{PipeReader, Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, channel};
+use std::sync::{Arc, Mutex, MutexGuard, Once, OnceLock, PoisonError, Weak};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+
+use crate::temporary;
+
+/// The argument of `hubslosh` that makes it a guarded process, followed by what [`enter`] takes.
+pub const OPTION: &str = "--guarded";
+/// Time that one call of an FMU may take, unless the user gives more.
+pub const CALL: Duration = Duration::from_secs(8);
+/// Bytes of memory that an FMU may take, unless the user gives more.
+pub const MEMORY: u64 = 320 << 20;
+/// Bytes that a file may have, unless a table needs more.
+pub const FILE: u64 = 64 << 20;
+/// Bytes that are kept of what a process prints, on stdout and on stderr.
+pub const PRINTED: usize = 64 << 10;
+
+/// Bytes that a process whose output is kept may print.
+pub const FLOOD: u64 = 16 << 20;
+
+/// What a process may take.
+#[derive(Clone, Debug)]
+pub struct Limits {
+    /// Time that one call of an FMU may take.
+    pub call: Duration,
+    /// Time for everything, if that is limited.
+    pub total: Option<Duration>,
+    /// Bytes of memory beyond what the process has when the first binary is loaded.
+    pub memory: u64,
+    /// Bytes that a file may have.
+    pub file: u64,
+}
+
+/// How a process ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Cause {
+    /// It called [`done`] with this code.
+    Done(u8),
+    /// Something else ended it.
+    Ended(ExitStatus),
+    /// It was ended because a call of the FMU did not return in time.
+    EndlessCall,
+    /// It was ended because it took too long.
+    TooLong,
+    /// It was ended because it printed more than [`FLOOD`].
+    Flood,
+}
+
+/// What came of a process.
+#[derive(Debug)]
+pub struct Outcome {
+    /// How it ended.
+    pub cause: Cause,
+    /// What it printed to stdout and stderr, up to [`PRINTED`] bytes; echoed, both are the first.
+    pub printed: [Vec<u8>; 2],
+}
+
+impl Outcome {
+    /// The last line that it printed.
+    pub fn last_line(&self) -> Option<String> {
+        let all = self.printed.concat();
+        let text = String::from_utf8_lossy(&all);
+        text.lines().rfind(|line| !line.trim().is_empty()).map(String::from)
+    }
+}
+
+/// What becomes of a process's output.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Output {
+    /// It is kept for the parent.
+    Kept,
+    /// The process has the parent's stdout and stderr; what the FMU's binary prints comes to stderr.
+    Shown,
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+// ---------------------------------------------------------------- the parent
+
+/// The processes that run now.
+static RUNNING: Mutex<BTreeSet<u32>> = Mutex::new(BTreeSet::new());
+
+/// Runs a program that calls [`enter`], to its end and the end of whatever it started.
+pub fn run<A: AsRef<OsStr>>(
+    program: &Path,
+    arguments: impl IntoIterator<Item = A>,
+    limits: &Limits,
+    output: Output,
+) -> Result<Outcome> {
+    let folder = temporary::Folder::new()?;
+    let (told, files) = (folder.path().join("told"), folder.path().join("files"));
+    std::fs::create_dir(&files)?;
+    let mut news = News { file: File::create_new(&told).and(File::open(&told))?, text: Vec::new() };
+    let (first, first_end) = std::io::pipe()?;
+    let (second, second_end) = std::io::pipe()?;
+    let mut command = Command::new(program);
+    command.arg(OPTION).arg(Spec { told, limits: limits.clone(), output }.write());
+    command.args(arguments).env("TMPDIR", &files).env("TEMP", &files).env("TMP", &files);
+    match output {
+        Output::Kept => command.stdin(Stdio::null()).stdout(first_end).stderr(second_end),
+        // The child puts it in the place of stdout and stderr; to stdin a pipe can be handed everywhere.
+        Output::Shown => {
+            drop(second_end);
+            command.stdin(first_end)
+        }
+    };
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(&mut command, 0);
+    let shown = output == Output::Shown;
+    let readers = [reader(first, shown), reader(second, shown)];
+    let started = Instant::now();
+    let child = {
+        // so that a signal finds it
+        let mut running = lock(&RUNNING);
+        let child =
+            command.spawn().with_context(|| format!("{} cannot be run", program.display()))?;
+        running.insert(child.id());
+        child
+    };
+    drop(command); // with its ends of the pipes
+    let floods = || !shown && readers.iter().any(|reader| lock(&reader.printed).more > FLOOD);
+    let cause = watch(child, &mut news, started, limits, &files, &floods)?;
+    let printed = readers.map(|reader| {
+        // a process that could not be found may hold the pipe
+        let _ = reader.end.recv_timeout(Duration::from_millis(500));
+        let printed = lock(&reader.printed);
+        if shown && printed.more > 0 {
+            eprintln!("(the FMU printed {} bytes more)", printed.more);
+        }
+        printed.kept.clone()
+    });
+    Ok(Outcome { cause, printed })
+}
+
+/// Waits for the end of a process, or makes it.
+fn watch(
+    mut child: Child,
+    news: &mut News,
+    started: Instant,
+    limits: &Limits,
+    files: &Path,
+    floods: &dyn Fn() -> bool,
+) -> Result<Cause> {
+    // a process says four times a second that it lives; one that is stopped does not
+    let silence = limits.call.max(Duration::from_secs(3));
+    let (mut heard, mut heard_at, mut done_at) = (0, started, None);
+    let mut cause = None;
+    let mut pause = Duration::from_millis(1);
+    while !has_ended(&mut child)? {
+        news.read();
+        let now = Instant::now();
+        if news.text.len() > heard {
+            (heard, heard_at) = (news.text.len(), now);
+        }
+        if news.done().is_some() {
+            // what is left is the end of the program itself
+            if now - *done_at.get_or_insert(now) > Duration::from_secs(2) {
+                break;
+            }
+        } else if news.text.contains(&ENDLESS) || now - heard_at > silence {
+            cause = Some(Cause::EndlessCall);
+            break;
+        } else if limits.total.is_some_and(|total| now - started > total) {
+            cause = Some(Cause::TooLong);
+            break;
+        } else if floods() {
+            cause = Some(Cause::Flood);
+            break;
+        }
+        std::thread::sleep(pause);
+        pause = (pause * 2).min(Duration::from_millis(10));
+    }
+    let id = child.id();
+    end(id, &mut child, files);
+    let status = child.wait()?;
+    lock(&RUNNING).remove(&id);
+    news.read();
+    Ok(match (news.done(), cause) {
+        (Some(code), _) => Cause::Done(code),
+        (None, Some(cause)) => cause,
+        (None, None) => Cause::Ended(status),
+    })
+}
+
+/// Ends a process, its group, and those that have left the group: they still name its folder for
+/// temporary files.
+fn end(id: u32, child: &mut Child, files: &Path) {
+    kill_group(id);
+    let _ = child.kill(); // it may have ended; either is fine
+    for _ in 0..10 {
+        if !kill_descendants(files) {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// For a program that a signal ends: lets what runs remove its half-written files, for a second at
+/// most, and ends it. Whatever would be started from here on waits for that end.
+pub fn end_all() {
+    let running = lock(&RUNNING);
+    #[cfg(unix)]
+    {
+        use rustix::process::{Pid, Signal, kill_process};
+        let ids = running.iter().filter_map(|id| Pid::from_raw(i32::try_from(*id).ok()?));
+        let ids: Vec<Pid> = ids.collect();
+        for id in &ids {
+            let _ = kill_process(*id, Signal::TERM);
+        }
+        for _ in 0..100 {
+            if ids.iter().all(|id| is_over(*id).unwrap_or(true)) {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+    running.iter().for_each(|id| kill_group(*id));
+    std::mem::forget(running);
+}
+
+#[cfg(unix)]
+fn kill_group(id: u32) {
+    let id = i32::try_from(id).ok().and_then(rustix::process::Pid::from_raw);
+    if let Some(id) = id {
+        let _ = rustix::process::kill_process_group(id, rustix::process::Signal::KILL);
+    }
+}
+
+#[cfg(not(unix))]
+fn kill_group(_: u32) {}
+
+/// Whether a process has ended; it is not waited for, so that its number stays its own.
+#[cfg(unix)]
+fn has_ended(child: &mut Child) -> Result<bool> {
+    let id = rustix::process::Pid::from_raw(i32::try_from(child.id())?);
+    is_over(id.context("a process without a number")?)
+}
+
+#[cfg(unix)]
+fn is_over(id: rustix::process::Pid) -> Result<bool> {
+    use rustix::process::{WaitId, WaitIdOptions, waitid};
+    let options = WaitIdOptions::EXITED | WaitIdOptions::NOWAIT | WaitIdOptions::NOHANG;
+    Ok(waitid(WaitId::Pid(id), options)?.is_some())
+}
+
+#[cfg(not(unix))]
+fn has_ended(child: &mut Child) -> Result<bool> {
+    Ok(child.try_wait()?.is_some())
+}
+
+/// Ends the processes in whose environment a folder is that for temporary files; whether there were
+/// any.
+#[cfg(target_os = "linux")]
+fn kill_descendants(files: &Path) -> bool {
+    use rustix::process::{Pid, Signal, kill_process};
+    let wanted = format!("TMPDIR={}", files.display());
+    let mut any = false;
+    for entry in std::fs::read_dir("/proc").into_iter().flatten().flatten() {
+        let Some(id) = entry.file_name().to_str().and_then(|name| name.parse().ok()) else {
+            continue;
+        };
+        let environment = std::fs::read(entry.path().join("environ")).unwrap_or_default();
+        if environment.split(|byte| *byte == 0).any(|variable| variable == wanted.as_bytes())
+            && let Some(id) = Pid::from_raw(id)
+        {
+            any |= kill_process(id, Signal::KILL).is_ok();
+        }
+    }
+    any
+}
+
+#[cfg(not(target_os = "linux"))]
+fn kill_descendants(_: &Path) -> bool {
+    false
+}
+
+/// What a process tells: a point as long as it lives, [`ENDLESS`], at the end [`DONE`] and a code.
+struct News {
+    file: File,
+    text: Vec<u8>,
+}
+
+const ALIVE: u8 = b'.';
+const ENDLESS: u8 = b'!';
+const DONE: u8 = b'=';
+
+impl News {
+    fn read(&mut self) {
+        let _ = self.file.read_to_end(&mut self.text);
+    }
+
+    fn done(&self) -> Option<u8> {
+        let at = self.text.iter().position(|byte| *byte == DONE)?;
+        self.text.get(at + 1).copied()
+    }
+}
+
+/// What was read of a pipe.
+#[derive(Default)]
+struct Printed {
+    kept: Vec<u8>,
+    more: u64,
+}
+
+struct Reader {
+    printed: Arc<Mutex<Printed>>,
+    end: Receiver<()>,
+}
+
+/// Reads a pipe to its end, so that nobody who writes waits, and keeps the beginning.
+fn reader(mut pipe: PipeReader, shown: bool) -> Reader {
+    let (printed, (tell, end)) = (Arc::<Mutex<Printed>>::default(), channel());
+    let to = printed.clone();
+    std::thread::spawn(move || {
+        let mut buffer = vec![0; 1 << 16];
+        while let Ok(read @ 1..) = pipe.read(&mut buffer) {
+            let mut to = lock(&to);
+            let kept = &buffer[..read.min(PRINTED - to.kept.len())];
+            to.kept.extend(kept);
+            to.more += (read - kept.len()) as u64;
+            if shown {
+                let _ = std::io::stderr().write_all(kept);
+            }
+        }
+        let _ = tell.send(());
+    });
+    Reader { printed, end }
+}
+
+/// What the parent hands to [`enter`].
+struct Spec {
+    told: PathBuf,
+    limits: Limits,
+    output: Output,
+}
+
+impl Spec {
+    fn write(&self) -> String {
+        let Limits { call, memory, file, .. } = self.limits;
+        let shown = u8::from(self.output == Output::Shown);
+        format!("{},{memory},{file},{shown},{}", call.as_millis(), self.told.display())
+    }
+
+    fn read(text: &str) -> Option<Spec> {
+        let mut parts = text.splitn(5, ',');
+        let call = Duration::from_millis(parts.next()?.parse().ok()?);
+        let (memory, file) = (parts.next()?.parse().ok()?, parts.next()?.parse().ok()?);
+        let output = if parts.next()? == "1" { Output::Shown } else { Output::Kept };
+        let told = parts.next()?.into();
+        Some(Spec { told, limits: Limits { call, total: None, memory, file }, output })
+    }
+}
+
+// ---------------------------------------------------------------- the child
+
+/// What a guarded process knows.
+struct Guarded {
+    told: File,
+    spec: Spec,
+    /// stdin, stdout and stderr as they were given.
+    #[cfg(unix)]
+    streams: Option<[File; 3]>,
+}
+
+static GUARDED: OnceLock<Guarded> = OnceLock::new();
+
+/// Makes this process the guarded one that [`run`] has started.
+pub fn enter(spec: &str) -> Result<()> {
+    let spec = Spec::read(spec).context("this is for hubslosh alone")?;
+    let told = File::options().append(true).open(&spec.told)?;
+    #[cfg(unix)]
+    let streams = match spec.output {
+        Output::Kept => None,
+        Output::Shown => {
+            use std::os::fd::AsFd;
+            let copy =
+                |stream: std::os::fd::BorrowedFd| stream.try_clone_to_owned().map(File::from);
+            let streams = [
+                copy(std::io::stdin().as_fd())?,
+                copy(std::io::stdout().as_fd())?,
+                copy(std::io::stderr().as_fd())?,
+            ];
+            rustix::stdio::dup2_stdin(File::open("/dev/null")?)?;
+            Some(streams)
+        }
+    };
+    #[cfg(unix)]
+    restrict(rustix::process::Resource::Core, 0);
+    #[cfg(target_os = "linux")]
+    rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL))?;
+    let guarded = Guarded {
+        told,
+        spec,
+        #[cfg(unix)]
+        streams,
+    };
+    if GUARDED.set(guarded).is_err() {
+        bail!("it is guarded already");
+    }
+    std::thread::spawn(tell_of_life);
+    Ok(())
+}
+
+fn tell(what: &[u8]) {
+    if let Some(guarded) = GUARDED.get() {
+        let _ = (&guarded.told).write_all(what);
+    }
+}
+
+/// Tells the parent that all is done, with this exit code. Without a parent it is nothing.
+pub fn done(code: u8) {
+    tell(&[DONE, code]);
+}
+
+/// stdout and stderr of a guarded process, which a binary does not know.
+pub fn streams() -> Option<(&'static File, &'static File)> {
+    #[cfg(unix)]
+    if let Some([_, stdout, stderr]) = GUARDED.get().and_then(|guarded| guarded.streams.as_ref()) {
+        return Some((stdout, stderr));
+    }
+    None
+}
+
+/// Tells four times a second that the process lives, until a call takes too long.
+fn tell_of_life() {
+    let Some(guarded) = GUARDED.get() else { return };
+    let mut seen: Vec<(Weak<AtomicU64>, u64, Instant)> = Vec::new();
+    loop {
+        let now = Instant::now();
+        let known = std::mem::take(&mut seen);
+        for calls in lock(&CALLS).iter() {
+            let Some(count) = calls.upgrade().map(|calls| calls.load(Ordering::Relaxed)) else {
+                continue;
+            };
+            let before = known.iter().find(|(k, n, _)| k.ptr_eq(calls) && *n == count);
+            let since = before.map_or(now, |(.., since)| *since);
+            if count % 2 == 1 && now - since > guarded.spec.limits.call {
+                return tell(&[ENDLESS]);
+            }
+            seen.push((calls.clone(), count, since));
+        }
+        tell(&[ALIVE]);
+        std::thread::sleep(Duration::from_millis(250));
+    }
+}
+
+/// Callers of a binary, each with a number that is odd during a call.
+static CALLS: Mutex<Vec<Weak<AtomicU64>>> = Mutex::new(Vec::new());
+
+/// Marks the calls of one caller, so that one that does not return is noticed.
+#[derive(Debug)]
+pub(crate) struct Calls(Arc<AtomicU64>);
+
+impl Calls {
+    pub(crate) fn new() -> Calls {
+        let calls = Calls(Arc::default());
+        if GUARDED.get().is_some() {
+            let mut all = lock(&CALLS);
+            all.retain(|calls| calls.strong_count() > 0);
+            all.push(Arc::downgrade(&calls.0));
+        }
+        calls
+    }
+
+    /// One that is in a call until it is dropped.
+    pub(crate) fn one() -> Calls {
+        let calls = Calls::new();
+        calls.begin();
+        calls
+    }
+
+    pub(crate) fn begin(&self) {
+        self.0.store((self.0.load(Ordering::Relaxed) + 1) | 1, Ordering::Relaxed);
+    }
+
+    pub(crate) fn end(&self) {
+        self.0.store((self.0.load(Ordering::Relaxed) | 1) + 1, Ordering::Relaxed);
+    }
+}
+
+/// Sets the limits and hands stdout and stderr to the binary that is loaded next; once, in a guarded
+/// process.
+pub(crate) fn before_loading() {
+    static ONCE: Once = Once::new();
+    let Some(guarded) = GUARDED.get() else { return };
+    ONCE.call_once(|| {
+        #[cfg(target_os = "linux")]
+        {
+            use rustix::process::Resource;
+            let memory = guarded.spec.limits.memory;
+            restrict(Resource::Data, in_use("VmData:").saturating_add(memory));
+            // What is shared does not count as data. Each thread reserves more than it uses.
+            let threads = std::thread::available_parallelism().map_or(1, usize::from) as u64;
+            let reserved = (1 << 30) + (threads << 27);
+            restrict(Resource::As, in_use("VmSize:").saturating_add(memory + reserved));
+        }
+        #[cfg(unix)]
+        {
+            restrict(rustix::process::Resource::Fsize, guarded.spec.limits.file);
+            if let Some([pipe, ..]) = &guarded.streams {
+                let _ = std::io::stdout().flush();
+                let _ = rustix::stdio::dup2_stdout(pipe);
+                let _ = rustix::stdio::dup2_stderr(pipe);
+            }
+        }
+        #[cfg(not(unix))]
+        let _ = guarded;
+    });
+}
+
+/// Lets a guarded process take so many bytes more, of memory and in a file: what its own tables need.
+pub fn allow(bytes: u64) {
+    before_loading();
+    #[cfg(target_os = "linux")]
+    for resource in [rustix::process::Resource::Data, rustix::process::Resource::As] {
+        extend(resource, bytes);
+    }
+    #[cfg(unix)]
+    extend(rustix::process::Resource::Fsize, bytes);
+    #[cfg(not(unix))]
+    let _ = bytes;
+}
+
+/// Sets a limit that can be raised again, to what was given at most.
+#[cfg(unix)]
+fn restrict(resource: rustix::process::Resource, bytes: u64) {
+    let mut limit = rustix::process::getrlimit(resource);
+    let mut given = lock(&GIVEN);
+    let given = given.entry(resource as u32).or_insert(limit.current);
+    limit.current = Some(given.map_or(bytes, |most| most.min(bytes)));
+    let _ = rustix::process::setrlimit(resource, limit);
+}
+
+/// The limits that this process was given.
+#[cfg(unix)]
+static GIVEN: Mutex<std::collections::BTreeMap<u32, Option<u64>>> =
+    Mutex::new(std::collections::BTreeMap::new());
+
+#[cfg(unix)]
+fn extend(resource: rustix::process::Resource, bytes: u64) {
+    if GUARDED.get().is_some()
+        && let Some(now) = rustix::process::getrlimit(resource).current
+    {
+        restrict(resource, now.saturating_add(bytes));
+    }
+}
+
+/// Bytes of memory in use, of a kind that Linux names.
+#[cfg(target_os = "linux")]
+fn in_use(kind: &str) -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix(kind));
+    let kilobytes =
+        line.and_then(|line| line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok());
+    kilobytes.unwrap_or(1 << 20) << 10
+}
