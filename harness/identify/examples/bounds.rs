@@ -10,7 +10,7 @@ use host::fmi2::Fmu;
 use identify::fit::{Differences, Problem};
 use identify::noise::Noise;
 use identify::recording::Recording;
-use identify::simulate::{Between, Setup};
+use identify::simulate::{Intersample, Setup};
 use identify::twin;
 use identify::unknown::Unknown;
 
@@ -38,8 +38,8 @@ fn main() -> Result<()> {
     let positive = |list: &[(&str, &str, f64)]| -> Vec<Unknown> {
         list.iter().map(|(name, unit, value)| Unknown::positive(name, unit, *value)).collect()
     };
-    let flaws = vec![Unknown::asymmetry(), Unknown::delay(), Unknown::gyro_bias(0)];
-    let all = [positive(&TRUTH), flaws].concat();
+    let sensor_errors = vec![Unknown::asymmetry(), Unknown::delay(), Unknown::gyro_bias(0)];
+    let all = [positive(&TRUTH), sensor_errors].concat();
     // how many of the first eight, and which of the others
     let sets: [(&str, Vec<usize>); 5] = [
         ("6: b and omega_s known", (0..6).collect()),
@@ -53,7 +53,7 @@ fn main() -> Result<()> {
             .chain(std::env::args().skip(1))
             .filter_map(|pair| pair.split_once(':').map(|(n, v)| (n.to_string(), v.to_string())))
             .collect(),
-        between: Between::Lines,
+        intersample: Intersample::FirstOrderHold,
     };
     for torque in ["lin-sweep:amplitude=0.1", "lin-sweep:amplitude=0.25", "multisine:0.25,600"] {
         let torque_text = torque;

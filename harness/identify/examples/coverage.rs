@@ -14,7 +14,7 @@
 //!   friction=stribeck,… as for hubslosh identify --friction
 //!   starts=data         or far: all starts 40 % off, up or down by the seed's bits
 //!   perfect=true        no delay, bias, asymmetry, gyro scale is estimated (false: all are)
-//!   flaws=false         true: 5 ms delay, gyro scale 1.01, bias 2 mrad/s, asymmetry 0.1 in the twin
+//!   sensor_errors=false         true: 5 ms delay, gyro scale 1.01, bias 2 mrad/s, asymmetry 0.1 in the twin
 //!   blind=              tilt, nutation, warming, clipping, with + between several
 //!   rate=50             rows a second
 //!   gyro=50             values of the gyro a second, where it is slower than the rows
@@ -31,9 +31,9 @@ use identify::nominal::COARSEST;
 use identify::options::Options;
 use identify::recording;
 use identify::residual::Tests;
-use identify::simulate::Between;
+use identify::simulate::Intersample;
 use identify::start::PARAMETERS;
-use identify::twin::{self, Blind, Flaws, Twin};
+use identify::twin::{self, Blind, SensorErrors, Twin};
 
 /// What the command line asks for.
 struct Arguments {
@@ -56,7 +56,7 @@ fn arguments() -> Result<Arguments> {
         twin,
         options: Options {
             models: vec!["linear".into()],
-            flaws: false,
+            sensor_errors: false,
             gyro_scale: 0.0,
             ..Options::default()
         },
@@ -84,26 +84,27 @@ fn arguments() -> Result<Arguments> {
             "friction" => asked.options.friction = list(value),
             "starts" => asked.far = value == "far",
             "perfect" => {
-                let flaws = value != "true";
-                (asked.options.flaws, asked.options.gyro_scale) =
-                    (flaws, if flaws { 0.01 } else { 0.0 });
+                let sensor_errors = value != "true";
+                (asked.options.sensor_errors, asked.options.gyro_scale) =
+                    (sensor_errors, if sensor_errors { 0.01 } else { 0.0 });
             }
-            "flaws" if value == "true" => {
+            "sensor_errors" if value == "true" => {
                 asked.twin.settings.push(("friction.asymmetry".into(), "0.1".into()));
-                asked.twin.flaws = Flaws { delay: 0.005, gyro_scale: 1.01, gyro_bias: 2e-3 };
-                (asked.options.flaws, asked.options.gyro_scale) = (true, 0.01);
+                asked.twin.sensor_errors =
+                    SensorErrors { delay: 0.005, gyro_scale: 1.01, gyro_bias: 2e-3 };
+                (asked.options.sensor_errors, asked.options.gyro_scale) = (true, 0.01);
             }
-            "flaws" => {}
+            "sensor_errors" => {}
             "blind" => {
                 asked.twin.blind = value.split('+').map(Blind::named).collect::<Result<_>>()?
             }
             "rate" => asked.twin.rate = value.parse()?,
             "gyro" => asked.twin.gyro = Some(value.parse()?),
-            "between" => {
-                asked.twin.between = match value {
-                    "held" => Between::Held,
-                    "smooth" => Between::Smooth,
-                    _ => Between::Lines,
+            "intersample" => {
+                asked.twin.intersample = match value {
+                    "held" => Intersample::ZeroOrderHold,
+                    "smooth" => Intersample::BandLimited,
+                    _ => Intersample::FirstOrderHold,
                 }
             }
             "say" => asked.say = value == "true",
@@ -123,8 +124,8 @@ fn truths(fmu: &Fmu, twin: &Twin) -> Result<BTreeMap<String, f64>> {
     for name in PARAMETERS.into_iter().chain(["friction.asymmetry"]) {
         truths.insert(name.to_string(), instance.real(name)?);
     }
-    truths.insert("delay".into(), twin.flaws.delay);
-    truths.insert("gyro_scale".into(), twin.flaws.gyro_scale);
+    truths.insert("delay".into(), twin.sensor_errors.delay);
+    truths.insert("gyro_scale".into(), twin.sensor_errors.gyro_scale);
     truths.insert("friction.c + friction.d".into(), truths["friction.c"] + truths["friction.d"]);
     Ok(truths)
 }

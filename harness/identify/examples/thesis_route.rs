@@ -17,7 +17,7 @@ use identify::compensation::{self, Friction};
 use identify::identification::identify;
 use identify::nominal::Bench;
 use identify::options::Options;
-use identify::twin::{self, Flaws};
+use identify::twin::{self, SensorErrors};
 
 fn main() -> anyhow::Result<()> {
     let duration: f64 = std::env::args().nth(1).unwrap_or("2700".into()).parse()?;
@@ -29,24 +29,24 @@ fn main() -> anyhow::Result<()> {
         Friction { b: 0.03793, c: 0.003498, d: 0.002423, omega_s: 0.08581, dead_band: 0.0 };
     let known = [("slosh.zeta_from_correlation", "false"), ("slosh.zeta", "0.003")];
     let uneven = [&known[..], &[("friction.asymmetry", "0.1")]].concat();
-    let flaws = Flaws { delay: 0.005, gyro_scale: 1.0, gyro_bias: 2e-3 };
+    let sensor_errors = SensorErrors { delay: 0.005, gyro_scale: 1.0, gyro_bias: 2e-3 };
     let cases = [
-        ("clean", &known[..], None, Flaws::default(), "71.1"),
-        ("with the gyro's noise", &known[..], Some(1), Flaws::default(), "46.28"),
-        ("as in an experiment", &uneven[..], Some(1), flaws, "-520.9"),
+        ("clean", &known[..], None, SensorErrors::default(), "71.1"),
+        ("with the gyro's noise", &known[..], Some(1), SensorErrors::default(), "46.28"),
+        ("as in an experiment", &uneven[..], Some(1), sensor_errors, "-520.9"),
     ];
     println!(
         "{:24} {:>8} {:>12} {:>12} {:>10} {:>9} {:>9}",
         "fit of the rate, %", "thesis", "compensated", "dead band", "ours", "d, mm", "ours, s"
     );
-    for (name, settings, seed, flaws, thesis) in cases {
-        let recording = twin::record(&fmu, settings, &torque, seed, flaws)?;
+    for (name, settings, seed, sensor_errors, thesis) in cases {
+        let recording = twin::record(&fmu, settings, &torque, seed, sensor_errors)?;
         let start = (0.163, 0.1, 0.003);
         let by = |friction| compensation::identify(&recording, friction, 0.322414, start, bench);
         let (plain, banded) = (by(friction)?, by(Friction { dead_band: 2e-3, ..friction })?);
         let options = Options {
             models: vec!["linear".into()],
-            flaws: flaws.delay > 0.0,
+            sensor_errors: sensor_errors.delay > 0.0,
             gyro_scale: 0.0,
             ..Options::default()
         };

@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use crate::fit::{Answer, Problem};
-use crate::simulate::Between;
+use crate::simulate::Intersample;
 use crate::uncertainty::Covariance;
 
 /// What an error of something that is not estimated does to the estimates.
@@ -57,9 +57,11 @@ pub fn of(
         let mut other = Problem { recordings: &recordings, ..problem.clone() };
         other.setup.settings.extend(wrong.settings);
         if wrong.swap {
-            other.setup.between = match problem.setup.between {
-                Between::Held => Between::Lines,
-                Between::Lines | Between::Smooth => Between::Held,
+            other.setup.intersample = match problem.setup.intersample {
+                Intersample::ZeroOrderHold => Intersample::FirstOrderHold,
+                Intersample::FirstOrderHold | Intersample::BandLimited => {
+                    Intersample::ZeroOrderHold
+                }
             };
         }
         let (mut there, mut last) = (x.to_vec(), f64::INFINITY);

@@ -11,7 +11,7 @@ use crate::nominal::Start;
 use crate::options::Options;
 use crate::recording::Recording;
 use crate::residual::Tests;
-use crate::simulate::{Between, Setup};
+use crate::simulate::{Intersample, Setup};
 use crate::start;
 use crate::stribeck::Places;
 use crate::unknown::{Quantity, Scale, Unknown};
@@ -115,7 +115,7 @@ pub fn fit<'a>(
         problem: of(&starts[0], options)?,
         far,
         others,
-        between: options.between,
+        intersample: options.intersample,
         alone: options.models.iter().filter(|m| *m != "frozen").count() == 1,
         label: model.to_string(),
         simulations: 0,
@@ -155,7 +155,7 @@ struct Search<'a, 'h> {
     /// Further starts from the data, and for what is not in them from the user.
     others: Vec<Vec<f64>>,
     /// What the torque does between rows; `None`: not known.
-    between: Option<Between>,
+    intersample: Option<Intersample>,
     /// No other model of the slosh is tried, which may fit where this one does not.
     alone: bool,
     label: String,
@@ -199,9 +199,9 @@ impl<'a> Search<'a, '_> {
             if other.cost < best.cost {
                 best = other;
             }
-            let before = self.problem.setup.between;
+            let before = self.problem.setup.intersample;
             best = self.joined(best)?;
-            if self.problem.setup.between != before {
+            if self.problem.setup.intersample != before {
                 (best, spread) = self.friction(best)?;
             }
         }
@@ -227,17 +227,17 @@ impl<'a> Search<'a, '_> {
     /// Tries what else the torque may do between rows: the sum of squares that is left after the best step from
     /// here, to first order. Returns whether another one was better and is set.
     fn join(&mut self, near: &Polished) -> Result<bool> {
-        if self.between.is_some() || !self.problem.recordings.iter().any(varies_fast) {
+        if self.intersample.is_some() || !self.problem.recordings.iter().any(varies_fast) {
             return Ok(false);
         }
-        let now = self.problem.setup.between;
+        let now = self.problem.setup.intersample;
         let mut best = (near.cost - JOINS, now);
-        for other in Between::ALL.into_iter().filter(|b| *b != now) {
+        for other in Intersample::ALL.into_iter().filter(|b| *b != now) {
             let mut problem = self.problem.clone();
-            problem.setup.between = other;
+            problem.setup.intersample = other;
             // held torque is late by half a row
             let mut x = near.x.clone();
-            let late = |b: Between| if b == Between::Held { 0.5 } else { 0.0 };
+            let late = |b: Intersample| if b == Intersample::ZeroOrderHold { 0.5 } else { 0.0 };
             if let Some(place) = problem.unknowns.iter().position(|u| u.quantity == Quantity::Delay)
             {
                 let scale = problem.unknowns[place].scale;
@@ -257,7 +257,7 @@ impl<'a> Search<'a, '_> {
         if best.1 == now {
             return Ok(false);
         }
-        self.problem.setup.between = best.1;
+        self.problem.setup.intersample = best.1;
         (self.heard)(format!("{}: the torque is {}", self.label, best.1.words()));
         Ok(true)
     }
@@ -366,7 +366,7 @@ impl<'a> Search<'a, '_> {
             x[hub] += 0.1;
         }
         self.problem.channels.clone_from(&other.problem.channels);
-        self.problem.setup.between = other.problem.setup.between;
+        self.problem.setup.intersample = other.problem.setup.intersample;
         let same = self.problem.unknowns.len() == known.len();
         let known = same.then_some(&other.polished.jacobian);
         let polished = self.problem.polish(&x, known, 3)?;
@@ -428,7 +428,8 @@ fn problem<'a>(
     }
     let chosen = |name: &str| matches!(name, "slosh.model" | "friction.model");
     settings.extend(options.settings.iter().filter(|(name, _)| !chosen(name)).cloned());
-    let setup = Setup { settings, between: options.between.unwrap_or(Between::Lines) };
+    let setup =
+        Setup { settings, intersample: options.intersample.unwrap_or(Intersample::FirstOrderHold) };
     Ok(Problem::new(fmu, setup, recordings, unknowns))
 }
 
@@ -508,7 +509,7 @@ fn unknowns(
             unknown.prior = Some((*mean, *deviation));
         }
     }
-    if options.flaws {
+    if options.sensor_errors {
         if !setting("friction.asymmetry") && dry {
             list.push(Unknown::asymmetry());
         }

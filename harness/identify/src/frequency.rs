@@ -35,7 +35,7 @@ use crate::estimate::Estimated;
 use crate::least_squares::{differences, minimise};
 use crate::nominal::Bench;
 use crate::recording::{self, Recording};
-use crate::simulate::Between;
+use crate::simulate::Intersample;
 use crate::start;
 use crate::uncertainty::Covariance;
 
@@ -142,7 +142,7 @@ fn spectrum(signal: &[f64], bins: &std::ops::RangeInclusive<usize>) -> Vec<Compl
 }
 
 /// Fits a recording of a hub with slosh. `between`: what the torque did between rows.
-pub fn identify(recording: &Recording, bench: Bench, between: Between) -> Result<Found> {
+pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -> Result<Found> {
     let measured = start::response(recording)?;
     let rough = TransferFunction::fit(&measured).context("no transfer function fits")?;
     let (step, torque, rate) = recording.even();
@@ -165,10 +165,10 @@ pub fn identify(recording: &Recording, bench: Bench, between: Between) -> Result
     let between = |s: &f64| {
         let half = s * unit * step / 2.0;
         let sinc = half.sin() / half;
-        match between {
-            Between::Held => Complex64::from_polar(sinc, -half),
-            Between::Lines => Complex64::from(sinc * sinc),
-            Between::Smooth => Complex64::from(1.0),
+        match intersample {
+            Intersample::ZeroOrderHold => Complex64::from_polar(sinc, -half),
+            Intersample::FirstOrderHold => Complex64::from(sinc * sinc),
+            Intersample::BandLimited => Complex64::from(1.0),
         }
     };
     let u = spectrum(&torque, &bins).iter().zip(&s).map(|(u, s)| u * between(s)).collect();
@@ -385,7 +385,7 @@ mod tests {
             let mut random = Random::new(seed, 5);
             let mut one = clean.clone();
             one.rate.iter_mut().for_each(|w| *w += 4.07e-4 * random.normal());
-            let found = identify(&one, BENCH, Between::Lines).unwrap();
+            let found = identify(&one, BENCH, Intersample::FirstOrderHold).unwrap();
             assert!(found.converged && found.described, "{seed}: {:?}", found.verdict);
             for (k, (name, value)) in truth.iter().enumerate() {
                 let p = found.response.get(*name).or(found.parameters.get(*name)).unwrap();

@@ -5,7 +5,7 @@ use host::fmi2::Fmu;
 
 use crate::nominal::Nominal;
 use crate::recording::Recording;
-use crate::simulate::Between;
+use crate::simulate::Intersample;
 
 /// What is asked for.
 #[derive(Clone, Debug)]
@@ -21,11 +21,11 @@ pub struct Options {
     /// Starts in place of those from the data, by FMU name.
     pub starts: Vec<(String, f64)>,
     /// Whether delay, gyro bias and friction asymmetry are estimated as well.
-    pub flaws: bool,
+    pub sensor_errors: bool,
     /// Standard deviation of the gyro's scale about 1, as its data sheet has it; 0: exactly 1.
     pub gyro_scale: f64,
     /// What the torque does between rows; `None`: what fits best.
-    pub between: Option<Between>,
+    pub intersample: Option<Intersample>,
     /// Recordings that are simulated, not fitted.
     pub validation: Vec<Recording>,
 }
@@ -38,9 +38,9 @@ impl Default for Options {
             settings: Vec::new(),
             known: Vec::new(),
             starts: Vec::new(),
-            flaws: true,
+            sensor_errors: true,
             gyro_scale: 0.01,
-            between: None,
+            intersample: None,
             validation: Vec::new(),
         }
     }

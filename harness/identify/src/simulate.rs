@@ -19,27 +19,28 @@ pub struct Motion {
     pub acceleration: Vec<f64>,
 }
 
-/// What the torque does between the rows of a recording.
+/// Intersample behaviour: what the torque does between the rows of a recording (Ljung; Pintelon & Schoukens).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Between {
-    /// A line.
-    Lines,
-    /// It is held from row to row.
-    Held,
-    /// What a band-limited signal does, which was sampled: see [`smooth`].
-    Smooth,
+pub enum Intersample {
+    /// A line from row to row.
+    FirstOrderHold,
+    /// The row's value until the next.
+    ZeroOrderHold,
+    /// What a band-limited signal does that was sampled: see [`smooth`].
+    BandLimited,
 }
 
-impl Between {
+impl Intersample {
     /// All, the likeliest first.
-    pub const ALL: [Between; 3] = [Between::Lines, Between::Smooth, Between::Held];
+    pub const ALL: [Intersample; 3] =
+        [Intersample::FirstOrderHold, Intersample::BandLimited, Intersample::ZeroOrderHold];
 
     /// In words.
     pub fn words(self) -> &'static str {
         match self {
-            Between::Lines => "linear between rows",
-            Between::Held => "held from row to row",
-            Between::Smooth => "smooth between rows",
+            Intersample::FirstOrderHold => "linear between rows",
+            Intersample::ZeroOrderHold => "held from row to row",
+            Intersample::BandLimited => "smooth between rows",
         }
     }
 }
@@ -77,7 +78,7 @@ pub struct Setup {
     /// Values by FMU name, as text, set first.
     pub settings: Vec<(String, String)>,
     /// What the torque does between rows.
-    pub between: Between,
+    pub intersample: Intersample,
 }
 
 impl Setup {
@@ -100,12 +101,12 @@ impl Setup {
             instance.set_real(&[reference(name)?], &[*value])?;
         }
         let smoothed;
-        let torque = match self.between {
-            Between::Smooth => {
+        let torque = match self.intersample {
+            Intersample::BandLimited => {
                 smoothed = smooth(&recording.time, &recording.torque);
                 &smoothed
             }
-            Between::Lines | Between::Held => &recording.torque,
+            Intersample::FirstOrderHold | Intersample::ZeroOrderHold => &recording.torque,
         };
         let mut inputs = vec![(reference("tau_cmd")?, torque)];
         if let Some(gravity) = &recording.gravity {
@@ -116,7 +117,7 @@ impl Setup {
             signals: inputs.iter().map(|(_, signal)| signal.as_slice()).collect(),
             outputs: [reference("theta")?, reference("omega")?, reference("omega_dot")?],
             time: &recording.time,
-            held: self.between == Between::Held,
+            held: self.intersample == Intersample::ZeroOrderHold,
             instance: &mut instance,
         };
         drive.begin()?;

@@ -8,11 +8,11 @@ use host::fmi2::Fmu;
 
 use crate::design::Multisine;
 use crate::recording::Recording;
-use crate::simulate::Between;
+use crate::simulate::Intersample;
 
 /// What the gyro and the data link add to the FMU's own noise.
 #[derive(Clone, Copy, Debug)]
-pub struct Flaws {
+pub struct SensorErrors {
     /// Delay from torque to rate, s; a multiple of the sampling time is exact.
     pub delay: f64,
     /// Reading over rate.
@@ -21,9 +21,9 @@ pub struct Flaws {
     pub gyro_bias: f64,
 }
 
-impl Default for Flaws {
+impl Default for SensorErrors {
     fn default() -> Self {
-        Flaws { delay: 0.0, gyro_scale: 1.0, gyro_bias: 0.0 }
+        SensorErrors { delay: 0.0, gyro_scale: 1.0, gyro_bias: 0.0 }
     }
 }
 
@@ -92,9 +92,9 @@ pub struct Twin {
     /// Values of the gyro a second; `None`: as many as rows.
     pub gyro: Option<f64>,
     /// What the torque does between rows.
-    pub between: Between,
+    pub intersample: Intersample,
     /// What gyro and data link add.
-    pub flaws: Flaws,
+    pub sensor_errors: SensorErrors,
     /// What the models do not have.
     pub blind: Vec<Blind>,
 }
@@ -105,8 +105,8 @@ impl Default for Twin {
             settings: Vec::new(),
             rate: 50.0,
             gyro: None,
-            between: Between::Lines,
-            flaws: Flaws::default(),
+            intersample: Intersample::FirstOrderHold,
+            sensor_errors: SensorErrors::default(),
             blind: Vec::new(),
         }
     }
@@ -136,13 +136,13 @@ impl Twin {
     /// Records it under a torque; `seed` is that of the gyro's noise, none without noise.
     pub fn record(&self, fmu: &Fmu, torque: &Torque, seed: Option<u32>) -> Result<Recording> {
         let (start, stop) = torque.span();
-        let (step, late) = (1.0 / self.rate, self.flaws.delay);
+        let (step, late) = (1.0 / self.rate, self.sensor_errors.delay);
         let rows = ((stop - start) * self.rate).round() as usize;
         let time: Vec<f64> = (0..=rows).map(|k| start + k as f64 * step).collect();
         let tau: Vec<f64> = time.iter().map(|&t| torque.at(t)).collect();
         // the FMU hears the recorded torque late: its knots are shifted, before them is no torque
-        let held = self.between == Between::Held;
-        let heard = if self.between == Between::Smooth {
+        let held = self.intersample == Intersample::ZeroOrderHold;
+        let heard = if self.intersample == Intersample::BandLimited {
             torque.clone()
         } else if late == 0.0 {
             Torque::Rows { time: time.clone(), tau: tau.clone(), held }
@@ -152,8 +152,8 @@ impl Twin {
             Torque::Rows { time: knots, tau: values, held }
         };
         // steps that meet the knots, or are short against a smooth torque's cycle
-        let parts = match (self.between, late == 0.0) {
-            (Between::Smooth, _) => (step / 1e-3).ceil() as u32,
+        let parts = match (self.intersample, late == 0.0) {
+            (Intersample::BandLimited, _) => (step / 1e-3).ceil() as u32,
             (_, true) => 1,
             (_, false) => 4,
         };
@@ -184,7 +184,9 @@ impl Twin {
                 true => ROCKING_SEEN * rocking.step(now[1], step),
                 false => 0.0,
             };
-            rate.push(self.flaws.gyro_scale * (now[0] + seen) + self.flaws.gyro_bias);
+            rate.push(
+                self.sensor_errors.gyro_scale * (now[0] + seen) + self.sensor_errors.gyro_bias,
+            );
             if row == rows {
                 break;
             }
@@ -200,7 +202,7 @@ impl Twin {
                     part => time[row] + f64::from(part) * run.step,
                 };
                 let (t, next) = (at(part), at(part + 1));
-                let shift = if self.between == Between::Smooth { late } else { 0.0 };
+                let shift = if self.intersample == Intersample::BandLimited { late } else { 0.0 };
                 let (value, slope) = match held {
                     true => (heard.at(t), 0.0),
                     false => heard.chord((t - shift).max(start), next - t),
@@ -244,9 +246,9 @@ pub fn record(
     settings: &[(&str, &str)],
     torque: &Torque,
     seed: Option<u32>,
-    flaws: Flaws,
+    sensor_errors: SensorErrors,
 ) -> Result<Recording> {
     let pair = |(name, value): &(&str, &str)| (name.to_string(), value.to_string());
     let settings = settings.iter().map(pair).collect();
-    Twin { settings, flaws, ..Twin::default() }.record(fmu, torque, seed)
+    Twin { settings, sensor_errors, ..Twin::default() }.record(fmu, torque, seed)
 }

@@ -4,17 +4,20 @@ use bench::profile::Torque;
 use host::fmi2::Fmu;
 use identify::acceleration::{self, Weights};
 use identify::recording::Recording;
-use identify::simulate::{Between, Setup};
-use identify::twin::{self, Flaws};
+use identify::simulate::{Intersample, Setup};
+use identify::twin::{self, SensorErrors};
 use pack::packed_for_tests;
 
 /// A sweep of a bench with a rigid liquid, and the encoder's angle.
 fn rigid(fmu: &Fmu, settings: &[(&str, &str)], torque: &str) -> Recording {
     let torque = Torque::Profile(torque.parse().unwrap());
     let settings = [&[("slosh.model", "frozen")], settings].concat();
-    let mut one = twin::record(fmu, &settings, &torque, Some(3), Flaws::default()).unwrap();
+    let mut one = twin::record(fmu, &settings, &torque, Some(3), SensorErrors::default()).unwrap();
     let text = |(name, value): &(&str, &str)| (name.to_string(), value.to_string());
-    let setup = Setup { settings: settings.iter().map(text).collect(), between: Between::Lines };
+    let setup = Setup {
+        settings: settings.iter().map(text).collect(),
+        intersample: Intersample::FirstOrderHold,
+    };
     one.angle = Some(setup.run(fmu, &[], &one, 0.0).unwrap().angle);
     one
 }
@@ -84,9 +87,12 @@ fn the_preferential_direction_shows_in_free_decay_and_in_the_harmonics() {
     }
     let torque = Torque::Rows { time, tau, held: false };
     let settings = [&[("slosh.model", "frozen")], &bench[..]].concat();
-    let mut one = twin::record(&fmu, &settings, &torque, Some(3), Flaws::default()).unwrap();
+    let mut one = twin::record(&fmu, &settings, &torque, Some(3), SensorErrors::default()).unwrap();
     let text = |(name, value): &(&str, &str)| (name.to_string(), value.to_string());
-    let setup = Setup { settings: settings.iter().map(text).collect(), between: Between::Lines };
+    let setup = Setup {
+        settings: settings.iter().map(text).collect(),
+        intersample: Intersample::FirstOrderHold,
+    };
     one.angle = Some(setup.run(&fmu, &[], &one, 0.0).unwrap().angle);
     let asked = acceleration::Options { harmonics: 2, weights: Weights::RunTime, ..options() };
     let found = acceleration::identify(&fmu, &[one], &asked).unwrap();

@@ -6,8 +6,8 @@ use identify::fit::{Differences, Problem};
 use identify::identification::identify;
 use identify::options::Options;
 use identify::recording::Recording;
-use identify::simulate::{Between, Setup};
-use identify::twin::{self, Flaws, Twin};
+use identify::simulate::{Intersample, Setup};
+use identify::twin::{self, SensorErrors, Twin};
 use identify::unknown::Unknown;
 use pack::packed_for_tests;
 
@@ -20,11 +20,17 @@ fn sweep(fmu: &Fmu, torque: &str, settings: &[(&str, &str)]) -> Recording {
     let torque: Profile = torque.parse().unwrap();
     let zeta = [("slosh.zeta_from_correlation", "false"), ("slosh.zeta", "0.003")];
     let settings = [&zeta, settings].concat();
-    twin::record(fmu, &settings, &Torque::Profile(torque), Some(4), Flaws::default()).unwrap()
+    twin::record(fmu, &settings, &Torque::Profile(torque), Some(4), SensorErrors::default())
+        .unwrap()
 }
 
 fn options() -> Options {
-    Options { models: vec!["linear".into()], flaws: false, gyro_scale: 0.0, ..Options::default() }
+    Options {
+        models: vec!["linear".into()],
+        sensor_errors: false,
+        gyro_scale: 0.0,
+        ..Options::default()
+    }
 }
 
 #[test]
@@ -129,11 +135,11 @@ fn a_downward_sweep_shows_that_slosh_rotates() {
 #[test]
 fn an_encoder_shows_the_gyros_scale() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
-    let flaws = Flaws { gyro_scale: 1.01, ..Flaws::default() };
+    let sensor_errors = SensorErrors { gyro_scale: 1.01, ..SensorErrors::default() };
     let torque = Torque::Profile(SHORT.parse().unwrap());
-    let mut recording = twin::record(&fmu, &[], &torque, Some(2), flaws).unwrap();
+    let mut recording = twin::record(&fmu, &[], &torque, Some(2), sensor_errors).unwrap();
     // an encoder of 17 bits on the same motion, whose angle is that of a run without noise
-    let setup = Setup { settings: Vec::new(), between: Between::Lines };
+    let setup = Setup { settings: Vec::new(), intersample: Intersample::FirstOrderHold };
     let motion = setup.run(&fmu, &[], &recording, 0.0).unwrap();
     let count = std::f64::consts::TAU / f64::from(1 << 17);
     recording.angle = Some(motion.angle.iter().map(|a| (a / count).round() * count).collect());
@@ -153,7 +159,7 @@ fn sensitivities_are_those_of_smaller_and_larger_steps() {
     let unknowns = names.map(|(name, unit, value)| Unknown::positive(name, unit, value)).to_vec();
     let setup = Setup {
         settings: vec![("slosh.zeta_from_correlation".into(), "false".into())],
-        between: Between::Lines,
+        intersample: Intersample::FirstOrderHold,
     };
     let problem = Problem::new(&fmu, setup, &recordings, unknowns);
     let (x, all) = (problem.start(), [0, 1, 2]);
@@ -198,24 +204,25 @@ fn degrees_per_second_are_refused_by_name() {
 fn a_twin_with_a_delay_or_a_smooth_torque_is_what_the_fit_simulates() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque = Torque::Profile("lin-sweep:amplitude=0.1,duration=130,f0=2,f1=3".parse().unwrap());
-    for (between, delay) in [
-        (Between::Lines, 0.0),
-        (Between::Held, 0.0),
-        (Between::Smooth, 0.0),
-        (Between::Lines, 0.005),
-        (Between::Smooth, 0.005),
+    for (intersample, delay) in [
+        (Intersample::FirstOrderHold, 0.0),
+        (Intersample::ZeroOrderHold, 0.0),
+        (Intersample::BandLimited, 0.0),
+        (Intersample::FirstOrderHold, 0.005),
+        (Intersample::BandLimited, 0.005),
     ] {
-        let flaws = Flaws { delay, ..Flaws::default() };
+        let sensor_errors = SensorErrors { delay, ..SensorErrors::default() };
         // the gyro's clock without its noise
         let settings = ["imu.arw", "imu.bias_instability"].map(|name| (name.into(), "0".into()));
-        let twin = Twin { between, flaws, settings: settings.to_vec(), ..Twin::default() };
+        let twin =
+            Twin { intersample, sensor_errors, settings: settings.to_vec(), ..Twin::default() };
         let recording = twin.record(&fmu, &torque, Some(1)).unwrap();
-        let setup = Setup { settings: Vec::new(), between };
+        let setup = Setup { settings: Vec::new(), intersample };
         let motion = setup.run(&fmu, &[], &recording, delay).unwrap();
         let off = recording.rate.iter().zip(&motion.rate).map(|(a, b)| (a - b).abs());
         let off = off.fold(0.0, f64::max);
         let largest = recording.rate.iter().fold(0.0, |m: f64, w| m.max(w.abs()));
         // friction where the hub turns round is the steepest: a thousandth of it is some 1e-5 rad/s
-        assert!(off < 1e-3 * largest, "{between:?}, {delay} s late: off by {off} of {largest}");
+        assert!(off < 1e-3 * largest, "{intersample:?}, {delay} s late: off by {off} of {largest}");
     }
 }

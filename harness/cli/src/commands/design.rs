@@ -48,8 +48,8 @@ pub struct DesignArgs {
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
     /// Delay, gyro bias and friction asymmetry are to be estimated as well.
-    #[arg(long)]
-    flaws: bool,
+    #[arg(long, alias = "flaws")]
+    sensor_errors: bool,
     /// The FMU.
     #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
     fmu: PathBuf,
@@ -139,7 +139,7 @@ impl DesignArgs {
             let value = if name == "slosh.zeta" { zeta } else { real(name)? };
             unknowns.push(Unknown::positive(name, &unit, value));
         }
-        if self.flaws {
+        if self.sensor_errors {
             unknowns.extend([Unknown::asymmetry(), Unknown::delay(), Unknown::gyro_bias(0)]);
         }
         let (arw, rate) = (real("imu.arw")?, real("imu.rate")?);
@@ -152,7 +152,7 @@ impl DesignArgs {
         let plan = (time.clone(), torque.clone());
         let bounds = design::cramer_rao(
             &fmu,
-            Setup { settings, between: identify::simulate::Between::Lines },
+            Setup { settings, intersample: identify::simulate::Intersample::FirstOrderHold },
             plan,
             unknowns,
             noise,

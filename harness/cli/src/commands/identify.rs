@@ -11,7 +11,7 @@ use identify::identification::{Identification, identify};
 use identify::nominal::Nominal;
 use identify::options::Options;
 use identify::recording::Recording;
-use identify::simulate::Between;
+use identify::simulate::Intersample;
 use identify::{black_box, distortion, frequency, plausible, recording, report, start};
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -197,13 +197,13 @@ impl IdentifyArgs {
             ensure!(html, "{}: the name must end in .html", path.display());
         }
         let options = Options {
-            between: self.between(),
+            intersample: self.intersample(),
             models: self.model.clone(),
             friction: self.friction.clone(),
             known: self.known.clone(),
             settings: self.settings.clone(),
             starts: self.starts.clone(),
-            flaws: !self.perfect,
+            sensor_errors: !self.perfect,
             gyro_scale: self.gyro_scale,
             validation: Vec::new(),
         };
@@ -256,11 +256,11 @@ impl IdentifyArgs {
 
 impl IdentifyArgs {
     /// What the torque did between rows, if it is said.
-    fn between(&self) -> Option<Between> {
+    fn intersample(&self) -> Option<Intersample> {
         self.torque.as_deref().map(|how| match how {
-            "held" => Between::Held,
-            "smooth" => Between::Smooth,
-            _ => Between::Lines,
+            "held" => Intersample::ZeroOrderHold,
+            "smooth" => Intersample::BandLimited,
+            _ => Intersample::FirstOrderHold,
         })
     }
 
@@ -308,8 +308,8 @@ impl IdentifyArgs {
             Method::Frequency => {
                 let (one, fmu) = (one()?, Fmu::open(&self.fmu)?);
                 let bench = Nominal::of(&fmu, &self.settings, &[])?.bench;
-                let between = self.between().unwrap_or(Between::Lines);
-                let found = frequency::identify(one, bench, between)?;
+                let intersample = self.intersample().unwrap_or(Intersample::FirstOrderHold);
+                let found = frequency::identify(one, bench, intersample)?;
                 estimates(&[&found.parameters, &found.response]);
                 println!(
                     "{} lines from {:.3} to {:.3} Hz, condition number {:.0}",
