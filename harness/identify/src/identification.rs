@@ -18,7 +18,7 @@ use crate::plausible;
 use crate::recording::{self, Recording};
 use crate::residual::Tests;
 use crate::start::{self, Response};
-use crate::uncertainty::{self, Combination, Covariance};
+use crate::uncertainty::{self, Combination, Covariance, Sources};
 use crate::unknown::{Quantity, Unknown};
 use crate::verdict::{self, DECIDES};
 
@@ -319,36 +319,23 @@ fn finish(
     let values = problem.values(&x);
     let slopes: Vec<f64> =
         problem.unknowns.iter().zip(&x).map(|(u, &x)| u.scale.slope(x)).collect();
-    let mut full = covariance.x.clone();
-    if let Some(spread) = &spread {
-        // of the recording's noise this is the better account; what the gyro's scale adds stays
+    // of the values, and so of the variables
+    let friction_curves = spread.as_ref().map(|spread| {
         let n = spread.nrows();
-        full = &full - &noise_only;
-        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
-            full[(i, j)] += spread[(i, j)] / slopes[i] / slopes[j];
-        }
-        if scale_is_unknown {
-            full[(n, n)] = covariance.x[(n, n)];
-        }
-    }
-    if let Some(gained) = &of_models {
-        let n = gained.nrows();
-        let with = full.view((0, 0), (n, n)) + gained;
-        full.view_mut((0, 0), (n, n)).copy_from(&with);
-    }
-    if !described {
+        DMatrix::from_fn(n, n, |i, j| spread[(i, j)] / slopes[i] / slopes[j])
+    });
+    let sandwich = (!described).then(|| {
         let e = problem.stacked(&answer, &x);
-        let robust = covariance.sandwich(&jacobian, e.as_slice(), &windows(&problem));
-        for i in 0..x.len() {
-            if robust[(i, i)] > full[(i, i)] {
-                let factor = (robust[(i, i)] / full[(i, i)]).sqrt();
-                for j in 0..x.len() {
-                    full[(i, j)] *= factor;
-                    full[(j, i)] *= factor;
-                }
-            }
-        }
+        covariance.sandwich(&jacobian, e.as_slice(), &windows(&problem))
+    });
+    let full = Sources {
+        noise: &covariance.x,
+        noise_alone: &noise_only,
+        friction_curves: friction_curves.as_ref(),
+        models: of_models.as_ref(),
+        residual: sandwich.as_ref(),
     }
+    .total();
     let of_values = DMatrix::from_fn(x.len(), x.len(), |i, j| full[(i, j)] * slopes[i] * slopes[j]);
     let (mut parameters, mut measurement) = (BTreeMap::new(), BTreeMap::new());
     for (i, unknown) in problem.unknowns.iter().enumerate() {

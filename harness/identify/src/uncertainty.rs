@@ -81,6 +81,52 @@ impl Covariance {
     }
 }
 
+/// What makes the estimates uncertain, as covariances of the variables x.
+#[derive(Clone, Copy, Debug)]
+pub struct Sources<'a> {
+    /// The recording's noise, (JᵀJ)⁻¹, with the gyro's scale known to its tolerance alone.
+    pub noise: &'a DMatrix<f64>,
+    /// The same with the gyro's scale, the last variable if it is one, known exactly.
+    pub noise_alone: &'a DMatrix<f64>,
+    /// Of all variables but the gyro's scale over several friction curves: of the noise the better account.
+    pub friction_curves: Option<&'a DMatrix<f64>>,
+    /// Of the same variables because another slosh model may be the right one.
+    pub models: Option<&'a DMatrix<f64>>,
+    /// The sandwich, where the residual is more than noise: no variance is less than there.
+    pub residual: Option<&'a DMatrix<f64>>,
+}
+
+impl Sources<'_> {
+    /// All of them together.
+    pub fn total(&self) -> DMatrix<f64> {
+        let mut all = self.noise.clone();
+        if let Some(curves) = self.friction_curves {
+            let n = curves.nrows();
+            all -= self.noise_alone;
+            let with = all.view((0, 0), (n, n)) + curves;
+            all.view_mut((0, 0), (n, n)).copy_from(&with);
+            if n < all.nrows() {
+                all[(n, n)] = self.noise[(n, n)];
+            }
+        }
+        if let Some(models) = self.models {
+            let n = models.nrows();
+            let with = all.view((0, 0), (n, n)) + models;
+            all.view_mut((0, 0), (n, n)).copy_from(&with);
+        }
+        if let Some(sandwich) = self.residual {
+            for i in 0..all.nrows() {
+                if sandwich[(i, i)] > all[(i, i)] {
+                    let factor = (sandwich[(i, i)] / all[(i, i)]).sqrt();
+                    all.row_mut(i).scale_mut(factor);
+                    all.column_mut(i).scale_mut(factor);
+                }
+            }
+        }
+        all
+    }
+}
+
 /// Two unknowns of which only the sum is known.
 #[derive(Clone, Debug, Serialize)]
 pub struct Combination {
@@ -131,6 +177,32 @@ pub fn combinations(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Two variables and the gyro's scale.
+    #[test]
+    fn sources_of_uncertainty_add_up_and_a_residual_sets_the_least() {
+        let diagonal = |d: [f64; 3]| DMatrix::from_diagonal(&DVector::from_row_slice(&d));
+        let (noise, alone) = (diagonal([4.0, 2.0, 1.0]), diagonal([3.0, 2.0, 0.0]));
+        let sources = Sources {
+            noise: &noise,
+            noise_alone: &alone,
+            friction_curves: None,
+            models: None,
+            residual: None,
+        };
+        assert_eq!(sources.total(), noise);
+        let two = DMatrix::from_row_slice(2, 2, &[10.0, 1.0, 1.0, 5.0]);
+        let with_curves = Sources { friction_curves: Some(&two), ..sources }.total();
+        // what the gyro's scale adds, 1 and 0, stays
+        assert_eq!(with_curves.diagonal().as_slice(), [11.0, 5.0, 1.0]);
+        let with_models = Sources { models: Some(&two), ..sources }.total();
+        assert_eq!(with_models.diagonal().as_slice(), [14.0, 7.0, 1.0]);
+        let sandwich = diagonal([1.0, 8.0, 1.0]);
+        let wide = Sources { models: Some(&two), residual: Some(&sandwich), ..sources }.total();
+        // an off-diagonal element grows with the deviation, by sqrt(8/7)
+        assert!((wide[(1, 1)] - 8.0).abs() < 1e-14 && wide[(0, 0)] == 14.0);
+        assert!((wide[(0, 1)] - (8.0_f64 / 7.0).sqrt()).abs() < 1e-15);
+    }
 
     #[test]
     fn a_straight_line_has_its_textbook_covariance() {
