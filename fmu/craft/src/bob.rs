@@ -27,7 +27,7 @@
 //! ```
 //!
 //! Source: Newton's second law with the constraint eliminated; every vector in body axes.
-//! Checked against the same law in p'' (tests/independent.rs).
+//! Checked against the same law in p'' (tests/craft/independent.rs).
 
 use crate::parameters::Tank;
 use crate::series::{self, Pair, Series, Vector, ZERO, ZERO_PAIR, ZERO_VECTOR};

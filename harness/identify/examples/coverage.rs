@@ -26,7 +26,7 @@ use std::collections::BTreeMap;
 
 use anyhow::{Context, Result, bail};
 use host::fmi2::Fmu;
-use identify::identification::{Identification, identify};
+use identify::methods::output_error::{Identification, identify};
 use identify::nominal::COARSEST;
 use identify::options::Options;
 use identify::recording;
@@ -142,20 +142,20 @@ struct Tally {
 
 impl Tally {
     fn add(&mut self, seed: u32, found: &Identification, truths: &BTreeMap<String, f64>) {
-        self.seconds.push(found.seconds);
+        self.seconds.push(found.details.seconds);
         let verdict = match found.verdict.first() {
             Some(line) if line.starts_with("Cannot tell") => {
-                format!("cannot tell, {} first", found.fit.model)
+                format!("cannot tell, {} first", found.details.fit.model)
             }
-            _ => format!("{} with {}", found.fit.model, found.fit.friction),
+            _ => format!("{} with {}", found.details.fit.model, found.details.fit.friction),
         };
         *self.chosen.entry(verdict).or_default() += 1;
-        self.not_described += u32::from(!found.described);
+        self.not_described += u32::from(found.described != Some(true));
         self.not_converged += u32::from(!found.converged);
         let mut worst = (0.0, String::new());
         for (name, truth) in truths {
             let single = found.parameters.get(name).or(found.measurement.get(name));
-            let sum = found.combinations.iter().find(|c| c.name == *name);
+            let sum = found.details.combinations.iter().find(|c| c.name == *name);
             let (value, std, inside) = match (single, sum) {
                 (Some(p), _) => (p.value, p.std, (p.interval[0]..=p.interval[1]).contains(truth)),
                 (_, Some(c)) => (c.value, c.std, (c.value - truth).abs() < 1.96 * c.std),
@@ -167,16 +167,16 @@ impl Tally {
                 worst = (off, name.clone());
             }
         }
-        let tests = found.fit.tests.iter().map(Tests::worst).fold(0.0, f64::max);
+        let tests = found.details.fit.tests.iter().map(Tests::worst).fold(0.0, f64::max);
         println!(
             "seed {seed}: {} {:.1} s, {} answers, worst {} {:.1} std, tests {tests:.1}, decrement {:.3}{}",
-            found.fit.model,
-            found.seconds,
-            found.fit.simulations,
+            found.details.fit.model,
+            found.details.seconds,
+            found.details.fit.simulations,
             worst.1,
             worst.0,
-            found.fit.newton_decrement,
-            if found.described { "" } else { ", NOT DESCRIBED" },
+            found.details.fit.newton_decrement,
+            if found.described == Some(true) { "" } else { ", NOT DESCRIBED" },
         );
     }
 

@@ -14,7 +14,7 @@
 use bench::profile::Torque;
 use host::fmi2::Fmu;
 use identify::compensation::{self, Friction};
-use identify::identification::identify;
+use identify::methods::output_error::identify;
 use identify::nominal::Bench;
 use identify::options::Options;
 use identify::twin::{self, SensorErrors};
@@ -55,9 +55,9 @@ fn main() -> anyhow::Result<()> {
             "{name:24} {thesis:>8} {:>12.2} {:>12.2} {:>10.3} {:>9.3} {:>9.1}",
             plain.fit_pct,
             banded.fit_pct,
-            ours.fit.fit_pct,
+            ours.details.fit.fit_pct,
             1e3 * ours.parameters["tank.d"].value,
-            ours.seconds
+            ours.details.seconds
         );
     }
     Ok(())

@@ -1,25 +1,20 @@
 //! From recordings of torque and hub rate to the FMU's parameters, with their uncertainty.
 
-pub mod acceleration;
-pub mod black_box;
 pub mod budget;
 pub mod candidate;
 pub mod compensation;
 pub mod design;
-pub mod distortion;
 pub mod estimate;
 pub mod fit;
-pub mod frequency;
 pub mod friction;
 pub mod goodness;
-pub mod identification;
 pub mod least_squares;
+pub mod methods;
 pub mod noise;
 pub mod nominal;
 pub mod options;
 pub mod plausible;
 pub mod recording;
-pub mod report;
 pub mod residual;
 pub mod search;
 pub mod simulate;

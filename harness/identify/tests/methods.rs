@@ -2,7 +2,7 @@
 
 use bench::profile::Torque;
 use host::fmi2::Fmu;
-use identify::acceleration::{self, Weights};
+use identify::methods::acceleration::{self, Weights};
 use identify::recording::Recording;
 use identify::simulate::{Intersample, Setup};
 use identify::twin::{self, SensorErrors};
@@ -37,7 +37,7 @@ fn the_accelerations_least_squares_find_friction_and_inertia_without_its_biases(
     let torque = "lin-sweep:amplitude=0.1,f0=1.25,f1=3.5,duration=300";
     let recordings = [rigid(&fmu, &[("friction.asymmetry", "0.1")], torque)];
     let found = acceleration::identify(&fmu, &recordings, &options()).unwrap();
-    assert!(found.converged && found.described, "{:?}", found.verdict);
+    assert!(found.converged && found.described == Some(true), "{:?}", found.verdict);
     for (name, truth) in [
         ("hub.I", 0.322414),
         ("friction.b", 0.03793),
@@ -53,7 +53,7 @@ fn the_accelerations_least_squares_find_friction_and_inertia_without_its_biases(
     assert!(inertia.std < 3e-3 * inertia.value, "{inertia:?}");
     // without the corrections: the difference makes it (Ωh)²/6 = 0.4 to 3.2 % too large, the noise (0.0144
     // rad/s² of 0.17) 0.7 % too small
-    let off = found.uncorrected["hub.I"] / 0.322414 - 1.0;
+    let off = found.details.uncorrected["hub.I"] / 0.322414 - 1.0;
     assert!(off.abs() > 4.0 * inertia.std / inertia.value, "{off}");
 }
 
@@ -63,7 +63,7 @@ fn liquid_that_moves_is_flagged_by_the_accelerations_least_squares() {
     let torque = "lin-sweep:amplitude=0.1,f0=1.8,f1=3,duration=150";
     let recordings = [rigid(&fmu, &[("slosh.model", "linear")], torque)];
     let found = acceleration::identify(&fmu, &recordings, &options()).unwrap();
-    assert!(!found.described && found.verdict[0].starts_with("NOT DESCRIBED"));
+    assert!(found.described != Some(true) && found.verdict[0].starts_with("NOT DESCRIBED"));
 }
 
 #[test]
@@ -105,7 +105,7 @@ fn the_preferential_direction_shows_in_free_decay_and_in_the_harmonics() {
         let p = &found.parameters[name];
         assert!((p.value - truth).abs() < 4.0 * p.std && p.std < 0.05, "{name}: {p:?}");
     }
-    let [ahead, back] = &found.braking[..] else { panic!("{:?}", found.braking) };
+    let [ahead, back] = &found.details.braking[..] else { panic!("{:?}", found.details.braking) };
     // forwards it brakes harder: the preferential direction is backwards
     assert!(-ahead.coefficients[0] > back.coefficients[0], "{ahead:?} {back:?}");
 }

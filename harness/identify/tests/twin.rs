@@ -3,7 +3,7 @@
 use bench::profile::{Profile, Torque};
 use host::fmi2::Fmu;
 use identify::fit::{Differences, Problem};
-use identify::identification::identify;
+use identify::methods::output_error::identify;
 use identify::options::Options;
 use identify::recording::Recording;
 use identify::simulate::{Intersample, Setup};
@@ -37,7 +37,7 @@ fn options() -> Options {
 fn parameters_come_back_and_coulomb_and_stribeck_friction_as_their_sum() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let found = identify(&fmu, &[sweep(&fmu, LONG, &[])], &options(), &mut |_| {}).unwrap();
-    assert!(found.converged && found.described, "{:?}", found.verdict);
+    assert!(found.converged && found.described == Some(true), "{:?}", found.verdict);
     for (name, truth) in [
         ("tank.d", 0.163),
         ("tank.h", 0.1),
@@ -51,7 +51,8 @@ fn parameters_come_back_and_coulomb_and_stribeck_friction_as_their_sum() {
     }
     // the tank is known to better than a thousandth, or the fit has learnt nothing
     assert!(found.parameters["tank.d"].std < 1e-3 * 0.163);
-    let sum = found.combinations.iter().find(|c| c.name == "friction.c + friction.d").unwrap();
+    let sum =
+        found.details.combinations.iter().find(|c| c.name == "friction.c + friction.d").unwrap();
     assert!((sum.value - 0.005921).abs() < 4.0 * sum.std, "{sum:?}");
     assert!(found.verdict.iter().any(|line| line.contains("cannot be told apart")));
 }
@@ -64,7 +65,8 @@ fn the_error_budget_is_what_a_new_fit_gives() {
     let heavier = vec![("g_axial".to_string(), (9.81 * 1.001).to_string())];
     let options = Options { settings: heavier, ..options() };
     let again = identify(&fmu, &recordings, &options, &mut |_| {}).unwrap();
-    let budget = found.error_budget.iter().find(|e| e.source.starts_with("g_axial")).unwrap();
+    let budget =
+        found.details.error_budget.iter().find(|e| e.source.starts_with("g_axial")).unwrap();
     for (name, p) in &found.parameters {
         let (said, seen) = (budget.change[name], again.parameters[name].value - p.value);
         // both searches end within a hundredth of a standard deviation, along the friction's valleys a tenth; the
@@ -87,7 +89,7 @@ fn starts_forty_percent_off_end_at_the_minimum_of_the_datas_own() {
     let truth = |name: &str| own.parameters[name].value;
     let starts = far.map(|(name, off)| (name.to_string(), off * truth(name))).to_vec();
     let there = identify(&fmu, &recordings, &Options { starts, ..options() }, &mut |_| {}).unwrap();
-    assert!(there.converged && there.described, "{:?}", there.verdict);
+    assert!(there.converged && there.described == Some(true), "{:?}", there.verdict);
     for (name, p) in &own.parameters {
         // both searches end within a hundredth of a standard deviation, along the friction's valleys a tenth
         let off = (there.parameters[name].value - p.value).abs() / p.std;
@@ -123,8 +125,8 @@ fn a_downward_sweep_shows_that_slosh_rotates() {
     let models = ["linear", "spherical"].map(String::from).to_vec();
     let found =
         identify(&fmu, &[recording], &Options { models, ..options() }, &mut |_| {}).unwrap();
-    assert!(found.converged && found.described, "{:?}", found.verdict);
-    assert_eq!(found.fit.model, "spherical");
+    assert!(found.converged && found.described == Some(true), "{:?}", found.verdict);
+    assert_eq!(found.details.fit.model, "spherical");
     for (name, truth) in [("tank.d", 0.163), ("tank.h", 0.1), ("slosh.zeta", 0.003)] {
         let p = &found.parameters[name];
         // four standard deviations, as above
@@ -183,7 +185,7 @@ fn a_torque_that_is_clipped_is_flagged_as_not_described() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let clipped = sweep(&fmu, SHORT, &[("wheel.enabled", "true"), ("wheel.tau_max", "0.09")]);
     let found = identify(&fmu, &[clipped], &options(), &mut |_| {}).unwrap();
-    assert!(!found.described);
+    assert!(found.described != Some(true));
     assert!(
         found.verdict.iter().any(|line| line.starts_with("NOT DESCRIBED")),
         "{:?}",

@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import pandas as pd
 
@@ -100,6 +100,10 @@ class Estimated:
     unit: str
 
 
+Method = Literal["output-error", "acceleration", "frequency", "multisine", "black-box"]
+"""The methods of ``hubslosh identify``."""
+
+
 @dataclass(frozen=True)
 class Identification:
     """What ``hubslosh identify`` finds; `all` is its result.json as it is."""
@@ -107,15 +111,15 @@ class Identification:
     parameters: dict[str, Estimated]
     """Of the FMU, by name."""
     measurement: dict[str, Estimated]
-    """Delay, gyro scale and bias."""
-    model: str
-    """The chosen slosh model."""
+    """Delay, gyro scale and bias; poles and zeros of method "frequency"."""
+    model: str | None
+    """The chosen slosh model, of a method that has one."""
     settings: dict[str, str]
     """Settings of the FMU that belong to the parameters."""
     converged: bool
     """The search ended at a minimum."""
-    described: bool
-    """The residual is the gyro's noise; if not, no interval is to be trusted."""
+    described: bool | None
+    """The residual is the gyro's noise; if not, no interval is to be trusted. None: cannot be told."""
     verdict: tuple[str, ...]
     """The answer in words."""
     all: dict[str, Any]
@@ -125,6 +129,7 @@ def identify(
     data: pd.DataFrame | str | Path,
     model: str | None = None,
     *arguments: str,
+    method: Method = "output-error",
     fmu: str | Path = "HubSlosh",
     out: str | Path | None = None,
     program: str | Path | None = None,
@@ -137,14 +142,14 @@ def identify(
 
     The parameters with ``settings`` simulate the bench:
     ``{n: e.value for n, e in found.parameters.items()} | found.settings``, and so does the file:
-    ``simulate(parameters="result.json")``. The program's other methods (``--method``) have results
-    of other kinds; they are not for this function.
+    ``simulate(parameters="result.json")``.
+
+    method: "output-error" simulates the FMU; "acceleration" finds friction and inertia where no
+    liquid moves; "frequency" three poles and two zeros; "multisine" and "black-box" estimate no
+    parameters of the FMU, `all` has their results.
     """
     if any(argument.split("=")[0] == "--method" for argument in arguments):
-        raise FmuError(
-            "identify() estimates by simulation; run `hubslosh identify DATA --method …` for the "
-            "other methods, whose results are of other kinds"
-        )
+        raise FmuError("--method is given as method=")
     path = find_program(program)
     with tempfile.TemporaryDirectory() as folder:
         file, result = Path(folder) / "data.parquet", Path(folder) / "result.json"
@@ -158,7 +163,7 @@ def identify(
         else:
             file = Path(data)
         flags = ["--model", model] if model is not None else []
-        flags += ["--fmu", str(find(fmu))]
+        flags += ["--method", method, "--fmu", str(find(fmu))]
         _run(path, ["identify", file, *flags, *arguments, "--out", result])
         loaded: dict[str, Any] = json.loads(result.read_text(encoding="utf-8"))
     estimates = {
@@ -170,10 +175,10 @@ def identify(
     }
     return Identification(
         **estimates,
-        model=loaded["fit"]["model"],
+        model=loaded.get("models", [{}])[0].get("model") or loaded["settings"].get("slosh.model"),
         settings=loaded["settings"],
         converged=loaded["converged"],
-        described=loaded["described"],
+        described=loaded.get("described"),
         verdict=tuple(loaded["verdict"]),
         all=loaded,
     )

@@ -45,11 +45,30 @@ def test_a_missing_program_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
         hubslosh.campaign("thesis", program="elsewhere")
 
 
-def test_identification_by_another_method_is_the_program_s() -> None:
-    """Their results are no parameters of a simulated bench."""
+def test_the_method_of_an_identification_is_an_argument() -> None:
+    """Not a flag among the others, so that it is told which there are."""
     for flags in (["--method", "multisine"], ["--method=frequency"]):
-        with pytest.raises(FmuError, match="hubslosh identify DATA --method"):
+        with pytest.raises(FmuError, match="method="):
             hubslosh.identify("data.csv", None, *flags)
+
+
+def test_every_method_gives_the_same_kind_of_answer(
+    fmu: Path, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    """A sweep over a rigid liquid: friction by the acceleration, models without physics."""
+    time = np.arange(0, 180, 0.02)
+    torque = 0.05 * np.sin(2 * np.pi * (0.3 * time + 0.008 * time**2))
+    inputs = pd.DataFrame({"time": time, "tau_cmd": torque})
+    run = hubslosh.simulate(fmu, {"slosh.model": "frozen"}, inputs, outputs=["omega"])
+    run["omega"] += 1e-4 * np.random.default_rng(2).standard_normal(len(run))
+    program = option(request, "--hubslosh")
+    found = hubslosh.identify(run, method="acceleration", fmu=fmu, program=program)
+    inertia = found.parameters["hub.I"]
+    assert abs(inertia.value - 0.322414) < 5 * inertia.std and found.described
+    assert found.model == "frozen" and found.all["condition"] > 1
+    found = hubslosh.identify(run, method="black-box", fmu=fmu, program=program)
+    assert not found.parameters and found.described is None and found.model is None
+    assert len(found.all["models"]) > 2 and found.verdict
 
 
 def test_identification_gives_typed_estimates(

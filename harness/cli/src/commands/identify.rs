@@ -5,14 +5,17 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail, ensure};
 use host::fmi2::Fmu;
 use host::output::atomically;
-use identify::acceleration::{self, Weights};
 use identify::estimate::Estimated;
-use identify::identification::{Identification, identify};
+use identify::methods::acceleration::{self, Acceleration, Weights};
+use identify::methods::black_box::BlackBox;
+use identify::methods::frequency::Frequency;
+use identify::methods::multisine::Multisine;
+use identify::methods::output_error::OutputError;
+use identify::methods::{Method, Task};
 use identify::nominal::Nominal;
 use identify::options::Options;
-use identify::recording::Recording;
+use identify::recording::{self, Recording};
 use identify::simulate::Intersample;
-use identify::{black_box, distortion, frequency, plausible, recording, report, start};
 use std::collections::BTreeMap;
 use std::io::Write;
 
@@ -37,7 +40,7 @@ pub struct IdentifyArgs {
     /// without a simulation, of a bench whose liquid does not move; `frequency` three poles and two zeros;
     /// `multisine` tells noise from nonlinear distortion; `black-box` fits ARX and ARMAX.
     #[arg(long, value_name = "NAME", default_value = "output-error")]
-    method: Method,
+    method: MethodName,
     /// Weights of the rows, of --method acceleration.
     #[arg(long, value_name = "NAME", default_value = "uniform")]
     weights: Weighting,
@@ -104,9 +107,9 @@ pub struct IdentifyArgs {
     report: Option<PathBuf>,
 }
 
-/// Ways to parameters.
+/// The methods, one file each in `harness/identify/src/methods`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum Method {
+enum MethodName {
     OutputError,
     Acceleration,
     Frequency,
@@ -180,11 +183,11 @@ impl IdentifyArgs {
             ensure!(there, "{} cannot be written: there is no such directory", path.display());
         }
         ensure!(
-            self.bounds.is_empty() || self.method == Method::Acceleration,
+            self.bounds.is_empty() || self.method == MethodName::Acceleration,
             "--bound is for --method acceleration alone"
         );
         ensure!(
-            self.starts.is_empty() || self.method == Method::OutputError,
+            self.starts.is_empty() || self.method == MethodName::OutputError,
             "--start is for --method output-error alone: the other methods need none"
         );
         let trim = match self.trim[..] {
@@ -196,7 +199,29 @@ impl IdentifyArgs {
             let html = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("html"));
             ensure!(html, "{}: the name must end in .html", path.display());
         }
-        let options = Options {
+        match self.method {
+            MethodName::OutputError => self.answer(OutputError { options: self.options() }, trim),
+            MethodName::Acceleration => {
+                let options = acceleration::Options {
+                    weights: self.weights.into(),
+                    bounds: self.bounds.clone(),
+                    harmonics: self.harmonics,
+                    settings: self.settings.clone(),
+                };
+                self.answer(Acceleration { options }, trim)
+            }
+            MethodName::Frequency => {
+                let intersample = self.intersample().unwrap_or(Intersample::FirstOrderHold);
+                self.answer(Frequency { settings: self.settings.clone(), intersample }, trim)
+            }
+            MethodName::Multisine => self.answer(Multisine { period: self.period }, trim),
+            MethodName::BlackBox => self.answer(BlackBox, trim),
+        }
+    }
+
+    /// What is asked for, with the names of the FMU.
+    fn options(&self) -> Options {
+        Options {
             intersample: self.intersample(),
             models: self.model.clone(),
             friction: self.friction.clone(),
@@ -206,55 +231,9 @@ impl IdentifyArgs {
             sensor_errors: !self.perfect,
             gyro_scale: self.gyro_scale,
             validation: Vec::new(),
-        };
-        let nominal = match self.method {
-            Method::Multisine | Method::BlackBox => None,
-            _ => Some(options.nominal(&Fmu::open(&self.fmu)?)?),
-        };
-        let coarsest = nominal.as_ref().map_or(f64::INFINITY, Nominal::coarsest);
-        let mut done = Vec::new();
-        let mut read = |paths: &[PathBuf]| -> Result<Vec<_>> {
-            let mut all = Vec::new();
-            for path in paths {
-                all.extend(recording::read(path, trim, coarsest, &mut |line| {
-                    eprintln!("{line}");
-                    done.push(line);
-                })?);
-            }
-            Ok(all)
-        };
-        let recordings = read(&self.data)?;
-        let validation = read(&self.validate)?;
-        if self.method != Method::OutputError {
-            if let Some(nominal) = &nominal
-                && let (Some(found), _) = start::from_data(&recordings, nominal)?
-            {
-                plausible::check_size(&found, nominal.inertia)?;
-            }
-            return self.quickly(&recordings, &validation);
         }
-        let options = Options { validation, ..options };
-        let fmu = Fmu::open(&self.fmu)?;
-        let spinner = progress::of_search()?;
-        let found =
-            identify(&fmu, &recordings, &options, &mut |line| progress::tell(&spinner, line));
-        spinner.finish_and_clear();
-        let mut found = found?;
-        found.done.splice(0..0, done);
-        let text = found.json()?;
-        atomically(&self.out, |file| Ok(file.write_all(text.as_bytes())?))?;
-        print(&found);
-        if let Some(path) = &self.report {
-            let page = report::page(&found);
-            atomically(path, |file| Ok(file.write_all(page.as_bytes())?))?;
-            println!("{}", path.display());
-        }
-        println!("{}", self.out.display());
-        Ok(())
     }
-}
 
-impl IdentifyArgs {
     /// What the torque did between rows, if it is said.
     fn intersample(&self) -> Option<Intersample> {
         self.torque.as_deref().map(|how| match how {
@@ -264,89 +243,48 @@ impl IdentifyArgs {
         })
     }
 
-    /// The methods that need no simulation.
-    fn quickly(&self, recordings: &[Recording], held_out: &[Recording]) -> Result<()> {
-        ensure!(self.report.is_none(), "--report is for --method output-error alone");
+    /// Reads, identifies, writes and prints.
+    fn answer<M: Method>(&self, method: M, trim: Option<(f64, f64)>) -> Result<()> {
         ensure!(
-            held_out.is_empty() || self.method == Method::BlackBox,
+            self.validate.is_empty() || M::NEEDS.validation,
             "--validate is for --method output-error and black-box alone"
         );
-        let one = || match recordings {
-            [one] => Ok(one),
-            _ => bail!("this method takes one uninterrupted recording, not {}", recordings.len()),
+        ensure!(
+            self.report.is_none() || M::HAS_PAGE,
+            "--report is for --method output-error alone"
+        );
+        let fmu = if M::NEEDS.fmu { Some(Fmu::open(&self.fmu)?) } else { None };
+        let nominal = fmu.as_ref().map(|fmu| self.options().nominal(fmu)).transpose()?;
+        let coarsest = nominal.as_ref().map_or(f64::INFINITY, Nominal::coarsest);
+        let mut notes = Vec::new();
+        let mut read = |paths: &[PathBuf]| -> Result<Vec<Recording>> {
+            let mut all = Vec::new();
+            for path in paths {
+                all.extend(recording::read(path, trim, coarsest, &mut |line| {
+                    eprintln!("{line}");
+                    notes.push(line);
+                })?);
+            }
+            Ok(all)
         };
-        match self.method {
-            Method::Multisine => {
-                let found = distortion::analyse(one()?, self.period)?;
-                println!(
-                    "{} periods, {} lines; a line's rms: response {:.2e} rad/s, noise {:.2e}, odd distortion \
-                     {:.2e}, even distortion {:.2e}",
-                    found.periods,
-                    found.lines.len(),
-                    found.levels.linear,
-                    found.levels.noise,
-                    found.levels.odd,
-                    found.levels.even
-                );
-                self.finish(&serde_json::to_string_pretty(&found)?, &found.verdict)
-            }
-            Method::BlackBox => {
-                let found = black_box::identify(one()?, held_out.first())?;
-                println!(
-                    "{:6} {:>5} {:>12} {:>12} {:>12}  poles",
-                    "", "order", "one step %", "simulated %", "held back %"
-                );
-                for (m, poles) in found.models.iter().zip(&found.poles) {
-                    let poles = poles.map_or(String::new(), |(f, z)| format!("{f:.4} Hz, {z:.4}"));
-                    println!(
-                        "{:6} {:>5} {:>12.2} {:>12.2} {:>12.2}  {poles}",
-                        m.kind, m.order, m.one_step_pct, m.simulated_pct, m.held_out_pct
-                    );
-                }
-                self.finish(&serde_json::to_string_pretty(&found)?, &found.verdict)
-            }
-            Method::Frequency => {
-                let (one, fmu) = (one()?, Fmu::open(&self.fmu)?);
-                let bench = Nominal::of(&fmu, &self.settings, &[])?.bench;
-                let intersample = self.intersample().unwrap_or(Intersample::FirstOrderHold);
-                let found = frequency::identify(one, bench, intersample)?;
-                estimates(&[&found.parameters, &found.response]);
-                println!(
-                    "{} lines from {:.3} to {:.3} Hz, condition number {:.0}",
-                    found.fit.lines, found.fit.band.0, found.fit.band.1, found.fit.condition
-                );
-                self.finish(&serde_json::to_string_pretty(&found)?, &found.verdict)
-            }
-            Method::Acceleration | Method::OutputError => {
-                let fmu = Fmu::open(&self.fmu)?;
-                let options = acceleration::Options {
-                    weights: self.weights.into(),
-                    bounds: self.bounds.clone(),
-                    harmonics: self.harmonics,
-                    settings: self.settings.clone(),
-                };
-                let found = acceleration::identify(&fmu, recordings, &options)?;
-                estimates(&[&found.parameters, &found.measurement]);
-                println!(
-                    "residual {:.2e} rad/s2 (the gyro's noise makes {:.2e}), condition number {:.0} ({:.0} in SI \
-                     units)",
-                    found.fit.rmse, found.fit.expected, found.condition, found.condition_si
-                );
-                println!("correlations:");
-                for (name, row) in found.correlations.0.iter().zip(&found.correlations.1) {
-                    let row: Vec<String> = row.iter().map(|r| format!("{r:>6.2}")).collect();
-                    println!("{name:24} {}", row.join(" "));
-                }
-                self.finish(&serde_json::to_string_pretty(&found)?, &found.verdict)
-            }
-        }
-    }
-
-    fn finish(&self, json: &str, verdict: &[String]) -> Result<()> {
-        let text = format!("{json}\n");
+        let (recordings, validation) = (read(&self.data)?, read(&self.validate)?);
+        let task = Task { fmu: fmu.as_ref(), recordings: &recordings, validation: &validation };
+        let spinner = progress::of_search()?;
+        let found = method.identify(&task, &mut |line| progress::tell(&spinner, line));
+        spinner.finish_and_clear();
+        let mut found = found?;
+        found.done.splice(0..0, notes);
+        let text = found.json()?;
         atomically(&self.out, |file| Ok(file.write_all(text.as_bytes())?))?;
-        for line in verdict {
+        if !(found.parameters.is_empty() && found.measurement.is_empty()) {
+            estimates(&[&found.parameters, &found.measurement]);
+        }
+        for line in M::lines(&found).iter().chain(&found.verdict) {
             println!("{line}");
+        }
+        if let (Some(path), Some(page)) = (&self.report, M::page(&found)) {
+            atomically(path, |file| Ok(file.write_all(page.as_bytes())?))?;
+            println!("{}", path.display());
         }
         println!("{}", self.out.display());
         Ok(())
@@ -359,20 +297,5 @@ fn estimates(tables: &[&BTreeMap<String, Estimated>]) {
     for (name, p) in tables.iter().flat_map(|table| table.iter()) {
         let percent = 100.0 * p.std / p.value.abs();
         println!("{name:24} {:>14.7} {:>12.2e} {percent:>9.4}  {}", p.value, p.std, p.unit);
-    }
-}
-
-fn print(found: &Identification) {
-    estimates(&[&found.parameters, &found.measurement]);
-    println!(
-        "fit {:.3} %, noise {:.2e} rad/s, condition number {:.0}, {} answers of the FMU in {:.1} s",
-        found.fit.fit_pct,
-        found.fit.noise_white,
-        found.condition,
-        found.fit.simulations,
-        found.seconds
-    );
-    for line in &found.verdict {
-        println!("{line}");
     }
 }

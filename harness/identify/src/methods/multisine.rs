@@ -15,6 +15,7 @@ use bench::analysis::Complex64;
 use serde::Serialize;
 use signals::fourier::Forward;
 
+use super::{Identified, Method, Needs, Task};
 use crate::recording::Recording;
 
 /// Beginning that is left out, s: slosh of a bare tank decays with 23 s, to a thousandth in this time.
@@ -52,9 +53,12 @@ pub struct Levels {
     pub even: f64,
 }
 
+/// The result.
+pub type Found = Identified<Details>;
+
 /// The analysis.
 #[derive(Clone, Debug, Serialize)]
-pub struct Found {
+pub struct Details {
     /// Periods that were used.
     pub periods: usize,
     /// Excited lines.
@@ -63,8 +67,35 @@ pub struct Found {
     pub levels: Levels,
     /// How sure the two kinds of distortion are, in standard deviations of what noise alone would make.
     pub significance: (f64, f64),
-    /// In words.
-    pub verdict: Vec<String>,
+}
+
+/// Noise told from nonlinear distortion.
+pub struct Multisine {
+    /// Period of the torque, s.
+    pub period: f64,
+}
+
+impl Method for Multisine {
+    type Details = Details;
+
+    const NEEDS: Needs = Needs { fmu: false, validation: false };
+
+    fn identify(&self, task: &Task, _: &mut dyn FnMut(&str)) -> Result<Found> {
+        analyse(task.one()?, self.period)
+    }
+
+    fn lines(found: &Found) -> Vec<String> {
+        let Details { periods, lines, levels, .. } = &found.details;
+        vec![format!(
+            "{periods} periods, {} lines; a line's rms: response {:.2e} rad/s, noise {:.2e}, odd distortion {:.2e}, even \
+             distortion {:.2e}",
+            lines.len(),
+            levels.linear,
+            levels.noise,
+            levels.odd,
+            levels.even
+        )]
+    }
 }
 
 /// Analyses a recording of several periods, s each.
@@ -170,7 +201,7 @@ pub fn analyse(recording: &Recording, period: f64) -> Result<Found> {
     };
     let significance = (sure(&odd), sure(&even));
     let verdict = words(&levels, significance);
-    Ok(Found { periods, lines, levels, significance, verdict })
+    Ok(Found::words_alone(verdict, Details { periods, lines, levels, significance }))
 }
 
 fn words(levels: &Levels, (odd, even): (f64, f64)) -> Vec<String> {
@@ -204,7 +235,7 @@ fn words(levels: &Levels, (odd, even): (f64, f64)) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::design::Multisine;
+    use crate::design;
     use bench::analysis::linear::{Linear, Mode};
     use bench::random::Random;
 
@@ -213,7 +244,7 @@ mod tests {
         let mode = Mode { mass: 0.756_293_271_9, frequency: 2.343_618_143_1, damping: 0.02 };
         let inertia = 0.322414 + 1.330_431_108_5 * 0.225f64.powi(2);
         let plant = Linear { inertia, friction: 0.2, arm: 0.225, modes: vec![mode] };
-        let torque = Multisine::new(50.0, (1.25, 3.5), 0.25, 3).unwrap();
+        let torque = design::Multisine::new(50.0, (1.25, 3.5), 0.25, 3).unwrap();
         let time: Vec<f64> = (0..7 * 2500).map(|k| 0.02 * f64::from(k)).collect();
         let tau: Vec<f64> = time.iter().map(|&t| torque.at(t)).collect();
         let mut random = Random::new(2, 2);
@@ -228,15 +259,29 @@ mod tests {
     fn noise_even_and_odd_distortion_are_told_apart() {
         let linear = analyse(&recorded(0.0, 0.0), 50.0).unwrap();
         // three periods are left out, four are used
-        assert_eq!(linear.periods, 4);
-        assert!(linear.significance.0.abs() < 4.0 && linear.significance.1.abs() < 4.0);
+        assert_eq!(linear.details.periods, 4);
+        assert!(
+            linear.details.significance.0.abs() < 4.0 && linear.details.significance.1.abs() < 4.0
+        );
         // an amplitude of noise: σ sqrt(4/N) a period, over sqrt(4) periods; 100 lines, 3 periods' worth each: 6 %, times 4
         let expected = 4e-4 * (4.0 / 2500.0f64).sqrt() / 2.0;
-        assert!((linear.levels.noise / expected - 1.0).abs() < 0.25, "{:?}", linear.levels);
+        assert!(
+            (linear.details.levels.noise / expected - 1.0).abs() < 0.25,
+            "{:?}",
+            linear.details.levels
+        );
         let even = analyse(&recorded(0.5, 0.0), 50.0).unwrap();
-        assert!(even.significance.1 > 10.0 && even.significance.0 < 4.0, "{:?}", even.significance);
+        assert!(
+            even.details.significance.1 > 10.0 && even.details.significance.0 < 4.0,
+            "{:?}",
+            even.details.significance
+        );
         let odd = analyse(&recorded(0.0, 30.0), 50.0).unwrap();
-        assert!(odd.significance.0 > 10.0 && odd.significance.1 < 4.0, "{:?}", odd.significance);
+        assert!(
+            odd.details.significance.0 > 10.0 && odd.details.significance.1 < 4.0,
+            "{:?}",
+            odd.details.significance
+        );
         assert!(odd.verdict.iter().any(|line| line.starts_with("Odd nonlinear distortion is")));
     }
 

@@ -20,6 +20,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::{Identified, Method, Needs, Task};
 use crate::recording::Recording;
 
 /// Orders of ARX that are tried.
@@ -56,9 +57,12 @@ pub struct Model {
     pub held_out_pct: f64,
 }
 
+/// The result.
+pub type Found = Identified<Details>;
+
 /// The models and the choice.
 #[derive(Clone, Debug, Serialize)]
-pub struct Found {
+pub struct Details {
     /// All that were tried.
     pub models: Vec<Model>,
     /// Place of the best ARX.
@@ -69,8 +73,35 @@ pub struct Found {
     pub poles: Vec<Option<(f64, f64)>>,
     /// From when on rows were held back, s.
     pub held_out_from: f64,
-    /// In words.
-    pub verdict: Vec<String>,
+}
+
+/// ARX and ARMAX.
+pub struct BlackBox;
+
+impl Method for BlackBox {
+    type Details = Details;
+
+    const NEEDS: Needs = Needs { fmu: false, validation: true };
+
+    fn identify(&self, task: &Task, _: &mut dyn FnMut(&str)) -> Result<Found> {
+        identify(task.one()?, task.validation.first())
+    }
+
+    fn lines(found: &Found) -> Vec<String> {
+        let Details { models, poles, .. } = &found.details;
+        let mut lines = vec![format!(
+            "{:6} {:>5} {:>12} {:>12} {:>12}  poles",
+            "", "order", "one step %", "simulated %", "held back %"
+        )];
+        lines.extend(models.iter().zip(poles).map(|(m, poles)| {
+            let poles = poles.map_or(String::new(), |(f, z)| format!("{f:.4} Hz, {z:.4}"));
+            format!(
+                "{:6} {:>5} {:>12.2} {:>12.2} {:>12.2}  {poles}",
+                m.kind, m.order, m.one_step_pct, m.simulated_pct, m.held_out_pct
+            )
+        }));
+        lines
+    }
 }
 
 impl Model {
@@ -334,7 +365,7 @@ pub fn identify(recording: &Recording, held_out: Option<&Recording>) -> Result<F
     let verdict = vec![line(&models[arx]), line(&models[armax])];
     let held_out_from =
         if cut < u.len() { recording.time[0] + cut as f64 * step } else { f64::NAN };
-    Ok(Found { models, arx, armax, poles, held_out_from, verdict })
+    Ok(Found::words_alone(verdict, Details { models, arx, armax, poles, held_out_from }))
 }
 
 #[cfg(test)]
@@ -361,19 +392,20 @@ mod tests {
         let size = (rate.iter().map(|w| w * w).sum::<f64>() / rate.len() as f64).sqrt();
         let found = identify(&Recording::of("noise", time, torque, rate), None).unwrap();
         let at = |kind: &str, n: usize| {
-            found.models.iter().position(|m| m.kind == kind && m.order == n).unwrap()
+            found.details.models.iter().position(|m| m.kind == kind && m.order == n).unwrap()
         };
-        let (simple, moving) = (&found.models[at("ARX", 3)], &found.models[at("ARMAX", 3)]);
+        let (simple, moving) =
+            (&found.details.models[at("ARX", 3)], &found.details.models[at("ARMAX", 3)]);
         // white noise on the output is C = A, which ARMAX has and ARX lacks
         // the noise alone is left of what was held back; its rms there is that of the whole to a few percent
         let limit = 100.0 * (1.0 - 4e-4 / size);
         assert!(moving.held_out_pct > limit - 1.0, "{moving:?} {limit}");
         assert!(simple.held_out_pct < limit - 5.0, "{simple:?} {limit}");
         // ω_p² = ω²(1 + m r²/I0), within what friction and noise leave
-        let (f, _) = found.poles[at("ARMAX", 3)].unwrap();
+        let (f, _) = found.details.poles[at("ARMAX", 3)].unwrap();
         assert!((f / 2.456 - 1.0).abs() < 2e-3, "{f}");
         // one step ahead both look good
         assert!(simple.one_step_pct > 80.0 && moving.one_step_pct > 80.0, "{simple:?}");
-        assert!(found.models[found.arx].held_out_pct > simple.held_out_pct);
+        assert!(found.details.models[found.details.arx].held_out_pct > simple.held_out_pct);
     }
 }

@@ -26,8 +26,10 @@ use host::fmi2::Fmu;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
+use super::{Identified, Method, Needs, Task};
 use crate::estimate::Estimated;
 use crate::least_squares::{Minimum, minimise};
+use crate::nominal::Nominal;
 use crate::recording::{self, Recording};
 use crate::uncertainty::Covariance;
 use crate::unknown::Scale;
@@ -68,35 +70,59 @@ pub struct Options {
     pub settings: Vec<(String, String)>,
 }
 
-/// The result.
+/// The result; `measurement` is the inertia of hub and all the liquid, and each recording's gyro bias.
+pub type Found = Identified<Details>;
+
+/// What this method alone has to say.
 #[derive(Clone, Debug, Serialize)]
-pub struct Found {
-    /// The FMU's parameters.
-    pub parameters: BTreeMap<String, Estimated>,
-    /// Inertia of hub and all the liquid, and each recording's gyro bias.
-    pub measurement: BTreeMap<String, Estimated>,
-    /// Settings of the FMU that belong to the parameters.
-    pub settings: BTreeMap<String, String>,
+pub struct Details {
     /// Sizes.
     pub fit: Fit,
-    /// The search ended at a minimum.
-    pub converged: bool,
-    /// The residual is what the gyro's noise makes.
-    pub described: bool,
     /// The same without any of the corrections above: 5.4 to 5.6 as they stand.
     pub uncorrected: BTreeMap<String, f64>,
     /// Unknowns that ended at a bound; they have no standard deviation.
     pub at_bound: Vec<String>,
-    /// Names and matrix of the correlations.
-    pub correlations: (Vec<String>, Vec<Vec<f64>>),
     /// Condition number of the sensitivities with columns of unit length.
     pub condition: f64,
     /// cond₂(J) in SI units, as the thesis states it.
     pub condition_si: f64,
     /// Braking against the angle in free decay (5.4), clockwise and counter-clockwise.
     pub braking: Vec<Braking>,
-    /// In words.
-    pub verdict: Vec<String>,
+}
+
+/// Least squares of the acceleration.
+pub struct Acceleration {
+    /// What is asked for.
+    pub options: Options,
+}
+
+impl Method for Acceleration {
+    type Details = Details;
+
+    const NEEDS: Needs = Needs { fmu: true, validation: false };
+
+    fn identify(&self, task: &Task, _: &mut dyn FnMut(&str)) -> Result<Found> {
+        let fmu = task.fmu()?;
+        task.check_size(&Nominal::of(fmu, &self.options.settings, &[])?)?;
+        identify(fmu, task.recordings, &self.options)
+    }
+
+    fn lines(found: &Found) -> Vec<String> {
+        let Details { fit, condition, condition_si, .. } = &found.details;
+        let mut lines = vec![
+            format!(
+                "residual {:.2e} rad/s2 (the gyro's noise makes {:.2e}), condition number {condition:.0} \
+                 ({condition_si:.0} in SI units)",
+                fit.rmse, fit.expected
+            ),
+            "correlations:".to_string(),
+        ];
+        for (name, row) in found.correlations.0.iter().zip(&found.correlations.1) {
+            let row: Vec<String> = row.iter().map(|r| format!("{r:>6.2}")).collect();
+            lines.push(format!("{name:24} {}", row.join(" ")));
+        }
+        lines
+    }
 }
 
 /// Sizes of a fit.
@@ -508,25 +534,29 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
         parameters,
         measurement,
         settings,
-        fit: Fit {
-            rows: e.len(),
-            rmse: rms / p[0],
-            expected: expected / p[0],
-            noise: problem.rows.iter().map(|r| r.noise).collect(),
-            weights: options.weights,
-        },
-        converged: minimum.converged,
-        described,
-        uncorrected,
-        at_bound: named(&|j| at_bound[j]),
         correlations: (
             names,
             correlations.row_iter().map(|row| row.iter().copied().collect()).collect(),
         ),
-        condition: covariance.condition,
-        condition_si: si.max() / si.min(),
-        braking,
+        converged: minimum.converged,
+        described: Some(described),
         verdict: Vec::new(),
+        done: Vec::new(),
+        residuals: Vec::new(),
+        details: Details {
+            fit: Fit {
+                rows: e.len(),
+                rmse: rms / p[0],
+                expected: expected / p[0],
+                noise: problem.rows.iter().map(|r| r.noise).collect(),
+                weights: options.weights,
+            },
+            uncorrected,
+            at_bound: named(&|j| at_bound[j]),
+            condition: covariance.condition,
+            condition_si: si.max() / si.min(),
+            braking,
+        },
     };
     found.verdict = words(&found);
     Ok(found)
@@ -617,21 +647,22 @@ fn braking(recordings: &[Recording], way: f64, harmonics: usize) -> Option<Braki
 
 fn words(found: &Found) -> Vec<String> {
     let mut words = Vec::new();
-    let ratio = found.fit.rmse / found.fit.expected;
-    if found.described {
+    let Details { fit, at_bound, braking, .. } = &found.details;
+    let (ratio, described) = (fit.rmse / fit.expected, found.described == Some(true));
+    if described {
         words.push(format!(
             "The residual is that of the gyro's noise: {:.2e} rad/s2, {ratio:.3} times what is expected.",
-            found.fit.rmse
+            fit.rmse
         ));
     } else {
         words.push(format!(
             "NOT DESCRIBED: the residual is {:.2e} rad/s2, {ratio:.2} times what the gyro's noise makes. Something acts \
              that inertia and friction do not explain (a liquid that moves, a delay); no number here is to be \
              trusted. With a liquid: hubslosh identify without --method.",
-            found.fit.rmse
+            fit.rmse
         ));
     }
-    for name in &found.at_bound {
+    for name in at_bound {
         words.push(format!("{name} ended at a bound; its value is the bound's."));
     }
     let (names, matrix) = &found.correlations;
@@ -646,7 +677,7 @@ fn words(found: &Found) -> Vec<String> {
         }
     }
     if let Some(asymmetry) = found.parameters.get("friction.asymmetry") {
-        let strong = asymmetry.value.abs() > 3.0 * asymmetry.std && found.described;
+        let strong = asymmetry.value.abs() > 3.0 * asymmetry.std && described;
         if strong {
             let (harder, easier) = if asymmetry.value > 0.0 {
                 ("counter-clockwise", "clockwise")
@@ -659,7 +690,7 @@ fn words(found: &Found) -> Vec<String> {
             ));
         }
     }
-    if let [ahead, back] = &found.braking[..] {
+    if let [ahead, back] = &braking[..] {
         words.push(format!(
             "Free decay: counter-clockwise {:.4} rad/s2, clockwise {:.4} rad/s2 on average over the angle.",
             ahead.coefficients[0], back.coefficients[0]

@@ -6,9 +6,10 @@ use bench::analysis::welch::{Segments, Spectra};
 use bench::svg::{Axis, Chart, Series, Style};
 use host::html::escape;
 
+use super::Residual;
+use super::output_error::Identification;
 use crate::candidate::ModelFit;
 use crate::estimate::Estimated;
-use crate::identification::{Identification, Signals};
 
 /// Points of a curve: more than a screen has pixels are not seen.
 const POINTS: usize = 700;
@@ -31,7 +32,7 @@ details{margin:.6rem 0}summary{cursor:pointer}
 ";
 
 /// The page.
-pub fn page(found: &Identification) -> String {
+pub fn of(found: &Identification) -> String {
     let mut out = String::new();
     let _ = write!(
         out,
@@ -41,15 +42,16 @@ pub fn page(found: &Identification) -> String {
     );
     verdict(&mut out, found);
     parameters(&mut out, found);
-    for signals in &found.signals {
+    for signals in &found.residuals {
         let _ = writeln!(out, "<h2>{}</h2>", escape(&signals.name));
         // on a narrow screen a figure scrolls, as a table does, instead of having letters that nobody can read
-        for chart in [envelope(signals), stretch(signals), spectrum(signals, found.fit.noise_white)]
+        for chart in
+            [envelope(signals), stretch(signals), spectrum(signals, found.details.fit.noise_white)]
         {
             let _ = writeln!(out, "<div class=\"scroll\">{}</div>", chart.svg());
         }
     }
-    models(&mut out, &found.models);
+    models(&mut out, &found.details.models);
     correlations(&mut out, found);
     budget(&mut out, found);
     let _ = write!(out, "<h2>What was done</h2>\n<ol>");
@@ -61,14 +63,14 @@ pub fn page(found: &Identification) -> String {
 }
 
 fn verdict(out: &mut String, found: &Identification) {
-    let fine = found.described && found.converged;
+    let fine = found.described == Some(true) && found.converged;
     if fine {
         let _ = writeln!(
             out,
             "<p>The model {} with {} friction leaves the gyro's noise alone, {:.2e} rad/s a row.</p>",
-            escape(&found.fit.model),
-            escape(&found.fit.friction),
-            found.fit.noise_white
+            escape(&found.details.fit.model),
+            escape(&found.details.fit.friction),
+            found.details.fit.noise_white
         );
     }
     for line in &found.verdict {
@@ -106,7 +108,7 @@ fn parameters(out: &mut String, found: &Identification) {
     for (name, p) in found.parameters.iter().chain(&found.measurement) {
         row(out, name, p);
     }
-    for c in &found.combinations {
+    for c in &found.details.combinations {
         let ends = [c.value - 1.96 * c.std, c.value + 1.96 * c.std];
         let p = Estimated {
             value: c.value,
@@ -140,7 +142,7 @@ fn series(points: Vec<(f64, f64)>, color: &str, style: Style, title: &str) -> Se
 }
 
 /// Largest rate in each of [`POINTS`] windows, measured and simulated, and the residual's root mean square.
-fn envelope(signals: &Signals) -> Chart {
+fn envelope(signals: &Residual) -> Chart {
     let width = (signals.time.len() / POINTS).max(1);
     let windows = |of: &dyn Fn(usize) -> f64, mean: bool| -> Vec<(f64, f64)> {
         (0..signals.time.len() / width)
@@ -164,7 +166,7 @@ fn envelope(signals: &Signals) -> Chart {
 }
 
 /// The stretch around the fastest motion, row by row.
-fn stretch(signals: &Signals) -> Chart {
+fn stretch(signals: &Residual) -> Chart {
     let fastest = (0..signals.measured.len())
         .max_by(|a, b| signals.measured[*a].abs().total_cmp(&signals.measured[*b].abs()))
         .unwrap_or(0);
@@ -182,7 +184,7 @@ fn stretch(signals: &Signals) -> Chart {
 }
 
 /// One-sided amplitude density of residual and measured rate.
-fn spectrum(signals: &Signals, white: f64) -> Chart {
+fn spectrum(signals: &Residual, white: f64) -> Chart {
     let count = signals.time.len();
     let step = (signals.time[count - 1] - signals.time[0]) / (count - 1) as f64;
     let spectra = Spectra::of(step, &signals.residual, &signals.measured, Segments::Seconds(20.0));
@@ -241,7 +243,7 @@ fn correlations(out: &mut String, found: &Identification) {
         out,
         "<h2>Correlations</h2>\n<p>Condition number of the sensitivities: {:.0}.</p>\n\
          <div class=\"scroll\"><table><tr><th></th>",
-        found.condition
+        found.details.condition
     );
     for name in names {
         let _ = write!(out, "<th>{}</th>", escape(name));
@@ -272,7 +274,7 @@ fn budget(out: &mut String, found: &Identification) {
         let _ = write!(out, "<th>{}</th>", escape(name));
     }
     out.push_str("</tr>\n");
-    for effect in &found.error_budget {
+    for effect in &found.details.error_budget {
         let _ = write!(out, "<tr><td>{}</td>", escape(&effect.source));
         for (name, p) in &found.parameters {
             let change = effect.change.get(name).copied().unwrap_or(0.0);

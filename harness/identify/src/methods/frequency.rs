@@ -31,9 +31,10 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 use signals::fourier::Forward;
 
+use super::{Identified, Method, Needs, Task};
 use crate::estimate::Estimated;
 use crate::least_squares::{differences, minimise};
-use crate::nominal::Bench;
+use crate::nominal::{Bench, Nominal};
 use crate::recording::{self, Recording};
 use crate::simulate::Intersample;
 use crate::start;
@@ -50,27 +51,47 @@ const ROUNDS: usize = 5;
 /// Residual over the gyro's noise beyond which the plant is not linear, or something else acts.
 const MISFIT: f64 = 1.3;
 
-/// The result.
+/// The result: parameters of an upright cylinder; `measurement` is poles, zeros and what they say without a tank's
+/// shape.
+pub type Found = Identified<Details>;
+
+/// What this method alone has to say.
 #[derive(Clone, Debug, Serialize)]
-pub struct Found {
-    /// The FMU's parameters, of an upright cylinder.
-    pub parameters: BTreeMap<String, Estimated>,
-    /// Settings that belong to them.
-    pub settings: BTreeMap<String, String>,
-    /// Poles, zeros and what they say without a tank's shape.
-    pub response: BTreeMap<String, Estimated>,
+pub struct Details {
     /// Sizes.
     pub fit: Fit,
-    /// The search ended at a minimum.
-    pub converged: bool,
-    /// The residual is the gyro's noise, and the structure holds.
-    pub described: bool,
-    /// In words.
-    pub verdict: Vec<String>,
+}
+
+/// Three poles and two zeros.
+pub struct Frequency {
+    /// What is known of the bench, by FMU name.
+    pub settings: Vec<(String, String)>,
+    /// What the torque did between rows.
+    pub intersample: Intersample,
+}
+
+impl Method for Frequency {
+    type Details = Details;
+
+    const NEEDS: Needs = Needs { fmu: true, validation: false };
+
+    fn identify(&self, task: &Task, _: &mut dyn FnMut(&str)) -> Result<Found> {
+        let nominal = Nominal::of(task.fmu()?, &self.settings, &[])?;
+        task.check_size(&nominal)?;
+        identify(task.one()?, nominal.bench, self.intersample)
+    }
+
+    fn lines(found: &Found) -> Vec<String> {
+        let Fit { lines, band, condition, .. } = found.details.fit;
+        vec![format!(
+            "{lines} lines from {:.3} to {:.3} Hz, condition number {condition:.0}",
+            band.0, band.1
+        )]
+    }
 }
 
 /// Sizes of a fit.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize)]
 pub struct Fit {
     /// Lines of the spectrum.
     pub lines: usize,
@@ -273,11 +294,14 @@ pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -
         ]
         .map(setting)
         .into(),
-        response,
-        fit,
+        measurement: response,
+        correlations: (Vec::new(), Vec::new()),
         converged,
-        described,
+        described: Some(described),
         verdict,
+        done: Vec::new(),
+        residuals: Vec::new(),
+        details: Details { fit },
     })
 }
 
@@ -386,9 +410,13 @@ mod tests {
             let mut one = clean.clone();
             one.rate.iter_mut().for_each(|w| *w += 4.07e-4 * random.normal());
             let found = identify(&one, BENCH, Intersample::FirstOrderHold).unwrap();
-            assert!(found.converged && found.described, "{seed}: {:?}", found.verdict);
+            assert!(
+                found.converged && found.described == Some(true),
+                "{seed}: {:?}",
+                found.verdict
+            );
             for (k, (name, value)) in truth.iter().enumerate() {
-                let p = found.response.get(*name).or(found.parameters.get(*name)).unwrap();
+                let p = found.measurement.get(*name).or(found.parameters.get(*name)).unwrap();
                 inside[k] += u64::from(p.interval[0] <= *value && *value <= p.interval[1]);
                 // the tank to better than a percent, or nothing is learnt
                 assert!(p.std < 0.05 * value, "{name}: {p:?}");

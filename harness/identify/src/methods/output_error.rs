@@ -1,4 +1,5 @@
-//! The whole way from recordings to parameters with their uncertainty, and to words.
+//! Output-error fit of the FMU in the time domain: the whole way from recordings to parameters with their uncertainty,
+//! and to words.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -8,6 +9,7 @@ use host::fmi2::Fmu;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
+use super::{Identified, Method, Needs, Residual, Task, page};
 use crate::budget::{self, Effect};
 use crate::candidate::{self, Fitted, ModelFit};
 use crate::estimate::Estimated;
@@ -22,63 +24,58 @@ use crate::uncertainty::{self, Combination, Covariance, Sources};
 use crate::unknown::{Quantity, Unknown};
 use crate::verdict::{self, DECIDES};
 
+/// The FMU fitted in the time domain.
+pub struct OutputError {
+    /// What is asked for.
+    pub options: Options,
+}
+
 /// The result.
+pub type Identification = Identified<Details>;
+
+/// What this method alone has to say.
 #[derive(Clone, Debug, Serialize)]
-pub struct Identification {
-    /// The FMU's parameters.
-    pub parameters: BTreeMap<String, Estimated>,
-    /// Delay, gyro scale and bias.
-    pub measurement: BTreeMap<String, Estimated>,
+pub struct Details {
     /// The chosen model's fit.
     pub fit: ModelFit,
-    /// The search ended at a minimum.
-    pub converged: bool,
-    /// Whether the residual is the gyro's noise; if not, no interval is to be trusted.
-    pub described: bool,
-    /// The answer in words.
-    pub verdict: Vec<String>,
     /// Sums that are known where their terms are not.
     pub combinations: Vec<Combination>,
-    /// Names and matrix of the correlations.
-    pub correlations: (Vec<String>, Vec<Vec<f64>>),
     /// Condition number of the sensitivities.
     pub condition: f64,
     /// The error budget.
     pub error_budget: Vec<Effect>,
     /// All models that were tried, the chosen one first.
     pub models: Vec<ModelFit>,
-    /// Settings of the FMU that belong to the parameters.
-    pub settings: BTreeMap<String, String>,
     /// What the frequency response says.
     pub frequency_response: Option<Response>,
     /// Starts from the data.
     pub start: Option<Start>,
-    /// What was done, step by step.
-    pub done: Vec<String>,
     /// Wall time, s.
     pub seconds: f64,
-    /// The FMU's answer with the result, for figures.
-    #[serde(skip)]
-    pub signals: Vec<Signals>,
 }
 
-/// What was measured and what the identified FMU does, for one recording.
-#[derive(Clone, Debug, Default)]
-pub struct Signals {
-    /// The recording's name.
-    pub name: String,
-    /// s.
-    pub time: Vec<f64>,
-    /// Measured rate, rad/s.
-    pub measured: Vec<f64>,
-    /// Measured less modelled rate, rad/s.
-    pub residual: Vec<f64>,
-}
+impl Method for OutputError {
+    type Details = Details;
 
-impl Identification {
-    /// As `result.json`.
-    pub fn json(&self) -> Result<String> {
-        Ok(serde_json::to_string_pretty(self)? + "\n")
+    const NEEDS: Needs = Needs { fmu: true, validation: true };
+
+    fn identify(&self, task: &Task, heard: &mut dyn FnMut(&str)) -> Result<Identification> {
+        let options = Options { validation: task.validation.to_vec(), ..self.options.clone() };
+        identify(task.fmu()?, task.recordings, &options, heard)
+    }
+
+    fn lines(found: &Identification) -> Vec<String> {
+        let Details { fit, condition, seconds, .. } = &found.details;
+        vec![format!(
+            "fit {:.3} %, noise {:.2e} rad/s, condition number {condition:.0}, {} answers of the FMU in {seconds:.1} s",
+            fit.fit_pct, fit.noise_white, fit.simulations
+        )]
+    }
+
+    const HAS_PAGE: bool = true;
+
+    fn page(found: &Identification) -> Option<String> {
+        Some(page::of(found))
     }
 }
 
@@ -99,7 +96,8 @@ pub fn identify(
     heard: &mut dyn FnMut(&str),
 ) -> Result<Identification> {
     let mut found = identify_whole(fmu, recordings, options, heard)?;
-    if let ([recording], false, true) = (recordings, found.described, found.fit.poor) {
+    if let ([recording], Some(false), true) = (recordings, found.described, found.details.fit.poor)
+    {
         found.verdict.extend(described_beginning(fmu, recording, options, heard));
     }
     Ok(found)
@@ -121,7 +119,9 @@ fn described_beginning(
         }
         heard(&format!("no model describes the whole recording; the rows until {end:.0} s"));
         match identify_whole(fmu, &[part], &options, &mut |_| {}) {
-            Ok(found) if found.described && found.converged => longest = Some((end, found)),
+            Ok(found) if found.described == Some(true) && found.converged => {
+                longest = Some((end, found));
+            }
             _ => break,
         }
     }
@@ -129,7 +129,7 @@ fn described_beginning(
     Some(format!(
         "Until {end:.0} s the {} model describes the recording, and leaves noise alone: --trim {:.0},{end:.0} gives parameters \
          that can be trusted. (Where slosh begins to rotate it is chaotic, and no fit follows it from there on.)",
-        found.fit.model, recording.time[0]
+        found.details.fit.model, recording.time[0]
     ))
 }
 
@@ -247,14 +247,15 @@ fn identify_whole(
         doubts: &doubts,
     };
     let mut found = finish(best, of_models, &question, options)?;
-    let chosen =
-        models.iter().position(|m| *m.model == found.fit.model && m.friction == found.fit.friction);
+    let fit = &found.details.fit;
+    let chosen = models.iter().position(|m| *m.model == fit.model && m.friction == fit.friction);
     models.swap(0, chosen.unwrap_or(0));
-    found.models = models;
-    found.frequency_response = response;
-    found.start = Some(start);
+    let details = &mut found.details;
+    details.models = models;
+    details.frequency_response = response;
+    details.start = Some(start);
+    details.seconds = begun.elapsed().as_secs_f64();
     found.done = done;
-    found.seconds = begun.elapsed().as_secs_f64();
     Ok(found)
 }
 
@@ -370,31 +371,33 @@ fn finish(
     Ok(Identification {
         parameters,
         measurement,
-        converged: fit.converged,
-        fit,
-        described,
-        verdict,
-        combinations,
-        correlations: (names, correlations),
-        condition: covariance.condition,
-        error_budget,
-        models: Vec::new(),
         settings: problem.setup.settings.iter().cloned().collect(),
-        frequency_response: None,
-        start: None,
+        correlations: (names, correlations),
+        converged: fit.converged,
+        described: Some(described),
+        verdict,
         done: Vec::new(),
-        seconds: 0.0,
-        signals: signals(&problem, &answer),
+        residuals: residuals(&problem, &answer),
+        details: Details {
+            fit,
+            combinations,
+            condition: covariance.condition,
+            error_budget,
+            models: Vec::new(),
+            frequency_response: None,
+            start: None,
+            seconds: 0.0,
+        },
     })
 }
 
-fn signals(problem: &Problem, answer: &Answer) -> Vec<Signals> {
+fn residuals(problem: &Problem, answer: &Answer) -> Vec<Residual> {
     let rates = problem.channels.iter().zip(&answer.residual);
     rates
         .filter(|(channel, _)| channel.signal == crate::fit::Signal::Rate)
         .map(|(channel, residual)| {
             let recording = &problem.recordings[channel.recording];
-            Signals {
+            Residual {
                 name: recording.name.clone(),
                 time: recording.time.clone(),
                 measured: recording.rate.clone(),

@@ -1,0 +1,154 @@
+//! Methods of identification, one a file: what each is given, what it needs of that, and what all return.
+
+pub mod acceleration;
+pub mod black_box;
+pub mod frequency;
+pub mod multisine;
+pub mod output_error;
+mod page;
+
+use std::collections::BTreeMap;
+
+use anyhow::{Context, Result, bail};
+use host::fmi2::Fmu;
+use serde::Serialize;
+
+use crate::estimate::Estimated;
+use crate::nominal::Nominal;
+use crate::recording::Recording;
+use crate::{plausible, start};
+
+/// What a method is given.
+#[derive(Clone, Copy)]
+pub struct Task<'a> {
+    /// The FMU, for methods that need it.
+    pub fmu: Option<&'a Fmu>,
+    /// What is fitted.
+    pub recordings: &'a [Recording],
+    /// What is simulated with the result, not fitted.
+    pub validation: &'a [Recording],
+}
+
+impl<'a> Task<'a> {
+    fn fmu(&self) -> Result<&'a Fmu> {
+        self.fmu.context("this method needs an FMU")
+    }
+
+    fn one(&self) -> Result<&'a Recording> {
+        match self.recordings {
+            [one] => Ok(one),
+            _ => bail!(
+                "this method takes one uninterrupted recording, not {}",
+                self.recordings.len()
+            ),
+        }
+    }
+
+    /// Refuses recordings of another bench than the FMU's: units or inertia are wrong.
+    fn check_size(&self, nominal: &Nominal) -> Result<()> {
+        match start::from_data(self.recordings, nominal)? {
+            (Some(found), _) => plausible::check_size(&found, nominal.inertia),
+            (None, _) => Ok(()),
+        }
+    }
+}
+
+/// What a method needs, and what it can use.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Needs {
+    /// The FMU.
+    pub fmu: bool,
+    /// Recordings that are held back.
+    pub validation: bool,
+}
+
+/// What every method returns; `D`: what it alone has to say.
+#[derive(Clone, Debug, Serialize)]
+pub struct Identified<D> {
+    /// The FMU's parameters, by name.
+    pub parameters: BTreeMap<String, Estimated>,
+    /// What else was estimated: delay, gyro scale and bias, poles and zeros.
+    pub measurement: BTreeMap<String, Estimated>,
+    /// Settings of the FMU that belong to the parameters.
+    pub settings: BTreeMap<String, String>,
+    /// Names and matrix of the correlations.
+    pub correlations: (Vec<String>, Vec<Vec<f64>>),
+    /// The search ended at a minimum.
+    pub converged: bool,
+    /// Whether the residual is the gyro's noise; if not, no interval is to be trusted. `None`: the method cannot tell.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub described: Option<bool>,
+    /// The answer in words.
+    pub verdict: Vec<String>,
+    /// What was done, step by step.
+    pub done: Vec<String>,
+    /// Measured rates and residuals, of methods that have them in time.
+    #[serde(skip)]
+    pub residuals: Vec<Residual>,
+    /// What the method alone has to say.
+    #[serde(flatten)]
+    pub details: D,
+}
+
+/// What was measured and what is left of it, for one recording.
+#[derive(Clone, Debug, Default)]
+pub struct Residual {
+    /// The recording's name.
+    pub name: String,
+    /// s.
+    pub time: Vec<f64>,
+    /// Measured rate, rad/s.
+    pub measured: Vec<f64>,
+    /// Measured less modelled rate, rad/s.
+    pub residual: Vec<f64>,
+}
+
+impl<D: Serialize> Identified<D> {
+    /// Of a method that estimates no parameters of the FMU.
+    fn words_alone(verdict: Vec<String>, details: D) -> Self {
+        Identified {
+            parameters: BTreeMap::new(),
+            measurement: BTreeMap::new(),
+            settings: BTreeMap::new(),
+            correlations: (Vec::new(), Vec::new()),
+            converged: true,
+            described: None,
+            verdict,
+            done: Vec::new(),
+            residuals: Vec::new(),
+            details,
+        }
+    }
+
+    /// As `result.json`.
+    pub fn json(&self) -> Result<String> {
+        Ok(serde_json::to_string_pretty(self)? + "\n")
+    }
+}
+
+/// A method of identification.
+pub trait Method {
+    /// What it alone has to say.
+    type Details: Serialize;
+
+    /// What it needs of a [`Task`].
+    const NEEDS: Needs;
+
+    /// Does it. `heard` is told what happens.
+    fn identify(
+        &self,
+        task: &Task,
+        heard: &mut dyn FnMut(&str),
+    ) -> Result<Identified<Self::Details>>;
+
+    /// Lines for a terminal, below the table of estimates.
+    fn lines(found: &Identified<Self::Details>) -> Vec<String>;
+
+    /// Whether it makes a page.
+    const HAS_PAGE: bool = false;
+
+    /// The page, in HTML.
+    fn page(_found: &Identified<Self::Details>) -> Option<String> {
+        None
+    }
+}
