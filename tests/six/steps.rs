@@ -2,13 +2,13 @@
 //! matter.
 
 use craft::{Inputs, Line, Ramp, TankInputs, TankParameters};
-use host::fmi2::{CallError, Status};
+use host::fmi2::{CallError, MODEL_EXCHANGE, Status};
 use runtime::instance::Instance;
 use runtime::operation::{GET_REAL, Interface, SET_INTEGER, SET_REAL, Version};
 use runtime::snapshot::to_bytes;
 use runtime::variable::Value;
 
-use super::component::{SloshTank, Spacecraft};
+use super::component::{SloshTank, Spacecraft, load};
 use super::draining::tank;
 use super::random::Random;
 use super::records::{STEP, at_end, motion_at_end};
@@ -170,4 +170,28 @@ fn a_kind_is_its_enumeration_for_hosts_that_set_none() {
     }
     let why = m(&[("coupling", 2), ("coupling_kind", 3)]).unwrap_err().text;
     assert!(why.contains("coupling_kind = 3 contradicts coupling = 2"), "{why}");
+}
+
+/// A host that integrates itself moves the wheels and gives no torque: one warning, however many steps follow.
+#[test]
+fn wheels_that_move_without_a_torque_in_model_exchange_are_warned_of_once() {
+    let fmu = load("Spacecraft");
+    let mut with = fmu.instantiation("one");
+    with.kind = MODEL_EXCHANGE;
+    let mut instance = fmu.instantiate_with(&with).unwrap();
+    instance.setup_experiment(None, 0.0, None).unwrap();
+    instance.enter_initialization_mode().unwrap();
+    instance.exit_initialization_mode().unwrap();
+    instance.new_discrete_states().unwrap();
+    instance.enter_continuous_time_mode().unwrap();
+    let mut warnings = Vec::new();
+    for k in 1..=10 {
+        instance.set_time(k as f64 * STEP).unwrap();
+        instance.set("h_wheels[1]", &format!("{}", 0.1 * k as f64)).unwrap();
+        instance.completed_integrator_step().unwrap();
+        warnings.extend(instance.take_messages());
+    }
+    let [warning] = &warnings[..] else { panic!("{warnings:?}") };
+    assert_eq!((warning.status, warning.category.as_str()), (Status::Warning, "logStatusWarning"));
+    assert!(warning.text.contains("add -d(h_wheels)/dt to torque"), "{}", warning.text);
 }
