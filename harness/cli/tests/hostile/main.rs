@@ -158,7 +158,7 @@ fn hostile_archives_and_descriptions_are_refused_by_every_command() {
     let plus = |name: &str, content: Vec<u8>| zipped(&vec![(NAME, xml("")), (name, content)]);
     let variable = r#"<ScalarVariable name="v" valueReference="1"><Real/></ScalarVariable>"#;
     let one = |attribute: &str, text: String| {
-        xml(&variable.replace(attribute, &attribute.replace('v', &text).replace('1', &text)))
+        xml(&variable.replace(attribute, &attribute.replace(['v', '1'], &text)))
     };
     let many: Vec<String> = (0..20_000).map(|n| format!("resources/{n}")).collect();
     let many: Files = many.iter().map(|name| (name.as_str(), Vec::new())).collect();
