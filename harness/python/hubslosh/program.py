@@ -119,7 +119,7 @@ class Identification:
     converged: bool
     """The search ended at a minimum."""
     described: bool | None
-    """The residual is the gyro's noise; if not, no interval is to be trusted. None: cannot be told."""
+    """The residual is the gyro's noise; if not, no interval is to be trusted. None: not known."""
     verdict: tuple[str, ...]
     """The answer in words."""
     all: dict[str, Any]
