@@ -535,7 +535,7 @@ impl Craft {
         let negative = determinant < -1e-12 * xx * yy * zz;
         if !indefinite && negative {
             problems.0.push(format!(
-                "{name}.J has a negative principal moment: its determinant is {determinant:?} \
+                "{name}.Jxx to {name}.Jyz have a negative principal moment: the determinant is {determinant:?} \
                  kg3.m6 (allowed: 0 and above)"
             ));
         }
@@ -547,8 +547,8 @@ impl Craft {
             let [small, middle, large, sum] = [small, middle, large, sum]
                 .map(|moment| format!("{moment:.5e}").parse().unwrap_or(moment));
             problems.0.push(format!(
-                "{name}.J has the principal moments {small:?}, {middle:?} and {large:?} kg.m2: the largest exceeds {sum:?}, \
-                 the sum of the others (allowed: up to that sum, as no body has more)"
+                "{name}.Jxx, {name}.Jyy, {name}.Jzz, with {name}.Jxy, {name}.Jxz, {name}.Jyz, have the principal moments \
+                 {small:?}, {middle:?} and {large:?} kg.m2: the largest exceeds {sum:?}, the sum of the others (allowed: up to that sum, as no body has more)"
             ));
         }
     }

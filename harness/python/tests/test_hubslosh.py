@@ -105,5 +105,5 @@ def test_each_processor_has_its_folder(system: str, machine: str, folder: str) -
         "import hubslosh; print(hubslosh.fmu.PLATFORM)"
     )
     command = [sys.executable, "-c", program]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=PACKAGE)
     assert done.stdout.split() == [folder], done.stderr

@@ -56,15 +56,16 @@ def test_every_method_gives_the_same_kind_of_answer(
     fmu: Path, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
     """A sweep over a rigid liquid: friction by the acceleration, models without physics."""
-    time = np.arange(0, 180, 0.02)
-    torque = 0.05 * np.sin(2 * np.pi * (0.3 * time + 0.008 * time**2))
+    time = np.arange(0, 300, 0.02)
+    torque = 0.1 * np.sin(2 * np.pi * (1.25 * time + 0.00375 * time**2))
     inputs = pd.DataFrame({"time": time, "tau_cmd": torque})
     run = hubslosh.simulate(fmu, {"slosh.model": "frozen"}, inputs, outputs=["omega"])
     run["omega"] += 1e-4 * np.random.default_rng(2).standard_normal(len(run))
     program = option(request, "--hubslosh")
     found = hubslosh.identify(run, method="acceleration", fmu=fmu, program=program)
     inertia = found.parameters["hub.I"]
-    assert abs(inertia.value - 0.322414) < 5 * inertia.std and found.described
+    # how exact the method is, its own tests say (harness/identify/tests/methods.rs)
+    assert abs(inertia.value / 0.322414 - 1) < 0.01 and inertia.std > 0 and found.described
     assert found.model == "frozen" and found.all["condition"] > 1
     found = hubslosh.identify(run, method="black-box", fmu=fmu, program=program)
     assert not found.parameters and found.described is None and found.model is None

@@ -194,7 +194,7 @@ def test_an_unknown_model_is_told(tmp_path: Path) -> None:
     with pytest.raises(FmuError, match="pack makes it"):
         simulate(tmp_path / "none.fmu")
     (tmp_path / "text.fmu").write_text("no zip")
-    with pytest.raises(FmuError, match="is not an FMU that fmpy can read"):
+    with pytest.raises(FmuError, match="is not an FMU: it is not a zip archive"):
         simulate(tmp_path / "text.fmu")
 
 

@@ -328,7 +328,12 @@ fn a_harmful_binary_ends_its_own_process_and_every_command_says_so() {
             let output = bench.hubslosh(&["variables", "--fmu", &fmu]);
             assert!(output.status.success(), "{what}: a description is no binary");
             if *name == LOUD {
-                assert!(bench.hubslosh(&run).status.success(), "{what}");
+                // a gigabyte through a pipe may take longer than the limit of the others
+                let patient: Vec<&str> =
+                    run.iter().copied().filter(|a| !matches!(*a, "--call-limit" | "0.5")).collect();
+                let output = bench.hubslosh(&patient);
+                let said = String::from_utf8_lossy(&output.stderr).into_owned();
+                assert!(output.status.success(), "{what}: {said}");
             } else {
                 for command in [&run[..], &campaign[..]] {
                     let said = bench.fails(command);
