@@ -951,8 +951,7 @@ fn check_slope<M: Model>(
     slope: f64,
 ) -> Result<(), Fault> {
     let is_input = matches!(scalar.access, Access::Input(_));
-    let fastest = scalar.variable.fastest();
-    if is_input && order == 1 && is_finite(slope) && slope.abs() <= fastest {
+    if is_input && order == 1 && scalar.variable.allows_rate(slope) {
         return Ok(());
     }
     if !is_input {
@@ -960,6 +959,7 @@ fn check_slope<M: Model>(
     }
     check_order(call, scalar, order)?;
     let (name, unit) = (scalar.name(), scalar.variable.unit());
+    let fastest = scalar.variable.fastest();
     let allowed = match fastest.is_finite() {
         true => format!("-{fastest:?} to {fastest:?} {unit}/s"),
         false => "any finite number".into(),

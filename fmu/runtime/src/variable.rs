@@ -546,6 +546,16 @@ impl<M: Model> Variable<M> {
         }
     }
 
+    /// Whether an input may change at this rate: finite, and no more than [`Variable::fastest`].
+    #[inline]
+    pub fn allows_rate(&self, rate: f64) -> bool {
+        let Kind::Real(Quantity { min, max, .. }) = &self.kind else { return is_finite(rate) };
+        // NaN is multiplied with nothing: see [`is_finite`].
+        let change = if is_finite(rate) { rate.abs() } else { 0.0 } * CROSSING;
+        is_finite(rate)
+            && (max.is_none_or(|max| change <= max) || min.is_none_or(|min| change <= -min))
+    }
+
     /// The unit of a quantity.
     pub const fn unit(&self) -> &'static str {
         match self.kind {
@@ -582,11 +592,9 @@ impl<M: Model> Variable<M> {
     fn allows(&self, value: Value) -> bool {
         match (&self.kind, value) {
             (Kind::Real(Quantity { min, max, .. }), Value::Real(x)) => {
-                // -0 is 0
-                let x = if x.to_bits() == (-0.0_f64).to_bits() { 0.0 } else { x };
-                is_finite(x)
-                    && min.is_none_or(|m| x.total_cmp(&m).is_ge())
-                    && max.is_none_or(|m| x.total_cmp(&m).is_le())
+                // NaN is compared with nothing: see [`is_finite`].
+                let number = if is_finite(x) { x } else { f64::INFINITY };
+                is_finite(x) && min.is_none_or(|m| number >= m) && max.is_none_or(|m| number <= m)
             }
             (Kind::Integer { min, max }, Value::Integer(n)) => {
                 min.is_none_or(|m| n >= m) && max.is_none_or(|m| n <= m)
