@@ -20,8 +20,10 @@ use super::{Check, Findings, Options, RULES, Rule, life};
 pub const SUBCOMMAND: &str = "check-calls";
 /// After so many endless calls no more are made: the check would take for ever as well.
 const HANGS: usize = 2;
-/// Least time that one call may take if the rule has so much.
-const CALL: Duration = Duration::from_secs(5);
+/// Least time that one call may take if the rule has so much, and what part of the limit: [`HANGS`] of them
+/// are not to take more than 10 s.
+const CALL: Duration = Duration::from_secs(4);
+const PART: f64 = 15.0;
 /// Bytes that a file of an FMU may have: rules run side by side.
 const FILE: u64 = 8 << 20;
 /// The rule that tells what is wrong with loading.
@@ -133,7 +135,7 @@ fn run(
         seconds.as_ref(),
     ];
     let limits = Limits {
-        call: options.limit.div_f64(10.0).max(CALL).min(options.limit),
+        call: options.limit.div_f64(PART).max(CALL).min(options.limit),
         total: Some(options.limit),
         memory: guard::MEMORY,
         file: FILE,

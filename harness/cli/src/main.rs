@@ -172,10 +172,13 @@ fn guarded(cli: &Cli) -> Result<u8> {
                 guard::FILE >> 20
             )
         }
-        _ => bail!(
+        Cause::EndlessCall | Cause::TooLong => bail!(
             "a call of the FMU has not returned within {} s (--call-limit gives more time)",
             cli.call_limit
         ),
+        Cause::Flood => {
+            bail!("the FMU has printed more than {} GiB (allowed: less)", guard::FLOOD_SHOWN >> 30)
+        }
     }
 }
 

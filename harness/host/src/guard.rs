@@ -38,8 +38,10 @@ pub const FILE: u64 = 64 << 20;
 /// Bytes that are kept of what a process prints, on stdout and on stderr.
 pub const PRINTED: usize = 64 << 10;
 
-/// Bytes that a process whose output is kept may print.
+/// Bytes that a process may print: one whose output is kept, and one whose output is shown.
 pub const FLOOD: u64 = 16 << 20;
+/// See [`FLOOD`].
+pub const FLOOD_SHOWN: u64 = 4 << 30;
 
 /// What a process may take.
 #[derive(Clone, Debug)]
@@ -65,7 +67,7 @@ pub enum Cause {
     EndlessCall,
     /// It was ended because it took too long.
     TooLong,
-    /// It was ended because it printed more than [`FLOOD`].
+    /// It was ended because it printed more than [`FLOOD`] or [`FLOOD_SHOWN`].
     Flood,
 }
 
@@ -143,7 +145,8 @@ pub fn run<A: AsRef<OsStr>>(
         child
     };
     drop(command); // with its ends of the pipes
-    let floods = || !shown && readers.iter().any(|reader| lock(&reader.printed).more > FLOOD);
+    let flood = if shown { FLOOD_SHOWN } else { FLOOD };
+    let floods = || readers.iter().any(|reader| lock(&reader.printed).more > flood);
     let cause = watch(child, &mut news, started, limits, &files, &floods)?;
     let printed = readers.map(|reader| {
         // a process that could not be found may hold the pipe
