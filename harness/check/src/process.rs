@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
 use host::guard::{self, Cause, Limits, Output};
+use host::temporary;
 use serde::{Deserialize, Serialize};
 
 use super::under_test::{FmuUnderTest, Unusable};
@@ -123,7 +124,7 @@ fn run(
     so_far: &SoFar,
     findings: &mut Findings,
 ) -> Result<bool> {
-    let folder = tempfile::tempdir().context("no temporary directory")?;
+    let folder = temporary::Folder::new()?;
     let answer = folder.path().join("answer");
     let seconds = options.limit.as_secs_f64().to_string();
     let arguments = [

@@ -54,6 +54,11 @@ struct Cli {
 }
 
 impl Cli {
+    /// Whether memory and files of the command are limited.
+    fn has_memory_limit(&self) -> bool {
+        matches!(self.command, None | Some(Command::Run(_) | Command::Campaign(_)))
+    }
+
     /// Whether the command loads an FMU into its own process.
     fn loads(&self) -> bool {
         use Command::*;
@@ -68,12 +73,10 @@ impl Cli {
         let call = Duration::try_from_secs_f64(self.call_limit).ok().filter(|time| !time.is_zero());
         let call =
             call.with_context(|| format!("--call-limit {} (allowed: above 0 s)", self.call_limit))?;
-        let (memory, file) = match self.command {
-            None | Some(Command::Run(_) | Command::Campaign(_)) => {
-                (self.memory.saturating_mul(1 << 20), guard::FILE)
-            }
+        let (memory, file) = match self.has_memory_limit() {
+            true => (self.memory.saturating_mul(1 << 20), guard::FILE),
             // fits and records take what they need
-            _ => (1 << 40, 1 << 40),
+            false => (1 << 40, 1 << 40),
         };
         Ok(Limits { call, total: None, memory, file })
     }
@@ -164,12 +167,17 @@ fn guarded(cli: &Cli) -> Result<u8> {
         Cause::Done(code) => Ok(code),
         Cause::Ended(status) => {
             let last = outcome.last_line().map(|line| format!("; it printed {line:?}"));
+            let within = match cli.has_memory_limit() {
+                true => {
+                    let files = guard::FILE >> 20;
+                    format!(", in {} MiB of memory and files of {files} MiB", cli.memory)
+                }
+                false => String::new(),
+            };
             bail!(
                 "the FMU has ended the process that ran it ({status}{}), before the command was done \
-                 (allowed: every call returns, in {} MiB of memory and files of {} MiB)",
-                last.unwrap_or_default(),
-                cli.memory,
-                guard::FILE >> 20
+                 (allowed: every call returns{within})",
+                last.unwrap_or_default()
             )
         }
         Cause::EndlessCall | Cause::TooLong => bail!(

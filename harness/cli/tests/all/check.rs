@@ -929,7 +929,7 @@ fn a_call_without_end_is_a_finding_and_not_the_end_of_the_check() {
     let [(rule, finding)] = &all[..] else { panic!("{}", report.text()) };
     assert_eq!((rule.id, finding.severity), ("steps.size", Severity::Error));
     assert!(finding.place.contains("communicationStepSize = 0.0"), "{}", finding.place);
-    assert!(finding.text.contains("no end after 5 s"), "{}", finding.text);
+    assert!(finding.text.contains("no end after 4 s"), "{}", finding.text);
 }
 
 #[test]
