@@ -192,7 +192,7 @@ fn run(
         }
         // One rule tells it; the others would say the same.
         None if is_lost && rule.id != OPENS => {
-            findings.skip(format!("the process ended while {doing}: {why}"));
+            findings.skip_for(OPENS, format!("the process ended while {doing}: {why}"));
         }
         None => tell_crash(findings, doing, why, crash),
     }

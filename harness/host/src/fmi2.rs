@@ -885,6 +885,7 @@ impl<'fmu> Instance<'fmu> {
         values: &mut [T],
     ) -> Called {
         assert_eq!(references.len(), values.len());
+        self.calls.begin();
         // SAFETY: two slices of the length given.
         let status = unsafe {
             function(self.component, references.as_ptr(), references.len(), values.as_mut_ptr())
@@ -901,6 +902,7 @@ impl<'fmu> Instance<'fmu> {
         values: &[T],
     ) -> Called {
         assert_eq!(references.len(), values.len());
+        self.calls.begin();
         // SAFETY: two slices of the length given.
         let status = unsafe {
             function(self.component, references.as_ptr(), references.len(), values.as_ptr())

@@ -83,7 +83,8 @@ impl Folder {
         output::directory(&unfinished)?;
         let registered = temporary::register(&unfinished);
         let place = path.join(MANIFEST);
-        let text = fs::read_to_string(&place).unwrap_or_default();
+        let text = fs::read(&place).unwrap_or_default();
+        let text = String::from_utf8_lossy(&text);
         let mut found = sums(&text);
         found.retain(|name, _| path.join(name).is_file());
         if lines(&found) != text {
@@ -153,7 +154,8 @@ impl Folder {
             Ok(name)
         });
         let names = names.collect::<Result<Vec<_>>>()?;
-        let gone = manifest.sums.keys().filter(|name| !sums.contains_key(*name));
+        let gone =
+            manifest.sums.keys().filter(|name| is_published(name) && !sums.contains_key(*name));
         let publish = || -> Result<()> {
             for name in gone {
                 let _ = fs::remove_file(self.path.join(name));
@@ -235,6 +237,14 @@ fn hold(path: &Path, about: &str) -> Result<File> {
     Ok(lock)
 }
 
+/// Whether a name is one that a campaign gives to what it publishes: nothing else is removed, whatever
+/// stands in the manifest.
+fn is_published(name: &str) -> bool {
+    let features = name.strip_prefix("features").and_then(|rest| rest.strip_suffix(".csv"));
+    matches!(name, "plan.toml" | "report.html" | "runs.csv")
+        || features.is_some_and(|rest| rest.chars().all(|c| c.is_alphanumeric() || c == '_'))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -307,5 +317,24 @@ mod tests {
         let mut names: Vec<_> = names.map(|entry| entry.unwrap().file_name()).collect();
         names.sort();
         assert_eq!(names, [".lock", MANIFEST, "plan.toml", "runs", "runs.csv"]);
+    }
+
+    #[test]
+    fn what_is_no_campaigns_is_left_alone_whatever_the_manifest_says() {
+        let directory = tempfile::tempdir().unwrap();
+        let out = directory.path().join("out");
+        fs::create_dir(&out).unwrap();
+        let others = [directory.path().join("precious.csv"), out.join("notes.txt")];
+        for place in &others {
+            fs::write(place, "mine").unwrap();
+        }
+        let sum = sha256(b"mine");
+        let names = ["../precious.csv", "notes.txt", "features_old.csv", "../features.csv"];
+        fs::write(out.join("features_old.csv"), "an older campaign's").unwrap();
+        let lines: String = names.iter().map(|name| format!("{sum}  {name}\n")).collect();
+        fs::write(out.join(MANIFEST), lines).unwrap();
+        Folder::take(&out, "").unwrap().publish(vec![("plan.toml", b"A".to_vec())]).unwrap();
+        assert!(others.iter().all(|place| place.exists()));
+        assert!(!out.join("features_old.csv").exists());
     }
 }

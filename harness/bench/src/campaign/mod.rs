@@ -181,6 +181,7 @@ impl Campaign {
         });
         let jobs = budget::jobs(self.jobs, bytes.max().unwrap_or(0))?;
         watch(Progress::Begins { runs: cases.len(), steps });
+        let jobs = jobs.min(cases.len().max(1));
         let pool = rayon::ThreadPoolBuilder::new().num_threads(jobs).build()?;
         let warned = Mutex::new(BTreeSet::new());
         // once of many runs, whose warnings differ in numbers at most
