@@ -1,5 +1,5 @@
 /* The FMU of model.c with a fault that harms its host, when it is loaded (-DAT_LOAD) or in its first
- * step (-DAT_STEP). -DHARM=… says which. */
+ * step (-DAT_STEP) or when a value is read (-DAT_GET). -DHARM=… says which. */
 #define _GNU_SOURCE
 #include <signal.h>
 #include <unistd.h>
@@ -9,8 +9,12 @@
 #endif
 
 #define fmi2DoStep step_of_model
+#ifdef AT_GET
+#define fmi2GetReal get_real_of_model
+#endif
 #include "../all/model.c"
 #undef fmi2DoStep
+#undef fmi2GetReal
 
 enum { EXIT = 1, ABORT, CRASH, LOOP, SLEEP, MEMORY, SHARED, STACK, DISK, PRINT, CHILDREN, STOP, FLUSH };
 
@@ -93,3 +97,11 @@ Status fmi2DoStep(Component m, double t, double h, int forget)
 #endif
     return step_of_model(m, t, h, forget);
 }
+
+#ifdef AT_GET
+Status fmi2GetReal(Component m, const unsigned *references, size_t n, double *values)
+{
+    harm();
+    return get_real_of_model(m, references, n, values);
+}
+#endif

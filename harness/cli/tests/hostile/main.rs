@@ -367,3 +367,13 @@ fn what_loading_changes_for_the_host_is_told() {
     let said = String::from_utf8_lossy(&said);
     assert!(said.contains("warning: loading a.fmu has changed"), "{said}");
 }
+
+#[test]
+fn a_value_that_is_never_returned_ends_a_run_as_a_step_does() {
+    const LOOP: u32 = 4;
+    let bench = Bench::new();
+    std::fs::write(bench.path("a.fmu"), harmful(LOOP, "AT_GET")).unwrap();
+    let run = ["run", "--call-limit", "0.5", "--profile", "zero", "--stop", "0.1"];
+    let said = bench.fails(&[&run[..], &["--fmu", "a.fmu", "--out", "a.csv"]].concat());
+    assert!(said.contains("has not returned within 0.5 s"), "{said}");
+}
