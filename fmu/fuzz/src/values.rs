@@ -82,6 +82,9 @@ fn set_something<M: Model>(instance: &mut Instance<M>, data: &mut Unstructured) 
         return Ok(());
     }
     let value = match scalar.variable.kind {
+        Kind::Real(quantity) if scalar.variable.causality == Causality::Input => {
+            Value::Real(within(everyday(quantity), data)?)
+        }
         Kind::Real(quantity) => Value::Real(within(quantity, data)?),
         Kind::Integer { .. } => Value::Integer(data.int_in_range(-1..=11)?),
         Kind::Enumeration(of) => Value::Integer(data.int_in_range(0..=of.items.len() as i32 + 1)?),
@@ -92,6 +95,12 @@ fn set_something<M: Model>(instance: &mut Instance<M>, data: &mut Unstructured) 
         assert!(to_bytes(instance) == before, "a refused value has changed something");
     }
     Ok(())
+}
+
+/// An input within what a simulation sees: at 1e12 N.m a step uses up all that it is allowed.
+fn everyday(quantity: Quantity) -> Quantity {
+    let near = |limit: Option<f64>| limit.filter(|limit| limit.abs() <= 1e6);
+    Quantity { min: near(quantity.min), max: near(quantity.max), ..quantity }
 }
 
 /// A value of a quantity: at its limits, between them, of its order of magnitude, or anything.

@@ -155,8 +155,7 @@ impl Motion {
             g: [f64::NAN; 2],
             near_weightless: 0.0,
             tolerance,
-            // A fuzzer's sanitizer makes each step dear.
-            max_steps: if cfg!(fuzzing) { p.solver.max_steps.min(200) } else { p.solver.max_steps },
+            max_steps: p.solver.max_steps,
             hub,
             tau: [0.0; 2],
             inertia: ZERO,

@@ -147,9 +147,15 @@ pub fn from_bytes<M: Model>(version: Version, bytes: &[u8]) -> Result<Instance<M
             for number in ramp(&mut saved.inputs, scalar.element) {
                 *number = rest.finite(scalar.variable.name)?;
             }
-            let [value, _] = ramp(&mut saved.inputs, scalar.element);
+            let [value, slope] = ramp(&mut saved.inputs, scalar.element);
             if let Some(problem) = scalar.problem(Value::Real(*value)) {
                 return Err(format!("the saved state is damaged: {problem}"));
+            }
+            if !scalar.variable.allows_rate(*slope) {
+                let name = scalar.name();
+                return Err(format!(
+                    "the saved state is damaged: derivative of {name} = {slope:?}"
+                ));
             }
         }
     }
