@@ -61,7 +61,7 @@ SCIPY = {"SciPy RK45": ("RK45", [1e-4, 1e-6]), "SciPy LSODA": ("LSODA", [1e-5, 1
 
 def build() -> Path:
     """Build the Rust side and return its program."""
-    command = ["cargo", "build", "--release", "-p", "bench", "--example", "work_precision"]
+    command = ["cargo", "build", "--release", "-p", "experiments", "--example", "work_precision"]
     done = subprocess.run(
         [*command, "--message-format=json"], cwd=ROOT, stdout=subprocess.PIPE, text=True
     )

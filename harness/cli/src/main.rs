@@ -27,10 +27,10 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
-use bench::campaign::Campaign;
-use bench::plan::Plan;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use commands::*;
+use experiments::campaign::Campaign;
+use experiments::plan::Plan;
 use host::guard::{self, Cause, Limits, Output};
 
 /// Packs FMUs, checks them, simulates campaigns and reports.

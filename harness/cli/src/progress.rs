@@ -1,7 +1,7 @@
 //! Progress bars on a terminal; the libraries only tell how far they are.
 
 use anyhow::Result;
-use bench::progress::Progress;
+use experiments::progress::Progress;
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// A bar for steps of one run.

@@ -11,7 +11,7 @@
 //! 10 % asymmetric and whose gyro has a bias of 2 mrad/s and a delay of 5 ms, which neither way is told.
 //! The compensated way knows everything else exactly: the friction, the hub's inertia, and d, h and ζ as starts.
 
-use bench::profile::Torque;
+use experiments::profile::Torque;
 use host::fmi2::Fmu;
 use identify::compensation::{self, Friction};
 use identify::methods::output_error::identify;

@@ -12,9 +12,9 @@
 
 use std::f64::consts::PI;
 
+use analysis::linear::{Linear, Mode};
+use analysis::transfer_function::fit_time;
 use anyhow::{Result, ensure};
-use bench::analysis::linear::{Linear, Mode};
-use bench::analysis::transfer_function::fit_time;
 use formulas::cylinder::{Pendulum, pendulum};
 use serde::Serialize;
 

@@ -3,9 +3,9 @@
 
 use std::f64::consts::TAU;
 
+use analysis::linear::Linear;
+use analysis::random::Random;
 use anyhow::{Result, ensure};
-use bench::analysis::linear::Linear;
-use bench::random::Random;
 use host::budget;
 use host::fmi2::Fmu;
 use nalgebra::Matrix5;
@@ -242,7 +242,7 @@ pub fn cramer_rao(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench::analysis::linear::Mode;
+    use analysis::linear::Mode;
 
     #[test]
     fn a_multisine_has_odd_lines_alone_and_its_peak() {

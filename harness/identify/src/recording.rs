@@ -434,7 +434,7 @@ mod tests {
 
     #[test]
     fn a_gyro_slower_than_the_rows_is_seen_by_its_repeats() {
-        let mut random = bench::random::Random::new(1, 0);
+        let mut random = analysis::random::Random::new(1, 0);
         let mut noisy = rigid();
         noisy.rate.iter_mut().for_each(|w| *w += 4e-4 * random.normal());
         assert!(fresh(&noisy.rate).is_none());
@@ -457,7 +457,7 @@ mod tests {
     #[test]
     fn the_noise_level_is_that_of_the_noise() {
         let mut noisy = rigid();
-        let mut random = bench::random::Random::new(1, 0);
+        let mut random = analysis::random::Random::new(1, 0);
         noisy.rate.iter_mut().for_each(|w| *w += 4e-4 * random.normal());
         // relative standard error of the median of 15,000 squares: 2 %
         assert!(

@@ -158,7 +158,7 @@ mod tests {
 
     #[test]
     fn white_noise_passes_and_what_is_left_of_a_signal_does_not() {
-        let mut random = bench::random::Random::new(5, 0);
+        let mut random = analysis::random::Random::new(5, 0);
         let time: Vec<f64> = (0..50_000).map(|k| 0.02 * f64::from(k)).collect();
         let torque: Vec<f64> = time.iter().map(|t| 0.1 * (t * (8.0 + 0.005 * t)).sin()).collect();
         let white: Vec<f64> = time.iter().map(|_| random.normal()).collect();

@@ -10,13 +10,13 @@
 
 use std::f64::consts::{PI, TAU};
 
-use anyhow::{Context, Result, ensure};
-use bench::analysis::features::Features;
-use bench::analysis::transfer_function::TransferFunction;
-use bench::analysis::{
+use analysis::features::Features;
+use analysis::transfer_function::TransferFunction;
+use analysis::{
     Complex64, FrequencyResponse, logarithmic_grid, spa,
     welch::{self, Spectra},
 };
+use anyhow::{Context, Result, ensure};
 use formulas::cylinder::tank_of_first_mode;
 use signals::fourier::Forward;
 
@@ -390,8 +390,8 @@ fn friction(recordings: &[Recording]) -> Start {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench::analysis::BAND;
-    use bench::analysis::linear::{Linear, Mode};
+    use analysis::BAND;
+    use analysis::linear::{Linear, Mode};
 
     const BENCH: Bench = Bench { arm: 0.225, density: 1000.0, gravity: 9.81 };
 

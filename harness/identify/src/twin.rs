@@ -2,8 +2,8 @@
 //! and what a planned experiment would record.
 
 use anyhow::{Result, bail, ensure};
-use bench::profile::{Profile, Torque};
-use bench::run::Run;
+use experiments::profile::{Profile, Torque};
+use experiments::run::Run;
 use host::fmi2::Fmu;
 
 use crate::design::Multisine;
@@ -159,7 +159,7 @@ impl Twin {
         };
         let run = Run {
             settings: self.settings(&tau, seed),
-            input: Some(bench::run::TORQUE.into()),
+            input: Some(experiments::run::TORQUE.into()),
             torque: heard.clone(),
             others: Vec::new(),
             step: step / f64::from(parts),
@@ -174,8 +174,10 @@ impl Twin {
         let friction = friction.map(reference).into_iter().collect::<Result<Vec<u32>>>()?;
         let mut cold = vec![0.0; friction.len()];
         instance.get_real(&friction, &mut cold)?;
-        let (input, read) =
-            (reference(bench::run::TORQUE)?, [reference("omega_imu")?, reference("omega_dot")?]);
+        let (input, read) = (
+            reference(experiments::run::TORQUE)?,
+            [reference("omega_imu")?, reference("omega_dot")?],
+        );
         let (mut rate, mut rocking) = (Vec::with_capacity(time.len()), Rocking::default());
         for row in 0..=rows {
             let mut now = [0.0; 2];

@@ -1,6 +1,6 @@
 //! The methods beside the output-error fit, on recordings of the FMU itself.
 
-use bench::profile::Torque;
+use experiments::profile::Torque;
 use host::fmi2::Fmu;
 use identify::methods::acceleration::{self, Weights};
 use identify::recording::Recording;

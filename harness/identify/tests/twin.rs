@@ -1,6 +1,6 @@
 //! Recordings of the FMU itself, with its gyro's noise, identified with nothing told.
 
-use bench::profile::{Profile, Torque};
+use experiments::profile::{Profile, Torque};
 use host::fmi2::Fmu;
 use identify::fit::{Differences, Problem};
 use identify::methods::output_error::identify;

@@ -3,9 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail, ensure};
-use bench::campaign::{Campaign, Folder};
-use bench::plan::{self, Plan, Sweeps};
-use bench::report;
+use experiments::campaign::{Campaign, Folder};
+use experiments::plan::{self, Plan, Sweeps};
 use host::fmi2::Fmu;
 use host::{budget, guard};
 
@@ -187,7 +186,7 @@ pub fn drive(fmu: &Fmu, campaign: &Campaign, folder: Folder) -> Result<()> {
     bar.finish_and_clear();
     let mut files = campaign.tables(fmu, &results)?;
     files.push(("plan.toml", campaign.plan.text.clone().into_bytes()));
-    files.push(("report.html", report::page(campaign, fmu, &results).into_bytes()));
+    files.push(("report.html", report::campaign::page(campaign, fmu, &results).into_bytes()));
     folder.publish(files)?;
     let (all, reused) = results.counts();
     println!("{} runs simulated, {reused} reused", all - reused);

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use analysis::linear::{Linear, Mode};
 use anyhow::{Result, bail, ensure};
-use bench::analysis::linear::{Linear, Mode};
-use bench::profile::Written;
+use experiments::profile::Written;
 use host::budget;
 use host::fmi2::Fmu;
 use identify::design::{self, Multisine, Wheel};

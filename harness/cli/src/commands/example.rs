@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use anyhow::Result;
-use bench::example;
+use experiments::example;
 use host::fmi2::Fmu;
 
 use super::DEFAULT_FMU;

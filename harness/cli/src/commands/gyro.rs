@@ -1,10 +1,13 @@
 //! `hubslosh gyro`.
 
+use std::collections::BTreeMap;
+use std::io::Write;
 use std::path::PathBuf;
 
 use anyhow::Result;
-use bench::gyro::Recording;
+use experiments::gyro::Recording;
 use host::fmi2::Fmu;
+use host::output;
 
 use super::{DEFAULT_FMU, setting};
 use crate::progress;
@@ -44,13 +47,14 @@ impl GyroArgs {
         let found =
             recording.characterise(&Fmu::open(&self.fmu)?, &|news| progress::show(&bar, news))?;
         bar.finish_and_clear();
-        found.write(&self.out)?;
+        output::directory(&self.out)?;
+        let [table, picture] = ["allan.csv", "allan.svg"].map(|name| self.out.join(name));
+        found.table().write(&table, &BTreeMap::new())?;
+        output::atomically(&picture, |file| {
+            Ok(file.write_all(report::gyro::allan_deviations(&found).as_bytes())?)
+        })?;
         print!("{}", found.text());
-        println!(
-            "{}\n{}",
-            self.out.join("allan.csv").display(),
-            self.out.join("allan.svg").display()
-        );
+        println!("{}\n{}", table.display(), picture.display());
         Ok(())
     }
 }

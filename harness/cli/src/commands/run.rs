@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use anyhow::{Result, bail};
-use bench::campaign::{Range, WAVE, stored_columns};
-use bench::profile::{self, Written};
-use bench::run::{Run, driven, histories};
+use experiments::campaign::{Range, WAVE, stored_columns};
+use experiments::profile::{self, Written};
+use experiments::run::{Run, driven, histories};
 use host::description::ModelDescription;
 use host::guard;
 

@@ -1,8 +1,8 @@
 //! `hubslosh scale`.
 
 use anyhow::Result;
-use bench::scaling::{self, Flight};
 use clap::Subcommand;
+use experiments::scaling::{self, Flight};
 use formulas::similarity::Liquid;
 
 /// Computes the flight tank that the bench represents (similarity): Bond numbers, Froude factors.

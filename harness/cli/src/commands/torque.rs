@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
-use bench::profile::{self, Written};
-use bench::run::Run;
+use experiments::profile::{self, Written};
+use experiments::run::Run;
 
 use super::{check_out, write_out};
 

@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use bench::campaign::{Folder, MANIFEST};
-use bench::random::Random;
+use analysis::random::Random;
+use experiments::campaign::{Folder, MANIFEST};
 use host::output::sha256;
 use pack::packed_for_tests;
 

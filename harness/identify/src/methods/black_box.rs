@@ -14,8 +14,8 @@
 
 use std::f64::consts::TAU;
 
+use analysis::transfer_function::fit_time;
 use anyhow::{Result, ensure};
-use bench::analysis::transfer_function::fit_time;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -371,8 +371,8 @@ pub fn identify(recording: &Recording, held_out: Option<&Recording>) -> Result<F
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bench::analysis::linear::{Linear, Mode};
-    use bench::random::Random;
+    use analysis::linear::{Linear, Mode};
+    use analysis::random::Random;
 
     #[test]
     fn armax_finds_a_noisy_linear_bench_where_arx_of_its_order_does_not() {

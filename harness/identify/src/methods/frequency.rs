@@ -24,9 +24,9 @@
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
+use analysis::Complex64;
+use analysis::transfer_function::TransferFunction;
 use anyhow::{Context, Result, ensure};
-use bench::analysis::Complex64;
-use bench::analysis::transfer_function::TransferFunction;
 use nalgebra::DMatrix;
 use serde::Serialize;
 use signals::fourier::Forward;
@@ -375,8 +375,8 @@ fn words(fit: &Fit, described: bool, converged: bool) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::design::Multisine;
-    use bench::analysis::linear::{Linear, Mode};
-    use bench::random::Random;
+    use analysis::linear::{Linear, Mode};
+    use analysis::random::Random;
 
     const BENCH: Bench = Bench { arm: 0.225, density: 1000.0, gravity: 9.81 };
 

@@ -10,8 +10,8 @@
 //! Coherence cannot do this: it falls by either. The distortion of an excited line is that of the detection
 //! lines around it, and belongs, with the noise, to the standard deviation of the response there.
 
+use analysis::Complex64;
 use anyhow::{Result, ensure};
-use bench::analysis::Complex64;
 use serde::Serialize;
 use signals::fourier::Forward;
 
@@ -236,8 +236,8 @@ fn words(levels: &Levels, (odd, even): (f64, f64)) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::design;
-    use bench::analysis::linear::{Linear, Mode};
-    use bench::random::Random;
+    use analysis::linear::{Linear, Mode};
+    use analysis::random::Random;
 
     /// Seven periods of 50 s of a linear bench whose gyro is bent by `square` ω² + `cube` ω³.
     fn recorded(square: f64, cube: f64) -> Recording {

@@ -2,9 +2,9 @@
 
 use std::fmt::Write as _;
 
-use bench::analysis::welch::{Segments, Spectra};
-use bench::svg::{Axis, Chart, Series, Style};
+use analysis::welch::{Segments, Spectra};
 use host::html::escape;
+use report::svg::{Axis, Chart, Series, Style};
 
 use super::Residual;
 use super::output_error::Identification;

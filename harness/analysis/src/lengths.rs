@@ -1,0 +1,70 @@
+//! How long windows, lags and segments are. They follow from the torque's own band and duration, so
+//! that a spacecraft whose slosh takes 20 s is seen as sharply as a bench's, whose takes 0.4 s. For
+//! the thesis's sweep, 1.25 to 3.5 Hz in 2700 s, they are 24 cycles, 200 s and 20 s.
+
+use crate::sweep::Sweep;
+use crate::{BAND, spa, welch};
+
+/// Samples in a cycle of the band's highest frequency that an estimate of the whole record needs;
+/// the thesis's sweep has 14.3.
+const SAMPLES: f64 = 14.0;
+/// Of the record, the most that a lag may be.
+const MOST_LAG: f64 = 0.5;
+
+/// Lengths for estimates from a whole record, s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lengths {
+    /// Longest lag of [`spa`]: as many cycles of the band's middle as 200 s are of the thesis's, and
+    /// at most half of the record. It resolves 1/lag.
+    pub lag: f64,
+    /// Segments for coherence: so long that six half-overlapping ones see each frequency of the
+    /// sweep, L = sqrt(1/(3 rate)); of noise, as many cycles as 20 s are of the thesis's.
+    pub segment: f64,
+    /// Samples whose mean is taken as one, in torque and rate alike.
+    pub decimation: usize,
+}
+
+impl Lengths {
+    /// Of a record of `duration` s sampled every `step` s whose torque has power in the band, Hz.
+    pub fn of(band: (f64, f64), sweep: Option<&Sweep>, duration: f64, step: f64) -> Self {
+        let middle = |(from, to): (f64, f64)| (from * to).sqrt();
+        let slower = middle(BAND) / middle(band);
+        let rate = sweep.map(|sweep| (sweep.f1 - sweep.f0).abs() / sweep.duration);
+        Lengths {
+            lag: (spa::LAG * slower).min(MOST_LAG * duration),
+            segment: rate.map_or(welch::SEGMENT * slower, |rate| (1.0 / (3.0 * rate)).sqrt()),
+            decimation: ((1.0 / (step * band.1 * SAMPLES)) as usize).max(1),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Lengths;
+    use crate::demodulation::cycles;
+    use crate::sweep::{Law, Sweep};
+
+    #[test]
+    fn the_thesis_has_its_own_lengths() {
+        for law in [Law::Exponential, Law::Linear] {
+            let sweep = Sweep { law, ..Sweep::THESIS };
+            let lengths = Lengths::of(sweep.band(), Some(&sweep), 2700.0, 0.02);
+            let expected = Lengths { lag: 200.0, segment: 20.0, decimation: 1 };
+            assert_eq!(lengths.lag, expected.lag);
+            assert!((lengths.segment - 20.0).abs() < 1e-12 && lengths.decimation == 1);
+            assert!([1.25, 2.4, 3.5].iter().all(|&f| cycles(&sweep, f) == 24.0));
+        }
+    }
+
+    #[test]
+    fn a_slow_spacecraft_has_longer_ones_and_a_fast_sweep_fewer_cycles() {
+        let slow = Sweep { f0: 0.01, f1: 0.3, duration: 40_000.0, ..Sweep::THESIS };
+        let lengths = Lengths::of(slow.band(), Some(&slow), 40_000.0, 0.1);
+        // 200 s times sqrt(1.25 3.5)/sqrt(0.01 0.3); 10 Hz over 0.3 Hz is 33 samples a cycle
+        assert!((lengths.lag - 7637.6).abs() < 0.1, "{lengths:?}");
+        assert_eq!(lengths.decimation, 2);
+        let fast = Sweep { duration: 2700.0, ..slow };
+        assert_eq!(Lengths::of(fast.band(), Some(&fast), 2700.0, 0.1).lag, 1350.0);
+        assert_eq!(cycles(&fast, 0.045), 3.0);
+    }
+}

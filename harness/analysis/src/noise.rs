@@ -1,0 +1,154 @@
+//! How much of an output no linear response to the input explains: gyro noise, what dry friction and
+//! a nonlinear liquid add. From it follows how uncertain a frequency response is.
+//!
+//! The local rational method (McKelvey and Guérin, *Non-parametric frequency response estimation
+//! using a local rational model*, SYSID 2012; Pintelon and Schoukens, *System Identification: A
+//! Frequency Domain Approach*, 2nd ed., 2012, chapter 7): at the line k of the spectra of the whole record and
+//! n lines to either side of it,
+//!
+//! ```text
+//! (1 + a r) Y(k + r) = (b0 + b1 r + b2 r²) U(k + r) + t0 + t1 r + t2 r² + (1 + a r) V(k + r),   |r| ≤ n
+//! ```
+//!
+//! by least squares. The rational function follows a resonance as narrow as a few lines, the
+//! polynomial in t what the record's ends leave in the spectra. What is left is V.
+
+use nalgebra::{SMatrix, SVector};
+use signals::fourier::Forward;
+
+use crate::Complex64;
+
+/// Lines to either side, n.
+const SIDE: usize = 6;
+const LINES: usize = 2 * SIDE + 1;
+/// b0, b1, b2, t0, t1, t2, a.
+const UNKNOWNS: usize = 7;
+
+/// Two-sided power spectral density of V (unit of the output squared, times s) at frequencies (Hz)
+/// of signals sampled every `step` s; NaN where nothing can be said.
+pub fn power(step: f64, input: &[f64], output: &[f64], frequencies: &[f64]) -> Vec<f64> {
+    // N steps have N + 1 samples: N is as a rule a round number, whose transform is twice as fast
+    let count = input.len() / 2 * 2;
+    let transform = Forward::new(count);
+    let (u, y) = (transform.of(input[..count].to_vec()), transform.of(output[..count].to_vec()));
+    let mut last: Option<(usize, f64)> = None;
+    let at = |frequency: &f64| {
+        let k = (frequency * step * count as f64).round() as usize;
+        if k < SIDE || k + SIDE >= u.len() {
+            return f64::NAN;
+        }
+        match last {
+            Some((same, power)) if same == k => power,
+            _ => {
+                let left = unexplained(&u[k - SIDE..=k + SIDE], &y[k - SIDE..=k + SIDE]);
+                let power = left.map_or(f64::NAN, |left| left * step / count as f64);
+                last = Some((k, power));
+                power
+            }
+        }
+    };
+    frequencies.iter().map(at).collect()
+}
+
+/// Mean of |V|² over the lines.
+fn unexplained(u: &[Complex64], y: &[Complex64]) -> Option<f64> {
+    let mean = |x: &[Complex64]| x.iter().map(|x| x.norm()).sum::<f64>() / LINES as f64;
+    let (scale_u, scale_y) = (mean(u), mean(y));
+    if scale_u == 0.0 || scale_y == 0.0 {
+        return None;
+    }
+    let place = |i: usize| (i as f64 - SIDE as f64) / SIDE as f64;
+    let a = SMatrix::<Complex64, LINES, UNKNOWNS>::from_fn(|i, j| match j {
+        0..=2 => u[i] / scale_u * place(i).powi(j as i32),
+        3..=5 => place(i).powi(j as i32 - 3).into(),
+        _ => -y[i] / scale_y * place(i),
+    });
+    let b = SVector::<Complex64, LINES>::from_fn(|i, _| y[i] / scale_y);
+    let qr = a.qr();
+    let x = qr.r().solve_upper_triangular(&(qr.q().adjoint() * b))?;
+    let left = (b - a * x).norm_squared() / (LINES - UNKNOWNS) as f64;
+    // what is left is (1 + a r) V
+    let weight = (0..LINES).map(|i| (1.0 + x[6] * place(i)).norm_sqr()).sum::<f64>() / LINES as f64;
+    let power = left / weight * scale_y * scale_y;
+    power.is_finite().then_some(power)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::features::Features;
+    use crate::linear::Linear;
+    use crate::sweep::Sweep;
+    use crate::{BAND, demodulation, lengths, logarithmic_grid, spa};
+
+    const STEP: f64 = 0.02;
+
+    /// The thesis's sweep of some amplitude, N·m, and the rate of the linear bench.
+    fn sweep(amplitude: f64) -> (Sweep, Vec<f64>, Vec<f64>) {
+        let sweep = Sweep { amplitude, ..Sweep::THESIS };
+        let torque: Vec<f64> = (0..135_000).map(|k| sweep.torque(f64::from(k) * STEP)).collect();
+        let rate = Linear::bench_10_cm(0.0029757).simulate(STEP, &torque, 0.0);
+        (sweep, torque, rate)
+    }
+
+    #[test]
+    fn a_linear_plant_leaves_the_noise_that_was_added_and_nothing_without() {
+        let (_, torque, mut rate) = sweep(0.1);
+        let grid = logarithmic_grid((2.0, 3.0), 200);
+        let clean = power(STEP, &torque, &rate, &grid);
+        // the thesis's gyro: 5.75e-5 rad/s/√Hz
+        let density = 5.75e-5_f64.powi(2);
+        // antiresonance and resonance included: four decades below the gyro's noise
+        assert!(clean.iter().all(|s| *s < 1e-4 * density), "{clean:?}");
+        let mut random = crate::random::Random::new(3, 0);
+        rate.iter_mut().for_each(|rate| *rate += (density / STEP).sqrt() * random.normal());
+        let noisy = power(STEP, &torque, &rate, &grid);
+        let mean = noisy.iter().sum::<f64>() / noisy.len() as f64;
+        // 200 of 2,700 lines, six degrees of freedom of each: 4 %; neighbours share lines
+        assert!((mean / density - 1.0).abs() < 0.15, "{mean:e}");
+    }
+
+    #[test]
+    fn the_scatter_over_noises_is_the_stated_deviation() {
+        // a small one of the thesis's torques, at which the gyro's noise is seen; 24 noises
+        let (sweep, torque, rate) = sweep(0.05);
+        let near = logarithmic_grid((2.25, 2.6), 300);
+        let lag = lengths::Lengths::of(BAND, Some(&sweep), 2700.0, STEP).lag;
+        let time: Vec<f64> = (0..torque.len()).map(|k| k as f64 * STEP).collect();
+        let mut found = vec![Vec::new(); 4];
+        let mut stated = vec![Vec::new(); 4];
+        for seed in 0..24 {
+            let mut random = crate::random::Random::new(seed, 0);
+            let noisy: Vec<f64> = rate.iter().map(|r| r + 4.066e-4 * random.normal()).collect();
+            let left = power(STEP, &torque, &noisy, &near);
+            let swept =
+                demodulation::frequency_responses(&sweep, &time, &torque, [&noisy[..]], &near);
+            let [response] = &swept.responses;
+            let deviation = demodulation::deviation(response, &left, &swept.noise_gain);
+            let whole = spa::Estimate::of(STEP, &torque, &noisy, &near, lag);
+            for (i, (response, deviation, slope)) in [
+                (response, deviation, demodulation::slope(&sweep, 2.4)),
+                (&whole.response, whole.deviation(&left), whole.slope()),
+            ]
+            .into_iter()
+            .enumerate()
+            {
+                let features = Features::of(response);
+                let std = features.deviations(response, &deviation, |_| slope);
+                found[2 * i].push(features.f_dip.unwrap());
+                found[2 * i + 1].push(features.f_res.unwrap());
+                stated[2 * i].push(std.f_dip.unwrap());
+                stated[2 * i + 1].push(std.f_res.unwrap());
+            }
+        }
+        let mut ratios = Vec::new();
+        for (found, stated) in found.iter().zip(&stated) {
+            let mean = found.iter().sum::<f64>() / 24.0;
+            let scatter = (found.iter().map(|f| (f - mean).powi(2)).sum::<f64>() / 23.0).sqrt();
+            let stated = stated.iter().sum::<f64>() / 24.0;
+            ratios.push(stated / scatter);
+        }
+        // 24 noises tell a scatter to 15 %, three of which are allowed
+        assert!(ratios.iter().all(|ratio| (0.6..1.7).contains(ratio)), "{ratios:?}");
+    }
+}

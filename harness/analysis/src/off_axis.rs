@@ -1,0 +1,77 @@
+//! How much of the liquid's force is not about the axis (thesis 6.3.6, as far as a hub that can't
+//! tilt shows it).
+//!
+//! The thesis takes the rates that a gyro reads about x and y. What makes a platform tilt is the
+//! liquid's force on the tank: the tangential force F_t turns the hub, the radial force F_r only
+//! pulls at the bearing. So F_r stands for what is off the axis, F_t for what is on it:
+//!
+//! ```text
+//! fraction(t) = F_r² / (F_r² + F_t²)      leakage(f) = r |F_r(f)| / |τ(f)|
+//! ```
+//!
+//! with the Fourier coefficients at the sweep's phase in the leakage (by demodulation) and r the
+//! tank's distance from the axis. A wave in a plane pulls radially at twice the sweep's frequency
+//! only, by its centripetal force: no leakage. A circling wave has the fraction 1/2 on the average.
+
+use crate::FrequencyResponse;
+
+/// Off-axis figures of a sweep.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct OffAxis {
+    /// Median of the fraction over the samples, 0 to 1: how the thesis condenses it.
+    pub median: f64,
+    /// Σ F_r² / Σ (F_r² + F_t²), 0 to 1: the fraction of the whole record.
+    pub energy: f64,
+    /// Root mean square of the leakage over the frequencies.
+    pub leakage: f64,
+}
+
+impl OffAxis {
+    /// From the forces (N) at every sample and the leakage over the sweep.
+    pub fn of(radial: &[f64], tangential: &[f64], leakage: &[f64]) -> Self {
+        let (mut off, mut all) = (0.0, 0.0);
+        let mut fractions: Vec<f64> = Vec::with_capacity(radial.len());
+        for (r, t) in radial.iter().zip(tangential) {
+            let (r, sum) = (r * r, r * r + t * t);
+            (off, all) = (off + r, all + sum);
+            if sum > 0.0 {
+                fractions.push(r / sum);
+            }
+        }
+        let middle = fractions.len() / 2;
+        let median = if fractions.is_empty() {
+            0.0
+        } else {
+            *fractions.select_nth_unstable_by(middle, f64::total_cmp).1
+        };
+        let squares: f64 = leakage.iter().map(|l| l * l).sum();
+        OffAxis {
+            median,
+            energy: if all > 0.0 { off / all } else { 0.0 },
+            leakage: (squares / leakage.len().max(1) as f64).sqrt(),
+        }
+    }
+}
+
+/// The leakage at each frequency, from the radial force's response to the torque (N per N·m) and
+/// the tank's distance from the axis, m.
+pub fn leakage(radial: &FrequencyResponse, arm: f64) -> Vec<f64> {
+    radial.response.iter().map(|h| arm * h.norm()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_circling_force_is_half_off_the_axis_and_a_tangential_one_not_at_all() {
+        let turn = |k: usize| (k as f64 * std::f64::consts::TAU / 1000.0).sin_cos();
+        let (sine, cosine): (Vec<f64>, Vec<f64>) = (0..1000).map(turn).unzip();
+        let circle = OffAxis::of(&sine, &cosine, &[3.0, 4.0]);
+        // the median lies between two samples' fractions, 6e-3 apart there
+        assert!((circle.energy - 0.5).abs() < 1e-12 && (circle.median - 0.5).abs() < 1e-2);
+        assert!((circle.leakage - 12.5_f64.sqrt()).abs() < 1e-12);
+        let line = OffAxis::of(&[0.0; 1000], &cosine, &[]);
+        assert_eq!(line, OffAxis::default());
+    }
+}

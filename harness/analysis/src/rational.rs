@@ -1,0 +1,191 @@
+//! A transfer function with three poles and two zeros, fitted to the spectra of a whole record
+//! together with what the record's ends leave in them (Pintelon and Schoukens, *System
+//! Identification: A Frequency Domain Approach*, 2nd ed., 2012, chapter 6): without windows, torque U
+//! and rate Y of a linear plant H = B/A obey
+//!
+//! ```text
+//! A(s) Y = B(s) U + T(s),   s = jω, T of the degree of B
+//! ```
+//!
+//! however fast the sweep and however long the plant still rings behind it. So it tells
+//! antiresonance and resonance apart that lie closer than the record resolves, if the plant is
+//! linear. Least squares relative to |Y|, weighted with the last denominator (Sanathanan and
+//! Koerner).
+
+use std::f64::consts::TAU;
+
+use nalgebra::{DMatrix, DVector};
+use signals::fourier::Forward;
+
+use crate::features::{Deviations, Features};
+use crate::{Complex64, FrequencyResponse};
+
+/// Iterations; ten settle it.
+const ITERATIONS: usize = 20;
+/// The most frequencies that are fitted; of more, some at equal distances.
+const POINTS: usize = 1500;
+
+/// The fitted function.
+#[derive(Clone, Copy, Debug)]
+pub struct Rational {
+    /// Middle of the band, rad/s: the unit of s.
+    unit: f64,
+    /// b2, b1, b0.
+    numerator: [f64; 3],
+    /// a2, a1, a0; s³ has 1.
+    denominator: [f64; 3],
+    /// Root mean square of what the fit leaves, relative to |Y|.
+    pub misfit: f64,
+    /// A root of the covariance of numerator and denominator, one column for each unknown of the fit.
+    spread: [[f64; 6]; 9],
+}
+
+impl Rational {
+    /// Fits torque and rate, sampled every `step` s, between two frequencies, Hz; `None` where there
+    /// is nothing to fit.
+    pub fn fit(step: f64, torque: &[f64], rate: &[f64], (from, to): (f64, f64)) -> Option<Self> {
+        let count = torque.len();
+        let bin = 1.0 / (step * count as f64);
+        let bins = (from / bin).ceil() as usize..=((to / bin) as usize).min(count / 2);
+        let every = (bins.clone().count() / POINTS).max(1);
+        let transform = Forward::new(count);
+        let spectrum =
+            |signal: &[f64]| transform.of(signal.iter().map(|x| x / count as f64).collect());
+        let (u, y) = (spectrum(torque), spectrum(rate));
+        let unit = TAU * (from * to).sqrt();
+        let points: Vec<(Complex64, Complex64, Complex64)> = bins
+            .step_by(every)
+            .map(|k| (Complex64::new(0.0, TAU * k as f64 * bin / unit), u[k], y[k]))
+            .filter(|(_, _, y)| y.norm_sqr() > 0.0)
+            .collect();
+        if points.len() < 20 {
+            return None;
+        }
+        let mut found = Rational {
+            unit,
+            numerator: [0.0; 3],
+            denominator: [0.0; 3],
+            misfit: f64::INFINITY,
+            spread: [[0.0; 6]; 9],
+        };
+        for _ in 0..ITERATIONS {
+            let (mut a, mut b) =
+                (DMatrix::zeros(2 * points.len(), 9), DVector::zeros(2 * points.len()));
+            for (k, &(s, u, y)) in points.iter().enumerate() {
+                let weight = 1.0 / (found.denominator_at(s).norm() * y.norm());
+                let powers = [s * s, s, Complex64::from(1.0)];
+                let entries = [-u, Complex64::from(-1.0), y].into_iter();
+                let entries = entries.flat_map(|x| powers.map(|p| p * x));
+                let right = -y * s * s * s;
+                for (j, entry) in entries.enumerate() {
+                    (a[(2 * k, j)], a[(2 * k + 1, j)]) = (entry.re * weight, entry.im * weight);
+                }
+                (b[2 * k], b[2 * k + 1]) = (right.re * weight, right.im * weight);
+            }
+            let sizes: Vec<f64> = a.column_iter().map(|column| column.norm().max(1e-300)).collect();
+            for (mut column, size) in a.column_iter_mut().zip(&sizes) {
+                column /= *size;
+            }
+            // Householder: the normal equations would lose half of the digits
+            let qr = a.clone().qr();
+            let x = qr.r().solve_upper_triangular(&(qr.q().transpose() * &b))?;
+            let left = (&a * &x - &b).norm() / (b.len() as f64).sqrt();
+            let x: Vec<f64> = x.iter().zip(&sizes).map(|(x, size)| x / size).collect();
+            found.numerator = [x[0], x[1], x[2]];
+            found.denominator = [x[6], x[7], x[8]];
+            found.misfit = left;
+            // the covariance of x is left² (RᵀR)⁻¹
+            let root = qr.r().try_inverse()?;
+            let scale = left * (b.len() as f64 / (b.len() as f64 - 9.0)).sqrt();
+            found.spread = std::array::from_fn(|j| {
+                [0, 1, 2, 6, 7, 8].map(|i| scale * root[(i, j)] / sizes[i])
+            });
+        }
+        found.misfit.is_finite().then_some(found)
+    }
+
+    /// Relative standard deviation of the response on a grid of frequencies (Hz), and that of its
+    /// antiresonance and resonance: each column of the covariance's root moves the coefficients.
+    pub fn deviations(&self, frequencies: &[f64]) -> (Vec<f64>, Deviations) {
+        let nominal = self.frequency_response(frequencies);
+        let found = Features::of(&nominal);
+        let mut squares = vec![0.0; frequencies.len()];
+        let mut moved = [Some(0.0), Some(0.0)];
+        for column in &self.spread {
+            let mut other = *self;
+            for i in 0..3 {
+                other.numerator[i] += column[i];
+                other.denominator[i] += column[i + 3];
+            }
+            let response = other.frequency_response(frequencies);
+            for (i, square) in squares.iter_mut().enumerate() {
+                let (h, nominal) = (response.response[i].norm(), nominal.response[i].norm());
+                *square += (h / nominal).ln().powi(2);
+            }
+            let features = Features::of(&response);
+            for (sum, (new, old)) in
+                moved.iter_mut().zip([(features.f_res, found.f_res), (features.f_dip, found.f_dip)])
+            {
+                *sum = (|| Some((*sum)? + (new? - old?).powi(2)))();
+            }
+        }
+        let [f_res, f_dip] = moved.map(|sum| sum.map(f64::sqrt));
+        (squares.into_iter().map(f64::sqrt).collect(), Deviations { f_res, f_dip })
+    }
+
+    fn denominator_at(&self, s: Complex64) -> Complex64 {
+        let [a2, a1, a0] = self.denominator;
+        ((s + a2) * s + a1) * s + a0
+    }
+
+    /// The response on a grid of frequencies, Hz.
+    pub fn frequency_response(&self, frequencies: &[f64]) -> FrequencyResponse {
+        let [b2, b1, b0] = self.numerator;
+        let response = frequencies.iter().map(|f| {
+            let s = Complex64::new(0.0, TAU * f / self.unit);
+            (b2 * s * s + b1 * s + b0) / self.denominator_at(s)
+        });
+        FrequencyResponse { response: response.collect(), frequency: frequencies.to_vec() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::logarithmic_grid;
+    use crate::sweep::Sweep;
+    use crate::transfer_function::TransferFunction;
+
+    #[test]
+    fn a_record_too_short_to_resolve_them_still_tells_antiresonance_from_resonance() {
+        // 800 kg m2: poles of the same plant as zeros and poles of a transfer function
+        let tf = TransferFunction {
+            numerator: [1.0 / 800.0, 2.0 * 0.004 * 0.2752 / 800.0, 0.2752 * 0.2752 / 800.0],
+            real_pole: 1e-4,
+            pole_omega: 0.2827,
+            pole_damping: 0.0042,
+        };
+        let sweep = Sweep { f0: 0.01, f1: 0.3, duration: 900.0, ..Sweep::THESIS };
+        let step = 0.2;
+        let torque: Vec<f64> = (0..4500).map(|k| sweep.torque(f64::from(k) * step)).collect();
+        let rate = tf.simulate(step, &torque);
+        let band = (0.01, 0.3);
+        let found = Rational::fit(step, &torque, &rate, band).unwrap();
+        let features = Features::of(&found.frequency_response(&logarithmic_grid(band, 2000)));
+        let (antiresonance, resonance) = (0.2752 / TAU, 0.2827 / TAU);
+        // 1.1 mHz of a record have little more than one period; a thousandth of the frequency is
+        // what sampling leaves
+        assert!((features.f_dip.unwrap() / antiresonance - 1.0).abs() < 2e-3, "{features:?}");
+        assert!((features.f_res.unwrap() / resonance - 1.0).abs() < 2e-3, "{features:?}");
+        assert!(found.misfit < 0.2, "{}", found.misfit);
+    }
+
+    #[test]
+    fn what_is_no_transfer_function_misfits() {
+        let mut random = crate::random::Random::new(7, 0);
+        let mut noise = || (0..4000).map(|_| random.normal()).collect::<Vec<_>>();
+        let (u, y) = (noise(), noise());
+        let found = Rational::fit(0.1, &u, &y, (0.1, 2.0)).unwrap();
+        assert!(found.misfit > 0.6, "{}", found.misfit);
+    }
+}

@@ -1,0 +1,88 @@
+//! The thesis's linear model of a run, how well it fits, and what it leaves (6.3.2 to 6.3.5).
+
+use crate::FrequencyResponse;
+use crate::features::Features;
+use crate::transfer_function::{TransferFunction, fit_time};
+use crate::welch::{Segments, Spectra};
+
+/// A transfer function fitted to a run, and what it leaves of the run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ModelFit {
+    /// Three poles, two zeros.
+    pub model: TransferFunction,
+    /// Fit in the frequency domain, %.
+    pub fit_frequency: f64,
+    /// Fit in the time domain, %.
+    pub fit_time: f64,
+    /// Mean coherence of residual and torque between antiresonance and resonance, if there are
+    /// such.
+    pub coherence: Option<f64>,
+    /// Skewness of the residual.
+    pub skewness: f64,
+    /// Kurtosis of the residual; a Gaussian has 3.
+    pub kurtosis: f64,
+}
+
+impl ModelFit {
+    /// Fits the model to the measured response and drives it with the run's own torque.
+    /// Signals are sampled every `step` s; `None` where there is no response to fit. Also returns
+    /// the spectra of torque and residual, in segments of `segment` s.
+    pub fn of(
+        step: f64,
+        segment: f64,
+        torque: &[f64],
+        rate: &[f64],
+        measured: &FrequencyResponse,
+        features: &Features,
+    ) -> Option<(Self, Spectra)> {
+        let model = TransferFunction::fit(measured)?;
+        let mean = rate.iter().sum::<f64>() / rate.len() as f64;
+        let forced = model.simulate(step, torque);
+        let missing: Vec<f64> = rate.iter().zip(&forced).map(|(y, m)| y - mean - m).collect();
+        let free = model.free_answer(step, &missing);
+        let residual: Vec<f64> = missing.iter().zip(&free).map(|(e, f)| e - f).collect();
+        let answer: Vec<f64> = forced.iter().zip(&free).map(|(m, f)| mean + m + f).collect();
+        let (skewness, kurtosis) = skewness_and_kurtosis(&residual);
+        let spectra = Spectra::of(step, torque, &residual, Segments::Seconds(segment));
+        let fit = ModelFit {
+            model,
+            fit_frequency: model.fit_frequency(measured),
+            fit_time: fit_time(rate, &answer),
+            coherence: features
+                .f_dip
+                .zip(features.f_res)
+                .map(|(antiresonance, resonance)| spectra.mean_coherence(antiresonance, resonance)),
+            skewness,
+            kurtosis,
+        };
+        Some((fit, spectra))
+    }
+}
+
+/// Skewness and kurtosis of a signal: the means of z³ and z⁴, z the signal less its mean
+/// over its standard deviation. A Gaussian has 0 and 3.
+pub fn skewness_and_kurtosis(signal: &[f64]) -> (f64, f64) {
+    let count = signal.len() as f64;
+    let mean = signal.iter().sum::<f64>() / count;
+    let moment = |n: i32| signal.iter().map(|x| (x - mean).powi(n)).sum::<f64>() / count;
+    let deviation = moment(2).sqrt();
+    (moment(3) / deviation.powi(3), moment(4) / deviation.powi(4))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moments_of_a_sine_and_of_a_coin() {
+        let sine: Vec<f64> =
+            (0..1000).map(|k| (std::f64::consts::TAU * k as f64 / 1000.0).sin()).collect();
+        let (skewness, kurtosis) = skewness_and_kurtosis(&sine);
+        assert!(skewness.abs() < 1e-12 && (kurtosis - 1.5).abs() < 1e-12);
+        let coin = [0.0, 0.0, 0.0, 1.0];
+        let (skewness, kurtosis) = skewness_and_kurtosis(&coin);
+        // p = 1/4: (1 - 2p)/sqrt(p q) and 3 + (1 - 6 p q)/(p q)
+        assert!((skewness - 2.0 / 3f64.sqrt()).abs() < 1e-12);
+        assert!((kurtosis - 7.0 / 3.0).abs() < 1e-12);
+    }
+}

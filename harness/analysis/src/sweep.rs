@@ -1,0 +1,114 @@
+//! A sine whose frequency sweeps: its phase is known, so estimates are made along it.
+
+use std::f64::consts::TAU;
+
+use crate::BAND;
+
+/// A sin φ(t), with a frequency φ'/2π that goes from f0 to f1, upwards or downwards.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sweep {
+    /// A, N·m.
+    pub amplitude: f64,
+    /// Frequency at the start, Hz.
+    pub f0: f64,
+    /// Frequency at the end, Hz.
+    pub f1: f64,
+    /// T, s.
+    pub duration: f64,
+    /// How it gets from one to the other.
+    pub law: Law,
+}
+
+/// How a sweep's frequency grows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Law {
+    /// f = f0 e^{at}, a = ln(f1/f0)/T (Rubaga's thesis 5.1.4).
+    Exponential,
+    /// f = f0 + s t, s = (f1 − f0)/T.
+    Linear,
+}
+
+impl Sweep {
+    /// The thesis's (its chapter 5), 0.1 N·m.
+    pub const THESIS: Sweep =
+        Sweep { amplitude: 0.1, f0: BAND.0, f1: BAND.1, duration: 2700.0, law: Law::Exponential };
+
+    /// Torque at `t`, N·m.
+    pub fn torque(&self, t: f64) -> f64 {
+        self.amplitude * self.phase(t).sin()
+    }
+
+    /// Phase φ(t), rad: 2π f0 (e^{at} − 1)/a, or 2π (f0 t + s t²/2).
+    pub fn phase(&self, t: f64) -> f64 {
+        let Sweep { f0, f1, duration, .. } = *self;
+        match self.law {
+            Law::Exponential => {
+                let a = (f1 / f0).ln() / duration;
+                TAU * f0 * (a * t).exp_m1() / a
+            }
+            Law::Linear => TAU * (f0 * t + (f1 - f0) / duration * t * t / 2.0),
+        }
+    }
+
+    /// The time at which it passes `frequency` (Hz), s; `None` if it never does.
+    pub fn time_of(&self, frequency: f64) -> Option<f64> {
+        let Sweep { f0, f1, duration, .. } = *self;
+        let t = match self.law {
+            Law::Exponential => (frequency / f0).ln() * duration / (f1 / f0).ln(),
+            Law::Linear => (frequency - f0) / (f1 - f0) * duration,
+        };
+        (-1e-9..=duration * (1.0 + 1e-12)).contains(&t).then_some(t)
+    }
+
+    /// df/dt at `frequency`, Hz/s, negative downwards.
+    pub fn rate_at(&self, frequency: f64) -> f64 {
+        let Sweep { f0, f1, duration, .. } = *self;
+        match self.law {
+            Law::Exponential => frequency * (f1 / f0).ln() / duration,
+            Law::Linear => (f1 - f0) / duration,
+        }
+    }
+
+    /// Lowest and highest frequency, Hz.
+    pub fn band(&self) -> (f64, f64) {
+        (self.f0.min(self.f1), self.f0.max(self.f1))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use super::{Law, Sweep};
+
+    const LAWS: [Law; 2] = [Law::Exponential, Law::Linear];
+
+    #[test]
+    fn the_sweeps_have_the_cycles_of_the_thesis() {
+        // 5900.24 and 6412.5 cycles from 1.25 to 3.5 Hz in 2700 s, by hand from the formulas
+        for (law, cycles) in LAWS.into_iter().zip([5900.24, 6412.5]) {
+            let sweep = Sweep { law, ..Sweep::THESIS };
+            assert!((sweep.phase(2700.0) / TAU - cycles).abs() < 5e-3, "{law:?}");
+            let t = sweep.time_of(2.4).unwrap();
+            let f = (sweep.phase(t + 1e-3) - sweep.phase(t - 1e-3)) / 2e-3 / TAU;
+            assert!((f - 2.4).abs() < 1e-7, "{law:?}: the frequency is the phase's derivative");
+        }
+    }
+
+    #[test]
+    fn a_downward_sweep_is_the_upward_one_run_backwards() {
+        for law in LAWS {
+            let sweep = |f0, f1| Sweep { f0, f1, duration: 100.0, law, ..Sweep::THESIS };
+            let (up, down) = (sweep(1.25, 3.5), sweep(3.5, 1.25));
+            assert_eq!(down.band(), (1.25, 3.5));
+            for f in [1.25, 2.0, 3.5] {
+                let (t_up, t_down) = (up.time_of(f).unwrap(), down.time_of(f).unwrap());
+                // rounding of times up to 100 s, of phases up to 1500 rad
+                assert!((t_up + t_down - 100.0).abs() < 1e-11, "{law:?}, {f} Hz");
+                assert!((up.rate_at(f) + down.rate_at(f)).abs() < 1e-15);
+                let behind = up.phase(100.0) - up.phase(t_up);
+                assert!((down.phase(t_down) - behind).abs() < 1e-9, "{law:?}, {f} Hz");
+            }
+        }
+    }
+}

@@ -1,0 +1,648 @@
+//! What a run of the bench shows: figures of the run as a whole, and, where its torque allows, its
+//! frequency response by three estimators, a fitted model, and how the liquid moved.
+
+use std::borrow::Cow;
+
+use anyhow::{Context, Result};
+use host::description::ModelDescription;
+use host::fmi2::Instance;
+
+use super::Case;
+use crate::profile::{Profile, Torque};
+use crate::run::{Run, TORQUE};
+use analysis::features::{Deviations, Features};
+use analysis::lengths::Lengths;
+use analysis::linear::{Linear, Mode};
+use analysis::off_axis::{self, OffAxis};
+use analysis::rational::Rational;
+use analysis::residual::ModelFit;
+use analysis::rotary::{self, Rotary};
+use analysis::sweep::Sweep;
+use analysis::welch::{self, Spectra};
+use analysis::{FrequencyResponse, demodulation, logarithmic_grid, noise, spa};
+use signals::table::Table;
+
+/// Frequencies at which responses are evaluated: 1.2 mHz apart at the antiresonance of the thesis's
+/// sweep.
+const GRID_POINTS: usize = 2000;
+
+/// Separation of antiresonance and resonance that counts as resolved, in units of what is resolved.
+const RESOLVED: f64 = 3.0;
+/// Most misfit of a fitted transfer function that is trusted: what does not follow from the torque
+/// has a tenth of the rate's power.
+const MOST_MISFIT: f64 = 0.3;
+/// Part of the separation by which a passing sweep may shift the resonance, and by which two
+/// estimates from a whole record may differ. The shift is 0.6 times
+/// the root of the sweep's rate where the resonance is narrower than that.
+const MOST_SHIFT: f64 = 0.25;
+
+/// Least signal-to-noise ratio at a resonance that is trusted, dB.
+const LEAST_SNR: f64 = 0.0;
+
+/// Figures of a run as a whole.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Figures {
+    /// Largest |slosh_angle|, rad.
+    pub peak_slosh_angle: f64,
+    /// Largest |slosh_angle_radial|, rad.
+    pub peak_radial_angle: f64,
+    /// Largest wave height, m.
+    pub peak_wave_height: f64,
+    /// Largest |E(t) − E(0) − work + heat| over the energy throughput Σ|Δwork| + heat.
+    pub max_energy_residual: f64,
+    /// Time in stiction, s.
+    pub stuck: f64,
+}
+
+impl Figures {
+    fn of(table: &Table) -> Self {
+        let column = |name| table.column(name).unwrap_or_default();
+        let peak = |name| column(name).iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        let (energy, work, heat) = (column("energy"), column("work"), column("heat"));
+        let throughput: f64 = work.windows(2).map(|w| (w[1] - w[0]).abs()).sum::<f64>()
+            + heat.last().copied().unwrap_or(0.0);
+        let residual = (0..energy.len())
+            .map(|i| (energy[i] - energy[0] - (work[i] - work[0]) + (heat[i] - heat[0])).abs())
+            .fold(0.0, f64::max);
+        Figures {
+            peak_slosh_angle: peak("slosh_angle"),
+            peak_radial_angle: peak("slosh_angle_radial"),
+            peak_wave_height: peak("wave_height"),
+            max_energy_residual: if throughput > 0.0 { residual / throughput } else { 0.0 },
+            stuck: column("stuck_time").last().copied().unwrap_or(0.0),
+        }
+    }
+}
+
+/// Signals of a run, thinned for drawing: of each of at most [`History::STRETCHES`] stretches the
+/// smallest and the largest value, in the order in which they come.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct History {
+    /// Times, s.
+    pub time: Vec<f64>,
+    /// Names and values.
+    pub signals: Vec<(String, Vec<f64>)>,
+}
+
+impl History {
+    /// Stretches of a run that are told apart.
+    pub const STRETCHES: usize = 300;
+
+    /// Of columns of equal length.
+    pub fn of(time: &[f64], columns: &[(&str, &[f64])]) -> History {
+        let length = time.len().div_ceil(Self::STRETCHES);
+        if length <= 2 {
+            let copy = |(name, values): &(&str, &[f64])| (name.to_string(), values.to_vec());
+            return History { time: time.to_vec(), signals: columns.iter().map(copy).collect() };
+        }
+        let ends = |values: &[f64]| -> Vec<f64> {
+            let pair = |chunk: &[f64]| {
+                let by = |a: &usize, b: &usize| chunk[*a].total_cmp(&chunk[*b]);
+                let (low, high) = ((0..chunk.len()).min_by(by), (0..chunk.len()).max_by(by));
+                let (low, high) = (low.unwrap_or(0), high.unwrap_or(0));
+                [chunk[low.min(high)], chunk[low.max(high)]]
+            };
+            values.chunks(length).flat_map(pair).collect()
+        };
+        let step = (time[time.len() - 1] - time[0]) / (time.len() - 1) as f64;
+        let half = length as f64 * step / 2.0;
+        let points = 2 * time.len().div_ceil(length);
+        History {
+            time: (0..points).map(|i| time[0] + i as f64 * half).collect(),
+            signals: columns
+                .iter()
+                .map(|(name, values)| (name.to_string(), ends(values)))
+                .collect(),
+        }
+    }
+
+    /// A signal over time.
+    pub fn curve(&self, name: &str) -> Curve {
+        let values = self.signals.iter().find(|(n, _)| n == name).map(|(_, values)| values);
+        values.map_or(Curve::new(), |v| self.time.iter().copied().zip(v.iter().copied()).collect())
+    }
+}
+
+/// The path of the liquid surface's crest seen from above, in two short stretches of a run: time, s,
+/// and angles outwards and towards +θ, rad.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SloshPath {
+    /// Where the wave is largest.
+    pub largest: Vec<[f64; 3]>,
+    /// Around the onset of rotary slosh, if there is any.
+    pub onset: Option<Vec<[f64; 3]>>,
+}
+
+impl SloshPath {
+    /// Length of the stretch around the largest wave in periods of the slosh.
+    pub const LARGEST: f64 = 7.0;
+    /// Length of the stretch around the onset in periods of the slosh.
+    pub const ONSET: f64 = 38.0;
+
+    fn of(table: &Table, onset: Option<f64>, frequency: f64) -> Self {
+        let column = |name| table.column(name).unwrap_or_default();
+        let (time, radial, tangential) =
+            (column("time"), column("slosh_angle_radial"), column("slosh_angle"));
+        let size = |i: usize| radial[i].hypot(tangential[i]);
+        let top = (0..time.len()).max_by(|&a, &b| size(a).total_cmp(&size(b))).map(|i| time[i]);
+        let stretch = |centre: f64, periods: f64| {
+            (0..time.len())
+                .filter(|&i| (time[i] - centre).abs() * frequency <= periods / 2.0)
+                .map(|i| [time[i], radial[i], tangential[i]])
+                .collect()
+        };
+        SloshPath {
+            largest: top.map_or(Vec::new(), |t| stretch(t, Self::LARGEST)),
+            onset: onset.map(|t| stretch(t, Self::ONSET)),
+        }
+    }
+}
+
+/// A run of the bench, and what it shows.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// Which run.
+    pub case: Case,
+    /// Model, tank and fill.
+    pub range: Range,
+    /// Its exact linear counterpart with viscous friction, from the FMU's calculated parameters.
+    pub linear: Linear,
+    /// Of the run as a whole.
+    pub figures: Figures,
+    /// What the whole record shows; `None` if the torque is neither sweep nor noise.
+    pub record: Option<Record>,
+    /// What is seen while a sweep passes; `None` if the torque is no sweep.
+    pub passing: Option<Passing>,
+    /// Torque, rate, slosh angles, and the residual: the rate less that of the exact linear
+    /// counterpart under the same torque.
+    pub history: History,
+    /// The crest's path seen from above.
+    pub path: SloshPath,
+    /// It was not simulated but read.
+    pub reused: bool,
+}
+
+/// A frequency response and its features.
+#[derive(Clone, Debug)]
+pub struct Estimate {
+    /// Rate over torque.
+    pub response: FrequencyResponse,
+    /// Its antiresonance and resonance; none if they are not to be trusted.
+    pub features: Features,
+    /// What it resolves at the resonance, Hz.
+    pub resolution: f64,
+    /// Standard deviation of its magnitude, relative, and of its phase, rad, from what of the rate
+    /// no linear response explains; empty if that is not known.
+    pub deviation: Vec<f64>,
+    /// Standard deviations of the features.
+    pub deviations: Deviations,
+    /// Why its features are not to be trusted, if they are not.
+    pub doubt: Option<Doubt>,
+}
+
+/// Why a response shows an antiresonance and a resonance that are not to be trusted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Doubt {
+    /// The sweep shifts the resonance by more than a quarter of its distance to the antiresonance.
+    TooFast,
+    /// The record, or its lags or segments, is too short to tell one from the other.
+    TooShort,
+    /// At the resonance there is more noise than signal.
+    Noise,
+    /// Two estimates of one linear response differ by more than a quarter of the separation: after
+    /// a fast sweep a nonlinear liquid swings freely, at a frequency that follows its amplitude, and
+    /// no linear response makes that of the torque.
+    Nonlinear,
+}
+
+impl std::fmt::Display for Doubt {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(match self {
+            Doubt::TooFast => "the sweep is too fast",
+            Doubt::TooShort => "the record is too short",
+            Doubt::Noise => "too much noise",
+            Doubt::Nonlinear => "no single linear response: it depends on the amplitude",
+        })
+    }
+}
+
+impl Estimate {
+    /// From a response whose features are looked for between two frequencies, Hz; `doubt` says what
+    /// speaks against them.
+    fn of(
+        response: FrequencyResponse,
+        inner: (f64, f64),
+        resolution: f64,
+        doubt: impl Fn(&Features) -> Option<Doubt>,
+    ) -> Self {
+        let found = Features::within(&response, inner);
+        let doubt = if found.any() { doubt(&found) } else { None };
+        let features = if doubt.is_some() { Features::default() } else { found };
+        let (deviation, deviations) = (Vec::new(), Deviations::default());
+        Estimate { response, features, resolution, deviation, deviations, doubt }
+    }
+
+    /// The same with uncertainties: `slope` is how fast the error changes along a frequency.
+    fn with(self, deviation: Vec<f64>, slope: impl Fn(f64) -> f64) -> Self {
+        let deviations = self.features.deviations(&self.response, &deviation, slope);
+        Estimate { deviation, deviations, ..self }
+    }
+
+    fn doubted(&mut self, doubt: Doubt) {
+        (self.features, self.deviations) = Default::default();
+        self.doubt = Some(doubt);
+    }
+}
+
+/// Whether a separation of antiresonance and resonance is less than can be told apart, Hz; of one of
+/// the two alone nothing is said.
+fn closer(features: &Features, than: f64) -> bool {
+    features.delta_f().is_some_and(|delta| delta < than)
+}
+
+/// Means of `count` neighbours; what is left over at the end is left out.
+fn means(signal: &[f64], count: usize) -> Cow<'_, [f64]> {
+    if count == 1 {
+        return signal.into();
+    }
+    let mean = |chunk: &[f64]| chunk.iter().sum::<f64>() / count as f64;
+    signal.chunks_exact(count).map(mean).collect::<Vec<_>>().into()
+}
+
+/// Values over the frequency, Hz.
+pub type Curve = Vec<(f64, f64)>;
+
+/// Estimates from the whole record.
+#[derive(Clone, Debug)]
+pub struct Record {
+    /// By `spa`.
+    pub spa: Estimate,
+    /// By Welch's H1.
+    pub h1: Estimate,
+    /// Signal-to-noise ratio of the rate at resonance and antiresonance of `spa`, dB, from its
+    /// coherence with the torque; `None` if there are no such.
+    pub snr_db: Option<[f64; 2]>,
+    /// The same, dB, over the band.
+    pub snr_over_band: Curve,
+    /// A fitted transfer function, if neither `spa` nor H1 nor the passing sweep is to be trusted.
+    pub rational: Option<Estimate>,
+    /// The thesis's linear model, fitted to the `spa` response, and over the band the coherence of
+    /// its residual with the torque; `None` if nothing can be fitted.
+    pub fit: Option<(ModelFit, Curve)>,
+}
+
+/// Estimates while a sweep passes, by sweep-synchronous demodulation.
+#[derive(Clone, Debug)]
+pub struct Passing {
+    /// Response of the rate.
+    pub rate: Estimate,
+    /// Where in the sweep the slosh was rotary.
+    pub rotary: Rotary,
+    /// How much of the liquid's force was off the axis.
+    pub off_axis: OffAxis,
+    /// The leakage at the frequencies of `rate`.
+    pub leakage: Vec<f64>,
+}
+
+impl Record {
+    /// `enough`: there is an estimate to be trusted already. `unexplained`: power of what no linear
+    /// response explains, at the frequencies of the responses.
+    fn of(
+        profile: &Profile,
+        step: f64,
+        tau: &[f64],
+        omega: &[f64],
+        unexplained: &[f64],
+        enough: bool,
+    ) -> Option<Record> {
+        let band = profile.band()?;
+        let duration = step * tau.len() as f64;
+        let lengths = Lengths::of(band, profile.sweep(), duration, step);
+        let (tau, omega) = (means(tau, lengths.decimation), means(omega, lengths.decimation));
+        let step = step * lengths.decimation as f64;
+        let frequencies = logarithmic_grid(band, GRID_POINTS);
+        let spectra = Spectra::of(step, &tau, &omega, welch::RESPONSE);
+        let snr = spectra.snr_db();
+        let noisy = |features: &Features| {
+            // what the segments do not resolve looks like noise
+            let resolved = !closer(features, RESOLVED / spectra.length);
+            resolved && features.f_res.is_some_and(|f| spectra.at(&snr, f) < LEAST_SNR)
+        };
+        let estimate = |response: FrequencyResponse, length: f64| {
+            let resolution = 1.0 / length;
+            // at its ends the band is cut off, which rings
+            let inner = (band.0 + resolution, band.1 - resolution);
+            Estimate::of(response, inner, resolution, |features| match features {
+                features if closer(features, RESOLVED * resolution) => Some(Doubt::TooShort),
+                features if noisy(features) => Some(Doubt::Noise),
+                _ => None,
+            })
+        };
+        let spa = spa::Estimate::of(step, &tau, &omega, &frequencies, lengths.lag);
+        let (deviation, slope) = (spa.deviation(unexplained), spa.slope());
+        let mut spa = estimate(spa.response, lengths.lag).with(deviation, |_| slope);
+        // after a sweep that was too fast to see anything while it passed, a second opinion
+        let fast = profile.sweep().is_some() && !enough;
+        let mut rational = (fast || !enough && !spa.features.any())
+            .then(|| Rational::fit(step, &tau, &omega, band))
+            .flatten()
+            .map(|fitted| {
+                let response = fitted.frequency_response(&frequencies);
+                let estimate = Estimate::of(response, band, 1.0 / duration, |_| {
+                    (fitted.misfit > MOST_MISFIT).then_some(Doubt::Noise)
+                });
+                let (deviation, deviations) = fitted.deviations(&frequencies);
+                Estimate { deviation, deviations, ..estimate }
+            });
+        let extrema = spa.features.f_res.zip(spa.features.f_dip);
+        let fit = ModelFit::of(step, lengths.segment, &tau, &omega, &spa.response, &spa.features);
+        if let (true, Some(fitted), Some(delta)) = (fast, &mut rational, spa.features.delta_f()) {
+            let apart = |get: fn(&Features) -> Option<f64>| {
+                let pair = get(&spa.features).zip(get(&fitted.features));
+                pair.is_some_and(|(a, b)| (a - b).abs() > MOST_SHIFT * delta)
+            };
+            if apart(|f| f.f_dip) || apart(|f| f.f_res) {
+                spa.doubted(Doubt::Nonlinear);
+                fitted.doubted(Doubt::Nonlinear);
+            }
+        }
+        Some(Record {
+            h1: estimate(spectra.h1(band), spectra.length),
+            snr_db: extrema.map(|(res, antiresonance)| {
+                [spectra.at(&snr, res), spectra.at(&snr, antiresonance)]
+            }),
+            snr_over_band: spectra.within(band, &snr),
+            rational,
+            fit: fit.map(|(fit, spectra)| (fit, spectra.within(band, &spectra.coherence()))),
+            spa,
+        })
+    }
+}
+
+impl Passing {
+    /// `unexplained`: as for [`Record`].
+    fn of(sweep: &Sweep, table: &Table, arm: f64, unexplained: &[f64]) -> Passing {
+        let column = |name| table.column(name).unwrap_or_default();
+        let signals = ["omega_imu", "slosh_angle_radial", "slosh_angle", "F_radial"];
+        let grid = logarithmic_grid(sweep.band(), GRID_POINTS);
+        let demodulation::Demodulated { responses, noise_gain } = demodulation::frequency_responses(
+            sweep,
+            column("time"),
+            column("tau_cmd"),
+            signals.map(column),
+            &grid,
+        );
+        let [rate, radial, tangential, force] = responses;
+        // of the frequencies that the sweep passes
+        let unexplained: Vec<f64> = (rate.frequency.iter())
+            .map(|f| unexplained.get(grid.partition_point(|g| g < f)).copied().unwrap_or(f64::NAN))
+            .collect();
+        let deviation = demodulation::deviation(&rate, &unexplained, &noise_gain);
+        let swirl = rotary::swirl(&radial, &tangential, sweep.amplitude.abs());
+        let passed = &radial.frequency;
+        let times: Vec<f64> = passed.iter().filter_map(|f| sweep.time_of(*f)).collect();
+        let rotary = Rotary::of(passed, &times, &swirl);
+        let leakage = off_axis::leakage(&force, arm);
+        // where a window would begin before the sweep or end after it
+        let whole = |f: f64| {
+            let half = demodulation::cycles(sweep, f) / f / 2.0;
+            sweep.time_of(f).is_some_and(|t| t - half >= 0.0 && t + half <= sweep.duration)
+        };
+        let mut inner = rate.frequency.iter().copied().filter(|f| whole(*f));
+        let inner = (
+            inner.clone().next().unwrap_or(f64::INFINITY),
+            inner.next_back().unwrap_or(f64::NEG_INFINITY),
+        );
+        let moves = |f: f64| sweep.rate_at(f).abs() * demodulation::cycles(sweep, f) / f;
+        let middle = sweep.band();
+        let mut rate = Estimate::of(rate, inner, 0.0, |features| {
+            let shift = |f: f64| 0.6 * sweep.rate_at(f).abs().sqrt();
+            let fast = features.f_res.is_some_and(|f| closer(features, shift(f) / MOST_SHIFT));
+            fast.then_some(Doubt::TooFast)
+        })
+        .with(deviation, |f| demodulation::slope(sweep, f));
+        rate.resolution = moves(rate.features.f_res.unwrap_or((middle.0 * middle.1).sqrt()));
+        Passing {
+            rate,
+            rotary,
+            off_axis: OffAxis::of(column("F_radial"), column("F_tangential"), &leakage),
+            leakage,
+        }
+    }
+}
+
+impl Outcome {
+    /// From a stored run, and an initialised instance that tells the parameters.
+    pub(super) fn of(
+        case: &Case,
+        run: &Run,
+        instance: &mut Instance,
+        table: &Table,
+        reused: bool,
+    ) -> Result<Outcome> {
+        let linear = exact_linear(instance)?;
+        let range = Range::of(instance.fmu().description(), instance)?.context("not the bench")?;
+        let column = |name| table.column(name).unwrap_or_default();
+        let (record, passing) = match &run.torque {
+            Torque::Rows { .. } => (None, None),
+            Torque::Profile(profile) => {
+                let (tau, omega) = (column("tau_cmd"), column("omega_imu"));
+                // in every fourth of the frequencies: it changes little between them
+                let unexplained = profile.band().map_or(Vec::new(), |band| {
+                    let grid = logarithmic_grid(band, GRID_POINTS);
+                    let some: Vec<f64> = grid.into_iter().skip(1).step_by(4).collect();
+                    let power = noise::power(run.step, tau, omega, &some);
+                    power.into_iter().flat_map(|power| [power; 4]).collect()
+                });
+                let passing = profile
+                    .sweep()
+                    .map(|sweep| Passing::of(sweep, table, linear.arm, &unexplained));
+                let enough = passing.as_ref().is_some_and(|passing| passing.rate.doubt.is_none());
+                (Record::of(profile, run.step, tau, omega, &unexplained, enough), passing)
+            }
+        };
+        let (rate, start) = (column("omega_imu"), column("omega").first().copied());
+        let start = start.unwrap_or(0.0);
+        let modelled = match &run.torque {
+            Torque::Profile(profile) if profile.sweep().is_some() && !run.hold => {
+                linear.simulate(run.step, column("tau_cmd"), start)
+            }
+            // edges of the torque stand at the steps' ends, and are no slopes
+            _ => {
+                let torque = run.torque_table();
+                let column = |name| torque.column(name).unwrap_or_default();
+                linear.simulate_ramps(run.step, column(TORQUE), column("tau_slope"), start)
+            }
+        };
+        let residual: Vec<f64> = rate.iter().zip(&modelled).map(|(y, m)| y - m).collect();
+        let signals = ["tau_cmd", "omega_imu", "slosh_angle", "slosh_angle_radial"];
+        let signals = signals.map(|name| (name, column(name)));
+        let all: Vec<(&str, &[f64])> =
+            signals.into_iter().chain([("residual", &residual[..])]).collect();
+        let onset = passing.as_ref().and_then(|passing| {
+            let Torque::Profile(profile) = &run.torque else { return None };
+            profile.sweep()?.time_of(passing.rotary.from?)
+        });
+        let frequency = linear.modes.first().map_or(1.0, |mode| mode.frequency);
+        Ok(Outcome {
+            history: History::of(column("time"), &all),
+            path: SloshPath::of(table, onset, frequency),
+            case: case.clone(),
+            range,
+            linear,
+            figures: Figures::of(table),
+            record,
+            passing,
+            reused,
+        })
+    }
+
+    /// The estimate of a sweep that goes into `features.csv`, and its name: that of the demodulated
+    /// response, which says what the hub did while the sweep passed, the sweep's shift of the
+    /// resonance included (see the report); if that is not to be trusted, `spa`'s, and
+    /// else that of a fitted transfer function.
+    pub fn estimate(&self) -> Option<(&Estimate, &'static str)> {
+        let passing = self.passing.as_ref()?;
+        match (&passing.rate.doubt, &self.record) {
+            (Some(_), Some(record)) if record.spa.features.any() => Some((&record.spa, "spa")),
+            (Some(_), Some(Record { rational: Some(fitted), .. })) if fitted.features.any() => {
+                Some((fitted, "transfer function"))
+            }
+            (Some(_), Some(record)) if record.spa.doubt == Some(Doubt::Nonlinear) => {
+                Some((&record.spa, "spa"))
+            }
+            _ => Some((&passing.rate, "demodulation")),
+        }
+    }
+
+    /// Features of [`Outcome::estimate`].
+    pub fn features(&self) -> Features {
+        self.estimate().map_or(Features::default(), |(estimate, _)| estimate.features)
+    }
+
+    /// How the run left the range of its model, if it did.
+    pub fn beyond_model(&self) -> Option<String> {
+        self.range.left(&[self.figures.peak_wave_height])
+    }
+
+    /// Features of the `spa` response.
+    pub fn spa_features(&self) -> Features {
+        self.record.as_ref().map_or(Features::default(), |record| record.spa.features)
+    }
+
+    /// Features of the H1 response.
+    pub fn h1_features(&self) -> Features {
+        self.record.as_ref().map_or(Features::default(), |record| record.h1.features)
+    }
+
+    /// The fitted linear model.
+    pub fn fit(&self) -> Option<ModelFit> {
+        Some(self.record.as_ref()?.fit.as_ref()?.0)
+    }
+
+    /// Where in the sweep the slosh was rotary.
+    pub fn rotary(&self) -> Option<Rotary> {
+        Some(self.passing.as_ref()?.rotary)
+    }
+
+    /// How much of the liquid's force was off the axis.
+    pub fn off_axis(&self) -> Option<OffAxis> {
+        Some(self.passing.as_ref()?.off_axis)
+    }
+
+    /// The liquid's regime at its largest wave, from the wave height over the tank's radius (thesis
+    /// 2.3.5): linear below 0.15, nonlinear above 0.25.
+    pub fn regime(&self) -> &'static str {
+        match self.figures.peak_wave_height / self.range.radius {
+            ratio if ratio < 0.15 => "linear",
+            ratio if ratio <= 0.25 => "transitional",
+            _ => "nonlinear",
+        }
+    }
+}
+
+/// The variable that tells whether the liquid is in its model's range.
+pub const WAVE: &str = "wave_height";
+
+/// The range in which a model of the liquid means something.
+#[derive(Clone, Debug)]
+pub struct Range {
+    /// Value of `slosh.model`, by name.
+    pub model: String,
+    /// Radius of the tank, m.
+    pub radius: f64,
+    /// Fill, m; `None` if the modes come from a table, which knows of none.
+    pub fill: Option<f64>,
+}
+
+impl Range {
+    /// Of an initialised instance; `None` if the FMU is not the bench.
+    pub fn of(description: &ModelDescription, instance: &mut Instance) -> Result<Option<Range>> {
+        if !super::is_bench(description) {
+            return Ok(None);
+        }
+        let model = item(instance, "slosh.model", "slosh.kind")?.unwrap_or_default();
+        let source = item(instance, "slosh.source", "slosh.source_kind")?;
+        let fill = instance.real("tank.h")?;
+        Ok(Some(Range {
+            model,
+            radius: instance.real("tank.d")? / 2.0,
+            fill: (source.as_deref() != Some("table")).then_some(fill),
+        }))
+    }
+
+    /// How a run with these wave heights, m, left it: a linear liquid in waves beyond a quarter of
+    /// the tank's radius (thesis 2.3.5), or any whose trough would lie below the tank's bottom.
+    pub fn left(&self, waves: &[f64]) -> Option<String> {
+        let wave = waves.iter().fold(0.0, |most: f64, wave| most.max(wave.abs()));
+        let mm = |length: f64| format!("{:.1} mm", length * 1e3);
+        let linear = self.radius / 4.0;
+        if self.model == "linear" && wave > linear {
+            let (wave, most) = (mm(wave), mm(linear));
+            return Some(format!(
+                "a wave of {wave}; linear slosh theory holds up to a quarter of the tank's radius, {most}"
+            ));
+        }
+        let fill = self.fill.filter(|fill| self.model != "frozen" && wave > *fill)?;
+        Some(format!("a wave of {}, more than the liquid is deep, {}", mm(wave), mm(fill)))
+    }
+}
+
+/// Name of the item that an enumeration of an initialised instance has, or the integer `kind` beside
+/// it if that is not 0; `None` if the FMU, as one of an older version, has no such enumeration.
+fn item(instance: &mut Instance, name: &str, kind: &str) -> Result<Option<String>> {
+    let description = instance.fmu().description();
+    let Ok(variable) = description.variable(name) else { return Ok(None) };
+    let mut number = [0];
+    instance.get_integer(&[variable.reference], &mut number)?;
+    if let Ok(kind) = description.variable(kind) {
+        let mut instead = [0];
+        instance.get_integer(&[kind.reference], &mut instead)?;
+        number = if instead[0] != 0 { instead } else { number };
+    }
+    let found = description.items(variable).iter().find(|item| item.value == number[0]);
+    Ok(found.map(|item| item.name.clone()))
+}
+
+/// The linear model that has the FMU's own (calculated) parameters, with viscous friction unless the
+/// FMU has none.
+pub(super) fn exact_linear(instance: &mut Instance) -> Result<Linear> {
+    let mut real = |name: &str| instance.real(name);
+    let arm = real("tank.r")?;
+    let mut modes = Vec::new();
+    for n in 1..=10 {
+        let mass = real(&format!("slosh.mass[{n}]"))?;
+        if mass > 0.0 {
+            modes.push(Mode {
+                mass,
+                frequency: real(&format!("slosh.frequency[{n}]"))?,
+                damping: real(&format!("slosh.damping[{n}]"))?,
+            });
+        }
+    }
+    let inertia = real("hub.I")? + real("tank.m_0")? * arm * arm;
+    let viscous = real("friction.b")?;
+    let law = item(instance, "friction.model", "friction.kind")?;
+    let friction = if law.as_deref() == Some("none") { 0.0 } else { viscous };
+    Ok(Linear { inertia, friction, arm, modes })
+}

@@ -1,0 +1,11 @@
+//! Drives FMUs: torque histories, single runs, plans of many runs and campaigns, what their tables hold.
+
+pub mod campaign;
+pub mod example;
+pub mod gyro;
+pub mod plan;
+pub mod profile;
+pub mod progress;
+pub mod rounding;
+pub mod run;
+pub mod scaling;

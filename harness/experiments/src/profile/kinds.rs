@@ -1,0 +1,249 @@
+//! Every profile, one entry each: the parser, `--help`, the keys `profile.…` of plans, the page of
+//! the documentation and the torque itself come from here.
+
+use std::sync::Arc;
+
+use analysis::sweep::{Law, Sweep};
+use host::budget::FREQUENCY;
+
+use super::Values;
+use super::noise::Noise;
+use super::shape::{Dwell, Piece, Pieces, Shape};
+
+/// A kind of torque history. Times in s, frequencies in Hz, torques in N·m.
+#[derive(Debug)]
+pub struct Kind {
+    /// Its name.
+    pub name: &'static str,
+    /// What the torque is, for people.
+    pub says: &'static str,
+    /// What can be chosen; one is called `duration`.
+    pub parameters: &'static [Parameter],
+    /// What must hold between several parameters, and the sentence that says so.
+    pub(super) demands: &'static [Demand],
+    /// The torque; the values are allowed ones.
+    pub(super) shape: fn(&Values) -> Arc<dyn Shape>,
+}
+
+/// What must hold, and the sentence that says so.
+pub(super) type Demand = (fn(&Values) -> bool, &'static str);
+
+/// A number that a profile is given.
+#[derive(Debug)]
+pub struct Parameter {
+    /// Its name.
+    pub name: &'static str,
+    /// Its value where none is given.
+    pub default: f64,
+    /// Its unit; empty if it has none.
+    pub unit: &'static str,
+    /// What it is, for axes.
+    pub label: &'static str,
+    /// Which values make sense.
+    pub allowed: Allowed,
+}
+
+/// Which values of a parameter make sense; all are finite.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Allowed {
+    /// All.
+    Any,
+    /// All but 0.
+    NotZero,
+    /// Above 0.
+    Positive,
+    /// 0 or above.
+    NotNegative,
+    /// Within ±this.
+    Within(f64),
+    /// Whole numbers from 0 to this.
+    Whole(f64),
+}
+
+impl Allowed {
+    /// What is wrong with a value, to follow the parameter's name.
+    pub(super) fn fault(self, value: f64) -> Option<String> {
+        let (met, demand) = match self {
+            Allowed::Any => (true, String::new()),
+            Allowed::NotZero => (value != 0.0, "must not be 0; use zero".into()),
+            Allowed::Positive => (value > 0.0, "must be positive".into()),
+            Allowed::NotNegative => (value >= 0.0, "must not be negative".into()),
+            Allowed::Within(most) => {
+                (value.abs() <= most, format!("must be from -{most} to {most}"))
+            }
+            Allowed::Whole(most) => (
+                (0.0..=most).contains(&value) && value.fract() == 0.0,
+                format!("expects a whole number from 0 to {most:e}"),
+            ),
+        };
+        (!met).then_some(demand)
+    }
+}
+
+const fn parameter(
+    name: &'static str,
+    default: f64,
+    unit: &'static str,
+    label: &'static str,
+    allowed: Allowed,
+) -> Parameter {
+    Parameter { name, default, unit, label, allowed }
+}
+
+const fn duration(default: f64) -> Parameter {
+    parameter("duration", default, "s", "duration", Allowed::Positive)
+}
+
+const fn time(name: &'static str, default: f64, label: &'static str) -> Parameter {
+    parameter(name, default, "s", label, Allowed::NotNegative)
+}
+
+/// Both sweeps.
+const SWEEP: &[Parameter] = &[
+    parameter("amplitude", Sweep::THESIS.amplitude, "N.m", "torque amplitude", Allowed::NotZero),
+    parameter("f0", Sweep::THESIS.f0, "Hz", "first frequency", Allowed::Positive),
+    parameter("f1", Sweep::THESIS.f1, "Hz", "last frequency", Allowed::Positive),
+    duration(Sweep::THESIS.duration),
+];
+const SWEEPS: &[Demand] = &[(|v| v.of("f0") != v.of("f1"), "f0 and f1 are equal; use sine"), BAND];
+/// Beyond it a phase is no number that has a sine.
+const BAND: Demand = (
+    |v| ["f0", "f1"].iter().all(|name| (1.0 / FREQUENCY..=FREQUENCY).contains(&v.of(name))),
+    "f0 and f1 must be from 1e-9 to 1e9 Hz",
+);
+
+fn sweep(v: &Values, law: Law) -> Arc<dyn Shape> {
+    let [amplitude, f0, f1, duration] = ["amplitude", "f0", "f1", "duration"].map(|n| v.of(n));
+    Arc::new(Sweep { amplitude, f0, f1, duration, law })
+}
+
+fn pieces(list: impl Into<Vec<Piece>>) -> Arc<dyn Shape> {
+    Arc::new(Pieces(list.into()))
+}
+
+/// All profiles but [`FILE`].
+pub const KINDS: &[Kind] = &[
+    Kind {
+        name: "exp-sweep",
+        says: "A sin φ, φ = 2π f0 (e^(at) - 1)/a, a = ln(f1/f0)/duration: a sine whose frequency changes exponentially from f0 to f1, upwards or downwards (thesis 5.1.4)",
+        parameters: SWEEP,
+        demands: SWEEPS,
+        shape: |v| sweep(v, Law::Exponential),
+    },
+    Kind {
+        name: "lin-sweep",
+        says: "A sin φ, φ = 2π (f0 t + s t²/2), s = (f1 - f0)/duration: a sine whose frequency changes linearly in time",
+        parameters: SWEEP,
+        demands: SWEEPS,
+        shape: |v| sweep(v, Law::Linear),
+    },
+    Kind {
+        name: "sine",
+        says: "A sin 2πft: a dwell",
+        parameters: &[
+            parameter("amplitude", 0.1, "N.m", "torque amplitude", Allowed::Any),
+            parameter("frequency", 2.4, "Hz", "frequency", Allowed::Within(FREQUENCY)),
+            duration(60.0),
+        ],
+        demands: &[],
+        shape: |v| Arc::new(Dwell { amplitude: v.of("amplitude"), frequency: v.of("frequency") }),
+    },
+    Kind {
+        name: "constant",
+        says: "always the same torque",
+        parameters: &[
+            parameter("amplitude", 0.1, "N.m", "torque amplitude", Allowed::Any),
+            duration(20.0),
+        ],
+        demands: &[],
+        shape: |v| pieces([Piece::always(v.of("amplitude"))]),
+    },
+    Kind {
+        name: "pulse",
+        says: "the amplitude from `start` for `width` seconds",
+        parameters: &[
+            parameter("amplitude", 0.05, "N.m", "torque amplitude", Allowed::Any),
+            time("start", 0.0, "start of the torque"),
+            time("width", 1.0, "length of the pulse"),
+            duration(20.0),
+        ],
+        demands: &[],
+        shape: |v| pieces([Piece::new(v.of("start"), v.of("width"), v.of("amplitude"))]),
+    },
+    Kind {
+        name: "bang-stop-bang",
+        says: "+amplitude for `bang` seconds from `start` on, none for `stop` seconds, -amplitude for `bang` seconds, then none: the hub is spun up, coasts and is brought to rest (thesis 2.7.1)",
+        parameters: &[
+            parameter("amplitude", 0.1, "N.m", "torque amplitude", Allowed::Any),
+            time("start", 0.0, "start of the torque"),
+            time("bang", 1.0, "length of each pulse"),
+            time("stop", 10.0, "time between the pulses"),
+            duration(60.0),
+        ],
+        demands: &[],
+        shape: |v| {
+            let [amplitude, start, bang, stop] =
+                ["amplitude", "start", "bang", "stop"].map(|n| v.of(n));
+            pieces([
+                Piece::new(start, bang, amplitude),
+                Piece::new(start + bang + stop, bang, -amplitude),
+            ])
+        },
+    },
+    Kind {
+        name: "acceleration-step",
+        says: "inertia × acceleration from `start` for `width` seconds: what a wheel makes whose speed is ramped linearly (thesis 2.7.1)",
+        parameters: &[
+            parameter("acceleration", 0.1, "rad/s2", "acceleration", Allowed::Any),
+            // hub.I + tank.m_liq tank.r² at the FMU's start values
+            parameter("inertia", 0.428054, "kg.m2", "inertia", Allowed::Positive),
+            time("start", 1.0, "start of the torque"),
+            time("width", 5.0, "length of the pulse"),
+            duration(60.0),
+        ],
+        demands: &[],
+        shape: |v| {
+            let torque = v.of("inertia") * v.of("acceleration");
+            pieces([Piece::new(v.of("start"), v.of("width"), torque)])
+        },
+    },
+    Kind {
+        name: "noise",
+        says: "band-limited noise with power density ~ f^exponent (0 white, -1 pink, -2 brown), clipped at ±limit",
+        parameters: &[
+            parameter("rms", 0.05, "N.m", "torque, rms", Allowed::Positive),
+            parameter("f0", 1.25, "Hz", "lowest frequency", Allowed::Positive),
+            parameter("f1", 3.5, "Hz", "highest frequency", Allowed::Positive),
+            parameter("exponent", 0.0, "", "spectral exponent", Allowed::Within(10.0)),
+            parameter("seed", 1.0, "", "seed", Allowed::Whole(9e15)),
+            parameter("limit", 0.26, "N.m", "torque limit", Allowed::Positive), // the wheel's (thesis 5.1.3)
+            duration(600.0),
+        ],
+        demands: &[
+            (|v| v.of("f0") < v.of("f1"), "it expects 0 < f0 < f1"),
+            BAND,
+            (
+                |v| v.of("rms") <= v.of("limit") / 2.0,
+                "rms must be at most half of limit (else too much of it is clipped)",
+            ),
+        ],
+        shape: |v| {
+            let band = (v.of("f0"), v.of("f1"));
+            let seed = v.of("seed") as u64;
+            Arc::new(Noise::new(v.of("rms"), band, v.of("exponent"), seed, v.of("limit")))
+        },
+    },
+    Kind {
+        name: "zero",
+        says: "no torque",
+        parameters: &[duration(20.0)],
+        demands: &[],
+        shape: |_| pieces([]),
+    },
+];
+
+/// The profile that is no formula: how it is written, and what it is.
+pub const FILE: (&str, &str) = (
+    "file:path=FILE,hold=false",
+    "the rows of a CSV or Parquet file with the columns `time` and `tau_cmd`, joined by lines, or held with hold=true; a relative path starts where the command is started",
+);

@@ -1,0 +1,468 @@
+//! Torque against time: named profiles with parameters ([`KINDS`]), or the rows of a file.
+
+mod kinds;
+mod noise;
+mod shape;
+
+use std::fmt;
+use std::path::Path;
+use std::str::FromStr;
+use std::sync::Arc;
+
+use anyhow::{Context, Result, bail, ensure};
+use host::description::did_you_mean;
+
+pub use self::kinds::{Allowed, FILE, KINDS, Kind, Parameter};
+pub use self::noise::TONES;
+pub use self::shape::Shape;
+use analysis::sweep::Sweep;
+use signals::table::Table;
+
+/// A torque history with a formula: an entry of [`KINDS`] with values for its parameters.
+#[derive(Clone, Debug)]
+pub struct Profile {
+    kind: &'static Kind,
+    values: Vec<f64>,
+    shape: Arc<dyn Shape>,
+}
+
+/// The values of a kind's parameters, by name.
+pub struct Values<'a> {
+    kind: &'a Kind,
+    values: &'a [f64],
+}
+
+impl Values<'_> {
+    /// The value of a parameter.
+    ///
+    /// # Panics
+    /// If the kind has no such parameter.
+    pub fn of(&self, name: &str) -> f64 {
+        self.get(name).unwrap_or_else(|| panic!("{} has no {name}", self.kind.name))
+    }
+
+    fn get(&self, name: &str) -> Option<f64> {
+        let place = self.kind.parameters.iter().position(|p| p.name == name)?;
+        Some(self.values[place])
+    }
+}
+
+impl Kind {
+    /// It with these values, as the parser takes it.
+    fn written(&self, values: &[f64]) -> String {
+        let pairs = self.parameters.iter().zip(values);
+        let pairs: Vec<_> = pairs.map(|(p, value)| format!("{}={value}", p.name)).collect();
+        format!("{}:{}", self.name, pairs.join(","))
+    }
+
+    fn defaults(&self) -> Vec<f64> {
+        self.parameters.iter().map(|parameter| parameter.default).collect()
+    }
+}
+
+/// Every profile with its defaults and what it is, for `--help`.
+pub fn help() -> String {
+    let all = KINDS.iter().map(|kind| (kind.written(&kind.defaults()), kind.says));
+    all.chain([(FILE.0.into(), FILE.1)])
+        .map(|(written, says)| format!("  {written}\n      {}\n", says.replace('`', "")))
+        .collect()
+}
+
+/// Every profile as a Markdown table, as the documentation shows it.
+pub fn table() -> String {
+    let mut text =
+        String::from("| profile, with its defaults | torque | units |\n| --- | --- | --- |\n");
+    for kind in KINDS {
+        let units = kind.parameters.iter().filter(|p| !p.unit.is_empty());
+        let units: Vec<_> = units.map(|p| format!("{} {}", p.name, p.unit)).collect();
+        let written = kind.written(&kind.defaults());
+        text.push_str(&format!("| `{written}` | {} | {} |\n", kind.says, units.join(", ")));
+    }
+    text.push_str(&format!("| `{}` | {} | s, N.m |\n", FILE.0, FILE.1));
+    text
+}
+
+/// A profile as it was written, `name` or `name:key=value,key=value`: not yet looked at.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Written {
+    name: String,
+    pairs: Vec<(String, String)>,
+}
+
+impl FromStr for Written {
+    type Err = anyhow::Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let (name, rest) = text.split_once(':').unwrap_or((text, ""));
+        let name = name.trim();
+        let mut written = Written { name: name.into(), pairs: Vec::new() };
+        for pair in rest.split(',').filter(|pair| !pair.trim().is_empty()) {
+            let (key, value) = pair.split_once('=').with_context(|| {
+                format!("profile {name}: \"{pair}\" is not of the form key=value")
+            })?;
+            let key = key.trim();
+            ensure!(
+                written.pairs.iter().all(|(k, _)| k != key),
+                "profile {name}: {key} is given twice"
+            );
+            written.pairs.push((key.into(), value.trim().into()));
+        }
+        Ok(written)
+    }
+}
+
+impl fmt::Display for Written {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let pairs: Vec<_> =
+            self.pairs.iter().map(|(key, value)| format!("{key}={value}")).collect();
+        write!(f, "{}:{}", self.name, pairs.join(","))
+    }
+}
+
+impl Written {
+    /// Gives a parameter another value.
+    pub fn set(&mut self, key: &str, value: &str) {
+        self.pairs.retain(|(k, _)| k != key);
+        self.pairs.push((key.into(), value.into()));
+    }
+
+    /// The torque it stands for; a file is read.
+    pub fn torque(&self) -> Result<Torque> {
+        if self.name == "file" { self.file() } else { Ok(Torque::Profile(self.profile()?)) }
+    }
+
+    /// The file that `file:path=…` names.
+    pub fn path(&self) -> Option<&Path> {
+        let path = self.pairs.iter().find(|(key, _)| key == "path");
+        path.filter(|_| self.name == "file").map(|(_, path)| Path::new(path))
+    }
+
+    fn file(&self) -> Result<Torque> {
+        let mut held = false;
+        for (key, value) in &self.pairs {
+            match (key.as_str(), value.as_str()) {
+                ("path", _) => {}
+                ("hold", "true" | "false") => held = value == "true",
+                ("hold", _) => bail!("profile file: hold expects true or false, not \"{value}\""),
+                _ => bail!("profile file has no parameter \"{key}\" (it has path, hold)"),
+            }
+        }
+        let path = self.path().context("profile file: it expects path=FILE")?;
+        Torque::read(path, held)
+    }
+
+    /// Whether a parameter takes whole numbers only.
+    pub fn is_whole(&self, key: &str) -> bool {
+        let kind = KINDS.iter().find(|kind| kind.name == self.name);
+        let parameter = kind.and_then(|kind| kind.parameters.iter().find(|p| p.name == key));
+        parameter.is_some_and(|p| matches!(p.allowed, Allowed::Whole(_)))
+    }
+
+    fn profile(&self) -> Result<Profile> {
+        let name = self.name.as_str();
+        let kind = KINDS.iter().find(|kind| kind.name == name).with_context(|| {
+            let names = KINDS.iter().map(|kind| kind.name).chain(["file"]);
+            let all: Vec<_> = names.clone().collect();
+            let hint = did_you_mean(name, names);
+            format!("there is no profile \"{name}\" (there are {}){hint}", all.join(", "))
+        })?;
+        let mut problems = Vec::new();
+        let mut values = kind.defaults();
+        for (key, text) in &self.pairs {
+            let Some(place) = kind.parameters.iter().position(|p| p.name == key) else {
+                let names: Vec<_> = kind.parameters.iter().map(|p| p.name).collect();
+                problems
+                    .push(format!("it has no parameter \"{key}\" (it has {})", names.join(", ")));
+                continue;
+            };
+            match text.parse().ok().filter(|v: &f64| v.is_finite()) {
+                Some(value) => values[place] = value,
+                None => problems.push(format!("{key} expects a number, not \"{text}\"")),
+            }
+        }
+        for (parameter, value) in kind.parameters.iter().zip(&values) {
+            let fault = parameter.allowed.fault(*value);
+            problems.extend(fault.map(|fault| format!("{} {fault}", parameter.name)));
+        }
+        let given = Values { kind, values: &values };
+        let unmet = kind.demands.iter().filter(|(met, _)| !met(&given));
+        problems.extend(unmet.map(|(_, demand)| demand.to_string()));
+        ensure!(problems.is_empty(), "profile {name}: {}", problems.join("; "));
+        let shape = (kind.shape)(&given);
+        Ok(Profile { kind, values, shape })
+    }
+}
+
+impl FromStr for Profile {
+    type Err = anyhow::Error;
+
+    /// `name` or `name:key=value,key=value`; what is not given has its default.
+    fn from_str(text: &str) -> Result<Self> {
+        text.parse::<Written>()?.profile()
+    }
+}
+
+impl fmt::Display for Profile {
+    /// As the parser takes it, with every parameter.
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(&self.kind.written(&self.values))
+    }
+}
+
+impl PartialEq for Profile {
+    fn eq(&self, other: &Self) -> bool {
+        self.kind.name == other.kind.name && self.values == other.values
+    }
+}
+
+impl Profile {
+    fn get(&self, name: &str) -> Option<f64> {
+        Values { kind: self.kind, values: &self.values }.get(name)
+    }
+
+    /// What its kind says of a parameter.
+    pub fn parameter(&self, name: &str) -> Option<&'static Parameter> {
+        self.kind.parameters.iter().find(|parameter| parameter.name == name)
+    }
+
+    /// Length, s.
+    pub fn duration(&self) -> f64 {
+        self.get("duration").unwrap_or(0.0)
+    }
+
+    /// Its parameter `amplitude`, N·m, if it has one.
+    pub fn amplitude(&self) -> Option<f64> {
+        self.get("amplitude")
+    }
+
+    /// The sweep, if its frequency sweeps.
+    pub fn sweep(&self) -> Option<&Sweep> {
+        self.shape.sweep()
+    }
+
+    /// The frequencies it excites uniformly enough for a frequency response, from and to, Hz; `None`
+    /// if there are none.
+    pub fn band(&self) -> Option<(f64, f64)> {
+        self.shape.band()
+    }
+}
+
+/// Where a run's torque comes from.
+#[derive(Clone, Debug)]
+pub enum Torque {
+    /// A formula.
+    Profile(Profile),
+    /// The rows of a file: `time` (s, growing; two at one time are a jump) and torque (N·m).
+    Rows {
+        /// Times, s.
+        time: Vec<f64>,
+        /// Torques, N·m.
+        tau: Vec<f64>,
+        /// Held from row to row (else linear between rows).
+        held: bool,
+    },
+}
+
+impl Torque {
+    /// Reads the columns `time,tau_cmd` of a CSV or Parquet file.
+    pub fn read(path: &Path, held: bool) -> Result<Self> {
+        let table = Table::read(path, &["time", "tau_cmd"])?;
+        let column = |name| table.column(name).unwrap_or_default();
+        Torque::rows(column("time"), column("tau_cmd"), None, held)
+            .with_context(|| format!("{} cannot be used", path.display()))
+    }
+
+    /// From rows; with `slopes` the torque runs on from each row with its own slope until the next,
+    /// and jumps there if the two do not meet.
+    pub fn rows(time: &[f64], tau: &[f64], slopes: Option<&[f64]>, held: bool) -> Result<Self> {
+        ensure!(time.len() >= 2, "it has {} rows; a history needs two", time.len());
+        if let Some(row) = time.windows(2).position(|pair| pair[1] <= pair[0]) {
+            bail!(
+                "row {}: time goes from {} to {} s; it must grow",
+                row + 2,
+                time[row],
+                time[row + 1]
+            );
+        }
+        let Some(slopes) = slopes else {
+            return Ok(Torque::Rows { time: time.to_vec(), tau: tau.to_vec(), held });
+        };
+        let (mut times, mut torques) = (Vec::new(), Vec::new());
+        for (k, slope) in slopes.iter().enumerate() {
+            times.push(time[k]);
+            torques.push(tau[k]);
+            let Some(next) = time.get(k + 1) else { break };
+            let end = tau[k] + slope * (next - time[k]);
+            // rounding of the slope is no jump
+            if (end - tau[k + 1]).abs() > 1e-12 * (tau[k].abs() + tau[k + 1].abs()) {
+                times.push(*next);
+                torques.push(end);
+            }
+        }
+        Ok(Torque::Rows { time: times, tau: torques, held })
+    }
+
+    /// First and last time, s.
+    pub fn span(&self) -> (f64, f64) {
+        match self {
+            Torque::Profile(profile) => (0.0, profile.duration()),
+            Torque::Rows { time, .. } => (time[0], time[time.len() - 1]),
+        }
+    }
+
+    /// Torque at `t`, N·m (at a jump: after it).
+    pub fn at(&self, t: f64) -> f64 {
+        match self {
+            Torque::Profile(profile) => profile.shape.after(t),
+            Torque::Rows { time, tau, held } => {
+                // communication points k·H may lie an ulp before the row they are meant to meet
+                let slack = 1e-9 * (1.0 + t.abs());
+                let next = time.partition_point(|row| *row <= t + slack);
+                match next {
+                    0 => tau[0],
+                    n if n == time.len() || *held => tau[n - 1],
+                    n => {
+                        let part = (t - time[n - 1]) / (time[n] - time[n - 1]);
+                        tau[n - 1] + (tau[n] - tau[n - 1]) * part
+                    }
+                }
+            }
+        }
+    }
+
+    /// Torque at the beginning of a step and the slope of the chord to its end, N·m and N·m/s.
+    pub fn chord(&self, t: f64, step: f64) -> (f64, f64) {
+        let begin = self.at(t);
+        let end = match self {
+            Torque::Profile(profile) => profile.shape.before(t + step),
+            Torque::Rows { held: true, .. } => begin,
+            Torque::Rows { time, tau, .. } => {
+                let end = t + step;
+                let slack = 1e-9 * (1.0 + end.abs());
+                match time.partition_point(|row| *row <= end + slack) {
+                    // just before a jump at the step's end
+                    n if n > 1 && time[n - 1] == time[n - 2] && time[n - 1] > end - slack => {
+                        tau[n - 2]
+                    }
+                    _ => self.at(end),
+                }
+            }
+        };
+        (begin, (end - begin) / step)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn documentation_lists_the_profiles() {
+        let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../book/campaigns.md");
+        let page = std::fs::read_to_string(page).unwrap();
+        assert!(
+            page.contains(&table()),
+            "campaigns.md is out of date: put what `hubslosh torque --profiles` prints under \"Profiles\""
+        );
+    }
+
+    #[test]
+    fn a_profile_reads_back_from_its_own_text() {
+        for kind in KINDS {
+            let profile: Profile = kind.name.parse().unwrap();
+            assert_eq!(profile.to_string().parse::<Profile>().unwrap(), profile);
+            assert!(profile.duration() > 0.0, "{} has a duration", kind.name);
+        }
+    }
+
+    #[test]
+    fn wrong_profiles_are_refused_with_what_there_is() {
+        for (text, word) in [
+            ("exp-swep:f0=1", "did you mean \"exp-sweep\""),
+            ("sine:freq=2", "it has amplitude, frequency, duration"),
+            ("sine:frequency=2,frequency=3", "frequency is given twice"),
+            ("lin-sweep:f0=0,duration=0", "f0 must be positive; duration must be positive"),
+            ("exp-sweep:f0=1e-320", "f0 and f1 must be from 1e-9 to 1e9 Hz"),
+            ("lin-sweep:f1=1e300", "f0 and f1 must be from 1e-9 to 1e9 Hz"),
+            ("noise:f0=1e-300", "f0 and f1 must be from 1e-9 to 1e9 Hz"),
+            ("sine:frequency=1e308", "frequency must be from -1000000000 to 1000000000"),
+            ("exp-sweep:amplitude=0", "amplitude must not be 0"),
+            ("pulse:width=-1", "width must not be negative"),
+            ("noise:rms=0.2", "at most half of limit"),
+            (
+                "noise:f0=3,f1=2,seed=0.5",
+                "seed expects a whole number from 0 to 9e15; it expects 0 < f0 < f1",
+            ),
+            ("acceleration-step:inertia=0", "inertia must be positive"),
+            ("sine:frequency=fast", "expects a number"),
+            ("sine:amplitude=NaN", "expects a number"),
+            ("zero:duration=0", "must be positive"),
+        ] {
+            let error = text.parse::<Profile>().unwrap_err().to_string();
+            assert!(error.contains(word), "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn bang_stop_bang_takes_back_all_the_momentum_it_gave() {
+        let text = "bang-stop-bang:amplitude=0.1,start=0.1,bang=0.3,stop=0.5,duration=2";
+        let torque = Torque::Profile(text.parse().unwrap());
+        let mut momentum: f64 = 0.0;
+        for k in 0..100 {
+            let (tau, slope) = torque.chord(k as f64 * 0.02, 0.02);
+            let expected = match k {
+                5..20 => 0.1,
+                45..60 => -0.1,
+                _ => 0.0,
+            };
+            assert_eq!((tau, slope), (expected, 0.0), "step {k}");
+            momentum += tau * 0.02;
+        }
+        assert!(momentum.abs() < 1e-15);
+    }
+
+    #[test]
+    fn an_acceleration_step_is_inertia_times_acceleration() {
+        let text = "acceleration-step:acceleration=0.5,inertia=0.4,start=1,width=2,duration=5";
+        let torque = Torque::Profile(text.parse().unwrap());
+        assert_eq!([0.5, 1.0, 2.9, 3.0].map(|t| torque.at(t)), [0.0, 0.2, 0.2, 0.0]);
+    }
+
+    #[test]
+    fn a_torque_file_can_be_named_as_a_profile() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("torque.csv");
+        std::fs::write(&path, "time,tau_cmd\n0,0\n1,2\n").unwrap();
+        let torque = |rest: &str| {
+            format!("file:path={}{rest}", path.display()).parse::<Written>().unwrap().torque()
+        };
+        assert_eq!(torque("").unwrap().at(0.5), 1.0);
+        assert_eq!(torque(",hold=true").unwrap().at(0.5), 0.0);
+        let error = torque(",hold=maybe").unwrap_err().to_string();
+        assert!(error.contains("hold expects true or false"), "{error}");
+        let error = "file".parse::<Written>().unwrap().torque().unwrap_err().to_string();
+        assert!(error.contains("path=FILE"), "{error}");
+    }
+
+    #[test]
+    fn a_pulse_has_no_ramps() {
+        let pulse = Torque::Profile("pulse:amplitude=2,start=0.1,width=0.3".parse().unwrap());
+        for k in 0..50 {
+            let (t, step) = (k as f64 * 0.02, 0.02);
+            let (tau, slope) = pulse.chord(t, step);
+            assert_eq!(slope, 0.0, "at {t}");
+            assert_eq!(tau, if (5..20).contains(&k) { 2.0 } else { 0.0 }, "at {t}");
+        }
+    }
+
+    #[test]
+    fn rows_are_joined_by_lines_or_held() {
+        let rows =
+            |held| Torque::Rows { time: vec![0.0, 1.0, 3.0], tau: vec![0.0, 2.0, 0.0], held };
+        assert_eq!((rows(false).at(0.5), rows(false).at(2.0)), (1.0, 1.0));
+        assert_eq!((rows(true).at(0.5), rows(true).at(2.0)), (0.0, 2.0));
+        assert_eq!(rows(false).chord(0.0, 0.5), (0.0, 2.0));
+        assert_eq!(rows(true).chord(1.0, 2.0), (2.0, 0.0));
+        assert_eq!(rows(false).at(9.0), 0.0);
+    }
+}

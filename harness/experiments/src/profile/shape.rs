@@ -1,0 +1,94 @@
+//! Torque against time by a formula: what the profiles are made from.
+
+use std::f64::consts::TAU;
+use std::fmt::Debug;
+
+use analysis::sweep::Sweep;
+
+/// A torque against time; t in s, torque in N·m.
+pub trait Shape: Debug + Send + Sync {
+    /// Torque just after `t`.
+    fn after(&self, t: f64) -> f64;
+
+    /// Torque just before `t`; another one where the torque jumps.
+    fn before(&self, t: f64) -> f64 {
+        self.after(t)
+    }
+
+    /// The frequencies it excites uniformly enough for a frequency response, from and to, Hz; `None`
+    /// if there are none.
+    fn band(&self) -> Option<(f64, f64)> {
+        None
+    }
+
+    /// Itself, if its frequency sweeps.
+    fn sweep(&self) -> Option<&Sweep> {
+        None
+    }
+}
+
+impl Shape for Sweep {
+    fn after(&self, t: f64) -> f64 {
+        self.torque(t)
+    }
+
+    fn band(&self) -> Option<(f64, f64)> {
+        Some(Sweep::band(self))
+    }
+
+    fn sweep(&self) -> Option<&Sweep> {
+        Some(self)
+    }
+}
+
+/// A sin 2πft.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Dwell {
+    /// A, N·m.
+    pub amplitude: f64,
+    /// f, Hz.
+    pub frequency: f64,
+}
+
+impl Shape for Dwell {
+    fn after(&self, t: f64) -> f64 {
+        self.amplitude * (TAU * self.frequency * t).sin()
+    }
+}
+
+/// Constant torques one after the other, none between them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pieces(pub Vec<Piece>);
+
+/// A constant torque for some time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Piece {
+    from: f64,
+    to: f64,
+    torque: f64,
+}
+
+impl Piece {
+    /// A torque (N·m) from `start` for `width` seconds.
+    pub fn new(start: f64, width: f64, torque: f64) -> Piece {
+        Piece { from: start, to: start + width, torque }
+    }
+
+    /// A torque (N·m) without end.
+    pub fn always(torque: f64) -> Piece {
+        Piece { from: f64::NEG_INFINITY, to: f64::INFINITY, torque }
+    }
+}
+
+impl Shape for Pieces {
+    fn after(&self, t: f64) -> f64 {
+        // a communication point k·H may lie an ulp beside the edge it is meant to be
+        let slack = 1e-9 * (1.0 + t.abs());
+        let now = self.0.iter().find(|piece| t >= piece.from - slack && t < piece.to - slack);
+        now.map_or(0.0, |piece| piece.torque)
+    }
+
+    fn before(&self, t: f64) -> f64 {
+        self.after(t - 3e-9 * (1.0 + t.abs()))
+    }
+}

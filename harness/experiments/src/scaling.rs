@@ -1,0 +1,295 @@
+//! What a bench says of a flight tank, in words: Bond numbers, the tank that has the same ones,
+//! Froude's factors (`formulas::similarity`; Rubaga's thesis 2.5, 2.6, 7.2, with its figures corrected).
+//!
+//! The two numbers of an angular acceleration are not the same: the thesis's 45.87 is Bo_i of
+//! its bench, and the equivalent tank it prints beside it follows from Bo_r.
+
+use std::fmt::Write;
+
+use anyhow::{Result, ensure};
+
+use formulas::similarity::{Liquid, agility, froude, froude_viscosity, regime};
+
+use crate::rounding::significant;
+
+/// Water at 25 degC as the thesis's 7.2.1 has it.
+pub const WATER: Liquid = Liquid { density: 997.0, tension: 0.072 };
+/// Water as the thesis's 7.2.2 has it.
+pub const ROUND_WATER: Liquid = Liquid { density: 1000.0, tension: 0.072 };
+/// Liquid oxygen at its boiling point, 90 K (the thesis says -200 degC).
+pub const OXYGEN: Liquid = Liquid { density: 1141.0, tension: 0.0132 };
+/// The bench's tank: its radius and its distance from the axis, m.
+pub const BENCH: (f64, f64) = (0.0815, 0.225);
+
+/// All of these must be positive numbers; names all that are not.
+fn positive(values: &[(&str, f64)]) -> Result<()> {
+    let wrong: Vec<String> = values
+        .iter()
+        .filter(|(_, x)| !(x.is_finite() && *x > 0.0))
+        .map(|(name, x)| format!("{name} = {x}"))
+        .collect();
+    ensure!(wrong.is_empty(), "{} (allowed: positive numbers)", wrong.join(", "));
+    Ok(())
+}
+
+/// What is known of the flight tank.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Flight {
+    /// Its radius, m; wanted is the acceleration.
+    Radius(f64),
+    /// The acceleration, m/s2 or rad/s2; wanted is the radius.
+    Acceleration(f64),
+}
+
+/// The bench's Bond number and the flight tank that has the same, in words.
+pub fn bond_text(
+    bench: Liquid,
+    (a, radius): (f64, f64),
+    liquid: Liquid,
+    flight: Option<Flight>,
+) -> Result<String> {
+    positive(&[
+        ("density", bench.density),
+        ("tension", bench.tension),
+        ("acceleration", a),
+        ("radius", radius),
+        ("flight density", liquid.density),
+        ("flight tension", liquid.tension),
+    ])?;
+    let bond = bench.bond(a, radius);
+    let mut text = format!("Bond number {bond:.4}: {}\n", regime(bond));
+    match flight {
+        Some(Flight::Radius(r)) => {
+            positive(&[("flight radius", r)])?;
+            let same = liquid.acceleration(bond, r);
+            writeln!(
+                text,
+                "a tank of radius {r} m has it at an acceleration of {} m/s2",
+                significant(same, 7)
+            )?;
+        }
+        Some(Flight::Acceleration(g)) => {
+            positive(&[("flight acceleration", g)])?;
+            let same = liquid.radius(bond, g);
+            writeln!(text, "at an acceleration of {g} m/s2 a tank of radius {same:.6} m has it")?;
+        }
+        None => {}
+    }
+    Ok(text)
+}
+
+/// The bench's rotational Bond numbers, and the tanks that have the same at another angular
+/// acceleration, in words.
+pub fn rotation_text(
+    liquid: Liquid,
+    (radius, arm): (f64, f64),
+    (alpha, omega): (f64, Option<f64>),
+    target: f64,
+) -> Result<String> {
+    let omega_2 = omega.map_or(1.0, |w| w * w);
+    positive(&[
+        ("density", liquid.density),
+        ("tension", liquid.tension),
+        ("radius", radius),
+        ("arm", arm),
+        ("alpha", alpha),
+        ("omega squared", omega_2),
+        ("flight alpha", target),
+    ])?;
+    let by_arm = liquid.rotational_bond(alpha, radius, arm);
+    let by_radius = liquid.rotational_bond(alpha, radius, radius);
+    let same_arm = liquid.radius(by_arm, target * arm);
+    let cube = liquid.radius_by_cube(by_radius, target);
+    let mut text = format!(
+        "Bo_i = rho alpha R^2 L/sigma = {by_arm:.4}: {}\n\
+         Bo_r = rho alpha R^3/sigma   = {by_radius:.4}: {}\n",
+        regime(by_arm),
+        regime(by_radius)
+    );
+    if let Some(w) = omega {
+        let bond = liquid.rotational_bond(w * w, radius, arm);
+        writeln!(text, "Bo_c = rho omega^2 R^2 L/sigma = {bond:.4}: {}", regime(bond))?;
+    }
+    writeln!(text, "at {target} rad/s2 ({}) the same has a tank of diameter", agility(target))?;
+    writeln!(text, "  {:.4} m by Bo_i, at the same distance from the axis", 2.0 * same_arm)?;
+    writeln!(text, "  {:.4} m by Bo_r (R^3, distance and radius scaled together)", 2.0 * cube)?;
+    Ok(text)
+}
+
+/// Table 2.3 for a scale, in words.
+pub fn froude_text(lambda: f64, density: f64, gravity: f64) -> Result<String> {
+    positive(&[("lambda", lambda), ("density ratio", density), ("gravity ratio", gravity)])?;
+    let factors = froude(lambda, density, gravity);
+    ensure!(
+        factors.iter().all(|(_, _, factor)| factor.is_finite() && *factor > 0.0),
+        "lambda = {lambda:?}, density ratio = {density:?}, gravity ratio = {gravity:?}: some factors are \
+         beyond the range of numbers"
+    );
+    let mut text = String::from("full size = factor x model\n");
+    for (name, unit, factor) in factors {
+        writeln!(text, "{name:22}{unit:8}{}", significant(factor, 7))?;
+    }
+    writeln!(
+        text,
+        "not kept: Reynolds' number, unless the full size's viscosity nu is {:.4} times the model's; \
+         Bond's, unless its sigma/rho is {:.4} times the model's",
+        froude_viscosity(lambda, gravity),
+        lambda * lambda * gravity
+    )?;
+    Ok(text)
+}
+
+/// A figure of the thesis's scaling, as printed and as it follows from its own data.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Figure {
+    /// Where it stands and what it is.
+    pub what: &'static str,
+    /// As printed.
+    pub printed: &'static str,
+    /// As it follows.
+    pub value: f64,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Why it differs, if it does.
+    pub remark: &'static str,
+}
+
+/// The thesis's figures of 7.2 and what is behind them, computed anew.
+pub fn thesis() -> Vec<Figure> {
+    let figure = |what, printed, value, unit, remark| Figure { what, printed, value, unit, remark };
+    let (radius, arm) = BENCH;
+    let bond = WATER.bond(9.81, radius);
+    let flight = 0.005; // rad/s2
+    let rotation = |alpha: f64| {
+        let by_arm = ROUND_WATER.rotational_bond(alpha, radius, arm);
+        let by_radius = ROUND_WATER.rotational_bond(alpha, radius, radius);
+        let cube = 2.0 * ROUND_WATER.radius_by_cube(by_radius, flight);
+        let mixed = 2.0 * ROUND_WATER.radius_by_cube(by_arm, flight);
+        let same_arm = 2.0 * ROUND_WATER.radius(by_arm, flight * arm);
+        (by_arm, by_radius, cube, mixed, same_arm)
+    };
+    let (arm_250, radius_250, cube_250, mixed_250, same_250) = rotation(2.21);
+    let (arm_12, radius_12, cube_12, ..) = rotation(0.222);
+    vec![
+        figure("7.2.1 Bond number of the bench", "902.3", bond, "", ""),
+        figure(
+            "5.1.2 Bond number of the 0.111 m tank",
+            "420",
+            WATER.bond(9.81, 0.0555),
+            "",
+            "420 is rounded",
+        ),
+        figure(
+            "8.2.2 diameter at Bo = 30",
+            "below roughly 5 cm",
+            2.0 * WATER.radius(30.0, 9.81),
+            "m",
+            "the radius is the length",
+        ),
+        figure(
+            "7.2.1 acceleration of a 2.0425 m tank of oxygen",
+            "0.002502",
+            OXYGEN.acceleration(bond, 2.0425),
+            "m/s2",
+            "at 90 K, not at -200 degC",
+        ),
+        figure(
+            "7.2.1 a_main",
+            "147000/18000 = 7.8191",
+            147_000.0 / 18_800.0,
+            "m/s2",
+            "the mass is 18800 kg",
+        ),
+        figure("7.2.1 a_RCS", "0.0025", 4.4 * 6.0 / 10_450.0, "m/s2", ""),
+        figure("7.2.2 0.25 N m, Bo_i (R^2 L)", "45.87 as Bo_r", arm_250, "", "it is eq. 2.25's"),
+        figure("7.2.2 0.25 N m, Bo_r (R^3)", "45.87", radius_250, "", "eq. 7.3 gives this"),
+        figure("7.2.2 0.25 N m, D by R^3", "1.2416", cube_250, "m", "follows from Bo_r"),
+        figure(
+            "7.2.2 0.25 N m, D by 45.87 in R^3",
+            "1.2416",
+            mixed_250,
+            "m",
+            "what 45.87 would give",
+        ),
+        figure("7.2.2 0.25 N m, D by R^2 L", "-", same_250, "m", "at the same arm"),
+        figure("7.2.2 0.0125 N m, Bo_i (R^2 L)", "4.62", arm_12, "", ""),
+        figure("7.2.2 0.0125 N m, Bo_r (R^3)", "4.62", radius_12, "", "eq. 7.3 gives this"),
+        figure("7.2.2 0.0125 N m, D by R^3", "0.5778", cube_12, "m", ""),
+    ]
+}
+
+/// [`thesis`] as a table.
+pub fn thesis_text() -> String {
+    let line = |f: Figure| {
+        let value = format!("{:.6} {}", f.value, f.unit);
+        format!("{:50} {:24} {value:22} {}\n", f.what, f.printed, f.remark)
+    };
+    let head = format!("{:50} {:24} {:22} {}\n", "figure", "printed", "computed", "remark");
+    head + &thesis().into_iter().map(line).collect::<String>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(what: &str) -> f64 {
+        thesis().into_iter().find(|f| f.what.starts_with(what)).expect(what).value
+    }
+
+    /// Each to half a unit of the last digit that is known.
+    #[test]
+    fn figures_of_the_thesis_come_out_corrected() {
+        for (what, known, digit) in [
+            ("7.2.1 Bond number", 902.3, 0.05),
+            ("5.1.2", 418.4, 0.05),
+            ("8.2.2", 0.0297, 5e-5),
+            ("7.2.1 acceleration", 0.002502, 5e-7),
+            ("7.2.1 a_main", 7.8191, 5e-5),
+            ("7.2.1 a_RCS", 0.00253, 5e-6),
+            ("7.2.2 0.25 N m, Bo_i", 45.87, 5e-3),
+            ("7.2.2 0.25 N m, Bo_r", 16.62, 5e-3),
+            ("7.2.2 0.25 N m, D by R^3", 1.2416, 1e-4), // printed with alpha rounded
+            ("7.2.2 0.25 N m, D by 45.87", 1.742, 5e-4),
+            ("7.2.2 0.25 N m, D by R^2", 3.43, 5e-3),
+            ("7.2.2 0.0125 N m, Bo_i", 4.608, 5e-4),
+            ("7.2.2 0.0125 N m, Bo_r", 1.669, 5e-4),
+            ("7.2.2 0.0125 N m, D", 0.5772, 5e-5),
+        ] {
+            assert!((of(what) - known).abs() <= digit, "{what}: {} not {known}", of(what));
+        }
+    }
+
+    #[test]
+    fn the_equivalent_tank_has_the_bench_s_bond_number() {
+        let bond = WATER.bond(9.81, BENCH.0);
+        let g = OXYGEN.acceleration(bond, 2.0425);
+        // rounding of a handful of products
+        assert!((OXYGEN.bond(g, 2.0425) / bond - 1.0).abs() < 1e-14);
+        assert!((OXYGEN.radius(bond, g) / 2.0425 - 1.0).abs() < 1e-14);
+        let cube = OXYGEN.rotational_bond(0.3, 0.7, 0.7);
+        assert!((OXYGEN.radius_by_cube(cube, 0.3) / 0.7 - 1.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn froude_factors_are_those_of_table_2_3_and_keep_the_froude_number() {
+        let (lambda, density) = (4.0, 1.2);
+        let factors = froude(lambda, density, 1.0);
+        let of = |name: &str| factors.iter().find(|f| f.0 == name).expect(name).2;
+        assert_eq!(of("time"), 2.0);
+        assert_eq!(of("acceleration"), 1.0);
+        assert_eq!(of("mass"), 64.0 * density);
+        assert_eq!(of("force"), 64.0 * density);
+        assert_eq!(of("moment"), 256.0 * density);
+        assert_eq!(of("pressure"), 4.0 * density);
+        let froude = of("velocity").powi(2) / (of("acceleration") * of("length"));
+        assert_eq!(froude, 1.0);
+        assert_eq!(of("length") / of("time"), of("velocity"));
+    }
+
+    #[test]
+    fn bad_numbers_are_refused_all_at_once() {
+        let none = Liquid { density: -1.0, tension: f64::NAN };
+        let text = bond_text(none, (9.81, 0.0), WATER, None).unwrap_err().to_string();
+        assert_eq!(text, "density = -1, tension = NaN, radius = 0 (allowed: positive numbers)");
+    }
+}

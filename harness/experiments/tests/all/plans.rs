@@ -1,0 +1,45 @@
+//! Built-in plans stay where their models mean something.
+
+use experiments::campaign::{Range, WAVE};
+use experiments::plan::{BUILT_IN, Case, Plan};
+use host::fmi2::Fmu;
+use pack::packed_for_tests;
+use rayon::prelude::*;
+
+/// Plans that leave the range of a model; their texts say why.
+const BEYOND: [&str; 4] = ["thesis", "thesis_models", "t5_near_resonance", "amplitudes"];
+
+/// The runs that are made here: of many those with the largest torque, of draws every twentieth.
+fn some<'a>(plan: &Plan, cases: &'a [Case]) -> Vec<&'a Case> {
+    let largest = cases.iter().filter_map(|case| case.amplitude).fold(0.0, f64::max);
+    match cases.len() {
+        _ if plan.is_random() => cases.iter().step_by(20).collect(),
+        0..=20 => cases.iter().collect(),
+        _ => cases.iter().filter(|case| case.amplitude.unwrap_or(0.0) >= largest).collect(),
+    }
+}
+
+/// How a run leaves its model's range, in the FMU's words and in those of the tables.
+fn beyond(fmu: &Fmu, case: &Case) -> Vec<String> {
+    let run = case.run();
+    let mut instance = run.initialise(fmu).unwrap();
+    let mut said = instance.take_warnings();
+    let range = Range::of(fmu.description(), &mut instance).unwrap().unwrap();
+    let table = run.drive(&mut instance, &[WAVE], |_| {}).unwrap();
+    said.extend(range.left(table.column(WAVE).unwrap()));
+    said.into_iter().map(|why| format!("{}: {why}", case.name)).collect()
+}
+
+#[test]
+fn built_in_plans_stay_in_their_models_range_or_say_that_they_leave_it() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    for (name, text) in BUILT_IN {
+        let plan = Plan::parse(text).unwrap();
+        let cases = plan.cases(fmu.description()).unwrap();
+        let left: Vec<String> =
+            some(&plan, &cases).par_iter().flat_map(|case| beyond(&fmu, case)).collect();
+        let says = text.contains("\n# Beyond the range of ");
+        assert_eq!(says, BEYOND.contains(name), "{name}");
+        assert_eq!(says, !left.is_empty(), "{name}: {left:#?}");
+    }
+}

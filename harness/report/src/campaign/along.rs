@@ -1,0 +1,248 @@
+//! Figures against the number that the plan varies.
+
+use analysis::features::{Deviations, Features};
+use analysis::rotary;
+use experiments::campaign::Outcome;
+
+use super::colors;
+use super::figure::{Figure, Panel, dots, line};
+use super::page::{Axis, Page, best, exact_features, list_of, manoeuvre};
+
+/// A quantity of a run: label, what it is, whether its axis is logarithmic, and a level to compare
+/// with.
+struct Quantity<'a> {
+    label: &'a str,
+    of: &'a dyn Fn(&Outcome) -> Option<f64>,
+    decades: bool,
+    level: Option<(f64, &'a str)>,
+}
+
+fn quantity<'a>(label: &'a str, of: &'a dyn Fn(&Outcome) -> Option<f64>) -> Quantity<'a> {
+    Quantity { label, of, decades: false, level: None }
+}
+
+/// Antiresonance and resonance of every group, with the exact linear ones: the question of most
+/// plans of sweeps.
+pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
+    let mut traces = Vec::new();
+    let mut untrusted = Vec::new();
+    for (i, group) in page.groups.iter().enumerate() {
+        type Side = (
+            &'static str,
+            &'static str,
+            fn(&Features) -> Option<f64>,
+            fn(&Deviations) -> Option<f64>,
+        );
+        let sides: [Side; 2] = [
+            ("antiresonance", "circle", |f| f.f_dip, |s| s.f_dip),
+            ("resonance", "diamond", |f| f.f_res, |s| s.f_res),
+        ];
+        for (k, (what, symbol, get, std)) in sides.into_iter().enumerate() {
+            let color = colors::category(2 * i + k);
+            let points: Vec<(f64, f64, Option<f64>)> = group
+                .runs
+                .iter()
+                .filter_map(|run| {
+                    let (estimate, _) = best(run)?;
+                    let value = get(&estimate.features)?;
+                    Some((axis.of(run)?, value, std(&estimate.deviations).map(|std| 2.0 * std)))
+                })
+                .collect();
+            traces.push(dots(0, &format!("{what}, {}", group.title()), color, symbol, &points));
+        }
+        for run in &group.runs {
+            let doubt = best(run).and_then(|(estimate, _)| estimate.doubt);
+            untrusted.extend(doubt.map(|doubt| format!("{} ({doubt})", run.case.name)));
+        }
+    }
+    // groups of equal plants share their exact response
+    let mut drawn: Vec<Vec<(f64, f64)>> = Vec::new();
+    for group in &page.groups {
+        for get in [|f: &Features| f.f_dip, |f: &Features| f.f_res] {
+            let points: Vec<(f64, f64)> = group
+                .runs
+                .iter()
+                .filter_map(|run| Some((axis.of(run)?, get(&exact_features(run))?)))
+                .collect();
+            if !drawn.contains(&points) {
+                traces.push(line(0, "exact, linear and viscous", colors::INK, "dot", &points));
+                drawn.push(points);
+            }
+        }
+    }
+    Figure {
+        title: format!("Antiresonance and resonance against {}", axis.name),
+        caption: format!(
+            "Circles: antiresonance, where the liquid holds the hub still; diamonds: resonance, where hub and liquid swing against each other; dotted: both of the exact linear plant with viscous friction. Bars: 95 % intervals, from what of the rate no linear response explains: gyro noise, dry friction, a nonlinear liquid (Methods). An upward sweep shows a narrow resonance late, so above the exact one (Methods).{}",
+            list_of("Not to be trusted, and not drawn", &untrusted)
+        ),
+        height: 460,
+        panels: vec![Panel::new(&axis.label, "frequency / Hz")],
+        traces,
+        ..Figure::default()
+    }
+}
+
+/// The largest of a signal at the end: after a manoeuvre, or in the last fifth of a run.
+fn at_the_end(run: &Outcome, signal: &str) -> Option<f64> {
+    let curve = run.history.curve(signal);
+    let (first, last) = (curve.first()?.0, curve.last()?.0);
+    let from = manoeuvre(run).unwrap_or(first + 0.8 * (last - first));
+    let late = curve.iter().filter(|(t, _)| *t > from);
+    Some(late.fold(0.0, |most: f64, (_, value)| most.max(value.abs())))
+}
+
+/// What a manoeuvre leaves behind: rate and slosh angle after its torque.
+pub(super) fn left_behind(page: &Page, axis: &Axis) -> Figure {
+    let rate = |run: &Outcome| Some(1e3 * at_the_end(run, "omega_imu")?);
+    let angle = |run: &Outcome| Some(at_the_end(run, "slosh_angle")?.to_degrees());
+    let title = format!("What is left after the manoeuvre, against {}", axis.name);
+    let figure = small(
+        page,
+        axis,
+        &title,
+        "The largest rate of the hub and the largest slosh angle after the torque has ended. A rigid craft that the torque brings to rest has none of either; what bearing friction leaves is the same for all models. In a slew by more than some tens of degrees linear and planar models turn the plane of the swing with the hub; spherical pendulums keep it in space.",
+        [quantity("largest rate / (mrad/s)", &rate), quantity("largest slosh angle / deg", &angle)],
+    );
+    Figure { columns: 2, height: 340, ..figure }
+}
+
+/// The largest slosh angles, and what is left at the end, for torques without a frequency response.
+pub(super) fn slosh_angles(page: &Page, axis: &Axis) -> Figure {
+    let radial = |run: &Outcome| Some(run.figures.peak_radial_angle.to_degrees());
+    let tangential = |run: &Outcome| Some(run.figures.peak_slosh_angle.to_degrees());
+    let angle = |run: &Outcome| Some(at_the_end(run, "slosh_angle")?.to_degrees());
+    let rate = |run: &Outcome| at_the_end(run, "omega_imu");
+    let title = format!("Slosh angles against {}", axis.name);
+    let figure = small(
+        page,
+        axis,
+        &title,
+        "The largest slosh angle along the hub's turn and across it, which only rotary slosh makes; and in the last fifth of the run, a dwell's steady state.",
+        [
+            quantity("largest tangential / deg", &tangential),
+            quantity("largest radial / deg", &radial),
+            quantity("tangential at the end / deg", &angle),
+            quantity("rate at the end / (rad/s)", &rate),
+        ],
+    );
+    Figure { columns: 2, height: 300, ..figure }
+}
+
+pub(super) fn features(page: &Page, axis: &Axis) -> Figure {
+    small(
+        page,
+        axis,
+        "Separation and notch depth",
+        "While the sweep passes, and over the whole record (<code>spa</code>). For a linear plant with linear friction the torque's amplitude would not matter; dry friction counts most when the torque is small, a nonlinear liquid when it is large.",
+        [
+            quantity("Δf, swept / mHz", &|run| {
+                Some(1e3 * run.passing.as_ref()?.rate.features.delta_f()?)
+            }),
+            quantity("Δf, spa / mHz", &|run| Some(1e3 * run.spa_features().delta_f()?)),
+            quantity("notch, swept / dB", &|run| run.passing.as_ref()?.rate.features.notch_db),
+            quantity("notch, spa / dB", &|run| run.spa_features().notch_db),
+        ],
+    )
+}
+
+pub(super) fn bearing_and_liquid(page: &Page, axis: &Axis) -> Figure {
+    let quarter = page.groups.first().map_or(0.0, |g| g.runs[0].range.radius / 4.0 * 1e3);
+    small(
+        page,
+        axis,
+        "Stiction, slosh amplitude, energy balance",
+        "Beyond the dashed line, a quarter of the tank's radius, linear slosh theory no longer holds: a linear model's runs there are computed faithfully, but they are not what a tank does. The energy residual checks the FMU's balance at every sample.",
+        [
+            Quantity {
+                decades: true,
+                ..quantity("time in stiction / s", &|run| Some(run.figures.stuck))
+            },
+            quantity("largest slosh angle / deg", &|run| {
+                Some(run.figures.peak_slosh_angle.to_degrees())
+            }),
+            Quantity {
+                level: Some((quarter, "a quarter of the radius")),
+                ..quantity("largest wave / mm", &|run| Some(run.figures.peak_wave_height * 1e3))
+            },
+            Quantity {
+                decades: true,
+                ..quantity("energy residual / throughput", &|run| {
+                    Some(run.figures.max_energy_residual)
+                })
+            },
+        ],
+    )
+}
+
+pub(super) fn linear_fit(page: &Page, axis: &Axis) -> Figure {
+    small(
+        page,
+        axis,
+        "Validity of a linear fit",
+        "A transfer function with three poles and two zeros, fitted to each run's <code>spa</code> response and driven with the run's own torque, as in the thesis. It cannot represent dry friction at small torque, nor a resonance that moves with the amplitude.",
+        [
+            quantity("fit in frequency / %", &|run| Some(run.fit()?.fit_frequency)),
+            quantity("fit in time / %", &|run| Some(run.fit()?.fit_time)),
+            quantity("residual coherence", &|run| run.fit()?.coherence),
+            quantity("SNR at antiresonance / dB", &|run| Some(run.record.as_ref()?.snr_db?[1])),
+        ],
+    )
+}
+
+pub(super) fn out_of_the_plane(page: &Page, axis: &Axis) -> Figure {
+    small(
+        page,
+        axis,
+        "Out of the plane",
+        "Swirl: 0 for motion in a plane, 1 for a circle; beyond the dashed line the slosh is rotary. Off-axis energy and leakage: the liquid's radial force, which only loads the bearing, relative to the tangential one and to the torque.",
+        [
+            Quantity {
+                level: Some((rotary::ROTARY, "counts as rotary")),
+                ..quantity("largest |swirl|", &|run| Some(run.rotary()?.swirl.abs()))
+            },
+            quantity("time in rotary slosh / s", &|run| Some(run.rotary()?.time)),
+            quantity("off-axis energy", &|run| Some(run.off_axis()?.energy)),
+            quantity("leakage", &|run| Some(run.off_axis()?.leakage)),
+        ],
+    )
+}
+
+/// One panel for each quantity, one series for each group.
+fn small<'a>(
+    page: &Page,
+    axis: &Axis,
+    title: &str,
+    caption: &str,
+    quantities: impl IntoIterator<Item = Quantity<'a>>,
+) -> Figure {
+    let (mut panels, mut traces) = (Vec::new(), Vec::new());
+    for (p, quantity) in quantities.into_iter().enumerate() {
+        panels.push(Panel { log_y: quantity.decades, ..Panel::new(&axis.label, quantity.label) });
+        let mut ends: Option<(f64, f64)> = None;
+        for (i, group) in page.groups.iter().enumerate() {
+            let points: Vec<(f64, f64, Option<f64>)> = group
+                .runs
+                .iter()
+                .filter_map(|run| Some((axis.of(run)?, (quantity.of)(run)?, None)))
+                .filter(|(_, y, _)| y.is_finite() && (!quantity.decades || *y > 0.0))
+                .collect();
+            for (x, ..) in &points {
+                ends = ends.map(|(low, high)| (low.min(*x), high.max(*x))).or(Some((*x, *x)));
+            }
+            traces.push(dots(p, &group.title(), colors::category(i), colors::symbol(i), &points));
+        }
+        if let (Some((level, name)), Some((low, high))) = (quantity.level, ends) {
+            traces.push(line(p, name, colors::INK, "dash", &[(low, level), (high, level)]));
+        }
+    }
+    Figure {
+        title: title.into(),
+        caption: caption.into(),
+        columns: 4,
+        height: 270,
+        panels,
+        traces,
+        ..Figure::default()
+    }
+}

@@ -1,0 +1,156 @@
+//! Monte Carlo: which of the drawn parameters decide, and the distribution of what they make.
+
+use experiments::campaign::Outcome;
+
+use super::colors;
+use super::figure::{Figure, Panel, numbers};
+use super::page::{Group, Page, best};
+
+/// Name, unit, and what it is of a run.
+type Figures = (&'static str, &'static str, fn(&Outcome) -> Option<f64>);
+
+const QUANTITIES: [Figures; 4] = [
+    ("antiresonance", "mHz", |run| Some(1e3 * best(run)?.0.features.f_dip?)),
+    ("resonance", "mHz", |run| Some(1e3 * best(run)?.0.features.f_res?)),
+    ("separation Δf", "mHz", |run| Some(1e3 * best(run)?.0.features.delta_f()?)),
+    ("notch depth", "dB", |run| best(run)?.0.features.notch_db),
+];
+
+/// Ranked sensitivities and histograms of a group.
+pub(super) fn draws(page: &Page, group: &Group) -> Vec<Figure> {
+    let grouping = page.plan.grouping();
+    let drawn = page.plan.varied().into_iter().enumerate();
+    let drawn: Vec<(usize, &str)> =
+        drawn.filter(|(_, n)| !grouping.contains(n) && !n.ends_with("seed")).collect();
+    let effect = |place: usize, of: fn(&Outcome) -> Option<f64>| {
+        let point = |run: &&Outcome| Some((run.case.varied[place].parse().ok()?, of(run)?));
+        let points: Vec<(f64, f64)> = group.runs.iter().filter_map(point).collect();
+        let (_, deviation) = moments(&points.iter().map(|p| p.1).collect::<Vec<_>>());
+        (correlation(&points), deviation)
+    };
+    // one standard deviation of the parameter moves the quantity by ρ of its own deviation
+    let mut ranked: Vec<(&str, [f64; 2], [f64; 2])> = drawn
+        .iter()
+        .map(|(place, name)| {
+            let each = [0, 1].map(|i| effect(*place, QUANTITIES[i].2));
+            (*name, each.map(|(rho, s)| rho * s), each.map(|(rho, _)| rho))
+        })
+        .collect();
+    let size = |row: &(&str, [f64; 2], [f64; 2])| row.1[0].abs().max(row.1[1].abs());
+    ranked.sort_by(|a, b| size(a).total_cmp(&size(b)));
+    let names: Vec<&str> = ranked.iter().map(|row| row.0).collect();
+    let bars = [0, 1].map(|i| {
+        let text: Vec<String> = ranked.iter().map(|row| format!("ρ = {:.2}", row.2[i])).collect();
+        serde_json::json!({
+            "type": "bar", "orientation": "h", "panel": 0, "name": QUANTITIES[i].0, "y": names,
+            "x": numbers(ranked.iter().map(|row| row.1[i])), "text": text, "textposition": "none",
+            "marker": {"color": colors::category(i)},
+            "hovertemplate": "%{y}: %{x:.3g} mHz, %{text}",
+        })
+    });
+    let count = group.runs.len();
+    let by_chance = 2.0 / (count.max(1) as f64).sqrt();
+    let first = Figure {
+        title: "Ranked sensitivities".into(),
+        caption: format!(
+            "How far antiresonance and resonance move when a drawn parameter grows by one standard deviation, the others at random: the largest effect on top. ρ is the coefficient of correlation; in {count} draws what is below {by_chance:.2} may be chance."
+        ),
+        height: 110 + 30 * ranked.len(),
+        panels: vec![Panel::new("change for one standard deviation / mHz", "")],
+        traces: bars.to_vec(),
+        ..Figure::default()
+    };
+    let (mut panels, mut traces, mut says) = (Vec::new(), Vec::new(), Vec::new());
+    for (p, (name, unit, of)) in QUANTITIES.into_iter().enumerate() {
+        let values: Vec<f64> = group.runs.iter().filter_map(|run| of(run)).collect();
+        let (mean, deviation) = moments(&values);
+        says.push(format!("{name} {mean:.1} ± {deviation:.1} {unit}"));
+        panels.push(Panel::new(&format!("{name} / {unit}"), "draws"));
+        let (x, counts) = histogram(&values);
+        traces.push(serde_json::json!({
+            "type": "bar", "panel": p, "name": name, "showlegend": false,
+            "x": numbers(x), "y": counts, "marker": {"color": colors::category(p)},
+        }));
+    }
+    let second = Figure {
+        title: "Distribution over the draws".into(),
+        caption: format!("Mean and standard deviation of {count} draws: {}.", says.join(", ")),
+        columns: 4,
+        height: 270,
+        panels,
+        traces,
+        ..Figure::default()
+    };
+    let (mut panels, mut traces) = (Vec::new(), Vec::new());
+    for (p, row) in ranked.iter().rev().take(4).enumerate() {
+        let Some((place, _)) = drawn.iter().find(|(_, name)| *name == row.0) else { continue };
+        panels.push(Panel::new(row.0, "frequency / mHz"));
+        for (i, (name, _, of)) in QUANTITIES.into_iter().take(2).enumerate() {
+            let point =
+                |run: &&Outcome| Some((run.case.varied[*place].parse::<f64>().ok()?, of(run)?));
+            let points: Vec<(f64, f64)> = group.runs.iter().filter_map(point).collect();
+            traces.push(serde_json::json!({
+                "type": "scatter", "mode": "markers", "panel": p, "name": name, "legendgroup": name,
+                "x": numbers(points.iter().map(|p| p.0)), "y": numbers(points.iter().map(|p| p.1)),
+                "marker": {"color": colors::category(i), "size": 4},
+            }));
+        }
+    }
+    let third = Figure {
+        title: "Every draw over the parameters that decide".into(),
+        caption: "Antiresonance and resonance of each draw over the four parameters with the largest effect.".into(),
+        columns: 4,
+        height: 270,
+        panels,
+        traces,
+        ..Figure::default()
+    };
+    vec![first, second, third]
+}
+
+/// Middles of bins and how many values are in each.
+fn histogram(values: &[f64]) -> (Vec<f64>, Vec<usize>) {
+    const BINS: usize = 24;
+    let (low, high) = values.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
+    let width = ((high - low) / BINS as f64).max(1e-9);
+    let mut counts = vec![0; BINS];
+    for value in values {
+        counts[(((value - low) / width) as usize).min(BINS - 1)] += 1;
+    }
+    ((0..BINS).map(|i| low + (i as f64 + 0.5) * width).collect(), counts)
+}
+
+/// Mean and standard deviation.
+fn moments(values: &[f64]) -> (f64, f64) {
+    let count = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count;
+    (mean, variance.sqrt())
+}
+
+/// Coefficient of correlation, −1 to 1; 0 where one of the two does not vary.
+fn correlation(points: &[(f64, f64)]) -> f64 {
+    let (x, y): (Vec<f64>, Vec<f64>) = points.iter().copied().unzip();
+    let ((mx, sx), (my, sy)) = (moments(&x), moments(&y));
+    let mean = points.iter().map(|(x, y)| (x - mx) * (y - my)).sum::<f64>() / points.len() as f64;
+    if sx * sy > 0.0 { mean / (sx * sy) } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_goes_together_correlates_by_one_and_what_is_constant_not_at_all() {
+        let line: Vec<(f64, f64)> = (0..10).map(|i| (f64::from(i), 3.0 - f64::from(i))).collect();
+        assert!((correlation(&line) + 1.0).abs() < 1e-12);
+        assert_eq!(correlation(&[(1.0, 2.0), (2.0, 2.0)]), 0.0);
+    }
+
+    #[test]
+    fn a_histogram_counts_every_value_once() {
+        let (x, counts) = histogram(&[1.0, 1.1, 1.5, 2.0]);
+        assert_eq!(counts.iter().sum::<usize>(), 4);
+        assert!(x[0] > 1.0 && x[23] < 2.0);
+    }
+}

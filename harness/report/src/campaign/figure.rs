@@ -1,0 +1,207 @@
+//! Figures: what `report.js` draws with plotly, and the HTML around it.
+
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+
+use host::html::escape;
+use serde_json::{Value, json};
+
+use crate::svg::simplified;
+use experiments::rounding::significant;
+
+/// A figure of one or more panels with a common legend.
+pub(super) struct Figure {
+    pub title: String,
+    /// What to see, as HTML.
+    pub caption: String,
+    /// Panels beside each other on a wide screen.
+    pub columns: usize,
+    /// Height of a row of panels, px.
+    pub height: usize,
+    /// Half of the page's width on a wide screen.
+    pub half: bool,
+    /// Panels that zoom together along x.
+    pub shared: bool,
+    pub panels: Vec<Panel>,
+    pub traces: Vec<Value>,
+}
+
+/// Axes of a panel.
+#[derive(Clone, Default)]
+pub(super) struct Panel {
+    pub x: String,
+    pub y: String,
+    pub log_x: bool,
+    pub log_y: bool,
+    /// The same scale both ways.
+    pub equal: bool,
+    /// Where x begins and ends at first, if not at the data's ends.
+    pub range: Option<(f64, f64)>,
+}
+
+impl Panel {
+    pub fn new(x: &str, y: &str) -> Panel {
+        Panel { x: x.into(), y: y.into(), ..Panel::default() }
+    }
+}
+
+impl Default for Figure {
+    fn default() -> Self {
+        Figure {
+            title: String::new(),
+            caption: String::new(),
+            columns: 1,
+            height: 330,
+            half: false,
+            shared: false,
+            panels: Vec::new(),
+            traces: Vec::new(),
+        }
+    }
+}
+
+/// The page's figures, in their order.
+#[derive(Default)]
+pub(super) struct Figures {
+    specifications: Vec<Value>,
+    titles: Vec<String>,
+}
+
+impl Figures {
+    /// Takes a figure and gives the HTML of its place; nothing if it has nothing to show.
+    pub fn add(&mut self, figure: Figure) -> String {
+        let none = |axis: &Value| axis.as_array().is_some_and(Vec::is_empty);
+        let empty = |trace: &Value| none(&trace["x"]) || none(&trace["y"]);
+        let mut traces: Vec<Value> = figure.traces.into_iter().filter(|t| !empty(t)).collect();
+        // a panel without a trace would be a blank
+        let drawn: BTreeSet<u64> = traces.iter().filter_map(|t| t["panel"].as_u64()).collect();
+        if drawn.is_empty() {
+            return String::new();
+        }
+        for trace in &mut traces {
+            let place = drawn.iter().position(|p| trace["panel"] == *p);
+            trace["panel"] = json!(place);
+        }
+        let panels: Vec<Value> = drawn
+            .iter()
+            .map(|p| &figure.panels[*p as usize])
+            .map(|p| {
+                json!({"x": p.x, "y": p.y, "logx": p.log_x, "logy": p.log_y, "equal": p.equal,
+                       "range": p.range.map(|(from, to)| [number(from), number(to)])})
+            })
+            .collect();
+        self.specifications.push(json!({
+            "columns": figure.columns, "height": figure.height, "shared": figure.shared,
+            "panels": panels, "traces": traces,
+        }));
+        let number = self.specifications.len();
+        self.titles.push(figure.title.clone());
+        let half = if figure.half { " class=\"half\"" } else { "" };
+        let title = escape(&figure.title);
+        format!(
+            "<figure id=\"figure-{number}\"{half}><div class=\"plot\" role=\"img\" aria-label=\"{title}\"></div>\
+             <figcaption><a href=\"#figure-{number}\">Figure {number}</a> <b>{title}.</b> {}</figcaption></figure>\n",
+            figure.caption
+        )
+    }
+
+    /// Links to the figures.
+    pub fn list(&self) -> String {
+        let mut out = String::new();
+        for (i, title) in self.titles.iter().enumerate() {
+            let _ = write!(out, "<li><a href=\"#figure-{0}\">{1}</a></li>", i + 1, escape(title));
+        }
+        out
+    }
+
+    /// The specifications, as they stand in a script element: without `<`, since `</script` ends it
+    /// and `<!--<script` keeps its end from being seen (HTML, 13.2.5.20).
+    pub fn json(&self) -> String {
+        Value::Array(self.specifications.clone()).to_string().replace('<', "\\u003c")
+    }
+}
+
+/// A number with five digits; null if it is none.
+pub(super) fn number(value: f64) -> Value {
+    let rounded = significant(value, 5);
+    if rounded.is_finite() && rounded == rounded.trunc() && rounded.abs() < 1e15 {
+        return json!(rounded as i64); // shorter
+    }
+    json!(rounded.is_finite().then_some(rounded))
+}
+
+pub(super) fn numbers(values: impl IntoIterator<Item = f64>) -> Vec<Value> {
+    values.into_iter().map(number).collect()
+}
+
+/// A curve in panel `panel`: a line, `dash` as plotly names it.
+pub(super) fn line(
+    panel: usize,
+    name: &str,
+    color: &str,
+    dash: &str,
+    points: &[(f64, f64)],
+) -> Value {
+    let mut trace = json!({
+        "type": "scatter", "mode": "lines", "name": name, "panel": panel, "legendgroup": name,
+        "y": numbers(points.iter().map(|p| p.1)),
+        "line": {"color": color, "dash": dash, "width": 1.6},
+    });
+    match even(points) {
+        Some((first, step)) => (trace["x0"], trace["dx"]) = (json!(first), json!(step)),
+        None => trace["x"] = Value::Array(numbers(points.iter().map(|p| p.0))),
+    }
+    trace
+}
+
+/// The first x and the distance of the others, if all are as far apart.
+fn even(points: &[(f64, f64)]) -> Option<(f64, f64)> {
+    let [first, .., last] = points else { return None };
+    let step = (last.0 - first.0) / (points.len() - 1) as f64;
+    let off = |(i, p): (usize, &(f64, f64))| (p.0 - first.0 - i as f64 * step).abs();
+    let most = points.iter().enumerate().map(off).fold(0.0, f64::max);
+    (points.len() > 20 && step > 0.0 && most < 1e-6 * step).then_some((first.0, step))
+}
+
+/// Points joined by a line, each with the half-width of its uncertainty if there is one.
+pub(super) fn dots(
+    panel: usize,
+    name: &str,
+    color: &str,
+    symbol: &str,
+    points: &[(f64, f64, Option<f64>)],
+) -> Value {
+    let mut trace = json!({
+        "type": "scatter", "mode": "lines+markers", "name": name, "panel": panel,
+        "legendgroup": name,
+        "x": numbers(points.iter().map(|p| p.0)), "y": numbers(points.iter().map(|p| p.1)),
+        "line": {"color": color, "width": 1.2}, "marker": {"color": color, "symbol": symbol, "size": 7},
+    });
+    if points.iter().any(|p| p.2.is_some()) {
+        let array = numbers(points.iter().map(|p| p.2.unwrap_or(0.0)));
+        trace["error_y"] =
+            json!({"type": "data", "array": array, "color": color, "thickness": 1, "width": 3});
+    }
+    trace
+}
+
+/// Points of a curve that a drawing of common size needs; x even in the logarithm if `log`.
+pub(super) fn thinned(points: &[(f64, f64)], log: bool) -> Vec<(f64, f64)> {
+    let finite = |p: &&(f64, f64)| p.0.is_finite() && p.1.is_finite();
+    let points: Vec<(f64, f64)> = points.iter().filter(finite).copied().collect();
+    let place = |x: f64| if log { x.ln() } else { x };
+    let span = |of: &dyn Fn(&(f64, f64)) -> f64| {
+        let (low, high) = points
+            .iter()
+            .map(of)
+            .fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
+        (low, (high - low).max(1e-300))
+    };
+    let ((x0, w), (y0, h)) = (span(&|p| place(p.0)), span(&|p| p.1));
+    // a drawing of 2000 by 400 px: a narrow resonance may be zoomed
+    let scaled: Vec<(f64, f64)> =
+        points.iter().map(|p| (2000.0 * (place(p.0) - x0) / w, 400.0 * (p.1 - y0) / h)).collect();
+    let mut kept = simplified(&scaled, 0.4).into_iter().peekable();
+    let mut keep = |i: usize| kept.next_if(|p| *p == scaled[i]).is_some();
+    points.iter().enumerate().filter(|(i, _)| keep(*i)).map(|(_, p)| *p).collect()
+}

@@ -1,0 +1,209 @@
+//! Time histories, and the path of the liquid's crest.
+
+use analysis::rotary;
+use experiments::campaign::{Outcome, SloshPath};
+
+use super::colors;
+use super::figure::{Figure, Panel, line};
+use super::page::{Group, Page, manoeuvre};
+
+/// Runs of a group that are drawn over time: all if they are few, else the first, the middle and the
+/// last.
+fn chosen<'a>(runs: &[&'a Outcome]) -> Vec<&'a Outcome> {
+    match runs.len() {
+        0..=4 => runs.to_vec(),
+        n => vec![runs[0], runs[n / 2], runs[n - 1]],
+    }
+}
+
+/// Torque, rate, slosh angles and residual of some runs of a group.
+pub(super) fn history(page: &Page, group: &Group) -> Figure {
+    let runs = chosen(&group.runs);
+    let mut traces = Vec::new();
+    let panels = [
+        "torque / N·m",
+        "rate / (rad/s)",
+        "tangential / deg",
+        "radial / deg",
+        "residual / (rad/s)",
+    ];
+    let signals = ["tau_cmd", "omega_imu", "slosh_angle", "slosh_angle_radial", "residual"];
+    // the largest first, or it would hide the others
+    for (i, run) in runs.iter().enumerate().rev() {
+        let color = colors::ordered(i, runs.len());
+        for (p, signal) in signals.iter().enumerate() {
+            let mut curve = run.history.curve(signal);
+            if p == 2 || p == 3 {
+                curve.iter_mut().for_each(|(_, angle)| *angle = angle.to_degrees());
+            }
+            traces.push(line(p, &page.name(run), &color, "solid", &curve));
+        }
+    }
+    Figure {
+        title: format!("Time histories, {}", group.title()),
+        caption: format!(
+            "Torque, measured rate, slosh angles along and across the hub's turn, and the residual: the rate less that of the exact linear plant, with viscous friction at most, under the same torque; it is what dry friction and nonlinear slosh do.{}{}",
+            if runs.len() < group.runs.len() {
+                format!(" {} of {}.", runs.len(), super::runs(group.runs.len()))
+            } else {
+                String::new()
+            },
+            if runs
+                .iter()
+                .any(|run| run.case.run().steps() > 2 * experiments::campaign::History::STRETCHES)
+            {
+                " Fast oscillations are drawn by their envelope."
+            } else {
+                ""
+            },
+        ),
+        height: 135,
+        half: page.groups.len() > 1,
+        shared: true,
+        panels: panels.map(|y| Panel::new("time / s", y)).to_vec(),
+        traces,
+        ..Figure::default()
+    }
+}
+
+/// Rate and slosh angle after a manoeuvre, one colour for each group: the run of each whose value
+/// of the axis is in the middle.
+pub(super) fn after(page: &Page) -> Figure {
+    let mut traces = Vec::new();
+    let mut from = f64::INFINITY;
+    for (i, group) in page.groups.iter().enumerate() {
+        let run = group.runs[group.runs.len() / 2];
+        from = from.min(manoeuvre(run).unwrap_or(f64::INFINITY));
+        let name = format!("{}, {}", group.title(), page.name(run));
+        for (p, (signal, scale)) in
+            [("omega_imu", 1e3), ("slosh_angle", 1f64.to_degrees())].iter().enumerate()
+        {
+            let late = run.history.curve(signal).into_iter().filter(|(t, _)| *t >= from);
+            let curve: Vec<(f64, f64)> = late.map(|(t, value)| (t, scale * value)).collect();
+            traces.push(line(p, &name, colors::category(i), "solid", &curve));
+        }
+    }
+    Figure {
+        title: "Rate and slosh angle after the manoeuvre".into(),
+        caption: "From the end of the torque on. With a rigid liquid the hub is at rest then; a sloshing liquid goes on pushing it at the slosh frequency.".into(),
+        columns: 2,
+        height: 300,
+        panels: vec![
+            Panel::new("time / s", "rate / (mrad/s)"),
+            Panel::new("time / s", "tangential slosh angle / deg"),
+        ],
+        traces,
+        ..Figure::default()
+    }
+}
+
+/// All runs of a plan over each other, if it has no axis to draw them along.
+pub(super) fn compared(page: &Page) -> Figure {
+    let runs =
+        || page.groups.iter().flat_map(|group| group.runs.iter().map(move |run| (group, run)));
+    let signals = [
+        ("omega_imu", "rate / (rad/s)", 1.0),
+        ("slosh_angle", "tangential / deg", 1f64.to_degrees()),
+        ("slosh_angle_radial", "radial / deg", 1f64.to_degrees()),
+    ];
+    let mut traces = Vec::new();
+    for (i, (group, run)) in runs().enumerate() {
+        let name = match group.runs.len() {
+            1 => group.title(),
+            _ => format!("{}, {}", group.title(), page.name(run)),
+        };
+        for (p, (signal, _, scale)) in signals.iter().enumerate() {
+            let curve = run.history.curve(signal).into_iter();
+            let curve: Vec<(f64, f64)> = curve.map(|(t, value)| (t, scale * value)).collect();
+            let (color, dash) = (colors::category(i), ["solid", "dash", "dot"][i % 3]);
+            traces.push(line(p, &name, color, dash, &curve));
+        }
+    }
+    // smallest and largest rate of each stretch of a run's history
+    let envelope = |run: &Outcome| -> Vec<[f64; 2]> {
+        let rate = run.history.curve("omega_imu");
+        rate.chunks_exact(2).map(|p| [p[0].1.min(p[1].1), p[0].1.max(p[1].1)]).collect()
+    };
+    let rates: Vec<_> = runs().map(|(_, run)| envelope(run)).collect();
+    let apart = match rates.iter().all(|rate| rate.len() == rates[0].len()) {
+        true => {
+            let pairs =
+                rates.iter().flat_map(|rate| rate.iter().flatten().zip(rates[0].iter().flatten()));
+            let most = pairs.fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+            format!(" The envelopes of the rates differ by at most {most:.1e} rad/s.")
+        }
+        false => String::new(),
+    };
+    Figure {
+        title: "The runs compared".into(),
+        caption: format!("Measured rate, slosh angles along and across the hub's turn.{apart}"),
+        height: 190,
+        shared: true,
+        panels: signals.iter().map(|(_, label, _)| Panel::new("time / s", label)).collect(),
+        traces,
+        ..Figure::default()
+    }
+}
+
+/// The crest's path seen from above and over time, if the slosh leaves its plane.
+pub(super) fn paths(page: &Page, group: &Group) -> Vec<Figure> {
+    let radial = |run: &Outcome| run.figures.peak_radial_angle;
+    let Some(last) = group.runs.iter().copied().max_by(|a, b| radial(a).total_cmp(&radial(b)))
+    else {
+        return Vec::new();
+    };
+    // a wave that stays in its plane has no path to show
+    if radial(last) < rotary::LEAST {
+        return Vec::new();
+    }
+    let onset = group.runs.iter().find_map(|run| Some((*run, run.path.onset.as_ref()?)));
+    let planar = group.runs.iter().copied().take_while(|run| run.path.onset.is_none()).last();
+    let mut parts: Vec<(String, &[[f64; 3]])> = Vec::new();
+    if let (Some(planar), Some(_)) = (planar, onset) {
+        parts.push((format!("planar, {}", page.name(planar)), &planar.path.largest));
+    }
+    if let Some((run, path)) = onset {
+        parts.push((format!("onset of rotary slosh, {}", page.name(run)), path));
+    }
+    parts.push((format!("largest wave, {}", page.name(last)), &last.path.largest));
+    let deg = f64::to_degrees;
+    let mut traces = Vec::new();
+    for (i, (name, path)) in parts.iter().enumerate() {
+        let points: Vec<(f64, f64)> = path.iter().map(|[_, r, t]| (deg(*t), deg(*r))).collect();
+        traces.push(line(0, name, colors::category(i), "solid", &points));
+    }
+    let seen = Figure {
+        title: format!("The wave seen from above, {}", group.title()),
+        caption: format!(
+            "Slosh angle outwards against slosh angle along the hub's turn, the same scale both ways; a line is planar slosh, a circle rotary slosh. {} periods around the largest wave, {} around the moment at which the swirl passes {}. An entry of the legend switches its path.",
+            SloshPath::LARGEST,
+            SloshPath::ONSET,
+            rotary::ROTARY
+        ),
+        height: 470,
+        half: true,
+        panels: vec![Panel {
+            equal: true,
+            ..Panel::new("tangential angle / deg, towards +θ", "radial angle / deg, outwards")
+        }],
+        traces,
+        ..Figure::default()
+    };
+    let (name, path) = &parts[parts.len().saturating_sub(if onset.is_some() { 2 } else { 1 })];
+    let over = |k: usize| path.iter().map(|row| (row[0], deg(row[k]))).collect::<Vec<_>>();
+    let time = Figure {
+        title: format!("The same over time, {}", group.title()),
+        caption: format!(
+            "{name}: the radial motion grows out of the plane of the tangential one; in rotary slosh the two are a quarter of a period apart."
+        ),
+        height: 470,
+        half: true,
+        panels: vec![Panel::new("time / s", "slosh angle / deg")],
+        traces: vec![
+            line(0, "tangential", colors::category(0), "solid", &over(2)),
+            line(0, "radial", colors::category(1), "solid", &over(1)),
+        ],
+        ..Figure::default()
+    };
+    vec![seen, time]
+}

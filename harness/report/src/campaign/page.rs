@@ -1,0 +1,291 @@
+//! What every figure of a page about a campaign looks at: the runs in groups, the axis along which they
+//! are drawn.
+
+use std::fmt::Write as _;
+
+use analysis::features::Features;
+use analysis::sweep::Sweep;
+use analysis::{BAND, FrequencyResponse, logarithmic_grid};
+use experiments::campaign::{Curve, Estimate, Outcome, Results};
+use experiments::plan::Plan;
+use experiments::profile::Torque;
+use host::fmi2::Fmu;
+use host::html::escape;
+
+/// Runs that differ in nothing but the number along which they are drawn (and what is drawn at
+/// random).
+pub(super) struct Group<'a> {
+    pub model: &'a str,
+    /// m; `None` if it is drawn at random, or what the runs are drawn along.
+    pub fill: Option<f64>,
+    /// What else tells it from the other groups, such as `tank.d 111 mm`.
+    pub others: Vec<String>,
+    pub runs: Vec<&'a Outcome>,
+    /// The sweep of its first run.
+    pub sweep: Option<&'a Sweep>,
+    /// Features of each run's exact linear response on the grid of its band.
+    pub exact: Vec<Features>,
+    /// That response of the first run.
+    pub exact_response: FrequencyResponse,
+}
+
+impl Group<'_> {
+    pub fn title(&self) -> String {
+        let mut title = self.model.to_string();
+        if let Some(fill) = self.fill {
+            let _ = write!(title, ", {} cm fill", cm(fill));
+        }
+        for other in &self.others {
+            let _ = write!(title, ", {other}");
+        }
+        title
+    }
+
+    pub fn band(&self) -> Option<(f64, f64)> {
+        band(self.runs[0])
+    }
+}
+
+/// The number along which runs are drawn.
+pub(super) struct Axis {
+    /// Its place among what is varied.
+    pub place: usize,
+    pub name: String,
+    /// With its unit.
+    pub label: String,
+    /// What a value is multiplied by.
+    pub scale: f64,
+}
+
+impl Axis {
+    pub fn of(&self, run: &Outcome) -> Option<f64> {
+        let value: f64 = run.case.varied[self.place].parse().ok()?;
+        Some((value * self.scale * 1e9).round() / 1e9)
+    }
+}
+
+/// What every figure may look at.
+pub(super) struct Page<'a> {
+    pub plan: &'a Plan,
+    pub groups: Vec<Group<'a>>,
+    pub axis: Option<Axis>,
+    /// All that is varied, in the plan's order.
+    pub varied: Vec<Option<Varied>>,
+}
+
+impl Page<'_> {
+    /// A run's name within its group.
+    pub fn name(&self, run: &Outcome) -> String {
+        let value = self.axis.as_ref().and_then(|axis| Some((axis, axis.of(run)?)));
+        match value {
+            Some((axis, x)) => match axis.label.split_once(" / ") {
+                Some((_, unit)) => format!("{x} {unit}"),
+                None => format!("{} {x}", axis.label),
+            },
+            None => run.case.name.clone(),
+        }
+    }
+}
+
+/// Most curves in one figure of responses.
+pub(super) const MOST_CURVES: usize = 24;
+
+/// The estimate that a run's headline is taken from, and its name: of a sweep that of
+/// `features.csv`, else `spa`'s.
+pub(super) fn best(run: &Outcome) -> Option<(&Estimate, &'static str)> {
+    run.estimate().or_else(|| Some((&run.record.as_ref()?.spa, "spa")))
+}
+
+/// Level in dB over the frequency while the sweep passes.
+pub(super) fn passing(run: &Outcome) -> Curve {
+    let response = run.passing.as_ref().map(|passing| &passing.rate.response);
+    response.map_or(Curve::new(), |r| zip(&r.frequency, &r.decibels()))
+}
+
+/// The sweep that drives a run, if it is one.
+pub(super) fn sweep(run: &Outcome) -> Option<&Sweep> {
+    match &*run.case.torque {
+        Torque::Profile(profile) => profile.sweep(),
+        _ => None,
+    }
+}
+
+/// The band in which a run has a frequency response, Hz.
+pub(super) fn band(run: &Outcome) -> Option<(f64, f64)> {
+    match &*run.case.torque {
+        Torque::Profile(profile) => profile.band(),
+        _ => None,
+    }
+}
+
+/// Features of a run's exact linear response.
+pub(super) fn exact_features(run: &Outcome) -> Features {
+    let grid = logarithmic_grid(band(run).unwrap_or(BAND), 2000);
+    Features::of(&run.linear.frequency_response(&grid))
+}
+
+/// The unit of a variable, as it is printed.
+pub(super) fn unit(fmu: &Fmu, name: &str) -> Option<String> {
+    let unit = fmu.description().variable(name).ok()?.attributes().unit.clone()?;
+    Some(printed(&unit))
+}
+
+/// A unit in FMI's spelling, as it is printed: N.m, kg.m2, rad/s2.
+pub(super) fn printed(unit: &str) -> String {
+    unit.replace('.', "·").replace("m2", "m²").replace("s2", "s²")
+}
+
+/// What a plan varies, for readers: a profile's parameter by what it is, a variable by its name.
+pub(super) struct Varied {
+    pub name: String,
+    /// As it is printed; empty if it has none.
+    pub unit: String,
+    /// What a value is multiplied by.
+    pub scale: f64,
+}
+
+impl Varied {
+    pub fn of(variable: &str, fmu: &Fmu, runs: &[Outcome]) -> Option<Varied> {
+        let (name, unit) = match variable.strip_prefix("profile.") {
+            Some(name) => {
+                let parameter = runs.iter().find_map(|run| match &*run.case.torque {
+                    Torque::Profile(profile) => profile.parameter(name),
+                    Torque::Rows { .. } => None,
+                })?;
+                (parameter.label, printed(parameter.unit))
+            }
+            None => (variable, unit(fmu, variable).unwrap_or_default()),
+        };
+        let (unit, scale) = match &*unit {
+            "N·m" if variable == "profile.amplitude" => ("mN·m".into(), 1e3),
+            "m" => ("mm".into(), 1e3),
+            "1" => (String::new(), 1.0),
+            _ => (unit, 1.0),
+        };
+        Some(Varied { name: name.into(), unit, scale })
+    }
+
+    /// One of its values: `tank.d 111 mm`, `slosh.model planar`.
+    pub fn value(&self, text: &str) -> String {
+        let number = text.parse::<f64>().ok().map(|value| {
+            // without the dust of binary fractions
+            let value = (value * self.scale * 1e9).round() / 1e9;
+            format!("{value} {}", self.unit).trim_end().to_string()
+        });
+        format!("{} {}", self.name, number.as_deref().unwrap_or(text))
+    }
+
+    /// Name and unit.
+    pub fn label(&self) -> String {
+        match &*self.unit {
+            "" => self.name.clone(),
+            unit => format!("{} / {unit}", self.name),
+        }
+    }
+}
+
+pub(super) fn axis(plan: &Plan, fmu: &Fmu, runs: &[Outcome]) -> Option<Axis> {
+    let variable = plan.axis()?;
+    let place = plan.varied().iter().position(|n| *n == variable)?;
+    let varied = Varied::of(variable, fmu, runs)?;
+    Some(Axis { place, label: varied.label(), name: varied.name, scale: varied.scale })
+}
+
+pub(super) fn groups<'a>(plan: &Plan, fmu: &Fmu, results: &'a Results) -> Vec<Group<'a>> {
+    let axis = plan.axis().unwrap_or("");
+    // the places, among all that is varied, of what tells groups apart beside model and fill
+    let grouping = plan.grouping();
+    let others: Vec<(usize, Varied)> = plan
+        .varied()
+        .into_iter()
+        .enumerate()
+        .filter(|(_, name)| grouping.contains(name) && *name != axis)
+        .filter(|(_, name)| !["slosh.model", "tank.h"].contains(name))
+        .filter_map(|(i, name)| Some((i, Varied::of(name, fmu, &results.outcomes)?)))
+        .collect();
+    let one_fill = axis != "tank.h" && (!plan.is_random() || grouping.contains(&"tank.h"));
+    let mut groups: Vec<Group> = Vec::new();
+    for run in &results.outcomes {
+        let values = others.iter().filter(|(i, _)| !run.case.varied[*i].is_empty());
+        let key: Vec<String> = match &run.case.listed {
+            // what the plan calls it says more than the values that make it
+            Some(name) => vec![name.replace('_', " ")],
+            None => values.map(|(i, varied)| varied.value(&run.case.varied[*i])).collect(),
+        };
+        let same = |g: &&mut Group| {
+            g.model == run.range.model && (!one_fill || g.fill == run.range.fill) && g.others == key
+        };
+        let grid = logarithmic_grid(band(run).unwrap_or(BAND), 2000);
+        let exact_response = run.linear.frequency_response(&grid);
+        let exact = Features::of(&exact_response);
+        match groups.iter_mut().find(same) {
+            Some(group) => {
+                group.runs.push(run);
+                group.exact.push(exact);
+            }
+            None => {
+                groups.push(Group {
+                    model: &run.range.model,
+                    fill: run.range.fill.filter(|_| one_fill),
+                    others: key,
+                    runs: vec![run],
+                    sweep: sweep(run),
+                    exact: vec![exact],
+                    exact_response,
+                });
+            }
+        }
+    }
+    groups
+}
+
+/// "1 run", "2 runs".
+pub(super) fn runs(count: usize) -> String {
+    format!("{count} run{}", if count == 1 { "" } else { "s" })
+}
+
+/// When the torque of a run ends for good, s, if the run goes on after that: a manoeuvre.
+pub(super) fn manoeuvre(run: &Outcome) -> Option<f64> {
+    let torque = run.history.curve("tau_cmd");
+    let last = torque.iter().rposition(|(_, torque)| *torque != 0.0)?;
+    let (end, whole) = (torque.get(last + 1)?.0, torque.last()?.0);
+    (end < 0.9 * whole).then_some(end)
+}
+
+/// A sentence that lists at most four of several things; nothing if there are none.
+pub(super) fn list_of(what: &str, things: &[String]) -> String {
+    match things {
+        [] => String::new(),
+        few if few.len() <= 4 => format!(" {what}: {}.", escape(&few.join(", "))),
+        many => format!(" {what}: {} and {} more.", escape(&many[..3].join(", ")), many.len() - 3),
+    }
+}
+
+/// Each value once, in the order of the first.
+pub(super) fn distinct<T: PartialEq>(values: impl Iterator<Item = T>) -> Vec<T> {
+    let mut found = Vec::new();
+    for value in values {
+        if !found.contains(&value) {
+            found.push(value);
+        }
+    }
+    found
+}
+
+/// Amplitude of a run's torque, N·m; 0 where there is none.
+pub(super) fn torque_of(run: &Outcome) -> f64 {
+    run.case.amplitude.unwrap_or(0.0)
+}
+
+pub(super) fn zip(x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {
+    x.iter().copied().zip(y.iter().copied()).collect()
+}
+
+/// A length in cm to the micrometre.
+pub(super) fn cm(length: f64) -> f64 {
+    (length * 1e6).round() / 1e4
+}
+
+pub(super) fn hertz(value: Option<f64>) -> String {
+    value.map_or("none".into(), |f| format!("{f:.4} Hz"))
+}
