@@ -3,75 +3,39 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use HubSlosh::table::TABLE;
+use host::xml::{Element, double};
 use plant::{FrictionModel, SloshModel, SloshSource};
 use runtime::operation::{GET_BOOLEAN, GET_INTEGER, GET_REAL, Interface};
 use runtime::variable::{Causality, Kind, Value, Variable};
 
-/// An element of the XML with its attributes.
-struct Element {
-    name: String,
-    attributes: BTreeMap<String, String>,
-    /// Names of the elements around it, outermost first.
-    path: Vec<String>,
+fn number(element: &Element, attribute: &str) -> Option<f64> {
+    element.get(attribute).map(|text| double(text).unwrap())
 }
 
-impl Element {
-    fn get(&self, attribute: &str) -> Option<&str> {
-        self.attributes.get(attribute).map(String::as_str)
-    }
-
-    fn number(&self, attribute: &str) -> Option<f64> {
-        self.get(attribute).map(|text| text.parse().unwrap())
-    }
-
-    /// Indices in an attribute that is a list.
-    fn list(&self, attribute: &str) -> Vec<usize> {
-        let words = self.get(attribute).unwrap().split_whitespace();
-        words.map(|word| word.parse().unwrap()).collect()
-    }
+/// Indices in an attribute that is a list.
+fn indices(element: &Element, attribute: &str) -> Vec<usize> {
+    let words = element.get(attribute).unwrap().split_whitespace();
+    words.map(|word| word.parse().unwrap()).collect()
 }
 
 fn committed() -> String {
     std::fs::read_to_string(model_description::path::<HubSlosh::HubSlosh>()).unwrap()
 }
 
-/// All elements of the committed file, in its order.
-fn elements() -> Vec<Element> {
-    let text = committed();
-    let (mut all, mut path) = (Vec::new(), Vec::new());
-    for event in xml::EventReader::from_str(&text) {
-        match event.unwrap() {
-            xml::reader::XmlEvent::StartElement { name, attributes, .. } => {
-                let attributes =
-                    attributes.into_iter().map(|a| (a.name.local_name, a.value)).collect();
-                all.push(Element { name: name.local_name.clone(), attributes, path: path.clone() });
-                path.push(name.local_name);
-            }
-            xml::reader::XmlEvent::EndElement { .. } => {
-                path.pop();
-            }
-            _ => {}
-        }
-    }
-    all
+/// The root of the committed file.
+fn root() -> Element {
+    Element::parse(committed().as_bytes()).unwrap()
 }
 
 /// Each variable with the element of its type.
 fn variables() -> Vec<(Element, Element)> {
-    let mut all = Vec::new();
-    let mut rest = elements().into_iter();
-    while let Some(element) = rest.next() {
-        if element.name == "ScalarVariable" {
-            all.push((element, rest.next().unwrap()));
-        }
-    }
-    all
+    let root = root();
+    let of_type = |variable: &Element| (variable.clone(), variable.children[0].clone());
+    root.list("ModelVariables").map(of_type).collect()
 }
 
 fn unknowns(list: &str) -> Vec<Element> {
-    let mut all = elements();
-    all.retain(|e| e.name == "Unknown" && e.path.last().is_some_and(|p| p == list));
-    all
+    root().child("ModelStructure").unwrap().list(list).cloned().collect()
 }
 
 #[test]
@@ -84,7 +48,7 @@ fn committed_file_is_what_the_table_says() {
 
 #[test]
 fn guid_is_the_binarys() {
-    assert_eq!(elements()[0].get("guid"), Some(TABLE.guid()));
+    assert_eq!(root().get("guid"), Some(TABLE.guid()));
 }
 
 #[test]
@@ -121,9 +85,9 @@ fn start_values_are_within_min_and_max() {
         if !matches!(kind.name.as_str(), "Real" | "Integer") {
             continue;
         }
-        let (min, max) = (kind.number("min"), kind.number("max"));
+        let (min, max) = (number(&kind, "min"), number(&kind, "max"));
         let name = variable.get("name").unwrap();
-        if let Some(start) = kind.number("start") {
+        if let Some(start) = number(&kind, "start") {
             assert!(min.is_none_or(|min| min <= start), "{name}");
             assert!(max.is_none_or(|max| start <= max), "{name}");
         }
@@ -179,20 +143,13 @@ fn ports_have_flat_names_and_parameters_short_ones() {
 #[test]
 fn every_unit_and_display_unit_is_defined() {
     let mut units: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-    let mut unit = String::new();
-    for element in elements() {
-        match element.name.as_str() {
-            "Unit" => {
-                unit = element.get("name").unwrap().into();
-                units.insert(unit.clone(), BTreeSet::new());
-            }
-            "DisplayUnit" => {
-                let name = element.get("name").unwrap().to_string();
-                units.get_mut(&unit).unwrap().insert(name);
-                assert!(element.number("factor").unwrap() > 0.0);
-            }
-            _ => {}
-        }
+    for unit in root().list("UnitDefinitions") {
+        let displayed = unit.children.iter().filter(|child| child.name == "DisplayUnit");
+        let displayed = displayed.map(|display| {
+            assert!(number(display, "factor").unwrap() > 0.0);
+            display.get("name").unwrap().to_string()
+        });
+        units.insert(unit.get("name").unwrap().into(), displayed.collect());
     }
     let mut used = BTreeSet::new();
     for (variable, kind) in variables() {
@@ -215,11 +172,9 @@ fn every_unit_and_display_unit_is_defined() {
 
 #[test]
 fn enumerations_are_declared() {
-    let types: BTreeSet<_> = elements()
-        .iter()
-        .filter(|e| e.name == "SimpleType")
-        .map(|e| e.get("name").unwrap().to_string())
-        .collect();
+    let root = root();
+    let types: BTreeSet<_> =
+        root.list("TypeDefinitions").map(|of| of.get("name").unwrap()).collect();
     for (variable, kind) in variables() {
         if kind.name == "Enumeration" {
             let declared = kind.get("declaredType").unwrap();
@@ -295,7 +250,7 @@ fn states_are_continuous_each_has_one_derivative_and_only_states_are_reinitialis
         .collect();
     assert_eq!(reinitialised.len(), 2);
     assert!(reinitialised.iter().all(|index| states.contains(index)));
-    let indicators: usize = elements()[0].get("numberOfEventIndicators").unwrap().parse().unwrap();
+    let indicators: usize = root().get("numberOfEventIndicators").unwrap().parse().unwrap();
     assert_eq!(indicators, plant::INDICATORS);
 }
 
@@ -315,7 +270,7 @@ fn dependencies_are_always_given_and_point_to_what_the_host_sets() {
         ("InitialUnknowns", ["input", "parameter"]),
     ] {
         for unknown in unknowns(list) {
-            let dependencies = unknown.list("dependencies");
+            let dependencies = indices(&unknown, "dependencies");
             assert!(dependencies.is_sorted_by(|a, b| a < b));
             assert!(dependencies.iter().all(|index| allowed.contains(&kind(index))));
             let kinds = unknown.get("dependenciesKind").unwrap().split_whitespace();

@@ -23,19 +23,17 @@ pub(crate) fn read(path: &Path, scale: f64) -> Result<Vec<Segment>, Problems> {
 
 /// The `d` of the first path.
 fn first_path(text: &str) -> Result<String, String> {
-    for event in xml::EventReader::from_str(text) {
-        let event = event.map_err(|error| format!("not well-formed: {error}."))?;
-        if let xml::reader::XmlEvent::StartElement { name, attributes, .. } = event {
-            let value = |key: &str| attributes.iter().find(|a| a.name.local_name == key);
-            if value("transform").is_some() {
-                return Err(format!(
-                    "the element `{}` has a transform; apply it in the drawing.",
-                    name.local_name
-                ));
-            }
-            if let ("path", Some(data)) = (name.local_name.as_str(), value("d")) {
-                return Ok(data.value.clone());
-            }
+    // drawing programs name SVG's document type
+    let options = roxmltree::ParsingOptions { allow_dtd: true, ..Default::default() };
+    let drawing = roxmltree::Document::parse_with_options(text, options)
+        .map_err(|error| format!("not well-formed: {error}."))?;
+    for element in drawing.descendants().filter(roxmltree::Node::is_element) {
+        let name = element.tag_name().name();
+        if element.has_attribute("transform") {
+            return Err(format!("the element `{name}` has a transform; apply it in the drawing."));
+        }
+        if let ("path", Some(data)) = (name, element.attribute("d")) {
+            return Ok(data.into());
         }
     }
     Err("contains no path.".to_string())

@@ -332,7 +332,8 @@ fn a_contour_is_read_from_an_svg_drawing() {
     let folder = tempfile::tempdir().unwrap();
     let read = |path: &str, scale: f64| {
         let svg = format!(
-            "<svg xmlns='http://www.w3.org/2000/svg'><g><path fill='none' d='{path}'/></g></svg>"
+            "<!DOCTYPE svg PUBLIC '-//W3C//DTD SVG 1.1//EN' 'http://www.w3.org/Graphics/SVG/1.1/DTD/svg11.dtd'>
+            <svg xmlns='http://www.w3.org/2000/svg'><g><path fill='none' d='{path}'/></g></svg>"
         );
         std::fs::write(folder.path().join("tank.svg"), svg).unwrap();
         let text = format!("density = 1000.0\nsvg = 'tank.svg'\nscale = {scale:?}");
