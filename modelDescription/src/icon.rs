@@ -1,20 +1,49 @@
 //! The FMU's icon as pixels, drawn from `modelDescription/icon/icon.svg`. Importers want a PNG;
 //! only few draw an SVG.
+//!
+//! `icon/SHA256SUMS` says which drawing the committed pixels are of. Drawing takes the feature
+//! `icon`, for the crate that draws takes longer to compile than all that is needed otherwise.
 
-use resvg::{tiny_skia, usvg};
+use sha2::{Digest, Sha256};
 
-/// The drawing.
-pub const SOURCE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/icon/icon.svg");
-/// Where the committed picture is; each FMU has it as `model.png`.
-pub const PATH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/icon/icon.png");
+/// Where the drawing (`icon.svg`), its picture (`icon.png`, each FMU's `model.png`) and their
+/// hashes are.
+pub const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/icon");
 /// Width and height, px.
 pub const SIZE: u32 = 512;
 
 /// The picture, drawn from the SVG's text.
-pub fn draw(svg: &str) -> Result<tiny_skia::Pixmap, usvg::Error> {
+#[cfg(feature = "icon")]
+pub fn draw(svg: &str) -> Result<resvg::tiny_skia::Pixmap, resvg::usvg::Error> {
+    use resvg::{tiny_skia, usvg};
     let tree = usvg::Tree::from_str(svg, &usvg::Options::default())?;
     let mut picture = tiny_skia::Pixmap::new(SIZE, SIZE).ok_or(usvg::Error::InvalidSize)?;
     let (x, y) = (SIZE as f32 / tree.size().width(), SIZE as f32 / tree.size().height());
     resvg::render(&tree, tiny_skia::Transform::from_scale(x, y), &mut picture.as_mut());
     Ok(picture)
+}
+
+/// The hashes of drawing and picture, as `sha256sum icon.svg icon.png` writes them.
+pub fn hashes() -> std::io::Result<String> {
+    let mut lines = String::new();
+    for name in ["icon.svg", "icon.png"] {
+        let hash = Sha256::digest(std::fs::read(format!("{FOLDER}/{name}"))?);
+        lines += &format!("{}  {name}\n", base16ct::lower::encode_string(&hash));
+    }
+    Ok(lines)
+}
+
+#[cfg(all(test, feature = "icon"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_committed_picture_is_what_is_drawn() {
+        let shown = std::fs::read(format!("{FOLDER}/icon.png")).unwrap();
+        let shown = resvg::tiny_skia::Pixmap::decode_png(&shown).unwrap();
+        let drawn = draw(&std::fs::read_to_string(format!("{FOLDER}/icon.svg")).unwrap()).unwrap();
+        // Edges may be shaded differently by a step or two where another processor rounds otherwise.
+        let pixels = shown.data().iter().zip(drawn.data());
+        assert_eq!(pixels.filter(|(a, b)| a.abs_diff(**b) > 2).count(), 0);
+    }
 }
