@@ -3,12 +3,11 @@
 //! `book/SUMMARY.md` lists parts (headings) and pages (list items), in the form of mdBook. A page may
 //! be anywhere in the project.
 
-use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
-use host::html::escape;
 use host::output;
+use maud::{DOCTYPE, Markup, html};
 use serde_json::json;
 
 use super::fmu::one_file;
@@ -50,11 +49,12 @@ pub fn render(root: &Path) -> Result<Files> {
     for (place, page) in pages.iter().enumerate() {
         let body = page.html(root, &pages, Layout::Site, &mut all);
         let navigation = navigation(&parts, &pages, &titles, place);
-        let html = site_page(page, &navigation, &body, &neighbours(&pages, &titles, place));
+        let neighbours = neighbours(&pages, &titles, place);
+        let html = site_page(page, &navigation, &body, &neighbours).into_string();
         files.push((format!("{}.html", page.name), html.into_bytes()));
     }
     let whole = one_file(root, &pages, "HubSlosh: the whole book", &mut all);
-    files.push(("print.html".into(), whole.into_bytes()));
+    files.push(("print.html".into(), whole.into_string().into_bytes()));
     files.push(("page.css".into(), super::CSS.into()));
     files.push(("search.js".into(), include_bytes!("search.js").to_vec()));
     files.push(("search-index.js".into(), search_index(&pages)?.into_bytes()));
@@ -92,56 +92,71 @@ fn link(line: &str) -> Option<(&str, &str)> {
 }
 
 /// The list of all pages; of the present one the headings too.
-fn navigation(parts: &[Part], pages: &[Page], titles: &[String], present: usize) -> String {
-    let mut list = String::new();
-    for part in parts {
-        let _ = write!(list, "<p>{}</p>\n<ul>\n", escape(&part.name));
-        for &place in &part.pages {
-            let (page, title) = (&pages[place], escape(&titles[place]));
-            let address = Layout::Site.address(page, "");
-            if place != present {
-                let _ = writeln!(list, "<li><a href=\"{address}\">{title}</a></li>");
-                continue;
+fn navigation(parts: &[Part], pages: &[Page], titles: &[String], present: usize) -> Markup {
+    html! {
+        @for part in parts {
+            p { (part.name) }
+            ul {
+                @for &place in &part.pages {
+                    @let here = place == present;
+                    @let address = Layout::Site.address(&pages[place], "");
+                    li {
+                        a aria-current=[here.then_some("page")] href=(address) { (titles[place]) }
+                        @if here {
+                            ul {
+                                @for heading in pages[place].chapters() {
+                                    li { a href={ "#" (heading.slug) } { (heading.title) } }
+                                }
+                            }
+                        }
+                    }
+                }
             }
-            let _ = write!(list, "<li><a aria-current=\"page\" href=\"{address}\">{title}</a><ul>");
-            for heading in page.headings.iter().filter(|heading| heading.level == 2) {
-                let (slug, title) = (escape(&heading.slug), escape(&heading.title));
-                let _ = write!(list, "<li><a href=\"#{slug}\">{title}</a></li>");
-            }
-            list.push_str("</ul></li>\n");
         }
-        list.push_str("</ul>\n");
     }
-    list
 }
 
 /// Links to the page before and the page after.
-fn neighbours(pages: &[Page], titles: &[String], present: usize) -> String {
+fn neighbours(pages: &[Page], titles: &[String], present: usize) -> Markup {
     let link = |place: Option<usize>, class: &str| {
-        let Some((page, title)) = place.and_then(|p| Some((pages.get(p)?, titles.get(p)?))) else {
-            return String::new();
-        };
-        let (address, title) = (Layout::Site.address(page, ""), escape(title));
-        format!("<a class=\"{class}\" href=\"{address}\">{title}</a>")
+        let neighbour = place.and_then(|place| pages.get(place).zip(titles.get(place)));
+        html! {
+            @if let Some((page, title)) = neighbour {
+                a class=(class) href=(Layout::Site.address(page, "")) { (title) }
+            }
+        }
     };
-    link(present.checked_sub(1), "before") + &link(Some(present + 1), "after")
+    html! { (link(present.checked_sub(1), "before")) (link(Some(present + 1), "after")) }
 }
 
-fn site_page(page: &Page, navigation: &str, body: &str, neighbours: &str) -> String {
-    let title = escape(&page.title);
-    format!(
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-         <meta name=\"viewport\" content=\"width=device-width\">\n<title>{title} · HubSlosh</title>\n\
-         <link rel=\"stylesheet\" href=\"page.css\"></head><body class=\"site\">\n\
-         <input type=\"checkbox\" id=\"menu\" aria-label=\"Contents\"><label for=\"menu\">Contents</label>\n\
-         <nav><input type=\"search\" id=\"search\" placeholder=\"Search\" aria-label=\"Search\" \
-         autocomplete=\"off\" spellcheck=\"false\">\n\
-         <ol id=\"found\"></ol>\n<div id=\"pages\">\n{navigation}\
-         <p><a href=\"print.html\">The whole book on one page, to print</a></p></div></nav>\n\
-         <main>\n{body}<footer>{neighbours}</footer>\n</main>\n\
-         <script src=\"search-index.js\" defer></script><script src=\"search.js\" defer></script>\
-         </body></html>\n"
-    )
+fn site_page(page: &Page, navigation: &Markup, body: &Markup, neighbours: &Markup) -> Markup {
+    html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width";
+                title { (page.title) " · HubSlosh" }
+                link rel="stylesheet" href="page.css";
+            }
+            body .site {
+                input type="checkbox" id="menu" aria-label="Contents";
+                label for="menu" { "Contents" }
+                nav {
+                    input type="search" id="search" placeholder="Search" aria-label="Search"
+                        autocomplete="off" spellcheck="false";
+                    ol #found {}
+                    div #pages {
+                        (navigation)
+                        p { a href="print.html" { "The whole book on one page, to print" } }
+                    }
+                }
+                main { (body) footer { (neighbours) } }
+                script src="search-index.js" defer {}
+                script src="search.js" defer {}
+            }
+        }
+    }
 }
 
 /// The words of every section: a script, because a page opened from the disk may load no data.

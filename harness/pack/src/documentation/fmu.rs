@@ -2,11 +2,10 @@
 //! as one file with everything in it but the figures, which are beside it.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::Result;
-use host::html::escape;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use super::page::{Gathered, Layout, Page};
 
@@ -30,38 +29,47 @@ pub fn render(root: &Path, introduction: &str, title: &str) -> Result<Documentat
         pages.push(Page::read(root, &path)?);
     }
     let mut all = Gathered::default();
-    let page = one_file(root, &pages, title, &mut all);
+    let page = one_file(root, &pages, title, &mut all).into_string();
     Ok(Documentation { page, figures: all.figures()? })
 }
 
 /// All pages as one file.
-pub(super) fn one_file(root: &Path, pages: &[Page], title: &str, all: &mut Gathered) -> String {
+pub(super) fn one_file(root: &Path, pages: &[Page], title: &str, all: &mut Gathered) -> Markup {
     let layout = Layout::OneFile;
-    let (mut navigation, mut body) = (String::new(), String::new());
-    for page in pages {
-        contents(page, &mut navigation);
-        let html = page.html(root, pages, layout, all);
-        let _ = writeln!(body, "<section id=\"{}\">\n{html}</section>", layout.id(page, ""));
+    html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width";
+                title { (title) }
+                style { (PreEscaped(super::CSS)) }
+            }
+            body {
+                nav {
+                    p { (title) }
+                    ul {
+                        @for page in pages {
+                            li {
+                                a href=(layout.address(page, "")) { (page.title) }
+                                ul {
+                                    @for heading in page.chapters() {
+                                        @let address = layout.address(page, &heading.slug);
+                                        li { a href=(address) { (heading.title) } }
+                                    }
+                                }
+                            }
+                        }
+                    }
+                }
+                main {
+                    @for page in pages {
+                        section id=(layout.id(page, "")) { (page.html(root, pages, layout, all)) }
+                    }
+                }
+            }
+        }
     }
-    format!(
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-         <meta name=\"viewport\" content=\"width=device-width\">\n<title>{title}</title>\n\
-         <style>\n{css}</style></head><body>\n<nav><p>{title}</p>\n<ul>\n{navigation}</ul></nav>\n\
-         <main>\n{body}</main></body></html>\n",
-        title = escape(title),
-        css = super::CSS,
-    )
-}
-
-/// A page's entries in the list of contents.
-fn contents(page: &Page, list: &mut String) {
-    let address = |slug| escape(&Layout::OneFile.address(page, slug));
-    let _ = write!(list, "<li><a href=\"{}\">{}</a><ul>", address(""), escape(&page.title));
-    for heading in page.headings.iter().filter(|heading| heading.level == 2) {
-        let (address, title) = (address(&heading.slug), escape(&heading.title));
-        let _ = write!(list, "<li><a href=\"{address}\">{title}</a></li>");
-    }
-    list.push_str("</ul></li>\n");
 }
 
 #[cfg(test)]

@@ -5,7 +5,8 @@ use std::convert::Infallible;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
-use pulldown_cmark::{CowStr, Event, Options, Parser, Tag, TagEnd, html};
+use maud::{Markup, PreEscaped, html};
+use pulldown_cmark::{CowStr, Event, Options, Parser, Tag, TagEnd};
 use pulldown_latex::config::{DisplayMode, RenderConfig};
 
 /// One Markdown file.
@@ -131,9 +132,14 @@ impl Page {
         paths
     }
 
+    /// The headings of the second level.
+    pub fn chapters(&self) -> impl Iterator<Item = &Heading> {
+        self.headings.iter().filter(|heading| heading.level == 2)
+    }
+
     /// The page as HTML. A link to one of `pages` leads there; of another link that leads to a file of
     /// the project only the text is left.
-    pub fn html(&self, root: &Path, pages: &[Page], layout: Layout, all: &mut Gathered) -> String {
+    pub fn html(&self, root: &Path, pages: &[Page], layout: Layout, all: &mut Gathered) -> Markup {
         let mut headings = self.headings.iter();
         let mut dropped = false; // inside a link that leads out of the documentation
         let events = events(&self.text).filter_map(|event| match event {
@@ -177,8 +183,8 @@ impl Page {
             other => Some(other),
         });
         let mut page = String::new();
-        html::push_html(&mut page, events);
-        page
+        pulldown_cmark::html::push_html(&mut page, events);
+        PreEscaped(page)
     }
 
     /// Where a link leads; `None` out of the documentation.
@@ -232,7 +238,7 @@ impl Page {
             ));
         }
         if block {
-            mathml = format!("<span class=\"equation\">{mathml}</span>");
+            mathml = html! { span .equation { (PreEscaped(mathml)) } }.into_string();
         }
         mathml.into()
     }
@@ -369,7 +375,7 @@ mod tests {
         .unwrap();
         let page = Page::read(folder.path(), "a.md").unwrap();
         let mut all = Gathered::default();
-        let html = page.html(folder.path(), &[], Layout::Site, &mut all);
+        let html = page.html(folder.path(), &[], Layout::Site, &mut all).into_string();
         assert!(html.contains("<msub><mi>ξ</mi><mn>1</mn></msub>"), "{html}");
         assert!(html.contains("display=\"block\"") && html.contains("<mfrac>"), "{html}");
         assert_eq!(all.faults.len(), 1);
