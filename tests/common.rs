@@ -4,19 +4,7 @@ use std::path::PathBuf;
 use std::process::{Command, Output};
 
 use HubSlosh::table::TABLE;
-use plant::{FrictionModel, Parameters, SloshModel};
 use runtime::variable::Kind;
-
-/// Every slosh model.
-pub const SLOSH: [SloshModel; SloshModel::ALL.len()] = SloshModel::ALL;
-
-/// Whether the model ends at a rim, which a violent motion reaches.
-pub fn has_rim(slosh: SloshModel) -> bool {
-    matches!(slosh, SloshModel::Paraboloid | SloshModel::Liquid)
-}
-
-/// Every friction law.
-pub const FRICTION: [FrictionModel; FrictionModel::ALL.len()] = FrictionModel::ALL;
 
 /// The numbers of the items of an enumeration, by the name of a variable.
 ///
@@ -28,53 +16,6 @@ pub fn items(name: &str) -> std::ops::RangeInclusive<i32> {
         Some(Kind::Enumeration(of)) => 1..=of.items.len() as i32,
         _ => panic!("{name} is not an enumeration"),
     }
-}
-
-/// The bench with the given models.
-pub fn bench(slosh: SloshModel, friction: FrictionModel) -> Parameters {
-    let mut p = Parameters::default();
-    p.slosh.model = slosh;
-    p.friction.model = friction;
-    p
-}
-
-/// A plant somewhere in the allowed range: sizes from a toy to a launcher's stage,
-/// any fill, one to ten modes, any damping and friction, a start in motion.
-pub fn anywhere(rng: &mut fastrand::Rng, slosh: SloshModel, friction: FrictionModel) -> Parameters {
-    let mut p = bench(slosh, friction);
-    let mut between = |low: f64, high: f64| low + (high - low) * rng.f64();
-    p.tank.d = 10f64.powf(between(-1.5, 0.5));
-    p.tank.h = p.tank.d * 10f64.powf(between(-1.5, 0.5));
-    if slosh == SloshModel::Liquid {
-        // Neither shallow nor next to a secondary resonance, where it warns.
-        p.tank.h = p.tank.d
-            * if between(0.0, 1.0) < 0.5 { between(0.22, 0.37) } else { between(0.6, 3.0) };
-    }
-    p.tank.r = p.tank.d * between(0.0, 5.0);
-    let m_liq = 1000.0 * 0.785 * p.tank.d * p.tank.d * p.tank.h;
-    p.hub.inertia = m_liq * p.tank.d * p.tank.d * 10f64.powf(between(-1.0, 2.0));
-    p.slosh.zeta_from_correlation = between(0.0, 1.0) < 0.5;
-    p.slosh.zeta = between(0.0, 0.3);
-    p.slosh.hardening = between(0.0, 2.0);
-    let torque = p.hub.inertia * between(0.0, 1.0);
-    p.friction.b = torque * between(0.0, 1.0);
-    p.friction.c = torque * between(0.0, 0.1);
-    p.friction.d = torque * between(0.0, 0.1);
-    p.friction.omega_s = between(0.01, 0.5);
-    p.friction.eps = 10f64.powf(between(-4.0, -1.0));
-    // Bristles that deflect by 10 mrad, without damping of their own: passive with any friction.
-    p.friction.sigma0 = 100.0 * (p.friction.c + p.friction.d);
-    p.friction.sigma1 = 0.0;
-    p.friction.asymmetry = between(-0.3, 0.3);
-    p.friction.harmonics_forward = core::array::from_fn(|_| between(-0.15, 0.15));
-    p.friction.harmonics_backward = core::array::from_fn(|_| between(-0.15, 0.15));
-    p.init.omega = between(-0.5, 0.5);
-    p.init.slosh_angle = between(-0.5, 0.5);
-    p.init.slosh_angle_radial = between(-0.5, 0.5);
-    p.init.slosh_rate = between(-2.0, 2.0);
-    p.init.slosh_rate_radial = between(-2.0, 2.0);
-    p.slosh.modes = rng.usize(1..=plant::MODES);
-    p
 }
 
 /// The output of a command that must succeed.

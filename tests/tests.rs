@@ -12,12 +12,8 @@ mod life {
     mod instance;
 }
 mod physics {
-    mod balances;
-    mod errata;
     mod liquid;
-    mod rotary;
     mod tanks;
-    mod trajectories;
 }
 mod python;
 mod second;

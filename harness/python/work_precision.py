@@ -12,7 +12,7 @@ straight lines between knots 20 ms apart, the rate wanted at every knot. The FMU
 set-valued friction law; the others, which have no events, smooth sgn(omega) to
 tanh(omega / 1e-5 rad/s), whose own error is 1.5e-5 rad/s; Dopri5 also with 1e-8 rad/s in the
 place of 1e-5, to get further. Errors are against the FMU's solution at tolerance 1e-13, which meets
-the reference trajectories to their last digits (tests/physics/trajectories.rs).
+the reference trajectories to their last digits (fmu/plant/tests/plant/trajectories.rs).
 """
 
 import functools

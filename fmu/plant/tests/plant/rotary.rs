@@ -4,7 +4,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::common::bench;
+use super::common::bench;
 use ode_solvers::dop853::Dop853;
 use ode_solvers::{SVector, System};
 use plant::{FrictionModel, Inputs, Parameters, Plant, Ramp, SloshModel};

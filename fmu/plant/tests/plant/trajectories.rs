@@ -1,6 +1,6 @@
 //! The plant against trajectories of known accuracy.
 //!
-//! `reference/trajectories.json`: 20 s runs by two independent high-order integrators
+//! `trajectories.json`: 20 s runs by two independent high-order integrators
 //! (the linear model by a 60-digit matrix exponential), sampled every second here.
 //! Each record says how many of its digits are good (`digits`, relative to the
 //! signal's largest value, `largest`); `events` are [time, contact] of the set-valued
@@ -176,7 +176,7 @@ fn differences(name: &str, fill: &Fill, run: &Run, tolerance: f64) -> Vec<String
 }
 
 fn check(model: &str, tolerance: f64) {
-    let text = include_str!("../reference/trajectories.json");
+    let text = include_str!("../trajectories.json");
     let fills: BTreeMap<String, Fill> = serde_json::from_str(text).unwrap();
     let mut wrong = Vec::new();
     let mut runs = 0;

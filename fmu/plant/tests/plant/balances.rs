@@ -1,6 +1,6 @@
 //! Laws that hold for every model, parameter and input: energy, momentum, limits.
 
-use crate::common::{FRICTION, SLOSH, anywhere, bench, has_rim};
+use super::common::{FRICTION, SLOSH, anywhere, bench, has_rim};
 use plant::{FrictionModel, Inputs, Outputs, Plant, Ramp, SloshModel};
 
 /// Tolerance of all runs here. The plant's errors come out two to three decades
@@ -362,9 +362,9 @@ fn gyro_reads_the_same_however_time_is_cut() {
     }
 }
 
-/// Random steps in the default test. `HUBSLOSH_RANDOM_STEPS=1000000` runs a million, in
-/// some 25 minutes; `HUBSLOSH_RANDOM_SEED` starts elsewhere, to share them among processes.
-const RANDOM_STEPS: usize = 5_000;
+/// Random steps in the default test, fewer without `--release`. `HUBSLOSH_RANDOM_STEPS=1000000` runs a
+/// million, in some 25 minutes; `HUBSLOSH_RANDOM_SEED` starts elsewhere, to share them among processes.
+const RANDOM_STEPS: usize = if cfg!(debug_assertions) { 1_000 } else { 5_000 };
 
 #[test]
 fn random_steps_end_in_numbers_or_in_a_clear_error() {

@@ -4,7 +4,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::common::bench;
+use super::common::bench;
 use plant::{FrictionModel, Inputs, Plant, Ramp, STATES, SloshModel, x};
 
 /// The linear model's equations as the plant has them, by directional derivatives:
