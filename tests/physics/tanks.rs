@@ -1,6 +1,5 @@
-//! Tanks of any shape through a table of modes.
+//! Tanks that `hubslosh tank` has computed, through the plant's table of modes.
 
-use crate::common::bench;
 use hubslosh_tank::Tank;
 use plant::{FrictionModel, Inputs, Outputs, Parameters, Plant, Ramp, SloshModel, SloshSource};
 
@@ -46,7 +45,8 @@ fn table_of_the_old_cylinder_gives_the_old_motion() {
     for model in
         [SloshModel::Linear, SloshModel::Planar, SloshModel::Spherical, SloshModel::Paraboloid]
     {
-        let mut p = bench(model, FrictionModel::Stribeck);
+        let mut p = Parameters::default();
+        p.slosh.model = model;
         p.slosh.modes = 3;
         let expected = run(&p);
         for tank in [
@@ -65,68 +65,6 @@ fn table_of_the_old_cylinder_gives_the_old_motion() {
     }
 }
 
-#[test]
-fn a_frequency_stands_for_a_length() {
-    let mut p = with_table(
-        &bench(SloshModel::Linear, FrictionModel::Viscous),
-        "density = 1000\nshape = { sphere = { radius = 0.1 } }",
-        3,
-    );
-    p.slosh.table.k = [0.0; plant::MODES];
-    p.slosh.table.k[0] = 2.0;
-    let lengths = plant(&p).calculated().length;
-    for n in 0..3 {
-        let table = &mut p.slosh.table;
-        let omega2 = table.g_ref / lengths[n] + table.k[n] / table.mass[n];
-        table.frequency[n] = omega2.sqrt() / std::f64::consts::TAU;
-        table.length[n] = 0.0;
-    }
-    for (a, b) in plant(&p).calculated().length.iter().zip(lengths).take(3) {
-        assert!((a / b - 1.0).abs() < 1e-14, "{a} {b}");
-    }
-}
-
-#[test]
-fn a_table_that_is_no_tank_is_refused_with_everything_that_is_wrong() {
-    let good = with_table(
-        &bench(SloshModel::Linear, FrictionModel::Viscous),
-        "density = 1000\nshape = { sphere = { radius = 0.1 } }",
-        3,
-    );
-    let refused = |change: fn(&mut Parameters)| {
-        let mut p = good;
-        change(&mut p);
-        Plant::new(&p, &Inputs::default(), 0.0, 1e-9).err().unwrap_or_default()
-    };
-    assert!(refused(|_| {}).is_empty());
-    let all = refused(|p| {
-        p.slosh.table.m_liq = 0.0;
-        p.slosh.table.mass[1] = 0.0;
-        p.slosh.table.length[2] = 0.0;
-        p.slosh.model = SloshModel::Liquid;
-    });
-    assert_eq!(all.len(), 4, "{all:?}");
-    for (what, place) in
-        [("liquid", 0), ("slosh.table.m_liq", 1), ("slosh.table.mass[2]", 2), ("length[3]", 3)]
-    {
-        assert!(all[place].contains(what), "{all:?}");
-    }
-    let one = |change: fn(&mut Parameters), what: &str| {
-        let problems = refused(change);
-        assert!(problems.len() == 1 && problems[0].contains(what), "{problems:?}");
-    };
-    one(|p| p.slosh.table.frequency[0] = 1.0, "one of them greater than 0");
-    one(|p| p.slosh.table.length.swap(0, 1), "order of their frequencies");
-    one(|p| p.slosh.table.m_liq *= 0.1, "add up to");
-    one(
-        |p| {
-            p.slosh.table.length[0] = 0.0;
-            (p.slosh.table.frequency[0], p.slosh.table.k[0]) = (0.1, 1e3);
-        },
-        "not above that of slosh.table.k[1]",
-    );
-}
-
 /// A box is dragged along about its vertical axis (`tank.I_own`): with the rigid liquid it is that much
 /// harder to turn, and a square of 0.1 m has 0.1565 of its rigid inertia.
 #[test]
@@ -135,7 +73,8 @@ fn a_box_drags_liquid_about_its_axis() {
     let data = tank.solve(0.1, 1).unwrap();
     let own = data.i_eff_axis.unwrap();
     assert!((own / data.i_frozen_axis - 0.1565).abs() < 5e-5, "{}", own / data.i_frozen_axis);
-    let mut p = bench(SloshModel::Linear, FrictionModel::None);
+    let mut p = Parameters::default();
+    p.friction.model = FrictionModel::None;
     p.slosh.source = SloshSource::Table;
     (p.tank.r, p.hub.inertia) = (0.0, 1e-3);
     p.slosh.table.m_liq = data.m_liq;

@@ -134,4 +134,104 @@ mod tests {
             assert!((gyro.held - 0.012_3).abs() < 2e-3, "within noise");
         }
     }
+
+    /// Without noise, bias and quantisation: it reads what it is given.
+    fn clean(rate: f64) -> Imu {
+        Imu { rate, arw: 0.0, bias_instability: 0.0, lsb: 0.0, ..Imu::default() }
+    }
+
+    #[test]
+    fn white_noise_of_a_sample_is_the_random_walk_times_the_root_of_the_rate() {
+        for rate in [50.0, 200.0] {
+            let imu = Imu { arw: 1e-3, ..clean(rate) };
+            let mut gyro = imu.start();
+            let mut sum = 0.0;
+            const COUNT: usize = 40_000;
+            for _ in 0..COUNT {
+                imu.sample(&mut gyro, 2.0);
+                sum += (gyro.held - 2.0) * (gyro.held - 2.0);
+            }
+            let spread = (sum / COUNT as f64).sqrt();
+            // Relative standard error 1/sqrt(2 COUNT) = 0.35 %; four of them.
+            assert!((spread / (1e-3 * rate.sqrt()) - 1.0).abs() < 0.014, "{rate} {spread}");
+        }
+    }
+
+    #[test]
+    fn bias_is_drawn_from_its_spread_and_keeps_its_correlation_time() {
+        const COUNT: i32 = 40_000;
+        // One period is one correlation time: exp(-1) of the bias is left.
+        let imu = Imu { bias_instability: 1e-3, bias_time: 0.1, ..clean(10.0) };
+        let (mut first, mut product) = (0.0, 0.0);
+        for seed in 0..COUNT {
+            let imu = Imu { seed, ..imu };
+            let mut gyro = imu.start();
+            let start = gyro.bias;
+            imu.sample(&mut gyro, 0.0);
+            assert_eq!(gyro.held, start, "the bias is in the reading");
+            (first, product) = (first + start * start, product + start * gyro.bias);
+        }
+        let variance = first / f64::from(COUNT);
+        // Four standard errors: sqrt(2/COUNT) of a variance, 1/sqrt(COUNT) of a correlation.
+        assert!((variance / (1e-3 / 0.664f64).powi(2) - 1.0).abs() < 0.028, "{variance}");
+        assert!((product / first - (-1.0f64).exp()).abs() < 0.02, "{}", product / first);
+    }
+
+    /// The generator's published first outputs for the states 0 and 1234567 (Vigna's splitmix64.c), and
+    /// the same noise for the same seed for good.
+    #[test]
+    fn numbers_are_those_of_splitmix64_and_the_same_for_good() {
+        assert_eq!(mix(0), 0xE220_A839_7B1D_CDAF);
+        assert_eq!(mix(1_234_567), 6_457_827_717_110_365_317);
+        let [(a, b), (c, d)] = [normals(1, 0), normals(-3, 12)];
+        let known = [
+            0.462_029_024_044_276_5,
+            -0.416_131_221_726_402_5,
+            1.419_565_558_308_071_5,
+            -0.952_311_423_782_375_5,
+        ];
+        for (got, known) in [a, b, c, d].into_iter().zip(known) {
+            assert!((got - known).abs() < 1e-15, "{got} {known}");
+        }
+    }
+
+    #[test]
+    fn sample_k_is_taken_k_periods_after_the_start() {
+        let imu = clean(50.0);
+        let mut gyro = imu.start();
+        imu.sample(&mut gyro, 0.0);
+        // From 13 ms on for 0.1 s: samples at 20, 40, ... 100 ms see the rate 7, 27, ... 87 ms later.
+        assert_eq!(imu.follow(&mut gyro, 0.013, 0.1, |t| 2.0 + t, 9), 5);
+        assert_eq!((gyro.next, gyro.held), (6, 2.0 + (0.1 - 0.013)));
+        // Up to a millionth of a period early, seen at the end; no earlier.
+        let early = |share: f64| {
+            let mut gyro = gyro;
+            let length = 0.02 * (1.0 - share);
+            (imu.follow(&mut gyro, 0.1, length, |t| t, 9), gyro.held, length)
+        };
+        let (taken, held, length) = early(0.9e-6);
+        assert_eq!((taken, held), (1, length));
+        assert_eq!(early(1.1e-6).0, 0);
+        // One that is overdue sees the beginning; one more than allowed is all that is taken.
+        assert_eq!(imu.follow(&mut gyro.clone(), 0.121, 0.01, |t| 3.0 + t, 9), 1);
+        let mut late = gyro;
+        imu.follow(&mut late, 0.121, 0.01, |t| 3.0 + t, 9);
+        assert_eq!(late.held, 3.0);
+        assert_eq!(imu.follow(&mut gyro, 0.1, 10.0, |_| 0.0, 7), 8);
+        assert_eq!(gyro.next, 6 + 8);
+    }
+
+    #[test]
+    fn a_reading_is_rounded_to_the_nearest_step() {
+        let imu = Imu { lsb: 1e-3, ..clean(50.0) };
+        for (rate, steps) in [(0.012_3, 12.0), (0.012_7, 13.0), (-0.012_7, -13.0)] {
+            let mut gyro = imu.start();
+            imu.sample(&mut gyro, rate);
+            assert_eq!(gyro.held, steps * 1e-3);
+        }
+        // Beyond 2^53 steps there is nothing to round.
+        let mut gyro = imu.start();
+        imu.sample(&mut gyro, 1.1e13);
+        assert_eq!(gyro.held, 1.1e13);
+    }
 }

@@ -119,4 +119,89 @@ mod tests {
         assert_eq!(w.torque(w.speed_0, Ramp { value: 0.1, slope: 0.0 }).value, 0.0);
         assert_eq!(w.torque(w.speed_0, Ramp { value: -0.1, slope: 0.0 }).value, -0.1);
     }
+
+    fn ramp(value: f64, slope: f64) -> Ramp {
+        Ramp { value, slope }
+    }
+
+    #[test]
+    fn a_speed_outside_its_limits_is_refused_and_one_at_them_is_not() {
+        let Wheel { speed_min: low, speed_max: high, .. } = wheel();
+        let wrong = |speed_0: f64| !Wheel { speed_0, ..wheel() }.problems().is_empty();
+        assert_eq!([low, high, low - 1e-6, high + 1e-6].map(wrong), [false, false, true, true]);
+    }
+
+    /// A command at a limit, or at zero with the rotor at its speed limit, counts by where it goes.
+    #[test]
+    fn a_command_at_a_limit_is_within_or_beyond_it_by_its_slope() {
+        let w = wheel();
+        let (limit, middle) = (w.tau_max, w.speed_0);
+        for sign in [1.0, -1.0] {
+            let held = ramp(sign * limit, 0.0);
+            assert_eq!(w.torque(middle, ramp(sign * limit, sign)), held, "outwards");
+            assert_eq!(w.torque(middle, held), held);
+            let inwards = ramp(sign * limit, -sign);
+            assert_eq!(w.torque(middle, inwards), inwards);
+            assert_eq!(w.torque(middle, ramp(sign * 2.0 * limit, -sign)), held);
+            let within = ramp(sign * 0.5 * limit, sign);
+            assert_eq!(w.torque(middle, within), within);
+        }
+        // Torque on the hub forwards brakes the rotor, backwards speeds it up.
+        for (speed, away) in [(w.speed_max, -1.0), (w.speed_min, 1.0)] {
+            let nothing = ramp(0.0, 0.0);
+            for command in [ramp(away * 0.1, 0.0), ramp(away * 0.1, -away), ramp(0.0, away)] {
+                assert_eq!(w.torque(speed, command), nothing, "{command:?}");
+            }
+            for command in [ramp(-away * 0.1, 0.0), ramp(-away * 0.1, away), ramp(0.0, -away)] {
+                assert_eq!(w.torque(speed, command), command);
+            }
+        }
+    }
+
+    #[test]
+    fn a_piece_ends_where_the_command_passes_a_limit_or_zero() {
+        let w = Wheel { inertia: 1.0, ..wheel() }; // far from its speed limits
+        let next = |command: Ramp| w.next(w.speed_0, command, 10.0).0;
+        // From -0.5 N m at 0.1 N m/s: to -0.26 in 2.4 s, on to 0 in 2.6 s, on to 0.26.
+        for (from, length) in [(-0.5, 2.4), (-0.26, 2.6), (0.0, 2.6)] {
+            assert!((next(ramp(from, 0.1)) - length).abs() < 1e-12, "{from}");
+            assert!((next(ramp(-from, -0.1)) - length).abs() < 1e-12, "{from}");
+        }
+        assert_eq!(next(ramp(0.0, 0.0)), 10.0);
+    }
+
+    /// I_w (W_0 - W) = a t + b t^2/2: the rotor meets its limit on time, on a ramp and on a held torque.
+    #[test]
+    fn the_rotor_reaches_its_speed_limit_when_the_impulse_has_done_it() {
+        let w = Wheel { speed_0: 100.0, speed_min: 20.0, speed_max: 150.0, ..wheel() };
+        for (command, limit) in [
+            (ramp(0.1, 0.0), w.speed_min),
+            (ramp(0.1, 0.02), w.speed_min),
+            (ramp(0.2, -0.02), w.speed_min),
+            (ramp(-0.1, 0.0), w.speed_max),
+            (ramp(-0.1, -0.02), w.speed_max),
+            (ramp(0.0, -0.05), w.speed_max),
+        ] {
+            let (length, torque, speed) = w.next(w.speed_0, command, 10.0);
+            assert_eq!((torque, speed), (command, limit));
+            let turned = command.integral(length) / w.inertia;
+            assert!((w.speed_0 - turned - limit).abs() < 1e-12, "{command:?} {length}");
+            // Short of it the torque alone says where the rotor is.
+            let (all, _, before) = w.next(w.speed_0, command, length / 2.0);
+            assert_eq!(all, length / 2.0);
+            let turned = command.integral(length / 2.0) / w.inertia;
+            assert!((w.speed_0 - turned - before).abs() < 1e-12, "{command:?}");
+        }
+    }
+
+    #[test]
+    fn an_actuator_without_a_wheel_gives_what_it_is_told_and_counts_the_reaction() {
+        let w = Wheel { enabled: false, ..wheel() };
+        let command = ramp(5.0, -1.0);
+        assert_eq!(w.torque(1e6, command), command);
+        // 5 N m falling by 1 N m/s over 2 s: 8 N m s.
+        let (length, torque, speed) = w.next(100.0, command, 2.0);
+        assert_eq!((length, torque), (2.0, command));
+        assert!((speed - (100.0 - 8.0 / w.inertia)).abs() < 1e-9);
+    }
 }

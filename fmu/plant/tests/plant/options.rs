@@ -326,6 +326,10 @@ fn damping_ratio_follows_the_restoring_force_down_to_weightlessness() {
                 / Plant::new(&p, &at(9.81), 0.0, 1e-9).unwrap().calculated().frequency[n];
             let expected = if correlation { first[n] * ratio.powf(-0.5) } else { first[n] };
             assert!((last[n] / expected - 1.0).abs() < 1e-12, "{correlation} {n} {last:?}");
+            // A start without weight has the damping that is calculated for it.
+            let started = weightless.damping_ratio(n, &at(0.0))[0];
+            let calculated = weightless.calculated().damping[n];
+            assert!((started / calculated - 1.0).abs() < 1e-14, "{started} {calculated}");
         }
         // And it is the ratio of the motion: the envelope over a period.
         let omega = TAU * weightless.calculated().frequency[0];

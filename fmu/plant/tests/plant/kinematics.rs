@@ -1,0 +1,189 @@
+//! What the outputs say of forces, momentum and energy is what follows from where the masses are: the
+//! bobs' places from the states, their velocities and accelerations by differences of the places.
+
+use super::common::bench;
+use plant::{Calculated, FrictionModel, Inputs, Outputs, Parameters, Plant, Ramp, SloshModel, x};
+
+/// Between samples, s. Differences of five points leave (omega h)^4/30 of a derivative: 2e-8 of the second
+/// mode's, at 25 rad/s.
+const H: f64 = 5e-4;
+
+const G: f64 = 9.81;
+
+/// A bench that leans, with three modes of which two move, and an unbalanced hub.
+fn moving(slosh: SloshModel) -> Parameters {
+    let mut p = bench(slosh, FrictionModel::Viscous);
+    p.slosh.modes = 3;
+    (p.bench.tilt, p.bench.tilt_azimuth) = (0.1, 0.7);
+    (p.hub.imbalance, p.hub.imbalance_angle) = (0.4, 2.0);
+    p.tank.own_inertia = 0.01;
+    (p.init.omega, p.init.theta) = (0.8, 0.4);
+    (p.init.slosh_angle, p.init.slosh_angle_radial) = (0.3, -0.2);
+    (p.init.slosh_rate, p.init.slosh_rate_radial) = (1.0, 2.0);
+    p
+}
+
+/// Places of the masses at an instant: hub's angle, and each bob in the hub's frame with its height,
+/// m, and what stands for its height in the potential energy.
+struct Place {
+    theta: f64,
+    /// x from the axis, y, height that moves with it, height that gravity feels
+    bobs: Vec<[f64; 4]>,
+}
+
+/// Displacement of a bob from the hinge, its height, and the height that gravity feels.
+fn displaced(p: &Parameters, l: f64, first: bool, q: [f64; 2]) -> [f64; 4] {
+    let [a, b] = q;
+    match p.slosh.model {
+        SloshModel::Frozen => [0.0; 4],
+        // No height of its own; the potential is that of a spring.
+        SloshModel::Linear => [0.0, l * b, 0.0, l * b * b / 2.0],
+        SloshModel::Planar => [0.0, l * b.sin(), l * (1.0 - b.cos()), l * (1.0 - b.cos())],
+        SloshModel::Spherical => {
+            let k = 2.0 / (1.0 + a * a + b * b);
+            let up = l * (2.0 - k);
+            [l * k * a, l * k * b, up, up]
+        }
+        SloshModel::Paraboloid | SloshModel::Liquid => {
+            let fill = p.tank.h / (p.tank.d / 2.0);
+            let (s, kappa) = match (p.slosh.model, first) {
+                (SloshModel::Liquid, true) => formulas::third_order::coefficients(fill),
+                _ => (1.0, 1.0),
+            };
+            let hardening = match p.slosh.model {
+                SloshModel::Liquid => kappa / (2.0 * l * l),
+                _ => p.slosh.hardening / (p.tank.d * p.tank.d / 4.0),
+            };
+            let q2 = a * a + b * b;
+            // s weighs the kinetic energy upwards.
+            let up = s.sqrt() * q2 / (2.0 * l);
+            [a, b, up, (q2 / 2.0 + hardening * q2 * q2 / 4.0) / l]
+        }
+    }
+}
+
+fn place(p: &Parameters, known: &Calculated, plant: &Plant) -> Place {
+    let states = plant.continuous_states();
+    let modes = known.mass.iter().take_while(|m| **m > 0.0).count();
+    let bob = |n: usize| {
+        let q = &states[x::SLOSH + 4 * n..];
+        let [x, y, up, felt] = displaced(p, known.length[n], n == 0, [q[0], q[1]]);
+        [p.tank.r + x, y, up, felt]
+    };
+    Place { theta: states[x::THETA], bobs: (0..modes).map(bob).collect() }
+}
+
+/// First and second derivative at the middle of five samples.
+fn derivatives(f: [f64; 5]) -> [f64; 2] {
+    let [a, b, c, d, e] = f;
+    [
+        (a - 8.0 * b + 8.0 * d - e) / (12.0 * H),
+        (-a + 16.0 * b - 30.0 * c + 16.0 * d - e) / (12.0 * H * H),
+    ]
+}
+
+/// The outputs in the middle of five samples, with everything as differences have it.
+fn sampled(p: &Parameters) -> (Calculated, [Place; 5], Outputs) {
+    let inputs = Inputs { tau_cmd: Ramp::held(0.3), ..Inputs::default() };
+    let mut plant = Plant::new(p, &inputs, 0.0, 1e-13).unwrap();
+    let known = *plant.calculated();
+    plant.step(&inputs, 0.1).unwrap();
+    let mut outputs = None;
+    let places = [0, 1, 2, 3, 4].map(|k| {
+        if k > 0 {
+            plant.step(&inputs, H).unwrap();
+        }
+        if k == 2 {
+            outputs = Some(plant.outputs(&inputs));
+        }
+        place(p, &known, &plant)
+    });
+    (known, places, outputs.unwrap())
+}
+
+fn assert_near(got: f64, want: f64, size: f64, what: &str) {
+    assert!((got - want).abs() < size, "{what}: {got} {want}");
+}
+
+#[test]
+fn forces_momentum_and_energy_are_those_of_the_masses_at_their_places() {
+    for slosh in SloshModel::ALL {
+        let p = moving(slosh);
+        let (known, places, o) = sampled(&p);
+        let theta = places.each_ref().map(|place| place.theta);
+        let [w, wd] = derivatives(theta);
+        let (r, now) = (p.tank.r, theta[2]);
+        let lateral = G * p.bench.tilt.tan();
+        let (e_y, e_x) = (p.bench.tilt_azimuth - now).sin_cos();
+        let (e_x, e_y) = (lateral * e_x, lateral * e_y);
+        let (i_0, m_0) = (known.m_0 * r * r + p.tank.own_inertia, known.m_0);
+        // Rigid liquid, and the hub's imbalance u, whose gravity alone counts: inertia has it.
+        let (u_y, u_x) = p.hub.imbalance_angle.sin_cos();
+        let (u_x, u_y) = (p.hub.imbalance * u_x, p.hub.imbalance * u_y);
+        let mut force = [m_0 * (r * w * w + e_x), m_0 * (-r * wd + e_y)];
+        let mut momentum = (p.hub.inertia + i_0) * w;
+        let mut energy = (p.hub.inertia + i_0) * w * w / 2.0 - (u_x + m_0 * r) * e_x - u_y * e_y;
+        for n in 0..places[2].bobs.len() {
+            let m = known.mass[n];
+            let along = |i: usize| derivatives(places.each_ref().map(|place| place.bobs[n][i]));
+            let [x, y, _, felt] = places[2].bobs[n];
+            let ([x_d, x_dd], [y_d, y_dd], [up_d, _]) = (along(0), along(1), along(2));
+            let linear = slosh == SloshModel::Linear;
+            // Velocity and acceleration as seen from outside; to first order tangentially in the
+            // linear model, whose bob moves along the tangent.
+            let velocity = if linear { [0.0, r * w + y_d] } else { [x_d - w * y, y_d + w * x] };
+            let radial = x_dd - 2.0 * w * y_d - wd * y - w * w * x;
+            let tangential =
+                if linear { y_dd + wd * r } else { y_dd + 2.0 * w * x_d + wd * x - w * w * y };
+            force[0] += m * (e_x - radial);
+            force[1] += m * (e_y - tangential);
+            momentum +=
+                m * if linear { r * velocity[1] } else { x * velocity[1] - y * velocity[0] };
+            let speed2 = velocity[0].powi(2) + velocity[1].powi(2) + up_d.powi(2);
+            energy += m * (speed2 / 2.0 + G * felt - e_x * x - e_y * y);
+        }
+        // Forces of 10 N and differences of accelerations of 100 m/s2 (second and third mode) to 1e-8.
+        let what = format!("{slosh:?}");
+        assert_near(o.omega, w, 1e-9, &what);
+        assert_near(o.omega_dot, wd, 1e-6, &what);
+        assert_near(o.f_radial, force[0], 1e-5, &format!("{what} radial force"));
+        assert_near(o.f_tangential, force[1], 1e-5, &format!("{what} tangential force"));
+        assert_near(o.momentum, momentum, 1e-8, &format!("{what} momentum"));
+        assert_near(o.energy, energy, 1e-8, &format!("{what} energy"));
+        assert!(force[0].abs() > 0.4 && force[1].abs() > 0.4, "neither is small: {what} {force:?}");
+    }
+}
+
+/// The whole liquid at rest in the hub: its force is m_liq r w^2 outwards.
+#[test]
+fn liquid_that_turns_with_the_hub_pushes_outwards() {
+    for slosh in SloshModel::ALL {
+        let mut p = bench(slosh, FrictionModel::None);
+        p.init.omega = 0.5;
+        let o = Plant::new(&p, &Inputs::default(), 0.0, 1e-9).unwrap().outputs(&Inputs::default());
+        let m_liq = 1000.0 * core::f64::consts::FRAC_PI_4 * 0.163 * 0.163 * 0.10;
+        // A spherical bob that hangs is pushed by the centrifugal force and pulls at nothing yet.
+        let pushed = match slosh {
+            SloshModel::Frozen | SloshModel::Linear | SloshModel::Planar => m_liq,
+            _ => Plant::new(&p, &Inputs::default(), 0.0, 1e-9).unwrap().calculated().m_0,
+        };
+        assert_near(o.f_radial, pushed * 0.225 * 0.25, 1e-12, &format!("{slosh:?}"));
+    }
+}
+
+/// Where a torque makes the hub speed up from rest, the liquid pushes it back.
+#[test]
+fn liquid_pushes_back_against_an_acceleration() {
+    for slosh in SloshModel::ALL {
+        let p = bench(slosh, FrictionModel::None);
+        let inputs = Inputs { tau_ext: Ramp::held(0.1), ..Inputs::default() };
+        let mut plant = Plant::new(&p, &inputs, 0.0, 1e-9).unwrap();
+        let m_0 = plant.calculated().m_0;
+        let o = plant.outputs(&inputs);
+        // Bobs at rest under their hinges transmit nothing sideways.
+        let wd = 0.1 / (p.hub.inertia + m_0 * 0.225 * 0.225);
+        assert_near(o.omega_dot, wd, 1e-14, &format!("{slosh:?}"));
+        assert_near(o.f_tangential, -m_0 * 0.225 * wd, 1e-14, &format!("{slosh:?}"));
+        assert_near(o.tau_fluid, -m_0 * 0.225 * 0.225 * wd, 1e-14, &format!("{slosh:?}"));
+    }
+}

@@ -1,0 +1,122 @@
+//! Ranges of validity, what is refused, and what is said of it.
+
+use super::common::bench;
+use plant::{FrictionModel, Inputs, Parameters, Plant, Ramp, Regime, SloshModel, SloshSource};
+
+fn at(g: f64) -> Inputs {
+    Inputs { g_axial: Ramp::held(g), ..Inputs::default() }
+}
+
+/// Wave height at the wall over angle, in radii: 2/(xi_1^2 - 1).
+const WAVE: f64 = 2.0 / (1.841_183_781_340_659_5 * 1.841_183_781_340_659_5 - 1.0);
+
+/// Thesis 2.3.5: linear below 0.15 R, nonlinear above 0.25 R.
+#[test]
+fn regimes_end_at_waves_of_0_15_and_0_25_radii() {
+    let regime = |ratio: f64| {
+        let mut p = bench(SloshModel::Linear, FrictionModel::None);
+        p.init.slosh_angle = ratio / WAVE;
+        let o = Plant::new(&p, &at(9.81), 0.0, 1e-9).unwrap().outputs(&at(9.81));
+        assert!((o.wave_height - ratio * 0.0815).abs() < 1e-15);
+        o.discrete.regime
+    };
+    for (ratio, expected) in [
+        (0.0, Regime::Linear),
+        (0.149_999, Regime::Linear),
+        (0.150_001, Regime::Transitional),
+        (0.249_999, Regime::Transitional),
+        (0.250_001, Regime::Nonlinear),
+        (2.0, Regime::Nonlinear),
+    ] {
+        assert_eq!(regime(ratio), expected, "{ratio}");
+    }
+}
+
+/// The stroke at the ring, eta exp(-1.84 d/R), is 0.64 to 6.4 widths; the ring stays covered.
+#[test]
+fn the_rings_law_holds_between_its_strokes_and_under_water() {
+    let within = |width: f64, depth: f64, wave: f64| {
+        let mut p = bench(SloshModel::Linear, FrictionModel::None);
+        (p.baffle.width, p.baffle.depth) = (width, depth);
+        p.init.slosh_angle = wave / (0.0815 * WAVE);
+        let o = Plant::new(&p, &at(9.81), 0.0, 1e-9).unwrap().outputs(&at(9.81));
+        assert!((o.baffle_wave / wave - 1.0).abs() < 1e-3);
+        o.discrete.baffle_in_range
+    };
+    let left = (-1.84f64 * 0.03 / 0.0815).exp();
+    // The amplitude has a floor, 4e-4 of the wave where the range begins.
+    let smallest = 0.64 * 0.008 / left;
+    assert!(!within(0.008, 0.03, smallest * 0.998) && within(0.008, 0.03, smallest * 1.002));
+    let largest = 6.4 * 0.002 / left;
+    assert!(within(0.002, 0.03, largest * 0.998) && !within(0.002, 0.03, largest * 1.002));
+    assert!(within(0.008, 0.02, 0.01999) && !within(0.008, 0.02, 0.02001), "covered");
+    // alpha = w/R (2 - w/R) = 0.25 at w/R = 1 - sqrt(0.75)
+    let widest = 0.0815 * (1.0 - 0.75f64.sqrt());
+    assert!(within(widest * 0.999, 0.03, 0.025) && !within(widest * 1.001, 0.03, 0.025));
+}
+
+#[test]
+fn what_leaves_the_range_of_a_formula_is_warned_of() {
+    let mut p = bench(SloshModel::Linear, FrictionModel::None);
+    let warnings = |p: &Parameters, g: f64| Plant::warnings(p, &at(g));
+    assert!(warnings(&p, 9.81).is_empty());
+    // 1000 0.0815^2 g/0.07213 = 92.1 g
+    assert!(warnings(&p, 1.08).len() == 1 && warnings(&p, 1.09).is_empty(), "Bond number 100");
+    let weightless = warnings(&p, 0.0);
+    assert!(weightless[0].contains("nothing restores or damps slosh mode 1"), "{weightless:?}");
+    p.slosh.model = SloshModel::Frozen;
+    assert!(warnings(&p, 0.0).is_empty(), "rigid liquid needs no g");
+    p.slosh.model = SloshModel::Liquid;
+    p.tank.h = 0.399 * 0.0815;
+    assert!(warnings(&p, 9.81)[0].contains("shallow"));
+    p.tank.h = 0.401 * 0.0815;
+    assert!(!warnings(&p, 9.81).iter().any(|text| text.contains("shallow")));
+
+    let mut p = bench(SloshModel::Linear, FrictionModel::None);
+    (p.baffle.width, p.baffle.depth) = (0.008, 0.01);
+    assert!(warnings(&p, 9.81).is_empty());
+    p.slosh.source = SloshSource::Table;
+    p.slosh.table.m_liq = 2.0;
+    (p.slosh.table.mass[0], p.slosh.table.length[0]) = (0.7, 0.05);
+    let all = warnings(&p, 9.81);
+    assert!(all.len() == 1 && all[0].contains("upright cylinder"), "{all:?}");
+    p.baffle.width = 0.0;
+    assert!(warnings(&p, 9.81).is_empty());
+    p.slosh.zeta_from_correlation = false;
+    assert!(warnings(&p, 9.81)[0].contains("slosh.zeta_from_correlation without effect"));
+    // Weightless, but centred.
+    p.slosh.zeta_from_correlation = true;
+    p.slosh.table.k[0] = 1.0;
+    assert!(warnings(&p, 0.0).is_empty());
+}
+
+#[test]
+fn a_ring_wider_than_the_tank_or_below_its_bottom_is_refused() {
+    let problems = |change: fn(&mut Parameters)| {
+        let mut p = bench(SloshModel::Linear, FrictionModel::None);
+        (p.baffle.width, p.baffle.depth) = (0.0814, 0.0999);
+        change(&mut p);
+        Plant::problems(&p).len()
+    };
+    assert_eq!(problems(|_| {}), 0);
+    assert_eq!(problems(|p| p.baffle.width = 0.0815), 1);
+    assert_eq!(problems(|p| p.baffle.depth = 0.1), 1);
+    assert_eq!(problems(|p| (p.baffle.width, p.baffle.depth) = (0.0, 0.2)), 0, "there is none");
+}
+
+/// What a table gives is taken as it stands down to the last digit of the sum of its masses.
+#[test]
+fn a_table_whose_masses_are_the_whole_liquid_has_no_fixed_mass() {
+    let mut p = bench(SloshModel::Linear, FrictionModel::None);
+    (p.slosh.source, p.slosh.modes) = (SloshSource::Table, 2);
+    p.slosh.table.m_liq = 1.0;
+    p.slosh.table.mass[..2].copy_from_slice(&[0.75, 0.25 + 5e-10]);
+    p.slosh.table.length[..2].copy_from_slice(&[0.1, 0.1]);
+    let plant = Plant::new(&p, &at(9.81), 0.0, 1e-9).unwrap();
+    assert_eq!(plant.calculated().m_0, 0.0);
+    p.slosh.table.mass[1] = 0.25 + 2e-9;
+    assert!(Plant::problems(&p)[0].contains("add up to"));
+    p.slosh.table.mass[1] = 0.2;
+    let plant = Plant::new(&p, &at(9.81), 0.0, 1e-9).unwrap();
+    assert!((plant.calculated().m_0 - 0.05).abs() < 1e-15);
+}

@@ -1,0 +1,136 @@
+//! Tanks of any shape through a table of modes.
+
+use super::common::bench;
+use formulas::cylinder;
+use plant::{FrictionModel, Inputs, Outputs, Parameters, Plant, Ramp, SloshModel, SloshSource};
+
+fn plant(p: &Parameters) -> Plant {
+    Plant::new(p, &Inputs::default(), 0.0, 1e-10).unwrap()
+}
+
+/// A sphere of 0.2 m, half full, three modes.
+fn sphere() -> Parameters {
+    let mut p = bench(SloshModel::Linear, FrictionModel::Viscous);
+    (p.slosh.source, p.slosh.modes) = (SloshSource::Table, 3);
+    let table = &mut p.slosh.table;
+    table.m_liq = 2.0944;
+    table.mass[..3].copy_from_slice(&[1.2, 0.05, 0.012]);
+    table.length[..3].copy_from_slice(&[0.0641, 0.0189, 0.0117]);
+    p
+}
+
+fn run(p: &Parameters) -> Vec<Outputs> {
+    let mut plant = plant(p);
+    let mut inputs = Inputs { tau_cmd: Ramp { value: 0.1, slope: -0.02 }, ..Inputs::default() };
+    (0..100)
+        .map(|_| {
+            plant.step(&inputs, 0.02).unwrap();
+            inputs.tau_cmd.value += 0.02 * inputs.tau_cmd.slope;
+            plant.outputs(&inputs)
+        })
+        .collect()
+}
+
+/// With and without a height of the wave, which defaults to that of a cylinder of the diameter tank.d.
+#[test]
+fn table_of_a_cylinder_moves_as_the_cylinder_does() {
+    for model in
+        [SloshModel::Linear, SloshModel::Planar, SloshModel::Spherical, SloshModel::Paraboloid]
+    {
+        let mut p = bench(model, FrictionModel::Stribeck);
+        p.slosh.modes = 3;
+        let (expected, known) = (run(&p), *plant(&p).calculated());
+        p.slosh.source = SloshSource::Table;
+        p.slosh.table.m_liq = known.m_liq;
+        for n in 0..3 {
+            let of = cylinder::pendulum(n, p.tank.d, p.tank.h, known.m_liq);
+            (p.slosh.table.mass[n], p.slosh.table.length[n]) = (of.mass, of.length);
+            p.slosh.table.zeta[n] = known.damping[n];
+        }
+        assert_eq!(run(&p), expected, "{model:?}");
+        // Waves of another height, and nothing else.
+        p.slosh.table.wave[..3].copy_from_slice(&[0.1, 0.2, 0.3]);
+        for (a, b) in run(&p).iter().zip(&expected) {
+            assert_eq!((a.omega, a.slosh_angle), (b.omega, b.slosh_angle));
+        }
+        let mut start = p;
+        (start.init.slosh_angle, start.init.slosh_angle_radial) = (0.3, 0.4);
+        let o = plant(&start).outputs(&Inputs::default());
+        let radial = if o.slosh_angle_radial == 0.0 { 0.0 } else { 0.4 };
+        let [x, y] = o.wave;
+        assert!((x - 0.1 * radial).abs() < 1e-15 && (y - 0.1 * 0.3).abs() < 1e-15, "{model:?}");
+        assert!((o.wave_height - x.hypot(y)).abs() < 1e-15, "{model:?}");
+    }
+}
+
+#[test]
+fn a_frequency_stands_for_a_length() {
+    let mut p = sphere();
+    p.slosh.table.k = [0.0; plant::MODES];
+    p.slosh.table.k[0] = 2.0;
+    let lengths = plant(&p).calculated().length;
+    for n in 0..3 {
+        let table = &mut p.slosh.table;
+        let omega2 = table.g_ref / lengths[n] + table.k[n] / table.mass[n];
+        table.frequency[n] = omega2.sqrt() / std::f64::consts::TAU;
+        table.length[n] = 0.0;
+    }
+    for (a, b) in plant(&p).calculated().length.iter().zip(lengths).take(3) {
+        assert!((a / b - 1.0).abs() < 1e-14, "{a} {b}");
+    }
+}
+
+#[test]
+fn a_table_that_is_no_tank_is_refused_with_everything_that_is_wrong() {
+    let good = sphere();
+    let refused = |change: fn(&mut Parameters)| {
+        let mut p = good;
+        change(&mut p);
+        Plant::new(&p, &Inputs::default(), 0.0, 1e-9).err().unwrap_or_default()
+    };
+    assert!(refused(|_| {}).is_empty());
+    let all = refused(|p| {
+        p.slosh.table.m_liq = 0.0;
+        p.slosh.table.mass[1] = 0.0;
+        p.slosh.table.length[2] = 0.0;
+        p.slosh.model = SloshModel::Liquid;
+    });
+    assert_eq!(all.len(), 4, "{all:?}");
+    for (what, place) in
+        [("liquid", 0), ("slosh.table.m_liq", 1), ("slosh.table.mass[2]", 2), ("length[3]", 3)]
+    {
+        assert!(all[place].contains(what), "{all:?}");
+    }
+    let one = |change: fn(&mut Parameters), what: &str| {
+        let problems = refused(change);
+        assert!(problems.len() == 1 && problems[0].contains(what), "{problems:?}");
+    };
+    one(|p| p.slosh.table.frequency[0] = 1.0, "one of them greater than 0");
+    one(|p| p.slosh.table.length.swap(0, 1), "order of their frequencies");
+    one(|p| p.slosh.table.m_liq *= 0.1, "add up to");
+    one(
+        |p| {
+            p.slosh.table.length[0] = 0.0;
+            (p.slosh.table.frequency[0], p.slosh.table.k[0]) = (0.1, 1e3);
+        },
+        "not above that of slosh.table.k[1]",
+    );
+}
+
+/// Liquid that the walls drag along (`tank.I_own`) is that much more to turn, wherever the tank is.
+#[test]
+fn the_tanks_own_inertia_is_turned_with_the_hub() {
+    let mut p = bench(SloshModel::Frozen, FrictionModel::None);
+    let inputs = Inputs { tau_cmd: Ramp::held(1e-3), ..Inputs::default() };
+    for r in [0.0, 0.225] {
+        p.tank.r = r;
+        p.tank.own_inertia = 0.002;
+        let o = Plant::new(&p, &inputs, 0.0, 1e-9).unwrap().outputs(&inputs);
+        // pi/4 d^2 h of water, rigid, on its circle
+        let m = 1000.0 * core::f64::consts::FRAC_PI_4 * 0.163 * 0.163 * 0.10;
+        let inertia = p.hub.inertia + 0.002 + m * r * r;
+        assert!((o.omega_dot * inertia / 1e-3 - 1.0).abs() < 1e-12, "{r} {}", o.omega_dot);
+        let drag = -(0.002 + m * r * r) * o.omega_dot;
+        assert!((o.tau_fluid / drag - 1.0).abs() < 1e-12, "{r} {}", o.tau_fluid);
+    }
+}
