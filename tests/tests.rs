@@ -18,12 +18,13 @@ mod physics {
 mod python;
 mod second;
 mod six {
-    mod balances;
     mod component;
     mod cosimulation;
     mod hubslosh;
     mod steps;
     // Tests of the crate `craft`, here with the packed FMUs as `component`.
+    #[path = "../../fmu/craft/tests/craft/balances.rs"]
+    mod balances;
     #[path = "../../fmu/craft/tests/craft/draining.rs"]
     mod draining;
     #[path = "../../fmu/craft/tests/craft/exchange.rs"]

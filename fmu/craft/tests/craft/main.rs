@@ -1,8 +1,9 @@
 //! What must hold of the craft and of the tank alone.
 //!
 //! `tests/six`, at the root of the project, runs most of these once more through the packed FMUs,
-//! and has the balances over 1000 s and the coupling by co-simulation.
+//! and has the coupling by co-simulation.
 
+mod balances;
 mod component;
 mod draining;
 mod equations;
