@@ -7,6 +7,7 @@ use anyhow::{Context, Result, bail, ensure};
 use crate::profile::Torque;
 use host::budget;
 use host::description::{ModelDescription, Type, Variable};
+use host::drive::Inputs;
 use host::fmi2::{Fmu, Instance};
 use signals::table::{self, Table};
 
@@ -174,6 +175,13 @@ impl Run {
         first.chain(self.others.iter().map(|(name, history)| (name.as_str(), history))).collect()
     }
 
+    /// The driven inputs as the FMU is told them.
+    fn inputs(&self, description: &ModelDescription) -> Result<Inputs> {
+        let driven = self.driven();
+        let names: Vec<&str> = driven.iter().map(|(name, _)| *name).collect();
+        Inputs::new(description, &names, self.hold)
+    }
+
     /// Fails with one sentence if the numbers make no sense.
     pub fn check(&self) -> Result<()> {
         ensure!(
@@ -208,13 +216,15 @@ impl Run {
                 ),
             }
         }
-        instance.setup_experiment(self.tolerance, self.start(), Some(self.stop))?;
-        instance.enter_initialization_mode()?;
-        for (input, history) in self.driven() {
-            let reference = [fmu.description().variable(input)?.reference];
-            instance.set_real(&reference, &[history.at(self.start())])?;
-        }
-        instance.exit_initialization_mode()?;
+        let first: Vec<f64> =
+            self.driven().iter().map(|(_, history)| history.at(self.start())).collect();
+        self.inputs(fmu.description())?.initialise(
+            &mut instance,
+            self.tolerance,
+            self.start(),
+            Some(self.stop),
+            &first,
+        )?;
         Ok(instance)
     }
 
@@ -231,55 +241,34 @@ impl Run {
         let steps = self.steps();
         budget::table(steps + 1, 1 + self.driven().len() + columns.len())?;
         let mut recorder = Recorder::new(instance, columns, steps + 1)?;
-        let description = instance.fmu().description();
         let driven = self.driven();
-        let references: Vec<u32> = driven
-            .iter()
-            .map(|(name, _)| Ok(description.variable(name)?.reference))
-            .collect::<Result<_>>()?;
-        let orders = vec![1; driven.len()];
-        let slopes = !self.hold
-            && description.co_simulation.as_ref().is_some_and(|cs| cs.can_interpolate_inputs);
         let points = steps + 1;
         let mut time = Vec::with_capacity(points);
-        let mut inputs: Vec<Vec<f64>> = driven.iter().map(|_| Vec::with_capacity(points)).collect();
-        let (mut values, mut rises) = (vec![0.0; driven.len()], vec![0.0; driven.len()]);
-        let mut t = self.start();
-        for step in 1..=steps {
-            let next = self.time(step);
-            time.push(t);
+        let mut given: Vec<Vec<f64>> = driven.iter().map(|_| Vec::with_capacity(points)).collect();
+        let inputs = self.inputs(instance.fmu().description())?;
+        inputs.drive(instance, self.start(), |instance, t, course| {
+            let step = time.len();
+            let next = (step < steps).then(|| self.time(step + 1));
             for (i, (_, history)) in driven.iter().enumerate() {
-                (values[i], rises[i]) = history.chord(t, next - t);
-                inputs[i].push(values[i]);
+                match next {
+                    Some(next) => {
+                        (course.values[i], course.slopes[i]) = history.chord(t, next - t);
+                    }
+                    None => course.values[i] = history.at(t),
+                }
+                given[i].push(course.values[i]);
             }
+            time.push(t);
             recorder.record(instance)?;
-            let set = |instance: &mut Instance| {
-                if driven.is_empty() {
-                    return Ok(());
-                }
-                instance.set_real(&references, &values)?;
-                match slopes {
-                    true => instance.set_real_input_derivatives(&references, &orders, &rises),
-                    false => Ok(()),
-                }
-            };
-            set(instance)
-                .and_then(|()| instance.do_step(t, next - t))
-                .with_context(|| format!("the run stopped at t = {t} s"))?;
-            t = next;
-            if step % REPORT_EVERY == 0 {
+            if step > 0 && step.is_multiple_of(REPORT_EVERY) {
                 progress(REPORT_EVERY as u64);
             }
-        }
+            Ok(next)
+        })?;
         progress((steps % REPORT_EVERY) as u64);
-        time.push(t);
-        for (input, (_, history)) in inputs.iter_mut().zip(&driven) {
-            input.push(history.at(t));
-        }
-        recorder.record(instance)?;
 
         let names = driven.iter().map(|(name, _)| name.to_string());
-        let head = [("time".to_string(), time)].into_iter().chain(names.zip(inputs));
+        let head = [("time".to_string(), time)].into_iter().chain(names.zip(given));
         let recorded = columns.iter().map(|name| name.to_string()).zip(recorder.columns());
         let (names, columns) = head.chain(recorded).unzip();
         Ok(Table::new(names, columns))

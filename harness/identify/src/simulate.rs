@@ -1,7 +1,8 @@
 //! The FMU's answer to a recording's torque, at the recording's instants.
 
-use anyhow::{Context, Result};
-use host::fmi2::{Fmu, Instance};
+use anyhow::Result;
+use host::drive::Inputs;
+use host::fmi2::Fmu;
 
 use crate::recording::Recording;
 
@@ -108,85 +109,46 @@ impl Setup {
             }
             Intersample::FirstOrderHold | Intersample::ZeroOrderHold => &recording.torque,
         };
-        let mut inputs = vec![(reference("tau_cmd")?, torque)];
-        if let Some(gravity) = &recording.gravity {
-            inputs.push((reference("g_axial")?, gravity));
-        }
-        let mut drive = Drive {
-            references: inputs.iter().map(|(reference, _)| *reference).collect(),
-            signals: inputs.iter().map(|(_, signal)| signal.as_slice()).collect(),
-            outputs: [reference("theta")?, reference("omega")?, reference("omega_dot")?],
-            time: &recording.time,
-            held: self.intersample == Intersample::ZeroOrderHold,
-            instance: &mut instance,
-        };
-        drive.begin()?;
-        drive.through(delay)
-    }
-}
+        let mut driven = vec![("tau_cmd", torque.as_slice())];
+        driven.extend(recording.gravity.as_ref().map(|gravity| ("g_axial", gravity.as_slice())));
+        let (names, signals): (Vec<&str>, Vec<&[f64]>) = driven.into_iter().unzip();
+        let held = self.intersample == Intersample::ZeroOrderHold;
+        let inputs = Inputs::new(fmu.description(), &names, held)?;
+        let time = &recording.time;
+        let first: Vec<f64> = signals.iter().map(|signal| signal[0]).collect();
+        inputs.initialise(&mut instance, None, time[0], None, &first)?;
 
-/// An instance that is driven with the signals of a recording.
-struct Drive<'a, 'fmu> {
-    instance: &'a mut Instance<'fmu>,
-    references: Vec<u32>,
-    signals: Vec<&'a [f64]>,
-    outputs: [u32; 3],
-    time: &'a [f64],
-    held: bool,
-}
-
-impl Drive<'_, '_> {
-    fn begin(&mut self) -> Result<()> {
-        self.instance.setup_experiment(None, self.time[0], None)?;
-        self.instance.enter_initialization_mode()?;
-        let first: Vec<f64> = self.signals.iter().map(|signal| signal[0]).collect();
-        self.instance.set_real(&self.references, &first)?;
-        self.instance.exit_initialization_mode()?;
-        Ok(())
-    }
-
-    fn through(&mut self, delay: f64) -> Result<Motion> {
-        let (time, count) = (self.time, self.references.len());
-        let orders = vec![1; count];
-        let (mut values, mut slopes) = (vec![0.0; count], vec![0.0; count]);
+        let outputs = [reference("theta")?, reference("omega")?, reference("omega_dot")?];
         let mut motion = Motion::default();
-        let (mut t, mut knot) = (time[0], 0);
-        for &row in time {
-            let target = row - delay;
-            while t < target - SAME {
-                let end = time.get(knot + 1).copied().unwrap_or(f64::INFINITY);
-                let next = if end < target + SAME { end } else { target };
-                for (i, signal) in self.signals.iter().enumerate() {
-                    slopes[i] = match time.get(knot + 1) {
-                        Some(end) if !self.held => {
-                            (signal[knot + 1] - signal[knot]) / (end - time[knot])
-                        }
-                        _ => 0.0,
-                    };
-                    values[i] = signal[knot] + slopes[i] * (t - time[knot]);
+        // the row that is read next; the row from which on the signals go to the one after it
+        let (mut row, mut knot) = (0, 0);
+        inputs.drive(&mut instance, time[0], |instance, t, course| {
+            let target = loop {
+                let Some(&recorded) = time.get(row) else { return Ok(None) };
+                let target = recorded - delay;
+                if t < target - SAME {
+                    break target;
                 }
-                let references = &self.references;
-                self.instance
-                    .set_real(references, &values)
-                    .and_then(|()| match self.held {
-                        true => Ok(()),
-                        false => {
-                            self.instance.set_real_input_derivatives(references, &orders, &slopes)
-                        }
-                    })
-                    .and_then(|()| self.instance.do_step(t, next - t))
-                    .with_context(|| format!("the FMU stopped at t = {t} s"))?;
-                t = next;
-                if t >= end {
-                    knot += 1;
-                }
+                let mut values = [0.0; 3];
+                instance.get_real(&outputs, &mut values)?;
+                motion.angle.push(values[0]);
+                motion.rate.push(values[1]);
+                motion.acceleration.push(values[2]);
+                row += 1;
+            };
+            if time.get(knot + 1).is_some_and(|end| t >= *end) {
+                knot += 1;
             }
-            let mut values = [0.0; 3];
-            self.instance.get_real(&self.outputs, &mut values)?;
-            motion.angle.push(values[0]);
-            motion.rate.push(values[1]);
-            motion.acceleration.push(values[2]);
-        }
+            let end = time.get(knot + 1).copied();
+            for (i, signal) in signals.iter().enumerate() {
+                course.slopes[i] = match end {
+                    Some(end) if !held => (signal[knot + 1] - signal[knot]) / (end - time[knot]),
+                    _ => 0.0,
+                };
+                course.values[i] = signal[knot] + course.slopes[i] * (t - time[knot]);
+            }
+            Ok(Some(end.filter(|end| *end < target + SAME).unwrap_or(target)))
+        })?;
         Ok(motion)
     }
 }

@@ -3,7 +3,8 @@
 
 use anyhow::{Result, bail, ensure};
 use experiments::profile::{Profile, Torque};
-use experiments::run::Run;
+use experiments::run::{Run, TORQUE};
+use host::drive::Inputs;
 use host::fmi2::Fmu;
 
 use crate::design::Multisine;
@@ -153,16 +154,16 @@ impl Twin {
         };
         // steps that meet the knots, or are short against a smooth torque's cycle
         let parts = match (self.intersample, late == 0.0) {
-            (Intersample::BandLimited, _) => (step / 1e-3).ceil() as u32,
+            (Intersample::BandLimited, _) => (step / 1e-3).ceil() as usize,
             (_, true) => 1,
             (_, false) => 4,
         };
         let run = Run {
             settings: self.settings(&tau, seed),
-            input: Some(experiments::run::TORQUE.into()),
+            input: Some(TORQUE.into()),
             torque: heard.clone(),
             others: Vec::new(),
-            step: step / f64::from(parts),
+            step: step / parts as f64,
             stop,
             tolerance: None,
             hold: false,
@@ -174,46 +175,43 @@ impl Twin {
         let friction = friction.map(reference).into_iter().collect::<Result<Vec<u32>>>()?;
         let mut cold = vec![0.0; friction.len()];
         instance.get_real(&friction, &mut cold)?;
-        let (input, read) = (
-            reference(experiments::run::TORQUE)?,
-            [reference("omega_imu")?, reference("omega_dot")?],
-        );
+        let read = [reference("omega_imu")?, reference("omega_dot")?];
         let (mut rate, mut rocking) = (Vec::with_capacity(time.len()), Rocking::default());
-        for row in 0..=rows {
-            let mut now = [0.0; 2];
-            instance.get_real(&read, &mut now)?;
-            let seen = match self.blind.contains(&Blind::Nutation) {
-                true => ROCKING_SEEN * rocking.step(now[1], step),
-                false => 0.0,
+        let inputs = Inputs::new(fmu.description(), &[TORQUE], held)?;
+        let mut steps = 0;
+        inputs.drive(&mut instance, start, |instance, t, course| {
+            let (row, part) = (steps / parts, steps % parts);
+            if part == 0 {
+                let mut now = [0.0; 2];
+                instance.get_real(&read, &mut now)?;
+                let seen = match self.blind.contains(&Blind::Nutation) {
+                    true => ROCKING_SEEN * rocking.step(now[1], step),
+                    false => 0.0,
+                };
+                let SensorErrors { gyro_scale, gyro_bias, .. } = self.sensor_errors;
+                rate.push(gyro_scale * (now[0] + seen) + gyro_bias);
+                if row == rows {
+                    return Ok(None);
+                }
+                if self.blind.contains(&Blind::Warming) && row % 50 == 0 {
+                    let part = 1.0 - WARM * (1.0 - (-(time[row] - start) / WARMING).exp());
+                    let warm: Vec<f64> = cold.iter().map(|value| value * part).collect();
+                    instance.set_real(&friction, &warm)?;
+                }
+            }
+            // the last part ends where the next row begins, to the last bit: the FMU's clock adds them up
+            let next = match part + 1 {
+                end if end == parts => time[row + 1],
+                end => time[row] + end as f64 * run.step,
             };
-            rate.push(
-                self.sensor_errors.gyro_scale * (now[0] + seen) + self.sensor_errors.gyro_bias,
-            );
-            if row == rows {
-                break;
-            }
-            if self.blind.contains(&Blind::Warming) && row % 50 == 0 {
-                let part = 1.0 - WARM * (1.0 - (-(time[row] - start) / WARMING).exp());
-                let warm: Vec<f64> = cold.iter().map(|value| value * part).collect();
-                instance.set_real(&friction, &warm)?;
-            }
-            for part in 0..parts {
-                // each step ends where the next begins, to the last bit: the FMU's clock adds them up
-                let at = |part: u32| match part {
-                    part if part == parts => time[row + 1],
-                    part => time[row] + f64::from(part) * run.step,
-                };
-                let (t, next) = (at(part), at(part + 1));
-                let shift = if self.intersample == Intersample::BandLimited { late } else { 0.0 };
-                let (value, slope) = match held {
-                    true => (heard.at(t), 0.0),
-                    false => heard.chord((t - shift).max(start), next - t),
-                };
-                instance.set_real(&[input], &[value])?;
-                instance.set_real_input_derivatives(&[input], &[1], &[slope])?;
-                instance.do_step(t, next - t)?;
-            }
-        }
+            let shift = if self.intersample == Intersample::BandLimited { late } else { 0.0 };
+            (course.values[0], course.slopes[0]) = match held {
+                true => (heard.at(t), 0.0),
+                false => heard.chord((t - shift).max(start), next - t),
+            };
+            steps += 1;
+            Ok(Some(next))
+        })?;
         Ok(Recording::of("twin", time, tau, rate))
     }
 }
