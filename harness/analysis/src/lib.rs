@@ -22,6 +22,7 @@ pub mod random;
 pub mod rational;
 pub mod residual;
 pub mod rotary;
+pub mod sanathanan_koerner;
 pub mod spa;
 pub mod sweep;
 pub mod transfer_function;

@@ -18,26 +18,29 @@ use nalgebra::{DMatrix, DVector};
 use signals::fourier::Forward;
 
 use crate::features::{Deviations, Features};
+use crate::sanathanan_koerner::{self, Coefficients, Line};
 use crate::{Complex64, FrequencyResponse};
 
-/// Iterations; ten settle it.
-const ITERATIONS: usize = 20;
 /// The most frequencies that are fitted; of more, some at equal distances.
 const POINTS: usize = 1500;
+/// The fewest.
+const LEAST: usize = 20;
+/// Rounds of the iteration; ten settle it.
+const ROUNDS: usize = 20;
+
+/// Columns of six coefficients, one for each unknown.
+type Spread = [[f64; 6]; 9];
 
 /// The fitted function.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Rational {
     /// Middle of the band, rad/s: the unit of s.
     unit: f64,
-    /// b2, b1, b0.
-    numerator: [f64; 3],
-    /// a2, a1, a0; s³ has 1.
-    denominator: [f64; 3],
-    /// Root mean square of what the fit leaves, relative to |Y|.
+    coefficients: Coefficients,
+    /// Root mean square of the fit's residual, relative to |Y|.
     pub misfit: f64,
     /// A root of the covariance of numerator and denominator, one column for each unknown of the fit.
-    spread: [[f64; 6]; 9],
+    spread: Spread,
 }
 
 impl Rational {
@@ -53,55 +56,22 @@ impl Rational {
             |signal: &[f64]| transform.of(signal.iter().map(|x| x / count as f64).collect());
         let (u, y) = (spectrum(torque), spectrum(rate));
         let unit = TAU * (from * to).sqrt();
-        let points: Vec<(Complex64, Complex64, Complex64)> = bins
+        let lines: Vec<Line> = bins
             .step_by(every)
-            .map(|k| (Complex64::new(0.0, TAU * k as f64 * bin / unit), u[k], y[k]))
-            .filter(|(_, _, y)| y.norm_sqr() > 0.0)
+            .filter(|k| y[*k].norm_sqr() > 0.0)
+            .map(|k| Line {
+                s: Complex64::new(0.0, TAU * k as f64 * bin / unit),
+                input: u[k],
+                output: y[k],
+                scale: y[k].norm(),
+            })
             .collect();
-        if points.len() < 20 {
+        if lines.len() < LEAST {
             return None;
         }
-        let mut found = Rational {
-            unit,
-            numerator: [0.0; 3],
-            denominator: [0.0; 3],
-            misfit: f64::INFINITY,
-            spread: [[0.0; 6]; 9],
-        };
-        for _ in 0..ITERATIONS {
-            let (mut a, mut b) =
-                (DMatrix::zeros(2 * points.len(), 9), DVector::zeros(2 * points.len()));
-            for (k, &(s, u, y)) in points.iter().enumerate() {
-                let weight = 1.0 / (found.denominator_at(s).norm() * y.norm());
-                let powers = [s * s, s, Complex64::from(1.0)];
-                let entries = [-u, Complex64::from(-1.0), y].into_iter();
-                let entries = entries.flat_map(|x| powers.map(|p| p * x));
-                let right = -y * s * s * s;
-                for (j, entry) in entries.enumerate() {
-                    (a[(2 * k, j)], a[(2 * k + 1, j)]) = (entry.re * weight, entry.im * weight);
-                }
-                (b[2 * k], b[2 * k + 1]) = (right.re * weight, right.im * weight);
-            }
-            let sizes: Vec<f64> = a.column_iter().map(|column| column.norm().max(1e-300)).collect();
-            for (mut column, size) in a.column_iter_mut().zip(&sizes) {
-                column /= *size;
-            }
-            // Householder: the normal equations would lose half of the digits
-            let qr = a.clone().qr();
-            let x = qr.r().solve_upper_triangular(&(qr.q().transpose() * &b))?;
-            let left = (&a * &x - &b).norm() / (b.len() as f64).sqrt();
-            let x: Vec<f64> = x.iter().zip(&sizes).map(|(x, size)| x / size).collect();
-            found.numerator = [x[0], x[1], x[2]];
-            found.denominator = [x[6], x[7], x[8]];
-            found.misfit = left;
-            // the covariance of x is left² (RᵀR)⁻¹
-            let root = qr.r().try_inverse()?;
-            let scale = left * (b.len() as f64 / (b.len() as f64 - 9.0)).sqrt();
-            found.spread = std::array::from_fn(|j| {
-                [0, 1, 2, 6, 7, 8].map(|i| scale * root[(i, j)] / sizes[i])
-            });
-        }
-        found.misfit.is_finite().then_some(found)
+        let (coefficients, (misfit, spread)) =
+            sanathanan_koerner::fit(&lines, true, ROUNDS, solved)?;
+        misfit.is_finite().then_some(Rational { unit, coefficients, misfit, spread })
     }
 
     /// Relative standard deviation of the response on a grid of frequencies (Hz), and that of its
@@ -112,12 +82,12 @@ impl Rational {
         let mut squares = vec![0.0; frequencies.len()];
         let mut moved = [Some(0.0), Some(0.0)];
         for column in &self.spread {
-            let mut other = *self;
+            let mut other = self.coefficients;
             for i in 0..3 {
                 other.numerator[i] += column[i];
                 other.denominator[i] += column[i + 3];
             }
-            let response = other.frequency_response(frequencies);
+            let response = self.response(other, frequencies);
             for (i, square) in squares.iter_mut().enumerate() {
                 let (h, nominal) = (response.response[i].norm(), nominal.response[i].norm());
                 *square += (h / nominal).ln().powi(2);
@@ -133,20 +103,35 @@ impl Rational {
         (squares.into_iter().map(f64::sqrt).collect(), Deviations { f_res, f_dip })
     }
 
-    fn denominator_at(&self, s: Complex64) -> Complex64 {
-        let [a2, a1, a0] = self.denominator;
-        ((s + a2) * s + a1) * s + a0
-    }
-
     /// The response on a grid of frequencies, Hz.
     pub fn frequency_response(&self, frequencies: &[f64]) -> FrequencyResponse {
-        let [b2, b1, b0] = self.numerator;
-        let response = frequencies.iter().map(|f| {
-            let s = Complex64::new(0.0, TAU * f / self.unit);
-            (b2 * s * s + b1 * s + b0) / self.denominator_at(s)
-        });
+        self.response(self.coefficients, frequencies)
+    }
+
+    fn response(&self, of: Coefficients, frequencies: &[f64]) -> FrequencyResponse {
+        let response =
+            frequencies.iter().map(|f| of.response(Complex64::new(0.0, TAU * f / self.unit)));
         FrequencyResponse { response: response.collect(), frequency: frequencies.to_vec() }
     }
+}
+
+/// Least squares of nine unknowns; the equations' root mean square residual, and a root of the covariance
+/// of the first and the last three unknowns.
+fn solved(mut a: DMatrix<f64>, b: DVector<f64>) -> Option<(DVector<f64>, (f64, Spread))> {
+    let sizes = DVector::from_iterator(9, a.column_iter().map(|column| column.norm().max(1e-300)));
+    for (mut column, size) in a.column_iter_mut().zip(&sizes) {
+        column /= *size;
+    }
+    // Householder: the normal equations would lose half of the digits
+    let qr = a.clone().qr();
+    let x = qr.r().solve_upper_triangular(&(qr.q().transpose() * &b))?;
+    let rows = b.len() as f64;
+    let misfit = (&a * &x - &b).norm() / rows.sqrt();
+    // the covariance of x is misfit² (RᵀR)⁻¹
+    let root = qr.r().try_inverse()?;
+    let scale = misfit * (rows / (rows - 9.0)).sqrt();
+    let column = |j| [0, 1, 2, 6, 7, 8].map(|i| scale * root[(i, j)] / sizes[i]);
+    Some((x.component_div(&sizes), (misfit, std::array::from_fn(column))))
 }
 
 #[cfg(test)]

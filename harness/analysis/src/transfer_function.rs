@@ -5,17 +5,17 @@
 //! H(s) = (b2 s² + b1 s + b0) / ((s + p) (s² + 2 ζ ω s + ω²))
 //! ```
 //!
-//! Sanathanan and Koerner's iteration (linear least squares, weighted by the last
-//! denominator) gives the start; Levenberg–Marquardt minimises Σ |H_meas − H_mod|², which is
+//! [Sanathanan and Koerner's iteration](crate::sanathanan_koerner) gives the start; Levenberg–Marquardt minimises Σ |H_meas − H_mod|², which is
 //! what Fit_freq measures. p, ω and ζ are fitted as logarithms, so the poles are stable.
 
 use std::f64::consts::TAU;
 
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
 use nalgebra::storage::Owned;
-use nalgebra::{DMatrix, DVector, Dyn, Matrix3, Matrix5, OMatrix, SVector, U6, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Dyn, Matrix3, Matrix5, OMatrix, U6, Vector3, Vector6};
 
 use crate::features::Features;
+use crate::sanathanan_koerner::{self, Coefficients, Line};
 use crate::{Complex64, FrequencyResponse};
 
 /// A transfer function with three stable poles and two zeros; s in rad/s.
@@ -63,7 +63,7 @@ impl TransferFunction {
 
     /// Fits a measured response; `None` when there is nothing to fit.
     pub fn fit(measured: &FrequencyResponse) -> Option<Self> {
-        let starts = [sanathanan_koerner(measured), at_the_resonance(measured)];
+        let starts = [by_sanathanan_koerner(measured), at_the_resonance(measured)];
         let fitted = starts.into_iter().flatten().filter_map(|start| {
             let problem = Problem { measured, unit: start.pole_omega, model: start };
             let (problem, report) = LevenbergMarquardt::new().with_patience(200).minimize(problem);
@@ -183,40 +183,31 @@ fn at_the_resonance(measured: &FrequencyResponse) -> Option<TransferFunction> {
     Some(TransferFunction { numerator, ..start })
 }
 
-/// Linear least squares of N(s) − H D(s), weighted by 1/|D| of the round before.
-fn sanathanan_koerner(measured: &FrequencyResponse) -> Option<TransferFunction> {
+/// Rounds of the iteration for the start.
+const ROUNDS: usize = 30;
+
+/// The iteration on U = 1, Y = H.
+fn by_sanathanan_koerner(measured: &FrequencyResponse) -> Option<TransferFunction> {
     let count = measured.frequency.len();
-    if count < 6 {
-        return None;
-    }
-    // s in units of the band's middle, for the equations' condition.
-    let middle = TAU * measured.frequency[count / 2];
-    let mut denominator = [1.0, 0.0, 0.0, 0.0]; // s³ + c2 s² + c1 s + c0: any start will do
-    let mut found = SVector::<f64, 6>::zeros();
-    for _ in 0..30 {
-        let mut a = DMatrix::zeros(2 * count, 6);
-        let mut b = DVector::zeros(2 * count);
-        for (k, (&f, h)) in measured.frequency.iter().zip(&measured.response).enumerate() {
-            let s = Complex64::new(0.0, TAU * f / middle);
-            let [_, c2, c1, c0] = denominator;
-            let weight = 1.0 / (s * s * s + c2 * s * s + c1 * s + c0).norm();
-            let row = [s * s, s, 1.0.into(), -h * s * s, -h * s, -h];
-            let right = h * s * s * s * weight;
-            for (j, entry) in row.into_iter().enumerate() {
-                a[(2 * k, j)] = entry.re * weight;
-                a[(2 * k + 1, j)] = entry.im * weight;
-            }
-            (b[2 * k], b[2 * k + 1]) = (right.re, right.im);
-        }
-        let solution = a.svd(true, true).solve(&b, 1e-14).ok()?;
-        found = SVector::from_column_slice(solution.as_slice());
-        denominator = [1.0, found[3], found[4], found[5]];
-    }
-    let (p, w, z) = stable_poles([found[3], found[4], found[5]])?;
+    let middle = TAU * measured.frequency.get(count / 2)?;
+    let points = measured.frequency.iter().zip(&measured.response);
+    let lines: Vec<Line> = points
+        .map(|(&f, &h)| Line {
+            s: Complex64::new(0.0, TAU * f / middle),
+            input: Complex64::ONE,
+            output: h,
+            scale: 1.0,
+        })
+        .collect();
+    // a response may leave coefficients open: the smallest that do
+    let solve =
+        |a: DMatrix<f64>, b: DVector<f64>| Some((a.svd(true, true).solve(&b, 1e-14).ok()?, ()));
+    let (Coefficients { numerator: [b2, b1, b0], denominator }, ()) =
+        sanathanan_koerner::fit(&lines, false, ROUNDS, solve)?;
+    let (p, w, z) = stable_poles(denominator)?;
     // Back to rad/s; the numerator has the unit of H times s.
-    let numerator = [found[0] * middle, found[1] * middle.powi(2), found[2] * middle.powi(3)];
     Some(TransferFunction {
-        numerator,
+        numerator: [b2 * middle, b1 * middle.powi(2), b0 * middle.powi(3)],
         real_pole: p * middle,
         pole_omega: w * middle,
         pole_damping: z,

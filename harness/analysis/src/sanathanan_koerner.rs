@@ -1,0 +1,122 @@
+//! Sanathanan and Koerner's iteration (IEEE Transactions on Automatic Control 8, 1963): a transfer
+//! function with three poles and two zeros from spectra of input U and output Y,
+//!
+//! ```text
+//! A(s) Y = B(s) U + T(s),   A = s³ + a2 s² + a1 s + a0,   B = b2 s² + b1 s + b0
+//! ```
+//!
+//! by linear least squares, each round weighted with 1/|A| of the one before. T, of the degree of B,
+//! is what the ends of a record leave in its spectra.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::Complex64;
+
+/// Spectra at one frequency.
+#[derive(Clone, Copy, Debug)]
+pub struct Line {
+    /// jω, in a unit near the middle of the lines, for the equations' condition.
+    pub s: Complex64,
+    /// U.
+    pub input: Complex64,
+    /// Y.
+    pub output: Complex64,
+    /// What the equation is divided by.
+    pub scale: f64,
+}
+
+/// B/A; s in the unit of the lines.
+#[derive(Clone, Copy, Debug)]
+pub struct Coefficients {
+    /// b2, b1, b0.
+    pub numerator: [f64; 3],
+    /// a2, a1, a0; s³ has 1.
+    pub denominator: [f64; 3],
+}
+
+impl Coefficients {
+    /// B(s)/A(s).
+    pub fn response(&self, s: Complex64) -> Complex64 {
+        let [b2, b1, b0] = self.numerator;
+        (b2 * s * s + b1 * s + b0) / self.denominator_at(s)
+    }
+
+    fn denominator_at(&self, s: Complex64) -> Complex64 {
+        let [a2, a1, a0] = self.denominator;
+        s * s * s + a2 * s * s + a1 * s + a0
+    }
+}
+
+/// Fits spectra in so many rounds, with T if `transient`, and gives what `solve` says of the last
+/// equations beside their solution by least squares; `None` where there is nothing to fit.
+pub fn fit<S>(
+    lines: &[Line],
+    transient: bool,
+    rounds: usize,
+    solve: impl Fn(DMatrix<f64>, DVector<f64>) -> Option<(DVector<f64>, S)>,
+) -> Option<(Coefficients, S)> {
+    // B, T and A
+    let unknowns = if transient { 9 } else { 6 };
+    let rows = 2 * lines.len();
+    if rows < 2 * unknowns {
+        return None;
+    }
+    let mut found = Coefficients { numerator: [0.0; 3], denominator: [0.0; 3] };
+    let mut said = None;
+    for _ in 0..rounds {
+        let (mut a, mut b) = (DMatrix::zeros(rows, unknowns), DVector::zeros(rows));
+        for (k, &Line { s, input, output, scale }) in lines.iter().enumerate() {
+            let weight = 1.0 / (found.denominator_at(s).norm() * scale);
+            let of_transient = transient.then_some(Complex64::ONE);
+            let factors = [input].into_iter().chain(of_transient).chain([-output]);
+            let entries = factors.flat_map(|x| [x * s * s, x * s, x]);
+            for (j, entry) in entries.enumerate() {
+                (a[(2 * k, j)], a[(2 * k + 1, j)]) = (entry.re * weight, entry.im * weight);
+            }
+            let right = output * s * s * s * weight;
+            (b[2 * k], b[2 * k + 1]) = (right.re, right.im);
+        }
+        let (x, beside) = solve(a, b)?;
+        let a0 = unknowns - 1;
+        found = Coefficients {
+            numerator: [x[0], x[1], x[2]],
+            denominator: [x[a0 - 2], x[a0 - 1], x[a0]],
+        };
+        said = Some(beside);
+    }
+    Some((found, said?))
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, DVector};
+
+    use super::{Coefficients, Line, fit};
+    use crate::Complex64;
+
+    #[test]
+    fn a_transfer_function_is_found_in_its_own_spectra_beside_a_transient() {
+        let plant = Coefficients { numerator: [0.4, 0.02, 0.35], denominator: [0.31, 1.1, 0.25] };
+        let lines = |transient: f64| -> Vec<Line> {
+            let line = |k: i32| {
+                let s = Complex64::new(0.0, 0.5 + 0.05 * f64::from(k));
+                let input = Complex64::from_polar(1.0, f64::from(k * k));
+                let output = plant.response(s) * input
+                    + transient * (0.7 * s * s - s + 0.2) / plant.denominator_at(s);
+                Line { s, input, output, scale: 1.0 }
+            };
+            (0..40).map(line).collect()
+        };
+        let solve =
+            |a: DMatrix<f64>, b: DVector<f64>| Some((a.svd(true, true).solve(&b, 1e-14).ok()?, ()));
+        let error = |transient, fitted| {
+            let (found, ()) = fit(&lines(transient), fitted, 10, solve).unwrap();
+            let parts = |c: Coefficients| c.numerator.into_iter().chain(c.denominator);
+            parts(found).zip(parts(plant)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+        };
+        // exact data: rounding times the condition of some hundred
+        assert!(error(0.0, false) < 1e-12 && error(0.3, true) < 1e-12);
+        assert!(error(0.3, false) > 1e-3, "a transient that is left out spoils the fit");
+        assert!(fit(&lines(0.0)[..8], true, 10, solve).is_none());
+    }
+}
