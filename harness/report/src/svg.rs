@@ -3,7 +3,7 @@
 
 use std::fmt::Write as _;
 
-use host::html::escape;
+use maud::{Markup, html};
 
 /// One axis.
 #[derive(Clone, Debug)]
@@ -138,115 +138,83 @@ impl Chart {
         let (left, right, top, bottom) = (MARGIN.0, width - MARGIN.1, MARGIN.2, height - MARGIN.3);
         let x = |value: f64| left + (right - left) * self.x.place(value);
         let y = |value: f64| bottom - (bottom - top) * self.y.place(value);
-        let mut out = opening(&self.title, self.size);
-        for &tick in &self.x.ticks {
-            let at = x(tick);
-            let _ = write!(
-                out,
-                "<path class=\"grid\" d=\"M{at:.1} {top}V{bottom}\"/>\
-                 <text class=\"tick\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"{}\">{}</text>",
-                // a number at the right end would be cut off at the drawing's edge
-                if at > right - 6.0 { width } else { at },
-                bottom + 15.0,
-                if at > right - 6.0 { "end" } else { "middle" },
-                number(tick, &self.x)
-            );
-        }
-        for &tick in &self.y.ticks {
-            let at = y(tick);
-            let _ = write!(
-                out,
-                "<path class=\"grid\" d=\"M{left} {at:.1}H{right}\"/>\
-                 <text class=\"tick\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
-                left - 6.0,
-                at + 3.5,
-                number(tick, &self.y)
-            );
-        }
-        let _ = write!(
-            out,
-            "<path class=\"frame\" d=\"M{left} {top}V{bottom}H{right}\"/>\
-             <text class=\"label\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>\
-             <text class=\"label\" transform=\"translate(13 {:.1}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
-            (left + right) / 2.0,
-            height - 7.0,
-            escape(&self.x.label),
-            (top + bottom) / 2.0,
-            escape(&self.y.label)
-        );
-        // a nested svg cuts off what leaves the plot
-        let _ = write!(
-            out,
-            "<svg x=\"{left}\" y=\"{top}\" width=\"{w}\" height=\"{h}\" viewBox=\"{left} {top} {w} {h}\">",
-            w = right - left,
-            h = bottom - top
-        );
-        for series in &self.series {
-            let points: Vec<(f64, f64)> = series
-                .points
-                .iter()
-                .map(|&(px, py)| (x(px), y(py)))
-                .filter(|(px, py)| px.is_finite() && py.is_finite())
-                .collect();
-            out.push_str(&curve(&points, series));
-        }
-        for (i, series) in self.series.iter().filter(|_| self.legend).enumerate() {
-            let at = top + 14.0 + 16.0 * i as f64;
-            let sample = [(right - 30.0, at - 4.0), (right - 6.0, at - 4.0)];
-            out.push_str(&curve(&sample, series));
-            let _ = write!(
-                out,
-                "<text class=\"label\" x=\"{:.1}\" y=\"{at:.1}\" text-anchor=\"end\">{}</text>",
-                right - 36.0,
-                escape(&series.title)
-            );
-        }
-        out.push_str("</svg></svg>\n");
-        out
+        // a number at the right end would be cut off at the drawing's edge
+        let place = |at: f64| if at > right - 6.0 { (width, "end") } else { (at, "middle") };
+        let drawing = html! {
+            svg viewBox={ "0 0 " (width) " " (height) } role="img" aria-label=(self.title) {
+                text .title x=(left) y="15" { (self.title) }
+                @for &tick in &self.x.ticks {
+                    @let (at, anchor) = place(x(tick));
+                    path .grid d={ "M" (tenth(x(tick))) " " (top) "V" (bottom) } {}
+                    text .tick x=(tenth(at)) y=(tenth(bottom + 15.0)) text-anchor=(anchor) {
+                        (number(tick, &self.x))
+                    }
+                }
+                @for &tick in &self.y.ticks {
+                    path .grid d={ "M" (left) " " (tenth(y(tick))) "H" (right) } {}
+                    text .tick x=(tenth(left - 6.0)) y=(tenth(y(tick) + 3.5)) text-anchor="end" {
+                        (number(tick, &self.y))
+                    }
+                }
+                path .frame d={ "M" (left) " " (top) "V" (bottom) "H" (right) } {}
+                text .label x=(tenth((left + right) / 2.0)) y=(tenth(height - 7.0))
+                    text-anchor="middle" { (self.x.label) }
+                text .label transform={ "translate(13 " (tenth((top + bottom) / 2.0)) ") rotate(-90)" }
+                    text-anchor="middle" { (self.y.label) }
+                // a nested svg cuts off what leaves the plot
+                @let (w, h) = (right - left, bottom - top);
+                svg x=(left) y=(top) width=(w) height=(h)
+                    viewBox={ (left) " " (top) " " (w) " " (h) } {
+                    @for series in &self.series {
+                        (curve(series.points.iter().map(|&(px, py)| (x(px), y(py))), series))
+                    }
+                    @if self.legend {
+                        @for (i, series) in self.series.iter().enumerate() {
+                            @let at = top + 14.0 + 16.0 * i as f64;
+                            (curve([right - 30.0, right - 6.0].map(|x| (x, at - 4.0)), series))
+                            text .label x=(tenth(right - 36.0)) y=(tenth(at)) text-anchor="end" {
+                                (series.title)
+                            }
+                        }
+                    }
+                }
+            }
+        };
+        drawing.into_string()
     }
 }
 
-/// The opening tag of a drawing, with its title.
-fn opening(title: &str, (width, height): (f64, f64)) -> String {
-    format!(
-        "<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{title}\">\
-         <text class=\"title\" x=\"{}\" y=\"15\">{title}</text>",
-        MARGIN.0,
-        title = escape(title)
-    )
+/// A length in px.
+fn tenth(length: f64) -> String {
+    format!("{length:.1}")
 }
 
-fn curve(points: &[(f64, f64)], series: &Series) -> String {
+fn curve(points: impl IntoIterator<Item = (f64, f64)>, series: &Series) -> Markup {
+    let points: Vec<(f64, f64)> =
+        points.into_iter().filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
     let mut path = String::new();
-    let line = if series.style == Style::Cloud { Vec::new() } else { simplified(points, 0.1) };
+    let line = if series.style == Style::Cloud { Vec::new() } else { simplified(&points, 0.1) };
     for (i, (x, y)) in line.into_iter().enumerate() {
         let _ = write!(path, "{}{x:.1} {y:.1}", if i == 0 { "M" } else { "L" });
     }
     let (dash, dots) = match series.style {
-        Style::Line => ("", None),
-        Style::Dashed => (" stroke-dasharray=\"6 4\"", None),
-        Style::Dots | Style::Cloud => ("", Some(series.color.as_str())),
-        Style::OpenDots => (" stroke-dasharray=\"3 3\"", Some("var(--paper)")),
+        Style::Line => (None, None),
+        Style::Dashed => (Some("6 4"), None),
+        Style::Dots | Style::Cloud => (None, Some(series.color.as_str())),
+        Style::OpenDots => (Some("3 3"), Some("var(--paper)")),
     };
-    let mut out = format!(
-        "<g class=\"curve\" style=\"stroke:{color}\"><title>{title}</title>",
-        color = series.color,
-        title = escape(&series.title),
-    );
-    if !path.is_empty() {
-        let _ = write!(out, "<path d=\"{path}\"{dash}/>");
-    }
-    if let Some(fill) = dots {
-        let radius = if series.style == Style::Cloud { 1.5 } else { 3.0 };
-        for (x, y) in points {
-            let _ = write!(
-                out,
-                "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" style=\"fill:{fill}\"/>"
-            );
+    let radius = if series.style == Style::Cloud { "1.5" } else { "3" };
+    html! {
+        g .curve style={ "stroke:" (series.color) } {
+            title { (series.title) }
+            @if !path.is_empty() { path d=(path) stroke-dasharray=[dash] {} }
+            @if let Some(fill) = dots {
+                @for (x, y) in &points {
+                    circle cx=(tenth(*x)) cy=(tenth(*y)) r=(radius) style={ "fill:" (fill) } {}
+                }
+            }
         }
     }
-    out.push_str("</g>");
-    out
 }
 
 /// Leaves out the points that lie within `tolerance` of the line through the others (Ramer, Douglas
@@ -274,13 +242,10 @@ pub(crate) fn simplified(points: &[(f64, f64)], tolerance: f64) -> Vec<(f64, f64
 }
 
 /// A tick's number with the digits its axis needs.
-fn number(value: f64, axis: &Axis) -> String {
+fn number(value: f64, axis: &Axis) -> Markup {
     let written = if axis.logarithmic && !(1e-3..1e4).contains(&value.abs()) {
         let exponent = value.log10().round() as i32;
-        return format!(
-            "10<tspan dy=\"-4\" font-size=\"8\">{}</tspan>",
-            minus(&exponent.to_string())
-        );
+        return html! { "10" tspan dy="-4" font-size="8" { (minus(&exponent.to_string())) } };
     } else if axis.logarithmic {
         format!("{value}")
     } else {
@@ -288,7 +253,7 @@ fn number(value: f64, axis: &Axis) -> String {
         let digits = (-(step.log10() + 1e-9).floor()).clamp(0.0, 9.0) as usize;
         format!("{:.digits$}", if value.abs() < step * 1e-6 { 0.0 } else { value })
     };
-    minus(&written)
+    html! { (minus(&written)) }
 }
 
 /// A true minus sign.
@@ -304,7 +269,7 @@ mod tests {
     fn ticks_are_round_and_cover_the_values() {
         let axis = Axis::linear("f / Hz", [2.4568, 2.4603], 0.02, 4);
         assert!(axis.from <= 2.4568 && axis.to >= 2.4603 && axis.to - axis.from >= 0.02);
-        let written: Vec<_> = axis.ticks.iter().map(|t| number(*t, &axis)).collect();
+        let written: Vec<_> = axis.ticks.iter().map(|t| number(*t, &axis).0).collect();
         assert_eq!(written, ["2.445", "2.450", "2.455", "2.460", "2.465", "2.470"]);
         let axis = Axis::decades("t / s", [0.0, 0.003, 59.0]);
         assert_eq!((axis.from, axis.to, axis.ticks.len()), (0.001, 100.0, 6));

@@ -3,6 +3,7 @@
 use analysis::features::{Deviations, Features};
 use analysis::rotary;
 use experiments::campaign::Outcome;
+use maud::{Markup, html};
 
 use super::colors;
 use super::figure::{Figure, Panel, dots, line};
@@ -72,10 +73,10 @@ pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
     }
     Figure {
         title: format!("Antiresonance and resonance against {}", axis.name),
-        caption: format!(
-            "Circles: antiresonance, where the liquid holds the hub still; diamonds: resonance, where hub and liquid swing against each other; dotted: both of the exact linear plant with viscous friction. Bars: 95 % intervals, from what of the rate no linear response explains: gyro noise, dry friction, a nonlinear liquid (Methods). An upward sweep shows a narrow resonance late, so above the exact one (Methods).{}",
-            list_of("Not to be trusted, and not drawn", &untrusted)
-        ),
+        caption: html! {
+            "Circles: antiresonance, where the liquid holds the hub still; diamonds: resonance, where hub and liquid swing against each other; dotted: both of the exact linear plant with viscous friction. Bars: 95 % intervals, from what of the rate no linear response explains: gyro noise, dry friction, a nonlinear liquid (Methods). An upward sweep shows a narrow resonance late, so above the exact one (Methods)."
+            (list_of("Not to be trusted, and not drawn", &untrusted))
+        },
         height: 460,
         panels: vec![Panel::new(&axis.label, "frequency / Hz")],
         traces,
@@ -101,7 +102,7 @@ pub(super) fn left_behind(page: &Page, axis: &Axis) -> Figure {
         page,
         axis,
         &title,
-        "The largest rate of the hub and the largest slosh angle after the torque has ended. A rigid craft that the torque brings to rest has none of either; what bearing friction leaves is the same for all models. In a slew by more than some tens of degrees linear and planar models turn the plane of the swing with the hub; spherical pendulums keep it in space.",
+        html! { "The largest rate of the hub and the largest slosh angle after the torque has ended. A rigid craft that the torque brings to rest has none of either; what bearing friction leaves is the same for all models. In a slew by more than some tens of degrees linear and planar models turn the plane of the swing with the hub; spherical pendulums keep it in space." },
         [quantity("largest rate / (mrad/s)", &rate), quantity("largest slosh angle / deg", &angle)],
     );
     Figure { columns: 2, height: 340, ..figure }
@@ -118,7 +119,7 @@ pub(super) fn slosh_angles(page: &Page, axis: &Axis) -> Figure {
         page,
         axis,
         &title,
-        "The largest slosh angle along the hub's turn and across it, which only rotary slosh makes; and in the last fifth of the run, a dwell's steady state.",
+        html! { "The largest slosh angle along the hub's turn and across it, which only rotary slosh makes; and in the last fifth of the run, a dwell's steady state." },
         [
             quantity("largest tangential / deg", &tangential),
             quantity("largest radial / deg", &radial),
@@ -134,7 +135,7 @@ pub(super) fn features(page: &Page, axis: &Axis) -> Figure {
         page,
         axis,
         "Separation and notch depth",
-        "While the sweep passes, and over the whole record (<code>spa</code>). For a linear plant with linear friction the torque's amplitude would not matter; dry friction counts most when the torque is small, a nonlinear liquid when it is large.",
+        html! { "While the sweep passes, and over the whole record (" code { "spa" } "). For a linear plant with linear friction the torque's amplitude would not matter; dry friction counts most when the torque is small, a nonlinear liquid when it is large." },
         [
             quantity("Δf, swept / mHz", &|run| {
                 Some(1e3 * run.passing.as_ref()?.rate.features.delta_f()?)
@@ -152,7 +153,7 @@ pub(super) fn bearing_and_liquid(page: &Page, axis: &Axis) -> Figure {
         page,
         axis,
         "Stiction, slosh amplitude, energy balance",
-        "Beyond the dashed line, a quarter of the tank's radius, linear slosh theory no longer holds: a linear model's runs there are computed faithfully, but they are not what a tank does. The energy residual checks the FMU's balance at every sample.",
+        html! { "Beyond the dashed line, a quarter of the tank's radius, linear slosh theory no longer holds: a linear model's runs there are computed faithfully, but they are not what a tank does. The energy residual checks the FMU's balance at every sample." },
         [
             Quantity {
                 decades: true,
@@ -180,7 +181,7 @@ pub(super) fn linear_fit(page: &Page, axis: &Axis) -> Figure {
         page,
         axis,
         "Validity of a linear fit",
-        "A transfer function with three poles and two zeros, fitted to each run's <code>spa</code> response and driven with the run's own torque, as in the thesis. It cannot represent dry friction at small torque, nor a resonance that moves with the amplitude.",
+        html! { "A transfer function with three poles and two zeros, fitted to each run's " code { "spa" } " response and driven with the run's own torque, as in the thesis. It cannot represent dry friction at small torque, nor a resonance that moves with the amplitude." },
         [
             quantity("fit in frequency / %", &|run| Some(run.fit()?.fit_frequency)),
             quantity("fit in time / %", &|run| Some(run.fit()?.fit_time)),
@@ -195,7 +196,7 @@ pub(super) fn out_of_the_plane(page: &Page, axis: &Axis) -> Figure {
         page,
         axis,
         "Out of the plane",
-        "Swirl: 0 for motion in a plane, 1 for a circle; beyond the dashed line the slosh is rotary. Off-axis energy and leakage: the liquid's radial force, which only loads the bearing, relative to the tangential one and to the torque.",
+        html! { "Swirl: 0 for motion in a plane, 1 for a circle; beyond the dashed line the slosh is rotary. Off-axis energy and leakage: the liquid's radial force, which only loads the bearing, relative to the tangential one and to the torque." },
         [
             Quantity {
                 level: Some((rotary::ROTARY, "counts as rotary")),
@@ -213,7 +214,7 @@ fn small<'a>(
     page: &Page,
     axis: &Axis,
     title: &str,
-    caption: &str,
+    caption: Markup,
     quantities: impl IntoIterator<Item = Quantity<'a>>,
 ) -> Figure {
     let (mut panels, mut traces) = (Vec::new(), Vec::new());
@@ -238,7 +239,7 @@ fn small<'a>(
     }
     Figure {
         title: title.into(),
-        caption: caption.into(),
+        caption,
         columns: 4,
         height: 270,
         panels,

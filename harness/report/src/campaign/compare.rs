@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use experiments::campaign::{Outcome, Results};
-use host::html::escape;
+use maud::{Markup, html};
 
 use super::colors;
 use super::figure::{Figure, Panel, numbers};
@@ -23,11 +23,11 @@ pub(super) fn compare(
     other: &Path,
     page: &Page,
     results: &Results,
-    add: &mut dyn FnMut(Vec<Figure>) -> String,
-) -> String {
-    let name = escape(&other.display().to_string());
+    add: &mut dyn FnMut(Vec<Figure>) -> Markup,
+) -> Markup {
+    let name = other.display();
     let Some(rows) = rows(other) else {
-        return format!("<p class=\"warning\">{name} has no runs.csv to compare with.</p>");
+        return html! { p .warning { (name) " has no runs.csv to compare with." } };
     };
     let mut alone = Vec::new();
     let (mut panels, mut traces) = (Vec::new(), Vec::new());
@@ -69,18 +69,16 @@ pub(super) fn compare(
     }
     let figure = add(vec![Figure {
         title: "This campaign less the other".into(),
-        caption: format!(
-            "{}{}",
-            list_of("Largest differences", &largest),
-            list_of("Only in this campaign", &alone)
-        ),
+        caption: html! {
+            (list_of("Largest differences", &largest)) (list_of("Only in this campaign", &alone))
+        },
         columns: 2,
         height: 120 + 14 * results.outcomes.len(),
         panels,
         traces,
         ..Figure::default()
     }]);
-    format!("<p>Runs of the same name in <code>{name}</code>.</p>{figure}")
+    html! { p { "Runs of the same name in " code { (name) } "." } (figure) }
 }
 
 fn rows(directory: &Path) -> Option<HashMap<String, HashMap<String, String>>> {

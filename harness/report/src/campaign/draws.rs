@@ -1,6 +1,7 @@
 //! Monte Carlo: which of the drawn parameters decide, and the distribution of what they make.
 
 use experiments::campaign::Outcome;
+use maud::html;
 
 use super::colors;
 use super::figure::{Figure, Panel, numbers};
@@ -52,9 +53,9 @@ pub(super) fn draws(page: &Page, group: &Group) -> Vec<Figure> {
     let by_chance = 2.0 / (count.max(1) as f64).sqrt();
     let first = Figure {
         title: "Ranked sensitivities".into(),
-        caption: format!(
-            "How far antiresonance and resonance move when a drawn parameter grows by one standard deviation, the others at random: the largest effect on top. ρ is the coefficient of correlation; in {count} draws what is below {by_chance:.2} may be chance."
-        ),
+        caption: html! {
+            "How far antiresonance and resonance move when a drawn parameter grows by one standard deviation, the others at random: the largest effect on top. ρ is the coefficient of correlation; in " (count) " draws what is below " (format!("{by_chance:.2}")) " may be chance."
+        },
         height: 110 + 30 * ranked.len(),
         panels: vec![Panel::new("change for one standard deviation / mHz", "")],
         traces: bars.to_vec(),
@@ -74,7 +75,7 @@ pub(super) fn draws(page: &Page, group: &Group) -> Vec<Figure> {
     }
     let second = Figure {
         title: "Distribution over the draws".into(),
-        caption: format!("Mean and standard deviation of {count} draws: {}.", says.join(", ")),
+        caption: html! { "Mean and standard deviation of " (count) " draws: " (says.join(", ")) "." },
         columns: 4,
         height: 270,
         panels,
@@ -98,7 +99,7 @@ pub(super) fn draws(page: &Page, group: &Group) -> Vec<Figure> {
     }
     let third = Figure {
         title: "Every draw over the parameters that decide".into(),
-        caption: "Antiresonance and resonance of each draw over the four parameters with the largest effect.".into(),
+        caption: html! { "Antiresonance and resonance of each draw over the four parameters with the largest effect." },
         columns: 4,
         height: 270,
         panels,

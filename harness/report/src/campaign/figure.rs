@@ -1,9 +1,8 @@
 //! Figures: what `report.js` draws with plotly, and the HTML around it.
 
 use std::collections::BTreeSet;
-use std::fmt::Write as _;
 
-use host::html::escape;
+use maud::{Markup, html};
 use serde_json::{Value, json};
 
 use crate::svg::simplified;
@@ -12,8 +11,8 @@ use experiments::rounding::significant;
 /// A figure of one or more panels with a common legend.
 pub(super) struct Figure {
     pub title: String,
-    /// What to see, as HTML.
-    pub caption: String,
+    /// What to see.
+    pub caption: Markup,
     /// Panels beside each other on a wide screen.
     pub columns: usize,
     /// Height of a row of panels, px.
@@ -49,7 +48,7 @@ impl Default for Figure {
     fn default() -> Self {
         Figure {
             title: String::new(),
-            caption: String::new(),
+            caption: html! {},
             columns: 1,
             height: 330,
             half: false,
@@ -69,14 +68,14 @@ pub(super) struct Figures {
 
 impl Figures {
     /// Takes a figure and gives the HTML of its place; nothing if it has nothing to show.
-    pub fn add(&mut self, figure: Figure) -> String {
+    pub fn add(&mut self, figure: Figure) -> Markup {
         let none = |axis: &Value| axis.as_array().is_some_and(Vec::is_empty);
         let empty = |trace: &Value| none(&trace["x"]) || none(&trace["y"]);
         let mut traces: Vec<Value> = figure.traces.into_iter().filter(|t| !empty(t)).collect();
         // a panel without a trace would be a blank
         let drawn: BTreeSet<u64> = traces.iter().filter_map(|t| t["panel"].as_u64()).collect();
         if drawn.is_empty() {
-            return String::new();
+            return html! {};
         }
         for trace in &mut traces {
             let place = drawn.iter().position(|p| trace["panel"] == *p);
@@ -96,22 +95,25 @@ impl Figures {
         }));
         let number = self.specifications.len();
         self.titles.push(figure.title.clone());
-        let half = if figure.half { " class=\"half\"" } else { "" };
-        let title = escape(&figure.title);
-        format!(
-            "<figure id=\"figure-{number}\"{half}><div class=\"plot\" role=\"img\" aria-label=\"{title}\"></div>\
-             <figcaption><a href=\"#figure-{number}\">Figure {number}</a> <b>{title}.</b> {}</figcaption></figure>\n",
-            figure.caption
-        )
+        html! {
+            figure id={ "figure-" (number) } class=[figure.half.then_some("half")] {
+                div .plot role="img" aria-label=(figure.title) {}
+                figcaption {
+                    a href={ "#figure-" (number) } { "Figure " (number) } " "
+                    b { (figure.title) "." } " " (figure.caption)
+                }
+            }
+            "\n" // the space between two halves
+        }
     }
 
     /// Links to the figures.
-    pub fn list(&self) -> String {
-        let mut out = String::new();
-        for (i, title) in self.titles.iter().enumerate() {
-            let _ = write!(out, "<li><a href=\"#figure-{0}\">{1}</a></li>", i + 1, escape(title));
+    pub fn list(&self) -> Markup {
+        html! {
+            @for (title, number) in self.titles.iter().zip(1..) {
+                li { a href={ "#figure-" (number) } { (title) } }
+            }
         }
-        out
     }
 
     /// The specifications, as they stand in a script element: without `<`, since `</script` ends it

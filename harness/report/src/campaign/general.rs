@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use experiments::campaign::{History, is_slosh_angle};
 use host::fmi2::Fmu;
+use maud::html;
 
 use super::colors;
 use super::figure::{Figure, Panel, line};
@@ -45,7 +46,7 @@ pub(super) fn run(fmu: &Fmu, name: &str, history: &History, tail: &History) -> V
                 "Time histories{}, {name}",
                 if part > 0 { format!(" ({})", part + 1) } else { String::new() }
             ),
-            caption: "Signals that change; a long run by its envelope.".into(),
+            caption: html! { "Signals that change; a long run by its envelope." },
             columns: 2,
             height: 230,
             panels,
@@ -74,10 +75,10 @@ pub(super) fn run(fmu: &Fmu, name: &str, history: &History, tail: &History) -> V
     }
     out.push(Figure {
         title: format!("Path of the bobs, {name}"),
-        caption: format!(
-            "Slosh angles along the tank's axes, the same scale both ways, in the last {} rows.",
-            tail.time.len()
-        ),
+        caption: html! {
+            "Slosh angles along the tank's axes, the same scale both ways, in the last "
+            (tail.time.len()) " rows."
+        },
         height: 470,
         half: true,
         panels: vec![Panel { equal: true, ..Panel::new("angle_x / deg", "angle_y / deg") }],

@@ -1,7 +1,8 @@
 //! Time histories, and the path of the liquid's crest.
 
 use analysis::rotary;
-use experiments::campaign::{Outcome, SloshPath};
+use experiments::campaign::{History, Outcome, SloshPath};
+use maud::html;
 
 use super::colors;
 use super::figure::{Figure, Panel, line};
@@ -41,22 +42,15 @@ pub(super) fn history(page: &Page, group: &Group) -> Figure {
     }
     Figure {
         title: format!("Time histories, {}", group.title()),
-        caption: format!(
-            "Torque, measured rate, slosh angles along and across the hub's turn, and the residual: the rate less that of the exact linear plant, with viscous friction at most, under the same torque; it is what dry friction and nonlinear slosh do.{}{}",
-            if runs.len() < group.runs.len() {
-                format!(" {} of {}.", runs.len(), super::runs(group.runs.len()))
-            } else {
-                String::new()
-            },
-            if runs
-                .iter()
-                .any(|run| run.case.run().steps() > 2 * experiments::campaign::History::STRETCHES)
-            {
+        caption: html! {
+            "Torque, measured rate, slosh angles along and across the hub's turn, and the residual: the rate less that of the exact linear plant, with viscous friction at most, under the same torque; it is what dry friction and nonlinear slosh do."
+            @if runs.len() < group.runs.len() {
+                " " (runs.len()) " of " (super::page::runs(group.runs.len())) "."
+            }
+            @if runs.iter().any(|run| run.case.run().steps() > 2 * History::STRETCHES) {
                 " Fast oscillations are drawn by their envelope."
-            } else {
-                ""
-            },
-        ),
+            }
+        },
         height: 135,
         half: page.groups.len() > 1,
         shared: true,
@@ -85,7 +79,7 @@ pub(super) fn after(page: &Page) -> Figure {
     }
     Figure {
         title: "Rate and slosh angle after the manoeuvre".into(),
-        caption: "From the end of the torque on. With a rigid liquid the hub is at rest then; a sloshing liquid goes on pushing it at the slosh frequency.".into(),
+        caption: html! { "From the end of the torque on. With a rigid liquid the hub is at rest then; a sloshing liquid goes on pushing it at the slosh frequency." },
         columns: 2,
         height: 300,
         panels: vec![
@@ -136,7 +130,7 @@ pub(super) fn compared(page: &Page) -> Figure {
     };
     Figure {
         title: "The runs compared".into(),
-        caption: format!("Measured rate, slosh angles along and across the hub's turn.{apart}"),
+        caption: html! { "Measured rate, slosh angles along and across the hub's turn." (apart) },
         height: 190,
         shared: true,
         panels: signals.iter().map(|(_, label, _)| Panel::new("time / s", label)).collect(),
@@ -174,12 +168,12 @@ pub(super) fn paths(page: &Page, group: &Group) -> Vec<Figure> {
     }
     let seen = Figure {
         title: format!("The wave seen from above, {}", group.title()),
-        caption: format!(
-            "Slosh angle outwards against slosh angle along the hub's turn, the same scale both ways; a line is planar slosh, a circle rotary slosh. {} periods around the largest wave, {} around the moment at which the swirl passes {}. An entry of the legend switches its path.",
-            SloshPath::LARGEST,
-            SloshPath::ONSET,
-            rotary::ROTARY
-        ),
+        caption: html! {
+            "Slosh angle outwards against slosh angle along the hub's turn, the same scale both ways; a line is planar slosh, a circle rotary slosh. "
+            (SloshPath::LARGEST) " periods around the largest wave, " (SloshPath::ONSET)
+            " around the moment at which the swirl passes " (rotary::ROTARY)
+            ". An entry of the legend switches its path."
+        },
         height: 470,
         half: true,
         panels: vec![Panel {
@@ -193,9 +187,9 @@ pub(super) fn paths(page: &Page, group: &Group) -> Vec<Figure> {
     let over = |k: usize| path.iter().map(|row| (row[0], deg(row[k]))).collect::<Vec<_>>();
     let time = Figure {
         title: format!("The same over time, {}", group.title()),
-        caption: format!(
-            "{name}: the radial motion grows out of the plane of the tangential one; in rotary slosh the two are a quarter of a period apart."
-        ),
+        caption: html! {
+            (name) ": the radial motion grows out of the plane of the tangential one; in rotary slosh the two are a quarter of a period apart."
+        },
         height: 470,
         half: true,
         panels: vec![Panel::new("time / s", "slosh angle / deg")],

@@ -12,14 +12,12 @@ mod page;
 mod responses;
 mod thesis;
 
-use std::fmt::Write as _;
-
 use analysis::BAND;
 use analysis::features::Features;
 use experiments::campaign::{Campaign, Results};
 use experiments::rounding::thousandths;
 use host::fmi2::Fmu;
-use host::html::escape;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use self::figure::{Figure, Figures};
 use self::page::{Group, Page, Varied, axis, best, groups, manoeuvre, runs};
@@ -37,46 +35,51 @@ pub fn page(campaign: &Campaign, fmu: &Fmu, results: &Results) -> String {
         varied: plan.varied().iter().map(|n| Varied::of(n, fmu, &results.outcomes)).collect(),
     };
     let mut figures = Figures::default();
-    let sections = match results.unanalysed.is_empty() {
+    let mut sections = match results.unanalysed.is_empty() {
         true => bench_sections(&page, campaign, results, &mut figures),
         false => general_sections(fmu, results, &mut figures),
     };
-    let mut out = String::new();
-    let _ = write!(
-        out,
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>HubSlosh: {}</title>\n<style>\n{}</style>\n</head>\n<body><main>\n",
-        escape(&plan.title),
-        include_str!("page.css"),
-    );
-    out.push_str(&introduction(&page, fmu, results));
-    out.push_str("<nav aria-label=\"Contents\"><b>Contents</b><ul>");
-    let sections: Vec<(&str, String)> =
-        sections.into_iter().filter(|(_, html)| !html.is_empty()).collect();
-    for (title, _) in &sections {
-        let _ = write!(out, "<li><a href=\"#{}\">{}</a></li>", anchor(title), escape(title));
-    }
-    let _ = writeln!(
-        out,
-        "</ul><details><summary>All figures</summary><ol>{}</ol></details></nav>\n\
-         <noscript><p class=\"warning\">The figures need JavaScript; the numbers are in the results table and the files beside this page.</p></noscript>",
-        figures.list()
-    );
-    for (title, html) in &sections {
-        let _ = writeln!(out, "<h2 id=\"{}\">{}</h2>\n{html}", anchor(title), escape(title));
-    }
-    out.push_str(&notes::provenance(campaign, fmu, results));
-    let _ = write!(
-        out,
-        "</main>\n<script type=\"application/json\" id=\"figures\">{}</script>\n\
-         <script>\n/* {} */\n{}</script>\n<script>\n{}</script>\n</body>\n</html>\n",
-        figures.json(),
-        include_str!("plotly/LICENSE").replace("*/", "* /"),
-        include_str!("plotly/plotly-cartesian.min.js"),
-        include_str!("report.js"),
-    );
-    out
+    sections.retain(|(_, content)| !content.0.is_empty());
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { "HubSlosh: " (plan.title) }
+                style { (PreEscaped(include_str!("page.css"))) }
+            }
+            body {
+                main {
+                    (introduction(&page, fmu, results))
+                    nav aria-label="Contents" {
+                        b { "Contents" }
+                        ul {
+                            @for (title, _) in &sections {
+                                li { a href={ "#" (anchor(title)) } { (title) } }
+                            }
+                        }
+                        details { summary { "All figures" } ol { (figures.list()) } }
+                    }
+                    noscript {
+                        p .warning { "The figures need JavaScript; the numbers are in the results table and the files beside this page." }
+                    }
+                    @for (title, content) in &sections {
+                        h2 id=(anchor(title)) { (title) }
+                        (content)
+                    }
+                    (notes::provenance(campaign, fmu, results))
+                }
+                script type="application/json" id="figures" { (PreEscaped(figures.json())) }
+                script {
+                    (PreEscaped(format!("/* {} */\n", include_str!("plotly/LICENSE").replace("*/", "* /"))))
+                    (PreEscaped(include_str!("plotly/plotly-cartesian.min.js")))
+                }
+                script { (PreEscaped(include_str!("report.js"))) }
+            }
+        }
+    };
+    page.into_string()
 }
 
 /// An element's name in a link.
@@ -90,15 +93,15 @@ fn bench_sections<'a>(
     campaign: &Campaign,
     results: &Results,
     figures: &mut Figures,
-) -> Vec<(&'a str, String)> {
+) -> Vec<(&'a str, Markup)> {
     let (groups, plan) = (&page.groups, page.plan);
     let random = plan.is_random();
     let has_response = groups.iter().any(|group| group.band().is_some());
     let swept = groups.iter().any(|group| group.sweep.is_some());
     let axis = page.axis.as_ref();
     let few = &groups[..groups.len().min(MOST_GROUPS)];
-    let mut sections: Vec<(&str, String)> = Vec::new();
-    let mut add = |all: Vec<Figure>| all.into_iter().map(|f| figures.add(f)).collect::<String>();
+    let mut sections: Vec<(&str, Markup)> = Vec::new();
+    let mut add = |all: Vec<Figure>| html! { @for figure in all { (figures.add(figure)) } };
 
     // the plan's question first
     let mut first = Vec::new();
@@ -173,104 +176,97 @@ fn general_sections<'a>(
     fmu: &Fmu,
     results: &Results,
     figures: &mut Figures,
-) -> Vec<(&'a str, String)> {
-    let mut out = String::new();
-    for run in results.unanalysed.iter().take(MOST_GROUPS) {
-        for figure in general::run(fmu, &run.case.name, &run.history, &run.tail) {
-            out.push_str(&figures.add(figure));
+) -> Vec<(&'a str, Markup)> {
+    let runs = &results.unanalysed;
+    let content = html! {
+        @for run in runs.iter().take(MOST_GROUPS) {
+            @for figure in general::run(fmu, &run.case.name, &run.history, &run.tail) {
+                (figures.add(figure))
+            }
         }
-    }
-    if results.unanalysed.len() > MOST_GROUPS {
-        let _ = write!(out, "<p>The first {MOST_GROUPS} of {} runs.</p>", results.unanalysed.len());
-    }
-    vec![("Time histories", out)]
+        @if runs.len() > MOST_GROUPS {
+            p { "The first " (MOST_GROUPS) " of " (runs.len()) " runs." }
+        }
+    };
+    vec![("Time histories", content)]
 }
 
-fn introduction(page: &Page, fmu: &Fmu, results: &Results) -> String {
+fn introduction(page: &Page, fmu: &Fmu, results: &Results) -> Markup {
     let plan = page.plan;
     let first = results.outcomes.first().map(|run| &run.case);
     let first = first.or_else(|| results.unanalysed.first().map(|run| &run.case));
     let count = results.outcomes.len() + results.unanalysed.len();
-    let mut out = format!(
-        "<h1>{}</h1>\n<p class=\"lead\">{} of the FMU {} (version {}), sampled at {} Hz: {}.</p>\n",
-        escape(if plan.title.is_empty() { "A campaign" } else { &plan.title }),
-        runs(count),
-        escape(&fmu.description().model_name),
-        escape(&fmu.description().version),
-        first.map_or(0.0, |case| thousandths(1e3 / case.step) / 1e6),
-        escape(&torques(results)),
-    );
-    if !results.failures.is_empty() {
-        let _ = write!(
-            out,
-            "<div class=\"failed\"><p><b>{} failed:</b></p><ul>",
-            runs(results.failures.len())
-        );
-        for failure in &results.failures {
-            let _ = write!(
-                out,
-                "<li><code>{}</code>: {}</li>",
-                escape(&failure.case.name),
-                escape(&failure.reason)
-            );
-        }
-        out.push_str("</ul></div>\n");
-    }
+    let rate = first.map_or(0.0, |case| thousandths(1e3 / case.step) / 1e6);
+    let (fmu, failures) = (fmu.description(), &results.failures);
     let beyond: Vec<String> = results
         .outcomes
         .iter()
         .filter_map(|run| Some(format!("{} ({})", run.case.name, run.beyond_model()?)))
         .collect();
-    if let Some(one) = beyond.first() {
-        let _ = writeln!(
-            out,
-            "<p class=\"warning\"><b>{} of {} left the range of {} model</b>{} {}. Computed faithfully, but not what a tank does. The results table marks it.</p>",
-            beyond.len(),
-            runs(count),
-            if beyond.len() == 1 { "its" } else { "their" },
-            if beyond.len() == 1 { ":" } else { ", such as" },
-            escape(one)
-        );
-    }
-    out.push_str("<div class=\"cards\">");
     let groups = page.groups.iter().filter(|group| group.band().is_some());
-    for group in groups.take(2 * MOST_GROUPS) {
-        let over = |get: &dyn Fn(&Features) -> Option<f64>| {
-            let found = group.runs.iter().filter_map(|run| get(&best(run)?.0.features));
-            let values: Vec<f64> = found.collect();
-            let ends = values
-                .iter()
-                .copied()
-                .reduce(f64::min)
-                .zip(values.iter().copied().reduce(f64::max));
-            match ends {
-                Some((low, high)) if high - low < 2e-5 * high => format!("{low:.4} Hz"),
-                Some((low, high)) => format!("{}–{} Hz", digits(low, high), digits(high, low)),
-                None => {
-                    let doubt = group.runs.iter().find_map(|run| best(run)?.0.doubt);
-                    doubt.map_or("none".into(), |doubt| format!("not to be trusted: {doubt}"))
+    html! {
+        h1 { @if plan.title.is_empty() { "A campaign" } @else { (plan.title) } }
+        p .lead {
+            (runs(count)) " of the FMU " (fmu.model_name) " (version " (fmu.version)
+            "), sampled at " (rate) " Hz: " (torques(results)) "."
+        }
+        @if !failures.is_empty() {
+            div .failed {
+                p { b { (runs(failures.len())) " failed:" } }
+                ul {
+                    @for failure in failures {
+                        li { code { (failure.case.name) } ": " (failure.reason) }
+                    }
                 }
             }
-        };
-        let [antiresonance, resonance] = [over(&|f| f.f_dip), over(&|f| f.f_res)];
-        let exact = group.exact[0].f_dip.zip(group.exact[0].f_res);
-        let exact =
-            exact.filter(|_| page.axis.as_ref().is_none_or(|a| a.name == "torque amplitude"));
-        let _ = write!(
-            out,
-            "<div class=\"card\"><b>{antiresonance}</b><b>{resonance}</b><span>antiresonance and resonance ({}), {}{}</span></div>",
-            best(group.runs[0]).map_or("", |(_, name)| name),
-            escape(&group.title()),
-            exact.filter(|_| !plan.is_random()).map_or(
-                String::new(),
-                |(antiresonance, resonance)| format!(
-                    " (exact, linear: {antiresonance:.4} and {resonance:.4} Hz)"
-                )
-            ),
-        );
+        }
+        @if let Some(one) = beyond.first() {
+            p .warning {
+                b {
+                    (beyond.len()) " of " (runs(count)) " left the range of "
+                    @if beyond.len() == 1 { "its" } @else { "their" } " model"
+                }
+                @if beyond.len() == 1 { ": " } @else { ", such as " }
+                (one) ". Computed faithfully, but not what a tank does. The results table marks it."
+            }
+        }
+        div .cards { @for group in groups.take(2 * MOST_GROUPS) { (card(page, group)) } }
     }
-    out.push_str("</div>\n");
-    out
+}
+
+/// Antiresonance and resonance of a group's runs.
+fn card(page: &Page, group: &Group) -> Markup {
+    let over = |get: &dyn Fn(&Features) -> Option<f64>| {
+        let found = group.runs.iter().filter_map(|run| get(&best(run)?.0.features));
+        let values: Vec<f64> = found.collect();
+        let ends =
+            values.iter().copied().reduce(f64::min).zip(values.iter().copied().reduce(f64::max));
+        match ends {
+            Some((low, high)) if high - low < 2e-5 * high => format!("{low:.4} Hz"),
+            Some((low, high)) => format!("{}–{} Hz", digits(low, high), digits(high, low)),
+            None => {
+                let doubt = group.runs.iter().find_map(|run| best(run)?.0.doubt);
+                doubt.map_or("none".into(), |doubt| format!("not to be trusted: {doubt}"))
+            }
+        }
+    };
+    let exact = group.exact[0].f_dip.zip(group.exact[0].f_res);
+    let one_response = page.axis.as_ref().is_none_or(|axis| axis.name == "torque amplitude");
+    let exact = exact.filter(|_| one_response && !page.plan.is_random());
+    html! {
+        div .card {
+            b { (over(&|f| f.f_dip)) }
+            b { (over(&|f| f.f_res)) }
+            span {
+                "antiresonance and resonance (" (best(group.runs[0]).map_or("", |(_, name)| name))
+                "), " (group.title())
+                @if let Some((antiresonance, resonance)) = exact {
+                    " (exact, linear: " (format!("{antiresonance:.4}")) " and "
+                    (format!("{resonance:.4}")) " Hz)"
+                }
+            }
+        }
+    }
 }
 
 /// A frequency with the digits that tell it from another.

@@ -10,7 +10,6 @@ use experiments::campaign::{Curve, Estimate, Outcome, Results};
 use experiments::plan::Plan;
 use experiments::profile::Torque;
 use host::fmi2::Fmu;
-use host::html::escape;
 
 /// Runs that differ in nothing but the number along which they are drawn (and what is drawn at
 /// random).
@@ -256,8 +255,8 @@ pub(super) fn manoeuvre(run: &Outcome) -> Option<f64> {
 pub(super) fn list_of(what: &str, things: &[String]) -> String {
     match things {
         [] => String::new(),
-        few if few.len() <= 4 => format!(" {what}: {}.", escape(&few.join(", "))),
-        many => format!(" {what}: {} and {} more.", escape(&many[..3].join(", ")), many.len() - 3),
+        few if few.len() <= 4 => format!(" {what}: {}.", few.join(", ")),
+        many => format!(" {what}: {} and {} more.", many[..3].join(", "), many.len() - 3),
     }
 }
 

@@ -2,6 +2,7 @@
 
 use analysis::{BAND, FrequencyResponse, logarithmic_grid};
 use experiments::campaign::{Curve, Estimate, Outcome};
+use maud::html;
 
 use super::colors;
 use super::figure::{Figure, Panel, line, number, numbers, thinned};
@@ -35,10 +36,9 @@ pub(super) fn responses(page: &Page, group: &Group) -> Figure {
     let panel = |y: &str| Panel { log_x: true, range: near, ..Panel::new("frequency / Hz", y) };
     Figure {
         title: format!("Frequency response, {}", group.title()),
-        caption: format!(
-            "Hub rate over torque ({}). The response falls to the antiresonance at the slosh frequency and rises to the resonance above it. Shaded: 95 % intervals of the first and the last run, where they are wider than a line. At first around the two: a double click shows the whole band.",
-            names.join(", ")
-        ),
+        caption: html! {
+            "Hub rate over torque (" (names.join(", ")) "). The response falls to the antiresonance at the slosh frequency and rises to the resonance above it. Shaded: 95 % intervals of the first and the last run, where they are wider than a line. At first around the two: a double click shows the whole band."
+        },
         height: 235,
         half: true,
         shared: true,
@@ -132,7 +132,7 @@ pub(super) fn models(page: &Page) -> Vec<Figure> {
             let what = fill.map_or("any fill".into(), |fill| format!("{} cm fill", cm(fill)));
             Figure {
                 title: format!("Models overlaid, {what}"),
-                caption: "The smallest (dashed) and the largest (solid) of the runs of each model: what nonlinear slosh changes, and what dry friction does to all models alike. At first around the two: a double click shows the whole band.".into(),
+                caption: html! { "The smallest (dashed) and the largest (solid) of the runs of each model: what nonlinear slosh changes, and what dry friction does to all models alike. At first around the two: a double click shows the whole band." },
                 height: 340,
                 half: true,
                 panels: vec![Panel { log_x: true, range: near(groups[0]), ..Panel::new("frequency / Hz", "|H| / dB") }],
@@ -209,7 +209,7 @@ pub(super) fn maps(group: &Group, axis: &Axis) -> Figure {
     }
     Figure {
         title: format!("Over frequency and {}, {}", axis.name, group.title()),
-        caption: "One row of cells for each run. Residual coherence: bright where what the linear fit leaves still follows the torque steadily. Leakage: the radial force times the tank's arm over the torque; bright in rotary slosh.".into(),
+        caption: html! { "One row of cells for each run. Residual coherence: bright where what the linear fit leaves still follows the torque steadily. Leakage: the radial force times the tank's arm over the torque; bright in rotary slosh." },
         columns: 4,
         height: 250,
         panels,

@@ -5,10 +5,8 @@
 //! spherical model, those on the synthetic data, whose liquid is linear, by the linear one; the
 //! other model is shown for comparison. A rule must hold for every fill.
 
-use std::fmt::Write as _;
-
 use experiments::campaign::Outcome;
-use host::html::escape;
+use maud::{Markup, html};
 
 use super::page::{Group, cm, torque_of};
 
@@ -478,58 +476,74 @@ fn turning_from(group: &Group) -> String {
 }
 
 /// The table; empty where the plan has none of the runs it needs.
-pub(super) fn statements(groups: &[Group]) -> String {
+pub(super) fn statements(groups: &[Group]) -> Markup {
     let of = |model: &str| -> Vec<&Group> {
         groups.iter().filter(|g| g.model == model && g.others.is_empty()).collect()
     };
     let (linear, spherical) = (of("linear"), of("spherical"));
-    let (mut rows, mut agreed, mut judged) = (String::new(), 0, 0);
+    let (mut rows, mut agreed) = (Vec::new(), 0);
     for statement in STATEMENTS {
         let [linear, spherical] = [&linear, &spherical].map(|groups| shown(statement, groups));
         let judge = if statement.who == Who::Bench { &spherical } else { &linear };
-        let Some((_, holds)) = judge else { continue };
-        judged += 1;
-        agreed += usize::from(*holds);
-        let cell = |shown: &Option<Shown>| match shown {
-            Some((text, holds)) => format!("{} {text}", if *holds { "✓" } else { "✗" }),
-            None => String::new(),
-        };
-        let note = |text: &str| match text {
-            "" => String::new(),
-            text => format!("<span class=\"note\">{}</span>", escape(text)),
-        };
-        let _ = writeln!(
-            rows,
-            "<tr><td><span class=\"{}\">{}</span></td><td>{}<span class=\"note\">Thesis {}, {}.</span>{}{}</td><td>{}</td><td>{}</td></tr>",
-            if *holds { "yes" } else { "no" },
-            if *holds { "agrees" } else { "does not agree" },
-            escape(statement.says),
-            statement.section,
-            if statement.who == Who::Bench { "bench" } else { "synthetic data" },
-            note(&format!("Rule: {}.", statement.rule)),
-            note(if *holds { "" } else { statement.why }),
-            cell(&linear),
-            cell(&spherical),
-        );
+        let Some((_, holds)) = *judge else { continue };
+        agreed += usize::from(holds);
+        let (class, verdict) = if holds { ("yes", "agrees") } else { ("no", "does not agree") };
+        rows.push(html! {
+            tr {
+                td { span class=(class) { (verdict) } }
+                td {
+                    (statement.says)
+                    span .note {
+                        "Thesis " (statement.section) ", "
+                        @if statement.who == Who::Bench { "bench" } @else { "synthetic data" } "."
+                    }
+                    span .note { "Rule: " (statement.rule) "." }
+                    @if !holds && !statement.why.is_empty() { span .note { (statement.why) } }
+                }
+                @for model in [&linear, &spherical] {
+                    td {
+                        @if let Some((each, holds)) = model {
+                            @if *holds { "✓ " } @else { "✗ " }
+                            @for (i, text) in each.iter().enumerate() {
+                                @if i > 0 { br; "\u{2003}" }
+                                (text)
+                            }
+                        }
+                    }
+                }
+            }
+        });
     }
     if rows.is_empty() {
-        return rows;
+        return html! {};
     }
-    format!(
-        "<p>{agreed} of {judged} statements of Rubaga's thesis agree with these runs. What the thesis says of its bench and of its synthetic data, in our words, and what these runs do. ✓ and ✗ say whether a model does what the statement says, at every fill. Statements on the bench are judged by the spherical model, those on the synthetic data by the linear one. The thesis prints its features as figures only; where it names a number, the rule has it. Off-axis rates (7.1.5, first half) are not here: the hub of the FMU does not tilt.</p>\n<div class=\"wide\"><table class=\"statements\"><thead><tr><th>verdict</th><th>what the thesis says</th><th>linear model</th><th>spherical model</th></tr></thead><tbody>\n{rows}</tbody></table></div>\n"
-    )
+    html! {
+        p {
+            (agreed) " of " (rows.len()) " statements of Rubaga's thesis agree with these runs. What the thesis says of its bench and of its synthetic data, in our words, and what these runs do. ✓ and ✗ say whether a model does what the statement says, at every fill. Statements on the bench are judged by the spherical model, those on the synthetic data by the linear one. The thesis prints its features as figures only; where it names a number, the rule has it. Off-axis rates (7.1.5, first half) are not here: the hub of the FMU does not tilt."
+        }
+        div .wide {
+            table .statements {
+                thead {
+                    tr {
+                        th { "verdict" } th { "what the thesis says" }
+                        th { "linear model" } th { "spherical model" }
+                    }
+                }
+                tbody { @for row in &rows { (row) } }
+            }
+        }
+    }
 }
 
-/// What the groups of a model show together: each fill's figures; it holds if it holds for all.
+/// What the groups of a model show together: what each fill shows; it holds if it holds for all.
 /// `None` if there is none, or one lacks the runs.
-fn shown(statement: &Statement, groups: &[&Group]) -> Option<Shown> {
+fn shown(statement: &Statement, groups: &[&Group]) -> Option<(Vec<String>, bool)> {
     let each: Vec<Shown> =
         groups.iter().map(|group| (statement.shows)(group)).collect::<Option<_>>()?;
     let text = groups.iter().zip(&each).map(|(group, (text, _))| match group.fill {
         Some(fill) => format!("{} cm: {text}", cm(fill)),
         None => text.clone(),
     });
-    let text =
-        text.map(|t| escape(&t).replace('-', "\u{2212}")).collect::<Vec<_>>().join("<br>\u{2003}");
+    let text = text.map(|text| text.replace('-', "\u{2212}")).collect();
     (!each.is_empty()).then(|| (text, each.iter().all(|(_, holds)| *holds)))
 }
