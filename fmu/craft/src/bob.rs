@@ -29,12 +29,15 @@
 //! Source: Newton's second law with the constraint eliminated; every vector in body axes.
 //! Checked against the same law in p'' (tests/craft/independent.rs).
 
-use crate::parameters::Tank;
-use crate::series::{self, Pair, Series, Vector, ZERO, ZERO_PAIR, ZERO_VECTOR};
-use crate::vector::{
-    Mat3, Number, Vec3, add, constant, cross, dot, largest, on_sphere, on_sphere_slope, rotation,
-    scale, sub, times, transposed_times, unit_quaternion,
+use taylor::number::Number;
+use taylor::series::{self, Series, ZERO};
+use taylor::space::{self, Pair, Vector, ZERO_PAIR, ZERO_VECTOR};
+use taylor::vector::{
+    Mat3, Vec3, add, constant, cross, dot, largest, on_sphere, on_sphere_slope, rotation, scale,
+    sub, times, transposed_times, unit_quaternion,
 };
+
+use crate::parameters::Tank;
 
 /// One bob, as the outputs need it.
 pub(crate) struct BobNow<T> {
@@ -155,7 +158,7 @@ impl Bob {
     /// same 1e-16 in every step.
     #[inline(always)]
     pub fn at(&self, x: &[f64; 6], n: usize, t: f64, w: Vec3) -> [f64; 6] {
-        let (p, v) = (series::value(&self.p, n, t), series::value(&self.v, n, t));
+        let (p, v) = (space::value(&self.p, n, t), space::value(&self.v, n, t));
         let p_d = sub(v, cross(w, p));
         let dp = transposed_times(&self.axes, sub(p, self.p[0]));
         let dp_d = transposed_times(&self.axes, sub(p_d, self.p_d[0]));
@@ -171,17 +174,17 @@ impl Bob {
     #[inline(always)]
     pub fn reaction<const N: usize>(&mut self, w: &Pair, w2: &Mat3) -> [Vec3; 2] {
         let Bob { m, l, c, k, .. } = *self;
-        self.turned = series::cross_pair::<N>(w, &self.both);
+        self.turned = space::cross_pair::<N>(w, &self.both);
         let p_d = [0, 1, 2].map(|i| self.v[N][i] - self.turned[i][0]);
         self.p_d[N] = p_d;
         self.centripetal = times(w2, self.hinge);
-        let mut pull = l * series::square_vector::<N>(&self.v)
-            - series::dot_known::<N>(&self.p, &self.specific_force)
+        let mut pull = l * space::square_vector::<N>(&self.v)
+            - space::dot_tail::<N>(&self.p, &self.specific_force)
             - dot(self.p[0], self.centripetal);
         let (mut reaction, mut twist) = ([0.0; 3], [0.0; 3]);
         if c > 0.0 {
             reaction = scale(c * l, p_d);
-            twist = scale(c * l, series::cross::<N>(&self.p, &self.p_d));
+            twist = scale(c * l, space::cross::<N>(&self.p, &self.p_d));
         }
         if k > 0.0 {
             self.height[N] = dot(self.e, self.p[N]);
@@ -190,15 +193,15 @@ impl Bob {
             let off_axis_2 = if N == 0 {
                 dot(self.p_perp, self.p_perp)
             } else {
-                -series::square::<N>(&self.height)
+                -series::square(N, &self.height)
             };
             pull -= self.k_m * l * off_axis_2;
             reaction = add(reaction, scale(k * l, self.p_perp));
-            let around = cross(self.e, series::scale::<N>(&self.height, &self.p));
+            let around = cross(self.e, space::scale::<N>(&self.height, &self.p));
             twist = add(twist, scale(k * l, around));
         }
         self.known_pull = pull;
-        let pulled = series::scale_known::<N>(&self.pull, &self.p);
+        let pulled = space::scale_head::<N>(&self.pull, &self.p);
         self.known = add(pulled, scale(pull, self.p[0]));
         let force = add(scale(m, self.known), reaction);
         [force, add(cross(self.hinge, force), scale(l, twist))]
@@ -222,7 +225,7 @@ impl Bob {
             v_d = sub(v_d, scale(self.k_m, self.p_perp));
         }
         self.v_d[N] = v_d;
-        self.both.set_next::<N>([0, 1, 2].map(|i| [self.p_d[N][i], v_d[i]]));
+        self.both.set_next(N, [0, 1, 2].map(|i| [self.p_d[N][i], v_d[i]]));
         [self.p[N + 1], self.v[N + 1]] = self.both.get(N + 1);
     }
 
@@ -230,7 +233,7 @@ impl Bob {
     #[inline(always)]
     pub fn dissipation<const N: usize>(&self) -> f64 {
         if self.c > 0.0 {
-            self.c * self.l * self.l * series::square_vector::<N>(&self.p_d)
+            self.c * self.l * self.l * space::square_vector::<N>(&self.p_d)
         } else {
             0.0
         }
@@ -239,7 +242,7 @@ impl Bob {
     /// Coefficient N (0 or 1) of the rates of the six numbers (tank axes): p', and
     /// p'' = v' - w' x p - w x p'.
     pub fn rates<const N: usize>(&self, w: &Vector, w_d: &Vector) -> [f64; 6] {
-        let turned = add(series::cross::<N>(w_d, &self.p), series::cross::<N>(w, &self.p_d));
+        let turned = add(space::cross::<N>(w_d, &self.p), space::cross::<N>(w, &self.p_d));
         let p_dd = sub(self.v_d[N], turned);
         let p_d = transposed_times(&self.axes, self.p_d[N]);
         let p_dd = transposed_times(&self.axes, p_dd);

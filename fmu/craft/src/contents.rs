@@ -40,16 +40,19 @@
 //! Source: momentum and moment of momentum of a volume fixed in the craft, with d(m s)/dt = K - f r_out;
 //! the energy is that of `outputs.rs`, differentiated along the motion.
 
+use taylor::error::StepError;
+use taylor::extrapolation::{self, Pace, System};
+use taylor::number::Number;
+use taylor::vector::{
+    Mat3, Vec3, add, constant, cross, dot, on_sphere, rotation, scale, sub, times,
+    transposed_times, unit_quaternion,
+};
+
 use crate::bob::BobNow;
-use crate::integrator::{Limits, Pace, StepError, System, advance_by_extrapolation};
-use crate::parameters::Tank;
+use crate::parameters::{Limits, Tank};
 use crate::rigid::{Mat6, Rigid};
 use crate::sizes::{MODES, POINTS};
 use crate::state::Line;
-use crate::vector::{
-    Mat3, Number, Vec3, add, constant, cross, dot, on_sphere, rotation, scale, sub, times,
-    transposed_times, unit_quaternion,
-};
 
 /// A tank in its place.
 #[derive(Clone, Debug)]
@@ -375,7 +378,6 @@ impl Outflow<'_> {
         else {
             return Ok(());
         };
-        let ends = [*low, *high];
         // Where the flow turns, and at the end.
         let turns = flow.value * flow.slope < 0.0 && flow.value.abs() < flow.slope.abs() * h;
         let turn = if turns { -flow.value / flow.slope } else { h };
@@ -384,7 +386,11 @@ impl Outflow<'_> {
             let slack = 1e-12 * high;
             // NaN is beyond, too.
             if !(low - slack..=high + slack).contains(&liquid) {
-                return Err(StepError::BeyondTable { tank, liquid, ends });
+                let index = if tank > 0 { format!("[{tank}]") } else { String::new() };
+                return Err(StepError::Model(format!(
+                    "mass_flow{index} would leave {liquid} kg in tank{index} (allowed: {low} to {high} kg, \
+                     the ends of its table fill.liquid)"
+                )));
             }
         }
         Ok(())
@@ -437,10 +443,10 @@ pub trait Drains<const D: usize>: System<D> + Sized {
             flow.check(x[flow.at], h)?;
         }
         let start = *x;
-        let (mut t, mut pace) = (0.0, Pace::new(h));
+        let (mut t, mut pace) = (0.0, Pace::new(h, limits.steps()));
         while t < h {
             let end = self.outflows().fold(h, |end, flow| flow.next_point(start[flow.at], t, end));
-            advance_by_extrapolation(self, x, (t, end), limits, &mut pace)
+            extrapolation::advance(self, x, (t, end), limits.tolerance, &mut pace)
                 .map_err(|why| why.after(begin))?;
             self.normalise(x, end);
             for flow in self.outflows() {

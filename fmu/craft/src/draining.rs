@@ -8,18 +8,22 @@
 //! as in `motion.rs`, with the loads of what flows within. When a flow jumps, its K and L do: an impulse, the same
 //! equations with the flow's slope alone.
 
+use taylor::error::StepError;
+use taylor::extrapolation::System;
+use taylor::integrator::RATE_FLOOR;
+use taylor::number::{Dual, Number};
+use taylor::vector::{
+    Vec3, add, constant, cross, dot, largest, rotation, scale, sub, times, transposed_times,
+    unit_quaternion,
+};
+
 use crate::contents::{Contents, Drains, Outflow, Place, has_diverged, normalise_bobs, vec_of};
-use crate::integrator::{RATE_FLOOR, StepError, System};
 use crate::motion::SCALE_TIME;
 use crate::outputs::{Now, TankNow};
 use crate::parameters::{Mount, Parameters, Tank};
 use crate::rigid::{Factors, Rigid};
 use crate::sizes::{MODES, TANKS};
 use crate::state::{INPUTS, Inputs, Line, STATES, State, index};
-use crate::vector::{
-    Dual, Number, Vec3, add, constant, cross, dot, largest, rotation, scale, sub, times,
-    transposed_times, unit_quaternion,
-};
 
 /// What acts from outside, as numbers of the wanted kind.
 pub struct Acting<T> {
@@ -297,7 +301,7 @@ mod tests {
 
     use super::*;
     use crate::Spacecraft;
-    use crate::integrator::{Limits, MAX_STEPS};
+    use crate::parameters::{Limits, MAX_STEPS};
     use crate::state::Ramp;
 
     /// A run that counts how often its equations are evaluated.

@@ -23,27 +23,23 @@
 //!
 //! Where to look: `spacecraft.rs` and `slosh_tank.rs` are the two components as a host sees
 //! them; `motion.rs` has the craft's equations, `bob.rs` those of one slosh mode, `rigid.rs`
-//! the mass matrix, `outputs.rs` energy and momentum; `integrator.rs` steps through time with
-//! the arithmetic of `series.rs`. `contents.rs` is what is in a tank that drains by a table (`table.rs`),
+//! the mass matrix, `outputs.rs` energy and momentum; the crate `taylor` steps through time.
+//! `contents.rs` is what is in a tank that drains by a table (`table.rs`),
 //! `draining.rs` a craft with such tanks.
 
 mod bob;
 mod contents;
 mod draining;
-mod integrator;
 mod motion;
 mod outputs;
 mod parameters;
 mod rigid;
-mod series;
 mod sizes;
 mod slosh_tank;
 mod spacecraft;
 mod state;
 mod table;
-mod vector;
 
-pub use integrator::StepError;
 pub use outputs::{Outputs, TankOutputs};
 pub use parameters::{Craft, Inertia, Init, Mount, Parameters, Tank};
 pub use sizes::{MODES, POINTS, TANKS};
@@ -54,3 +50,4 @@ pub use slosh_tank::{
 pub use spacecraft::Spacecraft;
 pub use state::{INPUTS, Inputs, Line, Ramp, STATES, State, index};
 pub use table::FillTable;
+pub use taylor::error::StepError;

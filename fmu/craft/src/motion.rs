@@ -9,7 +9,7 @@
 //! ```
 //!
 //! F and torque are what the bobs load O with, besides their added mass. M is factorised once
-//! per expansion: coefficient N of [a; w'] solves the same system at every order.
+//! per expansion: coefficient n of [a; w'] solves the same system at every order.
 //!
 //! Velocity and position are expanded from where the step begins, V_0 and r_0, in body axes:
 //!
@@ -25,24 +25,28 @@
 //!
 //! Source: Newton-Euler about O with the bobs' pulls eliminated.
 
-use crate::bob::Bob;
-use crate::integrator::{MAX_MAGNITUDE, Motion, RATE_FLOOR};
-use crate::parameters::{Mount, Parameters, Tank};
-use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod};
-use crate::series::{
-    self, Attitude, Pair, Series, Vector, ZERO, ZERO_ATTITUDE, ZERO_PAIR, ZERO_VECTOR, cross,
-    cross_pair, cross_ramp, dot_ramp, next, products, quaternion_rate, ramp,
+use taylor::at_each_order;
+use taylor::error::StepError;
+use taylor::integrator::{self, MAX_MAGNITUDE, Motion, RATE_FLOOR, Steps};
+use taylor::series::{self, ORDER, Series, ZERO};
+use taylor::space::{
+    self, Attitude, Pair, Vector, ZERO_ATTITUDE, ZERO_PAIR, ZERO_VECTOR, cross, cross_pair,
+    cross_ramp, dot_ramp, next, products, quaternion_rate, ramp,
 };
-use crate::state::{Inputs, STATES, State, index};
-use crate::vector::{
+use taylor::vector::{
     self, Mat3, Vec3, add, largest, part, rotation, scale, sub, times, transposed_times,
     unit_quaternion, unit_quaternion_slope,
 };
 
+use crate::bob::Bob;
+use crate::parameters::{Limits, Mount, Parameters, Tank};
+use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod};
+use crate::state::{Inputs, STATES, State, index};
+
 /// Rates change within this time at most, s: a step much longer does not see how fast they are.
 pub const SCALE_TIME: f64 = 0.1;
 
-/// Coefficient N of the matrix of y -> w x (w x y) = (w w^T - |w|^2 1) y, from that of
+/// Coefficient n of the matrix of y -> w x (w x y) = (w w^T - |w|^2 1) y, from that of
 /// w w^T.
 #[inline(always)]
 pub fn twice_crossed([xx, yy, zz, xy, xz, yz]: [f64; 6]) -> Mat3 {
@@ -217,7 +221,7 @@ impl CraftMotion {
     pub fn evaluate(&mut self, inputs: &Inputs) {
         self.inputs = *inputs;
         self.start(0.0);
-        self.rates::<0>();
+        self.rates_of::<0>();
     }
 
     /// Coefficients 0 and 1 of everything along the direction (dx, du).
@@ -250,7 +254,7 @@ impl CraftMotion {
             let [x, dx] = [x, dx].map(|x| x[at..at + 6].try_into().unwrap());
             bob.seed_direction(x, dx, self.w[0], dw);
         }
-        self.rates::<1>();
+        self.rates_of::<1>();
     }
 
     /// The rotation, rad, body axes, that coefficient 1 of the attitude stands for:
@@ -261,6 +265,64 @@ impl CraftMotion {
         let u = [x, y, z];
         let sum = add(sub(scale(a, v), scale(b, u)), scale(-1.0, vector::cross(u, v)));
         scale(2.0, sum)
+    }
+
+    /// Moves the states on by `h` > 0; on an error they are unusable.
+    // Apart from what prepares a step: compiled together, both take more instructions.
+    #[inline(never)]
+    pub fn advance(&mut self, h: f64, limits: Limits) -> Result<(), StepError> {
+        let begin = self.state.time;
+        integrator::advance(self, begin, h, limits.tolerance, &mut limits.steps())
+    }
+
+    /// Coefficient N of every quantity and N + 1 of the states.
+    #[inline(always)]
+    fn rates_of<const N: usize>(&mut self) {
+        self.w_both.set(N, self.w[N], self.w[N]);
+        let ww = products::<N>(&self.w);
+        let w2 = twice_crossed(ww);
+        let mut force = sub(ramp::<N>(&self.force), times(&w2, self.rigid.moment));
+        let mut torque = sub(
+            ramp::<N>(&self.torque),
+            add(gyroscopic(&self.rigid.inertia, ww), cross_ramp::<N>(&self.w, &self.h)),
+        );
+        for bob in &mut self.bobs {
+            let [f, tau] = bob.reaction::<N>(&self.w_both, &w2);
+            force = add(force, f);
+            torque = add(torque, tau);
+        }
+        if N == 0 {
+            self.factorise();
+        }
+        if self.mount == Mount::Pivot {
+            force = self.a[N];
+        }
+        let [a, w_d] = self.solve([force, torque]);
+        self.w_d[N] = w_d;
+        let q_d = quaternion_rate::<N>(&self.q, &self.w_both);
+        self.q.set_next(N, q_d);
+        self.work[N] = dot_ramp::<N>(&self.torque, &self.w);
+        match self.mount {
+            Mount::Free => {
+                self.a[N] = a;
+                self.speed[N] = add(self.drift[N], self.gain[N]);
+                self.work[N] += dot_ramp::<N>(&self.force, &self.speed);
+                let turned = cross_pair::<N>(&self.w_both, &self.travel);
+                let gain = self.gain[N];
+                let rates = [0, 1, 2].map(|i| [a[i] - turned[i][0], gain[i] - turned[i][1]]);
+                self.travel.set_next(N, rates);
+                self.gain[N + 1] = self.travel.get(N + 1)[0];
+                self.drift[N + 1] = next::<N>(cross::<N>(&self.drift, &self.w));
+            }
+            Mount::Pivot => self.a[N + 1] = next::<N>(cross::<N>(&self.a, &self.w)),
+        }
+        self.w[N + 1] = next::<N>(w_d);
+        let mut dissipation = 0.0;
+        for bob in &mut self.bobs {
+            bob.accelerate::<N>(self.a[N], w_d);
+            dissipation += bob.dissipation::<N>();
+        }
+        self.dissipation[N] = dissipation;
     }
 
     /// Coefficient N (0 or 1) of x'.
@@ -311,56 +373,13 @@ impl Motion for CraftMotion {
     }
 
     #[inline(always)]
-    fn rates<const N: usize>(&mut self) {
-        self.w_both.set(N, self.w[N], self.w[N]);
-        let ww = products::<N>(&self.w);
-        let w2 = twice_crossed(ww);
-        let mut force = sub(ramp::<N>(&self.force), times(&w2, self.rigid.moment));
-        let mut torque = sub(
-            ramp::<N>(&self.torque),
-            add(gyroscopic(&self.rigid.inertia, ww), cross_ramp::<N>(&self.w, &self.h)),
-        );
-        for bob in &mut self.bobs {
-            let [f, tau] = bob.reaction::<N>(&self.w_both, &w2);
-            force = add(force, f);
-            torque = add(torque, tau);
-        }
-        if N == 0 {
-            self.factorise();
-        }
-        if self.mount == Mount::Pivot {
-            force = self.a[N];
-        }
-        let [a, w_d] = self.solve([force, torque]);
-        self.w_d[N] = w_d;
-        let q_d = quaternion_rate::<N>(&self.q, &self.w_both);
-        self.q.set(N + 1, q_d.map(|rate| rate * const { 1.0 / (N + 1) as f64 }));
-        self.work[N] = dot_ramp::<N>(&self.torque, &self.w);
-        match self.mount {
-            Mount::Free => {
-                self.a[N] = a;
-                self.speed[N] = add(self.drift[N], self.gain[N]);
-                self.work[N] += dot_ramp::<N>(&self.force, &self.speed);
-                let turned = cross_pair::<N>(&self.w_both, &self.travel);
-                let gain = self.gain[N];
-                let rates = [0, 1, 2].map(|i| [a[i] - turned[i][0], gain[i] - turned[i][1]]);
-                self.travel.set_next::<N>(rates);
-                self.gain[N + 1] = self.travel.get(N + 1)[0];
-                self.drift[N + 1] = next::<N>(cross::<N>(&self.drift, &self.w));
-            }
-            Mount::Pivot => self.a[N + 1] = next::<N>(cross::<N>(&self.a, &self.w)),
-        }
-        self.w[N + 1] = next::<N>(w_d);
-        let mut dissipation = 0.0;
-        for bob in &mut self.bobs {
-            bob.accelerate::<N>(self.a[N], w_d);
-            dissipation += bob.dissipation::<N>();
-        }
-        self.dissipation[N] = dissipation;
+    fn rates(&mut self, n: usize) {
+        const RATES: [fn(&mut CraftMotion); ORDER] = at_each_order!(CraftMotion::rates_of);
+        RATES[n](self)
     }
 
     #[inline(always)]
-    fn set_error_scale(&mut self, h: f64, allowed: f64) {
+    fn set_error_scale(&mut self, h: f64, allowed: f64) -> f64 {
         let time = h.min(SCALE_TIME);
         let rate = RATE_FLOOR + largest(self.w[0]) + largest(self.w[1]) * time;
         let swing = rate
@@ -368,6 +387,7 @@ impl Motion for CraftMotion {
         // Force passes zero, too.
         let speed = largest(self.a[0]) * time + self.longest * swing + RATE_FLOOR;
         self.inv_allowed = [1.0, rate, swing, speed].map(|scale| 1.0 / (allowed * scale));
+        h
     }
 
     #[inline(always)]
@@ -383,9 +403,9 @@ impl Motion for CraftMotion {
     }
 
     #[inline(always)]
-    fn take(&mut self, n: usize, h: f64) -> bool {
+    fn take(&mut self, n: usize, h: f64, t: f64, _: &mut Steps) -> Result<(), StepError> {
         let q = unit_quaternion(self.q.value(n, h));
-        let w = series::value(&self.w, n, h);
+        let w = space::value(&self.w, n, h);
         let x = &mut self.state.x;
         x[index::Q..index::Q + 4].copy_from_slice(&q);
         x[index::OMEGA..index::OMEGA + 3].copy_from_slice(&w);
@@ -397,8 +417,9 @@ impl Motion for CraftMotion {
                 x[index::VELOCITY + i] += gain[i];
             }
         }
-        x[index::WORK] += series::integral(&self.work, n - 1, h);
-        x[index::DISSIPATED] += series::integral(&self.dissipation, n - 1, h);
+        let [work, dissipated] = series::integrals([&self.work, &self.dissipation], n - 1, h);
+        x[index::WORK] += work;
+        x[index::DISSIPATED] += dissipated;
         let mut finite = x[..index::BOBS].iter().all(|x| x.abs() < MAX_MAGNITUDE);
         for bob in &self.bobs {
             let at = index::bob(bob.tank, bob.mode);
@@ -406,6 +427,6 @@ impl Motion for CraftMotion {
             finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
             x[at..at + 6].copy_from_slice(&moved);
         }
-        finite
+        if finite { Ok(()) } else { Err(StepError::NotFinite { time: self.state.time + t }) }
     }
 }

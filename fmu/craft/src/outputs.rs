@@ -12,15 +12,17 @@
 //! everything from O; V in body axes. H is about r_c and does not contain V: after a long
 //! thrust nothing cancels. drained': `contents.rs`. On a pivot H is about O, and E has the potential a.S with all masses.
 
+use taylor::number::Number;
+use taylor::vector::{
+    Mat3, Quaternion, Vec3, add, constant, cross, dot, part, rotation, scale, sub, times,
+};
+
 use crate::bob::BobNow;
 use crate::motion::CraftMotion;
 use crate::parameters::Mount;
 use crate::rigid::Rigid;
 use crate::sizes::{MODES, TANKS};
 use crate::state::{STATES, index};
-use crate::vector::{
-    Mat3, Number, Quaternion, Vec3, add, constant, cross, dot, part, rotation, scale, sub, times,
-};
 
 /// What one tank shows.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,12 +3,12 @@
 //! Names in the messages are those of the FMU's parameters. Indices count from 1 there.
 
 use formulas::cylinder;
+use taylor::integrator::Steps;
+use taylor::vector::{Quaternion, Vec3, add, rotation, scale, unit_quaternion};
 
-use crate::integrator::MAX_STEPS;
 use crate::rigid::{Factors, Rigid};
 use crate::sizes::{MODES, POINTS, TANKS};
 use crate::table::FillTable;
-use crate::vector::{Quaternion, Vec3, add, rotation, scale, unit_quaternion};
 
 /// Symmetric inertia tensor, kg m2: the matrix of J = integral of (|s|^2 1 - s s^T) dm.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -346,6 +346,28 @@ pub(crate) fn tolerance_problem(tolerance: f64) -> Option<String> {
 }
 
 /// What is wrong with a bound on steps, if anything.
+/// The integrator's steps that one call may take, unless a parameter says otherwise: twelve modes need
+/// some seconds for them. It stops what would never end; what keeps any step below 0.1 s, 650 where twelve modes
+/// drain, would refuse single steps over minutes, which take thousands.
+pub(crate) const MAX_STEPS: usize = 100_000;
+
+/// What one call may take.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Limits {
+    /// Relative error.
+    pub tolerance: f64,
+    /// Steps of the integrator.
+    pub max_steps: usize,
+}
+
+impl Limits {
+    /// At the start of a call.
+    pub fn steps(&self) -> Steps {
+        let advice = ", or check for a very short pendulum (length) or a very stiff one (k)";
+        Steps::new(self.max_steps, advice)
+    }
+}
+
 pub(crate) fn steps_problem(max_steps: usize) -> Option<String> {
     (max_steps == 0).then(|| "solver.max_steps = 0 (allowed: 1 and above)".into())
 }

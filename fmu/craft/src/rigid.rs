@@ -7,7 +7,8 @@
 //!
 //! Source: Newton and Euler about a point that is not the centre of mass.
 
-use crate::vector::{Mat3, Number, Vec3, add, constant, cross, dot, scale, times};
+use taylor::number::Number;
+use taylor::vector::{Mat3, Vec3, add, constant, cross, dot, scale, times};
 
 /// A symmetric matrix of six rows.
 pub type Mat6<T = f64> = [[T; 6]; 6];

@@ -36,21 +36,23 @@
 //! A tank that drains (`contents.rs`) moves by extrapolation instead of power series, as a craft does. A jump of its
 //! flow is an impulse on the host, which a force cannot be; it is left out, here and in the bobs.
 
+use taylor::at_each_order;
+use taylor::error::StepError;
+use taylor::extrapolation::System;
+use taylor::integrator::{self, MAX_MAGNITUDE, Motion, RATE_FLOOR, Steps};
+use taylor::number::{Dual, Number};
+use taylor::series::{self, ORDER, Series, ZERO};
+use taylor::space::{self, Pair, Vector, ZERO_PAIR, ZERO_VECTOR, products};
+use taylor::vector::{Mat3, Vec3, add, constant, cross, largest, on_sphere, part, scale};
+
 use crate::bob::{Bob, BobNow};
 use crate::contents::{Drains, Outflow, Place, has_diverged, normalise_bobs, vec_of};
-use crate::integrator::{
-    Limits, MAX_MAGNITUDE, MAX_STEPS, Motion, RATE_FLOOR, StepError, System, advance,
-};
 use crate::motion::{SCALE_TIME, twice_crossed};
 use crate::outputs::{MassProperties, TankOutputs};
-use crate::parameters::{Craft, Tank, steps_problem, tolerance_problem};
+use crate::parameters::{Craft, Limits, MAX_STEPS, Tank, steps_problem, tolerance_problem};
 use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod, largest_eigenvalue};
-use crate::series::{self, Pair, Series, Vector, ZERO, ZERO_PAIR, ZERO_VECTOR, products};
 use crate::sizes::MODES;
 use crate::state::{Line, Ramp, has_direction};
-use crate::vector::{
-    Dual, Mat3, Number, Vec3, add, constant, cross, largest, on_sphere, part, scale,
-};
 
 /// Number of continuous states of a tank: p and p' of each mode, then the dissipated energy and the
 /// mass of liquid.
@@ -324,23 +326,17 @@ impl Motion for TankMotion {
     }
 
     #[inline(always)]
-    fn rates<const N: usize>(&mut self) {
-        self.w_both.set(N, self.w[N], self.w[N]);
-        let w2 = twice_crossed(products::<N>(&self.w));
-        let mut dissipation = 0.0;
-        for bob in &mut self.bobs {
-            bob.reaction::<N>(&self.w_both, &w2);
-            bob.accelerate::<N>(self.a[N], self.w_d[N]);
-            dissipation += bob.dissipation::<N>();
-        }
-        self.dissipation[N] = dissipation;
+    fn rates(&mut self, n: usize) {
+        const RATES: [fn(&mut TankMotion); ORDER] = at_each_order!(TankMotion::rates_of);
+        RATES[n](self)
     }
 
     #[inline(always)]
-    fn set_error_scale(&mut self, _: f64, allowed: f64) {
+    fn set_error_scale(&mut self, h: f64, allowed: f64) -> f64 {
         let swing =
             self.bobs.iter().map(Bob::rate_scale).fold(0.0, |a, b| if b > a { b } else { a });
         self.inv_allowed = 1.0 / (allowed * (RATE_FLOOR + largest(self.w[0]) + swing));
+        h
     }
 
     #[inline(always)]
@@ -350,10 +346,10 @@ impl Motion for TankMotion {
     }
 
     #[inline(always)]
-    fn take(&mut self, n: usize, h: f64) -> bool {
-        let w = series::value(&self.w, 2, h);
+    fn take(&mut self, n: usize, h: f64, t: f64, _: &mut Steps) -> Result<(), StepError> {
+        let w = space::value(&self.w, 2, h);
         let x = &mut self.state.x;
-        x[DISSIPATED] += series::integral(&self.dissipation, n - 1, h);
+        x[DISSIPATED] += series::integrals([&self.dissipation], n - 1, h)[0];
         let mut finite = x[DISSIPATED].abs() < MAX_MAGNITUDE && largest(w) < MAX_MAGNITUDE;
         for bob in &self.bobs {
             let at = 6 * bob.mode;
@@ -361,7 +357,7 @@ impl Motion for TankMotion {
             finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
             x[at..at + 6].copy_from_slice(&moved);
         }
-        finite
+        if finite { Ok(()) } else { Err(StepError::NotFinite { time: self.state.time + t }) }
     }
 }
 
@@ -369,7 +365,7 @@ impl TankMotion {
     fn evaluate(&mut self, inputs: &TankInputs) {
         self.inputs = *inputs;
         self.start(0.0);
-        self.rates::<0>();
+        self.rates_of::<0>();
     }
 
     fn evaluate_direction(
@@ -386,7 +382,29 @@ impl TankMotion {
             let [x, dx] = [&self.state.x, dx].map(|x| x[at..at + 6].try_into().unwrap());
             bob.seed_direction(x, dx, self.w[0], dw);
         }
-        self.rates::<1>();
+        self.rates_of::<1>();
+    }
+
+    /// Moves the states on by `h` > 0; on an error they are unusable.
+    // Apart from what prepares a step: compiled together, both take more instructions.
+    #[inline(never)]
+    fn advance(&mut self, h: f64, limits: Limits) -> Result<(), StepError> {
+        let begin = self.state.time;
+        integrator::advance(self, begin, h, limits.tolerance, &mut limits.steps())
+    }
+
+    /// Coefficient N of every quantity and N + 1 of the states.
+    #[inline(always)]
+    fn rates_of<const N: usize>(&mut self) {
+        self.w_both.set(N, self.w[N], self.w[N]);
+        let w2 = twice_crossed(products::<N>(&self.w));
+        let mut dissipation = 0.0;
+        for bob in &mut self.bobs {
+            bob.reaction::<N>(&self.w_both, &w2);
+            bob.accelerate::<N>(self.a[N], self.w_d[N]);
+            dissipation += bob.dissipation::<N>();
+        }
+        self.dissipation[N] = dissipation;
     }
 
     fn state_rates<const N: usize>(&self) -> [f64; TANK_STATES] {
@@ -537,7 +555,7 @@ impl SloshTank {
             let x = &mut self.motion.state.x;
             Run { place, inputs }.advance(x, before.time, h, self.limits)
         } else {
-            advance(&mut *self.motion, before.time, h, self.limits)
+            self.motion.advance(h, self.limits)
         };
         match done {
             Ok(()) => self.motion.state.time = before.time + h,

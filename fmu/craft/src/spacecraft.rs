@@ -1,15 +1,17 @@
 //! A free spacecraft with sloshing tanks: the whole, its steps, and its equations for hosts
 //! that integrate themselves.
 
+use taylor::error::StepError;
+use taylor::number::{Dual, Number};
+use taylor::vector::{on_sphere, unit_quaternion};
+
 use crate::contents::Drains;
 use crate::draining::{Acting, Draining, Run};
-use crate::integrator::{Limits, StepError, advance};
 use crate::motion::CraftMotion;
 use crate::outputs::{Now, Outputs};
-use crate::parameters::{Parameters, tolerance_problem};
+use crate::parameters::{Limits, Parameters, tolerance_problem};
 use crate::sizes::{MODES, TANKS};
 use crate::state::{INPUTS, Inputs, STATES, State, index};
-use crate::vector::{Dual, Number, on_sphere, unit_quaternion};
 
 /// A rigid body with up to four tanks, free or on a pivot.
 #[derive(Clone, Debug)]
@@ -106,7 +108,7 @@ impl Spacecraft {
         self.motion.inputs = *inputs;
         self.take_jumps(inputs);
         let done = match &self.draining {
-            None => advance(&mut *self.motion, before.time, h, self.limits),
+            None => self.motion.advance(h, self.limits),
             Some(craft) => {
                 let x = &mut self.motion.state.x;
                 Run { craft, inputs }.advance(x, before.time, h, self.limits)

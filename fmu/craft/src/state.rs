@@ -1,8 +1,9 @@
 //! The craft's continuous states x in their order, its inputs, and its memory.
 
-use crate::integrator::MAX_MAGNITUDE;
+use taylor::integrator::MAX_MAGNITUDE;
+use taylor::vector::Vec3;
+
 use crate::sizes::{MODES, TANKS};
-use crate::vector::Vec3;
 
 /// Places in x. Units: 1, rad/s, m, m/s, J, J, then 1 and 1/s for each bob.
 pub mod index {
@@ -42,47 +43,10 @@ pub const STATES: usize = index::DRAINED + 1;
 pub const INPUTS: usize = 9 + TANKS;
 
 /// A vector that is linear in time: `value + slope t`.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct Ramp {
-    /// Value now.
-    pub value: Vec3,
-    /// Rate of change, 1/s.
-    pub slope: Vec3,
-}
-
-impl Ramp {
-    /// A vector that stays.
-    pub fn held(value: Vec3) -> Ramp {
-        Ramp { value, slope: [0.0; 3] }
-    }
-
-    /// The value after `t` seconds.
-    #[inline(always)]
-    pub fn at(&self, t: f64) -> Vec3 {
-        [0, 1, 2].map(|i| self.value[i] + self.slope[i] * t)
-    }
-}
+pub type Ramp = taylor::ramp::Ramp<Vec3>;
 
 /// A number that is linear in time: `value + slope t`.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct Line {
-    /// Value now.
-    pub value: f64,
-    /// Rate of change, 1/s.
-    pub slope: f64,
-}
-
-impl Line {
-    /// The value after `t` seconds.
-    pub fn at(&self, t: f64) -> f64 {
-        self.value + self.slope * t
-    }
-
-    /// The integral from 0 to `t`.
-    pub fn integral(&self, t: f64) -> f64 {
-        (self.value + self.slope * t / 2.0) * t
-    }
-}
+pub type Line = taylor::ramp::Ramp;
 
 /// What acts on the craft from outside over one step; body axes.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]

@@ -15,8 +15,9 @@
 //! Source: the region of monotonicity as in Fritsch and Carlson, SIAM J. Numer. Anal. 17 (1980), here
 //! for quintics.
 
+use taylor::number::Number;
+
 use crate::sizes::{MODES, POINTS};
-use crate::vector::Number;
 
 /// Modes and rigid liquid at some masses of the liquid.
 #[derive(Clone, Copy, Debug, PartialEq)]

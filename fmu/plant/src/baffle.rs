@@ -23,9 +23,9 @@
 //! damping than it says.
 
 use formulas::damping::{covered, miles_ring, motion_at_ring};
+use taylor::series::{Series, ZERO, mul_ramp};
 
 use crate::parameters::{Parameters, Ring, SloshSource};
-use crate::series::{Series, ZERO, mul_ramp};
 
 /// What the ring's range begins with, over its width: the wave times exp(-1.84 d/R).
 const STROKE: core::ops::RangeInclusive<f64> = 0.64..=6.4;

@@ -10,10 +10,11 @@
 //!
 //! with c_0 at a reference g_0; without restoring force there is no damping.
 
+use taylor::series::{Series, ZERO};
+
 use crate::inputs::Ramp;
 use crate::parameters::{MODES, Parameters, SloshSource};
 use crate::pendulum::Pendulum;
-use crate::series::{RAMP_ORDER, Series, ZERO};
 use crate::tank::Calculated;
 
 /// Below this share of the largest g on a ramp the factor is replaced by its mean: there its
@@ -23,6 +24,9 @@ const NEAR_ZERO: f64 = 1e-6;
 
 /// Share of the series' radius of convergence, the time to g = 0, that one step takes.
 const SHARE_OF_RADIUS: f64 = 0.5;
+
+/// The highest order of an expansion along which the damping changes.
+pub const RAMP_ORDER: usize = 10;
 
 /// c/c_0 of every mode as a function of g.
 #[derive(Clone, Debug)]

@@ -4,11 +4,13 @@
 //! x is declared in `state.rs`. The friction's contact and the regime are discrete states:
 //! they change in [`Plant::take_event`] alone, when an indicator has crossed zero.
 
+use taylor::error::StepError;
+
 use crate::contact::Contact;
 use crate::friction::Law;
 use crate::imu::SLACK;
 use crate::inputs::{Inputs, Ramp};
-use crate::motion::StepError;
+use crate::motion::out_of_range;
 use crate::outputs::unsigned_zero;
 use crate::parameters::Friction;
 use crate::plant::Plant;
@@ -133,14 +135,17 @@ impl Plant {
     /// the gyro's samples, finds the regime. Returns whether continuous states have changed.
     ///
     /// # Errors
-    /// [`StepError::TooManySamples`], [`StepError::NotFinite`]; nothing has changed.
+    /// [`StepError::Model`], [`StepError::NotFinite`]; nothing has changed.
     pub fn take_event(&mut self, inputs: &Inputs) -> Result<bool, StepError> {
         let (before, time) = (self.state, self.state.time);
         let period = 1.0 / self.imu.rate;
         // Too many, or so far from zero that the clock can't tell one sample from the next.
         let endless = |due| time - due > SAMPLES_AT_ONCE * period || time + period <= time;
         if self.next_time_event().is_some_and(endless) {
-            return Err(StepError::TooManySamples { time });
+            return Err(StepError::Model(format!(
+                "more gyro samples are due at t = {time} s than can be taken at once; the host has \
+                 passed time events, or imu.rate is too high for times of this size"
+            )));
         }
         if self.wheel.enabled {
             let speed = &mut self.state.x[x::WHEEL_SPEED];
@@ -235,13 +240,13 @@ impl Plant {
     /// Whether the states that the host has set are within the models' range.
     ///
     /// # Errors
-    /// [`StepError::OutOfRange`]
+    /// [`StepError::Model`]
     pub fn check_range(&self) -> Result<(), StepError> {
         let time = self.state.time;
         with_modes!(&self.liquid, modes => {
             for (i, (mode, q)) in modes.iter().zip(self.state.slosh()).enumerate() {
                 if let Some(what) = mode.out_of_range(q) {
-                    return Err(StepError::OutOfRange { time, mode: i + 1, what });
+                    return Err(out_of_range(time, i, what));
                 }
             }
         });

@@ -1,6 +1,6 @@
 //! The hub's motion as power series, and gravity across the axis of a bench that leans.
 
-use crate::series::{Series, ZERO, mul_ramp};
+use taylor::series::{Series, ZERO, mul_ramp};
 
 /// The hub's motion as liquid and bearing see it.
 #[derive(Clone, Debug)]

@@ -9,7 +9,7 @@
 //! Where to look: `plant.rs` couples everything, `state.rs` declares the states, `outputs.rs`
 //! and `equations.rs` are what a host reads, `motion.rs` steps through time and finds stick
 //! and slip, `friction/`, `slosh/`, `damping.rs`, `tank.rs`, `wheel.rs`, `imu.rs` say what their names say,
-//! `series.rs` is the arithmetic.
+//! the arithmetic is the crate `taylor`.
 
 mod baffle;
 mod contact;
@@ -24,7 +24,6 @@ mod outputs;
 mod parameters;
 mod pendulum;
 mod plant;
-mod series;
 mod slosh;
 mod state;
 mod tank;
@@ -32,7 +31,6 @@ mod wheel;
 
 pub use contact::Contact;
 pub use inputs::{Inputs, Ramp};
-pub use motion::StepError;
 pub use outputs::{Discrete, Outputs};
 pub use parameters::{
     Bench, Fluid, Friction, FrictionModel, Hub, Imu, Init, MODES, ModeTable, Parameters, Ring,
@@ -41,3 +39,4 @@ pub use parameters::{
 pub use plant::Plant;
 pub use state::{INDICATORS, Regime, STATES, State, indicator, x};
 pub use tank::Calculated;
+pub use taylor::error::StepError;

@@ -1,103 +1,29 @@
-//! Steps through time: a Taylor-series integrator with an automaton for stick and slip.
-//!
-//! Over one step the whole motion is a power series in time (`series.rs`). The order
-//! grows until terms in a row, at the step's end, are below the tolerance; where
-//! the highest order does not get there, the step is cut to the length at which it
-//! does. So short steps are cheap, nothing is ever rejected, and the series between
-//! the ends is as exact as at the ends: the instants at which the hub comes to rest
-//! or breaks away are roots of polynomials, found without stepping back.
+//! The hub's equation as power series, and the automaton for stick and slip: the instants at which the
+//! hub comes to rest or breaks away are roots of polynomials, found without stepping back. The steps are
+//! the core's (`taylor::integrator`).
+
+use taylor::error::StepError;
+use taylor::integrator::{self, Convergence, RATE_FLOOR, Steps};
+use taylor::root::first_root;
+use taylor::series::{self, ORDER, Series, ZERO};
 
 use crate::contact::Contact;
-use crate::damping::Damping;
+use crate::damping::{Damping, RAMP_ORDER};
 use crate::friction::Law;
 use crate::hub::HubMotion;
 use crate::inputs::Ramp;
 use crate::parameters::{Imu, Parameters, SloshModel};
-use crate::series::{self, ORDER, RAMP_ORDER, Series, ZERO, for_each_order};
 use crate::slosh::SloshMode;
 use crate::state::{State, x};
 
-/// Error of one step against the tolerance asked for. A step's error is forgotten
-/// as the liquid's motion decays, within some thousand steps.
-const STEP_SHARE: f64 = 1e-2;
+/// Where the steps of a call do not suffice.
+const ADVICE: &str = ", with stribeck_smooth a larger friction.eps, with the gyro (its samples count as \
+                      steps) a lower imu.rate";
 
-/// The floor of the error's scale, rad/s.
-const RATE_FLOOR: f64 = 1e-6;
-
-/// The longest expansion, s: its powers up to the highest order do not overflow.
-const LONGEST: f64 = 1e9;
-
-/// The lowest order that is trusted to show that a series has converged.
-const MIN_ORDER: usize = 5;
-
-/// Why a step was refused; its text is for the user. The state is as before the step.
-#[derive(Clone, Debug, PartialEq)]
-pub enum StepError {
-    /// The motion overflows.
-    NotFinite {
-        /// When, s.
-        time: f64,
-    },
-    /// The step needs more internal steps than `solver.max_steps`.
-    TooManySteps {
-        /// How far the integrator came, s.
-        time: f64,
-        /// `solver.max_steps`.
-        max_steps: usize,
-    },
-    /// More samples of the gyro are due than can be taken at once.
-    TooManySamples {
-        /// When, s.
-        time: f64,
-    },
-    /// A slosh mode left the range in which its model is valid.
-    OutOfRange {
-        /// When, s.
-        time: f64,
-        /// Which mode, counted from 1.
-        mode: usize,
-        /// What happened.
-        what: &'static str,
-    },
-}
-
-impl core::fmt::Display for StepError {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            StepError::NotFinite { time } => {
-                write!(f, "the state is not finite at t = {time} s")
-            }
-            StepError::TooManySteps { time, max_steps } => write!(
-                f,
-                "the step was stopped at t = {time} s after solver.max_steps = {max_steps} internal \
-                 steps (gyro samples count as steps); use shorter communication steps, a looser \
-                 tolerance or a larger solver.max_steps, with stribeck_smooth a larger \
-                 friction.eps, with the gyro a lower imu.rate"
-            ),
-            StepError::TooManySamples { time } => write!(
-                f,
-                "more gyro samples are due at t = {time} s than can be taken at once; the host \
-                 has passed time events, or imu.rate is too high for times of this size"
-            ),
-            StepError::OutOfRange { time, mode, what } => {
-                write!(f, "slosh mode {mode} left its range at t = {time} s: {what}")
-            }
-        }
-    }
-}
-
-/// How far an expansion reaches.
-#[derive(Default)]
-struct Reach {
-    /// Its length, s.
-    h: f64,
-    /// h^(n + 1) after order n.
-    power: f64,
-    /// Errors allowed at that length, rad/s.
-    hub_allowed: f64,
-    slosh_allowed: f64,
-    /// How many of the last terms in succession were below them.
-    negligible: usize,
+/// Why a mode that has left its range at `time` refuses the step; `mode` from 0.
+pub(crate) fn out_of_range(time: f64, mode: usize, what: &str) -> StepError {
+    let number = mode + 1;
+    StepError::Model(format!("slosh mode {number} left its range at t = {time} s: {what}"))
 }
 
 /// The hub's equation with the power series of its parts:
@@ -121,7 +47,7 @@ pub(crate) struct Motion {
     near_weightless: f64,
     tolerance: f64,
     /// Internal steps and gyro samples that one call may take.
-    pub max_steps: usize,
+    max_steps: usize,
     pub hub: HubMotion,
     /// Torque of wheel and environment over the step.
     tau: [f64; 2],
@@ -288,84 +214,6 @@ impl Motion {
         self.derivatives(0, true, modes, contact);
     }
 
-    /// Expands the motion up to `h` ahead; `ramp` says whether the specific force changes.
-    /// Returns the order and the length, at most `h`, at which the terms left out are below
-    /// the tolerance.
-    #[inline(always)]
-    fn expand<const UNROLLED: bool, M: SloshMode>(
-        &mut self,
-        ramp: bool,
-        modes: &mut [M],
-        h: f64,
-        contact: Contact,
-    ) -> (usize, f64) {
-        let mut reach = Reach { h: h.min(LONGEST), ..Reach::default() };
-        let highest = if ramp { RAMP_ORDER } else { ORDER };
-        if UNROLLED {
-            for_each_order!(n => {
-                if self.expand_order(n, ramp, modes, contact, &mut reach) {
-                    return (n + 1, reach.h);
-                }
-            });
-        } else {
-            for n in 0..highest {
-                if self.expand_order(n, ramp, modes, contact, &mut reach) {
-                    return (n + 1, reach.h);
-                }
-            }
-        }
-        let Reach { h, hub_allowed, slosh_allowed, .. } = reach;
-        // The last two terms reach the tolerance at this length.
-        let length = |n: usize| {
-            let slosh = modes.iter().map(|m| m.coefficient_norm(n)).fold(0.0, f64::max);
-            let term = f64::max(self.hub.omega[n].abs() / hub_allowed, slosh / slosh_allowed);
-            let term = f64::max(term, self.law.coefficient_norm(n) / self.allowed());
-            if term > 0.0 { libm::exp(-libm::log(term) / n as f64) } else { h }
-        };
-        (highest, h.min(length(highest)).min(length(highest - 1)))
-    }
-
-    /// The error allowed to one step, relative to the motion's scale.
-    fn allowed(&self) -> f64 {
-        STEP_SHARE * self.tolerance
-    }
-
-    /// Order n of an expansion; returns whether the series has converged.
-    #[inline(always)]
-    fn expand_order<M: SloshMode>(
-        &mut self,
-        n: usize,
-        ramp: bool,
-        modes: &mut [M],
-        contact: Contact,
-        reach: &mut Reach,
-    ) -> bool {
-        self.derivatives(n, ramp, modes, contact);
-        let allowed = self.allowed();
-        if n == 1 {
-            let h = reach.h.min(self.law.convergence_radius(&self.hub.omega));
-            reach.h = if ramp { h.min(self.hub.damping_reach) } else { h };
-            reach.power = reach.h;
-            // The hub's rate passes zero many times; the scale of its error must not.
-            let [w, w_d] = [self.hub.omega[0], self.hub.omega[1]].map(f64::abs);
-            let hub_scale = RATE_FLOOR + w + w_d * reach.h.min(0.1);
-            let slosh_scale =
-                hub_scale + modes.iter().map(SloshMode::error_scale).fold(0.0, f64::max);
-            reach.hub_allowed = allowed * hub_scale;
-            reach.slosh_allowed = allowed * slosh_scale;
-        }
-        reach.power *= reach.h;
-        if n + 2 < MIN_ORDER {
-            return false;
-        }
-        let slosh = modes.iter().map(|m| m.coefficient_norm(n + 1)).fold(0.0, larger);
-        let is_negligible = self.hub.omega[n + 1].abs() * reach.power <= reach.hub_allowed
-            && slosh * reach.power <= reach.slosh_allowed
-            && self.law.coefficient_norm(n + 1) * reach.power <= allowed;
-        reach.negligible = if is_negligible { reach.negligible + 1 } else { 0 };
-        reach.negligible >= self.law.negligible_terms()
-    }
-
     /// The sign that the hub's contact has by its rate or, at rest, by the torque
     /// that the bearing would have to hold.
     pub fn contact<M: SloshMode>(&mut self, modes: &mut [M], state: &State) -> Contact {
@@ -385,8 +233,9 @@ impl Motion {
         self.law.contact_at_rest(net, state.x[x::THETA], state.contact)
     }
 
-    pub fn too_many_steps(&self, time: f64) -> StepError {
-        StepError::TooManySteps { time, max_steps: self.max_steps }
+    /// What a call that begins may take.
+    pub fn steps(&self) -> Steps {
+        Steps::new(self.max_steps, ADVICE)
     }
 
     /// When, within `h`, the hub comes to rest, from the series of order n.
@@ -402,7 +251,7 @@ impl Motion {
         // acceleration: these roots at t = 0 are behind it.
         let first = rate[..n].iter().position(|&x| x > 0.0)?;
         let behind = if rate[0] > 0.0 { 0 } else { first };
-        series::first_root(&rate[behind..=n], h)
+        first_root(&rate[behind..=n], h)
     }
 
     /// When, within `h`, the torque exceeds what the bearing holds, and to which side.
@@ -413,7 +262,7 @@ impl Motion {
             left[0] += hold;
             // At a torque that is just held and falls there is no break-away.
             let behind = if left[0] > 0.0 { 0 } else { left[..n].iter().position(|&x| x > 0.0)? };
-            series::first_root(&left[behind..n], h)
+            first_root(&left[behind..n], h)
         };
         let forward = root(1.0, against_forward).map(|t| (t, Contact::Forward));
         let backward = root(-1.0, against_backward).map(|t| (t, Contact::Backward));
@@ -424,8 +273,8 @@ impl Motion {
     }
 
     /// Moves the state on by `h`, during which torque and specific force run along
-    /// their ramps; the gyro takes the samples that fall due. `steps` counts against
-    /// the largest number allowed. On an error the state is unusable.
+    /// their ramps; the gyro takes the samples that fall due and count as steps. On an error the state
+    /// is unusable.
     pub fn advance<M: SloshMode>(
         &mut self,
         modes: &mut [M],
@@ -433,7 +282,7 @@ impl Motion {
         acting: (Ramp, Ramp),
         h: f64,
         imu: &Imu,
-        steps: &mut usize,
+        steps: &mut Steps,
     ) -> Result<(), StepError> {
         // The usual case is compiled apart: one mode, no loops over modes and orders.
         match modes {
@@ -451,93 +300,34 @@ impl Motion {
         &mut self,
         modes: &mut [M],
         state: &mut State,
-        (tau, g): (Ramp, Ramp),
+        acting: (Ramp, Ramp),
         h: f64,
         imu: &Imu,
-        steps: &mut usize,
+        steps: &mut Steps,
     ) -> Result<(), StepError> {
-        let ramp = !UNROLLED && (g.slope != 0.0 || self.varies);
-        let begin = state.time;
-        let mut t = 0.0;
-        self.near_weightless = Damping::floor(g, h);
-        self.start(modes, state, (tau, g));
+        let (begin, tolerance) = (state.time, self.tolerance);
+        self.near_weightless = Damping::floor(acting.1, h);
         if state.x[x::OMEGA] == 0.0 {
+            self.start(modes, state, acting);
             let contact = self.contact(modes, state);
             state.record_contact(contact, begin);
         }
-        while t < h {
-            *steps += 1;
-            if *steps > self.max_steps {
-                return Err(self.too_many_steps(begin + t));
-            }
-            let left = h - t;
-            let contact = state.contact;
-            let (n, mut length) = self.expand::<UNROLLED, M>(ramp, modes, left, contact);
-            let mut event = None;
-            if self.law.switches_at_rest() {
-                if contact == Contact::Stuck {
-                    event = self.time_of_break_away(n, length);
-                } else if let Some(rest) = self.time_of_rest(n, length, contact) {
-                    event = Some((rest, Contact::Stuck));
-                }
-            }
-            if let Some((at, _)) = event {
-                length = at;
-            }
-            if length.is_nan() {
-                return Err(StepError::NotFinite { time: begin + t });
-            }
-            if imu.enabled {
-                let since_start = begin + t - state.start_time;
-                let omega = |s| series::values([&self.hub.omega], n, s)[0];
-                let allowed = self.max_steps - *steps;
-                *steps += imu.follow(&mut state.gyro, since_start, length, omega, allowed);
-                if *steps > self.max_steps {
-                    return Err(self.too_many_steps(begin + t));
-                }
-            }
-            let stuck = contact == Contact::Stuck;
-            let [theta, omega] = series::values([&self.hub.theta, &self.hub.omega], n, length);
-            let omega = if stuck { 0.0 } else { omega };
-            let [work, heat] = series::integrals([&self.power, &self.dissipation], n - 1, length);
-            state.x[x::WORK] += work;
-            state.x[x::HEAT] += heat;
-            if !UNROLLED && g.slope != 0.0 {
-                state.axial.work += g.slope * self.integral_of_mass_height(modes, n, length);
-            }
-            state.x[x::THETA] = theta;
-            state.x[x::OMEGA] = omega;
-            for (i, (mode, q)) in modes.iter().zip(state.slosh_mut()).enumerate() {
-                *q = mode.at(n, length, omega);
-                if let Some(what) = mode.out_of_range(q) {
-                    let time = begin + t + length;
-                    return Err(StepError::OutOfRange { time, mode: i + 1, what });
-                }
-            }
-            self.law.advance(n, length, &mut state.x[x::BRISTLE]);
-            if stuck {
-                state.x[x::STUCK_TIME] += length;
-            }
-            t = if length == left { h } else { t + length };
-            let acting = (tau.after(t), g.after(t));
-            match event {
-                Some((_, Contact::Stuck)) => {
-                    state.x[x::OMEGA] = 0.0;
-                    self.start(modes, state, acting);
-                    let contact = self.contact(modes, state);
-                    state.record_contact(contact, begin + t);
-                }
-                Some((_, contact)) => {
-                    self.start(modes, state, acting);
-                    state.record_contact(contact, begin + t);
-                }
-                None if t < h => self.start(modes, state, acting),
-                None => {}
-            }
-            if !state.is_finite(modes.len()) {
-                return Err(StepError::NotFinite { time: begin + t });
-            }
-        }
+        let varies = acting.1.slope != 0.0 || self.varies;
+        let allowed = [0.0; 3];
+        let (t, event) = (0.0, None);
+        let mut stretch = Stretch::<UNROLLED, M> {
+            motion: &mut *self,
+            modes,
+            state: &mut *state,
+            acting,
+            imu,
+            varies,
+            begin,
+            t,
+            event,
+            allowed,
+        };
+        integrator::advance(&mut stretch, begin, h, tolerance, steps)?;
         state.time = begin + h;
         self.near_weightless = 0.0;
         Ok(())
@@ -553,6 +343,158 @@ impl Motion {
         }
         let [integral] = series::integrals([&sum], n - 1, length);
         integral
+    }
+}
+
+/// One stretch of a step, along which torque and specific force are linear in time.
+struct Stretch<'a, const UNROLLED: bool, M: SloshMode> {
+    motion: &'a mut Motion,
+    modes: &'a mut [M],
+    state: &'a mut State,
+    /// Torque and specific force from the start of the stretch on.
+    acting: (Ramp, Ramp),
+    imu: &'a Imu,
+    /// Whether the specific force, the drag or the weight changes.
+    varies: bool,
+    /// When the stretch begins, and the expansion after it, s.
+    begin: f64,
+    t: f64,
+    /// The contact that the event at the expansion's end makes.
+    event: Option<Contact>,
+    /// Errors allowed to the rates of hub and liquid, rad/s, and to the friction law's own state.
+    allowed: [f64; 3],
+}
+
+impl<const UNROLLED: bool, M: SloshMode> Stretch<'_, UNROLLED, M> {
+    #[inline(always)]
+    fn varies(&self) -> bool {
+        !UNROLLED && self.varies
+    }
+
+    #[inline(always)]
+    fn acting_at(&self, t: f64) -> (Ramp, Ramp) {
+        (self.acting.0.after(t), self.acting.1.after(t))
+    }
+}
+
+impl<const UNROLLED: bool, M: SloshMode> integrator::Motion for Stretch<'_, UNROLLED, M> {
+    const UNROLLED: bool = UNROLLED;
+
+    #[inline(always)]
+    fn start(&mut self, t: f64) {
+        self.t = t;
+        self.motion.start(self.modes, self.state, self.acting_at(t));
+    }
+
+    #[inline(always)]
+    fn rates(&mut self, n: usize) {
+        let varies = self.varies();
+        self.motion.derivatives(n, varies, self.modes, self.state.contact);
+    }
+
+    #[inline(always)]
+    fn set_error_scale(&mut self, h: f64, allowed: f64) -> f64 {
+        let motion = &self.motion;
+        let h = h.min(motion.law.convergence_radius(&motion.hub.omega));
+        let h = if self.varies() { h.min(motion.hub.damping_reach) } else { h };
+        // The hub's rate passes zero many times; the scale of its error must not.
+        let [w, w_d] = [motion.hub.omega[0], motion.hub.omega[1]].map(f64::abs);
+        let hub = RATE_FLOOR + w + w_d * h.min(0.1);
+        let slosh = hub + self.modes.iter().map(SloshMode::error_scale).fold(0.0, f64::max);
+        self.allowed = [hub, slosh, 1.0].map(|scale| allowed * scale);
+        h
+    }
+
+    #[inline(always)]
+    fn coefficient_norm(&self, n: usize) -> f64 {
+        let slosh = self.modes.iter().map(|mode| mode.coefficient_norm(n)).fold(0.0, larger);
+        let [hub, liquid, law] = self.allowed;
+        let norm = larger(self.motion.hub.omega[n].abs() / hub, slosh / liquid);
+        larger(norm, self.motion.law.coefficient_norm(n) / law)
+    }
+
+    #[inline(always)]
+    fn is_negligible(&self, n: usize, power: f64) -> bool {
+        let [hub, liquid, law] = self.allowed;
+        let slosh = || self.modes.iter().map(|mode| mode.coefficient_norm(n)).fold(0.0, larger);
+        self.motion.hub.omega[n].abs() * power <= hub
+            && slosh() * power <= liquid
+            && self.motion.law.coefficient_norm(n) * power <= law
+    }
+
+    #[inline(always)]
+    fn convergence(&self) -> Convergence {
+        Convergence::Terms(self.motion.law.negligible_terms())
+    }
+
+    #[inline(always)]
+    fn highest_order(&self) -> usize {
+        if self.varies() { RAMP_ORDER } else { ORDER }
+    }
+
+    /// The hub comes to rest or breaks away.
+    #[inline(always)]
+    fn event(&mut self, n: usize, h: f64) -> Option<f64> {
+        self.event = None;
+        if !self.motion.law.switches_at_rest() {
+            return None;
+        }
+        let contact = self.state.contact;
+        let (at, next) = if contact == Contact::Stuck {
+            self.motion.time_of_break_away(n, h)?
+        } else {
+            (self.motion.time_of_rest(n, h, contact)?, Contact::Stuck)
+        };
+        self.event = Some(next);
+        Some(at)
+    }
+
+    #[inline(always)]
+    fn take(&mut self, n: usize, h: f64, t: f64, steps: &mut Steps) -> Result<(), StepError> {
+        let Stretch { motion, modes, state, begin, .. } = self;
+        if self.imu.enabled {
+            let since_start = *begin + self.t - state.start_time;
+            let omega = |s| series::values([&motion.hub.omega], n, s)[0];
+            let taken = self.imu.follow(&mut state.gyro, since_start, h, omega, steps.left());
+            steps.count(taken, *begin + self.t)?;
+        }
+        let stuck = state.contact == Contact::Stuck;
+        let [theta, omega] = series::values([&motion.hub.theta, &motion.hub.omega], n, h);
+        let omega = if stuck { 0.0 } else { omega };
+        let [work, heat] = series::integrals([&motion.power, &motion.dissipation], n - 1, h);
+        state.x[x::WORK] += work;
+        state.x[x::HEAT] += heat;
+        let g_slope = self.acting.1.slope;
+        if !UNROLLED && g_slope != 0.0 {
+            state.axial.work += g_slope * motion.integral_of_mass_height(modes, n, h);
+        }
+        state.x[x::THETA] = theta;
+        state.x[x::OMEGA] = omega;
+        for (i, (mode, q)) in modes.iter().zip(state.slosh_mut()).enumerate() {
+            *q = mode.at(n, h, omega);
+            if let Some(what) = mode.out_of_range(q) {
+                return Err(out_of_range(*begin + self.t + h, i, what));
+            }
+        }
+        motion.law.advance(n, h, &mut state.x[x::BRISTLE]);
+        if stuck {
+            state.x[x::STUCK_TIME] += h;
+        }
+        if let Some(contact) = self.event {
+            if contact == Contact::Stuck {
+                state.x[x::OMEGA] = 0.0;
+            }
+            self.start(t);
+            let Stretch { motion, modes, state, .. } = self;
+            let contact =
+                if contact == Contact::Stuck { motion.contact(modes, state) } else { contact };
+            state.record_contact(contact, self.begin + t);
+        }
+        if self.state.is_finite(self.modes.len()) {
+            Ok(())
+        } else {
+            Err(StepError::NotFinite { time: self.begin + t })
+        }
     }
 }
 

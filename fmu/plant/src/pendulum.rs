@@ -1,7 +1,8 @@
 //! One slosh mode as a pendulum: its constants, its restoring force and its drag.
 
+use taylor::series::{Series, ZERO, mul, mul_ramp};
+
 use crate::baffle::Baffle;
-use crate::series::{Series, ZERO, mul, mul_ramp};
 
 /// One slosh mode as a pendulum that hangs at the tank's axis.
 #[derive(Clone, Copy, Debug, PartialEq)]

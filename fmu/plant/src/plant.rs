@@ -4,12 +4,14 @@
 //! I_hub w' = tau_actuator + tau_ext + tau_friction + tau_fluid
 //! ```
 
+use taylor::error::StepError;
+
 use crate::baffle::Range;
 use crate::contact::Contact;
 use crate::damping::Damping;
 use crate::friction::Law;
 use crate::inputs::{Inputs, Ramp};
-use crate::motion::{Motion, StepError};
+use crate::motion::Motion;
 use crate::parameters::{Imu, MODES, Parameters, Wheel};
 use crate::slosh::{Angles, Liquid, SloshMode, with_modes};
 use crate::state::{Axial, Ranges, Regime, STATES, State, x};
@@ -191,13 +193,10 @@ impl Plant {
         }
         let state = &mut self.state;
         let begin = state.time;
-        let (mut t, mut steps) = (0.0, 0);
+        let (mut t, mut steps) = (0.0, self.motion.steps());
         while t < h {
             // A piece of no length takes no step of the integrator; it counts as one.
-            steps += 1;
-            if steps > self.motion.max_steps {
-                return Err(self.motion.too_many_steps(begin + t));
-            }
+            steps.count(1, begin + t)?;
             let speed = state.x[x::WHEEL_SPEED];
             let (length, torque, speed) = self.wheel.next(speed, inputs.tau_cmd.after(t), h - t);
             let external = inputs.tau_ext.after(t);

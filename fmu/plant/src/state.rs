@@ -1,6 +1,8 @@
 //! The plant's state, and the names of its parts: the continuous states and the event
 //! indicators are declared here and nowhere else.
 
+use taylor::integrator::MAX_MAGNITUDE;
+
 use crate::contact::Contact;
 use crate::imu::Gyro;
 
@@ -57,9 +59,6 @@ pub mod indicator {
 
 /// Number of event indicators.
 pub const INDICATORS: usize = indicator::COUNT;
-
-/// From here on energies and forces may overflow, though angles and rates do not yet.
-const MAX_MAGNITUDE: f64 = 1e100;
 
 /// How far the linear range of sloshing reaches, by the wave's height at the wall:
 /// below 0.15 R, up to 0.25 R, above (thesis 2.3.5).

@@ -4,8 +4,9 @@
 //! T_C(w) = c + d exp(-(w/w_s)^2)
 //! ```
 
+use taylor::series::{self, Series, ZERO};
+
 use crate::parameters::Friction;
-use crate::series::{self, Series, ZERO};
 
 #[derive(Clone, Debug)]
 pub struct StribeckCurve {

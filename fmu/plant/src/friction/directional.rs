@@ -6,9 +6,10 @@
 //!
 //! with + while the hub turns forwards, - backwards.
 
+use taylor::series::{self, Series, ZERO};
+
 use crate::contact::Contact;
 use crate::parameters::Friction;
-use crate::series::{self, Series, ZERO};
 
 /// B+-(theta) of one direction.
 #[derive(Clone, Copy, Debug)]

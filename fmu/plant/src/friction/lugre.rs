@@ -31,13 +31,14 @@
 //! g/(sigma_0 |w|) seconds; the integrator resolves that, so its steps are of that length. As
 //! sigma_0 grows the law approaches the set-valued one, at a rising price.
 
+use taylor::series::{self, Series, ZERO};
+
 use super::FrictionLaw;
 use super::curve::StribeckCurve;
 use super::directional::DirectionalFactor;
 use crate::contact::Contact;
 use crate::hub::HubMotion;
 use crate::parameters::Friction;
-use crate::series::{self, Series, ZERO};
 
 #[derive(Clone, Debug)]
 pub struct Lugre {

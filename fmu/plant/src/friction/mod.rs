@@ -10,10 +10,11 @@ mod stribeck;
 mod stribeck_smooth;
 mod viscous;
 
+use taylor::series::{self, Series};
+
 use crate::contact::Contact;
 use crate::hub::HubMotion;
 use crate::parameters::{Friction, FrictionModel};
-use crate::series::{self, Series};
 use directional::DirectionalFactor;
 
 /// A law of friction as a set of power series in time. It may have one state of its own; w = 0 may be a

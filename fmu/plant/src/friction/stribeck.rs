@@ -11,13 +11,14 @@
 //! reverse. Stick and slip are located as events, so it is exact and fast. Its hub does not
 //! move at all while stuck; for motion before sliding a law with a bristle is needed.
 
+use taylor::series::{self, Series, ZERO};
+
 use super::FrictionLaw;
 use super::curve::StribeckCurve;
 use super::directional::DirectionalFactor;
 use crate::contact::Contact;
 use crate::hub::HubMotion;
 use crate::parameters::Friction;
-use crate::series::{self, Series, ZERO};
 
 #[derive(Clone, Debug)]
 pub struct Stribeck {

@@ -10,13 +10,14 @@
 //! where it should be at rest, and each reversal within eps takes steps of about
 //! eps/|w'| seconds: it costs far more than the set-valued law that it approximates.
 
+use taylor::series::{self, Series, ZERO};
+
 use super::FrictionLaw;
 use super::curve::StribeckCurve;
 use super::directional::DirectionalFactor;
 use crate::contact::Contact;
 use crate::hub::HubMotion;
 use crate::parameters::Friction;
-use crate::series::{self, Series, ZERO};
 
 #[derive(Clone, Debug)]
 pub struct StribeckSmooth {

@@ -13,10 +13,11 @@
 //! On a bench that leans, gravity across the axis, e, adds e_y/l to al'', -m l e_x al to T and
 //! -m (e_x r + e_y l al) to E.
 
+use taylor::series::{Series, ZERO, constant, mul, next, square, values};
+
 use super::{Angles, HubReaction, SloshMode};
 use crate::hub::HubMotion;
 use crate::pendulum::Pendulum;
-use crate::series::{Series, ZERO, constant, mul, next, square, values};
 
 #[derive(Clone, Debug)]
 pub struct Linear {

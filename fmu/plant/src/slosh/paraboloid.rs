@@ -17,10 +17,11 @@
 //! s = 1 on the paraboloid; the model `liquid` (`liquid.rs`) has another s and h = kappa/(2 l^2).
 //! For small q a pendulum is the case s = 1, h = 1/(2 l^2).
 
+use taylor::series::{Series, ZERO, constant, mul, mul_tail, next, square, values};
+
 use super::{Angles, HubReaction, SloshMode};
 use crate::hub::HubMotion;
 use crate::pendulum::Pendulum;
-use crate::series::{Series, ZERO, constant, mul, mul_tail, next, square, values};
 
 #[derive(Clone, Debug)]
 pub struct Paraboloid {

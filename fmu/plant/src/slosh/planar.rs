@@ -15,10 +15,11 @@
 //! that leans, gravity across the axis, e, adds -e_y c_ to p, m (r e_y - l s e_x) to T and
 //! -m (e_x r + e_y l s) to E.
 
+use taylor::series::{Series, ZERO, constant, mul, next, sin_cos, square, values};
+
 use super::{Angles, HubReaction, SloshMode};
 use crate::hub::HubMotion;
 use crate::pendulum::Pendulum;
-use crate::series::{Series, ZERO, constant, mul, next, sin_cos, square, values};
 
 #[derive(Clone, Debug)]
 pub struct Planar {

@@ -33,37 +33,38 @@
 //! Checked against Lagrange's equations for xi (below), against another way to the hub's
 //! acceleration (tests/physics/rotary.rs) and against a pendulum in angles (Basilisk).
 
+use taylor::plane::{
+    self, Vector2, ZERO_VECTOR2, dot, each, mul_part, mul_part_head, scale, scale_head, squares,
+};
+use taylor::series::{Series, ZERO, constant, mul, mul_tail, next, square, values};
+
 use super::{Angles, HubReaction, SloshMode};
 use crate::hub::HubMotion;
 use crate::parameters::Init;
 use crate::pendulum::Pendulum;
-use crate::series::{
-    Pair, Series, ZERO, ZERO_PAIR, constant, dot, each, mul, mul_part, mul_part_head, mul_tail,
-    next, scale, scale_head, square, squares, values, values_pair,
-};
 
 #[derive(Clone, Debug)]
 pub struct Spherical {
     p: Pendulum,
     /// Coordinates, 1 + |xi|^2, k, xi.xi' and k xi.xi': orders 0 and 1 alone.
-    xi: Pair,
-    xi_d: Pair,
+    xi: Vector2,
+    xi_d: Vector2,
     sum: Series,
     k: Series,
     rho: Series,
     k_rho: Series,
     /// The bob's direction, horizontally and upwards.
-    dir: Pair,
+    dir: Vector2,
     dir_z: Series,
     /// p' horizontally; upwards it is v_z.
-    dir_d: Pair,
+    dir_d: Vector2,
     /// p' times the course of the damping: horizontally with its components exchanged, and
     /// upwards.
-    drag_swapped: Pair,
+    drag_swapped: Vector2,
     drag_z: Series,
-    v: Pair,
+    v: Vector2,
     v_z: Series,
-    v_d: Pair,
+    v_d: Vector2,
     v_z_d: Series,
     /// v_z^2
     v_z2: Series,
@@ -132,20 +133,20 @@ impl SloshMode for Spherical {
     fn new(p: &Pendulum) -> Self {
         Spherical {
             p: *p,
-            xi: ZERO_PAIR,
-            xi_d: ZERO_PAIR,
+            xi: ZERO_VECTOR2,
+            xi_d: ZERO_VECTOR2,
             sum: ZERO,
             k: ZERO,
             rho: ZERO,
             k_rho: ZERO,
-            dir: ZERO_PAIR,
+            dir: ZERO_VECTOR2,
             dir_z: ZERO,
-            dir_d: ZERO_PAIR,
-            drag_swapped: ZERO_PAIR,
+            dir_d: ZERO_VECTOR2,
+            drag_swapped: ZERO_VECTOR2,
             drag_z: ZERO,
-            v: ZERO_PAIR,
+            v: ZERO_VECTOR2,
             v_z: ZERO,
-            v_d: ZERO_PAIR,
+            v_d: ZERO_VECTOR2,
             v_z_d: ZERO,
             v_z2: ZERO,
             pull_0: ZERO,
@@ -313,7 +314,7 @@ impl SloshMode for Spherical {
     /// xi = p/k and k xi' = p' + v_z xi; k = 1 - p_z, above the horizontal by |p| = 1.
     #[inline(always)]
     fn at(&self, n: usize, t: f64, omega: f64) -> [f64; 4] {
-        let [[x, y], [v_x, v_y]] = values_pair([&self.dir, &self.v], n, t);
+        let [[x, y], [v_x, v_y]] = plane::values([&self.dir, &self.v], n, t);
         let [z, v_z] = values([&self.dir_z, &self.v_z], n, t);
         let inv_k = if z > 0.0 { (1.0 + z) / (x * x + y * y) } else { 1.0 / (1.0 - z) };
         let (xi, eta) = (inv_k * x, inv_k * y);
@@ -364,7 +365,7 @@ fn largest([x, y]: [f64; 2]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::series::ORDER;
+    use taylor::series::ORDER;
 
     /// Lagrange's equations of the bob in xi, with v = xi' + w R xi and rho = xi.xi':
     ///

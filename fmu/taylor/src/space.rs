@@ -1,28 +1,14 @@
-//! Power series in time, of scalars and of vectors: x(t) = x_0 + x_1 t + x_2 t^2 + ...
+//! Power series of vectors in space and of quaternions.
 //!
-//! The equations of motion are written once, as rules for coefficient N of each quantity from
-//! the coefficients up to N of the quantities it depends on. Order 0 of a rule is the quantity
-//! itself at an instant; all orders together are the Taylor expansion that the integrator
-//! steps with; order 1 along a direction is the directional derivative.
-//!
-//! The equations are polynomials, so the product (Cauchy) rule is all there is. N is a constant
-//! of each rule, so that the compiler writes every sum out. Each sum has its newest
-//! coefficients last: they come out of other sums of this order, and a processor adds up the
-//! rest while it waits for them.
+//! The rules are the product (Cauchy) rule. Each sum has its newest coefficients last, as in
+//! `series.rs`. The order N is a constant of a rule: that the compiler writes sums of vectors out before it
+//! puts them where they are used spares a seventieth of the instructions of a step.
 
+use crate::series::{ORDER, RECIPROCAL, Series};
 use crate::vector::{self, Vec3};
-
-/// The highest order kept.
-pub const ORDER: usize = 18;
-
-/// Coefficients 0 to [`ORDER`] of a scalar.
-pub type Series = [f64; ORDER + 1];
 
 /// Coefficients 0 to [`ORDER`] of a vector.
 pub type Vector = [Vec3; ORDER + 1];
-
-/// All coefficients zero.
-pub const ZERO: Series = [0.0; ORDER + 1];
 
 /// All coefficients zero.
 pub const ZERO_VECTOR: Vector = [[0.0; 3]; ORDER + 1];
@@ -30,7 +16,7 @@ pub const ZERO_VECTOR: Vector = [[0.0; 3]; ORDER + 1];
 /// Coefficient N + 1 of x from coefficient N of x'.
 #[inline(always)]
 pub fn next<const N: usize>(rate: Vec3) -> Vec3 {
-    vector::scale(const { 1.0 / (N + 1) as f64 }, rate)
+    vector::scale(RECIPROCAL[N + 1], rate)
 }
 
 /// Coefficients of two vectors that most rules treat alike: `[n][i]` is component i of both,
@@ -56,10 +42,10 @@ impl Pair {
         [[x[0], y[0], z[0]], [x[1], y[1], z[1]]]
     }
 
-    /// Sets coefficient N + 1 of both from coefficient N of their rates.
+    /// Sets coefficient n + 1 of both from coefficient n of their rates.
     #[inline(always)]
-    pub fn set_next<const N: usize>(&mut self, rates: [[f64; 2]; 3]) {
-        self.0[N + 1] = rates.map(|pair| pair.map(|rate| rate * const { 1.0 / (N + 1) as f64 }));
+    pub fn set_next(&mut self, n: usize, rates: [[f64; 2]; 3]) {
+        self.0[n + 1] = rates.map(|pair| pair.map(|rate| rate * RECIPROCAL[n + 1]));
     }
 
     /// The values at t of both series cut after order n.
@@ -74,16 +60,6 @@ impl Pair {
         let [x, y, z] = sum;
         [[x[0], y[0], z[0]], [x[1], y[1], z[1]]]
     }
-}
-
-/// Coefficient N of a^2.
-#[inline(always)]
-pub fn square<const N: usize>(a: &Series) -> f64 {
-    let mut half = 0.0;
-    for j in (0..N.div_ceil(2)).rev() {
-        half += a[j] * a[N - j];
-    }
-    2.0 * half + if N.is_multiple_of(2) { a[N / 2] * a[N / 2] } else { 0.0 }
 }
 
 /// Coefficient N of a.a.
@@ -129,7 +105,7 @@ pub fn products<const N: usize>(a: &Vector) -> [f64; 6] {
 /// Coefficient N of a b, b a vector.
 #[inline(always)]
 pub fn scale<const N: usize>(a: &Series, b: &Vector) -> Vec3 {
-    let mut sum = scale_known::<N>(a, b);
+    let mut sum = scale_head::<N>(a, b);
     for i in 0..3 {
         sum[i] += a[N] * b[0][i];
     }
@@ -138,7 +114,7 @@ pub fn scale<const N: usize>(a: &Series, b: &Vector) -> Vec3 {
 
 /// Coefficient N of a b, b a vector, without its term a_N b_0.
 #[inline(always)]
-pub fn scale_known<const N: usize>(a: &Series, b: &Vector) -> Vec3 {
+pub fn scale_head<const N: usize>(a: &Series, b: &Vector) -> Vec3 {
     let mut sum = [0.0; 3];
     for j in 0..N {
         for i in 0..3 {
@@ -150,7 +126,7 @@ pub fn scale_known<const N: usize>(a: &Series, b: &Vector) -> Vec3 {
 
 /// Coefficient N of a.b without its term a_0.b_N.
 #[inline(always)]
-pub fn dot_known<const N: usize>(a: &Vector, b: &Vector) -> f64 {
+pub fn dot_tail<const N: usize>(a: &Vector, b: &Vector) -> f64 {
     let mut sum = [0.0; 3];
     for j in 0..N {
         for i in 0..3 {
@@ -227,6 +203,12 @@ impl Attitude {
         self.0[n] = [[-b, a], [c, d], [-d, c], [a, b]];
     }
 
+    /// Sets coefficient n + 1 from coefficient n of its rate.
+    #[inline(always)]
+    pub fn set_next(&mut self, n: usize, rate: [f64; 4]) {
+        self.set(n + 1, rate.map(|rate| rate * RECIPROCAL[n + 1]));
+    }
+
     /// Coefficient n.
     #[inline(always)]
     pub fn get(&self, n: usize) -> [f64; 4] {
@@ -249,8 +231,7 @@ impl Attitude {
 }
 
 /// Coefficient N of q' = q o (0, w)/2 (Hamilton's product), where `w` is the pair (w, w).
-// A function of its own: inlined, its lanes are regrouped with the code around it and a
-// tenth more instructions result.
+// A function of its own, as `cross_pair`.
 #[inline(never)]
 pub fn quaternion_rate<const N: usize>(q: &Attitude, w: &Pair) -> [f64; 4] {
     let (mut ab, mut cd) = ([0.0; 2], [0.0; 2]);
@@ -275,38 +256,11 @@ pub fn value<const D: usize>(a: &[[f64; D]; ORDER + 1], n: usize, t: f64) -> [f6
     })
 }
 
-/// The integral from 0 to t of the series cut after order n.
-#[inline(always)]
-pub fn integral(a: &Series, n: usize, t: f64) -> f64 {
-    const SHARES: Series = {
-        let (mut shares, mut j) = (ZERO, 0);
-        while j <= ORDER {
-            shares[j] = 1.0 / (j + 1) as f64;
-            j += 1;
-        }
-        shares
-    };
-    let terms = a[..=n].iter().zip(&SHARES).rev();
-    terms.fold(0.0, |sum, (x, share)| sum * t + x * share) * t
-}
-
-/// Does something with `$N` as the constants 0, 1, ... [`ORDER`] - 1, in turn.
-macro_rules! for_each_order {
-    ($N:ident => $do:block) => {
-        for_each_order!($N => $do; 0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17)
-    };
-    ($N:ident => $do:block; $($n:literal)*) => {
-        $({
-            const $N: usize = $n;
-            $do
-        })*
-    };
-}
-pub(crate) use for_each_order;
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::for_each_order;
+    use crate::series::ZERO;
 
     /// Turning at a constant rate: q' = q o (0, w)/2 and y' = -w x y have closed forms.
     #[test]
@@ -320,7 +274,7 @@ mod tests {
         let mut y = ZERO_VECTOR;
         y[0] = [1.0, 2.0, -0.5];
         for_each_order!(N => {
-            q.set(N + 1, quaternion_rate::<N>(&q, &both).map(|x| x / (N + 1) as f64));
+            q.set_next(N, quaternion_rate::<N>(&q, &both));
             y[N + 1] = next::<N>(cross::<N>(&y, &w));
         });
         let (t, size) = (0.4, vector::norm(rate));
@@ -357,13 +311,14 @@ mod tests {
         for_each_order!(N => {
             let dot = plain(N, &|i, j| vector::dot(a[i], b[j]));
             if N < 4 {
-                assert_eq!(dot_known::<N>(&x, &y) + vector::dot(x[0], y[N]), dot);
+                assert_eq!(dot_tail::<N>(&x, &y) + vector::dot(x[0], y[N]), dot);
             }
             assert_eq!(square_vector::<N>(&x), plain(N, &|i, j| vector::dot(a[i], a[j])));
-            assert_eq!(square::<N>(&s), plain(N, &|i, j| b[i][1] * b[j][1]));
             let squares = products::<N>(&x);
-            for (n, (k, l)) in [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].iter().enumerate() {
-                assert_eq!(squares[n], plain(N, &|i, j| a[i][*k] * a[j][*l]));
+            for (which, (k, l)) in
+                [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].iter().enumerate()
+            {
+                assert_eq!(squares[which], plain(N, &|i, j| a[i][*k] * a[j][*l]));
             }
             for i in 0..3 {
                 let crossed = plain(N, &|j, k| vector::cross(a[j], b[k])[i]);
@@ -374,7 +329,7 @@ mod tests {
                 assert_eq!(scale::<N>(&s, &x)[i], scaled);
                 if N < 4 {
                     let newest = s[N] * x[0][i];
-                    assert_eq!(scale_known::<N>(&s, &x)[i] + newest, scaled);
+                    assert_eq!(scale_head::<N>(&s, &x)[i] + newest, scaled);
                 }
             }
         });

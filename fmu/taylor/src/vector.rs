@@ -1,6 +1,6 @@
-//! Vectors of three components, rotations, and numbers that carry a derivative.
+//! Vectors of three components, matrices and rotations, of values or of what carries a derivative.
 
-use core::ops::{Add, Mul, Neg, Sub};
+use crate::number::Number;
 
 /// A column of three components.
 pub type Vec3<T = f64> = [T; 3];
@@ -11,171 +11,19 @@ pub type Mat3<T = f64> = [[T; 3]; 3];
 /// A unit quaternion, scalar first.
 pub type Quaternion<T = f64> = [T; 4];
 
-/// What the outputs' formulas are evaluated with: [`f64`] for their values, [`Dual`] for their
-/// derivatives along a direction.
-pub trait Number:
-    Copy
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Mul<f64, Output = Self>
-    + Neg<Output = Self>
-{
-    /// A quantity that depends on nothing.
-    fn constant(value: f64) -> Self;
-    /// A quantity from coefficients 0 and 1 of its series.
-    fn of(value: f64, slope: f64) -> Self;
-    /// What is looked for: the value or the derivative.
-    fn result(self) -> f64;
-    /// The value.
-    fn value(self) -> f64;
-    /// The larger of itself and a constant.
-    fn at_least(self, floor: f64) -> Self {
-        if self.value() < floor { Self::constant(floor) } else { self }
-    }
-    /// 1/self
-    fn recip(self) -> Self;
-    /// Of a quantity above 0.
-    fn sqrt(self) -> Self;
-    /// asin, its derivative 0 at +-1, where it has none.
-    fn asin(self) -> Self;
-    /// sqrt(self^2 + b^2), its derivative 0 at 0, where it has none.
-    fn hypot(self, b: Self) -> Self;
-}
-
-impl Number for f64 {
-    fn constant(value: f64) -> f64 {
-        value
-    }
-
-    fn of(value: f64, _: f64) -> f64 {
-        value
-    }
-
-    fn result(self) -> f64 {
-        self
-    }
-
-    fn value(self) -> f64 {
-        self
-    }
-
-    fn recip(self) -> f64 {
-        1.0 / self
-    }
-
-    fn sqrt(self) -> f64 {
-        libm::sqrt(self)
-    }
-
-    fn asin(self) -> f64 {
-        libm::asin(self.clamp(-1.0, 1.0))
-    }
-
-    fn hypot(self, b: f64) -> f64 {
-        libm::hypot(self, b)
-    }
-}
-
-/// A value and its derivative along a direction: value + slope s + O(s^2).
-#[derive(Clone, Copy, Debug)]
-pub struct Dual {
-    value: f64,
-    slope: f64,
-}
-
-impl Add for Dual {
-    type Output = Dual;
-
-    fn add(self, b: Dual) -> Dual {
-        Dual { value: self.value + b.value, slope: self.slope + b.slope }
-    }
-}
-
-impl Sub for Dual {
-    type Output = Dual;
-
-    fn sub(self, b: Dual) -> Dual {
-        Dual { value: self.value - b.value, slope: self.slope - b.slope }
-    }
-}
-
-impl Mul for Dual {
-    type Output = Dual;
-
-    fn mul(self, b: Dual) -> Dual {
-        let slope = self.slope * b.value + self.value * b.slope;
-        Dual { value: self.value * b.value, slope }
-    }
-}
-
-impl Mul<f64> for Dual {
-    type Output = Dual;
-
-    fn mul(self, b: f64) -> Dual {
-        Dual { value: self.value * b, slope: self.slope * b }
-    }
-}
-
-impl Neg for Dual {
-    type Output = Dual;
-
-    fn neg(self) -> Dual {
-        Dual { value: -self.value, slope: -self.slope }
-    }
-}
-
-impl Number for Dual {
-    fn constant(value: f64) -> Dual {
-        Dual { value, slope: 0.0 }
-    }
-
-    fn of(value: f64, slope: f64) -> Dual {
-        Dual { value, slope }
-    }
-
-    fn result(self) -> f64 {
-        self.slope
-    }
-
-    fn value(self) -> f64 {
-        self.value
-    }
-
-    fn recip(self) -> Dual {
-        let value = 1.0 / self.value;
-        Dual { value, slope: -self.slope * value * value }
-    }
-
-    fn sqrt(self) -> Dual {
-        let value = libm::sqrt(self.value);
-        Dual { value, slope: 0.5 * self.slope / value }
-    }
-
-    fn asin(self) -> Dual {
-        let cos = libm::sqrt(f64::max((1.0 - self.value) * (1.0 + self.value), 0.0));
-        let slope = if cos > 0.0 { self.slope / cos } else { 0.0 };
-        Dual { value: self.value.asin(), slope }
-    }
-
-    fn hypot(self, b: Dual) -> Dual {
-        let value = libm::hypot(self.value, b.value);
-        let along = self.slope * self.value + b.slope * b.value;
-        Dual { value, slope: if value > 0.0 { along / value } else { 0.0 } }
-    }
-}
-
 /// Three components of an array from `at` on.
 #[inline(always)]
 pub fn part(x: &[f64], at: usize) -> Vec3 {
     [x[at], x[at + 1], x[at + 2]]
 }
 
+/// a + b.
 #[inline(always)]
 pub fn add<T: Number>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
+/// a - b.
 #[inline(always)]
 pub fn sub<T: Number>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
@@ -187,11 +35,13 @@ pub fn scale<T: Number>(a: T, b: Vec3<T>) -> Vec3<T> {
     [a * b[0], a * b[1], a * b[2]]
 }
 
+/// a.b
 #[inline(always)]
 pub fn dot<T: Number>(a: Vec3<T>, b: Vec3<T>) -> T {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+/// a x b.
 #[inline(always)]
 pub fn cross<T: Number>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]

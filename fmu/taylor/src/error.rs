@@ -1,0 +1,63 @@
+//! Why a step was refused.
+
+use alloc::string::String;
+
+/// Why a step was refused; its text is for the user. The state is as before the step.
+#[derive(Clone, Debug, PartialEq)]
+pub enum StepError {
+    /// The step's length is not a finite number above 0.
+    Length {
+        /// The length, s.
+        h: f64,
+    },
+    /// The motion grew beyond all numbers, or the inputs are not finite.
+    NotFinite {
+        /// When, s.
+        time: f64,
+    },
+    /// The step needs more internal steps than `solver.max_steps`.
+    TooManySteps {
+        /// How far the integrator came, s.
+        time: f64,
+        /// `solver.max_steps`.
+        max_steps: usize,
+        /// What to do about it in this model, besides shorter steps and a larger `solver.max_steps`.
+        advice: &'static str,
+    },
+    /// What the model says, in its words: the motion left the range in which it holds.
+    Model(String),
+}
+
+impl core::fmt::Display for StepError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            StepError::Length { h } => {
+                write!(f, "a step of {h} s (allowed: a finite length above 0)")
+            }
+            StepError::NotFinite { time } => write!(
+                f,
+                "the motion is no longer finite at t = {time} s; check that inputs and their \
+                 derivatives are finite and of sensible size"
+            ),
+            StepError::TooManySteps { time, max_steps, advice } => write!(
+                f,
+                "the step was stopped at t = {time} s after solver.max_steps = {max_steps} internal \
+                 steps; use shorter communication steps, a looser tolerance or a larger \
+                 solver.max_steps{advice}"
+            ),
+            StepError::Model(why) => f.write_str(why),
+        }
+    }
+}
+
+impl core::error::Error for StepError {}
+
+impl StepError {
+    /// The same with its time counted from `begin` instead of from there.
+    pub fn after(mut self, begin: f64) -> StepError {
+        if let StepError::NotFinite { time } | StepError::TooManySteps { time, .. } = &mut self {
+            *time += begin;
+        }
+        self
+    }
+}

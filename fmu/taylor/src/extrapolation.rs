@@ -1,0 +1,171 @@
+//! Steps through time by extrapolation, for rates that are too many to be expanded in power series by hand: craft with
+//! tanks that drain. A step that misses the tolerance is rejected.
+//!
+//! Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, II.9.
+
+use crate::error::StepError;
+use crate::integrator::{MAX_MAGNITUDE, STEP_SHARE, Steps};
+
+/// A system of first order, x' = rates(t, x), that [`advance`] moves on.
+pub trait System<const D: usize> {
+    /// The rates of the states, `t` after the start of the call.
+    fn rates(&self, t: f64, x: &[f64; D]) -> [f64; D];
+
+    /// What the errors of a step are compared with, from states and rates at its start t; `h`: how far there is to go.
+    fn error_scale(&self, t: f64, x: &[f64; D], rate: &[f64; D], h: f64) -> [f64; D];
+}
+
+/// Columns of an extrapolation.
+const COLUMNS: usize = 8;
+
+/// Rounding of a step, of its scale and of 1 rad, rad/s, m, m/s: no smaller error is asked for. Below these terms may
+/// cancel in the rates that are not small themselves.
+const ROUNDING: f64 = 2e-14;
+
+/// How much longer or shorter a step may be than the one before.
+const LONGER: f64 = 4.0;
+const SHORTER: f64 = 0.1;
+
+/// Errors below this, which make no step longer than [`LONGER`] allows, count as this: 1/0 and powers of numbers near
+/// the largest end the process of a host that traps them.
+const LEAST_ERROR: f64 = 1e-30;
+
+/// Evaluations of the rates up to column k (from 0).
+fn work(k: usize) -> f64 {
+    (1 + (k + 1) * (k + 2)) as f64
+}
+
+/// One step of an extrapolation.
+struct Trial<const D: usize> {
+    /// The states at its end, where two columns agree.
+    end: Option<[f64; D]>,
+    /// The length, s, with the least work per second.
+    best: f64,
+}
+
+/// Moves x, whose rates at t are `first`, on by `h` with Gragg's midpoint rule of 2, 4, ... 16 steps, extrapolated to
+/// steps of length 0 until two columns agree to `allowed`. Gives up where the columns hardly come nearer to each other.
+fn extrapolate<const D: usize>(
+    system: &impl System<D>,
+    x: &[f64; D],
+    first: &[f64; D],
+    (t, h): (f64, f64),
+    allowed: &[f64; D],
+) -> Trial<D> {
+    let mut before = [[0.0; D]; COLUMNS];
+    let (mut least, mut best) = (f64::INFINITY, SHORTER * h);
+    let mut error_before = f64::INFINITY;
+    for k in 0..COLUMNS {
+        let n = 2 * (k + 1);
+        let step = h / n as f64;
+        let (mut last, mut now) = (*x, *x);
+        for i in 0..D {
+            now[i] += step * first[i];
+        }
+        for j in 1..n {
+            let rate = system.rates(t + j as f64 * step, &now);
+            for i in 0..D {
+                (last[i], now[i]) = (now[i], last[i] + 2.0 * step * rate[i]);
+            }
+        }
+        let rate = system.rates(t + h, &now);
+        let mut row = [[0.0; D]; COLUMNS];
+        for i in 0..D {
+            row[0][i] = 0.5 * (now[i] + last[i] + step * rate[i]);
+        }
+        for j in 1..=k {
+            let ratio = n as f64 / (2 * (k + 1 - j)) as f64;
+            for i in 0..D {
+                row[j][i] =
+                    row[j - 1][i] + (row[j - 1][i] - before[j - 1][i]) / (ratio * ratio - 1.0);
+            }
+        }
+        if k >= 2 {
+            let error = (0..D).fold(0.0, |largest, i| {
+                let error = (row[k][i] - row[k - 1][i]).abs() / allowed[i];
+                // NaN is an error without bounds.
+                if error <= largest { largest } else { f64::min(error, f64::MAX) }
+            });
+            // Error of column k - 1: h^(2k + 1).
+            let change =
+                0.94 * libm::pow(0.65 / f64::max(error, LEAST_ERROR), 1.0 / (2 * k + 1) as f64);
+            let length = h * change.clamp(SHORTER, LONGER);
+            let is_best = work(k) / length < least;
+            if is_best {
+                (least, best) = (work(k) / length, length);
+            }
+            if error <= 1.0 {
+                // One column more would be better still.
+                if is_best && k + 1 < COLUMNS {
+                    best = f64::min(best * work(k + 1) / work(k), LONGER * h);
+                }
+                return Trial { end: Some(row[k]), best };
+            }
+            if error > 0.1 * error_before {
+                break;
+            }
+            error_before = error;
+        }
+        before = row;
+    }
+    Trial { end: None, best }
+}
+
+/// How an extrapolation goes on from one stretch of a call to the next.
+pub struct Pace {
+    /// The steps that the call has tried.
+    steps: Steps,
+    /// Length of the next step, s.
+    h: f64,
+}
+
+impl Pace {
+    /// At the start of a call over `h`: the first step tries the whole.
+    pub fn new(h: f64, steps: Steps) -> Pace {
+        Pace { steps, h }
+    }
+}
+
+/// Moves x from `begin` to `end` by extrapolation, in as many steps as the tolerance needs. A step's length follows
+/// from the errors of the columns before, what they are compared with from the states at its start: after a rejection
+/// steps grow again.
+///
+/// # Errors
+/// [`StepError::NotFinite`], [`StepError::TooManySteps`]; x is unusable then. Their time counts as `begin` does.
+pub fn advance<const D: usize>(
+    system: &impl System<D>,
+    x: &mut [f64; D],
+    (begin, end): (f64, f64),
+    tolerance: f64,
+    pace: &mut Pace,
+) -> Result<(), StepError> {
+    let mut t = begin;
+    while t < end {
+        let first = system.rates(t, x);
+        let allowed = system
+            .error_scale(t, x, &first, end - t)
+            .map(|scale| f64::max(STEP_SHARE * tolerance * scale, ROUNDING * f64::max(scale, 1.0)));
+        loop {
+            pace.steps.count(1, t)?;
+            let is_last = t + pace.h >= end;
+            let h = if is_last { end - t } else { pace.h };
+            let Trial { end: moved, best } = extrapolate(system, x, &first, (t, h), &allowed);
+            let Some(moved) = moved else {
+                pace.h = f64::min(best, h / 2.0);
+                if t + pace.h <= t {
+                    return Err(StepError::NotFinite { time: t });
+                }
+                continue;
+            };
+            if !moved.iter().all(|x| x.abs() < MAX_MAGNITUDE) {
+                return Err(StepError::NotFinite { time: t });
+            }
+            *x = moved;
+            t = if is_last { end } else { t + h };
+            // A step that a stretch's end has cut short says less of the next than the one before.
+            pace.h = if is_last { f64::max(best, pace.h) } else { best };
+            break;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,109 @@
+//! Power series of vectors in the plane. Most rules treat both components alike, so that a
+//! processor does both at once.
+
+use crate::series::{self, ORDER, Series};
+
+/// Sum of `term(j)` over 0 <= j <= n, ends last; see `series.rs`.
+#[inline(always)]
+fn sum_both(n: usize, term: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
+    let add = |a: [f64; 2], b: [f64; 2]| [a[0] + b[0], a[1] + b[1]];
+    let sum = add((1..n).fold([-0.0; 2], |sum, j| add(sum, term(j))), term(0));
+    if n == 0 { sum } else { add(sum, term(n)) }
+}
+
+/// Coefficients of a vector in the plane, in memory aligned for both components at once.
+#[derive(Clone, Debug)]
+#[repr(align(16))]
+pub struct Vector2([[f64; 2]; ORDER + 1]);
+
+/// All coefficients zero.
+pub const ZERO_VECTOR2: Vector2 = Vector2([[0.0; 2]; ORDER + 1]);
+
+impl core::ops::Index<usize> for Vector2 {
+    type Output = [f64; 2];
+
+    #[inline(always)]
+    fn index(&self, n: usize) -> &[f64; 2] {
+        &self.0[n]
+    }
+}
+
+impl core::ops::IndexMut<usize> for Vector2 {
+    #[inline(always)]
+    fn index_mut(&mut self, n: usize) -> &mut [f64; 2] {
+        &mut self.0[n]
+    }
+}
+
+/// Coefficient n of a b, b a vector.
+#[inline(always)]
+pub fn scale(n: usize, a: &Series, b: &Vector2) -> [f64; 2] {
+    let (a, b) = (&a[..=n], &b.0[..=n]);
+    sum_both(n, |j| [a[j] * b[n - j][0], a[j] * b[n - j][1]])
+}
+
+/// Coefficient n of a b_i, b a vector.
+#[inline(always)]
+pub fn mul_part(n: usize, a: &Series, b: &Vector2, i: usize) -> f64 {
+    let (a, b) = (&a[..=n], &b.0[..=n]);
+    series::sum(n, |j| a[j] * b[n - j][i])
+}
+
+/// Coefficient n of a b, b a vector, without its term a_n b_0.
+#[inline(always)]
+pub fn scale_head(n: usize, a: &Series, b: &Vector2) -> [f64; 2] {
+    let mut sum = [0.0; 2];
+    for (a, b) in a[..n].iter().zip(b.0[1..=n].iter().rev()) {
+        sum = [sum[0] + a * b[0], sum[1] + a * b[1]];
+    }
+    sum
+}
+
+/// Coefficient n of a b_i, b a vector, without its term a_n b_0.
+#[inline(always)]
+pub fn mul_part_head(n: usize, a: &Series, b: &Vector2, i: usize) -> f64 {
+    let mut sum = 0.0;
+    for (a, b) in a[..n].iter().zip(b.0[1..=n].iter().rev()) {
+        sum += a * b[i];
+    }
+    sum
+}
+
+/// Coefficient n of (a_1 b_1, a_2 b_2).
+#[inline(always)]
+pub fn each(n: usize, a: &Vector2, b: &Vector2) -> [f64; 2] {
+    let (a, b) = (&a.0[..=n], &b.0[..=n]);
+    sum_both(n, |j| [a[j][0] * b[n - j][0], a[j][1] * b[n - j][1]])
+}
+
+/// Coefficient n of (a_1^2, a_2^2).
+#[inline(always)]
+pub fn squares(n: usize, a: &Vector2) -> [f64; 2] {
+    let mut half = [0.0; 2];
+    for j in (0..n.div_ceil(2)).rev() {
+        half = [half[0] + a[j][0] * a[n - j][0], half[1] + a[j][1] * a[n - j][1]];
+    }
+    let middle = if n.is_multiple_of(2) { a[n / 2].map(|x| x * x) } else { [0.0; 2] };
+    [2.0 * half[0] + middle[0], 2.0 * half[1] + middle[1]]
+}
+
+/// Coefficient n of a.b.
+#[inline(always)]
+pub fn dot(n: usize, a: &Vector2, b: &Vector2) -> f64 {
+    let [x, y] = each(n, a, b);
+    x + y
+}
+
+/// The values at t of several vectors cut after order n.
+#[inline(always)]
+pub fn values<const K: usize>(a: [&Vector2; K], n: usize, t: f64) -> [[f64; 2]; K] {
+    let n = n.min(ORDER);
+    let mut sums = [[0.0; 2]; K];
+    for j in (0..n + 1).rev() {
+        for k in 0..K {
+            let [x, y] = a[k][j];
+            sums[k] = [sums[k][0] * t + x, sums[k][1] * t + y];
+        }
+    }
+    sums
+}

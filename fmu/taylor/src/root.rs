@@ -1,0 +1,72 @@
+//! The first root of a polynomial: when, within a step, an event falls due.
+
+/// The first t in (0, h] at which the polynomial `a`, positive at t = 0, has
+/// fallen to zero; `None` when it stays positive.
+///
+/// From a point where the value is f > 0 and the slope f', a bound M on |f''|
+/// over [0, h] gives f(t + s) >= f + f' s - M s^2 / 2. The root of that parabola
+/// is a step that cannot pass the first zero, and it converges to it
+/// quadratically, as Newton's does.
+pub fn first_root(a: &[f64], h: f64) -> Option<f64> {
+    let (mut power, mut lowest) = (1.0, a[0]);
+    for x in &a[1..] {
+        power *= h;
+        lowest += f64::min(0.0, x * power);
+    }
+    if lowest > 0.0 {
+        return None;
+    }
+    let (mut power, mut bend) = (1.0, 0.0);
+    for (j, x) in a.iter().enumerate().skip(2) {
+        bend += (j * (j - 1)) as f64 * x.abs() * power;
+        power *= h;
+    }
+    let mut t = 0.0;
+    // Far from a tangency some five steps do; the limit only bounds the work.
+    for _ in 0..200 {
+        let (mut f, mut slope) = (0.0, 0.0);
+        for x in a.iter().rev() {
+            slope = slope * t + f;
+            f = f * t + x;
+        }
+        if f <= 0.0 {
+            return Some(t);
+        }
+        let fall = libm::sqrt(slope * slope + 2.0 * bend * f) - slope;
+        // Straight and not falling.
+        if fall <= 0.0 {
+            return None;
+        }
+        let next = t + 2.0 * f / fall;
+        if next > h || next.is_nan() {
+            return None;
+        }
+        if next == t {
+            return Some(t);
+        }
+        t = next;
+    }
+    Some(t)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn first_root_finds_the_first_of_two_close_roots() {
+        // (t - 0.5)(t - 0.5001)(t - 0.9), negated to start positive
+        let (a, b, c) = (0.5, 0.5001, 0.9);
+        let p = [a * b * c, -(a * b + b * c + c * a), a + b + c, -1.0];
+        // The root's condition: rounding 1e-16 over the slope 4e-5.
+        assert!((first_root(&p, 1.0).unwrap() - 0.5).abs() < 1e-11);
+        assert_eq!(first_root(&p, 0.4999), None);
+    }
+
+    #[test]
+    fn first_root_passes_over_a_minimum_that_stays_positive() {
+        // (t - 0.5)^2 + 1e-9
+        assert_eq!(first_root(&[0.25 + 1e-9, -1.0, 1.0], 1.0), None);
+        assert_eq!(first_root(&[1.0, 0.0, 0.0], 1.0), None);
+    }
+}
