@@ -15,7 +15,9 @@ use runtime::instance::DEFAULT_TOLERANCE;
 use runtime::log::categories;
 use runtime::table::Scalar;
 use runtime::unit::Unit;
+use runtime::v2::Fmi2;
 use runtime::variable::{Access, Causality, Enumeration, Kind, Value};
+use runtime::version::Version;
 
 /// The folder of a model's XML, documentation and pictures.
 pub fn folder<M: Model>() -> PathBuf {
@@ -86,7 +88,7 @@ fn description<M: Model>() -> schema::ModelDescription {
             .filter(|all| !all.is_empty())
             .map(|all| schema::Types { all: all.into_iter().map(simple_type).collect() }),
         log_categories: schema::LogCategories {
-            all: categories(table)
+            all: categories::<M, Fmi2>(table)
                 .into_iter()
                 .map(|c| schema::Category { name: c.name, description: c.description })
                 .collect(),
@@ -187,7 +189,7 @@ fn variable<M: Model>(scalar: &Scalar<M>) -> schema::ScalarVariable {
     };
     schema::ScalarVariable {
         name: scalar.name(),
-        value_reference: scalar.reference,
+        value_reference: Fmi2::reference(scalar),
         description: v.description,
         causality,
         variability,
@@ -211,7 +213,7 @@ fn is_derivative<M: Model>(scalar: &Scalar<M>) -> bool {
 
 /// Place among the variables, counted from 1.
 fn index<M: Model>(scalar: &Scalar<M>) -> usize {
-    scalar.reference as usize + 1
+    scalar.index as usize + 1
 }
 
 /// Some of the scalars in the order of their indices, with what they depend on.

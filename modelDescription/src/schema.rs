@@ -199,7 +199,7 @@ pub struct Category {
     #[serde(rename = "@name")]
     pub name: &'static str,
     #[serde(rename = "@description")]
-    pub description: &'static str,
+    pub description: String,
 }
 
 /// `<DefaultExperiment>`

@@ -6,7 +6,8 @@ use HubSlosh::Instance;
 use HubSlosh::table::TABLE;
 use allocation_counter::measure;
 use plant::{INDICATORS, STATES};
-use runtime::operation::{GET_REAL, Interface, SET_BOOLEAN, SET_INTEGER, SET_REAL};
+use runtime::call::Interface;
+use runtime::v2::{GET_REAL, SET_BOOLEAN, SET_INTEGER, SET_REAL};
 use runtime::variable::Value;
 
 fn reference(name: &str) -> u32 {

@@ -5,13 +5,11 @@ use crate::common::items;
 use HubSlosh::table::TABLE;
 use HubSlosh::{Instance, Scalar, from_bytes};
 use plant::{STATES, SloshModel};
+use runtime::call::{CType, Fault, InstanceState, Interface, Severity};
 use runtime::hash::Hash;
 use runtime::instance::DEFAULT_TOLERANCE;
-use runtime::operation::{
-    CType, Fault, GET_BOOLEAN, GET_INTEGER, GET_REAL, InstanceState, Interface, SET_BOOLEAN,
-    SET_INTEGER, SET_REAL, Severity,
-};
 use runtime::snapshot::{size, to_bytes};
+use runtime::v2::{GET_BOOLEAN, GET_INTEGER, GET_REAL, SET_BOOLEAN, SET_INTEGER, SET_REAL};
 use runtime::variable::{Access, Causality, Kind, Value};
 
 fn fresh() -> Instance {
@@ -639,7 +637,7 @@ fn output_derivatives_are_how_the_outputs_move_on() {
         };
         set_slope(&mut instance);
         for scalar in TABLE.scalars.iter().filter(|s| s.variable.causality == Causality::Output) {
-            let n = scalar.reference;
+            let n = scalar.index;
             let derivative = output_derivative(&mut instance, n, 1).unwrap();
             assert!(output_derivative(&mut instance, n, 2).is_err());
             let h = 1e-6;
@@ -717,7 +715,7 @@ fn check_directional_derivatives(rng: &mut fastrand::Rng, slosh_model: i32, fric
     }
     instance.set_continuous_states(&states).unwrap();
 
-    let inputs: Vec<u32> = TABLE.inputs().iter().map(|s| s.reference).collect();
+    let inputs: Vec<u32> = TABLE.inputs().iter().map(|s| s.index).collect();
     let states_by_reference: Vec<u32> = TABLE
         .derivatives()
         .iter()
@@ -731,7 +729,7 @@ fn check_directional_derivatives(rng: &mut fastrand::Rng, slosh_model: i32, fric
         s.variable.causality == Causality::Output
             || matches!(s.variable.access, Access::Derivative(_))
     };
-    let unknowns: Vec<u32> = TABLE.scalars.iter().filter(is_unknown).map(|s| s.reference).collect();
+    let unknowns: Vec<u32> = TABLE.scalars.iter().filter(is_unknown).map(|s| s.index).collect();
     let mut answers = vec![0.0; unknowns.len()];
     instance.directional_derivative(&unknowns, &knowns, &direction, &mut answers).unwrap();
 
@@ -1027,7 +1025,7 @@ fn no_variable_follows_a_continuous_state_that_it_does_not_list() {
                     for (scalar, (before, after)) in
                         TABLE.scalars.iter().zip(before.iter().zip(all(&mut other)))
                     {
-                        let listed = scalar.depends_on().any(|s| s.reference == state.reference);
+                        let listed = scalar.depends_on().any(|s| s.index == state.index);
                         if !listed {
                             let (name, state) = (scalar.name(), state.name());
                             assert_eq!(*before, after, "{name} follows {state}");

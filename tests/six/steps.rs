@@ -3,9 +3,10 @@
 
 use craft::{Inputs, Line, Ramp, TankInputs, TankParameters};
 use host::fmi2::{CallError, MODEL_EXCHANGE, Status};
+use runtime::call::Interface;
 use runtime::instance::Instance;
-use runtime::operation::{GET_REAL, Interface, SET_INTEGER, SET_REAL, Version};
 use runtime::snapshot::to_bytes;
+use runtime::v2::{Fmi2, GET_REAL, SET_INTEGER, SET_REAL};
 use runtime::variable::Value;
 
 use super::component::{SloshTank, Spacecraft, load};
@@ -123,7 +124,7 @@ fn a_million_random_steps_end_in_numbers_or_a_clear_error() {
 /// omega follows from omega_dot in a step and may not leave its range there.
 #[test]
 fn a_step_refused_for_where_an_input_would_end_leaves_the_tank_as_it_was() {
-    let mut tank = Instance::<::SloshTank::Model>::new(Version::Fmi2, Interface::CoSimulation);
+    let mut tank = Instance::<::SloshTank::Model, Fmi2>::new(Interface::CoSimulation);
     tank.setup_experiment(None, 0.0, None).unwrap();
     tank.enter_initialization_mode().unwrap();
     tank.exit_initialization_mode().unwrap();
@@ -139,8 +140,8 @@ fn a_step_refused_for_where_an_input_would_end_leaves_the_tank_as_it_was() {
 fn with_kind<M: runtime::Model>(
     settings: &[(&str, i32)],
     shown: &str,
-) -> Result<Value, runtime::operation::Fault> {
-    let mut instance = Instance::<M>::new(Version::Fmi2, Interface::CoSimulation);
+) -> Result<Value, runtime::call::Fault> {
+    let mut instance = Instance::<M, Fmi2>::new(Interface::CoSimulation);
     for (name, number) in settings {
         let reference = M::table().find(name).unwrap();
         instance.set(&SET_INTEGER, &[reference], |_| Value::Integer(*number))?;

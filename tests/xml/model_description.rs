@@ -5,7 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use HubSlosh::table::TABLE;
 use host::xml::{Element, double};
 use plant::{FrictionModel, SloshModel, SloshSource};
-use runtime::operation::{GET_BOOLEAN, GET_INTEGER, GET_REAL, Interface};
+use runtime::call::Interface;
+use runtime::v2::{GET_BOOLEAN, GET_INTEGER, GET_REAL};
 use runtime::variable::{Causality, Kind, Value, Variable};
 
 fn number(element: &Element, attribute: &str) -> Option<f64> {

@@ -9,11 +9,13 @@ pub mod states;
 pub mod values;
 
 use runtime::Model;
+use runtime::call::Call;
 use runtime::instance::Instance;
-use runtime::operation::{self as op, Operation, Version};
 use runtime::snapshot::{from_bytes, to_bytes};
 use runtime::table::Scalar;
+use runtime::v2::{Fmi2, GET_BOOLEAN, GET_INTEGER, GET_REAL, SET_BOOLEAN, SET_INTEGER, SET_REAL};
 use runtime::variable::{Access, Causality, Kind, Value};
+use runtime::version::Version;
 
 /// What the environment variable `HUBSLOSH_FUZZ_TARGET` names.
 ///
@@ -41,20 +43,20 @@ pub fn sizes<M: Model>() -> [usize; 4] {
 }
 
 /// The call that reads a variable of this type.
-fn getter<M: Model>(scalar: &Scalar<M>) -> &'static Operation {
+fn getter<M: Model>(scalar: &Scalar<M>) -> &'static Call {
     match scalar.variable.kind {
-        Kind::Real(_) => &op::GET_REAL,
-        Kind::Integer { .. } | Kind::Enumeration(_) => &op::GET_INTEGER,
-        Kind::Boolean => &op::GET_BOOLEAN,
+        Kind::Real(_) => &GET_REAL,
+        Kind::Integer { .. } | Kind::Enumeration(_) => &GET_INTEGER,
+        Kind::Boolean => &GET_BOOLEAN,
     }
 }
 
 /// A value's own call to set it.
-fn setter(value: Value) -> &'static Operation {
+fn setter(value: Value) -> &'static Call {
     match value {
-        Value::Real(_) => &op::SET_REAL,
-        Value::Integer(_) => &op::SET_INTEGER,
-        Value::Boolean(_) => &op::SET_BOOLEAN,
+        Value::Real(_) => &SET_REAL,
+        Value::Integer(_) => &SET_INTEGER,
+        Value::Boolean(_) => &SET_BOOLEAN,
     }
 }
 
@@ -62,14 +64,14 @@ fn setter(value: Value) -> &'static Operation {
 ///
 /// # Panics
 /// If not.
-fn everything_is_a_number<M: Model>(instance: &mut Instance<M>) {
+fn everything_is_a_number<M: Model>(instance: &mut Instance<M, Fmi2>) {
     let shown = |scalar: &&Scalar<M>| {
         matches!(scalar.variable.causality, Causality::Output | Causality::Local)
             // these are read one by one from all states together: slow, and seen in the states
             && !matches!(scalar.variable.access, Access::Derivative(_))
     };
     for scalar in M::table().scalars.iter().filter(shown) {
-        match instance.get(getter(scalar), scalar.reference) {
+        match instance.get(getter(scalar), Fmi2::reference(scalar)) {
             Ok(Value::Real(x)) => assert!(x.is_finite(), "{} = {x}", scalar.name()),
             Ok(_) => {}
             Err(fault) => panic!("{}: {}", scalar.name(), fault.text),
@@ -81,10 +83,9 @@ fn everything_is_a_number<M: Model>(instance: &mut Instance<M>) {
 ///
 /// # Panics
 /// If not.
-fn survives_being_saved<M: Model>(instance: &Instance<M>) -> Instance<M> {
+fn survives_being_saved<M: Model>(instance: &Instance<M, Fmi2>) -> Instance<M, Fmi2> {
     let bytes = to_bytes(instance);
-    let again = from_bytes(Version::Fmi2, &bytes)
-        .unwrap_or_else(|why| panic!("own bytes are refused: {why}"));
+    let again = from_bytes(&bytes).unwrap_or_else(|why| panic!("own bytes are refused: {why}"));
     assert!(to_bytes(&again) == bytes, "bytes that were read are written otherwise");
     again
 }

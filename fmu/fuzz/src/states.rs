@@ -5,11 +5,13 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 
 use runtime::Model;
+use runtime::call::{InstanceState, Interface};
 use runtime::hash::Hash;
 use runtime::instance::Instance;
-use runtime::operation::{self as op, InstanceState, Interface, Version};
 use runtime::snapshot::{from_bytes, to_bytes};
+use runtime::v2::{Fmi2, GET_REAL, SET_REAL};
 use runtime::variable::Value::{self, Boolean, Integer, Real};
+use runtime::version::Version;
 
 use crate::{everything_is_a_number, setter, survives_being_saved};
 
@@ -22,7 +24,7 @@ const CHECKSUM: usize = 16;
 pub fn run<M: Model>(data: &[u8]) {
     let Some((which, mut patches)) = data.split_first() else { return };
     if *which == u8::MAX {
-        _ = from_bytes::<M>(Version::Fmi2, patches);
+        _ = from_bytes::<M, Fmi2>(patches);
         return;
     }
     let bases = bases::<M>();
@@ -38,19 +40,19 @@ pub fn run<M: Model>(data: &[u8]) {
     }
     let checksum = Hash::new().bytes(&bytes[..body]).value().to_le_bytes();
     bytes[body..].copy_from_slice(&checksum);
-    let Ok(read) = from_bytes::<M>(Version::Fmi2, &bytes) else { return };
+    let Ok(read) = from_bytes::<M, Fmi2>(&bytes) else { return };
     let read = survives_being_saved(&read);
-    let mut instance = Instance::new(Version::Fmi2, read.interface());
+    let mut instance = Instance::new(read.interface());
     instance.restore(&read).expect("a state that could be read can be restored");
     live(&mut instance);
 }
 
 /// What a host may do next. Calls may be refused; after a step that succeeded everything is a
 /// number.
-fn live<M: Model>(instance: &mut Instance<M>) {
+fn live<M: Model>(instance: &mut Instance<M, Fmi2>) {
     let table = M::table();
     for input in table.inputs() {
-        _ = instance.set(&op::SET_REAL, &[input.reference], |_| Real(0.1));
+        _ = instance.set(&SET_REAL, &[Fmi2::reference(input)], |_| Real(0.1));
     }
     if instance.state() == InstanceState::Instantiated {
         _ = instance.enter_initialization_mode();
@@ -59,7 +61,7 @@ fn live<M: Model>(instance: &mut Instance<M>) {
         _ = instance.exit_initialization_mode();
     }
     for n in 0..table.scalars.len() as u32 {
-        _ = instance.get(&op::GET_REAL, n);
+        _ = instance.get(&GET_REAL, n);
         _ = instance.output_derivatives(&[n], &[1], &mut [0.0]);
     }
     match instance.interface() {
@@ -111,7 +113,7 @@ fn bases<M: Model>() -> &'static [Vec<u8>] {
 
 /// The saved states of one life.
 fn life_of<M: Model>(interface: Interface, settings: &[(&str, Value)], all: &mut Vec<Vec<u8>>) {
-    let mut instance = Instance::<M>::new(Version::Fmi2, interface);
+    let mut instance = Instance::<M, Fmi2>::new(interface);
     for (name, value) in settings {
         let reference = M::table().find(name).expect("the table has the variable");
         instance.set(setter(*value), &[reference], |_| *value).expect("a good value");

@@ -6,10 +6,12 @@ use std::time::{Duration, Instant};
 use arbitrary::{Result, Unstructured};
 
 use runtime::Model;
+use runtime::call::{InstanceState, Interface};
 use runtime::instance::Instance;
-use runtime::operation::{InstanceState, Interface, Version};
 use runtime::snapshot::to_bytes;
+use runtime::v2::Fmi2;
 use runtime::variable::{Causality, Kind, Quantity, Value};
+use runtime::version::Version;
 
 use crate::{everything_is_a_number, setter, survives_being_saved};
 
@@ -27,7 +29,7 @@ pub fn run<M: Model>(data: &[u8]) {
 }
 
 fn co_simulation<M: Model>(data: &mut Unstructured) -> Result<()> {
-    let mut instance = Instance::<M>::new(Version::Fmi2, Interface::CoSimulation);
+    let mut instance = Instance::<M, Fmi2>::new(Interface::CoSimulation);
     for _ in 0..data.int_in_range(0..=12)? {
         set_something(&mut instance, data)?;
     }
@@ -50,7 +52,7 @@ fn co_simulation<M: Model>(data: &mut Unstructured) -> Result<()> {
             set_something(&mut instance, data)?;
         }
         if data.ratio(1, 3)? {
-            let input = data.choose(M::table().scalars)?.reference;
+            let input = Fmi2::reference(data.choose(M::table().scalars)?);
             _ = instance.set_input_derivatives(&[input], &[1], &[real(data)?]);
         }
         let h = real(data)?.min(LONGEST);
@@ -76,7 +78,10 @@ fn co_simulation<M: Model>(data: &mut Unstructured) -> Result<()> {
 }
 
 /// Sets a parameter or an input, mostly to something allowed; refusals change nothing.
-fn set_something<M: Model>(instance: &mut Instance<M>, data: &mut Unstructured) -> Result<()> {
+fn set_something<M: Model>(
+    instance: &mut Instance<M, Fmi2>,
+    data: &mut Unstructured,
+) -> Result<()> {
     let scalar = data.choose(M::table().scalars)?;
     if !matches!(scalar.variable.causality, Causality::Parameter | Causality::Input) {
         return Ok(());
@@ -91,7 +96,7 @@ fn set_something<M: Model>(instance: &mut Instance<M>, data: &mut Unstructured) 
         Kind::Boolean => Value::Boolean(data.arbitrary()?),
     };
     let before = to_bytes(instance);
-    if instance.set(setter(value), &[scalar.reference], |_| value).is_err() {
+    if instance.set(setter(value), &[Fmi2::reference(scalar)], |_| value).is_err() {
         assert!(to_bytes(instance) == before, "a refused value has changed something");
     }
     Ok(())

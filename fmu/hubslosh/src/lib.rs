@@ -10,22 +10,23 @@ pub mod table;
 
 pub use model::{HubSlosh, Parameters};
 
-use runtime::operation::{Interface, Version};
+use runtime::call::Interface;
+use runtime::v2::Fmi2;
 
 /// An instance of the FMU.
-pub type Instance = runtime::instance::Instance<HubSlosh>;
+pub type Instance = runtime::instance::Instance<HubSlosh, Fmi2>;
 
 /// One scalar of the FMU's variables.
 pub type Scalar = runtime::table::Scalar<HubSlosh>;
 
 /// An instance as a host gets it through FMI 2.0, for hosts and tests in Rust.
 pub fn instance(interface: Interface) -> Instance {
-    Instance::new(Version::Fmi2, interface)
+    Instance::new(interface)
 }
 
 /// The saved state that the bytes hold, or why they hold none.
 pub fn from_bytes(bytes: &[u8]) -> Result<Instance, String> {
-    runtime::snapshot::from_bytes(Version::Fmi2, bytes)
+    runtime::snapshot::from_bytes(bytes)
 }
 
 /// The functions of FMI 2.0 that the binary exports.

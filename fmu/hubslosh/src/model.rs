@@ -133,7 +133,7 @@ impl Model for HubSlosh {
         Ok(HubSlosh { plant, present: false })
     }
 
-    fn warnings(parameters: &Parameters, inputs: &Inputs) -> Vec<String> {
+    fn warnings(&self, parameters: &Parameters, inputs: &Inputs) -> Vec<String> {
         parameters.resolved().map_or(Vec::new(), |p| Plant::warnings(&p, inputs))
     }
 

@@ -1,17 +1,20 @@
-//! What the calls of a host do to one instance, in terms of no version of FMI's C interface.
+//! What the calls of a host do to one instance, in any version of FMI's C interface.
 //!
 //! A call that is refused changes nothing. The one exception is a step that the
 //! model could not compute: the model stands where it was, but the instance goes
 //! to the state "step failed", where it can be read, reset, or given a saved
 //! state.
 //!
-//! In Model Exchange the host integrates: it sets time and states, and what is
-//! discrete changes in [`Instance::new_discrete_states`] alone.
+//! In Model Exchange the host integrates: it sets time and states. Where the host handles events
+//! ([`Events::ByHost`]), what is discrete changes in [`Instance::new_discrete_states`] alone.
 
+use std::marker::PhantomData;
+
+use crate::call::{Call, Events, Fault, InstanceState, Interface};
 use crate::model::Model;
-use crate::operation::{self as op, Call, Fault, InstanceState, Interface, Operation, Version};
 use crate::table::Scalar;
 use crate::variable::{Access, Causality, Value, is_finite, text};
+use crate::version::Version;
 
 /// The tolerance when the host names none.
 pub const DEFAULT_TOLERANCE: f64 = 1e-8;
@@ -23,13 +26,15 @@ pub const MAX_STATE: f64 = 1e100;
 /// add up steps in their own way and are off by a few ulps.
 const TIME_SLACK: f64 = 1e-9;
 
-/// An instance of an FMU.
+/// An instance of an FMU, for hosts that speak a version of FMI.
 ///
 /// Cloning it is saving its state: there is nothing else to an instance.
 #[derive(Debug)]
-pub struct Instance<M: Model> {
-    version: Version,
+pub struct Instance<M: Model, V: Version> {
+    version: PhantomData<V>,
     pub(crate) interface: Interface,
+    /// Who handles events.
+    pub(crate) events: Events,
     pub(crate) state: InstanceState,
     pub(crate) start: f64,
     pub(crate) stop: Option<f64>,
@@ -53,7 +58,7 @@ pub struct Instance<M: Model> {
     scratch: [Vec<f64>; 2],
 }
 
-/// What fmi2NewDiscreteStates tells.
+/// What is to be known of an event that has been handled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EventInfo {
     /// The FMU has changed continuous states.
@@ -63,7 +68,7 @@ pub struct EventInfo {
 }
 
 // Derived, the second would take memory anew.
-impl<M: Model> Clone for Instance<M> {
+impl<M: Model, V: Version> Clone for Instance<M, V> {
     fn clone(&self) -> Self {
         Instance {
             parameters: self.parameters.clone(),
@@ -84,13 +89,14 @@ impl<M: Model> Clone for Instance<M> {
     }
 }
 
-impl<M: Model> Instance<M> {
-    /// As fmi2Instantiate leaves it.
-    pub fn new(version: Version, interface: Interface) -> Self {
+impl<M: Model, V: Version> Instance<M, V> {
+    /// Just made.
+    pub fn new(interface: Interface) -> Self {
         let states = M::table().derivatives().len();
         Instance {
-            version,
+            version: PhantomData,
             interface,
+            events: V::events(interface),
             state: InstanceState::Instantiated,
             start: 0.0,
             stop: None,
@@ -111,11 +117,10 @@ impl<M: Model> Instance<M> {
         self.interface
     }
 
-    /// The call of an operation in this instance's version of FMI, if it is allowed now.
+    /// Whether a call is allowed now.
     #[inline]
-    pub fn check(&self, operation: &'static Operation) -> Result<Call, Fault> {
-        let call = operation.call(self.version);
-        call.check(self.interface, self.state)?;
+    pub fn check(&self, call: &'static Call) -> Result<&'static Call, Fault> {
+        call.check(self.interface, self.events, self.state)?;
         Ok(call)
     }
 
@@ -134,14 +139,14 @@ impl<M: Model> Instance<M> {
         self.state = InstanceState::Fatal;
     }
 
-    /// fmi2SetupExperiment: `None` where the host defines nothing.
+    /// Tolerance and times: `None` where the host defines nothing.
     pub fn setup_experiment(
         &mut self,
         tolerance: Option<f64>,
         start: f64,
         stop: Option<f64>,
     ) -> Result<(), Fault> {
-        let call = &self.check(&op::SETUP_EXPERIMENT)?;
+        let call = self.check(V::SETUP_EXPERIMENT)?;
         let mut problems = Vec::new();
         if !is_finite(start) {
             problems.push(format!("startTime = {} (allowed: any finite number)", text(start)));
@@ -169,30 +174,31 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// fmi2EnterInitializationMode
+    /// From here on all variables can be read.
     pub fn enter_initialization_mode(&mut self) -> Result<(), Fault> {
-        self.check(&op::ENTER_INITIALIZATION)?;
+        self.check(V::ENTER_INITIALIZATION)?;
         self.state = InstanceState::Initialization;
         Ok(())
     }
 
-    /// fmi2ExitInitializationMode: here at the latest bad parameters come up.
+    /// The motion can begin: here at the latest bad parameters come up.
     pub fn exit_initialization_mode(&mut self) -> Result<(), Fault> {
-        let call = &self.check(&op::EXIT_INITIALIZATION)?;
+        let call = self.check(V::EXIT_INITIALIZATION)?;
         self.outputs(call)?;
-        self.state = match self.interface {
-            Interface::CoSimulation => InstanceState::Stepping,
-            Interface::ModelExchange => InstanceState::Initialized,
+        self.state = match self.events {
+            Events::InStep => InstanceState::Stepping,
+            Events::ByHost => InstanceState::Initialized,
         };
         Ok(())
     }
 
     /// What there is to be warned of, see [`Model::warnings`].
     pub fn warnings(&self) -> Vec<String> {
-        self.model_parameters().map_or(Vec::new(), |p| M::warnings(&p, &self.inputs))
+        let of = |model: &M| model.warnings(&self.given_parameters(), &self.inputs);
+        self.model.as_ref().map_or(Vec::new(), of)
     }
 
-    /// Model Exchange goes on from initialization: parameters are what they are now.
+    /// The host goes on from initialization: parameters are what they are now.
     fn leave_initialized(&mut self, call: &Call) -> Result<(), Fault> {
         if self.state == InstanceState::Initialized {
             self.model(call)?;
@@ -201,31 +207,31 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// fmi2Terminate
+    /// Ends the simulation.
     pub fn terminate(&mut self) -> Result<(), Fault> {
-        let call = &self.check(&op::TERMINATE)?;
+        let call = self.check(V::TERMINATE)?;
         self.leave_initialized(call)?;
         self.state = InstanceState::Terminated;
         Ok(())
     }
 
-    /// fmi2Reset: as new.
+    /// As new.
     pub fn reset(&mut self) -> Result<(), Fault> {
-        self.check(&op::RESET)?;
-        *self = Instance::new(self.version, self.interface);
+        self.check(V::RESET)?;
+        *self = Instance::new(self.interface);
         Ok(())
     }
 
-    /// fmi2GetReal and its kin: one value.
-    pub fn get(&mut self, operation: &'static Operation, reference: u32) -> Result<Value, Fault> {
-        let call = &self.check(operation)?;
+    /// One value, by one of the version's calls.
+    pub fn get(&mut self, call: &'static Call, reference: u32) -> Result<Value, Fault> {
+        let call = self.check(call)?;
         self.value(call, reference)
     }
 
     /// One value, for a call that [`Instance::check`] allows.
     #[inline(always)]
     pub fn value(&mut self, call: &Call, reference: u32) -> Result<Value, Fault> {
-        let scalar = scalar::<M>(call, reference)?;
+        let scalar = scalar::<M, V>(call, reference)?;
         // A state is never looked up among the outputs.
         match (scalar.state, scalar.access, &self.model, &self.outputs) {
             (Some(place), _, Some(model), _) => {
@@ -282,15 +288,15 @@ impl<M: Model> Instance<M> {
         })
     }
 
-    /// fmi2SetReal and its kin: all of the values, or none.
+    /// Sets all of the values, or none, by one of the version's calls.
     #[inline]
     pub fn set(
         &mut self,
-        operation: &'static Operation,
+        call: &'static Call,
         references: &[u32],
         value: impl Fn(usize) -> Value,
     ) -> Result<(), Fault> {
-        let call = &self.check(operation)?;
+        let call = self.check(call)?;
         if let [reference] = references {
             let scalar = self.check_set(call, *reference, value(0))?;
             if matches!(scalar.access, Access::Input(_)) {
@@ -307,7 +313,7 @@ impl<M: Model> Instance<M> {
             self.tune(call, references, &value)?;
         }
         for (n, reference) in references.iter().enumerate() {
-            self.put(scalar::<M>(call, *reference)?, value(n));
+            self.put(scalar::<M, V>(call, *reference)?, value(n));
         }
         Ok(())
     }
@@ -350,7 +356,7 @@ impl<M: Model> Instance<M> {
         reference: u32,
         value: Value,
     ) -> Result<&'static Scalar<M>, Fault> {
-        let scalar = scalar::<M>(call, reference)?;
+        let scalar = scalar::<M, V>(call, reference)?;
         let is_input = matches!(scalar.access, Access::Input(_));
         // Wrong parameters are refused all together when initialization ends, everything
         // else on the spot.
@@ -402,7 +408,7 @@ impl<M: Model> Instance<M> {
         // All of them are in their ranges: so it was when the motion began, and since.
         let mut parameters = self.given_parameters();
         for (n, reference) in references.iter().enumerate() {
-            let scalar = scalar::<M>(call, *reference)?;
+            let scalar = scalar::<M, V>(call, *reference)?;
             scalar.variable.set_parameter(&mut parameters, scalar.element, value(n));
         }
         let inputs = self.inputs;
@@ -411,20 +417,20 @@ impl<M: Model> Instance<M> {
             .map_err(|problems| call.error(problems.join("; ")))
     }
 
-    /// fmi2SetRealInputDerivatives: the slope holds for the next step only.
+    /// Slopes of inputs: they hold for the next step only.
     pub fn set_input_derivatives(
         &mut self,
         references: &[u32],
         orders: &[i32],
         values: &[f64],
     ) -> Result<(), Fault> {
-        let call = &self.check(&op::SET_INPUT_DERIVATIVES)?;
+        let call = self.check(V::SET_INPUT_DERIVATIVES)?;
         for ((reference, order), slope) in references.iter().zip(orders).zip(values) {
-            check_slope(call, scalar::<M>(call, *reference)?, *order, *slope)?;
+            check_slope(call, scalar::<M, V>(call, *reference)?, *order, *slope)?;
         }
         self.drop_past_slopes();
         for (reference, slope) in references.iter().zip(values) {
-            let scalar = scalar::<M>(call, *reference)?;
+            let scalar = scalar::<M, V>(call, *reference)?;
             if let Access::Input(ramp) = scalar.access {
                 *ramp(&mut self.inputs, scalar.element)[1] = *slope;
                 self.sloped = true;
@@ -433,7 +439,7 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// fmi2GetRealOutputDerivatives: time derivatives of variables, the inputs
+    /// Time derivatives of variables, the inputs
     /// running along the slopes that are set for the next step.
     pub fn output_derivatives(
         &mut self,
@@ -441,9 +447,9 @@ impl<M: Model> Instance<M> {
         orders: &[i32],
         answers: &mut [f64],
     ) -> Result<(), Fault> {
-        let call = &self.check(&op::GET_OUTPUT_DERIVATIVES)?;
+        let call = self.check(V::GET_OUTPUT_DERIVATIVES)?;
         for (reference, order) in references.iter().zip(orders) {
-            check_order(call, scalar::<M>(call, *reference)?, *order)?;
+            check_order(call, scalar::<M, V>(call, *reference)?, *order)?;
         }
         let (inputs, past_slopes) = (self.inputs, self.past_slopes);
         self.drop_past_slopes();
@@ -467,7 +473,7 @@ impl<M: Model> Instance<M> {
         self.derivatives_along(call, references, &along, answers)
     }
 
-    /// fmi2GetDirectionalDerivative: the derivative of the unknowns in a direction of the
+    /// The derivative of the unknowns in a direction of the
     /// knowns. Knowns are inputs and continuous states; in initialization mode, where
     /// the motion's start is still to be found, inputs and real parameters.
     pub fn directional_derivative(
@@ -477,7 +483,7 @@ impl<M: Model> Instance<M> {
         direction: &[f64],
         answers: &mut [f64],
     ) -> Result<(), Fault> {
-        let call = &self.check(&op::DIRECTIONAL_DERIVATIVE)?;
+        let call = self.check(V::DIRECTIONAL_DERIVATIVE)?;
         if self.state == InstanceState::Initialization {
             return self.initial_derivative(call, unknowns, (knowns, direction), answers);
         }
@@ -489,7 +495,7 @@ impl<M: Model> Instance<M> {
         }
         self.scratch[0].fill(0.0);
         for (reference, d) in knowns.iter().zip(direction) {
-            let scalar = scalar::<M>(call, *reference)?;
+            let scalar = scalar::<M, V>(call, *reference)?;
             check_direction(call, scalar, *d)?;
             match (scalar.access, scalar.state()) {
                 (Access::Input(ramp), _) => *ramp(&mut along, scalar.element)[1] += d,
@@ -520,7 +526,7 @@ impl<M: Model> Instance<M> {
         });
         let done = found.and_then(|outputs| {
             for (reference, answer) in unknowns.iter().zip(answers) {
-                let scalar = scalar::<M>(call, *reference)?;
+                let scalar = scalar::<M, V>(call, *reference)?;
                 *answer = match (scalar.access, scalar.state()) {
                     (Access::Derivative(place), _) => dx_dot[place(scalar.element)],
                     (_, Some(place)) => dx[place],
@@ -554,7 +560,7 @@ impl<M: Model> Instance<M> {
         let mut start = Vec::with_capacity(knowns.len());
         let mut size: f64 = 0.0;
         for (reference, d) in knowns.iter().zip(direction) {
-            let scalar = scalar::<M>(call, *reference)?;
+            let scalar = scalar::<M, V>(call, *reference)?;
             check_direction(call, scalar, *d)?;
             let known = [Causality::Input, Causality::Parameter];
             let value = match self.clone().get_any(call, scalar)? {
@@ -575,10 +581,10 @@ impl<M: Model> Instance<M> {
         let at = |s: f64| -> Result<Vec<f64>, Fault> {
             let mut moved = self.clone();
             for ((reference, x), d) in knowns.iter().zip(&start).zip(direction) {
-                moved.put(scalar::<M>(call, *reference)?, Value::Real(x + s * step * d));
+                moved.put(scalar::<M, V>(call, *reference)?, Value::Real(x + s * step * d));
             }
             let values = unknowns.iter().map(|reference| {
-                match moved.get_any(call, scalar::<M>(call, *reference)?)? {
+                match moved.get_any(call, scalar::<M, V>(call, *reference)?)? {
                     Value::Real(x) => Ok(x),
                     _ => Err(call.error("wrong type")),
                 }
@@ -592,9 +598,9 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// fmi2DoStep: from `at` on by `h`. Does not allocate unless it fails.
+    /// A step from `at` on by `h`. Does not allocate unless it fails.
     pub fn do_step(&mut self, at: f64, h: f64) -> Result<(), Fault> {
-        let call = &self.check(&op::DO_STEP)?;
+        let call = self.check(V::DO_STEP)?;
         if !(is_finite(h) && h > 0.0) {
             return Err(call.error(format_args!(
                 "communicationStepSize = {} s (allowed: greater than 0, finite)",
@@ -674,20 +680,20 @@ impl<M: Model> Instance<M> {
         }
     }
 
-    // ---- Model Exchange ----
+    // ---- Events and continuous time, by the host ----
 
-    /// fmi2EnterEventMode
+    /// At an event.
     pub fn enter_event_mode(&mut self) -> Result<(), Fault> {
-        let call = &self.check(&op::ENTER_EVENT)?;
+        let call = self.check(V::ENTER_EVENT)?;
         self.leave_initialized(call)?;
         self.state = InstanceState::Event;
         Ok(())
     }
 
-    /// fmi2NewDiscreteStates: everything that is due now. Once is enough; calling it
+    /// Does everything that is due now. Once is enough; calling it
     /// again, after other inputs, does no harm.
     pub fn new_discrete_states(&mut self) -> Result<EventInfo, Fault> {
-        let call = &self.check(&op::NEW_DISCRETE_STATES)?;
+        let call = self.check(V::NEW_DISCRETE_STATES)?;
         let event = self.query(call, |model, inputs| model.handle_event(inputs))?;
         let states_changed = event.map_err(|why| call.error(why))?;
         self.state = InstanceState::Event;
@@ -695,17 +701,17 @@ impl<M: Model> Instance<M> {
         Ok(EventInfo { states_changed, next_time: self.model(call)?.next_time_event() })
     }
 
-    /// fmi2EnterContinuousTimeMode
+    /// Between events.
     pub fn enter_continuous_time_mode(&mut self) -> Result<(), Fault> {
-        let call = &self.check(&op::ENTER_CONTINUOUS_TIME)?;
+        let call = self.check(V::ENTER_CONTINUOUS_TIME)?;
         self.leave_initialized(call)?;
         self.state = InstanceState::Continuous;
         Ok(())
     }
 
-    /// fmi2CompletedIntegratorStep: whether an event has to be handled now.
+    /// The host has accepted a step: whether an event has to be handled now.
     pub fn completed_integrator_step(&mut self) -> Result<bool, Fault> {
-        let call = &self.check(&op::COMPLETED_STEP)?;
+        let call = self.check(V::COMPLETED_STEP)?;
         let time = self.time;
         if let Some(stop) = self.stop
             && time > stop + TIME_SLACK * stop.abs().max(1.0)
@@ -722,9 +728,9 @@ impl<M: Model> Instance<M> {
         })
     }
 
-    /// fmi2SetTime
+    /// The present time.
     pub fn set_time(&mut self, time: f64) -> Result<(), Fault> {
-        let call = &self.check(&op::SET_TIME)?;
+        let call = self.check(V::SET_TIME)?;
         if !is_finite(time) {
             let time = text(time);
             return Err(call.error(format_args!("time = {time} s (allowed: any finite number)")));
@@ -736,10 +742,10 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// fmi2SetContinuousStates. States that are not finite, or whose squares and products may not be, are
+    /// The continuous states. Those that are not finite, or whose squares and products may not be, are
     /// discarded: the integrator should try a shorter step.
     pub fn set_continuous_states(&mut self, states: &[f64]) -> Result<(), Fault> {
-        let call = &self.check(&op::SET_CONTINUOUS_STATES)?;
+        let call = self.check(V::SET_CONTINUOUS_STATES)?;
         let places = M::table().places();
         check_length(call, "nx", states.len(), places.len())?;
         for (place, x) in places.zip(states) {
@@ -762,9 +768,9 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// fmi2GetContinuousStates
+    /// The continuous states, in the host's order.
     pub fn continuous_states(&mut self, states: &mut [f64]) -> Result<(), Fault> {
-        let call = &self.check(&op::GET_CONTINUOUS_STATES)?;
+        let call = self.check(V::GET_CONTINUOUS_STATES)?;
         let places = M::table().places();
         check_length(call, "nx", states.len(), places.len())?;
         let all = self.model(call)?.continuous_states();
@@ -774,9 +780,9 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// fmi2GetDerivatives. NaN and infinity are discarded, as above.
+    /// The states' derivatives. NaN and infinity are discarded, as above.
     pub fn derivatives(&mut self, derivatives: &mut [f64]) -> Result<(), Fault> {
-        let call = &self.check(&op::GET_DERIVATIVES)?;
+        let call = self.check(V::GET_DERIVATIVES)?;
         let places = M::table().places();
         check_length(call, "nx", derivatives.len(), places.len())?;
         let mut x_dot = std::mem::take(&mut self.scratch[0]);
@@ -794,16 +800,16 @@ impl<M: Model> Instance<M> {
         Ok(())
     }
 
-    /// fmi2GetEventIndicators
+    /// Functions that cross zero at events.
     pub fn event_indicators(&mut self, indicators: &mut [f64]) -> Result<(), Fault> {
-        let call = &self.check(&op::GET_EVENT_INDICATORS)?;
+        let call = self.check(V::GET_EVENT_INDICATORS)?;
         check_length(call, "ni", indicators.len(), M::table().about.event_indicators)?;
         self.query(call, |model, inputs| model.event_indicators(inputs, indicators))
     }
 
-    /// fmi2GetNominalsOfContinuousStates
+    /// The states' orders of magnitude.
     pub fn nominals(&self, nominals: &mut [f64]) -> Result<(), Fault> {
-        let call = &self.check(&op::GET_NOMINALS)?;
+        let call = self.check(V::GET_NOMINALS)?;
         let places = M::table().places();
         check_length(call, "nx", nominals.len(), places.len())?;
         for (place, x) in places.zip(nominals) {
@@ -814,9 +820,9 @@ impl<M: Model> Instance<M> {
 
     // ---- Saved states and what is behind it all ----
 
-    /// fmi2SetFMUstate
-    pub fn restore(&mut self, saved: &Instance<M>) -> Result<(), Fault> {
-        let call = &self.check(&op::SET_FMU_STATE)?;
+    /// Takes a saved state.
+    pub fn restore(&mut self, saved: &Self) -> Result<(), Fault> {
+        let call = self.check(V::SET_STATE)?;
         if saved.interface != self.interface {
             return Err(call.error(format_args!(
                 "the state is of an instance for {}, and this one is for {}",
@@ -884,10 +890,10 @@ impl<M: Model> Instance<M> {
         question: impl FnOnce(&mut M, &M::Inputs) -> T,
     ) -> Result<T, Fault> {
         self.model(call)?;
-        let Instance { interface, model: Some(model), inputs, .. } = self else {
+        let Instance { events, model: Some(model), inputs, .. } = self else {
             return Err(call.error("the instance was never initialised"));
         };
-        Ok(answer(*interface, model, inputs, question))
+        Ok(answer(*events, model, inputs, question))
     }
 
     /// What there is to be warned of in how the host drives the model, see [`Model::step_warning`].
@@ -907,23 +913,23 @@ impl<M: Model> Instance<M> {
     }
 }
 
-/// What the model answers to a question: in Co-Simulation as the present inputs leave it; in Model
-/// Exchange, where discrete changes happen at events alone, as it is.
+/// What the model answers to a question: as the present inputs leave it, where it handles events
+/// itself; where the host does, as it is.
 #[inline(always)]
 fn answer<M: Model, T>(
-    interface: Interface,
+    events: Events,
     model: &mut M,
     inputs: &M::Inputs,
     question: impl FnOnce(&mut M, &M::Inputs) -> T,
 ) -> T {
-    match interface {
-        Interface::CoSimulation => {
+    match events {
+        Events::InStep => {
             let before = model.apply_present_inputs(inputs);
             let answer = question(model, inputs);
             model.revert(before);
             answer
         }
-        Interface::ModelExchange => question(model, inputs),
+        Events::ByHost => question(model, inputs),
     }
 }
 
@@ -992,24 +998,6 @@ fn check_length(call: &Call, name: &str, given: usize, needed: usize) -> Result<
 
 /// The variable of a value reference, if it has the type that the call is for.
 #[inline]
-fn scalar<M: Model>(call: &Call, reference: u32) -> Result<&'static Scalar<M>, Fault> {
-    match M::table().scalars.get(reference as usize) {
-        Some(scalar) if call.c_type() == Some(scalar.c_type) => Ok(scalar),
-        other => Err(wrong_reference(call, reference, other)),
-    }
-}
-
-#[cold]
-fn wrong_reference<M: Model>(call: &Call, reference: u32, found: Option<&Scalar<M>>) -> Fault {
-    match found {
-        Some(scalar) => call.error(format_args!(
-            "{} (value reference {reference}) is of type {:?}",
-            scalar.name(),
-            scalar.c_type
-        )),
-        None => call.error(format_args!(
-            "no variable has the value reference {reference}; the last one is {}",
-            M::table().scalars.len() - 1
-        )),
-    }
+fn scalar<M: Model, V: Version>(call: &Call, reference: u32) -> Result<&'static Scalar<M>, Fault> {
+    V::scalar(reference, call.c_type).map_err(|why| call.error(why))
 }

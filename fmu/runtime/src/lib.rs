@@ -1,24 +1,27 @@
 //! What every FMU of the project shares. It knows FMI and no physics; a model knows its physics
 //! and no FMI. They meet in one trait, [`Model`].
 //!
-//! [`variable`] and [`table`] say what a model's variables are, [`operation`] which call is
-//! allowed in which state, [`instance`] what the calls do, [`snapshot`] how a state is saved,
-//! [`log`] what is told to the host. Each version of FMI's C interface is one file ([`v2`]); these
-//! files hold the only unsafe code.
+//! [`variable`] and [`table`] say what a model's variables are, [`call`] when a call is allowed,
+//! [`instance`] what the calls do, [`snapshot`] how a state is saved, [`log`] what is told to the
+//! host. What differs between the versions of FMI is the trait [`version::Version`]; each is one file
+//! ([`v2`]), with its C interface on top of what they share ([`c_abi`]): these hold the only unsafe
+//! code.
 //!
 //! An FMU is a crate with a table, an implementation of [`Model`] and one line:
 //! `runtime::export_fmi2!(TheModel);`.
 
+pub mod c_abi;
+pub mod call;
 pub mod hash;
 pub mod instance;
 pub mod log;
 pub mod model;
-pub mod operation;
 pub mod snapshot;
 pub mod table;
 pub mod unit;
 pub mod v2;
 pub mod variable;
+pub mod version;
 
 pub use model::Model;
 

@@ -2,14 +2,15 @@
 //!
 //! Calls that fail, what to be warned of when the motion begins, and, for those who ask, the
 //! model's events. A host that asks for
-//! nothing gets no chatter: `loggingOn` of fmi2Instantiate switches nothing, because
+//! nothing gets no chatter: `loggingOn` of a new instance switches nothing, because
 //! failures are reported either way (a status without a reason helps nobody) and
-//! events only on an explicit wish. fmi2SetDebugLogging is one and is obeyed: off means
+//! events only on an explicit wish. Setting the debug logging is one and is obeyed: off means
 //! silence, and no category named means all.
 
+use crate::call::Severity;
 use crate::model::Model;
-use crate::operation::Severity;
 use crate::table::Table;
+use crate::version::Version;
 
 /// What a message is about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,57 +24,50 @@ pub enum Topic {
 }
 
 /// A log category of the model description.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Category {
     /// As hosts name it.
     pub name: &'static str,
     /// What it holds.
-    pub description: &'static str,
+    pub description: String,
     /// What it is for; `None` stands for everything.
     pub topic: Option<Topic>,
 }
 
-const FAILURES: [Category; 5] = [
-    Category {
-        name: "logStatusWarning",
-        description: "What the parameters leave of the range in which the model is known",
-        topic: Some(Topic::Warning),
-    },
-    Category {
-        name: "logStatusDiscard",
-        description: "Why a call returned fmi2Discard",
-        topic: Some(Topic::Failure(Severity::Discard)),
-    },
-    Category {
-        name: "logStatusError",
-        description: "Why a call returned fmi2Error",
-        topic: Some(Topic::Failure(Severity::Error)),
-    },
-    Category {
-        name: "logStatusFatal",
-        description: "Why a call returned fmi2Fatal",
-        topic: Some(Topic::Failure(Severity::Fatal)),
-    },
-    Category { name: "logAll", description: "All of the above", topic: None },
+/// The categories' names, which the standard gives, with their topics.
+const NAMES: [(&str, Option<Topic>); 6] = [
+    ("logEvents", Some(Topic::Event)),
+    ("logStatusWarning", Some(Topic::Warning)),
+    ("logStatusDiscard", Some(Topic::Failure(Severity::Discard))),
+    ("logStatusError", Some(Topic::Failure(Severity::Error))),
+    ("logStatusFatal", Some(Topic::Failure(Severity::Fatal))),
+    ("logAll", None),
 ];
-const EVENTS: &str = "logEvents";
 
-/// All categories of a model.
-pub fn categories<M: Model>(table: &Table<M>) -> Vec<Category> {
-    let events =
-        Category { name: EVENTS, description: table.about.events, topic: Some(Topic::Event) };
-    let has_events = !table.about.events.is_empty();
-    has_events.then_some(events).into_iter().chain(FAILURES).collect()
+/// The categories of a model.
+fn names_of<M: Model>(table: &Table<M>) -> &'static [(&'static str, Option<Topic>)] {
+    if table.about.events.is_empty() { &NAMES[1..] } else { &NAMES }
+}
+
+/// The categories of a model as a version of FMI describes them.
+pub fn categories<M: Model, V: Version>(table: &Table<M>) -> Vec<Category> {
+    let description = |topic| match topic {
+        Some(Topic::Event) => table.about.events.into(),
+        Some(Topic::Warning) => {
+            "What the parameters leave of the range in which the model is known".into()
+        }
+        Some(Topic::Failure(severity)) => {
+            format!("Why a call returned {}{severity:?}", V::PREFIX)
+        }
+        None => "All of the above".into(),
+    };
+    let all = names_of(table).iter();
+    all.map(|&(name, topic)| Category { name, description: description(topic), topic }).collect()
 }
 
 /// The category of messages on this topic.
 pub fn category(topic: Topic) -> &'static str {
-    match topic {
-        Topic::Event => EVENTS,
-        Topic::Warning | Topic::Failure(_) => {
-            FAILURES.iter().find(|c| c.topic == Some(topic)).map_or("logAll", |c| c.name)
-        }
-    }
+    NAMES.iter().find(|(_, of)| *of == Some(topic)).map_or("logAll", |(name, _)| name)
 }
 
 /// What one instance logs.
@@ -99,14 +93,14 @@ impl Filter {
     /// Only these categories; none given means all. Unknown names are an error
     /// that lists them and the known ones.
     pub fn of<M: Model>(names: &[String], table: &Table<M>) -> Result<Filter, String> {
-        let categories = categories(table);
+        let known = names_of(table);
         if names.is_empty() {
             return Ok(Filter::ALL);
         }
         let mut filter = Filter::NONE;
         let mut unknown = Vec::new();
         for name in names {
-            match categories.iter().find(|c| c.name == name).map(|c| c.topic) {
+            match known.iter().find(|(known, _)| known == name).map(|(_, topic)| *topic) {
                 Some(None) => filter = Filter::ALL,
                 Some(Some(topic)) => *filter.switch(topic) = true,
                 None => unknown.push(format!("\"{name}\"")),
@@ -115,7 +109,7 @@ impl Filter {
         if unknown.is_empty() {
             return Ok(filter);
         }
-        let known: Vec<_> = categories.iter().map(|c| c.name).collect();
+        let known: Vec<_> = known.iter().map(|(name, _)| *name).collect();
         Err(format!("unknown log category {}; known: {}", unknown.join(", "), known.join(", ")))
     }
 

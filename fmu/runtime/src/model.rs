@@ -36,9 +36,9 @@ pub trait Model: Clone + Debug + Sized + 'static {
         tolerance: f64,
     ) -> Result<Self, Vec<String>>;
 
-    /// What parameters and inputs at the start leave of the range in which the model is known, one
-    /// sentence each.
-    fn warnings(parameters: &Self::Parameters, inputs: &Self::Inputs) -> Vec<String> {
+    /// What its parameters and the inputs at the start leave of the range in which the model is known,
+    /// one sentence each.
+    fn warnings(&self, parameters: &Self::Parameters, inputs: &Self::Inputs) -> Vec<String> {
         let _ = (parameters, inputs);
         Vec::new()
     }
@@ -87,9 +87,9 @@ pub trait Model: Clone + Debug + Sized + 'static {
         dx_dot: &mut [f64],
     ) -> Self::Outputs;
 
-    /// In Co-Simulation: changes what the present inputs change at once of what is discrete, before
-    /// the model is looked at; what is returned goes to [`Model::revert`] afterwards. In Model
-    /// Exchange discrete changes happen at events alone, and neither is called.
+    /// Changes what the present inputs change at once of what is discrete, before the model is looked
+    /// at; what is returned goes to [`Model::revert`] afterwards. Where the host handles events,
+    /// discrete changes happen there alone, and neither is called.
     fn apply_present_inputs(&mut self, inputs: &Self::Inputs) -> Self::Discrete {
         let _ = inputs;
         Self::Discrete::default()

@@ -9,7 +9,7 @@
 //! | version of this format | 4 |
 //! | length of the whole | 4 |
 //! | GUID of the variable table | 38 |
-//! | instance state, flags (1: stop time, 2: model, 4: slopes) | 1 + 1 |
+//! | instance state, flags (1: stop time, 2: model, 4: slopes, 8: slopes of the step before) | 1 + 1 |
 //! | interface, 0 | 1 + 1 |
 //! | start, stop, tolerance, time | 4 x 8 |
 //! | parameters in the table's order: number, or 0/1 | 8 each |
@@ -19,12 +19,13 @@
 //!
 //! Everything else about a model follows from its parameters.
 
+use crate::call::{InstanceState, Interface};
 use crate::hash::Hash;
 use crate::instance::{Instance, TOLERANCES};
 use crate::model::Model;
-use crate::operation::{InstanceState, Interface, Version};
 use crate::table::Scalar;
 use crate::variable::{Access, Value};
+use crate::version::Version;
 
 const MAGIC: &[u8; 8] = b"FMUstate";
 const FORMAT: u32 = 3;
@@ -42,7 +43,7 @@ pub fn size<M: Model>() -> usize {
 }
 
 /// A state as bytes.
-pub fn to_bytes<M: Model>(saved: &Instance<M>) -> Vec<u8> {
+pub fn to_bytes<M: Model, V: Version>(saved: &Instance<M, V>) -> Vec<u8> {
     let (table, size) = (M::table(), size::<M>());
     let mut bytes = Vec::with_capacity(size);
     bytes.extend(MAGIC);
@@ -86,8 +87,8 @@ pub fn to_bytes<M: Model>(saved: &Instance<M>) -> Vec<u8> {
     bytes
 }
 
-/// The state that the bytes hold, for an instance of a version of FMI, or why they hold none.
-pub fn from_bytes<M: Model>(version: Version, bytes: &[u8]) -> Result<Instance<M>, String> {
+/// The state that the bytes hold, or why they hold none.
+pub fn from_bytes<M: Model, V: Version>(bytes: &[u8]) -> Result<Instance<M, V>, String> {
     let (table, size) = (M::table(), size::<M>());
     let model = table.about.model;
     let mut rest = Reader(bytes);
@@ -123,12 +124,11 @@ pub fn from_bytes<M: Model>(version: Version, bytes: &[u8]) -> Result<Instance<M
         1 => Interface::CoSimulation,
         _ => return Err("the saved state is damaged: no such interface".into()),
     };
-    let possible = |s: &InstanceState| {
-        *s != InstanceState::Fatal && s.only_in().is_none_or(|only| only == interface)
-    };
+    let mut saved = Instance::new(interface);
+    let possible =
+        |s: &InstanceState| *s != InstanceState::Fatal && s.is_reachable(interface, saved.events);
     let state = InstanceState::ALL.get(usize::from(state)).copied().filter(possible);
     let state = state.ok_or("the saved state is damaged: no such instance state")?;
-    let mut saved = Instance::new(version, interface);
     saved.state = state;
     saved.sloped = flags & HAS_SLOPES != 0;
     saved.past_slopes = flags & HAS_PAST_SLOPES != 0;

@@ -5,9 +5,9 @@
 
 use std::sync::OnceLock;
 
+use crate::call::CType;
 use crate::hash::Hash;
 use crate::model::Model;
-use crate::operation::CType;
 use crate::unit::{self, Unit};
 use crate::variable::{Access, Causality, Enumeration, Kind, Place, Value, Variable};
 
@@ -36,7 +36,7 @@ pub struct Table<M: Model> {
     pub about: About,
     /// The variables.
     pub variables: &'static [Variable<M>],
-    /// Every scalar; the place is its value reference. Made by [`scalars`].
+    /// Every scalar. Made by [`scalars`].
     pub scalars: &'static [Scalar<M>],
     inputs: Span,
     parameters: Span,
@@ -85,8 +85,9 @@ pub struct Scalar<M: Model> {
     pub c_type: CType,
     /// Its place among the model's continuous states, if it is one, likewise.
     pub state: Option<Place>,
-    /// Its value reference, and its place among all scalars.
-    pub reference: u32,
+    /// Its place among all scalars, from which its value reference follows (see
+    /// [`Version`](crate::version::Version)).
+    pub index: u32,
     /// Its place in the array, 0 for the first.
     pub element: usize,
     /// How many scalar parameters come before it.
@@ -120,7 +121,7 @@ pub const fn scalars<M: Model, const N: usize>(
         access: variables[0].access,
         c_type: variables[0].c_type(),
         state: variables[0].state,
-        reference: 0,
+        index: 0,
         element: 0,
         slot: 0,
     };
@@ -135,7 +136,7 @@ pub const fn scalars<M: Model, const N: usize>(
                 access: variable.access,
                 c_type: variable.c_type(),
                 state: variable.state,
-                reference: n as u32,
+                index: n as u32,
                 element,
                 slot,
             };
@@ -228,7 +229,7 @@ impl<M: Model> Table<M> {
         }
     }
 
-    /// The value reference of a name.
+    /// The index of a scalar's name, which is its value reference in FMI 2.0.
     pub fn find(&self, name: &str) -> Option<u32> {
         self.scalars.iter().position(|s| s.name() == name).map(|n| n as u32)
     }

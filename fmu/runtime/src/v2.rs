@@ -1,10 +1,8 @@
-//! The C interface of FMI 2.0, Model Exchange and Co-Simulation: 44 functions.
+//! FMI 2.0, Model Exchange and Co-Simulation: 44 functions, their names, signatures and numbers.
 //!
 //! Every function is generic in the model; [`crate::export_fmi2`] exports them for one model under
-//! their names. Every function catches panics; one that happens poisons the instance and is
-//! told to the logger. Pointers may be NULL wherever the standard does not
-//! forbid it, and mostly where it does. What the functions mean is in
-//! [`crate::instance`] and [`crate::snapshot`]; here is only how C says it.
+//! their names. What the functions mean is in [`crate::instance`] and [`crate::snapshot`], what C
+//! asks for in any version in [`crate::c_abi`].
 
 #![allow(unsafe_code)]
 // The names are the standard's.
@@ -14,19 +12,23 @@
 // strings end with NUL.
 #![allow(clippy::missing_safety_doc)]
 
-use std::any::Any;
-use std::ffi::{CStr, CString, c_char, c_int, c_uint, c_void};
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::ffi::{c_char, c_int, c_uint, c_void};
+use std::panic::catch_unwind;
 use std::ptr;
 
-use crate::instance::Instance;
-use crate::log::{Filter, Topic, category};
-use crate::model::Model;
-use crate::operation::{
-    self as op, Call, Fault, InstanceState, Interface, Operation, Severity, Version,
+use crate::c_abi::{
+    self, Log, Logger, array, array_mut, c_string, free_component, free_state, new_component,
+    new_state, null, on, on_start, place, saved_state, text,
 };
+use crate::call::states::*;
+use crate::call::{CType, Call, Events, Fault, InstanceState, Interface, Severity};
+use crate::instance::Instance;
+use crate::log::Filter;
+use crate::model::Model;
 use crate::snapshot;
+use crate::table::Scalar;
 use crate::variable::Value;
+use crate::version::Version;
 
 /// An instance, opaque to the host.
 pub type fmi2Component = *mut c_void;
@@ -50,17 +52,17 @@ pub type fmi2String = *const fmi2Char;
 pub type fmi2Byte = c_char;
 
 /// What a call returns.
-pub type fmi2Status = c_int;
+pub type fmi2Status = c_abi::Status;
 /// All is well.
-pub const fmi2OK: fmi2Status = 0;
+pub const fmi2OK: fmi2Status = c_abi::OK;
 /// Never returned.
-pub const fmi2Warning: fmi2Status = 1;
+pub const fmi2Warning: fmi2Status = c_abi::WARNING;
 /// The question has no answer.
-pub const fmi2Discard: fmi2Status = 2;
+pub const fmi2Discard: fmi2Status = c_abi::DISCARD;
 /// The call was refused or failed.
-pub const fmi2Error: fmi2Status = 3;
+pub const fmi2Error: fmi2Status = c_abi::ERROR;
 /// The instance is unusable.
-pub const fmi2Fatal: fmi2Status = 4;
+pub const fmi2Fatal: fmi2Status = c_abi::FATAL;
 /// Never returned.
 pub const fmi2Pending: fmi2Status = 5;
 
@@ -106,235 +108,123 @@ pub struct fmi2CallbackFunctions {
     pub componentEnvironment: fmi2ComponentEnvironment,
 }
 
-const FMI2: Version = Version::Fmi2;
+// ---- Which functions there are, and when each may be called ----
 
-/// Marks a live component, so that a wrong handle is an error and no crash.
-const COMPONENT: u64 = 0x4875_6253_6c6f_7368;
-/// Marks a live saved state.
-const STATE: u64 = 0x5374_6174_6548_7562;
-
-/// What a component handle points to.
-#[repr(C)]
-struct Component<M: Model> {
-    mark: u64,
-    instance: Instance<M>,
-    log: Log,
+const fn both(name: &'static str, allowed: u16) -> Call {
+    Call::new(name, allowed)
 }
 
-/// What a state handle points to.
-#[repr(C)]
-struct SavedState<M: Model> {
-    mark: u64,
-    instance: Instance<M>,
+const fn of(c_type: CType, name: &'static str, allowed: u16) -> Call {
+    Call::new(name, allowed).of(c_type)
 }
 
-/// The way to the host's logger.
-struct Log {
-    // Copied: the host's struct need not outlive fmi2Instantiate.
-    callbacks: fmi2CallbackFunctions,
-    instance_name: CString,
-    filter: Filter,
-    /// Whether the host was warned of how it drives the model: once is enough.
-    step_warned: bool,
+/// Of Co-Simulation.
+const fn cs(call: Call) -> Call {
+    call.only_in(Interface::CoSimulation)
 }
 
-impl Log {
-    fn report(&self, fault: &Fault) {
-        let topic = Topic::Failure(fault.severity);
-        if self.filter.wants(topic) {
-            self.write(status(fault.severity), topic, &fault.text);
+/// Of Model Exchange.
+const fn me(call: Call) -> Call {
+    call.only_in(Interface::ModelExchange)
+}
+
+/// The functions that one operation of an instance has several of, and those that are the C interface's own.
+#[allow(missing_docs)]
+#[rustfmt::skip]
+mod list {
+    use super::*;
+    pub static SET_DEBUG_LOGGING:   Call = both("fmi2SetDebugLogging", ANY);
+    // Parameters and inputs can be read from the start; everything else has a
+    // value from initialization mode on. Which variable can be set when is the
+    // variable's business.
+    pub static GET_REAL:            Call = of(CType::Real, "fmi2GetReal", ANY);
+    pub static GET_INTEGER:         Call = of(CType::Integer, "fmi2GetInteger", ANY);
+    pub static GET_BOOLEAN:         Call = of(CType::Boolean, "fmi2GetBoolean", ANY);
+    pub static GET_STRING:          Call = of(CType::String, "fmi2GetString", ANY);
+    pub static SET_REAL:            Call = of(CType::Real, "fmi2SetReal", I | M | S | E | C);
+    pub static SET_INTEGER:         Call = of(CType::Integer, "fmi2SetInteger", I | M | S | E | C);
+    pub static SET_BOOLEAN:         Call = of(CType::Boolean, "fmi2SetBoolean", I | M | S | E | C);
+    pub static SET_STRING:          Call = of(CType::String, "fmi2SetString", I | M | S | E | C);
+    pub static GET_STATE:           Call = both("fmi2GetFMUstate", ANY);
+    pub static FREE_STATE:          Call = both("fmi2FreeFMUstate", ANY | FATAL);
+    pub static SERIALIZED_SIZE:     Call = both("fmi2SerializedFMUstateSize", ANY);
+    pub static SERIALIZE:           Call = both("fmi2SerializeFMUstate", ANY);
+    pub static DESERIALIZE:         Call = both("fmi2DeSerializeFMUstate", ANY);
+    pub static CANCEL_STEP:         Call = cs(both("fmi2CancelStep", S));
+    pub static GET_STATUS:          Call = cs(both("fmi2GetStatus", ANY));
+    pub static GET_REAL_STATUS:     Call = cs(both("fmi2GetRealStatus", ANY));
+    pub static GET_INTEGER_STATUS:  Call = cs(both("fmi2GetIntegerStatus", ANY));
+    pub static GET_BOOLEAN_STATUS:  Call = cs(both("fmi2GetBooleanStatus", ANY));
+    pub static GET_STRING_STATUS:   Call = cs(both("fmi2GetStringStatus", ANY));
+}
+pub use list::*;
+
+/// FMI 2.0
+#[derive(Clone, Copy, Debug)]
+pub struct Fmi2;
+
+#[rustfmt::skip]
+impl Version for Fmi2 {
+    const PREFIX: &'static str = "fmi2";
+
+    const SETUP_EXPERIMENT:       &'static Call = &both("fmi2SetupExperiment", I);
+    const ENTER_INITIALIZATION:   &'static Call = &both("fmi2EnterInitializationMode", I);
+    const EXIT_INITIALIZATION:    &'static Call = &both("fmi2ExitInitializationMode", M);
+    const TERMINATE:              &'static Call = &both("fmi2Terminate", S | E | C | F);
+    const RESET:                  &'static Call = &both("fmi2Reset", ANY);
+    const SET_STATE:              &'static Call = &both("fmi2SetFMUstate", ANY);
+    const DIRECTIONAL_DERIVATIVE: &'static Call = &of(CType::Real, "fmi2GetDirectionalDerivative", M | RUN);
+
+    const SET_INPUT_DERIVATIVES:  &'static Call = &cs(of(CType::Real, "fmi2SetRealInputDerivatives", I | M | S));
+    const GET_OUTPUT_DERIVATIVES: &'static Call = &cs(of(CType::Real, "fmi2GetRealOutputDerivatives", RUN));
+    const DO_STEP:                &'static Call = &cs(both("fmi2DoStep", S));
+
+    // The standard has this in continuous-time mode alone; OpenModelica up to 1.27 calls it in
+    // the event mode after initialization too.
+    const ENTER_EVENT:            &'static Call = &me(both("fmi2EnterEventMode", E | C));
+    const NEW_DISCRETE_STATES:    &'static Call = &me(both("fmi2NewDiscreteStates", E));
+    const ENTER_CONTINUOUS_TIME:  &'static Call = &me(both("fmi2EnterContinuousTimeMode", E));
+    const COMPLETED_STEP:         &'static Call = &me(both("fmi2CompletedIntegratorStep", C));
+    const SET_TIME:               &'static Call = &me(both("fmi2SetTime", E | C));
+    // As above.
+    const SET_CONTINUOUS_STATES:  &'static Call = &me(both("fmi2SetContinuousStates", E | C));
+    const GET_DERIVATIVES:        &'static Call = &me(both("fmi2GetDerivatives", M | E | C | T | F));
+    const GET_EVENT_INDICATORS:   &'static Call = &me(both("fmi2GetEventIndicators", M | E | C | T | F));
+    const GET_CONTINUOUS_STATES:  &'static Call = &me(both("fmi2GetContinuousStates", M | E | C | T | F));
+    const GET_NOMINALS:           &'static Call = &me(both("fmi2GetNominalsOfContinuousStates", ANY));
+
+    fn events(interface: Interface) -> Events {
+        match interface {
+            Interface::ModelExchange => Events::ByHost,
+            Interface::CoSimulation => Events::InStep,
         }
     }
 
-    #[cold]
-    fn report_warnings<M: Model>(&self, instance: &Instance<M>) {
-        if self.filter.wants(Topic::Warning) {
-            for warning in instance.warnings() {
-                self.write(fmi2Warning, Topic::Warning, &warning);
-            }
-        }
+    fn reference<M: Model>(scalar: &Scalar<M>) -> u32 {
+        scalar.index
     }
 
-    /// Tells of the last event, if there was one since `before` were counted and if somebody wants
-    /// to know.
-    #[inline(always)]
-    fn report_event<M: Model>(
-        &self,
-        operation: &'static Operation,
-        before: i32,
-        now: &Instance<M>,
-    ) {
-        let events = now.event_count().wrapping_sub(before);
-        if events != 0 && self.filter.wants(Topic::Event) {
-            self.write_event(operation, events, &now.last_event());
-        }
-    }
-
-    #[cold]
-    fn write_event(&self, operation: &'static Operation, events: i32, last: &str) {
-        let many = match events {
-            1 => String::new(),
-            n => format!(", the last of {n} events in this call"),
-        };
-        let name = operation.call(FMI2).name();
-        self.write(fmi2OK, Topic::Event, &format!("{name}: {last}{many}"));
-    }
-
-    fn write(&self, status: fmi2Status, topic: Topic, text: &str) {
-        let Some(logger) = self.callbacks.logger else { return };
-        let category = c_string(category(topic));
-        let message = c_string(text);
-        // The text is an argument, not the format: it may contain a percent sign.
-        unsafe {
-            logger(
-                self.callbacks.componentEnvironment,
-                self.instance_name.as_ptr(),
-                status,
-                category.as_ptr(),
-                c"%s".as_ptr(),
-                message.as_ptr(),
-            );
+    #[inline]
+    fn scalar<M: Model>(reference: u32, c_type: Option<CType>) -> Result<&'static Scalar<M>, String> {
+        match M::table().scalars.get(reference as usize) {
+            Some(scalar) if c_type == Some(scalar.c_type) => Ok(scalar),
+            other => Err(wrong_reference(reference, other)),
         }
     }
 }
 
-fn status(severity: Severity) -> fmi2Status {
-    match severity {
-        Severity::Discard => fmi2Discard,
-        Severity::Error => fmi2Error,
-        Severity::Fatal => fmi2Fatal,
-    }
-}
-
-fn c_string(text: &str) -> CString {
-    CString::new(text.replace('\0', " ")).unwrap_or_default()
-}
-
-/// The host's text: `None` for NULL.
-unsafe fn text(string: fmi2String) -> Option<String> {
-    if string.is_null() {
-        return None;
-    }
-    Some(unsafe { CStr::from_ptr(string) }.to_string_lossy().into_owned())
-}
-
-/// The host's array; NULL is fine when it is empty.
-unsafe fn array<'a, T>(
-    call: &Call,
-    name: &str,
-    pointer: *const T,
-    length: usize,
-) -> Result<&'a [T], Fault> {
-    if length == 0 {
-        return Ok(&[]);
-    }
-    if pointer.is_null() {
-        return Err(null(call, name));
-    }
-    Ok(unsafe { std::slice::from_raw_parts(pointer, length) })
-}
-
-/// As [`array`], to write to.
-unsafe fn array_mut<'a, T>(
-    call: &Call,
-    name: &str,
-    pointer: *mut T,
-    length: usize,
-) -> Result<&'a mut [T], Fault> {
-    if length == 0 {
-        return Ok(&mut []);
-    }
-    if pointer.is_null() {
-        return Err(null(call, name));
-    }
-    Ok(unsafe { std::slice::from_raw_parts_mut(pointer, length) })
-}
-
-/// A place of the host's to write one thing to.
-unsafe fn place<'a, T>(call: &Call, name: &str, pointer: *mut T) -> Result<&'a mut T, Fault> {
-    unsafe { pointer.as_mut() }.ok_or_else(|| null(call, name))
-}
-
-fn null(call: &Call, name: &str) -> Fault {
-    call.error(format_args!("argument {name} is NULL"))
-}
-
-unsafe fn saved_state<'a, M: Model>(
-    call: &Call,
-    handle: fmi2FMUstate,
-) -> Result<&'a mut SavedState<M>, Fault> {
-    if handle.is_null() {
-        return Err(null(call, "FMUstate"));
-    }
-    if !handle.cast::<SavedState<M>>().is_aligned()
-        || unsafe { ptr::read(handle.cast::<u64>()) } != STATE
-    {
-        return Err(call.error("argument FMUstate is not a saved state of this FMU"));
-    }
-    Ok(unsafe { &mut *handle.cast::<SavedState<M>>() })
-}
-
-/// Does `body` on the component behind the handle: failures are logged and become
-/// the status, a panic poisons the instance.
-#[inline]
-unsafe fn on<M: Model>(
-    handle: fmi2Component,
-    operation: &'static Operation,
-    body: impl FnOnce(&mut Component<M>) -> Result<(), Fault>,
-) -> fmi2Status {
-    if handle.is_null()
-        || !handle.cast::<Component<M>>().is_aligned()
-        || unsafe { ptr::read(handle.cast::<u64>()) } != COMPONENT
-    {
-        return fmi2Error;
-    }
-    let component = unsafe { &mut *handle.cast::<Component<M>>() };
-    let result = catch_unwind(AssertUnwindSafe(|| body(component)));
-    let fault = match result {
-        Ok(Ok(())) => return fmi2OK,
-        Ok(Err(fault)) => fault,
-        Err(payload) => {
-            component.instance.poison();
-            let text =
-                format!("{} panicked: {}", operation.call(FMI2).name(), panic_text(&*payload));
-            Fault { severity: Severity::Fatal, text }
-        }
-    };
-    component.log.report(&fault);
-    status(fault.severity)
-}
-
-/// As [`on`], for the calls with which the motion can begin: then warnings are logged, of the parameters and
-/// inputs that it begins with.
-unsafe fn on_start<M: Model>(
-    handle: fmi2Component,
-    operation: &'static Operation,
-    body: impl FnOnce(&mut Component<M>) -> Result<(), Fault>,
-) -> fmi2Status {
-    let with_warnings = |component: &mut Component<M>| {
-        let was_running = component.instance.is_running();
-        body(component)?;
-        if !was_running && component.instance.is_running() {
-            component.log.report_warnings(&component.instance);
-        }
-        Ok(())
-    };
-    unsafe { on(handle, operation, with_warnings) }
-}
-
-fn panic_text(payload: &(dyn Any + Send)) -> &str {
-    let text = payload.downcast_ref::<&str>().copied();
-    text.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("no text")
-}
-
-/// Panics are told to the host's logger and printed nowhere. The hook belongs to
-/// this library's own copy of std, not to the host.
-fn silence_panics() {
-    // In this crate's own tests std is the test runner's.
-    #[cfg(not(test))]
-    {
-        static ONCE: std::sync::Once = std::sync::Once::new();
-        ONCE.call_once(|| std::panic::set_hook(Box::new(|_| {})));
+#[cold]
+fn wrong_reference<M: Model>(reference: u32, found: Option<&Scalar<M>>) -> String {
+    match found {
+        Some(scalar) => format!(
+            "{} (value reference {reference}) is of type {:?}",
+            scalar.name(),
+            scalar.c_type
+        ),
+        None => format!(
+            "no variable has the value reference {reference}; the last one is {}",
+            M::table().scalars.len() - 1
+        ),
     }
 }
 
@@ -357,10 +247,10 @@ pub unsafe fn fmi2SetDebugLogging<M: Model>(
     nCategories: usize,
     categories: *const fmi2String,
 ) -> fmi2Status {
-    let operation = &op::SET_DEBUG_LOGGING;
+    let call = &SET_DEBUG_LOGGING;
     unsafe {
-        on::<M>(c, operation, |component| {
-            let call = &component.instance.check(operation)?;
+        on::<M, Fmi2>(c, call, |component| {
+            component.instance.check(call)?;
             if loggingOn == 0 {
                 component.log.filter = Filter::NONE;
                 return Ok(());
@@ -388,20 +278,12 @@ pub unsafe fn fmi2Instantiate<M: Model>(
     if functions.is_null() {
         return ptr::null_mut();
     }
-    silence_panics();
+    c_abi::silence_panics();
     let made = catch_unwind(|| unsafe {
         let name = text(instanceName);
-        let log = Log {
-            callbacks: *functions,
-            instance_name: c_string(name.as_deref().unwrap_or("")),
-            filter: Filter::FAILURES,
-            step_warned: false,
-        };
+        let log = Log::new(logger(&*functions, name.as_deref()));
         match interface::<M>(name, fmuType, text(fmuGUID)) {
-            Ok(interface) => {
-                let instance = Instance::<M>::new(FMI2, interface);
-                Box::into_raw(Box::new(Component { mark: COMPONENT, instance, log })).cast()
-            }
+            Ok(interface) => new_component(Instance::<M, Fmi2>::new(interface), log),
             Err(why) => {
                 let text = format!("fmi2Instantiate: {why}");
                 log.report(&Fault { severity: Severity::Error, text });
@@ -410,6 +292,18 @@ pub unsafe fn fmi2Instantiate<M: Model>(
         }
     });
     made.unwrap_or(ptr::null_mut())
+}
+
+/// The host's logger. Its struct need not outlive fmi2Instantiate.
+fn logger(functions: &fmi2CallbackFunctions, instance_name: Option<&str>) -> Option<Logger> {
+    let logger = functions.logger?;
+    let environment = functions.componentEnvironment;
+    let name = c_string(instance_name.unwrap_or(""));
+    // The text is an argument, not the format: it may contain a percent sign.
+    Some(Box::new(move |status, category, message| unsafe {
+        let (category, message) = (category.as_ptr(), message.as_ptr());
+        logger(environment, name.as_ptr(), status, category, c"%s".as_ptr(), message);
+    }))
 }
 
 /// What the instance is for, or why there can be none like this.
@@ -438,18 +332,7 @@ fn interface<M: Model>(
 
 /// Frees an instance; NULL is fine.
 pub unsafe fn fmi2FreeInstance<M: Model>(c: fmi2Component) {
-    unsafe {
-        if c.is_null()
-            || !c.cast::<Component<M>>().is_aligned()
-            || ptr::read(c.cast::<u64>()) != COMPONENT
-        {
-            return;
-        }
-        // A later call with this handle should be an error as long as nobody
-        // else got the memory.
-        ptr::write_volatile(c.cast::<u64>(), 0);
-        let _ = catch_unwind(|| drop(Box::from_raw(c.cast::<Component<M>>())));
-    }
+    unsafe { free_component::<M, Fmi2>(c) }
 }
 
 /// Tells times and tolerance.
@@ -464,7 +347,7 @@ pub unsafe fn fmi2SetupExperiment<M: Model>(
     let tolerance = (toleranceDefined != 0).then_some(tolerance);
     let stop = (stopTimeDefined != 0).then_some(stopTime);
     unsafe {
-        on::<M>(c, &op::SETUP_EXPERIMENT, |component| {
+        on::<M, Fmi2>(c, Fmi2::SETUP_EXPERIMENT, |component| {
             component.instance.setup_experiment(tolerance, startTime, stop)
         })
     }
@@ -473,7 +356,7 @@ pub unsafe fn fmi2SetupExperiment<M: Model>(
 /// From here on all variables can be read.
 pub unsafe fn fmi2EnterInitializationMode<M: Model>(c: fmi2Component) -> fmi2Status {
     unsafe {
-        on::<M>(c, &op::ENTER_INITIALIZATION, |component| {
+        on::<M, Fmi2>(c, Fmi2::ENTER_INITIALIZATION, |component| {
             component.instance.enter_initialization_mode()
         })
     }
@@ -483,7 +366,7 @@ pub unsafe fn fmi2EnterInitializationMode<M: Model>(c: fmi2Component) -> fmi2Sta
 /// steps can be made.
 pub unsafe fn fmi2ExitInitializationMode<M: Model>(c: fmi2Component) -> fmi2Status {
     unsafe {
-        on_start::<M>(c, &op::EXIT_INITIALIZATION, |component| {
+        on_start::<M, Fmi2>(c, Fmi2::EXIT_INITIALIZATION, |component| {
             component.instance.exit_initialization_mode()
         })
     }
@@ -491,12 +374,12 @@ pub unsafe fn fmi2ExitInitializationMode<M: Model>(c: fmi2Component) -> fmi2Stat
 
 /// Ends the simulation; values can still be read.
 pub unsafe fn fmi2Terminate<M: Model>(c: fmi2Component) -> fmi2Status {
-    unsafe { on_start::<M>(c, &op::TERMINATE, |component| component.instance.terminate()) }
+    unsafe { on_start::<M, Fmi2>(c, Fmi2::TERMINATE, |component| component.instance.terminate()) }
 }
 
 /// As new.
 pub unsafe fn fmi2Reset<M: Model>(c: fmi2Component) -> fmi2Status {
-    unsafe { on::<M>(c, &op::RESET, |component| component.instance.reset()) }
+    unsafe { on::<M, Fmi2>(c, Fmi2::RESET, |component| component.instance.reset()) }
 }
 
 // ---- Values ----
@@ -505,13 +388,13 @@ pub unsafe fn fmi2Reset<M: Model>(c: fmi2Component) -> fmi2Status {
 #[inline]
 unsafe fn get<M: Model, T>(
     c: fmi2Component,
-    operation: &'static Operation,
+    call: &'static Call,
     (vr, nvr, value): (*const fmi2ValueReference, usize, *mut T),
     as_c: impl Fn(Value) -> Option<T>,
 ) -> fmi2Status {
     unsafe {
-        on::<M>(c, operation, |component| {
-            let call = &component.instance.check(operation)?;
+        on::<M, Fmi2>(c, call, |component| {
+            component.instance.check(call)?;
             let references = array(call, "vr", vr, nvr)?;
             let places = array_mut(call, "value", value, nvr)?;
             for (reference, place) in references.iter().zip(places) {
@@ -527,16 +410,16 @@ unsafe fn get<M: Model, T>(
 #[inline]
 unsafe fn set<M: Model, T: Copy>(
     c: fmi2Component,
-    operation: &'static Operation,
+    call: &'static Call,
     (vr, nvr, value): (*const fmi2ValueReference, usize, *const T),
     from_c: impl Fn(T) -> Value,
 ) -> fmi2Status {
     unsafe {
-        on::<M>(c, operation, |component| {
-            let call = &component.instance.check(operation)?;
+        on::<M, Fmi2>(c, call, |component| {
+            component.instance.check(call)?;
             let references = array(call, "vr", vr, nvr)?;
             let values = array(call, "value", value, nvr)?;
-            component.instance.set(operation, references, |n| from_c(values[n]))
+            component.instance.set(call, references, |n| from_c(values[n]))
         })
     }
 }
@@ -552,7 +435,7 @@ pub unsafe fn fmi2GetReal<M: Model>(
         Value::Real(x) => Some(x),
         _ => None,
     };
-    unsafe { get::<M, _>(c, &op::GET_REAL, (vr, nvr, value), as_c) }
+    unsafe { get::<M, _>(c, &GET_REAL, (vr, nvr, value), as_c) }
 }
 
 /// Reads integers and enumerations.
@@ -566,7 +449,7 @@ pub unsafe fn fmi2GetInteger<M: Model>(
         Value::Integer(n) => Some(n),
         _ => None,
     };
-    unsafe { get::<M, _>(c, &op::GET_INTEGER, (vr, nvr, value), as_c) }
+    unsafe { get::<M, _>(c, &GET_INTEGER, (vr, nvr, value), as_c) }
 }
 
 /// Reads Booleans: 0 or 1.
@@ -580,7 +463,7 @@ pub unsafe fn fmi2GetBoolean<M: Model>(
         Value::Boolean(b) => Some(fmi2Boolean::from(b)),
         _ => None,
     };
-    unsafe { get::<M, _>(c, &op::GET_BOOLEAN, (vr, nvr, value), as_c) }
+    unsafe { get::<M, _>(c, &GET_BOOLEAN, (vr, nvr, value), as_c) }
 }
 
 /// There are no strings.
@@ -590,7 +473,7 @@ pub unsafe fn fmi2GetString<M: Model>(
     nvr: usize,
     value: *mut fmi2String,
 ) -> fmi2Status {
-    unsafe { get::<M, _>(c, &op::GET_STRING, (vr, nvr, value), |_| None) }
+    unsafe { get::<M, _>(c, &GET_STRING, (vr, nvr, value), |_| None) }
 }
 
 /// Sets reals.
@@ -600,7 +483,7 @@ pub unsafe fn fmi2SetReal<M: Model>(
     nvr: usize,
     value: *const fmi2Real,
 ) -> fmi2Status {
-    unsafe { set::<M, _>(c, &op::SET_REAL, (vr, nvr, value), Value::Real) }
+    unsafe { set::<M, _>(c, &SET_REAL, (vr, nvr, value), Value::Real) }
 }
 
 /// Sets integers and enumerations.
@@ -610,7 +493,7 @@ pub unsafe fn fmi2SetInteger<M: Model>(
     nvr: usize,
     value: *const fmi2Integer,
 ) -> fmi2Status {
-    unsafe { set::<M, _>(c, &op::SET_INTEGER, (vr, nvr, value), Value::Integer) }
+    unsafe { set::<M, _>(c, &SET_INTEGER, (vr, nvr, value), Value::Integer) }
 }
 
 /// Sets Booleans: everything but 0 is true.
@@ -620,7 +503,7 @@ pub unsafe fn fmi2SetBoolean<M: Model>(
     nvr: usize,
     value: *const fmi2Boolean,
 ) -> fmi2Status {
-    unsafe { set::<M, _>(c, &op::SET_BOOLEAN, (vr, nvr, value), |b| Value::Boolean(b != 0)) }
+    unsafe { set::<M, _>(c, &SET_BOOLEAN, (vr, nvr, value), |b| Value::Boolean(b != 0)) }
 }
 
 /// There are no strings.
@@ -631,7 +514,7 @@ pub unsafe fn fmi2SetString<M: Model>(
     value: *const fmi2String,
 ) -> fmi2Status {
     // No variable is a string, so the value is never looked at.
-    unsafe { set::<M, _>(c, &op::SET_STRING, (vr, nvr, value), |_| Value::Boolean(false)) }
+    unsafe { set::<M, _>(c, &SET_STRING, (vr, nvr, value), |_| Value::Boolean(false)) }
 }
 
 // ---- Saved states ----
@@ -641,60 +524,39 @@ pub unsafe fn fmi2GetFMUstate<M: Model>(
     c: fmi2Component,
     FMUstate: *mut fmi2FMUstate,
 ) -> fmi2Status {
-    let operation = &op::GET_FMU_STATE;
+    let call = &GET_STATE;
     unsafe {
-        on::<M>(c, operation, |component| {
-            let call = &component.instance.check(operation)?;
+        on::<M, Fmi2>(c, call, |component| {
+            component.instance.check(call)?;
             let handle = place(call, "FMUstate", FMUstate)?;
             if handle.is_null() {
                 *handle = new_state(component.instance.clone());
             } else {
-                saved_state(call, *handle)?.instance.clone_from(&component.instance);
+                saved_state(call, "FMUstate", *handle)?.clone_from(&component.instance);
             }
             Ok(())
         })
     }
-}
-
-fn new_state<M: Model>(instance: Instance<M>) -> fmi2FMUstate {
-    Box::into_raw(Box::new(SavedState { mark: STATE, instance })).cast()
 }
 
 /// Takes a saved state, this instance's or another's, in any instance state.
 pub unsafe fn fmi2SetFMUstate<M: Model>(c: fmi2Component, FMUstate: fmi2FMUstate) -> fmi2Status {
-    let operation = &op::SET_FMU_STATE;
+    let call = Fmi2::SET_STATE;
     unsafe {
-        on::<M>(c, operation, |component| {
-            let call = &component.instance.check(operation)?;
-            component.instance.restore(&saved_state(call, FMUstate)?.instance)
+        on::<M, Fmi2>(c, call, |component| {
+            component.instance.check(call)?;
+            component.instance.restore(saved_state(call, "FMUstate", FMUstate)?)
         })
     }
 }
 
-/// Frees a saved state and clears the handle; NULL is fine. fmusim (0.0.39) gives the state itself in
-/// place of the handle's address: known by its mark, which no address equals, it is freed too.
+/// Frees a saved state and clears the handle; NULL is fine.
 pub unsafe fn fmi2FreeFMUstate<M: Model>(
     c: fmi2Component,
     FMUstate: *mut fmi2FMUstate,
 ) -> fmi2Status {
-    let operation = &op::FREE_FMU_STATE;
-    unsafe {
-        on::<M>(c, operation, |_| {
-            if FMUstate.is_null() || (*FMUstate).is_null() {
-                return Ok(());
-            }
-            let is_itself = ptr::read(FMUstate.cast::<u64>()) == STATE;
-            let state = if is_itself { FMUstate.cast() } else { *FMUstate };
-            saved_state::<M>(&operation.call(FMI2), state)?;
-            // as in fmi2FreeInstance
-            ptr::write_volatile(state.cast::<u64>(), 0);
-            drop(Box::from_raw(state.cast::<SavedState<M>>()));
-            if !is_itself {
-                *FMUstate = ptr::null_mut();
-            }
-            Ok(())
-        })
-    }
+    let call = &FREE_STATE;
+    unsafe { on::<M, Fmi2>(c, call, |_| free_state::<M, Fmi2>(call, "FMUstate", FMUstate)) }
 }
 
 /// How many bytes a saved state takes.
@@ -703,11 +565,11 @@ pub unsafe fn fmi2SerializedFMUstateSize<M: Model>(
     FMUstate: fmi2FMUstate,
     size: *mut usize,
 ) -> fmi2Status {
-    let operation = &op::SERIALIZED_SIZE;
+    let call = &SERIALIZED_SIZE;
     unsafe {
-        on::<M>(c, operation, |component| {
-            let call = &component.instance.check(operation)?;
-            saved_state::<M>(call, FMUstate)?;
+        on::<M, Fmi2>(c, call, |component| {
+            component.instance.check(call)?;
+            saved_state::<M, Fmi2>(call, "FMUstate", FMUstate)?;
             *place(call, "size", size)? = snapshot::size::<M>();
             Ok(())
         })
@@ -721,11 +583,12 @@ pub unsafe fn fmi2SerializeFMUstate<M: Model>(
     serializedState: *mut fmi2Byte,
     size: usize,
 ) -> fmi2Status {
-    let operation = &op::SERIALIZE;
+    let call = &SERIALIZE;
     unsafe {
-        on::<M>(c, operation, |component| {
-            let call = &component.instance.check(operation)?;
-            let bytes = snapshot::to_bytes(&saved_state::<M>(call, FMUstate)?.instance);
+        on::<M, Fmi2>(c, call, |component| {
+            component.instance.check(call)?;
+            let saved = saved_state::<M, Fmi2>(call, "FMUstate", FMUstate)?;
+            let bytes = snapshot::to_bytes(saved);
             if size < bytes.len() {
                 return Err(call.error(format_args!(
                     "size is {size}; a saved state takes {} bytes",
@@ -747,16 +610,16 @@ pub unsafe fn fmi2DeSerializeFMUstate<M: Model>(
     size: usize,
     FMUstate: *mut fmi2FMUstate,
 ) -> fmi2Status {
-    let operation = &op::DESERIALIZE;
+    let call = &DESERIALIZE;
     unsafe {
-        on::<M>(c, operation, |component| {
-            let call = &component.instance.check(operation)?;
+        on::<M, Fmi2>(c, call, |component| {
+            component.instance.check(call)?;
             if FMUstate.is_null() {
                 return Err(null(call, "FMUstate"));
             }
             let bytes = array(call, "serializedState", serializedState.cast::<u8>(), size)?;
-            let instance = snapshot::from_bytes::<M>(FMI2, bytes).map_err(|why| call.error(why))?;
-            ptr::write(FMUstate, new_state(instance));
+            let instance = snapshot::from_bytes::<M, Fmi2>(bytes);
+            ptr::write(FMUstate, new_state(instance.map_err(|why| call.error(why))?));
             Ok(())
         })
     }
@@ -772,10 +635,10 @@ pub unsafe fn fmi2GetDirectionalDerivative<M: Model>(
     dvKnown: *const fmi2Real,
     dvUnknown: *mut fmi2Real,
 ) -> fmi2Status {
-    let operation = &op::DIRECTIONAL_DERIVATIVE;
+    let call = Fmi2::DIRECTIONAL_DERIVATIVE;
     unsafe {
-        on::<M>(c, operation, |component| {
-            let call = &component.instance.check(operation)?;
+        on::<M, Fmi2>(c, call, |component| {
+            component.instance.check(call)?;
             let unknowns = array(call, "vUnknown_ref", vUnknown_ref, nUnknown)?;
             let knowns = array(call, "vKnown_ref", vKnown_ref, nKnown)?;
             let direction = array(call, "dvKnown", dvKnown, nKnown)?;
@@ -802,7 +665,9 @@ pub struct fmi2EventInfo {
 
 /// At an event.
 pub unsafe fn fmi2EnterEventMode<M: Model>(c: fmi2Component) -> fmi2Status {
-    unsafe { on_start::<M>(c, &op::ENTER_EVENT, |component| component.instance.enter_event_mode()) }
+    unsafe {
+        on_start::<M, Fmi2>(c, Fmi2::ENTER_EVENT, |component| component.instance.enter_event_mode())
+    }
 }
 
 /// Does what is due at the event.
@@ -810,10 +675,10 @@ pub unsafe fn fmi2NewDiscreteStates<M: Model>(
     c: fmi2Component,
     eventInfo: *mut fmi2EventInfo,
 ) -> fmi2Status {
-    let operation = &op::NEW_DISCRETE_STATES;
+    let call = Fmi2::NEW_DISCRETE_STATES;
     unsafe {
-        on_start::<M>(c, operation, |component| {
-            let call = &component.instance.check(operation)?;
+        on_start::<M, Fmi2>(c, call, |component| {
+            component.instance.check(call)?;
             let place = place(call, "eventInfo", eventInfo)?;
             let before = component.instance.event_count();
             let info = component.instance.new_discrete_states()?;
@@ -823,7 +688,7 @@ pub unsafe fn fmi2NewDiscreteStates<M: Model>(
                 nextEventTime: info.next_time.unwrap_or(0.0),
                 ..fmi2EventInfo::default()
             };
-            component.log.report_event(operation, before, &component.instance);
+            component.log.report_event(call, before, &component.instance);
             Ok(())
         })
     }
@@ -832,7 +697,7 @@ pub unsafe fn fmi2NewDiscreteStates<M: Model>(
 /// Between events.
 pub unsafe fn fmi2EnterContinuousTimeMode<M: Model>(c: fmi2Component) -> fmi2Status {
     unsafe {
-        on_start::<M>(c, &op::ENTER_CONTINUOUS_TIME, |component| {
+        on_start::<M, Fmi2>(c, Fmi2::ENTER_CONTINUOUS_TIME, |component| {
             component.instance.enter_continuous_time_mode()
         })
     }
@@ -846,21 +711,15 @@ pub unsafe fn fmi2CompletedIntegratorStep<M: Model>(
     enterEventMode: *mut fmi2Boolean,
     terminateSimulation: *mut fmi2Boolean,
 ) -> fmi2Status {
-    let operation = &op::COMPLETED_STEP;
+    let call = Fmi2::COMPLETED_STEP;
     unsafe {
-        on::<M>(c, operation, |component| {
-            let call = &component.instance.check(operation)?;
+        on::<M, Fmi2>(c, call, |component| {
+            component.instance.check(call)?;
             let enter = place(call, "enterEventMode", enterEventMode)?;
             let terminate = place(call, "terminateSimulation", terminateSimulation)?;
             *enter = component.instance.completed_integrator_step()?.into();
             *terminate = 0;
-            if !component.log.step_warned
-                && component.log.filter.wants(Topic::Warning)
-                && let Some(warning) = component.instance.step_warning()
-            {
-                component.log.step_warned = true;
-                component.log.write(fmi2Warning, Topic::Warning, warning);
-            }
+            component.log.report_step_warning(&component.instance);
             Ok(())
         })
     }
@@ -868,7 +727,7 @@ pub unsafe fn fmi2CompletedIntegratorStep<M: Model>(
 
 /// The present time.
 pub unsafe fn fmi2SetTime<M: Model>(c: fmi2Component, time: fmi2Real) -> fmi2Status {
-    unsafe { on_start::<M>(c, &op::SET_TIME, |component| component.instance.set_time(time)) }
+    unsafe { on_start::<M, Fmi2>(c, Fmi2::SET_TIME, |component| component.instance.set_time(time)) }
 }
 
 /// The states as the host has integrated them.
@@ -877,10 +736,10 @@ pub unsafe fn fmi2SetContinuousStates<M: Model>(
     x: *const fmi2Real,
     nx: usize,
 ) -> fmi2Status {
-    let operation = &op::SET_CONTINUOUS_STATES;
+    let call = Fmi2::SET_CONTINUOUS_STATES;
     unsafe {
-        on_start::<M>(c, operation, |component| {
-            let call = &component.instance.check(operation)?;
+        on_start::<M, Fmi2>(c, call, |component| {
+            component.instance.check(call)?;
             component.instance.set_continuous_states(array(call, "x", x, nx)?)
         })
     }
@@ -889,13 +748,13 @@ pub unsafe fn fmi2SetContinuousStates<M: Model>(
 /// Fills the host's array by `body`.
 unsafe fn fill<M: Model>(
     c: fmi2Component,
-    operation: &'static Operation,
+    call: &'static Call,
     (name, pointer, length): (&str, *mut fmi2Real, usize),
-    body: impl FnOnce(&mut Instance<M>, &mut [fmi2Real]) -> Result<(), Fault>,
+    body: impl FnOnce(&mut Instance<M, Fmi2>, &mut [fmi2Real]) -> Result<(), Fault>,
 ) -> fmi2Status {
     unsafe {
-        on::<M>(c, operation, |component| {
-            let call = &component.instance.check(operation)?;
+        on::<M, Fmi2>(c, call, |component| {
+            component.instance.check(call)?;
             body(&mut component.instance, array_mut(call, name, pointer, length)?)
         })
     }
@@ -908,7 +767,7 @@ pub unsafe fn fmi2GetDerivatives<M: Model>(
     nx: usize,
 ) -> fmi2Status {
     let into = ("derivatives", derivatives, nx);
-    unsafe { fill::<M>(c, &op::GET_DERIVATIVES, into, Instance::derivatives) }
+    unsafe { fill::<M>(c, Fmi2::GET_DERIVATIVES, into, Instance::derivatives) }
 }
 
 /// Functions that cross zero at events.
@@ -918,7 +777,7 @@ pub unsafe fn fmi2GetEventIndicators<M: Model>(
     ni: usize,
 ) -> fmi2Status {
     let into = ("eventIndicators", eventIndicators, ni);
-    unsafe { fill::<M>(c, &op::GET_EVENT_INDICATORS, into, Instance::event_indicators) }
+    unsafe { fill::<M>(c, Fmi2::GET_EVENT_INDICATORS, into, Instance::event_indicators) }
 }
 
 /// The states, in the order of the model description.
@@ -927,7 +786,7 @@ pub unsafe fn fmi2GetContinuousStates<M: Model>(
     x: *mut fmi2Real,
     nx: usize,
 ) -> fmi2Status {
-    unsafe { fill::<M>(c, &op::GET_CONTINUOUS_STATES, ("x", x, nx), Instance::continuous_states) }
+    unsafe { fill::<M>(c, Fmi2::GET_CONTINUOUS_STATES, ("x", x, nx), Instance::continuous_states) }
 }
 
 /// The states' orders of magnitude.
@@ -937,7 +796,7 @@ pub unsafe fn fmi2GetNominalsOfContinuousStates<M: Model>(
     nx: usize,
 ) -> fmi2Status {
     let into = ("x_nominal", x_nominal, nx);
-    unsafe { fill::<M>(c, &op::GET_NOMINALS, into, |instance, x| instance.nominals(x)) }
+    unsafe { fill::<M>(c, Fmi2::GET_NOMINALS, into, |instance, x| instance.nominals(x)) }
 }
 
 // ---- Co-Simulation ----
@@ -950,10 +809,10 @@ pub unsafe fn fmi2SetRealInputDerivatives<M: Model>(
     order: *const fmi2Integer,
     value: *const fmi2Real,
 ) -> fmi2Status {
-    let operation = &op::SET_INPUT_DERIVATIVES;
+    let call = Fmi2::SET_INPUT_DERIVATIVES;
     unsafe {
-        on::<M>(c, operation, |component| {
-            let call = &component.instance.check(operation)?;
+        on::<M, Fmi2>(c, call, |component| {
+            component.instance.check(call)?;
             let references = array(call, "vr", vr, nvr)?;
             let orders = array(call, "order", order, nvr)?;
             let values = array(call, "value", value, nvr)?;
@@ -970,10 +829,10 @@ pub unsafe fn fmi2GetRealOutputDerivatives<M: Model>(
     order: *const fmi2Integer,
     value: *mut fmi2Real,
 ) -> fmi2Status {
-    let operation = &op::GET_OUTPUT_DERIVATIVES;
+    let call = Fmi2::GET_OUTPUT_DERIVATIVES;
     unsafe {
-        on::<M>(c, operation, |component| {
-            let call = &component.instance.check(operation)?;
+        on::<M, Fmi2>(c, call, |component| {
+            component.instance.check(call)?;
             let references = array(call, "vr", vr, nvr)?;
             let orders = array(call, "order", order, nvr)?;
             let places = array_mut(call, "value", value, nvr)?;
@@ -990,12 +849,12 @@ pub unsafe fn fmi2DoStep<M: Model>(
     communicationStepSize: fmi2Real,
     _noSetFMUStatePriorToCurrentPoint: fmi2Boolean,
 ) -> fmi2Status {
-    let operation = &op::DO_STEP;
+    let call = Fmi2::DO_STEP;
     unsafe {
-        on::<M>(c, operation, |component| {
+        on::<M, Fmi2>(c, call, |component| {
             let before = component.instance.event_count();
             component.instance.do_step(currentCommunicationPoint, communicationStepSize)?;
-            component.log.report_event(operation, before, &component.instance);
+            component.log.report_event(call, before, &component.instance);
             Ok(())
         })
     }
@@ -1003,10 +862,10 @@ pub unsafe fn fmi2DoStep<M: Model>(
 
 /// Steps are never asynchronous, so there is nothing to cancel.
 pub unsafe fn fmi2CancelStep<M: Model>(c: fmi2Component) -> fmi2Status {
-    let operation = &op::CANCEL_STEP;
+    let call = &CANCEL_STEP;
     unsafe {
-        on::<M>(c, operation, |component| {
-            let call = &component.instance.check(operation)?;
+        on::<M, Fmi2>(c, call, |component| {
+            component.instance.check(call)?;
             Err(call.error("no step is running: fmi2DoStep returns when the step is done"))
         })
     }
@@ -1015,14 +874,14 @@ pub unsafe fn fmi2CancelStep<M: Model>(c: fmi2Component) -> fmi2Status {
 /// Answers a question about the last step, or discards it.
 unsafe fn answer<M: Model, T>(
     c: fmi2Component,
-    operation: &'static Operation,
+    call: &'static Call,
     kind: fmi2StatusKind,
     value: *mut T,
-    known: impl FnOnce(&Instance<M>) -> Option<T>,
+    known: impl FnOnce(&Instance<M, Fmi2>) -> Option<T>,
 ) -> fmi2Status {
     unsafe {
-        on::<M>(c, operation, |component| {
-            let call = &component.instance.check(operation)?;
+        on::<M, Fmi2>(c, call, |component| {
+            component.instance.check(call)?;
             let place = place(call, "value", value)?;
             let value = known(&component.instance);
             *place = value
@@ -1038,11 +897,11 @@ pub unsafe fn fmi2GetStatus<M: Model>(
     s: fmi2StatusKind,
     value: *mut fmi2Status,
 ) -> fmi2Status {
-    let known = |instance: &Instance<M>| {
+    let known = |instance: &Instance<M, Fmi2>| {
         let ended = if instance.state() == InstanceState::Failed { fmi2Error } else { fmi2OK };
         (s == fmi2DoStepStatus).then_some(ended)
     };
-    unsafe { answer::<M, _>(c, &op::GET_STATUS, s, value, known) }
+    unsafe { answer::<M, _>(c, &GET_STATUS, s, value, known) }
 }
 
 /// How far the last step came.
@@ -1051,8 +910,9 @@ pub unsafe fn fmi2GetRealStatus<M: Model>(
     s: fmi2StatusKind,
     value: *mut fmi2Real,
 ) -> fmi2Status {
-    let known = |instance: &Instance<M>| (s == fmi2LastSuccessfulTime).then_some(instance.time());
-    unsafe { answer::<M, _>(c, &op::GET_REAL_STATUS, s, value, known) }
+    let known =
+        |instance: &Instance<M, Fmi2>| (s == fmi2LastSuccessfulTime).then_some(instance.time());
+    unsafe { answer::<M, _>(c, &GET_REAL_STATUS, s, value, known) }
 }
 
 /// No integer says anything about the last step.
@@ -1061,7 +921,7 @@ pub unsafe fn fmi2GetIntegerStatus<M: Model>(
     s: fmi2StatusKind,
     value: *mut fmi2Integer,
 ) -> fmi2Status {
-    unsafe { answer::<M, _>(c, &op::GET_INTEGER_STATUS, s, value, |_| None) }
+    unsafe { answer::<M, _>(c, &GET_INTEGER_STATUS, s, value, |_| None) }
 }
 
 /// The FMU never ends the simulation by itself.
@@ -1070,8 +930,8 @@ pub unsafe fn fmi2GetBooleanStatus<M: Model>(
     s: fmi2StatusKind,
     value: *mut fmi2Boolean,
 ) -> fmi2Status {
-    let known = |_: &Instance<M>| (s == fmi2Terminated).then_some(0);
-    unsafe { answer::<M, _>(c, &op::GET_BOOLEAN_STATUS, s, value, known) }
+    let known = |_: &Instance<M, Fmi2>| (s == fmi2Terminated).then_some(0);
+    unsafe { answer::<M, _>(c, &GET_BOOLEAN_STATUS, s, value, known) }
 }
 
 /// No step is ever pending.
@@ -1080,7 +940,7 @@ pub unsafe fn fmi2GetStringStatus<M: Model>(
     s: fmi2StatusKind,
     value: *mut fmi2String,
 ) -> fmi2Status {
-    unsafe { answer::<M, _>(c, &op::GET_STRING_STATUS, s, value, |_| None) }
+    unsafe { answer::<M, _>(c, &GET_STRING_STATUS, s, value, |_| None) }
 }
 
 /// Exports the functions of FMI 2.0 for a model, under their names in C and as Rust functions of
@@ -1191,7 +1051,10 @@ mod tests {
         let mut state = ptr::null_mut();
         unsafe {
             assert_eq!(fmi2GetFMUstate::<Spring>(c, &mut state), fmi2OK);
-            assert_eq!(on::<Spring>(c, &op::DO_STEP, |_| panic!("this is a test")), fmi2Fatal);
+            assert_eq!(
+                on::<Spring, Fmi2>(c, Fmi2::DO_STEP, |_| panic!("this is a test")),
+                fmi2Fatal
+            );
             assert_eq!(fmi2Reset::<Spring>(c), fmi2Fatal);
             assert_eq!(fmi2GetReal::<Spring>(c, ptr::null(), 0, ptr::null_mut()), fmi2Fatal);
             assert_eq!(fmi2GetFMUstate::<Spring>(c, &mut state), fmi2Fatal);

@@ -1,17 +1,17 @@
 //! What a variable of an FMU is: the words that a model's table is written in.
 
+use crate::call::CType;
 use crate::model::Model;
-use crate::operation::CType;
 
 /// The value of one scalar, as it crosses the C interface. Enumerations are
 /// integers there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Value {
-    /// fmi2Real
+    /// A real number.
     Real(f64),
-    /// fmi2Integer
+    /// An integer, or the number of an enumeration's item.
     Integer(i32),
-    /// fmi2Boolean
+    /// A Boolean.
     Boolean(bool),
 }
 

@@ -119,9 +119,8 @@ impl runtime::Model for Model {
         Ok(Model { tank, coupling_ratio })
     }
 
-    fn warnings(parameters: &Parameters, inputs: &Inputs) -> Vec<String> {
-        let model = <Model as runtime::Model>::new(parameters, inputs, 0.0, 1e-6);
-        let ratio = model.map_or(0.0, |model| model.coupling_ratio);
+    fn warnings(&self, parameters: &Parameters, _: &Inputs) -> Vec<String> {
+        let ratio = self.coupling_ratio;
         let is_split = parameters.resolved().is_ok_and(|p| p.coupling == Coupling::Split);
         if !is_split || ratio <= LIMIT {
             return Vec::new();

@@ -1,0 +1,377 @@
+//! What the C interfaces of all versions of FMI have in common: the status of a call, the way to
+//! the host's logger, the host's texts and arrays, handles of instances and of saved states. Panics
+//! end here: one poisons the instance and is told to the logger.
+//!
+//! Pointers may be NULL wherever the standard does not forbid it, and mostly where it does.
+
+#![allow(unsafe_code)]
+// The safety contract of every function is the FMI standard's: a handle comes from this FMU and is
+// not yet freed, arrays have the lengths given, strings end with NUL.
+#![allow(clippy::missing_safety_doc)]
+
+use std::any::Any;
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::ptr;
+
+use crate::call::{Call, Fault, Severity};
+use crate::instance::Instance;
+use crate::log::{Filter, Topic, category};
+use crate::model::Model;
+use crate::version::Version;
+
+// ---- Status and logger ----
+
+/// What a call returns.
+pub type Status = c_int;
+/// All is well.
+pub const OK: Status = 0;
+/// Never returned, but logged with.
+pub const WARNING: Status = 1;
+/// The question has no answer.
+pub const DISCARD: Status = 2;
+/// The call was refused or failed.
+pub const ERROR: Status = 3;
+/// The instance is unusable.
+pub const FATAL: Status = 4;
+
+fn status(severity: Severity) -> Status {
+    match severity {
+        Severity::Discard => DISCARD,
+        Severity::Error => ERROR,
+        Severity::Fatal => FATAL,
+    }
+}
+
+/// The host's logger, in terms of no version: status, category, message.
+pub type Logger = Box<dyn Fn(Status, &CStr, &CStr)>;
+
+/// The way to the host's logger.
+pub struct Log {
+    logger: Option<Logger>,
+    /// What is logged.
+    pub filter: Filter,
+    /// Whether the host was warned of how it drives the model: once is enough.
+    step_warned: bool,
+}
+
+impl Log {
+    /// As an instance starts.
+    pub fn new(logger: Option<Logger>) -> Log {
+        Log { logger, filter: Filter::FAILURES, step_warned: false }
+    }
+
+    /// Tells why a call has failed.
+    pub fn report(&self, fault: &Fault) {
+        self.write(status(fault.severity), Topic::Failure(fault.severity), || fault.text.clone());
+    }
+
+    #[cold]
+    /// Tells what there is to be warned of in the motion that begins.
+    pub fn report_warnings<M: Model, V: Version>(&self, instance: &Instance<M, V>) {
+        if self.filter.wants(Topic::Warning) {
+            for warning in instance.warnings() {
+                self.write(WARNING, Topic::Warning, || warning);
+            }
+        }
+    }
+
+    /// Warns, once, of how the host drives the model.
+    pub fn report_step_warning<M: Model, V: Version>(&mut self, instance: &Instance<M, V>) {
+        if !self.step_warned
+            && self.filter.wants(Topic::Warning)
+            && let Some(warning) = instance.step_warning()
+        {
+            self.step_warned = true;
+            self.write(WARNING, Topic::Warning, || warning.into());
+        }
+    }
+
+    /// Tells of the last event, if there was one since `before` were counted and if somebody wants
+    /// to know.
+    #[inline(always)]
+    pub fn report_event<M: Model, V: Version>(
+        &self,
+        call: &Call,
+        before: i32,
+        now: &Instance<M, V>,
+    ) {
+        let events = now.event_count().wrapping_sub(before);
+        if events != 0 {
+            self.write_event(call, events, || now.last_event());
+        }
+    }
+
+    #[cold]
+    fn write_event(&self, call: &Call, events: i32, last: impl FnOnce() -> String) {
+        self.write(OK, Topic::Event, || {
+            let many = match events {
+                1 => String::new(),
+                n => format!(", the last of {n} events in this call"),
+            };
+            format!("{}: {}{many}", call.name, last())
+        });
+    }
+
+    fn write(&self, status: Status, topic: Topic, message: impl FnOnce() -> String) {
+        if let Some(logger) = &self.logger
+            && self.filter.wants(topic)
+        {
+            logger(status, &c_string(category(topic)), &c_string(&message()));
+        }
+    }
+}
+
+// ---- Texts and arrays ----
+
+/// A text for the host.
+pub fn c_string(text: &str) -> CString {
+    CString::new(text.replace('\0', " ")).unwrap_or_default()
+}
+
+/// The host's text: `None` for NULL.
+pub unsafe fn text(string: *const c_char) -> Option<String> {
+    if string.is_null() {
+        return None;
+    }
+    Some(unsafe { CStr::from_ptr(string) }.to_string_lossy().into_owned())
+}
+
+/// The host's array; NULL is fine when it is empty.
+pub unsafe fn array<'a, T>(
+    call: &Call,
+    name: &str,
+    pointer: *const T,
+    length: usize,
+) -> Result<&'a [T], Fault> {
+    if length == 0 {
+        return Ok(&[]);
+    }
+    if pointer.is_null() {
+        return Err(null(call, name));
+    }
+    Ok(unsafe { std::slice::from_raw_parts(pointer, length) })
+}
+
+/// As [`array`], to write to.
+pub unsafe fn array_mut<'a, T>(
+    call: &Call,
+    name: &str,
+    pointer: *mut T,
+    length: usize,
+) -> Result<&'a mut [T], Fault> {
+    if length == 0 {
+        return Ok(&mut []);
+    }
+    if pointer.is_null() {
+        return Err(null(call, name));
+    }
+    Ok(unsafe { std::slice::from_raw_parts_mut(pointer, length) })
+}
+
+/// A place of the host's to write one thing to.
+pub unsafe fn place<'a, T>(call: &Call, name: &str, pointer: *mut T) -> Result<&'a mut T, Fault> {
+    unsafe { pointer.as_mut() }.ok_or_else(|| null(call, name))
+}
+
+/// An argument may not be NULL.
+pub fn null(call: &Call, name: &str) -> Fault {
+    call.error(format_args!("argument {name} is NULL"))
+}
+
+// ---- Instances ----
+
+/// Marks a live component, so that a wrong handle is an error and no crash.
+const COMPONENT: u64 = 0x4875_6253_6c6f_7368;
+
+/// What a component handle points to.
+#[repr(C)]
+pub struct Component<M: Model, V: Version> {
+    mark: u64,
+    /// The instance.
+    pub instance: Instance<M, V>,
+    /// Its way to the host's logger.
+    pub log: Log,
+}
+
+/// A handle of a new component.
+pub fn new_component<M: Model, V: Version>(instance: Instance<M, V>, log: Log) -> *mut c_void {
+    Box::into_raw(Box::new(Component { mark: COMPONENT, instance, log })).cast()
+}
+
+/// Whether a handle is of a live `T`, whose first field is a mark.
+unsafe fn is_live<T>(handle: *mut c_void, mark: u64) -> bool {
+    !handle.is_null()
+        && handle.cast::<T>().is_aligned()
+        && unsafe { ptr::read(handle.cast::<u64>()) } == mark
+}
+
+/// Frees what a live handle points to.
+unsafe fn free<T>(handle: *mut c_void) {
+    unsafe {
+        // A later call with this handle should be an error as long as nobody
+        // else got the memory.
+        ptr::write_volatile(handle.cast::<u64>(), 0);
+        drop(Box::from_raw(handle.cast::<T>()));
+    }
+}
+
+/// Frees a component; what is none is left alone.
+pub unsafe fn free_component<M: Model, V: Version>(handle: *mut c_void) {
+    unsafe {
+        if is_live::<Component<M, V>>(handle, COMPONENT) {
+            let _ = catch_unwind(|| free::<Component<M, V>>(handle));
+        }
+    }
+}
+
+/// Does `body` on the component behind the handle: failures are logged and become
+/// the status, a panic poisons the instance.
+#[inline]
+pub unsafe fn on<M: Model, V: Version>(
+    handle: *mut c_void,
+    call: &'static Call,
+    body: impl FnOnce(&mut Component<M, V>) -> Result<(), Fault>,
+) -> Status {
+    if !unsafe { is_live::<Component<M, V>>(handle, COMPONENT) } {
+        return ERROR;
+    }
+    let component = unsafe { &mut *handle.cast::<Component<M, V>>() };
+    let result = catch_unwind(AssertUnwindSafe(|| body(component)));
+    let fault = match result {
+        Ok(Ok(())) => return OK,
+        Ok(Err(fault)) => fault,
+        Err(payload) => {
+            component.instance.poison();
+            let text = format!("{} panicked: {}", call.name, panic_text(&*payload));
+            Fault { severity: Severity::Fatal, text }
+        }
+    };
+    component.log.report(&fault);
+    status(fault.severity)
+}
+
+/// As [`on`], for the calls with which the motion can begin: then warnings are logged, of the parameters and
+/// inputs that it begins with.
+pub unsafe fn on_start<M: Model, V: Version>(
+    handle: *mut c_void,
+    call: &'static Call,
+    body: impl FnOnce(&mut Component<M, V>) -> Result<(), Fault>,
+) -> Status {
+    let with_warnings = |component: &mut Component<M, V>| {
+        let was_running = component.instance.is_running();
+        body(component)?;
+        if !was_running && component.instance.is_running() {
+            component.log.report_warnings(&component.instance);
+        }
+        Ok(())
+    };
+    unsafe { on(handle, call, with_warnings) }
+}
+
+fn panic_text(payload: &(dyn Any + Send)) -> &str {
+    let text = payload.downcast_ref::<&str>().copied();
+    text.or_else(|| payload.downcast_ref::<String>().map(String::as_str)).unwrap_or("no text")
+}
+
+/// Panics are told to the host's logger and printed nowhere. The hook belongs to
+/// this library's own copy of std, not to the host.
+pub fn silence_panics() {
+    // In this crate's own tests std is the test runner's.
+    #[cfg(not(test))]
+    {
+        static ONCE: std::sync::Once = std::sync::Once::new();
+        ONCE.call_once(|| std::panic::set_hook(Box::new(|_| {})));
+    }
+}
+
+// ---- Saved states ----
+
+/// Marks a live saved state.
+const STATE: u64 = 0x5374_6174_6548_7562;
+
+/// What a state handle points to.
+#[repr(C)]
+struct SavedState<M: Model, V: Version> {
+    mark: u64,
+    instance: Instance<M, V>,
+}
+
+/// A handle of a new saved state.
+pub fn new_state<M: Model, V: Version>(instance: Instance<M, V>) -> *mut c_void {
+    Box::into_raw(Box::new(SavedState { mark: STATE, instance })).cast()
+}
+
+/// The instance that is saved behind a handle, which the version's function calls by a name.
+pub unsafe fn saved_state<'a, M: Model, V: Version>(
+    call: &Call,
+    name: &str,
+    handle: *mut c_void,
+) -> Result<&'a mut Instance<M, V>, Fault> {
+    if handle.is_null() {
+        return Err(null(call, name));
+    }
+    if !unsafe { is_live::<SavedState<M, V>>(handle, STATE) } {
+        return Err(call.error(format_args!("argument {name} is not a saved state of this FMU")));
+    }
+    Ok(unsafe { &mut (*handle.cast::<SavedState<M, V>>()).instance })
+}
+
+/// Frees a saved state and clears the handle; NULL is fine. fmusim (0.0.39) gives the state itself in
+/// place of the handle's address: known by its mark, which no address equals, it is freed too.
+pub unsafe fn free_state<M: Model, V: Version>(
+    call: &Call,
+    name: &str,
+    handle: *mut *mut c_void,
+) -> Result<(), Fault> {
+    unsafe {
+        if handle.is_null() || (*handle).is_null() {
+            return Ok(());
+        }
+        let is_itself = ptr::read(handle.cast::<u64>()) == STATE;
+        let state = if is_itself { handle.cast() } else { *handle };
+        saved_state::<M, V>(call, name, state)?;
+        free::<SavedState<M, V>>(state);
+        if !is_itself {
+            *handle = ptr::null_mut();
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::call::Interface;
+    use crate::spring::Spring;
+    use crate::v2::Fmi2;
+    use std::cell::RefCell;
+    use std::rc::Rc;
+
+    #[test]
+    fn a_panic_is_fatal_and_told_with_its_text() {
+        let lines = Rc::new(RefCell::new(Vec::new()));
+        let to = lines.clone();
+        let log = Log::new(Some(Box::new(move |status, _, message| {
+            to.borrow_mut().push((status, message.to_str().unwrap().to_string()));
+        })));
+        let c = new_component(Instance::<Spring, Fmi2>::new(Interface::CoSimulation), log);
+        let number = 7;
+        let all: [(&str, &dyn Fn()); 3] = [
+            ("fmi2Reset panicked: a text", &|| panic!("a text")),
+            ("fmi2Reset panicked: number 7", &|| panic!("number {number}")),
+            ("fmi2Reset panicked: no text", &|| std::panic::panic_any(7)),
+        ];
+        for (says, panics) in all {
+            let status = unsafe {
+                on::<Spring, Fmi2>(c, Fmi2::RESET, |_| {
+                    panics();
+                    Ok(())
+                })
+            };
+            assert_eq!(status, FATAL);
+            assert_eq!(lines.take(), [(FATAL, says.to_string())]);
+        }
+        unsafe { free_component::<Spring, Fmi2>(c) };
+    }
+}

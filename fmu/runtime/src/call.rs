@@ -1,0 +1,301 @@
+//! What a call of a host is: the function's name and the instance states in which it may be called,
+//! as data; and what it is answered when it may not.
+//!
+//! The calls themselves are listed by each version of FMI (see [`Version`](crate::version::Version)).
+
+use std::fmt;
+
+/// What an instance is made for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Interface {
+    /// The host integrates.
+    ModelExchange = 0,
+    /// The FMU integrates.
+    CoSimulation = 1,
+}
+
+impl Interface {
+    /// As messages name it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Interface::ModelExchange => "Model Exchange",
+            Interface::CoSimulation => "Co-Simulation",
+        }
+    }
+}
+
+/// Who handles events.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Events {
+    /// The FMU, within the steps that it makes.
+    InStep,
+    /// The host, in event mode: what is discrete changes there alone.
+    ByHost,
+}
+
+/// The state of an instance, as in the state machines of the standard.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum InstanceState {
+    /// Just made, or reset.
+    Instantiated = 0,
+    /// Parameters and inputs are set, initial values can be read.
+    Initialization = 1,
+    /// Co-Simulation: ready for a step.
+    Stepping = 2,
+    /// At an event that the host handles.
+    Event = 3,
+    /// Model Exchange: between events.
+    Continuous = 4,
+    /// The simulation has ended: the last values can still be read.
+    Terminated = 5,
+    /// A step failed. The last values can be read, a saved state restored.
+    Failed = 6,
+    /// A call panicked. Only freeing is left.
+    Fatal = 7,
+    /// Event mode after initialization mode. Parameters can still be set, as
+    /// OpenModelica does; the first call that goes on makes it an event as any other.
+    Initialized = 8,
+}
+
+impl InstanceState {
+    /// All of them, each at the place of its number.
+    pub const ALL: [InstanceState; 9] = [
+        InstanceState::Instantiated,
+        InstanceState::Initialization,
+        InstanceState::Stepping,
+        InstanceState::Event,
+        InstanceState::Continuous,
+        InstanceState::Terminated,
+        InstanceState::Failed,
+        InstanceState::Fatal,
+        InstanceState::Initialized,
+    ];
+
+    /// As messages name it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            InstanceState::Instantiated => "instantiated",
+            InstanceState::Initialization => "initialization mode",
+            InstanceState::Stepping => "stepping",
+            InstanceState::Event | InstanceState::Initialized => "event mode",
+            InstanceState::Continuous => "continuous-time mode",
+            InstanceState::Terminated => "terminated",
+            InstanceState::Failed => "step failed",
+            InstanceState::Fatal => "fatal",
+        }
+    }
+
+    /// Whether an instance for this interface and with this policy can get there.
+    pub fn is_reachable(self, interface: Interface, events: Events) -> bool {
+        match self {
+            InstanceState::Stepping => interface == Interface::CoSimulation,
+            InstanceState::Continuous => interface == Interface::ModelExchange,
+            InstanceState::Event | InstanceState::Initialized => events == Events::ByHost,
+            _ => true,
+        }
+    }
+
+    const fn bit(self) -> u16 {
+        1 << self as u16
+    }
+}
+
+/// The C types that values are got and set with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum CType {
+    Real,
+    Integer,
+    Boolean,
+    String,
+}
+
+/// Sets of instance states, to write down where a call is allowed.
+#[allow(missing_docs)]
+pub(crate) mod states {
+    use super::InstanceState;
+
+    pub const I: u16 = InstanceState::Instantiated.bit();
+    pub const M: u16 = InstanceState::Initialization.bit();
+    pub const S: u16 = InstanceState::Stepping.bit();
+    pub const E: u16 = InstanceState::Event.bit() | InstanceState::Initialized.bit();
+    pub const C: u16 = InstanceState::Continuous.bit();
+    pub const T: u16 = InstanceState::Terminated.bit();
+    pub const F: u16 = InstanceState::Failed.bit();
+    /// All but fatal.
+    pub const ANY: u16 = I | M | S | E | C | T | F;
+    /// All in which the model moves or has moved.
+    pub const RUN: u16 = S | E | C | T | F;
+    pub const FATAL: u16 = InstanceState::Fatal.bit();
+}
+
+/// A function of one version of FMI, as far as an instance is concerned.
+#[derive(Debug)]
+pub struct Call {
+    /// The function's name, which messages begin with.
+    pub name: &'static str,
+    /// The states in which it may be called.
+    allowed: u16,
+    /// The C type of the values it passes, if that is its business.
+    pub c_type: Option<CType>,
+    /// The interface it belongs to, if not to both.
+    only_in: Option<Interface>,
+}
+
+impl Call {
+    /// A function that may be called in some [`states`].
+    pub(crate) const fn new(name: &'static str, allowed: u16) -> Call {
+        Call { name, allowed, c_type: None, only_in: None }
+    }
+
+    /// It passes values of a type.
+    pub(crate) const fn of(self, c_type: CType) -> Call {
+        Call { c_type: Some(c_type), ..self }
+    }
+
+    /// It belongs to one interface.
+    pub(crate) const fn only_in(self, interface: Interface) -> Call {
+        Call { only_in: Some(interface), ..self }
+    }
+
+    /// Whether an instance may be called like this in this state; if not, the message says where.
+    #[inline]
+    pub fn check(
+        &self,
+        interface: Interface,
+        events: Events,
+        state: InstanceState,
+    ) -> Result<(), Fault> {
+        let foreign = self.only_in.filter(|only| *only != interface);
+        if foreign.is_none() && self.allowed & state.bit() != 0 {
+            return Ok(());
+        }
+        self.refuse(foreign, interface, events, state)
+    }
+
+    #[cold]
+    fn refuse(
+        &self,
+        foreign: Option<Interface>,
+        interface: Interface,
+        events: Events,
+        state: InstanceState,
+    ) -> Result<(), Fault> {
+        if state == InstanceState::Fatal {
+            let text = "an earlier call panicked; the instance can only be freed";
+            return Err(Fault {
+                severity: Severity::Fatal,
+                text: format!("{}: {text}", self.name),
+            });
+        }
+        if let Some(other) = foreign {
+            return Err(self.error(format_args!(
+                "not allowed in state \"{}\": it belongs to {}, and this instance is for {}",
+                state.name(),
+                other.name(),
+                interface.name()
+            )));
+        }
+        let possible = InstanceState::ALL.iter().filter(|s| s.is_reachable(interface, events));
+        // To a host the first event mode is one as any other.
+        let possible = possible.filter(|s| **s != InstanceState::Initialized);
+        let allowed: Vec<_> =
+            possible.filter(|s| self.allowed & s.bit() != 0).map(|s| s.name()).collect();
+        Err(self.error(format_args!(
+            "not allowed in state \"{}\"; allowed in: {}",
+            state.name(),
+            allowed.join(", ")
+        )))
+    }
+
+    /// This call failed.
+    #[cold]
+    pub fn error(&self, why: impl fmt::Display) -> Fault {
+        Fault { severity: Severity::Error, text: format!("{}: {why}", self.name) }
+    }
+
+    /// This call has no answer, and nothing is wrong with the instance.
+    #[cold]
+    pub fn discard(&self, why: impl fmt::Display) -> Fault {
+        Fault { severity: Severity::Discard, text: format!("{}: {why}", self.name) }
+    }
+}
+
+/// How bad a failure is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Severity {
+    /// The call has no answer.
+    Discard,
+    /// The call was refused or failed.
+    Error,
+    /// The instance is unusable.
+    Fatal,
+}
+
+/// Why a call failed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fault {
+    /// What the call returns.
+    pub severity: Severity,
+    /// What the log says: the call, the variable, what is allowed.
+    pub text: String,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Events::{ByHost, InStep};
+    use super::*;
+    use crate::v2::{FREE_STATE, Fmi2, GET_REAL};
+    use crate::version::Version;
+
+    #[test]
+    fn states_stand_at_their_number() {
+        for (n, state) in InstanceState::ALL.iter().enumerate() {
+            assert_eq!(*state as usize, n);
+        }
+    }
+
+    const CS: Interface = Interface::CoSimulation;
+    const ME: Interface = Interface::ModelExchange;
+
+    #[test]
+    fn refusal_names_call_state_and_allowed_states() {
+        let fault = Fmi2::DO_STEP.check(CS, InStep, InstanceState::Instantiated).unwrap_err();
+        assert_eq!(
+            fault.text,
+            "fmi2DoStep: not allowed in state \"instantiated\"; allowed in: stepping"
+        );
+        let fault = Fmi2::TERMINATE.check(ME, ByHost, InstanceState::Initialization).unwrap_err();
+        assert_eq!(
+            fault.text,
+            "fmi2Terminate: not allowed in state \"initialization mode\"; allowed in: event mode, \
+             continuous-time mode, step failed"
+        );
+    }
+
+    #[test]
+    fn calls_of_the_other_interface_are_refused_and_say_so() {
+        let fault = Fmi2::DO_STEP.check(ME, ByHost, InstanceState::Event).unwrap_err();
+        assert_eq!(
+            fault.text,
+            "fmi2DoStep: not allowed in state \"event mode\": it belongs to Co-Simulation, and this \
+             instance is for Model Exchange"
+        );
+        assert!(Fmi2::SET_TIME.check(CS, InStep, InstanceState::Stepping).is_err());
+    }
+
+    #[test]
+    fn after_a_panic_everything_is_fatal_but_freeing() {
+        assert_eq!(
+            GET_REAL.check(CS, InStep, InstanceState::Fatal).unwrap_err().severity,
+            Severity::Fatal
+        );
+        assert_eq!(
+            Fmi2::DO_STEP.check(ME, ByHost, InstanceState::Fatal).unwrap_err().severity,
+            Severity::Fatal
+        );
+        assert_eq!(FREE_STATE.check(CS, InStep, InstanceState::Fatal), Ok(()));
+    }
+}

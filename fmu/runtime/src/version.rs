@@ -1,0 +1,50 @@
+//! What a version of FMI says of an instance: its functions' names, when they may be called, who
+//! handles events, and how value references number the variables.
+
+use crate::call::{CType, Call, Events, Interface};
+use crate::model::Model;
+use crate::table::Scalar;
+
+/// A version of FMI. Each constant is the call by which it asks for an operation of
+/// [`Instance`](crate::instance::Instance); getting and setting values, for which a version has several
+/// functions, name theirs themselves.
+#[allow(missing_docs)]
+pub trait Version: std::fmt::Debug + 'static {
+    /// What the names of its functions and types begin with.
+    const PREFIX: &'static str;
+
+    const SETUP_EXPERIMENT: &'static Call;
+    const ENTER_INITIALIZATION: &'static Call;
+    const EXIT_INITIALIZATION: &'static Call;
+    const TERMINATE: &'static Call;
+    const RESET: &'static Call;
+    const SET_STATE: &'static Call;
+    const DIRECTIONAL_DERIVATIVE: &'static Call;
+
+    const SET_INPUT_DERIVATIVES: &'static Call;
+    const GET_OUTPUT_DERIVATIVES: &'static Call;
+    const DO_STEP: &'static Call;
+
+    const ENTER_EVENT: &'static Call;
+    const NEW_DISCRETE_STATES: &'static Call;
+    const ENTER_CONTINUOUS_TIME: &'static Call;
+    const COMPLETED_STEP: &'static Call;
+    const SET_TIME: &'static Call;
+    const SET_CONTINUOUS_STATES: &'static Call;
+    const GET_DERIVATIVES: &'static Call;
+    const GET_EVENT_INDICATORS: &'static Call;
+    const GET_CONTINUOUS_STATES: &'static Call;
+    const GET_NOMINALS: &'static Call;
+
+    /// Who handles the events of an instance for this interface.
+    fn events(interface: Interface) -> Events;
+
+    /// The value reference of a scalar.
+    fn reference<M: Model>(scalar: &Scalar<M>) -> u32;
+
+    /// The scalar of a value reference, if its values pass as this C type; if not, why.
+    fn scalar<M: Model>(
+        reference: u32,
+        c_type: Option<CType>,
+    ) -> Result<&'static Scalar<M>, String>;
+}
