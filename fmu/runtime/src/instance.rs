@@ -436,6 +436,9 @@ impl<M: Model, V: Version> Instance<M, V> {
                 self.sloped = true;
             }
         }
+        if M::OUTPUTS_USE_SLOPES {
+            self.outputs = None;
+        }
         Ok(())
     }
 
