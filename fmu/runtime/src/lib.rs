@@ -31,3 +31,5 @@ extern crate self as runtime;
 #[cfg(test)]
 #[path = "../../../tests/spring/src/spring.rs"]
 mod spring;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,157 @@
+//! What the host's logger is told.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use super::*;
+use crate::c_abi::{self, Log, Status};
+use crate::log::{Category, Filter, Topic, categories};
+use crate::version::Version;
+
+/// Status, category, message.
+type Line = (Status, String, String);
+
+/// A log, and what has come through it.
+fn log() -> (Log, Rc<RefCell<Vec<Line>>>) {
+    let lines = Rc::new(RefCell::new(Vec::new()));
+    let to = lines.clone();
+    let logger = move |status, category: &std::ffi::CStr, message: &std::ffi::CStr| {
+        let text = |c: &std::ffi::CStr| c.to_str().unwrap().to_string();
+        to.borrow_mut().push((status, text(category), text(message)));
+    };
+    (Log::new(Some(Box::new(logger))), lines)
+}
+
+fn line(status: Status, category: &str, message: &str) -> Line {
+    (status, category.into(), message.into())
+}
+
+#[test]
+fn failures_come_with_status_and_category() {
+    let (mut log, lines) = log();
+    for (severity, status, category) in [
+        (Severity::Discard, c_abi::DISCARD, "logStatusDiscard"),
+        (Severity::Error, c_abi::ERROR, "logStatusError"),
+        (Severity::Fatal, c_abi::FATAL, "logStatusFatal"),
+    ] {
+        log.report(&Fault { severity, text: "100 %, \0 and all".into() });
+        assert_eq!(lines.take(), [line(status, category, "100 %,   and all")]);
+    }
+    log.filter = Filter::NONE;
+    log.report(&Fault { severity: Severity::Fatal, text: String::new() });
+    assert!(lines.take().is_empty());
+    // A host without a logger hears nothing.
+    Log::new(None).report(&Fault { severity: Severity::Fatal, text: String::new() });
+}
+
+#[test]
+fn events_are_told_to_those_who_ask_with_the_last_one_and_their_number() {
+    let (mut log, lines) = log();
+    let mut instance = started(CS, &[("z", 3.0)]);
+    set(&mut instance, "z", 1.0).unwrap();
+    instance.do_step(0.0, 0.5).unwrap();
+    log.report_event(Fmi2::DO_STEP, 0, &instance);
+    assert!(lines.take().is_empty());
+    log.filter = Filter::ALL;
+    log.report_event(Fmi2::DO_STEP, 0, &instance);
+    let message = "fmi2DoStep: valve closes at 0.5 s";
+    assert_eq!(lines.take(), [line(c_abi::OK, "logEvents", message)]);
+    log.report_event(Fmi2::DO_STEP, -1, &instance);
+    let message = "fmi2DoStep: valve closes at 0.5 s, the last of 2 events in this call";
+    assert_eq!(lines.take(), [line(c_abi::OK, "logEvents", message)]);
+    log.report_event(Fmi2::DO_STEP, 1, &instance);
+    assert!(lines.take().is_empty());
+}
+
+/// From the model that exists: with its parameters, its states and the inputs that act.
+#[test]
+fn warnings_are_of_the_model_that_begins_to_move() {
+    let mut instance = fresh(ME);
+    set(&mut instance, "leak", 6.0).unwrap();
+    set(&mut instance, "start.level[2]", 8.0).unwrap();
+    assert!(instance.warnings().is_empty());
+    instance.enter_initialization_mode().unwrap();
+    instance.exit_initialization_mode().unwrap();
+    set(&mut instance, "z", 1.5).unwrap();
+    instance.enter_event_mode().unwrap();
+    let warning = "leak 6 of 6, levels [8.0, 3.0], platform at 1.5 m";
+    assert_eq!(instance.warnings(), [warning]);
+    let (mut log, lines) = log();
+    log.report_warnings(&instance);
+    assert_eq!(lines.take(), [line(c_abi::WARNING, "logStatusWarning", warning)]);
+    log.filter = Filter::NONE;
+    log.report_warnings(&instance);
+    assert!(lines.take().is_empty());
+    assert!(started(CS, &[]).warnings().is_empty());
+}
+
+#[test]
+fn the_host_is_warned_once_of_how_it_drives_the_model() {
+    let (mut log, lines) = log();
+    let mut instance = continuous(&[]);
+    log.report_step_warning(&instance);
+    assert!(lines.take().is_empty());
+    instance.set_time(2.0).unwrap();
+    assert_eq!(instance.step_warning(), Some("the host's steps are long"));
+    log.filter = Filter::NONE;
+    log.report_step_warning(&instance);
+    log.filter = Filter::FAILURES;
+    log.report_step_warning(&instance);
+    log.report_step_warning(&instance);
+    let expected = line(c_abi::WARNING, "logStatusWarning", "the host's steps are long");
+    assert_eq!(lines.take(), [expected]);
+}
+
+#[test]
+fn categories_are_the_standards_and_events_only_where_there_are_some() {
+    let described = |all: Vec<Category>| -> Vec<(&str, String)> {
+        all.into_iter().map(|c| (c.name, c.description)).collect()
+    };
+    let all = described(categories::<_, Fmi2>(&TABLE));
+    let expected = [
+        ("logEvents", "The valve moves"),
+        ("logStatusWarning", "What the parameters leave of the range in which the model is known"),
+        ("logStatusDiscard", "Why a call returned fmi2Discard"),
+        ("logStatusError", "Why a call returned fmi2Error"),
+        ("logStatusFatal", "Why a call returned fmi2Fatal"),
+        ("logAll", "All of the above"),
+    ];
+    assert_eq!(all, expected.map(|(name, description)| (name, description.to_string())));
+    let without = described(categories::<_, Fmi2>(Spring::table()));
+    assert_eq!(without, all[1..]);
+}
+
+#[test]
+fn categories_are_switched_by_name() {
+    let all = [
+        Topic::Event,
+        Topic::Warning,
+        Topic::Failure(Severity::Discard),
+        Topic::Failure(Severity::Error),
+        Topic::Failure(Severity::Fatal),
+    ];
+    let wanted = |names: &[&str]| {
+        let names: Vec<String> = names.iter().map(|name| name.to_string()).collect();
+        Filter::of(&names, &TABLE).map(|filter| all.map(|topic| filter.wants(topic)))
+    };
+    assert_eq!(wanted(&[]), Ok([true; 5]));
+    assert_eq!(wanted(&["logAll"]), Ok([true; 5]));
+    assert_eq!(wanted(&["logEvents", "logStatusError"]), Ok([true, false, false, true, false]));
+    assert_eq!(
+        wanted(&["logStatusWarning", "logStatusDiscard"]),
+        Ok([false, true, true, false, false])
+    );
+    assert_eq!(
+        wanted(&["a", "logEvents", "b"]),
+        Err("unknown log category \"a\", \"b\"; known: logEvents, logStatusWarning, logStatusDiscard, \
+             logStatusError, logStatusFatal, logAll"
+            .into())
+    );
+    let events = Filter::of(&["logEvents".into()], Spring::table());
+    assert!(events.unwrap_err().ends_with(
+        "known: logStatusWarning, logStatusDiscard, \
+         logStatusError, logStatusFatal, logAll"
+    ));
+    assert_eq!(all.map(|topic| Filter::FAILURES.wants(topic)), [false, true, true, true, true]);
+    assert_eq!(all.map(|topic| Filter::NONE.wants(topic)), [false; 5]);
+}

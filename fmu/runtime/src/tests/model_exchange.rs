@@ -1,0 +1,157 @@
+//! Where the host integrates and handles events.
+
+use super::*;
+use crate::call::InstanceState;
+use crate::instance::EventInfo;
+
+#[test]
+fn states_derivatives_and_nominals_come_in_the_hosts_order() {
+    let mut instance = started(ME, &[]);
+    let mut x = [0.0; 2];
+    instance.continuous_states(&mut x).unwrap();
+    assert_eq!(x, [3.0, 4.0]);
+    instance.derivatives(&mut x).unwrap();
+    assert_eq!(x, [1.0 - 1.5, 2.0 - 2.0]);
+    instance.nominals(&mut x).unwrap();
+    assert_eq!(x, [5.0, 5.0]);
+    spring(ME).nominals(&mut x).unwrap();
+    assert_eq!(x, [1.0, 1.0]);
+    instance.set_continuous_states(&[6.0, 8.0]).unwrap();
+    assert_eq!((real(&mut instance, "level[1]"), real(&mut instance, "sum")), (6.0, 14.0));
+    assert_eq!(real(&mut instance, "der(level[2])"), 2.0 - 4.0);
+    let mut room = [0.0];
+    instance.event_indicators(&mut room).unwrap();
+    assert_eq!(room, [-2.0]);
+}
+
+#[test]
+fn arrays_of_another_length_are_refused() {
+    let mut instance = started(ME, &[]);
+    let long = &mut [0.0; 3];
+    let messages = [
+        unchanged(&mut instance, |i| i.continuous_states(long)),
+        unchanged(&mut instance, |i| i.set_continuous_states(&[1.0])),
+        unchanged(&mut instance, |i| i.derivatives(&mut [0.0; 3])),
+        unchanged(&mut instance, |i| i.nominals(&mut [0.0; 3])),
+        unchanged(&mut instance, |i| i.event_indicators(&mut [0.0; 2])),
+    ];
+    for (message, end) in messages.iter().zip([
+        "nx = 3 (allowed: 2)",
+        "nx = 1 (allowed: 2)",
+        "nx = 3 (allowed: 2)",
+        "nx = 3 (allowed: 2)",
+        "ni = 2 (allowed: 1)",
+    ]) {
+        assert!(message.ends_with(end), "{message}");
+    }
+}
+
+#[test]
+fn states_that_are_too_large_are_discarded() {
+    let mut instance = continuous(&[]);
+    for x in [f64::NAN, f64::INFINITY, 1e100, -1e100] {
+        let before = to_bytes(&instance);
+        let why = discarded(instance.set_continuous_states(&[1.0, x]));
+        let x = if x.is_nan() { "NaN".into() } else { format!("{x:?}") };
+        assert_eq!(
+            why,
+            format!("fmi2SetContinuousStates: level[2] = {x} (allowed: magnitudes below 1e100)")
+        );
+        assert_eq!(to_bytes(&instance), before);
+    }
+    assert_eq!(instance.set_continuous_states(&[0.99e100, -0.99e100]), Ok(()));
+}
+
+#[test]
+fn derivatives_that_are_not_finite_are_discarded() {
+    let mut instance = continuous(&[("leak", 1e300)]);
+    instance.set_continuous_states(&[0.0, 1e99]).unwrap();
+    let mut x = [0.0; 2];
+    assert_eq!(discarded(instance.derivatives(&mut x)), "fmi2GetDerivatives: der(level[2]) = -inf");
+}
+
+#[test]
+fn discrete_changes_happen_at_events_alone() {
+    let mut instance = continuous(&[("inspection", 5.0)]);
+    set(&mut instance, "z", 3.0).unwrap();
+    assert_eq!(get(&mut instance, "open"), Ok(Value::Boolean(false)));
+    assert_eq!(instance.completed_integrator_step(), Ok(true));
+    instance.enter_event_mode().unwrap();
+    let info = EventInfo { states_changed: true, next_time: Some(5.0) };
+    assert_eq!(instance.new_discrete_states(), Ok(info));
+    assert_eq!(get(&mut instance, "open"), Ok(Value::Boolean(true)));
+    assert_eq!(real(&mut instance, "level[1]"), 1.5);
+    assert_eq!((instance.event_count(), instance.time()), (1, 0.0));
+    // Once is enough.
+    let info = EventInfo { states_changed: false, next_time: Some(5.0) };
+    assert_eq!(instance.new_discrete_states(), Ok(info));
+    instance.enter_continuous_time_mode().unwrap();
+    assert_eq!(instance.completed_integrator_step(), Ok(false));
+    instance.set_time(5.0).unwrap();
+    assert_eq!(instance.time(), 5.0);
+    instance.enter_event_mode().unwrap();
+    assert_eq!(instance.new_discrete_states().unwrap().next_time, None);
+    set(&mut instance, "z", 101.0).unwrap();
+    assert_eq!(
+        unchanged(&mut instance, |i| i.new_discrete_states()),
+        "fmi2NewDiscreteStates: the platform is too high"
+    );
+}
+
+#[test]
+fn outputs_follow_what_the_host_sets() {
+    let mut instance = continuous(&[]);
+    assert_eq!(real(&mut instance, "sum"), 7.0);
+    instance.set_continuous_states(&[1.0, 1.0]).unwrap();
+    assert_eq!(real(&mut instance, "sum"), 2.0);
+    assert_eq!(
+        unchanged(&mut instance, |i| i.set_time(f64::NAN)),
+        "fmi2SetTime: time = NaN s (allowed: any finite number)"
+    );
+}
+
+#[test]
+fn states_that_mean_nothing_end_the_simulation() {
+    let mut instance = continuous(&[]);
+    instance.set_continuous_states(&[-2.0, 1.0]).unwrap();
+    assert_eq!(
+        refused(instance.completed_integrator_step()),
+        "fmi2CompletedIntegratorStep: a level is below the ground"
+    );
+    assert_eq!(instance.state(), InstanceState::Failed);
+}
+
+/// Within 1e-9 of the stop time, at least 1e-9 s, and the slack's own end included.
+#[test]
+fn accepted_steps_may_pass_the_stop_time_by_rounding_errors() {
+    for (stop, slack) in [(1000.0, 1e-6), (-1000.0, 1e-6), (0.0, 1e-9)] {
+        let mut instance = fresh(ME);
+        instance.setup_experiment(None, -2000.0, Some(stop)).unwrap();
+        instance.enter_initialization_mode().unwrap();
+        instance.exit_initialization_mode().unwrap();
+        instance.enter_continuous_time_mode().unwrap();
+        for share in [-1.0, 0.0, 0.9, 1.0] {
+            instance.set_time(stop + share * slack).unwrap();
+            assert_eq!(instance.completed_integrator_step(), Ok(false));
+        }
+        instance.set_time(stop + 1.1 * slack).unwrap();
+        let why = unchanged(&mut instance, |i| i.completed_integrator_step());
+        assert!(why.contains(&format!("has passed the stop time {stop:?} s")), "{why}");
+    }
+}
+
+#[test]
+fn model_without_events_has_none() {
+    let mut instance = spring(ME);
+    let info = EventInfo { states_changed: false, next_time: None };
+    assert_eq!(instance.new_discrete_states(), Ok(info));
+    instance.enter_continuous_time_mode().unwrap();
+    assert_eq!(instance.completed_integrator_step(), Ok(false));
+    assert_eq!(instance.event_indicators(&mut []), Ok(()));
+    assert_eq!((instance.event_count(), instance.last_event()), (0, String::new()));
+    assert_eq!((instance.warnings(), instance.step_warning()), (Vec::new(), None));
+    let mut inputs = [1.0, 0.0];
+    assert!(!Spring::set_dependent_slopes(&mut inputs, 1.0));
+    let Ok(mut model) = Spring::new(&Default::default(), &inputs, 0.0, 1e-6) else { panic!() };
+    assert_eq!(model.tune(&Default::default(), &inputs), Ok(()));
+}

@@ -1,0 +1,271 @@
+//! Steps of Co-Simulation, and inputs with slopes.
+
+use super::*;
+use crate::variable::Access;
+
+/// The level after `h` of one that leaks with k = 1/2.
+fn level(x: f64, q: f64, slope: f64, h: f64) -> f64 {
+    let e = (-0.5 * h).exp();
+    x * e + 2.0 * q * (1.0 - e) + 2.0 * slope * (h - 2.0 * (1.0 - e))
+}
+
+fn slope(instance: &mut Subject, name: &str, slope: f64) -> Result<(), Fault> {
+    instance.set_input_derivatives(&[reference(name)], &[1], &[slope])
+}
+
+fn rate(instance: &mut Subject, name: &str) -> Result<f64, Fault> {
+    let mut answer = [0.0];
+    instance.output_derivatives(&[reference(name)], &[1], &mut answer).map(|()| answer[0])
+}
+
+#[test]
+fn a_step_moves_the_model_along_the_inputs_slopes() {
+    let mut instance = started(CS, &[]);
+    slope(&mut instance, "q[1]", 2.0).unwrap();
+    instance.do_step(0.0, 0.5).unwrap();
+    assert_eq!(instance.time(), 0.5);
+    let x = level(3.0, 1.0, 2.0, 0.5);
+    close(real(&mut instance, "level[1]"), x, 1e-15);
+    close(real(&mut instance, "level[2]"), 4.0, 1e-15);
+    assert_eq!(real(&mut instance, "q[1]"), 2.0);
+    // The slope held for that step only.
+    instance.do_step(0.5, 0.25).unwrap();
+    close(real(&mut instance, "level[1]"), level(x, 2.0, 0.0, 0.25), 1e-15);
+    assert_eq!((real(&mut instance, "q[1]"), instance.time()), (2.0, 0.75));
+}
+
+#[test]
+fn a_step_has_a_length_and_begins_where_the_last_one_ended() {
+    let mut instance = started(CS, &[]);
+    for (h, text) in [(0.0, "0.0"), (-1.0, "-1.0"), (f64::NAN, "NaN"), (f64::INFINITY, "inf")] {
+        assert_eq!(
+            unchanged(&mut instance, |i| i.do_step(0.0, h)),
+            format!(
+                "fmi2DoStep: communicationStepSize = {text} s (allowed: greater than 0, finite)"
+            )
+        );
+    }
+    assert_eq!(
+        unchanged(&mut instance, |i| i.do_step(0.5, 1.0)),
+        "fmi2DoStep: currentCommunicationPoint = 0.5 s, but the last step ended at 0.0 s"
+    );
+    assert!(unchanged(&mut instance, |i| i.do_step(f64::NAN, 1.0)).contains("= NaN s"));
+    assert!(unchanged(&mut instance, |i| i.do_step(-0.5, 1.0)).contains("= -0.5 s"));
+}
+
+/// Hosts add up steps in their own way: times are the same within 1e-9 of the larger of time and step.
+#[test]
+fn communication_point_may_be_off_by_rounding_errors() {
+    for (start, h, slack) in [(100.0, 0.01, 1e-7), (-100.0, 0.01, 1e-7), (0.0, 1.0, 1e-9)] {
+        for sign in [-1.0, 1.0] {
+            let mut instance = fresh(CS);
+            instance.setup_experiment(None, start, None).unwrap();
+            instance.enter_initialization_mode().unwrap();
+            instance.exit_initialization_mode().unwrap();
+            let at = |share: f64| start + sign * share * slack;
+            unchanged(&mut instance, |i| i.do_step(at(1.1), h));
+            instance.do_step(at(0.9), h).unwrap();
+            assert_eq!(instance.time(), at(0.9) + h);
+        }
+    }
+}
+
+/// The same slack, its own end included, holds for the stop time.
+#[test]
+fn the_last_step_may_pass_the_stop_time_by_rounding_errors() {
+    for (start, stop, slack) in [(0.0, 1000.0, 1e-6), (-1100.0, -1000.0, 1e-6), (-1.0, 0.0, 1e-9)] {
+        let mut instance = fresh(CS);
+        instance.setup_experiment(None, start, Some(stop)).unwrap();
+        instance.enter_initialization_mode().unwrap();
+        instance.exit_initialization_mode().unwrap();
+        let to = |share: f64| stop + share * slack - start;
+        let why = unchanged(&mut instance, |i| i.do_step(start, to(1.1)));
+        assert!(why.contains(&format!("would pass the stop time {stop:?} s")), "{why}");
+        for share in [0.9, 0.0] {
+            assert_eq!(instance.clone().do_step(start, to(share)), Ok(()));
+        }
+    }
+    let mut instance = fresh(CS);
+    instance.setup_experiment(None, 0.0, Some(1000.0)).unwrap();
+    instance.enter_initialization_mode().unwrap();
+    instance.exit_initialization_mode().unwrap();
+    assert_eq!(instance.do_step(0.0, 1000.0 + 1e-9 * 1000.0), Ok(()));
+}
+
+#[test]
+fn a_step_to_the_stop_time_is_the_last() {
+    let mut instance = fresh(CS);
+    instance.setup_experiment(None, 0.0, Some(1.0)).unwrap();
+    instance.enter_initialization_mode().unwrap();
+    instance.exit_initialization_mode().unwrap();
+    instance.do_step(0.0, 1.0).unwrap();
+    assert_eq!(
+        unchanged(&mut instance, |i| i.do_step(1.0, 0.5)),
+        "fmi2DoStep: the step to 1.5 s would pass the stop time 1.0 s"
+    );
+}
+
+/// q may not fall below 1. A ramp from 4 down to it may miss it by 1e-9 of its height: it ends there.
+#[test]
+fn a_ramp_down_to_the_smallest_value_ends_there() {
+    let after = |end: f64| {
+        let mut instance = started(CS, &[("q[1]", 4.0)]);
+        slope(&mut instance, "q[1]", end - 4.0).unwrap();
+        let done = instance.do_step(0.0, 1.0);
+        done.map(|()| real(&mut instance, "q[1]"))
+    };
+    assert_eq!(after(1.0), Ok(1.0));
+    assert_eq!(after(1.0 - 2.7e-9), Ok(1.0));
+    assert_eq!(after(2.5), Ok(2.5));
+    assert!(refused(after(1.0 - 3.3e-9)).contains("at the end of the step q[1] = 0.9999"));
+    assert!(refused(after(0.5)).contains("at the end of the step q[1] = 0.5 m/s"));
+    assert!(refused(after(10.5)).contains("at the end of the step q[1] = 10.5 m/s"));
+    // What has no smallest value goes where its slope leads.
+    let mut instance = started(CS, &[]);
+    slope(&mut instance, "w", -2.0).unwrap();
+    instance.do_step(0.0, 1.0).unwrap();
+    assert_eq!((real(&mut instance, "w"), real(&mut instance, "z")), (-2.0, -1.0));
+}
+
+#[test]
+fn a_step_that_is_refused_keeps_the_slopes() {
+    let mut instance = started(CS, &[("w", 1.0)]);
+    slope(&mut instance, "w", 2.0).unwrap();
+    let why = unchanged(&mut instance, |i| i.do_step(0.0, 1.0));
+    assert!(why.contains("at the end of the step w = 3.0 m/s"), "{why}");
+    // Those of the step before, too.
+    instance.do_step(0.0, 0.5).unwrap();
+    assert!(instance.past_slopes);
+    let why = unchanged(&mut instance, |i| i.do_step(0.5, f64::MAX));
+    assert!(why.contains("at the end of the step z = inf m"), "{why}");
+}
+
+#[test]
+fn a_rate_given_as_an_input_moves_the_input_that_it_is_the_rate_of() {
+    let mut instance = started(CS, &[("z", 1.0), ("w", 0.5)]);
+    instance.do_step(0.0, 0.5).unwrap();
+    assert_eq!(real(&mut instance, "z"), 1.25);
+    slope(&mut instance, "w", 2.0).unwrap();
+    // Looking on from here: the platform rises at w, whatever w does later.
+    assert_eq!(rate(&mut instance, "room"), Ok(-0.5));
+    instance.do_step(0.5, 0.5).unwrap();
+    assert_eq!(real(&mut instance, "w"), 1.5);
+    assert_eq!(real(&mut instance, "z"), 1.25 + 0.5 * 0.5 + 0.5 * 2.0 * 0.25);
+}
+
+/// Outputs at the end of a step are limits from the left, with the slopes of that step; a new value or slope
+/// of any input begins the next one, without them.
+#[test]
+fn past_slopes_are_seen_until_an_input_is_set() {
+    let ramped = || {
+        let mut instance = started(CS, &[]);
+        slope(&mut instance, "q[1]", 2.0).unwrap();
+        assert_eq!(real(&mut instance, "trend"), 2.0);
+        instance.do_step(0.0, 0.5).unwrap();
+        assert!(instance.past_slopes && !instance.sloped);
+        assert_eq!(real(&mut instance, "trend"), 2.0);
+        instance
+    };
+    let mut set_anew = ramped();
+    set(&mut set_anew, "q[2]", 3.0).unwrap();
+    assert_eq!(real(&mut set_anew, "trend"), 0.0);
+    let mut sloped_anew = ramped();
+    slope(&mut sloped_anew, "q[2]", 0.25).unwrap();
+    let why = unchanged(&mut ramped(), |i| slope(i, "q[2]", f64::NAN));
+    assert!(why.contains("derivative of q[2] = NaN"), "{why}");
+    assert_eq!(real(&mut sloped_anew, "trend"), 0.25);
+    // Held through the next step, they are gone.
+    let mut held = ramped();
+    held.do_step(0.5, 0.5).unwrap();
+    assert_eq!(real(&mut held, "trend"), 0.0);
+    assert!(!held.past_slopes);
+    // Derivatives look forward: past slopes are no part of them, and stay.
+    let mut asked = ramped();
+    let net = real(&mut asked, "net[1]");
+    assert_eq!(rate(&mut asked, "net[1]"), Ok(-0.5 * net));
+    assert!(asked.past_slopes);
+    assert_eq!(real(&mut asked, "trend"), 2.0);
+}
+
+#[test]
+fn a_model_whose_outputs_use_no_slopes_keeps_none() {
+    let mut instance = spring(CS);
+    let force = Spring::table().find("F").unwrap();
+    instance.set_input_derivatives(&[force], &[1], &[3.0]).unwrap();
+    instance.do_step(0.0, 0.5).unwrap();
+    assert!(!instance.past_slopes);
+    let Access::Input(ramp) = Spring::table().inputs()[0].access else { panic!("F is an input") };
+    assert_eq!(ramp(&mut instance.inputs, 0).map(|x| *x), [1.5, 0.0]);
+}
+
+#[test]
+fn slopes_that_an_input_cannot_have_are_refused() {
+    let mut instance = started(CS, &[]);
+    let names = references(["q[1]", "w", "z"]);
+    assert_eq!(
+        unchanged(&mut instance, |i| i.set_input_derivatives(&names, &[1; 3], &[1.0, 9e9, 0.0])),
+        "fmi2SetRealInputDerivatives: derivative of w = 9000000000.0 (allowed: -7999999999.999999 to \
+         7999999999.999999 m/s/s)"
+    );
+    assert_eq!(
+        unchanged(&mut instance, |i| slope(i, "z", f64::INFINITY)),
+        "fmi2SetRealInputDerivatives: derivative of z = inf (allowed: any finite number)"
+    );
+    assert_eq!(
+        unchanged(&mut instance, |i| slope(i, "sum", 1.0)),
+        "fmi2SetRealInputDerivatives: sum is not an input"
+    );
+    assert_eq!(
+        unchanged(&mut instance, |i| i.set_input_derivatives(&names, &[1, 2, 1], &[0.0; 3])),
+        "fmi2SetRealInputDerivatives: order 2 of w (allowed: 1)"
+    );
+    assert_eq!(
+        unchanged(&mut instance, |i| i.output_derivatives(&names, &[1, 1, 0], &mut [0.0; 3])),
+        "fmi2GetRealOutputDerivatives: order 0 of z (allowed: 1)"
+    );
+    assert_eq!(slope(&mut instance, "w", 7.9e9), Ok(()));
+    assert_eq!(slope(&mut instance, "z", 1e300), Ok(()));
+}
+
+#[test]
+fn derivatives_of_outputs_follow_states_and_slopes() {
+    let mut instance = started(CS, &[]);
+    slope(&mut instance, "q[2]", 3.0).unwrap();
+    // net = q - k level, and level' = net.
+    assert_eq!(rate(&mut instance, "net[1]"), Ok(-0.5 * -0.5));
+    assert_eq!(rate(&mut instance, "net[2]"), Ok(3.0));
+    assert_eq!(rate(&mut instance, "level[1]"), Ok(-0.5));
+    assert_eq!(rate(&mut instance, "sum"), Ok(-0.5));
+    assert!(refused(rate(&mut instance, "leak")).contains("leak is not computed from states"));
+    assert!(refused(rate(&mut fresh(CS), "sum")).contains("not allowed in state"));
+}
+
+/// Between steps outputs are as the present inputs leave the valve, and the model is not changed by it.
+#[test]
+fn what_present_inputs_change_at_once_is_seen_and_undone() {
+    let mut instance = started(CS, &[]);
+    set(&mut instance, "z", 3.0).unwrap();
+    assert_eq!(get(&mut instance, "open"), Ok(Value::Boolean(true)));
+    set(&mut instance, "z", 1.0).unwrap();
+    assert_eq!(get(&mut instance, "open"), Ok(Value::Boolean(false)));
+    assert_eq!(get(&mut instance, "events"), Ok(Value::Integer(0)));
+    set(&mut instance, "z", 3.0).unwrap();
+    assert_eq!(get(&mut instance, "valve"), Ok(Value::Integer(2)));
+    // Had it stayed open, the step would see no event.
+    instance.do_step(0.0, 1e-9).unwrap();
+    assert_eq!(instance.event_count(), 1);
+    close(real(&mut instance, "level[1]"), 1.5, 1e-8);
+    assert_eq!(instance.last_event(), "valve opens at 0.000000001 s");
+}
+
+#[test]
+fn the_model_is_told_the_hosts_time_before_each_step() {
+    // Due at 100.5 s and half of the slack: the host is later than that.
+    let mut instance = fresh(CS);
+    set(&mut instance, "inspection", 100.5 + 0.5e-7).unwrap();
+    instance.setup_experiment(None, 100.0, None).unwrap();
+    instance.enter_initialization_mode().unwrap();
+    instance.exit_initialization_mode().unwrap();
+    instance.do_step(100.0 + 0.9e-7, 0.5).unwrap();
+    assert_eq!(instance.model.unwrap().next_time_event(), None);
+}

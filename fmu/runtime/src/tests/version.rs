@@ -1,0 +1,85 @@
+//! An instance in a version of FMI that is not 2.0: as in 3.0, one space of value references that begins
+//! elsewhere, and events that the host handles in Co-Simulation, too.
+
+use super::*;
+use crate::call::{CType, Call, Events, InstanceState};
+use crate::table::Scalar;
+use crate::version::Version;
+
+#[derive(Clone, Copy, Debug)]
+struct Other;
+
+const FIRST: u32 = 100;
+
+const fn call(name: &'static str) -> Call {
+    Call::new(name, u16::MAX)
+}
+
+static GET_FLOAT: Call = call("otherGetFloat").of(CType::Real);
+
+#[rustfmt::skip]
+impl Version for Other {
+    const PREFIX: &'static str = "other";
+
+    const SETUP_EXPERIMENT:       &'static Call = &call("otherEnterInitialization");
+    const ENTER_INITIALIZATION:   &'static Call = &call("otherEnterInitialization");
+    const EXIT_INITIALIZATION:    &'static Call = &call("otherExitInitialization");
+    const TERMINATE:              &'static Call = &call("otherTerminate");
+    const RESET:                  &'static Call = &call("otherReset");
+    const SET_STATE:              &'static Call = &call("otherSetState");
+    const DIRECTIONAL_DERIVATIVE: &'static Call = &call("otherDirectionalDerivative").of(CType::Real);
+
+    const SET_INPUT_DERIVATIVES:  &'static Call = &call("otherSetInputDerivatives").of(CType::Real);
+    const GET_OUTPUT_DERIVATIVES: &'static Call = &call("otherGetOutputDerivatives").of(CType::Real);
+    const DO_STEP:                &'static Call = &call("otherDoStep");
+
+    const ENTER_EVENT:            &'static Call = &call("otherEnterEventMode");
+    const NEW_DISCRETE_STATES:    &'static Call = &call("otherUpdateDiscreteStates");
+    const ENTER_CONTINUOUS_TIME:  &'static Call = &call("otherEnterContinuousTime");
+    const COMPLETED_STEP:         &'static Call = &call("otherCompletedStep");
+    const SET_TIME:               &'static Call = &call("otherSetTime");
+    const SET_CONTINUOUS_STATES:  &'static Call = &call("otherSetContinuousStates");
+    const GET_DERIVATIVES:        &'static Call = &call("otherGetDerivatives");
+    const GET_EVENT_INDICATORS:   &'static Call = &call("otherGetEventIndicators");
+    const GET_CONTINUOUS_STATES:  &'static Call = &call("otherGetContinuousStates");
+    const GET_NOMINALS:           &'static Call = &call("otherGetNominals");
+
+    fn events(_: Interface) -> Events {
+        Events::ByHost
+    }
+
+    fn reference<M: Model>(scalar: &Scalar<M>) -> u32 {
+        FIRST + scalar.index
+    }
+
+    fn scalar<M: Model>(reference: u32, _: Option<CType>) -> Result<&'static Scalar<M>, String> {
+        let index = reference.checked_sub(FIRST).ok_or("they begin at 100")?;
+        M::table().scalars.get(index as usize).ok_or("no such variable".into())
+    }
+}
+
+#[test]
+fn names_references_and_the_policy_of_events_are_the_versions() {
+    let mut instance = Instance::<Vessels, Other>::new(CS);
+    instance.enter_initialization_mode().unwrap();
+    instance.exit_initialization_mode().unwrap();
+    assert_eq!(instance.state(), InstanceState::Initialized);
+    let sum = TABLE.find("sum").unwrap();
+    let scalar = &TABLE.scalars[sum as usize];
+    assert_eq!((Other::reference(scalar), Fmi2::reference(scalar)), (sum + FIRST, sum));
+    assert_eq!(instance.get(&GET_FLOAT, sum + FIRST), Ok(Value::Real(7.0)));
+    assert_eq!(refused(instance.get(&GET_FLOAT, sum)), "otherGetFloat: they begin at 100");
+    assert_eq!(
+        refused(instance.do_step(0.0, -1.0)),
+        "otherDoStep: communicationStepSize = -1.0 s (allowed: greater than 0, finite)"
+    );
+    // The present inputs move no valve: the host has not handled an event yet.
+    let references = ["z", "open"].map(|name| TABLE.find(name).unwrap() + FIRST);
+    instance.set(&GET_FLOAT, &references[..1], |_| Value::Real(3.0)).unwrap();
+    assert_eq!(instance.get(&GET_FLOAT, references[1]), Ok(Value::Boolean(true)));
+    instance.enter_event_mode().unwrap();
+    instance.set(&GET_FLOAT, &references[..1], |_| Value::Real(1.0)).unwrap();
+    assert_eq!(instance.get(&GET_FLOAT, references[1]), Ok(Value::Boolean(true)));
+    instance.new_discrete_states().unwrap();
+    assert_eq!(instance.get(&GET_FLOAT, references[1]), Ok(Value::Boolean(false)));
+}
