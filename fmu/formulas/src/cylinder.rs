@@ -147,12 +147,70 @@ mod tests {
         assert!((pendulum(0, 0.163, 0.1, 1.0).wave / 0.068202 - 1.0).abs() < 1e-5);
     }
 
-    /// A film has no height: the liquid turns like a disk, R^2/4. A column is one: h^2/12 - 3 R^2/4
-    /// remain.
+    /// J1' = J0 - J1/x, between last digits of xi of opposite signs.
+    #[test]
+    fn the_table_holds_the_zeros_of_the_bessel_function_s_slope() {
+        for xi in XI {
+            let slope = |x: f64| libm::j0(x) - libm::j1(x) / x;
+            assert!(slope(xi * (1.0 - 1e-15)) * slope(xi * (1.0 + 1e-15)) < 0.0, "{xi}");
+        }
+    }
+
+    /// Of modes beyond the first, R = 1 m, h = 1 m: by hand with tanh(xi_2) = 0.99995313, its half 0.99037.
+    #[test]
+    fn the_second_mode_has_its_mass_length_and_hinge() {
+        let second = pendulum(1, 2.0, 1.0, 3.0);
+        let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-5, "{a} {b}");
+        near(second.mass, 3.0 * 2.0 * 0.999_953_13 / (5.331_442_77 * 27.424_282));
+        near(second.length, 1.0 / (5.331_442_77 * 0.999_953_13));
+        near(second.hinge, 1.0 - (0.990_37 - 0.009_681) / 5.331_442_77);
+        near(second.wave, 2.0 / 27.424_282);
+    }
+
+    /// The centre of mass of the whole, by every mode: bobs and rest.
+    #[test]
+    fn bobs_and_rest_have_the_liquid_s_mass_and_centre() {
+        let (d, h, m_liq) = (0.9, 0.6, 380.0);
+        let kept: [Pendulum; 3] = core::array::from_fn(|n| pendulum(n, d, h, m_liq));
+        let [m_0, h_0, _] = rest(d, h, m_liq, &kept);
+        let mass: f64 = m_0 + kept.iter().map(|p| p.mass).sum::<f64>();
+        let moment = m_0 * h_0 + kept.iter().map(|p| p.mass * (p.hinge - p.length)).sum::<f64>();
+        assert!((mass / m_liq - 1.0).abs() < 1e-15);
+        assert!((moment / (m_liq * h / 2.0) - 1.0).abs() < 1e-14);
+    }
+
+    /// What the surface does is told by the depth of a few radii: below, nothing changes, and nothing
+    /// overflows.
+    #[test]
+    fn a_deep_tank_s_pendulum_hangs_below_the_surface_as_in_any_deep_tank() {
+        let [deep, deeper] = [20.0, 1e6].map(|h| (h, pendulum(0, 2.0, h, h)));
+        assert!((deep.1.mass / deeper.1.mass - 1.0).abs() < 1e-15);
+        assert_eq!(deep.1.length, deeper.1.length);
+        let below = [deep, deeper].map(|(h, p)| h - p.hinge);
+        assert!((below[0] - 1.0 / XI[0]).abs() < 1e-14 && (below[1] - 1.0 / XI[0]).abs() < 1e-9);
+    }
+
+    /// From a length of which no fill is told the tank is 0.995 of the deepest: tanh(2 xi h/d) = 0.995.
+    #[test]
+    fn a_tank_too_deep_to_tell_is_taken_as_nearly_deep() {
+        let Pendulum { mass, length, .. } = pendulum(0, 1.0, 5.0, 5000.0);
+        let (d, h) = tank_of_first_mode(length, mass, 1000.0);
+        assert!((d / 0.995 - 1.0).abs() < 1e-14);
+        assert!((libm::tanh(2.0 * XI[0] * h / d) - 0.995).abs() < 1e-15);
+    }
+
+    /// A film has no height: the liquid turns like a disk, R^2/4; for a film the
+    /// integral in place of the last zeros lacks 8/(12 pi end^3), end = 400 pi + 1.6. A column is one: h^2/12 - 3 R^2/4 remain.
     #[test]
     fn the_capped_inertia_has_its_limits() {
-        let film = capped_inertia(2.0, 1e-3);
-        assert!((film - 0.25).abs() < 1e-3, "{film}");
+        let film = capped_inertia(2.0, 1e-12);
+        assert!((film - (0.25 - 1.068e-10)).abs() < 1e-12, "{film}");
+        let twice = capped_inertia(4.0, 1e-12);
+        assert!((twice / film - 4.0).abs() < 1e-12, "{twice}");
+        let column = capped_inertia(2.0, 1e3);
+        let sum = 16.0 / 1e3
+            * (1..=10).map(|n| 1.0 / (XI[n - 1].powi(3) * (XI[n - 1].powi(2) - 1.0))).sum::<f64>();
+        assert!((column - (1e6 / 12.0 - 0.75) - sum).abs() < 1e-6, "{column}");
         let column = capped_inertia(2.0, 1e4);
         assert!((column / (1e8 / 12.0) - 1.0).abs() < 1e-7, "{column}");
     }
@@ -162,5 +220,9 @@ mod tests {
     fn mcmahon_s_zeros_continue_the_table() {
         let tenth = mcmahon(10);
         assert!((tenth - XI[9]).abs() < 1e-7, "{tenth} {}", XI[9]);
+        assert_eq!((zero(1), zero(10)), (XI[0], XI[9]));
+        // as libm's J1' has it: the 11th is 1e-8 of the expansion's next term
+        let eleventh = zero(11);
+        assert!((libm::j0(eleventh) - libm::j1(eleventh) / eleventh).abs() < 1e-8, "{eleventh}");
     }
 }

@@ -126,14 +126,75 @@ mod tests {
         );
     }
 
+    /// Shallow, where sign and size of every term count: x = 0.2, 1 and 2; twelve digits of the published
+    /// formula, evaluated elsewhere.
+    #[test]
+    fn mikishev_and_dorozhkin_s_bottom_counts_in_shallow_liquid_and_changes_sign_above_the_radius()
+    {
+        let (r, nu, g) = (0.0815, 9.1312e-7, 9.81);
+        for (x, zeta) in [
+            (0.2, 0.006928328365141964),
+            (0.5, 0.003928811830428135),
+            (1.0, 0.0030862117706254165),
+            (2.0, 0.002839065877108384),
+        ] {
+            assert!((mikishev_dorozhkin(r, x * r, nu, g) / zeta - 1.0).abs() < 1e-12, "{x}");
+        }
+        // So deep that sinh would overflow, nothing of it is left.
+        assert_eq!(mikishev_dorozhkin(r, 1e4 * r, nu, g), 0.79 * sqrt(inverse_reynolds(r, nu, g)));
+    }
+
+    /// As twice the bottom's share where x is small: 2 (1 - x)/sinh 3.68 x.
+    #[test]
+    fn stephens_s_bottom_counts_in_shallow_liquid() {
+        let deep = stephens(1.0, 5.0, 1e-6, 9.81);
+        let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-4, "{a} {b}");
+        // x = 1/2: sinh 1.84 = 3.06896, tanh 0.92 = 0.72590
+        near(stephens(1.0, 0.5, 1e-6, 9.81) / deep, (1.0 + 1.0 / 3.06896) / pow(0.72590, 0.25));
+        // x = 2: sinh 7.36 = 785.92, tanh 3.68 = 0.998729
+        near(stephens(1.0, 2.0, 1e-6, 9.81) / deep, (1.0 - 2.0 / 785.92) / pow(0.998729, 0.25));
+        near(stephens(1.0, 1e4, 1e-6, 9.81) / deep, 1.0);
+    }
+
+    /// Where a correlation has no end it is held: a sphere at 0.1 and 1.9 radii, a cone at 0 and 45 degrees.
+    #[test]
+    fn correlations_without_bound_are_held_at_their_ends() {
+        let sphere = |x: f64| sphere(1.0, x, 1e-6, 9.81);
+        assert_eq!((sphere(0.01), sphere(1.99)), (sphere(0.1), sphere(1.9)));
+        assert!(sphere(0.11) < sphere(0.1) && sphere(1.89) != sphere(1.9));
+        // full to 1.9 radii: (1 + 0.046)/0.146 of half full
+        assert!((sphere(1.9) / sphere(1.0) / (1.046 / 0.146) - 1.0).abs() < 1e-12);
+        let cone = |b: f64| cone(1.0, b, 1e-6, 9.81);
+        assert_eq!((cone(-5.0), cone(60.0)), (cone(0.0), cone(45.0)));
+        // b = 20 and 40 degrees: C5 1.2557 and 1.5077, C4 0.819 and 0.397
+        let both = cone(40.0) / cone(20.0);
+        assert!((both / (1.5077 / 1.2557 * sqrt(0.819 / 0.397)) - 1.0).abs() < 1e-12, "{both}");
+    }
+
+    /// y = 1, full: the sum of the coefficients; the measured tank's Re in another tank by its root.
+    #[test]
+    fn the_torus_has_its_fit_and_grows_with_the_root_of_its_number() {
+        let full = torus(0.0635, 2.0 * 0.0635, 3.3e-6, 9.81);
+        assert!((full * TAU / (1.6629 - 3.7955 + 3.5583 - 1.6759 + 0.3865) - 1.0).abs() < 1e-12);
+        assert!((torus_number(0.0635, 3.3e-6, 9.81) - 1.0).abs() < 1e-15);
+        assert!((torus(4.0 * 0.0635, 8.0 * 0.0635, 8.0 * 3.3e-6, 9.81) / full - 1.0).abs() < 1e-14);
+        let quarter = torus(0.0635, 0.5 * 0.0635, 4.0 * 3.3e-6, 9.81);
+        let fit = 1.6629 / 256.0 - 3.7955 / 64.0 + 3.5583 / 16.0 - 1.6759 / 4.0 + 0.3865;
+        assert!((quarter * TAU / (2.0 * fit) - 1.0).abs() < 1e-12);
+    }
+
     /// alpha = 0.19 at w/R = 0.1; by hand, four digits.
     #[test]
     fn the_ring_has_the_damping_of_miles() {
         let zeta = miles_ring(1.0, 0.1, 0.1, 0.04);
         assert!((zeta / (2.83 * 0.63128 * 0.082819 * 0.2) - 1.0).abs() < 1e-4, "{zeta}");
         assert!((motion_at_ring(2.0, 0.2) / 0.83194 - 1.0).abs() < 1e-4);
-        // Four times the wave has twice the damping.
+        // Four times the wave has twice the damping; all lengths twice, the same.
         assert!((miles_ring(1.0, 0.1, 0.1, 0.16) / zeta - 2.0).abs() < 1e-14);
+        assert!((miles_ring(2.0, 0.2, 0.2, 0.08) / zeta - 1.0).abs() < 1e-14);
+        assert!((covered(2.0, 0.2) - 0.19).abs() < 1e-15);
+        assert_eq!(motion_at_ring(1.0, 1e9), motion_at_ring(1.0, 1e6));
+        assert!(motion_at_ring(1.0, 1e9) > 0.0);
     }
 
     /// beta = 10/m, nu = 8e-6 m2/s, omega = 4 rad/s: 10 sqrt(2.5e-7).

@@ -109,6 +109,35 @@ mod tests {
         assert!((liquid.radius_by_cube(bond, 2.0) - 0.25).abs() < 1e-16);
     }
 
+    /// The thesis's limits, each within its lower or upper range.
+    #[test]
+    fn regimes_and_agilities_change_at_their_limits() {
+        let regimes = [1001.0, 1000.0, 31.0, 30.0, 1.1, 1.0].map(|bond| &regime(bond)[..5]);
+        assert_eq!(regimes, ["high ", "low g", "low g", "micro", "micro", "capil"]);
+        let agilities = [4.9e-5, 5e-5, 5e-4, 5.1e-4].map(agility);
+        assert_eq!(agilities, ["low agility", "medium agility", "medium agility", "high agility"]);
+    }
+
+    /// Of powers of two, so that roots are exact: lambda 4, densities 2, gravity 1/4.
+    #[test]
+    fn froude_s_factors_are_those_of_the_table() {
+        let factors = froude(4.0, 2.0, 0.25).map(|(name, _, factor)| (name, factor));
+        let expected = [
+            ("length", 4.0),
+            ("time", 4.0),
+            ("frequency", 0.25),
+            ("velocity", 1.0),
+            ("acceleration", 0.25),
+            ("angular acceleration", 0.0625),
+            ("mass", 128.0),
+            ("force", 32.0),
+            ("moment", 128.0),
+            ("pressure", 2.0),
+        ];
+        assert_eq!(factors, expected);
+        assert_eq!(froude_viscosity(16.0, 0.25), 32.0);
+    }
+
     #[test]
     fn froude_keeps_the_ratio_of_inertia_to_gravity() {
         let factor = |name: &str, all: [(&str, &str, f64); 10]| {

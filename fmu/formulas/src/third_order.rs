@@ -111,6 +111,37 @@ mod tests {
         }
     }
 
+    /// Twelve digits of the same shifts by Lagrange's averaged function: its stationary values by solving for
+    /// the excited modes, integrals by Gauss's rule, Bessel functions by their integral. Signs and sizes of every
+    /// term, close to the resonance at 0.15 as well.
+    #[test]
+    fn coefficients_are_those_of_the_averaged_lagrangian() {
+        for (fill, s, kappa) in [
+            (0.2, -38.74226735998278, 22.32712645333884),
+            (0.6135, 1.1444681651736963, 0.8416439361254805),
+            (1.227, 1.407640267347122, 0.7341692160456458),
+            (2.0, 1.4502237597113634, 0.7298828599314776),
+            (5.0, 1.4524171652692395, 0.7298748807366736),
+        ] {
+            let found = coefficients(fill);
+            assert!((found.0 / s - 1.0).abs() < 1e-11, "{fill} {found:?}");
+            assert!((found.1 / kappa - 1.0).abs() < 1e-11, "{fill} {found:?}");
+        }
+    }
+
+    /// Fills where twice the first mode's frequency is 0.95 % off that of (0, 1), (2, 2), (0, 2); and 1.05 %.
+    #[test]
+    fn a_secondary_resonance_ends_one_per_cent_off() {
+        for (near, beyond, mode) in [
+            ([0.131207, 0.171408], [0.128838, 0.173340], (0, 1)),
+            ([0.781046, 0.892573], [0.776228, 0.899858], (2, 2)),
+            ([0.919713, 1.143618], [0.911728, 1.162381], (0, 2)),
+        ] {
+            assert_eq!(near.map(secondary_resonance), [Some(mode); 2]);
+            assert!(beyond.iter().all(|fill| secondary_resonance(*fill).is_none()));
+        }
+    }
+
     #[test]
     fn secondary_resonances_are_known_by_their_mode() {
         assert_eq!(secondary_resonance(0.831), Some((2, 2)));
