@@ -206,7 +206,7 @@ pub(super) fn provenance(campaign: &Campaign, fmu: &Fmu, results: &Results) -> M
     let analysed = results.outcomes.first().map(|run| &run.case);
     let first = analysed.or_else(|| results.unanalysed.first().map(|run| &run.case));
     let plan = &campaign.plan;
-    let settings: Vec<_> = plan.set().iter().map(|(k, v)| format!("{k} = {v}")).collect();
+    let settings: Vec<_> = plan.set().map(|(k, v)| format!("{k} = {v}")).collect();
     let tolerance =
         match (first.and_then(|c| c.tolerance), description.default_experiment.tolerance) {
             (Some(t), _) => t.to_string(),

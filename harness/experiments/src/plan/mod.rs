@@ -1,19 +1,24 @@
 //! A campaign's plan: a TOML file, read, checked and expanded into runs. The format by example:
 //! `book/campaigns.md`.
 
+mod file;
+mod problems;
+mod random;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use anyhow::{Context, Result, bail, ensure};
-use toml::Value;
 
 use crate::profile::{Torque, Written};
 use crate::rounding::thousandths;
 use crate::run::{Run, driven};
-use analysis::random::Random;
 use host::budget;
-use host::description::{self, ModelDescription, Type, did_you_mean};
+use host::description::{ModelDescription, did_you_mean};
 use host::output::sha256;
+
+use self::problems::{Lines, Problems};
+use self::random::Draws;
 
 /// Slosh models of the default campaign: what the thesis's synthetic data have, and what its bench
 /// does.
@@ -26,31 +31,40 @@ pub const AMPLITUDES: [f64; 11] =
 
 /// Plans that come with the program: their names and texts.
 pub const BUILT_IN: &[(&str, &str)] = &[
-    ("thesis", include_str!("../../campaigns/thesis.toml")),
-    ("thesis_models", include_str!("../../campaigns/thesis_models.toml")),
-    ("t1_resonance", include_str!("../../campaigns/t1_resonance.toml")),
-    ("t2_mass", include_str!("../../campaigns/t2_mass.toml")),
-    ("t3_diameter", include_str!("../../campaigns/t3_diameter.toml")),
-    ("t4_distance", include_str!("../../campaigns/t4_distance.toml")),
-    ("t5_near_resonance", include_str!("../../campaigns/t5_near_resonance.toml")),
-    ("t6_high_amplitude", include_str!("../../campaigns/t6_high_amplitude.toml")),
-    ("t7_on_the_axis", include_str!("../../campaigns/t7_on_the_axis.toml")),
-    ("fills", include_str!("../../campaigns/fills.toml")),
-    ("amplitudes", include_str!("../../campaigns/amplitudes.toml")),
-    ("monte_carlo", include_str!("../../campaigns/monte_carlo.toml")),
-    ("low_thrust", include_str!("../../campaigns/low_thrust.toml")),
-    ("slew", include_str!("../../campaigns/slew.toml")),
+    ("thesis", include_str!("../../../campaigns/thesis.toml")),
+    ("thesis_models", include_str!("../../../campaigns/thesis_models.toml")),
+    ("t1_resonance", include_str!("../../../campaigns/t1_resonance.toml")),
+    ("t2_mass", include_str!("../../../campaigns/t2_mass.toml")),
+    ("t3_diameter", include_str!("../../../campaigns/t3_diameter.toml")),
+    ("t4_distance", include_str!("../../../campaigns/t4_distance.toml")),
+    ("t5_near_resonance", include_str!("../../../campaigns/t5_near_resonance.toml")),
+    ("t6_high_amplitude", include_str!("../../../campaigns/t6_high_amplitude.toml")),
+    ("t7_on_the_axis", include_str!("../../../campaigns/t7_on_the_axis.toml")),
+    ("fills", include_str!("../../../campaigns/fills.toml")),
+    ("amplitudes", include_str!("../../../campaigns/amplitudes.toml")),
+    ("monte_carlo", include_str!("../../../campaigns/monte_carlo.toml")),
+    ("low_thrust", include_str!("../../../campaigns/low_thrust.toml")),
+    ("slew", include_str!("../../../campaigns/slew.toml")),
 ];
 
 /// The communication step of a plan that names none: the thesis's IMU at 50 Hz, s.
 const STEP: f64 = 0.02;
 /// What the interface's file names `<model>_<fill>mm_<amplitude>` are made of.
 const NAMING: [&str; 3] = ["slosh.model", "tank.h", "profile.amplitude"];
-/// How often a number is drawn again that lies outside its bounds.
-const MOST_DRAWS: usize = 10_000;
 
-/// Names (FMU variables, `profile`, `profile.PARAMETER`) and the texts of their values.
-type Values = Vec<(String, String)>;
+/// What a file says of a name: an FMU variable, `profile`, `profile.PARAMETER`.
+#[derive(Clone, Debug)]
+struct Named<T> {
+    name: String,
+    value: T,
+    lines: Lines,
+}
+
+impl<T> Named<T> {
+    fn map<U>(self, f: impl FnOnce(T) -> U) -> Named<U> {
+        Named { name: self.name, value: f(self.value), lines: self.lines }
+    }
+}
 
 /// What a campaign is to do.
 #[derive(Clone, Debug)]
@@ -59,16 +73,16 @@ pub struct Plan {
     pub title: String,
     /// The file's text.
     pub text: String,
-    profile: Written,
+    profile: Named<Written>,
     step: f64,
-    stop: Option<f64>,
+    stop: Option<Named<f64>>,
     tolerance: Option<f64>,
     hold: bool,
-    input: Option<String>,
-    set: Values,
-    vary: Vec<(String, Vec<String>)>,
+    input: Option<Named<String>>,
+    set: Vec<Named<String>>,
+    vary: Vec<Named<Vec<String>>>,
     listed: Vec<Listed>,
-    count: Vec<(String, i64)>,
+    count: Vec<Named<i64>>,
     draws: Option<Draws>,
 }
 
@@ -93,41 +107,7 @@ pub struct Sweeps {
 #[derive(Clone, Debug, Default)]
 struct Listed {
     name: Option<String>,
-    values: Values,
-}
-
-/// `[random]`.
-#[derive(Clone, Debug)]
-struct Draws {
-    runs: usize,
-    seed: u64,
-    draw: Vec<(String, Distribution)>,
-}
-
-/// Where a random value comes from; drawn again while outside `min` to `max` and the bounds of the
-/// variable itself.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Distribution {
-    kind: Kind,
-    min: f64,
-    max: f64,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Kind {
-    Normal {
-        mean: f64,
-        deviation: f64,
-    },
-    Uniform {
-        from: f64,
-        to: f64,
-    },
-    /// `deviation` is that of the natural logarithm.
-    Lognormal {
-        median: f64,
-        deviation: f64,
-    },
+    values: Vec<Named<String>>,
 }
 
 /// One run of a plan.
@@ -155,7 +135,7 @@ pub struct Case {
     /// The input that the torque drives; `None`: none.
     pub input: Option<String>,
     /// Start values by FMU name.
-    pub settings: Values,
+    pub settings: Vec<(String, String)>,
     /// Communication step, s.
     pub step: f64,
     /// Stop time, s.
@@ -182,33 +162,6 @@ impl Case {
     }
 }
 
-/// What is wrong, each once, in the order found.
-#[derive(Default)]
-struct Problems(Vec<String>);
-
-impl Problems {
-    fn add(&mut self, problem: impl Into<String>) {
-        let problem = problem.into();
-        if !self.0.contains(&problem) {
-            self.0.push(problem);
-        }
-    }
-
-    /// Takes the value, or notes what `place` is wrong with.
-    fn take<T>(&mut self, place: &str, result: Result<T>) -> Option<T> {
-        result.map_err(|error| self.add(format!("{place}{error:#}"))).ok()
-    }
-
-    /// Fails if there are any.
-    fn check(self) -> Result<()> {
-        match &self.0[..] {
-            [] => Ok(()),
-            [one] => bail!("{one}"),
-            many => bail!("{} problems:\n  {}", many.len(), many.join("\n  ")),
-        }
-    }
-}
-
 impl Plan {
     /// Reads a plan file, or takes the built-in plan of that name.
     pub fn read(file: &str) -> Result<Self> {
@@ -231,84 +184,13 @@ impl Plan {
 
     /// Reads a plan's text. Names are checked against the FMU by [`Plan::cases`].
     pub fn parse(text: &str) -> Result<Self> {
-        let table: toml::Table = text.parse().context("it is not TOML")?;
         let mut problems = Problems::default();
-        const KEYS: [&str; 11] = [
-            "title",
-            "profile",
-            "input",
-            "step",
-            "stop",
-            "tolerance",
-            "hold",
-            "set",
-            "vary",
-            "run",
-            "random",
-        ];
-        known(&mut problems, "", &table, &[&KEYS[..], &["count"]].concat());
-
-        let title = text_at(&mut problems, &table, "title").unwrap_or_default();
-        let profile = text_at(&mut problems, &table, "profile");
-        if profile.is_none() && !table.contains_key("profile") {
-            problems.add("it has no profile, such as profile = \"exp-sweep:amplitude=0.1\"");
+        let plan = file::read(text, &mut problems);
+        if let Some(plan) = &plan {
+            plan.each_name_once(&mut problems);
         }
-        let profile = profile.and_then(|text| problems.take("", text.parse::<Written>()));
-        let input = text_at(&mut problems, &table, "input");
-        let step = positive_at(&mut problems, &table, "step").unwrap_or(STEP);
-        let stop = positive_at(&mut problems, &table, "stop");
-        let tolerance = positive_at(&mut problems, &table, "tolerance");
-        let hold = match table.get("hold") {
-            None => false,
-            Some(Value::Boolean(hold)) => *hold,
-            Some(other) => {
-                problems.add(format!("hold expects true or false, not {other}"));
-                false
-            }
-        };
-
-        let set = table_at(&mut problems, &table, "set")
-            .map(|set| values(&mut problems, "[set]", set))
-            .unwrap_or_default();
-        for (name, _) in &set {
-            if name == "profile" || name.starts_with("profile.") {
-                problems.add(format!("[set] {name}: write it into profile = \"…\""));
-            }
-        }
-        let vary = table_at(&mut problems, &table, "vary")
-            .map(|vary| lists(&mut problems, vary))
-            .unwrap_or_default();
-        let count = table_at(&mut problems, &table, "count")
-            .map(|count| counts(&mut problems, count))
-            .unwrap_or_default();
-        let listed = listed(&mut problems, &table);
-        let draws = table_at(&mut problems, &table, "random")
-            .and_then(|random| draws(&mut problems, random));
-
-        let plan = match profile {
-            Some(profile) => Plan {
-                title,
-                text: text.into(),
-                profile,
-                step,
-                stop,
-                tolerance,
-                hold,
-                input,
-                set,
-                vary,
-                listed,
-                count,
-                draws,
-            },
-            None => {
-                problems.check()?;
-                bail!("it has no profile");
-            }
-        };
-        plan.each_name_once(&mut problems);
         problems.check()?;
-        Ok(plan)
+        plan.context("it has no profile")
     }
 
     /// The thesis's sweeps for every one of these models, fills and amplitudes.
@@ -318,19 +200,22 @@ impl Plan {
     pub fn sweeps(sweeps: Sweeps) -> Result<Self> {
         let Sweeps { models, fills, amplitudes, profile, set, tolerance } = sweeps;
         let numbers = |values: Vec<f64>| values.iter().map(f64::to_string).collect();
-        let vary: [(&str, Vec<String>); 3] =
-            [(NAMING[0], models), (NAMING[1], numbers(fills)), (NAMING[2], numbers(amplitudes))];
+        fn named<T>(name: &str, value: T) -> Named<T> {
+            Named { name: name.into(), value, lines: Lines::default() }
+        }
+        let varied = [models, numbers(fills), numbers(amplitudes)];
+        let vary = NAMING.iter().zip(varied).map(|(name, values)| named(name, values));
         let mut plan = Plan {
             title: "Sweeps at several fills and amplitudes".into(),
             text: String::new(),
-            profile: format!("{profile}:f0=1.25,f1=3.5,duration=2700").parse()?,
+            profile: named("profile", format!("{profile}:f0=1.25,f1=3.5,duration=2700").parse()?),
             step: STEP,
             stop: None,
             tolerance,
             hold: false,
             input: None,
-            set,
-            vary: vary.map(|(name, values)| (name.to_string(), values)).into(),
+            set: set.into_iter().map(|(name, value)| named(&name, value)).collect(),
+            vary: vary.collect(),
             listed: Vec::new(),
             count: Vec::new(),
             draws: None,
@@ -346,32 +231,39 @@ impl Plan {
     fn written(&self) -> Result<String> {
         let mut table = toml::Table::new();
         table.insert("title".into(), self.title.clone().into());
-        table.insert("profile".into(), self.profile.to_string().into());
+        table.insert("profile".into(), self.profile.value.to_string().into());
         if let Some(tolerance) = self.tolerance {
             table.insert("tolerance".into(), tolerance.into());
         }
-        let set = self.set.iter().map(|(name, value)| (name.clone(), value.as_str().into()));
+        let set = self.set.iter().map(|set| (set.name.clone(), set.value.as_str().into()));
         table.insert("set".into(), set.collect::<toml::Table>().into());
-        let vary = self.vary.iter().map(|(name, values)| (name.clone(), values.clone().into()));
+        let vary = self.vary.iter().map(|vary| (vary.name.clone(), vary.value.clone().into()));
         table.insert("vary".into(), vary.collect::<toml::Table>().into());
         Ok(toml::to_string(&table)?)
     }
 
     /// A name may be set, varied, listed, counted or drawn, but only one of these.
     fn each_name_once(&self, problems: &mut Problems) {
-        let mut owner: BTreeMap<&str, &str> = BTreeMap::new();
-        let listed: BTreeSet<&str> =
-            self.listed.iter().flat_map(|run| run.values.iter().map(|(n, _)| n.as_str())).collect();
-        let named = (self.set.iter().map(|(n, _)| (n.as_str(), "[set]")))
-            .chain(self.vary.iter().map(|(n, _)| (n.as_str(), "[vary]")))
-            .chain(listed.into_iter().map(|n| (n, "[[run]]")))
-            .chain(self.count.iter().map(|(n, _)| (n.as_str(), "[count]")))
-            .chain(
-                self.draws.iter().flat_map(|d| &d.draw).map(|(n, _)| (n.as_str(), "[random.draw]")),
-            );
-        for (name, place) in named {
-            if let Some(other) = owner.insert(name, place) {
-                problems.add(format!("{name} stands in {other} and in {place}"));
+        fn all<'a, T>(
+            named: &'a [Named<T>],
+            place: &'static str,
+        ) -> impl Iterator<Item = (&'a str, &'static str, &'a Lines)> {
+            named.iter().map(move |one| (one.name.as_str(), place, &one.lines))
+        }
+        let mut owner: BTreeMap<&str, (&str, &Lines)> = BTreeMap::new();
+        let listed = self.listed.iter().flat_map(|run| all(&run.values, "[[run]]"));
+        let named = all(&self.set, "[set]")
+            .chain(all(&self.vary, "[vary]"))
+            .chain(listed)
+            .chain(all(&self.count, "[count]"))
+            .chain(self.draws.iter().flat_map(|draws| all(&draws.draw, "[random.draw]")));
+        for (name, place, lines) in named {
+            match owner.insert(name, (place, lines)) {
+                Some((other, others)) if other != place => {
+                    let both = others.and(lines);
+                    problems.add(&both, format!("{name} stands in {other} and in {place}"));
+                }
+                _ => {}
             }
         }
     }
@@ -380,17 +272,16 @@ impl Plan {
     /// `[count]`.
     pub fn varied(&self) -> Vec<&str> {
         let mut names = self.grouping();
-        let draws = self.draws.iter().flat_map(|d| &d.draw).map(|(n, _)| n.as_str());
-        names.extend(draws);
-        names.extend(self.count.iter().map(|(n, _)| n.as_str()));
+        names.extend(self.draws.iter().flat_map(|d| &d.draw).map(|one| one.name.as_str()));
+        names.extend(self.count.iter().map(|one| one.name.as_str()));
         names
     }
 
     /// Names of what the plan varies on purpose: by `[[run]]` and `[vary]`.
     pub fn grouping(&self) -> Vec<&str> {
         let mut names: Vec<&str> = Vec::new();
-        let listed = self.listed.iter().flat_map(|run| run.values.iter().map(|(n, _)| n.as_str()));
-        for name in listed.chain(self.vary.iter().map(|(n, _)| n.as_str())) {
+        let listed = self.listed.iter().flat_map(|run| &run.values).map(|one| one.name.as_str());
+        for name in listed.chain(self.vary.iter().map(|one| one.name.as_str())) {
             if !names.contains(&name) {
                 names.push(name);
             }
@@ -402,14 +293,14 @@ impl Plan {
     /// values the last. None if there is none, or if values are drawn at random.
     pub fn axis(&self) -> Option<&str> {
         let numbers = |values: &[String]| values.iter().all(|v| v.parse::<f64>().is_ok());
-        let along = self.vary.iter().filter(|(_, values)| values.len() > 1 && numbers(values));
-        let most = along.max_by_key(|(_, values)| values.len());
-        most.map(|(name, _)| name.as_str()).filter(|_| !self.is_random())
+        let along = self.vary.iter().filter(|vary| vary.value.len() > 1 && numbers(&vary.value));
+        let most = along.max_by_key(|vary| vary.value.len());
+        most.map(|vary| vary.name.as_str()).filter(|_| !self.is_random())
     }
 
     /// What is set in every run, by FMU name.
-    pub fn set(&self) -> &[(String, String)] {
-        &self.set
+    pub fn set(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.set.iter().map(|set| (set.name.as_str(), set.value.as_str()))
     }
 
     /// Whether values are drawn at random.
@@ -425,7 +316,7 @@ impl Plan {
         let count = self
             .vary
             .iter()
-            .map(|(_, values)| values.len())
+            .map(|vary| vary.value.len())
             .chain([self.listed.len().max(1), draws])
             .try_fold(1_usize, usize::checked_mul)
             .filter(|count| *count <= budget::RUNS)
@@ -435,10 +326,11 @@ impl Plan {
             [] => vec![Listed::default()],
             listed => listed.to_vec(),
         };
-        for (name, values) in &self.vary {
+        for Named { name, value: values, lines } in &self.vary {
             let with = |run: &Listed, value: &String| {
                 let mut run = run.clone();
-                run.values.push((name.clone(), value.clone()));
+                let (name, value, lines) = (name.clone(), value.clone(), lines.clone());
+                run.values.push(Named { name, value, lines });
                 run
             };
             combinations = combinations
@@ -448,8 +340,13 @@ impl Plan {
         }
 
         let mut problems = Problems::default();
-        let input = driven(description, self.input.as_deref());
-        let input = input.context("the plan's input")?;
+        let asked = self.input.as_ref().map(|input| input.value.as_str());
+        let input = driven(description, asked).context("the plan's input");
+        let lines = self.input.as_ref().map_or(Lines::default(), |input| input.lines.clone());
+        let Some(input) = problems.take(&lines, input) else {
+            problems.check()?;
+            return Ok(Vec::new());
+        };
         let mut torques = BTreeMap::new();
         let mut names = BTreeSet::new();
         let mut cases = Vec::with_capacity(count);
@@ -457,11 +354,17 @@ impl Plan {
             for draw in 0..draws {
                 let mut values = run.values.clone();
                 if let Some(random) = &self.draws {
-                    let drawn = random.draw(description, &self.profile, draw as u64);
-                    values.extend(problems.take("[random.draw] ", drawn).unwrap_or_default());
+                    let number = draw as u64;
+                    values.extend(random.draw(
+                        description,
+                        &self.profile.value,
+                        number,
+                        &mut problems,
+                    ));
                 }
-                for (name, first) in &self.count {
-                    values.push((name.clone(), (first + cases.len() as i64).to_string()));
+                for count in &self.count {
+                    let number = |first: i64| (first + cases.len() as i64).to_string();
+                    values.push(count.clone().map(number));
                 }
                 let case = self.case(description, &input, &mut torques, &mut problems, &values);
                 let Some(mut case) = case else {
@@ -471,7 +374,7 @@ impl Plan {
                 case.listed.clone_from(&run.name);
                 cases.push(case);
             }
-            if problems.0.len() > 20 {
+            if problems.count() > 20 {
                 break; // enough to go on with
             }
         }
@@ -485,27 +388,27 @@ impl Plan {
         input: &Option<String>,
         torques: &mut BTreeMap<String, (Arc<Torque>, Option<String>)>,
         problems: &mut Problems,
-        values: &Values,
+        values: &[Named<String>],
     ) -> Option<Case> {
-        let before = problems.0.len();
-        let mut written = self.profile.clone();
-        if let Some((_, text)) = values.iter().find(|(name, _)| name == "profile") {
-            written = problems.take("", text.parse())?;
+        let before = problems.count();
+        let Named { value: mut written, mut lines, .. } = self.profile.clone();
+        if let Some(profile) = values.iter().find(|one| one.name == "profile") {
+            written = problems.take(&profile.lines, profile.value.parse())?;
+            lines = profile.lines.clone();
         }
-        for (name, value) in values {
-            if let Some(parameter) = name.strip_prefix("profile.") {
-                written.set(parameter, value);
+        for one in values {
+            if let Some(parameter) = one.name.strip_prefix("profile.") {
+                written.set(parameter, &one.value);
+                lines = lines.and(&one.lines);
             }
         }
-        let settings: Values = self
-            .set
-            .iter()
-            .chain(values)
-            .filter(|(name, _)| name != "profile" && !name.starts_with("profile."))
-            .cloned()
-            .collect();
-        for (name, value) in &settings {
-            problems.take("", settable(description, input, name, value));
+        let mut settings: Vec<(String, String)> = Vec::new();
+        let of_fmu = |name: &str| name != "profile" && !name.starts_with("profile.");
+        for Named { name, value, lines } in
+            self.set.iter().chain(values).filter(|one| of_fmu(&one.name))
+        {
+            problems.take(lines, settable(description, input, name, value));
+            settings.push((name.clone(), value.clone()));
         }
 
         // a file is read once, however many runs it drives
@@ -515,7 +418,7 @@ impl Plan {
                 .path()
                 .and_then(|path| std::fs::read(path).ok())
                 .map(|bytes| sha256(&bytes));
-            let torque = problems.take("", written.torque())?;
+            let torque = problems.take(&lines, written.torque())?;
             torques.insert(key.clone(), (Arc::new(torque), hash));
         }
         let (torque, torque_sha256) = torques[&key].clone();
@@ -530,9 +433,9 @@ impl Plan {
         let from_table = value("slosh.source").as_deref() == Some("table")
             || value("slosh.source_kind").as_deref() == Some("2");
         for name in ["tank.h", "slosh.zeta"] {
-            if from_table && values.iter().any(|(n, _)| n == name) {
-                problems
-                    .add(format!("{name} is varied, but has no effect with slosh.source = table"));
+            if let Some(varied) = values.iter().find(|one| from_table && one.name == name) {
+                let what = "is varied, but has no effect with slosh.source = table";
+                problems.add(&varied.lines, format!("{name} {what}"));
             }
         }
         let case = Case {
@@ -542,8 +445,8 @@ impl Plan {
                 .varied()
                 .iter()
                 .map(|name| {
-                    let value = values.iter().find(|(n, _)| n == name);
-                    value.map_or(String::new(), |(_, v)| v.clone())
+                    let value = values.iter().find(|one| one.name == *name);
+                    value.map_or(String::new(), |one| one.value.clone())
                 })
                 .collect(),
             model: value("slosh.model"),
@@ -559,7 +462,7 @@ impl Plan {
                     format!("file:path={},hold={held}", written.path()?.display())
                 }
             },
-            stop: self.stop.unwrap_or(torque.span().1),
+            stop: self.stop.as_ref().map_or(torque.span().1, |stop| stop.value),
             torque,
             torque_sha256,
             settings,
@@ -567,8 +470,9 @@ impl Plan {
             tolerance: self.tolerance,
             hold: self.hold,
         };
-        problems.take("", case.run().check());
-        (problems.0.len() == before).then_some(case)
+        let lines = self.stop.as_ref().map_or(lines, |stop| stop.lines.clone());
+        problems.take(&lines, case.run().check());
+        (problems.count() == before).then_some(case)
     }
 
     /// The run's own name; or `linear_100mm_12.5` (model, fill in mm, amplitude in mN·m) where
@@ -581,7 +485,8 @@ impl Plan {
         };
         let values: Vec<_> = match &run.name {
             Some(_) => {
-                run.values.iter().filter(|(n, _)| self.vary.iter().any(|(v, _)| v == n)).collect()
+                let varied = |name: &str| self.vary.iter().any(|vary| vary.name == name);
+                run.values.iter().filter(|one| varied(&one.name)).collect()
             }
             None => run.values.iter().collect(),
         };
@@ -589,13 +494,13 @@ impl Plan {
             (Some(model), Some(fill), Some(amplitude))
                 if run.name.is_none()
                     && self.draws.is_none()
-                    && values.iter().all(|(name, _)| NAMING.contains(&name.as_str())) =>
+                    && values.iter().all(|one| NAMING.contains(&one.name.as_str())) =>
             {
                 let [fill, amplitude] = [fill, amplitude].map(thousandths);
                 parts.push(format!("{model}_{fill}mm_{amplitude}"));
             }
             _ => {
-                for (name, value) in values {
+                for Named { name, value, .. } in values {
                     let name = name.rsplit('.').next().unwrap_or(name);
                     let value = value.split(':').next().unwrap_or(value);
                     // a word speaks for itself, a number or a truth does not
@@ -649,318 +554,11 @@ fn settable(
     description.value(variable, text).map(|_| ())
 }
 
-// ---------------------------------------------------------------- the file's parts
-
-/// Notes the keys of a table that have no meaning there.
-fn known(problems: &mut Problems, place: &str, table: &toml::Table, keys: &[&str]) {
-    for key in table.keys().filter(|key| !keys.contains(&key.as_str())) {
-        let hint = did_you_mean(key, keys.iter().copied());
-        problems
-            .add(format!("{place}there is no key \"{key}\" (there are {}){hint}", keys.join(", ")));
-    }
-}
-
-fn text_at(problems: &mut Problems, table: &toml::Table, key: &str) -> Option<String> {
-    match table.get(key)? {
-        Value::String(text) => Some(text.clone()),
-        other => {
-            problems.add(format!("{key} expects a text in quotes, not {other}"));
-            None
-        }
-    }
-}
-
-fn number(value: &Value) -> Option<f64> {
-    match value {
-        Value::Integer(i) => Some(*i as f64),
-        Value::Float(f) if f.is_finite() => Some(*f),
-        _ => None,
-    }
-}
-
-fn positive_at(problems: &mut Problems, table: &toml::Table, key: &str) -> Option<f64> {
-    let value = table.get(key)?;
-    let positive = number(value).filter(|v| *v > 0.0);
-    if positive.is_none() {
-        problems.add(format!("{key} expects a positive number, not {value}"));
-    }
-    positive
-}
-
-fn table_at<'a>(
-    problems: &mut Problems,
-    table: &'a toml::Table,
-    key: &str,
-) -> Option<&'a toml::Table> {
-    match table.get(key)? {
-        Value::Table(inner) => Some(inner),
-        other => {
-            problems.add(format!("[{key}] must be a table, not {other}"));
-            None
-        }
-    }
-}
-
-/// `tank.h = 1` is a table in a table in TOML; here it is the name `tank.h`. Tables that `leaf`
-/// accepts are values.
-fn flat<'a>(
-    table: &'a toml::Table,
-    leaf: &dyn Fn(&toml::Table) -> bool,
-) -> Vec<(String, &'a Value)> {
-    let mut names = Vec::new();
-    for (key, value) in table {
-        match value {
-            Value::Table(inner) if !leaf(inner) => {
-                names.extend(flat(inner, leaf).into_iter().map(|(n, v)| (format!("{key}.{n}"), v)))
-            }
-            _ => names.push((key.clone(), value)),
-        }
-    }
-    names
-}
-
-/// A single value as text.
-fn plain(value: &Value) -> Option<String> {
-    match value {
-        Value::String(text) => Some(text.clone()),
-        Value::Boolean(b) => Some(b.to_string()),
-        Value::Integer(i) => Some(i.to_string()),
-        Value::Float(f) if f.is_finite() => Some(f.to_string()),
-        _ => None,
-    }
-}
-
-fn values(problems: &mut Problems, place: &str, table: &toml::Table) -> Values {
-    let mut values = Vec::new();
-    for (name, value) in flat(table, &|_| false) {
-        match plain(value) {
-            Some(text) => values.push((name, text)),
-            None => problems.add(format!(
-                "{place} {name} expects a number, true, false or a text in quotes, not {value}"
-            )),
-        }
-    }
-    values
-}
-
-fn lists(problems: &mut Problems, table: &toml::Table) -> Vec<(String, Vec<String>)> {
-    let mut lists = Vec::new();
-    for (name, value) in flat(table, &|_| false) {
-        let texts = match value {
-            Value::Array(items) if !items.is_empty() => items.iter().map(plain).collect(),
-            _ => None,
-        };
-        match texts {
-            Some(texts) => lists.push((name, texts)),
-            None => problems.add(format!(
-                "[vary] {name} expects a list of values, such as [0.05, 0.1], not {value}"
-            )),
-        }
-    }
-    lists
-}
-
-fn counts(problems: &mut Problems, table: &toml::Table) -> Vec<(String, i64)> {
-    let mut counts = Vec::new();
-    for (name, value) in flat(table, &|_| false) {
-        match value {
-            // room for a run's number above it
-            Value::Integer(first) if (0..=i64::from(i32::MAX / 2)).contains(first) => {
-                counts.push((name, *first))
-            }
-            _ => problems.add(format!(
-                "[count] {name} expects the whole number to count from, 0 to {}, not {value}",
-                i32::MAX / 2
-            )),
-        }
-    }
-    counts
-}
-
-fn listed(problems: &mut Problems, table: &toml::Table) -> Vec<Listed> {
-    let Some(value) = table.get("run") else {
-        return Vec::new();
-    };
-    let Some(runs) = value.as_array() else {
-        problems.add("runs are listed as [[run]], with two brackets");
-        return Vec::new();
-    };
-    let mut listed = Vec::new();
-    for (i, run) in runs.iter().enumerate() {
-        let place = format!("[[run]] number {}:", i + 1);
-        let Some(run) = run.as_table() else {
-            problems.add(format!("{place} it must be a table, not {run}"));
-            continue;
-        };
-        let mut run = run.clone();
-        let name = text_at(problems, &run, "name");
-        if name.as_ref().is_some_and(|name| !(1..=budget::NAME).contains(&name.len())) {
-            let most = budget::NAME;
-            problems.add(format!(
-                "{place} its name must have 1 to {most} bytes; without one leave it out"
-            ));
-        }
-        run.remove("name");
-        listed.push(Listed { name, values: values(problems, &place, &run) });
-    }
-    listed
-}
-
-fn draws(problems: &mut Problems, table: &toml::Table) -> Option<Draws> {
-    known(problems, "[random] ", table, &["runs", "seed", "draw"]);
-    let mut whole = |key: &str, least: i64| match table.get(key) {
-        Some(Value::Integer(i)) if *i >= least => Some(*i as u64),
-        Some(other) => {
-            problems
-                .add(format!("[random] {key} expects a whole number from {least} on, not {other}"));
-            None
-        }
-        None => {
-            problems.add(format!("[random] has no {key}"));
-            None
-        }
-    };
-    let (runs, seed) = (whole("runs", 1), whole("seed", 0));
-    let Some(Value::Table(inner)) = table.get("draw") else {
-        problems.add("[random] has no table [random.draw]");
-        return None;
-    };
-    let mut draw = Vec::new();
-    for (name, value) in flat(inner, &|table| table.contains_key("distribution")) {
-        let place = format!("[random.draw] {name}: ");
-        if let Some(distribution) = distribution(problems, &place, value) {
-            draw.push((name, distribution));
-        }
-    }
-    Some(Draws { runs: runs? as usize, seed: seed?, draw })
-}
-
-fn distribution(problems: &mut Problems, place: &str, value: &Value) -> Option<Distribution> {
-    const KINDS: [(&str, [&str; 2]); 3] = [
-        ("normal", ["mean", "deviation"]),
-        ("uniform", ["from", "to"]),
-        ("lognormal", ["median", "deviation"]),
-    ];
-    let Some(table) = value.as_table() else {
-        problems.add(format!(
-            "{place}it expects {{ distribution = \"normal\", mean = 1.0, deviation = 0.1 }} or the \
-             like, not {value}"
-        ));
-        return None;
-    };
-    let kind = text_at(problems, table, "distribution")?;
-    let Some((kind, [first, second])) = KINDS.iter().find(|(name, _)| *name == kind) else {
-        let names = KINDS.map(|(name, _)| name);
-        let hint = did_you_mean(&kind, names.into_iter());
-        problems.add(format!(
-            "{place}there is no distribution \"{kind}\" (there are {}){hint}",
-            names.join(", ")
-        ));
-        return None;
-    };
-    known(problems, place, table, &["distribution", first, second, "min", "max"]);
-    let mut of = |key: &str, default: Option<f64>| match table.get(key) {
-        None if default.is_none() => {
-            problems.add(format!("{place}{kind} expects {key}"));
-            None
-        }
-        None => default,
-        Some(value) => {
-            let found = number(value);
-            if found.is_none() {
-                problems.add(format!("{place}{key} expects a number, not {value}"));
-            }
-            found
-        }
-    };
-    let (a, b) = (of(first, None), of(second, None));
-    let (min, max) = (of("min", Some(f64::NEG_INFINITY))?, of("max", Some(f64::INFINITY))?);
-    let (a, b) = (a?, b?);
-    let (makes_sense, rule, kind) = match *kind {
-        "normal" => (b > 0.0, "deviation must be positive", Kind::Normal { mean: a, deviation: b }),
-        "uniform" => (a < b, "from must be less than to", Kind::Uniform { from: a, to: b }),
-        _ => (
-            a > 0.0 && b > 0.0,
-            "median and deviation must be positive",
-            Kind::Lognormal { median: a, deviation: b },
-        ),
-    };
-    if !makes_sense || min >= max {
-        problems.add(format!(
-            "{place}{}",
-            if makes_sense { "min must be less than max" } else { rule }
-        ));
-        return None;
-    }
-    Some(Distribution { kind, min, max })
-}
-
-// ---------------------------------------------------------------- drawing
-
-impl Draws {
-    /// The values of draw `number`. Every draw has its own stream, so that it stays the same
-    /// however many runs there are.
-    fn draw(
-        &self,
-        description: &ModelDescription,
-        profile: &Written,
-        number: u64,
-    ) -> Result<Values> {
-        let mut random = Random::new(self.seed, number);
-        let mut values = Vec::with_capacity(self.draw.len());
-        for (name, distribution) in &self.draw {
-            let variable = match name.starts_with("profile.") {
-                true => None,
-                false => Some(description.variable(name)?),
-            };
-            let whole = match variable {
-                Some(variable) => variable.kind() == Type::Integer,
-                None => name.strip_prefix("profile.").is_some_and(|key| profile.is_whole(key)),
-            };
-            values.push((name.clone(), distribution.draw(&mut random, name, variable, whole)?));
-        }
-        Ok(values)
-    }
-}
-
-impl Distribution {
-    fn draw(
-        &self,
-        random: &mut Random,
-        name: &str,
-        variable: Option<&description::Variable>,
-        whole: bool,
-    ) -> Result<String> {
-        let bound = |text: Option<&String>| text.and_then(|text| text.parse::<f64>().ok());
-        let attributes = variable.map(|variable| variable.attributes());
-        let min =
-            attributes.and_then(|a| bound(a.min.as_ref())).map_or(self.min, |m| m.max(self.min));
-        let max =
-            attributes.and_then(|a| bound(a.max.as_ref())).map_or(self.max, |m| m.min(self.max));
-        for _ in 0..MOST_DRAWS {
-            let value = match self.kind {
-                Kind::Normal { mean, deviation } => mean + deviation * random.normal(),
-                // whole numbers from `from` to `to`, both included
-                Kind::Uniform { from, to } if whole => {
-                    from + (random.uniform() * (to - from + 1.0)).floor()
-                }
-                Kind::Uniform { from, to } => from + (to - from) * random.uniform(),
-                Kind::Lognormal { median, deviation } => {
-                    median * libm::exp(deviation * random.normal())
-                }
-            };
-            let value = if whole { value.round() } else { value };
-            if (min..=max).contains(&value) {
-                return Ok(value.to_string());
-            }
-        }
-        bail!("{name}: {MOST_DRAWS} draws, none within {min} to {max}")
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use host::description::ModelDescription;
+
+    use super::{AMPLITUDES, BUILT_IN, Case, FILLS, MODELS, Plan, Sweeps};
 
     /// The FMU's own description, without the FMU.
     fn description() -> ModelDescription {
@@ -1109,22 +707,47 @@ mod tests {
             tank.r = { distribution = \"uniform\", from = 2, to = 1, mx = 3 }\n";
         let error = Plan::parse(text).unwrap_err().to_string();
         for words in [
-            "there is no key \"titel\" (there are title, profile,",
+            "line 1: there is no key \"titel\" (there are title, profile,",
             "did you mean \"title\"",
-            "profile expects a text in quotes, not 3",
-            "step expects a positive number, not -1",
-            "hold expects true or false, not 1",
-            "[set] tank.h expects a number, true, false or a text in quotes, not [1]",
-            "[set] profile.amplitude: write it into profile",
-            "[vary] tank.d expects a list of values, such as [0.05, 0.1], not 1",
-            "[random] runs expects a whole number from 1 on, not 0",
-            "[random] has no seed",
-            "[random.draw] hub.I: there is no distribution \"norml\" (there are normal, uniform, lognormal); did you mean \"normal\"",
-            "[random.draw] tank.r: there is no key \"mx\"",
-            "[random.draw] tank.r: from must be less than to",
+            "line 2: profile expects a text in quotes, not 3",
+            "line 3: step expects a positive number, not -1",
+            "line 4: hold expects true or false, not 1",
+            "line 6: [set] tank.h expects a number, true, false or a text in quotes, not [1]",
+            "line 7: [set] profile.amplitude: write it into profile",
+            "line 9: [vary] tank.d expects a list of values, such as [0.05, 0.1], not 1",
+            "line 11: [random] runs expects a whole number from 1 on, not 0",
+            "line 10: [random] has no seed",
+            "line 13: [random.draw] hub.I: there is no distribution \"norml\" (there are normal, uniform, lognormal); did you mean \"normal\"",
+            "line 14: [random.draw] tank.r: there is no key \"mx\"",
+            "line 14: [random.draw] tank.r: from must be less than to",
         ] {
             assert!(error.contains(words), "\"{words}\" is not in:\n{error}");
         }
+    }
+
+    #[test]
+    fn every_error_of_the_format_has_its_line() {
+        let lines = |text: &str| -> Vec<String> {
+            let error = Plan::parse(text).unwrap_err().to_string();
+            error.lines().skip(1).map(|line| line.trim().to_string()).collect()
+        };
+        let syntax = lines("title = \"a\nstep = = 1\nstop = 2\n[set\n");
+        let places = syntax.iter().filter_map(|line| line.split_once(": it is not TOML: "));
+        let places: Vec<&str> = places.map(|(place, _)| place).collect();
+        assert_eq!(places, ["line 1", "line 2", "line 2", "line 4"], "{syntax:?}");
+        let text = "profile = [\n1,\n2]\n[random]\nruns = 1\nseed = 1e3\nset = 1\n\
+            [[run]]\nname = \"\"\n[vary]\na.b = [1, nan]\n";
+        let expected = [
+            "line 1: profile expects a text in quotes, not [ 1, 2]",
+            "line 4: [random] has no table [random.draw]",
+            "line 6: [random] seed expects a whole number from 0 on, not 1e3",
+            "line 7: [random] there is no key \"set\" (there are runs, seed, draw); did you mean \"seed\"?",
+            "line 9: [[run]] number 1: name expects a text in quotes of 1 to 200 bytes (without one leave it out), not \"\"",
+            "line 11: [vary] a.b expects a list of values, such as [0.05, 0.1], not [1, nan]",
+        ];
+        assert_eq!(lines(text), expected);
+        let error = Plan::parse("title = \"\"").unwrap_err().to_string();
+        assert!(error.starts_with("it has no profile, such as profile = "), "{error}");
     }
 
     #[test]
@@ -1134,16 +757,16 @@ mod tests {
         let error = Plan::parse(text).unwrap().cases(&description()).unwrap_err().to_string();
         for words in [
             "no variable \"tank.hh\"; did you mean \"tank.h\"",
-            "omega cannot be set",
-            "slosh.model expects one of frozen (1)",
-            "tau_cmd comes from the profile",
-            "profile sine: it has no parameter \"amplitde\"",
+            "line 5: omega cannot be set",
+            "line 6: slosh.model expects one of frozen (1)",
+            "line 7: tau_cmd comes from the profile",
+            "lines 1 and 9: profile sine: it has no parameter \"amplitde\"",
         ] {
             assert_eq!(error.matches(words).count(), 1, "{words}:\n{error}");
         }
         let twice = "profile = \"sine\"\n[set]\ntank.h = 1\n[vary]\ntank.h = [1]\n";
         let error = Plan::parse(twice).unwrap_err().to_string();
-        assert_eq!(error, "tank.h stands in [set] and in [vary]");
+        assert_eq!(error, "lines 3 and 5: tank.h stands in [set] and in [vary]");
         let many =
             format!("profile = \"sine\"\n[vary]\ntank.h = {0:?}\ntank.d = {0:?}", [0.1; 400]);
         let error = Plan::parse(&many).unwrap().cases(&description()).unwrap_err().to_string();
@@ -1208,7 +831,8 @@ mod tests {
         let text = "profile = \"zero\"\n[random]\nruns = 1\nseed = 1\n[random.draw]\n\
             tank.h = { distribution = \"uniform\", from = -2, to = -1 }\n";
         let error = Plan::parse(text).unwrap().cases(&description()).unwrap_err().to_string();
-        assert!(error.contains("tank.h: 10000 draws, none within 0.0001 to 100"), "{error}");
+        let expected = "line 6: [random.draw] tank.h: 10000 draws, none within 0.0001 to 100";
+        assert_eq!(error, expected);
     }
 
     #[test]

@@ -1,0 +1,323 @@
+//! A plan's file. Serde reads each value by itself, so that all that is wrong is said at once.
+
+use std::fmt;
+use std::ops::Range;
+
+use host::budget;
+use host::description::did_you_mean;
+use serde::Deserialize;
+use serde::de::{DeserializeOwned, IntoDeserializer};
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::problems::{Lines, Problems};
+use super::random::{Distribution, Draws, Family};
+use super::{Listed, Named, Plan, STEP};
+use crate::profile::Written;
+
+/// A single value.
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Scalar {
+    Truth(bool),
+    Whole(i64),
+    Number(f64),
+    Text(String),
+}
+
+impl Scalar {
+    fn is_allowed(&self) -> bool {
+        !matches!(self, Scalar::Number(x) if !x.is_finite())
+    }
+}
+
+impl fmt::Display for Scalar {
+    /// As an FMU's start values are written.
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Scalar::Truth(value) => value.fmt(f),
+            Scalar::Whole(value) => value.fmt(f),
+            Scalar::Number(value) => value.fmt(f),
+            Scalar::Text(value) => value.fmt(f),
+        }
+    }
+}
+
+/// Keys of the file.
+const KEYS: [&str; 12] = [
+    "title",
+    "profile",
+    "input",
+    "step",
+    "stop",
+    "tolerance",
+    "hold",
+    "set",
+    "vary",
+    "run",
+    "random",
+    "count",
+];
+
+/// The plan that a text says, if it is one but for `problems`.
+pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Plan> {
+    let (table, errors) = DeTable::parse_recoverable(text);
+    let table = table.get_ref();
+    let mut reader = Reader { text, problems };
+    for error in &errors {
+        let problem = format!("it is not TOML: {}", error.message());
+        reader.add(error.span().unwrap_or_default(), problem);
+    }
+    if !errors.is_empty() {
+        return None;
+    }
+    reader.known("", table, &KEYS);
+
+    let title = reader.text("", table, "title");
+    let profile = reader.text("", table, "profile").and_then(|Named { name, value, lines }| {
+        let value = reader.problems.take(&lines, value.parse::<Written>())?;
+        Some(Named { name, value, lines })
+    });
+    if !table.contains_key("profile") {
+        let what = "it has no profile, such as profile = \"exp-sweep:amplitude=0.1\"";
+        reader.problems.add(&Lines::default(), what);
+    }
+    let input = reader.text("", table, "input");
+    let mut positive =
+        |key| reader.take("", table, key, "a positive number", |v: &f64| *v > 0.0 && v.is_finite());
+    let (step, stop, tolerance) = (positive("step"), positive("stop"), positive("tolerance"));
+    let hold = reader.take("", table, "hold", "true or false", |_: &bool| true);
+
+    let set = reader.names(table, "set");
+    let set = reader.settings("[set] ", set);
+    for Named { name, lines, .. } in &set {
+        if name == "profile" || name.starts_with("profile.") {
+            reader.problems.add(lines, format!("[set] {name}: write it into profile = \"…\""));
+        }
+    }
+    let vary = reader.names(table, "vary");
+    let allowed = |list: &Vec<Scalar>| !list.is_empty() && list.iter().all(Scalar::is_allowed);
+    let vary =
+        reader.named("[vary] ", vary, "a list of values, such as [0.05, 0.1]", allowed).into_iter();
+    let vary = vary.map(|vary| vary.map(|list| list.iter().map(Scalar::to_string).collect()));
+    // room for a run's number above it
+    let most = i64::from(i32::MAX / 2);
+    let expected = format!("the whole number to count from, 0 to {most}");
+    let count = reader.names(table, "count");
+    let count =
+        reader.named("[count] ", count, &expected, |first: &i64| (0..=most).contains(first));
+    let (listed, draws) = (reader.listed(table), reader.draws(table));
+    Some(Plan {
+        title: title.map_or(String::new(), |title| title.value),
+        text: text.into(),
+        profile: profile?,
+        step: step.map_or(STEP, |step| step.value),
+        stop,
+        tolerance: tolerance.map(|tolerance| tolerance.value),
+        hold: hold.is_some_and(|hold| hold.value),
+        input,
+        set,
+        vary: vary.collect(),
+        listed,
+        count,
+        draws,
+    })
+}
+
+/// Values by name.
+type Values<'t, 'i> = Vec<(String, &'t Spanned<DeValue<'i>>)>;
+
+/// `tank.h = 1` is a table in a table in TOML; here it is the name `tank.h`. Tables that `is_value`
+/// accepts are values.
+fn names<'t, 'i>(table: &'t DeTable<'i>, is_value: &dyn Fn(&DeTable) -> bool) -> Values<'t, 'i> {
+    let mut all = Values::new();
+    for (key, value) in table {
+        match value.get_ref() {
+            DeValue::Table(inner) if !is_value(inner) => {
+                let inner = names(inner, is_value).into_iter();
+                all.extend(inner.map(|(name, v)| (format!("{}.{name}", key.get_ref()), v)));
+            }
+            _ => all.push((key.get_ref().to_string(), value)),
+        }
+    }
+    all
+}
+
+/// Reads values, and notes what is wrong with them.
+struct Reader<'a> {
+    text: &'a str,
+    problems: &'a mut Problems,
+}
+
+impl Reader<'_> {
+    fn lines(&self, span: Range<usize>) -> Lines {
+        Lines::one(1 + self.text[..span.start].matches('\n').count())
+    }
+
+    fn add(&mut self, span: Range<usize>, problem: String) {
+        let lines = self.lines(span);
+        self.problems.add(&lines, problem);
+    }
+
+    /// Notes that a value is not what is expected.
+    fn other(&mut self, value: &Spanned<DeValue>, expected: &str) {
+        let written = self.text[value.span()].split_whitespace().collect::<Vec<_>>().join(" ");
+        self.add(value.span(), format!("{expected}, not {written}"));
+    }
+
+    /// Notes the keys of a table that have no meaning there.
+    fn known(&mut self, place: &str, table: &DeTable, keys: &[&str]) {
+        for (key, _) in table {
+            let name: &str = key.get_ref();
+            if !keys.contains(&name) {
+                let (all, hint) = (keys.join(", "), did_you_mean(name, keys.iter().copied()));
+                let problem = format!("{place}there is no key \"{name}\" (there are {all}){hint}");
+                self.add(key.span(), problem);
+            }
+        }
+    }
+
+    /// A value, if it is what is expected.
+    fn value<T: DeserializeOwned>(
+        &mut self,
+        place: &str,
+        (name, value): (String, &Spanned<DeValue>),
+        expected: &str,
+        allowed: impl Fn(&T) -> bool,
+    ) -> Option<Named<T>> {
+        let read = T::deserialize(value.clone().into_deserializer()).ok().filter(allowed);
+        if read.is_none() {
+            self.other(value, &format!("{place}{name} expects {expected}"));
+        }
+        Some(Named { name, value: read?, lines: self.lines(value.span()) })
+    }
+
+    /// The value of a key, if it is there and what is expected.
+    fn take<T: DeserializeOwned>(
+        &mut self,
+        place: &str,
+        table: &DeTable,
+        key: &str,
+        expected: &str,
+        allowed: impl Fn(&T) -> bool,
+    ) -> Option<Named<T>> {
+        self.value(place, (key.into(), table.get(key)?), expected, allowed)
+    }
+
+    fn text(&mut self, place: &str, table: &DeTable, key: &str) -> Option<Named<String>> {
+        self.take(place, table, key, "a text in quotes", |_| true)
+    }
+
+    /// The names in the table at a key, if there is one.
+    fn names<'t, 'i>(&mut self, table: &'t DeTable<'i>, key: &str) -> Values<'t, 'i> {
+        match table.get(key).map(|value| (value, value.get_ref())) {
+            Some((_, DeValue::Table(inner))) => names(inner, &|_| false),
+            Some((value, _)) => {
+                self.other(value, &format!("[{key}] must be a table"));
+                Values::new()
+            }
+            None => Values::new(),
+        }
+    }
+
+    /// Those values that are what is expected.
+    fn named<T: DeserializeOwned>(
+        &mut self,
+        place: &str,
+        values: Values,
+        expected: &str,
+        allowed: impl Fn(&T) -> bool,
+    ) -> Vec<Named<T>> {
+        let read = |value| self.value(place, value, expected, &allowed);
+        values.into_iter().filter_map(read).collect()
+    }
+
+    fn settings(&mut self, place: &str, values: Values) -> Vec<Named<String>> {
+        let expected = "a number, true, false or a text in quotes";
+        let scalars = self.named(place, values, expected, Scalar::is_allowed);
+        scalars.into_iter().map(|scalar| scalar.map(|value| value.to_string())).collect()
+    }
+
+    fn listed(&mut self, table: &DeTable) -> Vec<Listed> {
+        let Some(value) = table.get("run") else { return Vec::new() };
+        let Some(runs) = value.get_ref().as_array() else {
+            self.add(value.span(), "runs are listed as [[run]], with two brackets".into());
+            return Vec::new();
+        };
+        let mut listed = Vec::new();
+        for (i, run) in runs.iter().enumerate() {
+            let place = format!("[[run]] number {}: ", i + 1);
+            let Some(table) = run.get_ref().as_table() else {
+                self.other(run, &format!("{place}it must be a table"));
+                continue;
+            };
+            let (most, text) = (budget::NAME, "a text in quotes");
+            let expected = format!("{text} of 1 to {most} bytes (without one leave it out)");
+            let allowed = |name: &String| (1..=most).contains(&name.len());
+            let name = self.take(&place, table, "name", &expected, allowed);
+            let values = names(table, &|_| false).into_iter().filter(|(key, _)| key != "name");
+            let values = self.settings(&place, values.collect());
+            listed.push(Listed { name: name.map(|name| name.value), values });
+        }
+        listed
+    }
+
+    fn draws(&mut self, table: &DeTable) -> Option<Draws> {
+        let (header, value) = table.get_key_value("random")?;
+        let Some(table) = value.get_ref().as_table() else {
+            self.other(value, "[random] must be a table");
+            return None;
+        };
+        self.known("[random] ", table, &["runs", "seed", "draw"]);
+        for key in ["runs", "seed"].iter().filter(|key| !table.contains_key(**key)) {
+            self.add(header.span(), format!("[random] has no {key}"));
+        }
+        let mut whole = |key: &str, least: i64| {
+            let expected = format!("a whole number from {least} on");
+            self.take("[random] ", table, key, &expected, |v: &i64| *v >= least)
+        };
+        let (runs, seed) = (whole("runs", 1), whole("seed", 0));
+        let Some(DeValue::Table(inner)) = table.get("draw").map(Spanned::get_ref) else {
+            self.add(header.span(), "[random] has no table [random.draw]".into());
+            return None;
+        };
+        let mut draw = Vec::new();
+        for (name, value) in names(inner, &|table| table.contains_key("distribution")) {
+            let distribution = self.distribution(&format!("[random.draw] {name}: "), value);
+            let lines = self.lines(value.span());
+            draw.extend(distribution.map(|value| Named { name, value, lines }));
+        }
+        Some(Draws { runs: runs?.value as usize, seed: seed?.value as u64, draw })
+    }
+
+    fn distribution(&mut self, place: &str, value: &Spanned<DeValue>) -> Option<Distribution> {
+        let Some(table) = value.get_ref().as_table() else {
+            let like = "{ distribution = \"normal\", mean = 1.0, deviation = 0.1 } or the like";
+            self.other(value, &format!("{place}it expects {like}"));
+            return None;
+        };
+        let kind = self.text(place, table, "distribution")?.value;
+        let Some(family) = Family::ALL.iter().find(|family| family.name == kind) else {
+            let all = Family::ALL.map(|family| family.name);
+            let (hint, all) = (did_you_mean(&kind, all.into_iter()), all.join(", "));
+            let problem = format!("there is no distribution \"{kind}\" (there are {all}){hint}");
+            self.add(value.span(), format!("{place}{problem}"));
+            return None;
+        };
+        let [first, second] = family.parameters;
+        self.known(place, table, &["distribution", first, second, "min", "max"]);
+        for key in [first, second].iter().filter(|key| !table.contains_key(**key)) {
+            self.add(value.span(), format!("{place}{kind} expects {key}"));
+        }
+        // None: it is wrong; NaN: it is not there
+        let mut number = |key: &str| match table.contains_key(key) {
+            true => self.take(place, table, key, "a number", |v: &f64| v.is_finite()),
+            false => Some(Named { name: key.into(), value: f64::NAN, lines: Lines::default() }),
+        };
+        let [a, b, min, max] = [first, second, "min", "max"].map(|key| Some(number(key)?.value));
+        let bounds = (f64::NEG_INFINITY.max(min?), f64::INFINITY.min(max?));
+        let (a, b) = (a.filter(|a| !a.is_nan())?, b.filter(|b| !b.is_nan())?);
+        let distribution = family.distribution([a, b], bounds);
+        distribution.map_err(|rule| self.add(value.span(), format!("{place}{rule}"))).ok()
+    }
+}

@@ -1,0 +1,68 @@
+//! What is wrong with a plan, all at once, each with its lines in the file.
+
+use anyhow::{Result, bail};
+
+/// Lines of a file, growing; none where no file says it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Lines(Vec<usize>);
+
+impl Lines {
+    /// One line.
+    pub fn one(line: usize) -> Self {
+        Lines(vec![line])
+    }
+
+    /// These and others.
+    pub fn and(&self, other: &Lines) -> Self {
+        let mut all = [&self.0[..], &other.0].concat();
+        all.sort_unstable();
+        all.dedup();
+        Lines(all)
+    }
+
+    /// To stand in front of what is wrong there.
+    fn words(&self) -> String {
+        match &self.0[..] {
+            [] => String::new(),
+            [one] => format!("line {one}: "),
+            [all @ .., last] => {
+                let all: Vec<String> = all.iter().map(usize::to_string).collect();
+                format!("lines {} and {last}: ", all.join(", "))
+            }
+        }
+    }
+}
+
+/// What is wrong, each once.
+#[derive(Default)]
+pub(super) struct Problems(Vec<(Lines, String)>);
+
+impl Problems {
+    pub fn add(&mut self, lines: &Lines, problem: impl Into<String>) {
+        let problem = (lines.clone(), problem.into());
+        if !self.0.contains(&problem) {
+            self.0.push(problem);
+        }
+    }
+
+    /// Takes the value, or notes what is wrong.
+    pub fn take<T>(&mut self, lines: &Lines, result: Result<T>) -> Option<T> {
+        result.map_err(|error| self.add(lines, format!("{error:#}"))).ok()
+    }
+
+    pub fn count(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Fails if there are any, in the file's order.
+    pub fn check(mut self) -> Result<()> {
+        self.0.sort_by_key(|(lines, _)| lines.0.first().copied());
+        let all: Vec<String> =
+            self.0.iter().map(|(lines, problem)| lines.words() + problem).collect();
+        match &all[..] {
+            [] => Ok(()),
+            [one] => bail!("{one}"),
+            many => bail!("{} problems:\n  {}", many.len(), many.join("\n  ")),
+        }
+    }
+}
