@@ -10,11 +10,11 @@
 //! sigma_A²(tau) = ½ E[(b2 − b1)²] = var b1 − cov(b1, b2) = sigma² (2x − 3 + 4 e^−x − e^−2x) / x²
 //! ```
 //!
-//! It rises with slope +1/2, has its peak 0.617 sigma at tau = 1.89 T, and falls with slope −1/2:
+//! It rises with slope +1/2, has its maximum 0.617 sigma at tau = 1.89 T, and falls with slope −1/2:
 //! there is no plateau. The *bias instability* B of data sheets is that of flicker noise, whose
 //! Allan deviation is flat at sqrt(2 ln 2/pi) B = 0.664 B. The FMU's bias has sigma = B/0.664
-//! (thesis 5.5), so the peak stands at 0.617/0.664 B = 0.93 B, and B is read from it as 0.664/0.617
-//! = 1.076 times the peak.
+//! (thesis 5.5), so the maximum stands at 0.617/0.664 B = 0.93 B, and B is read from it as 0.664/0.617
+//! = 1.076 times the maximum.
 
 /// Flat part of the Allan deviation of flicker noise over B; the FMU's bias has sigma = B/0.664.
 pub const FLICKER: f64 = 0.664;
@@ -154,7 +154,7 @@ fn minimum(f: impl Fn(f64) -> f64, low: f64, high: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{FLICKER, Noise, Point, minimum, variances};
     use crate::random::Random;
 
     #[test]
@@ -241,13 +241,13 @@ mod tests {
             let points: Vec<Point> =
                 (0..75).map(|i| Point { tau: tau(i), variance: noise.variance(tau(i)) }).collect();
             let found = Noise::fitted(&points).unwrap();
-            for (found, asked) in [
+            for (found, specified) in [
                 (found.arw, noise.arw),
                 (found.bias_instability, noise.bias_instability),
                 (found.bias_time, noise.bias_time),
             ] {
                 // the search for the time ends at 1e-9, where the minimum is flat to 1e-8
-                assert!((found / asked - 1.0).abs() < 1e-5, "{found}, not {asked}");
+                assert!((found / specified - 1.0).abs() < 1e-5, "{found}, not {specified}");
             }
         }
         assert_eq!(Noise::fitted(&[]), None);

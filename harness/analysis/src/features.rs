@@ -116,12 +116,12 @@ fn vertex(response: &FrequencyResponse, level: &[f64], i: usize) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::Features;
     use crate::linear::Linear;
     use crate::{BAND, logarithmic_grid};
 
     #[test]
-    fn features_of_the_exact_transfer_function_are_the_reference_figures() {
+    fn features_of_the_exact_transfer_function_are_the_reference_values() {
         // roots of d log|H|/df to 17 digits from an independent calculation (60-digit arithmetic);
         // 2000 points are 1.2 mHz apart, where the parabola misses by a few µHz
         for (plant, f_dip, f_res, notch) in [
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn a_damped_peak_is_found_though_the_band_edge_is_higher() {
+    fn a_damped_resonance_is_found_though_the_band_edge_is_higher() {
         let plant = Linear::bench_10_cm(0.05);
         let response = plant.frequency_response(&logarithmic_grid(BAND, 2000));
         let features = Features::of(&response);

@@ -131,9 +131,9 @@ impl Linear {
         Self::bench(0.4165810206, 0.6267811696, 2.1335346636, damping)
     }
 
-    fn bench(frozen: f64, mass: f64, frequency: f64, damping: f64) -> Self {
+    fn bench(fixed_mass: f64, mass: f64, frequency: f64, damping: f64) -> Self {
         Linear {
-            inertia: 0.322414 + frozen * 0.225 * 0.225,
+            inertia: 0.322414 + fixed_mass * 0.225 * 0.225,
             friction: 0.03793,
             arm: 0.225,
             modes: vec![Mode { mass, frequency, damping }],
@@ -143,10 +143,11 @@ impl Linear {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::Linear;
     use crate::features::Features;
     use crate::sweep::{Law, Sweep};
     use crate::{BAND, demodulation, logarithmic_grid, spa};
+    use std::f64::consts::TAU;
 
     #[test]
     fn a_torque_that_jumps_between_steps_is_no_slope() {
@@ -172,7 +173,7 @@ mod tests {
         let torque: Vec<f64> = (0..40_000).map(|k| (TAU * f * f64::from(k) * step).sin()).collect();
         let rate = plant.simulate(step, &torque, 0.0);
         let largest = rate[35_000..].iter().fold(0.0f64, |m, y| m.max(y.abs()));
-        // after 70 s the start has decayed; chords of the sine and the sampled peak: (w h)²/8
+        // after 70 s the start has decayed; chords of the sine and the sampled maximum: (w h)²/8
         assert!((largest / plant.response(f).norm() - 1.0).abs() < 2e-4, "{largest}");
     }
 
@@ -216,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn a_downward_sweep_finds_the_same_dip_and_a_peak_shifted_downwards() {
+    fn a_downward_sweep_finds_the_same_antiresonance_and_a_resonance_shifted_downwards() {
         let grid = logarithmic_grid(BAND, 2000);
         let (f_dip, f_res) = (2.3431981, 2.4566022);
         for law in [Law::Exponential, Law::Linear] {
@@ -241,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn both_estimators_find_the_dip_and_the_sweep_shifts_the_peak_upwards() {
+    fn both_estimators_find_the_antiresonance_and_the_sweep_shifts_the_resonance_upwards() {
         let grid = logarithmic_grid(BAND, 2000);
         for (plant, f_dip, f_res) in [
             (Linear::bench_10_cm(0.0029757), 2.3431981, 2.4566022),

@@ -11,7 +11,7 @@
 //! ```
 //!
 //! by least squares. The rational function follows a resonance as narrow as a few lines, the
-//! polynomial in t what the record's ends leave in the spectra. What is left is V.
+//! polynomial in t what the record's ends leave in the spectra. The residual is V.
 
 use nalgebra::{SMatrix, SVector};
 use signals::fourier::Forward;
@@ -40,8 +40,8 @@ pub fn power(step: f64, input: &[f64], output: &[f64], frequencies: &[f64]) -> V
         match last {
             Some((same, power)) if same == k => power,
             _ => {
-                let left = unexplained(&u[k - SIDE..=k + SIDE], &y[k - SIDE..=k + SIDE]);
-                let power = left.map_or(f64::NAN, |left| left * step / count as f64);
+                let residual = unexplained(&u[k - SIDE..=k + SIDE], &y[k - SIDE..=k + SIDE]);
+                let power = residual.map_or(f64::NAN, |residual| residual * step / count as f64);
                 last = Some((k, power));
                 power
             }
@@ -66,16 +66,16 @@ fn unexplained(u: &[Complex64], y: &[Complex64]) -> Option<f64> {
     let b = SVector::<Complex64, LINES>::from_fn(|i, _| y[i] / scale_y);
     let qr = a.qr();
     let x = qr.r().solve_upper_triangular(&(qr.q().adjoint() * b))?;
-    let left = (b - a * x).norm_squared() / (LINES - UNKNOWNS) as f64;
-    // what is left is (1 + a r) V
+    let residual = (b - a * x).norm_squared() / (LINES - UNKNOWNS) as f64;
+    // the residual is (1 + a r) V
     let weight = (0..LINES).map(|i| (1.0 + x[6] * place(i)).norm_sqr()).sum::<f64>() / LINES as f64;
-    let power = left / weight * scale_y * scale_y;
+    let power = residual / weight * scale_y * scale_y;
     power.is_finite().then_some(power)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::power;
     use crate::features::Features;
     use crate::linear::Linear;
     use crate::sweep::Sweep;
@@ -120,15 +120,15 @@ mod tests {
         for seed in 0..24 {
             let mut random = crate::random::Random::new(seed, 0);
             let noisy: Vec<f64> = rate.iter().map(|r| r + 4.066e-4 * random.normal()).collect();
-            let left = power(STEP, &torque, &noisy, &near);
+            let residual = power(STEP, &torque, &noisy, &near);
             let swept =
                 demodulation::frequency_responses(&sweep, &time, &torque, [&noisy[..]], &near);
             let [response] = &swept.responses;
-            let deviation = demodulation::deviation(response, &left, &swept.noise_gain);
+            let deviation = demodulation::deviation(response, &residual, &swept.noise_gain);
             let whole = spa::Estimate::of(STEP, &torque, &noisy, &near, lag);
             for (i, (response, deviation, slope)) in [
                 (response, deviation, demodulation::slope(&sweep, 2.4)),
-                (&whole.response, whole.deviation(&left), whole.slope()),
+                (&whole.response, whole.deviation(&residual), whole.slope()),
             ]
             .into_iter()
             .enumerate()

@@ -61,7 +61,7 @@ pub fn leakage(radial: &FrequencyResponse, arm: f64) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::OffAxis;
 
     #[test]
     fn a_circling_force_is_half_off_the_axis_and_a_tangential_one_not_at_all() {

@@ -34,7 +34,7 @@ impl Random {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::Random;
 
     #[test]
     fn a_seed_gives_these_numbers_on_every_machine() {

@@ -136,10 +136,12 @@ fn solved(mut a: DMatrix<f64>, b: DVector<f64>) -> Option<(DVector<f64>, (f64, S
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::Rational;
+    use crate::features::Features;
     use crate::logarithmic_grid;
     use crate::sweep::Sweep;
     use crate::transfer_function::TransferFunction;
+    use std::f64::consts::TAU;
 
     #[test]
     fn a_record_too_short_to_resolve_them_still_tells_antiresonance_from_resonance() {

@@ -71,7 +71,7 @@ pub fn skewness_and_kurtosis(signal: &[f64]) -> (f64, f64) {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::skewness_and_kurtosis;
 
     #[test]
     fn moments_of_a_sine_and_of_a_coin() {

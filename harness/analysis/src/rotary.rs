@@ -59,7 +59,9 @@ impl Rotary {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{Rotary, swirl};
+    use crate::Complex64;
+    use crate::FrequencyResponse;
 
     #[test]
     fn a_circle_swirls_by_one_and_a_line_not_at_all() {

@@ -152,7 +152,8 @@ fn transformed(lags: &[[f64; 3]], angles: [f64; TOGETHER]) -> [(Complex64, f64);
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::frequency_response;
+    use crate::Complex64;
 
     #[test]
     fn it_is_the_sum_of_its_definition() {

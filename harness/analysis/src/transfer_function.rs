@@ -303,9 +303,10 @@ impl LeastSquaresProblem<f64, Dyn, U6> for Problem<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{TransferFunction, fit_time};
     use crate::linear::{Linear, Mode};
     use crate::{BAND, logarithmic_grid};
+    use std::f64::consts::TAU;
 
     #[test]
     fn the_exact_linear_model_is_found_again() {
@@ -336,7 +337,7 @@ mod tests {
         let answer = tf.simulate(step, &input);
         let largest = answer[55_000..].iter().fold(0.0f64, |m, y| m.max(y.abs()));
         // Chords of the sine: (w h)²/12 = 1.3e-5; the start has decayed by e^(-27); the
-        // peak falls between samples by (w h)²/8.
+        // maximum falls between samples by (w h)²/8.
         assert!((largest / tf.response(f).norm() - 1.0).abs() < 5e-5);
     }
 

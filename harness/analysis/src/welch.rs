@@ -150,7 +150,7 @@ impl Spectra {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{RESPONSE, SEGMENT, Segments, Spectra};
 
     /// White noise, even in ±1: the multiplicative generator of MINSTD.
     fn noise(seed: u64, count: usize) -> Vec<f64> {

@@ -16,7 +16,7 @@ use signals::table::Table;
 const LEAST_RECORDS: usize = 4;
 /// More records would take days.
 const MOST_RECORDS: usize = 10_000;
-/// The shortest record in correlation times of the bias, for its peak (at 1.89) to be seen: the
+/// The shortest record in correlation times of the bias, for its maximum (at 1.89) to be seen: the
 /// longest averaging time is a tenth of the record.
 const LEAST_TIMES: f64 = 30.0;
 
@@ -202,11 +202,14 @@ impl Characteristics {
             deviation(&|point| self.specified.variance(point.tau)),
             deviation(&|point| self.estimated.variance(point.tau)),
         ];
-        Table::new(["tau_s", "deviation", "asked", "fitted"].map(String::from).to_vec(), columns)
+        Table::new(
+            ["tau_s", "deviation", "specified", "estimated"].map(String::from).to_vec(),
+            columns,
+        )
     }
 }
 
-/// A figure of the noise by its name and unit.
+/// A parameter of the noise by its name and unit.
 type Quantity = (&'static str, fn(&Noise) -> f64);
 
 /// What the table shows.

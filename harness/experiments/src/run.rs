@@ -36,13 +36,13 @@ pub struct Run {
 /// The input that the torque drives, where an FMU has one of that name.
 pub const TORQUE: &str = "tau_cmd";
 
-/// The input of an FMU that is driven: the one `asked` for; else [`TORQUE`]; else its only Real
+/// The input of an FMU that is driven: the one that is `chosen`; else [`TORQUE`]; else its only Real
 /// input; else none, if it has none.
 ///
 /// # Errors
 /// If there is no such input, or if several could be meant.
-pub fn driven(description: &ModelDescription, asked: Option<&str>) -> Result<Option<String>> {
-    if let Some(name) = asked {
+pub fn driven(description: &ModelDescription, chosen: Option<&str>) -> Result<Option<String>> {
+    if let Some(name) = chosen {
         let variable = description.variable(name)?;
         ensure!(
             variable.causality == "input" && variable.kind() == Type::Real,
@@ -66,14 +66,14 @@ pub const SLOPE: &str = "tau_slope";
 
 /// Reads a file's histories of inputs: every column that is a Real input of the FMU, and
 /// [`SLOPE`] with [`TORQUE`]. Other columns than these and `time` are refused by name, or passed
-/// over if `ignore`. The first is the input `asked` for, else [`TORQUE`], else the file's first.
+/// over if `ignore`. The first is the input that is `chosen`, else [`TORQUE`], else the file's first.
 ///
 /// # Errors
 /// If the file has no such column, or others; all that is wrong with its columns is said at once.
 pub fn histories(
     description: &ModelDescription,
     path: &Path,
-    asked: Option<&str>,
+    chosen: Option<&str>,
     held: bool,
     ignore: bool,
 ) -> Result<Vec<(String, Torque)>> {
@@ -104,8 +104,8 @@ pub fn histories(
             if wrong.len() == 1 { "is" } else { "are" }
         ));
     }
-    if let Some(asked) = asked.filter(|asked| !inputs.contains(asked)) {
-        problems.push(format!("it has no column {asked}, which is to be driven"));
+    if let Some(chosen) = chosen.filter(|chosen| !inputs.contains(chosen)) {
+        problems.push(format!("it has no column {chosen}, which is to be driven"));
     }
     ensure!(
         problems.is_empty(),
@@ -114,7 +114,7 @@ pub fn histories(
         all.join(", "),
         columns.join(", ")
     );
-    let first = asked.or_else(|| inputs.contains(&TORQUE).then_some(TORQUE)).unwrap_or(inputs[0]);
+    let first = chosen.or_else(|| inputs.contains(&TORQUE).then_some(TORQUE)).unwrap_or(inputs[0]);
     let rest = inputs.iter().copied().filter(|name| *name != first);
     let ordered: Vec<&str> = [first].into_iter().chain(rest).collect();
     let wanted: Vec<&str> =

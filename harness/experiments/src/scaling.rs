@@ -1,5 +1,5 @@
 //! What a bench says of a flight tank, in words: Bond numbers, the tank that has the same ones,
-//! Froude's factors (`formulas::similarity`; Rubaga's thesis 2.5, 2.6, 7.2, with its figures corrected).
+//! Froude's factors (`formulas::similarity`; Rubaga's thesis 2.5, 2.6, 7.2, with its numbers corrected).
 //!
 //! The two numbers of an angular acceleration are not the same: the thesis's 45.87 is Bo_i of
 //! its bench, and the equivalent tank it prints beside it follows from Bo_r.
@@ -139,9 +139,9 @@ pub fn froude_text(lambda: f64, density: f64, gravity: f64) -> Result<String> {
     Ok(text)
 }
 
-/// A figure of the thesis's scaling, as printed and as it follows from its own data.
+/// A number of the thesis's scaling, as printed and as it follows from its own data.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Figure {
+pub struct Comparison {
     /// Where it stands and what it is.
     pub what: &'static str,
     /// As printed.
@@ -154,9 +154,10 @@ pub struct Figure {
     pub remark: &'static str,
 }
 
-/// The thesis's figures of 7.2 and what is behind them, computed anew.
-pub fn thesis() -> Vec<Figure> {
-    let figure = |what, printed, value, unit, remark| Figure { what, printed, value, unit, remark };
+/// The thesis's numbers of 7.2 and what is behind them, computed anew.
+pub fn thesis() -> Vec<Comparison> {
+    let compared =
+        |what, printed, value, unit, remark| Comparison { what, printed, value, unit, remark };
     let (radius, arm) = BENCH;
     let bond = WATER.bond(9.81, radius);
     let flight = 0.005; // rad/s2
@@ -171,56 +172,56 @@ pub fn thesis() -> Vec<Figure> {
     let (arm_250, radius_250, cube_250, mixed_250, same_250) = rotation(2.21);
     let (arm_12, radius_12, cube_12, ..) = rotation(0.222);
     vec![
-        figure("7.2.1 Bond number of the bench", "902.3", bond, "", ""),
-        figure(
+        compared("7.2.1 Bond number of the bench", "902.3", bond, "", ""),
+        compared(
             "5.1.2 Bond number of the 0.111 m tank",
             "420",
             WATER.bond(9.81, 0.0555),
             "",
             "420 is rounded",
         ),
-        figure(
+        compared(
             "8.2.2 diameter at Bo = 30",
             "below roughly 5 cm",
             2.0 * WATER.radius(30.0, 9.81),
             "m",
             "the radius is the length",
         ),
-        figure(
+        compared(
             "7.2.1 acceleration of a 2.0425 m tank of oxygen",
             "0.002502",
             OXYGEN.acceleration(bond, 2.0425),
             "m/s2",
             "at 90 K, not at -200 degC",
         ),
-        figure(
+        compared(
             "7.2.1 a_main",
             "147000/18000 = 7.8191",
             147_000.0 / 18_800.0,
             "m/s2",
             "the mass is 18800 kg",
         ),
-        figure("7.2.1 a_RCS", "0.0025", 4.4 * 6.0 / 10_450.0, "m/s2", ""),
-        figure("7.2.2 0.25 N m, Bo_i (R^2 L)", "45.87 as Bo_r", arm_250, "", "it is eq. 2.25's"),
-        figure("7.2.2 0.25 N m, Bo_r (R^3)", "45.87", radius_250, "", "eq. 7.3 gives this"),
-        figure("7.2.2 0.25 N m, D by R^3", "1.2416", cube_250, "m", "follows from Bo_r"),
-        figure(
+        compared("7.2.1 a_RCS", "0.0025", 4.4 * 6.0 / 10_450.0, "m/s2", ""),
+        compared("7.2.2 0.25 N m, Bo_i (R^2 L)", "45.87 as Bo_r", arm_250, "", "it is eq. 2.25's"),
+        compared("7.2.2 0.25 N m, Bo_r (R^3)", "45.87", radius_250, "", "eq. 7.3 gives this"),
+        compared("7.2.2 0.25 N m, D by R^3", "1.2416", cube_250, "m", "follows from Bo_r"),
+        compared(
             "7.2.2 0.25 N m, D by 45.87 in R^3",
             "1.2416",
             mixed_250,
             "m",
             "what 45.87 would give",
         ),
-        figure("7.2.2 0.25 N m, D by R^2 L", "-", same_250, "m", "at the same arm"),
-        figure("7.2.2 0.0125 N m, Bo_i (R^2 L)", "4.62", arm_12, "", ""),
-        figure("7.2.2 0.0125 N m, Bo_r (R^3)", "4.62", radius_12, "", "eq. 7.3 gives this"),
-        figure("7.2.2 0.0125 N m, D by R^3", "0.5778", cube_12, "m", ""),
+        compared("7.2.2 0.25 N m, D by R^2 L", "-", same_250, "m", "at the same arm"),
+        compared("7.2.2 0.0125 N m, Bo_i (R^2 L)", "4.62", arm_12, "", ""),
+        compared("7.2.2 0.0125 N m, Bo_r (R^3)", "4.62", radius_12, "", "eq. 7.3 gives this"),
+        compared("7.2.2 0.0125 N m, D by R^3", "0.5778", cube_12, "m", ""),
     ]
 }
 
 /// [`thesis`] as a table.
 pub fn thesis_text() -> String {
-    let line = |f: Figure| {
+    let line = |f: Comparison| {
         let value = format!("{:.6} {}", f.value, f.unit);
         format!("{:50} {:24} {value:22} {}\n", f.what, f.printed, f.remark)
     };
@@ -230,7 +231,9 @@ pub fn thesis_text() -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{BENCH, OXYGEN, WATER, bond_text, thesis};
+    use formulas::similarity::Liquid;
+    use formulas::similarity::froude;
 
     fn of(what: &str) -> f64 {
         thesis().into_iter().find(|f| f.what.starts_with(what)).expect(what).value
@@ -238,7 +241,7 @@ mod tests {
 
     /// Each to half a unit of the last digit that is known.
     #[test]
-    fn figures_of_the_thesis_come_out_corrected() {
+    fn numbers_of_the_thesis_come_out_corrected() {
         for (what, known, digit) in [
             ("7.2.1 Bond number", 902.3, 0.05),
             ("5.1.2", 418.4, 0.05),

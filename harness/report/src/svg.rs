@@ -263,7 +263,7 @@ fn minus(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{Axis, number, simplified};
 
     #[test]
     fn ticks_are_round_and_cover_the_values() {

@@ -247,7 +247,11 @@ fn is_published(name: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{Folder, MANIFEST};
+    use host::output::sha256;
+    use signals::table::Table;
+    use std::collections::BTreeMap;
+    use std::fs;
 
     fn table(value: f64) -> Table {
         Table::new(vec!["time".into()], vec![vec![0.0, value]])

@@ -28,7 +28,7 @@ use serde_json::json;
 
 pub use self::folder::{Folder, MANIFEST};
 pub use self::outcome::{
-    Curve, Doubt, Estimate, Figures, History, Outcome, Passing, Range, Record, SloshPath, WAVE,
+    Curve, Doubt, Estimate, History, Outcome, Passing, Range, Record, SloshPath, Totals, WAVE,
 };
 pub use self::rows::{FeatureRow, MadeFrom};
 use crate::plan::{Case, Plan};

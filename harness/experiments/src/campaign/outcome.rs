@@ -1,4 +1,4 @@
-//! What a run of the bench shows: figures of the run as a whole, and, where its torque allows, its
+//! What a run of the bench shows: totals of the run as a whole, and, where its torque allows, its
 //! frequency response by three estimators, a fitted model, and how the liquid moved.
 
 use std::borrow::Cow;
@@ -39,9 +39,9 @@ const MOST_SHIFT: f64 = 0.25;
 /// Least signal-to-noise ratio at a resonance that is trusted, dB.
 const LEAST_SNR: f64 = 0.0;
 
-/// Figures of a run as a whole.
+/// Maxima and totals of a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Figures {
+pub struct Totals {
     /// Largest |slosh_angle|, rad.
     pub peak_slosh_angle: f64,
     /// Largest |slosh_angle_radial|, rad.
@@ -54,7 +54,7 @@ pub struct Figures {
     pub stuck: f64,
 }
 
-impl Figures {
+impl Totals {
     fn of(table: &Table) -> Self {
         let column = |name| table.column(name).unwrap_or_default();
         let peak = |name| column(name).iter().fold(0.0_f64, |m, v| m.max(v.abs()));
@@ -64,7 +64,7 @@ impl Figures {
         let residual = (0..energy.len())
             .map(|i| (energy[i] - energy[0] - (work[i] - work[0]) + (heat[i] - heat[0])).abs())
             .fold(0.0, f64::max);
-        Figures {
+        Totals {
             peak_slosh_angle: peak("slosh_angle"),
             peak_radial_angle: peak("slosh_angle_radial"),
             peak_wave_height: peak("wave_height"),
@@ -168,7 +168,7 @@ pub struct Outcome {
     /// Its exact linear counterpart with viscous friction, from the FMU's calculated parameters.
     pub linear: Linear,
     /// Of the run as a whole.
-    pub figures: Figures,
+    pub totals: Totals,
     /// What the whole record shows; `None` if the torque is neither sweep nor noise.
     pub record: Option<Record>,
     /// What is seen while a sweep passes; `None` if the torque is no sweep.
@@ -260,7 +260,7 @@ fn closer(features: &Features, than: f64) -> bool {
     features.delta_f().is_some_and(|delta| delta < than)
 }
 
-/// Means of `count` neighbours; what is left over at the end is left out.
+/// Means of `count` neighbours; an incomplete group at the end is left out.
 fn means(signal: &[f64], count: usize) -> Cow<'_, [f64]> {
     if count == 1 {
         return signal.into();
@@ -490,7 +490,7 @@ impl Outcome {
             case: case.clone(),
             range,
             linear,
-            figures: Figures::of(table),
+            totals: Totals::of(table),
             record,
             passing,
             reused,
@@ -522,7 +522,7 @@ impl Outcome {
 
     /// How the run left the range of its model, if it did.
     pub fn beyond_model(&self) -> Option<String> {
-        self.range.left(&[self.figures.peak_wave_height])
+        self.range.left(&[self.totals.peak_wave_height])
     }
 
     /// Features of the `spa` response.
@@ -553,7 +553,7 @@ impl Outcome {
     /// The liquid's regime at its largest wave, from the wave height over the tank's radius (thesis
     /// 2.3.5): linear below 0.15, nonlinear above 0.25.
     pub fn regime(&self) -> &'static str {
-        match self.figures.peak_wave_height / self.range.radius {
+        match self.totals.peak_wave_height / self.range.radius {
             ratio if ratio < 0.15 => "linear",
             ratio if ratio <= 0.25 => "transitional",
             _ => "nonlinear",

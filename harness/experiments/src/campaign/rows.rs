@@ -68,7 +68,7 @@ impl FeatureRow {
         plan_sha256: &str,
     ) -> FeatureRow {
         let features = estimate.map_or(Features::default(), |(estimate, _)| estimate.features);
-        let figures = &run.figures;
+        let totals = &run.totals;
         let (fit, rotary, off_axis) = (run.fit(), run.rotary(), run.off_axis());
         let snr_db = run.record.as_ref().and_then(|record| record.snr_db);
         FeatureRow {
@@ -83,11 +83,11 @@ impl FeatureRow {
             snr_dip_db: snr_db.map(|[_, antiresonance]| antiresonance),
             skewness: fit.map(|fit| fit.skewness),
             kurtosis: fit.map(|fit| fit.kurtosis),
-            peak_slosh_angle_deg: Some(figures.peak_slosh_angle.to_degrees()),
-            peak_radial_angle_deg: Some(figures.peak_radial_angle.to_degrees()),
-            peak_wave_height_m: Some(figures.peak_wave_height),
-            max_energy_residual: Some(figures.max_energy_residual),
-            stuck_s: Some(figures.stuck),
+            peak_slosh_angle_deg: Some(totals.peak_slosh_angle.to_degrees()),
+            peak_radial_angle_deg: Some(totals.peak_radial_angle.to_degrees()),
+            peak_wave_height_m: Some(totals.peak_wave_height),
+            max_energy_residual: Some(totals.max_energy_residual),
+            stuck_s: Some(totals.stuck),
             zero_hz: fit.and_then(|fit| fit.model.zero_frequency()),
             zero_damping: fit.and_then(|fit| fit.model.zero_damping()),
             pole_hz: fit.map(|fit| fit.model.pole_frequency()),

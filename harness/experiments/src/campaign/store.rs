@@ -150,7 +150,8 @@ pub fn because(case: &Case, why: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::difference;
+    use std::collections::BTreeMap;
 
     fn notes(pairs: &[(&str, &str)]) -> BTreeMap<String, String> {
         pairs.iter().map(|(k, v)| (k.to_string(), v.to_string())).collect()

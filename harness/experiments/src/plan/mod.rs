@@ -340,8 +340,8 @@ impl Plan {
         }
 
         let mut problems = Problems::default();
-        let asked = self.input.as_ref().map(|input| input.value.as_str());
-        let input = driven(description, asked).context("the plan's input");
+        let chosen = self.input.as_ref().map(|input| input.value.as_str());
+        let input = driven(description, chosen).context("the plan's input");
         let lines = self.input.as_ref().map_or(Lines::default(), |input| input.lines.clone());
         let Some(input) = problems.take(&lines, input) else {
             problems.check()?;
@@ -787,7 +787,7 @@ mod tests {
         imu.seed = { distribution = \"uniform\", from = 1, to = 6 }\n";
 
     #[test]
-    fn draws_have_the_distributions_asked_for_within_the_variables_bounds() {
+    fn draws_have_the_specified_distributions_within_the_variables_bounds() {
         let cases = cases(&RANDOM.replace("RUNS", "4000"));
         assert_eq!((cases[0].name.as_str(), cases[3999].name.as_str()), ("0001", "4000"));
         let drawn = |i: usize| -> Vec<f64> {

@@ -106,7 +106,7 @@ const SWEEP: &[Parameter] = &[
     duration(Sweep::THESIS.duration),
 ];
 const SWEEPS: &[Demand] = &[(|v| v.of("f0") != v.of("f1"), "f0 and f1 are equal; use sine"), BAND];
-/// Beyond it a phase is no number that has a sine.
+/// Beyond it a phase has no digit left that its sine depends on.
 const BAND: Demand = (
     |v| ["f0", "f1"].iter().all(|name| (1.0 / FREQUENCY..=FREQUENCY).contains(&v.of(name))),
     "f0 and f1 must be from 1e-9 to 1e9 Hz",

@@ -354,7 +354,8 @@ impl Torque {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::kinds::KINDS;
+    use super::{Profile, Torque, Written, table};
 
     #[test]
     fn documentation_lists_the_profiles() {

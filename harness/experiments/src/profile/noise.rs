@@ -84,15 +84,17 @@ impl Shape for Noise {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::Noise;
+    use crate::profile::Shape;
     use analysis::Complex64;
+    use std::f64::consts::TAU;
 
     fn samples(noise: &Noise, duration: f64, step: f64) -> Vec<f64> {
         (0..(duration / step) as usize).map(|k| noise.after(k as f64 * step)).collect()
     }
 
     #[test]
-    fn noise_has_the_rms_asked_for_and_stays_within_the_limit() {
+    fn noise_has_the_specified_rms_and_stays_within_the_limit() {
         let noise = Noise::new(0.05, (1.25, 3.5), -1.0, 3, 0.26);
         let tau = samples(&noise, 600.0, 0.05);
         let rms = (tau.iter().map(|v| v * v).sum::<f64>() / tau.len() as f64).sqrt();
@@ -104,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_has_its_power_in_the_band_and_the_colour_asked_for() {
+    fn noise_has_its_power_in_the_band_and_the_specified_colour() {
         let power = |exponent: f64, (from, to): (f64, f64)| {
             let noise = Noise::new(0.05, (1.0, 4.0), exponent, 5, 1.0);
             let step = 0.1;

@@ -94,10 +94,10 @@ fn at_the_end(run: &Outcome, signal: &str) -> Option<f64> {
 }
 
 /// What a manoeuvre leaves behind: rate and slosh angle after its torque.
-pub(super) fn left_behind(page: &Page, axis: &Axis) -> Figure {
+pub(super) fn residual_motion(page: &Page, axis: &Axis) -> Figure {
     let rate = |run: &Outcome| Some(1e3 * at_the_end(run, "omega_imu")?);
     let angle = |run: &Outcome| Some(at_the_end(run, "slosh_angle")?.to_degrees());
-    let title = format!("What is left after the manoeuvre, against {}", axis.name);
+    let title = format!("Residual motion after the manoeuvre, against {}", axis.name);
     let figure = small(
         page,
         axis,
@@ -108,10 +108,10 @@ pub(super) fn left_behind(page: &Page, axis: &Axis) -> Figure {
     Figure { columns: 2, height: 340, ..figure }
 }
 
-/// The largest slosh angles, and what is left at the end, for torques without a frequency response.
+/// The largest slosh angles, and the residual motion, for torques without a frequency response.
 pub(super) fn slosh_angles(page: &Page, axis: &Axis) -> Figure {
-    let radial = |run: &Outcome| Some(run.figures.peak_radial_angle.to_degrees());
-    let tangential = |run: &Outcome| Some(run.figures.peak_slosh_angle.to_degrees());
+    let radial = |run: &Outcome| Some(run.totals.peak_radial_angle.to_degrees());
+    let tangential = |run: &Outcome| Some(run.totals.peak_slosh_angle.to_degrees());
     let angle = |run: &Outcome| Some(at_the_end(run, "slosh_angle")?.to_degrees());
     let rate = |run: &Outcome| at_the_end(run, "omega_imu");
     let title = format!("Slosh angles against {}", axis.name);
@@ -157,19 +157,19 @@ pub(super) fn bearing_and_liquid(page: &Page, axis: &Axis) -> Figure {
         [
             Quantity {
                 decades: true,
-                ..quantity("time in stiction / s", &|run| Some(run.figures.stuck))
+                ..quantity("time in stiction / s", &|run| Some(run.totals.stuck))
             },
             quantity("largest slosh angle / deg", &|run| {
-                Some(run.figures.peak_slosh_angle.to_degrees())
+                Some(run.totals.peak_slosh_angle.to_degrees())
             }),
             Quantity {
                 level: Some((quarter, "a quarter of the radius")),
-                ..quantity("largest wave / mm", &|run| Some(run.figures.peak_wave_height * 1e3))
+                ..quantity("largest wave / mm", &|run| Some(run.totals.peak_wave_height * 1e3))
             },
             Quantity {
                 decades: true,
                 ..quantity("energy residual / throughput", &|run| {
-                    Some(run.figures.max_energy_residual)
+                    Some(run.totals.max_energy_residual)
                 })
             },
         ],

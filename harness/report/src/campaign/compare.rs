@@ -37,7 +37,7 @@ pub(super) fn compare(
             "f_dip_hz" => run.features().f_dip,
             "f_res_hz" => run.features().f_res,
             "fit_freq_pct" => run.fit().map(|fit| fit.fit_frequency),
-            _ => Some(run.figures.peak_slosh_angle.to_degrees()),
+            _ => Some(run.totals.peak_slosh_angle.to_degrees()),
         };
         let mut most: Option<(f64, &str)> = None;
         panels.push(Panel::new(&format!("this − other, {label}"), if p == 0 { "run" } else { "" }));

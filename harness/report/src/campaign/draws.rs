@@ -8,9 +8,9 @@ use super::figure::{Figure, Panel, numbers};
 use super::page::{Group, Page, best};
 
 /// Name, unit, and what it is of a run.
-type Figures = (&'static str, &'static str, fn(&Outcome) -> Option<f64>);
+type Quantity = (&'static str, &'static str, fn(&Outcome) -> Option<f64>);
 
-const QUANTITIES: [Figures; 4] = [
+const QUANTITIES: [Quantity; 4] = [
     ("antiresonance", "mHz", |run| Some(1e3 * best(run)?.0.features.f_dip?)),
     ("resonance", "mHz", |run| Some(1e3 * best(run)?.0.features.f_res?)),
     ("separation Δf", "mHz", |run| Some(1e3 * best(run)?.0.features.delta_f()?)),
@@ -139,7 +139,7 @@ fn correlation(points: &[(f64, f64)]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::{correlation, histogram};
 
     #[test]
     fn what_goes_together_correlates_by_one_and_what_is_constant_not_at_all() {

@@ -141,7 +141,7 @@ pub(super) fn compared(page: &Page) -> Figure {
 
 /// The crest's path seen from above and over time, if the slosh leaves its plane.
 pub(super) fn paths(page: &Page, group: &Group) -> Vec<Figure> {
-    let radial = |run: &Outcome| run.figures.peak_radial_angle;
+    let radial = |run: &Outcome| run.totals.peak_radial_angle;
     let Some(last) = group.runs.iter().copied().max_by(|a, b| radial(a).total_cmp(&radial(b)))
     else {
         return Vec::new();

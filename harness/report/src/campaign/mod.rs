@@ -112,7 +112,7 @@ fn bench_sections<'a>(
     } else if let (Some(axis), false) =
         (axis, groups.iter().all(|g| manoeuvre(g.runs[0]).is_none()))
     {
-        first.push(along::left_behind(page, axis));
+        first.push(along::residual_motion(page, axis));
         first.push(histories::after(page));
     } else if let Some(axis) = axis {
         first.push(along::slosh_angles(page, axis));

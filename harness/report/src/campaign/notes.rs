@@ -153,10 +153,10 @@ pub(super) fn table(page: &Page, results: &Results) -> Markup {
                             }
                             @if swept { (cells(run.passing.as_ref().map(|passing| &passing.rate))) }
                             @if recorded { (cells(run.record.as_ref().map(|record| &record.spa))) }
-                            td { (format!("{:.1}", run.figures.peak_slosh_angle.to_degrees())) }
-                            td { (format!("{:.1}", run.figures.peak_wave_height * 1e3)) }
-                            td { (format!("{:.3}", run.figures.stuck)) }
-                            td { (format!("{:.1e}", run.figures.max_energy_residual)) }
+                            td { (format!("{:.1}", run.totals.peak_slosh_angle.to_degrees())) }
+                            td { (format!("{:.1}", run.totals.peak_wave_height * 1e3)) }
+                            td { (format!("{:.3}", run.totals.stuck)) }
+                            td { (format!("{:.1e}", run.totals.max_energy_residual)) }
                             td {
                                 @match run.beyond_model() {
                                     Some(how) => span .warn title=(how) { "left" },
