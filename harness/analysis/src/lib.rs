@@ -12,8 +12,12 @@
 //! * [`rational`]: a transfer function fitted to the spectra of the whole record.
 
 pub mod allan;
+pub mod armax;
 pub mod demodulation;
 pub mod features;
+pub mod gauss_markov;
+pub mod innovations;
+pub mod least_squares;
 pub mod lengths;
 pub mod linear;
 pub mod noise;

@@ -118,7 +118,6 @@ impl Linear {
     }
 }
 
-#[cfg(test)]
 impl Linear {
     /// The thesis's bench with 10 cm of water: Table 4.1 with the exact first root of J1',
     /// ρ = 1000 kg/m³, g = 9.81 m/s².

@@ -44,6 +44,12 @@ impl TransferFunction {
         (b0 / b2 > 0.0).then(|| b1 / b2 / (2.0 * (b0 / b2).sqrt()))
     }
 
+    /// a2, a1, a0 of the denominator s³ + a2 s² + a1 s + a0.
+    pub fn denominator(&self) -> [f64; 3] {
+        let (p, w, z) = (self.real_pole, self.pole_omega, self.pole_damping);
+        [p + 2.0 * z * w, w * w + 2.0 * z * w * p, w * w * p]
+    }
+
     /// Frequency of the pair of poles, Hz.
     pub fn pole_frequency(&self) -> f64 {
         self.pole_omega / TAU

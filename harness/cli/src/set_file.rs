@@ -63,9 +63,10 @@ fn from_json(text: &str) -> Result<Vec<(String, String)>> {
     let parameters = table("parameters")
         .context("it has no \"parameters\": it is not a result of hubslosh identify, or one of a --method without any")?;
     let no = |key: &str| root.get(key).and_then(serde_json::Value::as_bool) == Some(false);
-    if no("described") || no("converged") {
+    // "described" is what versions until 0.2 wrote
+    if no("fits") || no("described") || no("converged") {
         eprintln!(
-            "warning: these parameters do not describe the recording that they are from; see its verdict"
+            "warning: these parameters do not fit the recording that they are from; see its verdict"
         );
     }
     let mut settings = Vec::new();

@@ -5,10 +5,10 @@
 //! cargo run --release -p identify --example bounds -- [NAME:VALUE ...]
 //! ```
 
+use analysis::gauss_markov::Noise;
 use anyhow::Result;
 use host::fmi2::Fmu;
 use identify::fit::{Differences, Problem};
-use identify::noise::Noise;
 use identify::recording::Recording;
 use identify::simulate::{Intersample, Setup};
 use identify::twin;

@@ -1,7 +1,6 @@
 //! Do the estimates keep what they state? Many recordings of the FMU with different gyro noise, each
-//! identified with nothing told; prints the root-mean-square error over the stated standard deviation, how
-//! often the 95 % interval holds the truth, which models were chosen, and how often a recording was called
-//! not described.
+//! identified without priors and starts; prints the root-mean-square error over the stated standard deviation, how
+//! often the 95 % interval holds the truth, which models were chosen, and how often none fitted a recording.
 //!
 //! ```text
 //! cargo run --release -p identify --example coverage -- [KEY=VALUE ...]
@@ -24,13 +23,13 @@
 
 use std::collections::BTreeMap;
 
+use analysis::innovations::Tests;
 use anyhow::{Context, Result, bail};
 use host::fmi2::Fmu;
 use identify::methods::output_error::{Identification, identify};
 use identify::nominal::COARSEST;
 use identify::options::Options;
 use identify::recording;
-use identify::residual::Tests;
 use identify::simulate::Intersample;
 use identify::start::PARAMETERS;
 use identify::twin::{self, Blind, SensorErrors, Twin};
@@ -134,7 +133,7 @@ fn truths(fmu: &Fmu, twin: &Twin) -> Result<BTreeMap<String, f64>> {
 struct Tally {
     rows: BTreeMap<String, Vec<(f64, f64, bool)>>,
     chosen: BTreeMap<String, u32>,
-    not_described: u32,
+    invalidated: u32,
     not_converged: u32,
     refused: u32,
     seconds: Vec<f64>,
@@ -150,7 +149,7 @@ impl Tally {
             _ => format!("{} with {}", found.details.fit.model, found.details.fit.friction),
         };
         *self.chosen.entry(verdict).or_default() += 1;
-        self.not_described += u32::from(found.described != Some(true));
+        self.invalidated += u32::from(found.fits != Some(true));
         self.not_converged += u32::from(!found.converged);
         let mut worst = (0.0, String::new());
         for (name, truth) in truths {
@@ -176,7 +175,7 @@ impl Tally {
             worst.1,
             worst.0,
             found.details.fit.newton_decrement,
-            if found.described == Some(true) { "" } else { ", NOT DESCRIBED" },
+            if found.fits == Some(true) { "" } else { ", DOES NOT FIT" },
         );
     }
 
@@ -184,12 +183,12 @@ impl Tally {
         let mean = self.seconds.iter().sum::<f64>() / self.seconds.len().max(1) as f64;
         let longest = self.seconds.iter().copied().fold(0.0, f64::max);
         println!(
-            "\n{} identified in {mean:.1} s on average, {longest:.1} s at most; refused {}; chosen {:?}; not described {}; \
+            "\n{} identified in {mean:.1} s on average, {longest:.1} s at most; refused {}; chosen {:?}; none fitted {}; \
              not at a minimum {}",
             self.seconds.len(),
             self.refused,
             self.chosen,
-            self.not_described,
+            self.invalidated,
             self.not_converged
         );
         println!(
@@ -232,9 +231,9 @@ fn main() -> Result<()> {
                 options.starts.push((name.to_string(), if up { 1.4 } else { 0.6 } * truths[*name]));
             }
         }
-        match identify(&fmu, &recordings, &options, &mut |line| {
+        match identify(&fmu, &recordings, &options, &mut |news| {
             if asked.say {
-                println!("  {line}");
+                println!("  {}", news.line());
             }
         }) {
             Ok(found) => {

@@ -7,6 +7,7 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use crate::fit::{Answer, Problem};
+use crate::nominal;
 use crate::simulate::Intersample;
 use crate::uncertainty::Covariance;
 
@@ -39,8 +40,8 @@ const ROUNDS: usize = 10;
 const SETTLED: f64 = 0.05;
 
 /// The shift of the estimates when they are fitted anew: Gauss–Newton steps −(JᵀJ)⁻¹ Jᵀ Δe with the Jacobian that
-/// there is, Δe the innovations' change. One step would not do: what of Δe is of second order stands beside weak
-/// directions, friction's, like a large error of theirs. A source with which they do not settle is left out:
+/// there is, Δe the innovations' change. One step would not do: what of Δe is of second order looks like a large error
+/// in weak directions, friction's. A source with which they do not settle is left out:
 /// torque held in place of linear where no delay is estimated, which no fit could take for the bench.
 pub fn of(
     problem: &Problem,
@@ -92,16 +93,11 @@ pub fn of(
 }
 
 fn list(problem: &Problem) -> Result<Vec<Wrong>> {
-    let mut instance = problem.fmu.instantiate("identify")?;
-    for (name, value) in &problem.setup.settings {
-        instance.set(name, value)?;
-    }
-    instance.setup_experiment(None, 0.0, None)?;
-    instance.enter_initialization_mode()?;
+    let mut instance = nominal::initialised(problem.fmu, &problem.setup.settings)?;
     let exact = |source, settings| Wrong { source, settings, gain: 1.0, part: 1.0, swap: false };
     let small = |source, settings| Wrong { part: PART, ..exact(source, settings) };
     let mut list = Vec::new();
-    if problem.place("slosh.zeta").is_some() {
+    if problem.index("slosh.zeta").is_some() {
         let mut set = |name: &str, change: &dyn Fn(f64) -> f64| -> Result<_> {
             Ok(vec![(name.to_string(), change(instance.real(name)?).to_string())])
         };

@@ -7,17 +7,18 @@ use serde::Serialize;
 
 use crate::fit::{Polished, Problem};
 use crate::goodness::{fit_pct, is_poor, tests};
+use crate::news::News;
 use crate::nominal::Start;
 use crate::options::Options;
 use crate::recording::Recording;
-use crate::residual::Tests;
 use crate::search::{Search, Sibling};
 use crate::simulate::{Intersample, Setup};
 use crate::start;
 use crate::unknown::{Scale, Unknown};
+use analysis::innovations::Tests;
 
 /// One model's fit.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct ModelFit {
     /// slosh.model.
     pub model: String,
@@ -41,7 +42,7 @@ pub struct ModelFit {
     pub noise_white: f64,
     /// Answers of the FMU that were needed.
     pub simulations: usize,
-    /// Neither noise nor a small effect explains what the fit leaves.
+    /// Neither noise nor a small effect explains the residual.
     #[serde(skip)]
     pub poor: bool,
 }
@@ -82,7 +83,7 @@ pub fn fit<'a>(
     (model, law): (&str, &str),
     starts: &[Start],
     from: Option<&Fitted<'a>>,
-    heard: &mut dyn FnMut(String),
+    heard: &mut dyn FnMut(News),
 ) -> Result<Fitted<'a>> {
     let of =
         |start: &Start, options: &Options| problem(fmu, recordings, options, (model, law), start);
@@ -91,38 +92,37 @@ pub fn fit<'a>(
     let mut told = options.clone();
     told.starts.retain(|(name, _)| !start::PARAMETERS.contains(&name.as_str()));
     let first = of(&starts[0], options)?;
-    let mut places = vec![first.start()];
+    let mut variables = vec![first.start()];
     for start in &starts[if far { 0 } else { 1 }..] {
         let x = of(start, &told)?.start();
-        places.extend(x.iter().all(|x| x.is_finite()).then_some(x));
+        variables.extend(x.iter().all(|x| x.is_finite()).then_some(x));
     }
     let mut search = Search {
         problem: first,
-        starts: places,
+        starts: variables,
         far,
         intersample: options.intersample,
         alone: options.models.iter().filter(|m| *m != "frozen").count() == 1,
         model,
         simulations: 0,
-        heard,
+        heard: &mut |line| heard(News::Detail(line)),
     };
-    let (polished, spread) = match from {
-        Some(other) => {
-            let Fitted { problem, polished: minimum, spread, fit } = other;
-            // a sibling that explains the recording, or nearly, leaves no room for a poor fit of this one
-            let pair = (&*fit.model, model);
-            let is_richer = !fit.poor
-                && matches!(
-                    pair,
-                    ("planar", "spherical" | "paraboloid") | ("spherical", "paraboloid")
-                );
-            search.near(&Sibling { problem, minimum, spread: spread.as_ref() }, is_richer)?
+    let sibling = from.map(|other| {
+        let pair = (&*other.fit.model, model);
+        let is_poorer =
+            matches!(pair, ("planar", "spherical" | "paraboloid") | ("spherical", "paraboloid"));
+        Sibling {
+            problem: &other.problem,
+            minimum: &other.polished,
+            spread: other.spread.as_ref(),
+            is_poorer: is_poorer && !other.fit.poor,
         }
-        None => search.from_starts()?,
-    };
+    });
+    let (polished, spread) = search.run(sibling.as_ref())?;
     let (mut problem, simulations) = (search.problem, search.simulations);
     problem.estimate_noise(&polished.answer);
     let fit = summary(&problem, &polished, options, (model, law), simulations)?;
+    heard(News::Step(fit.line()));
     Ok(Fitted { problem, polished, fit, spread })
 }
 

@@ -11,10 +11,10 @@ use host::fmi2::Fmu;
 use nalgebra::Matrix5;
 
 use crate::fit::Problem;
-use crate::noise::Noise;
 use crate::recording::Recording;
 use crate::simulate::Setup;
 use crate::unknown::Unknown;
+use analysis::gauss_markov::Noise;
 
 /// A random-phase odd multisine with detection lines (Pintelon and Schoukens, System Identification,
 /// chapter 4): Σ a_k sin(2π k f_0 t + φ_k) over odd k, one of each group of [`GROUP`] left out at random.
@@ -242,7 +242,6 @@ pub fn cramer_rao(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use analysis::linear::Mode;
 
     #[test]
     fn a_multisine_has_odd_lines_alone_and_its_peak() {
@@ -259,8 +258,7 @@ mod tests {
 
     #[test]
     fn d_optimal_power_stands_around_the_slosh_and_tells_more() {
-        let mode = Mode { mass: 0.756_293_271_9, frequency: 2.343_618_143_1, damping: 0.003 };
-        let plant = Linear { inertia: 0.39, friction: 0.1, arm: 0.225, modes: vec![mode] };
+        let plant = Linear { friction: 0.1, ..Linear::bench_10_cm(0.003) };
         let frequencies: Vec<f64> = (125..350).step_by(2).map(|k| f64::from(k) / 100.0).collect();
         let shares = d_optimal(&plant, &frequencies);
         assert!((shares.iter().sum::<f64>() - 1.0).abs() < 1e-9);

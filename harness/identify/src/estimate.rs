@@ -16,3 +16,16 @@ pub struct Estimated {
     /// As in modelDescription.xml.
     pub unit: String,
 }
+
+impl Estimated {
+    /// A number whose only uncertainty is noise, normally distributed.
+    pub fn normal(value: f64, std: f64, unit: &str) -> Self {
+        let interval = [value - 1.96 * std, value + 1.96 * std];
+        Estimated { value, std, std_noise: std, interval, unit: unit.into() }
+    }
+}
+
+/// A unit of the FMU as prose has it: kg·m² for kg.m2.
+pub fn prose(unit: &str) -> String {
+    unit.replace('.', "·").replace('2', "²")
+}

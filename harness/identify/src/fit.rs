@@ -6,7 +6,7 @@
 //!
 //! ω is the FMU's answer (see [`crate::simulate`]), s, b and δ the gyro's scale and bias and the delay,
 //! the second sum what is known of some parameters beforehand, the whitening filter that of
-//! [`crate::noise`]. Where an encoder was recorded, its angle less an offset is a second such sum, which
+//! [`analysis::gauss_markov`]. Where an encoder was recorded, its angle less an offset is a second such sum, which
 //! knows nothing of the gyro's scale.
 //!
 //! Two searches. From afar, Levenberg and Marquardt's method as MINPACK has it. Near the minimum, Gauss
@@ -30,18 +30,20 @@
 //! known before, L = V S⁻¹ of their J = U S Vᵀ, which move the answer by one standard deviation
 //! each and at right angles to one another; then J = D L⁻¹ is as good along the valley as across it.
 
+use std::cell::{Cell, RefCell};
+
 use anyhow::{Context, Result};
 use host::fmi2::Fmu;
-use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
-use nalgebra::{DMatrix, DVector, Dyn, storage::Owned};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::noise::{FLOOR, Noise, Whitening};
 use crate::recording::{self, Recording};
 use crate::simulate::{Motion, Setup};
 use crate::stribeck;
-use crate::uncertainty::Covariance;
+use crate::uncertainty::{self, Covariance};
 use crate::unknown::{Quantity, Scale, Unknown};
+use analysis::gauss_markov::{FLOOR, Noise, Whitening};
+use analysis::least_squares;
 
 /// By how much a difference moves the answer, in units of the noise's norm of one degree of freedom.
 pub const MOVE: f64 = 0.3;
@@ -162,7 +164,7 @@ impl<'a> Problem<'a> {
             let noise = Noise { white: recording.rate_noise().max(FLOOR), ..TYPICAL };
             channels.push(Channel { recording: index, signal: Signal::Rate, noise });
             if let Some(angle) = &recording.angle {
-                // the angle adds up what the rate leaves: much drift
+                // the angle integrates the residual of the rate: much drift
                 let white = recording::noise_level(angle).max(FLOOR);
                 let noise = Noise { white, drift: 30.0, time: 100.0 };
                 channels.push(Channel { recording: index, signal: Signal::Angle, noise });
@@ -182,15 +184,15 @@ impl<'a> Problem<'a> {
         self.unknowns.iter().map(|unknown| unknown.scale.variable(unknown.start)).collect()
     }
 
-    /// Place of a parameter of the FMU among the unknowns.
-    pub fn place(&self, parameter: &str) -> Option<usize> {
+    /// Index of a parameter of the FMU among the unknowns.
+    pub fn index(&self, parameter: &str) -> Option<usize> {
         self.unknowns.iter().position(|u| u.quantity.parameter() == Some(parameter))
     }
 
     /// Value of an unknown, or what it is if it is not unknown.
     fn value_of(&self, x: &[f64], quantity: &Quantity, otherwise: f64) -> f64 {
-        let place = self.unknowns.iter().position(|unknown| unknown.quantity == *quantity);
-        place.map_or(otherwise, |i| self.unknowns[i].scale.value(x[i]))
+        let index = self.unknowns.iter().position(|unknown| unknown.quantity == *quantity);
+        index.map_or(otherwise, |i| self.unknowns[i].scale.value(x[i]))
     }
 
     fn motion(&self, x: &[f64], recording: usize) -> Result<Motion> {
@@ -214,7 +216,7 @@ impl<'a> Problem<'a> {
         (0..self.recordings.len()).into_par_iter().map(|i| self.motion(x, i)).collect()
     }
 
-    /// The FMU's answer and what it leaves of the recordings.
+    /// The FMU's answer and the residual of the recordings.
     pub fn answer(&self, x: &[f64]) -> Result<Answer> {
         let motion = self.motions(x)?;
         let residual = self.channels.iter().map(|c| self.residual(x, *c, &motion)).collect();
@@ -269,7 +271,7 @@ impl<'a> Problem<'a> {
         squares + self.filters().iter().map(Whitening::log_variance).sum::<f64>()
     }
 
-    /// Estimates each channel's noise from what an answer leaves.
+    /// Estimates each channel's noise from the residual of an answer.
     pub fn estimate_noise(&mut self, answer: &Answer) {
         let of = |(channel, residual): (&Channel, &Vec<f64>)| {
             Noise::of(&self.recordings[channel.recording].time, residual, self.fresh(channel))
@@ -303,95 +305,108 @@ impl<'a> Problem<'a> {
         which: &[usize],
         base: &[Motion],
         steps: &[f64],
-        how: Differences,
+    ) -> Result<DMatrix<f64>> {
+        let column = |k: usize| self.column(x, which[k], base, steps[which[k]]);
+        Ok(self.with_priors(&self.whitened(which.len(), &column)?, which))
+    }
+
+    /// A matrix whose columns are given channel by channel, each turned into innovations.
+    fn whitened(
+        &self,
+        count: usize,
+        column: &(dyn Fn(usize) -> Result<Vec<Vec<f64>>> + Sync),
     ) -> Result<DMatrix<f64>> {
         let filters = self.filters();
-        let rows: Vec<usize> =
-            self.channels.iter().map(|c| self.recordings[c.recording].time.len()).collect();
-        let priors = self.priors();
-        let columns: Vec<Vec<f64>> = which
-            .par_iter()
-            .map(|&j| -> Result<Vec<f64>> {
-                let mut column = self.column(x, j, base, steps[j], how)?;
-                for (piece, filter) in column.iter_mut().zip(&filters) {
-                    filter.apply(piece);
-                }
-                let mut column = column.concat();
-                column
-                    .extend(priors.iter().map(|&i| if i == j { self.prior_slope(i) } else { 0.0 }));
-                Ok(column)
-            })
-            .collect::<Result<_>>()?;
-        let height = rows.iter().sum::<usize>() + priors.len();
-        Ok(DMatrix::from_vec(height, which.len(), columns.concat()))
+        let filtered = |k: usize| -> Result<Vec<f64>> {
+            let mut pieces = column(k)?;
+            pieces.iter_mut().zip(&filters).for_each(|(piece, filter)| filter.apply(piece));
+            Ok(pieces.concat())
+        };
+        let columns: Vec<Vec<f64>> =
+            (0..count).into_par_iter().map(filtered).collect::<Result<_>>()?;
+        let rows = self.channels.iter().map(|c| self.recordings[c.recording].time.len()).sum();
+        Ok(DMatrix::from_vec(rows, count, columns.concat()))
+    }
+
+    /// Sensitivities to the variables `which` with the rows of what is known of unknowns below.
+    fn with_priors(&self, sensitivities: &DMatrix<f64>, which: &[usize]) -> DMatrix<f64> {
+        let known: Vec<usize> =
+            (0..self.unknowns.len()).filter(|&j| self.unknowns[j].prior.is_some()).collect();
+        let rows = sensitivities.nrows();
+        let mut all = sensitivities.clone().resize_vertically(rows + known.len(), 0.0);
+        for (row, i) in known.into_iter().enumerate() {
+            if let Some(column) = which.iter().position(|&j| j == i) {
+                all[(rows + row, column)] = self.prior_slope(i);
+            }
+        }
+        all
     }
 
     /// Derivative of the residuals with respect to one variable, for each channel.
-    fn column(
+    fn column(&self, x: &[f64], j: usize, base: &[Motion], step: f64) -> Result<Vec<Vec<f64>>> {
+        let quantity = &self.unknowns[j].quantity;
+        if matches!(quantity, Quantity::Parameter(_) | Quantity::Initial(..)) {
+            let moved = |by: f64| -> Result<Vec<Motion>> {
+                let mut moved = x.to_vec();
+                moved[j] += by;
+                let each = (0..self.recordings.len()).into_par_iter();
+                each.map(|i| match quantity {
+                    Quantity::Initial(of, _) if *of != i => Ok(base[i].clone()),
+                    _ => self.motion(&moved, i),
+                })
+                .collect()
+            };
+            return self.differenced(x, base, step, &moved);
+        }
+        let slope = self.unknowns[j].scale.slope(x[j]);
+        let scale = self.value_of(x, &Quantity::GyroScale, 1.0);
+        let exact = |c: &Channel| -> Vec<f64> {
+            let motion = &base[c.recording];
+            match (quantity, c.signal) {
+                (Quantity::GyroScale, Signal::Rate) => {
+                    motion.rate.iter().map(|w| -w * slope).collect()
+                }
+                (Quantity::GyroBias(of), Signal::Rate)
+                | (Quantity::AngleOffset(of), Signal::Angle)
+                    if c.recording == *of =>
+                {
+                    vec![-slope; motion.rate.len()]
+                }
+                (Quantity::Delay, Signal::Rate) => {
+                    motion.acceleration.iter().map(|a| scale * a * slope).collect()
+                }
+                (Quantity::Delay, Signal::Angle) => motion.rate.iter().map(|w| w * slope).collect(),
+                _ => vec![0.0; motion.rate.len()],
+            }
+        };
+        Ok(self.channels.iter().map(exact).collect())
+    }
+
+    /// Derivative of the residuals for each channel by differences of the motion, which `moved` gives some steps from
+    /// x in a direction.
+    fn differenced(
         &self,
         x: &[f64],
-        j: usize,
         base: &[Motion],
         step: f64,
-        how: Differences,
+        moved: &dyn Fn(f64) -> Result<Vec<Motion>>,
     ) -> Result<Vec<Vec<f64>>> {
-        let unknown = &self.unknowns[j];
-        let slope = unknown.scale.slope(x[j]);
+        let ahead = moved(step)?;
+        let (behind, width) = match self.differences {
+            Differences::Forward => (None, step),
+            Differences::Central => (Some(moved(-step)?), 2.0 * step),
+        };
+        let behind = behind.as_deref().unwrap_or(base);
         let scale = self.value_of(x, &Quantity::GyroScale, 1.0);
-        let zero = |c: &Channel| vec![0.0; self.recordings[c.recording].time.len()];
-        let per_channel =
-            |of: &dyn Fn(&Channel) -> Vec<f64>| self.channels.iter().map(of).collect();
-        Ok(match &unknown.quantity {
-            Quantity::GyroScale => per_channel(&|c| match c.signal {
-                Signal::Rate => base[c.recording].rate.iter().map(|w| -w * slope).collect(),
-                Signal::Angle => zero(c),
-            }),
-            Quantity::GyroBias(of) => per_channel(&|c| match c.signal {
-                Signal::Rate if c.recording == *of => zero(c).iter().map(|_| -slope).collect(),
-                _ => zero(c),
-            }),
-            Quantity::AngleOffset(of) => per_channel(&|c| match c.signal {
-                Signal::Angle if c.recording == *of => zero(c).iter().map(|_| -slope).collect(),
-                _ => zero(c),
-            }),
-            Quantity::Delay => per_channel(&|c| {
-                let motion = &base[c.recording];
-                match c.signal {
-                    Signal::Rate => motion.acceleration.iter().map(|a| scale * a * slope).collect(),
-                    Signal::Angle => motion.rate.iter().map(|w| w * slope).collect(),
-                }
-            }),
-            Quantity::Parameter(_) | Quantity::Initial(..) => {
-                let affected =
-                    |i: usize| !matches!(&unknown.quantity, Quantity::Initial(of, _) if *of != i);
-                let moved = |by: f64| -> Result<Vec<Motion>> {
-                    let mut moved = x.to_vec();
-                    moved[j] += by;
-                    let each = (0..self.recordings.len()).into_par_iter();
-                    each.map(|i| match affected(i) {
-                        true => self.motion(&moved, i),
-                        false => Ok(base[i].clone()),
-                    })
-                    .collect()
-                };
-                let ahead = moved(step)?;
-                let (behind, width) = match how {
-                    Differences::Forward => (None, step),
-                    Differences::Central => (Some(moved(-step)?), 2.0 * step),
-                };
-                let behind = behind.as_deref().unwrap_or(base);
-                let difference = |a: &[f64], b: &[f64], factor: f64| -> Vec<f64> {
-                    a.iter().zip(b).map(|(a, b)| -factor * (a - b) / width).collect()
-                };
-                per_channel(&|c| {
-                    let (a, b) = (&ahead[c.recording], &behind[c.recording]);
-                    match c.signal {
-                        Signal::Rate => difference(&a.rate, &b.rate, scale),
-                        Signal::Angle => difference(&a.angle, &b.angle, 1.0),
-                    }
-                })
-            }
-        })
+        let difference = |c: &Channel| -> Vec<f64> {
+            let (a, b) = (&ahead[c.recording], &behind[c.recording]);
+            let (a, b, factor) = match c.signal {
+                Signal::Rate => (&a.rate, &b.rate, scale / width),
+                Signal::Angle => (&a.angle, &b.angle, 1.0 / width),
+            };
+            a.iter().zip(b).map(|(a, b)| -factor * (a - b)).collect()
+        };
+        Ok(self.channels.iter().map(difference).collect())
     }
 
     /// Steps of the differences that move the answer by [`MOVE`] at these sensitivities.
@@ -413,9 +428,8 @@ impl<'a> Problem<'a> {
         let each = if self.differences == Differences::Central { 2 } else { 1 };
         let Some(known) = known else {
             let axes = vec![1e-5; x.len()];
-            let rough = self.jacobian(x, free, base, &axes, self.differences)?;
-            let mut known = DMatrix::zeros(rough.nrows(), x.len());
-            free.iter().enumerate().for_each(|(k, &j)| known.set_column(j, &rough.column(k)));
+            let rough = self.jacobian(x, free, base, &axes)?;
+            let known = at_places(&rough, free, x.len());
             let (found, needed) = self.sensitivities(x, free, base, Some(&known))?;
             return Ok((found, needed + each * free.len()));
         };
@@ -423,20 +437,10 @@ impl<'a> Problem<'a> {
         let (mixed, single): (Vec<usize>, Vec<usize>) =
             free.iter().copied().partition(is_parameter);
         let steps = Problem::steps(known);
-        let along_axes = self.jacobian(x, &single, base, &steps, self.differences)?;
+        let along_axes = self.jacobian(x, &single, base, &steps)?;
         let mixture = self.along(x, &mixed, base, known)?;
-        let height = along_axes.nrows();
-        let mut all = DMatrix::zeros(height, free.len());
-        for (k, j) in free.iter().enumerate() {
-            match mixed.iter().position(|m| m == j) {
-                Some(place) => all.set_column(k, &mixture.column(place)),
-                None => {
-                    let place = single.iter().position(|s| s == j);
-                    all.set_column(k, &along_axes.column(place.context("a free variable")?));
-                }
-            }
-        }
-        Ok((all, each * free.len()))
+        let all = at_places(&along_axes, &single, x.len()) + at_places(&mixture, &mixed, x.len());
+        Ok((all.select_columns(free), each * free.len()))
     }
 
     /// Sensitivities to the parameters `mixed`, differenced along the directions that `known` ones give.
@@ -447,59 +451,22 @@ impl<'a> Problem<'a> {
         base: &[Motion],
         known: &DMatrix<f64>,
     ) -> Result<DMatrix<f64>> {
-        let how = self.differences;
-        let directions = directions(&known.select_columns(mixed));
-        let scale = self.value_of(x, &Quantity::GyroScale, 1.0);
+        let (directions, _) = uncertainty::directions(&known.select_columns(mixed));
         let fastest = fastest(base);
-        let filters = self.filters();
-        let columns: Vec<Vec<f64>> = (0..mixed.len())
-            .into_par_iter()
-            .map(|k| -> Result<Vec<f64>> {
-                let direction = directions.column(k);
-                let step = MOVE.min(LONGEST_STEP / direction.amax());
-                let moved = |by: f64| {
-                    let mut part = vec![0.0; x.len()];
-                    mixed.iter().zip(&direction).for_each(|(&j, d)| part[j] = by * d);
-                    self.motions(&stribeck::moved(&self.unknowns, x, &part, fastest))
-                };
-                let ahead = moved(step)?;
-                let (behind, width) = match how {
-                    Differences::Forward => (None, step),
-                    Differences::Central => (Some(moved(-step)?), 2.0 * step),
-                };
-                let behind = behind.as_deref().unwrap_or(base);
-                let mut column = Vec::new();
-                for (c, filter) in self.channels.iter().zip(&filters) {
-                    let (a, b) = (&ahead[c.recording], &behind[c.recording]);
-                    let (a, b, factor) = match c.signal {
-                        Signal::Rate => (&a.rate, &b.rate, scale / width),
-                        Signal::Angle => (&a.angle, &b.angle, 1.0 / width),
-                    };
-                    let mut piece: Vec<f64> =
-                        a.iter().zip(b).map(|(a, b)| -factor * (a - b)).collect();
-                    filter.apply(&mut piece);
-                    column.extend(piece);
-                }
-                Ok(column)
-            })
-            .collect::<Result<_>>()?;
-        let rows = columns.first().map_or(0, Vec::len);
-        let differences = DMatrix::from_vec(rows, mixed.len(), columns.concat());
-        let inverse = directions.try_inverse().context("sensitivities without a direction")?;
-        let found = differences * inverse;
-        let priors = self.priors();
-        let mut all = found.resize_vertically(rows + priors.len(), 0.0);
-        for (row, &i) in priors.iter().enumerate() {
-            if let Some(column) = mixed.iter().position(|&j| j == i) {
-                all[(rows + row, column)] = self.prior_slope(i);
-            }
-        }
-        Ok(all)
-    }
-
-    /// Unknowns of which something is known.
-    fn priors(&self) -> Vec<usize> {
-        (0..self.unknowns.len()).filter(|&j| self.unknowns[j].prior.is_some()).collect()
+        let column = |k: usize| {
+            let direction = directions.column(k);
+            let step = MOVE.min(LONGEST_STEP / direction.amax());
+            let moved = |by: f64| {
+                let mut part = vec![0.0; x.len()];
+                mixed.iter().zip(&direction).for_each(|(&j, d)| part[j] = by * d);
+                self.motions(&stribeck::moved(&self.unknowns, x, &part, fastest))
+            };
+            self.differenced(x, base, step, &moved)
+        };
+        let differences = self.whitened(mixed.len(), &column)?;
+        let inverse = directions.clone().try_inverse();
+        let found = differences * inverse.context("sensitivities without a direction")?;
+        Ok(self.with_priors(&found, mixed))
     }
 
     /// Derivative of what is known of an unknown with respect to its x: 1 over its standard deviation.
@@ -573,19 +540,11 @@ impl<'a> Problem<'a> {
             };
             if decrement < enough || round >= rounds {
                 let cost = e.norm_squared();
-                return Ok(Polished {
-                    x,
-                    jacobian,
-                    covariance,
-                    answer,
-                    cost,
-                    decrement,
-                    simulations,
-                });
+                let found =
+                    Polished { x, jacobian, covariance, answer, cost, decrement, simulations };
+                return Ok(found);
             }
-            let mut all = DMatrix::zeros(jacobian.nrows(), x.len());
-            free.iter().enumerate().for_each(|(k, &j)| all.set_column(j, &jacobian.column(k)));
-            known = Some(all);
+            known = Some(at_places(&jacobian, free, x.len()));
         }
         unreachable!("the rounds are counted")
     }
@@ -614,27 +573,46 @@ impl<'a> Problem<'a> {
 
     /// Levenberg and Marquardt's search; ends when the sum of squares falls by less than `tolerance`, relatively.
     pub fn search(&self, x: &[f64], tolerance: f64) -> Result<Estimate> {
-        self.answer(x).context("the FMU refuses the start of the search")?;
-        let (search, report) = LevenbergMarquardt::new()
-            .with_ftol(tolerance)
-            .with_xtol(1e-8)
-            .with_gtol(0.0)
-            .with_patience(4)
-            .minimize(Search::new(self, x));
-        Ok(Estimate {
-            x: search.x.clone(),
-            jacobian: search.last.borrow().clone(),
-            reason: format!("{:?}", report.termination),
-            simulations: search.simulations.get(),
-        })
+        let first = self.answer(x).context("the FMU refuses the start of the search")?;
+        let first = Cell::new(Some(first));
+        // the motion at the last x, steps of the next differences, the last sensitivities
+        let motion = RefCell::new(None);
+        let steps = RefCell::new(vec![1e-5; x.len()]);
+        let last = RefCell::new(None);
+        let simulations = Cell::new(0);
+        let residuals = |x: &[f64]| {
+            simulations.set(simulations.get() + 1);
+            let answer = first.take().map_or_else(|| self.answer(x), Ok);
+            let answer = answer.unwrap_or_else(|_| {
+                // a parameter the FMU refuses: worse than anything, so that the step is taken back
+                let far = |c: &Channel| vec![1e6; self.recordings[c.recording].time.len()];
+                Answer { motion: Vec::new(), residual: self.channels.iter().map(far).collect() }
+            });
+            let e = self.stacked(&answer, x);
+            *motion.borrow_mut() = Some(answer.motion).filter(|motion| !motion.is_empty());
+            e.as_slice().to_vec()
+        };
+        let all: Vec<usize> = (0..x.len()).collect();
+        let derivatives = |x: &[f64]| {
+            let motion = motion.borrow();
+            let found = self.jacobian(x, &all, motion.as_ref()?, &steps.borrow()).ok()?;
+            simulations.set(simulations.get() + x.len());
+            *steps.borrow_mut() = Problem::steps(&found);
+            *last.borrow_mut() = Some(found.clone());
+            Some(found)
+        };
+        let method = least_squares::tolerances(tolerance, 1e-8).with_gtol(0.0).with_patience(4);
+        let found = least_squares::minimise_by(&method, &residuals, &derivatives, x);
+        let jacobian = last.borrow_mut().take();
+        Ok(Estimate { x: found.x, reason: found.reason, jacobian, simulations: simulations.get() })
     }
 
     /// The same over windows of the recordings that grow, each from the estimate of the one before.
     ///
     /// A start whose slosh frequency is 20 % off is out of phase after a few cycles; over a whole
     /// recording its error has as many minima as there are cycles. Over the beginning it has one,
-    /// and as the window grows the estimate stays within its reach. Where a window leaves [`LEAP`] times as
-    /// much as the one before (a resonance or rotary slosh has come into it), it is reached in smaller steps.
+    /// and as the window grows the estimate stays within its reach. Where the residual of a window has [`LEAP`] times the
+    /// mean square of the one before (a resonance or rotary slosh has come into it), it is reached in smaller steps.
     pub fn search_growing(
         &self,
         x: &[f64],
@@ -643,11 +621,11 @@ impl<'a> Problem<'a> {
     ) -> Result<Estimate> {
         let mut to_come: Vec<f64> = windows.iter().rev().copied().collect();
         let (mut from, mut jacobian, mut simulations) = (x.to_vec(), None, 0);
-        // the last window, what it left, its estimate; none once a leap was taken all the same
+        // the last window, its residual, its estimate; none once a leap was taken all the same
         let mut before: Option<(f64, f64, Vec<f64>)> = None;
         let mut careful = true;
         while let Some(window) = to_come.pop() {
-            let (estimate, left) = self.search_window(x, &from, window)?;
+            let (estimate, residual) = self.search_window(x, &from, window)?;
             heard(format!(
                 "window of {:.0} %: {}, {} simulations",
                 100.0 * window,
@@ -655,7 +633,7 @@ impl<'a> Problem<'a> {
                 estimate.simulations
             ));
             simulations += estimate.simulations;
-            if let Some((reached, less, estimate)) = before.take_if(|b| left > LEAP * b.1) {
+            if let Some((reached, less, estimate)) = before.take_if(|b| residual > LEAP * b.1) {
                 if window - reached > SHORTEST {
                     to_come.extend([window, 0.5 * (reached + window)]);
                     from.clone_from(&estimate);
@@ -665,7 +643,7 @@ impl<'a> Problem<'a> {
                 careful = false;
             }
             if careful {
-                before = Some((window, left, estimate.x.clone()));
+                before = Some((window, residual, estimate.x.clone()));
             }
             from = estimate.x;
             jacobian = estimate.jacobian.map(|jacobian| jacobian * BLUNT);
@@ -673,7 +651,7 @@ impl<'a> Problem<'a> {
         Ok(Estimate { x: from, simulations, jacobian, reason: String::new() })
     }
 
-    /// The search over a window of the recordings from x, and the mean square of what it leaves. Each parameter is
+    /// The search over a window of the recordings from x, and the residual's mean square. Each parameter is
     /// also held near its first start ([`LOOSE`]), for a short window does not say everything, and what the
     /// model cannot follow yet counts as noise of [`BLUNT`] times the gyro's.
     fn search_window(&self, first: &[f64], x: &[f64], fraction: f64) -> Result<(Estimate, f64)> {
@@ -696,35 +674,29 @@ impl<'a> Problem<'a> {
             channel.noise.white *= BLUNT;
         }
         let estimate = problem.search(x, 1e-3)?;
-        let left = problem.stacked(&problem.answer(&estimate.x)?, &estimate.x);
-        let left = left.norm_squared() / left.len() as f64;
-        Ok((estimate, left))
+        let e = problem.stacked(&problem.answer(&estimate.x)?, &estimate.x);
+        Ok((estimate, e.norm_squared() / e.len() as f64))
     }
 }
 
-/// L = V S⁻¹ of sensitivities U S Vᵀ, from columns of unit length: each column moves the answer by one standard
-/// deviation, at right angles to the others.
-fn directions(jacobian: &DMatrix<f64>) -> DMatrix<f64> {
-    let norms: Vec<f64> = jacobian.column_iter().map(|c| c.norm().max(1e-9)).collect();
-    let mut scaled = jacobian.clone();
-    scaled.column_iter_mut().zip(&norms).for_each(|(mut column, norm)| column /= *norm);
-    let svd = scaled.qr().r().svd(false, true);
-    let mut l = svd.v_t.map_or_else(DMatrix::default, |v| v.transpose());
-    let least = 1e-9 * svd.singular_values.max();
-    for (mut column, value) in l.column_iter_mut().zip(&svd.singular_values) {
-        column /= value.max(least);
-    }
-    for (mut row, norm) in l.row_iter_mut().zip(&norms) {
-        row /= *norm;
-    }
-    l
+/// The columns of a matrix at these places of `n` columns, with zeros for the others.
+fn at_places(columns: &DMatrix<f64>, places: &[usize], n: usize) -> DMatrix<f64> {
+    let mut all = DMatrix::zeros(columns.nrows(), n);
+    places.iter().enumerate().for_each(|(k, &j)| all.set_column(j, &columns.column(k)));
+    all
+}
+
+/// Speeds of some of the rows, growing, rad/s.
+pub fn speeds(motion: &[Motion]) -> Vec<f64> {
+    let mut speeds: Vec<f64> =
+        motion.iter().flat_map(|m| &m.rate).step_by(7).map(|w| w.abs()).collect();
+    speeds.sort_by(f64::total_cmp);
+    speeds
 }
 
 /// The speed that 1 % of the rows exceed, rad/s.
 pub fn fastest(motion: &[Motion]) -> f64 {
-    let mut speeds: Vec<f64> =
-        motion.iter().flat_map(|m| &m.rate).step_by(7).map(|w| w.abs()).collect();
-    speeds.sort_by(f64::total_cmp);
+    let speeds = speeds(motion);
     speeds[speeds.len() * 99 / 100]
 }
 
@@ -734,70 +706,9 @@ pub const WINDOWS: [f64; 7] = [0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0];
 pub const WHOLE: [f64; 1] = [1.0];
 /// By how much the noise of a window is taken for larger than the gyro's.
 const BLUNT: f64 = 10.0;
-/// By how much more a window must leave than the one before to be reached in smaller steps.
+/// Mean square of a window's residual over that of the one before beyond which it is reached in smaller steps.
 const LEAP: f64 = 3.0;
 /// Shortest step from one window to the next, as a fraction of the recordings.
 const SHORTEST: f64 = 0.05;
 /// How far a parameter may be from its start in a window, relatively.
 const LOOSE: f64 = 0.5;
-
-/// The problem as the crate wants it.
-struct Search<'p, 'a> {
-    problem: &'p Problem<'a>,
-    x: Vec<f64>,
-    answer: Option<Answer>,
-    steps: std::cell::RefCell<Vec<f64>>,
-    last: std::cell::RefCell<Option<DMatrix<f64>>>,
-    simulations: std::cell::Cell<usize>,
-}
-
-impl<'p, 'a> Search<'p, 'a> {
-    fn new(problem: &'p Problem<'a>, x: &[f64]) -> Self {
-        Search {
-            problem,
-            x: x.to_vec(),
-            answer: problem.answer(x).ok(),
-            steps: vec![1e-5; x.len()].into(),
-            last: None.into(),
-            simulations: 1.into(),
-        }
-    }
-}
-
-impl LeastSquaresProblem<f64, Dyn, Dyn> for Search<'_, '_> {
-    type ParameterStorage = Owned<f64, Dyn>;
-    type ResidualStorage = Owned<f64, Dyn>;
-    type JacobianStorage = Owned<f64, Dyn, Dyn>;
-
-    fn set_params(&mut self, x: &DVector<f64>) {
-        self.x = x.as_slice().to_vec();
-        self.answer = self.problem.answer(&self.x).ok();
-        self.simulations.set(self.simulations.get() + 1);
-    }
-
-    fn params(&self) -> DVector<f64> {
-        DVector::from_column_slice(&self.x)
-    }
-
-    fn residuals(&self) -> Option<DVector<f64>> {
-        let refused = || {
-            // a parameter the FMU refuses: worse than anything, so that the step is taken back
-            let far = |c: &Channel| vec![1e6; self.problem.recordings[c.recording].time.len()];
-            let residual = self.problem.channels.iter().map(far).collect();
-            Answer { motion: Vec::new(), residual }
-        };
-        let answer = self.answer.clone().unwrap_or_else(refused);
-        Some(self.problem.stacked(&answer, &self.x))
-    }
-
-    fn jacobian(&self) -> Option<DMatrix<f64>> {
-        let (steps, answer) = (self.steps.borrow().clone(), self.answer.as_ref()?);
-        let all: Vec<usize> = (0..self.x.len()).collect();
-        let how = self.problem.differences;
-        let jacobian = self.problem.jacobian(&self.x, &all, &answer.motion, &steps, how).ok()?;
-        self.simulations.set(self.simulations.get() + self.x.len());
-        *self.steps.borrow_mut() = Problem::steps(&jacobian);
-        *self.last.borrow_mut() = Some(jacobian.clone());
-        Some(jacobian)
-    }
-}

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! b, c and d enter linearly, ω_s does not. Far below ω_s only c + d shows, far above only c; so the sum of squares has
-//! valleys and more than one minimum along ω_s. Here ω_s stands on a grid over the speeds of the recording;
+//! valleys and more than one minimum along ω_s. Here ω_s is taken from a grid over the speeds of the recording;
 //! at each value the other unknowns are fitted. The lowest is where the search goes on, which no
 //! start can lead astray. Where several are nearly as low, the recording does not say which, and the spread over
 //! them belongs to the estimates' uncertainty.
@@ -15,7 +15,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
 use crate::fit::{self, Polished, Problem};
-use crate::stribeck::Places;
+use crate::stribeck::Indices;
+use crate::uncertainty::spread_out;
 
 /// ω_s over the fastest speed of the recording.
 const GRID: [f64; 6] = [0.1, 0.3, 0.7, 1.5, 4.0, 15.0];
@@ -24,13 +25,13 @@ const GRID: [f64; 6] = [0.1, 0.3, 0.7, 1.5, 4.0, 15.0];
 const VAGUE: f64 = 0.2;
 
 /// Whether a minimum may be one of several: none at all, or one whose Stribeck excess the recording hardly shows.
-pub fn is_vague(problem: &Problem, found: &Polished, places: Places) -> bool {
-    let relative = |place: usize| {
-        let scale = problem.unknowns[place].scale;
-        let deviation = found.covariance.x[(place, place)].sqrt() * scale.slope(found.x[place]);
-        deviation / scale.value(found.x[place])
+pub fn is_vague(problem: &Problem, found: &Polished, indices: Indices) -> bool {
+    let relative = |index: usize| {
+        let scale = problem.unknowns[index].scale;
+        let deviation = found.covariance.x[(index, index)].sqrt() * scale.slope(found.x[index]);
+        deviation / scale.value(found.x[index])
     };
-    !found.converged() || relative(places.d) > VAGUE || relative(places.speed) > VAGUE
+    !found.converged() || relative(indices.d) > VAGUE || relative(indices.speed) > VAGUE
 }
 
 /// The best fit at one Stribeck speed.
@@ -49,14 +50,12 @@ pub struct Point {
 }
 
 /// Fits at the Stribeck speeds of a grid over the recording's speeds, near the fit `from`.
-pub fn profile(problem: &Problem, from: &Polished, places: Places) -> Result<Vec<Point>> {
-    let mut speeds: Vec<f64> =
-        from.answer.motion.iter().flat_map(|m| &m.rate).step_by(7).map(|w| w.abs()).collect();
-    speeds.sort_by(f64::total_cmp);
+pub fn profile(problem: &Problem, from: &Polished, indices: Indices) -> Result<Vec<Point>> {
+    let speeds = fit::speeds(&from.answer.motion);
     let fastest = fit::fastest(&from.answer.motion);
     let some: Vec<f64> = speeds.iter().copied().step_by((speeds.len() / 500).max(1)).collect();
     let points: Vec<Result<Point>> =
-        GRID.par_iter().map(|part| point(problem, from, places, part * fastest, &some)).collect();
+        GRID.par_iter().map(|part| point(problem, from, indices, part * fastest, &some)).collect();
     points.into_iter().collect()
 }
 
@@ -65,28 +64,23 @@ pub fn profile(problem: &Problem, from: &Polished, places: Places) -> Result<Vec
 fn point(
     problem: &Problem,
     from: &Polished,
-    places: Places,
+    indices: Indices,
     speed: f64,
     speeds: &[f64],
 ) -> Result<Point> {
     let mut x = from.x.clone();
-    let value = |place: usize| problem.unknowns[place].scale.value(from.x[place]);
+    let value = |index: usize| problem.unknowns[index].scale.value(from.x[index]);
     let curve = |w: f64| {
-        let stribeck = (-(w / value(places.speed)).powi(2)).exp();
-        value(places.b) * w + value(places.c) + value(places.d) * stribeck
+        let stribeck = (-(w / value(indices.speed)).powi(2)).exp();
+        value(indices.b) * w + value(indices.c) + value(indices.d) * stribeck
     };
     let [b, c, d] = nearest(&curve, speed, speeds);
-    for (place, value) in [(places.b, b), (places.c, c), (places.d, d), (places.speed, speed)] {
-        x[place] = problem.unknowns[place].scale.variable(value);
+    for (index, value) in [(indices.b, b), (indices.c, c), (indices.d, d), (indices.speed, speed)] {
+        x[index] = problem.unknowns[index].scale.variable(value);
     }
-    let others: Vec<usize> = (0..x.len()).filter(|j| *j != places.speed).collect();
+    let others: Vec<usize> = (0..x.len()).filter(|j| *j != indices.speed).collect();
     let found = problem.polish_some(&x, &others, Some(&from.jacobian), (3, 0.3))?;
-    let mut covariance = DMatrix::zeros(x.len(), x.len());
-    for (i, &row) in others.iter().enumerate() {
-        for (j, &column) in others.iter().enumerate() {
-            covariance[(row, column)] = found.covariance.x[(i, j)];
-        }
-    }
+    let covariance = spread_out(&found.covariance.x, &others, x.len());
     let (cost, simulations) = (found.cost, found.simulations);
     Ok(Point { speed, cost, x: found.x, covariance, simulations })
 }

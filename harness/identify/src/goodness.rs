@@ -1,12 +1,12 @@
 //! How well an answer of the FMU explains the recordings.
 
 use crate::fit::{Answer, Channel, Problem, Signal};
-use crate::residual::Tests;
+use analysis::innovations::Tests;
 
 /// Fit of a rate below which a minimum is taken for a wrong one at first, %.
 const POOR: f64 = 90.0;
 
-/// Whether what an answer leaves is noise, for each channel.
+/// Whether the residual of an answer is noise, for each channel.
 pub fn tests(problem: &Problem, answer: &Answer) -> Vec<Tests> {
     let one = |(channel, e): (&Channel, &Vec<f64>)| {
         let recording = &problem.recordings[channel.recording];

@@ -2,20 +2,17 @@
 
 pub mod budget;
 pub mod candidate;
-pub mod compensation;
 pub mod design;
 pub mod estimate;
 pub mod fit;
 pub mod friction;
 pub mod goodness;
-pub mod least_squares;
 pub mod methods;
-pub mod noise;
+pub mod news;
 pub mod nominal;
 pub mod options;
 pub mod plausible;
 pub mod recording;
-pub mod residual;
 pub mod search;
 pub mod simulate;
 pub mod start;

@@ -1,7 +1,7 @@
 //! The bench as the FMU is set up, before anything is estimated.
 
 use anyhow::{Result, ensure};
-use host::fmi2::Fmu;
+use host::fmi2::{Fmu, Instance};
 
 /// What is known of the bench without the recording.
 #[derive(Clone, Copy, Debug)]
@@ -28,6 +28,16 @@ pub struct Start {
     pub omega_s: f64,
 }
 
+impl Start {
+    /// What it is in one line.
+    pub fn line(&self) -> String {
+        format!(
+            "d {:.4} m, h {:.4} m, damping ratio {:.4}, hub.I {:.4} kg·m²",
+            self.d, self.h, self.zeta, self.hub_inertia
+        )
+    }
+}
+
 /// What the FMU says of the bench.
 #[derive(Clone, Copy, Debug)]
 pub struct Nominal {
@@ -41,6 +51,34 @@ pub struct Nominal {
     pub period: f64,
 }
 
+/// The FMU with settings, initialised.
+pub fn initialised<'fmu>(fmu: &'fmu Fmu, settings: &[(String, String)]) -> Result<Instance<'fmu>> {
+    let mut instance = fmu.instantiate("identify")?;
+    for (name, value) in settings {
+        let variable = fmu.description().variable(name)?;
+        ensure!(
+            matches!(variable.causality.as_str(), "parameter" | "input") && name != "tau_cmd",
+            "{name} cannot be set: it is no parameter"
+        );
+        instance.set(name, value)?;
+    }
+    instance.setup_experiment(None, 0.0, None)?;
+    instance.enter_initialization_mode()?;
+    Ok(instance)
+}
+
+impl Bench {
+    /// Mass of the liquid in an upright cylinder, kg.
+    pub fn liquid(self, d: f64, h: f64) -> f64 {
+        self.density * std::f64::consts::PI / 4.0 * d * d * h
+    }
+
+    /// Moment of inertia about the hub's axis of a mass (kg) in the tank that turns with the hub, kg·m².
+    pub fn inertia(self, mass: f64) -> f64 {
+        mass * self.arm.powi(2)
+    }
+}
+
 impl Nominal {
     /// Of the FMU with settings, and with what is `expected` of parameters that are estimated.
     pub fn of(
@@ -48,20 +86,9 @@ impl Nominal {
         settings: &[(String, String)],
         expected: &[(String, f64)],
     ) -> Result<Nominal> {
-        let mut instance = fmu.instantiate("identify")?;
-        for (name, value) in settings {
-            let variable = fmu.description().variable(name)?;
-            ensure!(
-                matches!(variable.causality.as_str(), "parameter" | "input") && name != "tau_cmd",
-                "{name} cannot be set: it is no parameter"
-            );
-            instance.set(name, value)?;
-        }
-        for (name, value) in expected {
-            instance.set(name, &value.to_string())?;
-        }
-        instance.setup_experiment(None, 0.0, None)?;
-        instance.enter_initialization_mode()?;
+        let expected = expected.iter().map(|(name, value)| (name.clone(), value.to_string()));
+        let all: Vec<(String, String)> = settings.iter().cloned().chain(expected).collect();
+        let mut instance = initialised(fmu, &all)?;
         let mut real = |name: &str| instance.real(name);
         let bench =
             Bench { arm: real("tank.r")?, density: real("fluid.rho")?, gravity: real("g_axial")? };
@@ -75,8 +102,7 @@ impl Nominal {
             stribeck: real("friction.d")?,
             omega_s: real("friction.omega_s")?,
         };
-        let liquid = bench.density * std::f64::consts::PI / 4.0 * start.d * start.d * start.h;
-        let inertia = start.hub_inertia + liquid * bench.arm.powi(2);
+        let inertia = start.hub_inertia + bench.inertia(bench.liquid(start.d, start.h));
         Ok(Nominal { bench, start, inertia, period: 1.0 / real("slosh.frequency[1]")? })
     }
 

@@ -4,8 +4,8 @@
 use anyhow::{Result, bail};
 
 use crate::recording::{Recording, noise_level};
-use crate::residual;
 use crate::start::Response;
+use analysis::innovations;
 
 /// Refuses what is off by a factor that only a wrong unit makes.
 pub fn check_size(found: &Response, nominal: f64) -> Result<()> {
@@ -19,14 +19,14 @@ pub fn check_size(found: &Response, nominal: f64) -> Result<()> {
             "omega looks like degrees per second; it must be in rad/s"
         }
         r if r > 110.0 => {
-            "tau_cmd must be in N.m and omega in rad/s; omega looks like mrad/s or mdeg/s"
+            "tau_cmd must be in N·m and omega in rad/s; omega looks like mrad/s or mdeg/s"
         }
-        r if (300.0..3000.0).contains(&(1.0 / r)) => "tau_cmd looks like mN.m; it must be in N.m",
+        r if (300.0..3000.0).contains(&(1.0 / r)) => "tau_cmd looks like mN·m; it must be in N·m",
         r if r > 1.0 => "omega looks like rpm; it must be in rad/s",
-        _ => "tau_cmd must be in N.m, omega in rad/s and time in s",
+        _ => "tau_cmd must be in N·m, omega in rad/s and time in s",
     };
     bail!(
-        "the recording shows an inertia of {:.3e} kg.m2, the FMU with its settings has {nominal:.3e} kg.m2: \
+        "the recording shows an inertia of {:.3e} kg·m², the FMU with its settings has {nominal:.3e} kg·m²: \
          {guess}. If the bench really is that different, say what is expected of it: --known hub.I={:.1e}:{:.1e} estimates \
          it all the same.",
         found.inertia,
@@ -44,11 +44,11 @@ pub fn columns(recording: &Recording) -> (Vec<String>, Vec<String>) {
     if let Some(speed) = &recording.wheel_speed {
         match actuator(recording, speed) {
             Actuator { inertia, missing: None } => notes.push(format!(
-                "{}: the wheel gave the commanded torque, wheel.I = {inertia:.3e} kg.m2 by its speed",
+                "{}: the wheel gave the commanded torque, wheel.I = {inertia:.3e} kg·m² by its speed",
                 recording.name
             )),
             Actuator { inertia, missing: Some((from, seconds)) } => doubts.push(format!(
-                "{}: the wheel's speed (wheel.I = {inertia:.3e} kg.m2) does not go with tau_cmd for {seconds:.1} s, first \
+                "{}: the wheel's speed (wheel.I = {inertia:.3e} kg·m²) does not go with tau_cmd for {seconds:.1} s, first \
                  at {from:.1} s: the wheel did not give the commanded torque",
                 recording.name
             )),
@@ -60,12 +60,12 @@ pub fn columns(recording: &Recording) -> (Vec<String>, Vec<String>) {
         let mean = rate.iter().sum::<f64>() / rate.len() as f64;
         let rms = (rate.iter().map(|w| (w - mean).powi(2)).sum::<f64>() / rate.len() as f64).sqrt();
         let unit: Vec<f64> = rate.iter().map(|w| (w - mean) / noise.max(1e-12)).collect();
-        let correlation = residual::crossed(&unit, &recording.torque, recording.step());
+        let correlation = innovations::crossed(&unit, &recording.torque, recording.step());
         let line = format!(
             "{}: {name} is {rms:.2e} rad/s rms, {noise:.2e} rad/s of it noise",
             recording.name
         );
-        notes.push(match (rms > 2.0 * noise, correlation > residual::LIMIT) {
+        notes.push(match (rms > 2.0 * noise, correlation > innovations::LIMIT) {
             (_, true) => format!(
                 "{line}; it is correlated with the torque ({correlation:.0} standard deviations): the hub's axis is not \
                  a principal axis, or the liquid leaves its plane"

@@ -28,7 +28,7 @@ pub struct Recording {
     pub torque: Vec<f64>,
     /// Hub rate as measured, rad/s.
     pub rate: Vec<f64>,
-    /// Hub angle of an encoder, rad, if there is one. It is fitted beside the rate.
+    /// Hub angle of an encoder, rad, if there is one. It is fitted together with the rate.
     pub angle: Option<Vec<f64>>,
     /// Specific force along the tank's axis, m/s², if it was recorded: an input like the torque.
     pub gravity: Option<Vec<f64>>,
@@ -342,7 +342,7 @@ fn check_signals(part: &Recording) -> Result<()> {
     let largest = part.torque.iter().fold(0.0, |m: f64, t| m.max(t.abs()));
     ensure!(
         deviation(&part.torque) > 1e-9 * largest.max(1e-12),
-        "{name}: tau_cmd is constant ({} N.m). Without excitation nothing can be identified",
+        "{name}: tau_cmd is constant ({} N·m). Without excitation nothing can be identified",
         part.torque[0]
     );
     ensure!(deviation(&part.rate) > 0.0, "{name}: omega is constant ({} rad/s)", part.rate[0]);
@@ -406,7 +406,7 @@ mod tests {
     fn each_fault_has_a_sentence_of_its_own() {
         type Change = fn(&mut Recording);
         let faults: [(Change, &str); 6] = [
-            (|r| r.torque.fill(0.1), "tau_cmd is constant (0.1 N.m)"),
+            (|r| r.torque.fill(0.1), "tau_cmd is constant (0.1 N·m)"),
             (|r| *r = r.rows(0, 1500), "30 s of data are too few"),
             (|r| std::mem::swap(&mut r.torque, &mut r.rate), "swapped"),
             (|r| r.rate.iter_mut().for_each(|w| *w = -*w), "wrong sign"),

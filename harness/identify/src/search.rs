@@ -1,5 +1,7 @@
-//! The search for a model's minimum: where it starts, over which part of the recording, and when another attempt is
-//! made. The attempts are data ([`Search::attempts`]), tried in their order and told in words.
+//! The search for a model's minimum. What is tried is a list of attempts ([`Search::attempts`]): where each starts, over
+//! which part of the recordings, when it is made, and what it must do better than the best so far to be accepted.
+//! They are tried in their order and told in words. Every unknown is free in all of them; what holds one of them fixed is
+//! the grid of Stribeck speeds ([`crate::friction`]).
 
 use anyhow::{Result, bail};
 use nalgebra::DMatrix;
@@ -8,16 +10,19 @@ use crate::fit::{Polished, Problem, WHOLE, WINDOWS};
 use crate::friction;
 use crate::goodness::{fit_pct, is_poor, tests};
 use crate::recording::Recording;
-use crate::residual::Tests;
 use crate::simulate::Intersample;
-use crate::stribeck::Places;
+use crate::stribeck::Indices;
 use crate::unknown::Quantity;
+use analysis::innovations::Tests;
 
-/// Sum of squares over the rows beyond which a model near another one, which leaves only noise, is given up.
-const HOPELESS: f64 = 1.5;
+/// Sum of squares over the rows below which a model may be near its minimum: that of noise, and half as much again.
+const NEAR: f64 = 1.5;
 
 /// By how much less the sum of squares must be for another torque between rows.
 const JOINS: f64 = 20.0;
+
+/// Sets of sensitivities that Gauss and Newton's steps have at most.
+const ROUNDS: usize = 6;
 
 /// Whether it matters what the torque does between rows: where it changes a lot from one to the next.
 fn varies_fast(recording: &Recording) -> bool {
@@ -57,15 +62,17 @@ pub struct Sibling<'f, 'a> {
     pub minimum: &'f Polished,
     /// Covariance of its values over several friction curves.
     pub spread: Option<&'f DMatrix<f64>>,
+    /// What that model explains this one explains too, so a poor fit of this one is a search that went astray.
+    pub is_poorer: bool,
 }
 
 /// One way to look for a minimum.
 #[derive(Clone, Copy, Debug)]
 struct Attempt {
     from: From,
-    /// Parts of the recording over which the fit grows.
-    windows: &'static [f64],
+    how: How,
     when: When,
+    accept: Accept,
 }
 
 /// Where an attempt starts.
@@ -75,48 +82,127 @@ enum From {
     Start(usize),
     /// At the best minimum so far.
     Best,
+    /// At the other model's minimum, with its noise.
+    Sibling,
+}
+
+/// How an attempt searches.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum How {
+    /// Gauss and Newton's steps over the whole recordings, with so many sets of sensitivities at most.
+    Steps(usize),
+    /// Levenberg and Marquardt's search over the whole recordings, then such steps.
+    Search,
+    /// Levenberg and Marquardt's search over parts of the recordings that grow, then such steps; noise, intersample
+    /// behaviour and the friction's curve are found on the way.
+    Windows(&'static [f64]),
 }
 
 /// What must hold of the best minimum so far for an attempt to be made.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum When {
-    /// Nothing.
     Always,
-    /// Noise does not explain what it leaves, and no other model is tried that may fit where this one does not.
+    /// Noise does not explain what a start led to, and no other model is tried that may fit where this one does not.
     Unexplained,
     /// The attempt before has moved it, and noise still does not explain it: such a torque has more minima than one, and
     /// the lowest shows from the beginning on.
     Moved,
     /// There is none, or a poor one.
-    Nowhere,
+    Poor,
+    /// The search has not ended there, and the residual is nearly the noise ([`NEAR`]).
+    Near,
+    /// The search has not ended there, and the fit is not poor.
+    Unfinished,
 }
 
-impl When {
-    /// Why the attempt is made, in words.
-    fn words(self) -> Option<&'static str> {
-        match self {
-            When::Always | When::Moved => None,
-            When::Unexplained => Some("noise does not explain it; from another start"),
-            When::Nowhere => Some("poor fit from there; again with other windows"),
+/// What an attempt must do better than the best so far.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Accept {
+    /// Less sum of squares, of the same noise.
+    LessCost,
+    /// A better fit, where each has a noise of its own.
+    BetterFit,
+}
+
+/// What the attempts before have found.
+#[derive(Default)]
+struct Best {
+    found: Option<Found>,
+    /// An attempt from a start was made.
+    started: bool,
+    /// The last attempt has moved it.
+    moved: bool,
+}
+
+impl Attempt {
+    /// From a minimum that is near.
+    fn near(from: From, how: How, when: When) -> Self {
+        Attempt { from, how, when, accept: Accept::LessCost }
+    }
+
+    /// Over windows, with a noise of its own.
+    fn over(from: From, windows: &'static [f64], when: When) -> Self {
+        Attempt { from, how: How::Windows(windows), when, accept: Accept::BetterFit }
+    }
+
+    /// Where it starts and how it searches, in words.
+    fn words(&self) -> String {
+        let from = match self.from {
+            From::Start(i) => format!("from start {}", i + 1),
+            From::Best => "from the best so far".into(),
+            From::Sibling => "from the other model's minimum".into(),
+        };
+        match self.how {
+            How::Steps(rounds) => {
+                format!("{from}, Gauss–Newton steps with {rounds} sets of sensitivities at most")
+            }
+            How::Search => format!("{from}, Levenberg–Marquardt over the whole recording"),
+            How::Windows(parts) => {
+                let parts: Vec<String> =
+                    parts.iter().map(|part| format!("{:.0}", 100.0 * part)).collect();
+                format!("{from}, windows of {} % of the recording", parts.join(", "))
+            }
         }
     }
 }
 
-/// The attempts without regard to other models, in their order.
-const AFRESH: [Attempt; 2] = [
-    Attempt { from: From::Start(0), windows: &WINDOWS, when: When::Always },
-    Attempt { from: From::Start(0), windows: &WHOLE, when: When::Nowhere },
-];
+impl When {
+    fn words(self) -> &'static str {
+        match self {
+            When::Always => "it is the first",
+            When::Unexplained => "noise does not explain what the starts before led to",
+            When::Moved => {
+                "the attempt before found another minimum, and noise does not explain it"
+            }
+            When::Poor => "the fit so far is poor",
+            When::Near => "the search has not ended, and the residual is nearly noise",
+            When::Unfinished => "the search has not ended, and the fit is not poor",
+        }
+    }
+}
 
 impl<'a> Search<'a, '_> {
-    fn polish(&mut self, x: &[f64], known: Option<&DMatrix<f64>>) -> Result<Polished> {
-        let polished = self.problem.polish(x, known, 6)?;
+    /// Gauss and Newton's steps.
+    fn polish(
+        &mut self,
+        x: &[f64],
+        known: Option<&DMatrix<f64>>,
+        rounds: usize,
+    ) -> Result<Polished> {
+        let polished = self.problem.polish(x, known, rounds)?;
         self.simulations += polished.simulations;
         (self.heard)(format!(
             "{}: {:.4} standard deviations from the minimum after {} simulations",
             self.model, polished.decrement, polished.simulations
         ));
         Ok(polished)
+    }
+
+    /// Levenberg and Marquardt's search, then Gauss and Newton's steps.
+    fn search(&mut self, x: &[f64], tolerance: f64) -> Result<Polished> {
+        let rough = self.problem.search(x, tolerance)?;
+        self.simulations += rough.simulations;
+        self.polish(&rough.x, rough.jacobian.as_ref(), ROUNDS)
     }
 
     /// From variables x, over windows; the noise is estimated on the way.
@@ -130,17 +216,13 @@ impl<'a> Search<'a, '_> {
         self.problem.estimate_noise(&answer);
         if is_poor(&self.problem, &answer) {
             // a model that does not fit has no minimum worth the search
-            let near = self.problem.polish(&rough.x, rough.jacobian.as_ref(), 1)?;
-            self.simulations += near.simulations;
-            return Ok((near, None));
+            return Ok((self.polish(&rough.x, rough.jacobian.as_ref(), 1)?, None));
         }
-        let near = self.polish(&rough.x, rough.jacobian.as_ref())?;
+        let near = self.polish(&rough.x, rough.jacobian.as_ref(), ROUNDS)?;
         let near = self.joined(near)?;
         let (mut best, mut spread) = self.friction(near)?;
         if !best.converged() {
-            let again = self.problem.search(&best.x, 1e-4)?;
-            self.simulations += again.simulations;
-            let other = self.polish(&again.x, again.jacobian.as_ref())?;
+            let other = self.search(&best.x, 1e-4)?;
             if other.cost < best.cost {
                 best = other;
             }
@@ -150,12 +232,12 @@ impl<'a> Search<'a, '_> {
                 (best, spread) = self.friction(best)?;
             }
         }
-        // the noise from what is left and, if it is another one, the minimum with its filter
+        // the noise from the residual and, if it is another one, the minimum with its filter
         let before = self.problem.channels.clone();
         self.problem.estimate_noise(&best.answer);
         let pairs = before.iter().zip(&self.problem.channels);
         if pairs.into_iter().any(|(a, b)| (a.noise.white / b.noise.white - 1.0).abs() > 0.05) {
-            let again = self.polish(&best.x, Some(&best.jacobian))?;
+            let again = self.polish(&best.x, Some(&best.jacobian), ROUNDS)?;
             (best, spread) = self.friction(again)?;
         }
         Ok((best, spread))
@@ -166,10 +248,10 @@ impl<'a> Search<'a, '_> {
         if !near.converged() || !self.join(&near)? {
             return Ok(near);
         }
-        self.polish(&near.x, Some(&near.jacobian))
+        self.polish(&near.x, Some(&near.jacobian), ROUNDS)
     }
 
-    /// Tries what else the torque may do between rows: the sum of squares that is left after the best step from
+    /// Tries what else the torque may do between rows: the sum of squares after the best step from
     /// here, to first order. Returns whether another one was better and is set.
     fn join(&mut self, near: &Polished) -> Result<bool> {
         if self.intersample.is_some() || !self.problem.recordings.iter().any(varies_fast) {
@@ -183,18 +265,25 @@ impl<'a> Search<'a, '_> {
             // held torque is late by half a row
             let mut x = near.x.clone();
             let late = |b: Intersample| if b == Intersample::ZeroOrderHold { 0.5 } else { 0.0 };
-            if let Some(place) = problem.unknowns.iter().position(|u| u.quantity == Quantity::Delay)
+            if let Some(index) = problem.unknowns.iter().position(|u| u.quantity == Quantity::Delay)
             {
-                let scale = problem.unknowns[place].scale;
+                let scale = problem.unknowns[index].scale;
                 let rows = late(now) - late(other);
-                let delay = scale.value(x[place]) + rows * problem.recordings[0].step();
-                x[place] = scale.variable(delay);
+                let delay = scale.value(x[index]) + rows * problem.recordings[0].step();
+                x[index] = scale.variable(delay);
             }
             self.simulations += 1;
             let Ok(answer) = problem.answer(&x) else { continue };
             let e = problem.stacked(&answer, &x);
             let gradient = near.jacobian.tr_mul(&e);
             let cost = e.norm_squared() - gradient.dot(&(&near.covariance.x * &gradient));
+            (self.heard)(format!(
+                "{}: torque {}, all free: sum of squares {cost:.1}, {} {:.1}",
+                self.model,
+                other.words(),
+                now.words(),
+                near.cost
+            ));
             if cost < best.0 {
                 best = (cost, other);
             }
@@ -207,23 +296,29 @@ impl<'a> Search<'a, '_> {
         Ok(true)
     }
 
-    /// Whether it is a minimum that leaves only noise.
+    /// Whether it is a minimum whose residual is only noise.
     fn explains(&self, found: &Polished) -> bool {
         found.converged() && tests(&self.problem, &found.answer).iter().all(Tests::passed)
     }
 
     /// Other friction curves, if a minimum may be one of several, and the lowest.
     fn friction(&mut self, near: Polished) -> Result<Found> {
-        let places = Places::of(&self.problem.unknowns);
-        let Some(places) = places.filter(|p| friction::is_vague(&self.problem, &near, *p)) else {
+        let indices = Indices::of(&self.problem.unknowns);
+        let Some(indices) = indices.filter(|i| friction::is_vague(&self.problem, &near, *i)) else {
             return Ok((near, None));
         };
-        let points = friction::profile(&self.problem, &near, places)?;
+        let points = friction::profile(&self.problem, &near, indices)?;
         self.simulations += points.iter().map(|p| p.simulations).sum::<usize>();
+        for point in &points {
+            (self.heard)(format!(
+                "{}: friction.omega_s held at {:.3e} rad/s, all else free: sum of squares {:.1}, all free {:.1}",
+                self.model, point.speed, point.cost, near.cost
+            ));
+        }
         let lowest = points.iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
         let mut best = near;
         if let Some(point) = lowest.filter(|p| p.cost < best.cost) {
-            let other = self.polish(&point.x, Some(&best.jacobian))?;
+            let other = self.polish(&point.x, Some(&best.jacobian), ROUNDS)?;
             if other.cost < best.cost {
                 best = other;
             }
@@ -235,160 +330,190 @@ impl<'a> Search<'a, '_> {
         Ok((best, spread))
     }
 
-    /// The attempts from the data's or the user's starts, in their order.
-    fn attempts(&self) -> Vec<Attempt> {
-        let slosh = self.model != "frozen";
+    /// The attempts, in their order: from the data's or the user's starts, or near the minimum of another model.
+    fn attempts(&self, sibling: Option<&Sibling>) -> Vec<Attempt> {
+        let frozen = self.model == "frozen";
         // The response that starts come from is linear: a model that is not may be far from it.
-        let nonlinear = slosh && self.model != "linear";
+        let nonlinear = !frozen && self.model != "linear";
         let windows: &[f64] = if self.far || nonlinear { &WINDOWS } else { &WHOLE };
-        let mut all = vec![Attempt { from: From::Start(0), windows, when: When::Always }];
-        if slosh {
-            for i in 1..self.starts.len() {
-                let from = From::Start(i);
-                all.push(Attempt { from, windows: &WHOLE, when: When::Unexplained });
-                all.push(Attempt { from: From::Best, windows: &WINDOWS, when: When::Moved });
+        let others = (1..if frozen { 1 } else { self.starts.len() }).flat_map(|i| {
+            [
+                Attempt::over(From::Start(i), &WHOLE, When::Unexplained),
+                Attempt::over(From::Best, &WINDOWS, When::Moved),
+            ]
+        });
+        let Some(sibling) = sibling else {
+            let mut all = vec![Attempt::over(From::Start(0), windows, When::Always)];
+            all.extend(others);
+            if self.model == "linear" && self.alone && !self.far {
+                all.push(Attempt::over(From::Start(0), &WINDOWS, When::Poor));
             }
+            return all;
+        };
+        let near = Attempt::near(From::Sibling, How::Steps(3), When::Always);
+        if frozen {
+            return vec![near];
         }
-        if slosh && !nonlinear && self.alone && !self.far {
-            all.push(Attempt { from: From::Start(0), windows: &WINDOWS, when: When::Nowhere });
+        if is_poor(sibling.problem, &sibling.minimum.answer) {
+            // so nonlinear that the other model's estimate leads nowhere
+            return vec![
+                Attempt::over(From::Start(0), &WINDOWS, When::Always),
+                Attempt::over(From::Start(0), &WHOLE, When::Poor),
+            ];
         }
+        let mut all = vec![near, Attempt::near(From::Best, How::Steps(ROUNDS), When::Near)];
+        if tests(sibling.problem, &sibling.minimum.answer).iter().all(Tests::passed) {
+            // where the residual of the other is only noise, this one is as good near there or not at all
+            all.push(Attempt::near(From::Best, How::Search, When::Near));
+            if sibling.is_poorer {
+                all.push(Attempt::over(From::Start(0), &WINDOWS, When::Poor));
+            }
+        } else {
+            // its minimum may be anywhere
+            all.push(Attempt::near(From::Best, How::Search, When::Unfinished));
+            all.push(Attempt::over(From::Start(0), &WINDOWS, When::Poor));
+            all.push(Attempt::over(From::Start(0), &WHOLE, When::Poor));
+        }
+        all.extend(others.filter(|_| sibling.is_poorer));
         all
     }
 
-    /// Searches from the starts.
-    pub fn from_starts(&mut self) -> Result<Found> {
-        let attempts = self.attempts();
-        self.make(&attempts)
-    }
-
-    /// Makes the attempts in their order, and returns what leaves least.
-    fn make(&mut self, attempts: &[Attempt]) -> Result<Found> {
-        let (mut best, mut failed, mut moved): (Option<Found>, _, _) = (None, None, false);
-        for attempt in attempts {
-            let is_due = self.is_due(attempt.when, best.as_ref().map(|found| &found.0), moved);
-            moved = false;
-            let x = match (attempt.from, &best) {
-                (From::Start(i), _) => self.starts[i].clone(),
-                (From::Best, Some((minimum, _))) => minimum.x.clone(),
-                (From::Best, None) => continue,
-            };
+    /// Makes the attempts in their order, and returns the best that was accepted.
+    pub fn run(&mut self, sibling: Option<&Sibling<'_, 'a>>) -> Result<Found> {
+        self.alone |= sibling.is_some_and(|s| s.is_poorer);
+        let (mut best, mut failed) = (Best::default(), None);
+        let attempts = self.attempts(sibling);
+        for (number, attempt) in attempts.iter().enumerate() {
+            let label = format!("{}, attempt {}, {}", self.model, number + 1, attempt.words());
+            let is_due = self.is_due(attempt.when, &best);
+            best.moved = false;
             if !is_due {
+                (self.heard)(format!("{label}: not made, only if {}", attempt.when.words()));
                 continue;
             }
-            if let Some(why) = attempt.when.words() {
-                (self.heard)(format!("{}: {why}", self.model));
-            }
+            best.started |= matches!(attempt.from, From::Start(_));
             let before = self.problem.clone();
-            match self.windows(&x, attempt.windows) {
-                Ok(found) if self.is_better(&found, &before, best.as_ref()) => {
-                    moved = best.as_ref().is_none_or(|before| before.0.x != found.0.x);
-                    best = Some(found);
+            (self.heard)(format!("{label}: made, {}", attempt.when.words()));
+            let said = match self.attempt(attempt, best.found.as_ref(), sibling) {
+                Ok(found) => {
+                    let (accepted, why) =
+                        self.accepts(attempt.accept, &found, &before, best.found.as_ref());
+                    if accepted {
+                        best.moved = best.found.is_none_or(|before| before.0.x != found.0.x);
+                        best.found = Some(found);
+                    } else {
+                        self.problem = before;
+                    }
+                    format!("{}, {why}", if accepted { "accepted" } else { "refused" })
                 }
-                Ok(_) => self.problem = before,
                 Err(error) => {
                     self.problem = before;
+                    let said = format!("failed, {error:#}");
                     failed.get_or_insert(error);
+                    said
                 }
-            }
+            };
+            (self.heard)(format!("{}, attempt {}: {said}", self.model, number + 1));
         }
-        match (best, failed) {
+        match (best.found, failed) {
             (Some(best), _) => Ok(best),
             (None, Some(error)) => Err(error),
             (None, None) => bail!("{}: there is no start", self.model),
         }
     }
 
-    /// Whether an attempt is to be made.
-    fn is_due(&self, when: When, best: Option<&Polished>, moved: bool) -> bool {
-        let explained = best.is_some_and(|found| self.explains(found));
-        let poor = best.map(|found| is_poor(&self.problem, &found.answer));
-        match when {
-            When::Always => true,
-            When::Unexplained => {
-                let left_to_others = poor == Some(true) && !self.alone && !self.far;
-                !explained && !left_to_others
+    /// Makes one attempt.
+    fn attempt(
+        &mut self,
+        attempt: &Attempt,
+        best: Option<&Found>,
+        sibling: Option<&Sibling<'_, 'a>>,
+    ) -> Result<Found> {
+        let (x, known, spread) = match (attempt.from, best, sibling) {
+            (From::Start(i), ..) => (self.starts[i].clone(), None, None),
+            (From::Best, Some((minimum, spread)), _) => {
+                (minimum.x.clone(), Some(&minimum.jacobian), spread.as_ref())
             }
-            When::Moved => moved && !explained,
-            When::Nowhere => poor != Some(false),
-        }
-    }
-
-    /// Whether what was found leaves less than what was found before, of the problem as it was then.
-    fn is_better(&self, found: &Found, before: &Problem, best: Option<&Found>) -> bool {
-        let fit = fit_pct(&self.problem, &found.0.answer);
-        best.is_none_or(|best| fit > fit_pct(before, &best.0.answer))
-    }
-
-    /// Searches near the minimum of another model.
-    ///
-    /// `is_richer`: what the other explains this one explains too, so a poor fit is a search that went astray.
-    pub fn near(&mut self, sibling: &Sibling<'_, 'a>, is_richer: bool) -> Result<Found> {
-        let found = self.beside(sibling)?;
-        if !is_richer || !is_poor(&self.problem, &found.0.answer) {
-            return Ok(found);
-        }
-        self.alone = true;
-        let before = self.problem.clone();
-        match self.from_starts() {
-            Ok(other) if self.is_better(&other, &before, Some(&found)) => Ok(other),
-            _ => {
-                self.problem = before;
-                Ok(found)
+            (From::Sibling, _, Some(sibling)) => {
+                let x = self.x_of(sibling);
+                let same = x.len() == sibling.minimum.x.len();
+                (x, same.then_some(&sibling.minimum.jacobian), sibling.spread.filter(|_| same))
             }
-        }
+            (From::Best | From::Sibling, ..) => bail!("there is no minimum to start from"),
+        };
+        let values = self.problem.unknowns.iter().zip(self.problem.values(&x));
+        let free: Vec<String> =
+            values.map(|(u, value)| format!("{} {value:.4e}", u.quantity.name())).collect();
+        (self.heard)(format!("{}: free, from {}", self.model, free.join(", ")));
+        let near = match attempt.how {
+            How::Windows(windows) => return self.windows(&x, windows),
+            How::Steps(rounds) => self.polish(&x, known, rounds)?,
+            How::Search => self.search(&x, 1e-3)?,
+        };
+        Ok((near, spread.cloned()))
     }
 
-    fn beside(&mut self, sibling: &Sibling<'_, 'a>) -> Result<Found> {
-        let frozen = self.model == "frozen";
-        if !frozen && is_poor(sibling.problem, &sibling.minimum.answer) {
-            // so nonlinear that the other model's estimate leads nowhere
-            return self.make(&AFRESH);
-        }
-        // what both have, from there
+    /// The other model's minimum in this one's unknowns; its noise and intersample behaviour are taken over.
+    fn x_of(&mut self, sibling: &Sibling<'_, 'a>) -> Vec<f64> {
         let mut x = self.problem.start();
         let known = &sibling.problem.unknowns;
         for (x, unknown) in x.iter_mut().zip(&self.problem.unknowns) {
-            if let Some(place) = known.iter().position(|u| u.quantity == unknown.quantity) {
-                *x = sibling.minimum.x[place];
+            if let Some(index) = known.iter().position(|u| u.quantity == unknown.quantity) {
+                *x = sibling.minimum.x[index];
             }
         }
-        if let (true, Some(hub)) = (frozen, self.problem.place("hub.I")) {
+        if let ("frozen", Some(hub)) = (self.model, self.problem.index("hub.I")) {
             // all the liquid turns with the hub: the inertia above the resonance and more
             x[hub] += 0.1;
         }
         self.problem.channels.clone_from(&sibling.problem.channels);
         self.problem.setup.intersample = sibling.problem.setup.intersample;
-        let same = self.problem.unknowns.len() == known.len();
-        let known = same.then_some(&sibling.minimum.jacobian);
-        let spread = if same { sibling.spread.cloned() } else { None };
-        let mut best = self.problem.polish(&x, known, 3)?;
-        self.simulations += best.simulations;
-        if frozen {
-            return Ok((best, spread));
+        x
+    }
+
+    /// Whether an attempt is to be made.
+    fn is_due(&self, when: When, best: &Best) -> bool {
+        let Some((minimum, _)) = &best.found else {
+            return matches!(when, When::Always | When::Unexplained | When::Poor);
+        };
+        let poor = is_poor(&self.problem, &minimum.answer);
+        let explained = || self.explains(minimum);
+        let rows = minimum.answer.residual.iter().map(Vec::len).sum::<usize>() as f64;
+        match when {
+            When::Always => true,
+            When::Unexplained => {
+                let left_to_others = poor && !self.alone && !self.far;
+                best.started && !left_to_others && !explained()
+            }
+            When::Moved => best.moved && !explained(),
+            When::Poor => poor,
+            When::Near => !minimum.converged() && !poor && minimum.cost <= NEAR * rows,
+            When::Unfinished => !minimum.converged() && !poor,
         }
-        // Where the other leaves only noise, this one is as good near there or not at all. Else its minimum may be
-        // anywhere.
-        let rows = best.answer.residual.concat().len() as f64;
-        let hopeless = is_poor(&self.problem, &best.answer) || best.cost > HOPELESS * rows;
-        if !best.converged() && !hopeless {
-            best = self.polish(&best.x.clone(), Some(&best.jacobian.clone()))?;
-        }
-        let other_explains =
-            tests(sibling.problem, &sibling.minimum.answer).iter().all(Tests::passed);
-        if other_explains && (best.converged() || hopeless) {
-            return Ok((best, spread));
-        }
-        if !best.converged() && !is_poor(&self.problem, &best.answer) {
-            let rough = self.problem.search(&best.x, 1e-3)?;
-            self.simulations += rough.simulations;
-            let again = self.polish(&rough.x, rough.jacobian.as_ref())?;
-            if again.cost < best.cost {
-                best = again;
+    }
+
+    /// Whether what was found is better than the best so far, of the problem as it was then, and why in words.
+    fn accepts(
+        &self,
+        rule: Accept,
+        found: &Found,
+        before: &Problem,
+        best: Option<&Found>,
+    ) -> (bool, String) {
+        let Some(best) = best else {
+            return (true, "the first".into());
+        };
+        let fits = [(&self.problem, found), (before, best)];
+        let [fit, fit_before] = fits.map(|(problem, found)| fit_pct(problem, &found.0.answer));
+        let (cost, cost_before) = (found.0.cost, best.0.cost);
+        match rule {
+            Accept::LessCost => {
+                let why = format!("sum of squares {cost:.1}, before {cost_before:.1}");
+                (cost < cost_before, why)
+            }
+            Accept::BetterFit => {
+                (fit > fit_before, format!("fit {fit:.3} %, before {fit_before:.3} %"))
             }
         }
-        if is_poor(&self.problem, &best.answer) {
-            return self.make(&AFRESH);
-        }
-        Ok((best, spread))
     }
 }

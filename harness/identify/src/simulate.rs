@@ -39,9 +39,9 @@ impl Intersample {
     /// In words.
     pub fn words(self) -> &'static str {
         match self {
-            Intersample::FirstOrderHold => "linear between rows",
-            Intersample::ZeroOrderHold => "held from row to row",
-            Intersample::BandLimited => "smooth between rows",
+            Intersample::FirstOrderHold => "linear between rows (first-order hold)",
+            Intersample::ZeroOrderHold => "held from row to row (zero-order hold)",
+            Intersample::BandLimited => "smooth between rows (band-limited)",
         }
     }
 }

@@ -1,12 +1,5 @@
 //! Starts from the data: frequency response, three poles and two zeros, and from these the tank, the
-//! inertia and the friction.
-//!
-//! ```text
-//! Ω/τ = (s² + 2ζω s + ω²)/(a3 s³ + a2 s² + a1 s + a0)
-//! a3 = I0, a2 = b + 2ζω J, a1 = 2ζω b + ω² J, a0 = b ω²,   J = I0 + m r²
-//! ```
-//!
-//! (thesis 6.7, corrected). The tank is the upright cylinder whose first mode has this frequency and mass.
+//! inertia and the friction ([`Plant`]). The tank is the upright cylinder whose first mode has this frequency and mass.
 
 use std::f64::consts::{PI, TAU};
 
@@ -83,26 +76,64 @@ pub fn response(recording: &Recording) -> Result<FrequencyResponse> {
     Ok(spa::frequency_response(step, &torque, &rate, &logarithmic_grid(band, 1200), lag))
 }
 
+/// A hub with one slosh mode and viscous friction as three poles and two zeros.
+///
+/// ```text
+/// Ω/τ = (b2 s² + b1 s + b0)/(s³ + a2 s² + a1 s + a0),   μ = m r²/I0
+/// b2 = 1/I0,  b1/b2 = 2ζω,  b0/b2 = ω²
+/// a0 = ω² b/I0,  a1 = ω²(1 + μ) + 2ζω b/I0,  a2 = b/I0 + 2ζω(1 + μ)
+/// ```
+///
+/// (thesis 6.7, corrected). Six coefficients, five unknowns: that a2 is what the others say tests the structure.
+#[derive(Clone, Copy, Debug)]
+pub struct Plant {
+    /// Slosh frequency ω, rad/s.
+    pub omega: f64,
+    /// Slosh damping ratio ζ.
+    pub zeta: f64,
+    /// I0, inertia of hub and fixed mass, kg·m².
+    pub inertia: f64,
+    /// μ.
+    pub mass_ratio: f64,
+    /// b, N·m·s.
+    pub friction: f64,
+    /// a2 less what the other coefficients make of it, 1/s.
+    pub structure: f64,
+}
+
+impl Plant {
+    /// From the coefficients; `None` where they are not those of such a hub.
+    pub fn of([b2, b1, b0]: [f64; 3], [a2, a1, a0]: [f64; 3]) -> Option<Self> {
+        let omega = (b2 > 0.0 && b0 > 0.0).then(|| (b0 / b2).sqrt())?;
+        let zeta = b1 / b2 / (2.0 * omega);
+        let inertia = 1.0 / b2;
+        let friction = a0 / (omega * omega) * inertia;
+        let mass_ratio = (a1 - 2.0 * zeta * omega * friction / inertia) / (omega * omega) - 1.0;
+        let structure = a2 - friction / inertia - 2.0 * zeta * omega * (1.0 + mass_ratio);
+        Some(Plant { omega, zeta, inertia, mass_ratio, friction, structure })
+    }
+
+    /// Slosh mass m, kg.
+    pub fn mass(&self, bench: Bench) -> f64 {
+        self.mass_ratio * self.inertia / bench.inertia(1.0)
+    }
+}
+
 /// Poles and zeros of a measured response, as slosh and inertia.
 pub fn translate(measured: &FrequencyResponse, bench: Bench) -> Option<Response> {
     let model = TransferFunction::fit(measured)?;
-    let inertia = 1.0 / model.numerator[0];
-    let w = TAU * model.zero_frequency()?;
-    let (p, wp, zp) = (model.real_pole, model.pole_omega, model.pole_damping);
-    let b = p * wp * wp * inertia / (w * w);
-    let z = model.zero_damping()?;
-    let total = (inertia * (wp * wp + 2.0 * zp * wp * p) - 2.0 * z * w * b) / (w * w);
+    let plant = Plant::of(model.numerator, model.denominator())?;
     let found = Response {
-        slosh_frequency: w / TAU,
-        slosh_damping: z,
-        resonance_frequency: wp / TAU,
-        slosh_mass: (total - inertia) / bench.arm.powi(2),
-        inertia,
+        slosh_frequency: plant.omega / TAU,
+        slosh_damping: plant.zeta,
+        resonance_frequency: model.pole_frequency(),
+        slosh_mass: plant.mass(bench),
+        inertia: plant.inertia,
         fit: model.fit_frequency(measured),
     };
     let (low, high) = (measured.frequency[0], *measured.frequency.last()?);
     let within = found.slosh_frequency > low && found.resonance_frequency < high;
-    (inertia > 0.0 && found.slosh_mass > 0.0 && within).then_some(found)
+    (found.slosh_mass > 0.0 && within).then_some(found)
 }
 
 /// The tank (d, h) whose first mode has this frequency (Hz) and mass (kg).
@@ -143,17 +174,12 @@ pub fn from_data(
         all.push(mode.start(bench, rough));
         modes.retain(|other| !other.is_near(&mode));
     }
-    all.push(Start {
-        b: rough.b,
-        c: rough.c,
-        stribeck: rough.stribeck,
-        omega_s: rough.omega_s,
-        ..nominal.start
-    });
+    let Start { d, h, zeta, hub_inertia, .. } = nominal.start;
+    all.push(Start { d, h, zeta, hub_inertia, ..rough });
     Ok((responses.first().copied().or(Some(first)), all))
 }
 
-/// What the balance of torques says in bands of the recordings, what leaves least first.
+/// What the balance of torques says in bands of the recordings, the least residual first.
 fn balances(
     recordings: &[Recording],
     bench: Bench,
@@ -163,7 +189,7 @@ fn balances(
     for recording in recordings {
         found.extend(bands(recording).into_iter().filter_map(|b| balance(recording, bench, b)));
     }
-    found.sort_by(|a, b| a.left.total_cmp(&b.left));
+    found.sort_by(|a, b| a.residual.total_cmp(&b.residual));
     found.iter().map(|b| b.response(bench)).collect()
 }
 
@@ -180,6 +206,19 @@ fn octaves(low: f64, high: f64) -> Vec<(f64, f64)> {
 }
 
 impl Response {
+    /// What it is in one line.
+    pub fn line(&self) -> String {
+        format!(
+            "frequency response: slosh at {:.4} Hz, damping ratio {:.4}, resonance at {:.4} Hz, slosh mass {:.3} kg, \
+             inertia {:.4} kg·m²",
+            self.slosh_frequency,
+            self.slosh_damping,
+            self.resonance_frequency,
+            self.slosh_mass,
+            self.inertia
+        )
+    }
+
     /// Whether a search from another one would lead to the same minimum.
     fn is_near(&self, other: &Response) -> bool {
         let ratio = |a: f64, b: f64| (a / b).ln().abs();
@@ -190,8 +229,8 @@ impl Response {
 
     fn start(&self, bench: Bench, friction: Start) -> Start {
         let (d, h) = tank(self.slosh_frequency, self.slosh_mass, bench);
-        let fixed = bench.density * PI / 4.0 * d * d * h - self.slosh_mass;
-        let hub_inertia = self.inertia - fixed.max(0.0) * bench.arm.powi(2);
+        let fixed = bench.liquid(d, h) - self.slosh_mass;
+        let hub_inertia = self.inertia - bench.inertia(fixed.max(0.0));
         Start {
             d,
             h,
@@ -213,13 +252,13 @@ pub struct Balance {
     pub mass: f64,
     /// I0, kg·m².
     pub inertia: f64,
-    /// Part of the hub's motion that is left unexplained.
-    pub left: f64,
+    /// Root mean square of the residual over that of the hub's motion.
+    pub residual: f64,
 }
 
 impl Balance {
     fn response(&self, bench: Bench) -> Response {
-        let ratio = self.mass * bench.arm.powi(2) / self.inertia;
+        let ratio = bench.inertia(self.mass) / self.inertia;
         Response {
             slosh_frequency: self.frequency,
             slosh_damping: self.damping,
@@ -242,7 +281,7 @@ const FINENESS: f64 = 1e-3;
 /// T = jΩ I0 W + jΩ m r² G(Ω) W + b W + c S − δ jΩ T,   G = (ω² + 2jζωΩ)/(ω² − Ω² + 2jζωΩ)
 /// ```
 ///
-/// S is the spectrum of sgn ω, δ a delay (which stands for what dry friction does to the phase as well, and is not used). All but ω and ζ are linear; these stand on a grid. What is left counts as
+/// S is the spectrum of sgn ω, δ a delay (which stands for what dry friction does to the phase as well, and is not used). All but ω and ζ are linear; these are taken from a grid. The residual counts as
 /// motion: it is divided by |jΩ(I0 + m r² G)|. Since nothing is simulated, a multisine's lines make no wrong minima, and
 /// since dry friction is in it, small amplitudes do not pass for damping.
 pub fn balance(recording: &Recording, bench: Bench, band: (f64, f64)) -> Option<Balance> {
@@ -291,14 +330,14 @@ pub fn balance(recording: &Recording, bench: Bench, band: (f64, f64)) -> Option<
         let scale = normal.diagonal().map(|d| 1.0 / d.sqrt());
         let scaled = nalgebra::Matrix5::from_fn(|a, b| normal[(a, b)] * scale[a] * scale[b]);
         let found = scaled.cholesky()?.solve(&right.component_mul(&scale)).component_mul(&scale);
-        let left = ((total - found.dot(&right)).max(0.0) / all).sqrt();
+        let residual = ((total - found.dot(&right)).max(0.0) / all).sqrt();
         let plausible = found[0] > 0.0 && found[1] > 0.0;
         plausible.then_some(Balance {
             frequency,
             damping,
-            mass: found[1] / bench.arm.powi(2),
+            mass: found[1] / bench.inertia(1.0),
             inertia: found[0],
-            left,
+            residual,
         })
     };
     let steps = ((band.1 / band.0).ln() / FINENESS) as u32;
@@ -322,12 +361,12 @@ pub fn balance(recording: &Recording, bench: Bench, band: (f64, f64)) -> Option<
         let found = candidates
             .into_iter()
             .filter_map(|(f, z)| try_mode(f, z, weights))
-            .min_by(|a, b| a.left.total_cmp(&b.left));
+            .min_by(|a, b| a.residual.total_cmp(&b.residual));
         let Some(found) = found else { break };
-        weights = (found.inertia, found.mass * bench.arm.powi(2));
+        weights = (found.inertia, bench.inertia(found.mass));
         best = Some(found);
     }
-    best.filter(|b| b.left < 0.3)
+    best.filter(|b| b.residual < 0.3)
 }
 
 /// Where the transfer function does not fit (large amplitudes bend its peak): antiresonance,
@@ -350,7 +389,7 @@ fn from_features(measured: &FrequencyResponse, bench: Bench) -> Option<Response>
         slosh_frequency: f,
         slosh_damping: 0.005,
         resonance_frequency: fp,
-        slosh_mass: ratio * inertia / bench.arm.powi(2),
+        slosh_mass: ratio * inertia / bench.inertia(1.0),
         inertia,
         fit: 0.0,
     })
@@ -391,19 +430,14 @@ fn friction(recordings: &[Recording]) -> Start {
 mod tests {
     use super::*;
     use analysis::BAND;
-    use analysis::linear::{Linear, Mode};
+    use analysis::linear::Linear;
 
     const BENCH: Bench = Bench { arm: 0.225, density: 1000.0, gravity: 9.81 };
 
-    fn bench_10_cm() -> Linear {
-        let mode = Mode { mass: 0.756_293_271_9, frequency: 2.343_618_143_1, damping: 0.002_975_7 };
-        let inertia = 0.322414 + 1.330_431_108_5 * 0.225f64.powi(2);
-        Linear { inertia, friction: 0.03793, arm: 0.225, modes: vec![mode] }
-    }
-
     #[test]
     fn poles_and_zeros_of_the_exact_response_give_the_bench_back() {
-        let measured = bench_10_cm().frequency_response(&logarithmic_grid(BAND, 1200));
+        let measured =
+            Linear::bench_10_cm(0.002_975_7).frequency_response(&logarithmic_grid(BAND, 1200));
         let found = translate(&measured, BENCH).unwrap();
         // the table of physics: 10 cm of water in a cylinder of 163 mm
         assert!((found.slosh_frequency / 2.343_618_143_1 - 1.0).abs() < 1e-6, "{found:?}");

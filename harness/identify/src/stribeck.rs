@@ -10,9 +10,9 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::unknown::Unknown;
 
-/// Unknowns of the friction law: places of b, c, d and ω_s.
+/// Where b, c, d and ω_s stand among the unknowns.
 #[derive(Clone, Copy, Debug)]
-pub struct Places {
+pub struct Indices {
     /// friction.b
     pub b: usize,
     /// friction.c
@@ -23,14 +23,14 @@ pub struct Places {
     pub speed: usize,
 }
 
-impl Places {
+impl Indices {
     /// `None` unless all four are unknown.
     pub fn of(unknowns: &[Unknown]) -> Option<Self> {
-        let place = |name: &str| {
+        let index = |name: &str| {
             let name = Some(format!("friction.{name}"));
             unknowns.iter().position(|u| u.quantity.parameter() == name.as_deref())
         };
-        Some(Places { b: place("b")?, c: place("c")?, d: place("d")?, speed: place("omega_s")? })
+        Some(Indices { b: index("b")?, c: index("c")?, d: index("d")?, speed: index("omega_s")? })
     }
 }
 
@@ -39,36 +39,36 @@ impl Places {
 /// is bent. Where that needs a negative b, c or d, the step is plainly added.
 pub fn moved(unknowns: &[Unknown], x: &[f64], step: &[f64], fastest: f64) -> Vec<f64> {
     let plain: Vec<f64> = x.iter().zip(step).map(|(x, step)| x + step).collect();
-    let Some(places) = Places::of(unknowns) else { return plain };
-    let scale = |place: usize| unknowns[place].scale;
-    let value = |place: usize, x: &[f64]| scale(place).value(x[place]);
-    let (d, speed) = (value(places.d, x), value(places.speed, x));
-    let change = |place: usize| scale(place).slope(x[place]) * step[place];
-    let new_speed = value(places.speed, &plain);
+    let Some(indices) = Indices::of(unknowns) else { return plain };
+    let scale = |index: usize| unknowns[index].scale;
+    let value = |index: usize, x: &[f64]| scale(index).value(x[index]);
+    let (d, speed) = (value(indices.d, x), value(indices.speed, x));
+    let change = |index: usize| scale(index).slope(x[index]) * step[index];
+    let new_speed = value(indices.speed, &plain);
     let (mut matrix, mut torque) = (Matrix3::zeros(), Vector3::zeros());
     for (row, w) in [0.0, 0.4 * fastest, 0.9 * fastest].into_iter().enumerate() {
         let shape = (-(w / speed).powi(2)).exp();
         // T and its first-order change
-        let now = value(places.b, x) * w + value(places.c, x) + d * shape;
+        let now = value(indices.b, x) * w + value(indices.c, x) + d * shape;
         let slope = 2.0 * d * shape * w * w / speed.powi(3);
         torque[row] = now
-            + change(places.b) * w
-            + change(places.c)
-            + change(places.d) * shape
-            + change(places.speed) * slope;
+            + change(indices.b) * w
+            + change(indices.c)
+            + change(indices.d) * shape
+            + change(indices.speed) * slope;
         let new_shape = (-(w / new_speed).powi(2)).exp();
         matrix.set_row(row, &Vector3::new(w, 1.0, new_shape).transpose());
     }
     let Some(inverse) = matrix.try_inverse() else { return plain };
     let found = inverse * torque;
     let mut moved = plain.clone();
-    for (place, new) in [(places.b, found[0]), (places.c, found[1]), (places.d, found[2])] {
+    for (index, new) in [(indices.b, found[0]), (indices.c, found[1]), (indices.d, found[2])] {
         // no further from the plain step than a factor, and positive
-        let near = new / value(place, &plain);
+        let near = new / value(index, &plain);
         if !(0.05..20.0).contains(&near) {
             return plain;
         }
-        moved[place] = scale(place).variable(new);
+        moved[index] = scale(index).variable(new);
     }
     moved
 }

@@ -31,29 +31,9 @@ pub struct Covariance {
 impl Covariance {
     /// From sensitivities; `None` if some combination of unknowns has no influence at all.
     pub fn of(jacobian: &DMatrix<f64>) -> Option<Self> {
-        let norms: Vec<f64> = jacobian.column_iter().map(|column| column.norm()).collect();
-        if !norms.iter().all(|norm| *norm > 0.0) {
-            return None;
-        }
-        let mut scaled = jacobian.clone();
-        for (mut column, norm) in scaled.column_iter_mut().zip(&norms) {
-            column /= *norm;
-        }
-        let r = scaled.qr().r();
-        let svd = r.svd(false, true);
-        let (largest, smallest) = (svd.singular_values.max(), svd.singular_values.min());
-        if smallest.is_nan() || smallest <= 1e-9 * largest {
-            return None;
-        }
-        let v = svd.v_t?.transpose();
-        let mut half = v;
-        for (mut column, value) in half.column_iter_mut().zip(&svd.singular_values) {
-            column /= *value;
-        }
-        for (mut row, norm) in half.row_iter_mut().zip(&norms) {
-            row /= *norm;
-        }
-        Some(Covariance { x: &half * half.transpose(), condition: largest / smallest })
+        let (l, condition) = directions(jacobian);
+        let all_act = jacobian.column_iter().all(|column| column.norm() > 0.0);
+        (all_act && condition < 1e9).then(|| Covariance { x: &l * l.transpose(), condition })
     }
 
     /// The sandwich for innovations that are not white; `windows` are ranges of rows.
@@ -73,12 +53,56 @@ impl Covariance {
         &self.x * middle * &self.x
     }
 
-    /// Correlations.
-    pub fn correlations(covariance: &DMatrix<f64>) -> DMatrix<f64> {
-        DMatrix::from_fn(covariance.nrows(), covariance.ncols(), |i, j| {
+    /// Correlations, row by row.
+    pub fn correlations(covariance: &DMatrix<f64>) -> Vec<Vec<f64>> {
+        let of = |i: usize, j: usize| {
             covariance[(i, j)] / (covariance[(i, i)] * covariance[(j, j)]).sqrt()
-        })
+        };
+        let n = covariance.nrows();
+        (0..n).map(|i| (0..n).map(|j| of(i, j)).collect()).collect()
     }
+}
+
+/// L = V S⁻¹ of sensitivities U S Vᵀ, from columns of unit length: each column moves the answer by one standard
+/// deviation, at right angles to the others, and L Lᵀ is the covariance (JᵀJ)⁻¹. Also the condition number.
+pub fn directions(jacobian: &DMatrix<f64>) -> (DMatrix<f64>, f64) {
+    let norms: Vec<f64> = jacobian.column_iter().map(|c| c.norm().max(1e-9)).collect();
+    let mut scaled = jacobian.clone();
+    scaled.column_iter_mut().zip(&norms).for_each(|(mut column, norm)| column /= *norm);
+    let svd = scaled.qr().r().svd(false, true);
+    let (largest, smallest) = (svd.singular_values.max(), svd.singular_values.min());
+    let mut l = svd.v_t.map_or_else(DMatrix::default, |v| v.transpose());
+    for (mut column, value) in l.column_iter_mut().zip(&svd.singular_values) {
+        column /= value.max(1e-9 * largest);
+    }
+    l.row_iter_mut().zip(&norms).for_each(|(mut row, norm)| row /= *norm);
+    (l, largest / smallest)
+}
+
+/// Windows of `seconds` for [`Covariance::sandwich`], of recordings with so many rows, so many seconds apart.
+pub fn windows(
+    recordings: impl Iterator<Item = (usize, f64)>,
+    seconds: f64,
+) -> Vec<(usize, usize)> {
+    let (mut windows, mut first) = (Vec::new(), 0);
+    for (rows, step) in recordings {
+        let width = ((seconds / step) as usize).clamp(1, rows);
+        windows
+            .extend((0..rows).step_by(width).map(|k| (first + k, first + (k + width).min(rows))));
+        first += rows;
+    }
+    windows
+}
+
+/// A square matrix over the variables `places` as one over all `n`, with zeros for the others.
+pub fn spread_out(matrix: &DMatrix<f64>, places: &[usize], n: usize) -> DMatrix<f64> {
+    let mut all = DMatrix::zeros(n, n);
+    for (i, &row) in places.iter().enumerate() {
+        for (j, &column) in places.iter().enumerate() {
+            all[(row, column)] = matrix[(i, j)];
+        }
+    }
+    all
 }
 
 /// What makes the estimates uncertain, as covariances of the variables x.

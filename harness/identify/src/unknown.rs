@@ -1,4 +1,4 @@
-//! What is estimated: parameters of the FMU, and what stands between it and the recording.
+//! What is estimated: parameters of the FMU, and what is between it and the recording.
 
 use serde::Serialize;
 
@@ -104,15 +104,14 @@ impl Scale {
 }
 
 impl Unknown {
+    /// An unknown of which nothing is known beforehand.
+    fn new(quantity: Quantity, unit: &str, start: f64, scale: Scale) -> Self {
+        Unknown { quantity, unit: unit.into(), start, prior: None, scale }
+    }
+
     /// A positive parameter of the FMU.
     pub fn positive(name: &str, unit: &str, start: f64) -> Self {
-        Unknown {
-            quantity: Quantity::Parameter(name.into()),
-            unit: unit.into(),
-            start,
-            prior: None,
-            scale: Scale::Log,
-        }
+        Unknown::new(Quantity::Parameter(name.into()), unit, start, Scale::Log)
     }
 
     /// Whether its value must be positive.
@@ -127,73 +126,39 @@ impl Unknown {
 
     /// The direction-dependent part of dry friction, between −1 and 1.
     pub fn asymmetry() -> Self {
-        Unknown {
-            quantity: Quantity::Parameter("friction.asymmetry".into()),
-            unit: "1".into(),
-            start: 0.0,
-            prior: None,
-            scale: Scale::Logit(-1.0, 1.0),
-        }
+        let quantity = Quantity::Parameter("friction.asymmetry".into());
+        Unknown::new(quantity, "1", 0.0, Scale::Logit(-1.0, 1.0))
     }
 
     /// The delay from torque to rate.
     pub fn delay() -> Self {
-        Unknown {
-            quantity: Quantity::Delay,
-            unit: "s".into(),
-            start: 0.0,
-            prior: None,
-            scale: Scale::Linear(1e-3),
-        }
+        Unknown::new(Quantity::Delay, "s", 0.0, Scale::Linear(1e-3))
     }
 
     /// The gyro's scale.
     pub fn gyro_scale() -> Self {
-        Unknown {
-            quantity: Quantity::GyroScale,
-            unit: "1".into(),
-            start: 1.0,
-            prior: None,
-            scale: Scale::Log,
-        }
+        Unknown::new(Quantity::GyroScale, "1", 1.0, Scale::Log)
     }
 
     /// The gyro's bias in a recording.
     pub fn gyro_bias(recording: usize) -> Self {
-        Unknown {
-            quantity: Quantity::GyroBias(recording),
-            unit: "rad/s".into(),
-            start: 0.0,
-            prior: None,
-            scale: Scale::Linear(1e-3),
-        }
+        Unknown::new(Quantity::GyroBias(recording), "rad/s", 0.0, Scale::Linear(1e-3))
     }
 
     /// The encoder's zero in a recording.
     pub fn angle_offset(recording: usize, start: f64) -> Self {
-        Unknown {
-            quantity: Quantity::AngleOffset(recording),
-            unit: "rad".into(),
-            start,
-            prior: None,
-            scale: Scale::Linear(1e-3),
-        }
+        Unknown::new(Quantity::AngleOffset(recording), "rad", start, Scale::Linear(1e-3))
     }
 
     /// The start of a recording that does not begin at rest: `init.omega`, `init.slosh_angle` or
     /// `init.slosh_rate`, with what is typical of it.
     pub fn initial(recording: usize, name: &str, unit: &str, typical: f64) -> Self {
-        Unknown {
-            quantity: Quantity::Initial(recording, name.into()),
-            unit: unit.into(),
-            start: 0.0,
-            prior: None,
-            scale: match name {
-                // the FMU allows 1.5 rad
-                "init.slosh_angle" => Scale::Logit(-1.4, 1.4),
-                _ => Scale::Linear(typical),
-            },
-        }
+        let scale = match name {
+            // the FMU allows 1.5 rad
+            "init.slosh_angle" => Scale::Logit(-1.4, 1.4),
+            _ => Scale::Linear(typical),
+        };
+        Unknown::new(Quantity::Initial(recording, name.into()), unit, 0.0, scale)
     }
 }
 

@@ -4,12 +4,17 @@ use std::collections::BTreeMap;
 
 use crate::budget::Effect;
 use crate::candidate::ModelFit;
-use crate::estimate::Estimated;
-use crate::residual::{self, Tests};
+use crate::estimate::{Estimated, prose};
 use crate::uncertainty::Combination;
+use analysis::innovations::{self, Tests};
 
 /// Least difference of the information criterion that decides (Kass and Raftery: very strong).
 pub const DECIDES: f64 = 10.0;
+
+/// How the sentence begins that says that the model is invalidated.
+pub const DOES_NOT_FIT: &str = "DOES NOT FIT";
+/// How the sentence begins that says that a search has not converged.
+pub const NO_MINIMUM: &str = "The search did not end at a minimum";
 
 /// What there was to choose from.
 pub struct Question<'a> {
@@ -23,31 +28,32 @@ pub struct Question<'a> {
     pub doubts: &'a [String],
 }
 
-/// Each sentence answers one question: which model, which friction, described or not, what is known and what not.
+/// Each sentence answers one question: which model, which friction, whether it fits, what is known and what not.
 pub fn words(
     question: &Question,
-    described: bool,
+    fits: bool,
     fit: &ModelFit,
     combinations: &[Combination],
     parameters: &BTreeMap<String, Estimated>,
     budget: &[Effect],
 ) -> Vec<String> {
     let mut lines = Vec::new();
-    lines.extend(slosh(question, described));
+    lines.extend(slosh(question, fits));
     lines.extend(friction(question.laws));
-    if !described {
+    if !fits {
         let mut reasons: Vec<String> =
             fit.tests.iter().map(reasons).filter(|t| !t.is_empty()).collect();
         reasons.extend(question.doubts.iter().cloned());
         lines.push(format!(
-            "NOT DESCRIBED: no model tried leaves only the gyro's noise ({}). Values and intervals are those of \
-             the nearest model and are not to be trusted: something acts on the bench that the model does not have.",
+            "{DOES_NOT_FIT}: the residual of no model tried is the gyro's noise alone ({}). Values and intervals are \
+             those of the nearest model and are not to be trusted: something acts on the bench that the model does not \
+             have.",
             reasons.join("; ")
         ));
     }
     if !fit.converged {
         lines.push(format!(
-            "The search did not end at a minimum (it is {:.2} standard deviations away): values and standard \
+            "{NO_MINIMUM} (it is {:.2} standard deviations away): values and standard \
              deviations are not to be trusted. More torque, a longer recording or --start may help.",
             fit.newton_decrement
         ));
@@ -55,14 +61,22 @@ pub fn words(
     for c in combinations {
         lines.push(format!(
             "{} and {} cannot be told apart (correlation {:.4}); known is {} = {:.6} ± {:.6} {}.",
-            c.of[0], c.of[1], c.correlation, c.name, c.value, c.std, c.unit
+            c.of[0],
+            c.of[1],
+            c.correlation,
+            c.name,
+            c.value,
+            c.std,
+            prose(&c.unit)
         ));
     }
     for (name, p) in parameters {
         if p.value != 0.0 && p.std > 0.5 * p.value.abs() && name != "friction.asymmetry" {
             lines.push(format!(
                 "{name} is not determined by these data ({:.3e} ± {:.1e} {}).",
-                p.value, p.std, p.unit
+                p.value,
+                p.std,
+                prose(&p.unit)
             ));
         }
     }
@@ -79,7 +93,7 @@ pub fn probabilities(bic: impl Iterator<Item = f64> + Clone) -> Vec<f64> {
     weights.iter().map(|w| w / sum).collect()
 }
 
-fn slosh(question: &Question, described: bool) -> Option<String> {
+fn slosh(question: &Question, fits: bool) -> Option<String> {
     let best = question.slosh.first()?;
     if question.slosh.len() == 1 {
         return None;
@@ -98,7 +112,7 @@ fn slosh(question: &Question, described: bool) -> Option<String> {
         ));
     }
     let second = &question.slosh[1];
-    let is = if described { "The slosh model is" } else { "The nearest slosh model is" };
+    let is = if fits { "The slosh model is" } else { "The nearest slosh model is" };
     Some(format!(
         "{is} {}: its BIC is {:.0} below that of the next, {}.",
         best.model,
@@ -150,37 +164,20 @@ fn modes(parameters: &BTreeMap<String, Estimated>, budget: &[Effect]) -> Option<
     })
 }
 
+/// Which tests of the residual fail, and by how many standard deviations.
 fn reasons(tests: &Tests) -> String {
-    let limit = residual::LIMIT;
-    let mut list = Vec::new();
-    if tests.whiteness > limit {
-        list.push(format!(
-            "its residual is correlated, {:.0} standard deviations",
-            tests.whiteness
-        ));
-    }
-    if tests.in_time.0 > limit {
-        list.push(format!(
-            "it is too large around {:.0} s ({:.0})",
-            tests.in_time.1, tests.in_time.0
-        ));
-    }
-    if tests.in_frequency.0 > limit {
-        list.push(format!(
-            "it is too large around {:.2} Hz ({:.0})",
-            tests.in_frequency.1, tests.in_frequency.0
-        ));
-    }
-    if tests.torque > limit {
-        list.push(format!("it is correlated with the torque ({:.0})", tests.torque));
-    }
-    if tests.torque_squared > limit {
-        list.push(format!(
-            "it is correlated with the torque's square ({:.0})",
-            tests.torque_squared
-        ));
-    }
-    list.join(", ")
+    let (time, frequency) = (tests.in_time, tests.in_frequency);
+    let all = [
+        (tests.whiteness, "its residual is correlated".to_string()),
+        (time.0, format!("it is too large around {:.0} s", time.1)),
+        (frequency.0, format!("it is too large around {:.2} Hz", frequency.1)),
+        (tests.torque, "it is correlated with the torque".into()),
+        (tests.torque_squared, "it is correlated with the torque's square".into()),
+    ];
+    let failed = all.into_iter().filter(|(deviations, _)| *deviations > innovations::LIMIT);
+    let words: Vec<String> =
+        failed.map(|(deviations, what)| format!("{what} ({deviations:.0} σ)")).collect();
+    words.join(", ")
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The methods beside the output-error fit, on recordings of the FMU itself.
+//! The methods other than the output-error fit, on recordings of the FMU itself.
 
 use experiments::profile::Torque;
 use host::fmi2::Fmu;
@@ -6,6 +6,7 @@ use identify::methods::acceleration::{self, Weights};
 use identify::recording::Recording;
 use identify::simulate::{Intersample, Setup};
 use identify::twin::{self, SensorErrors};
+use identify::verdict::DOES_NOT_FIT;
 use pack::packed_for_tests;
 
 /// A sweep of a bench with a rigid liquid, and the encoder's angle.
@@ -37,7 +38,7 @@ fn the_accelerations_least_squares_find_friction_and_inertia_without_its_biases(
     let torque = "lin-sweep:amplitude=0.1,f0=1.25,f1=3.5,duration=300";
     let recordings = [rigid(&fmu, &[("friction.asymmetry", "0.1")], torque)];
     let found = acceleration::identify(&fmu, &recordings, &options()).unwrap();
-    assert!(found.converged && found.described == Some(true), "{:?}", found.verdict);
+    assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
     for (name, truth) in [
         ("hub.I", 0.322414),
         ("friction.b", 0.03793),
@@ -58,12 +59,12 @@ fn the_accelerations_least_squares_find_friction_and_inertia_without_its_biases(
 }
 
 #[test]
-fn liquid_that_moves_is_flagged_by_the_accelerations_least_squares() {
+fn liquid_that_moves_does_not_fit_the_accelerations_least_squares() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let torque = "lin-sweep:amplitude=0.1,f0=1.8,f1=3,duration=150";
     let recordings = [rigid(&fmu, &[("slosh.model", "linear")], torque)];
     let found = acceleration::identify(&fmu, &recordings, &options()).unwrap();
-    assert!(found.described != Some(true) && found.verdict[0].starts_with("NOT DESCRIBED"));
+    assert!(found.fits != Some(true) && found.verdict[0].starts_with(DOES_NOT_FIT));
 }
 
 #[test]

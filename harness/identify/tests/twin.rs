@@ -1,4 +1,4 @@
-//! Recordings of the FMU itself, with its gyro's noise, identified with nothing told.
+//! Recordings of the FMU itself, with its gyro's noise, identified without priors and starts.
 
 use experiments::profile::{Profile, Torque};
 use host::fmi2::Fmu;
@@ -9,6 +9,7 @@ use identify::recording::Recording;
 use identify::simulate::{Intersample, Setup};
 use identify::twin::{self, SensorErrors, Twin};
 use identify::unknown::Unknown;
+use identify::verdict::DOES_NOT_FIT;
 use pack::packed_for_tests;
 
 /// The thesis's sweep of 2700 s.
@@ -37,7 +38,7 @@ fn options() -> Options {
 fn parameters_come_back_and_coulomb_and_stribeck_friction_as_their_sum() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let found = identify(&fmu, &[sweep(&fmu, LONG, &[])], &options(), &mut |_| {}).unwrap();
-    assert!(found.converged && found.described == Some(true), "{:?}", found.verdict);
+    assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
     for (name, truth) in [
         ("tank.d", 0.163),
         ("tank.h", 0.1),
@@ -89,7 +90,7 @@ fn starts_forty_percent_off_end_at_the_minimum_of_the_datas_own() {
     let truth = |name: &str| own.parameters[name].value;
     let starts = far.map(|(name, off)| (name.to_string(), off * truth(name))).to_vec();
     let there = identify(&fmu, &recordings, &Options { starts, ..options() }, &mut |_| {}).unwrap();
-    assert!(there.converged && there.described == Some(true), "{:?}", there.verdict);
+    assert!(there.converged && there.fits == Some(true), "{:?}", there.verdict);
     for (name, p) in &own.parameters {
         // both searches end within a hundredth of a standard deviation, along the friction's valleys a tenth
         let off = (there.parameters[name].value - p.value).abs() / p.std;
@@ -125,7 +126,7 @@ fn a_downward_sweep_shows_that_slosh_rotates() {
     let models = ["linear", "spherical"].map(String::from).to_vec();
     let found =
         identify(&fmu, &[recording], &Options { models, ..options() }, &mut |_| {}).unwrap();
-    assert!(found.converged && found.described == Some(true), "{:?}", found.verdict);
+    assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
     assert_eq!(found.details.fit.model, "spherical");
     for (name, truth) in [("tank.d", 0.163), ("tank.h", 0.1), ("slosh.zeta", 0.003)] {
         let p = &found.parameters[name];
@@ -166,7 +167,10 @@ fn sensitivities_are_those_of_smaller_and_larger_steps() {
     let problem = Problem::new(&fmu, setup, &recordings, unknowns);
     let (x, all) = (problem.start(), [0, 1, 2]);
     let motion = problem.answer(&x).unwrap().motion;
-    let of = |steps: &[f64], how| problem.jacobian(&x, &all, &motion, steps, how).unwrap();
+    let of = |steps: &[f64], differences| {
+        let problem = Problem { differences, ..problem.clone() };
+        problem.jacobian(&x, &all, &motion, steps).unwrap()
+    };
     let steps = Problem::steps(&of(&[1e-5; 3], Differences::Forward));
     let forward = of(&steps, Differences::Forward);
     for part in [0.3, 3.0] {
@@ -181,16 +185,12 @@ fn sensitivities_are_those_of_smaller_and_larger_steps() {
 }
 
 #[test]
-fn a_torque_that_is_clipped_is_flagged_as_not_described() {
+fn no_model_fits_a_torque_that_is_clipped() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let clipped = sweep(&fmu, SHORT, &[("wheel.enabled", "true"), ("wheel.tau_max", "0.09")]);
     let found = identify(&fmu, &[clipped], &options(), &mut |_| {}).unwrap();
-    assert!(found.described != Some(true));
-    assert!(
-        found.verdict.iter().any(|line| line.starts_with("NOT DESCRIBED")),
-        "{:?}",
-        found.verdict
-    );
+    assert!(found.fits != Some(true));
+    assert!(found.verdict.iter().any(|line| line.starts_with(DOES_NOT_FIT)), "{:?}", found.verdict);
 }
 
 #[test]

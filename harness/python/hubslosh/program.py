@@ -118,8 +118,9 @@ class Identification:
     """Settings of the FMU that belong to the parameters."""
     converged: bool
     """The search ended at a minimum."""
-    described: bool | None
-    """The residual is the gyro's noise; if not, no interval is to be trusted. None: not known."""
+    fits: bool | None
+    """The model is not invalidated: the residual is the gyro's noise. If it is, no interval is to be
+    trusted. None: not known."""
     verdict: tuple[str, ...]
     """The answer in words."""
     all: dict[str, Any]
@@ -178,7 +179,7 @@ def identify(
         model=loaded.get("models", [{}])[0].get("model") or loaded["settings"].get("slosh.model"),
         settings=loaded["settings"],
         converged=loaded["converged"],
-        described=loaded.get("described"),
+        fits=loaded.get("fits"),
         verdict=tuple(loaded["verdict"]),
         all=loaded,
     )

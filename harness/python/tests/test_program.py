@@ -65,10 +65,10 @@ def test_every_method_gives_the_same_kind_of_answer(
     found = hubslosh.identify(run, method="acceleration", fmu=fmu, program=program)
     inertia = found.parameters["hub.I"]
     # how exact the method is, its own tests say (harness/identify/tests/methods.rs)
-    assert abs(inertia.value / 0.322414 - 1) < 0.01 and inertia.std > 0 and found.described
+    assert abs(inertia.value / 0.322414 - 1) < 0.01 and inertia.std > 0 and found.fits
     assert found.model == "frozen" and found.all["condition"] > 1
     found = hubslosh.identify(run, method="black-box", fmu=fmu, program=program)
-    assert not found.parameters and found.described is None and found.model is None
+    assert not found.parameters and found.fits is None and found.model is None
     assert len(found.all["models"]) > 2 and found.verdict
 
 

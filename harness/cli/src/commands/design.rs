@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use analysis::gauss_markov::Noise;
 use analysis::linear::{Linear, Mode};
 use anyhow::{Result, bail, ensure};
 use experiments::profile::Written;
 use host::budget;
 use host::fmi2::Fmu;
 use identify::design::{self, Multisine, Wheel};
-use identify::noise::Noise;
+use identify::nominal;
 use identify::simulate::Setup;
 use identify::unknown::Unknown;
 use signals::table::{self, Table};
@@ -25,7 +26,7 @@ pub struct DesignArgs {
     /// Torque profile, as of `hubslosh run`.
     #[arg(long, value_name = "PROFILE", conflicts_with = "multisine")]
     profile: Option<String>,
-    /// An odd random-phase multisine with detection lines and this peak, N.m.
+    /// An odd random-phase multisine with detection lines and this peak, N·m.
     #[arg(long, value_name = "PEAK")]
     multisine: Option<f64>,
     /// Period of the multisine, s.
@@ -70,12 +71,7 @@ impl DesignArgs {
             table::check_ending(out)?;
         }
         let fmu = Fmu::open(&self.fmu)?;
-        let mut instance = fmu.instantiate("design")?;
-        for (name, value) in &self.settings {
-            instance.set(name, value)?;
-        }
-        instance.setup_experiment(None, 0.0, None)?;
-        instance.enter_initialization_mode()?;
+        let mut instance = nominal::initialised(&fmu, &self.settings)?;
         let mut real = |name: &str| instance.real(name);
         let wheel = Wheel {
             torque: real("wheel.tau_max")?,
@@ -124,7 +120,7 @@ impl DesignArgs {
         let rpm = std::f64::consts::TAU / 60.0;
         let [_, low, high] = wheel.speeds;
         println!(
-            "peak {peak:.3} N.m (the wheel gives {:.3}), wheel from {:.0} to {:.0} rpm (allowed {:.0} to {:.0})",
+            "peak {peak:.3} N·m (the wheel gives {:.3}), wheel from {:.0} to {:.0} rpm (allowed {:.0} to {:.0})",
             wheel.torque,
             least / rpm,
             largest / rpm,

@@ -12,6 +12,7 @@ use identify::methods::frequency::Frequency;
 use identify::methods::multisine::Multisine;
 use identify::methods::output_error::OutputError;
 use identify::methods::{Method, Task};
+use identify::news::News;
 use identify::nominal::Nominal;
 use identify::options::Options;
 use identify::recording::{self, Recording};
@@ -24,8 +25,8 @@ use crate::progress;
 
 /// Finds the FMU's parameters from recordings of a bench, and how sure they are.
 ///
-/// Recordings have the columns time (s), tau_cmd (N.m) and omega (rad/s), and optionally theta (rad) of an
-/// encoder, g_axial (m/s2), wheel_speed, omega_x and omega_y (rad/s). Several are fitted together.
+/// Recordings have the columns time (s), tau_cmd (N·m) and omega (rad/s), and optionally theta (rad) of an
+/// encoder, g_axial (m/s²), wheel_speed, omega_x and omega_y (rad/s). Several are fitted together.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh identify sweep.parquet --out result.json\n  \
     hubslosh identify up.csv down.csv --validate noise.csv --model linear,planar,spherical \\\n      \
@@ -86,8 +87,8 @@ pub struct IdentifyArgs {
     /// Standard deviation of the gyro's scale about 1; 0: exactly 1.
     #[arg(long, value_name = "NUMBER", default_value_t = 0.01)]
     gyro_scale: f64,
-    /// What the torque did between rows: linear, held (a sampled controller's) or smooth (a sampled recording of a
-    /// smooth torque). Else what fits best is taken.
+    /// Intersample behaviour of the torque: linear (first-order hold), held (zero-order hold, a sampled controller's) or
+    /// smooth (band-limited, a sampled recording of a smooth torque). Else what fits best is taken.
     #[arg(long, value_name = "HOW", value_parser = ["linear", "held", "smooth"])]
     torque: Option<String>,
     /// Uses the rows between two times alone.
@@ -96,6 +97,10 @@ pub struct IdentifyArgs {
     /// A recording that is simulated with the result, not fitted.
     #[arg(long, value_name = "DATA")]
     validate: Vec<PathBuf>,
+    /// Also prints each attempt of the search: its start, window and free unknowns, and why it was made, accepted or
+    /// refused.
+    #[arg(long)]
+    verbose: bool,
     /// The FMU.
     #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
     fmu: PathBuf,
@@ -234,7 +239,7 @@ impl IdentifyArgs {
         }
     }
 
-    /// What the torque did between rows, if it is said.
+    /// Intersample behaviour of the torque, if it is given.
     fn intersample(&self) -> Option<Intersample> {
         self.torque.as_deref().map(|how| match how {
             "held" => Intersample::ZeroOrderHold,
@@ -270,7 +275,10 @@ impl IdentifyArgs {
         let (recordings, validation) = (read(&self.data)?, read(&self.validate)?);
         let task = Task { fmu: fmu.as_ref(), recordings: &recordings, validation: &validation };
         let spinner = progress::of_search()?;
-        let found = method.identify(&task, &mut |line| progress::tell(&spinner, line));
+        let found = method.identify(&task, &mut |news| match news {
+            News::Detail(line) if !self.verbose => spinner.set_message(line.clone()),
+            news => progress::tell(&spinner, news.line()),
+        });
         spinner.finish_and_clear();
         let mut found = found?;
         found.done.splice(0..0, notes);

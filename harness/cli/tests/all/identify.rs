@@ -76,13 +76,15 @@ fn what_cannot_be_written_or_means_nothing_is_refused_before_the_search() {
         let error = hubslosh(folder, &[&["identify", "data.csv"], flags].concat()).unwrap_err();
         assert!(error.contains(word), "{error}");
     }
-    // a fit that does not describe its recording says so when it is used
-    let result = r#"{"described":false,"settings":{},"parameters":{"hub.I":{"value":0.4}}}"#;
-    std::fs::write(folder.join("poor.json"), result).unwrap();
-    let flags = ["--parameters", "poor.json", "--profile", "zero", "--out", "out.csv"];
-    let done = run(folder, &[&["run"][..], &flags].concat());
-    let said = String::from_utf8_lossy(&done.stderr);
-    assert!(done.status.success() && said.contains("do not describe the recording"), "{said}");
+    // a model that does not fit its recording says so when it is used, also in files of older versions
+    for key in ["fits", "described"] {
+        let result = r#"{"KEY":false,"settings":{},"parameters":{"hub.I":{"value":0.4}}}"#;
+        std::fs::write(folder.join("poor.json"), result.replace("KEY", key)).unwrap();
+        let flags = ["--parameters", "poor.json", "--profile", "zero", "--out", "out.csv"];
+        let done = run(folder, &[&["run"][..], &flags].concat());
+        let said = String::from_utf8_lossy(&done.stderr);
+        assert!(done.status.success() && said.contains("do not fit the recording"), "{said}");
+    }
 }
 
 #[test]
@@ -114,9 +116,9 @@ fn a_designed_multisine_is_within_the_wheels_limits_and_its_distortion_is_seen()
     let folder = folder.path();
     let asked = ["design", "--multisine", "0.5", "--duration", "400", "--optimal"];
     let said = hubslosh(folder, &[&asked[..], &["--out", "torque.csv"]].concat()).unwrap();
-    // 0.5 N.m is more than the wheel's 0.26
+    // 0.5 N·m is more than the wheel's 0.26
     assert!(
-        said.contains("within the wheel's limits") && said.contains("peak 0.260 N.m"),
+        said.contains("within the wheel's limits") && said.contains("peak 0.260 N·m"),
         "{said}"
     );
     let bench = ["--set", "imu.enabled=true", "--columns", "omega_imu"];

@@ -39,6 +39,10 @@ const WORDS: &[(&str, &str)] = &[
     ("asked | found", "specified | estimated"),
     // signal analysis
     ("signal over noise", "signal-to-noise ratio"),
+    // identification: Ljung, System Identification, chapter 16
+    ("not described by", "does not fit"),
+    ("described by the model", "the model fits"),
+    ("nothing told", "no prior given"),
     ("coherence of the rest", "residual coherence"),
     ("one linear model reaches", "validity of a linear fit"),
     ("how the figures are found", "methods"),

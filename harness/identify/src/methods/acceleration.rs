@@ -28,11 +28,13 @@ use serde::Serialize;
 
 use super::{Identified, Method, Needs, Task};
 use crate::estimate::Estimated;
-use crate::least_squares::{Minimum, minimise};
-use crate::nominal::Nominal;
+use crate::news::News;
+use crate::nominal::{self, Nominal};
 use crate::recording::{self, Recording};
-use crate::uncertainty::Covariance;
+use crate::uncertainty::{self, Covariance};
 use crate::unknown::Scale;
+use crate::verdict::DOES_NOT_FIT;
+use analysis::least_squares::{Minimum, minimise};
 
 /// How rows are weighted (thesis 5.2.3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -101,7 +103,7 @@ impl Method for Acceleration {
 
     const NEEDS: Needs = Needs { fmu: true, validation: false };
 
-    fn identify(&self, task: &Task, _: &mut dyn FnMut(&str)) -> Result<Found> {
+    fn identify(&self, task: &Task, _: &mut dyn FnMut(&News)) -> Result<Found> {
         let fmu = task.fmu()?;
         task.check_size(&Nominal::of(fmu, &self.options.settings, &[])?)?;
         identify(fmu, task.recordings, &self.options)
@@ -111,7 +113,7 @@ impl Method for Acceleration {
         let Details { fit, condition, condition_si, .. } = &found.details;
         let mut lines = vec![
             format!(
-                "residual {:.2e} rad/s2 (the gyro's noise makes {:.2e}), condition number {condition:.0} \
+                "residual {:.2e} rad/s² (the gyro's noise makes {:.2e}), condition number {condition:.0} \
                  ({condition_si:.0} in SI units)",
                 fit.rmse, fit.expected
             ),
@@ -149,7 +151,7 @@ pub struct Braking {
     pub coefficients: Vec<f64>,
     /// Their standard deviations, rad/s².
     pub std: Vec<f64>,
-    /// Root mean square of what is left, rad/s².
+    /// Root mean square of the residual, rad/s².
     pub rmse: f64,
     /// Coefficient of determination.
     pub r_squared: f64,
@@ -252,7 +254,8 @@ impl<'a> Problem<'a> {
                 });
                 Rows {
                     recording,
-                    noise: recording::noise_level(&recording.rate).max(crate::noise::FLOOR),
+                    noise: recording::noise_level(&recording.rate)
+                        .max(analysis::gauss_markov::FLOOR),
                     weight: weight.map(f64::sqrt).collect(),
                 }
             })
@@ -413,7 +416,7 @@ impl<'a> Problem<'a> {
             for (j, mut column) in jacobian.column_iter_mut().enumerate() {
                 column *= self.scales[j].slope(x[j]);
             }
-            jacobian
+            Some(jacobian)
         };
         let minima = starts.iter().map(|start| minimise(&residuals, &derivatives, start));
         let best = minima.min_by(|a, b| a.cost.total_cmp(&b.cost));
@@ -447,7 +450,9 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     {
         bail!("{}: harmonics of the angle need the column theta (rad)", without.name);
     }
-    let liquid = inertia_of_liquid(fmu, &options.settings)?;
+    let mut bench = nominal::initialised(fmu, &options.settings)?;
+    // it turns with the hub, all of it
+    let liquid = bench.real("tank.m_liq")? * bench.real("tank.r")?.powi(2);
     let plain = Problem::new(recordings, options, Form::AtRow)?;
     let near = plain.solve(&SPEEDS.map(|part| plain.start(part)));
     let uncorrected = plain.values(&near.x);
@@ -472,40 +477,27 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     let p_free = DVector::from_iterator(free.len(), free.iter().map(|&j| p[j]));
     let normal = jacobian.tr_mul(&jacobian);
     let corrected_normal = (&normal - &of_noise).try_inverse().filter(|m| m[(0, 0)] > 0.0);
-    let moved = corrected_normal.as_ref().map(|inverse| inverse * (&of_noise * &p_free));
-    let sandwich = covariance.sandwich(&jacobian, &e, &windows(&problem));
-    let mut of_values = DMatrix::zeros(n, n);
     let mut values = p.clone();
-    for (i, &row) in free.iter().enumerate() {
-        values[row] = problem.bounded(row, p[row] + moved.as_ref().map_or(0.0, |m| m[i]));
-        for (j, &column) in free.iter().enumerate() {
-            of_values[(row, column)] = sandwich[(i, j)];
-        }
-    }
-    // the correction multiplies the noise's scatter as it does the estimate
+    let mut scatter = covariance.sandwich(&jacobian, &e, &windows(&problem));
+    let correlations = Covariance::correlations(&scatter);
     if let Some(inverse) = &corrected_normal {
-        let widened = inverse * &normal;
-        let wide = &widened * &sandwich * widened.transpose();
-        for (i, &row) in free.iter().enumerate() {
-            for (j, &column) in free.iter().enumerate() {
-                of_values[(row, column)] = wide[(i, j)];
-            }
+        let moved = inverse * (&of_noise * &p_free);
+        for (&j, moved) in free.iter().zip(&moved) {
+            values[j] = problem.bounded(j, p[j] + moved);
         }
+        // the correction multiplies the noise's scatter as it does the estimate
+        let widened = inverse * &normal;
+        scatter = &widened * scatter * widened.transpose();
     }
+    let of_values = uncertainty::spread_out(&scatter, &free, n);
     let rms = (e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64).sqrt();
     let expected = p[0] * (problem.of_noise()[(0, 0)] / e.len() as f64).sqrt();
-    let described = rms < MISFIT * expected && corrected_normal.is_some();
+    let fits = rms < MISFIT * expected && corrected_normal.is_some();
     let estimated = |j: usize, less: f64| {
         let std = of_values[(j, j)].sqrt();
         let end = |side: f64| problem.bounded(j, values[j] + side * 1.96 * std) - less;
-        let value = values[j] - less;
-        Estimated {
-            value,
-            std,
-            std_noise: std,
-            interval: [end(-1.0), end(1.0)],
-            unit: unit(&problem.names[j]).into(),
-        }
+        let interval = [end(-1.0), end(1.0)];
+        Estimated { interval, ..Estimated::normal(values[j] - less, std, unit(&problem.names[j])) }
     };
     let (mut parameters, mut measurement) = (BTreeMap::new(), BTreeMap::new());
     for (j, name) in problem.names.iter().enumerate() {
@@ -519,8 +511,6 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     let named = |keep: &dyn Fn(usize) -> bool| -> Vec<String> {
         (0..n).filter(|&j| keep(j)).map(|j| problem.names[j].clone()).collect()
     };
-    let correlations = Covariance::correlations(&sandwich);
-    let names = named(&|j| !at_bound[j]);
     let si = jacobian.clone().qr().r().svd(false, false).singular_values;
     let mut settings: BTreeMap<String, String> = options.settings.iter().cloned().collect();
     settings.insert("slosh.model".into(), "frozen".into());
@@ -530,33 +520,28 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     uncorrected.entry("hub.I".into()).and_modify(|inertia| *inertia -= liquid);
     let braking: Vec<Braking> =
         [1.0, -1.0].into_iter().filter_map(|way| braking(recordings, way, 2)).collect();
+    let details = Details {
+        fit: Fit {
+            rows: e.len(),
+            rmse: rms / p[0],
+            expected: expected / p[0],
+            noise: problem.rows.iter().map(|r| r.noise).collect(),
+            weights: options.weights,
+        },
+        uncorrected,
+        at_bound: named(&|j| at_bound[j]),
+        condition: covariance.condition,
+        condition_si: si.max() / si.min(),
+        braking,
+    };
     let mut found = Found {
         parameters,
         measurement,
         settings,
-        correlations: (
-            names,
-            correlations.row_iter().map(|row| row.iter().copied().collect()).collect(),
-        ),
+        correlations: (named(&|j| !at_bound[j]), correlations),
         converged: minimum.converged,
-        described: Some(described),
-        verdict: Vec::new(),
-        done: Vec::new(),
-        residuals: Vec::new(),
-        details: Details {
-            fit: Fit {
-                rows: e.len(),
-                rmse: rms / p[0],
-                expected: expected / p[0],
-                noise: problem.rows.iter().map(|r| r.noise).collect(),
-                weights: options.weights,
-            },
-            uncorrected,
-            at_bound: named(&|j| at_bound[j]),
-            condition: covariance.condition,
-            condition_si: si.max() / si.min(),
-            braking,
-        },
+        fits: Some(fits),
+        ..Found::new(details)
     };
     found.verdict = words(&found);
     Ok(found)
@@ -575,26 +560,8 @@ fn unit(name: &str) -> &'static str {
 
 /// Rows of the windows, over all recordings.
 fn windows(problem: &Problem) -> Vec<(usize, usize)> {
-    let (mut windows, mut first) = (Vec::new(), 0);
-    for rows in &problem.rows {
-        let count = rows.inner().len();
-        let width = ((WINDOW / rows.recording.step()) as usize).clamp(1, count);
-        let ends = (0..count).step_by(width).map(|k| (first + k, first + (k + width).min(count)));
-        windows.extend(ends);
-        first += count;
-    }
-    windows
-}
-
-/// Mass of the liquid times r², from the FMU with these settings.
-fn inertia_of_liquid(fmu: &Fmu, settings: &[(String, String)]) -> Result<f64> {
-    let mut instance = fmu.instantiate("identify")?;
-    for (name, value) in settings {
-        instance.set(name, value)?;
-    }
-    instance.setup_experiment(None, 0.0, None)?;
-    instance.enter_initialization_mode()?;
-    Ok(instance.real("tank.m_liq")? * instance.real("tank.r")?.powi(2))
+    let rows = problem.rows.iter().map(|rows| (rows.inner().len(), rows.recording.step()));
+    uncertainty::windows(rows, WINDOW)
 }
 
 /// Torque below which nothing drives the hub, over the largest torque.
@@ -632,15 +599,16 @@ fn braking(recordings: &[Recording], way: f64, harmonics: usize) -> Option<Braki
     let y = DVector::from_vec(accelerations);
     let inverse = a.tr_mul(&a).try_inverse()?;
     let found = &inverse * a.tr_mul(&y);
-    let left = &y - &a * &found;
-    let variance = left.norm_squared() / (count - width) as f64;
+    let residual = &y - &a * &found;
+    let variance = residual.norm_squared() / (count - width) as f64;
     let mean = y.mean();
     Some(Braking {
         direction: if way > 0.0 { "counter-clockwise" } else { "clockwise" },
         std: (0..width).map(|j| (variance * inverse[(j, j)]).sqrt()).collect(),
         coefficients: found.as_slice().to_vec(),
-        rmse: (left.norm_squared() / count as f64).sqrt(),
-        r_squared: 1.0 - left.norm_squared() / y.iter().map(|v| (v - mean).powi(2)).sum::<f64>(),
+        rmse: (residual.norm_squared() / count as f64).sqrt(),
+        r_squared: 1.0
+            - residual.norm_squared() / y.iter().map(|v| (v - mean).powi(2)).sum::<f64>(),
         rows: count,
     })
 }
@@ -648,15 +616,15 @@ fn braking(recordings: &[Recording], way: f64, harmonics: usize) -> Option<Braki
 fn words(found: &Found) -> Vec<String> {
     let mut words = Vec::new();
     let Details { fit, at_bound, braking, .. } = &found.details;
-    let (ratio, described) = (fit.rmse / fit.expected, found.described == Some(true));
-    if described {
+    let (ratio, fits) = (fit.rmse / fit.expected, found.fits == Some(true));
+    if fits {
         words.push(format!(
-            "The residual is that of the gyro's noise: {:.2e} rad/s2, {ratio:.3} times what is expected.",
+            "The residual is that of the gyro's noise: {:.2e} rad/s², {ratio:.3} times what is expected.",
             fit.rmse
         ));
     } else {
         words.push(format!(
-            "NOT DESCRIBED: the residual is {:.2e} rad/s2, {ratio:.2} times what the gyro's noise makes. Something acts \
+            "{DOES_NOT_FIT}: the residual is {:.2e} rad/s², {ratio:.2} times what the gyro's noise makes. Something acts \
              that inertia and friction do not explain (a liquid that moves, a delay); no number here is to be \
              trusted. With a liquid: hubslosh identify without --method.",
             fit.rmse
@@ -677,7 +645,7 @@ fn words(found: &Found) -> Vec<String> {
         }
     }
     if let Some(asymmetry) = found.parameters.get("friction.asymmetry") {
-        let strong = asymmetry.value.abs() > 3.0 * asymmetry.std && described;
+        let strong = asymmetry.value.abs() > 3.0 * asymmetry.std && fits;
         if strong {
             let (harder, easier) = if asymmetry.value > 0.0 {
                 ("counter-clockwise", "clockwise")
@@ -692,7 +660,7 @@ fn words(found: &Found) -> Vec<String> {
     }
     if let [ahead, back] = &braking[..] {
         words.push(format!(
-            "Free decay: counter-clockwise {:.4} rad/s2, clockwise {:.4} rad/s2 on average over the angle.",
+            "Free decay: counter-clockwise {:.4} rad/s², clockwise {:.4} rad/s² on average over the angle.",
             ahead.coefficients[0], back.coefficients[0]
         ));
     }

@@ -6,20 +6,13 @@
 //! B = b2 s² + b1 s + b0,   A = s³ + a2 s² + a1 s + a0
 //! ```
 //!
-//! U and Y are the discrete Fourier transforms of the whole record, without a window; T, a polynomial, is what
-//! the record's ends leave in them (Pintelon & Schoukens, System Identification, 2nd ed., chapters 6 and 9).
+//! U and Y are the discrete Fourier transforms of the whole record, without a window; T, a polynomial, is the
+//! transient of the record's ends (Pintelon & Schoukens, System Identification, 2nd ed., chapters 6 and 9).
 //! V_k are then independent from line to line, of the variance σ²(f) that the residual shows around f, and
 //! weighted least squares is maximum likelihood: (JᵀJ)⁻¹ is the estimates' covariance. Noise and whatever
 //! is not linear in the plant are both in σ², as long as the latter looks like noise.
 //!
-//! Back to the bench (thesis 6.7 corrected, μ = m r²/I0):
-//!
-//! ```text
-//! b1/b2 = 2ζω,  b0/b2 = ω²,  b2 = 1/I0
-//! a0 = ω² b/I0,  a1 = ω²(1 + μ) + 2ζω b/I0,  a2 = b/I0 + 2ζω(1 + μ)
-//! ```
-//!
-//! Six coefficients, five unknowns: that a2 is what the others say tests the structure.
+//! Back to the bench: [`Plant`].
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -27,18 +20,19 @@ use std::f64::consts::TAU;
 use analysis::Complex64;
 use analysis::transfer_function::TransferFunction;
 use anyhow::{Context, Result, ensure};
-use nalgebra::DMatrix;
 use serde::Serialize;
 use signals::fourier::Forward;
 
 use super::{Identified, Method, Needs, Task};
 use crate::estimate::Estimated;
-use crate::least_squares::{differences, minimise};
+use crate::news::News;
 use crate::nominal::{Bench, Nominal};
 use crate::recording::{self, Recording};
 use crate::simulate::Intersample;
-use crate::start;
+use crate::start::{self, Plant};
 use crate::uncertainty::Covariance;
+use crate::verdict::{DOES_NOT_FIT, NO_MINIMUM};
+use analysis::least_squares::{differences, minimise};
 
 /// Degree of T. Two are the plant's own; two more take what sampling folds back.
 const TRANSIENT: usize = 4;
@@ -66,7 +60,7 @@ pub struct Details {
 pub struct Frequency {
     /// What is known of the bench, by FMU name.
     pub settings: Vec<(String, String)>,
-    /// What the torque did between rows.
+    /// Intersample behaviour of the torque.
     pub intersample: Intersample,
 }
 
@@ -75,7 +69,7 @@ impl Method for Frequency {
 
     const NEEDS: Needs = Needs { fmu: true, validation: false };
 
-    fn identify(&self, task: &Task, _: &mut dyn FnMut(&str)) -> Result<Found> {
+    fn identify(&self, task: &Task, _: &mut dyn FnMut(&News)) -> Result<Found> {
         let nominal = Nominal::of(task.fmu()?, &self.settings, &[])?;
         task.check_size(&nominal)?;
         identify(task.one()?, nominal.bench, self.intersample)
@@ -125,7 +119,7 @@ impl Problem {
     }
 
     /// Y_k less the model's.
-    fn left(&self, x: &[f64]) -> Vec<Complex64> {
+    fn residual(&self, x: &[f64]) -> Vec<Complex64> {
         let delay = x[6] * self.step * self.unit;
         (0..self.s.len())
             .map(|k| {
@@ -140,11 +134,11 @@ impl Problem {
 }
 
 /// Local variance of the residual, |V|² on average over the neighbours, corrected for the coefficients fitted.
-fn variances(left: &[Complex64], unknowns: usize) -> Vec<f64> {
-    let count = left.len();
+fn variances(residual: &[Complex64], unknowns: usize) -> Vec<f64> {
+    let count = residual.len();
     let freedom = 1.0 - unknowns as f64 / (2 * count) as f64;
     let mut sums = vec![0.0];
-    for v in left {
+    for v in residual {
         sums.push(sums[sums.len() - 1] + v.norm_sqr());
     }
     (0..count)
@@ -162,7 +156,7 @@ fn spectrum(signal: &[f64], bins: &std::ops::RangeInclusive<usize>) -> Vec<Compl
     spectrum[bins.clone()].to_vec()
 }
 
-/// Fits a recording of a hub with slosh. `between`: what the torque did between rows.
+/// Fits a recording of a hub with slosh.
 pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -> Result<Found> {
     let measured = start::response(recording)?;
     let rough = TransferFunction::fit(&measured).context("no transfer function fits")?;
@@ -182,7 +176,7 @@ pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -
     );
     let unit = TAU * (band.0 * band.1).sqrt();
     let s: Vec<f64> = bins.clone().map(|k| TAU * k as f64 * bin / unit).collect();
-    // a torque joined by lines has sinc² of its samples' spectrum, one that is held sinc and half a row's delay
+    // first-order hold has sinc² of the samples' spectrum, zero-order hold sinc and half a row's delay
     let between = |s: &f64| {
         let half = s * unit * step / 2.0;
         let sinc = half.sin() / half;
@@ -197,74 +191,47 @@ pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -
     let size = (y.iter().map(Complex64::norm_sqr).sum::<f64>() / y.len() as f64).sqrt();
     let problem = Problem { s, u, y, unit, step, size };
 
-    let (p, w, z) = (rough.real_pole / unit, rough.pole_omega / unit, rough.pole_damping);
-    let [b2, b1, b0] = rough.numerator;
-    let mut x = vec![b2 / unit, b1 / unit.powi(2), b0 / unit.powi(3)];
-    x.extend([p + 2.0 * z * w, w * w + 2.0 * z * w * p, w * w * p, 0.0]);
+    let scaled = |[c2, c1, c0]: [f64; 3]| [c2 / unit, c1 / unit.powi(2), c0 / unit.powi(3)];
+    let mut x = [scaled(rough.numerator), scaled(rough.denominator())].concat();
+    x.push(0.0);
     x.extend([0.0; TRANSIENT + 1]);
-    let noise = recording::noise_level(&rate).max(crate::noise::FLOOR);
+    let noise = recording::noise_level(&rate).max(analysis::gauss_markov::FLOOR);
     let mut sigma = vec![noise * (count as f64).sqrt(); problem.s.len()];
     let mut converged = false;
     let mut steps = vec![1e-6; x.len()];
     let weighted = |x: &[f64], sigma: &[f64]| -> Vec<f64> {
-        let scaled = problem.left(x).into_iter().zip(sigma).map(|(v, s)| v * (2f64.sqrt() / s));
+        let scaled = problem.residual(x).into_iter().zip(sigma).map(|(v, s)| v * (2f64.sqrt() / s));
         scaled.flat_map(|v| [v.re, v.im]).collect()
     };
     for _ in 0..ROUNDS {
         let residuals = |x: &[f64]| weighted(x, &sigma);
         let derivatives = |x: &[f64]| differences(&residuals, x, &steps);
-        let minimum = minimise(&residuals, &derivatives, &x);
+        let minimum = minimise(&residuals, &|x| Some(derivatives(x)), &x);
         converged = minimum.converged;
         x = minimum.x;
         // steps that are small against the standard deviations and large against rounding
         let norms: Vec<f64> = derivatives(&x).column_iter().map(|c| c.norm()).collect();
         steps = norms.iter().map(|n| (0.1 / n).clamp(1e-9, 1e-3)).collect();
-        sigma = variances(&problem.left(&x), x.len()).into_iter().map(f64::sqrt).collect();
+        sigma = variances(&problem.residual(&x), x.len()).into_iter().map(f64::sqrt).collect();
     }
     let jacobian = differences(&|x| weighted(x, &sigma), &x, &steps);
     let covariance = Covariance::of(&jacobian)
         .with_context(|| format!("{}: poles and zeros are not determined", recording.name))?;
 
-    let names = [
-        ("slosh_frequency", "Hz"),
-        ("slosh_damping", "1"),
-        ("resonance_frequency", "Hz"),
-        ("resonance_damping", "1"),
-        ("real_pole", "1/s"),
-        ("inertia", "kg.m2"),
-        ("mass_ratio", "1"),
-        ("slosh_mass", "kg"),
-        ("friction", "N.m.s"),
-        ("delay", "s"),
-        ("structure", "1/s"),
-        ("tank.d", "m"),
-        ("tank.h", "m"),
-        ("hub.I", "kg.m2"),
-    ];
     let physical = |x: &[f64]| translated(x, unit, step, bench);
-    let values = physical(&x).context("the poles and zeros are not those of a hub with slosh")?;
+    let quantities =
+        physical(&x).context("the poles and zeros are not those of a hub with slosh")?;
     // the delta method
-    let mut slope = DMatrix::zeros(names.len(), x.len());
-    for j in 0..PLANT {
-        let by = 1e-3 * covariance.x[(j, j)].sqrt();
-        let at = |by: f64| {
-            let mut moved = x.clone();
-            moved[j] += by;
-            physical(&moved)
-        };
-        let (Some(ahead), Some(behind)) = (at(by), at(-by)) else { continue };
-        for i in 0..names.len() {
-            slope[(i, j)] = (ahead[i] - behind[i]) / (2.0 * by);
-        }
-    }
+    let steps: Vec<f64> =
+        covariance.x.diagonal().iter().map(|variance| 1e-3 * variance.sqrt()).collect();
+    let values = |x: &[f64]| physical(x).unwrap_or(quantities).map(|(.., value)| value).to_vec();
+    let slope = differences(&values, &x, &steps);
     let of_values = &slope * &covariance.x * slope.transpose();
-    let estimated = |i: usize| {
-        let std = of_values[(i, i)].sqrt();
-        let interval = [values[i] - 1.96 * std, values[i] + 1.96 * std];
-        Estimated { value: values[i], std, std_noise: std, interval, unit: names[i].1.into() }
-    };
-    let mut response: BTreeMap<String, Estimated> =
-        (0..names.len()).map(|i| (names[i].0.to_string(), estimated(i))).collect();
+    let mut response = BTreeMap::new();
+    for (i, (name, unit, value)) in quantities.into_iter().enumerate() {
+        let estimated = Estimated::normal(value, of_values[(i, i)].sqrt(), unit);
+        response.insert(name.to_string(), estimated);
+    }
     let structure = response.remove("structure").map_or(0.0, |p| p.value / p.std);
     let mut parameters = BTreeMap::new();
     for name in ["tank.d", "tank.h", "hub.I"] {
@@ -283,8 +250,8 @@ pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -
         structure,
         condition: covariance.condition,
     };
-    let described = over_noise < MISFIT && structure.abs() < 3.3;
-    let verdict = words(&fit, described, converged);
+    let fits = over_noise < MISFIT && structure.abs() < 3.3;
+    let verdict = words(&fit, fits, converged);
     Ok(Found {
         parameters,
         settings: [
@@ -295,30 +262,23 @@ pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -
         .map(setting)
         .into(),
         measurement: response,
-        correlations: (Vec::new(), Vec::new()),
         converged,
-        described: Some(described),
+        fits: Some(fits),
         verdict,
-        done: Vec::new(),
-        residuals: Vec::new(),
-        details: Details { fit },
+        ..Found::new(Details { fit })
     })
 }
 
-/// Coefficients (s in units of `unit`) as the quantities in the order of their names.
-fn translated(x: &[f64], unit: f64, step: f64, bench: Bench) -> Option<Vec<f64>> {
-    let (b2, b1, b0) = (x[0] * unit, x[1] * unit.powi(2), x[2] * unit.powi(3));
-    let (a2, a1, a0) = (x[3] * unit, x[4] * unit.powi(2), x[5] * unit.powi(3));
-    if b2 <= 0.0 || b0 <= 0.0 {
-        return None;
-    }
-    let w = (b0 / b2).sqrt();
-    let zeta = b1 / b2 / (2.0 * w);
-    let inertia = 1.0 / b2;
-    let friction = a0 / (w * w) * inertia;
-    let ratio = (a1 - 2.0 * zeta * w * friction / inertia) / (w * w) - 1.0;
-    let structure = a2 - friction / inertia - 2.0 * zeta * w * (1.0 + ratio);
+/// A quantity's name, unit and value.
+type Named = (&'static str, &'static str, f64);
+
+/// What coefficients (s in units of `unit`) say of the bench.
+fn translated(x: &[f64], unit: f64, step: f64, bench: Bench) -> Option<[Named; 14]> {
+    let scaled = |c: &[f64]| [c[0] * unit, c[1] * unit.powi(2), c[2] * unit.powi(3)];
+    let (numerator, denominator) = (scaled(&x[..3]), scaled(&x[3..6]));
+    let plant = Plant::of(numerator, denominator)?;
     // the real root of A by Newton's method from the side where it is slow, then the pair
+    let [a2, a1, a0] = denominator;
     let mut root = -a0 / a1;
     for _ in 0..60 {
         let value = ((root + a2) * root + a1) * root + a0;
@@ -326,42 +286,42 @@ fn translated(x: &[f64], unit: f64, step: f64, bench: Bench) -> Option<Vec<f64>>
     }
     let (sum, product) = (a2 + root, a1 + root * (a2 + root));
     let pair = (product > 0.0).then(|| product.sqrt())?;
-    let mass = ratio * inertia / bench.arm.powi(2);
-    let (d, h) = if mass > 0.0 { start::tank(w / TAU, mass, bench) } else { (f64::NAN, f64::NAN) };
-    let rigid = bench.density * std::f64::consts::PI / 4.0 * d * d * h - mass;
-    let hub = inertia - rigid * bench.arm.powi(2);
-    Some(vec![
-        w / TAU,
-        zeta,
-        pair / TAU,
-        sum / (2.0 * pair),
-        -root,
-        inertia,
-        ratio,
-        mass,
-        friction,
-        x[6] * step,
-        structure,
-        d,
-        h,
-        hub,
+    let (frequency, mass) = (plant.omega / TAU, plant.mass(bench));
+    let (d, h) =
+        if mass > 0.0 { start::tank(frequency, mass, bench) } else { (f64::NAN, f64::NAN) };
+    let hub = plant.inertia - bench.inertia(bench.liquid(d, h) - mass);
+    Some([
+        ("slosh_frequency", "Hz", frequency),
+        ("slosh_damping", "1", plant.zeta),
+        ("resonance_frequency", "Hz", pair / TAU),
+        ("resonance_damping", "1", sum / (2.0 * pair)),
+        ("real_pole", "1/s", -root),
+        ("inertia", "kg.m2", plant.inertia),
+        ("mass_ratio", "1", plant.mass_ratio),
+        ("slosh_mass", "kg", mass),
+        ("friction", "N.m.s", plant.friction),
+        ("delay", "s", x[6] * step),
+        ("structure", "1/s", plant.structure),
+        ("tank.d", "m", d),
+        ("tank.h", "m", h),
+        ("hub.I", "kg.m2", hub),
     ])
 }
 
-fn words(fit: &Fit, described: bool, converged: bool) -> Vec<String> {
+fn words(fit: &Fit, fits: bool, converged: bool) -> Vec<String> {
     let mut words = Vec::new();
     if !converged {
-        words.push("The search did not end at a minimum.".to_string());
+        words.push(format!("{NO_MINIMUM}."));
     }
-    words.push(if described {
+    words.push(if fits {
         format!(
-            "Three poles and two zeros describe the record: the residual is {:.2} times the gyro's noise, and the poles \
+            "Three poles and two zeros fit the record: the residual is {:.2} times the gyro's noise, and the poles \
              are where the zeros, the inertia and the friction say ({:+.1} standard deviations).",
             fit.over_noise, fit.structure
         )
     } else {
         format!(
-            "NOT DESCRIBED by three poles and two zeros: the residual is {:.2} times the gyro's noise, and the poles are \
+            "{DOES_NOT_FIT}: the residual of three poles and two zeros is {:.2} times the gyro's noise, and the poles are \
              {:+.1} standard deviations from where zeros, inertia and friction say. Dry friction and large slosh are \
              not linear; the intervals hold for what looks like noise alone. Use the time domain \
              (hubslosh identify without --method).",
@@ -375,16 +335,14 @@ fn words(fit: &Fit, described: bool, converged: bool) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::design::Multisine;
-    use analysis::linear::{Linear, Mode};
+    use analysis::linear::Linear;
     use analysis::random::Random;
 
     const BENCH: Bench = Bench { arm: 0.225, density: 1000.0, gravity: 9.81 };
 
     /// The bench with 10 cm of water, viscous friction, under two periods of a multisine from rest.
     fn clean() -> Recording {
-        let mode = Mode { mass: 0.756_293_271_9, frequency: 2.343_618_143_1, damping: 0.002_975_7 };
-        let inertia = 0.322414 + 1.330_431_108_5 * 0.225f64.powi(2);
-        let plant = Linear { inertia, friction: 0.03793, arm: 0.225, modes: vec![mode] };
+        let plant = Linear::bench_10_cm(0.002_975_7);
         let torque = Multisine::new(100.0, (1.25, 3.5), 0.1, 1).unwrap();
         let time: Vec<f64> = (0..10_000).map(|k| 0.02 * f64::from(k)).collect();
         let tau: Vec<f64> = time.iter().map(|&t| torque.at(t)).collect();
@@ -410,11 +368,7 @@ mod tests {
             let mut one = clean.clone();
             one.rate.iter_mut().for_each(|w| *w += 4.07e-4 * random.normal());
             let found = identify(&one, BENCH, Intersample::FirstOrderHold).unwrap();
-            assert!(
-                found.converged && found.described == Some(true),
-                "{seed}: {:?}",
-                found.verdict
-            );
+            assert!(found.converged && found.fits == Some(true), "{seed}: {:?}", found.verdict);
             for (k, (name, value)) in truth.iter().enumerate() {
                 let p = found.measurement.get(*name).or(found.parameters.get(*name)).unwrap();
                 inside[k] += u64::from(p.interval[0] <= *value && *value <= p.interval[1]);

@@ -14,6 +14,7 @@ use host::fmi2::Fmu;
 use serde::Serialize;
 
 use crate::estimate::Estimated;
+use crate::news::News;
 use crate::nominal::Nominal;
 use crate::recording::Recording;
 use crate::{plausible, start};
@@ -75,9 +76,10 @@ pub struct Identified<D> {
     pub correlations: (Vec<String>, Vec<Vec<f64>>),
     /// The search ended at a minimum.
     pub converged: bool,
-    /// Whether the residual is the gyro's noise; if not, no interval is to be trusted. `None`: the method cannot tell.
+    /// Whether the model is not invalidated: the residual is the gyro's noise. If it is invalidated, no interval is to be
+    /// trusted. `None`: the method cannot tell.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub described: Option<bool>,
+    pub fits: Option<bool>,
     /// The answer in words.
     pub verdict: Vec<String>,
     /// What was done, step by step.
@@ -90,7 +92,7 @@ pub struct Identified<D> {
     pub details: D,
 }
 
-/// What was measured and what is left of it, for one recording.
+/// Measured rate and residual of one recording.
 #[derive(Clone, Debug, Default)]
 pub struct Residual {
     /// The recording's name.
@@ -104,16 +106,16 @@ pub struct Residual {
 }
 
 impl<D: Serialize> Identified<D> {
-    /// Of a method that estimates no parameters of the FMU.
-    fn words_alone(verdict: Vec<String>, details: D) -> Self {
+    /// A result without parameters and words.
+    fn new(details: D) -> Self {
         Identified {
             parameters: BTreeMap::new(),
             measurement: BTreeMap::new(),
             settings: BTreeMap::new(),
             correlations: (Vec::new(), Vec::new()),
             converged: true,
-            described: None,
-            verdict,
+            fits: None,
+            verdict: Vec::new(),
             done: Vec::new(),
             residuals: Vec::new(),
             details,
@@ -138,7 +140,7 @@ pub trait Method {
     fn identify(
         &self,
         task: &Task,
-        heard: &mut dyn FnMut(&str),
+        heard: &mut dyn FnMut(&News),
     ) -> Result<Identified<Self::Details>>;
 
     /// Lines for a terminal, below the table of estimates.

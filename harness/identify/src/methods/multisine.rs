@@ -16,6 +16,7 @@ use serde::Serialize;
 use signals::fourier::Forward;
 
 use super::{Identified, Method, Needs, Task};
+use crate::news::News;
 use crate::recording::Recording;
 
 /// Beginning that is left out, s: slosh of a bare tank decays with 23 s, to a thousandth in this time.
@@ -80,7 +81,7 @@ impl Method for Multisine {
 
     const NEEDS: Needs = Needs { fmu: false, validation: false };
 
-    fn identify(&self, task: &Task, _: &mut dyn FnMut(&str)) -> Result<Found> {
+    fn identify(&self, task: &Task, _: &mut dyn FnMut(&News)) -> Result<Found> {
         analyse(task.one()?, self.period)
     }
 
@@ -201,7 +202,7 @@ pub fn analyse(recording: &Recording, period: f64) -> Result<Found> {
     };
     let significance = (sure(&odd), sure(&even));
     let verdict = words(&levels, significance);
-    Ok(Found::words_alone(verdict, Details { periods, lines, levels, significance }))
+    Ok(Found { verdict, ..Found::new(Details { periods, lines, levels, significance }) })
 }
 
 fn words(levels: &Levels, (odd, even): (f64, f64)) -> Vec<String> {
@@ -236,14 +237,12 @@ fn words(levels: &Levels, (odd, even): (f64, f64)) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::design;
-    use analysis::linear::{Linear, Mode};
+    use analysis::linear::Linear;
     use analysis::random::Random;
 
     /// Seven periods of 50 s of a linear bench whose gyro is bent by `square` ω² + `cube` ω³.
     fn recorded(square: f64, cube: f64) -> Recording {
-        let mode = Mode { mass: 0.756_293_271_9, frequency: 2.343_618_143_1, damping: 0.02 };
-        let inertia = 0.322414 + 1.330_431_108_5 * 0.225f64.powi(2);
-        let plant = Linear { inertia, friction: 0.2, arm: 0.225, modes: vec![mode] };
+        let plant = Linear { friction: 0.2, ..Linear::bench_10_cm(0.02) };
         let torque = design::Multisine::new(50.0, (1.25, 3.5), 0.25, 3).unwrap();
         let time: Vec<f64> = (0..7 * 2500).map(|k| 0.02 * f64::from(k)).collect();
         let tau: Vec<f64> = time.iter().map(|&t| torque.at(t)).collect();
@@ -270,19 +269,15 @@ mod tests {
             "{:?}",
             linear.details.levels
         );
-        let even = analyse(&recorded(0.5, 0.0), 50.0).unwrap();
-        assert!(
-            even.details.significance.1 > 10.0 && even.details.significance.0 < 4.0,
-            "{:?}",
-            even.details.significance
-        );
-        let odd = analyse(&recorded(0.0, 30.0), 50.0).unwrap();
-        assert!(
-            odd.details.significance.0 > 10.0 && odd.details.significance.1 < 4.0,
-            "{:?}",
-            odd.details.significance
-        );
-        assert!(odd.verdict.iter().any(|line| line.starts_with("Odd nonlinear distortion is")));
+        for (square, cube) in [(0.5, 0.0), (0.0, 30.0)] {
+            let bent = analyse(&recorded(square, cube), 50.0).unwrap();
+            let (odd, even) = bent.details.significance;
+            let (there, absent) = if cube > 0.0 { (odd, even) } else { (even, odd) };
+            assert!(there > 10.0 && absent < 4.0, "{odd} {even}");
+            let kind = if cube > 0.0 { "Odd nonlinear" } else { "Even nonlinear" };
+            let seen = |line: &String| line.starts_with(kind) && line.contains("dB below");
+            assert!(bent.verdict.iter().any(seen), "{:?}", bent.verdict);
+        }
     }
 
     #[test]

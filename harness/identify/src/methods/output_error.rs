@@ -14,15 +14,16 @@ use crate::budget::{self, Effect};
 use crate::candidate::{self, Fitted, ModelFit};
 use crate::estimate::Estimated;
 use crate::fit::{Answer, Differences, Problem};
+use crate::news::News;
 use crate::nominal::Start;
 use crate::options::Options;
 use crate::plausible;
 use crate::recording::{self, Recording};
-use crate::residual::Tests;
 use crate::start::{self, Response};
 use crate::uncertainty::{self, Combination, Covariance, Sources};
 use crate::unknown::{Quantity, Unknown};
 use crate::verdict::{self, DECIDES};
+use analysis::innovations::Tests;
 
 /// The FMU fitted in the time domain.
 pub struct OutputError {
@@ -34,7 +35,7 @@ pub struct OutputError {
 pub type Identification = Identified<Details>;
 
 /// What this method alone has to say.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Details {
     /// The chosen model's fit.
     pub fit: ModelFit,
@@ -59,7 +60,7 @@ impl Method for OutputError {
 
     const NEEDS: Needs = Needs { fmu: true, validation: true };
 
-    fn identify(&self, task: &Task, heard: &mut dyn FnMut(&str)) -> Result<Identification> {
+    fn identify(&self, task: &Task, heard: &mut dyn FnMut(&News)) -> Result<Identification> {
         let options = Options { validation: task.validation.to_vec(), ..self.options.clone() };
         identify(task.fmu()?, task.recordings, &options, heard)
     }
@@ -82,10 +83,13 @@ impl Method for OutputError {
 /// Difference below which the simpler model is taken (not worth more than a bare mention, ibid.).
 const ALIKE: f64 = 2.0;
 
+/// Slosh models in the order in which they are fitted.
+const ORDER: [&str; 5] = ["linear", "planar", "spherical", "paraboloid", "frozen"];
+
 /// From the simplest slosh model to the richest.
 const SIMPLEST: [&str; 5] = ["frozen", "linear", "planar", "spherical", "paraboloid"];
 
-/// Beginnings that are tried where the whole recording is not described, as fractions of its rows.
+/// Beginnings that are tried where no model fits the whole recording, as fractions of its rows.
 const BEGINNINGS: [f64; 2] = [0.35, 0.5];
 
 /// Identifies the FMU from recordings. `heard` is told what happens.
@@ -93,22 +97,21 @@ pub fn identify(
     fmu: &Fmu,
     recordings: &[Recording],
     options: &Options,
-    heard: &mut dyn FnMut(&str),
+    heard: &mut dyn FnMut(&News),
 ) -> Result<Identification> {
     let mut found = identify_whole(fmu, recordings, options, heard)?;
-    if let ([recording], Some(false), true) = (recordings, found.described, found.details.fit.poor)
-    {
-        found.verdict.extend(described_beginning(fmu, recording, options, heard));
+    if let ([recording], Some(false), true) = (recordings, found.fits, found.details.fit.poor) {
+        found.verdict.extend(fitting_beginning(fmu, recording, options, heard));
     }
     Ok(found)
 }
 
-/// The longest beginning of a recording that a model describes, in words.
-fn described_beginning(
+/// The longest beginning of a recording that a model fits, in words.
+fn fitting_beginning(
     fmu: &Fmu,
     recording: &Recording,
     options: &Options,
-    heard: &mut dyn FnMut(&str),
+    heard: &mut dyn FnMut(&News),
 ) -> Option<String> {
     let options = Options { validation: Vec::new(), ..options.clone() };
     let mut longest = None;
@@ -117,9 +120,9 @@ fn described_beginning(
         if part.duration() < recording::SHORTEST {
             continue;
         }
-        heard(&format!("no model describes the whole recording; the rows until {end:.0} s"));
+        heard(&News::Step(format!("no model fits the whole recording; the rows until {end:.0} s")));
         match identify_whole(fmu, &[part], &options, &mut |_| {}) {
-            Ok(found) if found.described == Some(true) && found.converged => {
+            Ok(found) if found.fits == Some(true) && found.converged => {
                 longest = Some((end, found));
             }
             _ => break,
@@ -127,7 +130,7 @@ fn described_beginning(
     }
     let (end, found) = longest?;
     Some(format!(
-        "Until {end:.0} s the {} model describes the recording, and leaves noise alone: --trim {:.0},{end:.0} gives parameters \
+        "Until {end:.0} s the {} model fits the recording, and the residual is noise alone: --trim {:.0},{end:.0} gives parameters \
          that can be trusted. (Where slosh begins to rotate it is chaotic, and no fit follows it from there on.)",
         found.details.fit.model, recording.time[0]
     ))
@@ -137,70 +140,45 @@ fn identify_whole(
     fmu: &Fmu,
     recordings: &[Recording],
     options: &Options,
-    heard: &mut dyn FnMut(&str),
+    heard: &mut dyn FnMut(&News),
 ) -> Result<Identification> {
     let begun = Instant::now();
     ensure!(!recordings.is_empty(), "there is no recording");
     let mut done = Vec::new();
-    let mut say = |line: String, done: &mut Vec<String>| {
-        heard(&line);
-        done.push(line);
+    let mut tell = |news: News| {
+        heard(&news);
+        done.push(news.line().to_string());
     };
     let nominal = options.nominal(fmu)?;
     let mut doubts = Vec::new();
     for recording in recordings {
         let (notes, found) = plausible::columns(recording);
-        notes.into_iter().for_each(|line| say(line, &mut done));
+        notes.into_iter().for_each(|line| tell(News::Step(line)));
         doubts.extend(found);
     }
     let (response, starts) = start::from_data(recordings, &nominal)?;
-    let start = starts[0];
     if let Some(found) = &response {
         plausible::check_size(found, nominal.inertia)?;
-        say(
-            format!(
-                "frequency response: slosh at {:.4} Hz, damping ratio {:.4}, resonance at {:.4} Hz, \
-                 slosh mass {:.3} kg, inertia {:.4} kg.m2",
-                found.slosh_frequency,
-                found.slosh_damping,
-                found.resonance_frequency,
-                found.slosh_mass,
-                found.inertia
-            ),
-            &mut done,
-        );
-    } else {
-        say("frequency response: no slosh in it".into(), &mut done);
     }
-
-    say(
-        format!(
-            "starts: d {:.4} m, h {:.4} m, damping ratio {:.4}, hub.I {:.4} kg.m2",
-            start.d, start.h, start.zeta, start.hub_inertia
-        ),
-        &mut done,
-    );
+    let said = response.as_ref().map(Response::line);
+    tell(News::Step(said.unwrap_or("frequency response: no slosh in it".into())));
+    for (number, start) in starts.iter().enumerate() {
+        let line = format!("start {}: {}", number + 1, start.line());
+        tell(if number == 0 { News::Step(line) } else { News::Detail(line) });
+    }
+    // the slosh models with the first friction law, each from the best so far
+    let law = options.friction.first().map_or("stribeck", String::as_str);
     let (mut fitted, mut failed): (Vec<Fitted>, _) = (Vec::new(), None);
-    let order = ["linear", "planar", "spherical", "paraboloid", "frozen"];
-    let wanted = |model: &&str| options.models.iter().any(|m| m == model);
-    for model in order.into_iter().filter(wanted) {
+    for model in ORDER.into_iter().filter(|model| options.models.iter().any(|m| m == model)) {
         if model != "frozen" && response.is_none() && options.starts.is_empty() {
-            say(format!("{model}: not tried, the data show no slosh to start from"), &mut done);
+            tell(News::Step(format!("{model}: not tried, the data show no slosh to start from")));
             continue;
         }
-        let law = options.friction.first().map_or("stribeck", String::as_str);
         let from = fitted.iter().min_by(|a, b| a.fit.bic.total_cmp(&b.fit.bic));
-        let one =
-            candidate::fit(fmu, recordings, options, (model, law), &starts, from, &mut |line| {
-                say(line, &mut done);
-            });
-        match one {
-            Ok(one) => {
-                say(one.fit.line(), &mut done);
-                fitted.push(one);
-            }
+        match candidate::fit(fmu, recordings, options, (model, law), &starts, from, &mut tell) {
+            Ok(one) => fitted.push(one),
             Err(error) => {
-                say(format!("{model}: could not be fitted: {error:#}"), &mut done);
+                tell(News::Step(format!("{model}: could not be fitted: {error:#}")));
                 failed = Some(error);
             }
         }
@@ -213,47 +191,35 @@ fn identify_whole(
         "the data show no slosh (no antiresonance with a resonance above it in the excited band), and no \
          start was given"
     );
-    let rank = |f: &Fitted| SIMPLEST.iter().position(|s| *s == f.fit.model);
-    let alike = sort(&mut fitted, &rank);
+    let (near, slosh) = sort(&mut fitted);
     // other friction laws with the slosh model that was chosen
-    let mut friction = Vec::new();
+    let (first, mut others) = (&fitted[0], Vec::new());
     for law in options.friction.iter().skip(1) {
-        let model = fitted[0].fit.model.clone();
-        let from = fitted.first();
-        let one =
-            candidate::fit(fmu, recordings, options, (&model, law), &starts, from, &mut |line| {
-                say(line, &mut done);
-            })?;
-        say(one.fit.line(), &mut done);
-        friction.push(one);
+        let pair = (&*first.fit.model, law.as_str());
+        let from = Some(first);
+        others.push(candidate::fit(fmu, recordings, options, pair, &starts, from, &mut tell)?);
     }
-    let mut laws = vec![fitted[0].fit.clone()];
-    laws.extend(friction.iter().map(|f| f.fit.clone()));
-    let mut models: Vec<ModelFit> = fitted.iter().map(|f| f.fit.clone()).collect();
-    models.extend(friction.iter().map(|f| f.fit.clone()));
+    let laws: Vec<ModelFit> =
+        std::iter::once(first).chain(&others).map(|f| f.fit.clone()).collect();
+    let mut models: Vec<ModelFit> = fitted.iter().chain(&others).map(|f| f.fit.clone()).collect();
     // a law must be better than the first by what decides
-    let least = friction.iter().position(|f| f.fit.bic < fitted[0].fit.bic - DECIDES);
-    let (best, of_models) = match least {
-        Some(place) => (friction.swap_remove(place), None),
+    let (best, of_models) = match others.iter().position(|f| f.fit.bic < first.fit.bic - DECIDES) {
+        Some(index) => (others.swap_remove(index), None),
         None => {
-            let gained = of_models(&fitted[..alike.0]);
+            let gained = of_models(&fitted[..near]);
             (fitted.swap_remove(0), Some(gained))
         }
     };
-    let question = verdict::Question {
-        slosh: &models[..alike.1],
-        near: alike.0,
-        laws: &laws,
-        doubts: &doubts,
-    };
+    let question =
+        verdict::Question { slosh: &models[..slosh], near, laws: &laws, doubts: &doubts };
     let mut found = finish(best, of_models, &question, options)?;
-    let fit = &found.details.fit;
+    let details = &mut found.details;
+    let fit = &details.fit;
     let chosen = models.iter().position(|m| *m.model == fit.model && m.friction == fit.friction);
     models.swap(0, chosen.unwrap_or(0));
-    let details = &mut found.details;
     details.models = models;
     details.frequency_response = response;
-    details.start = Some(start);
+    details.start = starts.first().copied();
     details.seconds = begun.elapsed().as_secs_f64();
     found.done = done;
     Ok(found)
@@ -261,11 +227,11 @@ fn identify_whole(
 
 /// Sorts by the information criterion, the simplest first among those that it does not tell apart at all. Returns how
 /// many cannot be told from the first with certainty, and how many there are in all.
-fn sort(fitted: &mut [Fitted], rank: &dyn Fn(&Fitted) -> Option<usize>) -> (usize, usize) {
+fn sort(fitted: &mut [Fitted]) -> (usize, usize) {
     fitted.sort_by(|a, b| a.fit.bic.total_cmp(&b.fit.bic));
     let within = |of: f64| fitted.iter().filter(|f| f.fit.bic < fitted[0].fit.bic + of).count();
     let (near, alike) = (within(DECIDES), within(ALIKE));
-    fitted[..alike].sort_by_key(rank);
+    fitted[..alike].sort_by_key(|f| SIMPLEST.iter().position(|model| *model == f.fit.model));
     (near, fitted.len())
 }
 
@@ -278,8 +244,8 @@ fn of_models(near: &[Fitted]) -> DMatrix<f64> {
     for (other, probability) in near.iter().zip(probabilities).skip(1) {
         let difference = unknowns.iter().zip(first).map(|(unknown, x)| {
             let same = |u: &Unknown| u.quantity == unknown.quantity;
-            let place = other.problem.unknowns.iter().position(same);
-            place.map_or(0.0, |place| other.polished.x[place] - x)
+            let index = other.problem.unknowns.iter().position(same);
+            index.map_or(0.0, |index| other.polished.x[index] - x)
         });
         let difference = DVector::from_iterator(first.len(), difference);
         gained += &difference * difference.transpose() * probability;
@@ -301,8 +267,8 @@ fn finish(
         problem.unknowns.push(Unknown::gyro_scale().known(1.0, options.gyro_scale));
         x.push(0.0);
         // sensitivities to the scale are exact: no direction is needed for them
-        let place = known.ncols();
-        known = known.insert_column(place, 0.0);
+        let last = known.ncols();
+        known = known.insert_column(last, 0.0);
     }
     // the gyro's scale is nearly a combination of the others: only exact sensitivities tell it from them
     problem.differences = Differences::Central;
@@ -312,7 +278,7 @@ fn finish(
     fit.newton_decrement = polished.decrement;
     x = polished.x;
     let (jacobian, covariance, answer) = (polished.jacobian, polished.covariance, polished.answer);
-    let described = fit.tests.iter().all(Tests::passed) && question.doubts.is_empty();
+    let fits = fit.tests.iter().all(Tests::passed) && question.doubts.is_empty();
     let noise_only = match scale_is_unknown {
         true => without_last(&jacobian).unwrap_or_else(|| covariance.x.clone()),
         false => covariance.x.clone(),
@@ -325,7 +291,7 @@ fn finish(
         let n = spread.nrows();
         DMatrix::from_fn(n, n, |i, j| spread[(i, j)] / slopes[i] / slopes[j])
     });
-    let sandwich = (!described).then(|| {
+    let sandwich = (!fits).then(|| {
         let e = problem.stacked(&answer, &x);
         covariance.sandwich(&jacobian, e.as_slice(), &windows(&problem))
     });
@@ -363,31 +329,20 @@ fn finish(
     }
     let combinations = uncertainty::combinations(&problem.unknowns, &values, &of_values);
     let error_budget = budget::of(&problem, &x, &answer, &jacobian, &covariance)?;
-    let matrix = Covariance::correlations(&full);
     let names = problem.unknowns.iter().map(|u| u.quantity.name()).collect();
-    let correlations = matrix.row_iter().map(|row| row.iter().copied().collect()).collect();
-    let verdict =
-        verdict::words(question, described, &fit, &combinations, &parameters, &error_budget);
+    let verdict = verdict::words(question, fits, &fit, &combinations, &parameters, &error_budget);
+    let (converged, condition) = (fit.converged, covariance.condition);
+    let details = Details { fit, combinations, condition, error_budget, ..Details::default() };
     Ok(Identification {
         parameters,
         measurement,
         settings: problem.setup.settings.iter().cloned().collect(),
-        correlations: (names, correlations),
-        converged: fit.converged,
-        described: Some(described),
+        correlations: (names, Covariance::correlations(&full)),
+        converged,
+        fits: Some(fits),
         verdict,
-        done: Vec::new(),
         residuals: residuals(&problem, &answer),
-        details: Details {
-            fit,
-            combinations,
-            condition: covariance.condition,
-            error_budget,
-            models: Vec::new(),
-            frequency_response: None,
-            start: None,
-            seconds: 0.0,
-        },
+        ..Identified::new(details)
     })
 }
 
@@ -409,22 +364,13 @@ fn residuals(problem: &Problem, answer: &Answer) -> Vec<Residual> {
 
 /// Rows of the windows of the sandwich.
 fn windows(problem: &Problem) -> Vec<(usize, usize)> {
-    let mut windows = Vec::new();
-    let mut first = 0;
-    for channel in &problem.channels {
-        let recording = &problem.recordings[channel.recording];
-        let rows = recording.time.len();
-        let width = ((uncertainty::WINDOW / recording.step()) as usize).clamp(1, rows);
-        windows
-            .extend((0..rows).step_by(width).map(|k| (first + k, first + (k + width).min(rows))));
-        first += rows;
-    }
-    windows
+    let recordings = problem.channels.iter().map(|channel| &problem.recordings[channel.recording]);
+    uncertainty::windows(recordings.map(|r| (r.time.len(), r.step())), uncertainty::WINDOW)
 }
 
 /// The covariance if the last unknown were known exactly; its row and column are 0.
 fn without_last(jacobian: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let place = jacobian.ncols() - 1;
-    let rest = Covariance::of(&jacobian.clone().remove_column(place))?.x;
-    Some(rest.insert_row(place, 0.0).insert_column(place, 0.0))
+    let last = jacobian.ncols() - 1;
+    let rest = Covariance::of(&jacobian.clone().remove_column(last))?.x;
+    Some(rest.insert_row(last, 0.0).insert_column(last, 0.0))
 }

@@ -1,15 +1,15 @@
 //! One self-contained page on an identification.
 
-use std::fmt::Write as _;
-
 use analysis::welch::{Segments, Spectra};
-use host::html::escape;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
 use report::svg::{Axis, Chart, Series, Style};
 
 use super::Residual;
 use super::output_error::Identification;
+use crate::budget::Effect;
 use crate::candidate::ModelFit;
-use crate::estimate::Estimated;
+use crate::estimate::{Estimated, prose};
+use crate::verdict::{DOES_NOT_FIT, NO_MINIMUM};
 
 /// Points of a curve: more than a screen has pixels are not seen.
 const POINTS: usize = 700;
@@ -23,7 +23,7 @@ body{font:15px/1.5 system-ui,sans-serif;color:var(--ink);background:var(--paper)
 h1{font-size:1.5rem}h2{font-size:1.15rem;margin-top:2rem}
 .scroll{overflow-x:auto}table{border-collapse:collapse;font-variant-numeric:tabular-nums}
 th,td{padding:.2rem .7rem;border-bottom:1px solid var(--rule);text-align:right;white-space:nowrap}
-th:first-child,td:first-child{text-align:left}td.text{white-space:normal;text-align:left}
+th:first-child,td:first-child{text-align:left}
 th{color:var(--soft);font-weight:500}.doubt{background:var(--warn);padding:.5rem .8rem;border-radius:4px}
 svg{width:100%;min-width:40rem;height:auto;display:block;margin:.6rem 0}
 svg text{fill:var(--ink);font:12px system-ui,sans-serif}svg .tick,svg .label{fill:var(--soft);font-size:11px}
@@ -33,50 +33,50 @@ details{margin:.6rem 0}summary{cursor:pointer}
 
 /// The page.
 pub fn of(found: &Identification) -> String {
-    let mut out = String::new();
-    let _ = write!(
-        out,
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-         <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\
-         <title>Identification</title><style>{STYLE}</style></head><body>\n<h1>Identification</h1>\n"
-    );
-    verdict(&mut out, found);
-    parameters(&mut out, found);
-    for signals in &found.residuals {
-        let _ = writeln!(out, "<h2>{}</h2>", escape(&signals.name));
-        // on a narrow screen a figure scrolls, as a table does, instead of having letters that nobody can read
-        for chart in
-            [envelope(signals), stretch(signals), spectrum(signals, found.details.fit.noise_white)]
-        {
-            let _ = writeln!(out, "<div class=\"scroll\">{}</div>", chart.svg());
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width,initial-scale=1";
+                title { "Identification" }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                h1 { "Identification" }
+                (verdict(found))
+                (parameters(found))
+                @for signals in &found.residuals {
+                    h2 { (signals.name) }
+                    // on a narrow screen a chart scrolls, as a table does, instead of having letters that nobody can read
+                    @for chart in [envelope(signals), stretch(signals), spectrum(signals, found.details.fit.noise_white)] {
+                        div class="scroll" { (PreEscaped(chart.svg())) }
+                    }
+                }
+                (models(&found.details.models))
+                (correlations(found))
+                (budget(found))
+                h2 { "What was done" }
+                ol { @for line in &found.done { li { (line) } } }
+            }
         }
-    }
-    models(&mut out, &found.details.models);
-    correlations(&mut out, found);
-    budget(&mut out, found);
-    let _ = write!(out, "<h2>What was done</h2>\n<ol>");
-    for line in &found.done {
-        let _ = write!(out, "<li>{}</li>", escape(line));
-    }
-    out.push_str("</ol>\n</body></html>\n");
-    out
+    };
+    page.into_string()
 }
 
-fn verdict(out: &mut String, found: &Identification) {
-    let fine = found.described == Some(true) && found.converged;
-    if fine {
-        let _ = writeln!(
-            out,
-            "<p>The model {} with {} friction leaves the gyro's noise alone, {:.2e} rad/s a row.</p>",
-            escape(&found.details.fit.model),
-            escape(&found.details.fit.friction),
-            found.details.fit.noise_white
-        );
-    }
-    for line in &found.verdict {
-        let doubt = line.starts_with("NOT DESCRIBED") || line.starts_with("The search did not");
-        let class = if doubt { " class=\"doubt\"" } else { "" };
-        let _ = writeln!(out, "<p{class}>{}</p>", escape(line));
+fn verdict(found: &Identification) -> Markup {
+    let fit = &found.details.fit;
+    html! {
+        @if found.fits == Some(true) && found.converged {
+            p {
+                (format!("The model {} with {} friction fits: its residual is the gyro's noise, {:.2e} rad/s a row.",
+                    fit.model, fit.friction, fit.noise_white))
+            }
+        }
+        @for line in &found.verdict {
+            @let doubt = [DOES_NOT_FIT, NO_MINIMUM].iter().any(|words| line.starts_with(words));
+            p class=[doubt.then_some("doubt")] { (line) }
+        }
     }
 }
 
@@ -86,40 +86,38 @@ fn digits(value: f64, deviation: f64) -> String {
     format!("{value:.*}", places.clamp(0.0, 12.0) as usize)
 }
 
-fn parameters(out: &mut String, found: &Identification) {
-    out.push_str(
-        "<h2>Parameters</h2>\n<div class=\"scroll\"><table><tr><th>name</th><th>value</th>\
-         <th>standard deviation</th><th>%</th><th>by noise alone</th><th>95 % interval</th><th>unit</th></tr>\n",
-    );
-    let row = |out: &mut String, name: &str, p: &Estimated| {
-        let _ = writeln!(
-            out,
-            "<tr><td>{}</td><td>{}</td><td>{:.1e}</td><td>{:.3}</td><td>{:.1e}</td><td>{} to {}</td><td>{}</td></tr>",
-            escape(name),
+fn table<'a>(
+    head: impl IntoIterator<Item = &'a str>,
+    rows: impl IntoIterator<Item = Vec<String>>,
+) -> Markup {
+    html! {
+        div class="scroll" {
+            table {
+                tr { @for cell in head { th { (cell) } } }
+                @for row in rows { tr { @for cell in row { td { (cell) } } } }
+            }
+        }
+    }
+}
+
+fn parameters(found: &Identification) -> Markup {
+    let row = |(name, p): (&String, &Estimated)| {
+        vec![
+            name.clone(),
             digits(p.value, p.std),
-            p.std,
-            100.0 * p.std / p.value.abs(),
-            p.std_noise,
-            digits(p.interval[0], p.std),
-            digits(p.interval[1], p.std),
-            escape(&p.unit)
-        );
+            format!("{:.1e}", p.std),
+            format!("{:.3}", 100.0 * p.std / p.value.abs()),
+            format!("{:.1e}", p.std_noise),
+            format!("{} to {}", digits(p.interval[0], p.std), digits(p.interval[1], p.std)),
+            prose(&p.unit),
+        ]
     };
-    for (name, p) in found.parameters.iter().chain(&found.measurement) {
-        row(out, name, p);
-    }
-    for c in &found.details.combinations {
-        let ends = [c.value - 1.96 * c.std, c.value + 1.96 * c.std];
-        let p = Estimated {
-            value: c.value,
-            std: c.std,
-            std_noise: c.std,
-            interval: ends,
-            unit: c.unit.clone(),
-        };
-        row(out, &c.name, &p);
-    }
-    out.push_str("</table></div>\n");
+    let head =
+        ["name", "value", "standard deviation", "%", "by noise alone", "95 % interval", "unit"];
+    let sums = found.details.combinations.iter();
+    let sums = sums.map(|c| row((&c.name, &Estimated::normal(c.value, c.std, &c.unit))));
+    let rows = found.parameters.iter().chain(&found.measurement).map(row).chain(sums);
+    html! { h2 { "Parameters" } (table(head, rows)) }
 }
 
 fn axis_chart(title: &str, x: &str, y: &str, series: Vec<Series>, logarithmic: bool) -> Chart {
@@ -162,7 +160,7 @@ fn envelope(signals: &Residual) -> Chart {
         series(windows(&simulated, false), "a", Style::Dashed, "simulated, peak"),
         series(windows(&|i| signals.residual[i], true), "b", Style::Line, "residual, rms"),
     ];
-    axis_chart("Rate of the hub and what the model leaves", "time, s", "rad/s", lines, true)
+    axis_chart("Rate of the hub and residual", "time, s", "rad/s", lines, true)
 }
 
 /// The stretch around the fastest motion, row by row.
@@ -214,76 +212,73 @@ fn spectrum(signals: &Residual, white: f64) -> Chart {
     axis_chart("Amplitude density", "frequency, Hz", "rad/s/√Hz", lines, true)
 }
 
-fn models(out: &mut String, models: &[ModelFit]) {
-    out.push_str(
-        "<h2>Models</h2>\n<div class=\"scroll\"><table><tr><th>slosh</th><th>friction</th><th>fit, %</th><th>BIC less the best</th>\
-         <th>worst residual test</th><th>of recordings held back, %</th><th>simulations</th></tr>\n",
-    );
+fn models(models: &[ModelFit]) -> Markup {
     let best = models.iter().map(|m| m.bic).fold(f64::INFINITY, f64::min);
-    for m in models {
+    let row = |m: &ModelFit| {
         let worst = m.tests.iter().map(|t| t.worst()).fold(0.0, f64::max);
         let held: Vec<String> = m.validation_pct.iter().map(|v| format!("{v:.3}")).collect();
-        let _ = writeln!(
-            out,
-            "<tr><td>{}</td><td>{}</td><td>{:.3}</td><td>{:.1}</td><td>{worst:.1}</td><td>{}</td><td>{}</td></tr>",
-            escape(&m.model),
-            escape(&m.friction),
-            m.fit_pct,
-            m.bic - best,
+        vec![
+            m.model.clone(),
+            m.friction.clone(),
+            format!("{:.3}", m.fit_pct),
+            format!("{:.1}", m.bic - best),
+            format!("{worst:.1}"),
             held.join(", "),
-            m.simulations
-        );
-    }
-    out.push_str("</table></div>\n");
+            m.simulations.to_string(),
+        ]
+    };
+    let head = [
+        "slosh",
+        "friction",
+        "fit, %",
+        "BIC less the best",
+        "worst residual test",
+        "of recordings held back, %",
+        "simulations",
+    ];
+    html! { h2 { "Models" } (table(head, models.iter().map(row))) }
 }
 
-fn correlations(out: &mut String, found: &Identification) {
+fn correlations(found: &Identification) -> Markup {
     let (names, matrix) = &found.correlations;
-    let _ = write!(
-        out,
-        "<h2>Correlations</h2>\n<p>Condition number of the sensitivities: {:.0}.</p>\n\
-         <div class=\"scroll\"><table><tr><th></th>",
-        found.details.condition
-    );
-    for name in names {
-        let _ = write!(out, "<th>{}</th>", escape(name));
-    }
-    out.push_str("</tr>\n");
-    for (name, row) in names.iter().zip(matrix) {
-        let _ = write!(out, "<tr><td>{}</td>", escape(name));
-        for value in row {
-            // the ink grows with the correlation
-            let share = (value.abs() * 60.0) as i32;
-            let color = if *value < 0.0 { "b" } else { "a" };
-            let _ = write!(
-                out,
-                "<td style=\"background:color-mix(in srgb,var(--{color}) {share}%,transparent)\">{value:.3}</td>"
-            );
+    // the ink grows with the correlation
+    let style = |value: f64| {
+        let (share, color) = ((value.abs() * 60.0) as i32, if value < 0.0 { "b" } else { "a" });
+        format!("background:color-mix(in srgb,var(--{color}) {share}%,transparent)")
+    };
+    html! {
+        h2 { "Correlations" }
+        p { (format!("Condition number of the sensitivities: {:.0}.", found.details.condition)) }
+        div class="scroll" {
+            table {
+                tr { th {} @for name in names { th { (name) } } }
+                @for (name, row) in names.iter().zip(matrix) {
+                    tr {
+                        td { (name) }
+                        @for value in row { td style=(style(*value)) { (format!("{value:.3}")) } }
+                    }
+                }
+            }
         }
-        out.push_str("</tr>\n");
     }
-    out.push_str("</table></div>\n");
 }
 
-fn budget(out: &mut String, found: &Identification) {
-    out.push_str(
-        "<h2>Error budget</h2>\n<p>What an error of something that is not estimated would do to each estimate, in %.</p>\n\
-         <div class=\"scroll\"><table><tr><th>wrong</th>",
-    );
-    for name in found.parameters.keys() {
-        let _ = write!(out, "<th>{}</th>", escape(name));
-    }
-    out.push_str("</tr>\n");
-    for effect in &found.details.error_budget {
-        let _ = write!(out, "<tr><td>{}</td>", escape(&effect.source));
-        for (name, p) in &found.parameters {
+fn budget(found: &Identification) -> Markup {
+    let row = |effect: &Effect| {
+        let mut cells = vec![effect.source.clone()];
+        cells.extend(found.parameters.iter().map(|(name, p)| {
             let change = effect.change.get(name).copied().unwrap_or(0.0);
-            let _ = match name.as_str() {
-                "friction.asymmetry" => write!(out, "<td>{change:+.4} abs.</td>"),
-                _ => write!(out, "<td>{:+.3}</td>", 100.0 * change / p.value),
-            };
-        }
-        out.push_str("</tr>\n");
+            match name.as_str() {
+                "friction.asymmetry" => format!("{change:+.4} abs."),
+                _ => format!("{:+.3}", 100.0 * change / p.value),
+            }
+        }));
+        cells
+    };
+    let head = std::iter::once("wrong").chain(found.parameters.keys().map(String::as_str));
+    html! {
+        h2 { "Error budget" }
+        p { "What an error of something that is not estimated would do to each estimate, in %." }
+        (table(head, found.details.error_budget.iter().map(row)))
     }
-    out.push_str("</table></div>\n");
 }

@@ -16,15 +16,13 @@ use analysis::linear::{Linear, Mode};
 use analysis::transfer_function::fit_time;
 use anyhow::{Result, ensure};
 use formulas::cylinder::{Pendulum, pendulum};
-use serde::Serialize;
 
-use crate::least_squares::{differences, minimise};
-use crate::nominal::Bench;
-use crate::recording::Recording;
+use analysis::least_squares::{differences, minimise};
+use identify::nominal::Bench;
+use identify::recording::Recording;
 
 /// Friction as it is known beforehand, SI.
 #[derive(Clone, Copy, Debug)]
-#[allow(missing_docs)]
 pub struct Friction {
     pub b: f64,
     pub c: f64,
@@ -43,39 +41,25 @@ impl Friction {
     }
 }
 
-/// The result.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub struct Found {
-    /// tank.d, m.
-    pub d: f64,
-    /// tank.h, m.
-    pub h: f64,
-    /// slosh.zeta.
-    pub zeta: f64,
-    /// Fit of the rate, %: 100 (1 − |y − ŷ|/|y − mean y|).
-    pub fit_pct: f64,
-    /// Fit with the start's d, h and ζ, %.
-    pub fit_of_start_pct: f64,
-}
-
 /// The linear bench without friction.
 fn bench_of(hub_inertia: f64, (d, h, zeta): (f64, f64, f64), bench: Bench) -> Linear {
-    let liquid = bench.density * PI / 4.0 * d * d * h;
+    let liquid = bench.liquid(d, h);
     let Pendulum { mass, length, .. } = pendulum(0, d, h, liquid);
     let frequency = (bench.gravity / length).sqrt() / (2.0 * PI);
-    let inertia = hub_inertia + (liquid - mass) * bench.arm.powi(2);
+    let inertia = hub_inertia + bench.inertia(liquid - mass);
     let modes = vec![Mode { mass, frequency, damping: zeta }];
     Linear { inertia, friction: 0.0, arm: bench.arm, modes }
 }
 
-/// Fits d, h and ζ from a start, the hub's inertia and the friction being known.
+/// Fits d, h and ζ from a start, the hub's inertia and the friction being known: the fit of the rate, %,
+/// 100 (1 − |y − ŷ|/|y − mean y|).
 pub fn identify(
     recording: &Recording,
     friction: Friction,
     hub_inertia: f64,
     start: (f64, f64, f64),
     bench: Bench,
-) -> Result<Found> {
+) -> Result<f64> {
     let (step, torque, rate) = recording.even();
     let actual: Vec<f64> =
         torque.iter().zip(&rate).map(|(tau, w)| tau + friction.torque(*w)).collect();
@@ -87,14 +71,8 @@ pub fn identify(
         simulated(x).iter().zip(&rate).map(|(model, w)| model - w).collect()
     };
     let x = [start.0.ln(), start.1.ln(), start.2.ln()];
-    let derivatives = |x: &[f64]| differences(&residuals, x, &[1e-5; 3]);
+    let derivatives = |x: &[f64]| Some(differences(&residuals, x, &[1e-5; 3]));
     let found = minimise(&residuals, &derivatives, &x).x;
     ensure!(found.iter().all(|x| x.is_finite()), "{}: the search failed", recording.name);
-    Ok(Found {
-        d: found[0].exp(),
-        h: found[1].exp(),
-        zeta: found[2].exp(),
-        fit_pct: fit_time(&rate, &simulated(&found)),
-        fit_of_start_pct: fit_time(&rate, &simulated(&x)),
-    })
+    Ok(fit_time(&rate, &simulated(&found)))
 }

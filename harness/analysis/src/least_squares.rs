@@ -5,8 +5,8 @@ use nalgebra::{DMatrix, DVector, Dyn, storage::Owned};
 
 /// Residuals at x.
 pub type Residuals<'a> = &'a dyn Fn(&[f64]) -> Vec<f64>;
-/// Their derivatives at x, a row for each residual.
-pub type Derivatives<'a> = &'a dyn Fn(&[f64]) -> DMatrix<f64>;
+/// Their derivatives at x, a row for each residual; `None` ends the search.
+pub type Derivatives<'a> = &'a dyn Fn(&[f64]) -> Option<DMatrix<f64>>;
 
 /// Where the sum of squares is least.
 #[derive(Clone, Debug)]
@@ -15,19 +15,36 @@ pub struct Minimum {
     pub x: Vec<f64>,
     /// Sum of squares.
     pub cost: f64,
-    /// Why the search ended is a minimum, not the end of patience.
+    /// The search ended at a minimum, not at the end of its patience.
     pub converged: bool,
+    /// Why it ended.
+    pub reason: String,
 }
 
 /// The minimum of the sum of squares near `x`.
 pub fn minimise(residuals: Residuals, derivatives: Derivatives, x: &[f64]) -> Minimum {
+    minimise_by(&tolerances(1e-9, 1e-9), residuals, derivatives, x)
+}
+
+/// The method with tolerances of the sum of squares and of x, both relative.
+pub fn tolerances(cost: f64, x: f64) -> LevenbergMarquardt<f64> {
+    LevenbergMarquardt::new().with_ftol(cost).with_xtol(x)
+}
+
+/// The same with other tolerances. Derivatives are asked for where residuals were last, if at all.
+pub fn minimise_by(
+    method: &LevenbergMarquardt<f64>,
+    residuals: Residuals,
+    derivatives: Derivatives,
+    x: &[f64],
+) -> Minimum {
     let search = Search { residuals, derivatives, x: DVector::from_column_slice(x) };
-    let (search, report) =
-        LevenbergMarquardt::new().with_ftol(1e-9).with_xtol(1e-9).minimize(search);
+    let (search, report) = method.minimize(search);
     Minimum {
         x: search.x.as_slice().to_vec(),
         cost: 2.0 * report.objective_function,
         converged: report.termination.was_successful(),
+        reason: format!("{:?}", report.termination),
     }
 }
 
@@ -70,7 +87,7 @@ impl LeastSquaresProblem<f64, Dyn, Dyn> for Search<'_> {
     }
 
     fn jacobian(&self) -> Option<DMatrix<f64>> {
-        Some((self.derivatives)(self.x.as_slice()))
+        (self.derivatives)(self.x.as_slice())
     }
 }
 
@@ -81,8 +98,8 @@ mod tests {
     #[test]
     fn rosenbrocks_valley_ends_at_one_and_one() {
         let residuals = |x: &[f64]| vec![10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]];
-        let found =
-            minimise(&residuals, &|x| differences(&residuals, x, &[1e-5, 1e-5]), &[-1.2, 1.0]);
+        let derivatives = |x: &[f64]| Some(differences(&residuals, x, &[1e-5, 1e-5]));
+        let found = minimise(&residuals, &derivatives, &[-1.2, 1.0]);
         // no residual is left there: the last step is quadratic in the one before, of 1e-9 of x
         assert!(found.converged && (found.x[0] - 1.0).abs() + (found.x[1] - 1.0).abs() < 1e-8);
     }

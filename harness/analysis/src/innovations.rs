@@ -1,15 +1,15 @@
-//! Is what a model leaves the gyro's noise? Tests of the innovations (Ljung, System Identification,
+//! Is the residual of a model the gyro's noise? Tests of the innovations (Ljung, System Identification,
 //! chapter 16), which are white with unit variance if it is.
 //!
 //! * whiteness: Ljung and Box's Q of the autocorrelations up to [`LAGS`];
 //! * in time: power in windows of [`WINDOW`] rows against the white noise level, which a burst or a clipped
 //!   stretch raises;
 //! * in frequency: power in bands of the periodogram;
-//! * cross-correlation with the torque and with its square: what is left of the input is
+//! * cross-correlation with the torque and with its square: what depends on the input is
 //!   something the model does not do.
 //!
-//! Many rows make each test sensitive to effects of no importance; so the size of what is left
-//! is stated beside it, over the noise.
+//! Many rows make each test sensitive to effects of no importance; so the size of the excess
+//! is stated with them.
 
 use serde::Serialize;
 use signals::fourier::Forward;
@@ -37,8 +37,9 @@ pub struct Tests {
     pub torque: f64,
     /// Largest cross-correlation with the torque's square.
     pub torque_squared: f64,
-    /// Root mean square of what is left in the worst band beyond the noise, rad/s.
-    pub left: f64,
+    /// Root mean square of the residual in the worst band beyond the noise, rad/s.
+    #[serde(rename = "left")]
+    pub excess: f64,
 }
 
 impl Tests {
@@ -61,7 +62,7 @@ impl Tests {
         let e: Vec<f64> = e.iter().map(|v| v - mean).collect();
         let power = e.iter().map(|v| v * v).sum::<f64>() / count;
         if power < 0.01 {
-            // a tenth of the least noise that is reckoned with (noise::FLOOR): nothing is left
+            // a tenth of the least noise that is reckoned with ([`crate::gauss_markov::FLOOR`]): no residual
             return Tests::default();
         }
         let q: f64 = (1..=LAGS.min(e.len() - 1))
@@ -84,7 +85,6 @@ impl Tests {
             bands.iter().enumerate().map(|(k, p)| (*p, (k as f64 + 0.5) * width)).collect();
         let in_frequency = worst(&mut levels, (1.0 / per_band).sqrt());
         let excess: f64 = bands.iter().map(|p| (p - median(&bands)).max(0.0)).fold(0.0, f64::max);
-        let left = white * (excess / bands.len() as f64).sqrt();
         let squared: Vec<f64> = torque.iter().map(|t| t * t).collect();
         Tests {
             whiteness: normal(q, LAGS as f64),
@@ -92,7 +92,7 @@ impl Tests {
             in_frequency,
             torque: crossed(&e, torque, step),
             torque_squared: crossed(&e, &squared, step),
-            left,
+            excess: white * (excess / bands.len() as f64).sqrt(),
         }
     }
 }
@@ -157,8 +157,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn white_noise_passes_and_what_is_left_of_a_signal_does_not() {
-        let mut random = analysis::random::Random::new(5, 0);
+    fn white_noise_passes_and_a_residual_signal_does_not() {
+        let mut random = crate::random::Random::new(5, 0);
         let time: Vec<f64> = (0..50_000).map(|k| 0.02 * f64::from(k)).collect();
         let torque: Vec<f64> = time.iter().map(|t| 0.1 * (t * (8.0 + 0.005 * t)).sin()).collect();
         let white: Vec<f64> = time.iter().map(|_| random.normal()).collect();

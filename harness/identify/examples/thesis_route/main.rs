@@ -1,5 +1,5 @@
-//! The thesis's way to tank parameters in the time domain beside ours, on the same recordings of the FMU:
-//! friction outside of the equations (`identify::compensation`) against friction inside
+//! The thesis's way to tank parameters in the time domain compared with ours, on the same recordings of the FMU:
+//! friction outside of the equations (`compensation.rs`) against friction inside
 //! (`hubslosh identify`).
 //!
 //! ```text
@@ -13,11 +13,14 @@
 
 use experiments::profile::Torque;
 use host::fmi2::Fmu;
-use identify::compensation::{self, Friction};
 use identify::methods::output_error::identify;
 use identify::nominal::Bench;
 use identify::options::Options;
 use identify::twin::{self, SensorErrors};
+
+mod compensation;
+
+use compensation::Friction;
 
 fn main() -> anyhow::Result<()> {
     let duration: f64 = std::env::args().nth(1).unwrap_or("2700".into()).parse()?;
@@ -53,8 +56,8 @@ fn main() -> anyhow::Result<()> {
         let ours = identify(&fmu, &[recording], &options, &mut |_| {})?;
         println!(
             "{name:24} {thesis:>8} {:>12.2} {:>12.2} {:>10.3} {:>9.3} {:>9.1}",
-            plain.fit_pct,
-            banded.fit_pct,
+            plain,
+            banded,
             ours.details.fit.fit_pct,
             1e3 * ours.parameters["tank.d"].value,
             ours.details.seconds
