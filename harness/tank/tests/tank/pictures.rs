@@ -3,7 +3,38 @@
 use std::path::Path;
 
 use hubslosh_tank::sweep::sweep;
+use hubslosh_tank::third_order::Overlaps;
 use hubslosh_tank::{Tank, picture, table};
+
+/// A drawing and the file that it is committed as; with `HUBSLOSH_DRAW` set it is written instead, to be looked at.
+fn is_drawn(svg: &str, file: &str) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
+    if std::env::var_os("HUBSLOSH_DRAW").is_some() {
+        std::fs::write(&path, svg).unwrap();
+    }
+    let committed = std::fs::read_to_string(&path).unwrap();
+    let differs = committed.lines().zip(svg.lines()).find(|(a, b)| a != b);
+    assert!(committed == svg, "{file}: {differs:?}");
+}
+
+#[test]
+fn the_documentation_s_figure_is_the_one_that_is_drawn() {
+    let svg = picture::third_order(&Overlaps::new(40));
+    is_drawn(&svg, "../../modelDescription/HubSlosh/documentation/liquid.svg");
+}
+
+/// A tank with a dome, its modes and its sweep, as somebody has looked at them.
+#[test]
+fn a_tank_and_its_sweep_look_as_before() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/common_bulkhead.toml");
+    let tank = Tank::read(&path).unwrap();
+    let depth = tank.depth().unwrap();
+    let data = tank.solve(0.55 * depth, 3).unwrap();
+    is_drawn(&picture::tank(&tank, &data, 9.80665), "tests/tank/drawn/tank.svg");
+    let fills: Vec<f64> = (1..10).map(|i| 0.1 * depth * f64::from(i)).collect();
+    let swept = sweep(&tank, &fills, 3).unwrap();
+    is_drawn(&picture::sweep(&tank, &swept, 9.80665), "tests/tank/drawn/sweep.svg");
+}
 
 /// An axis has some length where all its values are the same: frequencies without gravity, hinges at a sphere's centre.
 #[test]
