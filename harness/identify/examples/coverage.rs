@@ -14,10 +14,10 @@
 //!   starts=data         or far: all starts 40 % off, up or down by the seed's bits
 //!   perfect=true        no delay, bias, asymmetry, gyro scale is estimated (false: all are)
 //!   sensor_errors=false         true: 5 ms delay, gyro scale 1.01, bias 2 mrad/s, asymmetry 0.1 in the twin
-//!   blind=              tilt, nutation, warming, clipping, with + between several
+//!   unmodelled=         tilt, nutation, warming, clipping, with + between several
 //!   rate=50             rows a second
 //!   gyro=50             values of the gyro a second, where it is slower than the rows
-//!   between=lines       what the twin's torque does between rows: lines, held, smooth
+//!   intersample=linear  of the twin's torque: linear, held, smooth
 //!   say=false           true: the verdict of every seed
 //! ```
 
@@ -32,7 +32,7 @@ use identify::options::Options;
 use identify::recording;
 use identify::simulate::Intersample;
 use identify::start::PARAMETERS;
-use identify::twin::{self, Blind, SensorErrors, Twin};
+use identify::twin::{self, SensorErrors, Twin, Unmodelled};
 
 /// What the command line asks for.
 struct Arguments {
@@ -94,8 +94,9 @@ fn arguments() -> Result<Arguments> {
                 (asked.options.sensor_errors, asked.options.gyro_scale) = (true, 0.01);
             }
             "sensor_errors" => {}
-            "blind" => {
-                asked.twin.blind = value.split('+').map(Blind::named).collect::<Result<_>>()?
+            "unmodelled" => {
+                asked.twin.unmodelled =
+                    value.split('+').map(Unmodelled::named).collect::<Result<_>>()?
             }
             "rate" => asked.twin.rate = value.parse()?,
             "gyro" => asked.twin.gyro = Some(value.parse()?),

@@ -20,13 +20,13 @@ pub struct Effect {
     pub change: BTreeMap<String, f64>,
 }
 
-/// What may be wrong.
-struct Wrong {
-    source: &'static str,
+/// A source of error: what may be wrong.
+struct Source {
+    name: &'static str,
     settings: Vec<(String, String)>,
     /// Factor of the torque.
     gain: f64,
-    /// How much of what `source` says is tried; the estimates' change is taken as proportional.
+    /// How much of what `name` says is tried; the estimates' change is taken as proportional.
     part: f64,
     /// The torque is held between rows where it was taken as linear, or the reverse.
     swap: bool,
@@ -52,12 +52,12 @@ pub fn of(
 ) -> Result<Vec<Effect>> {
     let base = problem.stacked(answer, x);
     let mut effects = Vec::new();
-    for wrong in list(problem)? {
+    for source in list(problem)? {
         let mut recordings = problem.recordings.to_vec();
-        recordings.iter_mut().flat_map(|r| &mut r.torque).for_each(|t| *t *= wrong.gain);
+        recordings.iter_mut().flat_map(|r| &mut r.torque).for_each(|t| *t *= source.gain);
         let mut other = Problem { recordings: &recordings, ..problem.clone() };
-        other.setup.settings.extend(wrong.settings);
-        if wrong.swap {
+        other.setup.settings.extend(source.settings);
+        if source.swap {
             other.setup.intersample = match problem.setup.intersample {
                 Intersample::ZeroOrderHold => Intersample::FirstOrderHold,
                 Intersample::FirstOrderHold | Intersample::BandLimited => {
@@ -86,16 +86,16 @@ pub fn of(
         let values = problem.values(x).into_iter().zip(problem.values(&there));
         let change = problem.unknowns.iter().zip(values);
         let change =
-            change.map(|(u, (before, after))| (u.quantity.name(), (after - before) / wrong.part));
-        effects.push(Effect { source: wrong.source.into(), change: change.collect() });
+            change.map(|(u, (before, after))| (u.quantity.name(), (after - before) / source.part));
+        effects.push(Effect { source: source.name.into(), change: change.collect() });
     }
     Ok(effects)
 }
 
-fn list(problem: &Problem) -> Result<Vec<Wrong>> {
+fn list(problem: &Problem) -> Result<Vec<Source>> {
     let mut instance = nominal::initialised(problem.fmu, &problem.setup.settings)?;
-    let exact = |source, settings| Wrong { source, settings, gain: 1.0, part: 1.0, swap: false };
-    let small = |source, settings| Wrong { part: PART, ..exact(source, settings) };
+    let exact = |name, settings| Source { name, settings, gain: 1.0, part: 1.0, swap: false };
+    let small = |name, settings| Source { part: PART, ..exact(name, settings) };
     let mut list = Vec::new();
     if problem.index("slosh.zeta").is_some() {
         let mut set = |name: &str, change: &dyn Fn(f64) -> f64| -> Result<_> {
@@ -112,8 +112,8 @@ fn list(problem: &Problem) -> Result<Vec<Wrong>> {
             list.push(small("g_axial wrong by 0.1 %", gravity));
         }
     }
-    list.push(Wrong { gain: 1.0 + PART * 0.01, ..small("torque wrong by 1 %", vec![]) });
+    list.push(Source { gain: 1.0 + PART * 0.01, ..small("torque wrong by 1 %", vec![]) });
     let held = "torque held between rows instead of linear, or the reverse";
-    list.push(Wrong { swap: true, ..exact(held, vec![]) });
+    list.push(Source { swap: true, ..exact(held, vec![]) });
     Ok(list)
 }

@@ -40,7 +40,7 @@ pub struct ModelFit {
     pub validation_pct: Vec<f64>,
     /// The gyro's noise: white, rad/s.
     pub noise_white: f64,
-    /// Answers of the FMU that were needed.
+    /// Simulations that were needed.
     pub simulations: usize,
     /// Neither noise nor a small effect explains the residual.
     #[serde(skip)]
@@ -83,7 +83,7 @@ pub fn fit<'a>(
     (model, law): (&str, &str),
     starts: &[Start],
     from: Option<&Fitted<'a>>,
-    heard: &mut dyn FnMut(News),
+    progress: &mut dyn FnMut(News),
 ) -> Result<Fitted<'a>> {
     let of =
         |start: &Start, options: &Options| problem(fmu, recordings, options, (model, law), start);
@@ -105,7 +105,7 @@ pub fn fit<'a>(
         alone: options.models.iter().filter(|m| *m != "frozen").count() == 1,
         model,
         simulations: 0,
-        heard: &mut |line| heard(News::Detail(line)),
+        progress: &mut |line| progress(News::Detail(line)),
     };
     let sibling = from.map(|other| {
         let pair = (&*other.fit.model, model);
@@ -122,7 +122,7 @@ pub fn fit<'a>(
     let (mut problem, simulations) = (search.problem, search.simulations);
     problem.estimate_noise(&polished.answer);
     let fit = summary(&problem, &polished, options, (model, law), simulations)?;
-    heard(News::Step(fit.line()));
+    progress(News::Step(fit.line()));
     Ok(Fitted { problem, polished, fit, spread })
 }
 

@@ -112,7 +112,7 @@ pub struct Estimate {
     pub reason: String,
     /// Sensitivities near there.
     pub jacobian: Option<DMatrix<f64>>,
-    /// Answers of the FMU that were needed, all recordings together being one.
+    /// Simulations that were needed, of all recordings together.
     pub simulations: usize,
 }
 
@@ -131,7 +131,7 @@ pub struct Polished {
     pub cost: f64,
     /// Newton decrement: the distance to the minimum, in standard deviations.
     pub decrement: f64,
-    /// Answers of the FMU that were needed.
+    /// Simulations that were needed.
     pub simulations: usize,
 }
 
@@ -611,13 +611,13 @@ impl<'a> Problem<'a> {
     ///
     /// A start whose slosh frequency is 20 % off is out of phase after a few cycles; over a whole
     /// recording its error has as many minima as there are cycles. Over the beginning it has one,
-    /// and as the window grows the estimate stays within its reach. Where the residual of a window has [`LEAP`] times the
+    /// and as the window grows the estimate stays within its reach. Where the residual of a window has [`JUMP`] times the
     /// mean square of the one before (a resonance or rotary slosh has come into it), it is reached in smaller steps.
     pub fn search_growing(
         &self,
         x: &[f64],
         windows: &[f64],
-        heard: &mut dyn FnMut(String),
+        progress: &mut dyn FnMut(String),
     ) -> Result<Estimate> {
         let mut to_come: Vec<f64> = windows.iter().rev().copied().collect();
         let (mut from, mut jacobian, mut simulations) = (x.to_vec(), None, 0);
@@ -626,14 +626,14 @@ impl<'a> Problem<'a> {
         let mut careful = true;
         while let Some(window) = to_come.pop() {
             let (estimate, residual) = self.search_window(x, &from, window)?;
-            heard(format!(
+            progress(format!(
                 "window of {:.0} %: {}, {} simulations",
                 100.0 * window,
                 estimate.reason,
                 estimate.simulations
             ));
             simulations += estimate.simulations;
-            if let Some((reached, less, estimate)) = before.take_if(|b| residual > LEAP * b.1) {
+            if let Some((reached, less, estimate)) = before.take_if(|b| residual > JUMP * b.1) {
                 if window - reached > SHORTEST {
                     to_come.extend([window, 0.5 * (reached + window)]);
                     from.clone_from(&estimate);
@@ -646,14 +646,14 @@ impl<'a> Problem<'a> {
                 before = Some((window, residual, estimate.x.clone()));
             }
             from = estimate.x;
-            jacobian = estimate.jacobian.map(|jacobian| jacobian * BLUNT);
+            jacobian = estimate.jacobian.map(|jacobian| jacobian * NOISE_FACTOR);
         }
         Ok(Estimate { x: from, simulations, jacobian, reason: String::new() })
     }
 
     /// The search over a window of the recordings from x, and the residual's mean square. Each parameter is
-    /// also held near its first start ([`LOOSE`]), for a short window does not say everything, and what the
-    /// model cannot follow yet counts as noise of [`BLUNT`] times the gyro's.
+    /// also held near its first start ([`PRIOR_WIDTH`]), for a short window does not say everything, and what the
+    /// model cannot follow yet counts as noise of [`NOISE_FACTOR`] times the gyro's.
     fn search_window(&self, first: &[f64], x: &[f64], fraction: f64) -> Result<(Estimate, f64)> {
         let part: Vec<Recording> = self.recordings.iter().map(|r| r.beginning(fraction)).collect();
         let mut problem = Problem { recordings: &part, ..self.clone() };
@@ -661,17 +661,17 @@ impl<'a> Problem<'a> {
             if let Some(name) = unknown.quantity.parameter() {
                 // the friction's shape is left to the search that knows of its valleys
                 let shape = matches!(name, "friction.d" | "friction.omega_s");
-                let loose = if shape { 0.4 * LOOSE } else { LOOSE };
+                let width = if shape { 0.4 * PRIOR_WIDTH } else { PRIOR_WIDTH };
                 let value = unknown.scale.value(x);
                 let size = match unknown.scale {
                     Scale::Log | Scale::Softplus(_) => value,
                     Scale::Logit(..) | Scale::Linear(_) => unknown.scale.slope(x).abs(),
                 };
-                unknown.prior = Some((value, loose * size));
+                unknown.prior = Some((value, width * size));
             }
         }
         for channel in &mut problem.channels {
-            channel.noise.white *= BLUNT;
+            channel.noise.white *= NOISE_FACTOR;
         }
         let estimate = problem.search(x, 1e-3)?;
         let e = problem.stacked(&problem.answer(&estimate.x)?, &estimate.x);
@@ -705,10 +705,10 @@ pub const WINDOWS: [f64; 7] = [0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0];
 /// Windows for starts from the frequency response.
 pub const WHOLE: [f64; 1] = [1.0];
 /// By how much the noise of a window is taken for larger than the gyro's.
-const BLUNT: f64 = 10.0;
+const NOISE_FACTOR: f64 = 10.0;
 /// Mean square of a window's residual over that of the one before beyond which it is reached in smaller steps.
-const LEAP: f64 = 3.0;
+const JUMP: f64 = 3.0;
 /// Shortest step from one window to the next, as a fraction of the recordings.
 const SHORTEST: f64 = 0.05;
 /// How far a parameter may be from its start in a window, relatively.
-const LOOSE: f64 = 0.5;
+const PRIOR_WIDTH: f64 = 0.5;

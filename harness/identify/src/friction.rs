@@ -45,7 +45,7 @@ pub struct Point {
     pub cost: f64,
     /// Covariance of x at this ω_s; its own row and column are 0.
     pub covariance: DMatrix<f64>,
-    /// Answers of the FMU that were needed.
+    /// Simulations that were needed.
     pub simulations: usize,
 }
 

@@ -48,10 +48,10 @@ pub struct Search<'a, 'h> {
     pub alone: bool,
     /// Name of the model.
     pub model: &'h str,
-    /// Answers of the FMU so far.
+    /// Simulations so far.
     pub simulations: usize,
     /// Is told what happens.
-    pub heard: &'h mut dyn FnMut(String),
+    pub progress: &'h mut dyn FnMut(String),
 }
 
 /// A minimum that another model has near.
@@ -191,7 +191,7 @@ impl<'a> Search<'a, '_> {
     ) -> Result<Polished> {
         let polished = self.problem.polish(x, known, rounds)?;
         self.simulations += polished.simulations;
-        (self.heard)(format!(
+        (self.progress)(format!(
             "{}: {:.4} standard deviations from the minimum after {} simulations",
             self.model, polished.decrement, polished.simulations
         ));
@@ -207,10 +207,10 @@ impl<'a> Search<'a, '_> {
 
     /// From variables x, over windows; the noise is estimated on the way.
     fn windows(&mut self, x: &[f64], windows: &[f64]) -> Result<Found> {
-        let (label, heard) = (self.model, &mut *self.heard);
+        let (label, progress) = (self.model, &mut *self.progress);
         let rough = self
             .problem
-            .search_growing(x, windows, &mut |line| heard(format!("{label}: {line}")))?;
+            .search_growing(x, windows, &mut |line| progress(format!("{label}: {line}")))?;
         self.simulations += rough.simulations;
         let answer = self.problem.answer(&rough.x)?;
         self.problem.estimate_noise(&answer);
@@ -277,7 +277,7 @@ impl<'a> Search<'a, '_> {
             let e = problem.stacked(&answer, &x);
             let gradient = near.jacobian.tr_mul(&e);
             let cost = e.norm_squared() - gradient.dot(&(&near.covariance.x * &gradient));
-            (self.heard)(format!(
+            (self.progress)(format!(
                 "{}: torque {}, all free: sum of squares {cost:.1}, {} {:.1}",
                 self.model,
                 other.words(),
@@ -292,7 +292,7 @@ impl<'a> Search<'a, '_> {
             return Ok(false);
         }
         self.problem.setup.intersample = best.1;
-        (self.heard)(format!("{}: the torque is {}", self.model, best.1.words()));
+        (self.progress)(format!("{}: the torque is {}", self.model, best.1.words()));
         Ok(true)
     }
 
@@ -310,7 +310,7 @@ impl<'a> Search<'a, '_> {
         let points = friction::profile(&self.problem, &near, indices)?;
         self.simulations += points.iter().map(|p| p.simulations).sum::<usize>();
         for point in &points {
-            (self.heard)(format!(
+            (self.progress)(format!(
                 "{}: friction.omega_s held at {:.3e} rad/s, all else free: sum of squares {:.1}, all free {:.1}",
                 self.model, point.speed, point.cost, near.cost
             ));
@@ -325,7 +325,10 @@ impl<'a> Search<'a, '_> {
         }
         let spread = friction::spread(&self.problem, &points, &best);
         if spread.is_some() {
-            (self.heard)(format!("{}: several Stribeck speeds explain the recording", self.model));
+            (self.progress)(format!(
+                "{}: several Stribeck speeds explain the recording",
+                self.model
+            ));
         }
         Ok((best, spread))
     }
@@ -388,12 +391,12 @@ impl<'a> Search<'a, '_> {
             let is_due = self.is_due(attempt.when, &best);
             best.moved = false;
             if !is_due {
-                (self.heard)(format!("{label}: not made, only if {}", attempt.when.words()));
+                (self.progress)(format!("{label}: not made, only if {}", attempt.when.words()));
                 continue;
             }
             best.started |= matches!(attempt.from, From::Start(_));
             let before = self.problem.clone();
-            (self.heard)(format!("{label}: made, {}", attempt.when.words()));
+            (self.progress)(format!("{label}: made, for {}", attempt.when.words()));
             let said = match self.attempt(attempt, best.found.as_ref(), sibling) {
                 Ok(found) => {
                     let (accepted, why) =
@@ -404,7 +407,7 @@ impl<'a> Search<'a, '_> {
                     } else {
                         self.problem = before;
                     }
-                    format!("{}, {why}", if accepted { "accepted" } else { "refused" })
+                    format!("{} {why}", if accepted { "accepted," } else { "refused," })
                 }
                 Err(error) => {
                     self.problem = before;
@@ -413,7 +416,7 @@ impl<'a> Search<'a, '_> {
                     said
                 }
             };
-            (self.heard)(format!("{}, attempt {}: {said}", self.model, number + 1));
+            (self.progress)(format!("{}, attempt {}: {said}", self.model, number + 1));
         }
         match (best.found, failed) {
             (Some(best), _) => Ok(best),
@@ -444,7 +447,7 @@ impl<'a> Search<'a, '_> {
         let values = self.problem.unknowns.iter().zip(self.problem.values(&x));
         let free: Vec<String> =
             values.map(|(u, value)| format!("{} {value:.4e}", u.quantity.name())).collect();
-        (self.heard)(format!("{}: free, from {}", self.model, free.join(", ")));
+        (self.progress)(format!("{}: free, from {}", self.model, free.join(", ")));
         let near = match attempt.how {
             How::Windows(windows) => return self.windows(&x, windows),
             How::Steps(rounds) => self.polish(&x, known, rounds)?,
@@ -501,18 +504,18 @@ impl<'a> Search<'a, '_> {
         best: Option<&Found>,
     ) -> (bool, String) {
         let Some(best) = best else {
-            return (true, "the first".into());
+            return (true, "for it is the first".into());
         };
         let fits = [(&self.problem, found), (before, best)];
         let [fit, fit_before] = fits.map(|(problem, found)| fit_pct(problem, &found.0.answer));
         let (cost, cost_before) = (found.0.cost, best.0.cost);
         match rule {
             Accept::LessCost => {
-                let why = format!("sum of squares {cost:.1}, before {cost_before:.1}");
+                let why = format!("for the sum of squares is {cost:.1}, before {cost_before:.1}");
                 (cost < cost_before, why)
             }
             Accept::BetterFit => {
-                (fit > fit_before, format!("fit {fit:.3} %, before {fit_before:.3} %"))
+                (fit > fit_before, format!("for the fit is {fit:.3} %, before {fit_before:.3} %"))
             }
         }
     }

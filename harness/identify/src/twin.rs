@@ -30,7 +30,7 @@ impl Default for SensorErrors {
 
 /// What a bench may do and no model that is tried does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Blind {
+pub enum Unmodelled {
     /// The bearing's axis leans by 1°: gravity turns hub and liquid back to where they began.
     Tilt,
     /// The hub rocks at [`ROCKING`] under the wheel's torque, and the gyro sees some of it.
@@ -52,17 +52,14 @@ const WARM: f64 = 0.3;
 /// Time constant of warming up, s.
 const WARMING: f64 = 600.0;
 
-impl Blind {
-    /// All of them.
-    pub const ALL: [Blind; 4] = [Blind::Tilt, Blind::Nutation, Blind::Warming, Blind::Clipping];
-
+impl Unmodelled {
     /// By its name: tilt, nutation, warming or clipping.
     pub fn named(name: &str) -> Result<Self> {
         Ok(match name {
-            "tilt" => Blind::Tilt,
-            "nutation" => Blind::Nutation,
-            "warming" => Blind::Warming,
-            "clipping" => Blind::Clipping,
+            "tilt" => Unmodelled::Tilt,
+            "nutation" => Unmodelled::Nutation,
+            "warming" => Unmodelled::Warming,
+            "clipping" => Unmodelled::Clipping,
             _ => bail!("{name} is none of tilt, nutation, warming, clipping"),
         })
     }
@@ -97,7 +94,7 @@ pub struct Twin {
     /// What gyro and data link add.
     pub sensor_errors: SensorErrors,
     /// What the models do not have.
-    pub blind: Vec<Blind>,
+    pub unmodelled: Vec<Unmodelled>,
 }
 
 impl Default for Twin {
@@ -108,7 +105,7 @@ impl Default for Twin {
             gyro: None,
             intersample: Intersample::FirstOrderHold,
             sensor_errors: SensorErrors::default(),
-            blind: Vec::new(),
+            unmodelled: Vec::new(),
         }
     }
 }
@@ -123,10 +120,10 @@ impl Twin {
             set("imu.rate", self.gyro.unwrap_or(self.rate).to_string());
             set("imu.seed", seed.to_string());
         }
-        if self.blind.contains(&Blind::Tilt) {
+        if self.unmodelled.contains(&Unmodelled::Tilt) {
             set("bench.tilt", 1f64.to_radians().to_string());
         }
-        if self.blind.contains(&Blind::Clipping) {
+        if self.unmodelled.contains(&Unmodelled::Clipping) {
             let largest = torque.iter().fold(0.0, |m: f64, t| m.max(t.abs()));
             set("wheel.enabled", "true".into());
             set("wheel.tau_max", (0.9 * largest).to_string());
@@ -184,7 +181,7 @@ impl Twin {
             if part == 0 {
                 let mut now = [0.0; 2];
                 instance.get_real(&read, &mut now)?;
-                let seen = match self.blind.contains(&Blind::Nutation) {
+                let seen = match self.unmodelled.contains(&Unmodelled::Nutation) {
                     true => ROCKING_SEEN * rocking.step(now[1], step),
                     false => 0.0,
                 };
@@ -193,7 +190,7 @@ impl Twin {
                 if row == rows {
                     return Ok(None);
                 }
-                if self.blind.contains(&Blind::Warming) && row % 50 == 0 {
+                if self.unmodelled.contains(&Unmodelled::Warming) && row % 50 == 0 {
                     let part = 1.0 - WARM * (1.0 - (-(time[row] - start) / WARMING).exp());
                     let warm: Vec<f64> = cold.iter().map(|value| value * part).collect();
                     instance.set_real(&friction, &warm)?;

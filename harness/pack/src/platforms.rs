@@ -126,8 +126,8 @@ pub struct Built {
 /// Builds and checks the binaries of an FMU for all platforms. Before anything is built, everything
 /// that is missing is named; after, every fault of every binary.
 pub fn build(model: &Model) -> Result<Vec<Built>> {
-    let bench = Bench::look()?;
-    bench.check()?;
+    let toolchain = Toolchain::look()?;
+    toolchain.check()?;
     let mut faults = Vec::new();
     let mut all = Vec::new();
     for platform in &PLATFORMS {
@@ -136,7 +136,7 @@ pub fn build(model: &Model) -> Result<Vec<Built>> {
             .targets
             .iter()
             .map(|target| {
-                let path = project::cargo_build(bench.command(model, platform, target), false)
+                let path = project::cargo_build(toolchain.command(model, platform, target), false)
                     .with_context(|| format!("{} ({})", platform.folder, target.triple))?;
                 std::fs::read(&path).with_context(|| format!("{} cannot be read", path.display()))
             })
@@ -149,7 +149,7 @@ pub fn build(model: &Model) -> Result<Vec<Built>> {
         let wanted = [Fmu::symbols(), Fmu::step_symbols(), Fmu::exchange_symbols()].concat();
         let found = binary.faults(&wanted);
         faults.extend(found.iter().map(|fault| format!("\n  {}: {fault}", platform.folder)));
-        for folder in bench.private() {
+        for folder in toolchain.private() {
             if bytes.windows(folder.len()).any(|w| w == folder.as_bytes()) {
                 faults.push(format!("\n  {}: it names the folder {folder}", platform.folder));
             }
@@ -163,7 +163,7 @@ pub fn build(model: &Model) -> Result<Vec<Built>> {
 }
 
 /// Where this machine keeps what building needs.
-struct Bench {
+struct Toolchain {
     root: PathBuf,
     /// PATH with `target/tools/bin` in front.
     path: OsString,
@@ -175,7 +175,7 @@ struct Bench {
     home: String,
 }
 
-impl Bench {
+impl Toolchain {
     fn look() -> Result<Self> {
         let root = project::root();
         let tools = root.join("target").join("tools");
@@ -202,7 +202,7 @@ impl Bench {
         let home = env::var_os("CARGO_HOME")
             .map(PathBuf::from)
             .or_else(|| env::home_dir().map(|home| home.join(".cargo")));
-        Ok(Bench {
+        Ok(Toolchain {
             root,
             path: env::join_paths(folders).context("a folder on PATH has a strange name")?,
             sysroot,

@@ -19,15 +19,15 @@ const MEMORY: i64 = 500 << 20;
 const DISK: u64 = 100 << 20;
 
 /// The program, in a folder of its own with a folder for temporary files.
-struct Bench {
+struct Sandbox {
     directory: tempfile::TempDir,
 }
 
-impl Bench {
-    fn new() -> Bench {
-        let bench = Bench { directory: tempfile::tempdir().unwrap() };
-        std::fs::create_dir(bench.temporary()).unwrap();
-        bench
+impl Sandbox {
+    fn new() -> Sandbox {
+        let sandbox = Sandbox { directory: tempfile::tempdir().unwrap() };
+        std::fs::create_dir(sandbox.temporary()).unwrap();
+        sandbox
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -237,17 +237,17 @@ fn hostile_archives_and_descriptions_are_refused_by_every_command() {
         described(xml(&"<ScalarVariable/>".repeat(290_000))),
         "more like these",
     ));
-    let bench = Bench::new();
+    let sandbox = Sandbox::new();
     for (name, bytes, words) in &set {
-        std::fs::write(bench.path("a.fmu"), bytes).unwrap();
+        std::fs::write(sandbox.path("a.fmu"), bytes).unwrap();
         if *name != "a library outside" {
-            let said = bench.fails(&["variables", "--fmu", "a.fmu"]);
+            let said = sandbox.fails(&["variables", "--fmu", "a.fmu"]);
             assert!(said.contains(words), "{name}: {said}");
         }
         let run = ["run", "--profile", "zero", "--stop", "1", "--fmu", "a.fmu", "--out", "a.csv"];
-        let said = bench.fails(&run);
+        let said = sandbox.fails(&run);
         assert!(said.contains(words), "{name}: {said}");
-        let output = bench.hubslosh(&["check", "a.fmu"]);
+        let output = sandbox.hubslosh(&["check", "a.fmu"]);
         let report = String::from_utf8_lossy(&output.stdout).into_owned();
         assert_eq!(output.status.code(), Some(1), "{name}: {report}");
         assert!(taken_by_check.contains(name) || report.contains("error "), "{name}: {report}");
@@ -292,13 +292,13 @@ const LOUD: &str = "prints 1 GB";
 
 #[test]
 fn a_harmful_binary_ends_its_own_process_and_every_command_says_so() {
-    let bench = Bench::new();
-    std::fs::write(bench.path("plan.toml"), "title = \"a\"\nprofile = \"zero:duration=1\"\n")
+    let sandbox = Sandbox::new();
+    std::fs::write(sandbox.path("plan.toml"), "title = \"a\"\nprofile = \"zero:duration=1\"\n")
         .unwrap();
     for (harm, name) in HARMS.iter().enumerate() {
         for when in ["AT_LOAD", "AT_STEP"] {
             let fmu = format!("{harm}{when}.fmu");
-            std::fs::write(bench.path(&fmu), harmful(harm as u32 + 1, when)).unwrap();
+            std::fs::write(sandbox.path(&fmu), harmful(harm as u32 + 1, when)).unwrap();
             let what = format!("{name}, {when}");
             let run = [
                 "run",
@@ -325,18 +325,18 @@ fn a_harmful_binary_ends_its_own_process_and_every_command_says_so() {
                 "campaign",
                 "--force",
             ];
-            let output = bench.hubslosh(&["variables", "--fmu", &fmu]);
+            let output = sandbox.hubslosh(&["variables", "--fmu", &fmu]);
             assert!(output.status.success(), "{what}: a description is no binary");
             if *name == LOUD {
                 // a gigabyte through a pipe may take longer than the limit of the others
                 let patient: Vec<&str> =
                     run.iter().copied().filter(|a| !matches!(*a, "--call-limit" | "0.5")).collect();
-                let output = bench.hubslosh(&patient);
+                let output = sandbox.hubslosh(&patient);
                 let said = String::from_utf8_lossy(&output.stderr).into_owned();
                 assert!(output.status.success(), "{what}: {said}");
             } else {
                 for command in [&run[..], &campaign[..]] {
-                    let said = bench.fails(command);
+                    let said = sandbox.fails(command);
                     let told = said.contains("the FMU has ended the process")
                         || said.contains("has not returned within 0.5 s");
                     assert!(told, "{what}: {said}");
@@ -344,7 +344,7 @@ fn a_harmful_binary_ends_its_own_process_and_every_command_says_so() {
             }
             // the rules that see it; all of them would make every step of every rule wait
             let only = if when == "AT_LOAD" { "load" } else { "load,host.silent,steps.run" };
-            let output = bench.hubslosh(&["check", &fmu, "--limit", "1", "--only", only]);
+            let output = sandbox.hubslosh(&["check", &fmu, "--limit", "1", "--only", only]);
             let report = String::from_utf8_lossy(&output.stdout).into_owned();
             assert_eq!(output.status.code(), Some(1), "{what}: {report}");
             let told = ["the process ended", "no end after 1 s", "it prints"];
@@ -357,13 +357,13 @@ fn a_harmful_binary_ends_its_own_process_and_every_command_says_so() {
 #[test]
 fn what_loading_changes_for_the_host_is_told() {
     const FLUSH: u32 = 13;
-    let bench = Bench::new();
-    std::fs::write(bench.path("a.fmu"), harmful(FLUSH, "AT_LOAD")).unwrap();
-    let output = bench.hubslosh(&["check", "a.fmu", "--only", "host.untouched"]);
+    let sandbox = Sandbox::new();
+    std::fs::write(sandbox.path("a.fmu"), harmful(FLUSH, "AT_LOAD")).unwrap();
+    let output = sandbox.hubslosh(&["check", "a.fmu", "--only", "host.untouched"]);
     let report = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(report.contains("it changes the floating-point control"), "{report}");
     let run = ["run", "--profile", "zero", "--stop", "0.1", "--fmu", "a.fmu", "--out", "a.csv"];
-    let said = bench.hubslosh(&run).stderr;
+    let said = sandbox.hubslosh(&run).stderr;
     let said = String::from_utf8_lossy(&said);
     assert!(said.contains("warning: loading a.fmu has changed"), "{said}");
 }
@@ -371,9 +371,9 @@ fn what_loading_changes_for_the_host_is_told() {
 #[test]
 fn a_value_that_is_never_returned_ends_a_run_as_a_step_does() {
     const LOOP: u32 = 4;
-    let bench = Bench::new();
-    std::fs::write(bench.path("a.fmu"), harmful(LOOP, "AT_GET")).unwrap();
+    let sandbox = Sandbox::new();
+    std::fs::write(sandbox.path("a.fmu"), harmful(LOOP, "AT_GET")).unwrap();
     let run = ["run", "--call-limit", "0.5", "--profile", "zero", "--stop", "0.1"];
-    let said = bench.fails(&[&run[..], &["--fmu", "a.fmu", "--out", "a.csv"]].concat());
+    let said = sandbox.fails(&[&run[..], &["--fmu", "a.fmu", "--out", "a.csv"]].concat());
     assert!(said.contains("has not returned within 0.5 s"), "{said}");
 }

@@ -136,11 +136,11 @@ pub trait Method {
     /// What it needs of a [`Task`].
     const NEEDS: Needs;
 
-    /// Does it. `heard` is told what happens.
+    /// Does it. `progress` is told what happens.
     fn identify(
         &self,
         task: &Task,
-        heard: &mut dyn FnMut(&News),
+        progress: &mut dyn FnMut(&News),
     ) -> Result<Identified<Self::Details>>;
 
     /// Lines for a terminal, below the table of estimates.

@@ -60,15 +60,15 @@ impl Method for OutputError {
 
     const NEEDS: Needs = Needs { fmu: true, validation: true };
 
-    fn identify(&self, task: &Task, heard: &mut dyn FnMut(&News)) -> Result<Identification> {
+    fn identify(&self, task: &Task, progress: &mut dyn FnMut(&News)) -> Result<Identification> {
         let options = Options { validation: task.validation.to_vec(), ..self.options.clone() };
-        identify(task.fmu()?, task.recordings, &options, heard)
+        identify(task.fmu()?, task.recordings, &options, progress)
     }
 
     fn lines(found: &Identification) -> Vec<String> {
         let Details { fit, condition, seconds, .. } = &found.details;
         vec![format!(
-            "fit {:.3} %, noise {:.2e} rad/s, condition number {condition:.0}, {} answers of the FMU in {seconds:.1} s",
+            "fit {:.3} %, noise {:.2e} rad/s, condition number {condition:.0}, {} simulations in {seconds:.1} s",
             fit.fit_pct, fit.noise_white, fit.simulations
         )]
     }
@@ -92,16 +92,16 @@ const SIMPLEST: [&str; 5] = ["frozen", "linear", "planar", "spherical", "parabol
 /// Beginnings that are tried where no model fits the whole recording, as fractions of its rows.
 const BEGINNINGS: [f64; 2] = [0.35, 0.5];
 
-/// Identifies the FMU from recordings. `heard` is told what happens.
+/// Identifies the FMU from recordings. `progress` is told what happens.
 pub fn identify(
     fmu: &Fmu,
     recordings: &[Recording],
     options: &Options,
-    heard: &mut dyn FnMut(&News),
+    progress: &mut dyn FnMut(&News),
 ) -> Result<Identification> {
-    let mut found = identify_whole(fmu, recordings, options, heard)?;
+    let mut found = identify_whole(fmu, recordings, options, progress)?;
     if let ([recording], Some(false), true) = (recordings, found.fits, found.details.fit.poor) {
-        found.verdict.extend(fitting_beginning(fmu, recording, options, heard));
+        found.verdict.extend(fitting_beginning(fmu, recording, options, progress));
     }
     Ok(found)
 }
@@ -111,7 +111,7 @@ fn fitting_beginning(
     fmu: &Fmu,
     recording: &Recording,
     options: &Options,
-    heard: &mut dyn FnMut(&News),
+    progress: &mut dyn FnMut(&News),
 ) -> Option<String> {
     let options = Options { validation: Vec::new(), ..options.clone() };
     let mut longest = None;
@@ -120,7 +120,9 @@ fn fitting_beginning(
         if part.duration() < recording::SHORTEST {
             continue;
         }
-        heard(&News::Step(format!("no model fits the whole recording; the rows until {end:.0} s")));
+        progress(&News::Step(format!(
+            "no model fits the whole recording; the rows until {end:.0} s"
+        )));
         match identify_whole(fmu, &[part], &options, &mut |_| {}) {
             Ok(found) if found.fits == Some(true) && found.converged => {
                 longest = Some((end, found));
@@ -140,13 +142,13 @@ fn identify_whole(
     fmu: &Fmu,
     recordings: &[Recording],
     options: &Options,
-    heard: &mut dyn FnMut(&News),
+    progress: &mut dyn FnMut(&News),
 ) -> Result<Identification> {
     let begun = Instant::now();
     ensure!(!recordings.is_empty(), "there is no recording");
     let mut done = Vec::new();
     let mut tell = |news: News| {
-        heard(&news);
+        progress(&news);
         done.push(news.line().to_string());
     };
     let nominal = options.nominal(fmu)?;

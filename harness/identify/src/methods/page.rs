@@ -275,7 +275,8 @@ fn budget(found: &Identification) -> Markup {
         }));
         cells
     };
-    let head = std::iter::once("wrong").chain(found.parameters.keys().map(String::as_str));
+    let head =
+        std::iter::once("source of error").chain(found.parameters.keys().map(String::as_str));
     html! {
         h2 { "Error budget" }
         p { "What an error of something that is not estimated would do to each estimate, in %." }
