@@ -30,6 +30,18 @@ fn the_physics_knows_no_fmi_and_the_runtime_no_physics() {
     assert_eq!(all["runtime"], BTreeSet::new());
 }
 
+/// A build is the check: without the standard library's prelude a crate that needs it does not compile.
+#[test]
+fn the_models_and_what_they_are_made_of_need_no_standard_library() {
+    for krate in ["formulas", "taylor", "plant", "craft"] {
+        let file = pack::root().join("fmu").join(krate).join("src/lib.rs");
+        let text = fs::read_to_string(file).expect("a crate's root");
+        let is_free = ["#![no_std]", "#![cfg_attr(not(test), no_std)]"];
+        assert!(text.lines().any(|line| is_free.contains(&line)), "{krate}");
+        assert!(!text.contains("extern crate std"), "{krate}");
+    }
+}
+
 /// The packages of the harness, each with those of the workspace that it may link: of `fmu/` the formulas
 /// alone, which are no model.
 const HARNESS: [(&str, &[&str]); 11] = [

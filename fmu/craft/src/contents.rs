@@ -40,6 +40,8 @@
 //! Source: momentum and moment of momentum of a volume fixed in the craft, with d(m s)/dt = K - f r_out;
 //! the energy is that of `outputs.rs`, differentiated along the motion.
 
+use alloc::format;
+use alloc::string::String;
 use taylor::error::StepError;
 use taylor::extrapolation::{self, Pace, System};
 use taylor::number::Number;

@@ -8,6 +8,7 @@
 //! as in `motion.rs`, with the loads of what flows within. When a flow jumps, its K and L do: an impulse, the same
 //! equations with the flow's slope alone.
 
+use alloc::vec::Vec;
 use taylor::error::StepError;
 use taylor::extrapolation::System;
 use taylor::integrator::RATE_FLOOR;

@@ -27,6 +27,10 @@
 //! `contents.rs` is what is in a tank that drains by a table (`table.rs`),
 //! `draining.rs` a craft with such tanks.
 
+#![cfg_attr(not(test), no_std)]
+
+extern crate alloc;
+
 mod bob;
 mod contents;
 mod draining;

@@ -25,6 +25,7 @@
 //!
 //! Source: Newton-Euler about O with the bobs' pulls eliminated.
 
+use alloc::vec::Vec;
 use taylor::at_each_order;
 use taylor::error::StepError;
 use taylor::integrator::{self, MAX_MAGNITUDE, Motion, RATE_FLOOR, Steps};

@@ -2,6 +2,9 @@
 //!
 //! Names in the messages are those of the FMU's parameters. Indices count from 1 there.
 
+use alloc::format;
+use alloc::string::String;
+use alloc::vec::Vec;
 use formulas::cylinder;
 use taylor::integrator::Steps;
 use taylor::vector::{Quaternion, Vec3, add, rotation, scale, unit_quaternion};

@@ -36,6 +36,9 @@
 //! A tank that drains (`contents.rs`) moves by extrapolation instead of power series, as a craft does. A jump of its
 //! flow is an impulse on the host, which a force cannot be; it is left out, here and in the bobs.
 
+use alloc::boxed::Box;
+use alloc::string::String;
+use alloc::vec::Vec;
 use taylor::at_each_order;
 use taylor::error::StepError;
 use taylor::extrapolation::System;

@@ -1,6 +1,9 @@
 //! A free spacecraft with sloshing tanks: the whole, its steps, and its equations for hosts
 //! that integrate themselves.
 
+use alloc::boxed::Box;
+use alloc::string::String;
+use alloc::vec::Vec;
 use taylor::error::StepError;
 use taylor::number::{Dual, Number};
 use taylor::vector::{on_sphere, unit_quaternion};

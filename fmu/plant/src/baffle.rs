@@ -22,6 +22,9 @@
 //! is 0.64 to 6.4 widths, the ring stays covered (d >= eta) and alpha < 0.25. Smaller waves keep more
 //! damping than it says.
 
+use alloc::format;
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
 use formulas::damping::{covered, miles_ring, motion_at_ring};
 use taylor::series::{Series, ZERO, mul_ramp};
 

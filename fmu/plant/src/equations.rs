@@ -4,6 +4,9 @@
 //! x is declared in `state.rs`. The friction's contact and the regime are discrete states:
 //! they change in [`Plant::take_event`] alone, when an indicator has crossed zero.
 
+use alloc::format;
+use alloc::string::String;
+use alloc::vec::Vec;
 use taylor::error::StepError;
 
 use crate::contact::Contact;

@@ -11,6 +11,10 @@
 //! and slip, `friction/`, `slosh/`, `damping.rs`, `tank.rs`, `wheel.rs`, `imu.rs` say what their names say,
 //! the arithmetic is the crate `taylor`.
 
+#![cfg_attr(not(test), no_std)]
+
+extern crate alloc;
+
 mod baffle;
 mod contact;
 mod damping;

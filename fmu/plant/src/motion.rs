@@ -2,6 +2,7 @@
 //! hub comes to rest or breaks away are roots of polynomials, found without stepping back. The steps are
 //! the core's (`taylor::integrator`).
 
+use alloc::format;
 use taylor::error::StepError;
 use taylor::integrator::{self, Convergence, RATE_FLOOR, Steps};
 use taylor::root::first_root;
@@ -96,7 +97,7 @@ impl Motion {
     /// Takes another law of slosh damping and returns the last one.
     pub fn set_damping(&mut self, damping: Damping) -> Damping {
         self.g = [f64::NAN; 2];
-        std::mem::replace(&mut self.damping, damping)
+        core::mem::replace(&mut self.damping, damping)
     }
 
     /// Puts everything at the state, with the given torque and specific force.

@@ -216,8 +216,8 @@ impl Plant {
         let before = self.state.x;
         let size = self.size_of_direction(dx, du);
         let step = if size >= f64::MIN_POSITIVE { SHARE / size } else { 1.0 };
-        let with_wheel = std::mem::replace(&mut self.wheel.enabled, false);
-        let law = std::mem::replace(&mut self.motion.law, Law::NONE);
+        let with_wheel = core::mem::replace(&mut self.wheel.enabled, false);
+        let law = core::mem::replace(&mut self.motion.law, Law::NONE);
         let tangent = self.motion.damping.tangent(inputs.g_axial.value);
         let damping = self.motion.set_damping(tangent);
         let [p2, p1, m1, m2] = [2.0, 1.0, -1.0, -2.0].map(|steps| {

@@ -4,6 +4,10 @@
 //! I_hub w' = tau_actuator + tau_ext + tau_friction + tau_fluid
 //! ```
 
+use alloc::boxed::Box;
+use alloc::string::{String, ToString};
+use alloc::vec;
+use alloc::vec::Vec;
 use taylor::error::StepError;
 
 use crate::baffle::Range;

@@ -10,6 +10,9 @@
 //! a_n = k_n l_n/m_n = sigma xi_n^2/(rho R^2)
 //! ```
 
+use alloc::format;
+use alloc::string::{String, ToString};
+use alloc::vec::Vec;
 use formulas::cylinder::{self, XI};
 use formulas::damping::mikishev_dorozhkin;
 use formulas::similarity;

@@ -5,6 +5,11 @@
 //! (thesis Table 5.4). W follows from the command alone, so a step with a linear
 //! command is cut into pieces with linear torque before the hub's motion is known.
 
+use alloc::format;
+use alloc::string::String;
+use alloc::vec;
+use alloc::vec::Vec;
+
 use crate::inputs::Ramp;
 use crate::parameters::Wheel;
 

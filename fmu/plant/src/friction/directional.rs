@@ -6,6 +6,10 @@
 //!
 //! with + while the hub turns forwards, - backwards.
 
+use alloc::boxed::Box;
+use alloc::format;
+use alloc::string::String;
+use alloc::vec::Vec;
 use taylor::series::{self, Series, ZERO};
 
 use crate::contact::Contact;

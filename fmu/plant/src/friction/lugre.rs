@@ -31,6 +31,10 @@
 //! g/(sigma_0 |w|) seconds; the integrator resolves that, so its steps are of that length. As
 //! sigma_0 grows the law approaches the set-valued one, at a rising price.
 
+use alloc::format;
+use alloc::string::String;
+use alloc::vec;
+use alloc::vec::Vec;
 use taylor::series::{self, Series, ZERO};
 
 use super::FrictionLaw;

@@ -10,6 +10,8 @@ mod stribeck;
 mod stribeck_smooth;
 mod viscous;
 
+use alloc::string::String;
+use alloc::vec::Vec;
 use taylor::series::{self, Series};
 
 use crate::contact::Contact;

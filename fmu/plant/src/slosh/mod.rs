@@ -17,6 +17,9 @@ mod paraboloid;
 mod planar;
 mod spherical;
 
+use alloc::string::String;
+use alloc::vec::Vec;
+
 use crate::hub::HubMotion;
 use crate::parameters::{Init, Parameters, SloshModel};
 use crate::pendulum::Pendulum;

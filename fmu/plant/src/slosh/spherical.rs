@@ -33,6 +33,8 @@
 //! Checked against Lagrange's equations for xi (below), against another way to the hub's
 //! acceleration (tests/physics/rotary.rs) and against a pendulum in angles (Basilisk).
 
+use alloc::format;
+use alloc::string::String;
 use taylor::plane::{
     self, Vector2, ZERO_VECTOR2, dot, each, mul_part, mul_part_head, scale, scale_head, squares,
 };
