@@ -26,6 +26,7 @@ use alloc::format;
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 use formulas::damping::{covered, miles_ring, motion_at_ring};
+use taylor::number::Number;
 use taylor::series::{Series, ZERO, mul_ramp};
 
 use crate::parameters::{Parameters, Ring, SloshSource};
@@ -168,10 +169,10 @@ impl Baffle {
     }
 
     /// Amplitude of the motion, rad, and its damping ratio, at W = `w` and [|q|^2, |q'|^2].
-    pub fn present(&self, w: f64, [q2, v2]: [f64; 2]) -> (f64, f64) {
-        let w = w + self.w_floor;
-        let amplitude = libm::sqrt(q2 + v2 / w);
-        (amplitude, self.zeta * libm::sqrt(amplitude))
+    pub fn present<T: Number>(&self, w: T, [q2, v2]: [T; 2]) -> (T, T) {
+        let w = w + T::constant(self.w_floor);
+        let amplitude = (q2 + v2 / w).sqrt();
+        (amplitude, amplitude.sqrt() * self.zeta)
     }
 
     /// Starts an expansion with W along `w`, at [|q|^2, |q'|^2] and the viscous drag coefficient `c`

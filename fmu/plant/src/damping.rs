@@ -39,8 +39,6 @@ pub struct Damping {
     zeta: [f64; MODES],
     /// a_n, m/s2
     centring: [f64; MODES],
-    /// The g whose tangents stand for the powers, if they do.
-    tangent_at: Option<f64>,
 }
 
 impl Damping {
@@ -51,31 +49,13 @@ impl Damping {
             p.slosh.zeta_from_correlation && p.slosh.source == SloshSource::Geometry;
         let exponent = if by_correlation { 0.25 } else { 0.5 };
         let Calculated { damping: zeta, centring, .. } = *calculated;
-        Damping { reference, exponent, zeta, centring, tangent_at: None }
+        Damping { reference, exponent, zeta, centring }
     }
 
     /// (g + a)/(g_0 + a) to the power p
     fn power(&self, g: f64, a: f64) -> f64 {
         let root = libm::sqrt(f64::max(g + a, 0.0) / (self.reference + a));
         if self.exponent == 0.25 { libm::sqrt(root) } else { root }
-    }
-
-    /// Its derivative by g, s2/m; 0 at g + a = 0, where there is none.
-    fn slope(&self, g: f64, a: f64) -> f64 {
-        if g + a > 0.0 { self.exponent * self.power(g, a) / (g + a) } else { 0.0 }
-    }
-
-    /// c/c_0
-    fn factor(&self, g: f64, a: f64) -> f64 {
-        match self.tangent_at {
-            Some(at) => self.power(at, a) + self.slope(at, a) * (g - at),
-            None => self.power(g, a),
-        }
-    }
-
-    /// The same close to g, but linear.
-    pub fn tangent(&self, g: f64) -> Damping {
-        Damping { tangent_at: Some(g), ..self.clone() }
     }
 
     /// The damping ratio of mode `n` at g; 0 without restoring force and where it overflows next to
@@ -106,10 +86,10 @@ impl Damping {
         let mut course = ZERO;
         course[0] = 1.0;
         let (factor, reach) = if g.slope == 0.0 || self.zeta[n] <= 0.0 {
-            (self.factor(g.value, a), f64::INFINITY)
+            (self.power(g.value, a), f64::INFINITY)
         } else if x > floor {
             self.series(g.slope / x, &mut course);
-            (self.factor(g.value, a), SHARE_OF_RADIUS * x / g.slope.abs())
+            (self.power(g.value, a), SHARE_OF_RADIUS * x / g.slope.abs())
         } else if g.slope > 0.0 && floor > 0.0 {
             (self.mean(g.value, 2.0 * floor - a, a), (2.0 * floor - x) / g.slope)
         } else {
@@ -134,12 +114,8 @@ impl Damping {
 
     /// Mean of the factor over g from `from` to `to`.
     fn mean(&self, from: f64, to: f64, a: f64) -> f64 {
-        let integral = |g: f64| f64::max(g + a, 0.0) * self.factor(g, a) / (1.0 + self.exponent);
-        if from == to {
-            self.factor(from, a)
-        } else {
-            (integral(to) - integral(from)) / (to - from)
-        }
+        let integral = |g: f64| f64::max(g + a, 0.0) * self.power(g, a) / (1.0 + self.exponent);
+        if from == to { self.power(from, a) } else { (integral(to) - integral(from)) / (to - from) }
     }
 }
 

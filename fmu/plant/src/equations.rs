@@ -230,7 +230,8 @@ impl Plant {
     /// [`StepError::NotFinite`]; then nothing has changed.
     pub fn accept_step(&mut self, inputs: &Inputs) -> Result<(), StepError> {
         let work = self.work_axial(inputs);
-        let [mass_height, rate] = self.mass_height(inputs);
+        self.evaluate(inputs);
+        let [mass_height, rate] = self.height();
         let (g, time) = (inputs.g_axial.value, self.state.time);
         let axial = Axial { work, g, time, mass_height, rate };
         if !axial.is_finite() {

@@ -1,6 +1,7 @@
 //! The hub's motion as power series, and gravity across the axis of a bench that leans.
 
-use taylor::series::{Series, ZERO, mul_ramp};
+use taylor::number::Number;
+use taylor::series::{Series, ZERO, mul_ramp, number};
 
 /// The hub's motion as liquid and bearing see it.
 #[derive(Clone, Debug)]
@@ -79,9 +80,15 @@ impl Tilt {
         -(0..=n).map(term).sum::<f64>()
     }
 
-    /// e at order 0, m/s2.
-    pub fn now(&self) -> [f64; 2] {
-        [self.e[0][0], self.e[1][0]]
+    /// e at the start of an expansion, m/s2.
+    pub fn now<T: Number>(&self) -> [T; 2] {
+        [number(&self.e[0]), number(&self.e[1])]
+    }
+
+    /// -d.X and its rate for a place X with the rate X' in the frame of a hub that turns with `w`, m, m/s.
+    pub fn height_now<T: Number>(&self, [x, y]: [T; 2], [x_d, y_d]: [T; 2], w: T) -> [T; 2] {
+        let [d_x, d_y]: [T; 2] = [number(&self.direction[0]), number(&self.direction[1])];
+        [-(x * d_x + y * d_y), -(x_d * d_x + y_d * d_y + w * (x * d_y - y * d_x))]
     }
 }
 

@@ -5,8 +5,9 @@
 use alloc::format;
 use taylor::error::StepError;
 use taylor::integrator::{self, Convergence, RATE_FLOOR, Steps};
+use taylor::number::Number;
 use taylor::root::first_root;
-use taylor::series::{self, ORDER, Series, ZERO};
+use taylor::series::{self, ORDER, Series, ZERO, number};
 
 use crate::contact::Contact;
 use crate::damping::{Damping, RAMP_ORDER};
@@ -94,12 +95,6 @@ impl Motion {
         }
     }
 
-    /// Takes another law of slosh damping and returns the last one.
-    pub fn set_damping(&mut self, damping: Damping) -> Damping {
-        self.g = [f64::NAN; 2];
-        core::mem::replace(&mut self.damping, damping)
-    }
-
     /// Puts everything at the state, with the given torque and specific force.
     pub fn start<M: SloshMode>(&mut self, modes: &mut [M], state: &State, (tau, g): (Ramp, Ramp)) {
         self.hub.theta[0] = state.x[x::THETA];
@@ -122,8 +117,8 @@ impl Motion {
         self.g = if self.with_baffle { [f64::NAN; 2] } else { self.hub.g };
         self.hub.damping_reach = f64::INFINITY;
         for (n, mode) in modes.iter_mut().enumerate() {
-            let amplitude2 = mode.amplitude2();
-            let pendulum = mode.pendulum();
+            let amplitude2 = mode.amplitude2::<f64>();
+            let pendulum = mode.pendulum_mut();
             let reach = self.damping.expand(n, g, self.near_weightless, pendulum);
             self.hub.damping_reach = self.hub.damping_reach.min(reach);
             if pendulum.baffle.zeta > 0.0 {
@@ -138,20 +133,31 @@ impl Motion {
         x * e_y[n] - y * e_x[n]
     }
 
-    /// Torque of gravity on the dry hub, N m, on the rigid liquid's mass moment, kg m, at order 0.
-    pub fn gravity_torques(&self) -> [f64; 2] {
-        [self.gravity_torque(0), self.rigid_moment * self.hub.tilt.e[1][0]]
+    /// Torque of gravity on the dry hub, N m, and on the rigid liquid.
+    pub fn gravity_torques<T: Number>(&self) -> [T; 2] {
+        let ([x, y], [e_x, e_y]): (_, [T; 2]) = (self.imbalance, self.hub.tilt.now());
+        [e_y * x - e_x * y, e_y * self.rigid_moment]
     }
 
     /// Potential energy of the dry hub and of the rigid liquid, J.
-    pub fn potential(&self) -> f64 {
-        let ([x, y], [e_x, e_y]) = (self.imbalance, self.hub.tilt.now());
-        -((x + self.rigid_moment) * e_x + y * e_y)
+    pub fn potential<T: Number>(&self) -> T {
+        let ([x, y], [e_x, e_y]): (_, [T; 2]) = (self.imbalance, self.hub.tilt.now());
+        -(e_x * (x + self.rigid_moment) + e_y * y)
     }
 
-    /// Coefficient n of mass times height of hub and liquid above rest, kg m: the potential energy
-    /// over g.
-    pub fn mass_height<M: SloshMode>(&self, n: usize, modes: &mut [M]) -> f64 {
+    /// Mass times height of hub and liquid above rest, kg m, the potential energy over g, and its rate.
+    pub fn height<T: Number, M: SloshMode>(&self, modes: &[M]) -> [T; 2] {
+        let ([x, y], still) = (self.imbalance, [T::constant(0.0); 2]);
+        let moment = [x + self.rigid_moment, y].map(T::constant);
+        let dry = self.hub.tilt.height_now(moment, still, number(&self.hub.omega));
+        modes
+            .iter()
+            .map(|mode| mode.height(&self.hub))
+            .fold(dry, |sum, mode: [T; 2]| [sum[0] + mode[0], sum[1] + mode[1]])
+    }
+
+    /// Coefficient n of mass times height of hub and liquid above rest, kg m.
+    fn mass_height<M: SloshMode>(&self, n: usize, modes: &mut [M]) -> f64 {
         let [x, y] = self.imbalance;
         let moment = |j| [series::constant(j, x + self.rigid_moment), series::constant(j, y)];
         modes.iter_mut().map(|mode| mode.mass_height(n, &self.hub)).sum::<f64>()

@@ -1,17 +1,13 @@
 //! What can be read of the plant at an instant, and its time derivatives along a direction.
 
+use taylor::number::{Dual, Number};
+use taylor::series::number;
+
 use crate::contact::Contact;
-use crate::friction::Law;
 use crate::inputs::{Inputs, Ramp};
 use crate::plant::Plant;
 use crate::slosh::{Angles, SloshMode, with_modes};
 use crate::state::{Ranges, Regime, STATES, x};
-
-/// By how much the coordinates move to either side for a derivative by differences, as
-/// a share of the size at which they curve (1 rad, or a pendulum's length). What is left
-/// out, SHARE^4/30 of the fifth derivative, and the rounding, 1e-16/SHARE, are both
-/// about 1e-13.
-const SHARE: f64 = 1.0 / 512.0;
 
 /// The plant's outputs at one instant, or their derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -109,69 +105,79 @@ impl Plant {
     pub fn outputs_held(&mut self, inputs: &Inputs) -> Outputs {
         let work_axial = self.work_axial(inputs);
         self.evaluate(inputs);
-        let state = &self.state;
-        let hub = &self.motion.hub;
-        let (w, wd) = (state.x[x::OMEGA], hub.omega_dot[0]);
-        let [e_x, e_y] = hub.tilt.now();
-        let mut force =
-            [self.m_0 * self.r * w * w + self.m_0 * e_x, -self.m_0 * self.r * wd + self.m_0 * e_y];
-        let [tau_gravity, on_rigid] = self.motion.gravity_torques();
-        let mut tau_fluid = -self.i_0 * wd + on_rigid;
-        let mut energy = (self.hub_inertia + self.i_0) * w * w / 2.0
-            + self.motion.law.energy(0)
-            + self.motion.potential();
-        let mut momentum = (self.hub_inertia + self.i_0) * w;
-        let mut wave = [0.0; 2];
-        let (mut mode1, mut baffle_zeta) = (Angles::default(), 0.0);
-        let mut amplitude = 0.0;
-        with_modes!(&mut self.liquid, modes => for (i, mode) in modes.iter_mut().enumerate() {
-            let [f_x, f_y] = mode.force(hub);
-            force[0] += f_x;
-            force[1] += f_y;
-            tau_fluid += mode.torque(hub);
-            energy += mode.energy(hub);
-            momentum += mode.momentum(hub);
-            let angles = mode.angles();
-            wave[0] += self.wave[i] * angles.angle[0];
-            wave[1] += self.wave[i] * angles.angle[1];
+        self.present(&self.state.x, inputs.tau_cmd, work_axial)
+    }
+
+    /// The outputs, or their derivatives along a direction: `x` is the states or the direction, and where the
+    /// equations were evaluated last they were so along it, as `tau_cmd` is.
+    fn present<T: Number>(&self, x: &[f64; STATES], tau_cmd: Ramp, work_axial: T) -> Outputs {
+        let (state, motion) = (&self.state, &self.motion);
+        let hub = &motion.hub;
+        let [w, wd]: [T; 2] = [number(&hub.omega), number(&hub.omega_dot)];
+        let [e_x, e_y]: [T; 2] = hub.tilt.now();
+        let mut force = [
+            w * (self.m_0 * self.r) * w + e_x * self.m_0,
+            e_y * self.m_0 - wd * (self.m_0 * self.r),
+        ];
+        let [tau_gravity, on_rigid]: [T; 2] = motion.gravity_torques();
+        let mut tau_fluid = on_rigid - wd * self.i_0;
+        let inertia = self.hub_inertia + self.i_0;
+        let stored = T::of(motion.law.energy(0), motion.law.energy(1));
+        let mut energy = w * inertia * w * 0.5 + stored + motion.potential();
+        let mut momentum = w * inertia;
+        let zero = T::constant(0.0);
+        let (mut wave, mut mode1) = ([zero; 2], Angles::<T>::zero());
+        let (mut amplitude, mut baffle_zeta) = (zero, zero);
+        with_modes!(&self.liquid, modes => for (i, mode) in modes.iter().enumerate() {
+            let [f_x, f_y]: [T; 2] = mode.force(hub);
+            force = [force[0] + f_x, force[1] + f_y];
+            tau_fluid = tau_fluid + mode.torque(hub);
+            energy = energy + mode.energy(hub);
+            momentum = momentum + mode.momentum(hub);
+            let angles = mode.angles::<T>();
+            for k in 0..2 {
+                wave[k] = wave[k] + angles.angle[k] * self.wave[i];
+            }
             if i == 0 {
                 mode1 = angles;
                 if self.baffle.is_some() {
-                    let at = mode.amplitude2();
                     let pendulum = mode.pendulum();
-                    let w = pendulum.g[0] * pendulum.inv_l;
-                    (amplitude, baffle_zeta) = pendulum.baffle.present(w, at);
+                    let [g, _]: [T; 2] = pendulum.restoring_and_drag();
+                    (amplitude, baffle_zeta) =
+                        pendulum.baffle.present(g * pendulum.inv_l, mode.amplitude2());
                 }
             }
         });
-        let tau_actuator = self.wheel.torque(state.x[x::WHEEL_SPEED], inputs.tau_cmd).value;
+        let gyro = if self.imu.enabled { T::constant(state.gyro.held) } else { w };
+        let actuator = self.wheel.torque(state.x[x::WHEEL_SPEED], tau_cmd);
+        let plain = |x: T| unsigned_zero(x.result());
         Outputs {
-            theta: state.x[x::THETA],
-            omega: w,
-            omega_dot: unsigned_zero(wd),
-            slosh_angle: mode1.angle[1],
-            slosh_rate: mode1.rate[1],
-            slosh_angle_radial: mode1.angle[0],
-            slosh_rate_radial: mode1.rate[0],
-            tau_friction: unsigned_zero(self.motion.tau_f[0]),
-            tau_fluid: unsigned_zero(tau_fluid),
-            tau_gravity: unsigned_zero(tau_gravity),
-            f_tangential: unsigned_zero(force[1]),
-            f_radial: unsigned_zero(force[0]),
-            wave_height: libm::hypot(wave[0], wave[1]),
-            wave,
-            baffle_wave: self.wave[0] * amplitude,
-            omega_imu: if self.imu.enabled { state.gyro.held } else { w },
-            energy,
-            momentum: unsigned_zero(momentum),
-            power_dissipated: unsigned_zero(self.motion.dissipation[0]),
-            tau_actuator: unsigned_zero(tau_actuator),
-            wheel_speed: state.x[x::WHEEL_SPEED],
-            work: state.x[x::WORK],
-            work_axial,
-            heat: state.x[x::HEAT],
-            stuck_time: state.x[x::STUCK_TIME],
-            baffle_zeta,
+            theta: x[x::THETA],
+            omega: x[x::OMEGA],
+            omega_dot: plain(wd),
+            slosh_angle: mode1.angle[1].result(),
+            slosh_rate: mode1.rate[1].result(),
+            slosh_angle_radial: mode1.angle[0].result(),
+            slosh_rate_radial: mode1.rate[0].result(),
+            tau_friction: plain(number(&motion.tau_f)),
+            tau_fluid: plain(tau_fluid),
+            tau_gravity: plain(tau_gravity),
+            f_tangential: plain(force[1]),
+            f_radial: plain(force[0]),
+            wave_height: wave[0].hypot(wave[1]).result(),
+            wave: wave.map(T::result),
+            baffle_wave: (amplitude * self.wave[0]).result(),
+            omega_imu: gyro.result(),
+            energy: energy.result(),
+            momentum: plain(momentum),
+            power_dissipated: plain(number(&motion.dissipation)),
+            tau_actuator: plain(T::of(actuator.value, actuator.slope)),
+            wheel_speed: x[x::WHEEL_SPEED],
+            work: x[x::WORK],
+            work_axial: work_axial.result(),
+            heat: x[x::HEAT],
+            stuck_time: x[x::STUCK_TIME],
+            baffle_zeta: baffle_zeta.result(),
             discrete: Discrete {
                 stuck: state.contact == Contact::Stuck,
                 regime: state.ranges.regime,
@@ -190,111 +196,19 @@ impl Plant {
         [damping.ratio(n, g.value), damping.slope_of_ratio(n, g.value) * g.slope]
     }
 
-    /// The derivative of the outputs in the direction (dx, du); what is discrete in them
-    /// is as it is now. Contact and wheel are held.
-    ///
-    /// Friction, dissipation and the hub's acceleration come from the series and are exact.
-    /// Forces, energy and the like are smooth in x once the friction is just another
-    /// torque tau_f + tau_f' s, so they are differentiated by central differences with
-    /// Richardson's extrapolation, four evaluations, good to 1e-9 of their size.
+    /// The derivative of the outputs in the direction (dx, du), exact; what is discrete in them
+    /// is as it is now. Contact and wheel are held. The amplitude of a wave has none at 0.
     pub fn output_derivatives(
         &mut self,
         inputs: &Inputs,
         dx: &[f64; STATES],
         du: &[f64; 3],
     ) -> Outputs {
-        let now = self.outputs_held(inputs);
-        let derivatives = self.directional_derivative(inputs, dx, du);
-        let motion = &self.motion;
-        let (friction, friction_d) = (motion.tau_f[0], motion.tau_f[1]);
-        let (dissipation_d, stored_d) = (motion.dissipation[1], motion.law.energy(1));
-        let command = Ramp { value: inputs.tau_cmd.value, slope: du[0] };
-        let torque = self.wheel.torque(self.state.x[x::WHEEL_SPEED], command);
-
-        // From here on without wheel and friction: their torques are prescribed, and the slosh
-        // damping is linear in g.
-        let before = self.state.x;
-        let size = self.size_of_direction(dx, du);
-        let step = if size >= f64::MIN_POSITIVE { SHARE / size } else { 1.0 };
-        let with_wheel = core::mem::replace(&mut self.wheel.enabled, false);
-        let law = core::mem::replace(&mut self.motion.law, Law::NONE);
-        let tangent = self.motion.damping.tangent(inputs.g_axial.value);
-        let damping = self.motion.set_damping(tangent);
-        let [p2, p1, m1, m2] = [2.0, 1.0, -1.0, -2.0].map(|steps| {
-            let s = steps * step;
-            self.state.x = core::array::from_fn(|i| before[i] + s * dx[i]);
-            self.outputs_held(&Inputs {
-                tau_cmd: Ramp::held(torque.at(s)),
-                tau_ext: Ramp::held(inputs.tau_ext.value + s * du[1] + friction + s * friction_d),
-                g_axial: Ramp::held(inputs.g_axial.value + s * du[2]),
-            })
-        });
-        self.wheel.enabled = with_wheel;
-        self.motion.law = law;
-        self.motion.set_damping(damping);
-        self.state.x = before;
-
-        let by_differences = |get: fn(&Outputs) -> f64| {
-            (8.0 * (get(&p1) - get(&m1)) - (get(&p2) - get(&m2))) / (12.0 * step)
-        };
-        let wave = [by_differences(|o| o.wave[0]), by_differences(|o| o.wave[1])];
-        let tau_gravity = by_differences(|o| o.tau_gravity);
-        let wave_height = now.wave[0] * wave[0] + now.wave[1] * wave[1];
-        // Every field is named: an output without its derivative does not compile.
-        Outputs {
-            theta: dx[x::THETA],
-            omega: dx[x::OMEGA],
-            omega_dot: derivatives[x::OMEGA],
-            slosh_angle: by_differences(|o| o.slosh_angle),
-            slosh_rate: by_differences(|o| o.slosh_rate),
-            slosh_angle_radial: by_differences(|o| o.slosh_angle_radial),
-            slosh_rate_radial: by_differences(|o| o.slosh_rate_radial),
-            tau_friction: friction_d,
-            tau_fluid: self.hub_inertia * derivatives[x::OMEGA]
-                - torque.slope
-                - du[1]
-                - friction_d
-                - tau_gravity,
-            tau_gravity,
-            f_tangential: by_differences(|o| o.f_tangential),
-            f_radial: by_differences(|o| o.f_radial),
-            // A cone: at its tip there is no derivative.
-            wave_height: if now.wave_height > 0.0 { wave_height / now.wave_height } else { 0.0 },
-            wave,
-            baffle_wave: by_differences(|o| o.baffle_wave),
-            omega_imu: if self.imu.enabled { 0.0 } else { dx[x::OMEGA] },
-            energy: by_differences(|o| o.energy) + stored_d,
-            momentum: by_differences(|o| o.momentum),
-            power_dissipated: dissipation_d,
-            tau_actuator: torque.slope,
-            wheel_speed: dx[x::WHEEL_SPEED],
-            work: dx[x::WORK],
-            work_axial: by_differences(|o| o.work_axial),
-            heat: dx[x::HEAT],
-            stuck_time: dx[x::STUCK_TIME],
-            baffle_zeta: by_differences(|o| o.baffle_zeta),
-            discrete: now.discrete,
-        }
-    }
-
-    /// Size of a direction, in units in which 1 is where the outputs curve. What they
-    /// are linear in counts less: it may move far.
-    fn size_of_direction(&self, dx: &[f64; STATES], du: &[f64; 3]) -> f64 {
-        let torque = 10.0 * self.motion.i0;
-        let hub = [dx[x::OMEGA] / 10.0, du[0] / torque, du[1] / torque, du[2] / 10.0];
-        let hub = hub.iter().fold(0.0, |size: f64, d| size.max(d.abs()));
-        // On a bench that leans the weight curves with the angle.
-        let angle = if self.motion.hub.tilt.tangent == 0.0 { 0.0 } else { dx[x::THETA].abs() };
-        let hub = f64::max(hub, angle);
-        let slosh = dx[x::SLOSH..].as_chunks::<4>().0.iter().enumerate();
-        with_modes!(&self.liquid, modes => {
-            let modes = slosh.map(|(i, dq)| {
-                let q = f64::max(dq[0].abs(), dq[1].abs());
-                let v = f64::max(dq[2].abs(), dq[3].abs());
-                q.max(v / 10.0) / modes.get(i).map_or(1.0, SloshMode::coordinate_scale)
-            });
-            modes.fold(hub, f64::max)
-        })
+        self.directional_derivative(inputs, dx, du);
+        let change = Dual::of(inputs.g_axial.value - self.state.axial.g, du[2]);
+        let work_axial = self.work_axial_at(change, self.height());
+        let tau_cmd = Ramp { value: inputs.tau_cmd.value, slope: du[0] };
+        self.present::<Dual>(dx, tau_cmd, work_axial)
     }
 
     /// Brings the ranges among the outputs to what the outputs are now.

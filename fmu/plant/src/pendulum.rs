@@ -1,5 +1,6 @@
 //! One slosh mode as a pendulum: its constants, its restoring force and its drag.
 
+use taylor::number::Number;
 use taylor::series::{Series, ZERO, mul, mul_ramp};
 
 use crate::baffle::Baffle;
@@ -80,6 +81,11 @@ impl Pendulum {
         self.c = self.baffle.start(w, at, self.m, self.c, self.course);
         self.c_m = self.c / self.m;
         self.course[0] = 1.0;
+    }
+
+    /// Restoring specific force and viscous coefficient at the start of an expansion.
+    pub fn restoring_and_drag<T: Number>(&self) -> [T; 2] {
+        [T::of(self.g[0], self.g[1]), T::of(self.c, self.c * self.course[1])]
     }
 
     /// Coefficient n of g a; `varies` says whether g changes.

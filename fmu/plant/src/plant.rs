@@ -9,6 +9,7 @@ use alloc::string::{String, ToString};
 use alloc::vec;
 use alloc::vec::Vec;
 use taylor::error::StepError;
+use taylor::number::Number;
 
 use crate::baffle::Range;
 use crate::contact::Contact;
@@ -232,24 +233,26 @@ impl Plant {
         if change == 0.0 {
             return last.work;
         }
-        let [mass_height, rate] = self.mass_height(inputs);
+        self.evaluate(inputs);
+        self.work_axial_at(change, self.height())
+    }
+
+    /// The same from g_axial's change since the last accepted step and from the liquid's mass times height.
+    pub(crate) fn work_axial_at<T: Number>(&self, change: T, [mass_height, rate]: [T; 2]) -> T {
+        let last = self.state.axial;
         let h = self.state.time - last.time;
+        let c = T::constant;
         let mean = if h > 0.0 {
-            (last.mass_height + mass_height) / 2.0 + h / 12.0 * (last.rate - rate)
+            (c(last.mass_height) + mass_height) * 0.5 + (c(last.rate) - rate) * (h / 12.0)
         } else {
             mass_height
         };
-        last.work + change * mean
+        c(last.work) + change * mean
     }
 
-    /// The liquid's mass times height above rest, kg m, and its rate.
-    pub(crate) fn mass_height(&mut self, inputs: &Inputs) -> [f64; 2] {
-        self.evaluate(inputs);
-        let contact = self.state.contact;
-        with_modes!(&mut self.liquid, modes => {
-            self.motion.derivatives(1, self.motion.varies, modes, contact);
-            [self.motion.mass_height(0, modes), self.motion.mass_height(1, modes)]
-        })
+    /// Mass times height of hub and liquid above rest, kg m, and its rate, where the equations were evaluated last.
+    pub(crate) fn height<T: Number>(&self) -> [T; 2] {
+        with_modes!(&self.liquid, modes => self.motion.height(modes))
     }
 
     /// Evaluates the equations at the present instant.

@@ -1,6 +1,6 @@
 //! Numbers that a formula is written once for: the value, or the derivative along a direction.
 
-use core::ops::{Add, Mul, Neg, Sub};
+use core::ops::{Add, Div, Mul, Neg, Sub};
 
 /// What a formula is evaluated with: [`f64`] for its value, [`Dual`] for its derivative along a
 /// direction.
@@ -10,6 +10,7 @@ pub trait Number:
     + Sub<Output = Self>
     + Mul<Output = Self>
     + Mul<f64, Output = Self>
+    + Div<Output = Self>
     + Neg<Output = Self>
 {
     /// A quantity that depends on nothing.
@@ -24,10 +25,16 @@ pub trait Number:
     fn at_least(self, floor: f64) -> Self {
         if self.value() < floor { Self::constant(floor) } else { self }
     }
+    /// Itself between two constants, which do not depend on anything.
+    fn clamp(self, low: f64, high: f64) -> Self {
+        if self.value() > high { Self::constant(high) } else { self.at_least(low) }
+    }
     /// 1/self
     fn recip(self) -> Self;
-    /// Of a quantity above 0.
+    /// The root, its derivative 0 at 0, where it has none.
     fn sqrt(self) -> Self;
+    /// sin
+    fn sin(self) -> Self;
     /// asin, its derivative 0 at +-1, where it has none.
     fn asin(self) -> Self;
     /// sqrt(self^2 + b^2), its derivative 0 at 0, where it has none.
@@ -57,6 +64,10 @@ impl Number for f64 {
 
     fn sqrt(self) -> f64 {
         libm::sqrt(self)
+    }
+
+    fn sin(self) -> f64 {
+        libm::sin(self)
     }
 
     fn asin(self) -> f64 {
@@ -108,6 +119,15 @@ impl Mul<f64> for Dual {
     }
 }
 
+impl Div for Dual {
+    type Output = Dual;
+
+    fn div(self, b: Dual) -> Dual {
+        let value = self.value / b.value;
+        Dual { value, slope: (self.slope - value * b.slope) / b.value }
+    }
+}
+
 impl Neg for Dual {
     type Output = Dual;
 
@@ -140,7 +160,12 @@ impl Number for Dual {
 
     fn sqrt(self) -> Dual {
         let value = libm::sqrt(self.value);
-        Dual { value, slope: 0.5 * self.slope / value }
+        Dual { value, slope: if value > 0.0 { 0.5 * self.slope / value } else { 0.0 } }
+    }
+
+    fn sin(self) -> Dual {
+        let (value, cos) = libm::sincos(self.value);
+        Dual { value, slope: self.slope * cos }
     }
 
     fn asin(self) -> Dual {

@@ -1,6 +1,7 @@
 //! Power series of vectors in the plane. Most rules treat both components alike, so that a
 //! processor does both at once.
 
+use crate::number::Number;
 use crate::series::{self, ORDER, Series};
 
 /// Sum of `term(j)` over 0 <= j <= n, ends last; see `series.rs`.
@@ -18,6 +19,11 @@ pub struct Vector2([[f64; 2]; ORDER + 1]);
 
 /// All coefficients zero.
 pub const ZERO_VECTOR2: Vector2 = Vector2([[0.0; 2]; ORDER + 1]);
+
+/// Both components, as [`series::number`].
+pub fn numbers<T: Number>(a: &Vector2) -> [T; 2] {
+    [0, 1].map(|i| T::of(a[0][i], a[1][i]))
+}
 
 impl core::ops::Index<usize> for Vector2 {
     type Output = [f64; 2];

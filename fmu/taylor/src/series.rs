@@ -8,6 +8,8 @@
 //! Source of the rules: the product (Cauchy) rule, and for f(u) the differential
 //! equation that f satisfies; see Jorba & Zou, Experimental Mathematics 14 (2005).
 
+use crate::number::Number;
+
 /// The highest order kept.
 pub const ORDER: usize = 18;
 
@@ -16,6 +18,12 @@ pub type Series = [f64; ORDER + 1];
 
 /// All coefficients zero.
 pub const ZERO: Series = [0.0; ORDER + 1];
+
+/// The quantity at the start of an expansion; of a number that carries a derivative, the one along the
+/// direction that is coefficient 1.
+pub fn number<T: Number>(a: &Series) -> T {
+    T::of(a[0], a[1])
+}
 
 /// 1/n
 pub(crate) const RECIPROCAL: [f64; ORDER + 2] = {

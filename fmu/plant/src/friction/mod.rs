@@ -229,8 +229,3 @@ laws! {
     Stribeck => stribeck::Stribeck;
     Lugre => lugre::Lugre;
 }
-
-impl Law {
-    /// No friction.
-    pub const NONE: Law = Law::None(viscous::Free);
-}

@@ -13,7 +13,8 @@
 //! On a bench that leans, gravity across the axis, e, adds e_y/l to al'', -m l e_x al to T and
 //! -m (e_x r + e_y l al) to E.
 
-use taylor::series::{Series, ZERO, constant, mul, next, square, values};
+use taylor::number::Number;
+use taylor::series::{Series, ZERO, constant, mul, next, number, square, values};
 
 use super::{Angles, HubReaction, SloshMode};
 use crate::hub::HubMotion;
@@ -39,20 +40,25 @@ impl SloshMode for Linear {
         Linear { p: *p, al: ZERO, al_d: ZERO, al_dd: ZERO, g_al: ZERO, drag: ZERO }
     }
 
-    fn pendulum(&mut self) -> &mut Pendulum {
+    fn pendulum(&self) -> &Pendulum {
+        &self.p
+    }
+
+    fn pendulum_mut(&mut self) -> &mut Pendulum {
         &mut self.p
     }
 
-    fn amplitude2(&self) -> [f64; 2] {
-        [self.al[0] * self.al[0], self.al_d[0] * self.al_d[0]]
+    fn amplitude2<T: Number>(&self) -> [T; 2] {
+        [&self.al, &self.al_d].map(|x| number::<T>(x) * number::<T>(x))
     }
 
     fn coordinates(&self, at: &Angles) -> [f64; 4] {
         [0.0, at.angle[1], 0.0, at.rate[1]]
     }
 
-    fn angles(&self) -> Angles {
-        Angles { angle: [0.0, self.al[0]], rate: [0.0, self.al_d[0]] }
+    fn angles<T: Number>(&self) -> Angles<T> {
+        let zero = T::constant(0.0);
+        Angles { angle: [zero, number(&self.al)], rate: [zero, number(&self.al_d)] }
     }
 
     fn start(&mut self, q: &[f64; 4], _: &HubMotion) {
@@ -126,31 +132,42 @@ impl SloshMode for Linear {
         [0.0, al, 0.0, al_d]
     }
 
+    fn height<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
+        let Pendulum { m, l, r, .. } = self.p;
+        let (al, al_d): (T, T) = (number(&self.al), number(&self.al_d));
+        let (place, rate) = ([T::constant(r), al * l], [T::constant(0.0), al_d * l]);
+        let tilted = hub.tilt.height_now(place, rate, number(&hub.omega));
+        [al * al * (m * l) * 0.5 + tilted[0] * m, al * al_d * (m * l) + tilted[1] * m]
+    }
+
     /// Tangential -m (r w' + l al''); radial from the bob's place (r, l al):
     /// m (r w^2 + 2 w l al' + w' l al), of second order in the motion.
-    fn force(&self, hub: &HubMotion) -> [f64; 2] {
+    fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
         let Pendulum { m, l, r, .. } = self.p;
-        let (w, wd) = (hub.omega[0], hub.omega_dot[0]);
-        let radial = m * (r * w * w + 2.0 * w * l * self.al_d[0] + wd * l * self.al[0]);
-        let [e_x, e_y] = hub.tilt.now();
-        [radial + m * e_x, -m * (r * wd + l * self.al_dd[0]) + m * e_y]
+        let [w, wd]: [T; 2] = [number(&hub.omega), number(&hub.omega_dot)];
+        let [al, al_d, al_dd] = [&self.al, &self.al_d, &self.al_dd].map(number::<T>);
+        let radial = (w * r * w + w * 2.0 * l * al_d + wd * l * al) * m;
+        let [e_x, e_y]: [T; 2] = hub.tilt.now();
+        [radial + e_x * m, e_y * m - (wd * r + al_dd * l) * m]
     }
 
     /// r F_y: in the linear model the force acts at the hinge; gravity of a leaning bench at the bob.
-    fn torque(&self, hub: &HubMotion) -> f64 {
-        self.p.r * self.force(hub)[1] - self.p.m * self.p.l * self.al[0] * hub.tilt.now()[0]
+    fn torque<T: Number>(&self, hub: &HubMotion) -> T {
+        let Pendulum { m, l, r, .. } = self.p;
+        let ([_, f_y], [e_x, _]): ([T; 2], [T; 2]) = (self.force(hub), hub.tilt.now());
+        f_y * r - number::<T>(&self.al) * (m * l) * e_x
     }
 
-    fn energy(&self, hub: &HubMotion) -> f64 {
+    fn energy<T: Number>(&self, hub: &HubMotion) -> T {
         let Pendulum { m, l, r, .. } = self.p;
-        let speed = r * hub.omega[0] + l * self.al_d[0];
-        let [e_x, e_y] = hub.tilt.now();
-        (m * speed * speed + m * self.p.g[0] * l * self.al[0] * self.al[0]) / 2.0
-            - m * (e_x * r + e_y * l * self.al[0])
+        let (al, [g, _]) = (number::<T>(&self.al), self.p.restoring_and_drag::<T>());
+        let speed = number::<T>(&hub.omega) * r + number::<T>(&self.al_d) * l;
+        let [e_x, e_y]: [T; 2] = hub.tilt.now();
+        (speed * m * speed + g * m * l * al * al) * 0.5 - (e_x * r + e_y * l * al) * m
     }
 
-    fn momentum(&self, hub: &HubMotion) -> f64 {
+    fn momentum<T: Number>(&self, hub: &HubMotion) -> T {
         let Pendulum { m, l, r, .. } = self.p;
-        m * r * (r * hub.omega[0] + l * self.al_d[0])
+        (number::<T>(&hub.omega) * r + number::<T>(&self.al_d) * l) * (m * r)
     }
 }

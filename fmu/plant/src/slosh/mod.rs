@@ -20,6 +20,8 @@ mod spherical;
 use alloc::string::String;
 use alloc::vec::Vec;
 
+use taylor::number::Number;
+
 use crate::hub::HubMotion;
 use crate::parameters::{Init, Parameters, SloshModel};
 use crate::pendulum::Pendulum;
@@ -86,15 +88,26 @@ pub struct HubReaction {
 }
 
 /// Mode displacement as angles with sin(angle) = displacement / l.
-#[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct Angles {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Angles<T = f64> {
     /// Radial and tangential angle, rad.
-    pub angle: [f64; 2],
+    pub angle: [T; 2],
     /// Their rates, rad/s.
-    pub rate: [f64; 2],
+    pub rate: [T; 2],
+}
+
+impl<T: Number> Angles<T> {
+    /// Of a mode at rest.
+    pub fn zero() -> Angles<T> {
+        let zero = [T::constant(0.0); 2];
+        Angles { angle: zero, rate: zero }
+    }
 }
 
 /// One slosh mode as a set of power series in time.
+///
+/// What is given over [`Number`] holds at the start of an expansion: the value, or the derivative along the
+/// direction that was seeded.
 pub trait SloshMode {
     /// Whether steps with a single mode and g held are compiled with the sums of every order
     /// written out: twice as fast, 40 to 100 KB of code.
@@ -108,17 +121,15 @@ pub trait SloshMode {
         None
     }
     /// The pendulum that it is made of.
-    fn pendulum(&mut self) -> &mut Pendulum;
-    /// Squares of displacement over length and of its rate, at order 0 after `start`, rad2, rad2/s2.
-    fn amplitude2(&self) -> [f64; 2];
-    /// A displacement of the coordinates at which forces and energies curve, in their unit.
-    fn coordinate_scale(&self) -> f64 {
-        1.0
-    }
+    fn pendulum(&self) -> &Pendulum;
+    /// As [`SloshMode::pendulum`], to set it.
+    fn pendulum_mut(&mut self) -> &mut Pendulum;
+    /// Squares of displacement over length and of its rate, after `start`, rad2, rad2/s2.
+    fn amplitude2<T: Number>(&self) -> [T; 2];
     /// Coordinates from angles with sin(angle) = displacement/l and their rates.
     fn coordinates(&self, at: &Angles) -> [f64; 4];
-    /// The reverse, at order 0.
-    fn angles(&self) -> Angles;
+    /// The reverse.
+    fn angles<T: Number>(&self) -> Angles<T>;
     /// Sets the coordinates at the start of the expansion; w is known to order 0.
     fn start(&mut self, q: &[f64; 4], hub: &HubMotion);
     /// Sets the direction, coefficient 1 of the coordinates, for a partial derivative; w is
@@ -142,14 +153,16 @@ pub trait SloshMode {
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64;
     /// Coordinates at t, where the hub turns with `omega`, from the series cut after order n.
     fn at(&self, n: usize, t: f64, omega: f64) -> [f64; 4];
-    /// Force of the bob on the tank, N, radial and tangential, at order 0.
-    fn force(&self, hub: &HubMotion) -> [f64; 2];
-    /// Torque of the bob on the hub, N m, at order 0.
-    fn torque(&self, hub: &HubMotion) -> f64;
-    /// Kinetic and potential energy, J, at order 0.
-    fn energy(&self, hub: &HubMotion) -> f64;
-    /// Angular momentum about the bearing's axis, kg m2/s, at order 0.
-    fn momentum(&self, hub: &HubMotion) -> f64;
+    /// Mass times height above rest, kg m, and its rate.
+    fn height<T: Number>(&self, hub: &HubMotion) -> [T; 2];
+    /// Force of the bob on the tank, N, radial and tangential.
+    fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2];
+    /// Torque of the bob on the hub, N m.
+    fn torque<T: Number>(&self, hub: &HubMotion) -> T;
+    /// Kinetic and potential energy, J.
+    fn energy<T: Number>(&self, hub: &HubMotion) -> T;
+    /// Angular momentum about the bearing's axis, kg m2/s.
+    fn momentum<T: Number>(&self, hub: &HubMotion) -> T;
     /// What makes the coordinates meaningless, if anything does.
     fn out_of_range(&self, _q: &[f64; 4]) -> Option<&'static str> {
         None

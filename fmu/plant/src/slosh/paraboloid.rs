@@ -17,7 +17,8 @@
 //! s = 1 on the paraboloid; the model `liquid` (`liquid.rs`) has another s and h = kappa/(2 l^2).
 //! For small q a pendulum is the case s = 1, h = 1/(2 l^2).
 
-use taylor::series::{Series, ZERO, constant, mul, mul_tail, next, square, values};
+use taylor::number::Number;
+use taylor::series::{Series, ZERO, constant, mul, mul_tail, next, number, square, values};
 
 use super::{Angles, HubReaction, SloshMode};
 use crate::hub::HubMotion;
@@ -49,6 +50,11 @@ pub struct Paraboloid {
     q2: Series,
 }
 
+/// Both components as numbers.
+fn pair<T: Number>(a: &[Series; 2]) -> [T; 2] {
+    [number(&a[0]), number(&a[1])]
+}
+
 impl SloshMode for Paraboloid {
     fn new(p: &Pendulum) -> Self {
         Paraboloid {
@@ -71,18 +77,20 @@ impl SloshMode for Paraboloid {
         }
     }
 
-    fn pendulum(&mut self) -> &mut Pendulum {
+    fn pendulum(&self) -> &Pendulum {
+        &self.p
+    }
+
+    fn pendulum_mut(&mut self) -> &mut Pendulum {
         &mut self.p
     }
 
-    fn amplitude2(&self) -> [f64; 2] {
-        let l2 = self.p.l * self.p.l;
-        [&self.q, &self.q_d].map(|[x, y]| (x[0] * x[0] + y[0] * y[0]) / l2)
-    }
-
-    /// A displacement is in m.
-    fn coordinate_scale(&self) -> f64 {
-        self.p.l
+    fn amplitude2<T: Number>(&self) -> [T; 2] {
+        let l2 = T::constant(self.p.l * self.p.l);
+        [&self.q, &self.q_d].map(|q| {
+            let [x, y] = pair::<T>(q);
+            (x * x + y * y) / l2
+        })
     }
 
     fn coordinates(&self, at: &Angles) -> [f64; 4] {
@@ -91,14 +99,15 @@ impl SloshMode for Paraboloid {
         [q[0], q[1], rate(0), rate(1)]
     }
 
-    fn angles(&self) -> Angles {
-        let l = self.p.l;
-        let sin = [0, 1].map(|i| (self.q[i][0] / l).clamp(-1.0, 1.0));
+    fn angles<T: Number>(&self) -> Angles<T> {
+        let (l, one) = (T::constant(self.p.l), T::constant(1.0));
+        let [q, q_d] = [&self.q, &self.q_d].map(pair::<T>);
+        let sin = q.map(|q| (q / l).clamp(-1.0, 1.0));
         let rate = |i: usize| {
-            let cos = libm::sqrt((1.0 - sin[i]) * (1.0 + sin[i]));
-            if cos > 0.0 { self.q_d[i][0] / (l * cos) } else { 0.0 }
+            let cos = ((one - sin[i]) * (one + sin[i])).sqrt();
+            if cos.value() > 0.0 { q_d[i] / (l * cos) } else { T::constant(0.0) }
         };
-        Angles { angle: sin.map(libm::asin), rate: [rate(0), rate(1)] }
+        Angles { angle: sin.map(T::asin), rate: [rate(0), rate(1)] }
     }
 
     fn start(&mut self, q: &[f64; 4], _: &HubMotion) {
@@ -216,34 +225,48 @@ impl SloshMode for Paraboloid {
         values([x, y, x_d, y_d], n, t)
     }
 
+    fn height<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
+        let Pendulum { m, l, hardening, .. } = self.p;
+        let [[x, y], rate] = [&self.q, &self.q_d].map(pair::<T>);
+        let (q2, rise) = (x * x + y * y, x * rate[0] + y * rate[1]);
+        let place = [number(&self.arm), y];
+        let tilted = hub.tilt.height_now(place, rate, number(&hub.omega));
+        let height = q2 * 0.5 + q2 * q2 * hardening * 0.25;
+        let height_d = rise + q2 * rise * hardening;
+        [height * (m / l) + tilted[0] * m, height_d * (m / l) + tilted[1] * m]
+    }
+
     /// Minus the bob's mass times its acceleration, -m (q'' - a - w' (y, -(r + x))).
-    fn force(&self, hub: &HubMotion) -> [f64; 2] {
-        let wd = hub.omega_dot[0];
-        let euler = [wd * self.q[1][0], -wd * self.arm[0]];
-        [0, 1].map(|i| -self.p.m * (self.q_dd[i][0] - self.a[i][0] - euler[i]))
+    fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
+        let (wd, y, arm) =
+            (number::<T>(&hub.omega_dot), number::<T>(&self.q[1]), number::<T>(&self.arm));
+        let euler = [wd * y, -wd * arm];
+        let [q_dd, a] = [&self.q_dd, &self.a].map(pair::<T>);
+        [0, 1].map(|i| -((q_dd[i] - a[i] - euler[i]) * self.p.m))
     }
 
-    fn torque(&self, hub: &HubMotion) -> f64 {
-        let [f_x, f_y] = self.force(hub);
-        self.arm[0] * f_y - self.q[1][0] * f_x
+    fn torque<T: Number>(&self, hub: &HubMotion) -> T {
+        let [f_x, f_y]: [T; 2] = self.force(hub);
+        number::<T>(&self.arm) * f_y - number::<T>(&self.q[1]) * f_x
     }
 
-    fn energy(&self, hub: &HubMotion) -> f64 {
+    fn energy<T: Number>(&self, hub: &HubMotion) -> T {
         let Pendulum { m, l, hardening, s, .. } = self.p;
-        let (x, y, x_d, y_d) = (self.q[0][0], self.q[1][0], self.q_d[0][0], self.q_d[1][0]);
-        let (w, [e_x, e_y]) = (hub.omega[0], hub.tilt.now());
-        let (v_x, v_y) = (x_d - w * y, y_d + w * self.arm[0]);
+        let ([x, y], [x_d, y_d]) = (pair::<T>(&self.q), pair::<T>(&self.q_d));
+        let (w, arm, l) = (number::<T>(&hub.omega), number::<T>(&self.arm), T::constant(l));
+        let ([e_x, e_y], [g, _]) = (hub.tilt.now::<T>(), self.p.restoring_and_drag::<T>());
+        let (v_x, v_y) = (x_d - w * y, y_d + w * arm);
         let v_z = (x * x_d + y * y_d) / l;
         let q2 = x * x + y * y;
-        m * (v_x * v_x + v_y * v_y + s * v_z * v_z) / 2.0
-            + m * self.p.g[0] / l * (q2 / 2.0 + hardening * q2 * q2 / 4.0)
-            - m * (e_x * self.arm[0] + e_y * y)
+        (v_x * v_x + v_y * v_y + v_z * s * v_z) * m * 0.5
+            + g * m / l * (q2 * 0.5 + q2 * hardening * q2 * 0.25)
+            - (e_x * arm + e_y * y) * m
     }
 
-    fn momentum(&self, hub: &HubMotion) -> f64 {
-        let (y, x_d, y_d) = (self.q[1][0], self.q_d[0][0], self.q_d[1][0]);
-        let arm = self.arm[0];
-        self.p.m * (hub.omega[0] * (arm * arm + y * y) + arm * y_d - y * x_d)
+    fn momentum<T: Number>(&self, hub: &HubMotion) -> T {
+        let ([_, y], [x_d, y_d]) = (pair::<T>(&self.q), pair::<T>(&self.q_d));
+        let arm = number::<T>(&self.arm);
+        (number::<T>(&hub.omega) * (arm * arm + y * y) + arm * y_d - y * x_d) * self.p.m
     }
 
     fn out_of_range(&self, q: &[f64; 4]) -> Option<&'static str> {

@@ -15,7 +15,8 @@
 //! that leans, gravity across the axis, e, adds -e_y c_ to p, m (r e_y - l s e_x) to T and
 //! -m (e_x r + e_y l s) to E.
 
-use taylor::series::{Series, ZERO, constant, mul, next, sin_cos, square, values};
+use taylor::number::Number;
+use taylor::series::{Series, ZERO, constant, mul, next, number, sin_cos, square, values};
 
 use super::{Angles, HubReaction, SloshMode};
 use crate::hub::HubMotion;
@@ -58,20 +59,25 @@ impl SloshMode for Planar {
         }
     }
 
-    fn pendulum(&mut self) -> &mut Pendulum {
+    fn pendulum(&self) -> &Pendulum {
+        &self.p
+    }
+
+    fn pendulum_mut(&mut self) -> &mut Pendulum {
         &mut self.p
     }
 
-    fn amplitude2(&self) -> [f64; 2] {
-        [self.al[0] * self.al[0], self.al_d[0] * self.al_d[0]]
+    fn amplitude2<T: Number>(&self) -> [T; 2] {
+        [&self.al, &self.al_d].map(|x| number::<T>(x) * number::<T>(x))
     }
 
     fn coordinates(&self, at: &Angles) -> [f64; 4] {
         [0.0, at.angle[1], 0.0, at.rate[1]]
     }
 
-    fn angles(&self) -> Angles {
-        Angles { angle: [0.0, self.al[0]], rate: [0.0, self.al_d[0]] }
+    fn angles<T: Number>(&self) -> Angles<T> {
+        let zero = T::constant(0.0);
+        Angles { angle: [zero, number(&self.al)], rate: [zero, number(&self.al_d)] }
     }
 
     fn start(&mut self, q: &[f64; 4], _: &HubMotion) {
@@ -155,36 +161,46 @@ impl SloshMode for Planar {
         [0.0, al, 0.0, al_d]
     }
 
+    fn height<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
+        let Pendulum { m, l, r, .. } = self.p;
+        let [al, al_d, s, c] = [&self.al, &self.al_d, &self.s, &self.c].map(number::<T>);
+        let half = (al * 0.5).sin();
+        let (place, rate) = ([T::constant(r), s * l], [T::constant(0.0), c * l * al_d]);
+        let tilted = hub.tilt.height_now(place, rate, number(&hub.omega));
+        [half * 2.0 * half * (m * l) + tilted[0] * m, s * al_d * (m * l) + tilted[1] * m]
+    }
+
     /// -m times the bob's acceleration at (r, l s); the plane's guide takes the
     /// radial part.
-    fn force(&self, hub: &HubMotion) -> [f64; 2] {
+    fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
         let Pendulum { m, l, r, .. } = self.p;
-        let (s, c, ad) = (self.s[0], self.c[0], self.al_d[0]);
-        let (w, wd) = (hub.omega[0], hub.omega_dot[0]);
-        let (y, y_d, y_dd) = (l * s, l * c * ad, l * (c * self.al_dd[0] - s * ad * ad));
-        let [e_x, e_y] = hub.tilt.now();
-        [m * (wd * y + 2.0 * w * y_d + w * w * r + e_x), -m * (y_dd + wd * r - w * w * y - e_y)]
+        let [s, c, ad, al_dd] = [&self.s, &self.c, &self.al_d, &self.al_dd].map(number::<T>);
+        let [w, wd]: [T; 2] = [number(&hub.omega), number(&hub.omega_dot)];
+        let (y, y_d, y_dd) = (s * l, c * l * ad, (c * al_dd - s * ad * ad) * l);
+        let [e_x, e_y]: [T; 2] = hub.tilt.now();
+        [(wd * y + w * 2.0 * y_d + w * w * r + e_x) * m, -((y_dd + wd * r - w * w * y - e_y) * m)]
     }
 
-    fn torque(&self, hub: &HubMotion) -> f64 {
-        let [f_x, f_y] = self.force(hub);
-        self.p.r * f_y - self.p.l * self.s[0] * f_x
+    fn torque<T: Number>(&self, hub: &HubMotion) -> T {
+        let [f_x, f_y]: [T; 2] = self.force(hub);
+        f_y * self.p.r - number::<T>(&self.s) * self.p.l * f_x
     }
 
-    fn energy(&self, hub: &HubMotion) -> f64 {
+    fn energy<T: Number>(&self, hub: &HubMotion) -> T {
         let Pendulum { m, l, r, .. } = self.p;
-        let (s, c, ad, w) = (self.s[0], self.c[0], self.al_d[0], hub.omega[0]);
-        let (along, up, across) = (r * w + l * c * ad, l * s * ad, l * s * w);
-        let half = libm::sin(self.al[0] / 2.0);
-        let [e_x, e_y] = hub.tilt.now();
-        m * (along * along + up * up + across * across) / 2.0
-            + 2.0 * m * self.p.g[0] * l * half * half
-            - m * (e_x * r + e_y * l * s)
+        let [al, s, c, ad] = [&self.al, &self.s, &self.c, &self.al_d].map(number::<T>);
+        let (w, [g, _]) = (number::<T>(&hub.omega), self.p.restoring_and_drag::<T>());
+        let (along, up, across) = (w * r + c * l * ad, s * l * ad, s * l * w);
+        let half = (al * 0.5).sin();
+        let [e_x, e_y]: [T; 2] = hub.tilt.now();
+        (along * along + up * up + across * across) * m * 0.5 + g * (2.0 * m) * l * half * half
+            - (e_x * r + e_y * l * s) * m
     }
 
-    fn momentum(&self, hub: &HubMotion) -> f64 {
+    fn momentum<T: Number>(&self, hub: &HubMotion) -> T {
         let Pendulum { m, l, r, .. } = self.p;
-        let (s, c) = (self.s[0], self.c[0]);
-        m * ((r * r + l * l * s * s) * hub.omega[0] + r * l * c * self.al_d[0])
+        let [s, c, ad] = [&self.s, &self.c, &self.al_d].map(number::<T>);
+        let inertia = T::constant(r * r) + s * (l * l) * s;
+        (inertia * number::<T>(&hub.omega) + c * (r * l) * ad) * m
     }
 }

@@ -35,10 +35,12 @@
 
 use alloc::format;
 use alloc::string::String;
+use taylor::number::Number;
 use taylor::plane::{
-    self, Vector2, ZERO_VECTOR2, dot, each, mul_part, mul_part_head, scale, scale_head, squares,
+    self, Vector2, ZERO_VECTOR2, dot, each, mul_part, mul_part_head, numbers, scale, scale_head,
+    squares,
 };
-use taylor::series::{Series, ZERO, constant, mul, mul_tail, next, square, values};
+use taylor::series::{Series, ZERO, constant, mul, mul_tail, next, number, square, values};
 
 use super::{Angles, HubReaction, SloshMode};
 use crate::hub::HubMotion;
@@ -115,15 +117,23 @@ impl Spherical {
     }
 
     /// Bob in the hub's frame, horizontally, m: X, Y.
-    fn bob(&self) -> [f64; 2] {
+    fn bob<T: Number>(&self) -> [T; 2] {
         let Pendulum { l, r, .. } = self.p;
-        [r + l * self.dir[0][0], l * self.dir[0][1]]
+        let [x, y]: [T; 2] = numbers(&self.dir);
+        [T::constant(r) + x * l, y * l]
     }
 
     /// Its velocity as seen from outside, in the hub's frame, m/s: X, Y, Z.
-    fn velocity(&self, hub: &HubMotion) -> [f64; 3] {
+    fn velocity<T: Number>(&self, hub: &HubMotion) -> [T; 3] {
         let Pendulum { l, r, .. } = self.p;
-        [l * self.v[0][0], l * self.v[0][1] + r * hub.omega[0], l * self.v_z[0]]
+        let [v_x, v_y]: [T; 2] = numbers(&self.v);
+        [v_x * l, v_y * l + number::<T>(&hub.omega) * r, number::<T>(&self.v_z) * l]
+    }
+
+    /// 1 + p_z = |xi|^2 k, without cancellation near rest.
+    fn above_rest<T: Number>(&self) -> T {
+        let [xi_1, xi_2]: [T; 2] = numbers(&self.xi);
+        number::<T>(&self.k) * (xi_1 * xi_1 + xi_2 * xi_2)
     }
 }
 
@@ -157,13 +167,17 @@ impl SloshMode for Spherical {
         }
     }
 
-    fn pendulum(&mut self) -> &mut Pendulum {
+    fn pendulum(&self) -> &Pendulum {
+        &self.p
+    }
+
+    fn pendulum_mut(&mut self) -> &mut Pendulum {
         &mut self.p
     }
 
-    fn amplitude2(&self) -> [f64; 2] {
-        let [x, y] = self.dir[0];
-        let [x_d, y_d] = self.xi_d[0].map(|rate| self.k[0] * rate);
+    fn amplitude2<T: Number>(&self) -> [T; 2] {
+        let [x, y]: [T; 2] = numbers(&self.dir);
+        let [x_d, y_d] = numbers::<T>(&self.xi_d).map(|rate| number::<T>(&self.k) * rate);
         [x * x + y * y, x_d * x_d + y_d * y_d]
     }
 
@@ -189,13 +203,14 @@ impl SloshMode for Spherical {
         [x, y, (v_x + x * v_z) / (1.0 - p_z), (v_y + y * v_z) / (1.0 - p_z)]
     }
 
-    fn angles(&self) -> Angles {
-        let (p, d) = (self.dir[0].map(|p| p.clamp(-1.0, 1.0)), self.dir_d[0]);
+    fn angles<T: Number>(&self) -> Angles<T> {
+        let p = numbers::<T>(&self.dir).map(|p| p.clamp(-1.0, 1.0));
+        let (d, one) = (numbers::<T>(&self.dir_d), T::constant(1.0));
         let rate = |i: usize| {
-            let cos = libm::sqrt((1.0 - p[i]) * (1.0 + p[i]));
-            if cos > 0.0 { d[i] / cos } else { 0.0 }
+            let cos = ((one - p[i]) * (one + p[i])).sqrt();
+            if cos.value() > 0.0 { d[i] / cos } else { T::constant(0.0) }
         };
-        Angles { angle: p.map(libm::asin), rate: [rate(0), rate(1)] }
+        Angles { angle: p.map(T::asin), rate: [rate(0), rate(1)] }
     }
 
     fn start(&mut self, q: &[f64; 4], hub: &HubMotion) {
@@ -324,33 +339,41 @@ impl SloshMode for Spherical {
         [xi, eta, rate(v_x + omega * y, xi), rate(v_y - omega * x, eta)]
     }
 
+    fn height<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
+        let Pendulum { m, l, .. } = self.p;
+        let rate = numbers::<T>(&self.dir_d).map(|rate| rate * l);
+        let tilted = hub.tilt.height_now(self.bob(), rate, number(&hub.omega));
+        let above = [self.above_rest::<T>(), number(&self.v_z)];
+        [0, 1].map(|i| above[i] * (m * l) + tilted[i] * m)
+    }
+
     /// The rod's pull along p and the drag.
-    fn force(&self, _: &HubMotion) -> [f64; 2] {
-        let Pendulum { m, l, c, .. } = self.p;
-        [0, 1].map(|i| m * l * self.pull[0] * self.dir[0][i] + c * l * self.dir_d[0][i])
+    fn force<T: Number>(&self, _: &HubMotion) -> [T; 2] {
+        let Pendulum { m, l, .. } = self.p;
+        let (pull, [_, c]) = (number::<T>(&self.pull), self.p.restoring_and_drag::<T>());
+        let [p, p_d] = [&self.dir, &self.dir_d].map(numbers::<T>);
+        [0, 1].map(|i| pull * (m * l) * p[i] + c * l * p_d[i])
     }
 
     /// The pull acts at the hinge, the drag at the bob.
-    fn torque(&self, hub: &HubMotion) -> f64 {
-        let Pendulum { l, c, r, .. } = self.p;
-        let ([x, y], [x_d, y_d]) = (self.dir[0], self.dir_d[0]);
-        r * self.force(hub)[1] + c * l * l * (x * y_d - y * x_d)
+    fn torque<T: Number>(&self, hub: &HubMotion) -> T {
+        let (Pendulum { l, r, .. }, [_, c]) = (self.p, self.p.restoring_and_drag::<T>());
+        let [[x, y], [x_d, y_d]] = [&self.dir, &self.dir_d].map(numbers::<T>);
+        self.force::<T>(hub)[1] * r + c * l * l * (x * y_d - y * x_d)
     }
 
-    fn energy(&self, hub: &HubMotion) -> f64 {
-        let Pendulum { m, l, .. } = self.p;
-        let [v_x, v_y, v_z] = self.velocity(hub);
-        // 1 + p_z = |xi|^2 k, without cancellation near rest
-        let [xi_1, xi_2] = self.xi[0];
-        let height = l * self.k[0] * (xi_1 * xi_1 + xi_2 * xi_2);
-        let ([x, y], [e_x, e_y]) = (self.bob(), hub.tilt.now());
-        m * (v_x * v_x + v_y * v_y + v_z * v_z) / 2.0 + m * self.p.g[0] * height
-            - m * (e_x * x + e_y * y)
+    fn energy<T: Number>(&self, hub: &HubMotion) -> T {
+        let (Pendulum { m, l, .. }, [g, _]) = (self.p, self.p.restoring_and_drag::<T>());
+        let [v_x, v_y, v_z] = self.velocity::<T>(hub);
+        let [xi_1, xi_2]: [T; 2] = numbers(&self.xi);
+        let height = number::<T>(&self.k) * l * (xi_1 * xi_1 + xi_2 * xi_2);
+        let ([x, y], [e_x, e_y]): ([T; 2], [T; 2]) = (self.bob(), hub.tilt.now());
+        (v_x * v_x + v_y * v_y + v_z * v_z) * m * 0.5 + g * m * height - (e_x * x + e_y * y) * m
     }
 
-    fn momentum(&self, hub: &HubMotion) -> f64 {
-        let ([x, y], [v_x, v_y, _]) = (self.bob(), self.velocity(hub));
-        self.p.m * (x * v_y - y * v_x)
+    fn momentum<T: Number>(&self, hub: &HubMotion) -> T {
+        let ([x, y], [v_x, v_y, _]): ([T; 2], [T; 3]) = (self.bob(), self.velocity(hub));
+        (x * v_y - y * v_x) * self.p.m
     }
 
     fn out_of_range(&self, q: &[f64; 4]) -> Option<&'static str> {
@@ -407,7 +430,7 @@ mod tests {
             let mut hub = HubMotion::REST;
             (hub.omega[0], hub.omega2[0], hub.omega_dot[0]) = (w, w * w, w_d);
             let mut mode = Spherical::new(&p);
-            mode.pendulum().set_restoring([g, 0.0]);
+            mode.pendulum_mut().set_restoring([g, 0.0]);
             mode.start(&q, &hub);
             mode.hub_reaction(0, false, &hub);
             mode.accelerate(0, false, &hub);
