@@ -17,12 +17,12 @@ MY_TANK = {
     "tank.d": (600, "mm"),  # inner diameter
     "tank.h": (400, "mm"),  # fill height
     "tank.r": (500, "mm"),  # from the axis of rotation to the tank's axis
-    "fluid.rho": 1010.0,  # kg/m3
+    "fluid.rho": 1010.0,  # kg/m³
     "fluid.nu": 0.9e-6,  # m2/s
-    "g_axial": 9.81,  # m/s2 along the tank's axis: gravity, or thrust over mass
+    "g_axial": 9.81,  # m/s² along the tank's axis: gravity, or thrust over mass
     "friction.model": "none",
 }
-# The manoeuvre: rows of time (s) and torque (N.m), joined by straight lines; two rows make a jump.
+# The manoeuvre: rows of time (s) and torque (N·m), joined by straight lines; two rows make a jump.
 TORQUE = [(0, 10), (2, 10), (2, -10), (4, -10), (4, 0), (20, 0)]
 
 

@@ -205,8 +205,8 @@ def main() -> None:
         text += f"after it {np.degrees(late['error'].abs().max()):.5f} deg, "
         text += f"imaging after {tranquillisation(run):.1f} s"
         if "slosh" in run:
-            text += f"; slosh torque up to {run['slosh'].abs().max():.4f} N.m, "
-            text += f"estimated to {(run['slosh'] - run['estimate']).abs().max():.4f} N.m, "
+            text += f"; slosh torque up to {run['slosh'].abs().max():.4f} N·m, "
+            text += f"estimated to {(run['slosh'] - run['estimate']).abs().max():.4f} N·m, "
             text += f"angle up to {np.degrees(run['tank[1].angle_y[1]'].abs().max()):.1f} deg"
         print(text)
     for share in (0.9, 1.1):

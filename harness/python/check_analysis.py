@@ -1,4 +1,4 @@
-"""Computes the figures of a campaign of sweeps again, from its stored runs, with numpy and scipy.
+"""Computes the features of a campaign of sweeps again, from its stored runs, with numpy and scipy.
 
 It is written from the definitions in book/campaigns.md, not
 from the harness's code, and shares no part of it: another Fourier transform, another least-squares
@@ -22,7 +22,7 @@ from scipy import optimize, signal, stats
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-Figures = dict[str, float | None]
+Features = dict[str, float | None]
 
 TOLERANCES = {
     "f_dip_hz": 3e-3,
@@ -44,7 +44,7 @@ TOLERANCES = {
     "off_axis_energy": 1e-6,
     "leakage": 1e-6,
 }
-"""How far the harness's figure may be from ours, in the column's unit. The two fits leave residuals
+"""How far the harness's value may be from ours, in the column's unit. The two fits leave residuals
 that differ a little, so skewness and kurtosis do; sums over the same samples do not."""
 
 
@@ -134,7 +134,7 @@ def spa(step: float, torque: Real, output: Real, grid: Real, lag: float) -> Comp
     return transformed(y) / transformed(u)
 
 
-def features(grid: Real, response: Complex) -> Figures:
+def features(grid: Real, response: Complex) -> Features:
     """Antiresonance and resonance: the ends of the level's largest rise with the frequency."""
     level = 20 * np.log10(np.abs(response))
     lowest = np.minimum.accumulate(level)
@@ -234,8 +234,8 @@ def coherence(step: float, torque: Real, output: Real, length: int) -> tuple[Rea
     )
 
 
-def analyse(path: Path) -> tuple[Figures, Figures]:
-    """Return the figures of ``features.csv`` and of ``features_spa.csv`` for a stored sweep."""
+def analyse(path: Path) -> tuple[Features, Features]:
+    """Return the features of ``features.csv`` and of ``features_spa.csv`` for a stored sweep."""
     file = pyarrow.parquet.ParquetFile(path)
     notes = {k.decode(): v.decode() for k, v in file.metadata.metadata.items()}
     columns = file.read()
@@ -254,54 +254,54 @@ def analyse(path: Path) -> tuple[Figures, Figures]:
     sweep, step = Sweep.parse(notes["profile"]), float(notes["step"])
     grid = np.geomspace(*sweep.band, 2000)
     longest = 2 * len(time) // 9
-    figures: Figures = {}
+    values: Features = {}
 
     whole = spa(step, torque, rate, grid, sweep.lag)
     spa_features = features(grid, whole)
     model = fit(grid, whole)
     miss = np.linalg.norm(whole - model.response(grid))
-    figures["fit_freq_pct"] = 100 * (1 - miss / np.linalg.norm(whole - whole.mean()))
+    values["fit_freq_pct"] = 100 * (1 - miss / np.linalg.norm(whole - whole.mean()))
     residual = residual_of(model, step, torque, rate)
     lost = np.linalg.norm(residual) / np.linalg.norm(rate - rate.mean())
-    figures["fit_time_pct"] = 100 * (1 - lost)
-    figures["skewness"] = float(stats.skew(residual))
-    figures["kurtosis"] = float(stats.kurtosis(residual, fisher=False))
+    values["fit_time_pct"] = 100 * (1 - lost)
+    values["skewness"] = float(stats.skew(residual))
+    values["kurtosis"] = float(stats.kurtosis(residual, fisher=False))
     antiresonance, resonance = spa_features.get("f_dip_hz"), spa_features.get("f_res_hz")
     if antiresonance and resonance:
         segment = np.sqrt(1 / (3 * sweep.mean_rate))
         f, gamma = coherence(step, torque, residual, min(round(segment / step), longest))
-        figures["coherence"] = float(gamma[(f >= antiresonance) & (f <= resonance)].mean())
+        values["coherence"] = float(gamma[(f >= antiresonance) & (f <= resonance)].mean())
         f, gamma = coherence(step, torque, rate, longest)
         snr = 10 * np.log10(gamma / (1 - gamma))
-        figures["snr_res_db"] = float(snr[np.argmin(np.abs(f - resonance))])
-        figures["snr_dip_db"] = float(snr[np.argmin(np.abs(f - antiresonance))])
+        values["snr_res_db"] = float(snr[np.argmin(np.abs(f - resonance))])
+        values["snr_dip_db"] = float(snr[np.argmin(np.abs(f - antiresonance))])
 
     amplitude = abs(float(notes["profile"].split("amplitude=")[1].split(",")[0]))
     x, y, force = (demodulate(sweep, time, torque, s, grid) for s in (radial, tangential, force_r))
     power = np.abs(x) ** 2 + np.abs(y) ** 2
     swirl = np.where(np.sqrt(power) * amplitude < 0.02, 0, 2 * (x * y.conj()).imag / power)
     turning = np.abs(swirl) > 0.5
-    figures["swirl"] = float(swirl[np.argmax(np.abs(swirl))])
+    values["swirl"] = float(swirl[np.argmax(np.abs(swirl))])
     share = np.abs(np.gradient(sweep.time_of(grid), edge_order=1))
     share[[0, -1]] /= 2
-    figures["rotary_s"] = float(share[turning].sum())
-    figures["rotary_from_hz"] = float(grid[turning][0]) if turning.any() else None
-    figures["rotary_to_hz"] = float(grid[turning][-1]) if turning.any() else None
+    values["rotary_s"] = float(share[turning].sum())
+    values["rotary_from_hz"] = float(grid[turning][0]) if turning.any() else None
+    values["rotary_to_hz"] = float(grid[turning][-1]) if turning.any() else None
     squares = force_r**2, force_r**2 + force_t**2
     some = squares[1] > 0
-    figures["off_axis_median"] = float(np.median(squares[0][some] / squares[1][some]))
-    figures["off_axis_energy"] = float(squares[0].sum() / squares[1].sum())
+    values["off_axis_median"] = float(np.median(squares[0][some] / squares[1][some]))
+    values["off_axis_energy"] = float(squares[0].sum() / squares[1].sum())
     # the tank's arm is no stored signal: the plan's or the FMU's start value
     settings = dict(pair.split("=", 1) for pair in notes["settings"].split())
     arm = float(settings.get("tank.r", 0.225))
-    figures["leakage"] = float(np.sqrt(np.mean(np.abs(arm * force) ** 2)))
+    values["leakage"] = float(np.sqrt(np.mean(np.abs(arm * force) ** 2)))
 
     swept = features(grid, demodulate(sweep, time, torque, rate, grid))
-    return figures | swept, figures | spa_features
+    return values | swept, values | spa_features
 
 
 def compare(
-    campaign: Path, analyse: Callable[[Path], tuple[Figures, Figures]] = analyse
+    campaign: Path, analyse: Callable[[Path], tuple[Features, Features]] = analyse
 ) -> list[str]:
     """Analyse every run of a campaign; return what differs by more than its tolerance."""
     rows = {}
@@ -315,9 +315,9 @@ def compare(
     for i, name in enumerate(names):
         print(f"{name} ({i + 1} of {len(names)})", file=sys.stderr)
         ours = analyse(campaign / "runs" / f"{name}.parquet")
-        for table, figures in zip(rows, ours, strict=True):
+        for table, values in zip(rows, ours, strict=True):
             for column, tolerance in TOLERANCES.items():
-                text, value = rows[table][i][column], figures.get(column)
+                text, value = rows[table][i][column], values.get(column)
                 if (text == "") != (value is None):
                     differences.append(f"{name}: {column} is {text or 'empty'}, here {value}")
                 elif value is not None:

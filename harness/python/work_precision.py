@@ -112,7 +112,7 @@ def counted(program: Path, method: str, tolerance: str, *options: str) -> float:
 
 
 def scipy(method: str, tolerance: float, exact: np.ndarray) -> tuple[float, float]:
-    """Solve the smoothed equations by SciPy; the same figures as ``run``."""
+    """Solve the smoothed equations by SciPy; the same results as ``run``."""
     m, length, r, g = 0.756293271862872, 0.045241351252659934, 0.225, 9.81
     i0, c = 0.322414 + 1.3304311084678084 * r * r, 0.06627875369876737
     rate = math.log(3.5 / 1.25) / SWEEP

@@ -289,7 +289,7 @@ fn communication_points_may_wobble_by_rounding() {
 /// With a slope, one long step sees the same input as many short ones. Both are
 /// within the tolerance 1e-8 (relative) of the truth.
 #[test]
-fn input_with_a_slope_does_not_depend_on_how_time_is_cut() {
+fn input_with_a_slope_does_not_depend_on_the_choice_of_communication_step() {
     let run = |cuts: u32| {
         let mut instance =
             stepping(&[("friction.model", number(2)), ("tau_cmd", Value::Real(-0.05))]);

@@ -2,7 +2,7 @@
 //! and turns the 34 C functions of co-simulation into safe calls whose errors carry
 //! the FMU's own words; those of model exchange too, where the FMU has them.
 //!
-//! The only unsafe code of the harness is in this file.
+//! Unsafe code of the harness is here and in `harness/batch/src/abi.rs` (`tests/architecture.rs`).
 #![allow(unsafe_code)]
 
 use std::cell::Cell;

@@ -18,7 +18,7 @@ def main() -> None:
     parser.add_argument("--fmu", default="HubSlosh", metavar="FILE")
     parser.add_argument(
         "--input", type=Path, required=True, metavar="FILE",
-        help="columns time (s) and tau_cmd (N.m), .csv or .parquet",
+        help="columns time (s) and tau_cmd (N·m), .csv or .parquet",
     )  # fmt: skip
     parser.add_argument("--out", type=Path, required=True, metavar="FILE")
     parser.add_argument(

@@ -1,4 +1,4 @@
-"""The harness's figures are those of an independent analysis of the same stored runs."""
+"""The harness's features are those of an independent analysis of the same stored runs."""
 
 import csv
 import functools
@@ -40,18 +40,18 @@ def campaign(request: pytest.FixtureRequest, fmu: Path, tmp_path_factory) -> Pat
     return directory / "out"
 
 
-def test_every_figure_is_found_again_from_the_definitions(campaign: Path) -> None:
+def test_every_feature_is_found_again_from_the_definitions(campaign: Path) -> None:
     """Within the tolerances of ``check_analysis``, for linear and for rotary slosh."""
     assert check_analysis.compare(campaign, analyse) == []
     with (campaign / "features.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
-    # every figure was there to be compared, the rotary ones too
+    # every feature was there to be compared, the rotary ones too
     turning = rows[-1]
     assert [turning[column] for column in TOLERANCES if turning[column] == ""] == []
     assert rows[0]["rotary_from_hz"] == ""
 
 
-def test_a_wrong_figure_is_seen(campaign: Path) -> None:
+def test_a_wrong_feature_is_seen(campaign: Path) -> None:
     """An antiresonance 4 mHz off, and one that is missing."""
     path = campaign / "features_spa.csv"
     text = path.read_text(encoding="utf-8")

@@ -74,7 +74,7 @@ def test_a_library_outside_the_archive_is_refused(tmp_path, fmu) -> None:
 
 
 def test_the_budgets_are_those_of_the_program() -> None:
-    """One figure in two languages."""
+    """One number in two languages."""
     host = ROOT / "harness" / "host" / "src"
     rust = "".join((host / name).read_text() for name in ("archive.rs", "xml.rs"))
 

@@ -102,7 +102,7 @@ impl Hyperbolic {
     }
 }
 
-/// Upright circular cylinder of radius `radius` filled to `h`, m; `rho` in kg/m3.
+/// Upright circular cylinder of radius `radius` filled to `h`, m; `rho` in kg/m³.
 ///
 ///   m_n/m_liq = 2 R tanh(kh)/(xi (xi^2 - 1) h),  k = xi/R,  wave 2 R/(xi^2 - 1)
 ///   I_eff/m_liq = h^2/12 - 3 R^2/4 + (16 R^3/h) sum tanh(k h/2)/(xi^3 (xi^2 - 1))

@@ -12,11 +12,11 @@ use crate::modal::Mode;
 /// A liquid under a specific force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fluid {
-    /// Density, kg/m3.
+    /// Density, kg/m³.
     pub rho: f64,
     /// Surface tension, N/m.
     pub sigma: f64,
-    /// Specific force along the axis, m/s2.
+    /// Specific force along the axis, m/s².
     pub g: f64,
 }
 
@@ -30,7 +30,7 @@ impl Fluid {
 /// A mode with capillarity.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Capillary {
-    /// Square of the natural frequency, 1/s2.
+    /// Square of the natural frequency, 1/s².
     pub omega2: f64,
     /// Centring spring at the bob, N/m. Slightly negative for a wetting liquid at a large Bond number.
     pub spring: f64,

@@ -142,7 +142,7 @@ pub struct ModalData {
     pub name: Option<String>,
     /// `revolution` or `box`.
     pub kind: &'static str,
-    /// Density, kg/m3.
+    /// Density, kg/m³.
     pub rho: f64,
     /// Height of the free surface above the lowest point, m.
     pub fill: f64,

@@ -30,7 +30,7 @@ pub enum Target {
 /// What is known of the liquid besides its density.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Liquid {
-    /// Specific force along the axis at which damping ratios and stiffnesses hold, m/s2; 0 or more.
+    /// Specific force along the axis at which damping ratios and stiffnesses hold, m/s²; 0 or more.
     pub gravity: f64,
     /// Kinematic viscosity, m2/s; without it the damping ratios stay as they are in the FMU.
     pub nu: Option<f64>,
@@ -117,7 +117,7 @@ fn springs(
     let Some(sigma) = liquid.sigma else {
         if liquid.gravity == 0.0 {
             warnings
-                .push("nothing centres the liquid at 0 m/s2 without surface tension".to_string());
+                .push("nothing centres the liquid at 0 m/s² without surface tension".to_string());
         }
         return vec![0.0; modes.len()];
     };
@@ -131,7 +131,7 @@ fn springs(
             let bond = fluid.bond(*radius);
             notes.push(format!(
                 "k of mode 1: meniscus of a deep cylinder at a contact angle of {angle} degrees and the Bond \
-                 number {bond:.4}, free contact line (table); it holds at {} m/s2",
+                 number {bond:.4}, free contact line (table); it holds at {} m/s²",
                 liquid.gravity
             ));
             warnings.push(
@@ -204,7 +204,7 @@ impl ParameterSet {
             .into());
         };
         if liquid.gravity == 0.0 && liquid.nu.is_some() {
-            return Err("A damping ratio holds at a specific force, and at 0 m/s2 there is none: give the one that it \
+            return Err("A damping ratio holds at a specific force, and at 0 m/s² there is none: give the one that it \
                         is to hold at, or no viscosity."
                 .to_string()
                 .into());

@@ -240,7 +240,7 @@ fn draw_modes(svg: &mut String, frame: &Frame, section: &Section, modes: &[Mode]
 
 /// The tank in section with its liquid, the free surface in each mode (largest elevations drawn alike)
 /// and, for modes with more than 1 % of the mass, the pendulum's hinge and bob if they lie in the
-/// drawing. `gravity`, m/s2, gives frequencies.
+/// drawing. `gravity`, m/s², gives frequencies.
 pub fn tank(tank: &Tank, data: &ModalData, gravity: f64) -> String {
     let section = section(tank, data);
     let margin = 0.16 * section.wall.iter().map(|p| p[0]).fold(0.0, f64::max);

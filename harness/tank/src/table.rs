@@ -9,12 +9,12 @@ pub(crate) fn short(length: f64) -> String {
     format!("{length:.9}").trim_end_matches('0').trim_end_matches('.').to_string()
 }
 
-/// The result as text: liquid, modes, what stays with the tank, and the error. `gravity`, m/s2, gives the
+/// The result as text: liquid, modes, what stays with the tank, and the error. `gravity`, m/s², gives the
 /// frequencies.
 pub fn table(data: &ModalData, gravity: f64) -> String {
     let mut text = String::new();
     let name = data.name.as_deref().unwrap_or("tank");
-    let _ = writeln!(text, "{name}: fill {} m, density {} kg/m3", short(data.fill), data.rho);
+    let _ = writeln!(text, "{name}: fill {} m, density {} kg/m³", short(data.fill), data.rho);
     let _ = writeln!(text, "  heights               {}", data.origin());
     if data.modes.is_empty() {
         let _ = writeln!(text, "  free surface          none: the tank is full and does not slosh");
@@ -48,7 +48,7 @@ pub fn table(data: &ModalData, gravity: f64) -> String {
     if gravity == 0.0 && !data.modes.is_empty() {
         let _ = writeln!(
             text,
-            "\nat 0 m/s2 only capillarity brings the liquid back, which is not in this table: f is 0"
+            "\nat 0 m/s² only capillarity brings the liquid back, which is not in this table: f is 0"
         );
     }
     let _ = writeln!(
@@ -74,7 +74,7 @@ fn section(
     }
     let _ = writeln!(
         text,
-        "\n  n  f at {gravity} m/s2    lambda        m         m/m_liq    length       bob at      hinge at    wave        beta"
+        "\n  n  f at {gravity} m/s²    lambda        m         m/m_liq    length       bob at      hinge at    wave        beta"
     );
     let _ = writeln!(
         text,

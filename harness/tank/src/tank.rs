@@ -205,7 +205,7 @@ impl Shape {
 /// What a tank looks like.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Geometry {
-    /// A body of revolution; `closed_form` where the whole tank has one.
+    /// A body of revolution.
     Revolution {
         /// Generating curve.
         contour: Contour,
@@ -226,7 +226,7 @@ pub enum Geometry {
 pub struct Tank {
     /// Its name, if it has one.
     pub name: Option<String>,
-    /// Density of the liquid, kg/m3.
+    /// Density of the liquid, kg/m³.
     pub density: f64,
     /// Its geometry.
     pub geometry: Geometry,
@@ -289,11 +289,11 @@ impl Tank {
             Some(density) if density > 0.0 && density.is_finite() => density,
             Some(density) => {
                 problems
-                    .push(format!("density is {density}; it must be a number above 0, in kg/m3."));
+                    .push(format!("density is {density}; it must be a number above 0, in kg/m³."));
                 1.0
             }
             None => {
-                problems.push("density is missing: the liquid's density in kg/m3.".to_string());
+                problems.push("density is missing: the liquid's density in kg/m³.".to_string());
                 1.0
             }
         };
@@ -387,7 +387,7 @@ impl Tank {
         };
         if let Some(capacity) = capacity.filter(|c| volume > c * (1.0 + 1e-9)) {
             return Err(format!(
-                "{} kg are more than the tank holds: {:.6} kg ({capacity:.6} m3 at {} kg/m3).",
+                "{} kg are more than the tank holds: {:.6} kg ({capacity:.6} m³ at {} kg/m³).",
                 volume * self.density,
                 capacity * self.density,
                 self.density

@@ -34,7 +34,7 @@ pub struct CampaignArgs {
     /// Fills, m.
     #[arg(long, value_name = "M,…", value_delimiter = ',', default_values_t = plan::FILLS)]
     fills: Vec<f64>,
-    /// Torque amplitudes, N.m.
+    /// Torque amplitudes, N·m.
     #[arg(long, value_name = "NM,…", value_delimiter = ',', default_values_t = plan::AMPLITUDES)]
     amplitudes: Vec<f64>,
     /// How the frequency grows from 1.25 to 3.5 Hz in 2700 s.

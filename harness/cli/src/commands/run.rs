@@ -154,7 +154,7 @@ fn default_columns(description: &ModelDescription) -> Vec<String> {
 
 fn help() -> String {
     format!(
-        "Profiles, with their defaults (torque in N.m, frequencies in Hz, times in s):\n{}\n\
+        "Profiles, with their defaults (torque in N·m, frequencies in Hz, times in s):\n{}\n\
          Examples:\n  hubslosh run --profile exp-sweep:amplitude=0.1 --out sweep.parquet\n  \
          hubslosh run --profile sine:amplitude=0.05,frequency=2.344 --set friction.model=none \\\n      \
          --set tank.h=0.05 --step 0.005 --columns theta,omega,slosh_angle --out dwell.csv\n  \

@@ -22,19 +22,19 @@ enum Scale {
     Thesis,
     /// Bond number of an acceleration, and the flight tank that has the same.
     Bond {
-        /// Density of the bench's liquid, kg/m3.
+        /// Density of the bench's liquid, kg/m³.
         #[arg(long, default_value_t = scaling::WATER.density)]
         density: f64,
         /// Its surface tension, N/m.
         #[arg(long, default_value_t = scaling::WATER.tension)]
         tension: f64,
-        /// Acceleration along the tank's axis, m/s2.
+        /// Acceleration along the tank's axis, m/s².
         #[arg(long, default_value_t = 9.81)]
         acceleration: f64,
         /// Radius of the bench's tank, m.
         #[arg(long, default_value_t = scaling::BENCH.0)]
         radius: f64,
-        /// Density of the liquid in flight, kg/m3 [default: the bench's].
+        /// Density of the liquid in flight, kg/m³ [default: the bench's].
         #[arg(long)]
         flight_density: Option<f64>,
         /// Surface tension of the liquid in flight, N/m [default: the bench's].
@@ -43,13 +43,13 @@ enum Scale {
         /// Radius of the flight tank, m: gives its acceleration.
         #[arg(long, conflicts_with = "flight_acceleration")]
         flight_radius: Option<f64>,
-        /// Acceleration in flight, m/s2: gives the tank's radius.
+        /// Acceleration in flight, m/s²: gives the tank's radius.
         #[arg(long)]
         flight_acceleration: Option<f64>,
     },
     /// Bond numbers of a rotation, and the tanks that have the same at another one.
     Rotation {
-        /// Density of the liquid, kg/m3.
+        /// Density of the liquid, kg/m³.
         #[arg(long, default_value_t = scaling::ROUND_WATER.density)]
         density: f64,
         /// Its surface tension, N/m.
@@ -61,13 +61,13 @@ enum Scale {
         /// Distance of the tank from the axis, m.
         #[arg(long, default_value_t = scaling::BENCH.1)]
         arm: f64,
-        /// Largest angular acceleration on the bench, rad/s2.
+        /// Largest angular acceleration on the bench, rad/s².
         #[arg(long)]
         alpha: f64,
         /// Largest angular rate on the bench, rad/s.
         #[arg(long)]
         omega: Option<f64>,
-        /// Angular acceleration in flight, rad/s2.
+        /// Angular acceleration in flight, rad/s².
         #[arg(long, default_value_t = 0.005)]
         flight_alpha: f64,
     },

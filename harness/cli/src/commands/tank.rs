@@ -39,7 +39,7 @@ pub struct TankArgs {
     /// How many lateral modes, 1 to 20.
     #[arg(long, value_name = "NUMBER", default_value_t = 5)]
     modes: usize,
-    /// Acceleration along the tank's axis for the frequencies in table and picture, m/s2. At 0 they are 0: only
+    /// Acceleration along the tank's axis for the frequencies in table and picture, m/s². At 0 they are 0: only
     /// capillarity (--sigma) brings the liquid back.
     #[arg(long, value_name = "NUMBER", default_value_t = 9.80665)]
     gravity: f64,

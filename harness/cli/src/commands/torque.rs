@@ -9,7 +9,7 @@ use experiments::run::Run;
 
 use super::{check_out, write_out};
 
-/// Writes a profile's torque alone: time (s), tau_cmd (N.m), and tau_slope (N.m/s), which is the
+/// Writes a profile's torque alone: time (s), tau_cmd (N·m), and tau_slope (N·m/s), which is the
 /// torque's derivative until the next row.
 ///
 /// Given value and slope at every row the FMU sees what `hubslosh run` shows it, jumps included;
@@ -62,7 +62,7 @@ impl TorqueArgs {
 
 fn help() -> String {
     format!(
-        "Profiles, with their defaults (torque in N.m, frequencies in Hz, times in s):\n{}\n\
+        "Profiles, with their defaults (torque in N·m, frequencies in Hz, times in s):\n{}\n\
          Example:\n  hubslosh torque --profile bang-stop-bang:amplitude=0.2,bang=2 --step 0.02 --out torque.csv",
         profile::help()
     )

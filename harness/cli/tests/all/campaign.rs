@@ -1,4 +1,4 @@
-//! A small campaign from outside: its files, its figures, its second start.
+//! A small campaign from outside: its files, its results, its second start.
 
 use std::path::Path;
 use std::process::{Command, Output};

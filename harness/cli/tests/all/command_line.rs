@@ -91,7 +91,7 @@ fn a_run_leaves_the_columns_asked_for() {
     .unwrap();
     assert_eq!(table.rows(), 11);
     assert_eq!(table.column("time").unwrap()[10], 0.2);
-    // at rest, held by the bearing until the torque exceeds 5.9 mN.m
+    // at rest, held by the bearing until the torque exceeds 5.9 mN·m
     assert_eq!(table.column("stuck").unwrap()[0], 1.0);
     assert!(table.column("omega").unwrap()[10] > 0.0);
     assert_eq!(files(directory.path()), ["out.csv"]);
@@ -202,7 +202,7 @@ fn a_number_that_no_machine_can_hold_is_refused_before_anything_is_allocated() {
         (&["torque", "--profile", "zero:duration=1e12", "--out", "a.csv"], steps),
         (&["torque", "--profile", "zero", "--stop", "1e300", "--out", "a.csv"], steps),
         (&["torque", "--profile", "exp-sweep:f0=1e-320", "--out", "a.csv"], "from 1e-9 to 1e9 Hz"),
-        // between two rows 1e-300 s apart a torque of 1e300 N.m has no finite slope
+        // between two rows 1e-300 s apart a torque of 1e300 N·m has no finite slope
         (
             &[
                 "torque",
@@ -406,7 +406,7 @@ fn every_column_that_is_an_input_drives_and_others_are_refused_by_name() {
     // one torque, two ways in: the same to rounding
     assert!((ext / cmd - 1.0).abs() < 1e-12 && ext > 1e-3, "{ext} {cmd}");
 
-    // the slope makes an edge an edge: 0.1 N.m for 0.1 s, then none; joined by lines it would
+    // the slope makes an edge an edge: 0.1 N·m for 0.1 s, then none; joined by lines it would
     // fall during a step
     let edge = "time,tau_cmd,tau_slope\n0,0.1,0\n0.1,0,0\n0.2,0,0\n";
     assert!(run(edge, &[]).status.success());

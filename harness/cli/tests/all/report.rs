@@ -114,7 +114,7 @@ fn one_linear_model_fits_ever_less_of_a_spherical_liquid() {
     let (_, swept, _) = &*TEN;
     let of = |name| figure(swept, "spherical", name);
     let (fit, coherence) = (of("fit_freq_pct"), of("coherence"));
-    // from about 90 to about 40 points; 0.0125 N.m is the bearing's
+    // from about 90 to about 40 points; 0.0125 N·m is the bearing's
     assert!(fit[1] > 80.0 && fit[2] < 60.0 && (30.0..45.0).contains(&fit[4]), "{fit:?}");
     // the bench's 0.45 to 0.7 at large torque, and rising
     assert!(coherence[1] < 0.2 && coherence[3] > coherence[1] + 0.1, "{coherence:?}");
@@ -201,7 +201,7 @@ fn what_the_thesis_says_is_judged_by_the_runs() {
     );
     assert!(!agrees(page, "The sweep is slow enough"));
     assert!(agrees(page, "The synthetic data's resonance, whose liquid"));
-    // statements whose runs are not there (0.2 N.m) have no row
+    // statements whose runs are not there (0.2 N·m) have no row
     assert!(!page.contains("Rotary slosh comes and goes"));
 
     // without dry friction the linear resonance has no reason to start higher: the verdict turns
@@ -265,7 +265,7 @@ fn well_formed(page: &str) {
 fn a_spacecraft_under_low_thrust_gets_its_antiresonance_and_resonance_to_a_hundredth() {
     let directory = tempfile::tempdir().unwrap();
     let directory = directory.path();
-    // 800 kg.m2, 0.02 m/s2: poles and zeros of the linear plant at 0.0438 and 0.0450 Hz. A sweep of
+    // 800 kg·m², 0.02 m/s²: poles and zeros of the linear plant at 0.0438 and 0.0450 Hz. A sweep of
     // three quarters of an hour resolves 0.4 mHz, one of six hours enough; both are too fast for the
     // response while they pass
     let plan = "profile = \"exp-sweep:amplitude=0.1,f0=0.01,f1=0.3\"\nstep = 0.2\n\

@@ -238,7 +238,7 @@ fn at_no_gravity_only_capillarity_is_left() {
     assert!(ok && said.contains("only capillarity brings the liquid back"), "{said}{error}");
     assert!(!said.contains("NaN") && !said.contains("inf"), "{said}");
     let (ok, _, said) = tank(&[&base[..], &["--parameters", &set]].concat());
-    assert!(ok && said.contains("nothing centres the liquid at 0 m/s2"), "{said}");
+    assert!(ok && said.contains("nothing centres the liquid at 0 m/s²"), "{said}");
     let (ok, _, said) = tank(&[&base[..], &["--parameters", &set, "--sigma=0.072"]].concat());
     assert!(ok, "{said}");
     let written = std::fs::read_to_string(&set).unwrap();
@@ -255,7 +255,7 @@ fn at_no_gravity_only_capillarity_is_left() {
     }
 }
 
-/// In a sphere of 1 m at 1e-6 m/s2 the first order in capillarity is a multiple of what it corrects.
+/// In a sphere of 1 m at 1e-6 m/s² the first order in capillarity is a multiple of what it corrects.
 #[test]
 fn a_stiffness_far_outside_of_its_formula_is_written_with_force_alone() {
     let folder = tempfile::tempdir().unwrap();

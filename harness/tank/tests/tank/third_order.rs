@@ -5,7 +5,7 @@ use hubslosh_tank::third_order::Overlaps;
 /// Excited modes of each azimuthal number: the terms fall as n^-5, 40 leave 1e-7.
 const COUNT: usize = 40;
 
-/// The bench's tank, R 81.5 mm. The figures, three digits, are from an independent derivation; half
+/// The bench's tank, R 81.5 mm. The values, three digits, are from an independent derivation; half
 /// a unit of their last digit.
 #[test]
 fn shifts_of_the_bench_are_the_known_ones() {
