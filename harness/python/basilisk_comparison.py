@@ -368,7 +368,7 @@ def page(
         "about x and y, and our inertia about z, `hub.I` + m_0 r². Gravity is a thrust (M + m) g",
         "along the body's z. The pendulum hinges at (`tank.r`, 0, 0); its damping is c times the",
         "unit matrix, c = 2 zeta omega_1 m. RKF78 at 1 ms; ours through fmpy in steps of 20 ms,",
-        f"tolerance {TOLERANCE:.0e}. Samples every 20 ms; figures are the largest difference over",
+        f"tolerance {TOLERANCE:.0e}. Samples every 20 ms; numbers are the largest difference over",
         "the signal's maximum.",
         "",
         f"## Every case, M = {MASS:.0e} kg",
