@@ -13,7 +13,7 @@ from hubslosh.plot import time_histories
 
 # Any parameter by its name: in SI units, or with a unit. The list: `hubslosh variables`.
 MY_TANK = {
-    "hub.I": 40.0,  # kg m2, craft and dry tank about the axis of rotation
+    "hub.I": 40.0,  # kg·m², craft and dry tank about the axis of rotation
     "tank.d": (600, "mm"),  # inner diameter
     "tank.h": (400, "mm"),  # fill height
     "tank.r": (500, "mm"),  # from the axis of rotation to the tank's axis

@@ -297,7 +297,7 @@ fn effective(a: f64, b: f64) -> f64 {
 }
 
 /// Inertia of the liquid that a box of `length_x` x `length_y` drags along when it turns about its
-/// vertical axis, filled to `h`, kg m2: `tank.I_own` of a hub that turns. The twisting modes of the
+/// vertical axis, filled to `h`, kg·m²: `tank.I_own` of a hub that turns. The twisting modes of the
 /// surface are counted as rigid.
 pub fn box_yaw_inertia(length_x: f64, length_y: f64, h: f64, rho: f64) -> f64 {
     rho * length_x * length_y * h * effective(length_x, length_y)

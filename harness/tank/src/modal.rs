@@ -64,7 +64,7 @@ pub struct Mode {
     /// m_n h_n with h_n = H_n - z_cg, kg m.
     #[serde(skip)]
     pub m_h: f64,
-    /// m_n h_n^2, kg m2.
+    /// m_n h_n^2, kg·m².
     #[serde(skip)]
     pub m_h2: f64,
     /// Elevation per angle along the surface: (r, m/rad), from the axis or inner wall outwards.
@@ -105,7 +105,7 @@ pub struct Rest {
     /// Its height, m from the contour's own zero. It can lie outside the tank.
     #[serde(rename = "H_0")]
     pub height: f64,
-    /// Its inertia across the axis about its own centre, kg m2.
+    /// Its inertia across the axis about its own centre, kg·m².
     #[serde(rename = "I_0")]
     pub inertia: f64,
 }
@@ -113,10 +113,10 @@ pub struct Rest {
 /// The liquid as seen along one horizontal axis of a box.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Axis {
-    /// Inertia of the rigid liquid about its centre of mass, kg m2.
+    /// Inertia of the rigid liquid about its centre of mass, kg·m².
     #[serde(rename = "I_frozen_cg")]
     pub i_frozen_cg: f64,
-    /// Effective inertia of the liquid under a lid about its centre of mass, kg m2.
+    /// Effective inertia of the liquid under a lid about its centre of mass, kg·m².
     #[serde(rename = "I_eff_cg")]
     pub i_eff_cg: f64,
     /// The modes.
@@ -165,17 +165,17 @@ pub struct ModalData {
     /// Height of the tank's lowest point, m from the contour's own zero; 0 for shapes and boxes, whose
     /// heights count from there.
     pub z_lowest: f64,
-    /// Inertia of the rigid liquid across the axis about its centre of mass, kg m2.
+    /// Inertia of the rigid liquid across the axis about its centre of mass, kg·m².
     #[serde(rename = "I_frozen_cg")]
     pub i_frozen_cg: f64,
-    /// Inertia of the rigid liquid about the axis, kg m2.
+    /// Inertia of the rigid liquid about the axis, kg·m².
     #[serde(rename = "I_frozen_axis")]
     pub i_frozen_axis: f64,
     /// Effective inertia about the axis: what a body that turns about it drags along (a box does, a
-    /// tank of revolution does not), kg m2.
+    /// tank of revolution does not), kg·m².
     #[serde(rename = "I_eff_axis", skip_serializing_if = "Option::is_none")]
     pub i_eff_axis: Option<f64>,
-    /// Effective inertia of the liquid under a lid, across the axis, about its centre of mass, kg m2.
+    /// Effective inertia of the liquid under a lid, across the axis, about its centre of mass, kg·m².
     #[serde(rename = "I_eff_cg")]
     pub i_eff_cg: f64,
     /// The modes, in the order of their frequency. Of a box, those along its first length.

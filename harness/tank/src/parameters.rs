@@ -8,7 +8,7 @@ use core::fmt::Write as _;
 use crate::contour::Problems;
 use crate::low_gravity::{self, Capillary, Fluid};
 use crate::modal::ModalData;
-use crate::table::short;
+use crate::table::{short, significant};
 use crate::tank::{Geometry, Shape, Tank};
 use crate::{damping, modal};
 
@@ -194,12 +194,12 @@ impl ParameterSet {
         let Some(first) = modes.first() else {
             return Err(format!(
                 "There are no modes: the tank is full and does not slosh. Its liquid is a rigid body: {:.6} kg at \
-                 z = {:.6} m ({}), inertia {:.6e} kg m2 across the axis and {:.6e} kg m2 about it.",
+                 z = {:.6} m ({}), inertia {} kg·m² across the axis and {} kg·m² about it.",
                 data.m_liq,
                 data.z_cg,
                 data.origin(),
-                data.i_eff_cg,
-                data.i_eff_axis.unwrap_or(0.0)
+                significant(data.i_eff_cg),
+                significant(data.i_eff_axis.unwrap_or(0.0))
             )
             .into());
         };

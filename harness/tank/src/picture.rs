@@ -6,6 +6,7 @@ use crate::contour::Wall;
 use crate::curve::{Curve, Point, Segment};
 use crate::modal::{ModalData, Mode};
 use crate::sweep::Sweep;
+use crate::table::significant;
 use crate::tank::{Geometry, Tank};
 use crate::third_order::Overlaps;
 
@@ -61,14 +62,14 @@ impl Frame {
         for x in ticks(self.x, (width / 70.0) as usize) {
             let (px, _) = self.place(x, self.y[0]);
             let _ = writeln!(svg, "<path d=\"M{px:.2} {bottom}v5\" stroke=\"{INK}\"/>");
-            text(svg, px, bottom + 18.0, "middle", &label(x));
+            text(svg, px, bottom + 18.0, "middle", &significant(x));
         }
         text(svg, left + width / 2.0, bottom + 36.0, "middle", x_label);
         for y in ticks(self.y, (height / 50.0) as usize) {
             let (_, py) = self.place(self.x[0], y);
             let _ = writeln!(svg, "<path d=\"M{left} {py:.2}h-5\" stroke=\"{INK}\"/>");
             if y_label.is_some() {
-                text(svg, left - 8.0, py + 4.0, "end", &label(y));
+                text(svg, left - 8.0, py + 4.0, "end", &significant(y));
             }
         }
         if let Some(y_label) = y_label {
@@ -90,12 +91,6 @@ fn ticks([from, to]: [f64; 2], count: usize) -> Vec<f64> {
         [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter().find(|s| *s >= raw).unwrap_or(raw);
     let first = (from / step - 1e-9).ceil() as i64;
     (first..).map(|k| k as f64 * step).take_while(|t| *t <= to + 1e-9 * step).collect()
-}
-
-/// A tick's value without the noise of its computation.
-fn label(value: f64) -> String {
-    let rounded: f64 = format!("{value:.6e}").parse().unwrap_or(value);
-    if rounded == 0.0 { "0".into() } else { rounded.to_string() }
 }
 
 fn text(svg: &mut String, x: f64, y: f64, anchor: &str, words: &str) {
@@ -274,13 +269,13 @@ pub fn tank(tank: &Tank, data: &ModalData, gravity: f64) -> String {
     // legend
     let x = frame.left + frame.width + 40.0;
     let name = data.name.as_deref().unwrap_or("tank");
-    let title = format!("{name}, fill {} m", label(data.fill));
+    let title = format!("{name}, fill {} m", significant(data.fill));
     text(&mut svg, frame.left, 28.0, "start", &title);
     let mut y = 70.0;
     for line in [
         format!("liquid {} kg", digits(data.m_liq)),
         format!("centre of mass at {} m", digits(data.z_cg)),
-        format!("at g = {} m/s²:", label(gravity)),
+        format!("at g = {} m/s²:", significant(gravity)),
     ] {
         text(&mut svg, x, y, "start", &line);
         y += 20.0;
@@ -395,7 +390,7 @@ pub fn sweep(tank: &Tank, sweep: &Sweep, gravity: f64) -> String {
         left += 250.0;
     }
     let name = last.name.as_deref().unwrap_or("tank");
-    let title = format!("{name}: modes over the fill, g = {} m/s²", label(gravity));
+    let title = format!("{name}: modes over the fill, g = {} m/s²", significant(gravity));
     text(&mut svg, frame.left, 26.0, "start", &title);
     let mut x = frame.left;
     for (n, colour) in COLOURS.iter().enumerate().take(last.modes.len().min(DRAWN)) {

@@ -117,11 +117,11 @@ pub struct AtFill {
     pub m_liq: f64,
     /// Height of its centre of mass, m.
     pub z_cg: f64,
-    /// Rigid inertia across the axis about the centre of mass, kg m2.
+    /// Rigid inertia across the axis about the centre of mass, kg·m².
     pub i_frozen_cg: f64,
-    /// Rigid inertia about the axis, kg m2.
+    /// Rigid inertia about the axis, kg·m².
     pub i_frozen_axis: f64,
-    /// Effective inertia across the axis about the centre of mass, kg m2.
+    /// Effective inertia across the axis about the centre of mass, kg·m².
     pub i_eff_cg: f64,
     /// The modes; their shapes are empty.
     pub modes: Vec<Mode>,

@@ -9,6 +9,12 @@ pub(crate) fn short(length: f64) -> String {
     format!("{length:.9}").trim_end_matches('0').trim_end_matches('.').to_string()
 }
 
+/// A number to seven digits, without the noise of its computation.
+pub(crate) fn significant(value: f64) -> String {
+    let rounded: f64 = format!("{value:.6e}").parse().unwrap_or(value);
+    if rounded == 0.0 { "0".into() } else { rounded.to_string() }
+}
+
 /// The result as text: liquid, modes, what stays with the tank, and the error. `gravity`, m/s², gives the
 /// frequencies.
 pub fn table(data: &ModalData, gravity: f64) -> String {
@@ -31,10 +37,11 @@ pub fn table(data: &ModalData, gravity: f64) -> String {
         "  liquid                {:.6} kg, centre of mass at z = {:.6} m",
         data.m_liq, data.z_cg
     );
-    let _ =
-        writeln!(text, "  inertia about the axis, rigid          {:.6e} kg m2", data.i_frozen_axis);
+    let rigid = significant(data.i_frozen_axis);
+    let _ = writeln!(text, "  inertia about the axis, rigid          {rigid} kg·m²");
     if let Some(inertia) = data.i_eff_axis {
-        let _ = writeln!(text, "  inertia about the axis, effective      {inertia:.6e} kg m2");
+        let inertia = significant(inertia);
+        let _ = writeln!(text, "  inertia about the axis, effective      {inertia} kg·m²");
     }
     if let Some(axes) = &data.axes {
         for (name, axis) in [("x", &axes.x), ("y", &axes.y)] {
@@ -67,8 +74,9 @@ fn section(
     rest: &[Rest],
     gravity: f64,
 ) {
-    let _ = writeln!(text, "  inertia about the centre, rigid        {rigid:.6e} kg m2");
-    let _ = writeln!(text, "  inertia about the centre, effective    {effective:.6e} kg m2");
+    let (rigid, effective) = (significant(rigid), significant(effective));
+    let _ = writeln!(text, "  inertia about the centre, rigid        {rigid} kg·m²");
+    let _ = writeln!(text, "  inertia about the centre, effective    {effective} kg·m²");
     if modes.is_empty() {
         return;
     }
@@ -97,7 +105,7 @@ fn section(
             m.beta
         );
     }
-    let _ = writeln!(text, "\n  fixed mass after       m_0, kg     H_0, m      I_0, kg m2");
+    let _ = writeln!(text, "\n  fixed mass after       m_0, kg     H_0, m      I_0, kg·m²");
     for r in rest {
         let modes = if r.modes == 1 { "mode " } else { "modes" };
         let _ = writeln!(

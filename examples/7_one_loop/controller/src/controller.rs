@@ -17,7 +17,7 @@ pub struct Parameters {
 
 impl Default for Parameters {
     fn default() -> Self {
-        // 0.5 Hz and a damping ratio of 0.7 on 0.428 kg m2
+        // 0.5 Hz and a damping ratio of 0.7 on 0.428 kg·m²
         Parameters { k_p: 4.22, k_d: 1.88, t_f: 0.02 }
     }
 }
