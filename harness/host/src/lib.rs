@@ -12,7 +12,6 @@ pub mod description;
 pub mod drive;
 pub mod fmi2;
 pub mod guard;
-pub mod html;
 pub mod output;
 pub mod temporary;
 pub mod xml;
