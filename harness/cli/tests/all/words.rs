@@ -195,8 +195,10 @@ fn literals(texts: &mut Vec<Text>) {
         let lines = source.lines().filter(|line| !line.trim_start().starts_with("//"));
         let source: String = lines.collect::<Vec<_>>().join("\n");
         let source = source.replace("\\\n", " ").replace("\\\"", "'").replace("'\"'", " ");
+        // a subscript is part of a name
+        let source = source.replace("sub { \"", "sub { \"_");
         let literals: Vec<_> = source.split('"').skip(1).step_by(2).collect();
-        texts.push((path.display().to_string(), literals.join(" | ").replace("<sub>", "_")));
+        texts.push((path.display().to_string(), literals.join(" | ")));
     }
 }
 
