@@ -39,11 +39,5 @@ pub fn allan_deviations(gyro: &Characteristics) -> String {
         ],
         legend: true,
     };
-    let style = "<style>svg { background: #ffffff; font: 11px system-ui, sans-serif }\
-         text { fill: #1d2733 } .title { font-size: 12.5px; font-weight: 600 }\
-         .grid { stroke: #dde3ea; stroke-width: .7; fill: none }\
-         .frame { stroke: #66758a; fill: none }\
-         .curve path { fill: none; stroke-width: 1.5 }</style>";
-    let svg = chart.svg().replacen("<svg ", "<svg xmlns=\"http://www.w3.org/2000/svg\" ", 1);
-    svg.replacen('>', &format!(">{style}"), 1)
+    chart.file()
 }

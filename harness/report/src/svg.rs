@@ -128,12 +128,28 @@ pub struct Chart {
     pub legend: bool,
 }
 
+/// Of a file of its own: white paper.
+const STYLE: &str = "svg { background: #ffffff; font: 11px system-ui, sans-serif }\
+    text { fill: #1d2733 } .title { font-size: 12.5px; font-weight: 600 }\
+    .grid { stroke: #dde3ea; stroke-width: .7; fill: none }\
+    .frame { stroke: #66758a; fill: none }\
+    .curve path { fill: none; stroke-width: 1.5 }";
+
 /// Space beside the plot for numbers and labels, px: left, right, top, bottom.
 const MARGIN: (f64, f64, f64, f64) = (56.0, 12.0, 26.0, 40.0);
 
 impl Chart {
-    /// The `<svg>` element.
+    /// The `<svg>` element, for a page that styles it.
     pub fn svg(&self) -> String {
+        self.drawing(None)
+    }
+
+    /// A file of its own.
+    pub fn file(&self) -> String {
+        self.drawing(Some(STYLE))
+    }
+
+    fn drawing(&self, style: Option<&str>) -> String {
         let (width, height) = self.size;
         let (left, right, top, bottom) = (MARGIN.0, width - MARGIN.1, MARGIN.2, height - MARGIN.3);
         let x = |value: f64| left + (right - left) * self.x.place(value);
@@ -141,7 +157,9 @@ impl Chart {
         // a number at the right end would be cut off at the drawing's edge
         let place = |at: f64| if at > right - 6.0 { (width, "end") } else { (at, "middle") };
         let drawing = html! {
-            svg viewBox={ "0 0 " (width) " " (height) } role="img" aria-label=(self.title) {
+            svg xmlns=[style.map(|_| "http://www.w3.org/2000/svg")]
+                viewBox={ "0 0 " (width) " " (height) } role="img" aria-label=(self.title) {
+                @if let Some(style) = style { style { (style) } }
                 text .title x=(left) y="15" { (self.title) }
                 @for &tick in &self.x.ticks {
                     @let (at, anchor) = place(x(tick));
