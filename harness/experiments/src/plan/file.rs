@@ -251,8 +251,9 @@ impl Reader<'_> {
                 self.other(run, &format!("{place}it must be a table"));
                 continue;
             };
-            let (most, text) = (budget::NAME, "a text in quotes");
-            let expected = format!("{text} of 1 to {most} bytes (without one leave it out)");
+            let most = budget::NAME;
+            let rule = format!("must have 1 to {most} bytes (without one leave it out)");
+            let expected = format!("a text in quotes, which {rule}");
             let allowed = |name: &String| (1..=most).contains(&name.len());
             let name = self.take(&place, table, "name", &expected, allowed);
             let values = names(table, &|_| false).into_iter().filter(|(key, _)| key != "name");

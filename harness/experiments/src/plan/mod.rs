@@ -742,7 +742,7 @@ mod tests {
             "line 4: [random] has no table [random.draw]",
             "line 6: [random] seed expects a whole number from 0 on, not 1e3",
             "line 7: [random] there is no key \"set\" (there are runs, seed, draw); did you mean \"seed\"?",
-            "line 9: [[run]] number 1: name expects a text in quotes of 1 to 200 bytes (without one leave it out), not \"\"",
+            "line 9: [[run]] number 1: name expects a text in quotes, which must have 1 to 200 bytes (without one leave it out), not \"\"",
             "line 11: [vary] a.b expects a list of values, such as [0.05, 0.1], not [1, nan]",
         ];
         assert_eq!(lines(text), expected);

@@ -39,7 +39,7 @@ pub(super) fn estimators(groups: &[Group]) -> Markup {
             b { "Uncertainty." } " What of the rate no linear response explains is estimated by the local rational method: around each line of the whole record's spectra a rational function of the torque's spectrum and a polynomial for the record's ends are fitted, and what is left is gyro noise, dry friction and nonlinear slosh. From its power spectral density Φ" sub { "v" } " follow the standard deviations of |H|, √(Φ" sub { "v" } "/(2nΦ" sub { "uu" } ")) over n averaged lines, and of an extremum of ln |H|, that of its slope over its curvature. Intervals are two standard deviations to either side. A shift that the sweep itself makes (below) is not in them."
         }
         p {
-            b { "Features." } " f" sub { "dip" } " and f" sub { "res" } " are the two ends of the largest rise of |H| as the frequency grows, within the sweep's band, refined by a parabola through three points of log |H|; Δf is their separation, the notch depth their difference in dB. For a bench with little damping they are the smallest and the largest |H| in the band, as in the thesis; with strong damping the largest |H| is the band's lower edge, not the slosh resonance, and the ripple behind the resonance may go deeper than the antiresonance."
+            b { "Features." } " Antiresonance and resonance are the two ends of the largest rise of |H| as the frequency grows, within the sweep's band, refined by a parabola through three points of log |H|; Δf is their separation, the notch depth their difference in dB. For a bench with little damping they are the smallest and the largest |H| in the band, as in the thesis; with strong damping the largest |H| is the band's lower edge, not the slosh resonance, and the ripple behind the resonance may go deeper than the antiresonance."
         }
         p {
             b { "Fit." } " Three poles, two zeros, least squares on the complex " code { "spa" } " response. In time it is driven with the run's torque from the initial state that fits best, as MATLAB's " code { "compare" } " does: the band says little of a slow real pole, and from rest such a pole would keep the offset of the first half cycle for the whole run."
@@ -133,7 +133,7 @@ pub(super) fn table(page: &Page, results: &Results) -> Markup {
                         th { "model" } th { "fill" br; "cm" } th { "torque" br; "mN·m" }
                         @for place in &others { (head(place)) }
                         @for _ in 0..usize::from(swept) + usize::from(recorded) {
-                            th { "f" sub { "dip" } br; "Hz" } th { "f" sub { "res" } br; "Hz" }
+                            th { "antiresonance" br; "Hz" } th { "resonance" br; "Hz" }
                             th { "Δf" br; "mHz" } th { "notch" br; "dB" }
                         }
                         th { "largest slosh" br; "angle, deg" } th { "largest wave" br; "mm" }
