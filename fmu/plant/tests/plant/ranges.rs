@@ -71,6 +71,8 @@ fn what_leaves_the_range_of_a_formula_is_warned_of() {
     assert!(warnings(&p, 9.81)[0].contains("shallow"));
     p.tank.h = 0.401 * 0.0815;
     assert!(!warnings(&p, 9.81).iter().any(|text| text.contains("shallow")));
+    (p.slosh.model, p.tank.h) = (SloshModel::Linear, 0.1 * 0.0815);
+    assert!(warnings(&p, 9.81).is_empty(), "the linear model has shallow waves");
 
     let mut p = bench(SloshModel::Linear, FrictionModel::None);
     (p.baffle.width, p.baffle.depth) = (0.008, 0.01);
@@ -119,4 +121,18 @@ fn a_table_whose_masses_are_the_whole_liquid_has_no_fixed_mass() {
     p.slosh.table.mass[1] = 0.2;
     let plant = Plant::new(&p, &at(9.81), 0.0, 1e-9).unwrap();
     assert!((plant.calculated().m_0 - 0.05).abs() < 1e-15);
+}
+
+/// sin^2 + sin^2 of the two angles is the bob's distance from its hinge's vertical, squared.
+#[test]
+fn a_spherical_bob_starts_below_the_horizontal() {
+    let refused = |radial: f64, tangential: f64| {
+        let mut p = bench(SloshModel::Spherical, FrictionModel::None);
+        (p.init.slosh_angle_radial, p.init.slosh_angle) = (radial, tangential);
+        Plant::new(&p, &at(9.81), 0.0, 1e-9).is_err()
+    };
+    // 45 degrees each are 90 together.
+    assert!(!refused(0.78, 0.78) && !refused(-0.78, 0.78) && refused(0.79, -0.79));
+    assert!(!refused(1.55, 0.0) && refused(1.57, 0.0) && !refused(0.0, 1.55) && refused(0.0, 1.57));
+    assert!(refused(0.9, 0.9), "beyond");
 }

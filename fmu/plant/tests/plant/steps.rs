@@ -1,0 +1,78 @@
+//! What a step costs and how exact it is.
+
+use super::common::bench;
+use plant::{FrictionModel, Inputs, Parameters, Plant, Ramp, STATES, SloshModel, StepError};
+
+/// Displaced liquid on a hub that turns, under a torque that brakes it.
+fn start(slosh: SloshModel, friction: FrictionModel) -> (Parameters, Inputs) {
+    let mut p = bench(slosh, friction);
+    p.friction.eps = 1e-2;
+    p.friction.sigma0 = 100.0;
+    (p.init.omega, p.init.slosh_angle, p.init.slosh_angle_radial) = (0.1, 0.2, 0.1);
+    (p, Inputs { tau_cmd: Ramp { value: -0.05, slope: 0.02 }, ..Inputs::default() })
+}
+
+fn after(p: &Parameters, inputs: &Inputs, tolerance: f64, h: f64) -> [f64; STATES] {
+    let mut plant = Plant::new(p, inputs, 0.0, tolerance).unwrap();
+    plant.step(inputs, h).unwrap();
+    *plant.continuous_states()
+}
+
+/// The internal steps that `h` takes.
+fn steps(p: &Parameters, inputs: &Inputs, tolerance: f64, h: f64) -> usize {
+    let is_enough = |max_steps: usize| {
+        let mut p = *p;
+        p.solver.max_steps = max_steps;
+        let done = Plant::new(&p, inputs, 0.0, tolerance).unwrap().step(inputs, h);
+        assert!(matches!(done, Ok(()) | Err(StepError::TooManySteps { .. })), "{done:?}");
+        done.is_ok()
+    };
+    let (mut few, mut enough) = (0, 1 << 16);
+    while enough - few > 1 {
+        let middle = (few + enough) / 2;
+        if is_enough(middle) { enough = middle } else { few = middle }
+    }
+    enough
+}
+
+#[test]
+fn states_are_as_exact_as_the_tolerance_says() {
+    for slosh in SloshModel::ALL {
+        for friction in FrictionModel::ALL {
+            let (p, inputs) = start(slosh, friction);
+            let exact = after(&p, &inputs, 1e-14, 2.0);
+            for tolerance in [1e-3, 1e-5, 1e-7, 1e-9] {
+                let found = after(&p, &inputs, tolerance, 2.0);
+                let off = found.iter().zip(exact).map(|(a, b)| (a - b).abs());
+                let off = off.fold(0.0, f64::max);
+                // Rates of 3 rad/s; a step is allowed a hundredth of the tolerance.
+                assert!(off < 0.1 * tolerance, "{slosh:?} {friction:?} {tolerance:e}: {off:e}");
+            }
+        }
+    }
+}
+
+/// None, viscous, smoothed, set-valued, LuGre; at the tolerances 1e-5 and 1e-10. More would be slower, fewer
+/// less exact; one in twenty is rounding.
+const STEPS: [[[usize; 2]; 5]; 6] = [
+    [[2, 2], [2, 2], [7, 11], [4, 5], [121, 129]],
+    [[7, 12], [7, 12], [34, 56], [16, 29], [174, 194]],
+    [[15, 28], [15, 28], [34, 56], [16, 30], [172, 194]],
+    [[16, 30], [16, 30], [34, 56], [17, 31], [172, 192]],
+    [[18, 34], [18, 34], [34, 56], [19, 36], [172, 192]],
+    [[19, 36], [19, 36], [34, 57], [20, 37], [172, 192]],
+];
+
+#[test]
+fn a_second_takes_few_internal_steps() {
+    for (slosh, of_model) in SloshModel::ALL.into_iter().zip(STEPS) {
+        for (friction, expected) in FrictionModel::ALL.into_iter().zip(of_model) {
+            let (p, inputs) = start(slosh, friction);
+            for (tolerance, expected) in [1e-5, 1e-10].into_iter().zip(expected) {
+                let found = steps(&p, &inputs, tolerance, 1.0);
+                let off = found.abs_diff(expected);
+                assert!(20 * off <= expected, "{slosh:?} {friction:?} {tolerance:e}: {found}");
+            }
+        }
+    }
+}
