@@ -285,6 +285,7 @@ mod tests {
     #[test]
     fn shallow_liquid_and_secondary_resonances_are_warned_of() {
         assert!(third_order_warning(0.3).is_some_and(|text| text.contains("shallow")));
+        assert!(third_order_warning(SHALLOW).is_none());
         assert!(third_order_warning(0.831).is_some_and(|text| text.contains("mode (2,2)")));
         assert!(third_order_warning(1.01).is_some_and(|text| text.contains("mode (0,2)")));
         assert!([5.0, 1.3, 0.6].iter().all(|fill| third_order_warning(*fill).is_none()));

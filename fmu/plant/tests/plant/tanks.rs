@@ -107,6 +107,9 @@ fn a_table_that_is_no_tank_is_refused_with_everything_that_is_wrong() {
     };
     one(|p| p.slosh.table.frequency[0] = 1.0, "one of them greater than 0");
     one(|p| p.slosh.table.length.swap(0, 1), "order of their frequencies");
+    // A stiffness counts: omega^2 = g/l + k/m.
+    one(|p| p.slosh.table.k[0] = 1000.0, "order of their frequencies");
+    assert!(refused(|p| (p.slosh.table.length[1], p.slosh.table.k[1]) = (0.1, 20.0)).is_empty());
     one(|p| p.slosh.table.m_liq *= 0.1, "add up to");
     one(
         |p| {
