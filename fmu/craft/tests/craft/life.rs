@@ -88,7 +88,9 @@ fn the_tolerance_is_kept_while_tanks_drain() {
         };
         let mut p = Parameters { tanks: 1, ..random.parameters() };
         p.tank[0] = tank;
-        let mut on = random.inputs();
+        let thrust = [20.0, -10.0, 2.0 * p.craft.mass];
+        let mut on = Inputs { force: Ramp::held(thrust), ..Inputs::default() };
+        on.torque = Ramp { value: [5.0, 3.0, -1.0], slope: [1.0, -2.0, 0.5] };
         on.mass_flow[0] = mass_flow;
         let of_craft = |tolerance: f64| {
             let mut craft = Spacecraft::new(&p, &on, 0.0, tolerance).unwrap();

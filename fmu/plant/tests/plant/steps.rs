@@ -76,3 +76,17 @@ fn a_second_takes_few_internal_steps() {
         }
     }
 }
+
+/// The tolerance is relative to the motion: on a hub at rest small waves take no more steps than large ones.
+#[test]
+fn a_small_motion_takes_no_more_steps_than_a_large_one() {
+    for slosh in SloshModel::ALL {
+        let of_angle = |angle: f64| {
+            let mut p = bench(slosh, FrictionModel::None);
+            p.init.slosh_angle = angle;
+            steps(&p, &Inputs::default(), 1e-8, 1.0)
+        };
+        let [small, large] = [2e-3, 0.2].map(of_angle);
+        assert!(small <= large + 1, "{slosh:?}: {small} {large}");
+    }
+}
