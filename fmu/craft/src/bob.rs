@@ -6,7 +6,7 @@
 //! c  drag -c l p' on the bob (its velocity against the tank), kg/s
 //! k  centring potential k l^2 |p_perp|^2/2, p_perp = p - e (e.p), N/m
 //! B = a + w' x P + w x (w x P)     specific force at the hinge
-//! T  pull of the rod, > 0 when it pulls the bob to the hinge
+//! T  tension of the rod, > 0 when it pulls the bob to the hinge
 //! ```
 //!
 //! The motion is expanded in p and in v = p' + w x p, the bob's velocity against the hinge over
@@ -81,14 +81,14 @@ pub struct Bob {
     /// B
     specific_force: Vector,
     /// T/m
-    pull: Series,
+    tension: Series,
     /// p.e
     height: Series,
     /// Of the order at hand: what does not depend on [a; w'] of this order.
     turned: [[f64; 2]; 3],
     centripetal: Vec3,
     p_perp: Vec3,
-    known_pull: f64,
+    known_tension: f64,
     known: Vec3,
 }
 
@@ -118,12 +118,12 @@ impl Bob {
             p_d: ZERO_VECTOR,
             v_d: ZERO_VECTOR,
             specific_force: ZERO_VECTOR,
-            pull: ZERO,
+            tension: ZERO,
             height: ZERO,
             turned: [[0.0; 2]; 3],
             centripetal: [0.0; 3],
             p_perp: [0.0; 3],
-            known_pull: 0.0,
+            known_tension: 0.0,
             known: [0.0; 3],
         }
     }
@@ -178,7 +178,7 @@ impl Bob {
         let p_d = [0, 1, 2].map(|i| self.v[N][i] - self.turned[i][0]);
         self.p_d[N] = p_d;
         self.centripetal = times(w2, self.hinge);
-        let mut pull = l * space::square_vector::<N>(&self.v)
+        let mut tension = l * space::square_vector::<N>(&self.v)
             - space::dot_tail::<N>(&self.p, &self.specific_force)
             - dot(self.p[0], self.centripetal);
         let (mut reaction, mut twist) = ([0.0; 3], [0.0; 3]);
@@ -195,14 +195,14 @@ impl Bob {
             } else {
                 -series::square(N, &self.height)
             };
-            pull -= self.k_m * l * off_axis_2;
+            tension -= self.k_m * l * off_axis_2;
             reaction = add(reaction, scale(k * l, self.p_perp));
             let around = cross(self.e, space::scale::<N>(&self.height, &self.p));
             twist = add(twist, scale(k * l, around));
         }
-        self.known_pull = pull;
-        let pulled = space::scale_head::<N>(&self.pull, &self.p);
-        self.known = add(pulled, scale(pull, self.p[0]));
+        self.known_tension = tension;
+        let pulled = space::scale_head::<N>(&self.tension, &self.p);
+        self.known = add(pulled, scale(tension, self.p[0]));
         let force = add(scale(m, self.known), reaction);
         [force, add(cross(self.hinge, force), scale(l, twist))]
     }
@@ -214,7 +214,7 @@ impl Bob {
         let at_hinge = add(a, cross(w_d, self.hinge));
         self.specific_force[N] = add(at_hinge, self.centripetal);
         let along = dot(self.p[0], at_hinge);
-        self.pull[N] = self.known_pull - along;
+        self.tension[N] = self.known_tension - along;
         let pulled = sub(self.known, scale(along, self.p[0]));
         let fall = scale(self.inv_l, add(self.specific_force[N], pulled));
         let mut v_d = [0, 1, 2].map(|i| -self.turned[i][1] - fall[i]);
@@ -273,20 +273,20 @@ impl Bob {
     /// Force on the craft and its torque about O.
     pub fn wrench<T: Number>(&self) -> [Vec3<T>; 2] {
         let [p, p_d, _] = self.state::<T>();
-        let pull = T::of(self.pull[0], self.pull[1]) * self.m;
-        self.at_hinge_and_bob(pull, p, p_d)
+        let tension = T::of(self.tension[0], self.tension[1]) * self.m;
+        self.at_hinge_and_bob(tension, p, p_d)
     }
 
-    /// The wrench at a = 0 and w' = 0, that is with the pull
+    /// The wrench at a = 0 and w' = 0, that is with the tension
     /// T_0 = m (l |v|^2 - p.(w x (w x P))) - k l |p_perp|^2.
     pub fn bias<T: Number>(&self, w: Vec3<T>) -> [Vec3<T>; 2] {
         let [p, p_d, _] = self.state::<T>();
         let v = add(p_d, cross(w, p));
         let p_perp = self.perpendicular(p);
         let centripetal = cross(w, cross(w, constant(self.hinge)));
-        let pull = (dot(v, v) * self.l - dot(p, centripetal)) * self.m
+        let tension = (dot(v, v) * self.l - dot(p, centripetal)) * self.m
             - dot(p_perp, p_perp) * (self.k * self.l);
-        self.at_hinge_and_bob(pull, p, p_d)
+        self.at_hinge_and_bob(tension, p, p_d)
     }
 
     fn perpendicular<T: Number>(&self, p: Vec3<T>) -> Vec3<T> {
@@ -294,10 +294,10 @@ impl Bob {
         sub(p, scale(dot(e, p), e))
     }
 
-    fn at_hinge_and_bob<T: Number>(&self, pull: T, p: Vec3<T>, p_d: Vec3<T>) -> [Vec3<T>; 2] {
+    fn at_hinge_and_bob<T: Number>(&self, tension: T, p: Vec3<T>, p_d: Vec3<T>) -> [Vec3<T>; 2] {
         let p_perp = self.perpendicular(p);
         let phi = [0, 1, 2].map(|i| (p_d[i] * self.c + p_perp[i] * self.k) * self.l);
-        let force = add(scale(pull, p), phi);
+        let force = add(scale(tension, p), phi);
         let twist = cross(p, phi).map(|x| x * self.l);
         [force, add(cross(constant(self.hinge), force), twist)]
     }

@@ -56,9 +56,9 @@ use crate::rigid::{Mat6, Rigid};
 use crate::sizes::{MODES, POINTS};
 use crate::state::Line;
 
-/// A tank in its place.
+/// A tank where it is mounted.
 #[derive(Clone, Debug)]
-pub struct Place {
+pub struct MountedTank {
     pub tank: Tank,
     axes: Mat3,
     e: Vec3,
@@ -90,7 +90,7 @@ pub struct Swing<T> {
     centring: T,
     /// m', and the velocity of the rod's far end for a bob at rest on it, h' e + l' p.
     m_d: T,
-    reel: Vec3<T>,
+    end_rate: Vec3<T>,
     /// k l l' |p_perp|^2
     centring_d: T,
 }
@@ -99,9 +99,9 @@ pub struct Swing<T> {
 pub struct Contents<T> {
     pub rigid: Rigid<T>,
     /// Force and torque about O that the flow within makes.
-    stirring: [Vec3<T>; 2],
+    flow_wrench: [Vec3<T>; 2],
     /// K and L.
-    pub stir: [Vec3<T>; 2],
+    pub flow_momentum: [Vec3<T>; 2],
     bobs: [Option<Swing<T>>; MODES],
     /// Power dissipated, W.
     pub dissipation: T,
@@ -113,10 +113,10 @@ pub fn vec_of<T: Number>(x: &[T], at: usize) -> Vec3<T> {
     [x[at], x[at + 1], x[at + 2]]
 }
 
-impl Place {
-    pub fn new(tank: &Tank) -> Place {
+impl MountedTank {
+    pub fn new(tank: &Tank) -> MountedTank {
         let axes = rotation(&unit_quaternion(tank.q));
-        Place { tank: *tank, axes, e: axes.map(|row| row[2]), d: tank.position }
+        MountedTank { tank: *tank, axes, e: axes.map(|row| row[2]), d: tank.position }
     }
 
     /// x: p and p' of each mode, tank axes; `liquid`, `flow` and its `slope` count for tanks with a table.
@@ -128,7 +128,7 @@ impl Place {
         flow: T,
         slope: f64,
     ) -> Contents<T> {
-        let Place { tank, axes, .. } = self;
+        let MountedTank { tank, axes, .. } = self;
         let table = &tank.fill;
         let drains = table.points > 0;
         let c = T::constant;
@@ -151,7 +151,7 @@ impl Place {
         // K and L without the axial part, with their derivatives; sum of m_n' b_n and its derivative.
         let (mut level, mut level_d) = ([zero; 2], [zero; 2]);
         let mut sinking = [c(0.0); 2];
-        let mut stirring = [zero; 2];
+        let mut flow_wrench = [zero; 2];
         let mut dissipation = c(0.0);
         for n in 0..tank.modes {
             let m = follow(&table.mass[n], tank.mass[n]);
@@ -194,9 +194,9 @@ impl Place {
                 add(level_d[1], add(cross(foot, lost_d), cross(scale(b_d, e), lost))),
             ];
             let speed = add(cross(w, rho), rho_d);
-            stirring = [
-                sub(stirring[0], scale(m[1], rho_d)),
-                sub(stirring[1], scale(m[1], cross(rho, speed))),
+            flow_wrench = [
+                sub(flow_wrench[0], scale(m[1], rho_d)),
+                sub(flow_wrench[1], scale(m[1], cross(rho, speed))),
             ];
             dissipation = dissipation + drag * l[0] * l[0] * dot(p_d, p_d);
             bobs[n] = Some(Swing {
@@ -212,7 +212,7 @@ impl Place {
                 known,
                 centring: l[0] * l[0] * dot(p_perp, p_perp) * (0.5 * k),
                 m_d: m[1],
-                reel: add(scale(h[1], e), scale(l[1], p)),
+                end_rate: add(scale(h[1], e), scale(l[1], p)),
                 centring_d: l[0] * l[1] * dot(p_perp, p_perp) * k,
             });
         }
@@ -243,12 +243,12 @@ impl Place {
             shrinking.1 = [add(scale(m_0[1], s), scale(m_0[0], s_d)), turning];
             let leaving = scale(flow, cross(outlet, cross(w, outlet)));
             let torque = [turning, leaving, cross(w, l), level_d[1]];
-            stirring = [
-                sub(stirring[0], force),
-                torque.into_iter().fold(stirring[1], |sum, part| sub(sum, part)),
+            flow_wrench = [
+                sub(flow_wrench[0], force),
+                torque.into_iter().fold(flow_wrench[1], |sum, part| sub(sum, part)),
             ];
         }
-        Contents { rigid, stirring, stir: level, bobs, dissipation, shrinking }
+        Contents { rigid, flow_wrench, flow_momentum: level, bobs, dissipation, shrinking }
     }
 
     /// The bobs' p' and p'' in tank axes, as six numbers each, under [a; w'].
@@ -293,14 +293,14 @@ impl Place {
 
 impl<T: Number> Swing<T> {
     /// T under [a; w'].
-    fn pull(&self, a: Vec3<T>, w_d: Vec3<T>) -> T {
+    fn tension(&self, a: Vec3<T>, w_d: Vec3<T>) -> T {
         let u = self.u;
         self.t_0 - self.m * (dot([u[0], u[1], u[2]], a) + dot([u[3], u[4], u[5]], w_d))
     }
 
-    /// Force and torque about O on the craft at the pull T.
-    fn wrench(&self, pull: T) -> [Vec3<T>; 2] {
-        let force = add(scale(pull, self.p), self.phi);
+    /// Force and torque about O on the craft at the tension T.
+    fn wrench(&self, tension: T) -> [Vec3<T>; 2] {
+        let force = add(scale(tension, self.p), self.phi);
         [force, cross(self.rho, force)]
     }
 }
@@ -320,14 +320,15 @@ impl<T: Number> Contents<T> {
     /// Force and torque about O on the craft at a = w' = 0, the rigid liquid's inertia left out.
     pub fn loads(&self) -> [Vec3<T>; 2] {
         let bobs = self.bobs.iter().flatten().map(|bob| bob.wrench(bob.t_0));
-        bobs.fold(self.stirring, |sum, bob| [add(sum[0], bob[0]), add(sum[1], bob[1])])
+        bobs.fold(self.flow_wrench, |sum, bob| [add(sum[0], bob[0]), add(sum[1], bob[1])])
     }
 
     /// Force and torque about O on the craft.
     pub fn wrench(&self, a: Vec3<T>, w: Vec3<T>, w_d: Vec3<T>) -> [Vec3<T>; 2] {
         let rigid = self.rigid.inertial_wrench(a, w, w_d);
-        let bobs = self.bobs.iter().flatten().map(|bob| bob.wrench(bob.pull(a, w_d)));
-        let sum = bobs.fold(self.stirring, |sum, bob| [add(sum[0], bob[0]), add(sum[1], bob[1])]);
+        let bobs = self.bobs.iter().flatten().map(|bob| bob.wrench(bob.tension(a, w_d)));
+        let sum =
+            bobs.fold(self.flow_wrench, |sum, bob| [add(sum[0], bob[0]), add(sum[1], bob[1])]);
         [sub(sum[0], rigid[0]), sub(sum[1], rigid[1])]
     }
 
@@ -335,7 +336,7 @@ impl<T: Number> Contents<T> {
     pub fn drained(&self, v: Vec3<T>, w: Vec3<T>, [a, w_d]: [Vec3<T>; 2], on_pivot: bool) -> T {
         let half = 0.5;
         let (m_0_d, [s_d, turning]) = self.shrinking;
-        let [force, torque] = self.stirring;
+        let [force, torque] = self.flow_wrench;
         let mut power = dot(force, v)
             + dot(torque, w)
             + dot(v, v) * m_0_d * half
@@ -344,9 +345,9 @@ impl<T: Number> Contents<T> {
         let mut moment_d = s_d;
         for bob in self.bobs.iter().flatten() {
             let speed = add(v, add(cross(w, bob.rho), bob.rho_d));
-            let pull = add(scale(bob.pull(a, w_d), bob.p), bob.phi);
-            power =
-                power + dot(speed, speed) * bob.m_d * half - dot(pull, bob.reel) + bob.centring_d;
+            let tension = add(scale(bob.tension(a, w_d), bob.p), bob.phi);
+            power = power + dot(speed, speed) * bob.m_d * half - dot(tension, bob.end_rate)
+                + bob.centring_d;
             moment_d = add(moment_d, scale(bob.m_d, bob.rho));
         }
         if on_pivot {
@@ -359,7 +360,7 @@ impl<T: Number> Contents<T> {
 /// The outflow of a tank over one step.
 #[derive(Clone, Copy)]
 pub struct Outflow<'a> {
-    pub place: &'a Place,
+    pub mounted: &'a MountedTank,
     pub flow: Line,
     /// Where the mass of liquid stands in the states.
     pub at: usize,
@@ -374,9 +375,9 @@ impl Outflow<'_> {
 
     /// Whether the flow can go on for `h`.
     pub fn check(&self, liquid: f64, h: f64) -> Result<(), StepError> {
-        let Outflow { place, flow, tank, .. } = *self;
+        let Outflow { mounted, flow, tank, .. } = *self;
         let [Some(low), Some(high)] =
-            [place.tank.fill.masses().first(), place.tank.fill.masses().last()]
+            [mounted.tank.fill.masses().first(), mounted.tank.fill.masses().last()]
         else {
             return Ok(());
         };
@@ -401,7 +402,7 @@ impl Outflow<'_> {
     /// The first time after `t` at which the tank passes a point of its table, or `h`.
     fn next_point(&self, liquid: f64, t: f64, h: f64) -> f64 {
         let (flow, mut next) = (self.flow, h);
-        for point in self.place.tank.fill.masses() {
+        for point in self.mounted.tank.fill.masses() {
             // f t + f' t^2/2 = gone
             let gone = liquid - point;
             let square = flow.value * flow.value + 2.0 * flow.slope * gone;

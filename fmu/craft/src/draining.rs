@@ -18,7 +18,9 @@ use taylor::vector::{
     unit_quaternion,
 };
 
-use crate::contents::{Contents, Drains, Outflow, Place, has_diverged, normalise_bobs, vec_of};
+use crate::contents::{
+    Contents, Drains, MountedTank, Outflow, has_diverged, normalise_bobs, vec_of,
+};
 use crate::motion::SCALE_TIME;
 use crate::outputs::{Now, TankNow};
 use crate::parameters::{Mount, Parameters, Tank};
@@ -79,7 +81,7 @@ pub struct Draining {
     craft: Rigid,
     mount: Mount,
     gravity: Vec3,
-    tanks: Vec<Place>,
+    tanks: Vec<MountedTank>,
 }
 
 /// The same over one step.
@@ -147,23 +149,23 @@ impl Draining {
             craft: p.craft.rigid(),
             mount: p.mount,
             gravity: p.gravity,
-            tanks: tanks.iter().map(|tank| Place::new(&tank.resolve())).collect(),
+            tanks: tanks.iter().map(|tank| MountedTank::new(&tank.resolve())).collect(),
         })
     }
 
     /// The tanks as they are with that much liquid.
     pub fn tanks<'a>(&'a self, x: &'a [f64; STATES]) -> [Tank; TANKS] {
         core::array::from_fn(|i| match self.tanks.get(i) {
-            Some(place) => Tank { liquid_0: x[index::LIQUID + i], ..place.tank }.resolve(),
+            Some(mounted) => Tank { liquid_0: x[index::LIQUID + i], ..mounted.tank }.resolve(),
             None => Tank::default(),
         })
     }
 
     fn outflows<'a>(&'a self, flow: &'a [Line; TANKS]) -> impl Iterator<Item = Outflow<'a>> {
-        let drains = self.tanks.iter().enumerate().filter(|(_, place)| place.drains());
-        drains.map(|(i, place)| {
+        let drains = self.tanks.iter().enumerate().filter(|(_, mounted)| mounted.drains());
+        drains.map(|(i, mounted)| {
             let (at, tank) = (index::LIQUID + i, i + 1);
-            Outflow { place, flow: flow[i], at, tank }
+            Outflow { mounted, flow: flow[i], at, tank }
         })
     }
 
@@ -216,10 +218,10 @@ impl Draining {
         let w = vec_of(x, index::OMEGA);
         let velocity = transposed_times(&axes, vec_of(x, index::VELOCITY));
         let contents: [Option<Contents<T>>; TANKS] = core::array::from_fn(|i| {
-            let place = self.tanks.get(i)?;
+            let mounted = self.tanks.get(i)?;
             let liquid = x[index::LIQUID + i];
             let bobs = &x[index::bob(i, 0)..index::bob(i, 0) + 6 * MODES];
-            Some(place.contents(bobs, w, liquid, acting.flow[i], acting.flow_slope[i]))
+            Some(mounted.contents(bobs, w, liquid, acting.flow[i], acting.flow_slope[i]))
         });
         let all = || contents.iter().flatten();
         let rigid = all().fold(self.craft.lift::<T>(), |sum, tank| sum.and(&tank.rigid));
@@ -267,17 +269,17 @@ impl Draining {
         let on_pivot = self.mount == Mount::Pivot;
         let mut drained = c(0.0);
         let mut tanks = [(); TANKS].map(|()| None);
-        for (i, (tank, place)) in all().zip(&self.tanks).enumerate() {
-            if place.drains() {
+        for (i, (tank, mounted)) in all().zip(&self.tanks).enumerate() {
+            if mounted.drains() {
                 put(index::LIQUID + i, &[-acting.flow[i]]);
                 drained = drained + tank.drained(velocity, w, [a, w_d], on_pivot);
             }
-            place.put_rates(tank, [a, w_d], |at, numbers| put(index::bob(i, 0) + at, numbers));
+            mounted.put_rates(tank, [a, w_d], |at, numbers| put(index::bob(i, 0) + at, numbers));
             tanks[i] = Some(TankNow {
                 rigid: tank.rigid,
-                stir: tank.stir,
+                flow_momentum: tank.flow_momentum,
                 wrench: tank.wrench(a, w, w_d),
-                bobs: place.bobs_now(tank),
+                bobs: mounted.bobs_now(tank),
             });
         }
         put(index::DRAINED, &[drained]);

@@ -177,7 +177,7 @@ pub(crate) struct TankNow<T> {
     /// Force and torque about O on the craft.
     pub wrench: [Vec3<T>; 2],
     /// Momentum and moment of momentum about O of the flow within (draining.rs).
-    pub stir: [Vec3<T>; 2],
+    pub flow_momentum: [Vec3<T>; 2],
     pub bobs: [Option<BobNow<T>>; MODES],
 }
 
@@ -213,8 +213,8 @@ impl CraftMotion {
                 wrench = [add(wrench[0], f), add(wrench[1], tau)];
                 bobs[bob.mode] = Some(bob.now());
             }
-            let stir = [constant([0.0; 3]); 2];
-            tanks[i] = Some(TankNow { rigid, wrench, stir, bobs });
+            let flow_momentum = [constant([0.0; 3]); 2];
+            tanks[i] = Some(TankNow { rigid, wrench, flow_momentum, bobs });
         }
         Now {
             a,
@@ -264,8 +264,8 @@ impl<T: Number> Now<T> {
             energy = energy + dot(speed, speed) * bob.m * half + bob.centring;
         }
         for tank in tanks() {
-            inner_momentum = add(inner_momentum, tank.stir[0]);
-            inner_angular = add(inner_angular, tank.stir[1]);
+            inner_momentum = add(inner_momentum, tank.flow_momentum[0]);
+            inner_angular = add(inner_angular, tank.flow_momentum[1]);
         }
         let center = all.center();
         let momentum = add(scale(all.mass, velocity), inner_momentum);

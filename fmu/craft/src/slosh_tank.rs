@@ -9,7 +9,7 @@
 //! bias = sum of (T_0 u + [phi; rho x phi]) - [m_0 w x (w x s); w x (I_s w)]
 //! ```
 //!
-//! M_0, I_s: the rigid liquid about O (`rigid.rs`); T_0: the pull at a = w' = 0 (`bob.rs`). A
+//! M_0, I_s: the rigid liquid about O (`rigid.rs`); T_0: the tension at a = w' = 0 (`bob.rs`). A
 //! host that solves (M_host + M_a) [a; w'] = rest + bias has no algebraic loop, whatever the
 //! masses.
 //!
@@ -49,7 +49,7 @@ use taylor::space::{self, Pair, Vector, ZERO_PAIR, ZERO_VECTOR, products};
 use taylor::vector::{Mat3, Vec3, add, constant, cross, largest, on_sphere, part, scale};
 
 use crate::bob::{Bob, BobNow};
-use crate::contents::{Drains, Outflow, Place, has_diverged, normalise_bobs, vec_of};
+use crate::contents::{Drains, MountedTank, Outflow, has_diverged, normalise_bobs, vec_of};
 use crate::motion::{SCALE_TIME, twice_crossed};
 use crate::outputs::{MassProperties, TankOutputs};
 use crate::parameters::{Craft, Limits, MAX_STEPS, Tank, steps_problem, tolerance_problem};
@@ -224,13 +224,13 @@ pub struct SloshTank {
     /// M of [`Coupling::Lumped`].
     lumped: Rigid,
     /// If the tank can drain.
-    draining: Option<Box<Place>>,
+    draining: Option<Box<MountedTank>>,
     limits: Limits,
 }
 
 /// The motion of a tank that drains over one step.
 struct Run<'a> {
-    place: &'a Place,
+    mounted: &'a MountedTank,
     inputs: &'a TankInputs,
 }
 
@@ -255,7 +255,7 @@ impl System<TANK_STATES> for Run<'_> {
         }
         let TankInputs { a, omega_dot, mass_flow, .. } = self.inputs;
         let moved = [a.at(t), self.inputs.omega_at(t), omega_dot.at(t)];
-        draining_rates(self.place, x, &(moved, mass_flow.at(t)), mass_flow.slope)
+        draining_rates(self.mounted, x, &(moved, mass_flow.at(t)), mass_flow.slope)
     }
 
     fn error_scale(
@@ -277,21 +277,21 @@ impl Drains<TANK_STATES> for Run<'_> {
     }
 
     fn outflows(&self) -> impl Iterator<Item = Outflow<'_>> {
-        let Run { place, inputs } = *self;
-        core::iter::once(Outflow { place, flow: inputs.mass_flow, at: LIQUID, tank: 0 })
+        let Run { mounted, inputs } = *self;
+        core::iter::once(Outflow { mounted, flow: inputs.mass_flow, at: LIQUID, tank: 0 })
     }
 }
 
 fn draining_rates<T: Number>(
-    place: &Place,
+    mounted: &MountedTank,
     x: &[T; TANK_STATES],
     acting: &Acting<T>,
     slope: f64,
 ) -> [T; TANK_STATES] {
     let ([a, w, w_d], flow) = *acting;
-    let contents = place.contents(x, w, x[LIQUID], flow, slope);
+    let contents = mounted.contents(x, w, x[LIQUID], flow, slope);
     let mut rate = [T::constant(0.0); TANK_STATES];
-    place.put_rates(&contents, [a, w_d], |at, numbers| {
+    mounted.put_rates(&contents, [a, w_d], |at, numbers| {
         rate[at..at + numbers.len()].copy_from_slice(numbers);
     });
     rate[DISSIPATED] = contents.dissipation;
@@ -517,7 +517,7 @@ impl SloshTank {
             coupling: p.coupling,
             host: p.host,
             lumped,
-            draining: (tank.fill.points > 0).then(|| Box::new(Place::new(&tank))),
+            draining: (tank.fill.points > 0).then(|| Box::new(MountedTank::new(&tank))),
             limits: Limits { tolerance, max_steps: p.max_steps },
         }
     }
@@ -554,9 +554,9 @@ impl SloshTank {
         let mut given = given.chain(&inputs.omega_dot.value).chain(&inputs.omega_dot.slope);
         let done = if !given.all(|x| x.is_finite()) {
             Err(StepError::NotFinite { time: before.time })
-        } else if let Some(place) = &self.draining {
+        } else if let Some(mounted) = &self.draining {
             let x = &mut self.motion.state.x;
-            Run { place, inputs }.advance(x, before.time, h, self.limits)
+            Run { mounted, inputs }.advance(x, before.time, h, self.limits)
         } else {
             self.motion.advance(h, self.limits)
         };
@@ -570,11 +570,11 @@ impl SloshTank {
     /// What the tank shows now, under the inputs' present values.
     pub fn outputs(&mut self, inputs: &TankInputs) -> SloshTankOutputs {
         let x = self.motion.state.x;
-        if let Some(place) = &self.draining {
+        if let Some(mounted) = &self.draining {
             let TankInputs { a, omega, omega_dot, mass_flow } = *inputs;
             let motion = [a.value, omega, omega_dot.value];
             return self.draining_outputs(
-                place,
+                mounted,
                 &x,
                 &x,
                 &(motion, mass_flow.value),
@@ -587,13 +587,13 @@ impl SloshTank {
 
     fn draining_outputs<T: Number>(
         &self,
-        place: &Place,
+        mounted: &MountedTank,
         shown: &[f64; TANK_STATES],
         x: &[T; TANK_STATES],
         ([a, w, w_d], flow): &Acting<T>,
         slope: f64,
     ) -> SloshTankOutputs {
-        let contents = place.contents(x, *w, x[LIQUID], *flow, slope);
+        let contents = mounted.contents(x, *w, x[LIQUID], *flow, slope);
         let mut matrix = contents.rigid.mass_matrix();
         contents.add_rods(&mut matrix);
         let parts = Parts {
@@ -602,7 +602,7 @@ impl SloshTank {
             wrench: contents.wrench(*a, *w, *w_d),
             loads: contents.loads(),
             matrix,
-            bobs: place.bobs_now(&contents),
+            bobs: mounted.bobs_now(&contents),
         };
         self.outputs_from(shown, parts)
     }
@@ -681,8 +681,8 @@ impl SloshTank {
 
     /// x'; directions and their rates are normalised first.
     pub fn derivatives(&mut self, inputs: &TankInputs) -> [f64; TANK_STATES] {
-        if let Some(place) = &self.draining {
-            return Run { place, inputs }.rates(0.0, &self.motion.state.x);
+        if let Some(mounted) = &self.draining {
+            return Run { mounted, inputs }.rates(0.0, &self.motion.state.x);
         }
         self.motion.evaluate(inputs);
         self.motion.state_rates::<0>()
@@ -696,10 +696,10 @@ impl SloshTank {
         dx: &[f64; TANK_STATES],
         du: &[f64; TANK_INPUTS],
     ) -> [f64; TANK_STATES] {
-        if let Some(place) = &self.draining {
+        if let Some(mounted) = &self.draining {
             let (x, acting) = along(&self.motion.state.x, inputs, dx, du);
             let slope = inputs.mass_flow.slope;
-            return draining_rates(place, &x, &acting, slope).map(Number::result);
+            return draining_rates(mounted, &x, &acting, slope).map(Number::result);
         }
         self.motion.evaluate_direction(inputs, dx, du);
         self.motion.state_rates::<1>()
@@ -712,9 +712,9 @@ impl SloshTank {
         dx: &[f64; TANK_STATES],
         du: &[f64; TANK_INPUTS],
     ) -> SloshTankOutputs {
-        if let Some(place) = &self.draining {
+        if let Some(mounted) = &self.draining {
             let (x, acting) = along(&self.motion.state.x, inputs, dx, du);
-            return self.draining_outputs(place, dx, &x, &acting, inputs.mass_flow.slope);
+            return self.draining_outputs(mounted, dx, &x, &acting, inputs.mass_flow.slope);
         }
         self.motion.evaluate_direction(inputs, dx, du);
         self.outputs_of::<Dual>(dx)
@@ -736,8 +736,8 @@ impl SloshTank {
     /// changes its velocity by `dv`, m/s, and the host its rate by `dw`, rad/s, host axes.
     pub fn take_impulse(&mut self, dv: Vec3, dw: Vec3) {
         let TankMotion { state, bobs, .. } = &mut *self.motion;
-        if let Some(place) = &self.draining {
-            let tank = Tank { liquid_0: state.x[LIQUID], ..place.tank }.resolve();
+        if let Some(mounted) = &self.draining {
+            let tank = Tank { liquid_0: state.x[LIQUID], ..mounted.tank }.resolve();
             bobs.iter_mut().for_each(|bob| *bob = Bob::new(&tank, 0, bob.mode));
         }
         self.motion.start(0.0);

@@ -15,7 +15,7 @@
 //! v' = -w R v - L p + (r/l) (w^2 e_x - w' e_y) - (g/l) e_z - (c/m) p'
 //! ```
 //!
-//! m l L is the pull of the rod. It keeps v.p = 0, so
+//! m l L is the tension of the rod. It keeps v.p = 0, so
 //!
 //! ```text
 //! L = L_0 - (r/l) w' p_y,   L_0 = |v|^2 - (g/l) p_z + (r/l) w^2 p_x
@@ -73,8 +73,8 @@ pub struct Spherical {
     /// v_z^2
     v_z2: Series,
     /// L_0, L
-    pull_0: Series,
-    pull: Series,
+    tension_0: Series,
+    tension: Series,
     /// Newest coefficient of L p without that of L
     pulled: [f64; 2],
 }
@@ -161,8 +161,8 @@ impl SloshMode for Spherical {
             v_d: ZERO_VECTOR2,
             v_z_d: ZERO,
             v_z2: ZERO,
-            pull_0: ZERO,
-            pull: ZERO,
+            tension_0: ZERO,
+            tension: ZERO,
             pulled: [0.0; 2],
         }
     }
@@ -252,21 +252,22 @@ impl SloshMode for Spherical {
         self.drag_swapped[n] = [drag_y, drag_x];
         self.drag_z[n] = self.p.drag(n, ramp, &self.v_z);
         let [v2_x, v2_y] = squares(n, &self.v);
-        self.pull_0[n] = v2_x + v2_y + self.v_z2[n] - inv_l * self.p.weight(n, ramp, &self.dir_z)
+        self.tension_0[n] = v2_x + v2_y + self.v_z2[n]
+            - inv_l * self.p.weight(n, ramp, &self.dir_z)
             + r_l * mul_part(n, &hub.omega2, &self.dir, 0);
         if ramp {
             let [e_x, e_y] = &hub.tilt.e;
-            self.pull_0[n] +=
+            self.tension_0[n] +=
                 inv_l * (mul_part(n, e_x, &self.dir, 0) + mul_part(n, e_y, &self.dir, 1));
         }
         let [plus, minus] = each(n, &self.dir, &self.drag_swapped);
         // L and L p without their share of the newest w', which J stands for.
         let y_0 = self.dir[0][1];
-        self.pull[n] = self.pull_0[n] - r_l * mul_part_head(n, &hub.omega_dot, &self.dir, 1);
-        self.pulled = scale_head(n, &self.pull, &self.dir);
+        self.tension[n] = self.tension_0[n] - r_l * mul_part_head(n, &hub.omega_dot, &self.dir, 1);
+        self.pulled = scale_head(n, &self.tension, &self.dir);
         HubReaction {
             j: if n == 0 { m * r * r * y_0 * y_0 } else { 0.0 },
-            t: m * r * l * (self.pulled[1] + self.pull[n] * y_0)
+            t: m * r * l * (self.pulled[1] + self.tension[n] * y_0)
                 + c * l * (r * drag_y + l * (plus - minus)),
         }
     }
@@ -275,9 +276,10 @@ impl SloshMode for Spherical {
     fn accelerate(&mut self, n: usize, ramp: bool, hub: &HubMotion) {
         let Pendulum { c_m, r_l, inv_l, .. } = self.p;
         let [x_0, y_0] = self.dir[0];
-        self.pull[n] -= r_l * hub.omega_dot[n] * y_0;
+        self.tension[n] -= r_l * hub.omega_dot[n] * y_0;
         let [w_x, w_y] = scale(n, &hub.omega, &self.v);
-        let pulled = [self.pulled[0] + self.pull[n] * x_0, self.pulled[1] + self.pull[n] * y_0];
+        let pulled =
+            [self.pulled[0] + self.tension[n] * x_0, self.pulled[1] + self.tension[n] * y_0];
         let [drag_y, drag_x] = self.drag_swapped[n];
         let fall = inv_l * if n < 2 { self.p.g[n] } else { 0.0 };
         self.v_d[n] = [
@@ -289,7 +291,7 @@ impl SloshMode for Spherical {
                 self.v_d[n][i] += inv_l * hub.tilt.e[i][n];
             }
         }
-        self.v_z_d[n] = -mul(n, &self.pull, &self.dir_z) - fall - c_m * self.drag_z[n];
+        self.v_z_d[n] = -mul(n, &self.tension, &self.dir_z) - fall - c_m * self.drag_z[n];
         self.dir[n + 1] = self.dir_d[n].map(|rate| next(n, rate));
         self.dir_z[n + 1] = next(n, self.v_z[n]);
         self.v[n + 1] = self.v_d[n].map(|rate| next(n, rate));
@@ -347,15 +349,15 @@ impl SloshMode for Spherical {
         [0, 1].map(|i| above[i] * (m * l) + tilted[i] * m)
     }
 
-    /// The rod's pull along p and the drag.
+    /// The rod's tension along p and the drag.
     fn force<T: Number>(&self, _: &HubMotion) -> [T; 2] {
         let Pendulum { m, l, .. } = self.p;
-        let (pull, [_, c]) = (number::<T>(&self.pull), self.p.restoring_and_drag::<T>());
+        let (tension, [_, c]) = (number::<T>(&self.tension), self.p.restoring_and_drag::<T>());
         let [p, p_d] = [&self.dir, &self.dir_d].map(numbers::<T>);
-        [0, 1].map(|i| pull * (m * l) * p[i] + c * l * p_d[i])
+        [0, 1].map(|i| tension * (m * l) * p[i] + c * l * p_d[i])
     }
 
-    /// The pull acts at the hinge, the drag at the bob.
+    /// The tension acts at the hinge, the drag at the bob.
     fn torque<T: Number>(&self, hub: &HubMotion) -> T {
         let (Pendulum { l, r, .. }, [_, c]) = (self.p, self.p.restoring_and_drag::<T>());
         let [[x, y], [x_d, y_d]] = [&self.dir, &self.dir_d].map(numbers::<T>);
