@@ -1,4 +1,4 @@
-// Search over the sections in search-index.js: every word typed must begin a word of the section.
+// Search over the sections in search-index.js: the stem of every word typed must begin a word of the section.
 "use strict";
 const field = document.getElementById("search");
 const found = document.getElementById("found");
@@ -6,6 +6,11 @@ const pages = document.getElementById("pages");
 
 function wordsOf(text) {
   return text.toLowerCase().split(/[^\p{L}\p{N}_.]+/u).filter(Boolean);
+}
+
+// A word without its English ending, if four letters or more are left: "oscillations" finds oscillation.
+function stem(word) {
+  return word.replace(/(?<=^\p{L}{4,})(ions?|ies|es|s|ed|ing)$/u, "");
 }
 
 // Where a word begins with what is asked, as whole variables (`slosh.model`) or their parts.
@@ -21,7 +26,7 @@ function matches(words, asked) {
 let sections = null; // split into words when the first letter is typed
 function search(text) {
   sections ??= SECTIONS.map((s) => ({ ...s, inTitle: wordsOf(s.title), inText: wordsOf(s.words) }));
-  const asked = wordsOf(text);
+  const asked = wordsOf(text).map(stem);
   const ranked = [];
   for (const section of sections) {
     let rank = 0;
@@ -50,7 +55,7 @@ field.addEventListener("input", () => {
     const text = document.createElement("small");
     link.href = section.at;
     link.textContent = section.title;
-    text.textContent = excerpt(section, asked[0]);
+    text.textContent = excerpt(section, stem(asked[0]));
     item.append(link, text);
     return item;
   }));
