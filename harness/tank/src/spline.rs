@@ -114,3 +114,100 @@ fn smooth(points: &[Point], segments: &mut Vec<Segment>) {
         segments.push(Segment { curve: Curve::Cubic { c }, from: 0.0, to: 1.0 });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Value and first three derivatives by arc length of the polyline at both ends of every piece.
+    fn derivatives(points: &[Point]) -> Vec<[[Point; 4]; 2]> {
+        let pieces = spline(points).unwrap();
+        let one = |(segment, p): (&Segment, &[Point])| {
+            let Curve::Cubic { c } = &segment.curve else { panic!("{:?}", segment.curve) };
+            let h = norm(sub(p[1], p[0]));
+            let at = |t: f64| {
+                let of = |i: usize| {
+                    [
+                        c[0][i] + t * (c[1][i] + t * (c[2][i] + t * c[3][i])),
+                        (c[1][i] + t * (2.0 * c[2][i] + t * 3.0 * c[3][i])) / h,
+                        (2.0 * c[2][i] + t * 6.0 * c[3][i]) / (h * h),
+                        6.0 * c[3][i] / (h * h * h),
+                    ]
+                };
+                let (r, z) = (of(0), of(1));
+                [0, 1, 2, 3].map(|n| [r[n], z[n]])
+            };
+            [at(0.0), at(1.0)]
+        };
+        pieces.iter().zip(points.windows(2)).map(one).collect()
+    }
+
+    fn near(a: Point, b: Point) {
+        // second and third derivatives are of the order of 10 and 100, from a solved system
+        assert!(norm(sub(a, b)) < 1e-10 * (1.0 + norm(b)), "{a:?} {b:?}");
+    }
+
+    /// Points at uneven distances, none at the axis.
+    const POINTS: [Point; 6] =
+        [[1.0, 0.0], [1.3, 0.2], [1.4, 0.5], [1.35, 0.9], [1.1, 1.2], [0.9, 1.3]];
+
+    #[test]
+    fn a_spline_passes_its_points_twice_continuously_differentiable() {
+        let all = derivatives(&POINTS);
+        assert_eq!(all.len(), 5);
+        for (piece, p) in all.iter().zip(POINTS.windows(2)) {
+            near(piece[0][0], p[0]);
+            near(piece[1][0], p[1]);
+        }
+        for pair in all.windows(2) {
+            near(pair[0][1][1], pair[1][0][1]);
+            near(pair[0][1][2], pair[1][0][2]);
+        }
+    }
+
+    #[test]
+    fn away_from_the_axis_the_first_and_last_two_pieces_are_one_cubic_each() {
+        let all = derivatives(&POINTS);
+        near(all[0][0][3], all[1][0][3]);
+        near(all[3][0][3], all[4][0][3]);
+        assert!(norm(sub(all[1][0][3], all[2][0][3])) > 1.0);
+        // Three points have one parabola.
+        for piece in derivatives(&POINTS[..3]) {
+            near(piece[0][3], [0.0, 0.0]);
+        }
+    }
+
+    #[test]
+    fn at_the_axis_a_spline_is_level() {
+        let mut dome = [0.0, 0.4, 0.9, 1.5, 2.0, 2.6, 3.0].map(|a: f64| [a.sin(), 1.0 - a.cos()]);
+        dome[6] = [0.0, 2.0];
+        let all = derivatives(&dome);
+        near(all[0][0][1], [1.0, 0.0]);
+        near(all[5][1][1], [-1.0, 0.0]);
+    }
+
+    #[test]
+    fn corners_stay_and_very_many_points_are_thinned_out() {
+        let corner = spline(&[[1.0, 0.0], [1.0, 1.0], [2.0, 1.0]]).unwrap();
+        assert!(corner.iter().all(|segment| !matches!(segment.curve, Curve::Cubic { .. })));
+        let arc = |n: usize| -> Vec<Point> {
+            let angle = |i: usize| 0.01 + 1.5 * i as f64 / (n - 1) as f64;
+            (0..n).map(|i| [angle(i).sin(), 1.0 - angle(i).cos()]).collect()
+        };
+        for (points, pieces) in [(100, 99), (101, 50), (250, 83), (251, 84)] {
+            let segments = spline(&arc(points)).unwrap();
+            assert_eq!(segments.len(), pieces);
+            let Curve::Cubic { c } = segments[pieces - 1].curve else { panic!() };
+            let end = [0, 1].map(|i| c[0][i] + c[1][i] + c[2][i] + c[3][i]);
+            near(end, arc(points)[points - 1]);
+        }
+    }
+
+    #[test]
+    fn equal_points_are_all_named() {
+        let p = [1.0, 0.5];
+        let message = spline(&[p, p, [1.0, 1.0], p, p]).unwrap_err().to_string();
+        assert!(message.contains("Points 1 and 2 are the same, (1, 0.5) m."), "{message}");
+        assert!(message.contains("Points 4 and 5"), "{message}");
+    }
+}

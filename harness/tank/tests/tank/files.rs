@@ -389,3 +389,19 @@ fn example_files_work() {
     }
     assert!(count >= 6);
 }
+
+/// 200 pieces are solved in time; one more is refused, with its number.
+#[test]
+fn a_contour_has_at_most_200_segments() {
+    let parsed = |count: usize| {
+        let z = |i: usize| i as f64 / (count - 1) as f64;
+        let line = |i: usize| format!("{{ line = [1, {}, 1, {}] }}", z(i), z(i + 1));
+        let wall: Vec<String> = (0..count - 1).map(line).collect();
+        let floor = "{ line = [0, 0, 1, 0] }";
+        let text = format!("density = 1.0\nprofile = [{floor}, {}]", wall.join(", "));
+        Tank::parse(&text, Path::new(""))
+    };
+    assert!(parsed(200).is_ok());
+    let message = parsed(201).unwrap_err().to_string();
+    assert!(message.contains("The contour has 201 segments, at most 200."), "{message}");
+}

@@ -29,6 +29,39 @@ fn interpolated_modes_are_those_between_the_fills() {
     }
 }
 
+/// At a fill of the table an interpolation is the solution itself, but for rounding in sums of its modes; outside,
+/// that of the nearest end.
+#[test]
+fn at_the_table_s_own_fills_nothing_is_interpolated() {
+    let tank = tank("density = 1000.0\nshape = { sphere = { radius = 1.0 } }");
+    let all = fills(0.2, 1.8, 8);
+    let depletion = Depletion::new(&sweep(&tank, &all, 3).unwrap()).unwrap();
+    assert_eq!(depletion.range(), [all[0], all[8]]);
+    for (fill, asked) in [(all[0], 0.1), (all[3], all[3]), (all[6], all[6]), (all[8], 5.0)] {
+        let (exact, at) = (tank.solve(fill, 3).unwrap(), depletion.at(asked));
+        let near = |a: f64, b: f64| assert!((a - b).abs() < 1e-9 * b.abs(), "{fill}: {a} {b}");
+        assert_eq!(at.fill, fill);
+        near(at.m_liq, exact.m_liq);
+        near(at.z_cg, exact.z_cg);
+        near(at.i_frozen_cg, exact.i_frozen_cg);
+        near(at.i_frozen_axis, exact.i_frozen_axis);
+        // of a sphere, which drags its liquid by the surface alone, a small difference
+        assert!((at.i_eff_cg - exact.i_eff_cg).abs() < 1e-9 * exact.i_frozen_cg);
+        let rest = exact.rest(3);
+        near(at.rest.m_0, rest.m_0);
+        near(at.rest.height, rest.height);
+        assert!((at.rest.inertia - rest.inertia).abs() < 1e-9 * exact.i_frozen_cg);
+        for (a, b) in at.modes.iter().zip(&exact.modes) {
+            near(a.l, b.l);
+            near(a.m, b.m);
+            near(a.m_h, b.m_h);
+            near(a.m_h2, b.m_h2);
+            near(a.wave, b.wave);
+            near(a.beta, b.beta);
+        }
+    }
+}
+
 /// The first pendulum of a sphere shortens with the fill, at every step; mass of the liquid rises; m_0
 /// stays positive and I_0 too.
 #[test]
