@@ -14,6 +14,8 @@
 use serde::Serialize;
 use signals::fourier::Forward;
 
+use crate::statistics::{mean, median};
+
 /// Lags of the whiteness test.
 pub const LAGS: usize = 50;
 /// Rows of a window: 20 s at 50 Hz.
@@ -58,8 +60,8 @@ impl Tests {
     /// Tests innovations `e` at `time` (s) under `torque`; `white` is the noise's size, rad/s.
     pub fn of(time: &[f64], torque: &[f64], e: &[f64], white: f64) -> Self {
         let count = e.len() as f64;
-        let mean = e.iter().sum::<f64>() / count;
-        let e: Vec<f64> = e.iter().map(|v| v - mean).collect();
+        let middle = mean(e);
+        let e: Vec<f64> = e.iter().map(|v| v - middle).collect();
         let power = e.iter().map(|v| v * v).sum::<f64>() / count;
         if power < 0.01 {
             // a tenth of the least noise that is reckoned with ([`crate::gauss_markov::FLOOR`]): no residual
@@ -84,7 +86,8 @@ impl Tests {
         let mut levels: Vec<(f64, f64)> =
             bands.iter().enumerate().map(|(k, p)| (*p, (k as f64 + 0.5) * width)).collect();
         let in_frequency = worst(&mut levels, (1.0 / per_band).sqrt());
-        let excess: f64 = bands.iter().map(|p| (p - median(&bands)).max(0.0)).fold(0.0, f64::max);
+        let middle = median(&bands).unwrap_or(0.0);
+        let excess: f64 = bands.iter().map(|p| (p - middle).max(0.0)).fold(0.0, f64::max);
         let squared: Vec<f64> = torque.iter().map(|t| t * t).collect();
         Tests {
             whiteness: normal(q, LAGS as f64),
@@ -103,16 +106,11 @@ fn normal(chi_squared: f64, n: f64) -> f64 {
     ((chi_squared / n).powf(1.0 / 3.0) - (1.0 - spread)) / spread.sqrt()
 }
 
-fn median(x: &[f64]) -> f64 {
-    let mut sorted = x.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted[sorted.len() / 2]
-}
-
 /// Largest excess over the median in standard deviations, and where; one of many is allowed as much
 /// more as the largest of them has by chance.
 fn worst(levels: &mut [(f64, f64)], deviation: f64) -> (f64, f64) {
-    let middle = median(&levels.iter().map(|(level, _)| *level).collect::<Vec<_>>());
+    let values: Vec<f64> = levels.iter().map(|(level, _)| *level).collect();
+    let middle = median(&values).unwrap_or(0.0);
     let excess = |level: f64| (level / middle - 1.0) / deviation;
     levels
         .iter()
@@ -137,7 +135,7 @@ fn periodogram(e: &[f64], step: f64) -> (Vec<f64>, f64, f64) {
 /// Largest cross-correlation of e with an input over lags from 0 to 2 s, in standard deviations if e
 /// is white, whatever the input.
 pub fn crossed(e: &[f64], input: &[f64], step: f64) -> f64 {
-    let mean = input.iter().sum::<f64>() / input.len() as f64;
+    let mean = mean(input);
     let lags = ((2.0 / step) as usize).min(e.len() / 2);
     let squares: f64 = input.iter().map(|u| (u - mean).powi(2)).sum();
     if squares == 0.0 {

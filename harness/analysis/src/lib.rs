@@ -28,6 +28,7 @@ pub mod residual;
 pub mod rotary;
 pub mod sanathanan_koerner;
 pub mod spa;
+pub mod statistics;
 pub mod sweep;
 pub mod transfer_function;
 pub mod welch;

@@ -1,9 +1,9 @@
 //! The thesis's linear model of a run, how well it fits, and what it leaves (6.3.2 to 6.3.5).
 
-use crate::FrequencyResponse;
 use crate::features::Features;
 use crate::transfer_function::{TransferFunction, fit_time};
 use crate::welch::{Segments, Spectra};
+use crate::{FrequencyResponse, statistics};
 
 /// A transfer function fitted to a run, and what it leaves of the run.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,7 +36,7 @@ impl ModelFit {
         features: &Features,
     ) -> Option<(Self, Spectra)> {
         let model = TransferFunction::fit(measured)?;
-        let mean = rate.iter().sum::<f64>() / rate.len() as f64;
+        let mean = statistics::mean(rate);
         let forced = model.simulate(step, torque);
         let missing: Vec<f64> = rate.iter().zip(&forced).map(|(y, m)| y - mean - m).collect();
         let free = model.free_answer(step, &missing);
@@ -63,7 +63,7 @@ impl ModelFit {
 /// over its standard deviation. A Gaussian has 0 and 3.
 pub fn skewness_and_kurtosis(signal: &[f64]) -> (f64, f64) {
     let count = signal.len() as f64;
-    let mean = signal.iter().sum::<f64>() / count;
+    let mean = statistics::mean(signal);
     let moment = |n: i32| signal.iter().map(|x| (x - mean).powi(n)).sum::<f64>() / count;
     let deviation = moment(2).sqrt();
     (moment(3) / deviation.powi(3), moment(4) / deviation.powi(4))

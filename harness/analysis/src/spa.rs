@@ -8,7 +8,7 @@
 
 use signals::fourier::{Forward, Inverse};
 
-use crate::{Complex64, FrequencyResponse};
+use crate::{Complex64, FrequencyResponse, statistics};
 
 /// Longest lag for the thesis's band, s. `spa` resolves about 1/lag: 10 mHz need 100 s. 200 s leave the antiresonance,
 /// whose half-power width is 14 mHz, nearly its own shape.
@@ -89,7 +89,7 @@ fn estimate(
     let (forward, inverse) = (Forward::new(length), Inverse::new(length));
 
     let spectrum = |signal: &[f64]| {
-        let mean = signal.iter().sum::<f64>() / signal.len() as f64;
+        let mean = statistics::mean(signal);
         let mut padded: Vec<f64> = signal.iter().map(|v| v - mean).collect();
         padded.resize(length, 0.0);
         forward.of(padded)

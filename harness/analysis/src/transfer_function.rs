@@ -16,6 +16,7 @@ use nalgebra::{DMatrix, DVector, Dyn, Matrix3, Matrix5, OMatrix, U6, Vector3, Ve
 
 use crate::features::Features;
 use crate::sanathanan_koerner::{self, Coefficients, Line};
+use crate::statistics::mean;
 use crate::{Complex64, FrequencyResponse};
 
 /// A transfer function with three stable poles and two zeros; s in rad/s.
@@ -159,7 +160,7 @@ impl TransferFunction {
 
 /// Fit_time, %: 100 (1 − |y − ŷ| / |y − mean y|) (thesis 6.14).
 pub fn fit_time(measured: &[f64], model: &[f64]) -> f64 {
-    let mean = measured.iter().sum::<f64>() / measured.len() as f64;
+    let mean = mean(measured);
     let miss: f64 = measured.iter().zip(model).map(|(y, m)| (y - m).powi(2)).sum();
     let spread: f64 = measured.iter().map(|y| (y - mean).powi(2)).sum();
     100.0 * (1.0 - (miss / spread).sqrt())

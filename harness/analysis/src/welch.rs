@@ -14,7 +14,7 @@
 
 use signals::fourier::Forward;
 
-use crate::{Complex64, FrequencyResponse};
+use crate::{Complex64, FrequencyResponse, statistics};
 
 /// Segments of a record, as MATLAB's `mscohere`, `cpsd` and `tfestimate` take them when
 /// they are not told otherwise.
@@ -78,7 +78,7 @@ impl Spectra {
             output: vec![0.0; bins],
             cross: vec![Complex64::default(); bins],
         };
-        let means = [input, output].map(|s| s.iter().sum::<f64>() / s.len() as f64);
+        let means = [input, output].map(statistics::mean);
         let spectrum = |signal: &[f64], mean: f64| {
             let mut windowed: Vec<f64> =
                 signal.iter().zip(&window).map(|(x, w)| (x - mean) * w).collect();
@@ -114,7 +114,7 @@ impl Spectra {
         let first = (from / self.resolution).ceil() as usize;
         let last = ((to / self.resolution).floor() as usize).min(self.cross.len() - 1);
         let band = &self.coherence()[first.min(last)..=last];
-        band.iter().sum::<f64>() / band.len() as f64
+        statistics::mean(band)
     }
 
     /// Signal-to-noise ratio from the coherence γ²: 10 log10(γ²/(1 − γ²)), dB, per bin (thesis

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 
 use analysis::linear::Linear;
 use analysis::random::Random;
+use analysis::statistics::peak;
 use anyhow::{Result, ensure};
 use host::budget;
 use host::fmi2::Fmu;
@@ -205,13 +206,16 @@ impl Wheel {
 
     /// The largest factor (at most 1) by which a torque can be multiplied within the limits.
     pub fn factor(&self, time: &[f64], torque: &[f64]) -> f64 {
-        let peak = torque.iter().fold(0.0, |m: f64, t| m.max(t.abs()));
         let (least, largest) = self.range(time, torque);
         let [start, low, high] = self.speeds;
-        [self.torque / peak, (start - low) / (start - least), (high - start) / (largest - start)]
-            .into_iter()
-            .filter(|f| f.is_finite())
-            .fold(1.0, f64::min)
+        [
+            self.torque / peak(torque),
+            (start - low) / (start - least),
+            (high - start) / (largest - start),
+        ]
+        .into_iter()
+        .filter(|f| f.is_finite())
+        .fold(1.0, f64::min)
     }
 }
 

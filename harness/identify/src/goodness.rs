@@ -2,6 +2,7 @@
 
 use crate::fit::{Answer, Channel, Problem, Signal};
 use analysis::innovations::Tests;
+use analysis::statistics::mean;
 
 /// Fit of a rate below which a minimum is taken for a wrong one at first, %.
 const POOR: f64 = 90.0;
@@ -26,7 +27,7 @@ pub fn fit_pct(problem: &Problem, answer: &Answer) -> f64 {
         .iter()
         .map(|r| {
             let rate = r.of_fresh(&r.rate);
-            let mean = rate.iter().sum::<f64>() / rate.len() as f64;
+            let mean = mean(&rate);
             rate.iter().map(|y| (y - mean).powi(2)).sum::<f64>()
         })
         .sum();

@@ -6,6 +6,7 @@ use anyhow::{Result, bail};
 use crate::recording::{Recording, noise_level};
 use crate::start::Response;
 use analysis::innovations;
+use analysis::statistics::{deviation, mean, median};
 
 /// Refuses what is off by a factor that only a wrong unit makes.
 pub fn check_size(found: &Response, nominal: f64) -> Result<()> {
@@ -57,8 +58,7 @@ pub fn columns(recording: &Recording) -> (Vec<String>, Vec<String>) {
     for (axis, name) in recording.off_axis.iter().zip(["omega_x", "omega_y"]) {
         let Some(rate) = axis else { continue };
         let noise = noise_level(rate);
-        let mean = rate.iter().sum::<f64>() / rate.len() as f64;
-        let rms = (rate.iter().map(|w| (w - mean).powi(2)).sum::<f64>() / rate.len() as f64).sqrt();
+        let (mean, rms) = (mean(rate), deviation(rate));
         let unit: Vec<f64> = rate.iter().map(|w| (w - mean) / noise.max(1e-12)).collect();
         let correlation = innovations::crossed(&unit, &recording.torque, recording.step());
         let line = format!(
@@ -97,13 +97,12 @@ fn actuator(recording: &Recording, speed: &[f64]) -> Actuator {
     }
     // the median of the ratios of large windows: a saturated part does not move it
     let largest = pairs.iter().map(|p| p.2.abs()).fold(0.0, f64::max);
-    let mut ratios: Vec<f64> = pairs
+    let ratios: Vec<f64> = pairs
         .iter()
         .filter(|p| p.2.abs() > 0.2 * largest)
         .map(|(_, impulse, change)| impulse / change)
         .collect();
-    ratios.sort_by(f64::total_cmp);
-    let inertia = ratios.get(ratios.len() / 2).copied().unwrap_or(f64::NAN);
+    let inertia = median(&ratios).unwrap_or(f64::NAN);
     let allowed = 0.1 * largest + 6.0 * noise;
     let off: Vec<f64> = pairs
         .iter()

@@ -7,6 +7,7 @@
 
 use std::path::Path;
 
+use analysis::statistics::{correlation, deviation, mean, median, peak};
 use anyhow::{Context, Result, bail, ensure};
 use signals::table::{self, Table};
 
@@ -257,9 +258,8 @@ fn check_time(all: &Recording, coarsest: f64) -> Result<()> {
             all.time[row]
         );
     }
-    let mut steps: Vec<f64> = all.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    steps.sort_by(f64::total_cmp);
-    let step = steps[steps.len() / 2];
+    let steps: Vec<f64> = all.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let step = median(&steps).unwrap_or(0.0);
     ensure!(
         step <= coarsest,
         "{name}: rows are {step} s apart, at most {coarsest:.3} s are allowed, a fifth of the slosh's expected period{}",
@@ -316,32 +316,19 @@ fn fresh(rate: &[f64]) -> Option<Vec<bool>> {
 /// hertz has almost none), and at least that of rounding to the smallest step it ever makes, step/√12.
 pub fn noise_level(signal: &[f64]) -> f64 {
     let third = signal.windows(4).map(|y| y[3] - 3.0 * y[2] + 3.0 * y[1] - y[0]);
-    let mut squares: Vec<f64> = third.map(|d| d * d).collect();
-    squares.sort_by(f64::total_cmp);
+    let squares: Vec<f64> = third.map(|d| d * d).collect();
     let steps = signal.windows(2).map(|y| (y[1] - y[0]).abs()).filter(|step| *step > 0.0);
     let smallest = steps.fold(f64::INFINITY, f64::min);
     let rounding = if smallest.is_finite() { smallest / 12f64.sqrt() } else { 0.0 };
     // the median of χ² with one degree of freedom is 0.4549; variance of third differences 20 σ²
-    let white = squares.get(squares.len() / 2).map_or(0.0, |s| (s / 0.4549 / 20.0).sqrt());
+    let white = median(&squares).map_or(0.0, |s| (s / 0.4549 / 20.0).sqrt());
     white.max(rounding)
-}
-
-fn deviation(x: &[f64]) -> f64 {
-    let mean = x.iter().sum::<f64>() / x.len() as f64;
-    (x.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / x.len() as f64).sqrt()
-}
-
-fn correlation(a: &[f64], b: &[f64]) -> f64 {
-    let (ma, mb) = (a.iter().sum::<f64>() / a.len() as f64, b.iter().sum::<f64>() / b.len() as f64);
-    let product: f64 = a.iter().zip(b).map(|(x, y)| (x - ma) * (y - mb)).sum();
-    product / a.len() as f64 / (deviation(a) * deviation(b))
 }
 
 fn check_signals(part: &Recording) -> Result<()> {
     let name = &part.name;
-    let largest = part.torque.iter().fold(0.0, |m: f64, t| m.max(t.abs()));
     ensure!(
-        deviation(&part.torque) > 1e-9 * largest.max(1e-12),
+        deviation(&part.torque) > 1e-9 * peak(&part.torque).max(1e-12),
         "{name}: tau_cmd is constant ({} N·m). Without excitation nothing can be identified",
         part.torque[0]
     );
@@ -371,8 +358,8 @@ fn check_signals(part: &Recording) -> Result<()> {
 fn smoothed(part: &Recording) -> (Vec<f64>, Vec<f64>) {
     let (step, torque, rate) = part.even();
     let width = ((0.1 / step) as usize).max(1);
-    let mean = |x: &[f64]| x.windows(width).map(|w| w.iter().sum::<f64>() / width as f64).collect();
-    (mean(&torque), mean(&rate))
+    let averaged = |x: &[f64]| x.windows(width).map(mean).collect();
+    (averaged(&torque), averaged(&rate))
 }
 
 #[cfg(test)]

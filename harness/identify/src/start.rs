@@ -4,6 +4,7 @@
 use std::f64::consts::{PI, TAU};
 
 use analysis::features::Features;
+use analysis::statistics::{mean, median, quantile};
 use analysis::transfer_function::TransferFunction;
 use analysis::{
     Complex64, FrequencyResponse, logarithmic_grid, spa,
@@ -287,7 +288,7 @@ const FINENESS: f64 = 1e-3;
 pub fn balance(recording: &Recording, bench: Bench, band: (f64, f64)) -> Option<Balance> {
     let (step, torque, rate) = recording.even();
     let n = rate.len();
-    let mean = rate.iter().sum::<f64>() / n as f64;
+    let mean = mean(&rate);
     let noise = recording.rate_noise();
     let signs: Vec<f64> = rate.iter().map(|w| ((w - mean) / (3.0 * noise)).tanh()).collect();
     let transform = Forward::new(n);
@@ -376,15 +377,14 @@ fn from_features(measured: &FrequencyResponse, bench: Bench) -> Option<Response>
     let (f, fp) = (features.f_dip?, features.f_res?);
     let ratio = (fp / f).powi(2) - 1.0;
     // far from both, Ω/τ = (ω² − Ω²)/(jΩ I0 (ω_p² − Ω²))
-    let mut inertias: Vec<f64> = measured
+    let inertias: Vec<f64> = measured
         .frequency
         .iter()
         .zip(&measured.response)
         .filter(|(g, _)| **g < 0.9 * f || **g > 1.1 * fp)
         .map(|(g, h)| ((f * f - g * g) / (fp * fp - g * g)).abs() / (TAU * g * h.norm()))
         .collect();
-    inertias.sort_by(f64::total_cmp);
-    let inertia = *inertias.get(inertias.len() / 2)?;
+    let inertia = median(&inertias)?;
     Some(Response {
         slosh_frequency: f,
         slosh_damping: 0.005,
@@ -413,13 +413,9 @@ fn friction(recordings: &[Recording]) -> Start {
             }
         }
     }
-    let at = |x: &mut Vec<f64>, part: f64| {
-        x.sort_by(f64::total_cmp);
-        x.get((x.len() as f64 * part) as usize).copied()
-    };
-    let torque = at(&mut torques, 0.5).unwrap_or(1e-3);
-    let (middle, fastest) =
-        (at(&mut speeds, 0.5).unwrap_or(1e-2), at(&mut speeds, 0.99).unwrap_or(1e-2));
+    let torque = median(&torques).unwrap_or(1e-3);
+    let middle = median(&speeds).unwrap_or(1e-2);
+    let fastest = quantile(&speeds, 0.99).unwrap_or(1e-2);
     // the peak of a sine is π/2 times its mean
     let (b, omega_s) = (0.1 * torque / middle, 0.5 * PI * fastest);
     let (c, stribeck) = (0.55 * torque, 0.35 * torque);

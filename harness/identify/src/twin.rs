@@ -1,6 +1,7 @@
 //! Recordings of the FMU in place of a bench, with its gyro's noise: what identification is tried on,
 //! and what a planned experiment would record.
 
+use analysis::statistics::peak;
 use anyhow::{Result, bail, ensure};
 use experiments::profile::{Profile, Torque};
 use experiments::run::{Run, TORQUE};
@@ -124,9 +125,8 @@ impl Twin {
             set("bench.tilt", 1f64.to_radians().to_string());
         }
         if self.unmodelled.contains(&Unmodelled::Clipping) {
-            let largest = torque.iter().fold(0.0, |m: f64, t| m.max(t.abs()));
             set("wheel.enabled", "true".into());
-            set("wheel.tau_max", (0.9 * largest).to_string());
+            set("wheel.tau_max", (0.9 * peak(torque)).to_string());
         }
         all
     }

@@ -116,7 +116,7 @@ impl DesignArgs {
             (None, None) => bail!("a plan needs --profile or --multisine"),
         };
         let (least, largest) = wheel.range(&time, &torque);
-        let peak = torque.iter().fold(0.0, |m: f64, t| m.max(t.abs()));
+        let peak = analysis::statistics::peak(&torque);
         let rpm = std::f64::consts::TAU / 60.0;
         let [_, low, high] = wheel.speeds;
         println!(

@@ -21,6 +21,7 @@
 
 use std::collections::BTreeMap;
 
+use analysis::statistics::peak;
 use anyhow::{Result, bail, ensure};
 use host::fmi2::Fmu;
 use nalgebra::{DMatrix, DVector};
@@ -261,8 +262,8 @@ impl<'a> Problem<'a> {
             })
             .collect();
         let largest = |of: &dyn Fn(&Rows) -> f64| rows.iter().map(of).fold(0.0, f64::max);
-        let torque = largest(&|r| r.recording.torque.iter().fold(0.0, |m, t| m.max(t.abs())));
-        let speed = largest(&|r| r.recording.rate.iter().fold(0.0, |m, w| m.max(w.abs())));
+        let torque = largest(&|r| peak(&r.recording.torque));
+        let speed = largest(&|r| peak(&r.recording.rate));
         let size = |of: &dyn Fn(&Rows, usize) -> f64| {
             rows.iter().flat_map(|r| r.inner().map(|k| of(r, k).powi(2))).sum::<f64>().sqrt()
         };
@@ -572,12 +573,11 @@ const MOVING: f64 = 0.05;
 /// The braking of free decay in one direction against the angle, ordinary least squares (thesis 5.4);
 /// `None` without angle or free decay.
 fn braking(recordings: &[Recording], way: f64, harmonics: usize) -> Option<Braking> {
-    let largest = |signal: &[f64]| signal.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
     let (mut rows, mut accelerations) = (Vec::new(), Vec::new());
     for recording in recordings {
         let angle = recording.angle.as_ref()?;
         let (torque, rate, t) = (&recording.torque, &recording.rate, &recording.time);
-        let (still, slow) = (FREE * largest(torque), MOVING * largest(rate));
+        let (still, slow) = (FREE * peak(torque), MOVING * peak(rate));
         for k in 1..t.len() - 1 {
             let free = (k - 1..=k + 1).all(|i| torque[i].abs() <= still && way * rate[i] > slow);
             if free {

@@ -5,6 +5,7 @@
 //! orders are chosen by the simulation B/A u of rows that were not fitted.
 
 use analysis::armax::{Model, armax, arx};
+use analysis::statistics::mean;
 use analysis::transfer_function::fit_time;
 use anyhow::{Result, ensure};
 use rayon::prelude::*;
@@ -88,7 +89,7 @@ impl Method for BlackBox {
 pub fn identify(recording: &Recording, held_out: Option<&Recording>) -> Result<Found> {
     // means belong together: an offset of the gyro is in one, the answer to a steady torque in both
     let centred = |signal: Vec<f64>| -> Vec<f64> {
-        let mean = signal.iter().sum::<f64>() / signal.len() as f64;
+        let mean = mean(&signal);
         signal.into_iter().map(|v| v - mean).collect()
     };
     let (step, u, y) = recording.even();

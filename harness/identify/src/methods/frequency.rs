@@ -18,6 +18,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use analysis::Complex64;
+use analysis::statistics::mean;
 use analysis::transfer_function::TransferFunction;
 use anyhow::{Context, Result, ensure};
 use serde::Serialize;
@@ -151,7 +152,7 @@ fn variances(residual: &[Complex64], unknowns: usize) -> Vec<f64> {
 
 /// Spectra of a signal at the lines `bins`.
 fn spectrum(signal: &[f64], bins: &std::ops::RangeInclusive<usize>) -> Vec<Complex64> {
-    let mean = signal.iter().sum::<f64>() / signal.len() as f64;
+    let mean = mean(signal);
     let spectrum = Forward::new(signal.len()).of(signal.iter().map(|v| v - mean).collect());
     spectrum[bins.clone()].to_vec()
 }

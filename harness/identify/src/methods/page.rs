@@ -1,5 +1,6 @@
 //! One self-contained page on an identification.
 
+use analysis::statistics::variance;
 use analysis::welch::{Segments, Spectra};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use report::svg::{Axis, Chart, Series, Style};
@@ -187,10 +188,6 @@ fn spectrum(signals: &Residual, white: f64) -> Chart {
     let step = (signals.time[count - 1] - signals.time[0]) / (count - 1) as f64;
     let spectra = Spectra::of(step, &signals.residual, &signals.measured, Segments::Seconds(20.0));
     // the spectra's unit is arbitrary: Parseval's theorem fixes it
-    let power = |x: &[f64]| {
-        let mean = x.iter().sum::<f64>() / count as f64;
-        x.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count as f64
-    };
     let density = |bins: &[f64], total: f64| -> Vec<(f64, f64)> {
         let sum = bins.iter().sum::<f64>() * spectra.resolution;
         let each = bins.iter().enumerate().skip(1).step_by((bins.len() / POINTS).max(1));
@@ -201,12 +198,12 @@ fn spectrum(signals: &Residual, white: f64) -> Chart {
     let level = white / half.sqrt();
     let lines = vec![
         series(
-            density(&spectra.output, power(&signals.measured)),
+            density(&spectra.output, variance(&signals.measured)),
             "soft",
             Style::Line,
             "measured rate",
         ),
-        series(density(&spectra.input, power(&signals.residual)), "b", Style::Line, "residual"),
+        series(density(&spectra.input, variance(&signals.residual)), "b", Style::Line, "residual"),
         series(vec![(0.0, level), (half, level)], "a", Style::Dashed, "white noise of the gyro"),
     ];
     axis_chart("Amplitude density", "frequency, Hz", "rad/s/√Hz", lines, true)
