@@ -31,7 +31,7 @@
 //! ```
 //!
 //! Checked against Lagrange's equations for xi (below), against another way to the hub's
-//! acceleration (tests/physics/rotary.rs) and against a pendulum in angles (Basilisk).
+//! acceleration (tests/plant/rotary.rs) and against a pendulum in angles (Basilisk).
 
 use alloc::format;
 use alloc::string::String;

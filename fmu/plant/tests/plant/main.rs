@@ -6,6 +6,7 @@ mod common;
 mod errata;
 mod events;
 mod kinematics;
+mod liquid;
 mod lugre;
 mod options;
 mod ranges;
