@@ -119,7 +119,7 @@ class Identification:
     converged: bool
     """The search ended at a minimum."""
     fits: bool | None
-    """The model is not invalidated: the residual is the gyro's noise. If it is, no interval is to be
+    """The residual is the gyro's noise; if not, the model is invalidated, and no interval is to be
     trusted. None: not known."""
     verdict: tuple[str, ...]
     """The answer in words."""
