@@ -100,7 +100,7 @@ const fn time(name: &'static str, default: f64, label: &'static str) -> Paramete
 
 /// Both sweeps.
 const SWEEP: &[Parameter] = &[
-    parameter("amplitude", Sweep::THESIS.amplitude, "N.m", "torque amplitude", Allowed::NotZero),
+    parameter("amplitude", Sweep::THESIS.amplitude, "N·m", "torque amplitude", Allowed::NotZero),
     parameter("f0", Sweep::THESIS.f0, "Hz", "first frequency", Allowed::Positive),
     parameter("f1", Sweep::THESIS.f1, "Hz", "last frequency", Allowed::Positive),
     duration(Sweep::THESIS.duration),
@@ -141,7 +141,7 @@ pub const KINDS: &[Kind] = &[
         name: "sine",
         says: "A sin 2πft: a dwell",
         parameters: &[
-            parameter("amplitude", 0.1, "N.m", "torque amplitude", Allowed::Any),
+            parameter("amplitude", 0.1, "N·m", "torque amplitude", Allowed::Any),
             parameter("frequency", 2.4, "Hz", "frequency", Allowed::Within(FREQUENCY)),
             duration(60.0),
         ],
@@ -152,7 +152,7 @@ pub const KINDS: &[Kind] = &[
         name: "constant",
         says: "always the same torque",
         parameters: &[
-            parameter("amplitude", 0.1, "N.m", "torque amplitude", Allowed::Any),
+            parameter("amplitude", 0.1, "N·m", "torque amplitude", Allowed::Any),
             duration(20.0),
         ],
         demands: &[],
@@ -162,7 +162,7 @@ pub const KINDS: &[Kind] = &[
         name: "pulse",
         says: "the amplitude from `start` for `width` seconds",
         parameters: &[
-            parameter("amplitude", 0.05, "N.m", "torque amplitude", Allowed::Any),
+            parameter("amplitude", 0.05, "N·m", "torque amplitude", Allowed::Any),
             time("start", 0.0, "start of the torque"),
             time("width", 1.0, "length of the pulse"),
             duration(20.0),
@@ -174,7 +174,7 @@ pub const KINDS: &[Kind] = &[
         name: "bang-stop-bang",
         says: "+amplitude for `bang` seconds from `start` on, none for `stop` seconds, -amplitude for `bang` seconds, then none: the hub is spun up, coasts and is brought to rest (thesis 2.7.1)",
         parameters: &[
-            parameter("amplitude", 0.1, "N.m", "torque amplitude", Allowed::Any),
+            parameter("amplitude", 0.1, "N·m", "torque amplitude", Allowed::Any),
             time("start", 0.0, "start of the torque"),
             time("bang", 1.0, "length of each pulse"),
             time("stop", 10.0, "time between the pulses"),
@@ -194,9 +194,9 @@ pub const KINDS: &[Kind] = &[
         name: "acceleration-step",
         says: "inertia × acceleration from `start` for `width` seconds: what a wheel makes whose speed is ramped linearly (thesis 2.7.1)",
         parameters: &[
-            parameter("acceleration", 0.1, "rad/s2", "acceleration", Allowed::Any),
+            parameter("acceleration", 0.1, "rad/s²", "acceleration", Allowed::Any),
             // hub.I + tank.m_liq tank.r² at the FMU's start values
-            parameter("inertia", 0.428054, "kg.m2", "inertia", Allowed::Positive),
+            parameter("inertia", 0.428054, "kg·m²", "inertia", Allowed::Positive),
             time("start", 1.0, "start of the torque"),
             time("width", 5.0, "length of the pulse"),
             duration(60.0),
@@ -211,12 +211,12 @@ pub const KINDS: &[Kind] = &[
         name: "noise",
         says: "band-limited noise with power density ~ f^exponent (0 white, -1 pink, -2 brown), clipped at ±limit",
         parameters: &[
-            parameter("rms", 0.05, "N.m", "torque, rms", Allowed::Positive),
+            parameter("rms", 0.05, "N·m", "torque, rms", Allowed::Positive),
             parameter("f0", 1.25, "Hz", "lowest frequency", Allowed::Positive),
             parameter("f1", 3.5, "Hz", "highest frequency", Allowed::Positive),
             parameter("exponent", 0.0, "", "spectral exponent", Allowed::Within(10.0)),
             parameter("seed", 1.0, "", "seed", Allowed::Whole(9e15)),
-            parameter("limit", 0.26, "N.m", "torque limit", Allowed::Positive), // the wheel's (thesis 5.1.3)
+            parameter("limit", 0.26, "N·m", "torque limit", Allowed::Positive), // the wheel's (thesis 5.1.3)
             duration(600.0),
         ],
         demands: &[

@@ -78,7 +78,7 @@ pub fn table() -> String {
         let written = kind.written(&kind.defaults());
         text.push_str(&format!("| `{written}` | {} | {} |\n", kind.says, units.join(", ")));
     }
-    text.push_str(&format!("| `{}` | {} | s, N.m |\n", FILE.0, FILE.1));
+    text.push_str(&format!("| `{}` | {} | s, N·m |\n", FILE.0, FILE.1));
     text
 }
 

@@ -151,7 +151,7 @@ impl Varied {
                     Torque::Profile(profile) => profile.parameter(name),
                     Torque::Rows { .. } => None,
                 })?;
-                (parameter.label, printed(parameter.unit))
+                (parameter.label, parameter.unit.to_string())
             }
             None => (variable, unit(fmu, variable).unwrap_or_default()),
         };
