@@ -198,7 +198,7 @@ fn stuck_hub_is_exactly_at_rest() {
 }
 
 #[test]
-fn trajectory_does_not_depend_on_how_time_is_cut() {
+fn trajectory_does_not_depend_on_the_communication_step() {
     let mut rng = fastrand::Rng::with_seed(5);
     for slosh in SLOSH {
         for friction in FRICTION {
@@ -338,7 +338,7 @@ fn without_gravity_the_liquid_keeps_its_place_and_nothing_breaks() {
 }
 
 #[test]
-fn gyro_reads_the_same_however_time_is_cut() {
+fn gyro_reads_the_same_at_any_communication_step() {
     let mut p = bench(SloshModel::Linear, FrictionModel::Viscous);
     p.imu.enabled = true;
     p.imu.lsb = 1e-6;

@@ -94,7 +94,7 @@ fn energy_balances_with_the_work_of_a_changing_g() {
 }
 
 #[test]
-fn motion_under_ramps_does_not_depend_on_how_time_is_cut() {
+fn motion_under_ramps_does_not_depend_on_the_communication_step() {
     for slosh in SLOSHING {
         for correlation in [true, false] {
             let mut p = bench(slosh, FrictionModel::Viscous);

@@ -96,7 +96,7 @@ fn energy_balances_on_a_leaning_bench_with_baffle_and_capillarity() {
 }
 
 #[test]
-fn motion_with_all_options_does_not_depend_on_how_time_is_cut() {
+fn motion_with_all_options_does_not_depend_on_the_communication_step() {
     for slosh in SloshModel::ALL {
         let p = everything(slosh, FrictionModel::Viscous);
         let (coarse, fine) = (run(&p, 10.0), run(&p, 0.003));
