@@ -167,6 +167,11 @@ fn products_of_inertia_need_moments_to_match() {
     assert!(negative.len() == 1, "{negative:?}");
     assert!(negative[0].contains("the determinant is -45602"), "{negative:?}");
     assert_eq!(equal(-0.49), [""; 0]);
+    // So for a craft of any size.
+    let small = with([1.0, 1.0, 1.0, -0.51, -0.51, -0.51].map(|x| 1e-6 * x));
+    assert!(small.len() == 1 && small[0].contains("negative principal moment"), "{small:?}");
+    let wide = with([1.0, 1.0, 2.5, 0.0, 0.0, 0.0].map(|x| 1e-6 * x));
+    assert!(wide.len() == 1 && wide[0].contains("exceeds"), "{wide:?}");
     // Unequal ones: 2 3 5 + 2 d - (2 yz^2 + 3 xz^2 + 5 xy^2), d the product of all three.
     let [xy, xz, yz] = [0.7, -1.1, 2.0f64];
     let determinant = 30.0 + 2.0 * xy * xz * yz - 2.0 * yz * yz - 3.0 * xz * xz - 5.0 * xy * xy;
