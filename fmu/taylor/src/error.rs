@@ -61,3 +61,22 @@ impl StepError {
         self
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use alloc::string::ToString;
+
+    #[test]
+    fn every_error_says_what_and_when() {
+        let says = |error: StepError, parts: &[&str]| {
+            let text = error.to_string();
+            assert!(parts.iter().all(|part| text.contains(part)), "{text}");
+        };
+        says(StepError::Length { h: -1.5 }, &["-1.5 s", "above 0"]);
+        says(StepError::NotFinite { time: 2.5 }.after(1.0), &["t = 3.5 s", "inputs"]);
+        let many = StepError::TooManySteps { time: 0.5, max_steps: 7, advice: ", or rest" };
+        says(many.after(1.0), &["t = 1.5 s", "solver.max_steps = 7", "solver.max_steps, or rest"]);
+        says(StepError::Model("the tank is empty".into()).after(1.0), &["the tank is empty"]);
+    }
+}

@@ -169,3 +169,103 @@ pub fn advance<const D: usize>(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::cell::Cell;
+
+    /// Kepler's problem, x'' = -x/|x|^3, on an ellipse; `growth` adds growth x to the rates.
+    struct Orbit {
+        growth: f64,
+        evaluations: Cell<usize>,
+    }
+
+    impl Orbit {
+        fn new() -> Orbit {
+            Orbit { growth: 0.0, evaluations: Cell::new(0) }
+        }
+    }
+
+    impl System<4> for Orbit {
+        fn rates(&self, _: f64, x: &[f64; 4]) -> [f64; 4] {
+            self.evaluations.set(self.evaluations.get() + 1);
+            let r3 = libm::pow(x[0] * x[0] + x[1] * x[1], 1.5);
+            let rate = [x[2], x[3], -x[0] / r3, -x[1] / r3];
+            core::array::from_fn(|i| rate[i] + self.growth * x[i] * x[i])
+        }
+
+        fn error_scale(&self, _: f64, _: &[f64; 4], _: &[f64; 4], _: f64) -> [f64; 4] {
+            [1.0; 4]
+        }
+    }
+
+    const STEPS: Steps = Steps::new(100_000, "");
+
+    /// At the far end of an ellipse with eccentricity 0.6, semi-axis 1: a revolution takes 2 pi.
+    const START: [f64; 4] = [1.6, 0.0, 0.0, 0.5];
+
+    #[test]
+    fn a_revolution_ends_where_it_began_and_costs_more_where_more_is_asked() {
+        let mut before = 0;
+        for tolerance in [1e-4, 1e-6, 1e-8, 1e-10] {
+            let (orbit, mut x) = (Orbit::new(), START);
+            let end = core::f64::consts::TAU;
+            advance(&orbit, &mut x, (0.0, end), tolerance, &mut Pace::new(end, STEPS)).unwrap();
+            // A step may be off by a hundredth of the tolerance; errors along the orbit grow tenfold and more.
+            let off = (0..4).map(|i| (x[i] - START[i]).abs()).fold(0.0, f64::max);
+            assert!(off < 3.0 * tolerance, "{tolerance}: {off}");
+            let work = orbit.evaluations.get();
+            assert!(work > before && work < 3000, "{work} {before}");
+            before = work;
+        }
+    }
+
+    #[test]
+    fn a_call_in_stretches_ends_where_it_does_in_one() {
+        let (mut x, mut y) = (START, START);
+        let mut pace = Pace::new(3.0, STEPS);
+        for (from, to) in [(0.0, 0.5), (0.5, 0.6), (0.6, 3.0)] {
+            advance(&Orbit::new(), &mut x, (from, to), 1e-10, &mut pace).unwrap();
+        }
+        advance(&Orbit::new(), &mut y, (0.0, 3.0), 1e-10, &mut Pace::new(3.0, STEPS)).unwrap();
+        for i in 0..4 {
+            assert!((x[i] - y[i]).abs() < 1e-10, "{i}");
+        }
+    }
+
+    /// A polynomial of the rule's own degree comes out but for rounding, in three columns: 1 + 2 + 4 + 6 evaluations.
+    #[test]
+    fn three_columns_are_enough_for_a_quartic() {
+        struct Quartic(Cell<usize>);
+        impl System<1> for Quartic {
+            fn rates(&self, t: f64, _: &[f64; 1]) -> [f64; 1] {
+                self.0.set(self.0.get() + 1);
+                [5.0 * t.powi(4)]
+            }
+
+            fn error_scale(&self, _: f64, _: &[f64; 1], _: &[f64; 1], _: f64) -> [f64; 1] {
+                [1.0]
+            }
+        }
+        let (system, mut x) = (Quartic(Cell::new(0)), [0.0]);
+        advance(&system, &mut x, (0.0, 2.0), 1e-10, &mut Pace::new(2.0, STEPS)).unwrap();
+        assert!((x[0] - 32.0).abs() < 1e-12, "{}", x[0]);
+        assert!(system.0.get() <= work(3) as usize, "{}", system.0.get());
+        assert_eq!([work(0), work(1), work(2)], [3.0, 7.0, 13.0]);
+    }
+
+    #[test]
+    fn what_grows_beyond_all_numbers_or_takes_too_many_steps_is_an_error() {
+        let orbit = Orbit { growth: 10.0, ..Orbit::new() };
+        let run = |steps: Steps| {
+            advance(&orbit, &mut START.clone(), (0.0, 9.0), 1e-8, &mut Pace::new(9.0, steps))
+        };
+        let error = run(STEPS).unwrap_err();
+        assert!(matches!(error, StepError::NotFinite { .. } | StepError::TooManySteps { .. }));
+        assert!(matches!(
+            run(Steps::new(2, "")),
+            Err(StepError::TooManySteps { max_steps: 2, .. })
+        ));
+    }
+}

@@ -44,9 +44,9 @@ pub struct Steps {
 
 impl Steps {
     /// None taken yet of `max`; `advice` is what to do where they do not suffice.
-    pub fn new(max: usize, advice: &'static str) -> Steps {
+    pub const fn new(max: usize, advice: &'static str) -> Steps {
         // A fuzzer's sanitizer makes each step dear.
-        let max = if cfg!(fuzzing) { max.min(200) } else { max };
+        let max = if cfg!(fuzzing) && max > 200 { 200 } else { max };
         Steps { taken: 0, max, advice }
     }
 
@@ -90,7 +90,7 @@ pub enum Convergence {
 fn are_negligible([now, one, two, three]: [f64; 4]) -> bool {
     let decays = now <= DECAY * two && one <= DECAY * three;
     let foretold = one * now <= FORETOLD * two && one * one <= FORETOLD * three;
-    // NaN is not negligible; it ends the step.
+    // NaN is not negligible; the states that come of it end the step.
     now <= 1.0 && (one <= 1.0 || decays && foretold)
 }
 
@@ -246,4 +246,246 @@ pub fn advance<M: Motion>(
         motion.take(n, length, t, steps)?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::root::first_root;
+    use crate::series::{self, Series, ZERO};
+
+    /// x' = v, v' = -x between walls: at x = `wall`, if there is one, v changes its sign.
+    struct Oscillator {
+        now: [f64; 2],
+        x: Series,
+        v: Series,
+        allowed: f64,
+        wall: Option<f64>,
+        hits: usize,
+        convergence: Convergence,
+        highest: usize,
+        rates: usize,
+    }
+
+    impl Oscillator {
+        fn new(convergence: Convergence) -> Oscillator {
+            Oscillator {
+                now: [1.0, 0.0],
+                x: ZERO,
+                v: ZERO,
+                allowed: 0.0,
+                wall: None,
+                hits: 0,
+                convergence,
+                highest: ORDER,
+                rates: 0,
+            }
+        }
+
+        fn advance(&mut self, h: f64, tolerance: f64) -> Result<(), StepError> {
+            advance(self, 7.0, h, tolerance, &mut Steps::new(100_000, ""))
+        }
+
+        /// Largest difference from x = cos t, v = -sin t.
+        fn error(&self, t: f64) -> f64 {
+            f64::max((self.now[0] - t.cos()).abs(), (self.now[1] + t.sin()).abs())
+        }
+    }
+
+    impl Motion for Oscillator {
+        const UNROLLED: bool = false;
+
+        fn start(&mut self, _: f64) {
+            [self.x[0], self.v[0]] = self.now;
+        }
+
+        fn rates(&mut self, n: usize) {
+            self.rates += 1;
+            self.x[n + 1] = series::next(n, self.v[n]);
+            self.v[n + 1] = series::next(n, -self.x[n]);
+        }
+
+        fn set_error_scale(&mut self, h: f64, allowed: f64) -> f64 {
+            self.allowed = allowed;
+            h
+        }
+
+        fn coefficient_norm(&self, n: usize) -> f64 {
+            f64::max(self.x[n].abs(), self.v[n].abs()) / self.allowed
+        }
+
+        fn convergence(&self) -> Convergence {
+            self.convergence
+        }
+
+        fn highest_order(&self) -> usize {
+            self.highest
+        }
+
+        fn event(&mut self, n: usize, h: f64) -> Option<f64> {
+            let mut above = self.x;
+            above[0] -= self.wall?;
+            // On the wall the root at 0 is behind.
+            let behind = usize::from(above[0] <= 1e-15);
+            first_root(&above[behind..=n], h)
+        }
+
+        fn take(&mut self, n: usize, h: f64, _: f64, _: &mut Steps) -> Result<(), StepError> {
+            self.now = series::values([&self.x, &self.v], n, h);
+            if self.now.iter().any(|x| x.is_nan()) {
+                return Err(StepError::NotFinite { time: 0.5 });
+            }
+            if self.wall.is_some_and(|wall| (self.now[0] - wall).abs() < 1e-12) {
+                self.now[1] = -self.now[1];
+                self.hits += 1;
+            }
+            Ok(())
+        }
+    }
+
+    /// The same, compiled with every order apart.
+    struct Unrolled(Oscillator);
+
+    impl Motion for Unrolled {
+        fn start(&mut self, t: f64) {
+            self.0.start(t);
+        }
+
+        fn rates(&mut self, n: usize) {
+            self.0.rates(n);
+        }
+
+        fn set_error_scale(&mut self, h: f64, allowed: f64) -> f64 {
+            self.0.set_error_scale(h, allowed)
+        }
+
+        fn coefficient_norm(&self, n: usize) -> f64 {
+            self.0.coefficient_norm(n)
+        }
+
+        fn take(&mut self, n: usize, h: f64, t: f64, s: &mut Steps) -> Result<(), StepError> {
+            self.0.take(n, h, t, s)
+        }
+    }
+
+    #[test]
+    fn steps_of_any_length_keep_the_tolerance() {
+        for convergence in [Convergence::Decay, Convergence::Terms(2), Convergence::Terms(3)] {
+            for tolerance in [1e-4, 1e-8, 1e-12] {
+                for h in [1e-3, 0.1, 2.0, 50.0] {
+                    let mut motion = Oscillator::new(convergence);
+                    motion.advance(h, tolerance).unwrap();
+                    // An error of one step is a hundredth; 50 s take up to thirty. 1e-14: rounding.
+                    let error = motion.error(h);
+                    assert!(error < tolerance + 1e-14, "{convergence:?} {tolerance} {h}: {error}");
+                }
+            }
+        }
+    }
+
+    /// What stops an expansion after n = 4, 5, ... is read off the terms 0.1^n/n! themselves.
+    #[test]
+    fn an_expansion_ends_when_its_terms_say_so() {
+        let order = |convergence, tolerance: f64| {
+            let mut motion = Oscillator::new(convergence);
+            motion.start(0.0);
+            let (n, h) = expand(&mut motion, 0.1, tolerance);
+            assert_eq!((h, motion.rates), (0.1, n));
+            n
+        };
+        // Terms from 4 on: 4.2e-6, 8.3e-8, 1.4e-9, 2.0e-11, 2.5e-13; allowed is a hundredth of the tolerance.
+        assert_eq!(order(Convergence::Terms(2), 1e-3), 5);
+        assert_eq!(order(Convergence::Terms(3), 1e-3), 6);
+        assert_eq!(order(Convergence::Terms(4), 1e-3), 7);
+        assert_eq!(order(Convergence::Terms(2), 1e-4), 6);
+        assert_eq!(order(Convergence::Terms(2), 1e-6), 7);
+        // Term 5 is allowed, term 6 foretold by two orders' decay to be below a quarter.
+        assert_eq!(order(Convergence::Decay, 1e-3), 5);
+        assert_eq!(order(Convergence::Decay, 1e-5), 5);
+        assert_eq!(order(Convergence::Decay, 1e-6), 6);
+    }
+
+    #[test]
+    fn two_terms_are_negligible_or_the_second_is_foretold() {
+        // Known to be.
+        assert!(are_negligible([1.0, 1.0, 9.0, 9.0]));
+        assert!(!are_negligible([1.1, 0.1, 9.0, 9.0]));
+        // 2 x 0.5/20 = 0.05 and 2 x 2/30 are below a quarter, after decays of ten and more.
+        assert!(are_negligible([0.5, 2.0, 20.0, 30.0]));
+        // No decay from two orders before, of the one and of the other.
+        assert!(!are_negligible([0.5, 2.0, 4.0, 30.0]));
+        assert!(!are_negligible([0.05, 2.0, 20.0, 19.0]));
+        // Decay enough, but from too far: 4 x 1/12 and 8 x 8/81.
+        assert!(!are_negligible([1.0, 4.0, 12.0, 400.0]));
+        assert!(!are_negligible([0.1, 8.0, 20.0, 81.0]));
+        assert!(!are_negligible([f64::NAN, 0.0, 0.0, 0.0]));
+        assert!(!are_negligible([0.0, f64::NAN, 0.0, 0.0]));
+    }
+
+    #[test]
+    fn a_step_too_long_for_the_highest_order_is_cut_to_where_the_last_two_terms_are_allowed() {
+        for highest in [10, ORDER] {
+            let mut motion = Oscillator { highest, ..Oscillator::new(Convergence::Decay) };
+            motion.start(0.0);
+            let (n, h) = expand(&mut motion, 50.0, 1e-8);
+            assert_eq!(n, highest);
+            let term = |n: usize| motion.coefficient_norm(n) * h.powi(n as i32);
+            let largest = f64::max(term(n), term(n - 1));
+            // One of the two is at its limit, to the rounding of a power.
+            assert!((largest - 1.0).abs() < 1e-12, "{largest}");
+        }
+    }
+
+    #[test]
+    fn orders_compiled_apart_give_the_same_bits() {
+        let mut loops = Oscillator::new(Convergence::Decay);
+        let mut apart = Unrolled(Oscillator::new(Convergence::Decay));
+        for h in [0.01, 0.3, 9.0] {
+            loops.advance(h, 1e-9).unwrap();
+            advance(&mut apart, 7.0, h, 1e-9, &mut Steps::new(100, "")).unwrap();
+            assert_eq!(loops.now, apart.0.now);
+        }
+    }
+
+    /// From x = 1 the wall at 1/2 is met every 2 pi/3.
+    #[test]
+    fn an_event_ends_the_expansion_and_the_step_goes_on_from_there() {
+        let mut motion = Oscillator { wall: Some(0.5), ..Oscillator::new(Convergence::Decay) };
+        motion.advance(7.0, 1e-12).unwrap();
+        let since = 7.0 - 3.0 * core::f64::consts::TAU / 3.0;
+        assert_eq!(motion.hits, 3);
+        assert!((motion.now[0] - since.cos()).abs() < 1e-12, "{:?}", motion.now);
+    }
+
+    #[test]
+    fn steps_are_counted_and_the_time_of_an_error_is_the_hosts() {
+        let mut motion = Oscillator::new(Convergence::Decay);
+        let mut steps = Steps::new(3, "; rest");
+        let error = advance(&mut motion, 7.0, 1e3, 1e-8, &mut steps).unwrap_err();
+        let StepError::TooManySteps { time, max_steps: 3, advice: "; rest" } = error else {
+            panic!("{error}");
+        };
+        // Three steps of some 2 s.
+        assert!(time > 9.0 && time < 20.0, "{time}");
+        let mut steps = Steps::new(5, "");
+        steps.count(3, 0.0).unwrap();
+        assert_eq!(steps.left(), 2);
+        steps.count(2, 0.0).unwrap();
+        assert!(steps.count(1, 0.0).is_err());
+    }
+
+    #[test]
+    fn what_is_not_finite_is_refused_by_the_motion_or_by_its_length() {
+        let mut motion = Oscillator { now: [f64::NAN, 0.0], ..Oscillator::new(Convergence::Decay) };
+        assert_eq!(motion.advance(1.0, 1e-8), Err(StepError::NotFinite { time: 0.5 }));
+        let mut motion = Oscillator::new(Convergence::Decay);
+        assert_eq!(motion.advance(f64::INFINITY, 1e-8).map_err(|_| ()), Err(()));
+    }
+
+    #[test]
+    fn an_expansion_over_ages_stays_within_numbers() {
+        let mut motion = Oscillator { now: [0.0, 0.0], ..Oscillator::new(Convergence::Terms(2)) };
+        motion.start(0.0);
+        assert_eq!(expand(&mut motion, 1e300, 1e-8), (5, LONGEST));
+    }
 }

@@ -8,7 +8,7 @@
 //! Where to look: why a step was refused, `error.rs`; when a series has converged, how long a step is and how many
 //! there may be, `integrator.rs`; when an event falls due, `root.rs`.
 
-#![no_std]
+#![cfg_attr(not(test), no_std)]
 
 extern crate alloc;
 

@@ -180,3 +180,69 @@ impl Number for Dual {
         Dual { value, slope: if value > 0.0 { along / value } else { 0.0 } }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Uses everything that a number can do, each with an argument of its own.
+    fn formulas<T: Number>(x: T) -> [T; 14] {
+        let c = T::constant;
+        [
+            x + c(2.0),
+            c(2.0) - x,
+            x * x,
+            x * 3.0,
+            c(1.0) / x,
+            x / (x + c(1.0)),
+            -x,
+            x.recip(),
+            x.sqrt(),
+            x.sin(),
+            (x * 0.5).asin(),
+            x.hypot(x * x),
+            x.at_least(0.1),
+            x.clamp(-9.0, 9.0),
+        ]
+    }
+
+    #[test]
+    fn a_dual_number_has_the_value_and_the_derivative_of_the_formula() {
+        let (x, slope, h) = (0.8, 1.5, 1e-5);
+        let at = |s: f64| formulas(x + slope * s);
+        for (i, dual) in formulas(Dual::of(x, slope)).iter().enumerate() {
+            assert_eq!(dual.value(), at(0.0)[i], "{i}");
+            let expected = (at(h)[i] - at(-h)[i]) / (2.0 * h);
+            // h^2 times the third derivative, and rounding over h.
+            assert!((dual.result() - expected).abs() < 1e-9, "{i}: {} {expected}", dual.result());
+        }
+    }
+
+    #[test]
+    fn where_there_is_no_derivative_it_is_0() {
+        let zero = Dual::of(0.0, 1.0);
+        assert_eq!(zero.sqrt().result(), 0.0);
+        assert_eq!(zero.hypot(zero).result(), 0.0);
+        for end in [-1.0, 1.0, 1.0 + 1e-15] {
+            assert_eq!(Dual::of(end, 1.0).asin().result(), 0.0);
+            assert_eq!(
+                Dual::of(end, 1.0).asin().value(),
+                end.signum() * core::f64::consts::FRAC_PI_2
+            );
+        }
+        let bounded = [Dual::of(0.05, 1.0).at_least(0.1), Dual::of(10.0, 1.0).clamp(-9.0, 9.0)];
+        assert_eq!(bounded.map(|x| (x.value(), x.result())), [(0.1, 0.0), (9.0, 0.0)]);
+        assert_eq!(Number::at_least(0.05, 0.1), 0.1);
+        assert_eq!(Number::asin(-2.0f64), -core::f64::consts::FRAC_PI_2);
+    }
+
+    #[test]
+    fn of_a_plain_number_the_result_is_the_value() {
+        assert_eq!(
+            (f64::of(2.0, 5.0), f64::constant(3.0), 4.0.result(), 4.0.value()),
+            (2.0, 3.0, 4.0, 4.0)
+        );
+        let dual = Dual::constant(3.0);
+        assert_eq!((dual.value(), dual.result()), (3.0, 0.0));
+    }
+}

@@ -113,3 +113,49 @@ pub fn values<const K: usize>(a: [&Vector2; K], n: usize, t: f64) -> [[f64; 2]; 
     }
     sums
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::series::{Series, ZERO};
+
+    /// Products of two cubics, whose coefficients are small integers and hence exact.
+    #[test]
+    fn the_rules_are_the_product_rule() {
+        let (mut a, mut b, mut s) = (ZERO_VECTOR2, ZERO_VECTOR2, ZERO);
+        let (x, y) = (
+            [[1.0, 2.0], [3.0, 0.0], [0.0, -2.0], [4.0, 1.0]],
+            [[2.0, -3.0], [1.0, 1.0], [-1.0, 4.0], [0.0, 2.0]],
+        );
+        for j in 0..4 {
+            (a[j], b[j], s[j]) = (x[j], y[j], y[j][1]);
+        }
+        let plain = |n: usize, term: &dyn Fn(usize, usize) -> f64| -> f64 {
+            (0..=n).map(|j| term(j, n - j)).sum()
+        };
+        for n in 0..ORDER {
+            for i in 0..2 {
+                let scaled = plain(n, &|j, k| s[j] * a[k][i]);
+                assert_eq!(scale(n, &s, &a)[i], scaled);
+                assert_eq!(mul_part(n, &s, &a, i), scaled);
+                assert_eq!(scale_head(n, &s, &a)[i] + s[n] * a[0][i], scaled);
+                assert_eq!(mul_part_head(n, &s, &a, i) + s[n] * a[0][i], scaled);
+                assert_eq!(each(n, &a, &b)[i], plain(n, &|j, k| a[j][i] * b[k][i]));
+                assert_eq!(squares(n, &a)[i], plain(n, &|j, k| a[j][i] * a[k][i]));
+            }
+            assert_eq!(dot(n, &a, &b), plain(n, &|j, k| a[j][0] * b[k][0] + a[j][1] * b[k][1]));
+        }
+    }
+
+    #[test]
+    fn values_and_numbers_are_those_of_both_components() {
+        let mut a = ZERO_VECTOR2;
+        (a[0], a[1], a[2]) = ([1.0, -1.0], [2.0, 3.0], [0.5, 4.0]);
+        assert_eq!(values([&a, &a], ORDER, 2.0), [[7.0, 21.0]; 2]);
+        assert_eq!(values([&a], 1, 2.0), [[5.0, 5.0]]);
+        assert_eq!(numbers::<f64>(&a), [1.0, -1.0]);
+        let along = numbers::<crate::number::Dual>(&a);
+        assert_eq!(along.map(Number::result), [2.0, 3.0]);
+        let _: &Series = &ZERO;
+    }
+}

@@ -46,3 +46,19 @@ impl Ramp<Vec3> {
         [0, 1, 2].map(|i| self.value[i] + self.slope[i] * t)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ramp_is_linear_in_time() {
+        let ramp = Ramp { value: 2.0, slope: 3.0 };
+        assert_eq!((ramp.at(2.0), ramp.integral(2.0)), (8.0, 10.0));
+        assert_eq!(ramp.after(2.0), Ramp { value: 8.0, slope: 3.0 });
+        assert_eq!(Ramp::<f64>::held(2.0), Ramp { value: 2.0, slope: 0.0 });
+        let ramp = Ramp { value: [1.0, 2.0, 3.0], slope: [1.0, 0.0, -1.0] };
+        assert_eq!(ramp.at(2.0), [3.0, 2.0, 1.0]);
+        assert_eq!(Ramp::<Vec3>::held([1.0; 3]), Ramp { value: [1.0; 3], slope: [0.0; 3] });
+    }
+}

@@ -69,4 +69,19 @@ mod tests {
         assert_eq!(first_root(&[0.25 + 1e-9, -1.0, 1.0], 1.0), None);
         assert_eq!(first_root(&[1.0, 0.0, 0.0], 1.0), None);
     }
+
+    #[test]
+    fn roots_of_lines_parabolas_and_cubics_are_theirs() {
+        assert_eq!(first_root(&[2.0, -1.0], 3.0), Some(2.0));
+        assert_eq!(first_root(&[2.0, -1.0], 2.0), Some(2.0));
+        assert_eq!(first_root(&[2.0, -1.0], 1.9), None);
+        assert_eq!(first_root(&[2.0, 1.0], 9.0), None);
+        // 1 - t^2, and what falls after it has risen: 1 + t - t^2
+        assert!((first_root(&[1.0, 0.0, -1.0], 9.0).unwrap() - 1.0).abs() < 1e-15);
+        let golden = 0.5 + 1.25f64.sqrt();
+        assert!((first_root(&[1.0, 1.0, -1.0], 9.0).unwrap() - golden).abs() < 1e-15);
+        // (1 - t)(2 - t)(3 - t)
+        assert!((first_root(&[6.0, -11.0, 6.0, -1.0], 9.0).unwrap() - 1.0).abs() < 1e-14);
+        assert_eq!(first_root(&[f64::NAN, 1.0], 1.0), None);
+    }
 }

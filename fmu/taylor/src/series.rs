@@ -201,4 +201,39 @@ mod tests {
         assert!((values([&s], ORDER, 0.1)[0] - f64::sin(0.395)).abs() < ULPS);
         assert!((values([&c], ORDER, 0.1)[0] - f64::cos(0.395)).abs() < ULPS);
     }
+
+    /// Products of two cubics, whose coefficients are small integers and hence exact.
+    #[test]
+    fn the_rules_are_the_product_rule() {
+        let (mut a, mut b) = (ZERO, ZERO);
+        a[..4].copy_from_slice(&[1.0, 3.0, -2.0, 4.0]);
+        b[..4].copy_from_slice(&[2.0, -1.0, 5.0, 1.0]);
+        let ramp = [2.0, -1.0];
+        for n in 0..ORDER {
+            let product =
+                |a: &Series, b: &Series| -> f64 { (0..=n).map(|j| a[j] * b[n - j]).sum() };
+            assert_eq!(mul(n, &a, &b), product(&a, &b));
+            assert_eq!(mul_tail(n, &a, &b) + a[0] * b[n], product(&a, &b));
+            assert_eq!(square(n, &a), product(&a, &a));
+            let mut line = ZERO;
+            line[..2].copy_from_slice(&ramp);
+            assert_eq!(mul_ramp(n, &ramp, &a), product(&line, &a));
+            assert_eq!(next(n, 1.0), 1.0 / (n + 1) as f64);
+        }
+        assert_eq!((constant(0, 3.0), constant(1, 3.0)), (3.0, 0.0));
+    }
+
+    #[test]
+    fn values_and_integrals_are_those_of_the_polynomial_that_is_left() {
+        let mut a = ZERO;
+        a[..3].copy_from_slice(&[1.0, 2.0, 3.0]);
+        assert_eq!(values([&a], ORDER, 2.0), [17.0]);
+        assert_eq!(values([&a], 1, 2.0), [5.0]);
+        assert_eq!(values([&a], ORDER + 5, 2.0), [17.0]);
+        assert_eq!(integrals([&a, &a], ORDER, 2.0), [14.0; 2]);
+        assert_eq!(integrals([&a], 1, 2.0), [6.0]);
+        assert_eq!(integrals([&a], ORDER + 5, 2.0), [14.0]);
+        assert_eq!(number::<f64>(&a), 1.0);
+        assert_eq!(number::<crate::number::Dual>(&a).result(), 2.0);
+    }
 }

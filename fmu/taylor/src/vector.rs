@@ -123,3 +123,80 @@ pub fn on_sphere_slope(p: Vec3, p_d: Vec3, dp: Vec3, dp_d: Vec3) -> [Vec3; 2] {
     let d_along = dot(d_unit, p_d) + dot(unit, dp_d);
     [d_unit, sub(dp_d, add(scale(d_along, unit), scale(along, d_unit)))]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::number::Dual;
+
+    const A: Vec3 = [1.0, 2.0, -3.0];
+    const B: Vec3 = [0.5, -1.0, 4.0];
+
+    #[test]
+    fn products_are_those_of_small_integers() {
+        assert_eq!((add(A, B), sub(A, B)), ([1.5, 1.0, 1.0], [0.5, 3.0, -7.0]));
+        assert_eq!((scale(2.0, A), dot(A, B)), ([2.0, 4.0, -6.0], -13.5));
+        assert_eq!(cross(A, B), [5.0, -5.5, -2.0]);
+        let m = [A, B, [1.0, 0.0, 2.0]];
+        assert_eq!(times(&m, [1.0, 1.0, 2.0]), [-3.0, 7.5, 5.0]);
+        assert_eq!(transposed_times(&m, [1.0, 2.0, 3.0]), [5.0, 0.0, 11.0]);
+        assert_eq!(
+            (largest(A), largest([-9.0, 2.0, 1.0]), largest([0.0, -7.0, 1.0])),
+            (3.0, 9.0, 7.0)
+        );
+        assert_eq!((norm([3.0, 0.0, 4.0]), part(&[9.0, 1.0, 2.0, 3.0], 1)), (5.0, [1.0, 2.0, 3.0]));
+        assert_eq!(constant::<f64>(A), A);
+    }
+
+    /// A quarter turn about each axis, and about a slanted one Rodrigues' formula.
+    #[test]
+    fn a_quaternion_turns_by_its_angle_about_its_axis() {
+        let turned = |axis: Vec3, angle: f64, x: Vec3| {
+            let (sin, cos) = libm::sincos(angle / 2.0);
+            let [a, b, c] = scale(sin / norm(axis), axis);
+            times(&rotation(&[cos, a, b, c]), x)
+        };
+        let quarter = core::f64::consts::FRAC_PI_2;
+        let close = |a: Vec3, b: Vec3| assert!(norm(sub(a, b)) < 4e-15, "{a:?} {b:?}");
+        close(turned([1.0, 0.0, 0.0], quarter, [0.0, 1.0, 0.0]), [0.0, 0.0, 1.0]);
+        close(turned([0.0, 1.0, 0.0], quarter, [0.0, 0.0, 1.0]), [1.0, 0.0, 0.0]);
+        close(turned([0.0, 0.0, 1.0], quarter, [1.0, 0.0, 0.0]), [0.0, 1.0, 0.0]);
+        let (u, angle) = (scale(1.0 / norm(A), A), 0.7);
+        let (sin, cos) = libm::sincos(angle);
+        let rodrigues =
+            add(add(scale(cos, B), scale(sin, cross(u, B))), scale((1.0 - cos) * dot(u, B), u));
+        close(turned(A, angle, B), rodrigues);
+    }
+
+    #[test]
+    fn normalised_is_of_unit_length_and_its_rate_across() {
+        let q = unit_quaternion([2.0, -4.0, 5.0, 6.0]);
+        assert_eq!(q, [2.0, -4.0, 5.0, 6.0].map(|x| x / 9.0));
+        let [p, p_d] = on_sphere(A, B);
+        assert!((norm(p) - 1.0).abs() < 1e-15 && dot(p, p_d).abs() < 1e-15);
+        assert!(norm(cross(p, A)) < 1e-15 && dot(p, A) > 0.0);
+        // What is along p has gone from the rate, nothing else.
+        assert!(norm(sub(sub(B, p_d), scale(dot(p, B), p))) < 1e-15);
+    }
+
+    /// The derivatives by hand against those of the formula over dual numbers.
+    #[test]
+    fn slopes_are_the_derivatives_of_what_they_belong_to() {
+        let (q, dq) = ([0.9, -0.1, 0.5, 0.3], [0.2, 0.7, -0.4, 0.1]);
+        let dual = |x: f64, dx: f64| Dual::of(x, dx);
+        let exact = unit_quaternion([0, 1, 2, 3].map(|i| dual(q[i], dq[i])));
+        let slope = unit_quaternion_slope(&unit_quaternion(q), &q, &dq);
+        for i in 0..4 {
+            assert!((slope[i] - exact[i].result()).abs() < 1e-15, "{i}");
+        }
+        let (da, db) = ([0.3, -0.2, 0.6], [-0.5, 0.1, 0.2]);
+        let with = |x: Vec3, dx: Vec3| [0, 1, 2].map(|i| dual(x[i], dx[i]));
+        let exact = on_sphere(with(A, da), with(B, db));
+        let slope = on_sphere_slope(A, B, da, db);
+        for k in 0..2 {
+            for i in 0..3 {
+                assert!((slope[k][i] - exact[k][i].result()).abs() < 1e-15, "{k} {i}");
+            }
+        }
+    }
+}
