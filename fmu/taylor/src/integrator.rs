@@ -422,6 +422,43 @@ mod tests {
         assert!(!are_negligible([0.0, f64::NAN, 0.0, 0.0]));
     }
 
+    /// An expansion whose terms are given.
+    struct Given([f64; ORDER + 1]);
+
+    impl Motion for Given {
+        fn start(&mut self, _: f64) {}
+
+        fn rates(&mut self, _: usize) {}
+
+        fn set_error_scale(&mut self, h: f64, _: f64) -> f64 {
+            h
+        }
+
+        fn coefficient_norm(&self, n: usize) -> f64 {
+            self.0[n]
+        }
+
+        fn event(&mut self, _: usize, _: f64) -> Option<f64> {
+            Some(f64::NAN)
+        }
+
+        fn take(&mut self, _: usize, _: f64, _: f64, _: &mut Steps) -> Result<(), StepError> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn terms_count_from_the_second_on_and_an_end_at_no_time_is_refused() {
+        let mut terms = [0.0; ORDER + 1];
+        // Of term 2 the decay to term 4 is seen, at order 5.
+        terms[2..6].copy_from_slice(&[60.0, 30.0, 3.0, 0.1]);
+        assert_eq!(expand(&mut Given(terms), 1.0, 1e-8), (5, 1.0));
+        terms[2] = 29.0;
+        assert_eq!(expand(&mut Given(terms), 1.0, 1e-8), (6, 1.0));
+        let end = advance(&mut Given(terms), 7.0, 1.0, 1e-8, &mut Steps::new(9, ""));
+        assert_eq!(end, Err(StepError::NotFinite { time: 7.0 }));
+    }
+
     #[test]
     fn a_step_too_long_for_the_highest_order_is_cut_to_where_the_last_two_terms_are_allowed() {
         for highest in [10, ORDER] {

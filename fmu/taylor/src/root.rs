@@ -84,4 +84,40 @@ mod tests {
         assert!((first_root(&[6.0, -11.0, 6.0, -1.0], 9.0).unwrap() - 1.0).abs() < 1e-14);
         assert_eq!(first_root(&[f64::NAN, 1.0], 1.0), None);
     }
+
+    /// Polynomials of degree 8 whose terms decay, as those of a series do, against samples of them: nothing is
+    /// passed over.
+    #[test]
+    fn no_sample_before_the_first_root_is_below_zero() {
+        let mut seed = 1u64;
+        let mut between_ones = || {
+            seed = seed
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+        };
+        let mut found = 0;
+        for h in [0.5, 1.0, 1.7] {
+            for _ in 0..3000 {
+                let mut a: [f64; 9] = core::array::from_fn(|_| between_ones());
+                // Near 0, so that roots are close to each other.
+                a[0] = 0.03 * (1.0 + a[0]);
+                for (n, x) in a.iter_mut().enumerate() {
+                    *x *= libm::pow(0.8 / h, n as f64);
+                }
+                let value = |t: f64| a.iter().rev().fold(0.0, |sum, x| sum * t + x);
+                let at = |k: usize| h * k as f64 / 4000.0;
+                let below = (0..=4000).map(at).find(|t| value(*t) < 0.0);
+                let root = first_root(&a, h);
+                if let Some(below) = below {
+                    assert!(root.is_some_and(|root| root <= below), "{a:?} {h}: {root:?} {below}");
+                }
+                if let Some(root) = root {
+                    found += 1;
+                    assert!(value(root).abs() < 1e-12, "{a:?} {h}: {root}");
+                }
+            }
+        }
+        assert!(found > 3000, "{found}");
+    }
 }

@@ -291,6 +291,46 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_pair_keeps_both_vectors() {
+        let (a, b) = ([1.0, 2.0, 3.0], [-1.0, 0.5, 4.0]);
+        let mut both = ZERO_PAIR;
+        both.set(0, a, b);
+        both.set_next(0, [[4.0, 1.0], [5.0, 2.0], [6.0, 3.0]]);
+        both.set_next(1, [[2.0, 8.0]; 3]);
+        assert_eq!(both.get(0), [a, b]);
+        assert_eq!(both.get(1), [[4.0, 5.0, 6.0], [1.0, 2.0, 3.0]]);
+        assert_eq!(both.get(2), [[1.0; 3], [4.0; 3]]);
+        assert_eq!(both.value(2, 2.0), [[13.0, 16.0, 19.0], [17.0, 20.5, 26.0]]);
+        assert_eq!(both.value(1, 2.0), [[9.0, 12.0, 15.0], [1.0, 4.5, 10.0]]);
+    }
+
+    #[test]
+    fn an_attitude_keeps_its_quaternions() {
+        let mut q = ZERO_ATTITUDE;
+        q.set(0, [1.0, 2.0, 3.0, 4.0]);
+        q.set_next(0, [1.0, -1.0, 2.0, 0.0]);
+        q.set_next(1, [2.0, 4.0, 6.0, 8.0]);
+        assert_eq!([q.get(0), q.get(1)], [[1.0, 2.0, 3.0, 4.0], [1.0, -1.0, 2.0, 0.0]]);
+        assert_eq!(q.get(2), [1.0, 2.0, 3.0, 4.0]);
+        assert_eq!(q.value(2, 2.0), [7.0, 8.0, 19.0, 20.0]);
+    }
+
+    #[test]
+    fn ramps_are_series_of_two_terms() {
+        let (line, mut b) = ([[1.0, 2.0, 3.0], [-1.0, 0.0, 2.0]], ZERO_VECTOR);
+        (b[0], b[1], b[2]) = ([1.0, 1.0, 0.0], [0.0, 2.0, 1.0], [3.0, 0.0, 0.0]);
+        assert_eq!(
+            [ramp::<0>(&line), ramp::<1>(&line), ramp::<2>(&line)],
+            [line[0], line[1], [0.0; 3]]
+        );
+        assert_eq!([dot_ramp::<0>(&line, &b), dot_ramp::<1>(&line, &b)], [3.0, 6.0]);
+        assert_eq!(dot_ramp::<2>(&line, &b), 5.0);
+        assert_eq!(cross_ramp::<0>(&b, &line), vector::cross(b[0], line[0]));
+        let second = vector::add(vector::cross(b[2], line[0]), vector::cross(b[1], line[1]));
+        assert_eq!(cross_ramp::<2>(&b, &line), second);
+    }
+
     /// Products of two cubics, whose coefficients are small integers and hence exact.
     #[test]
     fn the_rules_are_the_product_rule() {
