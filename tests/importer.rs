@@ -62,12 +62,9 @@ fn co_simulation_gives_the_crate_fmi_the_bits_that_it_gives_us() {
     assert_eq!(theirs.get_types_platform(), "default");
     start(&mut theirs, &fmu);
     let mut ours = started(&fmu, host::fmi2::CO_SIMULATION);
-    let outputs: Vec<u32> = TABLE
-        .scalars
-        .iter()
-        .filter(|s| s.variable.causality == Causality::Output)
-        .map(|s| s.reference)
-        .collect();
+    let outputs = TABLE.scalars.iter().filter(|s| s.variable.causality == Causality::Output);
+    let names: Vec<String> = outputs.map(|s| s.name()).collect();
+    let outputs = references(&fmu, &names.iter().map(String::as_str).collect::<Vec<_>>());
     let torque = references(&fmu, &["tau_cmd"]);
     let (mut saved, mut after) = (Vec::new(), Vec::new());
     let tau_at = |time: f64| 0.05 * f64::sin(15.0 * time);
