@@ -12,6 +12,9 @@ mod life {
     mod instance;
 }
 mod physics {
+    // As it stands in the crate `plant`.
+    #[path = "../../fmu/plant/tests/plant/free_oscillation.rs"]
+    mod free_oscillation;
     mod liquid;
     mod tanks;
 }

@@ -5,6 +5,7 @@ mod changing_g;
 mod common;
 mod errata;
 mod events;
+mod free_oscillation;
 mod kinematics;
 mod liquid;
 mod lugre;
