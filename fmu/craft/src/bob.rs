@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! m  mass, l  length, e  the tank's axis, P  the hinge from O, p  unit vector from hinge to bob
-//! c  drag -c l p' on the bob (its velocity against the tank), kg/s
+//! c  drag -c l p' on the bob (its velocity against the tank), kg/s (`damping.rs`)
 //! k  centring potential k l^2 |p_perp|^2/2, p_perp = p - e (e.p), N/m
 //! B = a + w' x P + w x (w x P)     specific force at the hinge
 //! T  tension of the rod, > 0 when it pulls the bob to the hinge
@@ -37,6 +37,7 @@ use taylor::vector::{
     sub, times, transposed_times, unit_quaternion,
 };
 
+use crate::damping::Drag;
 use crate::parameters::Tank;
 
 /// One bob, as the outputs need it.
@@ -45,6 +46,9 @@ pub(crate) struct BobNow<T> {
     /// From O, and its velocity against the tank.
     pub rho: Vec3<T>,
     pub rate: Vec3<T>,
+    /// The hinge from O, and the tank's axis.
+    pub hinge: Vec3<T>,
+    pub e: Vec3,
     /// p in tank axes.
     pub in_tank: Vec3<T>,
     pub wave: f64,
@@ -62,6 +66,10 @@ pub struct Bob {
     pub l: f64,
     c: f64,
     k: f64,
+    /// Whether c depends on acceleration or amplitude; then as a series, and c p'.
+    follows: bool,
+    drag: Drag,
+    dragged: Vector,
     /// c/m, k/m, 1/l
     c_m: f64,
     k_m: f64,
@@ -105,6 +113,9 @@ impl Bob {
             l,
             c,
             k,
+            follows: tank.follows(mode),
+            drag: Drag::new(tank, mode),
+            dragged: ZERO_VECTOR,
             c_m: c / m,
             k_m: k / m,
             inv_l: 1.0 / l,
@@ -182,7 +193,11 @@ impl Bob {
             - space::dot_tail::<N>(&self.p, &self.specific_force)
             - dot(self.p[0], self.centripetal);
         let (mut reaction, mut twist) = ([0.0; 3], [0.0; 3]);
-        if c > 0.0 {
+        if self.follows {
+            self.drag_of::<N>();
+            reaction = scale(l, self.dragged[N]);
+            twist = scale(l, space::cross::<N>(&self.p, &self.dragged));
+        } else if c > 0.0 {
             reaction = scale(c * l, p_d);
             twist = scale(c * l, space::cross::<N>(&self.p, &self.p_d));
         }
@@ -207,6 +222,42 @@ impl Bob {
         [force, add(cross(self.hinge, force), scale(l, twist))]
     }
 
+    /// Coefficient N of the specific force along the tank's axis at the hinge that the drag follows.
+    #[inline(always)]
+    pub fn set_axial<const N: usize>(&mut self, x: f64) {
+        self.drag.set_axial(N, x);
+    }
+
+    /// Whether the drag depends on acceleration or amplitude.
+    pub fn follows(&self) -> bool {
+        self.follows
+    }
+
+    /// e and P x e: along the tank's axis at the hinge.
+    pub fn along_axis(&self) -> [Vec3; 2] {
+        [self.e, cross(self.hinge, self.e)]
+    }
+
+    /// The bob at rest as a point mass, from O.
+    pub fn at_rest(&self) -> Vec3 {
+        sub(self.hinge, scale(self.l, self.e))
+    }
+
+    /// Coefficient N of c p'.
+    #[inline(never)]
+    fn drag_of<const N: usize>(&mut self) {
+        self.height[N] = dot(self.e, self.p[N]);
+        // |p_perp|^2 = 1 - (p.e)^2, near rest without cancellation at order 0.
+        let off_axis_2 = if N == 0 {
+            let p_perp = sub(self.p[0], scale(self.height[0], self.e));
+            dot(p_perp, p_perp)
+        } else {
+            -series::square(N, &self.height)
+        };
+        self.drag.expand(N, off_axis_2, space::square_vector::<N>(&self.p_d));
+        self.dragged[N] = space::scale::<N>(&self.drag.c, &self.p_d);
+    }
+
     /// Coefficient N of the rest, and N + 1 of direction and velocity, from coefficient N of
     /// [a; w'].
     #[inline(always)]
@@ -218,7 +269,9 @@ impl Bob {
         let pulled = sub(self.known, scale(along, self.p[0]));
         let fall = scale(self.inv_l, add(self.specific_force[N], pulled));
         let mut v_d = [0, 1, 2].map(|i| -self.turned[i][1] - fall[i]);
-        if self.c > 0.0 {
+        if self.follows {
+            v_d = sub(v_d, scale(1.0 / self.m, self.dragged[N]));
+        } else if self.c > 0.0 {
             v_d = sub(v_d, scale(self.c_m, self.p_d[N]));
         }
         if self.k > 0.0 {
@@ -232,7 +285,11 @@ impl Bob {
     /// Coefficient N of the power dissipated, c l^2 |p'|^2, W.
     #[inline(always)]
     pub fn dissipation<const N: usize>(&self) -> f64 {
-        if self.c > 0.0 {
+        if self.follows {
+            let power =
+                space::dot_tail::<N>(&self.p_d, &self.dragged) + dot(self.p_d[0], self.dragged[N]);
+            self.l * self.l * power
+        } else if self.c > 0.0 {
             self.c * self.l * self.l * space::square_vector::<N>(&self.p_d)
         } else {
             0.0
@@ -296,7 +353,11 @@ impl Bob {
 
     fn at_hinge_and_bob<T: Number>(&self, tension: T, p: Vec3<T>, p_d: Vec3<T>) -> [Vec3<T>; 2] {
         let p_perp = self.perpendicular(p);
-        let phi = [0, 1, 2].map(|i| (p_d[i] * self.c + p_perp[i] * self.k) * self.l);
+        let c = match self.follows {
+            true => T::of(self.drag.c[0], self.drag.c[1]),
+            false => T::constant(self.c),
+        };
+        let phi = [0, 1, 2].map(|i| (p_d[i] * c + p_perp[i] * self.k) * self.l);
         let force = add(scale(tension, p), phi);
         let twist = cross(p, phi).map(|x| x * self.l);
         [force, add(cross(constant(self.hinge), force), twist)]
@@ -310,6 +371,8 @@ impl Bob {
             m: T::constant(self.m),
             rho: add(constant(self.hinge), p.map(|x| x * self.l)),
             rate: p_d.map(|x| x * self.l),
+            hinge: constant(self.hinge),
+            e: self.e,
             in_tank: transposed_times(&self.axes.map(constant), p),
             wave: self.wave,
             centring: dot(p_perp, p_perp) * (0.5 * self.k * self.l * self.l),

@@ -51,23 +51,24 @@ use taylor::vector::{
 };
 
 use crate::bob::BobNow;
+use crate::damping;
 use crate::parameters::{Limits, Tank};
 use crate::rigid::{Mat6, Rigid};
-use crate::sizes::{MODES, POINTS};
+use crate::sizes::MODES;
 use crate::state::Line;
+use crate::table::{FillCurves, Jet};
 
 /// A tank where it is mounted.
 #[derive(Clone, Debug)]
 pub struct MountedTank {
     pub tank: Tank,
+    curves: FillCurves,
     axes: Mat3,
     e: Vec3,
     d: Vec3,
 }
 
-/// A quantity and its first two derivatives by time.
-type Jet<T> = [T; 3];
-
+/// A quantity that stays, with its derivatives by time.
 fn jet<T: Number>(x: f64) -> Jet<T> {
     [x, 0.0, 0.0].map(T::constant)
 }
@@ -116,32 +117,60 @@ pub fn vec_of<T: Number>(x: &[T], at: usize) -> Vec3<T> {
 impl MountedTank {
     pub fn new(tank: &Tank) -> MountedTank {
         let axes = rotation(&unit_quaternion(tank.q));
-        MountedTank { tank: *tank, axes, e: axes.map(|row| row[2]), d: tank.position }
+        let curves = tank.fill.curves(tank.modes);
+        MountedTank { tank: *tank, curves, axes, e: axes.map(|row| row[2]), d: tank.position }
     }
 
-    /// x: p and p' of each mode, tank axes; `liquid`, `flow` and its `slope` count for tanks with a table.
+    /// Whether any mode's drag depends on acceleration or amplitude.
+    pub fn follows(&self) -> bool {
+        (0..self.tank.modes).any(|n| self.tank.follows(n))
+    }
+
+    /// The liquid at rest as a rigid body; `liquid` counts for tanks with a table.
+    pub fn at_rest<T: Number>(&self, liquid: T) -> Rigid<T> {
+        let MountedTank { tank, curves, .. } = self;
+        let constant_of = |x: f64| T::constant(x);
+        let place = (tank.fill.points > 0).then(|| curves.place(liquid));
+        let (e, d, zero) = (constant::<T>(self.e), constant::<T>(self.d), constant_of(0.0));
+        let mut m_0 = if place.is_some() { liquid } else { constant_of(tank.m_0) };
+        let mut bobs = Rigid { mass: zero, moment: [zero; 3], inertia: [[zero; 3]; 3] };
+        for n in 0..tank.modes {
+            let [m, l, h] = match place {
+                Some(place) => curves.mode(n, place).map(|jet| jet[0]),
+                None => [tank.mass[n], tank.length[n], tank.hinge[n]].map(constant_of),
+            };
+            if place.is_some() {
+                m_0 = m_0 - m;
+            }
+            bobs = bobs.and(&Rigid::axial(m, add(d, scale(h - l, e)), zero, zero, e));
+        }
+        let [h_0, i_0, i_z] = match place {
+            Some(place) => curves.rigid(place).map(|jet| jet[0]),
+            None => [tank.h_0, tank.i_0, tank.i_z].map(constant_of),
+        };
+        bobs.and(&Rigid::axial(m_0, add(d, scale(h_0, e)), i_0, i_z, e))
+    }
+
+    /// x: p and p' of each mode, tank axes; `a`, `w_d`: the motion whose acceleration along the tank the drag follows;
+    /// `liquid`, `flow` and its `slope` count for tanks with a table.
     pub fn contents<T: Number>(
         &self,
         x: &[T],
-        w: Vec3<T>,
+        [a, w, w_d]: [Vec3<T>; 3],
         liquid: T,
         flow: T,
         slope: f64,
     ) -> Contents<T> {
-        let MountedTank { tank, axes, .. } = self;
-        let table = &tank.fill;
-        let drains = table.points > 0;
+        let MountedTank { tank, curves, axes, .. } = self;
+        let drains = tank.fill.points > 0;
         let c = T::constant;
         let flow = if drains { flow } else { c(0.0) };
         let slope = if drains { slope } else { 0.0 };
         // By the mass of liquid, m' = -f, m'' = -f'.
-        let follow = |y: &[f64; POINTS], constant: f64| -> Jet<T> {
-            if !drains {
-                return jet(constant);
-            }
-            let [value, first, second] = table.at(y, liquid);
+        let follow = |[value, first, second]: Jet<T>| -> Jet<T> {
             [value, -(first * flow), second * flow * flow - first * slope]
         };
+        let place = drains.then(|| curves.place(liquid));
         let (e, d) = (constant::<T>(self.e), constant::<T>(self.d));
         let outlet = add(d, e.map(|x| x * tank.outlet));
         let mut m_0 = if drains { [liquid, -flow, c(-slope)] } else { jet(tank.m_0) };
@@ -154,9 +183,10 @@ impl MountedTank {
         let mut flow_wrench = [zero; 2];
         let mut dissipation = c(0.0);
         for n in 0..tank.modes {
-            let m = follow(&table.mass[n], tank.mass[n]);
-            let l = follow(&table.length[n], tank.length[n]);
-            let h = follow(&table.hinge[n], tank.hinge[n]);
+            let [m, l, h] = match place {
+                Some(place) => curves.mode(n, place).map(follow),
+                None => [tank.mass[n], tank.length[n], tank.hinge[n]].map(jet),
+            };
             let k = tank.k[n];
             if drains {
                 m_0 = [m_0[0] - m[0], m_0[1] - m[1], m_0[2] - m[2]];
@@ -170,9 +200,9 @@ impl MountedTank {
             let (height, height_d) = (dot(e, p), dot(e, p_d));
             let p_perp = sub(p, scale(height, e));
             let p_perp_d = sub(p_d, scale(height_d, e));
-            // c = 2 zeta m sqrt(g_ref/l + k/m)
-            let stiffness = l[0].recip() * tank.g_ref + m[0].recip() * k;
-            let drag = m[0] * stiffness.sqrt() * (2.0 * tank.zeta[n]);
+            let at_hinge = add(add(a, cross(w_d, hinge)), cross(w, cross(w, hinge)));
+            let motion = [dot(p_perp, p_perp), dot(p_d, p_d)];
+            let drag = damping::coefficient(tank, n, [m[0], l[0]], dot(e, at_hinge), motion);
             let phi = add(scale(drag * l[0], p_d), scale(l[0] * k, p_perp));
             let centripetal = add(cross(w, cross(w, rho)), cross(w, rho_d).map(|x| x * 2.0));
             let settling = add(centripetal, scale(h[2], e));
@@ -216,8 +246,10 @@ impl MountedTank {
                 centring_d: l[0] * l[1] * dot(p_perp, p_perp) * k,
             });
         }
-        let h_0 = follow(&table.h_0, tank.h_0);
-        let [i_0, i_z] = [follow(&table.i_0, tank.i_0), follow(&table.i_z, tank.i_z)];
+        let [h_0, i_0, i_z] = match place {
+            Some(place) => curves.rigid(place).map(follow),
+            None => [tank.h_0, tank.i_0, tank.i_z].map(jet),
+        };
         // The rigid liquid about O.
         let s = add(d, scale(h_0[0], e));
         let s_d = scale(h_0[1], e);
@@ -277,6 +309,8 @@ impl MountedTank {
                 m: bob.m,
                 rho: bob.rho,
                 rate: bob.rho_d,
+                hinge: sub(bob.rho, scale(bob.l, bob.p)),
+                e: self.e,
                 in_tank: transposed_times(&axes, bob.p),
                 wave: self.tank.wave[n],
                 centring: bob.centring,
@@ -411,7 +445,7 @@ impl Outflow<'_> {
             }
             let root = libm::sqrt(square);
             let sum = flow.value + if flow.value < 0.0 { -root } else { root };
-            for (over, under) in [(2.0 * gone, sum), (sum, flow.slope)] {
+            for (over, under) in [(2.0 * gone, sum), (-sum, flow.slope)] {
                 // Never, and where the division overflows after h.
                 if over.abs() >= under.abs() * h {
                     continue;
@@ -473,5 +507,32 @@ pub fn normalise_bobs(x: &mut [f64]) {
         let [p, p_d] = on_sphere(vec_of(bob, 0), vec_of(bob, 3));
         bob[..3].copy_from_slice(&p);
         bob[3..].copy_from_slice(&p_d);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A flow of 2 - t kg/s turns at 2 s: what is 1.5 kg below passes at 2 t - t^2/2 = 1.5, at 1 s, and comes back at 3 s.
+    /// One of 1 + t kg/s has passed it at 1 s for good.
+    #[test]
+    fn a_point_of_the_table_is_passed_again_after_the_flow_turns() {
+        let tank = Tank::default();
+        let mut mounted = MountedTank::new(&tank);
+        mounted.tank.fill.points = 2;
+        mounted.tank.fill.liquid[..2].copy_from_slice(&[100.0, 1000.0]);
+        let passes = |value: f64, slope: f64, after: f64, liquid: f64| {
+            let flow = Line { value, slope };
+            Outflow { mounted: &mounted, flow, at: 0, tank: 0 }.next_point(liquid, after, 10.0)
+        };
+        for sign in [1.0, -1.0] {
+            let liquid = 100.0 + sign * 1.5;
+            assert_eq!(passes(sign * 2.0, -sign, 0.0, liquid), 1.0);
+            assert_eq!(passes(sign * 2.0, -sign, 1.0, liquid), 3.0);
+            assert_eq!(passes(sign * 2.0, -sign, 3.0, liquid), 10.0);
+            assert_eq!(passes(sign, sign, 0.0, liquid), 1.0);
+            assert_eq!(passes(sign, sign, 1.0, liquid), 10.0);
+        }
     }
 }

@@ -14,7 +14,7 @@ use taylor::extrapolation::System;
 use taylor::integrator::RATE_FLOOR;
 use taylor::number::{Dual, Number};
 use taylor::vector::{
-    Vec3, add, constant, cross, dot, largest, rotation, scale, sub, times, transposed_times,
+    Mat3, Vec3, add, constant, cross, dot, largest, rotation, scale, sub, times, transposed_times,
     unit_quaternion,
 };
 
@@ -24,7 +24,7 @@ use crate::contents::{
 use crate::motion::SCALE_TIME;
 use crate::outputs::{Now, TankNow};
 use crate::parameters::{Mount, Parameters, Tank};
-use crate::rigid::{Factors, Rigid};
+use crate::rigid::{Factors, Mat6, Rigid};
 use crate::sizes::{MODES, TANKS};
 use crate::state::{INPUTS, Inputs, Line, STATES, State, index};
 
@@ -205,6 +205,52 @@ impl Draining {
         true
     }
 
+    /// [a; w'] from the equations of motion; on a pivot a is given.
+    fn solve<T: Number>(
+        &self,
+        mut matrix: Mat6<T>,
+        [mut force, mut torque]: [Vec3<T>; 2],
+        axes: &Mat3<T>,
+    ) -> [Vec3<T>; 2] {
+        if self.mount == Mount::Pivot {
+            let a = transposed_times(axes, constant(self.gravity)).map(|x| -x);
+            for i in 0..3 {
+                let coupled = [matrix[3 + i][0], matrix[3 + i][1], matrix[3 + i][2]];
+                torque[i] = torque[i] - dot(coupled, a);
+            }
+            for i in 0..3 {
+                for k in 0..6 {
+                    let one = T::constant(if i == k { 1.0 } else { 0.0 });
+                    (matrix[i][k], matrix[k][i]) = (one, one);
+                }
+            }
+            force = a;
+        }
+        Factors::of(&matrix).solve([force, torque])
+    }
+
+    /// [a; w'] of craft and liquids at rest as one rigid body, if any drag follows it (`damping.rs`).
+    fn rigid_motion<T: Number>(
+        &self,
+        x: &[T; STATES],
+        acting: &Acting<T>,
+        axes: &Mat3<T>,
+    ) -> [Vec3<T>; 2] {
+        let zero = constant::<T>([0.0; 3]);
+        if !self.tanks.iter().any(MountedTank::follows) {
+            return [zero; 2];
+        }
+        let w = vec_of(x, index::OMEGA);
+        let liquids = self.tanks.iter().enumerate();
+        let whole = liquids.fold(self.craft.lift::<T>(), |sum, (i, mounted)| {
+            sum.and(&mounted.at_rest(x[index::LIQUID + i]))
+        });
+        let [centripetal, gyroscopic] = whole.inertial_wrench(zero, w, zero);
+        let force = sub(acting.force, centripetal);
+        let torque = sub(acting.torque, add(gyroscopic, cross(w, acting.h_wheels)));
+        self.solve(whole.mass_matrix(), [force, torque], axes)
+    }
+
     /// The rates of the states, and what the outputs follow from.
     pub fn evaluate<T: Number>(
         &self,
@@ -217,11 +263,13 @@ impl Draining {
         let axes = rotation(&q);
         let w = vec_of(x, index::OMEGA);
         let velocity = transposed_times(&axes, vec_of(x, index::VELOCITY));
+        let [a_rigid, w_d_rigid] = self.rigid_motion(x, acting, &axes);
         let contents: [Option<Contents<T>>; TANKS] = core::array::from_fn(|i| {
             let mounted = self.tanks.get(i)?;
             let liquid = x[index::LIQUID + i];
             let bobs = &x[index::bob(i, 0)..index::bob(i, 0) + 6 * MODES];
-            Some(mounted.contents(bobs, w, liquid, acting.flow[i], acting.flow_slope[i]))
+            let motion = [a_rigid, w, w_d_rigid];
+            Some(mounted.contents(bobs, motion, liquid, acting.flow[i], acting.flow_slope[i]))
         });
         let all = || contents.iter().flatten();
         let rigid = all().fold(self.craft.lift::<T>(), |sum, tank| sum.and(&tank.rigid));
@@ -234,21 +282,7 @@ impl Draining {
             (force, torque) = (add(force, f), add(torque, tau));
             tank.add_rods(&mut matrix);
         }
-        if self.mount == Mount::Pivot {
-            let a = transposed_times(&axes, constant(self.gravity)).map(|x| -x);
-            for i in 0..3 {
-                let coupled = [matrix[3 + i][0], matrix[3 + i][1], matrix[3 + i][2]];
-                torque[i] = torque[i] - dot(coupled, a);
-            }
-            for i in 0..3 {
-                for k in 0..6 {
-                    let one = c(if i == k { 1.0 } else { 0.0 });
-                    (matrix[i][k], matrix[k][i]) = (one, one);
-                }
-            }
-            force = a;
-        }
-        let [a, w_d] = Factors::of(&matrix).solve([force, torque]);
+        let [a, w_d] = self.solve(matrix, [force, torque], &axes);
 
         let mut rate = [c(0.0); STATES];
         let mut put = |at: usize, numbers: &[T]| {
@@ -304,7 +338,7 @@ mod tests {
 
     use super::*;
     use crate::Spacecraft;
-    use crate::parameters::{Limits, MAX_STEPS};
+    use crate::parameters::{DampingLaw, Limits, MAX_STEPS};
     use crate::state::Ramp;
 
     /// A run that counts how often its equations are evaluated.
@@ -351,7 +385,10 @@ mod tests {
             tank.position = [size(0.6), size(0.6), size(0.4)];
             tank.q = [1.0, size(0.1), size(0.1), size(0.3)];
             tank.modes = (seed as usize + i) % 4;
-            tank.fill.points = 8;
+            // Every law, and drag that grows with the amplitude.
+            tank.damping_law = DampingLaw::ALL[(seed as usize + i + 1) % 3];
+            tank.zeta_amplitude = [0.02 * (seed % 2) as f64; MODES];
+            tank.fill.points = crate::POINTS;
             tank.p_0 = [(); MODES].map(|()| [size(0.2), size(0.2), -1.0]);
             // 382 kg in it, of which 52 to 232 flow out in 30 s: past two to five points of its table.
             mass_flow[i] = Line { value: 4.5 + size(2.0), slope: size(0.05) };

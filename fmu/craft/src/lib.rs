@@ -33,10 +33,12 @@ extern crate alloc;
 
 mod bob;
 mod contents;
+mod damping;
 mod draining;
 mod motion;
 mod outputs;
 mod parameters;
+mod ranges;
 mod rigid;
 mod sizes;
 mod slosh_tank;
@@ -44,14 +46,15 @@ mod spacecraft;
 mod state;
 mod table;
 
+pub use formulas::regime::Regime;
 pub use outputs::{Outputs, TankOutputs};
-pub use parameters::{Craft, Inertia, Init, Mount, Parameters, Tank};
+pub use parameters::{Craft, DampingLaw, Inertia, Init, Mount, Parameters, Tank};
 pub use sizes::{MODES, POINTS, TANKS};
 pub use slosh_tank::{
     Coupling, SloshTank, SloshTankOutputs, TANK_INPUTS, TANK_STATES, TRIANGLE, TankInputs,
     TankParameters, TankState,
 };
 pub use spacecraft::Spacecraft;
-pub use state::{INPUTS, Inputs, Line, Ramp, STATES, State, index};
+pub use state::{INPUTS, Inputs, Line, Ramp, Ranges, STATES, State, index};
 pub use table::FillTable;
 pub use taylor::error::StepError;

@@ -62,6 +62,17 @@ fn gyroscopic(inertia: &Mat3, [xx, yy, zz, xy, xz, yz]: [f64; 6]) -> Vec3 {
     [element(2, 1) - element(1, 2), element(0, 2) - element(2, 0), element(1, 0) - element(0, 1)]
 }
 
+/// Makes the upper half of what a matrix is solved for that of the right-hand side: a on a pivot.
+#[inline(always)]
+fn hold_upper_rows(matrix: &mut Mat6) {
+    for i in 0..3 {
+        for j in 0..6 {
+            let one = if i == j { 1.0 } else { 0.0 };
+            (matrix[i][j], matrix[j][i]) = (one, one);
+        }
+    }
+}
+
 /// The craft at its present state and the series of its motion.
 #[derive(Clone, Debug)]
 pub struct CraftMotion {
@@ -76,6 +87,12 @@ pub struct CraftMotion {
     pub liquids: Vec<Rigid>,
     pub bobs: Vec<Bob>,
     /// M at the start of the expansion, and its factors.
+    /// Whether any bob's drag follows the acceleration.
+    follows: bool,
+    /// Craft and liquids at rest as one rigid body, and what of its motion is along each bob's tank (on a pivot of
+    /// [a; torque], else of [force; torque]).
+    whole: Rigid,
+    along: Vec<[Vec3; 2]>,
     matrix: Mat6,
     factors: Factors,
     force: [Vec3; 2],
@@ -114,7 +131,7 @@ impl CraftMotion {
             .flat_map(|(i, tank)| (0..tank.modes).map(move |n| Bob::new(tank, i, n)))
             .collect();
         let mass_matrix = rigid.mass_matrix();
-        CraftMotion {
+        let mut motion = CraftMotion {
             state,
             inputs: Inputs::default(),
             mount: p.mount,
@@ -123,6 +140,9 @@ impl CraftMotion {
             rigid,
             mass_matrix,
             liquids,
+            follows: bobs.iter().any(Bob::follows),
+            whole: rigid,
+            along: bobs.iter().map(Bob::along_axis).collect(),
             matrix: mass_matrix,
             factors: Factors::of(&mass_matrix),
             force: [[0.0; 3]; 2],
@@ -142,6 +162,22 @@ impl CraftMotion {
             inv_allowed: [0.0; 4],
             longest: bobs.iter().fold(0.0, |longest, bob| bob.l.max(longest)),
             bobs,
+        };
+        motion.freeze();
+        motion
+    }
+
+    /// Craft and liquids at rest as one rigid body: what the bobs' drag takes for the acceleration along their tanks.
+    fn freeze(&mut self) {
+        let point = |bob: &Bob| Rigid::new(bob.m, bob.at_rest(), &[[0.0; 3]; 3]);
+        self.whole = self.bobs.iter().fold(self.rigid, |sum, bob| sum.and(&point(bob)));
+        let mut matrix = self.whole.mass_matrix();
+        if self.mount == Mount::Pivot {
+            hold_upper_rows(&mut matrix);
+        }
+        let factors = Factors::of(&matrix);
+        for (along, bob) in self.along.iter_mut().zip(&self.bobs) {
+            *along = factors.solve(bob.along_axis());
         }
     }
 
@@ -158,6 +194,7 @@ impl CraftMotion {
                 *bob = Bob::new(tank, bob.tank, bob.mode);
             }
         }
+        self.freeze();
     }
 
     /// M at the present directions and its factors. On a pivot the upper rows hold a.
@@ -169,12 +206,7 @@ impl CraftMotion {
         }
         self.matrix = matrix;
         if self.mount == Mount::Pivot {
-            for i in 0..3 {
-                for j in 0..6 {
-                    let one = if i == j { 1.0 } else { 0.0 };
-                    (matrix[i][j], matrix[j][i]) = (one, one);
-                }
-            }
+            hold_upper_rows(&mut matrix);
         }
         self.factors = Factors::of(&matrix);
     }
@@ -287,6 +319,9 @@ impl CraftMotion {
             ramp::<N>(&self.torque),
             add(gyroscopic(&self.rigid.inertia, ww), cross_ramp::<N>(&self.w, &self.h)),
         );
+        if self.follows {
+            self.set_axial::<N>(ww);
+        }
         for bob in &mut self.bobs {
             let [f, tau] = bob.reaction::<N>(&self.w_both, &w2);
             force = add(force, f);
@@ -324,6 +359,29 @@ impl CraftMotion {
             dissipation += bob.dissipation::<N>();
         }
         self.dissipation[N] = dissipation;
+    }
+
+    /// Coefficient N of the specific force along each tank at the hinges, e.(a + w' x P + w x (w x P)), of craft and
+    /// liquids as one rigid body. `ww` is that of w w^T.
+    #[inline(never)]
+    fn set_axial<const N: usize>(&mut self, ww: [f64; 6]) {
+        let (whole, w2) = (&self.whole, twice_crossed(ww));
+        let gyroscopic = add(gyroscopic(&whole.inertia, ww), cross_ramp::<N>(&self.w, &self.h));
+        let mut torque = sub(ramp::<N>(&self.torque), gyroscopic);
+        let force = match self.mount {
+            Mount::Free => sub(ramp::<N>(&self.force), times(&w2, whole.moment)),
+            Mount::Pivot => {
+                torque = sub(torque, vector::cross(whole.moment, self.a[N]));
+                self.a[N]
+            }
+        };
+        for (bob, [by_force, by_torque]) in self.bobs.iter_mut().zip(&self.along) {
+            let [e, _] = bob.along_axis();
+            let turning = vector::dot(e, times(&w2, bob.hinge));
+            bob.set_axial::<N>(
+                vector::dot(*by_force, force) + vector::dot(*by_torque, torque) + turning,
+            );
+        }
     }
 
     /// Coefficient N (0 or 1) of x'.

@@ -22,7 +22,7 @@ use crate::motion::CraftMotion;
 use crate::parameters::Mount;
 use crate::rigid::Rigid;
 use crate::sizes::{MODES, TANKS};
-use crate::state::{STATES, index};
+use crate::state::{Ranges, STATES, index};
 
 /// What one tank shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,6 +41,10 @@ pub struct TankOutputs {
     pub angle_y: [f64; MODES],
     /// Amplitude of the surface at the wall, all modes together, m.
     pub wave_height: f64,
+    /// Specific force along the tank's axis at the hinge of mode 1, m/s2; 0 without modes.
+    pub axial: f64,
+    /// Where the pendulums stand for the liquid.
+    pub ranges: Ranges,
 }
 
 /// What the craft shows at one instant.
@@ -102,15 +106,22 @@ impl TankOutputs {
             angle_x: [0.0; MODES],
             angle_y: [0.0; MODES],
             wave_height: 0.0,
+            axial: 0.0,
+            ranges: Ranges::default(),
         }
     }
 
     pub(crate) fn set_angles<'a, T: Number + 'a>(
         &mut self,
+        [a, w, w_d]: [Vec3<T>; 3],
         bobs: impl Iterator<Item = &'a BobNow<T>>,
     ) {
         let mut wave = [T::constant(0.0); 2];
         for (n, bob) in bobs.enumerate() {
+            if n == 0 {
+                let turning = add(cross(w_d, bob.hinge), cross(w, cross(w, bob.hinge)));
+                self.axial = dot(constant(bob.e), add(a, turning)).result();
+            }
             let [x, y] = [bob.in_tank[0].asin(), bob.in_tank[1].asin()];
             self.angle_x[n] = x.result();
             self.angle_y[n] = y.result();
@@ -244,7 +255,7 @@ impl<T: Number> Now<T> {
         let (mut slosh_force, mut slosh_torque) = ([0.0; 3], [0.0; 3]);
         for (out, now) in tank.iter_mut().zip(tanks()) {
             [out.force, out.torque] = now.wrench.map(result);
-            out.set_angles(now.bobs.iter().flatten());
+            out.set_angles([self.a, w, self.w_d], now.bobs.iter().flatten());
             slosh_force = add(slosh_force, out.force);
             slosh_torque = add(slosh_torque, out.torque);
         }

@@ -10,7 +10,7 @@ use taylor::integrator::Steps;
 use taylor::vector::{Quaternion, Vec3, add, rotation, scale, unit_quaternion};
 
 use crate::rigid::{Factors, Rigid};
-use crate::sizes::{MODES, POINTS, TANKS};
+use crate::sizes::{MODES, POINTS, TANKS, modes_of};
 use crate::table::FillTable;
 
 /// Symmetric inertia tensor, kg m2: the matrix of J = integral of (|s|^2 1 - s s^T) dm.
@@ -93,6 +93,24 @@ impl Mount {
     pub const ALL: [Mount; 2] = [Mount::Free, Mount::Pivot];
 }
 
+/// How a mode's drag coefficient c follows its natural frequency w, and with it the acceleration along the tank.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum DampingLaw {
+    /// c ~ w^(1/2): a laminar layer at the wall, for bare tanks.
+    Laminar = 1,
+    /// c ~ w: the damping ratio stays, for one that was measured or prescribed.
+    ConstantRatio = 2,
+    /// c stays, whatever the acceleration: for what is no layer, a diaphragm for example.
+    Constant = 3,
+}
+
+impl DampingLaw {
+    /// All, by their numbers.
+    pub const ALL: [DampingLaw; 3] =
+        [DampingLaw::Laminar, DampingLaw::ConstantRatio, DampingLaw::Constant];
+}
+
 /// One tank: rigid liquid and pendulums, in the tank's own axes. Its z axis is the tank's
 /// axis; liquid at rest hangs towards -z.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -134,6 +152,13 @@ pub struct Tank {
     pub k: [f64; MODES],
     /// Damping ratio at `g_ref`.
     pub zeta: [f64; MODES],
+    /// How it goes on from there.
+    pub damping_law: DampingLaw,
+    /// Acceleration along the axis, m/s2, around which the drag stops to follow it (`damping.rs`); 0: 1e-4 of
+    /// `g_ref`.
+    pub g_floor: f64,
+    /// Growth of the damping ratio with the amplitude, 1/rad.
+    pub zeta_amplitude: [f64; MODES],
     /// Elevation of the surface at the wall per slosh angle, m/rad.
     pub wave: [f64; MODES],
     /// How modes and rigid liquid follow the mass of liquid. With points in it the tank can drain, and
@@ -166,16 +191,15 @@ impl Tank {
             [tank.m_0, tank.h_0, tank.i_0] = cylinder::rest(d, h, m_liq, &pendulums[..modes]);
         }
         if (2..=POINTS).contains(&self.fill.points) {
-            let at = |y: &[f64; POINTS]| self.fill.at(y, self.liquid_0)[0];
+            let curves = self.fill.curves(modes);
+            let at = curves.place(self.liquid_0);
             tank.m_0 = self.liquid_0;
             for n in 0..modes {
-                tank.mass[n] = at(&self.fill.mass[n]);
-                tank.length[n] = at(&self.fill.length[n]);
-                tank.hinge[n] = at(&self.fill.hinge[n]);
+                let mode = curves.mode(n, at).map(|jet| jet[0]);
+                [tank.mass[n], tank.length[n], tank.hinge[n]] = mode;
                 tank.m_0 -= tank.mass[n];
             }
-            (tank.h_0, tank.i_0) = (at(&self.fill.h_0), at(&self.fill.i_0));
-            tank.i_z = at(&self.fill.i_z);
+            [tank.h_0, tank.i_0, tank.i_z] = curves.rigid(at).map(|jet| jet[0]);
             return tank;
         }
         for n in 0..modes {
@@ -200,7 +224,18 @@ impl Tank {
         Rigid::new(self.m_0, add(self.position, scale(self.h_0, e)), &own)
     }
 
-    /// c = 2 zeta m sqrt(g_ref/l + k/m) of mode n (from 0), N s/m.
+    /// a_f, m/s2.
+    pub(crate) fn smallest_acceleration(&self) -> f64 {
+        if self.g_floor > 0.0 { self.g_floor } else { 1e-4 * self.g_ref }
+    }
+
+    /// Whether the drag of mode n (from 0) depends on acceleration or amplitude.
+    pub(crate) fn follows(&self, n: usize) -> bool {
+        let by_acceleration = self.damping_law != DampingLaw::Constant && self.zeta[n] > 0.0;
+        by_acceleration || self.zeta_amplitude[n] > 0.0
+    }
+
+    /// c = 2 zeta m sqrt(g_ref/l + k/m) of mode n (from 0), at g_ref, N s/m.
     pub fn drag(&self, n: usize) -> f64 {
         let (m, l) = (self.mass[n], self.length[n]);
         2.0 * self.zeta[n] * m * libm::sqrt(self.g_ref / l + self.k[n] / m)
@@ -250,29 +285,29 @@ impl Default for Craft {
 }
 
 /// The default tank, an upright cylinder of R = 0.45 m with its bottom at -0.3 m, filled with water
-/// 0.1, 0.2, ... 0.8 m deep, one mode kept: numbers of `formulas::cylinder`.
+/// 0.1, 0.2, ... 1.2 m deep, one mode kept: numbers of `formulas::cylinder`.
 #[rustfmt::skip]
 const CYLINDER: FillTable = FillTable {
-    points: 8,
-    liquid: [63.6173, 127.235, 190.852, 254.469, 318.086, 381.704, 445.321, 508.938],
-    h_0: [-0.0636349, -0.00124903, 0.00795427, 0.0167251, 0.0330603, 0.0563967, 0.0852024, 0.118179],
-    i_0: [2.50041, 3.15786, 3.14549, 3.06287, 3.15717, 3.67522, 4.92169, 7.24793],
+    points: POINTS,
+    liquid: [63.6173, 127.235, 190.852, 254.469, 318.086, 381.704, 445.321, 508.938, 572.555, 636.173, 699.79, 763.407],
+    h_0: [-0.0636349, -0.00124903, 0.00795427, 0.0167251, 0.0330603, 0.0563967, 0.0852024, 0.118179, 0.154351, 0.192997, 0.233579, 0.275689],
+    i_0: [2.50041, 3.15786, 3.14549, 3.06287, 3.15717, 3.67522, 4.92169, 7.24793, 11.0317, 16.6603, 24.5201, 34.9903],
     i_z: [0.0; POINTS],
-    mass: [
-        [50.4527, 87.717, 109.537, 120.617, 125.838, 128.211, 129.272, 129.743],
-        [3.24612, 3.84804, 3.90955, 3.91535, 3.9159, 3.91595, 3.91595, 3.91595],
-        [0.892184, 0.932325, 0.933248, 0.933269, 0.93327, 0.93327, 0.93327, 0.93327],
-    ],
-    length: [
-        [0.63032, 0.362545, 0.290326, 0.263656, 0.252717, 0.248039, 0.246003, 0.245111],
-        [0.101822, 0.0858945, 0.0845431, 0.0844178, 0.0844061, 0.084405, 0.0844049, 0.0844049],
-        [0.0551436, 0.0527694, 0.0527171, 0.052716, 0.0527159, 0.0527159, 0.0527159, 0.0527159],
-    ],
-    hinge: [
-        [0.331692, 0.0730052, 0.0230679, 0.0341225, 0.0758217, 0.136534, 0.209939, 0.29198],
-        [-0.187919, -0.15404, -0.0748788, 0.0185355, 0.116497, 0.215871, 0.31568, 0.415621],
-        [-0.222781, -0.148021, -0.0520051, 0.0473908, 0.1473, 0.247286, 0.347284, 0.447284],
-    ],
+    mass: modes_of([
+        [50.4527, 87.717, 109.537, 120.617, 125.838, 128.211, 129.272, 129.743, 129.951, 130.043, 130.084, 130.102],
+        [3.24612, 3.84804, 3.90955, 3.91535, 3.9159, 3.91595, 3.91595, 3.91595, 3.91595, 3.91595, 3.91595, 3.91595],
+        [0.892184, 0.932325, 0.933248, 0.933269, 0.93327, 0.93327, 0.93327, 0.93327, 0.93327, 0.93327, 0.93327, 0.93327],
+    ]),
+    length: modes_of([
+        [0.63032, 0.362545, 0.290326, 0.263656, 0.252717, 0.248039, 0.246003, 0.245111, 0.244718, 0.244545, 0.244468, 0.244435],
+        [0.101822, 0.0858945, 0.0845431, 0.0844178, 0.0844061, 0.084405, 0.0844049, 0.0844049, 0.0844049, 0.0844049, 0.0844049, 0.0844049],
+        [0.0551436, 0.0527694, 0.0527171, 0.052716, 0.0527159, 0.0527159, 0.0527159, 0.0527159, 0.0527159, 0.0527159, 0.0527159, 0.0527159],
+    ]),
+    hinge: modes_of([
+        [0.331692, 0.0730052, 0.0230679, 0.0341225, 0.0758217, 0.136534, 0.209939, 0.29198, 0.379898, 0.4718, 0.566386, 0.662775],
+        [-0.187919, -0.15404, -0.0748788, 0.0185355, 0.116497, 0.215871, 0.31568, 0.415621, 0.515603, 0.615597, 0.715596, 0.815595],
+        [-0.222781, -0.148021, -0.0520051, 0.0473908, 0.1473, 0.247286, 0.347284, 0.447284, 0.547284, 0.647284, 0.747284, 0.847284],
+    ]),
 };
 
 impl Default for Tank {
@@ -289,13 +324,16 @@ impl Default for Tank {
             i_z: 0.0,
             modes: 1,
             g_ref: 1.5,
-            mass: [128.211, 3.91595, 0.93327],
-            length: [0.248039, 0.084405, 0.0527159],
+            mass: modes_of([128.211, 3.91595, 0.93327]),
+            length: modes_of([0.248039, 0.084405, 0.0527159]),
             frequency: [0.0; MODES],
-            hinge: [0.136534, 0.215871, 0.247286],
+            hinge: modes_of([0.136534, 0.215871, 0.247286]),
             k: [0.0; MODES],
             zeta: [0.005; MODES],
-            wave: [0.376618, 0.0328144, 0.0125218],
+            damping_law: DampingLaw::Laminar,
+            g_floor: 0.0,
+            zeta_amplitude: [0.0; MODES],
+            wave: modes_of([0.376618, 0.0328144, 0.0125218]),
             fill: FillTable { points: 0, ..CYLINDER },
             liquid_0: 381.704,
             outlet: -0.3,
@@ -494,6 +532,7 @@ impl Tank {
             problems.0.push(format!("{name}.modes = {} (allowed: 0 to {MODES})", self.modes));
         }
         problems.number(&format!("{name}.g_ref"), self.g_ref, 1e-9, 1e6, "m/s2");
+        problems.number(&format!("{name}.g_floor"), self.g_floor, 0.0, 1e6, "m/s2");
         for n in 0..self.modes.min(MODES) {
             let i = n + 1;
             problems.number(&format!("{name}.mass[{i}]"), self.mass[n], LIGHTEST, HEAVIEST, "kg");
@@ -512,6 +551,8 @@ impl Tank {
             problems.number(&format!("{name}.hinge[{i}]"), hinge, -FARTHEST, FARTHEST, "m");
             problems.number(&format!("{name}.k[{i}]"), self.k[n], 0.0, HEAVIEST, "N/m");
             problems.number(&format!("{name}.zeta[{i}]"), self.zeta[n], 0.0, 10.0, "");
+            let growth = self.zeta_amplitude[n];
+            problems.number(&format!("{name}.zeta_amplitude[{i}]"), growth, 0.0, 10.0, "1/rad");
             problems.number(&format!("{name}.wave[{i}]"), self.wave[n], 0.0, FARTHEST, "m/rad");
             problems.direction(&format!("{name}.p_0[{i}]"), &self.p_0[n]);
             problems.vector(&format!("{name}.p_dot_0[{i}]"), &self.p_dot_0[n], "1/s");

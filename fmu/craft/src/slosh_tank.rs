@@ -46,16 +46,19 @@ use taylor::integrator::{self, MAX_MAGNITUDE, Motion, RATE_FLOOR, Steps};
 use taylor::number::{Dual, Number};
 use taylor::series::{self, ORDER, Series, ZERO};
 use taylor::space::{self, Pair, Vector, ZERO_PAIR, ZERO_VECTOR, products};
-use taylor::vector::{Mat3, Vec3, add, constant, cross, largest, on_sphere, part, scale};
+use taylor::vector::{
+    Mat3, Vec3, add, constant, cross, dot, largest, on_sphere, part, scale, times,
+};
 
 use crate::bob::{Bob, BobNow};
 use crate::contents::{Drains, MountedTank, Outflow, has_diverged, normalise_bobs, vec_of};
 use crate::motion::{SCALE_TIME, twice_crossed};
 use crate::outputs::{MassProperties, TankOutputs};
 use crate::parameters::{Craft, Limits, MAX_STEPS, Tank, steps_problem, tolerance_problem};
+use crate::ranges;
 use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod, largest_eigenvalue};
 use crate::sizes::MODES;
-use crate::state::{Line, Ramp, has_direction};
+use crate::state::{Line, Ramp, Ranges, has_direction};
 
 /// Number of continuous states of a tank: p and p' of each mode, then the dissipated energy and the
 /// mass of liquid.
@@ -173,11 +176,13 @@ pub struct SloshTankOutputs {
 pub struct TankState {
     time: f64,
     x: [f64; TANK_STATES],
+    /// Ranges of the motion since the last event, for hosts that integrate themselves.
+    ranges: Ranges,
 }
 
 impl TankState {
     /// Length of the flat form.
-    pub const WORDS: usize = 1 + TANK_STATES;
+    pub const WORDS: usize = 2 + TANK_STATES;
 
     /// The state as plain words, for saving.
     pub fn to_words(&self) -> [u64; Self::WORDS] {
@@ -185,6 +190,7 @@ impl TankState {
         for (word, number) in words[1..].iter_mut().zip(self.x) {
             *word = number.to_bits();
         }
+        words[Self::WORDS - 1] = self.ranges.to_word();
         words
     }
 
@@ -194,7 +200,8 @@ impl TankState {
         let x: [f64; TANK_STATES] = core::array::from_fn(|i| numbers[1 + i]);
         let bobs = (0..MODES).all(|n| has_direction(&part(&x, 6 * n)));
         let is_state = numbers[0].is_finite() && x.iter().all(|x| x.abs() < MAX_MAGNITUDE) && bobs;
-        is_state.then_some(TankState { time: numbers[0], x })
+        let ranges = Ranges::from_word(words[Self::WORDS - 1])?;
+        is_state.then_some(TankState { time: numbers[0], x, ranges })
     }
 }
 
@@ -226,6 +233,7 @@ pub struct SloshTank {
     /// If the tank can drain.
     draining: Option<Box<MountedTank>>,
     limits: Limits,
+    bounds: ranges::Bounds,
 }
 
 /// The motion of a tank that drains over one step.
@@ -289,7 +297,7 @@ fn draining_rates<T: Number>(
     slope: f64,
 ) -> [T; TANK_STATES] {
     let ([a, w, w_d], flow) = *acting;
-    let contents = mounted.contents(x, w, x[LIQUID], flow, slope);
+    let contents = mounted.contents(x, [a, w, w_d], x[LIQUID], flow, slope);
     let mut rate = [T::constant(0.0); TANK_STATES];
     mounted.put_rates(&contents, [a, w_d], |at, numbers| {
         rate[at..at + numbers.len()].copy_from_slice(numbers);
@@ -403,6 +411,11 @@ impl TankMotion {
         let w2 = twice_crossed(products::<N>(&self.w));
         let mut dissipation = 0.0;
         for bob in &mut self.bobs {
+            if bob.follows() {
+                let [e, turned] = bob.along_axis();
+                let turning = dot(e, times(&w2, bob.hinge));
+                bob.set_axial::<N>(dot(e, self.a[N]) + dot(turned, self.w_d[N]) + turning);
+            }
             bob.reaction::<N>(&self.w_both, &w2);
             bob.accelerate::<N>(self.a[N], self.w_d[N]);
             dissipation += bob.dissipation::<N>();
@@ -467,7 +480,7 @@ impl SloshTank {
     /// wrong with them.
     pub fn new(
         p: &TankParameters,
-        _: &TankInputs,
+        inputs: &TankInputs,
         start_time: f64,
         tolerance: f64,
     ) -> Result<SloshTank, Vec<String>> {
@@ -488,7 +501,10 @@ impl SloshTank {
         }
         let tank = p.tank.resolve();
         x[LIQUID] = tank.mass[..tank.modes].iter().fold(tank.m_0, |sum, m| sum + m);
-        Ok(SloshTank::resume(p, &TankState { time: start_time, x }, tolerance))
+        let state = TankState { time: start_time, x, ranges: Ranges::default() };
+        let mut tank = SloshTank::resume(p, &state, tolerance);
+        tank.take_event(inputs);
+        Ok(tank)
     }
 
     /// A tank that continues from a saved state of one with the same parameters, which
@@ -519,6 +535,7 @@ impl SloshTank {
             lumped,
             draining: (tank.fill.points > 0).then(|| Box::new(MountedTank::new(&tank))),
             limits: Limits { tolerance, max_steps: p.max_steps },
+            bounds: ranges::Bounds::new(&tank),
         }
     }
 
@@ -567,8 +584,42 @@ impl SloshTank {
         done
     }
 
+    /// The ranges that the motion is in now.
+    pub fn ranges(&mut self, inputs: &TankInputs) -> Ranges {
+        let outputs = self.outputs_held(inputs);
+        self.bounds.of(&outputs.tank)
+    }
+
+    /// The ranges as the last event has left them.
+    pub fn ranges_held(&self) -> Ranges {
+        self.motion.state.ranges
+    }
+
+    /// Whether the motion is in the tank's range at the end of the step that it has made last, `h` long.
+    pub fn is_in_range_after(&self, inputs: &TankInputs, h: f64) -> bool {
+        let TankMotion { state, bobs, .. } = &*self.motion;
+        let [a, w, w_d] = [inputs.a.at(h), inputs.omega_at(h), inputs.omega_dot.at(h)];
+        let axial = bobs.first().map_or(0.0, |bob| {
+            let turning = add(cross(w_d, bob.hinge), cross(w, cross(w, bob.hinge)));
+            dot(bob.along_axis()[0], add(a, turning))
+        });
+        self.bounds.contain(core::array::from_fn(|n| state.x[6 * n + 2]), axial)
+    }
+
+    /// Does what is due at an event: the ranges are those of the present motion from now on.
+    pub fn take_event(&mut self, inputs: &TankInputs) {
+        self.motion.state.ranges = self.ranges(inputs);
+    }
+
     /// What the tank shows now, under the inputs' present values.
     pub fn outputs(&mut self, inputs: &TankInputs) -> SloshTankOutputs {
+        let mut outputs = self.outputs_held(inputs);
+        outputs.tank.ranges = self.bounds.of(&outputs.tank);
+        outputs
+    }
+
+    /// As [`SloshTank::outputs`], with the ranges as the last event has left them.
+    pub fn outputs_held(&mut self, inputs: &TankInputs) -> SloshTankOutputs {
         let x = self.motion.state.x;
         if let Some(mounted) = &self.draining {
             let TankInputs { a, omega, omega_dot, mass_flow } = *inputs;
@@ -593,7 +644,7 @@ impl SloshTank {
         ([a, w, w_d], flow): &Acting<T>,
         slope: f64,
     ) -> SloshTankOutputs {
-        let contents = mounted.contents(x, *w, x[LIQUID], *flow, slope);
+        let contents = mounted.contents(x, [*a, *w, *w_d], x[LIQUID], *flow, slope);
         let mut matrix = contents.rigid.mass_matrix();
         contents.add_rods(&mut matrix);
         let parts = Parts {
@@ -637,7 +688,7 @@ impl SloshTank {
         for bob in bobs.iter().flatten() {
             all.add(bob.m, bob.rho);
         }
-        tank.set_angles(bobs.iter().flatten());
+        tank.set_angles([a, w, w_d], bobs.iter().flatten());
         let zero = constant::<T>([0.0; 3]);
         let lumped = self.lumped.lift::<T>();
         let bias = match self.coupling {
@@ -650,6 +701,7 @@ impl SloshTank {
         if self.coupling != Coupling::Split {
             matrix = lumped.mass_matrix();
         }
+        tank.ranges = self.motion.state.ranges;
         (tank.force, tank.torque) = (wrench[0].map(T::result), wrench[1].map(T::result));
         let [f, tau] = bias.map(|half| half.map(T::result));
         SloshTankOutputs {

@@ -6,15 +6,16 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use taylor::error::StepError;
 use taylor::number::{Dual, Number};
-use taylor::vector::{on_sphere, unit_quaternion};
+use taylor::vector::{add, cross, dot, on_sphere, unit_quaternion};
 
 use crate::contents::Drains;
 use crate::draining::{Acting, Draining, Run};
 use crate::motion::CraftMotion;
 use crate::outputs::{Now, Outputs};
 use crate::parameters::{Limits, Parameters, tolerance_problem};
+use crate::ranges;
 use crate::sizes::{MODES, TANKS};
-use crate::state::{INPUTS, Inputs, STATES, State, index};
+use crate::state::{INPUTS, Inputs, Ranges, STATES, State, index};
 
 /// A rigid body with up to four tanks, free or on a pivot.
 #[derive(Clone, Debug)]
@@ -23,6 +24,8 @@ pub struct Spacecraft {
     /// Equations with draining tanks, if there are any.
     draining: Option<Box<Draining>>,
     limits: Limits,
+    /// Of the tanks in use.
+    bounds: Vec<ranges::Bounds>,
 }
 
 impl Spacecraft {
@@ -68,8 +71,12 @@ impl Spacecraft {
             }
         }
         let flow = inputs.mass_flow.map(|flow| flow.value);
-        let state = State { time: start_time, x, h_wheels: inputs.h_wheels.value, flow };
-        Ok(Spacecraft::resume(p, &state, tolerance))
+        let h_wheels = inputs.h_wheels.value;
+        let ranges = [Ranges::default(); TANKS];
+        let state = State { time: start_time, x, h_wheels, flow, ranges };
+        let mut craft = Spacecraft::resume(p, &state, tolerance);
+        craft.motion.state.ranges = craft.ranges(inputs);
+        Ok(craft)
     }
 
     /// A craft that continues from a saved state of one with the same parameters, which
@@ -77,7 +84,9 @@ impl Spacecraft {
     pub fn resume(p: &Parameters, state: &State, tolerance: f64) -> Spacecraft {
         let draining = Draining::new(p).map(Box::new);
         let limits = Limits { tolerance, max_steps: p.max_steps };
-        Spacecraft { motion: Box::new(CraftMotion::new(p, *state)), draining, limits }
+        let tanks = p.tank[..p.tanks].iter().map(|tank| ranges::Bounds::new(&tank.resolve()));
+        let motion = Box::new(CraftMotion::new(p, *state));
+        Spacecraft { motion, draining, limits, bounds: tanks.collect() }
     }
 
     /// The present time, s.
@@ -134,19 +143,58 @@ impl Spacecraft {
     pub fn outputs(&mut self, inputs: &Inputs) -> Outputs {
         let before = self.motion.state;
         self.take_jumps(inputs);
-        let outputs = self.outputs_held(inputs);
+        let mut outputs = self.outputs_held(inputs);
         self.motion.state = before;
+        self.update_ranges(&mut outputs);
         outputs
+    }
+
+    /// The ranges that the tanks' motion is in now.
+    pub fn ranges(&mut self, inputs: &Inputs) -> [Ranges; TANKS] {
+        let mut outputs = self.outputs_held(inputs);
+        self.update_ranges(&mut outputs);
+        outputs.tank.map(|tank| tank.ranges)
+    }
+
+    /// The ranges as the last event has left them.
+    pub fn ranges_held(&self) -> [Ranges; TANKS] {
+        self.motion.state.ranges
+    }
+
+    /// Whether every tank is in its range after a step, of the liquid's directions then and the accelerations in it.
+    pub fn is_in_range(&self) -> bool {
+        let CraftMotion { bobs, state, a, w, w_d, .. } = &*self.motion;
+        self.bounds.iter().enumerate().all(|(i, limits)| {
+            let mut first = bobs.iter().filter(|bob| bob.tank == i && bob.mode == 0);
+            // The accelerations of a craft that drains are its equations' alone.
+            let axial = first.next().filter(|_| self.draining.is_none()).map_or(0.0, |bob| {
+                let turning = add(cross(w_d[0], bob.hinge), cross(w[0], cross(w[0], bob.hinge)));
+                dot(bob.along_axis()[0], add(a[0], turning))
+            });
+            limits.contain(core::array::from_fn(|n| state.x[index::bob(i, n) + 2]), axial)
+        })
+    }
+
+    /// Brings the ranges among the outputs to what the outputs are now.
+    fn update_ranges(&self, outputs: &mut Outputs) {
+        for (tank, limits) in outputs.tank.iter_mut().zip(&self.bounds) {
+            tank.ranges = limits.of(tank);
+        }
     }
 
     /// As [`Spacecraft::outputs`], with the states as the last step or event has left them.
     pub fn outputs_held(&mut self, inputs: &Inputs) -> Outputs {
         let x = &self.motion.state.x;
-        if let Some(draining) = &self.draining {
-            return draining.evaluate(x, &Acting::of(inputs, 0.0)).1.outputs(x);
+        let mut outputs = if let Some(draining) = &self.draining {
+            draining.evaluate(x, &Acting::of(inputs, 0.0)).1.outputs(x)
+        } else {
+            self.motion.evaluate(inputs);
+            self.motion.now::<f64>().outputs(&self.motion.state.x)
+        };
+        for (tank, ranges) in outputs.tank.iter_mut().zip(self.motion.state.ranges) {
+            tank.ranges = ranges;
         }
-        self.motion.evaluate(inputs);
-        self.motion.now::<f64>().outputs(&self.motion.state.x)
+        outputs
     }
 
     /// x; see [`index`].
@@ -242,6 +290,7 @@ impl Spacecraft {
             self.motion.state = before;
             return Err(StepError::NotFinite { time: before.time });
         }
+        self.motion.state.ranges = self.ranges(inputs);
         Ok(changed)
     }
 

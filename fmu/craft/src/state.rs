@@ -1,5 +1,6 @@
 //! The craft's continuous states x in their order, its inputs, and its memory.
 
+use formulas::regime::Regime;
 use taylor::integrator::MAX_MAGNITUDE;
 use taylor::vector::Vec3;
 
@@ -64,6 +65,37 @@ pub struct Inputs {
     pub mass_flow: [Line; TANKS],
 }
 
+/// The ranges that a tank's motion is in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ranges {
+    /// How high the wave is.
+    pub regime: Regime,
+    /// Whether the liquid is held at the tank's bottom, and every bob within 45 degrees of the axis.
+    pub in_range: bool,
+}
+
+impl Default for Ranges {
+    fn default() -> Self {
+        Ranges { regime: Regime::Linear, in_range: true }
+    }
+}
+
+impl Ranges {
+    /// As a word, for saving.
+    pub(crate) fn to_word(self) -> u64 {
+        self.regime as u64 | u64::from(self.in_range) << 8
+    }
+
+    /// The reverse.
+    pub(crate) fn from_word(word: u64) -> Option<Ranges> {
+        let regime = Regime::from_number(word as u8)?;
+        match word >> 8 {
+            held @ 0..=1 => Some(Ranges { regime, in_range: held == 1 }),
+            _ => None,
+        }
+    }
+}
+
 /// The craft's memory: all that a saved state needs besides parameters and inputs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State {
@@ -72,11 +104,16 @@ pub struct State {
     /// The wheels' momentum and the outflows that the motion has taken account of.
     pub(crate) h_wheels: Vec3,
     pub(crate) flow: [f64; TANKS],
+    /// Ranges of the tanks' motion since the last event, for hosts that integrate themselves.
+    pub(crate) ranges: [Ranges; TANKS],
 }
 
 impl State {
     /// Length of the flat form.
-    pub const WORDS: usize = 4 + TANKS + STATES;
+    pub const WORDS: usize = Self::REALS + TANKS;
+
+    /// How many of the words are real numbers; the ranges follow.
+    const REALS: usize = 4 + TANKS + STATES;
 
     /// The wheels' momentum that the motion has taken account of, N m s.
     pub fn h_wheels(&self) -> Vec3 {
@@ -91,12 +128,19 @@ impl State {
         for (word, number) in words.iter_mut().zip(numbers) {
             *word = number.to_bits();
         }
+        for (word, ranges) in words[Self::REALS..].iter_mut().zip(self.ranges) {
+            *word = ranges.to_word();
+        }
         words
     }
 
     /// The reverse; `None` when the words are no state.
     pub fn from_words(words: &[u64; Self::WORDS]) -> Option<State> {
-        let numbers = words.map(f64::from_bits);
+        let numbers: [f64; Self::REALS] = core::array::from_fn(|i| f64::from_bits(words[i]));
+        let mut ranges = [Ranges::default(); TANKS];
+        for (ranges, word) in ranges.iter_mut().zip(&words[Self::REALS..]) {
+            *ranges = Ranges::from_word(*word)?;
+        }
         let x: [f64; STATES] = core::array::from_fn(|i| numbers[4 + TANKS + i]);
         let bobs = (0..TANKS * MODES).all(|i| has_direction(&x[index::bob(0, i)..][..3]));
         let is_state = numbers[0].is_finite()
@@ -105,7 +149,7 @@ impl State {
             && bobs;
         let h_wheels = [numbers[1], numbers[2], numbers[3]];
         let flow = core::array::from_fn(|i| numbers[4 + i]);
-        is_state.then_some(State { time: numbers[0], x, h_wheels, flow })
+        is_state.then_some(State { time: numbers[0], x, h_wheels, flow, ranges })
     }
 }
 
@@ -130,7 +174,7 @@ mod tests {
             words[place] = number.to_bits();
             State::from_words(&words)
         };
-        for place in 0..State::WORDS {
+        for place in 0..State::REALS {
             assert_eq!(with(place, f64::NAN), None);
             // The time is the only one without squares.
             assert_eq!(with(place, 1e100).is_none(), place > 0, "{place}");

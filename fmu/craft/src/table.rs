@@ -1,20 +1,17 @@
 //! How a tank's modes and rigid liquid follow the mass of its liquid: a table, and between its points
-//! monotone interpolation with two continuous derivatives.
-//!
-//! Between two points a distance h apart with the values y_0, y_1, secant s = (y_1 - y_0)/h, slopes
-//! d_0, d_1 and second derivatives 0, t from 0 to 1:
+//! monotone interpolation with two continuous derivatives, so that the forces of what flows have no steps.
 //!
 //! ```text
-//! y' = 30 s t^2 (1 - t)^2 + d_0 (1 - 18 t^2 + 32 t^3 - 15 t^4) + d_1 (-12 t^2 + 28 t^3 - 15 t^4)
+//! interpolated over m_liq:   1/l_n,   h_n - l_n (the bob at rest),   m_n/m_liq,   H_0, I_0, I_z
 //! ```
 //!
-//! The slope at an inner point is the harmonic mean of the secants beside it, 0 where they differ in
-//! sign, so at most twice the smaller; at the ends it is the secant. y' is linear in d_0 and d_1 and
-//! has the sign of s at the corners of 0 <= d_0/s, d_1/s <= 2: y is monotone where the table is.
+//! 1/l_n is omega^2/g. A shallow liquid has a long pendulum whose hinge is far above it, as 1/depth; its
+//! frequency, the height of its bob and its share of the liquid change little, and are met by few points.
+//! Each curve stays between its two points, so lengths and masses stay above 0.
 //!
-//! Source: the region of monotonicity as in Fritsch and Carlson, SIAM J. Numer. Anal. 17 (1980), here
-//! for quintics.
+//! Source: `formulas::interpolation`.
 
+use formulas::interpolation::{derivatives, quintic};
 use taylor::number::Number;
 
 use crate::sizes::{MODES, POINTS};
@@ -46,35 +43,126 @@ impl FillTable {
         &self.liquid[..self.points]
     }
 
-    /// y and its first two derivatives by the mass, at the mass x; beyond the ends the last interval
-    /// goes on.
-    pub fn at<T: Number>(&self, y: &[f64; POINTS], x: T) -> [T; 3] {
-        let masses = self.masses();
-        let last = self.points - 2;
-        let i = (0..last).find(|&i| x.value() < masses[i + 1]).unwrap_or(last);
-        let secant = |i: usize| (y[i + 1] - y[i]) / (masses[i + 1] - masses[i]);
-        let slope = |i: usize| {
-            if i == 0 {
-                return secant(0);
+    /// Mass, length and height of the hinge of mode `n`, from 0, with this mass of liquid, kg.
+    pub fn mode(&self, n: usize, liquid: f64) -> [f64; 3] {
+        let curves = self.curves(n + 1);
+        curves.mode(n, curves.place(liquid)).map(|jet| jet[0])
+    }
+
+    /// What a tank with these modes computes with while it drains.
+    pub(crate) fn curves(&self, modes: usize) -> FillCurves {
+        let curve = |y: [f64; POINTS]| Curve::new(self.masses(), y);
+        let of_mode = |n: usize| {
+            let (mass, l, h) = (&self.mass[n], &self.length[n], &self.hinge[n]);
+            // of the points and modes in use alone: the others' numbers may be anything
+            let used = |f: &dyn Fn(usize) -> f64| {
+                core::array::from_fn(|i| if i < self.points && n < modes { f(i) } else { 0.0 })
+            };
+            ModeCurves {
+                stiffness: curve(used(&|i| 1.0 / l[i])),
+                bob: curve(used(&|i| h[i] - l[i])),
+                share: curve(used(&|i| mass[i] / self.liquid[i])),
             }
-            if i > last {
-                return secant(last);
-            }
-            let (a, b) = (secant(i - 1), secant(i));
-            if a * b > 0.0 { 2.0 * a * b / (a + b) } else { 0.0 }
         };
-        let h = masses[i + 1] - masses[i];
-        let (s, d_0, d_1) = (secant(i), slope(i), slope(i + 1));
-        let c_3 = 10.0 * s - 6.0 * d_0 - 4.0 * d_1;
-        let c_4 = -15.0 * s + 8.0 * d_0 + 7.0 * d_1;
-        let c_5 = 6.0 * s - 3.0 * (d_0 + d_1);
-        let c = T::constant;
-        let t = (x - c(masses[i])) * (1.0 / h);
-        let t_2 = t * t;
+        FillCurves {
+            points: self.points,
+            liquid: self.liquid,
+            rigid: [curve(self.h_0), curve(self.i_0), curve(self.i_z)],
+            modes: core::array::from_fn(of_mode),
+        }
+    }
+}
+
+/// A quantity and its first two derivatives, by the mass of liquid or by time.
+pub(crate) type Jet<T> = [T; 3];
+
+/// A quantity at the points of a table, with its slopes and second derivatives there.
+#[derive(Clone, Copy, Debug)]
+struct Curve([[f64; 3]; POINTS]);
+
+impl Curve {
+    fn new(masses: &[f64], y: [f64; POINTS]) -> Curve {
+        let (mut slope, mut curvature) = ([0.0; POINTS], [0.0; POINTS]);
+        let n = masses.len();
+        derivatives(masses, &y[..n], true, &mut slope[..n], &mut curvature[..n]);
+        Curve(core::array::from_fn(|i| [y[i], slope[i], curvature[i]]))
+    }
+
+    fn at<T: Number>(&self, at: Place<T>) -> Jet<T> {
+        let Place { interval: i, t, h, .. } = at;
+        let c = quintic(h, self.0[i], self.0[i + 1]);
+        let first: [f64; 5] = core::array::from_fn(|k| (k + 1) as f64 * c[k + 1] / h);
+        let second: [f64; 4] = core::array::from_fn(|k| (k + 1) as f64 * first[k + 1] / h);
+        [polynomial(&c, t), polynomial(&first, t), polynomial(&second, t)]
+    }
+}
+
+/// The sum of c_k t^k.
+fn polynomial<T: Number>(c: &[f64], t: T) -> T {
+    c.iter().rev().fold(T::constant(0.0), |sum, c| sum * t + T::constant(*c))
+}
+
+#[derive(Clone, Copy, Debug)]
+struct ModeCurves {
+    stiffness: Curve,
+    bob: Curve,
+    share: Curve,
+}
+
+/// A table with its curves.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FillCurves {
+    points: usize,
+    liquid: [f64; POINTS],
+    rigid: [Curve; 3],
+    modes: [ModeCurves; MODES],
+}
+
+/// Where a mass of liquid is in a table: interval, place in it from 0 to 1, and its width.
+#[derive(Clone, Copy)]
+pub(crate) struct Place<T> {
+    liquid: T,
+    interval: usize,
+    t: T,
+    h: f64,
+}
+
+impl FillCurves {
+    /// Finds a mass of liquid, kg; beyond the ends the tank is as it is there.
+    pub fn place<T: Number>(&self, liquid: T) -> Place<T> {
+        let masses = &self.liquid[..self.points];
+        let (low, high) = (masses[0], masses[self.points - 1]);
+        let liquid = match liquid.value() {
+            m if m < low => T::constant(low),
+            m if m > high => T::constant(high),
+            _ => liquid,
+        };
+        let last = self.points - 2;
+        let interval = (0..last).find(|&i| liquid.value() < masses[i + 1]).unwrap_or(last);
+        let h = masses[interval + 1] - masses[interval];
+        Place { liquid, interval, t: (liquid - T::constant(masses[interval])) * (1.0 / h), h }
+    }
+
+    /// H_0, I_0 and I_z.
+    pub fn rigid<T: Number>(&self, at: Place<T>) -> [Jet<T>; 3] {
+        [0, 1, 2].map(|k| self.rigid[k].at(at))
+    }
+
+    /// Mass, length and height of the hinge of a mode.
+    pub fn mode<T: Number>(&self, n: usize, at: Place<T>) -> [Jet<T>; 3] {
+        let ModeCurves { stiffness, bob, share } = &self.modes[n];
+        let [k, k_d, k_dd] = stiffness.at(at);
+        let l = k.recip();
+        let l_d = -(k_d * l * l);
+        // from l k = 1: l'' k + 2 l' k' + l k'' = 0
+        let length = [l, l_d, -((l_d * k_d * 2.0 + l * k_dd) * l)];
+        let b = bob.at(at);
+        let [r, r_d, r_dd] = share.at(at);
+        let m = at.liquid;
         [
-            c(y[i]) + t * (c(d_0) + t_2 * (c(c_3) + t * (c(c_4) + t * c_5))) * h,
-            c(d_0) + t_2 * (c(3.0 * c_3) + t * (c(4.0 * c_4) + t * (5.0 * c_5))),
-            t * (c(6.0 * c_3) + t * (c(12.0 * c_4) + t * (20.0 * c_5))) * (1.0 / h),
+            [m * r, r + m * r_d, r_d * 2.0 + m * r_dd],
+            length,
+            [b[0] + length[0], b[1] + length[1], b[2] + length[2]],
         ]
     }
 }
@@ -82,12 +170,6 @@ impl FillTable {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn table(liquid: &[f64]) -> FillTable {
-        let mut table = FillTable { points: liquid.len(), ..crate::Tank::default().fill };
-        table.liquid[..liquid.len()].copy_from_slice(liquid);
-        table
-    }
 
     /// Random monotone data, also with flat stretches: never a slope of the wrong sign, values and
     /// both derivatives the same from either side of a point.
@@ -100,32 +182,71 @@ mod tests {
                 x[i] = x[i - 1] + 0.1 + rng.f64();
                 y[i] = y[i - 1] + [0.0, 1e-3, 1.0, 30.0][rng.usize(..4)] * rng.f64();
             }
-            let table = table(&x);
+            let default = crate::Tank::default().fill;
+            let curves = FillTable { points: POINTS, liquid: x, h_0: y, ..default }.curves(0);
+            let at = |m: f64| curves.rigid(curves.place(m))[0];
             for k in 0..=1000 {
-                let [value, slope, _] = table.at(&y, x[POINTS - 1] * k as f64 / 1000.0);
-                assert!(slope > -1e-13, "{slope}");
-                assert!(value > -1e-13 && value < y[POINTS - 1] + 1e-12);
+                let [value, slope, _] = at(x[POINTS - 1] * k as f64 / 1000.0);
+                // rounding of terms as large as the steepest secant, 300
+                assert!(slope > -1e-10, "{slope}");
+                assert!(value > -1e-12 && value < y[POINTS - 1] + 1e-12);
             }
             for i in 1..POINTS - 1 {
-                let [left, right] = [-1e-9, 1e-9].map(|e| table.at(&y, x[i] + e));
+                let [left, right] = [-1e-9, 1e-9].map(|e| at(x[i] + e));
                 assert!((left[0] - y[i]).abs() < 1e-6 && (right[0] - y[i]).abs() < 1e-6);
                 assert!((left[1] - right[1]).abs() < 1e-4, "{left:?} {right:?}");
-                // y'' is 0 there; y''' is up to 60 times the secant over h^2.
-                assert!(left[2].abs() < 1e-2 && right[2].abs() < 1e-2, "{left:?} {right:?}");
+                // the third derivative is up to 60 times the secant over h^2, 2e6, over 2e-9
+                assert!((left[2] - right[2]).abs() < 1e-2, "{left:?} {right:?}");
             }
         }
     }
 
     #[test]
     fn derivatives_are_those_by_differences() {
-        let table = table(&[1.0, 2.0, 4.0, 5.0]);
-        let y = [1.0, 3.0, 4.0, 9.0, 0.0, 0.0, 0.0, 0.0];
-        for x in [1.3, 2.2, 3.9, 4.5] {
-            let e = 1e-5;
-            let [low, now, high] = [x - e, x, x + e].map(|x| table.at(&y, x));
-            for i in 0..2 {
-                assert!(((high[i] - low[i]) / (2.0 * e) - now[i + 1]).abs() < 1e-6);
+        let default = crate::Tank::default().fill;
+        let curves = FillTable { points: POINTS, ..default }.curves(MODES);
+        let all = |m: f64| {
+            let at = curves.place(m);
+            let modes = (0..MODES).flat_map(|n| curves.mode(n, at));
+            modes.chain(curves.rigid(at)).collect::<Vec<_>>()
+        };
+        for m in [70.0, 150.0, 333.3, 600.0] {
+            let e = 1e-3;
+            let (low, now, high) = (all(m - e), all(m), all(m + e));
+            for ((low, now), high) in low.iter().zip(&now).zip(&high) {
+                for i in 0..2 {
+                    // e^2 times a third derivative, and rounding over e
+                    let slope = (high[i] - low[i]) / (2.0 * e);
+                    assert!(
+                        (slope - now[i + 1]).abs() < 1e-8 * (1.0 + now[0].abs()),
+                        "{slope} {now:?}"
+                    );
+                }
             }
+        }
+    }
+
+    /// 25 fills between each two of twelve points, from a sixth of the radius to three radii.
+    #[test]
+    fn a_cylinder_is_met_between_the_points() {
+        let (d, r) = (0.9, 0.45);
+        let mass = |h: f64| 1000.0 * core::f64::consts::PI * r * r * h;
+        let depth = |i: f64| r * (1.0 / 6.0 + (17.0 / 6.0) * (i / (POINTS - 1) as f64).powf(1.5));
+        let mut table = FillTable { points: POINTS, ..crate::Tank::default().fill };
+        for i in 0..POINTS {
+            let h = depth(i as f64);
+            let pendulum = formulas::cylinder::pendulum(0, d, h, mass(h));
+            (table.liquid[i], table.mass[0][i]) = (mass(h), pendulum.mass);
+            (table.length[0][i], table.hinge[0][i]) = (pendulum.length, pendulum.hinge);
+        }
+        let curves = table.curves(1);
+        for k in 0..=25 * (POINTS - 1) {
+            let h = depth(k as f64 / 25.0);
+            let exact = formulas::cylinder::pendulum(0, d, h, mass(h));
+            let [m, l, hinge] = curves.mode(0, curves.place(mass(h))).map(|jet| jet[0]);
+            assert!((m / exact.mass - 1.0).abs() < 5e-3, "h {h}: mass {m} {}", exact.mass);
+            assert!(((exact.length / l).sqrt() - 1.0).abs() < 5e-3, "h {h}: length {l}");
+            assert!((hinge - exact.hinge).abs() < 5e-3 * r, "h {h}: {hinge} {}", exact.hinge);
         }
     }
 }

@@ -1,13 +1,186 @@
-//! Damping ratios of the first mode: published correlations, the laminar layer at the wall, ring
-//! baffles.
+//! Damping ratios: one law for every tank ([`estimate`]), made of the laminar layer at the wall and of published
+//! correlations; ring baffles.
+//!
+//! ```text
+//! zeta_n = f beta_n sqrt(nu/(8 omega_n)),   omega_n^2 = g lambda_n + k_n/m_n
+//! ```
+//!
+//! beta_n, 1/m, is the mode's share of rubbing at the wall, int_W |grad phi|^2 dS / int_Q |grad phi|^2 dV; omega_n the
+//! true natural frequency, capillarity included, so that zeta stays finite where g vanishes. f is what surface film
+//! and contact line add: that of a measured shape, [`UNMEASURED`] for any other.
 //!
 //! Re = nu/sqrt(g R^3) throughout (an inverse Reynolds number), x = h/R the fill; zeta is the
-//! logarithmic decrement over 2 pi. Measured tanks scatter by some 30 % around any of these. Where a
-//! formula leaves its range is said by who calls it.
+//! logarithmic decrement over 2 pi. Measured tanks scatter by some 30 % around any correlation.
 
 use core::f64::consts::TAU;
 
 use libm::{cosh, exp, pow, sinh, sqrt, tanh};
+
+use crate::cylinder::XI;
+
+/// f of a shape without measurements: that of measured cylinders, 1.49 (Stephens) and 1.39 to 1.54
+/// (Mikishev and Dorozhkin).
+pub const UNMEASURED: f64 = 1.45;
+
+/// By how much measured tanks scatter around a correlation.
+pub const SCATTER: f64 = 0.3;
+
+/// One mode of a liquid, as its damping sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mode {
+    /// Rubbing at the wall, 1/m.
+    pub beta: f64,
+    /// 1/l, 1/m: what gravity alone makes of the frequency is sqrt(g lambda).
+    pub lambda: f64,
+    /// Natural frequency, capillarity included, rad/s.
+    pub omega: f64,
+}
+
+impl Mode {
+    /// Mode `n` (from 0) of an upright cylinder under the specific force `g`, which counts what a centring stiffness
+    /// adds, k l/m.
+    pub fn of_cylinder(n: usize, radius: f64, depth: f64, g: f64) -> Mode {
+        let lambda = XI[n] / radius * tanh(XI[n] * depth / radius);
+        Mode { beta: cylinder_beta(n, radius, depth), lambda, omega: sqrt(g * lambda) }
+    }
+
+    /// The laminar layer alone, f = 1.
+    pub fn laminar(&self, nu: f64) -> f64 {
+        laminar(self.beta, nu, self.omega)
+    }
+}
+
+/// Shapes of which the damping of the first mode has been measured; lengths in m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[allow(missing_docs)]
+pub enum Shape {
+    /// Upright, with a flat bottom.
+    Cylinder {
+        radius: f64,
+        depth: f64,
+    },
+    Sphere {
+        radius: f64,
+        depth: f64,
+    },
+    /// Apex down, `radius` of the free surface, half angle in degrees.
+    Cone {
+        radius: f64,
+        half_angle: f64,
+    },
+    /// Axis upright.
+    Torus {
+        tube_radius: f64,
+        depth: f64,
+    },
+    /// None of these.
+    Other,
+}
+
+/// What a correlation says of a first mode.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Correlation {
+    /// Damping ratio.
+    pub zeta: f64,
+    /// Whether it was measured there.
+    pub in_range: bool,
+}
+
+impl Shape {
+    /// The published correlation of the first mode's damping ratio, `g` with what a centring stiffness adds.
+    ///
+    /// Cylinder: Mikishev and Dorozhkin from h/R = 0.5 on; below, where that falls under the laminar layer,
+    /// Stephens, Leonard and Perry.
+    pub fn correlation(&self, nu: f64, g: f64) -> Option<Correlation> {
+        let (zeta, in_range) = match *self {
+            Shape::Cylinder { radius, depth } => (cylinder(radius, depth, nu, g), true),
+            Shape::Sphere { radius, depth } => (
+                sphere(radius, depth, nu, g),
+                (0.1..=1.9).contains(&(depth / radius))
+                    && (1e-2..=1.0).contains(&sphere_number(radius, nu, g)),
+            ),
+            Shape::Cone { radius, half_angle } => {
+                (cone(radius, half_angle, nu, g), (0.0..=45.0).contains(&half_angle))
+            }
+            Shape::Torus { tube_radius, depth } => (
+                torus(tube_radius, depth, nu, g),
+                (0.1..=0.9).contains(&(0.5 * depth / tube_radius))
+                    && (0.1..=10.0).contains(&torus_number(tube_radius, nu, g)),
+            ),
+            Shape::Other => return None,
+        };
+        Some(Correlation { zeta, in_range })
+    }
+}
+
+/// Which of two estimates was taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Basis {
+    /// The shape's correlation: it was measured there.
+    Correlation,
+    /// [`UNMEASURED`] laminar layers: there is no correlation for the shape.
+    Unmeasured,
+    /// The same: the correlation was not measured there.
+    OutOfRange,
+    /// The same: the correlation is below the laminar layer, and no wall takes less than that.
+    BelowLayer,
+}
+
+/// A damping ratio, and between what it is to be expected.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate {
+    /// Damping ratio.
+    pub zeta: f64,
+    /// Its interval.
+    pub interval: [f64; 2],
+    /// The laminar layer alone.
+    pub laminar: f64,
+    /// What the correlation says of the first mode, where there is one.
+    pub correlation: Option<f64>,
+    /// Which was taken.
+    pub basis: Basis,
+    /// Whether correlation and [`UNMEASURED`] laminar layers differ by more than measured tanks scatter.
+    pub disagree: bool,
+}
+
+/// The damping ratio of `mode` of a tank whose first mode is `first`.
+///
+/// The first mode has its shape's correlation where that was measured, and [`UNMEASURED`] laminar layers elsewhere. The
+/// others have as many layers of their own as the first. The interval is the scatter of measured tanks around a
+/// correlation that agrees with the layers; otherwise, for other modes and for other shapes it runs from the layer
+/// alone to 1.3 of the larger of both.
+pub fn estimate(shape: Shape, nu: f64, first: Mode, mode: Mode) -> Estimate {
+    let layers = UNMEASURED * first.laminar(nu);
+    let correlation = shape.correlation(nu, first.omega * first.omega / first.lambda);
+    let basis = match correlation {
+        None => Basis::Unmeasured,
+        Some(Correlation { in_range: false, .. }) => Basis::OutOfRange,
+        Some(Correlation { zeta, .. }) if zeta < first.laminar(nu) => Basis::BelowLayer,
+        Some(_) => Basis::Correlation,
+    };
+    let published = correlation.map(|correlation| correlation.zeta);
+    let taken = published.filter(|_| basis == Basis::Correlation).unwrap_or(layers);
+    let (low, high) =
+        published.map_or((layers, layers), |zeta| (zeta.min(layers), zeta.max(layers)));
+    let disagree = high > (1.0 + SCATTER) * low;
+    // The same multiple of its own layer; 0/0 without viscosity.
+    let share = if mode == first { 1.0 } else { mode.laminar(nu) / first.laminar(nu) };
+    let share = if share.is_finite() { share } else { 1.0 };
+    let is_measured = basis == Basis::Correlation && !disagree && mode == first;
+    let interval = if is_measured {
+        [(1.0 - SCATTER) * taken, (1.0 + SCATTER) * taken]
+    } else {
+        [first.laminar(nu) * share, (1.0 + SCATTER) * high * share]
+    };
+    Estimate {
+        zeta: taken * share,
+        interval,
+        laminar: first.laminar(nu) * share,
+        correlation: published,
+        basis,
+        disagree,
+    }
+}
 
 /// Re = nu/sqrt(g R^3).
 pub fn inverse_reynolds(radius: f64, nu: f64, g: f64) -> f64 {
@@ -18,6 +191,31 @@ pub fn inverse_reynolds(radius: f64, nu: f64, g: f64) -> f64 {
 /// shape (Case and Parkinson 1957 for the cylinder, Keulegan 1959 for the box).
 pub fn laminar(beta: f64, nu: f64, omega: f64) -> f64 {
     beta * sqrt(nu / (8.0 * omega))
+}
+
+/// beta of mode `n` (from 0) of an upright cylinder, 1/m (Case and Parkinson, J. Fluid Mech. 2 (1957) 172):
+/// beta R = (xi^2 + 1)/(xi^2 - 1) + 2 xi (1 - x)/sinh(2 xi x).
+pub fn cylinder_beta(n: usize, radius: f64, depth: f64) -> f64 {
+    let (xi, x) = (XI[n], depth / radius);
+    let u = 2.0 * xi * x;
+    let shallow = if u > 700.0 { 0.0 } else { 2.0 * xi * (1.0 - x) / sinh(u) };
+    ((xi * xi + 1.0) / (xi * xi - 1.0) + shallow) / radius
+}
+
+/// First mode of an upright cylinder at any depth: [`mikishev_dorozhkin`] from h/R = 0.5 on, [`stephens`] below.
+pub fn cylinder(radius: f64, depth: f64, nu: f64, g: f64) -> f64 {
+    if depth >= 0.5 * radius {
+        mikishev_dorozhkin(radius, depth, nu, g)
+    } else {
+        stephens(radius, depth, nu, g)
+    }
+}
+
+/// First mode of an upright cylinder at 10 < Bo < 100, where the contact line takes more than at large Bond numbers:
+/// 0.83 (nu^2/(g R^3))^(1/4) (1 + 8.2 Bo^(-3/5)), as it is quoted for drop-tower tests (Salzman, Labus and Masica,
+/// NASA TN D-4132). The report was not seen: an upper bound here.
+pub fn low_bond_cylinder(radius: f64, nu: f64, g: f64, bond: f64) -> f64 {
+    0.83 * sqrt(inverse_reynolds(radius, nu, g)) * (1.0 + 8.2 * pow(bond, -0.6))
 }
 
 /// Upright cylinder, Mikishev and Dorozhkin (Dodge 2000): 0.79 sqrt(Re) [1 + (0.318/sinh 1.84 x)

@@ -1,11 +1,11 @@
 //! Slosh damping that follows the specific force g along the tank's axis.
 //!
-//! The viscous coefficient of a mode is c = 2 zeta omega_n m with omega_n = sqrt(g/l). A given
-//! damping ratio zeta makes c ~ g^(1/2); the correlation, zeta ~ g^(-1/4), makes c ~ g^(1/4).
-//! A centring stiffness makes g larger by a_n (`tank.rs`). So
+//! The viscous coefficient of a mode is c = 2 zeta omega_n m with omega_n = sqrt(g/l). A constant
+//! damping ratio zeta makes c ~ g^(1/2); a laminar layer at the wall, zeta ~ omega_n^(-1/2)
+//! (`formulas::damping`), makes c ~ g^(1/4). A centring stiffness makes g larger by a_n (`tank.rs`). So
 //!
 //! ```text
-//! c(g) = c_0 [(g + a_n)/(g_0 + a_n)]^p,   p = 1/2 or 1/4
+//! c(g) = c_0 [(g + a_n)/(g_0 + a_n)]^p,   p = 1/2 (constant_ratio) or 1/4 (laminar)
 //! ```
 //!
 //! with c_0 at a reference g_0; without restoring force there is no damping.
@@ -13,7 +13,7 @@
 use taylor::series::{Series, ZERO};
 
 use crate::inputs::Ramp;
-use crate::parameters::{MODES, Parameters, SloshSource};
+use crate::parameters::{DampingLaw, MODES, Parameters, SloshSource};
 use crate::pendulum::Pendulum;
 use crate::tank::Calculated;
 
@@ -47,7 +47,12 @@ impl Damping {
     pub fn new(p: &Parameters, calculated: &Calculated, reference: f64) -> Damping {
         let by_correlation =
             p.slosh.zeta_from_correlation && p.slosh.source == SloshSource::Geometry;
-        let exponent = if by_correlation { 0.25 } else { 0.5 };
+        let is_laminar = match p.slosh.damping_law {
+            DampingLaw::Laminar => true,
+            DampingLaw::ConstantRatio => false,
+            DampingLaw::BySource => by_correlation,
+        };
+        let exponent = if is_laminar { 0.25 } else { 0.5 };
         let Calculated { damping: zeta, centring, .. } = *calculated;
         Damping { reference, exponent, zeta, centring }
     }

@@ -15,6 +15,7 @@
 
 extern crate alloc;
 
+mod amplitude;
 mod baffle;
 mod contact;
 mod damping;
@@ -34,13 +35,14 @@ mod tank;
 mod wheel;
 
 pub use contact::Contact;
+pub use formulas::regime::Regime;
 pub use inputs::{Inputs, Ramp};
 pub use outputs::{Discrete, Outputs};
 pub use parameters::{
-    Bench, Fluid, Friction, FrictionModel, Hub, Imu, Init, MODES, ModeTable, Parameters, Ring,
-    Slosh, SloshModel, SloshSource, Solver, Tank, Wheel,
+    Bench, DampingLaw, Fluid, Friction, FrictionModel, Hub, Imu, Init, MODES, ModeTable,
+    Parameters, Ring, Slosh, SloshModel, SloshSource, Solver, Tank, Wheel,
 };
 pub use plant::Plant;
-pub use state::{INDICATORS, Regime, STATES, State, indicator, x};
+pub use state::{INDICATORS, STATES, State, indicator, x};
 pub use tank::Calculated;
 pub use taylor::error::StepError;

@@ -36,10 +36,11 @@ pub(crate) struct Motion {
     pub i0: f64,
     pub law: Law,
     pub damping: Damping,
-    /// Whether drag or weight change along an expansion though g is held: with a baffle, or on a
-    /// bench that leans.
+    /// Whether drag or weight change along an expansion though g is held: with drag by amplitude, or
+    /// on a bench that leans.
     pub varies: bool,
-    with_baffle: bool,
+    /// Whether drag depends on the amplitude: by a baffle, or growing with it.
+    with_amplitude: bool,
     /// Mass moments of the dry hub, radially and tangentially, and of the rigid liquid, kg m.
     imbalance: [f64; 2],
     rigid_moment: f64,
@@ -71,13 +72,14 @@ impl Motion {
         let mut hub = HubMotion::REST;
         hub.tilt.tangent = libm::tan(p.bench.tilt);
         hub.tilt.azimuth = p.bench.tilt_azimuth;
-        let with_baffle = p.baffle.width > 0.0 && p.slosh.model != SloshModel::Frozen;
+        let with_amplitude = (p.baffle.width > 0.0 || p.slosh.zeta_amplitude > 0.0)
+            && p.slosh.model != SloshModel::Frozen;
         Motion {
             i0: p.hub.inertia + i_0,
             law: Law::new(&p.friction),
             damping,
-            varies: with_baffle || hub.tilt.tangent != 0.0,
-            with_baffle,
+            varies: with_amplitude || hub.tilt.tangent != 0.0,
+            with_amplitude,
             imbalance: [p.hub.imbalance * cos, p.hub.imbalance * sin],
             rigid_moment: m_0 * p.tank.r,
             g: [f64::NAN; 2],
@@ -113,16 +115,16 @@ impl Motion {
     #[cold]
     fn set_axial<M: SloshMode>(&mut self, modes: &mut [M], g: Ramp) {
         self.hub.g = [g.value, g.slope];
-        // The baffle's drag belongs to the motion at this instant alone.
-        self.g = if self.with_baffle { [f64::NAN; 2] } else { self.hub.g };
+        // Drag by amplitude belongs to the motion at this instant alone.
+        self.g = if self.with_amplitude { [f64::NAN; 2] } else { self.hub.g };
         self.hub.damping_reach = f64::INFINITY;
         for (n, mode) in modes.iter_mut().enumerate() {
             let amplitude2 = mode.amplitude2::<f64>();
             let pendulum = mode.pendulum_mut();
             let reach = self.damping.expand(n, g, self.near_weightless, pendulum);
             self.hub.damping_reach = self.hub.damping_reach.min(reach);
-            if pendulum.baffle.zeta > 0.0 {
-                pendulum.add_baffle(amplitude2);
+            if pendulum.follows_amplitude() {
+                pendulum.add_amplitude_drag(amplitude2);
             }
         }
     }

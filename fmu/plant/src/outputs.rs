@@ -1,5 +1,6 @@
 //! What can be read of the plant at an instant, and its time derivatives along a direction.
 
+use formulas::regime::Regime;
 use taylor::number::{Dual, Number};
 use taylor::series::number;
 
@@ -7,7 +8,7 @@ use crate::contact::Contact;
 use crate::inputs::{Inputs, Ramp};
 use crate::plant::Plant;
 use crate::slosh::{Angles, SloshMode, with_modes};
-use crate::state::{Ranges, Regime, STATES, x};
+use crate::state::{Ranges, STATES, x};
 
 /// The plant's outputs at one instant, or their derivatives.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -220,11 +221,7 @@ impl Plant {
 
     /// The ranges that the outputs are in.
     pub(crate) fn ranges_of(&self, outputs: &Outputs) -> Ranges {
-        let regime = match outputs.wave_height / self.radius {
-            ratio if ratio < 0.15 => Regime::Linear,
-            ratio if ratio <= 0.25 => Regime::Transitional,
-            _ => Regime::Nonlinear,
-        };
+        let regime = Regime::of(outputs.wave_height / self.radius);
         let baffle = self.baffle.is_none_or(|range| range.contains(outputs.baffle_wave));
         Ranges { regime, baffle }
     }

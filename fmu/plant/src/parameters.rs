@@ -98,6 +98,24 @@ impl SloshSource {
 /// The largest number of slosh modes.
 pub const MODES: usize = 10;
 
+/// How a mode's viscous coefficient c follows its natural frequency omega_n.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum DampingLaw {
+    /// c ~ omega_n^(1/2): a laminar layer at the wall, for bare tanks.
+    Laminar = 1,
+    /// c ~ omega_n: the damping ratio stays, for one that was measured or prescribed.
+    ConstantRatio = 2,
+    /// Laminar where the damping ratio comes from the correlation, constant where it is given.
+    BySource = 3,
+}
+
+impl DampingLaw {
+    /// All of them, in the order of their numbers.
+    pub const ALL: [DampingLaw; 3] =
+        [DampingLaw::Laminar, DampingLaw::ConstantRatio, DampingLaw::BySource];
+}
+
 /// Choice and parameters of the slosh model; `modes` is 1 to [`MODES`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
@@ -109,6 +127,8 @@ pub struct Slosh {
     pub table: ModeTable,
     pub zeta_from_correlation: bool,
     pub zeta: f64,
+    pub damping_law: DampingLaw,
+    pub zeta_amplitude: f64,
     pub hardening: f64,
 }
 
@@ -116,6 +136,8 @@ pub struct Slosh {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub struct ModeTable {
+    /// The modes are those along one axis of a tank that has others across it.
+    pub one_axis: bool,
     pub m_liq: f64,
     pub g_ref: f64,
     pub mass: [f64; MODES],
@@ -277,6 +299,8 @@ impl Default for Slosh {
             table: ModeTable::default(),
             zeta_from_correlation: true,
             zeta: 0.003,
+            damping_law: DampingLaw::BySource,
+            zeta_amplitude: 0.0,
             hardening: 0.58,
         }
     }
@@ -286,6 +310,7 @@ impl Default for ModeTable {
     fn default() -> Self {
         let none = [0.0; MODES];
         ModeTable {
+            one_axis: false,
             m_liq: 0.0,
             g_ref: 9.81,
             mass: none,

@@ -3,6 +3,7 @@
 use taylor::number::Number;
 use taylor::series::{Series, ZERO, mul, mul_ramp};
 
+use crate::amplitude::Growth;
 use crate::baffle::Baffle;
 
 /// One slosh mode as a pendulum that hangs at the tank's axis.
@@ -35,6 +36,7 @@ pub struct Pendulum {
     /// c over its value at the start of the expansion.
     pub course: Series,
     pub baffle: Baffle,
+    pub growth: Growth,
 }
 
 impl Default for Pendulum {
@@ -57,6 +59,7 @@ impl Default for Pendulum {
             omega_n: 0.0,
             course: ZERO,
             baffle: Baffle::default(),
+            growth: Growth::default(),
         }
     }
 }
@@ -75,12 +78,31 @@ impl Pendulum {
         self.course = course;
     }
 
-    /// Adds the drag of the baffle at [|q|^2, |q'|^2], squares of angle and rate.
-    pub fn add_baffle(&mut self, at: [f64; 2]) {
+    /// Whether the drag depends on the amplitude of the motion.
+    #[inline(always)]
+    pub fn follows_amplitude(&self) -> bool {
+        self.baffle.zeta > 0.0 || self.growth.zeta > 0.0
+    }
+
+    /// Adds the drag of the baffle, and what grows with the amplitude, at [|q|^2, |q'|^2], squares of angle
+    /// and rate.
+    pub fn add_amplitude_drag(&mut self, at: [f64; 2]) {
         let w = self.g.map(|g| g * self.inv_l);
-        self.c = self.baffle.start(w, at, self.m, self.c, self.course);
+        if self.baffle.zeta > 0.0 {
+            self.c = self.baffle.start(w, at, self.m, self.c, self.course);
+        }
+        if self.growth.zeta > 0.0 {
+            self.c = self.growth.start(w, at, self.m, self.c, self.course);
+        }
         self.c_m = self.c / self.m;
         self.course[0] = 1.0;
+    }
+
+    /// Sets coefficient n of the course of the drag from those of [|q|^2, |q'|^2].
+    pub fn expand_drag(&mut self, n: usize, at: [f64; 2]) {
+        let Pendulum { baffle, growth, .. } = self;
+        let other = if baffle.zeta > 0.0 { baffle.expand(n, at) } else { growth.viscous[n] };
+        self.course[n] = if growth.zeta > 0.0 { growth.expand(n, at, other) } else { other };
     }
 
     /// Restoring specific force and viscous coefficient at the start of an expansion.

@@ -8,6 +8,7 @@ use alloc::boxed::Box;
 use alloc::string::{String, ToString};
 use alloc::vec;
 use alloc::vec::Vec;
+use formulas::regime::Regime;
 use taylor::error::StepError;
 use taylor::number::Number;
 
@@ -19,7 +20,7 @@ use crate::inputs::{Inputs, Ramp};
 use crate::motion::Motion;
 use crate::parameters::{Imu, MODES, Parameters, Wheel};
 use crate::slosh::{Angles, Liquid, SloshMode, with_modes};
-use crate::state::{Axial, Ranges, Regime, STATES, State, x};
+use crate::state::{Axial, Ranges, STATES, State, x};
 use crate::tank::{self, Calculated};
 
 /// Hub, bearing, tank, wheel and gyro.

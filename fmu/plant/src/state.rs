@@ -1,6 +1,7 @@
 //! The plant's state, and the names of its parts: the continuous states and the event
 //! indicators are declared here and nowhere else.
 
+use formulas::regime::Regime;
 use taylor::integrator::MAX_MAGNITUDE;
 
 use crate::contact::Contact;
@@ -59,19 +60,6 @@ pub mod indicator {
 
 /// Number of event indicators.
 pub const INDICATORS: usize = indicator::COUNT;
-
-/// How far the linear range of sloshing reaches, by the wave's height at the wall:
-/// below 0.15 R, up to 0.25 R, above (thesis 2.3.5).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Regime {
-    /// Below 0.15 R.
-    Linear = 1,
-    /// From 0.15 R to 0.25 R.
-    Transitional = 2,
-    /// Above 0.25 R.
-    Nonlinear = 3,
-}
 
 /// The ranges of validity that the motion is in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -163,12 +151,7 @@ impl State {
             1 => Contact::Forward,
             _ => return None,
         };
-        let regime = match (words[0] >> 40) as u8 {
-            1 => Regime::Linear,
-            2 => Regime::Transitional,
-            3 => Regime::Nonlinear,
-            _ => return None,
-        };
+        let regime = Regime::from_number((words[0] >> 40) as u8)?;
         let baffle = match words[0] >> 48 {
             0 => false,
             1 => true,

@@ -1,7 +1,7 @@
 //! The liquid as pendulums: of an upright cylinder by its dimensions, of any tank by a table.
 //!
 //! Modal masses and lengths (`formulas::cylinder`): thesis Table 4.1, the same as Abramson NASA SP-106
-//! and Dodge (2000), with the exact zeros of J1'. Damping: Mikishev-Dorozhkin.
+//! and Dodge (2000), with the exact zeros of J1'. Damping: `formulas::damping`.
 //! Capillarity with a flat surface and a free contact line, exact in the cylinder: omega_n^2 =
 //! g/l_n + sigma xi_n^3 tanh(xi_n h/R)/(rho R^3). The lengths are geometry; capillarity acts as a
 //! centring stiffness k_n, and that as if g were larger by
@@ -14,10 +14,11 @@ use alloc::format;
 use alloc::string::{String, ToString};
 use alloc::vec::Vec;
 use formulas::cylinder::{self, XI};
-use formulas::damping::mikishev_dorozhkin;
+use formulas::damping;
 use formulas::similarity;
 use formulas::third_order::{coefficients, secondary_resonance};
 
+use crate::amplitude::Growth;
 use crate::baffle::{self, Baffle};
 use crate::parameters::{MODES, Parameters, SloshModel, SloshSource};
 use crate::pendulum::Pendulum;
@@ -54,6 +55,14 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
         problems.push(
             "slosh.model = liquid needs slosh.source = geometry: how the frequency depends on the \
              amplitude is known for the upright cylinder alone"
+                .to_string(),
+        );
+    }
+    let both = matches!(slosh.model, SloshModel::Spherical | SloshModel::Paraboloid);
+    if table.one_axis && both {
+        problems.push(
+            "slosh.table.one_axis: the modes are those along one axis of the tank, which has others across it; slosh.model \
+             = spherical and paraboloid move along both with the same (allowed: frozen, linear, planar)"
                 .to_string(),
         );
     }
@@ -187,8 +196,8 @@ const LOW_BOND: f64 = 100.0;
 impl Calculated {
     /// Modal parameters at the specific force `g` along the tank's axis, m/s2.
     ///
-    /// The correlation covers the first mode; higher modes take its ratio. Without
-    /// restoring force (g = 0, no centring stiffness) there is no frequency; the damping
+    /// The correlation covers the first mode; each higher mode has as many laminar layers of its own
+    /// (`formulas::damping`). Without restoring force (g = 0, no centring stiffness) there is no frequency; the damping
     /// ratio, which has no meaning there, is reported as 0.
     pub fn new(p: &Parameters, g: f64) -> Calculated {
         let Parameters { tank, fluid, slosh, .. } = p;
@@ -222,7 +231,15 @@ impl Calculated {
             all.damping[n] = match (slosh.source, slosh.zeta_from_correlation) {
                 _ if restoring <= 0.0 => 0.0,
                 (SloshSource::Table, _) => slosh.table.zeta[n],
-                (_, true) => mikishev_dorozhkin(radius, tank.h, fluid.nu, g + all.centring[0]),
+                (_, true) if n == 0 => damping::cylinder(radius, tank.h, fluid.nu, restoring),
+                // As many laminar layers of its own as the first mode.
+                (_, true) => {
+                    let mode = |n: usize| {
+                        let g = g + all.centring[n];
+                        damping::Mode::of_cylinder(n, radius, tank.h, g).laminar(1.0)
+                    };
+                    all.damping[0] * mode(n) / mode(0)
+                }
                 (_, false) => slosh.zeta,
             };
             all.m_0 -= all.mass[n];
@@ -271,6 +288,10 @@ impl Calculated {
                 baffle: match n == 0 && p.baffle.width > 0.0 {
                     true => Baffle::new(&p, wave, l),
                     false => Baffle::default(),
+                },
+                growth: match slosh.zeta_amplitude > 0.0 {
+                    true => Growth::new(slosh.zeta_amplitude, l),
+                    false => Growth::default(),
                 },
                 ..Pendulum::default()
             }

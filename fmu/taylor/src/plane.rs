@@ -2,13 +2,13 @@
 //! processor does both at once.
 
 use crate::number::Number;
-use crate::series::{self, ORDER, Series};
+use crate::series::{self, EMPTY, ORDER, Series};
 
 /// Sum of `term(j)` over 0 <= j <= n, ends last; see `series.rs`.
 #[inline(always)]
 fn sum_both(n: usize, term: impl Fn(usize) -> [f64; 2]) -> [f64; 2] {
     let add = |a: [f64; 2], b: [f64; 2]| [a[0] + b[0], a[1] + b[1]];
-    let sum = add((1..n).fold([-0.0; 2], |sum, j| add(sum, term(j))), term(0));
+    let sum = add((1..n).fold([EMPTY; 2], |sum, j| add(sum, term(j))), term(0));
     if n == 0 { sum } else { add(sum, term(n)) }
 }
 
@@ -58,7 +58,7 @@ pub fn mul_part(n: usize, a: &Series, b: &Vector2, i: usize) -> f64 {
 /// Coefficient n of a b, b a vector, without its term a_n b_0.
 #[inline(always)]
 pub fn scale_head(n: usize, a: &Series, b: &Vector2) -> [f64; 2] {
-    let mut sum = [0.0; 2];
+    let mut sum = [EMPTY; 2];
     for (a, b) in a[..n].iter().zip(b.0[1..=n].iter().rev()) {
         sum = [sum[0] + a * b[0], sum[1] + a * b[1]];
     }
@@ -68,7 +68,7 @@ pub fn scale_head(n: usize, a: &Series, b: &Vector2) -> [f64; 2] {
 /// Coefficient n of a b_i, b a vector, without its term a_n b_0.
 #[inline(always)]
 pub fn mul_part_head(n: usize, a: &Series, b: &Vector2, i: usize) -> f64 {
-    let mut sum = 0.0;
+    let mut sum = EMPTY;
     for (a, b) in a[..n].iter().zip(b.0[1..=n].iter().rev()) {
         sum += a * b[i];
     }
@@ -85,11 +85,11 @@ pub fn each(n: usize, a: &Vector2, b: &Vector2) -> [f64; 2] {
 /// Coefficient n of (a_1^2, a_2^2).
 #[inline(always)]
 pub fn squares(n: usize, a: &Vector2) -> [f64; 2] {
-    let mut half = [0.0; 2];
+    let mut half = [EMPTY; 2];
     for j in (0..n.div_ceil(2)).rev() {
         half = [half[0] + a[j][0] * a[n - j][0], half[1] + a[j][1] * a[n - j][1]];
     }
-    let middle = if n.is_multiple_of(2) { a[n / 2].map(|x| x * x) } else { [0.0; 2] };
+    let middle = if n.is_multiple_of(2) { a[n / 2].map(|x| x * x) } else { [EMPTY; 2] };
     [2.0 * half[0] + middle[0], 2.0 * half[1] + middle[1]]
 }
 
@@ -104,8 +104,8 @@ pub fn dot(n: usize, a: &Vector2, b: &Vector2) -> f64 {
 #[inline(always)]
 pub fn values<const K: usize>(a: [&Vector2; K], n: usize, t: f64) -> [[f64; 2]; K] {
     let n = n.min(ORDER);
-    let mut sums = [[0.0; 2]; K];
-    for j in (0..n + 1).rev() {
+    let mut sums = a.map(|a| a[n]);
+    for j in (0..n).rev() {
         for k in 0..K {
             let [x, y] = a[k][j];
             sums[k] = [sums[k][0] * t + x, sums[k][1] * t + y];

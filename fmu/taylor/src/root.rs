@@ -7,6 +7,10 @@
 /// over [0, h] gives f(t + s) >= f + f' s - M s^2 / 2. The root of that parabola
 /// is a step that cannot pass the first zero, and it converges to it
 /// quadratically, as Newton's does.
+///
+/// M is close enough where the terms a_n h^n decay, as those of a converged series do. Where they
+/// grow, the steps are short, and after 200 of them the answer is where they have come to: there is
+/// no zero before, and none need be there.
 pub fn first_root(a: &[f64], h: f64) -> Option<f64> {
     let (mut power, mut lowest) = (1.0, a[0]);
     for x in &a[1..] {
@@ -22,7 +26,7 @@ pub fn first_root(a: &[f64], h: f64) -> Option<f64> {
         power *= h;
     }
     let mut t = 0.0;
-    // Far from a tangency some five steps do; the limit only bounds the work.
+    // Far from a tangency some five steps do; the limit bounds the work.
     for _ in 0..200 {
         let (mut f, mut slope) = (0.0, 0.0);
         for x in a.iter().rev() {
@@ -83,6 +87,18 @@ mod tests {
         // (1 - t)(2 - t)(3 - t)
         assert!((first_root(&[6.0, -11.0, 6.0, -1.0], 9.0).unwrap() - 1.0).abs() < 1e-14);
         assert_eq!(first_root(&[f64::NAN, 1.0], 1.0), None);
+    }
+
+    /// 1 - t^18 up to 3: the last term is 4e8 times the first, and no step is longer than 1.3e-5.
+    #[test]
+    fn where_terms_grow_the_answer_is_before_the_root() {
+        let mut a = [0.0; 19];
+        (a[0], a[18]) = (1.0, -1.0);
+        let far = first_root(&a, 3.0).unwrap();
+        assert!(far > 0.0 && far < 200.0 * 1.3e-5, "{far}");
+        // Up to 1.2, where the last term is 27 times the first, they suffice.
+        let near = first_root(&a, 1.2).unwrap();
+        assert!((near - 1.0).abs() < 1e-12, "{near}");
     }
 
     /// Polynomials of degree 8 whose terms decay, as those of a series do, against samples of them: nothing is

@@ -54,11 +54,14 @@ pub fn next(n: usize, rate: f64) -> f64 {
 // order, and a processor adds up the rest while it waits for them. Where a rule is a loop, its
 // slices spare the processor a check of every index.
 
+/// What a sum begins with: -0 changes nothing that is added to it, +0 would make a +0 of -0, for which a
+/// processor has to add.
+pub(crate) const EMPTY: f64 = -0.0;
+
 /// Sum of `term(j)` over 0 <= j <= n, ends last.
 #[inline(always)]
 pub(crate) fn sum(n: usize, term: impl Fn(usize) -> f64) -> f64 {
-    // -0 is what no sum changes by.
-    let sum = (1..n).fold(-0.0, |sum, j| sum + term(j)) + term(0);
+    let sum = (1..n).fold(EMPTY, |sum, j| sum + term(j)) + term(0);
     if n == 0 { sum } else { sum + term(n) }
 }
 
@@ -72,7 +75,7 @@ pub fn mul(n: usize, a: &Series, b: &Series) -> f64 {
 /// Coefficient n of a b without its term a_0 b_n.
 #[inline(always)]
 pub fn mul_tail(n: usize, a: &Series, b: &Series) -> f64 {
-    let mut sum = 0.0;
+    let mut sum = EMPTY;
     for (a, b) in a[1..=n].iter().zip(b[..n].iter().rev()) {
         sum += a * b;
     }
@@ -85,11 +88,11 @@ pub fn square(n: usize, a: &Series) -> f64 {
     if n == 0 {
         return a[0] * a[0];
     }
-    let mut half = 0.0;
+    let mut half = EMPTY;
     for j in 1..n.div_ceil(2) {
         half += a[j] * a[n - j];
     }
-    let middle = if n.is_multiple_of(2) { a[n / 2] * a[n / 2] } else { 0.0 };
+    let middle = if n.is_multiple_of(2) { a[n / 2] * a[n / 2] } else { EMPTY };
     2.0 * (half + a[0] * a[n]) + middle
 }
 
@@ -104,7 +107,7 @@ pub fn mul_ramp(n: usize, ramp: &[f64; 2], a: &Series) -> f64 {
 #[inline(always)]
 pub fn chain(n: usize, u: f64, u_d: &mut Series, g: &Series) -> f64 {
     u_d[n - 1] = n as f64 * u;
-    let mut before = 0.0;
+    let mut before = EMPTY;
     for (u_d, g) in u_d[..n - 1].iter().zip(g[1..n].iter().rev()) {
         before += u_d * g;
     }
@@ -147,8 +150,8 @@ macro_rules! at_each_order {
 #[inline(always)]
 pub fn values<const K: usize>(a: [&Series; K], n: usize, t: f64) -> [f64; K] {
     let n = n.min(ORDER);
-    let mut sums = [0.0; K];
-    for j in (0..n + 1).rev() {
+    let mut sums = a.map(|a| a[n]);
+    for j in (0..n).rev() {
         for k in 0..K {
             sums[k] = sums[k] * t + a[k][j];
         }
@@ -160,8 +163,8 @@ pub fn values<const K: usize>(a: [&Series; K], n: usize, t: f64) -> [f64; K] {
 #[inline(always)]
 pub fn integrals<const K: usize>(a: [&Series; K], n: usize, t: f64) -> [f64; K] {
     let n = n.min(ORDER);
-    let mut sums = [0.0; K];
-    for j in (0..n + 1).rev() {
+    let mut sums = a.map(|a| a[n] * RECIPROCAL[n + 1]);
+    for j in (0..n).rev() {
         for k in 0..K {
             sums[k] = sums[k] * t + a[k][j] * RECIPROCAL[j + 1];
         }

@@ -4,7 +4,7 @@
 //! `series.rs`. The order N is a constant of a rule: that the compiler writes sums of vectors out before it
 //! puts them where they are used spares a seventieth of the instructions of a step.
 
-use crate::series::{ORDER, RECIPROCAL, Series};
+use crate::series::{EMPTY, ORDER, RECIPROCAL, Series};
 use crate::vector::{self, Vec3};
 
 /// Coefficients 0 to [`ORDER`] of a vector.
@@ -51,8 +51,8 @@ impl Pair {
     /// The values at t of both series cut after order n.
     #[inline(always)]
     pub fn value(&self, n: usize, t: f64) -> [Vec3; 2] {
-        let mut sum = [[0.0; 2]; 3];
-        for x in self.0[..=n].iter().rev() {
+        let mut sum = self.0[n];
+        for x in self.0[..n].iter().rev() {
             for i in 0..3 {
                 sum[i] = [sum[i][0] * t + x[i][0], sum[i][1] * t + x[i][1]];
             }
@@ -65,13 +65,13 @@ impl Pair {
 /// Coefficient N of a.a.
 #[inline(always)]
 pub fn square_vector<const N: usize>(a: &Vector) -> f64 {
-    let mut half = [0.0; 3];
+    let mut half = [EMPTY; 3];
     for j in (0..N.div_ceil(2)).rev() {
         for i in 0..3 {
             half[i] += a[j][i] * a[N - j][i];
         }
     }
-    let middle = if N.is_multiple_of(2) { vector::dot(a[N / 2], a[N / 2]) } else { 0.0 };
+    let middle = if N.is_multiple_of(2) { vector::dot(a[N / 2], a[N / 2]) } else { EMPTY };
     2.0 * (half[0] + half[1] + half[2]) + middle
 }
 
@@ -79,7 +79,7 @@ pub fn square_vector<const N: usize>(a: &Vector) -> f64 {
 #[inline(always)]
 pub fn products<const N: usize>(a: &Vector) -> [f64; 6] {
     // Terms j and N - j together: 2 a_j b_(N-j) of a square, a_j b_(N-j) + a_(N-j) b_j of the rest.
-    let mut sum = [0.0; 6];
+    let mut sum = [EMPTY; 6];
     for j in (0..N.div_ceil(2)).rev() {
         let (a, b) = (a[j], a[N - j]);
         sum[0] += a[0] * b[0];
@@ -115,7 +115,7 @@ pub fn scale<const N: usize>(a: &Series, b: &Vector) -> Vec3 {
 /// Coefficient N of a b, b a vector, without its term a_N b_0.
 #[inline(always)]
 pub fn scale_head<const N: usize>(a: &Series, b: &Vector) -> Vec3 {
-    let mut sum = [0.0; 3];
+    let mut sum = [EMPTY; 3];
     for j in 0..N {
         for i in 0..3 {
             sum[i] += a[j] * b[N - j][i];
@@ -127,7 +127,7 @@ pub fn scale_head<const N: usize>(a: &Series, b: &Vector) -> Vec3 {
 /// Coefficient N of a.b without its term a_0.b_N.
 #[inline(always)]
 pub fn dot_tail<const N: usize>(a: &Vector, b: &Vector) -> f64 {
-    let mut sum = [0.0; 3];
+    let mut sum = [EMPTY; 3];
     for j in 0..N {
         for i in 0..3 {
             sum[i] += a[N - j][i] * b[j][i];
@@ -139,7 +139,7 @@ pub fn dot_tail<const N: usize>(a: &Vector, b: &Vector) -> f64 {
 /// Coefficient N of a x b.
 #[inline(always)]
 pub fn cross<const N: usize>(a: &Vector, b: &Vector) -> Vec3 {
-    let mut sum = [0.0; 3];
+    let mut sum = [EMPTY; 3];
     for j in 0..N + 1 {
         let ([ax, ay, az], [bx, by, bz]) = (a[j], b[N - j]);
         sum[0] += ay * bz - az * by;
@@ -155,7 +155,7 @@ pub fn cross<const N: usize>(a: &Vector, b: &Vector) -> Vec3 {
 // tenth more instructions result.
 #[inline(never)]
 pub fn cross_pair<const N: usize>(a: &Pair, b: &Pair) -> [[f64; 2]; 3] {
-    let mut sum = [[0.0; 2]; 3];
+    let mut sum = [[EMPTY; 2]; 3];
     for j in 0..N + 1 {
         let ([ax, ay, az], [bx, by, bz]) = (&a.0[j], &b.0[N - j]);
         for k in 0..2 {
@@ -219,8 +219,8 @@ impl Attitude {
     /// The value at t of the series cut after order n.
     #[inline(always)]
     pub fn value(&self, n: usize, t: f64) -> [f64; 4] {
-        let mut sum = [0.0; 4];
-        for n in (0..=n).rev() {
+        let mut sum = self.get(n);
+        for n in (0..n).rev() {
             let q = self.get(n);
             for i in 0..4 {
                 sum[i] = sum[i] * t + q[i];
@@ -234,6 +234,7 @@ impl Attitude {
 // A function of its own, as `cross_pair`.
 #[inline(never)]
 pub fn quaternion_rate<const N: usize>(q: &Attitude, w: &Pair) -> [f64; 4] {
+    // Not `EMPTY`: who rests turns at 0, not at -0.
     let (mut ab, mut cd) = ([0.0; 2], [0.0; 2]);
     for j in 0..N + 1 {
         let (q, [x, y, z]) = (&q.0[N - j], &w.0[j]);

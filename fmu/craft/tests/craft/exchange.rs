@@ -52,6 +52,9 @@ fn a_host_that_integrates_itself_meets_the_crafts_own_steps() {
         if seed.is_multiple_of(4) {
             (p.mount, p.init.velocity) = (Mount::Pivot, [0.0; 3]);
         }
+        if seed.is_multiple_of(3) {
+            p.tank.iter_mut().for_each(|tank| random.follow(tank));
+        }
         let inputs = random.inputs();
         let mut craft = Spacecraft::new(&p, &inputs, 0.0, 1e-13).unwrap();
         let mut own = Spacecraft::new(&p, &inputs, 0.0, 1e-13).unwrap();

@@ -12,10 +12,9 @@ type V = Vector3<f64>;
 
 /// Where the bob is from the host's O, and its rate on the rod, with `liquid` in the tank: l, rho, axes.
 fn rod(tank: &Tank, n: usize, liquid: f64, p: V) -> (f64, V, Matrix3<f64>) {
-    let at = |y: &[f64; craft::POINTS], constant: f64| {
-        if tank.fill.points > 0 { tank.fill.at(y, liquid)[0] } else { constant }
-    };
-    let (l, h) = (at(&tank.fill.length[n], tank.length[n]), at(&tank.fill.hinge[n], tank.hinge[n]));
+    let drains = tank.fill.points > 0;
+    let [_, l, h] =
+        if drains { tank.fill.mode(n, liquid) } else { [0.0, tank.length[n], tank.hinge[n]] };
     let [q0, x, y, z] = tank.q;
     let axes = UnitQuaternion::from_quaternion(Quaternion::new(q0, x, y, z));
     let axes: Matrix3<f64> = axes.to_rotation_matrix().into();

@@ -5,6 +5,7 @@
 
 mod balances;
 mod component;
+mod decays;
 mod draining;
 mod equations;
 mod exchange;

@@ -1,6 +1,6 @@
 //! Random craft, states and inputs, of the sizes that spacecraft have.
 
-use craft::{Craft, Inertia, Init, Inputs, Mount, Parameters, Ramp, TANKS, Tank};
+use craft::{Craft, DampingLaw, Inertia, Init, Inputs, Mount, Parameters, Ramp, TANKS, Tank};
 
 pub struct Random(fastrand::Rng);
 
@@ -26,7 +26,7 @@ impl Random {
         [(); N].map(|()| self.between(-size, size))
     }
 
-    /// Half the bobs have centring stiffness, a third no damping.
+    /// Half the bobs have centring stiffness, a third no damping; the drag is held.
     pub fn tank(&mut self) -> Tank {
         let mut tank = Tank {
             position: self.vector(0.8),
@@ -37,6 +37,7 @@ impl Random {
             i_z: self.between(0.0, 2.0),
             modes: 1 + self.below(3),
             g_ref: 1.5,
+            damping_law: DampingLaw::Constant,
             ..Tank::default()
         };
         for n in 0..tank.modes {
@@ -50,6 +51,16 @@ impl Random {
             tank.p_dot_0[n] = self.vector(1.0);
         }
         tank
+    }
+
+    /// Makes the drag of a tank follow acceleration and amplitude: every law; half the bobs with drag that grows.
+    pub fn follow(&mut self, tank: &mut Tank) {
+        tank.damping_law = DampingLaw::ALL[self.below(3)];
+        // Wide enough for differences of the kink there is without it at reversed thrust.
+        tank.g_floor = self.between(0.3, 1.0);
+        for growth in &mut tank.zeta_amplitude {
+            *growth = [0.0, self.between(0.0, 0.1)][self.below(2)];
+        }
     }
 
     pub fn parameters(&mut self) -> Parameters {

@@ -2,7 +2,8 @@
 //! written twice more, once in 113-bit arithmetic; what its signals are stands in its `about`.
 
 use craft::{
-    Craft, Inertia, Init, Inputs, Mount, Parameters, Ramp, TANKS, Tank, TankInputs, TankParameters,
+    Craft, DampingLaw, Inertia, Init, Inputs, Mount, Parameters, Ramp, TANKS, Tank, TankInputs,
+    TankParameters,
 };
 use serde_json::Value;
 
@@ -63,6 +64,7 @@ fn tank(value: &Value) -> Tank {
         i_z: number(&value["I_z"]),
         modes: modes.len(),
         g_ref: 1.0,
+        damping_law: DampingLaw::Constant,
         ..Tank::default()
     };
     for (n, mode) in modes.iter().enumerate() {

@@ -44,7 +44,7 @@ const FILL: [Number; 6] = [
     ("tank[1].fill.I_0[1]", |p| &mut p.tank[0].fill.i_0[0], 0.0, 1e12),
     ("tank[1].fill.I_z[3]", |p| &mut p.tank[0].fill.i_z[2], 0.0, 1e12),
     ("tank[1].fill.length[2,3]", |p| &mut p.tank[0].fill.length[1][2], 1e-6, 1e9),
-    ("tank[1].fill.hinge[1,8]", |p| &mut p.tank[0].fill.hinge[0][7], -1e9, 1e9),
+    ("tank[1].fill.hinge[1,12]", |p| &mut p.tank[0].fill.hinge[0][11], -1e9, 1e9),
     ("tank[1].outlet", |p| &mut p.tank[0].outlet, -1e9, 1e9),
 ];
 
@@ -74,7 +74,7 @@ fn numbers_are_taken_to_the_ends_of_their_ranges_and_refused_beyond() {
     };
     let draining = {
         let mut p = craft();
-        p.tank[0].fill.points = 8;
+        p.tank[0].fill.points = craft::POINTS;
         p
     };
     for (p, numbers) in [(craft(), &NUMBERS[..]), (cylinder, &CYLINDER), (draining, &FILL)] {
@@ -220,8 +220,8 @@ fn a_table_of_the_fill_rises_and_holds_its_bobs() {
         let problems = with(change);
         assert!(problems.len() == 1 && problems[0].contains(text), "{text}: {problems:?}");
     };
-    one(|t| t.fill.points = 1, "tank[1].fill.points = 1 (allowed: 0, or 2 to 8)");
-    one(|t| t.fill.points = 9, "tank[1].fill.points = 9");
+    one(|t| t.fill.points = 1, "tank[1].fill.points = 1 (allowed: 0, or 2 to 12)");
+    one(|t| t.fill.points = 13, "tank[1].fill.points = 13");
     one(|t| t.fill.liquid[2] = t.fill.liquid[1], "more than at the point before");
     one(|t| t.fill.liquid[2] = t.fill.liquid[1] * 0.99, "tank[1].fill.liquid[3] = 125.9");
     one(|t| t.liquid_0 = 63.6, "tank[1].liquid_0 = 63.6 (allowed: 63.6173 to 190.852 kg)");

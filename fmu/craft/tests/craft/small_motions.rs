@@ -13,7 +13,7 @@
 //!
 //! Source: Lagrange's equations of lateral and pitch motion with one pendulum.
 
-use craft::{INPUTS, Inertia, Inputs, Parameters, Ramp, STATES, Tank, index};
+use craft::{DampingLaw, INPUTS, Inertia, Inputs, Parameters, Ramp, STATES, Tank, index};
 use nalgebra::{Complex, DMatrix, Matrix4, Vector4};
 
 use super::component::Spacecraft;
@@ -35,7 +35,8 @@ fn craft_with_tank_at(z: f64, k: f64, c: f64) -> Parameters {
     let j = Inertia { xx: 860.0, yy: 860.0, zz: 640.0, xy: 0.0, xz: 0.0, yz: 0.0 };
     let mut p = Parameters::default();
     p.craft.j = j;
-    let mut tank = Tank { position: [0.0, 0.0, z], ..Tank::default() };
+    let law = DampingLaw::Constant;
+    let mut tank = Tank { position: [0.0, 0.0, z], damping_law: law, ..Tank::default() };
     tank.k[0] = k;
     tank.zeta[0] = 0.5;
     tank.zeta[0] *= c / tank.drag(0);
@@ -182,7 +183,7 @@ fn frequency_2(tank: Tank, g: f64) -> f64 {
 #[test]
 fn a_mode_has_the_frequency_that_it_is_given() {
     for k in [0.0, 60.0] {
-        let mut tank = Tank { g_ref: 2.0, ..Tank::default() };
+        let mut tank = Tank { g_ref: 2.0, damping_law: DampingLaw::Constant, ..Tank::default() };
         (tank.k[0], tank.frequency[0]) = (k, 0.5);
         let w_2 = f64::powi(std::f64::consts::TAU * 0.5, 2);
         assert_close(frequency_2(tank, 2.0), w_2, 1e-8);

@@ -149,3 +149,32 @@ impl DirectionalFactor {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use core::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, FRAC_PI_4};
+
+    use super::*;
+
+    /// At 45 degrees cos 2 theta is 0 and sin 2 theta 1, at 90 cos 2 theta is -1.
+    #[test]
+    fn each_harmonic_has_its_sign_where_the_hub_rests_and_where_it_turns() {
+        let one = OneWay { mean: 1.1, harmonics: [0.04, -0.03, 0.02, 0.01] };
+        for (theta, expected) in [
+            (0.0, 1.1 + 0.04 + 0.02),
+            (FRAC_PI_4, 1.1 + 0.01 * FRAC_1_SQRT_2 + 0.01),
+            (FRAC_PI_2, 1.1 - 0.03 - 0.02),
+            (-FRAC_PI_4, 1.1 + 0.07 * FRAC_1_SQRT_2 - 0.01),
+        ] {
+            let trig = [theta.cos(), theta.sin(), (2.0 * theta).cos(), (2.0 * theta).sin()];
+            let series = trig.map(|x| {
+                let mut series = ZERO;
+                series[0] = x;
+                series
+            });
+            // Rounding of five terms.
+            assert!((one.at(theta) - expected).abs() < 1e-15, "{theta}");
+            assert!((one.coefficient(0, &series) - expected).abs() < 1e-15, "{theta}");
+        }
+    }
+}

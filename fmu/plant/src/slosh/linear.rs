@@ -76,9 +76,9 @@ impl SloshMode for Linear {
     #[inline(always)]
     fn hub_reaction(&mut self, n: usize, ramp: bool, hub: &HubMotion) -> HubReaction {
         let Pendulum { m, l, c, r, .. } = self.p;
-        if ramp && self.p.baffle.zeta > 0.0 {
+        if ramp && self.p.follows_amplitude() {
             let at = [square(n, &self.al), square(n, &self.al_d)];
-            self.p.course[n] = self.p.baffle.expand(n, at);
+            self.p.expand_drag(n, at);
         }
         self.g_al[n] = self.p.weight(n, ramp, &self.al);
         self.drag[n] = self.p.drag(n, ramp, &self.al_d);

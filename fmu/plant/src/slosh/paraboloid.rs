@@ -128,10 +128,10 @@ impl SloshMode for Paraboloid {
     fn hub_reaction(&mut self, n: usize, ramp: bool, hub: &HubMotion) -> HubReaction {
         let Pendulum { m, c, r, c_m, hardening, l_s, l2_s, .. } = self.p;
         let one = constant(n, 1.0);
-        if ramp && self.p.baffle.zeta > 0.0 {
+        if ramp && self.p.follows_amplitude() {
             let inv_l2 = self.p.inv_l * self.p.inv_l;
             let at = [&self.q, &self.q_d].map(|[x, y]| inv_l2 * (square(n, x) + square(n, y)));
-            self.p.course[n] = self.p.baffle.expand(n, at);
+            self.p.expand_drag(n, at);
         }
         for i in 0..2 {
             self.drag[i][n] = self.p.drag(n, ramp, &self.q_d[i]);

@@ -99,9 +99,9 @@ impl SloshMode for Planar {
         self.sc[n] = mul(n, &self.s, &self.c);
         self.w_al_d[n] = mul(n, &hub.omega, &self.al_d);
         self.al_d2[n] = square(n, &self.al_d);
-        if ramp && self.p.baffle.zeta > 0.0 {
+        if ramp && self.p.follows_amplitude() {
             let at = [square(n, &self.al), self.al_d2[n]];
-            self.p.course[n] = self.p.baffle.expand(n, at);
+            self.p.expand_drag(n, at);
         }
         self.drag[n] = self.p.drag(n, ramp, &self.al_d);
         self.force[n] = self.p.weight(n, ramp, &self.s) + c_m * l * self.drag[n]

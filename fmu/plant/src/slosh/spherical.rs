@@ -242,10 +242,10 @@ impl SloshMode for Spherical {
         let (x_d, y_d) = (self.v[n][0] + w_y, self.v[n][1] - w_x);
         self.dir_d[n] = [x_d, y_d];
         self.v_z2[n] = square(n, &self.v_z);
-        if ramp && self.p.baffle.zeta > 0.0 {
+        if ramp && self.p.follows_amplitude() {
             let ([x2, y2], [x2_d, y2_d]) = (squares(n, &self.dir), squares(n, &self.dir_d));
             let at = [x2 + y2, x2_d + y2_d + self.v_z2[n]];
-            self.p.course[n] = self.p.baffle.expand(n, at);
+            self.p.expand_drag(n, at);
         }
         let [drag_x, drag_y] =
             if ramp { scale(n, &self.p.course, &self.dir_d) } else { [x_d, y_d] };

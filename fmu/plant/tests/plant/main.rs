@@ -3,6 +3,7 @@
 mod balances;
 mod changing_g;
 mod common;
+mod decays;
 mod errata;
 mod events;
 mod free_oscillation;

@@ -1,4 +1,4 @@
-//! A bench that leans, a ring baffle, capillarity: with each of them energy, momentum, derivatives
+//! A bench that leans, a ring baffle, damping that grows with the amplitude, capillarity: with each of them energy, momentum, derivatives
 //! and the independence of the communication step hold for every model.
 
 use std::f64::consts::TAU;
@@ -20,12 +20,14 @@ fn bench(slosh: SloshModel, friction: FrictionModel) -> Parameters {
     p
 }
 
-/// Leaning by 3 degrees, an unbalanced hub, a ring, surface tension a hundred times water's.
+/// Leaning by 3 degrees, an unbalanced hub, a ring, damping that grows with the amplitude, surface tension a hundred
+/// times water's.
 fn everything(slosh: SloshModel, friction: FrictionModel) -> Parameters {
     let mut p = bench(slosh, friction);
     (p.bench.tilt, p.bench.tilt_azimuth) = (0.05, 0.7);
     (p.hub.imbalance, p.hub.imbalance_angle) = (0.4, 2.0);
     (p.baffle.width, p.baffle.depth) = (0.008, 0.01);
+    p.slosh.zeta_amplitude = 0.05;
     p.slosh.capillarity = true;
     p.fluid.sigma = 7.0;
     p

@@ -137,3 +137,16 @@ fn the_tanks_own_inertia_is_turned_with_the_hub() {
         assert!((o.tau_fluid / drag - 1.0).abs() < 1e-12, "{r} {}", o.tau_fluid);
     }
 }
+
+/// A box's modes along one axis are not those along the other.
+#[test]
+fn modes_along_one_axis_are_refused_where_the_liquid_moves_along_both() {
+    for model in SloshModel::ALL.into_iter().filter(|model| *model != SloshModel::Liquid) {
+        let mut p = sphere();
+        (p.slosh.model, p.slosh.table.one_axis) = (model, true);
+        let refused = Plant::new(&p, &Inputs::default(), 0.0, 1e-10).err();
+        let both = matches!(model, SloshModel::Spherical | SloshModel::Paraboloid);
+        let named = refused.is_some_and(|problems| problems[0].starts_with("slosh.table.one_axis"));
+        assert_eq!(named, both, "{model:?}");
+    }
+}

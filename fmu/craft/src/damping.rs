@@ -1,0 +1,171 @@
+//! A mode's drag: how it follows the acceleration along the tank, and the amplitude.
+//!
+//! ```text
+//! drag on the bob: -c l p',   c = 2 m [ zeta w_ref (w/w_ref)^q + zeta_A w A ]
+//! w^2 = a_+/l + k/m,          w_ref: w at a_+ = g_ref
+//! a_+ = (x + sqrt(x^2 + a_f^2))/2
+//! A^2 = |p_perp|^2 + |p'|^2/w^2 + A_0^2
+//! ```
+//!
+//! q = 1/2: a laminar layer at the wall; 1: the damping ratio stays; 0: c does (`DampingLaw`). x is the specific force
+//! along the tank's axis at the hinge, of the given motion in SloshTank and of craft and liquids as one rigid body in
+//! Spacecraft (`motion.rs`): what the bobs' own drag makes of it, some 1e-4 of it, would be an equation to be solved.
+//! a_+ is x where thrust presses the liquid to the tank's bottom, falls smoothly to 0 where it pulls the tank
+//! away, and is a_f/2 without thrust. zeta_A makes the damping ratio grow with the amplitude, zeta + zeta_A A; A_0, far
+//! below any motion of interest, keeps the root where it has a power series. Every part of c is positive: the drag
+//! never drives.
+
+use taylor::number::Number;
+use taylor::series::{Series, ZERO, constant, mul, mul_tail};
+
+use crate::parameters::{DampingLaw, Tank};
+
+/// A_0, rad.
+const SMALLEST: f64 = 1e-4;
+
+/// What one mode's drag follows from, in a tank whose contents stay.
+#[derive(Clone, Debug)]
+pub struct Drag {
+    law: DampingLaw,
+    /// 2 m zeta_A, kg/rad
+    growth: f64,
+    /// c at g_ref without the amplitude's part, N s/m
+    c_ref: f64,
+    inv_l: f64,
+    k_m: f64,
+    /// w_ref^2
+    w2_ref: f64,
+    /// a_f^2
+    floor2: f64,
+    /// x, sqrt(x^2 + a_f^2), a_+ (or for x < 0 first its divisor), w^2, (w/w_ref)^q
+    x: Series,
+    root: Series,
+    divisor: Series,
+    above: Series,
+    w2: Series,
+    power: Series,
+    /// |p_perp|^2 + A_0^2, w^2 A^2, w A
+    perp2: Series,
+    speed2: Series,
+    speed: Series,
+    /// c, N s/m
+    pub c: Series,
+}
+
+/// q of a law.
+fn exponent(law: DampingLaw) -> f64 {
+    match law {
+        DampingLaw::Laminar => 0.5,
+        DampingLaw::ConstantRatio => 1.0,
+        DampingLaw::Constant => 0.0,
+    }
+}
+
+impl Drag {
+    /// Of mode `n` of a tank.
+    pub fn new(tank: &Tank, n: usize) -> Drag {
+        let (m, l) = (tank.mass[n], tank.length[n]);
+        let floor = tank.smallest_acceleration();
+        Drag {
+            law: tank.damping_law,
+            growth: 2.0 * m * tank.zeta_amplitude[n],
+            c_ref: tank.drag(n),
+            inv_l: 1.0 / l,
+            k_m: tank.k[n] / m,
+            w2_ref: tank.g_ref / l + tank.k[n] / m,
+            floor2: floor * floor,
+            x: ZERO,
+            root: ZERO,
+            divisor: ZERO,
+            above: ZERO,
+            w2: ZERO,
+            power: ZERO,
+            perp2: ZERO,
+            speed2: ZERO,
+            speed: ZERO,
+            c: ZERO,
+        }
+    }
+
+    /// Sets coefficient n of x.
+    #[inline(always)]
+    pub fn set_axial(&mut self, n: usize, x: f64) {
+        self.x[n] = x;
+    }
+
+    /// Coefficient n of c, from those of x, of |p_perp|^2 and of |p'|^2.
+    pub fn expand(&mut self, n: usize, perp2: f64, rate2: f64) -> f64 {
+        let square = mul(n, &self.x, &self.x) + constant(n, self.floor2);
+        self.root[n] = root(n, square, &self.root);
+        // For x < 0 without cancellation: a_f^2/2 over sqrt(x^2 + a_f^2) - x.
+        self.above[n] = if self.x[0] >= 0.0 {
+            0.5 * (self.x[n] + self.root[n])
+        } else {
+            self.divisor[n] = self.root[n] - self.x[n];
+            let rest = mul_tail(n, &self.divisor, &self.above);
+            (constant(n, 0.5 * self.floor2) - rest) / self.divisor[0]
+        };
+        self.w2[n] = self.above[n] * self.inv_l + constant(n, self.k_m);
+        // (w2/w2_ref)^(q/2)
+        let q = 0.5 * exponent(self.law);
+        self.power[n] = if n == 0 {
+            libm::pow(self.w2[0] / self.w2_ref, q)
+        } else {
+            let term = |j: usize| (q * j as f64 - (n - j) as f64) * self.w2[j] * self.power[n - j];
+            (1..=n).map(term).sum::<f64>() / (n as f64 * self.w2[0])
+        };
+        self.c[n] = self.c_ref * self.power[n];
+        if self.growth > 0.0 {
+            self.perp2[n] = perp2 + constant(n, SMALLEST * SMALLEST);
+            self.speed2[n] = mul(n, &self.w2, &self.perp2) + rate2;
+            self.speed[n] = root(n, self.speed2[n], &self.speed);
+            self.c[n] += self.growth * self.speed[n];
+        }
+        self.c[n]
+    }
+}
+
+/// Coefficient n of a root from that of what it is the root of, and its own below n.
+fn root(n: usize, square: f64, y: &Series) -> f64 {
+    if n == 0 {
+        return libm::sqrt(square);
+    }
+    let both: f64 = (1..n).map(|j| y[j] * y[n - j]).sum();
+    (square - both) / (2.0 * y[0])
+}
+
+/// c of mode `n` of a tank in which its mass m and length l change, from x, |p_perp|^2 and |p'|^2.
+pub fn coefficient<T: Number>(
+    tank: &Tank,
+    n: usize,
+    [m, l]: [T; 2],
+    x: T,
+    [perp2, rate2]: [T; 2],
+) -> T {
+    let stiffness = m.recip() * tank.k[n];
+    let reference = (l.recip() * tank.g_ref + stiffness).sqrt();
+    // At constant c in the words of `Tank::drag`.
+    let viscous = m * reference * (2.0 * tank.zeta[n]);
+    if !tank.follows(n) {
+        return viscous;
+    }
+    let floor = tank.smallest_acceleration();
+    let root = (x * x + T::constant(floor * floor)).sqrt();
+    let above = if x.value() >= 0.0 {
+        (x + root) * 0.5
+    } else {
+        T::constant(0.5 * floor * floor) / (root - x)
+    };
+    let w = (above / l + stiffness).sqrt();
+    let viscous = match tank.damping_law {
+        DampingLaw::Laminar => viscous * (w / reference).sqrt(),
+        DampingLaw::ConstantRatio => viscous * (w / reference),
+        DampingLaw::Constant => viscous,
+    };
+    if tank.zeta_amplitude[n] == 0.0 {
+        return viscous;
+    }
+    let amplitude2 = perp2 + T::constant(SMALLEST * SMALLEST);
+    let speed = (w * w * amplitude2 + rate2).sqrt();
+    viscous + m * speed * (2.0 * tank.zeta_amplitude[n])
+}

@@ -1,0 +1,67 @@
+//! Where the pendulums stand for the liquid.
+//!
+//! Linear theory reaches as far as the wave at the wall stays low against the radius R of the free surface: below 0.15 R
+//! it holds, up to 0.25 R it is left, above forces are indications (Rubaga's thesis 2.3.5, after Dodge). R is that of
+//! an upright cylinder with the tank's wave per slosh angle, R = wave (xi^2 - 1)/2, exact there.
+//!
+//! Liquid is at the bottom of its tank where thrust or capillarity holds it there: w^2 = x/l + k/m > 0, x the specific
+//! force along the tank at the hinge. Against that a bob swings over, and the liquid would fall. Beyond 45 degrees
+//! from the tank's axis a bob has a direction and no surface that stands for it.
+
+use formulas::cylinder::XI;
+use formulas::regime::Regime;
+
+use crate::outputs::TankOutputs;
+use crate::parameters::Tank;
+use crate::sizes::MODES;
+use crate::state::Ranges;
+
+/// What a tank's ranges follow from. Of a tank that drains they are those of its contents at the start.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Bounds {
+    modes: usize,
+    /// R, m; 0 where no wave is given.
+    radius: f64,
+    /// What x is at least, per mode: less pulls the liquid off the bottom.
+    lowest: [f64; MODES],
+}
+
+/// Cosine of the largest angle from the axis.
+const COS_45: f64 = core::f64::consts::FRAC_1_SQRT_2;
+
+impl Bounds {
+    /// Of a tank with all that follows from its parameters.
+    pub fn new(tank: &Tank) -> Bounds {
+        // Thrust that is off is not thrust that is reversed.
+        let floor = tank.smallest_acceleration();
+        Bounds {
+            modes: tank.modes,
+            radius: tank.wave[0] * (XI[0] * XI[0] - 1.0) / 2.0,
+            lowest: core::array::from_fn(|n| -floor - tank.k[n] * tank.length[n] / tank.mass[n]),
+        }
+    }
+
+    /// The ranges of what a tank shows.
+    pub fn of(&self, out: &TankOutputs) -> Ranges {
+        let heights = out.p.map(|p| p[2]);
+        let in_range = self.contain(heights, out.axial);
+        let upright = self.are_upright(heights);
+        // Without a wave per angle, a cylinder's: 2 R/(xi^2 - 1).
+        let height = match self.radius > 0.0 {
+            true => out.wave_height / self.radius,
+            false => 2.0 * libm::hypot(out.angle_x[0], out.angle_y[0]) / (XI[0] * XI[0] - 1.0),
+        };
+        let regime = if upright { Regime::of(height) } else { Regime::Nonlinear };
+        Ranges { regime, in_range }
+    }
+
+    /// Whether the tank is in its range, with the bobs' p_z and the specific force along it.
+    pub fn contain(&self, heights: [f64; MODES], axial: f64) -> bool {
+        let held = self.lowest[..self.modes].iter().all(|lowest| axial >= *lowest);
+        held && self.are_upright(heights)
+    }
+
+    fn are_upright(&self, heights: [f64; MODES]) -> bool {
+        heights[..self.modes].iter().all(|height| *height < -COS_45)
+    }
+}

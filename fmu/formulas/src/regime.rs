@@ -1,0 +1,52 @@
+//! How far linear theory of sloshing reaches: by the height of the wave at the wall over the radius R of
+//! the free surface (Rubaga's thesis, 2.3.5, after Dodge).
+
+/// A range of wave heights.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Regime {
+    /// Below 0.15 R: linear theory holds.
+    Linear = 1,
+    /// From 0.15 R to 0.25 R.
+    Transitional = 2,
+    /// Above 0.25 R: heights and forces are indications.
+    Nonlinear = 3,
+}
+
+impl Regime {
+    /// That of a wave height over R; NaN is nonlinear.
+    pub fn of(ratio: f64) -> Regime {
+        match ratio {
+            ratio if ratio < 0.15 => Regime::Linear,
+            ratio if ratio <= 0.25 => Regime::Transitional,
+            _ => Regime::Nonlinear,
+        }
+    }
+
+    /// The one with this number.
+    pub fn from_number(number: u8) -> Option<Regime> {
+        [Regime::Linear, Regime::Transitional, Regime::Nonlinear]
+            .into_iter()
+            .find(|regime| *regime as u8 == number)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regimes_end_at_0_15_and_0_25_of_the_radius() {
+        assert_eq!([0.1499, 0.15].map(Regime::of), [Regime::Linear, Regime::Transitional]);
+        assert_eq!([0.25, 0.2501].map(Regime::of), [Regime::Transitional, Regime::Nonlinear]);
+        assert_eq!(Regime::of(f64::NAN), Regime::Nonlinear);
+    }
+
+    #[test]
+    fn a_regime_has_its_number_and_no_other_number_is_one() {
+        for regime in [Regime::Linear, Regime::Transitional, Regime::Nonlinear] {
+            assert_eq!(Regime::from_number(regime as u8), Some(regime));
+        }
+        assert_eq!([0, 4, 255].map(Regime::from_number), [None; 3]);
+    }
+}
