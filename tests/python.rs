@@ -52,6 +52,7 @@ fn the_examples_give_what_their_readmes_say() {
     run(Command::new(one_loop).arg(fmu).arg(&folder), "the loop in the harness failed");
     pytest(
         Command::new(python())
+            .env("HUBSLOSH", harness())
             .args(["-m", "pytest"])
             .args([Path::new("--fmu"), fmu])
             .args([Path::new("--folder"), &folder])

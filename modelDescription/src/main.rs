@@ -1,11 +1,16 @@
 //! Rewrites what is committed and follows from something else: each FMU's modelDescription.xml
 //! and page of variables from its variable table; with the feature `icon`, the icon's pixels from
-//! its drawing.
+//! its drawing. With `--print-spacecraft` it prints the XML of Spacecraft.fmu as compiled, for `hubslosh pack --tanks`.
 
 use model_description::{path, variables, xml};
 use runtime::Model;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
+    // of a variant, which is not committed
+    if std::env::args().nth(1).as_deref() == Some("--print-spacecraft") {
+        print!("{}", xml::<Spacecraft::Model>()?);
+        return Ok(());
+    }
     write::<HubSlosh::HubSlosh>()?;
     write::<Spacecraft::Model>()?;
     write::<SloshTank::Model>()?;

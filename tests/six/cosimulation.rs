@@ -16,8 +16,8 @@
 //! restoring force by H/2 and 3 H/2 give the growth.
 
 use craft::{
-    Coupling, Craft, Inertia, Inputs, Parameters, Ramp, SloshTankOutputs, Tank, TankInputs,
-    TankParameters, index,
+    Coupling, Craft, DampingLaw, Inertia, Inputs, Parameters, Ramp, SloshTankOutputs, Tank,
+    TankInputs, TankParameters, index,
 };
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
@@ -362,7 +362,7 @@ fn the_split_makes_the_slosh_mode_grow_as_its_delay_says() {
 
 /// Largest difference of the rate to that of the craft as a whole over 20 s, relative.
 fn error(share: f64, exchange: Exchange, order: Order, h: f64) -> f64 {
-    let mut tank = Tank { zeta: [0.05; 3], ..Tank::default() };
+    let mut tank = Tank { zeta: [0.05; 3], damping_law: DampingLaw::Constant, ..Tank::default() };
     tank.p_0[0] = [0.1, 0.05, -1.0];
     let p = parameters(share, tank);
     let mut pair = Pair::new(&p, exchange, order);

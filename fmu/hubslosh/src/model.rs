@@ -3,8 +3,8 @@
 use std::ops::{Deref, DerefMut};
 
 use plant::{
-    Calculated, Contact, FrictionModel, Inputs, Outputs, Plant, STATES, SloshModel, SloshSource,
-    State,
+    Calculated, Contact, DampingLaw, FrictionModel, Inputs, Outputs, Plant, STATES, SloshModel,
+    SloshSource, State,
 };
 use runtime::Model;
 use runtime::table::Table;
@@ -40,12 +40,16 @@ pub struct Parameters {
     pub slosh_kind: i32,
     /// The number of the source of the modes, 0: as the enumeration says.
     pub slosh_source_kind: i32,
+    /// The number of the law of damping, 0: as the enumeration says.
+    pub damping_law_kind: i32,
     /// The number of the friction law, 0: as the enumeration says.
     pub friction_kind: i32,
     /// 1 for false, 2 for true, 0: as the Boolean says; likewise below.
     pub zeta_from_correlation_kind: i32,
     /// Of `slosh.capillarity`.
     pub capillarity_kind: i32,
+    /// Of `slosh.table.one_axis`.
+    pub one_axis_kind: i32,
     /// Of `wheel.enabled`.
     pub wheel_enabled_kind: i32,
     /// Of `imu.enabled`.
@@ -92,16 +96,23 @@ impl Parameters {
             ("slosh.source_kind", self.slosh_source_kind),
         );
         conflict(
+            ("slosh.damping_law", p.slosh.damping_law as i32),
+            start.slosh.damping_law as i32,
+            ("slosh.damping_law_kind", self.damping_law_kind),
+        );
+        conflict(
             ("friction.model", p.friction.model as i32),
             start.friction.model as i32,
             ("friction.kind", self.friction_kind),
         );
         table::set_item(&mut p.slosh.model, &SloshModel::ALL, self.slosh_kind);
         table::set_item(&mut p.slosh.source, &SloshSource::ALL, self.slosh_source_kind);
+        table::set_item(&mut p.slosh.damping_law, &DampingLaw::ALL, self.damping_law_kind);
         table::set_item(&mut p.friction.model, &FrictionModel::ALL, self.friction_kind);
         for (flag, kind) in [
             (&mut p.slosh.zeta_from_correlation, self.zeta_from_correlation_kind),
             (&mut p.slosh.capillarity, self.capillarity_kind),
+            (&mut p.slosh.table.one_axis, self.one_axis_kind),
             (&mut p.wheel.enabled, self.wheel_enabled_kind),
             (&mut p.imu.enabled, self.imu_enabled_kind),
         ] {

@@ -10,7 +10,9 @@
 //! sampling rate that can be stepped) and are wide otherwise; what parameters
 //! mean together is for the plant to judge.
 
-use plant::{FrictionModel, INDICATORS, MODES, Ramp, SloshModel, SloshSource, State, x};
+use plant::{
+    DampingLaw, FrictionModel, INDICATORS, MODES, Ramp, SloshModel, SloshSource, State, x,
+};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::{Enumeration, Item, Variable};
 
@@ -168,25 +170,25 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     V::local("wheel_speed", |o, _| o.wheel_speed, "rad/s",
         "Absolute speed of the wheel's rotor; a positive tau_actuator slows it down")
         .display_unit("rpm").nominal(100.0).is_state(|_| x::WHEEL_SPEED).reinit().depends_on(&["wheel_speed"]).initial_depends_on(&["wheel.speed_0"]),
-    V::local_boolean("stuck", |o| o.discrete.stuck,
+    V::local_boolean("stuck", |o, _| o.discrete.stuck,
         "The hub is held by dry friction")
         .depends_on(ALL_TORQUES),
-    V::local_integer("stuck_kind", |o| i32::from(o.discrete.stuck),
+    V::local_integer("stuck_kind", |o, _| i32::from(o.discrete.stuck),
         "stuck for hosts that misread Booleans (OpenModelica up to 1.27): 0 false, 1 true")
         .depends_on(ALL_TORQUES),
-    V::local_enumeration("regime", &REGIME, |o| o.discrete.regime as i32,
+    V::local_enumeration("regime", &REGIME, |o, _| o.discrete.regime as i32,
         "How far wave_height is inside the range of linear theory")
         .depends_on(&["slosh.q_radial", "slosh.q_tangential"]),
-    V::local_boolean("baffle.in_range", |o| o.discrete.baffle_in_range,
+    V::local_boolean("baffle.in_range", |o, _| o.discrete.baffle_in_range,
         "The law of the ring baffle holds: the liquid's stroke at the ring is 0.64 to 6.4 of its width, the wave does not uncover it, and it covers less than a quarter of the section; true without a baffle")
         .depends_on(WAVE_1),
-    V::local_integer("baffle.in_range_kind", |o| i32::from(o.discrete.baffle_in_range),
+    V::local_integer("baffle.in_range_kind", |o, _| i32::from(o.discrete.baffle_in_range),
         "baffle.in_range for hosts that misread Booleans (OpenModelica up to 1.27): 0 false, 1 true")
         .depends_on(WAVE_1),
-    V::local_integer("friction_mode", |o| o.discrete.friction_mode,
+    V::local_integer("friction_mode", |o, _| o.discrete.friction_mode,
         "Branch of the set-valued friction law: -1 turning backwards, 0 stuck, 1 turning forwards; 1 with other laws")
         .depends_on(ALL_TORQUES),
-    V::local_integer("event_count", |o| o.discrete.event_count,
+    V::local_integer("event_count", |o, _| o.discrete.event_count,
         "How often friction_mode has changed since the start"),
     V::local("event_time", |o, _| o.discrete.event_time, "s",
         "When friction_mode changed last"),
@@ -296,29 +298,38 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         .display_unit("mN/m").range(1e-9, 10.0),
 
     // Slosh model
-    V::choice("slosh.model", &SLOSH_MODEL, |p| p.slosh.model as i32,
-        |p, n| set_item(&mut p.slosh.model, &SloshModel::ALL, n),
+    V::choice("slosh.model", &SLOSH_MODEL, |p, _| p.slosh.model as i32,
+        |p, _, n| set_item(&mut p.slosh.model, &SloshModel::ALL, n),
         "Mechanical model of the liquid"),
     V::integer("slosh.kind", |p, _| &mut p.slosh_kind,
         "For hosts that set no enumerations: 0: as slosh.model says; otherwise the number of slosh.model's item. An error if slosh.model has been set to another one")
         .between(0, SLOSH_MODEL.items.len() as i32),
-    V::choice("slosh.source", &SLOSH_SOURCE, |p| p.slosh.source as i32,
-        |p, n| set_item(&mut p.slosh.source, &SloshSource::ALL, n),
+    V::choice("slosh.source", &SLOSH_SOURCE, |p, _| p.slosh.source as i32,
+        |p, _, n| set_item(&mut p.slosh.source, &SloshSource::ALL, n),
         "Where the modes' masses, lengths and damping come from"),
     V::integer("slosh.source_kind", |p, _| &mut p.slosh_source_kind,
         "For hosts that set no enumerations: 0: as slosh.source says; otherwise the number of slosh.source's item. An error if slosh.source has been set to another one")
         .between(0, SLOSH_SOURCE.items.len() as i32),
-    V::count("slosh.modes", |p| p.slosh.modes as i32, |p, n| p.slosh.modes = n.max(0) as usize,
+    V::count("slosh.modes", |p, _| p.slosh.modes as i32, |p, _, n| p.slosh.modes = n.max(0) as usize,
         "How many slosh modes are kept; the mass of the others moves with the tank")
         .between(1, MODES as i32),
     V::switch("slosh.zeta_from_correlation", |p| &mut p.slosh.zeta_from_correlation,
-        "Damping ratio from the correlation of Mikishev and Dorozhkin; if false it is slosh.zeta"),
+        "Damping ratio of mode 1 from the correlation of Mikishev and Dorozhkin (below tank.h = tank.d/4 of Stephens), of each higher mode by its laminar layer in proportion; if false it is slosh.zeta"),
     V::integer("slosh.zeta_from_correlation_kind", |p, _| &mut p.zeta_from_correlation_kind,
         "For hosts that misread Booleans (OpenModelica up to 1.27): 0: as slosh.zeta_from_correlation says; 1 false, 2 true, whatever it says")
         .between(0, 2),
     V::parameter("slosh.zeta", |p, _| &mut p.slosh.zeta, "1",
         "Damping ratio of every mode when slosh.zeta_from_correlation is false")
         .range(0.0, 0.999),
+    V::choice("slosh.damping_law", &DAMPING_LAW, |p, _| p.slosh.damping_law as i32,
+        |p, _, n| set_item(&mut p.slosh.damping_law, &DampingLaw::ALL, n),
+        "How damping follows g_axial: a mode's viscous coefficient against its natural frequency"),
+    V::integer("slosh.damping_law_kind", |p, _| &mut p.damping_law_kind,
+        "For hosts that set no enumerations: 0: as slosh.damping_law says; otherwise the number of slosh.damping_law's item. An error if slosh.damping_law has been set to another one")
+        .between(0, DAMPING_LAW.items.len() as i32),
+    V::parameter("slosh.zeta_amplitude", |p, _| &mut p.slosh.zeta_amplitude, "1/rad",
+        "Growth of every mode's damping ratio with its amplitude A (angle and rate over natural frequency, both directions together): zeta(A) = zeta + zeta_amplitude A")
+        .range(0.0, 10.0),
     V::parameter("slosh.hardening", |p, _| &mut p.slosh.hardening, "1",
         "Coefficient of the quartic spring, model paraboloid only")
         .range(0.0, 100.0),
@@ -329,6 +340,11 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         .between(0, 2),
 
     // The modes of a tank of any shape
+    V::switch("slosh.table.one_axis", |p| &mut p.slosh.table.one_axis,
+        "The modes are those along one axis of the tank, a box for example, that lies along the tangent: slosh.model = spherical and paraboloid, which move along both axes, are refused"),
+    V::integer("slosh.table.one_axis_kind", |p, _| &mut p.one_axis_kind,
+        "For hosts that misread Booleans (OpenModelica up to 1.27): 0: as slosh.table.one_axis says; 1 false, 2 true, whatever it says")
+        .between(0, 2),
     V::parameter("slosh.table.m_liq", |p, _| &mut p.slosh.table.m_liq, "kg",
         "Mass of the liquid, source table: what exceeds the modes' masses moves with the tank. tank.d is then the diameter of the free surface and tank.h is not used")
         .range(0.0, 1e9),
@@ -366,8 +382,8 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         .display_unit("mm").range(0.0, 100.0),
 
     // Bearing
-    V::choice("friction.model", &FRICTION_MODEL, |p| p.friction.model as i32,
-        |p, n| set_item(&mut p.friction.model, &FrictionModel::ALL, n),
+    V::choice("friction.model", &FRICTION_MODEL, |p, _| p.friction.model as i32,
+        |p, _, n| set_item(&mut p.friction.model, &FrictionModel::ALL, n),
         "Law of the bearing's friction")
         .tunable(),
     V::integer("friction.kind", |p, _| &mut p.friction_kind,
@@ -489,8 +505,8 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         "Seed of the noise: the same seed gives the same noise on every platform"),
 
     // Solver
-    V::count("solver.max_steps", |p| p.solver.max_steps as i32,
-        |p, n| p.solver.max_steps = n.max(0) as usize,
+    V::count("solver.max_steps", |p, _| p.solver.max_steps as i32,
+        |p, _, n| p.solver.max_steps = n.max(0) as usize,
         "Internal steps, and samples of the gyro, that one communication step may take: a step that needs more is refused")
         .between(1, 1_000_000_000),
 
@@ -542,6 +558,20 @@ static SLOSH_SOURCE: Enumeration = Enumeration {
     items: &[
         Item::new("geometry", "An upright cylinder by tank.d, tank.h and fluid.rho"),
         Item::new("table", "slosh.table, for a tank of any shape"),
+    ],
+};
+
+/// How damping follows the natural frequency.
+static DAMPING_LAW: Enumeration = Enumeration {
+    name: "DampingLaw",
+    description: "Viscous coefficient c of a mode against its natural frequency omega",
+    items: &[
+        Item::new("laminar", "c ~ sqrt(omega): a laminar layer at the wall, for bare tanks"),
+        Item::new("constant_ratio", "c ~ omega: the damping ratio stays"),
+        Item::new(
+            "by_source",
+            "laminar where the damping ratio comes from the correlation, constant_ratio where it is given",
+        ),
     ],
 };
 

@@ -282,8 +282,8 @@ impl<M: Model, V: Version> Instance<M, V> {
                 Value::Real(get(self.model(call)?, &inputs, element)[0])
             }
             Access::Output(get) => Value::Real(get(self.outputs(call)?, element)),
-            Access::OutputInteger(get) => Value::Integer(get(self.outputs(call)?)),
-            Access::OutputBoolean(get) => Value::Boolean(get(self.outputs(call)?)),
+            Access::OutputInteger(get) => Value::Integer(get(self.outputs(call)?, element)),
+            Access::OutputBoolean(get) => Value::Boolean(get(self.outputs(call)?, element)),
             _ => return Err(no_value(call, scalar)),
         })
     }
@@ -491,11 +491,7 @@ impl<M: Model, V: Version> Instance<M, V> {
             return self.initial_derivative(call, unknowns, (knowns, direction), answers);
         }
         let mut along = self.inputs;
-        for scalar in M::table().inputs() {
-            if let Access::Input(ramp) = scalar.access {
-                *ramp(&mut along, scalar.element)[1] = 0.0;
-            }
-        }
+        hold::<M>(&mut along);
         self.scratch[0].fill(0.0);
         for (reference, d) in knowns.iter().zip(direction) {
             let scalar = scalar::<M, V>(call, *reference)?;
@@ -626,48 +622,30 @@ impl<M: Model, V: Version> Instance<M, V> {
             return Err(call
                 .error(format_args!("the step to {end:?} s would pass the stop time {stop:?} s")));
         }
-        let before = (self.inputs, self.sloped, self.past_slopes);
-        self.drop_past_slopes();
-        self.sloped |= M::set_dependent_slopes(&mut self.inputs, h);
-        let after = if self.sloped { self.inputs_after(call, h) } else { Ok(self.inputs) };
-        let after = after.inspect_err(|_| {
-            (self.inputs, self.sloped, self.past_slopes) = before;
-        })?;
+        let mut inputs = self.inputs;
+        if M::OUTPUTS_USE_SLOPES && self.past_slopes {
+            hold::<M>(&mut inputs);
+        }
+        let sloped = M::set_dependent_slopes(&mut inputs, h) || self.sloped;
+        let mut after = inputs;
+        if sloped {
+            follow_slopes::<M>(call, &mut after, h)?;
+        }
         let Some(model) = &mut self.model else {
             return Err(call.error("the instance was never initialised"));
         };
         // Steps added up drift from the host's clock, on which things may be due.
         model.set_time(at);
-        if let Err(why) = model.step(&self.inputs, h) {
+        if let Err(why) = model.step(&inputs, h) {
             self.state = InstanceState::Failed;
             return Err(call.error(format_args!("step from {at:?} s to {end:?} s failed: {why}")));
         }
         self.inputs = after;
-        self.past_slopes = M::OUTPUTS_USE_SLOPES && self.sloped;
+        self.past_slopes = M::OUTPUTS_USE_SLOPES && sloped;
         self.sloped = false;
         self.time = end;
         self.outputs = None;
         Ok(())
-    }
-
-    /// The inputs where their slopes lead in `h`, which is in their ranges.
-    fn inputs_after(&self, call: &Call, h: f64) -> Result<M::Inputs, Fault> {
-        let mut after = self.inputs;
-        for scalar in M::table().inputs() {
-            let Access::Input(ramp) = scalar.access else { continue };
-            let [value, slope] = ramp(&mut after, scalar.element);
-            if *slope == 0.0 {
-                continue;
-            }
-            *value = end_of_ramp(scalar, (*value, *slope), h);
-            if let Some(problem) = scalar.problem(Value::Real(*value)) {
-                return Err(call.error(format_args!("at the end of the step {problem}")));
-            }
-            if !M::OUTPUTS_USE_SLOPES {
-                *slope = 0.0;
-            }
-        }
-        Ok(after)
     }
 
     /// From here on the inputs are held, unless slopes are set.
@@ -675,11 +653,7 @@ impl<M: Model, V: Version> Instance<M, V> {
     fn drop_past_slopes(&mut self) {
         if M::OUTPUTS_USE_SLOPES && self.past_slopes {
             self.past_slopes = false;
-            for scalar in M::table().inputs() {
-                if let Access::Input(ramp) = scalar.access {
-                    *ramp(&mut self.inputs, scalar.element)[1] = 0.0;
-                }
-            }
+            hold::<M>(&mut self.inputs);
         }
     }
 
@@ -882,7 +856,10 @@ impl<M: Model, V: Version> Instance<M, V> {
     }
 
     fn evaluate(&mut self, call: &Call) -> Result<(), Fault> {
-        self.outputs = Some(self.query(call, M::outputs)?);
+        self.model(call)?;
+        if let Instance { events, model: Some(model), inputs, outputs, .. } = self {
+            *outputs = Some(answer(*events, model, inputs, M::outputs));
+        }
         Ok(())
     }
 
@@ -933,6 +910,35 @@ fn answer<M: Model, T>(
             answer
         }
         Events::ByHost => question(model, inputs),
+    }
+}
+
+/// Takes the inputs to where their slopes lead in `h`, which is in their ranges.
+#[inline]
+fn follow_slopes<M: Model>(call: &Call, inputs: &mut M::Inputs, h: f64) -> Result<(), Fault> {
+    for scalar in M::table().inputs() {
+        let Access::Input(ramp) = scalar.access else { continue };
+        let [value, slope] = ramp(inputs, scalar.element);
+        if *slope == 0.0 {
+            continue;
+        }
+        *value = end_of_ramp(scalar, (*value, *slope), h);
+        if let Some(problem) = scalar.problem(Value::Real(*value)) {
+            return Err(call.error(format_args!("at the end of the step {problem}")));
+        }
+        if !M::OUTPUTS_USE_SLOPES {
+            *slope = 0.0;
+        }
+    }
+    Ok(())
+}
+
+/// Takes the inputs' slopes away.
+fn hold<M: Model>(inputs: &mut M::Inputs) {
+    for scalar in M::table().inputs() {
+        if let Access::Input(ramp) = scalar.access {
+            *ramp(inputs, scalar.element)[1] = 0.0;
+        }
     }
 }
 

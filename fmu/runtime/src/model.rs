@@ -134,8 +134,8 @@ pub trait Model: Clone + Debug + Sized + 'static {
         Ok(false)
     }
 
-    /// Model Exchange: what there is to be warned of in how the host has driven the model so far; looked at after each
-    /// step that it has accepted, until there is something.
+    /// What there is to be warned of in the motion so far, or in how a host that integrates itself has driven it; looked
+    /// at after each step, until there is something.
     fn step_warning(&self) -> Option<&'static str> {
         None
     }

@@ -35,6 +35,7 @@ pub static UNITS: &[Unit] = &[
     unit("Hz",      [ 0,  0, -1, 0], &[]),
     unit("1/s",     [ 0,  0, -1, 0], &[]),
     unit("1/s2",    [ 0,  0, -2, 0], &[]),
+    unit("1/rad",   [ 0,  0,  0, -1], &[]),
     unit("rad",     [ 0,  0,  0, 1], &[("deg", DEG)]),
     unit("rad/s",   [ 0,  0, -1, 1], &[("deg/s", DEG), ("deg/h", 3600.0 * DEG), ("rpm", RPM)]),
     unit("rad/s2",  [ 0,  0, -2, 1], &[("deg/s2", DEG)]),

@@ -855,6 +855,7 @@ pub unsafe fn fmi2DoStep<M: Model>(
             let before = component.instance.event_count();
             component.instance.do_step(currentCommunicationPoint, communicationStepSize)?;
             component.log.report_event(call, before, &component.instance);
+            component.log.report_step_warning(&component.instance);
             Ok(())
         })
     }

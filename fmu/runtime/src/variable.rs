@@ -102,8 +102,8 @@ pub enum Access<M: Model> {
     /// Value and slope.
     Input(fn(&mut M::Inputs, usize) -> [&mut f64; 2]),
     Output(fn(&M::Outputs, usize) -> f64),
-    OutputInteger(fn(&M::Outputs) -> i32),
-    OutputBoolean(fn(&M::Outputs) -> bool),
+    OutputInteger(fn(&M::Outputs, usize) -> i32),
+    OutputBoolean(fn(&M::Outputs, usize) -> bool),
     /// Of parameters and present inputs alone: its value, and its rate along the inputs' slopes.
     OfInputs(fn(&M, &M::Inputs, usize) -> [f64; 2]),
     Real(fn(&mut M::Parameters, usize) -> &mut f64),
@@ -111,8 +111,8 @@ pub enum Access<M: Model> {
     Integer(fn(&mut M::Parameters, usize) -> &mut i32),
     /// A parameter that the model does not keep as an i32.
     Choice {
-        get: fn(&M::Parameters) -> i32,
-        set: fn(&mut M::Parameters, i32),
+        get: fn(&M::Parameters, usize) -> i32,
+        set: fn(&mut M::Parameters, usize, i32),
     },
     /// Of the model itself: it does not change with time.
     Calculated(fn(&M, usize) -> f64),
@@ -275,7 +275,7 @@ impl<M: Model> Variable<M> {
     /// A Boolean to look at.
     pub const fn local_boolean(
         name: &'static str,
-        get: fn(&M::Outputs) -> bool,
+        get: fn(&M::Outputs, usize) -> bool,
         description: &'static str,
     ) -> Self {
         variable(name, Causality::Local, Kind::Boolean, Access::OutputBoolean(get), description)
@@ -284,7 +284,7 @@ impl<M: Model> Variable<M> {
     /// An integer to look at.
     pub const fn local_integer(
         name: &'static str,
-        get: fn(&M::Outputs) -> i32,
+        get: fn(&M::Outputs, usize) -> i32,
         description: &'static str,
     ) -> Self {
         let kind = Kind::Integer { min: None, max: None };
@@ -295,7 +295,7 @@ impl<M: Model> Variable<M> {
     pub const fn local_enumeration(
         name: &'static str,
         of: &'static Enumeration,
-        get: fn(&M::Outputs) -> i32,
+        get: fn(&M::Outputs, usize) -> i32,
         description: &'static str,
     ) -> Self {
         let kind = Kind::Enumeration(of);
@@ -334,8 +334,8 @@ impl<M: Model> Variable<M> {
     /// An integer parameter that the model keeps in another type.
     pub const fn count(
         name: &'static str,
-        get: fn(&M::Parameters) -> i32,
-        set: fn(&mut M::Parameters, i32),
+        get: fn(&M::Parameters, usize) -> i32,
+        set: fn(&mut M::Parameters, usize, i32),
         description: &'static str,
     ) -> Self {
         let kind = Kind::Integer { min: None, max: None };
@@ -346,8 +346,8 @@ impl<M: Model> Variable<M> {
     pub const fn choice(
         name: &'static str,
         of: &'static Enumeration,
-        get: fn(&M::Parameters) -> i32,
-        set: fn(&mut M::Parameters, i32),
+        get: fn(&M::Parameters, usize) -> i32,
+        set: fn(&mut M::Parameters, usize, i32),
         description: &'static str,
     ) -> Self {
         let kind = Kind::Enumeration(of);
@@ -512,7 +512,7 @@ impl<M: Model> Variable<M> {
             Access::Real(field) => Some(Value::Real(*field(parameters, element))),
             Access::Boolean(field) => Some(Value::Boolean(*field(parameters))),
             Access::Integer(field) => Some(Value::Integer(*field(parameters, element))),
-            Access::Choice { get, .. } => Some(Value::Integer(get(parameters))),
+            Access::Choice { get, .. } => Some(Value::Integer(get(parameters, element))),
             _ => None,
         }
     }
@@ -523,7 +523,7 @@ impl<M: Model> Variable<M> {
             (Access::Real(field), Value::Real(x)) => *field(parameters, element) = x,
             (Access::Boolean(field), Value::Boolean(x)) => *field(parameters) = x,
             (Access::Integer(field), Value::Integer(x)) => *field(parameters, element) = x,
-            (Access::Choice { set, .. }, Value::Integer(x)) => set(parameters, x),
+            (Access::Choice { set, .. }, Value::Integer(x)) => set(parameters, element, x),
             _ => {}
         }
     }

@@ -3,7 +3,7 @@
 use std::ops::{Deref, DerefMut};
 
 use craft::{
-    Coupling, Craft, SloshTank, SloshTankOutputs, TANK_INPUTS, TANK_STATES, TankInputs,
+    Coupling, Craft, DampingLaw, SloshTank, SloshTankOutputs, TANK_INPUTS, TANK_STATES, TankInputs,
     TankParameters, TankState,
 };
 use runtime::table::Table;
@@ -13,11 +13,20 @@ use crate::table::TABLE;
 /// Coupling by the total wrench, both sides extrapolated, is stable up to 2/sqrt(3) - 1 = 0.155.
 const LIMIT: f64 = 0.15;
 
+/// Said once.
+const OUT_OF_RANGE: &str = "the tank leaves its range (tank.in_range): thrust pulls it off its liquid and nothing \
+                            centres it, or a bob is more than 45 degrees from the axis; the pendulums go on, but \
+                            stand for no liquid there";
+
 /// One tank.
 #[derive(Clone, Debug)]
 pub struct Model {
     tank: SloshTank,
     coupling_ratio: f64,
+    /// Whether the present inputs are applied: in Co-Simulation ranges are those of the present motion.
+    present: bool,
+    /// Whether the motion has left the tank's range.
+    has_left_range: bool,
 }
 
 impl Model {
@@ -34,6 +43,8 @@ pub struct Parameters {
     tank: TankParameters,
     /// The coupling's number if it is not 0, for hosts that set no enumerations.
     pub coupling_kind: i32,
+    /// The number of the law of damping if it is not 0, for hosts that set no enumerations.
+    pub damping_law_kind: i32,
     /// Number of slosh modes.
     pub modes: i32,
     /// Number of points of the tank's table.
@@ -47,7 +58,7 @@ impl Default for Parameters {
         let tank = TankParameters::default();
         let host = Craft { mass: 0.0, ..craft::Parameters::default().craft };
         let (modes, points) = (tank.tank.modes as i32, tank.tank.fill.points as i32);
-        Parameters { coupling_kind: 0, modes, points, host, tank }
+        Parameters { coupling_kind: 0, damping_law_kind: 0, modes, points, host, tank }
     }
 }
 
@@ -78,6 +89,18 @@ impl Parameters {
         }
         if let Some(coupling) = usize::try_from(kind - 1).ok().and_then(|i| Coupling::ALL.get(i)) {
             p.coupling = *coupling;
+        }
+        let (law, kind) = (p.tank.damping_law, self.damping_law_kind);
+        let given = usize::try_from(kind - 1).ok().and_then(|i| DampingLaw::ALL.get(i));
+        if let Some(given) = given {
+            if law != TankParameters::default().tank.damping_law && law != *given {
+                let law = law as i32;
+                return Err(vec![format!(
+                    "tank.damping_law_kind = {kind} contradicts tank.damping_law = {law} (allowed: 0, or the same \
+                     number; tank.damping_law left at its start value)"
+                )]);
+            }
+            p.tank.damping_law = *given;
         }
         p.tank.modes = usize::try_from(self.modes).unwrap_or(0);
         p.tank.fill.points = usize::try_from(self.points).unwrap_or(0);
@@ -116,20 +139,25 @@ impl runtime::Model for Model {
         let p = parameters.resolved()?;
         let mut tank = SloshTank::new(&p, &inputs.tank, start_time, tolerance)?;
         let coupling_ratio = tank.coupling_ratio().unwrap_or(0.0);
-        Ok(Model { tank, coupling_ratio })
+        Ok(Model { tank, coupling_ratio, present: false, has_left_range: false })
     }
 
     fn warnings(&self, parameters: &Parameters, _: &Inputs) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if !self.tank.ranges_held().in_range {
+            warnings.push(format!("at the start {OUT_OF_RANGE}"));
+        }
         let ratio = self.coupling_ratio;
         let is_split = parameters.resolved().is_ok_and(|p| p.coupling == Coupling::Split);
         if !is_split || ratio <= LIMIT {
-            return Vec::new();
+            return warnings;
         }
-        vec![format!(
+        warnings.push(format!(
             "coupling_ratio = {ratio:.3}: a host that takes force and torque as they are diverges above 1 \
              (values held), 1/3 or {LIMIT} (extrapolated), at any communication step; use bias and \
              added_mass instead, and leave host.mass at 0 if you do"
-        )]
+        ));
+        warnings
     }
 
     fn save(&self, words: &mut Vec<u64>) {
@@ -143,15 +171,45 @@ impl runtime::Model for Model {
         let state = TankState::from_words(state.try_into().ok()?)?;
         let tank = p.problems().is_empty().then(|| SloshTank::resume(&p, &state, tolerance))?;
         let coupling_ratio = f64::from_bits(*ratio);
-        coupling_ratio.is_finite().then_some(Model { tank, coupling_ratio })
+        let model = Model { tank, coupling_ratio, present: false, has_left_range: false };
+        coupling_ratio.is_finite().then_some(model)
     }
 
     fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), String> {
-        self.tank.step(&inputs.tank, h).map_err(|why| why.to_string())
+        self.tank.step(&inputs.tank, h).map_err(|why| why.to_string())?;
+        self.has_left_range |= !self.tank.is_in_range_after(&inputs.tank, h);
+        Ok(())
     }
 
     fn outputs(&mut self, inputs: &Inputs) -> SloshTankOutputs {
-        self.tank.outputs(&inputs.tank)
+        if self.present {
+            self.tank.outputs(&inputs.tank)
+        } else {
+            self.tank.outputs_held(&inputs.tank)
+        }
+    }
+
+    fn apply_present_inputs(&mut self, _: &Inputs) {
+        self.present = true;
+    }
+
+    fn revert(&mut self, (): ()) {
+        self.present = false;
+    }
+
+    fn handle_event(&mut self, inputs: &Inputs) -> Result<bool, String> {
+        self.tank.take_event(&inputs.tank);
+        Ok(false)
+    }
+
+    fn accept_step(&mut self, inputs: &Inputs) -> Result<bool, String> {
+        let ranges = self.tank.ranges(&inputs.tank);
+        self.has_left_range |= !ranges.in_range;
+        Ok(ranges != self.tank.ranges_held())
+    }
+
+    fn step_warning(&self) -> Option<&'static str> {
+        self.has_left_range.then_some(OUT_OF_RANGE)
     }
 
     fn set_dependent_slopes(inputs: &mut Inputs, h: f64) -> bool {

@@ -1,7 +1,7 @@
 //! Every variable of SloshTank.fmu, once. Start values are those of
 //! `craft::TankParameters::default()`.
 
-use craft::{Coupling, MODES, POINTS, TANK_STATES, TRIANGLE, TankState};
+use craft::{Coupling, DampingLaw, MODES, POINTS, TANK_STATES, TRIANGLE, TankState};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::{Enumeration, Item, Variable};
 
@@ -25,8 +25,8 @@ pub static TABLE: Table<Model> = Table::new(
 
 static SCALARS: [Scalar<Model>; scalar_count(VARIABLES)] = scalars(VARIABLES);
 
-// Bias and added mass contain neither a nor omega_dot: a host that solves with them has no
-// algebraic loop. With the other couplings the bias contains both, as given in the step before.
+// The added mass contains neither a nor omega_dot, the bias only by the drag, which follows them weakly: a
+// host that solves with them at the a it has has no algebraic loop. With the other couplings the bias contains both, as given in the step before.
 const WRENCH: &[&str] =
     &["tank.p", "tank.p_dot", "tank.liquid", "a", "omega", "omega_dot", "mass_flow"];
 const EVERYTHING: &[&str] =
@@ -48,7 +48,7 @@ fn bob(n: usize) -> usize {
 const DISSIPATED: usize = TANK_STATES - 2;
 const LIQUID: usize = TANK_STATES - 1;
 
-fn set_coupling(p: &mut Parameters, number: i32) {
+fn set_coupling(p: &mut Parameters, _: usize, number: i32) {
     if let Some(coupling) = usize::try_from(number - 1).ok().and_then(|i| Coupling::ALL.get(i)) {
         p.coupling = *coupling;
     }
@@ -67,7 +67,7 @@ static VARIABLES: &[Variable<Model>] = &[
         "Torque of the whole liquid on the host about O, host axes")
         .shape(VECTOR).depends_on(WRENCH).initial_depends_on(EVERYTHING),
     V::output("bias", |o, n| o.bias[n], "",
-        "Force (1 to 3, N) and torque about O (4 to 6, N.m) that the host adds on its right side: force, torque = bias - added_mass [a; omega_dot]. Split, it contains neither a nor omega_dot. With coupling = rigid_body it is for a body that has the constant added_mass in its own mass, centre of mass and inertia, centrifugal and gyroscopic terms included")
+        "Force (1 to 3, N) and torque about O (4 to 6, N.m) that the host adds on its right side: force, torque = bias - added_mass [a; omega_dot]. Split, it contains neither a nor omega_dot but through the drag that follows them (with tank.damping_law = constant not at all): of a change of a some 1e-4 of the bobs' mass, which one evaluation settles. With coupling = rigid_body it is for a body that has the constant added_mass in its own mass, centre of mass and inertia, centrifugal and gyroscopic terms included")
         .shape(&[6]).depends_on(WRENCH).initial_depends_on(EVERYTHING),
     V::output("added_mass", |o, n| o.added_mass[n], "",
         "Symmetric 6 x 6 added-mass matrix about O that the host adds on its left side, upper triangle by rows (kg, kg.m, kg.m2): it follows from tank.p and tank.liquid alone; with coupling = lumped or rigid_body it is that of rigid liquid and each bob at its hinge at the start, constant")
@@ -91,6 +91,15 @@ static VARIABLES: &[Variable<Model>] = &[
     V::local("tank.wave_height", |o, _| o.tank.wave_height, "m",
         "Amplitude of the surface at the wall, all modes together: wave times slosh angle")
         .display_unit("mm").depends_on(&["tank.p"]),
+    V::local_enumeration("tank.regime", &REGIME, |o, _| o.tank.ranges.regime as i32,
+        "How far tank.wave_height is inside the range of linear theory; nonlinear, too, where a bob is beyond 45 degrees")
+        .depends_on(&["tank.p"]),
+    V::local_boolean("tank.in_range", |o, _| o.tank.ranges.in_range,
+        "The pendulums stand for the liquid: thrust or centring holds it at the tank's bottom, and every bob is within 45 degrees of the axis")
+        .depends_on(&["tank.p", "a", "omega", "omega_dot"]),
+    V::local_integer("tank.in_range_kind", |o, _| i32::from(o.tank.ranges.in_range),
+        "tank.in_range for hosts that misread Booleans (OpenModelica up to 1.27): 0 false, 1 true")
+        .depends_on(&["tank.p", "a", "omega", "omega_dot"]),
     V::local("mass", |o, _| o.mass, "kg",
         "Mass of the whole liquid").depends_on(&["tank.liquid"]),
     V::local("center_of_mass", |o, n| o.center_of_mass[n], "m",
@@ -121,7 +130,7 @@ static VARIABLES: &[Variable<Model>] = &[
 
     // The derivatives of the continuous states
     V::derivative("der(dissipated)", |_| DISSIPATED, "W", "Derivative of dissipated")
-        .depends_on(&["tank.p", "tank.p_dot", "tank.liquid"]).initial_depends_on(TANK),
+        .depends_on(WRENCH).initial_depends_on(EVERYTHING),
     V::derivative("der(tank.liquid)", |_| LIQUID, "kg/s", "Derivative of tank.liquid: minus mass_flow")
         .depends_on(&["mass_flow"]).initial_depends_on(&["mass_flow", "tank."]),
     V::derivative("der(tank.p)", bob, "1/s", "Derivative of tank.p: tank.p_dot")
@@ -130,7 +139,7 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(MODE_VECTOR).depends_on(WRENCH).initial_depends_on(EVERYTHING),
 
     // The tank
-    V::choice("coupling", &COUPLING, |p| p.coupling as i32, set_coupling,
+    V::choice("coupling", &COUPLING, |p, _| p.coupling as i32, set_coupling,
         "What bias and added_mass stand for"),
     V::integer("coupling_kind", |p, _| &mut p.coupling_kind,
         "For hosts that set no enumerations (ecos, libcosim): 0: as coupling says; 1 split, 2 lumped, 3 rigid_body. An error if coupling has been set to another one")
@@ -169,11 +178,20 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(PER_MODE),
     V::parameter("tank.k", |p, n| &mut p.tank.k[n], "N/m", "Centring stiffness of a mode (capillarity, diaphragm)")
         .shape(PER_MODE).range(0.0, 1e12),
-    V::parameter("tank.zeta", |p, n| &mut p.tank.zeta[n], "1", "Damping ratio of a mode at g_ref; the drag coefficient 2 zeta m sqrt(g_ref/l + k/m) is constant")
+    V::parameter("tank.zeta", |p, n| &mut p.tank.zeta[n], "1", "Damping ratio of a mode at g_ref: there its drag coefficient is 2 zeta m sqrt(g_ref/l + k/m); tank.damping_law says how it goes on")
+        .shape(PER_MODE).range(0.0, 10.0),
+    V::choice("tank.damping_law", &DAMPING_LAW, |p, _| p.tank.damping_law as i32, set_damping_law,
+        "How the modes' drag follows the acceleration along the tank, by their natural frequencies"),
+    V::integer("tank.damping_law_kind", |p, _| &mut p.damping_law_kind,
+        "For hosts that set no enumerations: 0: as tank.damping_law says; otherwise the number of its item. An error if tank.damping_law has been set to another one")
+        .between(0, DAMPING_LAW.items.len() as i32),
+    V::parameter("tank.g_floor", |p, _| &mut p.tank.g_floor, "m/s2", "Acceleration along the axis around which the drag stops to follow it; 0: 1e-4 g_ref")
+        .range(0.0, 1e6),
+    V::parameter("tank.zeta_amplitude", |p, n| &mut p.tank.zeta_amplitude[n], "1/rad", "Growth of a mode's damping ratio with its amplitude A (angle and rate over natural frequency, both directions together): zeta(A) = zeta + zeta_amplitude A")
         .shape(PER_MODE).range(0.0, 10.0),
     V::parameter("tank.wave", |p, n| &mut p.tank.wave[n], "m", "Elevation of the surface at the wall per slosh angle of a mode, for wave_height alone")
         .shape(PER_MODE).range(0.0, 1e9),
-    V::integer("tank.fill.points", |p, _| &mut p.points, "Points of the tank's table: 0 for a tank whose liquid stays; with 2 or more the tank can drain, and modes and rigid liquid are the table's, interpolated monotonely with two continuous derivatives; as they start, the default tank at depths of 0.1 to 0.8 m")
+    V::integer("tank.fill.points", |p, _| &mut p.points, "Points of the tank's table: 0 for a tank whose liquid stays; with 2 or more the tank can drain, and modes and rigid liquid are the table's, interpolated monotonely with two continuous derivatives; as they start, the default tank at depths of 0.1 to 1.2 m")
         .between(0, POINTS as i32),
     V::parameter("tank.liquid_0", |p, _| &mut p.tank.liquid_0, "kg", "Mass of liquid at the start, used with fill.points > 0")
         .range(0.0, 1e9),
@@ -213,7 +231,7 @@ static VARIABLES: &[Variable<Model>] = &[
     V::parameter("host.Jyz", |p, _| &mut p.host.j.yz, "kg.m2", "Its product of inertia, minus the integral of y z dm"),
 
     // Solver
-    V::count("solver.max_steps", |p| p.max_steps as i32, |p, n| p.max_steps = n.max(0) as usize,
+    V::count("solver.max_steps", |p, _| p.max_steps as i32, |p, _, n| p.max_steps = n.max(0) as usize,
         "Internal steps that one communication step may take: a step that needs more is refused")
         .between(1, 1_000_000_000),
 
@@ -222,6 +240,32 @@ static VARIABLES: &[Variable<Model>] = &[
         "Largest eigenvalue of the host's inverse mass matrix times the tank's added mass, 0 if host.mass is 0. A host that takes force and torque as they are diverges where it is too large, at any communication step: above 1 with held values, above 0.15 with extrapolated ones; use bias and added_mass")
         .initial_depends_on(&["tank.", "host."]),
 ];
+
+fn set_damping_law(p: &mut Parameters, _: usize, number: i32) {
+    if let Some(law) = usize::try_from(number - 1).ok().and_then(|i| DampingLaw::ALL.get(i)) {
+        p.tank.damping_law = *law;
+    }
+}
+
+static DAMPING_LAW: Enumeration = Enumeration {
+    name: "DampingLaw",
+    description: "Drag coefficient c of a mode against its natural frequency omega",
+    items: &[
+        Item::new("laminar", "c ~ sqrt(omega): a laminar layer at the wall, for bare tanks"),
+        Item::new("constant_ratio", "c ~ omega: the damping ratio stays"),
+        Item::new("constant", "c stays, whatever the acceleration"),
+    ],
+};
+
+static REGIME: Enumeration = Enumeration {
+    name: "Regime",
+    description: "Wave height at the wall against the free surface's radius R",
+    items: &[
+        Item::new("linear", "Below 0.15 R: linear theory holds"),
+        Item::new("transitional", "0.15 R to 0.25 R"),
+        Item::new("nonlinear", "Above 0.25 R: heights and forces are indications"),
+    ],
+};
 
 static COUPLING: Enumeration = Enumeration {
     name: "Coupling",

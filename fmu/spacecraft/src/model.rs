@@ -2,7 +2,7 @@
 
 use std::ops::{Deref, DerefMut};
 
-use craft::{INPUTS, Inputs, Mount, Outputs, STATES, Spacecraft, State, TANKS};
+use craft::{DampingLaw, INPUTS, Inputs, Mount, Outputs, STATES, Spacecraft, State, TANKS};
 use runtime::table::Table;
 
 use crate::table::TABLE;
@@ -15,7 +15,14 @@ pub struct Model {
     /// at once in Co-Simulation.
     present: bool,
     wheels: Wheels,
+    /// Whether a tank has left its range.
+    has_left_range: bool,
 }
+
+/// Said once.
+const OUT_OF_RANGE: &str = "a tank leaves its range (tank[].in_range): thrust pulls it off its liquid and nothing \
+                            centres it, or a bob is more than 45 degrees from the axis; the pendulums go on, but \
+                            stand for no liquid there";
 
 /// Whether a host that integrates itself, and from whom no slope of h_wheels is known, leaves the wheels' reaction
 /// -h_w' out of the torque: on an axis on which h_wheels moves and torque has never been other than 0.
@@ -55,6 +62,8 @@ pub struct Parameters {
     craft: craft::Parameters,
     /// The mount's number if it is not 0, for hosts that set no enumerations.
     pub mount_kind: i32,
+    /// The numbers of the tanks' laws of damping if they are not 0.
+    pub damping_law_kind: [i32; TANKS],
     /// Number of tanks.
     pub tanks: i32,
     /// Number of slosh modes of each tank.
@@ -68,7 +77,8 @@ impl Default for Parameters {
         let craft = craft::Parameters::default();
         let modes = craft.tank.map(|tank| tank.modes as i32);
         let points = craft.tank.map(|tank| tank.fill.points as i32);
-        Parameters { mount_kind: 0, tanks: craft.tanks as i32, modes, points, craft }
+        let (tanks, damping_law_kind) = (craft.tanks as i32, [0; TANKS]);
+        Parameters { mount_kind: 0, damping_law_kind, tanks, modes, points, craft }
     }
 }
 
@@ -102,6 +112,18 @@ impl Parameters {
         }
         p.tanks = usize::try_from(self.tanks).unwrap_or(0);
         for (i, tank) in p.tank.iter_mut().enumerate() {
+            let (law, kind) = (tank.damping_law, self.damping_law_kind[i]);
+            let given = usize::try_from(kind - 1).ok().and_then(|i| DampingLaw::ALL.get(i));
+            if let Some(given) = given {
+                if law != craft::Tank::default().damping_law && law != *given {
+                    let (law, number) = (law as i32, i + 1);
+                    return Err(vec![format!(
+                        "tank[{number}].damping_law_kind = {kind} contradicts tank[{number}].damping_law = {law} \
+                         (allowed: 0, or the same number; damping_law left at its start value)"
+                    )]);
+                }
+                tank.damping_law = *given;
+            }
             tank.modes = usize::try_from(self.modes[i]).unwrap_or(0);
             tank.fill.points = usize::try_from(self.points[i]).unwrap_or(0);
         }
@@ -129,7 +151,7 @@ impl runtime::Model for Model {
         tolerance: f64,
     ) -> Result<Self, Vec<String>> {
         let craft = Spacecraft::new(&parameters.resolved()?, inputs, start_time, tolerance)?;
-        Ok(Model { craft, present: false, wheels: Wheels::default() })
+        Ok(Model { craft, present: false, wheels: Wheels::default(), has_left_range: false })
     }
 
     fn save(&self, words: &mut Vec<u64>) {
@@ -140,11 +162,18 @@ impl runtime::Model for Model {
         let p = parameters.resolved().ok()?;
         let state = State::from_words(words.try_into().ok()?)?;
         let craft = p.problems().is_empty().then(|| Spacecraft::resume(&p, &state, tolerance))?;
-        Some(Model { craft, present: false, wheels: Wheels::default() })
+        Some(Model { craft, present: false, wheels: Wheels::default(), has_left_range: false })
     }
 
     fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), String> {
-        self.craft.step(inputs, h).map_err(|why| why.to_string())
+        self.craft.step(inputs, h).map_err(|why| why.to_string())?;
+        self.has_left_range |= !self.craft.is_in_range();
+        Ok(())
+    }
+
+    fn warnings(&self, _: &Parameters, _: &Inputs) -> Vec<String> {
+        let left = self.craft.ranges_held().iter().any(|ranges| !ranges.in_range);
+        left.then(|| format!("at the start {OUT_OF_RANGE}")).into_iter().collect()
     }
 
     fn outputs(&mut self, inputs: &Inputs) -> Outputs {
@@ -204,10 +233,16 @@ impl runtime::Model for Model {
     fn accept_step(&mut self, inputs: &Inputs) -> Result<bool, String> {
         self.wheels.see_step(self.craft.state().h_wheels(), inputs);
         self.craft.follow_inputs(inputs);
-        self.craft.check_liquids().map(|()| false).map_err(|why| why.to_string())
+        self.craft.check_liquids().map_err(|why| why.to_string())?;
+        let ranges = self.craft.ranges(inputs);
+        self.has_left_range |= ranges.iter().any(|ranges| !ranges.in_range);
+        Ok(ranges != self.craft.ranges_held())
     }
 
     fn step_warning(&self) -> Option<&'static str> {
+        if self.has_left_range && !self.wheels.lack_reaction() {
+            return Some(OUT_OF_RANGE);
+        }
         self.wheels.lack_reaction().then_some(
             "h_wheels moves on an axis on which torque has always been 0: in Model Exchange the slope of an input is not \
              known, and without the wheels' reaction momentum and angular_momentum are wrong; add -d(h_wheels)/dt \

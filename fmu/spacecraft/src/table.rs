@@ -1,21 +1,23 @@
 //! Every variable of Spacecraft.fmu, once. Start values are those of `craft::Parameters::default()`.
 //!
+//! A variant for fewer tanks and modes is made of the same table: the arrays are shorter.
+//!
 //! Arrays have FMI's structured names: `tank[].p` of the shape 4, 3, 3 is `tank[1].p[1,1]`, …: tank,
 //! mode, axis.
 
-use craft::{MODES, POINTS, STATES, State, TANKS, index};
+use craft::{DampingLaw, MODES, POINTS, STATES, State, TANKS, index};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::{Enumeration, Item, Variable};
 
 use crate::Model;
+use crate::model::Parameters;
 
 /// All that is said about the FMU's variables.
 pub static TABLE: Table<Model> = Table::new(
     About {
-        model: "Spacecraft",
+        model: NAME,
         version: env!("CARGO_PKG_VERSION"),
-        description: "A rigid spacecraft in six degrees of freedom with up to four tanks of sloshing \
-                      liquid, free or on an air bearing",
+        description: DESCRIPTION,
         events: "",
         event_indicators: 0,
         saved_words: State::WORDS,
@@ -23,6 +25,37 @@ pub static TABLE: Table<Model> = Table::new(
     VARIABLES,
     &SCALARS,
 );
+
+const DESCRIPTION: &str = match TANKS {
+    1 => {
+        "A rigid spacecraft in six degrees of freedom with a tank of sloshing liquid, free or on an air bearing"
+    }
+    2 => {
+        "A rigid spacecraft in six degrees of freedom with up to two tanks of sloshing liquid, free or on an air bearing"
+    }
+    3 => {
+        "A rigid spacecraft in six degrees of freedom with up to three tanks of sloshing liquid, free or on an air bearing"
+    }
+    _ => {
+        "A rigid spacecraft in six degrees of freedom with up to four tanks of sloshing liquid, free or on an air bearing"
+    }
+};
+
+/// Each variant has a name of its own, by which a host tells one's library from another's.
+const NAME: &str = match (TANKS, MODES) {
+    (1, 1) => "Spacecraft_1x1",
+    (1, 2) => "Spacecraft_1x2",
+    (1, 3) => "Spacecraft_1x3",
+    (2, 1) => "Spacecraft_2x1",
+    (2, 2) => "Spacecraft_2x2",
+    (2, 3) => "Spacecraft_2x3",
+    (3, 1) => "Spacecraft_3x1",
+    (3, 2) => "Spacecraft_3x2",
+    (3, 3) => "Spacecraft_3x3",
+    (4, 1) => "Spacecraft_4x1",
+    (4, 2) => "Spacecraft_4x2",
+    _ => "Spacecraft",
+};
 
 static SCALARS: [Scalar<Model>; scalar_count(VARIABLES)] = scalars(VARIABLES);
 
@@ -188,6 +221,15 @@ static VARIABLES: &[Variable<Model>] = &[
     V::local("tank[].wave_height", |o, n| o.tank[n].wave_height, "m",
         "Amplitude of a tank's surface at the wall, all modes together: wave times slosh angle")
         .display_unit("mm").shape(PER_TANK).depends_on(ANGLES),
+    V::local_enumeration("tank[].regime", &REGIME, |o, n| o.tank[n].ranges.regime as i32,
+        "How far a tank's wave_height is inside the range of linear theory; nonlinear, too, where a bob is beyond 45 degrees")
+        .shape(PER_TANK).depends_on(ANGLES),
+    V::local_boolean("tank[].in_range", |o, n| o.tank[n].ranges.in_range,
+        "The pendulums stand for the liquid: thrust or centring holds it at the tank's bottom, and every bob is within 45 degrees of the axis")
+        .shape(PER_TANK).depends_on(MOTION),
+    V::local_integer("tank[].in_range_kind", |o, n| i32::from(o.tank[n].ranges.in_range),
+        "tank[].in_range for hosts that misread Booleans (OpenModelica up to 1.27): 0 false, 1 true")
+        .shape(PER_TANK).depends_on(MOTION),
     V::local("tank[].angle_x", |o, n| o.tank[n / MODES].angle_x[n % MODES], "rad",
         "Slosh angle of a mode: its sine is the bob's displacement along the tank's x axis over the pendulum's length")
         .display_unit("deg").shape(PER_MODE).depends_on(ANGLES),
@@ -220,7 +262,7 @@ static VARIABLES: &[Variable<Model>] = &[
     V::derivative("der(work)", |_| index::WORK, "W", "Derivative of work")
         .depends_on(&["q", "omega", "velocity", "force", "torque", "h_wheels"]).initial_depends_on(EVERYTHING),
     V::derivative("der(dissipated)", |_| index::DISSIPATED, "W", "Derivative of dissipated")
-        .depends_on(&["tank[].p", "tank[].p_dot", "tank[].liquid"]).initial_depends_on(EVERYTHING),
+        .depends_on(MOTION).initial_depends_on(EVERYTHING),
     V::derivative("der(drained)", |_| index::DRAINED, "W", "Derivative of drained")
         .depends_on(ENERGIES).initial_depends_on(EVERYTHING),
     V::derivative("der(tank[].liquid)", |n| index::LIQUID + n, "kg/s", "Derivative of tank[].liquid: minus mass_flow")
@@ -244,7 +286,7 @@ static VARIABLES: &[Variable<Model>] = &[
     V::parameter("craft.Jxy", |p, _| &mut p.craft.j.xy, "kg.m2", "Product of inertia, minus the integral of x y dm"),
     V::parameter("craft.Jxz", |p, _| &mut p.craft.j.xz, "kg.m2", "Product of inertia, minus the integral of x z dm"),
     V::parameter("craft.Jyz", |p, _| &mut p.craft.j.yz, "kg.m2", "Product of inertia, minus the integral of y z dm"),
-    V::choice("mount", &MOUNT, |p| p.mount as i32, |p, n| p.mount = if n == 2 { craft::Mount::Pivot } else { craft::Mount::Free },
+    V::choice("mount", &MOUNT, |p, _| p.mount as i32, |p, _, n| p.mount = if n == 2 { craft::Mount::Pivot } else { craft::Mount::Free },
         "How the craft is held"),
     V::integer("mount_kind", |p, _| &mut p.mount_kind,
         "For hosts that set no enumerations: 0: as mount says; 1 free, 2 pivot. An error if mount has been set to another one")
@@ -290,11 +332,21 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(PER_MODE),
     V::parameter("tank[].k", |p, n| &mut p.tank[n / MODES].k[n % MODES], "N/m", "Centring stiffness of a mode (capillarity, diaphragm)")
         .shape(PER_MODE).range(0.0, 1e12),
-    V::parameter("tank[].zeta", |p, n| &mut p.tank[n / MODES].zeta[n % MODES], "1", "Damping ratio of a mode at g_ref; the drag coefficient 2 zeta m sqrt(g_ref/l + k/m) is constant")
+    V::parameter("tank[].zeta", |p, n| &mut p.tank[n / MODES].zeta[n % MODES], "1", "Damping ratio of a mode at g_ref: there its drag coefficient is 2 zeta m sqrt(g_ref/l + k/m); tank[].damping_law says how it goes on")
+        .shape(PER_MODE).range(0.0, 10.0),
+    V::choice("tank[].damping_law", &DAMPING_LAW, |p, n| p.tank[n].damping_law as i32, set_damping_law,
+        "How the drag of a tank's modes follows the acceleration along the tank, by their natural frequencies")
+        .shape(PER_TANK),
+    V::integer("tank[].damping_law_kind", |p, n| &mut p.damping_law_kind[n],
+        "For hosts that set no enumerations: 0: as damping_law says; otherwise the number of its item. An error if damping_law has been set to another one")
+        .between(0, DAMPING_LAW.items.len() as i32).shape(PER_TANK),
+    V::parameter("tank[].g_floor", |p, n| &mut p.tank[n].g_floor, "m/s2", "Acceleration along the axis around which the drag stops to follow it; 0: 1e-4 g_ref")
+        .shape(PER_TANK).range(0.0, 1e6),
+    V::parameter("tank[].zeta_amplitude", |p, n| &mut p.tank[n / MODES].zeta_amplitude[n % MODES], "1/rad", "Growth of a mode's damping ratio with its amplitude A (angle and rate over natural frequency, both directions together): zeta(A) = zeta + zeta_amplitude A")
         .shape(PER_MODE).range(0.0, 10.0),
     V::parameter("tank[].wave", |p, n| &mut p.tank[n / MODES].wave[n % MODES], "m", "Elevation of the surface at the wall per slosh angle of a mode, for wave_height alone")
         .shape(PER_MODE).range(0.0, 1e9),
-    V::integer("tank[].fill.points", |p, n| &mut p.points[n], "Points of the tank's table: 0 for a tank whose liquid stays; with 2 or more the tank can drain, and modes and rigid liquid are the table's, interpolated monotonely with two continuous derivatives; as they start, the default tank at depths of 0.1 to 0.8 m")
+    V::integer("tank[].fill.points", |p, n| &mut p.points[n], "Points of the tank's table: 0 for a tank whose liquid stays; with 2 or more the tank can drain, and modes and rigid liquid are the table's, interpolated monotonely with two continuous derivatives; as they start, the default tank at depths of 0.1 to 1.2 m")
         .between(0, POINTS as i32).shape(PER_TANK),
     V::parameter("tank[].liquid_0", |p, n| &mut p.tank[n].liquid_0, "kg", "Mass of liquid at the start, used with fill.points > 0")
         .shape(PER_TANK).range(0.0, 1e9),
@@ -332,10 +384,36 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(VECTOR),
 
     // Solver
-    V::count("solver.max_steps", |p| p.max_steps as i32, |p, n| p.max_steps = n.max(0) as usize,
+    V::count("solver.max_steps", |p, _| p.max_steps as i32, |p, _, n| p.max_steps = n.max(0) as usize,
         "Internal steps that one communication step may take: a step that needs more is refused")
         .between(1, 1_000_000_000),
 ];
+
+fn set_damping_law(p: &mut Parameters, tank: usize, number: i32) {
+    if let Some(law) = usize::try_from(number - 1).ok().and_then(|i| DampingLaw::ALL.get(i)) {
+        p.tank[tank].damping_law = *law;
+    }
+}
+
+static DAMPING_LAW: Enumeration = Enumeration {
+    name: "DampingLaw",
+    description: "Drag coefficient c of a mode against its natural frequency omega",
+    items: &[
+        Item::new("laminar", "c ~ sqrt(omega): a laminar layer at the wall, for bare tanks"),
+        Item::new("constant_ratio", "c ~ omega: the damping ratio stays"),
+        Item::new("constant", "c stays, whatever the acceleration"),
+    ],
+};
+
+static REGIME: Enumeration = Enumeration {
+    name: "Regime",
+    description: "Wave height at the wall against the free surface's radius R",
+    items: &[
+        Item::new("linear", "Below 0.15 R: linear theory holds"),
+        Item::new("transitional", "0.15 R to 0.25 R"),
+        Item::new("nonlinear", "Above 0.25 R: heights and forces are indications"),
+    ],
+};
 
 static MOUNT: Enumeration = Enumeration {
     name: "Mount",

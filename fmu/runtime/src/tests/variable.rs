@@ -49,7 +49,7 @@ fn values_in_the_range_are_taken_its_ends_included() {
     assert_eq!(low.problem(0, Real(1e300)), None);
     assert_eq!(a_real("m").problem(0, Real(-1e300)), None);
     assert_eq!(an_integer().problem(0, Integer(i32::MIN)), None);
-    let choice = V::choice("c", &CHOICE, |_| 1, |_, _| {}, "");
+    let choice = V::choice("c", &CHOICE, |_, _| 1, |_, _, _| {}, "");
     assert_eq!([1, 2].map(|n| choice.problem(0, Integer(n))), [None, None]);
     let switch = V::switch("b", |p| &mut p.has_lid, "");
     assert_eq!(switch.problem(0, Boolean(false)), None);
@@ -81,7 +81,7 @@ fn values_out_of_range_are_refused_with_the_range_and_unit() {
     assert_eq!(why(&one_sided, Integer(0)), "n = 0 (allowed: at least 1)");
     one_sided.kind = Kind::Integer { min: None, max: Some(1) };
     assert_eq!(why(&one_sided, Integer(2)), "n = 2 (allowed: at most 1)");
-    let choice = V::choice("c", &CHOICE, |_| 1, |_, _| {}, "");
+    let choice = V::choice("c", &CHOICE, |_, _| 1, |_, _, _| {}, "");
     for n in [-1, 0, 3] {
         assert_eq!(why(&choice, Integer(n)), format!("c = {n} (allowed: 1 a, 2 b)"));
     }

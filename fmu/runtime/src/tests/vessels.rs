@@ -109,9 +109,9 @@ static VARIABLES: &[Variable<Vessels>] = &[
         .depends_on(&["level[]", "q[]"]).initial_depends_on(&["start.level[1]", "leak"]),
     V::local_of_inputs("room", |_, i, _| [OPENS - i.z[0], -i.z[1]], "m", "Room below the valve")
         .depends_on(&["z"]),
-    V::local_boolean("open", |o| o.open, "Whether the valve is open"),
-    V::local_integer("events", |o| o.events, "How often the valve has moved"),
-    V::local_enumeration("valve", &VALVE, |o| o.valve, "Where the valve is"),
+    V::local_boolean("open", |o, _| o.open, "Whether the valve is open"),
+    V::local_integer("events", |o, _| o.events, "How often the valve has moved"),
+    V::local_enumeration("valve", &VALVE, |o, _| o.valve, "Where the valve is"),
     V::derivative("der(level)", |i| 1 - i, "m/s", "Derivatives of the levels").shape(&[2])
         .depends_on(&["level[]", "q[]"]).initial_depends_on(&["start.", "leak"]),
     V::input("q", |i, n| i.q[n].each_mut(), "m/s", "What flows in").shape(&[2]).range(1.0, 10.0),
@@ -123,8 +123,8 @@ static VARIABLES: &[Variable<Vessels>] = &[
     V::parameter("inspection", |p, _| &mut p.inspection, "s", "Time of the inspection"),
     V::switch("has_lid", |p| &mut p.has_lid, "Whether there is a lid"),
     V::integer("number", |p, _| &mut p.number, "A number").between(-3, 5),
-    V::count("gauges", |p| p.gauges.into(), |p, n| p.gauges = n as u8, "Gauges").between(0, 9),
-    V::choice("material", &MATERIAL, |p| p.material.into(), |p, n| p.material = n as u8, "Material"),
+    V::count("gauges", |p, _| p.gauges.into(), |p, _, n| p.gauges = n as u8, "Gauges").between(0, 9),
+    V::choice("material", &MATERIAL, |p, _| p.material.into(), |p, _, n| p.material = n as u8, "Material"),
     V::calculated("time_constant", |m, _| 1.0 / m.k, "s", "Time constant of the leak")
         .initial_depends_on(&["leak"]),
 ];
