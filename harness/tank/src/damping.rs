@@ -1,27 +1,188 @@
-//! Damping of the first mode: published correlations, the laminar layer at the wall, ring baffles.
+//! Damping: one law for every tank and mode ([`of_tank`], by `formulas::damping`), the published correlations by
+//! themselves, ring baffles.
 //!
 //! Re = nu/sqrt(g R^3) throughout (an inverse Reynolds number), x = h/R the fill; zeta is the
 //! logarithmic decrement over 2 pi. Measured tanks scatter by some 30 % around any of these.
 
 use core::f64::consts::PI;
 
-use formulas::damping as formula;
+use formulas::damping::{self as formula, Basis};
 
-use crate::modal::{ModalData, Mode};
+use crate::contour::Problems;
+use crate::modal::{Damping, ModalData, Mode, ModeDamping};
+use crate::shape::{self, Recognised};
+use crate::table::significant;
+use crate::tank::{Geometry, Shape, Tank};
+
+/// The damping of a tank that was solved for `data`, of a liquid of the kinematic viscosity `nu`, m2/s, under the specific
+/// force `gravity`, m/s². `springs` are the modes' centring stiffnesses, N/m, along each axis of a box; empty: none.
+/// `sigma`, N/m, where it is known, is for what is known of low Bond numbers.
+///
+/// A contour that *is* a sphere, an upright cylinder, a cone or a torus, to 1e-6 of its size over the wetted part, has
+/// that shape's damping.
+///
+/// # Errors
+/// No natural frequency: neither gravity nor a centring stiffness.
+pub fn of_tank(
+    tank: &Tank,
+    data: &ModalData,
+    nu: f64,
+    gravity: f64,
+    springs: [&[f64]; 2],
+    sigma: Option<f64>,
+) -> Result<Damping, Problems> {
+    let recognised = data.wall.as_ref().and_then(|wall| shape::recognise(wall, data.fill));
+    // The same modes for the same shape: those of its dimensions.
+    let is_given = |found: &Recognised| {
+        let Geometry::Revolution { shape: Some(given), .. } = &tank.geometry else { return false };
+        core::mem::discriminant(given) == core::mem::discriminant(&found.shape)
+    };
+    let drawn = recognised.filter(|found| !is_given(found));
+    let canonical = drawn.and_then(|found| solve_shape(tank, &found, data));
+    let modes = canonical.as_ref().map_or(&data.modes, |canonical| &canonical.modes);
+    let measured = recognised.map_or(formula::Shape::Other, |found| found.measured());
+    let seen = |modes: &[Mode], springs: &[f64]| -> Vec<formula::Mode> {
+        let of_mode = |(n, mode): (usize, &Mode)| {
+            let stiffness = springs.get(n).map_or(0.0, |k| k / mode.m);
+            let omega = (gravity * mode.lambda + stiffness.max(0.0)).sqrt();
+            formula::Mode { beta: mode.beta, lambda: mode.lambda, omega }
+        };
+        modes.iter().enumerate().map(of_mode).collect()
+    };
+    let along_x = seen(modes, springs[0]);
+    let Some(first) = along_x.first().copied() else {
+        return Err("There are no modes to be damped.".to_string().into());
+    };
+    if first.omega <= 0.0 {
+        return Err("A damping ratio holds at a specific force, and at 0 m/s² there is none: give the one that it is to \
+                    hold at, the surface tension, or no viscosity."
+            .to_string()
+            .into());
+    }
+    let mut warnings = Vec::new();
+    let estimate = formula::estimate(measured, nu, first, first);
+    let effective = first.omega * first.omega / first.lambda;
+    warnings
+        .extend(outside(measured, nu, effective).into_iter().map(|why| format!("damping: {why}")));
+    let layer = (2.0 * nu / first.omega).sqrt();
+    if layer >= 0.1 / first.lambda {
+        warnings.push(format!("damping: the layer of {layer:.3e} m is not thin against the wave"));
+    }
+    let mut all = |modes: &[formula::Mode]| -> Vec<ModeDamping> {
+        let of_mode = |(n, mode): (usize, &formula::Mode)| {
+            let found = formula::estimate(measured, nu, modes[0], *mode);
+            let mut interval = found.interval;
+            if let (0, formula::Shape::Cylinder { radius, .. }, Some(sigma)) = (n, measured, sigma)
+            {
+                let bond = data.rho * gravity * radius * radius / sigma;
+                if (10.0..=100.0).contains(&bond) {
+                    let high = formula::low_bond_cylinder(radius, nu, gravity, bond);
+                    interval[1] = interval[1].max(high);
+                    warnings.push(format!(
+                        "damping: at the Bond number {bond:.1} the contact line may take more: {} was found in \
+                         drop-tower tests, which ends the interval",
+                        significant(high)
+                    ));
+                }
+            }
+            ModeDamping { omega: mode.omega, zeta: found.zeta, interval, laminar: found.laminar }
+        };
+        modes.iter().enumerate().map(of_mode).collect()
+    };
+    let modes = all(&along_x);
+    let modes_y =
+        data.axes.as_ref().map_or(Vec::new(), |axes| all(&seen(&axes.y.modes, springs[1])));
+    let (layers, correlation) = (formula::UNMEASURED * estimate.laminar, estimate.correlation);
+    let other = correlation.map_or(String::new(), |zeta| {
+        let other = if estimate.basis == Basis::Correlation {
+            format!("{} laminar layers make {}", formula::UNMEASURED, significant(layers))
+        } else {
+            format!("its correlation makes {}", significant(zeta))
+        };
+        let disagree = if estimate.disagree {
+            ", more than measured tanks scatter: two estimates disagree"
+        } else {
+            ""
+        };
+        format!("; {other}{disagree}")
+    });
+    let name = name_of(measured);
+    let taken = match estimate.basis {
+        Basis::Correlation => format!("{}, measured there{other}", source_of(measured)),
+        Basis::Unmeasured => format!(
+            "{} laminar layers, as in measured cylinders: no measurements of this shape",
+            formula::UNMEASURED
+        ),
+        Basis::OutOfRange => format!(
+            "{} laminar layers, as in measured cylinders: the correlation of the {name} was not measured there{other}",
+            formula::UNMEASURED
+        ),
+        Basis::BelowLayer => format!(
+            "{} laminar layers, as in measured cylinders: the correlation of the {name} is below the laminar layer \
+             there{other}",
+            formula::UNMEASURED
+        ),
+    };
+    Ok(Damping { nu, gravity, shape: name, correlation, taken, modes, modes_y, warnings })
+}
+
+/// The shape's own modes at its fill, as many as `data` has.
+fn solve_shape(tank: &Tank, found: &Recognised, data: &ModalData) -> Option<ModalData> {
+    let whole = match found.shape {
+        // Open above the fill.
+        Shape::Cone { half_angle, height } => Shape::Cone { half_angle, height: 1.5 * height },
+        Shape::Cylinder { radius, height } => Shape::Cylinder { radius, height: 1.5 * height },
+        shape => shape,
+    };
+    Tank::of_shape(whole, tank.density).ok()?.solve(found.fill, data.modes.len()).ok()
+}
+
+fn name_of(shape: formula::Shape) -> &'static str {
+    match shape {
+        formula::Shape::Cylinder { .. } => "upright cylinder",
+        formula::Shape::Sphere { .. } => "sphere",
+        formula::Shape::Cone { .. } => "cone",
+        formula::Shape::Torus { .. } => "torus",
+        formula::Shape::Other => "other",
+    }
+}
+
+fn source_of(shape: formula::Shape) -> &'static str {
+    match shape {
+        formula::Shape::Cylinder { radius, depth } if depth < 0.5 * radius => {
+            "upright cylinder, shallow (Stephens, Leonard and Perry)"
+        }
+        formula::Shape::Cylinder { .. } => "upright cylinder (Mikishev and Dorozhkin)",
+        formula::Shape::Sphere { .. } => "sphere (after Mikishev and Dorozhkin, Sumner and Stofan)",
+        formula::Shape::Cone { .. } => "cone (fit of a published figure)",
+        formula::Shape::Torus { .. } => "torus (one tank)",
+        formula::Shape::Other => "",
+    }
+}
+
+/// Where a shape's correlation leaves its range, one sentence each.
+fn outside(shape: formula::Shape, nu: f64, g: f64) -> Vec<String> {
+    match shape {
+        formula::Shape::Sphere { radius, depth } => sphere(radius, depth, nu, g).outside,
+        formula::Shape::Cone { radius, half_angle } => cone(radius, half_angle, nu, g).outside,
+        formula::Shape::Torus { tube_radius, depth } => torus(tube_radius, depth, nu, g).outside,
+        formula::Shape::Cylinder { .. } | formula::Shape::Other => Vec::new(),
+    }
+}
 
 /// A damping ratio, and where the formula is used outside its range.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Damping {
+pub struct Formula {
     /// Damping ratio.
     pub zeta: f64,
     /// One sentence for each range that is left; empty inside.
     pub outside: Vec<String>,
 }
 
-impl Damping {
-    fn new(zeta: f64, ranges: &[(bool, String)]) -> Damping {
+impl Formula {
+    fn new(zeta: f64, ranges: &[(bool, String)]) -> Formula {
         let outside = ranges.iter().filter(|r| !r.0).map(|r| r.1.clone()).collect();
-        Damping { zeta, outside }
+        Formula { zeta, outside }
     }
 }
 
@@ -29,40 +190,33 @@ impl Damping {
 /// omega_n^2 = g lambda_n (Case and Parkinson 1957 for the cylinder, Keulegan 1959 for the box).
 ///
 /// It leaves out the surface film, the contact line and everything turbulent: measured cylinders have
-/// 1.4 to 1.5 times as much, see [`estimate`].
-pub fn laminar(mode: &Mode, nu: f64, g: f64) -> Damping {
+/// 1.4 to 1.5 times as much, see [`of_tank`].
+pub fn laminar(mode: &Mode, nu: f64, g: f64) -> Formula {
     let omega = (g * mode.lambda).sqrt();
     let layer = (2.0 * nu / omega).sqrt();
     let thin = layer < 0.1 * mode.l;
     let text = format!("the layer of {layer:.3e} m is not thin against the wave");
-    Damping::new(formula::laminar(mode.beta, nu, omega), &[(thin, text)])
-}
-
-/// The best one can offer for a shape without measurements: 1.45 times the laminar layer, the factor
-/// of measured cylinders (1.49 Stephens, 1.39 to 1.54 Mikishev and Dorozhkin).
-pub fn estimate(mode: &Mode, nu: f64, g: f64) -> Damping {
-    let laminar = laminar(mode, nu, g);
-    Damping { zeta: 1.45 * laminar.zeta, ..laminar }
+    Formula::new(formula::laminar(mode.beta, nu, omega), &[(thin, text)])
 }
 
 /// Upright cylinder, Mikishev and Dorozhkin. In shallow liquid it falls below the laminar layer, where
 /// [`stephens`] is sounder.
-pub fn mikishev_dorozhkin(radius: f64, fill: f64, nu: f64, g: f64) -> Damping {
+pub fn mikishev_dorozhkin(radius: f64, fill: f64, nu: f64, g: f64) -> Formula {
     let x = fill / radius;
     let text =
         format!("h/R = {x:.3} is below 0.5, where the formula falls below the laminar layer");
-    Damping::new(formula::mikishev_dorozhkin(radius, fill, nu, g), &[(x >= 0.5, text)])
+    Formula::new(formula::mikishev_dorozhkin(radius, fill, nu, g), &[(x >= 0.5, text)])
 }
 
 /// Upright cylinder, Stephens, Leonard and Perry: 1.493 times the laminar layer at every depth.
-pub fn stephens(radius: f64, fill: f64, nu: f64, g: f64) -> Damping {
-    Damping::new(formula::stephens(radius, fill, nu, g), &[])
+pub fn stephens(radius: f64, fill: f64, nu: f64, g: f64) -> Formula {
+    Formula::new(formula::stephens(radius, fill, nu, g), &[])
 }
 
 /// Sphere, see [`formula::sphere`].
-pub fn sphere(radius: f64, fill: f64, nu: f64, g: f64) -> Damping {
+pub fn sphere(radius: f64, fill: f64, nu: f64, g: f64) -> Formula {
     let (x, b) = (fill / radius, formula::sphere_number(radius, nu, g));
-    Damping::new(
+    Formula::new(
         formula::sphere(radius, fill, nu, g),
         &[
             ((0.1..=1.9).contains(&x), format!("h/R = {x:.3} is outside 0.1 to 1.9")),
@@ -72,16 +226,16 @@ pub fn sphere(radius: f64, fill: f64, nu: f64, g: f64) -> Damping {
 }
 
 /// Cone with its apex down, `radius` of the free surface, `half_angle` in degrees.
-pub fn cone(radius: f64, half_angle: f64, nu: f64, g: f64) -> Damping {
+pub fn cone(radius: f64, half_angle: f64, nu: f64, g: f64) -> Formula {
     let known = (0.0..=45.0).contains(&half_angle);
     let text = format!("the half angle of {half_angle} degrees is outside 0 to 45");
-    Damping::new(formula::cone(radius, half_angle, nu, g), &[(known, text)])
+    Formula::new(formula::cone(radius, half_angle, nu, g), &[(known, text)])
 }
 
 /// Torus, `tube_radius` of its section.
-pub fn torus(tube_radius: f64, fill: f64, nu: f64, g: f64) -> Damping {
+pub fn torus(tube_radius: f64, fill: f64, nu: f64, g: f64) -> Formula {
     let (y, scale) = (0.5 * fill / tube_radius, formula::torus_number(tube_radius, nu, g));
-    Damping::new(
+    Formula::new(
         formula::torus(tube_radius, fill, nu, g),
         &[
             ((0.1..=0.9).contains(&y), format!("h/2a = {y:.3} is outside 0.1 to 0.9")),
@@ -95,7 +249,7 @@ pub fn torus(tube_radius: f64, fill: f64, nu: f64, g: f64) -> Damping {
 
 /// Box, `length` along the motion and `width` across it, first mode: the laminar layer in closed form
 /// (Keulegan 1959), beta = 2/a + 2/w + 2 k (1 - 2 h/a)/sinh 2 k h, k = pi/a.
-pub fn keulegan(length: f64, width: f64, fill: f64, nu: f64, g: f64) -> Damping {
+pub fn keulegan(length: f64, width: f64, fill: f64, nu: f64, g: f64) -> Formula {
     let axis = crate::closed_form::box_axis(length, width, fill, 1.0, 1);
     laminar(&axis.modes[0], nu, g)
 }
@@ -130,11 +284,11 @@ fn ring_ranges(ring: Ring, amplitude: f64, reach: f64, covered: f64) -> Vec<(boo
 }
 
 /// Ring baffle in an upright cylinder, `amplitude` of the wave at the wall: see [`formula::miles_ring`].
-pub fn miles_ring(radius: f64, ring: Ring, amplitude: f64) -> Damping {
+pub fn miles_ring(radius: f64, ring: Ring, amplitude: f64) -> Formula {
     let Ring { depth, width } = ring;
     let (reach, covered) =
         (formula::motion_at_ring(radius, depth), formula::covered(radius, width));
-    Damping::new(
+    Formula::new(
         formula::miles_ring(radius, depth, width, amplitude),
         &ring_ranges(ring, amplitude, reach, covered),
     )
@@ -146,7 +300,7 @@ pub fn miles_ring(radius: f64, ring: Ring, amplitude: f64) -> Damping {
 /// rho pi lambda wave^2/m.
 ///
 /// None if no wall is that deep, or for a box.
-pub fn ring(data: &ModalData, ring: Ring, amplitude: f64) -> Option<Damping> {
+pub fn ring(data: &ModalData, ring: Ring, amplitude: f64) -> Option<Formula> {
     let (mode, wall) = (data.modes.first()?, data.wall.as_ref()?);
     let at = mode.wall_speed(wall.z_surface - ring.depth)?;
     let shape = data.rho * PI * mode.lambda * mode.wave * mode.wave / mode.m;
@@ -158,7 +312,7 @@ pub fn ring(data: &ModalData, ring: Ring, amplitude: f64) -> Option<Damping> {
         * at.r
         * shape;
     let w = ring.width / at.r;
-    Some(Damping::new(zeta, &ring_ranges(ring, amplitude, at.ratio, w * (2.0 - w))))
+    Some(Formula::new(zeta, &ring_ranges(ring, amplitude, at.ratio, w * (2.0 - w))))
 }
 
 /// Part of a full ring's damping that a sector keeps: int |cos theta|^(5/2) dtheta/2.8756 between two

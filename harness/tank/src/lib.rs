@@ -8,13 +8,16 @@
 //! * `ring`, `gauss`, `panel`, `potential_flow`: the boundary integral equation
 //! * [`modal`]: modes as pendulums; [`closed_form`]: cylinder, annulus, box
 //! * [`sweep`]: tables over the fill and their [`interpolation`]
+//! * [`fill_table`]: such tables for FMUs whose tanks drain
 //! * [`table()`], [`picture`]: to read and to look at; [`parameters`]: files for the FMUs
-//! * [`damping`], [`low_gravity`], [`third_order`]: what the modal parameters leave out
+//! * [`damping`], [`low_gravity`], [`third_order`]: what the modal parameters leave out; `shape`: which measured shape a
+//!   contour is
 
 pub mod closed_form;
 pub mod contour;
 pub mod curve;
 pub mod damping;
+pub mod fill_table;
 mod gauss;
 pub mod interpolation;
 pub mod low_gravity;
@@ -24,6 +27,7 @@ pub mod parameters;
 pub mod picture;
 mod potential_flow;
 mod ring;
+mod shape;
 mod spline;
 mod svg;
 pub mod sweep;

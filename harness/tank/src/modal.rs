@@ -134,6 +134,42 @@ pub struct Axes {
     pub y: Axis,
 }
 
+/// The damping of a tank's modes, smooth walls.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Damping {
+    /// Kinematic viscosity, m2/s.
+    pub nu: f64,
+    /// Specific force along the axis at which it holds, m/s².
+    pub gravity: f64,
+    /// The measured shape that the wetted wall is, or `other`.
+    pub shape: &'static str,
+    /// Of the first mode by the shape's correlation, where it has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub correlation: Option<f64>,
+    /// What the first mode's was taken from, and why.
+    pub taken: String,
+    /// The modes, in the order of their frequency. Of a box, those along its first length.
+    pub modes: Vec<ModeDamping>,
+    /// Of a box, those along its second length.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub modes_y: Vec<ModeDamping>,
+    /// What leaves the range of a formula, one sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// The damping of one mode.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ModeDamping {
+    /// Natural frequency, capillarity included, rad/s.
+    pub omega: f64,
+    /// Damping ratio.
+    pub zeta: f64,
+    /// Between what it is to be expected.
+    pub interval: [f64; 2],
+    /// By the laminar layer at the wall alone.
+    pub laminar: f64,
+}
+
 /// Modal parameters of a tank at one fill.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ModalData {
@@ -195,6 +231,9 @@ pub struct ModalData {
     pub error_i_0: f64,
     /// Estimated relative error of beta.
     pub error_beta: f64,
+    /// Damping, where the liquid's viscosity is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub damping: Option<Damping>,
     /// The wetted wall.
     #[serde(skip)]
     pub wall: Option<Wall>,
@@ -313,6 +352,7 @@ impl ModalData {
             error: 0.0,
             error_i_0: 0.0,
             error_beta: 0.0,
+            damping: None,
             wall: None,
         }
     }

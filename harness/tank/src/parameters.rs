@@ -47,6 +47,8 @@ pub enum Value {
     Real(f64),
     /// A number of something.
     Integer(i64),
+    /// Yes or no.
+    Boolean(bool),
     /// An item of an enumeration.
     Item(&'static str),
 }
@@ -62,45 +64,6 @@ pub struct ParameterSet {
     pub unknown: Vec<String>,
     /// Names and values.
     pub values: Vec<(String, Value)>,
-}
-
-/// Damping ratios of the modes: of the first by the published correlation of the shape, where there is
-/// one, and 1.45 laminar layers otherwise; of the others of a cylinder the first one's, as HubSlosh has
-/// it, else 1.45 laminar layers.
-fn damping_ratios(
-    tank: &Tank,
-    data: &ModalData,
-    nu: f64,
-    g: f64,
-    notes: &mut Vec<String>,
-    warnings: &mut Vec<String>,
-) -> Vec<f64> {
-    let fill = data.fill;
-    let estimate = |mode: &modal::Mode| damping::estimate(mode, nu, g);
-    let (first, source) = match &tank.geometry {
-        Geometry::Box { length_x, length_y } => {
-            (damping::keulegan(*length_x, *length_y, fill, nu, g), "Keulegan (laminar layer)")
-        }
-        Geometry::Revolution { shape: Some(shape), .. } => match *shape {
-            Shape::Cylinder { radius, .. } => (
-                damping::mikishev_dorozhkin(radius, fill, nu, g),
-                "Mikishev and Dorozhkin, all modes",
-            ),
-            Shape::Sphere { radius } => (damping::sphere(radius, fill, nu, g), "sphere (SP-106)"),
-            Shape::Torus { tube_radius, .. } => {
-                (damping::torus(tube_radius, fill, nu, g), "torus (one tank measured)")
-            }
-            _ => (estimate(&data.modes[0]), "1.45 laminar layers"),
-        },
-        Geometry::Revolution { .. } => (estimate(&data.modes[0]), "1.45 laminar layers"),
-    };
-    notes.push(format!("damping ratio of mode 1: {source}; measured tanks scatter by 30 %"));
-    warnings.extend(first.outside.iter().map(|why| format!("damping: {why}")));
-    let cylinder =
-        matches!(&tank.geometry, Geometry::Revolution { shape: Some(Shape::Cylinder { .. }), .. });
-    let others = data.modes.iter().skip(1);
-    let others = others.map(|mode| if cylinder { first.zeta } else { estimate(mode).zeta });
-    core::iter::once(first.zeta).chain(others).collect()
 }
 
 /// Centring stiffnesses of the modes, N/m: of a flat surface, and of the first mode of an upright cylinder
@@ -167,6 +130,25 @@ fn springs(
     all.iter().map(|capillary| capillary.spring).collect()
 }
 
+/// The damping of a tank's modes with the capillarity of the liquid: see [`damping::of_tank`].
+///
+/// # Errors
+/// No natural frequency, because neither gravity nor surface tension brings the liquid back.
+pub fn damping_of(
+    tank: &Tank,
+    data: &ModalData,
+    nu: f64,
+    liquid: Liquid,
+) -> Result<modal::Damping, Problems> {
+    let stiffnesses = |modes: &[modal::Mode]| {
+        let (mut notes, mut warnings, mut unknown) = (Vec::new(), Vec::new(), Vec::new());
+        springs(tank, data, modes, liquid, &mut notes, &mut warnings, &mut unknown)
+    };
+    let along_y = data.axes.as_ref().map_or(Vec::new(), |axes| stiffnesses(&axes.y.modes));
+    let springs = [&stiffnesses(&data.modes)[..], &along_y[..]];
+    damping::of_tank(tank, data, nu, liquid.gravity, springs, liquid.sigma)
+}
+
 impl ParameterSet {
     /// The parameters of a tank that was solved for `data`, as many modes as both have.
     ///
@@ -220,14 +202,27 @@ impl ParameterSet {
             .into());
         }
         let (mut warnings, mut unknown) = (Vec::new(), Vec::new());
+        let springs = springs(tank, data, modes, liquid, &mut notes, &mut warnings, &mut unknown);
         let ratios = match liquid.nu {
-            Some(nu) => damping_ratios(tank, data, nu, liquid.gravity, &mut notes, &mut warnings),
+            Some(nu) => {
+                let found = damping_of(tank, data, nu, liquid)?;
+                notes.push(format!("damping ratio of mode 1: {}", found.taken));
+                for (n, mode) in found.modes.iter().take(modes.len()).enumerate() {
+                    let [low, high] = mode.interval.map(significant);
+                    let zeta = significant(mode.zeta);
+                    notes.push(format!(
+                        "zeta[{}] = {zeta}, expected between {low} and {high}",
+                        n + 1
+                    ));
+                }
+                warnings.extend(found.warnings);
+                found.modes.iter().map(|mode| mode.zeta).collect()
+            }
             None => {
                 notes.push("no viscosity was given: the damping ratios are 0".to_string());
                 vec![0.0; data.modes.len()]
             }
         };
-        let springs = springs(tank, data, modes, liquid, &mut notes, &mut warnings, &mut unknown);
         // The same of every FMU, under the name of its tank.
         let of_modes = |prefix: &str, values: &mut Vec<(String, Value)>| {
             for (n, mode) in modes.iter().enumerate() {
@@ -244,6 +239,15 @@ impl ParameterSet {
             }
         };
         let mut values = Vec::new();
+        if let Geometry::Box { length_x, length_y } = &tank.geometry
+            && length_x != length_y
+        {
+            notes.push(format!(
+                "the modes are those along the box's first length, {length_x} m: on HubSlosh's hub it lies along the \
+                 tangent, and models that move along both axes (spherical, paraboloid) are refused"
+            ));
+            values.push(("slosh.table.one_axis".into(), Value::Boolean(true)));
+        }
         let mut real = |name: String, value: f64| values.push((name, Value::Real(value)));
         match target {
             Target::HubSlosh => {
@@ -261,6 +265,8 @@ impl ParameterSet {
                 real("tank.I_own".into(), data.i_eff_axis.unwrap_or(0.0));
                 of_modes("slosh.table", &mut values);
                 values.push(("slosh.source".into(), Value::Item("table")));
+                // As the laminar layer that they are made of.
+                values.push(("slosh.damping_law".into(), Value::Item("laminar")));
                 values.push(("slosh.modes".into(), Value::Integer(modes.len() as i64)));
             }
             Target::SloshTank | Target::Spacecraft { .. } => {
@@ -316,6 +322,7 @@ impl ParameterSet {
             let _ = match value {
                 Value::Real(x) => writeln!(text, "\"{name}\" = {x:?}"),
                 Value::Integer(n) => writeln!(text, "\"{name}\" = {n}"),
+                Value::Boolean(flag) => writeln!(text, "\"{name}\" = {flag}"),
                 Value::Item(item) => writeln!(text, "\"{name}\" = \"{item}\""),
             };
         }
@@ -338,6 +345,7 @@ impl ParameterSet {
             let value = match value {
                 Value::Real(x) => format!("<ssv:Real value=\"{x:?}\"/>"),
                 Value::Integer(n) => format!("<ssv:Integer value=\"{n}\"/>"),
+                Value::Boolean(flag) => format!("<ssv:Boolean value=\"{flag}\"/>"),
                 Value::Item(item) => format!("<ssv:Enumeration value=\"{item}\"/>"),
             };
             let _ = writeln!(text, "    <ssv:Parameter name=\"{name}\">{value}</ssv:Parameter>");

@@ -2,7 +2,7 @@
 
 use core::fmt::Write as _;
 
-use crate::modal::{Axis, ModalData, Mode, Rest};
+use crate::modal::{Axis, Damping, ModalData, Mode, Rest};
 
 /// A length in m to 1e-9 m, without zeros at its end: fills found from a volume have 17 digits.
 pub(crate) fn short(length: f64) -> String {
@@ -58,12 +58,49 @@ pub fn table(data: &ModalData, gravity: f64) -> String {
             "\nat 0 m/s² only capillarity brings the liquid back, which is not in this table: f is 0"
         );
     }
+    if let Some(damping) = &data.damping {
+        damping_section(&mut text, damping);
+    }
     let _ = writeln!(
         text,
         "\nestimated error {:.0e}, of I_0 {:.0e}, of beta {:.0e} (relative to the result, the liquid's mass, R)",
         data.error, data.error_i_0, data.error_beta
     );
     text
+}
+
+fn damping_section(text: &mut String, damping: &Damping) {
+    let _ = writeln!(
+        text,
+        "\ndamping at {} m/s², nu {} m2/s: {}",
+        damping.gravity,
+        significant(damping.nu),
+        damping.taken
+    );
+    for (along, modes) in [("", &damping.modes), (" along y", &damping.modes_y)] {
+        if modes.is_empty() {
+            continue;
+        }
+        let _ = writeln!(
+            text,
+            "\n  n{along:9}     f          zeta     expected between       laminar layer"
+        );
+        let _ = writeln!(text, "                Hz");
+        for (n, mode) in modes.iter().enumerate() {
+            let [low, high] = mode.interval;
+            let f = mode.omega / core::f64::consts::TAU;
+            let _ = writeln!(
+                text,
+                " {:2}  {f:17.6}  {:12.4e} {low:10.2e} {high:10.2e} {:15.4e}",
+                n + 1,
+                mode.zeta,
+                mode.laminar
+            );
+        }
+    }
+    for warning in &damping.warnings {
+        let _ = writeln!(text, "  {warning}");
+    }
 }
 
 fn section(

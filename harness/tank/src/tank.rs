@@ -346,6 +346,15 @@ impl Tank {
         }
     }
 
+    /// A tank of a shape, with a liquid of `density`, kg/m³.
+    ///
+    /// # Errors
+    /// Every dimension that is not allowed.
+    pub fn of_shape(shape: Shape, density: f64) -> Result<Tank, Problems> {
+        let geometry = revolution(shape.segments()?, Some(shape))?;
+        Ok(Tank { name: None, density, geometry })
+    }
+
     /// The largest fill, m above the lowest point; none for a box.
     pub fn depth(&self) -> Option<f64> {
         match &self.geometry {

@@ -4,7 +4,7 @@ use crate::common::solve;
 use hubslosh_tank::Tank;
 use hubslosh_tank::damping::{self, Ring};
 use hubslosh_tank::low_gravity::{self, Fluid};
-use hubslosh_tank::parameters::{Liquid, ParameterSet, Target, Value};
+use hubslosh_tank::parameters::{Liquid, ParameterSet, Target, Value, damping_of};
 use std::path::Path;
 
 const BENCH: &str = "shape = { cylinder = { radius = 0.0815, height = 0.3 } }";
@@ -286,4 +286,135 @@ fn curved_meniscus_is_smooth_between_its_values() {
     let zero = low_gravity::cylinder(mode, 0.0815, 0.2, 30.0, fluid);
     assert!(zero.spring > 0.0 && zero.outside.is_empty() && zero.omega2 > 0.0);
     assert_eq!(low_gravity::cylinder(mode, 0.0815, 0.2, 120.0, fluid).outside.len(), 1);
+}
+
+fn damped(
+    shape: &str,
+    fill: f64,
+    nu: f64,
+    gravity: f64,
+    sigma: Option<f64>,
+) -> hubslosh_tank::modal::Damping {
+    let text = format!("density = 1000.0\n{shape}");
+    let tank = Tank::parse(&text, Path::new("")).unwrap();
+    let data = tank.solve(fill, 3).unwrap();
+    damping_of(&tank, &data, nu, Liquid { gravity, nu: Some(nu), sigma, contact_angle: 90.0 })
+        .unwrap()
+}
+
+/// One tank, one number: drawn in one piece or in three, shifted, as an ellipse with equal axes, as the part of another
+/// tank that is wetted.
+#[test]
+fn a_contour_that_is_a_shape_has_the_damping_of_the_shape() {
+    let half = 1.0 / 2.0_f64.sqrt();
+    let pairs = [
+        ("sphere", 0.6, "sphere = { radius = 0.5 }", "arc = [0, 2, 0.5, -90, 90]".to_string()),
+        (
+            "sphere",
+            0.9,
+            "sphere = { radius = 0.5 }",
+            "arc = [0, 0, 0.5, -90, -20] }, { arc = [0, 0, 0.5, -20, 10] }, { arc = [0, 0, 0.5, 10, 90]".to_string(),
+        ),
+        ("sphere", 0.3, "sphere = { radius = 0.5 }", "ellipse = [0, 0.1, 0.5, 0.5, -90, 90]".to_string()),
+        (
+            "upright cylinder",
+            0.2,
+            "cylinder = { radius = 0.5, height = 1 }",
+            "line = [0, 1, 0.5, 1] }, { line = [0.5, 1, 0.5, 1.1] }, { line = [0.5, 1.1, 0.5, 3]".to_string(),
+        ),
+        (
+            "cone",
+            0.4,
+            "cone = { half_angle = 45, height = 1 }",
+            format!("line = [0, 0, {half}, {half}] }}, {{ line = [{half}, {half}, 2, 2]"),
+        ),
+        (
+            "torus",
+            0.08,
+            "torus = { ring_radius = 0.4, tube_radius = 0.0635 }",
+            "arc = [0.4, 0, 0.0635, -270, -80] }, { arc = [0.4, 0, 0.0635, -80, 90]".to_string(),
+        ),
+    ];
+    // In the range of the sphere's correlation, and far outside.
+    for (name, fill, shape, profile) in pairs {
+        for (nu, gravity) in [(1e-6, 0.05), (1e-6, 9.81)] {
+            let given = damped(&format!("shape = {{ {shape} }}"), fill, nu, gravity, None);
+            let drawn = damped(&format!("profile = [{{ {profile} }}]"), fill, nu, gravity, None);
+            assert_eq!((given.shape, drawn.shape), (name, name));
+            for (a, b) in given.modes.iter().zip(&drawn.modes) {
+                assert!((a.zeta / b.zeta - 1.0).abs() < 1e-9, "{name} {} {}", a.zeta, b.zeta);
+                assert!((a.interval[1] / b.interval[1] - 1.0).abs() < 1e-9, "{name}");
+            }
+        }
+    }
+    // A capsule filled above its lower hemisphere is no sphere.
+    let capsule = "profile = [{ arc = [0, 0.5, 0.5, -90, 0] }, { line = [0.5, 0.5, 0.5, 0.502] }, { arc = [0, 0.502, 0.5, 0, 90] }]";
+    let other = damped(capsule, 0.8, 1e-6, 0.05, None);
+    assert_eq!((other.shape, other.correlation), ("other", None));
+    assert_eq!(damped(capsule, 0.4, 1e-6, 0.05, None).shape, "sphere");
+}
+
+/// h/R = 0.2, R = 0.5 m: 1.45 layers are 2.98e-3, 1.06e-3 and 0.56e-3 (by hand, three digits); Stephens has 1.493.
+#[test]
+fn every_mode_of_a_cylinder_has_its_own_layer() {
+    let found =
+        damped("shape = { cylinder = { radius = 0.5, height = 1 } }", 0.1, 1e-6, 9.81, None);
+    for (mode, by_hand) in found.modes.iter().zip([2.98e-3, 1.06e-3, 0.56e-3]) {
+        assert!((mode.zeta * 1.45 / 1.493 / by_hand - 1.0).abs() < 6e-3, "{}", mode.zeta);
+    }
+    // The first one's correlation agrees with the layers: the scatter. The others' were not measured.
+    let [first, second] = [found.modes[0], found.modes[1]];
+    assert!((first.interval[1] / first.interval[0] / (1.3 / 0.7) - 1.0).abs() < 1e-12);
+    assert_eq!(second.interval[0], second.laminar);
+}
+
+/// A sphere of 0.5 m, half full: at 0.05 m/s2 measured, twice the layers; at 9.81 m/s2 not measured.
+#[test]
+fn two_estimates_that_disagree_are_both_written() {
+    let shape = "shape = { sphere = { radius = 0.5 } }";
+    let inside = damped(shape, 0.5, 1e-6, 0.05, None);
+    let (first, layers) = (inside.modes[0], 1.45 * inside.modes[0].laminar);
+    assert_eq!(Some(first.zeta), inside.correlation);
+    assert!((2.1..2.2).contains(&(first.zeta / layers)), "{} {layers}", first.zeta);
+    assert_eq!(first.interval, [first.laminar, 1.3 * first.zeta]);
+    assert!(inside.taken.contains("two estimates disagree") && inside.warnings.is_empty());
+    let outside = damped(shape, 0.5, 1e-6, 9.81, None);
+    assert!((outside.modes[0].zeta / outside.modes[0].laminar / 1.45 - 1.0).abs() < 1e-12);
+    assert!(outside.taken.contains("not measured there") && outside.warnings.len() == 1);
+    let correlation = outside.correlation.unwrap();
+    assert!(outside.modes[0].zeta < correlation && correlation < outside.modes[0].interval[1]);
+}
+
+/// Without gravity the frequency is capillarity's, and the damping finite; at a Bond number of 45 drop-tower tests end
+/// the interval.
+#[test]
+fn damping_follows_capillarity_where_gravity_vanishes() {
+    let shape = "shape = { cylinder = { radius = 0.3, height = 1 } }";
+    let zeta = |g: f64| damped(shape, 0.6, 1e-6, g, Some(0.02)).modes[0].zeta;
+    // omega^2 = sigma xi^3/(rho R^3) of a deep cylinder; Mikishev and Dorozhkin's 1.39 to 1.54 layers.
+    let omega = (0.02 * 1.8412_f64.powi(3) / 1000.0 / 0.3_f64.powi(3)).sqrt();
+    let layer = 1.8368 / 0.3 * (1e-6 / (8.0 * omega)).sqrt();
+    assert!((1.35..1.55).contains(&(zeta(1e-9) / layer)), "{}", zeta(1e-9) / layer);
+    assert!((zeta(0.0) / zeta(1e-9) - 1.0).abs() < 1e-4 && zeta(1e-4) < zeta(0.0));
+    let low = damped(shape, 0.6, 1e-6, 0.01, Some(0.02));
+    assert!(low.warnings.iter().any(|why| why.contains("Bond number 45.0")), "{:?}", low.warnings);
+    assert!(low.modes[0].interval[1] > 1.8 * low.modes[0].zeta);
+}
+
+/// A box of 0.8 m by 0.5 m: along which of them HubSlosh's modes are, and that a liquid that swirls has others.
+#[test]
+fn a_box_with_two_lengths_says_along_which_its_modes_are() {
+    let set = |lengths: &str| {
+        let tank =
+            Tank::parse(&format!("density = 1000.0\nbox = {lengths}"), Path::new("")).unwrap();
+        let data = tank.solve(0.4, 1).unwrap();
+        let liquid = Liquid { gravity: 9.81, nu: None, sigma: None, contact_angle: 90.0 };
+        ParameterSet::new(&tank, &data, Target::HubSlosh, liquid).unwrap()
+    };
+    let two = set("[0.8, 0.5]");
+    assert!(two.values.contains(&("slosh.table.one_axis".to_string(), Value::Boolean(true))));
+    assert!(two.notes.iter().any(|note| note.contains("first length, 0.8 m")), "{:?}", two.notes);
+    assert!(two.to_toml().contains("\"slosh.table.one_axis\" = true\n"));
+    assert!(two.to_ssv().contains("name=\"slosh.table.one_axis\"><ssv:Boolean value=\"true\"/>"));
+    assert!(set("[0.5, 0.5]").values.iter().all(|(name, _)| name != "slosh.table.one_axis"));
 }

@@ -1,7 +1,10 @@
 //! Tables over the fill.
 
 use crate::common::tank;
+use hubslosh_tank::interpolation::Monotone;
+use hubslosh_tank::parameters::{Liquid, Target, Value};
 use hubslosh_tank::sweep::{Depletion, sweep};
+use hubslosh_tank::{Fill, ModalData, fill_table};
 
 fn fills(from: f64, to: f64, count: usize) -> Vec<f64> {
     (0..=count).map(|i| from + (to - from) * i as f64 / count as f64).collect()
@@ -129,4 +132,72 @@ fn every_bad_fill_of_a_sweep_is_reported() {
     assert!(sweep(&tank, &[0.5, 0.4], 2).unwrap_err().to_string().contains("must ascend"));
     assert!(sweep(&tank, &[], 2).is_err());
     assert!(Depletion::new(&sweep(&tank, &[0.5], 2).unwrap()).is_err());
+}
+
+/// The law by which the FMUs interpolate, with the placed points, against solutions at eight fills that are none of
+/// them: frequency and mass within 0.5 %, hinge within 0.5 % of the radius.
+#[test]
+fn twelve_placed_points_are_enough_for_tanks_of_many_shapes() {
+    for shape in [
+        "cylinder = { radius = 0.5, height = 1.5 }",
+        "sphere = { radius = 0.5 }",
+        "domed_cylinder = { radius = 0.5, height = 1.0, bottom = 0.5, top = 0.5 }",
+        "cone = { half_angle = 30, height = 1.0 }",
+    ] {
+        let tank = tank(&format!("density = 1000.0\nshape = {{ {shape} }}"));
+        let height = |share: f64| tank.height_of(Fill::Share(share)).unwrap();
+        let placed = fill_table::place(&tank, height(0.02), height(0.98), 3).unwrap();
+        let rows = &placed.sweep.rows;
+        assert_eq!(rows.len(), fill_table::POINTS);
+        let x: Vec<f64> = rows.iter().map(|row| row.m_liq).collect();
+        let curve = |f: &dyn Fn(&ModalData) -> f64| {
+            Monotone::within(&x, &rows.iter().map(f).collect::<Vec<_>>())
+        };
+        let hinge = |row: &ModalData| row.modes[0].hinge.unwrap();
+        let stiffness = curve(&|row| 1.0 / row.modes[0].l);
+        let bob = curve(&|row| hinge(row) - row.modes[0].l);
+        let share = curve(&|row| row.modes[0].m / row.m_liq);
+        for fill in [0.031, 0.077, 0.152, 0.291, 0.443, 0.672, 0.879, 0.969] {
+            let exact = tank.solve(height(fill), 3).unwrap();
+            let (mode, m) = (&exact.modes[0], exact.m_liq);
+            let frequency = (stiffness.at(m) * mode.l).sqrt() - 1.0;
+            let mass = share.at(m) * m / mode.m - 1.0;
+            let height = (bob.at(m) + 1.0 / stiffness.at(m) - hinge(&exact)) / 0.5;
+            for (what, off) in [("frequency", frequency), ("mass", mass), ("hinge", height)] {
+                assert!(off.abs() < 5e-3, "{shape} at {fill}: {what} {off:.1e}");
+            }
+        }
+    }
+}
+
+/// Names and numbers of a table for both FMUs, and what is refused.
+#[test]
+fn a_table_over_the_fill_is_written_for_the_six_axis_fmus() {
+    let tank = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");
+    let table = sweep(&tank, &[0.1, 0.4, 0.8], 3).unwrap();
+    let liquid = Liquid { gravity: 9.81, nu: None, sigma: None, contact_angle: 90.0 };
+    for (target, prefix) in
+        [(Target::SloshTank, "tank"), (Target::Spacecraft { tank: 2 }, "tank[2]")]
+    {
+        let set = fill_table::parameters(&tank, &table, None, target, liquid).unwrap();
+        let value = |what: &str| {
+            let name = format!("{prefix}.{what}");
+            set.values.iter().find(|(known, _)| *known == name).map(|(_, value)| value.clone())
+        };
+        assert_eq!(value("fill.points"), Some(Value::Integer(3)));
+        assert_eq!(value("liquid_0"), Some(Value::Real(table.rows[2].m_liq)));
+        assert_eq!(value("fill.length[2,3]"), Some(Value::Real(table.rows[2].modes[1].l)));
+        assert_eq!(value("fill.H_0[1]"), Some(Value::Real(table.rows[0].rest(3).height)));
+        assert!(value("m_0").is_none() && value("mass[1]").is_none());
+        assert!(value("zeta[1]").is_some() && value("wave[3]").is_some());
+    }
+    let refused = |table, target| {
+        fill_table::parameters(&tank, table, None, target, liquid).unwrap_err().to_string()
+    };
+    assert!(refused(&table, Target::HubSlosh).contains("does not drain"));
+    let one = sweep(&tank, &[0.4], 3).unwrap();
+    assert!(refused(&one, Target::SloshTank).contains("2 to 12 points"));
+    let empty = sweep(&tank, &[0.0, 0.4], 3).unwrap();
+    assert!(refused(&empty, Target::SloshTank).contains("free surface"));
+    assert!(fill_table::place(&tank, 0.1, 1.0, 3).is_err());
 }

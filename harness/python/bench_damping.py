@@ -1,0 +1,164 @@
+"""Hold models of the liquid, damping that grows with amplitude, and seeds against a bench.
+
+    python3 harness/python/bench_damping.py [--jobs N] [--out FILE.csv]
+
+needs dist/HubSlosh.fmu (``cargo run --release -- pack``) and the packages in requirements.txt. Sine
+sweeps of 1.25 to 3.5 Hz in 2700 s, both fills of the bench, by
+
+* `slosh.model`: linear, spherical, paraboloid, liquid,
+* `slosh.zeta_amplitude`: 0 to 0.016 1/rad,
+* what a real bench has that starts rotary slosh (`SEEDS`).
+
+Of each: the largest hub acceleration at 0.25 N·m and at 0.0125 N·m (central differences of the
+rate at 50 Hz; the second also of the rate as the specified gyro reads it), and the first amplitude
+of the ladder at which the liquid swirls. Rubaga's thesis has 2.21 and 0.222 rad/s², and swirl from
+0.075 to 0.1 N·m. Prints the tables of book/damping.md. Some 500 runs: half an hour of CPU time.
+"""
+
+import argparse
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+import hubslosh
+
+ROOT = Path(__file__).resolve().parents[2]
+FMU = ROOT / "dist" / "HubSlosh.fmu"
+
+FIRST, LAST, DURATION, STEP = 1.25, 3.5, 2700.0, 0.02  # Hz, Hz, s, s
+LADDER = (0.05, 0.06, 0.075, 0.1, 0.125, 0.15, 0.2, 0.25)  # N·m
+SMALL, LARGE = 0.0125, 0.25  # N·m
+FILLS = (0.05, 0.10)  # m
+MODELS = ("linear", "spherical", "paraboloid", "liquid")
+GROWTHS = (0.0, 0.012, 0.016)  # 1/rad
+
+# Parameters, and the standard deviation of white torque noise at 50 Hz, N·m.
+SEEDS = {
+    "none": ({}, 0.0),
+    "waves": ({"init.slosh_angle_radial": np.radians(2.0)}, 0.0),
+    "tilt": ({"bench.tilt": np.radians(0.5), "hub.imbalance": 0.05}, 0.0),
+    "noise": ({}, 2e-3),
+}
+
+# Swirl: over two seconds the radial swing is half of the tangential one and above 3 degrees.
+WINDOW, SHARE, LEAST = 2.0, 0.5, np.radians(3.0)
+
+
+def sweep(amplitude: float, noise: float) -> pd.DataFrame:
+    """Return the torque of the thesis's sweep, linear in frequency, and what else turns the hub."""
+    time = np.arange(round(DURATION / STEP)) * STEP
+    phase = 2 * np.pi * (FIRST * time + (LAST - FIRST) / (2 * DURATION) * time**2)
+    columns = {"time": time, "tau_cmd": amplitude * np.sin(phase)}
+    if noise > 0:
+        columns["tau_ext"] = np.random.default_rng(1).normal(0.0, noise, len(time))
+    return pd.DataFrame(columns)
+
+
+def largest_acceleration(rate: pd.Series) -> float:
+    """Return the largest of central differences at 50 Hz, rad/s²."""
+    values = rate.to_numpy()
+    return float(np.abs(values[2:] - values[:-2]).max() / (2 * STEP))
+
+
+def swirls(run: pd.DataFrame) -> bool:
+    """Return whether the liquid swirls in some window."""
+    count = round(WINDOW / STEP)
+    whole = len(run) // count * count
+    swing = [
+        np.ptp(run[name].to_numpy()[:whole].reshape(-1, count), axis=1) / 2
+        for name in ("slosh_angle_radial", "slosh_angle")
+    ]
+    return bool(np.any((swing[0] > LEAST) & (swing[0] > SHARE * swing[1])))
+
+
+def drive(model: str, growth: float, fill: float, seed: str, amplitude: float) -> pd.DataFrame:
+    """Run one sweep."""
+    more, noise = SEEDS[seed]
+    parameters = {
+        "slosh.model": model,
+        "slosh.zeta_amplitude": growth,
+        "tank.h": fill,
+        "imu.enabled": True,
+        **more,
+    }
+    outputs = ["omega", "omega_imu", "slosh_angle", "slosh_angle_radial"]
+    return hubslosh.simulate(
+        FMU, parameters=parameters, inputs=sweep(amplitude, noise), outputs=outputs
+    )
+
+
+def case(key: tuple[str, float, float, str]) -> dict[str, object]:
+    """Return the bench's numbers of one model, growth, fill and seed."""
+    model, growth, fill, seed = key
+    row: dict[str, object] = dict(
+        zip(("model", "zeta_amplitude", "fill_m", "seed"), key, strict=True)
+    )
+    run = partial(drive, model, growth, fill, seed)
+    small = run(SMALL)
+    row["peak_small"] = largest_acceleration(small["omega"])
+    row["peak_small_gyro"] = largest_acceleration(small["omega_imu"])
+    try:
+        row["peak_large"] = largest_acceleration(run(LARGE)["omega"])
+    except hubslosh.RunError as why:
+        row["refused"] = str(why)
+    row["swirl_from"] = np.nan
+    if model != "linear":
+        for amplitude in LADDER:
+            try:
+                if swirls(run(amplitude)):
+                    row["swirl_from"] = amplitude
+                    break
+            except hubslosh.RunError as why:
+                row["refused"] = str(why)
+                break
+    return row
+
+
+def cases() -> list[tuple[str, float, float, str]]:
+    """Return all cases; a linear liquid stays in its plane, whatever the seed."""
+    every = product(MODELS, GROWTHS, FILLS, SEEDS)
+    return [key for key in every if key[0] != "linear" or key[3] == "none"]
+
+
+HEADS = ("ζ_A, 1/rad", "seed", "peak at 0.25 N·m", "at 0.0125", "with the gyro", "swirl from")
+MEASURED = "| measured (thesis 7.1, 7.2) | | | 2.21 | | 0.222 | 0.075 to 0.1 |"
+
+
+def text(rows: pd.DataFrame) -> str:
+    """Return the tables, Markdown."""
+    lines = []
+    for fill in FILLS:
+        lines.append(" | ".join((f"| {fill * 100:.0f} cm: model", *HEADS)) + " |")
+        lines.append("| --- " * (1 + len(HEADS)) + "|")
+        for row in rows[rows["fill_m"] == fill].itertuples():
+            large = "leaves its range" if np.isnan(row.peak_large) else f"{row.peak_large:.2f}"
+            onset = "none" if np.isnan(row.swirl_from) else f"{row.swirl_from:g}"
+            small, noisy = f"{row.peak_small:.3f}", f"{row.peak_small_gyro:.3f}"
+            swirl = "-" if row.model == "linear" else onset
+            cells = (row.model, f"{row.zeta_amplitude:g}", row.seed, large, small, noisy, swirl)
+            lines.append(f"| {' | '.join(cells)} |")
+        lines += [MEASURED, ""]
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Run all cases and print the tables."""
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--jobs", type=int, default=2, help="processes")
+    options.add_argument("--out", type=Path, help="where to put the rows, CSV")
+    given = options.parse_args()
+    with ProcessPoolExecutor(given.jobs) as pool:
+        rows = pd.DataFrame(pool.map(case, cases()))
+    if "peak_large" not in rows:
+        rows["peak_large"] = np.nan
+    if given.out:
+        rows.to_csv(given.out, index=False)
+    print(text(rows))
+
+
+if __name__ == "__main__":
+    main()

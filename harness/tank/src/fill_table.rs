@@ -1,0 +1,259 @@
+//! Tables over the fill for the six-axis FMUs: which fills to take, so that few of them are enough.
+//!
+//! Between its points an FMU interpolates 1/l, the height of the bob at rest and m/m_liq over the mass of liquid
+//! (`fmu/craft/src/table.rs`, with the slopes of [`formulas::interpolation`]). [`place`] solves at many fills
+//! and moves the points among them until the largest error between the points is least.
+
+use core::f64::consts::PI;
+
+use crate::contour::Problems;
+use crate::interpolation::Monotone;
+use crate::modal::ModalData;
+use crate::parameters::{Liquid, ParameterSet, Target, Value};
+use crate::sweep::{self, Sweep};
+use crate::table::short;
+use crate::tank::Tank;
+
+/// Most points of an FMU's table.
+pub const POINTS: usize = 12;
+
+/// Most modes that a six-axis FMU keeps of a tank.
+const MODES: usize = 3;
+
+/// Fills among which points are placed.
+const CANDIDATES: usize = 97;
+
+/// What an error of 1 is: 0.5 % of a frequency, a mass or the largest radius of the surface.
+const LIMIT: f64 = 5e-3;
+
+/// Fills of a table between two ends, m above the lowest point, and how well they are chosen.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Placed {
+    /// The rows of the table.
+    pub sweep: Sweep,
+    /// Largest errors between the points: of the first mode's frequency and mass, relative, and of its hinge over
+    /// the largest radius of the surface.
+    pub error: [f64; 3],
+}
+
+/// A mode at the candidates: mass of liquid, frequency's square over g, bob, share.
+struct Curves {
+    liquid: Vec<f64>,
+    modes: Vec<[Vec<f64>; 3]>,
+    radius: f64,
+}
+
+impl Curves {
+    fn new(rows: &[ModalData], modes: usize) -> Curves {
+        let of = |n: usize| {
+            [
+                rows.iter().map(|row| 1.0 / row.modes[n].l).collect(),
+                rows.iter().map(|row| bob(row, n)).collect(),
+                rows.iter().map(|row| row.modes[n].m / row.m_liq).collect(),
+            ]
+        };
+        let radius =
+            |row: &ModalData| row.r_surface.or(row.length_x.map(|l| l / 2.0)).unwrap_or(1.0);
+        Curves {
+            liquid: rows.iter().map(|row| row.m_liq).collect(),
+            modes: (0..modes).map(of).collect(),
+            radius: rows.iter().map(radius).fold(0.0, f64::max),
+        }
+    }
+
+    /// Largest errors of a mode with these points, in frequency, mass and hinge.
+    fn errors(&self, n: usize, points: &[usize]) -> [f64; 3] {
+        let taken = |y: &[f64]| points.iter().map(|i| y[*i]).collect::<Vec<_>>();
+        let x = taken(&self.liquid);
+        let mode = &self.modes[n];
+        let curves = mode.each_ref().map(|y| Monotone::within(&x, &taken(y)));
+        let mut worst = [0.0_f64; 3];
+        for (i, liquid) in self.liquid.iter().enumerate() {
+            let [stiffness, bob, share] = curves.each_ref().map(|curve| curve.at(*liquid));
+            let hinge = bob + 1.0 / stiffness - mode[1][i] - 1.0 / mode[0][i];
+            let off = [
+                (stiffness / mode[0][i]).sqrt() - 1.0,
+                share / mode[2][i] - 1.0,
+                hinge / self.radius,
+            ];
+            worst = core::array::from_fn(|k| worst[k].max(off[k].abs()));
+        }
+        worst
+    }
+
+    /// What is to be least: the first mode's largest error, and the others' by their share of its mass.
+    fn cost(&self, points: &[usize]) -> f64 {
+        let heaviest = |n: usize| self.modes[n][2].iter().copied().fold(0.0, f64::max);
+        let of = |n: usize| {
+            let largest = self.errors(n, points).into_iter().fold(0.0, f64::max);
+            largest * (heaviest(n) / heaviest(0)).min(1.0)
+        };
+        (0..self.modes.len()).map(of).fold(0.0, f64::max)
+    }
+}
+
+/// Height of the bob; of a mode that carries nothing, which has none, the liquid's centre.
+fn bob(row: &ModalData, n: usize) -> f64 {
+    row.modes[n].height.unwrap_or(row.z_cg)
+}
+
+/// Modes that carry liquid at every fill, at least one.
+fn carrying(rows: &[ModalData], most: usize) -> usize {
+    let carries =
+        |n: usize| rows.iter().all(|row| row.modes.len() > n && row.modes[n].m > 1e-6 * row.m_liq);
+    (1..most.min(MODES)).take_while(|n| carries(*n)).last().map_or(1, |n| n + 1)
+}
+
+/// Places [`POINTS`] fills between two, m above the lowest point, ends included.
+///
+/// # Errors
+/// Ends without a free surface, and those of a solution.
+pub fn place(tank: &Tank, low: f64, high: f64, modes: usize) -> Result<Placed, Problems> {
+    // closer to the ends, where the surface of a closed tank gets narrow and the modes change most
+    let share = |i: usize| 0.5 - 0.5 * (PI * i as f64 / (CANDIDATES - 1) as f64).cos();
+    let fills: Vec<f64> = (0..CANDIDATES)
+        .map(|i| match i {
+            0 => low,
+            _ if i == CANDIDATES - 1 => high,
+            _ => low + (high - low) * share(i),
+        })
+        .collect();
+    let dense = sweep::sweep(tank, &fills, modes)?.rows;
+    if dense.iter().any(|row| row.modes.is_empty()) {
+        return Err("A table over the fill needs a free surface at every fill: an empty tank and a full one have none."
+            .to_string()
+            .into());
+    }
+    let curves = Curves::new(&dense, carrying(&dense, modes));
+    let mut points: Vec<usize> =
+        (0..POINTS).map(|i| (i * (CANDIDATES - 1) + (POINTS - 1) / 2) / (POINTS - 1)).collect();
+    let mut best = curves.cost(&points);
+    let mut step = 8;
+    while step > 0 {
+        let mut moved = false;
+        for k in 1..POINTS - 1 {
+            for forwards in [true, false] {
+                let to = if forwards { points[k] + step } else { points[k].saturating_sub(step) };
+                if to <= points[k - 1] || to >= points[k + 1] {
+                    continue;
+                }
+                let from = core::mem::replace(&mut points[k], to);
+                let cost = curves.cost(&points);
+                if cost < best * (1.0 - 1e-9) {
+                    (best, moved) = (cost, true);
+                } else {
+                    points[k] = from;
+                }
+            }
+        }
+        if !moved {
+            step /= 2;
+        }
+    }
+    let error = curves.errors(0, &points);
+    let rows = points.iter().map(|i| dense[*i].clone()).collect();
+    Ok(Placed { sweep: Sweep { rows }, error })
+}
+
+/// The parameters of a tank that can drain: those at its largest fill, where it starts, and its table.
+///
+/// # Errors
+/// Those of [`ParameterSet::new`]; HubSlosh, whose tank does not drain; fewer than two fills, or more than [`POINTS`].
+pub fn parameters(
+    tank: &Tank,
+    sweep: &Sweep,
+    error: Option<[f64; 3]>,
+    target: Target,
+    liquid: Liquid,
+) -> Result<ParameterSet, Problems> {
+    let prefix = match target {
+        Target::HubSlosh => {
+            return Err("HubSlosh's tank does not drain: a table over the fill is for SloshTank or Spacecraft."
+                .to_string()
+                .into());
+        }
+        Target::SloshTank => "tank".to_string(),
+        Target::Spacecraft { tank } => format!("tank[{tank}]"),
+    };
+    let rows = &sweep.rows;
+    if !(2..=POINTS).contains(&rows.len()) {
+        return Err(
+            format!("A table over the fill has 2 to {POINTS} points, not {}.", rows.len()).into()
+        );
+    }
+    if rows.iter().any(|row| row.modes.is_empty()) {
+        return Err("A table over the fill needs a free surface at every fill: an empty tank and a full one have none."
+            .to_string()
+            .into());
+    }
+    let (first, last) = (&rows[0], &rows[rows.len() - 1]);
+    let most = rows.iter().map(|row| row.modes.len()).min().unwrap_or(0);
+    let modes = carrying(rows, most);
+    let with_modes = |row: &ModalData| {
+        let row = ModalData { modes: row.modes[..modes].to_vec(), ..row.clone() };
+        ParameterSet::new(tank, &row, target, liquid)
+    };
+    let (least, mut set) = (with_modes(first)?, with_modes(last)?);
+    let zeta = format!("{prefix}.zeta[1]");
+    let ratio = |set: &ParameterSet| {
+        set.values.iter().find_map(|(name, value)| match value {
+            Value::Real(x) if *name == zeta => Some(*x),
+            _ => None,
+        })
+    };
+    if let (Some(low), Some(high)) = (ratio(&least), ratio(&set))
+        && low != high
+    {
+        set.warnings.push(format!(
+            "damping ratios and stiffnesses stay those of the largest fill: zeta[1] is {high:.4} there, {low:.4} at the \
+             least"
+        ));
+    }
+    set.notes.push(format!(
+        "table of {} fills, {} to {} m; liquid_0 is the largest, outlet the tank's lowest point",
+        rows.len(),
+        short(first.fill),
+        short(last.fill)
+    ));
+    if let Some([frequency, mass, hinge]) = error {
+        set.notes.push(format!(
+            "between the points, of mode 1: frequency within {:.2} %, mass {:.2} %, hinge {:.2} % of the surface's \
+             largest radius",
+            100.0 * frequency,
+            100.0 * mass,
+            100.0 * hinge
+        ));
+        if frequency.max(mass).max(hinge) > LIMIT {
+            set.warnings.push(format!(
+                "{} points are few for this tank between these fills: more than {} % between them",
+                rows.len(),
+                100.0 * LIMIT
+            ));
+        }
+    }
+    // what the table has in place of
+    let replaced = ["m_0", "H_0", "I_0", "I_z", "mass[", "length[", "hinge["]
+        .map(|what| format!("{prefix}.{what}"));
+    set.values.retain(|(name, _)| !replaced.iter().any(|start| name.starts_with(start)));
+    let mut real = |what: String, value: f64| {
+        set.values.push((format!("{prefix}.{what}"), Value::Real(value)));
+    };
+    real("liquid_0".to_string(), last.m_liq);
+    real("outlet".to_string(), last.z_lowest);
+    for (i, row) in rows.iter().enumerate() {
+        let (at, rest) = (i + 1, row.rest(modes));
+        real(format!("fill.liquid[{at}]"), row.m_liq);
+        real(format!("fill.H_0[{at}]"), rest.height);
+        // the largest number of modes may leave it below 0 by rounding
+        real(format!("fill.I_0[{at}]"), rest.inertia.max(0.0));
+        real(format!("fill.I_z[{at}]"), row.i_eff_axis.unwrap_or(0.0));
+        for n in 0..modes {
+            let mode = &row.modes[n];
+            real(format!("fill.mass[{},{at}]", n + 1), mode.m);
+            real(format!("fill.length[{},{at}]", n + 1), mode.l);
+            real(format!("fill.hinge[{},{at}]", n + 1), bob(row, n) + mode.l);
+        }
+    }
+    set.values.push((format!("{prefix}.fill.points"), Value::Integer(rows.len() as i64)));
+    Ok(set)
+}

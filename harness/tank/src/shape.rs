@@ -1,0 +1,83 @@
+//! Which shape a contour is, as far as it is wetted: a tank has one damping, however it was drawn.
+
+use formulas::damping;
+
+use crate::contour::Wall;
+use crate::curve::{Point, norm, sub};
+use crate::tank::Shape;
+
+/// How close the wetted wall is to a shape, over its size.
+const SAME: f64 = 1e-6;
+
+/// Places on each segment that are compared.
+const PLACES: usize = 64;
+
+/// A shape whose damping was measured, its wetted part, and how deep it is filled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Recognised {
+    /// Large enough for the fill.
+    pub shape: Shape,
+    /// m above its lowest point.
+    pub fill: f64,
+}
+
+impl Recognised {
+    /// As the formulas have it.
+    pub fn measured(&self) -> damping::Shape {
+        let depth = self.fill;
+        match self.shape {
+            Shape::Cylinder { radius, .. } => damping::Shape::Cylinder { radius, depth },
+            Shape::Sphere { radius } => damping::Shape::Sphere { radius, depth },
+            Shape::Cone { half_angle, .. } => {
+                let radius = depth * half_angle.to_radians().tan();
+                damping::Shape::Cone { radius, half_angle }
+            }
+            Shape::Torus { tube_radius, .. } => damping::Shape::Torus { tube_radius, depth },
+            _ => damping::Shape::Other,
+        }
+    }
+}
+
+/// The sphere, upright cylinder, cone or torus that a wetted wall is.
+/// `fill`: height of the free surface above the lowest point, m.
+pub(crate) fn recognise(wall: &Wall, fill: f64) -> Option<Recognised> {
+    let points: Vec<Point> = wall
+        .segments
+        .iter()
+        .flat_map(|part| (0..=PLACES).map(|i| part.at(i as f64 / PLACES as f64)))
+        .collect();
+    let (first, last) = (*points.first()?, *points.last()?);
+    let (bottom, radius) = (last[1] - fill, last[0]);
+    let size = fill.max(radius);
+    let fits =
+        |distance: &dyn Fn(Point) -> f64| points.iter().all(|p| distance(*p).abs() <= SAME * size);
+    let closed = first[0] <= SAME * size && (first[1] - bottom).abs() <= SAME * size;
+    if closed {
+        // The bottom or the wall, whichever is nearer.
+        if fits(&|p| f64::min((p[1] - bottom).abs(), (p[0] - radius).abs())) {
+            return Some(Recognised { shape: Shape::Cylinder { radius, height: fill }, fill });
+        }
+        let slope = radius / fill;
+        if fits(&|p| (p[0] - slope * (p[1] - bottom)) / slope.hypot(1.0)) {
+            let half_angle = slope.atan().to_degrees();
+            return Some(Recognised { shape: Shape::Cone { half_angle, height: fill }, fill });
+        }
+        // The circle about the axis through bottom and contact line.
+        let sphere = (radius * radius + fill * fill) / (2.0 * fill);
+        if fits(&|p| norm([p[0], p[1] - bottom - sphere]) - sphere) {
+            return Some(Recognised { shape: Shape::Sphere { radius: sphere }, fill });
+        }
+        return None;
+    }
+    // The circle through both contact lines and the lowest point; level contact lines lie symmetrically about it.
+    let tube = {
+        let half = 0.5 * (last[0] - first[0]);
+        (half * half + fill * fill) / (2.0 * fill)
+    };
+    let center = [0.5 * (first[0] + last[0]), bottom + tube];
+    let is_level = (first[1] - last[1]).abs() <= SAME * size;
+    (is_level && center[0] > tube && fits(&|p| norm(sub(p, center)) - tube)).then_some(Recognised {
+        shape: Shape::Torus { ring_radius: center[0], tube_radius: tube },
+        fill,
+    })
+}
