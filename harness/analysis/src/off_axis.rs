@@ -53,6 +53,30 @@ impl OffAxis {
     }
 }
 
+/// The same of a platform that may tilt, from its rates (rad/s) about the hub's axis and about others, each with its
+/// response to the torque: the thesis's own, CEF = Σω_i²/(Σω_i² + ω²) and L = √(Σ|H_i|²)/|H|. The leakage at the
+/// responses' frequencies first; nothing without another rate.
+pub fn of_rates(
+    response: &FrequencyResponse,
+    rate: &[f64],
+    others: &[(&FrequencyResponse, &[f64])],
+) -> (Vec<f64>, Option<OffAxis>) {
+    if others.is_empty() {
+        return (Vec::new(), None);
+    }
+    let leakage: Vec<f64> = (response.response.iter().enumerate())
+        .map(|(k, h)| {
+            let squares: f64 = others.iter().map(|(other, _)| other.response[k].norm_sqr()).sum();
+            squares.sqrt() / h.norm()
+        })
+        .collect();
+    let off: Vec<f64> = (0..rate.len())
+        .map(|k| others.iter().map(|(_, other)| other[k] * other[k]).sum::<f64>().sqrt())
+        .collect();
+    let off_axis = OffAxis::of(&off, rate, &leakage);
+    (leakage, Some(off_axis))
+}
+
 /// The leakage at each frequency, from the radial force's response to the torque (N per N·m) and
 /// the tank's distance from the axis, m.
 pub fn leakage(radial: &FrequencyResponse, arm: f64) -> Vec<f64> {
@@ -61,7 +85,26 @@ pub fn leakage(radial: &FrequencyResponse, arm: f64) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::OffAxis;
+    use super::{OffAxis, of_rates};
+    use crate::{Complex64, FrequencyResponse};
+
+    #[test]
+    fn a_rate_of_a_tenth_about_each_other_axis_is_a_cef_of_a_fiftieth() {
+        let response = |size: f64| FrequencyResponse {
+            frequency: vec![1.0; 4],
+            response: vec![Complex64::new(0.0, size); 4],
+        };
+        let (all, x) = (response(2.0), response(0.2));
+        let (rate, tenth) = ([1.0, -2.0, 3.0, 0.0], [0.1, 0.2, -0.3, 0.0]);
+        let (leakage, found) = of_rates(&all, &rate, &[(&x, &tenth), (&x, &tenth)]);
+        let found = found.unwrap();
+        assert!(
+            (found.median - 0.02 / 1.02).abs() < 1e-15
+                && (found.energy - 0.02 / 1.02).abs() < 1e-15
+        );
+        assert!(leakage.iter().all(|l| (l - 0.02f64.sqrt()).abs() < 1e-15));
+        assert_eq!(of_rates(&all, &rate, &[]), (Vec::new(), None));
+    }
 
     #[test]
     fn a_circling_force_is_half_off_the_axis_and_a_tangential_one_not_at_all() {

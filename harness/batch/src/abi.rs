@@ -8,6 +8,7 @@
 use std::ffi::{c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use crate::feedback::{Closed, Controller, Feedback, Linear, Open};
 use crate::run::{self, Inputs, Instance, Outputs, Run, Stop};
 
 type Set<T> = unsafe extern "C" fn(*mut c_void, *const u32, usize, *const T) -> c_int;
@@ -73,6 +74,52 @@ pub struct CRun {
     pub boolean_outputs: CSignals<c_int>,
 }
 
+/// A controller outside of this library: cycle from 0, time in s, what is measured, place for the
+/// commands. Anything but 0 ends the run.
+pub type Law = unsafe extern "C" fn(usize, f64, *const f64, *mut f64) -> c_int;
+
+/// [`Feedback`] with pointers, and its controller: `law`, or if that is NULL, [`Linear`]. The run has
+/// `cycles` · `parts` + 1 rows.
+#[repr(C)]
+pub struct CFeedback {
+    /// Cycles of the controller.
+    pub cycles: usize,
+    /// See [`Feedback`].
+    pub parts: usize,
+    /// See [`Feedback`].
+    pub switch: usize,
+    /// See [`Feedback`].
+    pub latency: usize,
+    /// How many variables are measured.
+    pub measured: usize,
+    /// Their value references.
+    pub measured_references: *const u32,
+    /// How many inputs are commanded.
+    pub commanded: usize,
+    /// Their value references.
+    pub command_references: *const u32,
+    /// Place for rows × commanded values: the commands in force.
+    pub commands: *mut f64,
+    /// The controller, if it is not linear.
+    pub law: Option<Law>,
+    /// States of the linear controller.
+    pub states: usize,
+    /// states × states
+    pub a: *const f64,
+    /// states × measured
+    pub b: *const f64,
+    /// commanded × states
+    pub c: *const f64,
+    /// commanded × measured
+    pub d: *const f64,
+    /// cycles × measured
+    pub reference: *const f64,
+    /// cycles × commanded
+    pub feedforward: *const f64,
+    /// Four places among the measured, or NULL.
+    pub quaternion: *const usize,
+}
+
 /// Answer of [`hubslosh_batch_run`]: every row is done.
 pub const DONE: c_int = 0;
 /// A call failed; `stop` says which.
@@ -81,7 +128,7 @@ pub const STOPPED: c_int = 1;
 pub const BAD_ARGUMENTS: c_int = 2;
 
 /// Version of this interface; another one has other structures.
-pub const VERSION: c_int = 1;
+pub const VERSION: c_int = 2;
 
 /// The version of this interface.
 #[unsafe(no_mangle)]
@@ -111,16 +158,131 @@ pub unsafe extern "C" fn hubslosh_batch_run(
         };
         // SAFETY: as this function demands.
         let Some(mut run) = (unsafe { run.slices() }) else { return BAD_ARGUMENTS };
-        let caller = Caller { instance, first_order: vec![1; run.reals.references.len()] };
-        match run::run(&caller, &mut run) {
-            Ok(()) => DONE,
-            Err(why) => {
-                *stop = why;
-                STOPPED
-            }
-        }
+        let caller = Caller::new(instance, &run);
+        answer(run::run(&caller, &mut run, &mut Open), stop)
     }))
     .unwrap_or(BAD_ARGUMENTS)
+}
+
+/// As [`hubslosh_batch_run`], with a controller that sets inputs which `run` does not have; see
+/// [`crate::feedback`].
+///
+/// # Safety
+/// As there; the arrays of `feedback` must have the lengths they say.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hubslosh_batch_loop(
+    instance: *const CInstance,
+    run: *const CRun,
+    feedback: *const CFeedback,
+    stop: *mut Stop,
+) -> c_int {
+    catch_unwind(AssertUnwindSafe(|| {
+        // SAFETY: as this function demands; NULL becomes None.
+        let (instance, run, c, stop) =
+            unsafe { (instance.as_ref(), run.as_ref(), feedback.as_ref(), stop.as_mut()) };
+        let (Some(instance), Some(run), Some(c), Some(stop)) = (instance, run, c, stop) else {
+            return BAD_ARGUMENTS;
+        };
+        // SAFETY: as this function demands.
+        let Some(mut run) = (unsafe { run.slices() }) else { return BAD_ARGUMENTS };
+        let caller = Caller::new(instance, &run);
+        let rows = c.cycles.checked_mul(c.parts).and_then(|steps| steps.checked_add(1));
+        if rows != Some(run.time.len()) || c.switch >= c.parts {
+            return BAD_ARGUMENTS;
+        }
+        // SAFETY: as this function demands.
+        let result = match c.law {
+            Some(law) => unsafe { c.feedback(CLaw(law)) }
+                .map(|feedback| run::run(&caller, &mut run, &mut Closed::new(feedback))),
+            None => unsafe { c.linear().and_then(|controller| c.feedback(controller)) }
+                .map(|feedback| run::run(&caller, &mut run, &mut Closed::new(feedback))),
+        };
+        result.map_or(BAD_ARGUMENTS, |result| answer(result, stop))
+    }))
+    .unwrap_or(BAD_ARGUMENTS)
+}
+
+/// What C is told of a run's end.
+fn answer(result: Result<(), Stop>, stop: &mut Stop) -> c_int {
+    match result {
+        Ok(()) => DONE,
+        Err(why) => {
+            *stop = why;
+            STOPPED
+        }
+    }
+}
+
+/// A controller in the host's language.
+struct CLaw(Law);
+
+impl Controller for CLaw {
+    fn command(
+        &mut self,
+        cycle: usize,
+        time: f64,
+        measured: &[f64],
+        command: &mut [f64],
+    ) -> Result<(), c_int> {
+        // SAFETY: the host vouches for its function (`hubslosh_batch_loop`).
+        match unsafe { (self.0)(cycle, time, measured.as_ptr(), command.as_mut_ptr()) } {
+            0 => Ok(()),
+            why => Err(why),
+        }
+    }
+}
+
+impl CFeedback {
+    /// # Safety
+    /// The arrays must have the lengths they say, and nobody else looks at `commands` meanwhile.
+    unsafe fn feedback<'a, C>(&self, controller: C) -> Option<Feedback<'a, C>> {
+        let rows = self.cycles * self.parts + 1;
+        // SAFETY: as this function demands; the checks are those of `slice`.
+        unsafe {
+            let commands = match slice(self.commands, rows.checked_mul(self.commanded)?)?.len() {
+                0 => &mut [],
+                length => std::slice::from_raw_parts_mut(self.commands, length),
+            };
+            Some(Feedback {
+                controller,
+                measured: slice(self.measured_references, self.measured)?,
+                command: slice(self.command_references, self.commanded)?,
+                parts: self.parts,
+                switch: self.switch,
+                latency: self.latency,
+                commands,
+            })
+        }
+    }
+
+    /// # Safety
+    /// As [`CFeedback::feedback`].
+    unsafe fn linear<'a>(&self) -> Option<Linear<'a>> {
+        let matrix = |data, rows: usize, columns: usize| {
+            // SAFETY: as this function demands.
+            unsafe { slice::<f64>(data, rows.checked_mul(columns)?) }
+        };
+        // SAFETY: as this function demands.
+        let quaternion = match self.quaternion.is_null() {
+            true => None,
+            false => Some(<[usize; 4]>::try_from(unsafe { slice(self.quaternion, 4) }?).ok()?),
+        };
+        if quaternion.is_some_and(|at| at.iter().any(|i| *i >= self.measured)) {
+            return None;
+        }
+        Some(Linear {
+            x: vec![0.0; self.states],
+            a: matrix(self.a, self.states, self.states)?,
+            b: matrix(self.b, self.states, self.measured)?,
+            c: matrix(self.c, self.commanded, self.states)?,
+            d: matrix(self.d, self.commanded, self.measured)?,
+            reference: matrix(self.reference, self.cycles, self.measured)?,
+            feedforward: matrix(self.feedforward, self.cycles, self.commanded)?,
+            quaternion,
+            error: vec![0.0; self.measured],
+            next: vec![0.0; self.states],
+        })
+    }
 }
 
 /// A slice of C, or None where it cannot be one.
@@ -193,6 +355,12 @@ struct Caller<'a> {
     instance: &'a CInstance,
     /// A 1 for each Real input: the order of the derivatives.
     first_order: Vec<c_int>,
+}
+
+impl<'a> Caller<'a> {
+    fn new(instance: &'a CInstance, run: &Run) -> Self {
+        Caller { instance, first_order: vec![1; run.reals.references.len()] }
+    }
 }
 
 // SAFETY of all methods: the host vouches for instance and functions (`hubslosh_batch_run`); every

@@ -2,6 +2,8 @@
 
 use std::ffi::c_int;
 
+use crate::feedback::AtPoint;
+
 /// `fmi2OK`.
 pub const OK: c_int = 0;
 /// `fmi2Warning`: the call is done, the FMU has said why it warns.
@@ -27,6 +29,8 @@ pub enum Function {
     GetInteger,
     /// fmi2GetBoolean
     GetBoolean,
+    /// No function of FMI: the controller of a closed loop
+    Controller,
 }
 
 /// An instance after its initialisation, as the loop sees it. Every method returns the `fmi2Status`
@@ -117,7 +121,8 @@ impl<T> Outputs<'_, T> {
 }
 
 /// Drives an instance through a run: at every communication point it reads the outputs, then sets
-/// the inputs and steps on to the next point; after the last step it reads once more.
+/// the inputs and steps on to the next point; after the last step it reads once more. A controller acts
+/// between reading and setting (`at_point`).
 ///
 /// An output is thus its value at the end of the step that leads to its row (at the first row: after
 /// the initialisation). Where an input jumps at a row, an output that follows it at once shows the
@@ -125,7 +130,7 @@ impl<T> Outputs<'_, T> {
 ///
 /// # Errors
 /// The first call that fails ends the run.
-pub fn run(fmu: &impl Instance, run: &mut Run) -> Result<(), Stop> {
+pub fn run(fmu: &impl Instance, run: &mut Run, at_point: &mut impl AtPoint) -> Result<(), Stop> {
     for k in 0..run.time.len() {
         let check = |function, status| match status {
             OK | WARNING => Ok(()),
@@ -136,6 +141,11 @@ pub fn run(fmu: &impl Instance, run: &mut Run) -> Result<(), Stop> {
         check(Function::GetInteger, run.integer_outputs.get(k, |r, v| fmu.get_integer(r, v)))?;
         check(Function::GetBoolean, run.boolean_outputs.get(k, |r, v| fmu.get_boolean(r, v)))?;
         let Some(next) = run.time.get(k + 1) else { break };
+        at_point.act(fmu, k, time).map_err(|(function, status)| Stop {
+            row: k,
+            function,
+            status,
+        })?;
         check(Function::SetReal, run.reals.set(k, |r, v| fmu.set_real(r, v)))?;
         check(Function::SetInteger, run.integers.set(k, |r, v| fmu.set_integer(r, v)))?;
         check(Function::SetBoolean, run.booleans.set(k, |r, v| fmu.set_boolean(r, v)))?;
@@ -154,6 +164,7 @@ mod tests {
     use std::cell::RefCell;
 
     use super::*;
+    use crate::feedback::{Closed, Controller, Feedback, Open};
 
     /// Adds up u·H + slope·H²/2; writes down every call; `fails` at the step from that time.
     #[derive(Default)]
@@ -222,6 +233,7 @@ mod tests {
                 integer_outputs: Outputs { references: &[3], values: &mut integers },
                 boolean_outputs: Outputs { references: &[], values: &mut [] },
             },
+            &mut Open,
         );
         (stop, reals, integers)
     }
@@ -264,5 +276,68 @@ mod tests {
         assert_eq!(stop, Err(Stop { row: 1, function: Function::DoStep, status: 3 }));
         assert_eq!(reals, [0.0, 0.0, 1.0, 1.0, -1.0, -1.0], "rows after it are left alone");
         assert_eq!(fmu.calls.borrow().last().unwrap(), "step 1 2");
+    }
+
+    /// Commands the number of the cycle, counted from 1; fails in cycle `fails`.
+    struct Count {
+        fails: usize,
+    }
+
+    impl Controller for Count {
+        fn command(
+            &mut self,
+            cycle: usize,
+            _: f64,
+            measured: &[f64],
+            command: &mut [f64],
+        ) -> Result<(), c_int> {
+            assert_eq!(measured.len(), 1);
+            command.fill(cycle as f64 + 1.0);
+            if cycle == self.fails { Err(7) } else { Ok(()) }
+        }
+    }
+
+    /// Cycles of 1 s from time 0, each of two steps; commands act `latency` and a half cycle late.
+    fn close(fmu: &Integrator, latency: usize, fails: usize) -> (Result<(), Stop>, [f64; 7]) {
+        let (time, mut commands) = ([0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0], [0.0; 7]);
+        let mut run_data = Run {
+            time: &time,
+            reals: Inputs { references: &[], values: &[] },
+            slopes: None,
+            integers: Inputs { references: &[], values: &[] },
+            booleans: Inputs { references: &[], values: &[] },
+            real_outputs: Outputs { references: &[], values: &mut [] },
+            integer_outputs: Outputs { references: &[], values: &mut [] },
+            boolean_outputs: Outputs { references: &[], values: &mut [] },
+        };
+        let feedback = Feedback {
+            controller: Count { fails },
+            measured: &[8],
+            command: &[4],
+            parts: 2,
+            switch: 1,
+            latency,
+            commands: &mut commands,
+        };
+        (run(fmu, &mut run_data, &mut Closed::new(feedback)), commands)
+    }
+
+    #[test]
+    fn a_command_acts_as_late_as_it_should_and_is_held() {
+        let fmu = Integrator::default();
+        let (stop, commands) = close(&fmu, 0, 9);
+        assert_eq!(stop, Ok(()));
+        assert_eq!(commands[..6], [0.0, 1.0, 1.0, 2.0, 2.0, 3.0]);
+        let expected = ["get [8]", "step 0 0.5", "set [4] [1.0]", "step 0.5 0.5", "get [8]"];
+        assert_eq!(fmu.calls.borrow()[..5], expected);
+        assert_eq!(fmu.sum.borrow()[0], 0.5 * (1.0 + 1.0 + 2.0 + 2.0 + 3.0));
+        let (_, late) = close(&Integrator::default(), 2, 9);
+        assert_eq!(late[..6], [0.0, 0.0, 0.0, 0.0, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn a_controller_that_gives_up_ends_the_run() {
+        let (stop, _) = close(&Integrator::default(), 0, 1);
+        assert_eq!(stop, Err(Stop { row: 2, function: Function::Controller, status: 7 }));
     }
 }

@@ -67,6 +67,26 @@ impl Severity {
     }
 }
 
+/// What a rule says, for programs.
+#[derive(Debug, serde::Serialize)]
+pub struct Statement {
+    rule: &'static str,
+    title: &'static str,
+    source: &'static str,
+    severity: &'static str,
+}
+
+/// All rules.
+pub fn rules() -> Vec<Statement> {
+    let statement = |rule: &Rule| Statement {
+        rule: rule.id,
+        title: rule.title,
+        source: rule.source,
+        severity: rule.severity.name(),
+    };
+    RULES.iter().map(statement).collect()
+}
+
 /// One rule: what must hold, who says so, and how to look.
 pub struct Rule {
     /// Group and name, `group.name`.

@@ -48,7 +48,12 @@ const WINDOWS_LIBRARIES: [&str; 12] = [
     "ws2_32.dll",
 ];
 /// Where the libraries that are part of macOS are.
-const MACOS_LIBRARIES: [&str; 2] = ["/usr/lib/libSystem.B.dylib", "/usr/lib/libc++.1.dylib"];
+const MACOS_LIBRARIES: [&str; 4] = [
+    "/System/Library/Frameworks/CoreFoundation.framework/Versions/A/CoreFoundation",
+    "/usr/lib/libSystem.B.dylib",
+    "/usr/lib/libc++.1.dylib",
+    "/usr/lib/libiconv.2.dylib",
+];
 
 /// Major and minor version.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -135,12 +140,20 @@ impl Binary {
 
     /// What would keep it from loading on a machine without development tools.
     pub fn loading_faults(&self) -> Vec<String> {
+        self.loading_faults_for(match self.kind {
+            Kind::Linux | Kind::Windows => &["x86_64"],
+            Kind::LinuxArm => &["arm64"],
+            Kind::MacOs => &["x86_64", "arm64"],
+        })
+    }
+
+    /// As [`Binary::loading_faults`], of machines with these processors.
+    pub fn loading_faults_for(&self, architectures: &[&str]) -> Vec<String> {
         let mut faults = Vec::new();
-        let (architectures, libraries, newest): (&[_], &[&str], _) = match self.kind {
-            Kind::Linux => (&["x86_64"], &LINUX_LIBRARIES, Some(("glibc", GLIBC))),
-            Kind::LinuxArm => (&["arm64"], &LINUX_LIBRARIES, Some(("glibc", GLIBC))),
-            Kind::Windows => (&["x86_64"], &WINDOWS_LIBRARIES, None),
-            Kind::MacOs => (&["x86_64", "arm64"], &MACOS_LIBRARIES, Some(("macOS", MACOS))),
+        let (libraries, newest): (&[&str], _) = match self.kind {
+            Kind::Linux | Kind::LinuxArm => (&LINUX_LIBRARIES, Some(("glibc", GLIBC))),
+            Kind::Windows => (&WINDOWS_LIBRARIES, None),
+            Kind::MacOs => (&MACOS_LIBRARIES, Some(("macOS", MACOS))),
         };
         for architecture in architectures.iter().filter(|a| !self.architectures.contains(a)) {
             faults.push(format!("it has no code for {architecture}"));

@@ -27,6 +27,8 @@ pub struct ModelDescription {
     pub co_simulation: Option<Interface>,
     /// Present if the host may integrate.
     pub model_exchange: Option<Interface>,
+    /// Units that variables name.
+    pub units: Vec<Unit>,
     /// Named types.
     pub types: Vec<SimpleType>,
     /// Start, stop, tolerance and step the author suggests.
@@ -57,11 +59,33 @@ pub struct DefaultExperiment {
     pub step_size: Option<f64>,
 }
 
+/// Element `Unit`: a unit in which values are exchanged, and those in which people give and read them.
+#[derive(Clone, Debug)]
+pub struct Unit {
+    /// Name used by variables as `unit`.
+    pub name: String,
+    /// Elements `DisplayUnit`.
+    pub display: Vec<DisplayUnit>,
+}
+
+/// Element `DisplayUnit`: a number in it is `factor` times the value, plus `offset`.
+#[derive(Clone, Debug)]
+pub struct DisplayUnit {
+    /// Its name.
+    pub name: String,
+    /// What multiplies the value.
+    pub factor: f64,
+    /// What is added then.
+    pub offset: f64,
+}
+
 /// Element `SimpleType`.
 #[derive(Clone, Debug)]
 pub struct SimpleType {
     /// Name used by variables as `declaredType`.
     pub name: String,
+    /// Unit of variables of this type that name none.
+    pub unit: Option<String>,
     /// The values it can take, if it is an enumeration.
     pub items: Vec<Item>,
 }
@@ -201,6 +225,16 @@ impl Reader {
         }
     }
 
+    fn unit(&mut self, element: &Element) -> Unit {
+        let display = element.children.iter().filter(|child| child.name == "DisplayUnit");
+        let display = display.map(|shown| DisplayUnit {
+            name: self.text(shown, "name"),
+            factor: shown.number("factor").unwrap_or(1.0),
+            offset: shown.number("offset").unwrap_or(0.0),
+        });
+        Unit { display: display.collect(), name: self.text(element, "name") }
+    }
+
     fn item(&mut self, element: &Element) -> Item {
         let value = self.must(element, "value", |text| text.trim().parse().ok());
         Item { name: self.text(element, "name"), value }
@@ -211,6 +245,7 @@ impl Reader {
         SimpleType {
             items: items.map(|item| self.item(item)).collect(),
             name: self.text(element, "name"),
+            unit: element.child("Real").and_then(|real| real.get("unit")).map(String::from),
         }
     }
 
@@ -306,6 +341,7 @@ impl ModelDescription {
             generation_tool: optional("generationTool"),
             co_simulation: root.child("CoSimulation").map(|e| reader.interface(e)),
             model_exchange: root.child("ModelExchange").map(|e| reader.interface(e)),
+            units: root.list("UnitDefinitions").map(|e| reader.unit(e)).collect(),
             types: root.list("TypeDefinitions").map(|e| reader.simple_type(e)).collect(),
             default_experiment: match root.child("DefaultExperiment") {
                 None => DefaultExperiment::default(),
@@ -339,16 +375,58 @@ impl ModelDescription {
         named.map_or(&[], |t| &t.items)
     }
 
-    /// Reads a value of a variable from text.
+    /// The unit in which a variable is exchanged; empty if it has none.
+    pub fn unit<'a>(&'a self, variable: &'a Variable) -> &'a str {
+        let declared = variable.attributes.declared_type.as_ref();
+        let declared = || self.types.iter().find(|t| Some(&t.name) == declared)?.unit.as_ref();
+        variable.attributes.unit.as_ref().or_else(declared).map_or("", String::as_str)
+    }
+
+    /// The units in which people may give a variable, beside its own.
+    pub fn display_units(&self, variable: &Variable) -> &[DisplayUnit] {
+        let own = self.unit(variable);
+        let defined = self.units.iter().find(|unit| unit.name == own);
+        defined.map_or(&[], |unit| &unit.display)
+    }
+
+    /// A number of a Real: `0.05`, or with its own unit or one of its display units, `50mm`, `50 mm`.
+    fn real(&self, variable: &Variable, text: &str) -> Result<f64> {
+        if let Ok(number) = text.parse() {
+            return Ok(number);
+        }
+        let name = &variable.name;
+        let ends = text.char_indices().map(|(i, _)| i).rev();
+        let split = ends.map(|i| text.split_at(i)).find_map(|(number, unit)| {
+            let number: f64 = number.trim_end().parse().ok()?;
+            number.is_finite().then_some((number, unit.trim_start()))
+        });
+        let (number, unit) =
+            split.with_context(|| format!("{name} expects a number, not \"{text}\""))?;
+        let own = self.unit(variable);
+        if unit == own {
+            return Ok(number);
+        }
+        let display = self.display_units(variable);
+        if let Some(shown) = display.iter().find(|shown| shown.name == unit) {
+            return Ok((number - shown.offset) / shown.factor);
+        }
+        let all = [own].into_iter().chain(display.iter().map(|shown| shown.name.as_str()));
+        let all: Vec<&str> = all.filter(|unit| !unit.is_empty()).collect();
+        match all[..] {
+            [] => bail!("{name} has no unit; it expects a number, not \"{text}\""),
+            _ => bail!("{name} has no unit \"{unit}\" (allowed: {})", all.join(", ")),
+        }
+    }
+
+    /// Reads a value of a variable from text; of a Real with or without a unit.
+    ///
+    /// # Errors
+    /// If it is not of the variable's type; the error says what is allowed.
     pub fn value(&self, variable: &Variable, text: &str) -> Result<Value> {
         let name = &variable.name;
         let text = text.trim();
         match variable.kind() {
-            Type::Real => text
-                .parse()
-                .map(Value::Real)
-                .ok()
-                .with_context(|| format!("{name} expects a number, not \"{text}\"")),
+            Type::Real => self.real(variable, text).map(Value::Real),
             Type::Integer => text
                 .parse()
                 .map(Value::Integer)
@@ -422,6 +500,38 @@ mod tests {
         assert_eq!(d.items(model)[1].name, "linear");
         assert_eq!(d.variable("omega").unwrap().attributes().unit.as_deref(), Some("rad/s"));
         assert_eq!(d.variable("wheel.enabled").unwrap().kind(), Type::Boolean);
+    }
+
+    #[test]
+    fn a_number_may_have_the_variable_s_own_unit_or_a_display_unit() {
+        let with_angle = XML.replace(
+            "<ScalarVariable name=\"wheel.enabled\"",
+            "<ScalarVariable name=\"angle\" valueReference=\"9\" causality=\"parameter\" variability=\"fixed\">\
+             <Real unit=\"rad\" start=\"0\"/></ScalarVariable><ScalarVariable name=\"wheel.enabled\"",
+        );
+        let d = ModelDescription::from_xml(&with_angle).unwrap();
+        let angle = d.variable("angle").unwrap();
+        for (text, value) in [
+            ("5e-1", 0.5),
+            ("0.5rad", 0.5),
+            (" -5E-1 rad ", -0.5),
+            ("573deg", 573.0 / 57.3),
+            ("+573 deg", 573.0 / 57.3),
+        ] {
+            assert_eq!(d.value(angle, text).unwrap(), Value::Real(value), "{text}");
+        }
+        for (text, why) in [
+            ("5 mm", "angle has no unit \"mm\" (allowed: rad, deg)"),
+            ("5 deg deg", "angle has no unit \"deg deg\" (allowed: rad, deg)"),
+            ("deg", "angle expects a number, not \"deg\""),
+            ("", "angle expects a number, not \"\""),
+            ("µ5", "angle expects a number, not \"µ5\""),
+        ] {
+            assert_eq!(d.value(angle, text).unwrap_err().to_string(), why);
+        }
+        let omega = d.variable("omega").unwrap();
+        let why = d.value(omega, "5 rpm").unwrap_err().to_string();
+        assert_eq!(why, "omega has no unit \"rpm\" (allowed: rad/s)");
     }
 
     #[test]

@@ -9,14 +9,18 @@ use std::path::Path;
 
 use analysis::statistics::{correlation, deviation, mean, median, peak};
 use anyhow::{Context, Result, bail, ensure};
-use signals::table::{self, Table};
+use signals::recording::{self as files, Between, Columns, Signal, Wanted};
 
 /// Longest time between two rows over which torque is joined by a line, s.
 pub const LONGEST_GAP: f64 = 0.25;
 
-/// Shortest recording, s. A bare tank's slosh decays within some 23 s (1/(ζω) of the thesis's tank);
-/// its half-power width of 14 mHz is resolved by 1/14 mHz = 70 s.
-pub const SHORTEST: f64 = 120.0;
+/// Shortest recording, s: in it, of slosh at 2.4 Hz, some fifty periods.
+pub const SHORTEST: f64 = 20.0;
+
+/// A recording that is long for its slosh, s. A bare tank's slosh decays within some 23 s (1/(ζω) of the
+/// thesis's tank); its half-power width of 14 mHz is resolved by 1/14 mHz = 70 s. A shorter one says less of
+/// damping and mass, and its intervals are as wide as that.
+pub const LONG: f64 = 120.0;
 
 /// One uninterrupted recording.
 #[derive(Clone, Debug)]
@@ -139,22 +143,35 @@ pub const REQUIRED: [&str; 3] = ["time", "tau_cmd", "omega"];
 /// Columns that are used if they are there.
 pub const OPTIONAL: [&str; 5] = ["theta", "g_axial", "wheel_speed", "omega_x", "omega_y"];
 
-/// Reads a file with the columns [`REQUIRED`] and [`OPTIONAL`], in SI units; others are not looked at. Rows
-/// outside `trim` (s) are left out. Rows may be `coarsest` (s) apart. `done` hears what was done to it.
+/// Which columns a file has, and which rows are used.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// Columns and units of the signals.
+    pub columns: Columns,
+    /// What becomes of a torque that is slower than the rows.
+    pub slow: Between,
+    /// First and last time, s.
+    pub trim: Option<(f64, f64)>,
+}
+
+/// Reads a file with the signals [`REQUIRED`] and [`OPTIONAL`]. Rows outside `trim` are left out; rows may be
+/// `coarsest` (s) apart. `done` hears what was done to it.
 pub fn read(
     path: &Path,
-    trim: Option<(f64, f64)>,
+    source: &Source,
     coarsest: f64,
     done: &mut dyn FnMut(String),
 ) -> Result<Vec<Recording>> {
-    let there = table::names(path)?;
-    let optional = OPTIONAL.iter().copied().filter(|name| there.iter().any(|n| n == name));
-    let wanted: Vec<&str> = REQUIRED.iter().copied().chain(optional).collect();
-    let table = Table::read(path, &wanted)?;
+    let signal =
+        |name: &'static str, required: bool, between: Between| Signal { name, required, between };
+    let mut signals =
+        vec![signal("omega", true, Between::Line), signal("tau_cmd", true, source.slow)];
+    signals.extend(OPTIONAL.map(|name| signal(name, false, Between::Line)));
+    let table = files::read(path, &Wanted { signals: &signals, columns: &source.columns }, done)?;
     let maybe = |name: &str| table.column(name).map(<[f64]>::to_vec);
     let column = |name: &str| maybe(name).context("a column that was read");
     let name = path.display().to_string();
-    let mut all = Recording {
+    let all = Recording {
         angle: maybe("theta"),
         gravity: maybe("g_axial"),
         wheel_speed: maybe("wheel_speed"),
@@ -162,13 +179,59 @@ pub fn read(
         from_rest: false,
         ..Recording::of(&name, column("time")?, column("tau_cmd")?, column("omega")?)
     };
-    done(format!("{name}: columns used: {}", wanted.join(", ")));
-    if let Some((from, to)) = trim {
-        let before = all.time.len();
-        all = all.between(from, to);
-        done(format!("{name}: {} rows outside {from} to {to} s left out", before - all.time.len()));
-    }
-    prepare(all, coarsest, done)
+    prepare(trimmed(all, source.trim, done), coarsest, done)
+}
+
+/// What a free decay is seen by, in the order in which they are looked for.
+pub const DECAYING: [&str; 4] = ["wave_height", "force", "theta", "omega"];
+
+/// Reads a free decay, one signal of [`DECAYING`] without a torque: that of `source.columns`, else the first that the
+/// file has. Its name, and its values as the recording's rate.
+pub fn read_decay(
+    path: &Path,
+    source: &Source,
+    done: &mut dyn FnMut(String),
+) -> Result<(&'static str, Recording)> {
+    let name = path.display().to_string();
+    let given = DECAYING.iter().filter(|name| source.columns.names(name)).collect::<Vec<_>>();
+    ensure!(given.len() < 2, "--columns names {} signals; a free decay is one", given.len());
+    let there = files::names(path)?;
+    let found = given
+        .first()
+        .copied()
+        .or_else(|| DECAYING.iter().find(|name| there.iter().any(|n| n == *name)));
+    let Some(found) = found.copied() else {
+        bail!(
+            "{name} has no column {} (columns in it: {}; --columns time=COLUMN,wave_height=COLUMN:UNIT says which is \
+             which)",
+            DECAYING.join(", "),
+            there.join(", ")
+        )
+    };
+    let signals = [Signal { name: found, required: true, between: Between::Line }];
+    let table = files::read(path, &Wanted { signals: &signals, columns: &source.columns }, done)?;
+    let column =
+        |name: &str| table.column(name).map(<[f64]>::to_vec).context("a column that was read");
+    let (time, signal) = (column("time")?, column(found)?);
+    let torque = vec![0.0; time.len()];
+    let all = trimmed(Recording::of(&name, time, torque, signal), source.trim, done);
+    check_growth(&all)?;
+    let seconds = all.duration();
+    ensure!(
+        seconds >= SHORTEST,
+        "{name}: {seconds:.1} s are too few (allowed: at least {SHORTEST} s)"
+    );
+    ensure!(deviation(&all.rate) > 0.0, "{name}: {found} is constant ({})", all.rate[0]);
+    Ok((found, all))
+}
+
+/// The rows within two times.
+fn trimmed(all: Recording, trim: Option<(f64, f64)>, done: &mut dyn FnMut(String)) -> Recording {
+    let Some((from, to)) = trim else { return all };
+    let (before, part) = (all.time.len(), all.between(from, to));
+    let left_out = before - part.time.len();
+    done(format!("{}: {left_out} rows outside {from} to {to} s left out", part.name));
+    part
 }
 
 /// Checks a recording, whose rows may be `coarsest` (s) apart, and cuts it at its gaps.
@@ -195,8 +258,8 @@ pub fn prepare(
         if seconds < SHORTEST {
             ensure!(
                 cuts.len() > 2,
-                "{name}: {seconds:.0} s of data are too few. Slosh of a bare tank decays in some \
-                 23 s and its resonance is 14 mHz wide: at least {SHORTEST} s are needed to see it"
+                "{name}: {seconds:.0} s of data are too few (allowed: at least {SHORTEST} s, and {LONG} s where the \
+                 damping of a bare tank is to be seen: its slosh decays in some 23 s, its resonance is 14 mHz wide)"
             );
             done(format!(
                 "{name}: {seconds:.1} s from {:.2} s on left out: too short",
@@ -210,6 +273,13 @@ pub fn prepare(
             part.name = format!("{name}, part {}", index + 1);
         }
         done(describe(&part));
+        if seconds < LONG {
+            done(format!(
+                "{}: {seconds:.0} s are short for a bare tank, whose resonance takes {LONG} s to be resolved; expect wide \
+                 intervals of damping and mass",
+                part.name
+            ));
+        }
         if let Some(fresh) = &part.fresh {
             let new = fresh.iter().filter(|new| **new).count();
             done(format!(
@@ -247,7 +317,8 @@ fn describe(part: &Recording) -> String {
     )
 }
 
-fn check_time(all: &Recording, coarsest: f64) -> Result<()> {
+/// Fails unless there are rows and their time grows.
+fn check_growth(all: &Recording) -> Result<()> {
     let name = &all.name;
     ensure!(all.time.len() > 2, "{name}: {} rows are too few", all.time.len());
     if let Some(row) = all.time.windows(2).position(|pair| pair[1] <= pair[0]) {
@@ -258,6 +329,12 @@ fn check_time(all: &Recording, coarsest: f64) -> Result<()> {
             all.time[row]
         );
     }
+    Ok(())
+}
+
+fn check_time(all: &Recording, coarsest: f64) -> Result<()> {
+    check_growth(all)?;
+    let name = &all.name;
     let steps: Vec<f64> = all.time.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let step = median(&steps).unwrap_or(0.0);
     ensure!(
@@ -394,7 +471,7 @@ mod tests {
         type Change = fn(&mut Recording);
         let faults: [(Change, &str); 6] = [
             (|r| r.torque.fill(0.1), "tau_cmd is constant (0.1 N·m)"),
-            (|r| *r = r.rows(0, 1500), "30 s of data are too few"),
+            (|r| *r = r.rows(0, 500), "10 s of data are too few"),
             (|r| std::mem::swap(&mut r.torque, &mut r.rate), "swapped"),
             (|r| r.rate.iter_mut().for_each(|w| *w = -*w), "wrong sign"),
             (|r| r.time.iter_mut().for_each(|t| *t *= 1e3), "Is time in milliseconds?"),

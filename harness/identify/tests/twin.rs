@@ -58,6 +58,21 @@ fn parameters_come_back_and_coulomb_and_stribeck_friction_as_their_sum() {
     assert!(found.verdict.iter().any(|line| line.contains("cannot be told apart")));
 }
 
+/// By a start for it, as any parameter that is not estimated by itself.
+#[test]
+fn damping_that_grows_with_the_amplitude_comes_back() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let recordings = [sweep(&fmu, SHORT, &[("slosh.zeta_amplitude", "0.02")])];
+    let starts = vec![("slosh.zeta_amplitude".to_string(), 0.005)];
+    let found = identify(&fmu, &recordings, &Options { starts, ..options() }, &mut |_| {}).unwrap();
+    assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
+    for (name, truth) in [("slosh.zeta", 0.003), ("slosh.zeta_amplitude", 0.02)] {
+        let p = &found.parameters[name];
+        // As above; and known to a tenth, or the fit has learnt nothing.
+        assert!((p.value - truth).abs() < 4.0 * p.std && p.std < 0.1 * truth, "{name}: {p:?}");
+    }
+}
+
 #[test]
 fn the_error_budget_is_what_a_new_fit_gives() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();

@@ -1,5 +1,7 @@
-//! Sampled signals: as columns of files, and their Fourier transforms. What needs the large generic
-//! crates `parquet` and `realfft` stands here, so that their code is compiled once.
+//! Sampled signals: as columns of files, of our own (`table`) and of others (`recording`), and their Fourier
+//! transforms. What needs the large generic crates `parquet` and `realfft` stands here, so that their code is
+//! compiled once.
 
 pub mod fourier;
+pub mod recording;
 pub mod table;

@@ -188,15 +188,24 @@ pub fn names(path: &Path) -> Result<Vec<String>> {
                 let header = reader.headers().context("it has no header row")?;
                 Ok(header.iter().map(|h| h.trim_start_matches('\u{feff}').to_string()).collect())
             }
-            Format::Parquet => {
-                let reader =
-                    SerializedFileReader::new(file).context("it is not a complete Parquet file")?;
-                let schema = reader.metadata().file_metadata().schema_descr();
-                Ok(schema.columns().iter().map(|c| c.name().to_string()).collect())
-            }
+            Format::Parquet => parquet_names(path),
         }
     };
     names().with_context(|| format!("{name} cannot be used"))
+}
+
+/// Names of the columns of a Parquet file.
+pub(crate) fn parquet_names(path: &Path) -> Result<Vec<String>> {
+    let file = File::open(path).context("it cannot be opened")?;
+    let reader = SerializedFileReader::new(file).context("it is not a complete Parquet file")?;
+    let schema = reader.metadata().file_metadata().schema_descr();
+    Ok(schema.columns().iter().map(|c| c.name().to_string()).collect())
+}
+
+/// The columns of a Parquet file, NaN where a value is missing.
+pub(crate) fn parquet_columns(path: &Path, wanted: &[&str]) -> Result<Vec<Vec<f64>>> {
+    let table = read_parquet(File::open(path).context("it cannot be opened")?, wanted)?;
+    Ok(table.columns)
 }
 
 /// Where each wanted column stands, or which are missing.

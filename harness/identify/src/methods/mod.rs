@@ -2,6 +2,7 @@
 
 pub mod acceleration;
 pub mod black_box;
+pub mod free_decay;
 pub mod frequency;
 pub mod multisine;
 pub mod output_error;

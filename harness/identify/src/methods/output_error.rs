@@ -117,7 +117,7 @@ fn fitting_beginning(
     let mut longest = None;
     for part in BEGINNINGS.map(|fraction| recording.beginning(fraction)) {
         let end = part.time[part.time.len() - 1];
-        if part.duration() < recording::SHORTEST {
+        if part.duration() < recording::LONG {
             continue;
         }
         progress(&News::Step(format!(

@@ -23,7 +23,8 @@ const STYLE: &str = "
 body{font:15px/1.5 system-ui,sans-serif;color:var(--ink);background:var(--paper);max-width:62rem;margin:2rem auto;padding:0 1rem}
 h1{font-size:1.5rem}h2{font-size:1.15rem;margin-top:2rem}
 .scroll{overflow-x:auto}table{border-collapse:collapse;font-variant-numeric:tabular-nums}
-th,td{padding:.2rem .7rem;border-bottom:1px solid var(--rule);text-align:right;white-space:nowrap}
+th,td{padding:.2rem .5rem;border-bottom:1px solid var(--rule);text-align:right;white-space:nowrap}
+table{font-size:.88rem}th{white-space:normal;vertical-align:bottom}.numbered th,.numbered td{padding:.2rem .35rem}
 th:first-child,td:first-child{text-align:left}
 th{color:var(--soft);font-weight:500}.doubt{background:var(--warn);padding:.5rem .8rem;border-radius:4px}
 svg{width:100%;min-width:40rem;height:auto;display:block;margin:.6rem 0}
@@ -58,7 +59,10 @@ pub fn of(found: &Identification) -> String {
                 (correlations(found))
                 (budget(found))
                 h2 { "What was done" }
-                ol { @for line in &found.done { li { (line) } } }
+                details {
+                    summary { (found.done.len()) " steps" }
+                    ol { @for line in &found.done { li { (line) } } }
+                }
             }
         }
     };
@@ -81,10 +85,24 @@ fn verdict(found: &Identification) -> Markup {
     }
 }
 
-/// With as many digits as the standard deviation has a meaning for.
+/// With as many digits as the standard deviation has a meaning for; what is small, with a power of ten.
 fn digits(value: f64, deviation: f64) -> String {
     let places = if deviation > 0.0 { 1.0 - deviation.log10().floor() } else { 6.0 };
-    format!("{value:.*}", places.clamp(0.0, 12.0) as usize)
+    match value {
+        _ if value.abs() < 1e-3 * deviation => "0".into(),
+        _ if value.abs() < 1e-5 => format!("{value:.1e}"),
+        _ => format!("{value:.*}", places.clamp(0.0, 9.0) as usize),
+    }
+}
+
+/// A change of an estimate: in per cent, or in its own unit where the estimate is zero within its
+/// standard deviation and a share of it would say nothing.
+fn change(by: f64, p: &Estimated) -> String {
+    match p.value.abs() > p.std {
+        true => format!("{:+.3}", 100.0 * by / p.value),
+        false if by == 0.0 => "0".into(),
+        false => format!("{by:+.1e} {}", prose(&p.unit)).trim_end_matches(" 1").into(),
+    }
 }
 
 fn table<'a>(
@@ -107,7 +125,11 @@ fn parameters(found: &Identification) -> Markup {
             name.clone(),
             digits(p.value, p.std),
             format!("{:.1e}", p.std),
-            format!("{:.3}", 100.0 * p.std / p.value.abs()),
+            match p.value.abs() > p.std {
+                true => format!("{:.3}", 100.0 * p.std / p.value.abs()),
+                // zero within its standard deviation
+                false => "–".into(),
+            },
             format!("{:.1e}", p.std_noise),
             format!("{} to {}", digits(p.interval[0], p.std), digits(p.interval[1], p.std)),
             prose(&p.unit),
@@ -247,12 +269,13 @@ fn correlations(found: &Identification) -> Markup {
         h2 { "Correlations" }
         p { (format!("Condition number of the sensitivities: {:.0}.", found.details.condition)) }
         div class="scroll" {
-            table {
-                tr { th {} @for name in names { th { (name) } } }
-                @for (name, row) in names.iter().zip(matrix) {
+            // the columns have the rows' numbers: names would make it wider than a screen
+            table .numbered {
+                tr { th {} @for number in 1..=names.len() { th { (number) } } }
+                @for (number, (name, row)) in (1..).zip(names.iter().zip(matrix)) {
                     tr {
-                        td { (name) }
-                        @for value in row { td style=(style(*value)) { (format!("{value:.3}")) } }
+                        td { (number) " " (name) }
+                        @for value in row { td style=(style(*value)) { (format!("{value:.2}")) } }
                     }
                 }
             }
@@ -261,22 +284,33 @@ fn correlations(found: &Identification) -> Markup {
 }
 
 fn budget(found: &Identification) -> Markup {
-    let row = |effect: &Effect| {
-        let mut cells = vec![effect.source.clone()];
-        cells.extend(found.parameters.iter().map(|(name, p)| {
-            let change = effect.change.get(name).copied().unwrap_or(0.0);
-            match name.as_str() {
-                "friction.asymmetry" => format!("{change:+.4} abs."),
-                _ => format!("{:+.3}", 100.0 * change / p.value),
-            }
-        }));
-        cells
+    let effects = &found.details.error_budget;
+    let row = |(name, p): (&String, &Estimated)| {
+        let of = |effect: &Effect| change(effect.change.get(name).copied().unwrap_or(0.0), p);
+        std::iter::once(name.clone()).chain(effects.iter().map(of)).collect()
     };
-    let head =
-        std::iter::once("source of error").chain(found.parameters.keys().map(String::as_str));
+    let head = std::iter::once("estimate").chain(effects.iter().map(|e| e.source.as_str()));
     html! {
         h2 { "Error budget" }
-        p { "What an error of something that is not estimated would do to each estimate, in %." }
-        (table(head, found.details.error_budget.iter().map(row)))
+        p { "What an error of something that is not estimated would do to each estimate, in % of it; in its own unit where it is zero within its standard deviation." }
+        (table(head, found.parameters.iter().map(row)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{change, digits};
+    use crate::estimate::Estimated;
+
+    #[test]
+    fn an_estimate_that_is_zero_has_no_per_cent() {
+        let bias = Estimated::normal(-1.4e-14, 9.3e-9, "rad/s");
+        assert_eq!(digits(bias.value, bias.std), "0");
+        assert_eq!(change(6e-4, &bias), "+6.0e-4 rad/s");
+        assert_eq!(change(0.0, &bias), "0");
+        let inertia = Estimated::normal(0.32241, 8.1e-4, "kg.m2");
+        assert_eq!(change(-0.0032241, &inertia), "-1.000");
+        assert_eq!(digits(inertia.value, inertia.std), "0.32241");
+        assert_eq!(digits(-1.82e-8, 9.3e-9), "-1.8e-8");
     }
 }

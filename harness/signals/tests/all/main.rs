@@ -1,4 +1,5 @@
 //! Tests of `signals`, outside the library: its generic crates are compiled once.
 
 mod fourier;
+mod recording;
 mod table;

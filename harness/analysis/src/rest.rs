@@ -1,0 +1,219 @@
+//! A gyro's record at rest: Allan variances, and whether what they are read by is true, noise that is normal, white and
+//! steady (thesis 5.5.3): quantiles beside the normal distribution's, autocorrelation, statistics of chunks.
+
+use signals::fourier::{Forward, Inverse};
+
+use crate::allan::{self, Noise, Point};
+use crate::statistics::{deviation, mean, variance};
+
+/// Quantiles that are compared.
+const QUANTILES: usize = 200;
+/// Chunks, at most.
+const CHUNKS: usize = 1000;
+
+/// What a record at rest shows.
+#[derive(Clone, Debug)]
+pub struct Rest {
+    /// Time between samples, s.
+    pub step: f64,
+    /// Samples.
+    pub count: usize,
+    /// Mean, rad/s: the bias.
+    pub mean: f64,
+    /// Slope of the line that fits best, rad/s².
+    pub trend: f64,
+    /// Of the samples without that line: standard deviation, rad/s, …
+    pub deviation: f64,
+    /// … skewness and excess kurtosis; 0 of a normal distribution.
+    pub skewness: f64,
+    /// See `skewness`.
+    pub kurtosis: f64,
+    /// Smallest change of the reading, rad/s: its quantisation.
+    pub quantum: f64,
+    /// Allan variances of the samples, (rad/s)².
+    pub allan: Vec<Point>,
+    /// The noise that fits them.
+    pub noise: Option<Noise>,
+    /// Standard normal quantile and that of the samples without the line over their standard deviation.
+    pub quantiles: Vec<(f64, f64)>,
+    /// Autocorrelation of the samples without the line, at 0, 1, … steps.
+    pub autocorrelation: Vec<f64>,
+    /// Consecutive chunks.
+    pub chunks: Vec<Chunk>,
+}
+
+/// A part of a record.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Chunk {
+    /// Its beginning, s.
+    pub from: f64,
+    /// Mean of the samples without the record's line, rad/s.
+    pub mean: f64,
+    /// Their variance, (rad/s)².
+    pub variance: f64,
+}
+
+impl Rest {
+    /// Of samples that are `step` (s) apart, in chunks of `chunk` (s), the autocorrelation up to `lag` (s).
+    pub fn of(step: f64, samples: &[f64], chunk: f64, lag: f64) -> Rest {
+        let n = samples.len() as f64;
+        let middle = (n - 1.0) / 2.0;
+        let level = mean(samples);
+        let (mut products, mut squares) = (0.0, 0.0);
+        for (k, sample) in samples.iter().enumerate() {
+            let t = k as f64 - middle;
+            products += t * (sample - level);
+            squares += t * t;
+        }
+        let slope = if squares > 0.0 { products / squares } else { 0.0 };
+        let detrended: Vec<f64> = (samples.iter().enumerate())
+            .map(|(k, sample)| sample - level - slope * (k as f64 - middle))
+            .collect();
+        let sigma = deviation(&detrended);
+        let moment =
+            |power: i32| detrended.iter().map(|x| (x / sigma).powi(power)).sum::<f64>() / n;
+        let changes = samples.windows(2).map(|y| (y[1] - y[0]).abs()).filter(|d| *d > 0.0);
+        let quantum = changes.fold(f64::INFINITY, f64::min);
+        let mut sorted = detrended.clone();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let count = QUANTILES.min(samples.len());
+        let quantiles = (0..count)
+            .map(|k| {
+                let part = (k as f64 + 0.5) / count as f64;
+                (normal_quantile(part), sorted[(part * n) as usize] / sigma)
+            })
+            .collect();
+        let length = ((chunk / step).round() as usize).max(2).max(samples.len() / CHUNKS);
+        let chunks = (detrended.chunks_exact(length).enumerate())
+            .map(|(k, part)| Chunk {
+                from: (k * length) as f64 * step,
+                mean: mean(part),
+                variance: variance(part),
+            })
+            .collect();
+        let allan = allan::variances(step, samples);
+        Rest {
+            step,
+            count: samples.len(),
+            mean: level,
+            trend: slope / step,
+            deviation: sigma,
+            skewness: moment(3),
+            kurtosis: moment(4) - 3.0,
+            quantum: if quantum.is_finite() { quantum } else { 0.0 },
+            noise: Noise::fitted(&allan),
+            allan,
+            quantiles,
+            autocorrelation: autocorrelation(&detrended, (lag / step).round() as usize),
+            chunks,
+        }
+    }
+
+    /// Half of the 95 % interval of the autocorrelation of white noise, 1.96/√n.
+    pub fn white_bound(&self) -> f64 {
+        1.96 / (self.count as f64).sqrt()
+    }
+
+    /// Part of the autocorrelation beyond lag 0 that lies outside the interval of white noise, 0.05 of such.
+    pub fn outside(&self) -> f64 {
+        let rest = &self.autocorrelation[1..];
+        let out = rest.iter().filter(|r| r.abs() > self.white_bound()).count();
+        out as f64 / rest.len().max(1) as f64
+    }
+
+    /// Scatter of the chunks' means over what white noise of the record's standard deviation makes, and of their variances
+    /// over what normal noise makes (√(2/n) of the variance); 1 if the noise is white and steady.
+    pub fn scatter(&self, chunk: usize) -> [f64; 2] {
+        let means: Vec<f64> = self.chunks.iter().map(|chunk| chunk.mean).collect();
+        let variances: Vec<f64> = self.chunks.iter().map(|chunk| chunk.variance).collect();
+        let n = chunk as f64;
+        [
+            deviation(&means) / (self.deviation / n.sqrt()),
+            deviation(&variances) / (self.deviation.powi(2) * (2.0 / n).sqrt()),
+        ]
+    }
+
+    /// Samples of a chunk.
+    pub fn chunk_length(&self) -> usize {
+        self.chunks.get(1).map_or(self.count, |second| (second.from / self.step).round() as usize)
+    }
+}
+
+/// Autocorrelation of a signal without mean at 0 to `lags` steps, Σ x_k x_{k+m} / Σ x².
+fn autocorrelation(signal: &[f64], lags: usize) -> Vec<f64> {
+    let lags = lags.clamp(1, signal.len() - 1);
+    let length = (signal.len() + lags + 1).next_power_of_two();
+    let mut padded = signal.to_vec();
+    padded.resize(length, 0.0);
+    let mut spectrum = Forward::new(length).of(padded);
+    for line in &mut spectrum {
+        *line = (line.norm_sqr()).into();
+    }
+    let sums = Inverse::new(length).of(spectrum);
+    sums[..=lags].iter().map(|sum| sum / sums[0]).collect()
+}
+
+/// The value below which a standard normal variable lies with this probability, by Newton's method on erfc.
+pub fn normal_quantile(part: f64) -> f64 {
+    let mut x = 0.0;
+    for _ in 0..60 {
+        let error = 0.5 * libm::erfc(-x / std::f64::consts::SQRT_2) - part;
+        let density = (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt();
+        // steps of one deviation at most: far out the tangent is flat
+        let by = (error / density).clamp(-1.0, 1.0);
+        x -= by;
+        if by.abs() < 1e-14 {
+            break;
+        }
+    }
+    x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::Random;
+
+    #[test]
+    fn white_normal_noise_on_a_line_is_told_as_that() {
+        let mut random = Random::new(1, 0);
+        let samples: Vec<f64> =
+            (0..100_000).map(|k| 1e-3 + 1e-9 * f64::from(k) + 4e-4 * random.normal()).collect();
+        let rest = Rest::of(0.02, &samples, 100.0, 10.0);
+        // standard errors: mean of a line 4e-4/√1e5 = 1.3e-6, slope √12 σ/(n √n h) = 2.2e-9/s
+        assert!((rest.mean - 1.05e-3).abs() < 4e-6 && (rest.trend - 5e-8).abs() < 7e-9, "{rest:?}");
+        assert!((rest.deviation / 4e-4 - 1.0).abs() < 0.01);
+        assert!(rest.skewness.abs() < 0.03 && rest.kurtosis.abs() < 0.06);
+        assert_eq!((rest.chunks.len(), rest.autocorrelation.len()), (20, 501));
+        // 500 lags of which 5 % lie outside, ± 1 %
+        assert!(rest.outside() < 0.09, "{}", rest.outside());
+        // 20 chunks: the scatter of a scatter is 1/√40 = 16 %
+        let scatter = rest.scatter(rest.chunk_length());
+        assert!(scatter.iter().all(|s| (0.5..1.5).contains(s)), "{scatter:?}");
+        // quantiles between ±2 scatter by 5e-3 or less
+        let off = rest.quantiles.iter().filter(|(x, _)| x.abs() < 2.0).map(|(x, y)| (x - y).abs());
+        assert!(off.fold(0.0, f64::max) < 0.03);
+    }
+
+    #[test]
+    fn a_sum_of_neighbours_is_correlated_by_one_half() {
+        let mut random = Random::new(2, 0);
+        let white: Vec<f64> = (0..50_001).map(|_| random.normal()).collect();
+        let sums: Vec<f64> = white.windows(2).map(|x| x[0] + x[1]).collect();
+        let rest = Rest::of(1.0, &sums, 100.0, 3.0);
+        // standard error 1/√5e4 = 4.5e-3
+        assert!(
+            (rest.autocorrelation[1] - 0.5).abs() < 0.02 && rest.autocorrelation[2].abs() < 0.03
+        );
+        assert!(rest.scatter(100)[0] > 1.2);
+    }
+
+    #[test]
+    fn the_normal_quantiles_are_those_of_the_tables() {
+        for (part, x) in
+            [(0.5, 0.0), (0.975, 1.959_963_984_540_054), (1e-6, -4.753_424_308_822_899)]
+        {
+            assert!((normal_quantile(part) - x).abs() < 1e-10, "{part}");
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! Frequency and damping from free decays ([`analysis::free_decay`]): records without torque of a wave height, a force,
+//! an angle or a rate, of a tank that was shaken once or of a hub that was pushed.
+
+use analysis::free_decay::{self, LEAST_PERIODS, Record, Value};
+use anyhow::{Context, Result};
+use serde::Serialize;
+use signals::recording::{Quantity, quantity};
+
+use super::{Identified, Method, Needs, Task};
+use crate::estimate::Estimated;
+use crate::news::News;
+use crate::recording::noise_level;
+
+/// Residual over the signal's noise, beyond which something else than one decaying oscillation is in it.
+const MOST_RESIDUAL: f64 = 2.0;
+/// Part of the oscillation that another one in the residual has, from which on it is named.
+const NAMED: f64 = 0.02;
+
+/// The result; `measurement` has f, ζ, ζ_A and κ.
+pub type Found = Identified<Details>;
+
+/// What this method alone has to say.
+#[derive(Clone, Debug, Serialize)]
+pub struct Details {
+    /// The signal.
+    pub signal: String,
+    /// Amplitude at the beginning and at the end of each record, in the signal's SI unit.
+    pub amplitudes: Vec<[f64; 2]>,
+    /// Periods of each record.
+    pub periods: Vec<f64>,
+    /// ζ, if it is taken as the same at all amplitudes.
+    pub zeta_constant: f64,
+    /// Root mean square of the residual, in the signal's unit.
+    pub residual: f64,
+    /// The same if ζ is taken as constant.
+    pub residual_constant: f64,
+    /// The signal's white noise, in its unit.
+    pub noise: f64,
+}
+
+/// Fits free decays.
+pub struct FreeDecay {
+    /// Which signal the recordings' rate is.
+    pub signal: &'static str,
+}
+
+impl FreeDecay {
+    /// The signal's unit, and those of ζ_A and κ.
+    fn units(&self) -> [&'static str; 3] {
+        match quantity(self.signal) {
+            Ok(Quantity::Length) => ["m", "1/m", "1/m2"],
+            Ok(Quantity::Force) => ["N", "1/N", "1/N2"],
+            Ok(Quantity::Angle) => ["rad", "1/rad", "1/rad2"],
+            _ => ["rad/s", "s/rad", "s2/rad2"],
+        }
+    }
+}
+
+impl Method for FreeDecay {
+    type Details = Details;
+
+    const NEEDS: Needs = Needs { fmu: false, validation: false };
+
+    fn identify(&self, task: &Task, _: &mut dyn FnMut(&News)) -> Result<Found> {
+        let [unit, inverse, squared] = self.units();
+        let records: Vec<Record> =
+            task.recordings.iter().map(|r| Record { time: &r.time, signal: &r.rate }).collect();
+        let found = free_decay::FreeDecay::of(&records).with_context(|| {
+            format!(
+                "{}: no decaying oscillation of at least {LEAST_PERIODS} periods is seen in {}",
+                task.recordings.iter().map(|r| r.name.as_str()).collect::<Vec<_>>().join(", "),
+                self.signal
+            )
+        })?;
+        let noise = task.recordings.iter().map(|r| noise_level(&r.rate)).fold(0.0, f64::max);
+        let mut answer = Found::new(Details {
+            signal: self.signal.into(),
+            amplitudes: found.amplitudes.clone(),
+            periods: found.periods.clone(),
+            zeta_constant: found.constant,
+            residual: found.residual,
+            residual_constant: found.residual_constant,
+            noise,
+        });
+        let estimates = [
+            ("frequency", found.frequency, "Hz"),
+            ("zeta", found.zeta, "1"),
+            ("zeta_amplitude", found.zeta_amplitude, inverse),
+            ("hardening", found.hardening, squared),
+        ];
+        for (name, Value { value, std }, unit) in estimates {
+            answer.measurement.insert(name.into(), Estimated::normal(value, std, unit));
+        }
+        answer.converged = found.converged;
+        let fits = found.residual < MOST_RESIDUAL * noise.max(1e-9 * found.amplitudes[0][0]);
+        answer.fits = Some(fits);
+        let all = found.amplitudes.iter().flatten();
+        let (least, most) = all.fold((f64::MAX, 0.0_f64), |(a, b), x| (a.min(*x), b.max(*x)));
+        let plus = |value: Value| format!("{:.5} ± {:.5}", value.value, 1.96 * value.std);
+        answer.verdict = vec![
+            format!(
+                "f = {} Hz, ζ = {} at vanishing amplitude (95 % intervals).",
+                plus(found.frequency),
+                plus(found.zeta)
+            ),
+            if found.zeta_amplitude.value.abs() > 1.96 * found.zeta_amplitude.std {
+                format!(
+                    "Damping depends on the amplitude: ζ_A = {:.4} ± {:.4} {inverse}, so ζ is {:.5} at {least:.3} {unit} and \
+                     {:.5} at {most:.3} {unit}, the ends of what was recorded.",
+                    found.zeta_amplitude.value,
+                    1.96 * found.zeta_amplitude.std,
+                    found.zeta_at(least),
+                    found.zeta_at(most)
+                )
+            } else {
+                format!(
+                    "No dependence of the damping on the amplitude is seen: ζ_A = {:.4} ± {:.4} {inverse}; with ζ_A = 0, ζ = \
+                     {:.5}.",
+                    found.zeta_amplitude.value,
+                    1.96 * found.zeta_amplitude.std,
+                    found.constant
+                )
+            },
+            if fits {
+                "One decaying oscillation fits the record: the residual is its noise.".to_string()
+            } else {
+                format!(
+                    "One decaying oscillation does not fit the record: the residual is {:.2} times its noise. The intervals \
+                     have what of the residual lies beside f in them, nothing else.",
+                    found.residual / noise
+                )
+            },
+        ];
+        let (at, size) = found.other;
+        if size > NAMED * most && !fits {
+            answer.verdict.push(format!(
+                "The residual has an oscillation of {:.0} % at {at:.3} Hz: another mode, or a beat with it.",
+                100.0 * size / most
+            ));
+        }
+        Ok(answer)
+    }
+
+    fn lines(found: &Found) -> Vec<String> {
+        let Details { signal, amplitudes, periods, residual, noise, .. } = &found.details;
+        let mut lines: Vec<String> = amplitudes
+            .iter()
+            .zip(periods)
+            .map(|([first, last], periods)| {
+                format!("{signal}: {periods:.0} periods, amplitude from {first:.4} to {last:.4}")
+            })
+            .collect();
+        lines.push(format!("residual {residual:.2e}, noise {noise:.2e}"));
+        lines
+    }
+}

@@ -1,0 +1,146 @@
+//! `--columns time=t,tau_cmd=T_cmd:mNm,omega=gyro_z:deg/s`: which column of a file is which signal, in what
+//! unit.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::str::FromStr;
+
+use anyhow::{Context, Error, Result, bail, ensure};
+
+use super::unit::Quantity;
+
+/// A column of a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Column {
+    /// Its name in the file, or `#3`: the third.
+    pub name: String,
+    /// Its unit, if it is given.
+    pub unit: Option<String>,
+}
+
+/// Signals by name, each with its column.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Columns(BTreeMap<String, Column>);
+
+/// The signals that recordings may have, with what they measure.
+pub const SIGNALS: [(&str, Quantity); 10] = [
+    ("time", Quantity::Time),
+    ("tau_cmd", Quantity::Torque),
+    ("omega", Quantity::Rate),
+    ("omega_x", Quantity::Rate),
+    ("omega_y", Quantity::Rate),
+    ("theta", Quantity::Angle),
+    ("g_axial", Quantity::Acceleration),
+    ("wheel_speed", Quantity::Rate),
+    ("wave_height", Quantity::Length),
+    ("force", Quantity::Force),
+];
+
+/// What a signal measures.
+///
+/// # Errors
+/// If there is no such signal.
+pub fn quantity(signal: &str) -> Result<Quantity> {
+    let known = SIGNALS.iter().find(|(name, _)| *name == signal).map(|(_, quantity)| *quantity);
+    known.with_context(|| {
+        let names: Vec<&str> = SIGNALS.iter().map(|(name, _)| *name).collect();
+        format!("{signal} is no signal of a recording (allowed: {})", names.join(", "))
+    })
+}
+
+impl FromStr for Columns {
+    type Err = Error;
+
+    /// All that is wrong with it is said at once.
+    fn from_str(text: &str) -> Result<Self> {
+        let (mut columns, mut problems) = (BTreeMap::new(), Vec::new());
+        for item in text.split(',').filter(|_| !text.is_empty()) {
+            match one(item.trim()) {
+                Ok((signal, _)) if columns.contains_key(&signal) => {
+                    problems.push(format!("{signal} is given twice"));
+                }
+                Ok((signal, column)) => drop(columns.insert(signal, column)),
+                Err(error) => problems.push(error.to_string()),
+            }
+        }
+        ensure!(problems.is_empty(), "{}", problems.join("; "));
+        Ok(Columns(columns))
+    }
+}
+
+/// `SIGNAL=COLUMN[:UNIT]`; what follows the last colon is the unit.
+fn one(item: &str) -> Result<(String, Column)> {
+    let Some((signal, column)) = item.split_once('=') else {
+        bail!("\"{item}\" is not SIGNAL=COLUMN or SIGNAL=COLUMN:UNIT")
+    };
+    let signal = signal.trim();
+    let quantity = quantity(signal)?;
+    let (name, unit) = match column.rsplit_once(':') {
+        Some((name, unit)) => (name.trim(), Some(unit.trim().to_string())),
+        None => (column.trim(), None),
+    };
+    ensure!(!name.is_empty(), "\"{item}\" names no column");
+    if let Some(unit) = &unit {
+        ensure!(
+            quantity.factor(unit).is_some(),
+            "{signal}: \"{unit}\" is no unit of {quantity} (allowed: {})",
+            quantity.units()
+        );
+    }
+    Ok((signal.into(), Column { name: name.into(), unit }))
+}
+
+impl fmt::Display for Columns {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        for (k, (signal, column)) in self.0.iter().enumerate() {
+            write!(f, "{}{signal}={}", if k == 0 { "" } else { "," }, column.name)?;
+            if let Some(unit) = &column.unit {
+                write!(f, ":{unit}")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Columns {
+    /// The column of a signal; the one of its own name unless another is given.
+    pub fn of(&self, signal: &str) -> Column {
+        let own = || Column { name: signal.into(), unit: None };
+        self.0.get(signal).cloned().unwrap_or_else(own)
+    }
+
+    /// Whether a signal's column was given.
+    pub fn names(&self, signal: &str) -> bool {
+        self.0.contains_key(signal)
+    }
+
+    /// The signals whose columns were given.
+    pub fn signals(&self) -> impl Iterator<Item = &str> {
+        self.0.keys().map(String::as_str)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn columns_and_units_are_told_apart_and_every_fault_is_named() {
+        let columns: Columns = "time=t,tau_cmd=T_cmd:mNm, omega=gyro_z:deg/s".parse().unwrap();
+        let column = |name: &str, unit: Option<&str>| Column {
+            name: name.into(),
+            unit: unit.map(String::from),
+        };
+        assert_eq!(columns.of("tau_cmd"), column("T_cmd", Some("mNm")));
+        assert_eq!(columns.of("time"), column("t", None));
+        assert_eq!(columns.of("theta"), column("theta", None));
+        let error = "torque=T,omega=w:deg,time".parse::<Columns>().unwrap_err().to_string();
+        for words in [
+            "torque is no signal of a recording (allowed: time, tau_cmd,",
+            "omega: \"deg\" is no unit of a rate (allowed: rad/s, mrad/s, deg/s,",
+            "\"time\" is not SIGNAL=COLUMN",
+        ] {
+            assert!(error.contains(words), "{error}");
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! Rows on an even grid, for what needs one: spectra, Allan variances.
+
+use anyhow::{Result, ensure};
+
+use super::SHORT;
+use crate::table::Table;
+
+/// Part of the step by which times may be off the grid and count as on it.
+const OFF: f64 = 1e-3;
+/// Part of the record that may be missing and is joined by lines.
+const MISSING: f64 = 0.01;
+
+/// The table on an even grid, and its step, s. Values of rows that lie on one are as they are; else they are
+/// joined by lines, over gaps too, as long as these are little of the whole. `done` hears it.
+///
+/// # Errors
+/// If time does not grow, or if too much is missing.
+pub fn even(table: Table, done: &mut dyn FnMut(String)) -> Result<(f64, Table)> {
+    let time = table.column("time").unwrap_or_default();
+    let rows = time.len();
+    ensure!(rows > 2, "{rows} rows are too few");
+    if let Some(row) = time.windows(2).position(|pair| pair[1] <= pair[0]) {
+        anyhow::bail!(
+            "row {}: time must grow, but {} s follows {} s",
+            row + 2,
+            time[row + 1],
+            time[row]
+        );
+    }
+    let (first, last) = (time[0], time[rows - 1]);
+    let mean = (last - first) / (rows - 1) as f64;
+    if time.iter().enumerate().all(|(k, t)| (t - first - k as f64 * mean).abs() < OFF * mean) {
+        return Ok((mean, table));
+    }
+    let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let usual = *steps.select_nth_unstable_by((rows - 1) / 2, f64::total_cmp).1;
+    let gaps =
+        time.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap > SHORT.max(1.5 * usual));
+    let (count, missing) = gaps.fold((0, 0.0), |(n, sum), gap| (n + 1, sum + gap));
+    ensure!(
+        missing < MISSING * (last - first),
+        "rows are missing for {missing:.1} of {:.1} s, in {count} gaps (allowed: {} %)",
+        last - first,
+        100.0 * MISSING
+    );
+    let lost = time.windows(2).filter(|pair| pair[1] - pair[0] > 1.5 * usual).count();
+    // the whole number of steps that is nearest
+    let count_of = ((last - first) / usual).round().max(1.0);
+    let step = (last - first) / count_of;
+    done(format!(
+        "its rows are not equally spaced ({usual:.6} s mostly, in {lost} places more than 1.5 times that): they are joined by \
+         lines on a grid of {step:.6} s"
+    ));
+    let grid: Vec<f64> = (0..=count_of as usize).map(|k| first + k as f64 * step).collect();
+    let columns = table.names().iter().map(|name| {
+        let values = table.column(name).unwrap_or_default();
+        let mut row = 0;
+        let at = |t: &f64| {
+            while row + 2 < rows && time[row + 1] < *t {
+                row += 1;
+            }
+            let part = ((t - time[row]) / (time[row + 1] - time[row])).clamp(0.0, 1.0);
+            values[row] + part * (values[row + 1] - values[row])
+        };
+        if name == "time" { grid.clone() } else { grid.iter().map(at).collect() }
+    });
+    Ok((step, Table::new(table.names().to_vec(), columns.collect())))
+}

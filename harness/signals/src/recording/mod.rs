@@ -1,0 +1,350 @@
+//! Recordings: signals in SI units from files that others wrote. Text in columns, Parquet and MATLAB's `.mat`
+//! are told apart by their endings; which column is which signal, in what unit, is said by [`Columns`], by a
+//! row of units or by units in the names of the columns (`gyro_z [deg/s]`).
+//!
+//! The rows of a recording are those with a value of one signal, its rows' signal. Where another one has none,
+//! because it is slower or was lost, it is completed: held, or joined by lines. Nothing is resampled.
+
+mod columns;
+mod even;
+mod matlab;
+mod text;
+mod unit;
+
+use std::path::Path;
+
+use anyhow::{Context, Result, anyhow, bail, ensure};
+
+pub use self::columns::{Column, Columns, SIGNALS, quantity};
+pub use self::even::even;
+pub use self::unit::Quantity;
+use crate::table::{self, Table};
+
+/// Names and units of a file's columns.
+struct Header {
+    names: Vec<String>,
+    /// As they are written; `None` where none is.
+    units: Vec<Option<String>>,
+}
+
+impl Header {
+    /// From names, which may end in a unit in brackets, and a row of units.
+    fn of(names: Vec<String>, row: Option<Vec<String>>) -> Header {
+        let mut header = Header { names: Vec::new(), units: Vec::new() };
+        for (k, name) in names.into_iter().enumerate() {
+            let (bare, unit) = bracketed(&name).unwrap_or((&name, ""));
+            let below = row.as_ref().and_then(|row| row.get(k)).map(|unit| unit.as_str());
+            let unit = below.unwrap_or(unit).trim_matches(['[', ']', '(', ')', ' ']);
+            header.units.push((!unit.is_empty()).then(|| unit.to_string()));
+            header.names.push(bare.to_string());
+        }
+        header
+    }
+
+    /// Columns without a name are called by their numbers.
+    fn widen(&mut self, width: usize) {
+        for k in self.names.len()..width {
+            self.names.push(format!("#{}", k + 1));
+            self.units.push(None);
+        }
+    }
+
+    /// Where a column stands.
+    fn place(&self, column: &str) -> Result<usize> {
+        let number = column.strip_prefix('#').and_then(|number| number.parse::<usize>().ok());
+        if let Some(place) = number.filter(|n| (1..=self.names.len()).contains(n)) {
+            return Ok(place - 1);
+        }
+        let bare = bracketed(column).map_or(column, |(name, _)| name);
+        let found: Vec<usize> = (0..self.names.len()).filter(|k| self.names[*k] == bare).collect();
+        match found[..] {
+            [place] => Ok(place),
+            [] => Err(anyhow!("no column {column}")),
+            _ => Err(anyhow!("more than one column {column} (#{} and others)", found[0] + 1)),
+        }
+    }
+}
+
+/// Name and unit of `torque [mNm]` or `torque (mNm)`.
+fn bracketed(name: &str) -> Option<(&str, &str)> {
+    let (open, close) = match name.chars().last()? {
+        ']' => ('[', ']'),
+        ')' => ('(', ')'),
+        _ => return None,
+    };
+    let (bare, unit) = name.rsplit_once(open)?;
+    let (bare, unit) = (bare.trim(), unit.trim_end_matches(close).trim());
+    // `data(3)` of a .mat file is a name
+    let number = unit.chars().all(|c| c.is_ascii_digit());
+    (!bare.is_empty() && !number).then_some((bare, unit))
+}
+
+/// The columns that were read; NaN where a value is missing.
+struct Found {
+    columns: Vec<Vec<f64>>,
+    /// The first row's date, if time is dates: time counts from there.
+    origin: Option<String>,
+}
+
+/// What becomes of a signal in rows that have no value of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Between {
+    /// The last value, as of a command that is held.
+    Held,
+    /// A line from the last value to the next.
+    Line,
+}
+
+/// A signal that is wanted of a recording.
+#[derive(Clone, Copy, Debug)]
+pub struct Signal {
+    /// One of [`SIGNALS`].
+    pub name: &'static str,
+    /// It must be there.
+    pub required: bool,
+    /// How it is completed.
+    pub between: Between,
+}
+
+/// What is wanted of a recording beside its time.
+#[derive(Clone, Copy, Debug)]
+pub struct Wanted<'a> {
+    /// The first is the rows' signal.
+    pub signals: &'a [Signal],
+    /// Which columns they are.
+    pub columns: &'a Columns,
+}
+
+/// Times from here on, s, are counted from the recording's beginning: seconds since 1970, say.
+const LATE: f64 = 1e6;
+/// Rows that a slow signal may miss in succession, in units of its usual spacing, and at least [`SHORT`].
+const LOST: f64 = 10.0;
+/// Spacing, in units of the usual one, from which on a value in between must have been lost.
+const LATE_BY: f64 = 1.5;
+/// Time over which any signal may be completed, s.
+const SHORT: f64 = 0.25;
+
+/// Names of a file's columns, units in brackets left out.
+pub fn names(path: &Path) -> Result<Vec<String>> {
+    let file = File::open(path).with_context(|| format!("{} cannot be used", path.display()))?;
+    Ok(file.header().names.clone())
+}
+
+/// Reads a recording: `time` (s) and the signals that are there, in SI units. `done` hears what was done to it.
+///
+/// # Errors
+/// If the file cannot be read so; all that is wrong with its columns is said at once.
+pub fn read(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result<Table> {
+    let name = path.display().to_string();
+    read_as(path, wanted, &mut |words| done(format!("{name}: {words}")))
+        .with_context(|| format!("{name} cannot be used"))
+}
+
+/// The kinds of files.
+enum File {
+    Text(text::Layout),
+    Parquet(Header),
+    Matlab(Header),
+}
+
+impl File {
+    fn open(path: &Path) -> Result<File> {
+        let ending = path.extension().and_then(|e| e.to_str()).map(str::to_lowercase);
+        match ending.as_deref() {
+            Some("csv" | "txt" | "tsv" | "dat" | "asc" | "log") => {
+                Ok(File::Text(text::Layout::of(path)?))
+            }
+            Some("parquet") => {
+                let header = |names| Header::of(names, None);
+                Ok(File::Parquet(header(table::parquet_names(path)?)))
+            }
+            Some("mat") => Ok(File::Matlab(matlab::header(path)?)),
+            _ => bail!(
+                "the name must end in .csv, .txt, .tsv, .dat, .asc or .log (text in columns), .parquet or .mat"
+            ),
+        }
+    }
+
+    fn header(&self) -> &Header {
+        match self {
+            File::Text(layout) => &layout.header,
+            File::Parquet(header) | File::Matlab(header) => header,
+        }
+    }
+}
+
+fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result<Table> {
+    let file = File::open(path)?;
+    let header = file.header();
+    // time first, then the signals that are there
+    let rows_signal = wanted.signals[0];
+    let time = Signal { name: "time", required: true, between: Between::Line };
+    let (mut signals, mut places, mut factors) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut problems, mut used) = (Vec::new(), Vec::new());
+    let of_use = |name: &str| name == "time" || wanted.signals.iter().any(|s| s.name == name);
+    let names: Vec<&str> = wanted.signals.iter().map(|signal| signal.name).collect();
+    problems.extend(wanted.columns.signals().filter(|name| !of_use(name)).map(|name| {
+        format!("--columns {name} is of no use here (allowed: time, {})", names.join(", "))
+    }));
+    for signal in [&time].into_iter().chain(wanted.signals) {
+        let column = wanted.columns.of(signal.name);
+        let place = match header.place(&column.name) {
+            Ok(place) => place,
+            Err(_) if !signal.required && !wanted.columns.names(signal.name) => continue,
+            Err(error) => {
+                problems.push(error.to_string());
+                continue;
+            }
+        };
+        let quantity = quantity(signal.name)?;
+        let unit = column.unit.clone().or_else(|| header.units[place].clone());
+        let factor = match &unit {
+            None => Some(1.0),
+            Some(unit) => quantity.factor(unit),
+        };
+        let Some(factor) = factor else {
+            problems.push(format!(
+                "column {}: \"{}\" is no unit of {quantity} (allowed: {}); --columns {}={}:UNIT says which it is",
+                header.names[place],
+                unit.unwrap_or_default(),
+                quantity.units(),
+                signal.name,
+                column.name
+            ));
+            continue;
+        };
+        used.push(match &unit {
+            Some(unit) => format!("{} = {} in {unit}", signal.name, header.names[place]),
+            None if header.names[place] == signal.name => signal.name.to_string(),
+            None => format!("{} = {}", signal.name, header.names[place]),
+        });
+        signals.push(*signal);
+        places.push(place);
+        factors.push(factor);
+    }
+    ensure!(
+        problems.is_empty(),
+        "{} (columns in it: {}; --columns SIGNAL=COLUMN:UNIT,... says which is which)",
+        problems.join("; "),
+        header.names.join(", ")
+    );
+    let found = match &file {
+        File::Text(layout) => {
+            layout.notes.iter().cloned().for_each(&mut *done);
+            layout.read(path, &places, done)?
+        }
+        File::Parquet(header) => {
+            let names: Vec<&str> = places.iter().map(|p| header.names[*p].as_str()).collect();
+            Found { columns: table::parquet_columns(path, &names)?, origin: None }
+        }
+        File::Matlab(header) => matlab::read(path, header, &places)?,
+    };
+    done(format!("columns used: {}", used.join(", ")));
+    let Found { mut columns, origin } = found;
+    for (column, factor) in columns.iter_mut().zip(&factors) {
+        if *factor != 1.0 && !(origin.is_some() && *factor == factors[0]) {
+            column.iter_mut().for_each(|value| *value *= factor);
+        }
+    }
+    if let Some(origin) = origin {
+        done(format!("its times are dates: time counts from {origin}"));
+    }
+    let names = signals.iter().map(|signal| signal.name.to_string()).collect();
+    let columns = complete(&signals, columns, rows_signal.name, done)?;
+    Ok(Table::new(names, columns))
+}
+
+/// The rows with a value of the rows' signal; the other signals completed there.
+fn complete(
+    signals: &[Signal],
+    mut columns: Vec<Vec<f64>>,
+    rows_signal: &str,
+    done: &mut dyn FnMut(String),
+) -> Result<Vec<Vec<f64>>> {
+    let time = &columns[0];
+    ensure!(!time.is_empty(), "it has no rows of values");
+    if let Some(row) = time.iter().position(|t| t.is_nan()) {
+        bail!("row {} of its values has no time", row + 1);
+    }
+    let origin = if time[0].abs() > LATE { time[0] } else { 0.0 };
+    if origin != 0.0 {
+        done(format!("time counts from its first row, {origin} s"));
+        columns[0].iter_mut().for_each(|t| *t -= origin);
+    }
+    let complete = |column: &Vec<f64>| column.iter().all(|value| !value.is_nan());
+    if columns.iter().all(complete) {
+        return Ok(columns);
+    }
+    let rows = columns[0].len();
+    let mut keep = vec![true; rows];
+    let (time, rest) = columns.split_first_mut().context("a recording without time")?;
+    for (signal, column) in signals[1..].iter().zip(rest) {
+        let there: Vec<usize> = (0..rows).filter(|k| !column[*k].is_nan()).collect();
+        let name = signal.name;
+        ensure!(there.len() > 1, "{name} has values in {} rows (allowed: at least 2)", there.len());
+        if there.len() == rows {
+            continue;
+        }
+        if name == rows_signal {
+            keep.iter_mut().zip(column.iter()).for_each(|(keep, value)| *keep &= !value.is_nan());
+            done(format!("{} of {rows} rows have no {name} and are left out", rows - there.len()));
+            continue;
+        }
+        let mut spacings: Vec<f64> = there.windows(2).map(|k| time[k[1]] - time[k[0]]).collect();
+        let usual = *spacings.select_nth_unstable_by((there.len() - 1) / 2, f64::total_cmp).1;
+        let longest = SHORT.max(LOST * usual);
+        let how = match signal.between {
+            Between::Held => "held",
+            Between::Line => "joined by lines",
+        };
+        done(format!(
+            "{name} has a value in {} of {rows} rows, {usual:.4} s apart; it is {how} in between",
+            there.len()
+        ));
+        let late = there.windows(2).filter(|k| time[k[1]] - time[k[0]] > LATE_BY * usual).count();
+        if late > 0 {
+            done(format!(
+                "{name}: {late} times the next value comes late: one is lost, and what {name} was in between is a guess"
+            ));
+        }
+        let mut lost = 0;
+        for pair in there.windows(2) {
+            let (from, to) = (pair[0], pair[1]);
+            let span = time[to] - time[from];
+            for k in from + 1..to {
+                if span > longest {
+                    keep[k] = false;
+                    lost += 1;
+                    continue;
+                }
+                column[k] = match signal.between {
+                    Between::Held => column[from],
+                    Between::Line if span > 0.0 => {
+                        column[from] + (time[k] - time[from]) / span * (column[to] - column[from])
+                    }
+                    Between::Line => column[from],
+                };
+            }
+        }
+        // before its first value and, unless it is held a usual spacing longer, after its last
+        let last = there[there.len() - 1];
+        for k in (0..there[0]).chain(last + 1..rows) {
+            let holds = k > last && signal.between == Between::Held && time[k] - time[last] < usual;
+            if holds {
+                column[k] = column[last];
+            } else {
+                keep[k] = false;
+                lost += 1;
+            }
+        }
+        if lost > 0 {
+            done(format!("{lost} rows in which {name} is not known are left out"));
+        }
+    }
+    for column in &mut columns {
+        let mut keep = keep.iter();
+        column.retain(|_| keep.next().copied().unwrap_or(false));
+    }
+    ensure!(!columns[0].is_empty(), "no row of it has a value of every signal");
+    Ok(columns)
+}

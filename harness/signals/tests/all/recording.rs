@@ -1,0 +1,250 @@
+//! Recordings in every form in which loggers write them give the same numbers, and a wrong one is told where it is wrong.
+
+use std::path::{Path, PathBuf};
+
+use signals::recording::{Between, Columns, Signal, Wanted, even, read};
+use signals::table::Table;
+
+const fn signal(name: &'static str, required: bool) -> Signal {
+    Signal { name, required, between: Between::Held }
+}
+
+/// The rate has the rows; the torque is held, the angle joined by lines.
+const SIGNALS: [Signal; 3] = [
+    signal("omega", true),
+    signal("tau_cmd", true),
+    Signal { name: "theta", required: false, between: Between::Line },
+];
+
+fn columns(text: &str) -> Columns {
+    text.parse().unwrap()
+}
+
+/// What is read, and what was said.
+fn read_file(path: &Path, columns: &Columns) -> Result<(Table, String), String> {
+    let mut said = String::new();
+    let table = read(path, &Wanted { signals: &SIGNALS, columns }, &mut |line| {
+        said += &line;
+        said += "\n";
+    });
+    table.map(|table| (table, said)).map_err(|error| format!("{error:#}"))
+}
+
+/// The same of a text in a file of that ending.
+fn read_text(ending: &str, text: &[u8], of: &str) -> Result<(Table, String), String> {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join(format!("a.{ending}"));
+    std::fs::write(&path, text).unwrap();
+    read_file(&path, &columns(of))
+}
+
+fn column<'a>(table: &'a Table, name: &str) -> &'a [f64] {
+    table.column(name).unwrap()
+}
+
+/// Bit for bit but for a factor's rounding.
+fn assert_close(found: &[f64], expected: &[f64], of: &str) {
+    assert_eq!(found.len(), expected.len(), "{of}: {found:?}");
+    for (found, expected) in found.iter().zip(expected) {
+        assert!(
+            (found - expected).abs() <= 4e-16 * expected.abs().max(1e-3),
+            "{of}: {found} {expected}"
+        );
+    }
+}
+
+const TIME: [f64; 3] = [0.0, 0.02, 0.04];
+const TORQUE: [f64; 3] = [0.1, 0.25, -0.3];
+const RATE: [f64; 3] = [0.0, std::f64::consts::PI / 180.0, -1.5 * std::f64::consts::PI / 180.0];
+
+#[test]
+fn any_separator_decimal_mark_comment_and_unit_gives_the_same_numbers() {
+    let renamed = "time=t,tau_cmd=T_cmd,omega=gyro z";
+    let given = "time=t:ms,tau_cmd=T_cmd:mNm,omega=gyro z:deg/s";
+    let cases: [(&str, &str, &str); 11] = [
+        ("csv", "t,T_cmd,gyro z\n0,100,0\n20,250,1\n40,-300,-1.5\n", given),
+        ("csv", "t;T_cmd;gyro z\r\n0;100;0\r\n20;250;1\r\n40;-300;-1,5\r\n", given),
+        ("txt", "t\tT_cmd\tgyro z\n0\t100,0\t0,0\n20\t250,0\t1,0\n40\t-300,0\t-1,5\n", given),
+        (
+            "csv",
+            "\"t\",\"T_cmd\",\"gyro z\"\n\"0\",\"100\",\"0\"\n\"20\",\"250\",\"1,0\"\n\"40\",\"-300\",\"-1,5\"",
+            given,
+        ),
+        // units in a row, or in the names
+        ("csv", "t;T_cmd;gyro z\nms;mN·m;°/s\n0;100;0\n20;250;1\n40;-300;-1,5\n", renamed),
+        ("csv", "t [ms],T_cmd (mN.m),gyro z [deg/s]\n0,100,0\n20,250,1\n40,-300,-1.5\n", renamed),
+        (
+            "csv",
+            "# bench, 24 °C\n% again\nt [ms],T_cmd [mNm],gyro z [dps]\n// more\n0,100,0\n20,250,1\n# within\n\n40,-300,-1.5\n",
+            renamed,
+        ),
+        // a preamble, columns that nobody asked for, a separator at the end, the last line cut off
+        (
+            "csv",
+            "Logger 3000\nSerial;17\nt;state;T_cmd;gyro z\nms;;mNm;deg/s\n0;0;100;0;\n20;0;250;1;\n40;1;-300;-1,5;\n60;1;3",
+            renamed,
+        ),
+        // a header in a comment, as numpy writes it; blanks
+        (
+            "dat",
+            "# t T_cmd gyro\n0 100 0\n20 250 1\n  40  -300   -1.5\n",
+            "time=t:ms,tau_cmd=T_cmd:mNm,omega=gyro:deg/s",
+        ),
+        // no header
+        ("csv", "0,100,0\n20,250,1\n40,-300,-1.5\n", "time=#1:ms,tau_cmd=#2:mNm,omega=#3:deg/s"),
+        // dates, with and without a zone
+        (
+            "csv",
+            "t,T_cmd,gyro z\n2026-01-31T23:59:59.990Z,100,0\n2026-02-01T00:00:00.010Z,250,1\n2026-02-01T01:00:00.030+01:00,-300,-1.5\n",
+            "time=t,tau_cmd=T_cmd:mNm,omega=gyro z:deg/s",
+        ),
+    ];
+    for (ending, text, of) in &cases {
+        let (table, said) = read_text(ending, text.as_bytes(), of).unwrap();
+        assert_close(column(&table, "time"), &TIME, text);
+        assert_close(column(&table, "tau_cmd"), &TORQUE, text);
+        assert_close(column(&table, "omega"), &RATE, text);
+        assert!(said.contains("columns used: time = "), "{said}");
+    }
+    let dates = read_text(cases[10].0, cases[10].1.as_bytes(), cases[10].2).unwrap().1;
+    assert!(dates.contains("time counts from 2026-01-31T23:59:59.990+00:00"), "{dates}");
+    let cut = read_text(cases[7].0, cases[7].1.as_bytes(), cases[7].2).unwrap().1;
+    assert!(cut.contains("its last line, 8, is not complete and was left out"), "{cut}");
+    assert!(cut.contains("line 4 was taken for a row of units"), "{cut}");
+}
+
+#[test]
+fn a_slow_torque_is_held_and_lost_rows_are_left_out() {
+    // torque at 10 Hz under a gyro at 50 Hz, which has rows of its own; one rate lost
+    let mut text = String::from("time,tau_cmd,omega\n");
+    for k in 0..=100 {
+        let t = 0.02 * f64::from(k);
+        if k % 5 == 0 {
+            text += &format!("{},{},\n", t - 0.001, k);
+        }
+        text += &format!("{t},,{}\n", if k == 7 { "NaN".into() } else { format!("{k}") });
+    }
+    let (table, said) = read_text("csv", text.as_bytes(), "").unwrap();
+    let (rate, torque) = (column(&table, "omega"), column(&table, "tau_cmd"));
+    assert_eq!(rate.len(), 100);
+    for (rate, torque) in rate.iter().zip(torque) {
+        assert_eq!(*torque, (rate / 5.0).floor() * 5.0);
+    }
+    assert!(said.contains("22 of 122 rows have no omega and are left out"), "{said}");
+    assert!(
+        said.contains("tau_cmd has a value in 21 of 122 rows, 0.1000 s apart; it is held"),
+        "{said}"
+    );
+    // on an even grid the lost row is on the line between its neighbours
+    let (step, grid) = even(table, &mut |_| {}).unwrap();
+    assert!((step - 0.02).abs() < 1e-12 && grid.rows() == 101);
+    assert!((column(&grid, "omega")[7] - 7.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_torque_that_was_lost_for_long_leaves_a_gap() {
+    let mut text = String::from("time;tau_cmd;omega\n");
+    for k in 0..300 {
+        let torque = if (100..200).contains(&k) { String::new() } else { "0,5".into() };
+        text += &format!("{};{torque};{k}\n", f64::from(k) * 20.0);
+    }
+    let (table, said) = read_text("csv", text.as_bytes(), "time=time:ms").unwrap();
+    assert_eq!(table.rows(), 200);
+    assert!(said.contains("100 rows in which tau_cmd is not known are left out"), "{said}");
+    let error = even(table, &mut |_| {}).unwrap_err().to_string();
+    assert!(
+        error.contains("rows are missing for 2.0 of 6.0 s, in 1 gaps (allowed: 1 %)"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_matlab_file_gives_its_vectors_matrices_and_structures() {
+    let file = |name: &str| {
+        PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/all/data")).join(name)
+    };
+    let degree = std::f64::consts::PI / 180.0;
+    for (name, prefix) in [("plain.mat", ""), ("packed.mat", "log.")] {
+        let of = format!("time={prefix}t:ms,tau_cmd={prefix}T_cmd:mNm,omega={prefix}gyro(3):deg/s");
+        let (table, _) = read_file(&file(name), &columns(&of)).unwrap();
+        // the third rate is NaN
+        assert_close(column(&table, "time"), &[0.0, 0.02, 0.06, 0.08, 0.1], name);
+        assert_close(column(&table, "tau_cmd"), &[0.0, 0.1, 0.3, 0.2, 0.1], name);
+        assert_close(column(&table, "omega"), &[1.5, 3.0, 4.5, 6.0, 7.5].map(|w| w * degree), name);
+    }
+    let error = |name: &str, of: &str| read_file(&file(name), &columns(of)).unwrap_err();
+    let missing = error("plain.mat", "omega=gyro(4)");
+    assert!(missing.contains("columns in it: t, T_cmd, gyro(1), gyro(2), gyro(3)"), "{missing}");
+    assert!(
+        error("lengths.mat", "")
+            .contains("its columns differ in length (time 6, omega 4, tau_cmd 6)")
+    );
+    assert!(error("version_7_3.mat", "").contains("save('FILE.mat', ..., '-v7') writes version 5"));
+    // cut off anywhere it is refused, and never panics
+    let directory = tempfile::tempdir().unwrap();
+    for name in ["plain.mat", "packed.mat"] {
+        let whole = std::fs::read(file(name)).unwrap();
+        for length in (1..whole.len()).step_by(7) {
+            let path = directory.path().join("cut.mat");
+            std::fs::write(&path, &whole[..length]).unwrap();
+            let of = columns("time=t,tau_cmd=T_cmd,omega=gyro(3)");
+            assert!(read_file(&path, &of).is_err() || length > 128, "{name} {length}");
+        }
+    }
+}
+
+#[test]
+fn a_fault_is_named_with_line_column_and_what_is_allowed() {
+    let error = |text: &str, of: &str| read_text("csv", text.as_bytes(), of).unwrap_err();
+    let cases = [
+        (
+            "time,tau_cmd,omega\n0,0,0\n1,x,0\n2,0,1e999\n",
+            "",
+            "line 3, column tau_cmd: \"x\" is not a number; line 4, column omega: \"1e999\" is not a number (allowed: finite numbers",
+        ),
+        (
+            "time,tau_cmd,omega\n0,0,0\n1,0\n2,0,0\n",
+            "",
+            "line 3: 2 fields, where the others have 3",
+        ),
+        (
+            "t,tau_cmd,omega\n0,0,0\n1,0,0\n",
+            "",
+            "no column time (columns in it: t, tau_cmd, omega; --columns",
+        ),
+        ("time,tau_cmd,omega\n0,0,0\n", "omega=w:deg/s,theta=a", "no column w; no column a"),
+        (
+            "time,tau_cmd,omega [V]\n0,0,0\n",
+            "",
+            "column omega: \"V\" is no unit of a rate (allowed: rad/s, mrad/s,",
+        ),
+        (
+            "time,tau_cmd,omega\n0,0,0\n",
+            "force=omega",
+            "--columns force is of no use here (allowed: time, omega, tau_cmd, theta)",
+        ),
+        ("time,omega,tau_cmd,omega\n0,0,0,0\n", "", "more than one column omega (#2 and others)"),
+        ("time,tau_cmd,omega\n,0,0\n1,0,0\n", "", "row 1 of its values has no time"),
+        (
+            "time,tau_cmd,omega\n0,0,\n1,0,3\n",
+            "",
+            "omega has values in 1 rows (allowed: at least 2)",
+        ),
+        ("time,tau_cmd,omega\n0,02,0,1,0,3\n", "", "decimal commas need another separator"),
+        ("nothing here\n", "", "line 1, \"nothing here\", is no row of numbers"),
+        ("", "", "it is empty"),
+        ("a\0b\n", "", "line 1 has a byte 0: it is no text"),
+    ];
+    for (text, of, words) in cases {
+        let error = error(text, of);
+        assert!(
+            error.contains(words) && error.contains("a.csv cannot be used"),
+            "{words}:\n{error}"
+        );
+    }
+    let many: String = (0..9).map(|k| format!("{k},0,x\n")).collect();
+    let error = error(&format!("time,tau_cmd,omega\n0,0,0\n{many}"), "");
+    assert!(error.contains("; and 4 more (allowed"), "{error}");
+    let ending = read_text("xls", b"", "").unwrap_err();
+    assert!(ending.contains("the name must end in .csv, .txt,"), "{ending}");
+}
