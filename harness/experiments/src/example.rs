@@ -1,4 +1,4 @@
-//! The example that travels with the FMU: a torque history, and what the FMU answers to it. The
+//! The example that travels with each FMU: histories of inputs, and what the FMU answers to them. The
 //! files' names are those of the FMI project's rules for exchanged reference results.
 
 use std::collections::BTreeMap;
@@ -7,20 +7,65 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 
-use crate::profile::Torque;
 use crate::rounding::significant;
-use crate::run::{Run, driven};
+use crate::run::{Run, histories};
 use host::description::ModelDescription;
 use host::fmi2::Fmu;
 use host::output;
 use signals::table::Table;
 
-/// The torque: `time` (s), `tau_cmd` (N.m).
-pub const INPUT: &str = "HubSlosh_in.csv";
-/// The answer: `time` and every output.
-pub const REFERENCE: &str = "HubSlosh_ref.csv";
-/// Start, stop, step and tolerance.
-pub const OPTIONS: &str = "HubSlosh_ref.opt";
+/// The example of an FMU of this project.
+#[derive(Clone, Copy, Debug)]
+pub struct Example {
+    /// The FMU's modelName, with which the names of the files begin.
+    pub model: &'static str,
+    /// What drives it: inputs with their amplitude, the time function it is the amplitude of.
+    inputs: &'static [(&'static str, f64, Course)],
+}
+
+/// How an input goes over time; t in s, the largest value is 1.
+type Course = fn(t: f64) -> f64;
+
+/// A sine below the sloshing frequency of the bench that swells and fades within ten seconds, then nothing: the hub
+/// slips, reverses and comes to rest, while the liquid still pulls at it.
+const BENCH: Course = |t| swell(t) * (TAU * 2.0 * t).sin();
+/// A thrust that is there from the start.
+const THRUST: Course = |_| 1.0;
+/// Sines near the sloshing frequency of the default tank under that thrust, 0.42 Hz with the tank held; they swell and
+/// fade within ten seconds, then the liquid moves on its own. No two are in phase, so that nothing stays 0.
+const NEAR_SLOSH: Course = |t| swell(t) * (TAU * 0.4 * t).sin();
+const BELOW_SLOSH: Course = |t| swell(t) * (TAU * 0.25 * t).sin();
+const SLOW: Course = |t| swell(t) * (TAU * 0.1 * t).cos();
+
+fn swell(t: f64) -> f64 {
+    (t / 2.0).min((10.0 - t) / 2.0).clamp(0.0, 1.0)
+}
+
+/// The examples, one for each FMU. 2340 N give the default craft with its liquid, 1562 kg, the 1.5 m/s² that its
+/// tank's damping holds for.
+pub const EXAMPLES: [Example; 3] = [
+    Example { model: "HubSlosh", inputs: &[("tau_cmd", 0.1, BENCH)] },
+    Example {
+        model: "Spacecraft",
+        inputs: &[
+            ("force[3]", 2340.0, THRUST),
+            ("torque[1]", 10.0, BELOW_SLOSH),
+            ("torque[2]", 20.0, NEAR_SLOSH),
+            ("torque[3]", 5.0, SLOW),
+        ],
+    },
+    Example {
+        model: "SloshTank",
+        inputs: &[
+            ("a[1]", 0.02, NEAR_SLOSH),
+            ("a[2]", 0.02, BELOW_SLOSH),
+            ("a[3]", 1.5, THRUST),
+            ("omega_dot[1]", 0.01, NEAR_SLOSH),
+            ("omega_dot[2]", 0.01, BELOW_SLOSH),
+            ("omega_dot[3]", 0.005, SLOW),
+        ],
+    },
+];
 
 /// Length of the example and its communication step, s.
 const STOP: f64 = 20.0;
@@ -30,49 +75,84 @@ const EVERY: usize = 5;
 /// Tolerance of the reference; results of the FMU's default tolerance lie within 1e-6 of it.
 const TOLERANCE: f64 = 1e-12;
 
-/// Writes input, options and reference to `folder`, the reference from the given FMU.
-pub fn write(fmu: &Fmu, folder: &Path) -> Result<()> {
-    output::directory(folder)?;
-    let none = BTreeMap::new();
-    let input = folder.join(INPUT);
-    torque().write(&input, &none)?;
-    // what is compared with is the answer to the file, with the digits that are in it
-    let answer = replay(fmu, &input, Some(TOLERANCE), false)?;
-    thinned(&answer).write(&folder.join(REFERENCE), &none)?;
-    let options =
-        format!("StartTime, 0\nStopTime, {STOP}\nStepSize, {STEP}\nRelTol, {TOLERANCE:e}\n");
-    let path = folder.join(OPTIONS);
-    std::fs::write(&path, options).with_context(|| format!("{} was not written", path.display()))
+impl Example {
+    /// The example of the FMU.
+    ///
+    /// # Errors
+    /// If it has none.
+    pub fn of(fmu: &Fmu) -> Result<&'static Example> {
+        let model = &fmu.description().model_name;
+        let found = EXAMPLES.iter().find(|example| example.model == model);
+        found.with_context(|| {
+            let all = EXAMPLES.map(|example| example.model).join(", ");
+            format!("{model} has no example (there are: {all})")
+        })
+    }
+
+    /// Name of the file of the inputs: `time` (s) and them.
+    pub fn input(&self) -> String {
+        format!("{}_in.csv", self.model)
+    }
+
+    /// Name of the file of the answer: `time` and every output.
+    pub fn reference(&self) -> String {
+        format!("{}_ref.csv", self.model)
+    }
+
+    /// Name of the file of start, stop, step and tolerance.
+    pub fn options(&self) -> String {
+        format!("{}_ref.opt", self.model)
+    }
+
+    /// Writes input, options and reference to `folder`, the reference from the given FMU.
+    pub fn write(&self, fmu: &Fmu, folder: &Path) -> Result<()> {
+        output::directory(folder)?;
+        let none = BTreeMap::new();
+        let input = folder.join(self.input());
+        self.histories().write(&input, &none)?;
+        // what is compared with is the answer to the file, with the digits that are in it
+        let answer = replay(fmu, &input, Some(TOLERANCE), false)?;
+        thinned(fmu.description(), &answer).write(&folder.join(self.reference()), &none)?;
+        let options =
+            format!("StartTime, 0\nStopTime, {STOP}\nStepSize, {STEP}\nRelTol, {TOLERANCE:e}\n");
+        let path = folder.join(self.options());
+        std::fs::write(&path, options)
+            .with_context(|| format!("{} was not written", path.display()))
+    }
+
+    fn histories(&self) -> Table {
+        let rows = (STOP / STEP).round() as usize;
+        let time: Vec<f64> = (0..=rows).map(|row| round(row as f64 * STEP, 6)).collect();
+        let mut names = vec!["time".to_string()];
+        let mut columns = vec![time.clone()];
+        for (name, amplitude, course) in self.inputs {
+            names.push(name.to_string());
+            columns.push(time.iter().map(|&t| round(amplitude * course(t), 6)).collect());
+        }
+        Table::new(names, columns)
+    }
 }
 
-/// Drives the FMU with the torque of a file; `hold`: held over each step, as a host does that
+/// Drives the FMU with the inputs of a file; `hold`: held over each step, as a host does that
 /// does not know slopes.
 pub fn replay(fmu: &Fmu, input: &Path, tolerance: Option<f64>, hold: bool) -> Result<Table> {
-    let torque = Torque::read(input, hold)?;
+    let description = fmu.description();
+    let mut others = histories(description, input, None, hold, false)?;
+    let (first, torque) = others.remove(0);
     let (_, stop) = torque.span();
     let run = Run {
         settings: vec![],
-        input: driven(fmu.description(), None)?,
+        input: Some(first),
         torque,
-        others: Vec::new(),
+        others,
         step: STEP,
         stop,
         tolerance,
         hold,
     };
-    let columns = outputs(fmu.description());
+    let columns = outputs(description);
     let mut instance = run.initialise(fmu)?;
     run.drive(&mut instance, &columns, |_| {})
-}
-
-/// A sine below the sloshing frequency that swells and fades, then nothing: the hub slips, reverses
-/// and comes to rest, while the liquid still pulls at it.
-fn torque() -> Table {
-    let rows = (STOP / STEP).round() as usize;
-    let time: Vec<f64> = (0..=rows).map(|row| round(row as f64 * STEP, 6)).collect();
-    let swell = |t: f64| (t / 2.0).min((10.0 - t) / 2.0).clamp(0.0, 1.0);
-    let tau = time.iter().map(|&t| round(0.1 * swell(t) * (TAU * 2.0 * t).sin(), 6)).collect();
-    Table::new(vec!["time".into(), "tau_cmd".into()], vec![time, tau])
 }
 
 fn outputs(description: &ModelDescription) -> Vec<&str> {
@@ -80,15 +160,15 @@ fn outputs(description: &ModelDescription) -> Vec<&str> {
     outputs.map(|v| v.name.as_str()).collect()
 }
 
-/// Every so many rows, nine digits, without the torque.
-fn thinned(answer: &Table) -> Table {
-    let names: Vec<String> = answer.names().iter().filter(|n| *n != "tau_cmd").cloned().collect();
-    let column = |name: &String| {
+/// Every so many rows, nine digits, without the inputs.
+fn thinned(description: &ModelDescription, answer: &Table) -> Table {
+    let names: Vec<&str> = ["time"].into_iter().chain(outputs(description)).collect();
+    let column = |name: &&str| {
         let values = answer.column(name).unwrap_or_default();
         values.iter().step_by(EVERY).map(|&x| significant(x, 9)).collect()
     };
     let columns = names.iter().map(column).collect();
-    Table::new(names, columns)
+    Table::new(names.into_iter().map(String::from).collect(), columns)
 }
 
 /// `x` with so many decimals.

@@ -3,6 +3,7 @@
 
 use anyhow::{Context, Result, ensure};
 use rayon::prelude::*;
+use serde_json::json;
 
 use crate::profile::{Torque, Written};
 use crate::progress::Progress;
@@ -189,6 +190,18 @@ impl Characteristics {
             ));
         }
         text
+    }
+
+    /// Specified and estimated values, for programs; null where a number is not finite.
+    pub fn json(&self) -> serde_json::Value {
+        let quantity = |(name, of): &Quantity| {
+            let (specified, estimated, error) =
+                (of(&self.specified), of(&self.estimated), of(&self.error));
+            let values =
+                json!({ "specified": specified, "estimated": estimated, "standard_error": error });
+            (name.to_string(), values)
+        };
+        serde_json::Value::Object(QUANTITIES.iter().map(quantity).collect())
     }
 
     /// The Allan deviations of the records, of the specified and of the fitted noise.

@@ -238,6 +238,10 @@ impl Run {
         progress: impl Fn(u64),
     ) -> Result<Table> {
         self.check()?;
+        ensure!(
+            !columns.is_empty(),
+            "nothing would be recorded: the FMU has no output that is a number, and no other variable is named"
+        );
         let steps = self.steps();
         budget::table(steps + 1, 1 + self.driven().len() + columns.len())?;
         let mut recorder = Recorder::new(instance, columns, steps + 1)?;
@@ -259,7 +263,13 @@ impl Run {
                 given[i].push(course.values[i]);
             }
             time.push(t);
-            recorder.record(instance)?;
+            if let Some(column) = recorder.record(instance)? {
+                bail!(
+                    "the FMU gives {} = {} at t = {t} s (allowed: finite numbers)",
+                    columns[column],
+                    recorder.columns[column][step]
+                );
+            }
             if step > 0 && step.is_multiple_of(REPORT_EVERY) {
                 progress(REPORT_EVERY as u64);
             }
@@ -312,7 +322,8 @@ impl Recorder {
         })
     }
 
-    fn record(&mut self, instance: &mut Instance) -> Result<()> {
+    /// Adds a row. Returns the first column that is NaN or infinite.
+    fn record(&mut self, instance: &mut Instance) -> Result<Option<usize>> {
         instance.get_real(&self.reals, &mut self.values)?;
         for (value, place) in self.values.iter().zip(&self.places) {
             self.columns[*place].push(*value);
@@ -325,7 +336,8 @@ impl Recorder {
             }
             self.columns[*place].push(value[0].into());
         }
-        Ok(())
+        let wrong = self.values.iter().position(|value| !value.is_finite());
+        Ok(wrong.map(|i| self.places[i]))
     }
 
     fn columns(self) -> Vec<Vec<f64>> {

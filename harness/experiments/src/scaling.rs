@@ -7,8 +7,10 @@
 use std::fmt::Write;
 
 use anyhow::{Result, ensure};
+use serde::Serialize;
+use serde_json::{Value, json};
 
-use formulas::similarity::{Liquid, agility, froude, froude_viscosity, regime};
+use formulas::similarity::{self, Liquid, agility, froude_viscosity, regime};
 
 use crate::rounding::significant;
 
@@ -32,6 +34,15 @@ fn positive(values: &[(&str, f64)]) -> Result<()> {
     Ok(())
 }
 
+/// What was computed, in words and for programs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Found {
+    /// Lines for people.
+    pub text: String,
+    /// The same numbers, SI.
+    pub json: Value,
+}
+
 /// What is known of the flight tank.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Flight {
@@ -41,13 +52,13 @@ pub enum Flight {
     Acceleration(f64),
 }
 
-/// The bench's Bond number and the flight tank that has the same, in words.
-pub fn bond_text(
+/// The bench's Bond number and the flight tank that has the same.
+pub fn bond(
     bench: Liquid,
     (a, radius): (f64, f64),
     liquid: Liquid,
     flight: Option<Flight>,
-) -> Result<String> {
+) -> Result<Found> {
     positive(&[
         ("density", bench.density),
         ("tension", bench.tension),
@@ -58,10 +69,12 @@ pub fn bond_text(
     ])?;
     let bond = bench.bond(a, radius);
     let mut text = format!("Bond number {bond:.4}: {}\n", regime(bond));
+    let mut json = json!({ "bond": bond, "regime": regime(bond) });
     match flight {
         Some(Flight::Radius(r)) => {
             positive(&[("flight radius", r)])?;
             let same = liquid.acceleration(bond, r);
+            json["flight"] = json!({ "radius": r, "acceleration": same });
             writeln!(
                 text,
                 "a tank of radius {r} m has it at an acceleration of {} m/s2",
@@ -71,21 +84,22 @@ pub fn bond_text(
         Some(Flight::Acceleration(g)) => {
             positive(&[("flight acceleration", g)])?;
             let same = liquid.radius(bond, g);
+            json["flight"] = json!({ "radius": same, "acceleration": g });
             writeln!(text, "at an acceleration of {g} m/s2 a tank of radius {same:.6} m has it")?;
         }
         None => {}
     }
-    Ok(text)
+    Ok(Found { text, json })
 }
 
 /// The bench's rotational Bond numbers, and the tanks that have the same at another angular
-/// acceleration, in words.
-pub fn rotation_text(
+/// acceleration.
+pub fn rotation(
     liquid: Liquid,
     (radius, arm): (f64, f64),
     (alpha, omega): (f64, Option<f64>),
     target: f64,
-) -> Result<String> {
+) -> Result<Found> {
     let omega_2 = omega.map_or(1.0, |w| w * w);
     positive(&[
         ("density", liquid.density),
@@ -106,41 +120,55 @@ pub fn rotation_text(
         regime(by_arm),
         regime(by_radius)
     );
+    let number = |bond: f64| json!({ "bond": bond, "regime": regime(bond) });
+    let mut json = json!({
+        "Bo_i": number(by_arm),
+        "Bo_r": number(by_radius),
+        "flight_alpha": target,
+        "diameter_by_Bo_i": 2.0 * same_arm,
+        "diameter_by_Bo_r": 2.0 * cube,
+    });
     if let Some(w) = omega {
         let bond = liquid.rotational_bond(w * w, radius, arm);
+        json["Bo_c"] = number(bond);
         writeln!(text, "Bo_c = rho omega^2 R^2 L/sigma = {bond:.4}: {}", regime(bond))?;
     }
     writeln!(text, "at {target} rad/s2 ({}) the same has a tank of diameter", agility(target))?;
     writeln!(text, "  {:.4} m by Bo_i, at the same distance from the axis", 2.0 * same_arm)?;
     writeln!(text, "  {:.4} m by Bo_r (R^3, distance and radius scaled together)", 2.0 * cube)?;
-    Ok(text)
+    Ok(Found { text, json })
 }
 
-/// Table 2.3 for a scale, in words.
-pub fn froude_text(lambda: f64, density: f64, gravity: f64) -> Result<String> {
+/// Table 2.3 for a scale.
+pub fn froude(lambda: f64, density: f64, gravity: f64) -> Result<Found> {
     positive(&[("lambda", lambda), ("density ratio", density), ("gravity ratio", gravity)])?;
-    let factors = froude(lambda, density, gravity);
+    let factors = similarity::froude(lambda, density, gravity);
     ensure!(
         factors.iter().all(|(_, _, factor)| factor.is_finite() && *factor > 0.0),
         "lambda = {lambda:?}, density ratio = {density:?}, gravity ratio = {gravity:?}: some factors are \
          beyond the range of numbers"
     );
     let mut text = String::from("full size = factor x model\n");
+    let (viscosity, tension) = (froude_viscosity(lambda, gravity), lambda * lambda * gravity);
+    let of = factors.iter().map(|(name, _, factor)| (name.to_string(), json!(factor)));
+    let json = json!({
+        "factors": of.collect::<serde_json::Map<_, _>>(),
+        "viscosity_for_reynolds": viscosity,
+        "tension_over_density_for_bond": tension,
+    });
     for (name, unit, factor) in factors {
         writeln!(text, "{name:22}{unit:8}{}", significant(factor, 7))?;
     }
     writeln!(
         text,
-        "not kept: Reynolds' number, unless the full size's viscosity nu is {:.4} times the model's; \
-         Bond's, unless its sigma/rho is {:.4} times the model's",
-        froude_viscosity(lambda, gravity),
-        lambda * lambda * gravity
+        "not kept: Reynolds' number, unless the full size's viscosity nu is {viscosity:.4} times the model's; \
+         Bond's, unless its sigma/rho is {tension:.4} times the model's"
     )?;
-    Ok(text)
+    Ok(Found { text, json })
 }
 
 /// A number of the thesis's scaling, as printed and as it follows from its own data.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
     /// Where it stands and what it is.
     pub what: &'static str,
@@ -219,19 +247,20 @@ pub fn thesis() -> Vec<Comparison> {
     ]
 }
 
-/// [`thesis`] as a table.
-pub fn thesis_text() -> String {
+/// [`thesis`] as a table and for programs.
+pub fn thesis_found() -> Found {
+    let json = json!(thesis());
     let line = |f: Comparison| {
         let value = format!("{:.6} {}", f.value, f.unit);
         format!("{:50} {:24} {value:22} {}\n", f.what, f.printed, f.remark)
     };
     let head = format!("{:50} {:24} {:22} {}\n", "figure", "printed", "computed", "remark");
-    head + &thesis().into_iter().map(line).collect::<String>()
+    Found { text: head + &thesis().into_iter().map(line).collect::<String>(), json }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{BENCH, OXYGEN, WATER, bond_text, thesis};
+    use super::{BENCH, OXYGEN, WATER, bond, thesis};
     use formulas::similarity::Liquid;
     use formulas::similarity::froude;
 
@@ -264,11 +293,11 @@ mod tests {
 
     #[test]
     fn the_equivalent_tank_has_the_bench_s_bond_number() {
-        let bond = WATER.bond(9.81, BENCH.0);
-        let g = OXYGEN.acceleration(bond, 2.0425);
+        let same = WATER.bond(9.81, BENCH.0);
+        let g = OXYGEN.acceleration(same, 2.0425);
         // rounding of a handful of products
-        assert!((OXYGEN.bond(g, 2.0425) / bond - 1.0).abs() < 1e-14);
-        assert!((OXYGEN.radius(bond, g) / 2.0425 - 1.0).abs() < 1e-14);
+        assert!((OXYGEN.bond(g, 2.0425) / same - 1.0).abs() < 1e-14);
+        assert!((OXYGEN.radius(same, g) / 2.0425 - 1.0).abs() < 1e-14);
         let cube = OXYGEN.rotational_bond(0.3, 0.7, 0.7);
         assert!((OXYGEN.radius_by_cube(cube, 0.3) / 0.7 - 1.0).abs() < 1e-14);
     }
@@ -292,7 +321,7 @@ mod tests {
     #[test]
     fn bad_numbers_are_refused_all_at_once() {
         let none = Liquid { density: -1.0, tension: f64::NAN };
-        let text = bond_text(none, (9.81, 0.0), WATER, None).unwrap_err().to_string();
+        let text = bond(none, (9.81, 0.0), WATER, None).unwrap_err().to_string();
         assert_eq!(text, "density = -1, tension = NaN, radius = 0 (allowed: positive numbers)");
     }
 }

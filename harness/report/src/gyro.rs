@@ -1,6 +1,7 @@
-//! The Allan deviation of a gyro, as a picture.
+//! What a gyro shows at rest, as pictures: its Allan deviation, and of a recording the tests of its noise.
 
 use analysis::allan::Point;
+use analysis::rest::Rest;
 use experiments::gyro::Characteristics;
 
 use crate::svg::{Axis, Chart, Series, Style};
@@ -40,4 +41,100 @@ pub fn allan_deviations(gyro: &Characteristics) -> String {
         legend: true,
     };
     chart.file()
+}
+
+const MEASURED: &str = "#0b6aa8";
+const EXPECTED: &str = "#888888";
+const FITTED: &str = "#b45309";
+
+fn series(points: Vec<(f64, f64)>, color: &str, style: Style, title: &str) -> Series {
+    Series { points, color: color.into(), style, title: title.into() }
+}
+
+/// The pictures of a recording at rest, each with its file's name.
+pub fn rest(rest: &Rest) -> [(&'static str, String); 4] {
+    let chart = |title: &str, x: Axis, y: Axis, series: Vec<Series>, legend: bool| {
+        let chart = Chart { title: title.into(), size: (640.0, 400.0), x, y, series, legend };
+        chart.file()
+    };
+    // the frame that goes round what noise allows
+    let around = |to: f64, y: f64| vec![(0.0, y), (to, y), (to, -y), (0.0, -y)];
+    let deviation = |of: &dyn Fn(&Point) -> f64| -> Vec<(f64, f64)> {
+        rest.allan.iter().map(|point| (point.tau, of(point).sqrt())).collect()
+    };
+    let measured = deviation(&|point| point.variance);
+    let mut allan = vec![series(measured.clone(), MEASURED, Style::Dots, "recorded")];
+    if let Some(noise) = &rest.noise {
+        let white = deviation(&|point| noise.arw.powi(2) / point.tau);
+        allan.insert(0, series(white, EXPECTED, Style::Dashed, "its white noise, slope −1/2"));
+        let fitted = deviation(&|point| noise.variance(point.tau));
+        allan.push(series(fitted, FITTED, Style::Line, "fitted noise and bias"));
+    }
+    let allan = chart(
+        "Allan deviation of the recorded gyro at rest",
+        Axis::decades("averaging time / s", measured.iter().map(|p| p.0)),
+        Axis::decades("Allan deviation / (rad/s)", measured.iter().map(|p| p.1)),
+        allan,
+        true,
+    );
+    let end = rest.quantiles.last().map_or(3.0, |(x, _)| *x);
+    let quantiles = chart(
+        "Quantiles of the readings, dashed: of the normal distribution",
+        Axis::linear("standard normal quantile", rest.quantiles.iter().map(|q| q.0), 0.0, 8),
+        Axis::linear(
+            "reading without its line / standard deviation",
+            rest.quantiles.iter().map(|q| q.1),
+            0.0,
+            8,
+        ),
+        vec![
+            series(vec![(-end, -end), (end, end)], EXPECTED, Style::Dashed, "normal"),
+            series(rest.quantiles.clone(), MEASURED, Style::Cloud, "recorded"),
+        ],
+        false,
+    );
+    let bound = rest.white_bound();
+    let correlation: Vec<(f64, f64)> = (rest.autocorrelation.iter().enumerate().skip(1))
+        .map(|(k, r)| (k as f64 * rest.step, *r))
+        .collect();
+    let last = correlation.last().map_or(1.0, |(t, _)| *t);
+    let autocorrelation = chart(
+        "Autocorrelation beyond lag 0, where it is 1",
+        Axis::linear("lag / s", [0.0, last], 0.0, 8),
+        Axis::linear("autocorrelation", correlation.iter().map(|p| p.1), 8.0 * bound, 6),
+        vec![
+            series(correlation.clone(), MEASURED, Style::Line, "recorded"),
+            series(around(last, bound), EXPECTED, Style::Dashed, "95 % interval of white noise"),
+        ],
+        true,
+    );
+    let minutes = |from: f64| from / 60.0;
+    let n = (rest.chunk_length() as f64).sqrt();
+    let (white, normal) = (2.0 / n, 2.0 * 2f64.sqrt() / n);
+    let means: Vec<(f64, f64)> =
+        rest.chunks.iter().map(|c| (minutes(c.from), c.mean / rest.deviation)).collect();
+    let variances: Vec<(f64, f64)> = (rest.chunks.iter())
+        .map(|c| (minutes(c.from), c.variance / rest.deviation.powi(2) - 1.0))
+        .collect();
+    let end = minutes(rest.count as f64 * rest.step);
+    let both = means.iter().chain(&variances).map(|p| p.1);
+    let all = vec![
+        series(means.clone(), MEASURED, Style::Dots, "mean over the standard deviation"),
+        series(variances.clone(), FITTED, Style::Dots, "variance over the whole record's, less 1"),
+        series(around(end, white), MEASURED, Style::Dashed, "±2σ of the mean, white noise"),
+        series(around(end, normal), FITTED, Style::Dashed, "±2σ of the variance, normal noise"),
+    ];
+    let chunks = chart(
+        "Means and variances of consecutive chunks",
+        Axis::linear("time / min", [0.0, end], 0.0, 8),
+        Axis::linear("relative to the whole record", both, 6.0 * normal, 6),
+        all,
+        true,
+    );
+    [
+        ("allan.svg", allan),
+        ("quantiles.svg", quantiles),
+        ("autocorrelation.svg", autocorrelation),
+        ("chunks.svg", chunks),
+    ]
 }

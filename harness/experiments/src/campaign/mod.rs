@@ -11,6 +11,7 @@
 
 mod folder;
 mod outcome;
+pub mod recorded;
 mod rows;
 mod store;
 
@@ -18,7 +19,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use anyhow::Result;
+use anyhow::{Result, anyhow};
 use host::budget;
 use host::description::{ModelDescription, Type, Value};
 use host::fmi2::Fmu;
@@ -33,6 +34,7 @@ pub use self::outcome::{
 pub use self::rows::{FeatureRow, MadeFrom};
 use crate::plan::{Case, Plan};
 use crate::progress::Progress;
+use crate::run::Run;
 
 /// Columns of a stored run of the bench, SI units, at every communication point from the torque's
 /// start to the stop time; others may follow. The first six are what people look at; wave height,
@@ -128,6 +130,11 @@ pub struct Unanalysed {
 }
 
 impl Results {
+    /// Runs that were not simulated but recorded.
+    pub fn recordings(&self) -> usize {
+        self.outcomes.iter().filter(|run| run.is_recording()).count()
+    }
+
     /// Runs that did not fail, and how many of them were reused.
     pub fn counts(&self) -> (usize, usize) {
         let reused = self.outcomes.iter().map(|run| run.reused);
@@ -239,7 +246,8 @@ impl Campaign {
         let description = fmu.description();
         let mut columns = Vec::new();
         let mut runs = Vec::new();
-        for case in self.plan.cases(description)? {
+        let cases = self.plan.cases(description)?;
+        for case in cases.into_iter().filter(|case| case.recording.is_none()) {
             let run = case.run();
             columns = stored_columns(description, run.input.as_deref());
             let mut settings = serde_json::Map::new();
@@ -304,6 +312,23 @@ impl Campaign {
             Err(error) => return Ok(Done::Failed(error)),
         };
         instance.take_warnings().into_iter().for_each(|warning| warn(case, warning));
+        if let Some(recorded) = &case.recording {
+            watch(Progress::Steps(run.steps() as u64));
+            if !is_bench(fmu.description()) {
+                return Ok(Done::Failed(anyhow!(
+                    "recordings are analysed beside the bench, HubSlosh, alone"
+                )));
+            }
+            let read = recorded::table(case, recorded, &mut |line| watch(Progress::Note(line)));
+            let analysed = read.and_then(|(step, table)| {
+                folder.store(&case.name, &table, &recipe)?;
+                let run = Run { step, ..run };
+                Outcome::of(case, &run, &mut instance, &table, false)
+            });
+            return Ok(
+                analysed.map_or_else(Done::Failed, |outcome| Done::Analysed(Box::new(outcome)))
+            );
+        }
         let path = folder.path().join(folder::file_of(&case.name));
         let there = match self.force || !path.exists() {
             true => None,
@@ -326,6 +351,7 @@ impl Campaign {
                 let others: Vec<&str> = others.map(String::as_str).collect();
                 let driven =
                     run.drive(&mut instance, &others, |steps| watch(Progress::Steps(steps)));
+                instance.take_warnings().into_iter().for_each(|warning| warn(case, warning));
                 let table = match driven.and_then(|table| table.all_finite().map(|()| table)) {
                     Ok(table) => table,
                     Err(error) => return Ok(Done::Failed(error)),

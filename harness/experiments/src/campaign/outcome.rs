@@ -4,10 +4,12 @@
 use std::borrow::Cow;
 
 use anyhow::{Context, Result};
+use formulas::regime::Regime;
 use host::description::ModelDescription;
 use host::fmi2::Instance;
 
 use super::Case;
+use crate::plan::RECORDING;
 use crate::profile::{Profile, Torque};
 use crate::run::{Run, TORQUE};
 use analysis::features::{Deviations, Features};
@@ -39,7 +41,7 @@ const MOST_SHIFT: f64 = 0.25;
 /// Least signal-to-noise ratio at a resonance that is trusted, dB.
 const LEAST_SNR: f64 = 0.0;
 
-/// Maxima and totals of a run.
+/// Maxima and totals of a run; NaN what a recording does not tell.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Totals {
     /// Largest |slosh_angle|, rad.
@@ -48,6 +50,13 @@ pub struct Totals {
     pub peak_radial_angle: f64,
     /// Largest wave height, m.
     pub peak_wave_height: f64,
+    /// Largest |rate| that the gyro reads, rad/s.
+    pub peak_rate: f64,
+    /// Largest |angular acceleration|, rad/s²: central differences of the gyro's rate from row to row,
+    /// as Rubaga's thesis takes them (7.2.2).
+    pub peak_acceleration: f64,
+    /// The gyro's errors were on: it read something else than the rate.
+    pub gyro_errors: bool,
     /// Largest |E(t) − E(0) − work + heat| over the energy throughput Σ|Δwork| + heat.
     pub max_energy_residual: f64,
     /// Time in stiction, s.
@@ -55,6 +64,19 @@ pub struct Totals {
 }
 
 impl Totals {
+    /// Of a recording.
+    fn of_recording(table: &Table) -> Self {
+        Totals {
+            peak_slosh_angle: f64::NAN,
+            peak_radial_angle: f64::NAN,
+            peak_wave_height: f64::NAN,
+            gyro_errors: true,
+            max_energy_residual: f64::NAN,
+            stuck: f64::NAN,
+            ..Totals::of(table)
+        }
+    }
+
     fn of(table: &Table) -> Self {
         let column = |name| table.column(name).unwrap_or_default();
         let peak = |name| column(name).iter().fold(0.0_f64, |m, v| m.max(v.abs()));
@@ -68,10 +90,19 @@ impl Totals {
             peak_slosh_angle: peak("slosh_angle"),
             peak_radial_angle: peak("slosh_angle_radial"),
             peak_wave_height: peak("wave_height"),
+            peak_rate: peak("omega_imu"),
+            peak_acceleration: peak_slope(column("time"), column("omega_imu")),
+            gyro_errors: column("omega_imu") != column("omega"),
             max_energy_residual: if throughput > 0.0 { residual / throughput } else { 0.0 },
             stuck: column("stuck_time").last().copied().unwrap_or(0.0),
         }
     }
+}
+
+/// Largest slope of a signal by central differences.
+fn peak_slope(time: &[f64], signal: &[f64]) -> f64 {
+    let slopes = time.windows(3).zip(signal.windows(3)).map(|(t, y)| (y[2] - y[0]) / (t[2] - t[0]));
+    slopes.fold(0.0, |most, slope| f64::max(most, slope.abs()))
 }
 
 /// Signals of a run, thinned for drawing: of each of at most [`History::STRETCHES`] stretches the
@@ -296,11 +327,11 @@ pub struct Record {
 pub struct Passing {
     /// Response of the rate.
     pub rate: Estimate,
-    /// Where in the sweep the slosh was rotary.
-    pub rotary: Rotary,
-    /// How much of the liquid's force was off the axis.
-    pub off_axis: OffAxis,
-    /// The leakage at the frequencies of `rate`.
+    /// Where in the sweep the slosh was rotary; `None` of a recording, which has no liquid's angles.
+    pub rotary: Option<Rotary>,
+    /// How much of the liquid's force was off the axis; of a recording, of the hub's rates, if it has more than one.
+    pub off_axis: Option<OffAxis>,
+    /// The leakage at the frequencies of `rate`; empty where it is not known.
     pub leakage: Vec<f64>,
 }
 
@@ -383,7 +414,15 @@ impl Passing {
     /// `unexplained`: as for [`Record`].
     fn of(sweep: &Sweep, table: &Table, arm: f64, unexplained: &[f64]) -> Passing {
         let column = |name| table.column(name).unwrap_or_default();
-        let signals = ["omega_imu", "slosh_angle_radial", "slosh_angle", "F_radial"];
+        let is_recording = table.column("F_radial").is_none();
+        // where a recording has no such rate, another stands in its place, and is not looked at
+        let rates = ["omega_x", "omega_y"].map(|name| table.column(name).map(|_| name));
+        let signals = match is_recording {
+            false => ["omega_imu", "slosh_angle_radial", "slosh_angle", "F_radial"],
+            true => {
+                ["omega_imu", rates[0].unwrap_or("omega"), rates[1].unwrap_or("omega"), "omega"]
+            }
+        };
         let grid = logarithmic_grid(sweep.band(), GRID_POINTS);
         let demodulation::Demodulated { responses, noise_gain } = demodulation::frequency_responses(
             sweep,
@@ -392,17 +431,30 @@ impl Passing {
             signals.map(column),
             &grid,
         );
-        let [rate, radial, tangential, force] = responses;
+        let [rate, second, third, fourth] = responses;
         // of the frequencies that the sweep passes
         let unexplained: Vec<f64> = (rate.frequency.iter())
             .map(|f| unexplained.get(grid.partition_point(|g| g < f)).copied().unwrap_or(f64::NAN))
             .collect();
         let deviation = demodulation::deviation(&rate, &unexplained, &noise_gain);
-        let swirl = rotary::swirl(&radial, &tangential, sweep.amplitude.abs());
-        let passed = &radial.frequency;
-        let times: Vec<f64> = passed.iter().filter_map(|f| sweep.time_of(*f)).collect();
-        let rotary = Rotary::of(passed, &times, &swirl);
-        let leakage = off_axis::leakage(&force, arm);
+        let rotary = (!is_recording).then(|| {
+            let swirl = rotary::swirl(&second, &third, sweep.amplitude.abs());
+            let passed = &second.frequency;
+            let times: Vec<f64> = passed.iter().filter_map(|f| sweep.time_of(*f)).collect();
+            Rotary::of(passed, &times, &swirl)
+        });
+        let (leakage, off_axis) = if is_recording {
+            let [x, y] = rates.map(|name| name.map(column));
+            let others: Vec<(&FrequencyResponse, &[f64])> = [(&second, x), (&third, y)]
+                .into_iter()
+                .filter_map(|(h, w)| Some((h, w?)))
+                .collect();
+            off_axis::of_rates(&rate, column("omega_imu"), &others)
+        } else {
+            let leakage = off_axis::leakage(&fourth, arm);
+            let off_axis = OffAxis::of(column("F_radial"), column("F_tangential"), &leakage);
+            (leakage, Some(off_axis))
+        };
         // where a window would begin before the sweep or end after it
         let whole = |f: f64| {
             let half = demodulation::cycles(sweep, f) / f / 2.0;
@@ -422,12 +474,7 @@ impl Passing {
         })
         .with(deviation, |f| demodulation::slope(sweep, f));
         rate.resolution = moves(rate.features.f_res.unwrap_or((middle.0 * middle.1).sqrt()));
-        Passing {
-            rate,
-            rotary,
-            off_axis: OffAxis::of(column("F_radial"), column("F_tangential"), &leakage),
-            leakage,
-        }
+        Passing { rate, rotary, off_axis, leakage }
     }
 }
 
@@ -441,7 +488,11 @@ impl Outcome {
         reused: bool,
     ) -> Result<Outcome> {
         let linear = exact_linear(instance)?;
-        let range = Range::of(instance.fmu().description(), instance)?.context("not the bench")?;
+        let mut range =
+            Range::of(instance.fmu().description(), instance)?.context("not the bench")?;
+        if case.recording.is_some() {
+            range.model = RECORDING.into();
+        }
         let column = |name| table.column(name).unwrap_or_default();
         let (record, passing) = match &run.torque {
             Torque::Rows { .. } => (None, None),
@@ -475,22 +526,28 @@ impl Outcome {
             }
         };
         let residual: Vec<f64> = rate.iter().zip(&modelled).map(|(y, m)| y - m).collect();
-        let signals = ["tau_cmd", "omega_imu", "slosh_angle", "slosh_angle_radial"];
-        let signals = signals.map(|name| (name, column(name)));
-        let all: Vec<(&str, &[f64])> =
-            signals.into_iter().chain([("residual", &residual[..])]).collect();
+        let signals =
+            ["tau_cmd", "omega_imu", "slosh_angle", "slosh_angle_radial", "omega_x", "omega_y"];
+        let signals = signals.into_iter().filter_map(|name| Some((name, table.column(name)?)));
+        let all: Vec<(&str, &[f64])> = signals.chain([("residual", &residual[..])]).collect();
         let onset = passing.as_ref().and_then(|passing| {
             let Torque::Profile(profile) = &run.torque else { return None };
-            profile.sweep()?.time_of(passing.rotary.from?)
+            profile.sweep()?.time_of(passing.rotary?.from?)
         });
         let frequency = linear.modes.first().map_or(1.0, |mode| mode.frequency);
         Ok(Outcome {
             history: History::of(column("time"), &all),
-            path: SloshPath::of(table, onset, frequency),
+            path: match case.recording {
+                Some(_) => SloshPath::default(),
+                None => SloshPath::of(table, onset, frequency),
+            },
+            totals: match case.recording {
+                Some(_) => Totals::of_recording(table),
+                None => Totals::of(table),
+            },
             case: case.clone(),
             range,
             linear,
-            totals: Totals::of(table),
             record,
             passing,
             reused,
@@ -542,22 +599,27 @@ impl Outcome {
 
     /// Where in the sweep the slosh was rotary.
     pub fn rotary(&self) -> Option<Rotary> {
-        Some(self.passing.as_ref()?.rotary)
+        self.passing.as_ref()?.rotary
     }
 
     /// How much of the liquid's force was off the axis.
     pub fn off_axis(&self) -> Option<OffAxis> {
-        Some(self.passing.as_ref()?.off_axis)
+        self.passing.as_ref()?.off_axis
     }
 
-    /// The liquid's regime at its largest wave, from the wave height over the tank's radius (thesis
-    /// 2.3.5): linear below 0.15, nonlinear above 0.25.
-    pub fn regime(&self) -> &'static str {
-        match self.totals.peak_wave_height / self.range.radius {
-            ratio if ratio < 0.15 => "linear",
-            ratio if ratio <= 0.25 => "transitional",
-            _ => "nonlinear",
-        }
+    /// The liquid's regime at its largest wave; `None` of a recording, which has no wave.
+    pub fn regime(&self) -> Option<&'static str> {
+        let ratio = self.totals.peak_wave_height / self.range.radius;
+        (!ratio.is_nan()).then(|| match Regime::of(ratio) {
+            Regime::Linear => "linear",
+            Regime::Transitional => "transitional",
+            Regime::Nonlinear => "nonlinear",
+        })
+    }
+
+    /// Whether it was recorded, not simulated.
+    pub fn is_recording(&self) -> bool {
+        self.case.recording.is_some()
     }
 }
 

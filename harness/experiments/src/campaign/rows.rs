@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::outcome::{Estimate, Outcome};
 use super::{Case, Failure};
 use analysis::features::Features;
+use host::output::sha256;
 
 /// A row of `features.csv`; what is not found, or what the torque cannot show, stays empty.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -46,6 +47,8 @@ pub struct FeatureRow {
     beyond_model: Option<String>,
     f_res_std_hz: Option<f64>,
     f_dip_std_hz: Option<f64>,
+    peak_rate_rad_s: Option<f64>,
+    peak_acceleration_rad_s2: Option<f64>,
     plan_sha256: String,
 }
 
@@ -99,12 +102,14 @@ impl FeatureRow {
             off_axis_median: off_axis.map(|off_axis| off_axis.median),
             off_axis_energy: off_axis.map(|off_axis| off_axis.energy),
             leakage: off_axis.map(|off_axis| off_axis.leakage),
-            regime: Some(run.regime()),
+            regime: run.regime(),
             estimator: estimate.map(|(_, name)| name),
             not_trusted: estimate.and_then(|(estimate, _)| Some(estimate.doubt?.to_string())),
             beyond_model: run.beyond_model(),
             f_res_std_hz: estimate.and_then(|(estimate, _)| estimate.deviations.f_res),
             f_dip_std_hz: estimate.and_then(|(estimate, _)| estimate.deviations.f_dip),
+            peak_rate_rad_s: Some(totals.peak_rate),
+            peak_acceleration_rad_s2: Some(totals.peak_acceleration),
             ..FeatureRow::unanalysed(&run.case, plan_sha256)
         }
     }
@@ -121,11 +126,15 @@ pub struct MadeFrom {
     step_s: f64,
     stop_s: f64,
     tolerance: Option<f64>,
+    recording: Option<String>,
+    recording_sha256: Option<String>,
 }
 
 impl MadeFrom {
     /// Of a run, and why it failed if it did.
     pub fn of(case: &Case, failure: Option<&Failure>, fmu: &host::fmi2::Fmu) -> MadeFrom {
+        let recording = case.recording.as_ref();
+        let bytes = recording.and_then(|recording| std::fs::read(&recording.path).ok());
         MadeFrom {
             name: case.name.clone(),
             error: failure.map_or(String::new(), |failure| failure.reason.clone()),
@@ -135,6 +144,8 @@ impl MadeFrom {
             step_s: case.step,
             stop_s: case.stop,
             tolerance: case.tolerance,
+            recording: recording.map(|recording| recording.path.display().to_string()),
+            recording_sha256: bytes.map(|bytes| sha256(&bytes)),
         }
     }
 }

@@ -12,8 +12,9 @@ use toml::de::{DeTable, DeValue};
 
 use super::problems::{Lines, Problems};
 use super::random::{Distribution, Draws, Family};
-use super::{Listed, Named, Plan, STEP};
+use super::{Listed, Named, Plan, Recorded, STEP};
 use crate::profile::Written;
+use signals::recording::Columns;
 
 /// A single value.
 #[derive(Deserialize)]
@@ -256,11 +257,35 @@ impl Reader<'_> {
             let expected = format!("a text in quotes, which {rule}");
             let allowed = |name: &String| (1..=most).contains(&name.len());
             let name = self.take(&place, table, "name", &expected, allowed);
-            let values = names(table, &|_| false).into_iter().filter(|(key, _)| key != "name");
+            let recording = self.recording(&place, table);
+            let own = ["name", "recording", "columns"];
+            let values = names(table, &|_| false).into_iter();
+            let values = values.filter(|(key, _)| !own.contains(&key.as_str()));
             let values = self.settings(&place, values.collect());
-            listed.push(Listed { name: name.map(|name| name.value), values });
+            listed.push(Listed { name: name.map(|name| name.value), values, recording });
         }
         listed
+    }
+
+    /// What was recorded of a run, if anything was.
+    fn recording(&mut self, place: &str, table: &DeTable) -> Option<Recorded> {
+        let columns = self.text(place, table, "columns");
+        let columns = match columns {
+            Some(Named { value, lines, .. }) => self.problems.take(&lines, value.parse())?,
+            None => Columns::default(),
+        };
+        match self.text(place, table, "recording") {
+            Some(file) => Some(Recorded { path: file.value.into(), columns }),
+            None => {
+                if let Some((key, _)) = table.get_key_value("columns") {
+                    self.add(
+                        key.span(),
+                        format!("{place}columns are those of a recording, which is not there"),
+                    );
+                }
+                None
+            }
+        }
     }
 
     fn draws(&mut self, table: &DeTable) -> Option<Draws> {

@@ -6,6 +6,7 @@ mod problems;
 mod random;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use anyhow::{Context, Result, bail, ensure};
@@ -14,8 +15,9 @@ use crate::profile::{Torque, Written};
 use crate::rounding::thousandths;
 use crate::run::{Run, driven};
 use host::budget;
-use host::description::{ModelDescription, did_you_mean};
+use host::description::{ModelDescription, Value, did_you_mean};
 use host::output::sha256;
+use signals::recording::Columns;
 
 use self::problems::{Lines, Problems};
 use self::random::Draws;
@@ -108,7 +110,20 @@ pub struct Sweeps {
 struct Listed {
     name: Option<String>,
     values: Vec<Named<String>>,
+    recording: Option<Recorded>,
 }
+
+/// A recording of a run, and which of its columns are which signals.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recorded {
+    /// Its file.
+    pub path: PathBuf,
+    /// Columns and units.
+    pub columns: Columns,
+}
+
+/// What stands for the slosh model of a run that was recorded.
+pub const RECORDING: &str = "recording";
 
 /// One run of a plan.
 #[derive(Clone, Debug)]
@@ -144,6 +159,8 @@ pub struct Case {
     pub tolerance: Option<f64>,
     /// The torque is held over each step.
     pub hold: bool,
+    /// It is not simulated but read: what a bench did under this torque.
+    pub recording: Option<Recorded>,
 }
 
 impl Case {
@@ -292,10 +309,46 @@ impl Plan {
     /// The number that the plan varies most, along which its runs are drawn; of several with as many
     /// values the last. None if there is none, or if values are drawn at random.
     pub fn axis(&self) -> Option<&str> {
+        self.axis_of_vary().or_else(|| self.axis_of_recordings())
+    }
+
+    /// The number in which recordings differ most.
+    fn axis_of_recordings(&self) -> Option<&str> {
+        let runs = self.listed.iter().filter(|run| run.recording.is_some());
+        let mut values: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
+        for one in runs.flat_map(|run| &run.values).filter(|one| one.value.parse::<f64>().is_ok()) {
+            values.entry(&one.name).or_default().insert(&one.value);
+        }
+        let several = values.into_iter().filter(|(_, values)| values.len() > 1);
+        // of as many values the torque's amplitude
+        let most = several.max_by_key(|(name, values)| (values.len(), *name == NAMING[2]));
+        most.map(|(name, _)| name).filter(|_| !self.is_random())
+    }
+
+    fn axis_of_vary(&self) -> Option<&str> {
         let numbers = |values: &[String]| values.iter().all(|v| v.parse::<f64>().is_ok());
         let along = self.vary.iter().filter(|vary| vary.value.len() > 1 && numbers(&vary.value));
         let most = along.max_by_key(|vary| vary.value.len());
         most.map(|vary| vary.name.as_str()).filter(|_| !self.is_random())
+    }
+
+    /// Writes values that have a unit (`50 mm`) as numbers in the FMU's own; what cannot be read stays, for
+    /// [`Plan::cases`] to refuse.
+    pub fn convert_units(&mut self, description: &ModelDescription) {
+        let convert = |name: &str, text: &mut String| {
+            let variable = description.variable(name).ok();
+            let read = variable.and_then(|variable| description.value(variable, text).ok());
+            if let (Some(Value::Real(number)), Err(_)) = (read, text.trim().parse::<f64>()) {
+                *text = number.to_string();
+            }
+        };
+        let listed = self.listed.iter_mut().flat_map(|run| &mut run.values);
+        for one in self.set.iter_mut().chain(listed) {
+            convert(&one.name, &mut one.value);
+        }
+        for vary in &mut self.vary {
+            vary.value.iter_mut().for_each(|value| convert(&vary.name, value));
+        }
     }
 
     /// What is set in every run, by FMU name.
@@ -350,6 +403,20 @@ impl Plan {
         let mut torques = BTreeMap::new();
         let mut names = BTreeSet::new();
         let mut cases = Vec::with_capacity(count);
+        // what was recorded stands before what is simulated of the same run
+        for run in &self.listed {
+            let Some(recording) = &run.recording else { continue };
+            let case = self.case(description, &input, &mut torques, &mut problems, &run.values);
+            let Some(mut case) = case else { continue };
+            let varied = self.varied();
+            let model = varied.iter().position(|name| *name == NAMING[0]);
+            model.into_iter().for_each(|place| case.varied[place] = RECORDING.into());
+            case.model = Some(RECORDING.into());
+            case.recording = Some(recording.clone());
+            case.name = self.name(run, &case, 0, &mut names);
+            cases.push(case);
+        }
+        let recorded = cases.len();
         for run in &combinations {
             for draw in 0..draws {
                 let mut values = run.values.clone();
@@ -363,7 +430,7 @@ impl Plan {
                     ));
                 }
                 for count in &self.count {
-                    let number = |first: i64| (first + cases.len() as i64).to_string();
+                    let number = |first: i64| (first + (cases.len() - recorded) as i64).to_string();
                     values.push(count.clone().map(number));
                 }
                 let case = self.case(description, &input, &mut torques, &mut problems, &values);
@@ -371,7 +438,8 @@ impl Plan {
                     continue;
                 };
                 case.name = self.name(run, &case, draw, &mut names);
-                case.listed.clone_from(&run.name);
+                // recorded and simulated runs are drawn along their values, not by their names
+                case.listed = run.name.clone().filter(|_| run.recording.is_none());
                 cases.push(case);
             }
             if problems.count() > 20 {
@@ -469,6 +537,7 @@ impl Plan {
             step: self.step,
             tolerance: self.tolerance,
             hold: self.hold,
+            recording: None,
         };
         let lines = self.stop.as_ref().map_or(lines, |stop| stop.lines.clone());
         problems.take(&lines, case.run().check());
@@ -589,7 +658,7 @@ mod tests {
             .collect();
         let expected = [
             ("thesis", 44),
-            ("thesis_models", 66),
+            ("thesis_models", 88),
             ("t1_resonance", 6),
             ("t2_mass", 5),
             ("t3_diameter", 5),
@@ -604,6 +673,26 @@ mod tests {
             ("slew", 27),
         ];
         assert_eq!(counts, expected);
+    }
+
+    #[test]
+    fn values_with_units_are_the_same_plan() {
+        let [plain, with_units] = [
+            "profile = \"sine\"\n[set]\ntank.d = 0.163\n[vary]\ntank.h = [0.05, 0.1]\n[[run]]\nhub.I = 0.3\n",
+            "profile = \"sine\"\n[set]\ntank.d = \"163 mm\"\n[vary]\ntank.h = [\"50mm\", \"0.1 m\"]\n\
+             [[run]]\nhub.I = \"0.3 kg.m2\"\n",
+        ]
+        .map(|text| {
+            let mut plan = Plan::parse(text).unwrap();
+            plan.convert_units(&description());
+            (plan.axis().map(String::from), plan.cases(&description()).unwrap())
+        });
+        assert_eq!(plain.0.as_deref(), Some("tank.h"));
+        assert_eq!(format!("{plain:?}"), format!("{with_units:?}"));
+        let mut plan = Plan::parse("profile = \"sine\"\n[vary]\ntank.h = [\"5 V\"]\n").unwrap();
+        plan.convert_units(&description());
+        let why = plan.cases(&description()).unwrap_err().to_string();
+        assert!(why.contains("tank.h has no unit \"V\" (allowed: m, mm)"), "{why}");
     }
 
     #[test]

@@ -11,6 +11,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result, bail, ensure};
 use host::description::did_you_mean;
+use serde_json::json;
 
 pub use self::kinds::{Allowed, FILE, KINDS, Kind, Parameter};
 pub use self::noise::TONES;
@@ -80,6 +81,20 @@ pub fn table() -> String {
     }
     text.push_str(&format!("| `{}` | {} | s, N·m |\n", FILE.0, FILE.1));
     text
+}
+
+/// The profiles that take numbers, for programs.
+pub fn list() -> Vec<serde_json::Value> {
+    let parameter =
+        |p: &kinds::Parameter| json!({ "name": p.name, "unit": p.unit, "default": p.default });
+    let profile = |kind: &kinds::Kind| {
+        json!({
+            "profile": kind.name,
+            "torque": kind.says,
+            "parameters": kind.parameters.iter().map(parameter).collect::<Vec<_>>(),
+        })
+    };
+    KINDS.iter().map(profile).collect()
 }
 
 /// A profile as it was written, `name` or `name:key=value,key=value`: not yet looked at.

@@ -6,8 +6,8 @@ use experiments::campaign::Outcome;
 use maud::{Markup, html};
 
 use super::colors;
-use super::figure::{Figure, Panel, dots, line};
-use super::page::{Axis, Page, best, exact_features, list_of, manoeuvre};
+use super::figure::{Figure, Label, Panel, dots, line};
+use super::page::{Axis, Group, Page, best, distinct, exact_features, list_of, manoeuvre};
 
 /// A quantity of a run: label, what it is, whether its axis is logarithmic, and a level to compare
 /// with.
@@ -23,11 +23,21 @@ fn quantity<'a>(label: &'a str, of: &'a dyn Fn(&Outcome) -> Option<f64>) -> Quan
 }
 
 /// Antiresonance and resonance of every group, with the exact linear ones: the question of most
-/// plans of sweeps.
+/// plans of sweeps. Colour: what tells the groups apart beside their model; line: the model; marker:
+/// which of the two.
 pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
+    let plants = distinct(page.groups.iter().map(Group::plant));
+    let models = distinct(page.groups.iter().map(|group| group.model));
+    // solid is the last, which most plans have for the one with the most physics
+    let dash = |model: &str| {
+        let place = models.iter().rev().position(|other| *other == model).unwrap_or(0);
+        colors::line(place)
+    };
     let mut traces = Vec::new();
     let mut untrusted = Vec::new();
-    for (i, group) in page.groups.iter().enumerate() {
+    // where the lines end: (frequency, which of the two and plant, model, colour)
+    let mut ends: Vec<(f64, String, &str, &str)> = Vec::new();
+    for group in &page.groups {
         type Side = (
             &'static str,
             &'static str,
@@ -38,8 +48,9 @@ pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
             ("antiresonance", "circle", |f| f.f_dip, |s| s.f_dip),
             ("resonance", "diamond", |f| f.f_res, |s| s.f_res),
         ];
-        for (k, (what, symbol, get, std)) in sides.into_iter().enumerate() {
-            let color = colors::category(2 * i + k);
+        let plant = group.plant();
+        let color = colors::category(plants.iter().position(|p| *p == plant).unwrap_or(0));
+        for (what, symbol, get, std) in sides {
             let points: Vec<(f64, f64, Option<f64>)> = group
                 .runs
                 .iter()
@@ -49,7 +60,17 @@ pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
                     Some((axis.of(run)?, value, std(&estimate.deviations).map(|std| 2.0 * std)))
                 })
                 .collect();
-            traces.push(dots(0, &format!("{what}, {}", group.title()), color, symbol, &points));
+            let name = format!("{what}, {}", group.title());
+            let mut trace = dots(0, &name, color, symbol, &points);
+            trace["line"]["dash"] = dash(group.model).0.into();
+            traces.push(trace);
+            if let Some((_, end, _)) = points.iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+                let what = match plants.len() {
+                    1 => what.to_string(),
+                    _ => format!("{what}, {plant}"),
+                };
+                ends.push((*end, what, group.model, color));
+            }
         }
         for run in &group.runs {
             let doubt = best(run).and_then(|(estimate, _)| estimate.doubt);
@@ -71,21 +92,53 @@ pub(super) fn extrema(page: &Page, axis: &Axis) -> Figure {
             }
         }
     }
+    let lines: Vec<String> =
+        models.iter().map(|model| format!("{} {model}", dash(model).1)).collect();
     Figure {
         title: format!("Antiresonance and resonance against {}", axis.name),
         caption: html! {
-            "Circles: antiresonance, where the liquid holds the hub still; diamonds: resonance, where hub and liquid swing against each other; dotted: both of the exact linear plant with viscous friction. Bars: 95 % intervals, from what of the rate no linear response explains: gyro noise, dry friction, a nonlinear liquid (Methods). An upward sweep shows a narrow resonance late, so above the exact one (Methods)."
+            "Circles: antiresonance, where the liquid holds the hub still; diamonds: resonance, where hub and liquid swing against each other. "
+            @if models.len() > 1 { "Lines: " (lines.join(", ")) ". " }
+            "Thin and dotted: both of the exact linear plant with viscous friction. Bars: 95 % intervals, from what of the rate no linear response explains: gyro noise, dry friction, a nonlinear liquid (Methods). An upward sweep shows a narrow resonance late, so above the exact one (Methods)."
             (list_of("Not to be trusted, and not drawn", &untrusted))
         },
         height: 460,
         panels: vec![Panel::new(&axis.label, "frequency / Hz")],
         traces,
+        labels: labels(ends),
         ..Figure::default()
     }
 }
 
+/// Labels at the ends of lines; lines of one thing that end together share theirs. None where there
+/// are too many to be read.
+fn labels(mut ends: Vec<(f64, String, &str, &str)>) -> Vec<Label> {
+    const MOST: usize = 12;
+    /// What counts as together, of the span of all.
+    const TOGETHER: f64 = 0.03;
+    ends.sort_by(|a, b| a.1.cmp(&b.1).then(a.0.total_cmp(&b.0)));
+    let span = ends.iter().map(|end| end.0).fold(f64::MIN, f64::max)
+        - ends.iter().map(|end| end.0).fold(f64::MAX, f64::min);
+    let mut labels: Vec<(f64, String, Vec<&str>, &str)> = Vec::new();
+    for (y, what, model, color) in ends {
+        match labels.last_mut() {
+            Some(last) if last.1 == what && y - last.0 <= TOGETHER * span => last.2.push(model),
+            _ => labels.push((y, what, vec![model], color)),
+        }
+    }
+    if labels.len() > MOST {
+        return Vec::new();
+    }
+    let label = |(y, what, models, color): (f64, String, Vec<&str>, &str)| Label {
+        y,
+        text: format!("{what}: {}", models.join(", ")),
+        color: color.into(),
+    };
+    labels.into_iter().map(label).collect()
+}
+
 /// The largest of a signal at the end: after a manoeuvre, or in the last fifth of a run.
-fn at_the_end(run: &Outcome, signal: &str) -> Option<f64> {
+pub(super) fn at_the_end(run: &Outcome, signal: &str) -> Option<f64> {
     let curve = run.history.curve(signal);
     let (first, last) = (curve.first()?.0, curve.last()?.0);
     let from = manoeuvre(run).unwrap_or(first + 0.8 * (last - first));

@@ -27,6 +27,18 @@ pub(super) fn symbol(i: usize) -> &'static str {
     ["circle", "square", "diamond", "cross"][i / CATEGORIES.len() % 4]
 }
 
+/// Line of the i-th of several things whatever their colours: as plotly names it, and in words.
+pub(super) fn line(i: usize) -> (&'static str, &'static str) {
+    const LINES: [(&str, &str); 5] = [
+        ("solid", "solid"),
+        ("dash", "dashed"),
+        ("dashdot", "dash-dotted"),
+        ("longdash", "long dashes"),
+        ("longdashdot", "long dashes and dots"),
+    ];
+    LINES[i % LINES.len()]
+}
+
 /// Line of the i-th of several things, another one where the colours repeat.
 pub(super) fn dash(i: usize) -> &'static str {
     ["solid", "dash", "dot", "dashdot", "longdash", "longdashdot"][i / CATEGORIES.len() % 6]

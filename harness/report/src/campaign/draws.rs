@@ -10,19 +10,23 @@ use super::page::{Group, Page, best};
 /// Name, unit, and what it is of a run.
 type Quantity = (&'static str, &'static str, fn(&Outcome) -> Option<f64>);
 
-const QUANTITIES: [Quantity; 4] = [
+pub(super) const QUANTITIES: [Quantity; 4] = [
     ("antiresonance", "mHz", |run| Some(1e3 * best(run)?.0.features.f_dip?)),
     ("resonance", "mHz", |run| Some(1e3 * best(run)?.0.features.f_res?)),
     ("separation Δf", "mHz", |run| Some(1e3 * best(run)?.0.features.delta_f()?)),
     ("notch depth", "dB", |run| best(run)?.0.features.notch_db),
 ];
 
-/// Ranked sensitivities and histograms of a group.
-pub(super) fn draws(page: &Page, group: &Group) -> Vec<Figure> {
+/// Places and names of what a plan draws.
+fn drawn<'a>(page: &Page<'a>) -> Vec<(usize, &'a str)> {
     let grouping = page.plan.grouping();
     let drawn = page.plan.varied().into_iter().enumerate();
-    let drawn: Vec<(usize, &str)> =
-        drawn.filter(|(_, n)| !grouping.contains(n) && !n.ends_with("seed")).collect();
+    drawn.filter(|(_, n)| !grouping.contains(n) && !n.ends_with("seed")).collect()
+}
+
+/// Names of what is drawn, how far one standard deviation of each moves antiresonance and
+/// resonance (mHz), and the coefficients of correlation; the largest effect last.
+pub(super) fn ranked<'a>(page: &Page<'a>, group: &Group) -> Vec<(&'a str, [f64; 2], [f64; 2])> {
     let effect = |place: usize, of: fn(&Outcome) -> Option<f64>| {
         let point = |run: &&Outcome| Some((run.case.varied[place].parse().ok()?, of(run)?));
         let points: Vec<(f64, f64)> = group.runs.iter().filter_map(point).collect();
@@ -30,15 +34,21 @@ pub(super) fn draws(page: &Page, group: &Group) -> Vec<Figure> {
         (correlation(&points), deviation)
     };
     // one standard deviation of the parameter moves the quantity by ρ of its own deviation
-    let mut ranked: Vec<(&str, [f64; 2], [f64; 2])> = drawn
-        .iter()
+    let mut ranked: Vec<(&str, [f64; 2], [f64; 2])> = drawn(page)
+        .into_iter()
         .map(|(place, name)| {
-            let each = [0, 1].map(|i| effect(*place, QUANTITIES[i].2));
-            (*name, each.map(|(rho, s)| rho * s), each.map(|(rho, _)| rho))
+            let each = [0, 1].map(|i| effect(place, QUANTITIES[i].2));
+            (name, each.map(|(rho, s)| rho * s), each.map(|(rho, _)| rho))
         })
         .collect();
     let size = |row: &(&str, [f64; 2], [f64; 2])| row.1[0].abs().max(row.1[1].abs());
     ranked.sort_by(|a, b| size(a).total_cmp(&size(b)));
+    ranked
+}
+
+/// Ranked sensitivities and histograms of a group.
+pub(super) fn draws(page: &Page, group: &Group) -> Vec<Figure> {
+    let (drawn, ranked) = (drawn(page), ranked(page, group));
     let names: Vec<&str> = ranked.iter().map(|row| row.0).collect();
     let bars = [0, 1].map(|i| {
         let text: Vec<String> = ranked.iter().map(|row| format!("ρ = {:.2}", row.2[i])).collect();
@@ -122,7 +132,7 @@ fn histogram(values: &[f64]) -> (Vec<f64>, Vec<usize>) {
 }
 
 /// Mean and standard deviation.
-fn moments(values: &[f64]) -> (f64, f64) {
+pub(super) fn moments(values: &[f64]) -> (f64, f64) {
     let count = values.len().max(1) as f64;
     let mean = values.iter().sum::<f64>() / count;
     let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / count;

@@ -23,6 +23,15 @@ pub(super) struct Figure {
     pub shared: bool,
     pub panels: Vec<Panel>,
     pub traces: Vec<Value>,
+    /// At the right end of lines in the first panel, instead of a legend where there is room.
+    pub labels: Vec<Label>,
+}
+
+/// A text at the right end of a line.
+pub(super) struct Label {
+    pub y: f64,
+    pub text: String,
+    pub color: String,
 }
 
 /// Axes of a panel.
@@ -55,6 +64,7 @@ impl Default for Figure {
             shared: false,
             panels: Vec::new(),
             traces: Vec::new(),
+            labels: Vec::new(),
         }
     }
 }
@@ -89,9 +99,11 @@ impl Figures {
                        "range": p.range.map(|(from, to)| [number(from), number(to)])})
             })
             .collect();
+        let label = |l: &Label| json!({"y": number(l.y), "text": l.text, "color": l.color});
+        let labels: Vec<Value> = figure.labels.iter().map(label).collect();
         self.specifications.push(json!({
             "columns": figure.columns, "height": figure.height, "shared": figure.shared,
-            "panels": panels, "traces": traces,
+            "panels": panels, "traces": traces, "labels": labels,
         }));
         let number = self.specifications.len();
         self.titles.push(figure.title.clone());

@@ -29,11 +29,16 @@ pub(super) fn history(page: &Page, group: &Group) -> Figure {
         "residual / (rad/s)",
     ];
     let signals = ["tau_cmd", "omega_imu", "slosh_angle", "slosh_angle_radial", "residual"];
+    // a liquid that stays in its plane has nothing to show across it
+    let planar = runs.iter().all(|run| run.totals.peak_radial_angle == 0.0);
     // the largest first, or it would hide the others
     for (i, run) in runs.iter().enumerate().rev() {
         let color = colors::ordered(i, runs.len());
         for (p, signal) in signals.iter().enumerate() {
             let mut curve = run.history.curve(signal);
+            if p == 3 && planar {
+                continue;
+            }
             if p == 2 || p == 3 {
                 curve.iter_mut().for_each(|(_, angle)| *angle = angle.to_degrees());
             }
@@ -146,8 +151,8 @@ pub(super) fn paths(page: &Page, group: &Group) -> Vec<Figure> {
     else {
         return Vec::new();
     };
-    // a wave that stays in its plane has no path to show
-    if radial(last) < rotary::LEAST {
+    // a wave that stays in its plane has no path to show, a recording tells of none
+    if radial(last).is_nan() || radial(last) < rotary::LEAST {
         return Vec::new();
     }
     let onset = group.runs.iter().find_map(|run| Some((*run, run.path.onset.as_ref()?)));

@@ -9,7 +9,9 @@ mod general;
 mod histories;
 mod notes;
 mod page;
+mod recordings;
 mod responses;
+mod result;
 mod thesis;
 
 use analysis::BAND;
@@ -125,11 +127,12 @@ fn bench_sections<'a>(
     if has_response {
         let responses = few.iter().filter(|g| g.band().is_some());
         let mut all: Vec<Figure> = responses.map(|g| responses::responses(page, g)).collect();
-        if axis.is_some() {
+        if axis.is_some() || results.outcomes.iter().any(|run| run.is_recording()) {
             all.extend(responses::models(page));
         }
         sections.push(("Frequency responses", add(all)));
     }
+    sections.push(("The models beside the recordings", recordings::beside(results)));
     sections.push(("Time histories", add(histories(few))));
     if !random {
         let paths = few.iter().flat_map(|group| histories::paths(page, group));
@@ -204,12 +207,19 @@ fn introduction(page: &Page, fmu: &Fmu, results: &Results) -> Markup {
         .filter_map(|run| Some(format!("{} ({})", run.case.name, run.beyond_model()?)))
         .collect();
     let groups = page.groups.iter().filter(|group| group.band().is_some());
+    let result = result::sentence(page, results);
+    let recorded = results.recordings();
     html! {
         h1 { @if plan.title.is_empty() { "A campaign" } @else { (plan.title) } }
+        @if !result.is_empty() { p .result { (result) } }
         p .lead {
-            (runs(count)) " of the FMU " (fmu.model_name) " (version " (fmu.version)
+            @if recorded > 0 {
+                (recorded) " recording" @if recorded > 1 { "s" } ", beside "
+            }
+            (runs(count - recorded)) " of the FMU " (fmu.model_name) " (version " (fmu.version)
             "), sampled at " (rate) " Hz: " (torques(results)) "."
         }
+        div .cards { @for group in groups.take(2 * MOST_GROUPS) { (card(page, group)) } }
         @if !failures.is_empty() {
             div .failed {
                 p { b { (runs(failures.len())) " failed:" } }
@@ -230,7 +240,6 @@ fn introduction(page: &Page, fmu: &Fmu, results: &Results) -> Markup {
                 (one) ". Computed faithfully, but not what a tank does. The results table marks it."
             }
         }
-        div .cards { @for group in groups.take(2 * MOST_GROUPS) { (card(page, group)) } }
     }
 }
 

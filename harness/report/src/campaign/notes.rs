@@ -127,7 +127,7 @@ pub(super) fn table(page: &Page, results: &Results) -> Markup {
                         th colspan=(3 + others.len()) { "Run" }
                         @if swept { th colspan="4" { "While the sweep passes" } }
                         @if recorded { th colspan="4" { "Whole record (" code { "spa" } ")" } }
-                        th colspan="5" { "The run itself" }
+                        th colspan="7" { "The run itself" }
                     }
                     tr {
                         th { "model" } th { "fill" br; "cm" } th { "torque" br; "mN·m" }
@@ -137,6 +137,7 @@ pub(super) fn table(page: &Page, results: &Results) -> Markup {
                             th { "Δf" br; "mHz" } th { "notch" br; "dB" }
                         }
                         th { "largest slosh" br; "angle, deg" } th { "largest wave" br; "mm" }
+                        th { "largest rate" br; "rad/s" } th { "largest" br; "acceleration" br; "rad/s²" }
                         th { "stiction" br; "s" } th { "energy" br; "residual" }
                         th { "range of" br; "the model" }
                     }
@@ -153,13 +154,18 @@ pub(super) fn table(page: &Page, results: &Results) -> Markup {
                             }
                             @if swept { (cells(run.passing.as_ref().map(|passing| &passing.rate))) }
                             @if recorded { (cells(run.record.as_ref().map(|record| &record.spa))) }
-                            td { (format!("{:.1}", run.totals.peak_slosh_angle.to_degrees())) }
-                            td { (format!("{:.1}", run.totals.peak_wave_height * 1e3)) }
-                            td { (format!("{:.3}", run.totals.stuck)) }
-                            td { (format!("{:.1e}", run.totals.max_energy_residual)) }
+                            // of a recording most is unknown
+                            @let known = |text: String| if text == "NaN" { String::new() } else { text };
+                            td { (known(format!("{:.1}", run.totals.peak_slosh_angle.to_degrees()))) }
+                            td { (known(format!("{:.1}", run.totals.peak_wave_height * 1e3))) }
+                            td { (format!("{:.3}", run.totals.peak_rate)) }
+                            td { (format!("{:.3}", run.totals.peak_acceleration)) }
+                            td { (known(format!("{:.3}", run.totals.stuck))) }
+                            td { (known(format!("{:.1e}", run.totals.max_energy_residual))) }
                             td {
                                 @match run.beyond_model() {
                                     Some(how) => span .warn title=(how) { "left" },
+                                    None if run.is_recording() => "recorded",
                                     None => "within",
                                 }
                             }

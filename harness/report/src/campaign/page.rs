@@ -1,8 +1,6 @@
 //! What every figure of a page about a campaign looks at: the runs in groups, the axis along which they
 //! are drawn.
 
-use std::fmt::Write as _;
-
 use analysis::features::Features;
 use analysis::sweep::Sweep;
 use analysis::{BAND, FrequencyResponse, logarithmic_grid};
@@ -30,14 +28,16 @@ pub(super) struct Group<'a> {
 
 impl Group<'_> {
     pub fn title(&self) -> String {
-        let mut title = self.model.to_string();
-        if let Some(fill) = self.fill {
-            let _ = write!(title, ", {} cm fill", cm(fill));
+        match &*self.plant() {
+            "" => self.model.to_string(),
+            plant => format!("{}, {plant}", self.model),
         }
-        for other in &self.others {
-            let _ = write!(title, ", {other}");
-        }
-        title
+    }
+
+    /// What tells it from other groups of its model: `10 cm fill, tank.d 111 mm`.
+    pub fn plant(&self) -> String {
+        let fill = self.fill.map(|fill| format!("{} cm fill", cm(fill)));
+        fill.into_iter().chain(self.others.iter().cloned()).collect::<Vec<_>>().join(", ")
     }
 
     pub fn band(&self) -> Option<(f64, f64)> {
@@ -61,6 +61,11 @@ impl Axis {
         let value: f64 = run.case.varied[self.place].parse().ok()?;
         Some((value * self.scale * 1e9).round() / 1e9)
     }
+
+    /// What stands behind a value: a space and the unit, or nothing.
+    pub fn unit(&self) -> &str {
+        self.label.find(" / ").map_or("", |at| &self.label[at + 2..])
+    }
 }
 
 /// What every figure may look at.
@@ -77,10 +82,8 @@ impl Page<'_> {
     pub fn name(&self, run: &Outcome) -> String {
         let value = self.axis.as_ref().and_then(|axis| Some((axis, axis.of(run)?)));
         match value {
-            Some((axis, x)) => match axis.label.split_once(" / ") {
-                Some((_, unit)) => format!("{x} {unit}"),
-                None => format!("{} {x}", axis.label),
-            },
+            Some((axis, x)) if axis.unit().is_empty() => format!("{} {x}", axis.label),
+            Some((axis, x)) => format!("{x}{}", axis.unit()),
             None => run.case.name.clone(),
         }
     }
@@ -194,12 +197,19 @@ pub(super) fn groups<'a>(plan: &Plan, fmu: &Fmu, results: &'a Results) -> Vec<Gr
     let axis = plan.axis().unwrap_or("");
     // the places, among all that is varied, of what tells groups apart beside model and fill
     let grouping = plan.grouping();
+    let recorded = results.recordings() > 0;
+    let differs = |place: usize| {
+        let values = results.outcomes.iter().map(|run| &run.case.varied[place]);
+        distinct(values).len() > 1
+    };
     let others: Vec<(usize, Varied)> = plan
         .varied()
         .into_iter()
         .enumerate()
         .filter(|(_, name)| grouping.contains(name) && *name != axis)
         .filter(|(_, name)| !["slosh.model", "tank.h"].contains(name))
+        // one recording has its values alone; they tell it from nothing
+        .filter(|(i, _)| !recorded || differs(*i))
         .filter_map(|(i, name)| Some((i, Varied::of(name, fmu, &results.outcomes)?)))
         .collect();
     let one_fill = axis != "tank.h" && (!plan.is_random() || grouping.contains(&"tank.h"));

@@ -19,7 +19,39 @@
     return logs.reduce((a, b) => Math.max(a, b), -Infinity) - logs.reduce((a, b) => Math.min(a, b), Infinity);
   }
 
-  function draw(place, spec) {
+  // Texts at the right ends of lines, each at its line or as near as the others let it.
+  function labels(spec, size, night, inner, [low, high]) {
+    const px = (y) => ((y - low) / (high - low)) * inner;
+    const all = spec.labels.map((l) => ({ ...l, at: px(l.y) })).sort((a, b) => a.at - b.at);
+    const apart = size * 1.25;
+    // from below upwards, then from above downwards, so that none leaves the panel
+    all.forEach((l, i) => { if (i) l.at = Math.max(l.at, all[i - 1].at + apart); });
+    for (let i = all.length - 1, most = inner - apart / 2; i >= 0; i--, most -= apart) all[i].at = Math.min(all[i].at, most);
+    return all.map((l) => ({
+      text: l.text, font: { size, color: night || l.color }, showarrow: false, align: "left",
+      xref: "paper", x: 1, xanchor: "left", xshift: 4, yref: "y", y: l.y, yshift: l.at - px(l.y), yanchor: "middle",
+    }));
+  }
+
+  // Where the values of a panel end, error bars included, with some air.
+  function span(spec, panel) {
+    const ends = spec.traces.filter((t) => t.panel === panel).flatMap((t) =>
+      t.y.flatMap((y, i) => { const e = t.error_y ? t.error_y.array[i] : 0; return y === null ? [] : [y - e, y + e]; }));
+    const low = Math.min(...ends), high = Math.max(...ends), air = 0.05 * (high - low) || 0.05 * Math.abs(high) || 1;
+    return [low - air, high + air];
+  }
+
+  // Height over width of what a figure shows.
+  function shape(spec) {
+    const size = (axis) => {
+      const all = spec.traces.flatMap((t) => t[axis] || []);
+      return all.reduce((a, b) => Math.max(a, b), -Infinity) - all.reduce((a, b) => Math.min(a, b), Infinity);
+    };
+    const ratio = size("y") / size("x");
+    return ratio > 0 ? Math.min(Math.max(ratio, 0.4), 2) : 1;
+  }
+
+  function draw(place, spec, measured) {
     const night = dark.matches && !printing;
     const ink = night ? "#e6eaee" : "#1b1f24";
     const line = night ? "#39424c" : "#dfe4e8";
@@ -28,27 +60,34 @@
     const panels = spec.panels.length;
     const columns = Math.max(1, Math.min(spec.columns, Math.floor(width / (printing ? 170 : 290))));
     const rows = Math.ceil(panels / columns);
-    const row = printing ? Math.min(spec.height * 0.62, 250) : spec.height;
+    let row = printing ? Math.min(spec.height * 0.55, 250) : spec.height;
     const bars = spec.traces.some((trace) => trace.orientation === "h"); // whose names are long
-    const [space, right, top, below, gutter] = printing ? [44, 6, 8, 32, 44] : [62, 12, 30, 44, 66];
+    const [space, right, top, below, gutter] = printing ? [44, 6, 8, 32, 54] : [62, 12, 30, 44, 66];
     const between = bars ? 2 * gutter : gutter;
     const left = bars ? 2 * space + 20 : space;
     const named = new Set(spec.traces.filter((t) => t.showlegend !== false && t.name).map((t) => t.name));
-    const perLine = Math.max(1, Math.floor((width - 20) / (printing ? 120 : 190)));
-    const legend = named.size > 1 ? (printing ? 13 : perLine > 1 ? 25 : 30) * Math.ceil(named.size / perLine) + 14 : 0;
+    const small = printing ? 8 : 11;
+    const labelled = spec.labels.length > 0 && width >= 640;
+    const longest = Math.max(0, ...spec.labels.map((l) => l.text.length));
+    const aside = labelled ? 0.56 * small * longest + 10 : 0;
+    const showlegend = named.size > 1 && !labelled;
+    // its height is known once it is drawn
+    const legend = showlegend ? (measured ?? 30) + 6 : 0;
     const shared = spec.shared && columns === 1;
     const gap = shared ? 16 : below + 10;
+    const plotWidth = width - left - right - aside;
+    // what has the same scale both ways is no higher than its width needs
+    if (panels === 1 && spec.panels[0].equal) row = Math.min(row, below + plotWidth * shape(spec));
     const inner = rows * row - below;
     const height = top + rows * row + legend;
-    const plotWidth = width - left - right;
     const layout = {
       width, height, uirevision: "keep", hovermode: "closest", dragmode: "zoom",
-      margin: { l: left, r: right, t: top, b: below + legend },
+      margin: { l: left, r: right + aside, t: top, b: below + legend },
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
       font: { family: "system-ui, sans-serif", size: printing ? 8 : 12, color: ink },
-      legend: { orientation: "h", x: 0, xanchor: "left", yref: "container", y: 0, yanchor: "bottom", font: { size: printing ? 8 : 11 } },
-      showlegend: named.size > 1,
-      modebar: { color: night ? "#9aa5b1" : "#5b6570", bgcolor: "rgba(0,0,0,0)" },
+      legend: { orientation: "h", x: 0, xanchor: "left", yref: "container", y: 0, yanchor: "bottom", tracegroupgap: 0, font: { size: small } },
+      showlegend,
+      modebar: { color: night ? "#9aa5b1" : "#5b6570", activecolor: ink, bgcolor: "rgba(0,0,0,0)" },
     };
     const domains = [];
     spec.panels.forEach((panel, i) => {
@@ -62,17 +101,21 @@
       domains.push(domain);
       const common = { gridcolor: line, zerolinecolor: line, linecolor: ink, showline: true, automargin: false, exponentformat: "power", ticks: "outside", tickcolor: line };
       const last = !shared || i === panels - 1;
-      layout["xaxis" + suffix] = { ...common, domain: domain.x, anchor: "y" + suffix, title: { text: last ? panel.x : "", standoff: printing ? 4 : 10 }, showticklabels: last,
+      layout["xaxis" + suffix] = { ...common, domain: domain.x, anchor: "y" + suffix, title: { text: last ? panel.x : "", standoff: printing ? 4 : 8, font: { size: small + (printing ? 0 : 1) } }, showticklabels: last,
         type: panel.logx ? "log" : "-", nticks: Math.max(3, Math.round(w / 70)) };
       if (panel.logx) Object.assign(layout["xaxis" + suffix], { exponentformat: "none", tickformat: "~g" });
       if (panel.range) layout["xaxis" + suffix].range = panel.logx ? panel.range.map(Math.log10) : panel.range;
       if (spec.shared && i) layout["xaxis" + suffix].matches = "x";
-      layout["yaxis" + suffix] = { ...common, domain: domain.y, anchor: "x" + suffix, title: { text: panel.y, standoff: 2, font: { size: printing ? 8 : 11 } }, type: panel.logy ? "log" : "-", nticks: 6 };
+      layout["yaxis" + suffix] = { ...common, domain: domain.y, anchor: "x" + suffix, title: { text: panel.y, standoff: 2, font: { size: small } }, type: panel.logy ? "log" : "-", nticks: 6 };
       if (bars) Object.assign(layout["yaxis" + suffix], { type: "category", dtick: 1, tickfont: { size: printing ? 7 : 10 } });
       // at powers of ten; where there are less than two of them, where plotly puts them
       if (panel.logy && decades(spec, i) >= 2) layout["yaxis" + suffix].dtick = 1;
       if (panel.equal) Object.assign(layout["yaxis" + suffix], { scaleanchor: "x" + suffix, constrain: "domain" });
     });
+    if (labelled) {
+      layout.yaxis.range = span(spec, 0);
+      layout.annotations = labels(spec, small, night && ink, inner, layout.yaxis.range);
+    }
     const seen = new Set();
     const traces = spec.traces.map((source) => {
       const trace = JSON.parse(JSON.stringify(source).replaceAll('"@ink"', `"${ink}"`));
@@ -91,7 +134,11 @@
       return trace;
     });
     place.style.height = height + "px";
+    // what is measured while it is drawn must not be scaled
+    place.querySelectorAll(".main-svg").forEach((svg) => svg.removeAttribute("viewBox"));
     Plotly.react(place, traces, layout, config);
+    const found = showlegend && measured === undefined && place._fullLayout.legend._height;
+    if (found && Math.abs(found - 30) > 1) return draw(place, spec, found);
     // what is printed wider or narrower than drawn keeps its shape
     place.querySelectorAll(".main-svg").forEach((svg) => svg.setAttribute("viewBox", `0 0 ${width} ${height}`));
     place.style.setProperty("--shape", `${width} / ${height}`);

@@ -113,7 +113,9 @@ pub(super) fn models(page: &Page) -> Vec<Figure> {
     fills
         .into_iter()
         .map(|fill| {
-            let groups: Vec<&&Group> = comparable.iter().filter(|g| g.fill == fill).collect();
+            let mut groups: Vec<&&Group> = comparable.iter().filter(|g| g.fill == fill).collect();
+            // recordings are drawn over the models
+            groups.sort_by_key(|group| group.runs[0].is_recording());
             let mut traces = Vec::new();
             for (i, group) in groups.iter().enumerate() {
                 let ends = distinct([group.runs.first(), group.runs.last()].into_iter().flatten().map(|r| r.case.name.as_str()));
@@ -174,7 +176,10 @@ pub(super) fn maps(group: &Group, axis: &Axis) -> Figure {
             ends: Some((-10.0, 60.0)),
         },
         Quantity {
-            label: "leakage r|F_r|/|τ|",
+            label: match group.runs[0].is_recording() {
+                true => "leakage √(|H_x|²+|H_y|²)/|H|",
+                false => "leakage r|F_r|/|τ|",
+            },
             of: |run| {
                 let passing = run.passing.as_ref();
                 passing.map_or(Curve::new(), |p| zip(&p.rate.response.frequency, &p.leakage))
@@ -209,7 +214,9 @@ pub(super) fn maps(group: &Group, axis: &Axis) -> Figure {
     }
     Figure {
         title: format!("Over frequency and {}, {}", axis.name, group.title()),
-        caption: html! { "One row of cells for each run. Residual coherence: bright where what the linear fit leaves still follows the torque steadily. Leakage: the radial force times the tank's arm over the torque; bright in rotary slosh." },
+        caption: html! { "One row of cells for each run. Residual coherence: bright where what the linear fit leaves still follows the torque steadily. Leakage: "
+        @if group.runs[0].is_recording() { "the rates about the other axes over that about the hub's (thesis 6.3.6)." }
+        @else { "the radial force times the tank's arm over the torque; bright in rotary slosh." } },
         columns: 4,
         height: 250,
         panels,

@@ -1,0 +1,180 @@
+//! The model's runs beside what was recorded of the same run.
+
+use experiments::campaign::{Outcome, Results};
+use maud::{Markup, html};
+
+use super::page::{best, cm, distinct};
+use experiments::rounding::thousandths;
+
+/// A value and its standard deviation, if that is known.
+type Value = (f64, Option<f64>);
+
+/// A feature: heading, what it is of a run with its standard deviation, factor, unit and digits of a difference.
+struct Feature {
+    heading: [&'static str; 2],
+    of: fn(&Outcome) -> Option<Value>,
+    digits: usize,
+    /// Factor, digits and unit of a difference.
+    difference: (f64, usize, &'static str),
+}
+
+const FEATURES: [Feature; 9] = [
+    Feature {
+        heading: ["antiresonance", "Hz"],
+        of: |run| {
+            let (estimate, _) = best(run)?;
+            Some((estimate.features.f_dip?, estimate.deviations.f_dip))
+        },
+        digits: 4,
+        difference: (1e3, 1, "mHz"),
+    },
+    Feature {
+        heading: ["resonance", "Hz"],
+        of: |run| {
+            let (estimate, _) = best(run)?;
+            Some((estimate.features.f_res?, estimate.deviations.f_res))
+        },
+        digits: 4,
+        difference: (1e3, 1, "mHz"),
+    },
+    Feature {
+        heading: ["notch", "dB"],
+        of: |run| Some((best(run)?.0.features.notch_db?, None)),
+        digits: 2,
+        difference: (1.0, 2, "dB"),
+    },
+    Feature {
+        heading: ["fit in", "frequency %"],
+        of: |run| Some((run.fit()?.fit_frequency, None)),
+        digits: 1,
+        difference: (1.0, 1, "%"),
+    },
+    Feature {
+        heading: ["fit in", "time %"],
+        of: |run| Some((run.fit()?.fit_time, None)),
+        digits: 1,
+        difference: (1.0, 1, "%"),
+    },
+    Feature {
+        heading: ["residual", "coherence"],
+        of: |run| Some((run.fit()?.coherence?, None)),
+        digits: 2,
+        difference: (1.0, 2, ""),
+    },
+    Feature {
+        heading: ["SNR at", "resonance dB"],
+        of: |run| Some((run.record.as_ref()?.snr_db?[0], None)),
+        digits: 0,
+        difference: (1.0, 0, "dB"),
+    },
+    Feature {
+        heading: ["CEF,", "median"],
+        of: |run| Some((run.off_axis()?.median, None)).filter(|_| run.is_recording()),
+        digits: 4,
+        difference: (1.0, 4, ""),
+    },
+    Feature {
+        heading: ["leakage,", "rms"],
+        of: |run| Some((run.off_axis()?.leakage, None)).filter(|_| run.is_recording()),
+        digits: 4,
+        difference: (1.0, 4, ""),
+    },
+];
+
+/// Whether two runs are of the same torque and fill, and whatever else is varied but the slosh model.
+fn same_run(a: &Outcome, b: &Outcome) -> bool {
+    let close = |a: Option<f64>, b: Option<f64>| match (a, b) {
+        (Some(a), Some(b)) => (a - b).abs() < 1e-9,
+        (a, b) => a == b,
+    };
+    close(a.case.amplitude, b.case.amplitude) && close(a.case.fill, b.case.fill)
+}
+
+/// How far the models are off the recordings at most, in a sentence each.
+pub(super) fn result(results: &Results) -> String {
+    let (recorded, simulated): (Vec<&Outcome>, Vec<&Outcome>) =
+        results.outcomes.iter().partition(|run| run.is_recording());
+    let models = distinct(simulated.iter().map(|run| run.range.model.as_str()));
+    let off = |model: &str, feature: &Feature| {
+        let of = |run: &Outcome| Some((feature.of)(run)?.0);
+        let pairs = recorded.iter().flat_map(|there| {
+            let same =
+                simulated.iter().filter(|run| run.range.model == model && same_run(run, there));
+            same.filter_map(|run| Some(1e3 * (of(run)? - of(there)?)))
+        });
+        pairs.reduce(|most, off| if off.abs() > most.abs() { off } else { most })
+    };
+    let sentences = models.iter().filter_map(|model| {
+        let [antiresonance, resonance] = [off(model, &FEATURES[0])?, off(model, &FEATURES[1])?];
+        let text = format!(
+            "With the {model} model the antiresonance is off the recordings' by {antiresonance:+.1} mHz at most, the \
+             resonance by {resonance:+.1} mHz."
+        );
+        Some(text.replace('-', "\u{2212}"))
+    });
+    sentences.collect::<Vec<_>>().join(" ")
+}
+
+/// The table; empty without recordings.
+pub(super) fn beside(results: &Results) -> Markup {
+    let (recorded, simulated): (Vec<&Outcome>, Vec<&Outcome>) =
+        results.outcomes.iter().partition(|run| run.is_recording());
+    if recorded.is_empty() {
+        return html! {};
+    }
+    html! {
+        p {
+            "Of each recording what the same estimators find in it, and below what the models' runs of the same torque and fill are off it. ✓: within the 95 % interval that both estimates have together. CEF and leakage are of the recording's rates about the other axes (thesis 6.3.6), which a hub that cannot tilt does not have."
+        }
+        div .wide {
+            table {
+                thead {
+                    tr {
+                        th { "run" } th { "fill" br; "cm" } th { "torque" br; "mN·m" }
+                        @for feature in FEATURES { th { (feature.heading[0]) br; (feature.heading[1]) } }
+                    }
+                }
+                tbody {
+                    @for recording in recorded {
+                        tr {
+                            td { b { "recording" } }
+                            td { @if let Some(fill) = recording.range.fill { (cm(fill)) } }
+                            td { @if let Some(a) = recording.case.amplitude { (thousandths(a)) } }
+                            @for feature in FEATURES { td { (value(&feature, recording)) } }
+                        }
+                        @for run in simulated.iter().filter(|run| same_run(run, recording)) {
+                            tr {
+                                td { (run.range.model) } td {} td {}
+                                @for feature in FEATURES { td { (difference(&feature, run, recording)) } }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn value(feature: &Feature, run: &Outcome) -> String {
+    let digits = feature.digits;
+    let Some((value, std)) = (feature.of)(run) else { return String::new() };
+    let (factor, places, unit) = feature.difference;
+    match std {
+        Some(std) => format!("{value:.digits$} ± {:.places$} {unit}", 1.96 * std * factor),
+        None => format!("{value:.digits$}"),
+    }
+}
+
+/// A model's figure less the recording's.
+fn difference(feature: &Feature, run: &Outcome, recording: &Outcome) -> String {
+    let Some(((model, a), (there, b))) = (feature.of)(run).zip((feature.of)(recording)) else {
+        return String::new();
+    };
+    let (factor, places, unit) = feature.difference;
+    // no −0.0
+    let unit_of_last = 10f64.powi(places as i32);
+    let rounded = ((model - there) * factor * unit_of_last).round() / unit_of_last + 0.0;
+    let text = format!("{rounded:+.places$} {unit}").replace('-', "\u{2212}");
+    let within = a.zip(b).is_some_and(|(a, b)| (model - there).abs() < 1.96 * a.hypot(b));
+    format!("{}{}", text.trim_end(), if within { " ✓" } else { "" })
+}

@@ -1,0 +1,521 @@
+//! The sentence with which a page begins: what the runs show, from their own numbers.
+
+use experiments::campaign::{Outcome, Results};
+
+use super::along::at_the_end;
+use super::draws::moments;
+use super::page::{Axis, Group, Page, best, distinct, exact_features, manoeuvre};
+use super::recordings;
+
+/// What one run shows of its frequency response.
+#[derive(Clone, Copy, Debug)]
+struct Point {
+    /// What the runs are drawn along, in the axis's unit.
+    x: f64,
+    antiresonance: Option<f64>,
+    resonance: Option<f64>,
+    /// Of the exact linear plant.
+    exact: [Option<f64>; 2],
+    /// The slosh was rotary for some time.
+    swirls: bool,
+}
+
+impl Point {
+    fn both(&self) -> [Option<f64>; 2] {
+        [self.antiresonance, self.resonance]
+    }
+}
+
+/// The runs of one group along an axis, in its order.
+#[derive(Clone, Debug)]
+struct Series {
+    model: String,
+    /// What tells the group from others beside its model: `10 cm fill`.
+    plant: String,
+    points: Vec<Point>,
+}
+
+impl Series {
+    fn of(group: &Group, axis: Option<&Axis>) -> Series {
+        let point = |run: &&Outcome| {
+            let features = best(run)?.0.features;
+            let exact = exact_features(run);
+            Some(Point {
+                x: axis.map_or(Some(0.0), |axis| axis.of(run))?,
+                antiresonance: features.f_dip,
+                resonance: features.f_res,
+                exact: [exact.f_dip, exact.f_res],
+                swirls: run.rotary().is_some_and(|rotary| rotary.time > 0.0),
+            })
+        };
+        let mut points: Vec<Point> = group.runs.iter().filter_map(point).collect();
+        points.sort_by(|a, b| a.x.total_cmp(&b.x));
+        Series { model: group.model.into(), plant: group.plant(), points }
+    }
+
+    fn is_linear(&self) -> bool {
+        ["linear", "frozen"].contains(&&*self.model)
+    }
+
+    /// Where the slosh is rotary: the first and the last such place, and whether it stays so up to
+    /// the end.
+    fn swirl(&self) -> Option<(f64, f64, bool)> {
+        let first = self.points.iter().position(|p| p.swirls)?;
+        let last = self.points.iter().rposition(|p| p.swirls)?;
+        let on = last + 1 == self.points.len() && self.points[first..].iter().all(|p| p.swirls);
+        Some((self.points[first].x, self.points[last].x, on))
+    }
+}
+
+/// The result in one to three sentences; empty if the runs show nothing that a sentence could say.
+pub(super) fn sentence(page: &Page, results: &Results) -> String {
+    if results.recordings() > 0 {
+        return recordings::result(results);
+    }
+    if let Some(first) = page.groups.first() {
+        let axis = page.axis.as_ref();
+        let has_response = page.groups.iter().any(|group| group.band().is_some());
+        if page.plan.is_random() && has_response {
+            return scatter(page);
+        }
+        if has_response {
+            let series: Vec<Series> =
+                page.groups.iter().map(|group| Series::of(group, axis)).collect();
+            return match axis {
+                Some(axis) => along(&series, &axis.name, axis.unit()),
+                None => alone(&series),
+            };
+        }
+        return match (axis, manoeuvre(first.runs[0])) {
+            (_, Some(_)) => left_behind(page),
+            _ => largest_angle(page),
+        };
+    }
+    elsewhere(results)
+}
+
+/// Frequency responses along an axis.
+fn along(series: &[Series], name: &str, unit: &str) -> String {
+    let mut sentences = Vec::new();
+    let nonlinear: Vec<&Series> = series.iter().filter(|s| !s.is_linear()).collect();
+    let several = {
+        let mut plants: Vec<&str> = series.iter().map(|s| s.plant.as_str()).collect();
+        plants.sort_unstable();
+        plants.dedup();
+        plants.len() > 1
+    };
+    // the linear runs of the same plant, else the exact linear plant
+    let measured = |of: &Series| series.iter().find(|s| s.model == "linear" && s.plant == of.plant);
+    let reference = |of: &Series, point: &Point| -> [Option<f64>; 2] {
+        let run = measured(of).and_then(|s| s.points.iter().find(|p| p.x == point.x));
+        run.map_or(point.exact, Point::both)
+    };
+    let linear = match nonlinear.iter().all(|s| measured(s).is_some()) {
+        true => "the linear model",
+        false => "the exact linear response",
+    };
+    if name != "torque amplitude" || nonlinear.is_empty() {
+        sentences.extend(moves(series, name, unit, several));
+    }
+    let swirling: Vec<&&Series> = nonlinear.iter().filter(|s| s.swirl().is_some()).collect();
+    let ends = |s: &Series| s.points.first().map(|p| p.x).zip(s.points.last().map(|p| p.x));
+    // before the first swirl, or everywhere
+    let below = |s: &&Series| -> Vec<Point> {
+        s.points.iter().copied().take_while(|p| !p.swirls).collect()
+    };
+    let apart = nonlinear.iter().flat_map(|s| below(s).into_iter().map(move |p| (s, p)));
+    let apart = apart.flat_map(|(s, p)| {
+        let pairs = p.both().into_iter().zip(reference(s, &p));
+        pairs.filter_map(|(f, reference)| Some(((f? - reference?).abs(), reference?)))
+    });
+    let worst = apart.fold(None, |worst: Option<(f64, f64)>, (gap, f)| match worst {
+        Some((most, _)) if most >= gap => worst,
+        _ => Some((gap, f)),
+    });
+    let within = worst.map(|(gap, f)| {
+        format!(
+            "{linear} holds within {} mHz ({}\u{a0}%)",
+            digits(1e3 * gap),
+            digits(100.0 * gap / f)
+        )
+    });
+    let holds = |where_: &str| {
+        within.as_ref().map(|within| format!("{where_}{within} for antiresonance and resonance"))
+    };
+    if swirling.is_empty() {
+        let stays = nonlinear.iter().any(|s| s.model != "planar");
+        let range =
+            nonlinear.iter().filter_map(|s| ends(s)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        if let (Some(holds), Some((from, to))) = (holds(""), range) {
+            let plane = if stays { "No run leaves its plane (no rotary slosh): " } else { "" };
+            let range = if from == to {
+                format!("at {to}{unit}")
+            } else {
+                format!("from {from} to {to}{unit}")
+            };
+            sentences.push(capital(&format!("{plane}{holds}, {range}")));
+        }
+        return finished(&sentences);
+    }
+    let part = |s: &Series| {
+        let (first, last, on) = s.swirl().expect("they swirl");
+        let with = if several { format!(" ({})", s.plant) } else { String::new() };
+        let with = match nonlinear.iter().any(|other| other.model != s.model) {
+            true => format!("{with} ({})", s.model),
+            false => with,
+        };
+        match (on, first == last) {
+            (true, false) => format!("from {first}{unit} on{with}"),
+            (_, true) => format!("at {first}{unit}{with}"),
+            (false, false) => format!("between {first} and {last}{unit}{with}"),
+        }
+    };
+    let where_ = match swirling.len() {
+        0..=3 => swirling.iter().map(|s| part(s)).collect::<Vec<_>>().join(" and "),
+        many => {
+            let first = swirling.iter().filter_map(|s| Some(s.swirl()?.0)).fold(f64::MAX, f64::min);
+            format!("in {many} of {} series, from {first}{unit} at the earliest,", series.len())
+        }
+    };
+    // the largest departure of a resonance in rotary slosh, in the direction in which it goes
+    let shifts = swirling.iter().flat_map(|s| {
+        let turning = s.points.iter().filter(|p| p.swirls);
+        turning.filter_map(move |p| {
+            let reference = reference(s, p)[1].or(p.exact[1])?;
+            Some((p.resonance?, p.resonance? - reference))
+        })
+    });
+    let far =
+        shifts.fold((0.0, 0.0), |far: (f64, f64), s| if s.1.abs() > far.1.abs() { s } else { far });
+    let to = match far {
+        (_, shift) if shift.abs() < 5e-4 => String::new(),
+        (f, shift) => {
+            let way = if shift > 0.0 { "up" } else { "down" };
+            format!(" and the resonance moves {way} to {f:.2} Hz")
+        }
+    };
+    let first = capital(&format!("{where_} the liquid swirls{to}"));
+    let all: Vec<Point> = nonlinear.iter().flat_map(below).collect();
+    match holds("below, ").filter(|_| !all.is_empty()) {
+        Some(holds) => sentences.push(format!("{first}; {holds}")),
+        None => sentences.push(first),
+    }
+    finished(&sentences)
+}
+
+/// How antiresonance and resonance of the linear models, or of all if there are none, go along an
+/// axis; at most three series.
+fn moves(series: &[Series], name: &str, unit: &str, several: bool) -> Vec<String> {
+    let linear = series.iter().any(|s| s.model == "linear");
+    let these: Vec<&Series> =
+        series.iter().filter(|s| s.points.len() > 1 && (!linear || s.model == "linear")).collect();
+    let sentence = |s: &&Series| {
+        let [antiresonance, resonance] = [|p: &Point| p.antiresonance, |p: &Point| p.resonance]
+            .map(|of| {
+                let values: Vec<f64> = s.points.iter().filter_map(of).collect();
+                let (first, last) = (*values.first()?, *values.last()?);
+                let low = values.iter().copied().fold(f64::MAX, f64::min);
+                let high = values.iter().copied().fold(f64::MIN, f64::max);
+                Some(match high - low < 5e-3 * high {
+                    // what does not move
+                    true => format!(
+                        "stays within {} mHz of {:.3} Hz",
+                        digits(500.0 * (high - low)),
+                        (low + high) / 2.0
+                    ),
+                    // a walk from end to end
+                    false if (last - first).abs() > 0.9 * (high - low) => {
+                        format!("moves from {first:.3} to {last:.3} Hz")
+                    }
+                    false => format!("lies between {low:.3} and {high:.3} Hz"),
+                })
+            });
+        let (from, to) = (s.points.first()?.x, s.points.last()?.x);
+        let with = if several { format!("; {}", s.plant) } else { String::new() };
+        let parts: Vec<String> = [("antiresonance", antiresonance), ("resonance", resonance)]
+            .into_iter()
+            .filter_map(|(what, says)| Some(format!("the {what} {}", says?)))
+            .collect();
+        (!parts.is_empty()).then(|| {
+            capital(&format!("{} ({name} from {from} to {to}{unit}{with})", parts.join(", ")))
+        })
+    };
+    these.iter().take(3).filter_map(sentence).collect()
+}
+
+/// Runs with a response and nothing to draw them along.
+fn alone(series: &[Series]) -> String {
+    let hertz = |f: Option<f64>| f.map_or("none".into(), |f| format!("{f:.4} Hz"));
+    let of = |s: &Series| {
+        let point = s.points.first()?;
+        let [antiresonance, resonance] = point.both().map(hertz);
+        let exact = point.exact.map(hertz);
+        let what = if series.len() > 1 { format!("{}: ", s.title()) } else { String::new() };
+        Some(match point.both() {
+            [None, None] => format!(
+                "{what}No antiresonance and resonance that can be trusted; those of the exact linear plant are {} and {}",
+                exact[0], exact[1]
+            ),
+            _ => format!(
+                "{what}Antiresonance {antiresonance}, resonance {resonance}; of the exact linear plant {} and {}{}",
+                exact[0],
+                exact[1],
+                if point.swirls { "; the liquid swirls" } else { "" }
+            ),
+        })
+    };
+    finished(&series.iter().take(3).filter_map(of).collect::<Vec<_>>())
+}
+
+impl Series {
+    fn title(&self) -> String {
+        [&*self.model, &*self.plant]
+            .into_iter()
+            .filter(|s| !s.is_empty())
+            .collect::<Vec<_>>()
+            .join(", ")
+    }
+}
+
+/// Runs that are drawn at random: mean and standard deviation.
+fn scatter(page: &Page) -> String {
+    let of = |group: &Group| {
+        let parts: Vec<String> = super::draws::QUANTITIES[..2]
+            .iter()
+            .filter_map(|(name, _, of)| {
+                let values: Vec<f64> = group.runs.iter().filter_map(|run| of(run)).collect();
+                let (mean, deviation) = moments(&values);
+                let deviation = format!("standard deviation {} mHz", digits(deviation));
+                (values.len() > 1)
+                    .then(|| format!("the {name} is {:.3} Hz ({deviation})", 1e-3 * mean))
+            })
+            .collect();
+        let ranked = super::draws::ranked(page, group);
+        let most = ranked.last().map(|row| format!("; {} has the largest effect", row.0));
+        let title = match page.groups.len() {
+            1 => String::new(),
+            _ => format!(" ({})", group.title()),
+        };
+        let count = group.runs.len();
+        let parts_text = parts.join(", ");
+        (!parts.is_empty())
+            .then(|| format!("In {count} draws{title} {parts_text}{}", most.unwrap_or_default()))
+    };
+    finished(&page.groups.iter().take(3).filter_map(of).collect::<Vec<_>>())
+}
+
+/// What tells groups apart in a sentence: the model, and the rest where it differs.
+fn names(page: &Page) -> Vec<String> {
+    let plants = distinct(page.groups.iter().map(Group::plant));
+    let name = |group: &Group| match plants.len() {
+        1 => group.model.to_string(),
+        _ => group.title(),
+    };
+    page.groups.iter().map(name).collect()
+}
+
+/// What a manoeuvre leaves of the hub's rate, by group.
+fn left_behind(page: &Page) -> String {
+    let of = |group: &Group| {
+        let rates = group.runs.iter().filter_map(|run| {
+            let x = page.axis.as_ref().and_then(|axis| axis.of(run));
+            Some((1e3 * at_the_end(run, "omega_imu")?, x))
+        });
+        let rates: Vec<(f64, Option<f64>)> = rates.collect();
+        let most = rates.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0))?;
+        let least = rates.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some((most, least))
+    };
+    let named = page.groups.iter().zip(names(page)).take(4);
+    let all: Vec<_> = named
+        .filter_map(|(group, name)| of(group).map(|(most, least)| (name, most, least)))
+        .collect();
+    if all.is_empty() {
+        return String::new();
+    }
+    let rate =
+        |rate: f64| if rate < 1e-6 { "none".into() } else { format!("{} mrad/s", digits(rate)) };
+    let unit = page.axis.as_ref().map_or("", Axis::unit);
+    let name = page.axis.as_ref().map_or("", |axis| axis.name.as_str());
+    let parts = all.iter().map(|(title, most, least)| {
+        match (least.1, most.0 - least.0 > 0.05 * most.0 && most.0 >= 1e-6) {
+            (Some(x), true) => {
+                format!("{} with {title} (least, {}, at {x}{unit})", rate(most.0), rate(least.0))
+            }
+            _ => format!("{} with {title}", rate(most.0)),
+        }
+    });
+    let along = if name.is_empty() { String::new() } else { format!(", over {name}") };
+    let parts: Vec<String> = parts.collect();
+    finished(&[format!("Largest rate that the manoeuvre leaves{along}: {}", parts.join("; "))])
+}
+
+/// The largest slosh angles of runs without a frequency response, by model.
+fn largest_angle(page: &Page) -> String {
+    let part = |model: &str| {
+        let runs = page.groups.iter().filter(|g| g.model == model).flat_map(|g| &g.runs);
+        let most = |of: fn(&Outcome) -> f64| {
+            runs.clone().map(|run| of(run).to_degrees()).fold(0.0, f64::max)
+        };
+        let tangential = most(|run| run.totals.peak_slosh_angle);
+        let radial = most(|run| run.totals.peak_radial_angle);
+        let across = match radial > 0.1 * tangential {
+            true => format!(", out of its plane {}°", digits(radial)),
+            false => String::new(),
+        };
+        format!("{}° with {model}{across}", digits(tangential))
+    };
+    let models = distinct(page.groups.iter().map(|group| group.model));
+    let parts: Vec<String> = models.into_iter().take(4).map(part).collect();
+    finished(&[format!("Largest slosh angle: {}", parts.join("; "))])
+}
+
+/// The largest slosh angle of runs of another FMU.
+fn elsewhere(results: &Results) -> String {
+    let angles = results.unanalysed.iter().flat_map(|run| {
+        let signals = run.history.signals.iter();
+        signals.filter(|(name, _)| experiments::campaign::is_slosh_angle(name)).map(
+            |(name, values)| {
+                (
+                    values.iter().fold(0.0, |most: f64, v| most.max(v.abs())),
+                    name.as_str(),
+                    run.case.name.as_str(),
+                )
+            },
+        )
+    });
+    match angles.max_by(|a, b| a.0.total_cmp(&b.0)) {
+        Some((angle, signal, run)) if angle > 0.0 => finished(&[format!(
+            "Largest slosh angle: {}° ({signal}, run {run})",
+            digits(angle.to_degrees())
+        )]),
+        _ => String::new(),
+    }
+}
+
+/// A number with two significant digits.
+fn digits(value: f64) -> String {
+    let rounded = experiments::rounding::significant(value, 2);
+    match rounded.abs() {
+        size if size >= 10.0 || size == 0.0 => format!("{rounded:.0}"),
+        size => format!("{rounded:.*}", (1.0 - size.log10().floor()).clamp(0.0, 9.0) as usize),
+    }
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().chain(letters).collect())
+}
+
+fn finished(sentences: &[String]) -> String {
+    sentences.iter().map(|s| format!("{s}.")).collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Point, Series, alone, along, digits};
+
+    /// A series with exact responses at 2 and 3 Hz: (x, antiresonance, resonance, rotary).
+    fn series(model: &str, plant: &str, points: &[(f64, f64, f64, bool)]) -> Series {
+        let known = |f: f64| (f > 0.0).then_some(f);
+        let point = |&(x, a, r, swirls): &(f64, f64, f64, bool)| Point {
+            x,
+            antiresonance: known(a),
+            resonance: known(r),
+            exact: [Some(2.0), Some(3.0)],
+            swirls,
+        };
+        Series {
+            model: model.into(),
+            plant: plant.into(),
+            points: points.iter().map(point).collect(),
+        }
+    }
+
+    const TORQUE: &str = "torque amplitude";
+
+    #[test]
+    fn swirl_is_said_with_where_it_begins_and_how_far_the_linear_model_holds_below() {
+        let all = [
+            series("linear", "5 cm fill", &[(50.0, 2.0, 3.0, false), (100.0, 2.0, 3.0, false)]),
+            series("spherical", "5 cm fill", &[(50.0, 2.01, 2.97, false), (100.0, 2.0, 3.4, true)]),
+            series("linear", "10 cm fill", &[(50.0, 2.0, 3.0, false), (100.0, 2.0, 3.0, false)]),
+            series("spherical", "10 cm fill", &[(50.0, 2.0, 3.2, true), (100.0, 2.0, 3.5, true)]),
+        ];
+        assert_eq!(
+            along(&all, TORQUE, " mN·m"),
+            "At 100 mN·m (5 cm fill) and from 50 mN·m on (10 cm fill) the liquid swirls and the resonance \
+             moves up to 3.50 Hz; below, the linear model holds within 30 mHz (1.0\u{a0}%) for antiresonance and resonance."
+        );
+    }
+
+    #[test]
+    fn swirl_from_the_first_run_on_says_nothing_of_below() {
+        let all = [series("spherical", "", &[(50.0, 2.0, 2.9, true), (100.0, 0.0, 0.0, true)])];
+        assert_eq!(
+            along(&all, TORQUE, " mN·m"),
+            "From 50 mN·m on the liquid swirls and the resonance moves down to 2.90 Hz."
+        );
+    }
+
+    #[test]
+    fn swirl_that_ends_again_is_between() {
+        let points = [
+            (1.0, 2.0, 3.0, false),
+            (2.0, 2.0, 3.0, true),
+            (3.0, 2.0, 3.0, true),
+            (4.0, 2.0, 3.0, false),
+        ];
+        let says = along(&[series("spherical", "", &points)], TORQUE, " mN·m");
+        assert_eq!(
+            says,
+            "Between 2 and 3 mN·m the liquid swirls; below, the exact linear response holds within 0 mHz (0\u{a0}%) \
+             for antiresonance and resonance."
+        );
+    }
+
+    #[test]
+    fn without_swirl_and_without_linear_runs_the_exact_response_is_the_measure() {
+        let all =
+            [series("spherical", "", &[(50.0, 2.0, 3.0, false), (100.0, 2.002, 2.994, false)])];
+        assert_eq!(
+            along(&all, TORQUE, " mN·m"),
+            "No run leaves its plane (no rotary slosh): the exact linear response holds within 6.0 mHz (0.20\u{a0}%) for \
+             antiresonance and resonance, from 50 to 100 mN·m."
+        );
+        let planar =
+            [series("planar", "", &[(50.0, 2.0, 3.0, false), (100.0, 2.002, 2.994, false)])];
+        assert!(along(&planar, TORQUE, " mN·m").starts_with("The exact linear response holds"));
+    }
+
+    #[test]
+    fn one_linear_model_is_said_to_stay_or_to_move() {
+        let stays = [series("linear", "", &[(50.0, 2.0, 3.0, false), (100.0, 2.0, 3.002, false)])];
+        assert_eq!(
+            along(&stays, TORQUE, " mN·m"),
+            "The antiresonance stays within 0 mHz of 2.000 Hz, the resonance stays within 1.0 mHz of 3.001 Hz \
+             (torque amplitude from 50 to 100 mN·m)."
+        );
+        let moves = [series("linear", "", &[(111.0, 2.4, 2.9, false), (220.0, 1.7, 2.2, false)])];
+        assert_eq!(
+            along(&moves, "tank.d", " mm"),
+            "The antiresonance moves from 2.400 to 1.700 Hz, the resonance moves from 2.900 to 2.200 Hz \
+             (tank.d from 111 to 220 mm)."
+        );
+    }
+
+    #[test]
+    fn runs_without_a_trusted_response_say_nothing_or_that() {
+        let none = [series("linear", "", &[(1.0, 0.0, 0.0, false), (2.0, 0.0, 0.0, false)])];
+        assert_eq!(along(&none, TORQUE, ""), "");
+        assert_eq!(along(&[series("spherical", "", &[])], TORQUE, ""), "");
+        let alone = alone(&none);
+        assert!(alone.starts_with("No antiresonance and resonance that can be trusted"), "{alone}");
+    }
+
+    #[test]
+    fn numbers_have_two_digits() {
+        let of = [0.0, 0.0123, 1.0, 1.24, 12.4, 124.0].map(digits);
+        assert_eq!(of, ["0", "0.012", "1.0", "1.2", "12", "120"]);
+    }
+}
