@@ -98,7 +98,9 @@ pub fn read(path: &Path) -> Result<Vec<u8>> {
 fn zip(out: &mut (impl Write + Seek), files: &[(String, Vec<u8>)]) -> Result<()> {
     let mut archive = ZipWriter::new(out);
     for (name, bytes) in files {
-        let mode = if name.starts_with("binaries/") { 0o755 } else { 0o644 };
+        // an FMU's binaries, a wheel's command
+        let program = name.starts_with("binaries/") || name.contains(".data/scripts/");
+        let mode = if program { 0o755 } else { 0o644 };
         let options = SimpleFileOptions::default()
             .compression_method(CompressionMethod::Deflated)
             .compression_level(Some(9)) // tests/all/release.rs bounds the size

@@ -6,6 +6,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
+use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 use cargo_metadata::{DependencyKind, MetadataCommand};
@@ -280,6 +281,68 @@ pub fn licence_note(description: &ModelDescription, components: &[Component]) ->
     note
 }
 
+/// Licences of what is linked into the command `hubslosh` for one platform, with all texts: those of
+/// crates from the crates themselves.
+pub fn notices(binary: &[u8], folder: &'static str) -> Result<String> {
+    let binary = Packed { folder, ending: "", bytes: binary.to_vec() };
+    let metadata = MetadataCommand::new()
+        .current_dir(project::root())
+        .exec()
+        .context("cargo does not say what the program is linked from")?;
+    let ours = project::root().join("modelDescription/licenses");
+    // the same text once, with all that is under it
+    let mut texts: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    let mut list = String::new();
+    for component in linked("hubslosh", &[binary])? {
+        let version = component.version.as_deref().unwrap_or_default();
+        let this = format!("{} {version}", component.name).trim_end().to_string();
+        let package = metadata.packages.iter().find(|package| {
+            *package.name == component.name && package.version.to_string() == version
+        });
+        let found = match package {
+            Some(package) if package.source.is_none() => continue, // this project's own
+            Some(package) => {
+                let folder = package.manifest_path.parent().context("a crate without folder")?;
+                texts_in(folder.as_std_path())?
+            }
+            None => component
+                .texts
+                .iter()
+                .map(|name| crate::archive::read(&ours.join(name)))
+                .collect::<Result<_>>()?,
+        };
+        let _ = writeln!(list, "{this}: {}", component.licence);
+        for text in found {
+            let text = String::from_utf8_lossy(&text).trim().replace("\r\n", "\n");
+            texts.entry(text).or_default().insert(this.clone());
+        }
+    }
+    let mut notices = format!(
+        "The command hubslosh in this package holds the following; none of it asks more than that \n\
+         its notice travels with the program, as it does here.\n\n{list}"
+    );
+    for (text, names) in texts {
+        let names: Vec<_> = names.into_iter().collect();
+        let _ = write!(notices, "\n{}\n{}\n\n{text}\n", "=".repeat(80), names.join(", "));
+    }
+    Ok(notices)
+}
+
+/// The files of a crate that are licences or notices.
+fn texts_in(folder: &Path) -> Result<Vec<Vec<u8>>> {
+    const BEGINNINGS: [&str; 5] = ["LICENSE", "LICENCE", "COPYING", "NOTICE", "UNLICENSE"];
+    let mut found = Vec::new();
+    let cannot = || format!("{} cannot be read", folder.display());
+    for entry in folder.read_dir().with_context(cannot)? {
+        let path = entry.with_context(cannot)?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy().to_uppercase();
+        if path.is_file() && BEGINNINGS.iter().any(|beginning| name.starts_with(beginning)) {
+            found.push(crate::archive::read(&path)?);
+        }
+    }
+    Ok(found)
+}
+
 /// The software bill of materials (SBOM), CycloneDX 1.6. Neither a time nor a random number is in
 /// it, so the same binaries have the same SBOM.
 pub fn sbom(
@@ -320,7 +383,7 @@ pub fn sbom(
     let files = binaries.iter().map(|binary| {
         json!({
             "type": "file",
-            "name": binary.name(model.name),
+            "name": binary.name(&model.identifier()),
             "hashes": [{ "alg": "SHA-256", "content": sha256(&binary.bytes) }],
         })
     });

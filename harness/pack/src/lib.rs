@@ -4,10 +4,12 @@
 pub mod archive;
 pub mod components;
 pub mod documentation;
+pub mod metadata;
 pub mod models;
 pub mod platforms;
 mod project;
 pub mod release;
+pub mod sdist;
 pub mod wheel;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -18,13 +20,14 @@ use anyhow::{Context, Result};
 use host::description::ModelDescription;
 
 use crate::archive::{Files, Packed, below, read};
-pub use crate::models::{HUBSLOSH, MODELS, Model, model};
+pub use crate::models::{HUBSLOSH, MODELS, Model, Sizes, model};
 pub use crate::platforms::Built;
-pub use crate::project::{build, root};
+use crate::project::build_in;
+pub use crate::project::{build, has_source, needs_source, root};
 
 /// Builds the binary of an FMU for the platform this program runs on and packs it to `out`.
 pub fn pack(model: &Model, out: &Path) -> Result<()> {
-    let binary = Packed::native(&build(model.package, false)?)?;
+    let binary = Packed::native(&build_in(model.package, &model.environment(), false)?)?;
     archive::write(&files(model, &[binary])?, out)
 }
 
@@ -74,12 +77,12 @@ fn pack_for_tests(model: &Model) -> Result<PathBuf> {
 /// What is in the FMU.
 fn files(model: &Model, binaries: &[Packed]) -> Result<Files> {
     let source = model.folder();
-    let xml = read(&source.join("modelDescription.xml"))?;
+    let xml = model.description()?;
     let description = ModelDescription::from_xml(&String::from_utf8_lossy(&xml))?;
     let icon = read(&root().join("modelDescription/icon/icon.png"))?;
     let mut files = vec![("modelDescription.xml".into(), xml), ("model.png".into(), icon)];
     for binary in binaries {
-        files.push((binary.name(model.name), binary.bytes.clone()));
+        files.push((binary.name(&model.identifier()), binary.bytes.clone()));
     }
 
     let title = format!("{} {}", description.model_name, description.version);

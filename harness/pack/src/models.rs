@@ -1,28 +1,44 @@
 //! The FMUs that this project packs. Another one is another entry in [`MODELS`].
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use host::description::did_you_mean;
 
-use crate::project::root;
+use crate::archive::read;
+use crate::project::{self, root};
 
 /// An FMU of this project.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Model {
-    /// Its `modelIdentifier`; the folder `modelDescription/<name>` has all that travels with the
+    /// Its `modelIdentifier`, but of a variant; the folder `modelDescription/<name>` has all that travels with the
     /// binary: `modelDescription.xml`, `documentation/`, and, if
     /// there is one, `extra/`.
     pub name: &'static str,
     /// Cargo package whose cdylib is the binary.
     pub package: &'static str,
+    /// Of a variant for fewer tanks and modes.
+    pub sizes: Option<Sizes>,
 }
+
+/// How many tanks and modes per tank a variant of Spacecraft has; those of the FMU without variant are the most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sizes {
+    /// 1 to 4.
+    pub tanks: usize,
+    /// 1 to 3.
+    pub modes: usize,
+}
+
+/// Those of Spacecraft.fmu.
+const MOST: Sizes = Sizes { tanks: 4, modes: 3 };
 
 /// All of them; the first is packed unless another is named.
 pub const MODELS: [Model; 3] = [
-    Model { name: "HubSlosh", package: "hubslosh-fmu" },
-    Model { name: "Spacecraft", package: "spacecraft-fmu" },
-    Model { name: "SloshTank", package: "sloshtank-fmu" },
+    Model { name: "HubSlosh", package: "hubslosh-fmu", sizes: None },
+    Model { name: "Spacecraft", package: "spacecraft-fmu", sizes: None },
+    Model { name: "SloshTank", package: "sloshtank-fmu", sizes: None },
 ];
 
 /// The FMU that is packed unless another is named.
@@ -42,6 +58,60 @@ pub fn model(name: &str) -> Result<&'static Model> {
 }
 
 impl Model {
+    /// The variant for fewer tanks and modes.
+    ///
+    /// # Errors
+    /// If the FMU has no such variant.
+    pub fn variant(&self, tanks: Option<usize>, modes: Option<usize>) -> Result<Model> {
+        let sizes =
+            Sizes { tanks: tanks.unwrap_or(MOST.tanks), modes: modes.unwrap_or(MOST.modes) };
+        ensure!(
+            self.name == "Spacecraft",
+            "{} has no variants: --tanks and --modes are for Spacecraft",
+            self.name
+        );
+        ensure!(
+            (1..=MOST.tanks).contains(&sizes.tanks) && (1..=MOST.modes).contains(&sizes.modes),
+            "--tanks {}, --modes {} (allowed: 1 to {}, 1 to {})",
+            sizes.tanks,
+            sizes.modes,
+            MOST.tanks,
+            MOST.modes
+        );
+        Ok(Model { sizes: Some(sizes).filter(|sizes| *sizes != MOST), ..*self })
+    }
+
+    /// Its `modelIdentifier`: the name, and of a variant its sizes, so that a host can load several.
+    pub fn identifier(&self) -> String {
+        match self.sizes {
+            None => self.name.into(),
+            Some(Sizes { tanks, modes }) => format!("{}_{tanks}x{modes}", self.name),
+        }
+    }
+
+    /// What Cargo finds in its environment when it builds this one: a variant its sizes, and a folder where what
+    /// is compiled for it does not replace the other.
+    pub(crate) fn environment(&self) -> Vec<(&'static str, OsString)> {
+        let Some(Sizes { tanks, modes }) = self.sizes else { return Vec::new() };
+        vec![
+            ("HUBSLOSH_TANKS", tanks.to_string().into()),
+            ("HUBSLOSH_MODES", modes.to_string().into()),
+            ("CARGO_TARGET_DIR", root().join("target/variants").into()),
+        ]
+    }
+
+    /// modelDescription.xml: the committed one, or what the variant's table says.
+    pub(crate) fn description(&self) -> Result<Vec<u8>> {
+        match self.sizes {
+            None => read(&self.folder().join("modelDescription.xml")),
+            Some(_) => project::output(
+                &["run", "--release", "--quiet", "--package", "model-description"],
+                &["--print-spacecraft"],
+                &self.environment(),
+            ),
+        }
+    }
+
     /// The folder with all that travels with the binary.
     pub fn folder(&self) -> PathBuf {
         root().join("modelDescription").join(self.name)

@@ -1,4 +1,4 @@
-//! The platforms an FMU for everybody is built for, and what building for each
+//! The platforms an FMU and the program for everybody are built for, and what building for each
 //! takes.
 //!
 //! Rust's compiler writes code for all of them; what has to be had besides is
@@ -20,29 +20,34 @@ use crate::models::Model;
 use crate::project;
 
 /// A platform of FMI 2.0.5, section 2.3.
+#[derive(Debug)]
 pub struct Platform {
     /// Folder under `binaries/` of the FMU.
     pub folder: &'static str,
     /// Ending of the binary's name there.
     pub ending: &'static str,
     /// What is built; several are joined into one universal binary.
-    targets: &'static [Target],
+    pub targets: &'static [Target],
     /// Programs that building needs beside Rust.
     tools: &'static [Tool],
     /// Subcommand of Cargo, or another program with the same arguments.
     cargo: Cargo,
-    /// Arguments of the linker; `{name}` is the model's.
+    /// Arguments of the linker.
     link: &'static [&'static str],
 }
 
-struct Target {
+/// One system on one processor.
+#[derive(Debug)]
+pub struct Target {
     /// As rustc knows it.
-    triple: &'static str,
+    pub triple: &'static str,
     /// Appended for `cargo-zigbuild`: the oldest glibc.
     suffix: &'static str,
+    /// As [`Binary::architectures`] has it.
+    pub architecture: &'static str,
 }
 
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 enum Cargo {
     /// With the linker that Rust takes for the target.
     Plain,
@@ -50,6 +55,7 @@ enum Cargo {
     Zig,
 }
 
+#[derive(Debug)]
 struct Tool {
     program: &'static str,
     get: &'static str,
@@ -74,7 +80,11 @@ pub const PLATFORMS: [Platform; 4] = [
         // FMI 2.0's own names are for x86; for other processors it takes the tuples of FMI 3.0.
         folder: "aarch64-linux",
         ending: ".so",
-        targets: &[Target { triple: "aarch64-unknown-linux-gnu", suffix: ".2.17" }],
+        targets: &[Target {
+            triple: "aarch64-unknown-linux-gnu",
+            suffix: ".2.17",
+            architecture: "arm64",
+        }],
         tools: &[CARGO_ZIGBUILD, ZIG],
         cargo: Cargo::Zig,
         link: &[],
@@ -83,19 +93,22 @@ pub const PLATFORMS: [Platform; 4] = [
         folder: "darwin64",
         ending: ".dylib",
         targets: &[
-            Target { triple: "x86_64-apple-darwin", suffix: "" },
-            Target { triple: "aarch64-apple-darwin", suffix: "" },
+            Target { triple: "x86_64-apple-darwin", suffix: "", architecture: "x86_64" },
+            Target { triple: "aarch64-apple-darwin", suffix: "", architecture: "arm64" },
         ],
         tools: &[CARGO_ZIGBUILD, ZIG],
         cargo: Cargo::Zig,
-        // Hosts load it by its path; its name must not be that of a folder on this machine. Without
-        // debug information (-S) the identifier that zig gives it does not depend on one either.
-        link: &["-Wl,-install_name,@rpath/{name}.dylib", "-Wl,-S"],
+        // Without debug information (-S) the identifier that zig gives it depends on no folder of this machine.
+        link: &["-Wl,-S"],
     },
     Platform {
         folder: "linux64",
         ending: ".so",
-        targets: &[Target { triple: "x86_64-unknown-linux-gnu", suffix: ".2.17" }],
+        targets: &[Target {
+            triple: "x86_64-unknown-linux-gnu",
+            suffix: ".2.17",
+            architecture: "x86_64",
+        }],
         tools: &[CARGO_ZIGBUILD, ZIG],
         cargo: Cargo::Zig,
         link: &[],
@@ -103,13 +116,24 @@ pub const PLATFORMS: [Platform; 4] = [
     Platform {
         folder: "win64",
         ending: ".dll",
-        targets: &[Target { triple: "x86_64-pc-windows-gnu", suffix: "" }],
+        targets: &[Target { triple: "x86_64-pc-windows-gnu", suffix: "", architecture: "x86_64" }],
         tools: &[MINGW],
         cargo: Cargo::Plain,
         // same source, same bytes: no time of building in the file
         link: &["-Wl,--no-insert-timestamp"],
     },
 ];
+
+/// The platform of that folder.
+///
+/// # Errors
+/// If there is none; the error names those there are.
+pub fn platform(folder: &str) -> Result<&'static Platform> {
+    PLATFORMS.iter().find(|platform| platform.folder == folder).with_context(|| {
+        let all = PLATFORMS.each_ref().map(|platform| platform.folder);
+        format!("there is no platform \"{folder}\" (allowed: {})", all.join(", "))
+    })
+}
 
 /// One platform's binary, checked.
 pub struct Built {
@@ -127,7 +151,7 @@ pub struct Built {
 /// that is missing is named; after, every fault of every binary.
 pub fn build(model: &Model) -> Result<Vec<Built>> {
     let toolchain = Toolchain::look()?;
-    toolchain.check()?;
+    toolchain.check(&PLATFORMS.each_ref())?;
     let mut faults = Vec::new();
     let mut all = Vec::new();
     for platform in &PLATFORMS {
@@ -135,11 +159,7 @@ pub fn build(model: &Model) -> Result<Vec<Built>> {
         let parts = platform
             .targets
             .iter()
-            .map(|target| {
-                let path = project::cargo_build(toolchain.command(model, platform, target), false)
-                    .with_context(|| format!("{} ({})", platform.folder, target.triple))?;
-                std::fs::read(&path).with_context(|| format!("{} cannot be read", path.display()))
-            })
+            .map(|target| toolchain.build(&Product::Fmu(model), platform, target))
             .collect::<Result<Vec<_>>>()?;
         let bytes = match <[Vec<u8>; 1]>::try_from(parts) {
             Ok([only]) => only,
@@ -147,23 +167,33 @@ pub fn build(model: &Model) -> Result<Vec<Built>> {
         };
         let binary = Binary::read(&bytes).with_context(|| platform.folder)?;
         let wanted = [Fmu::symbols(), Fmu::step_symbols(), Fmu::exchange_symbols()].concat();
-        let found = binary.faults(&wanted);
-        faults.extend(found.iter().map(|fault| format!("\n  {}: {fault}", platform.folder)));
-        for folder in toolchain.private() {
-            if bytes.windows(folder.len()).any(|w| w == folder.as_bytes()) {
-                faults.push(format!("\n  {}: it names the folder {folder}", platform.folder));
-            }
-        }
+        faults.extend(toolchain.faults(platform, &bytes, binary.faults(&wanted)));
         all.push(Built { folder: platform.folder, ending: platform.ending, bytes, binary });
     }
-    if !faults.is_empty() {
-        bail!("the binaries would not work everywhere, so nothing was packed:{}", faults.concat());
-    }
+    refuse(&faults)?;
     Ok(all)
 }
 
+/// Fails if there are faults, with all of them.
+pub fn refuse(faults: &[String]) -> Result<()> {
+    if !faults.is_empty() {
+        bail!("the binaries would not work everywhere, so nothing was packed:{}", faults.concat());
+    }
+    Ok(())
+}
+
+/// What is built for other platforms.
+pub enum Product<'a> {
+    /// The library of an FMU.
+    Fmu(&'a Model),
+    /// The library of another package of this workspace, by its package and its file's name.
+    Library(&'static str, &'static str),
+    /// The command `hubslosh`.
+    Command,
+}
+
 /// Where this machine keeps what building needs.
-struct Toolchain {
+pub struct Toolchain {
     root: PathBuf,
     /// PATH with `target/tools/bin` in front.
     path: OsString,
@@ -176,7 +206,8 @@ struct Toolchain {
 }
 
 impl Toolchain {
-    fn look() -> Result<Self> {
+    /// Looks at this machine.
+    pub fn look() -> Result<Self> {
         let root = project::root();
         let tools = root.join("target").join("tools");
         let mut folders = vec![tools.join("bin")];
@@ -211,6 +242,28 @@ impl Toolchain {
         })
     }
 
+    /// Builds for one target.
+    pub fn build(
+        &self,
+        product: &Product,
+        platform: &Platform,
+        target: &Target,
+    ) -> Result<Vec<u8>> {
+        let path = project::cargo_build(self.command(product, platform, target), false)
+            .with_context(|| format!("{} ({})", platform.folder, target.triple))?;
+        std::fs::read(&path).with_context(|| format!("{} cannot be read", path.display()))
+    }
+
+    /// What is wrong with a binary: what was `found`, and what it tells of this machine.
+    pub fn faults(&self, platform: &Platform, bytes: &[u8], found: Vec<String>) -> Vec<String> {
+        let private = self.private().into_iter();
+        let named = private
+            .filter(|folder| bytes.windows(folder.len()).any(|w| w == folder.as_bytes()))
+            .map(|folder| format!("it names the folder {folder}"));
+        let all = found.into_iter().chain(named);
+        all.map(|fault| format!("\n  {}: {fault}", platform.folder)).collect()
+    }
+
     /// Folders of this machine that no binary may name.
     fn private(&self) -> Vec<String> {
         let folders = [self.root.to_string_lossy().into_owned(), self.home.clone()];
@@ -231,9 +284,9 @@ impl Toolchain {
     }
 
     /// Says all that is missing, for which platforms, and how to get it.
-    fn check(&self) -> Result<()> {
+    pub fn check(&self, platforms: &[&Platform]) -> Result<()> {
         let mut missing: BTreeMap<String, Vec<&str>> = BTreeMap::new();
-        for platform in &PLATFORMS {
+        for platform in platforms {
             for tool in platform.tools.iter().filter(|tool| !self.has_program(tool.program)) {
                 let line = format!("{}: {}", tool.program, tool.get);
                 missing.entry(line).or_default().push(platform.folder);
@@ -261,7 +314,7 @@ impl Toolchain {
     }
 
     /// What builds the binary for one target.
-    fn command(&self, model: &Model, platform: &Platform, target: &Target) -> Command {
+    fn command(&self, product: &Product, platform: &Platform, target: &Target) -> Command {
         let mut command = match platform.cargo {
             Cargo::Plain => project::cargo(),
             Cargo::Zig => Command::new("cargo-zigbuild"),
@@ -288,9 +341,31 @@ impl Toolchain {
         command.env("SOURCE_DATE_EPOCH", "0");
         let linker = MINGW.program;
         command.env("CARGO_TARGET_X86_64_PC_WINDOWS_GNU_LINKER", linker);
-        project::arguments(&mut command, model.package);
-        let link = platform.link.iter().map(|argument| argument.replace("{name}", model.name));
-        command.args(link.map(|argument| format!("-Clink-arg={argument}")));
+        let name = match product {
+            Product::Fmu(model) => {
+                command.envs(model.environment());
+                project::arguments(&mut command, model.package);
+                Some(model.identifier())
+            }
+            Product::Library(package, name) => {
+                project::arguments(&mut command, package);
+                Some(name.to_string())
+            }
+            Product::Command => {
+                project::program_arguments(&mut command);
+                None
+            }
+        };
+        let mut link: Vec<_> = platform.link.iter().map(|&argument| argument.to_string()).collect();
+        if let (Some(name), "darwin64") = (&name, platform.folder) {
+            // hosts load it by its path; its name must not be that of a folder on this machine
+            link.push(format!("-Wl,-install_name,@rpath/{name}{}", platform.ending));
+        }
+        if let (None, "darwin64") = (&name, platform.folder) {
+            // zig brings macOS's C library alone; the others' names are here
+            link.push(format!("-F{}", self.root.join("harness/platforms/macos").display()));
+        }
+        command.args(link.iter().map(|argument| format!("-Clink-arg={argument}")));
         command
     }
 }

@@ -1,15 +1,39 @@
 //! The project as Cargo builds it: where its source is, and how an FMU's binary is made from it.
 
-use std::path::{Path, PathBuf};
+use std::ffi::OsString;
+use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
+use cargo_metadata::camino::Utf8PathBuf;
 use cargo_metadata::{Message, TargetKind};
 
-/// The project's root: two folders above this crate when it was compiled.
+/// The project's root: the current folder, for a program that others have built.
+#[cfg(feature = "shipped")]
 pub fn root() -> PathBuf {
-    let crate_root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    std::env::current_dir().unwrap_or_else(|_| PathBuf::from("."))
+}
+
+/// The project's root: two folders above this crate when it was compiled.
+#[cfg(not(feature = "shipped"))]
+pub fn root() -> PathBuf {
+    let crate_root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
     crate_root.ancestors().nth(2).unwrap_or(crate_root).to_path_buf()
+}
+
+/// Whether the project's source is there.
+pub fn has_source() -> bool {
+    root().join("Cargo.toml").is_file()
+}
+
+/// Fails unless the project's source is there, which `what` is made from.
+pub fn needs_source(what: &str) -> Result<()> {
+    ensure!(
+        has_source(),
+        "{what} is made from the project's source, which is not in the folder {}",
+        root().display()
+    );
+    Ok(())
 }
 
 /// Cargo profile that binaries of FMUs are built with.
@@ -21,10 +45,38 @@ const PROFILE: &str = "fmu";
 /// # Errors
 /// If there is no source or no Cargo, or if it does not compile.
 pub fn build(package: &str, quiet: bool) -> Result<PathBuf> {
+    build_in(package, &[], quiet)
+}
+
+/// The same with more in Cargo's environment.
+pub(crate) fn build_in(
+    package: &str,
+    environment: &[(&'static str, OsString)],
+    quiet: bool,
+) -> Result<PathBuf> {
     let mut command = cargo();
+    command.envs(environment.iter().cloned());
     command.arg("rustc");
     arguments(&mut command, package);
     cargo_build(command, quiet)
+}
+
+/// What a program of this workspace prints.
+pub(crate) fn output(
+    cargo_arguments: &[&str],
+    arguments: &[&str],
+    environment: &[(&'static str, OsString)],
+) -> Result<Vec<u8>> {
+    needs_source("this")?;
+    let mut command = cargo();
+    command.current_dir(root()).args(cargo_arguments).arg("--").args(arguments);
+    let done = command
+        .envs(environment.iter().cloned())
+        .stderr(Stdio::inherit())
+        .output()
+        .context("cargo cannot be run")?;
+    ensure!(done.status.success(), "cargo {} failed", cargo_arguments.join(" "));
+    Ok(done.stdout)
 }
 
 /// Cargo, the one that runs this program if there is one.
@@ -46,12 +98,18 @@ pub(crate) fn arguments(command: &mut Command, package: &str) {
     command.args(["--", "-Cllvm-args=-slp-threshold=10"]);
 }
 
+/// Arguments of `cargo rustc` for the command `hubslosh` as others get it. What follows goes to the
+/// compiler.
+pub(crate) fn program_arguments(command: &mut Command) {
+    command.args(["--release", "--package", "hubslosh", "--bin", "hubslosh"]);
+    command.args(["--features", "shipped", "--message-format", "json-render-diagnostics"]);
+    command.args(["--", "-Cstrip=symbols"]);
+}
+
 /// Runs Cargo and returns where it put the binary; Cargo's own progress goes to stderr.
 pub(crate) fn cargo_build(mut command: Command, quiet: bool) -> Result<PathBuf> {
     let root = root();
-    if !root.join("Cargo.toml").exists() {
-        bail!("the project's source is no longer at {}; the FMU cannot be built", root.display());
-    }
+    needs_source("an FMU's binary")?;
     command.current_dir(&root);
     if quiet {
         command.env("CARGO_TERM_QUIET", "true");
@@ -61,16 +119,20 @@ pub(crate) fn cargo_build(mut command: Command, quiet: bool) -> Result<PathBuf> 
         .output()
         .context("cargo cannot be run; building the FMU needs Rust")?;
     if !built.status.success() {
-        bail!("the FMU's binary did not build");
+        bail!("it did not build");
     }
     Message::parse_stream(&built.stdout[..])
         .filter_map(|message| match message {
             Ok(Message::CompilerArtifact(artifact)) => Some(artifact),
             _ => None,
         })
-        .filter(|artifact| artifact.target.kind.contains(&TargetKind::CDyLib))
-        .flat_map(|artifact| artifact.filenames)
-        .find(|name| matches!(name.extension(), Some("so" | "dll" | "dylib")))
+        .filter_map(|artifact| {
+            let library = artifact.target.kind.contains(&TargetKind::CDyLib);
+            let mut files = artifact.filenames.into_iter();
+            let of = |name: &Utf8PathBuf| matches!(name.extension(), Some("so" | "dll" | "dylib"));
+            artifact.executable.or_else(|| files.find(of).filter(|_| library))
+        })
+        .last()
         .map(PathBuf::from)
-        .context("cargo built the FMU but does not say where its binary is")
+        .context("cargo built a binary but does not say where it is")
 }

@@ -1,5 +1,5 @@
 //! A release to take away: the FMU for all platforms, its hash, its SBOM and the
-//! report of its check.
+//! report of its check; the wheels' hashes, and that for Linux itself.
 
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
@@ -7,7 +7,12 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use host::output::{self, sha256};
 
-use crate::{Model, pack_all};
+use crate::metadata::{PACKAGE, VERSION};
+use crate::platforms::PLATFORMS;
+use crate::{Model, pack_all, wheel};
+
+/// Bytes up to which the wheel for Linux is in the release: it lies in the project's history forever.
+pub const LARGEST_WHEEL: u64 = 10_000_000;
 
 /// One file of an FMU.
 pub fn read(fmu: &Path, name: &str) -> Result<Vec<u8>> {
@@ -54,6 +59,52 @@ pub fn write(
         let path = path(model, folder).with_extension(ending);
         output::atomically(&path, |file| Ok(file.write_all(&bytes)?))?;
         written.push(path);
+    }
+    Ok(written)
+}
+
+/// Where the hashes of the present version's wheels are, in `folder`, as `sha256sum --check` reads them.
+pub fn wheel_hashes(folder: &Path) -> PathBuf {
+    folder.join(format!("{PACKAGE}-{VERSION}.sha256"))
+}
+
+/// Builds the wheels of all platforms to `made`, and writes their hashes to `folder`, with the wheel
+/// for Linux on x86-64 if it is not larger than [`LARGEST_WHEEL`]; an older version's wheel is removed. Returns
+/// what was written there.
+pub fn write_wheels(made: &Path, folder: &Path) -> Result<Vec<PathBuf>> {
+    let mut wheels = wheel::write_for(&PLATFORMS.each_ref(), made)?;
+    wheels.sort();
+    let mut hashes = String::new();
+    let mut linux = None;
+    for path in &wheels {
+        let bytes =
+            std::fs::read(path).with_context(|| format!("{} cannot be read", path.display()))?;
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        hashes += &format!("{}  {name}\n", sha256(&bytes));
+        if name.contains("manylinux") && name.contains("x86_64") {
+            linux = Some((folder.join(&*name), bytes));
+        }
+    }
+    output::directory(folder)?;
+    for entry in folder.read_dir()?.flatten() {
+        if entry.path().extension().is_some_and(|ending| ending == "whl") {
+            std::fs::remove_file(entry.path())?;
+        }
+    }
+    let mut written = vec![wheel_hashes(folder)];
+    output::atomically(&written[0], |file| Ok(file.write_all(hashes.as_bytes())?))?;
+    if let Some((path, bytes)) = linux {
+        if bytes.len() as u64 <= LARGEST_WHEEL {
+            output::atomically(&path, |file| Ok(file.write_all(&bytes)?))?;
+            written.push(path);
+        } else {
+            eprintln!(
+                "{} has {} bytes and is not kept in {} (allowed: {LARGEST_WHEEL})",
+                path.display(),
+                bytes.len(),
+                folder.display()
+            );
+        }
     }
     Ok(written)
 }

@@ -1,105 +1,226 @@
-//! The Python package `hubslosh` as a wheel, with the FMUs inside (packaging.python.org, "Binary
-//! distribution format"): same files, same bytes.
+//! The Python package `hubslosh` as wheels, one for each platform, with the FMUs and the command
+//! `hubslosh` inside (packaging.python.org, "Binary distribution format"): same files, same bytes.
 //!
-//! The wheel's tag is `py3-none-any`, because its Python runs anywhere and an FMU's binaries are data
-//! to it. Which platforms the FMUs have binaries for stands in its metadata, and the package says
-//! so where there is none for its own.
+//! Its Python runs anywhere, its binaries do not: the tag says which Linux, Windows or macOS they
+//! need, and is read from the binaries themselves.
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use base64ct::{Base64UrlUnpadded, Encoding};
+use host::binary::{Binary, GLIBC, Kind, MACOS, Version};
 use host::fmi2::PLATFORM;
 use sha2::{Digest, Sha256};
-use toml::{Table, Value};
 
-use crate::archive::{self, Files, below, read};
-use crate::{MODELS, build, pack, pack_all, root};
+use crate::archive::{self, Files, Packed, below, read};
+use crate::metadata::{self, PACKAGE, VERSION};
+use crate::platforms::{self, Platform, Product, Target, Toolchain};
+use crate::{MODELS, build, components, files as files_of_fmu, pack, root};
 
-/// Name of the package.
-const PACKAGE: &str = "hubslosh";
-/// Its version.
-const VERSION: &str = env!("CARGO_PKG_VERSION");
-/// Any Python 3, no binary interface of Python's, any platform.
-const TAG: &str = "py3-none-any";
-/// Cargo package of the library that makes a whole run in one call.
-const BATCH: &str = "hubslosh-batch";
-const LICENSES: [&str; 2] = ["LICENSE-APACHE", "LICENSE-MIT"];
+/// Cargo package of the library that makes a whole run in one call, and its file's name.
+const BATCH: (&str, &str) = ("hubslosh-batch", "hubslosh_batch");
 
-/// The file's name, from which pip reads package, version and tag.
-pub fn name() -> String {
-    format!("{PACKAGE}-{VERSION}-{TAG}.whl")
+/// The binaries of a wheel.
+struct Binaries {
+    /// Folder under `binaries/` of the FMUs.
+    folder: &'static str,
+    /// Names and bytes of the packed FMUs.
+    fmus: Files,
+    /// Name and bytes of the library for whole runs.
+    library: (String, Vec<u8>),
+    /// Name and bytes of the command.
+    command: Option<(String, Vec<u8>)>,
+    /// The libraries and the command, as read.
+    read: Vec<Binary>,
 }
 
-/// Builds and packs every FMU of this project, then the wheel to `out`. Returns the platforms its FMUs
-/// have binaries for. The library for whole runs in one call is there for this machine's platform
-/// alone; on others the package makes the calls one by one.
+/// Builds and packs every FMU of this project and the wheel with them, to `folder`, for this machine's
+/// platform. Returns where it is.
 ///
 /// # Errors
-/// If the file's name is not [`name`], or if something cannot be built, read or written.
-pub fn write(out: &Path, all_platforms: bool) -> Result<Vec<&'static str>> {
-    ensure!(
-        out.file_name().is_some_and(|file| file == name().as_str()),
-        "the wheel's file must be called {}, not {}: pip reads package and version from its name",
-        name(),
-        out.display()
-    );
-    let made = tempfile::tempdir().context("there is no place for temporary files")?;
-    let mut platforms = vec![PLATFORM];
-    let mut fmus = Vec::new();
-    for model in &MODELS {
-        let fmu = made.path().join(format!("{}.fmu", model.name));
-        if all_platforms {
-            platforms = pack_all(model, &fmu)?.iter().map(|built| built.folder).collect();
-        } else {
-            pack(model, &fmu)?;
-        }
-        fmus.push(fmu);
-    }
-    let library = build(BATCH, true)?;
-    archive::write(&files(&fmus, &library, &platforms)?, out)?;
-    Ok(platforms)
+/// If something cannot be built, read or written.
+pub fn write(folder: &Path) -> Result<PathBuf> {
+    check_folder(folder)?;
+    write_one(folder, native()?)
 }
 
-/// A wheel for tests, with these FMUs: to the folder of the first of them. Returns where it is.
+/// The same for other platforms, a wheel for each processor.
+///
+/// # Errors
+/// As [`write`]; if a binary would not run on every machine of its platform, nothing is written.
+pub fn write_for(platforms: &[&Platform], folder: &Path) -> Result<Vec<PathBuf>> {
+    check_folder(folder)?;
+    cross(platforms)?.into_iter().map(|binaries| write_one(folder, binaries)).collect()
+}
+
+fn check_folder(folder: &Path) -> Result<()> {
+    ensure!(
+        folder.extension().is_none_or(|ending| ending != "whl"),
+        "{} is the name of a file; a folder is expected, for pip reads package, version and platform \
+         from the wheel's own name",
+        folder.display()
+    );
+    Ok(())
+}
+
+/// A wheel for tests, with these FMUs and without the command: to the folder of the first of them.
+/// Returns where it is.
 ///
 /// # Panics
 /// If it cannot be made.
 pub fn for_tests(fmus: &[&Path]) -> PathBuf {
     let make = || {
-        let out = fmus[0].with_file_name(name());
-        let fmus: Vec<_> = fmus.iter().map(|fmu| fmu.to_path_buf()).collect();
-        archive::write(&files(&fmus, &build(BATCH, true)?, &[PLATFORM])?, &out)?;
-        anyhow::Ok(out)
+        let library = read(&build(BATCH.0, true)?)?;
+        let named = |fmu: &&Path| Ok((file_name(fmu), read(fmu)?));
+        let fmus_in = fmus.iter().map(named).collect::<Result<_>>()?;
+        let read = vec![Binary::read(&library)?];
+        let library = (library_name(std::env::consts::DLL_SUFFIX), library);
+        let binaries = Binaries { folder: PLATFORM, fmus: fmus_in, library, command: None, read };
+        write_one(fmus[0].parent().context("the FMU is in no folder")?, binaries)
     };
     make().unwrap_or_else(|error| panic!("the wheel for the tests could not be packed: {error:#}"))
 }
 
+/// Builds for the platform that this program runs on; the command is this program.
+fn native() -> Result<Binaries> {
+    let made = tempfile::tempdir().context("there is no place for temporary files")?;
+    let mut fmus = Files::new();
+    let mut all = Vec::new();
+    for model in &MODELS {
+        let fmu = made.path().join(format!("{}.fmu", model.name));
+        pack(model, &fmu)?;
+        fmus.push((file_name(&fmu), read(&fmu)?));
+        all.push(Binary::read(&read(&build(model.package, true)?)?)?);
+    }
+    let library = read(&build(BATCH.0, true)?)?;
+    let command = read(&std::env::current_exe().context("this program cannot find itself")?)?;
+    all.push(Binary::read(&library)?);
+    all.push(Binary::read(&command)?);
+    Ok(Binaries {
+        folder: PLATFORM,
+        fmus,
+        library: (library_name(std::env::consts::DLL_SUFFIX), library),
+        command: Some((format!("{PACKAGE}{}", std::env::consts::EXE_SUFFIX), command)),
+        read: all,
+    })
+}
+
+/// Builds for other platforms, and checks that the binaries run on all of their machines.
+fn cross(platforms: &[&Platform]) -> Result<Vec<Binaries>> {
+    let toolchain = Toolchain::look()?;
+    toolchain.check(platforms)?;
+    let mut faults = Vec::new();
+    let mut all = Vec::new();
+    for platform in platforms {
+        for target in platform.targets {
+            eprintln!("building for {}", target.triple);
+            all.push(cross_one(&toolchain, platform, target, &mut faults)?);
+        }
+    }
+    platforms::refuse(&faults)?;
+    Ok(all)
+}
+
+fn cross_one(
+    toolchain: &Toolchain,
+    platform: &Platform,
+    target: &Target,
+    faults: &mut Vec<String>,
+) -> Result<Binaries> {
+    let made = tempfile::tempdir().context("there is no place for temporary files")?;
+    let mut read = Vec::new();
+    let mut built = |product: &Product| -> Result<Vec<u8>> {
+        let bytes = toolchain.build(product, platform, target)?;
+        let binary = Binary::read(&bytes).context(target.triple)?;
+        let found = binary.loading_faults_for(&[target.architecture]);
+        faults.extend(toolchain.faults(platform, &bytes, found));
+        read.push(binary);
+        Ok(bytes)
+    };
+    let mut fmus = Files::new();
+    for model in &MODELS {
+        let bytes = built(&Product::Fmu(model))?;
+        let binary = Packed { folder: platform.folder, ending: platform.ending, bytes };
+        let fmu = made.path().join(format!("{}.fmu", model.name));
+        archive::write(&files_of_fmu(model, &[binary])?, &fmu)?;
+        fmus.push((file_name(&fmu), archive::read(&fmu)?));
+    }
+    let library = built(&Product::Library(BATCH.0, BATCH.1))?;
+    let command = built(&Product::Command)?;
+    let ending = if platform.ending == ".dll" { ".exe" } else { "" };
+    Ok(Binaries {
+        folder: platform.folder,
+        fmus,
+        library: (library_name(platform.ending), library),
+        command: Some((format!("{PACKAGE}{ending}"), command)),
+        read,
+    })
+}
+
+fn library_name(ending: &str) -> String {
+    format!("{}{}{ending}", if ending == ".dll" { "" } else { "lib" }, BATCH.1)
+}
+
+fn write_one(folder: &Path, binaries: Binaries) -> Result<PathBuf> {
+    let tags = tags(&binaries.read)?;
+    let out = folder.join(format!("{PACKAGE}-{VERSION}-py3-none-{}.whl", tags.join(".")));
+    archive::write(&files(binaries, &tags)?, &out)?;
+    Ok(out)
+}
+
+/// The tags of a platform on which all these binaries run ("Platform compatibility tags"); for
+/// glibc 2.17 also its older name.
+fn tags(binaries: &[Binary]) -> Result<Vec<String>> {
+    let Some(Binary { kind, architectures, .. }) = binaries.first() else {
+        bail!("a wheel without binaries has no platform")
+    };
+    let [architecture] = architectures[..] else {
+        bail!("a wheel is for one processor, not for {}", architectures.join(", "))
+    };
+    let needed = |oldest| binaries.iter().filter_map(|b| b.needs).fold(oldest, Version::max);
+    Ok(match kind {
+        Kind::Linux | Kind::LinuxArm => {
+            let machine = if architecture == "arm64" { "aarch64" } else { architecture };
+            let Version(major, minor) = needed(GLIBC);
+            let older =
+                (Version(major, minor) == GLIBC).then(|| format!("manylinux2014_{machine}"));
+            [format!("manylinux_{major}_{minor}_{machine}")].into_iter().chain(older).collect()
+        }
+        Kind::Windows => vec!["win_amd64".into()],
+        // from 11 on the second number is no release of its own
+        Kind::MacOs => vec![format!("macosx_{}_0_{architecture}", needed(MACOS).0)],
+    })
+}
+
 /// What is in the wheel; its metadata last, as the standard recommends, RECORD at the very end.
-fn files(fmus: &[PathBuf], library: &Path, platforms: &[&str]) -> Result<Files> {
-    let source = root().join("harness").join("python");
-    let package = below(&source.join(PACKAGE))?.into_iter();
+fn files(binaries: Binaries, tags: &[String]) -> Result<Files> {
+    let package = below(&root().join("harness").join("python").join(PACKAGE))?.into_iter();
     let mut files: Files = package
         .filter(|(name, _)| !name.contains("__pycache__"))
         .map(|(name, bytes)| (format!("{PACKAGE}/{name}"), bytes))
         .collect();
-    for fmu in fmus {
-        files.push((format!("{PACKAGE}/fmus/{}", file_name(fmu)), read(fmu)?));
+    for (name, bytes) in binaries.fmus {
+        files.push((format!("{PACKAGE}/fmus/{name}"), bytes));
     }
-    files.push((format!("{PACKAGE}/lib/{PLATFORM}/{}", file_name(library)), read(library)?));
+    let (name, bytes) = binaries.library;
+    files.push((format!("{PACKAGE}/lib/{}/{name}", binaries.folder), bytes));
     files.sort();
 
     let info = format!("{PACKAGE}-{VERSION}.dist-info");
-    let project = String::from_utf8(read(&source.join("pyproject.toml"))?)?;
-    let models: Vec<_> = fmus.iter().map(|fmu| file_name(fmu)).collect();
-    let metadata = metadata(&project.parse()?, &models, platforms).context("pyproject.toml")?;
-    for license in LICENSES {
+    for license in metadata::LICENSES {
         files.push((format!("{info}/licenses/{license}"), read(&root().join(license))?));
     }
-    files.push((format!("{info}/METADATA"), metadata.into_bytes()));
-    let wheel = format!(
-        "Wheel-Version: 1.0\nGenerator: {PACKAGE} {VERSION}\nRoot-Is-Purelib: true\nTag: {TAG}\n"
-    );
+    if let Some((name, bytes)) = binaries.command {
+        let notices = components::notices(&bytes, binaries.folder)?;
+        files.push((format!("{info}/licenses/{}", metadata::NOTICES), notices.into_bytes()));
+        files.insert(0, (format!("{PACKAGE}-{VERSION}.data/scripts/{name}"), bytes));
+    }
+    files.push((format!("{info}/METADATA"), metadata::text()?.into_bytes()));
+    let mut wheel =
+        format!("Wheel-Version: 1.0\nGenerator: {PACKAGE} {VERSION}\nRoot-Is-Purelib: false\n");
+    for tag in tags {
+        wheel += &format!("Tag: py3-none-{tag}\n");
+    }
     files.push((format!("{info}/WHEEL"), wheel.into_bytes()));
     let record = format!("{info}/RECORD");
     let list = files.iter().map(|(name, bytes)| record_line(name, bytes)).collect::<String>();
@@ -117,48 +238,6 @@ fn record_line(name: &str, bytes: &[u8]) -> String {
     format!("{name},sha256={hash},{}\n", bytes.len())
 }
 
-/// The core metadata, version 2.4, from `[project]` of pyproject.toml.
-fn metadata(pyproject: &Table, fmus: &[String], platforms: &[&str]) -> Result<String> {
-    let project =
-        pyproject.get("project").and_then(Value::as_table).context("it has no [project]")?;
-    let text = |key: &str| {
-        project.get(key).and_then(Value::as_str).with_context(|| format!("it has no {key}"))
-    };
-    let mut lines = vec![
-        "Metadata-Version: 2.4".to_string(),
-        format!("Name: {}", text("name")?),
-        format!("Version: {VERSION}"),
-        format!("Summary: {}", text("description")?),
-        format!("Requires-Python: {}", text("requires-python")?),
-        "License-Expression: MIT OR Apache-2.0".to_string(),
-    ];
-    lines.extend(LICENSES.map(|license| format!("License-File: {license}")));
-    lines.extend(platforms.iter().map(|platform| format!("Platform: {platform}")));
-    let list = |value: &Value| -> Vec<String> {
-        let values = value.as_array().into_iter().flatten();
-        values.filter_map(Value::as_str).map(String::from).collect()
-    };
-    for needed in project.get("dependencies").map(list).unwrap_or_default() {
-        lines.push(format!("Requires-Dist: {needed}"));
-    }
-    let extras = project.get("optional-dependencies").and_then(Value::as_table);
-    for (extra, packages) in extras.into_iter().flatten() {
-        lines.push(format!("Provides-Extra: {extra}"));
-        let packages = list(packages).into_iter();
-        lines.extend(
-            packages.map(|package| format!("Requires-Dist: {package}; extra == '{extra}'")),
-        );
-    }
-    lines.push("Description-Content-Type: text/markdown".to_string());
-    Ok(format!(
-        "{}\n\n{}.\n\nFMUs in this wheel: {}, with binaries for {}.\n",
-        lines.join("\n"),
-        text("description")?,
-        fmus.join(", "),
-        platforms.join(", ")
-    ))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -172,35 +251,42 @@ mod tests {
         );
     }
 
-    #[test]
-    fn metadata_has_what_pip_reads_and_names_the_platforms() {
-        let pyproject = r#"
-            [project]
-            name = "hubslosh"
-            description = "Slosh"
-            requires-python = ">=3.11"
-            dependencies = ["numpy>=2", "scipy"]
-            [project.optional-dependencies]
-            plot = ["matplotlib"]
-        "#;
-        let said = metadata(&pyproject.parse().unwrap(), &["M.fmu".into()], &["linux64"]).unwrap();
-        for line in [
-            "FMUs in this wheel: M.fmu, with binaries for linux64.",
-            "Name: hubslosh",
-            "Platform: linux64",
-            "Requires-Dist: scipy",
-            "Provides-Extra: plot",
-            "Requires-Dist: matplotlib; extra == 'plot'",
-        ] {
-            assert!(said.lines().any(|there| there == line), "{line} in\n{said}");
+    /// A binary that needs that version.
+    fn binary(kind: Kind, architecture: &'static str, needs: Option<Version>) -> Binary {
+        Binary {
+            kind,
+            size: 0,
+            architectures: vec![architecture],
+            libraries: vec![],
+            search_paths: vec![],
+            needs,
+            exports: vec![],
+            signature: None,
         }
-        let error = metadata(&"[project]\nname = \"x\"".parse().unwrap(), &[], &[]).unwrap_err();
-        assert_eq!(error.to_string(), "it has no description");
     }
 
     #[test]
-    fn another_name_of_the_file_is_refused_before_anything_is_built() {
-        let error = write(Path::new("dist/mine.whl"), false).unwrap_err().to_string();
-        assert!(error.contains(&name()) && error.contains("mine.whl"), "{error}");
+    fn the_tag_is_of_the_newest_system_that_a_binary_needs() {
+        let of = |kind, architecture, needs: &[_]| {
+            let all: Vec<_> =
+                needs.iter().map(|&version| binary(kind, architecture, version)).collect();
+            tags(&all).unwrap().join(".")
+        };
+        let (old, new) = (Some(Version(2, 14)), Some(Version(2, 34)));
+        assert_eq!(of(Kind::Linux, "x86_64", &[new, old]), "manylinux_2_34_x86_64");
+        assert_eq!(
+            of(Kind::LinuxArm, "arm64", &[old, None]),
+            "manylinux_2_17_aarch64.manylinux2014_aarch64"
+        );
+        assert_eq!(of(Kind::Windows, "x86_64", &[None]), "win_amd64");
+        assert_eq!(of(Kind::MacOs, "arm64", &[Some(Version(11, 0))]), "macosx_11_0_arm64");
+        assert_eq!(of(Kind::MacOs, "x86_64", &[Some(Version(12, 3))]), "macosx_12_0_x86_64");
+        assert!(tags(&[]).is_err());
+    }
+
+    #[test]
+    fn a_files_name_in_place_of_the_folder_is_refused_before_anything_is_built() {
+        let error = write(Path::new("dist/mine.whl")).unwrap_err().to_string();
+        assert!(error.contains("mine.whl") && error.contains("a folder is expected"), "{error}");
     }
 }

@@ -50,14 +50,14 @@ pub fn render(root: &Path) -> Result<Files> {
         let body = page.html(root, &pages, Layout::Site, &mut all);
         let navigation = navigation(&parts, &pages, &titles, place);
         let neighbours = neighbours(&pages, &titles, place);
-        let html = site_page(page, &navigation, &body, &neighbours).into_string();
+        let html = site_page(&titles[place], &navigation, &body, &neighbours).into_string();
         files.push((format!("{}.html", page.name), html.into_bytes()));
     }
     let whole = one_file(root, &pages, "HubSlosh: the whole book", &mut all);
     files.push(("print.html".into(), whole.into_string().into_bytes()));
     files.push(("page.css".into(), super::CSS.into()));
     files.push(("search.js".into(), include_bytes!("search.js").to_vec()));
-    files.push(("search-index.js".into(), search_index(&pages)?.into_bytes()));
+    files.push(("search-index.js".into(), search_index(&pages, &titles)?.into_bytes()));
     files.extend(all.figures()?);
     Ok(files)
 }
@@ -129,14 +129,14 @@ fn neighbours(pages: &[Page], titles: &[String], present: usize) -> Markup {
     html! { (link(present.checked_sub(1), "before")) (link(Some(present + 1), "after")) }
 }
 
-fn site_page(page: &Page, navigation: &Markup, body: &Markup, neighbours: &Markup) -> Markup {
+fn site_page(title: &str, navigation: &Markup, body: &Markup, neighbours: &Markup) -> Markup {
     html! {
         (DOCTYPE)
         html lang="en" {
             head {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width";
-                title { (page.title) " · HubSlosh" }
+                title { (title) " · HubSlosh" }
                 link rel="stylesheet" href="page.css";
             }
             body .site {
@@ -159,14 +159,15 @@ fn site_page(page: &Page, navigation: &Markup, body: &Markup, neighbours: &Marku
     }
 }
 
-/// The words of every section: a script, because a page opened from the disk may load no data.
-fn search_index(pages: &[Page]) -> Result<String> {
+/// The words of every section: a script, because a page opened from the disk may load no data. Pages have
+/// their titles in the list of all, which tells those of several FMUs apart.
+fn search_index(pages: &[Page], titles: &[String]) -> Result<String> {
     let mut sections = Vec::new();
-    for page in pages {
+    for (page, title) in pages.iter().zip(titles) {
         for section in page.sections() {
             let title = match section.slug.as_str() {
-                _ if section.title == page.title => page.title.clone(),
-                _ => format!("{}: {}", page.title, section.title),
+                _ if section.title == page.title => title.clone(),
+                _ => format!("{title}: {}", section.title),
             };
             let address = Layout::Site.address(page, &section.slug);
             sections.push(json!({ "at": address, "title": title, "words": section.words }));

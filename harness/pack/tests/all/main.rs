@@ -2,4 +2,5 @@
 
 mod archive;
 mod documentation;
+mod metadata;
 mod release;

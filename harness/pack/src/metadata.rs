@@ -1,0 +1,166 @@
+//! The core metadata of the Python package, version 2.4 (packaging.python.org, "Core metadata
+//! specifications"): from `[project]` of pyproject.toml, from Cargo.toml (version, authors, licence,
+//! repository) and README.md.
+
+use std::ops::Range;
+
+use anyhow::{Context, Result};
+use pulldown_cmark::{Event, Options, Parser, Tag};
+use toml::{Table, Value};
+
+use crate::archive::read;
+use crate::root;
+
+/// Name of the package, and of the command in it.
+pub const PACKAGE: &str = "hubslosh";
+/// Its version.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+/// Where the project's source is published.
+pub const REPOSITORY: &str = env!("CARGO_PKG_REPOSITORY");
+/// Texts of the project's licence.
+pub const LICENSES: [&str; 2] = ["LICENSE-APACHE", "LICENSE-MIT"];
+/// Licences and notices of what is linked into a wheel's command.
+pub const NOTICES: &str = "THIRD-PARTY.txt";
+
+/// The text of METADATA and PKG-INFO.
+pub fn text() -> Result<String> {
+    let project = read(&root().join("harness/python/pyproject.toml"))?;
+    let readme = String::from_utf8(read(&root().join("README.md"))?).context("README.md")?;
+    compose(&String::from_utf8(project)?.parse()?, &readme).context("pyproject.toml")
+}
+
+fn compose(pyproject: &Table, readme: &str) -> Result<String> {
+    let project =
+        pyproject.get("project").and_then(Value::as_table).context("it has no [project]")?;
+    let text = |key: &str| {
+        project.get(key).and_then(Value::as_str).with_context(|| format!("it has no {key}"))
+    };
+    let list = |value: &Value| -> Vec<String> {
+        let values = value.as_array().into_iter().flatten();
+        values.filter_map(Value::as_str).map(String::from).collect()
+    };
+    let of = |key: &str| project.get(key).map(list).unwrap_or_default();
+    let mut lines = vec![
+        "Metadata-Version: 2.4".to_string(),
+        format!("Name: {}", text("name")?),
+        format!("Version: {VERSION}"),
+        format!("Summary: {}", text("description")?),
+        format!("Keywords: {}", of("keywords").join(",")),
+        format!("Author: {}", env!("CARGO_PKG_AUTHORS").replace(':', ", ")),
+        format!("License-Expression: {}", env!("CARGO_PKG_LICENSE")),
+    ];
+    lines.extend(LICENSES.map(|license| format!("License-File: {license}")));
+    lines.extend(of("classifiers").iter().map(|classifier| format!("Classifier: {classifier}")));
+    for (name, page) in [
+        ("Source", ""),
+        ("Documentation", "/blob/main/book/SUMMARY.md"),
+        ("Changelog", "/blob/main/CHANGELOG.md"),
+        ("Issues", "/issues"),
+    ] {
+        lines.push(format!("Project-URL: {name}, {REPOSITORY}{page}"));
+    }
+    lines.push(format!("Requires-Python: {}", text("requires-python")?));
+    lines.extend(of("dependencies").iter().map(|needed| format!("Requires-Dist: {needed}")));
+    let extras = project.get("optional-dependencies").and_then(Value::as_table);
+    for (extra, packages) in extras.into_iter().flatten() {
+        lines.push(format!("Provides-Extra: {extra}"));
+        let packages = list(packages).into_iter();
+        lines.extend(
+            packages.map(|package| format!("Requires-Dist: {package}; extra == '{extra}'")),
+        );
+    }
+    lines.push("Description-Content-Type: text/markdown; variant=GFM".to_string());
+    Ok(format!("{}\n\n{}", lines.join("\n"), published(readme)))
+}
+
+/// A page of Markdown with links that work where the page stands alone: those to the project's
+/// files lead to the repository, at this version.
+fn published(page: &str) -> String {
+    let mut changes: Vec<(Range<usize>, String)> = Vec::new();
+    for (event, range) in Parser::new_ext(page, Options::ENABLE_TABLES).into_offset_iter() {
+        let (to, raw) = match event {
+            Event::Start(Tag::Link { dest_url, .. }) => (dest_url, "blob"),
+            Event::Start(Tag::Image { dest_url, .. }) => (dest_url, "raw"),
+            // <img src="…" …>
+            Event::Html(_) | Event::InlineHtml(_) => {
+                if let Some(place) = page[range.clone()].find(" src=\"") {
+                    let start = range.start + place + " src=\"".len();
+                    if !page[start..].starts_with("https://") {
+                        changes.push((start..start, format!("{REPOSITORY}/raw/v{VERSION}/")));
+                    }
+                }
+                continue;
+            }
+            _ => continue,
+        };
+        // "](…" of this link is its last in the range: what is inside ends before
+        let written = format!("]({to}");
+        if !to.contains("://")
+            && !to.starts_with('#')
+            && let Some(place) = page[range.clone()].rfind(&written)
+        {
+            let start = range.start + place + "](".len();
+            let address = format!("{REPOSITORY}/{raw}/v{VERSION}/{to}");
+            changes.push((start..start + to.len(), address));
+        }
+    }
+    // an image within a link comes after it, and stands before its end
+    changes.sort_by_key(|(range, _)| range.start);
+    let mut published = page.to_string();
+    for (range, address) in changes.into_iter().rev() {
+        published.replace_range(range, &address);
+    }
+    published
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn metadata_has_what_pip_and_an_index_read() {
+        let pyproject = r#"
+            [project]
+            name = "hubslosh"
+            description = "Slosh"
+            keywords = ["slosh", "FMI"]
+            requires-python = ">=3.11"
+            classifiers = ["Topic :: Scientific/Engineering"]
+            dependencies = ["numpy>=2", "scipy"]
+            [project.optional-dependencies]
+            plot = ["matplotlib"]
+        "#;
+        let said = compose(&pyproject.parse().unwrap(), "# Slosh\n").unwrap();
+        for line in [
+            "Name: hubslosh",
+            "Keywords: slosh,FMI",
+            "License-Expression: MIT OR Apache-2.0",
+            "Classifier: Topic :: Scientific/Engineering",
+            &format!("Project-URL: Source, {REPOSITORY}"),
+            "Requires-Dist: scipy",
+            "Provides-Extra: plot",
+            "Requires-Dist: matplotlib; extra == 'plot'",
+            "# Slosh",
+        ] {
+            assert!(said.lines().any(|there| there == line), "{line} in\n{said}");
+        }
+        let error = compose(&"[project]\nname = \"x\"".parse().unwrap(), "").unwrap_err();
+        assert_eq!(error.to_string(), "it has no description");
+    }
+
+    #[test]
+    fn links_to_files_lead_to_the_repository_and_others_stay() {
+        let page = "See [a](b.md#c), [d](https://e.org), [f](#f).\n\n| [g](h/) |\n| --- |\n| x |\n\n\
+                    [![i](j.svg)](k.html) `[l](m)`\n\n<img src=\"n.png\" width=\"9\">\n";
+        let (blob, raw) =
+            (format!("{REPOSITORY}/blob/v{VERSION}"), format!("{REPOSITORY}/raw/v{VERSION}"));
+        assert_eq!(
+            published(page),
+            format!(
+                "See [a]({blob}/b.md#c), [d](https://e.org), [f](#f).\n\n| [g]({blob}/h/) |\n| --- |\n| x |\n\n\
+                 [![i]({raw}/j.svg)]({blob}/k.html) `[l](m)`\n\n\
+                 <img src=\"{raw}/n.png\" width=\"9\">\n"
+            )
+        );
+    }
+}

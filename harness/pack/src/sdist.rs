@@ -1,0 +1,69 @@
+//! The project's source as a Python sdist (packaging.python.org, "Source distribution format"), from
+//! which pip builds the wheel where Rust and a C compiler are: same files, same bytes.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, ensure};
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use host::output;
+use tar::{Builder, Header};
+
+use crate::archive::{Files, read};
+use crate::metadata::{self, PACKAGE, VERSION};
+use crate::root;
+
+/// Where the build backend is, seen from pyproject.toml's own folder, and from the sdist's root.
+const BACKEND: [&str; 2] = ["backend-path = [\".\"]", "backend-path = [\"harness/python\"]"];
+
+/// Writes the sdist to `folder` and returns where it is.
+///
+/// # Errors
+/// If git does not list the project's files, or one cannot be read or written.
+pub fn write(folder: &Path) -> Result<PathBuf> {
+    let name = format!("{PACKAGE}-{VERSION}");
+    let out = folder.join(format!("{name}.tar.gz"));
+    let files = files()?;
+    output::directory(folder)?;
+    output::atomically(&out, |file| {
+        // no name and no time in gzip's header
+        let mut archive = Builder::new(GzEncoder::new(file, Compression::best()));
+        for (path, bytes) in &files {
+            let mut header = Header::new_ustar();
+            header.set_size(bytes.len() as u64);
+            header.set_mode(if bytes.starts_with(b"#!") { 0o755 } else { 0o644 });
+            header.set_mtime(0);
+            archive.append_data(&mut header, format!("{name}/{path}"), &bytes[..])?;
+        }
+        archive.into_inner()?.finish()?;
+        Ok(())
+    })?;
+    Ok(out)
+}
+
+/// What git knows of, but releases and what is for a checkout alone; pyproject.toml and the metadata
+/// at the root.
+fn files() -> Result<Files> {
+    let said = Command::new("git")
+        .current_dir(root())
+        .args(["ls-files", "-z", "--cached", "--others", "--exclude-standard"])
+        .output()
+        .context("git cannot be run, which knows the files of the source")?;
+    let why = String::from_utf8_lossy(&said.stderr);
+    ensure!(said.status.success(), "git does not list the files of the source: {}", why.trim());
+    let mut files = Files::new();
+    for name in String::from_utf8(said.stdout)?.split('\0').filter(|name| !name.is_empty()) {
+        // deleted in the working tree, but not yet in git
+        let path = root().join(name);
+        if !name.starts_with("dist/") && !name.starts_with(".git") && path.is_file() {
+            files.push((name.into(), read(&path)?));
+        }
+    }
+    let project = String::from_utf8(read(&root().join("harness/python/pyproject.toml"))?)?;
+    ensure!(project.contains(BACKEND[0]), "pyproject.toml does not say {}", BACKEND[0]);
+    files.push(("pyproject.toml".into(), project.replace(BACKEND[0], BACKEND[1]).into_bytes()));
+    files.push(("PKG-INFO".into(), metadata::text()?.into_bytes()));
+    files.sort();
+    Ok(files)
+}

@@ -1,0 +1,41 @@
+//! What is said of the project outside of Cargo.toml is what Cargo.toml says.
+
+use pack::metadata::{self, REPOSITORY, VERSION};
+use pack::root;
+
+fn read(name: &str) -> String {
+    std::fs::read_to_string(root().join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+}
+
+#[test]
+fn address_and_version_are_those_of_cargo_toml() {
+    let citation = read("CITATION.cff");
+    for line in [format!("version: {VERSION}"), format!("repository-code: {REPOSITORY}")] {
+        assert!(citation.lines().any(|there| there == line), "CITATION.cff: {line}");
+    }
+    for page in ["README.md", "book/start.md", "book/index.md"] {
+        for line in read(page).lines() {
+            let clone = line.trim_start().strip_prefix("git clone ");
+            assert!(clone.is_none_or(|rest| rest.starts_with(REPOSITORY)), "{page}: {line}");
+            // `pip install --find-links dist "hubslosh[plot]==1.2.3"`
+            if let Some((_, wanted)) =
+                line.split_once("hubslosh").and_then(|(_, w)| w.split_once("=="))
+            {
+                assert!(wanted.starts_with(VERSION), "{page}: {line}");
+            }
+        }
+    }
+}
+
+#[test]
+fn an_index_shows_readme_with_links_that_work() {
+    let text = metadata::text().unwrap();
+    let (head, body) = text.split_once("\n\n").unwrap();
+    assert!(head.contains(&format!("\nProject-URL: Source, {REPOSITORY}\n")), "{head}");
+    assert!(body.starts_with("# HubSlosh\n"), "{body}");
+    // every link and picture is absolute, or leads to a heading of the page
+    for target in body.match_indices("](").map(|(place, _)| &body[place + 2..]) {
+        let to = target.split([')', ' ']).next().unwrap_or_default();
+        assert!(to.starts_with("https://") || to.starts_with('#'), "{to}");
+    }
+}

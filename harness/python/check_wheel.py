@@ -1,0 +1,159 @@
+"""Installs a wheel of this package as a user does, where no Rust is, and uses all of it.
+
+    python3 harness/python/check_wheel.py dist/hubslosh-….whl [--find-links FOLDER]
+
+In a new virtual environment, with nothing on PATH but it and the system's own programs: how long
+until the first plot; ``import hubslosh``; the command ``hubslosh`` with its FMUs beside it (run,
+check, tank, identify, the campaign and its report); the package's ``campaign``; every example that
+needs no further package. With --find-links pip takes packages from that folder alone, so that a
+machine without a network will do. Python 3.11 or newer and its standard library are enough.
+
+Exit code 0 if everything runs, within the times that are printed.
+"""
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+IMPORT = 0.2
+"""s of CPU time for ``import hubslosh``."""
+
+FIRST_PLOT = 60.0
+"""s elapsed from the downloaded wheels to the first plot."""
+
+REPORT = 180.0
+"""s elapsed for the campaign with its report."""
+
+NEEDS_MORE = {"6_monte_carlo": "distributed", "7_one_loop": "the crate one-loop"}
+"""Examples that need what the wheel's extras do not bring."""
+
+
+class Machine:
+    """An environment with the wheel, and nothing else beside the system's programs."""
+
+    def __init__(self, folder: Path) -> None:
+        """Make the environment."""
+        self.folder = folder
+        venv = folder / "venv"
+        subprocess.run([sys.executable, "-m", "venv", venv], check=True)
+        self.scripts = venv / ("Scripts" if os.name == "nt" else "bin")
+        self.python = self.scripts / ("python.exe" if os.name == "nt" else "python")
+        system = (
+            [str(Path(os.environ["SYSTEMROOT"]) / "System32")]
+            if os.name == "nt"
+            else ["/usr/bin", "/bin"]
+        )
+        path = os.pathsep.join([str(self.scripts), *system])
+        for tool in ("cargo", "rustc"):
+            if found := shutil.which(tool, path=path):
+                sys.exit(f"error: {found} is here; this is to be tried where no Rust is")
+        keep = ("SYSTEMROOT", "TEMP", "TMP", "TMPDIR", "LANG", "LC_ALL", "PIP_CACHE_DIR")
+        self.environment = {name: os.environ[name] for name in keep if name in os.environ} | {
+            "PATH": path,
+            "HOME": str(folder),
+            "USERPROFILE": str(folder),
+            "MPLBACKEND": "agg",
+            "MPLCONFIGDIR": str(folder / "matplotlib"),
+        }
+
+    def run(self, *command: str | Path) -> tuple[str, float]:
+        """Return what a command prints, and how long it took, s; end the program if it fails."""
+        begin = time.monotonic()
+        done = subprocess.run(
+            command, cwd=self.folder, env=self.environment, text=True, encoding="utf-8",
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False,
+        )  # fmt: skip
+        if done.returncode:
+            line = " ".join(map(str, command))
+            sys.exit(f"{done.stdout}\nerror: {line}: exit code {done.returncode}")
+        return done.stdout, time.monotonic() - begin
+
+
+def within(what: str, seconds: float, limit: float) -> None:
+    """Say how long something took, and fail if that is too long."""
+    print(f"{what}: {seconds:.2f} s (allowed: {limit:g} s)", flush=True)
+    if seconds > limit:
+        sys.exit(f"error: {what} took too long")
+
+
+def main() -> None:
+    """Install, and use."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("wheel", type=Path)
+    parser.add_argument("--find-links", type=Path, metavar="FOLDER")
+    parser.add_argument("--no-examples", action="store_true")
+    args = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="wheel-", ignore_cleanup_errors=True) as folder:
+        check(Machine(Path(folder)), args)
+    print("the wheel works")
+
+
+def check(machine: Machine, args: argparse.Namespace) -> None:
+    """Use all of the wheel."""
+    run, python = machine.run, machine.python
+    begin = time.monotonic()
+    source = (
+        []
+        if args.find_links is None
+        else ["--no-index", "--find-links", args.find_links.absolute()]
+    )
+    wheel = f"{args.wheel.absolute()}[plot,control]"
+    run(python, "-m", "pip", "install", "--disable-pip-version-check", *source, wheel)
+    shutil.copytree(ROOT / "examples", machine.folder / "examples")
+    tank = machine.folder / "examples" / "0_your_own_tank" / "my_tank.py"
+    run(python, tank)
+    picture = next(machine.folder.rglob("my_tank.png"))
+    within(f"installed, and {picture.name} drawn", time.monotonic() - begin, FIRST_PLOT)
+
+    code = "import time; import hubslosh; print(time.process_time())"
+    bare = float(run(python, "-c", "import time; print(time.process_time())")[0])
+    within("import hubslosh, CPU time", float(run(python, "-c", code)[0]) - bare, IMPORT)
+
+    program = shutil.which("hubslosh", path=machine.environment["PATH"])
+    if program is None:
+        sys.exit("error: the wheel has brought no command hubslosh")
+    print(run(program, "--version")[0].strip(), "at", program)
+    for fmu in ("HubSlosh", "Spacecraft", "SloshTank"):
+        print(run(program, "check", fmu)[0].strip().splitlines()[-1])
+    drawing = ROOT / "harness" / "tank" / "examples" / "capsule.toml"
+    run(program, "tank", drawing, "--fill", "1.2", "--out", "tank.json")
+    run(program, "run", "--profile", "exp-sweep:amplitude=0.1", "--out", "sweep.csv")
+    _, seconds = run(program, "identify", "sweep.csv", "--out", "result.json")
+    print(f"identify: {seconds:.1f} s", flush=True)
+    _, seconds = run(program, "campaign")
+    report = machine.folder / "dist" / "campaign" / "report.html"
+    if report.stat().st_size < 1_000_000:
+        sys.exit(f"error: {report} has {report.stat().st_size} bytes")
+    within("the campaign and its report", seconds, REPORT)
+
+    # the package finds the command that pip has put beside it
+    plan = (
+        'title = "Two pulses"\\nprofile = "pulse:amplitude=0.05,start=1,width=1,duration=10"\\n'
+        '[vary]\\nslosh.model = ["linear", "spherical"]\\n'
+    )
+    machine.environment["PATH"] = machine.environment["PATH"].split(os.pathsep, 1)[1]
+    code = f"import hubslosh\nassert len(hubslosh.campaign('''{plan}''', 'two')) == 2"
+    run(python, "-c", code)
+    if args.no_examples:
+        return
+    for script in sorted((machine.folder / "examples").glob("*/*.py")):
+        name = script.parent.name
+        if script.name.startswith("test_") or name in NEEDS_MORE:
+            continue
+        _, seconds = run(python, script)
+        print(f"example {name}: {seconds:.1f} s", flush=True)
+    for name, what in NEEDS_MORE.items():
+        print(f"example {name}: not run, it needs {what}")
+
+
+if __name__ == "__main__":
+    main()
