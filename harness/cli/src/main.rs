@@ -3,25 +3,30 @@
 /// `println!` of the standard library panics when its reader is gone (`hubslosh variables | head`);
 /// this one ends the program.
 macro_rules! println {
-    () => { crate::say("\n".into()) };
-    ($($arguments:tt)*) => { crate::say(format!("{}\n", format_args!($($arguments)*))) };
+    () => { crate::terminal::say("\n".into()) };
+    ($($arguments:tt)*) => { crate::terminal::say(format!("{}\n", format_args!($($arguments)*))) };
 }
 
 /// The same of `print!`.
 macro_rules! print {
-    ($($arguments:tt)*) => { crate::say(format!($($arguments)*)) };
+    ($($arguments:tt)*) => { crate::terminal::say(format!($($arguments)*)) };
 }
 
-/// `eprintln!` of the standard library writes to where a guarded FMU does.
-macro_rules! eprintln {
-    ($($arguments:tt)*) => { crate::complain(format!("{}\n", format_args!($($arguments)*))) };
+/// A line on stdout about what was done, which is no result: not with `--quiet`.
+macro_rules! done {
+    ($($arguments:tt)*) => {
+        if !crate::terminal::is_quiet() {
+            println!($($arguments)*);
+        }
+    };
 }
 
 mod commands;
+mod fmu;
 mod progress;
 mod set_file;
+mod terminal;
 
-use std::io::{ErrorKind, Write};
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -32,6 +37,7 @@ use commands::*;
 use experiments::campaign::Campaign;
 use experiments::plan::Plan;
 use host::guard::{self, Cause, Limits, Output};
+use terminal::Terminal;
 
 /// Packs FMUs, checks them, simulates campaigns and reports.
 ///
@@ -49,23 +55,34 @@ struct Cli {
     /// How a process that runs FMUs is started.
     #[arg(long, hide = true)]
     guarded: Option<String>,
+    #[command(flatten)]
+    terminal: Terminal,
     #[command(subcommand)]
     command: Option<Command>,
 }
 
 impl Cli {
-    /// Whether memory and files of the command are limited.
-    fn has_memory_limit(&self) -> bool {
-        matches!(self.command, None | Some(Command::Run(_) | Command::Campaign(_)))
+    /// The FMU that the command loads into its own process, as the command line names it.
+    fn fmu(&self) -> Option<&Path> {
+        use Command::*;
+        match self.command.as_ref()? {
+            Run(args) => Some(&args.fmu),
+            Campaign(args) => Some(&args.fmu),
+            Analyse(args) => Some(&args.fmu),
+            Gyro(args) => args.needs_fmu().then_some(&args.fmu),
+            Example(args) => Some(&args.fmu),
+            Identify(args) => args.needs_fmu().then_some(&args.fmu),
+            Design(args) => Some(&args.fmu),
+            _ => None,
+        }
     }
 
-    /// Whether the command loads an FMU into its own process.
-    fn loads(&self) -> bool {
-        use Command::*;
-        let of = |command: &Command| {
-            matches!(command, Run(_) | Campaign(_) | Gyro(_) | Example(_) | Identify(_) | Design(_))
-        };
-        self.command.as_ref().is_none_or(of)
+    /// Whether memory and files of the command are limited.
+    fn has_memory_limit(&self) -> bool {
+        matches!(
+            self.command,
+            None | Some(Command::Run(_) | Command::Campaign(_) | Command::Analyse(_))
+        )
     }
 
     /// What the process that does it may take.
@@ -86,7 +103,7 @@ impl Cli {
 const EXIT_CODES: &str = "Exit codes:\n  \
     0  done, or the reader of its output has closed the pipe\n  \
     1  it failed; stderr says what was wrong, where, and what is allowed (of check: errors were \
-    found)\n  \
+    found; with --strict: warnings were)\n  \
     2  the command line was not understood";
 
 #[derive(Subcommand)]
@@ -96,6 +113,7 @@ enum Command {
     Variables(variables::VariablesArgs),
     Torque(torque::TorqueArgs),
     Campaign(campaign::CampaignArgs),
+    Analyse(analyse::AnalyseArgs),
     Check(check::CheckArgs),
     /// The calls of one rule of `check`, in a process of their own.
     #[command(hide = true)]
@@ -120,7 +138,7 @@ fn command_line() -> clap::Command {
         };
         command.mut_args(of).mut_subcommands(with_negative_numbers)
     }
-    with_negative_numbers(Cli::command())
+    with_negative_numbers(Cli::command()).color(terminal::color_of_arguments())
 }
 
 /// Has SIGINT and SIGTERM end guarded processes and remove what is temporary before they end the program. SIGHUP stays as it
@@ -142,13 +160,14 @@ fn main() -> ExitCode {
     #[cfg(unix)]
     clean_up_on_signals();
     let cli = Cli::from_arg_matches(&command_line().get_matches()).unwrap_or_else(|e| e.exit());
-    let code = match (&cli.guarded, cli.loads()) {
+    cli.terminal.set();
+    let code = match (&cli.guarded, cli.command.is_none() || cli.fmu().is_some()) {
         (None, true) => guarded(&cli),
         (Some(spec), _) => guard::enter(spec).map(|()| carry_out(cli)),
         (None, false) => Ok(carry_out(cli)),
     };
     let code = code.unwrap_or_else(|error| {
-        eprintln!("error: {error:#}");
+        terminal::error(format_args!("{error:#}"));
         1
     });
     guard::done(code);
@@ -157,8 +176,13 @@ fn main() -> ExitCode {
 
 /// Has a guarded process carry the command out.
 fn guarded(cli: &Cli) -> Result<u8> {
-    if cli.command.is_none() {
-        pack::native(::pack::HUBSLOSH, Path::new(DEFAULT_FMU))?;
+    // before the guard: what is built is not to be built within its limits
+    match cli.fmu() {
+        Some(name) => drop(fmu::find(name)?),
+        None if fmu::installed("HubSlosh.fmu").is_none() && ::pack::has_source() => {
+            pack::native(::pack::HUBSLOSH, Path::new("dist/HubSlosh.fmu"))?;
+        }
+        None => drop(fmu::find(Path::new(DEFAULT_FMU))?),
     }
     let limits = cli.limits()?;
     let program = std::env::current_exe().context("this program cannot find itself")?;
@@ -199,6 +223,7 @@ fn carry_out(cli: Cli) -> u8 {
         Some(Command::Completions(args)) => args.run(),
         Some(Command::Torque(args)) => args.run(),
         Some(Command::Campaign(args)) => args.run(),
+        Some(Command::Analyse(args)) => args.run(),
         Some(Command::Check(args)) => args.run(),
         Some(Command::CheckCalls(args)) => args.run(),
         Some(Command::Scale(args)) => args.run(),
@@ -212,55 +237,12 @@ fn carry_out(cli: Cli) -> u8 {
         None => everything(),
     };
     match done {
-        Ok(()) => 0,
+        Ok(()) => terminal::code(),
         Err(error) => {
-            eprintln!("error: {error:#}");
+            terminal::error(format_args!("{error:#}"));
             1
         }
     }
-}
-
-/// Prints a text to stdout.
-fn say(text: String) {
-    if let Err(error) = quiet_if_closed(stdout().write_all(text.as_bytes())) {
-        eprintln!("error: could not write to stdout: {error}");
-        exit(1);
-    }
-}
-
-/// stdout, out of the reach of a guarded FMU.
-fn stdout() -> Box<dyn Write> {
-    match guard::streams() {
-        Some((stdout, _)) => Box::new(stdout),
-        None => Box::new(std::io::stdout().lock()),
-    }
-}
-
-/// Prints a text to stderr.
-fn complain(text: String) {
-    // who has closed it does not want to know
-    let _ = match guard::streams() {
-        Some((_, mut stderr)) => stderr.write_all(text.as_bytes()),
-        None => std::io::stderr().write_all(text.as_bytes()),
-    };
-}
-
-/// Ends the program on purpose.
-fn exit(code: u8) -> ! {
-    guard::done(code);
-    std::process::exit(code.into())
-}
-
-/// Ends the program, as done, if what was written to has no reader any more.
-fn quiet_if_closed<T, E: Into<anyhow::Error>>(written: Result<T, E>) -> Result<T> {
-    written.map_err(|error| {
-        let error = error.into();
-        let io = error.downcast_ref::<std::io::Error>();
-        if io.is_some_and(|io| io.kind() == ErrorKind::BrokenPipe) {
-            exit(0);
-        }
-        error
-    })
 }
 
 /// What `cargo run --release` does with the FMU that it has packed.

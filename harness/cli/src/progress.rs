@@ -4,6 +4,8 @@ use anyhow::Result;
 use experiments::progress::Progress;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::terminal;
+
 /// A bar for steps of one run.
 pub fn of_steps() -> Result<ProgressBar> {
     bar("{bar:40} {percent:>3} %  {elapsed} elapsed, {eta} left")
@@ -30,16 +32,20 @@ pub fn of_search() -> Result<ProgressBar> {
 pub fn tell(bar: &ProgressBar, line: &str) {
     // where no bar is drawn, indicatif would swallow the line
     if bar.is_hidden() {
-        eprintln!("{line}");
+        terminal::note(line);
     } else {
         bar.println(line);
         bar.set_message(line.to_string());
     }
 }
 
-/// Not drawn where stderr is no terminal.
+/// Not drawn where stderr is no terminal, nor with `--quiet`.
 fn bar(template: &str) -> Result<ProgressBar> {
     let bar = ProgressBar::new(0).with_style(ProgressStyle::with_template(template)?);
+    if terminal::is_quiet() {
+        bar.set_draw_target(indicatif::ProgressDrawTarget::hidden());
+        return Ok(bar);
+    }
     #[cfg(unix)]
     if let Some((_, stderr)) = host::guard::streams() {
         let terminal = console::Term::read_write_pair(stderr.try_clone()?, stderr.try_clone()?);
@@ -57,7 +63,7 @@ pub fn show(bar: &ProgressBar, news: Progress) {
         }
         Progress::Steps(steps) => bar.inc(steps),
         // where no bar is drawn, indicatif would swallow the line
-        Progress::Note(line) if bar.is_hidden() => eprintln!("{line}"),
+        Progress::Note(line) if bar.is_hidden() => terminal::note(line),
         Progress::Note(line) => bar.println(line),
     }
 }

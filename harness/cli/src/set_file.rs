@@ -65,8 +65,8 @@ fn from_json(text: &str) -> Result<Vec<(String, String)>> {
     let no = |key: &str| root.get(key).and_then(serde_json::Value::as_bool) == Some(false);
     // "described" is what versions until 0.2 wrote
     if no("fits") || no("described") || no("converged") {
-        eprintln!(
-            "warning: these parameters do not fit the recording that they are from; see its verdict"
+        crate::terminal::warn(
+            "these parameters do not fit the recording that they are from; see its verdict",
         );
     }
     let mut settings = Vec::new();

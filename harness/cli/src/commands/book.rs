@@ -19,8 +19,9 @@ pub struct BookArgs {
 impl BookArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
+        pack::needs_source("the book")?;
         let files = book::write(&pack::root(), &self.out)?;
-        println!("{} ({files} files)", self.out.join("index.html").display());
+        done!("{} ({files} files)", self.out.join("index.html").display());
         Ok(())
     }
 }

@@ -9,7 +9,7 @@ use host::fmi2::Fmu;
 use host::{budget, guard};
 
 use super::{DEFAULT_CAMPAIGN, DEFAULT_FMU, open, setting};
-use crate::progress;
+use crate::{progress, terminal};
 
 /// Simulates a plan's runs, or the sine sweeps of Rubaga's thesis at several fills and amplitudes,
 /// analyses them and reports.
@@ -40,7 +40,8 @@ pub struct CampaignArgs {
     /// How the frequency grows from 1.25 to 3.5 Hz in 2700 s.
     #[arg(long, value_enum, default_value = "exponential")]
     sweep: Sweep,
-    /// Sets a parameter or an input by its FMU name; enumerations by name or number.
+    /// Sets a parameter or an input by its FMU name: a number in SI or with a unit of the variable (50mm); enumerations by
+    /// name or number.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
     /// Relative tolerance of the FMU's solver [default: the FMU's own].
@@ -52,9 +53,9 @@ pub struct CampaignArgs {
     /// Runs at once [default: as many as the machine has cores].
     #[arg(long, value_name = "NUMBER", default_value_t = 0, hide_default_value = true)]
     jobs: usize,
-    /// The FMU.
-    #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
-    fmu: PathBuf,
+    /// The FMU: a file, or the name of one of this project.
+    #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
+    pub fmu: PathBuf,
     /// Directory for runs, tables and report.html [default: dist/campaign, with flags that change
     /// the campaign dist/campaign_ and these flags, with --plan dist/ and the plan's name].
     #[arg(long, value_name = "DIRECTORY")]
@@ -92,8 +93,9 @@ impl CampaignArgs {
         let named = self.out.is_some();
         let out = self.out.clone().unwrap_or(out);
         let compare = self.compare.clone();
-        let campaign = Campaign { plan, force: self.force, jobs: self.jobs, compare, out };
+        let mut campaign = Campaign { plan, force: self.force, jobs: self.jobs, compare, out };
         let fmu = open(&self.fmu)?;
+        campaign.plan.convert_units(fmu.description());
         if self.list {
             println!("{:#}", campaign.list(&fmu)?);
             return Ok(());
@@ -114,9 +116,9 @@ impl CampaignArgs {
                  elsewhere, --replace replaces tables and report (equal runs are reused)",
                 file.display()
             );
-            eprintln!(
+            terminal::note(format_args!(
                 "{out} held the campaign of another plan; its tables and report are replaced"
-            );
+            ));
         }
         drive(&fmu, &campaign, folder)
     }
@@ -189,16 +191,16 @@ pub fn drive(fmu: &Fmu, campaign: &Campaign, folder: Folder) -> Result<()> {
     files.push(("report.html", report::campaign::page(campaign, fmu, &results).into_bytes()));
     folder.publish(files)?;
     let (all, reused) = results.counts();
-    println!("{} runs simulated, {reused} reused", all - reused);
+    let recorded = results.recordings();
+    done!("{} runs simulated, {reused} reused", all - reused - recorded);
+    if recorded > 0 {
+        done!("{recorded} recordings read");
+    }
     let file = |name: &str| campaign.out.join(name);
     if results.unanalysed.is_empty() {
-        println!("features: {}", file("features.csv").display());
+        done!("features: {}", file("features.csv").display());
     }
-    println!(
-        "runs:     {}\nreport:   {}",
-        file("runs.csv").display(),
-        file("report.html").display()
-    );
+    done!("runs:     {}\nreport:   {}", file("runs.csv").display(), file("report.html").display());
     let beyond: Vec<&str> = results
         .outcomes
         .iter()
@@ -206,13 +208,13 @@ pub fn drive(fmu: &Fmu, campaign: &Campaign, folder: Folder) -> Result<()> {
         .map(|run| run.case.name.as_str())
         .collect();
     if let Some(first) = beyond.first() {
-        println!(
+        terminal::warn(format_args!(
             "{} of {all} runs left the range of their model, such as {first}; the report says how",
             beyond.len()
-        );
+        ));
     }
     for failure in &results.failures {
-        eprintln!("{} failed: {}", failure.case.name, failure.reason);
+        terminal::error(format_args!("{} failed: {}", failure.case.name, failure.reason));
     }
     if !results.failures.is_empty() {
         bail!("{} of the campaign's runs failed", results.failures.len());

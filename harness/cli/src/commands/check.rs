@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 use check::{Options, Severity, check, json, junit, process, table};
 use host::output;
 
-use crate::progress;
+use crate::{fmu, progress, terminal};
 
 /// Checks an FMU 2.0 against the standard and against what hosts ask for.
 ///
@@ -17,15 +17,15 @@ use crate::progress;
 #[command(after_help = "Examples:\n  hubslosh check dist/HubSlosh.fmu\n  \
     hubslosh check other.fmu --only zip,xml --junit check.xml\n  hubslosh check --rules")]
 pub struct CheckArgs {
-    /// The FMU.
+    /// The FMU: a file, or the name of one of this project.
     #[arg(value_name = "FMU", required_unless_present = "rules")]
     fmu: Option<PathBuf>,
     /// Writes the report as JUnit XML, one test case for each rule.
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
-    /// Writes the report as JSON, one object for each rule.
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    /// Writes the report as JSON, one object for each rule; after the FMU and without FILE: prints it.
+    #[arg(long, value_name = "FILE", num_args = 0..=1)]
+    json: Option<Option<PathBuf>>,
     /// Rules (zip.names) or groups of rules (zip) to look at [default: all].
     #[arg(long, value_name = "RULE,…", value_delimiter = ',')]
     only: Vec<String>,
@@ -51,10 +51,13 @@ impl CheckArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
         if self.rules {
-            print!("{}", table());
+            match self.json {
+                Some(_) => terminal::say_json(&check::rules())?,
+                None => print!("{}", table()),
+            }
             return Ok(());
         }
-        let fmu = self.fmu.as_ref().context("no FMU is given")?;
+        let fmu = &fmu::find(self.fmu.as_ref().context("no FMU is given")?)?;
         let limit = Duration::try_from_secs_f64(self.limit).ok().filter(|limit| !limit.is_zero());
         let limit =
             limit.with_context(|| format!("--limit {} (allowed: above 0 s)", self.limit))?;
@@ -66,12 +69,18 @@ impl CheckArgs {
             bar.inc(1);
         })?;
         bar.finish_and_clear();
-        print!("{}", report.text());
+        match &self.json {
+            Some(None) => json::write(&report, &mut terminal::stdout())?,
+            _ => print!("{}", report.text()),
+        }
         if let Some(path) = &self.junit {
             output::atomically(path, |file| junit::write(&report, file))?;
         }
-        if let Some(path) = &self.json {
+        if let Some(Some(path)) = &self.json {
             output::atomically(path, |file| json::write(&report, file))?;
+        }
+        if let warnings @ 1.. = report.count(Severity::Warning) {
+            terminal::warn(format_args!("{} draws {warnings} warnings", fmu.display()));
         }
         match report.count(Severity::Error) {
             0 => Ok(()),

@@ -8,14 +8,15 @@ use analysis::linear::{Linear, Mode};
 use anyhow::{Result, bail, ensure};
 use experiments::profile::Written;
 use host::budget;
-use host::fmi2::Fmu;
 use identify::design::{self, Multisine, Wheel};
 use identify::nominal;
 use identify::simulate::Setup;
 use identify::unknown::Unknown;
+use serde_json::json;
 use signals::table::{self, Table};
 
-use super::{DEFAULT_FMU, setting};
+use super::{DEFAULT_FMU, open, setting};
+use crate::terminal;
 
 /// Says beforehand what a planned experiment will tell about each parameter (Cramér–Rao bound).
 #[derive(clap::Args)]
@@ -51,9 +52,12 @@ pub struct DesignArgs {
     /// Delay, gyro bias and friction asymmetry are to be estimated as well.
     #[arg(long, alias = "flaws")]
     sensor_errors: bool,
-    /// The FMU.
-    #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
-    fmu: PathBuf,
+    /// The FMU: a file, or the name of one of this project.
+    #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
+    pub fmu: PathBuf,
+    /// Print what is found as JSON.
+    #[arg(long)]
+    json: bool,
     /// Where to put the torque, .csv or .parquet.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -70,7 +74,7 @@ impl DesignArgs {
         if let Some(out) = &self.out {
             table::check_ending(out)?;
         }
-        let fmu = Fmu::open(&self.fmu)?;
+        let fmu = open(&self.fmu)?;
         let mut instance = nominal::initialised(&fmu, &self.settings)?;
         let mut real = |name: &str| instance.real(name);
         let wheel = Wheel {
@@ -86,6 +90,7 @@ impl DesignArgs {
             let tau = time.iter().map(|&t| at(t)).collect();
             Ok((time, tau))
         };
+        let mut scaled_by = 1.0;
         let (time, torque) = match (&self.profile, self.multisine) {
             (Some(profile), _) => {
                 let torque = profile.parse::<Written>()?.torque()?;
@@ -108,7 +113,7 @@ impl DesignArgs {
                 let (time, tau) = sampled(self.duration, &|t| torque.at(t))?;
                 let factor = wheel.factor(&time, &tau);
                 if factor < 1.0 {
-                    println!("torques times {factor:.4}, within the wheel's limits");
+                    scaled_by = factor;
                     torque = torque.scaled(factor);
                 }
                 sampled(self.duration, &|t| torque.at(t))?
@@ -119,7 +124,10 @@ impl DesignArgs {
         let peak = analysis::statistics::peak(&torque);
         let rpm = std::f64::consts::TAU / 60.0;
         let [_, low, high] = wheel.speeds;
-        println!(
+        if scaled_by < 1.0 && !self.json {
+            println!("torques times {scaled_by:.4}, within the wheel's limits");
+        }
+        let shown = format!(
             "peak {peak:.3} N·m (the wheel gives {:.3}), wheel from {:.0} to {:.0} rpm (allowed {:.0} to {:.0})",
             wheel.torque,
             least / rpm,
@@ -153,15 +161,33 @@ impl DesignArgs {
             unknowns,
             noise,
         )?;
-        println!("{:20} {:>12} {:>12} {:>9}", "", "expected", "std", "std %");
-        for (name, value, deviation) in bounds {
-            let percent = 100.0 * deviation / value.abs();
-            println!("{name:20} {value:>12.6} {deviation:>12.2e} {percent:>9.4}");
+        if self.json {
+            let parameters = bounds.into_iter().map(|(name, value, std)| {
+                let unit = fmu
+                    .description()
+                    .variable(&name)
+                    .map(|v| fmu.description().unit(v).to_string());
+                (name, json!({ "value": value, "std": std, "unit": unit.ok() }))
+            });
+            terminal::say_json(&json!({
+                "peak": peak,
+                "torque_factor": scaled_by,
+                "wheel_speed": [least, largest],
+                "wheel_speed_allowed": [low, high],
+                "parameters": parameters.collect::<serde_json::Map<_, _>>(),
+            }))?;
+        } else {
+            println!("{shown}");
+            println!("{:20} {:>12} {:>12} {:>9}", "", "expected", "std", "std %");
+            for (name, value, deviation) in bounds {
+                let percent = 100.0 * deviation / value.abs();
+                println!("{name:20} {value:>12.6} {deviation:>12.2e} {percent:>9.4}");
+            }
         }
         if let Some(out) = &self.out {
             let names = ["time", "tau_cmd"].map(String::from).to_vec();
             Table::new(names, vec![time, torque]).write(out, &BTreeMap::new())?;
-            println!("{}", out.display());
+            done!("{}", out.display());
         }
         Ok(())
     }

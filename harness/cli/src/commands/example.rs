@@ -3,27 +3,31 @@
 use std::path::PathBuf;
 
 use anyhow::Result;
-use experiments::example;
-use host::fmi2::Fmu;
+use experiments::example::Example;
 
-use super::DEFAULT_FMU;
+use super::{DEFAULT_FMU, open};
 
-/// Writes the example that travels with the FMU (modelDescription/HubSlosh/extra): torque and
+/// Writes the example that travels with the FMU (modelDescription/NAME/extra): inputs and
 /// answer.
 #[derive(clap::Args)]
-#[command(after_help = "Example:\n  hubslosh pack && hubslosh example")]
+#[command(after_help = "Examples:\n  hubslosh pack && hubslosh example\n  \
+    hubslosh example --fmu Spacecraft")]
 pub struct ExampleArgs {
-    /// The FMU that answers.
-    #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
-    fmu: PathBuf,
+    /// The FMU that answers: a file, or the name of one of this project.
+    #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
+    pub fmu: PathBuf,
 }
 
 impl ExampleArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        let folder = pack::HUBSLOSH.folder().join(pack::HUBSLOSH.extra());
-        example::write(&Fmu::open(&self.fmu)?, &folder)?;
-        println!("wrote {}", folder.display());
+        pack::needs_source("the example")?;
+        let fmu = open(&self.fmu)?;
+        let example = Example::of(&fmu)?;
+        let model = pack::model(example.model)?;
+        let folder = model.folder().join(model.extra());
+        example.write(&fmu, &folder)?;
+        done!("wrote {}", folder.display());
         Ok(())
     }
 }

@@ -2,25 +2,45 @@
 
 use std::collections::BTreeMap;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use analysis::allan::Noise;
+use analysis::rest::Rest;
+use anyhow::{Result, ensure};
 use experiments::gyro::Recording;
-use host::fmi2::Fmu;
 use host::output;
+use signals::recording::{self, Between, Columns, Signal, Wanted};
+use signals::table::Table;
 
-use super::{DEFAULT_FMU, setting};
-use crate::progress;
+use super::{DEFAULT_FMU, open, setting};
+use crate::{progress, terminal};
 
 /// Where its files go.
 const DEFAULT_GYRO: &str = "dist/gyro";
 
 /// Records the gyro for hours at rest, estimates its noise from the Allan deviation and compares it
-/// with the specified noise. Leaves allan.csv and allan.svg.
+/// with the specified noise. Leaves allan.csv and allan.svg. With --recording the same of a real gyro at rest, and
+/// whether its noise is normal, white and steady: quantiles, autocorrelation, statistics of chunks.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh gyro\n  \
-    hubslosh gyro --set imu.arw=1e-4 --set imu.bias_time=300 --hours 12 --out dist/other_gyro")]
+    hubslosh gyro --set imu.arw=1e-4 --set imu.bias_time=300 --hours 12 --out dist/other_gyro\n  \
+    hubslosh gyro --recording rest.csv --columns time=t:ms,omega=gyro_z:deg/s --out dist/our_gyro")]
 pub struct GyroArgs {
+    /// A gyro's recording at rest: text in columns, .parquet or .mat.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["hours", "records", "settings", "fmu"])]
+    recording: Option<PathBuf>,
+    /// Which columns of the recording are time and omega, in what unit.
+    #[arg(
+        long,
+        value_name = "SIGNAL=COLUMN[:UNIT],…",
+        default_value_t,
+        hide_default_value = true,
+        requires = "recording"
+    )]
+    columns: Columns,
+    /// Length of the recording's chunks, s: the thesis's 15 min.
+    #[arg(long, value_name = "SECONDS", default_value_t = 900.0, requires = "recording")]
+    chunk: f64,
     /// Length of each record, h.
     #[arg(long, value_name = "HOURS", default_value_t = 6.0)]
     hours: f64,
@@ -30,22 +50,33 @@ pub struct GyroArgs {
     /// Sets a parameter by its FMU name.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
-    /// The FMU.
-    #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
-    fmu: PathBuf,
-    /// Directory for allan.csv and allan.svg.
+    /// The FMU: a file, or the name of one of this project.
+    #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
+    pub fmu: PathBuf,
+    /// Print what is found as JSON, of the FMU's gyro.
+    #[arg(long, conflicts_with = "recording")]
+    json: bool,
+    /// Directory for the tables and pictures.
     #[arg(long, value_name = "DIRECTORY", default_value = DEFAULT_GYRO)]
     out: PathBuf,
 }
 
 impl GyroArgs {
+    /// Whether it records the FMU's gyro.
+    pub fn needs_fmu(&self) -> bool {
+        self.recording.is_none()
+    }
+
     /// Runs the command.
     pub fn run(self) -> Result<()> {
+        if let Some(path) = &self.recording {
+            return self.look_at(path);
+        }
         let recording =
             Recording { settings: self.settings, hours: self.hours, records: self.records };
         let bar = progress::of_steps()?;
         let found =
-            recording.characterise(&Fmu::open(&self.fmu)?, &|news| progress::show(&bar, news))?;
+            recording.characterise(&open(&self.fmu)?, &|news| progress::show(&bar, news))?;
         bar.finish_and_clear();
         output::directory(&self.out)?;
         let [table, picture] = ["allan.csv", "allan.svg"].map(|name| self.out.join(name));
@@ -53,8 +84,127 @@ impl GyroArgs {
         output::atomically(&picture, |file| {
             Ok(file.write_all(report::gyro::allan_deviations(&found).as_bytes())?)
         })?;
-        print!("{}", found.text());
-        println!("{}\n{}", table.display(), picture.display());
+        match self.json {
+            true => terminal::say_json(&found.json())?,
+            false => print!("{}", found.text()),
+        }
+        done!("{}\n{}", table.display(), picture.display());
         Ok(())
     }
+}
+
+/// Longest lag of the autocorrelation, s, and the shortest record in chunks.
+const LAG: f64 = 10.0;
+const LEAST_CHUNKS: f64 = 3.0;
+
+impl GyroArgs {
+    /// Looks at a recording.
+    fn look_at(&self, path: &Path) -> Result<()> {
+        let signals = [Signal { name: "omega", required: true, between: Between::Line }];
+        let wanted = Wanted { signals: &signals, columns: &self.columns };
+        let mut say = |line: String| terminal::note(line);
+        let table = recording::read(path, &wanted, &mut say)?;
+        let (step, table) = recording::even(table, &mut say)?;
+        let omega = table.column("omega").unwrap_or_default();
+        let seconds = step * omega.len() as f64;
+        ensure!(
+            self.chunk > 0.0 && seconds > LEAST_CHUNKS * self.chunk && self.chunk > 10.0 * step,
+            "{}: it lasts {seconds:.0} s, in chunks of {} s (allowed: at least {LEAST_CHUNKS} chunks of at least 10 rows; \
+             --chunk SECONDS makes them shorter)",
+            path.display(),
+            self.chunk
+        );
+        ensure!(
+            omega.iter().any(|w| *w != omega[0]),
+            "{}: omega is constant, {} rad/s: the gyro is off, or coarser than its noise",
+            path.display(),
+            omega[0]
+        );
+        let rest = Rest::of(step, omega, self.chunk, LAG);
+        output::directory(&self.out)?;
+        for (name, table) in tables(&rest) {
+            table.write(&self.out.join(name), &BTreeMap::new())?;
+        }
+        for (name, picture) in report::gyro::rest(&rest) {
+            output::atomically(&self.out.join(name), |file| {
+                Ok(file.write_all(picture.as_bytes())?)
+            })?;
+        }
+        print!("{}", text(&rest));
+        done!("{}", self.out.display());
+        Ok(())
+    }
+}
+
+/// The tables of a recording at rest, each with its file's name.
+fn tables(rest: &Rest) -> [(&'static str, Table); 4] {
+    let table = |names: &[&str], columns: Vec<Vec<f64>>| {
+        Table::new(names.iter().map(|name| name.to_string()).collect(), columns)
+    };
+    let tau: Vec<f64> = rest.allan.iter().map(|point| point.tau).collect();
+    let deviation = rest.allan.iter().map(|point| point.variance.sqrt()).collect();
+    let mut allan = (vec!["tau_s", "deviation"], vec![tau.clone(), deviation]);
+    if let Some(noise) = &rest.noise {
+        allan.0.push("estimated");
+        allan.1.push(tau.iter().map(|tau| noise.variance(*tau).sqrt()).collect());
+    }
+    let (normal, reading) = rest.quantiles.iter().copied().unzip();
+    let lags = (0..rest.autocorrelation.len()).map(|k| k as f64 * rest.step).collect();
+    let chunks = [
+        rest.chunks.iter().map(|chunk| chunk.from).collect(),
+        rest.chunks.iter().map(|chunk| chunk.mean).collect(),
+        rest.chunks.iter().map(|chunk| chunk.variance).collect(),
+    ];
+    [
+        ("allan.csv", table(&allan.0, allan.1)),
+        ("quantiles.csv", table(&["normal", "reading"], vec![normal, reading])),
+        (
+            "autocorrelation.csv",
+            table(&["lag_s", "autocorrelation"], vec![lags, rest.autocorrelation.clone()]),
+        ),
+        ("chunks.csv", table(&["from_s", "mean", "variance"], chunks.to_vec())),
+    ]
+}
+
+/// What a recording at rest shows, as lines of text.
+fn text(rest: &Rest) -> String {
+    let hours = rest.count as f64 * rest.step / 3600.0;
+    let mut text = format!(
+        "{} samples in {hours:.2} h\n\
+         {:34}{:>12.4e} rad/s\n{:34}{:>12.4e} rad/s per hour\n{:34}{:>12.4e} rad/s\n",
+        rest.count,
+        "mean (bias)",
+        rest.mean,
+        "trend",
+        rest.trend * 3600.0,
+        "standard deviation without it",
+        rest.deviation
+    );
+    let mut line = |name: &str, value: String| text.push_str(&format!("{name:34}{value}\n"));
+    line("smallest change of a reading", format!("{:>12.4e} rad/s", rest.quantum));
+    if let Some(Noise { arw, bias_instability, bias_time }) = rest.noise {
+        line("angle random walk N", format!("{arw:>12.4e} rad/s/sqrt(Hz)"));
+        line(
+            "bias instability B",
+            format!("{bias_instability:>12.4e} rad/s, time {bias_time:.0} s"),
+        );
+    }
+    line(
+        "skewness, excess kurtosis",
+        format!("{:>12.3} {:.3} (normal: 0, 0)", rest.skewness, rest.kurtosis),
+    );
+    line(
+        "autocorrelation outside ±1.96/√n",
+        format!("{:>12.1} % of the lags up to {LAG} s (white: 5 %)", 100.0 * rest.outside()),
+    );
+    let [means, variances] = rest.scatter(rest.chunk_length());
+    line(
+        "scatter of the chunks",
+        format!(
+            "{means:>12.2} of the means, {variances:.2} of the variances, {} chunks of {:.0} s (white, steady: 1, 1)",
+            rest.chunks.len(),
+            rest.chunk_length() as f64 * rest.step
+        ),
+    );
+    text
 }

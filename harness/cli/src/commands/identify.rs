@@ -8,38 +8,44 @@ use host::output::atomically;
 use identify::estimate::Estimated;
 use identify::methods::acceleration::{self, Acceleration, Weights};
 use identify::methods::black_box::BlackBox;
+use identify::methods::free_decay::FreeDecay;
 use identify::methods::frequency::Frequency;
 use identify::methods::multisine::Multisine;
 use identify::methods::output_error::OutputError;
-use identify::methods::{Method, Task};
+use identify::methods::{Identified, Method, Task};
 use identify::news::News;
 use identify::nominal::Nominal;
 use identify::options::Options;
-use identify::recording::{self, Recording};
+use identify::recording::{self, Recording, Source};
 use identify::simulate::Intersample;
+use signals::recording::{Between, Columns};
 use std::collections::BTreeMap;
 use std::io::Write;
 
-use super::{DEFAULT_FMU, setting};
-use crate::progress;
+use super::{DEFAULT_FMU, open, setting};
+use crate::{progress, terminal};
 
 /// Finds the FMU's parameters from recordings of a bench, and how sure they are.
 ///
 /// Recordings have the columns time (s), tau_cmd (N·m) and omega (rad/s), and optionally theta (rad) of an
-/// encoder, g_axial (m/s²), wheel_speed, omega_x and omega_y (rad/s). Several are fitted together.
+/// encoder, g_axial (m/s²), wheel_speed, omega_x and omega_y (rad/s); --columns takes other names and units.
+/// Several are fitted together. A free decay has no torque.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh identify sweep.parquet --out result.json\n  \
     hubslosh identify up.csv down.csv --validate noise.csv --model linear,planar,spherical \\\n      \
     --set tank.d=0.163 --out result.json\n  \
     hubslosh identify empty.csv --method acceleration --weights run --out friction.json\n  \
-    hubslosh identify multisine.csv --method frequency --out poles.json")]
+    hubslosh identify multisine.csv --method frequency --out poles.json\n  \
+    hubslosh identify bench.mat --columns time=t,tau_cmd=T_cmd:mNm,omega=gyro_z:deg/s --out result.json\n  \
+    hubslosh identify decay.csv --method free-decay --columns wave_height=probe:mm --out decay.json")]
 pub struct IdentifyArgs {
-    /// Recordings, .csv or .parquet.
+    /// Recordings: text in columns (.csv, .txt, .tsv, .dat), .parquet or .mat.
     #[arg(value_name = "DATA", required = true)]
     data: Vec<PathBuf>,
     /// How: `output-error` fits all of the FMU's parameters in time; `acceleration` friction and inertia
     /// without a simulation, of a bench whose liquid does not move; `frequency` three poles and two zeros;
-    /// `multisine` tells noise from nonlinear distortion; `black-box` fits ARX and ARMAX.
+    /// `multisine` tells noise from nonlinear distortion; `black-box` fits ARX and ARMAX; `free-decay` takes records
+    /// without torque and finds frequency and damping, and how both depend on the amplitude.
     #[arg(long, value_name = "NAME", default_value = "output-error")]
     method: MethodName,
     /// Weights of the rows, of --method acceleration.
@@ -91,6 +97,13 @@ pub struct IdentifyArgs {
     /// smooth (band-limited, a sampled recording of a smooth torque). Else what fits best is taken.
     #[arg(long, value_name = "HOW", value_parser = ["linear", "held", "smooth"])]
     torque: Option<String>,
+    /// Which column of the recordings is which signal, in what unit: time, tau_cmd, omega, theta, g_axial,
+    /// wheel_speed, omega_x, omega_y; of a free decay wave_height, force, theta or omega.
+    #[arg(long, value_name = "SIGNAL=COLUMN[:UNIT],…", default_value_t, hide_default_value = true)]
+    columns: Columns,
+    /// The tank is empty: no liquid is assumed, the whole inertia is the hub's.
+    #[arg(long)]
+    empty: bool,
     /// Uses the rows between two times alone.
     #[arg(long, value_name = "S,S", value_delimiter = ',', allow_hyphen_values = true)]
     trim: Vec<f64>,
@@ -101,9 +114,12 @@ pub struct IdentifyArgs {
     /// refused.
     #[arg(long)]
     verbose: bool,
-    /// The FMU.
-    #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
-    fmu: PathBuf,
+    /// The FMU: a file, or the name of one of this project.
+    #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
+    pub fmu: PathBuf,
+    /// Print the result as JSON too, in place of tables and verdict.
+    #[arg(long)]
+    json: bool,
     /// Where to put the result, .json.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -120,6 +136,7 @@ enum MethodName {
     Frequency,
     Multisine,
     BlackBox,
+    FreeDecay,
 }
 
 /// Weights of the rows.
@@ -172,8 +189,25 @@ fn known(text: &str) -> Result<(String, f64, f64)> {
 }
 
 impl IdentifyArgs {
+    /// Whether the method simulates the FMU.
+    pub fn needs_fmu(&self) -> bool {
+        match self.method {
+            MethodName::OutputError => OutputError::NEEDS.fmu,
+            MethodName::Acceleration => Acceleration::NEEDS.fmu,
+            MethodName::Frequency => Frequency::NEEDS.fmu,
+            MethodName::Multisine => Multisine::NEEDS.fmu,
+            MethodName::BlackBox => BlackBox::NEEDS.fmu,
+            MethodName::FreeDecay => FreeDecay::NEEDS.fmu,
+        }
+    }
+
     /// Runs the command.
-    pub fn run(self) -> Result<()> {
+    pub fn run(mut self) -> Result<()> {
+        if self.empty {
+            // the least that the FMU takes: 2e-9 kg in the bench's tank
+            self.settings.push(("fluid.rho".into(), "1e-6".into()));
+            self.model = vec!["frozen".into()];
+        }
         let json = self.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
         ensure!(json, "{}: the name must end in .json", self.out.display());
         ensure!(
@@ -221,6 +255,7 @@ impl IdentifyArgs {
             }
             MethodName::Multisine => self.answer(Multisine { period: self.period }, trim),
             MethodName::BlackBox => self.answer(BlackBox, trim),
+            MethodName::FreeDecay => self.decay(trim),
         }
     }
 
@@ -248,7 +283,7 @@ impl IdentifyArgs {
         })
     }
 
-    /// Reads, identifies, writes and prints.
+    /// Reads and identifies.
     fn answer<M: Method>(&self, method: M, trim: Option<(f64, f64)>) -> Result<()> {
         ensure!(
             self.validate.is_empty() || M::NEEDS.validation,
@@ -258,22 +293,69 @@ impl IdentifyArgs {
             self.report.is_none() || M::HAS_PAGE,
             "--report is for --method output-error alone"
         );
-        let fmu = if M::NEEDS.fmu { Some(Fmu::open(&self.fmu)?) } else { None };
+        let fmu = if M::NEEDS.fmu { Some(open(&self.fmu)?) } else { None };
         let nominal = fmu.as_ref().map(|fmu| self.options().nominal(fmu)).transpose()?;
         let coarsest = nominal.as_ref().map_or(f64::INFINITY, Nominal::coarsest);
         let mut notes = Vec::new();
+        let source = self.source(trim);
         let mut read = |paths: &[PathBuf]| -> Result<Vec<Recording>> {
             let mut all = Vec::new();
             for path in paths {
-                all.extend(recording::read(path, trim, coarsest, &mut |line| {
-                    eprintln!("{line}");
+                all.extend(recording::read(path, &source, coarsest, &mut |line| {
+                    terminal::note(&line);
                     notes.push(line);
                 })?);
             }
             Ok(all)
         };
         let (recordings, validation) = (read(&self.data)?, read(&self.validate)?);
-        let task = Task { fmu: fmu.as_ref(), recordings: &recordings, validation: &validation };
+        self.find(method, fmu, &recordings, &validation, notes)
+    }
+
+    /// How the recordings are read.
+    fn source(&self, trim: Option<(f64, f64)>) -> Source {
+        let slow = match self.intersample() {
+            Some(Intersample::FirstOrderHold | Intersample::BandLimited) => Between::Line,
+            Some(Intersample::ZeroOrderHold) | None => Between::Held,
+        };
+        Source { columns: self.columns.clone(), slow, trim }
+    }
+
+    /// Reads free decays, which are of one signal, and identifies.
+    fn decay(&self, trim: Option<(f64, f64)>) -> Result<()> {
+        ensure!(
+            self.validate.is_empty() && self.report.is_none(),
+            "--validate and --report are not for --method free-decay"
+        );
+        let (source, mut notes) = (self.source(trim), Vec::new());
+        let (mut signals, mut recordings) = (Vec::new(), Vec::new());
+        for path in &self.data {
+            let (signal, recording) = recording::read_decay(path, &source, &mut |line| {
+                terminal::note(&line);
+                notes.push(line);
+            })?;
+            signals.push(signal);
+            recordings.push(recording);
+        }
+        let signal = signals[0];
+        ensure!(
+            signals.iter().all(|other| *other == signal),
+            "the recordings are of different signals: {}",
+            signals.join(", ")
+        );
+        self.find(FreeDecay { signal }, None, &recordings, &[], notes)
+    }
+
+    /// Identifies, writes and prints.
+    fn find<M: Method>(
+        &self,
+        method: M,
+        fmu: Option<Fmu>,
+        recordings: &[Recording],
+        validation: &[Recording],
+        notes: Vec<String>,
+    ) -> Result<()> {
+        let task = Task { fmu: fmu.as_ref(), recordings, validation };
         let spinner = progress::of_search()?;
         let found = method.identify(&task, &mut |news| match news {
             News::Detail(line) if !self.verbose => spinner.set_message(line.clone()),
@@ -284,18 +366,30 @@ impl IdentifyArgs {
         found.done.splice(0..0, notes);
         let text = found.json()?;
         atomically(&self.out, |file| Ok(file.write_all(text.as_bytes())?))?;
-        if !(found.parameters.is_empty() && found.measurement.is_empty()) {
-            estimates(&[&found.parameters, &found.measurement]);
+        if self.json {
+            print!("{text}");
+        } else {
+            self.tell::<M>(&found);
         }
-        for line in M::lines(&found).iter().chain(&found.verdict) {
-            println!("{line}");
+        if found.fits == Some(false) || !found.converged {
+            terminal::warn("the result is not to be trusted; its verdict says why");
         }
         if let (Some(path), Some(page)) = (&self.report, M::page(&found)) {
             atomically(path, |file| Ok(file.write_all(page.as_bytes())?))?;
-            println!("{}", path.display());
+            done!("{}", path.display());
         }
-        println!("{}", self.out.display());
+        done!("{}", self.out.display());
         Ok(())
+    }
+
+    /// Prints tables and verdict.
+    fn tell<M: Method>(&self, found: &Identified<M::Details>) {
+        if !(found.parameters.is_empty() && found.measurement.is_empty()) {
+            estimates(&[&found.parameters, &found.measurement]);
+        }
+        for line in M::lines(found).iter().chain(&found.verdict) {
+            println!("{line}");
+        }
     }
 }
 

@@ -7,6 +7,9 @@ use anyhow::{Context, Result};
 use host::fmi2::Fmu;
 use signals::table::{self, Table};
 
+use crate::terminal;
+
+pub mod analyse;
 pub mod book;
 pub mod campaign;
 pub mod check;
@@ -24,15 +27,19 @@ pub mod torque;
 pub mod variables;
 
 /// The FMU that commands drive unless another is named.
-pub const DEFAULT_FMU: &str = "dist/HubSlosh.fmu";
+pub const DEFAULT_FMU: &str = "HubSlosh";
 /// Where a campaign goes.
 pub const DEFAULT_CAMPAIGN: &str = "dist/campaign";
 
-/// Opens an FMU, and says what that has changed.
-pub fn open(path: &Path) -> Result<Fmu> {
-    let fmu = Fmu::open(path)?;
+/// Opens the FMU that `--fmu` names, and says what that has changed.
+pub fn open(name: &Path) -> Result<Fmu> {
+    let path = crate::fmu::find(name)?;
+    let fmu = Fmu::open(&path)?;
     for what in fmu.changed() {
-        eprintln!("warning: loading {} has changed this process's {what}", path.display());
+        terminal::warn(format_args!(
+            "loading {} has changed this process's {what}",
+            path.display()
+        ));
     }
     Ok(fmu)
 }
@@ -53,9 +60,9 @@ fn check_out(out: &Path) -> Result<()> {
 /// Writes a table and says where; to `-` it prints CSV.
 fn write_out(table: &Table, out: &Path, metadata: &BTreeMap<String, String>) -> Result<()> {
     if out == Path::new("-") {
-        return crate::quiet_if_closed(table.write_csv(crate::stdout()));
+        return terminal::quiet_if_closed(table.write_csv(terminal::stdout()));
     }
     table.write(out, metadata)?;
-    println!("{} rows in {}", table.rows(), out.display());
+    done!("{} rows in {}", table.rows(), out.display());
     Ok(())
 }

@@ -3,27 +3,41 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use pack::{Model, wheel};
+use pack::platforms::{self, PLATFORMS, Platform};
+use pack::{Model, sdist, wheel};
 
-/// Builds the binary of an FMU and packs it, or the Python package with all FMUs inside.
+/// Builds the binary of an FMU and packs it, or the Python package with all FMUs and this command inside.
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  hubslosh pack --out dist/HubSlosh.fmu\n  hubslosh pack --all-platforms\n  \
-                  hubslosh pack --python"
+                  hubslosh pack --model Spacecraft --tanks 1 --modes 1\n  \
+                  hubslosh pack --python\n  hubslosh pack --python --all-platforms\n  hubslosh pack --sdist"
 )]
 pub struct PackArgs {
     /// Which FMU.
     #[arg(long, value_name = "NAME", default_value = pack::HUBSLOSH.name, value_parser = pack::model)]
     model: &'static Model,
-    /// Pack the Python package instead, with all FMUs inside, as a wheel.
+    /// Pack the Python package instead, with all FMUs and the command hubslosh inside, as a wheel.
     #[arg(long, conflicts_with = "model")]
     python: bool,
-    /// Where to put the FMU or the wheel [default: dist/NAME.fmu,
-    /// dist/hubslosh-VERSION-py3-none-any.whl].
-    #[arg(long, value_name = "FILE")]
+    /// Wheels for these platforms alone, by their folders in an FMU; as --all-platforms otherwise.
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', requires = "python", conflicts_with = "all_platforms", value_parser = platforms::platform)]
+    platform: Vec<&'static Platform>,
+    /// Pack the source as an sdist instead, from which pip builds the Python package.
+    #[arg(long, conflicts_with_all = ["model", "python", "all_platforms"])]
+    sdist: bool,
+    /// Where to put the FMU; the folder for wheels and sdist [default: dist/NAME.fmu, dist].
+    #[arg(long, value_name = "FILE|FOLDER")]
     out: Option<PathBuf>,
-    /// For Linux, Windows and macOS instead of this machine's platform; on a Debian machine
-    /// harness/platforms/setup gets what that takes.
+    /// Of Spacecraft: a variant for this many tanks, 1 to 4, which has no variables of more. It is called Spacecraft_1x1
+    /// for one tank of one mode.
+    #[arg(long, value_name = "NUMBER", conflicts_with = "python")]
+    tanks: Option<usize>,
+    /// Of Spacecraft: a variant for this many slosh modes of each tank, 1 to 3.
+    #[arg(long, value_name = "NUMBER", conflicts_with = "python")]
+    modes: Option<usize>,
+    /// For Linux, Windows and macOS instead of this machine's platform: one FMU for all, one wheel for each;
+    /// on a Debian machine harness/platforms/setup gets what that takes.
     #[arg(long)]
     all_platforms: bool,
 }
@@ -31,20 +45,36 @@ pub struct PackArgs {
 impl PackArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        if self.python {
-            let out = self.out.unwrap_or_else(|| Path::new("dist").join(wheel::name()));
-            let platforms = wheel::write(&out, self.all_platforms)?;
-            println!("packed {}, FMUs for {}", out.display(), platforms.join(", "));
+        pack::needs_source("an FMU")?;
+        if self.python || self.sdist {
+            let folder = self.out.unwrap_or_else(|| "dist".into());
+            let packed = match self.sdist {
+                true => vec![sdist::write(&folder)?],
+                false if self.all_platforms => wheel::write_for(&PLATFORMS.each_ref(), &folder)?,
+                false if !self.platform.is_empty() => wheel::write_for(&self.platform, &folder)?,
+                false => vec![wheel::write(&folder)?],
+            };
+            for file in packed {
+                done!("packed {} ({} bytes)", file.display(), file.metadata()?.len());
+            }
             return Ok(());
         }
-        let out = self.out.unwrap_or_else(|| format!("dist/{}.fmu", self.model.name).into());
+        let variant;
+        let model = match (self.tanks, self.modes) {
+            (None, None) => self.model,
+            (tanks, modes) => {
+                variant = self.model.variant(tanks, modes)?;
+                &variant
+            }
+        };
+        let out = self.out.unwrap_or_else(|| format!("dist/{}.fmu", model.identifier()).into());
         if !self.all_platforms {
-            return native(self.model, &out);
+            return native(model, &out);
         }
-        for built in pack::pack_all(self.model, &out)? {
-            println!("{}: {}", built.folder, built.binary);
+        for built in pack::pack_all(model, &out)? {
+            done!("{}: {}", built.folder, built.binary);
         }
-        println!("packed {} ({} bytes)", out.display(), out.metadata()?.len());
+        done!("packed {} ({} bytes)", out.display(), out.metadata()?.len());
         Ok(())
     }
 }
@@ -52,6 +82,6 @@ impl PackArgs {
 /// Packs for this machine's platform.
 pub fn native(model: &Model, out: &Path) -> Result<()> {
     pack::pack(model, out)?;
-    println!("packed {}", out.display());
+    done!("packed {}", out.display());
     Ok(())
 }

@@ -13,14 +13,17 @@ use crate::progress;
 const DEFAULT_RELEASE: &str = "dist/release";
 
 /// Builds and checks the release for all platforms: each FMU, its hash, its software bill of
-/// materials (SBOM).
+/// materials (SBOM); the Python package's wheels, of which the hashes and that for Linux are kept.
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  hubslosh release\n\n\
     On a Debian machine harness/platforms/setup gets what building for all platforms needs.")]
 pub struct ReleaseArgs {
-    /// Which FMU; without it, every one.
+    /// Which FMU; without it, every one, and the wheels.
     #[arg(long, value_name = "NAME", value_parser = pack::model)]
     model: Option<&'static Model>,
+    /// Directory for all wheels.
+    #[arg(long, value_name = "DIRECTORY", default_value = "dist")]
+    wheels: PathBuf,
     /// Directory for the release's files.
     #[arg(long, value_name = "DIRECTORY", default_value = DEFAULT_RELEASE)]
     out: PathBuf,
@@ -29,10 +32,16 @@ pub struct ReleaseArgs {
 impl ReleaseArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
+        pack::needs_source("a release")?;
         let models = self.model.map_or(&pack::MODELS[..], std::slice::from_ref);
         for model in models {
             for path in release::write(model, &self.out, checked)? {
-                println!("{} ({} bytes)", path.display(), path.metadata()?.len());
+                done!("{} ({} bytes)", path.display(), path.metadata()?.len());
+            }
+        }
+        if self.model.is_none() {
+            for path in release::write_wheels(&self.wheels, &self.out)? {
+                done!("{} ({} bytes)", path.display(), path.metadata()?.len());
             }
         }
         Ok(())

@@ -11,7 +11,7 @@ use host::description::ModelDescription;
 use host::guard;
 
 use super::{DEFAULT_FMU, check_out, open, setting, write_out};
-use crate::{progress, set_file};
+use crate::{progress, set_file, terminal};
 
 /// Simulates one run: a torque history in, signals out.
 #[derive(clap::Args)]
@@ -36,7 +36,8 @@ pub struct RunArgs {
     /// the .json that `hubslosh identify` writes.
     #[arg(long, visible_alias = "set-file", value_name = "FILE")]
     parameters: Option<PathBuf>,
-    /// Sets a parameter or an input by its FMU name; enumerations by name or number.
+    /// Sets a parameter or an input by its FMU name: a number in SI or with a unit of the variable (50mm); enumerations by
+    /// name or number.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
     /// Communication step, s.
@@ -59,9 +60,9 @@ pub struct RunArgs {
     /// angles].
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     columns: Vec<String>,
-    /// The FMU.
-    #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
-    fmu: PathBuf,
+    /// The FMU: a file, or the name of one of this project.
+    #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
+    pub fmu: PathBuf,
     /// Where to put the signals, .csv or .parquet; - prints them as CSV.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
@@ -104,12 +105,12 @@ impl RunArgs {
         };
         let mut instance = run.initialise(&fmu)?;
         for warning in instance.take_warnings() {
-            eprintln!("warning: {warning}");
+            terminal::warn(warning);
         }
         let columns = match self.columns.is_empty() {
             // what is driven stands in the table anyway
             true => default_columns(description),
-            false => self.columns,
+            false => whole_names(self.columns),
         };
         let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
         if let Some(i) = (1..columns.len()).find(|i| columns[..*i].contains(&columns[*i])) {
@@ -126,6 +127,9 @@ impl RunArgs {
         bar.set_length(run.steps() as u64);
         let table = run.drive(&mut instance, &columns, |steps| bar.inc(steps))?;
         bar.finish_and_clear();
+        for warning in instance.take_warnings() {
+            terminal::warn(warning);
+        }
         let notes = BTreeMap::from([
             ("fmu".into(), fmu.hash().into()),
             ("guid".into(), fmu.description().guid.clone()),
@@ -136,7 +140,7 @@ impl RunArgs {
         let kept: Vec<&str> = table.names()[..driven + asked].iter().map(String::as_str).collect();
         write_out(&table.only(&kept), &self.out, &notes)?;
         if let Some(how) = beyond {
-            eprintln!("the run left the range of its model: {how}");
+            terminal::warn(format_args!("the run left the range of its model: {how}"));
         }
         Ok(())
     }
@@ -152,12 +156,25 @@ fn default_columns(description: &ModelDescription) -> Vec<String> {
     stored_columns(description, None).split_off(1) // without time
 }
 
+/// Names from what stands between commas: that in `inertia[1,2]` is part of the name.
+fn whole_names(parts: Vec<String>) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for part in parts {
+        match names.last_mut().filter(|name| name.matches('[').count() > name.matches(']').count())
+        {
+            Some(open) => *open = format!("{open},{part}"),
+            None => names.push(part),
+        }
+    }
+    names
+}
+
 fn help() -> String {
     format!(
         "Profiles, with their defaults (torque in N·m, frequencies in Hz, times in s):\n{}\n\
          Examples:\n  hubslosh run --profile exp-sweep:amplitude=0.1 --out sweep.parquet\n  \
          hubslosh run --profile sine:amplitude=0.05,frequency=2.344 --set friction.model=none \\\n      \
-         --set tank.h=0.05 --step 0.005 --columns theta,omega,slosh_angle --out dwell.csv\n  \
+         --set tank.h=50mm --step 0.005 --columns theta,omega,slosh_angle --out dwell.csv\n  \
          hubslosh run --input torque.csv --out answer.csv\n  \
          hubslosh run --parameters result.json --input bench.csv --ignore-columns --out twin.csv\n  \
          hubslosh run --profile zero --set init.slosh_angle=0.1 --out - | head",

@@ -5,6 +5,8 @@ use clap::Subcommand;
 use experiments::scaling::{self, Flight};
 use formulas::similarity::Liquid;
 
+use crate::terminal;
+
 /// Computes the flight tank that the bench represents (similarity): Bond numbers, Froude factors.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh scale thesis\n  \
@@ -12,6 +14,9 @@ use formulas::similarity::Liquid;
     hubslosh scale rotation --alpha 2.21 --flight-alpha 0.005\n  \
     hubslosh scale froude --lambda 25 --density-ratio 1.14")]
 pub struct ScaleArgs {
+    /// Print the numbers as JSON, SI.
+    #[arg(long, global = true)]
+    json: bool,
     #[command(subcommand)]
     what: Scale,
 }
@@ -88,8 +93,8 @@ enum Scale {
 impl ScaleArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        let text = match self.what {
-            Scale::Thesis => scaling::thesis_text(),
+        let found = match self.what {
+            Scale::Thesis => scaling::thesis_found(),
             Scale::Bond {
                 density,
                 tension,
@@ -108,17 +113,20 @@ impl ScaleArgs {
                 let flight = flight_radius
                     .map(Flight::Radius)
                     .or(flight_acceleration.map(Flight::Acceleration));
-                scaling::bond_text(bench, (acceleration, radius), liquid, flight)?
+                scaling::bond(bench, (acceleration, radius), liquid, flight)?
             }
             Scale::Rotation { density, tension, radius, arm, alpha, omega, flight_alpha } => {
                 let liquid = Liquid { density, tension };
-                scaling::rotation_text(liquid, (radius, arm), (alpha, omega), flight_alpha)?
+                scaling::rotation(liquid, (radius, arm), (alpha, omega), flight_alpha)?
             }
             Scale::Froude { lambda, density_ratio, gravity_ratio } => {
-                scaling::froude_text(lambda, density_ratio, gravity_ratio)?
+                scaling::froude(lambda, density_ratio, gravity_ratio)?
             }
         };
-        print!("{text}");
+        match self.json {
+            true => terminal::say_json(&found.json)?,
+            false => print!("{}", found.text),
+        }
         Ok(())
     }
 }

@@ -5,8 +5,10 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail, ensure};
 use host::output::atomically;
-use hubslosh_tank::parameters::{Liquid, ParameterSet, Target};
-use hubslosh_tank::{Fill, ModalData, Tank, picture, sweep, table};
+use hubslosh_tank::parameters::{Liquid, ParameterSet, Target, damping_of};
+use hubslosh_tank::{Fill, Problems, Tank, fill_table, picture, sweep, table};
+
+use crate::terminal;
 
 /// Modal parameters of a tank: from a drawing and a fill to slosh masses, pendulum lengths, hinge
 /// heights, the rigid liquid and the error of all of them.
@@ -19,6 +21,7 @@ use hubslosh_tank::{Fill, ModalData, Tank, picture, sweep, table};
     hubslosh tank tank.toml --fill 60% --modes 3 --out result.json --picture tank.svg\n  \
     hubslosh tank tank.toml --sweep 20%,40%,60%,80% --out sweep.csv --picture sweep.svg\n  \
     hubslosh tank tank.toml --fill 1.2 --modes 3 --nu 1e-6 --parameters tank-1.2.toml\n  \
+    hubslosh tank tank.toml --sweep 2%,98% --model SloshTank --nu 1e-6 --parameters draining.toml\n  \
     hubslosh tank tank.toml --fill 1.2 --gravity 0.001 --sigma 0.013 --contact-angle 5 --parameters coast.toml\n  \
     hubslosh run --set-file tank-1.2.toml --profile exp-sweep:amplitude=0.1 --out sweep.parquet\n\n\
     The format of TANK.toml is described in harness/tank/README.md.")]
@@ -33,7 +36,8 @@ pub struct TankArgs {
     /// In place of --fill: mass of the liquid, kg, at the tank's density.
     #[arg(long, value_name = "KG", conflicts_with = "fill")]
     fill_mass: Option<f64>,
-    /// Several fills, m or %: a table of them (CSV).
+    /// Several fills, m or %: a table of them (CSV). With --parameters the table of a tank that drains: of two fills
+    /// the ends, between which it places its points, otherwise the points themselves, at most 12.
     #[arg(long, value_name = "METRES|PERCENT%,…", value_delimiter = ',', conflicts_with_all = ["fill", "fill_mass"])]
     sweep: Vec<Fill>,
     /// How many lateral modes, 1 to 20.
@@ -43,6 +47,9 @@ pub struct TankArgs {
     /// capillarity (--sigma) brings the liquid back.
     #[arg(long, value_name = "NUMBER", default_value_t = 9.80665)]
     gravity: f64,
+    /// Print the result as JSON, that of --sweep too.
+    #[arg(long, conflicts_with = "out")]
+    json: bool,
     /// Where to put the result, JSON (of --sweep CSV).
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -51,7 +58,7 @@ pub struct TankArgs {
     picture: Option<PathBuf>,
     /// Where to put the parameters under the names of an FMU's variables, .toml (for `hubslosh run
     /// --set-file` and Python) or .ssv (SSP 1.0).
-    #[arg(long, value_name = "FILE", conflicts_with = "sweep")]
+    #[arg(long, value_name = "FILE")]
     parameters: Option<PathBuf>,
     /// The FMU that --parameters are for.
     #[arg(long, value_name = "MODEL", default_value = "HubSlosh", requires = "parameters")]
@@ -59,12 +66,13 @@ pub struct TankArgs {
     /// The tank of Spacecraft that --parameters are for, 1 to 4.
     #[arg(long, value_name = "NUMBER", default_value_t = 1, requires = "parameters")]
     tank_number: usize,
-    /// Kinematic viscosity of the liquid, m2/s, for the damping ratios of --parameters, at --gravity
-    /// [default: none, the ratios are 0].
-    #[arg(long, value_name = "NUMBER", requires = "parameters")]
+    /// Kinematic viscosity of the liquid, m2/s, for the damping ratios and between what they are to be expected, at
+    /// --gravity: in the table, in --out and in --parameters [default: none, the ratios are 0].
+    #[arg(long, value_name = "NUMBER", conflicts_with = "sweep")]
     nu: Option<f64>,
-    /// Surface tension, N/m, for the centring stiffness of --parameters [default: none].
-    #[arg(long, value_name = "NUMBER", requires = "parameters")]
+    /// Surface tension, N/m, for the centring stiffness of --parameters and the frequencies that damping follows
+    /// [default: none].
+    #[arg(long, value_name = "NUMBER", conflicts_with = "sweep")]
     sigma: Option<f64>,
     /// Contact angle between surface and wall, degrees: the centring stiffness of an upright cylinder's first mode is
     /// then that of the meniscus that --gravity and --sigma make. 90 is a flat surface.
@@ -113,45 +121,74 @@ impl TankArgs {
         }
         let read = || self.tank.display().to_string();
         let tank = Tank::read(&self.tank).with_context(read)?;
-        let mut parameters = None;
-        let (text, picture, as_table) = match self.fill.or(self.fill_mass.map(Fill::Mass)) {
+        let parameters;
+        let (text, json, picture, as_table) = match self.fill.or(self.fill_mass.map(Fill::Mass)) {
             Some(fill) => {
                 let fill = tank.height_of(fill).with_context(read)?;
-                let data = tank.solve(fill, self.modes).with_context(read)?;
-                parameters = self.set_file(&tank, &data)?;
+                let mut data = tank.solve(fill, self.modes).with_context(read)?;
+                if let Some(nu) = self.nu.filter(|_| !data.modes.is_empty()) {
+                    let liquid = self.liquid();
+                    data.damping = Some(damping_of(&tank, &data, nu, liquid).with_context(read)?);
+                }
+                parameters = self
+                    .set_file(|target, liquid| ParameterSet::new(&tank, &data, target, liquid))?;
                 let json = serde_json::to_string_pretty(&data)? + "\n";
                 let drawn = picture::tank(&tank, &data, self.gravity);
-                (json, drawn, table(&data, self.gravity))
+                (json.clone(), json, drawn, table(&data, self.gravity))
             }
             None => {
                 let fills: Result<Vec<f64>, _> =
                     self.sweep.iter().map(|fill| tank.height_of(*fill)).collect();
-                let swept = sweep::sweep(&tank, &fills.with_context(read)?, self.modes)
-                    .with_context(read)?;
+                let fills = fills.with_context(read)?;
+                let (swept, error) = match fills[..] {
+                    [low, high] if self.parameters.is_some() && low < high => {
+                        let placed = fill_table::place(&tank, low, high, self.modes);
+                        let placed = placed.with_context(read)?;
+                        (placed.sweep, Some(placed.error))
+                    }
+                    _ => (sweep::sweep(&tank, &fills, self.modes).with_context(read)?, None),
+                };
+                parameters = self.set_file(|target, liquid| {
+                    fill_table::parameters(&tank, &swept, error, target, liquid)
+                })?;
                 let csv = swept.to_csv();
-                (csv.clone(), picture::sweep(&tank, &swept, self.gravity), csv)
+                let json = serde_json::to_string_pretty(&swept.rows)? + "\n";
+                (csv.clone(), json, picture::sweep(&tank, &swept, self.gravity), csv)
             }
         };
         match &self.out {
             Some(out) => {
                 atomically(out, |file| Ok(file.write_all(text.as_bytes())?))?;
-                println!("{}", out.display());
+                done!("{}", out.display());
             }
+            None if self.json => print!("{json}"),
             None => print!("{as_table}"),
         }
         if let Some((path, text)) = &parameters {
             atomically(path, |file| Ok(file.write_all(text.as_bytes())?))?;
-            println!("{}", path.display());
+            done!("{}", path.display());
         }
         if let Some(path) = &self.picture {
             atomically(path, |file| Ok(file.write_all(picture.as_bytes())?))?;
-            println!("{}", path.display());
+            done!("{}", path.display());
         }
         Ok(())
     }
 
+    fn liquid(&self) -> Liquid {
+        Liquid {
+            gravity: self.gravity,
+            nu: self.nu,
+            sigma: self.sigma,
+            contact_angle: self.contact_angle,
+        }
+    }
+
     /// The file of --parameters and what stands in it.
-    fn set_file(&self, tank: &Tank, data: &ModalData) -> Result<Option<(PathBuf, String)>> {
+    fn set_file(
+        &self,
+        make: impl Fn(Target, Liquid) -> Result<ParameterSet, Problems>,
+    ) -> Result<Option<(PathBuf, String)>> {
         let Some(path) = &self.parameters else { return Ok(None) };
         ensure!(
             self.gravity == 0.0 || self.gravity >= 1e-9,
@@ -163,16 +200,9 @@ impl TankArgs {
             Model::SloshTank => Target::SloshTank,
             Model::Spacecraft => Target::Spacecraft { tank: self.tank_number },
         };
-        let liquid = Liquid {
-            gravity: self.gravity,
-            nu: self.nu,
-            sigma: self.sigma,
-            contact_angle: self.contact_angle,
-        };
-        let set = ParameterSet::new(tank, data, target, liquid)
-            .with_context(|| self.tank.display().to_string())?;
+        let set = make(target, self.liquid()).with_context(|| self.tank.display().to_string())?;
         for warning in &set.warnings {
-            eprintln!("warning: {warning}");
+            terminal::warn(warning);
         }
         ensure!(
             self.force || set.unknown.is_empty(),

@@ -8,6 +8,7 @@ use experiments::profile::{self, Written};
 use experiments::run::Run;
 
 use super::{check_out, write_out};
+use crate::terminal;
 
 /// Writes a profile's torque alone: time (s), tau_cmd (N·m), and tau_slope (N·m/s), which is the
 /// torque's derivative until the next row.
@@ -32,13 +33,19 @@ pub struct TorqueArgs {
     /// Lists the profiles as a Markdown table and writes nothing.
     #[arg(long)]
     profiles: bool,
+    /// Lists them as JSON.
+    #[arg(long, requires = "profiles")]
+    json: bool,
 }
 
 impl TorqueArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
         if self.profiles {
-            print!("{}", profile::table());
+            match self.json {
+                true => terminal::say_json(&profile::list())?,
+                false => print!("{}", profile::table()),
+            }
             return Ok(());
         }
         let (profile, out) = self.profile.zip(self.out).context("nothing to write")?;

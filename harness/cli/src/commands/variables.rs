@@ -5,8 +5,10 @@ use std::path::PathBuf;
 
 use anyhow::{Result, bail};
 use host::description::{ModelDescription, Variable};
+use serde_json::{Map, Value, json};
 
 use super::DEFAULT_FMU;
+use crate::{fmu, terminal};
 
 /// Lists an FMU's variables: name, causality, start, unit, range, meaning.
 #[derive(clap::Args)]
@@ -19,9 +21,13 @@ pub struct VariablesArgs {
     /// Only those of this causality: input, output, parameter, calculatedParameter, local.
     #[arg(long, value_name = "NAME")]
     causality: Option<String>,
-    /// The FMU.
-    #[arg(long, value_name = "FILE", default_value = DEFAULT_FMU)]
-    fmu: PathBuf,
+    /// Print them as JSON: an object each, with the units that a value may be given in (a number in them is factor ·
+    /// value + offset).
+    #[arg(long)]
+    json: bool,
+    /// The FMU: a file, or the name of one of this project.
+    #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
+    pub fmu: PathBuf,
 }
 
 /// Characters to which a column is filled; longer cells push the next ones to the right.
@@ -33,13 +39,18 @@ const ITEMS: usize = 50;
 impl VariablesArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        let description = &ModelDescription::of_packed(&self.fmu)?;
+        let fmu = fmu::find(&self.fmu)?;
+        let description = &ModelDescription::of_packed(&fmu)?;
         let filter = self.filter.unwrap_or_default().to_lowercase();
         let wanted = |v: &&Variable| {
             let named = v.name.to_lowercase().contains(&filter);
             (named || v.description.to_lowercase().contains(&filter))
                 && self.causality.as_ref().is_none_or(|causality| *causality == v.causality)
         };
+        if self.json && description.variables.iter().any(|v| wanted(&v)) {
+            let chosen = description.variables.iter().filter(wanted);
+            return terminal::say_json(&chosen.map(|v| object(description, v)).collect::<Vec<_>>());
+        }
         let rows: Vec<[String; 6]> =
             description.variables.iter().filter(wanted).map(|v| row(description, v)).collect();
         if rows.is_empty() {
@@ -52,7 +63,7 @@ impl VariablesArgs {
             let there: Vec<&str> = there.into_iter().collect();
             bail!(
                 "{} has no variable{asked} (causalities in it: {})",
-                self.fmu.display(),
+                fmu.display(),
                 there.join(", ")
             );
         }
@@ -69,6 +80,41 @@ impl VariablesArgs {
         }
         Ok(())
     }
+}
+
+/// All that the FMU says of a variable.
+fn object(description: &ModelDescription, variable: &Variable) -> Value {
+    let attributes = variable.attributes();
+    let own = description.unit(variable);
+    let own = (!own.is_empty()).then(|| (own.to_string(), json!({ "factor": 1.0, "offset": 0.0 })));
+    let shown = description
+        .display_units(variable)
+        .iter()
+        .map(|unit| (unit.name.clone(), json!({ "factor": unit.factor, "offset": unit.offset })));
+    // numbers as numbers: what is written in the FMU is exact
+    let value = |text: &Option<String>| {
+        let text = text.as_ref()?;
+        Some(match description.value(variable, text) {
+            Ok(host::description::Value::Real(number)) => json!(number),
+            Ok(host::description::Value::Integer(number)) => json!(number),
+            Ok(host::description::Value::Boolean(truth)) => json!(truth),
+            _ => json!(text),
+        })
+    };
+    let items =
+        description.items(variable).iter().map(|item| (item.name.clone(), item.value.into()));
+    json!({
+        "name": variable.name,
+        "type": format!("{:?}", variable.kind()),
+        "causality": variable.causality,
+        "variability": variable.variability,
+        "start": value(&attributes.start),
+        "min": value(&attributes.min),
+        "max": value(&attributes.max),
+        "units": own.into_iter().chain(shown).collect::<Map<_, _>>(),
+        "items": items.collect::<Map<String, Value>>(),
+        "meaning": variable.description,
+    })
 }
 
 /// Name, causality, start, unit, range (of an enumeration its items), meaning.

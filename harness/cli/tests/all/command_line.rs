@@ -496,3 +496,109 @@ fn exit_codes_tell_a_failure_from_a_wrong_command_line() {
         assert_eq!(hubslosh(Path::new("."), arguments).status.code(), Some(code), "{arguments:?}");
     }
 }
+
+#[test]
+fn a_number_with_its_unit_is_the_number_in_si() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let answer = |sets: [&str; 2]| {
+        let [a, b] = sets;
+        let done = short_run(directory, &["--profile", "sine", "--set", a, "--set", b]);
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        std::fs::read(directory.join("out.csv")).unwrap()
+    };
+    let in_si = answer(["tank.h=0.05", "init.slosh_angle=0.1"]);
+    assert_eq!(answer(["tank.h=50mm", "init.slosh_angle = 0.1 rad"]), in_si);
+    refuses(
+        directory,
+        || short_run(directory, &["--profile", "zero", "--set", "tank.h=2 in"]),
+        &["tank.h has no unit \"in\" (allowed: m, mm)"],
+    );
+}
+
+#[test]
+fn messages_are_coloured_when_asked_and_never_into_a_file_unasked() {
+    let run = |color: &str| {
+        let flags = [color, "variables", "--fmu", "none.fmu"];
+        String::from_utf8(hubslosh(Path::new("."), &flags).stderr).unwrap()
+    };
+    assert!(
+        run("--color=always").starts_with("\u{1b}[1m\u{1b}[31merror:\u{1b}[0m there is no FMU")
+    );
+    assert!(run("--color=auto").starts_with("error: there is no FMU"));
+    assert!(run("--color=never").starts_with("error: there is no FMU"));
+    // also what clap says of the command line itself
+    let wrong = hubslosh(Path::new("."), &["--color", "always", "nothing"]);
+    assert!(String::from_utf8(wrong.stderr).unwrap().contains("\u{1b}[31merror:"));
+}
+
+#[test]
+fn quiet_leaves_results_and_warnings_and_strict_makes_warnings_fail() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    let loud = short_run(directory, &["--profile", "zero"]);
+    assert_eq!(text(&loud.stdout), "11 rows in out.csv\n");
+    let quiet = short_run(directory, &["--profile", "zero", "--quiet", "--strict"]);
+    assert!(quiet.status.success() && quiet.stdout.is_empty() && quiet.stderr.is_empty());
+    // no stiffness: the FMU warns
+    let weightless = ["--profile", "zero", "--set", "g_axial=0", "--quiet"];
+    let warned = short_run(directory, &weightless);
+    assert!(warned.status.success() && text(&warned.stderr).starts_with("warning: "));
+    let strict = short_run(directory, &[&weightless[..], &["--strict"]].concat());
+    assert_eq!(strict.status.code(), Some(1));
+    let last = text(&strict.stderr).lines().last().map(String::from);
+    assert_eq!(last.as_deref(), Some("error: there was a warning, which --strict makes an error"));
+    let rows = hubslosh(directory, &["--quiet", "torque", "--profiles"]);
+    assert!(text(&rows.stdout).contains("exp-sweep"), "what is asked for is no notice");
+}
+
+#[test]
+fn everything_that_prints_a_table_prints_json_too() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let fmu = packed_for_tests().to_str().unwrap();
+    let json = |arguments: &[&str]| -> serde_json::Value {
+        let done = hubslosh(directory, arguments);
+        assert!(done.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&done.stderr));
+        serde_json::from_slice(&done.stdout).unwrap_or_else(|e| panic!("{arguments:?}: {e}"))
+    };
+    let tank = concat!(env!("CARGO_MANIFEST_DIR"), "/../tank/examples/capsule.toml");
+    let half = json(&["tank", tank, "--fill", "50%", "--modes", "1", "--json"]);
+    let rows = json(&["tank", tank, "--sweep", "40%,50%", "--modes", "1", "--json"]);
+    assert_eq!(rows[1]["modes"], half["modes"]);
+    let start = &json(&["variables", "tank.h", "--json", "--fmu", fmu])[0]["start"];
+    assert_eq!(start, &serde_json::json!(0.1));
+    let units = &json(&["variables", "tank.h", "--json", "--fmu", fmu])[0]["units"];
+    assert_eq!(units["mm"]["factor"], 1000.0);
+    let bond = &json(&["scale", "bond", "--json"])["bond"];
+    assert!((bond.as_f64().unwrap() - 902.2915).abs() < 1e-4, "{bond}");
+    assert_eq!(json(&["scale", "--json", "froude", "--lambda", "4"])["factors"]["time"], 2.0);
+    assert!(json(&["scale", "rotation", "--alpha", "2.21", "--json"])["Bo_r"]["bond"].is_f64());
+    assert!(json(&["scale", "thesis", "--json"])[0]["value"].is_f64());
+    assert_eq!(json(&["torque", "--profiles", "--json"])[0]["profile"], "exp-sweep");
+    assert_eq!(json(&["check", "--rules", "--json"])[0]["rule"], "zip.readable");
+    assert_eq!(json(&["check", fmu, "--only", "zip", "--json"])["errors"], 0);
+    let plan = ["design", "--fmu", fmu, "--profile", "sine:duration=20", "--json"];
+    assert_eq!(json(&plan)["parameters"]["hub.I"]["unit"], "kg.m2");
+    let gyro = ["gyro", "--fmu", fmu, "--hours", "0.9", "--records", "1", "--json", "--quiet"];
+    assert!(json(&gyro)["B, rad/s"]["specified"].is_f64());
+}
+
+#[test]
+fn an_installed_command_finds_the_fmus_that_came_with_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let place = |name: &str| directory.path().join(name);
+    let command = place("bin").join(if cfg!(windows) { "hubslosh.exe" } else { "hubslosh" });
+    for folder in ["bin", "elsewhere", "lib/python3.12/site-packages/hubslosh/fmus"] {
+        std::fs::create_dir_all(place(folder)).unwrap();
+    }
+    std::fs::copy(env!("CARGO_BIN_EXE_hubslosh"), &command).unwrap();
+    let fmu = place("lib/python3.12/site-packages/hubslosh/fmus/HubSlosh.fmu");
+    std::fs::copy(packed_for_tests(), fmu).unwrap();
+    let run = ["run", "--profile", "zero", "--stop", "0.1", "--out", "a.csv"];
+    let done = Command::new(&command).current_dir(place("elsewhere")).args(run).output().unwrap();
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    assert!(done.stderr.is_empty(), "nothing is built: {}", String::from_utf8_lossy(&done.stderr));
+    assert_eq!(files(&place("elsewhere")), ["a.csv"]);
+}

@@ -7,6 +7,7 @@ mod documents;
 mod folder;
 mod identify;
 mod plans;
+mod recordings;
 mod report;
 mod tank;
 mod words;

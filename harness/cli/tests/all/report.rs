@@ -126,18 +126,24 @@ fn one_linear_model_fits_ever_less_of_a_spherical_liquid() {
     assert!(coherence[0] > 0.5 && (0.15..0.35).contains(&coherence[4]), "{coherence:?}");
 }
 
-/// The verdict of the table's row that begins so: what the thesis says, and whether it agrees.
-fn agrees(page: &str, says: &str) -> bool {
-    let row = page.split("<tr>").find(|row| row.contains(&format!("</td><td>{says}")));
+/// Whether the `column`-th model does what the thesis says, in the table's row that begins so.
+fn agrees(page: &str, says: &str, column: usize) -> bool {
+    let row = page.split("<tr>").find(|row| row.starts_with(&format!("<td>{says}")));
     let row = row.unwrap_or_else(|| panic!("no row says {says}"));
-    assert_ne!(row.contains("class=\"yes\""), row.contains("class=\"no\""), "{row}");
-    row.contains("class=\"yes\"")
+    let cell = row.split("<td>").nth(2 + column).unwrap();
+    assert_ne!(cell.contains("class=\"yes\""), cell.contains("class=\"no\""), "{row}");
+    cell.contains("class=\"yes\"")
 }
 
 #[test]
 fn the_page_is_well_formed_and_has_every_figure() {
     let (page, ..) = &*TEN;
     well_formed(page);
+    // the result first, what is to be said about it later
+    let result = "From 150 mN·m on the liquid swirls and the resonance moves up to 3.10 Hz; below, the linear model holds within ";
+    let [result, warnings, figure] = [result, "class=\"warning\"", "id=\"figure-1\""]
+        .map(|words| page.find(words).unwrap_or_else(|| panic!("{words} is not in the page")));
+    assert!(result < warnings && warnings < figure);
     for words in [
         "Comparison with the thesis",
         "Sweeps &amp; &lt;models&gt;",
@@ -193,14 +199,18 @@ fn text_of(page: &str) -> String {
 #[test]
 fn what_the_thesis_says_is_judged_by_the_runs() {
     let (page, ..) = &*TEN;
-    assert!(agrees(page, "With growing torque resonance and antiresonance move apart"));
-    assert!(agrees(page, "Resonance and antiresonance hardly depend on the torque"));
+    let (linear, spherical) = (0, 1);
+    assert!(agrees(page, "With growing torque resonance and antiresonance move apart", spherical));
+    assert!(!agrees(page, "With growing torque resonance and antiresonance move apart", linear));
+    assert!(agrees(page, "Resonance and antiresonance hardly depend on the torque", linear));
     assert!(
-        !agrees(page, "At moderate and large torque the bench's resonance"),
+        !agrees(page, "At moderate and large torque the bench's resonance", spherical),
         "the branch is too long"
     );
-    assert!(!agrees(page, "The sweep is slow enough"));
-    assert!(agrees(page, "The synthetic data's resonance, whose liquid"));
+    assert!(!agrees(page, "The sweep is slow enough", linear));
+    assert!(agrees(page, "The synthetic data's resonance, whose liquid", linear));
+    // numbers are held to: 2.21 rad/s² measured, more than twice that here
+    assert!(!agrees(page, "The hub's largest acceleration at 0.25", spherical));
     // statements whose runs are not there (0.2 N·m) have no row
     assert!(!page.contains("Rotary slosh comes and goes"));
 
@@ -212,7 +222,7 @@ fn what_the_thesis_says_is_judged_by_the_runs() {
     let plan = plan.replace("[count]\nimu.seed = 1\n", "[vary]\nslosh.model = [\"linear\"]\n");
     let plan = format!("{plan}profile.amplitude = [0.0125, 0.05]\n");
     campaign(directory, &plan);
-    assert!(!agrees(&self::page(directory), "The synthetic data's resonance, whose liquid"));
+    assert!(!agrees(&self::page(directory), "The synthetic data's resonance, whose liquid", 0));
     // what is missing to 100 is the lag window of spa
     let fit = figure(&rows(directory, "features.csv"), "linear", "fit_freq_pct");
     assert!(fit.iter().all(|fit| *fit > 98.5), "{fit:?}: dry friction is all that does not fit");
@@ -228,6 +238,7 @@ fn draws_have_histograms_and_scatter() {
     campaign(directory, plan);
     let page = page(directory);
     well_formed(&page);
+    assert!(page.contains("<p class=\"result\">In 8 draws the antiresonance is "));
     for words in ["What decides", "Ranked sensitivities", "Distribution over the draws"] {
         assert!(page.contains(words), "{words}");
     }
@@ -320,8 +331,11 @@ fn along_a_profiles_number_the_axis_says_what_it_is() {
         "profile = \"bang-stop-bang:amplitude=0.1,start=1,bang=2,duration=30\"\n\
         [set]\nfriction.model = \"viscous\"\n[vary]\nprofile.stop = [6.5, 6.7]\n",
     );
-    let axes = axes(&page(directory));
+    let page = page(directory);
+    let axes = axes(&page);
     assert!(axes.iter().any(|axis| axis == "time between the pulses / s"), "{axes:?}");
+    let result = "<p class=\"result\">Largest rate that the manoeuvre leaves, over time between the pulses: ";
+    assert!(page.contains(result));
     assert!(!axes.iter().any(|axis| axis.starts_with("profile.")), "{axes:?}");
 }
 

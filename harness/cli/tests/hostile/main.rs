@@ -257,6 +257,15 @@ fn hostile_archives_and_descriptions_are_refused_by_every_command() {
 
 /// The FMU of hostile.c.
 fn harmful(harm: u32, when: &str) -> Vec<u8> {
+    packed(harm, when, xml(""))
+}
+
+/// One that does no harm, with another description.
+fn with_description(xml: Vec<u8>) -> Vec<u8> {
+    packed(0, "AT_STEP", xml)
+}
+
+fn packed(harm: u32, when: &str, xml: Vec<u8>) -> Vec<u8> {
     let directory = tempfile::tempdir().unwrap();
     let out = directory.path().join("model.so");
     let done = Command::new("cc")
@@ -269,7 +278,7 @@ fn harmful(harm: u32, when: &str) -> Vec<u8> {
         .expect("a C compiler is there");
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     let binary = format!("binaries/{PLATFORM}/model.so");
-    zipped(&vec![("modelDescription.xml", xml("")), (binary.as_str(), std::fs::read(out).unwrap())])
+    zipped(&vec![("modelDescription.xml", xml), (binary.as_str(), std::fs::read(out).unwrap())])
 }
 
 /// In the order of hostile.c.
@@ -376,4 +385,32 @@ fn a_value_that_is_never_returned_ends_a_run_as_a_step_does() {
     let run = ["run", "--call-limit", "0.5", "--profile", "zero", "--stop", "0.1"];
     let said = sandbox.fails(&[&run[..], &["--fmu", "a.fmu", "--out", "a.csv"]].concat());
     assert!(said.contains("has not returned within 0.5 s"), "{said}");
+}
+
+#[test]
+fn a_value_that_is_nan_and_a_run_without_values_are_failures() {
+    const NONE: u32 = 14;
+    let sandbox = Sandbox::new();
+    std::fs::write(sandbox.path("a.fmu"), harmful(NONE, "AT_GET")).unwrap();
+    let plan = "title = \"a\"\nprofile = \"zero:duration=1\"\n";
+    std::fs::write(sandbox.path("plan.toml"), plan).unwrap();
+    let run = ["run", "--profile", "zero", "--stop", "0.1", "--fmu", "a.fmu", "--out", "a.csv"];
+    let campaign = ["campaign", "--plan", "plan.toml", "--fmu", "a.fmu", "--out", "campaign"];
+    for command in [&run[..], &campaign[..]] {
+        let said = sandbox.fails(command);
+        assert!(said.contains("the FMU gives x = NaN at t = 0.06 s"), "{said}");
+    }
+    assert!(!sandbox.path("a.csv").exists());
+
+    let local = |text: String| text.replace("causality=\"output\"", "causality=\"local\"");
+    let silent = local(String::from_utf8(xml("")).unwrap());
+    let silent = silent.replace("<Outputs><Unknown index=\"1\" dependencies=\"2\"/></Outputs>", "");
+    std::fs::write(sandbox.path("b.fmu"), with_description(silent.into_bytes())).unwrap();
+    let nothing = "nothing would be recorded";
+    for command in [&run[..], &campaign[..]] {
+        let command: Vec<_> =
+            command.iter().map(|&a| if a == "a.fmu" { "b.fmu" } else { a }).collect();
+        let said = sandbox.fails(&command);
+        assert!(said.contains(nothing), "{said}");
+    }
 }

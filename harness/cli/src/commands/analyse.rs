@@ -1,0 +1,132 @@
+//! `hubslosh analyse`.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail, ensure};
+use experiments::campaign::{Campaign, recorded};
+use experiments::plan::{Plan, Recorded};
+use experiments::profile::{Torque, Written};
+use signals::recording::Columns;
+
+use super::{DEFAULT_FMU, campaign, open, setting};
+
+/// Analyses recordings of a bench as `campaign` does its runs, and the model's runs under the same torque beside them.
+///
+/// A recording has torque and one to three rates: time (s), tau_cmd (N·m), omega (rad/s), and perhaps omega_x and omega_y;
+/// --columns takes other names and units. It leaves the tables and the report of a campaign.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:\n  \
+    hubslosh analyse bench_050.csv bench_100.csv --columns time=t:ms,tau_cmd=T_cmd:mNm,omega=gyro_z:deg/s\n  \
+    hubslosh analyse up.mat --profile lin-sweep:f0=1,f1=4,duration=600 --set tank.h=0.08 --model spherical\n  \
+    hubslosh analyse --plan bench.toml\n\n\
+    In a plan a [[run]] with recording = \"FILE\" (and columns = \"…\") is read; it is simulated too.")]
+pub struct AnalyseArgs {
+    /// Recordings: text in columns (.csv, .txt, .tsv, .dat), .parquet or .mat.
+    #[arg(value_name = "RECORDING", required_unless_present = "plan")]
+    recordings: Vec<PathBuf>,
+    /// Which column of the recordings is which signal, in what unit.
+    #[arg(long, value_name = "SIGNAL=COLUMN[:UNIT],…", default_value_t, hide_default_value = true)]
+    columns: Columns,
+    /// The torque that was commanded; its amplitude is taken from the recording.
+    #[arg(long, value_name = "PROFILE", default_value = "exp-sweep:f0=1.25,f1=3.5,duration=2700")]
+    profile: String,
+    /// Slosh models to simulate beside the recordings.
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',', default_value = "linear,spherical")]
+    model: Vec<String>,
+    /// Sets what is known of the bench by its FMU name: tank.h, tank.d, hub.I, friction.b.
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
+    settings: Vec<(String, String)>,
+    /// A plan with recordings instead.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["recordings", "columns", "profile", "model", "settings"])]
+    plan: Option<String>,
+    /// Runs at once [default: as many as the machine has cores].
+    #[arg(long, value_name = "NUMBER", default_value_t = 0, hide_default_value = true)]
+    jobs: usize,
+    /// The FMU: a file, or the name of one of this project.
+    #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
+    pub fmu: PathBuf,
+    /// Directory for runs, tables and report.html [default: dist/ and the first recording's or the plan's name].
+    #[arg(long, value_name = "DIRECTORY")]
+    out: Option<PathBuf>,
+}
+
+impl AnalyseArgs {
+    /// Runs the command.
+    pub fn run(self) -> Result<()> {
+        let first =
+            self.plan.as_ref().map(Path::new).or(self.recordings.first().map(PathBuf::as_path));
+        let stem = first.and_then(Path::file_stem).context("no recording")?;
+        let out = self.out.clone().unwrap_or_else(|| Path::new("dist").join(stem));
+        let mut plan = match &self.plan {
+            Some(file) => Plan::read(file)?,
+            None => Plan::parse(&self.written()?)?,
+        };
+        let fmu = open(&self.fmu)?;
+        plan.convert_units(fmu.description());
+        let cases = plan.cases(fmu.description())?;
+        ensure!(
+            cases.iter().any(|case| case.recording.is_some()),
+            "no [[run]] of the plan has recording = \"FILE\"; hubslosh campaign --plan simulates it"
+        );
+        let campaign = Campaign { plan, force: false, jobs: self.jobs, compare: None, out };
+        let folder = campaign.take()?;
+        ensure!(
+            !campaign.holds_another() || self.out.is_some(),
+            "{} holds the results of another plan: --out DIRECTORY puts these elsewhere",
+            campaign.out.display()
+        );
+        campaign::drive(&fmu, &campaign, folder)
+    }
+
+    /// The plan of the command line: every recording as a run with its torque's amplitude, simulated with every model.
+    fn written(&self) -> Result<String> {
+        let profile: Written = self.profile.parse()?;
+        if let Torque::Rows { .. } = profile.torque()? {
+            bail!(
+                "--profile {}: it must be a sweep or a noise, which have a frequency response",
+                self.profile
+            )
+        }
+        let text = |value: &str| toml::Value::from(value).to_string();
+        let mut plan = format!("title = \"Recordings\"\nprofile = {}\n", text(&self.profile));
+        let (mut runs, mut step) = (String::new(), None);
+        for path in &self.recordings {
+            let recorded = Recorded { path: path.clone(), columns: self.columns.clone() };
+            // what is done to it is told when it is analysed
+            let (each, table) = recorded::read(&recorded, &mut |_| {})?;
+            step.get_or_insert(each);
+            let torque = table.column("tau_cmd").unwrap_or_default();
+            let amplitude = torque.iter().fold(0.0, |most: f64, tau| most.max(tau.abs()));
+            ensure!(amplitude > 0.0, "{}: tau_cmd is 0 N·m all along", path.display());
+            runs.push_str("[[run]]\n");
+            runs.push_str(&format!("recording = {}\n", text(&path.display().to_string())));
+            let columns = self.columns.to_string();
+            if !columns.is_empty() {
+                runs.push_str(&format!("columns = {}\n", text(&columns)));
+            }
+            // to four digits: what a command was meant to be
+            let digits = 10f64.powi(3 - amplitude.log10().floor() as i32);
+            runs.push_str(&format!(
+                "profile.amplitude = {}\n",
+                (amplitude * digits).round() / digits
+            ));
+        }
+        let step = step.map_or(0.02, |step| (step * 1e9).round() / 1e9);
+        plan.push_str(&format!("step = {step:?}\n"));
+        if !self.settings.is_empty() {
+            plan.push_str("[set]\n");
+            for (name, value) in &self.settings {
+                let value = if value.parse::<f64>().is_ok() || value.parse::<bool>().is_ok() {
+                    value.clone()
+                } else {
+                    text(value)
+                };
+                plan.push_str(&format!("{name} = {value}\n"));
+            }
+        }
+        plan.push_str(&runs);
+        let models: Vec<String> = self.model.iter().map(|model| text(model)).collect();
+        plan.push_str(&format!("[vary]\nslosh.model = [{}]\n", models.join(", ")));
+        Ok(plan)
+    }
+}

@@ -1,0 +1,78 @@
+//! Which file `--fmu` means: one that is named, or the FMU of this project with that name.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail, ensure};
+
+/// Where the project's FMUs lie below the folder of the command's own: beside it, in its data folder,
+/// in the Python package that it came with.
+const INSTALLED: [&str; 5] =
+    [".", "fmus", "../share/hubslosh", "../hubslosh/fmus", "../Lib/site-packages/hubslosh/fmus"];
+
+/// The file of an FMU: `name` is a file, or the name of one of this project's FMUs. That is looked for in
+/// `dist`, where `hubslosh pack` puts it, then where this command is installed, then in `dist` of the source that
+/// the command was built from, where it is packed if need be.
+///
+/// # Errors
+/// If there is none; the error says what to do.
+pub fn find(name: &Path) -> Result<PathBuf> {
+    let models = || pack::MODELS.iter().map(|model| model.name);
+    let known = models().find(|model| name == Path::new(model));
+    let Some(known) = known else {
+        let all: Vec<_> = models().collect();
+        ensure!(
+            name.is_file(),
+            "there is no FMU at {} (allowed: a file, or one of this project by its name: {})",
+            name.display(),
+            all.join(", ")
+        );
+        return Ok(name.into());
+    };
+    let file = format!("{known}.fmu");
+    let packed = Path::new("dist").join(&file);
+    if packed.is_file() {
+        return Ok(packed);
+    }
+    if let Some(installed) = installed(&file) {
+        return Ok(installed);
+    }
+    if !pack::has_source() {
+        let places: Vec<_> = folders().iter().map(|place| place.display().to_string()).collect();
+        bail!(
+            "{file} was not found in dist, nor where this command is installed ({}), and there is no source to \
+             build it from: put it there, or name it by --fmu FILE; releases and the Python package have it",
+            places.join(", ")
+        );
+    }
+    let packed = pack::root().join("dist").join(&file);
+    if !packed.is_file() {
+        super::terminal::note(format_args!("building {}", packed.display()));
+        pack::pack(pack::model(known)?, &packed)
+            .with_context(|| format!("there is no {file} yet, and it cannot be built"))?;
+    }
+    Ok(packed)
+}
+
+/// The FMU that came with this command.
+pub fn installed(file: &str) -> Option<PathBuf> {
+    folders().into_iter().map(|folder| folder.join(file)).find(|path| path.is_file())
+}
+
+/// The folders that [`INSTALLED`] means.
+fn folders() -> Vec<PathBuf> {
+    let command = std::env::current_exe().and_then(|path| path.canonicalize());
+    let Some(own) = command.ok().and_then(|path| path.parent().map(Path::to_path_buf)) else {
+        return Vec::new();
+    };
+    // lib/python3.12/site-packages on Linux and macOS
+    let versions = std::fs::read_dir(own.join("../lib")).into_iter().flatten().flatten();
+    let mut pythons: Vec<_> = versions
+        .map(|entry| entry.path())
+        .filter(|path| path.to_string_lossy().contains("python3"))
+        .map(|python| python.join("site-packages/hubslosh/fmus"))
+        .collect();
+    pythons.sort();
+    let all = INSTALLED.iter().map(|place| own.join(place)).chain(pythons);
+    // as the reader would write it, where it is there
+    all.filter(|place| place.is_dir()).map(|place| place.canonicalize().unwrap_or(place)).collect()
+}

@@ -1,0 +1,161 @@
+//! What the command says: results on stdout, all else on stderr.
+
+use std::io::{ErrorKind, Write};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use anstream::AutoStream;
+use anyhow::Result;
+use clap::ColorChoice;
+use clap::builder::styling::{AnsiColor, Effects, Style, Styles};
+use host::guard;
+
+/// How the command says it.
+#[derive(Clone, Copy, Default, clap::Args)]
+#[group(skip)]
+pub struct Terminal {
+    /// Print results, warnings and errors alone: no progress, and no lines about what was written.
+    #[arg(long, short, global = true)]
+    quiet: bool,
+    /// Exit with 1 if there was a warning.
+    #[arg(long, global = true)]
+    strict: bool,
+    /// Whether messages are coloured; `auto`: on a terminal, unless NO_COLOR is set.
+    #[arg(long, global = true, value_name = "WHEN", default_value = "auto")]
+    color: ColorChoice,
+}
+
+static TERMINAL: OnceLock<Terminal> = OnceLock::new();
+static WARNINGS: AtomicUsize = AtomicUsize::new(0);
+
+impl Terminal {
+    /// From now on.
+    pub fn set(self) {
+        TERMINAL.get_or_init(|| self);
+    }
+}
+
+fn terminal() -> Terminal {
+    TERMINAL.get().copied().unwrap_or_default()
+}
+
+/// Whether only results, warnings and errors are wanted.
+pub fn is_quiet() -> bool {
+    terminal().quiet
+}
+
+/// The choice of `--color` before the command line is understood, for what is said of it then.
+pub fn color_of_arguments() -> ColorChoice {
+    let arguments: Vec<_> = std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect();
+    let flags = arguments.iter().take_while(|argument| *argument != "--");
+    let value =
+        flags.enumerate().find_map(|(i, argument)| match argument.strip_prefix("--color")? {
+            "" => arguments.get(i + 1).map(String::as_str),
+            value => value.strip_prefix('='),
+        });
+    value.and_then(|value| value.parse().ok()).unwrap_or_default()
+}
+
+/// What has gone wrong, as clap says it.
+pub fn error(text: impl std::fmt::Display) {
+    complain(format!("{} {text}\n", styled("error:", *Styles::styled().get_error())));
+}
+
+/// What the reader should know of a result; with `--strict` it is an error in the end.
+pub fn warn(text: impl std::fmt::Display) {
+    WARNINGS.fetch_add(1, Ordering::Relaxed);
+    let style = AnsiColor::Yellow.on_default().effects(Effects::BOLD);
+    complain(format!("{} {text}\n", styled("warning:", style)));
+}
+
+/// What was done or is going on; not with `--quiet`.
+pub fn note(text: impl std::fmt::Display) {
+    if !is_quiet() {
+        complain(format!("{text}\n"));
+    }
+}
+
+/// The exit code of a command that has done its work.
+pub fn code() -> u8 {
+    match WARNINGS.load(Ordering::Relaxed) {
+        0 => 0,
+        _ if !terminal().strict => 0,
+        1 => fails("there was a warning, which --strict makes an error"),
+        n => fails(&format!("there were {n} warnings, which --strict makes an error")),
+    }
+}
+
+fn fails(why: &str) -> u8 {
+    error(why);
+    1
+}
+
+fn styled(word: &str, style: Style) -> String {
+    if choice() != anstream::ColorChoice::Never {
+        format!("{style}{word}{style:#}")
+    } else {
+        word.into()
+    }
+}
+
+/// Whether messages are coloured on stderr, the one behind a guard's pipes.
+fn choice() -> anstream::ColorChoice {
+    let auto = || match guard::streams() {
+        Some((_, stderr)) => AutoStream::choice(stderr),
+        None => AutoStream::choice(&std::io::stderr()),
+    };
+    match terminal().color {
+        ColorChoice::Always => anstream::ColorChoice::Always,
+        ColorChoice::Never => anstream::ColorChoice::Never,
+        ColorChoice::Auto => auto(),
+    }
+}
+
+/// Prints a text to stdout.
+pub fn say(text: String) {
+    if let Err(error) = quiet_if_closed(stdout().write_all(text.as_bytes())) {
+        self::error(format_args!("could not write to stdout: {error}"));
+        exit(1);
+    }
+}
+
+/// Prints a value as JSON.
+pub fn say_json(value: &impl serde::Serialize) -> Result<()> {
+    say(serde_json::to_string_pretty(value)? + "\n");
+    Ok(())
+}
+
+/// stdout, out of the reach of a guarded FMU.
+pub fn stdout() -> Box<dyn Write> {
+    match guard::streams() {
+        Some((stdout, _)) => Box::new(stdout),
+        None => Box::new(std::io::stdout().lock()),
+    }
+}
+
+/// Prints a text to stderr, the standard library's or that which a guarded FMU does not know.
+fn complain(text: String) {
+    // who has closed it does not want to know
+    let _ = match guard::streams() {
+        Some((_, mut stderr)) => stderr.write_all(text.as_bytes()),
+        None => AutoStream::new(std::io::stderr(), choice()).write_all(text.as_bytes()),
+    };
+}
+
+/// Ends the program on purpose.
+fn exit(code: u8) -> ! {
+    guard::done(code);
+    std::process::exit(code.into())
+}
+
+/// Ends the program, as done, if what was written to has no reader any more.
+pub fn quiet_if_closed<T, E: Into<anyhow::Error>>(written: Result<T, E>) -> Result<T> {
+    written.map_err(|error| {
+        let error = error.into();
+        let io = error.downcast_ref::<std::io::Error>();
+        if io.is_some_and(|io| io.kind() == ErrorKind::BrokenPipe) {
+            exit(0);
+        }
+        error
+    })
+}

@@ -1,0 +1,278 @@
+//! Recordings through the program: a twin shows what the run shows that it was made from, in whatever form it is written;
+//! a gyro at rest; a free decay; an empty tank.
+
+use std::collections::{BTreeMap, HashMap};
+use std::fmt::Write as _;
+use std::path::Path;
+use std::process::Command;
+
+use analysis::random::Random;
+use pack::packed_for_tests;
+use signals::table::Table;
+
+fn hubslosh(folder: &Path, arguments: &[&str]) -> Result<String, String> {
+    let done = Command::new(env!("CARGO_BIN_EXE_hubslosh"))
+        .current_dir(folder)
+        .args(arguments)
+        .output()
+        .expect("the program runs");
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    if done.status.success() {
+        Ok(text(&done.stdout) + &text(&done.stderr))
+    } else {
+        Err(text(&done.stderr))
+    }
+}
+
+/// Rows of a table as name → text.
+fn rows(path: &Path) -> Vec<HashMap<String, String>> {
+    let mut reader = csv::Reader::from_path(path).unwrap();
+    reader.deserialize().map(|row| row.unwrap()).collect()
+}
+
+/// Columns of a table of features in which a recording and the run it was made from must be the same.
+const SAME: [&str; 22] = [
+    "fill_m",
+    "amplitude_nm",
+    "f_res_hz",
+    "f_dip_hz",
+    "delta_f_hz",
+    "notch_db",
+    "fit_freq_pct",
+    "fit_time_pct",
+    "coherence",
+    "snr_res_db",
+    "snr_dip_db",
+    "skewness",
+    "kurtosis",
+    "zero_hz",
+    "zero_damping",
+    "pole_hz",
+    "pole_damping",
+    "estimator",
+    "f_res_std_hz",
+    "f_dip_std_hz",
+    "peak_rate_rad_s",
+    "peak_acceleration_rad_s2",
+];
+
+#[test]
+fn a_twin_shows_the_features_of_its_run_to_the_last_digit_and_other_forms_of_it_the_same() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let fmu = packed_for_tests();
+    let fmu = fmu.to_str().unwrap();
+    // a sixth of the thesis's sweep: a second each
+    let profile = "exp-sweep:f0=1.25,f1=3.5,duration=450";
+    let plan = format!(
+        "profile = \"{profile},amplitude=0.1\"\n[set]\nimu.enabled = true\nimu.seed = 3\n[vary]\nslosh.model = [\"linear\"]\n"
+    );
+    std::fs::write(directory.join("run.toml"), plan).unwrap();
+    hubslosh(directory, &["campaign", "--plan", "run.toml", "--out", "run", "--fmu", fmu]).unwrap();
+    let run =
+        std::fs::read_dir(directory.join("run/runs")).unwrap().next().unwrap().unwrap().path();
+    let run = Table::read(&run, &["time", "tau_cmd", "omega_imu"]).unwrap();
+    let [time, torque, rate] =
+        ["time", "tau_cmd", "omega_imu"].map(|name| run.column(name).unwrap().to_vec());
+
+    // a hub that tilts with a tenth and a fifth of its rate
+    let names = ["time", "tau_cmd", "omega", "omega_x", "omega_y"].map(String::from).to_vec();
+    let part = |factor: f64| rate.iter().map(|w| factor * w).collect::<Vec<f64>>();
+    let twin =
+        Table::new(names, vec![time.clone(), torque.clone(), rate.clone(), part(0.1), part(-0.2)]);
+    twin.write(&directory.join("twin.csv"), &BTreeMap::new()).unwrap();
+    let settings =
+        ["--set", "imu.enabled=true", "--set", "imu.seed=3", "--model", "linear", "--fmu", fmu];
+    let analyse = |name: &str, others: &[&str]| {
+        let all =
+            [&["analyse", name, "--out", "found", "--profile", profile], &settings[..], others]
+                .concat();
+        let said = hubslosh(directory, &all).unwrap();
+        (rows(&directory.join("found/features.csv")), said)
+    };
+    let (found, _) = analyse("twin.csv", &[]);
+    let [recording, model] = &found[..] else { panic!("{found:?}") };
+    assert_eq!((recording["model"].as_str(), model["model"].as_str()), ("recording", "linear"));
+    for table in ["features.csv", "features_spa.csv", "features_h1.csv"] {
+        let [of, from] = ["found", "run"].map(|folder| rows(&directory.join(folder).join(table)));
+        for name in SAME {
+            assert_eq!(of[0][name], from[0][name], "{table}: {name}");
+            // and the model beside it is the run once more
+            assert_eq!(of[1][name], from[0][name], "{table}: {name} of the model");
+        }
+    }
+    // CEF of rates in proportion: (0.01 + 0.04)/1.05; leakage √0.05
+    let number = |row: &HashMap<String, String>, name: &str| row[name].parse::<f64>().unwrap();
+    assert!((number(recording, "off_axis_median") - 0.05 / 1.05).abs() < 1e-12);
+    assert!((number(recording, "leakage") - 0.05f64.sqrt()).abs() < 1e-9);
+    assert!(
+        ["stuck_s", "peak_slosh_angle_deg", "regime", "swirl"]
+            .iter()
+            .all(|name| recording[*name].is_empty())
+    );
+    let page = std::fs::read_to_string(directory.join("found/report.html")).unwrap();
+    for words in [
+        "The models beside the recordings",
+        "Models overlaid",
+        ">recording<",
+        "1 recording, beside 1 run",
+    ] {
+        assert!(page.contains(words), "{words}");
+    }
+
+    // as a logger writes it: semicolons, decimal commas, milliseconds, degrees, a lead-in of 5 s, rows lost
+    let mut random = Random::new(4, 0);
+    let mut text = String::from("# bench\nt;T_cmd;gyro z\nms;mNm;deg/s\n");
+    for k in -250..time.len() as i64 {
+        let at = usize::try_from(k).ok();
+        if random.uniform() < 0.002 && at.is_some() {
+            continue;
+        }
+        let value = |column: &[f64]| at.map_or(0.0, |k| column[k]);
+        let torque = 1e3 * value(&torque);
+        let rate = value(&rate).to_degrees();
+        let _ = writeln!(text, "{};{torque};{rate}", 7000 + 20 * k);
+    }
+    std::fs::write(directory.join("logger.csv"), text.replace('.', ",")).unwrap();
+    let columns = ["--columns", "time=t,tau_cmd=T_cmd,omega=gyro z"];
+    let (found, said) = analyse("logger.csv", &columns);
+    assert!(said.contains("the torque begins at 7.00 s of it"), "{said}");
+    // a row in 500 on a line between its neighbours: of a 2.4 Hz sine at 50 Hz, 4.5 % of its size too little
+    for (name, most) in
+        [("f_res_hz", 2e-4), ("f_dip_hz", 2e-4), ("notch_db", 0.3), ("fit_time_pct", 0.5)]
+    {
+        let off = number(&found[0], name) - number(recording, name);
+        assert!(off.abs() < most, "{name}: {off}");
+    }
+
+    // another torque is refused, and so is a plan without recordings
+    let wrong = [
+        "analyse",
+        "twin.csv",
+        "--fmu",
+        fmu,
+        "--profile",
+        "lin-sweep:duration=450",
+        "--out",
+        "wrong",
+    ];
+    let error = hubslosh(directory, &wrong).unwrap_err();
+    assert!(
+        error.contains("its torque is not lin-sweep") && error.contains("allowed: at least 0.9"),
+        "{error}"
+    );
+    let error = hubslosh(directory, &["analyse", "--plan", "run.toml", "--fmu", fmu]).unwrap_err();
+    assert!(error.contains("no [[run]] of the plan has recording"), "{error}");
+}
+
+#[test]
+fn a_recorded_gyro_at_rest_is_characterised() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let mut random = Random::new(1, 0);
+    // 4e-4 rad/s at 50 Hz: N = 4e-4/√50
+    let mut text = String::from("t,w\n");
+    for k in 0..50_000 {
+        let _ = writeln!(text, "{},{}", 20 * k, (4e-4 * random.normal()).to_degrees());
+    }
+    std::fs::write(directory.join("rest.csv"), text).unwrap();
+    let of = ["gyro", "--recording", "rest.csv", "--columns", "time=t:ms,omega=w:deg/s"];
+    let said = hubslosh(directory, &[&of[..], &["--chunk", "50", "--out", "g"]].concat()).unwrap();
+    let line = said.lines().find(|line| line.starts_with("angle random walk N")).unwrap();
+    let walk: f64 = line.split_whitespace().nth(4).unwrap().parse().unwrap();
+    // 50,000 samples: 0.5 %
+    assert!((walk / (4e-4 / 50f64.sqrt()) - 1.0).abs() < 0.03, "{line}");
+    for name in ["allan", "quantiles", "autocorrelation", "chunks"] {
+        assert!(
+            directory.join(format!("g/{name}.svg")).is_file()
+                && directory.join(format!("g/{name}.csv")).is_file()
+        );
+    }
+    let error = hubslosh(directory, &[&of[..], &["--out", "g"]].concat()).unwrap_err();
+    assert!(
+        error.contains("it lasts 1000 s, in chunks of 900 s (allowed: at least 3 chunks"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_free_decay_of_30_s_tells_frequency_damping_and_its_growth() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let mut random = Random::new(2, 0);
+    let (f, zeta, growth, start) = (2.33, 0.004, 0.4, 0.03);
+    let omega = std::f64::consts::TAU * f;
+    let mut text = String::from("time\tprobe\ns\tmm\n");
+    for k in 0..1500 {
+        let t = 0.02 * f64::from(k);
+        let g = -(-zeta * omega * t).exp_m1() / zeta;
+        let size = start * (-zeta * omega * t).exp() / (1.0 + growth * start * g);
+        let wave = size * (omega * t).cos() + 2e-4 * random.normal();
+        let _ = writeln!(text, "{t:.2}\t{:.4}", 1e3 * wave);
+    }
+    std::fs::write(directory.join("decay.txt"), text.replace('.', ",")).unwrap();
+    let of = ["identify", "decay.txt", "--method", "free-decay", "--out", "d.json"];
+    let said =
+        hubslosh(directory, &[&of[..], &["--columns", "wave_height=probe"]].concat()).unwrap();
+    assert!(said.contains("Damping depends on the amplitude"), "{said}");
+    let found: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(directory.join("d.json")).unwrap()).unwrap();
+    for (name, truth, unit) in
+        [("frequency", f, "Hz"), ("zeta", zeta, "1"), ("zeta_amplitude", growth, "1/m")]
+    {
+        let estimate = &found["measurement"][name];
+        let (value, std) = (estimate["value"].as_f64().unwrap(), estimate["std"].as_f64().unwrap());
+        // one draw of the noise: four standard deviations
+        assert!((value - truth).abs() < 4.0 * std && std < 0.05 * truth, "{name}: {estimate}");
+        assert_eq!(estimate["unit"], unit);
+    }
+    let error = hubslosh(directory, &of).unwrap_err();
+    assert!(
+        error.contains(
+            "decay.txt has no column wave_height, force, theta, omega (columns in it: time, probe;"
+        ),
+        "{error}"
+    );
+}
+
+#[test]
+fn an_empty_tank_leaves_the_hub_its_whole_inertia() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let fmu = packed_for_tests();
+    let fmu = fmu.to_str().unwrap();
+    let run = [
+        "run",
+        "--profile",
+        "lin-sweep:amplitude=0.1,f0=0.5,f1=2,duration=60",
+        "--out",
+        "empty.csv",
+        "--fmu",
+        fmu,
+        "--set",
+        "fluid.rho=1e-6",
+        "--set",
+        "slosh.model=frozen",
+        "--columns",
+        "omega",
+    ];
+    hubslosh(directory, &run).unwrap();
+    let of = [
+        "identify",
+        "empty.csv",
+        "--method",
+        "acceleration",
+        "--empty",
+        "--perfect",
+        "--fmu",
+        fmu,
+        "--out",
+        "e.json",
+    ];
+    hubslosh(directory, &of).unwrap();
+    let found: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(directory.join("e.json")).unwrap()).unwrap();
+    let inertia = found["parameters"]["hub.I"]["value"].as_f64().unwrap();
+    // without the flag 2.09 kg of water, a quarter of it, would be taken off; means over two rows leave 0.1 %
+    assert!((inertia / 0.322414 - 1.0).abs() < 3e-3, "{inertia}");
+}
