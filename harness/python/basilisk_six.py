@@ -155,6 +155,7 @@ def ours(fmu: Path, case: Case, start: Signals, tolerance: float = TOLERANCE) ->
         settings |= {f"{name}.mass[1]": tank.mass, f"{name}.length[1]": tank.length}
         settings |= {f"{name}.hinge[1]": tank.hinge, f"{name}.zeta[1]": case.zeta}
         settings[f"{name}.g_ref"] = G_REF
+        settings[f"{name}.damping_law"] = "constant"
         put(f"{name}.position", tank.position)
         put(f"{name}.q", tank.q)
         put(f"{name}.p_0", tank.p, "1,{}")

@@ -50,13 +50,17 @@ def clicks(page: Page) -> None:
     text = label.first.text_content() or ""
     assert re.search(r"\d", text), f"the pointer shows no value: {text!r}"
 
-    shown = "document.querySelector('.plot').data[0].visible"
+    # a figure whose lines have their names at their ends has no legend
+    legend = page.locator(".plot:has(.legendtoggle)").first
+    shown = "document.querySelector('.plot:has(.legendtoggle)').data[0].visible"
     assert page.evaluate(shown) in (None, True)
-    plot.locator(".legendtoggle").first.click()
+    legend.scroll_into_view_if_needed()
+    legend.locator(".legendtoggle").first.click()
     page.wait_for_function(f"{shown} === 'legendonly'", timeout=10_000)
     page.wait_for_timeout(600)  # two quick clicks would be a double click, which shows one alone
-    plot.locator(".legendtoggle").first.click()
+    legend.locator(".legendtoggle").first.click()
     page.wait_for_function(f"{shown} === true", timeout=10_000)
+    plot.scroll_into_view_if_needed()
 
     before = page.evaluate(RANGE)
     area = plot.locator(".nsewdrag").first.bounding_box()
@@ -84,6 +88,26 @@ def clicks(page: Page) -> None:
     assert page.locator(target).bounding_box()["y"] < 900, f"{target} is not in view"
 
 
+FAULTS = """
+() => [...document.querySelectorAll(".plot")].flatMap((place, i) => {
+  const rects = (what) => [...place.querySelectorAll(what)].map((e) => e.getBoundingClientRect())
+    .filter((r) => r.width && r.height);
+  const cut = (a, b) => Math.min(a.right, b.right) - Math.max(a.left, b.left) > 2
+    && Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 2;
+  const panels = rects(".nsewdrag"), titles = rects("[class^=g-x], [class^=g-y]");
+  const legend = rects(".legend")[0], box = place.getBoundingClientRect();
+  const lowest = Math.max(...panels.map((r) => r.bottom), ...titles.map((r) => r.bottom));
+  const much = 40 * Math.max(1, box.width / place._fullLayout.width), faults = [];
+  if (titles.some((t) => panels.some((p) => cut(t, p)))) faults.push("an axis title in the plot");
+  if (legend && [...panels, ...titles].some((r) => cut(legend, r))) faults.push("legend over plot");
+  if (legend && legend.top - lowest > much) faults.push("a blank band above the legend");
+  if (box.bottom - (legend ? legend.bottom : lowest) > much) faults.push("a blank band below");
+  return faults.map((fault) => `figure ${i + 1}: ${fault}`);
+})
+"""
+"""What is wrong with the figures as they are drawn."""
+
+
 def background(page: Page) -> int:
     """Return how light the page is, 0 to 765."""
     color = page.evaluate("getComputedStyle(document.body).backgroundColor")
@@ -104,6 +128,16 @@ def main() -> None:
         page = opened(browser, arguments.report, 1400)
         clicks(page)
         assert background(page) > 700
+        assert not (faults := page.evaluate(FAULTS)), f"on a wide screen: {faults[:5]}"
+        # of the tool that is chosen, too
+        icons = "[...document.querySelectorAll('.modebar-btn path')].map(p => p.style.fill)"
+        for fill in set(page.evaluate(icons)):
+            assert sum(int(part) for part in re.findall(r"\d+", fill)[:3]) < 400, f"icons {fill}"
+        page.emulate_media(media="print")
+        page.evaluate("dispatchEvent(new Event('beforeprint'))")
+        assert not (faults := page.evaluate(FAULTS)), f"on paper: {faults[:5]}"
+        page.evaluate("dispatchEvent(new Event('afterprint'))")
+        page.emulate_media(media="null")
         pdf = Path(directory) / "report.pdf"
         page.pdf(path=pdf, prefer_css_page_size=True)
         pages = len(re.findall(rb"/Type\s*/Page[^s]", pdf.read_bytes()))
@@ -118,6 +152,7 @@ def main() -> None:
         phone = opened(browser, arguments.report, 400)
         width = phone.evaluate("document.documentElement.scrollWidth")
         assert width <= 400, f"text {width} px wide on a phone of 400 px"
+        assert not (faults := phone.evaluate(FAULTS)), f"on a phone: {faults[:5]}"
         browser.close()
     print(f"{arguments.report}: hover, legend, zoom, reset, contents, dark, phone; {pages} pages")
 

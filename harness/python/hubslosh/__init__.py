@@ -6,28 +6,51 @@
     run = hubslosh.simulate(parameters=start, stop=60)
 
 `simulate` returns a table of time histories, `closed_loop` one under a sampled controller,
+`margins` how far that loop is from instability, `monte_carlo` many runs with drawn parameters,
 `linearize` a state-space model, `frequency_response` an estimate from a history, `fit` a transfer
-function through such an estimate; `campaign` and `identify` call the program ``hubslosh``. `plot`
-draws. `Plant` and `drive` are for those who step an instance themselves.
+function through such an estimate; `analyse`, `campaign`, `identify` and `tank` call the program
+``hubslosh``. `plot` draws. `Plant` and `drive` are for those who step an instance themselves.
 """
 
-from importlib.metadata import PackageNotFoundError, version
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-from . import batch, plot
-from .fitting import TransferFunction, fit
-from .fmu import Fmu, FmuError, FmuWarning, Quantity, Value
-from .linearization import LinearModel, linearize
-from .loop import Law, closed_loop
-from .plant import COLUMNS, TORQUE, Plant, RunError, drive
-from .program import Estimated, Identification, campaign, identify
-from .simulation import simulate
-from .spectrum import frequency_response
-from .tables import read_parameters, read_table, setting, write_table
+if TYPE_CHECKING:
+    from . import attitude, batch, plot
+    from .files import to_csv, to_mat, to_parquet
+    from .fitting import TransferFunction, fit
+    from .fmu import Fmu, FmuError, FmuWarning, Quantity, Value
+    from .linearization import LinearModel, linearize
+    from .loop import Law, Loop, closed_loop
+    from .plant import COLUMNS, TORQUE, Plant, RunError, drive
+    from .program import Estimated, Identification, analyse, campaign, identify
+    from .sampling import draw, monte_carlo, quantiles
+    from .simulation import simulate
+    from .spectrum import frequency_response
+    from .stability import Margins, margins
+    from .tables import read_parameters, read_table, setting, write_table
+    from .tanks import Tank, tank
 
-try:
-    __version__ = version("hubslosh")
-except PackageNotFoundError:
-    __version__ = "source tree"
+    __version__: str
+
+# numpy, pandas, fmpy and scipy take 0.3 to 1.2 s to import: each module comes on the first use of
+# one of its names (PEP 562). The same as above, for Python itself; a test compares.
+_MODULES = {
+    "files": ("to_csv", "to_mat", "to_parquet"),
+    "fitting": ("TransferFunction", "fit"),
+    "fmu": ("Fmu", "FmuError", "FmuWarning", "Quantity", "Value"),
+    "linearization": ("LinearModel", "linearize"),
+    "loop": ("Law", "Loop", "closed_loop"),
+    "plant": ("COLUMNS", "TORQUE", "Plant", "RunError", "drive"),
+    "program": ("Estimated", "Identification", "analyse", "campaign", "identify"),
+    "sampling": ("draw", "monte_carlo", "quantiles"),
+    "simulation": ("simulate",),
+    "spectrum": ("frequency_response",),
+    "stability": ("Margins", "margins"),
+    "tables": ("read_parameters", "read_table", "setting", "write_table"),
+    "tanks": ("Tank", "tank"),
+}
+_MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 
 __all__ = [
     "COLUMNS",
@@ -39,23 +62,64 @@ __all__ = [
     "Identification",
     "Law",
     "LinearModel",
+    "Loop",
+    "Margins",
     "Plant",
     "Quantity",
     "RunError",
+    "Tank",
     "TransferFunction",
     "Value",
+    "analyse",
+    "attitude",
     "batch",
     "campaign",
     "closed_loop",
+    "draw",
     "drive",
     "fit",
     "frequency_response",
     "identify",
     "linearize",
+    "margins",
+    "monte_carlo",
     "plot",
+    "quantiles",
     "read_parameters",
     "read_table",
     "setting",
     "simulate",
+    "tank",
+    "to_csv",
+    "to_mat",
+    "to_parquet",
     "write_table",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Import what is used for the first time."""
+    if name == "__version__":
+        value: Any = _version()
+    elif name in _MODULE_OF:
+        value = getattr(import_module(f".{_MODULE_OF[name]}", __name__), name)
+    elif name in __all__:
+        value = import_module(f".{name}", __name__)
+    else:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """Return the names that there are, imported or not."""
+    return sorted({*globals(), *__all__, "__version__"})
+
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("hubslosh")
+    except PackageNotFoundError:
+        return "source tree"

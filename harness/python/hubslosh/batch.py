@@ -7,7 +7,7 @@ platform, the same calls are made from here one by one: same numbers, some thirt
 
 import ctypes
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from ctypes import POINTER, Structure, c_double, c_int, c_size_t, c_uint32, c_void_p
 from dataclasses import dataclass
@@ -20,6 +20,7 @@ import numpy as np
 from fmpy import sharedLibraryExtension
 from fmpy.fmi1 import FMICallException
 
+from .feedback import Feedback, Linear
 from .fmu import PLATFORM, FmuError, source_tree
 
 FUNCTIONS = (
@@ -33,6 +34,9 @@ FUNCTIONS = (
     "fmi2GetBoolean",
 )
 """The functions of FMI that a run calls; the library knows them by their places here."""
+
+CONTROLLER = "controller"
+"""In the place of a function's name: the controller of a closed loop ended the run."""
 
 STATUS = ("fmi2OK", "fmi2Warning", "fmi2Discard", "fmi2Error", "fmi2Fatal", "fmi2Pending")
 
@@ -135,7 +139,7 @@ def library() -> ctypes.CDLL | None:
 _kept = ExitStack()
 """Files that live as long as the program."""
 
-_VERSION = 1
+_VERSION = 2
 """Of the library's interface."""
 
 
@@ -149,19 +153,20 @@ def _load(path: Path) -> ctypes.CDLL:
         raise FmuError(f"the library {path} has interface {version}, not {_VERSION}; build it anew")
     loaded.hubslosh_batch_run.argtypes = (POINTER(_Instance), POINTER(_Run), POINTER(_Stop))
     loaded.hubslosh_batch_run.restype = c_int
+    loaded.hubslosh_batch_loop.restype = c_int
     return loaded
 
 
-def run(fmu: Any, rows: Rows) -> Stop | None:
+def run(fmu: Any, rows: Rows, feedback: Feedback | None = None) -> Stop | None:
     """Drive an instance of ``fmpy.fmi2.FMU2Slave`` through a run, by the library if there is one.
 
     At every communication point the outputs are read, then the inputs set and the step made; after
-    the last step outputs are read once more. Returns None at the end, or where it stopped: at the
-    first call that answers neither fmi2OK nor fmi2Warning.
+    the last step outputs are read once more. A controller acts between the two. Returns None at the
+    end, or where it stopped: at the first call that answers neither fmi2OK nor fmi2Warning.
     """
     loaded = library()
     if loaded is None:
-        return step_by_step(fmu, rows)
+        return step_by_step(fmu, rows, feedback)
     functions = (ctypes.cast(fmu._functions[name], c_void_p) for name in FUNCTIONS)
     slopes = None if rows.slopes is None else rows.slopes.ctypes.data
     arguments = _Run(
@@ -176,14 +181,20 @@ def run(fmu: Any, rows: Rows) -> Stop | None:
         _Signals.of(rows.boolean_outputs),
     )
     stop = _Stop()
-    answer = loaded.hubslosh_batch_run(_Instance(fmu.component, *functions), arguments, stop)
+    instance = _Instance(fmu.component, *functions)
+    if feedback is None:
+        answer = loaded.hubslosh_batch_run(ctypes.byref(instance), ctypes.byref(arguments), stop)
+    else:
+        structure, _kept = feedback.structure()
+        pointers = (ctypes.byref(item) for item in (instance, arguments, structure, stop))
+        answer = loaded.hubslosh_batch_loop(*pointers)
     if answer == 0:
         return None
     assert answer == 1, "the arrays of a run have the lengths that they say"
-    return Stop(stop.row, FUNCTIONS[stop.function], stop.status)
+    return Stop(stop.row, (*FUNCTIONS, CONTROLLER)[stop.function], stop.status)
 
 
-def step_by_step(fmu: Any, rows: Rows) -> Stop | None:
+def step_by_step(fmu: Any, rows: Rows, feedback: Feedback | None = None) -> Stop | None:
     """As `run`, each call from Python."""
     c = fmu.component
 
@@ -216,16 +227,52 @@ def step_by_step(fmu: Any, rows: Rows) -> Stop | None:
     if rows.slopes is not None:
         name = "fmi2SetRealInputDerivatives"
         sets.append(calls(name, rows.reals, c_double, first, values=rows.slopes))
-    before = [call for call in (*gets, *sets) if call]
-    at_end = [call for call in gets if call]
+    gets, sets = ([call for call in calls if call] for calls in (gets, sets))
+    act = None if feedback is None else _closed(fmu, rows, feedback)
     time = rows.time.tolist()
     last = len(time) - 1
     for k, now in enumerate(time):
         try:
-            for call in before if k < last else at_end:
+            for call in gets:
                 call(k)
             if k < last:
+                if act is not None and not act(k):
+                    return Stop(k, CONTROLLER, 1)
+                for call in sets:
+                    call(k)
                 fmu.fmi2DoStep(c, now, time[k + 1] - now, 1)
         except FMICallException as error:
             return Stop(k, error.function, error.status)
     return None
+
+
+def _closed(fmu: Any, rows: Rows, feedback: Feedback) -> Callable[[int], bool]:
+    """Return what a controller does at a row, and whether the run goes on."""
+    c, width = fmu.component, len(feedback.command)
+    controller = feedback.controller
+    law = controller.law() if isinstance(controller, Linear) else controller
+    measured, command = np.empty(len(feedback.measured)), np.empty(width)
+    on_the_way = np.zeros((feedback.latency + 1, width))
+
+    def exchange(function: Any, references: np.ndarray, values: np.ndarray) -> None:
+        pointer = references.ctypes.data_as(POINTER(c_uint32))
+        function(c, pointer, len(references), values.ctypes.data_as(POINTER(c_double)))
+
+    def act(k: int) -> bool:
+        cycle, part = divmod(k, feedback.parts)
+        if k:
+            feedback.commands[k] = feedback.commands[k - 1]
+        if part == 0:
+            exchange(fmu.fmi2GetReal, feedback.measured, measured)
+            try:
+                on_the_way[cycle % len(on_the_way)] = law(cycle, float(rows.time[k]), measured)
+            except BaseException as error:
+                feedback.error = error
+                return False
+        if part == feedback.switch and cycle >= feedback.latency:
+            command[:] = on_the_way[(cycle - feedback.latency) % len(on_the_way)]
+            feedback.commands[k] = command
+            exchange(fmu.fmi2SetReal, feedback.command, command)
+        return True
+
+    return act

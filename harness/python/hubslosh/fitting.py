@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from .arguments import check_table
 from .fmu import FmuError
 
 ITERATIONS = 30
@@ -59,6 +60,10 @@ def fit(response: pd.DataFrame, poles: int = 3, zeros: int = 2) -> TransferFunct
     """
     from scipy.optimize import least_squares
 
+    check_table(response, "response")
+    for name, count in (("poles", poles), ("zeros", zeros)):
+        if not isinstance(count, int | np.integer):
+            raise FmuError(f"{name} must be a whole number, not {count!r}")
     problems = [
         f"response has no column {name}"
         for name in ("frequency", "real", "imag")

@@ -4,8 +4,8 @@ import atexit
 import difflib
 import math
 import shutil
+import threading
 from collections.abc import Callable, Iterable
-from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -21,7 +21,7 @@ FMI 2.0's linux64 is for x86-64, but fmpy looks there on ARM too.
 """
 
 Value = float | int | bool | str
-"""A value in SI units; of an enumeration also an item's name."""
+"""A value in SI units, or with its unit, ``"50 mm"``; of an enumeration also an item's name."""
 
 INTEGERS = range(-(2**31), 2**31)
 """Numbers that fmi2Integer has."""
@@ -46,6 +46,10 @@ def source_tree() -> Path | None:
 
 def find(model: str | Path) -> Path:
     """Return the FMU of a model: a file ``….fmu``, or the name of one that is in this package."""
+    if not isinstance(model, str | Path):
+        raise FmuError(
+            f'model must be the name of an FMU, such as "Spacecraft", or a file, not {model!r}'
+        )
     if isinstance(model, Path) or model.endswith(".fmu"):
         path = Path(model)
         if not path.is_file():
@@ -67,7 +71,7 @@ def find(model: str | Path) -> Path:
 
 def did_you_mean(wrong: str, names: Iterable[str]) -> str:
     """Return "; did you mean …?" with the most similar name, or nothing."""
-    close = difflib.get_close_matches(wrong, list(names), n=1)
+    close = difflib.get_close_matches(str(wrong), list(names), n=1)
     return f"; did you mean {close[0]}?" if close else ""
 
 
@@ -81,6 +85,8 @@ class Fmu:
 
     def __init__(self, path: Path) -> None:
         """Read modelDescription.xml."""
+        self._unpacking = threading.Lock()
+        self._directory: str | None = None
         self.path = path
         if why := next(faults(path), None):
             raise FmuError(f"{path} is not an FMU: {why}")
@@ -115,15 +121,17 @@ class Fmu:
             cls._opened[key] = cls(path)
         return cls._opened[key]
 
-    @cached_property
+    @property
     def directory(self) -> str:
         """Where the FMU is unpacked until the program ends."""
-        try:
-            directory = str(extract(str(self.path)))
-        except Exception as error:  # as in reading
-            raise FmuError(f"{self.path} cannot be unpacked: {error}") from None
-        atexit.register(shutil.rmtree, directory, ignore_errors=True)
-        return directory
+        with self._unpacking:
+            if self._directory is None:
+                try:
+                    self._directory = str(extract(str(self.path)))
+                except Exception as error:  # as in reading
+                    raise FmuError(f"{self.path} cannot be unpacked: {error}") from None
+                atexit.register(shutil.rmtree, self._directory, ignore_errors=True)
+            return self._directory
 
     def names(self, *causalities: str) -> list[str]:
         """Return the names of the variables with these causalities ("output", "local", …)."""
@@ -146,7 +154,8 @@ class Fmu:
         """Return a value in the type and unit of a variable.
 
         Enumerations take an item's name or number, Booleans also the texts true and false, Reals
-        also a number with its unit: the variable's own or one of its display units.
+        also a number with its unit, ``(50, "mm")`` or ``"50 mm"``: the variable's own or one of its
+        display units.
         """
         variable = self.variable(name)
         converters: dict[str, Callable[[Any], Value]] = {
@@ -164,6 +173,8 @@ class Fmu:
             raise FmuError(f"{name} cannot be {value!r}: {error}") from None
 
     def _real(self, name: str, value: Quantity) -> float:
+        if isinstance(value, str):
+            value = _with_unit(value)
         if not isinstance(value, tuple):
             return _finite(value)
         if len(value) != 2:
@@ -181,6 +192,18 @@ class Fmu:
             units = ", ".join(u for u in (base, *shown) if u)
             raise ValueError(f"it has no unit {unit} (units: {units or 'none'})")
         return float(shown[unit].factor), float(shown[unit].offset)
+
+
+def _with_unit(text: str) -> Quantity:
+    """Return the number and the unit of ``"50 mm"`` or ``"50mm"``; a text without unit as it is."""
+    for end in range(len(text), 0, -1):
+        try:
+            number = float(text[:end])
+        except ValueError:
+            continue
+        unit = text[end:].strip()
+        return (number, unit) if unit else number
+    return text
 
 
 def _item(variable: ScalarVariable, value: Any) -> int:

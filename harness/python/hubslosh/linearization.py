@@ -3,17 +3,51 @@
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from fmpy import fmi2
 from numpy.typing import ArrayLike, NDArray
 
+from .arguments import names_of
 from .fmu import Fmu, FmuError, Quantity
 from .plant import Instance
+from .simulation import parameters_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Matrix = NDArray[np.float64]
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float | np.integer | np.floating)
+
+
+def check_seconds(**values: Any) -> None:
+    """Refuse what is no positive number of seconds, by name."""
+    if problems := wrong_seconds(**values):
+        raise FmuError("; ".join(problems))
+
+
+def wrong_seconds(**values: Any) -> list[str]:
+    """Return what is wrong with numbers of seconds, by name."""
+    return [
+        f"{name} must be a positive number of seconds, not {value!r}"
+        for name, value in values.items()
+        if not (_is_number(value) and np.isfinite(value) and value > 0)
+    ]
+
+
+def split_delay(delay: float, period: float) -> tuple[int, float]:
+    """Return a delay as whole cycles and a rest in seconds; 1e-9 of a cycle is rounding."""
+    if not (_is_number(delay) and np.isfinite(delay) and delay >= 0):
+        raise FmuError(f"delay must be a number of seconds from 0 on, not {delay!r}")
+    cycles = int(np.floor(delay / period + 1e-9))
+    rest = round(float(delay / period - cycles), 12)
+    return cycles, rest * period if rest > 1e-9 else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,36 +86,99 @@ class LinearModel:
 
         s = jω, or z = exp(jωT) in its place if the model is sampled.
         """
-        s: NDArray[np.complex128] = 2j * np.pi * np.atleast_1d(np.asarray(frequency, float))
+        try:
+            s: NDArray[np.complex128] = 2j * np.pi * np.atleast_1d(np.asarray(frequency, float))
+        except (TypeError, ValueError):
+            raise FmuError(f"frequency must be numbers, Hz, not {frequency!r}") from None
         if self.period is not None:
             s = np.exp(s * self.period)
         system = s[:, None, None] * np.eye(len(self.A)) - self.A
         states = np.linalg.solve(system, np.broadcast_to(self.B, (len(s), *self.B.shape)))
         return np.asarray(self.C @ states + self.D, np.complex128)
 
-    def sampled(self, period: float, latency: int = 0) -> "LinearModel":
+    def sampled(self, period: float, latency: int = 0, delay: float = 0.0) -> "LinearModel":
         """Return the model as a controller sees it that works in cycles of ``period`` seconds.
 
-        The inputs are held for a cycle, ``latency`` cycles after the controller gave them; those on
-        the way are further states. The result is exact at the sampling instants.
+        The inputs are held for a cycle, ``latency`` cycles and ``delay`` seconds (any, not only
+        whole cycles) after the controller gave them; those on the way are further states. Exact at
+        the sampling instants; an output that follows an input at once is that just after.
         """
         from scipy.signal import cont2discrete
 
         if self.period is not None:
             raise FmuError("the model is sampled already")
-        if not (np.isfinite(period) and period > 0):
-            raise FmuError(f"period must be a positive number of seconds, not {period}")
-        if latency < 0 or latency != int(latency):
-            raise FmuError(f"latency must be a whole number of cycles, not {latency}")
+        check_seconds(period=period)
+        if not _is_number(latency) or latency < 0 or latency != int(latency):
+            raise FmuError(f"latency must be a whole number of cycles, not {latency!r}")
+        cycles, rest = split_delay(delay, period)
+        cycles += int(latency)
+        if rest:
+            return self._delayed(period, cycles, rest)
         A, B, C, D, _ = cont2discrete((*self,), period, "zoh")
         states = list(self.states)
-        for cycle in range(latency):  # the oldest command first: it reaches the plant next
+        for cycle in range(cycles):  # the oldest command first: it reaches the plant next
             n, m = B.shape
             A = np.block([[A, B], [np.zeros((m, n + m))]])
             B = np.vstack([np.zeros((n, m)), np.eye(m)])
             C, D = np.hstack([C, D]), np.zeros_like(D)
-            states += [f"{name}[-{latency - cycle}]" for name in self.inputs]
+            states += [f"{name}[-{cycles - cycle}]" for name in self.inputs]
         return LinearModel(A, B, C, D, tuple(states), self.inputs, self.outputs, period)
+
+    def _delayed(self, period: float, cycles: int, rest: float) -> "LinearModel":
+        """Return it sampled with a delay of ``cycles`` and ``rest`` seconds, 0 ≤ rest < period.
+
+        In cycle k the command of cycle k - cycles - 1 acts for ``rest`` seconds, then the next one
+        (Åström and Wittenmark, Computer-Controlled Systems, section 2.4). An output that follows an
+        input at once is that just before a new command, which a controller measures.
+        """
+        n, m = self.B.shape
+        (step, full), (_, later) = _held(self, period), _held(self, period - rest)
+        on_the_way = m * (cycles + 1)  # the oldest command first: it acts as the cycle begins
+        A, B = np.zeros((n + on_the_way, n + on_the_way)), np.zeros((n + on_the_way, m))
+        A[:n, :n], A[:n, n : n + m] = step, full - later
+        effect = np.hstack([A, B])  # the input is the last command of all
+        effect[:n, n + m : n + 2 * m] = later
+        effect[n:, n + m :] = np.eye(on_the_way)
+        C = np.hstack([self.C, self.D, np.zeros((len(self.C), m * cycles))])
+        states = [f"{u}[-{k}]" for k in range(cycles + 1, 0, -1) for u in self.inputs]
+        return LinearModel(
+            effect[:, : n + on_the_way],
+            effect[:, n + on_the_way :],
+            C,
+            np.zeros_like(self.D),
+            (*self.states, *states),
+            self.inputs,
+            self.outputs,
+            period,
+        )
+
+    def modes(self, below: float = 1.0) -> "pd.DataFrame":
+        """Return the oscillatory modes with a damping ratio below ``below``, by frequency.
+
+        Columns: ``frequency`` (Hz, undamped: the pole's magnitude), ``zeta`` (damping ratio), and
+        ``states``: the names of those that take part, most first, by participation factors
+        (Pérez-Arriaga, Verghese and Schweppe 1982) of a fifth of the largest or more.
+        """
+        import pandas as pd
+        from scipy.linalg import eig
+
+        poles, left, right = eig(self.A, left=True)
+        rows = []
+        for k, pole in enumerate(poles):
+            if self.period is not None:
+                pole = np.log(pole) / self.period if pole else -np.inf
+            if not pole.imag > 0 or -pole.real >= below * abs(pole):
+                continue
+            if self.period is not None and pole.imag * self.period > np.pi * (1 - 1e-9):
+                continue  # a negative real pole of a sampled model
+            share = np.abs(left[:, k] * right[:, k])
+            most = [i for i in np.argsort(-share, kind="stable") if share[i] > 0.2 * share.max()]
+            names = tuple(self.states[i] for i in most)
+            rows.append((abs(pole) / (2 * np.pi), -pole.real / abs(pole), names))
+        rows.sort(key=lambda row: row[0])
+        table = pd.DataFrame(rows, columns=["frequency", "zeta", "states"])
+        table.attrs["units"] = {"frequency": "Hz", "zeta": "1"}
+        return table
 
     def to_control(self) -> Any:
         """Return it as ``control.StateSpace``, with names; needs the package control."""
@@ -98,11 +195,21 @@ class LinearModel:
         )
 
 
+@lru_cache(maxsize=32)
+def _held(model: LinearModel, time: float) -> tuple[Matrix, Matrix]:
+    """Return exp(A t) and what a unit input does within the time t."""
+    from scipy.linalg import expm
+
+    n, m = model.B.shape
+    whole = expm(np.block([[model.A, model.B], [np.zeros((m, n + m))]]) * time)
+    return whole[:n, :n], whole[:n, n:]
+
+
 def linearize(
     model: str | Path = "HubSlosh",
-    parameters: Mapping[str, Quantity] | None = None,
-    inputs: Sequence[str] | None = None,
-    outputs: Sequence[str] | None = None,
+    parameters: Mapping[str, Quantity] | str | Path | None = None,
+    inputs: Sequence[str] | str | None = None,
+    outputs: Sequence[str] | str | None = None,
     *,
     all_states: bool = False,
 ) -> LinearModel:
@@ -122,6 +229,7 @@ def linearize(
     exchange = fmu.description.modelExchange
     if exchange is None or not exchange.providesDirectionalDerivative:
         raise FmuError(f"{fmu.path} offers no directional derivatives in Model Exchange")
+    parameters = parameters_of(parameters)
     names_in = _reals(fmu, inputs, "input")
     names_out = _reals(fmu, outputs, "output")
     derivatives = [unknown.variable for unknown in fmu.description.derivatives]
@@ -132,7 +240,7 @@ def linearize(
     known += [fmu.variable(name).valueReference for name in names_in]
 
     with Instance(fmu, fmi2.FMU2Model) as instance:
-        for name, value in (parameters or {}).items():
+        for name, value in parameters.items():
             instance.set(name, value)
         instance._call("setupExperiment")
         instance._call("enterInitializationMode")
@@ -177,11 +285,12 @@ def _seen(A: Matrix, C: Matrix) -> NDArray[np.bool_]:
         seen = more
 
 
-def _reals(fmu: Fmu, names: Sequence[str] | None, causality: str) -> list[str]:
+def _reals(fmu: Fmu, names: Sequence[str] | str | None, causality: str) -> list[str]:
     """Return the Real variables meant."""
     if names is None:
         return [name for name in fmu.names(causality) if fmu.variable(name).type == "Real"]
-    problems = []
+    problems: list[str] = []
+    names = names_of(names, f"{causality}s", problems)
     for name in names:
         try:
             variable = fmu.variable(name)

@@ -1,105 +1,501 @@
 """A sampled controller in closed loop with an FMU."""
 
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from .fmu import Fmu, FmuError, Quantity
+from .arguments import names_of, not_numbers
+from .feedback import Feedback, Linear
+from .fmu import Fmu, FmuError, Quantity, did_you_mean
+from .linearization import LinearModel, linearize, split_delay, wrong_seconds
 from .plant import TORQUE, Plant
-from .simulation import check_outputs, check_parameters, histories_of, too_many_rows
+from .simulation import (
+    History,
+    check_outputs,
+    check_parameters,
+    histories_of,
+    parameters_of,
+    too_many_rows,
+)
 
-Law = Callable[[float, NDArray[np.float64]], float]
-"""What a controller computes in a cycle: the command from time (s) and measurements."""
+Law = Callable[[float, NDArray[np.float64]], Any]
+"""What a controller computes in a cycle: the command, or one for each of several, from time (s) and
+measurements."""
+
+QUATERNION = tuple(f"q[{i}]" for i in range(1, 5))
+"""Attitude of Spacecraft, scalar first."""
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """A sampled controller around an FMU: what `closed_loop` simulates and `margins` looks at.
+
+    controller: a function of time (s) and the values of ``measured`` that returns a command (or as
+    many as there are). Or a linear controller of the error, reference − measured: a matrix of gains
+    (commands × measured), a `LinearModel`, or a state space or transfer function of python-control.
+    A discrete one must have the period of the loop; a continuous one is discretised by Tustin's
+    rule, which moves a frequency f to atan(π f T)/(π T).
+    period: of the controller's cycle, s.
+    model, parameters: as for `simulate`.
+    measured, command: variables and inputs of the FMU by name, one or several.
+    delay: from measurement to command, s; any. latency: the same in whole cycles. The command of a
+    cycle acts that much later and is held until the next one acts: a continuous design sees half a
+    cycle more.
+    """
+
+    controller: Any
+    period: float
+    model: str | Path = "HubSlosh"
+    parameters: Mapping[str, Quantity] | str | Path | None = None
+    measured: Sequence[str] | str = ("theta", "omega")
+    command: Sequence[str] | str = TORQUE
+    latency: int = 0
+    delay: float = 0.0
+
+    def problems(self) -> list[str]:
+        """Return everything that is wrong with it."""
+        found = wrong_seconds(period=self.period)
+        if not _is_whole(self.latency, 0):
+            found.append(f"latency must be a whole number from 0 on, not {self.latency!r}")
+        try:
+            split_delay(self.delay, 1.0)
+        except FmuError as error:
+            found.append(str(error))
+        fmu = Fmu.open(self.model)
+        for name in (commands := names_of(self.command, "command", found)):
+            if name not in fmu.names("input"):
+                allowed = fmu.names("input")
+                hint = did_you_mean(name, allowed)
+                found.append(
+                    f"the command {name} is no input of {fmu.name} (inputs: {', '.join(allowed)})"
+                    f"{hint}"
+                )
+            elif fmu.variable(name).type != "Real":
+                found.append(f"the command {name} is of type {fmu.variable(name).type}, not Real")
+        measured = names_of(self.measured, "measured", found)
+        check_outputs(fmu, measured, found)
+        for name in measured:
+            if name in fmu.variables and fmu.variable(name).type not in ("Real", "String"):
+                found.append(
+                    f"{name} is of type {fmu.variable(name).type}: only Reals are measured"
+                )
+        found += [f"the command {name} is given twice" for name in _twice(commands)]
+        if not commands:
+            found.append("there is no command")
+        if not found:
+            try:
+                self.linear()
+            except FmuError as error:
+                found.append(str(error))
+        return found
+
+    def check(self) -> None:
+        """Raise FmuError with everything that is wrong with it."""
+        if found := self.problems():
+            raise FmuError("; ".join(found))
+
+    @property
+    def names(self) -> tuple[list[str], list[str]]:
+        """Names of what is measured, and of the commands."""
+        return names_of(self.measured, "", []), names_of(self.command, "", [])
+
+    def linear(self) -> LinearModel | None:
+        """Return the controller as a sampled linear model; None if it is a function."""
+        measured, command = self.names
+        return _linear(self.controller, self.period, measured, command)
+
+    def _must_be_linear(self) -> LinearModel:
+        controller = self.linear()
+        if controller is None:
+            raise FmuError(
+                "the loop gain needs a linear controller: a matrix of gains, a LinearModel, or a "
+                "state space or transfer function of python-control"
+            )
+        return controller
+
+    @property
+    def whole_delay(self) -> tuple[int, float]:
+        """Cycles and seconds from measurement to command."""
+        cycles, rest = split_delay(self.delay, self.period)
+        return cycles + int(self.latency), rest
+
+    def plant(self, parameters: Mapping[str, Quantity] | None = None) -> LinearModel:
+        """Return the FMU's linear model from commands to measurements, in continuous time.
+
+        parameters: further ones, such as ``{"friction.model": "viscous"}``.
+        """
+        measured, command = self.names
+        every = parameters_of(self.parameters) | parameters_of(parameters)
+        return linearize(self.model, every, command, measured)
+
+    def gain(
+        self, parameters: Mapping[str, Quantity] | None = None, *, more_delay: float = 0.0
+    ) -> LinearModel:
+        """Return the loop gain L from commands round to commands; the loop closes with u = -L u.
+
+        It is exact at the sampling instants, delay included. more_delay: s, added.
+        """
+        self.check()
+        self._must_be_linear()
+        return self._gain(self.plant(parameters), more_delay)
+
+    def _gain(self, plant: LinearModel, more_delay: float = 0.0) -> LinearModel:
+        K = self._must_be_linear()
+        cycles, rest = split_delay(self.delay + more_delay, self.period)
+        # measured as in the simulation: before the command changes
+        P = plant._delayed(self.period, cycles + int(self.latency), rest)
+        n, m = len(P.A), len(K.A)
+        return LinearModel(
+            np.block([[P.A, np.zeros((n, m))], [K.B @ P.C, K.A]]),
+            np.vstack([P.B, np.zeros((m, P.B.shape[1]))]),
+            np.hstack([K.D @ P.C, K.C]),
+            np.zeros((len(K.D), P.B.shape[1])),
+            (*P.states, *(f"controller.{name}" for name in K.states)),
+            plant.inputs,
+            plant.inputs,
+            self.period,
+        )
+
+    def simulate(
+        self,
+        stop: float,
+        parameters: Mapping[str, Quantity] | None = None,
+        *,
+        reference: pd.DataFrame | None = None,
+        inputs: pd.DataFrame | None = None,
+        outputs: Sequence[str] | str | None = None,
+        substeps: int = 1,
+        tolerance: float | None = None,
+    ) -> pd.DataFrame:
+        """Simulate the loop from time 0 to ``stop``, s; see `closed_loop`.
+
+        parameters: further ones, which go before those of the loop.
+        """
+        fmu = Fmu.open(self.model)
+        problems = wrong_seconds(period=self.period, stop=stop)
+        if not _is_whole(substeps, 1):
+            problems.append(f"substeps must be a whole number from 1 on, not {substeps!r}")
+        problems += [p for p in self.problems() if p not in problems]
+        problems += not_numbers(tolerance=tolerance)
+        histories = histories_of(fmu, inputs, False, problems)
+        measured, command = self.names
+        if isinstance(inputs, pd.DataFrame):
+            problems += [
+                f"{name} is the controller's command; inputs may not have it"
+                for name in command
+                if name in inputs
+            ]
+        every = parameters_of(self.parameters) | parameters_of(parameters)
+        check_parameters(fmu, every, {**histories, **dict.fromkeys(command)}, problems)
+        columns = fmu.names("output") if outputs is None else names_of(outputs, "outputs", problems)
+        check_outputs(fmu, columns, problems)
+        if not problems:
+            problems += too_many_rows(0.0, stop, self.period / substeps)
+        if problems:
+            raise FmuError("; ".join(problems))
+
+        cycles = max(round(stop / self.period), 1)
+        grid = np.arange(cycles * substeps + 1) * (self.period / substeps)
+        latency, rest = self.whole_delay
+        points, switch, wanted = _points(grid, substeps, self.period, rest)
+        parts = (len(points) - 1) // cycles
+        controller, seen = self._controller(
+            cycles, grid[:-1:substeps], reference, measured, command
+        )
+        feedback = Feedback(
+            controller,
+            *(
+                np.array([fmu.variable(n).valueReference for n in names], np.uint32)
+                for names in (seen, command)
+            ),
+            cycles=cycles,
+            parts=parts,
+            switch=switch,
+            latency=min(latency, cycles),
+        )
+        given = {name: history.after(points) for name, history in histories.items()}
+        sloped = any(slopes.any() for _, slopes in given.values())
+        start = {name: values[0] for name, (values, _) in given.items()}
+        asked = [name for name in columns if name not in (*command, *given)]
+        with Plant(
+            self.model,
+            every,
+            tolerance=tolerance,
+            inputs=dict.fromkeys(command, 0.0) | start,
+        ) as plant:
+            recorded = plant.run(
+                points,
+                {name: values for name, (values, _) in given.items()},
+                {name: slopes for name, (_, slopes) in given.items()} if sloped else None,
+                asked,
+                feedback,
+            )
+        commands = feedback.commands
+        commands[-1] = commands[-2]
+        table = pd.DataFrame(
+            {"time": points}
+            | dict(zip(command, commands.T, strict=True))
+            | {name: values for name, (values, _) in given.items()}
+            | recorded,
+            copy=False,
+        )
+        if wanted is not None:
+            table = table[wanted].reset_index(drop=True)
+        units = {name: fmu.unit(name) for name in table.columns if name != "time"}
+        table.attrs["units"] = {"time": "s"} | units
+        return table
+
+    def _controller(
+        self,
+        cycles: int,
+        time: NDArray[np.float64],
+        reference: pd.DataFrame | None,
+        measured: list[str],
+        command: list[str],
+    ) -> tuple[Any, list[str]]:
+        """Return the controller for a run, and the names of what it measures."""
+        model = self.linear()
+        if model is None:
+            if reference is not None:
+                raise FmuError(
+                    "reference is for linear controllers; a function knows its own reference"
+                )
+            return _called(self.controller, command), measured
+        table = _reference(reference, measured, command)
+        attitude = all(name in table for name in QUATERNION)
+        # the scalar part, which a controller seldom has, is measured as well
+        seen = measured + [n for n in QUATERNION if attitude and n not in measured]
+        if attitude and any(n not in Fmu.open(self.model).variables for n in QUATERNION):
+            raise FmuError(f"{Path(self.model).name} has no quaternion q[1], …, q[4]")
+        rows = {name: history.after(time)[0] for name, history in table.items()}
+        wide = [np.pad(m, ((0, 0), (0, len(seen) - len(measured)))) for m in (model.B, model.D)]
+
+        def columns(names: list[str]) -> NDArray[np.float64]:
+            return np.column_stack([rows.get(name, np.zeros(cycles)) for name in names])
+
+        wanted, quaternion = columns(seen), None
+        if attitude:
+            quaternion = np.array([seen.index(name) for name in QUATERNION], np.uintp)
+            wanted[:, quaternion] /= np.linalg.norm(wanted[:, quaternion], axis=1)[:, None]
+        linear = Linear(model.A, wide[0], model.C, wide[1], wanted, columns(command), quaternion)
+        return linear, seen
 
 
 def closed_loop(
-    law: Law,
+    controller: Any,
     period: float,
     stop: float,
     model: str | Path = "HubSlosh",
-    parameters: Mapping[str, Quantity] | None = None,
+    parameters: Mapping[str, Quantity] | str | Path | None = None,
     *,
-    measured: Sequence[str] = ("theta", "omega"),
-    command: str = TORQUE,
+    measured: Sequence[str] | str = ("theta", "omega"),
+    command: Sequence[str] | str = TORQUE,
     latency: int = 0,
+    delay: float = 0.0,
+    reference: pd.DataFrame | None = None,
     inputs: pd.DataFrame | None = None,
-    outputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | str | None = None,
     substeps: int = 1,
     tolerance: float | None = None,
 ) -> pd.DataFrame:
     """Simulate an FMU under a sampled controller from time 0 to ``stop``, s.
 
-    In every cycle of ``period`` seconds ``law`` is called with the time and the values of
-    ``measured``. The command that it returns is set ``latency`` cycles later and held for one
-    cycle; until the first arrives, the input ``command`` is 0. A continuous design sees a delay of
-    ``latency + 1/2`` cycles, the half being the hold's.
+    controller, period, measured, command, latency, delay: see `Loop`. In every cycle of ``period``
+    seconds the controller gets the values of ``measured``. What it commands is set ``delay``
+    seconds (and ``latency`` cycles) later and held for one cycle; until the first arrives, commands
+    are 0.
 
+    reference: for a linear controller, a table with the column ``time`` and any of ``measured``
+    (what is wanted of it, otherwise 0) and of the commands (added to them: feedforward); straight
+    lines between the rows. With the four columns q[1], …, q[4] the error of q[2], q[3], q[4] is the
+    vector part of q⁻¹ ⊗ q_reference: half of what is left to turn about each body axis.
     inputs: histories of other inputs, as for `simulate`; straight lines between the rows, followed
     from substep to substep. substeps: rows of the result per cycle.
     model, parameters, outputs, tolerance: as for `simulate`.
 
-    Returns a table with the columns ``time``, ``command`` (as it is from that time on), the inputs
-    and ``outputs``; its last row ends the last whole cycle. Units are in ``.attrs["units"]``.
+    Returns a table with the columns ``time``, the commands (as they are from that time on), the
+    inputs and ``outputs``; its last row ends the last whole cycle. Units: ``.attrs["units"]``.
+    With a linear controller the whole loop is compiled code; a function is called once per cycle.
 
     Raises FmuError with everything that is wrong with the arguments, or with what the FMU says.
     """
-    fmu = Fmu.open(model)
-    problems = [
-        f"{name} must be a positive number of seconds, not {value}"
-        for name, value in (("period", period), ("stop", stop))
-        if not (np.isfinite(value) and value > 0)
-    ]
-    problems += [
-        f"{name} must be a whole number from {least} on, not {value}"
-        for name, value, least in (("latency", latency, 0), ("substeps", substeps, 1))
-        if value < least or value != int(value)
-    ]
-    histories = histories_of(fmu, inputs, False, problems)
-    if command not in fmu.names("input"):
-        allowed = ", ".join(fmu.names("input"))
-        problems.append(f"the command {command} is no input of {fmu.name} (inputs: {allowed})")
-    if inputs is not None and command in inputs:
-        problems.append(f"{command} is the law's command; inputs may not have it")
-    check_parameters(fmu, parameters or {}, {**histories, command: None}, problems)
-    columns = fmu.names("output") if outputs is None else list(outputs)
-    check_outputs(fmu, columns, problems)
-    check_outputs(fmu, list(measured), problems)
-    if not problems:
-        problems += too_many_rows(0.0, stop, period / substeps)
+    loop = Loop(controller, period, model, parameters, measured, command, latency, delay)
+    return loop.simulate(
+        stop, reference=reference, inputs=inputs, outputs=outputs, substeps=substeps,
+        tolerance=tolerance,
+    )  # fmt: skip
+
+
+def _is_whole(value: Any, least: int) -> bool:
+    return (
+        isinstance(value, int | float | np.integer | np.floating)
+        and np.isfinite(value)
+        and value >= least
+        and value == int(value)
+    )
+
+
+def _twice(names: list[str]) -> list[str]:
+    return [name for name in dict.fromkeys(names) if names.count(name) > 1]
+
+
+def _points(
+    grid: NDArray[np.float64], substeps: int, period: float, rest: float
+) -> tuple[NDArray[np.float64], int, NDArray[np.bool_] | None]:
+    """Return communication points, at which of each cycle's a command acts, and which are rows."""
+    place = rest / period * substeps
+    nearest = round(place)
+    if abs(place - nearest) < 1e-9 * substeps:
+        return grid, nearest % substeps, None
+    switch = int(place) + 1
+    cycles = grid[:-1].reshape(-1, substeps)
+    points = np.insert(cycles, switch, cycles[:, 0] + rest, axis=1)
+    wanted = np.ones(points.size + 1, bool)
+    wanted[switch :: substeps + 1] = False
+    return np.append(points.ravel(), grid[-1]), switch, wanted
+
+
+def _called(law: Law, command: list[str]) -> Callable[[int, float, NDArray[np.float64]], Any]:
+    """Return a function as a run calls it; what it returns is checked."""
+    one = f"a finite number for {command[0]}"
+    several = f"{len(command)} finite numbers ({', '.join(command)})"
+    expected = one if len(command) == 1 else several
+
+    def call(cycle: int, time: float, measured: NDArray[np.float64]) -> NDArray[np.float64]:
+        returned = law(time, measured)
+        try:
+            values = np.atleast_1d(np.asarray(returned, float))
+        except (TypeError, ValueError):
+            values = np.array([np.nan])
+        if values.shape != (len(command),) or not np.isfinite(values).all():
+            raise FmuError(
+                f"the controller returned {returned!r} at t = {time:g} s; {expected} must come back"
+            )
+        return values
+
+    return call
+
+
+def _reference(
+    reference: pd.DataFrame | None, measured: list[str], command: list[str]
+) -> dict[str, History]:
+    """Return what is wanted, by name."""
+    if reference is None:
+        return {}
+    allowed = [*measured, *command, *QUATERNION]
+    if not isinstance(reference, pd.DataFrame) or "time" not in reference.columns:
+        raise FmuError(
+            "reference must be a pandas.DataFrame with the column time and any of "
+            f"{', '.join([*measured, *command])}"
+        )
+    problems = []
+    time = reference["time"].to_numpy(float)
+    if len(time) < 2 or not np.isfinite(time).all() or (np.diff(time) < 0).any():
+        problems.append("time in reference must be two finite numbers or more that grow")
+    histories = {}
+    for name in reference.columns:
+        if name == "time":
+            continue
+        if name not in allowed:
+            hint = did_you_mean(str(name), allowed)
+            problems.append(f"reference has {name}, which is neither measured nor a command{hint}")
+            continue
+        try:
+            values = reference[name].to_numpy(float)
+        except (TypeError, ValueError) as error:
+            problems.append(f"the column {name} of reference is not of numbers: {error}")
+            continue
+        if not np.isfinite(values).all():
+            problems.append(f"the column {name} of reference is not finite everywhere")
+        histories[str(name)] = values
+    some = [name for name in QUATERNION if name in histories]
+    if 0 < len(some) < 4 and any(name not in measured for name in some):
+        problems.append(f"reference has {', '.join(some)} of q[1], …, q[4]: all four are needed")
     if problems:
         raise FmuError("; ".join(problems))
+    return {name: History(time, values, None, False) for name, values in histories.items()}
 
-    steps = max(round(stop / period), 1) * substeps
-    time = np.arange(steps + 1) * (period / substeps)
-    given = {name: history.after(time) for name, history in histories.items()}
-    now = 0.0
-    commands, recorded = np.empty(steps + 1), np.empty((steps + 1, len(columns)))
-    on_the_way = deque([0.0] * latency)
-    start = {name: float(values[0]) for name, (values, _) in given.items()}
-    with Plant(model, parameters, tolerance=tolerance, inputs={command: 0.0, **start}) as plant:
-        for k in range(steps):
-            recorded[k] = plant.get(columns)
-            if k % substeps == 0:
-                on_the_way.append(float(law(float(time[k]), np.array(plant.get(measured)))))
-                now = on_the_way.popleft()
-                plant.set(command, now)
-            commands[k] = now
-            for name, (values, slopes) in given.items():
-                plant.set(name, values[k])
-                if slopes[k]:
-                    plant.set_slope(name, slopes[k])
-            plant.step(float(time[k + 1]))
-        recorded[-1], commands[-1] = plant.get(columns), now
-    table = pd.DataFrame(
-        {"time": time, command: commands}
-        | {name: values for name, (values, _) in given.items()}
-        | dict(zip(columns, recorded.T, strict=True)),
-        copy=False,
-    )
-    units = {name: fmu.unit(name) for name in table.columns if name != "time"}
-    table.attrs["units"] = {"time": "s"} | units
-    return table
+
+def _linear(
+    controller: Any, period: float, measured: list[str], command: list[str]
+) -> LinearModel | None:
+    """Return a controller as a sampled linear model of this period; None: it is a function."""
+    if isinstance(controller, LinearModel):
+        model = controller
+    elif hasattr(controller, "dt") and hasattr(controller, "ninputs"):
+        model = _from_control(controller)
+    elif callable(controller):
+        return None
+    else:
+        try:
+            gains = np.atleast_2d(np.asarray(controller, float))
+        except (TypeError, ValueError):
+            gains = np.empty(0)
+        if gains.ndim != 2:
+            raise FmuError(
+                "the controller must be a function of time and measurements, a matrix of gains, a "
+                f"LinearModel or a system of python-control, not {type(controller).__name__}"
+            )
+        none = np.zeros((0, 0))
+        B, C = np.zeros((0, gains.shape[1])), np.zeros((len(gains), 0))
+        model = LinearModel(none, B, C, gains, (), (), (), period)
+    found = model.D.shape
+    if found != (len(command), len(measured)):
+        raise FmuError(
+            f"the controller has {found[1]} inputs and {found[0]} outputs; it needs "
+            f"{len(measured)} ({', '.join(measured)}) and {len(command)} ({', '.join(command)})"
+        )
+    if not all(np.isfinite(m).all() for m in model):
+        raise FmuError("the controller has numbers that are not finite")
+    if model.period is None:
+        return _tustin(model, period)
+    if abs(model.period - period) > 1e-9 * period:
+        raise FmuError(
+            f"the controller is sampled with {model.period:g} s, the loop with {period:g} s"
+        )
+    return model
+
+
+def _tustin(model: LinearModel, period: float) -> LinearModel:
+    """Return a continuous controller discretised by Tustin's rule, s = 2/T (z − 1)/(z + 1)."""
+    from scipy.signal import cont2discrete
+
+    if len(model.A) and np.abs(np.linalg.eigvals(model.A) * period - 2).min() < 1e-9:
+        raise FmuError(
+            f"the controller has a pole at 2/period = {2 / period:g} rad/s, which Tustin's rule "
+            "cannot discretise; give it in discrete time"
+        )
+    A, B, C, D = model
+    if len(A):
+        A, B, C, D, _ = cont2discrete((A, B, C, D), period, "bilinear")
+    return LinearModel(A, B, C, D, model.states, model.inputs, model.outputs, period)
+
+
+def _from_control(system: Any) -> LinearModel:
+    """Return a system of python-control; period None is continuous time."""
+    import control
+
+    try:
+        state_space = control.ss(system)
+    except Exception as error:  # of several kinds
+        raise FmuError(
+            f"the controller has no state space (is it improper, s alone in it?): {error}"
+        ) from None
+    A, B, C, D = (np.asarray(getattr(state_space, m), float) for m in "ABCD")
+    period = system.dt
+    if len(A) and (period is None or period is True):
+        raise FmuError(
+            "the controller's time base is not specified: dt=0 is continuous time, dt=0.1 a period"
+        )
+    if not len(A):
+        period = 0
+    states = tuple(str(name) for name in state_space.state_labels)
+    return LinearModel(
+        A, B, C, D, states, tuple(state_space.input_labels), tuple(state_space.output_labels),
+        float(period) or None,
+    )  # fmt: skip

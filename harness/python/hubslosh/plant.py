@@ -5,7 +5,10 @@ torque and the slope of the chord to the next row, so that it sees straight line
 ``hubslosh run`` does. All variables have their FMU names and SI units.
 """
 
+import atexit
 import contextlib
+import copy
+import threading
 import warnings
 from collections.abc import Mapping, Sequence
 from ctypes import byref
@@ -20,6 +23,7 @@ from fmpy.logging import addLoggerProxy
 
 from . import batch
 from .batch import Rows, Signals
+from .feedback import Feedback
 from .fmu import PLATFORM, Fmu, FmuError, FmuWarning, Quantity
 
 TORQUE = "tau_cmd"
@@ -31,14 +35,21 @@ COLUMNS = ("omega", "omega_imu", "slosh_angle", "slosh_angle_radial")
 _INSTANCE = "hubslosh"
 """Name of our instances, by which the logger knows them."""
 
-_messages: list[str] = []
-"""What the FMU said during the present call."""
+
+class _Messages(threading.local):
+    """What FMUs said during the present call of this thread."""
+
+    def __init__(self) -> None:
+        self.said: list[str] = []
+
+
+_messages = _Messages()
 
 
 def _log(environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
     """Keep the messages of our instances; print those of others, as fmpy does."""
     if name.decode() == _INSTANCE:
-        _messages.append(message.decode(errors="replace"))
+        _messages.said.append(message.decode(errors="replace"))
     else:
         printLogMessage(environment, name, status, category, message)
 
@@ -64,6 +75,33 @@ class RunError(FmuError):
         """What was recorded until then."""
 
 
+_LOADING = threading.Lock()
+_libraries: dict[tuple[type, Path], Any] = {}
+"""fmpy's objects without an instance, for each library that has been loaded."""
+
+
+def _loaded(kind: type, fmu: Fmu, identifier: str, binary: Path) -> Any:
+    """Return fmpy's object for a new instance; the library stays loaded until the program ends.
+
+    fmpy changes the working directory while it loads one, which threads share: it is done once.
+    """
+    with _LOADING:
+        if (kind, binary) not in _libraries:
+            library = kind(
+                guid=fmu.description.guid,
+                modelIdentifier=identifier,
+                unzipDirectory=fmu.directory,
+                instanceName=_INSTANCE,
+                libraryPath=str(binary),
+            )
+            # later than the folder's removal, hence called before it
+            atexit.register(library.freeLibrary)
+            _libraries[kind, binary] = library
+        instance = copy.copy(_libraries[kind, binary])
+    instance.freeLibrary = lambda: None
+    return instance
+
+
 class Instance:
     """An instance of an FMU 2.0, from fmi2Instantiate to fmi2FreeInstance; variables by name.
 
@@ -87,21 +125,15 @@ class Instance:
             there = ", ".join(sorted(path.name for path in folder.glob("*"))) or "none"
             raise FmuError(f"{fmu.path} has no binary for {PLATFORM} (platforms in it: {there})")
         try:
-            instance = kind(
-                guid=description.guid,
-                modelIdentifier=interface.modelIdentifier,
-                unzipDirectory=fmu.directory,
-                instanceName=_INSTANCE,
-                libraryPath=str(binary),
-            )
+            instance = _loaded(kind, fmu, interface.modelIdentifier, binary)
         except Exception as error:  # fmpy raises nothing more special
             raise FmuError(f"{fmu.path} cannot be loaded: {error}") from None
-        _messages.clear()
+        _messages.said.clear()
         try:
             instance.instantiate(callbacks=_CALLBACKS)
         except Exception as error:
             instance.freeLibrary()
-            raise FmuError(" ".join([str(error), *_messages])) from None
+            raise FmuError(" ".join([str(error), *_messages.said])) from None
         self._instance = instance
 
     def __enter__(self) -> Self:
@@ -159,12 +191,12 @@ class Instance:
 
     def _call(self, function: str, *args: Any, **kwargs: Any) -> Any:
         """Call a function of fmpy's instance; an error or a warning carries what the FMU logged."""
-        _messages.clear()
+        _messages.said.clear()
         try:
             result = getattr(self._instance, function)(*args, **kwargs)
         except FMICallException as error:
-            raise FmuError(" ".join([str(error), *_messages])) from None
-        for message in _messages:
+            raise FmuError(" ".join([str(error), *_messages.said])) from None
+        for message in _messages.said:
             warnings.warn(message, FmuWarning, stacklevel=5)
         return result
 
@@ -230,14 +262,15 @@ class Plant(Instance):
         inputs: Mapping[str, np.ndarray],
         slopes: Mapping[str, np.ndarray] | None,
         columns: Sequence[str],
+        feedback: Feedback | None = None,
     ) -> dict[str, np.ndarray]:
         """Step from row to row in one call and return ``columns`` at every row.
 
         time: communication points, s, from the present one on, growing. inputs: by name, their
         values from each row to the next. slopes: the derivatives of the Real ones, per s; None:
-        inputs are held. Returns an array per column: floats, integers (enumerations by number) or
-        bools. An output that follows an input at once shows its jump in the next row: rows are
-        read before inputs are set.
+        inputs are held. feedback: a controller, of other inputs. Returns an array per column:
+        floats, integers (enumerations by number) or bools. An output that follows an input at once
+        shows its jump in the next row: rows are read before inputs are set.
         """
         rows = len(time)
         numbers: dict[str, list[str]] = {"Real": [], "Integer": [], "Boolean": []}
@@ -264,17 +297,21 @@ class Plant(Instance):
             integer_outputs=signals(outputs["getInteger"], whole, None),
             boolean_outputs=signals(outputs["getBoolean"], whole, None),
         )
-        _messages.clear()
-        stop = batch.run(self._instance, run)
+        _messages.said.clear()
+        stop = batch.run(self._instance, run, feedback)
         recorded = dict(zip(outputs["getReal"], run.real_outputs.values.T, strict=True))
         recorded |= zip(outputs["getInteger"], run.integer_outputs.values.T, strict=True)
         recorded |= zip(outputs["getBoolean"], run.boolean_outputs.values.T != 0, strict=True)
         result = {name: recorded[name] for name in columns}
         if stop is None:
             self.time = float(time[-1])
+            for message in _messages.said:
+                warnings.warn(message, FmuWarning, stacklevel=3)
             return result
         self.time = float(time[stop.row])
-        said = " ".join(_messages)
+        if feedback is not None and feedback.error is not None:
+            raise feedback.error
+        said = " ".join(_messages.said)
         sentence = f"the run stopped at t = {self.time} s: {stop.function} returned "
         sentence += batch.STATUS[stop.status] if 0 <= stop.status < 6 else str(stop.status)
         sentence += f": {said}" if said else " without a message"

@@ -3,16 +3,20 @@
 Each function draws into the axes it is given, or into a new figure, and returns the axes.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
+from .arguments import check_table
 from .fmu import FmuError, did_you_mean
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from .linearization import LinearModel
 
@@ -36,6 +40,7 @@ def _subplots(rows: int, **options: Any) -> "Sequence[Axes]":
 
 
 def _check(table: pd.DataFrame, names: Sequence[str]) -> None:
+    check_table(table, "what is drawn")
     there = [str(name) for name in table.columns]
     missing = [f"{name}{did_you_mean(name, there)}" for name in names if name not in there]
     if missing:
@@ -51,6 +56,7 @@ def time_histories(
     run: pd.DataFrame, *names: str, axes: "Sequence[Axes] | None" = None, label: str | None = None
 ) -> "Sequence[Axes]":
     """Draw columns of a run over time, one above the other; by default all of them."""
+    check_table(run, "what is drawn")
     columns = list(names) or [str(c) for c in run.columns if c != "time"]
     _check(run, ["time", *columns])
     axes = _subplots(len(columns), sharex=True) if axes is None else axes
@@ -89,13 +95,18 @@ def bode(
     """Draw gain and phase of frequency responses, one above the other.
 
     Estimates of `frequency_response` are dots with their standard deviation; linear models, of
-    their first input to their first output, are lines over the same band.
+    their first input to their first output, are lines over the same band. Without an estimate the
+    band goes from a fifth of the lowest pole or zero to five times the highest, at most to half the
+    sampling rate.
     """
     frames = [r for r in responses if isinstance(r, pd.DataFrame)]
     for frame in frames:
         _check(frame, ["frequency", "gain", "phase", "gain_std"])
-    if not frames and responses:
-        raise FmuError("bode needs an estimate beside linear models, for the band")
+    models = [r for r in responses if not isinstance(r, pd.DataFrame)]
+    if wrong := [r for r in models if not hasattr(r, "response")]:
+        raise FmuError(
+            f"bode draws tables of frequency_response and LinearModels, not {wrong[0]!r}"
+        )
     gain, phase = _subplots(2, sharex=True) if axes is None else axes
     for k, response in enumerate(responses):
         color = COLORS[k % len(COLORS)]
@@ -108,9 +119,12 @@ def bode(
             )  # fmt: skip
             phase.plot(f, response["phase"], ".", color=color, markersize=4)
         else:
-            low = min(frame["frequency"].min() for frame in frames)
-            high = max(frame["frequency"].max() for frame in frames)
-            line = np.geomspace(low, high, 2000)
+            if frames:
+                low = min(frame["frequency"].min() for frame in frames)
+                high = max(frame["frequency"].max() for frame in frames)
+            else:
+                low, high = band(*models)
+            line = frequencies(response, low, high)
             h = response.response(line)[:, 0, 0]
             # above the dots, which would hide it
             style: dict[str, Any] = {"color": color, "linewidth": 1.2, "zorder": 3}
@@ -122,6 +136,220 @@ def bode(
     phase.set_xlabel("frequency (Hz)")
     for ax in (gain, phase):
         ax.grid(alpha=0.3, which="both")
+    if not frames:
+        gain.set_xscale("log")
     if labels:
         gain.legend()
     return gain, phase
+
+
+def band(*models: "LinearModel") -> tuple[float, float]:
+    """Return the band in which models do something, Hz: a fifth of the lowest pole or zero on."""
+    from scipy.linalg import eigvals
+
+    found, highest = [], np.inf
+    for model in models:
+        n = len(model.A)
+        system = np.block([[model.A, model.B[:, :1]], [model.C[:1], model.D[:1, :1]]])
+        with np.errstate(all="ignore"):
+            zeros = eigvals(system, np.diag([1.0] * n + [0.0]))
+        values = np.concatenate([model.poles, zeros[np.isfinite(zeros)]])
+        if model.period is not None:
+            values = np.log(values[values != 0].astype(complex)) / model.period
+            highest = min(highest, 0.5 / model.period)
+        sizes = np.abs(values) / (2 * np.pi)
+        found += [float(f) for f in sizes if 1e-6 < f < 1e6]
+    low, high = min(found, default=0.1) / 5, max(found, default=10.0) * 5
+    high = min(high, highest)
+    return min(low, high / 100), high
+
+
+def frequencies(model: "LinearModel", low: float, high: float) -> np.ndarray:
+    """Return 2000 frequencies between two, Hz, and more about each lightly damped pole."""
+    line = [np.geomspace(low, high, 2000)]
+    for mode in model.modes(0.3).itertuples():
+        width = max(mode.zeta, 1e-6) * mode.frequency
+        about = width * np.concatenate([[0], np.geomspace(0.05, 50, 60)])
+        line.append(mode.frequency + np.concatenate([-about, about]))
+    every = np.unique(np.concatenate(line))
+    return every[(every >= low) & (every <= high)]
+
+
+def margins(
+    loop: Any,
+    parameters: Mapping[str, Any] | None = None,
+    axes: "Sequence[Axes] | None" = None,
+) -> "Sequence[Axes]":
+    """Draw gain (dB) and phase of a `Loop`'s gain with all its crossings, a colour per command.
+
+    Each loop is drawn with the others closed, as `hubslosh.margins` takes it, which this calls.
+    Gain crossings are dots, phase crossings squares. The smallest margins are written beside them,
+    and those of crossings near slosh.
+    """
+    from .stability import _broken_at, margins_and_gain
+
+    found, loop_gain = margins_and_gain(loop, parameters)
+    table = found.crossings
+    known = table.loc[table["frequency"] > 0, "frequency"]
+    gain, phase = _subplots(2, sharex=True) if axes is None else axes
+    lows, highs = zip(
+        *(band(_broken_at(loop_gain, i)) for i in range(len(loop_gain.D))), strict=True
+    )
+    low = min(known.min() / 5 if len(known) else np.inf, max(lows))
+    high = max(known.max() * 2 if len(known) else 0, min(highs))
+    if loop_gain.period is not None:
+        high = min(high, 0.5 / loop_gain.period)
+    lowest = 0.0
+    for i in range(len(loop_gain.D)):
+        one = _broken_at(loop_gain, i)
+        name = one.inputs[0] if one.inputs else "loop gain"
+        line = frequencies(one, low, high)
+        h = one.response(line)[:, 0, 0]
+        angle = np.degrees(np.unwrap(np.angle(h)))
+        angle -= 360 * np.round((np.median(angle[: max(len(angle) // 4, 1)]) + 90) / 360)
+        lowest = min(lowest, angle.min())
+        style: dict[str, Any] = {"color": COLORS[i % len(COLORS)], "linewidth": 1.1}
+        small = {"textcoords": "offset points", "fontsize": 7, "color": style["color"]}
+        gain.plot(line, 20 * np.log10(np.abs(h)), label=name, **style)
+        phase.plot(line, angle, **style)
+        for row in table[table["loop"] == name].itertuples():
+            if row.frequency <= 0:
+                continue
+            level = float(np.interp(row.frequency, line, angle))
+            if row.crossing == "gain":
+                phase.plot(row.frequency, level, "o", color=style["color"], markersize=4)
+                if row.phase_margin != found.phase_margin and "slosh" not in row.near:
+                    continue
+                text = f"{row.phase_margin:.0f}°" + (" slosh" if "slosh" in row.near else "")
+                phase.annotate(text, (row.frequency, level), (4, 4), **small)
+            else:
+                gain.plot(row.frequency, -row.gain_margin, "s", color=style["color"], markersize=4)
+                if row.gain_margin not in found.gain_margins:
+                    continue
+                place = (row.frequency, -row.gain_margin)
+                gain.annotate(f"{row.gain_margin:.1f} dB", place, (4, 4), **small)
+    gain.axhline(0, color="black", linewidth=0.8)
+    for turn in (-180, -540):
+        if turn == -180 or lowest < turn:
+            phase.axhline(turn, color="black", linewidth=0.8)
+    gain.set_xscale("log")
+    gain.set_xlim(low, high)
+    phase.margins(y=0.15)
+    gain.set_ylabel("loop gain (dB)")
+    phase.set_ylabel("phase (deg)")
+    phase.set_xlabel("frequency (Hz)")
+    delay = f"delay margin {found.delay_margin:.3g} s" if found.stable else "UNSTABLE"
+    crossed = table.loc[
+        (table["crossing"] == "gain") & table["near"].str.contains("slosh"), "frequency"
+    ]
+    slosh = ", ".join(f"{f:.3g}" for f in crossed)
+    margin = f"{found.phase_margin:.0f}°" if np.isfinite(found.phase_margin) else "none"
+    answer = f"phase margin {margin}, {delay}"
+    answer += f"; slosh crosses 0 dB at {slosh} Hz" if slosh else ""
+    gain.set_title(answer, fontsize=10)
+    for ax in (gain, phase):
+        ax.grid(alpha=0.3, which="both")
+    if len(loop_gain.D) > 1:
+        gain.legend()
+    return gain, phase
+
+
+def closed_loop(
+    run: pd.DataFrame,
+    reference: pd.DataFrame | None = None,
+    axes: "Sequence[Axes] | None" = None,
+    label: str | None = None,
+) -> "Sequence[Axes]":
+    """Draw attitude, rates and torques of a run of `hubslosh.closed_loop`, in degrees.
+
+    Of Spacecraft roll, pitch and yaw from its quaternion, of HubSlosh the hub's angle. With the
+    reference that the run had there is also what is left to turn about each axis.
+    """
+    from .attitude import NAMES, angles, error
+
+    _check(run, ["time"])
+    panels: list[tuple[str, dict[str, pd.Series]]] = []
+    if all(name in run.columns for name in NAMES):
+        turned = np.degrees(angles(run))
+        panels.append(("attitude (deg)", {name: turned[name] for name in turned.columns}))
+    elif "theta" in run.columns:
+        panels.append(("attitude (deg)", {"theta": np.degrees(run["theta"])}))
+    if reference is not None:
+        _check(reference, ["time"])
+        wanted = {
+            str(n): np.interp(run["time"], reference["time"], reference[n])
+            for n in reference.columns
+        }
+        if all(name in run.columns and name in wanted for name in NAMES):
+            left = np.degrees(error(run, pd.DataFrame(wanted)))
+            panels.append(
+                (
+                    "left to turn (deg)",
+                    {f"about {x}": left[n] for x, n in zip("xyz", left, strict=True)},
+                )
+            )
+        elif "theta" in run.columns and "theta" in wanted:
+            panels.append(
+                ("left to turn (deg)", {"theta": np.degrees(wanted["theta"] - run["theta"])})
+            )
+    rates = [n for n in run.columns if n == "omega" or n.startswith("omega[")]
+    if rates:
+        panels.append(("rate (deg/s)", {n: np.degrees(run[n]) for n in rates}))
+    torques = [n for n in run.columns if n == "tau_cmd" or n.startswith("torque[")]
+    if torques:
+        panels.append(("torque (N·m)", {n: run[n] for n in torques}))
+    if not panels:
+        raise FmuError("the run has neither an attitude, rates nor torques; see time_histories")
+    axes = _subplots(len(panels), sharex=True) if axes is None else axes
+    for ax, (title, lines) in zip(axes, panels, strict=True):
+        for name, values in lines.items():
+            text = name if label is None else f"{name}, {label}"
+            color = COLORS[len(ax.lines) % len(COLORS)]
+            ax.plot(run["time"], values, color=color, linewidth=0.9, label=text)
+        ax.set_ylabel(title)
+        ax.grid(alpha=0.3)
+        ax.legend(fontsize=8)
+    axes[-1].set_xlabel("time (s)")
+    return axes
+
+
+def monte_carlo(
+    table: pd.DataFrame, *columns: str, axes: "Sequence[Axes] | None" = None, at: float = 0.95
+) -> "Sequence[Axes]":
+    """Draw the share of runs below each value, of each result of `hubslosh.monte_carlo`.
+
+    columns: by default every number that is no drawn parameter's, the names with a dot or bracket.
+    A vertical line and a band are the quantile ``at`` with its 95 % interval.
+    """
+    from .sampling import quantiles
+
+    check_table(table, "what is drawn")
+    numbers = [str(c) for c in table.select_dtypes("number").columns if c != "run"]
+    names = list(columns) or [n for n in numbers if "." not in n and "[" not in n]
+    _check(table, names)
+    if not names:
+        raise FmuError("the table has no results to draw")
+    axes = _subplots(len(names)) if axes is None else axes
+    for ax, row in zip(axes, quantiles(table, names, at=[at]).itertuples(), strict=True):
+        values = np.sort(table[row.result].dropna().to_numpy(float))
+        share = 100 * np.arange(1, len(values) + 1) / len(values)
+        ax.step(values, share, where="post", color=COLORS[0], linewidth=1.2)
+        right = row.high if np.isfinite(row.high) else values[-1]
+        left = row.low if np.isfinite(row.low) else values[0]
+        ax.axvspan(left, right, color=COLORS[1], alpha=0.2, linewidth=0)
+        text = f"{100 * at:g} % below {row.value:.4g}"
+        ax.axvline(row.value, color=COLORS[1], linewidth=1, label=text)
+        ax.set_ylabel("runs (%)")
+        ax.set_xlabel(_label(table, row.result))
+        ax.grid(alpha=0.3)
+        ax.legend(fontsize=8)
+    return axes
+
+
+def save(figure: "Figure", path: "str | Path") -> None:
+    """Write a figure; the same figure gives the same bytes, as SVG too."""
+    import matplotlib
+
+    metadata = {"Date": None} if str(path).endswith(".svg") else None
+    with matplotlib.rc_context({"svg.hashsalt": "hubslosh"}):
+        figure.savefig(path, metadata=metadata)

@@ -1,14 +1,15 @@
 """What the program ``hubslosh`` does: campaigns and identification.
 
-It comes with the project's source (``cargo build --release``), not with this package.
+It comes with this package's wheel, or is built from the project's source.
 """
 
 import json
 import os
 import shutil
 import subprocess
+import sysconfig
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -19,7 +20,11 @@ from .fmu import FmuError, find, source_tree
 
 
 def find_program(path: str | Path | None = None) -> Path:
-    """Return where the program is: at ``path``, $HUBSLOSH, on PATH, or in the source tree."""
+    """Return where the program is.
+
+    At ``path``; named in $HUBSLOSH; where pip has put it with this package; on PATH; in the source
+    tree.
+    """
     exe = "hubslosh.exe" if os.name == "nt" else "hubslosh"
     named = path or os.environ.get("HUBSLOSH")
     if named:
@@ -27,17 +32,27 @@ def find_program(path: str | Path | None = None) -> Path:
         if found is None:
             raise FmuError(f"there is no program at {named}")
         return Path(found)
+    root = source_tree()
+    if not root and (packed := next(filter(os.path.isfile, _scripts(exe)), None)):
+        return packed
     if found := shutil.which(exe):
         return Path(found)
-    if root := source_tree():
+    if root:
         built = root / os.environ.get("CARGO_TARGET_DIR", "target") / "release" / exe
         if built.is_file():
             return built
     raise FmuError(
-        "the program hubslosh was not found, which does this; build it from the project's source "
-        "(cargo build --release), then put it on PATH, name it in the environment variable "
-        "HUBSLOSH, or give program="
+        "the program hubslosh was not found, which does this; it comes with the wheel of this "
+        "package, or is built from the project's source (cargo build --release): put it on PATH, "
+        "name it in the environment variable HUBSLOSH, or give program="
     )
+
+
+def _scripts(exe: str) -> Iterator[Path]:
+    """Yield where pip puts a wheel's programs: in an environment, for a user, with --target."""
+    yield Path(sysconfig.get_path("scripts")) / exe
+    yield Path(sysconfig.get_path("scripts", sysconfig.get_preferred_scheme("user"))) / exe
+    yield Path(__file__).resolve().parents[1] / "bin" / exe
 
 
 def _run(program: Path, arguments: Sequence[str | Path]) -> str:
@@ -86,6 +101,36 @@ def campaign(
     return table
 
 
+def analyse(
+    recordings: str | Path | Sequence[str | Path],
+    out: str | Path,
+    *arguments: str,
+    columns: str | None = None,
+    settings: dict[str, object] | None = None,
+    fmu: str | Path = "HubSlosh",
+    program: str | Path | None = None,
+) -> pd.DataFrame:
+    """Analyse recordings of a bench with ``hubslosh analyse``, and return its table of runs.
+
+    recordings: files (text, .parquet, .mat) with torque and one to three rates. out: directory for
+    runs, tables and report.html. columns: which columns they are, in what units, as
+    ``"time=t:ms,tau_cmd=T:mNm,omega=gyro_z:deg/s"``. settings: what is known of the bench by its
+    FMU name, ``{"tank.h": 0.1}``. arguments: further flags of the command.
+
+    Returns ``runs.csv``, as :func:`campaign` does; the model of a recording is ``recording``.
+    """
+    files = [recordings] if isinstance(recordings, str | Path) else list(recordings)
+    flags = ["--columns", columns] if columns else []
+    for name, value in (settings or {}).items():
+        text = str(value).lower() if isinstance(value, bool) else str(value)
+        flags += ["--set", f"{name}={text}"]
+    where: list[str | Path] = ["--fmu", find(fmu), "--out", out]
+    _run(find_program(program), ["analyse", *files, *flags, *arguments, *where])
+    table = pd.read_csv(Path(out) / "runs.csv")
+    table.attrs["directory"] = Path(out)
+    return table
+
+
 @dataclass(frozen=True)
 class Estimated:
     """An estimated number, in SI units."""
@@ -100,7 +145,9 @@ class Estimated:
     unit: str
 
 
-Method = Literal["output-error", "acceleration", "frequency", "multisine", "black-box"]
+Method = Literal[
+    "output-error", "acceleration", "frequency", "multisine", "black-box", "free-decay"
+]
 """The methods of ``hubslosh identify``."""
 
 
@@ -137,9 +184,10 @@ def identify(
 ) -> Identification:
     """Estimate the FMU's parameters from a measurement, with the program ``hubslosh identify``.
 
-    data: a table, or a .csv or .parquet file, with the columns ``time`` (s), ``tau_cmd`` (N·m) and
-    ``omega`` (rad/s). model: the slosh model. arguments: further flags of the command. fmu: the
-    name of an FMU of this package, or the file of a HubSlosh. out: where to keep the result, .json.
+    data: a table, or a file (text, .parquet, .mat), with the columns ``time`` (s), ``tau_cmd``
+    (N·m) and ``omega`` (rad/s), or others by the flag ``--columns``. model: the slosh model.
+    arguments: further flags of the command. fmu: the name of an FMU of this package, or the file
+    of a HubSlosh. out: where to keep the result, .json.
 
     The parameters with ``settings`` simulate the bench:
     ``{n: e.value for n, e in found.parameters.items()} | found.settings``, and so does the file:
@@ -147,7 +195,9 @@ def identify(
 
     method: "output-error" simulates the FMU; "acceleration" finds friction and inertia where no
     liquid moves; "frequency" three poles and two zeros; "multisine" and "black-box" estimate no
-    parameters of the FMU, `all` has their results.
+    parameters of the FMU, `all` has their results; "free-decay" takes data without torque, with
+    ``wave_height`` (m), ``force`` (N), ``theta`` (rad) or ``omega``, and finds frequency and
+    damping.
     """
     if any(argument.split("=")[0] == "--method" for argument in arguments):
         raise FmuError("--method is given as method=")
@@ -156,7 +206,8 @@ def identify(
         file, result = Path(folder) / "data.parquet", Path(folder) / "result.json"
         result = result if out is None else Path(out)
         if isinstance(data, pd.DataFrame):
-            missing = [name for name in ("time", "tau_cmd", "omega") if name not in data.columns]
+            needed = ("time",) if method == "free-decay" else ("time", "tau_cmd", "omega")
+            missing = [name for name in needed if name not in data.columns]
             if missing:
                 raise FmuError(f"data has no column {', '.join(missing)}")
             file = file.with_suffix(".csv")

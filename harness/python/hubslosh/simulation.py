@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from .arguments import names_of, not_numbers
 from .fmu import INTEGERS, Fmu, FmuError, Quantity, did_you_mean
 from .plant import TORQUE, Plant
 from .tables import read_parameters
@@ -54,7 +55,7 @@ def simulate(
     inputs: pd.DataFrame | None = None,
     stop: float | None = None,
     step: float | None = None,
-    outputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | str | None = None,
     *,
     start: float | None = None,
     tolerance: float | None = None,
@@ -84,16 +85,17 @@ def simulate(
     Raises FmuError with everything that is wrong with the arguments, or with what the FMU says.
     """
     fmu = Fmu.open(model)
-    if isinstance(parameters, str | Path):
-        parameters = read_parameters(Path(parameters))
+    parameters = parameters_of(parameters)
     problems: list[str] = []
     histories = histories_of(fmu, inputs, hold, problems)
     rows = next(iter(histories.values())).time if histories else None
-    if rows is None and inputs is not None and "time" in inputs and not problems:
+    if rows is None and inputs is not None and not problems and "time" in inputs:
         rows = inputs["time"].to_numpy(float)
-    check_parameters(fmu, parameters or {}, histories, problems)
-    columns = fmu.names("output") if outputs is None else list(outputs)
+    check_parameters(fmu, parameters, histories, problems)
+    columns = fmu.names("output") if outputs is None else names_of(outputs, "outputs", problems)
     check_outputs(fmu, columns, problems)
+    if wrong := not_numbers(start=start, stop=stop, step=step, tolerance=tolerance):
+        raise FmuError("; ".join(problems + wrong))
     experiment = fmu.description.defaultExperiment
 
     def suggested(name: str, otherwise: float) -> float:
@@ -143,6 +145,22 @@ def simulate(
     return table
 
 
+def parameters_of(
+    parameters: Mapping[str, Quantity] | str | Path | None,
+) -> dict[str, Quantity]:
+    """Return parameters by name; a text or a path is a file of them."""
+    if isinstance(parameters, str | Path):
+        return dict(read_parameters(Path(parameters)))
+    if parameters is None:
+        return {}
+    if not isinstance(parameters, Mapping):
+        raise FmuError(
+            'parameters must be values by name, such as {"tank.h": 0.1}, or the file of a '
+            f"parameter set, not {parameters!r}"
+        )
+    return dict(parameters)
+
+
 def too_many_rows(start: float, stop: float, step: float) -> list[str]:
     """Return what is wrong with that many rows, if they are more than a computer should hold."""
     rows = (stop - start) / step
@@ -186,6 +204,12 @@ def histories_of(
 ) -> dict[str, History]:
     """Return the inputs' histories by name; what is wrong with the table goes to ``problems``."""
     if inputs is None:
+        return {}
+    if not isinstance(inputs, pd.DataFrame):
+        problems.append(
+            "inputs must be a pandas.DataFrame with the column time and one for each input, "
+            f"not {type(inputs).__name__}"
+        )
         return {}
     known = fmu.names("input")
     slopes = {column: name for column, name in SLOPES.items() if name in known}

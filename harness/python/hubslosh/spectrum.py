@@ -6,6 +6,7 @@ This is an estimate of its own, independent of the one in the program ``hubslosh
 import numpy as np
 import pandas as pd
 
+from .arguments import check_numbers, check_table, vector
 from .fmu import FmuError, did_you_mean
 
 BINS = 3
@@ -47,6 +48,10 @@ def frequency_response(
     """
     from scipy import fft, signal
 
+    check_table(data, "data")
+    check_numbers(resolution=resolution)
+    if band is not None:
+        vector(band, 2, "band")
     problems = [
         f"data has no column {name}{did_you_mean(name, map(str, data.columns))}"
         for name in ("time", input, output)

@@ -33,12 +33,15 @@ def read_table(path: Path, columns: Sequence[str]) -> dict[str, np.ndarray]:
     return {name: table[name].to_numpy().astype(float) for name in columns}
 
 
-def read_parameters(path: Path) -> dict[str, Value]:
+def read_parameters(path: str | Path) -> dict[str, Value]:
     """Read a file of parameters: .toml, .ssv or .json.
 
     ``"name" = value`` as TOML (nested tables are names with dots), SSP 1.0's parameter set
     (``hubslosh tank --parameters`` writes both), or what ``hubslosh identify --out`` writes.
     """
+    if not isinstance(path, str | Path):
+        raise FmuError(f"the file of parameters must be a path, not {path!r}")
+    path = Path(path)
     try:
         text = path.read_text(encoding="utf-8")
         if path.suffix == ".toml":

@@ -102,7 +102,7 @@ def test_each_processor_has_its_folder(system: str, machine: str, folder: str) -
     """FMI 2.0.5, section 2.3: linux64 is for x86-64, ARM has a platform tuple."""
     program = (
         f"import platform, sys; sys.platform = {system!r}; platform.machine = lambda: {machine!r}; "
-        "import hubslosh; print(hubslosh.fmu.PLATFORM)"
+        "from hubslosh.fmu import PLATFORM; print(PLATFORM)"
     )
     command = [sys.executable, "-c", program]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=PACKAGE)

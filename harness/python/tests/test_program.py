@@ -1,5 +1,7 @@
 """What the package has the program ``hubslosh`` do."""
 
+import json
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +11,7 @@ from conftest import option
 
 import hubslosh
 from hubslosh import FmuError
+from hubslosh.fmu import Fmu
 
 PLAN = """
 title = "Two pulses"
@@ -24,6 +27,53 @@ def test_a_campaign_comes_back_as_a_table(fmu: Path, tmp_path: Path, request) ->
     table = hubslosh.campaign(PLAN, tmp_path / "out", model=fmu, program=binary)
     assert len(table) == 2
     assert (table.attrs["directory"] / "report.html").is_file()
+
+
+def test_a_recording_comes_back_as_a_row_beside_the_model(
+    fmu: Path, tmp_path: Path, request
+) -> None:
+    """As a logger has written it: other names, milliseconds, semicolons, decimal commas."""
+    binary = option(request, "--hubslosh")
+    profile = "exp-sweep:f0=1.25,f1=3.5,duration=60"
+    time, growth = 0.02 * np.arange(3001), np.log(3.5 / 1.25) / 60
+    torque = 0.1 * np.sin(2 * np.pi * 1.25 * np.expm1(growth * time) / growth)
+    inputs = pd.DataFrame({"time": time, "tau_cmd": torque})
+    run = hubslosh.simulate(fmu, inputs=inputs, outputs=["omega"])
+    table = pd.DataFrame({"t": 1e3 * time, "T": torque, "w": run["omega"]})
+    table.to_csv(tmp_path / "bench.csv", sep=";", decimal=",", index=False)
+    found = hubslosh.analyse(
+        tmp_path / "bench.csv",
+        tmp_path / "out",
+        "--profile",
+        profile,
+        "--model",
+        "linear",
+        columns="time=t:ms,tau_cmd=T,omega=w",
+        settings={"tank.h": 0.1},
+        fmu=fmu,
+        program=binary,
+    )
+    assert list(found["model"]) == ["recording", "linear"]
+    # the recording is the model's run but for the sine's last digits and rounding of milliseconds
+    assert np.ptp(found["fit_freq_pct"]) < 1e-4
+
+
+def test_units_are_those_of_the_command_line(fmu: Path, request) -> None:
+    """Every variable takes the same units in both, by the same factors."""
+    command = [option(request, "--hubslosh"), "variables", "--json", "--fmu", fmu]
+    listed = json.loads(subprocess.run(command, capture_output=True, check=True).stdout)
+    opened = Fmu.open(fmu)
+    assert {variable["name"] for variable in listed} == opened.variables.keys()
+    several = 0
+    for variable in listed:
+        name, units = variable["name"], variable["units"]
+        own = opened.unit(name)
+        assert set(units) == {unit for unit in (own, *opened._units.get(own, {})) if unit}, name
+        for unit, scale in units.items():
+            assert opened.scale(name, unit) == (scale["factor"], scale["offset"]), (name, unit)
+        several += len(units) > 1
+    assert several > 50, "most angles and lengths have a display unit"
+    assert opened.convert("tank.h", "50 mm") == opened.convert("tank.h", "50mm") == 0.05
 
 
 def test_what_the_program_refuses_is_told_in_its_words(fmu: Path, tmp_path: Path, request) -> None:

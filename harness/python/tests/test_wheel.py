@@ -7,6 +7,7 @@ import os
 import re
 import subprocess
 import sys
+import textwrap
 import zipfile
 from pathlib import Path
 
@@ -14,6 +15,8 @@ import nbformat
 import pytest
 from conftest import ROOT, TARGET, option
 from nbclient import NotebookClient
+from packaging.tags import sys_tags
+from packaging.utils import parse_wheel_filename
 
 import environment
 
@@ -64,11 +67,22 @@ def test_the_record_has_every_file_and_its_hash(wheel: Path) -> None:
     assert {"hubslosh/py.typed", *fmus} <= set(names)
 
 
+def test_the_tag_is_of_this_machine_alone(wheel: Path) -> None:
+    """As pip reads it from the name, and as the wheel says itself."""
+    tags = parse_wheel_filename(wheel.name)[3]
+    assert set(tags) & set(sys_tags())
+    with zipfile.ZipFile(wheel) as archive:
+        said = next(n for n in archive.namelist() if n.endswith(".dist-info/WHEEL"))
+        lines = archive.read(said).decode().splitlines()
+    assert {f"Tag: {tag}" for tag in tags} <= set(lines) and "Root-Is-Purelib: false" in lines
+    assert all(tag.platform != "any" for tag in tags)
+
+
 def python_in(page: Path) -> list[str]:
     """Return the blocks of Python in a page of Markdown."""
-    blocks = re.findall(r"^```python\n(.*?)^```", page.read_text(), re.DOTALL | re.MULTILINE)
+    blocks = re.findall(r"^ *```python\n(.*?)^ *```", page.read_text(), re.DOTALL | re.MULTILINE)
     assert blocks, f"{page} has no Python"
-    return blocks
+    return [textwrap.dedent(block) for block in blocks]
 
 
 @pytest.mark.parametrize("readme", [ROOT / "README.md", HERE / "README.md"])
@@ -81,24 +95,38 @@ def test_the_code_in_a_readme_runs(installed: Path, tmp_path: Path, readme: Path
         assert done.returncode == 0, f"{code}\n{done.stderr}"
 
 
-def test_the_books_page_for_python_runs(wheel: Path, tmp_path: Path, request) -> None:
-    """All its blocks as one program, with the wheel, matplotlib and the harness's binary."""
+def run_pages(pages: tuple[str, ...], wheel: Path, folder: Path, request) -> str:
+    """Run pages of the book as one program, with the wheel, matplotlib and the harness's binary."""
     with zipfile.ZipFile(wheel) as archive:
-        archive.extractall(tmp_path / "wheel")
-    code = "\n".join(python_in(ROOT / "book" / "python.md"))
+        archive.extractall(folder / "wheel")
+    code = "\n".join(block for page in pages for block in python_in(ROOT / "book" / f"{page}.md"))
     surroundings = os.environ | {
-        "PYTHONPATH": str(tmp_path / "wheel"),
+        "PYTHONPATH": str(folder / "wheel"),
         "HUBSLOSH": str(option(request, "--hubslosh")),
         "MPLBACKEND": "agg",
-        "MPLCONFIGDIR": str(tmp_path),
+        "MPLCONFIGDIR": str(folder),
     }
     done = subprocess.run(
         [sys.executable, "-c", code],
-        cwd=tmp_path, env=surroundings, capture_output=True, text=True, check=False,
+        cwd=folder, env=surroundings, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert "there are frozen, linear, planar, spherical" in done.stdout
+    return done.stdout
+
+
+def test_the_books_page_for_python_runs(wheel: Path, tmp_path: Path, request) -> None:
+    """All its blocks as one program."""
+    said = run_pages(("python",), wheel, tmp_path, request)
+    assert "there are frozen, linear, planar, spherical" in said
     for file in ("loop.png", "bode.png", "path.png", "slew/report.html"):
+        assert (tmp_path / file).stat().st_size > 1000, file
+
+
+def test_the_books_pages_about_a_spacecraft_run(wheel: Path, tmp_path: Path, request) -> None:
+    """The worked example, then the three questions."""
+    pages = ("spacecraft", "which_damping", "how_many_modes", "is_it_slosh")
+    assert "slosh of tank 1, slosh of tank 2" in run_pages(pages, wheel, tmp_path, request)
+    for file in ("tank.svg", "margins.png", "slew.png"):
         assert (tmp_path / file).stat().st_size > 1000, file
 
 

@@ -1,0 +1,65 @@
+"""Search the book in a browser and say what is not found.
+
+Needs Playwright (``requirements-browser.txt``) and Debian's Chromium; ``.ci/browser`` gets both.
+"""
+
+import argparse
+import shutil
+import sys
+from pathlib import Path
+
+from playwright.sync_api import Page, sync_playwright
+
+ALIKE = (
+    ("linearise", "linearize", "linearisation", "linearized"),
+    ("behaviour", "behavior"),
+    ("controller", "controler"),
+    ("manoeuvre", "maneuver"),
+    ("centre", "center"),
+)
+"""Words that must find the same sections, one at least: spellings, endings, a common mistake."""
+MEANT = {
+    "dampign": "damping",
+    "frequncy response": "frequency response",
+    "spherical pendulm": "spherical pendulum",
+}
+"""What is proposed where nothing is found."""
+
+
+def titles(page: Page, text: str) -> list[str]:
+    """Return the titles of what a search finds."""
+    page.fill("#search", text)
+    return page.locator("#found a").all_text_contents()
+
+
+def main() -> None:
+    """Check one book; exit with 1 and a sentence if something is not found."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser.add_argument("book", type=Path, help="the folder with index.html")
+    arguments = parser.parse_args()
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        sys.exit("no chromium: .ci/browser installs it")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        page = browser.new_page()
+        page.goto((arguments.book / "index.html").absolute().as_uri())
+        for words in ALIKE:
+            found = {word: sorted(titles(page, word)) for word in words}
+            first = found[words[0]]
+            assert first and all(other == first for other in found.values()), found
+        for wrong, right in MEANT.items():
+            assert not titles(page, wrong)
+            page.locator("#found button").click()
+            assert page.input_value("#search") == right
+            assert page.locator("#found a").count()
+        for nonsense in ("ttt", "xyzzy"):
+            assert not titles(page, nonsense)
+            assert f"No page has “{nonsense}”" in page.inner_text("#found")
+            assert not page.locator("#found button").count()
+        browser.close()
+    print(f"{arguments.book}: spellings, endings, mistakes")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,166 @@
+"""Attitude: quaternions, angles, and the slew from one to another.
+
+A quaternion q has its scalar first and maps body to inertial axes, as Spacecraft's ``q[1]`` …
+``q[4]``. Angles are in rad.
+"""
+
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .arguments import check_numbers, vector
+from .fmu import FmuError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+NAMES = tuple(f"q[{i}]" for i in range(1, 5))
+"""Columns of a table that hold a quaternion."""
+
+Real = NDArray[np.float64]
+
+
+def _of(q: Any) -> Real:
+    """Return quaternions as rows, of length 1; of a table its columns q[1], …, q[4]."""
+    if hasattr(q, "columns"):
+        if missing := [name for name in NAMES if name not in q.columns]:
+            raise FmuError(f"the table has no column {', '.join(missing)}")
+        q = q[list(NAMES)].to_numpy(float)
+    try:
+        rows = np.asarray(q, float)
+    except (TypeError, ValueError):
+        rows = np.empty(0)
+    if rows.ndim not in (1, 2) or rows.shape[-1] != 4:
+        raise FmuError("a quaternion has four numbers, the scalar first")
+    length = np.linalg.norm(rows, axis=-1, keepdims=True)
+    if not (np.isfinite(rows).all() and (length > 0).all()):
+        raise FmuError("a quaternion must be finite and not 0")
+    return np.asarray(rows / length, float)
+
+
+def _like(q: Any, names: tuple[str, ...], values: Real) -> Any:
+    """Return values as a table if ``q`` is one."""
+    if not hasattr(q, "columns"):
+        return values
+    import pandas as pd
+
+    table = pd.DataFrame(values, columns=list(names), index=q.index)
+    table.attrs["units"] = dict.fromkeys(names, "rad")
+    return table
+
+
+def angles(q: "ArrayLike | pd.DataFrame") -> Any:
+    """Return roll, pitch and yaw (rad) of a quaternion, of rows of them, or of a table of a run.
+
+    About x, y, z: the craft is turned by yaw about z, then by pitch about its new y, then by roll
+    about its new x (3-2-1, Tait and Bryan). Pitch is from -90° to 90°; there roll is 0. A table
+    gives a table with the columns ``roll``, ``pitch``, ``yaw``.
+    """
+    from scipy.spatial.transform import Rotation
+
+    rows = _of(q)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # at a pitch of 90 degrees
+        turned = Rotation.from_quat(rows, scalar_first=True).as_euler("ZYX")
+    return _like(q, ("roll", "pitch", "yaw"), turned[..., ::-1])
+
+
+def quaternion(roll: ArrayLike = 0.0, pitch: ArrayLike = 0.0, yaw: ArrayLike = 0.0) -> Real:
+    """Return the quaternion (scalar first) of roll, pitch and yaw, rad; see `angles`.
+
+    Of arrays a row each.
+    """
+    from scipy.spatial.transform import Rotation
+
+    try:
+        three = np.stack(np.broadcast_arrays(yaw, pitch, roll), axis=-1).astype(float)
+    except (TypeError, ValueError) as error:
+        raise FmuError(f"roll, pitch and yaw must be numbers: {error}") from None
+    return np.asarray(Rotation.from_euler("ZYX", three).as_quat(canonical=True, scalar_first=True))
+
+
+def rotation_vector(q: "ArrayLike | pd.DataFrame") -> Any:
+    """Return axis times angle (rad, 0 to π) of a quaternion, of rows of them, or of a table."""
+    from scipy.spatial.transform import Rotation
+
+    turned = Rotation.from_quat(_of(q), scalar_first=True).as_rotvec()
+    return _like(q, ("angle[1]", "angle[2]", "angle[3]"), turned)
+
+
+def about(axis: ArrayLike, angle: ArrayLike) -> Real:
+    """Return the quaternion of a turn by ``angle`` (rad) about ``axis``; of arrays a row each."""
+    unit = vector(axis, 3, "an axis")
+    length = np.linalg.norm(unit)
+    if not length > 0:
+        raise FmuError("an axis must not be 0")
+    try:
+        half = np.asarray(angle, float)[..., None] / 2
+    except (TypeError, ValueError):
+        raise FmuError(f"angle must be numbers, rad, not {angle!r}") from None
+    return np.asarray(np.concatenate([np.cos(half), np.sin(half) * unit / length], axis=-1))
+
+
+def error(q: "ArrayLike | pd.DataFrame", wanted: "ArrayLike | pd.DataFrame") -> Any:
+    """Return what is left to turn from ``q`` to ``wanted``: a rotation vector in body axes, rad.
+
+    The short way round.
+    """
+    from scipy.spatial.transform import Rotation
+
+    mine, other = (Rotation.from_quat(_of(one), scalar_first=True) for one in (q, wanted))
+    turned = (mine.inv() * other).as_rotvec()
+    return _like(q, ("error[1]", "error[2]", "error[3]"), turned)
+
+
+def slew(
+    angle: float,
+    duration: float,
+    axis: ArrayLike = (1, 0, 0),
+    *,
+    inertia: ArrayLike | None = None,
+    start: float = 0.0,
+    step: float = 0.1,
+    stop: float | None = None,
+) -> "pd.DataFrame":
+    """Return the reference of a slew from rest to rest: a table for `closed_loop`.
+
+    From ``start`` on the craft turns by ``angle`` (rad) about ``axis`` within ``duration`` (s), its
+    acceleration one period of a sine. Columns: ``time``, ``q[1]`` … ``q[4]``, ``omega[1]`` …
+    ``omega[3]`` and, given the ``inertia`` (kg·m², about the axis or 3 × 3), the torque that it
+    takes, ``torque[1]`` … ``torque[3]``. step: between the rows, s; stop: of the last one, s.
+    """
+    import pandas as pd
+
+    check_numbers(angle=angle, duration=duration, step=step, start=start, stop=stop)
+    for name, value in (("duration", duration), ("step", step)):
+        if not (np.isfinite(value) and value > 0):
+            raise FmuError(f"{name} must be a positive number of seconds, not {value}")
+    end = start + duration
+    stop = end if stop is None else max(stop, end)
+    time = np.append(np.arange(0.0, stop - 1e-9 * step, step), stop)
+    t, w = np.clip(time - start, 0.0, duration), 2 * np.pi / duration
+    about(axis, 0.0)  # checks it
+    unit = np.asarray(axis, float) / np.linalg.norm(axis)
+    turned = angle * (t - np.sin(w * t) / w) / duration
+    rate = angle * (1 - np.cos(w * t)) / duration
+    acceleration = angle * w * np.sin(w * t) / duration
+    table = {"time": time} | dict(zip(NAMES, about(axis, turned).T, strict=True))
+    table |= {f"omega[{i + 1}]": rate * unit[i] for i in range(3)}
+    units = {"time": "s"} | {f"omega[{i + 1}]": "rad/s" for i in range(3)}
+    if inertia is not None:
+        try:
+            J = np.asarray(inertia, float)
+        except (TypeError, ValueError):
+            J = np.empty(0)
+        if J.shape not in ((), (3, 3)):
+            raise FmuError(f"inertia must be a number or a 3 × 3 matrix, not {inertia!r}")
+        moment = J * unit if J.shape == () else J @ unit
+        gyroscopic = np.zeros(3) if J.shape == () else np.cross(unit, moment)
+        torque = np.outer(acceleration, moment) + np.outer(rate**2, gyroscopic)
+        table |= {f"torque[{i + 1}]": torque[:, i] for i in range(3)}
+        units |= {f"torque[{i + 1}]": "N.m" for i in range(3)}
+    frame = pd.DataFrame(table)
+    frame.attrs["units"] = units
+    return frame

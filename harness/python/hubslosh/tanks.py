@@ -1,0 +1,281 @@
+"""From a tank's drawing and a fill to modal parameters, by the program ``hubslosh tank``."""
+
+import json
+import os
+import subprocess
+import tempfile
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .fmu import FmuError, FmuWarning
+from .program import find_program
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from .fmu import Value
+
+_TEMPORARY = ".hubslosh-tank.toml"
+
+SIX_AXES = ("Spacecraft", "SloshTank")
+"""FMUs in six axes; their tanks differ in the beginning of a name alone."""
+
+
+@dataclass(frozen=True, eq=False)
+class Tank:
+    """A tank at a fill, as `tank` gives it."""
+
+    all: dict[str, Any]
+    """What ``hubslosh tank --out`` writes: ``m_liq`` (kg), ``z_cg``, ``I_eff_cg``, …"""
+    picture: str
+    """Tank, free surface and mode shapes, SVG; a notebook shows it."""
+    gravity: float
+    """m/s² along the tank's axis."""
+    _source: "dict[str, Any] | Path" = field(repr=False)
+    _flags: list[str] = field(repr=False)
+    _liquid: list[str] = field(repr=False)
+    _program: Path = field(repr=False)
+
+    @property
+    def mass(self) -> float:
+        """Mass of the liquid, kg."""
+        return float(self.all["m_liq"])
+
+    @cached_property
+    def modes(self) -> "pd.DataFrame":
+        """A row per mode.
+
+        ``frequency`` (Hz), ``mass`` (kg), ``length``, heights of ``bob`` and ``hinge`` (m),
+        ``wave`` at the wall per pendulum angle (m/rad).
+        """
+        import numpy as np
+        import pandas as pd
+
+        columns = {"m": "mass", "l": "length", "H": "bob", "hinge": "hinge", "wave": "wave"}
+        table = pd.DataFrame(self.all["modes"]).reindex(columns=["lambda", *columns])
+        table.insert(0, "frequency", np.sqrt(self.gravity * table.pop("lambda")) / (2 * np.pi))
+        table = table.rename(columns=columns)
+        if damping := self.all.get("damping"):
+            found = damping["modes"]
+            table["zeta"] = [mode["zeta"] for mode in found]
+            for name, end in (("zeta_low", 0), ("zeta_high", 1)):
+                table[name] = [mode["interval"][end] for mode in found]
+        units = dict.fromkeys(("length", "bob", "hinge"), "m")
+        table.attrs["units"] = {"frequency": "Hz", "mass": "kg", "wave": "m/rad"} | units
+        return table
+
+    def _repr_svg_(self) -> str:
+        return self.picture
+
+    def save(self, path: str | Path) -> None:
+        """Write the picture, .svg."""
+        if Path(path).suffix.lower() != ".svg":
+            raise FmuError(f"{path}: the picture is SVG, its name ends in .svg")
+        try:
+            Path(path).write_text(self.picture, encoding="utf-8")
+        except OSError as error:
+            raise FmuError(f"{path} cannot be written: {error}") from None
+
+    def parameters(
+        self,
+        model: str = "Spacecraft",
+        number: int = 1,
+        *,
+        position: Sequence[float] | None = None,
+        axis: Sequence[float] | None = None,
+        rigid: bool = False,
+    ) -> "dict[str, Value]":
+        """Return it under the names of an FMU's parameters, for `simulate`, `Loop` and the others.
+
+        model: Spacecraft, with the ``number`` of the tank, 1 to 4; SloshTank; or HubSlosh, a table
+        of modes. Damping ratios and centring stiffnesses are there if `tank` was given viscosity
+        and surface tension; what the program warns of is a `FmuWarning`.
+        position: of the tank's zero (of a ``shape`` its lowest point) in body axes, m. axis:
+        upwards along the tank's axis, in body axes; by default z. rigid: the same liquid without
+        slosh, at its centre, with the inertia that it has under a lid. Not of HubSlosh.
+        """
+        placed = {"position": position, "axis": axis}
+        for name, value in placed.items():
+            if value is None:
+                continue
+            if model not in SIX_AXES:
+                raise FmuError(f"{name} is for {' and '.join(SIX_AXES)}, not for {model}")
+            try:
+                numbers = [float(x) for x in value]
+            except (TypeError, ValueError):
+                numbers = []
+            if len(numbers) != 3 or (name == "axis" and not any(numbers)):
+                raise FmuError(f"{name} must be three numbers, not {value!r}")
+        if model == "Spacecraft":
+            if number not in (1, 2, 3, 4):
+                raise FmuError(f"the tank's number is 1 to 4, not {number!r}")
+            prefix = f"tank[{number}]"
+            found = {
+                prefix + name.removeprefix("tank"): value for name, value in self._six_axes.items()
+            }
+        elif model == "SloshTank":
+            prefix, found = "tank", dict(self._six_axes)
+        elif model == "HubSlosh":
+            if rigid:
+                raise FmuError("HubSlosh has the rigid liquid as slosh.model = frozen")
+            return self._files("HubSlosh")
+        else:
+            raise FmuError(f"there are no parameters of a tank for {model!r} (for: Spacecraft, "
+                           "SloshTank, HubSlosh)")  # fmt: skip
+        if rigid:
+            kept = {f"{prefix}.{name}" for name in ("m_0", "H_0", "I_0", "I_z", "g_ref", "modes")}
+            found = {name: value for name, value in found.items() if name in kept}
+            found |= {f"{prefix}.m_0": self.mass, f"{prefix}.H_0": float(self.all["z_cg"])}
+            found |= {f"{prefix}.I_0": float(self.all["I_eff_cg"]), f"{prefix}.modes": 0}
+        if position is not None:
+            found |= {f"{prefix}.position[{i + 1}]": float(x) for i, x in enumerate(position)}
+        if axis is not None:
+            found |= {f"{prefix}.q[{i + 1}]": x for i, x in enumerate(_from_z(axis))}
+        return found
+
+    @cached_property
+    def _six_axes(self) -> "dict[str, Value]":
+        return self._files("SloshTank")
+
+    def _files(self, model: str) -> "dict[str, Value]":
+        from .tables import read_parameters
+
+        with _folder(self._source) as (folder, file):
+            out = folder / "parameters.toml"
+            flags = ["--model", model, "--parameters", str(out), "--out", str(folder / "r.json")]
+            _call(self._program, [str(file), *self._flags, *self._liquid, *flags])
+            return read_parameters(out)
+
+
+def tank(
+    source: str | Path | Mapping[str, Any],
+    fill: float | str | None = None,
+    *,
+    fill_mass: float | None = None,
+    modes: int = 3,
+    gravity: float = 9.80665,
+    nu: float | None = None,
+    sigma: float | None = None,
+    contact_angle: float | None = None,
+    program: str | Path | None = None,
+) -> Tank:
+    """Return masses, lengths and hinges of a tank's slosh modes, by linear potential flow.
+
+    source: a tank file (.toml), or what stands in one: ``{"density": 1010, "shape": {"sphere":
+    {"radius": 0.4}}}``. fill: height above the lowest point, m, or ``"60%"`` of the volume; or
+    fill_mass: kg. modes: how many. gravity: specific force along the axis, m/s², for frequencies
+    and damping. nu: kinematic viscosity, m²/s, for damping ratios. sigma: surface tension, N/m, for
+    centring stiffnesses, with contact_angle, degrees. They go into `Tank.parameters`.
+
+    Needs the program ``hubslosh``; see `campaign`. Its page on tanks has every shape.
+    """
+    if (fill is None) == (fill_mass is None):
+        raise FmuError('give the fill: a height in m, "60%" of the volume, or fill_mass in kg')
+    if isinstance(fill, str) and not fill.strip().endswith("%"):
+        raise FmuError(f'fill is a height in m, or a text such as "60%", not {fill!r}')
+    numbers = {
+        "fill": None if isinstance(fill, str) else fill, "fill_mass": fill_mass, "modes": modes,
+        "gravity": gravity, "nu": nu, "sigma": sigma, "contact_angle": contact_angle,
+    }  # fmt: skip
+    for name, value in numbers.items():
+        if value is not None and (isinstance(value, bool) or not _is_number(value)):
+            raise FmuError(f"{name} must be a number, not {value!r}")
+    given: dict[str, Any] | Path
+    if isinstance(source, Mapping):
+        given = dict(source)
+        for key in ("points", "svg"):  # files beside the tank file, which is elsewhere
+            if isinstance(given.get(key), str):
+                given[key] = str(Path(given[key]).absolute())
+    elif isinstance(source, str | Path):
+        given = Path(source)
+    else:
+        raise FmuError(f"a tank is a file or a dict of what stands in one, not {source!r}")
+    amount = ["--fill", str(fill)] if fill is not None else ["--fill-mass", str(fill_mass)]
+    flags = [*amount, "--modes", str(modes), "--gravity", repr(float(gravity))]
+    options = {"--nu": nu, "--sigma": sigma, "--contact-angle": contact_angle}
+    told = {name: repr(float(value)) for name, value in options.items() if value is not None}
+    liquid = [text for pair in told.items() for text in pair]
+    found = find_program(program)
+    with _folder(given) as (folder, file):
+        out, picture = folder / "result.json", folder / "picture.svg"
+        _call(found, [str(file), *flags, *liquid, "--out", str(out), "--picture", str(picture)])
+        result = json.loads(out.read_text(encoding="utf-8"))
+        drawing = picture.read_text(encoding="utf-8")
+    return Tank(result, drawing, float(gravity), given, flags, liquid, found)
+
+
+def _is_number(value: Any) -> bool:
+    try:
+        return float(value) == float(value)
+    except (TypeError, ValueError):
+        return False
+
+
+@contextmanager
+def _folder(source: dict[str, Any] | Path) -> "Iterator[tuple[Path, Path]]":
+    """Yield a folder for results, and the tank's file, which is there if it was a dict."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        if isinstance(source, Path):
+            yield folder, source
+            return
+        file = folder / _TEMPORARY
+        file.write_text(
+            "".join(f"{_key(k)} = {_toml(v)}\n" for k, v in source.items()), encoding="utf-8"
+        )
+        yield folder, file
+
+
+def _key(key: Any) -> str:
+    return json.dumps(str(key))
+
+
+def _toml(value: Any) -> str:
+    """Return a value as TOML has it."""
+    if isinstance(value, Mapping):
+        inner = ", ".join(f"{_key(k)} = {_toml(v)}" for k, v in value.items())
+        return f"{{ {inner} }}"
+    if isinstance(value, str | os.PathLike):
+        return json.dumps(str(value), ensure_ascii=False)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if hasattr(value, "tolist"):  # of numpy
+        return _toml(value.tolist())
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, Sequence):
+        return f"[{', '.join(_toml(v) for v in value)}]"
+    raise FmuError(f"{value!r} cannot stand in a tank file")
+
+
+def _call(program: Path, arguments: list[str]) -> None:
+    """Run ``hubslosh tank``; its warnings are warnings here."""
+    try:
+        done = subprocess.run([program, "tank", *arguments], capture_output=True, check=False)
+    except OSError as error:
+        raise FmuError(f"{program} cannot be started: {error}") from None
+    said = done.stderr.decode(errors="replace").strip()
+    if done.returncode != 0:
+        text = said.removeprefix("error: ")
+        if Path(arguments[0]).name == _TEMPORARY:  # of a dict; where it was says nothing
+            text = text.replace(f"{arguments[0]}: ", "").replace(arguments[0], "the tank")
+        raise FmuError(f"hubslosh tank: {text}")
+    for line in said.splitlines():
+        if line.startswith("warning: "):
+            warnings.warn(line.removeprefix("warning: "), FmuWarning, stacklevel=4)
+
+
+def _from_z(axis: Sequence[float]) -> list[float]:
+    """Return the quaternion of the shortest turn that takes z to an axis."""
+    import numpy as np
+
+    x, y, z = np.asarray(axis, float) / np.linalg.norm(axis)
+    if z < -1 + 1e-12:
+        return [0.0, 1.0, 0.0, 0.0]
+    q = np.array([1 + z, -y, x, 0.0])
+    return [float(v) for v in q / np.linalg.norm(q)]

@@ -1,0 +1,50 @@
+"""`import hubslosh` imports nothing large, and offers what its type checkers see."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import hubslosh
+
+LARGE = {"numpy", "pandas", "scipy", "fmpy", "lxml", "matplotlib", "control", "pyarrow"}
+
+
+def test_importing_the_package_imports_nothing_large() -> None:
+    """Half a second to a second and a half of CPU time of every program that imports it."""
+    code = (
+        "import sys, hubslosh\n"
+        "print(*{name.partition('.')[0] for name in sys.modules})\n"
+        "hubslosh.simulate, hubslosh.plot.time_histories\n"
+        "print(*{name.partition('.')[0] for name in sys.modules})\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=Path(hubslosh.__file__).parents[1], capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    before, after = (set(line.split()) for line in done.stdout.splitlines())
+    assert not before & LARGE
+    # simulating needs tables, and pandas imports pyarrow where it is installed; transfer functions
+    # and figures are other functions' business
+    assert after & LARGE <= {"numpy", "pandas", "pyarrow", "fmpy", "lxml"}
+
+
+def test_what_comes_on_first_use_is_what_type_checkers_see() -> None:
+    """The imports under TYPE_CHECKING, the names by module, and ``__all__``."""
+    tree = ast.parse(Path(hubslosh.__file__).read_text())
+    imported = {
+        (node.module or alias.name, alias.name)
+        for block in tree.body
+        if isinstance(block, ast.If)
+        for node in block.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    modules = {name for module, name in imported if module == name}
+    assert {(m, n) for n, m in hubslosh._MODULE_OF.items()} == {
+        (module, name) for module, name in imported if module != name
+    }
+    assert sorted(hubslosh.__all__) == sorted({*hubslosh._MODULE_OF, *modules})
+    for name in hubslosh.__all__:
+        assert getattr(hubslosh, name) is not None and name in dir(hubslosh)
+    assert isinstance(hubslosh.__version__, str)

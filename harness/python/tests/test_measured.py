@@ -1,0 +1,60 @@
+"""The page of measurements is what the command makes."""
+
+import os
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import ROOT, option
+
+import measured
+
+NUMBER = re.compile(r"-?\d+\.?\d*")
+
+
+@pytest.fixture
+def program(request: pytest.FixtureRequest, fmu: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the script take program and FMUs of this build."""
+    monkeypatch.setenv("HUBSLOSH", os.fspath(option(request, "--hubslosh")))
+    built = {name: fmu.with_name(f"{name}.fmu") for name in measured.FMUS}
+    monkeypatch.setattr(measured, "FMUS", built)
+
+
+@pytest.mark.usefixtures("program")
+def test_the_page_is_made_of_the_results() -> None:
+    """Page and README say what the kept comparisons come to."""
+    rows = measured.read_results()
+    assert measured.PAGE.read_text(encoding="utf-8") == measured.page(rows, measured.computed())
+    for page in ("README.md", "book/verification.md"):
+        text = " ".join((ROOT / page).read_text(encoding="utf-8").split())
+        assert measured.verdict(rows) in text
+
+
+@pytest.mark.usefixtures("program")
+@pytest.mark.parametrize("name", measured.QUICK)
+def test_a_comparison_comes_out_as_it_was_kept(name: str) -> None:
+    """Values to 1e-4 of themselves: results.csv has six digits; pictures to 0.2 px."""
+    rows, drawing = measured.EXPERIMENTS[name]()
+    kept = {(row.experiment, row.quantity): row for row in measured.read_results()}
+    for row in rows:
+        before = kept[row.experiment, row.quantity]
+        assert row.passed == before.passed
+        for value in ("measured", "error", "ours", "band"):
+            assert getattr(row, value) == pytest.approx(getattr(before, value), rel=1e-4, abs=1e-9)
+    if not drawing:
+        return
+    committed = (measured.BOOK / f"measured_{name}.svg").read_text(encoding="utf-8")
+    assert NUMBER.sub("0", drawing) == NUMBER.sub("0", committed)
+    places = [np.array(NUMBER.findall(text), float) for text in (drawing, committed)]
+    np.testing.assert_allclose(*places, atol=0.2)
+
+
+def test_every_measurement_has_its_source() -> None:
+    """A file of numbers says where they come from and how far they can be trusted."""
+    files = [file for file in measured.DATA.glob("*.csv") if file != measured.RESULTS]
+    assert len(files) >= 6
+    for file in files:
+        head = "".join(line for line in file.open(encoding="utf-8") if line.startswith("#"))
+        assert "Source:" in head
+        assert "Error:" in head or "computed, not measured" in head

@@ -1,0 +1,175 @@
+"""A tank from Python as from the command line; tables as files; plots of everything."""
+
+import json
+import subprocess
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pandas as pd
+import pytest
+from conftest import ROOT, option
+
+import hubslosh
+from hubslosh import FmuError, FmuWarning, attitude, plot, tank
+
+mpl.use("agg")
+SPHERE = {"density": 1008.0, "shape": {"sphere": {"radius": 0.35}}}
+
+
+@pytest.fixture(autouse=True)
+def program(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the program, and let the package find it."""
+    path = option(request, "--hubslosh")
+    monkeypatch.setenv("HUBSLOSH", str(path))
+    return path
+
+
+def test_a_tank_is_what_the_command_line_gives(program: Path, tmp_path: Path) -> None:
+    """The same file, fill and modes: result, picture and parameters."""
+    file = ROOT / "harness" / "tank" / "examples" / "capsule.toml"
+    mine = tank(file, fill="40%", modes=2, gravity=3.0, nu=1e-6)
+    out, picture, parameters = (tmp_path / name for name in ("r.json", "t.svg", "p.toml"))
+    subprocess.run(
+        [program, "tank", file, "--fill", "40%", "--modes", "2", "--gravity", "3", "--nu", "1e-6",
+         "--out", out, "--picture", picture, "--model", "Spacecraft", "--tank-number", "2",
+         "--parameters", parameters],
+        check=True, capture_output=True,
+    )  # fmt: skip
+    assert mine.all == json.loads(out.read_text())
+    assert mine.picture == picture.read_text() and mine.picture.startswith("<svg")
+    assert mine.parameters("Spacecraft", 2) == hubslosh.read_parameters(parameters)
+    assert mine.modes["frequency"][0] == pytest.approx(
+        np.sqrt(3 / mine.modes["length"][0]) / (2 * np.pi), rel=1e-12
+    )
+    assert "slosh.table.mass[1]" in mine.parameters("HubSlosh") or mine.parameters("HubSlosh")
+    modes = mine.modes
+    assert (modes["zeta_low"] < modes["zeta"]).all() and (modes["zeta"] < modes["zeta_high"]).all()
+    assert modes["zeta"][0] == mine.parameters("Spacecraft", 2)["tank[2].zeta[1]"]
+    # the same tank as a dict
+    import tomllib
+
+    again = tank(tomllib.loads(file.read_text()), fill="40%", modes=2, gravity=3.0, nu=1e-6)
+    assert again.all == mine.all
+    by_mass = tank(file, fill_mass=mine.mass, modes=1)
+    assert by_mass.all["fill"] == pytest.approx(mine.all["fill"], rel=1e-9)
+    mine.save(tmp_path / "again.svg")
+    assert (tmp_path / "again.svg").read_text() == mine.picture
+
+
+def test_a_tank_swings_in_the_fmu_with_its_frequency(fmu: Path) -> None:
+    """Held by a huge craft, along x and along an axis of its own: the pole is the mode's."""
+    full = tank(SPHERE, fill="60%", modes=1, gravity=0.1)
+    for axis, thrust in (((0, 0, 1), "force[3]"), ((1, 0, 0), "force[1]"), ((0, 0, -1), None)):
+        craft = {"craft.mass": 1e9, "tanks": 1, "craft.Jxx": 1e9, "craft.Jyy": 1e9}
+        craft |= {"craft.Jzz": 1e9, thrust or "force[3]": (1 if thrust else -1) * 0.1 * 1e9}
+        craft |= {f"craft.r[{i}]": 0.0 for i in (1, 2, 3)}
+        craft |= full.parameters("Spacecraft", position=(0.5, 0, 0), axis=axis)
+        model = hubslosh.linearize(fmu.with_name("Spacecraft.fmu"), craft)
+        # the craft has 1e7 times the liquid's mass
+        frequency = model.modes()["frequency"].to_numpy()
+        assert frequency == pytest.approx(full.modes["frequency"][0], rel=1e-5)
+    rigid = full.parameters("SloshTank", rigid=True)
+    assert rigid["tank.modes"] == 0 and rigid["tank.m_0"] == full.mass
+    assert not any("mass[1]" in name for name in rigid)
+
+
+def test_what_is_wrong_with_a_tank_is_told(tmp_path: Path) -> None:
+    """In our words, and in the program's."""
+    full = tank(SPHERE, fill=0.3, modes=1)
+    wrong = {
+        "give the fill": lambda: tank(SPHERE),
+        r'a height in m, or a text such as "60%"': lambda: tank(SPHERE, fill="60"),
+        "modes must be a number, not 'two'": lambda: tank(SPHERE, fill=0.3, modes="two"),
+        "a tank is a file or a dict": lambda: tank(3, fill=0.3),
+        "hubslosh|density": lambda: tank({"shape": {"sphere": {"radius": 1}}}, fill=0.3),
+        "above|top|fill": lambda: tank(SPHERE, fill=3.0),
+        "no_such.toml": lambda: tank("no_such.toml", fill=0.3),
+        "position must be three numbers, not 3": lambda: full.parameters(position=3),
+        "axis must be three numbers": lambda: full.parameters(axis=(0, 0, 0)),
+        "position is for Spacecraft and SloshTank": lambda: full.parameters(
+            "HubSlosh", position=(0, 0, 0)
+        ),
+        "number is 1 to 4, not 5": lambda: full.parameters("Spacecraft", 5),
+        "no parameters of a tank for 'Craft'": lambda: full.parameters("Craft"),
+        "ends in .svg": lambda: full.save("tank.png"),
+        "cannot stand in a tank file": lambda: tank({"density": object()}, fill=0.3),
+    }
+    for sentence, call in wrong.items():
+        with pytest.raises(FmuError, match=sentence):
+            call()
+    with pytest.warns(FmuWarning, match="capillarity"):
+        tank(SPHERE, fill=0.3, sigma=0.07, contact_angle=5.0, gravity=9.81).parameters()
+
+
+def test_tables_come_back_from_files_with_every_digit(tmp_path: Path) -> None:
+    """The table first, then the file."""
+    from scipy.io import loadmat
+
+    table = pd.DataFrame({"time": [0.0, 0.1], "q[1]": [1 / 3, np.pi], "stuck": [True, False]})
+    table.attrs["units"] = {"time": "s", "q[1]": "1"}
+    hubslosh.to_csv(table, tmp_path / "a.csv")
+    pd.testing.assert_frame_equal(pd.read_csv(tmp_path / "a.csv"), table, check_exact=True)
+    hubslosh.to_parquet(table, tmp_path / "a.parquet")
+    pd.testing.assert_frame_equal(pd.read_parquet(tmp_path / "a.parquet"), table, check_exact=True)
+    hubslosh.to_mat(table, str(tmp_path / "a.mat"))
+    matlab = loadmat(tmp_path / "a.mat")
+    assert (matlab["q_1"][:, 0] == table["q[1]"]).all() and matlab["time"].shape == (2, 1)
+    assert matlab["units"]["time"].item().item() == "s"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv", "a.mat", "a.parquet"]
+    wrong = {
+        "the table comes first": lambda: hubslosh.to_csv("a.csv", table),
+        "must end in .mat": lambda: hubslosh.to_mat(table, "a.csv"),
+        "DataFrame is expected, not list": lambda: hubslosh.to_parquet([1], "a.parquet"),
+        "the file's name is expected": lambda: hubslosh.to_csv(table, 3),
+        "cannot be written": lambda: hubslosh.to_csv(table, tmp_path / "none" / "a.csv"),
+        "named apart in MATLAB: a.b, a_b": lambda: hubslosh.to_mat(
+            pd.DataFrame({"a.b": [1], "a_b": [2]}), "a.mat"
+        ),
+    }
+    for sentence, call in wrong.items():
+        with pytest.raises(FmuError, match=sentence):
+            call()
+
+
+def test_every_plot_has_what_it_promises(fmu: Path) -> None:
+    """A band from the poles, crossings, panels in degrees, quantiles."""
+    viscous = {"friction.model": "viscous"}
+    model = hubslosh.linearize(fmu, viscous, ["tau_cmd"], ["omega"])
+    gain, _ = plot.bode(model)
+    line = gain.lines[0].get_xdata()
+    poles = np.abs(model.poles) / (2 * np.pi)
+    assert line[0] == pytest.approx(poles[0] / 5) and line[-1] == pytest.approx(poles[-1] * 5)
+    drawn, high = gain.lines[0].get_ydata(), np.abs(line - poles[-1]) < 0.05
+    peak = abs(model.response(np.linspace(poles[-1] - 0.05, poles[-1] + 0.05, 100_001))).max()
+    assert drawn[high].max() == pytest.approx(peak, rel=1e-3)
+    assert plot.band(model.sampled(0.1))[1] == 5.0
+
+    loop = hubslosh.Loop([[0.4, 0.6]], 0.1, fmu, viscous, delay=0.02)
+    gain, phase = plot.margins(loop)
+    found = hubslosh.margins(loop)
+    dots = [line.get_xdata()[0] for line in phase.lines if line.get_marker() == "o"]
+    squares = [line.get_xdata()[0] for line in gain.lines if line.get_marker() == "s"]
+    known = found.crossings.groupby("crossing")["frequency"].apply(list)
+    assert dots == known["gain"] and squares == known["phase"]
+
+    wanted = pd.DataFrame({"time": [0.0, 5.0], "theta": [0.1, 0.1]})
+    axes = plot.closed_loop(loop.simulate(5, reference=wanted), wanted)
+    labels = [ax.get_ylabel() for ax in axes]
+    assert labels == ["attitude (deg)", "left to turn (deg)", "rate (deg/s)", "torque (N·m)"]
+    assert axes[1].lines[0].get_ydata()[0] == pytest.approx(np.degrees(0.1))
+    turning = attitude.slew(0.3, 5)
+    left = plot.closed_loop(turning, turning)[1]
+    assert all(np.abs(line.get_ydata()).max() < 1e-6 for line in left.lines)
+
+    table = pd.DataFrame({"run": range(100), "hub.I": 0.3, "rate (deg/s)": np.arange(100.0)})
+    (ax,) = plot.monte_carlo(table)
+    assert ax.get_xlabel() == "rate (deg/s)"
+    assert ax.lines[0].get_ydata()[-1] == 100
+    for call, sentence in (
+        (lambda: plot.bode(3), "bode draws tables"),
+        (lambda: plot.monte_carlo(table[["run", "hub.I"]]), "no results to draw"),
+        (lambda: plot.closed_loop(wanted[["time"]]), "neither an attitude"),
+    ):
+        with pytest.raises(FmuError, match=sentence):
+            call()
