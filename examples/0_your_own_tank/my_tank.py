@@ -3,13 +3,15 @@
 python examples/0_your_own_tank/my_tank.py
 """
 
-import sys
+import argparse
+from pathlib import Path
 
 import matplotlib.pyplot as plt
+import numpy as np
 import pandas as pd
 
 import hubslosh
-from hubslosh.plot import time_histories
+from hubslosh.plot import COLORS, save
 
 # Any parameter by its name: in SI units, or with a unit. The list: `hubslosh variables`.
 MY_TANK = {
@@ -41,15 +43,53 @@ def compare(fmu: str = "HubSlosh") -> dict[str, pd.DataFrame]:
     }
 
 
+def pointing_error(runs: dict[str, pd.DataFrame]) -> pd.Series:
+    """Return by how much sloshing turns the craft away from where it would point, 0.001°."""
+    return 1e3 * np.degrees(runs["spherical"]["theta"] - runs["frozen"]["theta"])
+
+
+def answer(runs: dict[str, pd.DataFrame]) -> str:
+    """Say what the liquid does after the manoeuvre."""
+    end = max((time for time, torque in TORQUE if torque), default=0)
+    late = runs["spherical"]["time"] > end
+    error, wave = pointing_error(runs)[late], 1e3 * runs["spherical"]["wave_height"][late]
+    # the swing about its own middle: a torque that ends at rest may still leave another angle
+    swing = (error.max() - error.min()) / 2
+    return (
+        f"After the manoeuvre the liquid swings the craft by ±{swing:.0f} millidegrees,\n"
+        f"with a wave of up to {wave.max():.1f} mm"
+    )
+
+
+def figure(runs: dict[str, pd.DataFrame]) -> plt.Figure:
+    """Draw pointing error and wave, with the answer above them."""
+    drawing, (pointing, wave) = plt.subplots(2, figsize=(8, 5), sharex=True, layout="constrained")
+    time = runs["spherical"]["time"]
+    pointing.plot(time, pointing_error(runs), color=COLORS[1])
+    pointing.set(ylabel="pointing error (0.001°)")
+    wave.plot(time, 1e3 * runs["spherical"]["wave_height"], color=COLORS[0])
+    wave.set(xlabel="time (s)", ylabel="wave at the wall (mm)")
+    end = max((time for time, torque in TORQUE if torque), default=0)
+    for ax in (pointing, wave):
+        ax.axvspan(0, end, color="0.92", linewidth=0)
+        ax.grid(alpha=0.3)
+        ax.margins(x=0)
+    top = pointing.get_xaxis_transform()
+    pointing.text(end / 2, 0.96, "torque", transform=top, ha="center", va="top", color="0.4")
+    drawing.suptitle(answer(runs))
+    return drawing
+
+
 def main() -> None:
-    """Draw the two runs over each other."""
-    axes = None
-    for liquid, run in compare(*sys.argv[1:]).items():
-        names = ("tau_cmd", "theta", "omega", "slosh_angle", "wave_height")
-        axes = time_histories(run, *names, axes=axes, label=liquid)
-        print(f"{liquid}: {run['omega'].iloc[-500:].abs().max():.4f} rad/s in the last 10 s")
-    plt.savefig("my_tank.png", dpi=120)
-    print("wrote my_tank.png")
+    """Draw what the liquid does to the pointing."""
+    parser = argparse.ArgumentParser(description="What the liquid does to your craft.")
+    parser.add_argument("--fmu", default="HubSlosh", help="file, or the name of a packed one")
+    parser.add_argument("--out", type=Path, default=Path("my_tank.png"))
+    args = parser.parse_args()
+    runs = compare(args.fmu)
+    print(answer(runs))
+    save(figure(runs), args.out)
+    print("wrote", args.out)
 
 
 if __name__ == "__main__":

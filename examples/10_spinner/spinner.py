@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 import hubslosh
-from hubslosh.plot import COLORS
+from hubslosh.plot import COLORS, save
 
 SPIN = 1.1  # rad/s, about z
 DAMPED = 31.7569  # N·s/m, drag coefficient of each mode
@@ -36,7 +36,7 @@ def parameters(j_zz: float, slosh: bool = True, omega: tuple = START) -> dict[st
             f"{tank}.q[1]": np.sqrt(0.5), f"{tank}.q[3]": -side * np.sqrt(0.5),
             f"{tank}.I_0": 0.780463, f"{tank}.m_0": m_0, f"{tank}.H_0": H_0,
             f"{tank}.mass[1]": MASS, f"{tank}.length[1]": LENGTH, f"{tank}.hinge[1]": hinge,
-            f"{tank}.g_ref": 1.0,
+            f"{tank}.g_ref": 1.0, f"{tank}.damping_law": "constant",
             f"{tank}.zeta[1]": DAMPED / (2 * MASS * np.sqrt(1.0 / LENGTH)),
         }  # fmt: skip
         if not slosh:
@@ -86,10 +86,10 @@ def mean_growth(history: pd.DataFrame, until: float = np.inf) -> float:
 
 def figure(fmu: str) -> plt.Figure:
     """Draw the nutation angle of four craft."""
-    drawing, axes = plt.subplots(1, 2, figsize=(10, 3.6), layout="constrained")
+    drawing, axes = plt.subplots(1, 2, figsize=(11, 3.8), layout="constrained")
     for ax, j_zz, text, stop in (
-        (axes[0], PROLATE, "spin about the axis of least inertia", 1600),
-        (axes[1], OBLATE, "of greatest inertia", 1600),
+        (axes[0], PROLATE, "Spin about the axis of least inertia: slosh makes nutation grow", 1600),
+        (axes[1], OBLATE, "About that of greatest inertia: slosh damps it", 1600),
     ):
         for slosh, color in ((False, "0.6"), (True, COLORS[0])):
             run = nutation(fmu, j_zz, stop, slosh)
@@ -100,7 +100,8 @@ def figure(fmu: str) -> plt.Figure:
         line = np.degrees(first) * np.exp(rate * (run["time"] - 30))
         line[line > 90] = np.nan
         ax.plot(run["time"], line, "--", color=COLORS[1], label=f"pole: {rate:+.2e}/s")
-        ax.set(xlabel="time (s)", ylabel="nutation angle (°)", title=text, ylim=(0, None))
+        ax.set(xlabel="time (s)", ylabel="nutation angle (°)", ylim=(0, None))
+        ax.set_title(text, fontsize="medium")
         ax.legend(fontsize=8)
     return drawing
 
@@ -109,7 +110,7 @@ def main() -> None:
     """Print the numbers of README and draw its figure."""
     parser = argparse.ArgumentParser(description="Nutation of a spinner with slosh.")
     parser.add_argument("--fmu", default="Spacecraft", help="file, or the name of a packed one")
-    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".png"))
+    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
     args = parser.parse_args()
     for j_zz in (PROLATE, OBLATE):
         pole = nutation_pole(args.fmu, j_zz)
@@ -120,7 +121,7 @@ def main() -> None:
               f"{run['dissipated'].iloc[-1]:.3f} J")  # fmt: skip
     run = nutation(args.fmu, PROLATE, 4000)
     print("prolate after 4000 s:", np.degrees(run["angle"].iloc[-1]))
-    figure(args.fmu).savefig(args.out, dpi=110)
+    save(figure(args.fmu), args.out)
 
 
 if __name__ == "__main__":

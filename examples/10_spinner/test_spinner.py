@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from spinner import OBLATE, PROLATE, mean_growth, nutation, nutation_pole
 
+from hubslosh import FmuWarning
+
 
 def test_the_nutation_pole_is_that_of_an_independent_formulation(spacecraft: str) -> None:
     """Nine digits are known of the prolate craft's."""
@@ -24,6 +26,7 @@ def test_without_slosh_nutation_stays(spacecraft: str) -> None:
 
 
 def test_the_prolate_craft_ends_in_a_flat_spin(spacecraft: str) -> None:
-    """Energy is least about the axis of greatest inertia: z is across it."""
-    angle = np.degrees(nutation(spacecraft, PROLATE, 4000)["angle"].iloc[-1])
+    """Energy is least about the axis of greatest inertia: z is across it, and bobs point aside."""
+    with pytest.warns(FmuWarning, match="leaves its range"):
+        angle = np.degrees(nutation(spacecraft, PROLATE, 4000)["angle"].iloc[-1])
     assert angle == pytest.approx(90, abs=2)

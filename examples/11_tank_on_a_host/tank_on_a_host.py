@@ -63,6 +63,7 @@ def tank(name: str) -> Values:
         f"{name}.m_0": M_0, f"{name}.H_0": H_0, f"{name}.I_0": I_0, f"{name}.mass[1]": BOB,
         f"{name}.length[1]": LENGTH, f"{name}.hinge[1]": HINGE, f"{name}.k[1]": STIFFNESS,
         f"{name}.zeta[1]": ZETA, f"{name}.g_ref": 1e-6, f"{name}.p_0[1,1]": 0.4,
+        f"{name}.damping_law": "constant",
     }  # fmt: skip
     return values
 
@@ -281,12 +282,12 @@ def main() -> None:
     """Print the table of README and draw its figure."""
     import matplotlib.pyplot as plt
 
-    from hubslosh.plot import COLORS
+    from hubslosh.plot import COLORS, save
 
     parser = argparse.ArgumentParser(description="SloshTank.fmu on a rigid body in several hosts.")
     parser.add_argument("--folder", type=Path, help="where the FMUs are, if not in the package")
     parser.add_argument("--ssp", type=Path, help="write the system as SSP, too")
-    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".png"))
+    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
     args = parser.parse_args()
     if args.ssp:
         pack_ssp(args.folder, args.ssp, STEPS[1])
@@ -299,13 +300,18 @@ def main() -> None:
         "force and torque as they are": coupled(args.folder, STEPS[1], wrench=True),
     }
     print("the naive way ends at", runs["force and torque as they are"]["time"].iloc[-1], "s")
-    for ax, (text, run), color in zip(axes, runs.items(), COLORS, strict=False):
+    lessons = (
+        "With the bias the coupling is stable at any mass ratio",
+        "With the wrench it diverges within a second",
+    )
+    for ax, (text, run), color, lesson in zip(axes, runs.items(), COLORS, lessons, strict=False):
+        ax.set_title(lesson)
         ax.plot(run["time"], run["omega[1]"], color=color, label=text)
         ax.plot(reference["time"], reference["omega[1]"], "--", color="0.3", linewidth=1,
                 label="Spacecraft.fmu, all in one")  # fmt: skip
         ax.set(xlabel="time (s)", ylabel="rate about x (rad/s)", ylim=(-0.4, 0.6), xlim=(0, STOP))
         ax.legend(fontsize=8)
-    drawing.savefig(args.out, dpi=110)
+    save(drawing, args.out)
 
 
 if __name__ == "__main__":

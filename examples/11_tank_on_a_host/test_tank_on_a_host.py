@@ -10,6 +10,8 @@ import pytest
 from fmpy.ssp.ssd import read_ssd
 from tank_on_a_host import STEPS, coupled, error, pack_ssp, whole
 
+from hubslosh import FmuWarning
+
 
 @pytest.fixture
 def both(spacecraft: str) -> Path | None:
@@ -25,8 +27,9 @@ def test_the_lumped_coupling_converges_with_the_step(both: Path | None) -> None:
 
 
 def test_the_wrench_as_it_is_diverges(both: Path | None) -> None:
-    """Within a second at 20 ms."""
-    assert coupled(both, STEPS[1], wrench=True)["time"].iloc[-1] < 1.0
+    """Within a second at 20 ms; the FMU says that the bobs swing over."""
+    with pytest.warns(FmuWarning, match="leaves its range"):
+        assert coupled(both, STEPS[1], wrench=True)["time"].iloc[-1] < 1.0
 
 
 def test_the_ssp_is_valid_and_has_both_fmus(both: Path | None, tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ def main() -> None:
     """Print what the liquid does, draw the figure."""
     parser = argparse.ArgumentParser(description="A pulse of torque on the hub.")
     parser.add_argument("--fmu", default="HubSlosh", help="file, or the name of a packed one")
-    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".png"))
+    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
     args = parser.parse_args()
     axes = None
     for model in ("frozen", "spherical"):
@@ -40,7 +40,11 @@ def main() -> None:
         axes = hubslosh.plot.time_histories(
             table.query("time < 18"), *names, axes=axes, label=model
         )
-    axes[0].figure.savefig(args.out, dpi=80)
+    figure = axes[0].figure
+    figure.suptitle(
+        "The rate hardly shows the liquid, the acceleration does; it tears the stopped hub loose"
+    )
+    hubslosh.plot.save(figure, args.out)
     print(args.out)
 
 

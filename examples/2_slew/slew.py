@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 import hubslosh
-from hubslosh.plot import COLORS
+from hubslosh.plot import COLORS, save
 
 ANGLE = np.pi / 2
 """rad."""
@@ -107,6 +107,13 @@ def results(fmu: str | Path) -> dict[tuple[str, str], pd.DataFrame]:
     return {(p, m): slew(fmu, PROFILES[p], m) for p in PROFILES for m in models}
 
 
+def title(runs: dict[tuple[str, str], pd.DataFrame], profile: str) -> str:
+    """Say how long the slew takes and when it has settled."""
+    settled = settling_time(runs[profile, "spherical"], profile)
+    over = f"{profile.capitalize()}: over at {DURATION[profile]} s"
+    return f"{over}, settled at {settled:.1f} s"
+
+
 def figure(runs: dict[tuple[str, str], pd.DataFrame], path: Path) -> None:
     """Draw what README explains."""
     figure, axes = plt.subplots(3, 2, figsize=(10, 9), layout="constrained")
@@ -127,21 +134,21 @@ def figure(runs: dict[tuple[str, str], pd.DataFrame], path: Path) -> None:
                 path_of.plot(x, y, color=color, linewidth=0.8)
         error.axhline(np.degrees(TOLERANCE), color="black", linestyle="--", linewidth=0.8)
         error.axvline(DURATION[profile], color="black", linestyle=":", linewidth=0.8)
-        torque.set(title=profile, xlabel="time (s)", ylabel="torque (N·m)")
+        torque.set(title=title(runs, profile), xlabel="time (s)", ylabel="torque (N·m)")
         torque.legend()
         error.set(xlabel="time (s)", ylabel="|pointing error| (deg)", ylim=(1e-5, 1))
         path_of.set(xlabel="slosh angle, radial (deg)", ylabel="tangential (deg)", aspect="equal")
         path_of.set(xlim=(-2, 2), ylim=(-2, 2))
         for ax in column:
             ax.grid(alpha=0.3)
-    figure.savefig(path, dpi=80)
+    save(figure, path)
 
 
 def main() -> None:
     """Print the settling times, draw the figure."""
     parser = argparse.ArgumentParser(description="A slew with slosh, two profiles.")
     parser.add_argument("--fmu", default="HubSlosh", help="file, or the name of a packed one")
-    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".png"))
+    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
     args = parser.parse_args()
     runs = results(args.fmu)
     print("profile         model      largest error after the slew (deg)  settled at (s)")

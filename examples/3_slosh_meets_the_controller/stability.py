@@ -17,7 +17,7 @@ import pandas as pd
 from scipy.optimize import brentq, fsolve
 
 import hubslosh
-from hubslosh.plot import COLORS
+from hubslosh.plot import COLORS, save
 
 VISCOUS = {"friction.model": "viscous"}
 DRAINED = {"tank.h": (50, "mm")}
@@ -452,7 +452,7 @@ def figure(full: Bench, drained: Bench, path: Path) -> None:
     for ax in axes.flat:
         ax.grid(alpha=0.3, which="both")
         ax.legend(fontsize=7.5)
-    plt.savefig(path, dpi=80)
+    save(plt.gcf(), path)
     plt.close()
 
 
@@ -460,7 +460,7 @@ def main() -> None:
     """Print the table, draw the figure."""
     parser = argparse.ArgumentParser(description="Slosh and a sampled PD controller.")
     parser.add_argument("--fmu", default="HubSlosh", help="file, or the name of a packed one")
-    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".png"))
+    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
     args = parser.parse_args()
     full, drained, frozen = (Bench(args.fmu, more) for more in ({}, DRAINED, FROZEN))
     drained.inertia = full.inertia  # the controller does not know that the tank is drained

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 import hubslosh
-from hubslosh.plot import COLORS
+from hubslosh.plot import COLORS, save
 
 PERIOD, LATENCY = 0.02, 1
 """Of the controller: s, cycles."""
@@ -85,25 +85,33 @@ def figure(fmu: str | Path, path: Path) -> None:
         angle.plot(table["time"], np.degrees(table["theta"]), color=color, label=name)
         speed.plot(table["time"], table["wheel_speed"] * 30 / np.pi, color=color, label=name)
     speed.axhspan(200, 3000, color="gray", alpha=0.15, label="the wheel's range")
-    angle.set(xlabel="time (s)", ylabel="theta (deg)", title="90° step, free bearing")
-    speed.set(xlabel="time (s)", ylabel="wheel speed (rpm)", title="Wheel: torque and speed end")
-    for ax, integral, title in ((pd_error, 0.0, "PD"), (pid_error, INTEGRAL, "PID")):
+    angle.set(
+        xlabel="time (s)", ylabel="theta (deg)", title="90° step: the wheel's limits cost time only"
+    )
+    speed.set(
+        xlabel="time (s)",
+        ylabel="wheel speed (rpm)",
+        title="The wheel runs out of torque, then of speed",
+    )
+    held = "PD, 1° step: a bearing holds, smoothed laws creep"
+    waits = "PID: the hub waits, stuck; smoothed laws do not"
+    for ax, integral, title in ((pd_error, 0.0, held), (pid_error, INTEGRAL, waits)):
         for (name, table), color in zip(stiction(fmu, integral, 60).items(), COLORS, strict=False):
             error = np.degrees(table["theta"]) - 1
             ax.plot(table["time"], error, color=color, linewidth=1.1, label=name)
         ax.set(xlabel="time (s)", ylabel="pointing error (deg)", ylim=(-0.3, 0.3))
-        ax.set_title(f"{title}, 1° step: friction's laws")
+        ax.set_title(title)
     for ax in axes.flat:
         ax.grid(alpha=0.3)
         ax.legend(fontsize=8)
-    whole.savefig(path, dpi=80)
+    save(whole, path)
 
 
 def main() -> None:
     """Print the numbers, draw the figure."""
     parser = argparse.ArgumentParser(description="A wheel's limits, a bearing's stiction.")
     parser.add_argument("--fmu", default="HubSlosh", help="file, or the name of a packed one")
-    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".png"))
+    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
     args = parser.parse_args()
     for name, table in saturation(args.fmu).items():
         error = np.degrees((table["theta"] - np.pi / 2).abs())

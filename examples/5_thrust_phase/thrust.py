@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 import hubslosh
-from hubslosh.plot import COLORS
+from hubslosh.plot import COLORS, save
 
 CRAFT = {
     "hub.I": 8000.0,
@@ -26,8 +26,8 @@ CRAFT = {
 """Dry craft with the tank half a metre off the axis, free; liquid oxygen at 90 K."""
 THRUST = 0.012
 """Specific force of the engine, m/s²."""
-COAST = THRUST / 10
-"""In coast (Bond number 104; below 100 surface tension counts, and is not in the model), m/s²."""
+COAST = THRUST / 4
+"""In coast (Bond number 259; below 100 surface tension counts, and is not in the model), m/s²."""
 START, END, STOP = 100.0, 1200.0, 1600.0  # s
 RAMP = 5.0  # s
 PERIOD, LATENCY = 0.5, 1
@@ -102,21 +102,25 @@ def figure(fmu: str | Path, runs: dict[str, pd.DataFrame], path: Path) -> None:
     for ax in (error, slosh):
         ax.axvspan(START, END, color="gray", alpha=0.15)
         ax.set_xlabel("time (s); thrust in grey")
-    error.set(ylabel="pointing error (deg)")
-    slosh.set(ylabel="slosh angle (deg)")
+    error.set(ylabel="pointing error (deg)", title="Stiff control holds the craft")
+    slosh.set(
+        ylabel="slosh angle (deg)", title="and leaves the liquid alone; soft control damps it"
+    )
+    best = bandwidth[np.argmax(-poles.real / np.abs(poles))]
     damping.set(xlabel="bandwidth (Hz)", ylabel="slosh damping (%)")
+    damping.set_title(f"best at {best:.3f} Hz, a little below the slosh frequency")
     for ax in (error, slosh, damping):
         ax.grid(alpha=0.3, which="both")
     error.legend()
     damping.legend()
-    whole.savefig(path, dpi=80)
+    save(whole, path)
 
 
 def main() -> None:
     """Print the numbers, draw the figure."""
     parser = argparse.ArgumentParser(description="Slosh under thrust.")
     parser.add_argument("--fmu", default="HubSlosh", help="file, or the name of a packed one")
-    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".png"))
+    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
     args = parser.parse_args()
     runs = {name: run(args.fmu, bandwidth) for name, bandwidth in BANDWIDTHS.items()}
     print("bandwidth (Hz)  largest error (deg)  slosh decays with (1/s): predicted  simulated")

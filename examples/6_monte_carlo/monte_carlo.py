@@ -1,19 +1,26 @@
-"""Monte Carlo of settling time and robust stability over fill, damping and friction, on dask.
+"""Monte Carlo of settling time and robust stability over fill, damping and friction.
 
-pip install distributed
 python examples/6_monte_carlo/monte_carlo.py --runs 400
+
+On this machine's cores; with ``--scheduler`` on a dask cluster (pip install distributed).
 """
 
 import argparse
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
-from distributed import Client, LocalCluster
 
 import hubslosh
-from hubslosh.plot import COLORS
+from hubslosh.plot import COLORS, save
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 PERIOD, LATENCY = 0.1, 1
 """Of the controller: s, cycles."""
@@ -72,10 +79,15 @@ def one(row: dict[str, float], fmu: str) -> dict[str, float]:
     }
 
 
-def study(client: Client, runs: int, seed: int, fmu: str) -> pd.DataFrame:
-    """Return the draws with what the workers found."""
+def study(client: "Client | None", runs: int, seed: int, fmu: str) -> pd.DataFrame:
+    """Return the draws with what dask's workers found, or processes of this machine."""
     table = draws(runs, seed)
-    found = client.gather(client.map(one, table.to_dict("records"), fmu=fmu))
+    rows = table.to_dict("records")
+    if client:
+        found = client.gather(client.map(one, rows, fmu=fmu))
+    else:
+        with ProcessPoolExecutor() as pool:
+            found = list(pool.map(partial(one, fmu=fmu), rows, chunksize=4))
     return pd.concat([table, pd.DataFrame(found)], axis=1)
 
 
@@ -88,12 +100,12 @@ def figure(table: pd.DataFrame, path: Path) -> None:
     whole.colorbar(dots, label="fill (cm)")
     poles.axhline(1, color="black", linewidth=0.8)
     poles.set(xlabel="slosh damping (%)", ylabel="largest pole (1: unstable)")
-    poles.set_title("Linear model, viscous bearing")
+    poles.set_title("Too little slosh damping: unstable at any fill")
     for these, color, label in ((stable, COLORS[0], "stable"), (~stable, COLORS[1], "unstable")):
         torque = 1e3 * (table["friction.c"] + table["friction.d"])[these]
         times.plot(torque, table["settling_time"][these], ".", color=color, label=label)
-    times.set(xlabel="stiction (mN·m)", ylabel="settling time (s)")
-    times.set_title(f"Spherical, dry friction; {STOP:g} s: not settled")
+    times.set(xlabel="stiction (mN·m)", ylabel=f"settling time (s; {STOP:g}: not settled)")
+    times.set_title("Stiction hides most of the instability")
     times.legend(title="linear model")
     correlation = table.corr(method="spearman")
     names = ["tank.h", "slosh.zeta", "friction.c"]
@@ -101,25 +113,35 @@ def figure(table: pd.DataFrame, path: Path) -> None:
     for shift, of in ((-0.2, "largest_pole"), (0.2, "settling_time")):
         ranks.barh(place + shift, correlation.loc[names, of], 0.38, label=of.replace("_", " "))
     ranks.set_yticks(place, ["fill", "slosh damping", "dry friction"])
-    ranks.set(xlabel="rank correlation (Spearman)", xlim=(-1, 1), title="What matters")
+    ranks.set(
+        xlabel="rank correlation (Spearman)",
+        xlim=(-1, 1),
+        title="Damping decides stability, friction settling",
+    )
     ranks.legend()
     for ax in (poles, times, ranks):
         ax.grid(alpha=0.3)
-    whole.savefig(path, dpi=80)
+    save(whole, path)
 
 
 def main() -> None:
     """Run the study on this machine's cores, or on a cluster."""
-    parser = argparse.ArgumentParser(description="Settling time and robust stability, on dask.")
+    parser = argparse.ArgumentParser(description="Settling time and robust stability.")
     parser.add_argument("--fmu", default="HubSlosh", help="file, or the name of a packed one")
     parser.add_argument("--runs", type=int, default=400)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--scheduler", help="address of a dask scheduler; workers need the wheel")
-    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".png"))
+    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
     args = parser.parse_args()
-    cluster = args.scheduler or LocalCluster(threads_per_worker=1, dashboard_address=None)
-    with Client(cluster) as client:
-        table = study(client, args.runs, args.seed, args.fmu)
+    if args.scheduler:
+        try:
+            from distributed import Client
+        except ModuleNotFoundError:
+            sys.exit("error: --scheduler needs dask: pip install distributed")
+        with Client(args.scheduler) as client:
+            table = study(client, args.runs, args.seed, args.fmu)
+    else:
+        table = study(None, args.runs, args.seed, args.fmu)
     stable, settled = table["largest_pole"] < 1, table["settling_time"] < STOP - 6
     print(f"{args.runs} draws: linear model stable in {stable.sum()}, settled in {settled.sum()};")
     print(f"settled though unstable in {(settled & ~stable).sum()}")

@@ -1,17 +1,24 @@
-"""The study on dask gives what the draws give one by one; README runs it with 400."""
+"""The study gives what the draws give one by one; README runs it with 400 of them."""
 
 import pandas as pd
 from distributed import Client
 from monte_carlo import STOP, draws, one, study
 
 
-def test_dask_gives_what_single_runs_give(fmu: str) -> None:
-    """16 draws, bit for bit; both outcomes of each question are among them."""
+def test_dask_and_processes_give_what_single_runs_give(fmu: str) -> None:
+    """16 draws, 4 of them in processes, bit for bit; both outcomes of each question are there."""
     with Client(
         processes=False, n_workers=1, threads_per_worker=1, dashboard_address=None
     ) as client:
         table = study(client, 16, 1, fmu)
     pd.testing.assert_frame_equal(table.iloc[:, :4], draws(16, 1))
+    alone = study(None, 4, 1, fmu)
+    assert all(
+        one(row, fmu) == found
+        for row, found in zip(
+            alone.iloc[:, :4].to_dict("records"), alone.iloc[:, 4:].to_dict("records"), strict=True
+        )
+    )
     for k in (0, 7):
         found = one(table.iloc[k, :4].to_dict(), fmu)
         assert found == table.iloc[k, 4:].to_dict()

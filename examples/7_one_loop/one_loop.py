@@ -248,7 +248,7 @@ def figure(runs: dict[str, list[tuple[np.ndarray, int, float]]], path: Path) -> 
     """Draw what README explains."""
     import matplotlib.pyplot as plt
 
-    from hubslosh.plot import COLORS
+    from hubslosh.plot import COLORS, save
 
     whole, (history, steps, work) = plt.subplots(
         3, figsize=(8, 9), layout="constrained", height_ratios=(1, 1, 1.2)
@@ -258,19 +258,21 @@ def figure(runs: dict[str, list[tuple[np.ndarray, int, float]]], path: Path) -> 
     history.plot(
         rows[:, 0], np.degrees(rows[:, 3]), color=COLORS[1], linewidth=0.8, label="slosh angle"
     )
-    history.set(xlabel="time (s)", ylabel="angle (deg)")
+    history.set(xlabel="time (s)", ylabel="angle (deg)", title="Two pulses of torque, then ringing")
     steps.semilogy(rows[1:, 0], np.diff(rows[:, 0]), color=COLORS[0], linewidth=0.8)
     steps.set(xlabel="time (s)", ylabel="accepted step (s)")
+    steps.set_title("The master takes longer steps as the slosh dies out, short ones at a pulse")
     for (name, several), color in zip(runs.items(), COLORS[:2], strict=True):
         work.loglog(
             [n for _, n, _ in several], [e for _, _, e in several], "o-", color=color, label=name
         )
     work.set(xlabel="steps, those rolled back included", ylabel="largest error (rad, rad/s)")
+    work.set_title("and needs half as many for the same error")
     for ax in (history, steps, work):
         ax.grid(alpha=0.3, which="both")
     history.legend()
     work.legend(title="step")
-    whole.savefig(path, dpi=80)
+    save(whole, path)
 
 
 def main() -> None:
@@ -278,9 +280,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="One loop in several hosts.")
     parser.add_argument("--fmu", default="HubSlosh", help="file, or the name of a packed one")
     parser.add_argument("--folder", type=Path, default=Path("dist"), help="what one-loop wrote")
-    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".png"))
+    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
     parser.add_argument("--hosts-only", action="store_true", help="compare hosts, draw nothing")
     args = parser.parse_args()
+    if not (args.folder / "Controller.fmu").exists():
+        command = f"cargo run --release -p one-loop -- dist/HubSlosh.fmu {args.folder}"
+        sys.exit(f"error: {args.folder} has no Controller.fmu; this makes it: {command}")
     differences = hosts(args.folder, args.fmu)
     for name, value in differences.items():
         print(f"{name}: {value:.1e}")

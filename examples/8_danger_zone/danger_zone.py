@@ -13,7 +13,7 @@ import pandas as pd
 from scipy.optimize import brentq
 
 import hubslosh
-from hubslosh.plot import COLORS
+from hubslosh.plot import COLORS, save
 
 THRUST = 2400.0  # N
 GIMBAL = -1.3  # m: height of the engine's gimbal; O of the FMU is there
@@ -187,13 +187,17 @@ def figure(fmu: str) -> plt.Figure:
     left.plot(some, [1e3 * simulated_growth(fmu, Craft(z)) for z in some], "o", color=COLORS[2],
               label="simulated")  # fmt: skip
     left.set(xlabel="height of the tank's origin (m)", ylabel="growth of slosh (10$^{-3}$/s)",
-             title="Undamped liquid under attitude control")  # fmt: skip
+             title=f"With a tank at {low:.2f} to {high:.2f} m the loop is unstable")  # fmt: skip
     left.legend(fontsize=8)
     for n, (z, text) in enumerate(((0.5, "0.50 m: in the zone"), (-0.45, "−0.45 m"))):
         run = simulate(fmu, Craft(z), 300)
         right.plot(run["time"], np.degrees(run["tank[1].angle_x[1]"]), color=COLORS[1 - n],
                    linewidth=0.6, label=text)  # fmt: skip
-    right.set(xlabel="time (s)", ylabel="slosh angle (°)", title="Liquid let go at 1°")
+    right.set(
+        xlabel="time (s)",
+        ylabel="slosh angle (°)",
+        title="Slosh grows in the zone and dies out below it",
+    )
     right.legend(fontsize=8)
     return drawing
 
@@ -202,7 +206,7 @@ def main() -> None:
     """Print the numbers of README and draw its figure."""
     parser = argparse.ArgumentParser(description="Where a tank destabilises an attitude loop.")
     parser.add_argument("--fmu", default="Spacecraft", help="file, or the name of a packed one")
-    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".png"))
+    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
     args = parser.parse_args()
     print("zone, m: predicted {:.3f} to {:.3f}".format(*predicted_zone()), end="; ")
     print("from the FMU {:.3f} to {:.3f}".format(*zone(args.fmu)))
@@ -211,7 +215,7 @@ def main() -> None:
         rates = (craft.predicted_growth, growth(args.fmu, craft), simulated_growth(args.fmu, craft))
         cells = [f"{z:.2f}", *(f"{rate:.4e}" for rate in rates), f"{craft.damping_needed:.5f}"]
         print(f"| {' | '.join(cells)} |")
-    figure(args.fmu).savefig(args.out, dpi=110)
+    save(figure(args.fmu), args.out)
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ import pandas as pd
 from scipy.linalg import solve_discrete_are
 
 import hubslosh
-from hubslosh.plot import COLORS
+from hubslosh.plot import COLORS, save
 
 PERIOD = 0.1  # s, cycle of the controller; the torque comes one cycle later
 SLEW, DURATION = np.radians(30), 20.0
@@ -48,7 +48,7 @@ def parameters(slosh: bool = True, frequency: float = FREQUENCY) -> dict[str, fl
             f"{tank}.m_0": FIXED, f"{tank}.H_0": 0.0, f"{tank}.I_0": 0.7, f"{tank}.I_z": OWN,
             f"{tank}.mass[1]": MASS, f"{tank}.length[1]": LENGTH, f"{tank}.hinge[1]": LENGTH,
             f"{tank}.k[1]": MASS * (2 * np.pi * frequency) ** 2, f"{tank}.zeta[1]": ZETA,
-            f"{tank}.g_ref": 1e-9,
+            f"{tank}.g_ref": 1e-9, f"{tank}.damping_law": "constant",
         }  # fmt: skip
         if not slosh:
             values |= {f"{tank}.m_0": FIXED + MASS, f"{tank}.modes": 0}
@@ -164,22 +164,35 @@ def tranquillisation(run: pd.DataFrame) -> float:
 
 def figure(runs: dict[str, pd.DataFrame]) -> plt.Figure:
     """Draw pointing error and slosh torque of the runs."""
-    drawing, axes = plt.subplots(2, 1, figsize=(9, 5.6), sharex=True, layout="constrained")
+    drawing, axes = plt.subplots(
+        2, 1, figsize=(9, 5.6), sharex=True, layout="constrained", height_ratios=(2, 1)
+    )
     for (name, run), color in zip(runs.items(), ("0.5", COLORS[1], COLORS[0]), strict=True):
         run = run[run["time"] <= SHOWN]
-        axes[0].plot(run["time"], 1e3 * np.degrees(run["error"]), color=color, label=name)
+        # what a rigid craft does lies under the observer's line: dashed, on top of it
+        line = {"linestyle": ":", "zorder": 3} if name == "liquid rigid" else {}
+        axes[0].plot(run["time"], 1e3 * np.degrees(run["error"]), color=color, label=name, **line)
     axes[0].axhspan(-1e3 * np.degrees(POINTING), 1e3 * np.degrees(POINTING), color="0.9")
+    wait = tranquillisation(runs["sloshing"]) / 60
+    observed = tranquillisation(runs["sloshing, with observer"])
+    at_once = "at once" if observed == 0 else f"after {observed:.0f} s"
     axes[0].set(ylabel="pointing error (0.001°)")
+    axes[0].set_title(
+        f"Knowing the slosh: image {at_once}. Not knowing it: image after {wait:.0f} minutes"
+    )
     run = runs["sloshing, with observer"]
     run = run[run["time"] <= SHOWN]
     axes[1].plot(run["time"], 1e3 * run["slosh"], color=COLORS[0], label="slosh torque")
     axes[1].plot(
         run["time"], 1e3 * run["estimate"], "--", color="k", linewidth=1, label="estimated"
     )
-    axes[1].set(ylabel="torque about roll (mN·m)", xlabel="time (s)")
+    axes[1].set(ylabel="roll torque (mN·m)", xlabel="time (s)")
     for ax in axes:
-        ax.axvline(DURATION, color="0.7", linewidth=0.8)
-        ax.legend(fontsize=8)
+        ax.axvspan(0, DURATION, color="0.93", zorder=0, linewidth=0)
+        ax.margins(x=0)
+        ax.legend(fontsize=9, loc="upper right", framealpha=1)
+    top = axes[0].get_xaxis_transform()
+    axes[0].text(DURATION / 2, 0.96, "slew", transform=top, ha="center", va="top", color="0.4")
     return drawing
 
 
@@ -196,7 +209,7 @@ def main() -> None:
     """Print the numbers of README and draw its figure."""
     parser = argparse.ArgumentParser(description="Agile slew of an Earth observer.")
     parser.add_argument("--fmu", default="Spacecraft", help="file, or the name of a packed one")
-    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".png"))
+    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".svg"))
     args = parser.parse_args()
     runs = all_runs(args.fmu)
     for name, run in runs.items():
@@ -214,7 +227,7 @@ def main() -> None:
         late = run[run["time"] >= DURATION]
         print(f"observer's frequency x {share}: {np.degrees(late['error'].abs().max()):.5f} deg "
               f"after the slew, imaging after {tranquillisation(run):.1f} s")  # fmt: skip
-    figure(runs).savefig(args.out, dpi=110)
+    save(figure(runs), args.out)
 
 
 if __name__ == "__main__":
