@@ -677,6 +677,18 @@ impl<'f> Session<'f> {
     /// # Errors
     /// If one fails, which is the business of a rule of its own.
     pub fn advance(&mut self, steps: usize) -> Result<()> {
+        self.steps(steps, Session::stimulate)
+    }
+
+    /// As [`Session::advance`], with the inputs as they are.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn coast(&mut self, steps: usize) -> Result<()> {
+        self.steps(steps, |_| Ok(()))
+    }
+
+    fn steps(&mut self, steps: usize, prepare: fn(&mut Self) -> Called) -> Result<()> {
         let rule = match self.interface {
             Interface::CoSimulation => "steps.run",
             Interface::ModelExchange => "exchange.run",
@@ -685,7 +697,7 @@ impl<'f> Session<'f> {
             if self.is_ended() {
                 break;
             }
-            let done = self.stimulate().map_err(anyhow::Error::from);
+            let done = prepare(self).map_err(anyhow::Error::from);
             done.and_then(|()| self.go(self.step)).map_err(|error| match error.downcast() {
                 Ok(unusable) => Unusable { ..unusable },
                 Err(error) => Unusable { rule, why: error.to_string() },
