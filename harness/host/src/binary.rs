@@ -48,10 +48,11 @@ const WINDOWS_LIBRARIES: [&str; 12] = [
     "ws2_32.dll",
 ];
 /// Where the libraries that are part of macOS are.
-const MACOS_LIBRARIES: [&str; 4] = [
+const MACOS_LIBRARIES: [&str; 5] = [
     "/System/Library/Frameworks/CoreFoundation.framework/Versions/A/CoreFoundation",
     "/usr/lib/libSystem.B.dylib",
     "/usr/lib/libc++.1.dylib",
+    "/usr/lib/libcharset.1.dylib", // libiconv's, which exports it again
     "/usr/lib/libiconv.2.dylib",
 ];
 
