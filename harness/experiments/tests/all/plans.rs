@@ -7,7 +7,8 @@ use pack::packed_for_tests;
 use rayon::prelude::*;
 
 /// Plans that leave the range of a model; their texts say why.
-const BEYOND: [&str; 4] = ["thesis", "thesis_models", "t5_near_resonance", "amplitudes"];
+const BEYOND: [&str; 5] =
+    ["thesis", "thesis_models", "t5_near_resonance", "amplitudes", "bench_damping"];
 
 /// The runs that are made here: of many those with the largest torque, of draws every twentieth.
 fn some<'a>(plan: &Plan, cases: &'a [Case]) -> Vec<&'a Case> {
