@@ -142,6 +142,12 @@ fn with_kind<M: runtime::Model>(
     shown: &str,
 ) -> Result<Value, runtime::call::Fault> {
     let mut instance = Instance::<M, Fmi2>::new(Interface::CoSimulation);
+    // at rest
+    for name in ["init.omega[1]", "init.omega[3]", "a[1]", "a[3]"] {
+        if let Some(reference) = M::table().find(name) {
+            instance.set(&SET_REAL, &[reference], |_| Value::Real(0.0))?;
+        }
+    }
     for (name, number) in settings {
         let reference = M::table().find(name).unwrap();
         instance.set(&SET_INTEGER, &[reference], |_| Value::Integer(*number))?;

@@ -32,8 +32,8 @@ impl HubSlosh {
 }
 
 /// The plant's parameters, and the ways round enumerations for hosts that set none, and round Booleans for
-/// hosts that misread them.
-#[derive(Clone, Debug, Default)]
+/// hosts that misread them. By default the liquid is let go at [`START_ANGLE`].
+#[derive(Clone, Debug)]
 pub struct Parameters {
     plant: plant::Parameters,
     /// The number of the slosh model, 0: as the enumeration says.
@@ -54,6 +54,29 @@ pub struct Parameters {
     pub wheel_enabled_kind: i32,
     /// Of `imu.enabled`.
     pub imu_enabled_kind: i32,
+}
+
+/// `init.slosh_angle` of an FMU that nobody has set anything of, rad: 2 degrees, so that the first plot shows how
+/// the liquid swings, what it does to the hub and how the bearing catches it.
+pub const START_ANGLE: f64 = 0.035;
+
+impl Default for Parameters {
+    fn default() -> Self {
+        let mut plant = plant::Parameters::default();
+        plant.init.slosh_angle = START_ANGLE;
+        Parameters {
+            plant,
+            slosh_kind: 0,
+            slosh_source_kind: 0,
+            damping_law_kind: 0,
+            friction_kind: 0,
+            zeta_from_correlation_kind: 0,
+            capillarity_kind: 0,
+            one_axis_kind: 0,
+            wheel_enabled_kind: 0,
+            imu_enabled_kind: 0,
+        }
+    }
 }
 
 impl Deref for Parameters {

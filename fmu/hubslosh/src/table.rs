@@ -3,8 +3,8 @@
 //! A variable exists exactly when it has an entry here. The model description,
 //! the value references, get and set, start values, range checks, saved states
 //! and the GUID follow from this table. Start values are not written here: they are
-//! `plant::Parameters::default()` and `plant::Inputs::default()`, read through the
-//! entry's accessor.
+//! `plant::Parameters::default()`, with the liquid let go at `model::START_ANGLE`, and
+//! `plant::Inputs::default()`, read through the entry's accessor.
 //!
 //! Ranges keep the plant sane (positive inertia, a tank that is a tank, a
 //! sampling rate that can be stepped) and are wide otherwise; what parameters
@@ -446,7 +446,7 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         "Hub rate at the start")
         .display_unit("deg/s").range(-1e3, 1e3),
     V::parameter("init.slosh_angle", |p, _| &mut p.init.slosh_angle, "rad",
-        "slosh_angle at the start")
+        "slosh_angle at the start. Not 0, so that with nothing set something moves; 0 to start at rest")
         .display_unit("deg").range(-1.5, 1.5),
     V::parameter("init.slosh_angle_radial", |p, _| &mut p.init.slosh_angle_radial, "rad",
         "slosh_angle_radial at the start; without meaning in planar models")

@@ -3,8 +3,8 @@
 use std::ops::{Deref, DerefMut};
 
 use craft::{
-    Coupling, Craft, DampingLaw, SloshTank, SloshTankOutputs, TANK_INPUTS, TANK_STATES, TankInputs,
-    TankParameters, TankState,
+    Coupling, Craft, DampingLaw, Ramp, SloshTank, SloshTankOutputs, TANK_INPUTS, TANK_STATES,
+    TankInputs, TankParameters, TankState,
 };
 use runtime::table::Table;
 
@@ -109,13 +109,25 @@ impl Parameters {
     }
 }
 
-/// The host's motion. A slope that a host gives for omega is not used: it follows from omega_dot.
-#[derive(Clone, Copy, Debug, Default)]
+/// The host's motion. A slope that a host gives for omega is not used: it follows from omega_dot. By default
+/// the tank stands on the ground and is pushed with [`START_ACCELERATION`].
+#[derive(Clone, Copy, Debug)]
 pub struct Inputs {
     /// As the tank takes it.
     pub tank: TankInputs,
     /// The slope of omega, rad/s2.
     pub omega_slope: [f64; 3],
+}
+
+/// `a` of an FMU that no host has connected, m/s2: standard gravity along the tank's axis, and a push to the
+/// side, so that the first plot shows the liquid swing.
+pub const START_ACCELERATION: [f64; 3] = [0.1, 0.0, 9.80665];
+
+impl Default for Inputs {
+    fn default() -> Self {
+        let tank = TankInputs { a: Ramp::held(START_ACCELERATION), ..TankInputs::default() };
+        Inputs { tank, omega_slope: [0.0; 3] }
+    }
 }
 
 impl runtime::Model for Model {

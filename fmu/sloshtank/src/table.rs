@@ -1,5 +1,5 @@
 //! Every variable of SloshTank.fmu, once. Start values are those of
-//! `craft::TankParameters::default()`.
+//! `craft::TankParameters::default()` and `model::START_ACCELERATION`.
 
 use craft::{Coupling, DampingLaw, MODES, POINTS, TANK_STATES, TRIANGLE, TankState};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};

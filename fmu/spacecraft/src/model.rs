@@ -72,9 +72,14 @@ pub struct Parameters {
     pub points: [i32; TANKS],
 }
 
+/// `init.omega` of an FMU that nobody has set anything of, rad/s: a slow spin that is not about a principal
+/// axis, so that the first plot shows how it nutates and how the liquid answers.
+pub const START_RATE: [f64; 3] = [0.02, 0.0, 0.1];
+
 impl Default for Parameters {
     fn default() -> Self {
-        let craft = craft::Parameters::default();
+        let mut craft = craft::Parameters::default();
+        craft.init.omega = START_RATE;
         let modes = craft.tank.map(|tank| tank.modes as i32);
         let points = craft.tank.map(|tank| tank.fill.points as i32);
         let (tanks, damping_law_kind) = (craft.tanks as i32, [0; TANKS]);

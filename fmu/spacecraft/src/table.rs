@@ -1,4 +1,5 @@
-//! Every variable of Spacecraft.fmu, once. Start values are those of `craft::Parameters::default()`.
+//! Every variable of Spacecraft.fmu, once. Start values are those of `craft::Parameters::default()`,
+//! turning with `model::START_RATE`.
 //!
 //! A variant for fewer tanks and modes is made of the same table: the arrays are shorter.
 //!
@@ -376,7 +377,8 @@ static VARIABLES: &[Variable<Model>] = &[
     // Where the motion starts
     V::parameter("init.q", |p, n| &mut p.init.q[n], "1", "q at the start; normalised")
         .shape(&[4]),
-    V::parameter("init.omega", |p, n| &mut p.init.omega[n], "rad/s", "omega at the start")
+    V::parameter("init.omega", |p, n| &mut p.init.omega[n], "rad/s",
+        "omega at the start. Not 0, so that with nothing set something moves; 0 to start at rest")
         .display_unit("deg/s").shape(VECTOR).range(-1e3, 1e3),
     V::parameter("init.position", |p, n| &mut p.init.position[n], "m", "position at the start")
         .shape(VECTOR),

@@ -63,7 +63,7 @@ type Solution = (Vec<f64>, Vec<f64>);
 
 fn fmu(model: &str, outputs: usize, tolerance: f64, torque: &[f64]) -> Result<Solution> {
     let fmu = Fmu::open(Path::new("dist/HubSlosh.fmu"))?;
-    let mut instance = fmu.instantiate("work_precision")?;
+    let mut instance = fmu.instantiate_at_rest("work_precision")?;
     instance.set("slosh.model", model)?;
     instance.setup_experiment(Some(tolerance), 0.0, None)?;
     instance.enter_initialization_mode()?;

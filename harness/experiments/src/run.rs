@@ -203,7 +203,7 @@ impl Run {
     /// A new instance with the start values set, ready for the first step.
     pub fn initialise<'fmu>(&self, fmu: &'fmu Fmu) -> Result<Instance<'fmu>> {
         self.check()?;
-        let mut instance = fmu.instantiate("run")?;
+        let mut instance = fmu.instantiate_at_rest("run")?;
         for (name, value) in &self.settings {
             let variable = fmu.description().variable(name)?;
             match variable.causality.as_str() {

@@ -290,6 +290,17 @@ const MOST_TYPES: usize = 5000;
 const NAMED: usize = 20;
 
 impl ModelDescription {
+    /// The parameters and inputs by which this project's FMUs move when nobody sets anything, for a host's first
+    /// plot; 0 is at rest. None in FMUs of others.
+    pub fn moving_starts(&self) -> &'static [&'static str] {
+        match self.model_name.as_str() {
+            "HubSlosh" => &["init.slosh_angle"],
+            name if name.starts_with("Spacecraft") => &["init.omega[1]", "init.omega[3]"],
+            "SloshTank" => &["a[1]", "a[3]"],
+            _ => &[],
+        }
+    }
+
     /// Reads the description of a packed FMU; nothing is unpacked or loaded.
     pub fn of_packed(path: &Path) -> Result<Self> {
         let name = path.display();

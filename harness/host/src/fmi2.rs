@@ -490,6 +490,15 @@ impl Fmu {
         self.instantiate_with(&self.instantiation(name))
     }
 
+    /// The same, at rest: [`ModelDescription::moving_starts`] are 0. What then moves was asked for.
+    pub fn instantiate_at_rest(&self, name: &str) -> Result<Instance<'_>> {
+        let mut instance = self.instantiate(name)?;
+        for start in self.description.moving_starts() {
+            instance.set(start, "0")?;
+        }
+        Ok(instance)
+    }
+
     /// The arguments [`Fmu::instantiate`] uses, to be bent for tests of bad calls.
     pub fn instantiation<'a>(&'a self, name: &'a str) -> Instantiation<'a> {
         Instantiation {

@@ -116,7 +116,7 @@ fn arguments() -> Result<Arguments> {
 
 /// What the twin is, by the names of the estimates.
 fn truths(fmu: &Fmu, twin: &Twin) -> Result<BTreeMap<String, f64>> {
-    let mut instance = fmu.instantiate("truth")?;
+    let mut instance = fmu.instantiate_at_rest("truth")?;
     for (name, value) in &twin.settings {
         instance.set(name, value)?;
     }

@@ -53,7 +53,7 @@ pub struct Nominal {
 
 /// The FMU with settings, initialised.
 pub fn initialised<'fmu>(fmu: &'fmu Fmu, settings: &[(String, String)]) -> Result<Instance<'fmu>> {
-    let mut instance = fmu.instantiate("identify")?;
+    let mut instance = fmu.instantiate_at_rest("identify")?;
     for (name, value) in settings {
         let variable = fmu.description().variable(name)?;
         ensure!(

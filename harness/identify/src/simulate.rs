@@ -94,7 +94,7 @@ impl Setup {
     ) -> Result<Motion> {
         let reference =
             |name: &str| Ok::<_, anyhow::Error>(fmu.description().variable(name)?.reference);
-        let mut instance = fmu.instantiate("identify")?;
+        let mut instance = fmu.instantiate_at_rest("identify")?;
         for (name, value) in &self.settings {
             instance.set(name, value)?;
         }

@@ -102,10 +102,18 @@ def _loaded(kind: type, fmu: Fmu, identifier: str, binary: Path) -> Any:
     return instance
 
 
+# Start values by which the package's FMUs move when nobody sets anything, for a host's first plot.
+_STARTS = {
+    "HubSlosh": ["init.slosh_angle"],
+    "Spacecraft": ["init.omega[1]", "init.omega[3]"],
+    "SloshTank": ["a[1]", "a[3]"],
+}
+
+
 class Instance:
     """An instance of an FMU 2.0, from fmi2Instantiate to fmi2FreeInstance; variables by name.
 
-    Use it in a ``with`` statement.
+    Use it in a ``with`` statement. The package's FMUs start at rest here: what moves was asked for.
     """
 
     def __init__(self, fmu: Fmu, kind: type[fmi2.FMU2Slave] | type[fmi2.FMU2Model]) -> None:
@@ -135,6 +143,8 @@ class Instance:
             instance.freeLibrary()
             raise FmuError(" ".join([str(error), *_messages.said])) from None
         self._instance = instance
+        for start in _STARTS.get(fmu.name.partition("_")[0], []):
+            self.set(start, 0.0)
 
     def __enter__(self) -> Self:
         """Return the instance itself."""

@@ -35,7 +35,8 @@ def test_what_the_fmu_warns_of_is_a_warning(fmu: Path) -> None:
 def test_a_held_torque_gives_the_bits_of_fmpy(fmu: Path) -> None:
     """Same times, same calls: outputs of all types, every one of 3001 rows."""
     theirs = simulate_fmu(
-        str(fmu), stop_time=60, output_interval=STEP, start_values={"slosh.model": 4},
+        str(fmu), stop_time=60, output_interval=STEP,
+        start_values={"slosh.model": 4, "init.slosh_angle": 0},
         input=np.array(list(zip(TIME, TORQUE, strict=True)), [("time", float), ("tau_cmd", float)]),
         output=["omega", "slosh_angle_radial", "omega_dot", "stuck", "regime", "event_count"],
     )  # fmt: skip

@@ -250,7 +250,10 @@ impl Campaign {
         for case in cases.into_iter().filter(|case| case.recording.is_none()) {
             let run = case.run();
             columns = stored_columns(description, run.input.as_deref());
-            let mut settings = serde_json::Map::new();
+            let starts = description.moving_starts().iter();
+            let at_rest = starts.filter(|name| Some(**name) != run.input.as_deref());
+            let mut settings: serde_json::Map<_, _> =
+                at_rest.map(|name| (name.to_string(), json!(0.0))).collect();
             for (name, text) in &case.settings {
                 let value = match description.value(description.variable(name)?, text)? {
                     // an enumeration keeps its item's name
