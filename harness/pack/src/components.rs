@@ -239,8 +239,13 @@ fn standard_crates(bytes: &[u8]) -> Result<BTreeSet<(String, String)>> {
     let places = bytes.windows(BEFORE.len()).enumerate().filter(|(_, w)| *w == BEFORE);
     for (place, _) in places {
         // one separator, of this or of the target's system, on either side
-        let rest = &bytes[place + BEFORE.len() + 1..];
-        let end = rest.iter().position(|b| b"/\\".contains(b)).unwrap_or(0);
+        let separator = |b: &u8| b"/\\".contains(b);
+        let Some((first, rest)) = bytes[place + BEFORE.len()..].split_first() else { continue };
+        let of_a_name = |b: &u8| b.is_ascii_alphanumeric() || b"-_.+".contains(b);
+        let end = rest.iter().position(|b| !of_a_name(b)).unwrap_or(rest.len());
+        if !separator(first) || !rest.get(end).is_some_and(separator) {
+            continue; // no folder: the text above, where the binary is this program
+        }
         let folder = String::from_utf8_lossy(&rest[..end]);
         let parts = folder.split_once("-").and_then(|_| folder.rsplit_once('-'));
         let known = parts.filter(|(name, _)| STANDARD.iter().any(|(known, _)| known == name));
@@ -421,6 +426,18 @@ mod tests {
         assert_eq!(found, wanted.map(|(n, v)| (n.to_string(), v.to_string())).into());
         let error = standard_crates(b"/rust/deps/new-thing-1.0.0/src").unwrap_err().to_string();
         assert!(error.contains("new-thing-1.0.0"), "{error}");
+    }
+
+    #[test]
+    fn the_search_does_not_find_its_own_words() {
+        for words in [
+            "/rust/depsaddr2lineApache-2.0 OR MIT/x",
+            "/rust/deps",
+            "/rust/deps/",
+            "/rust/deps/a b/",
+        ] {
+            assert!(standard_crates(words.as_bytes()).unwrap().is_empty(), "{words}");
+        }
     }
 
     #[test]
