@@ -42,7 +42,8 @@ pub struct Folder {
 /// The hashes of the files, by name, and the file in which they are.
 #[derive(Debug)]
 struct Manifest {
-    file: File,
+    /// `None` from its publication on.
+    file: Option<File>,
     sums: BTreeMap<String, String>,
 }
 
@@ -95,7 +96,7 @@ impl Folder {
         Ok(Folder {
             path: path.to_path_buf(),
             unfinished,
-            manifest: Mutex::new(Manifest { file, sums: found }),
+            manifest: Mutex::new(Manifest { file: Some(file), sums: found }),
             _registered: registered,
             _lock: lock,
         })
@@ -154,6 +155,8 @@ impl Folder {
             Ok(name)
         });
         let names = names.collect::<Result<Vec<_>>>()?;
+        // Windows renames nothing to the name of a file that is open
+        drop(manifest.file.take());
         let gone =
             manifest.sums.keys().filter(|name| is_published(name) && !sums.contains_key(*name));
         let publish = || -> Result<()> {
@@ -191,9 +194,10 @@ impl Folder {
             return Ok(());
         }
         let line = format!("{sum}  {file}\n");
-        let added = manifest.file.write_all(line.as_bytes());
+        let place = manifest.file.as_mut().context("the campaign is published already")?;
+        let added = place.write_all(line.as_bytes());
         added
-            .and_then(|()| manifest.file.sync_data())
+            .and_then(|()| place.sync_data())
             .with_context(|| format!("{} cannot be written", self.path.join(MANIFEST).display()))?;
         manifest.sums.insert(file, sum);
         Ok(())

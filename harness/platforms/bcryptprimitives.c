@@ -1,0 +1,8 @@
+/* The one function of Windows' bcryptprimitives.dll that Rust's standard library calls, for a wine that is too old to have it. */
+#include <windows.h>
+#include <ntsecapi.h>
+
+__declspec(dllexport) BOOL WINAPI ProcessPrng(PBYTE buffer, SIZE_T length)
+{
+    return RtlGenRandom(buffer, (ULONG)length);
+}
