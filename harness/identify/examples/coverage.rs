@@ -14,7 +14,7 @@
 //!   starts=data         or far: all starts 40 % off, up or down by the seed's bits
 //!   perfect=true        no delay, bias, asymmetry, gyro scale is estimated (false: all are)
 //!   sensor_errors=false         true: 5 ms delay, gyro scale 1.01, bias 2 mrad/s, asymmetry 0.1 in the twin
-//!   unmodelled=         tilt, nutation, warming, clipping, with + between several
+//!   unmodelled=         tilt, nutation, warming, clipping, drag, with + between several
 //!   rate=50             rows a second
 //!   gyro=50             values of the gyro a second, where it is slower than the rows
 //!   intersample=linear  of the twin's torque: linear, held, smooth

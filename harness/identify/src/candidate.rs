@@ -102,6 +102,7 @@ pub fn fit<'a>(
         starts: variables,
         far,
         intersample: options.intersample,
+        acausal: options.acausal,
         alone: options.models.iter().filter(|m| *m != "frozen").count() == 1,
         model,
         simulations: 0,

@@ -196,6 +196,10 @@ impl<'a> Problem<'a> {
     }
 
     fn motion(&self, x: &[f64], recording: usize) -> Result<Motion> {
+        self.motion_under(x, recording, None)
+    }
+
+    fn motion_under(&self, x: &[f64], recording: usize, besides: Option<&[f64]>) -> Result<Motion> {
         let values: Vec<(&str, f64)> = self
             .unknowns
             .iter()
@@ -209,7 +213,8 @@ impl<'a> Problem<'a> {
             })
             .collect();
         let delay = self.value_of(x, &Quantity::Delay, 0.0);
-        self.setup.run(self.fmu, &values, &self.recordings[recording], delay)
+        let recording = &self.recordings[recording];
+        self.setup.run_under(self.fmu, &values, recording, delay, besides)
     }
 
     fn motions(&self, x: &[f64]) -> Result<Vec<Motion>> {
@@ -380,6 +385,27 @@ impl<'a> Problem<'a> {
             }
         };
         Ok(self.channels.iter().map(exact).collect())
+    }
+
+    /// Derivative of the stacked innovations and priors with respect to k, under torques k φ on the hub: `torque` is φ at the
+    /// rows of each recording.
+    pub fn to_torque(
+        &self,
+        x: &[f64],
+        base: &[Motion],
+        torque: &[Vec<f64>],
+        step: f64,
+    ) -> Result<DVector<f64>> {
+        let moved = |by: f64| -> Result<Vec<Motion>> {
+            let each = (0..self.recordings.len()).into_par_iter();
+            each.map(|i| {
+                let scaled: Vec<f64> = torque[i].iter().map(|phi| by * phi).collect();
+                self.motion_under(x, i, Some(&scaled))
+            })
+            .collect()
+        };
+        let column = self.whitened(1, &|_| self.differenced(x, base, step, &moved))?;
+        Ok(self.with_priors(&column, &[]).column(0).into_owned())
     }
 
     /// Derivative of the residuals for each channel by differences of the motion, which `moved` gives some steps from

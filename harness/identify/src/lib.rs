@@ -1,5 +1,6 @@
 //! From recordings of torque and hub rate to the FMU's parameters, with their uncertainty.
 
+pub mod between;
 pub mod budget;
 pub mod candidate;
 pub mod design;
@@ -8,6 +9,7 @@ pub mod fit;
 pub mod friction;
 pub mod goodness;
 pub mod methods;
+pub mod missing;
 pub mod news;
 pub mod nominal;
 pub mod options;

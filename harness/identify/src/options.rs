@@ -26,6 +26,8 @@ pub struct Options {
     pub gyro_scale: f64,
     /// What the torque does between rows; `None`: what fits best.
     pub intersample: Option<Intersample>,
+    /// The rate's time stamps may be early: a delay below zero is no doubt.
+    pub acausal: bool,
     /// Recordings that are simulated, not fitted.
     pub validation: Vec<Recording>,
 }
@@ -41,6 +43,7 @@ impl Default for Options {
             sensor_errors: true,
             gyro_scale: 0.01,
             intersample: None,
+            acausal: false,
             validation: Vec::new(),
         }
     }

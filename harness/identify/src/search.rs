@@ -6,13 +6,12 @@
 use anyhow::{Result, bail};
 use nalgebra::DMatrix;
 
+use crate::between;
 use crate::fit::{Polished, Problem, WHOLE, WINDOWS};
 use crate::friction;
 use crate::goodness::{fit_pct, is_poor, tests};
-use crate::recording::Recording;
 use crate::simulate::Intersample;
 use crate::stribeck::Indices;
-use crate::unknown::Quantity;
 use analysis::innovations::Tests;
 
 /// Sum of squares over the rows below which a model may be near its minimum: that of noise, and half as much again.
@@ -23,13 +22,6 @@ const JOINS: f64 = 20.0;
 
 /// Sets of sensitivities that Gauss and Newton's steps have at most.
 const ROUNDS: usize = 6;
-
-/// Whether it matters what the torque does between rows: where it changes a lot from one to the next.
-fn varies_fast(recording: &Recording) -> bool {
-    let square = |x: f64| x * x;
-    let changes: f64 = recording.torque.windows(2).map(|t| square(t[1] - t[0])).sum();
-    changes > 1e-4 * recording.torque.iter().map(|t| square(*t)).sum::<f64>()
-}
 
 /// A minimum, and the values' covariance if several friction curves explain the recording.
 pub type Found = (Polished, Option<DMatrix<f64>>);
@@ -44,6 +36,8 @@ pub struct Search<'a, 'h> {
     pub far: bool,
     /// Intersample behaviour of the torque; `None`: not known.
     pub intersample: Option<Intersample>,
+    /// The rate may come before the torque.
+    pub acausal: bool,
     /// No other model of the slosh is tried, which may fit where this one does not.
     pub alone: bool,
     /// Name of the model.
@@ -251,48 +245,29 @@ impl<'a> Search<'a, '_> {
         self.polish(&near.x, Some(&near.jacobian), ROUNDS)
     }
 
-    /// Tries what else the torque may do between rows: the sum of squares after the best step from
-    /// here, to first order. Returns whether another one was better and is set.
+    /// Tries what else the torque may do between rows. Returns whether another behaviour was better and is set.
     fn join(&mut self, near: &Polished) -> Result<bool> {
-        if self.intersample.is_some() || !self.problem.recordings.iter().any(varies_fast) {
+        if self.intersample.is_some() || !between::matters(self.problem.recordings) {
             return Ok(false);
         }
-        let now = self.problem.setup.intersample;
-        let mut best = (near.cost - JOINS, now);
-        for other in Intersample::ALL.into_iter().filter(|b| *b != now) {
-            let mut problem = self.problem.clone();
-            problem.setup.intersample = other;
-            // held torque is late by half a row
-            let mut x = near.x.clone();
-            let late = |b: Intersample| if b == Intersample::ZeroOrderHold { 0.5 } else { 0.0 };
-            if let Some(index) = problem.unknowns.iter().position(|u| u.quantity == Quantity::Delay)
-            {
-                let scale = problem.unknowns[index].scale;
-                let rows = late(now) - late(other);
-                let delay = scale.value(x[index]) + rows * problem.recordings[0].step();
-                x[index] = scale.variable(delay);
-            }
-            self.simulations += 1;
-            let Ok(answer) = problem.answer(&x) else { continue };
-            let e = problem.stacked(&answer, &x);
-            let gradient = near.jacobian.tr_mul(&e);
-            let cost = e.norm_squared() - gradient.dot(&(&near.covariance.x * &gradient));
-            (self.progress)(format!(
-                "{}: torque {}, all free: sum of squares {cost:.1}, {} {:.1}",
-                self.model,
-                other.words(),
-                now.words(),
-                near.cost
-            ));
-            if cost < best.0 {
-                best = (cost, other);
-            }
-        }
-        if best.1 == now {
+        let (now, step) = (self.problem.setup.intersample, self.problem.recordings[0].step());
+        let others =
+            between::alternatives(&self.problem, &near.x, &near.jacobian, &near.covariance);
+        self.simulations += others.len();
+        (self.progress)(format!(
+            "{}: {}",
+            self.model,
+            between::evidence((now, near.cost), step, &others)
+        ));
+        let best = others
+            .iter()
+            .filter(|other| self.acausal || !other.is_acausal(step))
+            .min_by(|a, b| a.cost.total_cmp(&b.cost));
+        let Some(best) = best.filter(|best| best.cost < near.cost - JOINS) else {
             return Ok(false);
-        }
-        self.problem.setup.intersample = best.1;
-        (self.progress)(format!("{}: the torque is {}", self.model, best.1.words()));
+        };
+        self.problem.setup.intersample = best.behaviour;
+        (self.progress)(format!("{}: the torque is {}", self.model, best.behaviour.words()));
         Ok(true)
     }
 

@@ -4,6 +4,7 @@ use anyhow::Result;
 use host::drive::Inputs;
 use host::fmi2::Fmu;
 
+use crate::missing;
 use crate::recording::Recording;
 
 /// Instants closer than this are the same, s.
@@ -18,6 +19,8 @@ pub struct Motion {
     pub rate: Vec<f64>,
     /// rad/s².
     pub acceleration: Vec<f64>,
+    /// Of the liquid's first mode, rad.
+    pub slosh_angle: Vec<f64>,
 }
 
 /// Intersample behaviour: what the torque does between the rows of a recording (Ljung; Pintelon & Schoukens).
@@ -92,6 +95,18 @@ impl Setup {
         recording: &Recording,
         delay: f64,
     ) -> Result<Motion> {
+        self.run_under(fmu, values, recording, delay, None)
+    }
+
+    /// The same with a torque on the hub besides the recorded one, N·m, at the recording's rows.
+    pub fn run_under(
+        &self,
+        fmu: &Fmu,
+        values: &[(&str, f64)],
+        recording: &Recording,
+        delay: f64,
+        besides: Option<&[f64]>,
+    ) -> Result<Motion> {
         let reference =
             |name: &str| Ok::<_, anyhow::Error>(fmu.description().variable(name)?.reference);
         let mut instance = fmu.instantiate_at_rest("identify")?;
@@ -111,6 +126,7 @@ impl Setup {
         };
         let mut driven = vec![("tau_cmd", torque.as_slice())];
         driven.extend(recording.gravity.as_ref().map(|gravity| ("g_axial", gravity.as_slice())));
+        driven.extend(besides.map(|torque| (missing::TORQUE, torque)));
         let (names, signals): (Vec<&str>, Vec<&[f64]>) = driven.into_iter().unzip();
         let held = self.intersample == Intersample::ZeroOrderHold;
         let inputs = Inputs::new(fmu.description(), &names, held)?;
@@ -118,7 +134,12 @@ impl Setup {
         let first: Vec<f64> = signals.iter().map(|signal| signal[0]).collect();
         inputs.initialise(&mut instance, None, time[0], None, &first)?;
 
-        let outputs = [reference("theta")?, reference("omega")?, reference("omega_dot")?];
+        let outputs = [
+            reference("theta")?,
+            reference("omega")?,
+            reference("omega_dot")?,
+            reference("slosh_angle")?,
+        ];
         let mut motion = Motion::default();
         // the row that is read next; the row from which on the signals go to the one after it
         let (mut row, mut knot) = (0, 0);
@@ -129,11 +150,12 @@ impl Setup {
                 if t < target - SAME {
                     break target;
                 }
-                let mut values = [0.0; 3];
+                let mut values = [0.0; 4];
                 instance.get_real(&outputs, &mut values)?;
                 motion.angle.push(values[0]);
                 motion.rate.push(values[1]);
                 motion.acceleration.push(values[2]);
+                motion.slosh_angle.push(values[3]);
                 row += 1;
             };
             if time.get(knot + 1).is_some_and(|end| t >= *end) {

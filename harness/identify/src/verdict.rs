@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use crate::budget::Effect;
 use crate::candidate::ModelFit;
 use crate::estimate::{Estimated, prose};
+use crate::missing::Missing;
 use crate::uncertainty::Combination;
 use analysis::innovations::{self, Tests};
 
@@ -28,22 +29,41 @@ pub struct Question<'a> {
     pub doubts: &'a [String],
 }
 
+/// What the chosen model's minimum shows besides values.
+pub struct Findings {
+    /// What the choice of the torque between rows rests on, in words.
+    pub torque: Vec<String>,
+    /// Torques that the model lacks.
+    pub missing: Vec<Missing>,
+    /// What makes recordings or model doubtful, in words.
+    pub doubts: Vec<String>,
+}
+
+impl Findings {
+    /// Whether the model with this fit explains the recordings.
+    pub fn fits(&self, fit: &ModelFit) -> bool {
+        fit.tests.iter().all(Tests::passed) && self.missing.is_empty() && self.doubts.is_empty()
+    }
+}
+
 /// Each sentence answers one question: which model, which friction, whether it fits, what is known and what not.
 pub fn words(
     question: &Question,
-    fits: bool,
+    findings: &Findings,
     fit: &ModelFit,
     combinations: &[Combination],
     parameters: &BTreeMap<String, Estimated>,
     budget: &[Effect],
 ) -> Vec<String> {
-    let mut lines = Vec::new();
+    let (mut lines, fits) = (Vec::new(), findings.fits(fit));
     lines.extend(slosh(question, fits));
     lines.extend(friction(question.laws));
+    lines.extend(findings.torque.iter().cloned());
     if !fits {
         let mut reasons: Vec<String> =
             fit.tests.iter().map(reasons).filter(|t| !t.is_empty()).collect();
-        reasons.extend(question.doubts.iter().cloned());
+        reasons.extend(findings.missing.iter().map(Missing::words));
+        reasons.extend(findings.doubts.iter().cloned());
         lines.push(format!(
             "{DOES_NOT_FIT}: the residual of no model tried is the gyro's noise alone ({}). Values and intervals are \
              those of the nearest model and are not to be trusted: something acts on the bench that the model does not \

@@ -7,7 +7,7 @@ use identify::methods::output_error::identify;
 use identify::options::Options;
 use identify::recording::Recording;
 use identify::simulate::{Intersample, Setup};
-use identify::twin::{self, SensorErrors, Twin};
+use identify::twin::{self, SensorErrors, Twin, Unmodelled};
 use identify::unknown::Unknown;
 use identify::verdict::DOES_NOT_FIT;
 use pack::packed_for_tests;
@@ -71,6 +71,47 @@ fn damping_that_grows_with_the_amplitude_comes_back() {
         // As above; and known to a tenth, or the fit has learnt nothing.
         assert!((p.value - truth).abs() < 4.0 * p.std && p.std < 0.1 * truth, "{name}: {p:?}");
     }
+}
+
+/// Which the general tests of the residual do not see: they stay below 4, and the friction is off by tens of its standard deviations.
+#[test]
+fn a_drag_that_the_model_lacks_is_named_with_its_size() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let settings = [("slosh.zeta_from_correlation", "false"), ("slosh.zeta", "0.003")];
+    let settings = settings.map(|(name, value)| (name.to_string(), value.to_string())).to_vec();
+    let twin = Twin { settings, unmodelled: vec![Unmodelled::Drag], ..Twin::default() };
+    let torque = Torque::Profile("lin-sweep:amplitude=0.25".parse().unwrap());
+    let recording = twin.record(&fmu, &torque, Some(1)).unwrap();
+    let found = identify(&fmu, &[recording], &options(), &mut |_| {}).unwrap();
+    let [drag] = &found.details.missing[..] else { panic!("{:?}", found.details.missing) };
+    assert_eq!(drag.follows, "the rate's square against the motion");
+    // as above, with a known to an eighth
+    assert!((drag.factor + 0.02).abs() < 4.0 * drag.std && drag.std < 0.003, "{drag:?}");
+    assert_eq!(found.fits, Some(false));
+    let said = found.verdict.iter().find(|line| line.starts_with(DOES_NOT_FIT)).unwrap();
+    assert!(said.contains("a torque that follows the rate's square"), "{said}");
+}
+
+/// The bench's dry friction is smooth near rest, and its torque linear between rows. Held torque that comes 10 ms before it is commanded
+/// would explain that a little better.
+#[test]
+fn no_model_error_makes_the_rate_come_before_the_torque() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let settings = [("friction.model", "stribeck_smooth"), ("friction.eps", "1e-3")];
+    let torque = Torque::Profile(LONG.parse().unwrap());
+    let zeta = [("slosh.zeta_from_correlation", "false"), ("slosh.zeta", "0.0029757")];
+    let settings = [&zeta[..], &settings].concat();
+    let recording =
+        twin::record(&fmu, &settings, &torque, Some(1), SensorErrors::default()).unwrap();
+    let options = Options { sensor_errors: true, gyro_scale: 0.01, ..options() };
+    let found = identify(&fmu, &[recording], &options, &mut |_| {}).unwrap();
+    let delay = &found.measurement["delay"];
+    assert!(delay.value.abs() < 4.0 * delay.std && delay.std < 1e-4, "{delay:?}");
+    let said = found.verdict.iter().find(|line| line.starts_with("The torque is taken")).unwrap();
+    assert!(
+        said.contains("held from row to row (zero-order hold) would need a delay of -10.0"),
+        "{said}"
+    );
 }
 
 #[test]

@@ -97,6 +97,9 @@ pub struct IdentifyArgs {
     /// smooth (band-limited, a sampled recording of a smooth torque). Else what fits best is taken.
     #[arg(long, value_name = "HOW", value_parser = ["linear", "held", "smooth"])]
     torque: Option<String>,
+    /// The rate's time stamps may be early: takes a delay below zero as it comes. Else it is a sign that something is wrong.
+    #[arg(long)]
+    acausal: bool,
     /// Which column of the recordings is which signal, in what unit: time, tau_cmd, omega, theta, g_axial,
     /// wheel_speed, omega_x, omega_y; of a free decay wave_height, force, theta or omega.
     #[arg(long, value_name = "SIGNAL=COLUMN[:UNIT],…", default_value_t, hide_default_value = true)]
@@ -263,6 +266,7 @@ impl IdentifyArgs {
     fn options(&self) -> Options {
         Options {
             intersample: self.intersample(),
+            acausal: self.acausal,
             models: self.model.clone(),
             friction: self.friction.clone(),
             known: self.known.clone(),

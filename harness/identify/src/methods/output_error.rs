@@ -10,10 +10,12 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use super::{Identified, Method, Needs, Residual, Task, page};
+use crate::between;
 use crate::budget::{self, Effect};
 use crate::candidate::{self, Fitted, ModelFit};
 use crate::estimate::Estimated;
-use crate::fit::{Answer, Differences, Problem};
+use crate::fit::{Answer, Differences, Polished, Problem};
+use crate::missing::{self, Missing};
 use crate::news::News;
 use crate::nominal::Start;
 use crate::options::Options;
@@ -22,8 +24,7 @@ use crate::recording::{self, Recording};
 use crate::start::{self, Response};
 use crate::uncertainty::{self, Combination, Covariance, Sources};
 use crate::unknown::{Quantity, Unknown};
-use crate::verdict::{self, DECIDES};
-use analysis::innovations::Tests;
+use crate::verdict::{self, DECIDES, Findings};
 
 /// The FMU fitted in the time domain.
 pub struct OutputError {
@@ -45,6 +46,8 @@ pub struct Details {
     pub condition: f64,
     /// The error budget.
     pub error_budget: Vec<Effect>,
+    /// Torques that the model lacks.
+    pub missing: Vec<Missing>,
     /// All models that were tried, the chosen one first.
     pub models: Vec<ModelFit>,
     /// What the frequency response says.
@@ -278,9 +281,20 @@ fn finish(
     fit.simulations += polished.simulations;
     fit.converged = polished.converged();
     fit.newton_decrement = polished.decrement;
-    x = polished.x;
-    let (jacobian, covariance, answer) = (polished.jacobian, polished.covariance, polished.answer);
-    let fits = fit.tests.iter().all(Tests::passed) && question.doubts.is_empty();
+    x.clone_from(&polished.x);
+    let e = problem.stacked(&polished.answer, &x);
+    let findings = Findings {
+        torque: torque_between_rows(&problem, &polished, options),
+        missing: missing::torques(&problem, &polished, &e)?,
+        doubts: question
+            .doubts
+            .iter()
+            .cloned()
+            .chain(acausal(&problem, &polished, options))
+            .collect(),
+    };
+    let fits = findings.fits(&fit);
+    let Polished { jacobian, covariance, answer, .. } = polished;
     let noise_only = match scale_is_unknown {
         true => without_last(&jacobian).unwrap_or_else(|| covariance.x.clone()),
         false => covariance.x.clone(),
@@ -293,10 +307,8 @@ fn finish(
         let n = spread.nrows();
         DMatrix::from_fn(n, n, |i, j| spread[(i, j)] / slopes[i] / slopes[j])
     });
-    let sandwich = (!fits).then(|| {
-        let e = problem.stacked(&answer, &x);
-        covariance.sandwich(&jacobian, e.as_slice(), &windows(&problem))
-    });
+    let sandwich =
+        (!fits).then(|| covariance.sandwich(&jacobian, e.as_slice(), &windows(&problem)));
     let full = Sources {
         noise: &covariance.x,
         noise_alone: &noise_only,
@@ -332,9 +344,12 @@ fn finish(
     let combinations = uncertainty::combinations(&problem.unknowns, &values, &of_values);
     let error_budget = budget::of(&problem, &x, &answer, &jacobian, &covariance)?;
     let names = problem.unknowns.iter().map(|u| u.quantity.name()).collect();
-    let verdict = verdict::words(question, fits, &fit, &combinations, &parameters, &error_budget);
+    let verdict =
+        verdict::words(question, &findings, &fit, &combinations, &parameters, &error_budget);
     let (converged, condition) = (fit.converged, covariance.condition);
-    let details = Details { fit, combinations, condition, error_budget, ..Details::default() };
+    let missing = findings.missing;
+    let details =
+        Details { fit, combinations, condition, error_budget, missing, ..Details::default() };
     Ok(Identification {
         parameters,
         measurement,
@@ -345,6 +360,33 @@ fn finish(
         verdict,
         residuals: residuals(&problem, &answer),
         ..Identified::new(details)
+    })
+}
+
+/// What the choice of the torque between rows rests on, if it was free, in words.
+fn torque_between_rows(problem: &Problem, found: &Polished, options: &Options) -> Vec<String> {
+    if options.intersample.is_some() || !between::matters(problem.recordings) {
+        return Vec::new();
+    }
+    let others = between::alternatives(problem, &found.x, &found.jacobian, &found.covariance);
+    let (now, step) = (problem.setup.intersample, problem.recordings[0].step());
+    let evidence = between::evidence((now, found.cost), step, &others);
+    let delay = between::delay(problem, &found.x, &found.covariance);
+    let half = delay.and_then(|delay| between::half_a_row(delay, step));
+    std::iter::once(evidence).chain(half).collect()
+}
+
+/// A rate that comes before the torque, if that is not allowed, in words.
+fn acausal(problem: &Problem, found: &Polished, options: &Options) -> Option<String> {
+    let (delay, std) = between::delay(problem, &found.x, &found.covariance)?;
+    let step = problem.recordings[0].step();
+    (!options.acausal && between::is_acausal((delay, std), step)).then(|| {
+        format!(
+            "the rate comes {:.2} ± {:.2} ms before the torque: the time stamps, or the torque between rows, are not what they \
+             are taken for (--torque; --acausal allows it)",
+            -1e3 * delay,
+            1e3 * std
+        )
     })
 }
 
