@@ -21,10 +21,8 @@ use serde::Serialize;
 use crate::estimate::prose;
 use crate::fit::{Polished, Problem};
 use crate::recording::Recording;
-use crate::simulate::Motion;
+use crate::simulate::{Motion, TORQUE_BESIDES};
 
-/// The FMU's input for a torque on the hub besides the actuator's.
-pub const TORQUE: &str = "tau_ext";
 /// Root mean square of the torque by which the answer is differenced, over that of the command: small against the nonlinearity,
 /// large against the integrator's tolerance.
 const STEP: f64 = 1e-4;
@@ -109,7 +107,7 @@ impl Missing {
 pub fn torques(problem: &Problem, found: &Polished, e: &DVector<f64>) -> Result<Vec<Missing>> {
     let Polished { x, jacobian, covariance, answer, .. } = found;
     let base = &answer.motion;
-    if problem.fmu.description().variable(TORQUE).is_err() {
+    if problem.fmu.description().variable(TORQUE_BESIDES).is_err() {
         return Ok(Vec::new());
     }
     let rest = |v: &DVector<f64>| v - jacobian * (&covariance.x * jacobian.tr_mul(v));

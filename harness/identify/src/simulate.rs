@@ -4,11 +4,13 @@ use anyhow::Result;
 use host::drive::Inputs;
 use host::fmi2::Fmu;
 
-use crate::missing;
 use crate::recording::Recording;
 
 /// Instants closer than this are the same, s.
 const SAME: f64 = 1e-9;
+
+/// The FMU's input for a torque on the hub besides the actuator's.
+pub const TORQUE_BESIDES: &str = "tau_ext";
 
 /// Motion of the hub at the rows of a recording.
 #[derive(Clone, Debug, Default)]
@@ -126,7 +128,7 @@ impl Setup {
         };
         let mut driven = vec![("tau_cmd", torque.as_slice())];
         driven.extend(recording.gravity.as_ref().map(|gravity| ("g_axial", gravity.as_slice())));
-        driven.extend(besides.map(|torque| (missing::TORQUE, torque)));
+        driven.extend(besides.map(|torque| (TORQUE_BESIDES, torque)));
         let (names, signals): (Vec<&str>, Vec<&[f64]>) = driven.into_iter().unzip();
         let held = self.intersample == Intersample::ZeroOrderHold;
         let inputs = Inputs::new(fmu.description(), &names, held)?;

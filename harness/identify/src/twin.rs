@@ -9,9 +9,8 @@ use host::drive::Inputs;
 use host::fmi2::Fmu;
 
 use crate::design::Multisine;
-use crate::missing;
 use crate::recording::Recording;
-use crate::simulate::Intersample;
+use crate::simulate::{Intersample, TORQUE_BESIDES};
 
 /// What the gyro and the data link add to the FMU's own noise.
 #[derive(Clone, Copy, Debug)]
@@ -184,7 +183,7 @@ impl Twin {
         let read = [reference("omega_imu")?, reference("omega_dot")?];
         let omega = reference("omega")?;
         let (mut rate, mut rocking) = (Vec::with_capacity(time.len()), Rocking::default());
-        let names = [TORQUE, missing::TORQUE];
+        let names = [TORQUE, TORQUE_BESIDES];
         let names = if drags { &names[..] } else { &names[..1] };
         let inputs = Inputs::new(fmu.description(), names, held)?;
         let mut steps = 0;
