@@ -249,6 +249,7 @@ impl IdentifyArgs {
                     bounds: self.bounds.clone(),
                     harmonics: self.harmonics,
                     settings: self.settings.clone(),
+                    held: self.intersample() == Some(Intersample::ZeroOrderHold),
                 };
                 self.answer(Acceleration { options }, trim)
             }

@@ -11,7 +11,7 @@
 //!
 //! * y_k is the mean of the acceleration from t_{k−1} to t_{k+1}, less than its value at t_k by (Ωh)²/6:
 //!   3.2 % at 3.5 Hz and 50 Hz sampling, which goes into I. [`Form::Averaged`] takes the mean of the
-//!   torques over the same interval: of a torque joined by lines, and of the friction at the rates of the
+//!   torques over the same interval: of a torque joined by lines or held, and of the friction at the rates of the
 //!   parabola through three rows, whose sign may change within it.
 //! * The gyro's noise is in y_k, and I multiplies it: I comes out too small by the noise's share of the
 //!   power of y. That share is known from the noise; the estimate is
@@ -71,6 +71,8 @@ pub struct Options {
     pub harmonics: usize,
     /// What is known of the bench, by FMU name.
     pub settings: Vec<(String, String)>,
+    /// The torque keeps a row's value until the next, else it goes to the next along a line.
+    pub held: bool,
 }
 
 /// The result; `measurement` is the inertia of hub and all the liquid, and each recording's gyro bias.
@@ -180,6 +182,8 @@ struct Rows<'a> {
     noise: f64,
     /// sqrt(w_k).
     weight: Vec<f64>,
+    /// The torque is held from row to row.
+    held: bool,
 }
 
 impl Rows<'_> {
@@ -192,6 +196,10 @@ impl Rows<'_> {
         let t = &self.recording.time;
         match form {
             Form::AtRow => [0.0, 1.0, 0.0],
+            Form::Averaged if self.held => {
+                let whole = t[k + 1] - t[k - 1];
+                [(t[k] - t[k - 1]) / whole, (t[k + 1] - t[k]) / whole, 0.0]
+            }
             Form::Averaged => {
                 let whole = 2.0 * (t[k + 1] - t[k - 1]);
                 [(t[k] - t[k - 1]) / whole, 0.5, (t[k + 1] - t[k]) / whole]
@@ -258,6 +266,7 @@ impl<'a> Problem<'a> {
                     noise: recording::noise_level(&recording.rate)
                         .max(analysis::gauss_markov::FLOOR),
                     weight: weight.map(f64::sqrt).collect(),
+                    held: options.held,
                 }
             })
             .collect();
