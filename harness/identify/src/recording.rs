@@ -7,6 +7,7 @@
 
 use std::path::Path;
 
+use analysis::innovations;
 use analysis::statistics::{correlation, deviation, mean, median, peak};
 use anyhow::{Context, Result, bail, ensure};
 use signals::recording::{self as files, Between, Columns, Signal, Wanted};
@@ -21,6 +22,9 @@ pub const SHORTEST: f64 = 20.0;
 /// thesis's tank); its half-power width of 14 mHz is resolved by 1/14 mHz = 70 s. A shorter one says less of
 /// damping and mass, and its intervals are as wide as that.
 pub const LONG: f64 = 120.0;
+
+/// Spread of the rate over its noise beyond which the hub moves; a gyro's drift makes less.
+const MOVES: f64 = 2.0;
 
 /// One uninterrupted recording.
 #[derive(Clone, Debug)]
@@ -292,6 +296,13 @@ pub fn prepare(
         parts.push(part);
     }
     ensure!(!parts.is_empty(), "{name}: no part between gaps is as long as {SHORTEST} s");
+    let torque = parts.iter().map(|part| peak(&part.torque)).fold(0.0, f64::max);
+    ensure!(
+        !parts.iter().all(is_stuck),
+        "{name}: the hub does not turn: omega is noise of {:.1e} rad/s and nothing of tau_cmd (up to {torque:.2e} N·m) is in it. \
+         The bearing sticks under so little torque, or omega is of another axis",
+        noise_level(&parts[0].rate)
+    );
     Ok(parts)
 }
 
@@ -431,6 +442,14 @@ fn check_signals(part: &Recording) -> Result<()> {
     Ok(())
 }
 
+/// Whether the rate is noise, in which the torque is not seen: neither itself nor much else.
+fn is_stuck(part: &Recording) -> bool {
+    let (mean, noise) = (mean(&part.rate), noise_level(&part.rate));
+    let unit: Vec<f64> = part.rate.iter().map(|w| (w - mean) / noise.max(1e-12)).collect();
+    deviation(&unit) < MOVES
+        && innovations::crossed(&unit, &part.torque, part.step()) < innovations::LIMIT
+}
+
 /// Torque and rate averaged over 0.1 s, to tame the noise of differences.
 fn smoothed(part: &Recording) -> (Vec<f64>, Vec<f64>) {
     let (step, torque, rate) = part.even();
@@ -469,12 +488,19 @@ mod tests {
     #[test]
     fn each_fault_has_a_sentence_of_its_own() {
         type Change = fn(&mut Recording);
-        let faults: [(Change, &str); 6] = [
+        let faults: [(Change, &str); 7] = [
             (|r| r.torque.fill(0.1), "tau_cmd is constant (0.1 N·m)"),
             (|r| *r = r.rows(0, 500), "10 s of data are too few"),
             (|r| std::mem::swap(&mut r.torque, &mut r.rate), "swapped"),
             (|r| r.rate.iter_mut().for_each(|w| *w = -*w), "wrong sign"),
             (|r| r.time.iter_mut().for_each(|t| *t *= 1e3), "Is time in milliseconds?"),
+            (
+                |r| {
+                    let mut random = analysis::random::Random::new(3, 0);
+                    r.rate.iter_mut().for_each(|w| *w = 1e-3 + 6e-4 * random.normal());
+                },
+                "the hub does not turn: omega is noise of 6",
+            ),
             (|r| r.time[7] = r.time[6], "row 8: time must grow"),
         ];
         for (change, word) in faults {

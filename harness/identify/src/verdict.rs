@@ -12,6 +12,9 @@ use analysis::innovations::{self, Tests};
 /// Least difference of the information criterion that decides (Kass and Raftery: very strong).
 pub const DECIDES: f64 = 10.0;
 
+/// Newton decrement from which on it is told.
+const TOLD: f64 = 0.1;
+
 /// How the sentence begins that says that the model is invalidated.
 pub const DOES_NOT_FIT: &str = "DOES NOT FIT";
 /// How the sentence begins that says that a search has not converged.
@@ -77,6 +80,19 @@ pub fn words(
              deviations are not to be trusted. More torque, a longer recording or --start may help.",
             fit.newton_decrement
         ));
+    }
+    if fit.converged && fit.newton_decrement > TOLD {
+        lines.push(format!(
+            "The search ended {:.2} standard deviations from the minimum; the stated ones hold that.",
+            fit.newton_decrement
+        ));
+    }
+    if fit.model == "frozen" && parameters.contains_key("hub.I") {
+        lines.push(
+            "hub.I is the whole inertia less that of the liquid as the tank is set (tank.d, tank.h, tank.r, fluid.rho), which no \
+             recording without slosh shows: its interval holds for that liquid."
+                .into(),
+        );
     }
     for c in combinations {
         lines.push(format!(

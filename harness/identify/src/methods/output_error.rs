@@ -86,6 +86,9 @@ impl Method for OutputError {
 /// Difference below which the simpler model is taken (not worth more than a bare mention, ibid.).
 const ALIKE: f64 = 2.0;
 
+/// Newton decrement up to which a search has ended near enough to a minimum: the standard deviations take it in, by an eighth at most.
+const NEAR: f64 = 0.5;
+
 /// Slosh models in the order in which they are fitted.
 const ORDER: [&str; 5] = ["linear", "planar", "spherical", "paraboloid", "frozen"];
 
@@ -279,7 +282,7 @@ fn finish(
     problem.differences = Differences::Central;
     let polished = problem.polish(&x, Some(&known), 3)?;
     fit.simulations += polished.simulations;
-    fit.converged = polished.converged();
+    fit.converged = polished.decrement < NEAR;
     fit.newton_decrement = polished.decrement;
     x.clone_from(&polished.x);
     let e = problem.stacked(&polished.answer, &x);
@@ -316,7 +319,9 @@ fn finish(
         models: of_models.as_ref(),
         residual: sandwich.as_ref(),
     }
-    .total();
+    .total()
+        // no estimate is further from the minimum than this part of its standard deviation
+        * (1.0 + fit.newton_decrement.powi(2));
     let of_values = DMatrix::from_fn(x.len(), x.len(), |i, j| full[(i, j)] * slopes[i] * slopes[j]);
     let (mut parameters, mut measurement) = (BTreeMap::new(), BTreeMap::new());
     for (i, unknown) in problem.unknowns.iter().enumerate() {
