@@ -17,6 +17,7 @@
 //!   unmodelled=         tilt, nutation, warming, clipping, drag, with + between several
 //!   rate=50             rows a second
 //!   gyro=50             values of the gyro a second, where it is slower than the rows
+//!   encoder=NUMBER      standard deviation of an encoder's angle, rad; without it there is none
 //!   intersample=linear  of the twin's torque: linear, held, smooth
 //!   say=false           true: the verdict of every seed
 //! ```
@@ -99,6 +100,7 @@ fn arguments() -> Result<Arguments> {
                     value.split('+').map(Unmodelled::named).collect::<Result<_>>()?
             }
             "rate" => asked.twin.rate = value.parse()?,
+            "encoder" => asked.twin.encoder = Some(value.parse()?),
             "gyro" => asked.twin.gyro = Some(value.parse()?),
             "intersample" => {
                 asked.twin.intersample = match value {

@@ -234,6 +234,10 @@ fn unknowns(
         list.push(Unknown::delay());
         list.extend((0..recordings.len()).map(Unknown::gyro_bias));
     }
+    // with an encoder the rate's scale shows, and without it no residual would be noise
+    if options.gyro_scale > 0.0 && recordings.iter().any(|r| r.angle.is_some()) {
+        list.push(Unknown::gyro_scale().known(1.0, options.gyro_scale));
+    }
     for (i, recording) in recordings.iter().enumerate() {
         if let Some(angle) = &recording.angle {
             list.push(Unknown::angle_offset(i, angle[0]));

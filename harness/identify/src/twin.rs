@@ -1,6 +1,7 @@
 //! Recordings of the FMU in place of a bench, with its gyro's noise: what identification is tried on,
 //! and what a planned experiment would record.
 
+use analysis::random::Random;
 use analysis::statistics::peak;
 use anyhow::{Result, bail, ensure};
 use experiments::profile::{Profile, Torque};
@@ -99,6 +100,8 @@ pub struct Twin {
     pub intersample: Intersample,
     /// What gyro and data link add.
     pub sensor_errors: SensorErrors,
+    /// Standard deviation of an encoder's angle, rad; `None`: there is no encoder.
+    pub encoder: Option<f64>,
     /// What the models do not have.
     pub unmodelled: Vec<Unmodelled>,
 }
@@ -111,6 +114,7 @@ impl Default for Twin {
             gyro: None,
             intersample: Intersample::FirstOrderHold,
             sensor_errors: SensorErrors::default(),
+            encoder: None,
             unmodelled: Vec::new(),
         }
     }
@@ -180,8 +184,9 @@ impl Twin {
         let friction = friction.map(reference).into_iter().collect::<Result<Vec<u32>>>()?;
         let mut cold = vec![0.0; friction.len()];
         instance.get_real(&friction, &mut cold)?;
-        let read = [reference("omega_imu")?, reference("omega_dot")?];
+        let read = [reference("omega_imu")?, reference("omega_dot")?, reference("theta")?];
         let omega = reference("omega")?;
+        let (mut angle, mut random) = (Vec::new(), Random::new(seed.unwrap_or(0).into(), 1));
         let (mut rate, mut rocking) = (Vec::with_capacity(time.len()), Rocking::default());
         let names = [TORQUE, TORQUE_BESIDES];
         let names = if drags { &names[..] } else { &names[..1] };
@@ -190,7 +195,7 @@ impl Twin {
         inputs.drive(&mut instance, start, |instance, t, course| {
             let (row, part) = (steps / parts, steps % parts);
             if part == 0 {
-                let mut now = [0.0; 2];
+                let mut now = [0.0; 3];
                 instance.get_real(&read, &mut now)?;
                 let seen = match self.unmodelled.contains(&Unmodelled::Nutation) {
                     true => ROCKING_SEEN * rocking.step(now[1], step),
@@ -198,6 +203,7 @@ impl Twin {
                 };
                 let SensorErrors { gyro_scale, gyro_bias, .. } = self.sensor_errors;
                 rate.push(gyro_scale * (now[0] + seen) + gyro_bias);
+                angle.extend(self.encoder.map(|std| now[2] + std * random.normal()));
                 if row == rows {
                     return Ok(None);
                 }
@@ -225,7 +231,8 @@ impl Twin {
             steps += 1;
             Ok(Some(next))
         })?;
-        Ok(Recording::of("twin", time, tau, rate))
+        let angle = self.encoder.map(|_| angle);
+        Ok(Recording { angle, ..Recording::of("twin", time, tau, rate) })
     }
 }
 

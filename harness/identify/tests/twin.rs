@@ -210,6 +210,36 @@ fn an_encoder_shows_the_gyros_scale() {
     assert!((scale.value - 1.01).abs() < 4.0 * scale.std, "{scale:?}");
 }
 
+/// Its angle shows the scale of the gyro, without which no residual is noise: the scale must be free from the beginning.
+#[test]
+fn a_recording_with_an_encoder_is_described_as_one_without() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let settings = [
+        ("slosh.zeta_from_correlation", "false"),
+        ("slosh.zeta", "0.003"),
+        ("friction.asymmetry", "0.1"),
+    ];
+    let settings = settings.map(|(name, value)| (name.to_string(), value.to_string())).to_vec();
+    let sensor_errors = SensorErrors { delay: 0.005, gyro_scale: 1.01, gyro_bias: 2e-3 };
+    let torque = Torque::Profile(SHORT.parse().unwrap());
+    for encoder in [2e-5, 3e-4] {
+        let twin = Twin {
+            settings: settings.clone(),
+            sensor_errors,
+            encoder: Some(encoder),
+            ..Twin::default()
+        };
+        let recording = twin.record(&fmu, &torque, Some(1)).unwrap();
+        let options = Options { sensor_errors: true, gyro_scale: 0.01, ..options() };
+        let found = identify(&fmu, &[recording], &options, &mut |_| {}).unwrap();
+        assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
+        let scale = &found.measurement["gyro_scale"];
+        assert!((scale.value - 1.01).abs() < 4.0 * scale.std && scale.std < 2e-3, "{scale:?}");
+        let d = &found.parameters["tank.d"];
+        assert!((d.value - 0.163).abs() < 4.0 * d.std, "{d:?}");
+    }
+}
+
 #[test]
 fn sensitivities_are_those_of_smaller_and_larger_steps() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();

@@ -270,8 +270,9 @@ fn finish(
 ) -> Result<Identification> {
     let Fitted { mut problem, polished, mut fit, spread } = best;
     let (mut x, mut known) = (polished.x.clone(), polished.jacobian.clone());
-    let scale_is_unknown = options.gyro_scale > 0.0;
-    if scale_is_unknown {
+    let place =
+        |problem: &Problem| problem.unknowns.iter().position(|u| u.quantity == Quantity::GyroScale);
+    if options.gyro_scale > 0.0 && place(&problem).is_none() {
         problem.unknowns.push(Unknown::gyro_scale().known(1.0, options.gyro_scale));
         x.push(0.0);
         // sensitivities to the scale are exact: no direction is needed for them
@@ -298,10 +299,9 @@ fn finish(
     };
     let fits = findings.fits(&fit);
     let Polished { jacobian, covariance, answer, .. } = polished;
-    let noise_only = match scale_is_unknown {
-        true => without_last(&jacobian).unwrap_or_else(|| covariance.x.clone()),
-        false => covariance.x.clone(),
-    };
+    let noise_only = place(&problem)
+        .and_then(|scale| without(&jacobian, scale))
+        .unwrap_or_else(|| covariance.x.clone());
     let values = problem.values(&x);
     let slopes: Vec<f64> =
         problem.unknowns.iter().zip(&x).map(|(u, &x)| u.scale.slope(x)).collect();
@@ -417,9 +417,8 @@ fn windows(problem: &Problem) -> Vec<(usize, usize)> {
     uncertainty::windows(recordings.map(|r| (r.time.len(), r.step())), uncertainty::WINDOW)
 }
 
-/// The covariance if the last unknown were known exactly; its row and column are 0.
-fn without_last(jacobian: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let last = jacobian.ncols() - 1;
-    let rest = Covariance::of(&jacobian.clone().remove_column(last))?.x;
-    Some(rest.insert_row(last, 0.0).insert_column(last, 0.0))
+/// The covariance if the unknown at `place` were known exactly; its row and column are 0.
+fn without(jacobian: &DMatrix<f64>, place: usize) -> Option<DMatrix<f64>> {
+    let rest = Covariance::of(&jacobian.clone().remove_column(place))?.x;
+    Some(rest.insert_row(place, 0.0).insert_column(place, 0.0))
 }
