@@ -23,6 +23,20 @@ impl Estimated {
         let interval = [value - 1.96 * std, value + 1.96 * std];
         Estimated { value, std, std_noise: std, interval, unit: unit.into() }
     }
+
+    /// A number as a percentage of the value; `None` where the value is zero within its standard deviation, and a share of it
+    /// would say nothing.
+    pub fn percent(&self, of: f64) -> Option<f64> {
+        (self.value.abs() > self.std).then(|| 100.0 * of / self.value)
+    }
+
+    /// A change of the value: in percent, or in its own unit.
+    pub fn change(&self, by: f64) -> String {
+        match self.percent(by) {
+            Some(percent) => format!("{percent:+.2} %"),
+            None => format!("{by:+.1e} {}", prose(&self.unit)).trim_end_matches(" 1").into(),
+        }
+    }
 }
 
 /// A unit of the FMU as prose has it: kg·m² for kg.m2.

@@ -17,6 +17,7 @@ pub mod plausible;
 pub mod recording;
 pub mod search;
 pub mod simulate;
+pub mod spikes;
 pub mod start;
 pub mod stribeck;
 pub mod twin;

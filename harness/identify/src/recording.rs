@@ -12,6 +12,8 @@ use analysis::statistics::{correlation, deviation, mean, median, peak};
 use anyhow::{Context, Result, bail, ensure};
 use signals::recording::{self as files, Between, Columns, Signal, Wanted};
 
+use crate::spikes;
+
 /// Longest time between two rows over which torque is joined by a line, s.
 pub const LONGEST_GAP: f64 = 0.25;
 
@@ -22,6 +24,9 @@ pub const SHORTEST: f64 = 20.0;
 /// thesis's tank); its half-power width of 14 mHz is resolved by 1/14 mHz = 70 s. A shorter one says less of
 /// damping and mass, and its intervals are as wide as that.
 pub const LONG: f64 = 120.0;
+
+/// Times of spikes that are told.
+const LISTED: usize = 8;
 
 /// Spread of the rate over its noise beyond which the hub moves; a gyro's drift makes less.
 const MOVES: f64 = 2.0;
@@ -47,7 +52,7 @@ pub struct Recording {
     pub off_axis: [Option<Vec<f64>>; 2],
     /// It begins at rest (else the initial state is unknown).
     pub from_rest: bool,
-    /// Which rows hold a new value of the gyro, where it is slower than the rows; the others are not fitted.
+    /// Which rows hold a new value of the gyro that belongs to its motion; the others are not fitted. `None`: all.
     pub fresh: Option<Vec<bool>>,
 }
 
@@ -292,6 +297,7 @@ pub fn prepare(
                 fresh.len()
             ));
         }
+        without_spikes(&mut part, done);
         check_signals(&part)?;
         parts.push(part);
     }
@@ -304,6 +310,30 @@ pub fn prepare(
         noise_level(&parts[0].rate)
     );
     Ok(parts)
+}
+
+/// Takes single values that belong to no motion out of a part, and says which.
+fn without_spikes(part: &mut Recording, done: &mut dyn FnMut(String)) {
+    let found = spikes::find(part);
+    let Some(largest) = found.iter().map(|(k, y)| (part.rate[*k] - y).abs()).reduce(f64::max)
+    else {
+        return;
+    };
+    let at: Vec<String> =
+        found.iter().take(LISTED).map(|(k, _)| format!("{:.2}", part.time[*k])).collect();
+    let more = if found.len() > LISTED { ", …" } else { "" };
+    done(format!(
+        "{}: {} single values of omega are off those beside them by more than noise, by up to {largest:.2e} rad/s; they are \
+         not fitted (at {}{more} s)",
+        part.name,
+        found.len(),
+        at.join(", ")
+    ));
+    let rows = part.rate.len();
+    let fresh = part.fresh.get_or_insert_with(|| vec![true; rows]);
+    for (k, y) in found {
+        (part.rate[k], fresh[k]) = (y, false);
+    }
 }
 
 fn describe(part: &Recording) -> String {

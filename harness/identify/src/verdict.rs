@@ -188,7 +188,7 @@ fn modes(parameters: &BTreeMap<String, Estimated>, budget: &[Effect]) -> Option<
         .iter()
         .filter_map(|(name, p)| {
             let change = modes.change.get(name)?;
-            (change.abs() > p.std).then(|| format!("{name} {:+.2} %", 100.0 * change / p.value))
+            (change.abs() > p.std).then(|| format!("{name} {}", p.change(*change)))
         })
         .collect();
     (!large.is_empty()).then(|| {

@@ -4,8 +4,9 @@ use experiments::profile::{Profile, Torque};
 use host::fmi2::Fmu;
 use identify::fit::{Differences, Problem};
 use identify::methods::output_error::identify;
+use identify::nominal::COARSEST;
 use identify::options::Options;
-use identify::recording::Recording;
+use identify::recording::{Recording, prepare};
 use identify::simulate::{Intersample, Setup};
 use identify::twin::{self, SensorErrors, Twin, Unmodelled};
 use identify::unknown::Unknown;
@@ -90,6 +91,24 @@ fn a_drag_that_the_model_lacks_is_named_with_its_size() {
     assert_eq!(found.fits, Some(false));
     let said = found.verdict.iter().find(|line| line.starts_with(DOES_NOT_FIT)).unwrap();
     assert!(said.contains("a torque that follows the rate's square"), "{said}");
+}
+
+#[test]
+fn twenty_spikes_are_told_and_left_out() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let mut recording = sweep(&fmu, SHORT, &[]);
+    let rows: Vec<usize> = (0..20).map(|k| 700 + 1439 * k).collect();
+    rows.iter().for_each(|&k| recording.rate[k] += if k % 2 == 0 { 0.3 } else { -0.05 });
+    let mut said = Vec::new();
+    let parts = prepare(recording, COARSEST, &mut |line| said.push(line)).unwrap();
+    let line = said.iter().find(|line| line.contains("20 single values of omega")).unwrap();
+    assert!(line.contains("not fitted (at 14.00, 42.78, "), "{line}");
+    let found = identify(&fmu, &parts, &options(), &mut |_| {}).unwrap();
+    assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
+    for (name, truth) in [("tank.d", 0.163), ("tank.h", 0.1), ("hub.I", 0.322414)] {
+        let p = &found.parameters[name];
+        assert!((p.value - truth).abs() < 4.0 * p.std, "{name}: {p:?}");
+    }
 }
 
 /// The bench's dry friction is smooth near rest, and its torque linear between rows. Held torque that comes 10 ms before it is commanded

@@ -402,7 +402,8 @@ impl IdentifyArgs {
 fn estimates(tables: &[&BTreeMap<String, Estimated>]) {
     println!("{:24} {:>14} {:>12} {:>9}  unit", "", "value", "std", "std %");
     for (name, p) in tables.iter().flat_map(|table| table.iter()) {
-        let percent = 100.0 * p.std / p.value.abs();
-        println!("{name:24} {:>14.7} {:>12.2e} {percent:>9.4}  {}", p.value, p.std, p.unit);
+        let percent =
+            p.percent(p.std).map_or("–".into(), |percent| format!("{:.4}", percent.abs()));
+        println!("{name:24} {:>14.7} {:>12.2e} {percent:>9}  {}", p.value, p.std, p.unit);
     }
 }

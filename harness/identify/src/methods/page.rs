@@ -98,10 +98,10 @@ fn digits(value: f64, deviation: f64) -> String {
 /// A change of an estimate: in per cent, or in its own unit where the estimate is zero within its
 /// standard deviation and a share of it would say nothing.
 fn change(by: f64, p: &Estimated) -> String {
-    match p.value.abs() > p.std {
-        true => format!("{:+.3}", 100.0 * by / p.value),
-        false if by == 0.0 => "0".into(),
-        false => format!("{by:+.1e} {}", prose(&p.unit)).trim_end_matches(" 1").into(),
+    match p.percent(by) {
+        Some(percent) => format!("{percent:+.3}"),
+        None if by == 0.0 => "0".into(),
+        None => p.change(by),
     }
 }
 
@@ -125,11 +125,7 @@ fn parameters(found: &Identification) -> Markup {
             name.clone(),
             digits(p.value, p.std),
             format!("{:.1e}", p.std),
-            match p.value.abs() > p.std {
-                true => format!("{:.3}", 100.0 * p.std / p.value.abs()),
-                // zero within its standard deviation
-                false => "–".into(),
-            },
+            p.percent(p.std).map_or("–".into(), |percent| format!("{:.3}", percent.abs())),
             format!("{:.1e}", p.std_noise),
             format!("{} to {}", digits(p.interval[0], p.std), digits(p.interval[1], p.std)),
             prose(&p.unit),
