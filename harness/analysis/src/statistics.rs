@@ -40,6 +40,19 @@ pub fn median(values: &[f64]) -> Option<f64> {
     quantile(values, 0.5)
 }
 
+/// Standard deviation of the white noise of a signal, from its third differences (a motion of a few
+/// hertz has almost none), and at least that of rounding to the smallest step it ever makes, step/√12.
+pub fn noise_level(signal: &[f64]) -> f64 {
+    let third = signal.windows(4).map(|y| y[3] - 3.0 * y[2] + 3.0 * y[1] - y[0]);
+    let squares: Vec<f64> = third.map(|d| d * d).collect();
+    let steps = signal.windows(2).map(|y| (y[1] - y[0]).abs()).filter(|step| *step > 0.0);
+    let smallest = steps.fold(f64::INFINITY, f64::min);
+    let rounding = if smallest.is_finite() { smallest / 12f64.sqrt() } else { 0.0 };
+    // the median of χ² with one degree of freedom is 0.4549; variance of third differences 20 σ²
+    let white = median(&squares).map_or(0.0, |s| (s / 0.4549 / 20.0).sqrt());
+    white.max(rounding)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -51,5 +64,18 @@ mod tests {
         assert_eq!((median(&values), quantile(&values, 0.2)), (Some(2.0), Some(-4.0)));
         assert!((correlation(&values, &[-1.0, 4.0, -2.0, -5.0]) + 1.0).abs() < 1e-15);
         assert!(median(&[]).is_none() && peak(&[]) == 0.0 && deviation(&values) == 10.5f64.sqrt());
+    }
+
+    #[test]
+    fn the_noise_level_is_that_of_the_noise_on_a_motion_of_a_few_hertz() {
+        let mut random = crate::random::Random::new(1, 0);
+        let noisy: Vec<f64> = (0..15_000)
+            .map(|k| 0.02 * (0.3 * f64::from(k)).sin() + 4e-4 * random.normal())
+            .collect();
+        let quantised: Vec<f64> = noisy.iter().map(|y| (y / 0.01).round() * 0.01).collect();
+        // relative standard error of the median of 15,000 squares: 2 %; the motion's third difference is 0.3^3 of 20 mrad/s
+        let level = noise_level(&noisy);
+        assert!((level / 4e-4 - 1.0).abs() < 0.2, "{level}");
+        assert!(noise_level(&quantised) >= 0.01 / 12f64.sqrt());
     }
 }

@@ -165,7 +165,7 @@ impl<'a> Problem<'a> {
             channels.push(Channel { recording: index, signal: Signal::Rate, noise });
             if let Some(angle) = &recording.angle {
                 // the angle integrates the residual of the rate: much drift
-                let white = recording::noise_level(angle).max(FLOOR);
+                let white = analysis::statistics::noise_level(angle).max(FLOOR);
                 let noise = Noise { white, drift: 30.0, time: 100.0 };
                 channels.push(Channel { recording: index, signal: Signal::Angle, noise });
             }

@@ -3,10 +3,10 @@
 
 use anyhow::{Result, bail};
 
-use crate::recording::{Recording, noise_level};
+use crate::recording::Recording;
 use crate::start::Response;
 use analysis::innovations;
-use analysis::statistics::{deviation, mean, median};
+use analysis::statistics::{deviation, mean, median, noise_level};
 
 /// Refuses what is off by a factor that only a wrong unit makes.
 pub fn check_size(found: &Response, nominal: f64) -> Result<()> {

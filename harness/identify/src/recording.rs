@@ -8,7 +8,7 @@
 use std::path::Path;
 
 use analysis::innovations;
-use analysis::statistics::{correlation, deviation, mean, median, peak};
+use analysis::statistics::{correlation, deviation, mean, median, noise_level, peak};
 use anyhow::{Context, Result, bail, ensure};
 use signals::recording::{self as files, Between, Columns, Signal, Wanted};
 
@@ -314,7 +314,7 @@ pub fn prepare(
 
 /// Takes single values that belong to no motion out of a part, and says which.
 fn without_spikes(part: &mut Recording, done: &mut dyn FnMut(String)) {
-    let found = spikes::find(part);
+    let found = spikes::find(&part.rate, &part.torque, part.fresh.as_deref());
     let Some(largest) = found.iter().map(|(k, y)| (part.rate[*k] - y).abs()).reduce(f64::max)
     else {
         return;
@@ -428,19 +428,6 @@ fn fresh(rate: &[f64]) -> Option<Vec<bool>> {
     values.dedup();
     let fine = values.len() > 9 * changes.len() / 10;
     fine.then(|| (0..rate.len()).map(|k| k == 0 || rate[k] != rate[k - 1]).collect())
-}
-
-/// Standard deviation of the white noise of a signal, from its third differences (a motion of a few
-/// hertz has almost none), and at least that of rounding to the smallest step it ever makes, step/√12.
-pub fn noise_level(signal: &[f64]) -> f64 {
-    let third = signal.windows(4).map(|y| y[3] - 3.0 * y[2] + 3.0 * y[1] - y[0]);
-    let squares: Vec<f64> = third.map(|d| d * d).collect();
-    let steps = signal.windows(2).map(|y| (y[1] - y[0]).abs()).filter(|step| *step > 0.0);
-    let smallest = steps.fold(f64::INFINITY, f64::min);
-    let rounding = if smallest.is_finite() { smallest / 12f64.sqrt() } else { 0.0 };
-    // the median of χ² with one degree of freedom is 0.4549; variance of third differences 20 σ²
-    let white = median(&squares).map_or(0.0, |s| (s / 0.4549 / 20.0).sqrt());
-    white.max(rounding)
 }
 
 fn check_signals(part: &Recording) -> Result<()> {
@@ -572,18 +559,5 @@ mod tests {
             (0..noisy.rate.len()).map(|k| noisy.rate[(k as f64 / 1.37) as usize]).collect();
         let new = fresh(&other).unwrap().iter().filter(|new| **new).count();
         assert!((new as f64 * 1.37 / other.len() as f64 - 1.0).abs() < 0.01, "{new}");
-    }
-
-    #[test]
-    fn the_noise_level_is_that_of_the_noise() {
-        let mut noisy = rigid();
-        let mut random = analysis::random::Random::new(1, 0);
-        noisy.rate.iter_mut().for_each(|w| *w += 4e-4 * random.normal());
-        // relative standard error of the median of 15,000 squares: 2 %
-        assert!(
-            (noise_level(&noisy.rate) / 4e-4 - 1.0).abs() < 0.08,
-            "{}",
-            noise_level(&noisy.rate)
-        );
     }
 }

@@ -10,9 +10,7 @@
 //! The largest is taken out first, for a spike spoils the cubic of its neighbours. The rows are left out of the fit, which is
 //! Hampel's loss with its three bends in one place: far out a value has no weight at all.
 
-use analysis::statistics::{median, peak};
-
-use crate::recording::{Recording, noise_level};
+use analysis::statistics::{median, noise_level, peak};
 
 /// Deviations of r beyond which a value is a spike; of 135,000 rows of noise none is in 10¹⁴ recordings.
 const BEYOND: f64 = 10.0;
@@ -25,13 +23,11 @@ const NEAR_STEP: usize = 3;
 /// Part of the torque's peak that is a step from one row to the next.
 const STEP: f64 = 0.5;
 
-/// Rows whose rate is a spike, growing, each with the cubic's rate. Empty where there are none, or more than can be called so.
-pub fn find(part: &Recording) -> Vec<(usize, f64)> {
-    let rows: Vec<usize> = match &part.fresh {
-        None => (0..part.rate.len()).collect(),
-        Some(fresh) => (0..fresh.len()).filter(|&k| fresh[k]).collect(),
-    };
-    let y: Vec<f64> = rows.iter().map(|&k| part.rate[k]).collect();
+/// Rows of an evenly sampled rate whose value is a spike, growing, each with the cubic's rate; of `fresh` rows alone where given.
+/// Empty where there are none, or more than can be called so.
+pub fn find(rate: &[f64], torque: &[f64], fresh: Option<&[bool]>) -> Vec<(usize, f64)> {
+    let rows: Vec<usize> = (0..rate.len()).filter(|&k| fresh.is_none_or(|f| f[k])).collect();
+    let y: Vec<f64> = rows.iter().map(|&k| rate[k]).collect();
     if y.len() < 100 {
         return Vec::new();
     }
@@ -42,7 +38,7 @@ pub fn find(part: &Recording) -> Vec<(usize, f64)> {
     let typical = median(&residuals).map_or(0.0, |m| m / 0.6745);
     let limit = BEYOND * typical.max(GAIN * noise_level(&y));
     let suspects: Vec<usize> = (2..y.len() - 2)
-        .filter(|&k| residuals[k - 2] > limit && !near_step(part, rows[k]))
+        .filter(|&k| residuals[k - 2] > limit && !near_step(torque, rows[k]))
         .collect();
     let most = (FEW * y.len() as f64) as usize;
     // a spike is in the cubics of four neighbours
@@ -84,10 +80,10 @@ fn cubic(y: &[f64], sound: &[bool], k: usize) -> f64 {
 }
 
 /// Whether the torque steps near a row.
-fn near_step(part: &Recording, row: usize) -> bool {
-    let step = STEP * peak(&part.torque);
-    let near = row.saturating_sub(NEAR_STEP)..(row + NEAR_STEP).min(part.torque.len() - 1);
-    near.into_iter().any(|k| (part.torque[k + 1] - part.torque[k]).abs() > step)
+fn near_step(torque: &[f64], row: usize) -> bool {
+    let step = STEP * peak(torque);
+    let near = row.saturating_sub(NEAR_STEP)..(row + NEAR_STEP).min(torque.len() - 1);
+    near.into_iter().any(|k| (torque[k + 1] - torque[k]).abs() > step)
 }
 
 #[cfg(test)]
@@ -95,8 +91,8 @@ mod tests {
     use super::*;
     use analysis::random::Random;
 
-    /// 300 s of a sine of 2.4 Hz in noise of 0.4 mrad/s, with spikes at rows.
-    fn with(spikes: &[(usize, f64)]) -> Recording {
+    /// Time, torque and rate: 300 s of a sine of 2.4 Hz in noise of 0.4 mrad/s, with spikes at rows.
+    fn with(spikes: &[(usize, f64)]) -> [Vec<f64>; 3] {
         let mut random = Random::new(7, 0);
         let time: Vec<f64> = (0..15_000).map(|k| 0.02 * f64::from(k)).collect();
         let phase = |t: f64| std::f64::consts::TAU * 2.4 * t;
@@ -104,36 +100,41 @@ mod tests {
         let mut rate: Vec<f64> =
             time.iter().map(|t| 0.02 * phase(*t).cos() + 4e-4 * random.normal()).collect();
         spikes.iter().for_each(|(k, size)| rate[*k] += size);
-        Recording::of("a.csv", time, torque, rate)
+        [time, torque, rate]
+    }
+
+    fn found(spikes: &[(usize, f64)]) -> Vec<(usize, f64)> {
+        let [_, torque, rate] = with(spikes);
+        find(&rate, &torque, None)
     }
 
     #[test]
     fn spikes_are_found_alone_and_side_by_side_and_noise_is_none() {
-        assert_eq!(find(&with(&[])), []);
+        assert_eq!(found(&[]), []);
         let spikes = [(300, 0.02), (4000, -0.5), (4001, -0.4), (9000, 3.0), (9002, 0.01)];
-        let found = find(&with(&spikes));
+        let found = found(&spikes);
         assert_eq!(found.iter().map(|f| f.0).collect::<Vec<_>>(), spikes.map(|s| s.0));
         // within 4 deviations of the cubic through noise, and the curve's own fourth order of 5 % of 20 mrad/s
-        let clean = with(&[]);
-        found.iter().for_each(|(k, y)| assert!((y - clean.rate[*k]).abs() < 3.3e-3, "{k} {y}"));
+        let [_, _, clean] = with(&[]);
+        found.iter().for_each(|(k, y)| assert!((y - clean[*k]).abs() < 3.3e-3, "{k} {y}"));
     }
 
     #[test]
     fn more_than_one_value_in_a_hundred_is_no_spike() {
         let many: Vec<(usize, f64)> = (10..14_000).step_by(60).map(|k| (k, 0.1)).collect();
         assert!(many.len() > 150);
-        assert_eq!(find(&with(&many)), []);
+        assert_eq!(found(&many), []);
     }
 
     #[test]
     fn a_step_of_the_torque_makes_no_spike() {
-        let mut slew = with(&[]);
-        for (k, t) in slew.time.clone().into_iter().enumerate() {
-            slew.torque[k] = if (k / 1000) % 2 == 0 { 2.0 } else { -2.0 };
+        let [time, mut torque, mut rate] = with(&[]);
+        for (k, t) in time.into_iter().enumerate() {
+            torque[k] = if (k / 1000) % 2 == 0 { 2.0 } else { -2.0 };
             // a triangle of 4 N·m/0.3 kg·m²: its kinks are 0.09 rad/s
             let part = (t / 20.0).fract() - 0.5;
-            slew.rate[k] += 13.0 * 20.0 * (0.5 - part.abs()) / 2.0;
+            rate[k] += 13.0 * 20.0 * (0.5 - part.abs()) / 2.0;
         }
-        assert_eq!(find(&slew), []);
+        assert_eq!(find(&rate, &torque, None), []);
     }
 }

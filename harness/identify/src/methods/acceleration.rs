@@ -21,7 +21,7 @@
 
 use std::collections::BTreeMap;
 
-use analysis::statistics::peak;
+use analysis::statistics::{noise_level, peak};
 use anyhow::{Result, bail, ensure};
 use host::fmi2::Fmu;
 use nalgebra::{DMatrix, DVector};
@@ -263,8 +263,7 @@ impl<'a> Problem<'a> {
                 });
                 Rows {
                     recording,
-                    noise: recording::noise_level(&recording.rate)
-                        .max(analysis::gauss_markov::FLOOR),
+                    noise: noise_level(&recording.rate).max(analysis::gauss_markov::FLOOR),
                     weight: weight.map(f64::sqrt).collect(),
                     held: options.held,
                 }

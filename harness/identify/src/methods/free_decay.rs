@@ -9,7 +9,7 @@ use signals::recording::{Quantity, quantity};
 use super::{Identified, Method, Needs, Task};
 use crate::estimate::Estimated;
 use crate::news::News;
-use crate::recording::noise_level;
+use analysis::statistics::noise_level;
 
 /// Residual over the signal's noise, beyond which something else than one decaying oscillation is in it.
 const MOST_RESIDUAL: f64 = 2.0;

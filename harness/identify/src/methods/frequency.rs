@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use analysis::Complex64;
-use analysis::statistics::mean;
+use analysis::statistics::{mean, noise_level};
 use analysis::transfer_function::TransferFunction;
 use anyhow::{Context, Result, ensure};
 use serde::Serialize;
@@ -196,7 +196,7 @@ pub fn identify(recording: &Recording, bench: Bench, intersample: Intersample) -
     let mut x = [scaled(rough.numerator), scaled(rough.denominator())].concat();
     x.push(0.0);
     x.extend([0.0; TRANSIENT + 1]);
-    let noise = recording::noise_level(&rate).max(analysis::gauss_markov::FLOOR);
+    let noise = noise_level(&rate).max(analysis::gauss_markov::FLOOR);
     let mut sigma = vec![noise * (count as f64).sqrt(); problem.s.len()];
     let mut converged = false;
     let mut steps = vec![1e-6; x.len()];
