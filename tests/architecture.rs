@@ -44,13 +44,14 @@ fn the_models_and_what_they_are_made_of_need_no_standard_library() {
 
 /// The packages of the harness, each with those of the workspace that it may link: of `fmu/` the formulas
 /// alone, which are no model.
-const HARNESS: [(&str, &[&str]); 11] = [
+const HARNESS: [(&str, &[&str]); 12] = [
     ("host", &[]),
     ("signals", &["host"]),
     ("check", &["host"]),
     ("pack", &["host"]),
     ("analysis", &["signals"]),
     ("experiments", &["formulas", "host", "signals", "analysis"]),
+    ("web", &[]),
     ("report", &["host", "analysis", "experiments"]),
     ("identify", &["formulas", "host", "signals", "analysis", "experiments", "report"]),
     ("hubslosh-tank", &["formulas"]),

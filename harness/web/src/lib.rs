@@ -1,0 +1,42 @@
+//! JavaScript that several of the project's pages hold, as text to be put between `<script>` and `</script>`.
+
+/// The part of three.js that [`SCENE`] uses, as the global `THREE` (MIT: [`THREE_LICENSE`] goes with it).
+pub const THREE: &str = include_str!("../three/three.min.js");
+
+/// The licence of [`THREE`], which every page that holds it holds too.
+pub const THREE_LICENSE: &str = include_str!("../three/LICENSE");
+
+/// The global `HubSloshScene`: bench or spacecraft with liquid (`scene/README.md`); needs [`THREE`].
+pub const SCENE: &str = include_str!("../scene/scene.js");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sha2::{Digest, Sha256};
+
+    #[test]
+    fn the_bundle_is_the_one_that_the_lock_file_makes() {
+        let sum = |text: &str| base16ct::lower::encode_string(&Sha256::digest(text));
+        let sums =
+            format!("{}  LICENSE\n{}  three.min.js\n", sum(THREE_LICENSE), sum(THREE));
+        assert_eq!(sums, include_str!("../three/SHA256SUMS"), "run harness/web/three/build");
+    }
+
+    #[test]
+    fn nothing_ends_the_script_element_that_holds_it() {
+        for text in [THREE, THREE_LICENSE, SCENE] {
+            assert!(!text.contains("</script") && !text.contains("<!--"));
+        }
+    }
+
+    /// esbuild takes what `used.js` names and nothing else: a name that is missing there fails in the browser.
+    #[test]
+    fn the_bundle_has_every_name_that_the_scene_uses() {
+        let exported = include_str!("../three/used.js");
+        for rest in SCENE.split("THREE.").skip(1) {
+            let name: String = rest.chars().take_while(|c| c.is_alphanumeric()).collect();
+            let listed = exported.split(|c: char| !c.is_alphanumeric()).any(|word| word == name);
+            assert!(listed || name.is_empty(), "{name} is not in used.js");
+        }
+    }
+}
