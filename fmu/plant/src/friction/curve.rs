@@ -8,6 +8,12 @@ use taylor::series::{self, Series, ZERO};
 
 use crate::parameters::Friction;
 
+/// Up to this rate over w_s the excess is above 1e-4 of d: every tolerance in use sees its terms.
+const VISIBLE: f64 = 3.0;
+
+/// Beyond this rate over w_s it is below 1e-12 of d.
+const FLAT: f64 = 5.3;
+
 #[derive(Clone, Debug)]
 pub struct StribeckCurve {
     c: f64,
@@ -25,6 +31,22 @@ impl StribeckCurve {
     pub fn new(p: &Friction) -> StribeckCurve {
         let inv_omega_s2 = 1.0 / (p.omega_s * p.omega_s);
         StribeckCurve { c: p.c, d: p.d, inv_omega_s2, u_d: ZERO, e: ZERO, torque: ZERO }
+    }
+
+    /// How far ahead a series of T_C shows what it holds, s, from w, w' and w''.
+    ///
+    /// Far from rest exp(-v^2), v = w/w_s, is so small that no tolerance sees its terms, which grow before they decay:
+    /// over dv the term of order n is (2 v dv)^n/n!, the largest at n = 2 v dv. Either the curve is still flat at the
+    /// end, or the terms decay from order 5 on.
+    pub fn convergence_radius(&self, omega: &Series) -> f64 {
+        let [v, v1, v2] =
+            [omega[0], omega[1], omega[2]].map(|w| w.abs() * libm::sqrt(self.inv_omega_s2));
+        if v < VISIBLE || self.d == 0.0 {
+            return f64::INFINITY;
+        }
+        let dv = f64::max(v - FLAT, 2.5 / v);
+        let speed = v1 + libm::sqrt(v1 * v1 + 4.0 * v2 * dv);
+        if speed > 0.0 { 2.0 * dv / speed } else { f64::INFINITY }
     }
 
     /// T_C(0), N m.

@@ -63,6 +63,10 @@ impl FrictionLaw for Stribeck {
         -self.b * hub.omega[n] - dry
     }
 
+    fn convergence_radius(&self, omega: &Series) -> f64 {
+        self.curve.convergence_radius(omega)
+    }
+
     fn holds(&self, theta: f64) -> (f64, f64) {
         let ((backward, forward), dry) = (self.factor.at(theta), self.curve.at_rest());
         (dry * backward, dry * forward)

@@ -77,12 +77,13 @@ impl FrictionLaw for StribeckSmooth {
     }
 
     /// tanh has its nearest poles at distance sqrt(v^2 + (pi/2)^2) from v = w/eps, and it is
-    /// so flat away from 0 that its coefficients there do not tell; half the way is safe.
+    /// so flat away from 0 that its coefficients there do not tell; half the way is safe. T_C has a reach of its own.
     fn convergence_radius(&self, omega: &Series) -> f64 {
         let [v, v1, v2] = [omega[0], omega[1], omega[2]].map(|x| (x / self.eps).abs());
         let half = libm::sqrt(v * v + 2.4674) / 2.0;
         let speed = v1 + libm::sqrt(v1 * v1 + 4.0 * v2 * half);
         // A hub at rest without torque stays.
-        if speed > 0.0 { 2.0 * half / speed } else { f64::INFINITY }
+        let sign = if speed > 0.0 { 2.0 * half / speed } else { f64::INFINITY };
+        sign.min(self.curve.convergence_radius(omega))
     }
 }

@@ -90,3 +90,24 @@ fn a_small_motion_takes_no_more_steps_than_a_large_one() {
         assert!(small <= large + 1, "{slosh:?}: {small} {large}");
     }
 }
+
+/// Stribeck's excess is 1e-30 and less at eight times its speed: a long step from there to rest must not miss it.
+#[test]
+fn a_long_step_from_a_fast_hub_to_rest_meets_short_ones() {
+    for friction in [FrictionModel::Stribeck, FrictionModel::StribeckSmooth] {
+        for (omega, torque) in [(0.7, -0.3), (1.5, -0.5), (0.5, -0.2)] {
+            let mut p = bench(SloshModel::Frozen, friction);
+            (p.init.omega, p.friction.eps) = (omega, 1e-3);
+            let inputs = Inputs { tau_cmd: Ramp::held(torque), ..Inputs::default() };
+            let run = |h: f64, count: usize| {
+                let mut plant = Plant::new(&p, &inputs, 0.0, 1e-9).unwrap();
+                for _ in 0..count {
+                    plant.step(&inputs, h).unwrap();
+                }
+                plant.omega()
+            };
+            let off = run(4.0, 1) - run(1e-3, 4000);
+            assert!(off.abs() < 1e-10, "{friction:?} {omega}: {off:e}");
+        }
+    }
+}
