@@ -102,7 +102,7 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         "Torque of the bearing's friction on the hub, opposes omega; while stuck it balances all other torques")
         .display_unit("mN.m").nominal(0.01).depends_on(ALL_TORQUES).initial_depends_on(DYNAMICS),
     V::output("tau_fluid", |o, _| o.tau_fluid, "N.m",
-        "Torque of the whole liquid, its rigid part included, on the hub: hub.I omega_dot = tau_actuator + tau_ext + tau_friction + tau_fluid (+ tau_gravity)")
+        "Torque of the whole liquid, its rigid part included, on the hub: hub.I omega_dot = tau_actuator + tau_ext + tau_friction + tau_fluid (+ tau_gravity + tau_suspension)")
         .display_unit("mN.m").nominal(0.1).depends_on(ALL_TORQUES).initial_depends_on(DYNAMICS),
     V::output("F_tangential", |o, _| o.f_tangential, "N",
         "Force of the liquid, its rigid part included, on the tank, hub frame: tangential, positive towards +theta")
@@ -136,20 +136,23 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     V::local("tau_gravity", |o, _| o.tau_gravity, "N.m",
         "Torque of gravity on the dry hub of a bench that leans, to be added to the other torques on the hub; 0 while bench.tilt or hub.imbalance is 0. That on the liquid is part of tau_fluid")
         .display_unit("mN.m").depends_on(&["theta", "g_axial"]).initial_depends_on(&["hub.", "bench.", "init.theta"]),
+    V::local("tau_suspension", |o, _| o.tau_suspension, "N.m",
+        "Torque of the suspension line on the hub, -hub.k (theta - hub.theta_0) - hub.c omega, to be added to the other torques on the hub; 0 while hub.k and hub.c are 0")
+        .display_unit("mN.m").depends_on(&["theta", "omega"]).initial_depends_on(&["hub.", "init.theta", "init.omega"]),
     V::local("energy", |o, _| o.energy, "J",
-        "Kinetic and potential energy of hub and liquid, 0 at rest on an upright bench")
+        "Kinetic and potential energy of hub, suspension line and liquid, 0 at rest on an upright bench with a line that is not twisted")
         .nominal(0.01).depends_on(ALL_TORQUES),
     V::local("momentum", |o, _| o.momentum, "kg.m2/s",
         "Angular momentum of hub and liquid about the bearing axis")
         .depends_on(HUB_AND_LIQUID),
     V::local("power_dissipated", |o, _| o.power_dissipated, "W",
-        "Power dissipated by bearing and liquid together, never negative")
+        "Power dissipated by bearing, suspension line and liquid together, never negative")
         .depends_on(HEAT),
     V::local("work", |o, _| o.work, "J",
         "Work done on the hub by tau_actuator and tau_ext since the start")
         .nominal(0.01).is_state(|_| x::WORK).depends_on(&["work"]),
     V::local("heat", |o, _| o.heat, "J",
-        "Energy dissipated by bearing and liquid since the start")
+        "Energy dissipated by bearing, suspension line and liquid since the start")
         .nominal(0.01).is_state(|_| x::HEAT).depends_on(&["heat"]),
     V::local("work_axial", |o, _| o.work_axial, "J",
         "Work done on the liquid through changes of g_axial since the start: energy - energy(0) = work + work_axial - heat. Co-Simulation: exact, also for jumps; Model Exchange: added up at accepted steps, to the fourth order of their length where g_axial is linear in time")
@@ -269,6 +272,15 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     V::parameter("hub.imbalance_angle", |p, _| &mut p.hub.imbalance_angle, "rad",
         "Direction of that centre in the hub's frame, from radial towards tangential")
         .display_unit("deg").range(-7.0, 7.0),
+    V::parameter("hub.k", |p, _| &mut p.hub.k, "N.m/rad",
+        "Torsional stiffness of a line that the hub hangs from; 0: none")
+        .range(0.0, 1e6),
+    V::parameter("hub.theta_0", |p, _| &mut p.hub.theta_0, "rad",
+        "The theta at which that line is not twisted")
+        .display_unit("deg").range(-1e6, 1e6),
+    V::parameter("hub.c", |p, _| &mut p.hub.c, "N.m.s/rad",
+        "Damping coefficient of that line; unlike friction.b it acts with every friction.model")
+        .range(0.0, 1e6),
     V::parameter("bench.tilt", |p, _| &mut p.bench.tilt, "rad",
         "By how much the bearing's axis leans. g_axial is the part of gravity along the axis; g_axial tan(bench.tilt) across it acts on hub and liquid")
         .display_unit("deg").range(0.0, 1.5),

@@ -279,11 +279,12 @@ mod tests {
         plant_with(slosh, friction, |_| {})
     }
 
-    /// A bench that leans, a ring baffle, damping that grows with the amplitude, surface tension a hundred times
+    /// A bench that leans, a suspension line, a ring baffle, damping that grows with the amplitude, surface tension a hundred times
     /// water's.
     fn every_option(p: &mut Parameters) {
         (p.bench.tilt, p.bench.tilt_azimuth) = (0.1, 0.7);
         (p.hub.imbalance, p.hub.imbalance_angle) = (0.4, 2.0);
+        (p.hub.k, p.hub.theta_0, p.hub.c) = (0.7, -0.3, 0.02);
         (p.baffle.width, p.baffle.depth) = (0.008, 0.01);
         (p.slosh.capillarity, p.fluid.sigma) = (true, 7.0);
         p.slosh.zeta_amplitude = 0.05;
@@ -398,6 +399,7 @@ mod tests {
             tau_friction,
             tau_fluid,
             tau_gravity,
+            tau_suspension,
             f_tangential,
             f_radial,
             wave_height,

@@ -8,7 +8,8 @@
 //!
 //! Where to look: `plant.rs` couples everything, `state.rs` declares the states, `outputs.rs`
 //! and `equations.rs` are what a host reads, `motion.rs` steps through time and finds stick
-//! and slip, `friction/`, `slosh/`, `damping.rs`, `tank.rs`, `wheel.rs`, `imu.rs` say what their names say,
+//! and slip, `friction/`, `slosh/`, `damping.rs`, `tank.rs`, `suspension.rs`, `wheel.rs`,
+//! `imu.rs` say what their names say,
 //! the arithmetic is the crate `taylor`.
 
 #![cfg_attr(not(test), no_std)]
@@ -31,6 +32,7 @@ mod pendulum;
 mod plant;
 mod slosh;
 mod state;
+mod suspension;
 mod tank;
 mod wheel;
 

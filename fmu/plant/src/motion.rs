@@ -17,6 +17,7 @@ use crate::inputs::Ramp;
 use crate::parameters::{Imu, Parameters, SloshModel};
 use crate::slosh::SloshMode;
 use crate::state::{State, x};
+use crate::suspension::Suspension;
 
 /// Where the steps of a call do not suffice.
 const ADVICE: &str = ", with stribeck_smooth a larger friction.eps, with the gyro (its samples count as \
@@ -35,6 +36,7 @@ pub(crate) struct Motion {
     /// Inertia of hub and rigid liquid, kg m2.
     pub i0: f64,
     pub law: Law,
+    pub suspension: Suspension,
     pub damping: Damping,
     /// Whether drag or weight change along an expansion though g is held: with drag by amplitude, or
     /// on a bench that leans.
@@ -61,7 +63,7 @@ pub(crate) struct Motion {
     pub tau_f: Series,
     /// tau + T, the torque that the bearing must hold at rest.
     pub net: Series,
-    /// Power of the torques from outside, and dissipated in bearing and liquid, W.
+    /// Power of the torques from outside, and dissipated in bearing, suspension line and liquid, W.
     pub power: Series,
     pub dissipation: Series,
 }
@@ -77,6 +79,7 @@ impl Motion {
         Motion {
             i0: p.hub.inertia + i_0,
             law: Law::new(&p.friction),
+            suspension: Suspension::new(&p.hub),
             damping,
             varies: with_amplitude || hub.tilt.tangent != 0.0,
             with_amplitude,
@@ -183,6 +186,9 @@ impl Motion {
             self.hub.tilt.expand(n, &self.hub.theta, &self.hub.g);
             net += self.gravity_torque(n) + self.rigid_moment * self.hub.tilt.e[1][n];
         }
+        if self.suspension.exists {
+            net += self.suspension.torque(n, &self.hub);
+        }
         for mode in modes.iter_mut() {
             let reaction = mode.hub_reaction(n, ramp, &self.hub);
             inertia += reaction.j;
@@ -210,6 +216,9 @@ impl Motion {
         self.hub.omega[n + 1] = series::next(n, self.hub.omega_dot[n]);
         self.power[n] = series::mul_ramp(n, &self.tau, &self.hub.omega);
         self.dissipation[n] = self.law.dissipation(n, &self.tau_f, &self.hub.omega);
+        if self.suspension.exists {
+            self.dissipation[n] += self.suspension.dissipation(n, &self.hub);
+        }
         for mode in modes.iter_mut() {
             mode.accelerate(n, ramp, &self.hub);
             self.dissipation[n] += mode.dissipation(n, ramp);

@@ -33,6 +33,8 @@ pub struct Outputs {
     pub tau_fluid: f64,
     /// Torque of gravity on the dry hub, N m: only on a bench that leans.
     pub tau_gravity: f64,
+    /// Torque of the suspension line on the hub, N m.
+    pub tau_suspension: f64,
     /// Force of all liquid on the tank along +theta, N.
     pub f_tangential: f64,
     /// Force of all liquid on the tank outwards, N.
@@ -45,11 +47,11 @@ pub struct Outputs {
     pub baffle_wave: f64,
     /// Reading of the gyro, rad/s.
     pub omega_imu: f64,
-    /// Kinetic and potential energy of hub and liquid, J.
+    /// Kinetic and potential energy of hub, suspension line and liquid, J.
     pub energy: f64,
     /// Angular momentum of hub and liquid about the bearing's axis, kg m2/s.
     pub momentum: f64,
-    /// Power dissipated in bearing and liquid, W.
+    /// Power dissipated in bearing, suspension line and liquid, W.
     pub power_dissipated: f64,
     /// Torque of the actuator on the hub, N m, after the wheel's limits.
     pub tau_actuator: f64,
@@ -60,7 +62,7 @@ pub struct Outputs {
     /// Work through the changes of g_axial on the liquid since the start, J:
     /// energy - energy(0) = work + work_axial - heat.
     pub work_axial: f64,
-    /// Energy dissipated in bearing and liquid since the start, J.
+    /// Energy dissipated in bearing, suspension line and liquid since the start, J.
     pub heat: f64,
     /// Time spent stuck since the start, s.
     pub stuck_time: f64,
@@ -121,10 +123,14 @@ impl Plant {
             e_y * self.m_0 - wd * (self.m_0 * self.r),
         ];
         let [tau_gravity, on_rigid]: [T; 2] = motion.gravity_torques();
+        let [tau_suspension, strain]: [T; 2] = motion.suspension.present(hub);
         let mut tau_fluid = on_rigid - wd * self.i_0;
         let inertia = self.hub_inertia + self.i_0;
         let stored = T::of(motion.law.energy(0), motion.law.energy(1));
         let mut energy = w * inertia * w * 0.5 + stored + motion.potential();
+        if motion.suspension.exists {
+            energy = energy + strain;
+        }
         let mut momentum = w * inertia;
         let zero = T::constant(0.0);
         let (mut wave, mut mode1) = ([zero; 2], Angles::<T>::zero());
@@ -163,6 +169,7 @@ impl Plant {
             tau_friction: plain(number(&motion.tau_f)),
             tau_fluid: plain(tau_fluid),
             tau_gravity: plain(tau_gravity),
+            tau_suspension: plain(tau_suspension),
             f_tangential: plain(force[1]),
             f_radial: plain(force[0]),
             wave_height: wave[0].hypot(wave[1]).result(),

@@ -29,6 +29,9 @@ pub struct Hub {
     pub inertia: f64,
     pub imbalance: f64,
     pub imbalance_angle: f64,
+    pub k: f64,
+    pub theta_0: f64,
+    pub c: f64,
 }
 
 /// An upright cylinder, its axis parallel to the bearing's.
@@ -273,7 +276,9 @@ const RPM: f64 = core::f64::consts::PI / 30.0;
 // inertia is an inference (a steel disc of 125 mm diameter).
 impl Default for Hub {
     fn default() -> Self {
-        Hub { inertia: 0.322414, imbalance: 0.0, imbalance_angle: 0.0 }
+        let (imbalance, imbalance_angle) = (0.0, 0.0);
+        let (k, theta_0, c) = (0.0, 0.0, 0.0);
+        Hub { inertia: 0.322414, imbalance, imbalance_angle, k, theta_0, c }
     }
 }
 

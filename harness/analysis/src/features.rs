@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn a_band_without_rise_or_that_ends_too_early_has_no_features() {
-        let hub = Linear { inertia: 0.4, friction: 0.04, arm: 0.2, modes: vec![] };
+        let hub = Linear { inertia: 0.4, friction: 0.04, arm: 0.2, ..Linear::default() };
         let grid = logarithmic_grid(BAND, 2000);
         assert_eq!(Features::of(&hub.frequency_response(&grid)), Features::default());
         // up to 2.4 Hz there is the antiresonance, but the resonance is not reached

@@ -1,10 +1,10 @@
 //! The exact frequency response of the linear model with viscous friction:
 //!
 //! ```text
-//! Ω/τ = 1 / ( I0 s + b + s Σ m_i r² (2 ζ_i ω_i s + ω_i²) / (s² + 2 ζ_i ω_i s + ω_i²) )
+//! Ω/τ = 1 / ( I0 s + b + k/s + s Σ m_i r² (2 ζ_i ω_i s + ω_i²) / (s² + 2 ζ_i ω_i s + ω_i²) )
 //! ```
 //!
-//! from the hub's equation I0 ω' = τ − b ω + r Σ (m_i g α_i + c_i l_i α_i') and the
+//! from the hub's equation I0 ω' = τ − b ω − k θ + r Σ (m_i g α_i + c_i l_i α_i') and the
 //! pendulums' α_i'' + 2 ζ_i ω_i α_i' + ω_i² α_i = −(r/l_i) ω' (thesis 4.27 and 4.29 with the sign
 //! of the slosh torque corrected). Its zeros are the pendulums' own poles: the antiresonance stands
 //! at the slosh frequency, the resonance above it.
@@ -22,6 +22,8 @@ pub struct Linear {
     pub inertia: f64,
     /// b, viscous friction, N·m·s.
     pub friction: f64,
+    /// k, torsional stiffness of the line that the hub hangs from, N·m/rad.
+    pub stiffness: f64,
     /// r, distance of the tank from the axis, m.
     pub arm: f64,
     /// The slosh modes.
@@ -52,7 +54,7 @@ impl Linear {
                 mode.mass * self.arm * self.arm * spring / (s * s + spring)
             })
             .sum();
-        (s * (slosh + self.inertia) + self.friction).inv()
+        (s * (slosh + self.inertia) + self.friction + self.stiffness / s).inv()
     }
 
     /// The rate, rad/s, that a torque (N·m) makes that is linear between samples `step` s apart, from
@@ -65,7 +67,7 @@ impl Linear {
 
     /// The same of a torque that has at the begin of each step of `step` s a value (N·m) and over it
     /// a slope (N·m/s): exact, by the matrix exponential of the state and the input's
-    /// value and slope. The state is ω and, for each mode, y = l α and y'.
+    /// value and slope. The state is ω, for each mode y = l α and y', and the angle from its start.
     pub fn simulate_ramps(
         &self,
         step: f64,
@@ -73,9 +75,11 @@ impl Linear {
         slopes: &[f64],
         start: f64,
     ) -> Vec<f64> {
-        let n = 1 + 2 * self.modes.len();
+        let theta = 1 + 2 * self.modes.len();
+        let n = theta + 1;
         let mut flow = DMatrix::<f64>::zeros(n + 2, n + 2);
         (flow[(0, 0)], flow[(0, n)]) = (-self.friction / self.inertia, 1.0 / self.inertia);
+        (flow[(0, theta)], flow[(theta, 0)]) = (-self.stiffness / self.inertia, 1.0);
         for (i, mode) in self.modes.iter().enumerate() {
             let (y, w) = (1 + 2 * i, TAU * mode.frequency);
             let pull = self.arm * mode.mass / self.inertia;
@@ -136,6 +140,7 @@ impl Linear {
             friction: 0.03793,
             arm: 0.225,
             modes: vec![Mode { mass, frequency, damping }],
+            ..Linear::default()
         }
     }
 }
@@ -151,7 +156,7 @@ mod tests {
     #[test]
     fn a_torque_that_jumps_between_steps_is_no_slope() {
         // a free hub: 0.2 N·m for a second, none, -0.2 for another; edges between samples 0.1 s apart
-        let hub = Linear { inertia: 0.4, friction: 0.0, arm: 0.2, modes: vec![] };
+        let hub = Linear { inertia: 0.4, arm: 0.2, ..Linear::default() };
         let torque: Vec<f64> = (0..40)
             .map(|k| match k {
                 0..10 => 0.2,
@@ -167,13 +172,16 @@ mod tests {
 
     #[test]
     fn the_exact_simulation_answers_a_sine_with_the_gain_of_the_response() {
-        let plant = Linear { friction: 2.0, ..Linear::bench_10_cm(0.05) };
-        let (step, f) = (0.002, 2.2);
-        let torque: Vec<f64> = (0..40_000).map(|k| (TAU * f * f64::from(k) * step).sin()).collect();
-        let rate = plant.simulate(step, &torque, 0.0);
-        let largest = rate[35_000..].iter().fold(0.0f64, |m, y| m.max(y.abs()));
-        // after 70 s the start has decayed; chords of the sine and the sampled maximum: (w h)²/8
-        assert!((largest / plant.response(f).norm() - 1.0).abs() < 2e-4, "{largest}");
+        for stiffness in [0.0, 60.0] {
+            let plant = Linear { friction: 2.0, stiffness, ..Linear::bench_10_cm(0.05) };
+            let (step, f) = (0.002, 2.2);
+            let torque: Vec<f64> =
+                (0..40_000).map(|k| (TAU * f * f64::from(k) * step).sin()).collect();
+            let rate = plant.simulate(step, &torque, 0.0);
+            let largest = rate[35_000..].iter().fold(0.0f64, |m, y| m.max(y.abs()));
+            // after 70 s the start has decayed; chords of the sine and the sampled maximum: (w h)²/8
+            assert!((largest / plant.response(f).norm() - 1.0).abs() < 2e-4, "{largest}");
+        }
     }
 
     /// The linear bench driven by a sweep sampled at 50 Hz and joined by lines, integrated with RK4

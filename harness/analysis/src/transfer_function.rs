@@ -354,7 +354,7 @@ mod tests {
         let grid = logarithmic_grid((0.01, 0.2), 2000);
         for inertia in [780.0, 800.0, 810.0] {
             let slosh = Mode { mass: 120.0, frequency: 0.04177, damping: 0.01 };
-            let plant = Linear { inertia, friction: 0.0, arm: 0.6, modes: vec![slosh] };
+            let plant = Linear { inertia, arm: 0.6, modes: vec![slosh], ..Linear::default() };
             let fitted = TransferFunction::fit(&plant.frequency_response(&grid)).unwrap();
             let zero = fitted.zero_frequency().unwrap();
             assert!((zero / slosh.frequency - 1.0).abs() < 1e-3, "{inertia}: {fitted:?}");

@@ -14,5 +14,6 @@ mod options;
 mod ranges;
 mod rotary;
 mod steps;
+mod suspension;
 mod tanks;
 mod trajectories;

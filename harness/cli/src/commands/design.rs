@@ -206,6 +206,7 @@ fn expected(real: &mut dyn FnMut(&str) -> Result<f64>, peak: f64) -> Result<Line
     let rate = peak / 3.0 / (inertia * std::f64::consts::TAU * mode.frequency);
     // ⟨|ω|⟩ of a normal distribution is sqrt(2/π) σ
     let dry = real("friction.c")? + real("friction.d")?;
-    let friction = real("friction.b")? + dry * (2.0 / std::f64::consts::PI).sqrt() / rate;
-    Ok(Linear { inertia, friction, arm, modes: vec![mode] })
+    let viscous = real("friction.b")? + real("hub.c")?;
+    let friction = viscous + dry * (2.0 / std::f64::consts::PI).sqrt() / rate;
+    Ok(Linear { inertia, friction, stiffness: real("hub.k")?, arm, modes: vec![mode] })
 }

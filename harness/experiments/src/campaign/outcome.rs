@@ -687,7 +687,7 @@ fn item(instance: &mut Instance, name: &str, kind: &str) -> Result<Option<String
 }
 
 /// The linear model that has the FMU's own (calculated) parameters, with viscous friction unless the
-/// FMU has none.
+/// FMU has none, and the line that it hangs from.
 pub(super) fn exact_linear(instance: &mut Instance) -> Result<Linear> {
     let mut real = |name: &str| instance.real(name);
     let arm = real("tank.r")?;
@@ -705,6 +705,9 @@ pub(super) fn exact_linear(instance: &mut Instance) -> Result<Linear> {
     let inertia = real("hub.I")? + real("tank.m_0")? * arm * arm;
     let viscous = real("friction.b")?;
     let law = item(instance, "friction.model", "friction.kind")?;
-    let friction = if law.as_deref() == Some("none") { 0.0 } else { viscous };
-    Ok(Linear { inertia, friction, arm, modes })
+    let bearing = if law.as_deref() == Some("none") { 0.0 } else { viscous };
+    // A bench of before 0.4 hangs from no line.
+    let mut line = |name: &str| instance.real(name).unwrap_or(0.0);
+    let (stiffness, friction) = (line("hub.k"), bearing + line("hub.c"));
+    Ok(Linear { inertia, friction, stiffness, arm, modes })
 }

@@ -48,7 +48,7 @@ fn bench_of(hub_inertia: f64, (d, h, zeta): (f64, f64, f64), bench: Bench) -> Li
     let frequency = (bench.gravity / length).sqrt() / (2.0 * PI);
     let inertia = hub_inertia + bench.inertia(liquid - mass);
     let modes = vec![Mode { mass, frequency, damping: zeta }];
-    Linear { inertia, friction: 0.0, arm: bench.arm, modes }
+    Linear { inertia, arm: bench.arm, modes, ..Linear::default() }
 }
 
 /// Fits d, h and ζ from a start, the hub's inertia and the friction being known: the fit of the rate, %,
