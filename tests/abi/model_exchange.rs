@@ -192,7 +192,7 @@ fn compare(
         assert_eq!(host.instance.get(name).unwrap(), own.get(name).unwrap(), "{name}");
     }
     let Value::Integer(count) = count else { panic!() };
-    (host.events, count)
+    (host.events, count as i32)
 }
 
 /// At 15 rad/s order 4 with 0.5 ms is late by omega (omega h)^4/120 = 4e-10 rad a second,
@@ -429,7 +429,7 @@ fn openmodelica_up_to_1_27_gets_the_motion_of_the_parameters_it_sets() {
         match fmu.description().value(v, text).unwrap() {
             _ if v.kind() == Type::Enumeration => {}
             Value::Real(x) => reals.push((v.reference, x)),
-            Value::Integer(n) => integers.push((v.reference, n)),
+            Value::Integer(n) => integers.push((v.reference, n as i32)),
             Value::Boolean(b) => booleans.push((v.reference, i32::from(b))),
             Value::String(_) => panic!("{} is a text", v.name),
         }
@@ -473,7 +473,7 @@ fn openmodelica_up_to_1_27_gets_the_motion_of_the_parameters_it_sets() {
     for (boolean, twin) in [("stuck", "stuck_kind"), ("baffle.in_range", "baffle.in_range_kind")] {
         let as_boolean = host.instance.get(boolean).unwrap() == Value::Boolean(true);
         let as_integer = host.instance.get(twin).unwrap();
-        assert_eq!(as_integer, Value::Integer(i32::from(as_boolean)), "{twin}");
+        assert_eq!(as_integer, Value::Integer(i64::from(as_boolean)), "{twin}");
     }
     for (name, expected) in values(&mut own) {
         let got = exchanged[&name];

@@ -734,7 +734,8 @@ pub fn aliases(d: &Description, findings: &mut Findings) {
         Type::Real => 0,
         Type::Integer | Type::Enumeration => 1,
         Type::Boolean => 2,
-        Type::String => 3,
+        // FMI 2.0 has no Binary and no Clock
+        Type::String | Type::Binary | Type::Clock => 3,
     };
     let mut sets: BTreeMap<(i32, u32), Vec<&Variable>> = BTreeMap::new();
     for v in &d.variables {

@@ -769,7 +769,8 @@ impl<'f> Session<'f> {
                 self.instance.get_boolean(&reference, &mut value)?;
                 Reading::Boolean(value[0])
             }
-            Type::String => {
+            // FMI 2.0 has no Binary and no Clock
+            Type::String | Type::Binary | Type::Clock => {
                 Reading::Text(self.instance.get_string(&reference)?.pop().unwrap_or_default())
             }
         })
@@ -833,7 +834,7 @@ pub fn start_value(v: &Variable) -> Option<Reading> {
         Type::Real => Reading::Real(host::xml::double(text)?),
         Type::Integer | Type::Enumeration => Reading::Integer(text.trim().parse().ok()?),
         Type::Boolean => Reading::Boolean(matches!(text.trim(), "true" | "1").into()),
-        Type::String => Reading::Text(text.to_string()),
+        Type::String | Type::Binary | Type::Clock => Reading::Text(text.to_string()),
     })
 }
 

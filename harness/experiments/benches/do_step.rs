@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use experiments::profile::Torque;
 use experiments::run::Run;
-use host::fmi2::{Fmu, Instance};
+use host::fmu::{Fmu, Instance};
 use ode_solvers::{Dopri5, SVector, System};
 use pack::packed_for_tests;
 
@@ -106,6 +106,7 @@ fn main() {
     let reference = fmu.description().variable("tau_cmd").expect("it is there").reference;
     // only fmi2DoStep is timed, not the calls that hand the torque over
     let steps_of = |instance: &mut Instance| {
+        let Instance::V2(instance, _) = instance else { panic!("an FMU 2.0") };
         let mut total = Duration::ZERO;
         for (k, knots) in knots.windows(2).enumerate() {
             instance.set_real(&[reference], &knots[..1]).expect("a torque");

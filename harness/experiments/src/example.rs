@@ -10,7 +10,7 @@ use anyhow::{Context, Result};
 use crate::rounding::significant;
 use crate::run::{Run, histories};
 use host::description::ModelDescription;
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use host::output;
 use signals::table::Table;
 

@@ -10,7 +10,7 @@ use crate::progress::Progress;
 use crate::run::{Run, TORQUE};
 use analysis::allan::{self, Noise, Point};
 use host::budget;
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use signals::table::Table;
 
 /// Fewest records whose scatter is a standard error: that of four is uncertain by 40 %.

@@ -6,9 +6,9 @@ use anyhow::{Context, Result, bail, ensure};
 
 use crate::profile::Torque;
 use host::budget;
-use host::description::{ModelDescription, Type, Variable};
+use host::description::{ModelDescription, Type, Value, Variable};
 use host::drive::Inputs;
-use host::fmi2::{Fmu, Instance};
+use host::fmu::{Fmu, Instance};
 use signals::table::{self, Table};
 
 /// What is to be run.
@@ -288,7 +288,7 @@ impl Run {
 /// Reads the recorded variables of each type with one call.
 struct Recorder {
     reals: Vec<u32>,
-    others: Vec<(Type, u32)>,
+    others: Vec<Variable>,
     /// Which column each value belongs to: first the reals, then the others.
     places: Vec<usize>,
     values: Vec<f64>,
@@ -306,9 +306,11 @@ impl Recorder {
                     reals.push(variable.reference);
                     real_places.push(place);
                 }
-                Type::String => bail!("{name} is a text; only numbers can be recorded"),
-                kind => {
-                    others.push((kind, variable.reference));
+                Type::String | Type::Binary | Type::Clock => {
+                    bail!("{name} is no number; only numbers can be recorded")
+                }
+                Type::Integer | Type::Boolean | Type::Enumeration => {
+                    others.push(variable.clone());
                     other_places.push(place);
                 }
             }
@@ -328,13 +330,14 @@ impl Recorder {
         for (value, place) in self.values.iter().zip(&self.places) {
             self.columns[*place].push(*value);
         }
-        for ((kind, reference), place) in self.others.iter().zip(&self.places[self.reals.len()..]) {
-            let mut value = [0];
-            match kind {
-                Type::Boolean => instance.get_boolean(&[*reference], &mut value)?,
-                _ => instance.get_integer(&[*reference], &mut value)?,
-            }
-            self.columns[*place].push(value[0].into());
+        for (variable, place) in self.others.iter().zip(&self.places[self.reals.len()..]) {
+            let number = match instance.value(variable)? {
+                Value::Real(x) => x,
+                Value::Integer(n) => n as f64,
+                Value::Boolean(yes) => f64::from(u8::from(yes)),
+                Value::String(_) => f64::NAN,
+            };
+            self.columns[*place].push(number);
         }
         let wrong = self.values.iter().position(|value| !value.is_finite());
         Ok(wrong.map(|i| self.places[i]))

@@ -130,7 +130,9 @@ impl Archive {
             if let Some(why) = entry.way_out() {
                 bail!("{name}: {why} (allowed: files and folders with relative names)");
             }
-            ensure!(names.insert(&entry.name), "two entries are called {name} (allowed: one)");
+            // a folder has nothing in it that one of the two could hide
+            let is_new = names.insert(&entry.name) || entry.is_folder();
+            ensure!(is_new, "two entries are called {name} (allowed: one)");
         }
         Ok(())
     }

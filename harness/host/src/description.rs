@@ -1,6 +1,11 @@
-//! What an FMU says of itself: `modelDescription.xml` (FMI 2.0, section 2.2), as far as a host
-//! needs it to drive the FMU.
+//! What an FMU says of itself: `modelDescription.xml` (FMI 2.0, section 2.2; FMI 3.0, section 2.4), as far as
+//! a host needs it to drive the FMU.
+//!
+//! Both versions are read into the same: what FMI 3.0 calls Float64 is a Real here, its instantiationToken a
+//! GUID, an alias a variable with the same reference. An array is read as its elements, `x[1,2]`, each a
+//! variable, as FMI 2.0 would have it; [`ModelDescription::element`] says where they are.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
@@ -11,11 +16,11 @@ use crate::xml::Element;
 /// The root element `fmiModelDescription`.
 #[derive(Clone, Debug)]
 pub struct ModelDescription {
-    /// FMI version; "2.0" for every FMU this host can drive.
+    /// FMI version, "2.0" or "3.0" and its like.
     pub fmi_version: String,
     /// Name of the model.
     pub model_name: String,
-    /// Fingerprint that XML and binary must share.
+    /// Fingerprint that XML and binary must share; the instantiationToken of FMI 3.0.
     pub guid: String,
     /// Version of the model; empty if none is given.
     pub version: String,
@@ -33,8 +38,30 @@ pub struct ModelDescription {
     pub types: Vec<SimpleType>,
     /// Start, stop, tolerance and step the author suggests.
     pub default_experiment: DefaultExperiment,
-    /// The variables, in the order of the file.
+    /// The variables, in the order of the file; the elements of an array one after the other, by rows.
     pub variables: Vec<Variable>,
+    arrays: BTreeMap<u32, Array>,
+    elements: BTreeMap<u32, ArrayElement>,
+}
+
+/// An array of FMI 3.0.
+#[derive(Clone, Debug)]
+pub struct Array {
+    /// How many elements it has.
+    pub length: usize,
+    /// Type of its elements.
+    pub c_type: CType,
+    /// Their start values, as written: none, one for all, or one for each.
+    pub start: Vec<String>,
+}
+
+/// Where an element of an array is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ArrayElement {
+    /// Value reference of the array.
+    pub array: u32,
+    /// Its place, counted from 0, by rows.
+    pub index: usize,
 }
 
 /// Element `CoSimulation` or `ModelExchange`.
@@ -42,7 +69,8 @@ pub struct ModelDescription {
 pub struct Interface {
     /// Name of the binary, without the platform's ending.
     pub model_identifier: String,
-    /// In co-simulation: whether it takes derivatives of its inputs.
+    /// In co-simulation: whether it takes derivatives of its inputs (FMI 2.0), or new values of them within a
+    /// step (FMI 3.0).
     pub can_interpolate_inputs: bool,
 }
 
@@ -96,15 +124,16 @@ pub struct Item {
     /// Its name.
     pub name: String,
     /// Its number.
-    pub value: i32,
+    pub value: i64,
 }
 
-/// Element `ScalarVariable`.
+/// Element `ScalarVariable`, in FMI 3.0 one of its type's name.
 #[derive(Clone, Debug)]
 pub struct Variable {
     /// Name, unique in the FMU.
     pub name: String,
-    /// Number by which calls refer to it (within its type).
+    /// Number by which calls refer to it (within its type); of an element of an array one of this host's own, that no
+    /// other variable has.
     pub reference: u32,
     /// input, output, parameter, calculatedParameter, local or independent.
     pub causality: String,
@@ -112,6 +141,9 @@ pub struct Variable {
     pub variability: String,
     /// What it means; empty if it is not said.
     pub description: String,
+    /// In FMI 3.0: it may be set or read within a step.
+    pub intermediate: bool,
+    c_type: CType,
     kind: Type,
     attributes: Attributes,
 }
@@ -146,6 +178,69 @@ pub enum Type {
     String,
     /// An integer with named values.
     Enumeration,
+    /// Bytes; this host does not exchange them.
+    Binary,
+    /// An instant; this host does not exchange them.
+    Clock,
+}
+
+/// In which type calls exchange a variable: those of FMI 3.0. Of FMI 2.0 a Real is a Float64, an Integer an Int32.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[allow(missing_docs)]
+pub enum CType {
+    Float32,
+    Float64,
+    Int8,
+    UInt8,
+    Int16,
+    UInt16,
+    Int32,
+    UInt32,
+    Int64,
+    UInt64,
+    Boolean,
+    String,
+    Binary,
+    Clock,
+}
+
+impl CType {
+    /// Of an element of FMI 3.0, with the type that it is to people.
+    pub fn of_element(name: &str) -> Option<(CType, Type)> {
+        Some(match name {
+            "Float32" => (CType::Float32, Type::Real),
+            "Float64" => (CType::Float64, Type::Real),
+            "Int8" => (CType::Int8, Type::Integer),
+            "UInt8" => (CType::UInt8, Type::Integer),
+            "Int16" => (CType::Int16, Type::Integer),
+            "UInt16" => (CType::UInt16, Type::Integer),
+            "Int32" => (CType::Int32, Type::Integer),
+            "UInt32" => (CType::UInt32, Type::Integer),
+            "Int64" => (CType::Int64, Type::Integer),
+            "UInt64" => (CType::UInt64, Type::Integer),
+            "Boolean" => (CType::Boolean, Type::Boolean),
+            "String" => (CType::String, Type::String),
+            "Binary" => (CType::Binary, Type::Binary),
+            "Enumeration" => (CType::Int64, Type::Enumeration),
+            "Clock" => (CType::Clock, Type::Clock),
+            _ => return None,
+        })
+    }
+
+    /// The whole numbers that it has, if it has no others.
+    fn whole(self) -> Option<(i64, i64)> {
+        Some(match self {
+            CType::Int8 => (i8::MIN.into(), i8::MAX.into()),
+            CType::UInt8 => (0, u8::MAX.into()),
+            CType::Int16 => (i16::MIN.into(), i16::MAX.into()),
+            CType::UInt16 => (0, u16::MAX.into()),
+            CType::Int32 => (i32::MIN.into(), i32::MAX.into()),
+            CType::UInt32 => (0, u32::MAX.into()),
+            CType::Int64 => (i64::MIN, i64::MAX),
+            CType::UInt64 => (0, i64::MAX),
+            _ => return None,
+        })
+    }
 }
 
 /// A value of a variable.
@@ -154,7 +249,7 @@ pub enum Value {
     /// Of a Real.
     Real(f64),
     /// Of an Integer or an Enumeration.
-    Integer(i32),
+    Integer(i64),
     /// Of a Boolean.
     Boolean(bool),
     /// Of a String.
@@ -165,6 +260,11 @@ impl Variable {
     /// Its type.
     pub fn kind(&self) -> Type {
         self.kind
+    }
+
+    /// In which type calls exchange it.
+    pub fn c_type(&self) -> CType {
+        self.c_type
     }
 
     /// Start, unit, bounds.
@@ -184,6 +284,7 @@ fn short(text: &str) -> String {
 /// Reads elements and keeps all that is wrong with them.
 #[derive(Default)]
 struct Reader {
+    is_fmi3: bool,
     problems: Vec<String>,
     more: usize,
 }
@@ -221,7 +322,8 @@ impl Reader {
     fn interface(&mut self, element: &Element) -> Interface {
         Interface {
             model_identifier: self.text(element, "modelIdentifier"),
-            can_interpolate_inputs: element.flag("canInterpolateInputs"),
+            can_interpolate_inputs: element.flag("canInterpolateInputs")
+                || element.flag("providesIntermediateUpdate"),
         }
     }
 
@@ -236,11 +338,22 @@ impl Reader {
     }
 
     fn item(&mut self, element: &Element) -> Item {
-        let value = self.must(element, "value", |text| text.trim().parse().ok());
+        // of 32 bits in FMI 2.0, of 64 in FMI 3.0
+        let is_fmi3 = self.is_fmi3;
+        let fits = |n: &i64| is_fmi3 || i32::try_from(*n).is_ok();
+        let value = self.must(element, "value", |text| text.trim().parse().ok().filter(fits));
         Item { name: self.text(element, "name"), value }
     }
 
     fn simple_type(&mut self, element: &Element) -> SimpleType {
+        if element.name.ends_with("Type") && element.name != "SimpleType" {
+            let items = element.children.iter().filter(|child| child.name == "Item");
+            return SimpleType {
+                items: items.map(|item| self.item(item)).collect(),
+                name: self.text(element, "name"),
+                unit: element.get("unit").map(String::from),
+            };
+        }
         let items = element.list("Enumeration").filter(|child| child.name == "Item");
         SimpleType {
             items: items.map(|item| self.item(item)).collect(),
@@ -268,6 +381,13 @@ impl Reader {
             causality: element.get("causality").unwrap_or("local").into(),
             variability: element.get("variability").unwrap_or_default().into(),
             description: element.get("description").unwrap_or_default().into(),
+            intermediate: false,
+            c_type: match typed.map_or(Type::Real, |(kind, _)| kind) {
+                Type::Integer | Type::Enumeration => CType::Int32,
+                Type::Boolean => CType::Boolean,
+                Type::String => CType::String,
+                _ => CType::Float64,
+            },
             kind: typed.map_or(Type::Real, |(kind, _)| kind),
             attributes: Attributes {
                 start: of("start"),
@@ -279,6 +399,124 @@ impl Reader {
             },
         }
     }
+
+    /// A variable of FMI 3.0 and its aliases; all its elements if it is an array.
+    fn variables3(&mut self, root: &Element, to: &mut ModelDescription) {
+        let sizes: BTreeMap<&str, u64> = root
+            .list("ModelVariables")
+            .filter_map(|e| Some((e.get("valueReference")?, e.get("start")?.trim().parse().ok()?)))
+            .collect();
+        let references = root.list("ModelVariables").filter_map(|e| e.get("valueReference"));
+        let references = references.filter_map(|r| r.trim().parse::<u32>().ok());
+        let mut next = references.max().map_or(Some(0), |last| last.checked_add(1));
+        for element in root.list("ModelVariables") {
+            let Some((c_type, kind)) = CType::of_element(&element.name) else {
+                self.problem(element, "there is no such type");
+                continue;
+            };
+            let of = |name: &str| element.get(name).map(String::from);
+            let starts: Vec<String> = match c_type {
+                CType::String | CType::Binary => {
+                    let starts = element.children.iter().filter(|child| child.name == "Start");
+                    starts.map(|start| start.get("value").unwrap_or_default().into()).collect()
+                }
+                _ => of("start")
+                    .iter()
+                    .flat_map(|s| s.split_whitespace())
+                    .map(String::from)
+                    .collect(),
+            };
+            let variability = element.get("variability").map(String::from).unwrap_or_else(|| {
+                let is_parameter = element
+                    .get("causality")
+                    .is_some_and(|c| c.to_lowercase().ends_with("parameter"));
+                match (is_parameter, kind) {
+                    (true, _) => "fixed".into(),
+                    (false, Type::Real) => "continuous".into(),
+                    (false, _) => "discrete".into(),
+                }
+            });
+            let variable = Variable {
+                name: self.must(element, "name", |n| (n.len() <= LONGEST_NAME).then(|| n.into())),
+                reference: self.must(element, "valueReference", |text| text.trim().parse().ok()),
+                causality: element.get("causality").unwrap_or("local").into(),
+                variability,
+                description: element.get("description").unwrap_or_default().into(),
+                intermediate: element.flag("intermediateUpdate"),
+                c_type,
+                kind,
+                attributes: Attributes {
+                    start: starts.first().cloned(),
+                    unit: of("unit"),
+                    display_unit: of("displayUnit"),
+                    min: of("min"),
+                    max: of("max"),
+                    declared_type: of("declaredType"),
+                },
+            };
+            let mut dimensions = Vec::new();
+            for dimension in element.children.iter().filter(|child| child.name == "Dimension") {
+                let size = match (dimension.get("start"), dimension.get("valueReference")) {
+                    (Some(start), _) => start.trim().parse().ok(),
+                    (None, Some(reference)) => sizes.get(reference).copied(),
+                    (None, None) => None,
+                };
+                match size {
+                    Some(size) => dimensions.push(size as usize),
+                    None => self.problem(dimension, "its size is not known"),
+                }
+            }
+            if dimensions.is_empty() {
+                for alias in element.children.iter().filter(|child| child.name == "Alias") {
+                    let name = self.text(alias, "name");
+                    let description = alias.get("description").unwrap_or_default().into();
+                    let mut other = Variable { name, description, ..variable.clone() };
+                    // it is set and recorded by its first name
+                    other.causality = "local".into();
+                    let shown = alias.get("displayUnit").map(String::from);
+                    other.attributes.display_unit = shown.or(other.attributes.display_unit);
+                    to.variables.push(other);
+                }
+                let at = to.variables.len()
+                    - element.children.iter().filter(|c| c.name == "Alias").count();
+                to.variables.insert(at, variable);
+                continue;
+            }
+            let length = dimensions.iter().try_fold(1usize, |n, size| n.checked_mul(*size));
+            let Some(length) = length.filter(|n| to.elements.len() + n <= MOST_ELEMENTS) else {
+                self.problem(
+                    element,
+                    &format!("with it the arrays have more than {MOST_ELEMENTS} elements together"),
+                );
+                continue;
+            };
+            for index in 0..length {
+                let Some(own) = next else {
+                    self.problem(element, "no value references are left for its elements");
+                    break;
+                };
+                next = own.checked_add(1);
+                let mut one = variable.clone();
+                one.name = format!("{}[{}]", variable.name, indices(index, &dimensions));
+                one.reference = own;
+                one.attributes.start = starts.get(index).or(starts.first()).cloned();
+                to.elements.insert(own, ArrayElement { array: variable.reference, index });
+                to.variables.push(one);
+            }
+            to.arrays.insert(variable.reference, Array { length, c_type, start: starts });
+        }
+    }
+}
+
+/// Indices from 1, with commas between, of an element counted from 0, by rows.
+fn indices(mut index: usize, dimensions: &[usize]) -> String {
+    let mut all = Vec::new();
+    for size in dimensions.iter().rev() {
+        all.push((index % size + 1).to_string());
+        index /= size;
+    }
+    all.reverse();
+    all.join(",")
 }
 
 /// Bytes that the name of a variable may have.
@@ -286,6 +524,8 @@ const LONGEST_NAME: usize = 1024;
 /// Types that a description may have, and items of one: what a variable is declared as is looked up
 /// among all of them.
 const MOST_TYPES: usize = 5000;
+/// Elements that all arrays of an FMU may have together.
+const MOST_ELEMENTS: usize = 100_000;
 /// What is missing is named so many times.
 const NAMED: usize = 20;
 
@@ -312,30 +552,55 @@ impl ModelDescription {
         Ok(description)
     }
 
-    /// Fails unless it is of FMI 2.0.
+    /// Fails unless it is of FMI 2.0 or 3.
     pub fn check_version(&self) -> Result<()> {
         let version = short(&self.fmi_version).replace('"', "");
-        ensure!(self.fmi_version == "2.0", "it is of FMI version {version}; this host drives 2.0");
+        ensure!(
+            self.fmi_version == "2.0" || self.is_fmi3(),
+            "it is of FMI version {version}; this host drives 2.0 and 3.0"
+        );
         Ok(())
+    }
+
+    /// Whether it is of FMI 3.
+    pub fn is_fmi3(&self) -> bool {
+        self.fmi_version.starts_with("3.")
+    }
+
+    /// Where an element of an array is, by its variable's reference; none for a variable that is no element.
+    pub fn element(&self, reference: u32) -> Option<ArrayElement> {
+        self.elements.get(&reference).copied()
+    }
+
+    /// Whether there are arrays.
+    pub fn has_arrays(&self) -> bool {
+        !self.arrays.is_empty()
+    }
+
+    /// The array of that value reference.
+    pub fn array(&self, reference: u32) -> Option<&Array> {
+        self.arrays.get(&reference)
     }
 
     /// Reads the XML text.
     ///
     /// # Errors
-    /// If it is not well-formed, of FMI 1 or 3, or without what a host needs; what is missing is
-    /// named.
+    /// If it is not well-formed, of FMI 1, or without what a host needs; what is missing is named.
     pub fn from_xml(text: &str) -> Result<Self> {
         let root = Element::parse(text.as_bytes())
             .map_err(|why| anyhow!("modelDescription.xml, line and column {why}"))?;
         // what other versions have is not missing here
-        if let Some(version) = root.get("fmiVersion").filter(|version| !version.starts_with("2.")) {
+        let version = root.get("fmiVersion").unwrap_or("2.0");
+        let is_fmi3 = version.starts_with("3.");
+        if !is_fmi3 && !version.starts_with("2.") {
             let version = short(version).replace('"', "");
-            bail!("it is of FMI version {version}; this host drives 2.0");
+            bail!("it is of FMI version {version}; this host drives 2.0 and 3.0");
         }
-        let mut reader = Reader::default();
+        let mut reader = Reader { is_fmi3, ..Reader::default() };
         for list in root.children.iter().filter(|child| child.name == "TypeDefinitions") {
             let enumerations = list.children.iter().flat_map(|simple| &simple.children);
             let counts = enumerations.map(|of| of.children.len()).chain([list.children.len()]);
+            let counts = counts.chain(list.children.iter().map(|of| of.children.len()));
             if let Some(count) = counts.max().filter(|count| *count > MOST_TYPES) {
                 bail!(
                     "modelDescription.xml: {count} types, or items of one (allowed: {MOST_TYPES})"
@@ -343,10 +608,10 @@ impl ModelDescription {
             }
         }
         let optional = |name: &str| root.get(name).unwrap_or_default().to_string();
-        let description = ModelDescription {
+        let mut description = ModelDescription {
             fmi_version: reader.text(&root, "fmiVersion"),
             model_name: reader.text(&root, "modelName"),
-            guid: reader.text(&root, "guid"),
+            guid: reader.text(&root, if is_fmi3 { "instantiationToken" } else { "guid" }),
             version: optional("version"),
             description: optional("description"),
             generation_tool: optional("generationTool"),
@@ -363,9 +628,17 @@ impl ModelDescription {
                     step_size: element.number("stepSize"),
                 },
             },
-            variables: root.list("ModelVariables").map(|e| reader.variable(e)).collect(),
+            variables: Vec::new(),
+            arrays: BTreeMap::new(),
+            elements: BTreeMap::new(),
         };
-        let Reader { mut problems, more } = reader;
+        if is_fmi3 {
+            reader.variables3(&root, &mut description);
+        } else {
+            let variables = root.list("ModelVariables").map(|e| reader.variable(e));
+            description.variables = variables.collect();
+        }
+        let Reader { mut problems, more, .. } = reader;
         problems.extend((more > 0).then(|| format!("and {more} more like these")));
         ensure!(problems.is_empty(), "modelDescription.xml: {}", problems.join("; "));
         Ok(description)
@@ -438,17 +711,25 @@ impl ModelDescription {
         let text = text.trim();
         match variable.kind() {
             Type::Real => self.real(variable, text).map(Value::Real),
-            Type::Integer => text
-                .parse()
-                .map(Value::Integer)
-                .ok()
-                .with_context(|| format!("{name} expects a whole number, not \"{text}\"")),
+            Type::Integer => {
+                let (least, most) = variable.c_type.whole().unwrap_or((i64::MIN, i64::MAX));
+                let number = text.parse().ok().filter(|n| (least..=most).contains(n));
+                number.map(Value::Integer).with_context(|| match text.parse::<f64>() {
+                    Ok(x) if x.fract() == 0.0 => {
+                        format!("{name} expects a whole number from {least} to {most}, not {text}")
+                    }
+                    _ => format!("{name} expects a whole number, not \"{text}\""),
+                })
+            }
             Type::Boolean => match text {
                 "true" | "1" => Ok(Value::Boolean(true)),
                 "false" | "0" => Ok(Value::Boolean(false)),
                 _ => bail!("{name} expects true or false, not \"{text}\""),
             },
             Type::String => Ok(Value::String(text.into())),
+            Type::Binary | Type::Clock => {
+                bail!("{name} is a {:?}, of which this host exchanges no values", variable.kind)
+            }
             Type::Enumeration => {
                 let items = self.items(variable);
                 items
@@ -556,6 +837,60 @@ mod tests {
         {
             assert!(error.contains(words), "{words}: {error}");
         }
+    }
+
+    const XML3: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="M" instantiationToken="{2}">
+  <CoSimulation modelIdentifier="M" providesIntermediateUpdate="true"/>
+  <UnitDefinitions><Unit name="rad"><BaseUnit rad="1"/><DisplayUnit name="deg" factor="57.3"/></Unit></UnitDefinitions>
+  <TypeDefinitions><Float64Type name="Angle" unit="rad"/><EnumerationType name="Model"><Item name="frozen" value="1"/><Item name="linear" value="2"/></EnumerationType></TypeDefinitions>
+  <ModelVariables>
+    <UInt64 name="n" valueReference="7" causality="structuralParameter" start="2"/>
+    <Float64 name="a" valueReference="2" causality="input" declaredType="Angle" start="1 2 3 4 5 6" intermediateUpdate="true"><Dimension start="3"/><Dimension valueReference="7"/></Float64>
+    <Float64 name="y" valueReference="3" causality="output"><Alias name="z" displayUnit="deg"/></Float64>
+    <Enumeration name="model" valueReference="4" causality="parameter" declaredType="Model" start="2"/>
+    <UInt8 name="small" valueReference="5" causality="parameter" start="2"/>
+    <String name="text" valueReference="6" causality="parameter"><Start value="one word"/></String>
+  </ModelVariables>
+  <ModelStructure/>
+</fmiModelDescription>"#;
+
+    #[test]
+    fn arrays_of_fmi_3_are_read_as_their_elements_by_rows() {
+        let d = ModelDescription::from_xml(XML3).unwrap();
+        let elements = d.variables.iter().filter(|v| v.causality == "input");
+        let elements: Vec<_> =
+            elements.map(|v| (v.name.as_str(), v.attributes().start.as_deref().unwrap())).collect();
+        let all = [("a[1,1]", "1"), ("a[1,2]", "2"), ("a[2,1]", "3"), ("a[2,2]", "4")];
+        assert_eq!(elements[..4], all);
+        let last = d.variable("a[3,2]").unwrap();
+        assert_eq!(d.element(last.reference), Some(ArrayElement { array: 2, index: 5 }));
+        assert!(!d.variables.iter().any(|v| v.name != "a[3,2]" && v.reference == last.reference));
+        assert_eq!(d.array(2).unwrap().length, 6);
+        assert_eq!((d.unit(last), last.intermediate), ("rad", true));
+    }
+
+    #[test]
+    fn an_alias_of_fmi_3_is_the_same_value_by_another_name_and_no_second_output() {
+        let d = ModelDescription::from_xml(XML3).unwrap();
+        let (y, z) = (d.variable("y").unwrap(), d.variable("z").unwrap());
+        assert_eq!((y.reference, y.causality.as_str()), (z.reference, "output"));
+        assert_eq!(
+            (z.causality.as_str(), z.attributes().display_unit.as_deref()),
+            ("local", Some("deg"))
+        );
+    }
+
+    #[test]
+    fn a_whole_number_of_fmi_3_must_fit_its_type() {
+        let d = ModelDescription::from_xml(XML3).unwrap();
+        let small = d.variable("small").unwrap();
+        assert_eq!(d.value(small, "255").unwrap(), Value::Integer(255));
+        let why = d.value(small, "256").unwrap_err().to_string();
+        assert_eq!(why, "small expects a whole number from 0 to 255, not 256");
+        assert_eq!(d.value(d.variable("model").unwrap(), "frozen").unwrap(), Value::Integer(1));
+        assert_eq!(d.variable("text").unwrap().attributes().start.as_deref(), Some("one word"));
+        assert_eq!(d.variable("n").unwrap().variability, "fixed");
     }
 
     #[test]

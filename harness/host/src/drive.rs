@@ -1,15 +1,15 @@
-//! A run by Co-Simulation: Real inputs set at every communication point, with the slopes that they have
+//! A run by Co-Simulation of either version of FMI: Real inputs set at every communication point, with the slopes that they have
 //! until the next.
 
 use anyhow::{Context, Result};
 
+use crate::c_abi::Called;
 use crate::description::ModelDescription;
-use crate::fmi2::{Called, Instance};
+use crate::fmu::Instance;
 
 /// The Real inputs that a host drives.
 pub struct Inputs {
     references: Vec<u32>,
-    orders: Vec<i32>,
     /// The FMU is told slopes.
     sloped: bool,
 }
@@ -30,11 +30,7 @@ impl Inputs {
             names.iter().map(|name| Ok(description.variable(name)?.reference)).collect();
         let interpolates =
             description.co_simulation.as_ref().is_some_and(|cs| cs.can_interpolate_inputs);
-        Ok(Inputs {
-            references: references?,
-            orders: vec![1; names.len()],
-            sloped: !hold && interpolates && !names.is_empty(),
-        })
+        Ok(Inputs { references: references?, sloped: !hold && interpolates && !names.is_empty() })
     }
 
     /// Takes an instance whose start values are set through its initialisation, with the inputs' first
@@ -47,8 +43,7 @@ impl Inputs {
         stop: Option<f64>,
         values: &[f64],
     ) -> Called {
-        instance.setup_experiment(tolerance, start, stop)?;
-        instance.enter_initialization_mode()?;
+        instance.enter_initialization_mode(tolerance, start, stop)?;
         self.set(instance, values)?;
         instance.exit_initialization_mode()
     }
@@ -90,9 +85,9 @@ impl Inputs {
         slopes: &[f64],
     ) -> Called {
         self.set(instance, values)?;
-        if self.sloped {
-            instance.set_real_input_derivatives(&self.references, &self.orders, slopes)?;
+        match self.sloped {
+            true => instance.do_step_along(from, to - from, &self.references, values, slopes),
+            false => instance.do_step(from, to - from),
         }
-        instance.do_step(from, to - from)
     }
 }

@@ -2,7 +2,7 @@
 //! and turns the 34 C functions of co-simulation into safe calls whose errors carry
 //! the FMU's own words; those of model exchange too, where the FMU has them.
 //!
-//! Unsafe code of the harness is here and in `harness/batch/src/abi.rs` (`tests/architecture.rs`).
+//! Unsafe code of the harness is here, in `c_abi.rs`, `fmi3.rs` and `harness/batch/src/abi.rs` (`tests/architecture.rs`).
 #![allow(unsafe_code)]
 
 use std::cell::Cell;
@@ -10,15 +10,15 @@ use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 use std::ptr::{null, null_mut};
-use std::sync::Mutex;
 
 use anyhow::{Context, Result, bail};
 use libloading::Library;
 
 use crate::archive::Archive;
-use crate::description::{ModelDescription, Type, Value};
-use crate::guard::{self, Calls};
-use crate::output::sha256;
+use crate::c_abi::{self, Loaded, Sink, functions};
+pub use crate::c_abi::{CallError, Called, HostState, Message, Status};
+use crate::description::{ModelDescription, Type, Value, Variable};
+use crate::guard::Calls;
 use crate::temporary;
 
 pub mod guarded;
@@ -45,73 +45,6 @@ pub const PLATFORM: &str = if cfg!(all(target_os = "windows", target_arch = "aar
 type Component = *mut c_void;
 type State = *mut c_void;
 
-/// `fmi2Status`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Status {
-    /// All well.
-    Ok,
-    /// All well, but look at the message.
-    Warning,
-    /// The step was not done.
-    Discard,
-    /// The call failed; the instance lives on.
-    Error,
-    /// All instances of the FMU are lost.
-    Fatal,
-    /// The step goes on in the background.
-    Pending,
-}
-
-impl From<c_int> for Status {
-    fn from(status: c_int) -> Self {
-        match status {
-            0 => Status::Ok,
-            1 => Status::Warning,
-            2 => Status::Discard,
-            3 => Status::Error,
-            5 => Status::Pending,
-            _ => Status::Fatal,
-        }
-    }
-}
-
-/// The environment handed to the logger: the shim in `logger.c` calls `write`.
-#[repr(C)]
-struct Sink {
-    write: extern "C" fn(*mut Sink, c_int, *const c_char, *const c_char),
-    messages: Mutex<Vec<Message>>,
-}
-
-/// One message of the FMU's logger.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Message {
-    /// How bad it is.
-    pub status: Status,
-    /// Log category, as in modelDescription.xml.
-    pub category: String,
-    /// The text.
-    pub text: String,
-}
-
-/// Messages kept per instance; a chatty FMU shall not eat the memory.
-const MESSAGES_KEPT: usize = 1000;
-
-extern "C" fn write(sink: *mut Sink, status: c_int, category: *const c_char, text: *const c_char) {
-    // SAFETY: the shim passes on the environment given to fmi2Instantiate, which the instance
-    // keeps alive, and two strings that it terminated itself or got from the FMU.
-    let (sink, category, text) =
-        unsafe { (&*sink, CStr::from_ptr(category), CStr::from_ptr(text)) };
-    let message = Message {
-        status: status.into(),
-        category: category.to_string_lossy().into_owned(),
-        text: text.to_string_lossy().into_owned(),
-    };
-    let mut messages = sink.messages.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-    if messages.len() < MESSAGES_KEPT {
-        messages.push(message);
-    }
-}
-
 unsafe extern "C" {
     fn hubslosh_logger(
         environment: *mut c_void,
@@ -121,9 +54,6 @@ unsafe extern "C" {
         format: *const c_char,
         ...
     );
-    fn hubslosh_float_control() -> u32;
-    fn hubslosh_locale() -> *const c_char;
-    fn hubslosh_signal_handlers() -> u64;
     fn calloc(count: usize, size: usize) -> *mut c_void;
     fn free(memory: *mut c_void);
 }
@@ -148,24 +78,6 @@ type Get<T> = unsafe extern "C" fn(Component, Refs, usize, *mut T) -> c_int;
 type Set<T> = unsafe extern "C" fn(Component, Refs, usize, *const T) -> c_int;
 type GetVector = unsafe extern "C" fn(Component, *mut Real, usize) -> c_int;
 type GetStatus<T> = unsafe extern "C" fn(Component, c_int, *mut T) -> c_int;
-
-/// Declares a table of C functions once: field, symbol, type.
-macro_rules! functions {
-    ($table:ident: $($field:ident $symbol:literal $type:ty;)*) => {
-        struct $table { $($field: $type,)* }
-
-        impl $table {
-            /// Names of all the functions.
-            const SYMBOLS: &[&str] = &[$($symbol),*];
-
-            /// # Safety
-            /// The library must be an FMI 2.0 binary: the types are taken on trust.
-            unsafe fn load(library: &Library) -> Result<Self, libloading::Error> {
-                Ok($table { $($field: *unsafe { library.get::<$type>($symbol)? },)* })
-            }
-        }
-    };
-}
 
 // What every FMU must export.
 functions! { Functions:
@@ -234,60 +146,6 @@ pub struct EventInfo {
     pub values_changed: c_int,
     pub next_event_time_defined: c_int,
     pub next_event_time: f64,
-}
-
-/// What of this process an FMU shares with its host and must leave as it is.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct HostState {
-    /// Rounding mode, exception masks and flushing of small numbers.
-    pub float_control: u32,
-    /// The C library's locale.
-    pub locale: String,
-    /// A fingerprint of the signal handlers; 0 where there are none.
-    pub signal_handlers: u64,
-    /// The working directory.
-    pub directory: Option<PathBuf>,
-}
-
-impl HostState {
-    /// As it is now.
-    pub fn now() -> Self {
-        // SAFETY: the three take nothing; the locale's name is a terminated string of the C
-        // library.
-        unsafe {
-            HostState {
-                float_control: hubslosh_float_control(),
-                locale: CStr::from_ptr(hubslosh_locale()).to_string_lossy().into_owned(),
-                signal_handlers: hubslosh_signal_handlers(),
-                directory: std::env::current_dir().ok(),
-            }
-        }
-    }
-
-    /// What is other now.
-    fn changed(&self) -> Vec<&'static str> {
-        let now = HostState::now();
-        let parts = [
-            (
-                "floating-point control (rounding, flushing, traps)",
-                self.float_control == now.float_control,
-            ),
-            ("locale", self.locale == now.locale),
-            ("signal handlers", self.signal_handlers == now.signal_handlers),
-            ("working directory", self.directory == now.directory),
-        ];
-        parts.into_iter().filter(|(_, same)| !same).map(|(part, _)| part).collect()
-    }
-}
-
-/// All files below a folder; none if it cannot be read.
-fn files_below(folder: &Path) -> Vec<PathBuf> {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let below = entries.flat_map(|entry| match entry.path() {
-        path if path.is_dir() => files_below(&path),
-        path => vec![path],
-    });
-    below.collect()
 }
 
 // ---------------------------------------------------------------- the FMU
@@ -367,43 +225,15 @@ impl Fmu {
         };
         let identifier = identifier
             .with_context(|| format!("{name} offers neither co-simulation nor model exchange"))?;
-        // a library outside the archive is not the FMU's
-        if identifier.contains(['/', '\\', ':', '\0']) {
-            bail!(
-                "{name} cannot be used: modelIdentifier {identifier:?} leads out of the folder of its \
-                 binary (allowed: letters, digits, underscores)"
-            );
-        }
-        let binary = format!("binaries/{PLATFORM}/{identifier}{}", std::env::consts::DLL_SUFFIX);
-        let binary_path = directory.join(&binary);
-        if !binary_path.exists() {
-            let mut there = files_below(&directory.join("binaries"))
-                .iter()
-                .filter_map(|file| file.strip_prefix(directory).ok())
-                .map(|file| file.display().to_string())
-                .collect::<Vec<_>>();
-            there.sort();
-            let there = if there.is_empty() { "none".into() } else { there.join(", ") };
-            bail!("{name} has no binary for this platform, {binary} (binaries in it: {there})");
-        }
-        let bytes = std::fs::read(&binary_path)
-            .with_context(|| format!("{binary} in {name} cannot be read"))?;
-        let binary_hash = sha256(&bytes);
-        guard::before_loading();
-        let (before, calls) = (HostState::now(), Calls::one());
-        // SAFETY: loading runs the library's initialisers; that is what opening an FMU means.
-        let library = unsafe { Library::new(&binary_path) }
-            .with_context(|| format!("{binary} in {name} cannot be loaded"))?;
-        drop(calls);
-        let changed = before.changed();
+        let Loaded { library, hash, changed, binary } =
+            c_abi::load(directory, path, PLATFORM, identifier)?;
         let mut needed = Functions::SYMBOLS.to_vec();
         if stepping == Some(identifier) {
             needed.extend(StepFunctions::SYMBOLS);
         }
-        // SAFETY: only asked whether the symbol is there.
-        needed.retain(|symbol| unsafe { library.get::<*const c_void>(*symbol) }.is_err());
-        if !needed.is_empty() {
-            bail!("{binary} in {name} lacks {}", needed.join(", "));
+        let lacking = c_abi::lacking(&library, &needed);
+        if !lacking.is_empty() {
+            bail!("{binary} in {name} lacks {}", lacking.join(", "));
         }
         // SAFETY: the binary says it follows FMI 2.0, whose types are declared above.
         let functions = unsafe { Functions::load(&library) }
@@ -418,7 +248,7 @@ impl Fmu {
             exchange,
             resources: format!("file://{}/resources", directory.display()),
             hash: String::new(),
-            binary_hash,
+            binary_hash: hash,
             path: path.to_path_buf(),
             changed,
             library: Some(library),
@@ -518,7 +348,7 @@ impl Fmu {
         let (name, guid, resources) =
             (c_string(with.name), c_string(with.guid), c_string(with.resources));
         let pointer = |text: &Option<CString>| text.as_ref().map_or(null(), |t| t.as_ptr());
-        let sink = Box::into_raw(Box::new(Sink { write, messages: Mutex::default() }));
+        let sink = Box::into_raw(Box::new(Sink::new()));
         let full = matches!(with.callbacks, Callbacks::Full | Callbacks::Fleeting);
         let logs = full || with.callbacks == Callbacks::Logger;
         let callbacks = Box::into_raw(Box::new(CallbackFunctions {
@@ -690,41 +520,6 @@ pub enum Callbacks {
     Null,
 }
 
-/// A call that did not succeed: which, how, and what the FMU said.
-#[derive(Clone, Debug)]
-pub struct CallError {
-    /// The C function.
-    pub call: &'static str,
-    /// What it returned (fmi2Instantiate, which returns NULL: `Error`).
-    pub status: Status,
-    /// What the FMU logged during the call.
-    pub messages: Vec<Message>,
-}
-
-impl CallError {
-    /// What the FMU logged, in one line.
-    pub fn text(&self) -> String {
-        let prefix = format!("{}: ", self.call); // the FMU may name the call as well; once will do
-        let text = |m: &Message| m.text.trim().trim_start_matches(&prefix).to_string();
-        self.messages.iter().map(text).collect::<Vec<_>>().join("; ")
-    }
-}
-
-impl std::fmt::Display for CallError {
-    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        match (self.call, self.status) {
-            ("fmi2Instantiate", _) => write!(f, "fmi2Instantiate gave no instance")?,
-            (call, status) => write!(f, "{call} returned fmi2{status:?}")?,
-        }
-        match self.text() {
-            text if text.is_empty() => write!(f, " without a message"),
-            text => write!(f, ": {text}"),
-        }
-    }
-}
-
-impl std::error::Error for CallError {}
-
 // ---------------------------------------------------------------- an instance
 
 /// One instance of the FMU; freed when dropped. Belongs to the thread that made it.
@@ -756,9 +551,6 @@ impl Drop for Instance<'_> {
 /// be given back to it with [`Instance::free_state`]; otherwise its memory is lost.
 pub struct FmuState(State);
 
-/// Result of a call.
-pub type Called<T = ()> = Result<T, CallError>;
-
 impl<'fmu> Instance<'fmu> {
     /// The FMU it is an instance of.
     pub fn fmu(&self) -> &'fmu Fmu {
@@ -768,8 +560,7 @@ impl<'fmu> Instance<'fmu> {
     /// Everything logged since the last time somebody asked.
     pub fn take_messages(&self) -> Vec<Message> {
         // SAFETY: the sink lives as long as the instance.
-        let sink = unsafe { &*self.sink };
-        std::mem::take(&mut *sink.messages.lock().unwrap_or_else(|poisoned| poisoned.into_inner()))
+        unsafe { &*self.sink }.take()
     }
 
     /// What the FMU has warned of, of everything logged since the last time somebody asked.
@@ -1043,7 +834,11 @@ impl<'fmu> Instance<'fmu> {
 
     /// The value of a variable.
     pub fn get(&mut self, name: &str) -> Result<Value> {
-        let variable = self.fmu.description.variable(name)?;
+        Ok(self.value(self.fmu.description.variable(name)?)?)
+    }
+
+    /// The value of a variable of the description.
+    pub fn value(&mut self, variable: &Variable) -> Called<Value> {
         let reference = [variable.reference];
         Ok(match variable.kind() {
             Type::Real => {
@@ -1054,15 +849,30 @@ impl<'fmu> Instance<'fmu> {
             Type::Integer | Type::Enumeration => {
                 let mut value = [0];
                 self.get_integer(&reference, &mut value)?;
-                Value::Integer(value[0])
+                Value::Integer(value[0].into())
             }
             Type::Boolean => {
                 let mut value = [0];
                 self.get_boolean(&reference, &mut value)?;
                 Value::Boolean(value[0] != 0)
             }
-            Type::String => Value::String(self.get_string(&reference)?.remove(0)),
+            // FMI 2.0 has no Binary and no Clock
+            Type::String | Type::Binary | Type::Clock => {
+                Value::String(self.get_string(&reference)?.remove(0))
+            }
         })
+    }
+
+    /// Sets a variable of the description.
+    pub fn set_value(&mut self, variable: &Variable, value: Value) -> Called {
+        let reference = [variable.reference];
+        match value {
+            Value::Real(value) => self.set_real(&reference, &[value]),
+            // read within 32 bits: `ModelDescription::value`
+            Value::Integer(value) => self.set_integer(&reference, &[value as i32]),
+            Value::Boolean(value) => self.set_boolean(&reference, &[value.into()]),
+            Value::String(value) => self.set_string(&reference, &[&value]),
+        }
     }
 
     /// The value of a real variable.
@@ -1078,14 +888,8 @@ impl<'fmu> Instance<'fmu> {
     pub fn set(&mut self, name: &str, text: &str) -> Result<()> {
         let description = &self.fmu.description;
         let variable = description.variable(name)?;
-        let reference = [variable.reference];
-        match description.value(variable, text)? {
-            Value::Real(value) => self.set_real(&reference, &[value]),
-            Value::Integer(value) => self.set_integer(&reference, &[value]),
-            Value::Boolean(value) => self.set_boolean(&reference, &[value.into()]),
-            Value::String(value) => self.set_string(&reference, &[&value]),
-        }
-        .with_context(|| format!("{name}={text} was refused"))
+        let value = description.value(variable, text)?;
+        self.set_value(variable, value).with_context(|| format!("{name}={text} was refused"))
     }
 
     // ------------------------------------------------ snapshots

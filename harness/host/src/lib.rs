@@ -8,9 +8,12 @@
 pub mod archive;
 pub mod binary;
 pub mod budget;
+pub mod c_abi;
 pub mod description;
 pub mod drive;
 pub mod fmi2;
+pub mod fmi3;
+pub mod fmu;
 pub mod guard;
 pub mod output;
 pub mod temporary;

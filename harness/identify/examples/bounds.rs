@@ -7,7 +7,7 @@
 
 use analysis::gauss_markov::Noise;
 use anyhow::Result;
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use identify::fit::{Differences, Problem};
 use identify::recording::Recording;
 use identify::simulate::{Intersample, Setup};

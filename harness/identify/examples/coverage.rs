@@ -26,7 +26,7 @@ use std::collections::BTreeMap;
 
 use analysis::innovations::Tests;
 use anyhow::{Context, Result, bail};
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use identify::methods::output_error::{Identification, identify};
 use identify::nominal::COARSEST;
 use identify::options::Options;

@@ -1,7 +1,7 @@
 //! One model that may explain the recordings: a slosh model with a friction law, fitted.
 
 use anyhow::{Result, ensure};
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use nalgebra::DMatrix;
 use serde::Serialize;
 

@@ -8,7 +8,7 @@ use analysis::random::Random;
 use analysis::statistics::peak;
 use anyhow::{Result, ensure};
 use host::budget;
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use nalgebra::Matrix5;
 
 use crate::fit::Problem;

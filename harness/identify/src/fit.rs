@@ -33,7 +33,7 @@
 use std::cell::{Cell, RefCell};
 
 use anyhow::{Context, Result};
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 

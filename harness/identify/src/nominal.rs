@@ -1,7 +1,7 @@
 //! The bench as the FMU is set up, before anything is estimated.
 
 use anyhow::{Result, ensure};
-use host::fmi2::{Fmu, Instance};
+use host::fmu::{Fmu, Instance};
 
 /// What is known of the bench without the recording.
 #[derive(Clone, Copy, Debug)]
@@ -62,8 +62,7 @@ pub fn initialised<'fmu>(fmu: &'fmu Fmu, settings: &[(String, String)]) -> Resul
         );
         instance.set(name, value)?;
     }
-    instance.setup_experiment(None, 0.0, None)?;
-    instance.enter_initialization_mode()?;
+    instance.enter_initialization_mode(None, 0.0, None)?;
     Ok(instance)
 }
 

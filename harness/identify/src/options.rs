@@ -1,7 +1,7 @@
 //! What is asked of an identification.
 
 use anyhow::Result;
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 
 use crate::nominal::Nominal;
 use crate::recording::Recording;

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use host::drive::Inputs;
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 
 use crate::recording::Recording;
 

@@ -7,7 +7,7 @@ use anyhow::{Result, bail, ensure};
 use experiments::profile::{Profile, Torque};
 use experiments::run::{Run, TORQUE};
 use host::drive::Inputs;
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 
 use crate::design::Multisine;
 use crate::recording::Recording;

@@ -1,7 +1,7 @@
 //! The methods other than the output-error fit, on recordings of the FMU itself.
 
 use experiments::profile::Torque;
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use identify::methods::acceleration::{self, Weights};
 use identify::recording::Recording;
 use identify::simulate::{Intersample, Setup};

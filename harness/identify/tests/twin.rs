@@ -1,7 +1,7 @@
 //! Recordings of the FMU itself, with its gyro's noise, identified without priors and starts.
 
 use experiments::profile::{Profile, Torque};
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use identify::fit::{Differences, Problem};
 use identify::methods::output_error::identify;
 use identify::nominal::COARSEST;

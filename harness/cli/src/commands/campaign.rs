@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail, ensure};
 use experiments::campaign::{Campaign, Folder};
 use experiments::plan::{self, Plan, Sweeps};
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use host::{budget, guard};
 
 use super::{DEFAULT_CAMPAIGN, DEFAULT_FMU, open, setting};

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Result, bail, ensure};
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use host::output::atomically;
 use identify::estimate::Estimated;
 use identify::methods::acceleration::{self, Acceleration, Weights};

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use signals::table::{self, Table};
 
 use crate::terminal;

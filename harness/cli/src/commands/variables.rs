@@ -123,7 +123,7 @@ fn row(description: &ModelDescription, variable: &Variable) -> [String; 6] {
     let items = description.items(variable);
     let text = |value: &Option<String>| value.clone().unwrap_or_default();
     let start = text(&attributes.start);
-    let number = start.trim().parse::<i32>().ok();
+    let number = start.trim().parse::<i64>().ok();
     let start = match items.iter().find(|item| Some(item.value) == number) {
         Some(item) => item.name.clone(),
         None => start,

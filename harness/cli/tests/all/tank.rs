@@ -117,7 +117,7 @@ fn parameters_of_the_six_axis_fmus_have_their_names() {
         let set: toml::Table = std::fs::read_to_string(set).unwrap().parse().unwrap();
         let text = std::fs::read_to_string(path("result.json")).unwrap();
         let result: serde_json::Value = serde_json::from_str(&text).unwrap();
-        let fmu = host::fmi2::Fmu::open(pack::packed_model_for_tests(pack::model(model).unwrap()))
+        let fmu = host::fmu::Fmu::open(pack::packed_model_for_tests(pack::model(model).unwrap()))
             .unwrap();
         for name in set.keys() {
             fmu.description().variable(name).unwrap();

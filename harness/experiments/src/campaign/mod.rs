@@ -22,7 +22,7 @@ use std::sync::{Mutex, PoisonError};
 use anyhow::{Result, anyhow};
 use host::budget;
 use host::description::{ModelDescription, Type, Value};
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use host::output::sha256;
 use rayon::prelude::*;
 use serde_json::json;
@@ -88,7 +88,9 @@ pub fn stored_columns(description: &ModelDescription, input: Option<&str>) -> Ve
     // and the slosh angles of an FMU in six axes, which are local variables
     let outputs =
         description.variables.iter().filter(|v| v.causality == "output" || is_slosh_angle(&v.name));
-    let outputs = outputs.filter(|v| v.kind() != Type::String).map(|v| v.name.clone());
+    let outputs = outputs
+        .filter(|v| !matches!(v.kind(), Type::String | Type::Binary | Type::Clock))
+        .map(|v| v.name.clone());
     ["time".to_string()].into_iter().chain(input.map(String::from)).chain(outputs).collect()
 }
 

@@ -5,8 +5,8 @@ use std::borrow::Cow;
 
 use anyhow::{Context, Result};
 use formulas::regime::Regime;
-use host::description::ModelDescription;
-use host::fmi2::Instance;
+use host::description::{ModelDescription, Value};
+use host::fmu::Instance;
 
 use super::Case;
 use crate::plan::RECORDING;
@@ -675,14 +675,13 @@ impl Range {
 fn item(instance: &mut Instance, name: &str, kind: &str) -> Result<Option<String>> {
     let description = instance.fmu().description();
     let Ok(variable) = description.variable(name) else { return Ok(None) };
-    let mut number = [0];
-    instance.get_integer(&[variable.reference], &mut number)?;
+    let mut number = instance.value(variable)?;
     if let Ok(kind) = description.variable(kind) {
-        let mut instead = [0];
-        instance.get_integer(&[kind.reference], &mut instead)?;
-        number = if instead[0] != 0 { instead } else { number };
+        let instead = instance.value(kind)?;
+        number = if instead != Value::Integer(0) { instead } else { number };
     }
-    let found = description.items(variable).iter().find(|item| item.value == number[0]);
+    let mut items = description.items(variable).iter();
+    let found = items.find(|item| Value::Integer(item.value) == number);
     Ok(found.map(|item| item.name.clone()))
 }
 

@@ -132,7 +132,7 @@ pub struct MadeFrom {
 
 impl MadeFrom {
     /// Of a run, and why it failed if it did.
-    pub fn of(case: &Case, failure: Option<&Failure>, fmu: &host::fmi2::Fmu) -> MadeFrom {
+    pub fn of(case: &Case, failure: Option<&Failure>, fmu: &host::fmu::Fmu) -> MadeFrom {
         let recording = case.recording.as_ref();
         let bytes = recording.and_then(|recording| std::fs::read(&recording.path).ok());
         MadeFrom {

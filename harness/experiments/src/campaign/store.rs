@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use host::description::Value;
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 
 use super::Case;
 use crate::run::Run;

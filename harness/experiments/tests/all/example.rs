@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use experiments::example::{self, EXAMPLES, Example};
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use pack::{packed_for_tests, packed_model_for_tests};
 use signals::table::Table;
 

@@ -2,7 +2,7 @@
 
 use analysis::allan::Noise;
 use experiments::gyro::Recording;
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use pack::packed_for_tests;
 
 fn recording(hours: f64, records: usize, settings: &[(&str, &str)]) -> Recording {

@@ -2,7 +2,7 @@
 
 use experiments::campaign::{Range, WAVE};
 use experiments::plan::{BUILT_IN, Case, Plan};
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use pack::packed_for_tests;
 use rayon::prelude::*;
 

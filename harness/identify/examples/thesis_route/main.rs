@@ -12,7 +12,7 @@
 //! The compensated way knows everything else exactly: the friction, the hub's inertia, and d, h and ζ as starts.
 
 use experiments::profile::Torque;
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use identify::methods::output_error::identify;
 use identify::nominal::Bench;
 use identify::options::Options;

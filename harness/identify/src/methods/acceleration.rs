@@ -23,7 +23,7 @@ use std::collections::BTreeMap;
 
 use analysis::statistics::{noise_level, peak};
 use anyhow::{Result, bail, ensure};
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 

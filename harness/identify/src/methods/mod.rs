@@ -11,7 +11,7 @@ mod page;
 use std::collections::BTreeMap;
 
 use anyhow::{Context, Result, bail};
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use serde::Serialize;
 
 use crate::estimate::Estimated;

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use anyhow::{Result, ensure};
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use experiments::campaign::{History, is_slosh_angle};
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use maud::html;
 
 use super::colors;

@@ -18,7 +18,7 @@ use analysis::BAND;
 use analysis::features::Features;
 use experiments::campaign::{Campaign, Results};
 use experiments::rounding::thousandths;
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use self::figure::{Figure, Figures};

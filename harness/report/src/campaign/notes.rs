@@ -7,7 +7,7 @@ use analysis::lengths::Lengths;
 use analysis::{BAND, demodulation};
 use experiments::campaign::{Campaign, Estimate, Results};
 use experiments::rounding::thousandths;
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use maud::{Markup, html};
 
 use super::page::{Group, Page, Varied, cm, hertz, sweep};

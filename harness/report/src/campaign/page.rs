@@ -7,7 +7,7 @@ use analysis::{BAND, FrequencyResponse, logarithmic_grid};
 use experiments::campaign::{Curve, Estimate, Outcome, Results};
 use experiments::plan::Plan;
 use experiments::profile::Torque;
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 
 /// Runs that differ in nothing but the number along which they are drawn (and what is drawn at
 /// random).
