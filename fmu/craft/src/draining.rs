@@ -24,6 +24,7 @@ use crate::contents::{
 use crate::motion::SCALE_TIME;
 use crate::outputs::{Now, TankNow};
 use crate::parameters::{Mount, Parameters, Tank};
+use crate::pivot::Pivot;
 use crate::rigid::{Factors, Mat6, Rigid};
 use crate::sizes::{MODES, TANKS};
 use crate::state::{INPUTS, Inputs, Line, STATES, State, index};
@@ -81,6 +82,7 @@ pub struct Draining {
     craft: Rigid,
     mount: Mount,
     gravity: Vec3,
+    pivot: Pivot,
     tanks: Vec<MountedTank>,
 }
 
@@ -149,6 +151,7 @@ impl Draining {
             craft: p.craft.rigid(),
             mount: p.mount,
             gravity: p.gravity,
+            pivot: if p.mount == Mount::Pivot { p.pivot } else { Pivot::default() },
             tanks: tanks.iter().map(|tank| MountedTank::new(&tank.resolve())).collect(),
         })
     }
@@ -234,6 +237,7 @@ impl Draining {
         &self,
         x: &[T; STATES],
         acting: &Acting<T>,
+        of_pivot: Vec3<T>,
         axes: &Mat3<T>,
     ) -> [Vec3<T>; 2] {
         let zero = constant::<T>([0.0; 3]);
@@ -247,7 +251,10 @@ impl Draining {
         });
         let [centripetal, gyroscopic] = whole.inertial_wrench(zero, w, zero);
         let force = sub(acting.force, centripetal);
-        let torque = sub(acting.torque, add(gyroscopic, cross(w, acting.h_wheels)));
+        let mut torque = sub(acting.torque, add(gyroscopic, cross(w, acting.h_wheels)));
+        if self.pivot.acts() {
+            torque = add(torque, of_pivot);
+        }
         self.solve(whole.mass_matrix(), [force, torque], axes)
     }
 
@@ -263,7 +270,8 @@ impl Draining {
         let axes = rotation(&q);
         let w = vec_of(x, index::OMEGA);
         let velocity = transposed_times(&axes, vec_of(x, index::VELOCITY));
-        let [a_rigid, w_d_rigid] = self.rigid_motion(x, acting, &axes);
+        let (of_pivot, by_pivot, _) = self.pivot.present(&axes, w);
+        let [a_rigid, w_d_rigid] = self.rigid_motion(x, acting, of_pivot, &axes);
         let contents: [Option<Contents<T>>; TANKS] = core::array::from_fn(|i| {
             let mounted = self.tanks.get(i)?;
             let liquid = x[index::LIQUID + i];
@@ -276,6 +284,9 @@ impl Draining {
         let [centripetal, gyroscopic] = rigid.inertial_wrench(zero, w, zero);
         let mut force = sub(acting.force, centripetal);
         let mut torque = sub(acting.torque, add(gyroscopic, cross(w, acting.h_wheels)));
+        if self.pivot.acts() {
+            torque = add(torque, of_pivot);
+        }
         let mut matrix = rigid.mass_matrix();
         for tank in all() {
             let [f, tau] = tank.loads();
@@ -298,7 +309,10 @@ impl Draining {
             put(index::VELOCITY, &times(&axes, a));
         }
         put(index::WORK, &[dot(acting.force, velocity) + dot(acting.torque, w)]);
-        let dissipation = all().fold(c(0.0), |sum, tank| sum + tank.dissipation);
+        let mut dissipation = all().fold(c(0.0), |sum, tank| sum + tank.dissipation);
+        if self.pivot.acts() {
+            dissipation = dissipation + by_pivot;
+        }
         put(index::DISSIPATED, &[dissipation]);
         let on_pivot = self.mount == Mount::Pivot;
         let mut drained = c(0.0);
@@ -325,6 +339,7 @@ impl Draining {
             h_wheels: acting.h_wheels,
             axes,
             mount: self.mount,
+            pivot: self.pivot,
             craft: self.craft,
             tanks,
         };

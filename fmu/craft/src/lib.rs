@@ -38,6 +38,7 @@ mod draining;
 mod motion;
 mod outputs;
 mod parameters;
+mod pivot;
 mod ranges;
 mod rigid;
 mod sizes;
@@ -49,6 +50,7 @@ mod table;
 pub use formulas::regime::Regime;
 pub use outputs::{Outputs, TankOutputs};
 pub use parameters::{Craft, DampingLaw, Inertia, Init, Mount, Parameters, Tank};
+pub use pivot::Pivot;
 pub use sizes::{MODES, POINTS, TANKS};
 pub use slosh_tank::{
     Coupling, SloshTank, SloshTankOutputs, TANK_INPUTS, TANK_STATES, TRIANGLE, TankInputs,

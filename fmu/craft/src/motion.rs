@@ -21,7 +21,8 @@
 //!
 //! so that they round by what they gain in a step, however fast and far the craft is.
 //!
-//! With O on a pivot a = -C^T g is given, a' = -w x a; the lower half of the system is left.
+//! With O on a pivot a = -C^T g is given, a' = -w x a; the lower half of the system is left, and tau has the pivot's
+//! torque (pivot.rs) from its axis Z = C^T e_z, Z' = -w x Z.
 //!
 //! Source: Newton-Euler about O with the bobs' pulls eliminated.
 
@@ -41,6 +42,7 @@ use taylor::vector::{
 
 use crate::bob::Bob;
 use crate::parameters::{Limits, Mount, Parameters, Tank};
+use crate::pivot::Pivot;
 use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod};
 use crate::state::{Inputs, STATES, State, index};
 
@@ -80,6 +82,10 @@ pub struct CraftMotion {
     pub inputs: Inputs,
     pub mount: Mount,
     gravity: Vec3,
+    pub pivot: Pivot,
+    /// Whether the craft is on a pivot with stiffness or damping, and Z.
+    on_springs: bool,
+    upright: Vector,
     /// The dry craft, the same with the rigid liquids, and each tank's rigid liquid.
     pub craft: Rigid,
     pub rigid: Rigid,
@@ -136,6 +142,9 @@ impl CraftMotion {
             inputs: Inputs::default(),
             mount: p.mount,
             gravity: p.gravity,
+            pivot: if p.mount == Mount::Pivot { p.pivot } else { Pivot::default() },
+            on_springs: p.mount == Mount::Pivot && p.pivot.acts(),
+            upright: ZERO_VECTOR,
             craft: p.craft.rigid(),
             rigid,
             mass_matrix,
@@ -282,6 +291,9 @@ impl CraftMotion {
             }
             Mount::Pivot => self.a[1] = vector::cross(self.a[0], turn),
         }
+        if self.on_springs {
+            self.upright[1] = vector::cross(self.upright[0], turn);
+        }
         for bob in &mut self.bobs {
             let at = index::bob(bob.tank, bob.mode);
             let [x, dx] = [x, dx].map(|x| x[at..at + 6].try_into().unwrap());
@@ -319,8 +331,15 @@ impl CraftMotion {
             ramp::<N>(&self.torque),
             add(gyroscopic(&self.rigid.inertia, ww), cross_ramp::<N>(&self.w, &self.h)),
         );
+        let mut dissipation = 0.0;
+        let mut of_pivot = [0.0; 3];
+        if self.on_springs {
+            (of_pivot, dissipation) = self.pivot.load::<N>(&self.upright, &self.w, ww);
+            torque = add(torque, of_pivot);
+            self.upright[N + 1] = next::<N>(cross::<N>(&self.upright, &self.w));
+        }
         if self.follows {
-            self.set_axial::<N>(ww);
+            self.set_axial::<N>(ww, of_pivot);
         }
         for bob in &mut self.bobs {
             let [f, tau] = bob.reaction::<N>(&self.w_both, &w2);
@@ -353,7 +372,6 @@ impl CraftMotion {
             Mount::Pivot => self.a[N + 1] = next::<N>(cross::<N>(&self.a, &self.w)),
         }
         self.w[N + 1] = next::<N>(w_d);
-        let mut dissipation = 0.0;
         for bob in &mut self.bobs {
             bob.accelerate::<N>(self.a[N], w_d);
             dissipation += bob.dissipation::<N>();
@@ -362,9 +380,9 @@ impl CraftMotion {
     }
 
     /// Coefficient N of the specific force along each tank at the hinges, e.(a + w' x P + w x (w x P)), of craft and
-    /// liquids as one rigid body. `ww` is that of w w^T.
+    /// liquids as one rigid body. `ww` is that of w w^T, `of_pivot` that of the pivot's torque.
     #[inline(never)]
-    fn set_axial<const N: usize>(&mut self, ww: [f64; 6]) {
+    fn set_axial<const N: usize>(&mut self, ww: [f64; 6], of_pivot: Vec3) {
         let (whole, w2) = (&self.whole, twice_crossed(ww));
         let gyroscopic = add(gyroscopic(&whole.inertia, ww), cross_ramp::<N>(&self.w, &self.h));
         let mut torque = sub(ramp::<N>(&self.torque), gyroscopic);
@@ -372,6 +390,9 @@ impl CraftMotion {
             Mount::Free => sub(ramp::<N>(&self.force), times(&w2, whole.moment)),
             Mount::Pivot => {
                 torque = sub(torque, vector::cross(whole.moment, self.a[N]));
+                if self.on_springs {
+                    torque = add(torque, of_pivot);
+                }
                 self.a[N]
             }
         };
@@ -424,6 +445,9 @@ impl Motion for CraftMotion {
         match self.mount {
             Mount::Free => self.drift[0] = transposed_times(&axes, part(x, index::VELOCITY)),
             Mount::Pivot => self.a[0] = scale(-1.0, transposed_times(&axes, self.gravity)),
+        }
+        if self.on_springs {
+            self.upright[0] = axes[2];
         }
         for bob in &mut self.bobs {
             let at = index::bob(bob.tank, bob.mode);

@@ -10,7 +10,8 @@
 //!
 //! m, S, I: dry craft and rigid liquids about O; sums over the bobs; r_c: centre of mass of
 //! everything from O; V in body axes. H is about r_c and does not contain V: after a long
-//! thrust nothing cancels. drained': `contents.rs`. On a pivot H is about O, and E has the potential a.S with all masses.
+//! thrust nothing cancels. drained': `contents.rs`. On a pivot H is about O, and E has the potential a.S with all masses
+//! and the pivot's U (`pivot.rs`).
 
 use taylor::number::Number;
 use taylor::vector::{
@@ -20,6 +21,7 @@ use taylor::vector::{
 use crate::bob::BobNow;
 use crate::motion::CraftMotion;
 use crate::parameters::Mount;
+use crate::pivot::Pivot;
 use crate::rigid::Rigid;
 use crate::sizes::{MODES, TANKS};
 use crate::state::{Ranges, STATES, index};
@@ -66,17 +68,19 @@ pub struct Outputs {
     pub slosh_force: Vec3,
     /// Torque of all liquids on the craft about O, N m, body axes.
     pub slosh_torque: Vec3,
+    /// Torque of the pivot's stiffness and damping on the craft, N m, body axes.
+    pub pivot_torque: Vec3,
     /// Momentum of everything, kg m/s, inertial axes.
     pub momentum: Vec3,
     /// Angular momentum of everything, wheels included, about the centre of mass of everything
     /// (on a pivot: about O), N m s, inertial axes.
     pub angular_momentum: Vec3,
     /// Kinetic energy, with the wheels as dead mass, and energy of the centring stiffness (on a
-    /// pivot: of gravity, too), J.
+    /// pivot: of gravity and of the pivot's stiffness, too), J.
     pub energy: f64,
     /// Work of force and torque since the start, J.
     pub work: f64,
-    /// Energy dissipated by the liquids since the start, J.
+    /// Energy dissipated by the liquids and the pivot since the start, J.
     pub dissipated: f64,
     /// Energy that has gone with the outflow since the start, J.
     pub drained: f64,
@@ -203,6 +207,8 @@ pub(crate) struct Now<T> {
     /// Body to inertial.
     pub axes: Mat3<T>,
     pub mount: Mount,
+    /// Without stiffness and damping on a free craft.
+    pub pivot: Pivot,
     /// The dry craft.
     pub craft: Rigid,
     pub tanks: [Option<TankNow<T>>; TANKS],
@@ -235,6 +241,7 @@ impl CraftMotion {
             h_wheels: of(&self.h),
             axes: rotation(&[0, 1, 2, 3].map(|i| T::of(q[i], dq[i]))),
             mount: self.mount,
+            pivot: self.pivot,
             craft: self.craft,
             tanks,
         }
@@ -288,6 +295,11 @@ impl<T: Number> Now<T> {
         if self.mount == Mount::Pivot {
             energy = energy + dot(self.a, all.moment);
         }
+        let mut pivot_torque = [0.0; 3];
+        if self.pivot.acts() {
+            let (torque, _, strain) = self.pivot.present(&self.axes, w);
+            (pivot_torque, energy) = (result(torque), energy + strain);
+        }
         Outputs {
             q: [x[index::Q], x[index::Q + 1], x[index::Q + 2], x[index::Q + 3]],
             omega: part(x, index::OMEGA),
@@ -297,6 +309,7 @@ impl<T: Number> Now<T> {
             velocity: part(x, index::VELOCITY),
             slosh_force,
             slosh_torque,
+            pivot_torque,
             momentum: result(times(&self.axes, momentum)),
             angular_momentum: result(times(&self.axes, angular_momentum)),
             energy: energy.result(),

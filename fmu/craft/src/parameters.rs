@@ -9,6 +9,7 @@ use formulas::cylinder;
 use taylor::integrator::Steps;
 use taylor::vector::{Quaternion, Vec3, add, rotation, scale, unit_quaternion};
 
+use crate::pivot::Pivot;
 use crate::rigid::{Factors, Rigid};
 use crate::sizes::{MODES, POINTS, TANKS, modes_of};
 use crate::table::FillTable;
@@ -84,7 +85,7 @@ pub enum Mount {
     /// Not at all: it flies; gravity has no part in the motion, because position and velocity
     /// are counted from a freely falling frame.
     Free = 1,
-    /// O rests on an air bearing in uniform gravity; the craft turns about it.
+    /// O rests on a bearing in uniform gravity; the craft turns about it, freely unless it has stiffness or damping.
     Pivot = 2,
 }
 
@@ -264,6 +265,8 @@ pub struct Parameters {
     pub mount: Mount,
     /// Gravity of mount [`Mount::Pivot`], m/s2, inertial axes. Of no effect on a free craft.
     pub gravity: Vec3,
+    /// What that mount does besides holding O. Of no effect on a free craft.
+    pub pivot: Pivot,
     /// How many tanks there are, 0 to [`TANKS`].
     pub tanks: usize,
     /// The tanks.
@@ -356,6 +359,7 @@ impl Default for Parameters {
             craft: Craft::default(),
             mount: Mount::Free,
             gravity: [0.0, 0.0, -9.81],
+            pivot: Pivot::default(),
             tanks: 1,
             tank: [Tank::default(); TANKS],
             init: Init::default(),
@@ -642,6 +646,12 @@ impl Parameters {
         let mut problems = Problems(Vec::new());
         self.craft.find_problems("craft", &mut problems);
         problems.vector("gravity", &self.gravity, "m/s2");
+        for (i, k) in self.pivot.k.iter().enumerate() {
+            problems.number(&format!("pivot.k[{}]", i + 1), *k, 0.0, HEAVIEST, "N.m/rad");
+        }
+        for (i, c) in self.pivot.c.iter().enumerate() {
+            problems.number(&format!("pivot.c[{}]", i + 1), *c, 0.0, HEAVIEST, "N.m.s/rad");
+        }
         problems.0.extend(steps_problem(self.max_steps));
         if self.tanks > TANKS {
             problems.0.push(format!("tanks = {} (allowed: 0 to {TANKS})", self.tanks));

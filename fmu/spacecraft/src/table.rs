@@ -107,6 +107,7 @@ const EVERYTHING: &[&str] = &[
     "mount",
     "mount_kind",
     "gravity",
+    "pivot.",
     "tanks",
     "tank[].",
     "init.",
@@ -186,6 +187,9 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(PER_TANK).range(-1e9, 1e9),
 
     // Locals
+    V::local("pivot.torque", |o, n| o.pivot_torque[n], "N.m",
+        "Torque of a pivot's stiffness and damping on the craft, body axes; 0 while free")
+        .shape(VECTOR).depends_on(&["q", "omega"]),
     V::local("momentum", |o, n| o.momentum[n], "kg.m/s",
         "Linear momentum of everything, inertial axes")
         .shape(VECTOR).depends_on(MOMENTUM),
@@ -193,13 +197,13 @@ static VARIABLES: &[Variable<Model>] = &[
         "Angular momentum of everything about its centre of mass (on a pivot about O), wheels included, inertial axes")
         .shape(VECTOR).depends_on(MOMENTUM),
     V::local("energy", |o, _| o.energy, "J",
-        "Kinetic energy of everything, of the centring springs, and on a pivot of gravity; the wheels' spin and the flow towards an outlet left out")
+        "Kinetic energy of everything, of the centring springs, and on a pivot of gravity and of its stiffness; the wheels' spin and the flow towards an outlet left out")
         .depends_on(&["q", "omega", "velocity", "tank[].p", "tank[].p_dot", "tank[].liquid", "mass_flow"]),
     V::local("work", |o, _| o.work, "J",
         "Work of force, torque and wheels on the craft since the start: energy - energy(0) = work - dissipated - drained")
         .is_state(|_| index::WORK).depends_on(&["work"]),
     V::local("dissipated", |o, _| o.dissipated, "J",
-        "Energy dissipated by the liquids since the start")
+        "Energy dissipated by the liquids and by a pivot's damping since the start")
         .is_state(|_| index::DISSIPATED).depends_on(&["dissipated"]),
     V::local("drained", |o, _| o.drained, "J",
         "Energy that has gone with the outflow since the start: the kinetic energy of what has left, and what the flow within the tanks has taken")
@@ -294,6 +298,12 @@ static VARIABLES: &[Variable<Model>] = &[
         .between(0, MOUNT.items.len() as i32),
     V::parameter("gravity", |p, n| &mut p.gravity[n], "m/s2", "Uniform gravity, inertial axes: acts on a pivot alone")
         .shape(VECTOR).range(-1e4, 1e4),
+    V::parameter("pivot.k", |p, n| &mut p.pivot.k[n], "N.m/rad",
+        "Stiffness of a pivot against tilt of the body's z axis from the inertial z axis, about the body's x and y axis")
+        .shape(&[2]).range(0.0, 1e12),
+    V::parameter("pivot.c", |p, n| &mut p.pivot.c[n], "N.m.s/rad",
+        "Damping coefficient of a pivot about each body axis: against omega")
+        .shape(VECTOR).range(0.0, 1e12),
     V::integer("tanks", |p, _| &mut p.tanks, "Number of tanks")
         .between(0, TANKS as i32),
 
@@ -424,7 +434,7 @@ static MOUNT: Enumeration = Enumeration {
         Item::new("free", "It flies: position and velocity count from a freely falling frame"),
         Item::new(
             "pivot",
-            "O rests on an air bearing in uniform gravity; the craft turns about it",
+            "O rests on a bearing in uniform gravity; the craft turns about it, freely unless pivot.k or pivot.c is set",
         ),
     ],
 };

@@ -126,7 +126,7 @@ fn residuals(
                 Mount::Pivot => {
                     let weight = p.gravity.map(|g| out.mass * g);
                     let by_gravity = cross(turned(out.q, out.center_of_mass), weight);
-                    let tau = turned(out.q, tau);
+                    let tau = turned(out.q, [0, 1, 2].map(|i| tau[i] + out.pivot_torque[i]));
                     [0, 1, 2].map(|i| tau[i] + by_gravity[i])
                 }
             };
@@ -177,11 +177,16 @@ fn name(record: &Value) -> &str {
 #[test]
 fn momentum_angular_momentum_and_energy_balance_over_1000_s_of_random_craft() {
     let mut excess = Vec::new();
-    for seed in 0..10 {
+    for seed in 0..11 {
         let mut random = Random::new(seed);
         let mut p = random.parameters();
-        if seed == 9 {
+        if seed >= 9 {
             (p.mount, p.init.velocity) = (Mount::Pivot, [0.0; 3]);
+        }
+        let mut end = END;
+        if seed == 10 {
+            // Its torque changes the momentum about every axis.
+            (p.pivot, end) = (random.pivot(), 1000);
         }
         if seed.is_multiple_of(3) {
             p.tank.iter_mut().for_each(|tank| random.follow(tank));
@@ -201,7 +206,7 @@ fn momentum_angular_momentum_and_energy_balance_over_1000_s_of_random_craft() {
                 ..Inputs::default()
             }
         };
-        check(&format!("random {seed}"), residuals(&p, input, 1000, END), &mut excess);
+        check(&format!("random {seed}"), residuals(&p, input, 1000, end), &mut excess);
     }
     assert!(excess.is_empty(), "{}", excess.join("\n"));
 }

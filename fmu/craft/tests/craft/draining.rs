@@ -318,10 +318,10 @@ fn directional_derivatives_of_draining_craft_are_those_by_differences() {
             ramp.slope = [0.0; 3];
         }
         u.mass_flow.iter_mut().for_each(|flow| flow.slope = 0.0);
-        if seed == 3 {
-            (p.mount, p.init.velocity) = (Mount::Pivot, [0.0; 3]);
-        }
         let mut random = Random::new(seed + 100);
+        if seed == 3 {
+            (p.mount, p.init.velocity, p.pivot) = (Mount::Pivot, [0.0; 3], random.pivot());
+        }
         let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap();
         let x = craft.continuous_states();
         let (mut dx, du): ([f64; STATES], [f64; INPUTS]) = (random.vector(1.0), random.vector(3.0));
@@ -364,6 +364,9 @@ fn energy_is_kept_while_tanks_drain() {
         let (mut p, u) = craft(seed, seed as usize % 4);
         if seed >= 6 {
             (p.mount, p.init.velocity) = (Mount::Pivot, [0.0; 3]);
+        }
+        if seed == 7 {
+            p.pivot = Random::new(7).pivot();
         }
         let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-13).unwrap();
         let start = craft.outputs(&u);

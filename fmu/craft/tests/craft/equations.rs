@@ -93,6 +93,7 @@ fn somewhere(seed: u64) -> (Random, Parameters, Spacecraft, Inputs) {
     let mut p = random.parameters();
     if seed.is_multiple_of(3) {
         (p.mount, p.init.velocity) = (Mount::Pivot, [0.0; 3]);
+        p.pivot = random.pivot();
     }
     if seed.is_multiple_of(2) {
         p.tank.iter_mut().for_each(|tank| random.follow(tank));

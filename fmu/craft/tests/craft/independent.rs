@@ -43,6 +43,13 @@ fn bodies(p: &Parameters) -> Vec<(f64, V, Matrix3<f64>)> {
     bodies
 }
 
+/// A pivot's torque: the turn that brings its axis from where it is in the body to the body's z axis, and damping.
+fn of_pivot(p: &Parameters, x: &[f64; STATES]) -> V {
+    let upright = rotation(&x[..4]).inverse() * V::z();
+    let pull = V::new(p.pivot.k[1] * upright.x, p.pivot.k[0] * upright.y, 0.0);
+    upright.cross(&pull) - v(&p.pivot.c).component_mul(&v(&x[index::OMEGA..]))
+}
+
 /// [a; w'] of craft and liquids at rest as one rigid body, about its centre of mass; body axes.
 fn rigid_motion(p: &Parameters, x: &[f64; STATES], u: &Inputs) -> [V; 2] {
     let w = v(&x[index::OMEGA..]);
@@ -67,7 +74,7 @@ fn rigid_motion(p: &Parameters, x: &[f64; STATES], u: &Inputs) -> [V; 2] {
     if p.mount == Mount::Pivot {
         let a = -(rotation(&x[..4]).inverse() * v(&p.gravity));
         let inertia = about(V::zeros());
-        let torque = torque - center.cross(&a) * mass - w.cross(&(inertia * w));
+        let torque = torque - center.cross(&a) * mass - w.cross(&(inertia * w)) + of_pivot(p, x);
         return [a, inertia.try_inverse().unwrap() * torque];
     }
     let inertia = about(center);
@@ -234,6 +241,7 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
         }
         let a = -(rotation(&x[..4]).inverse() * v(&p.gravity));
         rhs.rows_mut(0, 3).copy_from(&a);
+        rhs.rows_mut(3, 3).copy_from(&(torque + of_pivot(p, x)));
     }
     let y = m.full_piv_lu().solve(&rhs).unwrap();
     let (a, w_d) = (v(&y.as_slice()[0..]), v(&y.as_slice()[3..]));
@@ -261,6 +269,7 @@ fn anywhere(seed: u64) -> (Random, Parameters, [f64; STATES], Inputs) {
     let mut p = random.parameters();
     if seed.is_multiple_of(4) {
         (p.mount, p.init.velocity) = (Mount::Pivot, [0.0; 3]);
+        p.pivot = random.pivot();
     }
     let inputs = random.inputs();
     let mut craft = Spacecraft::new(&p, &inputs, 0.0, 1e-9).unwrap();

@@ -20,3 +20,4 @@ mod reference;
 mod refusals;
 mod small_motions;
 mod special_cases;
+mod tilting;

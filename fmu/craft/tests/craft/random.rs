@@ -1,6 +1,8 @@
 //! Random craft, states and inputs, of the sizes that spacecraft have.
 
-use craft::{Craft, DampingLaw, Inertia, Init, Inputs, Mount, Parameters, Ramp, TANKS, Tank};
+use craft::{
+    Craft, DampingLaw, Inertia, Init, Inputs, Mount, Parameters, Pivot, Ramp, TANKS, Tank,
+};
 
 pub struct Random(fastrand::Rng);
 
@@ -88,6 +90,12 @@ impl Random {
             },
             ..Parameters::default()
         }
+    }
+
+    /// Stiffness and damping of a pivot for a craft of 150 to 3000 kg.
+    pub fn pivot(&mut self) -> Pivot {
+        let k = [(); 2].map(|()| self.magnitude(1e2, 1e4));
+        Pivot { k, c: [(); 3].map(|()| self.magnitude(1.0, 100.0)) }
     }
 
     pub fn inputs(&mut self) -> Inputs {
