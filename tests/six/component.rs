@@ -318,6 +318,8 @@ impl Spacecraft {
         settings.craft("craft", &p.craft);
         settings.integer("mount", p.mount as i32);
         settings.reals(elements("gravity", 3), &p.gravity);
+        settings.reals(elements("pivot.k", 2), &p.pivot.k);
+        settings.reals(elements("pivot.c", 3), &p.pivot.c);
         settings.integer("tanks", p.tanks as i32);
         settings.integer("solver.max_steps", p.max_steps as i32);
         for (i, tank) in p.tank.iter().enumerate() {
@@ -339,6 +341,7 @@ impl Spacecraft {
             "velocity",
             "slosh_force",
             "slosh_torque",
+            "pivot.torque",
             "momentum",
             "angular_momentum",
             "center_of_mass",
@@ -388,7 +391,8 @@ impl Spacecraft {
         let next = &mut Numbers(numbers.iter());
         let q = next.array();
         let [omega, omega_dot, specific_force, position, velocity] = next.matrix();
-        let [slosh_force, slosh_torque, momentum, angular_momentum, center_of_mass] = next.matrix();
+        let [slosh_force, slosh_torque, pivot_torque] = next.matrix();
+        let [momentum, angular_momentum, center_of_mass] = next.matrix();
         Outputs {
             q,
             omega,
@@ -398,6 +402,7 @@ impl Spacecraft {
             velocity,
             slosh_force,
             slosh_torque,
+            pivot_torque,
             momentum,
             angular_momentum,
             center_of_mass,
