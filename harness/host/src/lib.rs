@@ -17,4 +17,5 @@ pub mod fmu;
 pub mod guard;
 pub mod output;
 pub mod temporary;
+pub mod wasm;
 pub mod xml;

@@ -15,6 +15,7 @@ use anyhow::{Context, Result, bail};
 
 use host::binary::{self, Binary};
 use host::fmi2::Fmu;
+use host::wasm::Module;
 
 use crate::models::Model;
 use crate::project;
@@ -124,6 +125,18 @@ pub const PLATFORMS: [Platform; 4] = [
     },
 ];
 
+/// WebAssembly, for pages and for hosts that keep foreign code in a sandbox. The standard's lists have no such platform:
+/// the folder is named by the module's processor, as names of vendors may be. Its host gives callbacks as places in
+/// the module's table of functions, which is exported for that and can grow (`harness/web/fmu/host.js`).
+pub const WASM: Platform = Platform {
+    folder: "wasm32",
+    ending: ".wasm",
+    targets: &[Target { triple: "wasm32-unknown-unknown", suffix: "", architecture: "wasm32" }],
+    tools: &[],
+    cargo: Cargo::Plain,
+    link: &["--export-table", "--growable-table"],
+};
+
 /// The platform of that folder.
 ///
 /// # Errors
@@ -172,6 +185,20 @@ pub fn build(model: &Model) -> Result<Vec<Built>> {
     }
     refuse(&faults)?;
     Ok(all)
+}
+
+/// Builds and checks the module of an FMU for WebAssembly.
+///
+/// # Errors
+/// If something is missing for that, if it does not build, or if a page could not use it.
+pub fn build_wasm(model: &Model) -> Result<Vec<u8>> {
+    let toolchain = Toolchain::look()?;
+    toolchain.check(&[&WASM])?;
+    let bytes = toolchain.build(&Product::Fmu(model), &WASM, &WASM.targets[0])?;
+    let wanted = [Fmu::symbols(), Fmu::step_symbols(), Fmu::exchange_symbols()].concat();
+    let faults = Module::read(&bytes)?.faults(&wanted);
+    refuse(&toolchain.faults(&WASM, &bytes, faults))?;
+    Ok(bytes)
 }
 
 /// Fails if there are faults, with all of them.
@@ -333,8 +360,14 @@ impl Toolchain {
         {
             // Building std is an unstable feature of Cargo, which these two names open.
             command.env("RUSTC_BOOTSTRAP", "1").env("__CARGO_TESTS_ONLY_SRC_ROOT", source);
-            command.arg("-Zbuild-std=std,panic_unwind");
+            // a panic in WebAssembly traps: nothing unwinds
+            let panic = if platform.folder == WASM.folder { "panic_abort" } else { "panic_unwind" };
+            command.arg(format!("-Zbuild-std=std,{panic}"));
             flags.push(format!("--remap-path-prefix={}=library", source.display()));
+        }
+        if platform.folder == WASM.folder {
+            // a page has to carry it: a tenth smaller than at 3
+            command.env("CARGO_PROFILE_FMU_OPT_LEVEL", "2");
         }
         command.env("CARGO_ENCODED_RUSTFLAGS", flags.join("\x1f"));
         command.env("MACOSX_DEPLOYMENT_TARGET", binary::MACOS.to_string());

@@ -9,7 +9,7 @@ use pack::{Model, sdist, wheel};
 /// Builds the binary of an FMU and packs it, or the Python package with all FMUs and this command inside.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  hubslosh pack --out dist/HubSlosh.fmu\n  hubslosh pack --all-platforms\n  \
+    after_help = "Examples:\n  hubslosh pack --out dist/HubSlosh.fmu\n  hubslosh pack --all-platforms\n  hubslosh pack --wasm\n  \
                   hubslosh pack --model Spacecraft --tanks 1 --modes 1\n  \
                   hubslosh pack --python\n  hubslosh pack --python --all-platforms\n  hubslosh pack --sdist"
 )]
@@ -40,6 +40,10 @@ pub struct PackArgs {
     /// on a Debian machine harness/platforms/setup gets what that takes.
     #[arg(long)]
     all_platforms: bool,
+    /// With a module for WebAssembly beside this machine's binary, as binaries/wasm32/NAME.wasm, for web pages and Node.js
+    /// (harness/web/fmu/host.js); harness/platforms/setup --wasm gets what that takes.
+    #[arg(long, conflicts_with_all = ["python", "sdist", "all_platforms"])]
+    wasm: bool,
 }
 
 impl PackArgs {
@@ -68,6 +72,11 @@ impl PackArgs {
             }
         };
         let out = self.out.unwrap_or_else(|| format!("dist/{}.fmu", model.identifier()).into());
+        if self.wasm {
+            let size = pack::pack_with_wasm(model, &out)?;
+            done!("packed {}, with a module for WebAssembly of {size} bytes", out.display());
+            return Ok(());
+        }
         if !self.all_platforms {
             return native(model, &out);
         }
