@@ -1,5 +1,6 @@
 //! From recordings of torque and hub rate to the FMU's parameters, with their uncertainty.
 
+pub mod any_fmu;
 pub mod between;
 pub mod budget;
 pub mod candidate;

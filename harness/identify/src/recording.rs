@@ -171,8 +171,12 @@ pub fn read(
     coarsest: f64,
     done: &mut dyn FnMut(String),
 ) -> Result<Vec<Recording>> {
-    let signal =
-        |name: &'static str, required: bool, between: Between| Signal { name, required, between };
+    let signal = |name: &'static str, required: bool, between: Between| Signal {
+        name,
+        required,
+        between,
+        unit: None,
+    };
     let mut signals =
         vec![signal("omega", true, Between::Line), signal("tau_cmd", true, source.slow)];
     signals.extend(OPTIONAL.map(|name| signal(name, false, Between::Line)));
@@ -217,7 +221,7 @@ pub fn read_decay(
             there.join(", ")
         )
     };
-    let signals = [Signal { name: found, required: true, between: Between::Line }];
+    let signals = [Signal { name: found, required: true, between: Between::Line, unit: None }];
     let table = files::read(path, &Wanted { signals: &signals, columns: &source.columns }, done)?;
     let column =
         |name: &str| table.column(name).map(<[f64]>::to_vec).context("a column that was read");

@@ -9,7 +9,7 @@ import shutil
 import subprocess
 import sysconfig
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -173,12 +173,51 @@ class Identification:
     all: dict[str, Any]
 
 
+def _file(table: "Table", needed: Sequence[str], path: Path) -> Path:
+    """Return the file of a table, which is written if it is none."""
+    if not isinstance(table, pd.DataFrame):
+        return Path(table)
+    missing = [name for name in needed if name not in table.columns]
+    if missing:
+        raise FmuError(f"data has no column {', '.join(missing)}")
+    table.to_csv(path, index=False)
+    return path
+
+
+def _asked(
+    free: "Mapping[str, Free]",
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    prior: Mapping[str, tuple[float, float]],
+) -> list[str]:
+    """Return the flags that ask for any FMU's parameters."""
+    flags = []
+    for name, start in free.items():
+        numbers = start if isinstance(start, tuple) else (start,)
+        flags += ["--free", f"{name}=" + ":".join(repr(float(number)) for number in numbers)]
+    for name, (mean, std) in prior.items():
+        flags += ["--prior", f"{name}={mean!r}:{std!r}"]
+    flags += ["--inputs", ",".join(inputs)] if inputs else []
+    return [*flags, *(["--outputs", ",".join(outputs)] if outputs else [])]
+
+
+Table = pd.DataFrame | str | Path
+"""A table, or the file of one."""
+Free = float | tuple[float, float, float]
+"""Start of an unknown, or start, lowest and highest value."""
+
+
 def identify(
-    data: pd.DataFrame | str | Path,
+    data: Table | Sequence[Table],
     model: str | None = None,
     *arguments: str,
     method: Method = "output-error",
     fmu: str | Path = "HubSlosh",
+    free: Mapping[str, Free] | None = None,
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    prior: Mapping[str, tuple[float, float]] | None = None,
+    settings: Mapping[str, object] | None = None,
     out: str | Path | None = None,
     program: str | Path | None = None,
 ) -> Identification:
@@ -198,25 +237,40 @@ def identify(
     parameters of the FMU, `all` has their results; "free-decay" takes data without torque, with
     ``wave_height`` (m), ``force`` (N), ``theta`` (rad) or ``omega``, and finds frequency and
     damping.
+
+    free: fits any FMU, of others too: its Real parameters and start values with their starts,
+    ``{"mu": 1.0}``, or starts and bounds, ``{"mu": (1.0, 0.1, 5.0)}``; ``"x0@each"`` is another one
+    in each recording. inputs, outputs: columns of the data, by the FMU's names. prior: what is
+    known of an unknown beforehand, mean and standard deviation. settings: what is set.
     """
     if any(argument.split("=")[0] == "--method" for argument in arguments):
         raise FmuError("--method is given as method=")
+    if free is None and (inputs or outputs or prior):
+        raise FmuError("inputs=, outputs= and prior= go with free=")
+    if free is not None and (model is not None or method != "output-error"):
+        raise FmuError("free= fits any FMU by output error: model= and method= are not for it")
+    needed: Sequence[str] = ("time",) if method == "free-decay" else ("time", "tau_cmd", "omega")
+    flags = ["--model", model] if model is not None else []
+    flags += ["--fmu", str(find(fmu))]
+    if free is None:
+        flags += ["--method", method]
+    else:
+        needed = (
+            ()
+            if any(a.split("=")[0] == "--columns" for a in arguments)
+            else ("time", *inputs, *outputs)
+        )
+        flags += _asked(free, inputs, outputs, prior or {})
+    for name, value in (settings or {}).items():
+        flags += ["--set", f"{name}={str(value).lower() if isinstance(value, bool) else value}"]
     path = find_program(program)
     with tempfile.TemporaryDirectory() as folder:
-        file, result = Path(folder) / "data.parquet", Path(folder) / "result.json"
-        result = result if out is None else Path(out)
-        if isinstance(data, pd.DataFrame):
-            needed = ("time",) if method == "free-decay" else ("time", "tau_cmd", "omega")
-            missing = [name for name in needed if name not in data.columns]
-            if missing:
-                raise FmuError(f"data has no column {', '.join(missing)}")
-            file = file.with_suffix(".csv")
-            data.to_csv(file, index=False)
-        else:
-            file = Path(data)
-        flags = ["--model", model] if model is not None else []
-        flags += ["--method", method, "--fmu", str(find(fmu))]
-        _run(path, ["identify", file, *flags, *arguments, "--out", result])
+        result = Path(folder) / "result.json" if out is None else Path(out)
+        tables = [data] if isinstance(data, pd.DataFrame | str | Path) else list(data)
+        files = [
+            _file(table, needed, Path(folder) / f"data{k}.csv") for k, table in enumerate(tables, 1)
+        ]
+        _run(path, ["identify", *files, *flags, *arguments, "--out", result])
         loaded: dict[str, Any] = json.loads(result.read_text(encoding="utf-8"))
     estimates = {
         kind: {

@@ -15,6 +15,7 @@ use identify::unknown::Unknown;
 use serde_json::json;
 use signals::table::{self, Table};
 
+use super::any_fmu::{AnyFmuArgs, Told};
 use super::{DEFAULT_FMU, open, setting};
 use crate::terminal;
 
@@ -22,13 +23,15 @@ use crate::terminal;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh design --profile lin-sweep:amplitude=0.1\n  \
     hubslosh design --multisine 0.25 --duration 600 --out torque.csv\n  \
-    hubslosh design --multisine 0.25 --optimal --set friction.b=0.04 --out torque.csv")]
+    hubslosh design --multisine 0.25 --optimal --set friction.b=0.04 --out torque.csv\n  \
+    hubslosh design slew.csv --fmu Spacecraft --free craft.Jzz=640,tank[1].mass[1]=128 --inputs torque[3] \\\n      \
+    --outputs omega[3] --noise omega[3]=1e-5")]
 pub struct DesignArgs {
     /// Torque profile, as of `hubslosh run`.
-    #[arg(long, value_name = "PROFILE", conflicts_with = "multisine")]
+    #[arg(long, value_name = "PROFILE", conflicts_with_all = ["multisine", "free"])]
     profile: Option<String>,
     /// An odd random-phase multisine with detection lines and this peak, N·m.
-    #[arg(long, value_name = "PEAK")]
+    #[arg(long, value_name = "PEAK", conflicts_with = "free")]
     multisine: Option<f64>,
     /// Period of the multisine, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 100.0)]
@@ -50,7 +53,7 @@ pub struct DesignArgs {
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
     /// Delay, gyro bias and friction asymmetry are to be estimated as well.
-    #[arg(long, alias = "flaws")]
+    #[arg(long, alias = "flaws", conflicts_with = "free")]
     sensor_errors: bool,
     /// The FMU: a file, or the name of one of this project.
     #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
@@ -61,6 +64,23 @@ pub struct DesignArgs {
     /// Where to put the torque, .csv or .parquet.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Tables of the inputs that are planned, with --free.
+    #[arg(value_name = "DATA", requires = "free")]
+    data: Vec<PathBuf>,
+    /// Noise of a row of each output, with --free.
+    #[arg(long, value_name = "OUTPUT=STD,…", requires = "free")]
+    noise: Vec<String>,
+    /// Which column of the tables is which input, in what unit, with --free.
+    #[arg(
+        long,
+        value_name = "INPUT=COLUMN[:UNIT],…",
+        requires = "free",
+        default_value = "",
+        hide_default_value = true
+    )]
+    columns: String,
+    #[command(flatten)]
+    any: AnyFmuArgs,
 }
 
 /// Rows of the plan are this far apart, s.
@@ -71,6 +91,16 @@ const COLUMNS: usize = 20;
 impl DesignArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
+        if self.any.is_asked() {
+            let told = Told {
+                data: &self.data,
+                settings: &self.settings,
+                columns: &self.columns,
+                fmu: &self.fmu,
+                json: self.json,
+            };
+            return self.any.design(&told, &self.noise);
+        }
         if let Some(out) = &self.out {
             table::check_ending(out)?;
         }

@@ -100,7 +100,8 @@ const LEAST_CHUNKS: f64 = 3.0;
 impl GyroArgs {
     /// Looks at a recording.
     fn look_at(&self, path: &Path) -> Result<()> {
-        let signals = [Signal { name: "omega", required: true, between: Between::Line }];
+        let signals =
+            [Signal { name: "omega", required: true, between: Between::Line, unit: None }];
         let wanted = Wanted { signals: &signals, columns: &self.columns };
         let mut say = |line: String| terminal::note(line);
         let table = recording::read(path, &wanted, &mut say)?;

@@ -18,10 +18,11 @@ use identify::nominal::Nominal;
 use identify::options::Options;
 use identify::recording::{self, Recording, Source};
 use identify::simulate::Intersample;
-use signals::recording::{Between, Columns};
+use signals::recording::Between;
 use std::collections::BTreeMap;
 use std::io::Write;
 
+use super::any_fmu::{AnyFmuArgs, Out, Told};
 use super::{DEFAULT_FMU, open, setting};
 use crate::{progress, terminal};
 
@@ -30,6 +31,8 @@ use crate::{progress, terminal};
 /// Recordings have the columns time (s), tau_cmd (N·m) and omega (rad/s), and optionally theta (rad) of an
 /// encoder, g_axial (m/s²), wheel_speed, omega_x and omega_y (rad/s); --columns takes other names and units.
 /// Several are fitted together. A free decay has no torque.
+///
+/// With --free it fits any FMU: what is free, which inputs the recordings drive and which outputs they have is named.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh identify sweep.parquet --out result.json\n  \
     hubslosh identify up.csv down.csv --validate noise.csv --model linear,planar,spherical \\\n      \
@@ -37,7 +40,9 @@ use crate::{progress, terminal};
     hubslosh identify empty.csv --method acceleration --weights run --out friction.json\n  \
     hubslosh identify multisine.csv --method frequency --out poles.json\n  \
     hubslosh identify bench.mat --columns time=t,tau_cmd=T_cmd:mNm,omega=gyro_z:deg/s --out result.json\n  \
-    hubslosh identify decay.csv --method free-decay --columns wave_height=probe:mm --out decay.json")]
+    hubslosh identify decay.csv --method free-decay --columns wave_height=probe:mm --out decay.json\n  \
+    hubslosh identify a.csv b.csv --fmu VanDerPol.fmu --free mu=1:0.1:5,x0@each=1:-3:3 --outputs x0,x1 \\\n      \
+    --exchange --out result.json --report result.html")]
 pub struct IdentifyArgs {
     /// Recordings: text in columns (.csv, .txt, .tsv, .dat), .parquet or .mat.
     #[arg(value_name = "DATA", required = true)]
@@ -46,22 +51,22 @@ pub struct IdentifyArgs {
     /// without a simulation, of a bench whose liquid does not move; `frequency` three poles and two zeros;
     /// `multisine` tells noise from nonlinear distortion; `black-box` fits ARX and ARMAX; `free-decay` takes records
     /// without torque and finds frequency and damping, and how both depend on the amplitude.
-    #[arg(long, value_name = "NAME", default_value = "output-error")]
+    #[arg(conflicts_with = "free", long, value_name = "NAME", default_value = "output-error")]
     method: MethodName,
     /// Weights of the rows, of --method acceleration.
-    #[arg(long, value_name = "NAME", default_value = "uniform")]
+    #[arg(conflicts_with = "free", long, value_name = "NAME", default_value = "uniform")]
     weights: Weighting,
     /// Bounds of an unknown, of --method acceleration.
-    #[arg(long = "bound", value_name = "NAME=LOW:HIGH", value_parser = bound)]
+    #[arg(conflicts_with = "free", long = "bound", value_name = "NAME=LOW:HIGH", value_parser = bound)]
     bounds: Vec<(String, f64, f64)>,
     /// Harmonics of the angle in the friction, 0 to 2, of --method acceleration.
-    #[arg(long, value_name = "NUMBER", default_value_t = 0)]
+    #[arg(conflicts_with = "free", long, value_name = "NUMBER", default_value_t = 0)]
     harmonics: usize,
     /// Period of the torque, s, of --method multisine.
-    #[arg(long, value_name = "SECONDS", default_value_t = 100.0)]
+    #[arg(conflicts_with = "free", long, value_name = "SECONDS", default_value_t = 100.0)]
     period: f64,
     /// Slosh models to try.
-    #[arg(
+    #[arg(conflicts_with = "free", 
         long,
         value_name = "NAME,…",
         value_delimiter = ',',
@@ -70,7 +75,7 @@ pub struct IdentifyArgs {
     )]
     model: Vec<String>,
     /// Friction laws to try, the first with all slosh models, the others with the one that is chosen.
-    #[arg(
+    #[arg(conflicts_with = "free", 
         long,
         value_name = "NAME,…",
         value_delimiter = ',',
@@ -79,39 +84,51 @@ pub struct IdentifyArgs {
     )]
     friction: Vec<String>,
     /// What is known of a parameter that is estimated: value and standard deviation.
-    #[arg(long, value_name = "NAME=VALUE:STD", value_parser = known)]
+    #[arg(conflicts_with = "free", long, value_name = "NAME=VALUE:STD", value_parser = known)]
     known: Vec<(String, f64, f64)>,
     /// Sets what is known of the bench by its FMU name; it is then not estimated.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
     /// Starts from this value instead of one found in the data.
-    #[arg(long = "start", value_name = "NAME=VALUE", value_parser = start_value)]
+    #[arg(conflicts_with = "free", long = "start", value_name = "NAME=VALUE", value_parser = start_value)]
     starts: Vec<(String, f64)>,
     /// Takes the measurement as perfect: no delay, gyro bias or friction asymmetry is estimated.
-    #[arg(long)]
+    #[arg(conflicts_with = "free", long)]
     perfect: bool,
     /// Standard deviation of the gyro's scale about 1; 0: exactly 1.
-    #[arg(long, value_name = "NUMBER", default_value_t = 0.01)]
+    #[arg(conflicts_with = "free", long, value_name = "NUMBER", default_value_t = 0.01)]
     gyro_scale: f64,
     /// Intersample behaviour of the torque: linear (first-order hold), held (zero-order hold, a sampled controller's) or
     /// smooth (band-limited, a sampled recording of a smooth torque). Else what fits best is taken.
-    #[arg(long, value_name = "HOW", value_parser = ["linear", "held", "smooth"])]
+    #[arg(conflicts_with = "free", long, value_name = "HOW", value_parser = ["linear", "held", "smooth"])]
     torque: Option<String>,
     /// The rate's time stamps may be early: takes a delay below zero as it comes. Else it is a sign that something is wrong.
-    #[arg(long)]
+    #[arg(conflicts_with = "free", long)]
     acausal: bool,
     /// Which column of the recordings is which signal, in what unit: time, tau_cmd, omega, theta, g_axial,
     /// wheel_speed, omega_x, omega_y; of a free decay wave_height, force, theta or omega.
-    #[arg(long, value_name = "SIGNAL=COLUMN[:UNIT],…", default_value_t, hide_default_value = true)]
-    columns: Columns,
+    /// With --free: an input or output of the FMU.
+    #[arg(
+        long,
+        value_name = "SIGNAL=COLUMN[:UNIT],…",
+        default_value = "",
+        hide_default_value = true
+    )]
+    columns: String,
     /// The tank is empty: no liquid is assumed, the whole inertia is the hub's.
-    #[arg(long)]
+    #[arg(conflicts_with = "free", long)]
     empty: bool,
     /// Uses the rows between two times alone.
-    #[arg(long, value_name = "S,S", value_delimiter = ',', allow_hyphen_values = true)]
+    #[arg(
+        conflicts_with = "free",
+        long,
+        value_name = "S,S",
+        value_delimiter = ',',
+        allow_hyphen_values = true
+    )]
     trim: Vec<f64>,
     /// A recording that is simulated with the result, not fitted.
-    #[arg(long, value_name = "DATA")]
+    #[arg(conflicts_with = "free", long, value_name = "DATA")]
     validate: Vec<PathBuf>,
     /// Also prints each attempt of the search: its start, window and free unknowns, and why it was made, accepted or
     /// refused.
@@ -129,6 +146,8 @@ pub struct IdentifyArgs {
     /// Where to put a report, .html.
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
+    #[command(flatten)]
+    any: AnyFmuArgs,
 }
 
 /// The methods, one file each in `harness/identify/src/methods`.
@@ -241,6 +260,18 @@ impl IdentifyArgs {
             let html = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("html"));
             ensure!(html, "{}: the name must end in .html", path.display());
         }
+        if self.any.is_asked() {
+            let told = Told {
+                data: &self.data,
+                settings: &self.settings,
+                columns: &self.columns,
+                fmu: &self.fmu,
+                json: self.json,
+            };
+            let report = self.report.as_deref();
+            let out = Out { result: &self.out, report, verbose: self.verbose };
+            return self.any.identify(&told, &out);
+        }
         match self.method {
             MethodName::OutputError => self.answer(OutputError { options: self.options() }, trim),
             MethodName::Acceleration => {
@@ -302,7 +333,7 @@ impl IdentifyArgs {
         let nominal = fmu.as_ref().map(|fmu| self.options().nominal(fmu)).transpose()?;
         let coarsest = nominal.as_ref().map_or(f64::INFINITY, Nominal::coarsest);
         let mut notes = Vec::new();
-        let source = self.source(trim);
+        let source = self.source(trim)?;
         let mut read = |paths: &[PathBuf]| -> Result<Vec<Recording>> {
             let mut all = Vec::new();
             for path in paths {
@@ -318,12 +349,12 @@ impl IdentifyArgs {
     }
 
     /// How the recordings are read.
-    fn source(&self, trim: Option<(f64, f64)>) -> Source {
+    fn source(&self, trim: Option<(f64, f64)>) -> Result<Source> {
         let slow = match self.intersample() {
             Some(Intersample::FirstOrderHold | Intersample::BandLimited) => Between::Line,
             Some(Intersample::ZeroOrderHold) | None => Between::Held,
         };
-        Source { columns: self.columns.clone(), slow, trim }
+        Ok(Source { columns: self.columns.parse()?, slow, trim })
     }
 
     /// Reads free decays, which are of one signal, and identifies.
@@ -332,7 +363,7 @@ impl IdentifyArgs {
             self.validate.is_empty() && self.report.is_none(),
             "--validate and --report are not for --method free-decay"
         );
-        let (source, mut notes) = (self.source(trim), Vec::new());
+        let (source, mut notes) = (self.source(trim)?, Vec::new());
         let (mut signals, mut recordings) = (Vec::new(), Vec::new());
         for path in &self.data {
             let (signal, recording) = recording::read_decay(path, &source, &mut |line| {
@@ -399,7 +430,7 @@ impl IdentifyArgs {
 }
 
 /// A table of estimates.
-fn estimates(tables: &[&BTreeMap<String, Estimated>]) {
+pub(super) fn estimates(tables: &[&BTreeMap<String, Estimated>]) {
     println!("{:24} {:>14} {:>12} {:>9}  unit", "", "value", "std", "std %");
     for (name, p) in tables.iter().flat_map(|table| table.iter()) {
         let percent =

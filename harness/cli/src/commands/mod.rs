@@ -10,6 +10,7 @@ use signals::table::{self, Table};
 use crate::terminal;
 
 pub mod analyse;
+pub mod any_fmu;
 pub mod book;
 pub mod campaign;
 pub mod check;

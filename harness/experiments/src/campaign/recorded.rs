@@ -10,10 +10,10 @@ use crate::profile::Torque;
 
 /// What is read of a recording: the rate has the rows, torque and the rates about the other axes are joined by lines.
 const SIGNALS: [Signal; 4] = [
-    Signal { name: "omega", required: true, between: Between::Line },
-    Signal { name: "tau_cmd", required: true, between: Between::Line },
-    Signal { name: "omega_x", required: false, between: Between::Line },
-    Signal { name: "omega_y", required: false, between: Between::Line },
+    Signal { name: "omega", required: true, between: Between::Line, unit: None },
+    Signal { name: "tau_cmd", required: true, between: Between::Line, unit: None },
+    Signal { name: "omega_x", required: false, between: Between::Line, unit: None },
+    Signal { name: "omega_y", required: false, between: Between::Line, unit: None },
 ];
 
 /// Least correlation of the recorded torque with the one that the plan names.

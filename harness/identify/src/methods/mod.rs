@@ -6,7 +6,7 @@ pub mod free_decay;
 pub mod frequency;
 pub mod multisine;
 pub mod output_error;
-mod page;
+pub(crate) mod page;
 
 use std::collections::BTreeMap;
 
@@ -108,7 +108,7 @@ pub struct Residual {
 
 impl<D: Serialize> Identified<D> {
     /// A result without parameters and words.
-    fn new(details: D) -> Self {
+    pub(crate) fn new(details: D) -> Self {
         Identified {
             parameters: BTreeMap::new(),
             measurement: BTreeMap::new(),

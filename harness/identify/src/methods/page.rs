@@ -17,7 +17,8 @@ const POINTS: usize = 700;
 /// Length of the stretch that is drawn row by row, s.
 const STRETCH: f64 = 8.0;
 
-const STYLE: &str = "
+/// Of every page on an identification.
+pub(crate) const STYLE: &str = "
 :root{color-scheme:light dark;--ink:#1c1c1e;--paper:#fff;--soft:#6b6b70;--rule:#d8d8dc;--a:#0b62c4;--b:#c2410c;--warn:#fde8d7}
 @media(prefers-color-scheme:dark){:root{--ink:#e8e8ea;--paper:#16171a;--soft:#a0a0a8;--rule:#3a3b40;--a:#6cb1ff;--b:#ff9a5c;--warn:#4a2a12}}
 body{font:15px/1.5 system-ui,sans-serif;color:var(--ink);background:var(--paper);max-width:62rem;margin:2rem auto;padding:0 1rem}
@@ -86,7 +87,7 @@ fn verdict(found: &Identification) -> Markup {
 }
 
 /// With as many digits as the standard deviation has a meaning for; what is small, with a power of ten.
-fn digits(value: f64, deviation: f64) -> String {
+pub(crate) fn digits(value: f64, deviation: f64) -> String {
     let places = if deviation > 0.0 { 1.0 - deviation.log10().floor() } else { 6.0 };
     match value {
         _ if value.abs() < 1e-3 * deviation => "0".into(),
@@ -105,7 +106,8 @@ fn change(by: f64, p: &Estimated) -> String {
     }
 }
 
-fn table<'a>(
+/// A table that scrolls where it is wider than the page.
+pub(crate) fn table<'a>(
     head: impl IntoIterator<Item = &'a str>,
     rows: impl IntoIterator<Item = Vec<String>>,
 ) -> Markup {
@@ -139,7 +141,14 @@ fn parameters(found: &Identification) -> Markup {
     html! { h2 { "Parameters" } (table(head, rows)) }
 }
 
-fn axis_chart(title: &str, x: &str, y: &str, series: Vec<Series>, logarithmic: bool) -> Chart {
+/// A chart as wide as the page.
+pub(crate) fn axis_chart(
+    title: &str,
+    x: &str,
+    y: &str,
+    series: Vec<Series>,
+    logarithmic: bool,
+) -> Chart {
     let points = || series.iter().flat_map(|s| &s.points);
     Chart {
         title: title.into(),
@@ -154,7 +163,8 @@ fn axis_chart(title: &str, x: &str, y: &str, series: Vec<Series>, logarithmic: b
     }
 }
 
-fn series(points: Vec<(f64, f64)>, color: &str, style: Style, title: &str) -> Series {
+/// A curve in a colour of [`STYLE`].
+pub(crate) fn series(points: Vec<(f64, f64)>, color: &str, style: Style, title: &str) -> Series {
     Series { points, color: format!("var(--{color})"), style, title: title.into() }
 }
 

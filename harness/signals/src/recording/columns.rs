@@ -53,41 +53,35 @@ impl FromStr for Columns {
 
     /// All that is wrong with it is said at once.
     fn from_str(text: &str) -> Result<Self> {
-        let (mut columns, mut problems) = (BTreeMap::new(), Vec::new());
-        for item in text.split(',').filter(|_| !text.is_empty()) {
-            match one(item.trim()) {
-                Ok((signal, _)) if columns.contains_key(&signal) => {
-                    problems.push(format!("{signal} is given twice"));
-                }
-                Ok((signal, column)) => drop(columns.insert(signal, column)),
-                Err(error) => problems.push(error.to_string()),
-            }
-        }
-        ensure!(problems.is_empty(), "{}", problems.join("; "));
-        Ok(Columns(columns))
+        Columns::parse(text.split(','), one)
     }
 }
 
 /// `SIGNAL=COLUMN[:UNIT]`; what follows the last colon is the unit.
 fn one(item: &str) -> Result<(String, Column)> {
-    let Some((signal, column)) = item.split_once('=') else {
-        bail!("\"{item}\" is not SIGNAL=COLUMN or SIGNAL=COLUMN:UNIT")
-    };
-    let signal = signal.trim();
-    let quantity = quantity(signal)?;
-    let (name, unit) = match column.rsplit_once(':') {
-        Some((name, unit)) => (name.trim(), Some(unit.trim().to_string())),
-        None => (column.trim(), None),
-    };
-    ensure!(!name.is_empty(), "\"{item}\" names no column");
-    if let Some(unit) = &unit {
+    let (signal, column) = named(item)?;
+    let quantity = quantity(&signal)?;
+    if let Some(unit) = &column.unit {
         ensure!(
             quantity.factor(unit).is_some(),
             "{signal}: \"{unit}\" is no unit of {quantity} (allowed: {})",
             quantity.units()
         );
     }
-    Ok((signal.into(), Column { name: name.into(), unit }))
+    Ok((signal, column))
+}
+
+/// The same, of any signal and unit.
+fn named(item: &str) -> Result<(String, Column)> {
+    let Some((signal, column)) = item.split_once('=') else {
+        bail!("\"{item}\" is not SIGNAL=COLUMN or SIGNAL=COLUMN:UNIT")
+    };
+    let (name, unit) = match column.rsplit_once(':') {
+        Some((name, unit)) => (name.trim(), Some(unit.trim().to_string())),
+        None => (column.trim(), None),
+    };
+    ensure!(!name.is_empty(), "\"{item}\" names no column");
+    Ok((signal.trim().into(), Column { name: name.into(), unit }))
 }
 
 impl fmt::Display for Columns {
@@ -103,6 +97,32 @@ impl fmt::Display for Columns {
 }
 
 impl Columns {
+    /// Columns of an FMU's variables, `NAME=COLUMN[:UNIT]`, not split at commas.
+    ///
+    /// # Errors
+    /// All that is wrong with them.
+    pub fn of_variables<'a>(items: impl IntoIterator<Item = &'a str>) -> Result<Self> {
+        Columns::parse(items, named)
+    }
+
+    fn parse<'a>(
+        items: impl IntoIterator<Item = &'a str>,
+        one: impl Fn(&str) -> Result<(String, Column)>,
+    ) -> Result<Self> {
+        let (mut columns, mut problems) = (BTreeMap::new(), Vec::new());
+        for item in items.into_iter().map(str::trim).filter(|item| !item.is_empty()) {
+            match one(item) {
+                Ok((signal, _)) if columns.contains_key(&signal) => {
+                    problems.push(format!("{signal} is given twice"));
+                }
+                Ok((signal, column)) => drop(columns.insert(signal, column)),
+                Err(error) => problems.push(error.to_string()),
+            }
+        }
+        ensure!(problems.is_empty(), "{}", problems.join("; "));
+        Ok(Columns(columns))
+    }
+
     /// The column of a signal; the one of its own name unless another is given.
     pub fn of(&self, signal: &str) -> Column {
         let own = || Column { name: signal.into(), unit: None };

@@ -17,7 +17,7 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 
 pub use self::columns::{Column, Columns, SIGNALS, quantity};
 pub use self::even::even;
-pub use self::unit::Quantity;
+pub use self::unit::{Quantity, conversion};
 use crate::table::{self, Table};
 
 /// Names and units of a file's columns.
@@ -93,24 +93,28 @@ pub enum Between {
     Held,
     /// A line from the last value to the next.
     Line,
+    /// Nothing: it stays NaN.
+    Missing,
 }
 
 /// A signal that is wanted of a recording.
 #[derive(Clone, Copy, Debug)]
-pub struct Signal {
-    /// One of [`SIGNALS`].
-    pub name: &'static str,
+pub struct Signal<'a> {
+    /// One of [`SIGNALS`], or a variable of an FMU.
+    pub name: &'a str,
     /// It must be there.
     pub required: bool,
     /// How it is completed.
     pub between: Between,
+    /// The unit in which its values are wanted, and in which they are where the file names none; `None`: SI.
+    pub unit: Option<&'a str>,
 }
 
 /// What is wanted of a recording beside its time.
 #[derive(Clone, Copy, Debug)]
 pub struct Wanted<'a> {
-    /// The first is the rows' signal.
-    pub signals: &'a [Signal],
+    /// The first is the rows' signal, unless it may be missing ([`Between::Missing`]).
+    pub signals: &'a [Signal<'a>],
     /// Which columns they are.
     pub columns: &'a Columns,
 }
@@ -178,7 +182,7 @@ fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result
     let header = file.header();
     // time first, then the signals that are there
     let rows_signal = wanted.signals[0];
-    let time = Signal { name: "time", required: true, between: Between::Line };
+    let time = Signal { name: "time", required: true, between: Between::Line, unit: None };
     let (mut signals, mut places, mut factors) = (Vec::new(), Vec::new(), Vec::new());
     let (mut problems, mut used) = (Vec::new(), Vec::new());
     let of_use = |name: &str| name == "time" || wanted.signals.iter().any(|s| s.name == name);
@@ -196,22 +200,17 @@ fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result
                 continue;
             }
         };
-        let quantity = quantity(signal.name)?;
         let unit = column.unit.clone().or_else(|| header.units[place].clone());
-        let factor = match &unit {
-            None => Some(1.0),
-            Some(unit) => quantity.factor(unit),
-        };
-        let Some(factor) = factor else {
-            problems.push(format!(
-                "column {}: \"{}\" is no unit of {quantity} (allowed: {}); --columns {}={}:UNIT says which it is",
-                header.names[place],
-                unit.unwrap_or_default(),
-                quantity.units(),
-                signal.name,
-                column.name
-            ));
-            continue;
+        let factor = match unit.as_deref().map(|unit| factor(signal, unit)) {
+            None => 1.0,
+            Some(Ok(factor)) => factor,
+            Some(Err(error)) => {
+                problems.push(format!(
+                    "column {}: {error}; --columns {}={}:UNIT says which it is",
+                    header.names[place], signal.name, column.name
+                ));
+                continue;
+            }
         };
         used.push(match &unit {
             Some(unit) => format!("{} = {} in {unit}", signal.name, header.names[place]),
@@ -254,6 +253,19 @@ fn read_as(path: &Path, wanted: &Wanted, done: &mut dyn FnMut(String)) -> Result
     Ok(Table::new(names, columns))
 }
 
+/// What a value of a signal in a unit is multiplied by.
+fn factor(signal: &Signal, unit: &str) -> Result<f64> {
+    let Some(own) = signal.unit else {
+        let quantity = quantity(signal.name)?;
+        return quantity.factor(unit).with_context(|| {
+            format!("\"{unit}\" is no unit of {quantity} (allowed: {})", quantity.units())
+        });
+    };
+    // an FMU that names no unit gives no reason to convert
+    let known = if own.is_empty() { Some(1.0) } else { conversion(unit, own) };
+    known.with_context(|| format!("\"{unit}\" cannot be converted to {}'s \"{own}\"", signal.name))
+}
+
 /// The rows with a value of the rows' signal; the other signals completed there.
 fn complete(
     signals: &[Signal],
@@ -285,6 +297,9 @@ fn complete(
         if there.len() == rows {
             continue;
         }
+        if signal.between == Between::Missing {
+            continue;
+        }
         if name == rows_signal {
             keep.iter_mut().zip(column.iter()).for_each(|(keep, value)| *keep &= !value.is_nan());
             done(format!("{} of {rows} rows have no {name} and are left out", rows - there.len()));
@@ -296,6 +311,7 @@ fn complete(
         let how = match signal.between {
             Between::Held => "held",
             Between::Line => "joined by lines",
+            Between::Missing => continue,
         };
         done(format!(
             "{name} has a value in {} of {rows} rows, {usual:.4} s apart; it is {how} in between",
@@ -322,7 +338,7 @@ fn complete(
                     Between::Line if span > 0.0 => {
                         column[from] + (time[k] - time[from]) / span * (column[to] - column[from])
                     }
-                    Between::Line => column[from],
+                    Between::Line | Between::Missing => column[from],
                 };
             }
         }

@@ -72,6 +72,17 @@ fn plain(text: &str) -> String {
     text.chars().filter(|c| !matches!(c, '·' | '.' | '*' | '^' | ' ' | '⋅')).collect()
 }
 
+/// What a value in one unit is multiplied by to be in another; `None` if they are not known to be of one quantity.
+pub fn conversion(from: &str, to: &str) -> Option<f64> {
+    let (from, to) = (plain(from), plain(to));
+    if from == to {
+        return Some(1.0);
+    }
+    let known = |name: &str| UNITS.iter().find(|(_, unit, _)| *unit == name);
+    let ((quantity, _, factor), (other, _, own)) = (known(&from)?, known(&to)?);
+    (quantity == other).then_some(factor / own)
+}
+
 impl Quantity {
     /// What a value in that unit is multiplied by to be in SI; `None` if there is no such unit.
     pub fn factor(self, unit: &str) -> Option<f64> {
@@ -112,6 +123,8 @@ mod tests {
         }
         assert_eq!(Rate.factor("°/s"), Some(std::f64::consts::PI / 180.0));
         assert_eq!(Acceleration.factor("m/s²"), Acceleration.factor("m/s^2"));
+        assert_eq!((conversion("mN.m", "N.m"), conversion("kg", "kg")), (Some(1e-3), Some(1.0)));
+        assert_eq!((conversion("deg", "rad/s"), conversion("mm", "furlong")), (None, None));
         assert_eq!((Rate.factor("deg"), Torque.factor("mnm")), (None, None));
     }
 }

@@ -5,15 +5,15 @@ use std::path::{Path, PathBuf};
 use signals::recording::{Between, Columns, Signal, Wanted, even, read};
 use signals::table::Table;
 
-const fn signal(name: &'static str, required: bool) -> Signal {
-    Signal { name, required, between: Between::Held }
+const fn signal(name: &'static str, required: bool) -> Signal<'static> {
+    Signal { name, required, between: Between::Held, unit: None }
 }
 
 /// The rate has the rows; the torque is held, the angle joined by lines.
 const SIGNALS: [Signal; 3] = [
     signal("omega", true),
     signal("tau_cmd", true),
-    Signal { name: "theta", required: false, between: Between::Line },
+    Signal { name: "theta", required: false, between: Between::Line, unit: None },
 ];
 
 fn columns(text: &str) -> Columns {

@@ -1,0 +1,276 @@
+//! `hubslosh identify --free …` and `hubslosh design --free …`: identification of any FMU.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+use host::output::atomically;
+use identify::any_fmu::foresee::{Bound, foresee};
+use identify::any_fmu::question::{Question, Setting, Solver, list};
+use identify::any_fmu::record::Record;
+use identify::any_fmu::simulate::Model;
+use identify::any_fmu::{self, Identification};
+use identify::news::News;
+use signals::recording::Columns;
+use std::io::Write;
+
+use super::identify::estimates;
+use crate::{progress, terminal};
+
+/// What is asked of any FMU.
+#[derive(clap::Args)]
+#[command(next_help_heading = "Any FMU")]
+pub struct AnyFmuArgs {
+    /// Real parameters and start values of any FMU that are estimated, with bounds (else the FMU's min and max). NAME@each: every
+    /// recording has its own.
+    #[arg(long, value_name = "NAME=START[:LOW:HIGH],…")]
+    pub free: Vec<String>,
+    /// What is known of an unknown beforehand: mean and standard deviation.
+    #[arg(long, value_name = "NAME=MEAN:STD,…", requires = "free")]
+    prior: Vec<String>,
+    /// Inputs that the recordings drive.
+    #[arg(long, value_name = "NAME,…", requires = "free")]
+    inputs: Vec<String>,
+    /// Those inputs that are held from row to row; the others go along lines.
+    #[arg(long, value_name = "NAME,…", requires = "inputs")]
+    held: Vec<String>,
+    /// Outputs that were recorded.
+    #[arg(long, value_name = "NAME,…", requires = "free")]
+    outputs: Vec<String>,
+    /// Outputs whose sensor has a bias, in each recording another one; STD: what is known of it.
+    #[arg(long, value_name = "OUTPUT[=STD],…", requires = "free")]
+    bias: Vec<String>,
+    /// Three outputs read by an instrument with three axes, whose scales and alignment (rad) are estimated; SCALE and ANGLE are what
+    /// is known of them.
+    #[arg(long, value_name = "A,B,C=SCALE:ANGLE", requires = "free")]
+    triad: Vec<String>,
+    /// The noise of every output drifts: white noise and a Gauss–Markov bias.
+    #[arg(long, requires = "free")]
+    drift: bool,
+    /// The host steps the FMU (Model Exchange) with this relative tolerance, in place of the FMU's own solver.
+    #[arg(long, value_name = "TOLERANCE", requires = "free", num_args = 0..=1, default_missing_value = "1e-8")]
+    exchange: Option<f64>,
+    /// Starts that are drawn within the bounds where the search from the first one ends at no good fit.
+    #[arg(long, value_name = "NUMBER", requires = "free", default_value_t = 8)]
+    tries: usize,
+}
+
+/// What all commands are told.
+pub struct Told<'a> {
+    /// Recordings.
+    pub data: &'a [PathBuf],
+    /// `--set`.
+    pub settings: &'a [(String, String)],
+    /// `--columns`.
+    pub columns: &'a str,
+    /// The FMU.
+    pub fmu: &'a Path,
+    /// JSON in place of tables.
+    pub json: bool,
+}
+
+/// Where results go.
+pub struct Out<'a> {
+    /// JSON.
+    pub result: &'a Path,
+    /// HTML.
+    pub report: Option<&'a Path>,
+    /// Each iteration is told.
+    pub verbose: bool,
+}
+
+/// Items of a flag, each read; all that is wrong is said at once.
+fn read<T: std::str::FromStr<Err = anyhow::Error>>(
+    flags: &[String],
+    problems: &mut Vec<String>,
+) -> Vec<T> {
+    let mut items = Vec::new();
+    for item in flags.iter().flat_map(|flag| list(flag)) {
+        match item.parse() {
+            Ok(item) => items.push(item),
+            Err(error) => problems.push(format!("{error:#}")),
+        }
+    }
+    items
+}
+
+impl AnyFmuArgs {
+    /// Whether it is about any FMU.
+    pub fn is_asked(&self) -> bool {
+        !self.free.is_empty()
+    }
+
+    fn question(&self, told: &Told) -> Result<Question> {
+        let mut problems = Vec::new();
+        let names = |flags: &[String]| -> Vec<String> {
+            flags.iter().flat_map(|flag| list(flag)).map(String::from).collect()
+        };
+        let settings: Vec<String> =
+            told.settings.iter().map(|(name, value)| format!("{name}={value}")).collect();
+        let settings: Vec<Result<Setting>> = settings.iter().map(|text| text.parse()).collect();
+        // its names have commas before the sign of equality
+        let triads: Vec<Result<_>> = self.triad.iter().map(|text| text.parse()).collect();
+        let question = Question {
+            free: read(&self.free, &mut problems),
+            priors: read(&self.prior, &mut problems),
+            settings: kept(settings, &mut problems),
+            inputs: names(&self.inputs),
+            held: names(&self.held),
+            outputs: names(&self.outputs),
+            biases: read(&self.bias, &mut problems),
+            triads: kept(triads, &mut problems),
+            drift: self.drift,
+            solver: self.exchange.map_or(Solver::Own, Solver::Host),
+            starts: self.tries,
+        };
+        if self.exchange.is_some_and(|tolerance| !(1e-13..=1e-2).contains(&tolerance)) {
+            problems.push("--exchange (allowed: tolerances from 1e-13 to 1e-2)".into());
+        }
+        ensure!(problems.is_empty(), "{}", problems.join("; "));
+        Ok(question)
+    }
+
+    fn model(&self, told: &Told, question: &Question) -> Result<Model> {
+        let path = crate::fmu::find(told.fmu)?;
+        let model = Model::open(&path, question.solver)?;
+        for what in model.changed() {
+            terminal::warn(format_args!(
+                "loading {} has changed this process's {what}",
+                path.display()
+            ));
+        }
+        Ok(model)
+    }
+
+    /// Identifies, writes and prints.
+    pub fn identify(&self, told: &Told, out: &Out) -> Result<()> {
+        let question = self.question(told)?;
+        let model = self.model(told, &question)?;
+        let columns = Columns::of_variables(list(told.columns))?;
+        let mut notes = Vec::new();
+        let mut records = Vec::new();
+        for path in told.data {
+            records.push(Record::read(
+                path,
+                &question,
+                model.description(),
+                &columns,
+                &mut |line| {
+                    terminal::note(&line);
+                    notes.push(line);
+                },
+            )?);
+        }
+        let spinner = progress::of_search()?;
+        let found = any_fmu::identify(&model, &question, &records, &mut |news| match news {
+            News::Detail(line) if !out.verbose => spinner.set_message(line.clone()),
+            news => progress::tell(&spinner, news.line()),
+        });
+        spinner.finish_and_clear();
+        let mut found = found?;
+        found.done.splice(0..0, notes);
+        let text = found.json()?;
+        atomically(out.result, |file| Ok(file.write_all(text.as_bytes())?))?;
+        if told.json {
+            print!("{text}");
+        } else {
+            tell(&found);
+        }
+        if found.fits == Some(false) || !found.converged {
+            terminal::warn("the result is not to be trusted; its verdict says why");
+        }
+        if let Some(path) = out.report {
+            let page = any_fmu::page(&found);
+            atomically(path, |file| Ok(file.write_all(page.as_bytes())?))?;
+            done!("{}", path.display());
+        }
+        done!("{}", out.result.display());
+        Ok(())
+    }
+
+    /// Says what recordings with these inputs will tell; `noise`: `OUTPUT=STD,…`.
+    pub fn design(&self, told: &Told, noise: &[String]) -> Result<()> {
+        let question = self.question(told)?;
+        let model = self.model(told, &question)?;
+        let columns = Columns::of_variables(list(told.columns))?;
+        let mut given = BTreeMap::new();
+        for item in noise.iter().flat_map(|flag| list(flag)) {
+            let (name, std) = super::setting(item)?;
+            let std: f64 = std.parse().with_context(|| format!("--noise {item}"))?;
+            given.insert(name, std);
+        }
+        let missing: Vec<&str> = question
+            .outputs
+            .iter()
+            .filter(|name| !given.contains_key(*name))
+            .map(String::as_str)
+            .collect();
+        ensure!(
+            missing.is_empty(),
+            "--noise OUTPUT=STD, the noise of a row, is not given of {}",
+            missing.join(", ")
+        );
+        let sizes: Vec<f64> = question.outputs.iter().map(|name| given[name]).collect();
+        let alone = Question { outputs: Vec::new(), ..question.clone() };
+        let mut records = Vec::new();
+        for path in told.data {
+            let read = Record::read(path, &alone, model.description(), &columns, &mut |_| {})?;
+            let outputs = vec![vec![0.0; read.time.len()]; question.outputs.len()];
+            records.push(Record { outputs, ..read });
+        }
+        ensure!(!records.is_empty(), "name the tables of inputs that are planned");
+        let bounds = foresee(&model, &question, &records, &sizes)?;
+        if told.json {
+            println!("{}", serde_json::to_string_pretty(&bounds)?);
+        } else {
+            foreseen(&bounds);
+        }
+        Ok(())
+    }
+}
+
+fn kept<T>(read: Vec<Result<T>>, problems: &mut Vec<String>) -> Vec<T> {
+    let mut items = Vec::new();
+    for item in read {
+        match item {
+            Ok(item) => items.push(item),
+            Err(error) => problems.push(format!("{error:#}")),
+        }
+    }
+    items
+}
+
+/// Prints tables and verdict.
+fn tell(found: &Identification) {
+    estimates(&[&found.parameters, &found.measurement]);
+    for line in any_fmu::lines(found).iter().chain(&found.verdict) {
+        println!("{line}");
+    }
+}
+
+fn foreseen(bounds: &[Bound]) {
+    println!(
+        "{:28} {:>12} {:>10} {:>9} {:>10}  most correlated with",
+        "", "value", "std", "std %", "if alone"
+    );
+    for b in bounds {
+        let percent = match b.value {
+            0.0 => "–".into(),
+            value => format!("{:.3}", (100.0 * b.std / value).abs()),
+        };
+        let with = b.with.as_ref().map_or(String::new(), |(name, r)| format!("{name} ({r:+.3})"));
+        println!(
+            "{:28} {:>12.5} {:>10.2e} {percent:>9} {:>10.1e}  {with}",
+            b.name, b.value, b.std, b.std_alone
+        );
+    }
+    let told = |b: &&Bound| match b.prior {
+        Some(prior) => b.std > 0.9 * prior,
+        None => b.std.is_nan() || b.std > b.value.abs(),
+    };
+    let untold: Vec<&str> =
+        bounds.iter().filter(|b| b.is_parameter).filter(told).map(|b| b.name.as_str()).collect();
+    if !untold.is_empty() {
+        println!("Nothing will be known of {} from these inputs.", untold.join(", "));
+    }
+}

@@ -1,0 +1,85 @@
+//! What a planned recording will tell: the Cramér–Rao bound of each unknown from its sensitivities along the planned inputs.
+
+use anyhow::{Result, ensure};
+use serde::Serialize;
+
+use super::covariance;
+use super::problem::Problem;
+use super::question::{Question, What};
+use super::record::Record;
+use super::simulate::{Model, Setup};
+use analysis::gauss_markov::Noise;
+
+/// The bound of one unknown.
+#[derive(Clone, Debug, Serialize)]
+pub struct Bound {
+    /// Its name.
+    pub name: String,
+    /// Its value in the plan.
+    pub value: f64,
+    /// The least standard deviation of an unbiased estimate; NaN: none can be made.
+    pub std: f64,
+    /// The same if all others were known.
+    pub std_alone: f64,
+    /// Standard deviation beforehand.
+    pub prior: Option<f64>,
+    /// Its unit.
+    pub unit: String,
+    /// The unknown with which it is most correlated, and how.
+    pub with: Option<(String, f64)>,
+    /// A parameter of the FMU, or one of the sensors.
+    pub is_parameter: bool,
+}
+
+/// Foresees what recordings with these inputs tell at the starts; `noise`: of a row of each output. Their outputs are not looked at.
+///
+/// # Errors
+/// All that is wrong with what is asked; what the FMU refuses.
+pub fn foresee(
+    model: &Model,
+    question: &Question,
+    records: &[Record],
+    noise: &[f64],
+) -> Result<Vec<Bound>> {
+    ensure!(
+        noise.iter().all(|sigma| *sigma > 0.0 && sigma.is_finite()),
+        "the noise of an output must be above 0"
+    );
+    let setup = Setup::new(question, model.description())?;
+    let unknowns = question.unknowns(model.description(), records)?;
+    let mut problem = Problem::new(model, &setup, records, unknowns, 1.0);
+    for channel in &mut problem.channels {
+        channel.noise = Noise::white(noise[channel.output]);
+        channel.sampled.fill(true);
+    }
+    let x = problem.start();
+    let motion = problem.answer(&x)?.motion;
+    let mut steps = problem.first_steps();
+    // the second time with steps that suit the noise
+    problem.jacobian(&x, &motion, &mut steps)?;
+    let jacobian = problem.jacobian(&x, &motion, &mut steps)?;
+    let all: Vec<usize> = (0..x.len()).collect();
+    let covariance = covariance(&jacobian, &all, x.len());
+    let bound = |j: usize| {
+        let unknown = &problem.unknowns[j];
+        let std = covariance[(j, j)].sqrt();
+        let correlation =
+            |k: usize| covariance[(j, k)] / (covariance[(j, j)] * covariance[(k, k)]).sqrt();
+        let with = all.iter().filter(|k| **k != j).map(|&k| (k, correlation(k)));
+        let with = with
+            .filter(|(_, r)| r.is_finite())
+            .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
+            .map(|(k, r)| (problem.unknowns[k].name.clone(), r));
+        Bound {
+            name: unknown.name.clone(),
+            value: x[j],
+            std: if std.is_finite() { std } else { f64::NAN },
+            std_alone: 1.0 / jacobian.column(j).norm(),
+            prior: unknown.prior.map(|(_, std)| std),
+            unit: unknown.unit.clone(),
+            with,
+            is_parameter: matches!(unknown.what, What::Parameter { .. }),
+        }
+    };
+    Ok(all.iter().map(|&j| bound(j)).collect())
+}

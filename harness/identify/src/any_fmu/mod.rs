@@ -1,0 +1,420 @@
+//! Identification of any FMU by output error: which values of its parameters and starts make its outputs those of the recordings.
+//!
+//! [`question`] says what is asked and with which unknowns, [`record`] reads, [`simulate`] runs the FMU (by its own solver, or by
+//! the host's in [`exchange`]), [`problem`] has the sum of squares, [`search`] its minimum and [`profile`] how sure it is;
+//! [`page`] shows it. What a planned recording will tell is in [`foresee`].
+
+pub mod exchange;
+pub mod foresee;
+mod page;
+pub mod problem;
+pub mod profile;
+pub mod question;
+pub mod record;
+pub mod search;
+pub mod simulate;
+
+use anyhow::{Result, ensure};
+use nalgebra::DMatrix;
+use serde::Serialize;
+
+use self::problem::{Channel, Motion, Problem};
+use self::profile::Interval;
+use self::question::{Question, Unknown, What};
+use self::record::Record;
+use self::search::{Curvature, DECREMENT, Minimum};
+use self::simulate::{Model, Setup};
+use crate::estimate::{Estimated, prose};
+use crate::methods::{Identified, Residual};
+use crate::news::News;
+use crate::verdict::{DOES_NOT_FIT, NO_MINIMUM};
+use analysis::innovations::{LIMIT, Tests, crossed};
+use analysis::statistics::{mean, variance};
+
+/// Correlation from which on two estimates are named as a pair.
+const CORRELATED: f64 = 0.98;
+/// Part of the prior's standard deviation that is left where the recordings say nothing.
+const PRIOR_ALONE: f64 = 0.9;
+/// Turns of noise and fit.
+const TURNS: usize = 4;
+
+/// What there is to say besides the estimates.
+#[derive(Clone, Debug, Serialize)]
+pub struct Details {
+    /// The outputs of the recordings.
+    pub outputs: Vec<Output>,
+    /// Estimates that the recordings do not determine.
+    pub not_determined: Vec<String>,
+    /// Estimates at a bound.
+    pub at_bound: Vec<String>,
+    /// Estimates whose interval is no ± about them.
+    pub not_quadratic: Vec<String>,
+    /// −2 ln L but for a constant.
+    pub deviance: f64,
+    /// Starts that were tried.
+    pub starts: usize,
+    /// Distance to the minimum in standard deviations.
+    pub decrement: f64,
+    /// Covariance of the estimates, in the order of the correlations' names.
+    pub covariance: Vec<Vec<f64>>,
+}
+
+/// One output of one recording.
+#[derive(Clone, Debug, Serialize)]
+pub struct Output {
+    /// The recording's name.
+    pub recording: String,
+    /// The output's.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// Rows with a value.
+    pub rows: usize,
+    /// White noise of a row.
+    pub noise_white: f64,
+    /// Gauss–Markov bias: standard deviation and correlation time, s.
+    pub drift: Option<(f64, f64)>,
+    /// 100 (1 − |y − ŷ|/|y − mean y|), %.
+    pub fit_percent: f64,
+    /// Tests of the residual.
+    pub tests: Tests,
+    /// Its mean over the mean's standard deviation.
+    pub mean: f64,
+}
+
+impl Output {
+    fn passed(&self) -> bool {
+        self.tests.passed() && self.mean.abs() < LIMIT
+    }
+}
+
+/// What is found of any FMU.
+pub type Identification = Identified<Details>;
+
+/// Identifies.
+///
+/// # Errors
+/// All that is wrong with what is asked; what the FMU refuses.
+pub fn identify(
+    model: &Model,
+    question: &Question,
+    records: &[Record],
+    news: &mut dyn FnMut(&News),
+) -> Result<Identification> {
+    ensure!(!records.is_empty(), "there is no recording");
+    let setup = Setup::new(question, model.description())?;
+    let unknowns = question.unknowns(model.description(), records)?;
+    let mut done = Vec::new();
+    let mut told = |words: &News| {
+        if let News::Step(line) = words {
+            done.push(line.clone());
+        }
+        news(words);
+    };
+    let problem = Problem::new(model, &setup, records, unknowns, 1e-3);
+    told(&News::Step(format!(
+        "{} unknowns, {} recordings, {} runs for a set of sensitivities",
+        problem.unknowns.len(),
+        records.len(),
+        problem.runs_of_jacobian()
+    )));
+    let (mut minimum, starts) = search::best(&problem, question.starts, &mut told)?;
+    let mut problem = problem;
+    for turn in 1..=TURNS {
+        let before: Vec<f64> = problem.channels.iter().map(|c| c.noise.white).collect();
+        let free = problem.unknowns.iter().filter(|unknown| unknown.prior.is_none()).count();
+        let jumps = problem.leave_out_jumps(&minimum.answer.motion);
+        if jumps > 0 {
+            told(&News::Step(format!("{jumps} rows beside which an output jumps are left out")));
+        }
+        problem.estimate_noise(&minimum.answer.motion, &minimum.x, free, question.drift);
+        let changes = problem.channels.iter().zip(&before);
+        let change = changes.map(|(c, b)| (c.noise.white / b).ln().abs()).fold(0.0, f64::max);
+        if turn > 2 && change < 0.01 && minimum.converged() {
+            break;
+        }
+        told(&News::Step(format!("noise estimated, turn {turn}")));
+        minimum = search::search(&problem, &minimum.x, minimum.steps, DECREMENT, 30, &mut told)?;
+    }
+    // the last noise is that of the last minimum
+    minimum.answer.e = problem.stacked(&minimum.answer.motion, &minimum.x);
+    told(&News::Step("intervals from the profiles of the likelihood".into()));
+    let mut found = answer(&problem, &minimum, question);
+    found.details.starts = starts;
+    found.done = done;
+    Ok(found)
+}
+
+/// The covariance of all unknowns; rows of those at a bound are 0.
+pub(crate) fn covariance(jacobian: &DMatrix<f64>, which: &[usize], n: usize) -> DMatrix<f64> {
+    let inverse = Curvature::of(jacobian, which).inverse();
+    let mut all = DMatrix::zeros(n, n);
+    for (a, &i) in which.iter().enumerate() {
+        for (b, &j) in which.iter().enumerate() {
+            all[(i, j)] = inverse[(a, b)];
+        }
+    }
+    all
+}
+
+fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Identification {
+    let n = minimum.x.len();
+    let inner = minimum.inner(&problem.unknowns);
+    let covariance = covariance(&minimum.jacobian, &inner, n);
+    let curvature_alone = |j: usize| 1.0 / minimum.jacobian.column(j).norm();
+    // where differences end before the minimum, how far it may be off is part of how sure it is
+    let widened = (1.0 + minimum.decrement.powi(2)).sqrt();
+    // at a bound: as far as it would go with the others held
+    let std: Vec<f64> = (0..n)
+        .map(|j| match inner.contains(&j) {
+            true => widened * covariance[(j, j)].sqrt(),
+            false => curvature_alone(j),
+        })
+        .collect();
+    let intervals = profile::intervals(problem, minimum, &std);
+    let outputs = outputs(problem, &minimum.answer.motion, &minimum.x, question);
+    let mut found = Identified::new(Details {
+        outputs,
+        not_determined: Vec::new(),
+        at_bound: Vec::new(),
+        not_quadratic: Vec::new(),
+        deviance: problem.deviance(&minimum.answer),
+        starts: 1,
+        decrement: minimum.decrement,
+        covariance: (0..n)
+            .map(|i| covariance.row(i).iter().copied().map(finite).collect())
+            .collect(),
+    });
+    let names: Vec<String> = problem.unknowns.iter().map(|u| u.name.clone()).collect();
+    let correlation = |i: usize, j: usize| {
+        let size = (covariance[(i, i)] * covariance[(j, j)]).sqrt();
+        if size > 0.0 && size.is_finite() { covariance[(i, j)] / size } else { f64::from(i == j) }
+    };
+    let correlations: Vec<Vec<f64>> =
+        (0..n).map(|i| (0..n).map(|j| correlation(i, j)).collect()).collect();
+    found.converged = minimum.converged();
+    let fits = found.details.outputs.iter().all(Output::passed);
+    found.fits = Some(fits);
+    let mut words = vec![fit_in_words(&found.details.outputs)];
+    if !found.converged {
+        words.push(format!(
+            "{NO_MINIMUM}: it ended {:.1} standard deviations from it",
+            minimum.decrement
+        ));
+    }
+    for (j, unknown) in problem.unknowns.iter().enumerate() {
+        let interval = &intervals[j];
+        let e = Estimated {
+            value: minimum.x[j],
+            std: finite(std[j]),
+            std_noise: finite(std[j]),
+            interval: interval.ends.map(finite),
+            unit: unknown.unit.clone(),
+        };
+        say(unknown, &e, interval, inner.contains(&j), std[j], &mut found.details, &mut words);
+        match unknown.what {
+            What::Parameter { .. } => found.parameters.insert(unknown.name.clone(), e),
+            What::Bias { .. } | What::Gain { .. } => {
+                found.measurement.insert(unknown.name.clone(), e)
+            }
+        };
+    }
+    for i in 0..n {
+        for j in 0..i {
+            if correlations[i][j].abs() > CORRELATED {
+                words.push(format!(
+                    "{} and {} are told apart poorly (correlation {:+.3}): the recordings know a combination of them better than \
+                     each",
+                    names[j], names[i], correlations[i][j]
+                ));
+            }
+        }
+    }
+    found.correlations = (names, correlations);
+    found.verdict = words;
+    let residuals = problem.residuals(&minimum.answer.motion, &minimum.x);
+    found.residuals = problem
+        .channels
+        .iter()
+        .zip(&residuals)
+        .map(|(channel, residual)| {
+            let record = &problem.records[channel.recording];
+            let picked = |values: &[f64]| -> Vec<f64> {
+                let there = values.iter().zip(&channel.sampled).filter(|(_, sampled)| **sampled);
+                there.map(|(value, _)| *value).collect()
+            };
+            Residual {
+                name: format!("{}, {}", record.name, question.outputs[channel.output]),
+                time: picked(&record.time),
+                measured: picked(&record.outputs[channel.output]),
+                residual: picked(residual),
+            }
+        })
+        .collect();
+    found
+}
+
+/// JSON knows no infinity.
+fn finite(value: f64) -> f64 {
+    if value.is_finite() { value } else { f64::NAN }
+}
+
+/// What is to be said about one estimate.
+fn say(
+    unknown: &Unknown,
+    e: &Estimated,
+    interval: &Interval,
+    is_inner: bool,
+    std: f64,
+    details: &mut Details,
+    words: &mut Vec<String>,
+) {
+    let name = &unknown.name;
+    let unit = prose(&unknown.unit);
+    let unit = if unit == "1" || unit.is_empty() { String::new() } else { format!(" {unit}") };
+    if !std.is_finite() || interval.ended == [false, false] && is_inner {
+        details.not_determined.push(name.clone());
+        words.push(match std.is_finite() {
+            false => format!("{name} is not determined: no output depends on it by itself"),
+            true => format!(
+                "{name} is not determined: any value from {:.4e} to {:.4e}{unit} fits as well",
+                interval.ends[0], interval.ends[1]
+            ),
+        });
+        return;
+    }
+    if let Some((mean, beforehand)) = unknown.prior
+        && std > PRIOR_ALONE * beforehand
+    {
+        details.not_determined.push(name.clone());
+        words.push(format!(
+            "{name} is not determined by the recordings: {:.4e} ± {std:.1e}{unit} is what was known beforehand ({mean:.4e} ± \
+             {beforehand:.1e})",
+            e.value
+        ));
+        return;
+    }
+    if !is_inner {
+        let upper = e.value >= unknown.bounds.1;
+        let (which, other) = if upper { ("upper", 0) } else { ("lower", 1) };
+        details.at_bound.push(name.clone());
+        words.push(format!(
+            "{name} is at its {which} bound, {}{unit}: the recordings want to go further; its 95 % interval reaches from there to \
+             {:.4e}{unit}",
+            e.value, interval.ends[other]
+        ));
+    } else if !interval.quadratic {
+        details.not_quadratic.push(name.clone());
+        let open = match interval.ended {
+            [true, true] => String::new(),
+            [false, _] => "; to the left it has no end but the bound".into(),
+            [_, false] => "; to the right it has no end but the bound".into(),
+        };
+        words.push(format!(
+            "{name}: the likelihood is no parabola; its 95 % interval is {:.5e} to {:.5e}{unit}{open}",
+            interval.ends[0], interval.ends[1]
+        ));
+    }
+}
+
+fn fit_in_words(outputs: &[Output]) -> String {
+    let failed = |o: &&Output| !o.passed();
+    let worst = outputs.iter().filter(failed).max_by(|a, b| {
+        a.tests.worst().max(a.mean.abs()).total_cmp(&b.tests.worst().max(b.mean.abs()))
+    });
+    let Some(o) = worst else {
+        return "The model fits: the residual of every output is noise.".into();
+    };
+    let t = &o.tests;
+    let mut why = Vec::new();
+    for (value, what) in [
+        (o.mean.abs(), "its mean is not 0"),
+        (t.whiteness, "it is not white"),
+        (t.in_frequency.0, "some frequencies stand out"),
+        (t.torque, "it follows an input"),
+        (t.torque_squared, "it follows an input's square"),
+    ] {
+        if value >= LIMIT {
+            why.push(format!("{what} ({value:.0} standard deviations of chance)"));
+        }
+    }
+    if t.in_time.0 >= LIMIT {
+        why.push(format!("it is larger from t = {:.1} s ({:.0})", t.in_time.1, t.in_time.0));
+    }
+    let count = outputs.iter().filter(failed).count();
+    format!(
+        "{DOES_NOT_FIT}: the residual of {count} of {} outputs is not noise; {} of {}: {}. No interval is to be trusted.",
+        outputs.len(),
+        o.name,
+        o.recording,
+        why.join(", ")
+    )
+}
+
+fn outputs(problem: &Problem, motion: &Motion, x: &[f64], question: &Question) -> Vec<Output> {
+    let residuals = problem.residuals(motion, x);
+    let innovations = problem.innovations(motion, x);
+    let one = |((channel, e), residual): ((&Channel, &Vec<f64>), &Vec<f64>)| {
+        let record = &problem.records[channel.recording];
+        let picked = |values: &[f64]| -> Vec<f64> {
+            let there = values.iter().zip(&channel.sampled).filter(|(_, sampled)| **sampled);
+            there.map(|(value, _)| *value).collect()
+        };
+        let (time, e) = (picked(&record.time), picked(e));
+        let white = channel.noise.white;
+        let inputs: Vec<Vec<f64>> = record.inputs.iter().map(|input| picked(input)).collect();
+        let none = vec![0.0; time.len()];
+        let mut tests = Tests::of(&time, inputs.first().unwrap_or(&none), &e, white);
+        let count = e.len() as f64;
+        let step = (time[time.len() - 1] - time[0]) / (count - 1.0);
+        let centred: Vec<f64> = e.iter().map(|v| v - mean(&e)).collect();
+        for input in inputs.iter().skip(1) {
+            let squared: Vec<f64> = input.iter().map(|u| u * u).collect();
+            tests.torque = tests.torque.max(crossed(&centred, input, step));
+            tests.torque_squared = tests.torque_squared.max(crossed(&centred, &squared, step));
+        }
+        let measured = picked(&record.outputs[channel.output]);
+        let squares: f64 = residual.iter().map(|r| r * r).sum();
+        let name = &question.outputs[channel.output];
+        let description = problem.model.description();
+        let unit = description.variable(name).map_or("", |v| description.unit(v));
+        Output {
+            recording: record.name.clone(),
+            name: name.clone(),
+            unit: unit.into(),
+            rows: e.len(),
+            noise_white: white,
+            drift: (channel.noise.drift > 0.0)
+                .then_some((channel.noise.drift * white, channel.noise.time)),
+            fit_percent: 100.0 * (1.0 - (squares / (count * variance(&measured))).sqrt()),
+            tests,
+            mean: mean(&e) * count.sqrt(),
+        }
+    };
+    problem.channels.iter().zip(&innovations).zip(&residuals).map(one).collect()
+}
+
+/// Lines for a terminal, below the table of estimates.
+pub fn lines(found: &Identification) -> Vec<String> {
+    let mut lines = vec![format!(
+        "{:24} {:>8} {:>12} {:>8} {:>10}",
+        "output", "rows", "noise", "fit %", "worst test"
+    )];
+    for o in &found.details.outputs {
+        lines.push(format!(
+            "{:24} {:>8} {:>12.3e} {:>8.2} {:>10.1}  {}",
+            o.name,
+            o.rows,
+            o.noise_white,
+            o.fit_percent,
+            o.tests.worst().max(o.mean.abs()),
+            o.recording
+        ));
+    }
+    lines
+}
+
+/// The page, in HTML.
+pub fn page(found: &Identification) -> String {
+    page::of(found)
+}

@@ -1,0 +1,338 @@
+//! The sum of squares that the identification of any FMU minimises, and its derivatives.
+//!
+//! ```text
+//! Σ e_k² + Σ ((x_i − μ_i)/s_i)²,   e = whitened( y_ok − y_o(t_k; x) − Σ_j M_oj y_j(t_k; x) − b_o )
+//! ```
+//!
+//! y are the FMU's outputs, M and b the errors of the sensors, the whitening filter that of [`analysis::gauss_markov`], the second
+//! sum what is known beforehand.
+//!
+//! Derivatives by M and b are exact. Those by what is set in the FMU are central differences of whole runs, over a step that moves
+//! the answer by [`MOVE`] standard deviations: the secant over what the recordings can tell apart. It is large against the solver's
+//! errors, and it is a derivative in the mean where an event moves across a row and the residual jumps.
+//! `fmi2GetDirectionalDerivative` is not used: what is free is set before initialization, and after it FMI 2.0 gives derivatives by
+//! states and inputs alone (2.0.5, section 2.1.9). The variational equations would need ∂f/∂p by differences all the same,
+//! and jump at each event.
+
+use anyhow::Result;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::question::{Unknown, What};
+use super::record::Record;
+use super::simulate::{Model, Setup, Value};
+use analysis::gauss_markov::{Noise, Whitening};
+use analysis::statistics::median;
+
+/// By how much a difference moves the answer to either side, in units of the noise's norm of one degree of freedom.
+const MOVE: f64 = 0.5;
+/// Bounds of the differences' steps, in units of an unknown's reach.
+const STEPS: (f64, f64) = (1e-7, 2e-2);
+/// The first step, in the same units.
+const FIRST_STEP: f64 = 1e-3;
+/// Second difference of an output that counts as a jump: in standard deviations of its noise, and in medians of all.
+const JUMP: (f64, f64) = (8.0, 20.0);
+
+/// An output of a recording with its noise.
+#[derive(Clone, Debug)]
+pub struct Channel {
+    /// Number of the recording.
+    pub recording: usize,
+    /// Number of the output.
+    pub output: usize,
+    /// Its noise.
+    pub noise: Noise,
+    /// Which rows have a value.
+    pub sampled: Vec<bool>,
+}
+
+/// The FMU's outputs by recording, output and row.
+pub type Motion = Vec<Vec<Vec<f64>>>;
+
+/// A model, recordings and unknowns.
+#[derive(Clone)]
+pub struct Problem<'a> {
+    /// The FMU.
+    pub model: &'a Model,
+    /// How it is set up.
+    pub setup: &'a Setup,
+    /// What is fitted, together.
+    pub records: &'a [Record],
+    /// What is estimated.
+    pub unknowns: Vec<Unknown>,
+    /// Outputs with their noise.
+    pub channels: Vec<Channel>,
+}
+
+/// Answers of the FMU to one set of values.
+#[derive(Clone)]
+pub struct Answer {
+    /// Its outputs.
+    pub motion: Motion,
+    /// Residuals over their standard deviation, then what is known beforehand.
+    pub e: DVector<f64>,
+}
+
+impl<'a> Problem<'a> {
+    /// With white noise of the size that each output shows from row to row; a `floor` is the least, in parts of its spread.
+    pub fn new(
+        model: &'a Model,
+        setup: &'a Setup,
+        records: &'a [Record],
+        unknowns: Vec<Unknown>,
+        floor: f64,
+    ) -> Self {
+        let mut channels = Vec::new();
+        for (recording, record) in records.iter().enumerate() {
+            for output in 0..record.outputs.len() {
+                let white = record.noise(output).max(floor * record.spread(output));
+                let sampled = record.sampled(output);
+                channels.push(Channel { recording, output, noise: Noise::white(white), sampled });
+            }
+        }
+        Problem { model, setup, records, unknowns, channels }
+    }
+
+    /// The starts.
+    pub fn start(&self) -> Vec<f64> {
+        self.unknowns.iter().map(|unknown| unknown.start).collect()
+    }
+
+    /// Steps of the first differences.
+    pub fn first_steps(&self) -> Vec<f64> {
+        self.unknowns.iter().map(|unknown| FIRST_STEP * unknown.reach).collect()
+    }
+
+    fn values(&self, x: &[f64], number: usize) -> Vec<Value> {
+        let of = |(unknown, &x): (&Unknown, &f64)| match unknown.what {
+            What::Parameter { reference, recording } => {
+                recording.is_none_or(|of| of == number).then_some((reference, x))
+            }
+            _ => None,
+        };
+        self.unknowns.iter().zip(x).filter_map(of).collect()
+    }
+
+    fn run(&self, x: &[f64], number: usize) -> Result<Vec<Vec<f64>>> {
+        self.setup.run(self.model, &self.values(x, number), number, &self.records[number])
+    }
+
+    /// The FMU's answer for x.
+    pub fn answer(&self, x: &[f64]) -> Result<Answer> {
+        let runs = (0..self.records.len()).into_par_iter().map(|number| self.run(x, number));
+        let motion = runs.collect::<Result<Motion>>()?;
+        let e = self.stacked(&motion, x);
+        Ok(Answer { motion, e })
+    }
+
+    /// Measured less modelled, for each channel; 0 where nothing was read.
+    pub fn residuals(&self, motion: &Motion, x: &[f64]) -> Vec<Vec<f64>> {
+        let of = |channel: &Channel| {
+            let (outputs, number) = (&motion[channel.recording], channel.output);
+            let mut residual: Vec<f64> = self.records[channel.recording].outputs[number]
+                .iter()
+                .zip(&outputs[number])
+                .map(|(y, model)| if y.is_nan() { 0.0 } else { y - model })
+                .collect();
+            for (unknown, x) in self.unknowns.iter().zip(x) {
+                if let Some(shape) = sensor(unknown, channel, outputs) {
+                    residual.iter_mut().enumerate().for_each(|(k, r)| *r -= x * shape(k));
+                }
+            }
+            residual.iter_mut().zip(&channel.sampled).for_each(|(r, s)| *r *= f64::from(*s));
+            residual
+        };
+        self.channels.iter().map(of).collect()
+    }
+
+    fn filters(&self) -> Vec<Whitening> {
+        let filter = |channel: &Channel| {
+            let time = &self.records[channel.recording].time;
+            channel.noise.whitening(time, Some(&channel.sampled))
+        };
+        self.channels.iter().map(filter).collect()
+    }
+
+    /// Residuals over their standard deviation, a vector a channel.
+    pub fn innovations(&self, motion: &Motion, x: &[f64]) -> Vec<Vec<f64>> {
+        let mut residuals = self.residuals(motion, x);
+        residuals.iter_mut().zip(self.filters()).for_each(|(r, filter)| filter.apply(r));
+        residuals
+    }
+
+    /// Innovations and what is known beforehand.
+    pub fn stacked(&self, motion: &Motion, x: &[f64]) -> DVector<f64> {
+        let mut all = self.innovations(motion, x).concat();
+        for (unknown, x) in self.unknowns.iter().zip(x) {
+            if let Some((mean, std)) = unknown.prior {
+                all.push((x - mean) / std);
+            }
+        }
+        DVector::from_vec(all)
+    }
+
+    /// −2 ln L of recordings and priors but for a constant.
+    pub fn deviance(&self, answer: &Answer) -> f64 {
+        answer.e.norm_squared() + self.filters().iter().map(Whitening::log_variance).sum::<f64>()
+    }
+
+    /// Derivatives of the stacked innovations at x, where the motion is `base`. `steps` of the differences are made anew.
+    ///
+    /// # Errors
+    /// If the FMU refuses every step of an unknown.
+    pub fn jacobian(&self, x: &[f64], base: &Motion, steps: &mut [f64]) -> Result<DMatrix<f64>> {
+        let filters = self.filters();
+        let column = |j: usize| -> Result<DVector<f64>> {
+            let unknown = &self.unknowns[j];
+            let mut pieces = match unknown.what {
+                What::Parameter { recording, .. } => {
+                    self.difference(x, j, recording, base, steps[j])?
+                }
+                _ => self
+                    .channels
+                    .iter()
+                    .map(|channel| {
+                        let rows = channel.sampled.len();
+                        match sensor(unknown, channel, &base[channel.recording]) {
+                            None => vec![0.0; rows],
+                            Some(shape) => (0..rows).map(|k| -shape(k)).collect(),
+                        }
+                    })
+                    .collect(),
+            };
+            for ((piece, channel), filter) in pieces.iter_mut().zip(&self.channels).zip(&filters) {
+                piece.iter_mut().zip(&channel.sampled).for_each(|(v, s)| *v *= f64::from(*s));
+                filter.apply(piece);
+            }
+            let mut all = pieces.concat();
+            for (i, unknown) in self.unknowns.iter().enumerate() {
+                if let Some((_, std)) = unknown.prior {
+                    all.push(if i == j { 1.0 / std } else { 0.0 });
+                }
+            }
+            Ok(DVector::from_vec(all))
+        };
+        let columns =
+            (0..x.len()).into_par_iter().map(column).collect::<Result<Vec<DVector<f64>>>>()?;
+        let found = DMatrix::from_columns(&columns);
+        for (j, step) in steps.iter_mut().enumerate() {
+            let reach = self.unknowns[j].reach;
+            *step = (MOVE / found.column(j).norm()).clamp(STEPS.0 * reach, STEPS.1 * reach);
+        }
+        Ok(found)
+    }
+
+    /// Central difference of the residuals by one unknown; at a bound, or where the FMU refuses one side, the other side alone.
+    fn difference(
+        &self,
+        x: &[f64],
+        j: usize,
+        only: Option<usize>,
+        base: &Motion,
+        step: f64,
+    ) -> Result<Vec<Vec<f64>>> {
+        let (low, high) = self.unknowns[j].bounds;
+        let side = |by: f64| -> Result<(f64, Motion)> {
+            let mut moved = x.to_vec();
+            moved[j] = (x[j] + by).clamp(low, high);
+            let runs = (0..self.records.len()).into_par_iter().map(|number| match only {
+                Some(of) if of != number => Ok(base[number].clone()),
+                _ => self.run(&moved, number),
+            });
+            Ok((moved[j], runs.collect::<Result<Motion>>()?))
+        };
+        let (ahead, behind) = rayon::join(|| side(step), || side(-step));
+        let here = || (x[j], base.clone());
+        let (ahead, behind) = match (ahead, behind) {
+            (Err(error), Err(_)) => return Err(error),
+            (ahead, behind) => {
+                (ahead.unwrap_or_else(|_| here()), behind.unwrap_or_else(|_| here()))
+            }
+        };
+        let (mut to, mut from) = (x.to_vec(), x.to_vec());
+        (to[j], from[j]) = (ahead.0, behind.0);
+        let (to, from) = (self.residuals(&ahead.1, &to), self.residuals(&behind.1, &from));
+        let width = ahead.0 - behind.0;
+        let slope = |(a, b): (&Vec<f64>, &Vec<f64>)| -> Vec<f64> {
+            a.iter().zip(b).map(|(a, b)| (a - b) / width).collect()
+        };
+        Ok(to.iter().zip(&from).map(slope).collect())
+    }
+
+    /// Leaves out the rows beside which the model's outputs jump: an event that the estimate has on the wrong side of a row would be
+    /// a wall in the cost, and the row says nothing of how far it is off. Says how many rows these are.
+    pub fn leave_out_jumps(&mut self, motion: &Motion) -> usize {
+        let mut count = 0;
+        for channel in &mut self.channels {
+            let y = &motion[channel.recording][channel.output];
+            channel.sampled = self.records[channel.recording].sampled(channel.output);
+            let bends: Vec<f64> = y.windows(3).map(|y| (y[2] - 2.0 * y[1] + y[0]).abs()).collect();
+            let usual = median(&bends).unwrap_or(0.0);
+            let limit = (JUMP.0 * channel.noise.white).max(JUMP.1 * usual);
+            for (k, _) in bends.iter().enumerate().filter(|(_, bend)| **bend > limit) {
+                count += usize::from(channel.sampled[k + 1]);
+                channel.sampled[k + 1] = false;
+            }
+        }
+        count
+    }
+
+    /// Runs that a Jacobian needs.
+    pub fn runs_of_jacobian(&self) -> usize {
+        let one = |unknown: &Unknown| match unknown.what {
+            What::Parameter { recording: Some(_), .. } => 2,
+            What::Parameter { recording: None, .. } => 2 * self.records.len(),
+            _ => 0,
+        };
+        self.unknowns.iter().map(one).sum()
+    }
+
+    /// Estimates the noise of each channel from the residual at x, of which `free` degrees of freedom are fitted.
+    pub fn estimate_noise(&mut self, motion: &Motion, x: &[f64], free: usize, drift: bool) {
+        let residuals = self.residuals(motion, x);
+        let all: usize = self.channels.iter().map(Channel::count).sum();
+        let lost = 1.0 - (free as f64 / all as f64).min(0.5);
+        let of = |(channel, residual): (&Channel, &Vec<f64>)| {
+            let record = &self.records[channel.recording];
+            let squares: f64 = residual.iter().map(|r| r * r).sum();
+            let least = 1e-9 * record.spread(channel.output);
+            let rms = (squares / (lost * channel.count() as f64)).sqrt().max(least);
+            if !drift {
+                return Noise::white(rms);
+            }
+            // in units of its size, which may be any
+            let unit: Vec<f64> = residual.iter().map(|r| r / rms).collect();
+            let found = Noise::of(&record.time, &unit, Some(&channel.sampled));
+            Noise { white: found.white * rms / lost.sqrt(), ..found }
+        };
+        let noises: Vec<Noise> = self.channels.par_iter().zip(&residuals).map(of).collect();
+        self.channels.iter_mut().zip(noises).for_each(|(channel, noise)| channel.noise = noise);
+    }
+}
+
+impl Channel {
+    /// Rows with a value.
+    pub fn count(&self) -> usize {
+        self.sampled.iter().filter(|sampled| **sampled).count()
+    }
+}
+
+/// What a unit of a sensor's unknown adds to a channel's reading, row by row; `None`: nothing.
+fn sensor<'m>(
+    unknown: &Unknown,
+    channel: &Channel,
+    outputs: &'m [Vec<f64>],
+) -> Option<Box<dyn Fn(usize) -> f64 + 'm>> {
+    match unknown.what {
+        What::Bias { output, recording }
+            if (output, recording) == (channel.output, channel.recording) =>
+        {
+            Some(Box::new(|_| 1.0))
+        }
+        What::Gain { output, of } if output == channel.output => {
+            let other = &outputs[of];
+            Some(Box::new(move |k| other[k]))
+        }
+        _ => None,
+    }
+}

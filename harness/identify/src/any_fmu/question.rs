@@ -1,0 +1,451 @@
+//! What is asked of an FMU's identification, as text and with the FMU's own names, units and bounds.
+
+use std::str::FromStr;
+
+use anyhow::{Context, Error, Result, bail, ensure};
+use host::description::{ModelDescription, Type, Variable};
+
+use super::record::Record;
+
+/// Ends the name of an unknown that each recording has one of.
+pub const EACH: &str = "@each";
+
+/// `NAME=START[:LOW:HIGH]` or `NAME@each=START[:LOW:HIGH]`: a Real of the FMU that is set before it is initialised.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Free {
+    /// By its name in the FMU.
+    pub name: String,
+    /// Each recording has its own, as a start has.
+    pub each: bool,
+    /// Where the search begins.
+    pub start: f64,
+    /// Bounds; `None`: the FMU's min and max.
+    pub bounds: Option<(f64, f64)>,
+}
+
+impl FromStr for Free {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let (name, value) = named(text)?;
+        let values = numbers(value).with_context(|| format!("--free {text}"))?;
+        let (start, bounds) = match values[..] {
+            [start] => (start, None),
+            [start, low, high] if low < high => (start, Some((low, high))),
+            _ => {
+                bail!("--free {text} (allowed: NAME=START or NAME=START:LOW:HIGH with LOW < HIGH)")
+            }
+        };
+        ensure!(start.is_finite(), "--free {text}: START must be finite");
+        if let Some((low, high)) = bounds {
+            ensure!(
+                (low..=high).contains(&start),
+                "--free {text}: START must lie between LOW and HIGH"
+            );
+        }
+        let each = name.ends_with(EACH);
+        Ok(Free { name: name.trim_end_matches(EACH).into(), each, start, bounds })
+    }
+}
+
+/// `NAME=MEAN:STD`: what is known of an unknown beforehand.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prior {
+    /// The unknown's name, as the result has it.
+    pub name: String,
+    /// Mean.
+    pub mean: f64,
+    /// Standard deviation.
+    pub std: f64,
+}
+
+impl FromStr for Prior {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let (name, value) = named(text)?;
+        match numbers(value).with_context(|| format!("--prior {text}"))?[..] {
+            [mean, std] if mean.is_finite() && std.is_finite() && std > 0.0 => {
+                Ok(Prior { name: name.into(), mean, std })
+            }
+            _ => bail!("--prior {text} (allowed: NAME=MEAN:STD with STD above 0)"),
+        }
+    }
+}
+
+/// `OUTPUT` or `OUTPUT=STD`: a sensor with a bias, another one in each recording, of which STD is known beforehand.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bias {
+    /// The output.
+    pub output: String,
+    /// Standard deviation about 0.
+    pub std: Option<f64>,
+}
+
+impl FromStr for Bias {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let Ok((output, value)) = named(text) else {
+            return Ok(Bias { output: text.trim().into(), std: None });
+        };
+        match numbers(value).with_context(|| format!("--bias {text}"))?[..] {
+            [std] if std.is_finite() && std > 0.0 => {
+                Ok(Bias { output: output.into(), std: Some(std) })
+            }
+            _ => bail!("--bias {text} (allowed: OUTPUT or OUTPUT=STD with STD above 0)"),
+        }
+    }
+}
+
+/// `A,B,C=SCALE:ANGLE`: three outputs read by one instrument with three axes. A reading is
+/// y_i = Σ (δ_ij + M_ij) ω_j; of the M_ii, errors of scale, SCALE is the standard deviation, of the others, alignment, ANGLE (rad).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Triad {
+    /// The outputs.
+    pub outputs: [String; 3],
+    /// Standard deviation of the errors of scale.
+    pub scale: f64,
+    /// Standard deviation of the alignment, rad.
+    pub angle: f64,
+}
+
+impl FromStr for Triad {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let allowed =
+            || format!("--triad {text} (allowed: OUTPUT,OUTPUT,OUTPUT=SCALE:ANGLE, both above 0)");
+        let (names, value) = named(text).with_context(allowed)?;
+        let outputs = list(names).map(String::from).collect::<Vec<_>>().try_into();
+        match (outputs, &numbers(value).with_context(allowed)?[..]) {
+            (Ok(outputs), [scale, angle]) if *scale > 0.0 && *angle > 0.0 => {
+                Ok(Triad { outputs, scale: *scale, angle: *angle })
+            }
+            _ => bail!(allowed()),
+        }
+    }
+}
+
+/// `NAME=VALUE` or, of the second recording alone, `NAME@2=VALUE`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Setting {
+    /// By its name in the FMU.
+    pub name: String,
+    /// The recording, from 0; `None`: all.
+    pub recording: Option<usize>,
+    /// The value as text.
+    pub value: String,
+}
+
+impl FromStr for Setting {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let (name, value) = named(text)?;
+        let (name, recording) = match name.rsplit_once('@') {
+            None => (name, None),
+            Some((name, number)) => {
+                let number: usize = number.parse().ok().filter(|n| *n > 0).with_context(|| {
+                    format!("--set {text} (allowed: NAME=VALUE or NAME@RECORDING=VALUE, from 1)")
+                })?;
+                (name, Some(number - 1))
+            }
+        };
+        Ok(Setting { name: name.into(), recording, value: value.into() })
+    }
+}
+
+/// Whose solver steps the FMU.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Solver {
+    /// The FMU's (Co-Simulation).
+    Own,
+    /// The host's (Model Exchange), with this relative tolerance.
+    Host(f64),
+}
+
+/// What is asked.
+#[derive(Clone, Debug)]
+pub struct Question {
+    /// What is estimated.
+    pub free: Vec<Free>,
+    /// What is known of it beforehand.
+    pub priors: Vec<Prior>,
+    /// What is set.
+    pub settings: Vec<Setting>,
+    /// Inputs that are driven.
+    pub inputs: Vec<String>,
+    /// Those of them that are held from row to row; the others go along lines.
+    pub held: Vec<String>,
+    /// Outputs that were recorded.
+    pub outputs: Vec<String>,
+    /// Sensors with a bias.
+    pub biases: Vec<Bias>,
+    /// Instruments with three axes.
+    pub triads: Vec<Triad>,
+    /// Whether the noise of each output also drifts.
+    pub drift: bool,
+    /// Whose solver steps the FMU.
+    pub solver: Solver,
+    /// Starts that are drawn within the bounds where the search from the first one ends at no good fit.
+    pub starts: usize,
+}
+
+/// What an unknown is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum What {
+    /// A Real of the FMU, of one recording or of all.
+    Parameter {
+        /// Its value reference.
+        reference: u32,
+        /// `None`: of all.
+        recording: Option<usize>,
+    },
+    /// Reading of an output's sensor at 0, in one recording.
+    Bias {
+        /// The output.
+        output: usize,
+        /// The recording.
+        recording: usize,
+    },
+    /// What of one output is in another's reading, besides the output itself.
+    Gain {
+        /// The output that is read.
+        output: usize,
+        /// The output that is in it.
+        of: usize,
+    },
+}
+
+/// One unknown.
+#[derive(Clone, Debug)]
+pub struct Unknown {
+    /// Its name in the result.
+    pub name: String,
+    /// What it is.
+    pub what: What,
+    /// Its unit.
+    pub unit: String,
+    /// Where the search begins.
+    pub start: f64,
+    /// Bounds.
+    pub bounds: (f64, f64),
+    /// Mean and standard deviation beforehand.
+    pub prior: Option<(f64, f64)>,
+    /// How far from the start it may well be.
+    pub reach: f64,
+}
+
+impl Question {
+    /// The unknowns, in the result's order.
+    ///
+    /// # Errors
+    /// All that is wrong with names, types, bounds and priors.
+    pub fn unknowns(
+        &self,
+        description: &ModelDescription,
+        records: &[Record],
+    ) -> Result<Vec<Unknown>> {
+        let (mut unknowns, mut problems) = (Vec::new(), Vec::new());
+        let mut add = |made: Result<Vec<Unknown>>| match made {
+            Ok(made) => unknowns.extend(made),
+            Err(error) => problems.push(format!("{error:#}")),
+        };
+        for free in &self.free {
+            add(parameters(free, description, records.len()));
+        }
+        for triad in &self.triads {
+            add(self.gains(triad));
+        }
+        for bias in &self.biases {
+            add(self.bias(bias, description, records));
+        }
+        for prior in &self.priors {
+            let at = unknowns.iter_mut().find(|unknown: &&mut Unknown| unknown.name == prior.name);
+            match at {
+                Some(unknown) => unknown.prior = Some((prior.mean, prior.std)),
+                None => problems.push(format!("--prior {}: it is not free", prior.name)),
+            }
+        }
+        for (k, unknown) in unknowns.iter().enumerate() {
+            if unknowns[..k].iter().any(|other| other.name == unknown.name) {
+                problems.push(format!("{} is free twice", unknown.name));
+            }
+        }
+        for setting in &self.settings {
+            if let Some(n) = setting.recording.filter(|n| *n >= records.len()) {
+                problems.push(format!(
+                    "--set {}@{}: there are {} recordings",
+                    setting.name,
+                    n + 1,
+                    records.len()
+                ));
+            }
+        }
+        ensure!(problems.is_empty(), "{}", problems.join("; "));
+        ensure!(!unknowns.is_empty(), "nothing is free: name what is estimated with --free");
+        Ok(unknowns)
+    }
+
+    /// Where an output stands in the list.
+    fn output(&self, name: &str) -> Result<usize> {
+        let found = self.outputs.iter().position(|output| output == name);
+        found.with_context(|| {
+            format!("{name} is not among the outputs ({})", self.outputs.join(", "))
+        })
+    }
+
+    fn gains(&self, triad: &Triad) -> Result<Vec<Unknown>> {
+        let mut gains = Vec::new();
+        for (i, read) in triad.outputs.iter().enumerate() {
+            for (j, other) in triad.outputs.iter().enumerate() {
+                let (output, of) = (self.output(read)?, self.output(other)?);
+                let (name, std) = match i == j {
+                    true => (format!("scale({read})"), triad.scale),
+                    false => (format!("cross({read},{other})"), triad.angle),
+                };
+                gains.push(Unknown {
+                    name,
+                    what: What::Gain { output, of },
+                    unit: "1".into(),
+                    start: 0.0,
+                    bounds: (f64::NEG_INFINITY, f64::INFINITY),
+                    prior: Some((0.0, std)),
+                    reach: std,
+                });
+            }
+        }
+        Ok(gains)
+    }
+
+    fn bias(
+        &self,
+        bias: &Bias,
+        description: &ModelDescription,
+        records: &[Record],
+    ) -> Result<Vec<Unknown>> {
+        let output = self.output(&bias.output)?;
+        let unit = description.unit(real(description, &bias.output)?).to_string();
+        let one = |(recording, record): (usize, &Record)| Unknown {
+            name: numbered(&format!("bias({})", bias.output), recording),
+            what: What::Bias { output, recording },
+            unit: unit.clone(),
+            start: 0.0,
+            bounds: (f64::NEG_INFINITY, f64::INFINITY),
+            prior: bias.std.map(|std| (0.0, std)),
+            reach: bias.std.unwrap_or_else(|| record.spread(output)),
+        };
+        Ok(records.iter().enumerate().map(one).collect())
+    }
+}
+
+/// The name of what a recording has of its own.
+fn numbered(name: &str, recording: usize) -> String {
+    format!("{name}@{}", recording + 1)
+}
+
+fn parameters(
+    free: &Free,
+    description: &ModelDescription,
+    recordings: usize,
+) -> Result<Vec<Unknown>> {
+    let variable = real(description, &free.name)?;
+    let allowed = ["parameter", "output", "local", "input"];
+    ensure!(
+        allowed.contains(&variable.causality.as_str()) && variable.variability != "constant",
+        "{} cannot be free: it is a {} {}",
+        free.name,
+        variable.variability,
+        variable.causality
+    );
+    let attributes = variable.attributes();
+    let number = |text: &Option<String>, otherwise: f64| {
+        text.as_ref().and_then(|text| text.parse().ok()).unwrap_or(otherwise)
+    };
+    let own = (number(&attributes.min, f64::NEG_INFINITY), number(&attributes.max, f64::INFINITY));
+    let (low, high) = free.bounds.unwrap_or(own);
+    ensure!(
+        own.0 <= low && high <= own.1,
+        "{} is free from {low} to {high} (allowed by the FMU: {} to {})",
+        free.name,
+        own.0,
+        own.1
+    );
+    ensure!(
+        (low..=high).contains(&free.start),
+        "{} starts at {} (allowed: {low} to {high})",
+        free.name,
+        free.start
+    );
+    let reach = match free.bounds {
+        Some((low, high)) if (high - low).is_finite() => 0.25 * (high - low),
+        _ if free.start != 0.0 => 0.5 * free.start.abs(),
+        _ => 1.0,
+    };
+    let one = |recording: Option<usize>| Unknown {
+        name: recording.map_or(free.name.clone(), |k| numbered(&free.name, k)),
+        what: What::Parameter { reference: variable.reference, recording },
+        unit: description.unit(variable).into(),
+        start: free.start,
+        bounds: (low, high),
+        prior: None,
+        reach,
+    };
+    Ok(match free.each {
+        true => (0..recordings).map(|k| one(Some(k))).collect(),
+        false => vec![one(None)],
+    })
+}
+
+/// A Real of the FMU.
+pub fn real<'a>(description: &'a ModelDescription, name: &str) -> Result<&'a Variable> {
+    let variable = description.variable(name)?;
+    ensure!(variable.kind() == Type::Real, "{name} is a {:?} (allowed: Real)", variable.kind());
+    Ok(variable)
+}
+
+/// Items between commas, of which those in brackets separate nothing: `a,inertia[1,2]` are two.
+pub fn list(text: &str) -> impl Iterator<Item = &str> {
+    let mut depth = 0i32;
+    let items = text.split(move |c| {
+        depth += i32::from(matches!(c, '[' | '(')) - i32::from(matches!(c, ']' | ')'));
+        c == ',' && depth == 0
+    });
+    items.map(str::trim).filter(|item| !item.is_empty())
+}
+
+fn named(text: &str) -> Result<(&str, &str)> {
+    let (name, value) =
+        text.split_once('=').with_context(|| format!("\"{text}\" is not of the form NAME=…"))?;
+    Ok((name.trim(), value.trim()))
+}
+
+fn numbers(text: &str) -> Result<Vec<f64>> {
+    let one = |part: &str| {
+        let number: Option<f64> = part.trim().parse().ok().filter(|x: &f64| !x.is_nan());
+        number.with_context(|| format!("\"{part}\" is not a number"))
+    };
+    text.split(':').map(one).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_asked_is_read_from_text() {
+        let free: Free = "tank[1].mass[1]@each=2:0.5:inf".parse().unwrap();
+        assert_eq!((free.name.as_str(), free.each), ("tank[1].mass[1]", true));
+        assert_eq!((free.start, free.bounds), (2.0, Some((0.5, f64::INFINITY))));
+        let setting: Setting = "init.omega[1]@2=0.1".parse().unwrap();
+        assert_eq!((setting.name.as_str(), setting.recording), ("init.omega[1]", Some(1)));
+        let triad: Triad = "w[1],w[2],w[3]=0.01:5e-3".parse().unwrap();
+        assert_eq!((triad.outputs[2].as_str(), triad.angle), ("w[3]", 5e-3));
+        assert_eq!(list("a,inertia[1,2], b").collect::<Vec<_>>(), ["a", "inertia[1,2]", "b"]);
+        for wrong in ["k", "k=1:2", "k=3:4:5", "k=1:2:0", "k=x"] {
+            assert!(wrong.parse::<Free>().is_err(), "{wrong}");
+        }
+        assert!("k=1:0".parse::<Prior>().is_err() && "w=0".parse::<Bias>().is_err());
+    }
+}

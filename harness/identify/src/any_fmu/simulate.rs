@@ -1,0 +1,266 @@
+//! An FMU's outputs at the rows of a recording, by its own solver or by the host's.
+
+use std::path::Path;
+
+use anyhow::{Context, Result, ensure};
+use host::archive::Archive;
+use host::description::ModelDescription;
+use host::fmi2::{self, MODEL_EXCHANGE};
+use host::fmu::{Fmu, Instance};
+use host::temporary::Folder;
+use host::xml::Element;
+
+use super::exchange;
+use super::question::{Question, Setting, Solver, real};
+use super::record::Record;
+
+/// An FMU for one solver.
+pub enum Model {
+    /// It steps itself (Co-Simulation).
+    Own(Fmu),
+    /// The host integrates (Model Exchange of FMI 2.0).
+    Host {
+        /// The FMU.
+        fmu: fmi2::Fmu,
+        /// Continuous states and event indicators.
+        sizes: (usize, usize),
+        /// Where it is unpacked; dropped after it.
+        folder: Folder,
+    },
+}
+
+impl Model {
+    /// Opens an FMU for a solver.
+    ///
+    /// # Errors
+    /// If it is no FMU, or has not what the solver needs.
+    pub fn open(path: &Path, solver: Solver) -> Result<Self> {
+        if solver == Solver::Own {
+            return Ok(Model::Own(Fmu::open(path)?));
+        }
+        let archive = Archive::open(path)?;
+        let folder = Folder::new()?;
+        archive
+            .unpack(folder.path())
+            .with_context(|| format!("{} is not an FMU", path.display()))?;
+        let root = Element::parse(archive.description()?.as_bytes())
+            .map_err(|why| anyhow::anyhow!("modelDescription.xml cannot be read: {why}"))?;
+        let structure = root.child("ModelStructure");
+        let states = structure.map_or(0, |structure| structure.list("Derivatives").count());
+        let indicators = root.number("numberOfEventIndicators").unwrap_or(0.0) as usize;
+        let version = root.get("fmiVersion").unwrap_or_default();
+        ensure!(
+            version.starts_with("2."),
+            "{} is an FMU {version} (allowed for the host's solver: FMI 2.0); its own solver can step it",
+            path.display()
+        );
+        let fmu = fmi2::Fmu::load_for(MODEL_EXCHANGE, folder.path(), path)?;
+        ensure!(
+            fmu.has_exchange(),
+            "{} offers no model exchange: only its own solver can step it",
+            path.display()
+        );
+        Ok(Model::Host { fmu, sizes: (states, indicators), folder })
+    }
+
+    /// What it says of itself.
+    pub fn description(&self) -> &ModelDescription {
+        match self {
+            Model::Own(fmu) => fmu.description(),
+            Model::Host { fmu, .. } => fmu.description(),
+        }
+    }
+
+    /// What loading its binary has changed for this whole process.
+    pub fn changed(&self) -> &[&'static str] {
+        match self {
+            Model::Own(fmu) => fmu.changed(),
+            Model::Host { fmu, .. } => fmu.changed(),
+        }
+    }
+}
+
+/// How an FMU is set up and driven.
+#[derive(Clone, Debug)]
+pub struct Setup {
+    settings: Vec<Setting>,
+    /// Value references of the inputs, and whether each is held from row to row.
+    inputs: Vec<u32>,
+    held: Vec<bool>,
+    outputs: Vec<u32>,
+    /// Relative tolerance of the host's solver.
+    tolerance: f64,
+}
+
+/// An unknown's value: its reference.
+pub type Value = (u32, f64);
+
+impl Setup {
+    /// As asked.
+    ///
+    /// # Errors
+    /// All names that the FMU has not.
+    pub fn new(question: &Question, description: &ModelDescription) -> Result<Self> {
+        let mut problems = Vec::new();
+        let mut references = |names: &[String]| -> Vec<u32> {
+            let mut found = Vec::new();
+            for name in names {
+                match real(description, name) {
+                    Ok(variable) => found.push(variable.reference),
+                    Err(error) => problems.push(error.to_string()),
+                }
+            }
+            found
+        };
+        let (inputs, outputs) = (references(&question.inputs), references(&question.outputs));
+        for name in question.held.iter().filter(|name| !question.inputs.contains(name)) {
+            problems.push(format!("{name} is held, but is not among the inputs"));
+        }
+        if outputs.is_empty() {
+            problems.push("no output is fitted: name them with --outputs".into());
+        }
+        ensure!(problems.is_empty(), "{}", problems.join("; "));
+        Ok(Setup {
+            settings: question.settings.clone(),
+            held: question.inputs.iter().map(|name| question.held.contains(name)).collect(),
+            inputs,
+            outputs,
+            tolerance: match question.solver {
+                Solver::Own => 0.0,
+                Solver::Host(tolerance) => tolerance,
+            },
+        })
+    }
+
+    /// The outputs at the rows of the recording of this number.
+    ///
+    /// # Errors
+    /// What the FMU refuses, with the time.
+    pub fn run(
+        &self,
+        model: &Model,
+        values: &[Value],
+        number: usize,
+        record: &Record,
+    ) -> Result<Vec<Vec<f64>>> {
+        let first = self.course(record, 0).0;
+        let start = record.time[0];
+        let settings = || {
+            let own = |setting: &&Setting| setting.recording.is_none_or(|of| of == number);
+            self.settings.iter().filter(own)
+        };
+        match model {
+            Model::Own(fmu) => {
+                let mut instance = fmu.instantiate_at_rest("identify")?;
+                for setting in settings() {
+                    instance.set(&setting.name, &setting.value)?;
+                }
+                for (reference, value) in values {
+                    instance.set_real(&[*reference], &[*value])?;
+                }
+                instance.enter_initialization_mode(None, start, None)?;
+                if !first.is_empty() {
+                    instance.set_real(&self.inputs, &first)?;
+                }
+                instance.exit_initialization_mode()?;
+                self.step(&mut instance, fmu.description(), record)
+            }
+            Model::Host { fmu, sizes, .. } => {
+                let with = fmu.instantiation("identify");
+                let with = fmi2::Instantiation { kind: MODEL_EXCHANGE, ..with };
+                let mut instance = fmu.instantiate_with(&with)?;
+                for start in fmu.description().moving_starts() {
+                    instance.set(start, "0")?;
+                }
+                for setting in settings() {
+                    instance.set(&setting.name, &setting.value)?;
+                }
+                for (reference, value) in values {
+                    instance.set_real(&[*reference], &[*value])?;
+                }
+                instance.setup_experiment(None, start, None)?;
+                instance.enter_initialization_mode()?;
+                if !first.is_empty() {
+                    instance.set_real(&self.inputs, &first)?;
+                }
+                instance.exit_initialization_mode()?;
+                let run = exchange::Run::new(instance, *sizes, self.tolerance, start)?;
+                self.integrate(run, record)
+            }
+        }
+    }
+
+    /// By the host's solver, from row to row.
+    fn integrate(&self, mut run: exchange::Run, record: &Record) -> Result<Vec<Vec<f64>>> {
+        let mut read = vec![Vec::with_capacity(record.time.len()); self.outputs.len()];
+        for row in 0..record.time.len() {
+            let (values, slopes) = self.course(record, row);
+            let jumps = row > 0 && self.jumps(record, row);
+            run.drive(&self.inputs, &values, &slopes, jumps)?;
+            let mut at = vec![0.0; self.outputs.len()];
+            run.instance().get_real(&self.outputs, &mut at)?;
+            keep(&at, &mut read)?;
+            if let Some(next) = record.time.get(row + 1) {
+                run.integrate(*next)?;
+            }
+        }
+        Ok(read)
+    }
+
+    /// By the FMU's own solver: inputs are set at a row, with their slopes where the FMU takes them, the outputs are read and the
+    /// step to the next row is made.
+    fn step(
+        &self,
+        instance: &mut Instance,
+        description: &ModelDescription,
+        record: &Record,
+    ) -> Result<Vec<Vec<f64>>> {
+        let interface = description.co_simulation.as_ref();
+        let sloped = interface.is_some_and(|cs| cs.can_interpolate_inputs)
+            && self.held.iter().any(|held| !held);
+        let mut read = vec![Vec::with_capacity(record.time.len()); self.outputs.len()];
+        for row in 0..record.time.len() {
+            let (values, slopes) = self.course(record, row);
+            if !values.is_empty() {
+                instance.set_real(&self.inputs, &values)?;
+            }
+            let mut at = vec![0.0; self.outputs.len()];
+            instance.get_real(&self.outputs, &mut at)?;
+            keep(&at, &mut read)?;
+            if let Some(next) = record.time.get(row + 1) {
+                let (t, h) = (record.time[row], next - record.time[row]);
+                match sloped {
+                    true => instance.do_step_along(t, h, &self.inputs, &values, &slopes),
+                    false => instance.do_step(t, h),
+                }
+                .with_context(|| format!("the run stopped at t = {t} s"))?;
+            }
+        }
+        Ok(read)
+    }
+
+    /// Values of the inputs at a row and their slopes until the next.
+    fn course(&self, record: &Record, row: usize) -> (Vec<f64>, Vec<f64>) {
+        let one = |(signal, held): (&Vec<f64>, &bool)| {
+            let next = row + 1;
+            let slope = match record.time.get(next) {
+                Some(end) if !held => (signal[next] - signal[row]) / (end - record.time[row]),
+                _ => 0.0,
+            };
+            (signal[row], slope)
+        };
+        record.inputs.iter().zip(&self.held).map(one).unzip()
+    }
+
+    /// Whether an input that is held changes at a row.
+    fn jumps(&self, record: &Record, row: usize) -> bool {
+        let held = record.inputs.iter().zip(&self.held).filter(|(_, held)| **held);
+        held.into_iter().any(|(signal, _)| signal[row] != signal[row - 1])
+    }
+}
+
+fn keep(values: &[f64], read: &mut [Vec<f64>]) -> Result<()> {
+    ensure!(values.iter().all(|y| y.is_finite()), "an output is not finite");
+    read.iter_mut().zip(values).for_each(|(column, value)| column.push(*value));
+    Ok(())
+}

@@ -1,0 +1,263 @@
+"""Twins for `hubslosh identify --free`: whether the truth lies inside the stated intervals.
+
+    python identify_twins.py FOLDER [--cases VanDerPol,Hub,…] [--twins 100] [--program hubslosh]
+
+FOLDER has the FMUs of others by name: VanDerPol.fmu, BouncingBall.fmu and Dahlquist.fmu of
+modelica/Reference-FMUs (built for FMI 2.0), Orifice.fmu (`orifice.py`, exported by PythonFMU, whose
+binary needs LD_PRELOAD=libpython3.11.so). HubSlosh is found by the program.
+
+No recording comes from an FMU: each case solves its equation in closed form or by SciPy at a
+tolerance of 1e-10, draws the truth 30 % about the start of the search, and adds noise. Prints a
+table in Markdown.
+"""
+
+import argparse
+import json
+import subprocess
+import tempfile
+from collections import defaultdict
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import exp, log, sqrt
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.random import Generator, default_rng
+from scipy.integrate import solve_ivp
+
+
+@dataclass
+class Twin:
+    """A recording and what is true of it, by the names of the unknowns."""
+
+    table: pd.DataFrame
+    truth: dict[str, float]
+
+
+@dataclass
+class Case:
+    """An FMU, what is asked of it, and who makes its recordings."""
+
+    fmu: str
+    arguments: list[str]
+    make: Callable[[Generator], Twin]
+    what: str = field(default="")
+
+
+def about(random: Generator, value: float) -> float:
+    """Draw within 30 % of a value."""
+    return float(value * random.uniform(0.7, 1.3))
+
+
+def noisy(random: Generator, signal: np.ndarray, part: float) -> np.ndarray:
+    """Add noise that is a part of the signal's spread."""
+    return signal + part * signal.std() * random.normal(size=signal.size)
+
+
+def van_der_pol(random: Generator) -> Twin:
+    """x0' = x1, x1' = mu (1 - x0²) x1 - x0, a few cycles of a relaxation oscillation."""
+    truth = {
+        "mu": about(random, 1.0),
+        "x0@1": about(random, 2.0),
+        "x1@1": random.uniform(-0.3, 0.3),
+    }
+    mu, t = truth["mu"], np.arange(0.0, 20.001, 0.05)
+    solved = solve_ivp(
+        lambda _, x: [x[1], mu * (1 - x[0] ** 2) * x[1] - x[0]],
+        (0.0, 20.0),
+        [truth["x0@1"], truth["x1@1"]],
+        method="DOP853",
+        t_eval=t[t <= 20.0],
+        rtol=1e-10,
+        atol=1e-12,
+    )
+    x0, x1 = (noisy(random, x, 0.03) for x in solved.y)
+    return Twin(pd.DataFrame({"time": solved.t, "x0": x0, "x1": x1}), truth)
+
+
+def bouncing_ball(random: Generator) -> Twin:
+    """Parabolas from bounce to bounce; below 0.1 m/s the ball stays on the ground."""
+    truth = {"e": random.uniform(0.55, 0.9), "g": -about(random, 9.81), "h@1": about(random, 1.0)}
+    e, g, h0 = truth["e"], -truth["g"], truth["h@1"]
+    pieces, at = [(0.0, h0, 0.0)], sqrt(2 * h0 / g)
+    up = e * g * at
+    while up >= 0.1:
+        pieces.append((at, 0.0, up))
+        at += 2 * up / g
+        up *= e
+    time = np.arange(0.0, 3.0, 0.01)
+    h = np.zeros_like(time)
+    for k, (begin, start, up) in enumerate(pieces):
+        end = pieces[k + 1][0] if k + 1 < len(pieces) else at
+        rows = (time >= begin) & (time < end)
+        s = time[rows] - begin
+        h[rows] = start + up * s - g / 2 * s**2
+    return Twin(pd.DataFrame({"time": time, "h": noisy(random, h, 0.02)}), truth)
+
+
+def dahlquist(random: Generator) -> Twin:
+    """Decay, x' = -k x."""
+    truth = {"k": about(random, 1.0), "x@1": about(random, 1.0)}
+    time = np.arange(0.0, 5.0, 0.02)
+    x = truth["x@1"] * np.exp(-truth["k"] * time)
+    return Twin(pd.DataFrame({"time": time, "x": noisy(random, x, 0.05)}), truth)
+
+
+def orifice(random: Generator) -> Twin:
+    """Drained tank, area h' = q - c sqrt(h) under an inflow in steps."""
+    truth = {"area": about(random, 1.0), "c": about(random, 0.5), "h@1": about(random, 1.0)}
+    time = np.arange(0.0, 40.0, 0.2)
+    q = 0.3 + 0.3 * np.repeat(random.integers(0, 2, 20), 10)
+    h, levels = truth["h@1"], []
+    for flow in q:
+        levels.append(h)
+        solved = solve_ivp(
+            lambda _, y, flow=flow: (
+                (flow - truth["c"] * np.sqrt(np.maximum(y, 0.0))) / truth["area"]
+            ),
+            (0.0, 0.2),
+            [h],
+            method="DOP853",
+            rtol=1e-10,
+            atol=1e-12,
+        )
+        h = solved.y[0, -1]
+    level = noisy(random, np.array(levels), 0.03)
+    return Twin(pd.DataFrame({"time": time, "q": q, "h": level}), truth)
+
+
+def hub(random: Generator) -> Twin:
+    """I w' = tau - b w - c sgn(w): stick and slip under torque in steps, solved piece by piece."""
+    truth = {
+        "hub.I": about(random, 0.3),
+        "friction.b": about(random, 0.04),
+        "friction.c": about(random, 0.02),
+        "bias(omega)@1": 1e-3 * random.normal(),
+    }
+    inertia, b, c, _ = truth.values()
+    step, time = 0.05, np.arange(0.0, 60.0, 0.05)
+    tau = np.repeat(0.1 * random.uniform(-1.0, 1.0, 60), 20)
+    w, rates = 0.0, []
+    for torque in tau:
+        rates.append(w)
+        left = step
+        while left > 0.0:
+            if w == 0.0 and abs(torque) <= c:
+                break
+            sign = np.sign(w if w != 0.0 else torque)
+            limit = (torque - sign * c) / b
+            # w(t) = limit + (w - limit) exp(-b t/I): at rest when?
+            ratio = limit / (limit - w) if w != 0.0 else 1.0
+            stop = -inertia / b * log(ratio) if 0.0 < ratio < 1.0 else float("inf")
+            if stop < left:
+                w, left = 0.0, left - stop
+            else:
+                w = limit + (w - limit) * exp(-b * left / inertia)
+                left = 0.0
+    omega = np.array(rates) + truth["bias(omega)@1"] + 2e-3 * random.normal(size=time.size)
+    return Twin(pd.DataFrame({"time": time, "tau_cmd": tau, "omega": omega}), truth)
+
+
+STICKING = [
+    "slosh.model=frozen",
+    "fluid.rho=1e-6",
+    "friction.model=stribeck",
+    "friction.d=0",
+]
+CASES = {
+    "VanDerPol": Case(
+        "VanDerPol.fmu",
+        ["--free", "mu=1:0.2:4,x0@each=2:-4:4,x1@each=0:-2:2", "--outputs", "x0,x1", "--exchange"],
+        van_der_pol,
+        "limit cycle; Model Exchange, starts free",
+    ),
+    "BouncingBall": Case(
+        "BouncingBall.fmu",
+        ["--free", "e=0.7:0.5:0.99,g=-9.81:-15:-5,h@each=1:0.3:2", "--outputs", "h", "--exchange"],
+        bouncing_ball,
+        "bounces until it rests; Model Exchange, events",
+    ),
+    "Dahlquist": Case(
+        "Dahlquist.fmu",
+        ["--free", "k=1:0.1:5,x@each=1:0.1:5", "--outputs", "x", "--exchange"],
+        dahlquist,
+        "decay; Model Exchange",
+    ),
+    "Orifice": Case(
+        "Orifice.fmu",
+        [
+            "--free",
+            "area=1:0.1:5,c=0.5:0.05:2,h@each=1:0.1:5",
+            *("--outputs", "h", "--inputs", "q", "--held", "q"),
+        ],
+        orifice,
+        "exported by PythonFMU; Co-Simulation, driven",
+    ),
+    "Hub": Case(
+        "HubSlosh",
+        ["--free", "hub.I=0.3:0.05:2,friction.b=0.04:0:1,friction.c=0.02:0:0.1"]
+        + ["--bias", "omega", "--inputs", "tau_cmd", "--held", "tau_cmd", "--outputs", "omega"]
+        + [word for item in STICKING for word in ("--set", item)],
+        hub,
+        "stick and slip; Co-Simulation, bias free",
+    ),
+}
+
+
+def run(case: Case, twin: Twin, program: str, folder: str) -> dict:
+    """Identify one twin and return the result."""
+    recording, result = Path(folder) / "twin.csv", Path(folder) / "result.json"
+    twin.table.to_csv(recording, index=False)
+    command = [program, "-q", "identify", recording, "--fmu", case.fmu, *case.arguments]
+    subprocess.run([*command, "--out", result], check=True, capture_output=True)
+    return json.loads(result.read_text(encoding="utf-8"))
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path, help="where the FMUs of others are")
+    parser.add_argument("--cases", default=",".join(CASES), help="which cases")
+    parser.add_argument("--twins", type=int, default=100, help="how many of each")
+    parser.add_argument("--program", default="hubslosh", help="the program")
+    arguments = parser.parse_args()
+    print("| FMU | unknown | inside its 95 % interval | rms of error/σ | largest | median σ |")
+    print("| --- | --- | --- | --- | --- | --- |")
+    for name in arguments.cases.split(","):
+        case = CASES[name]
+        if case.fmu.endswith(".fmu"):
+            case.fmu = str(arguments.folder / case.fmu)
+        seen: dict[str, list[tuple[bool, float, float]]] = defaultdict(list)
+        refused, unfit, last = [], [], ""
+        with tempfile.TemporaryDirectory() as folder:
+            for seed in range(1, arguments.twins + 1):
+                twin = case.make(default_rng(seed))
+                try:
+                    found = run(case, twin, arguments.program, folder)
+                except subprocess.CalledProcessError as error:
+                    refused.append(seed)
+                    last = error.stderr.decode()[-200:]
+                    continue
+                if not (found["fits"] and found["converged"]):
+                    unfit.append(seed)
+                for unknown, e in (found["parameters"] | found["measurement"]).items():
+                    low, high = e["interval"]
+                    truth = twin.truth[unknown]
+                    seen[unknown].append(
+                        (low <= truth <= high, (e["value"] - truth) / e["std"], e["std"])
+                    )
+        for unknown, rows in seen.items():
+            inside, off, std = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
+            print(
+                f"| {name} | `{unknown}` | {int(inside.sum())} of {len(rows)} "
+                f"| {sqrt((off**2).mean()):.2f} | {abs(off).max():.1f} | {np.median(std):.1e} |"
+            )
+        print(
+            f"<!-- {name}: {case.what}; does not fit: {unfit}; refused: {refused} {last} -->",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()
