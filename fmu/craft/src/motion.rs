@@ -27,6 +27,8 @@
 //! Source: Newton-Euler about O with the bobs' pulls eliminated.
 
 use alloc::vec::Vec;
+use core::ops::ControlFlow;
+
 use taylor::at_each_order;
 use taylor::error::StepError;
 use taylor::integrator::{self, MAX_MAGNITUDE, Motion, RATE_FLOOR, Steps};
@@ -317,7 +319,7 @@ impl CraftMotion {
     #[inline(never)]
     pub fn advance(&mut self, h: f64, limits: Limits) -> Result<(), StepError> {
         let begin = self.state.time;
-        integrator::advance(self, begin, h, limits.tolerance, &mut limits.steps())
+        integrator::advance(self, begin, h, limits.tolerance, &mut limits.steps()).map(|_| ())
     }
 
     /// Coefficient N of every quantity and N + 1 of the states.
@@ -486,7 +488,13 @@ impl Motion for CraftMotion {
     }
 
     #[inline(always)]
-    fn take(&mut self, n: usize, h: f64, t: f64, _: &mut Steps) -> Result<(), StepError> {
+    fn take(
+        &mut self,
+        n: usize,
+        h: f64,
+        t: f64,
+        _: &mut Steps,
+    ) -> Result<ControlFlow<f64>, StepError> {
         let q = unit_quaternion(self.q.value(n, h));
         let w = space::value(&self.w, n, h);
         let x = &mut self.state.x;
@@ -510,6 +518,9 @@ impl Motion for CraftMotion {
             finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
             x[at..at + 6].copy_from_slice(&moved);
         }
-        if finite { Ok(()) } else { Err(StepError::NotFinite { time: self.state.time + t }) }
+        if !finite {
+            return Err(StepError::NotFinite { time: self.state.time + t });
+        }
+        Ok(ControlFlow::Continue(()))
     }
 }

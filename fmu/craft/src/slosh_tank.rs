@@ -39,6 +39,7 @@
 use alloc::boxed::Box;
 use alloc::string::String;
 use alloc::vec::Vec;
+use core::ops::ControlFlow;
 use taylor::at_each_order;
 use taylor::error::StepError;
 use taylor::extrapolation::System;
@@ -357,7 +358,13 @@ impl Motion for TankMotion {
     }
 
     #[inline(always)]
-    fn take(&mut self, n: usize, h: f64, t: f64, _: &mut Steps) -> Result<(), StepError> {
+    fn take(
+        &mut self,
+        n: usize,
+        h: f64,
+        t: f64,
+        _: &mut Steps,
+    ) -> Result<ControlFlow<f64>, StepError> {
         let w = space::value(&self.w, 2, h);
         let x = &mut self.state.x;
         x[DISSIPATED] += series::integrals([&self.dissipation], n - 1, h)[0];
@@ -368,7 +375,10 @@ impl Motion for TankMotion {
             finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
             x[at..at + 6].copy_from_slice(&moved);
         }
-        if finite { Ok(()) } else { Err(StepError::NotFinite { time: self.state.time + t }) }
+        if !finite {
+            return Err(StepError::NotFinite { time: self.state.time + t });
+        }
+        Ok(ControlFlow::Continue(()))
     }
 }
 
@@ -401,7 +411,7 @@ impl TankMotion {
     #[inline(never)]
     fn advance(&mut self, h: f64, limits: Limits) -> Result<(), StepError> {
         let begin = self.state.time;
-        integrator::advance(self, begin, h, limits.tolerance, &mut limits.steps())
+        integrator::advance(self, begin, h, limits.tolerance, &mut limits.steps()).map(|_| ())
     }
 
     /// Coefficient N of every quantity and N + 1 of the states.

@@ -216,6 +216,7 @@ impl Plant {
             return Err(problems);
         }
         self.motion.law = Law::new(p);
+        self.stopped = None;
         self.find_contact(inputs);
         Ok(())
     }

@@ -42,13 +42,25 @@ impl Imu {
         allowed: usize,
     ) -> usize {
         for taken in 0..=allowed {
-            let due = gyro.next as f64 / self.rate - since_start;
-            if due > length + SLACK / self.rate {
+            let due = self.due(gyro.next, since_start);
+            if !self.falls_within(due, length) {
                 return taken;
             }
             self.sample(gyro, omega(due.max(0.0).min(length)));
         }
         allowed + 1
+    }
+
+    /// When sample k falls due after `since_start`, both s.
+    #[inline(always)]
+    pub(crate) fn due(&self, k: u64, since_start: f64) -> f64 {
+        k as f64 / self.rate - since_start
+    }
+
+    /// Whether a sample falls within `length`, s, or but for rounding.
+    #[inline(always)]
+    pub(crate) fn falls_within(&self, due: f64, length: f64) -> bool {
+        due <= length + SLACK / self.rate
     }
 
     /// Takes the next sample of the rate `omega`.

@@ -44,7 +44,7 @@ pub use parameters::{
     Bench, DampingLaw, Fluid, Friction, FrictionModel, Hub, Imu, Init, MODES, ModeTable,
     Parameters, Ring, Slosh, SloshModel, SloshSource, Solver, Tank, Wheel,
 };
-pub use plant::Plant;
+pub use plant::{Plant, StepEnd, StoppedStep};
 pub use state::{INDICATORS, STATES, State, indicator, x};
 pub use tank::Calculated;
 pub use taylor::error::StepError;

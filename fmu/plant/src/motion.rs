@@ -3,6 +3,8 @@
 //! the core's (`taylor::integrator`).
 
 use alloc::format;
+use core::ops::ControlFlow;
+
 use taylor::error::StepError;
 use taylor::integrator::{self, Convergence, RATE_FLOOR, Steps};
 use taylor::number::Number;
@@ -27,6 +29,23 @@ const ADVICE: &str = ", with stribeck_smooth a larger friction.eps, with the gyr
 pub(crate) fn out_of_range(time: f64, mode: usize, what: &str) -> StepError {
     let number = mode + 1;
     StepError::Model(format!("slosh mode {number} left its range at t = {time} s: {what}"))
+}
+
+/// At which events a step stops.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stop {
+    /// How much of the step lies behind the stretch that is advanced, s.
+    pub offset: f64,
+    /// Events are passed over up to here, s from the step's start; with infinity all are.
+    pub passed: f64,
+}
+
+impl Stop {
+    /// Whether the step stops at an event `t` after the stretch's start.
+    #[inline(always)]
+    pub fn is_at(&self, t: f64) -> bool {
+        self.offset + t > self.passed
+    }
 }
 
 /// The hub's equation with the power series of its parts:
@@ -291,24 +310,24 @@ impl Motion {
     }
 
     /// Moves the state on by `h`, during which torque and specific force run along
-    /// their ramps; the gyro takes the samples that fall due and count as steps. On an error the state
-    /// is unusable.
+    /// their ramps; the gyro takes the samples that fall due and count as steps. Returns how far it came where it
+    /// stops at an event. On an error the state is unusable.
     pub fn advance<M: SloshMode>(
         &mut self,
         modes: &mut [M],
         state: &mut State,
         acting: (Ramp, Ramp),
         h: f64,
-        imu: &Imu,
+        (imu, stop): (&Imu, Stop),
         steps: &mut Steps,
-    ) -> Result<(), StepError> {
+    ) -> Result<ControlFlow<f64>, StepError> {
         // The usual case is compiled apart: one mode, no loops over modes and orders.
         match modes {
             [one] if M::UNROLLED && acting.1.slope == 0.0 && !self.varies => {
                 let one = core::slice::from_mut(one);
-                self.advance_along::<true, M>(one, state, acting, h, imu, steps)
+                self.advance_along::<true, M>(one, state, acting, h, (imu, stop), steps)
             }
-            _ => self.advance_along::<false, M>(modes, state, acting, h, imu, steps),
+            _ => self.advance_along::<false, M>(modes, state, acting, h, (imu, stop), steps),
         }
     }
 
@@ -320,15 +339,18 @@ impl Motion {
         state: &mut State,
         acting: (Ramp, Ramp),
         h: f64,
-        imu: &Imu,
+        (imu, stop): (&Imu, Stop),
         steps: &mut Steps,
-    ) -> Result<(), StepError> {
+    ) -> Result<ControlFlow<f64>, StepError> {
         let (begin, tolerance) = (state.time, self.tolerance);
         self.near_weightless = Damping::floor(acting.1, h);
         if state.x[x::OMEGA] == 0.0 {
             self.start(modes, state, acting);
             let contact = self.contact(modes, state);
-            state.record_contact(contact, begin);
+            if state.record_contact(contact, begin) && stop.is_at(0.0) {
+                self.near_weightless = 0.0;
+                return Ok(ControlFlow::Break(0.0));
+            }
         }
         let varies = acting.1.slope != 0.0 || self.varies;
         let allowed = [0.0; 3];
@@ -339,16 +361,20 @@ impl Motion {
             state: &mut *state,
             acting,
             imu,
+            stop,
             varies,
             begin,
             t,
             event,
             allowed,
         };
-        integrator::advance(&mut stretch, begin, h, tolerance, steps)?;
-        state.time = begin + h;
+        let flow = integrator::advance(&mut stretch, begin, h, tolerance, steps)?;
+        state.time = match flow {
+            ControlFlow::Continue(()) => begin + h,
+            ControlFlow::Break(t) => begin + t,
+        };
         self.near_weightless = 0.0;
-        Ok(())
+        Ok(flow)
     }
 
     /// Integral of the liquid's mass times height over `length`, kg m s, from the series of
@@ -372,6 +398,7 @@ struct Stretch<'a, const UNROLLED: bool, M: SloshMode> {
     /// Torque and specific force from the start of the stretch on.
     acting: (Ramp, Ramp),
     imu: &'a Imu,
+    stop: Stop,
     /// Whether the specific force, the drag or the weight changes.
     varies: bool,
     /// When the stretch begins, and the expansion after it, s.
@@ -387,6 +414,18 @@ impl<const UNROLLED: bool, M: SloshMode> Stretch<'_, UNROLLED, M> {
     #[inline(always)]
     fn varies(&self) -> bool {
         !UNROLLED && self.varies
+    }
+
+    /// When, at most `h` after the start of the expansion, the gyro takes the first sample at which the step stops.
+    #[cold]
+    fn stop_at_sample(&self, h: f64, allowed: usize) -> Option<f64> {
+        let since_start = self.begin + self.t - self.state.start_time;
+        let (imu, next) = (self.imu, self.state.gyro.next);
+        let mut due = (next..).take(allowed).map(|k| imu.due(k, since_start));
+        due.by_ref()
+            .take_while(|due| imu.falls_within(*due, h))
+            .map(|due| due.max(0.0).min(h))
+            .find(|due| self.stop.is_at(self.t + due))
     }
 
     #[inline(always)]
@@ -468,7 +507,24 @@ impl<const UNROLLED: bool, M: SloshMode> integrator::Motion for Stretch<'_, UNRO
     }
 
     #[inline(always)]
-    fn take(&mut self, n: usize, h: f64, t: f64, steps: &mut Steps) -> Result<(), StepError> {
+    fn take(
+        &mut self,
+        n: usize,
+        mut h: f64,
+        mut t: f64,
+        steps: &mut Steps,
+    ) -> Result<ControlFlow<f64>, StepError> {
+        let mut flow = ControlFlow::Continue(());
+        if self.imu.enabled
+            && self.stop.passed < f64::INFINITY
+            && let Some(due) = self.stop_at_sample(h, steps.left())
+        {
+            if due < h {
+                (h, t) = (due, self.t + due);
+                self.event = None;
+            }
+            flow = ControlFlow::Break(t);
+        }
         let Stretch { motion, modes, state, begin, .. } = self;
         if self.imu.enabled {
             let since_start = *begin + self.t - state.start_time;
@@ -507,9 +563,12 @@ impl<const UNROLLED: bool, M: SloshMode> integrator::Motion for Stretch<'_, UNRO
             let contact =
                 if contact == Contact::Stuck { motion.contact(modes, state) } else { contact };
             state.record_contact(contact, self.begin + t);
+            if self.stop.is_at(t) {
+                flow = ControlFlow::Break(t);
+            }
         }
         if self.state.is_finite(self.modes.len()) {
-            Ok(())
+            Ok(flow)
         } else {
             Err(StepError::NotFinite { time: self.begin + t })
         }

@@ -8,6 +8,8 @@ use alloc::boxed::Box;
 use alloc::string::{String, ToString};
 use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::ControlFlow;
+
 use formulas::regime::Regime;
 use taylor::error::StepError;
 use taylor::number::Number;
@@ -17,7 +19,7 @@ use crate::contact::Contact;
 use crate::damping::Damping;
 use crate::friction::Law;
 use crate::inputs::{Inputs, Ramp};
-use crate::motion::Motion;
+use crate::motion::{Motion, Stop};
 use crate::parameters::{Imu, MODES, Parameters, Wheel};
 use crate::slosh::{Angles, Liquid, SloshMode, with_modes};
 use crate::state::{Axial, Ranges, STATES, State, x};
@@ -42,6 +44,87 @@ pub struct Plant {
     pub(crate) motion: Box<Motion>,
     pub(crate) liquid: Liquid,
     pub(crate) state: State,
+    /// The step that has stopped at an event, until it is gone on with.
+    pub(crate) stopped: Option<StoppedStep>,
+}
+
+/// What two ways to compute a time may differ by, s.
+fn rounding(time: f64) -> f64 {
+    4.0 * f64::EPSILON * time.abs()
+}
+
+/// How a step has ended that stops at events.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StepEnd {
+    /// At its end.
+    End,
+    /// At its end, where there is an event.
+    EventAtEnd,
+    /// At an event before, at this time, s.
+    Event(f64),
+}
+
+/// A step that has stopped at an event: going on is going through it again from its start, past that event. So the
+/// motion is the same, to the last bit, whether somebody looks at its events or not.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StoppedStep {
+    /// The state at its start.
+    start: State,
+    /// Its length, and how far it has come, s.
+    h: f64,
+    passed: f64,
+    /// The inputs along it: tau_cmd, tau_ext, g_axial.
+    inputs: [f64; 3],
+    /// Time and states at the event.
+    time: f64,
+    x: [f64; STATES],
+}
+
+impl StoppedStep {
+    /// How many words it takes.
+    pub const WORDS: usize = State::WORDS + 6 + STATES;
+
+    /// It as words, for saving.
+    pub fn to_words(&self) -> [u64; Self::WORDS] {
+        let mut words = [0; Self::WORDS];
+        let (start, rest) = words.split_at_mut(State::WORDS);
+        start.copy_from_slice(&self.start.to_words());
+        let [a, b, c] = self.inputs;
+        let numbers = [self.h, self.passed, a, b, c, self.time];
+        for (word, x) in rest.iter_mut().zip(numbers.iter().chain(&self.x)) {
+            *word = x.to_bits();
+        }
+        words
+    }
+
+    /// The reverse; `None` when the words are none.
+    pub fn from_words(words: &[u64; Self::WORDS]) -> Option<StoppedStep> {
+        let (start, rest) = words.split_first_chunk()?;
+        let mut numbers = [0.0; 6 + STATES];
+        for (x, word) in numbers.iter_mut().zip(rest) {
+            *x = f64::from_bits(*word);
+        }
+        let ([h, passed, a, b, c, time], x) = numbers.split_first_chunk()?;
+        let possible = numbers.iter().all(|x| x.is_finite()) && (0.0..*h).contains(passed);
+        possible.then_some(StoppedStep {
+            start: State::from_words(start)?,
+            h: *h,
+            passed: *passed,
+            inputs: [*a, *b, *c],
+            time: *time,
+            x: x.try_into().ok()?,
+        })
+    }
+
+    /// Whether a step of length `h` from the present state goes on with it: to the same end, with the same inputs.
+    fn goes_on(&self, state: &State, inputs: &Inputs, h: f64) -> bool {
+        let ends = [state.time + h, self.start.time + self.h];
+        let held = [inputs.tau_cmd, inputs.tau_ext, inputs.g_axial];
+        held.iter().all(|input| input.slope == 0.0)
+            && held.map(|input| input.value) == self.inputs
+            && (state.time, &state.x) == (self.time, &self.x)
+            && (ends[0] - ends[1]).abs() <= rounding(ends[0])
+    }
 }
 
 impl Plant {
@@ -151,6 +234,7 @@ impl Plant {
             liquid: Liquid::new(p, &at_reference),
             calculated,
             state,
+            stopped: None,
         }
     }
 
@@ -179,27 +263,81 @@ impl Plant {
         self.state = *state;
     }
 
+    /// The step that has stopped at an event, for saving.
+    pub fn stopped(&self) -> Option<&StoppedStep> {
+        self.stopped.as_ref()
+    }
+
+    /// Takes a saved one.
+    pub fn set_stopped(&mut self, stopped: Option<StoppedStep>) {
+        self.stopped = stopped;
+    }
+
     /// Moves on by exactly `h` > 0 seconds; the inputs run along their ramps.
     ///
     /// # Errors
     /// See [`StepError`]; the plant is as before.
     pub fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), StepError> {
         let before = self.state;
-        let done = self.advance(inputs, h);
+        let done = self.advance(inputs, h, f64::INFINITY);
         if done.is_err() {
             self.state = before;
         }
-        done
+        done.map(|_| ())
     }
 
-    /// As [`Plant::step`], but an error leaves the state unusable.
-    fn advance(&mut self, inputs: &Inputs, h: f64) -> Result<(), StepError> {
+    /// As [`Plant::step`], but stops at the first event: the hub sticks or slips, the wheel reaches a limit, the gyro
+    /// takes a sample. A step from there to the same end, with the same inputs, goes on as if it had not stopped.
+    ///
+    /// # Errors
+    /// As [`Plant::step`].
+    pub fn step_to_event(&mut self, inputs: &Inputs, h: f64) -> Result<StepEnd, StepError> {
+        let (before, stopped) = (self.state, self.stopped.take());
+        let (mut length, mut passed) = (h, -1.0);
+        if let Some(step) = stopped.filter(|step| step.goes_on(&before, inputs, h)) {
+            self.state = step.start;
+            (length, passed) = (step.h, step.passed);
+        }
+        let start = self.state;
+        let mut end = StepEnd::End;
+        loop {
+            match self.advance(inputs, length, passed) {
+                Ok(ControlFlow::Continue(())) => return Ok(end),
+                Ok(ControlFlow::Break(at)) => passed = at,
+                Err(why) => {
+                    (self.state, self.stopped) = (before, stopped);
+                    return Err(why);
+                }
+            }
+            if passed >= length {
+                return Ok(StepEnd::EventAtEnd);
+            }
+            // An event that is at the end but for rounding leaves nothing to step through.
+            if length - passed > rounding(start.time + length) {
+                break;
+            }
+            (self.state, end) = (start, StepEnd::EventAtEnd);
+        }
+        let State { time, x, .. } = self.state;
+        let inputs = [inputs.tau_cmd, inputs.tau_ext, inputs.g_axial].map(|input| input.value);
+        self.stopped = Some(StoppedStep { start, h: length, passed, inputs, time, x });
+        Ok(StepEnd::Event(time))
+    }
+
+    /// As [`Plant::step`], but an error leaves the state unusable, and it stops at the first event more than
+    /// `passed` seconds after its start; then it returns how many.
+    fn advance(
+        &mut self,
+        inputs: &Inputs,
+        h: f64,
+        passed: f64,
+    ) -> Result<ControlFlow<f64>, StepError> {
         if inputs.g_axial.value != self.state.axial.g {
             self.state.axial.work = self.work_axial(inputs);
         }
         let state = &mut self.state;
         let begin = state.time;
-        let (mut t, mut steps) = (0.0, self.motion.steps());
+        let (mut t, mut steps, mut stopped) = (0.0, self.motion.steps(), None);
         while t < h {
             // A piece of no length takes no step of the integrator; it counts as one.
             steps.count(1, begin + t)?;
@@ -209,19 +347,35 @@ impl Plant {
             let tau =
                 Ramp { value: torque.value + external.value, slope: torque.slope + external.slope };
             let acting = (tau, inputs.g_axial.after(t));
-            with_modes!(&mut self.liquid, modes => self.motion.advance(
-                modes, state, acting, length, &self.imu, &mut steps,
+            let stop = Stop { offset: t, passed };
+            let flow = with_modes!(&mut self.liquid, modes => self.motion.advance(
+                modes, state, acting, length, (&self.imu, stop), &mut steps,
             ))?;
+            if let ControlFlow::Break(within) = flow {
+                stopped = Some(t + within);
+                if within < length {
+                    state.x[x::WHEEL_SPEED] -= torque.integral(within) / self.wheel.inertia;
+                    break;
+                }
+            }
             state.x[x::WHEEL_SPEED] = speed;
             t = if length == h - t { h } else { t + length };
+            // Where the wheel's torque changes.
+            if stopped.is_some() || t < h && t > passed {
+                stopped = Some(t);
+                break;
+            }
         }
-        state.time = begin + h;
+        let reached = stopped.unwrap_or(h);
+        if reached >= h {
+            state.time = begin + h;
+        }
         state.axial.time = state.time;
-        state.axial.g = inputs.g_axial.at(h);
+        state.axial.g = inputs.g_axial.at(reached);
         if !state.axial.is_finite() {
             return Err(StepError::NotFinite { time: state.time });
         }
-        Ok(())
+        Ok(stopped.map_or(ControlFlow::Continue(()), ControlFlow::Break))
     }
 
     /// Work through the changes of g_axial since the start, J, the present one included: of a
@@ -292,6 +446,14 @@ impl Plant {
             self.state.contact = self.present_contact(inputs);
         }
         before
+    }
+
+    /// As [`Plant::apply_present_contact`], for good: as the next step would begin.
+    pub fn take_present_contact(&mut self, inputs: &Inputs) {
+        if self.omega() == 0.0 {
+            let (contact, time) = (self.present_contact(inputs), self.state.time);
+            self.state.record_contact(contact, time);
+        }
     }
 
     /// Undoes [`Plant::apply_present_contact`].

@@ -202,13 +202,15 @@ impl State {
         self.x[x::SLOSH..].as_chunks_mut().0
     }
 
-    /// Notes a new contact at `time`.
-    pub(crate) fn record_contact(&mut self, contact: Contact, time: f64) {
-        if contact != self.contact {
+    /// Notes a new contact at `time`. Returns whether it is another than before.
+    pub(crate) fn record_contact(&mut self, contact: Contact, time: f64) -> bool {
+        let changes = contact != self.contact;
+        if changes {
             self.contact = contact;
             self.event_count = self.event_count.saturating_add(1);
             self.event_time = time;
         }
+        changes
     }
 
     /// Whether hub and so many modes, and their squares, are finite.

@@ -28,6 +28,13 @@ pub enum StepError {
     Model(String),
 }
 
+impl StepError {
+    /// Whether a shorter step may succeed: the motion itself has not left the range in which its model holds.
+    pub fn shorter_may_succeed(&self) -> bool {
+        matches!(self, StepError::TooManySteps { .. } | StepError::NotFinite { .. })
+    }
+}
+
 impl core::fmt::Display for StepError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {

@@ -8,6 +8,8 @@
 //!
 //! Source: Jorba & Zou, Experimental Mathematics 14 (2005).
 
+use core::ops::ControlFlow;
+
 use crate::error::StepError;
 use crate::for_each_order;
 use crate::series::ORDER;
@@ -138,11 +140,18 @@ pub trait Motion {
     }
 
     /// Moves the states by the series cut after order n to `h` after the start of the expansion, which
-    /// is `t` after the start of the call; there is the event that was found last, if there was one.
+    /// is `t` after the start of the call; there is the event that was found last, if there was one. Returns
+    /// whether the call goes on; if not, the length that it has come.
     ///
     /// # Errors
     /// The states are not finite, or the model does not hold there.
-    fn take(&mut self, n: usize, h: f64, t: f64, steps: &mut Steps) -> Result<(), StepError>;
+    fn take(
+        &mut self,
+        n: usize,
+        h: f64,
+        t: f64,
+        steps: &mut Steps,
+    ) -> Result<ControlFlow<f64>, StepError>;
 }
 
 /// How far an expansion has come.
@@ -215,8 +224,8 @@ fn expand<M: Motion>(motion: &mut M, h: f64, tolerance: f64) -> (usize, f64) {
     (highest, h.min(length(highest)).min(length(highest - 1)))
 }
 
-/// Moves the motion on by exactly `h` > 0 from the time `begin`. On an error its states are
-/// unusable.
+/// Moves the motion on by exactly `h` > 0 from the time `begin`, unless it ends the call itself: then it returns the
+/// length that it has come. On an error its states are unusable.
 ///
 /// # Errors
 /// See [`StepError`].
@@ -227,7 +236,7 @@ pub fn advance<M: Motion>(
     h: f64,
     tolerance: f64,
     steps: &mut Steps,
-) -> Result<(), StepError> {
+) -> Result<ControlFlow<f64>, StepError> {
     let mut t = 0.0;
     while t < h {
         steps.count(1, begin + t)?;
@@ -241,9 +250,11 @@ pub fn advance<M: Motion>(
             return Err(StepError::NotFinite { time: begin + t });
         }
         t = if length == left { h } else { t + length };
-        motion.take(n, length, t, steps)?;
+        if let ControlFlow::Break(t) = motion.take(n, length, t, steps)? {
+            return Ok(ControlFlow::Break(t));
+        }
     }
-    Ok(())
+    Ok(ControlFlow::Continue(()))
 }
 
 #[cfg(test)]
@@ -281,7 +292,7 @@ mod tests {
         }
 
         fn advance(&mut self, h: f64, tolerance: f64) -> Result<(), StepError> {
-            advance(self, 7.0, h, tolerance, &mut Steps::new(100_000, ""))
+            advance(self, 7.0, h, tolerance, &mut Steps::new(100_000, "")).map(|_| ())
         }
 
         /// Largest difference from x = cos t, v = -sin t.
@@ -328,7 +339,13 @@ mod tests {
             first_root(&above[behind..=n], h)
         }
 
-        fn take(&mut self, n: usize, h: f64, _: f64, _: &mut Steps) -> Result<(), StepError> {
+        fn take(
+            &mut self,
+            n: usize,
+            h: f64,
+            _: f64,
+            _: &mut Steps,
+        ) -> Result<ControlFlow<f64>, StepError> {
             self.now = series::values([&self.x, &self.v], n, h);
             if self.now.iter().any(|x| x.is_nan()) {
                 return Err(StepError::NotFinite { time: 0.5 });
@@ -337,7 +354,7 @@ mod tests {
                 self.now[1] = -self.now[1];
                 self.hits += 1;
             }
-            Ok(())
+            Ok(ControlFlow::Continue(()))
         }
     }
 
@@ -361,7 +378,13 @@ mod tests {
             self.0.coefficient_norm(n)
         }
 
-        fn take(&mut self, n: usize, h: f64, t: f64, s: &mut Steps) -> Result<(), StepError> {
+        fn take(
+            &mut self,
+            n: usize,
+            h: f64,
+            t: f64,
+            s: &mut Steps,
+        ) -> Result<ControlFlow<f64>, StepError> {
             self.0.take(n, h, t, s)
         }
     }
@@ -440,8 +463,14 @@ mod tests {
             Some(f64::NAN)
         }
 
-        fn take(&mut self, _: usize, _: f64, _: f64, _: &mut Steps) -> Result<(), StepError> {
-            Ok(())
+        fn take(
+            &mut self,
+            _: usize,
+            _: f64,
+            _: f64,
+            _: &mut Steps,
+        ) -> Result<ControlFlow<f64>, StepError> {
+            Ok(ControlFlow::Continue(()))
         }
     }
 
@@ -477,7 +506,8 @@ mod tests {
         let mut apart = Unrolled(Oscillator::new(Convergence::Decay));
         for h in [0.01, 0.3, 9.0] {
             loops.advance(h, 1e-9).unwrap();
-            advance(&mut apart, 7.0, h, 1e-9, &mut Steps::new(100, "")).unwrap();
+            let flow = advance(&mut apart, 7.0, h, 1e-9, &mut Steps::new(100, ""));
+            assert_eq!(flow, Ok(ControlFlow::Continue(())));
             assert_eq!(loops.now, apart.0.now);
         }
     }
