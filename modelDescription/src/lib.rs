@@ -4,6 +4,7 @@
 //! the table, and the XML is committed so that a change of the interface
 //! shows in a diff.
 
+pub mod fmi3;
 pub mod icon;
 pub mod schema;
 pub mod variables;
@@ -39,8 +40,12 @@ const STEP_SIZE: f64 = 0.02;
 
 /// The file's text.
 pub fn xml<M: Model>() -> Result<String, serde_xml_rs::Error> {
+    write(&description::<M>())
+}
+
+fn write(description: &impl serde::Serialize) -> Result<String, serde_xml_rs::Error> {
     let layout = xml::EmitterConfig::new().perform_indent(true).indent_string("  ");
-    let mut text = serde_xml_rs::SerdeXml::new().emitter(layout).to_string(&description::<M>())?;
+    let mut text = serde_xml_rs::SerdeXml::new().emitter(layout).to_string(description)?;
     text.push('\n');
     Ok(text)
 }

@@ -1,15 +1,23 @@
 //! Rewrites what is committed and follows from something else: each FMU's modelDescription.xml
 //! and page of variables from its variable table; with the feature `icon`, the icon's pixels from
-//! its drawing. With `--print-spacecraft` it prints the XML of Spacecraft.fmu as compiled, for `hubslosh pack --tanks`.
+//! its drawing. With `--print-spacecraft` or `--print-spacecraft-fmi3` it prints the XML of Spacecraft.fmu as
+//! compiled, for `hubslosh pack --tanks`.
 
-use model_description::{path, variables, xml};
+use model_description::{fmi3, path, variables, xml};
 use runtime::Model;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     // of a variant, which is not committed
-    if std::env::args().nth(1).as_deref() == Some("--print-spacecraft") {
-        print!("{}", xml::<Spacecraft::Model>()?);
-        return Ok(());
+    match std::env::args().nth(1).as_deref() {
+        Some("--print-spacecraft") => {
+            print!("{}", xml::<Spacecraft::Model>()?);
+            return Ok(());
+        }
+        Some("--print-spacecraft-fmi3") => {
+            print!("{}", fmi3::xml::<Spacecraft::Model>()?);
+            return Ok(());
+        }
+        _ => {}
     }
     write::<HubSlosh::HubSlosh>()?;
     write::<Spacecraft::Model>()?;
@@ -21,6 +29,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
 fn write<M: Model>() -> Result<(), Box<dyn std::error::Error>> {
     std::fs::write(path::<M>(), xml::<M>()?)?;
+    let fmi3 = fmi3::path::<M>();
+    std::fs::create_dir_all(fmi3.with_file_name(""))?;
+    std::fs::write(&fmi3, fmi3::xml::<M>()?)?;
+    println!("wrote {}", fmi3.display());
     std::fs::write(variables::path::<M>(), variables::page::<M>())?;
     println!("wrote {}\nwrote {}", path::<M>().display(), variables::path::<M>().display());
     Ok(())

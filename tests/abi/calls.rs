@@ -143,13 +143,34 @@ fn archive_begins_with_the_model_description_and_is_plain() {
 fn the_same_source_gives_the_same_archive() {
     let directory = tempfile();
     let again = directory.path().join("again.fmu");
-    pack::pack(pack::HUBSLOSH, &again).unwrap();
+    pack::pack(pack::HUBSLOSH, pack::Fmi::V2, &again).unwrap();
     // Cargo builds once for both; what packing adds is the same each time.
     assert!(std::fs::read(again).unwrap() == std::fs::read(packed_for_tests()).unwrap());
 }
 
 fn tempfile() -> tempfile::TempDir {
     tempfile::tempdir().unwrap()
+}
+
+/// The functions of fmi3FunctionTypes.h.
+fn fmi3_functions() -> BTreeSet<String> {
+    let values = "Float32 Float64 Int8 UInt8 Int16 UInt16 Int32 UInt32 Int64 UInt64 Boolean String Binary Clock \
+                  IntervalDecimal IntervalFraction ShiftDecimal ShiftFraction FMUState";
+    let values =
+        values.split_whitespace().flat_map(|t| [format!("fmi3Get{t}"), format!("fmi3Set{t}")]);
+    let others = "GetVersion SetDebugLogging InstantiateModelExchange InstantiateCoSimulation \
+                  InstantiateScheduledExecution FreeInstance EnterInitializationMode ExitInitializationMode \
+                  EnterEventMode Terminate Reset GetNumberOfVariableDependencies GetVariableDependencies \
+                  FreeFMUState SerializedFMUStateSize SerializeFMUState DeserializeFMUState \
+                  GetDirectionalDerivative GetAdjointDerivative EnterConfigurationMode ExitConfigurationMode \
+                  EvaluateDiscreteStates UpdateDiscreteStates EnterContinuousTimeMode CompletedIntegratorStep \
+                  SetTime SetContinuousStates GetContinuousStateDerivatives GetEventIndicators \
+                  GetContinuousStates GetNominalsOfContinuousStates GetNumberOfEventIndicators \
+                  GetNumberOfContinuousStates EnterStepMode GetOutputDerivatives DoStep ActivateModelPartition";
+    let all: BTreeSet<String> =
+        values.chain(others.split_whitespace().map(|name| format!("fmi3{name}"))).collect();
+    assert_eq!(all.len(), 75);
+    all
 }
 
 #[test]
@@ -168,6 +189,8 @@ fn binary_exports_the_functions_of_fmi_and_nothing_else() {
         .map(|s| s.to_string())
         .collect();
     assert_eq!(expected.len(), 44);
+    // The library serves both versions; a model description says which one a host uses.
+    let expected = &expected | &fmi3_functions();
     for name in binaries {
         let mut bytes = Vec::new();
         std::io::copy(&mut archive.by_name(&name).unwrap(), &mut bytes).unwrap();

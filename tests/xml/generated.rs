@@ -23,6 +23,7 @@ fn description_and_page_of_variables_are_what_the_table_says() {
 fn up_to_date<M: Model>() {
     for (path, text) in [
         (model_description::path::<M>(), model_description::xml::<M>().unwrap()),
+        (model_description::fmi3::path::<M>(), model_description::fmi3::xml::<M>().unwrap()),
         (variables::path::<M>(), variables::page::<M>()),
     ] {
         let there = String::from_utf8(committed(&path)).unwrap();

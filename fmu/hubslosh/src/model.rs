@@ -4,9 +4,10 @@ use std::ops::{Deref, DerefMut};
 
 use plant::{
     Calculated, Contact, DampingLaw, FrictionModel, Inputs, Outputs, Plant, STATES, SloshModel,
-    SloshSource, State,
+    SloshSource, State, StepError, StoppedStep,
 };
 use runtime::Model;
+use runtime::model::{StepEnd, StepFailure};
 use runtime::table::Table;
 
 use crate::table::{self, TABLE};
@@ -147,6 +148,13 @@ impl Parameters {
     }
 }
 
+fn failure(why: StepError) -> StepFailure {
+    StepFailure { text: why.to_string(), shorter_may_succeed: why.shorter_may_succeed() }
+}
+
+/// How many words [`Model::save`] writes.
+pub const SAVED_WORDS: usize = State::WORDS + 1 + StoppedStep::WORDS;
+
 impl Model for HubSlosh {
     type Parameters = Parameters;
     type Inputs = Inputs;
@@ -173,18 +181,43 @@ impl Model for HubSlosh {
 
     fn save(&self, words: &mut Vec<u64>) {
         words.extend(self.plant.state().to_words());
+        let stopped = self.plant.stopped().map(StoppedStep::to_words);
+        words.push(stopped.is_some().into());
+        words.extend(stopped.unwrap_or([0; StoppedStep::WORDS]));
     }
 
     fn resume(parameters: &Parameters, words: &[u64], tolerance: f64) -> Option<Self> {
-        let state = State::from_words(words.try_into().ok()?)?;
+        let (state, words) = words.split_first_chunk()?;
+        let (stopped, words) = words.split_first()?;
+        let stopped = match stopped {
+            0 => None,
+            1 => Some(StoppedStep::from_words(words.try_into().ok()?)?),
+            _ => return None,
+        };
+        let state = State::from_words(state)?;
         let p = parameters.resolved().ok()?;
-        let plant = Plant::problems(&p).is_empty().then(|| Plant::resume(&p, &state, tolerance))?;
+        let mut plant =
+            Plant::problems(&p).is_empty().then(|| Plant::resume(&p, &state, tolerance))?;
+        plant.set_stopped(stopped);
         Some(HubSlosh { plant, present: false })
     }
 
     #[inline]
-    fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), String> {
-        self.plant.step(inputs, h).map_err(|why| why.to_string())
+    fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), StepFailure> {
+        self.plant.step(inputs, h).map_err(failure)
+    }
+
+    fn step_to_event(&mut self, inputs: &Inputs, h: f64) -> Result<StepEnd, StepFailure> {
+        let end = self.plant.step_to_event(inputs, h).map_err(failure)?;
+        Ok(match end {
+            plant::StepEnd::End => StepEnd::End,
+            plant::StepEnd::EventAtEnd => StepEnd::EventAtEnd,
+            plant::StepEnd::Event(time) => StepEnd::Event(time),
+        })
+    }
+
+    fn take_present_inputs(&mut self, inputs: &Inputs) {
+        self.plant.take_present_contact(inputs);
     }
 
     #[inline]

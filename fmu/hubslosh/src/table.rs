@@ -10,13 +10,12 @@
 //! sampling rate that can be stepped) and are wide otherwise; what parameters
 //! mean together is for the plant to judge.
 
-use plant::{
-    DampingLaw, FrictionModel, INDICATORS, MODES, Ramp, SloshModel, SloshSource, State, x,
-};
+use plant::{DampingLaw, FrictionModel, INDICATORS, MODES, Ramp, SloshModel, SloshSource, x};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::{Enumeration, Item, Variable};
 
 use crate::HubSlosh;
+use crate::model::SAVED_WORDS;
 
 /// All that is said about the FMU's variables.
 pub static TABLE: Table<HubSlosh> = Table::new(
@@ -27,7 +26,7 @@ pub static TABLE: Table<HubSlosh> = Table::new(
                       tank with sloshing liquid, a reaction wheel and a rate gyro",
         events: "Each time the hub sticks in its bearing or breaks away",
         event_indicators: INDICATORS,
-        saved_words: State::WORDS,
+        saved_words: SAVED_WORDS,
     },
     VARIABLES,
     &SCALARS,

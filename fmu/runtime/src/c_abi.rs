@@ -192,11 +192,17 @@ pub struct Component<M: Model, V: Version> {
     pub instance: Instance<M, V>,
     /// Its way to the host's logger.
     pub log: Log,
+    /// What else its version keeps of the host.
+    pub host: V::Host<M>,
 }
 
 /// A handle of a new component.
-pub fn new_component<M: Model, V: Version>(instance: Instance<M, V>, log: Log) -> *mut c_void {
-    Box::into_raw(Box::new(Component { mark: COMPONENT, instance, log })).cast()
+pub fn new_component<M: Model, V: Version>(
+    instance: Instance<M, V>,
+    log: Log,
+    host: V::Host<M>,
+) -> *mut c_void {
+    Box::into_raw(Box::new(Component { mark: COMPONENT, instance, log, host })).cast()
 }
 
 /// Whether a handle is of a live `T`, whose first field is a mark.
@@ -247,6 +253,9 @@ pub unsafe fn on<M: Model, V: Version>(
             Fault { severity: Severity::Fatal, text }
         }
     };
+    if fault.severity == Severity::Error {
+        component.instance.after_error();
+    }
     component.log.report(&fault);
     status(fault.severity)
 }
@@ -355,7 +364,7 @@ mod tests {
         let log = Log::new(Some(Box::new(move |status, _, message| {
             to.borrow_mut().push((status, message.to_str().unwrap().to_string()));
         })));
-        let c = new_component(Instance::<Spring, Fmi2>::new(Interface::CoSimulation), log);
+        let c = new_component(Instance::<Spring, Fmi2>::new(Interface::CoSimulation), log, ());
         let number = 7;
         let all: [(&str, &dyn Fn()); 3] = [
             ("fmi2Reset panicked: a text", &|| panic!("a text")),

@@ -27,11 +27,19 @@ impl Interface {
 
 /// Who handles events.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
 pub enum Events {
     /// The FMU, within the steps that it makes.
-    InStep,
+    InStep = 0,
     /// The host, in event mode: what is discrete changes there alone.
-    ByHost,
+    ByHost = 1,
+    /// The FMU, within the steps that it makes; but what is discrete is shown to the host in event mode alone.
+    Reported = 2,
+}
+
+impl Events {
+    /// All of them, each at the place of its number.
+    pub const ALL: [Events; 3] = [Events::InStep, Events::ByHost, Events::Reported];
 }
 
 /// The state of an instance, as in the state machines of the standard.
@@ -57,11 +65,15 @@ pub enum InstanceState {
     /// Event mode after initialization mode. Parameters can still be set, as
     /// OpenModelica does; the first call that goes on makes it an event as any other.
     Initialized = 8,
+    /// Before initialization mode: structural parameters are set.
+    Configuration = 9,
+    /// Within a step that the host looks into.
+    Intermediate = 10,
 }
 
 impl InstanceState {
     /// All of them, each at the place of its number.
-    pub const ALL: [InstanceState; 9] = [
+    pub const ALL: [InstanceState; 11] = [
         InstanceState::Instantiated,
         InstanceState::Initialization,
         InstanceState::Stepping,
@@ -71,6 +83,8 @@ impl InstanceState {
         InstanceState::Failed,
         InstanceState::Fatal,
         InstanceState::Initialized,
+        InstanceState::Configuration,
+        InstanceState::Intermediate,
     ];
 
     /// As messages name it.
@@ -84,15 +98,19 @@ impl InstanceState {
             InstanceState::Terminated => "terminated",
             InstanceState::Failed => "step failed",
             InstanceState::Fatal => "fatal",
+            InstanceState::Configuration => "configuration mode",
+            InstanceState::Intermediate => "intermediate update",
         }
     }
 
-    /// Whether an instance for this interface and with this policy can get there.
+    /// Whether an instance for this interface and with this policy can get there and stay.
     pub fn is_reachable(self, interface: Interface, events: Events) -> bool {
         match self {
             InstanceState::Stepping => interface == Interface::CoSimulation,
+            // Calls come and go there; no saved state is of them.
+            InstanceState::Configuration | InstanceState::Intermediate => false,
             InstanceState::Continuous => interface == Interface::ModelExchange,
-            InstanceState::Event | InstanceState::Initialized => events == Events::ByHost,
+            InstanceState::Event | InstanceState::Initialized => events != Events::InStep,
             _ => true,
         }
     }
@@ -108,6 +126,8 @@ impl InstanceState {
 pub enum CType {
     Real,
     Integer,
+    /// Where a version passes enumerations in a type of their own.
+    Enumeration,
     Boolean,
     String,
 }
@@ -129,6 +149,8 @@ pub(crate) mod states {
     /// All in which the model moves or has moved.
     pub const RUN: u16 = S | E | C | T | F;
     pub const FATAL: u16 = InstanceState::Fatal.bit();
+    pub const CONFIGURATION: u16 = InstanceState::Configuration.bit();
+    pub const INTERMEDIATE: u16 = InstanceState::Intermediate.bit();
 }
 
 /// A function of one version of FMI, as far as an instance is concerned.
@@ -198,7 +220,10 @@ impl Call {
                 interface.name()
             )));
         }
-        let possible = InstanceState::ALL.iter().filter(|s| s.is_reachable(interface, events));
+        let passing = [InstanceState::Configuration, InstanceState::Intermediate];
+        let possible = InstanceState::ALL
+            .iter()
+            .filter(|s| s.is_reachable(interface, events) || passing.contains(s));
         // To a host the first event mode is one as any other.
         let possible = possible.filter(|s| **s != InstanceState::Initialized);
         let allowed: Vec<_> =

@@ -10,8 +10,8 @@
 
 use std::marker::PhantomData;
 
-use crate::call::{Call, Events, Fault, InstanceState, Interface};
-use crate::model::Model;
+use crate::call::{CType, Call, Events, Fault, InstanceState, Interface};
+use crate::model::{Model, StepEnd, StepFailure};
 use crate::table::Scalar;
 use crate::variable::{Access, Causality, Value, is_finite, text};
 use crate::version::Version;
@@ -54,8 +54,21 @@ pub struct Instance<M: Model, V: Version> {
     pub(crate) model: Option<M>,
     /// The outputs now, if somebody has asked.
     pub(crate) outputs: Option<M::Outputs>,
+    /// What the host is shown of what is discrete where it is told of events, at the outputs' slots.
+    pub(crate) shown: Vec<i32>,
+    /// The last event, behind which a host that integrates itself may not go back, s.
+    pub(crate) last_event: f64,
     /// Room for the continuous states in the model's order, for directions and derivatives.
     scratch: [Vec<f64>; 2],
+}
+
+/// What is to be known of a step that may stop at events.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepInfo {
+    /// There is an event to be handled.
+    pub event: bool,
+    /// It has stopped before its end.
+    pub early: bool,
 }
 
 /// What is to be known of an event that has been handled.
@@ -74,6 +87,7 @@ impl<M: Model, V: Version> Clone for Instance<M, V> {
             parameters: self.parameters.clone(),
             model: self.model.clone(),
             scratch: self.scratch.clone(),
+            shown: self.shown.clone(),
             ..*self
         }
     }
@@ -85,18 +99,25 @@ impl<M: Model, V: Version> Clone for Instance<M, V> {
         let mut model = self.model.take();
         model.clone_from(&other.model);
         let scratch = std::mem::take(&mut self.scratch);
-        *self = Instance { parameters, model, scratch, ..*other };
+        let mut shown = std::mem::take(&mut self.shown);
+        shown.clone_from(&other.shown);
+        *self = Instance { parameters, model, scratch, shown, ..*other };
     }
 }
 
 impl<M: Model, V: Version> Instance<M, V> {
     /// Just made.
     pub fn new(interface: Interface) -> Self {
+        Instance::with_events(interface, V::events(interface))
+    }
+
+    /// Just made, for a host that says who handles events.
+    pub fn with_events(interface: Interface, events: Events) -> Self {
         let states = M::table().derivatives().len();
         Instance {
             version: PhantomData,
             interface,
-            events: V::events(interface),
+            events,
             state: InstanceState::Instantiated,
             start: 0.0,
             stop: None,
@@ -108,6 +129,11 @@ impl<M: Model, V: Version> Instance<M, V> {
             past_slopes: false,
             model: None,
             outputs: None,
+            shown: match events {
+                Events::Reported => vec![0; M::table().discrete().count()],
+                _ => Vec::new(),
+            },
+            last_event: f64::NEG_INFINITY,
             scratch: [vec![0.0; states], vec![0.0; states]],
         }
     }
@@ -137,6 +163,13 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// After a panic nothing it says can be trusted.
     pub fn poison(&mut self) {
         self.state = InstanceState::Fatal;
+    }
+
+    /// What a failed call does to it.
+    pub(crate) fn after_error(&mut self) {
+        if let Some(state) = V::AFTER_ERROR.filter(|_| self.state != InstanceState::Fatal) {
+            self.state = state;
+        }
     }
 
     /// Tolerance and times: `None` where the host defines nothing.
@@ -187,8 +220,11 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.outputs(call)?;
         self.state = match self.events {
             Events::InStep => InstanceState::Stepping,
-            Events::ByHost => InstanceState::Initialized,
+            Events::ByHost | Events::Reported => V::FIRST_EVENT,
         };
+        if self.events == Events::Reported {
+            self.show_discrete(call)?;
+        }
         Ok(())
     }
 
@@ -218,7 +254,7 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// As new.
     pub fn reset(&mut self) -> Result<(), Fault> {
         self.check(V::RESET)?;
-        *self = Instance::new(self.interface);
+        *self = Instance::with_events(self.interface, self.events);
         Ok(())
     }
 
@@ -282,6 +318,15 @@ impl<M: Model, V: Version> Instance<M, V> {
                 Value::Real(get(self.model(call)?, &inputs, element)[0])
             }
             Access::Output(get) => Value::Real(get(self.outputs(call)?, element)),
+            Access::OutputInteger(_) | Access::OutputBoolean(_)
+                if self.events == Events::Reported && self.is_running() =>
+            {
+                let shown = self.shown.get(scalar.slot).copied().unwrap_or_default();
+                match scalar.access {
+                    Access::OutputBoolean(_) => Value::Boolean(shown != 0),
+                    _ => Value::Integer(shown),
+                }
+            }
             Access::OutputInteger(get) => Value::Integer(get(self.outputs(call)?, element)),
             Access::OutputBoolean(get) => Value::Boolean(get(self.outputs(call)?, element)),
             _ => return Err(no_value(call, scalar)),
@@ -318,6 +363,25 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
+    /// Brings what the host is shown of what is discrete up to date. Returns whether it was not.
+    fn show_discrete(&mut self, call: &Call) -> Result<bool, Fault> {
+        let outputs = *self.outputs(call)?;
+        let mut changed = false;
+        for (scalar, shown) in M::table().discrete().zip(&mut self.shown) {
+            let now = discrete(scalar, &outputs);
+            changed |= now != *shown;
+            *shown = now;
+        }
+        Ok(changed)
+    }
+
+    /// Whether something discrete is not as the host is shown it.
+    fn hides_discrete(&mut self, call: &Call) -> Result<bool, Fault> {
+        let outputs = *self.outputs(call)?;
+        let mut all = M::table().discrete().zip(&self.shown);
+        Ok(all.any(|(scalar, shown)| discrete(scalar, &outputs) != *shown))
+    }
+
     /// Sets an input or a parameter; what follows from it has to be computed anew.
     #[inline]
     fn put(&mut self, scalar: &Scalar<M>, value: Value) {
@@ -325,6 +389,13 @@ impl<M: Model, V: Version> Instance<M, V> {
             (Access::Input(ramp), Value::Real(x)) => {
                 self.drop_past_slopes();
                 *ramp(&mut self.inputs, scalar.element)[0] = x;
+            }
+            (_, Value::Real(x)) if V::SETS_STATES && scalar.state.is_some() => {
+                if let (Some(model), Some(place)) = (&mut self.model, scalar.state()) {
+                    self.scratch[0].copy_from_slice(model.continuous_states());
+                    self.scratch[0][place] = x;
+                    model.set_continuous_states(&self.scratch[0]);
+                }
             }
             (_, value) => {
                 if let Some(slot) = self.parameters.get_mut(scalar.slot) {
@@ -344,6 +415,7 @@ impl<M: Model, V: Version> Instance<M, V> {
         !matches!(
             self.state,
             InstanceState::Instantiated
+                | InstanceState::Configuration
                 | InstanceState::Initialization
                 | InstanceState::Initialized
         )
@@ -358,6 +430,12 @@ impl<M: Model, V: Version> Instance<M, V> {
     ) -> Result<&'static Scalar<M>, Fault> {
         let scalar = scalar::<M, V>(call, reference)?;
         let is_input = matches!(scalar.access, Access::Input(_));
+        if V::SETS_STATES && scalar.state.is_some() && self.takes_states() {
+            return match value {
+                Value::Real(x) if x.abs() < MAX_STATE => Ok(scalar),
+                _ => Err(call.discard(state_refusal(scalar, value))),
+            };
+        }
         // Wrong parameters are refused all together when initialization ends, everything
         // else on the spot.
         if !is_input {
@@ -366,9 +444,17 @@ impl<M: Model, V: Version> Instance<M, V> {
         let later = !is_input
             && matches!(self.state, InstanceState::Instantiated | InstanceState::Initialization);
         match scalar.problem(value) {
-            Some(problem) if !later => Err(call.error(problem)),
+            Some(problem) if !later => {
+                Err(Fault { severity: V::OUT_OF_RANGE, ..call.error(problem) })
+            }
             _ => Ok(scalar),
         }
+    }
+
+    /// Whether a host that integrates itself may set single states now.
+    fn takes_states(&self) -> bool {
+        self.interface == Interface::ModelExchange
+            && matches!(self.state, InstanceState::Event | InstanceState::Continuous)
     }
 
     fn check_set_parameter(&self, call: &Call, scalar: &Scalar<M>) -> Result<(), Fault> {
@@ -545,6 +631,81 @@ impl<M: Model, V: Version> Instance<M, V> {
         done
     }
 
+    /// The value references of what a variable depends on: before the motion begins what its initial value does; then
+    /// those of the inputs and states it is declared to depend on that it does depend on as things stand: in stick or
+    /// slip, by the models chosen. Derivatives that vanish at the very point count if they do not close by.
+    pub(crate) fn dependencies(
+        &mut self,
+        call: &Call,
+        scalar: &Scalar<M>,
+    ) -> Result<Vec<u32>, Fault> {
+        if !self.is_running() {
+            return Ok(scalar.initial_depends_on().map(V::reference).collect());
+        }
+        let declared: Vec<_> = scalar.depends_on().collect();
+        let has_derivative = matches!(
+            scalar.access,
+            Access::Output(_) | Access::OfInputs(_) | Access::Derivative(_)
+        );
+        if scalar.state.is_some() || !has_derivative {
+            return Ok(declared.into_iter().map(V::reference).collect());
+        }
+        /// How far the points are, in orders of magnitude.
+        const NEAR: f64 = 1e-3;
+        const POINTS: u64 = 4;
+        let mut depends = vec![false; declared.len()];
+        for point in 0..POINTS {
+            let mut near = self.clone();
+            near.model(call)?;
+            if point > 0 {
+                near.move_aside(NEAR, point);
+            }
+            for (known, depends) in declared.iter().zip(&mut depends).filter(|(_, is)| !**is) {
+                let mut along = near.inputs;
+                hold::<M>(&mut along);
+                near.scratch[0].fill(0.0);
+                match (known.access, known.state()) {
+                    (Access::Input(ramp), _) => *ramp(&mut along, known.element)[1] = 1.0,
+                    (_, Some(place)) => near.scratch[0][place] = 1.0,
+                    _ => {}
+                }
+                let mut answer = [0.0];
+                near.derivatives_along(call, &[V::reference(scalar)], &along, &mut answer)?;
+                *depends = answer[0] != 0.0;
+            }
+        }
+        let found = declared.into_iter().zip(depends).filter(|(_, is)| *is);
+        Ok(found.map(|(known, _)| V::reference(known)).collect())
+    }
+
+    /// Moves states and inputs aside by up to `share` of their orders of magnitude, each point by others.
+    fn move_aside(&mut self, share: f64, point: u64) {
+        // The golden ratio's multiples fill the interval evenly.
+        let part = |n: u64| 2.0 * (0.618_033_988_749_895 * (n + 1) as f64).fract() - 1.0;
+        if let Some(model) = &mut self.model {
+            self.scratch[0].copy_from_slice(model.continuous_states());
+            let count = self.scratch[0].len() as u64;
+            for (n, scalar) in (point * count..).zip(M::table().derivatives()) {
+                let Access::Derivative(place) = scalar.access else { continue };
+                let place = place(scalar.element);
+                let nominal =
+                    M::table().state_at(place).map_or(1.0, |s| s.variable.nominal_value());
+                self.scratch[0][place] += share * nominal * part(n);
+            }
+            model.set_continuous_states(&self.scratch[0]);
+        }
+        for (n, scalar) in (point..).zip(M::table().inputs()) {
+            if let Access::Input(ramp) = scalar.access {
+                let [value, _] = ramp(&mut self.inputs, scalar.element);
+                let moved = *value + share * scalar.variable.nominal_value() * part(n).abs();
+                if scalar.problem(Value::Real(moved)).is_none() {
+                    *value = moved;
+                }
+            }
+        }
+        self.outputs = None;
+    }
+
     /// As above, by central differences with Richardson's extrapolation between
     /// instances that start elsewhere: each known moves by a thousandth of its value, or
     /// of its order of magnitude where it is smaller.
@@ -600,6 +761,26 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// A step from `at` on by `h`. Does not allocate unless it fails.
     pub fn do_step(&mut self, at: f64, h: f64) -> Result<(), Fault> {
         let call = self.check(V::DO_STEP)?;
+        self.step_by(call, at, h, |model, inputs| model.step(inputs, h).map(|()| StepEnd::End))?;
+        Ok(())
+    }
+
+    /// As [`Instance::do_step`], for a host that is told of events, and where it allows so stops at the first.
+    pub fn step_to_event(&mut self, at: f64, h: f64, stops: bool) -> Result<StepInfo, Fault> {
+        let call = self.check(V::DO_STEP)?;
+        let reported = self.events == Events::Reported;
+        let next_time = self.model.as_ref().and_then(M::next_time_event);
+        let end = self.step_by(call, at, h, |model, inputs| match stops && reported {
+            true => model.step_to_event(inputs, h),
+            false => model.step(inputs, h).map(|()| StepEnd::End),
+        })?;
+        let sampled = self.model.as_ref().and_then(M::next_time_event) != next_time;
+        let event = reported && (end != StepEnd::End || sampled || self.hides_discrete(call)?);
+        Ok(StepInfo { event, early: matches!(end, StepEnd::Event(_)) })
+    }
+
+    /// What is wrong with a step from `at` on by `h`, whatever it finds on its way.
+    pub(crate) fn check_step(&self, call: &Call, at: f64, h: f64) -> Result<(), Fault> {
         if !(is_finite(h) && h > 0.0) {
             return Err(call.error(format_args!(
                 "communicationStepSize = {} s (allowed: greater than 0, finite)",
@@ -622,6 +803,19 @@ impl<M: Model, V: Version> Instance<M, V> {
             return Err(call
                 .error(format_args!("the step to {end:?} s would pass the stop time {stop:?} s")));
         }
+        Ok(())
+    }
+
+    #[inline(always)]
+    fn step_by(
+        &mut self,
+        call: &Call,
+        at: f64,
+        h: f64,
+        step: impl FnOnce(&mut M, &M::Inputs) -> Result<StepEnd, StepFailure>,
+    ) -> Result<StepEnd, Fault> {
+        self.check_step(call, at, h)?;
+        let end = at + h;
         let mut inputs = self.inputs;
         if M::OUTPUTS_USE_SLOPES && self.past_slopes {
             hold::<M>(&mut inputs);
@@ -636,16 +830,32 @@ impl<M: Model, V: Version> Instance<M, V> {
         };
         // Steps added up drift from the host's clock, on which things may be due.
         model.set_time(at);
-        if let Err(why) = model.step(&inputs, h) {
-            self.state = InstanceState::Failed;
-            return Err(call.error(format_args!("step from {at:?} s to {end:?} s failed: {why}")));
-        }
+        let ended = match step(model, &inputs) {
+            Ok(ended) => ended,
+            Err(StepFailure { text, shorter_may_succeed }) => {
+                let why = format_args!("step from {at:?} s to {end:?} s failed: {text}");
+                // Where failing has a state of its own, there is no going on with a shorter step.
+                if shorter_may_succeed && V::AFTER_ERROR.is_some() {
+                    return Err(call.discard(why));
+                }
+                self.state = InstanceState::Failed;
+                return Err(call.error(why));
+            }
+        };
+        let end = match ended {
+            StepEnd::Event(time) => {
+                after = inputs;
+                follow_slopes::<M>(call, &mut after, time - at)?;
+                time
+            }
+            _ => end,
+        };
         self.inputs = after;
         self.past_slopes = M::OUTPUTS_USE_SLOPES && sloped;
         self.sloped = false;
         self.time = end;
         self.outputs = None;
-        Ok(())
+        Ok(ended)
     }
 
     /// From here on the inputs are held, unless slopes are set.
@@ -657,11 +867,75 @@ impl<M: Model, V: Version> Instance<M, V> {
         }
     }
 
+    // ---- Within a step, by the host ----
+
+    /// The host looks in.
+    pub(crate) fn enter_intermediate(&mut self) {
+        self.state = InstanceState::Intermediate;
+    }
+
+    /// It has looked in.
+    pub(crate) fn leave_intermediate(&mut self, call: &Call) -> Result<(), Fault> {
+        if self.state != InstanceState::Intermediate {
+            return Err(call.error("a call of the host's failed within the intermediate update"));
+        }
+        self.state = InstanceState::Stepping;
+        Ok(())
+    }
+
+    /// Lets inputs run along lines for the next step, to where they are after `h`.
+    pub(crate) fn ramp_to(
+        &mut self,
+        call: &Call,
+        references: &[u32],
+        ends: &M::Inputs,
+        h: f64,
+    ) -> Result<(), Fault> {
+        let mut ends = *ends;
+        self.drop_past_slopes();
+        for reference in references {
+            let scalar =
+                V::scalar::<M>(*reference, Some(CType::Real)).map_err(|why| call.error(why))?;
+            let Access::Input(ramp) = scalar.access else { continue };
+            let [value, slope] = ramp(&mut self.inputs, scalar.element);
+            *slope = (*ramp(&mut ends, scalar.element)[0] - *value) / h;
+            let slope = *slope;
+            self.sloped = true;
+            if let Err(fault) = check_slope(call, scalar, 1, slope) {
+                self.drop_ramps();
+                return Err(fault);
+            }
+        }
+        Ok(())
+    }
+
+    /// Puts inputs exactly where the step has taken them but for rounding.
+    pub(crate) fn end_ramps(&mut self, references: &[u32], ends: &M::Inputs) {
+        let mut ends = *ends;
+        for reference in references {
+            if let Ok(scalar) = V::scalar::<M>(*reference, Some(CType::Real))
+                && let Access::Input(ramp) = scalar.access
+            {
+                *ramp(&mut self.inputs, scalar.element)[0] = *ramp(&mut ends, scalar.element)[0];
+            }
+        }
+        self.outputs = None;
+    }
+
+    /// Holds the inputs after all.
+    pub(crate) fn drop_ramps(&mut self) {
+        hold::<M>(&mut self.inputs);
+        self.sloped = false;
+    }
+
     // ---- Events and continuous time, by the host ----
 
     /// At an event.
     pub fn enter_event_mode(&mut self) -> Result<(), Fault> {
         let call = self.check(V::ENTER_EVENT)?;
+        if self.events == Events::InStep {
+            return Err(call.error("this instance was made with eventModeUsed = false"));
+        }
         self.leave_initialized(call)?;
         self.state = InstanceState::Event;
         Ok(())
@@ -671,11 +945,42 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// again, after other inputs, does no harm.
     pub fn new_discrete_states(&mut self) -> Result<EventInfo, Fault> {
         let call = self.check(V::NEW_DISCRETE_STATES)?;
+        if self.events == Events::Reported {
+            return self.report_discrete_states(call);
+        }
         let event = self.query(call, |model, inputs| model.handle_event(inputs))?;
         let states_changed = event.map_err(|why| call.error(why))?;
         self.state = InstanceState::Event;
         self.outputs = None;
+        self.last_event = self.time;
         Ok(EventInfo { states_changed, next_time: self.model(call)?.next_time_event() })
+    }
+
+    /// The same where the FMU has handled events within its step: takes over what the present inputs change, and
+    /// shows all that is discrete.
+    fn report_discrete_states(&mut self, call: &Call) -> Result<EventInfo, Fault> {
+        let inputs = self.inputs;
+        let time = self.time;
+        let model = self.model(call)?;
+        model.set_time(time);
+        model.take_present_inputs(&inputs);
+        self.outputs = None;
+        self.show_discrete(call)?;
+        Ok(EventInfo { states_changed: false, next_time: self.model(call)?.next_time_event() })
+    }
+
+    /// Into configuration mode or back.
+    pub fn configure(&mut self, call: &'static Call, to: InstanceState) -> Result<(), Fault> {
+        self.check(call)?;
+        self.state = to;
+        Ok(())
+    }
+
+    /// The host goes on with steps.
+    pub fn enter_step_mode(&mut self, call: &'static Call) -> Result<(), Fault> {
+        self.check(call)?;
+        self.state = InstanceState::Stepping;
+        Ok(())
     }
 
     /// Between events.
@@ -711,6 +1016,12 @@ impl<M: Model, V: Version> Instance<M, V> {
         if !is_finite(time) {
             let time = text(time);
             return Err(call.error(format_args!("time = {time} s (allowed: any finite number)")));
+        }
+        if V::SETS_STATES && time < self.last_event - TIME_SLACK * self.last_event.abs() {
+            let (time, last) = (text(time), self.last_event);
+            return Err(call.error(format_args!(
+                "time = {time} s lies before the last event (allowed: {last:?} s or later)"
+            )));
         }
         self.leave_initialized(call)?;
         self.model(call)?.set_time(time);
@@ -784,6 +1095,22 @@ impl<M: Model, V: Version> Instance<M, V> {
         self.query(call, |model, inputs| model.event_indicators(inputs, indicators))
     }
 
+    /// Functions that cross zero at events, for a call that reads variables.
+    pub(crate) fn indicators_for(
+        &mut self,
+        call: &Call,
+        indicators: &mut [f64],
+    ) -> Result<(), Fault> {
+        if self.state == InstanceState::Instantiated {
+            return Err(call.error(format_args!(
+                "event indicators have no value in state \"{}\"; they have one from {} on",
+                self.state.name(),
+                InstanceState::Initialization.name()
+            )));
+        }
+        self.query(call, |model, inputs| model.event_indicators(inputs, indicators))
+    }
+
     /// The states' orders of magnitude.
     pub fn nominals(&self, nominals: &mut [f64]) -> Result<(), Fault> {
         let call = self.check(V::GET_NOMINALS)?;
@@ -806,6 +1133,11 @@ impl<M: Model, V: Version> Instance<M, V> {
                 saved.interface.name(),
                 self.interface.name()
             )));
+        }
+        if saved.events != self.events {
+            return Err(call.error(
+                "the state is of an instance whose host handles events otherwise: eventModeUsed must be the same",
+            ));
         }
         self.clone_from(saved);
         Ok(())
@@ -903,7 +1235,7 @@ fn answer<M: Model, T>(
     question: impl FnOnce(&mut M, &M::Inputs) -> T,
 ) -> T {
     match events {
-        Events::InStep => {
+        Events::InStep | Events::Reported => {
             let before = model.apply_present_inputs(inputs);
             let answer = question(model, inputs);
             model.revert(before);
@@ -911,6 +1243,24 @@ fn answer<M: Model, T>(
         }
         Events::ByHost => question(model, inputs),
     }
+}
+
+/// The number by which the host is shown an output that is discrete.
+fn discrete<M: Model>(scalar: &Scalar<M>, outputs: &M::Outputs) -> i32 {
+    match scalar.access {
+        Access::OutputInteger(get) => get(outputs, scalar.element),
+        Access::OutputBoolean(get) => get(outputs, scalar.element).into(),
+        _ => 0,
+    }
+}
+
+#[cold]
+fn state_refusal<M: Model>(scalar: &Scalar<M>, value: Value) -> String {
+    let value = match value {
+        Value::Real(x) => text(x),
+        other => format!("{other:?}"),
+    };
+    format!("{} = {value} (allowed: magnitudes below {MAX_STATE:e})", scalar.name())
 }
 
 /// Takes the inputs to where their slopes lead in `h`, which is in their ranges.

@@ -4,11 +4,11 @@
 //! [`variable`] and [`table`] say what a model's variables are, [`call`] when a call is allowed,
 //! [`instance`] what the calls do, [`snapshot`] how a state is saved, [`log`] what is told to the
 //! host. What differs between the versions of FMI is the trait [`version::Version`]; each is one file
-//! ([`v2`]), with its C interface on top of what they share ([`c_abi`]): these hold the only unsafe
+//! ([`v2`], [`v3`]), with its C interface on top of what they share ([`c_abi`]): these hold the only unsafe
 //! code.
 //!
-//! An FMU is a crate with a table, an implementation of [`Model`] and one line:
-//! `runtime::export_fmi2!(TheModel);`.
+//! An FMU is a crate with a table, an implementation of [`Model`] and two lines:
+//! `runtime::export_fmi2!(TheModel);` and `runtime::export_fmi3!(TheModel);`.
 
 pub mod c_abi;
 pub mod call;
@@ -20,6 +20,7 @@ pub mod snapshot;
 pub mod table;
 pub mod unit;
 pub mod v2;
+pub mod v3;
 pub mod variable;
 pub mod version;
 

@@ -90,6 +90,14 @@ impl Filter {
     pub const NONE: Filter =
         Filter { events: false, warning: false, discard: false, error: false, fatal: false };
 
+    /// Why calls fail, and nothing else.
+    pub const ERRORS: Filter = Filter { warning: false, ..Filter::FAILURES };
+
+    /// The same, with why calls fail.
+    pub fn with_errors(self) -> Filter {
+        Filter { discard: true, error: true, fatal: true, ..self }
+    }
+
     /// Only these categories; none given means all. Unknown names are an error
     /// that lists them and the known ones.
     pub fn of<M: Model>(names: &[String], table: &Table<M>) -> Result<Filter, String> {

@@ -4,6 +4,26 @@ use std::fmt::Debug;
 
 use crate::table::Table;
 
+/// Why a step failed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StepFailure {
+    /// In words.
+    pub text: String,
+    /// Whether a shorter step may succeed.
+    pub shorter_may_succeed: bool,
+}
+
+/// How a step has ended that stops at events.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StepEnd {
+    /// At its end.
+    End,
+    /// At its end, where there is an event.
+    EventAtEnd,
+    /// At an event before, at this time, s.
+    Event(f64),
+}
+
 /// A dynamic system with inputs, parameters, continuous states and events.
 ///
 /// A clone is a saved state: nothing about a model is kept elsewhere. Times are in s.
@@ -52,7 +72,19 @@ pub trait Model: Clone + Debug + Sized + 'static {
 
     /// Moves on by exactly `h` > 0 seconds; the inputs run along their slopes. On an error the
     /// model is as before. Does not allocate unless it fails.
-    fn step(&mut self, inputs: &Self::Inputs, h: f64) -> Result<(), String>;
+    fn step(&mut self, inputs: &Self::Inputs, h: f64) -> Result<(), StepFailure>;
+
+    /// As [`Model::step`], but stops at the first event. A step from there to the same end, with the same inputs, ends
+    /// as the whole step does, bit for bit.
+    fn step_to_event(&mut self, inputs: &Self::Inputs, h: f64) -> Result<StepEnd, StepFailure> {
+        self.step(inputs, h).map(|()| StepEnd::End)
+    }
+
+    /// Changes for good what the present inputs change at once of what is discrete, see
+    /// [`Model::apply_present_inputs`].
+    fn take_present_inputs(&mut self, inputs: &Self::Inputs) {
+        let _ = inputs;
+    }
 
     /// What there is to see now.
     fn outputs(&mut self, inputs: &Self::Inputs) -> Self::Outputs;

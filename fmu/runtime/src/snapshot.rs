@@ -8,18 +8,19 @@
 //! | "FMUstate" | 8 |
 //! | version of this format | 4 |
 //! | length of the whole | 4 |
-//! | GUID of the variable table | 38 |
+//! | GUID or token of the variable table | 38 |
 //! | instance state, flags (1: stop time, 2: model, 4: slopes, 8: slopes of the step before) | 1 + 1 |
-//! | interface, 0 | 1 + 1 |
-//! | start, stop, tolerance, time | 4 x 8 |
+//! | interface, who handles events | 1 + 1 |
+//! | start, stop, tolerance, time, last event | 5 x 8 |
 //! | parameters in the table's order: number, or 0/1 | 8 each |
 //! | inputs: value, slope | 16 each |
+//! | the outputs that are discrete, as the host is shown them | 4 each |
 //! | the model's words | 8 each |
 //! | checksum of all before | 16 |
 //!
 //! Everything else about a model follows from its parameters.
 
-use crate::call::{InstanceState, Interface};
+use crate::call::{Events, InstanceState, Interface};
 use crate::hash::Hash;
 use crate::instance::{Instance, TOLERANCES};
 use crate::model::Model;
@@ -28,7 +29,7 @@ use crate::variable::{Access, Value};
 use crate::version::Version;
 
 const MAGIC: &[u8; 8] = b"FMUstate";
-const FORMAT: u32 = 3;
+const FORMAT: u32 = 4;
 const HAS_STOP: u8 = 1;
 const HAS_MODEL: u8 = 2;
 const HAS_SLOPES: u8 = 4;
@@ -37,8 +38,9 @@ const HAS_PAST_SLOPES: u8 = 8;
 /// The number of bytes; the same for every state of a model.
 pub fn size<M: Model>() -> usize {
     let table = M::table();
-    let head = 8 + 4 + 4 + 38 + 4 + 4 * 8;
-    let set = table.parameters().len() * 8 + table.inputs().len() * 16;
+    let head = 8 + 4 + 4 + 38 + 4 + 5 * 8;
+    let set =
+        table.parameters().len() * 8 + table.inputs().len() * 16 + table.discrete().count() * 4;
     head + set + table.about.saved_words * 8 + 16
 }
 
@@ -49,14 +51,16 @@ pub fn to_bytes<M: Model, V: Version>(saved: &Instance<M, V>) -> Vec<u8> {
     bytes.extend(MAGIC);
     bytes.extend(FORMAT.to_le_bytes());
     bytes.extend((size as u32).to_le_bytes());
-    bytes.extend(table.guid().as_bytes());
+    bytes.extend(V::token::<M>().as_bytes());
     let flag = |is: bool, flag: u8| if is { flag } else { 0 };
     let flags = flag(saved.stop.is_some(), HAS_STOP)
         | flag(saved.model.is_some(), HAS_MODEL)
         | flag(saved.sloped, HAS_SLOPES)
         | flag(saved.past_slopes, HAS_PAST_SLOPES);
-    bytes.extend([saved.state as u8, flags, saved.interface as u8, 0]);
-    for time in [saved.start, saved.stop.unwrap_or(0.0), saved.tolerance, saved.time] {
+    bytes.extend([saved.state as u8, flags, saved.interface as u8, saved.events as u8]);
+    // Until there is one, any finite number serves.
+    let last_event = saved.last_event.max(f64::MIN);
+    for time in [saved.start, saved.stop.unwrap_or(0.0), saved.tolerance, saved.time, last_event] {
         bytes.extend(time.to_le_bytes());
     }
     for value in &saved.parameters {
@@ -73,6 +77,9 @@ pub fn to_bytes<M: Model, V: Version>(saved: &Instance<M, V>) -> Vec<u8> {
                 bytes.extend(number.to_le_bytes());
             }
         }
+    }
+    for n in 0..table.discrete().count() {
+        bytes.extend(saved.shown.get(n).copied().unwrap_or(0).to_le_bytes());
     }
     let mut words = Vec::with_capacity(table.about.saved_words);
     if let Some(model) = &saved.model {
@@ -104,7 +111,7 @@ pub fn from_bytes<M: Model, V: Version>(bytes: &[u8]) -> Result<Instance<M, V>, 
         return Err(format!("the saved state should have {length} bytes, not {}", bytes.len()));
     }
     let guid = rest.take::<38>()?;
-    if guid != table.guid().as_bytes() {
+    if guid != V::token::<M>().as_bytes() {
         let guid = String::from_utf8_lossy(&guid);
         return Err(format!(
             "the saved state is of another FMU or of another version of {model}, {guid}"
@@ -118,13 +125,16 @@ pub fn from_bytes<M: Model, V: Version>(bytes: &[u8]) -> Result<Instance<M, V>, 
         return Err("the saved state is damaged: its checksum is wrong".into());
     }
 
-    let [state, flags, interface, _] = rest.take()?;
+    let [state, flags, interface, events] = rest.take()?;
     let interface = match interface {
         0 => Interface::ModelExchange,
         1 => Interface::CoSimulation,
         _ => return Err("the saved state is damaged: no such interface".into()),
     };
-    let mut saved = Instance::new(interface);
+    let events = Events::ALL.get(usize::from(events)).copied();
+    let events = events.filter(|events| V::allows(interface, *events));
+    let events = events.ok_or("the saved state is damaged: who handles events")?;
+    let mut saved = Instance::with_events(interface, events);
     let possible =
         |s: &InstanceState| *s != InstanceState::Fatal && s.is_reachable(interface, saved.events);
     let state = InstanceState::ALL.get(usize::from(state)).copied().filter(possible);
@@ -136,6 +146,7 @@ pub fn from_bytes<M: Model, V: Version>(bytes: &[u8]) -> Result<Instance<M, V>, 
     saved.stop = Some(rest.finite("stop time")?).filter(|_| flags & HAS_STOP != 0);
     saved.tolerance = rest.finite("tolerance")?;
     saved.time = rest.finite("time")?;
+    saved.last_event = rest.finite("last event")?;
     if !TOLERANCES.contains(&saved.tolerance) {
         return Err("the saved state is damaged: tolerance".into());
     }
@@ -157,6 +168,12 @@ pub fn from_bytes<M: Model, V: Version>(bytes: &[u8]) -> Result<Instance<M, V>, 
                     "the saved state is damaged: derivative of {name} = {slope:?}"
                 ));
             }
+        }
+    }
+    for n in 0..table.discrete().count() {
+        let shown = i32::from_le_bytes(rest.take()?);
+        if let Some(place) = saved.shown.get_mut(n) {
+            *place = shown;
         }
     }
     let mut words = vec![0; table.about.saved_words];

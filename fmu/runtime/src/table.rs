@@ -42,6 +42,7 @@ pub struct Table<M: Model> {
     parameters: Span,
     derivatives: Span,
     guid: OnceLock<[u8; GUID_LENGTH]>,
+    token: OnceLock<[u8; GUID_LENGTH]>,
 }
 
 /// Length of a GUID in braces.
@@ -90,7 +91,7 @@ pub struct Scalar<M: Model> {
     pub index: u32,
     /// Its place in the array, 0 for the first.
     pub element: usize,
-    /// How many scalar parameters come before it.
+    /// How many scalar parameters come before it; of an output that is discrete, how many of these.
     pub slot: usize,
 }
 
@@ -126,7 +127,7 @@ pub const fn scalars<M: Model, const N: usize>(
         slot: 0,
     };
     let mut scalars = [first; N];
-    let (mut n, mut entry, mut slot) = (0, 0, 0);
+    let (mut n, mut entry, mut slot, mut discrete) = (0, 0, 0, 0);
     while entry < variables.len() {
         let variable = &variables[entry];
         let mut element = 0;
@@ -138,18 +139,25 @@ pub const fn scalars<M: Model, const N: usize>(
                 state: variable.state,
                 index: n as u32,
                 element,
-                slot,
+                slot: if is_discrete(variable) { discrete } else { slot },
             };
             n += 1;
             element += 1;
             if matches!(variable.causality, Causality::Parameter) {
                 slot += 1;
+            } else if is_discrete(variable) {
+                discrete += 1;
             }
         }
         entry += 1;
     }
     assert!(n == N, "as many as scalar_count says");
     scalars
+}
+
+/// Whether a variable is an output that is discrete.
+const fn is_discrete<M: Model>(variable: &Variable<M>) -> bool {
+    matches!(variable.access, Access::OutputInteger(_) | Access::OutputBoolean(_))
 }
 
 impl<M: Model> Scalar<M> {
@@ -226,6 +234,7 @@ impl<M: Model> Table<M> {
             parameters: span(scalars, 'p'),
             derivatives: span(scalars, 'd'),
             guid: OnceLock::new(),
+            token: OnceLock::new(),
         }
     }
 
@@ -243,6 +252,22 @@ impl<M: Model> Table<M> {
             bytes
         });
         std::str::from_utf8(bytes).unwrap_or_default()
+    }
+
+    /// As the GUID, for model descriptions of FMI 3.0.
+    pub fn token(&self) -> &str {
+        let bytes = self.token.get_or_init(|| {
+            let mut bytes = [0; GUID_LENGTH];
+            let hash = Hash::new().text(self.guid()).text("FMI 3.0, scalars");
+            bytes.copy_from_slice(braced(hash).as_bytes());
+            bytes
+        });
+        std::str::from_utf8(bytes).unwrap_or_default()
+    }
+
+    /// The outputs that are discrete, in the table's order, each at its slot.
+    pub fn discrete(&self) -> impl Iterator<Item = &'static Scalar<M>> + use<M> {
+        self.scalars.iter().filter(|scalar| is_discrete(scalar.variable))
     }
 
     /// The parameters' start values, in the table's order.
@@ -353,16 +378,14 @@ impl<M: Model> Table<M> {
                 .iter()
                 .fold(hash, |h, (name, factor)| number(h.text(name), Some(*factor)));
         }
-        let hex = format!("{:032x}", hash.value());
-        format!(
-            "{{{}-{}-{}-{}-{}}}",
-            &hex[..8],
-            &hex[8..12],
-            &hex[12..16],
-            &hex[16..20],
-            &hex[20..]
-        )
+        braced(hash)
     }
+}
+
+/// A hash in the form of a GUID.
+fn braced(hash: Hash) -> String {
+    let hex = format!("{:032x}", hash.value());
+    format!("{{{}-{}-{}-{}-{}}}", &hex[..8], &hex[8..12], &hex[12..16], &hex[16..20], &hex[20..])
 }
 
 #[cfg(test)]

@@ -167,6 +167,13 @@ pub struct Fmi2;
 impl Version for Fmi2 {
     const PREFIX: &'static str = "fmi2";
 
+    type Host<M: Model> = ();
+
+    const AFTER_ERROR: Option<InstanceState> = None;
+    const OUT_OF_RANGE: Severity = Severity::Error;
+    const FIRST_EVENT: InstanceState = InstanceState::Initialized;
+    const SETS_STATES: bool = false;
+
     const SETUP_EXPERIMENT:       &'static Call = &both("fmi2SetupExperiment", I);
     const ENTER_INITIALIZATION:   &'static Call = &both("fmi2EnterInitializationMode", I);
     const EXIT_INITIALIZATION:    &'static Call = &both("fmi2ExitInitializationMode", M);
@@ -192,6 +199,10 @@ impl Version for Fmi2 {
     const GET_EVENT_INDICATORS:   &'static Call = &me(both("fmi2GetEventIndicators", M | E | C | T | F));
     const GET_CONTINUOUS_STATES:  &'static Call = &me(both("fmi2GetContinuousStates", M | E | C | T | F));
     const GET_NOMINALS:           &'static Call = &me(both("fmi2GetNominalsOfContinuousStates", ANY));
+
+    fn token<M: Model>() -> &'static str {
+        M::table().guid()
+    }
 
     fn events(interface: Interface) -> Events {
         match interface {
@@ -283,7 +294,7 @@ pub unsafe fn fmi2Instantiate<M: Model>(
         let name = text(instanceName);
         let log = Log::new(logger(&*functions, name.as_deref()));
         match interface::<M>(name, fmuType, text(fmuGUID)) {
-            Ok(interface) => new_component(Instance::<M, Fmi2>::new(interface), log),
+            Ok(interface) => new_component(Instance::<M, Fmi2>::new(interface), log, ()),
             Err(why) => {
                 let text = format!("fmi2Instantiate: {why}");
                 log.report(&Fault { severity: Severity::Error, text });

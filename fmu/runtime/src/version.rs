@@ -1,7 +1,7 @@
 //! What a version of FMI says of an instance: its functions' names, when they may be called, who
 //! handles events, and how value references number the variables.
 
-use crate::call::{CType, Call, Events, Interface};
+use crate::call::{CType, Call, Events, InstanceState, Interface, Severity};
 use crate::model::Model;
 use crate::table::Scalar;
 
@@ -12,6 +12,18 @@ use crate::table::Scalar;
 pub trait Version: std::fmt::Debug + 'static {
     /// What the names of its functions and types begin with.
     const PREFIX: &'static str;
+
+    /// What an instance keeps of its host besides the logger.
+    type Host<M: Model>;
+
+    /// The state after a call that failed, if it is another than before.
+    const AFTER_ERROR: Option<InstanceState>;
+    /// How bad a value outside its range is, where it is refused at once.
+    const OUT_OF_RANGE: Severity;
+    /// The state in which a host that handles events is after initialization mode.
+    const FIRST_EVENT: InstanceState;
+    /// Whether Model Exchange hosts may set single continuous states, and not go back behind an event.
+    const SETS_STATES: bool;
 
     const SETUP_EXPERIMENT: &'static Call;
     const ENTER_INITIALIZATION: &'static Call;
@@ -36,8 +48,16 @@ pub trait Version: std::fmt::Debug + 'static {
     const GET_CONTINUOUS_STATES: &'static Call;
     const GET_NOMINALS: &'static Call;
 
-    /// Who handles the events of an instance for this interface.
+    /// By which a model description and this binary know that they belong together.
+    fn token<M: Model>() -> &'static str;
+
+    /// Who handles the events of an instance for this interface, unless the host says more.
     fn events(interface: Interface) -> Events;
+
+    /// Whether a host may have events handled like this for this interface.
+    fn allows(interface: Interface, events: Events) -> bool {
+        events == Self::events(interface)
+    }
 
     /// The value reference of a scalar.
     fn reference<M: Model>(scalar: &Scalar<M>) -> u32;

@@ -6,6 +6,7 @@ use craft::{
     Coupling, Craft, DampingLaw, Ramp, SloshTank, SloshTankOutputs, TANK_INPUTS, TANK_STATES,
     TankInputs, TankParameters, TankState,
 };
+use runtime::model::StepFailure;
 use runtime::table::Table;
 
 use crate::table::TABLE;
@@ -187,8 +188,11 @@ impl runtime::Model for Model {
         coupling_ratio.is_finite().then_some(model)
     }
 
-    fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), String> {
-        self.tank.step(&inputs.tank, h).map_err(|why| why.to_string())?;
+    fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), StepFailure> {
+        self.tank.step(&inputs.tank, h).map_err(|why| StepFailure {
+            text: why.to_string(),
+            shorter_may_succeed: why.shorter_may_succeed(),
+        })?;
         self.has_left_range |= !self.tank.is_in_range_after(&inputs.tank, h);
         Ok(())
     }

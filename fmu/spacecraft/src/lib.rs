@@ -16,3 +16,10 @@ pub mod fmi2 {
 
     runtime::export_fmi2!(crate::Model);
 }
+
+/// The functions of FMI 3.0 that the binary exports.
+pub mod fmi3 {
+    pub use runtime::v3::*;
+
+    runtime::export_fmi3!(crate::Model);
+}

@@ -3,6 +3,7 @@
 use std::ops::{Deref, DerefMut};
 
 use craft::{DampingLaw, INPUTS, Inputs, Mount, Outputs, STATES, Spacecraft, State, TANKS};
+use runtime::model::StepFailure;
 use runtime::table::Table;
 
 use crate::table::TABLE;
@@ -170,8 +171,11 @@ impl runtime::Model for Model {
         Some(Model { craft, present: false, wheels: Wheels::default(), has_left_range: false })
     }
 
-    fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), String> {
-        self.craft.step(inputs, h).map_err(|why| why.to_string())?;
+    fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), StepFailure> {
+        self.craft.step(inputs, h).map_err(|why| StepFailure {
+            text: why.to_string(),
+            shorter_may_succeed: why.shorter_may_succeed(),
+        })?;
         self.has_left_range |= !self.craft.is_in_range();
         Ok(())
     }

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
+use pack::Fmi;
 
 /// Where the project's FMUs lie below the folder of the command's own: beside it, in its data folder,
 /// in the Python package that it came with.
@@ -47,7 +48,7 @@ pub fn find(name: &Path) -> Result<PathBuf> {
     let packed = pack::root().join("dist").join(&file);
     if !packed.is_file() {
         super::terminal::note(format_args!("building {}", packed.display()));
-        pack::pack(pack::model(known)?, &packed)
+        pack::pack(pack::model(known)?, Fmi::V2, &packed)
             .with_context(|| format!("there is no {file} yet, and it cannot be built"))?;
     }
     Ok(packed)

@@ -180,7 +180,7 @@ fn guarded(cli: &Cli) -> Result<u8> {
     match cli.fmu() {
         Some(name) => drop(fmu::find(name)?),
         None if fmu::installed("HubSlosh.fmu").is_none() && ::pack::has_source() => {
-            pack::native(::pack::HUBSLOSH, Path::new("dist/HubSlosh.fmu"))?;
+            pack::native(::pack::HUBSLOSH, ::pack::Fmi::V2, Path::new("dist/HubSlosh.fmu"))?;
         }
         None => drop(fmu::find(Path::new(DEFAULT_FMU))?),
     }

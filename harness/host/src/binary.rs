@@ -190,8 +190,10 @@ impl Binary {
     pub fn surplus(&self) -> Option<String> {
         // On macOS names are bound to the library they come from, so that others do no harm; and
         // the linker that links it elsewhere exports a few of Rust's.
+        // One library may serve several versions of FMI (FMI 3.0, 2.5).
+        let own = |name: &&str| name.starts_with("fmi2") || name.starts_with("fmi3");
         let others: Vec<_> =
-            self.exports.iter().map(String::as_str).filter(|e| !e.starts_with("fmi2")).collect();
+            self.exports.iter().map(String::as_str).filter(|name| !own(name)).collect();
         (self.kind != Kind::MacOs && !others.is_empty())
             .then(|| format!("it also exports {}", others.join(", ")))
     }

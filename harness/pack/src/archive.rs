@@ -9,6 +9,8 @@ use host::output;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
+use crate::models::Fmi;
+
 /// Names in the archive and contents, in the archive's order; modelDescription.xml first, as some
 /// hosts expect.
 pub type Files = Vec<(String, Vec<u8>)>;
@@ -30,9 +32,15 @@ impl Packed {
         Ok(Packed { folder: PLATFORM, ending: std::env::consts::DLL_SUFFIX, bytes })
     }
 
-    /// Its name in the FMU of that modelIdentifier.
+    /// Its name in the FMU 2.0 of that modelIdentifier.
     pub fn name(&self, identifier: &str) -> String {
         format!("binaries/{}/{identifier}{}", self.folder, self.ending)
+    }
+
+    /// Its names in the FMU of a version of FMI.
+    pub fn names(&self, identifier: &str, fmi: Fmi) -> impl Iterator<Item = String> {
+        let folders = fmi.folders(self.folder).iter();
+        folders.map(move |folder| format!("binaries/{folder}/{identifier}{}", self.ending))
     }
 }
 

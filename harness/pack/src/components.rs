@@ -12,7 +12,7 @@ use anyhow::{Context, Result, bail};
 use cargo_metadata::{DependencyKind, MetadataCommand};
 
 use crate::archive::Packed;
-use crate::models::Model;
+use crate::models::{Fmi, Model};
 use crate::project;
 use host::description::ModelDescription;
 use host::output::sha256;
@@ -353,6 +353,7 @@ fn texts_in(folder: &Path) -> Result<Vec<Vec<u8>>> {
 /// it, so the same binaries have the same SBOM.
 pub fn sbom(
     model: &Model,
+    fmi: Fmi,
     description: &ModelDescription,
     binaries: &[Packed],
     components: &[Component],
@@ -386,11 +387,15 @@ pub fn sbom(
     let mut dependencies =
         vec![json!({ "ref": this, "dependsOn": parts.clone().collect::<Vec<_>>() })];
     dependencies.extend(parts.map(|purl| json!({ "ref": purl })));
-    let files = binaries.iter().map(|binary| {
-        json!({
-            "type": "file",
-            "name": binary.name(&model.identifier()),
-            "hashes": [{ "alg": "SHA-256", "content": sha256(&binary.bytes) }],
+    let identifier = model.identifier();
+    let files = binaries.iter().flat_map(|binary| {
+        let hash = sha256(&binary.bytes);
+        binary.names(&identifier, fmi).map(move |name| {
+            json!({
+                "type": "file",
+                "name": name,
+                "hashes": [{ "alg": "SHA-256", "content": hash }],
+            })
         })
     });
     let sbom = json!({

@@ -1,5 +1,5 @@
 //! Builds the binaries of an FMU and packs them, with all that should travel with them, into a
-//! `.fmu` (FMI 2.0, section 2.3).
+//! `.fmu` (FMI 2.0, section 2.3; FMI 3.0, section 2.5).
 
 pub mod archive;
 pub mod components;
@@ -20,15 +20,15 @@ use anyhow::{Context, Result};
 use host::description::ModelDescription;
 
 use crate::archive::{Files, Packed, below, read};
-pub use crate::models::{HUBSLOSH, MODELS, Model, Sizes, model};
+pub use crate::models::{Fmi, HUBSLOSH, MODELS, Model, Sizes, model};
 pub use crate::platforms::Built;
 use crate::project::build_in;
 pub use crate::project::{build, has_source, needs_source, root};
 
 /// Builds the binary of an FMU for the platform this program runs on and packs it to `out`.
-pub fn pack(model: &Model, out: &Path) -> Result<()> {
+pub fn pack(model: &Model, fmi: Fmi, out: &Path) -> Result<()> {
     let binary = Packed::native(&build_in(model.package, &model.environment(), false)?)?;
-    archive::write(&files(model, &[binary])?, out)
+    archive::write(&files(model, fmi, &[binary])?, out)
 }
 
 /// The same with a module for WebAssembly beside it, for pages and for hosts in a sandbox; returns the module's size.
@@ -36,7 +36,7 @@ pub fn pack_with_wasm(model: &Model, out: &Path) -> Result<usize> {
     let native = Packed::native(&build_in(model.package, &model.environment(), false)?)?;
     let module = wasm(model)?;
     let size = module.bytes.len();
-    archive::write(&files(model, &[native, module])?, out)?;
+    archive::write(&files(model, Fmi::V2, &[native, module])?, out)?;
     Ok(size)
 }
 
@@ -50,13 +50,13 @@ pub fn wasm(model: &Model) -> Result<Packed> {
 }
 
 /// Builds the binaries of an FMU for all platforms and packs them to `out`.
-pub fn pack_all(model: &Model, out: &Path) -> Result<Vec<Built>> {
+pub fn pack_all(model: &Model, fmi: Fmi, out: &Path) -> Result<Vec<Built>> {
     let all = platforms::build(model)?;
     let binaries: Vec<_> = all
         .iter()
         .map(|b| Packed { folder: b.folder, ending: b.ending, bytes: b.bytes.clone() })
         .collect();
-    archive::write(&files(model, &binaries)?, out)?;
+    archive::write(&files(model, fmi, &binaries)?, out)?;
     Ok(all)
 }
 
@@ -75,32 +75,61 @@ pub fn packed_for_tests() -> &'static Path {
 /// # Panics
 /// If it cannot be built.
 pub fn packed_model_for_tests(model: &Model) -> &'static Path {
-    static PACKED: Mutex<BTreeMap<&str, &Path>> = Mutex::new(BTreeMap::new());
+    packed_version_for_tests(model, Fmi::V2)
+}
+
+/// As [`packed_model_for_tests`], for a version of FMI: `test-fmu/fmi3/<name>.fmu` for 3.0.
+///
+/// # Panics
+/// If it cannot be built.
+pub fn packed_version_for_tests(model: &Model, fmi: Fmi) -> &'static Path {
+    static PACKED: Mutex<BTreeMap<(&str, &str), &Path>> = Mutex::new(BTreeMap::new());
     let mut packed = PACKED.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-    packed.entry(model.name).or_insert_with(|| match pack_for_tests(model) {
+    packed.entry((model.name, fmi.icon())).or_insert_with(|| match pack_for_tests(model, fmi) {
         Ok(path) => Box::leak(path.into_boxed_path()),
         Err(error) => panic!("the FMU for the tests could not be packed: {error:#}"),
     })
 }
 
-fn pack_for_tests(model: &Model) -> Result<PathBuf> {
+fn pack_for_tests(model: &Model, fmi: Fmi) -> Result<PathBuf> {
     let binary = build(model.package, true)?;
     // <target>/<profile>/<binary>
     let target = binary.ancestors().nth(2).context("no target directory")?;
-    let out = target.join("test-fmu").join(format!("{}.fmu", model.name));
-    archive::write(&files(model, &[Packed::native(&binary)?])?, &out)?;
+    let out = fmi.path(&target.join("test-fmu"), model.name);
+    archive::write(&files(model, fmi, &[Packed::native(&binary)?])?, &out)?;
     Ok(out)
 }
 
+/// What the layered standard FMI-LS-REF calls the list of files that belong to an FMU.
+const REFERENCES: &str = "extra/org.fmi-standard.fmi-ls-ref/fmi-ls-manifest.xml";
+
+/// The list: the example's inputs and the result they lead to. FMI-LS-REF, 1.0.0-beta.1.
+fn references(model: &Model) -> String {
+    let name = model.name;
+    format!(
+        r#"<?xml version="1.0" encoding="UTF-8"?>
+<fmiReferences xmlns:fmi-ls="http://fmi-standard.org/fmi-ls-manifest" fmi-ls:fmi-ls-name="org.fmi-standard.fmi-ls-ref" fmi-ls:fmi-ls-version="1.0.0-beta.1" fmi-ls:fmi-ls-description="Layered Standard providing information on related files included in an FMU.">
+  <Related type="text/csv" source="../{name}/{name}_in.csv" role="experiment" description="Inputs of the example, with every parameter and start value as they are" />
+  <Related type="text/csv" source="../{name}/{name}_ref.csv" role="result" description="All outputs of the example" />
+  <Related type="text/markdown" source="../{name}/README.md" role="report" description="What the example shows, and how to compare with it" />
+</fmiReferences>
+"#
+    )
+}
+
 /// What is in the FMU.
-fn files(model: &Model, binaries: &[Packed]) -> Result<Files> {
+fn files(model: &Model, fmi: Fmi, binaries: &[Packed]) -> Result<Files> {
     let source = model.folder();
-    let xml = model.description()?;
-    let description = ModelDescription::from_xml(&String::from_utf8_lossy(&xml))?;
+    let xml = model.description(fmi)?;
+    // What is read of it here is the same in all versions.
+    let first = model.description(Fmi::V2)?;
+    let description = ModelDescription::from_xml(&String::from_utf8_lossy(&first))?;
     let icon = read(&root().join("modelDescription/icon/icon.png"))?;
-    let mut files = vec![("modelDescription.xml".into(), xml), ("model.png".into(), icon)];
+    let mut files = vec![("modelDescription.xml".into(), xml), (fmi.icon().into(), icon)];
     for binary in binaries {
-        files.push((binary.name(&model.identifier()), binary.bytes.clone()));
+        for name in binary.names(&model.identifier(), fmi) {
+            files.push((name, binary.bytes.clone()));
+        }
     }
 
     let title = format!("{} {}", description.model_name, description.version);
@@ -121,13 +150,15 @@ fn files(model: &Model, binaries: &[Packed]) -> Result<Files> {
         files.push((format!("documentation/licenses/{text}"), read(&folder.join(text))?));
     }
 
-    // terminalsAndIcons.xml belongs to FMI 3.0: FMI Library logs an FMU 2.0 that has it as fatal
+    // No terminalsAndIcons.xml: no terminal describes this plant, and FMI Library logs an FMU 2.0 that has it as
+    // fatal.
     let extra = source.join("extra");
     if extra.is_dir() {
         let extra = below(&extra)?.into_iter();
         files.extend(extra.map(|(name, bytes)| (format!("extra/{name}"), bytes)));
+        files.push((REFERENCES.into(), references(model).into_bytes()));
     }
-    let sbom = components::sbom(model, &description, binaries, &components);
+    let sbom = components::sbom(model, fmi, &description, binaries, &components);
     files.push((model.sbom(), sbom.into_bytes()));
     Ok(files)
 }

@@ -9,7 +9,7 @@ use host::output::{self, sha256};
 
 use crate::metadata::{PACKAGE, VERSION};
 use crate::platforms::PLATFORMS;
-use crate::{Model, pack_all, wheel};
+use crate::{Fmi, Model, pack_all, wheel};
 
 /// Bytes up to which the wheel for Linux is in the release: it lies in the project's history forever.
 pub const LARGEST_WHEEL: u64 = 10_000_000;
@@ -39,7 +39,7 @@ pub fn write(
 ) -> Result<Vec<PathBuf>> {
     let made = tempfile::tempdir().context("there is no place for temporary files")?;
     let fmu = path(model, made.path());
-    for built in pack_all(model, &fmu)? {
+    for built in pack_all(model, Fmi::V2, &fmu)? {
         eprintln!("{}: {}", built.folder, built.binary);
     }
     let bytes = std::fs::read(&fmu).with_context(|| format!("{} cannot be read", fmu.display()))?;

@@ -15,7 +15,7 @@ use sha2::{Digest, Sha256};
 use crate::archive::{self, Files, Packed, below, read};
 use crate::metadata::{self, PACKAGE, VERSION};
 use crate::platforms::{self, Platform, Product, Target, Toolchain};
-use crate::{MODELS, build, components, files as files_of_fmu, pack, root};
+use crate::{Fmi, MODELS, build, components, files as files_of_fmu, pack, root};
 
 /// Cargo package of the library that makes a whole run in one call, and its file's name.
 const BATCH: (&str, &str) = ("hubslosh-batch", "hubslosh_batch");
@@ -88,7 +88,7 @@ fn native() -> Result<Binaries> {
     let mut all = Vec::new();
     for model in &MODELS {
         let fmu = made.path().join(format!("{}.fmu", model.name));
-        pack(model, &fmu)?;
+        pack(model, Fmi::V2, &fmu)?;
         fmus.push((file_name(&fmu), read(&fmu)?));
         all.push(Binary::read(&read(&build(model.package, true)?)?)?);
     }
@@ -142,7 +142,7 @@ fn cross_one(
         let bytes = built(&Product::Fmu(model))?;
         let binary = Packed { folder: platform.folder, ending: platform.ending, bytes };
         let fmu = made.path().join(format!("{}.fmu", model.name));
-        archive::write(&files_of_fmu(model, &[binary])?, &fmu)?;
+        archive::write(&files_of_fmu(model, Fmi::V2, &[binary])?, &fmu)?;
         fmus.push((file_name(&fmu), archive::read(&fmu)?));
     }
     let library = built(&Product::Library(BATCH.0, BATCH.1))?;

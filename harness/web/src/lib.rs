@@ -17,8 +17,7 @@ mod tests {
     #[test]
     fn the_bundle_is_the_one_that_the_lock_file_makes() {
         let sum = |text: &str| base16ct::lower::encode_string(&Sha256::digest(text));
-        let sums =
-            format!("{}  LICENSE\n{}  three.min.js\n", sum(THREE_LICENSE), sum(THREE));
+        let sums = format!("{}  LICENSE\n{}  three.min.js\n", sum(THREE_LICENSE), sum(THREE));
         assert_eq!(sums, include_str!("../three/SHA256SUMS"), "run harness/web/three/build");
     }
 

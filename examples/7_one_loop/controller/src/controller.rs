@@ -4,6 +4,7 @@
 //! answer in whatever order a master reads and sets.
 
 use runtime::Model;
+use runtime::model::StepFailure;
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::Variable;
 
@@ -98,7 +99,7 @@ impl Model for Controller {
 
     /// With inputs along straight lines, v = v0 + v1 t, the exact solution is
     /// tau(h) = v(h) - t_f v1 + (tau(0) - v0 + t_f v1) exp(-h/t_f).
-    fn step(&mut self, Inputs { theta, omega }: &Inputs, h: f64) -> Result<(), String> {
+    fn step(&mut self, Inputs { theta, omega }: &Inputs, h: f64) -> Result<(), StepFailure> {
         let [v0, v1] = [0, 1].map(|k| self.wanted(theta[k], omega[k]));
         let lag = self.p.t_f * v1;
         self.tau[0] = v0 + v1 * h - lag + (self.tau[0] - v0 + lag) * (-h / self.p.t_f).exp();

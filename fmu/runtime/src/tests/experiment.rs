@@ -278,6 +278,7 @@ fn states_that_can_be_reached_follow_from_interface_and_policy_of_events() {
     for (interface, events, own) in [
         (CS, InStep, &[Stepping][..]),
         (CS, ByHost, &[Stepping, Event, Initialized]),
+        (CS, Events::Reported, &[Stepping, Event, Initialized]),
         (ME, ByHost, &[Event, Continuous, Initialized]),
     ] {
         let reached = reached(interface, events);

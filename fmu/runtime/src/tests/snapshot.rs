@@ -7,11 +7,14 @@ use crate::snapshot::{from_bytes, size};
 
 const CHECKSUM: usize = 16;
 /// Where the parts are, see the table in `snapshot.rs`.
+/// What is discrete among the outputs.
+const SHOWN_COUNT: usize = 3;
 const FLAGS: usize = 55;
 const TIMES: usize = 58;
-const PARAMETERS: usize = TIMES + 4 * 8;
+const PARAMETERS: usize = TIMES + 5 * 8;
 const INPUTS: usize = PARAMETERS + 8 * 8;
-const WORDS: usize = INPUTS + 4 * 16;
+const SHOWN: usize = INPUTS + 4 * 16;
+const WORDS: usize = SHOWN + SHOWN_COUNT * 4;
 
 fn read(bytes: &[u8]) -> Result<Subject, String> {
     from_bytes(bytes)
@@ -147,7 +150,7 @@ fn bytes_that_are_no_state_are_refused_and_say_why() {
     let why = |bytes: &[u8]| read(bytes).map(|_| ()).unwrap_err();
     assert_eq!(why(&[]), "the saved state is cut off");
     assert_eq!(why(b"FMUstatX"), "these bytes are not a saved state of Vessels");
-    assert_eq!(why(&patched(&bytes, 8, &[9])), "the saved state has format 9; known: 3");
+    assert_eq!(why(&patched(&bytes, 8, &[9])), "the saved state has format 9; known: 4");
     let length = bytes.len();
     let cut = &bytes[..length - 1];
     assert_eq!(why(cut), format!("the saved state should have {length} bytes, not {}", length - 1));

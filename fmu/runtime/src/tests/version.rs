@@ -21,6 +21,13 @@ static GET_FLOAT: Call = call("otherGetFloat").of(CType::Real);
 impl Version for Other {
     const PREFIX: &'static str = "other";
 
+    type Host<M: Model> = ();
+
+    const AFTER_ERROR: Option<InstanceState> = None;
+    const OUT_OF_RANGE: Severity = Severity::Error;
+    const FIRST_EVENT: InstanceState = InstanceState::Initialized;
+    const SETS_STATES: bool = false;
+
     const SETUP_EXPERIMENT:       &'static Call = &call("otherEnterInitialization");
     const ENTER_INITIALIZATION:   &'static Call = &call("otherEnterInitialization");
     const EXIT_INITIALIZATION:    &'static Call = &call("otherExitInitialization");
@@ -43,6 +50,10 @@ impl Version for Other {
     const GET_EVENT_INDICATORS:   &'static Call = &call("otherGetEventIndicators");
     const GET_CONTINUOUS_STATES:  &'static Call = &call("otherGetContinuousStates");
     const GET_NOMINALS:           &'static Call = &call("otherGetNominals");
+
+    fn token<M: Model>() -> &'static str {
+        M::table().guid()
+    }
 
     fn events(_: Interface) -> Events {
         Events::ByHost

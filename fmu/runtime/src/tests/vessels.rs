@@ -5,6 +5,7 @@
 //! [`OPENS`] of the platform a valve opens, which spills half of the first vessel.
 
 use crate::Model;
+use crate::model::StepFailure;
 use crate::table::{About, Scalar, Table, scalar_count, scalars};
 use crate::variable::{Enumeration, Item, Variable};
 
@@ -144,6 +145,10 @@ pub static TABLE: Table<Vessels> = Table::new(
     &SCALARS,
 );
 
+fn failure(text: String) -> StepFailure {
+    StepFailure { text, shorter_may_succeed: false }
+}
+
 impl Model for Vessels {
     type Parameters = Parameters;
     type Inputs = Inputs;
@@ -198,9 +203,9 @@ impl Model for Vessels {
         is_one.then_some(Vessels { k, inspection, time, x: [a, b], open, events, longest })
     }
 
-    fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), String> {
+    fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), StepFailure> {
         if inputs.z[0] > 100.0 {
-            return Err("the platform is too high".into());
+            return Err(failure("the platform is too high".into()));
         }
         let mut x = self.x;
         for (i, [q, slope]) in inputs.q.into_iter().enumerate() {
@@ -208,11 +213,11 @@ impl Model for Vessels {
             x[1 - i] = x[1 - i] * e + q * (1.0 - e) / k + slope * (h - (1.0 - e) / k) / k;
         }
         if x.iter().any(|x| *x > OVERFLOWS) {
-            return Err("a vessel overflows".into());
+            return Err(failure("a vessel overflows".into()));
         }
         self.x = x;
         self.time += h;
-        self.handle_event(inputs).map(|_| ())
+        self.handle_event(inputs).map(|_| ()).map_err(failure)
     }
 
     fn outputs(&mut self, inputs: &Inputs) -> Outputs {

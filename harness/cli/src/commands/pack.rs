@@ -2,21 +2,25 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use anyhow::{Result, bail, ensure};
 use pack::platforms::{self, PLATFORMS, Platform};
-use pack::{Model, sdist, wheel};
+use pack::{Fmi, Model, sdist, wheel};
 
 /// Builds the binary of an FMU and packs it, or the Python package with all FMUs and this command inside.
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  hubslosh pack --out dist/HubSlosh.fmu\n  hubslosh pack --all-platforms\n  hubslosh pack --wasm\n  \
                   hubslosh pack --model Spacecraft --tanks 1 --modes 1\n  \
+                  hubslosh pack --fmi 3\n  \
                   hubslosh pack --python\n  hubslosh pack --python --all-platforms\n  hubslosh pack --sdist"
 )]
 pub struct PackArgs {
     /// Which FMU.
     #[arg(long, value_name = "NAME", default_value = pack::HUBSLOSH.name, value_parser = pack::model)]
     model: &'static Model,
+    /// Of FMI 2.0 or of FMI 3.0; the binary is the same.
+    #[arg(long, value_name = "2|3", default_value = "2", value_parser = fmi, conflicts_with_all = ["python", "sdist"])]
+    fmi: Fmi,
     /// Pack the Python package instead, with all FMUs and the command hubslosh inside, as a wheel.
     #[arg(long, conflicts_with = "model")]
     python: bool,
@@ -26,7 +30,7 @@ pub struct PackArgs {
     /// Pack the source as an sdist instead, from which pip builds the Python package.
     #[arg(long, conflicts_with_all = ["model", "python", "all_platforms"])]
     sdist: bool,
-    /// Where to put the FMU; the folder for wheels and sdist [default: dist/NAME.fmu, dist].
+    /// Where to put the FMU; the folder for wheels and sdist [default: dist/NAME.fmu, dist/fmi3/NAME.fmu, dist].
     #[arg(long, value_name = "FILE|FOLDER")]
     out: Option<PathBuf>,
     /// Of Spacecraft: a variant for this many tanks, 1 to 4, which has no variables of more. It is called Spacecraft_1x1
@@ -71,16 +75,20 @@ impl PackArgs {
                 &variant
             }
         };
-        let out = self.out.unwrap_or_else(|| format!("dist/{}.fmu", model.identifier()).into());
+        let out = self.out.unwrap_or_else(|| self.fmi.path("dist".as_ref(), &model.identifier()));
         if self.wasm {
+            ensure!(
+                self.fmi == Fmi::V2,
+                "WebAssembly comes with FMI 2.0 (allowed with --wasm: --fmi 2)"
+            );
             let size = pack::pack_with_wasm(model, &out)?;
             done!("packed {}, with a module for WebAssembly of {size} bytes", out.display());
             return Ok(());
         }
         if !self.all_platforms {
-            return native(model, &out);
+            return native(model, self.fmi, &out);
         }
-        for built in pack::pack_all(model, &out)? {
+        for built in pack::pack_all(model, self.fmi, &out)? {
             done!("{}: {}", built.folder, built.binary);
         }
         done!("packed {} ({} bytes)", out.display(), out.metadata()?.len());
@@ -88,9 +96,17 @@ impl PackArgs {
     }
 }
 
+fn fmi(text: &str) -> Result<Fmi> {
+    match text {
+        "2" | "2.0" => Ok(Fmi::V2),
+        "3" | "3.0" => Ok(Fmi::V3),
+        _ => bail!("there is no FMI \"{text}\" here (allowed: 2, 3)"),
+    }
+}
+
 /// Packs for this machine's platform.
-pub fn native(model: &Model, out: &Path) -> Result<()> {
-    pack::pack(model, out)?;
+pub fn native(model: &Model, fmi: Fmi, out: &Path) -> Result<()> {
+    pack::pack(model, fmi, out)?;
     done!("packed {}", out.display());
     Ok(())
 }

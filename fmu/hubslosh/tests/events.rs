@@ -1,0 +1,323 @@
+//! Events in Co-Simulation of FMI 3.0: the motion is the same whether the host is told of events or not, and stops
+//! exactly where they are. FMI 3.0.2, 4.2.1; FMI 2.0's face is the reference.
+
+use HubSlosh::HubSlosh as Model;
+use runtime::call::{Events, InstanceState, Interface};
+use runtime::instance::Instance;
+use runtime::snapshot::{from_bytes, to_bytes};
+use runtime::table::Scalar;
+use runtime::v2::{self, Fmi2};
+use runtime::v3::{self, Fmi3};
+use runtime::variable::{Kind, Value};
+use runtime::version::Version;
+
+type Two = Instance<Model, Fmi2>;
+type Three = Instance<Model, Fmi3>;
+
+fn scalar(name: &str) -> &'static Scalar<Model> {
+    let table = <Model as runtime::Model>::table();
+    &table.scalars[table.find(name).unwrap_or_else(|| panic!("no variable {name}")) as usize]
+}
+
+fn reference<V: Version>(name: &str) -> u32 {
+    V::reference(scalar(name))
+}
+
+/// One value, through the function for its type.
+fn get<V: Version>(instance: &mut Instance<Model, V>, name: &str) -> Value {
+    let is_two = V::PREFIX == "fmi2";
+    let call = match scalar(name).variable.kind {
+        Kind::Real(_) if is_two => &v2::GET_REAL,
+        Kind::Integer { .. } | Kind::Enumeration(_) if is_two => &v2::GET_INTEGER,
+        Kind::Boolean if is_two => &v2::GET_BOOLEAN,
+        Kind::Real(_) => &v3::GET_FLOAT64,
+        Kind::Integer { .. } => &v3::GET_INT32,
+        Kind::Enumeration(_) => &v3::GET_INT64,
+        Kind::Boolean => &v3::GET_BOOLEAN,
+    };
+    instance.get(call, reference::<V>(name)).unwrap()
+}
+
+fn real<V: Version>(instance: &mut Instance<Model, V>, name: &str) -> f64 {
+    match get(instance, name) {
+        Value::Real(x) => x,
+        other => panic!("{name} = {other:?}"),
+    }
+}
+
+fn set<V: Version>(instance: &mut Instance<Model, V>, name: &str, value: Value) {
+    let is_two = V::PREFIX == "fmi2";
+    let call = match scalar(name).variable.kind {
+        Kind::Real(_) if is_two => &v2::SET_REAL,
+        Kind::Integer { .. } | Kind::Enumeration(_) if is_two => &v2::SET_INTEGER,
+        Kind::Boolean if is_two => &v2::SET_BOOLEAN,
+        Kind::Real(_) => &v3::SET_FLOAT64,
+        Kind::Integer { .. } => &v3::SET_INT32,
+        Kind::Enumeration(_) => &v3::SET_INT64,
+        Kind::Boolean => &v3::SET_BOOLEAN,
+    };
+    instance.set(call, &[reference::<V>(name)], |_| value).unwrap();
+}
+
+/// A hub that reverses, sticks and breaks away many times; a wheel near its limits; a gyro.
+const LIVELY: &[(&str, Value)] = &[
+    ("slosh.model", Value::Integer(4)),
+    ("slosh.modes", Value::Integer(2)),
+    ("init.omega", Value::Real(0.05)),
+    ("init.slosh_angle", Value::Real(0.2)),
+    ("init.slosh_angle_radial", Value::Real(0.1)),
+    ("wheel.enabled", Value::Boolean(true)),
+    ("wheel.speed_max", Value::Real(170.0)),
+    ("imu.enabled", Value::Boolean(true)),
+    ("imu.rate", Value::Real(7.0)),
+];
+
+fn initialised<V: Version>(events: Events, values: &[(&str, Value)]) -> Instance<Model, V> {
+    let mut instance = Instance::with_events(Interface::CoSimulation, events);
+    for (name, value) in values {
+        set(&mut instance, name, *value);
+    }
+    instance.setup_experiment(None, 0.0, None).unwrap();
+    instance.enter_initialization_mode().unwrap();
+    instance.exit_initialization_mode().unwrap();
+    instance
+}
+
+/// Through event mode, as hosts go.
+fn handle(instance: &mut Three) {
+    if instance.state() == InstanceState::Stepping {
+        instance.enter_event_mode().unwrap();
+    }
+    let next = instance.new_discrete_states().unwrap().next_time;
+    assert!(next.is_none_or(|next| next > instance.time()), "{next:?} {}", instance.time());
+    instance.enter_step_mode(&v3::ENTER_STEP).unwrap();
+}
+
+/// The torque of a communication step, N m.
+fn torque(step: usize) -> f64 {
+    0.06 * (0.7 * step as f64).sin()
+}
+
+/// What is compared at communication points: what is continuous, the reading and the number of changes of contact.
+const LOOKED_AT: [&str; 12] = [
+    "theta",
+    "omega",
+    "omega_dot",
+    "slosh_angle",
+    "slosh_rate",
+    "slosh_angle_radial",
+    "omega_imu",
+    "tau_friction",
+    "F_tangential",
+    "energy",
+    "wheel_speed",
+    "event_time",
+];
+const DISCRETE: [&str; 3] = ["stuck", "event_count", "regime"];
+
+const STEPS: usize = 100;
+const STEP: f64 = 0.1;
+
+fn reals<V: Version>(instance: &mut Instance<Model, V>) -> Vec<u64> {
+    LOOKED_AT.iter().map(|name| real(instance, name).to_bits()).collect()
+}
+
+fn discrete<V: Version>(instance: &mut Instance<Model, V>) -> Vec<Value> {
+    DISCRETE.iter().map(|name| get(instance, name)).collect()
+}
+
+/// FMI 2.0's trajectory.
+fn trajectory() -> Vec<(Vec<u64>, Vec<Value>)> {
+    let mut two: Two = initialised(Events::InStep, LIVELY);
+    let mut all = Vec::new();
+    for n in 0..STEPS {
+        set(&mut two, "tau_cmd", Value::Real(torque(n)));
+        two.do_step(n as f64 * STEP, STEP).unwrap();
+        all.push((reals(&mut two), discrete(&mut two)));
+    }
+    all
+}
+
+#[test]
+fn plain_cosimulation_gives_the_bits_of_fmi_2() {
+    let expected = trajectory();
+    for stops in [false, true] {
+        let mut three: Three = initialised(Events::InStep, LIVELY);
+        for (n, expected) in expected.iter().enumerate() {
+            set(&mut three, "tau_cmd", Value::Real(torque(n)));
+            let info = three.step_to_event(n as f64 * STEP, STEP, stops).unwrap();
+            assert!(!info.event && !info.early, "nobody is told of events without event mode");
+            assert_eq!(three.time(), n as f64 * STEP + STEP);
+            assert_eq!(&(reals(&mut three), discrete(&mut three)), expected, "step {n}");
+        }
+    }
+}
+
+#[test]
+fn a_host_that_handles_events_gets_the_same_motion_to_the_last_bit() {
+    let expected = trajectory();
+    let mut three: Three = initialised(Events::Reported, LIVELY);
+    handle(&mut three);
+    let mut early = 0;
+    for (n, expected) in expected.iter().enumerate() {
+        set(&mut three, "tau_cmd", Value::Real(torque(n)));
+        let end = n as f64 * STEP + STEP;
+        let (mut at, mut h) = (n as f64 * STEP, STEP);
+        loop {
+            let before = discrete(&mut three);
+            let info = three.step_to_event(at, h, true).unwrap();
+            assert_eq!(discrete(&mut three), before, "discrete values change in event mode alone");
+            if info.event {
+                handle(&mut three);
+            }
+            if !info.early {
+                break;
+            }
+            early += 1;
+            at = three.time();
+            h = end - at;
+            assert!(h > 0.0);
+        }
+        assert_eq!(&(reals(&mut three), discrete(&mut three)), expected, "step {n}");
+    }
+    // 70 samples of the gyro, and contacts and limits besides.
+    assert!(early > 80, "{early} early returns");
+}
+
+#[test]
+fn a_host_that_forbids_early_return_gets_the_same_motion_and_is_told_at_the_end() {
+    let expected = trajectory();
+    let mut three: Three = initialised(Events::Reported, LIVELY);
+    handle(&mut three);
+    let mut told = 0;
+    for (n, expected) in expected.iter().enumerate() {
+        set(&mut three, "tau_cmd", Value::Real(torque(n)));
+        let before = discrete(&mut three);
+        let info = three.step_to_event(n as f64 * STEP, STEP, false).unwrap();
+        assert!(!info.early);
+        assert_eq!(reals(&mut three), expected.0, "step {n}");
+        assert_eq!(discrete(&mut three), before, "latched until event mode");
+        assert!(info.event || before == expected.1, "step {n}: a change without an event");
+        if info.event {
+            told += 1;
+            handle(&mut three);
+        }
+        assert_eq!(discrete(&mut three), expected.1, "step {n}");
+    }
+    assert!(told > 60, "{told} events");
+}
+
+#[test]
+fn a_host_that_ignores_what_it_is_told_gets_the_same_motion() {
+    let expected = trajectory();
+    let mut three: Three = initialised(Events::Reported, LIVELY);
+    handle(&mut three);
+    for (n, expected) in expected.iter().enumerate() {
+        set(&mut three, "tau_cmd", Value::Real(torque(n)));
+        let (mut at, mut h, end) = (n as f64 * STEP, STEP, n as f64 * STEP + STEP);
+        while three.step_to_event(at, h, true).unwrap().early {
+            at = three.time();
+            h = end - at;
+        }
+        assert_eq!(reals(&mut three), expected.0, "step {n}");
+    }
+}
+
+/// Without gyro and wheel every early return is a change of contact: where FMI 2.0 says that it was.
+#[test]
+fn steps_stop_at_the_event_time_of_fmi_2_to_the_last_bit() {
+    let values = &LIVELY[..5];
+    let mut two: Two = initialised(Events::InStep, values);
+    let mut three: Three = initialised(Events::Reported, values);
+    handle(&mut three);
+    let mut stops = 0;
+    for n in 0..2 * STEPS {
+        let (mut at, mut h, end) = (n as f64 * STEP, STEP, n as f64 * STEP + STEP);
+        set(&mut two, "tau_cmd", Value::Real(torque(n)));
+        set(&mut three, "tau_cmd", Value::Real(torque(n)));
+        two.do_step(at, STEP).unwrap();
+        let mut last = None;
+        while three.step_to_event(at, h, true).unwrap().early {
+            at = three.time();
+            h = end - at;
+            last = Some(at);
+            handle(&mut three);
+            assert_eq!(real(&mut three, "event_time"), at, "the present one");
+        }
+        if let Some(last) = last {
+            stops += 1;
+            assert_eq!(last.to_bits(), real(&mut two, "event_time").to_bits(), "step {n}");
+        }
+    }
+    assert!(stops > 10, "{stops} steps with events");
+}
+
+#[test]
+fn torque_that_breaks_stiction_in_event_mode_is_slip_after_it() {
+    let values = [("slosh.model", Value::Integer(1))];
+    let mut three: Three = initialised(Events::Reported, &values);
+    handle(&mut three);
+    assert_eq!(get(&mut three, "stuck"), Value::Boolean(true));
+    three.step_to_event(0.0, 0.5, true).unwrap();
+    three.enter_event_mode().unwrap();
+    set(&mut three, "tau_cmd", Value::Real(0.5));
+    assert_eq!(get(&mut three, "stuck"), Value::Boolean(true), "shown by the update alone");
+    three.new_discrete_states().unwrap();
+    assert_eq!(get(&mut three, "stuck"), Value::Boolean(false));
+    let count = get(&mut three, "event_count");
+    three.new_discrete_states().unwrap();
+    assert_eq!(get(&mut three, "event_count"), count, "once is enough");
+    assert_eq!(real(&mut three, "event_time"), 0.5);
+    // In Step Mode the same torque is an event at the very start of the step.
+    let mut three: Three = initialised(Events::Reported, &values);
+    handle(&mut three);
+    set(&mut three, "tau_cmd", Value::Real(0.5));
+    let info = three.step_to_event(0.0, 0.5, true).unwrap();
+    assert!(info.event && info.early && three.time() == 0.0);
+    handle(&mut three);
+    assert_eq!(get(&mut three, "stuck"), Value::Boolean(false));
+    let info = three.step_to_event(0.0, 0.5, true).unwrap();
+    assert!(!info.early && three.time() == 0.5);
+}
+
+#[test]
+fn a_state_saved_at_an_event_goes_on_as_if_nothing_had_happened() {
+    let mut three: Three = initialised(Events::Reported, LIVELY);
+    handle(&mut three);
+    set(&mut three, "tau_cmd", Value::Real(0.03));
+    let mut at = 0.0;
+    while three.step_to_event(at, 1.0 - at, true).unwrap().early {
+        at = three.time();
+        // At the event, in event mode and after it.
+        for handled in 0..3 {
+            match handled {
+                1 => three.enter_event_mode().unwrap(),
+                2 => handle(&mut three),
+                _ => {}
+            }
+            let bytes = to_bytes(&three);
+            let mut other: Three = from_bytes(&bytes).unwrap();
+            assert_eq!(to_bytes(&other), bytes);
+            let mut one = three.clone();
+            for instance in [&mut one, &mut other] {
+                if handled < 2 {
+                    handle(instance);
+                }
+                instance.step_to_event(at, 1.0 - at, true).unwrap();
+            }
+            assert_eq!(to_bytes(&one), to_bytes(&other));
+        }
+    }
+    let plain: Three = initialised(Events::InStep, LIVELY);
+    assert!(three.restore(&plain).is_err(), "its host handles events otherwise");
+}
+
+#[test]
+fn a_step_with_too_much_work_is_discarded_and_a_shorter_one_goes_on() {
+    let mut three: Three = initialised(Events::InStep, &[("solver.max_steps", Value::Integer(10))]);
+    let before = to_bytes(&three);
+    let fault = three.step_to_event(0.0, 1e4, false).unwrap_err();
+    assert_eq!(fault.severity, runtime::call::Severity::Discard, "{}", fault.text);
+    assert_eq!(to_bytes(&three), before);
+    three.step_to_event(0.0, 0.1, false).unwrap();
+}

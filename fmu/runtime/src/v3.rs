@@ -1,0 +1,1784 @@
+//! FMI 3.0, Model Exchange and Co-Simulation: 75 functions, their names, signatures and numbers.
+//!
+//! Every function is generic in the model; [`crate::export_fmi3`] exports them for one model under
+//! their names. What the functions mean is in [`crate::instance`] and [`crate::snapshot`], what C
+//! asks for in any version in [`crate::c_abi`].
+//!
+//! A value reference is a scalar's place among the variables, counted from 1. Behind the table's follow the
+//! independent variable and the event indicators, which FMI 2.0 has no variables for. There are no clocks, no binary
+//! variables, no structural parameters: functions for these answer as the standard asks of an FMU that has none.
+
+#![allow(unsafe_code)]
+// The names are the standard's.
+#![allow(non_camel_case_types, non_upper_case_globals, non_snake_case)]
+// The safety contract of every function is the FMI 3.0 standard's: an instance comes from one of the functions that
+// make one and is not yet freed, arrays have the lengths given, strings end with NUL.
+#![allow(clippy::missing_safety_doc, clippy::too_many_arguments)]
+
+use std::ffi::{c_char, c_int, c_void};
+use std::panic::catch_unwind;
+use std::ptr;
+
+use crate::c_abi::{
+    self, Component, Log, Logger, array, array_mut, c_string, free_component, free_state,
+    new_component, new_state, null, on, on_start, place, saved_state, text,
+};
+use crate::call::states::*;
+use crate::call::{CType, Call, Events, Fault, InstanceState, Interface, Severity};
+use crate::instance::Instance;
+use crate::log::Filter;
+use crate::model::Model;
+use crate::snapshot;
+use crate::table::Scalar;
+use crate::variable::{Access, Causality, Kind, Value, is_finite, text as number};
+use crate::version::Version;
+
+/// An instance, opaque to the host.
+pub type fmi3Instance = *mut c_void;
+/// The host's own pointer, handed back to it.
+pub type fmi3InstanceEnvironment = *mut c_void;
+/// A saved state, opaque to the host.
+pub type fmi3FMUState = *mut c_void;
+/// The number of a variable.
+pub type fmi3ValueReference = u32;
+/// A real number.
+pub type fmi3Float64 = f64;
+/// A short real number.
+pub type fmi3Float32 = f32;
+/// An integer.
+pub type fmi3Int32 = i32;
+/// The number of an enumeration's item.
+pub type fmi3Int64 = i64;
+/// An unsigned integer.
+pub type fmi3UInt64 = u64;
+/// C's bool, one byte: 0 is false, everything else true. As a Rust bool, other bytes than 0 and 1 would be
+/// undefined behaviour.
+pub type fmi3Boolean = u8;
+/// Text that ends with NUL.
+pub type fmi3String = *const c_char;
+/// A byte of a saved state, or of a binary variable.
+pub type fmi3Byte = u8;
+/// The bytes of a binary variable.
+pub type fmi3Binary = *const fmi3Byte;
+/// Whether a clock ticks.
+pub type fmi3Clock = bool;
+
+/// What a call returns.
+pub type fmi3Status = c_abi::Status;
+/// All is well.
+pub const fmi3OK: fmi3Status = c_abi::OK;
+/// Never returned.
+pub const fmi3Warning: fmi3Status = c_abi::WARNING;
+/// The call has no answer, or a value was out of its range; the instance is as before.
+pub const fmi3Discard: fmi3Status = c_abi::DISCARD;
+/// The call was refused or failed; the simulation is terminated.
+pub const fmi3Error: fmi3Status = c_abi::ERROR;
+/// The instance is unusable.
+pub const fmi3Fatal: fmi3Status = c_abi::FATAL;
+
+/// How an unknown depends on a known.
+pub type fmi3DependencyKind = c_int;
+/// Nothing particular.
+pub const fmi3Dependent: fmi3DependencyKind = 1;
+
+/// What is asked for of a clock's interval.
+pub type fmi3IntervalQualifier = c_int;
+
+/// The host's logger.
+pub type fmi3LogMessageCallback = Option<
+    unsafe extern "C" fn(
+        environment: fmi3InstanceEnvironment,
+        status: fmi3Status,
+        category: fmi3String,
+        message: fmi3String,
+    ),
+>;
+
+/// What the host does within a step.
+pub type fmi3IntermediateUpdateCallback = Option<
+    unsafe extern "C" fn(
+        environment: fmi3InstanceEnvironment,
+        intermediateUpdateTime: fmi3Float64,
+        intermediateVariableSetRequested: fmi3Boolean,
+        intermediateVariableGetAllowed: fmi3Boolean,
+        intermediateStepFinished: fmi3Boolean,
+        canReturnEarly: fmi3Boolean,
+        earlyReturnRequested: *mut fmi3Boolean,
+        earlyReturnTime: *mut fmi3Float64,
+    ),
+>;
+
+/// Of Scheduled Execution.
+pub type fmi3ClockUpdateCallback =
+    Option<unsafe extern "C" fn(environment: fmi3InstanceEnvironment)>;
+/// Of Scheduled Execution.
+pub type fmi3LockPreemptionCallback = Option<unsafe extern "C" fn()>;
+/// Of Scheduled Execution.
+pub type fmi3UnlockPreemptionCallback = Option<unsafe extern "C" fn()>;
+
+// ---- Which functions there are, and when each may be called ----
+
+const fn both(name: &'static str, allowed: u16) -> Call {
+    Call::new(name, allowed)
+}
+
+const fn of(c_type: CType, name: &'static str, allowed: u16) -> Call {
+    Call::new(name, allowed).of(c_type)
+}
+
+/// Of Co-Simulation.
+const fn cs(call: Call) -> Call {
+    call.only_in(Interface::CoSimulation)
+}
+
+/// Of Model Exchange.
+const fn me(call: Call) -> Call {
+    call.only_in(Interface::ModelExchange)
+}
+
+/// In which states values are got and set.
+const GET: u16 = ANY;
+const SET: u16 = I | M | S | E | C;
+
+/// The functions that one operation of an instance has several of, and those that are the C interface's own.
+#[allow(missing_docs)]
+#[rustfmt::skip]
+mod list {
+    use super::*;
+    pub static SET_DEBUG_LOGGING:   Call = both("fmi3SetDebugLogging", ANY | CONFIGURATION);
+    pub static GET_FLOAT64:         Call = of(CType::Real, "fmi3GetFloat64", GET | INTERMEDIATE);
+    pub static GET_INT32:           Call = of(CType::Integer, "fmi3GetInt32", GET);
+    pub static GET_INT64:           Call = of(CType::Enumeration, "fmi3GetInt64", GET);
+    pub static GET_BOOLEAN:         Call = of(CType::Boolean, "fmi3GetBoolean", GET);
+    pub static SET_FLOAT64:         Call = of(CType::Real, "fmi3SetFloat64", SET | INTERMEDIATE);
+    pub static SET_INT32:           Call = of(CType::Integer, "fmi3SetInt32", SET);
+    pub static SET_INT64:           Call = of(CType::Enumeration, "fmi3SetInt64", SET);
+    pub static SET_BOOLEAN:         Call = of(CType::Boolean, "fmi3SetBoolean", SET);
+    pub static NUMBER_OF_DEPENDENCIES: Call = of(CType::Real, "fmi3GetNumberOfVariableDependencies", ANY);
+    pub static DEPENDENCIES:        Call = of(CType::Real, "fmi3GetVariableDependencies", ANY);
+    pub static GET_STATE:           Call = both("fmi3GetFMUState", ANY);
+    pub static FREE_STATE:          Call = both("fmi3FreeFMUState", ANY | CONFIGURATION | FATAL);
+    pub static SERIALIZED_SIZE:     Call = both("fmi3SerializedFMUStateSize", ANY);
+    pub static SERIALIZE:           Call = both("fmi3SerializeFMUState", ANY);
+    pub static DESERIALIZE:         Call = both("fmi3DeserializeFMUState", ANY);
+    pub static ADJOINT_DERIVATIVE:  Call = both("fmi3GetAdjointDerivative", M | RUN);
+    pub static ENTER_CONFIGURATION: Call = both("fmi3EnterConfigurationMode", I);
+    pub static EXIT_CONFIGURATION:  Call = both("fmi3ExitConfigurationMode", CONFIGURATION);
+    pub static EVALUATE_DISCRETE_STATES: Call = both("fmi3EvaluateDiscreteStates", M | E);
+    // The standard has the two numbers in fewer states; fmusim 0.8 asks in continuous-time mode.
+    pub static NUMBER_OF_INDICATORS: Call = me(both("fmi3GetNumberOfEventIndicators", ANY | CONFIGURATION));
+    pub static NUMBER_OF_STATES:    Call = me(both("fmi3GetNumberOfContinuousStates", ANY | CONFIGURATION));
+    pub static ENTER_STEP:          Call = cs(both("fmi3EnterStepMode", E));
+}
+pub use list::*;
+
+/// FMI 3.0
+#[derive(Clone, Copy, Debug)]
+pub struct Fmi3;
+
+#[rustfmt::skip]
+impl Version for Fmi3 {
+    const PREFIX: &'static str = "fmi3";
+
+    type Host<M: Model> = Host<M>;
+
+    const AFTER_ERROR: Option<InstanceState> = Some(InstanceState::Terminated);
+    const OUT_OF_RANGE: Severity = Severity::Discard;
+    const FIRST_EVENT: InstanceState = InstanceState::Event;
+    const SETS_STATES: bool = true;
+
+    // There is no such function: what it tells is told with initialization.
+    const SETUP_EXPERIMENT:       &'static Call = &both("fmi3EnterInitializationMode", I);
+    const ENTER_INITIALIZATION:   &'static Call = &both("fmi3EnterInitializationMode", I);
+    const EXIT_INITIALIZATION:    &'static Call = &both("fmi3ExitInitializationMode", M);
+    const TERMINATE:              &'static Call = &both("fmi3Terminate", S | E | C);
+    const RESET:                  &'static Call = &both("fmi3Reset", ANY | CONFIGURATION);
+    const SET_STATE:              &'static Call = &both("fmi3SetFMUState", ANY);
+    const DIRECTIONAL_DERIVATIVE: &'static Call = &of(CType::Real, "fmi3GetDirectionalDerivative", M | RUN);
+
+    // Inputs have slopes by intermediate update.
+    const SET_INPUT_DERIVATIVES:  &'static Call = &cs(of(CType::Real, "fmi3SetFloat64", INTERMEDIATE));
+    const GET_OUTPUT_DERIVATIVES: &'static Call = &cs(of(CType::Real, "fmi3GetOutputDerivatives", S | T | INTERMEDIATE));
+    const DO_STEP:                &'static Call = &cs(both("fmi3DoStep", S));
+
+    const ENTER_EVENT:            &'static Call = &both("fmi3EnterEventMode", S | C);
+    const NEW_DISCRETE_STATES:    &'static Call = &both("fmi3UpdateDiscreteStates", E);
+    const ENTER_CONTINUOUS_TIME:  &'static Call = &me(both("fmi3EnterContinuousTimeMode", E));
+    const COMPLETED_STEP:         &'static Call = &me(both("fmi3CompletedIntegratorStep", C));
+    const SET_TIME:               &'static Call = &me(both("fmi3SetTime", C));
+    const SET_CONTINUOUS_STATES:  &'static Call = &me(both("fmi3SetContinuousStates", C));
+    const GET_DERIVATIVES:        &'static Call = &me(both("fmi3GetContinuousStateDerivatives", M | E | C | T));
+    const GET_EVENT_INDICATORS:   &'static Call = &me(both("fmi3GetEventIndicators", M | E | C | T));
+    const GET_CONTINUOUS_STATES:  &'static Call = &me(both("fmi3GetContinuousStates", M | E | C | T));
+    const GET_NOMINALS:           &'static Call = &me(both("fmi3GetNominalsOfContinuousStates", ANY));
+
+    fn token<M: Model>() -> &'static str {
+        M::table().token()
+    }
+
+    fn events(interface: Interface) -> Events {
+        match interface {
+            Interface::ModelExchange => Events::ByHost,
+            Interface::CoSimulation => Events::InStep,
+        }
+    }
+
+    fn allows(interface: Interface, events: Events) -> bool {
+        let reported = interface == Interface::CoSimulation && events == Events::Reported;
+        reported || events == Self::events(interface)
+    }
+
+    fn reference<M: Model>(scalar: &Scalar<M>) -> u32 {
+        scalar.index + 1
+    }
+
+    #[inline]
+    fn scalar<M: Model>(reference: u32, c_type: Option<CType>) -> Result<&'static Scalar<M>, String> {
+        match M::table().scalars.get(reference.wrapping_sub(1) as usize) {
+            Some(scalar) if c_type == Some(type_of(scalar)) => Ok(scalar),
+            other => Err(wrong_reference(reference, other, c_type)),
+        }
+    }
+}
+
+/// The C type in which FMI 3.0 passes a scalar.
+#[inline]
+fn type_of<M: Model>(scalar: &Scalar<M>) -> CType {
+    match scalar.c_type {
+        CType::Integer if matches!(scalar.variable.kind, Kind::Enumeration(_)) => {
+            CType::Enumeration
+        }
+        other => other,
+    }
+}
+
+/// What FMI 3.0 calls a type.
+fn type_name(c_type: CType) -> &'static str {
+    match c_type {
+        CType::Real => "Float64",
+        CType::Integer => "Int32",
+        CType::Enumeration => "Enumeration (Int64)",
+        CType::Boolean => "Boolean",
+        CType::String => "String",
+    }
+}
+
+#[cold]
+fn wrong_reference<M: Model>(
+    reference: u32,
+    found: Option<&Scalar<M>>,
+    wanted: Option<CType>,
+) -> String {
+    match found {
+        Some(scalar) => {
+            let is = type_name(type_of(scalar));
+            format!("{} (value reference {reference}) is of type {is}", scalar.name())
+        }
+        None if extra::<M>(reference).is_some() => {
+            let name = extra_name::<M>(reference).unwrap_or_default();
+            match wanted {
+                Some(CType::Real) => {
+                    format!("{name} (value reference {reference}) can only be read")
+                }
+                _ => format!("{name} (value reference {reference}) is of type Float64"),
+            }
+        }
+        None => format!(
+            "no variable has the value reference {reference} (allowed: 1 to {})",
+            M::table().scalars.len() + 1 + M::table().about.event_indicators
+        ),
+    }
+}
+
+// ---- Variables that FMI 2.0 has no need of ----
+
+/// A variable behind those of the table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Extra {
+    /// The independent variable.
+    Time,
+    /// An event indicator.
+    Indicator(usize),
+}
+
+/// The extra variable of a value reference.
+#[inline]
+fn extra<M: Model>(reference: u32) -> Option<Extra> {
+    let beyond = (reference as usize).checked_sub(M::table().scalars.len() + 1)?;
+    match beyond.checked_sub(1) {
+        None => Some(Extra::Time),
+        Some(n) => (n < M::table().about.event_indicators).then_some(Extra::Indicator(n)),
+    }
+}
+
+/// The names of the extra variables, in the order of their value references.
+pub fn extra_names<M: Model>() -> Vec<String> {
+    let indicators = 1..=M::table().about.event_indicators;
+    let indicators = indicators.map(|n| format!("event_indicator[{n}]"));
+    std::iter::once("time".to_string()).chain(indicators).collect()
+}
+
+/// The value reference of the independent variable, which the first indicator's follows.
+pub fn time_reference<M: Model>() -> u32 {
+    M::table().scalars.len() as u32 + 1
+}
+
+fn extra_name<M: Model>(reference: u32) -> Option<String> {
+    let place = reference.checked_sub(time_reference::<M>())?;
+    extra_names::<M>().into_iter().nth(place as usize)
+}
+
+// ---- The host ----
+
+/// What an instance of FMI 3.0 keeps of its host.
+pub struct Host<M: Model> {
+    environment: fmi3InstanceEnvironment,
+    intermediate_update: fmi3IntermediateUpdateCallback,
+    early_return_allowed: bool,
+    /// The variables that the host wants within steps.
+    required: Vec<fmi3ValueReference>,
+    /// What it may do with them at present.
+    phase: Phase,
+    /// The inputs at the end of the piece that comes, as far as they are set.
+    ends: M::Inputs,
+    /// Which of them are set.
+    set: Vec<fmi3ValueReference>,
+    /// Room for event indicators.
+    indicators: Vec<f64>,
+}
+
+/// What a host may do in an intermediate update.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Phase {
+    Set,
+    Get,
+}
+
+impl<M: Model> Host<M> {
+    fn new(environment: fmi3InstanceEnvironment) -> Host<M> {
+        Host {
+            environment,
+            intermediate_update: None,
+            early_return_allowed: false,
+            required: Vec::new(),
+            phase: Phase::Get,
+            ends: M::Inputs::default(),
+            set: Vec::new(),
+            indicators: vec![0.0; M::table().about.event_indicators],
+        }
+    }
+}
+
+/// Whether hosts may get or set a variable within a step.
+pub fn has_intermediate_update<M: Model>(scalar: &Scalar<M>) -> bool {
+    matches!(scalar.variable.causality, Causality::Input | Causality::Output)
+        && scalar.c_type == CType::Real
+}
+
+// ---- Inquiry, life and death ----
+
+/// "3.0"
+pub fn fmi3GetVersion() -> fmi3String {
+    c"3.0".as_ptr()
+}
+
+/// Chooses what is logged; why calls fail is logged always.
+pub unsafe fn fmi3SetDebugLogging<M: Model>(
+    instance: fmi3Instance,
+    loggingOn: fmi3Boolean,
+    nCategories: usize,
+    categories: *const fmi3String,
+) -> fmi3Status {
+    let call = &SET_DEBUG_LOGGING;
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let mut names = Vec::new();
+            for category in array(call, "categories", categories, nCategories)? {
+                names.push(text(*category).ok_or_else(|| null(call, "categories[]"))?);
+            }
+            let filter = Filter::of(&names, M::table()).map_err(|why| call.error(why))?;
+            component.log.filter =
+                if loggingOn == 0 { Filter::ERRORS } else { filter.with_errors() };
+            Ok(())
+        })
+    }
+}
+
+/// The host's logger. In a message '#' begins a reference to a variable, unless there are two.
+fn logger(environment: fmi3InstanceEnvironment, logger: fmi3LogMessageCallback) -> Option<Logger> {
+    let logger = logger?;
+    Some(Box::new(move |status, category, message| unsafe {
+        let message = match message.to_str() {
+            Ok(text) if text.contains('#') => c_string(&text.replace('#', "##")),
+            _ => message.to_owned(),
+        };
+        logger(environment, status, category.as_ptr(), message.as_ptr());
+    }))
+}
+
+/// Makes an instance. NULL on failure, and the logger is told why.
+unsafe fn instantiate<M: Model>(
+    function: &str,
+    (name, token): (fmi3String, fmi3String),
+    (environment, log_message): (fmi3InstanceEnvironment, fmi3LogMessageCallback),
+    make: impl FnOnce() -> Result<(Instance<M, Fmi3>, Host<M>), String>,
+) -> fmi3Instance {
+    c_abi::silence_panics();
+    let made = catch_unwind(std::panic::AssertUnwindSafe(|| unsafe {
+        let log = Log::new(logger(environment, log_message));
+        match check_token::<M>(text(name), text(token)).and_then(|()| make()) {
+            Ok((instance, host)) => new_component(instance, log, host),
+            Err(why) => {
+                let text = format!("{function}: {why}");
+                log.report(&Fault { severity: Severity::Error, text });
+                ptr::null_mut()
+            }
+        }
+    }));
+    made.unwrap_or(ptr::null_mut())
+}
+
+/// Why there can be no instance of this name, for this model description.
+fn check_token<M: Model>(name: Option<String>, token: Option<String>) -> Result<(), String> {
+    let expected = M::table().token();
+    if name.is_none_or(|name| name.trim().is_empty()) {
+        return Err("instanceName is NULL or empty".into());
+    }
+    match token {
+        None => Err(format!("instantiationToken is NULL; expected {expected}")),
+        Some(token) if token != expected => Err(format!(
+            "instantiationToken is {token}; expected {expected}: model description and binary do not belong \
+             together"
+        )),
+        Some(_) => Ok(()),
+    }
+}
+
+/// An instance whose host integrates.
+pub unsafe fn fmi3InstantiateModelExchange<M: Model>(
+    instanceName: fmi3String,
+    instantiationToken: fmi3String,
+    _resourcePath: fmi3String,
+    _visible: fmi3Boolean,
+    _loggingOn: fmi3Boolean,
+    instanceEnvironment: fmi3InstanceEnvironment,
+    logMessage: fmi3LogMessageCallback,
+) -> fmi3Instance {
+    unsafe {
+        instantiate::<M>(
+            "fmi3InstantiateModelExchange",
+            (instanceName, instantiationToken),
+            (instanceEnvironment, logMessage),
+            || {
+                let instance = Instance::new(Interface::ModelExchange);
+                Ok((instance, Host::new(instanceEnvironment)))
+            },
+        )
+    }
+}
+
+/// An instance that integrates itself.
+pub unsafe fn fmi3InstantiateCoSimulation<M: Model>(
+    instanceName: fmi3String,
+    instantiationToken: fmi3String,
+    _resourcePath: fmi3String,
+    _visible: fmi3Boolean,
+    _loggingOn: fmi3Boolean,
+    eventModeUsed: fmi3Boolean,
+    earlyReturnAllowed: fmi3Boolean,
+    requiredIntermediateVariables: *const fmi3ValueReference,
+    nRequiredIntermediateVariables: usize,
+    instanceEnvironment: fmi3InstanceEnvironment,
+    logMessage: fmi3LogMessageCallback,
+    intermediateUpdate: fmi3IntermediateUpdateCallback,
+) -> fmi3Instance {
+    let function = "fmi3InstantiateCoSimulation";
+    unsafe {
+        instantiate::<M>(
+            function,
+            (instanceName, instantiationToken),
+            (instanceEnvironment, logMessage),
+            || {
+                let call = &both("fmi3InstantiateCoSimulation", 0);
+                let required = array(
+                    call,
+                    "requiredIntermediateVariables",
+                    requiredIntermediateVariables,
+                    nRequiredIntermediateVariables,
+                )
+                .map_err(|fault| fault.text)?;
+                for reference in required {
+                    let scalar = Fmi3::scalar::<M>(*reference, Some(CType::Real))?;
+                    if !has_intermediate_update(scalar) {
+                        return Err(format!(
+                            "{} is among requiredIntermediateVariables (allowed: continuous inputs and outputs)",
+                            scalar.name()
+                        ));
+                    }
+                }
+                let events = if eventModeUsed != 0 { Events::Reported } else { Events::InStep };
+                let host = Host {
+                    intermediate_update: intermediateUpdate,
+                    early_return_allowed: earlyReturnAllowed != 0,
+                    required: required.to_vec(),
+                    set: Vec::with_capacity(required.len()),
+                    ..Host::new(instanceEnvironment)
+                };
+                Ok((Instance::with_events(Interface::CoSimulation, events), host))
+            },
+        )
+    }
+}
+
+/// There is no Scheduled Execution.
+pub unsafe fn fmi3InstantiateScheduledExecution<M: Model>(
+    instanceName: fmi3String,
+    instantiationToken: fmi3String,
+    _resourcePath: fmi3String,
+    _visible: fmi3Boolean,
+    _loggingOn: fmi3Boolean,
+    instanceEnvironment: fmi3InstanceEnvironment,
+    logMessage: fmi3LogMessageCallback,
+    _clockUpdate: fmi3ClockUpdateCallback,
+    _lockPreemption: fmi3LockPreemptionCallback,
+    _unlockPreemption: fmi3UnlockPreemptionCallback,
+) -> fmi3Instance {
+    unsafe {
+        instantiate::<M>(
+            "fmi3InstantiateScheduledExecution",
+            (instanceName, instantiationToken),
+            (instanceEnvironment, logMessage),
+            || Err("this FMU has Model Exchange and Co-Simulation, no Scheduled Execution".into()),
+        )
+    }
+}
+
+/// Frees an instance; NULL is fine.
+pub unsafe fn fmi3FreeInstance<M: Model>(instance: fmi3Instance) {
+    unsafe { free_component::<M, Fmi3>(instance) }
+}
+
+/// Tells times and tolerance; from here on all variables can be read.
+pub unsafe fn fmi3EnterInitializationMode<M: Model>(
+    instance: fmi3Instance,
+    toleranceDefined: fmi3Boolean,
+    tolerance: fmi3Float64,
+    startTime: fmi3Float64,
+    stopTimeDefined: fmi3Boolean,
+    stopTime: fmi3Float64,
+) -> fmi3Status {
+    let tolerance = (toleranceDefined != 0).then_some(tolerance);
+    let stop = (stopTimeDefined != 0).then_some(stopTime);
+    unsafe {
+        on::<M, Fmi3>(instance, Fmi3::ENTER_INITIALIZATION, |component| {
+            component.instance.setup_experiment(tolerance, startTime, stop)?;
+            component.instance.enter_initialization_mode()
+        })
+    }
+}
+
+/// From here on parameters are fixed, and events are handled or steps made.
+pub unsafe fn fmi3ExitInitializationMode<M: Model>(instance: fmi3Instance) -> fmi3Status {
+    unsafe {
+        on_start::<M, Fmi3>(instance, Fmi3::EXIT_INITIALIZATION, |component| {
+            component.instance.exit_initialization_mode()
+        })
+    }
+}
+
+/// At an event.
+pub unsafe fn fmi3EnterEventMode<M: Model>(instance: fmi3Instance) -> fmi3Status {
+    unsafe {
+        on::<M, Fmi3>(instance, Fmi3::ENTER_EVENT, |component| {
+            component.instance.enter_event_mode()
+        })
+    }
+}
+
+/// Ends the simulation; values can still be read.
+pub unsafe fn fmi3Terminate<M: Model>(instance: fmi3Instance) -> fmi3Status {
+    unsafe { on::<M, Fmi3>(instance, Fmi3::TERMINATE, |component| component.instance.terminate()) }
+}
+
+/// As new.
+pub unsafe fn fmi3Reset<M: Model>(instance: fmi3Instance) -> fmi3Status {
+    unsafe { on::<M, Fmi3>(instance, Fmi3::RESET, |component| component.instance.reset()) }
+}
+
+// ---- Values ----
+
+/// There is a value for each reference: all variables are scalars.
+#[inline]
+fn check_count(call: &Call, references: usize, values: usize) -> Result<(), Fault> {
+    if references == values {
+        return Ok(());
+    }
+    Err(call.error(format_args!(
+        "nValues = {values} (allowed: {references}, one for each value reference)"
+    )))
+}
+
+/// The values of all references, each turned into its C type by `as_c`.
+#[inline]
+unsafe fn get<M: Model, T>(
+    instance: fmi3Instance,
+    call: &'static Call,
+    (references, count): (*const fmi3ValueReference, usize),
+    (values, value_count): (*mut T, usize),
+    as_c: impl Fn(Value) -> Option<T>,
+) -> fmi3Status {
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let references = array(call, "valueReferences", references, count)?;
+            check_count(call, count, value_count)?;
+            let places = array_mut(call, "values", values, value_count)?;
+            for (reference, place) in references.iter().zip(places) {
+                let value = as_c(value(component, call, *reference)?);
+                *place = value.ok_or_else(|| call.error("wrong type"))?;
+            }
+            Ok(())
+        })
+    }
+}
+
+#[inline]
+fn value<M: Model>(
+    component: &mut Component<M, Fmi3>,
+    call: &Call,
+    reference: u32,
+) -> Result<Value, Fault> {
+    if reference as usize > M::table().scalars.len() {
+        return extra_value(component, call, reference);
+    }
+    if component.instance.state() == InstanceState::Intermediate {
+        check_intermediate(component, call, reference, Phase::Get)?;
+    }
+    component.instance.value(call, reference)
+}
+
+#[cold]
+fn extra_value<M: Model>(
+    component: &mut Component<M, Fmi3>,
+    call: &Call,
+    reference: u32,
+) -> Result<Value, Fault> {
+    let Component { instance, host, .. } = component;
+    match extra::<M>(reference).filter(|_| call.c_type == Some(CType::Real)) {
+        Some(Extra::Time) => Ok(Value::Real(instance.time())),
+        Some(Extra::Indicator(n)) => {
+            instance.indicators_for(call, &mut host.indicators)?;
+            Ok(Value::Real(host.indicators[n]))
+        }
+        None => Err(call.error(wrong_reference::<M>(reference, None, call.c_type))),
+    }
+}
+
+/// Within a step hosts may get and set what they said before, when it is the time for it.
+#[cold]
+fn check_intermediate<M: Model>(
+    component: &Component<M, Fmi3>,
+    call: &Call,
+    reference: u32,
+    phase: Phase,
+) -> Result<(), Fault> {
+    let host = &component.host;
+    if host.phase != phase {
+        let (now, then) = match host.phase {
+            Phase::Set => ("set", "intermediateVariableSetRequested"),
+            Phase::Get => ("got", "intermediateVariableGetAllowed"),
+        };
+        return Err(call.error(format_args!(
+            "within this intermediate update variables can only be {now}: {then} alone is true"
+        )));
+    }
+    let name = || Fmi3::scalar::<M>(reference, call.c_type).map_or_else(|why| why, Scalar::name);
+    if !host.required.contains(&reference) {
+        return Err(call.error(format_args!(
+            "{} is not among the requiredIntermediateVariables of this instance",
+            name()
+        )));
+    }
+    Ok(())
+}
+
+/// Sets all references, each from its C type by `from_c`, or says why one can't be.
+#[inline]
+unsafe fn set<M: Model, T: Copy>(
+    instance: fmi3Instance,
+    call: &'static Call,
+    (references, count): (*const fmi3ValueReference, usize),
+    (values, value_count): (*const T, usize),
+    from_c: impl Fn(T) -> Value,
+) -> fmi3Status {
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let references = array(call, "valueReferences", references, count)?;
+            check_count(call, count, value_count)?;
+            let values = array(call, "values", values, value_count)?;
+            if component.instance.state() == InstanceState::Intermediate {
+                return set_ends(component, call, references, |n| from_c(values[n]));
+            }
+            component.instance.set(call, references, |n| from_c(values[n]))
+        })
+    }
+}
+
+/// Within a step: what inputs are at the end of the piece that comes.
+#[cold]
+fn set_ends<M: Model>(
+    component: &mut Component<M, Fmi3>,
+    call: &Call,
+    references: &[fmi3ValueReference],
+    value: impl Fn(usize) -> Value,
+) -> Result<(), Fault> {
+    for (n, reference) in references.iter().enumerate() {
+        let scalar = Fmi3::scalar::<M>(*reference, call.c_type).map_err(|why| call.error(why))?;
+        check_intermediate(component, call, *reference, Phase::Set)?;
+        if !matches!(scalar.access, Access::Input(_)) {
+            let name = scalar.name();
+            return Err(call.error(format_args!("{name} is computed; only inputs can be set")));
+        }
+        if let Some(problem) = scalar.problem(value(n)) {
+            return Err(call.discard(problem));
+        }
+    }
+    let host = &mut component.host;
+    for (n, reference) in references.iter().enumerate() {
+        let scalar = Fmi3::scalar::<M>(*reference, call.c_type).map_err(|why| call.error(why))?;
+        if let (Access::Input(ramp), Value::Real(x)) = (scalar.access, value(n)) {
+            *ramp(&mut host.ends, scalar.element)[0] = x;
+        }
+        if !host.set.contains(reference) {
+            host.set.push(*reference);
+        }
+    }
+    Ok(())
+}
+
+/// Reads reals.
+pub unsafe fn fmi3GetFloat64<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    values: *mut fmi3Float64,
+    nValues: usize,
+) -> fmi3Status {
+    let as_c = |value| match value {
+        Value::Real(x) => Some(x),
+        _ => None,
+    };
+    let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
+    unsafe { get::<M, _>(instance, &GET_FLOAT64, references, values, as_c) }
+}
+
+/// Reads integers.
+pub unsafe fn fmi3GetInt32<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    values: *mut fmi3Int32,
+    nValues: usize,
+) -> fmi3Status {
+    let as_c = |value| match value {
+        Value::Integer(n) => Some(n),
+        _ => None,
+    };
+    let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
+    unsafe { get::<M, _>(instance, &GET_INT32, references, values, as_c) }
+}
+
+/// Reads enumerations.
+pub unsafe fn fmi3GetInt64<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    values: *mut fmi3Int64,
+    nValues: usize,
+) -> fmi3Status {
+    let as_c = |value| match value {
+        Value::Integer(n) => Some(n.into()),
+        _ => None,
+    };
+    let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
+    unsafe { get::<M, _>(instance, &GET_INT64, references, values, as_c) }
+}
+
+/// Reads Booleans: 0 or 1.
+pub unsafe fn fmi3GetBoolean<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    values: *mut fmi3Boolean,
+    nValues: usize,
+) -> fmi3Status {
+    let as_c = |value| match value {
+        Value::Boolean(b) => Some(b.into()),
+        _ => None,
+    };
+    let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
+    unsafe { get::<M, _>(instance, &GET_BOOLEAN, references, values, as_c) }
+}
+
+/// Sets reals.
+pub unsafe fn fmi3SetFloat64<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    values: *const fmi3Float64,
+    nValues: usize,
+) -> fmi3Status {
+    let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
+    unsafe { set::<M, _>(instance, &SET_FLOAT64, references, values, Value::Real) }
+}
+
+/// Sets integers.
+pub unsafe fn fmi3SetInt32<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    values: *const fmi3Int32,
+    nValues: usize,
+) -> fmi3Status {
+    let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
+    unsafe { set::<M, _>(instance, &SET_INT32, references, values, Value::Integer) }
+}
+
+/// Sets enumerations.
+pub unsafe fn fmi3SetInt64<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    values: *const fmi3Int64,
+    nValues: usize,
+) -> fmi3Status {
+    // 0 is no item of any enumeration.
+    let from_c = |n| Value::Integer(i32::try_from(n).unwrap_or(0));
+    let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
+    unsafe { set::<M, _>(instance, &SET_INT64, references, values, from_c) }
+}
+
+/// Sets Booleans: everything but 0 is true.
+pub unsafe fn fmi3SetBoolean<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    values: *const fmi3Boolean,
+    nValues: usize,
+) -> fmi3Status {
+    let (references, values) = ((valueReferences, nValueReferences), (values, nValues));
+    unsafe { set::<M, _>(instance, &SET_BOOLEAN, references, values, |b| Value::Boolean(b != 0)) }
+}
+
+/// Gets or sets variables of a type that no variable has: fine when there are none.
+unsafe fn of_no_variable<M: Model>(
+    instance: fmi3Instance,
+    call: &'static Call,
+    (references, count): (*const fmi3ValueReference, usize),
+    value_count: usize,
+) -> fmi3Status {
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            match array(call, "valueReferences", references, count)?.first() {
+                Some(reference) => {
+                    let scalar = M::table().scalars.get(reference.wrapping_sub(1) as usize);
+                    Err(call.error(wrong_reference::<M>(*reference, scalar, call.c_type)))
+                }
+                None => check_count(call, count, value_count),
+            }
+        })
+    }
+}
+
+/// Functions for types that no variable has.
+macro_rules! of_no_variable {
+    ($($name:ident($value:ty), $allowed:expr;)*) => {$(
+        /// No variable is of this type.
+        pub unsafe fn $name<M: Model>(
+            instance: fmi3Instance,
+            valueReferences: *const fmi3ValueReference,
+            nValueReferences: usize,
+            _values: $value,
+            nValues: usize,
+        ) -> fmi3Status {
+            static CALL: Call = both(stringify!($name), $allowed);
+            let references = (valueReferences, nValueReferences);
+            unsafe { of_no_variable::<M>(instance, &CALL, references, nValues) }
+        }
+    )*};
+}
+
+of_no_variable! {
+    fmi3GetFloat32(*mut fmi3Float32), GET;
+    fmi3GetInt8(*mut i8), GET;
+    fmi3GetUInt8(*mut u8), GET;
+    fmi3GetInt16(*mut i16), GET;
+    fmi3GetUInt16(*mut u16), GET;
+    fmi3GetUInt32(*mut u32), GET;
+    fmi3GetUInt64(*mut u64), GET;
+    fmi3GetString(*mut fmi3String), GET;
+    fmi3SetFloat32(*const fmi3Float32), SET;
+    fmi3SetInt8(*const i8), SET;
+    fmi3SetUInt8(*const u8), SET;
+    fmi3SetInt16(*const i16), SET;
+    fmi3SetUInt16(*const u16), SET;
+    fmi3SetUInt32(*const u32), SET;
+    fmi3SetUInt64(*const u64), SET;
+    fmi3SetString(*const fmi3String), SET;
+}
+
+/// No variable is binary.
+pub unsafe fn fmi3GetBinary<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    _valueSizes: *mut usize,
+    _values: *mut fmi3Binary,
+    nValues: usize,
+) -> fmi3Status {
+    static CALL: Call = both("fmi3GetBinary", GET);
+    unsafe { of_no_variable::<M>(instance, &CALL, (valueReferences, nValueReferences), nValues) }
+}
+
+/// No variable is binary.
+pub unsafe fn fmi3SetBinary<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    _valueSizes: *const usize,
+    _values: *const fmi3Binary,
+    nValues: usize,
+) -> fmi3Status {
+    static CALL: Call = both("fmi3SetBinary", SET);
+    unsafe { of_no_variable::<M>(instance, &CALL, (valueReferences, nValueReferences), nValues) }
+}
+
+/// Functions for clocks, of which there are none.
+macro_rules! of_no_clock {
+    ($($name:ident($($argument:ident: $type:ty),*);)*) => {$(
+        /// There are no clocks.
+        pub unsafe fn $name<M: Model>(
+            instance: fmi3Instance,
+            valueReferences: *const fmi3ValueReference,
+            nValueReferences: usize,
+            $($argument: $type),*
+        ) -> fmi3Status {
+            static CALL: Call = both(stringify!($name), ANY);
+            let _ = ($($argument,)*);
+            let references = (valueReferences, nValueReferences);
+            unsafe { of_no_variable::<M>(instance, &CALL, references, nValueReferences) }
+        }
+    )*};
+}
+
+of_no_clock! {
+    fmi3GetClock(values: *mut fmi3Clock);
+    fmi3SetClock(values: *const fmi3Clock);
+    fmi3GetIntervalDecimal(intervals: *mut fmi3Float64, qualifiers: *mut fmi3IntervalQualifier);
+    fmi3GetIntervalFraction(counters: *mut fmi3UInt64, resolutions: *mut fmi3UInt64, qualifiers: *mut fmi3IntervalQualifier);
+    fmi3GetShiftDecimal(shifts: *mut fmi3Float64);
+    fmi3GetShiftFraction(counters: *mut fmi3UInt64, resolutions: *mut fmi3UInt64);
+    fmi3SetIntervalDecimal(intervals: *const fmi3Float64);
+    fmi3SetIntervalFraction(counters: *const fmi3UInt64, resolutions: *const fmi3UInt64);
+    fmi3SetShiftDecimal(shifts: *const fmi3Float64);
+    fmi3SetShiftFraction(counters: *const fmi3UInt64, resolutions: *const fmi3UInt64);
+}
+
+/// There are no model partitions.
+pub unsafe fn fmi3ActivateModelPartition<M: Model>(
+    instance: fmi3Instance,
+    _clockReference: fmi3ValueReference,
+    _activationTime: fmi3Float64,
+) -> fmi3Status {
+    static CALL: Call = both("fmi3ActivateModelPartition", ANY);
+    unsafe {
+        on::<M, Fmi3>(instance, &CALL, |component| {
+            component.instance.check(&CALL)?;
+            Err(CALL.error("this FMU has no Scheduled Execution"))
+        })
+    }
+}
+
+// ---- Dependencies ----
+
+/// What a variable depends on.
+fn dependencies<M: Model>(
+    component: &mut Component<M, Fmi3>,
+    call: &Call,
+    reference: u32,
+) -> Result<Vec<u32>, Fault> {
+    let found = M::table().scalars.get(reference.wrapping_sub(1) as usize);
+    let scalar = found.ok_or_else(|| call.error(wrong_reference::<M>(reference, found, None)))?;
+    let is_unknown = !matches!(scalar.variable.causality, Causality::Input | Causality::Parameter);
+    if !is_unknown {
+        let name = scalar.name();
+        return Err(call.error(format_args!("{name} is set by the host and depends on nothing")));
+    }
+    component.instance.dependencies(call, scalar)
+}
+
+/// How much a variable depends on.
+pub unsafe fn fmi3GetNumberOfVariableDependencies<M: Model>(
+    instance: fmi3Instance,
+    valueReference: fmi3ValueReference,
+    nDependencies: *mut usize,
+) -> fmi3Status {
+    let call = &NUMBER_OF_DEPENDENCIES;
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let count = place(call, "nDependencies", nDependencies)?;
+            *count = dependencies(component, call, valueReference)?.len();
+            Ok(())
+        })
+    }
+}
+
+/// What a variable depends on: at the start before the end of initialization mode, then at present.
+pub unsafe fn fmi3GetVariableDependencies<M: Model>(
+    instance: fmi3Instance,
+    dependent: fmi3ValueReference,
+    elementIndicesOfDependent: *mut usize,
+    independents: *mut fmi3ValueReference,
+    elementIndicesOfIndependents: *mut usize,
+    dependencyKinds: *mut fmi3DependencyKind,
+    nDependencies: usize,
+) -> fmi3Status {
+    let call = &DEPENDENCIES;
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let all = dependencies(component, call, dependent)?;
+            if all.len() != nDependencies {
+                return Err(call.error(format_args!(
+                    "nDependencies = {nDependencies} (allowed: {})",
+                    all.len()
+                )));
+            }
+            let n = nDependencies;
+            array_mut(call, "elementIndicesOfDependent", elementIndicesOfDependent, n)?.fill(1);
+            array_mut(call, "independents", independents, n)?.copy_from_slice(&all);
+            array_mut(call, "elementIndicesOfIndependents", elementIndicesOfIndependents, n)?
+                .fill(1);
+            array_mut(call, "dependencyKinds", dependencyKinds, n)?.fill(fmi3Dependent);
+            Ok(())
+        })
+    }
+}
+
+// ---- Saved states ----
+
+/// Saves the state, into the handle that is there or into a new one.
+pub unsafe fn fmi3GetFMUState<M: Model>(
+    instance: fmi3Instance,
+    FMUState: *mut fmi3FMUState,
+) -> fmi3Status {
+    let call = &GET_STATE;
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let handle = place(call, "FMUState", FMUState)?;
+            if handle.is_null() {
+                *handle = new_state(component.instance.clone());
+            } else {
+                saved_state(call, "FMUState", *handle)?.clone_from(&component.instance);
+            }
+            Ok(())
+        })
+    }
+}
+
+/// Takes a saved state, this instance's or another's, in any instance state.
+pub unsafe fn fmi3SetFMUState<M: Model>(
+    instance: fmi3Instance,
+    FMUState: fmi3FMUState,
+) -> fmi3Status {
+    let call = Fmi3::SET_STATE;
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            component.instance.restore(saved_state(call, "FMUState", FMUState)?)
+        })
+    }
+}
+
+/// Frees a saved state and clears the handle; NULL is fine.
+pub unsafe fn fmi3FreeFMUState<M: Model>(
+    instance: fmi3Instance,
+    FMUState: *mut fmi3FMUState,
+) -> fmi3Status {
+    let call = &FREE_STATE;
+    unsafe { on::<M, Fmi3>(instance, call, |_| free_state::<M, Fmi3>(call, "FMUState", FMUState)) }
+}
+
+/// How many bytes a saved state takes.
+pub unsafe fn fmi3SerializedFMUStateSize<M: Model>(
+    instance: fmi3Instance,
+    FMUState: fmi3FMUState,
+    size: *mut usize,
+) -> fmi3Status {
+    let call = &SERIALIZED_SIZE;
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            saved_state::<M, Fmi3>(call, "FMUState", FMUState)?;
+            *place(call, "size", size)? = snapshot::size::<M>();
+            Ok(())
+        })
+    }
+}
+
+/// Writes a saved state to the host's bytes.
+pub unsafe fn fmi3SerializeFMUState<M: Model>(
+    instance: fmi3Instance,
+    FMUState: fmi3FMUState,
+    serializedState: *mut fmi3Byte,
+    size: usize,
+) -> fmi3Status {
+    let call = &SERIALIZE;
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let bytes = snapshot::to_bytes(saved_state::<M, Fmi3>(call, "FMUState", FMUState)?);
+            if size < bytes.len() {
+                return Err(call.error(format_args!(
+                    "size is {size}; a saved state takes {} bytes",
+                    bytes.len()
+                )));
+            }
+            let room = array_mut(call, "serializedState", serializedState, size)?;
+            room[..bytes.len()].copy_from_slice(&bytes);
+            Ok(())
+        })
+    }
+}
+
+/// Makes a saved state from bytes. The handle is written, never read: the host need not have set it.
+pub unsafe fn fmi3DeserializeFMUState<M: Model>(
+    instance: fmi3Instance,
+    serializedState: *const fmi3Byte,
+    size: usize,
+    FMUState: *mut fmi3FMUState,
+) -> fmi3Status {
+    let call = &DESERIALIZE;
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            if FMUState.is_null() {
+                return Err(null(call, "FMUState"));
+            }
+            let bytes = array(call, "serializedState", serializedState, size)?;
+            let saved = snapshot::from_bytes::<M, Fmi3>(bytes);
+            ptr::write(FMUState, new_state(saved.map_err(|why| call.error(why))?));
+            Ok(())
+        })
+    }
+}
+
+// ---- Derivatives ----
+
+/// A derivative's unknowns and knowns, with as many numbers for the one as for the other. The independent variable,
+/// on which nothing depends but by states and inputs, is left out of the knowns.
+fn check_numbers(call: &Call, name: &str, given: usize, expected: usize) -> Result<(), Fault> {
+    if given == expected {
+        return Ok(());
+    }
+    Err(call.error(format_args!("{name} = {given} (allowed: {expected})")))
+}
+
+/// What the unknowns do when the knowns go in a direction.
+pub unsafe fn fmi3GetDirectionalDerivative<M: Model>(
+    instance: fmi3Instance,
+    unknowns: *const fmi3ValueReference,
+    nUnknowns: usize,
+    knowns: *const fmi3ValueReference,
+    nKnowns: usize,
+    seed: *const fmi3Float64,
+    nSeed: usize,
+    sensitivity: *mut fmi3Float64,
+    nSensitivity: usize,
+) -> fmi3Status {
+    let call = Fmi3::DIRECTIONAL_DERIVATIVE;
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let unknowns = array(call, "unknowns", unknowns, nUnknowns)?;
+            let knowns = array(call, "knowns", knowns, nKnowns)?;
+            check_numbers(call, "nSeed", nSeed, nKnowns)?;
+            check_numbers(call, "nSensitivity", nSensitivity, nUnknowns)?;
+            let seed = array(call, "seed", seed, nSeed)?;
+            let answers = array_mut(call, "sensitivity", sensitivity, nSensitivity)?;
+            let time = time_reference::<M>();
+            if !knowns.contains(&time) {
+                return component.instance.directional_derivative(unknowns, knowns, seed, answers);
+            }
+            let others = knowns.iter().zip(seed).filter(|(known, _)| **known != time);
+            let (knowns, seed): (Vec<u32>, Vec<f64>) = others.unzip();
+            component.instance.directional_derivative(unknowns, &knowns, &seed, answers)
+        })
+    }
+}
+
+/// What a weighted sum of the unknowns does with each known: column by column, each a directional derivative.
+pub unsafe fn fmi3GetAdjointDerivative<M: Model>(
+    instance: fmi3Instance,
+    unknowns: *const fmi3ValueReference,
+    nUnknowns: usize,
+    knowns: *const fmi3ValueReference,
+    nKnowns: usize,
+    seed: *const fmi3Float64,
+    nSeed: usize,
+    sensitivity: *mut fmi3Float64,
+    nSensitivity: usize,
+) -> fmi3Status {
+    let call = &ADJOINT_DERIVATIVE;
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let unknowns = array(call, "unknowns", unknowns, nUnknowns)?;
+            let knowns = array(call, "knowns", knowns, nKnowns)?;
+            check_numbers(call, "nSeed", nSeed, nUnknowns)?;
+            check_numbers(call, "nSensitivity", nSensitivity, nKnowns)?;
+            let seed = array(call, "seed", seed, nSeed)?;
+            for weight in seed {
+                if !is_finite(*weight) {
+                    let weight = number(*weight);
+                    return Err(
+                        call.error(format_args!("seed[] = {weight} (allowed: any finite number)"))
+                    );
+                }
+            }
+            let answers = array_mut(call, "sensitivity", sensitivity, nSensitivity)?;
+            let mut column = vec![0.0; unknowns.len()];
+            for (known, answer) in knowns.iter().zip(answers) {
+                *answer = 0.0;
+                if *known == time_reference::<M>() {
+                    continue;
+                }
+                let (known, one) = (std::slice::from_ref(known), &[1.0]);
+                component.instance.directional_derivative(unknowns, known, one, &mut column)?;
+                *answer = seed.iter().zip(&column).map(|(weight, d)| weight * d).sum();
+            }
+            Ok(())
+        })
+    }
+}
+
+// ---- Configuration ----
+
+/// There are no structural parameters to set.
+pub unsafe fn fmi3EnterConfigurationMode<M: Model>(instance: fmi3Instance) -> fmi3Status {
+    unsafe {
+        on::<M, Fmi3>(instance, &ENTER_CONFIGURATION, |component| {
+            component.instance.configure(&ENTER_CONFIGURATION, InstanceState::Configuration)
+        })
+    }
+}
+
+/// Back to where it came from.
+pub unsafe fn fmi3ExitConfigurationMode<M: Model>(instance: fmi3Instance) -> fmi3Status {
+    unsafe {
+        on::<M, Fmi3>(instance, &EXIT_CONFIGURATION, |component| {
+            component.instance.configure(&EXIT_CONFIGURATION, InstanceState::Instantiated)
+        })
+    }
+}
+
+// ---- Events ----
+
+/// Nothing is left to be evaluated: fmi3UpdateDiscreteStates does all.
+pub unsafe fn fmi3EvaluateDiscreteStates<M: Model>(instance: fmi3Instance) -> fmi3Status {
+    let call = &EVALUATE_DISCRETE_STATES;
+    unsafe { on::<M, Fmi3>(instance, call, |component| component.instance.check(call).map(|_| ())) }
+}
+
+/// Does what is due at the event.
+pub unsafe fn fmi3UpdateDiscreteStates<M: Model>(
+    instance: fmi3Instance,
+    discreteStatesNeedUpdate: *mut fmi3Boolean,
+    terminateSimulation: *mut fmi3Boolean,
+    nominalsOfContinuousStatesChanged: *mut fmi3Boolean,
+    valuesOfContinuousStatesChanged: *mut fmi3Boolean,
+    nextEventTimeDefined: *mut fmi3Boolean,
+    nextEventTime: *mut fmi3Float64,
+) -> fmi3Status {
+    let call = Fmi3::NEW_DISCRETE_STATES;
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let need_update = place(call, "discreteStatesNeedUpdate", discreteStatesNeedUpdate)?;
+            let terminate = place(call, "terminateSimulation", terminateSimulation)?;
+            let nominals_changed = place(
+                call,
+                "nominalsOfContinuousStatesChanged",
+                nominalsOfContinuousStatesChanged,
+            )?;
+            let values_changed =
+                place(call, "valuesOfContinuousStatesChanged", valuesOfContinuousStatesChanged)?;
+            let defined = place(call, "nextEventTimeDefined", nextEventTimeDefined)?;
+            let next = place(call, "nextEventTime", nextEventTime)?;
+            let before = component.instance.event_count();
+            let info = component.instance.new_discrete_states()?;
+            (*need_update, *terminate, *nominals_changed) = (0, 0, 0);
+            *values_changed = info.states_changed.into();
+            *defined = info.next_time.is_some().into();
+            *next = info.next_time.unwrap_or(0.0);
+            component.log.report_event(call, before, &component.instance);
+            Ok(())
+        })
+    }
+}
+
+// ---- Model Exchange ----
+
+/// Between events.
+pub unsafe fn fmi3EnterContinuousTimeMode<M: Model>(instance: fmi3Instance) -> fmi3Status {
+    unsafe {
+        on::<M, Fmi3>(instance, Fmi3::ENTER_CONTINUOUS_TIME, |component| {
+            component.instance.enter_continuous_time_mode()
+        })
+    }
+}
+
+/// The host has made a step and will not go back behind it. No past is kept, so
+/// `noSetFMUStatePriorToCurrentPoint` changes nothing.
+pub unsafe fn fmi3CompletedIntegratorStep<M: Model>(
+    instance: fmi3Instance,
+    _noSetFMUStatePriorToCurrentPoint: fmi3Boolean,
+    enterEventMode: *mut fmi3Boolean,
+    terminateSimulation: *mut fmi3Boolean,
+) -> fmi3Status {
+    let call = Fmi3::COMPLETED_STEP;
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let enter = place(call, "enterEventMode", enterEventMode)?;
+            let terminate = place(call, "terminateSimulation", terminateSimulation)?;
+            *enter = component.instance.completed_integrator_step()?.into();
+            *terminate = 0;
+            component.log.report_step_warning(&component.instance);
+            Ok(())
+        })
+    }
+}
+
+/// The present time.
+pub unsafe fn fmi3SetTime<M: Model>(instance: fmi3Instance, time: fmi3Float64) -> fmi3Status {
+    unsafe {
+        on::<M, Fmi3>(instance, Fmi3::SET_TIME, |component| component.instance.set_time(time))
+    }
+}
+
+/// The states as the host has integrated them.
+pub unsafe fn fmi3SetContinuousStates<M: Model>(
+    instance: fmi3Instance,
+    continuousStates: *const fmi3Float64,
+    nContinuousStates: usize,
+) -> fmi3Status {
+    let call = Fmi3::SET_CONTINUOUS_STATES;
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let states = array(call, "continuousStates", continuousStates, nContinuousStates)?;
+            component.instance.set_continuous_states(states)
+        })
+    }
+}
+
+/// Fills the host's array by `body`.
+unsafe fn fill<M: Model>(
+    instance: fmi3Instance,
+    call: &'static Call,
+    (name, pointer, length): (&str, *mut fmi3Float64, usize),
+    body: impl FnOnce(&mut Instance<M, Fmi3>, &mut [fmi3Float64]) -> Result<(), Fault>,
+) -> fmi3Status {
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            body(&mut component.instance, array_mut(call, name, pointer, length)?)
+        })
+    }
+}
+
+/// The derivatives of the states, in the order of the model description.
+pub unsafe fn fmi3GetContinuousStateDerivatives<M: Model>(
+    instance: fmi3Instance,
+    derivatives: *mut fmi3Float64,
+    nContinuousStates: usize,
+) -> fmi3Status {
+    let into = ("derivatives", derivatives, nContinuousStates);
+    unsafe { fill::<M>(instance, Fmi3::GET_DERIVATIVES, into, Instance::derivatives) }
+}
+
+/// Functions that cross zero at events.
+pub unsafe fn fmi3GetEventIndicators<M: Model>(
+    instance: fmi3Instance,
+    eventIndicators: *mut fmi3Float64,
+    nEventIndicators: usize,
+) -> fmi3Status {
+    let into = ("eventIndicators", eventIndicators, nEventIndicators);
+    unsafe { fill::<M>(instance, Fmi3::GET_EVENT_INDICATORS, into, Instance::event_indicators) }
+}
+
+/// The states, in the order of the model description.
+pub unsafe fn fmi3GetContinuousStates<M: Model>(
+    instance: fmi3Instance,
+    continuousStates: *mut fmi3Float64,
+    nContinuousStates: usize,
+) -> fmi3Status {
+    let into = ("continuousStates", continuousStates, nContinuousStates);
+    unsafe { fill::<M>(instance, Fmi3::GET_CONTINUOUS_STATES, into, Instance::continuous_states) }
+}
+
+/// The states' orders of magnitude.
+pub unsafe fn fmi3GetNominalsOfContinuousStates<M: Model>(
+    instance: fmi3Instance,
+    nominals: *mut fmi3Float64,
+    nContinuousStates: usize,
+) -> fmi3Status {
+    let into = ("nominals", nominals, nContinuousStates);
+    unsafe { fill::<M>(instance, Fmi3::GET_NOMINALS, into, |instance, x| instance.nominals(x)) }
+}
+
+unsafe fn tell<M: Model>(
+    instance: fmi3Instance,
+    call: &'static Call,
+    (name, pointer): (&str, *mut usize),
+    count: usize,
+) -> fmi3Status {
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            *place(call, name, pointer)? = count;
+            Ok(())
+        })
+    }
+}
+
+/// How many event indicators there are.
+pub unsafe fn fmi3GetNumberOfEventIndicators<M: Model>(
+    instance: fmi3Instance,
+    nEventIndicators: *mut usize,
+) -> fmi3Status {
+    let into = ("nEventIndicators", nEventIndicators);
+    let count = M::table().about.event_indicators;
+    unsafe { tell::<M>(instance, &NUMBER_OF_INDICATORS, into, count) }
+}
+
+/// How many continuous states there are.
+pub unsafe fn fmi3GetNumberOfContinuousStates<M: Model>(
+    instance: fmi3Instance,
+    nContinuousStates: *mut usize,
+) -> fmi3Status {
+    let into = ("nContinuousStates", nContinuousStates);
+    let count = M::table().derivatives().len();
+    unsafe { tell::<M>(instance, &NUMBER_OF_STATES, into, count) }
+}
+
+// ---- Co-Simulation ----
+
+/// Steps follow.
+pub unsafe fn fmi3EnterStepMode<M: Model>(instance: fmi3Instance) -> fmi3Status {
+    unsafe {
+        on::<M, Fmi3>(instance, &ENTER_STEP, |component| {
+            component.instance.enter_step_mode(&ENTER_STEP)
+        })
+    }
+}
+
+/// The derivatives of some outputs.
+pub unsafe fn fmi3GetOutputDerivatives<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    orders: *const fmi3Int32,
+    values: *mut fmi3Float64,
+    nValues: usize,
+) -> fmi3Status {
+    let call = Fmi3::GET_OUTPUT_DERIVATIVES;
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let references = array(call, "valueReferences", valueReferences, nValueReferences)?;
+            let orders = array(call, "orders", orders, nValueReferences)?;
+            check_count(call, nValueReferences, nValues)?;
+            let places = array_mut(call, "values", values, nValues)?;
+            if component.instance.state() == InstanceState::Intermediate {
+                for reference in references {
+                    check_intermediate(component, call, *reference, Phase::Get)?;
+                }
+            }
+            component.instance.output_derivatives(references, orders, places)
+        })
+    }
+}
+
+/// What the host answers in an intermediate update.
+#[derive(Clone, Copy)]
+struct Wish {
+    /// To return early, at this time.
+    early_return: Option<f64>,
+}
+
+/// Lets the host look into a step, at `time`. No reference into the instance lives meanwhile: the host calls back.
+unsafe fn intermediate_update<M: Model>(
+    instance: fmi3Instance,
+    time: f64,
+    phase: Phase,
+) -> Result<Wish, fmi3Status> {
+    let call = Fmi3::DO_STEP;
+    let mut prepared = None;
+    let status = unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            let host = &mut component.host;
+            let Some(update) = host.intermediate_update else { return Ok(()) };
+            (host.phase, host.ends) = (phase, M::Inputs::default());
+            host.set.clear();
+            prepared = Some((update, host.environment, host.early_return_allowed));
+            component.instance.enter_intermediate();
+            Ok(())
+        })
+    };
+    if status != fmi3OK {
+        return Err(status);
+    }
+    let Some((update, environment, can_return)) = prepared else {
+        return Ok(Wish { early_return: None });
+    };
+    let sets = phase == Phase::Set;
+    let (mut requested, mut at): (fmi3Boolean, fmi3Float64) = (0, time);
+    unsafe {
+        update(
+            environment,
+            time,
+            sets.into(),
+            (!sets).into(),
+            (!sets).into(),
+            can_return.into(),
+            &mut requested,
+            &mut at,
+        );
+    }
+    let status = unsafe {
+        on::<M, Fmi3>(instance, call, |component| component.instance.leave_intermediate(call))
+    };
+    if status != fmi3OK {
+        return Err(status);
+    }
+    Ok(Wish { early_return: Some(at).filter(|_| requested != 0 && can_return) })
+}
+
+/// One step. It may stop at an event where the host allows it; then, and where the host is told of events at its
+/// end, something discrete waits for event mode. `noSetFMUStatePriorToCurrentPoint` changes nothing here: no past is
+/// kept.
+pub unsafe fn fmi3DoStep<M: Model>(
+    instance: fmi3Instance,
+    currentCommunicationPoint: fmi3Float64,
+    communicationStepSize: fmi3Float64,
+    _noSetFMUStatePriorToCurrentPoint: fmi3Boolean,
+    eventHandlingNeeded: *mut fmi3Boolean,
+    terminateSimulation: *mut fmi3Boolean,
+    earlyReturn: *mut fmi3Boolean,
+    lastSuccessfulTime: *mut fmi3Float64,
+) -> fmi3Status {
+    let call = Fmi3::DO_STEP;
+    let (at, mut h) = (currentCommunicationPoint, communicationStepSize);
+    let mut looks_in = false;
+    // The answers are there whatever follows, as far as there is a place for them.
+    let begun = unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            let places = [
+                ("eventHandlingNeeded", eventHandlingNeeded),
+                ("terminateSimulation", terminateSimulation),
+                ("earlyReturn", earlyReturn),
+            ];
+            let last = place(call, "lastSuccessfulTime", lastSuccessfulTime);
+            let mut missing = None;
+            for (name, pointer) in places {
+                match place(call, name, pointer) {
+                    Ok(place) => *place = 0,
+                    Err(fault) => missing = missing.or(Some(fault)),
+                }
+            }
+            match last {
+                Ok(place) => *place = component.instance.time(),
+                Err(fault) => missing = missing.or(Some(fault)),
+            }
+            missing.map_or(Ok(()), Err)?;
+            component.instance.check(call)?;
+            looks_in = component.host.intermediate_update.is_some();
+            Ok(())
+        })
+    };
+    if begun != fmi3OK {
+        return begun;
+    }
+    if looks_in {
+        let checked = unsafe {
+            on::<M, Fmi3>(instance, call, |component| component.instance.check_step(call, at, h))
+        };
+        if checked != fmi3OK {
+            return checked;
+        }
+        let wish = match unsafe { intermediate_update::<M>(instance, at + h, Phase::Set) } {
+            Ok(wish) => wish,
+            Err(status) => return status,
+        };
+        let ramps = unsafe {
+            on::<M, Fmi3>(instance, call, |component| {
+                let Component { instance, host, .. } = component;
+                instance.ramp_to(call, &host.set, &host.ends, h)
+            })
+        };
+        if ramps != fmi3OK {
+            return ramps;
+        }
+        // Anywhere in the step; before it begins is at once.
+        if let Some(time) = wish.early_return.filter(|time| *time < at + h) {
+            h = time - at;
+            unsafe { *earlyReturn = 1 };
+            // Written so that NaN is at once, too.
+            let moves = h > 0.0;
+            if !moves {
+                let drop_ramps = |component: &mut Component<M, Fmi3>| {
+                    component.instance.drop_ramps();
+                    Ok(())
+                };
+                return unsafe { on::<M, Fmi3>(instance, call, drop_ramps) };
+            }
+        }
+    }
+    let status = unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            let before = component.instance.event_count();
+            let stops = component.host.early_return_allowed;
+            let step = component.instance.step_to_event(at, h, stops);
+            if looks_in {
+                let Component { instance, host, .. } = component;
+                match &step {
+                    Ok(step) if !step.early && h == communicationStepSize => {
+                        instance.end_ramps(&host.set, &host.ends);
+                    }
+                    Ok(_) => {}
+                    Err(_) => instance.drop_ramps(),
+                }
+            }
+            let step = step?;
+            *eventHandlingNeeded = step.event.into();
+            *earlyReturn |= fmi3Boolean::from(step.early);
+            *lastSuccessfulTime = component.instance.time();
+            component.log.report_event(call, before, &component.instance);
+            component.log.report_step_warning(&component.instance);
+            Ok(())
+        })
+    };
+    if status != fmi3OK || !looks_in {
+        return status;
+    }
+    let end = unsafe { *lastSuccessfulTime };
+    match unsafe { intermediate_update::<M>(instance, end, Phase::Get) } {
+        Ok(_) => fmi3OK,
+        Err(status) => status,
+    }
+}
+
+/// Exports the functions of FMI 3.0 for a model, under their names in C and as Rust functions of
+/// the module where it stands. A macro, because each FMU has to define these symbols itself.
+#[macro_export]
+macro_rules! export_fmi3 {
+    ($model:ty) => {
+        $crate::export_fmi3! { $model;
+            fn fmi3SetDebugLogging(instance: fmi3Instance, loggingOn: fmi3Boolean, nCategories: usize, categories: *const fmi3String) -> fmi3Status;
+            fn fmi3InstantiateModelExchange(instanceName: fmi3String, instantiationToken: fmi3String, resourcePath: fmi3String, visible: fmi3Boolean, loggingOn: fmi3Boolean, instanceEnvironment: fmi3InstanceEnvironment, logMessage: fmi3LogMessageCallback) -> fmi3Instance;
+            fn fmi3InstantiateCoSimulation(instanceName: fmi3String, instantiationToken: fmi3String, resourcePath: fmi3String, visible: fmi3Boolean, loggingOn: fmi3Boolean, eventModeUsed: fmi3Boolean, earlyReturnAllowed: fmi3Boolean, requiredIntermediateVariables: *const fmi3ValueReference, nRequiredIntermediateVariables: usize, instanceEnvironment: fmi3InstanceEnvironment, logMessage: fmi3LogMessageCallback, intermediateUpdate: fmi3IntermediateUpdateCallback) -> fmi3Instance;
+            fn fmi3InstantiateScheduledExecution(instanceName: fmi3String, instantiationToken: fmi3String, resourcePath: fmi3String, visible: fmi3Boolean, loggingOn: fmi3Boolean, instanceEnvironment: fmi3InstanceEnvironment, logMessage: fmi3LogMessageCallback, clockUpdate: fmi3ClockUpdateCallback, lockPreemption: fmi3LockPreemptionCallback, unlockPreemption: fmi3UnlockPreemptionCallback) -> fmi3Instance;
+            fn fmi3FreeInstance(instance: fmi3Instance);
+            fn fmi3EnterInitializationMode(instance: fmi3Instance, toleranceDefined: fmi3Boolean, tolerance: fmi3Float64, startTime: fmi3Float64, stopTimeDefined: fmi3Boolean, stopTime: fmi3Float64) -> fmi3Status;
+            fn fmi3ExitInitializationMode(instance: fmi3Instance) -> fmi3Status;
+            fn fmi3EnterEventMode(instance: fmi3Instance) -> fmi3Status;
+            fn fmi3Terminate(instance: fmi3Instance) -> fmi3Status;
+            fn fmi3Reset(instance: fmi3Instance) -> fmi3Status;
+            fn fmi3GetFloat32(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *mut fmi3Float32, nValues: usize) -> fmi3Status;
+            fn fmi3GetFloat64(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *mut fmi3Float64, nValues: usize) -> fmi3Status;
+            fn fmi3GetInt8(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *mut i8, nValues: usize) -> fmi3Status;
+            fn fmi3GetUInt8(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *mut u8, nValues: usize) -> fmi3Status;
+            fn fmi3GetInt16(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *mut i16, nValues: usize) -> fmi3Status;
+            fn fmi3GetUInt16(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *mut u16, nValues: usize) -> fmi3Status;
+            fn fmi3GetInt32(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *mut fmi3Int32, nValues: usize) -> fmi3Status;
+            fn fmi3GetUInt32(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *mut u32, nValues: usize) -> fmi3Status;
+            fn fmi3GetInt64(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *mut fmi3Int64, nValues: usize) -> fmi3Status;
+            fn fmi3GetUInt64(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *mut fmi3UInt64, nValues: usize) -> fmi3Status;
+            fn fmi3GetBoolean(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *mut fmi3Boolean, nValues: usize) -> fmi3Status;
+            fn fmi3GetString(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *mut fmi3String, nValues: usize) -> fmi3Status;
+            fn fmi3GetBinary(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, valueSizes: *mut usize, values: *mut fmi3Binary, nValues: usize) -> fmi3Status;
+            fn fmi3GetClock(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *mut fmi3Clock) -> fmi3Status;
+            fn fmi3SetFloat32(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *const fmi3Float32, nValues: usize) -> fmi3Status;
+            fn fmi3SetFloat64(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *const fmi3Float64, nValues: usize) -> fmi3Status;
+            fn fmi3SetInt8(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *const i8, nValues: usize) -> fmi3Status;
+            fn fmi3SetUInt8(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *const u8, nValues: usize) -> fmi3Status;
+            fn fmi3SetInt16(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *const i16, nValues: usize) -> fmi3Status;
+            fn fmi3SetUInt16(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *const u16, nValues: usize) -> fmi3Status;
+            fn fmi3SetInt32(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *const fmi3Int32, nValues: usize) -> fmi3Status;
+            fn fmi3SetUInt32(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *const u32, nValues: usize) -> fmi3Status;
+            fn fmi3SetInt64(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *const fmi3Int64, nValues: usize) -> fmi3Status;
+            fn fmi3SetUInt64(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *const fmi3UInt64, nValues: usize) -> fmi3Status;
+            fn fmi3SetBoolean(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *const fmi3Boolean, nValues: usize) -> fmi3Status;
+            fn fmi3SetString(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *const fmi3String, nValues: usize) -> fmi3Status;
+            fn fmi3SetBinary(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, valueSizes: *const usize, values: *const fmi3Binary, nValues: usize) -> fmi3Status;
+            fn fmi3SetClock(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, values: *const fmi3Clock) -> fmi3Status;
+            fn fmi3GetNumberOfVariableDependencies(instance: fmi3Instance, valueReference: fmi3ValueReference, nDependencies: *mut usize) -> fmi3Status;
+            fn fmi3GetVariableDependencies(instance: fmi3Instance, dependent: fmi3ValueReference, elementIndicesOfDependent: *mut usize, independents: *mut fmi3ValueReference, elementIndicesOfIndependents: *mut usize, dependencyKinds: *mut fmi3DependencyKind, nDependencies: usize) -> fmi3Status;
+            fn fmi3GetFMUState(instance: fmi3Instance, FMUState: *mut fmi3FMUState) -> fmi3Status;
+            fn fmi3SetFMUState(instance: fmi3Instance, FMUState: fmi3FMUState) -> fmi3Status;
+            fn fmi3FreeFMUState(instance: fmi3Instance, FMUState: *mut fmi3FMUState) -> fmi3Status;
+            fn fmi3SerializedFMUStateSize(instance: fmi3Instance, FMUState: fmi3FMUState, size: *mut usize) -> fmi3Status;
+            fn fmi3SerializeFMUState(instance: fmi3Instance, FMUState: fmi3FMUState, serializedState: *mut fmi3Byte, size: usize) -> fmi3Status;
+            fn fmi3DeserializeFMUState(instance: fmi3Instance, serializedState: *const fmi3Byte, size: usize, FMUState: *mut fmi3FMUState) -> fmi3Status;
+            fn fmi3GetDirectionalDerivative(instance: fmi3Instance, unknowns: *const fmi3ValueReference, nUnknowns: usize, knowns: *const fmi3ValueReference, nKnowns: usize, seed: *const fmi3Float64, nSeed: usize, sensitivity: *mut fmi3Float64, nSensitivity: usize) -> fmi3Status;
+            fn fmi3GetAdjointDerivative(instance: fmi3Instance, unknowns: *const fmi3ValueReference, nUnknowns: usize, knowns: *const fmi3ValueReference, nKnowns: usize, seed: *const fmi3Float64, nSeed: usize, sensitivity: *mut fmi3Float64, nSensitivity: usize) -> fmi3Status;
+            fn fmi3EnterConfigurationMode(instance: fmi3Instance) -> fmi3Status;
+            fn fmi3ExitConfigurationMode(instance: fmi3Instance) -> fmi3Status;
+            fn fmi3GetIntervalDecimal(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, intervals: *mut fmi3Float64, qualifiers: *mut fmi3IntervalQualifier) -> fmi3Status;
+            fn fmi3GetIntervalFraction(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, counters: *mut fmi3UInt64, resolutions: *mut fmi3UInt64, qualifiers: *mut fmi3IntervalQualifier) -> fmi3Status;
+            fn fmi3GetShiftDecimal(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, shifts: *mut fmi3Float64) -> fmi3Status;
+            fn fmi3GetShiftFraction(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, counters: *mut fmi3UInt64, resolutions: *mut fmi3UInt64) -> fmi3Status;
+            fn fmi3SetIntervalDecimal(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, intervals: *const fmi3Float64) -> fmi3Status;
+            fn fmi3SetIntervalFraction(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, counters: *const fmi3UInt64, resolutions: *const fmi3UInt64) -> fmi3Status;
+            fn fmi3SetShiftDecimal(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, shifts: *const fmi3Float64) -> fmi3Status;
+            fn fmi3SetShiftFraction(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, counters: *const fmi3UInt64, resolutions: *const fmi3UInt64) -> fmi3Status;
+            fn fmi3EvaluateDiscreteStates(instance: fmi3Instance) -> fmi3Status;
+            fn fmi3UpdateDiscreteStates(instance: fmi3Instance, discreteStatesNeedUpdate: *mut fmi3Boolean, terminateSimulation: *mut fmi3Boolean, nominalsOfContinuousStatesChanged: *mut fmi3Boolean, valuesOfContinuousStatesChanged: *mut fmi3Boolean, nextEventTimeDefined: *mut fmi3Boolean, nextEventTime: *mut fmi3Float64) -> fmi3Status;
+            fn fmi3EnterContinuousTimeMode(instance: fmi3Instance) -> fmi3Status;
+            fn fmi3CompletedIntegratorStep(instance: fmi3Instance, noSetFMUStatePriorToCurrentPoint: fmi3Boolean, enterEventMode: *mut fmi3Boolean, terminateSimulation: *mut fmi3Boolean) -> fmi3Status;
+            fn fmi3SetTime(instance: fmi3Instance, time: fmi3Float64) -> fmi3Status;
+            fn fmi3SetContinuousStates(instance: fmi3Instance, continuousStates: *const fmi3Float64, nContinuousStates: usize) -> fmi3Status;
+            fn fmi3GetContinuousStateDerivatives(instance: fmi3Instance, derivatives: *mut fmi3Float64, nContinuousStates: usize) -> fmi3Status;
+            fn fmi3GetEventIndicators(instance: fmi3Instance, eventIndicators: *mut fmi3Float64, nEventIndicators: usize) -> fmi3Status;
+            fn fmi3GetContinuousStates(instance: fmi3Instance, continuousStates: *mut fmi3Float64, nContinuousStates: usize) -> fmi3Status;
+            fn fmi3GetNominalsOfContinuousStates(instance: fmi3Instance, nominals: *mut fmi3Float64, nContinuousStates: usize) -> fmi3Status;
+            fn fmi3GetNumberOfEventIndicators(instance: fmi3Instance, nEventIndicators: *mut usize) -> fmi3Status;
+            fn fmi3GetNumberOfContinuousStates(instance: fmi3Instance, nContinuousStates: *mut usize) -> fmi3Status;
+            fn fmi3EnterStepMode(instance: fmi3Instance) -> fmi3Status;
+            fn fmi3GetOutputDerivatives(instance: fmi3Instance, valueReferences: *const fmi3ValueReference, nValueReferences: usize, orders: *const fmi3Int32, values: *mut fmi3Float64, nValues: usize) -> fmi3Status;
+            fn fmi3DoStep(instance: fmi3Instance, currentCommunicationPoint: fmi3Float64, communicationStepSize: fmi3Float64, noSetFMUStatePriorToCurrentPoint: fmi3Boolean, eventHandlingNeeded: *mut fmi3Boolean, terminateSimulation: *mut fmi3Boolean, earlyReturn: *mut fmi3Boolean, lastSuccessfulTime: *mut fmi3Float64) -> fmi3Status;
+            fn fmi3ActivateModelPartition(instance: fmi3Instance, clockReference: fmi3ValueReference, activationTime: fmi3Float64) -> fmi3Status;
+        }
+        #[allow(missing_docs, non_snake_case)]
+        #[unsafe(no_mangle)]
+        pub extern "C" fn fmi3GetVersion() -> $crate::v3::fmi3String {
+            $crate::v3::fmi3GetVersion()
+        }
+    };
+    ($model:ty; $(fn $name:ident($($argument:ident: $type:ty),*) $(-> $status:ty)?;)*) => {
+        $(
+            #[allow(missing_docs, non_snake_case, unsafe_code, clippy::missing_safety_doc, clippy::too_many_arguments)]
+            #[unsafe(no_mangle)]
+            pub unsafe extern "C" fn $name($($argument: $type),*) $(-> $status)? {
+                unsafe { $crate::v3::$name::<$model>($($argument),*) }
+            }
+        )*
+    };
+}
