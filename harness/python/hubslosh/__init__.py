@@ -9,7 +9,8 @@
 `margins` how far that loop is from instability, `monte_carlo` many runs with drawn parameters,
 `linearize` a state-space model, `frequency_response` an estimate from a history, `fit` a transfer
 function through such an estimate; `analyse`, `campaign`, `identify` and `tank` call the program
-``hubslosh``. `plot` draws. `Plant` and `drive` are for those who step an instance themselves.
+``hubslosh``, `liquid_modes` finds slosh modes in three dimensions. `plot` draws. `Plant` and
+`drive` are for those who step an instance themselves.
 """
 
 from importlib import import_module
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from .fitting import TransferFunction, fit
     from .fmu import Fmu, FmuError, FmuWarning, Quantity, Value
     from .linearization import LinearModel, linearize
+    from .liquid import LiquidModes, liquid_modes
     from .loop import Law, Loop, closed_loop
     from .plant import COLUMNS, TORQUE, Plant, RunError, drive
     from .program import Estimated, Identification, analyse, campaign, identify
@@ -40,6 +42,7 @@ _MODULES = {
     "fitting": ("TransferFunction", "fit"),
     "fmu": ("Fmu", "FmuError", "FmuWarning", "Quantity", "Value"),
     "linearization": ("LinearModel", "linearize"),
+    "liquid": ("LiquidModes", "liquid_modes"),
     "loop": ("Law", "Loop", "closed_loop"),
     "plant": ("COLUMNS", "TORQUE", "Plant", "RunError", "drive"),
     "program": ("Estimated", "Identification", "analyse", "campaign", "identify"),
@@ -62,6 +65,7 @@ __all__ = [
     "Identification",
     "Law",
     "LinearModel",
+    "LiquidModes",
     "Loop",
     "Margins",
     "Plant",
@@ -81,6 +85,7 @@ __all__ = [
     "frequency_response",
     "identify",
     "linearize",
+    "liquid_modes",
     "margins",
     "monte_carlo",
     "plot",

@@ -1,0 +1,551 @@
+"""Slosh modes of a tank of any shape, at any tilt, by linear potential flow in three dimensions.
+
+For the tanks that ``hubslosh tank`` cannot cut from a contour: cylinders that lie, sectors, tanks
+under a lateral component of gravity, solids of a CAD system. Needs the extra ``fem`` (gmsh for the
+mesh, scikit-fem for the finite elements).
+
+The liquid Q has the wetted wall W and the free surface F at z = z_F, normal to the specific force;
+n is the normal out of the liquid, λ = ω²/g:
+
+    Δφ = 0 in Q,   ∂φ/∂n = 0 on W,   ∂φ/∂z = λ φ on F
+    weak:          ∫_Q ∇φ·∇v = λ ∫_F φ v
+
+Of a motion j of the tank (three displacements, three rotations about O) N_j = n·e_j or
+n·(e_j × r) is the wall's velocity along n, the surface moving with it as a lid, and Ψ_j the
+potential with ∂Ψ_j/∂n = N_j. By Green's identity
+
+    B_nj = ∫_F φ_n Ψ_j = (1/λ_n) ∫_(W+F) φ_n N_j,        N_n = ∫_F φ_n²
+    mass matrix of mode n:   ρ λ_n B_nj B_nk/N_n          of the liquid under a lid: ρ ∫ Ψ_j N_k
+
+A mode with a displacement, A = (B_n1, B_n2), is a mass m = ρ λ |A|²/N on a pendulum of length 1/λ
+that swings along A/|A|; its height and its arm about the vertical through O follow from the
+rotations. A mode without one only twists. Sources: H. N. Abramson (ed.), NASA SP-106, ch. 6;
+Moiseyev and Rumyantsev, Dynamic Stability of Bodies Containing Fluid (1968).
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .fmu import FmuError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from .fmu import Value
+
+SHAPES: dict[str, tuple[str, ...]] = {
+    "cylinder": ("radius", "height"),
+    "horizontal_cylinder": ("radius", "length"),
+    "sphere": ("radius",),
+    "box": ("length", "width", "height"),
+    "sector": ("inner_radius", "radius", "angle", "height"),
+    "step": (),
+}
+"""Shapes and their dimensions, m; ``angle`` in degrees. ``step``: a file of a CAD system, m."""
+
+_MASSLESS = 1e-6
+"""Part of the liquid's mass below which a mode is one without displacement."""
+_EQUAL = 3e-4
+"""Difference of two λ, of their size, that the mesh makes of one."""
+
+
+@dataclass(frozen=True, eq=False)
+class LiquidModes:
+    """Slosh modes of a tank at a fill, as `liquid_modes` gives them.
+
+    Axes: origin O of the tank's shape (see `liquid_modes`), z against the specific force. Without
+    tilt these are the tank's own.
+    """
+
+    mass: float
+    """Of the liquid, kg."""
+    center: tuple[float, float, float]
+    """Of its mass, m."""
+    surface: float
+    """Height of the free surface, m."""
+    gravity: float
+    """Specific force, m/s²."""
+    lid_inertia: "np.ndarray"
+    """Inertia of the liquid under a lid about O, without its displacement, 3×3, kg·m²."""
+    all: "pd.DataFrame" = field(repr=False)
+    """A row per mode; `modes` are its columns."""
+    error: "pd.DataFrame" = field(repr=False)
+    """Difference of frequency and mass of each mode between two meshes, as part of the finer's."""
+
+    @property
+    def modes(self) -> "pd.DataFrame":
+        """A row per mode, by frequency.
+
+        ``frequency`` (Hz); ``mass`` (kg); ``direction`` in which the mass moves, degrees from x
+        towards y, −90 to 90; ``length`` of the pendulum (m); ``bob`` and ``hinge``: heights (m);
+        ``arm`` of the mass's line about the vertical through O (m); ``twist``: inertia about that
+        vertical that the mode moves (kg·m²). Of modes without displacement mass is about 0, and
+        direction, bob, hinge and arm are missing.
+        """
+        return self.all
+
+    @cached_property
+    def rest(self) -> dict[str, float]:
+        """Mass that the modes leave (kg) and its height (m), of x and of y.
+
+        Each direction has a sum of its own: a mass that swings along y alone is rigid along x.
+        """
+        found = {}
+        for name, part in (("x", _cos(self.all)), ("y", _sin(self.all))):
+            moving = self.all["mass"].to_numpy() * part**2
+            height = np.nan_to_num(self.all["bob"].to_numpy())
+            left = self.mass - moving.sum()
+            found[f"m_0_{name}"] = float(left)
+            found[f"H_0_{name}"] = float((self.mass * self.center[2] - moving @ height) / left)
+        return found
+
+    def table(self, direction: str = "y", modes: int = 1) -> "dict[str, Value]":
+        """Return the modes along x or y as HubSlosh's ``slosh.table``.
+
+        Of a tank that stands on the hub with this direction tangential; O is where the tank stands,
+        `tank.r` from the axis. Modes that move along both directions are refused.
+        """
+        if direction not in ("x", "y"):
+            raise FmuError(f"direction is x or y, not {direction!r}")
+        along = np.abs(_cos(self.all) if direction == "x" else _sin(self.all))
+        moving = self.all["mass"].to_numpy() > _MASSLESS * self.mass
+        mixed = moving & (along > 1e-3) & (along < 1 - 1e-3)
+        if mixed.any():
+            which = ", ".join(str(n + 1) for n in np.flatnonzero(mixed))
+            raise FmuError(
+                f"modes {which} move along x and y at once; HubSlosh's table has one axis"
+            )
+        chosen = self.all[moving & (along > 0.5)]
+        if not 1 <= modes <= min(len(chosen), 10):
+            raise FmuError(f"modes is 1 to {min(len(chosen), 10)} here, not {modes!r}")
+        values: dict[str, Value] = {
+            "slosh.source": "table",
+            "slosh.modes": modes,
+            "slosh.table.one_axis": True,
+            "slosh.table.m_liq": self.mass,
+            "slosh.table.g_ref": self.gravity,
+            "tank.I_own": float(
+                self.lid_inertia[2, 2] - self.mass * (self.center[0] ** 2 + self.center[1] ** 2)
+            ),
+        }
+        for n, (_, mode) in enumerate(chosen.head(modes).iterrows(), 1):
+            values |= {
+                f"slosh.table.mass[{n}]": float(mode["mass"]),
+                f"slosh.table.length[{n}]": float(mode["length"]),
+                f"slosh.table.hinge[{n}]": float(mode["hinge"]),
+                f"slosh.table.wave[{n}]": float(mode["wave"]),
+            }
+        return values
+
+
+def liquid_modes(
+    shape: Mapping[str, Any],
+    fill: float | str,
+    *,
+    density: float = 1000.0,
+    modes: int = 6,
+    specific_force: float | Sequence[float] = 9.80665,
+    resolution: int = 16,
+) -> LiquidModes:
+    """Return the slosh modes of a tank of any shape by finite elements in three dimensions.
+
+    shape: one of `SHAPES` with its dimensions, ``{"horizontal_cylinder": {"radius": 0.5, "length":
+    2}}``. O is the middle of the lowest plane or point of the upright shape, of a sector the point
+    where its axis meets the floor (x bisects the sector); a lying cylinder's axis is x.
+    ``{"step": "tank.step"}``: the inside of a tank as a solid, O and axes as in the file, m.
+    fill: height of the surface above the lowest point along the specific force, m, or ``"60%"`` of
+    the volume. density: kg/m³. specific_force: along the tank's z, or its three components in the
+    tank's axes (of a tank at rest: gravity, upwards), m/s².
+    resolution: elements across the surface of the finer of two meshes, from whose difference
+    `LiquidModes.error` follows. Takes 5 to 60 s.
+    """
+    import pandas as pd
+
+    name, size = _check_shape(shape)
+    force = np.atleast_1d(np.asarray(specific_force, float))
+    force = np.array([0.0, 0.0, force[0]]) if force.shape == (1,) else force
+    if force.shape != (3,) or not np.isfinite(force).all() or not np.linalg.norm(force) > 0:
+        raise FmuError("specific_force is a number or three, m/s², and not 0")
+    if not (isinstance(resolution, int) and 4 <= resolution <= 40):
+        raise FmuError(f"resolution is 4 to 40 elements, not {resolution!r}")
+    if not (isinstance(modes, int) and 1 <= modes <= 40):
+        raise FmuError(f"modes is 1 to 40, not {modes!r}")
+    if not (density > 0 and np.isfinite(density)):
+        raise FmuError(f"density is a positive number of kg/m³, not {density!r}")
+    gravity = float(np.linalg.norm(force))
+    found = []
+    for elements in (max(3.0, resolution / 1.5), float(resolution)):
+        for again in range(4):
+            mesh, surface = _mesh(name, size, _level(force), fill, elements * 1.05**again)
+            try:
+                found.append(_solve(mesh, surface, density, gravity, modes))
+                break
+            except Exception as error:  # scikit-fem's, of an element that is bent too much
+                reason = error
+        else:
+            raise FmuError(f"no usable mesh ({reason}); try another resolution")
+    coarse, fine = found
+    error = pd.DataFrame({
+        key: np.abs(coarse.all[key] - fine.all[key]).to_numpy()
+        / (fine.mass if key == "mass" else fine.all[key])
+        for key in ("frequency", "mass")
+    })  # fmt: skip
+    return LiquidModes(fine.mass, fine.center, fine.surface, gravity, fine.lid_inertia, fine.all,
+                       error)  # fmt: skip
+
+
+def _check_shape(shape: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
+    if not (isinstance(shape, Mapping) and len(shape) == 1 and next(iter(shape)) in SHAPES):
+        raise FmuError(f"shape is one of {', '.join(SHAPES)} with its dimensions, not {shape!r}")
+    [(name, given)] = shape.items()
+    if name == "step":
+        if not Path(given).is_file():
+            raise FmuError(f"{given}: no such file")
+        return name, {"file": str(given)}
+    wanted = SHAPES[name]
+    if not isinstance(given, Mapping) or set(given) != set(wanted):
+        raise FmuError(f"{name} expects {', '.join(wanted)}, not {given!r}")
+    size = {key: float(value) for key, value in given.items()}
+    for key, value in size.items():
+        least = 0.0 if key == "inner_radius" else np.nextafter(0.0, 1.0)
+        if not least <= value < np.inf:
+            raise FmuError(f"{key} of the {name} must be positive, not {value!r}")
+    if name == "sector":
+        if size["inner_radius"] >= size["radius"]:
+            raise FmuError("inner_radius of the sector must be smaller than its radius")
+        if size["angle"] >= 360:
+            raise FmuError("angle of the sector must be less than 360 degrees")
+    return name, size
+
+
+def _level(force: np.ndarray) -> np.ndarray:
+    """Return the rotation that takes the specific force to z, by the shortest way."""
+    a = force / np.linalg.norm(force)
+    axis = np.cross(a, [0.0, 0.0, 1.0])
+    s, c = np.linalg.norm(axis), a[2]
+    if s < 1e-15:
+        return np.diag([1.0, np.sign(c), np.sign(c)])
+    k = np.cross(np.eye(3), axis / s)  # k v = v × axis; minus it turns about the axis
+    return np.eye(3) - s * k + (1 - c) * k @ k
+
+
+def _heights(
+    occ: Any, solid: int, name: str, size: Mapping[str, Any], level: np.ndarray
+) -> tuple[float, float]:
+    """Return the heights of the lowest and the highest point of the turned tank.
+
+    From its corners and rims: the bounding boxes of the geometry's kernel are too large for curved
+    surfaces. Of a file they are what there is.
+    """
+    if name == "sphere":
+        center = level @ [0, 0, size["radius"]]
+        return float(center[2] - size["radius"]), float(center[2] + size["radius"])
+    if name == "step":
+        box = occ.getBoundingBox(3, solid)
+        return float(box[2]), float(box[5])
+    if name == "box":
+        a, b = size["length"] / 2, size["width"] / 2
+        rim = np.array([[a, a, -a, -a], [b, -b, b, -b]])
+    else:
+        half = np.radians(size.get("angle", 360)) / 2
+        turn = np.linspace(-half, half, 20001)  # a chord is 1e-8 of the radius off the arc
+        circle = np.array([np.cos(turn), np.sin(turn)])
+        rim = np.hstack([size["radius"] * circle, size.get("inner_radius", 0) * circle])
+    if name == "horizontal_cylinder":
+        ends = [np.vstack([np.full_like(rim[0], x), rim[0], size["radius"] + rim[1]])
+                for x in (-size["length"] / 2, size["length"] / 2)]  # fmt: skip
+    else:
+        ends = [np.vstack([rim, np.full_like(rim[0], z)]) for z in (0, size["height"])]
+    heights = level[2] @ np.hstack(ends)
+    return float(heights.min()), float(heights.max())
+
+
+def _solid(occ: Any, name: str, size: Mapping[str, Any]) -> int:
+    """Make the inside of the whole tank, upright, in its own axes."""
+    if name == "cylinder":
+        return int(occ.addCylinder(0, 0, 0, 0, 0, size["height"], size["radius"]))
+    if name == "horizontal_cylinder":
+        radius, length = size["radius"], size["length"]
+        tag = occ.addCylinder(-length / 2, 0, radius, length, 0, 0, radius)
+        # its seam out of the surface of a half full tank, where Boolean operations fail
+        occ.rotate([(3, tag)], 0, 0, radius, 1, 0, 0, 0.7)
+        return int(tag)
+    if name == "sphere":
+        return int(occ.addSphere(0, 0, size["radius"], size["radius"]))
+    if name == "box":
+        a, b = size["length"], size["width"]
+        return int(occ.addBox(-a / 2, -b / 2, 0, a, b, size["height"]))
+    if name == "sector":
+        angle = np.radians(size["angle"])
+        outer = occ.addCylinder(0, 0, 0, 0, 0, size["height"], size["radius"], angle=angle)
+        occ.rotate([(3, outer)], 0, 0, 0, 0, 0, 1, -angle / 2)
+        if size["inner_radius"] > 0:
+            inner = occ.addCylinder(0, 0, 0, 0, 0, size["height"], size["inner_radius"])
+            [(_, outer)], _ = occ.cut([(3, outer)], [(3, inner)])
+        return int(outer)
+    solids = [tag for dimension, tag in occ.importShapes(size["file"]) if dimension == 3]
+    if len(solids) != 1:
+        raise FmuError(f"{size['file']}: expects one solid, the tank's inside, not {len(solids)}")
+    return int(solids[0])
+
+
+def _mesh(
+    name: str, size: Mapping[str, Any], level: np.ndarray, fill: float | str, elements: float
+) -> "tuple[Any, float]":
+    """Return a mesh of the liquid of curved tetrahedra, and the height of its surface."""
+    try:
+        import gmsh
+        from skfem import MeshTet2
+    except (ImportError, OSError) as error:
+        raise FmuError(
+            f"{error}: modes in three dimensions need the extra fem: pip install 'hubslosh[fem]' "
+            "(gmsh also needs the system's libGLU: Debian's libglu1-mesa)"
+        ) from None
+
+    gmsh.initialize(interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.option.setString("Geometry.OCCTargetUnit", "M")
+        occ = gmsh.model.occ
+        solid = _solid(occ, name, size)
+        turn = np.eye(4)
+        turn[:3, :3] = level
+        occ.affineTransform([(3, solid)], turn.ravel().tolist())
+        occ.synchronize()
+        box = gmsh.model.occ.getBoundingBox(3, solid)
+        low, high = _heights(occ, solid, name, size, level)
+        surface = _surface(occ, solid, box, low, high, fill)
+        liquid = _cut(occ, solid, box, surface)
+        occ.synchronize()
+        faces = gmsh.model.getEntities(2)
+        flat = [tag for _, tag in faces if _is_at(gmsh, tag, surface, box)]
+        if not flat:
+            raise FmuError("no free surface: the tank is empty or full")
+        extent = np.array([gmsh.model.occ.getBoundingBox(2, tag) for tag in flat])
+        across = float(min(extent[:, 3].max() - extent[:, 0].min(),
+                           extent[:, 4].max() - extent[:, 1].min()))  # fmt: skip
+        _set_sizes(gmsh, flat, across / elements)
+        gmsh.model.mesh.generate(3)
+        gmsh.model.mesh.setOrder(2)
+        tags, points, _ = gmsh.model.mesh.getNodes()
+        index = np.zeros(int(tags.max()) + 1, int)
+        index[tags] = np.arange(len(tags))
+        kinds, _, nodes = gmsh.model.mesh.getElements(3, liquid)
+        cells = index[nodes[list(kinds).index(11)].reshape(-1, 10)]  # 11: ten nodes
+    except FmuError:
+        raise
+    except Exception as error:  # gmsh raises what it is
+        raise FmuError(f"no mesh of the liquid: {error}") from None
+    finally:
+        gmsh.finalize()
+    # gmsh's order of the middle nodes, as scikit-fem has it: 01, 12, 02, 03, 13, 23
+    cells = cells[:, [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]]
+    used, cells = np.unique(cells, return_inverse=True)
+    locations = np.ascontiguousarray(points.reshape(-1, 3)[used].T)
+    return MeshTet2(locations, np.ascontiguousarray(cells.reshape(-1, 10).T)), surface
+
+
+def _surface(
+    occ: Any, solid: int, box: Sequence[float], low: float, high: float, fill: float | str
+) -> float:
+    """Return the height of the free surface."""
+    if isinstance(fill, str) and fill.strip().endswith("%"):
+        try:
+            part = float(fill.strip()[:-1]) / 100
+        except ValueError:
+            part = np.nan
+        if not 0 < part < 1:
+            raise FmuError(f"fill is between 0% and 100% of the volume, not {fill!r}")
+        whole = occ.getMass(3, solid)
+
+        def excess(height: float) -> float:
+            [(_, copy)] = occ.copy([(3, solid)])
+            rest = _cut(occ, copy, box, height)
+            volume = float(occ.getMass(3, rest))
+            occ.remove([(3, rest)], recursive=True)
+            return volume - part * whole
+
+        from scipy.optimize import brentq
+
+        edge = 1e-4 * (high - low)
+        return float(brentq(excess, low + edge, high - edge, xtol=1e-9 * (high - low)))
+    if isinstance(fill, bool | str) or not 0 < float(fill) < high - low:
+        raise FmuError(
+            f'fill is a height between 0 and {high - low:.6g} m, or a text like "60%", not {fill!r}'
+        )
+    return low + float(fill)
+
+
+def _cut(occ: Any, solid: int, box: Sequence[float], surface: float) -> int:
+    """Cut away what is above the surface; return what is left."""
+    margin = max(box[3] - box[0], box[4] - box[1], box[5] - box[2])
+    lid = occ.addBox(
+        box[0] - margin, box[1] - margin, surface, *(3 * margin,) * 2, box[5] - surface + margin
+    )
+    left, _ = occ.cut([(3, solid)], [(3, lid)])
+    if len(left) != 1:
+        raise FmuError(f"the liquid is in {len(left)} parts that do not touch; give each as a tank")
+    return int(left[0][1])
+
+
+def _is_at(gmsh: Any, tag: int, surface: float, box: Sequence[float]) -> bool:
+    if gmsh.model.getType(2, tag) != "Plane":
+        return False
+    near = 1e-6 * (box[5] - box[2])
+    height = gmsh.model.occ.getCenterOfMass(2, tag)[2]
+    normal = gmsh.model.getNormal(tag, [0.5, 0.5])
+    return abs(height - surface) < near and abs(abs(normal[2]) - 1) < 1e-6
+
+
+def _set_sizes(gmsh: Any, flat: list[int], size: float) -> None:
+    """Let elements grow away from the surface, where the modes are, and be fine at its edge."""
+    mesh = gmsh.model.mesh
+    edges = gmsh.model.getBoundary([(2, tag) for tag in flat], oriented=False)
+    lines = sorted({tag for _, tag in edges})
+    near, distance = mesh.field, mesh.field.add("Distance")
+    near.setNumbers(distance, "SurfacesList", flat)
+    near.setNumbers(distance, "CurvesList", lines)
+    near.setNumber(distance, "Sampling", 60)
+    away = near.add("MathEval")
+    near.setString(away, "F", f"{size!r} + 0.1*F{distance}")
+    edge = near.add("Distance")
+    near.setNumbers(edge, "CurvesList", lines)
+    near.setNumber(edge, "Sampling", 200)
+    fine = near.add("MathEval")
+    near.setString(fine, "F", f"{0.6 * size!r} + 0.4*F{edge}")
+    both = near.add("Min")
+    near.setNumbers(both, "FieldsList", [away, fine])
+    near.setAsBackgroundMesh(both)
+    for key in ("MeshSizeExtendFromBoundary", "MeshSizeFromPoints", "MeshSizeFromCurvature"):
+        gmsh.option.setNumber(f"Mesh.{key}", 0)
+
+
+def _solve(mesh: Any, surface: float, density: float, gravity: float, count: int) -> LiquidModes:
+    """Return the modes of a mesh; their error is not known yet."""
+    import pandas as pd
+    from scipy.sparse.linalg import LinearOperator, eigsh, splu
+    from skfem import Basis, BilinearForm, ElementTetP2, FacetBasis, Functional, LinearForm
+
+    element = ElementTetP2()
+    volume = Basis(mesh, element, intorder=4)
+    outside = mesh.boundary_facets()
+    heights = mesh.p[2, mesh.facets[:, outside]]
+    tall = mesh.p[2].max() - mesh.p[2].min()
+    free = outside[np.all(np.abs(heights - surface) < 1e-7 * tall, axis=0)]
+    wet, lid = (FacetBasis(mesh, element, facets=f, intorder=5) for f in (outside, free))
+
+    @BilinearForm
+    def stiffness(u: Any, v: Any, _: Any) -> Any:
+        return sum(u.grad[i] * v.grad[i] for i in range(3))
+
+    @BilinearForm
+    def square(u: Any, v: Any, _: Any) -> Any:
+        return u * v
+
+    def integral(basis: Any, f: "Callable[[np.ndarray], np.ndarray]") -> float:
+        return float(Functional(lambda w: f(w.x)).assemble(basis))
+
+    q = integral(volume, lambda x: np.ones_like(x[0]))
+    center = np.array([integral(volume, lambda x, i=i: x[i]) / q for i in range(3)])
+
+    def along(j: int) -> "Callable[[Any], Any]":
+        """Return N_j: velocity of the wall along n as the tank moves, j = 0..2, or turns."""
+        if j < 3:
+            return lambda w: w.n[j]
+        a, b = (j - 2) % 3, (j - 1) % 3  # e_j × r has the components r_b, −r_a along b, a
+        return lambda w: w.n[b] * w.x[a] - w.n[a] * w.x[b]
+
+    normal = [along(j) for j in range(6)]
+    flux = [LinearForm(lambda v, w, f=f: v * f(w)).assemble(wet) for f in normal]
+    s, m = stiffness.assemble(volume).tocsc(), square.assemble(lid).tocsc()
+
+    # M x = μ (S + M) x, μ = 1/(1 + λ): the constant, μ = 1, comes first
+    both = splu((s + m).tocsc())
+    size = s.shape[0]
+    inverse = LinearOperator((size, size), matvec=both.solve)
+    start = np.random.default_rng(1).standard_normal(size)
+    mu, x = eigsh(m, count + 1, s + m, Minv=inverse, which="LA", v0=m @ start, tol=1e-12)
+    order = np.argsort(-mu)[1:]
+    lambdas, phi = 1 / mu[order] - 1, x[:, order]
+
+    norm = np.einsum("in,in->n", phi, m @ phi)
+    phi, norm = phi / np.sqrt(norm), np.ones(count)
+    lambdas, phi = _aligned(lambdas, phi, np.array([phi.T @ f for f in flux[:2]]).T)
+    b = np.array([phi.T @ f for f in flux]).T / lambdas[:, None]  # modes × motions
+    rows = [
+        _mode(density, gravity, lam, bn, nn, q * density)
+        for lam, bn, nn in zip(lambdas, b, norm, strict=True)
+    ]
+    table = pd.DataFrame(rows)
+    # elevation at the surface's highest place per angle of the pendulum, a_n = A φ(wall)/N
+    on_lid = np.unique(volume.get_dofs(free).flatten())
+    crest = np.abs(phi[on_lid]).max(axis=0)
+    table["wave"] = np.hypot(b[:, 0], b[:, 1]) * crest / norm
+    units = dict.fromkeys(("length", "bob", "hinge", "arm"), "m")
+    table.attrs["units"] = {"frequency": "Hz", "mass": "kg", "twist": "kg.m2", "direction": "deg",
+                            "wave": "m/rad", **units}  # fmt: skip
+
+    # Ψ of the rotations: S Ψ = ∫ v N, known up to a constant; one value is taken as 0
+    psi = np.zeros((3, size))
+    held = splu(s[1:, 1:].tocsc())
+    for k in range(3):
+        load = flux[3 + k] - flux[3 + k].mean()
+        psi[k, 1:] = held.solve(load[1:])
+    inertia = density * np.array([[p @ f for f in flux[3:]] for p in psi])
+    return LiquidModes(
+        q * density, (float(center[0]), float(center[1]), float(center[2])), surface, gravity,
+        (inertia + inertia.T) / 2, table, pd.DataFrame(),
+    )  # fmt: skip
+
+
+def _aligned(lambdas: np.ndarray, phi: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Turn two modes of one frequency, whose directions are the mesh's chance, to x and y.
+
+    a: coupling of the modes, of unit norm, with the displacements, modes × 2.
+    """
+    lambdas, phi = lambdas.copy(), phi.copy()
+    large = np.hypot(*a.T) > 1e-3 * np.hypot(*a.T).max()
+    for n in range(len(lambdas) - 1):
+        pair = slice(n, n + 2)
+        if lambdas[n + 1] - lambdas[n] < _EQUAL * lambdas[n] and large[pair].all():
+            c, s = a[pair, 0] / np.linalg.norm(a[pair, 0])
+            turn = np.array([[c, -s], [s, c]])
+            phi[:, pair] = phi[:, pair] @ turn
+            lambdas[pair] = np.diag(turn.T @ np.diag(lambdas[pair]) @ turn)
+    return lambdas, phi
+
+
+def _mode(
+    density: float, gravity: float, lam: float, b: np.ndarray, norm: float, liquid: float
+) -> dict[str, float]:
+    """Return the pendulum that stands for a mode; b: its coupling with the six motions."""
+    a = np.hypot(b[0], b[1])
+    mass = density * lam * a**2 / norm
+    twist = density * lam * b[5] ** 2 / norm
+    row = {"frequency": np.sqrt(gravity * lam) / (2 * np.pi), "mass": mass, "length": 1 / lam}
+    if mass < _MASSLESS * liquid:
+        nothing = dict.fromkeys(("direction", "bob", "hinge", "arm"), np.nan)
+        return {**row, **nothing, "twist": twist}
+    e = b[:2] / a
+    # one of two opposite directions; along y the first component is the mesh's chance
+    if e[1] < 0 if abs(e[0]) < 1e-3 else e[0] < 0:
+        e, a = -e, -a
+    # angular momentum about O of a momentum along e at (p, H): (−H e_y, H e_x, p_x e_y − p_y e_x)
+    bob = (b[4] * e[0] - b[3] * e[1]) / a
+    return {
+        **row, "direction": float(np.degrees(np.arctan2(e[1], e[0]))), "bob": bob,
+        "hinge": bob + 1 / lam, "arm": b[5] / a, "twist": twist,
+    }  # fmt: skip
+
+
+def _cos(modes: "pd.DataFrame") -> np.ndarray:
+    return np.cos(np.radians(np.nan_to_num(modes["direction"].to_numpy())))
+
+
+def _sin(modes: "pd.DataFrame") -> np.ndarray:
+    return np.sin(np.radians(np.nan_to_num(modes["direction"].to_numpy())))

@@ -1,0 +1,237 @@
+"""Slosh modes in three dimensions against closed forms, the axisymmetric solver, another method."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import option
+from scipy.linalg import eigh
+from scipy.optimize import brentq
+from scipy.special import jvp
+
+from hubslosh import FmuError, LiquidModes, liquid_modes, tank
+
+XI = 1.841183781340659  # first zero of J1'
+
+
+def lambdas(found: LiquidModes) -> np.ndarray:
+    """Return ω²/g of the modes."""
+    return (2 * np.pi * found.modes["frequency"].to_numpy()) ** 2 / found.gravity
+
+
+def error(found: LiquidModes, mode: int = 0) -> float:
+    """Return the stated error of λ, which is the frequency's squared."""
+    return 2 * float(found.error["frequency"][mode])
+
+
+def line(a: complex, b: complex) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return points, derivative and weights of a straight piece of a boundary, x + i z."""
+    nodes, weights = np.polynomial.legendre.leggauss(80)
+    return a + (b - a) * (nodes + 1) / 2, np.full_like(nodes, b - a, complex), weights / 2
+
+
+def arc(radius: float, start: float, end: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the same of an arc about 0."""
+    nodes, weights = np.polynomial.legendre.leggauss(80)
+    w = radius * np.exp(1j * (start + (end - start) * (nodes + 1) / 2))
+    return w, 1j * (end - start) * w, weights / 2
+
+
+def ritz(surface: tuple[complex, complex], wall: list[tuple[np.ndarray, ...]]) -> np.ndarray:
+    """Return λ of a plane liquid by Ritz's method, from above and without a mesh.
+
+    Trial functions are Re f and Im f, f = w^k, w = x + i z, k = 1..22: they solve Laplace's
+    equation, so ∫(∇φ)² = ∮ φ ∂φ/∂n ds, and by Cauchy and Riemann ∂/∂n Re f ds = d Im f on the way
+    counter-clockwise. wall: its pieces in that sense, from the surface's left end to its right.
+    """
+    size = max(np.abs(w).max() for w, _, _ in wall)
+
+    def trial(piece: tuple[np.ndarray, ...]) -> tuple[np.ndarray, np.ndarray]:
+        w, slope, weights = piece
+        k = np.arange(1, 23)[:, None]
+        f, d = (w / size) ** k, k * (w / size) ** (k - 1) * slope / size * weights
+        return np.vstack([f.real, f.imag]), np.vstack([d.imag, -d.real])
+
+    left, right = surface
+    top = line(right, left)
+    stiffness = sum(phi @ dn.T for phi, dn in map(trial, [*wall, top]))
+    phi, _ = trial(top)
+    width, weights = abs(right - left), top[2]
+    phi = phi - (phi @ weights)[:, None]  # modes have no mean
+    mass = width * phi @ np.diag(weights) @ phi.T
+    values, vectors = eigh((stiffness + stiffness.T) / 2)
+    kept = values > 1e-11 * values.max()
+    basis = vectors[:, kept] / np.sqrt(values[kept])
+    return 1 / eigh(basis.T @ mass @ basis, eigvals_only=True)[::-1][:4]
+
+
+def test_an_upright_cylinder_is_its_closed_forms() -> None:
+    """λ, mass, bob, wave and inertia to 1e-4: what the issue asks of this path, not its limit."""
+    r, h, rho = 0.5, 0.6, 900.0
+    found = liquid_modes({"cylinder": {"radius": r, "height": 2}}, h, density=rho, modes=2)
+    k, mass = XI / r, rho * np.pi * r**2 * h
+    assert found.mass == pytest.approx(mass, rel=3e-5)
+    assert found.modes["direction"].to_numpy() == pytest.approx([0, 90], abs=1e-2)
+    m = mass * 2 * r * np.tanh(k * h) / (XI * (XI**2 - 1) * h)
+    for n in (0, 1):
+        mode = found.modes.iloc[n]
+        assert mode["length"] == pytest.approx(1 / (k * np.tanh(k * h)), rel=1e-4)
+        assert mode["mass"] == pytest.approx(m, rel=1e-4)
+        assert mode["bob"] == pytest.approx(h - 2 / k * np.tanh(k * h / 2), rel=1e-4)
+        assert mode["wave"] == pytest.approx(2 * r / (XI**2 - 1), rel=3e-4)
+        assert abs(mode["arm"]) < 1e-5 and mode["twist"] < 1e-7 * mass
+    assert found.rest["m_0_x"] == pytest.approx(mass - m, rel=1e-4)
+    # inertia under a lid about its centre, NASA SP-106's series, and none about the axis
+    between = [1.0 + np.pi * i for i in range(40)]
+    xi = np.array([brentq(lambda x: jvp(1, x), low, low + 2) for low in between])
+    series = np.sum(np.tanh(xi * h / (2 * r)) / (xi**3 * (xi**2 - 1)))
+    inertia = mass * (h**2 / 12 - 3 * r**2 / 4 + 16 * r**3 / h * series) + mass * (h / 2) ** 2
+    assert found.lid_inertia[0, 0] == pytest.approx(inertia, rel=2e-3)
+    assert abs(found.lid_inertia[2, 2]) < 1e-6 * inertia
+
+
+def test_a_sphere_is_what_the_axisymmetric_solver_gives(
+    request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another discretisation, of a curve in place of a volume, whose own error is 1e-9."""
+    monkeypatch.setenv("HUBSLOSH", str(option(request, "--hubslosh")))
+    flat = tank({"density": 1000.0, "shape": {"sphere": {"radius": 1.0}}}, 0.8, modes=1)
+    found = liquid_modes({"sphere": {"radius": 1}}, 0.8, modes=1, resolution=18)
+    for name, bound in (("frequency", 1e-4), ("mass", 1e-4), ("wave", 3e-4)):
+        assert found.modes[name][0] == pytest.approx(flat.modes[name][0], rel=bound), name
+    # the hinge of every mode is the centre
+    assert found.modes["hinge"][0] == pytest.approx(1.0, abs=1e-4)
+
+
+def test_a_lying_cylinder_half_full_has_lamb_s_mode_and_swings_about_its_axis() -> None:
+    """Lamb, Hydrodynamics, art. 259: λR = 1.3557 across; Ritz's method gives two digits more."""
+    found = liquid_modes({"horizontal_cylinder": {"radius": 1, "length": 1}}, 1.0, modes=3,
+                         resolution=12)  # fmt: skip
+    across = found.modes[np.abs(found.modes["direction"]) > 89].iloc[0]
+    [first, *_] = ritz((-1, 1), [arc(1, np.pi, 2 * np.pi)])
+    assert first == pytest.approx(1.35573, abs=2e-5)
+    assert 1 / across["length"] == pytest.approx(first, rel=1e-4)
+    assert across["hinge"] == pytest.approx(1.0, abs=1e-4)  # the wall's normals meet in the axis
+
+
+@pytest.mark.parametrize(("inner", "angle"), [(0.0, 90.0), (0.4, 60.0)])
+def test_upright_sectors_have_the_modes_of_bessel_s_functions(inner: float, angle: float) -> None:
+    """λ = k tanh kh, cos(mθ) across the angle, m = nπ/α, zeros of J'm or of the cross product."""
+    from scipy.special import yvp
+
+    h, alpha = 0.7, np.radians(angle)
+    expected = []
+    for n in range(3):
+        m = n * np.pi / alpha
+
+        def slope(k: float, m: float = m) -> float:
+            if inner == 0:
+                return float(jvp(m, k))
+            return float(jvp(m, k * inner) * yvp(m, k) - yvp(m, k * inner) * jvp(m, k))
+
+        k = np.linspace(0.3, 9, 3000)
+        values = np.array([slope(x) for x in k])
+        changes = np.flatnonzero(values[1:] * values[:-1] < 0)
+        roots = [brentq(slope, k[i], k[i + 1]) for i in changes]
+        expected += [root * np.tanh(root * h) for root in roots]
+    size = {"inner_radius": inner, "radius": 1, "angle": angle, "height": 1}
+    found = liquid_modes({"sector": size}, h, modes=2, resolution=12)
+    assert lambdas(found) == pytest.approx(sorted(expected)[:2], rel=2e-4)
+    # across the angle the mass moves along y, off the axis: a sector that turns takes it along
+    assert abs(found.modes["direction"][0]) == pytest.approx(90, abs=0.1)
+    assert abs(found.modes["arm"][0]) > 0.5
+
+
+def test_a_box_drags_liquid_about_its_vertical() -> None:
+    """Lamb's series for a box: 0.1565 of the rigid inertia for a square."""
+    found = liquid_modes(
+        {"box": {"length": 0.4, "width": 0.4, "height": 1}}, "30%", modes=2, resolution=12
+    )
+    rigid = found.mass * (0.4**2 + 0.4**2) / 12
+    assert found.lid_inertia[2, 2] / rigid == pytest.approx(0.1565, abs=5e-4)
+    k = np.pi / 0.4
+    assert lambdas(found) == pytest.approx(2 * [k * np.tanh(k * 0.3)], rel=1e-4)
+    table = found.table("x")
+    assert table["slosh.table.length[1]"] == pytest.approx(1 / lambdas(found)[0], rel=1e-4)
+    assert table["tank.I_own"] == pytest.approx(0.1565 * rigid, rel=4e-3)
+
+
+@pytest.mark.parametrize("degrees", [10.0, 40.0])
+def test_a_tilted_box_is_the_plane_problem_of_its_section(degrees: float) -> None:
+    """Modes that do not vary across, by Ritz's method with polynomials on the tilted section."""
+    a, depth, t = 0.4, 0.5, np.radians(degrees)
+    force = 9.81 * np.array([np.sin(t), 0, np.cos(t)])
+    size = {"length": a, "width": 0.2, "height": 2}
+    found = liquid_modes({"box": size}, "25%", modes=1, specific_force=force, resolution=10)
+    # walls x = ±a/2, floor z = 0, surface through (0, depth), normal to the specific force
+    up = np.exp(1j * t)  # turns the tank's axes so that the specific force points along z
+    low, high = depth - a / 2 * -np.tan(t), depth - a / 2 * np.tan(t)
+    corners = [complex(-a / 2, low), complex(-a / 2, 0), complex(a / 2, 0), complex(a / 2, high)]
+    turned = [(c - 1j * depth) * up for c in corners]
+    assert abs(turned[0].imag) < 1e-12 and abs(turned[3].imag) < 1e-12
+    wall = [line(p, q) for p, q in pairwise(turned)]
+    [first, *_] = ritz((turned[0], turned[3]), wall)
+    assert lambdas(found)[0] == pytest.approx(first, rel=5e-4)
+    assert abs(found.modes["direction"][0]) < 0.1
+
+
+def test_small_tilts_change_frequencies_by_their_square() -> None:
+    """Perturbation theory: the first order is 0 by symmetry, so 8° do four times what 4° do."""
+
+    def frequency(degrees: float) -> float:
+        t = np.radians(degrees)
+        size = {"cylinder": {"radius": 0.1, "height": 1}}
+        force = [np.sin(t), 0, np.cos(t)]
+        found = liquid_modes(size, "20%", modes=1, specific_force=force, resolution=12)
+        return float(found.modes["frequency"][0])
+
+    upright, small, twice = (frequency(degrees) for degrees in (0, 4, 8))
+    assert small < upright
+    # the fourth order is 5 % of the second at 8°; meshes scatter by 1e-5 of 5e-3
+    assert (upright - twice) / (upright - small) == pytest.approx(4, rel=0.1)
+
+
+def test_a_solid_of_a_cad_system_is_the_shape_that_it_draws(tmp_path: Path) -> None:
+    """A box by its dimensions, and the same written as STEP."""
+    import gmsh
+
+    file = tmp_path / "tank.step"
+    gmsh.initialize(interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    gmsh.option.setString("Geometry.OCCTargetUnit", "M")
+    gmsh.model.occ.addBox(-0.2, -0.15, 0, 0.4, 0.3, 1)
+    gmsh.model.occ.synchronize()
+    gmsh.write(str(file))
+    gmsh.finalize()
+    drawn = liquid_modes({"step": file}, "50%", modes=1, resolution=6)
+    size = {"length": 0.4, "width": 0.3, "height": 1}
+    plain = liquid_modes({"box": size}, "50%", modes=1, resolution=6)
+    # two meshes of the same tank, each with its error
+    assert drawn.modes["frequency"][0] == pytest.approx(plain.modes["frequency"][0], rel=1e-3)
+
+
+def test_stated_errors_hold() -> None:
+    """The difference of the meshes is more than the finer one is off."""
+    k = np.pi / 0.4
+    size = {"length": 0.4, "width": 0.3, "height": 1}
+    for resolution in (6, 9):
+        found = liquid_modes({"box": size}, 0.3, modes=1, resolution=resolution)
+        assert abs(lambdas(found)[0] / (k * np.tanh(k * 0.3)) - 1) < error(found)
+
+
+@pytest.mark.parametrize(
+    ("shape", "fill", "words"),
+    [
+        ({"pear": {}}, 0.1, "shape is one of cylinder, horizontal_cylinder"),
+        ({"sphere": {"radius": -1}}, 0.1, "radius of the sphere must be positive, not -1.0"),
+        ({"sphere": {"diameter": 1}}, 0.1, "sphere expects radius"),
+        ({"sphere": {"radius": 1}}, 2.5, "between 0 and 2 m"),
+        ({"sphere": {"radius": 1}}, "120%", "between 0% and 100%"),
+        ({"step": "nowhere.step"}, 0.1, "nowhere.step: no such file"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_in_words(shape: dict, fill: float, words: str) -> None:
+    """Each says what is allowed."""
+    with pytest.raises(FmuError, match=words):
+        liquid_modes(shape, fill)
