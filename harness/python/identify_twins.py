@@ -1,6 +1,6 @@
 """Twins for `hubslosh identify --free`: whether the truth lies inside the stated intervals.
 
-    python identify_twins.py FOLDER [--cases VanDerPol,Hub,…] [--twins 100] [--program hubslosh]
+    python identify_twins.py FOLDER [--cases VanDerPol,Hub,…] [--twins 100] [--first 1]
 
 FOLDER has the FMUs of others by name: VanDerPol.fmu, BouncingBall.fmu and Dahlquist.fmu of
 modelica/Reference-FMUs (built for FMI 2.0), Orifice.fmu (`orifice.py`, exported by PythonFMU, whose
@@ -220,6 +220,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path, help="where the FMUs of others are")
     parser.add_argument("--cases", default=",".join(CASES), help="which cases")
     parser.add_argument("--twins", type=int, default=100, help="how many of each")
+    parser.add_argument("--first", type=int, default=1, help="the first seed")
     parser.add_argument("--program", default="hubslosh", help="the program")
     arguments = parser.parse_args()
     print("| FMU | unknown | inside its 95 % interval | rms of error/σ | largest | median σ |")
@@ -231,7 +232,7 @@ def main() -> None:
         seen: dict[str, list[tuple[bool, float, float]]] = defaultdict(list)
         refused, unfit, last = [], [], ""
         with tempfile.TemporaryDirectory() as folder:
-            for seed in range(1, arguments.twins + 1):
+            for seed in range(arguments.first, arguments.first + arguments.twins):
                 twin = case.make(default_rng(seed))
                 try:
                     found = run(case, twin, arguments.program, folder)

@@ -3,6 +3,7 @@
 use analysis::random::Random;
 use host::output::atomically;
 use identify::any_fmu::foresee::foresee;
+use identify::any_fmu::likelihood::deviances;
 use identify::any_fmu::question::{Question, Solver};
 use identify::any_fmu::record::Record;
 use identify::any_fmu::simulate::Model;
@@ -138,6 +139,41 @@ fn what_is_foreseen_is_what_a_fit_states() {
         // the noise is estimated to 2 %, and one row of a recording was lost
         assert!((stated / bound.std - 1.0).abs() < 0.1, "{}: {stated} {}", bound.name, bound.std);
     }
+}
+
+#[test]
+fn the_likelihood_beside_the_estimate_grows_as_the_covariance_says() {
+    let question = question(&FREE);
+    let found = found(&question);
+    let (names, _) = &found.correlations;
+    let middle: Vec<f64> = names
+        .iter()
+        .map(|name| {
+            found.parameters.get(name).or_else(|| found.measurement.get(name)).unwrap().value
+        })
+        .collect();
+    // along a column of the covariance, the direction in which the others follow: by k σ the deviance grows by k²
+    let covariance = &found.details.covariance;
+    let moved = |j: usize, k: f64| -> Vec<f64> {
+        let std = covariance[j][j].sqrt();
+        middle.iter().zip(&covariance[j]).map(|(x, c)| x + k * c / std).collect()
+    };
+    let mut points = vec![middle.clone()];
+    (0..names.len()).for_each(|j| points.extend([moved(j, 2.0), moved(j, -2.0)]));
+    let mut outside = middle.clone();
+    outside[1] = -0.1; // the friction's lower bound is 0
+    points.push(outside);
+    let model = Model::open(packed_for_tests(), question.solver).unwrap();
+    let records = [record(1, 0.2, BIAS), record(2, -0.1, 0.0)];
+    let result = found.json().unwrap();
+    let deviances = deviances(&model, &question, &records, &result, &points).unwrap();
+    for (j, pair) in deviances[1..deviances.len() - 1].chunks(2).enumerate() {
+        // the end of the search is within 0.02 standard deviations: 2 · 2 · 0.02, and the model is linear but for the inertia
+        for deviance in pair {
+            assert!((deviance - deviances[0] - 4.0).abs() < 0.2, "{}: {deviance}", names[j]);
+        }
+    }
+    assert_eq!(deviances[deviances.len() - 1], f64::INFINITY);
 }
 
 /// For a look at it: HUBSLOSH_PAGE=page.html.

@@ -9,8 +9,8 @@
 `margins` how far that loop is from instability, `monte_carlo` many runs with drawn parameters,
 `linearize` a state-space model, `frequency_response` an estimate from a history, `fit` a transfer
 function through such an estimate; `analyse`, `campaign`, `identify` and `tank` call the program
-``hubslosh``, `liquid_modes` finds slosh modes in three dimensions. `plot` draws. `Plant` and
-`drive` are for those who step an instance themselves.
+``hubslosh``, `liquid_modes` finds slosh modes in three dimensions, `posterior` samples what
+`identify` states. `plot` draws. `Plant` and `drive` are for those who step an instance themselves.
 """
 
 from importlib import import_module
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .linearization import LinearModel, linearize
     from .liquid import LiquidModes, liquid_modes
     from .loop import Law, Loop, closed_loop
+    from .mcmc import posterior
     from .plant import COLUMNS, TORQUE, Plant, RunError, drive
     from .program import Estimated, Identification, analyse, campaign, identify
     from .sampling import draw, monte_carlo, quantiles
@@ -44,6 +45,7 @@ _MODULES = {
     "linearization": ("LinearModel", "linearize"),
     "liquid": ("LiquidModes", "liquid_modes"),
     "loop": ("Law", "Loop", "closed_loop"),
+    "mcmc": ("posterior",),
     "plant": ("COLUMNS", "TORQUE", "Plant", "RunError", "drive"),
     "program": ("Estimated", "Identification", "analyse", "campaign", "identify"),
     "sampling": ("draw", "monte_carlo", "quantiles"),
@@ -89,6 +91,7 @@ __all__ = [
     "margins",
     "monte_carlo",
     "plot",
+    "posterior",
     "quantiles",
     "read_parameters",
     "read_table",

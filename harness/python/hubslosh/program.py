@@ -201,6 +201,14 @@ def _asked(
     return [*flags, *(["--outputs", ",".join(outputs)] if outputs else [])]
 
 
+def _settings(settings: Mapping[str, object]) -> list[str]:
+    """Return the flags ``--set``."""
+    flags = []
+    for name, value in settings.items():
+        flags += ["--set", f"{name}={str(value).lower() if isinstance(value, bool) else value}"]
+    return flags
+
+
 Table = pd.DataFrame | str | Path
 """A table, or the file of one."""
 Free = float | tuple[float, float, float]
@@ -261,8 +269,7 @@ def identify(
             else ("time", *inputs, *outputs)
         )
         flags += _asked(free, inputs, outputs, prior or {})
-    for name, value in (settings or {}).items():
-        flags += ["--set", f"{name}={str(value).lower() if isinstance(value, bool) else value}"]
+    flags += _settings(settings or {})
     path = find_program(program)
     with tempfile.TemporaryDirectory() as folder:
         result = Path(folder) / "result.json" if out is None else Path(out)

@@ -6,12 +6,14 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 use host::output::atomically;
 use identify::any_fmu::foresee::{Bound, foresee};
+use identify::any_fmu::likelihood::deviances;
 use identify::any_fmu::question::{Question, Setting, Solver, list};
 use identify::any_fmu::record::Record;
 use identify::any_fmu::simulate::Model;
 use identify::any_fmu::{self, Identification};
 use identify::news::News;
 use signals::recording::Columns;
+use signals::table::Table;
 use std::io::Write;
 
 use super::identify::estimates;
@@ -55,6 +57,17 @@ pub struct AnyFmuArgs {
     tries: usize,
 }
 
+/// Points at which the likelihood is asked for.
+#[derive(clap::Args)]
+pub struct PointsArgs {
+    /// A table of points, a column an unknown: --out gets −2 ln L of each, for `hubslosh.posterior` in Python.
+    #[arg(long, hide = true, value_name = "CSV", requires_all = ["free", "found"])]
+    points: Option<PathBuf>,
+    /// The result whose noise it is.
+    #[arg(long, hide = true, value_name = "JSON", requires = "points")]
+    found: Option<PathBuf>,
+}
+
 /// What all commands are told.
 pub struct Told<'a> {
     /// Recordings.
@@ -77,6 +90,8 @@ pub struct Out<'a> {
     pub report: Option<&'a Path>,
     /// Each iteration is told.
     pub verbose: bool,
+    /// Points in place of a fit.
+    pub points: &'a PointsArgs,
 }
 
 /// Items of a flag, each read; all that is wrong is said at once.
@@ -160,6 +175,25 @@ impl AnyFmuArgs {
                     notes.push(line);
                 },
             )?);
+        }
+        if let (Some(points), Some(found)) = (&out.points.points, &out.points.found) {
+            let names: Vec<String> = question
+                .unknowns(model.description(), &records)?
+                .into_iter()
+                .map(|u| u.name)
+                .collect();
+            let names: Vec<&str> = names.iter().map(String::as_str).collect();
+            let table = Table::read(points, &names)?;
+            let columns: Vec<&[f64]> = names.iter().filter_map(|name| table.column(name)).collect();
+            let rows = (0..table.rows())
+                .map(|k| columns.iter().map(|c| c[k]).collect())
+                .collect::<Vec<_>>();
+            let result = std::fs::read_to_string(found)
+                .with_context(|| format!("{} cannot be read", found.display()))?;
+            let deviances = deviances(&model, &question, &records, &result, &rows)?;
+            let text = serde_json::to_string(&deviances)? + "\n";
+            atomically(out.result, |file| Ok(file.write_all(text.as_bytes())?))?;
+            return Ok(());
         }
         let spinner = progress::of_search()?;
         let found = any_fmu::identify(&model, &question, &records, &mut |news| match news {

@@ -22,7 +22,7 @@ use signals::recording::Between;
 use std::collections::BTreeMap;
 use std::io::Write;
 
-use super::any_fmu::{AnyFmuArgs, Out, Told};
+use super::any_fmu::{AnyFmuArgs, Out, PointsArgs, Told};
 use super::{DEFAULT_FMU, open, setting};
 use crate::{progress, terminal};
 
@@ -148,6 +148,8 @@ pub struct IdentifyArgs {
     report: Option<PathBuf>,
     #[command(flatten)]
     any: AnyFmuArgs,
+    #[command(flatten)]
+    points: PointsArgs,
 }
 
 /// The methods, one file each in `harness/identify/src/methods`.
@@ -269,7 +271,8 @@ impl IdentifyArgs {
                 json: self.json,
             };
             let report = self.report.as_deref();
-            let out = Out { result: &self.out, report, verbose: self.verbose };
+            let out =
+                Out { result: &self.out, report, verbose: self.verbose, points: &self.points };
             return self.any.identify(&told, &out);
         }
         match self.method {

@@ -2,10 +2,12 @@
 //!
 //! [`question`] says what is asked and with which unknowns, [`record`] reads, [`simulate`] runs the FMU (by its own solver, or by
 //! the host's in [`exchange`]), [`problem`] has the sum of squares, [`search`] its minimum and [`profile`] how sure it is;
-//! [`page`] shows it. What a planned recording will tell is in [`foresee`].
+//! [`page`] shows it. What a planned recording will tell is in [`foresee`], the likelihood
+//! at other points in [`likelihood`].
 
 pub mod exchange;
 pub mod foresee;
+pub mod likelihood;
 mod page;
 pub mod problem;
 pub mod profile;

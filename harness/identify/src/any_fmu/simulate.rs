@@ -218,11 +218,16 @@ impl Setup {
         let interface = description.co_simulation.as_ref();
         let sloped = interface.is_some_and(|cs| cs.can_interpolate_inputs)
             && self.held.iter().any(|held| !held);
+        let orders = vec![1; self.inputs.len()];
         let mut read = vec![Vec::with_capacity(record.time.len()); self.outputs.len()];
         for row in 0..record.time.len() {
             let (values, slopes) = self.course(record, row);
             if !values.is_empty() {
                 instance.set_real(&self.inputs, &values)?;
+            }
+            // an output may follow an input's slope, which changes here: what is read is that of the row onwards
+            if let (true, Instance::V2(instance, _)) = (sloped, &mut *instance) {
+                instance.set_real_input_derivatives(&self.inputs, &orders, &slopes)?;
             }
             let mut at = vec![0.0; self.outputs.len()];
             instance.get_real(&self.outputs, &mut at)?;

@@ -1,0 +1,333 @@
+"""A flight in twins: what slews of 0.3° with two gyros of different quality tell of slosh.
+
+    python flight_twin.py [--gyro good|mems] [--twins 1] [--program hubslosh] [--fmu Spacecraft]
+
+A second simulator, independent of Spacecraft.fmu, flies a rigid craft with two tanks under thrust:
+Newton's law of craft and bobs with the rods' pulls as unknowns, one dense system, Runge and Kutta's
+rule. Wheels turn it by 0.3° to and fro and hold it, thrusters pulse sideways. Three gyros with
+scales, alignment and biases and an accelerometer are recorded at 10 Hz, in two flights. The search
+starts at what `hubslosh tank` says of the tanks' drawing; the truth is up to 10 % off.
+
+Prints estimates beside the truth; with more than one twin how many intervals hold it.
+"""
+
+import argparse
+import json
+import resource
+import subprocess
+import tempfile
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.random import Generator, default_rng
+
+STEP, ROWS = 0.1, 2000  # s
+THRUST = 800.0  # N, along z
+SLEW = np.radians(0.3)
+TANK = """
+density = 1000.0
+shape = { cylinder = { radius = 0.4, height = 1.0 } }
+"""
+# origin of each tank from O: its lowest point on the axis, m
+PLACES = ((0.0, 0.0, -0.75), (0.0, 0.0, 0.45))
+FILLS = (0.6, 0.35)  # m
+NOISE = {  # of a row: gyro, rad/s, and its drift; accelerometer, m/s²; biases, scale, alignment
+    "good": {"w": 9e-6, "drift": 0.0, "a": 3e-4, "b": 5e-6, "scale": 1e-3, "angle": 1e-3},
+    "mems": {"w": 2.8e-4, "drift": 5e-5, "a": 3e-3, "b": 1e-3, "scale": 1e-2, "angle": 1e-2},
+}
+
+
+def cross(v: np.ndarray) -> np.ndarray:
+    """Return the matrix of v ×."""
+    x, y, z = v
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def times(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return a × b; for two short vectors much faster than NumPy's."""
+    (a1, a2, a3), (b1, b2, b3) = a.tolist(), b.tolist()
+    return np.array([a2 * b3 - a3 * b2, a3 * b1 - a1 * b3, a1 * b2 - a2 * b1])
+
+
+class Craft:
+    """The second simulator. Parameters by their names in Spacecraft.fmu; body axes, about O."""
+
+    def __init__(self, p: dict[str, float]) -> None:
+        """Set up the rigid part: dry craft and rigid liquids."""
+        mass, at = p["craft.mass"], np.array([p[f"craft.r[{i}]"] for i in (1, 2, 3)])
+        inertia = np.diag([p[f"craft.J{i}{i}"] for i in "xyz"])
+        rigid = [(mass, at, inertia)]
+        bobs = []
+        for i, place in enumerate(PLACES, 1):
+            d, t = np.array(place), f"tank[{i}]."
+            own = np.diag([p[t + "I_0"], p[t + "I_0"], 0.0])
+            rigid.append((p[t + "m_0"], d + np.array([0, 0, p[t + "H_0"]]), own))
+            m, length = p[t + "mass[1]"], p[t + "length[1]"]
+            rate = np.sqrt(p[t + "g_ref"] / length)
+            drag = 2.0 * p[t + "zeta[1]"] * m * rate
+            bobs.append((m, length, drag, d + np.array([0, 0, p[t + "hinge[1]"]])))
+        self.mass = sum(m for m, _, _ in rigid)
+        self.moment = sum(m * s for m, s, _ in rigid)
+        self.inertia = sum(j - m * cross(s) @ cross(s) for m, s, j in rigid)
+        self.bobs = bobs
+        self.matrix = np.zeros((6 + 4 * len(bobs), 6 + 4 * len(bobs)))
+        self.matrix[:3, :3] = self.mass * np.eye(3)
+        self.matrix[:3, 3:6] = -cross(self.moment)
+        self.matrix[3:6, :3] = cross(self.moment)
+        self.matrix[3:6, 3:6] = self.inertia
+
+    def solve(self, x: np.ndarray, u: np.ndarray, slope: np.ndarray) -> np.ndarray:
+        """Solve for specific force, w', p'' and the pull T of each rod.
+
+        x: w, then p and p' of each bob. u: force, torque, momentum of the wheels; slope: h'.
+        """
+        w, (force, torque, h) = x[:3], u.reshape(3, 3)
+        m, right = self.matrix.copy(), np.zeros(len(self.matrix))
+        right[:3] = force - times(w, times(w, self.moment))
+        right[3:6] = torque - slope - times(w, self.inertia @ w + h)
+        for i, (mass, length, drag, hinge) in enumerate(self.bobs):
+            p, p_dot = x[3 + 6 * i : 6 + 6 * i], x[6 + 6 * i : 9 + 6 * i]
+            rho, push, k = hinge + length * p, drag * length * p_dot, 6 + 4 * i
+            # on the craft: the rod's pull T p and the drag, both at the bob
+            right[:3] += push
+            right[3:6] += times(rho, push)
+            m[:3, k + 3] = -p
+            m[3:6, k + 3] = -times(rho, p)
+            # m (a + w' × ρ + w × (w × ρ) + 2 l w × p' + l p'') = -T p - drag
+            m[k : k + 3, :3] = mass * np.eye(3)
+            m[k : k + 3, 3:6] = -mass * cross(rho)
+            m[k : k + 3, k : k + 3] = mass * length * np.eye(3)
+            m[k : k + 3, k + 3] = p
+            turning = times(w, times(w, rho)) + 2.0 * length * times(w, p_dot)
+            right[k : k + 3] = -push - mass * turning
+            # |p| = 1
+            m[k + 3, k : k + 3] = p
+            right[k + 3] = -p_dot @ p_dot
+        return np.linalg.solve(m, right)
+
+    def rate(self, x: np.ndarray, u: np.ndarray, slope: np.ndarray) -> np.ndarray:
+        """Return x'."""
+        solved, dx = self.solve(x, u, slope), np.empty_like(x)
+        dx[:3] = solved[3:6]
+        for i in range(len(self.bobs)):
+            dx[3 + 6 * i : 6 + 6 * i] = x[6 + 6 * i : 9 + 6 * i]
+            dx[6 + 6 * i : 9 + 6 * i] = solved[6 + 4 * i : 9 + 4 * i]
+        return dx
+
+    def fly(self, slew: np.ndarray, pulse: np.ndarray) -> pd.DataFrame:
+        """Fly: attitudes that are commanded and sideways forces, row by row; angles are small."""
+        x = np.concatenate([np.zeros(3), *(np.array([0, 0, -1.0, 0, 0, 0]) for _ in self.bobs)])
+        angle, h, rows = np.zeros(3), np.zeros(3), []
+        # the engine is trimmed: thrust through the centre of mass turns nothing
+        total = self.mass + sum(m for m, _, _, _ in self.bobs)
+        down = np.array([0.0, 0.0, 1.0])
+        center = self.moment + sum(m * (hinge - rod * down) for m, rod, _, hinge in self.bobs)
+        trim = times(center / total, np.array([0.0, 0.0, THRUST]))
+        for row in range(ROWS):
+            # proportional, derivative; a torque of the wheels over the next step
+            torque = -np.diag(self.inertia) * (0.5 * (angle - slew[row]) + 0.9 * x[:3])
+            torque = np.clip(torque, -3.0, 3.0)
+            force = np.array([*pulse[row], THRUST])
+            # the thrusters push 0.2 m above O
+            side = times(np.array([0.0, 0.0, 0.2]), np.array([*pulse[row], 0.0]))
+            u = np.concatenate([force, trim + side, h])
+            rows.append([row * STEP, *u, *x[:3], *self.solve(x, u, -torque)[:3]])
+            parts, d = 2, STEP / 2
+            for part in range(parts):
+                v = u.copy()
+
+                def at(s: float, y: np.ndarray, part: int = part, v: np.ndarray = v) -> np.ndarray:
+                    v[6:] = h - torque * (part + s) * d  # noqa: B023
+                    return self.rate(y, v, -torque)  # noqa: B023
+
+                k1 = at(0.0, x)
+                k2 = at(0.5, x + d / 2 * k1)
+                k3 = at(0.5, x + d / 2 * k2)
+                k4 = at(1.0, x + d * k3)
+                before = x[:3].copy()
+                x = x + d / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+                angle = angle + d / 2 * (before + x[:3])
+            h = h - torque * STEP
+        return pd.DataFrame(rows, columns=["time", *INPUTS, *OMEGA, *FORCE])
+
+
+def names(what: str) -> list[str]:
+    """Return the names of a vector's components."""
+    return [f"{what}[{i}]" for i in (1, 2, 3)]
+
+
+INPUTS = [*names("force"), *names("torque"), *names("h_wheels")]
+OMEGA, FORCE = names("omega"), names("specific_force")
+
+
+def drawn_tanks(program: str, folder: Path) -> dict[str, float]:
+    """Return what `hubslosh tank` says of both tanks."""
+    drawing, found = folder / "tank.toml", {}
+    drawing.write_text(TANK, encoding="utf-8")
+    for i, fill in enumerate(FILLS, 1):
+        command = [program, "-q", "tank", drawing, "--fill", str(fill), "--modes", "1", "--json"]
+        done = subprocess.run([*command, "--gravity", "0.5"], check=True, capture_output=True)
+        tank = json.loads(done.stdout)
+        mode, rigid, t = tank["modes"][0], tank["rest"][0], f"tank[{i}]."
+        found |= {
+            t + "mass[1]": mode["m"],
+            t + "length[1]": mode["l"],
+            t + "hinge[1]": mode["hinge"],
+            t + "m_0": rigid["m_0"],
+            t + "H_0": rigid["H_0"],
+            t + "I_0": rigid["I_0"],
+            t + "zeta[1]": 0.005,
+            t + "g_ref": 0.5,
+        }
+    return found
+
+
+def manoeuvre(flight: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return attitudes (rad) and sideways forces (N) of a flight at its rows."""
+    time = STEP * np.arange(ROWS)
+    slew, pulse = np.zeros((ROWS, 3)), np.zeros((ROWS, 2))
+    for k, start in enumerate(range(10, 190, 20)):
+        on = (time >= start) & (time < start + 10)
+        slew[on, (k + flight) % 3] = SLEW * (-1) ** (k // 3)
+    for k, start in enumerate((20, 55, 90, 125)):
+        on = (time >= start + 3 * flight) & (time < start + 3 * flight + 1.5)
+        pulse[on, (k + flight) % 2] = 22.0 * (-1) ** (k // 2)
+    return slew, pulse
+
+
+def measured(
+    random: Generator,
+    flight: pd.DataFrame,
+    noise: dict[str, float],
+    errors: np.ndarray,
+    truth: dict,
+) -> pd.DataFrame:
+    """Return what the sensors read of a flight; adds the biases to the truth."""
+    number = 1 + sum(name.startswith("bias(omega[1])") for name in truth)
+    table = flight.copy()
+    table[OMEGA] = flight[OMEGA].to_numpy() @ (np.eye(3) + errors).T
+    keep = np.exp(-STEP / 300.0)
+    for name in [*OMEGA, *FORCE]:
+        gyro = name in OMEGA
+        bias = (noise["b"] if gyro else 1e-3) * random.normal()
+        truth[f"bias({name})@{number}"] = bias
+        table[name] += bias + noise["w" if gyro else "a"] * random.normal(size=ROWS)
+        if gyro and noise["drift"]:
+            drift = [noise["drift"] * random.normal()]
+            for kick in noise["drift"] * np.sqrt(1 - keep**2) * random.normal(size=ROWS - 1):
+                drift.append(keep * drift[-1] + kick)
+            table[name] += drift
+            # a flight cannot tell the drift's mean from the bias
+            truth[f"bias({name})@{number}"] += np.mean(drift)
+    return table
+
+
+def asked(start: dict[str, float], noise: dict[str, float]) -> list[str]:
+    """Return the flags of `hubslosh identify` and `design` but for files."""
+    free = [f"craft.J{i}{i}={start[f'craft.J{i}{i}']}:200:2500" for i in "xyz"]
+    free += [f"{name}={start[name]}:-1:1" for name in names("craft.r")]
+    for i in (1, 2):
+        mass, length = start[f"tank[{i}].mass[1]"], start[f"tank[{i}].length[1]"]
+        free.append(f"tank[{i}].mass[1]={mass}:{0.5 * mass}:{2 * mass}")
+        free.append(f"tank[{i}].length[1]={length}:{0.6 * length}:{1.6 * length}")
+        free.append(f"tank[{i}].zeta[1]=0.005:0.0005:0.05")
+    known = {"tanks": 2, "craft.mass": start["craft.mass"]}
+    for i, place in enumerate(PLACES, 1):
+        t = f"tank[{i}]."
+        known |= {t + f"position[{k}]": at for k, at in enumerate(place, 1)}
+        known |= {t + n: start[t + n] for n in ("m_0", "H_0", "I_0", "hinge[1]", "g_ref")}
+        known |= {t + "modes": 1, t + "damping_law": "constant"}
+    flags = [
+        "--free",
+        ",".join(free),
+        "--triad",
+        f"{','.join(OMEGA)}={noise['scale']}:{noise['angle']}",
+    ]
+    flags += [
+        "--bias",
+        ",".join([*(f"{n}={noise['b']}" for n in OMEGA), *(f"{n}=1e-3" for n in FORCE)]),
+    ]
+    flags += ["--inputs", ",".join(INPUTS), "--held", ",".join(INPUTS[:6])]
+    flags += ["--outputs", ",".join([*OMEGA, *FORCE])]
+    for name, value in known.items():
+        flags += ["--set", f"{name}={value}"]
+    return flags
+
+
+def twin(
+    seed: int, kind: str, program: str, fmu: str, folder: Path
+) -> tuple[dict, dict[str, Any], float]:
+    """Fly and identify one; returns truth, result and CPU time (s)."""
+    random, noise = default_rng(seed), NOISE[kind]
+    start = drawn_tanks(program, folder) | {"craft.mass": 1180.0}
+    start |= {"craft.Jxx": 910.0, "craft.Jyy": 860.0, "craft.Jzz": 640.0}
+    start |= {"craft.r[1]": 0.0, "craft.r[2]": 0.0, "craft.r[3]": 0.21}
+    truth = dict(start)
+    for name in start:
+        if "mass[1]" in name or "length" in name or "craft.J" in name:
+            truth[name] *= random.uniform(0.9, 1.1)
+        if "zeta" in name:
+            truth[name] = random.uniform(0.003, 0.008)
+        if "craft.r" in name:
+            truth[name] += random.uniform(-0.01, 0.01)
+    errors = np.where(np.eye(3) > 0, noise["scale"], noise["angle"]) * random.normal(size=(3, 3))
+    for i, read in enumerate(OMEGA):
+        for j, of in enumerate(OMEGA):
+            truth[f"scale({read})" if i == j else f"cross({read},{of})"] = errors[i, j]
+    craft, files = Craft(truth), []
+    for flight in (0, 1):
+        files.append(folder / f"{kind}{seed}_{flight + 1}.csv")
+        table = measured(random, craft.fly(*manoeuvre(flight)), noise, errors, truth)
+        table.to_csv(files[-1], index=False)
+    result = folder / f"{kind}{seed}.json"
+    flags = [*asked(start, noise), *(["--drift"] if noise["drift"] else [])]
+    command = [program, "-q", "identify", *files, "--fmu", fmu, *flags, "--out", result]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    if done.returncode:
+        raise SystemExit(done.stderr)
+    return truth, json.loads(result.read_text(encoding="utf-8")), after.ru_utime - before.ru_utime
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--gyro", default="good", choices=list(NOISE), help="which gyro")
+    parser.add_argument("--twins", type=int, default=1, help="how many")
+    parser.add_argument("--first", type=int, default=1, help="the first seed")
+    parser.add_argument("--program", default="hubslosh", help="the program")
+    parser.add_argument("--fmu", default="Spacecraft", help="the FMU")
+    parser.add_argument("--keep", type=Path, help="a folder in which recordings are kept")
+    arguments = parser.parse_args()
+    seen: dict[str, list[tuple[bool, float, float]]] = defaultdict(list)
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = arguments.keep or Path(temporary)
+        for seed in range(arguments.first, arguments.first + arguments.twins):
+            truth, found, seconds = twin(
+                seed, arguments.gyro, arguments.program, arguments.fmu, folder
+            )
+            fits = found["fits"] and found["converged"]
+            print(f"twin {seed}: {seconds:.0f} s of CPU time, fits: {fits}", flush=True)
+            for name, e in (found["parameters"] | found["measurement"]).items():
+                low, high = e["interval"]
+                off = e["value"] - truth[name]
+                seen[name].append((low <= truth[name] <= high, off / e["std"], e["std"]))
+                if arguments.twins == 1:
+                    print(f"{name:28} {truth[name]:12.5g} {e['value']:12.5g} ± {e['std']:.2g}")
+    print("| unknown | inside its 95 % interval | rms of error/σ | σ, % |")
+    print("| --- | --- | --- | --- |")
+    for name, rows in seen.items():
+        inside, off, std = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
+        percent = 100 * np.median(std) / abs(truth[name])
+        print(
+            f"| `{name}` | {int(inside.sum())} of {len(rows)} "
+            f"| {np.sqrt((off**2).mean()):.2f} | {percent:.2g} |"
+        )
+
+
+if __name__ == "__main__":
+    main()

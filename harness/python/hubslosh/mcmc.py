@@ -1,0 +1,84 @@
+"""The posterior of an identification by Markov chain Monte Carlo, as a check of its intervals.
+
+emcee (Foreman-Mackey et al., PASP 125, 2013) samples the likelihood that ``hubslosh identify``
+maximises, with the noise that it has estimated. ``pip install "hubslosh[posterior]"`` brings emcee.
+"""
+
+import json
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from .fmu import FmuError, find
+from .program import Free, Identification, Table, _asked, _file, _run, _settings, find_program
+
+
+def posterior(
+    found: Identification,
+    data: Table | Sequence[Table],
+    *arguments: str,
+    fmu: str | Path,
+    free: Mapping[str, Free],
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    prior: Mapping[str, tuple[float, float]] | None = None,
+    settings: Mapping[str, object] | None = None,
+    walkers: int | None = None,
+    steps: int = 300,
+    burn: int = 100,
+    seed: int = 1,
+    program: str | Path | None = None,
+) -> pd.DataFrame:
+    """Sample the posterior of what :func:`hubslosh.identify` has found with ``free=``.
+
+    found: its result; the other arguments are those that it was given. walkers: of the ensemble,
+    at least twice as many as unknowns, by default four times. steps: of each walker, of which the
+    first ``burn`` are dropped. The walkers start from the normal distribution that the result
+    states.
+
+    Returns a row a sample and a column an unknown; ``table.quantile([0.025, 0.975])`` are the 95 %
+    intervals. ``.attrs["autocorrelation"]`` are the chains' correlation times in steps: where
+    ``steps - burn`` is less than some ten of them, the intervals are rough.
+    """
+    try:
+        import emcee
+    except ImportError:
+        raise FmuError('posterior() needs emcee: pip install "hubslosh[posterior]"') from None
+    names = list(found.all["correlations"][0])
+    estimates = found.parameters | found.measurement
+    middle = np.array([estimates[name].value for name in names])
+    covariance = np.array(found.all["covariance"], dtype=float)
+    if not np.isfinite(covariance).all():
+        raise FmuError("an unknown is not determined: there is nothing to start the walkers from")
+    walkers = walkers or 4 * len(names)
+    path = find_program(program)
+    with tempfile.TemporaryDirectory() as folder:
+        result, points, answer = (
+            Path(folder) / name for name in ("result.json", "points.csv", "deviance.json")
+        )
+        result.write_text(json.dumps(found.all), encoding="utf-8")
+        tables = [data] if isinstance(data, pd.DataFrame | str | Path) else list(data)
+        files = [_file(t, (), Path(folder) / f"data{k}.csv") for k, t in enumerate(tables, 1)]
+        flags = ["--fmu", str(find(fmu)), *_asked(free, inputs, outputs, prior or {})]
+        flags += [*_settings(settings or {}), *arguments]
+        flags += ["--points", str(points), "--found", str(result), "--out", str(answer)]
+
+        def log_likelihood(x: np.ndarray) -> np.ndarray:
+            pd.DataFrame(x, columns=names).to_csv(points, index=False)
+            _run(path, ["identify", *files, *flags])
+            deviance = json.loads(answer.read_text(encoding="utf-8"))
+            return np.array([-np.inf if d is None else -0.5 * d for d in deviance])
+
+        random = np.random.default_rng(seed)
+        start = random.multivariate_normal(middle, covariance, size=walkers, method="eigh")
+        sampler = emcee.EnsembleSampler(walkers, len(names), log_likelihood, vectorize=True)
+        sampler.random_state = np.random.RandomState(seed).get_state()
+        sampler.run_mcmc(start, steps)
+    samples = pd.DataFrame(sampler.get_chain(discard=burn, flat=True), columns=names)
+    samples.attrs["autocorrelation"] = dict(
+        zip(names, sampler.get_autocorr_time(quiet=True, tol=0), strict=True)
+    )
+    return samples
