@@ -37,7 +37,7 @@ use host::fmu::Fmu;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use crate::recording::{self, Recording};
+use crate::recording::Recording;
 use crate::simulate::{Motion, Setup};
 use crate::stribeck;
 use crate::uncertainty::{self, Covariance};

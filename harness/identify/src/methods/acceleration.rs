@@ -31,7 +31,7 @@ use super::{Identified, Method, Needs, Task};
 use crate::estimate::Estimated;
 use crate::news::News;
 use crate::nominal::{self, Nominal};
-use crate::recording::{self, Recording};
+use crate::recording::Recording;
 use crate::uncertainty::{self, Covariance};
 use crate::unknown::Scale;
 use crate::verdict::DOES_NOT_FIT;

@@ -28,7 +28,7 @@ use super::{Identified, Method, Needs, Task};
 use crate::estimate::Estimated;
 use crate::news::News;
 use crate::nominal::{Bench, Nominal};
-use crate::recording::{self, Recording};
+use crate::recording::Recording;
 use crate::simulate::Intersample;
 use crate::start::{self, Plant};
 use crate::uncertainty::Covariance;

@@ -1,0 +1,213 @@
+//! A twin: a bench with truths of its own, a torque, and what measures it.
+
+use std::f64::consts::TAU;
+
+use analysis::random::Random;
+use analysis::statistics::mean;
+use experiments::profile::Profile;
+use identify::design::Multisine;
+use identify::recording::Recording;
+use identify::simulate::Intersample;
+
+use crate::bench::{Bearing, Bench, Drive, Liquid};
+
+/// How far truths are from the nominal bench, relatively.
+const SPREAD: f64 = 0.3;
+/// White noise of a MEMS gyro, rad/s/√Hz; its drift, rad/s, with its correlation time, s; its least step, rad/s.
+const GYRO: (f64, f64, f64, f64) = (5.75e-5, 7.85e-5, 100.0, 1.53e-4);
+
+/// Kinds of torque.
+#[derive(Clone, Copy, Debug)]
+enum Excitation {
+    Up,
+    Down,
+    Slow,
+    Multisine,
+    Noise,
+    Gentle,
+}
+
+/// A bench with what measures it.
+pub struct Twin {
+    /// Its number.
+    pub seed: u64,
+    bench: Bench,
+    excitation: Excitation,
+    between: Intersample,
+    /// s.
+    duration: f64,
+    /// s.
+    delay: f64,
+    gyro_scale: f64,
+    /// rad/s.
+    gyro_bias: f64,
+    /// rad.
+    encoder: Option<f64>,
+    /// Rows a second.
+    rate: f64,
+    /// Drift of the gyro at each row, rad/s.
+    drift: Vec<f64>,
+}
+
+impl Twin {
+    /// The twin of a seed.
+    pub fn draw(seed: u64, duration: f64) -> Twin {
+        let mut random = Random::new(seed, 7);
+        let nominal = Bench::default();
+        let mut near = |value: f64| value * (1.0 + SPREAD * (2.0 * random.uniform() - 1.0));
+        let bearing = Bearing {
+            b: near(nominal.bearing.b),
+            c: near(nominal.bearing.c),
+            d: near(nominal.bearing.d),
+            omega_s: near(nominal.bearing.omega_s),
+            ..nominal.bearing
+        };
+        let mut bench = Bench {
+            hub_inertia: near(nominal.hub_inertia),
+            diameter: near(nominal.diameter),
+            height: near(nominal.height),
+            zeta: near(nominal.zeta),
+            bearing,
+            ..nominal
+        };
+        bench.bearing.asymmetry = 0.1 * (2.0 * random.uniform() - 1.0);
+        let excitations = [
+            Excitation::Up,
+            Excitation::Down,
+            Excitation::Multisine,
+            Excitation::Noise,
+            Excitation::Gentle,
+            Excitation::Slow,
+        ];
+        let excitation = excitations[(seed % 6) as usize];
+        let between = Intersample::ALL[(random.uniform() * 3.0) as usize];
+        bench.liquid = if random.uniform() < 0.4 { Liquid::Spherical } else { Liquid::Linear };
+        let mut twin = Twin {
+            seed,
+            excitation,
+            between,
+            duration: if matches!(excitation, Excitation::Slow) {
+                2.0 * duration
+            } else {
+                duration
+            },
+            delay: 0.01 * random.uniform(),
+            gyro_scale: 1.0 + 0.01 * random.normal(),
+            gyro_bias: 3e-3 * random.normal(),
+            encoder: match (random.uniform() * 8.0) as usize {
+                0 => Some(2e-5),
+                1 => Some(3e-4),
+                _ => None,
+            },
+            rate: if random.uniform() < 0.25 { 100.0 } else { 50.0 },
+            drift: Vec::new(),
+            bench,
+        };
+        // a Gauss–Markov process
+        let (_, drift, correlation, _) = GYRO;
+        let keep = (-1.0 / (twin.rate * correlation)).exp();
+        let mut now = drift * random.normal();
+        for _ in 0..=(twin.duration * twin.rate).round() as usize {
+            twin.drift.push(now);
+            now = keep * now + drift * (1.0 - keep * keep).sqrt() * random.normal();
+        }
+        twin
+    }
+
+    /// What is said of the torque between rows: where a delay may stand for it (half the twins), what it is.
+    pub fn told(&self) -> Option<Intersample> {
+        (self.seed.is_multiple_of(2)).then_some(self.between)
+    }
+
+    /// What it is in few words.
+    pub fn words(&self) -> String {
+        format!(
+            "{:?} {:?}, {}{}, {} Hz",
+            self.excitation,
+            self.bench.liquid,
+            self.between.words().split(' ').next().unwrap_or_default(),
+            self.encoder.map_or(String::new(), |std| format!(", encoder {std:.0e}")),
+            self.rate
+        )
+    }
+
+    /// The truths by the names of the estimates.
+    pub fn truths(&self) -> Vec<(&'static str, f64)> {
+        let Bench { hub_inertia, diameter, height, zeta, bearing, .. } = &self.bench;
+        vec![
+            ("tank.d", *diameter),
+            ("tank.h", *height),
+            ("slosh.zeta", *zeta),
+            ("hub.I", *hub_inertia),
+            ("friction.b", bearing.b),
+            ("friction.c", bearing.c),
+            ("friction.d", bearing.d),
+            ("friction.omega_s", bearing.omega_s),
+            ("friction.asymmetry", bearing.asymmetry),
+            ("delay", self.delay),
+            ("gyro_scale", self.gyro_scale),
+            // what the gyro reads at rest, in the mean of the recording
+            ("gyro_bias[1]", self.gyro_bias + self.gyro_scale * mean(&self.drift)),
+        ]
+    }
+
+    /// The torque as a function of time, N·m.
+    fn torque(&self) -> Box<dyn Fn(f64) -> f64> {
+        let duration = self.duration;
+        let profile = |text: String| -> Box<dyn Fn(f64) -> f64> {
+            let profile: Profile = text.parse().expect("a profile");
+            let torque = experiments::profile::Torque::Profile(profile);
+            Box::new(move |t| torque.at(t))
+        };
+        match self.excitation {
+            Excitation::Up => {
+                profile(format!("lin-sweep:amplitude=0.1,f0=1.5,f1=3.6,duration={duration}"))
+            }
+            Excitation::Down => {
+                profile(format!("lin-sweep:amplitude=0.1,f0=3.6,f1=1.5,duration={duration}"))
+            }
+            Excitation::Slow => profile(format!(
+                "exp-sweep:amplitude=0.08,f0=1.5,f1=3.6,duration={}",
+                2.0 * duration
+            )),
+            Excitation::Gentle => {
+                profile(format!("lin-sweep:amplitude=0.04,f0=1.5,f1=3.6,duration={duration}"))
+            }
+            Excitation::Noise => profile(format!(
+                "noise:rms=0.05,f0=1.25,f1=3.6,limit=0.26,duration={duration},seed={}",
+                self.seed
+            )),
+            Excitation::Multisine => {
+                let sine =
+                    Multisine::new(100.0, (1.25, 3.6), 0.25, self.seed).expect("a multisine");
+                Box::new(move |t| sine.at(t))
+            }
+        }
+    }
+
+    /// Records it.
+    pub fn record(&self) -> Recording {
+        let step = 1.0 / self.rate;
+        let time: Vec<f64> = (0..self.drift.len()).map(|k| k as f64 * step).collect();
+        let torque = self.torque();
+        let tau: Vec<f64> = time.iter().map(|t| torque(*t)).collect();
+        let drive = match self.between {
+            Intersample::FirstOrderHold => Drive::Lines(&time, &tau),
+            Intersample::ZeroOrderHold => Drive::Held(&time, &tau),
+            Intersample::BandLimited => Drive::Smooth(&time, &*torque),
+        };
+        let at: Vec<f64> = time.iter().map(|t| (t - self.delay).max(0.0)).collect();
+        let motion = self.bench.motion(&drive, &at);
+        let mut random = Random::new(self.seed, 8);
+        let (white, _, _, least) = GYRO;
+        let rate = motion.rate.iter().zip(&self.drift).map(|(rate, drift)| {
+            let noise = drift + white * self.rate.sqrt() * random.normal();
+            ((self.gyro_scale * (rate + noise) + self.gyro_bias) / least).round() * least
+        });
+        let rate: Vec<f64> = rate.collect();
+        let angle = self.encoder.map(|std| {
+            motion.angle.iter().map(|angle| angle + TAU * 0.1 + std * random.normal()).collect()
+        });
+        Recording { angle, ..Recording::of("twin", time, tau, rate) }
+    }
+}

@@ -1,0 +1,167 @@
+//! Do the estimates keep what they state, for recordings of a bench that is not the FMU? Twins of [`bench`]: truths drawn
+//! within ±30 %, all kinds of torque, noise and flaws of the measurement. Each is identified as a user would; then how often the
+//! 95 % intervals hold the truth.
+//!
+//! ```text
+//! cargo run --release -p identify --example twins -- [KEY=VALUE ...]
+//!   seeds=1-200         which twins
+//!   duration=400        of each recording, s
+//!   models=linear,…     as for hubslosh identify --model
+//!   say=false           true: the verdict of every twin
+//! ```
+
+#[allow(dead_code, reason = "its test looks at more of it")]
+mod bench;
+mod draw;
+
+use std::collections::BTreeMap;
+
+use analysis::innovations::Tests;
+use anyhow::{Context, Result, bail};
+use draw::Twin;
+use host::fmi2::Fmu;
+use identify::methods::output_error::{Identification, identify};
+use identify::options::Options;
+use identify::recording;
+
+/// Standard deviations beyond which an answer that says "described" is wrong.
+const WRONG: f64 = 5.0;
+
+/// What was found of one parameter, over all twins.
+#[derive(Default)]
+struct Row {
+    /// Error over its standard deviation.
+    off: Vec<f64>,
+    inside: usize,
+}
+
+/// What was found in all twins.
+#[derive(Default)]
+struct Tally {
+    rows: BTreeMap<String, Row>,
+    described: usize,
+    not_described: Vec<u64>,
+    refused: Vec<u64>,
+    wrong: Vec<String>,
+    seconds: f64,
+}
+
+impl Tally {
+    fn add(&mut self, twin: &Twin, found: &Identification) {
+        let described = found.fits == Some(true) && found.converged;
+        if described {
+            self.described += 1;
+        } else {
+            self.not_described.push(twin.seed);
+        }
+        self.seconds += found.details.seconds;
+        let mut each = Vec::new();
+        for (name, truth) in twin.truths() {
+            let Some(p) = found.parameters.get(name).or(found.measurement.get(name)) else {
+                continue;
+            };
+            let inside = (p.interval[0]..=p.interval[1]).contains(&truth);
+            let off = (p.value - truth) / p.std;
+            each.push(format!("{name} {off:+.1}{}", if inside { "" } else { "!" }));
+            if !described {
+                continue;
+            }
+            let row = self.rows.entry(name.into()).or_default();
+            row.off.push(off);
+            row.inside += usize::from(inside);
+            if off.abs() > WRONG {
+                self.wrong.push(format!("{} {name} {off:+.1}", twin.seed));
+            }
+        }
+        let tests = found.details.fit.tests.iter().map(Tests::worst).fold(0.0, f64::max);
+        println!(
+            "{}: {} as {}, {:.0} s, {} simulations, tests {tests:.1}, decrement {:.3}{}: {}",
+            twin.seed,
+            twin.words(),
+            found.details.fit.model,
+            found.details.seconds,
+            found.details.fit.simulations,
+            found.details.fit.newton_decrement,
+            if described { "" } else { ", NOT DESCRIBED" },
+            each.join(", ")
+        );
+    }
+
+    fn print(&self, twins: usize) {
+        println!(
+            "\n{twins} twins in {:.0} s: {} described, {} not {:?}, {} refused {:?}; described and more than {WRONG} standard \
+             deviations off: {:?}",
+            self.seconds,
+            self.described,
+            self.not_described.len(),
+            self.not_described,
+            self.refused.len(),
+            self.refused,
+            self.wrong
+        );
+        println!("| parameter | in 95 % | of | % | rms error / std | worst |");
+        println!("| --- | --- | --- | --- | --- | --- |");
+        let (mut inside, mut all) = (0, 0);
+        for (name, row) in &self.rows {
+            let n = row.off.len();
+            (inside, all) = (inside + row.inside, all + n);
+            let rms = (row.off.iter().map(|z| z * z).sum::<f64>() / n as f64).sqrt();
+            let worst = row.off.iter().fold(0.0_f64, |w, z| w.max(z.abs()));
+            let percent = 100.0 * row.inside as f64 / n as f64;
+            println!("| {name} | {} | {n} | {percent:.1} | {rms:.2} | {worst:.1} |", row.inside);
+        }
+        println!(
+            "| all | {inside} | {all} | {:.1} | | |",
+            100.0 * inside as f64 / all.max(1) as f64
+        );
+    }
+}
+
+fn main() -> Result<()> {
+    let (mut seeds, mut duration, mut say) = (1..=200, 400.0, false);
+    let mut options =
+        Options { models: vec!["linear".into(), "spherical".into()], ..Options::default() };
+    for argument in std::env::args().skip(1) {
+        let (key, value) =
+            argument.split_once('=').with_context(|| format!("{argument}: KEY=VALUE"))?;
+        match key {
+            "seeds" => {
+                let (from, to) = value.split_once('-').unwrap_or((value, value));
+                seeds = from.parse()?..=to.parse()?;
+            }
+            "duration" => duration = value.parse()?,
+            "models" => options.models = value.split(',').map(String::from).collect(),
+            "say" => say = value == "true",
+            _ => bail!("{key} is not asked for; see the head of examples/twins/main.rs"),
+        }
+    }
+    let fmu = Fmu::open(pack::packed_for_tests())?;
+    let (mut tally, mut twins) = (Tally::default(), 0);
+    for seed in seeds {
+        twins += 1;
+        let twin = Twin::draw(seed, duration);
+        let options = Options { intersample: twin.told(), ..options.clone() };
+        let coarsest = options.nominal(&fmu)?.coarsest();
+        let hear = |line: &str| {
+            if say {
+                println!("  {line}");
+            }
+        };
+        let found = recording::prepare(twin.record(), coarsest, &mut |line| hear(&line))
+            .and_then(|parts| identify(&fmu, &parts, &options, &mut |news| hear(news.line())));
+        match found {
+            Ok(found) => {
+                tally.add(&twin, &found);
+                if say || found.fits != Some(true) || !found.converged {
+                    found.verdict.iter().for_each(|line| println!("  > {line}"));
+                }
+            }
+            Err(error) => {
+                tally.refused.push(seed);
+                println!("{seed}: {}, REFUSED: {error:#}", twin.words());
+            }
+        }
+    }
+    tally.print(twins);
+    Ok(())
+}
