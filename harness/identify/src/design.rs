@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use analysis::linear::Linear;
 use analysis::random::Random;
 use analysis::statistics::peak;
-use anyhow::{Result, ensure};
+use anyhow::{Result, bail, ensure};
 use host::budget;
 use host::fmu::Fmu;
 use nalgebra::Matrix5;
@@ -217,6 +217,43 @@ impl Wheel {
         .filter(|f| f.is_finite())
         .fold(1.0, f64::min)
     }
+}
+
+/// Largest angle of the liquid's first mode under a torque from rest, rad.
+pub fn slosh_angle(fmu: &Fmu, setup: &Setup, time: &[f64], torque: &[f64]) -> Result<f64> {
+    let rate = vec![0.0; time.len()];
+    let recording = Recording::of("plan", time.to_vec(), torque.to_vec(), rate);
+    Ok(peak(&setup.run(fmu, &[], &recording, 0.0)?.slosh_angle))
+}
+
+/// The largest factor (at most 1) by which a torque can be multiplied so that the liquid stays within an angle, rad.
+pub fn within_angle(
+    fmu: &Fmu,
+    setup: &Setup,
+    time: &[f64],
+    torque: &[f64],
+    limit: f64,
+) -> Result<f64> {
+    let mut factor = 1.0;
+    // dry friction takes its share first, so the angle grows faster than the torque: a few rounds from above
+    for _ in 0..ROUNDS {
+        let scaled: Vec<f64> = torque.iter().map(|t| factor * t).collect();
+        let angle = slosh_angle(fmu, setup, time, &scaled)?;
+        if angle <= limit {
+            return Ok(factor);
+        }
+        factor *= 0.998 * limit / angle;
+    }
+    bail!("no torque of this shape keeps the liquid within {limit} rad")
+}
+
+/// Rounds of [`within_angle`].
+const ROUNDS: usize = 12;
+
+/// Geometric mean of the relative standard deviations: what one plan tells against another.
+pub fn merit(bounds: &[(String, f64, f64)]) -> f64 {
+    let sum: f64 = bounds.iter().map(|(_, value, std)| (std / value.abs().max(1e-12)).ln()).sum();
+    (sum / bounds.len() as f64).exp()
 }
 
 /// Standard deviation that no unbiased estimate can beat, for each unknown at its start, from a torque

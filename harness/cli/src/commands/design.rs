@@ -43,9 +43,14 @@ pub struct DesignArgs {
     #[arg(long, value_name = "HZ,HZ", value_delimiter = ',', default_value = "1.25,3.5")]
     band: Vec<f64>,
     /// Gives the lines the power that tells most of a linear bench as expected (D-optimal), a quarter of it spread
-    /// over all of them.
+    /// over all of them. A linear sweep of the same peak, band and length is compared with it, and the one that tells more is
+    /// recommended.
     #[arg(long, requires = "multisine")]
     optimal: bool,
+    /// Makes the torque as much smaller as the liquid's angle needs, rad; linear theory ends at 0.18 (a wave of 0.15 of
+    /// the radius).
+    #[arg(long, value_name = "RAD")]
+    slosh_angle: Option<f64>,
     /// Draw of the phases and the detection lines.
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     seed: u64,
@@ -85,6 +90,8 @@ pub struct DesignArgs {
 
 /// Rows of the plan are this far apart, s.
 const STEP: f64 = 0.02;
+/// Slosh angle at which the wave at the wall, 2 α R/(ξ² − 1), is 0.15 R, rad.
+const LINEAR: f64 = 0.18;
 /// Columns of numbers that the bound is computed from.
 const COLUMNS: usize = 20;
 
@@ -150,20 +157,47 @@ impl DesignArgs {
             }
             (None, None) => bail!("a plan needs --profile or --multisine"),
         };
+        let mut settings = self.settings.clone();
+        settings.push(("slosh.zeta_from_correlation".into(), "false".into()));
+        let intersample = identify::simulate::Intersample::FirstOrderHold;
+        // the damping as the FMU has it, whether by the correlation or not
+        let setup = Setup { settings: self.settings.clone(), intersample };
+        let limited = |time: &[f64], torque: Vec<f64>| -> Result<(f64, Vec<f64>)> {
+            let Some(limit) = self.slosh_angle else { return Ok((1.0, torque)) };
+            ensure!(limit > 0.0, "--slosh-angle must be a positive number, rad");
+            let factor = design::within_angle(&fmu, &setup, time, &torque, limit)?;
+            Ok((factor, torque.iter().map(|t| factor * t).collect()))
+        };
+        let full = analysis::statistics::peak(&torque);
+        let (by_angle, torque) = limited(&time, torque)?;
+        scaled_by *= by_angle;
+        let angle = design::slosh_angle(&fmu, &setup, &time, &torque)?;
         let (least, largest) = wheel.range(&time, &torque);
         let peak = analysis::statistics::peak(&torque);
         let rpm = std::f64::consts::TAU / 60.0;
         let [_, low, high] = wheel.speeds;
         if scaled_by < 1.0 && !self.json {
-            println!("torques times {scaled_by:.4}, within the wheel's limits");
+            println!(
+                "torques times {scaled_by:.4}, within the wheel's limits{}",
+                match self.slosh_angle {
+                    Some(limit) => format!(" and {limit} rad of slosh"),
+                    None => String::new(),
+                }
+            );
         }
         let shown = format!(
-            "peak {peak:.3} N·m (the wheel gives {:.3}), wheel from {:.0} to {:.0} rpm (allowed {:.0} to {:.0})",
+            "peak {peak:.3} N·m (the wheel gives {:.3}), wheel from {:.0} to {:.0} rpm (allowed {:.0} to {:.0}), \
+             slosh angle up to {angle:.3} rad{}",
             wheel.torque,
             least / rpm,
             largest / rpm,
             low / rpm,
-            high / rpm
+            high / rpm,
+            if angle > LINEAR {
+                format!(" (linear theory ends at {LINEAR}: --slosh-angle limits it)")
+            } else {
+                String::new()
+            }
         );
         let zeta = real("slosh.damping[1]")?;
         let mut unknowns = Vec::new();
@@ -181,37 +215,81 @@ impl DesignArgs {
         // Gauss–Markov bias of IEEE Std 952: its standard deviation is the instability over 0.664
         let drift = real("imu.bias_instability")? / 0.664 / white;
         let noise = Noise { white, drift, time: real("imu.bias_time")? };
-        let mut settings = self.settings;
-        settings.push(("slosh.zeta_from_correlation".into(), "false".into()));
-        let plan = (time.clone(), torque.clone());
-        let bounds = design::cramer_rao(
-            &fmu,
-            Setup { settings, intersample: identify::simulate::Intersample::FirstOrderHold },
-            plan,
-            unknowns,
-            noise,
-        )?;
+        let bounds_of = |time: &[f64], torque: &[f64]| {
+            let setup = Setup { settings: settings.clone(), intersample };
+            design::cramer_rao(
+                &fmu,
+                setup,
+                (time.to_vec(), torque.to_vec()),
+                unknowns.clone(),
+                noise,
+            )
+        };
+        let bounds = bounds_of(&time, &torque)?;
+        // what a plain sweep tells at the same peak, before its liquid is limited
+        let sweep = if self.optimal {
+            let (f0, f1) = (self.band[0], self.band[1]);
+            let written = |peak: f64| {
+                format!("lin-sweep:amplitude={peak:.4},f0={f0},f1={f1},duration={}", self.duration)
+            };
+            let profile = written(full).parse::<Written>()?.torque()?;
+            let (factor, sweep) = limited(&time, time.iter().map(|&t| profile.at(t)).collect())?;
+            let angle = design::slosh_angle(&fmu, &setup, &time, &sweep)?;
+            Some((written(factor * full), angle, bounds_of(&time, &sweep)?))
+        } else {
+            None
+        };
+        let is_better =
+            sweep.as_ref().is_some_and(|s| design::merit(&s.2) < design::merit(&bounds));
         if self.json {
-            let parameters = bounds.into_iter().map(|(name, value, std)| {
-                let unit = fmu
-                    .description()
-                    .variable(&name)
-                    .map(|v| fmu.description().unit(v).to_string());
-                (name, json!({ "value": value, "std": std, "unit": unit.ok() }))
+            let parameters = |bounds: &[(String, f64, f64)]| {
+                let one = |(name, value, std): &(String, f64, f64)| {
+                    let variable = fmu.description().variable(name);
+                    let unit = variable.map(|v| fmu.description().unit(v).to_string()).ok();
+                    (name.clone(), json!({ "value": value, "std": std, "unit": unit }))
+                };
+                bounds.iter().map(one).collect::<serde_json::Map<_, _>>()
+            };
+            let other = sweep.as_ref().map(|(profile, angle, bounds)| {
+                json!({ "profile": profile, "slosh_angle": angle, "parameters": parameters(bounds) })
             });
             terminal::say_json(&json!({
                 "peak": peak,
                 "torque_factor": scaled_by,
                 "wheel_speed": [least, largest],
                 "wheel_speed_allowed": [low, high],
-                "parameters": parameters.collect::<serde_json::Map<_, _>>(),
+                "slosh_angle": angle,
+                "parameters": parameters(&bounds),
+                "sweep": other,
+                "recommended": if is_better { "sweep" } else { "this" },
             }))?;
         } else {
             println!("{shown}");
-            println!("{:20} {:>12} {:>12} {:>9}", "", "expected", "std", "std %");
-            for (name, value, deviation) in bounds {
-                let percent = 100.0 * deviation / value.abs();
-                println!("{name:20} {value:>12.6} {deviation:>12.2e} {percent:>9.4}");
+            let head = if sweep.is_some() { "sweep %" } else { "" };
+            println!("{:20} {:>12} {:>12} {:>9} {head:>9}", "", "expected", "std", "std %");
+            for (k, (name, value, deviation)) in bounds.iter().enumerate() {
+                let percent = |std: f64| format!("{:.4}", 100.0 * std / value.abs());
+                let other = sweep.as_ref().map_or(String::new(), |sweep| percent(sweep.2[k].2));
+                println!(
+                    "{name:20} {value:>12.6} {deviation:>12.2e} {:>9} {other:>9}",
+                    percent(*deviation)
+                );
+            }
+            if let Some((profile, angle, other)) = &sweep {
+                let (own, other) = (design::merit(&bounds), design::merit(other));
+                println!(
+                    "Mean standard deviation (geometric): multisine {:.4} %, linear sweep {:.4} % (slosh angle up to {angle:.3} rad).",
+                    100.0 * own,
+                    100.0 * other
+                );
+                println!(
+                    "Recommended: {}",
+                    if is_better {
+                        format!("the sweep, --profile {profile}")
+                    } else {
+                        "the multisine".into()
+                    }
+                );
             }
         }
         if let Some(out) = &self.out {

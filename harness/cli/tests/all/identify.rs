@@ -121,6 +121,12 @@ fn a_designed_multisine_is_within_the_wheels_limits_and_its_distortion_is_seen()
         said.contains("within the wheel's limits") && said.contains("peak 0.260 N·m"),
         "{said}"
     );
+    // and with a linear sweep beside it, which is recommended where it tells more
+    let mean = said.lines().find(|line| line.starts_with("Mean standard deviation")).unwrap();
+    let numbers: Vec<f64> = mean.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+    let recommended =
+        if numbers[0] <= numbers[1] { "the multisine" } else { "the sweep, --profile lin-sweep" };
+    assert!(said.contains(&format!("Recommended: {recommended}")), "{said}");
     let bench = ["--set", "imu.enabled=true", "--columns", "omega_imu"];
     let asked = [&["run", "--input", "torque.csv"][..], &bench, &["--out", "clean.csv"]].concat();
     hubslosh(folder, &asked).unwrap();
@@ -129,6 +135,19 @@ fn a_designed_multisine_is_within_the_wheels_limits_and_its_distortion_is_seen()
     let columns = all.map(|column| clean.column(column).unwrap().to_vec()).to_vec();
     let names = ["time", "tau_cmd", "omega"].map(String::from).to_vec();
     Table::new(names, columns).write(&folder.join("data.csv"), &Default::default()).unwrap();
+    // less torque where the liquid must stay linear
+    let asked = [
+        "design",
+        "--profile",
+        "lin-sweep:duration=100,f0=2.2,f1=2.6",
+        "--slosh-angle",
+        "0.1",
+        "--json",
+    ];
+    let limited: serde_json::Value =
+        serde_json::from_str(&hubslosh(folder, &asked).unwrap()).unwrap();
+    let angle = limited["slosh_angle"].as_f64().unwrap();
+    assert!((0.09..=0.1).contains(&angle), "{limited}");
     let asked = ["identify", "data.csv", "--method", "multisine", "--out", "levels.json"];
     let said = hubslosh(folder, &asked).unwrap();
     // dry friction is odd; the linear liquid adds nothing
