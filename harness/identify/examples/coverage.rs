@@ -33,6 +33,7 @@ use identify::options::Options;
 use identify::recording;
 use identify::simulate::Intersample;
 use identify::start::PARAMETERS;
+use identify::tolerance::Tolerances;
 use identify::twin::{self, SensorErrors, Twin, Unmodelled};
 
 /// What the command line asks for.
@@ -58,6 +59,7 @@ fn arguments() -> Result<Arguments> {
             models: vec!["linear".into()],
             sensor_errors: false,
             gyro_scale: 0.0,
+            tolerances: Tolerances::NONE,
             ..Options::default()
         },
         far: false,

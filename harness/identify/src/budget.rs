@@ -1,14 +1,22 @@
 //! The error budget: what an error of something that is not estimated does to the estimates.
+//!
+//! To first order, with e the innovations, J their sensitivities and q what is wrong,
+//!
+//! ```text
+//! dx̂/dq = −(JᵀJ)⁻¹ Jᵀ ∂e/∂q
+//! ```
+//!
+//! What is known of q makes that part of the covariance of x̂: σ_q² (dx̂/dq)(dx̂/dq)ᵀ, as if q were one more unknown with that knowledge.
 
 use std::collections::BTreeMap;
 
 use anyhow::Result;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use crate::fit::{Answer, Problem};
 use crate::nominal;
-use crate::simulate::Intersample;
+use crate::tolerance::{NAMES, Tolerances};
 use crate::uncertainty::Covariance;
 
 /// What an error of something that is not estimated does to the estimates.
@@ -18,102 +26,117 @@ pub struct Effect {
     pub source: String,
     /// Change of each parameter, SI.
     pub change: BTreeMap<String, f64>,
+    /// It is a tolerance: a standard deviation of what is known, and part of the intervals.
+    pub tolerance: bool,
+    /// Change of the variables x.
+    #[serde(skip)]
+    pub x: DVector<f64>,
 }
 
-/// A source of error: what may be wrong.
-struct Source {
-    name: &'static str,
-    settings: Vec<(String, String)>,
-    /// Factor of the torque.
-    gain: f64,
-    /// How much of what `name` says is tried; the estimates' change is taken as proportional.
-    part: f64,
-    /// The torque is held between rows where it was taken as linear, or the reverse.
-    swap: bool,
-}
-
-/// How much of a number's error is tried: a long recording tells 0.1 % of g_axial by hundreds of standard deviations.
-const PART: f64 = 0.1;
-/// Rounds of [`of`]; each leaves a few tenths of the error before it.
-const ROUNDS: usize = 10;
+/// Relative change by which the answer is differenced: of a long recording, some tenths of a standard deviation.
+const STEP: f64 = 2e-5;
+/// Rounds of [`modes`]; each leaves a few tenths of the error before it.
+const ROUNDS: usize = 5;
 /// Step, in standard deviations, after which the estimates stay.
-const SETTLED: f64 = 0.05;
+const SETTLED: f64 = 0.1;
 
-/// The shift of the estimates when they are fitted anew: Gauss–Newton steps −(JᵀJ)⁻¹ Jᵀ Δe with the Jacobian that
-/// there is, Δe the innovations' change. One step would not do: what of Δe is of second order looks like a large error
-/// in weak directions, friction's. A source with which they do not settle is left out:
-/// torque held in place of linear where no delay is estimated, which no fit could take for the bench.
+/// What may be wrong in a problem, the tolerances first, and what that does at the minimum x.
 pub fn of(
     problem: &Problem,
-    x: &[f64],
-    answer: &Answer,
+    (x, answer): (&[f64], &Answer),
     jacobian: &DMatrix<f64>,
     covariance: &Covariance,
+    tolerances: &Tolerances,
 ) -> Result<Vec<Effect>> {
-    let base = problem.stacked(answer, x);
     let mut effects = Vec::new();
-    for source in list(problem)? {
-        let mut recordings = problem.recordings.to_vec();
-        recordings.iter_mut().flat_map(|r| &mut r.torque).for_each(|t| *t *= source.gain);
-        let mut other = Problem { recordings: &recordings, ..problem.clone() };
-        other.setup.settings.extend(source.settings);
-        if source.swap {
-            other.setup.intersample = match problem.setup.intersample {
-                Intersample::ZeroOrderHold => Intersample::FirstOrderHold,
-                Intersample::FirstOrderHold | Intersample::BandLimited => {
-                    Intersample::ZeroOrderHold
-                }
-            };
-        }
-        let (mut there, mut last) = (x.to_vec(), f64::INFINITY);
-        for _ in 0..ROUNDS {
-            let Ok(answer) = other.answer(&there) else { break };
-            let change = other.stacked(&answer, &there) - &base;
-            let step = -(&covariance.x * jacobian.tr_mul(&change));
-            there.iter_mut().zip(step.iter()).for_each(|(x, step)| *x += step);
-            let length = (jacobian * &step).norm();
-            if !length.is_finite() || length > 2.0 * last {
-                break;
-            }
-            last = length;
-            if length < SETTLED {
-                break;
-            }
-        }
-        if last >= SETTLED {
+    let sloshes = problem.index("slosh.zeta").is_some();
+    let effect = |source: String, change: DVector<f64>, tolerance: bool| {
+        let there: Vec<f64> = x.iter().zip(change.iter()).map(|(x, change)| x + change).collect();
+        let values = problem.values(x).into_iter().zip(problem.values(&there));
+        let changes = problem.unknowns.iter().zip(values);
+        let changes = changes.map(|(u, (before, after))| (u.quantity.name(), after - before));
+        Effect { source, change: changes.collect(), tolerance, x: change }
+    };
+    let mut instance = nominal::initialised(problem.fmu, &problem.setup.settings)?;
+    for (name, tolerance) in NAMES.into_iter().zip(tolerances.all()) {
+        let estimated = problem.index(name).is_some();
+        let recorded = name == "g_axial" && problem.recordings.iter().any(|r| r.gravity.is_some());
+        let unseen = !sloshes && matches!(name, "g_axial");
+        if tolerance == 0.0 || estimated || recorded || unseen {
             continue;
         }
-        let values = problem.values(x).into_iter().zip(problem.values(&there));
-        let change = problem.unknowns.iter().zip(values);
-        let change =
-            change.map(|(u, (before, after))| (u.quantity.name(), (after - before) / source.part));
-        effects.push(Effect { source: source.name.into(), change: change.collect() });
+        let nominal = match name {
+            "torque" | "clock" => 1.0,
+            _ => instance.real(name)?,
+        };
+        let moved = |by: f64| -> Result<DVector<f64>> {
+            let factor = 1.0 + by;
+            let mut recordings = problem.recordings.to_vec();
+            let mut other = problem.clone();
+            match name {
+                "torque" => {
+                    recordings.iter_mut().flat_map(|r| &mut r.torque).for_each(|t| *t *= factor)
+                }
+                "clock" => {
+                    recordings.iter_mut().flat_map(|r| &mut r.time).for_each(|t| *t *= factor)
+                }
+                _ => other.setup.settings.push((name.into(), (nominal * factor).to_string())),
+            }
+            let other = Problem { recordings: &recordings, ..other };
+            Ok(other.stacked(&other.answer(x)?, x))
+        };
+        let slope = (moved(STEP)? - moved(-STEP)?) / (2.0 * STEP);
+        let change = -(&covariance.x * jacobian.tr_mul(&slope)) * tolerance;
+        let source = format!("{name} wrong by {}", percent(tolerance));
+        effects.push(effect(source, change, true));
+    }
+    if let Some(change) = modes(problem, (x, answer), jacobian, covariance).filter(|_| sloshes) {
+        effects.push(effect("slosh modes 2 to 4, left out".into(), change, false));
     }
     Ok(effects)
 }
 
-fn list(problem: &Problem) -> Result<Vec<Source>> {
-    let mut instance = nominal::initialised(problem.fmu, &problem.setup.settings)?;
-    let exact = |name, settings| Source { name, settings, gain: 1.0, part: 1.0, swap: false };
-    let small = |name, settings| Source { part: PART, ..exact(name, settings) };
-    let mut list = Vec::new();
-    if problem.index("slosh.zeta").is_some() {
-        let mut set = |name: &str, change: &dyn Fn(f64) -> f64| -> Result<_> {
-            Ok(vec![(name.to_string(), change(instance.real(name)?).to_string())])
-        };
-        let modes = vec![("slosh.modes".to_string(), "4".to_string())];
-        list.push(exact("slosh modes 2 to 4, left out", modes));
-        list.push(small("tank.r wrong by 1 mm", set("tank.r", &|r| r + PART * 1e-3)?));
-        let density = set("fluid.rho", &|rho| rho * (1.0 + PART * 0.003))?;
-        list.push(small("fluid.rho wrong by 0.3 %", density));
-        let measured = problem.recordings.iter().any(|r| r.gravity.is_some());
-        if !measured {
-            let gravity = set("g_axial", &|g| g * (1.0 + PART * 0.001))?;
-            list.push(small("g_axial wrong by 0.1 %", gravity));
+/// A share in percent.
+pub fn percent(part: f64) -> String {
+    let text = format!("{:.4}", 100.0 * part);
+    format!("{} %", text.trim_end_matches('0').trim_end_matches('.'))
+}
+
+/// The change of x when the model is fitted anew with four modes, by Gauss and Newton's steps with the Jacobian that there is.
+/// One step would not do: what of the innovations' change is of second order looks like a large error
+/// in weak directions, friction's. `None` if they do not settle.
+fn modes(
+    problem: &Problem,
+    (x, answer): (&[f64], &Answer),
+    jacobian: &DMatrix<f64>,
+    covariance: &Covariance,
+) -> Option<DVector<f64>> {
+    if problem.setup.settings.iter().any(|(name, _)| name == "slosh.modes") {
+        return None;
+    }
+    let base = problem.stacked(answer, x);
+    let mut other = problem.clone();
+    other.setup.settings.push(("slosh.modes".into(), "4".into()));
+    let (mut there, mut last) = (x.to_vec(), f64::INFINITY);
+    for _ in 0..ROUNDS {
+        let answer = other.answer(&there).ok()?;
+        let change = other.stacked(&answer, &there) - &base;
+        let step = -(&covariance.x * jacobian.tr_mul(&change));
+        there.iter_mut().zip(step.iter()).for_each(|(x, step)| *x += step);
+        let length = (jacobian * &step).norm();
+        if !length.is_finite() || length > 2.0 * last {
+            return None;
+        }
+        last = length;
+        if length < SETTLED {
+            return Some(DVector::from_iterator(x.len(), there.iter().zip(x).map(|(a, b)| a - b)));
         }
     }
-    list.push(Source { gain: 1.0 + PART * 0.01, ..small("torque wrong by 1 %", vec![]) });
-    let held = "torque held between rows instead of linear, or the reverse";
-    list.push(Source { swap: true, ..exact(held, vec![]) });
-    Ok(list)
+    None
+}
+
+/// What tolerances add to the covariance of x.
+pub fn of_tolerances(effects: &[Effect], n: usize) -> DMatrix<f64> {
+    let each = effects.iter().filter(|effect| effect.tolerance).map(|e| &e.x * e.x.transpose());
+    each.fold(DMatrix::zeros(n, n), |sum, one| sum + one)
 }

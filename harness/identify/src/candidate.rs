@@ -2,7 +2,6 @@
 
 use anyhow::{Result, ensure};
 use host::fmu::Fmu;
-use nalgebra::DMatrix;
 use serde::Serialize;
 
 use crate::fit::{Polished, Problem};
@@ -71,8 +70,6 @@ pub struct Fitted<'a> {
     pub polished: Polished,
     /// In numbers for the reader.
     pub fit: ModelFit,
-    /// Covariance of the values if several friction curves explain the recording ([`friction::spread`]).
-    pub spread: Option<DMatrix<f64>>,
 }
 
 /// Fits a slosh model with a friction law, from the data's starts, the likeliest first, or from the fit of another model.
@@ -115,16 +112,15 @@ pub fn fit<'a>(
         Sibling {
             problem: &other.problem,
             minimum: &other.polished,
-            spread: other.spread.as_ref(),
             is_poorer: is_poorer && !other.fit.poor,
         }
     });
-    let (polished, spread) = search.run(sibling.as_ref())?;
+    let polished = search.run(sibling.as_ref())?;
     let (mut problem, simulations) = (search.problem, search.simulations);
     problem.estimate_noise(&polished.answer);
     let fit = summary(&problem, &polished, options, (model, law), simulations)?;
     progress(News::Step(fit.line()));
-    Ok(Fitted { problem, polished, fit, spread })
+    Ok(Fitted { problem, polished, fit })
 }
 
 fn problem<'a>(
@@ -194,7 +190,7 @@ fn unknowns(
             _ => 0.0,
         };
         if vague > 0.0 {
-            unknown = unknown.known(value, vague * value);
+            unknown = Unknown { vague: true, ..unknown.known(value, vague * value) };
         }
         list.push(unknown);
     }
@@ -224,7 +220,7 @@ fn unknowns(
     }
     for (name, mean, deviation) in &options.known {
         if let Some(unknown) = list.iter_mut().find(|u| u.quantity.parameter() == Some(name)) {
-            unknown.prior = Some((*mean, *deviation));
+            (unknown.prior, unknown.vague) = (Some((*mean, *deviation)), false);
         }
     }
     if options.sensor_errors {

@@ -11,8 +11,10 @@ pub struct Estimated {
     pub std: f64,
     /// Standard deviation from the noise alone.
     pub std_noise: f64,
-    /// 95 % interval.
+    /// 95 % interval. Where the recording sets no upper end it is infinite, and null in JSON; no lower end is 0.
     pub interval: [f64; 2],
+    /// The recording shows it: both ends are there, and it is known to better than half its size or is near zero by nature.
+    pub determined: bool,
     /// As in modelDescription.xml.
     pub unit: String,
 }
@@ -21,7 +23,7 @@ impl Estimated {
     /// A number whose only uncertainty is noise, normally distributed.
     pub fn normal(value: f64, std: f64, unit: &str) -> Self {
         let interval = [value - 1.96 * std, value + 1.96 * std];
-        Estimated { value, std, std_noise: std, interval, unit: unit.into() }
+        Estimated { value, std, std_noise: std, interval, determined: true, unit: unit.into() }
     }
 
     /// A number as a percentage of the value; `None` where the value is zero within its standard deviation, and a share of it

@@ -495,6 +495,32 @@ impl<'a> Problem<'a> {
         Ok(self.with_priors(&found, mixed))
     }
 
+    /// Sensitivities at x: those to the parameters `which` by differences along the directions of `known`, the others as known.
+    pub fn refreshed(
+        &self,
+        x: &[f64],
+        which: &[usize],
+        base: &[Motion],
+        known: &DMatrix<f64>,
+    ) -> Result<DMatrix<f64>> {
+        let found = self.along(x, which, base, known)?;
+        let mut all = known.clone();
+        which.iter().enumerate().for_each(|(k, &j)| all.set_column(j, &found.column(k)));
+        Ok(all)
+    }
+
+    /// What is known only vaguely of unknowns beforehand adds to the sum of squares.
+    pub fn vague_cost(&self, x: &[f64]) -> f64 {
+        let vague = (0..x.len()).filter(|&i| self.unknowns[i].vague);
+        vague.map(|i| (self.prior_slope(i) * (x[i] - self.prior_middle(i))).powi(2)).sum()
+    }
+
+    /// x of what is known of an unknown.
+    fn prior_middle(&self, i: usize) -> f64 {
+        let unknown = &self.unknowns[i];
+        unknown.scale.variable(unknown.prior.map_or(1.0, |(mean, _)| mean))
+    }
+
     /// Derivative of what is known of an unknown with respect to its x: 1 over its standard deviation.
     fn prior_slope(&self, i: usize) -> f64 {
         let unknown = &self.unknowns[i];

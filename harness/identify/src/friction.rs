@@ -5,10 +5,18 @@
 //! ```
 //!
 //! b, c and d enter linearly, ω_s does not. Far below ω_s only c + d shows, far above only c; so the sum of squares has
-//! valleys and more than one minimum along ω_s. Here ω_s is taken from a grid over the speeds of the recording;
-//! at each value the other unknowns are fitted. The lowest is where the search goes on, which no
-//! start can lead astray. Where several are nearly as low, the recording does not say which, and the spread over
-//! them belongs to the estimates' uncertainty.
+//! valleys and more than one minimum along ω_s. Here ω_s is held at one value after the other, and the other unknowns
+//! are fitted. On a grid over the speeds of the recording that shows where the lowest minimum is, which no start can lead astray
+//! ([`grid`]). From the minimum outwards it is the profile likelihood ([`Profile`]): with C(ω_s) the sum of squares, v(ω_s) the other
+//! unknown's value and V(ω_s) its variance at a fixed ω_s,
+//!
+//! ```text
+//! 95 % interval of ω_s:      C(ω_s) − C_min ≤ 1.96²
+//! 95 % interval of another:  the union of v ± sqrt((1.96² + C_min − C) V)
+//! ```
+//!
+//! (Pawitan, In All Likelihood, 3.4; for one interval of several minima too). What holds an unknown only vaguely beforehand does not count in C. An end that the speeds of the
+//! recording do not reach is open: the unknown is not determined there.
 
 use anyhow::Result;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
@@ -23,14 +31,29 @@ const GRID: [f64; 6] = [0.1, 0.3, 0.7, 1.5, 4.0, 15.0];
 
 /// Relative standard deviation of d or ω_s beyond which a minimum may be one of several.
 const VAGUE: f64 = 0.2;
+/// The same beyond which intervals are no longer those of a quadratic.
+const BENT: f64 = 0.05;
+/// Sum of squares above the least at the ends of the 95 % interval of one unknown: 1.96².
+const LIMIT: f64 = 3.8415;
+/// The same that still counts for the covariance: three standard deviations.
+const NEAR: f64 = 9.0;
+/// Longest step along ln ω_s.
+const LONGEST: f64 = 0.7;
+/// Points on either side of the minimum.
+const POINTS: usize = 7;
+/// Part by which the sum of squares at an end may differ from [`LIMIT`].
+const ENOUGH: f64 = 0.15;
+
+/// Standard deviation of the unknown at an index over its value.
+fn relative(problem: &Problem, found: &Polished, index: usize) -> f64 {
+    let scale = problem.unknowns[index].scale;
+    let deviation = found.covariance.x[(index, index)].sqrt() * scale.slope(found.x[index]);
+    deviation / scale.value(found.x[index])
+}
 
 /// Whether a minimum may be one of several: none at all, or one whose Stribeck excess the recording hardly shows.
 pub fn is_vague(problem: &Problem, found: &Polished, indices: Indices) -> bool {
-    let relative = |index: usize| {
-        let scale = problem.unknowns[index].scale;
-        let deviation = found.covariance.x[(index, index)].sqrt() * scale.slope(found.x[index]);
-        deviation / scale.value(found.x[index])
-    };
+    let relative = |index| relative(problem, found, index);
     !found.converged() || relative(indices.d) > VAGUE || relative(indices.speed) > VAGUE
 }
 
@@ -43,47 +66,101 @@ pub struct Point {
     pub x: Vec<f64>,
     /// Sum of squares.
     pub cost: f64,
+    /// The same without what is known vaguely beforehand.
+    data: f64,
     /// Covariance of x at this ω_s; its own row and column are 0.
-    pub covariance: DMatrix<f64>,
+    covariance: DMatrix<f64>,
+    jacobian: DMatrix<f64>,
     /// Simulations that were needed.
     pub simulations: usize,
 }
 
 /// Fits at the Stribeck speeds of a grid over the recording's speeds, near the fit `from`.
-pub fn profile(problem: &Problem, from: &Polished, indices: Indices) -> Result<Vec<Point>> {
-    let speeds = fit::speeds(&from.answer.motion);
+pub fn grid(problem: &Problem, from: &Polished, indices: Indices) -> Result<Vec<Point>> {
     let fastest = fit::fastest(&from.answer.motion);
-    let some: Vec<f64> = speeds.iter().copied().step_by((speeds.len() / 500).max(1)).collect();
-    let points: Vec<Result<Point>> =
-        GRID.par_iter().map(|part| point(problem, from, indices, part * fastest, &some)).collect();
+    let one = |part: &f64| point(problem, (&from.x, &from.jacobian), from, indices, part * fastest);
+    let points: Vec<Result<Point>> = GRID.par_iter().map(one).collect();
     points.into_iter().collect()
 }
 
-/// The fit at ω_s = `speed`: b, c and d whose curve is nearest to that of `from` over the recording's `speeds`, then
-/// Gauss and Newton's steps in all unknowns but ω_s.
+/// Rounds of steps at one speed.
+const STEPS: usize = 6;
+
+/// The fit at ω_s = `speed`: b, c and d whose curve is nearest to that of `near` over the recording's speeds, then Gauss and
+/// Newton's steps in all unknowns but ω_s. The sensitivities to b, c and d are taken there, the others are those of `near`.
 fn point(
     problem: &Problem,
-    from: &Polished,
+    (near, known): (&[f64], &DMatrix<f64>),
+    minimum: &Polished,
     indices: Indices,
     speed: f64,
-    speeds: &[f64],
 ) -> Result<Point> {
-    let mut x = from.x.clone();
-    let value = |index: usize| problem.unknowns[index].scale.value(from.x[index]);
+    let mut x = near.to_vec();
+    let value = |index: usize| problem.unknowns[index].scale.value(near[index]);
     let curve = |w: f64| {
         let stribeck = (-(w / value(indices.speed)).powi(2)).exp();
         value(indices.b) * w + value(indices.c) + value(indices.d) * stribeck
     };
-    let [b, c, d] = nearest(&curve, speed, speeds);
+    let speeds = fit::speeds(&minimum.answer.motion);
+    let some: Vec<f64> = speeds.iter().copied().step_by((speeds.len() / 500).max(1)).collect();
+    let [b, c, d] = nearest(&curve, speed, &some);
     for (index, value) in [(indices.b, b), (indices.c, c), (indices.d, d), (indices.speed, speed)] {
         x[index] = problem.unknowns[index].scale.variable(value);
     }
+    let bearing = [indices.b, indices.c, indices.d];
     let others: Vec<usize> = (0..x.len()).filter(|j| *j != indices.speed).collect();
-    let found = problem.polish_some(&x, &others, Some(&from.jacobian), (3, 0.3))?;
-    let covariance = spread_out(&found.covariance.x, &others, x.len());
-    let (cost, simulations) = (found.cost, found.simulations);
-    Ok(Point { speed, cost, x: found.x, covariance, simulations })
+    let mut answer = problem.answer(&x)?;
+    let mut e = problem.stacked(&answer, &x);
+    let mut jacobian = problem.refreshed(&x, &bearing, &answer.motion, known)?;
+    let mut simulations = 1 + bearing.len();
+    let mut free = jacobian.select_columns(&others);
+    let mut covariance = problem.covariance(&free)?;
+    let (mut before, mut refreshed) = (f64::INFINITY, false);
+    for _ in 0..STEPS {
+        let gradient = free.tr_mul(&e);
+        let step = -(&covariance.x * &gradient);
+        let decrement = (-gradient.dot(&step)).max(0.0).sqrt();
+        if decrement < CLOSE {
+            break;
+        }
+        if decrement > 0.7 * before && !refreshed {
+            jacobian = problem.refreshed(&x, &bearing, &answer.motion, &jacobian)?;
+            simulations += bearing.len();
+            free = jacobian.select_columns(&others);
+            covariance = problem.covariance(&free)?;
+            (before, refreshed) = (f64::INFINITY, true);
+            continue;
+        }
+        before = decrement;
+        let mut taken = false;
+        for part in [1.0, 0.3, 0.1] {
+            let mut there = x.clone();
+            others.iter().zip(step.iter()).for_each(|(&j, step)| there[j] += part * step);
+            simulations += 1;
+            let Ok(new) = problem.answer(&there) else { continue };
+            let stacked = problem.stacked(&new, &there);
+            if stacked.norm_squared() < e.norm_squared() {
+                (x, answer, e, taken) = (there, new, stacked, true);
+                break;
+            }
+        }
+        if !taken {
+            break;
+        }
+    }
+    Ok(Point {
+        speed,
+        cost: e.norm_squared(),
+        data: e.norm_squared() - problem.vague_cost(&x),
+        covariance: spread_out(&covariance.x, &others, x.len()),
+        jacobian,
+        x,
+        simulations,
+    })
 }
+
+/// Newton decrement below which a point is near enough to the minimum at its speed: 1 % of [`LIMIT`].
+const CLOSE: f64 = 0.2;
 
 /// b, c, d ≥ 0 for which b w + c + d exp(−(w/speed)²) is nearest to a curve at `speeds`, least squares.
 fn nearest(curve: &dyn Fn(f64) -> f64, speed: f64, speeds: &[f64]) -> [f64; 3] {
@@ -116,34 +193,187 @@ fn nearest(curve: &dyn Fn(f64) -> f64, speed: f64, speeds: &[f64]) -> [f64; 3] {
     std::array::from_fn(|i| value[i].max(least[i]))
 }
 
-/// Covariance of the unknowns' values if points of the grid are nearly as good as the best: variance within and
-/// between them, each weighted by its likelihood exp(−cost/2). `None` if the best stands alone, and the formula for
-/// one minimum holds.
-pub fn spread(problem: &Problem, points: &[Point], best: &Polished) -> Option<DMatrix<f64>> {
-    let near = |p: &&Point| p.cost - best.cost < NEAR;
-    if points.iter().filter(near).count() < 2 {
-        return None;
+/// The profile likelihood along ω_s.
+pub struct Profile {
+    /// Covariance of the unknowns' values over it: within each speed and between speeds, weighted by the likelihood exp(−C/2).
+    pub covariance: DMatrix<f64>,
+    /// 95 % interval of each unknown's value; infinite where it is open above.
+    pub intervals: Vec<[f64; 2]>,
+    /// The speeds at which it was fitted, rad/s, with the sum of squares above the least.
+    pub points: Vec<(f64, f64)>,
+    /// Simulations that were needed.
+    pub simulations: usize,
+}
+
+/// The profile likelihood from a minimum outwards; `None` where ω_s is not unknown or so well known that the sum of squares
+/// is quadratic.
+pub fn profile(problem: &Problem, minimum: &Polished) -> Result<Option<Profile>> {
+    let Some(indices) = Indices::of(&problem.unknowns) else { return Ok(None) };
+    let deviation = relative(problem, minimum, indices.speed);
+    if deviation < BENT && relative(problem, minimum, indices.d) < BENT {
+        return Ok(None);
     }
-    let n = best.x.len();
-    let middle = problem.values(&best.x);
-    let mut total = 0.0;
-    let mut covariance = DMatrix::zeros(n, n);
-    for point in points.iter().filter(near) {
-        let weight = (-(point.cost - best.cost).max(0.0) / 2.0).exp();
+    let others: Vec<usize> = (0..minimum.x.len()).filter(|j| *j != indices.speed).collect();
+    let held = problem.covariance(&minimum.jacobian.select_columns(&others))?;
+    let middle = Point {
+        speed: problem.unknowns[indices.speed].scale.value(minimum.x[indices.speed]),
+        x: minimum.x.clone(),
+        cost: minimum.cost,
+        data: minimum.cost - problem.vague_cost(&minimum.x),
+        covariance: spread_out(&held.x, &others, minimum.x.len()),
+        jacobian: minimum.jacobian.clone(),
+        simulations: 0,
+    };
+    let fastest = fit::fastest(&minimum.answer.motion);
+    let ends = [GRID[0] * fastest, GRID[GRID.len() - 1] * fastest];
+    let sides: Vec<Result<(Vec<Point>, bool)>> = [(-1.0, ends[0]), (1.0, ends[1])]
+        .into_par_iter()
+        .map(|(side, end)| outwards(problem, minimum, indices, &middle, (side, end, deviation)))
+        .collect();
+    let (mut points, mut open) = (vec![middle], [false; 2]);
+    for (side, found) in sides.into_iter().enumerate() {
+        let (found, is_open) = found?;
+        points.extend(found);
+        open[side] = is_open;
+    }
+    points.sort_by(|a, b| a.speed.total_cmp(&b.speed));
+    let least = points.iter().map(|p| p.data).fold(f64::INFINITY, f64::min);
+    let mut intervals = intervals(problem, &points, least);
+    intervals[indices.speed] = speeds(&points, least, open);
+    Ok(Some(Profile {
+        covariance: covariance(problem, minimum, &points, least),
+        intervals,
+        points: points.iter().map(|p| (p.speed, p.data - least)).collect(),
+        simulations: points.iter().map(|p| p.simulations).sum(),
+    }))
+}
+
+/// Fits from the middle outwards until the sum of squares is beyond [`LIMIT`], then nearer to it; whether even at the last speed, `end`, it
+/// is not.
+fn outwards(
+    problem: &Problem,
+    minimum: &Polished,
+    indices: Indices,
+    middle: &Point,
+    (side, end, deviation): (f64, f64, f64),
+) -> Result<(Vec<Point>, bool)> {
+    let mut points: Vec<Point> = Vec::new();
+    let mut step = (1.96 * deviation).clamp(0.02, LONGEST);
+    // signed root of the sum of squares above the middle's
+    let root = |p: &Point| (p.data - middle.data).max(0.0).sqrt();
+    // the last within and the first beyond
+    let (mut inside, mut outside) = (middle.clone(), None::<Point>);
+    while points.len() < POINTS {
+        let (from, to) = (inside.speed.ln(), outside.as_ref().map(|p| p.speed.ln()));
+        let at = match (&outside, to) {
+            (Some(beyond), Some(to)) => {
+                let part = (LIMIT.sqrt() - root(&inside)) / (root(beyond) - root(&inside));
+                from + (to - from) * part.clamp(0.1, 0.9)
+            }
+            _ => from + side * step,
+        };
+        let last = side * (at - end.ln()) >= 0.0 && outside.is_none();
+        let speed = if last { end } else { at.exp() };
+        if side * (speed / inside.speed).ln() <= 0.0 {
+            return Ok((points, true));
+        }
+        let near = [Some(&inside), outside.as_ref()].into_iter().flatten();
+        let near = near
+            .min_by(|a, b| (a.speed / speed).ln().abs().total_cmp(&(b.speed / speed).ln().abs()));
+        let near = near.unwrap_or(middle);
+        let found = point(problem, (&near.x, &near.jacobian), minimum, indices, speed)?;
+        let above = found.data - middle.data;
+        points.push(found.clone());
+        if above > LIMIT {
+            let near_enough = above < LIMIT * (1.0 + ENOUGH);
+            outside = Some(found);
+            if near_enough {
+                break;
+            }
+        } else {
+            let near_enough = above > LIMIT * (1.0 - ENOUGH);
+            inside = found;
+            step = (2.0 * step).min(LONGEST);
+            if last {
+                return Ok((points, true));
+            }
+            if near_enough && outside.is_some() {
+                break;
+            }
+        }
+    }
+    Ok((points, outside.is_none()))
+}
+
+/// The 95 % interval of ω_s.
+fn speeds(points: &[Point], least: f64, open: [bool; 2]) -> [f64; 2] {
+    let root = |p: &Point| (p.data - least).max(0.0).sqrt();
+    let is_in = |p: &Point| p.data - least <= LIMIT;
+    // between one within and its neighbour beyond, or from the last within with the slope there
+    let between = |inside: &Point, beyond: &Point| {
+        let part = (LIMIT.sqrt() - root(inside)) / (root(beyond) - root(inside));
+        (inside.speed.ln() + (beyond.speed / inside.speed).ln() * part.clamp(0.0, 1.0)).exp()
+    };
+    let (Some(first), Some(last)) = (points.iter().position(is_in), points.iter().rposition(is_in))
+    else {
+        return [0.0, f64::INFINITY];
+    };
+    let low = match first {
+        _ if open[0] => 0.0,
+        0 => points[0].speed,
+        k => between(&points[k], &points[k - 1]),
+    };
+    let high = match last {
+        _ if open[1] => f64::INFINITY,
+        k if k + 1 == points.len() => points[k].speed,
+        k => between(&points[k], &points[k + 1]),
+    };
+    [low, high]
+}
+
+/// The union of the intervals at fixed speeds, of every unknown.
+fn intervals(problem: &Problem, points: &[Point], least: f64) -> Vec<[f64; 2]> {
+    let mut all = vec![[f64::INFINITY, f64::NEG_INFINITY]; problem.unknowns.len()];
+    for point in points.iter().filter(|p| p.data - least <= LIMIT) {
+        let reach = (LIMIT - (point.data - least)).max(0.0).sqrt();
+        for (j, unknown) in problem.unknowns.iter().enumerate() {
+            let x = point.x[j];
+            let deviation = reach * point.covariance[(j, j)].sqrt();
+            let (low, high) = if unknown.is_additive() {
+                let (value, width) =
+                    (unknown.scale.value(x), deviation * unknown.scale.slope(x).abs());
+                ((value - width).max(0.0), value + width)
+            } else {
+                (unknown.scale.value(x - deviation), unknown.scale.value(x + deviation))
+            };
+            all[j] = [all[j][0].min(low), all[j][1].max(high)];
+        }
+    }
+    all
+}
+
+/// Covariance of the unknowns' values about the minimum.
+fn covariance(problem: &Problem, minimum: &Polished, points: &[Point], least: f64) -> DMatrix<f64> {
+    let n = minimum.x.len();
+    let middle = problem.values(&minimum.x);
+    let (mut total, mut sum) = (0.0, DMatrix::zeros(n, n));
+    for (k, point) in points.iter().enumerate().filter(|(_, p)| p.data - least < NEAR) {
+        // the part of ln ω_s that it stands for
+        let (before, after) =
+            (&points[k.saturating_sub(1)], &points[(k + 1).min(points.len() - 1)]);
+        let width = 0.5 * (after.speed / before.speed).ln();
+        let weight = width * (-(point.data - least) / 2.0).exp();
         let slopes: Vec<f64> =
             problem.unknowns.iter().zip(&point.x).map(|(u, &x)| u.scale.slope(x)).collect();
         let values = problem.values(&point.x);
         let off = DVector::from_iterator(n, values.iter().zip(&middle).map(|(a, b)| a - b));
         let within =
             DMatrix::from_fn(n, n, |i, j| point.covariance[(i, j)] * slopes[i] * slopes[j]);
-        covariance += (within + &off * off.transpose()) * weight;
+        sum += (within + &off * off.transpose()) * weight;
         total += weight;
     }
-    Some(covariance / total)
+    sum / total
 }
-
-/// Sum of squares above the least that still counts: three standard deviations.
-const NEAR: f64 = 9.0;
 
 #[cfg(test)]
 mod tests {

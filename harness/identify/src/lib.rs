@@ -21,6 +21,7 @@ pub mod simulate;
 pub mod spikes;
 pub mod start;
 pub mod stribeck;
+pub mod tolerance;
 pub mod twin;
 pub mod uncertainty;
 pub mod unknown;

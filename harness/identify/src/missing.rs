@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::estimate::prose;
-use crate::fit::{Polished, Problem};
+use crate::fit::{Differences, Polished, Problem};
 use crate::recording::Recording;
 use crate::simulate::{Motion, TORQUE_BESIDES};
 
@@ -107,6 +107,8 @@ impl Missing {
 pub fn torques(problem: &Problem, found: &Polished, e: &DVector<f64>) -> Result<Vec<Missing>> {
     let Polished { x, jacobian, covariance, answer, .. } = found;
     let base = &answer.motion;
+    // a size to a thousandth is enough
+    let problem = &Problem { differences: Differences::Forward, ..problem.clone() };
     if problem.fmu.description().variable(TORQUE_BESIDES).is_err() {
         return Ok(Vec::new());
     }

@@ -6,6 +6,7 @@ use host::fmu::Fmu;
 use crate::nominal::Nominal;
 use crate::recording::Recording;
 use crate::simulate::Intersample;
+use crate::tolerance::Tolerances;
 
 /// What is asked for.
 #[derive(Clone, Debug)]
@@ -24,6 +25,8 @@ pub struct Options {
     pub sensor_errors: bool,
     /// Standard deviation of the gyro's scale about 1, as its data sheet has it; 0: exactly 1.
     pub gyro_scale: f64,
+    /// How well is known what is not estimated.
+    pub tolerances: Tolerances,
     /// What the torque does between rows; `None`: what fits best.
     pub intersample: Option<Intersample>,
     /// The rate's time stamps may be early: a delay below zero is no doubt.
@@ -42,6 +45,7 @@ impl Default for Options {
             starts: Vec::new(),
             sensor_errors: true,
             gyro_scale: 0.01,
+            tolerances: Tolerances::default(),
             intersample: None,
             acausal: false,
             validation: Vec::new(),

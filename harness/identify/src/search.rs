@@ -23,9 +23,6 @@ const JOINS: f64 = 20.0;
 /// Sets of sensitivities that Gauss and Newton's steps have at most.
 const ROUNDS: usize = 6;
 
-/// A minimum, and the values' covariance if several friction curves explain the recording.
-pub type Found = (Polished, Option<DMatrix<f64>>);
-
 /// The search for one model's minimum.
 pub struct Search<'a, 'h> {
     /// What is solved; noise and intersample behaviour are found on the way.
@@ -54,8 +51,6 @@ pub struct Sibling<'f, 'a> {
     pub problem: &'f Problem<'a>,
     /// The minimum.
     pub minimum: &'f Polished,
-    /// Covariance of its values over several friction curves.
-    pub spread: Option<&'f DMatrix<f64>>,
     /// What that model explains this one explains too, so a poor fit of this one is a search that went astray.
     pub is_poorer: bool,
 }
@@ -121,7 +116,7 @@ enum Accept {
 /// What the attempts before have found.
 #[derive(Default)]
 struct Best {
-    found: Option<Found>,
+    found: Option<Polished>,
     /// An attempt from a start was made.
     started: bool,
     /// The last attempt has moved it.
@@ -200,7 +195,7 @@ impl<'a> Search<'a, '_> {
     }
 
     /// From variables x, over windows; the noise is estimated on the way.
-    fn windows(&mut self, x: &[f64], windows: &[f64]) -> Result<Found> {
+    fn windows(&mut self, x: &[f64], windows: &[f64]) -> Result<Polished> {
         let (label, progress) = (self.model, &mut *self.progress);
         let rough = self
             .problem
@@ -210,11 +205,11 @@ impl<'a> Search<'a, '_> {
         self.problem.estimate_noise(&answer);
         if is_poor(&self.problem, &answer) {
             // a model that does not fit has no minimum worth the search
-            return Ok((self.polish(&rough.x, rough.jacobian.as_ref(), 1)?, None));
+            return self.polish(&rough.x, rough.jacobian.as_ref(), 1);
         }
         let near = self.polish(&rough.x, rough.jacobian.as_ref(), ROUNDS)?;
         let near = self.joined(near)?;
-        let (mut best, mut spread) = self.friction(near)?;
+        let mut best = self.friction(near)?;
         if !best.converged() {
             let other = self.search(&best.x, 1e-4)?;
             if other.cost < best.cost {
@@ -223,7 +218,7 @@ impl<'a> Search<'a, '_> {
             let before = self.problem.setup.intersample;
             best = self.joined(best)?;
             if self.problem.setup.intersample != before {
-                (best, spread) = self.friction(best)?;
+                best = self.friction(best)?;
             }
         }
         // the noise from the residual and, if it is another one, the minimum with its filter
@@ -232,9 +227,9 @@ impl<'a> Search<'a, '_> {
         let pairs = before.iter().zip(&self.problem.channels);
         if pairs.into_iter().any(|(a, b)| (a.noise.white / b.noise.white - 1.0).abs() > 0.05) {
             let again = self.polish(&best.x, Some(&best.jacobian), ROUNDS)?;
-            (best, spread) = self.friction(again)?;
+            best = self.friction(again)?;
         }
-        Ok((best, spread))
+        Ok(best)
     }
 
     /// The minimum with what the torque does between rows, which only a minimum can tell.
@@ -277,12 +272,12 @@ impl<'a> Search<'a, '_> {
     }
 
     /// Other friction curves, if a minimum may be one of several, and the lowest.
-    fn friction(&mut self, near: Polished) -> Result<Found> {
+    fn friction(&mut self, near: Polished) -> Result<Polished> {
         let indices = Indices::of(&self.problem.unknowns);
         let Some(indices) = indices.filter(|i| friction::is_vague(&self.problem, &near, *i)) else {
-            return Ok((near, None));
+            return Ok(near);
         };
-        let points = friction::profile(&self.problem, &near, indices)?;
+        let points = friction::grid(&self.problem, &near, indices)?;
         self.simulations += points.iter().map(|p| p.simulations).sum::<usize>();
         for point in &points {
             (self.progress)(format!(
@@ -298,14 +293,7 @@ impl<'a> Search<'a, '_> {
                 best = other;
             }
         }
-        let spread = friction::spread(&self.problem, &points, &best);
-        if spread.is_some() {
-            (self.progress)(format!(
-                "{}: several Stribeck speeds explain the recording",
-                self.model
-            ));
-        }
-        Ok((best, spread))
+        Ok(best)
     }
 
     /// The attempts, in their order: from the data's or the user's starts, or near the minimum of another model.
@@ -357,7 +345,7 @@ impl<'a> Search<'a, '_> {
     }
 
     /// Makes the attempts in their order, and returns the best that was accepted.
-    pub fn run(&mut self, sibling: Option<&Sibling<'_, 'a>>) -> Result<Found> {
+    pub fn run(&mut self, sibling: Option<&Sibling<'_, 'a>>) -> Result<Polished> {
         self.alone |= sibling.is_some_and(|s| s.is_poorer);
         let (mut best, mut failed) = (Best::default(), None);
         let attempts = self.attempts(sibling);
@@ -377,7 +365,7 @@ impl<'a> Search<'a, '_> {
                     let (accepted, why) =
                         self.accepts(attempt.accept, &found, &before, best.found.as_ref());
                     if accepted {
-                        best.moved = best.found.is_none_or(|before| before.0.x != found.0.x);
+                        best.moved = best.found.is_none_or(|before| before.x != found.x);
                         best.found = Some(found);
                     } else {
                         self.problem = before;
@@ -404,18 +392,16 @@ impl<'a> Search<'a, '_> {
     fn attempt(
         &mut self,
         attempt: &Attempt,
-        best: Option<&Found>,
+        best: Option<&Polished>,
         sibling: Option<&Sibling<'_, 'a>>,
-    ) -> Result<Found> {
-        let (x, known, spread) = match (attempt.from, best, sibling) {
-            (From::Start(i), ..) => (self.starts[i].clone(), None, None),
-            (From::Best, Some((minimum, spread)), _) => {
-                (minimum.x.clone(), Some(&minimum.jacobian), spread.as_ref())
-            }
+    ) -> Result<Polished> {
+        let (x, known) = match (attempt.from, best, sibling) {
+            (From::Start(i), ..) => (self.starts[i].clone(), None),
+            (From::Best, Some(minimum), _) => (minimum.x.clone(), Some(&minimum.jacobian)),
             (From::Sibling, _, Some(sibling)) => {
                 let x = self.x_of(sibling);
                 let same = x.len() == sibling.minimum.x.len();
-                (x, same.then_some(&sibling.minimum.jacobian), sibling.spread.filter(|_| same))
+                (x, same.then_some(&sibling.minimum.jacobian))
             }
             (From::Best | From::Sibling, ..) => bail!("there is no minimum to start from"),
         };
@@ -423,12 +409,11 @@ impl<'a> Search<'a, '_> {
         let free: Vec<String> =
             values.map(|(u, value)| format!("{} {value:.4e}", u.quantity.name())).collect();
         (self.progress)(format!("{}: free, from {}", self.model, free.join(", ")));
-        let near = match attempt.how {
-            How::Windows(windows) => return self.windows(&x, windows),
-            How::Steps(rounds) => self.polish(&x, known, rounds)?,
-            How::Search => self.search(&x, 1e-3)?,
-        };
-        Ok((near, spread.cloned()))
+        match attempt.how {
+            How::Windows(windows) => self.windows(&x, windows),
+            How::Steps(rounds) => self.polish(&x, known, rounds),
+            How::Search => self.search(&x, 1e-3),
+        }
     }
 
     /// The other model's minimum in this one's unknowns; its noise and intersample behaviour are taken over.
@@ -451,7 +436,7 @@ impl<'a> Search<'a, '_> {
 
     /// Whether an attempt is to be made.
     fn is_due(&self, when: When, best: &Best) -> bool {
-        let Some((minimum, _)) = &best.found else {
+        let Some(minimum) = &best.found else {
             return matches!(when, When::Always | When::Unexplained | When::Poor);
         };
         let poor = is_poor(&self.problem, &minimum.answer);
@@ -474,16 +459,16 @@ impl<'a> Search<'a, '_> {
     fn accepts(
         &self,
         rule: Accept,
-        found: &Found,
+        found: &Polished,
         before: &Problem,
-        best: Option<&Found>,
+        best: Option<&Polished>,
     ) -> (bool, String) {
         let Some(best) = best else {
             return (true, "for it is the first".into());
         };
         let fits = [(&self.problem, found), (before, best)];
-        let [fit, fit_before] = fits.map(|(problem, found)| fit_pct(problem, &found.0.answer));
-        let (cost, cost_before) = (found.0.cost, best.0.cost);
+        let [fit, fit_before] = fits.map(|(problem, found)| fit_pct(problem, &found.answer));
+        let (cost, cost_before) = (found.cost, best.cost);
         match rule {
             Accept::LessCost => {
                 let why = format!("for the sum of squares is {cost:.1}, before {cost_before:.1}");

@@ -395,24 +395,31 @@ fn from_features(measured: &FrequencyResponse, bench: Bench) -> Option<Response>
     })
 }
 
-/// Friction from the balance of mean power over windows of 20 s, ⟨τω⟩ = T⟨|ω|⟩: the median torque T (in most
-/// windows the liquid takes as much as it gives), shared among b, c and d at the speeds of the recording. Rough, but of
-/// the right size and shape.
+/// Friction from the balance of mean power over windows of 20 s, ⟨τω⟩ = T⟨|ω|⟩ + δ⟨τ'ω⟩, with a delay δ, which near a quarter of a
+/// cycle between torque and rate makes power of nothing: least squares for T and δ, then the median torque T (in most windows
+/// the liquid takes as much as it gives), shared among b, c and d at the speeds of the recording. Rough, but of the right size and shape.
 fn friction(recordings: &[Recording]) -> Start {
-    let (mut torques, mut speeds) = (Vec::new(), Vec::new());
+    // power and τ'ω over |ω|, and |ω|
+    let mut windows: Vec<[f64; 3]> = Vec::new();
     for r in recordings {
-        let width = ((20.0 / r.step()) as usize).max(2);
-        for k in (0..r.rate.len().saturating_sub(width)).step_by(width) {
+        let width = ((20.0 / r.step()) as usize).max(3);
+        for k in (1..r.rate.len().saturating_sub(width)).step_by(width) {
             let mean = |f: &dyn Fn(usize) -> f64| (k..k + width).map(f).sum::<f64>() / width as f64;
             let offset = mean(&|i| r.rate[i]);
             let speed = mean(&|i| (r.rate[i] - offset).abs());
             let power = mean(&|i| r.torque[i] * (r.rate[i] - offset));
-            if speed > 0.0 && power > 0.0 {
-                torques.push(power / speed);
-                speeds.push(speed);
+            let slope =
+                |i: usize| (r.torque[i + 1] - r.torque[i - 1]) / (r.time[i + 1] - r.time[i - 1]);
+            let late = mean(&|i| slope(i) * (r.rate[i] - offset));
+            if speed > 0.0 {
+                windows.push([power / speed, late / speed, speed]);
             }
         }
     }
+    let delay = slope_of(&windows).filter(|delay| delay.abs() < LATEST).unwrap_or(0.0);
+    let torque = |[power, late, _]: &[f64; 3]| power - delay * late;
+    let (torques, speeds): (Vec<f64>, Vec<f64>) =
+        windows.iter().map(|w| (torque(w), w[2])).filter(|(torque, _)| *torque > 0.0).unzip();
     let torque = median(&torques).unwrap_or(1e-3);
     let middle = median(&speeds).unwrap_or(1e-2);
     let fastest = quantile(&speeds, 0.99).unwrap_or(1e-2);
@@ -420,6 +427,18 @@ fn friction(recordings: &[Recording]) -> Start {
     let (b, omega_s) = (0.1 * torque / middle, 0.5 * PI * fastest);
     let (c, stribeck) = (0.55 * torque, 0.35 * torque);
     Start { d: 0.0, h: 0.0, zeta: 0.003, hub_inertia: 0.0, b, c, stribeck, omega_s }
+}
+
+/// Longest delay that the balance of power may show, s.
+const LATEST: f64 = 0.05;
+
+/// Slope of the line through points (y, x, …), least squares; `None` where they do not tell.
+fn slope_of(points: &[[f64; 3]]) -> Option<f64> {
+    let n = points.len() as f64;
+    let [y, x] = [0, 1].map(|i| points.iter().map(|p| p[i]).sum::<f64>() / n);
+    let square: f64 = points.iter().map(|p| (p[1] - x).powi(2)).sum();
+    let product: f64 = points.iter().map(|p| (p[1] - x) * (p[0] - y)).sum();
+    (points.len() > 4 && square > 0.0).then(|| product / square)
 }
 
 #[cfg(test)]

@@ -110,12 +110,12 @@ pub fn spread_out(matrix: &DMatrix<f64>, places: &[usize], n: usize) -> DMatrix<
 pub struct Sources<'a> {
     /// The recording's noise, (JᵀJ)⁻¹, with the gyro's scale known to its tolerance alone.
     pub noise: &'a DMatrix<f64>,
-    /// The same with the gyro's scale, the last variable if it is one, known exactly.
-    pub noise_alone: &'a DMatrix<f64>,
-    /// Of all variables but the gyro's scale over several friction curves: of the noise the better account.
+    /// Of all variables over the profile of the friction's curves: of the noise the better account.
     pub friction_curves: Option<&'a DMatrix<f64>>,
     /// Of the same variables because another slosh model may be the right one.
     pub models: Option<&'a DMatrix<f64>>,
+    /// Of all variables, by tolerances of what is not estimated.
+    pub tolerances: Option<&'a DMatrix<f64>>,
     /// The sandwich, where the residual is more than noise: no variance is less than there.
     pub residual: Option<&'a DMatrix<f64>>,
 }
@@ -125,18 +125,15 @@ impl Sources<'_> {
     pub fn total(&self) -> DMatrix<f64> {
         let mut all = self.noise.clone();
         if let Some(curves) = self.friction_curves {
-            let n = curves.nrows();
-            all -= self.noise_alone;
-            let with = all.view((0, 0), (n, n)) + curves;
-            all.view_mut((0, 0), (n, n)).copy_from(&with);
-            if n < all.nrows() {
-                all[(n, n)] = self.noise[(n, n)];
-            }
+            all.copy_from(curves);
         }
         if let Some(models) = self.models {
             let n = models.nrows();
             let with = all.view((0, 0), (n, n)) + models;
             all.view_mut((0, 0), (n, n)).copy_from(&with);
+        }
+        if let Some(tolerances) = self.tolerances {
+            all += tolerances;
         }
         if let Some(sandwich) = self.residual {
             for i in 0..all.nrows() {
@@ -206,21 +203,23 @@ mod tests {
     #[test]
     fn sources_of_uncertainty_add_up_and_a_residual_sets_the_least() {
         let diagonal = |d: [f64; 3]| DMatrix::from_diagonal(&DVector::from_row_slice(&d));
-        let (noise, alone) = (diagonal([4.0, 2.0, 1.0]), diagonal([3.0, 2.0, 0.0]));
+        let noise = diagonal([4.0, 2.0, 1.0]);
         let sources = Sources {
             noise: &noise,
-            noise_alone: &alone,
             friction_curves: None,
             models: None,
+            tolerances: None,
             residual: None,
         };
         assert_eq!(sources.total(), noise);
         let two = DMatrix::from_row_slice(2, 2, &[10.0, 1.0, 1.0, 5.0]);
-        let with_curves = Sources { friction_curves: Some(&two), ..sources }.total();
-        // what the gyro's scale adds, 1 and 0, stays
-        assert_eq!(with_curves.diagonal().as_slice(), [11.0, 5.0, 1.0]);
+        let curves = diagonal([11.0, 5.0, 1.0]);
+        let with_curves = Sources { friction_curves: Some(&curves), ..sources }.total();
+        assert_eq!(with_curves, curves);
         let with_models = Sources { models: Some(&two), ..sources }.total();
         assert_eq!(with_models.diagonal().as_slice(), [14.0, 7.0, 1.0]);
+        let with_tolerances = Sources { tolerances: Some(&noise), ..sources }.total();
+        assert_eq!(with_tolerances.diagonal().as_slice(), [8.0, 4.0, 2.0]);
         let sandwich = diagonal([1.0, 8.0, 1.0]);
         let wide = Sources { models: Some(&two), residual: Some(&sandwich), ..sources }.total();
         // an off-diagonal element grows with the deviation, by sqrt(8/7)

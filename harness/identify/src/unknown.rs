@@ -13,6 +13,8 @@ pub struct Unknown {
     pub start: f64,
     /// What is known of it beforehand: mean and standard deviation.
     pub prior: Option<(f64, f64)>,
+    /// That is only its size, which keeps a search from going astray; it does not count as knowledge.
+    pub vague: bool,
     /// How it is made a variable without bounds.
     pub scale: Scale,
 }
@@ -106,7 +108,7 @@ impl Scale {
 impl Unknown {
     /// An unknown of which nothing is known beforehand.
     fn new(quantity: Quantity, unit: &str, start: f64, scale: Scale) -> Self {
-        Unknown { quantity, unit: unit.into(), start, prior: None, scale }
+        Unknown { quantity, unit: unit.into(), start, prior: None, vague: false, scale }
     }
 
     /// A positive parameter of the FMU.
@@ -117,6 +119,20 @@ impl Unknown {
     /// Whether its value must be positive.
     pub fn is_positive(&self) -> bool {
         matches!(self.scale, Scale::Log | Scale::Softplus(_))
+    }
+
+    /// An end of its interval, `reach` (in x) from x.
+    pub fn end(&self, x: f64, reach: f64) -> f64 {
+        if self.is_additive() {
+            (self.scale.value(x) + reach * self.scale.slope(x)).max(0.0)
+        } else {
+            self.scale.value(x + reach)
+        }
+    }
+
+    /// Whether the answer is linear in its value, not in x: its intervals are symmetric in the value, which must be positive.
+    pub fn is_additive(&self) -> bool {
+        matches!(self.scale, Scale::Softplus(_))
     }
 
     /// The same, known beforehand to be `mean` with standard deviation `deviation`.

@@ -107,12 +107,17 @@ pub fn words(
         ));
     }
     for (name, p) in parameters {
-        if p.value != 0.0 && p.std > 0.5 * p.value.abs() && name != "friction.asymmetry" {
+        if !p.determined {
+            let [low, high] = p.interval;
+            let within = if high.is_finite() {
+                format!("from {low:.2e} to {high:.2e}")
+            } else {
+                format!("above {low:.2e}")
+            };
             lines.push(format!(
-                "{name} is not determined by these data ({:.3e} ± {:.1e} {}).",
-                p.value,
-                p.std,
-                prose(&p.unit)
+                "{name} is not determined by these data: 95 % interval {within} {}, the nearest fit has {:.3e}.",
+                prose(&p.unit),
+                p.value
             ));
         }
     }

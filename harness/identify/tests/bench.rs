@@ -6,7 +6,7 @@
 mod bench;
 
 use bench::{Bearing, Bench, Drive, Liquid};
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use identify::recording::Recording;
 use identify::simulate::{Intersample, Setup};
 use pack::packed_for_tests;

@@ -140,9 +140,11 @@ class Estimated:
     """Standard deviation, everything in it."""
     std_noise: float
     """Standard deviation from the noise alone."""
-    interval: tuple[float, float]
-    """95 % interval."""
+    interval: tuple[float, float | None]
+    """95 % interval; None: the recording sets no upper end."""
     unit: str
+    determined: bool = True
+    """The recording shows it: both ends of the interval are there, and it is known to better than half its size."""
 
 
 Method = Literal[

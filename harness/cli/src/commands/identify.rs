@@ -18,6 +18,7 @@ use identify::nominal::Nominal;
 use identify::options::Options;
 use identify::recording::{self, Recording, Source};
 use identify::simulate::Intersample;
+use identify::tolerance::Tolerances;
 use signals::recording::Between;
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -98,6 +99,15 @@ pub struct IdentifyArgs {
     /// Standard deviation of the gyro's scale about 1; 0: exactly 1.
     #[arg(conflicts_with = "free", long, value_name = "NUMBER", default_value_t = 0.01)]
     gyro_scale: f64,
+    /// How well is known what no recording shows, relative standard deviations: torque (1%), clock (0.01%), g_axial (0.1%),
+    /// tank.r (0.4%), fluid.rho (0.3%). They are part of the intervals; 0 is exact.
+    #[arg(
+        conflicts_with = "free",
+        long = "tolerance",
+        value_name = "NAME=PART,…",
+        value_parser = |text: &str| Tolerances::default().with(text)
+    )]
+    tolerances: Option<Tolerances>,
     /// Intersample behaviour of the torque: linear (first-order hold), held (zero-order hold, a sampled controller's) or
     /// smooth (band-limited, a sampled recording of a smooth torque). Else what fits best is taken.
     #[arg(conflicts_with = "free", long, value_name = "HOW", value_parser = ["linear", "held", "smooth"])]
@@ -309,6 +319,7 @@ impl IdentifyArgs {
             starts: self.starts.clone(),
             sensor_errors: !self.perfect,
             gyro_scale: self.gyro_scale,
+            tolerances: self.tolerances.unwrap_or_default(),
             validation: Vec::new(),
         }
     }

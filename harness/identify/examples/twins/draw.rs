@@ -8,6 +8,7 @@ use experiments::profile::Profile;
 use identify::design::Multisine;
 use identify::recording::Recording;
 use identify::simulate::Intersample;
+use identify::tolerance::Tolerances;
 
 use crate::bench::{Bearing, Bench, Drive, Liquid};
 
@@ -45,6 +46,9 @@ pub struct Twin {
     encoder: Option<f64>,
     /// Rows a second.
     rate: f64,
+    /// Torque and clock of the recording over the true ones.
+    torque_scale: f64,
+    clock: f64,
     /// Drift of the gyro at each row, rad/s.
     drift: Vec<f64>,
 }
@@ -70,6 +74,13 @@ impl Twin {
             bearing,
             ..nominal
         };
+        // what the fit takes as known is so within its tolerances
+        let Tolerances { torque, clock, gravity, arm, density } = Tolerances::default();
+        let mut about = |part: f64| 1.0 + part * random.normal();
+        let (torque_scale, clock) = (about(torque), about(clock));
+        bench.gravity *= about(gravity);
+        bench.arm *= about(arm);
+        bench.density *= about(density);
         bench.bearing.asymmetry = 0.1 * (2.0 * random.uniform() - 1.0);
         let excitations = [
             Excitation::Up,
@@ -99,7 +110,9 @@ impl Twin {
                 1 => Some(3e-4),
                 _ => None,
             },
-            rate: if random.uniform() < 0.25 { 100.0 } else { 50.0 },
+            rate: if random.uniform() < 0.1 { 100.0 } else { 50.0 },
+            torque_scale,
+            clock,
             drift: Vec::new(),
             bench,
         };
@@ -117,6 +130,13 @@ impl Twin {
     /// What is said of the torque between rows: where a delay may stand for it (half the twins), what it is.
     pub fn told(&self) -> Option<Intersample> {
         (self.seed.is_multiple_of(2)).then_some(self.between)
+    }
+
+    /// Slosh models to try: the true one, and of every third twin the other too.
+    pub fn models(&self) -> Vec<String> {
+        let own = if self.bench.liquid == Liquid::Linear { "linear" } else { "spherical" };
+        let all = ["linear", "spherical"].into_iter();
+        all.filter(|name| self.seed.is_multiple_of(3) || *name == own).map(String::from).collect()
     }
 
     /// What it is in few words.
@@ -208,6 +228,9 @@ impl Twin {
         let angle = self.encoder.map(|std| {
             motion.angle.iter().map(|angle| angle + TAU * 0.1 + std * random.normal()).collect()
         });
+        // as the recording has it
+        let time = time.iter().map(|t| self.clock * t).collect();
+        let tau = tau.iter().map(|tau| self.torque_scale * tau).collect();
         Recording { angle, ..Recording::of("twin", time, tau, rate) }
     }
 }

@@ -5,8 +5,8 @@
 //! ```text
 //! cargo run --release -p identify --example twins -- [KEY=VALUE ...]
 //!   seeds=1-200         which twins
-//!   duration=400        of each recording, s
-//!   models=linear,…     as for hubslosh identify --model
+//!   duration=200        of each recording, s; twice that for a slow sweep
+//!   models=linear,…     as for hubslosh identify --model; else linear and spherical for every third, for the others what it is
 //!   say=false           true: the verdict of every twin
 //! ```
 
@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 use analysis::innovations::Tests;
 use anyhow::{Context, Result, bail};
 use draw::Twin;
-use host::fmi2::Fmu;
+use host::fmu::Fmu;
 use identify::methods::output_error::{Identification, identify};
 use identify::options::Options;
 use identify::recording;
@@ -118,9 +118,8 @@ impl Tally {
 }
 
 fn main() -> Result<()> {
-    let (mut seeds, mut duration, mut say) = (1..=200, 400.0, false);
-    let mut options =
-        Options { models: vec!["linear".into(), "spherical".into()], ..Options::default() };
+    let (mut seeds, mut duration, mut say) = (1..=200, 200.0, false);
+    let mut models: Option<Vec<String>> = None;
     for argument in std::env::args().skip(1) {
         let (key, value) =
             argument.split_once('=').with_context(|| format!("{argument}: KEY=VALUE"))?;
@@ -130,7 +129,7 @@ fn main() -> Result<()> {
                 seeds = from.parse()?..=to.parse()?;
             }
             "duration" => duration = value.parse()?,
-            "models" => options.models = value.split(',').map(String::from).collect(),
+            "models" => models = Some(value.split(',').map(String::from).collect()),
             "say" => say = value == "true",
             _ => bail!("{key} is not asked for; see the head of examples/twins/main.rs"),
         }
@@ -140,7 +139,8 @@ fn main() -> Result<()> {
     for seed in seeds {
         twins += 1;
         let twin = Twin::draw(seed, duration);
-        let options = Options { intersample: twin.told(), ..options.clone() };
+        let models = models.clone().unwrap_or_else(|| twin.models());
+        let options = Options { intersample: twin.told(), models, ..Options::default() };
         let coarsest = options.nominal(&fmu)?.coarsest();
         let hear = |line: &str| {
             if say {

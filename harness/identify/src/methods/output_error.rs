@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use std::time::Instant;
 
 use anyhow::{Result, ensure};
+use formulas::cylinder::XI;
+use formulas::regime::Regime;
 use host::fmu::Fmu;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
@@ -15,6 +17,7 @@ use crate::budget::{self, Effect};
 use crate::candidate::{self, Fitted, ModelFit};
 use crate::estimate::Estimated;
 use crate::fit::{Answer, Differences, Polished, Problem};
+use crate::friction;
 use crate::missing::{self, Missing};
 use crate::news::News;
 use crate::nominal::Start;
@@ -268,7 +271,7 @@ fn finish(
     question: &verdict::Question,
     options: &Options,
 ) -> Result<Identification> {
-    let Fitted { mut problem, polished, mut fit, spread } = best;
+    let Fitted { mut problem, polished, mut fit } = best;
     let (mut x, mut known) = (polished.x.clone(), polished.jacobian.clone());
     let place =
         |problem: &Problem| problem.unknowns.iter().position(|u| u.quantity == Quantity::GyroScale);
@@ -298,7 +301,12 @@ fn finish(
             .collect(),
     };
     let fits = findings.fits(&fit);
+    let profile = friction::profile(&problem, &polished)?;
+    fit.simulations += profile.as_ref().map_or(0, |p| p.simulations);
     let Polished { jacobian, covariance, answer, .. } = polished;
+    let error_budget =
+        budget::of(&problem, (&x, &answer), &jacobian, &covariance, &options.tolerances)?;
+    let tolerances = budget::of_tolerances(&error_budget, x.len());
     let noise_only = place(&problem)
         .and_then(|scale| without(&jacobian, scale))
         .unwrap_or_else(|| covariance.x.clone());
@@ -306,38 +314,56 @@ fn finish(
     let slopes: Vec<f64> =
         problem.unknowns.iter().zip(&x).map(|(u, &x)| u.scale.slope(x)).collect();
     // of the values, and so of the variables
-    let friction_curves = spread.as_ref().map(|spread| {
-        let n = spread.nrows();
-        DMatrix::from_fn(n, n, |i, j| spread[(i, j)] / slopes[i] / slopes[j])
+    let friction_curves = profile.as_ref().map(|profile| {
+        let n = x.len();
+        DMatrix::from_fn(n, n, |i, j| profile.covariance[(i, j)] / slopes[i] / slopes[j])
     });
     let sandwich =
         (!fits).then(|| covariance.sandwich(&jacobian, e.as_slice(), &windows(&problem)));
-    let full = Sources {
+    // no estimate is further from the minimum than this part of its standard deviation
+    let wider = 1.0 + fit.newton_decrement.powi(2);
+    let noise = Sources {
         noise: &covariance.x,
-        noise_alone: &noise_only,
         friction_curves: friction_curves.as_ref(),
+        models: None,
+        tolerances: None,
+        residual: None,
+    };
+    let full = Sources {
         models: of_models.as_ref(),
+        tolerances: Some(&tolerances),
         residual: sandwich.as_ref(),
+        ..noise
     }
     .total()
-        // no estimate is further from the minimum than this part of its standard deviation
-        * (1.0 + fit.newton_decrement.powi(2));
+        * wider;
+    let noise = noise.total();
     let of_values = DMatrix::from_fn(x.len(), x.len(), |i, j| full[(i, j)] * slopes[i] * slopes[j]);
     let (mut parameters, mut measurement) = (BTreeMap::new(), BTreeMap::new());
     for (i, unknown) in problem.unknowns.iter().enumerate() {
         let deviation = full[(i, i)].sqrt();
-        let end = |side: f64| match &spread {
-            // too wide for a linear map of x
-            Some(_) if unknown.is_positive() => {
-                (values[i] + side * 1.96 * of_values[(i, i)].sqrt()).max(0.0)
+        let interval = match &profile {
+            // the profile's ends, and what is not noise
+            Some(profile) => {
+                let more =
+                    1.96_f64.powi(2) * slopes[i].powi(2) * (full[(i, i)] - noise[(i, i)]).max(0.0);
+                let [low, high] = profile.intervals[i];
+                let least = if unknown.is_positive() { 0.0 } else { f64::NEG_INFINITY };
+                [
+                    (values[i] - ((values[i] - low).powi(2) + more).sqrt()).max(least),
+                    values[i] + ((high - values[i]).powi(2) + more).sqrt(),
+                ]
             }
-            _ => unknown.scale.value(x[i] + side * 1.96 * deviation),
+            None => [-1.0, 1.0].map(|side| unknown.end(x[i], side * 1.96 * deviation)),
         };
+        let std = of_values[(i, i)].sqrt();
+        let is_zero = !unknown.is_positive();
         let estimated = Estimated {
             value: values[i],
-            std: of_values[(i, i)].sqrt(),
+            std,
             std_noise: noise_only[(i, i)].sqrt() * slopes[i].abs(),
-            interval: [end(-1.0), end(1.0)],
+            interval,
+            determined: is_zero || interval[1].is_finite() && std < 0.5 * values[i].abs(),
             unit: unknown.unit.clone(),
         };
         let name = unknown.quantity.name();
@@ -347,10 +373,12 @@ fn finish(
         };
     }
     let combinations = uncertainty::combinations(&problem.unknowns, &values, &of_values);
-    let error_budget = budget::of(&problem, &x, &answer, &jacobian, &covariance)?;
+    let shares = shares(&problem, &tolerances, &full, &error_budget);
     let names = problem.unknowns.iter().map(|u| u.quantity.name()).collect();
-    let verdict =
+    let mut verdict =
         verdict::words(question, &findings, &fit, &combinations, &parameters, &error_budget);
+    verdict.extend(shares);
+    verdict.extend(regime(&fit.model, &answer));
     let (converged, condition) = (fit.converged, covariance.condition);
     let missing = findings.missing;
     let details =
@@ -367,6 +395,67 @@ fn finish(
         ..Identified::new(details)
     })
 }
+
+/// That the fit leaves linear slosh, in words: the wave at the wall, 2 α R/(ξ² − 1), over the radius R of an upright cylinder.
+fn regime(model: &str, answer: &Answer) -> Option<String> {
+    let angles = answer.motion.iter().flat_map(|motion| &motion.slosh_angle);
+    let angle = angles.fold(0.0_f64, |most, angle| most.max(angle.abs()));
+    let wave = 2.0 * angle / (XI[0] * XI[0] - 1.0);
+    let (is, advice) = match Regime::of(wave) {
+        Regime::Nonlinear => ("nonlinear", "less torque is better known"),
+        Regime::Transitional if model == "linear" => {
+            ("between linear and nonlinear", "--model planar,spherical tells whether that matters")
+        }
+        _ => return None,
+    };
+    (model != "frozen").then(|| {
+        format!(
+            "The slosh is {is}: the fit has a slosh angle up to {angle:.2} rad, a wave of {wave:.2} of the radius (linear up to 0.15, \
+             nonlinear from 0.25); {advice}."
+        )
+    })
+}
+
+/// Which estimates are less sure by tolerances than by the recording, in words.
+fn shares(
+    problem: &Problem,
+    tolerances: &DMatrix<f64>,
+    full: &DMatrix<f64>,
+    effects: &[Effect],
+) -> Option<String> {
+    let mut large = Vec::new();
+    for (i, unknown) in problem.unknowns.iter().enumerate() {
+        let share = tolerances[(i, i)] / full[(i, i)];
+        let most = effects
+            .iter()
+            .filter(|effect| effect.tolerance)
+            .max_by(|a, b| a.x[i].abs().total_cmp(&b.x[i].abs()));
+        if let (Some(most), true) = (most, share > TOLD_SHARE) {
+            let name = most.source.split(' ').next().unwrap_or_default();
+            large.push(format!(
+                "{} {:.0} % (most by {name})",
+                unknown.quantity.name(),
+                100.0 * share
+            ));
+        }
+    }
+    let known: Vec<String> = effects
+        .iter()
+        .filter(|effect| effect.tolerance)
+        .map(|effect| effect.source.replace(" wrong by", ""))
+        .collect();
+    (!large.is_empty()).then(|| {
+        format!(
+            "The intervals hold tolerances of what the recording cannot show ({}). Their share of the variance: {}. --tolerance \
+             sets them.",
+            known.join(", "),
+            large.join(", ")
+        )
+    })
+}
+
+/// Share of the variance from which on it is told.
+const TOLD_SHARE: f64 = 0.2;
 
 /// What the choice of the torque between rows rests on, if it was free, in words.
 fn torque_between_rows(problem: &Problem, found: &Polished, options: &Options) -> Vec<String> {

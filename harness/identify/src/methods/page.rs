@@ -121,6 +121,16 @@ pub(crate) fn table<'a>(
     }
 }
 
+/// The 95 % interval in words.
+fn interval(p: &Estimated) -> String {
+    let [low, high] = p.interval.map(|end| digits(end, p.std));
+    if p.interval[1].is_finite() {
+        format!("{low} to {high}")
+    } else {
+        format!("above {low}, open")
+    }
+}
+
 fn parameters(found: &Identification) -> Markup {
     let row = |(name, p): (&String, &Estimated)| {
         vec![
@@ -129,7 +139,7 @@ fn parameters(found: &Identification) -> Markup {
             format!("{:.1e}", p.std),
             p.percent(p.std).map_or("–".into(), |percent| format!("{:.3}", percent.abs())),
             format!("{:.1e}", p.std_noise),
-            format!("{} to {}", digits(p.interval[0], p.std), digits(p.interval[1], p.std)),
+            interval(p),
             prose(&p.unit),
         ]
     };
@@ -298,7 +308,7 @@ fn budget(found: &Identification) -> Markup {
     let head = std::iter::once("estimate").chain(effects.iter().map(|e| e.source.as_str()));
     html! {
         h2 { "Error budget" }
-        p { "What an error of something that is not estimated would do to each estimate, in % of it; in its own unit where it is zero within its standard deviation." }
+        p { "What an error of something that is not estimated would do to each estimate, in % of it; in its own unit where it is zero within its standard deviation. Tolerances (\"wrong by\") are part of the intervals." }
         (table(head, found.parameters.iter().map(row)))
     }
 }
