@@ -45,3 +45,16 @@ impl Estimated {
 pub fn prose(unit: &str) -> String {
     unit.replace('.', "·").replace('2', "²")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_end_that_is_open_is_null_in_json() {
+        let open =
+            Estimated { interval: [0.02, f64::INFINITY], ..Estimated::normal(0.1, 0.2, "rad/s") };
+        let json = serde_json::to_value(&open).unwrap();
+        assert_eq!(json["interval"], serde_json::json!([0.02, null]));
+    }
+}

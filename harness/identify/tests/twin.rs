@@ -77,12 +77,12 @@ fn damping_that_grows_with_the_amplitude_comes_back() {
     }
 }
 
-/// The recording has 2 % too much torque: the liquid and the hub are taken for too heavy, and no residual shows it.
+/// The recording has 2 % too little torque: the liquid is taken for too light, and no residual shows it.
 #[test]
 fn a_torque_that_is_wrong_within_its_tolerance_leaves_the_truth_in_the_intervals() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let mut recording = sweep(&fmu, SHORT, &[]);
-    recording.torque.iter_mut().for_each(|tau| *tau *= 1.02);
+    recording.torque.iter_mut().for_each(|tau| *tau *= 0.98);
     let of = |tolerances: Tolerances| {
         let options = Options { tolerances, ..options() };
         identify(&fmu, std::slice::from_ref(&recording), &options, &mut |_| {}).unwrap()
@@ -90,32 +90,32 @@ fn a_torque_that_is_wrong_within_its_tolerance_leaves_the_truth_in_the_intervals
     let sure = of(Tolerances::NONE);
     let found = of(Tolerances { torque: 0.02, ..Tolerances::NONE });
     assert_eq!(found.fits, Some(true), "{:?}", found.verdict);
-    for (name, truth) in [("tank.h", 0.1), ("hub.I", 0.322414)] {
+    for (name, truth) in [("tank.d", 0.163), ("tank.h", 0.1)] {
         let inside = |p: &Estimated| (p.interval[0]..=p.interval[1]).contains(&truth);
         assert!(!inside(&sure.parameters[name]), "{name}: {:?}", sure.parameters[name]);
         assert!(inside(&found.parameters[name]), "{name}: {:?}", found.parameters[name]);
     }
     let said = found.verdict.iter().find(|line| line.contains("share of the variance")).unwrap();
-    assert!(said.contains("torque 2 %") && said.contains("hub.I 9"), "{said}");
+    assert!(said.contains("torque 2 %") && said.contains("tank.h"), "{said}");
     // 0.1 N·m drives linear slosh to a quarter of a radian
-    assert!(
-        found.verdict.iter().any(|line| line.starts_with("The slosh is")),
-        "{:?}",
-        found.verdict
-    );
+    let is_told = found.verdict.iter().any(|line| line.starts_with("The slosh is"));
+    assert!(is_told, "{:?}", found.verdict);
 }
 
-/// So slow that the Stribeck speed lies beyond it: only c + d shows.
+/// So slow that the friction's curve hardly bends: the minimum stands at 0.02 rad/s, where a quadratic would exclude the truth by fourteen
+/// standard deviations.
 #[test]
-fn a_stribeck_speed_that_is_not_reached_is_not_determined_and_its_interval_is_open() {
+fn along_the_frictions_flat_valley_the_interval_is_that_of_the_likelihood() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let slow = "lin-sweep:amplitude=0.025,duration=600,f0=1.8,f1=3";
     let recordings = [sweep(&fmu, slow, &[])];
     let found = identify(&fmu, &recordings, &options(), &mut |_| {}).unwrap();
     assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
     let speed = &found.parameters["friction.omega_s"];
-    assert!(!speed.determined && speed.interval[1].is_infinite(), "{speed:?}");
-    assert_eq!(serde_json::to_value(speed).unwrap()["interval"][1], serde_json::Value::Null);
+    assert!(
+        (speed.value - 0.08581).abs() > 4.0 * speed.std_noise && !speed.determined,
+        "{speed:?}"
+    );
     for (name, truth) in [
         ("friction.omega_s", 0.08581),
         ("friction.b", 0.03793),
@@ -126,11 +126,8 @@ fn a_stribeck_speed_that_is_not_reached_is_not_determined_and_its_interval_is_op
         let p = &found.parameters[name];
         assert!((p.interval[0]..=p.interval[1]).contains(&truth), "{name}: {p:?}");
     }
-    assert!(
-        found.verdict.iter().any(|line| line.starts_with("friction.omega_s is not determined")),
-        "{:?}",
-        found.verdict
-    );
+    let said = found.verdict.iter().any(|l| l.starts_with("friction.omega_s is not determined"));
+    assert!(said, "{:?}", found.verdict);
 }
 
 /// Which the general tests of the residual do not see: they stay below 4, and the friction is off by tens of its standard deviations.

@@ -144,7 +144,8 @@ class Estimated:
     """95 % interval; None: the recording sets no upper end."""
     unit: str
     determined: bool = True
-    """The recording shows it: both ends of the interval are there, and it is known to better than half its size."""
+    """The recording shows it: the interval has both ends, and it is known to better than half its
+    size."""
 
 
 Method = Literal[

@@ -211,6 +211,7 @@ fn answer(problem: &Problem, minimum: &Minimum, question: &Question) -> Identifi
             std: finite(std[j]),
             std_noise: finite(std[j]),
             interval: interval.ends.map(finite),
+            determined: interval.ends.iter().all(|end| end.is_finite()),
             unit: unknown.unit.clone(),
         };
         say(unknown, &e, interval, inner.contains(&j), std[j], &mut found.details, &mut words);
