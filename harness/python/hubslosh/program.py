@@ -260,6 +260,7 @@ def identify(
         raise FmuError("inputs=, outputs= and prior= go with free=")
     if free is not None and (model is not None or method != "output-error"):
         raise FmuError("free= fits any FMU by output error: model= and method= are not for it")
+    path = find_program(program)
     needed: Sequence[str] = ("time",) if method == "free-decay" else ("time", "tau_cmd", "omega")
     flags = ["--model", model] if model is not None else []
     flags += ["--fmu", str(find(fmu))]
@@ -273,7 +274,6 @@ def identify(
         )
         flags += _asked(free, inputs, outputs, prior or {})
     flags += _settings(settings or {})
-    path = find_program(program)
     with tempfile.TemporaryDirectory() as folder:
         result = Path(folder) / "result.json" if out is None else Path(out)
         tables = [data] if isinstance(data, pd.DataFrame | str | Path) else list(data)
