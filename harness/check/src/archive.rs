@@ -213,8 +213,16 @@ pub fn links(archive: &Archive, findings: &mut Findings) {
 /// `zip.duplicates`
 pub fn duplicates(archive: &Archive, findings: &mut Findings) {
     let mut seen: BTreeMap<String, Vec<&str>> = BTreeMap::new();
-    for entry in &archive.entries {
-        seen.entry(entry.name.to_lowercase()).or_default().push(&entry.name);
+    // of folders that are there twice none hides what is in the other
+    let folders: std::collections::BTreeSet<&str> = archive
+        .entries
+        .iter()
+        .filter(|entry| entry.name.ends_with('/'))
+        .map(|entry| entry.name.as_str())
+        .collect();
+    let files = archive.entries.iter().filter(|entry| !entry.name.ends_with('/'));
+    for name in files.map(|entry| entry.name.as_str()).chain(folders) {
+        seen.entry(name.to_lowercase()).or_default().push(name);
     }
     for names in seen.into_values().filter(|names| names.len() > 1) {
         findings.add(

@@ -505,7 +505,7 @@ pub fn structured_names(d: &Description, findings: &mut Findings) {
 }
 
 /// The grammar of section 2.2.9.
-fn is_structured(name: &str) -> bool {
+pub(crate) fn is_structured(name: &str) -> bool {
     if let Some(inner) = name.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')')) {
         // A comma after the last index is the order's, one between brackets the indices'.
         return match inner.rsplit_once(',') {

@@ -1,6 +1,6 @@
-//! `hubslosh check`: does an FMU keep the rules of FMI 2.0, and those that hosts add?
+//! `hubslosh check`: does an FMU keep the rules of FMI 2.0 or 3.0, and those that hosts add?
 //!
-//! Every rule is an entry of one table, [`RULES`], with the function that looks. Rules of the
+//! Every rule is an entry of a table, [`RULES`] for FMI 2.0, [`v3::RULES`] for 3.0, with the function that looks. Rules of the
 //! archive, the description and the binaries look at the file. Rules of calls load the binary for
 //! this platform and call it as hosts do, each in a process of its own: an FMU that crashes or hangs
 //! is a finding, not the end of the check.
@@ -24,12 +24,14 @@ pub mod process;
 pub mod ranges;
 pub mod reading;
 pub mod rules;
+pub mod sarif;
 pub mod schema;
 pub mod states;
 pub mod steps;
 pub mod tunable;
 pub mod under_test;
 pub mod units;
+pub mod v3;
 pub mod values;
 
 use std::fmt::Write as _;
@@ -38,6 +40,7 @@ use std::time::Duration;
 
 use anyhow::{Result, bail};
 use host::fmi2::PLATFORM;
+use host::xml::Element;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -70,6 +73,7 @@ impl Severity {
 /// What a rule says, for programs.
 #[derive(Debug, serde::Serialize)]
 pub struct Statement {
+    fmi: &'static str,
     rule: &'static str,
     title: &'static str,
     source: &'static str,
@@ -78,13 +82,15 @@ pub struct Statement {
 
 /// All rules.
 pub fn rules() -> Vec<Statement> {
-    let statement = |rule: &Rule| Statement {
+    let statement = |fmi, rule: &Rule| Statement {
+        fmi,
         rule: rule.id,
         title: rule.title,
         source: rule.source,
         severity: rule.severity.name(),
     };
-    RULES.iter().map(statement).collect()
+    let second = RULES.iter().map(|rule| statement("2.0", rule));
+    second.chain(v3::RULES.iter().map(|rule| statement("3.0", rule))).collect()
 }
 
 /// One rule: what must hold, who says so, and how to look.
@@ -93,7 +99,7 @@ pub struct Rule {
     pub id: &'static str,
     /// What must hold.
     pub title: &'static str,
-    /// The section of FMI 2.0.5, or the host that trips over it.
+    /// The section of FMI 2.0.5 or 3.0.2, or the host that trips over it.
     pub source: &'static str,
     /// How bad it is to break it; a crash or an endless call is an error whatever is written here.
     pub severity: Severity,
@@ -111,6 +117,19 @@ pub enum Check {
     Binaries(fn(&Binaries, &mut Findings)),
     /// The loaded FMU, in a process of its own. A call that fails although it must not is a finding.
     Calls(fn(&FmuUnderTest, &mut Findings) -> Result<()>),
+    /// modelDescription.xml of FMI 3.0.
+    Description3(fn(&v3::Description, &mut Findings)),
+    /// The files under `binaries/` of an FMU 3.0.
+    Binaries3(fn(&v3::Binaries, &mut Findings)),
+    /// The loaded FMU 3.0, in a process of its own.
+    Calls3(fn(&v3::Subject, &mut Findings) -> Result<()>),
+}
+
+impl Rule {
+    /// Whether it calls the FMU.
+    pub fn is_of_calls(&self) -> bool {
+        matches!(self.check, Check::Calls(_) | Check::Calls3(_))
+    }
 }
 
 /// A rule that is broken.
@@ -219,11 +238,12 @@ pub struct Report {
 /// If the file cannot be read, a rule asked for is unknown, or there is no place to unpack. Whatever
 /// is wrong with the FMU is no error but a finding.
 pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) -> Result<Report> {
-    let known = |name: &str| RULES.iter().any(|rule| is_selected(rule, name));
+    let known = |name: &str| RULES.iter().chain(v3::RULES).any(|rule| is_selected(rule, name));
     let unknown: Vec<_> = options.only.iter().filter(|name| !known(name)).cloned().collect();
     if !unknown.is_empty() {
         let mut groups: Vec<_> =
-            RULES.iter().filter_map(|rule| rule.id.split('.').next()).collect();
+            RULES.iter().chain(v3::RULES).filter_map(|rule| rule.id.split('.').next()).collect();
+        groups.sort_unstable();
         groups.dedup();
         bail!(
             "no rule is called {} (groups of rules: {}; `hubslosh check --rules` lists all)",
@@ -240,20 +260,33 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
     };
     let binaries = Binaries::new(&archive, description.as_ref().ok().copied());
 
-    // An FMU of another version of FMI keeps other rules: one tells it.
+    // An FMU of FMI 3 keeps rules of its own. One of FMI 1 keeps others: one rule tells it.
+    let third = archive.file("modelDescription.xml").and_then(|xml| Element::parse(xml).ok());
+    let third = third.filter(|root| root.get("fmiVersion").is_some_and(|v| v.starts_with("3.")));
+    let third = third.map(v3::Description::new);
+    let libraries = v3::Binaries::new(&archive, third.as_ref());
     let is_foreign = description.as_ref().is_ok_and(|d| d.other_version().is_some());
-    let is_wanted = |rule: &&'static Rule| match is_foreign {
+    let is_wanted = |rule: &&'static Rule| match is_foreign && third.is_none() {
         true => rule.id == "xml.fmi_version",
         false => options.only.is_empty() || options.only.iter().any(|o| is_selected(rule, o)),
     };
-    let selected: Vec<&'static Rule> = RULES.iter().filter(is_wanted).collect();
-    let calls = selected.iter().filter(|rule| matches!(rule.check, Check::Calls(_))).count();
-    let callable = match &description {
-        Err(why) => Err(why.clone()),
-        Ok(_) if binaries.own().is_none() => {
+    let table = if third.is_some() { v3::RULES } else { RULES };
+    let selected: Vec<&'static Rule> = table.iter().filter(is_wanted).collect();
+    let calls = selected.iter().filter(|rule| rule.is_of_calls()).count();
+    let callable = match (&description, &third) {
+        (Err(why), _) => Err(why.clone()),
+        (_, Some(d))
+            if !["CoSimulation", "ModelExchange"].iter().any(|i| d.interface(i).is_some()) =>
+        {
+            Err("it offers neither Co-Simulation nor Model Exchange, which alone are called".into())
+        }
+        (_, Some(_)) if !libraries.is_callable() => {
+            Err(format!("it has no library for this platform, {}", host::fmi3::PLATFORM))
+        }
+        (_, None) if binaries.own().is_none() => {
             Err(format!("it has no binary for this platform, {PLATFORM}"))
         }
-        Ok(_) => Ok(()),
+        (Ok(_), _) => Ok(()),
     };
     let so_far = process::SoFar::default();
     let one = |rule: &&'static Rule| {
@@ -265,7 +298,12 @@ pub fn check(path: &Path, options: &Options, progress: impl Fn(usize) + Sync) ->
             // That it is missing or not well-formed is a rule of its own.
             (Check::Description(_), Err(why)) => findings.skip(why.clone()),
             (Check::Binaries(check), _) => check(&binaries, &mut findings),
-            (Check::Calls(_), _) => {
+            (Check::Description3(check), _) => match &third {
+                Some(description) => check(description, &mut findings),
+                None => findings.skip("it is no FMU 3.0"),
+            },
+            (Check::Binaries3(check), _) => check(&libraries, &mut findings),
+            (Check::Calls(_) | Check::Calls3(_), _) => {
                 match &callable {
                     Ok(()) => process::check(
                         rule,
@@ -379,11 +417,11 @@ impl Report {
     }
 }
 
-/// The table of rules as Markdown, as the documentation shows it.
-pub fn table() -> String {
+/// The table of rules of one version as Markdown, as the documentation shows it.
+pub fn table(rules: &[Rule]) -> String {
     let mut text = String::new();
     let mut group = "";
-    for rule in RULES {
+    for rule in rules {
         let (this, _) = rule.id.split_once('.').unwrap_or((rule.id, ""));
         if this != group {
             group = this;
@@ -409,12 +447,15 @@ mod tests {
 
     #[test]
     fn rules_have_names_of_their_own_and_stand_in_groups() {
-        let names: BTreeSet<_> = RULES.iter().map(|rule| rule.id).collect();
-        assert_eq!(names.len(), RULES.len());
-        let mut groups: Vec<_> = RULES.iter().map(|r| r.id.split_once('.').unwrap().0).collect();
-        groups.dedup();
-        let unique: BTreeSet<_> = groups.iter().collect();
-        assert_eq!(unique.len(), groups.len(), "a group is torn apart: {groups:?}");
+        for rules in [RULES, v3::RULES] {
+            let names: BTreeSet<_> = rules.iter().map(|rule| rule.id).collect();
+            assert_eq!(names.len(), rules.len());
+            let mut groups: Vec<_> =
+                rules.iter().map(|r| r.id.split_once('.').unwrap().0).collect();
+            groups.dedup();
+            let unique: BTreeSet<_> = groups.iter().collect();
+            assert_eq!(unique.len(), groups.len(), "a group is torn apart: {groups:?}");
+        }
     }
 
     #[test]

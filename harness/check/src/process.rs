@@ -12,10 +12,11 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result};
 use host::guard::{self, Cause, Limits, Output};
 use host::temporary;
+use host::xml::Element;
 use serde::{Deserialize, Serialize};
 
 use super::under_test::{FmuUnderTest, Unusable};
-use super::{Check, Findings, Options, RULES, Rule, life};
+use super::{Check, Findings, Options, RULES, Rule, life, v3};
 
 /// The hidden subcommand of `hubslosh`.
 pub const SUBCOMMAND: &str = "check-calls";
@@ -218,31 +219,60 @@ pub fn answer(
     answer: &Path,
     limit: Duration,
 ) -> Result<()> {
-    let rule = RULES.iter().find(|rule| rule.id == id).context("no such rule")?;
-    let Check::Calls(check) = rule.check else { anyhow::bail!("{id} makes no calls") };
+    let is_fmi3 = std::fs::read(directory.join("modelDescription.xml")).is_ok_and(|xml| {
+        let version =
+            Element::parse(&xml).ok().and_then(|root| root.get("fmiVersion").map(String::from));
+        version.is_some_and(|version| version.starts_with("3."))
+    });
+    let rules = if is_fmi3 { v3::RULES } else { RULES };
+    let rule = rules.iter().find(|rule| rule.id == id).context("no such rule")?;
     let trace = Trace(File::create(answer)?);
     trace.doing(LOADING, Crash::Error);
     let before = life::surroundings();
     let mut findings = Findings::new(rule.severity);
     // a rule that is slow, and not hung, shall tell what it has found by then
     let deadline = Instant::now() + limit.mul_f64(0.75);
-    match FmuUnderTest::open(directory, path, trace, deadline) {
-        Err(error) if rule.id == "load.opens" => findings.add("the binary", format!("{error:#}")),
-        Err(error) => findings.skip(format!("it cannot be loaded: {error:#}")),
-        Ok(mut fmu) => {
-            fmu.before = before;
-            if let Err(error) = check(&fmu, &mut findings) {
-                match error.downcast_ref::<Unusable>() {
-                    Some(unusable) if unusable.rule != rule.id => {
-                        findings.skip_for(unusable.rule, unusable.to_string());
+    let failed = |error: anyhow::Error, now: String, findings: &mut Findings| match error
+        .downcast_ref::<Unusable>()
+    {
+        Some(unusable) if unusable.rule != rule.id => {
+            findings.skip_for(unusable.rule, unusable.to_string());
+        }
+        _ => findings.add(now, format!("{error:#}")),
+    };
+    let lost = |error: anyhow::Error, findings: &mut Findings| match rule.id == OPENS {
+        true => findings.add("the binary", format!("{error:#}")),
+        false => findings.skip(format!("it cannot be loaded: {error:#}")),
+    };
+    match rule.check {
+        Check::Calls(check) => match FmuUnderTest::open(directory, path, trace, deadline) {
+            Err(error) => lost(error, &mut findings),
+            Ok(mut fmu) => {
+                fmu.before = before;
+                if let Err(error) = check(&fmu, &mut findings) {
+                    failed(error, fmu.now(), &mut findings);
+                }
+                fmu.doing("unloading the binary");
+                let trace = fmu.close();
+                return trace.done(findings);
+            }
+        },
+        Check::Calls3(check) => {
+            let told = trace.again()?;
+            let tell = Box::new(move |what: &str| told.doing(what, Crash::Error));
+            match v3::Subject::open(directory, path, tell, deadline) {
+                Err(error) => lost(error, &mut findings),
+                Ok(subject) => {
+                    if let Err(error) = check(&subject, &mut findings) {
+                        failed(error, subject.now(), &mut findings);
                     }
-                    _ => findings.add(fmu.now(), format!("{error:#}")),
+                    subject.doing("unloading the library");
+                    drop(subject);
+                    return trace.done(findings);
                 }
             }
-            fmu.doing("unloading the binary");
-            let trace = fmu.close();
-            return trace.done(findings);
         }
+        _ => anyhow::bail!("{id} makes no calls"),
     }
     Trace(File::options().append(true).open(answer)?).done(findings)
 }

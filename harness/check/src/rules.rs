@@ -43,7 +43,7 @@ pub static RULES: &[Rule] = &[
     rule("xml.doctype", Error, "modelDescription.xml has no document type declaration and no entities of its own", "parsers refuse it, expand entities without bound or open other files", Archive(reading::doctype)),
     rule("xml.schema", Error, "elements and attributes are those of the schema, in its order, none missing", "2.2, fmi2ModelDescription.xsd", Description(schema::structure)),
     rule("xml.values", Error, "attributes are written as the schema says: whole numbers (exponents of BaseUnit too), decimal points, known words", "2.2, fmi2ModelDescription.xsd", Description(schema::values)),
-    rule("xml.fmi_version", Error, "fmiVersion is exactly 2.0; on an FMU of FMI 1.0 or 3.0 no other rule is looked at", "2.2.1", Description(description::fmi_version)),
+    rule("xml.fmi_version", Error, "fmiVersion is exactly 2.0; on an FMU of FMI 1.0 no other rule is looked at", "2.2.1", Description(description::fmi_version)),
     rule("xml.guid", Error, "there is a GUID", "2.2.1", Description(description::guid)),
     rule("xml.date", Warning, "generationDateAndTime is in UTC, like 2026-01-31T12:00:00Z", "2.2.1", Description(description::date)),
     rule("xml.interfaces", Error, "ModelExchange or CoSimulation is there", "2.2.1", Description(description::interfaces)),

@@ -1,20 +1,34 @@
-//! The schema of modelDescription.xml (FMI 2.0.5, section 2.2) as a table: which elements stand
-//! where and in which order, which attributes they have and how those are written.
+//! The schema of modelDescription.xml as a table: which elements stand where and in which order, which
+//! attributes they have and how those are written. The table of FMI 2.0 (2.0.5, section 2.2) is here, that of 3.0 in
+//! `v3/schema.rs`.
 
 use super::{Description, Findings};
 use host::xml::{Element, double};
 
 /// How the value of an attribute is written.
 #[derive(Clone, Copy)]
-enum Written {
+pub enum Written {
+    /// Any text.
     Text,
+    /// true, false, 1, 0.
     Boolean,
+    /// 32 bits.
     Int,
+    /// 32 bits, from 0.
     Unsigned,
+    /// as xs:double.
     Double,
+    /// as xs:dateTime.
     Time,
     /// Whole numbers with spaces between.
     Indices,
+    /// Whole numbers of 64 bits with spaces between.
+    Longs,
+    /// Numbers with spaces between.
+    Doubles,
+    /// Words true, false, 1, 0 with spaces between.
+    Booleans,
+    /// One of these.
     OneOf(&'static [&'static str]),
     /// Words from a list with spaces between.
     Words(&'static [&'static str]),
@@ -23,7 +37,7 @@ enum Written {
 use Written::*;
 
 /// An element: `parent/name`, or `name` if it is the same wherever it stands.
-struct Kind {
+pub struct Kind {
     name: &'static str,
     needed: &'static [(&'static str, Written)],
     optional: &'static [(&'static str, Written)],
@@ -31,11 +45,15 @@ struct Kind {
 }
 
 /// What stands inside an element.
-enum Children {
+pub enum Children {
     /// Anything.
     Any,
     /// Each of these at most once, in this order; those with `!` must be there.
     Sequence(&'static [&'static str]),
+    /// Any number of each, in this order.
+    Ordered(&'static [&'static str]),
+    /// One or more of these, in any order.
+    ManyOf(&'static [&'static str]),
     /// One or more of this.
     Many(&'static str),
     /// One of these, then what else there may be.
@@ -51,7 +69,8 @@ const INITIAL: Written = OneOf(&["exact", "approx", "calculated"]);
 const DEPENDENCY: Written = Words(&["dependent", "constant", "fixed", "tunable", "discrete"]);
 const TYPES: &[&str] = &["Real", "Integer", "Boolean", "String", "Enumeration"];
 
-const fn kind(
+/// An element of a table.
+pub const fn kind(
     name: &'static str,
     needed: &'static [(&'static str, Written)],
     optional: &'static [(&'static str, Written)],
@@ -140,9 +159,9 @@ static KINDS: &[Kind] = &[
         Sequence(&[])),
 ];
 
-fn find(parent: &str, name: &str) -> Option<&'static Kind> {
+fn find(kinds: &'static [Kind], parent: &str, name: &str) -> Option<&'static Kind> {
     let full = format!("{parent}/{name}");
-    KINDS.iter().find(|k| k.name == full).or_else(|| KINDS.iter().find(|k| k.name == name))
+    kinds.iter().find(|k| k.name == full).or_else(|| kinds.iter().find(|k| k.name == name))
 }
 
 impl Written {
@@ -164,6 +183,20 @@ impl Written {
             Indices => (
                 value.split_whitespace().all(|word| word.parse::<u32>().is_ok()),
                 "whole numbers with spaces between".to_string(),
+            ),
+            Longs => (
+                value
+                    .split_whitespace()
+                    .all(|w| w.parse::<i64>().is_ok() || w.parse::<u64>().is_ok()),
+                "whole numbers with spaces between".to_string(),
+            ),
+            Doubles => (
+                value.split_whitespace().all(|word| double(word).is_some()),
+                "numbers with a decimal point, INF, -INF or NaN, with spaces between".to_string(),
+            ),
+            Booleans => (
+                value.split_whitespace().all(|w| matches!(w, "true" | "false" | "0" | "1")),
+                "true, false, 1, 0 with spaces between".to_string(),
             ),
             OneOf(words) => (words.contains(&value), words.join(", ")),
             Words(words) => {
@@ -216,19 +249,31 @@ fn place(element: &Element) -> String {
 
 /// `xml.schema`: elements and attributes that are there, missing or in the wrong order.
 pub fn structure(description: &Description, findings: &mut Findings) {
-    let root = &description.root;
+    structure_by(KINDS, &description.root, findings);
+}
+
+/// The same by the table of another version.
+pub fn structure_by(kinds: &'static [Kind], root: &Element, findings: &mut Findings) {
     if root.name != "fmiModelDescription" {
         return findings.add(place(root), "the root element is not fmiModelDescription");
     }
-    elements("", root, findings);
+    elements(kinds, "", root, findings);
 }
 
-fn elements(parent: &str, element: &Element, findings: &mut Findings) {
-    let Some(kind) = find(parent, &element.name) else { return };
+/// Elements on which the schema of FMI 3.0 allows attributes of other namespaces and vendors.
+const ANY_ATTRIBUTE: [&str; 3] = ["ModelExchange", "CoSimulation", "ScheduledExecution"];
+
+fn elements(kinds: &'static [Kind], parent: &str, element: &Element, findings: &mut Findings) {
+    let Some(kind) = find(kinds, parent, &element.name) else { return };
+    let is_open = !std::ptr::eq(kinds, KINDS) && ANY_ATTRIBUTE.contains(&element.name.as_str());
     for (attribute, _) in &element.attributes {
         let known = kind.needed.iter().chain(kind.optional).any(|(name, _)| name == attribute);
         // xsi:noNamespaceSchemaLocation belongs to XML itself
-        if !known && attribute != "noNamespaceSchemaLocation" && attribute != "schemaLocation" {
+        if !known
+            && !is_open
+            && attribute != "noNamespaceSchemaLocation"
+            && attribute != "schemaLocation"
+        {
             let all: Vec<_> =
                 kind.needed.iter().chain(kind.optional).map(|(name, _)| *name).collect();
             findings.add(
@@ -245,7 +290,7 @@ fn elements(parent: &str, element: &Element, findings: &mut Findings) {
     children(kind, element, findings);
     if !matches!(kind.children, Any) {
         for child in &element.children {
-            elements(&element.name, child, findings);
+            elements(kinds, &element.name, child, findings);
         }
     }
 }
@@ -263,6 +308,33 @@ fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
     };
     match kind.children {
         Any => {}
+        Ordered(names) => {
+            let mut reached = 0;
+            for child in &element.children {
+                match names.iter().position(|name| *name == child.name) {
+                    None => unknown(child, names, findings),
+                    Some(at) if at < reached => findings.add(
+                        place(child),
+                        format!(
+                            "it stands after {} (allowed order: {})",
+                            names[reached],
+                            names.join(", ")
+                        ),
+                    ),
+                    Some(at) => reached = at,
+                }
+            }
+        }
+        ManyOf(names) => {
+            if element.children.is_empty() {
+                findings.add(place(element), "it is empty (allowed: one element or more)");
+            }
+            for child in &element.children {
+                if !names.contains(&child.name.as_str()) {
+                    unknown(child, names, findings);
+                }
+            }
+        }
         Many(name) => {
             if element.children.is_empty() {
                 findings.add(place(element), format!("it is empty (allowed: one {name} or more)"));
@@ -333,11 +405,16 @@ fn children(kind: &Kind, element: &Element, findings: &mut Findings) {
 
 /// `xml.values`: how the values of attributes are written.
 pub fn values(description: &Description, findings: &mut Findings) {
-    value("", &description.root, findings);
+    values_by(KINDS, &description.root, findings);
 }
 
-fn value(parent: &str, element: &Element, findings: &mut Findings) {
-    let Some(kind) = find(parent, &element.name) else { return };
+/// The same by the table of another version.
+pub fn values_by(kinds: &'static [Kind], root: &Element, findings: &mut Findings) {
+    value(kinds, "", root, findings);
+}
+
+fn value(kinds: &'static [Kind], parent: &str, element: &Element, findings: &mut Findings) {
+    let Some(kind) = find(kinds, parent, &element.name) else { return };
     for (name, written) in kind.needed.iter().chain(kind.optional) {
         if let Some(value) = element.get(name)
             && let Some(allowed) = written.allowed(value)
@@ -347,7 +424,7 @@ fn value(parent: &str, element: &Element, findings: &mut Findings) {
     }
     if !matches!(kind.children, Any) {
         for child in &element.children {
-            self::value(&element.name, child, findings);
+            self::value(kinds, &element.name, child, findings);
         }
     }
 }
@@ -384,16 +461,19 @@ mod tests {
 
     #[test]
     fn every_element_that_stands_inside_another_is_in_the_table() {
-        for kind in KINDS {
-            let names: Vec<&str> = match kind.children {
-                Any => vec![],
-                Many(name) => vec![name],
-                Sequence(names) => names.to_vec(),
-                Choice(a, b) => [a, b].concat(),
-            };
-            let parent = kind.name.rsplit('/').next().unwrap();
-            for name in names {
-                assert!(find(parent, name.trim_start_matches('!')).is_some(), "{parent}/{name}");
+        for kinds in [KINDS, crate::v3::schema::KINDS] {
+            for kind in kinds {
+                let names: Vec<&str> = match kind.children {
+                    Any => vec![],
+                    Many(name) => vec![name],
+                    Sequence(names) | Ordered(names) | ManyOf(names) => names.to_vec(),
+                    Choice(a, b) => [a, b].concat(),
+                };
+                let parent = kind.name.rsplit('/').next().unwrap();
+                for name in names {
+                    let name = name.trim_start_matches('!');
+                    assert!(find(kinds, parent, name).is_some(), "{parent}/{name}");
+                }
             }
         }
     }

@@ -4,12 +4,12 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail};
-use check::{Options, Severity, check, json, junit, process, table};
+use check::{Options, RULES, Severity, check, json, junit, process, sarif, table, v3};
 use host::output;
 
 use crate::{fmu, progress, terminal};
 
-/// Checks an FMU 2.0 against the standard and against what hosts ask for.
+/// Checks an FMU 2.0 or 3.0 against the standard and against what hosts ask for.
 ///
 /// Looks at the archive, the description and the binaries, and calls the binary for this platform
 /// as hosts do. The exit code is 0 when there are no errors; warnings are only reported.
@@ -26,13 +26,16 @@ pub struct CheckArgs {
     /// Writes the report as JSON, one object for each rule; after the FMU and without FILE: prints it.
     #[arg(long, value_name = "FILE", num_args = 0..=1)]
     json: Option<Option<PathBuf>>,
+    /// Writes the findings as SARIF 2.1.0, for code hosts.
+    #[arg(long, value_name = "FILE")]
+    sarif: Option<PathBuf>,
     /// Rules (zip.names) or groups of rules (zip) to look at [default: all].
     #[arg(long, value_name = "RULE,…", value_delimiter = ',')]
     only: Vec<String>,
     /// Time that the calls of one rule may take, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 60.0)]
     limit: f64,
-    /// Lists the rules as a Markdown table and checks nothing.
+    /// Lists the rules as Markdown tables, those for FMI 2.0 and those for 3.0, and checks nothing.
     #[arg(long)]
     rules: bool,
 }
@@ -53,7 +56,9 @@ impl CheckArgs {
         if self.rules {
             match self.json {
                 Some(_) => terminal::say_json(&check::rules())?,
-                None => print!("{}", table()),
+                None => {
+                    print!("## FMI 2.0\n\n{}\n## FMI 3.0\n\n{}", table(RULES), table(v3::RULES));
+                }
             }
             return Ok(());
         }
@@ -78,6 +83,9 @@ impl CheckArgs {
         }
         if let Some(Some(path)) = &self.json {
             output::atomically(path, |file| json::write(&report, file))?;
+        }
+        if let Some(path) = &self.sarif {
+            output::atomically(path, |file| sarif::write(&report, file))?;
         }
         if let warnings @ 1.. = report.count(Severity::Warning) {
             terminal::warn(format_args!("{} draws {warnings} warnings", fmu.display()));

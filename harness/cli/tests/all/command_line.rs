@@ -354,8 +354,8 @@ fn an_fmu_whose_description_and_binary_do_not_belong_together_is_refused() {
     refuses(directory, run, &["fmi2Instantiate", "GUID"]);
     edited_fmu(directory, |_| None);
     refuses(directory, run, &["no modelDescription.xml"]);
-    edited_fmu(directory, |xml| Some(xml.replace("fmiVersion=\"2.0\"", "fmiVersion=\"3.0\"")));
-    refuses(directory, run, &["FMI version 3.0"]);
+    edited_fmu(directory, |xml| Some(xml.replace("fmiVersion=\"2.0\"", "fmiVersion=\"1.0\"")));
+    refuses(directory, run, &["FMI version 1.0", "2.0 and 3.0"]);
     edited_fmu(directory, |xml| {
         Some(xml.replace("modelIdentifier=\"HubSlosh\"", "modelIdentifier=\"Other\""))
     });

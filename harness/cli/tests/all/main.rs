@@ -2,6 +2,7 @@
 
 mod campaign;
 mod check;
+mod check3;
 mod command_line;
 mod documents;
 mod folder;

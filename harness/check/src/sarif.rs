@@ -1,0 +1,57 @@
+//! The report as SARIF 2.1.0, which code hosts show beside the code.
+
+use std::io::Write;
+
+use anyhow::Result;
+use serde_json::json;
+
+use super::{Report, Severity};
+
+/// Writes the report.
+///
+/// # Errors
+/// If it cannot be written.
+pub fn write(report: &Report, out: &mut impl Write) -> Result<()> {
+    let fmu = report.path.display().to_string().replace('\\', "/");
+    let rules: Vec<_> = report
+        .outcomes
+        .iter()
+        .map(|outcome| {
+            json!({
+                "id": outcome.rule.id,
+                "shortDescription": { "text": outcome.rule.title },
+                "help": { "text": format!("{} [{}]", outcome.rule.title, outcome.rule.source) },
+            })
+        })
+        .collect();
+    let results: Vec<_> = report
+        .all()
+        .map(|(rule, finding)| {
+            let level = match finding.severity {
+                Severity::Error => "error",
+                Severity::Warning => "warning",
+            };
+            json!({
+                "ruleId": rule.id,
+                "level": level,
+                "message": { "text": format!("{}: {}", finding.place, finding.text) },
+                "locations": [{ "physicalLocation": { "artifactLocation": { "uri": fmu } } }],
+            })
+        })
+        .collect();
+    let file = json!({
+        "$schema": "https://json.schemastore.org/sarif-2.1.0.json",
+        "version": "2.1.0",
+        "runs": [{
+            "tool": { "driver": {
+                "name": "hubslosh check",
+                "version": env!("CARGO_PKG_VERSION"),
+                "rules": rules,
+            } },
+            "results": results,
+        }],
+    });
+    serde_json::to_writer_pretty(&mut *out, &file)?;
+    writeln!(out)?;
+    Ok(())
+}

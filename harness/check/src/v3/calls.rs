@@ -1,0 +1,614 @@
+//! Rules of calls for FMUs 3.0: loading, life, values, states, log (FMI 3.0.2, sections 2.2 and 2.3).
+
+use anyhow::Result;
+
+use super::Subject;
+use super::subject::{STEPS, Use, difference, start_values};
+use crate::Findings;
+use host::c_abi::{CallError, Status};
+use host::description::{CType, Type, Value};
+use host::fmi3::Interface;
+
+/// `load.opens`
+pub fn opens(_: &Subject, _: &mut Findings) -> Result<()> {
+    Ok(()) // that it does not open is told where it is opened
+}
+
+/// `load.version`
+pub fn version(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    for interface in subject.interfaces() {
+        subject.doing("fmi3GetVersion");
+        let own = subject.binary(interface).map(|fmu| fmu.version()).unwrap_or_default();
+        if own != "3.0" && !own.starts_with("3.0.") {
+            findings.add("fmi3GetVersion", format!("it says {own:?} (allowed: \"3.0\")"));
+        }
+    }
+    Ok(())
+}
+
+/// `load.instance`
+pub fn instance(subject: &Subject, _: &mut Findings) -> Result<()> {
+    for using in subject.uses() {
+        subject.session(using)?;
+    }
+    Ok(())
+}
+
+/// `load.initialises`
+pub fn initialises(subject: &Subject, _: &mut Findings) -> Result<()> {
+    for using in subject.uses() {
+        subject.running(using)?;
+    }
+    Ok(())
+}
+
+/// `instantiate.token`
+pub fn token(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    for using in subject.plain_uses() {
+        let Some(binary) = subject.binary(using.interface) else { continue };
+        let mut with = subject.instantiation(using)?;
+        with.token = Some("{another token of another FMU}");
+        subject.doing("making an instance with another instantiationToken");
+        match binary.instantiate_with(&with) {
+            Ok(_) => findings.add(
+                subject.now(),
+                "it gives an instance (allowed: NULL for a token that is not that of modelDescription.xml)",
+            ),
+            Err(CallError { messages, .. }) if messages.is_empty() => {
+                findings.warn(subject.now(), "it gives none and says nothing (allowed: a message)");
+            }
+            Err(_) => {}
+        }
+    }
+    Ok(())
+}
+
+/// `instantiate.callbacks`
+pub fn callbacks(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    for using in subject.plain_uses() {
+        let Some(binary) = subject.binary(using.interface) else { continue };
+        let mut with = subject.instantiation(using)?;
+        with.logger = false;
+        with.intermediate_update = false;
+        subject.doing("making an instance without callbacks, and a step");
+        match binary.instantiate_with(&with) {
+            Ok(_) => {}
+            Err(error) => {
+                findings.add(subject.now(), error.to_string());
+                continue;
+            }
+        }
+        // required variables, but nobody who hears of them
+        let mut session = subject.session(using)?;
+        session.initialise()?;
+        session.advance(2)?;
+    }
+    Ok(())
+}
+
+/// `instantiate.free_null`
+pub fn free_null(subject: &Subject, _: &mut Findings) -> Result<()> {
+    for interface in subject.interfaces() {
+        subject.doing("fmi3FreeInstance(NULL)");
+        if let Some(fmu) = subject.binary(interface) {
+            fmu.free_null_instance();
+        }
+    }
+    Ok(())
+}
+
+/// What a run of every variable gives.
+fn run(subject: &Subject, using: Use) -> Result<Vec<(String, Vec<Value>)>> {
+    let mut session = subject.running(using)?;
+    session.advance(STEPS)?;
+    session.readings()
+}
+
+/// `life.deterministic`
+pub fn deterministic(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    for using in subject.uses() {
+        let first = run(subject, using)?;
+        // another instance lives meanwhile
+        let mut other = subject.running(using)?;
+        other.advance(3)?;
+        if let Some(text) = difference(&first, &run(subject, using)?) {
+            findings.add(using.name(), format!("after two equal runs {text}"));
+        }
+    }
+    Ok(())
+}
+
+/// `life.reset`
+pub fn reset(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    for using in subject.uses() {
+        let mut session = subject.running(using)?;
+        session.advance(STEPS)?;
+        subject.doing("fmi3Reset");
+        session.instance.reset()?;
+        (session.time, session.ended) = (subject.start(), false);
+        session.initialise()?;
+        let mut fresh = subject.running(using)?;
+        let begin = difference(&fresh.readings()?, &session.readings()?);
+        session.advance(STEPS)?;
+        fresh.advance(STEPS)?;
+        let end = difference(&fresh.readings()?, &session.readings()?);
+        if let Some(text) = begin.or(end) {
+            findings.add(using.name(), format!("of a new instance and after fmi3Reset {text}"));
+        }
+    }
+    Ok(())
+}
+
+/// `life.terminate`
+pub fn terminate(subject: &Subject, _: &mut Findings) -> Result<()> {
+    for using in subject.uses() {
+        let mut session = subject.running(using)?;
+        session.advance(2)?;
+        subject.doing("fmi3Terminate");
+        session.instance.terminate()?;
+        subject.doing("reading after fmi3Terminate");
+        session.readings()?;
+    }
+    Ok(())
+}
+
+// ---------------------------------------------------------------- values
+
+/// `values.readable`
+pub fn readable(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    for using in subject.plain_uses() {
+        let mut session = subject.running(using)?;
+        for v in subject.readable() {
+            subject.doing(format!("reading {}", v.name));
+            if let Err(error) = session.get(v) {
+                findings.add(v.place(), format!("{} ({error})", using.name()));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// `values.start`
+pub fn start(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    let using = subject.plain_uses()[0];
+    let mut session = subject.session(using)?;
+    session.enter_initialization()?;
+    for v in subject.readable().filter(|v| v.initial.as_deref() == Some("exact")) {
+        let Some(starts) = start_values(v) else { continue };
+        let values = session.read(v)?;
+        let differ = values.iter().zip(&starts).position(|(a, b)| match (a, b) {
+            (Value::Real(a), Value::Real(b)) => (a - b).abs() > 1e-12 * b.abs(),
+            (a, b) => a != b,
+        });
+        if let Some(i) = differ {
+            findings.add(
+                v.place(),
+                format!(
+                    "it is {:?} in initialization mode and {:?} in modelDescription.xml",
+                    values[i], starts[i]
+                ),
+            );
+        }
+    }
+    Ok(())
+}
+
+/// `values.set`
+pub fn set(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    let using = subject.plain_uses()[0];
+    let wanted = |v: &&super::Variable| v.is_set_by_hosts() && v.causality != "structuralParameter";
+    for v in subject.readable().filter(wanted) {
+        let Some(mut values) = start_values(v) else { continue };
+        let (min, max) = v.bounds();
+        // distinct for each element, so that one in the place of another shows
+        for (i, value) in values.iter_mut().enumerate() {
+            match value {
+                Value::Real(x) => {
+                    // a Float32 has it as it is
+                    let size = if *x == 0.0 { v.nominal() } else { x.abs() };
+                    let moved = f64::from((*x + size * (i + 1) as f64 / 64.0) as f32);
+                    if moved > min && moved < max {
+                        *x = moved;
+                    }
+                }
+                Value::Boolean(yes) => *yes = !*yes,
+                Value::Integer(n) if v.kind == Type::Integer => {
+                    let moved = n.saturating_add(1);
+                    if (moved as f64) < max.min(120.0) {
+                        *n = moved;
+                    }
+                }
+                Value::Integer(_) => {}
+                Value::String(text) => text.push('x'),
+            }
+        }
+        let mut session = subject.session(using)?;
+        subject.doing(format!("setting {}", v.name));
+        if let Err(error) = session.instance.set_values(v.c_type, v.reference, &values) {
+            // a value that the model has reasons to refuse is none to complain of, without being told why
+            if error.messages.is_empty() {
+                findings.add(v.place(), format!("{error} (allowed: a message)"));
+            }
+            continue;
+        }
+        if session.enter_initialization().is_err() {
+            continue;
+        }
+        let read = session.read(v)?;
+        if let Some(i) = (0..values.len()).find(|i| read[*i] != values[*i]) {
+            findings.add(
+                v.place(),
+                format!("element {} was set to {:?} and is {:?}", i + 1, values[i], read[i]),
+            );
+        }
+    }
+    Ok(())
+}
+
+/// `values.type`
+pub fn of_type(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    let mut session = subject.running(subject.plain_uses()[0])?;
+    for v in subject.readable() {
+        let n = v.length();
+        subject.doing(format!("reading {} by the call of another type", v.name));
+        let (call, answer) = match v.c_type {
+            CType::Float64 => {
+                ("fmi3GetInt32", session.instance.fetch(&[v.reference], &mut vec![0i32; n]))
+            }
+            _ => ("fmi3GetFloat64", session.instance.fetch(&[v.reference], &mut vec![0.0f64; n])),
+        };
+        if answer.is_ok() {
+            findings.add(
+                v.place(),
+                format!("{call} of this {} returns fmi3OK (allowed: fmi3Error)", v.written.name),
+            );
+        }
+    }
+    Ok(())
+}
+
+/// `values.unknown`
+pub fn unknown(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    let last = subject.description.variables.iter().map(|v| v.reference).max().unwrap_or(0);
+    let Some(unknown) = last.checked_add(1000) else {
+        findings.skip("no value reference is left");
+        return Ok(());
+    };
+    let mut session = subject.running(subject.plain_uses()[0])?;
+    subject.doing(format!("fmi3GetFloat64 of valueReference {unknown}, which no variable has"));
+    if session.instance.fetch(&[unknown], &mut [0.0f64]).is_ok() {
+        findings.add(subject.now(), "it returns fmi3OK (allowed: fmi3Error)");
+    }
+    Ok(())
+}
+
+/// `values.counts`
+pub fn counts(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    const CANARY: f64 = -7.25e77;
+    let mut session = subject.running(subject.plain_uses()[0])?;
+    let all = subject.readable().filter(|v| v.c_type == CType::Float64);
+    for v in all {
+        let n = v.length();
+        // the FMU is told of n values and of one less; the array is longer
+        for told in [n, n.saturating_sub(1)] {
+            subject.doing(format!("fmi3GetFloat64 of {} with nValues = {told}", v.name));
+            let mut values = vec![CANARY; n + 8];
+            let answer = session.instance.fetch(&[v.reference], &mut values[..told]);
+            if values[told..].iter().any(|x| x.to_bits() != CANARY.to_bits()) {
+                findings.add(
+                    v.place(),
+                    format!("fmi3GetFloat64 with nValues = {told} writes more values than that"),
+                );
+            } else if told < n && answer.is_ok() {
+                findings.warn(
+                    v.place(),
+                    format!(
+                        "fmi3GetFloat64 of its {n} values with nValues = {told} returns fmi3OK"
+                    ),
+                );
+            }
+        }
+    }
+    Ok(())
+}
+
+/// `values.booleans`
+pub fn booleans(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    let mut session = subject.running(subject.plain_uses()[0])?;
+    session.advance(2)?;
+    let mut any = false;
+    for v in subject.readable().filter(|v| v.c_type == CType::Boolean) {
+        any = true;
+        let mut bytes = vec![0xa5; v.length()];
+        session.instance.fetch_boolean(&[v.reference], &mut bytes)?;
+        if let Some(byte) = bytes.iter().find(|byte| **byte > 1) {
+            findings.add(v.place(), format!("fmi3GetBoolean writes {byte} (allowed: 0, 1)"));
+        }
+    }
+    if !any {
+        findings.skip("it has no Boolean");
+    }
+    Ok(())
+}
+
+/// `values.fixed`
+pub fn fixed(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    let Some(using) = subject.plain_uses().first().copied() else { return Ok(()) };
+    let mut any = false;
+    let wanted = |v: &&super::Variable| {
+        v.causality == "parameter" && v.variability == "fixed" && v.c_type == CType::Float64
+    };
+    for v in subject.readable().filter(wanted) {
+        any = true;
+        let mut session = subject.running(using)?;
+        session.advance(1)?;
+        let before = session.read(v)?;
+        let moved: Vec<f64> = before
+            .iter()
+            .map(|x| if let Value::Real(x) = x { x + 0.125 * v.nominal() } else { 0.0 })
+            .collect();
+        subject.doing(format!("setting the fixed parameter {} after initialisation", v.name));
+        if session.instance.give(&[v.reference], &moved).is_ok() && session.read(v)? != before {
+            findings.add(
+                v.place(),
+                "it is fixed, and fmi3SetFloat64 after initialization changes it (allowed: fmi3Error)",
+            );
+        }
+    }
+    if !any {
+        findings.skip("it has no fixed parameter of type Float64");
+    }
+    Ok(())
+}
+
+// ---------------------------------------------------------------- states
+
+/// Those uses in which states can be got and set.
+fn saving(subject: &Subject, flag: &str) -> Vec<Use> {
+    subject.uses().into_iter().filter(|u| subject.can(u.interface, flag)).collect()
+}
+
+/// `states.restore`
+pub fn restore(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    let uses = saving(subject, "canGetAndSetFMUState");
+    if uses.is_empty() {
+        findings.skip("canGetAndSetFMUState is not declared");
+    }
+    for using in uses {
+        let mut session = subject.running(using)?;
+        session.advance(5)?;
+        subject.doing("fmi3GetFMUState");
+        let state = session.instance.get_state()?;
+        let (time, next) = (session.time, session.next_event);
+        let at = session.readings()?;
+        session.advance(STEPS)?;
+        let first = session.readings()?;
+        subject.doing("fmi3SetFMUState");
+        session.instance.set_state(&state)?;
+        (session.time, session.next_event, session.ended) = (time, next, false);
+        let back = difference(&at, &session.readings()?);
+        session.advance(STEPS)?;
+        let again = difference(&first, &session.readings()?);
+        if let Some(text) = back.or(again) {
+            findings.add(
+                using.name(),
+                format!(
+                    "before and after fmi3SetFMUState {text} (allowed: the same to the last bit)"
+                ),
+            );
+        }
+        subject.doing("fmi3FreeFMUState");
+        session.instance.free_state(state)?;
+        session.instance.free_state_null()?;
+    }
+    Ok(())
+}
+
+/// `states.serialize`
+pub fn serialize(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    let uses = saving(subject, "canSerializeFMUState");
+    if uses.is_empty() {
+        findings.skip("canSerializeFMUState is not declared");
+    }
+    for using in uses {
+        let mut session = subject.running(using)?;
+        session.advance(5)?;
+        let state = session.instance.get_state()?;
+        subject.doing("fmi3SerializeFMUState");
+        let bytes = session.instance.serialize(&state)?;
+        let (time, next) = (session.time, session.next_event);
+        session.advance(STEPS)?;
+        let first = session.readings()?;
+        subject.doing("fmi3DeserializeFMUState");
+        let copy = session.instance.deserialize(&bytes)?;
+        session.instance.set_state(&copy)?;
+        (session.time, session.next_event, session.ended) = (time, next, false);
+        session.advance(STEPS)?;
+        if let Some(text) = difference(&first, &session.readings()?) {
+            findings.add(using.name(), format!("before and after a serialised state {text}"));
+        }
+        if let Some(half) = bytes.len().checked_div(2).filter(|half| *half > 0) {
+            subject.doing("fmi3DeserializeFMUState of half the bytes");
+            if let Ok(wrong) = session.instance.deserialize(&bytes[..half]) {
+                findings.add(
+                    using.name(),
+                    format!(
+                        "{half} of {} bytes are taken for a state (allowed: fmi3Error)",
+                        bytes.len()
+                    ),
+                );
+                session.instance.free_state(wrong)?;
+            }
+        }
+        session.instance.free_state(copy)?;
+        session.instance.free_state(state)?;
+    }
+    Ok(())
+}
+
+// ---------------------------------------------------------------- log
+
+/// `log.categories`
+pub fn log_categories(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    let declared: Vec<&str> =
+        subject.description.root.list("LogCategories").filter_map(|c| c.get("name")).collect();
+    if declared.is_empty() {
+        findings.skip("no log categories are declared");
+        return Ok(());
+    }
+    let mut session = subject.running(subject.plain_uses()[0])?;
+    session.advance(2)?;
+    // something to be refused, and said
+    subject.doing("fmi3GetFloat64 of a valueReference that no variable has");
+    let refused = session.instance.fetch(&[u32::MAX], &mut [0.0f64]);
+    let mut messages = session.instance.take_messages();
+    messages.extend(refused.err().into_iter().flat_map(|error| error.messages));
+    if session.instance.uncategorised() > 0 {
+        findings
+            .add("logMessage", "a message has the category NULL (allowed: one of those declared)");
+    }
+    for message in messages {
+        let known = declared.contains(&message.category.as_str());
+        if !known && !message.category.is_empty() {
+            findings.add(
+                "logMessage",
+                format!("category \"{}\" (declared: {})", message.category, declared.join(", ")),
+            );
+        }
+    }
+    Ok(())
+}
+
+/// `log.errors`
+pub fn log_errors(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    let mut session = subject.running(subject.plain_uses()[0])?;
+    subject.doing("fmi3GetFloat64 of a valueReference that no variable has");
+    if let Err(error) = session.instance.fetch(&[u32::MAX], &mut [0.0f64])
+        && error.status == Status::Error
+        && error.messages.is_empty()
+    {
+        findings.add(subject.now(), "it returns fmi3Error and says nothing (allowed: a message)");
+    }
+    Ok(())
+}
+
+// ---------------------------------------------------------------- Model Exchange
+
+/// `exchange.counts`
+pub fn exchange_counts(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    if subject.binary(Interface::ModelExchange).is_none() {
+        findings.skip("it offers no Model Exchange");
+        return Ok(());
+    }
+    let d = &subject.description;
+    let mut session = subject.running(Use::EXCHANGE)?;
+    let length = |r: u32| d.at(r).map_or(0, super::Variable::length);
+    let states: usize = d.states().into_iter().map(length).sum();
+    let indicators = d.unknowns("EventIndicator").filter_map(|u| u.reference);
+    let indicators: usize = indicators.map(length).sum();
+    for (call, own, declared, list) in [
+        (
+            "fmi3GetNumberOfContinuousStates",
+            session.instance.number_of_states()?,
+            states,
+            "ContinuousStateDerivative",
+        ),
+        (
+            "fmi3GetNumberOfEventIndicators",
+            session.instance.number_of_indicators()?,
+            indicators,
+            "EventIndicator",
+        ),
+    ] {
+        if own != declared {
+            findings
+                .add(call, format!("it says {own}; the elements {list} have {declared} values"));
+        }
+    }
+    Ok(())
+}
+
+/// `exchange.vectors`
+pub fn exchange_vectors(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    if subject.binary(Interface::ModelExchange).is_none() {
+        findings.skip("it offers no Model Exchange");
+        return Ok(());
+    }
+    let d = &subject.description;
+    let mut session = subject.running(Use::EXCHANGE)?;
+    session.advance(3)?;
+    let derivatives: Vec<u32> =
+        d.unknowns("ContinuousStateDerivative").filter_map(|u| u.reference).collect();
+    let indicators: Vec<u32> = d.unknowns("EventIndicator").filter_map(|u| u.reference).collect();
+    let n = session.instance.number_of_states()?;
+    let nz = session.instance.number_of_indicators()?;
+    let (mut x, mut dx, mut z) = (vec![0.0; n], vec![0.0; n], vec![0.0; nz]);
+    session.instance.continuous_states(&mut x)?;
+    session.instance.derivatives(&mut dx)?;
+    session.instance.event_indicators(&mut z)?;
+    for (call, vector, references) in [
+        ("fmi3GetContinuousStates", x, d.states()),
+        ("fmi3GetContinuousStateDerivatives", dx, derivatives),
+        ("fmi3GetEventIndicators", z, indicators),
+    ] {
+        let mut of = vector.iter();
+        for v in references.iter().filter_map(|r| d.at(*r)) {
+            for value in session.read(v)? {
+                if let (Value::Real(a), Some(b)) = (&value, of.next())
+                    && a.to_bits() != b.to_bits()
+                {
+                    findings.add(
+                        call,
+                        format!("it has {b:?} in the place of {}, which is {a:?}", v.name),
+                    );
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// `exchange.states_set`
+pub fn states_set(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    if subject.binary(Interface::ModelExchange).is_none() {
+        findings.skip("it offers no Model Exchange");
+        return Ok(());
+    }
+    let mut session = subject.running(Use::EXCHANGE)?;
+    let n = session.instance.number_of_states()?;
+    let mut x = vec![0.0; n];
+    session.instance.continuous_states(&mut x)?;
+    let moved: Vec<f64> = x.iter().map(|x| x + 1e-3 * x.abs().max(1e-3)).collect();
+    subject.doing("fmi3SetContinuousStates");
+    session.instance.set_continuous_states(&moved)?;
+    session.instance.continuous_states(&mut x)?;
+    if let Some(i) = (0..n).find(|i| x[*i].to_bits() != moved[*i].to_bits()) {
+        findings.add(
+            "fmi3SetContinuousStates",
+            format!("state {} was set to {:?} and is {:?}", i + 1, moved[i], x[i]),
+        );
+    }
+    Ok(())
+}
+
+/// `exchange.indicators`
+pub fn indicators(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    if subject.binary(Interface::ModelExchange).is_none() {
+        findings.skip("it offers no Model Exchange");
+        return Ok(());
+    }
+    let mut session = subject.running(Use::EXCHANGE)?;
+    let nz = session.instance.number_of_indicators()?;
+    if nz == 0 {
+        findings.skip("it has no event indicators");
+        return Ok(());
+    }
+    session.advance(10 * STEPS)?;
+    if let Some((time, i)) = session.zero_indicator {
+        findings.add(
+            format!("event indicator {}, t = {time:?} s", i + 1),
+            "it is 0 after event mode (allowed: on the side on which the model is)",
+        );
+    }
+    Ok(())
+}

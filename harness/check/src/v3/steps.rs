@@ -1,0 +1,773 @@
+//! Rules of steps for FMUs 3.0: what fmi3DoStep answers, events, intermediate update, derivatives and dependencies
+//! (FMI 3.0.2, sections 2.2.9 to 2.2.12, 2.3.5 and 4).
+
+use anyhow::Result;
+
+use super::subject::{STEPS, Session, Use};
+use super::{Subject, Variable};
+use crate::Findings;
+use host::description::{CType, Value};
+use host::fmi3::{Interface, Step, UNWRITTEN, Update};
+
+/// What is wrong with the answers of one fmi3DoStep from `from` by `h`.
+fn faults(using: Use, step: &Step, from: f64, h: f64) -> Vec<String> {
+    let mut faults = Vec::new();
+    for (name, byte) in [
+        ("eventHandlingNeeded", step.event),
+        ("terminateSimulation", step.terminate),
+        ("earlyReturn", step.early_return),
+    ] {
+        match byte {
+            0 | 1 => {}
+            UNWRITTEN => faults.push(format!("{name} is not written")),
+            other => faults.push(format!("{name} is {other} (allowed: 0, 1)")),
+        }
+    }
+    // 4.2.1 lets an FMU miss the end a little, as those do whose own steps do not fit
+    let slack = 1e-2 * h;
+    let end = from + h;
+    if step.last_time.is_nan() {
+        faults.push("lastSuccessfulTime is not written".into());
+    } else if step.early_return == 1 {
+        if !using.early_return {
+            faults.push("it returns early although earlyReturnAllowed is false".into());
+        }
+        if step.last_time < from - slack || step.last_time > end + slack {
+            faults.push(format!(
+                "lastSuccessfulTime after an early return is {:?} (allowed: {from:?} to {end:?})",
+                step.last_time
+            ));
+        }
+    } else if (step.last_time - end).abs() > slack {
+        faults.push(format!(
+            "lastSuccessfulTime is {:?}, the end of the step {end:?}",
+            step.last_time
+        ));
+    }
+    if step.event == 1 && !using.event_mode {
+        faults.push("eventHandlingNeeded although eventModeUsed is false".into());
+    }
+    faults
+}
+
+fn stepping(subject: &Subject, findings: &mut Findings) -> bool {
+    let is_there = subject.binary(Interface::CoSimulation).is_some();
+    if !is_there {
+        findings.skip("it offers no Co-Simulation");
+    }
+    is_there
+}
+
+fn stepping_uses(subject: &Subject) -> Vec<Use> {
+    let uses = subject.uses().into_iter();
+    uses.filter(|u| u.interface == Interface::CoSimulation).collect()
+}
+
+/// Steps long enough to meet events.
+const LONG: usize = 200;
+
+/// `steps.run`
+pub fn runs(subject: &Subject, _: &mut Findings) -> Result<()> {
+    for using in subject.uses() {
+        subject.running(using)?.advance(STEPS)?;
+    }
+    Ok(())
+}
+
+/// `steps.answers`
+pub fn answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    if !stepping(subject, findings) {
+        return Ok(());
+    }
+    let is_clock = |v: &&Variable| v.causality == "independent" && v.c_type == CType::Float64;
+    let clock = subject.readable().find(is_clock).cloned();
+    for using in stepping_uses(subject) {
+        let mut session = subject.running(using)?;
+        let mut told: Vec<String> = Vec::new();
+        for k in 0..LONG {
+            session.stimulate(k)?;
+            let (from, h) = (session.time, session.h);
+            let step = session.raw_step(h)?;
+            let mut all = faults(using, &step, from, h);
+            if let Some(v) = &clock
+                && let [Value::Real(own)] = session.read(v)?[..]
+                && (own - step.last_time).abs() > 1e-2 * h
+            {
+                all.push(format!(
+                    "lastSuccessfulTime is {:?}, {} is {own:?}",
+                    step.last_time, v.name
+                ));
+            }
+            for fault in all {
+                let kind = fault.split_whitespace().take(2).collect::<Vec<_>>().join(" ");
+                if !told.contains(&kind) {
+                    findings.add(format!("{}, step from {from:?} s", using.name()), fault);
+                    told.push(kind);
+                }
+            }
+            if step.event == 1 && using.event_mode && !session.ended {
+                session.event()?;
+            }
+            if session.ended {
+                break;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// `steps.wrong`
+pub fn wrong(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    if !stepping(subject, findings) {
+        return Ok(());
+    }
+    let mut session = subject.running(Use::PLAIN)?;
+    session.advance(1)?;
+    subject.doing("fmi3DoStep with a communicationStepSize below 0");
+    if session.instance.do_step(session.time, -session.h).is_ok() {
+        findings.add(subject.now(), "it returns fmi3OK (allowed: fmi3Error)");
+    }
+    Ok(())
+}
+
+// ---------------------------------------------------------------- events
+
+/// `events.answers`
+pub fn event_answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    let uses = subject.uses().into_iter();
+    let uses: Vec<Use> =
+        uses.filter(|u| u.event_mode || u.interface == Interface::ModelExchange).collect();
+    if uses.is_empty() {
+        findings.skip("it has no event mode");
+    }
+    for using in uses {
+        let mut session = subject.session(using)?;
+        session.enter_initialization()?;
+        session.instance.exit_initialization_mode()?;
+        let mut steps = 0;
+        for k in 0..LONG {
+            let info = session.leave_event()?;
+            for (name, byte) in [
+                ("discreteStatesNeedUpdate", info.needs_update),
+                ("terminateSimulation", info.terminate),
+                ("nominalsOfContinuousStatesChanged", info.nominals_changed),
+                ("valuesOfContinuousStatesChanged", info.values_changed),
+                ("nextEventTimeDefined", info.next_event_defined),
+            ] {
+                if byte > 1 {
+                    let what =
+                        if byte == UNWRITTEN { "is not written" } else { "is neither 0 nor 1" };
+                    findings.add(
+                        format!("{}, fmi3UpdateDiscreteStates", using.name()),
+                        format!("{name} {what}"),
+                    );
+                }
+            }
+            let passed = |next: f64| next.is_nan() || next <= session.time;
+            if info.next_event_defined == 1 && passed(info.next_event_time) {
+                findings.add(
+                    format!("{}, t = {:?} s", using.name(), session.time),
+                    format!("nextEventTime is {:?} (allowed: later)", info.next_event_time),
+                );
+            }
+            if session.ended || !findings.list.is_empty() {
+                break;
+            }
+            // on to the next event
+            let events = session.events;
+            while session.events == events && !session.ended && steps < LONG {
+                steps += 1;
+                session.stimulate(k)?;
+                let until = session.time + session.h;
+                session.advance_to(until)?;
+            }
+            if session.ended || session.events == events || steps >= LONG {
+                break;
+            }
+            subject.doing(format!("event mode at {:?} s", session.time));
+            session.instance.enter_event_mode()?;
+        }
+    }
+    Ok(())
+}
+
+/// `events.idempotent`
+pub fn idempotent(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    let uses = subject.uses().into_iter();
+    let uses: Vec<Use> =
+        uses.filter(|u| u.event_mode || u.interface == Interface::ModelExchange).collect();
+    if uses.is_empty() {
+        findings.skip("it has no event mode");
+    }
+    for using in uses {
+        let mut session = subject.running(using)?;
+        session.advance(STEPS)?;
+        if session.ended {
+            continue;
+        }
+        session.instance.enter_event_mode()?;
+        session.iterate()?;
+        let before = session.readings()?;
+        let info = session.iterate()?;
+        let clocks =
+            subject.description.variables.iter().any(|v| v.written.get("clocks").is_some());
+        if let Some(text) = super::subject::difference(&before, &session.readings()?)
+            && !clocks
+            && info.terminate != 1
+        {
+            findings.add(
+                using.name(),
+                format!(
+                    "after fmi3UpdateDiscreteStates, and after another at the same instant, {text}"
+                ),
+            );
+        }
+    }
+    Ok(())
+}
+
+/// `events.discrete_held`
+pub fn discrete_held(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    let uses: Vec<Use> = stepping_uses(subject).into_iter().filter(|u| u.event_mode).collect();
+    if uses.is_empty() {
+        findings.skip("it has no event mode in Co-Simulation");
+    }
+    let discrete: Vec<Variable> = subject
+        .readable()
+        .filter(|v| v.variability == "discrete" && v.causality != "input")
+        .cloned()
+        .collect();
+    for using in uses {
+        let mut session = subject.running(using)?;
+        for k in 0..LONG {
+            session.stimulate(k)?;
+            let before: Vec<Vec<Value>> =
+                discrete.iter().map(|v| session.read(v)).collect::<Result<_>>()?;
+            let (from, h) = (session.time, session.h);
+            let step = session.raw_step(h)?;
+            for (v, before) in discrete.iter().zip(&before) {
+                let after = session.read(v)?;
+                if after != *before {
+                    findings.add(
+                        v.place(),
+                        format!(
+                            "it is {before:?} before and {after:?} after fmi3DoStep from {from:?} s ({}; allowed: \
+                             discrete variables change in event mode alone)",
+                            using.name()
+                        ),
+                    );
+                    return Ok(());
+                }
+            }
+            if step.event == 1 && !session.ended {
+                session.event()?;
+            }
+            if session.ended {
+                break;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The outputs that are numbers or Booleans; the continuous ones alone, if so asked.
+fn outputs(session: &mut Session, continuous: bool) -> Result<Vec<(String, f64)>> {
+    let wanted = |v: &&Variable| v.causality == "output" && (!continuous || v.is_continuous());
+    let all: Vec<Variable> = session.subject.readable().filter(wanted).cloned().collect();
+    let mut outputs = Vec::new();
+    for v in all {
+        for value in session.read(&v)? {
+            let number = match value {
+                Value::Real(x) => x,
+                Value::Integer(n) => n as f64,
+                Value::Boolean(yes) => f64::from(u8::from(yes)),
+                Value::String(_) => continue,
+            };
+            outputs.push((v.name.clone(), number));
+        }
+    }
+    Ok(outputs)
+}
+
+/// Share of an output's size by which it may depend on how the host uses the FMU: its own solver may be restarted.
+const SAME: f64 = 1e-3;
+
+/// `events.same_trajectory`
+pub fn same_trajectory(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    if !stepping(subject, findings) {
+        return Ok(());
+    }
+    let mut plain = subject.running(Use::PLAIN)?;
+    let mut reference = Vec::new();
+    let until = |session: &Session, k: usize| session.subject.start() + (k + 1) as f64 * session.h;
+    for k in 0..LONG {
+        if plain.ended {
+            break;
+        }
+        let to = until(&plain, k);
+        plain.advance_to(to)?;
+        reference.push(outputs(&mut plain, false)?);
+    }
+    let others: Vec<Use> =
+        stepping_uses(subject).into_iter().filter(|u| *u != Use::PLAIN).collect();
+    if others.is_empty() {
+        findings.skip("it has neither event mode nor early return");
+    }
+    for using in others {
+        let mut session = subject.running(using)?;
+        for (k, expected) in reference.iter().enumerate() {
+            let to = until(&session, k);
+            session.advance_to(to)?;
+            let own = outputs(&mut session, false)?;
+            let size = |name: &str| {
+                let all = reference.iter().flatten().filter(|(n, _)| n == name);
+                all.fold(0.0, |size: f64, (_, x)| size.max(x.abs()))
+            };
+            let far = own
+                .iter()
+                .zip(expected)
+                .find(|((name, a), (_, b))| (a - b).abs() > SAME * size(name));
+            if let Some(((name, a), (_, b))) = far {
+                findings.add(
+                    format!("{}, t = {to:?} s", using.name()),
+                    format!("{name} is {a:?}, and {b:?} in plain Co-Simulation"),
+                );
+                break;
+            }
+        }
+    }
+    Ok(())
+}
+
+// ---------------------------------------------------------------- intermediate update
+
+fn updating(subject: &Subject, findings: &mut Findings) -> bool {
+    let stepping = Interface::CoSimulation;
+    let is =
+        subject.binary(stepping).is_some() && subject.can(stepping, "providesIntermediateUpdate");
+    if !is {
+        findings.skip("providesIntermediateUpdate is not declared");
+    }
+    is
+}
+
+const UPDATING: Use = Use { updates: true, ..Use::PLAIN };
+
+/// `intermediate.time`
+pub fn intermediate_time(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    if !updating(subject, findings) {
+        return Ok(());
+    }
+    let mut session = subject.running(UPDATING)?;
+    let mut last = f64::NEG_INFINITY;
+    for k in 0..STEPS {
+        session.stimulate(k)?;
+        let (from, h) = (session.time, session.h);
+        // as in `faults`: its own steps may not fit
+        let slack = 1e-2 * h;
+        let mut wrong: Option<String> = None;
+        session.raw_step_hearing(
+            h,
+            Some(&mut |update: &Update| {
+                let t = update.time;
+                if !(t >= from - slack && t <= from + h + slack) {
+                    wrong.get_or_insert(format!(
+                        "intermediateUpdateTime {t:?} lies outside of the step"
+                    ));
+                } else if t < last - slack {
+                    wrong.get_or_insert(format!("intermediateUpdateTime {t:?} after {last:?}"));
+                }
+                if update.can_return_early {
+                    wrong.get_or_insert(
+                        "canReturnEarly although earlyReturnAllowed is false".into(),
+                    );
+                }
+                if update.step_finished {
+                    last = last.max(t);
+                }
+                None
+            }),
+        )?;
+        if let Some(text) = wrong {
+            findings.add(format!("step from {from:?} s by {h:?} s"), text);
+            return Ok(());
+        }
+    }
+    if session.instance.updates() == 0 {
+        findings.add(
+            "intermediateUpdate",
+            "it is never called, although providesIntermediateUpdate is true",
+        );
+    }
+    Ok(())
+}
+
+/// `intermediate.early_return`
+pub fn intermediate_early_return(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    if !updating(subject, findings) {
+        return Ok(());
+    }
+    if !subject.can(Interface::CoSimulation, "canReturnEarlyAfterIntermediateUpdate") {
+        findings.skip("canReturnEarlyAfterIntermediateUpdate is not declared");
+        return Ok(());
+    }
+    let using = Use { early_return: true, ..UPDATING };
+    let mut session = subject.running(using)?;
+    let (from, h) = (session.time, 10.0 * session.h);
+    let mut asked = None;
+    let step = session.raw_step_hearing(
+        h,
+        Some(&mut |update: &Update| {
+            if update.can_return_early && asked.is_none() && update.time < from + h {
+                asked = Some(update.time);
+                return Some(update.time);
+            }
+            None
+        }),
+    )?;
+    match asked {
+        None => findings.skip("it offers no early return in a step of ten communication steps"),
+        Some(time) if step.early_return != 1 => findings.add(
+            format!("step from {from:?} s by {h:?} s"),
+            format!(
+                "an early return was asked for at {time:?} s, and earlyReturn is {}",
+                step.early_return
+            ),
+        ),
+        Some(time) if !(step.last_time <= from + h && step.last_time >= time - 1e-9 * h) => {
+            findings.add(
+                format!("step from {from:?} s by {h:?} s"),
+                format!(
+                    "lastSuccessfulTime is {:?} after an early return asked for at {time:?} s",
+                    step.last_time
+                ),
+            )
+        }
+        Some(_) => {}
+    }
+    Ok(())
+}
+
+/// `intermediate.inputs`
+///
+/// An input that goes in a straight line through a step, set in intermediate update, is followed better than one that
+/// is held: the outputs come nearer to those of steps 64 times as short.
+pub fn intermediate_inputs(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    if !updating(subject, findings) {
+        return Ok(());
+    }
+    let inputs: Vec<Variable> =
+        subject.inputs().filter(|v| v.written.flag("intermediateUpdate")).cloned().collect();
+    if inputs.is_empty() {
+        findings.skip("no input has intermediateUpdate");
+        return Ok(());
+    }
+    const FINE: usize = 64;
+    let fixed = subject.description.interface("CoSimulation");
+    if fixed.is_some_and(|e| !e.flag("canHandleVariableCommunicationStepSize")) {
+        findings.skip("its communication step is fixed");
+        return Ok(());
+    }
+    for v in &inputs {
+        let (min, max) = v.bounds();
+        let starts: Vec<f64> = v.starts.iter().filter_map(|s| host::xml::double(s)).collect();
+        let start = |i: usize| starts.get(i).or(starts.first()).copied().unwrap_or(0.0);
+        let steps = 8;
+        let h = subject.step();
+        let slope = v.nominal().max(start(0).abs()) / (h * steps as f64);
+        if start(0) + slope * h * steps as f64 > max || start(0) < min {
+            continue;
+        }
+        let at = |t: f64| -> Vec<f64> {
+            (0..v.length()).map(|i| start(i) + slope * (t - subject.start())).collect()
+        };
+        let run = |parts: usize, along: bool| -> Result<Vec<(String, f64)>> {
+            let mut session = subject.running(if along { UPDATING } else { Use::PLAIN })?;
+            let h = h / parts as f64;
+            for _ in 0..steps * parts {
+                // a held input is as wrong at the step's beginning as at its end: the fine one is right in the middle
+                let middle = if parts > 1 { 0.5 * h } else { 0.0 };
+                let values = at(session.time + middle);
+                session.instance.give(&[v.reference], &values)?;
+                if along {
+                    session.raw_step_hearing(
+                        h,
+                        Some(&mut |update: &Update| {
+                            if update.set_requested {
+                                update.set(&[v.reference], &at(update.time));
+                            }
+                            None
+                        }),
+                    )?;
+                } else {
+                    session.raw_step(h)?;
+                }
+            }
+            outputs(&mut session, true)
+        };
+        let (fine, held, along) = (run(FINE, false)?, run(1, false)?, run(1, true)?);
+        for (((name, right), (_, held)), (_, along)) in fine.iter().zip(&held).zip(&along) {
+            // direct feedthrough shows the input as it was set last, whatever was meant by it
+            let effect = (held - right).abs();
+            if effect > 1e-9 * right.abs().max(1e-9) && (along - right).abs() > 0.5 * effect {
+                findings.add(
+                    v.place(),
+                    format!(
+                        "set in intermediate update along a line, {name} is {along:?}; held it is {held:?}, with \
+                         steps {FINE} times as short {right:?} (allowed: nearer to the last)"
+                    ),
+                );
+            }
+        }
+    }
+    Ok(())
+}
+
+// ---------------------------------------------------------------- derivatives
+
+/// Unknowns and knowns of directional derivatives that are Float64 and listed with their dependencies.
+fn pairs(subject: &Subject) -> Vec<(Variable, Vec<Variable>)> {
+    let d = &subject.description;
+    let states = d.states();
+    let lists = ["Output", "ContinuousStateDerivative"];
+    let all = d.structure.iter().filter(|u| lists.contains(&u.list.as_str()));
+    let float = |v: &Variable| v.c_type == CType::Float64 && v.is_continuous();
+    all.filter_map(|u| {
+        let unknown = d.at(u.reference?).filter(|v| float(v))?;
+        let knowns = d.variables.iter().filter(|v| {
+            let listed = u.dependencies.as_ref().is_none_or(|all| all.contains(&v.reference));
+            let is_known = v.causality == "input" || states.contains(&v.reference);
+            float(v) && is_known && listed
+        });
+        Some((unknown.clone(), knowns.cloned().collect()))
+    })
+    .collect()
+}
+
+fn real(values: &[Value]) -> Vec<f64> {
+    values.iter().map(|v| if let Value::Real(x) = v { *x } else { f64::NAN }).collect()
+}
+
+/// The Float64 value of an unknown where a known is displaced in one element.
+fn displaced(
+    session: &mut Session,
+    unknown: &Variable,
+    known: &Variable,
+    base: &[f64],
+    element: usize,
+    by: f64,
+) -> Result<Vec<f64>> {
+    let mut moved = base.to_vec();
+    moved[element] += by;
+    session.instance.give(&[known.reference], &moved)?;
+    let values = session.read(unknown)?;
+    session.instance.give(&[known.reference], base)?;
+    Ok(real(&values))
+}
+
+fn deriving(subject: &Subject, flag: &str, findings: &mut Findings) -> Option<Use> {
+    // where derivatives follow from states and inputs at once: Model Exchange
+    if subject.binary(Interface::ModelExchange).is_none() {
+        findings.skip(
+            "it offers no Model Exchange, where derivatives can be compared with differences",
+        );
+        return None;
+    }
+    if !subject.can(Interface::ModelExchange, flag) {
+        findings.skip(format!("{flag} is not declared"));
+        return None;
+    }
+    Some(Use::EXCHANGE)
+}
+
+/// `derivatives.directional`
+pub fn directional(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    let Some(using) = deriving(subject, "providesDirectionalDerivatives", findings) else {
+        return Ok(());
+    };
+    let mut session = subject.running(using)?;
+    session.advance(2)?;
+    for (unknown, knowns) in pairs(subject) {
+        for known in knowns {
+            let base = real(&session.read(&known)?);
+            for element in 0..base.len() {
+                let mut seed = vec![0.0; base.len()];
+                seed[element] = 1.0;
+                subject.doing(format!(
+                    "fmi3GetDirectionalDerivative of {} by {}",
+                    unknown.name, known.name
+                ));
+                let own = session.instance.directional_derivative(
+                    &[unknown.reference],
+                    &[known.reference],
+                    &seed,
+                    unknown.length(),
+                )?;
+                let h = 1e-5 * base[element].abs().max(1e-3 * known.nominal()).max(1e-6);
+                let plus = displaced(&mut session, &unknown, &known, &base, element, h)?;
+                let minus = displaced(&mut session, &unknown, &known, &base, element, -h)?;
+                for (i, own) in own.iter().enumerate() {
+                    let (a, b) = (plus[i], minus[i]);
+                    let difference = (a - b) / (2.0 * h);
+                    // a difference loses what rounding takes of the values, and sees curvature
+                    let slack = 1e-4 * difference.abs().max(own.abs())
+                        + 1e-13 * a.abs().max(b.abs()) / h
+                        + 1e-9;
+                    let error = (own - difference).abs();
+                    if error.is_nan() || error > slack {
+                        findings.add(
+                            unknown.place(),
+                            format!(
+                                "its derivative by {} is {own:?}, and {difference:?} by central differences",
+                                known.name
+                            ),
+                        );
+                    }
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// `derivatives.adjoint`
+pub fn adjoint(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    let Some(using) = deriving(subject, "providesAdjointDerivatives", findings) else {
+        return Ok(());
+    };
+    if !subject.can(using.interface, "providesDirectionalDerivatives") {
+        findings.skip("there are no directional derivatives to compare with");
+        return Ok(());
+    }
+    let mut session = subject.running(using)?;
+    session.advance(2)?;
+    for (unknown, knowns) in pairs(subject) {
+        for known in knowns {
+            let (n, m) = (unknown.length(), known.length());
+            for j in 0..m {
+                let mut seed = vec![0.0; m];
+                seed[j] = 1.0;
+                let forward = session.instance.directional_derivative(
+                    &[unknown.reference],
+                    &[known.reference],
+                    &seed,
+                    n,
+                )?;
+                for (i, forward) in forward.iter().enumerate() {
+                    let mut seed = vec![0.0; n];
+                    seed[i] = 1.0;
+                    subject.doing(format!(
+                        "fmi3GetAdjointDerivative of {} by {}",
+                        unknown.name, known.name
+                    ));
+                    let back = session.instance.adjoint_derivative(
+                        &[unknown.reference],
+                        &[known.reference],
+                        &seed,
+                        m,
+                    )?[j];
+                    let error = (back - forward).abs();
+                    if error.is_nan() || error > 1e-12 * forward.abs().max(1e-12) {
+                        findings.add(
+                            unknown.place(),
+                            format!(
+                                "by {} the adjoint derivative is {back:?}, the directional one {forward:?} \
+                                 (allowed: the transpose)",
+                                known.name
+                            ),
+                        );
+                    }
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// `dependencies.declared`
+pub fn declared(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    if subject.binary(Interface::ModelExchange).is_none() {
+        findings.skip(
+            "it offers no Model Exchange, where a value follows from states and inputs at once",
+        );
+        return Ok(());
+    }
+    let d = &subject.description;
+    let states = d.states();
+    let mut session = subject.running(Use::EXCHANGE)?;
+    session.advance(2)?;
+    for unknown in &d.structure {
+        let Some(listed) = &unknown.dependencies else { continue };
+        if !["Output", "ContinuousStateDerivative", "EventIndicator"]
+            .contains(&unknown.list.as_str())
+        {
+            continue;
+        }
+        let Some(v) = unknown.reference.and_then(|r| d.at(r)) else { continue };
+        if v.c_type != CType::Float64 || !v.is_continuous() || !v.is_exchanged() {
+            continue;
+        }
+        for known in d.variables.iter().filter(|k| k.c_type == CType::Float64 && k.is_continuous())
+        {
+            let is_known = known.causality == "input" || states.contains(&known.reference);
+            // an output that is a state depends on itself
+            if !is_known || listed.contains(&known.reference) || known.reference == v.reference {
+                continue;
+            }
+            let base = real(&session.read(known)?);
+            let before = real(&session.read(v)?);
+            for element in 0..base.len() {
+                let by = 1e-2 * base[element].abs().max(known.nominal());
+                subject.doing(format!("moving {} and reading {}", known.name, v.name));
+                let after = displaced(&mut session, v, known, &base, element, by)?;
+                if after.iter().zip(&before).any(|(a, b)| a.to_bits() != b.to_bits()) {
+                    findings.add(
+                        format!("line {}, {}, {}", unknown.line, unknown.list, v.name),
+                        format!(
+                            "it follows {}, which is not among its dependencies: {before:?} becomes {after:?}",
+                            known.name
+                        ),
+                    );
+                    break;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// `dependencies.elements`
+pub fn elements(subject: &Subject, findings: &mut Findings) -> Result<()> {
+    let uses = subject.plain_uses().into_iter();
+    let using =
+        uses.into_iter().find(|u| subject.can(u.interface, "providesPerElementDependencies"));
+    let Some(using) = using else {
+        findings.skip("providesPerElementDependencies is not declared");
+        return Ok(());
+    };
+    let d = &subject.description;
+    let mut session = subject.running(using)?;
+    for unknown in d.structure.iter().filter(|u| u.list == "Output") {
+        let (Some(reference), Some(listed)) = (unknown.reference, &unknown.dependencies) else {
+            continue;
+        };
+        let Some(v) = d.at(reference) else { continue };
+        subject.doing(format!("fmi3GetVariableDependencies of {}", v.name));
+        for one in session.instance.dependencies(reference)? {
+            let length = d.at(one.independent).map(Variable::length);
+            if !listed.contains(&one.independent) {
+                findings.add(
+                    v.place(),
+                    format!(
+                        "it depends on valueReference {}, which is not declared",
+                        one.independent
+                    ),
+                );
+            } else if one.element > v.length() || length.is_none_or(|n| one.independent_element > n)
+            {
+                findings.add(v.place(), format!("{one:?} names an element that is not there"));
+            }
+        }
+    }
+    Ok(())
+}

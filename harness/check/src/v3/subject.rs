@@ -1,0 +1,523 @@
+//! The FMU 3.0 under test, loaded and called as hosts do, and what rules need to do so shortly.
+
+use std::cell::RefCell;
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::{Result, bail};
+
+use super::{Description, Variable};
+use crate::under_test::Unusable;
+use host::c_abi::Called;
+use host::description::{Type, Value};
+use host::fmi3::{EventInfo, Fmu, Instance, Instantiation, Interface, Step, Update};
+use host::xml::{Element, double};
+
+/// Steps of a short run.
+pub const STEPS: usize = 20;
+/// Calls of fmi3UpdateDiscreteStates after which an event iteration counts as endless.
+const ITERATIONS: usize = 100;
+/// Events in one communication step after which its FMU is not followed any more.
+const EVENTS: usize = 1000;
+
+/// Hears of a point within a step, and says when to return early, if at all.
+pub type Within<'a> = dyn FnMut(&Update) -> Option<f64> + 'a;
+
+/// The loaded FMU.
+pub struct Subject {
+    binaries: Vec<(Interface, Fmu)>,
+    /// What the FMU says of itself.
+    pub description: Description,
+    tell: Box<dyn Fn(&str)>,
+    doing: RefCell<String>,
+    deadline: Instant,
+}
+
+/// How an instance is used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Use {
+    /// Which interface.
+    pub interface: Interface,
+    /// eventModeUsed.
+    pub event_mode: bool,
+    /// earlyReturnAllowed.
+    pub early_return: bool,
+    /// intermediateUpdate is handed over.
+    pub updates: bool,
+}
+
+impl Use {
+    /// Co-Simulation as of FMI 2.0: no event mode, no early return, no intermediate update.
+    pub const PLAIN: Use = Use {
+        interface: Interface::CoSimulation,
+        event_mode: false,
+        early_return: false,
+        updates: false,
+    };
+    /// Model Exchange.
+    pub const EXCHANGE: Use = Use { interface: Interface::ModelExchange, ..Use::PLAIN };
+
+    /// As findings name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Use { interface: Interface::ModelExchange, .. } => "Model Exchange",
+            Use { event_mode: true, early_return: true, .. } => {
+                "Co-Simulation with event mode and early return"
+            }
+            Use { event_mode: true, .. } => "Co-Simulation with event mode",
+            Use { early_return: true, .. } => "Co-Simulation with early return",
+            _ => "Co-Simulation",
+        }
+    }
+}
+
+impl Subject {
+    /// Loads the FMU that is unpacked in `directory`, for each interface that rules call. `tell` hears what comes
+    /// next. Makes no instances after `deadline`.
+    pub fn open(
+        directory: &Path,
+        path: &Path,
+        tell: Box<dyn Fn(&str)>,
+        deadline: Instant,
+    ) -> Result<Subject> {
+        let xml = std::fs::read(directory.join("modelDescription.xml"))?;
+        let description = Description::new(Element::parse(&xml).map_err(anyhow::Error::msg)?);
+        let mut binaries = Vec::new();
+        for (name, interface) in
+            [("CoSimulation", Interface::CoSimulation), ("ModelExchange", Interface::ModelExchange)]
+        {
+            if description.interface(name).is_some() {
+                binaries.push((interface, Fmu::load_for(Some(interface), directory, path)?));
+            }
+        }
+        if binaries.is_empty() {
+            bail!("it offers neither Co-Simulation nor Model Exchange, which alone are called");
+        }
+        let doing = RefCell::default();
+        Ok(Subject { binaries, description, tell, doing, deadline })
+    }
+
+    /// Tells what comes next: the place of what goes wrong then.
+    pub fn doing(&self, what: impl Into<String>) {
+        let what = what.into();
+        (self.tell)(&what);
+        *self.doing.borrow_mut() = what;
+    }
+
+    /// What it was told last.
+    pub fn now(&self) -> String {
+        let doing = self.doing.borrow();
+        if doing.is_empty() { "a first call".into() } else { doing.clone() }
+    }
+
+    /// The interfaces that are called, Co-Simulation first.
+    pub fn interfaces(&self) -> Vec<Interface> {
+        self.binaries.iter().map(|(interface, _)| *interface).collect()
+    }
+
+    /// The binary of an interface, if it has that.
+    pub fn binary(&self, interface: Interface) -> Option<&Fmu> {
+        self.binaries.iter().find(|(of, _)| *of == interface).map(|(_, fmu)| fmu)
+    }
+
+    /// Whether an interface declares a capability.
+    pub fn can(&self, interface: Interface, flag: &str) -> bool {
+        let name = match interface {
+            Interface::CoSimulation => "CoSimulation",
+            Interface::ModelExchange => "ModelExchange",
+        };
+        self.description.interface(name).is_some_and(|element| element.flag(flag))
+    }
+
+    /// The plain use of each interface there is.
+    pub fn plain_uses(&self) -> Vec<Use> {
+        let uses = [Use::PLAIN, Use::EXCHANGE].into_iter();
+        uses.filter(|u| self.binary(u.interface).is_some()).collect()
+    }
+
+    /// Every use of the interfaces that the FMU declares.
+    pub fn uses(&self) -> Vec<Use> {
+        let mut uses = self.plain_uses();
+        let stepping = Interface::CoSimulation;
+        if self.binary(stepping).is_some() && self.can(stepping, "hasEventMode") {
+            uses.push(Use { event_mode: true, ..Use::PLAIN });
+            uses.push(Use { event_mode: true, early_return: true, ..Use::PLAIN });
+        }
+        if self.binary(stepping).is_some() && self.can(stepping, "mightReturnEarlyFromDoStep") {
+            uses.push(Use { early_return: true, ..Use::PLAIN });
+        }
+        uses
+    }
+
+    fn number(&self, name: &str) -> Option<f64> {
+        let experiment = self.description.root.child("DefaultExperiment");
+        experiment.and_then(|e| e.number(name)).filter(|x| x.is_finite())
+    }
+
+    /// Start time, s.
+    pub fn start(&self) -> f64 {
+        self.number("startTime").unwrap_or(0.0)
+    }
+
+    /// Communication step, s: the FMU's own or a 500th of its experiment.
+    pub fn step(&self) -> f64 {
+        let fixed = self.description.interface("CoSimulation");
+        let fixed = fixed.and_then(|e| e.number("fixedInternalStepSize")).filter(|h| *h > 0.0);
+        let span = self.number("stopTime").map(|stop| stop - self.start()).filter(|s| *s > 0.0);
+        let step = self.number("stepSize").filter(|h| *h > 0.0);
+        let step = step.filter(|h| span.is_none_or(|span| *h * STEPS as f64 <= span));
+        let step = step.or(span.map(|span| span / 500.0)).unwrap_or(0.01);
+        match fixed {
+            // a whole number of its own steps
+            // a whole number of its own steps, of which there may be millions in a 500th of the experiment
+            Some(own) => (step / own).round().clamp(1.0, 100.0) * own,
+            None => step,
+        }
+    }
+
+    /// The arguments of an instance.
+    pub fn instantiation(&self, using: Use) -> Result<Instantiation<'_>> {
+        let Some(binary) = self.binary(using.interface) else { bail!("no such interface") };
+        let mut with = binary.instantiation("check");
+        with.interface = using.interface;
+        with.event_mode = using.event_mode;
+        with.early_return = using.early_return;
+        with.intermediate_update = using.updates;
+        if !using.updates {
+            with.required.clear();
+        }
+        Ok(with)
+    }
+
+    /// A new instance.
+    pub fn session(&self, using: Use) -> Result<Session<'_>> {
+        if Instant::now() > self.deadline {
+            let why = "the time for its calls is over (--limit gives more)".into();
+            return Err(Unusable { rule: "", why }.into());
+        }
+        self.doing(format!("making an instance for {}", using.name()));
+        let with = self.instantiation(using)?;
+        let Some(binary) = self.binary(using.interface) else { bail!("no such interface") };
+        let instance = binary
+            .instantiate_with(&with)
+            .map_err(|error| Unusable { rule: "load.instance", why: error.to_string() })?;
+        let (time, h) = (self.start(), self.step());
+        Ok(Session {
+            subject: self,
+            using,
+            instance,
+            time,
+            h,
+            next_event: None,
+            events: 0,
+            zero_indicator: None,
+            ended: false,
+        })
+    }
+
+    /// A new instance, initialised and ready for a step.
+    pub fn running(&self, using: Use) -> Result<Session<'_>> {
+        let mut session = self.session(using)?;
+        session.initialise()?;
+        Ok(session)
+    }
+
+    /// Variables whose values rules read.
+    pub fn readable(&self) -> impl Iterator<Item = &Variable> {
+        self.description.variables.iter().filter(|v| v.is_exchanged())
+    }
+
+    /// Continuous Float64 inputs.
+    pub fn inputs(&self) -> impl Iterator<Item = &Variable> {
+        let float = host::description::CType::Float64;
+        let all = self.description.variables.iter();
+        all.filter(move |v| v.causality == "input" && v.is_continuous() && v.c_type == float)
+    }
+}
+
+/// An instance and how far it is.
+pub struct Session<'s> {
+    /// The FMU.
+    pub subject: &'s Subject,
+    /// How it is used.
+    pub using: Use,
+    /// The instance.
+    pub instance: Instance<'s>,
+    /// Time reached, s.
+    pub time: f64,
+    /// Communication step, s.
+    pub h: f64,
+    /// The next event that the FMU has told.
+    pub next_event: Option<f64>,
+    /// Event modes entered after the start.
+    pub events: usize,
+    /// The first indicator that was 0 after event mode: when and which.
+    pub zero_indicator: Option<(f64, usize)>,
+    /// The FMU has asked for the end.
+    pub ended: bool,
+}
+
+impl Session<'_> {
+    /// From instantiated to the first step.
+    pub fn initialise(&mut self) -> Result<()> {
+        self.enter_initialization()?;
+        self.leave_initialization()
+    }
+
+    /// Into initialization mode.
+    pub fn enter_initialization(&mut self) -> Result<()> {
+        self.subject.doing("fmi3EnterInitializationMode");
+        let tolerance = self.subject.number("tolerance").filter(|t| *t > 0.0);
+        self.instance.enter_initialization_mode(tolerance, self.time, None).map_err(starts)
+    }
+
+    /// Out of it, and on until a step may be made.
+    pub fn leave_initialization(&mut self) -> Result<()> {
+        self.subject.doing("fmi3ExitInitializationMode");
+        self.instance.exit_initialization_mode().map_err(starts)?;
+        if self.using.event_mode || self.using.interface == Interface::ModelExchange {
+            self.leave_event()?;
+        }
+        Ok(())
+    }
+
+    /// Iterates in event mode until nothing is new, then leaves it. What the FMU said in the last iteration.
+    pub fn leave_event(&mut self) -> Result<EventInfo> {
+        let info = self.iterate()?;
+        if self.ended {
+            return Ok(info);
+        }
+        match self.using.interface {
+            Interface::CoSimulation => {
+                self.subject.doing("fmi3EnterStepMode");
+                self.instance.enter_step_mode()?;
+            }
+            Interface::ModelExchange => {
+                self.subject.doing("fmi3EnterContinuousTimeMode");
+                self.instance.enter_continuous_time_mode()?;
+            }
+        }
+        Ok(info)
+    }
+
+    /// Calls fmi3UpdateDiscreteStates until nothing is new.
+    pub fn iterate(&mut self) -> Result<EventInfo> {
+        self.subject.doing("fmi3UpdateDiscreteStates");
+        for _ in 0..ITERATIONS {
+            let info = self.instance.update_discrete_states()?;
+            if info.terminate == 1 {
+                self.ended = true;
+            }
+            if info.needs_update != 1 || self.ended {
+                self.next_event = (info.next_event_defined == 1).then_some(info.next_event_time);
+                return Ok(info);
+            }
+        }
+        let why = format!(
+            "discreteStatesNeedUpdate is still true after {ITERATIONS} calls of fmi3UpdateDiscreteStates at \
+             t = {:?} s (allowed: an iteration that ends)",
+            self.time
+        );
+        Err(Unusable { rule: "events.iteration", why }.into())
+    }
+
+    /// Event mode and back.
+    pub fn event(&mut self) -> Result<EventInfo> {
+        self.events += 1;
+        self.subject.doing(format!("event mode at {:?} s", self.time));
+        self.instance.enter_event_mode()?;
+        let info = self.leave_event()?;
+        if self.using.interface == Interface::ModelExchange && !self.ended {
+            let mut z = vec![1.0; self.instance.number_of_indicators()?];
+            self.instance.event_indicators(&mut z)?;
+            let zero = z.iter().position(|z| *z == 0.0).map(|i| (self.time, i));
+            self.zero_indicator = self.zero_indicator.or(zero);
+        }
+        Ok(info)
+    }
+
+    /// fmi3DoStep, and the time that follows from it.
+    pub fn raw_step(&mut self, h: f64) -> Called<Step> {
+        self.raw_step_hearing(h, None)
+    }
+
+    /// The same; `within` hears of the points within the step.
+    pub fn raw_step_hearing(&mut self, h: f64, within: Option<&mut Within>) -> Called<Step> {
+        self.subject.doing(format!(
+            "fmi3DoStep from {:?} s by {h:?} s ({})",
+            self.time,
+            self.using.name()
+        ));
+        let step = match within {
+            Some(within) => self.instance.do_step_hearing(self.time, h, Some(within))?,
+            None => self.instance.do_step(self.time, h)?,
+        };
+        self.ended |= step.terminate == 1;
+        // an FMU that returns early says where; another is at the end
+        self.time = match step.early_return == 1 && step.last_time.is_finite() {
+            true => step.last_time,
+            false => self.time + h,
+        };
+        Ok(step)
+    }
+
+    /// Steps to `until`, s, with event mode where the FMU asks for it. Model Exchange by Euler's method, which is
+    /// good enough to move and no more; where states change fast it ends before.
+    pub fn advance_to(&mut self, until: f64) -> Result<()> {
+        if self.using.interface == Interface::ModelExchange {
+            return self.euler_to(until);
+        }
+        for _ in 0..EVENTS {
+            let h = until - self.time;
+            if h <= 1e-12 * until.abs().max(self.h) || self.ended {
+                return Ok(());
+            }
+            let step = self.raw_step(h).map_err(runs)?;
+            if step.event == 1 && self.using.event_mode && !self.ended {
+                self.event()?;
+            }
+        }
+        let why = format!("{EVENTS} events before t = {until} s");
+        Err(Unusable { rule: "events.iteration", why }.into())
+    }
+
+    fn euler_to(&mut self, until: f64) -> Result<()> {
+        const PARTS: usize = 10;
+        let n = self.instance.number_of_states()?;
+        let nz = self.instance.number_of_indicators()?;
+        let (mut x, mut dx) = (vec![0.0; n], vec![0.0; n]);
+        let (mut z, mut before) = (vec![0.0; nz], vec![0.0; nz]);
+        let longest = (until - self.time) / PARTS as f64;
+        let mut nominals = vec![1.0; n];
+        self.instance.nominals(&mut nominals)?;
+        for _ in 0..PARTS {
+            if self.ended {
+                return Ok(());
+            }
+            self.subject
+                .doing(format!("integrating from {:?} s by at most {longest:?} s", self.time));
+            self.instance.event_indicators(&mut before)?;
+            self.instance.continuous_states(&mut x)?;
+            self.instance.derivatives(&mut dx)?;
+            // Euler's method is stable where no state changes much
+            let share = |i: usize| dx[i].abs() / x[i].abs().max(nominals[i].abs()).max(1e-9);
+            let fastest = (0..n).map(share).fold(0.0, f64::max);
+            let h = longest.min(1e-3 / fastest.max(1e-3 / longest));
+            let due = self.next_event.is_some_and(|next| next <= self.time + h);
+            let to = self.next_event.filter(|_| due).unwrap_or(self.time + h);
+            for (x, dx) in x.iter_mut().zip(&dx) {
+                *x += (to - self.time) * dx;
+            }
+            self.time = to;
+            self.instance.set_time(to)?;
+            self.instance.set_continuous_states(&x)?;
+            self.instance.event_indicators(&mut z)?;
+            let crossed = z.iter().zip(&before).any(|(a, b)| (*a > 0.0) != (*b > 0.0));
+            let (enter, end) = self.instance.completed_integrator_step()?;
+            self.ended |= end;
+            if (enter || crossed || due) && !self.ended {
+                self.event()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes short steps, continuous inputs changing.
+    pub fn advance(&mut self, steps: usize) -> Result<()> {
+        for k in 0..steps {
+            if self.ended {
+                break;
+            }
+            self.stimulate(k)?;
+            self.advance_to(self.time + self.h)?;
+        }
+        Ok(())
+    }
+
+    /// Sets all continuous Float64 inputs to values that differ from step to step.
+    pub fn stimulate(&mut self, k: usize) -> Result<()> {
+        for (n, v) in self.subject.inputs().enumerate() {
+            let values = stimulus(v, k + 3 * n);
+            self.instance.give(&[v.reference], &values)?;
+        }
+        Ok(())
+    }
+
+    /// All values of a variable.
+    pub fn read(&mut self, v: &Variable) -> Result<Vec<Value>> {
+        self.get(v).map_err(|error| {
+            let why = format!("{} cannot be read: {error}", v.name);
+            Unusable { rule: "values.readable", why }.into()
+        })
+    }
+
+    /// The same; that it cannot be read is the caller's business.
+    pub fn get(&mut self, v: &Variable) -> Called<Vec<Value>> {
+        self.instance.values(v.c_type, v.reference, v.length())
+    }
+
+    /// Every value there is.
+    pub fn readings(&mut self) -> Result<Vec<(String, Vec<Value>)>> {
+        let all: Vec<Variable> = self.subject.readable().cloned().collect();
+        all.iter().map(|v| Ok((v.name.clone(), self.read(v)?))).collect()
+    }
+}
+
+fn starts(error: host::c_abi::CallError) -> anyhow::Error {
+    Unusable { rule: "load.initialises", why: error.to_string() }.into()
+}
+
+fn runs(error: host::c_abi::CallError) -> anyhow::Error {
+    Unusable { rule: "steps.run", why: error.to_string() }.into()
+}
+
+/// Values of an input that differ from its start values by something of its size, within its bounds.
+pub fn stimulus(v: &Variable, k: usize) -> Vec<f64> {
+    let (min, max) = v.bounds();
+    let swing = 0.25 * (0.7 * k as f64 + 0.3).sin();
+    let starts: Vec<f64> = v.starts.iter().filter_map(|s| double(s)).collect();
+    let start = |i: usize| starts.get(i).or(starts.first()).copied().unwrap_or(0.0);
+    let one = |i: usize| {
+        let x = start(i);
+        let size = if x == 0.0 { v.nominal() } else { x.abs() };
+        (x + swing * size).max(min).min(max.max(min))
+    };
+    (0..v.length()).map(one).collect()
+}
+
+/// The first variable whose values are not the same to the last bit, as a sentence.
+pub fn difference(
+    ours: &[(String, Vec<Value>)],
+    theirs: &[(String, Vec<Value>)],
+) -> Option<String> {
+    let same = |a: &Value, b: &Value| match (a, b) {
+        (Value::Real(a), Value::Real(b)) => a.to_bits() == b.to_bits(),
+        (a, b) => a == b,
+    };
+    ours.iter().zip(theirs).find_map(|((name, a), (_, b))| {
+        let (x, y) = a.iter().zip(b).find(|(x, y)| !same(x, y))?;
+        Some(format!("{name} is {x:?} and {y:?}"))
+    })
+}
+
+/// The start values that the description gives, one for each element.
+pub fn start_values(v: &Variable) -> Option<Vec<Value>> {
+    let value = |text: &String| {
+        Some(match v.kind {
+            Type::Real if v.c_type == host::description::CType::Float32 => {
+                Value::Real(f64::from(double(text)? as f32))
+            }
+            Type::Real => Value::Real(double(text)?),
+            Type::Integer | Type::Enumeration => Value::Integer(text.parse().ok()?),
+            Type::Boolean => Value::Boolean(matches!(text.as_str(), "true" | "1")),
+            Type::String => Value::String(text.clone()),
+            Type::Binary | Type::Clock => return None,
+        })
+    };
+    let all: Vec<Value> = v.starts.iter().map(value).collect::<Option<_>>()?;
+    match all.len() {
+        0 => None,
+        1 => Some(vec![all[0].clone(); v.length()]),
+        n => (n == v.length()).then_some(all),
+    }
+}
