@@ -5,6 +5,8 @@
 //! Bo_i = rho alpha R^2 L / sigma    angular acceleration, tank at distance L    (2.25)
 //! Bo_c = rho omega^2 R^2 L / sigma  angular rate                                (2.26)
 //! Bo_r = rho alpha R^3 / sigma      angular acceleration, R for L               (7.3)
+//! We   = rho V^2 L / sigma          inertia against surface tension             (2.21)
+//! Fr   = V^2 / (a L)                inertia against gravity, We/Bo              (2.23)
 //! ```
 
 use libm::{cbrt, sqrt};
@@ -30,6 +32,16 @@ impl Liquid {
         self.bond(alpha * arm, radius)
     }
 
+    /// We of a velocity, m/s, over a length, m.
+    pub fn weber(&self, velocity: f64, length: f64) -> f64 {
+        self.density * velocity * velocity * length / self.tension
+    }
+
+    /// How long surface tension takes to move liquid over a length, m, in s (2.29): a time, not a period.
+    pub fn capillary_time(&self, length: f64) -> f64 {
+        sqrt(self.density * length * length * length / self.tension)
+    }
+
     /// The acceleration, m/s2, that has this Bond number in a tank of this radius, m.
     pub fn acceleration(&self, bond: f64, radius: f64) -> f64 {
         bond * self.tension / (self.density * radius * radius)
@@ -43,6 +55,28 @@ impl Liquid {
     /// The radius, m, that has this Bo_r at this angular acceleration, rad/s2.
     pub fn radius_by_cube(&self, bond: f64, alpha: f64) -> f64 {
         cbrt(bond * self.tension / (self.density * alpha))
+    }
+}
+
+/// Fr of a velocity, m/s, over a length, m, at an acceleration, m/s2.
+pub fn froude_number(velocity: f64, acceleration: f64, length: f64) -> f64 {
+    velocity * velocity / (acceleration * length)
+}
+
+/// How long gravity takes to move liquid over a length, m, in s (2.28).
+pub fn gravity_time(acceleration: f64, length: f64) -> f64 {
+    sqrt(length / acceleration)
+}
+
+/// Which of gravity, surface tension and inertia rules (the thesis's 2.5): the largest of Bo, 1 and We. An inertia
+/// that beats both carries the liquid across the tank: no pendulum stands for it.
+pub fn ruling_force(bond: f64, weber: f64) -> &'static str {
+    match (bond > 1.0, weber > 1.0) {
+        (_, true) if weber > bond => {
+            "inertia: the liquid crosses the tank as a body; no pendulum stands for it"
+        }
+        (true, _) => "gravity: waves and pendulums",
+        _ => "surface tension: the liquid's shape, not a wave, decides",
     }
 }
 
@@ -107,6 +141,21 @@ mod tests {
         assert_eq!(liquid.rotational_bond(2.0, 0.25, 0.25), bond);
         // a cube root, to its last digit
         assert!((liquid.radius_by_cube(bond, 2.0) - 0.25).abs() < 1e-16);
+    }
+
+    /// We/Fr = Bo, the ratio of the times is the root of Bo; of numbers whose roots are exact.
+    #[test]
+    fn weber_froude_and_the_times_are_what_bond_s_number_says() {
+        let liquid = Liquid { density: 1000.0, tension: 0.0625 };
+        let (v, a, l) = (0.5, 0.25, 0.25);
+        let (we, fr, bo) = (liquid.weber(v, l), froude_number(v, a, l), liquid.bond(a, l));
+        assert_eq!((we, fr, bo), (1000.0, 4.0, 250.0));
+        assert_eq!(we / fr, bo);
+        let ratio = liquid.capillary_time(l) / gravity_time(a, l);
+        assert!((ratio * ratio / bo - 1.0).abs() < 1e-15);
+        let rules = [(250.0, 1000.0), (250.0, 10.0), (0.1, 0.5), (0.1, 3.0)]
+            .map(|(bo, we)| &ruling_force(bo, we)[..7]);
+        assert_eq!(rules, ["inertia", "gravity", "surface", "inertia"]);
     }
 
     /// The thesis's limits, each within its lower or upper range.

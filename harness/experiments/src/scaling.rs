@@ -92,6 +92,43 @@ pub fn bond(
     Ok(Found { text, json })
 }
 
+/// Bond, Weber and Froude numbers of a liquid that moves at a velocity (m/s), which of the forces rules, and how long gravity
+/// and surface tension take over the radius (2.28, 2.29).
+pub fn numbers(liquid: Liquid, (a, radius): (f64, f64), velocity: f64) -> Result<Found> {
+    positive(&[
+        ("density", liquid.density),
+        ("tension", liquid.tension),
+        ("acceleration", a),
+        ("radius", radius),
+        ("velocity", velocity),
+    ])?;
+    let (bond, weber) = (liquid.bond(a, radius), liquid.weber(velocity, radius));
+    let froude = similarity::froude_number(velocity, a, radius);
+    let (by_gravity, by_tension) =
+        (similarity::gravity_time(a, radius), liquid.capillary_time(radius));
+    let rules = similarity::ruling_force(bond, weber);
+    let text = format!(
+        "Bond   rho a R^2/sigma   {}\nWeber  rho V^2 R/sigma   {}\nFroude V^2/(a R)         {}\n\
+         {rules}\n\
+         time of gravity sqrt(R/a) {} s, of surface tension sqrt(rho R^3/sigma) {} s\n",
+        significant(bond, 5),
+        significant(weber, 5),
+        significant(froude, 5),
+        significant(by_gravity, 5),
+        significant(by_tension, 5),
+    );
+    let json = json!({
+        "bond": bond,
+        "weber": weber,
+        "froude": froude,
+        "rules": rules,
+        "regime": regime(bond),
+        "gravity_time": by_gravity,
+        "capillary_time": by_tension,
+    });
+    Ok(Found { text, json })
+}
+
 /// The bench's rotational Bond numbers, and the tanks that have the same at another angular
 /// acceleration.
 pub fn rotation(

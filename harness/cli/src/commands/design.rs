@@ -22,6 +22,7 @@ use crate::terminal;
 /// Says beforehand what a planned experiment will tell about each parameter (Cramér–Rao bound).
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh design --profile lin-sweep:amplitude=0.1\n  \
+    hubslosh design --snr 20 --band 1.25,20\n  \
     hubslosh design --multisine 0.25 --duration 600 --out torque.csv\n  \
     hubslosh design --multisine 0.25 --optimal --set friction.b=0.04 --out torque.csv\n  \
     hubslosh design slew.csv --fmu Spacecraft --free craft.Jzz=640,tank[1].mass[1]=128 --inputs torque[3] \\\n      \
@@ -33,13 +34,17 @@ pub struct DesignArgs {
     /// An odd random-phase multisine with detection lines and this peak, N·m.
     #[arg(long, value_name = "PEAK", conflicts_with = "free")]
     multisine: Option<f64>,
+    /// Says which torque gives a sine of the rate this signal-to-noise ratio, dB, in the gyro's samples: on the band, at
+    /// resonance and antiresonance, and what a rigid hub would need (thesis 8.6.1).
+    #[arg(long, value_name = "DB", conflicts_with_all = ["profile", "multisine", "out"])]
+    snr: Option<f64>,
     /// Period of the multisine, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 100.0)]
     period: f64,
     /// Length of the multisine, s.
     #[arg(long, value_name = "SECONDS", default_value_t = 600.0)]
     duration: f64,
-    /// Band of the multisine, Hz.
+    /// Band of the multisine, or of --snr, Hz.
     #[arg(long, value_name = "HZ,HZ", value_delimiter = ',', default_value = "1.25,3.5")]
     band: Vec<f64>,
     /// Gives the lines the power that tells most of a linear bench as expected (D-optimal), a quarter of it spread
@@ -119,6 +124,9 @@ impl DesignArgs {
             inertia: real("wheel.I")?,
             speeds: [real("wheel.speed_0")?, real("wheel.speed_min")?, real("wheel.speed_max")?],
         };
+        if let Some(snr) = self.snr {
+            return self.torque_for(snr, wheel.torque, &mut real);
+        }
         let sampled = |stop: f64, at: &dyn Fn(f64) -> f64| -> Result<(Vec<f64>, Vec<f64>)> {
             // time, torque, rate and its derivative with respect to every unknown
             budget::table(budget::steps(stop, STEP)? + 1, COLUMNS)?;
@@ -296,6 +304,67 @@ impl DesignArgs {
             let names = ["time", "tau_cmd"].map(String::from).to_vec();
             Table::new(names, vec![time, torque]).write(out, &BTreeMap::new())?;
             done!("{}", out.display());
+        }
+        Ok(())
+    }
+}
+
+impl DesignArgs {
+    /// Prints the torque for a rate of this signal-to-noise ratio.
+    fn torque_for(
+        &self,
+        snr: f64,
+        limit: f64,
+        real: &mut dyn FnMut(&str) -> Result<f64>,
+    ) -> Result<()> {
+        let [f0, f1] = self.band[..] else { bail!("--band needs two frequencies, Hz") };
+        ensure!(0.0 < f0 && f0 < f1 && f1.is_finite(), "--band = {f0},{f1} (allowed: 0 < f0 < f1)");
+        ensure!(snr.abs() <= 200.0, "--snr = {snr} (allowed: -200 to 200 dB)");
+        // Per sample: the sine's power Ω²/2 over arw² times the sampling rate.
+        let sigma = real("imu.arw")? * real("imu.rate")?.sqrt();
+        ensure!(sigma > 0.0, "imu.arw = 0 leaves no noise to compare with (allowed: above 0)");
+        let rate = sigma * std::f64::consts::SQRT_2 * 10f64.powf(snr / 20.0);
+        let dry = real("friction.c")? + real("friction.d")?;
+        // Its describing function at that rate.
+        let mut bench = expected(real, 1.0)?;
+        bench.friction =
+            real("friction.b")? + real("hub.c")? + 4.0 * dry / (std::f64::consts::PI * rate);
+        let torque = |f: f64| rate / bench.response(f).norm();
+        let grid = analysis::logarithmic_grid((f0, f1), 2000);
+        let (mut least, mut most) = ((f64::INFINITY, f0), (0.0, f0));
+        for f in grid {
+            let needed = torque(f);
+            if needed < least.0 {
+                least = (needed, f);
+            }
+            if needed > most.0 {
+                most = (needed, f);
+            }
+        }
+        let inertia =
+            bench.inertia + bench.arm.powi(2) * bench.modes.iter().map(|m| m.mass).sum::<f64>();
+        let rows = [
+            ("lower end of the band", f0, torque(f0)),
+            ("least, at the resonance", least.1, least.0),
+            ("most", most.1, most.0),
+            ("upper end of the band", f1, torque(f1)),
+            ("upper end, rigid: I 2πf Ω", f1, inertia * std::f64::consts::TAU * f1 * rate),
+        ];
+        if self.json {
+            let all = rows.map(|(what, f, torque)| {
+                json!({ "what": what, "frequency": f, "torque": torque, "wheel": torque <= limit })
+            });
+            return terminal::say_json(
+                &json!({ "snr": snr, "rate": rate, "wheel_torque": limit, "needs": all }),
+            );
+        }
+        println!(
+            "rate amplitude {rate:.3e} rad/s for {snr} dB in the gyro's samples (one has {sigma:.3e} rad/s)"
+        );
+        println!("{:28} {:>9} {:>11}", "", "Hz", "torque N·m");
+        for (what, f, torque) in rows {
+            let beyond = if torque > limit { "  more than the wheel gives" } else { "" };
+            println!("{what:28} {f:>9.4} {torque:>11.5}{beyond}");
         }
         Ok(())
     }

@@ -11,6 +11,7 @@ use crate::terminal;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  hubslosh scale thesis\n  \
     hubslosh scale bond --flight-radius 2.0425 --flight-density 1141 --flight-tension 0.0132\n  \
+    hubslosh scale numbers --radius 0.3 --acceleration 1e-5 --velocity 0.01\n  \
     hubslosh scale rotation --alpha 2.21 --flight-alpha 0.005\n  \
     hubslosh scale froude --lambda 25 --density-ratio 1.14")]
 pub struct ScaleArgs {
@@ -51,6 +52,24 @@ enum Scale {
         /// Acceleration in flight, m/s²: gives the tank's radius.
         #[arg(long)]
         flight_acceleration: Option<f64>,
+    },
+    /// Bond, Weber and Froude numbers of a moving liquid: which force rules, and how fast.
+    Numbers {
+        /// Density of the liquid, kg/m³.
+        #[arg(long, default_value_t = scaling::WATER.density)]
+        density: f64,
+        /// Its surface tension, N/m.
+        #[arg(long, default_value_t = scaling::WATER.tension)]
+        tension: f64,
+        /// Acceleration along the tank's axis, m/s².
+        #[arg(long, default_value_t = 9.81)]
+        acceleration: f64,
+        /// Radius of the tank, m.
+        #[arg(long, default_value_t = scaling::BENCH.0)]
+        radius: f64,
+        /// Velocity of the liquid in the tank, m/s.
+        #[arg(long)]
+        velocity: f64,
     },
     /// Bond numbers of a rotation, and the tanks that have the same at another one.
     Rotation {
@@ -114,6 +133,9 @@ impl ScaleArgs {
                     .map(Flight::Radius)
                     .or(flight_acceleration.map(Flight::Acceleration));
                 scaling::bond(bench, (acceleration, radius), liquid, flight)?
+            }
+            Scale::Numbers { density, tension, acceleration, radius, velocity } => {
+                scaling::numbers(Liquid { density, tension }, (acceleration, radius), velocity)?
             }
             Scale::Rotation { density, tension, radius, arm, alpha, omega, flight_alpha } => {
                 let liquid = Liquid { density, tension };

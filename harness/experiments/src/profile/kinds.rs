@@ -8,7 +8,7 @@ use host::budget::FREQUENCY;
 
 use super::Values;
 use super::noise::Noise;
-use super::shape::{Dwell, Piece, Pieces, Shape};
+use super::shape::{Dwell, DwellInNoise, Piece, Pieces, Shape};
 
 /// A kind of torque history. Times in s, frequencies in Hz, torques in N·m.
 #[derive(Debug)]
@@ -112,6 +112,23 @@ const BAND: Demand = (
     "f0 and f1 must be from 1e-9 to 1e9 Hz",
 );
 
+/// Of noise, which may begin at 0 Hz.
+const NOISE_BAND: [Demand; 2] = [
+    (|v| v.of("f0") < v.of("f1"), "it expects f0 < f1"),
+    (
+        |v| {
+            let (f0, f1) = (v.of("f0"), v.of("f1"));
+            (f0 == 0.0 || f0 >= 1.0 / FREQUENCY) && (1.0 / FREQUENCY..=FREQUENCY).contains(&f1)
+        },
+        "f0 must be 0 or, as f1, from 1e-9 to 1e9 Hz",
+    ),
+];
+
+fn noise(v: &Values, limit: f64) -> Noise {
+    let band = (v.of("f0"), v.of("f1"));
+    Noise::new(v.of("rms"), band, v.of("exponent"), v.of("seed") as u64, limit)
+}
+
 fn sweep(v: &Values, law: Law) -> Arc<dyn Shape> {
     let [amplitude, f0, f1, duration] = ["amplitude", "f0", "f1", "duration"].map(|n| v.of(n));
     Arc::new(Sweep { amplitude, f0, f1, duration, law })
@@ -212,7 +229,7 @@ pub const KINDS: &[Kind] = &[
         says: "band-limited noise with power density ~ f^exponent (0 white, -1 pink, -2 brown), clipped at ±limit",
         parameters: &[
             parameter("rms", 0.05, "N·m", "torque, rms", Allowed::Positive),
-            parameter("f0", 1.25, "Hz", "lowest frequency", Allowed::Positive),
+            parameter("f0", 1.25, "Hz", "lowest frequency", Allowed::NotNegative),
             parameter("f1", 3.5, "Hz", "highest frequency", Allowed::Positive),
             parameter("exponent", 0.0, "", "spectral exponent", Allowed::Within(10.0)),
             parameter("seed", 1.0, "", "seed", Allowed::Whole(9e15)),
@@ -220,17 +237,41 @@ pub const KINDS: &[Kind] = &[
             duration(600.0),
         ],
         demands: &[
-            (|v| v.of("f0") < v.of("f1"), "it expects 0 < f0 < f1"),
-            BAND,
+            NOISE_BAND[0],
+            NOISE_BAND[1],
             (
                 |v| v.of("rms") <= v.of("limit") / 2.0,
                 "rms must be at most half of limit (else too much of it is clipped)",
             ),
         ],
+        shape: |v| Arc::new(noise(v, v.of("limit"))),
+    },
+    Kind {
+        name: "sine-noise",
+        says: "A sin 2πft and on it noise as of `noise`, the sum clipped at ±limit: a steady wave that shows the other modes, too (thesis 8.6.1)",
+        parameters: &[
+            parameter("amplitude", 0.1, "N·m", "torque amplitude of the sine", Allowed::Any),
+            parameter("frequency", 2.4, "Hz", "frequency of the sine", Allowed::Within(FREQUENCY)),
+            parameter("rms", 0.03, "N·m", "torque of the noise, rms", Allowed::Positive),
+            parameter("f0", 0.0, "Hz", "lowest frequency of the noise", Allowed::NotNegative),
+            parameter("f1", 20.0, "Hz", "highest frequency of the noise", Allowed::Positive),
+            parameter("exponent", 0.0, "", "spectral exponent", Allowed::Within(10.0)),
+            parameter("seed", 1.0, "", "seed", Allowed::Whole(9e15)),
+            parameter("limit", 0.26, "N·m", "torque limit", Allowed::Positive),
+            duration(600.0),
+        ],
+        demands: &[
+            NOISE_BAND[0],
+            NOISE_BAND[1],
+            (
+                |v| v.of("amplitude").abs() + 2.0 * v.of("rms") <= v.of("limit"),
+                "amplitude and twice rms together must be within limit (else too much is clipped)",
+            ),
+        ],
         shape: |v| {
-            let band = (v.of("f0"), v.of("f1"));
-            let seed = v.of("seed") as u64;
-            Arc::new(Noise::new(v.of("rms"), band, v.of("exponent"), seed, v.of("limit")))
+            let dwell = Dwell { amplitude: v.of("amplitude"), frequency: v.of("frequency") };
+            let noise = noise(v, f64::INFINITY);
+            Arc::new(DwellInNoise { dwell, noise, limit: v.of("limit") })
         },
     },
     Kind {

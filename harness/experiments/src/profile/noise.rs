@@ -21,7 +21,7 @@ pub const TONES: usize = 512;
 pub struct Noise {
     /// Root mean square before the limit, N·m.
     pub rms: f64,
-    /// Lower end of the band, Hz.
+    /// Lower end of the band, Hz; may be 0.
     pub f0: f64,
     /// Upper end of the band, Hz.
     pub f1: f64,
@@ -49,11 +49,12 @@ impl Noise {
     pub fn new(rms: f64, (f0, f1): (f64, f64), exponent: f64, seed: u64, limit: f64) -> Self {
         let mut random = Random::new(seed, 0);
         let cell = (f1 - f0) / TONES as f64;
+        let unit = if f0 > 0.0 { f0 } else { f1 };
         let mut tones: Vec<Tone> = (0..TONES)
             .map(|k| {
                 let frequency = f0 + cell * (k as f64 + random.uniform());
                 Tone {
-                    amplitude: libm::pow(frequency / f0, exponent / 2.0),
+                    amplitude: libm::pow(frequency / unit, exponent / 2.0),
                     rate: TAU * frequency,
                     phase: TAU * random.uniform(),
                 }
@@ -77,8 +78,10 @@ impl Shape for Noise {
         sum.clamp(-self.limit, self.limit)
     }
 
+    /// From its second tone on: where it begins at 0 the first may be anywhere near.
     fn band(&self) -> Option<(f64, f64)> {
-        Some((self.f0, self.f1))
+        let tone = (self.f1 - self.f0) / TONES as f64;
+        Some((if self.f0 > 0.0 { self.f0 } else { tone }, self.f1))
     }
 }
 
@@ -91,6 +94,26 @@ mod tests {
 
     fn samples(noise: &Noise, duration: f64, step: f64) -> Vec<f64> {
         (0..(duration / step) as usize).map(|k| noise.after(k as f64 * step)).collect()
+    }
+
+    #[test]
+    fn noise_from_0_hz_has_its_rms_and_a_sine_in_noise_is_the_sum_of_both_within_the_limit() {
+        let text = "sine-noise:amplitude=0.1,frequency=2,rms=0.05,limit=0.2";
+        let both = crate::profile::Torque::Profile(text.parse().unwrap());
+        let noise = Noise::new(0.05, (0.0, 20.0), 0.0, 1, f64::INFINITY);
+        let (mut clipped, mut power) = (0, 0.0);
+        for k in 0..60_000 {
+            let t = k as f64 * 0.01;
+            let sum = 0.1 * (TAU * 2.0 * t).sin() + noise.after(t);
+            assert!((both.at(t) - sum.clamp(-0.2, 0.2)).abs() < 1e-15);
+            clipped += usize::from(sum.abs() > 0.2);
+            power += noise.after(t).powi(2);
+        }
+        assert!(clipped > 0);
+        // 600 s resolve 1.7 mHz, tones are 39 mHz apart: a fraction of a per cent
+        assert!(((power / 60_000.0).sqrt() / 0.05 - 1.0).abs() < 0.01);
+        let brown = Noise::new(0.05, (0.0, 20.0), -2.0, 1, 1.0);
+        assert!((0..100).all(|k| brown.after(k as f64).is_finite()));
     }
 
     #[test]
