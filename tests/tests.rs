@@ -7,6 +7,7 @@ mod abi {
 }
 mod architecture;
 mod common;
+mod fmi3;
 mod life {
     mod allocation;
     mod instance;
@@ -47,6 +48,7 @@ mod six {
 }
 mod xml {
     mod checklist;
+    mod fmi3;
     mod generated;
     mod model_description;
 }

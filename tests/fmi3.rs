@@ -1,0 +1,124 @@
+//! The packed FMUs 3.0 in FMPy's hands: it finds no fault, and drives them as it drives those of FMI 2.0.
+
+use std::io::Read;
+use std::process::Command;
+
+use crate::common::{python, run};
+use pack::{Fmi, MODELS, packed_model_for_tests, packed_version_for_tests};
+
+/// Whatever FMPy is told of events, the motion has the bits of FMI 2.0; through CVODE it is the same within what its
+/// tolerance, 1e-9, makes of 20 s of stick and slip.
+const FMPY: &str = r#"
+import sys
+import numpy as np
+from fmpy import simulate_fmu
+from fmpy.validation import validate_fmu
+
+name, two, three = sys.argv[1:]
+problems = validate_fmu(three)
+assert not problems, problems
+start = {"HubSlosh": {"slosh.model": 4, "init.slosh_angle": 0.5, "init.slosh_angle_radial": 0.3}}.get(name, {})
+outputs = {
+    "HubSlosh": ["theta", "omega", "omega_dot", "slosh_angle", "slosh_angle_radial", "tau_friction", "omega_imu"],
+    "Spacecraft": ["q[1]", "omega[1]", "omega[3]", "slosh_force[1]"],
+    "SloshTank": ["force[1]", "force[3]", "torque[2]"],
+}[name]
+
+
+def run(fmu, kind, settings=start, more=(), **arguments):
+    return simulate_fmu(
+        fmu, fmi_type=kind, stop_time=20 if name == "HubSlosh" else 4, output_interval=0.02, start_values=settings,
+        output=outputs + list(more), **arguments,
+    )
+
+
+def at(result, times):
+    # an event repeats its time: the last row is what comes of it
+    return result[np.searchsorted(result["time"], times + 1e-9) - 1]
+
+
+gyro = [{}, {"imu.enabled": True, "imu.rate": 7.0, "wheel.enabled": True}] if name == "HubSlosh" else [{}]
+for settings in gyro:
+    settings = {**start, **settings}
+    expected = run(two, "CoSimulation", settings)
+    rows = []
+    for event_mode in (False, True):
+        for early_return in (False, True):
+            result = run(three, "CoSimulation", settings, use_event_mode=event_mode, early_return_allowed=early_return)
+            rows.append(len(result))
+            same = at(result, expected["time"])
+            for output in outputs:
+                assert np.array_equal(same[output], expected[output]), (output, event_mode, early_return)
+    assert rows[0] == rows[1] == len(expected), rows
+    if name == "HubSlosh":
+        assert rows[3] > rows[2] > rows[1] + 20, rows
+
+more = {"HubSlosh": ["event_count"], "SloshTank": ["tank.p[1,1]"]}.get(name, [])
+fine = run(three, "CoSimulation", more=more, relative_tolerance=1e-12)
+if name == "HubSlosh":
+    assert fine["event_count"][-1] > 20, fine["event_count"][-1]
+mine = at(run(three, "ModelExchange", more=more, solver="CVode", relative_tolerance=1e-9), fine["time"])
+# a tank's forces are its weight, 50 N, times angles: these are compared
+for output in ["tank.p[1,1]"] if name == "SloshTank" else outputs:
+    # what jumps at events is compared by its integrals
+    if output in ("omega_dot", "tau_friction", "omega_imu"):
+        continue
+    error = np.max(np.abs(mine[output] - fine[output]))
+    assert error < 1e-6 * max(1.0, np.max(np.abs(fine[output]))), (output, error)
+    print(name, output, error)
+"#;
+
+#[test]
+fn fmpy_finds_no_fault_in_fmi_3_and_gets_the_bits_of_fmi_2_whatever_it_is_told_of_events() {
+    for model in &MODELS {
+        let said = run(
+            Command::new(python())
+                .args(["-c", FMPY, model.name])
+                .arg(packed_model_for_tests(model))
+                .arg(packed_version_for_tests(model, Fmi::V3)),
+            "FMPy does not drive the FMU 3.0 as it drives the FMU 2.0",
+        );
+        println!("{said}");
+    }
+}
+
+#[test]
+fn an_fmu_3_has_the_platform_tuple_the_icon_and_the_list_of_its_references() {
+    let file = std::fs::File::open(packed_version_for_tests(pack::HUBSLOSH, Fmi::V3)).unwrap();
+    let mut archive = zip::ZipArchive::new(file).unwrap();
+    let names: Vec<String> = archive.file_names().flatten().map(|name| name.into_owned()).collect();
+    let binary = names.iter().find(|name| name.starts_with("binaries/")).unwrap();
+    let tuple = binary.split('/').nth(1).unwrap();
+    let (processor, system) = tuple.split_once('-').unwrap();
+    assert!(["x86_64", "aarch64"].contains(&processor), "{binary}");
+    assert!(["linux", "windows", "darwin"].contains(&system), "{binary}");
+    let top =
+        ["modelDescription.xml", "terminalsAndIcons/", "documentation/", "binaries/", "extra/"];
+    for name in &names {
+        assert!(top.iter().any(|top| name.starts_with(top)), "{name}");
+    }
+    for name in [
+        "terminalsAndIcons/icon.png",
+        "documentation/index.html",
+        "documentation/licenses/license.txt",
+    ] {
+        assert!(names.iter().any(|there| there == name), "{name}");
+    }
+    // Every file that the list names is there.
+    let mut manifest = String::new();
+    let folder = "extra/org.fmi-standard.fmi-ls-ref";
+    archive
+        .by_name(&format!("{folder}/fmi-ls-manifest.xml"))
+        .unwrap()
+        .read_to_string(&mut manifest)
+        .unwrap();
+    let sources: Vec<_> = manifest
+        .split("source=\"../")
+        .skip(1)
+        .map(|rest| rest.split('"').next().unwrap())
+        .collect();
+    assert_eq!(sources.len(), 3);
+    for source in sources {
+        assert!(names.contains(&format!("extra/{source}")), "{source}");
+    }
+}

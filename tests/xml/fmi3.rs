@@ -1,0 +1,174 @@
+//! modelDescription.xml of FMI 3.0 says of every variable what that of FMI 2.0 says, and what 3.0 asks for besides.
+
+use std::collections::BTreeMap;
+
+use host::xml::Element;
+use runtime::Model;
+use runtime::v3::Fmi3;
+use runtime::version::Version;
+
+fn parse(text: &str) -> Element {
+    Element::parse(text.as_bytes()).unwrap()
+}
+
+fn two<M: Model>() -> Element {
+    parse(&model_description::xml::<M>().unwrap())
+}
+
+fn three<M: Model>() -> Element {
+    parse(&model_description::fmi3::xml::<M>().unwrap())
+}
+
+fn every_variable_is_as_in_fmi_2<M: Model>() {
+    let (two, three) = (two::<M>(), three::<M>());
+    let (old, new): (Vec<_>, Vec<_>) =
+        (two.list("ModelVariables").collect(), three.list("ModelVariables").collect());
+    let indicators = M::table().about.event_indicators;
+    assert_eq!(new.len(), old.len() + 1 + indicators);
+    for (place, (old, new)) in old.iter().zip(&new).enumerate() {
+        let name = old.get("name").unwrap();
+        let kind = &old.children[0];
+        let types = [
+            ("Real", "Float64"),
+            ("Integer", "Int32"),
+            ("Boolean", "Boolean"),
+            ("Enumeration", "Enumeration"),
+        ];
+        assert!(types.contains(&(kind.name.as_str(), new.name.as_str())), "{name}: {}", new.name);
+        for attribute in ["name", "description", "causality", "variability"] {
+            assert_eq!(old.get(attribute), new.get(attribute), "{name}");
+        }
+        for attribute in
+            ["unit", "displayUnit", "min", "max", "nominal", "start", "declaredType", "reinit"]
+        {
+            assert_eq!(kind.get(attribute), new.get(attribute), "{name} {attribute}");
+        }
+        // What is the default in 2.0 is written: an input's value is exact.
+        assert_eq!(Some(old.get("initial").unwrap_or("exact")), new.get("initial"), "{name}");
+        // Places count from 1 in both: a reference in 3.0 is the place.
+        let reference = (place + 1).to_string();
+        assert_eq!(new.get("valueReference"), Some(&*reference), "{name}");
+        assert_eq!(kind.get("derivative"), new.get("derivative"), "{name}");
+        let port = matches!(old.get("causality"), Some("input" | "output")) && kind.name == "Real";
+        assert_eq!(new.get("intermediateUpdate"), port.then_some("true"), "{name}");
+    }
+    let [time, z @ ..] = &new[old.len()..] else { panic!("no independent variable") };
+    assert_eq!((time.get("causality"), time.get("unit")), (Some("independent"), Some("s")));
+    assert_eq!((time.get("start"), time.get("initial"), time.get("min")), (None, None, None));
+    for z in z {
+        assert_eq!((z.get("causality"), z.get("variability")), (Some("local"), Some("continuous")));
+        assert_eq!(z.get("start"), None);
+    }
+    let mut names: BTreeMap<_, u32> = BTreeMap::new();
+    new.iter().for_each(|v| *names.entry(v.get("name").unwrap()).or_default() += 1);
+    assert!(names.values().all(|count| *count == 1), "names are unique");
+}
+
+#[test]
+fn every_variable_of_fmi_3_is_as_in_fmi_2() {
+    every_variable_is_as_in_fmi_2::<HubSlosh::HubSlosh>();
+    every_variable_is_as_in_fmi_2::<Spacecraft::Model>();
+    every_variable_is_as_in_fmi_2::<SloshTank::Model>();
+}
+
+fn the_structure_is_as_in_fmi_2<M: Model>() {
+    let (two, three) = (two::<M>(), three::<M>());
+    let old = two.child("ModelStructure").unwrap();
+    let new = three.child("ModelStructure").unwrap();
+    for (list, element) in [
+        ("Outputs", "Output"),
+        ("Derivatives", "ContinuousStateDerivative"),
+        ("InitialUnknowns", "InitialUnknown"),
+    ] {
+        let of = |element: &Element, reference: &str| {
+            [reference, "dependencies", "dependenciesKind"]
+                .map(|name| element.get(name).map(String::from))
+        };
+        let old: Vec<_> = old.list(list).map(|unknown| of(unknown, "index")).collect();
+        let new = new.children.iter().filter(|child| child.name == element);
+        let new: Vec<_> = new.map(|unknown| of(unknown, "valueReference")).collect();
+        assert_eq!(old, new, "{list}");
+    }
+    let indicators: Vec<_> =
+        new.children.iter().filter(|child| child.name == "EventIndicator").collect();
+    assert_eq!(indicators.len(), M::table().about.event_indicators);
+    let first = M::table().scalars.len() + 2;
+    for (n, indicator) in indicators.iter().enumerate() {
+        assert_eq!(indicator.get("valueReference"), Some(&*(first + n).to_string()));
+        assert!(indicator.get("dependencies").is_some());
+    }
+    let order: Vec<_> = new.children.iter().map(|child| child.name.as_str()).collect();
+    let mut sorted = order.clone();
+    let rank = |name: &str| {
+        ["Output", "ContinuousStateDerivative", "InitialUnknown", "EventIndicator"]
+            .iter()
+            .position(|n| *n == name)
+    };
+    sorted.sort_by_key(|name| rank(name));
+    assert_eq!(order, sorted);
+}
+
+#[test]
+fn the_structure_of_fmi_3_is_that_of_fmi_2_with_event_indicators() {
+    the_structure_is_as_in_fmi_2::<HubSlosh::HubSlosh>();
+    the_structure_is_as_in_fmi_2::<Spacecraft::Model>();
+    the_structure_is_as_in_fmi_2::<SloshTank::Model>();
+}
+
+fn units_are_defined<M: Model>() {
+    let three = three::<M>();
+    let mut defined: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for unit in three.list("UnitDefinitions") {
+        let shown = unit.children.iter().filter(|child| child.name == "DisplayUnit");
+        let shown = shown.map(|shown| shown.get("name").unwrap().to_string()).collect();
+        defined.insert(unit.get("name").unwrap().into(), shown);
+    }
+    for variable in three.list("ModelVariables") {
+        let name = variable.get("name").unwrap();
+        let Some(unit) = variable.get("unit") else { continue };
+        let shown = defined.get(unit).unwrap_or_else(|| panic!("{name}: {unit} is not defined"));
+        let display = variable.get("displayUnit");
+        assert!(display.is_none_or(|display| shown.iter().any(|s| s == display)), "{name}");
+    }
+}
+
+#[test]
+fn every_unit_of_fmi_3_is_defined_that_of_time_too() {
+    units_are_defined::<HubSlosh::HubSlosh>();
+    units_are_defined::<Spacecraft::Model>();
+    units_are_defined::<SloshTank::Model>();
+}
+
+#[test]
+fn the_root_of_fmi_3_has_its_own_token_and_the_form_of_the_schema() {
+    let text = model_description::fmi3::xml::<HubSlosh::HubSlosh>().unwrap();
+    assert!(text.starts_with(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<fmiModelDescription fmiVersion=\"3.0\""
+    ));
+    let (two, three) = (two::<HubSlosh::HubSlosh>(), three::<HubSlosh::HubSlosh>());
+    assert_eq!(three.get("instantiationToken"), Some(Fmi3::token::<HubSlosh::HubSlosh>()));
+    assert_ne!(three.get("instantiationToken"), two.get("guid"));
+    for attribute in ["modelName", "description", "author", "version", "generationDateAndTime"] {
+        assert_eq!(two.get(attribute), three.get(attribute));
+    }
+    assert!(three.get("generationDateAndTime").unwrap().ends_with('Z'));
+    let order: Vec<_> = three.children.iter().map(|child| child.name.as_str()).collect();
+    assert_eq!(
+        order,
+        [
+            "ModelExchange",
+            "CoSimulation",
+            "UnitDefinitions",
+            "TypeDefinitions",
+            "LogCategories",
+            "DefaultExperiment",
+            "ModelVariables",
+            "ModelStructure",
+        ]
+    );
+    let identifier = |interface: &str| three.child(interface).unwrap().get("modelIdentifier");
+    assert_eq!(
+        (identifier("ModelExchange"), identifier("CoSimulation")),
+        (Some("HubSlosh"), Some("HubSlosh"))
+    );
+}
