@@ -211,15 +211,18 @@ impl CraftMotion {
     /// M at the present directions and its factors. On a pivot the upper rows hold a.
     #[inline(always)]
     fn factorise(&mut self) {
-        let mut matrix = self.mass_matrix;
+        self.matrix = self.mass_matrix;
         for bob in &self.bobs {
-            add_rank_one(&mut matrix, bob.m, &along_rod(bob.p[0], bob.hinge));
+            add_rank_one(&mut self.matrix, bob.m, &along_rod(bob.p[0], bob.hinge));
         }
-        self.matrix = matrix;
-        if self.mount == Mount::Pivot {
-            hold_upper_rows(&mut matrix);
+        match self.mount {
+            Mount::Free => self.factors.set(&self.matrix),
+            Mount::Pivot => {
+                let mut held = self.matrix;
+                hold_upper_rows(&mut held);
+                self.factors.set(&held);
+            }
         }
-        self.factors = Factors::of(&matrix);
     }
 
     /// [a; w'] from the right-hand side; on a pivot its upper half is a.

@@ -10,7 +10,7 @@ use taylor::integrator::Steps;
 use taylor::vector::{Quaternion, Vec3, add, rotation, scale, unit_quaternion};
 
 use crate::pivot::Pivot;
-use crate::rigid::{Factors, Rigid};
+use crate::rigid::{Rigid, smallest_pivot};
 use crate::sizes::{MODES, POINTS, TANKS, modes_of};
 use crate::table::FillTable;
 
@@ -629,9 +629,7 @@ impl Craft {
     pub(crate) fn problems(&self, name: &str) -> Vec<String> {
         let mut problems = Problems(Vec::new());
         self.find_problems(name, &mut problems);
-        if problems.0.is_empty()
-            && Factors::of(&self.rigid().mass_matrix()).smallest_pivot() < 1e-12
-        {
+        if problems.0.is_empty() && smallest_pivot(&self.rigid().mass_matrix()) < 1e-12 {
             problems.0.push(format!(
                 "{name}.J is singular: the inertia about every axis must be above 0"
             ));
@@ -673,7 +671,7 @@ impl Parameters {
             let rigid = self.tank[..self.tanks]
                 .iter()
                 .fold(self.craft.rigid(), |sum, tank| sum.and(&tank.resolve().rigid()));
-            if Factors::of(&rigid.mass_matrix()).smallest_pivot() < 1e-12 {
+            if smallest_pivot(&rigid.mass_matrix()) < 1e-12 {
                 problems.0.push(
                     "craft.J with the tanks' m_0, I_0 and I_z is singular: the inertia of craft \
                      and rigid liquid about every axis through their centre of mass must be above 0"

@@ -129,10 +129,10 @@ const SMALLEST_DIVISOR: f64 = 0.5 / LARGEST_INVERSE;
 /// A symmetric positive definite matrix as L D L^T, L with ones on its diagonal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Factors<T = f64> {
+    /// What is below L's diagonal; the rest is not read.
     l: Mat6<T>,
-    /// 1/D, and D over the matrix's own diagonal.
+    /// 1/D
     inverse: [T; 6],
-    pivots: [f64; 6],
 }
 
 impl<T: Number> Factors<T> {
@@ -140,8 +140,16 @@ impl<T: Number> Factors<T> {
     #[inline(always)]
     pub fn of(matrix: &Mat6<T>) -> Factors<T> {
         let zero = T::constant(0.0);
-        let mut l = [[zero; 6]; 6];
-        let (mut inverse, mut pivots) = ([zero; 6], [0.0; 6]);
+        let mut factors = Factors { l: [[zero; 6]; 6], inverse: [zero; 6] };
+        factors.set(matrix);
+        factors
+    }
+
+    /// Becomes the factors of another matrix, in place: a step spends a fortieth of its instructions on copies of
+    /// matrices otherwise.
+    #[inline(always)]
+    pub fn set(&mut self, matrix: &Mat6<T>) {
+        let Factors { l, inverse } = self;
         for j in 0..6 {
             // Row j of L D, then of L.
             let mut d = matrix[j][j];
@@ -158,20 +166,7 @@ impl<T: Number> Factors<T> {
                 l[j][k] = x;
             }
             inverse[j] = d.at_least(SMALLEST_DIVISOR).recip();
-            pivots[j] = d.value() / f64::max(matrix[j][j].value(), SMALLEST_DIVISOR);
         }
-        Factors { l, inverse, pivots }
-    }
-
-    /// Smallest pivot over its element of the diagonal; 0 for a matrix that is not positive definite,
-    /// or so nearly singular that its inverse passes [`LARGEST_INVERSE`].
-    pub fn smallest_pivot(&self) -> f64 {
-        let bounded = |x: &T| (0.0..=LARGEST_INVERSE).contains(&x.value());
-        if !self.inverse.iter().all(bounded) {
-            return 0.0;
-        }
-        // NaN counts as 0.
-        self.pivots.iter().fold(1.0, |least, &x| if x >= least { least } else { x.max(0.0) })
     }
 
     /// The solution of matrix x = b.
@@ -194,6 +189,18 @@ impl<T: Number> Factors<T> {
         }
         [[x[0], x[1], x[2]], [x[3], x[4], x[5]]]
     }
+}
+
+/// The smallest element of D over the matrix's own diagonal; 0 for a matrix that is not positive definite,
+/// or so nearly singular that its inverse passes [`LARGEST_INVERSE`].
+pub fn smallest_pivot(matrix: &Mat6) -> f64 {
+    let Factors { inverse, .. } = Factors::of(matrix);
+    // NaN is not in the range.
+    if !inverse.iter().all(|x| (0.0..=LARGEST_INVERSE).contains(x)) {
+        return 0.0;
+    }
+    let pivot = |i: usize| 1.0 / (inverse[i] * f64::max(matrix[i][i], SMALLEST_DIVISOR));
+    (0..6).map(pivot).fold(1.0, f64::min)
 }
 
 impl Factors {
@@ -261,7 +268,7 @@ mod tests {
                 add_rank_one(&mut matrix, 100.0, &along_rod(p, hinge));
             }
             let factors = Factors::of(&matrix);
-            assert!(factors.smallest_pivot() > 0.01);
+            assert!(smallest_pivot(&matrix) > 0.01);
             let x: [f64; 6] = core::array::from_fn(|_| between(-1.0, 1.0));
             let b = matrix.map(|row| (0..6).map(|i| row[i] * x[i]).sum::<f64>());
             let [a, w_d] = factors.solve([[b[0], b[1], b[2]], [b[3], b[4], b[5]]]);
@@ -276,7 +283,7 @@ mod tests {
     fn a_matrix_with_no_inertia_about_an_axis_is_singular() {
         let rod = [[5.0, 0.0, 0.0], [0.0, 5.0, 0.0], [0.0, 0.0, 0.0]];
         let matrix = Rigid::new(10.0, [0.0, 0.0, 0.4], &rod).mass_matrix();
-        assert!(Factors::of(&matrix).smallest_pivot() < 1e-12);
+        assert!(smallest_pivot(&matrix) < 1e-12);
     }
 
     /// The eigenvalues of M^-1 A for A = m u u^T: m u.M^-1 u and five times 0.
