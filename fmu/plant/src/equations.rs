@@ -320,6 +320,20 @@ mod tests {
     }
 
     #[test]
+    fn time_at_rest_runs_while_the_hub_sticks_at_a_rate_that_depends_on_nothing() {
+        for (omega, rate) in [(0.0, 1.0), (0.07, 0.0)] {
+            let mut p = Parameters::default();
+            (p.slosh.model, p.friction.model) = (SloshModel::Frozen, FrictionModel::Stribeck);
+            p.init.omega = omega;
+            let inputs = Inputs::default();
+            let mut plant = Plant::new(&p, &inputs, 0.0, 1e-9).unwrap();
+            assert_eq!(plant.derivatives(&inputs)[x::STUCK_TIME], rate);
+            let slopes = plant.directional_derivative(&inputs, &[1.0; STATES], &[1.0; 3]);
+            assert_eq!(slopes[x::STUCK_TIME], 0.0);
+        }
+    }
+
+    #[test]
     fn directional_derivatives_agree_with_finite_differences() {
         compare_directional_derivatives(|_| {});
         compare_directional_derivatives(every_option);

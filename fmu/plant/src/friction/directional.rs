@@ -177,4 +177,20 @@ mod tests {
             assert!((one.coefficient(0, &series) - expected).abs() < 1e-15, "{theta}");
         }
     }
+
+    /// One harmonic of size 1 with its lowest angle on a sample and halfway between two: there B falls below both.
+    #[test]
+    fn the_lower_bound_is_below_the_lowest_factor_by_no_more_than_2e_6_of_its_harmonics() {
+        let half = core::f64::consts::PI / 4096.0;
+        for place in [0.0, 1.0, 1024.0, 1025.0, 3001.0, 4095.0] {
+            let (s, c) = (place * half).sin_cos();
+            let (s2, c2) = (2.0 * place * half).sin_cos();
+            for harmonics in [[-c, -s, 0.0, 0.0], [0.0, 0.0, -c2, -s2]] {
+                let one = OneWay { mean: 1.5, harmonics };
+                let below = 0.5 - one.lowest();
+                // Rounding.
+                assert!((-1e-15..2e-6).contains(&below), "{place} {harmonics:?} {below:e}");
+            }
+        }
+    }
 }

@@ -281,3 +281,25 @@ impl SloshMode for Paraboloid {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Displacement 1 is the length; an inertia that falls with the amplitude ends at 0.9 of where it is 0, a spring at
+    /// a tenth of its stiffness.
+    #[test]
+    fn a_mass_leaves_its_range_at_its_length_or_where_inertia_or_spring_are_nearly_gone() {
+        let outside = |l2_s: f64, hardening: f64, q: [f64; 2]| {
+            let mode = Paraboloid::new(&Pendulum { l2_s, hardening, ..Pendulum::default() });
+            mode.out_of_range(&[q[0], q[1], 0.0, 0.0]).is_some()
+        };
+        for (l2_s, hardening, ends) in
+            [(1.0, 0.0, 1.0), (-0.5, 0.0, 0.45), (1.0, -2.0, 0.45), (1.0, 2.0, 1.0)]
+        {
+            let at = |share: f64| [0.6, 0.8].map(|x| x * libm::sqrt(share * ends));
+            assert!(!outside(l2_s, hardening, at(0.999)), "{l2_s} {hardening}");
+            assert!(outside(l2_s, hardening, at(1.001)), "{l2_s} {hardening}");
+        }
+    }
+}

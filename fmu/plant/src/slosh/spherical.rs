@@ -418,6 +418,17 @@ mod tests {
         })
     }
 
+    /// tan(angle/2) is 1e3 at 0.115 degrees from straight up.
+    #[test]
+    fn a_bob_that_stands_straight_up_is_out_of_range() {
+        let mode = Spherical::new(&Pendulum::default());
+        for (q, is_out) in
+            [([0.0; 4], false), ([600.0, 700.0, 0.0, 0.0], false), ([0.0, -1001.0, 0.0, 0.0], true)]
+        {
+            assert_eq!(mode.out_of_range(&q).is_some(), is_out, "{q:?}");
+        }
+    }
+
     /// From hanging to 20 degrees from straight up, and what p and v say is the same motion.
     #[test]
     fn direction_and_velocity_move_as_lagrange_has_the_coordinates() {

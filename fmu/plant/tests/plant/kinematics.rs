@@ -187,3 +187,27 @@ fn liquid_pushes_back_against_an_acceleration() {
         assert_near(o.tau_fluid, -m_0 * 0.225 * 0.225 * wd, 1e-14, &format!("{slosh:?}"));
     }
 }
+
+/// Angles and rates of the first mode, in both directions, whatever coordinates the model has.
+#[test]
+fn a_plant_starts_at_the_angles_and_rates_that_it_was_given() {
+    for slosh in
+        [SloshModel::Linear, SloshModel::Planar, SloshModel::Spherical, SloshModel::Paraboloid]
+    {
+        let mut p = bench(slosh, FrictionModel::Viscous);
+        p.init.slosh_angle = 0.3;
+        p.init.slosh_rate = 1.5;
+        let both = !matches!(slosh, SloshModel::Linear | SloshModel::Planar);
+        if both {
+            (p.init.slosh_angle_radial, p.init.slosh_rate_radial) = (-0.2, 2.0);
+        }
+        let inputs = Inputs::default();
+        let o = Plant::new(&p, &inputs, 0.0, 1e-9).unwrap().outputs(&inputs);
+        let shown = [o.slosh_angle, o.slosh_rate, o.slosh_angle_radial, o.slosh_rate_radial];
+        let given = [0.3, 1.5, p.init.slosh_angle_radial, p.init.slosh_rate_radial];
+        for (shown, given) in shown.iter().zip(given) {
+            // Rounding of a few functions.
+            assert!((shown - given).abs() < 1e-14, "{slosh:?} {shown} {given}");
+        }
+    }
+}

@@ -52,6 +52,15 @@ fn states_are_as_exact_as_the_tolerance_says() {
     }
 }
 
+/// Angle, rate and energies of a hub without liquid and friction under a ramp of torque are polynomials of time.
+#[test]
+fn where_series_end_a_long_step_takes_as_many_internal_ones_as_a_short_one() {
+    let p = bench(SloshModel::Frozen, FrictionModel::None);
+    let inputs = Inputs { tau_cmd: Ramp { value: 0.01, slope: 1e-3 }, ..Inputs::default() };
+    let [short, long] = [0.02, 1e4].map(|h| steps(&p, &inputs, 1e-9, h));
+    assert_eq!(long, short);
+}
+
 /// None, viscous, smoothed, set-valued, LuGre; at the tolerances 1e-5 and 1e-10. More would be slower, fewer
 /// less exact; one in twenty is rounding.
 const STEPS: [[[usize; 2]; 5]; 6] = [
