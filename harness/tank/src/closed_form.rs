@@ -139,7 +139,8 @@ pub fn annular_wave_numbers(inner: f64, outer: f64, count: usize) -> Vec<f64> {
     let slope = |k: f64| {
         j1_slope(k * inner) * y1_slope(k * outer) - y1_slope(k * inner) * j1_slope(k * outer)
     };
-    let step = (0.1 / outer).min(0.05 * PI / (outer - inner));
+    // Zeros are 1/(mean radius) and pi/(outer - inner) from each other and from 0, or farther.
+    let step = 0.1 / outer;
     let mut found = Vec::with_capacity(count);
     let mut k = 0.5 / outer;
     let mut before = slope(k);

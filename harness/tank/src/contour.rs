@@ -616,3 +616,22 @@ impl Volume {
         Volume { volume, z_cg: base + z_cg, across: 0.5 * axial + second - first * z_cg, axial }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// -R at -90 degrees, between two of an arc's samples, and at the ends of others.
+    #[test]
+    fn the_lowest_and_the_highest_point_of_a_curve_are_between_its_samples() {
+        for (from, to) in [(-100.0, 63.0), (-123.4, 120.0), (-90.0, 90.0)] {
+            let arc = Segment::arc([0.4, 0.2], 0.1, from, to);
+            let (place, low) = extreme(&arc, 1.0);
+            // The square of 60 cuts by the golden section, which end at rounding's root.
+            assert!((low - 0.1).abs() < 1e-16 * 8.0, "{from} {low}");
+            assert!((place - (-90.0 - from) / (to - from)).abs() < 1e-7, "{from} {place}");
+            let top = 0.2 + 0.1 * f64::min(to, 90.0).to_radians().sin();
+            assert!((-extreme(&arc, -1.0).1 - top).abs() < 1e-15, "{to}");
+        }
+    }
+}

@@ -315,3 +315,38 @@ fn a_cusp_at_the_edge_of_an_inverted_dome_is_harmless() {
         assert!((a.lambda / b.lambda - 1.0).abs() < 1e-4, "{} {}", a.lambda, b.lambda);
     }
 }
+
+/// Wave numbers are lengths' inverse; of a thin annulus the first is the circle's own, 1/R, and the next ones those of
+/// standing waves between two walls, n pi/(R - R_i).
+#[test]
+fn wave_numbers_of_an_annulus_scale_and_have_the_limits_of_a_thin_one() {
+    let ones = closed_form::annular_wave_numbers(0.4, 1.0, 5);
+    for size in [1e-3, 0.3, 7.0, 1e3] {
+        let found = closed_form::annular_wave_numbers(0.4 * size, size, 5);
+        for (k, one) in found.iter().zip(&ones) {
+            // Zeros of functions of size 1 with an error of some 1e-15.
+            assert!((k * size / one - 1.0).abs() < 1e-12, "{size} {k} {one}");
+        }
+    }
+    let thin = closed_form::annular_wave_numbers(0.99, 1.0, 3);
+    // The gap's half over the radius.
+    assert!((thin[0] * 0.995 - 1.0).abs() < 1e-3, "{}", thin[0]);
+    for (n, k) in thin[1..].iter().enumerate() {
+        let plane = (n + 1) as f64 * core::f64::consts::PI / 0.01;
+        assert!((k / plane - 1.0).abs() < 1e-3, "{k} {plane}");
+    }
+}
+
+/// lambda times the length along the waves: k L tanh(k h), k L = pi, 3 pi.
+#[test]
+fn a_box_has_its_frequencies_over_its_own_length() {
+    let data = closed_form::rectangular(0.8, 0.5, 0.2, 1000.0, 2);
+    let axes = data.axes.unwrap();
+    for (axis, length) in [(axes.x, 0.8), (axes.y, 0.5)] {
+        for (n, mode) in axis.modes.iter().enumerate() {
+            let k_l = (2 * n + 1) as f64 * core::f64::consts::PI;
+            let expected = k_l * (k_l * 0.2 / length).tanh();
+            assert!((mode.lambda_l.unwrap() / expected - 1.0).abs() < 1e-14, "{length} {n}");
+        }
+    }
+}
