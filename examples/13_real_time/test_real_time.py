@@ -1,0 +1,23 @@
+"""What holds however busy the machine is: no time is tested."""
+
+import numpy as np
+from real_time import ANGLE, PERIOD, lines, run
+
+
+def test_every_cycle_is_made_once_and_its_lateness_counted(fmu: str) -> None:
+    """300 cycles, a third of a second."""
+    table = run(fmu, 300)
+    assert np.allclose(table["time"], PERIOD * np.arange(1, 301), rtol=0, atol=1e-12)
+    assert (table["start"] >= 0).all() and (table["work"] > 0).all()
+    late = table["start"] + table["work"] > PERIOD
+    # two subtractions of the clock's readings around the deadline differ by rounding
+    assert abs(int(late.sum()) - int(table["missed"].sum())) <= 1
+    assert lines(table)[0].startswith("300 cycles of 1 ms, ")
+
+
+def test_the_controller_in_the_other_process_turns_the_hub(fmu: str) -> None:
+    """A torque answers a state that is some cycles old; the hub goes towards the wanted angle."""
+    table = run(fmu, 1000)
+    answered = table["age"][table["age"] >= 0]
+    assert len(answered) > 0 and (answered >= 1).all()
+    assert 0 < table["theta"].iloc[-1] < 2 * ANGLE
