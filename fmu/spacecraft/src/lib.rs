@@ -17,7 +17,9 @@ pub mod fmi2 {
     runtime::export_fmi2!(crate::Model);
 }
 
-/// The functions of FMI 3.0 that the binary exports.
+/// The functions of FMI 3.0 that the binary exports; none in a module for WebAssembly, whose host speaks 2.0 and which
+/// a page has to carry.
+#[cfg(not(target_arch = "wasm32"))]
 pub mod fmi3 {
     pub use runtime::v3::*;
 
