@@ -247,7 +247,8 @@ fn a_wrong_archive_of_an_fmu_3_is_told() {
     let other = [("linux64", "linux"), ("win64", "windows"), ("darwin64", "macos")];
     let old =
         other.iter().find(|(_, os)| *os == std::env::consts::OS).map_or("linux64", |(old, _)| old);
-    let cases: Vec<(String, Option<(String, String)>, &str)> = vec![
+    type Case = (String, Option<(String, String)>, &'static str);
+    let cases: Vec<Case> = vec![
         (format!("binaries/{old}/Model3{suffix}"), None, "bin.tuples"),
         (format!("binaries/{PLATFORM}/libModel3{suffix}"), None, "bin.name"),
         (binary(), Some(("model.png".into(), "x".into())), "zip.folders"),
