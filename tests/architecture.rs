@@ -52,7 +52,7 @@ const HARNESS: [(&str, &[&str]); 12] = [
     ("analysis", &["signals"]),
     ("experiments", &["formulas", "host", "signals", "analysis"]),
     ("web", &[]),
-    ("report", &["host", "analysis", "experiments"]),
+    ("report", &["formulas", "host", "signals", "analysis", "experiments", "web"]),
     ("identify", &["formulas", "host", "signals", "analysis", "experiments", "report"]),
     ("hubslosh-tank", &["formulas"]),
     ("hubslosh-batch", &[]),

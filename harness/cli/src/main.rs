@@ -26,6 +26,7 @@ mod fmu;
 mod progress;
 mod set_file;
 mod terminal;
+mod video;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -110,6 +111,7 @@ const EXIT_CODES: &str = "Exit codes:\n  \
 enum Command {
     Pack(pack::PackArgs),
     Run(run::RunArgs),
+    View(view::ViewArgs),
     Variables(variables::VariablesArgs),
     Torque(torque::TorqueArgs),
     Campaign(campaign::CampaignArgs),
@@ -219,6 +221,7 @@ fn carry_out(cli: Cli) -> u8 {
     let done = match cli.command {
         Some(Command::Pack(args)) => args.run(),
         Some(Command::Run(args)) => args.run(),
+        Some(Command::View(args)) => args.run(),
         Some(Command::Variables(args)) => args.run(),
         Some(Command::Completions(args)) => args.run(),
         Some(Command::Torque(args)) => args.run(),

@@ -1,5 +1,6 @@
 //! One run: a torque history through one instance of the FMU.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
@@ -127,6 +128,36 @@ pub fn histories(
             let slopes = (slope && name == TORQUE && !held).then(|| column(SLOPE));
             let history = Torque::rows(column("time"), column(name), slopes, held);
             Ok((name.to_string(), history.with_context(|| format!("{file} cannot be used"))?))
+        })
+        .collect()
+}
+
+/// Every parameter and input with the text of its start value: as a run sets it, or the FMU's own; inputs that are `driven`
+/// are left out. Numbers are written in one way, enumerations by name.
+pub fn parameters(
+    description: &ModelDescription,
+    settings: &[(String, String)],
+    driven: &[String],
+) -> BTreeMap<String, String> {
+    let settable = description.variables.iter().filter(|variable| {
+        ["parameter", "input"].contains(&variable.causality.as_str())
+            && !driven.contains(&variable.name)
+    });
+    settable
+        .filter_map(|variable| {
+            let set = settings.iter().rfind(|(name, _)| *name == variable.name);
+            let text = set.map(|(_, text)| text).or(variable.attributes().start.as_ref())?;
+            let items = description.items(variable);
+            let text = match description.value(variable, text).ok()? {
+                Value::Real(x) => x.to_string(),
+                Value::Boolean(b) => b.to_string(),
+                Value::String(s) => s,
+                Value::Integer(i) => {
+                    let item = items.iter().find(|item| item.value == i);
+                    item.map_or(i.to_string(), |item| item.name.clone())
+                }
+            };
+            Some((variable.name.clone(), text))
         })
         .collect()
 }

@@ -10,7 +10,8 @@
 `linearize` a state-space model, `frequency_response` an estimate from a history, `fit` a transfer
 function through such an estimate; `analyse`, `campaign`, `identify` and `tank` call the program
 ``hubslosh``, `liquid_modes` finds slosh modes in three dimensions, `posterior` samples what
-`identify` states. `plot` draws. `Plant` and `drive` are for those who step an instance themselves.
+`identify` states. `view` shows a run in 3-D, `plot` draws. `Plant` and `drive` are for those who
+step an instance themselves.
 """
 
 from importlib import import_module
@@ -33,6 +34,7 @@ if TYPE_CHECKING:
     from .stability import Margins, margins
     from .tables import read_parameters, read_table, setting, write_table
     from .tanks import Tank, tank
+    from .viewing import View, view
 
     __version__: str
 
@@ -54,6 +56,7 @@ _MODULES = {
     "stability": ("Margins", "margins"),
     "tables": ("read_parameters", "read_table", "setting", "write_table"),
     "tanks": ("Tank", "tank"),
+    "viewing": ("View", "view"),
 }
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
 
@@ -76,6 +79,7 @@ __all__ = [
     "Tank",
     "TransferFunction",
     "Value",
+    "View",
     "analyse",
     "attitude",
     "batch",
@@ -101,6 +105,7 @@ __all__ = [
     "to_csv",
     "to_mat",
     "to_parquet",
+    "view",
     "write_table",
 ]
 

@@ -248,6 +248,7 @@ class Loop:
             table = table[wanted].reset_index(drop=True)
         units = {name: fmu.unit(name) for name in table.columns if name != "time"}
         table.attrs["units"] = {"time": "s"} | units
+        table.attrs |= {"model": str(self.model), "parameters": dict(every)}
         return table
 
     def _controller(

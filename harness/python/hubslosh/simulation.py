@@ -80,7 +80,7 @@ def simulate(
 
     Returns a table with the columns ``time``, the inputs and ``outputs``; enumerations by number.
     An output that follows an input at once shows a jump in the next row. Units are in
-    ``.attrs["units"]``.
+    ``.attrs["units"]``, what was simulated in ``.attrs["model"]`` and ``.attrs["parameters"]``.
 
     Raises FmuError with everything that is wrong with the arguments, or with what the FMU says.
     """
@@ -142,6 +142,7 @@ def simulate(
         table = table[wanted].reset_index(drop=True)
     units = {name: fmu.unit(name) for name in table.columns if name != "time"}
     table.attrs["units"] = {"time": "s"} | units
+    table.attrs |= {"model": str(model), "parameters": dict(parameters)}
     return table
 
 

@@ -1,5 +1,6 @@
-//! What people look at: the page about a campaign ([`campaign::page`]), charts in SVG.
+//! What people look at: the page about a campaign ([`campaign::page`]), about one run ([`view::page`]), charts in SVG.
 
 pub mod campaign;
 pub mod gyro;
 pub mod svg;
+pub mod view;

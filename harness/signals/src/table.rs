@@ -120,7 +120,12 @@ impl Table {
     pub fn write_csv(&self, file: impl Write) -> Result<()> {
         self.all_finite()?;
         let mut out = BufWriter::new(file);
-        writeln!(out, "{}", self.names.join(","))?;
+        // a comma within the name of an element, p[1,2], divides no columns (RFC 4180)
+        let quoted = |name: &String| match name.contains([',', '"']) {
+            true => format!("\"{}\"", name.replace('"', "\"\"")),
+            false => name.clone(),
+        };
+        writeln!(out, "{}", self.names.iter().map(quoted).collect::<Vec<_>>().join(","))?;
         for row in 0..self.rows() {
             for (i, column) in self.columns.iter().enumerate() {
                 // the shortest digits that read back to the same number

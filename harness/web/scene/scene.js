@@ -82,7 +82,7 @@ globalThis.HubSloshScene = (() => {
       this.data = data;
       this.group = new THREE.Group();
       if (data.position) this.group.position.fromArray(data.position);
-      if (data.q) this.group.quaternion.set(data.q[1], data.q[2], data.q[3], data.q[0]);
+      if (data.q) this.group.quaternion.set(data.q[1], data.q[2], data.q[3], data.q[0]).normalize();
       this.glass = new THREE.MeshLambertMaterial({ transparent: true, opacity: 0.1, side: THREE.DoubleSide, depthWrite: false });
       this.edge = new THREE.LineBasicMaterial({ transparent: true, opacity: 0.75 });
       this.wet = new THREE.MeshLambertMaterial({ transparent: true, opacity: 0.3, side: THREE.DoubleSide, depthWrite: false });
@@ -209,6 +209,7 @@ globalThis.HubSloshScene = (() => {
       this.wet.color.set(colors.liquid);
       this.top.color.set(colors.surface);
       this.metal.color.set(colors.bob);
+      this.metal.emissive.set(colors.bob).multiplyScalar(0.45); // seen through the liquid
       this.rod.color.set(colors.ink);
     }
   }
@@ -300,13 +301,14 @@ globalThis.HubSloshScene = (() => {
       position.needsUpdate = true;
       this.tube.geometry.computeVertexNormals();
       const a = from + turn, sign = Math.sign(turn);
+      this.head.scale.setScalar(Math.min(1, (Math.abs(turn) * radius) / (7 * thick)));
       this.head.position.set(radius * Math.cos(a), radius * Math.sin(a), 0);
       this.head.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), new THREE.Vector3(-sign * Math.sin(a), sign * Math.cos(a), 0));
     }
   }
 
   // The bench: a fixed base with marks every 30 degrees; the platform that turns with the tank; the wheel on the axis.
-  function bench({ reach, wheel, arm }, root, fixed, paint) {
+  function bench({ reach, wheel, arm, below }, root, fixed, paint) {
     const hub = paint(new THREE.MeshLambertMaterial(), "hub"), metal = paint(new THREE.MeshLambertMaterial(), "metal");
     const line = paint(new THREE.LineBasicMaterial(), "soft");
     const upright = (mesh, z) => { mesh.rotation.x = Math.PI / 2; mesh.position.z = z; return mesh; };
@@ -320,6 +322,7 @@ globalThis.HubSloshScene = (() => {
     const rotor = new THREE.Group(), spoke = new THREE.Mesh(new THREE.BoxGeometry(1.9 * wheel, 0.12 * wheel, 0.36 * wheel), paint(new THREE.MeshLambertMaterial(), "ink"));
     rotor.add(upright(new THREE.Mesh(new THREE.CylinderGeometry(wheel, wheel, 0.3 * wheel, 48), metal), 0.3 * wheel), spoke);
     spoke.position.z = 0.3 * wheel;
+    if (below) rotor.position.z = -thick - 0.6 * wheel;
     root.add(rotor);
     fixed.add(upright(new THREE.Mesh(new THREE.CylinderGeometry(0.12 * reach, 0.2 * reach, 0.45 * reach, 48), metal), -thick - 0.225 * reach));
     const z = -thick - 0.45 * reach, marks = [];
@@ -367,7 +370,8 @@ globalThis.HubSloshScene = (() => {
 .hs-scene .hs-legend li { display: flex; gap: .45rem; align-items: center; white-space: nowrap; margin: 0; max-width: none; }
 .hs-scene .hs-legend i { flex: none; width: 14px; height: 4px; border-radius: 2px; }
 .hs-scene .hs-legend b { margin-left: auto; padding-left: .6rem; font-weight: 600; font-variant-numeric: tabular-nums; }
-.hs-scene .hs-legend .hs-scale { color: var(--hs-soft); font-size: 11px; white-space: normal; max-width: 17rem; }`;
+.hs-scene .hs-legend .hs-scale { color: var(--hs-soft); font-size: 11px; white-space: normal; max-width: 17rem; }
+@media (max-width: 600px) { .hs-scene .hs-legend { font-size: 11px; line-height: 1.35; padding: .15rem .4rem; left: .25rem; top: .25rem; } .hs-scene .hs-legend .hs-scale { font-size: 10px; } }`;
 
   const digits = (value) => {
     const size = Math.abs(value);
@@ -438,7 +442,7 @@ globalThis.HubSloshScene = (() => {
       const row = document.createElement("li"), text = document.createElement("span");
       text.className = "hs-scale";
       const most = [...new Map(arrows.map(({ data }) => [data.kind + data.most, data])).values()];
-      text.textContent = most.map((d) => `full ${d.arc ? "arc" : d.kind === "torque" ? "two-headed arrow" : "arrow"}: ${digits(d.most)} ${d.unit}`).join(", ");
+      text.textContent = most.map((d) => `full ${d.arc ? "arc" : d.kind === "torque" ? "two-headed arrow" : "arrow"}: ${digits(d.most)}\u00a0${d.unit}`).join(", ");
       row.append(text);
       legend.append(row);
       element.append(legend);
@@ -577,6 +581,28 @@ globalThis.HubSloshScene = (() => {
       set frame(value) { frame = value; if (state) { apply(); request(); } },
       get frame() { return frame; },
       home() { home(); request(); },
+      // Takes the size of its element now, not when the browser says that it has changed.
+      resize,
+      // Copies the picture with its legend to a 2-D canvas of this size, `text` below on the left.
+      paint(pen, wide, high, text) {
+        const colors = COLORS[dark.matches ? "dark" : "light"], unit = high / 36;
+        pen.fillStyle = colors.paper;
+        pen.fillRect(0, 0, wide, high);
+        draw();
+        pen.drawImage(canvas, 0, 0, wide, high);
+        pen.font = `${0.8 * unit}px system-ui, sans-serif`;
+        pen.textBaseline = "middle";
+        arrows.forEach(({ data }, i) => {
+          const y = unit * (1.2 + 1.15 * i);
+          pen.fillStyle = rows[i].swatch.style.background;
+          pen.fillRect(unit, y - 0.12 * unit, unit, 0.24 * unit);
+          pen.fillStyle = colors.ink;
+          pen.fillText(`${data.label || data.name}: ${rows[i].value.textContent}`, 2.4 * unit, y);
+        });
+        pen.fillStyle = colors.ink;
+        pen.font = `600 ${unit}px system-ui, sans-serif`;
+        pen.fillText(text, unit, high - 1.2 * unit);
+      },
       // What is drawn, read back from its meshes: of each tank and mode hinge and bob in the body's frame, m, and the elevation
       // of the surface at the wall on the tank's x axis and y axis, m, exaggerated as it is drawn.
       read() {

@@ -8,7 +8,7 @@ use experiments::plan::{self, Plan, Sweeps};
 use host::fmu::Fmu;
 use host::{budget, guard};
 
-use super::{DEFAULT_CAMPAIGN, DEFAULT_FMU, open, setting};
+use super::{DEFAULT_CAMPAIGN, DEFAULT_FMU, open, setting, view};
 use crate::{progress, terminal};
 
 /// Simulates a plan's runs, or the sine sweeps of Rubaga's thesis at several fills and amplitudes,
@@ -188,7 +188,16 @@ pub fn drive(fmu: &Fmu, campaign: &Campaign, folder: Folder) -> Result<()> {
     bar.finish_and_clear();
     let mut files = campaign.tables(fmu, &results)?;
     files.push(("plan.toml", campaign.plan.text.clone().into_bytes()));
-    files.push(("report.html", report::campaign::page(campaign, fmu, &results).into_bytes()));
+    let telling = report::campaign::telling(&results);
+    let shown = match telling {
+        Some(run) => {
+            Some(view::of_stored(fmu.description(), &folder.run(&run.case.name), &run.case.name)?)
+        }
+        None => None,
+    };
+    let view = telling.map(|run| ("view.html", run));
+    files.push(("report.html", report::campaign::page(campaign, fmu, &results, view).into_bytes()));
+    files.extend(shown.map(|page| ("view.html", page.into_bytes())));
     folder.publish(files)?;
     let (all, reused) = results.counts();
     let recorded = results.recordings();

@@ -26,6 +26,7 @@ pub mod scale;
 pub mod tank;
 pub mod torque;
 pub mod variables;
+pub mod view;
 
 /// The FMU that commands drive unless another is named.
 pub const DEFAULT_FMU: &str = "HubSlosh";

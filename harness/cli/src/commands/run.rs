@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use anyhow::{Result, bail};
 use experiments::campaign::{Range, WAVE, stored_columns};
 use experiments::profile::{self, Written};
-use experiments::run::{Run, driven, histories};
+use experiments::run::{self, Run, driven, histories};
 use host::description::ModelDescription;
 use host::guard;
 
@@ -130,10 +130,18 @@ impl RunArgs {
         for warning in instance.take_warnings() {
             terminal::warn(warning);
         }
+        let named: Vec<String> =
+            run.input.iter().chain(run.others.iter().map(|(name, _)| name)).cloned().collect();
+        // at rest, but for what is set
+        let rest = description.moving_starts().iter().map(|name| (name.to_string(), "0".into()));
+        let settings: Vec<_> = rest.chain(run.settings.iter().cloned()).collect();
+        let parameters = run::parameters(description, &settings, &named);
         let notes = BTreeMap::from([
             ("fmu".into(), fmu.hash().into()),
             ("guid".into(), fmu.description().guid.clone()),
             ("version".into(), fmu.description().version.clone()),
+            ("model".into(), description.model_name.clone()),
+            ("parameters".into(), serde_json::json!(parameters).to_string()),
         ]);
         let beyond = range.and_then(|range| range.left(table.column(WAVE)?));
         let driven = table.names().len() - columns.len();

@@ -107,6 +107,11 @@ impl Folder {
         &self.path
     }
 
+    /// The file of a stored run.
+    pub fn run(&self, run: &str) -> PathBuf {
+        self.path.join(file_of(run))
+    }
+
     /// The SHA-256 of a stored run; the reason, if it is not what was stored. A run of another program
     /// that is seen for the first time is taken as it is.
     pub fn check(&self, run: &str) -> Result<String, String> {
@@ -245,7 +250,7 @@ fn hold(path: &Path, about: &str) -> Result<File> {
 /// stands in the manifest.
 fn is_published(name: &str) -> bool {
     let features = name.strip_prefix("features").and_then(|rest| rest.strip_suffix(".csv"));
-    matches!(name, "plan.toml" | "report.html" | "runs.csv")
+    matches!(name, "plan.toml" | "report.html" | "runs.csv" | "view.html")
         || features.is_some_and(|rest| rest.chars().all(|c| c.is_alphanumeric() || c == '_'))
 }
 

@@ -3,11 +3,10 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use host::description::Value;
 use host::fmu::Fmu;
 
 use super::Case;
-use crate::run::Run;
+use crate::run::{self, Run};
 use signals::table::{self, Table};
 
 /// Raised when stored runs of an older program mean something else.
@@ -26,12 +25,13 @@ const FORMAT: &str = "1";
 pub fn recipe(fmu: &Fmu, case: &Case, columns: &[String]) -> BTreeMap<String, String> {
     let settings: Vec<_> = case.settings.iter().map(|(k, v)| format!("{k}={v}")).collect();
     let torque = if case.hold { "held over each step" } else { "linear over each step" };
+    let parameters = run::parameters(fmu.description(), &case.settings, case.input.as_slice());
     let mut recipe = BTreeMap::from(
         [
             ("format", FORMAT.to_string()),
             ("model", fmu.description().model_name.clone()),
             ("binary_sha256", fmu.binary_hash().to_string()),
-            ("parameters", serde_json::json!(parameters(fmu, case)).to_string()),
+            ("parameters", serde_json::json!(parameters).to_string()),
             ("settings", settings.join(" ")),
             ("profile", case.profile.clone()),
             ("step", case.step.to_string()),
@@ -46,33 +46,6 @@ pub fn recipe(fmu: &Fmu, case: &Case, columns: &[String]) -> BTreeMap<String, St
         recipe.insert("torque_sha256".into(), hash.clone());
     }
     recipe
-}
-
-/// Every parameter and input with the text of its start value: as the run sets it, or the FMU's
-/// own. Numbers are written in one way, enumerations by name.
-fn parameters(fmu: &Fmu, case: &Case) -> BTreeMap<String, String> {
-    let description = fmu.description();
-    let settable = description.variables.iter().filter(|variable| {
-        ["parameter", "input"].contains(&variable.causality.as_str())
-            && Some(&variable.name) != case.input.as_ref()
-    });
-    settable
-        .filter_map(|variable| {
-            let set = case.settings.iter().rfind(|(name, _)| *name == variable.name);
-            let text = set.map(|(_, text)| text).or(variable.attributes().start.as_ref())?;
-            let items = description.items(variable);
-            let text = match description.value(variable, text).ok()? {
-                Value::Real(x) => x.to_string(),
-                Value::Boolean(b) => b.to_string(),
-                Value::String(s) => s,
-                Value::Integer(i) => {
-                    let item = items.iter().find(|item| item.value == i);
-                    item.map_or(i.to_string(), |item| item.name.clone())
-                }
-            };
-            Some((variable.name.clone(), text))
-        })
-        .collect()
 }
 
 /// The stored run, if it is complete and of this recipe; else why not.

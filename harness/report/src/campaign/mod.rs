@@ -16,19 +16,46 @@ mod thesis;
 
 use analysis::BAND;
 use analysis::features::Features;
-use experiments::campaign::{Campaign, Results};
+use experiments::campaign::{Campaign, Outcome, Results};
 use experiments::rounding::thousandths;
 use host::fmu::Fmu;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use self::figure::{Figure, Figures};
+pub(crate) use self::page::printed;
 use self::page::{Group, Page, Varied, axis, best, groups, manoeuvre, runs};
+
+/// plotly.js, as the global `Plotly`.
+pub(crate) const PLOTLY: &str = include_str!("plotly/plotly-cartesian.min.js");
+
+/// Its licence, which every page that holds it holds too.
+pub(crate) const PLOTLY_LICENSE: &str = include_str!("plotly/LICENSE");
 
 /// Most groups that get figures of their own; more would be a book.
 const MOST_GROUPS: usize = 6;
 
-/// The report.
-pub fn page(campaign: &Campaign, fmu: &Fmu, results: &Results) -> String {
+/// The campaign's most telling run: that with the largest radial slosh angle, which is rotary slosh; where none leaves its
+/// plane, that with the largest slosh angle. No recording.
+pub fn telling(results: &Results) -> Option<&Outcome> {
+    let simulated = results.outcomes.iter().filter(|run| !run.is_recording());
+    let (radial, tangential) =
+        (|run: &Outcome| run.totals.peak_radial_angle, |run: &Outcome| run.totals.peak_slosh_angle);
+    let largest = |angle: fn(&Outcome) -> f64| {
+        simulated
+            .clone()
+            .filter(|run| angle(run) > 0.0)
+            .max_by(|a, b| angle(a).total_cmp(&angle(b)))
+    };
+    largest(radial).or_else(|| largest(tangential))
+}
+
+/// The report; `view` is the page beside it that shows the run named.
+pub fn page(
+    campaign: &Campaign,
+    fmu: &Fmu,
+    results: &Results,
+    view: Option<(&str, &Outcome)>,
+) -> String {
     let plan = &campaign.plan;
     let page = Page {
         plan,
@@ -54,6 +81,7 @@ pub fn page(campaign: &Campaign, fmu: &Fmu, results: &Results) -> String {
             body {
                 main {
                     (introduction(&page, fmu, results))
+                    @if let Some((file, run)) = view { (link(file, run)) }
                     nav aria-label="Contents" {
                         b { "Contents" }
                         ul {
@@ -74,8 +102,8 @@ pub fn page(campaign: &Campaign, fmu: &Fmu, results: &Results) -> String {
                 }
                 script type="application/json" id="figures" { (PreEscaped(figures.json())) }
                 script {
-                    (PreEscaped(format!("/* {} */\n", include_str!("plotly/LICENSE").replace("*/", "* /"))))
-                    (PreEscaped(include_str!("plotly/plotly-cartesian.min.js")))
+                    (PreEscaped(format!("/* {} */\n", PLOTLY_LICENSE.replace("*/", "* /"))))
+                    (PreEscaped(PLOTLY))
                 }
                 script { (PreEscaped(include_str!("report.js"))) }
             }
@@ -239,6 +267,23 @@ fn introduction(page: &Page, fmu: &Fmu, results: &Results) -> Markup {
                 @if beyond.len() == 1 { ": " } @else { ", such as " }
                 (one) ". Computed faithfully, but not what a tank does. The results table marks it."
             }
+        }
+    }
+}
+
+/// To the page that shows one run.
+fn link(file: &str, run: &Outcome) -> Markup {
+    let radial = run.totals.peak_radial_angle;
+    let degrees = |angle: f64| format!("{:.1}°", angle.to_degrees());
+    html! {
+        p {
+            a href=(file) { b { "See a run move: " (run.case.name) } }
+            @if radial > 0.0 {
+                ", that with the largest radial slosh angle (" (degrees(radial)) ")."
+            } @else {
+                ", that with the largest slosh angle (" (degrees(run.totals.peak_slosh_angle)) ")."
+            }
+            " Others: " code { "hubslosh view runs/NAME.parquet" } "."
         }
     }
 }

@@ -133,7 +133,7 @@ pub(super) fn unit(fmu: &Fmu, name: &str) -> Option<String> {
 }
 
 /// A unit in FMI's spelling, as it is printed: N.m, kg.m2, rad/s2.
-pub(super) fn printed(unit: &str) -> String {
+pub(crate) fn printed(unit: &str) -> String {
     unit.replace('.', "·").replace("m2", "m²").replace("s2", "s²")
 }
 

@@ -1,0 +1,246 @@
+//! `hubslosh view`.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, bail, ensure};
+use host::description::ModelDescription;
+use host::output::atomically;
+use hubslosh_tank::tank::Geometry;
+use hubslosh_tank::{Fill, Tank};
+use report::view::{self, Drawing, Outline};
+use signals::table::{self, Table};
+
+use super::setting;
+use crate::video::{Film, film};
+use crate::{fmu, set_file, terminal};
+
+/// Makes a page of one run: bench or spacecraft in 3-D with its liquid, and plots that follow the time.
+///
+/// The page needs nothing else, no network either. Nothing is simulated: it shows what the table has.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:\n  \
+    hubslosh run --profile exp-sweep:amplitude=0.25 --set slosh.model=spherical --out sweep.parquet\n  \
+    hubslosh view sweep.parquet\n  \
+    hubslosh view sweep.parquet --from 300 --to 400 --out swirl.html --video swirl.mp4 --speed 2\n  \
+    hubslosh view drain.csv --fmu SloshTank --parameters draining.toml --tank tank.toml\n  \
+    hubslosh view slew.parquet --tank 1:oxidiser.toml --tank 2:fuel.toml")]
+pub struct ViewArgs {
+    /// The run: .parquet or .csv, as `hubslosh run` and `campaign` write them.
+    #[arg(value_name = "RUN")]
+    run: PathBuf,
+    /// Where to put the page [default: beside the run, its name with .html].
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// First time, s.
+    #[arg(long, value_name = "SECONDS")]
+    from: Option<f64>,
+    /// Last time, s.
+    #[arg(long, value_name = "SECONDS")]
+    to: Option<f64>,
+    /// Makes a film, too, .mp4: needs Chromium and ffmpeg on PATH.
+    #[arg(long, value_name = "FILE")]
+    video: Option<PathBuf>,
+    /// Run time per time of the film.
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, requires = "video")]
+    speed: f64,
+    /// Frames of the film a second.
+    #[arg(long, value_name = "NUMBER", default_value_t = 30, requires = "video", value_parser = clap::value_parser!(u32).range(1..=120))]
+    rate: u32,
+    /// Draws a tank as this file has it (the format of `hubslosh tank`), the first or that with the number: 2:fuel.toml.
+    #[arg(long = "tank", value_name = "[N:]TANK.toml")]
+    tanks: Vec<String>,
+    /// Parameters that the run was made with, where its file does not say them, before those of --set.
+    #[arg(long, visible_alias = "set-file", value_name = "FILE")]
+    parameters: Option<PathBuf>,
+    /// A parameter that the run was made with.
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
+    settings: Vec<(String, String)>,
+    /// The FMU that made the run: a file, or the name of one of this project [default: the one that the run names, or whose
+    /// variables its columns are].
+    #[arg(long, value_name = "FILE|NAME")]
+    fmu: Option<PathBuf>,
+}
+
+impl ViewArgs {
+    /// Runs the command.
+    pub fn run(self) -> Result<()> {
+        let out = self.out.clone().unwrap_or_else(|| self.run.with_extension("html"));
+        ensure!(
+            out.extension().is_some_and(|ending| ending == "html"),
+            "--out {}: the name must end in .html",
+            out.display()
+        );
+        if let Some(video) = &self.video {
+            ensure!(
+                video.extension().is_some_and(|ending| ending == "mp4"),
+                "--video {}: the name must end in .mp4",
+                video.display()
+            );
+        }
+        ensure!(
+            self.speed > 0.0 && self.speed.is_finite(),
+            "--speed {} (allowed: a number above 0)",
+            self.speed
+        );
+        let is_parquet = self.run.extension().is_some_and(|e| e.eq_ignore_ascii_case("parquet"));
+        let there = table::names(&self.run)?;
+        let notes = if is_parquet { table::metadata(&self.run)? } else { BTreeMap::new() };
+        let name = match &self.fmu {
+            Some(fmu) => fmu.clone(),
+            None => notes.get("model").map(PathBuf::from).or_else(|| model_of(&there)).with_context(|| {
+                format!(
+                    "{}: its columns are of no FMU of this project ({}): name the FMU that made it by --fmu",
+                    self.run.display(),
+                    there.join(", ")
+                )
+            })?,
+        };
+        let description = ModelDescription::of_packed(&fmu::find(&name)?)?;
+        let mut parameters: BTreeMap<String, String> = match notes.get("parameters") {
+            Some(text) => serde_json::from_str(text)
+                .with_context(|| format!("{}: its metadata are damaged", self.run.display()))?,
+            None => BTreeMap::new(),
+        };
+        let parameters_known =
+            !parameters.is_empty() || self.parameters.is_some() || !self.settings.is_empty();
+        if let Some(path) = &self.parameters {
+            parameters.extend(set_file::read(path)?);
+        }
+        parameters.extend(self.settings.iter().cloned());
+        for (name, value) in &parameters {
+            let variable = description.variable(name)?;
+            description.value(variable, value)?;
+        }
+        let known: BTreeSet<&str> = description.variables.iter().map(|v| v.name.as_str()).collect();
+        let wanted: Vec<&str> = there
+            .iter()
+            .map(String::as_str)
+            .filter(|n| *n == "time" || known.contains(n))
+            .collect();
+        let whole = Table::read(&self.run, &wanted)?;
+        let table = part(&whole, self.from, self.to)?;
+        let drawings =
+            self.tanks.iter().map(|text| drawing(text)).collect::<Result<BTreeMap<_, _>>>()?;
+        ensure!(drawings.len() == self.tanks.len(), "--tank names a tank twice");
+        let shown =
+            self.run.file_stem().map_or(String::new(), |stem| stem.to_string_lossy().into());
+        let page = view::page(&view::Run {
+            title: shown,
+            source: self.run.display().to_string(),
+            description: &description,
+            parameters: &parameters,
+            parameters_known,
+            drawings: &drawings,
+            table: &table,
+        })?;
+        for warning in page.warnings {
+            terminal::warn(warning);
+        }
+        atomically(&out, |file| Ok(file.write_all(page.html.as_bytes())?))?;
+        done!("{} ({:.1} MB)", out.display(), page.html.len() as f64 * 1e-6);
+        if let Some(video) = &self.video {
+            let time = table.column("time").unwrap_or_default();
+            let duration = time[time.len() - 1] - time[0];
+            film(&page.html, &Film { speed: self.speed, rate: self.rate, duration }, video)?;
+            done!("{}", video.display());
+        }
+        Ok(())
+    }
+}
+
+/// The page of a campaign's stored run.
+pub fn of_stored(description: &ModelDescription, file: &Path, title: &str) -> Result<String> {
+    let notes = table::metadata(file)?;
+    let parameters = serde_json::from_str(notes.get("parameters").map_or("{}", String::as_str))
+        .with_context(|| format!("{}: its metadata are damaged", file.display()))?;
+    let names = table::names(file)?;
+    let table = Table::read(file, &names.iter().map(String::as_str).collect::<Vec<_>>())?;
+    let page = view::page(&view::Run {
+        title: title.into(),
+        source: file.display().to_string(),
+        description,
+        parameters: &parameters,
+        parameters_known: true,
+        drawings: &BTreeMap::new(),
+        table: &table,
+    })?;
+    Ok(page.html)
+}
+
+/// The FMU of this project whose variables the columns are.
+fn model_of(columns: &[String]) -> Option<PathBuf> {
+    let any = |beginning: &str| columns.iter().any(|name| name.starts_with(beginning));
+    let name = match () {
+        () if any("slosh_angle") || any("tau_cmd") => "HubSlosh",
+        () if any("tank[") || any("q[") => "Spacecraft",
+        () if any("tank.") => "SloshTank",
+        () => return None,
+    };
+    Some(name.into())
+}
+
+/// The rows between two times.
+fn part(table: &Table, from: Option<f64>, to: Option<f64>) -> Result<Table> {
+    let time = table.column("time").unwrap_or_default();
+    let (from, to) = (from.unwrap_or(f64::NEG_INFINITY), to.unwrap_or(f64::INFINITY));
+    // a time that is written with fewer digits than it has is meant
+    let kept: Vec<usize> =
+        (0..time.len()).filter(|k| time[*k] >= from - 1e-9 && time[*k] <= to + 1e-9).collect();
+    if kept.len() < 2 && time.len() > 1 {
+        bail!(
+            "--from and --to leave {} row(s) (allowed: two or more, between {} and {} s)",
+            kept.len(),
+            time[0],
+            time[time.len() - 1]
+        );
+    }
+    let column = |name: &String| {
+        let values = table.column(name).expect("a column of this table");
+        kept.iter().map(|k| values[*k]).collect()
+    };
+    Ok(Table::new(table.names().to_vec(), table.names().iter().map(column).collect()))
+}
+
+/// Points of a drawn contour's segment, and masses at which the surface's height is computed.
+const POINTS: usize = 24;
+
+/// What `--tank [N:]FILE` names.
+fn drawing(text: &str) -> Result<(usize, Drawing)> {
+    let (number, path) = match text.split_once(':') {
+        Some((number, path)) if number.parse::<usize>().is_ok() => (number.parse()?, path),
+        _ => (1, text),
+    };
+    let path = Path::new(path);
+    let tank =
+        Tank::read(path).map_err(|problems| anyhow::anyhow!("{}: {problems}", path.display()))?;
+    let height =
+        |mass| tank.height_of(Fill::Mass(mass)).map_err(|problems| anyhow::anyhow!("{problems}"));
+    let name = tank.name.clone().unwrap_or_else(|| path.display().to_string());
+    Ok(match &tank.geometry {
+        Geometry::Revolution { contour, .. } => {
+            let mut points: Vec<[f64; 2]> = Vec::new();
+            for segment in contour.segments() {
+                let ends = (0..=POINTS).map(|i| segment.at(i as f64 / POINTS as f64));
+                points.extend(ends.map(|p| [p[0].max(0.0), p[1]]));
+            }
+            points.dedup_by(|a, b| (a[0] - b[0]).hypot(a[1] - b[1]) < 1e-9);
+            let (bottom, most) = (contour.bottom(), contour.capacity() * tank.density);
+            let levels = (0..=4 * POINTS)
+                .map(|i| {
+                    let mass = most * i as f64 / (4 * POINTS) as f64;
+                    Ok([mass, bottom + height(mass)?])
+                })
+                .collect::<Result<_>>()?;
+            (number, Drawing { name, outline: Outline::Revolved(points), levels })
+        }
+        Geometry::Box { length_x, length_y } => {
+            // open at the top: as high as it is long
+            let top = length_x.max(*length_y);
+            let most = top * length_x * length_y * tank.density;
+            let outline = Outline::Box([*length_x, *length_y, 0.0, top]);
+            (number, Drawing { name, outline, levels: vec![[0.0, 0.0], [most, top]] })
+        }
+    })
+}

@@ -1,0 +1,111 @@
+"""A run to be looked at: the page of ``hubslosh view``, in a notebook or a browser."""
+
+import html
+import os
+import tempfile
+import webbrowser
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from .arguments import check_table
+from .fmu import FmuError, Quantity, find
+from .program import _run, find_program
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+HEIGHT = 760
+"""Of the page in a notebook, px."""
+
+
+@dataclass(frozen=True)
+class View:
+    """A page that shows a run; a notebook shows it below the cell that it is the value of."""
+
+    html: str = field(repr=False)
+    """The page: it needs nothing else, no network either."""
+    path: Path | None = None
+    """Where it was written, if ``out`` was given."""
+
+    def _repr_html_(self) -> str:
+        """Return it in a frame of its own, which IPython shows."""
+        return (
+            f'<iframe title="A run of an FMU" style="width:100%;height:{HEIGHT}px;border:0" '
+            f'srcdoc="{html.escape(self.html)}"></iframe>'
+        )
+
+    def open(self) -> None:
+        """Show it in the web browser."""
+        path = self.path
+        if path is None:
+            handle, name = tempfile.mkstemp(prefix="hubslosh-", suffix=".html")
+            os.close(handle)
+            path = Path(name)
+            path.write_text(self.html, encoding="utf-8")
+        webbrowser.open(path.absolute().as_uri())
+
+
+def view(
+    run: "pd.DataFrame | str | Path",
+    out: str | Path | None = None,
+    *,
+    model: str | Path | None = None,
+    parameters: Mapping[str, Quantity] | None = None,
+    tanks: Sequence[str | Path] | Mapping[int, str | Path] = (),
+    start: float | None = None,
+    stop: float | None = None,
+    program: str | Path | None = None,
+) -> View:
+    """Show a run: bench or spacecraft in 3-D with its liquid, and plots that follow the time.
+
+    run: a table, as ``simulate`` and ``closed_loop`` return it, or a file of ``hubslosh run``.
+    out: also write the page to this .html file.
+    model, parameters: what made the run; by default what the table (``.attrs``) or the file says.
+    tanks: files of tanks (the format of ``hubslosh tank``) to draw them by, in their order or by
+    number from 1.
+    start, stop: s, a part of the run.
+
+    Nothing is simulated. The table needs ``theta`` or ``omega``, ``slosh_angle`` and
+    ``slosh_angle_radial`` (HubSlosh), ``q[1]`` to ``q[4]`` (Spacecraft), and of tanks the
+    directions ``p`` or the slosh angles, all of which ``simulate`` records by default; of tanks
+    that drain also ``liquid``.
+
+    Raises FmuError with the columns that are missing.
+    """
+    path = find_program(program)
+    if out is not None and Path(out).suffix != ".html":
+        raise FmuError(f"{out}: the name must end in .html")
+    numbered = tanks if isinstance(tanks, Mapping) else dict(enumerate(tanks, 1))
+    with tempfile.TemporaryDirectory() as folder:
+        if isinstance(run, str | os.PathLike):
+            file, known = Path(run), {}
+        else:
+            check_table(run, "what is shown")
+            file = Path(folder) / f"{Path(out).stem if out else 'run'}.csv"
+            run.to_csv(file, index=False)
+            model = model or run.attrs.get("model")
+            known = run.attrs.get("parameters", {})
+        page = Path(out) if out is not None else Path(folder) / "run.html"
+        arguments: list[str | Path] = ["view", file, "--out", page]
+        arguments += ["--fmu", find(model)] if model is not None else []
+        for name, value in {**known, **(parameters or {})}.items():
+            arguments += ["--set", f"{name}={_text(value)}"]
+        for number, tank in numbered.items():
+            arguments += ["--tank", f"{number}:{tank}"]
+        arguments += [] if start is None else ["--from", str(start)]
+        arguments += [] if stop is None else ["--to", str(stop)]
+        _run(path, arguments)
+        return View(page.read_text(encoding="utf-8"), None if out is None else Path(out))
+
+
+def _text(value: Quantity) -> str:
+    """Return a value as the program reads it: with its unit, if it has one."""
+    match value:
+        case bool():
+            return str(value).lower()
+        case (number, unit):
+            return f"{number}{unit}"
+        case _:
+            return str(value)

@@ -1,0 +1,60 @@
+"""A run as a page."""
+
+import base64
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import option
+
+import hubslosh
+from hubslosh import FmuError
+
+
+def shown(page: str) -> dict:
+    """Return what a page draws."""
+    found = re.search(r'<script type="application/json" id="run">(.*?)</script>', page, re.DOTALL)
+    assert found
+    return json.loads(found[1])
+
+
+def test_a_table_is_shown_with_the_parameters_it_was_made_with(fmu: Path, request) -> None:
+    """The tank has the diameter that was set, in a unit of its own; columns come to 32 bits."""
+    parameters = {"tank.d": (200, "mm"), "slosh.model": "spherical", "init.slosh_angle": 0.2}
+    run = hubslosh.simulate(fmu, parameters=parameters, stop=3.0, step=0.02)
+    page = hubslosh.view(run, program=option(request, "--hubslosh"))
+    drawn = shown(page.html)
+    tank = drawn["scene"]["geometry"]["tanks"][0]
+    assert [0.1, 0.0] in tank["shape"]["contour"]
+    assert tank["modes"][0]["wave"] == pytest.approx(0.2 / (1.841183781**2 - 1))
+    angle = np.frombuffer(base64.b64decode(drawn["columns"]["slosh_angle"]), "<f4")
+    assert np.array_equal(angle, run["slosh_angle"].to_numpy().astype("f4"))
+    assert "srcdoc" in page._repr_html_() and page.path is None
+
+
+def test_a_table_without_what_moves_is_refused_by_the_columns(
+    fmu: Path, tmp_path: Path, request
+) -> None:
+    """All that is missing at once, and how it is recorded; no half page."""
+    run = hubslosh.simulate(fmu, stop=1.0, step=0.02, outputs=["wave_height"])
+    out = tmp_path / "page.html"
+    with pytest.raises(FmuError, match=r"theta \(or omega\).*slosh_angle") as error:
+        hubslosh.view(run, out, program=option(request, "--hubslosh"))
+    assert "--columns theta,omega,slosh_angle,slosh_angle_radial" in str(error.value)
+    assert not out.exists()
+
+
+def test_a_tank_is_drawn_by_its_file(fmu: Path, tmp_path: Path, request) -> None:
+    """A sphere half full of the bench's liquid: its surface is at its middle."""
+    tank = tmp_path / "sphere.toml"
+    tank.write_text("density = 1000\nshape = { sphere = { radius = 0.1 } }\n")
+    mass = 1000 * 2 / 3 * np.pi * 0.1**3
+    depth = mass / 1000 / (np.pi * 0.0815**2)
+    run = hubslosh.simulate(fmu, {"tank.h": float(depth)}, stop=1.0, step=0.02)
+    page = hubslosh.view(run, tanks=[tank], program=option(request, "--hubslosh"))
+    drawn = shown(page.html)["scene"]["geometry"]["tanks"][0]
+    # between heights computed at a hundredth of the volume
+    assert drawn["level"] == pytest.approx(0.1, abs=1e-4)
+    assert max(r for r, _ in drawn["shape"]["contour"]) == pytest.approx(0.1)

@@ -1,0 +1,385 @@
+//! What is drawn of a run's bench or craft, from its parameters.
+//!
+//! A tank's outline is no parameter of an FMU; where nobody names it, an upright cylinder stands for it:
+//!
+//! ```text
+//! radius R        from the wave at the wall, w_1 = 2 R/(xi^2 - 1)
+//! depth h         from m_1/m_liq = 2 tanh(xi h/R)/(xi (xi^2 - 1) h/R), which falls with h/R
+//! height          its middle at z_liq = [m_0 H_0 + sum m_n (h_n - l_n)]/m_liq
+//! ```
+//!
+//! An upright cylinder comes out as it is. Where a tank drains, its surface is at z_s = d(m z_liq)/dm, whatever its shape: what is
+//! added lies on top.
+
+use std::collections::BTreeMap;
+
+use formulas::cylinder::{XI, pendulum};
+use formulas::interpolation::{derivatives, quintic};
+use host::description::{ModelDescription, Value};
+
+/// Parameters of a run: what was set, else the FMU's start values.
+pub(super) struct Parameters<'a> {
+    pub description: &'a ModelDescription,
+    pub set: &'a BTreeMap<String, String>,
+}
+
+impl Parameters<'_> {
+    fn value(&self, name: &str) -> Option<(Value, String)> {
+        let variable = self.description.variable(name).ok()?;
+        let text = self.set.get(name).or(variable.attributes().start.as_ref())?;
+        Some((self.description.value(variable, text).ok()?, text.clone()))
+    }
+
+    /// A number in SI units; 0 of what the FMU does not have.
+    pub fn number(&self, name: &str) -> f64 {
+        match self.value(name) {
+            Some((Value::Real(x), _)) => x,
+            Some((Value::Integer(n), _)) => n as f64,
+            Some((Value::Boolean(b), _)) => f64::from(u8::from(b)),
+            _ => 0.0,
+        }
+    }
+
+    /// The name of an enumeration's item.
+    pub fn item(&self, name: &str) -> String {
+        let Some((Value::Integer(n), text)) = self.value(name) else { return String::new() };
+        let variable = self.description.variable(name).expect("it has a value");
+        let items = self.description.items(variable);
+        items.iter().find(|item| item.value == n).map_or(text, |item| item.name.clone())
+    }
+
+    /// `name[1]` to `name[N]`.
+    pub fn vector<const N: usize>(&self, name: &str) -> [f64; N] {
+        std::array::from_fn(|i| self.number(&format!("{name}[{}]", i + 1)))
+    }
+}
+
+/// Outline of a tank, m, in the tank's axes.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outline {
+    /// (r, z) from the axis along the bottom and up the wall.
+    Revolved(Vec<[f64; 2]>),
+    /// Sides along x and y, bottom and top.
+    Box([f64; 4]),
+}
+
+/// A tank as somebody has drawn it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drawing {
+    /// What it is called.
+    pub name: String,
+    /// Its outline.
+    pub outline: Outline,
+    /// Masses of liquid, kg, rising, each with the height of its surface at rest, m.
+    pub levels: Vec<[f64; 2]>,
+}
+
+impl Drawing {
+    fn level(&self, liquid: f64) -> f64 {
+        line(&self.levels, liquid)
+    }
+}
+
+/// The straight line through points with rising x; beyond the ends the value there.
+fn line(points: &[[f64; 2]], x: f64) -> f64 {
+    let after = points.partition_point(|p| p[0] < x);
+    match (after.checked_sub(1).map(|i| points[i]), points.get(after)) {
+        (Some(a), Some(b)) => a[1] + (b[1] - a[1]) * (x - a[0]) / (b[0] - a[0]),
+        (Some(end), None) => end[1],
+        (None, Some(end)) => end[1],
+        (None, None) => 0.0,
+    }
+}
+
+/// A pendulum of a tank.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pendulum {
+    pub mass: f64,
+    pub length: f64,
+    pub hinge: f64,
+    pub wave: f64,
+}
+
+/// What is drawn of a tank.
+pub(super) struct Tank {
+    /// `tank[1]`, `tank`, or of the bench nothing.
+    pub prefix: String,
+    pub position: [f64; 3],
+    pub q: [f64; 4],
+    pub outline: Outline,
+    /// Of the surface at rest, at the start.
+    pub level: f64,
+    pub modes: Vec<Pendulum>,
+    /// How it drains.
+    pub fill: Option<Fill>,
+    /// What the outline is taken from, as a sentence.
+    pub note: String,
+}
+
+impl Tank {
+    /// The distance from its origin in which it is, m.
+    pub fn extent(&self) -> f64 {
+        match &self.outline {
+            Outline::Revolved(points) => {
+                points.iter().map(|p| p[0].hypot(p[1])).fold(0.0, f64::max)
+            }
+            Outline::Box([a, b, low, high]) => (0.5 * a.hypot(*b)).hypot(low.abs().max(high.abs())),
+        }
+    }
+}
+
+/// Modes and surface of a tank over the mass of its liquid, interpolated as the FMU does.
+pub(super) struct Fill {
+    masses: Vec<f64>,
+    /// 1/l_n and h_n - l_n at the points, with slope and second derivative.
+    modes: Vec<[Vec<[f64; 3]>; 2]>,
+    /// Height of the surface, by mass.
+    levels: Vec<[f64; 2]>,
+}
+
+impl Fill {
+    /// Height of the surface at rest, m.
+    pub fn level(&self, liquid: f64) -> f64 {
+        line(&self.levels, liquid)
+    }
+
+    /// Length and hinge of mode `n`, from 0, m.
+    pub fn mode(&self, n: usize, liquid: f64) -> [f64; 2] {
+        let last = self.masses.len() - 1;
+        let liquid = liquid.clamp(self.masses[0], self.masses[last]);
+        let i = self.masses[1..last].partition_point(|m| *m <= liquid);
+        let h = self.masses[i + 1] - self.masses[i];
+        let t = (liquid - self.masses[i]) / h;
+        let [stiffness, bob] = [0, 1].map(|k| {
+            let curve = &self.modes[n][k];
+            quintic(h, curve[i], curve[i + 1]).iter().rev().fold(0.0, |sum, c| sum * t + c)
+        });
+        [1.0 / stiffness, bob + 1.0 / stiffness]
+    }
+}
+
+/// Height of a cylinder above the liquid in it, in radii: how high it is nobody says.
+const FREEBOARD: f64 = 0.7;
+
+fn cylinder(radius: f64, bottom: f64, level: f64) -> Outline {
+    Outline::Revolved(vec![[0.0, bottom], [radius, bottom], [radius, level + FREEBOARD * radius]])
+}
+
+/// Depth over radius of the cylinder whose first mode has this part of the liquid's mass.
+fn depth_over_radius(share: f64) -> f64 {
+    let xi = XI[0];
+    let of = |x: f64| 2.0 * (xi * x).tanh() / (xi * (xi * xi - 1.0) * x);
+    let (mut low, mut high) = (0.02, 50.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        *if of(middle) > share { &mut low } else { &mut high } = middle;
+    }
+    0.5 * (low + high)
+}
+
+/// Pendulum length of a mode that is given by its natural frequency, Hz, at the acceleration `g`.
+fn length(given: f64, frequency: f64, g: f64, k_over_m: f64) -> f64 {
+    let omega = std::f64::consts::TAU * frequency;
+    let stiffness = (omega * omega - k_over_m) / g;
+    if frequency > 0.0 && stiffness > 0.0 { 1.0 / stiffness } else { given }
+}
+
+const DRAWN: &str = "an upright cylinder with the radius that its wave at the wall has, the depth that its first mode's share of the \
+    liquid has, and the liquid's centre of mass";
+
+/// The tank of the bench, its origin in the middle of the bottom.
+pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank {
+    let number = |name: &str| parameters.number(name);
+    let radius = 0.5 * number("tank.d");
+    let is_table = parameters.item("slosh.source") == "table" || number("slosh.source_kind") == 2.0;
+    let (mode, level, mut bottom, m_liq, mut note) = match is_table {
+        false => {
+            let h = number("tank.h");
+            let m_liq = number("fluid.rho") * std::f64::consts::PI * radius * radius * h;
+            let mode = pendulum(0, 2.0 * radius, h, m_liq);
+            let note =
+                "The tank is drawn by tank.d and tank.h; how high its wall is, is no parameter."
+                    .into();
+            (mode, h, 0.0, m_liq, note)
+        }
+        true => {
+            let one = |key: &str| number(&format!("slosh.table.{key}[1]"));
+            let (mass, m_liq) = (one("mass"), number("slosh.table.m_liq"));
+            let g = number("slosh.table.g_ref");
+            let l = length(one("length"), one("frequency"), g, one("k") / mass);
+            let depth = radius * depth_over_radius(mass / m_liq);
+            let like = pendulum(0, 2.0 * radius, depth, m_liq);
+            let wave = if one("wave") > 0.0 { one("wave") } else { like.wave };
+            // where the table has no heights, those of the cylinder
+            let hinge = if one("hinge") == 0.0 { like.hinge } else { one("hinge") };
+            let bottom = (hinge - l) - (like.hinge - like.length);
+            let mode = formulas::cylinder::Pendulum { mass, length: l, hinge, wave };
+            let note = format!(
+                "Of the tank only modes are known (slosh.source = table): it is drawn as {DRAWN}."
+            );
+            (mode, bottom + depth, bottom, m_liq, note)
+        }
+    };
+    let mut level = level;
+    let outline = match drawing {
+        Some(drawing) => {
+            note = format!("The tank is drawn as {}.", drawing.name);
+            level = drawing.level(m_liq);
+            bottom = lowest(&drawing.outline);
+            drawing.outline.clone()
+        }
+        None => cylinder(radius, bottom, level),
+    };
+    Tank {
+        prefix: String::new(),
+        // it stands on the platform
+        position: [number("tank.r"), 0.0, -bottom],
+        q: [1.0, 0.0, 0.0, 0.0],
+        outline,
+        level,
+        modes: vec![Pendulum {
+            mass: mode.mass,
+            length: mode.length,
+            hinge: mode.hinge,
+            wave: mode.wave,
+        }],
+        fill: None,
+        note,
+    }
+}
+
+fn lowest(outline: &Outline) -> f64 {
+    match outline {
+        Outline::Revolved(points) => points.iter().map(|p| p[1]).fold(f64::INFINITY, f64::min),
+        Outline::Box([_, _, low, _]) => *low,
+    }
+}
+
+/// A tank of Spacecraft or SloshTank, whose variables begin with `prefix`.
+pub(super) fn tank(parameters: &Parameters, prefix: &str, drawing: Option<&Drawing>) -> Tank {
+    let number = |key: &str| parameters.number(&format!("{prefix}.{key}"));
+    let count = (number("modes") as usize).max(1);
+    let of = |key: &str, n: usize| number(&format!("{key}[{}]", n + 1));
+    let points = number("fill.points") as usize;
+    let diameter = number("diameter");
+    let fill = (points > 1).then(|| fill(&number, points, count));
+    let mut modes: Vec<Pendulum> = (0..count)
+        .map(|n| {
+            let mass = of("mass", n);
+            let l = length(of("length", n), of("frequency", n), number("g_ref"), of("k", n) / mass);
+            Pendulum { mass, length: l, hinge: of("hinge", n), wave: of("wave", n) }
+        })
+        .collect();
+    let (radius, level, bottom, m_liq, mut note);
+    if let Some(fill) = &fill {
+        m_liq = number("liquid_0");
+        for (n, mode) in modes.iter_mut().enumerate() {
+            [mode.length, mode.hinge] = fill.mode(n, m_liq);
+        }
+        radius = radius_of(&modes[0]);
+        level = fill.level(m_liq);
+        // the first point as a cylinder: its middle is the liquid's centre, the mean of bottom and surface
+        let first = fill.levels[0];
+        let part = fill.levels[1];
+        bottom = first[1] - (part[1] - first[1]) * first[0] / (part[0] - first[0]);
+        note = format!(
+            "{prefix} drains by a table: its surface is at the height where that puts the liquid which leaves; it is drawn as an \
+             upright cylinder with the radius that its wave at the wall has."
+        );
+    } else if diameter > 0.0 {
+        radius = 0.5 * diameter;
+        let depth = number("depth");
+        m_liq = number("density") * std::f64::consts::PI * radius * radius * depth;
+        modes = (0..count)
+            .map(|n| {
+                let one = pendulum(n, diameter, depth, m_liq);
+                Pendulum { mass: one.mass, length: one.length, hinge: one.hinge, wave: one.wave }
+            })
+            .collect();
+        (level, bottom) = (depth, 0.0);
+        note = format!(
+            "{prefix} is drawn by its diameter and depth; how high its wall is, is no parameter."
+        );
+    } else {
+        m_liq = number("m_0") + modes.iter().map(|m| m.mass).sum::<f64>();
+        let moment = number("m_0") * number("H_0")
+            + modes.iter().map(|m| m.mass * (m.hinge - m.length)).sum::<f64>();
+        radius = radius_of(&modes[0]);
+        let depth = radius * depth_over_radius(modes[0].mass / m_liq);
+        (level, bottom) = (moment / m_liq + 0.5 * depth, moment / m_liq - 0.5 * depth);
+        note = format!("Of {prefix} only modes are known: it is drawn as {DRAWN}.");
+    }
+    let mut level = level;
+    let outline = match drawing {
+        Some(drawing) => {
+            note = format!("{prefix} is drawn as {}.", drawing.name);
+            level = drawing.level(m_liq);
+            drawing.outline.clone()
+        }
+        None => cylinder(radius, bottom, level),
+    };
+    let fill = fill.map(|fill| match drawing {
+        Some(drawing) => Fill { levels: drawing.levels.clone(), ..fill },
+        None => fill,
+    });
+    let q: [f64; 4] = parameters.vector(&format!("{prefix}.q"));
+    let position = parameters.vector(&format!("{prefix}.position"));
+    Tank { prefix: prefix.into(), position, q, outline, level, modes, fill, note }
+}
+
+fn radius_of(mode: &Pendulum) -> f64 {
+    match mode.wave {
+        wave if wave > 0.0 => 0.5 * wave * (XI[0] * XI[0] - 1.0),
+        // the length of a deep cylinder's first mode is R/xi
+        _ => mode.length * XI[0],
+    }
+}
+
+fn fill(number: &dyn Fn(&str) -> f64, points: usize, count: usize) -> Fill {
+    let at = |key: &str, k: usize| number(&format!("fill.{key}[{}]", k + 1));
+    let of = |key: &str, n: usize, k: usize| number(&format!("fill.{key}[{},{}]", n + 1, k + 1));
+    let masses: Vec<f64> = (0..points).map(|k| at("liquid", k)).collect();
+    let curve = |y: Vec<f64>| {
+        let (mut slope, mut curvature) = (vec![0.0; points], vec![0.0; points]);
+        derivatives(&masses, &y, true, &mut slope, &mut curvature);
+        (0..points).map(|k| [y[k], slope[k], curvature[k]]).collect::<Vec<_>>()
+    };
+    let modes: Vec<[Vec<[f64; 3]>; 2]> = (0..count)
+        .map(|n| {
+            let stiffness = (0..points).map(|k| 1.0 / of("length", n, k)).collect();
+            let bob = (0..points).map(|k| of("hinge", n, k) - of("length", n, k)).collect();
+            [curve(stiffness), curve(bob)]
+        })
+        .collect();
+    // m z_liq at the points, and its derivative by the parabola through three neighbours: exact for a cylinder
+    let moment: Vec<f64> = (0..points)
+        .map(|k| {
+            let bobs: f64 = (0..count).map(|n| of("mass", n, k)).sum();
+            let of_bobs: f64 = (0..count)
+                .map(|n| of("mass", n, k) * (of("hinge", n, k) - of("length", n, k)))
+                .sum();
+            (masses[k] - bobs) * at("H_0", k) + of_bobs
+        })
+        .collect();
+    let secant = |i: usize, j: usize| (moment[j] - moment[i]) / (masses[j] - masses[i]);
+    let levels = (0..points)
+        .map(|k| {
+            let slope = match k {
+                _ if points == 2 => secant(0, 1),
+                0 => secant(0, 1) + secant(0, 2) - secant(1, 2),
+                k if k + 1 == points => secant(k - 1, k) + secant(k - 2, k) - secant(k - 2, k - 1),
+                k => secant(k - 1, k) + secant(k, k + 1) - secant(k - 1, k + 1),
+            };
+            [masses[k], slope]
+        })
+        .collect();
+    Fill { masses, modes, levels }
+}
+
+/// The box with the dry craft's mass and moments of inertia, m: `a_x^2 = 6 (Jyy + Jzz - Jxx)/m`; none if there is no such box.
+pub(super) fn craft_box(parameters: &Parameters) -> Option<[f64; 3]> {
+    let [m, x, y, z] =
+        ["mass", "Jxx", "Jyy", "Jzz"].map(|k| parameters.number(&format!("craft.{k}")));
+    let sides = [y + z - x, x + z - y, x + y - z].map(|twice| (6.0 * twice / m).sqrt());
+    sides.iter().all(|side| side.is_finite() && *side > 0.0).then_some(sides)
+}
