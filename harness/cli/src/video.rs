@@ -23,8 +23,8 @@ pub struct Film {
 /// Names under which Chromium is installed.
 const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chrome"];
 
-/// Most frames: five minutes at 30 a second.
-const MOST_FRAMES: f64 = 9000.0;
+/// Most frames, two minutes at 30 a second: the browser hands them over together.
+const MOST_FRAMES: f64 = 3600.0;
 
 /// Size of the picture, px.
 const SIZE: [u32; 2] = [1280, 720];

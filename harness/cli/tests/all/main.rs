@@ -11,4 +11,5 @@ mod plans;
 mod recordings;
 mod report;
 mod tank;
+mod view;
 mod words;

@@ -383,3 +383,57 @@ pub(super) fn craft_box(parameters: &Parameters) -> Option<[f64; 3]> {
     let sides = [y + z - x, x + z - y, x + y - z].map(|twice| (6.0 * twice / m).sqrt());
     sides.iter().all(|side| side.is_finite() && *side > 0.0).then_some(sides)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const XML: &str = include_str!("../../../../modelDescription/SloshTank/modelDescription.xml");
+
+    fn tank_with(set: &[(&str, &str)]) -> Tank {
+        let description = ModelDescription::from_xml(XML).unwrap();
+        let set = set.iter().map(|(name, value)| (name.to_string(), value.to_string())).collect();
+        tank(&Parameters { description: &description, set: &set }, "tank", None)
+    }
+
+    fn radius_and_bottom(tank: &Tank) -> [f64; 2] {
+        let Outline::Revolved(points) = &tank.outline else { panic!("no body of revolution") };
+        points[1]
+    }
+
+    /// The start values are the modes of a cylinder of 0.9 m, 0.6 m deep, its origin at mid-depth, in six digits.
+    #[test]
+    fn modes_of_a_cylinder_are_drawn_as_that_cylinder() {
+        let drawn = tank_with(&[]);
+        let [radius, bottom] = radius_and_bottom(&drawn);
+        for (found, exact) in [(radius, 0.45), (bottom, -0.3), (drawn.level, 0.3)] {
+            assert!((found - exact).abs() < 2e-4, "{found}, not {exact}");
+        }
+    }
+
+    /// 0.1 to 1.2 m of the same cylinder; between the points the surface rises with the mass.
+    #[test]
+    fn the_surface_of_a_draining_cylinder_is_where_its_liquid_ends() {
+        let drawn = tank_with(&[("tank.fill.points", "12"), ("tank.liquid_0", "381.704")]);
+        let fill = drawn.fill.as_ref().unwrap();
+        let area = 1000.0 * std::f64::consts::PI * 0.45 * 0.45;
+        for depth in [0.1, 0.17, 0.33, 0.6, 0.95, 1.2] {
+            // six digits of heights times masses, divided by the mass of a tenth of the tank
+            assert!((fill.level(area * depth) + 0.3 - depth).abs() < 1e-3, "{depth}");
+            let exact = pendulum(0, 0.9, depth, area * depth);
+            let [length, hinge] = fill.mode(0, area * depth);
+            assert!((length - exact.length).abs() < 3e-3 * exact.length, "{depth}: {length}");
+            let bob = (hinge - length) - (exact.hinge - exact.length - 0.3);
+            assert!(bob.abs() < 1e-3, "{depth}: {bob}");
+        }
+        assert!((radius_and_bottom(&drawn)[1] + 0.3).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_mode_that_is_given_by_its_frequency_has_the_length_of_that_frequency() {
+        // 0.5 Hz at 1.5 m/s2: l = g/(2 pi f)^2
+        let drawn = tank_with(&[("tank.frequency[1]", "0.5")]);
+        let exact = 1.5 / (std::f64::consts::PI * std::f64::consts::PI);
+        assert!((drawn.modes[0].length - exact).abs() < 1e-12);
+    }
+}
