@@ -67,6 +67,13 @@ pub fn plain(
     write(&files, out)
 }
 
+/// The archive of some files, as bytes.
+pub fn zipped(files: &[(String, Vec<u8>)]) -> Result<Vec<u8>> {
+    let mut out = std::io::Cursor::new(Vec::new());
+    zip(&mut out, files)?;
+    Ok(out.into_inner())
+}
+
 /// Packs files; the archive appears whole or not at all.
 pub fn write(files: &Files, out: &Path) -> Result<()> {
     if let Some(parent) = out.parent().filter(|parent| !parent.as_os_str().is_empty()) {

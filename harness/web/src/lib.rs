@@ -9,6 +9,32 @@ pub const THREE_LICENSE: &str = include_str!("../three/LICENSE");
 /// The global `HubSloshScene`: bench or spacecraft with liquid (`scene/README.md`); needs [`THREE`].
 pub const SCENE: &str = include_str!("../scene/scene.js");
 
+/// The global `Live`: controls, plots and the place of a live page of the book.
+pub const LIVE: &str = include_str!("../pages/live.js");
+
+/// How live pages look, besides the book's own style.
+pub const LIVE_CSS: &str = include_str!("../pages/live.css");
+
+/// The live page "Swirl"; needs [`THREE`], [`SCENE`], [`fmu_host`], [`LIVE`] and HubSlosh in the global `FMUS`.
+pub const SWIRL: &str = include_str!("../pages/swirl.js");
+
+/// The host of FMUs compiled to WebAssembly (`fmu/host.js`) as one script without modules, which a page from the disk
+/// can load: the global `FmuHost` with `Fmu` and `FmiError`.
+pub fn fmu_host() -> String {
+    let modules = [
+        include_str!("../fmu/description.js"),
+        include_str!("../fmu/unzip.js"),
+        include_str!("../fmu/host.js"),
+    ];
+    let lines = modules.iter().flat_map(|text| text.lines());
+    let kept: Vec<_> = lines
+        .filter(|line| !line.starts_with("import "))
+        .map(|line| line.strip_prefix("export ").unwrap_or(line))
+        .collect();
+    let text = kept.join("\n");
+    format!("globalThis.FmuHost = (() => {{\n{text}\nreturn {{ Fmu, FmiError }};\n}})();\n")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

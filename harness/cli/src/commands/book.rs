@@ -4,23 +4,34 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use pack::documentation::book;
+use pack::documentation::live::{self, Plant};
 
 /// Writes the documentation as a book: a static site with search, to be opened from the disk.
 ///
 /// Its pages are Markdown files of this project; book/SUMMARY.md lists them.
 #[derive(clap::Args)]
-#[command(after_help = "Example:\n  hubslosh book && xdg-open dist/book/index.html")]
+#[command(
+    after_help = "Examples:\n  hubslosh book && xdg-open dist/book/index.html\n  hubslosh book --live"
+)]
 pub struct BookArgs {
     /// Directory for the site.
     #[arg(long, value_name = "DIRECTORY", default_value = "dist/book")]
     out: PathBuf,
+    /// With plants in the live pages: the FMUs as WebAssembly; harness/platforms/setup --wasm gets what that takes.
+    #[arg(long)]
+    live: bool,
 }
 
 impl BookArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
         pack::needs_source("the book")?;
-        let files = book::write(&pack::root(), &self.out)?;
+        let mut plants = Vec::new();
+        for name in live::models().filter(|_| self.live) {
+            let model = pack::model(name)?;
+            plants.push(Plant { model, module: pack::wasm(model)?.bytes });
+        }
+        let files = book::write(&pack::root(), &self.out, &plants)?;
         done!("{} ({files} files)", self.out.join("index.html").display());
         Ok(())
     }

@@ -11,6 +11,7 @@ use maud::{DOCTYPE, Markup, html};
 use serde_json::json;
 
 use super::fmu::one_file;
+use super::live::{self, Plant};
 use super::page::{Gathered, Layout, Page};
 
 /// The list of parts and pages, from the project's root.
@@ -25,12 +26,12 @@ struct Part {
     pages: Vec<usize>,
 }
 
-/// Writes the book into a directory.
+/// Writes the book into a directory; with `plants`, for its live pages.
 ///
 /// # Errors
 /// As [`render`], or if a file cannot be written.
-pub fn write(root: &Path, out: &Path) -> Result<usize> {
-    let files = render(root)?;
+pub fn write(root: &Path, out: &Path, plants: &[Plant]) -> Result<usize> {
+    let files = render(root, plants)?;
     output::directory(out)?;
     for (name, bytes) in &files {
         output::atomically(&out.join(name), |file| Ok(std::io::Write::write_all(file, bytes)?))?;
@@ -42,7 +43,7 @@ pub fn write(root: &Path, out: &Path) -> Result<usize> {
 ///
 /// # Errors
 /// With every link that leads nowhere, every missing figure and every equation that is not LaTeX.
-pub fn render(root: &Path) -> Result<Files> {
+pub fn render(root: &Path, plants: &[Plant]) -> Result<Files> {
     let (parts, pages, titles) = read(root)?;
     let mut all = Gathered::default();
     let mut files = Files::new();
@@ -50,7 +51,8 @@ pub fn render(root: &Path) -> Result<Files> {
         let body = page.html(root, &pages, Layout::Site, &mut all);
         let navigation = navigation(&parts, &pages, &titles, place);
         let neighbours = neighbours(&pages, &titles, place);
-        let html = site_page(&titles[place], &navigation, &body, &neighbours).into_string();
+        let head = live::head(page, plants);
+        let html = site_page(&titles[place], &head, &navigation, &body, &neighbours).into_string();
         files.push((format!("{}.html", page.name), html.into_bytes()));
     }
     let whole = one_file(root, &pages, "HubSlosh: the whole book", &mut all);
@@ -58,6 +60,7 @@ pub fn render(root: &Path) -> Result<Files> {
     files.push(("page.css".into(), super::CSS.into()));
     files.push(("search.js".into(), include_bytes!("search.js").to_vec()));
     files.push(("search-index.js".into(), search_index(&pages, &titles)?.into_bytes()));
+    files.extend(live::files(plants)?);
     files.extend(all.figures()?);
     Ok(files)
 }
@@ -129,7 +132,13 @@ fn neighbours(pages: &[Page], titles: &[String], present: usize) -> Markup {
     html! { (link(present.checked_sub(1), "before")) (link(Some(present + 1), "after")) }
 }
 
-fn site_page(title: &str, navigation: &Markup, body: &Markup, neighbours: &Markup) -> Markup {
+fn site_page(
+    title: &str,
+    head: &Markup,
+    navigation: &Markup,
+    body: &Markup,
+    neighbours: &Markup,
+) -> Markup {
     html! {
         (DOCTYPE)
         html lang="en" {
@@ -138,6 +147,7 @@ fn site_page(title: &str, navigation: &Markup, body: &Markup, neighbours: &Marku
                 meta name="viewport" content="width=device-width";
                 title { (title) " · HubSlosh" }
                 link rel="stylesheet" href="page.css";
+                (head)
             }
             body .site {
                 input type="checkbox" id="menu" aria-label="Contents";

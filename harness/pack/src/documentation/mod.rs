@@ -7,6 +7,7 @@
 
 pub mod book;
 pub mod fmu;
+pub mod live;
 pub mod page;
 
 /// What both outputs look like.

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use pack::documentation::book;
+use pack::documentation::live::{self, Plant};
 use pack::documentation::page::{Gathered, Layout, Page};
 
 /// Paths of all Markdown files of the project, from its root.
@@ -64,7 +65,11 @@ fn every_page_of_the_documentation_is_in_the_book() {
 
 #[test]
 fn every_link_and_figure_of_the_book_leads_to_one_of_its_files() {
-    let files: BTreeMap<_, _> = book::render(&pack::root()).unwrap().into_iter().collect();
+    // with a plant in each live page: their scripts too
+    let plant = |name| Plant { model: pack::model(name).unwrap(), module: b"module".to_vec() };
+    let plants: Vec<_> = live::models().map(plant).collect();
+    let files = book::render(&pack::root(), &plants).unwrap();
+    let files: BTreeMap<_, _> = files.into_iter().collect();
     let text = |name: &str| String::from_utf8(files[name].clone()).unwrap();
     let pages: Vec<_> = files.keys().filter(|name| name.ends_with(".html")).collect();
     assert!(pages.len() > 20, "{pages:?}");
@@ -85,7 +90,8 @@ fn every_link_and_figure_of_the_book_leads_to_one_of_its_files() {
 
 #[test]
 fn every_equation_is_typeset_and_every_place_the_search_finds_exists() {
-    let files: BTreeMap<_, _> = book::render(&pack::root()).unwrap().into_iter().collect();
+    let files: BTreeMap<_, _> = book::render(&pack::root(), &[]).unwrap().into_iter().collect();
+    assert!(!files.keys().any(|name| name.ends_with(".fmu.js")), "no live page was asked for");
     let text = |name: &str| String::from_utf8(files[name].clone()).unwrap();
     for name in files.keys().filter(|name| name.ends_with(".html")) {
         let page = text(name);

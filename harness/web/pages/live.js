@@ -1,0 +1,195 @@
+// What live pages share: controls whose settings stand in the address, plots that grow, and the loop that runs a plant.
+globalThis.Live = (() => {
+  "use strict";
+
+  const make = (tag, attributes = {}, ...children) => {
+    const element = document.createElement(tag);
+    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+    element.append(...children);
+    return element;
+  };
+  const draw = (tag, attributes = {}, text = "") => {
+    const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
+    for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+    if (text) element.textContent = text;
+    return element;
+  };
+  const print = (value, digits) => value.toFixed(digits).replace("-", "−");
+
+  // An FMU that the page holds as base64: a script, because a page from the disk may load no data.
+  async function fmu(name) {
+    const text = atob(globalThis.FMUS[name]);
+    return FmuHost.Fmu.open(Uint8Array.from(text, (letter) => letter.charCodeAt(0)));
+  }
+
+  /**
+   * Controls and their values. Each of `all`: key, label, and either min, max, step, unit, digits and start of a slider or
+   * `options` (pairs of value and text) and start of a list;
+   * one that is `hidden` has its control elsewhere. `changed(key)` is called after the reader has changed one.
+   * The address keeps what differs from the start: `#torque=120&fill=90`.
+   */
+  class Settings {
+    constructor(all, changed) {
+      this.all = all;
+      this.values = Object.fromEntries(all.map(({ key, start }) => [key, start]));
+      this.element = make("div", { class: "live-set" });
+      this.controls = new Map();
+      for (const one of all) {
+        const name = make("span", {}, one.label);
+        const control = one.options
+          ? make("select", { name: one.key }, ...one.options.map(([value, text]) => make("option", { value }, text)))
+          : make("input", { type: "range", name: one.key, min: one.min, max: one.max, step: one.step });
+        const shown = one.options ? null : make("output");
+        if (!one.hidden) this.element.append(make("label", {}, name, control, ...(shown ? [shown] : [])));
+        this.controls.set(one.key, { one, control, shown });
+        control.addEventListener("input", () => {
+          this.values[one.key] = one.options ? control.value : Number(control.value);
+          this.show(one.key);
+          this.keep();
+          changed(one.key);
+        });
+      }
+      this.read();
+      addEventListener("hashchange", () => {
+        const before = JSON.stringify(this.values);
+        this.read();
+        if (JSON.stringify(this.values) !== before) changed(null);
+      });
+    }
+
+    // Sets one from the program, without calling `changed`.
+    set(key, value) {
+      this.values[key] = value;
+      this.show(key);
+    }
+
+    show(key) {
+      const { one, control, shown } = this.controls.get(key), value = this.values[key];
+      control.value = String(value);
+      if (!shown) return;
+      shown.textContent = `${print(value / (one.scale ?? 1), one.digits)} ${one.unit}`;
+      control.setAttribute("aria-valuetext", shown.textContent);
+    }
+
+    // Takes what the address says; what it does not say is as at the start, what is not allowed too.
+    read() {
+      const said = new URLSearchParams(location.hash.includes("=") ? location.hash.slice(1) : "");
+      for (const one of this.all) {
+        const text = said.get(one.key), number = Number(text);
+        let value = one.start;
+        if (text !== null && one.options) value = one.options.some(([name]) => name === text) ? text : one.start;
+        else if (text !== null && Number.isFinite(number)) value = Math.min(one.max, Math.max(one.min, number));
+        this.values[one.key] = value;
+        this.show(one.key);
+      }
+    }
+
+    keep() {
+      const said = this.all.filter(({ key, start }) => this.values[key] !== start);
+      const text = said.map(({ key }) => `${key}=${this.values[key]}`).join("&");
+      try {
+        history.replaceState(null, "", text ? `#${text}` : location.pathname);
+      } catch {
+        // a browser that does not let pages from the disk do this: the link stays as it was
+      }
+    }
+  }
+
+  /** A plot over one abscissa; `lines` are added and grow. The ordinate's range grows with them. */
+  class Plot {
+    #x; #most; #lines = []; #scale; #axis = draw("g"); #curves = draw("g"); #now = draw("line", { class: "now" });
+    static WIDTH = 560; static HEIGHT = 210; static LEFT = 52; static BOTTOM = 36; static TOP = 10; static RIGHT = 10;
+
+    constructor({ label, x, y, most, caption }) {
+      this.#x = x;
+      this.#most = most;
+      this.y = y;
+      this.svg = draw("svg", { viewBox: `0 0 ${Plot.WIDTH} ${Plot.HEIGHT}`, role: "img", "aria-label": label });
+      this.svg.append(this.#axis, this.#curves, this.#now);
+      this.figure = make("figure", {}, this.svg, make("figcaption", {}, caption));
+      this.#redraw();
+    }
+
+    line(kind) {
+      const line = { points: [], curve: draw("polyline", { class: kind }) };
+      this.#curves.append(line.curve);
+      this.#lines.push(line);
+      return {
+        add: (x, y) => {
+          line.points.push([x, y]);
+          if (y > this.#scale) this.#redraw();
+          else line.curve.setAttribute("points", this.#path(line.points));
+        },
+        fade: () => line.curve.classList.add("old"),
+        points: line.points,
+      };
+    }
+
+    clear() {
+      this.#lines = [];
+      this.#curves.replaceChildren();
+      this.#redraw();
+    }
+
+    set now(x) {
+      const at = this.#at(x, 0)[0];
+      for (const [key, value] of Object.entries({ x1: at, x2: at, y1: Plot.TOP, y2: Plot.HEIGHT - Plot.BOTTOM })) this.#now.setAttribute(key, value);
+    }
+
+    #at(x, y) {
+      const [low, high] = this.#x.range;
+      return [
+        Plot.LEFT + ((x - low) / (high - low)) * (Plot.WIDTH - Plot.LEFT - Plot.RIGHT),
+        Plot.HEIGHT - Plot.BOTTOM - (y / this.#scale) * (Plot.HEIGHT - Plot.BOTTOM - Plot.TOP),
+      ];
+    }
+
+    #path(points) {
+      return points.map(([x, y]) => this.#at(x, y).map((value) => value.toFixed(1)).join(",")).join(" ");
+    }
+
+    #redraw() {
+      const largest = Math.max(this.#most, ...this.#lines.flatMap(({ points }) => points.map(([, y]) => y)));
+      const step = nice(largest / 4);
+      this.#scale = step * Math.ceil(largest / step);
+      this.#axis.replaceChildren();
+      const put = (tag, attributes, text) => this.#axis.append(draw(tag, attributes, text));
+      for (let y = 0; y <= this.#scale * 1.001; y += step) {
+        const [, at] = this.#at(0, y);
+        put("line", { class: "grid", x1: Plot.LEFT, x2: Plot.WIDTH - Plot.RIGHT, y1: at, y2: at });
+        put("text", { x: Plot.LEFT - 6, y: at + 4, "text-anchor": "end" }, String(Number(y.toPrecision(6))));
+      }
+      const [low, high] = this.#x.range;
+      for (let x = low; x <= high + 1e-9; x += this.#x.step) {
+        const [at] = this.#at(x, 0);
+        put("line", { class: "grid", x1: at, x2: at, y1: Plot.TOP, y2: Plot.HEIGHT - Plot.BOTTOM });
+        put("text", { x: at, y: Plot.HEIGHT - Plot.BOTTOM + 15, "text-anchor": "middle" }, x.toFixed(1));
+      }
+      put("text", { x: (Plot.LEFT + Plot.WIDTH) / 2, y: Plot.HEIGHT - 5, "text-anchor": "middle" }, this.#x.label);
+      put("text", { x: 12, y: Plot.HEIGHT / 2 - 10, "text-anchor": "middle", transform: `rotate(-90 12 ${Plot.HEIGHT / 2 - 10})` }, this.y);
+      this.#lines.forEach((line) => line.curve.setAttribute("points", this.#path(line.points)));
+    }
+  }
+
+  // 1, 2 or 5 times a power of ten, not less than the number.
+  function nice(number) {
+    const power = 10 ** Math.floor(Math.log10(number));
+    return power * [1, 2, 5, 10].find((factor) => factor * power >= number * (1 - 1e-9));
+  }
+
+  /** Puts a live page in the place of its picture; what goes wrong is said there, and the picture stays. */
+  async function mount(picture, build) {
+    const image = document.querySelector(`main img[src="${picture}"]`);
+    if (!image) return;
+    const place = image.closest("p") ?? image, element = make("div", { class: "live", role: "region", "aria-label": "Live" });
+    place.before(element);
+    try {
+      await build(element);
+      place.hidden = true;
+    } catch (error) {
+      element.replaceChildren(make("p", { class: "live-fault" }, `The page is not live here: ${error.message}`));
+    }
+  }
+
+  return { make, draw, print, fmu, Settings, Plot, mount, still: () => matchMedia("(prefers-reduced-motion: reduce)").matches };
+})();
