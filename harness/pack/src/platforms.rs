@@ -402,3 +402,20 @@ impl Toolchain {
         command
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::models::Fmi;
+
+    /// A platform without a folder would be built and then left out of the archive without a word.
+    #[test]
+    fn every_platform_has_its_folder_in_an_fmu() {
+        for platform in PLATFORMS.iter().chain([&WASM]) {
+            assert_eq!(Fmi::V2.folders(platform.folder), [platform.folder]);
+        }
+        for platform in &PLATFORMS {
+            assert!(!Fmi::V3.folders(platform.folder).is_empty(), "{}", platform.folder);
+        }
+    }
+}
