@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 use analysis::linear::Linear;
 use analysis::random::Random;
 use analysis::statistics::peak;
-use anyhow::{Result, bail, ensure};
+use anyhow::{Result, ensure};
 use host::budget;
 use host::fmu::Fmu;
 use nalgebra::Matrix5;
@@ -234,21 +234,32 @@ pub fn within_angle(
     torque: &[f64],
     limit: f64,
 ) -> Result<f64> {
-    let mut factor = 1.0;
-    // dry friction takes its share first, so the angle grows faster than the torque: a few rounds from above
-    for _ in 0..ROUNDS {
+    let angle = |factor: f64| {
         let scaled: Vec<f64> = torque.iter().map(|t| factor * t).collect();
-        let angle = slosh_angle(fmu, setup, time, &scaled)?;
-        if angle <= limit {
-            return Ok(factor);
-        }
-        factor *= 0.998 * limit / angle;
+        slosh_angle(fmu, setup, time, &scaled)
+    };
+    if angle(1.0)? <= limit {
+        return Ok(1.0);
     }
-    bail!("no torque of this shape keeps the liquid within {limit} rad")
+    // Dry friction takes its share first, so the angle grows faster than the torque: between a factor within the limit and
+    // one beyond it the middle one.
+    let (mut within, mut beyond) = (0.0, 1.0);
+    for _ in 0..ROUNDS {
+        let factor = 0.5 * (within + beyond);
+        let found = angle(factor)?;
+        *(if found <= limit { &mut within } else { &mut beyond }) = factor;
+        if (NEAR * limit..=limit).contains(&found) {
+            break;
+        }
+    }
+    ensure!(within > 0.0, "no torque of this shape keeps the liquid within {limit} rad");
+    Ok(within)
 }
 
 /// Rounds of [`within_angle`].
-const ROUNDS: usize = 12;
+const ROUNDS: usize = 20;
+/// Part of the limit that [`within_angle`] is content with.
+const NEAR: f64 = 0.97;
 
 /// Geometric mean of the relative standard deviations: what one plan tells against another.
 pub fn merit(bounds: &[(String, f64, f64)]) -> f64 {
