@@ -9,7 +9,7 @@ use host::output;
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
-use crate::models::Fmi;
+use crate::fmi::Fmi;
 
 /// Names in the archive and contents, in the archive's order; modelDescription.xml first, as some
 /// hosts expect.

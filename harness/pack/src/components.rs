@@ -12,7 +12,8 @@ use anyhow::{Context, Result, bail};
 use cargo_metadata::{DependencyKind, MetadataCommand};
 
 use crate::archive::Packed;
-use crate::models::{Fmi, Model};
+use crate::fmi::Fmi;
+use crate::models::Model;
 use crate::project;
 use host::description::ModelDescription;
 use host::output::sha256;

@@ -4,6 +4,7 @@
 pub mod archive;
 pub mod components;
 pub mod documentation;
+pub mod fmi;
 pub mod metadata;
 pub mod models;
 pub mod platforms;
@@ -20,7 +21,8 @@ use anyhow::{Context, Result};
 use host::description::ModelDescription;
 
 use crate::archive::{Files, Packed, below, read};
-pub use crate::models::{Fmi, HUBSLOSH, MODELS, Model, Sizes, model};
+pub use crate::fmi::Fmi;
+pub use crate::models::{HUBSLOSH, MODELS, Model, Sizes, model};
 pub use crate::platforms::Built;
 use crate::project::build_in;
 pub use crate::project::{build, has_source, needs_source, root};

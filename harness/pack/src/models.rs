@@ -1,12 +1,13 @@
 //! The FMUs that this project packs. Another one is another entry in [`MODELS`].
 
 use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
 use host::description::did_you_mean;
 
 use crate::archive::read;
+use crate::fmi::Fmi;
 use crate::project::{self, root};
 
 /// An FMU of this project.
@@ -40,55 +41,6 @@ pub const MODELS: [Model; 3] = [
     Model { name: "Spacecraft", package: "spacecraft-fmu", sizes: None },
     Model { name: "SloshTank", package: "sloshtank-fmu", sizes: None },
 ];
-
-/// A version of FMI that FMUs are packed for: the same binary, another description, other names in the archive.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fmi {
-    /// FMI 2.0
-    V2,
-    /// FMI 3.0
-    V3,
-}
-
-impl Fmi {
-    /// Both of them.
-    pub const ALL: [Fmi; 2] = [Fmi::V2, Fmi::V3];
-
-    /// Folders under `binaries/` for a platform that is known by its folder in FMI 2.0. A universal binary for macOS
-    /// lies in two of FMI 3.0.
-    pub fn folders(self, platform: &'static str) -> &'static [&'static str] {
-        match (self, platform) {
-            (Fmi::V3, "linux64") => &["x86_64-linux"],
-            (Fmi::V3, "win64") => &["x86_64-windows"],
-            (Fmi::V3, "darwin64") => &["aarch64-darwin", "x86_64-darwin"],
-            (_, "linux64") => &["linux64"],
-            (_, "win64") => &["win64"],
-            (_, "darwin64") => &["darwin64"],
-            (_, "aarch64-linux") => &["aarch64-linux"],
-            (_, "aarch64-windows") => &["aarch64-windows"],
-            (_, "aarch64-darwin") => &["aarch64-darwin"],
-            (Fmi::V2, "wasm32") => &["wasm32"], // the module has the functions of FMI 2.0 alone
-            _ => &[],
-        }
-    }
-
-    /// The icon's name in the archive.
-    pub fn icon(self) -> &'static str {
-        match self {
-            Fmi::V2 => "model.png",
-            Fmi::V3 => "terminalsAndIcons/icon.png",
-        }
-    }
-
-    /// The FMU of that name in a folder: those of FMI 3.0 have one of their own.
-    pub fn path(self, folder: &Path, identifier: &str) -> PathBuf {
-        let file = format!("{identifier}.fmu");
-        match self {
-            Fmi::V2 => folder.join(file),
-            Fmi::V3 => folder.join("fmi3").join(file),
-        }
-    }
-}
 
 /// The FMU that is packed unless another is named.
 pub const HUBSLOSH: &Model = &MODELS[0];

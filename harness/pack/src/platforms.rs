@@ -406,7 +406,7 @@ impl Toolchain {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::models::Fmi;
+    use crate::fmi::Fmi;
 
     /// A platform without a folder would be built and then left out of the archive without a word.
     #[test]

@@ -11,7 +11,8 @@ use maud::{Markup, html};
 use super::book::Files;
 use super::page::Page;
 use crate::archive;
-use crate::models::{Fmi, Model};
+use crate::fmi::Fmi;
+use crate::models::Model;
 
 /// A plant that live pages run.
 pub struct Plant {
