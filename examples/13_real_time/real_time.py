@@ -4,6 +4,7 @@ python examples/13_real_time/real_time.py
 """
 
 import argparse
+import os
 import socket
 import struct
 import subprocess
@@ -66,7 +67,10 @@ def run(fmu: str | Path, cycles: int) -> pd.DataFrame:
         link.bind(("127.0.0.1", 0))
         link.settimeout(30)
         arguments = [sys.executable, __file__, "--controller", str(link.getsockname()[1])]
-        peer = subprocess.Popen(arguments)
+        # it finds packages where this process does
+        peer = subprocess.Popen(
+            arguments, env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+        )
         try:
             _, address = link.recvfrom(64)
             link.setblocking(False)

@@ -13,6 +13,13 @@ pub struct StepFailure {
     pub shorter_may_succeed: bool,
 }
 
+/// Of a text alone: a shorter step may succeed, as where a step takes too much work.
+impl From<&str> for StepFailure {
+    fn from(text: &str) -> StepFailure {
+        StepFailure { text: text.into(), shorter_may_succeed: true }
+    }
+}
+
 /// How a step has ended that stops at events.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StepEnd {

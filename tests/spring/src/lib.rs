@@ -9,10 +9,3 @@ pub mod fmi2 {
 
     runtime::export_fmi2!(crate::spring::Spring);
 }
-
-/// The functions of FMI 3.0.
-pub mod fmi3 {
-    pub use runtime::v3::*;
-
-    runtime::export_fmi3!(crate::spring::Spring);
-}

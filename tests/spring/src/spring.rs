@@ -1,7 +1,6 @@
 //! A mass on a spring, m x'' = F - d x' - k x, by Runge-Kutta 4 in steps of 1 ms at most.
 
-use runtime::Model;
-use runtime::model::StepFailure;
+use runtime::model::{Model, StepFailure};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::Variable;
 
@@ -94,10 +93,7 @@ impl Model for Spring {
 
     fn step(&mut self, [force, slope]: &[f64; 2], h: f64) -> Result<(), StepFailure> {
         let steps = (h / 1e-3).ceil();
-        if steps > 1e6 {
-            let text = "it takes more than 1e6 internal steps".into();
-            return Err(StepFailure { text, shorter_may_succeed: true });
-        }
+        (steps <= 1e6).then_some(()).ok_or("it takes more than 1e6 internal steps")?;
         let (dt, mut x) = (h / steps, self.x);
         for n in 0..steps as usize {
             let at = |s: f64| force + slope * (n as f64 + s) * dt;
