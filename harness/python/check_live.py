@@ -1,32 +1,38 @@
-"""Try a live page of the book in a browser: bits, controls, link, sizes; print what it takes.
+"""Try the live pages of the book in a browser: bits, controls, link, margins, sizes.
 
-The page's plant answers the inputs of the FMU's example with the bits of ``hubslosh run --hold``
-on this machine. Needs Playwright (``requirements-browser.txt``) and Debian's Chromium;
-``.ci/browser`` gets both. Chromium draws without a graphics processor here, so frames per second
-are a lower bound.
+A page's plant answers the inputs of its FMU's example with the bits of ``hubslosh run --hold`` on
+this machine; the margins of "Slew" are those of ``slew_margins.py``. Needs Playwright
+(``requirements-browser.txt``) and Debian's Chromium; ``.ci/browser`` gets both. Chromium draws
+without a graphics processor here, so frames per second are a lower bound.
 """
 
 import argparse
 import csv
 import gzip
+import json
 import shutil
 import sys
 from pathlib import Path
 
 from playwright.sync_api import Browser, Page, sync_playwright
 
-SCRIPTS = ("three.js", "scene.js", "fmu.js", "live.js", "swirl.js", "HubSlosh.fmu.js")
+SHARED = ("three.js", "scene.js", "fmu.js", "live.js")
+PAGES = {
+    "swirl": ("swirl.js", "HubSlosh.fmu.js"),
+    "slew": ("loop.js", "slew.js", "Spacecraft.fmu.js"),
+}
+"""Live pages and their own scripts."""
 
-REPLAY = """([names, times, inputs]) => {
-  const plant = swirl.fmu.instantiate();
-  plant.set({ "init.slosh_angle": 0 });
+REPLAY = """([page, start, times, inputs, names]) => {
+  const plant = globalThis[page].fmu.instantiate();
+  plant.set(start);
   plant.setupExperiment();
   plant.enterInitializationMode();
-  plant.set({ tau_cmd: inputs[0] });
+  plant.set(inputs[0]);
   plant.exitInitializationMode();
   const rows = [[...plant.reals(names)]];
   for (let n = 0; n + 1 < times.length; n++) {
-    plant.set({ tau_cmd: inputs[n] });
+    plant.set(inputs[n]);
     plant.doStep(times[n], times[n + 1] - times[n]);
     rows.push([...plant.reals(names)]);
   }
@@ -36,15 +42,43 @@ REPLAY = """([names, times, inputs]) => {
 TORQUE = "swirl.settings.values.torque"
 TABBED = "document.activeElement.name || document.activeElement.textContent"
 
+MARGINS = """(settings) => {
+  for (const { key, start } of slew.settings.all) slew.settings.set(key, settings[key] ?? start);
+  slew.restart();
+  return slew.found.map(({ curve, ...rest }) => rest);
+}"""
 
-def replay(page: Page, native: Path) -> str:
+TOLERANCE = 1e-6
+"""Of frequencies and delays their part, of others dB, degrees, 1: both find a crossing to rounding,
+of a linear model whose eigenvalues rounding moves by 1e-9 of their size (double poles at 0)."""
+
+AFTER = """([settings, from, to]) => {
+  for (const { key, start } of slew.settings.all) slew.settings.set(key, settings[key] ?? start);
+  slew.restart();
+  const most = [0, 0];
+  for (let n = 0; n < 10 * (to + 50); n++) {
+    slew.step();
+    const error = Math.abs(slew.off[slew.axis]), at = slew.time;
+    if (at > from && at <= from + 50) most[0] = Math.max(most[0], error);
+    if (at > to) most[1] = Math.max(most[1], error);
+  }
+  return most;
+}"""
+
+
+def replay(page: Page, name: str, native: Path, start: dict[str, float]) -> str:
     """Compare the page's plant with a run of the command line; every output, every row."""
     with native.open() as file:
-        rows = list(csv.DictReader(file))
-    names = [name for name in rows[0] if name not in ("time", "tau_cmd")]
-    times, inputs = ([float(row[name]) for row in rows] for name in ("time", "tau_cmd"))
-    answer = page.evaluate(REPLAY, [names, times, inputs])
-    expected = [[float(row[name]) for name in names] for row in rows]
+        rows = [{k: float(v) for k, v in row.items()} for row in csv.DictReader(file)]
+    held = page.evaluate(
+        f"[...{name}.fmu.description.variables.values()]"
+        ".filter(v => v.causality === 'input').map(v => v.name)"
+    )
+    inputs = [{key: row[key] for key in row if key in held} for row in rows]
+    names = [key for key in rows[0] if key != "time" and key not in held]
+    times = [row["time"] for row in rows]
+    answer = page.evaluate(REPLAY, [name, start, times, inputs, names])
+    expected = [[row[key] for key in names] for row in rows]
     assert answer == expected, next(
         (time, a, b) for time, a, b in zip(times, answer, expected, strict=True) if a != b
     )
@@ -52,105 +86,216 @@ def replay(page: Page, native: Path) -> str:
 
 
 def opened(browser: Browser, address: str, **options: object) -> Page:
-    """Return the page, live; an error in a script is an error here."""
+    """Return the page, live; an error in a script, or something fetched, is an error here."""
     page = browser.new_context(**options).new_page()
     page.on("pageerror", lambda error: sys.exit(f"error in the page: {error}"))
+    local = ("file:", "data:", "blob:")
+    page.on(
+        "request",
+        lambda r: None if r.url.startswith(local) else sys.exit(f"fetched: {r.url}"),
+    )
     page.goto(address)
-    page.wait_for_function("globalThis.swirl?.frames >= 1", timeout=60_000)
+    name = Path(address.partition("#")[0]).stem
+    page.wait_for_function(f"globalThis.{name}?.frames >= 1", timeout=60_000)
     return page
+
+
+def speed(page: Page, name: str) -> str:
+    """Say when the first frame stood and how many follow in a second."""
+    before = page.evaluate(f"[{name}.frames, performance.now()]")
+    page.wait_for_timeout(3000)
+    after = page.evaluate(f"[{name}.frames, {name}.first, performance.now()]")
+    rate = 1000 * (after[0] - before[0]) / (after[2] - before[1])
+    return f"{name}: first frame after {after[1]:.0f} ms, {rate:.0f} frames a second"
+
+
+def said(page: Page) -> dict[str, str]:
+    """Return the settings that the address has."""
+    return dict(pair.split("=") for pair in page.url.partition("#")[2].split("&"))
+
+
+def swirl(browser: Browser, address: str, native: Path) -> None:
+    """Try the page "Swirl"."""
+    page = opened(browser, address, viewport={"width": 1400, "height": 1000})
+    bits = replay(page, "swirl", native, {"init.slosh_angle": 0})
+    print(f"swirl: bits of this machine's binary: {bits}")
+
+    # it moves, and the plots grow
+    page.wait_for_function("swirl.lines[0].points.length > 3", timeout=60_000)
+    print(speed(page, "swirl"))
+    assert not page.is_visible("img[src='swirl.png']")
+    page.click("text=Pause")
+    time = page.evaluate("swirl.time")
+    page.wait_for_timeout(300)
+    assert page.evaluate("swirl.time") == time > 0
+
+    # by keyboard alone: a slider, the address that keeps it, the page that this address opens
+    page.focus("input[name=torque]")
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("Tab")
+    assert page.evaluate(TABBED) == "frequency"
+    page.select_option("select[name=model]", "planar")
+    assert (said(page)["torque"], said(page)["model"]) == ("105", "planar"), page.url
+    again = opened(browser, page.url)
+    assert again.evaluate(f"[{TORQUE}, swirl.plant.get('slosh.model')]") == [105, 3]
+    again.context.close()
+    wrong = opened(browser, f"{address}#torque=9999&model=none&fill=x")
+    kept = f"[{TORQUE}, swirl.settings.values.model, swirl.settings.values.fill]"
+    assert wrong.evaluate(kept) == [250, "spherical", 100]
+    wrong.context.close()
+
+    # every choice is one that the FMU takes
+    for name in ("model", "bearing"):
+        choices = page.eval_on_selector_all(
+            f"select[name={name}] option", "all => all.map(o => o.value)"
+        )
+        for choice in choices:
+            page.select_option(f"select[name={name}]", choice)
+            page.evaluate("for (let n = 0; n < 200; n++) swirl.step()")
+    assert page.evaluate("swirl.time") > 1.9
+    page.context.close()
+
+
+def close(name: str, ours: float | None, theirs: float | None, size: float) -> float:
+    """Return the difference of two numbers in parts of what is allowed; neither may be missing."""
+    infinite = theirs is None or ours is None or abs(theirs) == float("inf")
+    if infinite:
+        assert ours == theirs, f"{name}: {ours}, not {theirs}"
+        return 0.0
+    off = abs(ours - theirs)
+    assert off <= TOLERANCE * size, f"{name}: {ours}, not {theirs}"
+    return off / size
+
+
+def margins(page: Page, file: Path) -> None:
+    """Compare all crossings and margins of the three loops with those of `hubslosh.margins`."""
+    worst, count = 0.0, 0
+    for case in json.loads(file.read_text()):
+        settings = case["settings"]
+        found = page.evaluate(MARGINS, settings)
+        assert all(one["stable"] for one in found) == case["stable"], settings
+        for axis, one in enumerate(found, 1):
+            theirs = [c for c in case["crossings"] if c["loop"] == f"torque[{axis}]"]
+            ours = one["crossings"]
+            kinds = [[c["kind"] for c in ours], [c["crossing"] for c in theirs]]
+            assert kinds[0] == kinds[1], f"{settings}, axis {axis}: {kinds}"
+            for a, b in zip(ours, theirs, strict=True):
+                where = f"{settings}, axis {axis}, {a['frequency']:.4g} Hz"
+                off = [close(where, a["frequency"], b["frequency"], b["frequency"])]
+                off.append(close(where, a.get("gainMargin"), b["gain_margin"], 1.0))
+                off.append(close(where, a.get("phaseMargin"), b["phase_margin"], 1.0))
+                worst, count = max(worst, *off), count + 1
+        modulus = min(one["modulusMargin"] for one in found)
+        delay = min(one["delayMargin"] for one in found)
+        worst = max(worst, close(f"{settings}: modulus", modulus, case["modulus"], 1.0))
+        worst = max(worst, close(f"{settings}: delay", delay, case["delay"], case["delay"] or 1.0))
+    print(f"slew: {count} crossings and the margins as hubslosh.margins has them, to {worst:.1e}")
+
+
+def slew(browser: Browser, address: str, native: Path, expected: Path) -> None:
+    """Try the page "Slew"."""
+    page = opened(browser, address, viewport={"width": 1400, "height": 1000})
+    still = {f"init.omega[{i}]": 0.0 for i in (1, 2, 3)}
+    print(f"slew: bits of this machine's binary: {replay(page, 'slew', native, still)}")
+    page.wait_for_function("slew.traces.at(-1).points.length > 30", timeout=60_000)
+    print(speed(page, "slew"))
+    assert not page.is_visible("img[src='slew.png']")
+    page.click("text=Pause")
+    margins(page, expected)
+
+    # the delay margin is where the plant itself begins to swing up: after a slew, over 250 s
+    start = page.evaluate(MARGINS, {})[2]["delayMargin"]
+    for more, grows in ((0.9 * start, False), (1.1 * start, True)):
+        first, last = page.evaluate(AFTER, [{"delay": 0.15 + more, "angle": 5}, 50, 300])
+        print(
+            f"slew: {more:.2f} s later (margin {start:.2f} s): {first:.2g}° at 50 s, "
+            f"{last:.2g}° at 300 s"
+        )
+        assert (last > first) == grows
+
+    # by keyboard alone: a slider, the address that keeps it, the page that this address opens
+    page.reload()
+    page.wait_for_function("globalThis.slew?.frames >= 1", timeout=60_000)
+    page.focus("input[name=bandwidth]")
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("Tab")
+    assert page.evaluate(TABBED) == "ratio"
+    page.select_option("select[name=notch]", "on")
+    page.select_option("select[name=axis]", "x")
+    assert said(page) == {"bandwidth": "0.031", "notch": "on", "axis": "x"}, page.url
+    again = opened(browser, page.url)
+    both = [one.evaluate("[slew.axis, slew.gains, slew.filter]") for one in (page, again)]
+    assert both[0] == both[1]
+    assert both[1][0] == 0
+    again.context.close()
+    page.context.close()
+
+
+def looks(browser: Browser, address: str, name: str, pictures: Path | None) -> None:
+    """Nothing moves by itself where it should not; no page is wider than a phone."""
+    wide, phone = {"width": 1400, "height": 1000}, {"width": 400, "height": 860}
+    kinds: dict[str, dict] = {
+        "wide": {"viewport": wide},
+        "still": {"viewport": wide, "reduced_motion": "reduce"},
+        "phone": {"viewport": phone, "device_scale_factor": 2},
+        "dark": {"viewport": wide, "color_scheme": "dark"},
+    }
+    for look, options in kinds.items():
+        one = opened(browser, address, **options)
+        one.wait_for_timeout(1500)
+        assert (one.evaluate(f"{name}.time") == 0) == (look == "still")
+        width = options["viewport"]["width"]
+        assert one.evaluate("document.documentElement.scrollWidth") <= width, (name, look)
+        if pictures:
+            pictures.mkdir(parents=True, exist_ok=True)
+            one.wait_for_timeout(4000)
+            one.screenshot(path=pictures / f"{name}_{look}.png", full_page=True)
+        one.context.close()
+    # without JavaScript the picture stands there
+    plain = browser.new_context(java_script_enabled=False).new_page()
+    plain.goto(address)
+    assert plain.is_visible(f"img[src='{name}.png']")
+    plain.context.close()
 
 
 def main() -> None:
     """Check one book; exit with 1 and a sentence if something is not as it should be."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("book", type=Path, help="the folder with swirl.html, made with --live")
-    parser.add_argument("native", type=Path, help="the table of hubslosh run --hold")
-    parser.add_argument("--pictures", type=Path, help="folder for pictures of the page")
+    parser.add_argument("book", type=Path, help="the folder of the book, made with --live")
+    parser.add_argument(
+        "native",
+        type=Path,
+        help="a folder: HubSlosh.csv and Spacecraft.csv of hubslosh run --hold, margins.json",
+    )
+    parser.add_argument("--pictures", type=Path, help="folder for pictures of the pages")
     arguments = parser.parse_args()
     chromium = shutil.which("chromium")
     if chromium is None:
         sys.exit("no chromium: .ci/browser installs it")
-    address = (arguments.book / "swirl.html").absolute().as_uri()
+    address = {name: (arguments.book / f"{name}.html").absolute().as_uri() for name in PAGES}
+    native = arguments.native
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(
             executable_path=chromium,
             args=["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
         )
-        page = opened(browser, address, viewport={"width": 1400, "height": 1000})
-        first = page.evaluate("swirl.first")
-        print(f"bits of this machine's binary: {replay(page, arguments.native)}")
-
-        # it moves, and the plots grow
-        before = page.evaluate("[swirl.frames, performance.now()]")
-        page.wait_for_function("swirl.lines[0].points.length > 3", timeout=60_000)
-        page.wait_for_timeout(3000)
-        after = page.evaluate("[swirl.frames, performance.now()]")
-        rate = 1000 * (after[0] - before[0]) / (after[1] - before[1])
-        print(f"first frame after {first:.0f} ms, {rate:.0f} frames a second")
-        assert not page.is_visible("img[src='swirl.png']")
-        page.click("text=Pause")
-        time = page.evaluate("swirl.time")
-        page.wait_for_timeout(300)
-        assert page.evaluate("swirl.time") == time > 0
-
-        # by keyboard alone: a slider, the address that keeps it, the page that this address opens
-        page.focus("input[name=torque]")
-        page.keyboard.press("ArrowRight")
-        page.keyboard.press("Tab")
-        assert page.evaluate(TABBED) == "frequency"
-        page.select_option("select[name=model]", "planar")
-        said = dict(pair.split("=") for pair in page.url.partition("#")[2].split("&"))
-        assert (said["torque"], said["model"]) == ("105", "planar"), page.url
-        again = opened(browser, page.url)
-        assert again.evaluate(f"[{TORQUE}, swirl.plant.get('slosh.model')]") == [105, 3]
-        again.context.close()
-        wrong = opened(browser, f"{address}#torque=9999&model=none&fill=x")
-        kept = f"[{TORQUE}, swirl.settings.values.model, swirl.settings.values.fill]"
-        assert wrong.evaluate(kept) == [250, "spherical", 100]
-        wrong.context.close()
-
-        # every choice is one that the FMU takes
-        for name in ("model", "bearing"):
-            choices = page.eval_on_selector_all(
-                f"select[name={name}] option", "all => all.map(o => o.value)"
-            )
-            for choice in choices:
-                page.select_option(f"select[name={name}]", choice)
-                page.evaluate("for (let n = 0; n < 200; n++) swirl.step()")
-        assert page.evaluate("swirl.time") > 1.9
-
-        page.context.close()
-
-        # nothing moves by itself where it should not; no page is wider than a phone
-        wide, phone = {"width": 1400, "height": 1000}, {"width": 400, "height": 860}
-        looks: dict[str, dict] = {
-            "still": {"viewport": wide, "reduced_motion": "reduce"},
-            "phone": {"viewport": phone, "device_scale_factor": 2},
-            "dark": {"viewport": wide, "color_scheme": "dark"},
-        }
-        for name, options in looks.items():
-            one = opened(browser, address, **options)
-            one.wait_for_timeout(1500)
-            assert (one.evaluate("swirl.time") == 0) == (name == "still")
-            width = options["viewport"]["width"]
-            assert one.evaluate("document.documentElement.scrollWidth") <= width
-            if arguments.pictures:
-                arguments.pictures.mkdir(parents=True, exist_ok=True)
-                one.screenshot(path=arguments.pictures / f"{name}.png", full_page=name == "phone")
-            one.context.close()
-
-        # without JavaScript the picture stands there; other pages load nothing of this
-        plain = browser.new_context(java_script_enabled=False).new_page()
-        plain.goto(address)
-        assert plain.is_visible("img[src='swirl.png']")
-        for other in arguments.book.glob("*.html"):
-            is_live = 'src="live.js"' in other.read_text()
-            assert is_live == (other.name == "swirl.html"), other
+        swirl(browser, address["swirl"], native / "HubSlosh.csv")
+        slew(browser, address["slew"], native / "Spacecraft.csv", native / "margins.json")
+        for name in PAGES:
+            looks(browser, address[name], name, arguments.pictures)
         browser.close()
-    sizes = {name: (arguments.book / name).read_bytes() for name in SCRIPTS}
-    for name, data in sizes.items():
-        print(f"{name}: {len(data)} bytes, {len(gzip.compress(data, 9))} compressed")
-    print(f"{arguments.book / 'swirl.html'}: {sum(map(len, sizes.values()))} bytes of scripts")
+    # other pages load nothing of this
+    for other in arguments.book.glob("*.html"):
+        assert ('src="live.js"' in other.read_text()) == (other.stem in PAGES), other
+    sizes = {
+        script: (arguments.book / script).read_bytes()
+        for scripts in (SHARED, *PAGES.values())
+        for script in scripts
+    }
+    for script, data in sizes.items():
+        print(f"{script}: {len(data)} bytes, {len(gzip.compress(data, 9))} compressed")
+    for name, own in PAGES.items():
+        print(f"{name}.html: {sum(len(sizes[s]) for s in (*SHARED, *own))} bytes of scripts")
 
 
 if __name__ == "__main__":

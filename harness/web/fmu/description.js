@@ -1,4 +1,4 @@
-// modelDescription.xml of FMI 2.0, as far as a host of Co-Simulation needs it.
+// modelDescription.xml of FMI 2.0, as far as a host of Co-Simulation needs it, or one that linearises.
 
 // The elements of an XML text in document order: name, attributes, depth. Enough for a description, whose data stand in
 // attributes; comments, processing instructions and CDATA are passed over.
@@ -35,14 +35,15 @@ const TYPES = ["Real", "Integer", "Boolean", "String", "Enumeration"];
  * `variables` is a Map by name. Each has `reference` (value reference), `type` (Real, Integer, Boolean, String,
  * Enumeration), `causality`, `variability`, `description`, `unit`, `min`, `max`, `start` (numbers, texts or booleans
  * where the XML has them) and, if it is an enumeration, `items` (a Map from the item's name to its value).
+ * `states` is a list of the names of the continuous states, each with that of its derivative.
  *
  * @param {string} xml the text of modelDescription.xml
  * @throws {Error} if it describes no FMU 2.0 for Co-Simulation
  */
 export function readDescription(xml) {
-  const found = { fmiVersion: "", modelName: "", guid: "", modelIdentifier: "", variables: new Map(), experiment: {} };
-  const types = new Map();
-  let type, variable;
+  const found = { fmiVersion: "", modelName: "", guid: "", modelIdentifier: "", variables: new Map(), states: [], experiment: {} };
+  const types = new Map(), derivatives = [];
+  let type, variable, section;
   for (const { name, of } of elements(xml)) {
     if (name === "fmiModelDescription") {
       Object.assign(found, { fmiVersion: of.fmiVersion, modelName: of.modelName, guid: of.guid });
@@ -67,6 +68,10 @@ export function readDescription(xml) {
       found.variables.set(of.name, variable);
     } else if (name === "Item" && type) {
       type.items.set(of.name, Number(of.value));
+    } else if (["Outputs", "Derivatives", "InitialUnknowns"].includes(name)) {
+      section = name;
+    } else if (name === "Unknown" && section === "Derivatives") {
+      derivatives.push(Number(of.index));
     } else if (TYPES.includes(name) && variable && variable.type === undefined) {
       Object.assign(variable, typed(name, of, types.get(of.declaredType)));
     } else if (TYPES.includes(name) && !variable && type) {
@@ -77,6 +82,11 @@ export function readDescription(xml) {
     throw new Error(`the model description is of FMI ${found.fmiVersion || "no version"} (allowed: 2.0)`);
   }
   if (!found.modelIdentifier) throw new Error(`${found.modelName} has no Co-Simulation interface`);
+  const all = [...found.variables.values()];
+  found.states = derivatives.map((index) => {
+    const { name, derivative } = all[index - 1];
+    return { state: all[derivative - 1].name, derivative: name };
+  });
   return found;
 }
 
@@ -84,7 +94,7 @@ function typed(type, own, declared) {
   const of = { ...declared?.of, ...own };
   const read = type === "String" ? String : type === "Boolean" ? (text) => text === "true" || text === "1" : Number;
   const result = { type, unit: of.unit ?? "" };
-  for (const key of ["start", "min", "max", "nominal"]) if (of[key] !== undefined) result[key] = read(of[key]);
+  for (const key of ["start", "min", "max", "nominal", "derivative"]) if (of[key] !== undefined) result[key] = read(of[key]);
   if (type === "Enumeration") result.items = declared?.items ?? new Map();
   return result;
 }

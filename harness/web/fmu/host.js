@@ -1,4 +1,5 @@
-// A host of FMUs that are compiled to WebAssembly: FMI 2.0, Co-Simulation, in a page or in node.
+// A host of FMUs that are compiled to WebAssembly: FMI 2.0, Co-Simulation, in a page or in node; and of Model Exchange
+// what it takes to linearise.
 //
 // It knows no model. An FMU "compiled so" is a core module for wasm32 that exports the functions of FMI 2.0 with C's
 // calling convention, its `memory`, and its table of functions, which can grow (the linker's --export-table and
@@ -17,7 +18,7 @@ import { unzip } from "./unzip.js";
 
 const STATUS = ["fmi2OK", "fmi2Warning", "fmi2Discard", "fmi2Error", "fmi2Fatal", "fmi2Pending"];
 const OK = 0, WARNING = 1, DISCARD = 2, FATAL = 4;
-const CO_SIMULATION = 1;
+const MODEL_EXCHANGE = 0, CO_SIMULATION = 1;
 /** Where an FMU has its module. */
 export const FOLDER = "binaries/wasm32";
 const PAGE = 65536; // bytes
@@ -70,7 +71,22 @@ export class Fmu {
    * @param {(status: string, category: string, message: string) => void} [options.logger] hears what the FMU logs
    */
   instantiate({ name = this.description.modelIdentifier, logger = () => {}, loggingOn = false } = {}) {
-    return new Instance(this, name, logger, loggingOn);
+    return new Instance(this, CO_SIMULATION, name, logger, loggingOn);
+  }
+
+  /**
+   * The matrices of x' = A x + B u, y = C x + D u where these values start it, by fmi2GetDirectionalDerivative of Model
+   * Exchange: lists of rows. x are `description.states`, in their order.
+   */
+  linearize(values, inputs, outputs) {
+    const instance = new Instance(this, MODEL_EXCHANGE, this.description.modelIdentifier, () => {}, false);
+    try {
+      instance.set(values);
+      instance.initialize();
+      return instance.jacobian(inputs, outputs);
+    } finally {
+      instance.free();
+    }
   }
 }
 
@@ -78,7 +94,7 @@ export class Fmu {
 export class Instance {
   #fmi; #memory; #arena; #component; #logger; #said = ""; #dead = false; #kept = new Map();
 
-  constructor(fmu, name, logger, loggingOn) {
+  constructor(fmu, type, name, logger, loggingOn) {
     this.description = fmu.description;
     this.#logger = logger;
     this.#fmi = new WebAssembly.Instance(fmu.module).exports;
@@ -95,7 +111,7 @@ export class Instance {
     ];
     new Uint32Array(this.#memory.buffer, functions, 5).set(callbacks);
     const texts = [name, fmu.description.guid, ""].map((text) => this.#text(text));
-    this.#component = this.#fmi.fmi2Instantiate(texts[0], CO_SIMULATION, texts[1], texts[2], functions, 0, Number(loggingOn));
+    this.#component = this.#fmi.fmi2Instantiate(texts[0], type, texts[1], texts[2], functions, 0, Number(loggingOn));
     texts.forEach((text) => this.#arena.giveBack(text)); // its callbacks it may keep
     if (!this.#component) throw new FmiError("fmi2Instantiate", 3, this.#said);
   }
@@ -185,6 +201,32 @@ export class Instance {
 
   enterInitializationMode() { this.#call("fmi2EnterInitializationMode"); }
   exitInitializationMode() { this.#call("fmi2ExitInitializationMode"); }
+
+  /** A, B, C and D of an initialized instance for Model Exchange: see `Fmu.linearize`. */
+  jacobian(inputs, outputs) {
+    const { states } = this.description, n = states.length;
+    const info = this.#arena.take(32); // fmi2EventInfo: five fmi2Boolean and a double
+    do this.#call("fmi2NewDiscreteStates", info); while (new Int32Array(this.#memory.buffer, info, 1)[0]);
+    this.#call("fmi2EnterContinuousTimeMode");
+    const unknown = [...states.map(({ derivative }) => derivative), ...outputs], known = [...states.map(({ state }) => state), ...inputs];
+    const references = (names) => {
+      const at = this.#arena.take(4 * names.length);
+      new Uint32Array(this.#memory.buffer, at, names.length).set(names.map((name) => this.#typed(name, "Real").reference));
+      return at;
+    };
+    const rows = references(unknown), one = this.#arena.take(8), column = this.#arena.take(8 * unknown.length);
+    new Float64Array(this.#memory.buffer, one, 1)[0] = 1;
+    const columns = known.map((name) => {
+      const at = references([name]);
+      this.#call("fmi2GetDirectionalDerivative", rows, unknown.length, at, 1, one, column);
+      this.#arena.giveBack(at);
+      return [...new Float64Array(this.#memory.buffer, column, unknown.length)];
+    });
+    [info, rows, one, column].forEach((address) => this.#arena.giveBack(address));
+    const part = (first, last, from, to) => Array.from({ length: last - first }, (_, i) => columns.slice(from, to).map((c) => c[first + i]));
+    const [all, wide] = [unknown.length, known.length];
+    return { A: part(0, n, 0, n), B: part(0, n, n, wide), C: part(n, all, 0, n), D: part(n, all, n, wide) };
+  }
 
   /** One communication step, both in s. */
   doStep(time, step) { this.#call("fmi2DoStep", time, step, 1); }

@@ -95,14 +95,18 @@ globalThis.Live = (() => {
     }
   }
 
-  /** A plot over one abscissa; `lines` are added and grow. The ordinate's range grows with them. */
+  /**
+   * A plot over one abscissa; `lines` are added and grow. The ordinate begins at 0 or, `signed`, has 0 in the middle, and its
+   * range grows with them from `most`; with `range` it stays. `x`: range, label, and the step of its grid or, `log`, decades.
+   */
   class Plot {
-    #x; #most; #lines = []; #scale; #axis = draw("g"); #curves = draw("g"); #now = draw("line", { class: "now" });
-    static WIDTH = 560; static HEIGHT = 210; static LEFT = 52; static BOTTOM = 36; static TOP = 10; static RIGHT = 10;
+    #x; #lines = []; #least; #low; #high; #fixed; #axis = draw("g"); #curves = draw("g"); #now = draw("line", { class: "now" });
+    static WIDTH = 560; static HEIGHT = 210; static LEFT = 62; static BOTTOM = 36; static TOP = 10; static RIGHT = 16;
 
-    constructor({ label, x, y, most, caption }) {
+    constructor({ label, x, y, most, signed = false, range = null, caption }) {
       this.#x = x;
-      this.#most = most;
+      this.#least = signed ? [-most, most] : [0, most];
+      this.#fixed = range;
       this.y = y;
       this.svg = draw("svg", { viewBox: `0 0 ${Plot.WIDTH} ${Plot.HEIGHT}`, role: "img", "aria-label": label });
       this.svg.append(this.#axis, this.#curves, this.#now);
@@ -117,12 +121,27 @@ globalThis.Live = (() => {
       return {
         add: (x, y) => {
           line.points.push([x, y]);
-          if (y > this.#scale) this.#redraw();
+          if (!this.#fixed && (y > this.#high || y < this.#low)) this.#redraw();
           else line.curve.setAttribute("points", this.#path(line.points));
         },
         fade: () => line.curve.classList.add("old"),
+        drop: () => {
+          line.curve.remove();
+          this.#lines = this.#lines.filter((other) => other !== line);
+        },
         points: line.points,
       };
+    }
+
+    // A curve as a whole, and dots with a class each, [x, y, class], in the place of what was there.
+    draw(kind, points, dots = []) {
+      this.#lines = [{ points, curve: draw("polyline", { class: kind }) }];
+      const circles = dots.map(([x, y, kind]) => {
+        const [cx, cy] = this.#at(x, y);
+        return draw("circle", { class: kind, cx, cy, r: 4.5 });
+      });
+      this.#curves.replaceChildren(this.#lines[0].curve, ...circles);
+      this.#redraw();
     }
 
     clear() {
@@ -137,10 +156,11 @@ globalThis.Live = (() => {
     }
 
     #at(x, y) {
-      const [low, high] = this.#x.range;
+      const [low, high] = this.#x.range, part = this.#x.log ? Math.log(x / low) / Math.log(high / low) : (x - low) / (high - low);
+      const up = (Math.min(this.#high, Math.max(this.#low, y)) - this.#low) / (this.#high - this.#low);
       return [
-        Plot.LEFT + ((x - low) / (high - low)) * (Plot.WIDTH - Plot.LEFT - Plot.RIGHT),
-        Plot.HEIGHT - Plot.BOTTOM - (y / this.#scale) * (Plot.HEIGHT - Plot.BOTTOM - Plot.TOP),
+        Plot.LEFT + part * (Plot.WIDTH - Plot.LEFT - Plot.RIGHT),
+        Plot.HEIGHT - Plot.BOTTOM - up * (Plot.HEIGHT - Plot.BOTTOM - Plot.TOP),
       ];
     }
 
@@ -149,25 +169,35 @@ globalThis.Live = (() => {
     }
 
     #redraw() {
-      const largest = Math.max(this.#most, ...this.#lines.flatMap(({ points }) => points.map(([, y]) => y)));
-      const step = nice(largest / 4);
-      this.#scale = step * Math.ceil(largest / step);
+      let [low, high] = this.#fixed ?? this.#least;
+      if (!this.#fixed) for (const { points } of this.#lines) for (const [, y] of points) { low = Math.min(low, y); high = Math.max(high, y); }
+      if (!this.#fixed && low < 0) [low, high] = [-Math.max(-low, high), Math.max(-low, high)];
+      const step = nice((high - low) / 4);
+      this.#high = this.#fixed ? high : step * Math.ceil(high / step - 1e-9);
+      this.#low = this.#fixed ? low : -step * Math.ceil(-low / step - 1e-9);
       this.#axis.replaceChildren();
       const put = (tag, attributes, text) => this.#axis.append(draw(tag, attributes, text));
-      for (let y = 0; y <= this.#scale * 1.001; y += step) {
-        const [, at] = this.#at(0, y);
-        put("line", { class: "grid", x1: Plot.LEFT, x2: Plot.WIDTH - Plot.RIGHT, y1: at, y2: at });
-        put("text", { x: Plot.LEFT - 6, y: at + 4, "text-anchor": "end" }, String(Number(y.toPrecision(6))));
+      for (let n = Math.ceil(this.#low / step - 1e-9); n * step <= this.#high + 1e-9 * step; n++) {
+        const y = n * step, [, at] = this.#at(this.#x.range[0], y);
+        put("line", { class: n || !this.#low ? "grid" : "grid zero", x1: Plot.LEFT, x2: Plot.WIDTH - Plot.RIGHT, y1: at, y2: at });
+        put("text", { x: Plot.LEFT - 6, y: at + 4, "text-anchor": "end" }, String(Number(y.toPrecision(6))).replace("-", "−"));
       }
-      const [low, high] = this.#x.range;
-      for (let x = low; x <= high + 1e-9; x += this.#x.step) {
+      for (const x of this.#ticks()) {
         const [at] = this.#at(x, 0);
         put("line", { class: "grid", x1: at, x2: at, y1: Plot.TOP, y2: Plot.HEIGHT - Plot.BOTTOM });
-        put("text", { x: at, y: Plot.HEIGHT - Plot.BOTTOM + 15, "text-anchor": "middle" }, x.toFixed(1));
+        put("text", { x: at, y: Plot.HEIGHT - Plot.BOTTOM + 15, "text-anchor": "middle" }, this.#x.log ? String(Number(x.toPrecision(3))) : x.toFixed(this.#x.digits ?? 1));
       }
       put("text", { x: (Plot.LEFT + Plot.WIDTH) / 2, y: Plot.HEIGHT - 5, "text-anchor": "middle" }, this.#x.label);
       put("text", { x: 12, y: Plot.HEIGHT / 2 - 10, "text-anchor": "middle", transform: `rotate(-90 12 ${Plot.HEIGHT / 2 - 10})` }, this.y);
       this.#lines.forEach((line) => line.curve.setAttribute("points", this.#path(line.points)));
+    }
+
+    #ticks() {
+      const [low, high] = this.#x.range, ticks = [];
+      if (this.#x.log) for (let power = 10 ** Math.floor(Math.log10(low) + 1e-9); power < high * 1.001; power *= 10) {
+        for (const factor of [1, 2, 5]) if (factor * power > low * 0.999 && factor * power < high * 1.001) ticks.push(factor * power);
+      } else for (let x = low; x <= high + 1e-9; x += this.#x.step) ticks.push(x);
+      return ticks;
     }
   }
 
@@ -175,6 +205,13 @@ globalThis.Live = (() => {
   function nice(number) {
     const power = 10 ** Math.floor(Math.log10(number));
     return power * [1, 2, 5, 10].find((factor) => factor * power >= number * (1 - 1e-9));
+  }
+
+  // A button that does something.
+  function button(text, act) {
+    const one = make("button", { type: "button" }, text);
+    one.addEventListener("click", act);
+    return one;
   }
 
   /** Puts a live page in the place of its picture; what goes wrong is said there, and the picture stays. */
@@ -191,5 +228,5 @@ globalThis.Live = (() => {
     }
   }
 
-  return { make, draw, print, fmu, Settings, Plot, mount, still: () => matchMedia("(prefers-reduced-motion: reduce)").matches };
+  return { make, draw, print, button, fmu, Settings, Plot, mount, still: () => matchMedia("(prefers-reduced-motion: reduce)").matches };
 })();

@@ -1,10 +1,10 @@
 // The live page "Swirl": HubSlosh under a sinusoidal torque whose frequency is held or swept.
 (() => {
   "use strict";
-  const { make, print, Settings, Plot } = Live;
+  const { make, print, button, Settings, Plot } = Live;
   const FREQUENCIES = [2.0, 2.8]; // Hz
   const STEP = 0.01; // communication step, s; between its ends the torque is a straight line
-    const WINDOW = 4; // periods over which an amplitude is taken
+  const WINDOW = 4; // periods over which an amplitude is taken
   const XI = 1.8411837813406593; // first zero of J1'
   const BUDGET = 12; // ms of a frame for the plant
   const DEGREES = 180 / Math.PI;
@@ -53,11 +53,6 @@
       this.place = make("div", { class: "live-scene" });
       this.says = make("p", { class: "live-says" });
       this.news = make("p", { class: "live-news", role: "status" }); // for those who do not see the motion
-      const button = (text, act) => {
-        const one = make("button", { type: "button" }, text);
-        one.addEventListener("click", act);
-        return one;
-      };
       this.buttons = {
         run: button("Run", () => { this.running = !this.running; this.mark(); }),
         up: button("Sweep up", () => this.begin(1)),

@@ -18,6 +18,12 @@ pub const LIVE_CSS: &str = include_str!("../pages/live.css");
 /// The live page "Swirl"; needs [`THREE`], [`SCENE`], [`fmu_host`], [`LIVE`] and HubSlosh in the global `FMUS`.
 pub const SWIRL: &str = include_str!("../pages/swirl.js");
 
+/// A sampled loop's gain, crossings and margins, as the global `SampledLoop`.
+pub const LOOP: &str = include_str!("../pages/loop.js");
+
+/// The live page "Slew"; needs [`THREE`], [`SCENE`], [`fmu_host`], [`LIVE`], [`LOOP`] and Spacecraft in the global `FMUS`.
+pub const SLEW: &str = include_str!("../pages/slew.js");
+
 /// The host of FMUs compiled to WebAssembly (`fmu/host.js`) as one script without modules, which a page from the disk
 /// can load: the global `FmuHost` with `Fmu` and `FmiError`.
 pub fn fmu_host() -> String {

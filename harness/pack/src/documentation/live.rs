@@ -27,12 +27,18 @@ struct Live {
     page: &'static str,
     /// Name of its FMU.
     model: &'static str,
-    /// Name and text of the script that is the page's own.
-    script: (&'static str, &'static str),
+    /// Names and texts of the scripts that are the page's own, in the order of their use.
+    scripts: &'static [(&'static str, &'static str)],
 }
 
-const LIVE: [Live; 1] =
-    [Live { page: "swirl", model: "HubSlosh", script: ("swirl.js", web::SWIRL) }];
+const LIVE: [Live; 2] = [
+    Live { page: "swirl", model: "HubSlosh", scripts: &[("swirl.js", web::SWIRL)] },
+    Live {
+        page: "slew",
+        model: "Spacecraft",
+        scripts: &[("loop.js", web::LOOP), ("slew.js", web::SLEW)],
+    },
+];
 
 /// The names of the FMUs that live pages run.
 pub fn models() -> impl Iterator<Item = &'static str> {
@@ -48,7 +54,7 @@ pub fn head(page: &Page, plants: &[Plant]) -> Markup {
             link rel="stylesheet" href="live.css";
             @for script in ["three.js", "scene.js", "fmu.js", "live.js"] { script src=(script) defer {} }
             script src=(script_of(live.model)) defer {}
-            script src=(live.script.0) defer {}
+            @for (name, _) in live.scripts { script src=(name) defer {} }
         }
     }
 }
@@ -68,8 +74,8 @@ pub fn files(plants: &[Plant]) -> Result<Files> {
     files.push(("fmu.js".into(), web::fmu_host().into_bytes()));
     files.push(("live.js".into(), web::LIVE.into()));
     files.push(("live.css".into(), web::LIVE_CSS.into()));
-    for Live { script: (name, text), .. } in LIVE {
-        files.push((name.into(), text.into()));
+    for (name, text) in LIVE.iter().flat_map(|live| live.scripts) {
+        files.push(((*name).into(), (*text).into()));
     }
     for Plant { model, module } in plants {
         let name = model.name;
