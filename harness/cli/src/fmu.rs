@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
-use pack::Fmi;
+use pack::{Fmi, Model};
 
 /// Where the project's FMUs lie below the folder of the command's own: beside it, in its data folder,
 /// in the Python package that it came with.
@@ -17,10 +17,10 @@ const INSTALLED: [&str; 5] =
 /// # Errors
 /// If there is none; the error says what to do.
 pub fn find(name: &Path) -> Result<PathBuf> {
-    let models = || pack::MODELS.iter().map(|model| model.name);
-    let known = models().find(|model| name == Path::new(model));
-    let Some(known) = known else {
-        let all: Vec<_> = models().collect();
+    let all = Fmi::ALL.iter().flat_map(|fmi| pack::MODELS.iter().map(move |model| (*fmi, model)));
+    let known = all.clone().find(|(fmi, model)| name == Path::new(&named(*fmi, model)));
+    let Some((fmi, model)) = known else {
+        let all: Vec<_> = all.map(|(fmi, model)| named(fmi, model)).collect();
         ensure!(
             name.is_file(),
             "there is no FMU at {} (allowed: a file, or one of this project by its name: {})",
@@ -29,7 +29,7 @@ pub fn find(name: &Path) -> Result<PathBuf> {
         );
         return Ok(name.into());
     };
-    let file = format!("{known}.fmu");
+    let file = format!("{}.fmu", named(fmi, model));
     let packed = Path::new("dist").join(&file);
     if packed.is_file() {
         return Ok(packed);
@@ -48,10 +48,15 @@ pub fn find(name: &Path) -> Result<PathBuf> {
     let packed = pack::root().join("dist").join(&file);
     if !packed.is_file() {
         super::terminal::note(format_args!("building {}", packed.display()));
-        pack::pack(pack::model(known)?, Fmi::V2, &packed)
+        pack::pack(model, fmi, &packed)
             .with_context(|| format!("there is no {file} yet, and it cannot be built"))?;
     }
     Ok(packed)
+}
+
+/// What `--fmu` calls one of this project's FMUs: `HubSlosh`, and of FMI 3.0 `HubSlosh-fmi3`.
+fn named(fmi: Fmi, model: &Model) -> String {
+    format!("{}{}", model.name, fmi.suffix())
 }
 
 /// The FMU that came with this command.

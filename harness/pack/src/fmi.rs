@@ -41,12 +41,17 @@ impl Fmi {
         }
     }
 
-    /// The FMU of that name in a folder: those of FMI 3.0 have one of their own.
-    pub fn path(self, folder: &Path, identifier: &str) -> PathBuf {
-        let file = format!("{identifier}.fmu");
+    /// What stands behind an FMU's name in the name of its file.
+    pub fn suffix(self) -> &'static str {
         match self {
-            Fmi::V2 => folder.join(file),
-            Fmi::V3 => folder.join("fmi3").join(file),
+            Fmi::V2 => "",
+            Fmi::V3 => "-fmi3",
         }
+    }
+
+    /// The FMU of that name in a folder: `NAME.fmu`, of FMI 3.0 `NAME-fmi3.fmu`. Hosts take the name of the library
+    /// from the description, not from the file.
+    pub fn path(self, folder: &Path, name: &str) -> PathBuf {
+        folder.join(format!("{name}{}.fmu", self.suffix()))
     }
 }

@@ -54,12 +54,17 @@ pub fn wasm(model: &Model) -> Result<Packed> {
 /// Builds the binaries of an FMU for all platforms and packs them to `out`.
 pub fn pack_all(model: &Model, fmi: Fmi, out: &Path) -> Result<Vec<Built>> {
     let all = platforms::build(model)?;
+    pack_built(model, fmi, &all, out)?;
+    Ok(all)
+}
+
+/// Packs what was built for all platforms.
+fn pack_built(model: &Model, fmi: Fmi, all: &[Built], out: &Path) -> Result<()> {
     let binaries: Vec<_> = all
         .iter()
         .map(|b| Packed { folder: b.folder, ending: b.ending, bytes: b.bytes.clone() })
         .collect();
-    archive::write(&files(model, fmi, &binaries)?, out)?;
-    Ok(all)
+    archive::write(&files(model, fmi, &binaries)?, out)
 }
 
 /// The packed HubSlosh for tests: [`packed_model_for_tests`].
@@ -80,7 +85,7 @@ pub fn packed_model_for_tests(model: &Model) -> &'static Path {
     packed_version_for_tests(model, Fmi::V2)
 }
 
-/// As [`packed_model_for_tests`], for a version of FMI: `test-fmu/fmi3/<name>.fmu` for 3.0.
+/// As [`packed_model_for_tests`], for a version of FMI: `test-fmu/<name>-fmi3.fmu` for 3.0.
 ///
 /// # Panics
 /// If it cannot be built.

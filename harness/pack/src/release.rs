@@ -1,4 +1,4 @@
-//! A release to take away: the FMU for all platforms, its hash, its SBOM and the
+//! A release to take away: the FMU for all platforms in both versions of FMI, its hash, its SBOM and the
 //! report of its check; the wheels' hashes, and that for Linux itself.
 
 use std::io::{Read, Write};
@@ -8,8 +8,8 @@ use anyhow::{Context, Result};
 use host::output::{self, sha256};
 
 use crate::metadata::{PACKAGE, VERSION};
-use crate::platforms::PLATFORMS;
-use crate::{Fmi, Model, pack_all, wheel};
+use crate::platforms::{Built, PLATFORMS};
+use crate::{Fmi, Model, pack_built, platforms, wheel};
 
 /// Bytes up to which the wheel for Linux is in the release: it lies in the project's history forever.
 pub const LARGEST_WHEEL: u64 = 10_000_000;
@@ -24,43 +24,59 @@ pub fn read(fmu: &Path, name: &str) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Where the release of the present version of an FMU is, in `folder`.
-pub fn path(model: &Model, folder: &Path) -> PathBuf {
-    folder.join(format!("{}-{}.fmu", model.name, env!("CARGO_PKG_VERSION")))
+/// Where the release of the present version of an FMU is, in `folder`: `NAME-VERSION.fmu`, of FMI 3.0
+/// `NAME-VERSION-fmi3.fmu`.
+pub fn path(model: &Model, fmi: Fmi, folder: &Path) -> PathBuf {
+    fmi.path(folder, &format!("{}-{}", model.name, env!("CARGO_PKG_VERSION")))
 }
 
-/// Builds for all platforms, checks, and writes the release's files to `folder`: the FMU,
+/// Builds for all platforms, checks, and writes the release's files to `folder`, for each version of FMI: the FMU,
 /// `.sha256`, as `sha256sum --check` reads it, `.cdx.json`, and the report of the check, which
-/// `check` returns. Returns what was written; an FMU that `check` refuses is not released.
+/// `check` returns. Returns what was written. If `check` refuses the FMU of one version, neither is released.
 pub fn write(
     model: &Model,
     folder: &Path,
-    check: impl FnOnce(&Path) -> Result<String>,
+    check: impl Fn(&Path) -> Result<String>,
 ) -> Result<Vec<PathBuf>> {
-    let made = tempfile::tempdir().context("there is no place for temporary files")?;
-    let fmu = path(model, made.path());
-    for built in pack_all(model, Fmi::V2, &fmu)? {
+    let all = platforms::build(model)?;
+    for built in &all {
         eprintln!("{}: {}", built.folder, built.binary);
     }
+    let mut files = Vec::new();
+    for fmi in Fmi::ALL {
+        let fmu = path(model, fmi, folder);
+        for (ending, bytes) in of_version(model, fmi, &all, &check)? {
+            files.push((fmu.with_extension(ending), bytes));
+        }
+    }
+    output::directory(folder)?;
+    for (path, bytes) in &files {
+        output::atomically(path, |file| Ok(file.write_all(bytes)?))?;
+    }
+    Ok(files.into_iter().map(|(path, _)| path).collect())
+}
+
+/// The release's files of one version of FMI: endings of their names, and bytes.
+fn of_version(
+    model: &Model,
+    fmi: Fmi,
+    all: &[Built],
+    check: impl Fn(&Path) -> Result<String>,
+) -> Result<[(&'static str, Vec<u8>); 4]> {
+    let made = tempfile::tempdir().context("there is no place for temporary files")?;
+    let fmu = path(model, fmi, made.path());
+    pack_built(model, fmi, all, &fmu)?;
     let bytes = std::fs::read(&fmu).with_context(|| format!("{} cannot be read", fmu.display()))?;
     let name = fmu.file_name().unwrap_or_default().to_string_lossy();
     let hash = format!("{}  {name}\n", sha256(&bytes));
     let report = check(&fmu)?;
     let sbom = read(&fmu, &model.sbom())?;
-    let files = [
+    Ok([
         ("fmu", bytes),
         ("fmu.sha256", hash.into_bytes()),
         ("cdx.json", sbom),
         ("check.txt", report.into_bytes()),
-    ];
-    output::directory(folder)?;
-    let mut written = Vec::new();
-    for (ending, bytes) in files {
-        let path = path(model, folder).with_extension(ending);
-        output::atomically(&path, |file| Ok(file.write_all(&bytes)?))?;
-        written.push(path);
-    }
-    Ok(written)
+    ])
 }
 
 /// Where the hashes of the present version's wheels are, in `folder`, as `sha256sum --check` reads them.

@@ -1,4 +1,4 @@
-//! The Python package `hubslosh` as wheels, one for each platform, with the FMUs and the command
+//! The Python package `hubslosh` as wheels, one for each platform, with the FMUs of both versions of FMI and the command
 //! `hubslosh` inside (packaging.python.org, "Binary distribution format"): same files, same bytes.
 //!
 //! Its Python runs anywhere, its binaries do not: the tag says which Linux, Windows or macOS they
@@ -87,9 +87,11 @@ fn native() -> Result<Binaries> {
     let mut fmus = Files::new();
     let mut all = Vec::new();
     for model in &MODELS {
-        let fmu = made.path().join(format!("{}.fmu", model.name));
-        pack(model, Fmi::V2, &fmu)?;
-        fmus.push((file_name(&fmu), read(&fmu)?));
+        for fmi in Fmi::ALL {
+            let fmu = fmi.path(made.path(), model.name);
+            pack(model, fmi, &fmu)?;
+            fmus.push((file_name(&fmu), read(&fmu)?));
+        }
         all.push(Binary::read(&read(&build(model.package, true)?)?)?);
     }
     let library = read(&build(BATCH.0, true)?)?;
@@ -140,10 +142,12 @@ fn cross_one(
     let mut fmus = Files::new();
     for model in &MODELS {
         let bytes = built(&Product::Fmu(model))?;
-        let binary = Packed { folder: platform.folder, ending: platform.ending, bytes };
-        let fmu = made.path().join(format!("{}.fmu", model.name));
-        archive::write(&files_of_fmu(model, Fmi::V2, &[binary])?, &fmu)?;
-        fmus.push((file_name(&fmu), archive::read(&fmu)?));
+        let binary = [Packed { folder: platform.folder, ending: platform.ending, bytes }];
+        for fmi in Fmi::ALL {
+            let fmu = fmi.path(made.path(), model.name);
+            archive::write(&files_of_fmu(model, fmi, &binary)?, &fmu)?;
+            fmus.push((file_name(&fmu), archive::read(&fmu)?));
+        }
     }
     let library = built(&Product::Library(BATCH.0, BATCH.1))?;
     let command = built(&Product::Command)?;

@@ -30,7 +30,7 @@ pub struct PackArgs {
     /// Pack the source as an sdist instead, from which pip builds the Python package.
     #[arg(long, conflicts_with_all = ["model", "python", "all_platforms"])]
     sdist: bool,
-    /// Where to put the FMU; the folder for wheels and sdist [default: dist/NAME.fmu, dist/fmi3/NAME.fmu, dist].
+    /// Where to put the FMU; the folder for wheels and sdist [default: dist/NAME.fmu, dist/NAME-fmi3.fmu, dist].
     #[arg(long, value_name = "FILE|FOLDER")]
     out: Option<PathBuf>,
     /// Of Spacecraft: a variant for this many tanks, 1 to 4, which has no variables of more. It is called Spacecraft_1x1

@@ -12,7 +12,7 @@ use crate::progress;
 /// Where the release goes.
 const DEFAULT_RELEASE: &str = "dist/release";
 
-/// Builds and checks the release for all platforms: each FMU, its hash, its software bill of
+/// Builds and checks the release for all platforms: each FMU in both versions of FMI, its hash, its software bill of
 /// materials (SBOM); the Python package's wheels, of which the hashes and that for Linux are kept.
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  hubslosh release\n\n\
