@@ -9,3 +9,4 @@ pub mod progress;
 pub mod rounding;
 pub mod run;
 pub mod scaling;
+pub mod sensors;

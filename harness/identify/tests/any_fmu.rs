@@ -50,6 +50,7 @@ fn question(free: &[&str]) -> Question {
         inputs: vec!["tau_cmd".into()],
         held: vec!["tau_cmd".into()],
         outputs: vec!["omega".into()],
+        sensors: Vec::new(),
         biases: vec!["omega=0.01".parse().unwrap()],
         triads: Vec::new(),
         drift: false,

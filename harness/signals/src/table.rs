@@ -1,7 +1,7 @@
 //! Columns of numbers with names, in CSV or Parquet files (told apart by the
 //! ending). Signals are in SI units under the FMU's names, `time` in s.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -25,6 +25,8 @@ use host::output::atomically;
 pub struct Table {
     names: Vec<String>,
     columns: Vec<Vec<f64>>,
+    /// Names of the columns in which NaN stands where a value is missing.
+    gaps: BTreeSet<String>,
 }
 
 /// How a table is stored.
@@ -52,7 +54,19 @@ impl Table {
     pub fn new(names: Vec<String>, columns: Vec<Vec<f64>>) -> Self {
         assert_eq!(names.len(), columns.len());
         assert!(columns.windows(2).all(|pair| pair[0].len() == pair[1].len()));
-        Table { names, columns }
+        Table { names, columns, gaps: BTreeSet::new() }
+    }
+
+    /// The table and a further column, in which NaN stands where a value is missing; a file has nothing there.
+    ///
+    /// # Panics
+    /// If it has another number of rows.
+    pub fn with_gaps(mut self, name: &str, column: Vec<f64>) -> Table {
+        assert_eq!(column.len(), self.rows());
+        self.names.push(name.into());
+        self.gaps.insert(name.into());
+        self.columns.push(column);
+        self
     }
 
     /// Number of rows.
@@ -74,10 +88,11 @@ impl Table {
     /// The table with only the columns `names`, which must be there.
     pub fn only(&self, names: &[&str]) -> Table {
         let column = |name: &&str| self.column(name).expect("a column of this table").to_vec();
-        Table::new(
-            names.iter().map(|n| n.to_string()).collect(),
-            names.iter().map(column).collect(),
-        )
+        Table {
+            names: names.iter().map(|n| n.to_string()).collect(),
+            columns: names.iter().map(column).collect(),
+            gaps: self.gaps.clone(),
+        }
     }
 
     /// Reads the columns `wanted` of a file, which may hold others. Every value must be a finite
@@ -95,10 +110,12 @@ impl Table {
         Ok(table)
     }
 
-    /// Fails with the first value that is not finite.
+    /// Fails with the first value that is not finite, nor missing where values may be.
     pub fn all_finite(&self) -> Result<()> {
         for (column, values) in self.names.iter().zip(&self.columns) {
-            if let Some(row) = values.iter().position(|value| !value.is_finite()) {
+            let gaps = self.gaps.contains(column);
+            let fine = |value: &f64| value.is_finite() || (gaps && value.is_nan());
+            if let Some(row) = values.iter().position(|value| !fine(value)) {
                 let value = values[row];
                 bail!("row {}: {column} is {value} (allowed: finite numbers)", row + 1);
             }
@@ -106,7 +123,7 @@ impl Table {
         Ok(())
     }
 
-    /// Writes the table, if all its values are finite; `metadata` are a Parquet file's key-value
+    /// Writes the table, if all its values are finite or may be missing; `metadata` are a Parquet file's key-value
     /// pairs.
     pub fn write(&self, path: &Path, metadata: &BTreeMap<String, String>) -> Result<()> {
         let format = format_of(path)?;
@@ -129,7 +146,11 @@ impl Table {
         for row in 0..self.rows() {
             for (i, column) in self.columns.iter().enumerate() {
                 // the shortest digits that read back to the same number
-                write!(out, "{}{:?}", if i == 0 { "" } else { "," }, column[row])?;
+                let comma = if i == 0 { "" } else { "," };
+                match column[row] {
+                    value if value.is_nan() => write!(out, "{comma}")?,
+                    value => write!(out, "{comma}{value:?}")?,
+                }
             }
             writeln!(out)?;
         }
@@ -143,8 +164,12 @@ impl Table {
             .names
             .iter()
             .map(|name| {
+                let repetition = match self.gaps.contains(name) {
+                    true => Repetition::OPTIONAL,
+                    false => Repetition::REQUIRED,
+                };
                 Type::primitive_type_builder(name, Physical::DOUBLE)
-                    .with_repetition(Repetition::REQUIRED)
+                    .with_repetition(repetition)
                     .build()
                     .map(Arc::new)
             })
@@ -159,9 +184,16 @@ impl Table {
             .build();
         let mut writer = SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties))?;
         let mut group = writer.next_row_group()?;
-        for values in &self.columns {
+        for (name, values) in self.names.iter().zip(&self.columns) {
             let mut column = group.next_column()?.context("fewer columns than names")?;
-            column.typed::<DoubleType>().write_batch(values, None, None)?;
+            let typed = column.typed::<DoubleType>();
+            if self.gaps.contains(name) {
+                let levels: Vec<i16> = values.iter().map(|v| i16::from(!v.is_nan())).collect();
+                let there: Vec<f64> = values.iter().copied().filter(|v| !v.is_nan()).collect();
+                typed.write_batch(&there, Some(&levels), None)?;
+            } else {
+                typed.write_batch(values, None, None)?;
+            }
             column.close()?;
         }
         group.close()?;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
+use experiments::sensors::Sensor;
 use host::output::atomically;
 use identify::any_fmu::foresee::{Bound, foresee};
 use identify::any_fmu::likelihood::deviances;
@@ -39,6 +40,10 @@ pub struct AnyFmuArgs {
     /// Outputs that were recorded.
     #[arg(long, value_name = "NAME,…", requires = "free")]
     outputs: Vec<String>,
+    /// A sensor among the outputs that is no variable of the FMU, as `hubslosh run --sensor` has it; its scale, bias and delay are
+    /// taken as known, its noise is estimated. One for each flag.
+    #[arg(long = "sensor", value_name = "NAME=KIND:key=value,…", requires = "free")]
+    sensors: Vec<Sensor>,
     /// Outputs whose sensor has a bias, in each recording another one; STD: what is known of it.
     #[arg(long, value_name = "OUTPUT[=STD],…", requires = "free")]
     bias: Vec<String>,
@@ -132,12 +137,21 @@ impl AnyFmuArgs {
             inputs: names(&self.inputs),
             held: names(&self.held),
             outputs: names(&self.outputs),
+            sensors: self.sensors.clone(),
             biases: read(&self.bias, &mut problems),
             triads: kept(triads, &mut problems),
             drift: self.drift,
             solver: self.exchange.map_or(Solver::Own, Solver::Host),
             starts: self.tries,
         };
+        for sensor in self.sensors.iter().filter(|s| {
+            let its = |output: &String| {
+                output.strip_prefix(&s.name).is_some_and(|r| r.is_empty() || r.starts_with('.'))
+            };
+            !question.outputs.iter().any(its)
+        }) {
+            problems.push(format!("--sensor {}: it is not among the --outputs", sensor.name));
+        }
         if self.exchange.is_some_and(|tolerance| !(1e-13..=1e-2).contains(&tolerance)) {
             problems.push("--exchange (allowed: tolerances from 1e-13 to 1e-2)".into());
         }

@@ -7,6 +7,7 @@ use anyhow::{Result, bail};
 use experiments::campaign::{Range, WAVE, stored_columns};
 use experiments::profile::{self, Written};
 use experiments::run::{self, Run, driven, histories};
+use experiments::sensors::{self, Sensor, Sensors};
 use host::description::ModelDescription;
 use host::guard;
 
@@ -60,6 +61,9 @@ pub struct RunArgs {
     /// angles].
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     columns: Vec<String>,
+    /// A sensor that is recorded too: sampled, late, noisy, biased, in steps (kinds below); one for each flag.
+    #[arg(long = "sensor", value_name = "NAME=KIND:key=value,…")]
+    sensors: Vec<Sensor>,
     /// The FMU: a file, or the name of one of this project.
     #[arg(long, value_name = "FILE|NAME", default_value = DEFAULT_FMU)]
     pub fmu: PathBuf,
@@ -119,10 +123,22 @@ impl RunArgs {
         let asked = columns.len();
         // read along, to say at the end whether the model still meant something
         let range = Range::of(description, &mut instance)?;
-        let extra = range.as_ref().map(|_| WAVE).filter(|wave| !columns.contains(wave));
-        let columns: Vec<&str> = columns.into_iter().chain(extra).collect();
+        let sensors = Sensors::new(&self.sensors, description, &run.settings, run.step)?;
+        let driven: Vec<&str> = run
+            .input
+            .iter()
+            .chain(run.others.iter().map(|(name, _)| name))
+            .map(String::as_str)
+            .collect();
+        let mut columns = columns;
+        for name in range.as_ref().map(|_| WAVE).into_iter().chain(sensors.needs()) {
+            if !columns.contains(&name) && !driven.contains(&name) {
+                columns.push(name);
+            }
+        }
         // the table, its copy for --columns, and what is written: 25 characters for a number
-        guard::allow((run.steps() * (columns.len() + 3) * 50) as u64);
+        let all = columns.len() + sensors.columns().len();
+        guard::allow((run.steps() * (all + 3) * 50) as u64);
         let bar = progress::of_steps()?;
         bar.set_length(run.steps() as u64);
         let table = run.drive(&mut instance, &columns, |steps| bar.inc(steps))?;
@@ -136,16 +152,22 @@ impl RunArgs {
         let rest = description.moving_starts().iter().map(|name| (name.to_string(), "0".into()));
         let settings: Vec<_> = rest.chain(run.settings.iter().cloned()).collect();
         let parameters = run::parameters(description, &settings, &named);
-        let notes = BTreeMap::from([
+        let mut notes = BTreeMap::from([
             ("fmu".into(), fmu.hash().into()),
             ("guid".into(), fmu.description().guid.clone()),
             ("version".into(), fmu.description().version.clone()),
             ("model".into(), description.model_name.clone()),
             ("parameters".into(), serde_json::json!(parameters).to_string()),
         ]);
+        if !self.sensors.is_empty() {
+            notes.insert("sensors".into(), serde_json::json!(sensors.texts()).to_string());
+        }
         let beyond = range.and_then(|range| range.left(table.column(WAVE)?));
         let driven = table.names().len() - columns.len();
-        let kept: Vec<&str> = table.names()[..driven + asked].iter().map(String::as_str).collect();
+        let kept = table.names()[..driven + asked].to_vec();
+        let kept: Vec<String> = kept.into_iter().chain(sensors.columns()).collect();
+        let kept: Vec<&str> = kept.iter().map(String::as_str).collect();
+        let table = sensors.read(table, "run", run.step)?;
         write_out(&table.only(&kept), &self.out, &notes)?;
         if let Some(how) = beyond {
             terminal::warn(format_args!("the run left the range of its model: {how}"));
@@ -180,12 +202,16 @@ fn whole_names(parts: Vec<String>) -> Vec<String> {
 fn help() -> String {
     format!(
         "Profiles, with their defaults (torque in N·m, frequencies in Hz, times in s):\n{}\n\
+         Sensors, with their defaults (SI; angles also as 90deg, lengths as 5mm):\n{}\n\
          Examples:\n  hubslosh run --profile exp-sweep:amplitude=0.1 --out sweep.parquet\n  \
          hubslosh run --profile sine:amplitude=0.05,frequency=2.344 --set friction.model=none \\\n      \
          --set tank.h=50mm --step 0.005 --columns theta,omega,slosh_angle --out dwell.csv\n  \
          hubslosh run --input torque.csv --out answer.csv\n  \
          hubslosh run --parameters result.json --input bench.csv --ignore-columns --out twin.csv\n  \
-         hubslosh run --profile zero --set init.slosh_angle=0.1 --out - | head",
-        profile::help()
+         hubslosh run --profile zero --set init.slosh_angle=0.1 --out - | head\n  \
+         hubslosh run --profile lin-sweep:duration=600 --sensor wave=gauge:angle=90deg,rate=25,noise=0.2mm \\\n      \
+         --sensor load=force:noise=0.01,quantum=0.005 --out bench.csv",
+        profile::help(),
+        sensors::help()
     )
 }

@@ -156,7 +156,10 @@ pub fn of_stored(description: &ModelDescription, file: &Path, title: &str) -> Re
     let parameters = serde_json::from_str(notes.get("parameters").map_or("{}", String::as_str))
         .with_context(|| format!("{}: its metadata are damaged", file.display()))?;
     let names = table::names(file)?;
-    let table = Table::read(file, &names.iter().map(String::as_str).collect::<Vec<_>>())?;
+    // readings of sensors are no variables: the picture has no place for them
+    let known = |n: &&str| *n == "time" || description.variables.iter().any(|v| v.name == *n);
+    let names: Vec<&str> = names.iter().map(String::as_str).filter(known).collect();
+    let table = Table::read(file, &names)?;
     let page = view::page(&view::Run {
         title: title.into(),
         source: file.display().to_string(),

@@ -144,3 +144,34 @@ fn other_flags_get_a_directory_of_their_own_and_another_plan_is_not_overwritten(
     let (done, _, error) = run(&["--plan", &one, "--out", "dist/mine"]);
     assert!(done && error.contains("held the campaign of another plan"), "{error}");
 }
+
+#[test]
+fn the_runs_of_a_plan_with_sensors_have_their_readings_and_are_reused() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let plan = "profile = \"sine:duration=2\"\n[vary]\nprofile.amplitude = [0.05, 0.1]\n\
+        [sensor]\nwave = \"gauge:rate=25,noise=0.2mm\"\nload = \"force:noise=0.01\"\n";
+    std::fs::write(directory.join("plan.toml"), plan).unwrap();
+    let run = || {
+        let program = env!("CARGO_BIN_EXE_hubslosh");
+        let flags = ["campaign", "--plan", "plan.toml", "--out", "c", "--fmu"];
+        let mut command = Command::new(program);
+        command.current_dir(directory).args(flags).arg(packed_for_tests()).output().unwrap()
+    };
+    let done = run();
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let loads = ["50", "100"].map(|name| {
+        let file = directory.join(format!("c/runs/linear_100mm_{name}.parquet"));
+        let all = signals::table::names(&file).unwrap();
+        assert_eq!(all[all.len() - 2..], ["wave", "load"], "{all:?}");
+        let table = Table::read(&file, &["load", "F_tangential"]).unwrap();
+        let [load, force] = ["load", "F_tangential"].map(|name| table.column(name).unwrap());
+        load.iter().zip(force).map(|(y, x)| y - x).collect::<Vec<f64>>()
+    });
+    // one seed, but the runs' noise is not the same
+    let alike = loads[0].iter().zip(&loads[1]).filter(|(a, b)| (*a - *b).abs() < 1e-6).count();
+    assert!(alike < 5, "{alike} of {}", loads[0].len());
+    let again = run();
+    let text = String::from_utf8_lossy(&again.stderr);
+    assert!(again.status.success() && !text.contains("re-running"), "{text}");
+}

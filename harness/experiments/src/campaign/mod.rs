@@ -35,6 +35,7 @@ pub use self::rows::{FeatureRow, MadeFrom};
 use crate::plan::{Case, Plan};
 use crate::progress::Progress;
 use crate::run::Run;
+use crate::sensors::Sensors;
 
 /// Columns of a stored run of the bench, SI units, at every communication point from the torque's
 /// start to the stop time; others may follow. The first six are what people look at; wave height,
@@ -251,6 +252,10 @@ impl Campaign {
         let cases = self.plan.cases(description)?;
         for case in cases.into_iter().filter(|case| case.recording.is_none()) {
             let run = case.run();
+            anyhow::ensure!(
+                case.sensors.is_empty(),
+                "runs with sensors are made by hubslosh campaign alone, not by another program"
+            );
             columns = stored_columns(description, run.input.as_deref());
             let starts = description.moving_starts().iter();
             let at_rest = starts.filter(|name| Some(**name) != run.input.as_deref());
@@ -353,11 +358,25 @@ impl Campaign {
             None => {
                 // time and the driven input are there anyway
                 let others = columns[1 + usize::from(run.input.is_some())..].iter();
-                let others: Vec<&str> = others.map(String::as_str).collect();
+                let mut others: Vec<&str> = others.map(String::as_str).collect();
+                let sensors =
+                    Sensors::new(&case.sensors, fmu.description(), &case.settings, case.step)?;
+                for name in sensors.needs() {
+                    if !others.contains(&name) && Some(name) != run.input.as_deref() {
+                        others.push(name);
+                    }
+                }
                 let driven =
                     run.drive(&mut instance, &others, |steps| watch(Progress::Steps(steps)));
                 instance.take_warnings().into_iter().for_each(|warning| warn(case, warning));
-                let table = match driven.and_then(|table| table.all_finite().map(|()| table)) {
+                let read = driven.and_then(|table| {
+                    table.all_finite()?;
+                    let kept = table.names()[..columns.len()].iter().cloned();
+                    let kept: Vec<String> = kept.chain(sensors.columns()).collect();
+                    let kept: Vec<&str> = kept.iter().map(String::as_str).collect();
+                    Ok(sensors.read(table, &case.name, case.step)?.only(&kept))
+                });
+                let table = match read {
                     Ok(table) => table,
                     Err(error) => return Ok(Done::Failed(error)),
                 };

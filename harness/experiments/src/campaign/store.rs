@@ -21,6 +21,7 @@ const FORMAT: &str = "1";
 /// * `profile`: the torque; `torque_sha256`: of the file, if it comes from one,
 /// * `step`, `stop`: s; `tolerance`: the relative tolerance handed to the FMU,
 /// * `torque`: whether the FMU is told the torque's slope over each step,
+/// * `sensors`: what is recorded beside variables, as a JSON object, if anything is,
 /// * `columns`: what is recorded; `format`: of all this.
 pub fn recipe(fmu: &Fmu, case: &Case, columns: &[String]) -> BTreeMap<String, String> {
     let settings: Vec<_> = case.settings.iter().map(|(k, v)| format!("{k}={v}")).collect();
@@ -42,6 +43,10 @@ pub fn recipe(fmu: &Fmu, case: &Case, columns: &[String]) -> BTreeMap<String, St
         ]
         .map(|(key, value)| (key.to_string(), value)),
     );
+    if !case.sensors.is_empty() {
+        let texts: BTreeMap<_, _> = case.sensors.iter().map(|s| (&s.name, &s.text)).collect();
+        recipe.insert("sensors".into(), serde_json::json!(texts).to_string());
+    }
     if let Some(hash) = &case.torque_sha256 {
         recipe.insert("torque_sha256".into(), hash.clone());
     }
@@ -59,6 +64,9 @@ pub fn stored(
     let found = table::metadata(path).map_err(|_| INCOMPLETE.to_string())?;
     if let Some(why) = difference(&found, recipe) {
         return Err(why);
+    }
+    if found.contains_key("sensors") && !recipe.contains_key("sensors") {
+        return Err("it has sensors".into());
     }
     let names: Vec<&str> = columns.iter().map(String::as_str).collect();
     let table = Table::read(path, &names).map_err(|_| INCOMPLETE.to_string())?;

@@ -14,6 +14,7 @@ use super::problems::{Lines, Problems};
 use super::random::{Distribution, Draws, Family};
 use super::{Listed, Named, Plan, Recorded, STEP};
 use crate::profile::Written;
+use crate::sensors::Sensor;
 use signals::recording::Columns;
 
 /// A single value.
@@ -45,7 +46,7 @@ impl fmt::Display for Scalar {
 }
 
 /// Keys of the file.
-const KEYS: [&str; 12] = [
+const KEYS: [&str; 13] = [
     "title",
     "profile",
     "input",
@@ -58,6 +59,7 @@ const KEYS: [&str; 12] = [
     "run",
     "random",
     "count",
+    "sensor",
 ];
 
 /// The plan that a text says, if it is one but for `problems`.
@@ -108,6 +110,7 @@ pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Plan> {
     let count =
         reader.named("[count] ", count, &expected, |first: &i64| (0..=most).contains(first));
     let (listed, draws) = (reader.listed(table), reader.draws(table));
+    let sensors = reader.sensors(table);
     Some(Plan {
         title: title.map_or(String::new(), |title| title.value),
         text: text.into(),
@@ -122,6 +125,7 @@ pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Plan> {
         listed,
         count,
         draws,
+        sensors,
     })
 }
 
@@ -286,6 +290,15 @@ impl Reader<'_> {
                 None
             }
         }
+    }
+
+    fn sensors(&mut self, table: &DeTable) -> Vec<Sensor> {
+        let texts = self.names(table, "sensor");
+        let texts = self.named("[sensor] ", texts, "a text in quotes", |_: &String| true);
+        let new = |one: &Named<String>, problems: &mut Problems| {
+            problems.take(&one.lines, Sensor::new(&one.name, &one.value))
+        };
+        texts.iter().filter_map(|one| new(one, self.problems)).collect()
     }
 
     fn draws(&mut self, table: &DeTable) -> Option<Draws> {

@@ -14,6 +14,7 @@ use anyhow::{Context, Result, bail, ensure};
 use crate::profile::{Torque, Written};
 use crate::rounding::thousandths;
 use crate::run::{Run, driven};
+use crate::sensors::{Sensor, Sensors};
 use host::budget;
 use host::description::{ModelDescription, Value, did_you_mean};
 use host::output::sha256;
@@ -87,6 +88,7 @@ pub struct Plan {
     listed: Vec<Listed>,
     count: Vec<Named<i64>>,
     draws: Option<Draws>,
+    sensors: Vec<Sensor>,
 }
 
 /// Sweeps of the bench from 1.25 to 3.5 Hz in 2700 s.
@@ -160,6 +162,8 @@ pub struct Case {
     pub tolerance: Option<f64>,
     /// The torque is held over each step.
     pub hold: bool,
+    /// What is recorded of it beside the FMU's variables.
+    pub sensors: Vec<Sensor>,
     /// It is not simulated but read: what a bench did under this torque.
     pub recording: Option<Recorded>,
 }
@@ -237,6 +241,7 @@ impl Plan {
             listed: Vec::new(),
             count: Vec::new(),
             draws: None,
+            sensors: Vec::new(),
         };
         let mut problems = Problems::default();
         plan.each_name_once(&mut problems);
@@ -538,8 +543,11 @@ impl Plan {
             step: self.step,
             tolerance: self.tolerance,
             hold: self.hold,
+            sensors: self.sensors.clone(),
             recording: None,
         };
+        let sensors = Sensors::new(&case.sensors, description, &case.settings, case.step);
+        problems.take(&Lines::default(), sensors);
         let lines = self.stop.as_ref().map_or(lines, |stop| stop.lines.clone());
         problems.take(&lines, case.run().check());
         (problems.count() == before).then_some(case)

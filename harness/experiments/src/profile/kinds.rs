@@ -28,8 +28,8 @@ pub struct Kind {
 /// What must hold, and the sentence that says so.
 pub(super) type Demand = (fn(&Values) -> bool, &'static str);
 
-/// A number that a profile is given.
-#[derive(Debug)]
+/// A number that a profile or a sensor is given.
+#[derive(Clone, Copy, Debug)]
 pub struct Parameter {
     /// Its name.
     pub name: &'static str,
@@ -80,7 +80,19 @@ impl Allowed {
     }
 }
 
-const fn parameter(
+impl Parameter {
+    /// A number as it is written: in the parameter's unit, or an angle in degrees (90deg), a length in mm (5mm).
+    pub(super) fn number(&self, text: &str) -> Option<f64> {
+        let (text, factor) = match self.unit {
+            "rad" => text.strip_suffix("deg").map_or((text, 1.0), |t| (t, 1f64.to_radians())),
+            "m" => text.strip_suffix("mm").map_or((text, 1.0), |t| (t, 1e-3)),
+            _ => (text, 1.0),
+        };
+        text.trim().parse().ok().map(|number: f64| number * factor)
+    }
+}
+
+pub(crate) const fn parameter(
     name: &'static str,
     default: f64,
     unit: &'static str,

@@ -13,6 +13,7 @@ use anyhow::{Context, Result, bail, ensure};
 use host::description::did_you_mean;
 use serde_json::json;
 
+pub(crate) use self::kinds::parameter;
 pub use self::kinds::{Allowed, FILE, KINDS, Kind, Parameter};
 pub use self::noise::TONES;
 pub use self::shape::Shape;
@@ -108,17 +109,24 @@ impl FromStr for Written {
     type Err = anyhow::Error;
 
     fn from_str(text: &str) -> Result<Self> {
+        Written::read("profile", text)
+    }
+}
+
+impl Written {
+    /// From text; `what` it stands for begins what is said of errors.
+    pub(crate) fn read(what: &str, text: &str) -> Result<Self> {
         let (name, rest) = text.split_once(':').unwrap_or((text, ""));
         let name = name.trim();
         let mut written = Written { name: name.into(), pairs: Vec::new() };
         for pair in rest.split(',').filter(|pair| !pair.trim().is_empty()) {
             let (key, value) = pair.split_once('=').with_context(|| {
-                format!("profile {name}: \"{pair}\" is not of the form key=value")
+                format!("{what} {name}: \"{pair}\" is not of the form key=value")
             })?;
             let key = key.trim();
             ensure!(
                 written.pairs.iter().all(|(k, _)| k != key),
-                "profile {name}: {key} is given twice"
+                "{what} {name}: {key} is given twice"
             );
             written.pairs.push((key.into(), value.trim().into()));
         }
@@ -173,6 +181,40 @@ impl Written {
         parameter.is_some_and(|p| matches!(p.allowed, Allowed::Whole(_)))
     }
 
+    /// The name before the colon.
+    pub(crate) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Takes a key that is no number away.
+    pub(crate) fn take(&mut self, key: &str) -> Option<String> {
+        let place = self.pairs.iter().position(|(k, _)| k == key)?;
+        Some(self.pairs.remove(place).1)
+    }
+
+    /// The values of these parameters, in their order, the defaults where none is given; and all that is wrong with them.
+    pub(crate) fn values(&self, parameters: &[Parameter]) -> (Vec<f64>, Vec<String>) {
+        let mut values: Vec<f64> = parameters.iter().map(|p| p.default).collect();
+        let mut problems = Vec::new();
+        for (key, text) in &self.pairs {
+            let Some(place) = parameters.iter().position(|p| p.name == key) else {
+                let names: Vec<_> = parameters.iter().map(|p| p.name).collect();
+                problems
+                    .push(format!("it has no parameter \"{key}\" (it has {})", names.join(", ")));
+                continue;
+            };
+            match parameters[place].number(text).filter(|v| v.is_finite()) {
+                Some(value) => values[place] = value,
+                None => problems.push(format!("{key} expects a number, not \"{text}\"")),
+            }
+        }
+        for (parameter, value) in parameters.iter().zip(&values) {
+            let fault = parameter.allowed.fault(*value);
+            problems.extend(fault.map(|fault| format!("{} {fault}", parameter.name)));
+        }
+        (values, problems)
+    }
+
     fn profile(&self) -> Result<Profile> {
         let name = self.name.as_str();
         let kind = KINDS.iter().find(|kind| kind.name == name).with_context(|| {
@@ -181,24 +223,7 @@ impl Written {
             let hint = did_you_mean(name, names);
             format!("there is no profile \"{name}\" (there are {}){hint}", all.join(", "))
         })?;
-        let mut problems = Vec::new();
-        let mut values = kind.defaults();
-        for (key, text) in &self.pairs {
-            let Some(place) = kind.parameters.iter().position(|p| p.name == key) else {
-                let names: Vec<_> = kind.parameters.iter().map(|p| p.name).collect();
-                problems
-                    .push(format!("it has no parameter \"{key}\" (it has {})", names.join(", ")));
-                continue;
-            };
-            match text.parse().ok().filter(|v: &f64| v.is_finite()) {
-                Some(value) => values[place] = value,
-                None => problems.push(format!("{key} expects a number, not \"{text}\"")),
-            }
-        }
-        for (parameter, value) in kind.parameters.iter().zip(&values) {
-            let fault = parameter.allowed.fault(*value);
-            problems.extend(fault.map(|fault| format!("{} {fault}", parameter.name)));
-        }
+        let (values, mut problems) = self.values(kind.parameters);
         let given = Values { kind, values: &values };
         let unmet = kind.demands.iter().filter(|(met, _)| !met(&given));
         problems.extend(unmet.map(|(_, demand)| demand.to_string()));

@@ -3,3 +3,4 @@
 mod example;
 mod gyro;
 mod plans;
+mod sensors;

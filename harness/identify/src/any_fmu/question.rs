@@ -3,6 +3,8 @@
 use std::str::FromStr;
 
 use anyhow::{Context, Error, Result, bail, ensure};
+use experiments::sensors::Sensor;
+use experiments::sensors::quantity::Quantity;
 use host::description::{ModelDescription, Type, Variable};
 
 use super::record::Record;
@@ -178,8 +180,10 @@ pub struct Question {
     pub inputs: Vec<String>,
     /// Those of them that are held from row to row; the others go along lines.
     pub held: Vec<String>,
-    /// Outputs that were recorded.
+    /// Outputs that were recorded: of the FMU, or columns of `sensors`.
     pub outputs: Vec<String>,
+    /// Sensors that read what is no output of the FMU: a wave gauge, a camera.
+    pub sensors: Vec<Sensor>,
     /// Sensors with a bias.
     pub biases: Vec<Bias>,
     /// Instruments with three axes.
@@ -288,6 +292,42 @@ impl Question {
         Ok(unknowns)
     }
 
+    /// What the column of a sensor shows: the sensor, what it measures, and the number of the channel; `None`: no sensor has it.
+    ///
+    /// # Errors
+    /// If the FMU has not what the sensor measures.
+    pub fn sensor(
+        &self,
+        column: &str,
+        description: &ModelDescription,
+    ) -> Result<Option<(&Sensor, Quantity, usize)>> {
+        let is_its = |sensor: &&Sensor| {
+            let rest = column.strip_prefix(&sensor.name);
+            rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+        };
+        let Some(sensor) = self.sensors.iter().find(is_its) else { return Ok(None) };
+        let of_all = self.settings.iter().filter(|setting| setting.recording.is_none());
+        let settings: Vec<_> = of_all.map(|s| (s.name.clone(), s.value.clone())).collect();
+        let quantity = sensor.quantity(description, &settings)?;
+        let columns: Vec<String> =
+            quantity.channels.iter().map(|(channel, _)| sensor.column(channel)).collect();
+        let channel = columns.iter().position(|name| name == column).with_context(|| {
+            format!("sensor {} has no column {column} (it has {})", sensor.name, columns.join(", "))
+        })?;
+        Ok(Some((sensor, quantity, channel)))
+    }
+
+    /// The unit of an output.
+    ///
+    /// # Errors
+    /// If there is no such output.
+    pub fn unit(&self, output: &str, description: &ModelDescription) -> Result<String> {
+        Ok(match self.sensor(output, description)? {
+            Some((_, quantity, channel)) => quantity.channels[channel].1.clone(),
+            None => description.unit(real(description, output)?).into(),
+        })
+    }
+
     /// Where an output stands in the list.
     fn output(&self, name: &str) -> Result<usize> {
         let found = self.outputs.iter().position(|output| output == name);
@@ -326,7 +366,7 @@ impl Question {
         records: &[Record],
     ) -> Result<Vec<Unknown>> {
         let output = self.output(&bias.output)?;
-        let unit = description.unit(real(description, &bias.output)?).to_string();
+        let unit = self.unit(&bias.output, description)?;
         let one = |(recording, record): (usize, &Record)| Unknown {
             name: numbered(&format!("bias({})", bias.output), recording),
             what: What::Bias { output, recording },

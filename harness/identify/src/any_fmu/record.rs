@@ -7,7 +7,7 @@ use anyhow::{Context, Result, ensure};
 use host::description::ModelDescription;
 use signals::recording::{self, Between, Columns, Signal, Wanted};
 
-use super::question::{Question, real};
+use super::question::Question;
 
 /// Values of an output below which nothing is estimated from them.
 const FEWEST: usize = 10;
@@ -39,6 +39,10 @@ impl Record {
     ) -> Result<Self> {
         let mut signals = Vec::new();
         let kinds = [(&question.outputs, true), (&question.inputs, false)];
+        let all = question.outputs.iter().chain(&question.inputs);
+        let units = all.map(|name| question.unit(name, description));
+        let units = units.collect::<Result<Vec<String>>>()?;
+        let mut unit = units.iter();
         for (names, is_output) in kinds {
             for name in names {
                 let held = question.held.contains(name);
@@ -47,8 +51,8 @@ impl Record {
                     (false, true) => Between::Held,
                     (false, false) => Between::Line,
                 };
-                let unit = description.unit(real(description, name)?);
-                signals.push(Signal { name, required: true, between, unit: Some(unit) });
+                let unit = unit.next().map(String::as_str);
+                signals.push(Signal { name, required: true, between, unit });
             }
         }
         let table = recording::read(path, &Wanted { signals: &signals, columns }, done)?;

@@ -3,6 +3,8 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
+use experiments::sensors::Sensor;
+use experiments::sensors::quantity::Quantity;
 use host::archive::Archive;
 use host::description::ModelDescription;
 use host::fmi2::{self, MODEL_EXCHANGE};
@@ -87,9 +89,32 @@ pub struct Setup {
     /// Value references of the inputs, and whether each is held from row to row.
     inputs: Vec<u32>,
     held: Vec<bool>,
-    outputs: Vec<u32>,
+    outputs: Vec<Output>,
+    /// What is read of the FMU for all outputs.
+    reads: Vec<u32>,
     /// Relative tolerance of the host's solver.
     tolerance: f64,
+}
+
+/// How an output follows from what is read.
+#[derive(Clone, Debug)]
+struct Output {
+    /// Where what it needs begins among all that is read.
+    from: usize,
+    /// What it is.
+    quantity: Quantity,
+    /// Which channel of that.
+    channel: usize,
+    /// The sensor that reads it.
+    sensor: Option<Sensor>,
+}
+
+impl Output {
+    fn value(&self, read: &[f64]) -> f64 {
+        let needs = &read[self.from..self.from + self.quantity.needs.len()];
+        let value = self.quantity.values(needs)[self.channel];
+        self.sensor.as_ref().map_or(value, |sensor| sensor.expected(value))
+    }
 }
 
 /// An unknown's value: its reference.
@@ -102,7 +127,7 @@ impl Setup {
     /// All names that the FMU has not.
     pub fn new(question: &Question, description: &ModelDescription) -> Result<Self> {
         let mut problems = Vec::new();
-        let mut references = |names: &[String]| -> Vec<u32> {
+        let references = |names: &[String], problems: &mut Vec<String>| -> Vec<u32> {
             let mut found = Vec::new();
             for name in names {
                 match real(description, name) {
@@ -112,7 +137,25 @@ impl Setup {
             }
             found
         };
-        let (inputs, outputs) = (references(&question.inputs), references(&question.outputs));
+        let inputs = references(&question.inputs, &mut problems);
+        let (mut outputs, mut reads) = (Vec::new(), Vec::new());
+        for name in &question.outputs {
+            let found = match question.sensor(name, description) {
+                Ok(Some((sensor, quantity, channel))) => {
+                    Ok((quantity, channel, Some(sensor.clone())))
+                }
+                Ok(None) => Quantity::variable(description, name, None).map(|q| (q, 0, None)),
+                Err(error) => Err(error),
+            };
+            match found {
+                Ok((quantity, channel, sensor)) => {
+                    let from = reads.len();
+                    reads.extend(references(&quantity.needs, &mut problems));
+                    outputs.push(Output { from, quantity, channel, sensor });
+                }
+                Err(error) => problems.push(format!("{error:#}")),
+            }
+        }
         for name in question.held.iter().filter(|name| !question.inputs.contains(name)) {
             problems.push(format!("{name} is held, but is not among the inputs"));
         }
@@ -125,6 +168,7 @@ impl Setup {
             held: question.inputs.iter().map(|name| question.held.contains(name)).collect(),
             inputs,
             outputs,
+            reads,
             tolerance: match question.solver {
                 Solver::Own => 0.0,
                 Solver::Host(tolerance) => tolerance,
@@ -197,14 +241,14 @@ impl Setup {
             let (values, slopes) = self.course(record, row);
             let jumps = row > 0 && self.jumps(record, row);
             run.drive(&self.inputs, &values, &slopes, jumps)?;
-            let mut at = vec![0.0; self.outputs.len()];
-            run.instance().get_real(&self.outputs, &mut at)?;
-            keep(&at, &mut read)?;
+            let mut at = vec![0.0; self.reads.len()];
+            run.instance().get_real(&self.reads, &mut at)?;
+            self.keep(&at, &mut read)?;
             if let Some(next) = record.time.get(row + 1) {
                 run.integrate(*next)?;
             }
         }
-        Ok(read)
+        self.late(record, read)
     }
 
     /// By the FMU's own solver: inputs are set at a row, with their slopes where the FMU takes them, the outputs are read and the
@@ -229,9 +273,9 @@ impl Setup {
             if let (true, Instance::V2(instance, _)) = (sloped, &mut *instance) {
                 instance.set_real_input_derivatives(&self.inputs, &orders, &slopes)?;
             }
-            let mut at = vec![0.0; self.outputs.len()];
-            instance.get_real(&self.outputs, &mut at)?;
-            keep(&at, &mut read)?;
+            let mut at = vec![0.0; self.reads.len()];
+            instance.get_real(&self.reads, &mut at)?;
+            self.keep(&at, &mut read)?;
             if let Some(next) = record.time.get(row + 1) {
                 let (t, h) = (record.time[row], next - record.time[row]);
                 match sloped {
@@ -239,6 +283,42 @@ impl Setup {
                     false => instance.do_step(t, h),
                 }
                 .with_context(|| format!("the run stopped at t = {t} s"))?;
+            }
+        }
+        self.late(record, read)
+    }
+
+    /// Adds a row of the outputs, from what was read.
+    fn keep(&self, at: &[f64], read: &mut [Vec<f64>]) -> Result<()> {
+        for (output, column) in self.outputs.iter().zip(read) {
+            let value = output.value(at);
+            ensure!(value.is_finite(), "an output is not finite");
+            column.push(value);
+        }
+        Ok(())
+    }
+
+    /// The readings of sensors that are late: at a row what was so that much earlier, at a row too; 0 where nothing has arrived yet.
+    fn late(&self, record: &Record, mut read: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>> {
+        for (number, (output, column)) in self.outputs.iter().zip(&mut read).enumerate() {
+            let Some(sensor) = output.sensor.as_ref().filter(|s| s.errors().delay > 0.0) else {
+                continue;
+            };
+            let (delay, truth) = (sensor.errors().delay, column.clone());
+            for (row, value) in column.iter_mut().enumerate() {
+                let then = record.time[row] - delay;
+                // a row within a billionth of the time
+                let slack = 1e-9 * (1.0 + record.time[row].abs());
+                let at = record.time.partition_point(|t| *t < then - slack);
+                let there = record.time[at] <= then + slack;
+                let measured = record.outputs.get(number).is_some_and(|y| !y[row].is_nan());
+                ensure!(
+                    there || !measured,
+                    "sensor {}: it has a reading at {} s, but no row is {delay} s earlier",
+                    sensor.name,
+                    record.time[row]
+                );
+                *value = if there { truth[at] } else { 0.0 };
             }
         }
         Ok(read)
@@ -262,10 +342,4 @@ impl Setup {
         let held = record.inputs.iter().zip(&self.held).filter(|(_, held)| **held);
         held.into_iter().any(|(signal, _)| signal[row] != signal[row - 1])
     }
-}
-
-fn keep(values: &[f64], read: &mut [Vec<f64>]) -> Result<()> {
-    ensure!(values.iter().all(|y| y.is_finite()), "an output is not finite");
-    read.iter_mut().zip(values).for_each(|(column, value)| column.push(*value));
-    Ok(())
 }

@@ -1,0 +1,397 @@
+//! Sensors in the record of a run: what they measure ([`quantity`]), and how wrong they are. A reading is
+//!
+//! ```text
+//! y = quantum · round((scale · x(t − delay) + bias + noise · n)/quantum),   n ~ N(0, 1) in every sample
+//! ```
+//!
+//! x is taken every 1/rate seconds, and a row has a reading where one arrives; where none does it has no value.
+
+pub mod quantity;
+
+use std::collections::BTreeMap;
+use std::str::FromStr;
+
+use analysis::random::Random;
+use anyhow::{Context, Error, Result, ensure};
+use host::description::{ModelDescription, did_you_mean};
+
+use self::quantity::{Quantity, Surface};
+use crate::profile::{Allowed, Parameter, Written, parameter};
+use crate::run;
+use signals::table::Table;
+
+/// A kind of sensor.
+#[derive(Debug)]
+pub struct Kind {
+    /// Its name.
+    pub name: &'static str,
+    /// What it measures, for people.
+    pub says: &'static str,
+    /// What can be chosen beside [`ERRORS`].
+    pub parameters: &'static [Parameter],
+    /// Unit of its readings; empty: that of the variable.
+    pub unit: &'static str,
+    /// It reads a variable, this one where none is named by `of`.
+    of: Option<Option<&'static str>>,
+}
+
+const ANGLE: Parameter = parameter(
+    "angle",
+    std::f64::consts::FRAC_PI_2,
+    "rad",
+    "angle from radial towards tangential",
+    Allowed::Any,
+);
+
+/// Every kind.
+pub const KINDS: &[Kind] = &[
+    Kind {
+        name: "gauge",
+        says: "wave at an angle on the wall of HubSlosh's tank, from radial outwards towards tangential, m",
+        parameters: &[ANGLE],
+        unit: "m",
+        of: None,
+    },
+    Kind {
+        name: "pressure",
+        says: "pressure on that wall at a height over the bottom, above that of the gas, Pa",
+        parameters: &[
+            ANGLE,
+            parameter("height", 0.0, "m", "height over the bottom", Allowed::NotNegative),
+        ],
+        unit: "Pa",
+        of: None,
+    },
+    Kind {
+        name: "camera",
+        says: "the surface in HubSlosh's tank: the plane that fits best and every mode, each as its height at the wall, m",
+        parameters: &[],
+        unit: "m",
+        of: None,
+    },
+    Kind {
+        name: "force",
+        says: "a force of the FMU, by of=NAME, N",
+        parameters: &[],
+        unit: "N",
+        of: Some(Some("F_tangential")),
+    },
+    Kind {
+        name: "accelerometer",
+        says: "specific force at a radius of HubSlosh's hub, on the tank's side, along an angle, m/s²",
+        parameters: &[
+            parameter("radius", 0.225, "m", "distance from the bearing axis", Allowed::Any),
+            ANGLE,
+        ],
+        unit: "m/s2",
+        of: None,
+    },
+    Kind {
+        name: "encoder",
+        says: "an angle of the FMU, by of=NAME, rad",
+        parameters: &[],
+        unit: "rad",
+        of: Some(Some("theta")),
+    },
+    Kind {
+        name: "variable",
+        says: "any Real of any FMU, by of=NAME",
+        parameters: &[],
+        unit: "",
+        of: Some(None),
+    },
+];
+
+/// Stands for the unit of a sensor's readings.
+const READING: &str = "its unit";
+
+/// How wrong any sensor can be.
+pub const ERRORS: [Parameter; 7] = [
+    parameter("rate", 0.0, "Hz", "samples a second; 0: one a row", Allowed::NotNegative),
+    parameter("noise", 0.0, READING, "standard deviation of a sample", Allowed::NotNegative),
+    parameter("bias", 0.0, READING, "reading at 0", Allowed::Any),
+    parameter("scale", 1.0, "", "reading over quantity", Allowed::NotZero),
+    parameter("quantum", 0.0, READING, "step of the readings; 0: none", Allowed::NotNegative),
+    parameter("delay", 0.0, "s", "time until a sample is read", Allowed::NotNegative),
+    parameter("seed", 1.0, "", "seed of the noise", Allowed::Whole(9e15)),
+];
+
+/// One sensor, as it was written: `NAME=KIND:key=value,…`.
+#[derive(Clone, Debug)]
+pub struct Sensor {
+    /// The column's name.
+    pub name: String,
+    /// As it was written.
+    pub text: String,
+    kind: &'static Kind,
+    of: Option<String>,
+    own: Vec<f64>,
+    errors: Errors,
+}
+
+/// Values of [`ERRORS`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Errors {
+    /// Samples a second; 0: one a row.
+    pub rate: f64,
+    /// Standard deviation of a sample, in the sensor's unit, as the next two.
+    pub noise: f64,
+    /// Reading at 0.
+    pub bias: f64,
+    /// Reading over quantity.
+    pub scale: f64,
+    /// Step of the readings; 0: none.
+    pub quantum: f64,
+    /// Time until a sample is read, s.
+    pub delay: f64,
+    /// Seed of the noise.
+    pub seed: u64,
+}
+
+impl FromStr for Sensor {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let allowed = "(allowed: NAME=KIND:key=value,…)";
+        let (name, rest) =
+            text.split_once('=').with_context(|| format!("sensor \"{text}\" {allowed}"))?;
+        Sensor::new(name.trim(), rest)
+    }
+}
+
+impl Sensor {
+    /// A sensor by the name of its column, from `KIND:key=value,…`.
+    ///
+    /// # Errors
+    /// All that is wrong with it.
+    pub fn new(name: &str, text: &str) -> Result<Self> {
+        let plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.';
+        ensure!(
+            name.chars().next().is_some_and(|c| c.is_ascii_alphabetic()) && name.chars().all(plain),
+            "sensor \"{name}\": a name has letters, digits, _ and . and begins with a letter"
+        );
+        let mut written = Written::read("sensor", text.trim())?;
+        let kind = KINDS.iter().find(|kind| kind.name == written.name()).with_context(|| {
+            let names = KINDS.iter().map(|kind| kind.name);
+            let all: Vec<_> = names.clone().collect();
+            let hint = did_you_mean(written.name(), names);
+            format!(
+                "sensor {name}: there is no kind \"{}\" (there are {}){hint}",
+                written.name(),
+                all.join(", ")
+            )
+        })?;
+        let of = written.take("of");
+        let of_kind = |parameter: &Parameter| match parameter.unit {
+            READING => Parameter { unit: kind.unit, ..*parameter },
+            _ => *parameter,
+        };
+        let parameters = kind.parameters.iter().chain(&ERRORS).map(of_kind);
+        let parameters: Vec<Parameter> = parameters.collect();
+        let (mut values, mut problems) = written.values(&parameters);
+        match (kind.of, &of) {
+            (None, Some(_)) => problems.push(format!("{} reads no variable by of=", kind.name)),
+            (Some(None), None) => problems.push("it expects of=NAME".into()),
+            _ => {}
+        }
+        ensure!(problems.is_empty(), "sensor {name}: {}", problems.join("; "));
+        let errors = values.split_off(kind.parameters.len());
+        let [rate, noise, bias, scale, quantum, delay, seed] = std::array::from_fn(|k| errors[k]);
+        let errors = Errors { rate, noise, bias, scale, quantum, delay, seed: seed as u64 };
+        Ok(Sensor { name: name.into(), text: text.trim().into(), kind, of, own: values, errors })
+    }
+
+    /// How wrong it is.
+    pub fn errors(&self) -> &Errors {
+        &self.errors
+    }
+
+    /// What it measures of an FMU with these settings.
+    ///
+    /// # Errors
+    /// If the FMU has no such quantity.
+    pub fn quantity(
+        &self,
+        description: &ModelDescription,
+        settings: &[(String, String)],
+    ) -> Result<Quantity> {
+        let parameters = run::parameters(description, settings, &[]);
+        let surface = Surface { description, parameters: &parameters };
+        let quantity = match (self.kind.name, self.kind.of) {
+            ("gauge", _) => Quantity::wave(&surface, self.own[0]),
+            ("pressure", _) => Quantity::pressure(&surface, self.own[0], self.own[1]),
+            ("camera", _) => Quantity::camera(&surface),
+            ("accelerometer", _) => Quantity::acceleration(description, self.own[0], self.own[1]),
+            (_, Some(default)) => {
+                let name = self.of.as_deref().or(default).unwrap_or_default();
+                let unit = Some(self.kind.unit).filter(|unit| !unit.is_empty());
+                Quantity::variable(description, name, unit)
+            }
+            (kind, None) => unreachable!("{kind} has no quantity"),
+        };
+        quantity.with_context(|| format!("sensor {} ({})", self.name, self.kind.name))
+    }
+
+    /// The column of a channel.
+    pub fn column(&self, channel: &str) -> String {
+        match channel {
+            "" => self.name.clone(),
+            channel => format!("{}.{channel}", self.name),
+        }
+    }
+
+    /// What it would read if it sampled in every row and had neither noise nor steps.
+    pub fn expected(&self, value: f64) -> f64 {
+        self.errors.scale * value + self.errors.bias
+    }
+
+    /// What it reads of one channel in the rows of a run; NaN where no reading arrives. `stream` tells the noise of channels and
+    /// runs apart.
+    fn readings(&self, truth: &[f64], every: usize, late: usize, stream: &str) -> Vec<f64> {
+        let Errors { noise, quantum, seed, .. } = self.errors;
+        let mut random = Random::new(seed, fnv(stream));
+        let mut readings = vec![f64::NAN; truth.len()];
+        for (k, value) in truth.iter().enumerate().step_by(every) {
+            let y = self.expected(*value) + noise * random.normal();
+            if let Some(reading) = readings.get_mut(k + late) {
+                // + 0.0: no −0 in a file
+                *reading = if quantum > 0.0 { quantum * (y / quantum).round() + 0.0 } else { y };
+            }
+        }
+        readings
+    }
+}
+
+/// Several sensors of one FMU, each with what it measures.
+#[derive(Debug, Default)]
+pub struct Sensors(Vec<(Sensor, Quantity)>);
+
+impl Sensors {
+    /// The sensors of a run with these settings, whose rows are `step` seconds apart.
+    ///
+    /// # Errors
+    /// All that is wrong with them.
+    pub fn new(
+        sensors: &[Sensor],
+        description: &ModelDescription,
+        settings: &[(String, String)],
+        step: f64,
+    ) -> Result<Self> {
+        let (mut problems, mut taken) = (Vec::new(), Vec::<String>::new());
+        let mut bound = Vec::new();
+        for sensor in sensors {
+            if description.variables.iter().any(|v| v.name == sensor.name) || sensor.name == "time"
+            {
+                problems.push(format!("sensor {}: a column has that name already", sensor.name));
+            } else if taken.contains(&sensor.name) {
+                problems.push(format!("sensor {}: there are two of that name", sensor.name));
+            }
+            taken.push(sensor.name.clone());
+            let rows = sensor.rows(step).map(|_| ());
+            match rows.and_then(|()| sensor.quantity(description, settings)) {
+                Ok(quantity) => bound.push((sensor.clone(), quantity)),
+                Err(error) => problems.push(format!("{error:#}")),
+            }
+        }
+        ensure!(problems.is_empty(), "{}", problems.join("; "));
+        Ok(Sensors(bound))
+    }
+
+    /// Variables that a run must record for them, each once.
+    pub fn needs(&self) -> Vec<&str> {
+        let mut needs: Vec<&str> = Vec::new();
+        for name in self.0.iter().flat_map(|(_, quantity)| &quantity.needs) {
+            if !needs.contains(&name.as_str()) {
+                needs.push(name);
+            }
+        }
+        needs
+    }
+
+    /// Their columns' names.
+    pub fn columns(&self) -> Vec<String> {
+        let one = |(sensor, quantity): &(Sensor, Quantity)| {
+            let names = quantity.channels.iter().map(|(channel, _)| sensor.column(channel));
+            names.collect::<Vec<_>>()
+        };
+        self.0.iter().flat_map(one).collect()
+    }
+
+    /// A run's table and their readings of it. `run` tells the noise of runs with one seed apart.
+    ///
+    /// # Errors
+    /// If the table lacks what they need.
+    pub fn read(&self, table: Table, run: &str, step: f64) -> Result<Table> {
+        let mut columns = Vec::new();
+        for (sensor, quantity) in &self.0 {
+            let [every, late] = sensor.rows(step)?;
+            let needs: Option<Vec<&[f64]>> =
+                quantity.needs.iter().map(|name| table.column(name)).collect();
+            let needs = needs.with_context(|| format!("sensor {}: not recorded", sensor.name))?;
+            let mut truth = vec![Vec::with_capacity(table.rows()); quantity.channels.len()];
+            for row in 0..table.rows() {
+                let read: Vec<f64> = needs.iter().map(|column| column[row]).collect();
+                let values = quantity.values(&read);
+                truth.iter_mut().zip(values).for_each(|(channel, value)| channel.push(value));
+            }
+            for ((channel, _), truth) in quantity.channels.iter().zip(truth) {
+                let column = sensor.column(channel);
+                let readings = sensor.readings(&truth, every, late, &format!("{run} {column}"));
+                columns.push((column, readings));
+            }
+        }
+        Ok(columns.into_iter().fold(table, |table, (name, column)| table.with_gaps(&name, column)))
+    }
+
+    /// The text of each by its name, for a file's metadata.
+    pub fn texts(&self) -> BTreeMap<&str, &str> {
+        self.0.iter().map(|(sensor, _)| (sensor.name.as_str(), sensor.text.as_str())).collect()
+    }
+}
+
+impl Sensor {
+    /// Rows from sample to sample, and from a sample to its reading.
+    fn rows(&self, step: f64) -> Result<[usize; 2]> {
+        let whole = |what: &str, seconds: f64| {
+            let rows = seconds / step;
+            ensure!(
+                (rows - rows.round()).abs() < 1e-6 * rows.max(1.0),
+                "sensor {}: {what} {seconds} s is no multiple of the step, {step} s",
+                self.name
+            );
+            Ok(rows.round() as usize)
+        };
+        let every = match self.errors.rate {
+            0.0 => 1,
+            rate => whole("1/rate =", 1.0 / rate)?,
+        };
+        ensure!(every > 0, "sensor {}: its rate is above one sample a row", self.name);
+        Ok([every, whole("delay =", self.errors.delay)?])
+    }
+}
+
+/// Every kind with its defaults and what it is, for `--help`.
+pub fn help() -> String {
+    let written = |parameters: &[Parameter]| {
+        let pairs = parameters.iter().map(|p| match p.unit {
+            "rad" => format!("{}={}deg", p.name, p.default.to_degrees()),
+            _ => format!("{}={}", p.name, p.default),
+        });
+        pairs.collect::<Vec<_>>().join(",")
+    };
+    let kinds = KINDS.iter().map(|kind| {
+        let own = written(kind.parameters);
+        let of = kind.of.map(|default| format!("of={}", default.unwrap_or("NAME")));
+        let all: Vec<String> = of.into_iter().chain([own]).filter(|t| !t.is_empty()).collect();
+        let colon = if all.is_empty() { "" } else { ":" };
+        format!("  {}{colon}{}\n      {}\n", kind.name, all.join(","), kind.says)
+    });
+    let errors = format!("  each: {}\n", written(&ERRORS));
+    kinds.chain([errors]).collect()
+}
+
+/// A number for a text, the same on every machine (FNV-1a).
+fn fnv(text: &str) -> u64 {
+    let step = |hash: u64, byte: u8| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+    text.bytes().fold(0xcbf2_9ce4_8422_2325, step)
+}

@@ -1,0 +1,280 @@
+//! What sensors measure, from variables of the FMU.
+//!
+//! The surface in an upright cylinder of radius R = d/2, filled to h, is a sum of modes (NASA SP-106, chapter 2; Dodge 2000). At the
+//! angle φ on the wall, from radial outwards towards tangential, with α_n the slosh angle of mode n in that direction:
+//!
+//! ```text
+//! wave       η(φ) = Σ b_n α_n                        b_n = 2 R/(ξ_n² − 1)
+//! plane that fits the surface best, at the wall:     Σ 4 b_n α_n/ξ_n²
+//! pressure   p(φ, z) = ρ g (h − z) + ρ Σ b_n (g α_n + a) cosh(ξ_n z/R)/cosh(ξ_n h/R) − ρ a R
+//! ```
+//!
+//! p is the pressure above that of the gas at the height z over the bottom, a the acceleration of the tank in the direction φ, less
+//! that of gravity. Where p comes from: in the frame of the tank Φ_t + g η + a r cos φ = 0 at the surface, and
+//! p = ρ g (h − z) − ρ Φ_t − ρ a R at the wall; each mode of Φ falls with depth as its cosh. A mode that is not kept follows at
+//! once, g α_n + a = 0, and adds nothing. Over the wall p adds up to the force of the pendulums and of the liquid that moves with the
+//! tank, Σ m_n g α_n − m_0 a (`tests/all/sensors.rs`). The plane is the least-squares fit over the disc: ∫ J_1(ξ r/R) r² dr = R³ J_1(ξ)/ξ².
+
+use std::collections::BTreeMap;
+
+use anyhow::{Context, Result, bail, ensure};
+use formulas::cylinder::{MODES, XI};
+use host::description::{ModelDescription, Type};
+
+/// What one sensor measures.
+#[derive(Clone, Debug)]
+pub struct Quantity {
+    /// Variables of the FMU that it follows from, all Real.
+    pub needs: Vec<String>,
+    /// What it shows: the ending of the column's name, and the unit.
+    pub channels: Vec<(String, String)>,
+    rule: Rule,
+}
+
+#[derive(Clone, Debug)]
+enum Rule {
+    Itself,
+    Wave { modes: Modes, angle: f64 },
+    Pressure { modes: Modes, angle: f64, height: f64 },
+    Camera { modes: Modes },
+    Acceleration { radius: f64, angle: f64 },
+}
+
+/// How a model's coordinate of a mode makes an angle.
+#[derive(Clone, Copy, Debug)]
+enum Coordinate {
+    /// It is the angle.
+    Angle,
+    /// The tangent of half the angle from the vertical, times the direction.
+    Stereographic,
+    /// The displacement, m.
+    Displacement,
+}
+
+/// The modes whose coordinates are the first things needed: of each radial, tangential and length; then the tank's diameter.
+#[derive(Clone, Debug)]
+struct Modes {
+    count: usize,
+    coordinate: Coordinate,
+}
+
+/// What moves the tank, as [`MOTION`] names it.
+const MOTION: [&str; 7] =
+    ["theta", "omega", "omega_dot", "tank.r", "g_axial", "bench.tilt", "bench.tilt_azimuth"];
+
+impl Quantity {
+    /// A Real of the FMU; `unit`: the one that it must have.
+    ///
+    /// # Errors
+    /// If there is no such variable, or none of that unit.
+    pub fn variable(
+        description: &ModelDescription,
+        name: &str,
+        unit: Option<&str>,
+    ) -> Result<Self> {
+        let variable = description.variable(name)?;
+        ensure!(variable.kind() == Type::Real, "{name} is no Real");
+        let own = description.unit(variable);
+        ensure!(
+            unit.is_none_or(|unit| unit == own),
+            "{name} has the unit {own} (allowed: {})",
+            unit.unwrap_or_default()
+        );
+        let channels = vec![(String::new(), own.to_string())];
+        Ok(Quantity { needs: vec![name.into()], channels, rule: Rule::Itself })
+    }
+
+    /// The wave at an angle on the wall (rad), m.
+    ///
+    /// # Errors
+    /// If the FMU is not HubSlosh with an upright cylinder whose liquid moves.
+    pub fn wave(surface: &Surface, angle: f64) -> Result<Self> {
+        let (needs, modes) = surface.modes()?;
+        Ok(Quantity { needs, channels: one("m"), rule: Rule::Wave { modes, angle } })
+    }
+
+    /// The pressure at an angle on the wall (rad) and a height over the bottom (m), Pa.
+    ///
+    /// # Errors
+    /// As [`Quantity::wave`]; if the height is that of no liquid at rest.
+    pub fn pressure(surface: &Surface, angle: f64, height: f64) -> Result<Self> {
+        let (mut needs, modes) = surface.modes()?;
+        let h = surface.number("tank.h")?;
+        ensure!(height <= h, "height {height} m is above the liquid at rest, tank.h = {h} m");
+        needs.extend(["tank.h", "fluid.rho"].into_iter().chain(MOTION).map(String::from));
+        Ok(Quantity { needs, channels: one("Pa"), rule: Rule::Pressure { modes, angle, height } })
+    }
+
+    /// The surface as a camera sees it: the plane that fits best, and every mode, at the wall, m.
+    ///
+    /// # Errors
+    /// As [`Quantity::wave`].
+    pub fn camera(surface: &Surface) -> Result<Self> {
+        let (needs, modes) = surface.modes()?;
+        let plane = ["plane_radial".to_string(), "plane_tangential".into()];
+        let each = (1..=modes.count)
+            .flat_map(|n| [format!("mode_radial[{n}]"), format!("mode_tangential[{n}]")]);
+        let channels = plane.into_iter().chain(each).map(|name| (name, "m".into())).collect();
+        Ok(Quantity { needs, channels, rule: Rule::Camera { modes } })
+    }
+
+    /// The specific force of a point of the hub along an angle (rad), from radial outwards towards tangential, m/s².
+    ///
+    /// # Errors
+    /// If the FMU is not HubSlosh.
+    pub fn acceleration(description: &ModelDescription, radius: f64, angle: f64) -> Result<Self> {
+        let needs: Vec<String> = MOTION.map(String::from).into();
+        present(description, &needs)?;
+        Ok(Quantity { needs, channels: one("m/s2"), rule: Rule::Acceleration { radius, angle } })
+    }
+
+    /// What it is, channel by channel, where the variables that it needs have these values, in their order.
+    pub fn values(&self, read: &[f64]) -> Vec<f64> {
+        match &self.rule {
+            Rule::Itself => vec![read[0]],
+            Rule::Wave { modes, angle } => {
+                let angles = modes.angles(read);
+                let radius = modes.radius(read);
+                let wave = |(n, a): (usize, &[f64; 2])| wall(n, radius) * along(*a, *angle);
+                vec![angles.iter().enumerate().map(wave).sum()]
+            }
+            Rule::Pressure { modes, angle, height } => {
+                let (angles, radius) = (modes.angles(read), modes.radius(read));
+                let rest = &read[modes.reads()..];
+                let (h, rho) = (rest[0], rest[1]);
+                let motion = &rest[2..];
+                let (g, a) = (motion[4], along(acceleration(motion, motion[3]), *angle));
+                let modal = |(n, angles): (usize, &[f64; 2])| {
+                    let k = XI[n] / radius;
+                    // cosh kz / cosh kh without overflow
+                    let falls = (k * (height - h)).exp() * (1.0 + (-2.0 * k * height).exp())
+                        / (1.0 + (-2.0 * k * h).exp());
+                    wall(n, radius) * (g * along(*angles, *angle) + a) * falls
+                };
+                let modal: f64 = angles.iter().enumerate().map(modal).sum();
+                vec![rho * (g * (h - height) + modal - a * radius)]
+            }
+            Rule::Camera { modes } => {
+                let (angles, radius) = (modes.angles(read), modes.radius(read));
+                let each = angles.iter().enumerate();
+                let each: Vec<[f64; 2]> =
+                    each.map(|(n, a)| a.map(|a| wall(n, radius) * a)).collect();
+                let plane = |k: usize| -> f64 {
+                    each.iter().enumerate().map(|(n, a)| 4.0 * a[k] / (XI[n] * XI[n])).sum()
+                };
+                [plane(0), plane(1)].into_iter().chain(each.iter().flatten().copied()).collect()
+            }
+            Rule::Acceleration { radius, angle } => {
+                vec![along(acceleration(read, *radius), *angle)]
+            }
+        }
+    }
+}
+
+/// Elevation at the wall per slosh angle of mode n from 0, m.
+fn wall(n: usize, radius: f64) -> f64 {
+    2.0 * radius / (XI[n] * XI[n] - 1.0)
+}
+
+fn along([radial, tangential]: [f64; 2], angle: f64) -> f64 {
+    radial * angle.cos() + tangential * angle.sin()
+}
+
+/// Radial and tangential acceleration of a point of the hub on the tank's side, less that of gravity; [`MOTION`] is given.
+fn acceleration(motion: &[f64], radius: f64) -> [f64; 2] {
+    let [theta, omega, omega_dot, _, g, tilt, azimuth] = std::array::from_fn(|k| motion[k]);
+    let (across, from_low) = (g * f64::tan(tilt), theta - azimuth);
+    [
+        -radius * omega * omega - across * f64::cos(from_low),
+        radius * omega_dot + across * f64::sin(from_low),
+    ]
+}
+
+fn one(unit: &str) -> Vec<(String, String)> {
+    vec![(String::new(), unit.into())]
+}
+
+impl Modes {
+    /// How many of the values that are read are theirs.
+    fn reads(&self) -> usize {
+        3 * self.count + 1
+    }
+
+    fn radius(&self, read: &[f64]) -> f64 {
+        0.5 * read[3 * self.count]
+    }
+
+    /// Slosh angles, radial and tangential, rad.
+    fn angles(&self, read: &[f64]) -> Vec<[f64; 2]> {
+        let angle = |mode: &[f64]| {
+            let q = [mode[0], mode[1]];
+            match self.coordinate {
+                Coordinate::Angle => q,
+                Coordinate::Stereographic => {
+                    let k = 2.0 / (1.0 + q[0] * q[0] + q[1] * q[1]);
+                    q.map(|q| (k * q).clamp(-1.0, 1.0).asin())
+                }
+                Coordinate::Displacement => q.map(|q| (q / mode[2]).clamp(-1.0, 1.0).asin()),
+            }
+        };
+        read[..3 * self.count].chunks_exact(3).map(angle).collect()
+    }
+}
+
+/// What is known of a HubSlosh before it runs: its start values, as text.
+pub struct Surface<'a> {
+    /// The FMU.
+    pub description: &'a ModelDescription,
+    /// Parameters by name.
+    pub parameters: &'a BTreeMap<String, String>,
+}
+
+impl Surface<'_> {
+    fn text(&self, name: &str) -> Result<&str> {
+        let found = self.parameters.get(name).map(String::as_str);
+        found.with_context(|| format!("the FMU has no {name}: only HubSlosh has such a surface"))
+    }
+
+    fn number(&self, name: &str) -> Result<f64> {
+        Ok(self.text(name)?.parse()?)
+    }
+
+    /// An enumeration by name, or by the number that hosts set that cannot set enumerations.
+    fn choice(&self, name: &str, kind: &str) -> Result<String> {
+        let number: i64 = self.text(kind)?.parse()?;
+        let items = self.description.items(self.description.variable(name)?);
+        let item = items.iter().find(|item| item.value == number);
+        Ok(item.map_or(self.text(name)?.to_string(), |item| item.name.clone()))
+    }
+
+    fn modes(&self) -> Result<(Vec<String>, Modes)> {
+        let source = self.choice("slosh.source", "slosh.source_kind")?;
+        ensure!(
+            source == "geometry",
+            "it is known of an upright cylinder alone (slosh.source = geometry), not of a {source}"
+        );
+        let coordinate = match self.choice("slosh.model", "slosh.kind")?.as_str() {
+            "linear" | "planar" => Coordinate::Angle,
+            "spherical" => Coordinate::Stereographic,
+            "paraboloid" | "liquid" => Coordinate::Displacement,
+            other => bail!("slosh.model = {other} has no surface that moves"),
+        };
+        let count = (self.number("slosh.modes")? as usize).clamp(1, MODES);
+        let mut needs = Vec::new();
+        for n in 1..=count {
+            let names = ["slosh.q_radial", "slosh.q_tangential", "slosh.length"];
+            needs.extend(names.map(|name| format!("{name}[{n}]")));
+        }
+        needs.push("tank.d".into());
+        present(self.description, &needs)?;
+        Ok((needs, Modes { count, coordinate }))
+    }
+}
+
+/// Fails if the FMU is not one that has all of these.
+fn present(description: &ModelDescription, names: &[String]) -> Result<()> {
+    for name in names {
+        description.variable(name).with_context(|| format!("it needs {name} of HubSlosh"))?;
+    }
+    Ok(())
+}
