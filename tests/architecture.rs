@@ -134,8 +134,8 @@ fn collect(root: &Path, folder: &Path, found: &mut BTreeSet<String>) {
     }
 }
 
-/// The crates whose modules use each other one way, with the modules that may go round in a circle.
-const ONE_WAY: [(&str, &[&str]); 20] = [
+/// The crates whose modules use each other one way, in each folder, with the modules that may go round in a circle.
+const ONE_WAY: [(&str, &[&str]); 21] = [
     ("fmu/plant", &[]),
     ("fmu/craft", &[]),
     ("fmu/formulas", &[]),
@@ -158,62 +158,181 @@ const ONE_WAY: [(&str, &[&str]); 20] = [
     ("harness/identify", &[]),
     ("harness/tank", &[]),
     ("harness/cli", &[]),
+    ("harness/batch", &[]),
 ];
 
-/// The modules of a crate (a folder is one), each with those that it names as `crate::module`; tests
-/// within the files are left out.
-fn modules(krate: &Path) -> BTreeMap<String, BTreeSet<String>> {
-    fn read(path: &Path, text: &mut String) {
-        if path.is_dir() {
-            for entry in fs::read_dir(path).expect("a folder of modules").flatten() {
-                read(&entry.path(), text);
-            }
-        } else if path.extension().is_some_and(|e| e == "rs") {
-            let file = fs::read_to_string(path).expect("a source file");
-            let code = file.split("#[cfg(test)]").next().unwrap_or_default();
-            text.extend(code.lines().filter(|line| !line.trim_start().starts_with("//")));
-        }
-    }
-    let mut all: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-    for entry in fs::read_dir(krate.join("src")).expect("a crate's src").flatten() {
-        let (path, mut text) = (entry.path(), String::new());
+/// A module by its path within the crate: `["methods", "page"]`; the crate's root is `[]`.
+type Module = Vec<String>;
+
+/// The modules of a crate with their code, tests within the files and comments left out.
+fn sources(folder: &Path, module: &[String], all: &mut BTreeMap<Module, String>) {
+    for entry in fs::read_dir(folder).expect("a folder of modules").flatten() {
+        let path = entry.path();
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        if !matches!(name.as_str(), "lib" | "main") {
-            read(&path, &mut text);
-            // `crate::name…` and `crate::{one, other::…}`
-            let names = text.split("crate::").skip(1).flat_map(|rest| {
-                let (list, count) = match rest.strip_prefix('{') {
-                    Some(list) => (list.split('}').next().unwrap_or_default(), usize::MAX),
-                    None => (rest, 1),
-                };
-                list.split(|c: char| !c.is_alphanumeric() && c != '_').take(count)
-            });
-            all.insert(name, names.map(String::from).collect());
+        let mut inner = module.to_vec();
+        if path.is_dir() {
+            inner.push(name);
+            sources(&path, &inner, all);
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            if !matches!(name.as_str(), "lib" | "main" | "mod") {
+                inner.push(name);
+            }
+            let file = fs::read_to_string(&path).expect("a source file");
+            let code = file.split("#[cfg(test)]").next().unwrap_or_default();
+            let lines = code.lines().filter(|line| !line.trim_start().starts_with("//"));
+            all.entry(inner).or_default().extend(lines.flat_map(|line| [line, "\n"]));
         }
     }
-    let known: BTreeSet<String> = all.keys().cloned().collect();
-    for (name, used) in &mut all {
-        used.retain(|other| known.contains(other) && other != name);
+}
+
+/// Words, `::` and other signs of a source, without white space.
+fn tokens(code: &str) -> Vec<&str> {
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let (mut found, mut rest) = (Vec::new(), code.trim_start());
+    while let Some(first) = rest.chars().next() {
+        let length = match first {
+            _ if is_word(first) => rest.find(|c| !is_word(c)).unwrap_or(rest.len()),
+            _ if rest.starts_with("::") => 2,
+            _ => first.len_utf8(),
+        };
+        let (token, after) = rest.split_at(length);
+        found.push(token);
+        rest = after.trim_start();
+    }
+    found
+}
+
+/// Every path of the tree that begins at `tokens[0]`: `a::{b, c::d as e}` has `a::b` and `a::c::d`. Returns how
+/// many tokens it takes.
+fn paths(tokens: &[&str], base: &Module, found: &mut Vec<Module>) -> usize {
+    let mut taken = 1;
+    match tokens.first() {
+        Some(&"{") => {
+            while tokens.get(taken).is_some_and(|token| *token != "}") {
+                taken += match tokens[taken] {
+                    "," => 1,
+                    "as" => 2,
+                    _ => paths(&tokens[taken..], base, found),
+                };
+            }
+            taken + 1
+        }
+        Some(name) => {
+            let path: Module = base.iter().cloned().chain([name.to_string()]).collect();
+            match tokens.get(1) {
+                Some(&"::") => 2 + paths(&tokens[2..], &path, found),
+                _ => {
+                    found.push(path);
+                    1
+                }
+            }
+        }
+        None => 0,
+    }
+}
+
+/// What a module names by `crate::`, `self::` and `super::`, as paths from the crate's root.
+fn named(module: &Module, code: &str) -> Vec<Module> {
+    let (tokens, mut found) = (tokens(code), Vec::new());
+    for at in 0..tokens.len() {
+        let mut base = match tokens[at] {
+            "crate" => Module::new(),
+            "self" => module.clone(),
+            "super" => module[..module.len().saturating_sub(1)].to_vec(),
+            _ => continue,
+        };
+        if at > 0 && tokens[at - 1] == "::" || tokens.get(at + 1) != Some(&"::") {
+            continue;
+        }
+        let mut rest = &tokens[at + 2..];
+        while let ["super", "::", after @ ..] = rest {
+            base.pop();
+            rest = after;
+        }
+        paths(rest, &base, &mut found);
+    }
+    found
+}
+
+/// Of each folder of a crate its modules (a folder is one), each with those beside it that it names. What stands
+/// in the folder itself (`mod.rs`, `lib.rs`) is of the folder: who names it names no module beside.
+fn modules(
+    sources: &BTreeMap<Module, String>,
+) -> BTreeMap<Module, BTreeMap<String, BTreeSet<String>>> {
+    let mut all: BTreeMap<Module, BTreeMap<String, BTreeSet<String>>> = BTreeMap::new();
+    for (module, code) in sources {
+        for path in named(module, code) {
+            let common = module.iter().zip(&path).take_while(|(a, b)| a == b).count();
+            let (folder, own, other) = (&path[..common], module.get(common), path.get(common));
+            let is_module = |name: &&String| {
+                sources.keys().any(|m| m.starts_with(folder) && m.get(common) == Some(name))
+            };
+            if let (Some(own), Some(other)) = (own, other.filter(is_module)) {
+                let beside = all.entry(folder.to_vec()).or_default();
+                beside.entry(own.clone()).or_default().insert(other.clone());
+                beside.entry(other.clone()).or_default();
+            }
+        }
     }
     all
+}
+
+/// What is in a circle or above one.
+fn circles(mut left: BTreeMap<String, BTreeSet<String>>) -> BTreeMap<String, BTreeSet<String>> {
+    // What uses nothing that is left is no part of a circle.
+    while let Some(leaf) =
+        left.iter().find(|(_, used)| used.is_empty()).map(|(name, _)| name.clone())
+    {
+        left.remove(&leaf);
+        left.values_mut().for_each(|used| {
+            used.remove(&leaf);
+        });
+    }
+    left
 }
 
 #[test]
 fn modules_of_a_crate_use_each_other_one_way() {
     for (krate, may_circle) in ONE_WAY {
-        let mut left = modules(&pack::root().join(krate));
-        for used in left.values_mut() {
-            used.retain(|other| !may_circle.contains(&other.as_str()));
+        let mut all = BTreeMap::new();
+        sources(&pack::root().join(krate).join("src"), &[], &mut all);
+        for (folder, mut beside) in modules(&all) {
+            for used in beside.values_mut() {
+                used.retain(|other| !folder.is_empty() || !may_circle.contains(&other.as_str()));
+            }
+            let left = circles(beside);
+            let folder = folder.join("/");
+            assert!(left.is_empty(), "{krate}/src/{folder}: in a circle or above one: {left:?}");
         }
-        // What uses nothing that is left is no part of a circle.
-        while let Some(leaf) =
-            left.iter().find(|(_, used)| used.is_empty()).map(|(name, _)| name.clone())
-        {
-            left.remove(&leaf);
-            left.values_mut().for_each(|used| {
-                used.remove(&leaf);
-            });
-        }
-        assert!(left.is_empty(), "{krate}: in a circle or above one: {left:?}");
     }
+}
+
+#[test]
+fn a_circle_is_seen_however_its_modules_name_each_other() {
+    let crate_of = |files: &[(&str, &str)]| -> BTreeMap<Module, String> {
+        let module =
+            |path: &str| path.split('/').filter(|s| !s.is_empty()).map(String::from).collect();
+        files.iter().map(|(path, code)| (module(path), code.to_string())).collect()
+    };
+    let by_ways = [
+        "use crate::one::first::A;",
+        "use super::first::A;",
+        "use super::{Kept, first::{self, A as B}};",
+        "use crate::{two, one::{Kept, first}};",
+        "fn f() { super::super::one::first::g() }",
+        "html! { p { (super::first::text()) } }",
+    ];
+    for way in by_ways {
+        let files = [
+            ("one", "mod first; mod second; use self::first::A;"),
+            ("one/first", "use super::second::C;"),
+            ("one/second", way),
+            ("two", ""),
+        ];
+        let found = modules(&crate_of(&files)).remove(&vec!["one".into()]).unwrap_or_default();
+        assert_eq!(circles(found).len(), 2, "{way}");
+    }
+    // one way, and by way of the folder
+    let files = [("one/first", "use super::second::C;"), ("one/second", "use super::Kept;")];
+    assert!(modules(&crate_of(&files)).into_values().all(|beside| circles(beside).is_empty()));
 }

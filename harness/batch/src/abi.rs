@@ -9,7 +9,8 @@ use std::ffi::{c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use crate::feedback::{Closed, Controller, Feedback, Linear, Open};
-use crate::run::{self, Inputs, Instance, Outputs, Run, Stop};
+use crate::instance::Instance;
+use crate::run::{self, Inputs, Outputs, Run, Stop};
 
 type Set<T> = unsafe extern "C" fn(*mut c_void, *const u32, usize, *const T) -> c_int;
 type Get<T> = unsafe extern "C" fn(*mut c_void, *const u32, usize, *mut T) -> c_int;

@@ -2,7 +2,7 @@
 
 use std::ffi::c_int;
 
-use crate::run::{Function, Instance, OK, WARNING};
+use crate::instance::{Function, Instance, OK, WARNING};
 
 /// What computes the commands of a cycle.
 pub trait Controller {

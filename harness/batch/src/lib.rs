@@ -9,4 +9,5 @@
 
 pub mod abi;
 pub mod feedback;
+pub mod instance;
 pub mod run;

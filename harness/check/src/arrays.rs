@@ -5,7 +5,6 @@ use anyhow::Result;
 
 use super::Findings;
 use super::description::Variable;
-use super::exchange::states;
 use super::under_test::{FmuUnderTest, Interface, Reading, Session};
 use host::description::Type;
 use host::fmi2::guarded::Lists;
@@ -40,7 +39,7 @@ fn lists(session: &mut Session) -> Result<Lists> {
         lists.unknowns = unknowns.collect();
         lists.knowns = lists.inputs.iter().map(|(reference, _)| *reference).collect();
         if interface == Interface::ModelExchange {
-            for (derivative, state) in states(fmu) {
+            for (derivative, state) in fmu.states() {
                 lists.unknowns.push(derivative.reference);
                 lists.knowns.push(state.reference);
             }
@@ -59,7 +58,7 @@ fn lists(session: &mut Session) -> Result<Lists> {
             }
         }
         Interface::ModelExchange => {
-            lists.states = Some(states(fmu).len());
+            lists.states = Some(fmu.states().len());
             lists.indicators = Some(session.indicators());
         }
     }

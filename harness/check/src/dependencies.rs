@@ -9,7 +9,6 @@ use anyhow::Result;
 
 use super::Findings;
 use super::description::{Unknown, Variable};
-use super::exchange::states;
 use super::life::first;
 use super::under_test::{FmuUnderTest, Interface, Reading, Session, start_value};
 use super::values::items;
@@ -218,7 +217,7 @@ fn watch(
     let exchange = fmu.interfaces().contains(&Interface::ModelExchange);
     let interface = if exchange { Interface::ModelExchange } else { first(fmu)? };
     let inputs: Vec<_> = fmu.variables().iter().filter(|v| v.causality == "input").collect();
-    let states = states(fmu);
+    let states = fmu.states();
     let mut seen = Seen::nothing();
     for attempt in 0..TRIES {
         let mut session = moved(fmu, interface, attempt)?;
@@ -333,7 +332,7 @@ pub fn directional(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
         .filter(|v| v.is_continuous())
         .collect();
     let references: Vec<u32> = unknowns.iter().map(|v| v.reference).collect();
-    let states = states(fmu);
+    let states = fmu.states();
     let inputs: Vec<_> =
         fmu.variables().iter().filter(|v| v.causality == "input" && v.is_continuous()).collect();
     let mut session = fmu.running(Interface::ModelExchange)?;

@@ -12,72 +12,15 @@ use anyhow::Result;
 use super::Findings;
 use super::dependencies::moved;
 use super::description::Variable;
-use super::exchange::{continuous, states};
-use super::under_test::{FmuUnderTest, Interface, Reading, STEPS, Session};
+use super::exchange::continuous;
+use super::under_test::{FmuUnderTest, Interface, STEPS, Session, Sight};
 
 /// Starts from which runs are made: the first as declared, then with other parameters.
 const STARTS: u64 = 12;
 /// A share of a value below which a change is rounding.
 const ROUNDING: f64 = 1e-9;
-/// A share of a derivative below which its change is what an iteration leaves in it.
-const ITERATED: f64 = 1e-2;
 /// An event in time that is nearer than this share of a step may be due.
 const NEARLY_DUE: f64 = 1e-6;
-
-/// What an event may change.
-pub struct Sight {
-    states: Vec<f64>,
-    derivatives: Vec<f64>,
-    discrete: Vec<Reading>,
-}
-
-fn discrete(fmu: &FmuUnderTest) -> impl Iterator<Item = &Variable> {
-    let computed = |v: &&Variable| matches!(v.causality.as_str(), "output" | "local");
-    fmu.variables().iter().filter(computed).filter(|v| v.variability == "discrete")
-}
-
-impl Sight {
-    /// What is to be seen now.
-    pub fn of(session: &mut Session) -> Result<Sight> {
-        let n = session.states();
-        let (mut states, mut derivatives) = (vec![0.0; n], vec![0.0; n]);
-        if n > 0 {
-            session.instance.continuous_states(&mut states)?;
-            session.instance.derivatives(&mut derivatives)?;
-        }
-        let discrete = discrete(session.fmu).map(|v| session.read(v)).collect::<Result<_>>()?;
-        Ok(Sight { states, derivatives, discrete })
-    }
-
-    /// The first thing that is another one afterwards: its name, and both values.
-    pub fn change<'f>(&self, after: &Sight, fmu: &'f FmuUnderTest) -> Option<(&'f str, String)> {
-        let jumps = |a: f64, b: f64, share: f64, size: f64| {
-            (a - b).abs() > share * a.abs().max(b.abs()).max(size)
-        };
-        for (v, (a, b)) in discrete(fmu).zip(self.discrete.iter().zip(&after.discrete)) {
-            let same = match (a, b) {
-                (Reading::Real(a), Reading::Real(b)) => {
-                    !jumps(*a, *b, ROUNDING, 1e-3 * v.nominal())
-                }
-                (a, b) => a.is(b),
-            };
-            if !same {
-                return Some((&v.name, format!("{a} to {b}")));
-            }
-        }
-        for (n, (derivative, state)) in states(fmu).into_iter().enumerate() {
-            let (a, b) = (self.states[n], after.states[n]);
-            if jumps(a, b, ROUNDING, 1e-3 * state.nominal()) {
-                return Some((&state.name, format!("{a:?} to {b:?}")));
-            }
-            let (a, b) = (self.derivatives[n], after.derivatives[n]);
-            if jumps(a, b, ITERATED, 1e-3 * derivative.nominal()) {
-                return Some((&derivative.name, format!("{a:?} to {b:?}")));
-            }
-        }
-        None
-    }
-}
 
 /// `exchange.events`
 pub fn told(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
@@ -167,7 +110,7 @@ pub fn values_changed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
     if continuous(fmu, findings)?.is_none() {
         return Ok(());
     }
-    if states(fmu).is_empty() {
+    if fmu.states().is_empty() {
         findings.skip("it has no continuous states");
         return Ok(());
     }
@@ -185,7 +128,7 @@ pub fn values_changed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
                     "{} goes from {before:?} to {after:?}, and valuesOfContinuousStatesChanged of \
                      fmi2NewDiscreteStates is false (allowed: true, or the host goes on from its own \
                      states)",
-                    states(fmu)[n].1.name
+                    fmu.states()[n].1.name
                 ),
             );
             return Ok(());
@@ -197,7 +140,7 @@ pub fn values_changed(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()>
 /// `exchange.nominals`
 pub fn nominals(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let Some(mut session) = continuous(fmu, findings)? else { return Ok(()) };
-    let states = states(fmu);
+    let states = fmu.states();
     let declared = |v: &Variable| v.typed.number("nominal").is_some();
     if !states.iter().any(|(_, state)| declared(state)) {
         findings.skip("no continuous state has a nominal");

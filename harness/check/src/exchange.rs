@@ -3,7 +3,6 @@
 use anyhow::Result;
 
 use super::Findings;
-use super::description::Variable;
 use super::life::expect_refusal;
 use super::under_test::{FmuUnderTest, Interface, Reading, STEPS, Session};
 
@@ -17,16 +16,6 @@ pub fn continuous<'f>(
         return Ok(None);
     }
     fmu.running(Interface::ModelExchange).map(Some)
-}
-
-/// Each derivative with its state, in the order of ModelStructure: that of all state vectors.
-pub fn states(fmu: &FmuUnderTest) -> Vec<(&Variable, &Variable)> {
-    let d = fmu.description();
-    let pair = |index| {
-        let derivative: &Variable = d.at(index)?;
-        Some((derivative, d.at(derivative.derivative_of()?)?))
-    };
-    d.derivatives.iter().filter_map(|unknown| pair(unknown.index)).collect()
 }
 
 /// `exchange.run`
@@ -78,7 +67,7 @@ pub fn terminate_simulation(fmu: &FmuUnderTest, findings: &mut Findings) -> Resu
 /// `exchange.vectors`
 pub fn vectors(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let Some(mut session) = continuous(fmu, findings)? else { return Ok(()) };
-    let (nx, ni) = (states(fmu).len(), session.indicators());
+    let (nx, ni) = (fmu.states().len(), session.indicators());
     for moved in [false, true] {
         if moved {
             session.advance(3)?;
@@ -118,7 +107,7 @@ pub fn vectors(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 /// `exchange.lengths`
 pub fn lengths(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let Some(mut session) = continuous(fmu, findings)? else { return Ok(()) };
-    let (nx, ni) = (states(fmu).len(), session.indicators());
+    let (nx, ni) = (fmu.states().len(), session.indicators());
     let place = |call: &str, n: usize, right: usize| {
         let place = format!("{call} with room for {n} numbers instead of {right}");
         fmu.doing(&place);
@@ -140,7 +129,7 @@ pub fn lengths(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
 /// `exchange.variables`
 pub fn variables(fmu: &FmuUnderTest, findings: &mut Findings) -> Result<()> {
     let Some(mut session) = continuous(fmu, findings)? else { return Ok(()) };
-    let states = states(fmu);
+    let states = fmu.states();
     if states.is_empty() {
         findings.skip("it has no continuous states");
         return Ok(());

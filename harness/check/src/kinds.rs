@@ -12,7 +12,6 @@ use anyhow::Result;
 use super::Findings;
 use super::dependencies::moved;
 use super::description::{Unknown, Variable};
-use super::exchange::states;
 use super::life::first;
 use super::under_test::{FmuUnderTest, Interface, Reading, Session};
 
@@ -75,7 +74,7 @@ impl Factor {
 fn put(session: &mut Session, known: &Variable, x: f64) -> Result<bool> {
     let fmu = session.fmu;
     if session.interface == Interface::ModelExchange
-        && let Some(n) = states(fmu).iter().position(|(_, state)| state.index == known.index)
+        && let Some(n) = fmu.states().iter().position(|(_, state)| state.index == known.index)
     {
         let mut all = vec![0.0; session.states()];
         session.instance.continuous_states(&mut all)?;
@@ -132,7 +131,7 @@ fn at_points(
         }
         if point > 0 && exchange && !initializing {
             // other states, between the same events
-            let states = states(fmu);
+            let states = fmu.states();
             let mut x = vec![0.0; states.len()];
             session.instance.continuous_states(&mut x)?;
             let here = x.clone();

@@ -28,6 +28,7 @@ pub mod sarif;
 pub mod schema;
 pub mod states;
 pub mod steps;
+pub mod trace;
 pub mod tunable;
 pub mod under_test;
 pub mod units;

@@ -1,5 +1,7 @@
 //! The FMU under test, loaded and called as hosts do, and what rules need to do so shortly.
 
+mod sight;
+
 use std::cell::{Cell, RefCell};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{self, RecvTimeoutError};
@@ -9,13 +11,14 @@ use anyhow::{Result, bail};
 
 use super::Findings;
 use super::description::{Description, Variable};
-use super::events::Sight;
-use super::process::{Crash, Trace};
+use super::trace::{Crash, Trace};
 use host::description::Type;
 use host::fmi2::{
     CO_SIMULATION, CallError, Called, Fmu, Instance, MODEL_EXCHANGE, PLATFORM, Status,
 };
 use host::xml::Element;
+
+pub use self::sight::Sight;
 
 /// Steps of a short run.
 pub const STEPS: usize = 20;
@@ -285,6 +288,16 @@ impl FmuUnderTest {
         &self.description.variables
     }
 
+    /// Each derivative with its state, in the order of ModelStructure: that of all state vectors.
+    pub fn states(&self) -> Vec<(&Variable, &Variable)> {
+        let d = &self.description;
+        let pair = |index| {
+            let derivative: &Variable = d.at(index)?;
+            Some((derivative, d.at(derivative.derivative_of()?)?))
+        };
+        d.derivatives.iter().filter_map(|unknown| pair(unknown.index)).collect()
+    }
+
     /// The interfaces that can be called, Co-Simulation first.
     pub fn interfaces(&self) -> Vec<Interface> {
         self.interfaces.iter().map(|(interface, _)| *interface).collect()
@@ -343,7 +356,7 @@ impl FmuUnderTest {
             (Interface::ModelExchange, Some(stop)) => (stop - start) / (3 * STEPS) as f64,
             _ => f64::INFINITY,
         };
-        let states = super::exchange::states(self);
+        let states = self.states();
         let nominal = |(_, state): &(&Variable, &Variable)| {
             state.typed.number("nominal").map_or(UNKNOWN_NOMINAL, |_| state.nominal())
         };

@@ -17,7 +17,7 @@ use signals::recording::Columns;
 use signals::table::Table;
 use std::io::Write;
 
-use super::identify::estimates;
+use super::estimates::print_estimates;
 use crate::{progress, terminal};
 
 /// What is asked of any FMU.
@@ -290,7 +290,7 @@ fn kept<T>(read: Vec<Result<T>>, problems: &mut Vec<String>) -> Vec<T> {
 
 /// Prints tables and verdict.
 fn tell(found: &Identification) {
-    estimates(&[&found.parameters, &found.measurement]);
+    print_estimates(&[&found.parameters, &found.measurement]);
     for line in any_fmu::lines(found).iter().chain(&found.verdict) {
         println!("{line}");
     }

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use anyhow::{Result, bail, ensure};
 use host::fmu::Fmu;
 use host::output::atomically;
-use identify::estimate::Estimated;
 use identify::methods::acceleration::{self, Acceleration, Weights};
 use identify::methods::black_box::BlackBox;
 use identify::methods::free_decay::FreeDecay;
@@ -20,10 +19,10 @@ use identify::recording::{self, Recording, Source};
 use identify::simulate::Intersample;
 use identify::tolerance::Tolerances;
 use signals::recording::Between;
-use std::collections::BTreeMap;
 use std::io::Write;
 
 use super::any_fmu::{AnyFmuArgs, Out, PointsArgs, Told};
+use super::estimates::print_estimates;
 use super::{DEFAULT_FMU, open, setting};
 use crate::{progress, terminal};
 
@@ -435,20 +434,10 @@ impl IdentifyArgs {
     /// Prints tables and verdict.
     fn tell<M: Method>(&self, found: &Identified<M::Details>) {
         if !(found.parameters.is_empty() && found.measurement.is_empty()) {
-            estimates(&[&found.parameters, &found.measurement]);
+            print_estimates(&[&found.parameters, &found.measurement]);
         }
         for line in M::lines(found).iter().chain(&found.verdict) {
             println!("{line}");
         }
-    }
-}
-
-/// A table of estimates.
-pub(super) fn estimates(tables: &[&BTreeMap<String, Estimated>]) {
-    println!("{:24} {:>14} {:>12} {:>9}  unit", "", "value", "std", "std %");
-    for (name, p) in tables.iter().flat_map(|table| table.iter()) {
-        let percent =
-            p.percent(p.std).map_or("–".into(), |percent| format!("{:.4}", percent.abs()));
-        println!("{name:24} {:>14.7} {:>12.2e} {percent:>9}  {}", p.value, p.std, p.unit);
     }
 }

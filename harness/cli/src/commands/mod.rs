@@ -16,6 +16,7 @@ pub mod campaign;
 pub mod check;
 pub mod completions;
 pub mod design;
+pub mod estimates;
 pub mod example;
 pub mod gyro;
 pub mod identify;

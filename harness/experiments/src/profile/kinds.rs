@@ -7,8 +7,8 @@ use analysis::sweep::{Law, Sweep};
 use host::budget::FREQUENCY;
 
 use super::Values;
-use super::noise::Noise;
-use super::shape::{Dwell, DwellInNoise, Piece, Pieces, Shape};
+use super::noise::{DwellInNoise, Noise};
+use super::shape::{Dwell, Piece, Pieces, Shape};
 
 /// A kind of torque history. Times in s, frequencies in Hz, torques in N·m.
 #[derive(Debug)]

@@ -9,7 +9,7 @@
 
 use std::f64::consts::TAU;
 
-use super::shape::Shape;
+use super::shape::{Dwell, Shape};
 use analysis::random::Random;
 
 /// Number of sines. Over the thesis's band they stand 4.4 mHz apart, closer than the 5 mHz that
@@ -82,6 +82,27 @@ impl Shape for Noise {
     fn band(&self) -> Option<(f64, f64)> {
         let tone = (self.f1 - self.f0) / TONES as f64;
         Some((if self.f0 > 0.0 { self.f0 } else { tone }, self.f1))
+    }
+}
+
+/// A sine and noise on it, both together within a limit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DwellInNoise {
+    /// The sine.
+    pub dwell: Dwell,
+    /// The noise, without a limit of its own.
+    pub noise: Noise,
+    /// Largest torque, N·m.
+    pub limit: f64,
+}
+
+impl Shape for DwellInNoise {
+    fn after(&self, t: f64) -> f64 {
+        (self.dwell.after(t) + self.noise.after(t)).clamp(-self.limit, self.limit)
+    }
+
+    fn band(&self) -> Option<(f64, f64)> {
+        self.noise.band()
     }
 }
 

@@ -5,8 +5,6 @@ use std::fmt::Debug;
 
 use analysis::sweep::Sweep;
 
-use super::noise::Noise;
-
 /// A torque against time; t in s, torque in N·m.
 pub trait Shape: Debug + Send + Sync {
     /// Torque just after `t`.
@@ -55,27 +53,6 @@ pub struct Dwell {
 impl Shape for Dwell {
     fn after(&self, t: f64) -> f64 {
         self.amplitude * (TAU * self.frequency * t).sin()
-    }
-}
-
-/// A sine and noise on it, both together within a limit.
-#[derive(Clone, Debug, PartialEq)]
-pub struct DwellInNoise {
-    /// The sine.
-    pub dwell: Dwell,
-    /// The noise, without a limit of its own.
-    pub noise: Noise,
-    /// Largest torque, N·m.
-    pub limit: f64,
-}
-
-impl Shape for DwellInNoise {
-    fn after(&self, t: f64) -> f64 {
-        (self.dwell.after(t) + self.noise.after(t)).clamp(-self.limit, self.limit)
-    }
-
-    fn band(&self) -> Option<(f64, f64)> {
-        self.noise.band()
     }
 }
 

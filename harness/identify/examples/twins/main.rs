@@ -20,7 +20,8 @@ use analysis::innovations::Tests;
 use anyhow::{Context, Result, bail};
 use draw::Twin;
 use host::fmu::Fmu;
-use identify::methods::output_error::{Identification, identify};
+use identify::methods::identification::Identification;
+use identify::methods::output_error::identify;
 use identify::options::Options;
 use identify::recording;
 

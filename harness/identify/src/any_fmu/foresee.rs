@@ -5,9 +5,10 @@ use serde::Serialize;
 
 use super::covariance;
 use super::problem::Problem;
-use super::question::{Question, What};
+use super::question::Question;
 use super::record::Record;
 use super::simulate::{Model, Setup};
+use super::unknown::What;
 use analysis::gauss_markov::Noise;
 
 /// The bound of one unknown.

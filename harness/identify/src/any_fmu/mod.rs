@@ -15,6 +15,7 @@ pub mod question;
 pub mod record;
 pub mod search;
 pub mod simulate;
+pub mod unknown;
 
 use anyhow::{Result, ensure};
 use nalgebra::DMatrix;
@@ -22,10 +23,11 @@ use serde::Serialize;
 
 use self::problem::{Channel, Motion, Problem};
 use self::profile::Interval;
-use self::question::{Question, Unknown, What};
+use self::question::Question;
 use self::record::Record;
 use self::search::{Curvature, DECREMENT, Minimum};
 use self::simulate::{Model, Setup};
+use self::unknown::{Unknown, What};
 use crate::estimate::{Estimated, prose};
 use crate::methods::{Identified, Residual};
 use crate::news::News;

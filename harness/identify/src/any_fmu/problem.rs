@@ -18,9 +18,9 @@ use anyhow::Result;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::question::{Unknown, What};
 use super::record::Record;
 use super::simulate::{Model, Setup, Value};
+use super::unknown::{Unknown, What};
 use analysis::gauss_markov::{Noise, Whitening};
 use analysis::statistics::median;
 

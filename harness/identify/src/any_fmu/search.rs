@@ -11,8 +11,8 @@ use anyhow::{Context, Result};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::problem::{Answer, Problem};
-use super::question::Unknown;
 use super::record::Record;
+use super::unknown::Unknown;
 use crate::news::News;
 use analysis::random::Random;
 

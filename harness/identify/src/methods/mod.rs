@@ -4,6 +4,7 @@ pub mod acceleration;
 pub mod black_box;
 pub mod free_decay;
 pub mod frequency;
+pub mod identification;
 pub mod multisine;
 pub mod output_error;
 pub(crate) mod page;

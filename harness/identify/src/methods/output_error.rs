@@ -9,8 +9,8 @@ use formulas::cylinder::XI;
 use formulas::regime::Regime;
 use host::fmu::Fmu;
 use nalgebra::{DMatrix, DVector};
-use serde::Serialize;
 
+use super::identification::{Details, Identification};
 use super::{Identified, Method, Needs, Residual, Task, page};
 use crate::between;
 use crate::budget::{self, Effect};
@@ -18,14 +18,13 @@ use crate::candidate::{self, Fitted, ModelFit};
 use crate::estimate::Estimated;
 use crate::fit::{Answer, Differences, Polished, Problem};
 use crate::friction;
-use crate::missing::{self, Missing};
+use crate::missing;
 use crate::news::News;
-use crate::nominal::Start;
 use crate::options::Options;
 use crate::plausible;
 use crate::recording::{self, Recording};
 use crate::start::{self, Response};
-use crate::uncertainty::{self, Combination, Covariance, Sources};
+use crate::uncertainty::{self, Covariance, Sources};
 use crate::unknown::{Quantity, Unknown};
 use crate::verdict::{self, DECIDES, Findings};
 
@@ -33,32 +32,6 @@ use crate::verdict::{self, DECIDES, Findings};
 pub struct OutputError {
     /// What is asked for.
     pub options: Options,
-}
-
-/// The result.
-pub type Identification = Identified<Details>;
-
-/// What this method alone has to say.
-#[derive(Clone, Debug, Default, Serialize)]
-pub struct Details {
-    /// The chosen model's fit.
-    pub fit: ModelFit,
-    /// Sums that are known where their terms are not.
-    pub combinations: Vec<Combination>,
-    /// Condition number of the sensitivities.
-    pub condition: f64,
-    /// The error budget.
-    pub error_budget: Vec<Effect>,
-    /// Torques that the model lacks.
-    pub missing: Vec<Missing>,
-    /// All models that were tried, the chosen one first.
-    pub models: Vec<ModelFit>,
-    /// What the frequency response says.
-    pub frequency_response: Option<Response>,
-    /// Starts from the data.
-    pub start: Option<Start>,
-    /// Wall time, s.
-    pub seconds: f64,
 }
 
 impl Method for OutputError {

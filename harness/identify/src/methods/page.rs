@@ -6,7 +6,7 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use report::svg::{Axis, Chart, Series, Style};
 
 use super::Residual;
-use super::output_error::Identification;
+use super::identification::Identification;
 use crate::budget::Effect;
 use crate::candidate::ModelFit;
 use crate::estimate::{Estimated, prose};

@@ -10,15 +10,13 @@ use host::output;
 use maud::{DOCTYPE, Markup, html};
 use serde_json::json;
 
+use super::Files;
 use super::fmu::one_file;
 use super::live::{self, Plant};
 use super::page::{Gathered, Layout, Page};
 
 /// The list of parts and pages, from the project's root.
 const SUMMARY: &str = "book/SUMMARY.md";
-
-/// The book before it is written: name and content of each file.
-pub type Files = Vec<(String, Vec<u8>)>;
 
 /// A part of the book: its name and its pages, as places in the list of all.
 struct Part {

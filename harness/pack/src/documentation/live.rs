@@ -8,7 +8,7 @@ use anyhow::Result;
 use base64ct::{Base64, Encoding};
 use maud::{Markup, html};
 
-use super::book::Files;
+use super::Files;
 use super::page::Page;
 use crate::archive;
 use crate::fmi::Fmi;

@@ -10,5 +10,8 @@ pub mod fmu;
 pub mod live;
 pub mod page;
 
+/// The book before it is written: name and content of each file.
+pub type Files = Vec<(String, Vec<u8>)>;
+
 /// What both outputs look like.
 const CSS: &str = include_str!("page.css");

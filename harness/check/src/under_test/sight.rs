@@ -1,0 +1,66 @@
+//! What an event may change, seen before and after it.
+
+use anyhow::Result;
+
+use super::{FmuUnderTest, Reading, Session};
+use crate::description::Variable;
+
+/// A share of a value below which a change is rounding.
+const ROUNDING: f64 = 1e-9;
+/// A share of a derivative below which its change is what an iteration leaves in it.
+const ITERATED: f64 = 1e-2;
+
+/// What an event may change.
+pub struct Sight {
+    states: Vec<f64>,
+    derivatives: Vec<f64>,
+    discrete: Vec<Reading>,
+}
+
+fn discrete(fmu: &FmuUnderTest) -> impl Iterator<Item = &Variable> {
+    let computed = |v: &&Variable| matches!(v.causality.as_str(), "output" | "local");
+    fmu.variables().iter().filter(computed).filter(|v| v.variability == "discrete")
+}
+
+impl Sight {
+    /// What is to be seen now.
+    pub fn of(session: &mut Session) -> Result<Sight> {
+        let n = session.states();
+        let (mut states, mut derivatives) = (vec![0.0; n], vec![0.0; n]);
+        if n > 0 {
+            session.instance.continuous_states(&mut states)?;
+            session.instance.derivatives(&mut derivatives)?;
+        }
+        let discrete = discrete(session.fmu).map(|v| session.read(v)).collect::<Result<_>>()?;
+        Ok(Sight { states, derivatives, discrete })
+    }
+
+    /// The first thing that is another one afterwards: its name, and both values.
+    pub fn change<'f>(&self, after: &Sight, fmu: &'f FmuUnderTest) -> Option<(&'f str, String)> {
+        let jumps = |a: f64, b: f64, share: f64, size: f64| {
+            (a - b).abs() > share * a.abs().max(b.abs()).max(size)
+        };
+        for (v, (a, b)) in discrete(fmu).zip(self.discrete.iter().zip(&after.discrete)) {
+            let same = match (a, b) {
+                (Reading::Real(a), Reading::Real(b)) => {
+                    !jumps(*a, *b, ROUNDING, 1e-3 * v.nominal())
+                }
+                (a, b) => a.is(b),
+            };
+            if !same {
+                return Some((&v.name, format!("{a} to {b}")));
+            }
+        }
+        for (n, (derivative, state)) in fmu.states().into_iter().enumerate() {
+            let (a, b) = (self.states[n], after.states[n]);
+            if jumps(a, b, ROUNDING, 1e-3 * state.nominal()) {
+                return Some((&state.name, format!("{a:?} to {b:?}")));
+            }
+            let (a, b) = (self.derivatives[n], after.derivatives[n]);
+            if jumps(a, b, ITERATED, 1e-3 * derivative.nominal()) {
+                return Some((&derivative.name, format!("{a:?} to {b:?}")));
+            }
+        }
+        None
+    }
+}
