@@ -4,6 +4,8 @@
 use std::path::Path;
 use std::process::Command;
 
+use pack::{Fmi, MODELS};
+
 use crate::common::{binary, harness, python, run};
 
 /// Runs pytest in the tests' environment, and says how many passed.
@@ -30,7 +32,9 @@ fn pytest(arguments: &mut Command, sentence: &str) {
 #[test]
 fn fmpy_drives_the_fmu_as_the_harness_does() {
     let fmu = pack::packed_for_tests();
-    let wheel = pack::wheel::for_tests(&pack::MODELS.each_ref().map(pack::packed_model_for_tests));
+    let both = Fmi::ALL
+        .map(|fmi| MODELS.each_ref().map(|model| pack::packed_version_for_tests(model, fmi)));
+    let wheel = pack::wheel::for_tests(both.as_flattened());
     pytest(
         Command::new(python())
             .args(["-m", "pytest"])

@@ -21,6 +21,7 @@ from fmpy import sharedLibraryExtension
 from fmpy.fmi1 import FMICallException
 
 from .feedback import Feedback, Linear
+from .fmi3 import Slave
 from .fmu import PLATFORM, FmuError, source_tree
 
 FUNCTIONS = (
@@ -160,11 +161,13 @@ def _load(path: Path) -> ctypes.CDLL:
 def run(fmu: Any, rows: Rows, feedback: Feedback | None = None) -> Stop | None:
     """Drive an instance of ``fmpy.fmi2.FMU2Slave`` through a run, by the library if there is one.
 
+    One of an FMU 3.0 is driven call by call.
+
     At every communication point the outputs are read, then the inputs set and the step made; after
     the last step outputs are read once more. A controller acts between the two. Returns None at the
     end, or where it stopped: at the first call that answers neither fmi2OK nor fmi2Warning.
     """
-    loaded = library()
+    loaded = None if isinstance(fmu, Slave) else library()
     if loaded is None:
         return step_by_step(fmu, rows, feedback)
     functions = (ctypes.cast(fmu._functions[name], c_void_p) for name in FUNCTIONS)

@@ -1,18 +1,21 @@
-"""A packed FMU 2.0: where it is, what it says of itself, values in the types of its variables."""
+"""A packed FMU, 2.0 or 3.0: where it is, what it says of itself, values in its variables' types."""
 
 import atexit
 import difflib
 import math
 import shutil
 import threading
+import zipfile
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, ClassVar
+from xml.etree import ElementTree
 
 from fmpy import extract, platform, platform_tuple, read_model_description
 from fmpy.model_description import ModelDescription, ScalarVariable
 
-from .opening import faults, is_file_name
+from .fmi3 import KINDS
+from .opening import DESCRIPTION, faults, is_file_name
 
 PLATFORM = platform_tuple if platform_tuple == "aarch64-linux" else platform
 """Folder of the binaries for this platform, as the program ``hubslosh`` names it.
@@ -76,7 +79,7 @@ def did_you_mean(wrong: str, names: Iterable[str]) -> str:
 
 
 class Fmu:
-    """An FMU 2.0, unpacked when its binary is first wanted.
+    """An FMU, unpacked when its binary is first wanted.
 
     `open` reads a file once per program, as long as it does not change.
     """
@@ -94,8 +97,13 @@ class Fmu:
             self.description: ModelDescription = read_model_description(str(path))
         except Exception as error:  # fmpy has no class of its own for what is wrong with a file
             raise FmuError(f"{path} is not an FMU that fmpy can read: {error}") from None
-        if self.description.fmiVersion != "2.0":
-            raise FmuError(f"{path} is of FMI {self.description.fmiVersion}; 2.0 is expected")
+        if self.description.fmiVersion not in ("2.0", "3.0"):
+            version = self.description.fmiVersion
+            raise FmuError(f"{path} is of FMI {version}; 2.0 or 3.0 is expected")
+        self.is_fmi3 = self.description.fmiVersion == "3.0"
+        """Whether it is of FMI 3.0."""
+        self.intermediate = _intermediate(path) if self.is_fmi3 else frozenset()
+        """Names of the variables that take part in intermediate update."""
         for interface in (self.description.coSimulation, self.description.modelExchange):
             if interface is not None and not is_file_name(interface.modelIdentifier):
                 raise FmuError(
@@ -144,6 +152,13 @@ class Fmu:
             raise FmuError(f"the FMU has no variable {name}{hint}")
         return self.variables[name]
 
+    def kind(self, name: str) -> str:
+        """Return a variable's type as FMI 2.0 calls it, or FMI 3.0 if 2.0 has none."""
+        variable = self.variable(name)
+        if variable.dimensions:
+            return f"array of {variable.type}"
+        return KINDS.get(variable.type, variable.type)
+
     def unit(self, name: str) -> str:
         """Return the unit in which a variable is exchanged; empty if it has none."""
         variable = self.variable(name)
@@ -157,7 +172,7 @@ class Fmu:
         also a number with its unit, ``(50, "mm")`` or ``"50 mm"``: the variable's own or one of its
         display units.
         """
-        variable = self.variable(name)
+        variable, kind = self.variable(name), self.kind(name)
         converters: dict[str, Callable[[Any], Value]] = {
             "Real": lambda v: self._real(name, v),
             "Integer": _integer,
@@ -166,9 +181,11 @@ class Fmu:
             "String": str,
         }
         try:
-            if isinstance(value, tuple) and variable.type != "Real":
-                raise ValueError(f"a value of type {variable.type} has no unit")
-            return converters[variable.type](value)
+            if isinstance(value, tuple) and kind != "Real":
+                raise ValueError(f"a value of type {kind} has no unit")
+            if kind not in converters:
+                raise ValueError(f"it is an {kind}" if " " in kind else f"it is of type {kind}")
+            return converters[kind](value)
         except (TypeError, ValueError, OverflowError) as error:
             raise FmuError(f"{name} cannot be {value!r}: {error}") from None
 
@@ -192,6 +209,17 @@ class Fmu:
             units = ", ".join(u for u in (base, *shown) if u)
             raise ValueError(f"it has no unit {unit} (units: {units or 'none'})")
         return float(shown[unit].factor), float(shown[unit].offset)
+
+
+def _intermediate(path: Path) -> frozenset[str]:
+    """Return the names of the variables with ``intermediateUpdate``, which fmpy does not read."""
+    with zipfile.ZipFile(path) as archive, archive.open(DESCRIPTION) as file:
+        variables = (element for _, element in ElementTree.iterparse(file))
+        return frozenset(
+            element.attrib["name"]
+            for element in variables
+            if element.get("intermediateUpdate") in ("true", "1")
+        )
 
 
 def _with_unit(text: str) -> Quantity:

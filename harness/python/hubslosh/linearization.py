@@ -227,6 +227,8 @@ def linearize(
     """
     fmu = Fmu.open(model)
     exchange = fmu.description.modelExchange
+    if fmu.is_fmi3:
+        raise FmuError(f"{fmu.path} is of FMI 3.0; 2.0 is expected here: its model is the same")
     if exchange is None or not exchange.providesDirectionalDerivative:
         raise FmuError(f"{fmu.path} offers no directional derivatives in Model Exchange")
     parameters = parameters_of(parameters)

@@ -75,15 +75,13 @@ class Loop:
                     f"the command {name} is no input of {fmu.name} (inputs: {', '.join(allowed)})"
                     f"{hint}"
                 )
-            elif fmu.variable(name).type != "Real":
-                found.append(f"the command {name} is of type {fmu.variable(name).type}, not Real")
+            elif fmu.kind(name) != "Real":
+                found.append(f"the command {name} is of type {fmu.kind(name)}, not Real")
         measured = names_of(self.measured, "measured", found)
         check_outputs(fmu, measured, found)
         for name in measured:
-            if name in fmu.variables and fmu.variable(name).type not in ("Real", "String"):
-                found.append(
-                    f"{name} is of type {fmu.variable(name).type}: only Reals are measured"
-                )
+            if name in fmu.variables and fmu.kind(name) not in ("Real", "String"):
+                found.append(f"{name} is of type {fmu.kind(name)}: only Reals are measured")
         found += [f"the command {name} is given twice" for name in _twice(commands)]
         if not commands:
             found.append("there is no command")

@@ -17,11 +17,11 @@ from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
-from fmpy import calloc, fmi2, free, sharedLibraryExtension
+from fmpy import calloc, fmi2, free, platform_tuple, sharedLibraryExtension
 from fmpy.fmi1 import FMICallException, printLogMessage
 from fmpy.logging import addLoggerProxy
 
-from . import batch
+from . import batch, fmi3
 from .batch import Rows, Signals
 from .feedback import Feedback
 from .fmu import PLATFORM, Fmu, FmuError, FmuWarning, Quantity
@@ -52,6 +52,11 @@ def _log(environment: Any, name: bytes, status: int, category: bytes, message: b
         _messages.said.append(message.decode(errors="replace"))
     else:
         printLogMessage(environment, name, status, category, message)
+
+
+def _say(text: str) -> None:
+    """Keep a message of an FMU 3.0, which tells its instance's own logger."""
+    _messages.said.append(text)
 
 
 # fmpy fills in the messages' arguments with a C function that remembers one logger for all
@@ -111,7 +116,9 @@ _STARTS = {
 
 
 class Instance:
-    """An instance of an FMU 2.0, from fmi2Instantiate to fmi2FreeInstance; variables by name.
+    """An instance of an FMU, from fmi2Instantiate to fmi2FreeInstance; variables by name.
+
+    Those of FMI 3.0 are for Co-Simulation, with the calls of FMI 2.0 (`fmi3.Slave`).
 
     Use it in a ``with`` statement. The package's FMUs start at rest here: what moves was asked for.
     """
@@ -127,18 +134,25 @@ class Instance:
             interface, name = description.modelExchange, "Model Exchange"
         if interface is None:
             raise FmuError(f"{fmu.path} offers no {name}")
+        assert not fmu.is_fmi3 or kind is fmi2.FMU2Slave, "FMI 3.0 is for Co-Simulation here"
         folder = Path(fmu.directory) / "binaries"
-        binary = folder / PLATFORM / f"{interface.modelIdentifier}{sharedLibraryExtension}"
+        platform = platform_tuple if fmu.is_fmi3 else PLATFORM
+        binary = folder / platform / f"{interface.modelIdentifier}{sharedLibraryExtension}"
         if not binary.is_file():
             there = ", ".join(sorted(path.name for path in folder.glob("*"))) or "none"
-            raise FmuError(f"{fmu.path} has no binary for {PLATFORM} (platforms in it: {there})")
+            raise FmuError(f"{fmu.path} has no binary for {platform} (platforms in it: {there})")
         try:
-            instance = _loaded(kind, fmu, interface.modelIdentifier, binary)
+            instance = _loaded(
+                fmi3.Slave if fmu.is_fmi3 else kind, fmu, interface.modelIdentifier, binary
+            )
         except Exception as error:  # fmpy raises nothing more special
             raise FmuError(f"{fmu.path} cannot be loaded: {error}") from None
         _messages.said.clear()
         try:
-            instance.instantiate(callbacks=_CALLBACKS)
+            if fmu.is_fmi3:
+                instance.instantiate(fmu.variables, fmu.intermediate, _say)
+            else:
+                instance.instantiate(callbacks=_CALLBACKS)
         except Exception as error:
             instance.freeLibrary()
             raise FmuError(" ".join([str(error), *_messages.said])) from None
@@ -172,9 +186,9 @@ class Instance:
     def set(self, name: str, value: Quantity) -> None:
         """Set a parameter or an input: a value as `Fmu.convert` takes it."""
         converted = self.fmu.convert(name, value)
-        variable = self.fmu.variable(name)
-        setter = "setInteger" if variable.type == "Enumeration" else f"set{variable.type}"
-        self._call(setter, [variable.valueReference], [converted])
+        kind = self.fmu.kind(name)
+        setter = "setInteger" if kind == "Enumeration" else f"set{kind}"
+        self._call(setter, [self.fmu.variable(name).valueReference], [converted])
 
     def get(self, names: Sequence[str]) -> list[float]:
         """Return the present values of numeric variables; booleans as 0 and 1."""
@@ -190,8 +204,8 @@ class Instance:
         by_type: dict[str, list[str]] = {"getReal": [], "getInteger": [], "getBoolean": []}
         texts = []
         for name in names:
-            kind = self.fmu.variable(name).type
-            if kind == "String":
+            kind = self.fmu.kind(name)
+            if kind not in ("Real", "Integer", "Enumeration", "Boolean"):
                 texts.append(name)
             else:
                 by_type["getInteger" if kind == "Enumeration" else f"get{kind}"].append(name)
@@ -285,7 +299,7 @@ class Plant(Instance):
         rows = len(time)
         numbers: dict[str, list[str]] = {"Real": [], "Integer": [], "Boolean": []}
         for name in inputs:
-            kind = self.fmu.variable(name).type
+            kind = self.fmu.kind(name)
             numbers["Integer" if kind == "Enumeration" else kind].append(name)
 
         def signals(names: list[str], kind: type, given: Mapping[str, Any] | None) -> Signals:
@@ -323,13 +337,15 @@ class Plant(Instance):
             raise feedback.error
         said = " ".join(_messages.said)
         sentence = f"the run stopped at t = {self.time} s: {stop.function} returned "
-        sentence += batch.STATUS[stop.status] if 0 <= stop.status < 6 else str(stop.status)
+        known = 0 <= stop.status < len(batch.STATUS)
+        status = batch.STATUS[stop.status] if known else str(stop.status)
+        sentence += status.replace("fmi2", stop.function[:4])
         sentence += f": {said}" if said else " without a message"
         if stop.function == "fmi2DoStep" and batch.STATUS[stop.status] == "fmi2Discard":
             with contextlib.suppress(FmuError):
                 if self._call("getBooleanStatus", fmi2.fmi2Terminated):
                     sentence += "; the FMU wants the simulation to end"
-        whole_rows = stop.row + (not stop.function.startswith("fmi2Get"))
+        whole_rows = stop.row + (stop.function[4:7] != "Get")
         before = {name: values[:whole_rows] for name, values in result.items()}
         raise RunError(sentence, self.time, {"time": run.time[:whole_rows]} | before)
 

@@ -63,7 +63,9 @@ def simulate(
 ) -> pd.DataFrame:
     """Simulate an FMU by its own solver (Co-Simulation) and return what it shows over time.
 
-    model: the name of an FMU of this package, or the file of any FMU 2.0 for Co-Simulation.
+    model: the name of an FMU of this package, ``"HubSlosh"`` or, of FMI 3.0, ``"HubSlosh-fmi3"``;
+    or the file of any FMU 2.0 or 3.0 for Co-Simulation. Both give the same bits where inputs are
+    held, and the same but for last digits where they go in lines.
     parameters: values of parameters and inputs by name, in SI units or with one of the variable's
     own units, ``{"tank.h": (50, "mm")}``; enumerations by item or number. Or a file of them, as
     ``hubslosh tank --parameters`` writes it, see ``read_parameters``.
@@ -125,7 +127,9 @@ def simulate(
     # without a slope the FMU has one call less to answer, and an FMU that cannot interpolate none
     sloped = any(slope.any() for _, slope in values.values())
     slopes = {name: slope for name, (_, slope) in values.items()} if sloped else None
-    if sloped and not fmu.description.coSimulation.canInterpolateInputs:
+    interface = fmu.description.coSimulation
+    by = "providesIntermediateUpdate" if fmu.is_fmi3 else "canInterpolateInputs"
+    if sloped and interface is not None and not getattr(interface, by):
         raise FmuError(f"{fmu.name} cannot interpolate its inputs; use hold=True")
     asked = [name for name in columns if name not in given]
     with Plant(
@@ -256,7 +260,7 @@ def histories_of(
         if column in columns and name not in columns:
             problems.append(f"inputs has {column} but not {name}")
     for name, values in columns.items():
-        kind = "Real" if name in slopes else fmu.variable(name).type
+        kind = "Real" if name in slopes else fmu.kind(name)
         if kind == "String":
             problems.append(f"the input {name} is a text; only numbers can be given over time")
         if kind in ("Integer", "Enumeration"):
@@ -271,7 +275,7 @@ def histories_of(
         return {}
     slope_of = {name: columns.pop(column) for column, name in slopes.items() if column in columns}
     return {
-        name: History(time, values, slope_of.get(name), hold or fmu.variable(name).type != "Real")
+        name: History(time, values, slope_of.get(name), hold or fmu.kind(name) != "Real")
         for name, values in columns.items()
     }
 

@@ -21,6 +21,7 @@ from packaging.utils import parse_wheel_filename
 import environment
 
 HERE = ROOT / "harness" / "python"
+MODELS = ("HubSlosh", "Spacecraft", "SloshTank")
 NOTEBOOKS = sorted((HERE / "notebooks").glob("*.ipynb"))
 
 
@@ -63,8 +64,25 @@ def test_the_record_has_every_file_and_its_hash(wheel: Path) -> None:
             digest = base64.urlsafe_b64encode(hashlib.sha256(data).digest()).decode().rstrip("=")
             assert (hashed, int(size)) == (f"sha256={digest}", len(data)), name
     assert rows[-1] == [record, "", ""]
-    fmus = {f"hubslosh/fmus/{model}.fmu" for model in ("HubSlosh", "Spacecraft", "SloshTank")}
+    models = [f"{model}{fmi}" for model in MODELS for fmi in ("", "-fmi3")]
+    fmus = {f"hubslosh/fmus/{model}.fmu" for model in models}
     assert {"hubslosh/py.typed", *fmus} <= set(names)
+
+
+def test_the_fmus_of_fmi_3_are_found_by_name(installed: Path, tmp_path: Path) -> None:
+    """In a folder without the source, as a user has it; the rate has the bits of FMI 2.0."""
+    program = """
+from hubslosh import simulate
+for model in ("HubSlosh", "Spacecraft", "SloshTank"):
+    two, three = (simulate(model + fmi, stop=0.1) for fmi in ("", "-fmi3"))
+    assert two.equals(three), model
+    print(three.attrs["model"])
+"""
+    done = subprocess.run(
+        [installed, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == [f"{model}-fmi3" for model in MODELS]
 
 
 def test_the_tag_is_of_this_machine_alone(wheel: Path) -> None:

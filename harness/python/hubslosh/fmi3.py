@@ -1,0 +1,194 @@
+# ruff: noqa: N802, N803, N815 - the names of FMI and of fmpy
+"""An instance of an FMU 3.0 with the calls of FMI 2.0, as `plant` and `batch` make them.
+
+Neither event mode nor early return is used: the FMU handles its events within its steps, as FMI 2.0
+has it. What FMI 3.0 no longer has, derivatives of inputs, are lines that the FMU hears of in
+intermediate update.
+"""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from ctypes import byref
+from typing import Any
+
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi3 import FMU3Slave, fmi3Boolean, fmi3Float64
+from fmpy.model_description import ScalarVariable
+
+KINDS = {"Float64": "Real", "Int32": "Integer"}
+"""Types that FMI 2.0 has under another name; Boolean, Enumeration and String have the same."""
+
+_DISCARD = 2
+_ERROR = 3
+
+
+class Slave(FMU3Slave):
+    """A Co-Simulation instance of ``fmpy.fmi3`` that is called like one of ``fmpy.fmi2``."""
+
+    def instantiate(
+        self,
+        variables: Mapping[str, ScalarVariable],
+        intermediate: Collection[str],
+        say: Callable[[str], None],
+    ) -> None:
+        """Instantiate; ``say`` is given what the FMU logs.
+
+        variables: of the FMU by name. intermediate: those that take part in intermediate update.
+        """
+        self._say = say
+        self._enumerations = {
+            v.valueReference for v in variables.values() if v.type == "Enumeration"
+        }
+        taken = [
+            variables[name].valueReference
+            for name in sorted(intermediate)
+            if variables[name].causality == "input"
+        ]
+        self._taken = set(taken)
+        self._lines: list[tuple[int, float, float]] = []
+        self._from = 0.0
+        self._refused: FMICallException | None = None
+        self._experiment: dict[str, Any] = {}
+        super().instantiate(
+            logMessage=lambda environment, status, category, text: say(
+                text.decode(errors="replace")
+            ),
+            intermediateUpdate=self._update if taken else None,
+            requiredIntermediateVariables=taken,
+        )
+
+    def _update(
+        self,
+        environment: Any,
+        time: float,
+        set_requested: bool,
+        get_allowed: bool,
+        step_finished: bool,
+        can_return_early: bool,
+        early_return_requested: Any,
+        early_return_time: Any,
+    ) -> None:
+        """Set the inputs that go in lines to their values at ``time``, s."""
+        if not set_requested or not self._lines:
+            return
+        try:
+            self.setFloat64(
+                [reference for reference, _, _ in self._lines],
+                [value + slope * (time - self._from) for _, value, slope in self._lines],
+            )
+        except FMICallException as error:  # nothing leaves a callback; the step's end says it
+            self._refused = error
+
+    # by name of fmpy.fmi2, with lists
+
+    def setupExperiment(self, **experiment: Any) -> None:
+        """Keep tolerance, start and stop for `enterInitializationMode`."""
+        self._experiment = experiment
+
+    def enterInitializationMode(self) -> None:
+        """Enter initialization mode with what `setupExperiment` was given."""
+        super().enterInitializationMode(**self._experiment)
+
+    def setReal(self, vr: Sequence[int], values: Sequence[float]) -> None:
+        """Set Float64s."""
+        self.setFloat64(vr, values)
+
+    def getReal(self, vr: Sequence[int]) -> list[float]:
+        """Return Float64s."""
+        return self.getFloat64(vr)
+
+    def setInteger(self, vr: Sequence[int], values: Sequence[int]) -> None:
+        """Set Int32s and enumerations."""
+        for reference, value in zip(vr, values, strict=True):
+            wide = reference in self._enumerations
+            (self.setInt64 if wide else self.setInt32)([reference], [value])
+
+    def getInteger(self, vr: Sequence[int]) -> list[int]:
+        """Return Int32s and enumerations."""
+        return [
+            (self.getInt64 if reference in self._enumerations else self.getInt32)([reference])[0]
+            for reference in vr
+        ]
+
+    def setRealInputDerivatives(
+        self, vr: Sequence[int], order: Sequence[int], values: Sequence[float]
+    ) -> None:
+        """Have inputs go with these slopes, per s, through the next step; others hold."""
+        assert set(order) <= {1}, "lines alone"
+        if untaken := [reference for reference in vr if reference not in self._taken]:
+            self._say(f"inputs {untaken} (value references) are not set within a step")
+            raise FMICallException(function="fmi3SetFloat64", status=_ERROR)
+        values_now = self.getFloat64(vr)
+        self._lines = list(zip(vr, values_now, values, strict=True))
+
+    def doStep(
+        self, currentCommunicationPoint: float, communicationStepSize: float, *_: Any
+    ) -> None:
+        """Make a step, to its end."""
+        self._from, self._refused = currentCommunicationPoint, None
+        event, terminate, early = fmi3Boolean(), fmi3Boolean(), fmi3Boolean()
+        reached = fmi3Float64()
+        try:
+            self.fmi3DoStep(
+                self.component,
+                currentCommunicationPoint,
+                communicationStepSize,
+                fmi3Boolean(True),
+                byref(event),
+                byref(terminate),
+                byref(early),
+                byref(reached),
+            )
+        finally:
+            self._lines = []
+        if self._refused is not None:
+            raise self._refused
+        if terminate.value:
+            self._say("the FMU wants the simulation to end")
+            raise FMICallException(function="fmi3DoStep", status=_DISCARD)
+        if early.value:
+            self._say(f"it returned early, at {reached.value} s, which it was not allowed to")
+            raise FMICallException(function="fmi3DoStep", status=_ERROR)
+
+    getFMUstate = FMU3Slave.getFMUState
+    setFMUstate = FMU3Slave.setFMUState
+    freeFMUstate = FMU3Slave.freeFMUState
+    serializeFMUstate = FMU3Slave.serializeFMUState
+    deSerializeFMUstate = FMU3Slave.deserializeFMUState
+
+    # by name of FMI 2.0, with C arrays
+
+    def fmi2SetReal(self, c: Any, vr: Any, count: int, values: Any) -> None:
+        """Set Float64s."""
+        self.fmi3SetFloat64(c, vr, count, values, count)
+
+    def fmi2GetReal(self, c: Any, vr: Any, count: int, values: Any) -> None:
+        """Read Float64s."""
+        self.fmi3GetFloat64(c, vr, count, values, count)
+
+    def fmi2SetInteger(self, c: Any, vr: Any, count: int, values: Any) -> None:
+        """Set Int32s and enumerations."""
+        self.setInteger(vr[:count], values[:count])
+
+    def fmi2GetInteger(self, c: Any, vr: Any, count: int, values: Any) -> None:
+        """Read Int32s and enumerations."""
+        for k, value in enumerate(self.getInteger(vr[:count])):
+            values[k] = value
+
+    def fmi2SetBoolean(self, c: Any, vr: Any, count: int, values: Any) -> None:
+        """Set Booleans."""
+        self.setBoolean(vr[:count], [value != 0 for value in values[:count]])
+
+    def fmi2GetBoolean(self, c: Any, vr: Any, count: int, values: Any) -> None:
+        """Read Booleans."""
+        for k, value in enumerate(self.getBoolean(vr[:count])):
+            values[k] = int(value)
+
+    def fmi2SetRealInputDerivatives(
+        self, c: Any, vr: Any, count: int, order: Any, values: Any
+    ) -> None:
+        """Have inputs go with these slopes through the next step."""
+        self.setRealInputDerivatives(vr[:count], order[:count], values[:count])
+
+    def fmi2DoStep(self, c: Any, time: float, step: float, *_: Any) -> None:
+        """Make a step, to its end."""
+        self.doStep(time, step)
