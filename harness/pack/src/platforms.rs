@@ -201,6 +201,19 @@ pub fn build_wasm(model: &Model) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// Builds the tank solver as a module for WebAssembly.
+///
+/// # Errors
+/// If something is missing for it, or if it does not build.
+pub fn build_tank_page() -> Result<Vec<u8>> {
+    let toolchain = Toolchain::look()?;
+    toolchain.check(&[&WASM])?;
+    let product = Product::Library("tank-page", "tank_page");
+    let bytes = toolchain.build(&product, &WASM, &WASM.targets[0])?;
+    refuse(&toolchain.faults(&WASM, &bytes, Vec::new()))?;
+    Ok(bytes)
+}
+
 /// Fails if there are faults, with all of them.
 pub fn refuse(faults: &[String]) -> Result<()> {
     if !faults.is_empty() {
@@ -366,8 +379,9 @@ impl Toolchain {
             flags.push(format!("--remap-path-prefix={}=library", source.display()));
         }
         if platform.folder == WASM.folder {
-            // a page has to carry it: a tenth smaller than at 3
-            command.env("CARGO_PROFILE_FMU_OPT_LEVEL", "2");
+            // a page has to carry it: an FMU is a tenth smaller than at 3
+            let level = if matches!(product, Product::Fmu(_)) { "2" } else { "z" };
+            command.env("CARGO_PROFILE_FMU_OPT_LEVEL", level);
         }
         command.env("CARGO_ENCODED_RUSTFLAGS", flags.join("\x1f"));
         command.env("MACOSX_DEPLOYMENT_TARGET", binary::MACOS.to_string());

@@ -25,7 +25,7 @@ globalThis.Live = (() => {
   /**
    * Controls and their values. Each of `all`: key, label, and either min, max, step, unit, digits and start of a slider or
    * `options` (pairs of value and text) and start of a list;
-   * one that is `hidden` has its control elsewhere. `changed(key)` is called after the reader has changed one.
+   * one that is `hidden` has its control elsewhere. `allowed(text)` in place of both is of a text without a control. `changed(key)` is called after the reader has changed one.
    * The address keeps what differs from the start: `#torque=120&fill=90`.
    */
   class Settings {
@@ -35,6 +35,7 @@ globalThis.Live = (() => {
       this.element = make("div", { class: "live-set" });
       this.controls = new Map();
       for (const one of all) {
+        if (one.allowed) continue;
         const name = make("span", {}, one.label);
         const control = one.options
           ? make("select", { name: one.key }, ...one.options.map(([value, text]) => make("option", { value }, text)))
@@ -63,7 +64,16 @@ globalThis.Live = (() => {
       this.show(key);
     }
 
+    // Shows the controls of these settings alone.
+    only(keys) {
+      for (const [key, { control }] of this.controls) {
+        const label = control.closest("label");
+        if (label) label.hidden = !keys.includes(key);
+      }
+    }
+
     show(key) {
+      if (!this.controls.has(key)) return;
       const { one, control, shown } = this.controls.get(key), value = this.values[key];
       control.value = String(value);
       if (!shown) return;
@@ -77,7 +87,8 @@ globalThis.Live = (() => {
       for (const one of this.all) {
         const text = said.get(one.key), number = Number(text);
         let value = one.start;
-        if (text !== null && one.options) value = one.options.some(([name]) => name === text) ? text : one.start;
+        if (text !== null && one.allowed) value = one.allowed(text) ? text : one.start;
+        else if (text !== null && one.options) value = one.options.some(([name]) => name === text) ? text : one.start;
         else if (text !== null && Number.isFinite(number)) value = Math.min(one.max, Math.max(one.min, number));
         this.values[one.key] = value;
         this.show(one.key);

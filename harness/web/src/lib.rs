@@ -24,8 +24,11 @@ pub const LOOP: &str = include_str!("../pages/loop.js");
 /// The live page "Slew"; needs [`THREE`], [`SCENE`], [`fmu_host`], [`LIVE`], [`LOOP`] and Spacecraft in the global `FMUS`.
 pub const SLEW: &str = include_str!("../pages/slew.js");
 
+/// The live page "Your tank"; needs [`THREE`], [`SCENE`], [`fmu_host`], [`LIVE`] and the solver in the global `MODULES`.
+pub const YOUR_TANK: &str = include_str!("../pages/your_tank.js");
+
 /// The host of FMUs compiled to WebAssembly (`fmu/host.js`) as one script without modules, which a page from the disk
-/// can load: the global `FmuHost` with `Fmu` and `FmiError`.
+/// can load: the global `FmuHost` with `Fmu`, `FmiError` and `unzip`.
 pub fn fmu_host() -> String {
     let modules = [
         include_str!("../fmu/description.js"),
@@ -38,7 +41,7 @@ pub fn fmu_host() -> String {
         .map(|line| line.strip_prefix("export ").unwrap_or(line))
         .collect();
     let text = kept.join("\n");
-    format!("globalThis.FmuHost = (() => {{\n{text}\nreturn {{ Fmu, FmiError }};\n}})();\n")
+    format!("globalThis.FmuHost = (() => {{\n{text}\nreturn {{ Fmu, FmiError, unzip }};\n}})();\n")
 }
 
 #[cfg(test)]

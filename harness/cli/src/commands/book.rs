@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use pack::documentation::book;
-use pack::documentation::live::{self, Plant};
+use pack::documentation::live;
 
 /// Writes the documentation as a book: a static site with search, to be opened from the disk.
 ///
@@ -17,7 +17,7 @@ pub struct BookArgs {
     /// Directory for the site.
     #[arg(long, value_name = "DIRECTORY", default_value = "dist/book")]
     out: PathBuf,
-    /// With plants in the live pages: the FMUs as WebAssembly; harness/platforms/setup --wasm gets what that takes.
+    /// With plants in the live pages: FMUs and tank solver as WebAssembly; harness/platforms/setup --wasm gets what that takes.
     #[arg(long)]
     live: bool,
 }
@@ -26,12 +26,8 @@ impl BookArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
         pack::needs_source("the book")?;
-        let mut plants = Vec::new();
-        for name in live::models().filter(|_| self.live) {
-            let model = pack::model(name)?;
-            plants.push(Plant { model, module: pack::wasm(model)?.bytes });
-        }
-        let files = book::write(&pack::root(), &self.out, &plants)?;
+        let modules = if self.live { live::build()? } else { Vec::new() };
+        let files = book::write(&pack::root(), &self.out, &modules)?;
         done!("{} ({files} files)", self.out.join("index.html").display());
         Ok(())
     }

@@ -12,7 +12,7 @@ use serde_json::json;
 
 use super::Files;
 use super::fmu::one_file;
-use super::live::{self, Plant};
+use super::live::{self, Module};
 use super::page::{Gathered, Layout, Page};
 
 /// The list of parts and pages, from the project's root.
@@ -24,12 +24,12 @@ struct Part {
     pages: Vec<usize>,
 }
 
-/// Writes the book into a directory; with `plants`, for its live pages.
+/// Writes the book into a directory; with `modules`, for its live pages.
 ///
 /// # Errors
 /// As [`render`], or if a file cannot be written.
-pub fn write(root: &Path, out: &Path, plants: &[Plant]) -> Result<usize> {
-    let files = render(root, plants)?;
+pub fn write(root: &Path, out: &Path, modules: &[Module]) -> Result<usize> {
+    let files = render(root, modules)?;
     output::directory(out)?;
     for (name, bytes) in &files {
         output::atomically(&out.join(name), |file| Ok(std::io::Write::write_all(file, bytes)?))?;
@@ -41,7 +41,7 @@ pub fn write(root: &Path, out: &Path, plants: &[Plant]) -> Result<usize> {
 ///
 /// # Errors
 /// With every link that leads nowhere, every missing figure and every equation that is not LaTeX.
-pub fn render(root: &Path, plants: &[Plant]) -> Result<Files> {
+pub fn render(root: &Path, modules: &[Module]) -> Result<Files> {
     let (parts, pages, titles) = read(root)?;
     let mut all = Gathered::default();
     let mut files = Files::new();
@@ -49,7 +49,7 @@ pub fn render(root: &Path, plants: &[Plant]) -> Result<Files> {
         let body = page.html(root, &pages, Layout::Site, &mut all);
         let navigation = navigation(&parts, &pages, &titles, place);
         let neighbours = neighbours(&pages, &titles, place);
-        let head = live::head(page, plants);
+        let head = live::head(page, modules);
         let html = site_page(&titles[place], &head, &navigation, &body, &neighbours).into_string();
         files.push((format!("{}.html", page.name), html.into_bytes()));
     }
@@ -58,7 +58,7 @@ pub fn render(root: &Path, plants: &[Plant]) -> Result<Files> {
     files.push(("page.css".into(), super::CSS.into()));
     files.push(("search.js".into(), include_bytes!("search.js").to_vec()));
     files.push(("search-index.js".into(), search_index(&pages, &titles)?.into_bytes()));
-    files.extend(live::files(plants)?);
+    files.extend(live::files(modules)?);
     files.extend(all.figures()?);
     Ok(files)
 }

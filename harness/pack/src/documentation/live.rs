@@ -12,60 +12,94 @@ use super::Files;
 use super::page::Page;
 use crate::archive;
 use crate::fmi::Fmi;
-use crate::models::Model;
+use crate::platforms;
 
-/// A plant that live pages run.
-pub struct Plant {
-    /// Which FMU.
-    pub model: &'static Model,
-    /// Its module for WebAssembly.
-    pub module: Vec<u8>,
+/// What a live page computes with.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Needed {
+    /// The FMU of that name.
+    Fmu(&'static str),
+    /// The tank solver.
+    Tank,
+}
+
+impl Needed {
+    /// The script that holds it.
+    fn script(self) -> String {
+        match self {
+            Needed::Fmu(name) => format!("{name}.fmu.js"),
+            Needed::Tank => "tank.wasm.js".into(),
+        }
+    }
+}
+
+/// A module for WebAssembly that a live page computes with.
+pub struct Module {
+    /// What it is.
+    pub needed: Needed,
+    /// The module.
+    pub bytes: Vec<u8>,
 }
 
 struct Live {
     /// Name of the page.
     page: &'static str,
-    /// Name of its FMU.
-    model: &'static str,
+    needed: Needed,
     /// Names and texts of the scripts that are the page's own, in the order of their use.
     scripts: &'static [(&'static str, &'static str)],
 }
 
-const LIVE: [Live; 2] = [
-    Live { page: "swirl", model: "HubSlosh", scripts: &[("swirl.js", web::SWIRL)] },
+const LIVE: [Live; 3] = [
+    Live { page: "swirl", needed: Needed::Fmu("HubSlosh"), scripts: &[("swirl.js", web::SWIRL)] },
     Live {
         page: "slew",
-        model: "Spacecraft",
+        needed: Needed::Fmu("Spacecraft"),
         scripts: &[("loop.js", web::LOOP), ("slew.js", web::SLEW)],
     },
+    Live { page: "your_tank", needed: Needed::Tank, scripts: &[("your_tank.js", web::YOUR_TANK)] },
 ];
 
-/// The names of the FMUs that live pages run.
-pub fn models() -> impl Iterator<Item = &'static str> {
-    LIVE.iter().map(|live| live.model)
+/// What the live pages compute with.
+pub fn needed() -> impl Iterator<Item = Needed> {
+    LIVE.iter().map(|live| live.needed)
 }
 
-/// What the head of a page has besides, if it is live and there is a plant for it.
-pub fn head(page: &Page, plants: &[Plant]) -> Markup {
+/// Builds what the live pages compute with.
+///
+/// # Errors
+/// If something is missing for it, or if it does not build.
+pub fn build() -> Result<Vec<Module>> {
+    let built = |needed| {
+        let bytes = match needed {
+            Needed::Fmu(name) => crate::wasm(crate::model(name)?)?.bytes,
+            Needed::Tank => platforms::build_tank_page()?,
+        };
+        Ok(Module { needed, bytes })
+    };
+    needed().map(built).collect()
+}
+
+/// What the head of a page has besides, if it is live and there is a module for it.
+pub fn head(page: &Page, modules: &[Module]) -> Markup {
     let live = LIVE.iter().find(|live| live.page == page.name);
-    let live = live.filter(|live| plants.iter().any(|plant| plant.model.name == live.model));
+    let live = live.filter(|live| modules.iter().any(|module| module.needed == live.needed));
     html! {
         @if let Some(live) = live {
             link rel="stylesheet" href="live.css";
             @for script in ["three.js", "scene.js", "fmu.js", "live.js"] { script src=(script) defer {} }
-            script src=(script_of(live.model)) defer {}
+            script src=(live.needed.script()) defer {}
             @for (name, _) in live.scripts { script src=(name) defer {} }
         }
     }
 }
 
-/// The files that live pages load; none without plants.
+/// The files that live pages load; none without modules.
 ///
 /// # Errors
 /// If an FMU's description cannot be read.
-pub fn files(plants: &[Plant]) -> Result<Files> {
+pub fn files(modules: &[Module]) -> Result<Files> {
     let mut files = Files::new();
-    if plants.is_empty() {
+    if modules.is_empty() {
         return Ok(files);
     }
     let three = format!("/*\n{}*/\n{}", web::THREE_LICENSE, web::THREE);
@@ -77,19 +111,21 @@ pub fn files(plants: &[Plant]) -> Result<Files> {
     for (name, text) in LIVE.iter().flat_map(|live| live.scripts) {
         files.push(((*name).into(), (*text).into()));
     }
-    for Plant { model, module } in plants {
-        let name = model.name;
-        let fmu = archive::zipped(&[
-            ("modelDescription.xml".into(), model.description(Fmi::V2)?),
-            (format!("binaries/wasm32/{name}.wasm"), module.clone()),
-        ])?;
-        let fmu = Base64::encode_string(&fmu);
-        let text = format!("(globalThis.FMUS ??= {{}}).{name} = \"{fmu}\";\n");
-        files.push((script_of(name), text.into_bytes()));
+    for Module { needed, bytes } in modules {
+        let (global, name, packed) = match needed {
+            Needed::Fmu(name) => {
+                let description = crate::model(name)?.description(Fmi::V2)?;
+                let module = format!("binaries/wasm32/{name}.wasm");
+                let files = [("modelDescription.xml".into(), description), (module, bytes.clone())];
+                ("FMUS", *name, archive::zipped(&files)?)
+            }
+            Needed::Tank => {
+                ("MODULES", "tank", archive::zipped(&[("tank.wasm".into(), bytes.clone())])?)
+            }
+        };
+        let packed = Base64::encode_string(&packed);
+        let text = format!("(globalThis.{global} ??= {{}}).{name} = \"{packed}\";\n");
+        files.push((needed.script(), text.into_bytes()));
     }
     Ok(files)
-}
-
-fn script_of(model: &str) -> String {
-    format!("{model}.fmu.js")
 }
