@@ -162,14 +162,21 @@ impl RunArgs {
         if !self.sensors.is_empty() {
             notes.insert("sensors".into(), serde_json::json!(sensors.texts()).to_string());
         }
-        let beyond = range.and_then(|range| range.left(table.column(WAVE)?));
+        let beyond: Vec<String> = range
+            .iter()
+            .filter_map(|range| Some((range, table.column(WAVE)?)))
+            .flat_map(|(range, waves)| {
+                [range.left(waves), range.without_weight(waves, table.column("g_axial"))]
+            })
+            .flatten()
+            .collect();
         let driven = table.names().len() - columns.len();
         let kept = table.names()[..driven + asked].to_vec();
         let kept: Vec<String> = kept.into_iter().chain(sensors.columns()).collect();
         let kept: Vec<&str> = kept.iter().map(String::as_str).collect();
         let table = sensors.read(table, "run", run.step)?;
         write_out(&table.only(&kept), &self.out, &notes)?;
-        if let Some(how) = beyond {
+        for how in beyond {
             terminal::warn(format_args!("the run left the range of its model: {how}"));
         }
         Ok(())

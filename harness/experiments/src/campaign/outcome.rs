@@ -22,6 +22,7 @@ use analysis::rotary::{self, Rotary};
 use analysis::sweep::Sweep;
 use analysis::welch::{self, Spectra};
 use analysis::{FrequencyResponse, demodulation, logarithmic_grid, noise, spa};
+use formulas::similarity::{Liquid, ruling_force};
 use signals::table::Table;
 
 /// Frequencies at which responses are evaluated: 1.2 mHz apart at the antiresonance of the thesis's
@@ -635,7 +636,16 @@ pub struct Range {
     pub radius: f64,
     /// Fill, m; `None` if the modes come from a table, which knows of none.
     pub fill: Option<f64>,
+    /// The liquid's density and surface tension.
+    pub liquid: Liquid,
+    /// `g_axial` at the start, m/s².
+    pub g: f64,
+    /// Length of mode 1, m; 0 if nothing sloshes.
+    pub length: f64,
 }
+
+/// Below this Bond number no model here stands for the liquid (thesis 2.5, 8.2.2).
+const LEAST_BOND: f64 = 30.0;
 
 impl Range {
     /// Of an initialised instance; `None` if the FMU is not the bench.
@@ -650,7 +660,48 @@ impl Range {
             model,
             radius: instance.real("tank.d")? / 2.0,
             fill: (source.as_deref() != Some("table")).then_some(fill),
+            liquid: Liquid {
+                density: instance.real("fluid.rho")?,
+                tension: instance.real("fluid.sigma")?,
+            },
+            g: instance.real("g_axial")?,
+            length: instance.real("slosh.length[1]")?,
         }))
+    }
+
+    /// What the liquid of a run with these wave heights, m, is ruled by at its least specific force, if that is not gravity:
+    /// Bond, Weber and Froude numbers by the tank's radius and the fastest wave before, V = η √(g/l) (thesis 2.5). `g`: `g_axial`
+    /// at each row, m/s², of a run that drives it.
+    pub fn without_weight(&self, waves: &[f64], g: Option<&[f64]>) -> Option<String> {
+        if self.length <= 0.0 {
+            return None;
+        }
+        let g_at = |row: usize| g.map_or(self.g, |g| g[row]);
+        let (mut velocity, mut worst) = (0.0f64, None::<(f64, f64, f64)>);
+        for (row, wave) in waves.iter().enumerate() {
+            let g = g_at(row);
+            velocity = velocity.max(wave.abs() * (g.max(0.0) / self.length).sqrt());
+            let (bond, weber) =
+                (self.liquid.bond(g, self.radius), self.liquid.weber(velocity, self.radius));
+            // how far weight is from ruling: against 30, and against inertia
+            let rules = (bond / LEAST_BOND).min(bond / weber.max(1.0));
+            if rules < 1.0 && worst.is_none_or(|(other, ..)| rules < other) {
+                worst = Some((rules, bond, weber));
+            }
+        }
+        let (_, bond, weber) = worst?;
+        let froude = if bond > 0.0 { format!("{:.2}", weber / bond) } else { "infinite".into() };
+        let rules = match ruling_force(bond, weber) {
+            // it still rules, but the surface is curved
+            gravity if gravity.starts_with("gravity") => {
+                "the surface is curved, and where the liquid is, is uncertain"
+            }
+            other => other,
+        };
+        Some(format!(
+            "Bond number {bond:.3}, Weber number {weber:.3}, Froude number {froude} (waves and pendulums need a \
+             Bond number above {LEAST_BOND} and a Froude number below 1): {rules}"
+        ))
     }
 
     /// How a run with these wave heights, m, left it: a linear liquid in waves beyond a quarter of
@@ -709,4 +760,37 @@ pub(super) fn exact_linear(instance: &mut Instance) -> Result<Linear> {
     let mut line = |name: &str| instance.real(name).unwrap_or(0.0);
     let (stiffness, friction) = (line("hub.k"), bearing + line("hub.c"));
     Ok(Linear { inertia, friction, stiffness, arm, modes })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Liquid, Range};
+
+    #[test]
+    fn a_liquid_without_weight_is_told_by_its_numbers() {
+        // water in the bench's tank, mode 1 at 10 cm
+        let range = Range {
+            model: "spherical".into(),
+            radius: 0.0815,
+            fill: Some(0.1),
+            liquid: Liquid { density: 1000.0, tension: 0.072 },
+            g: 9.81,
+            length: 0.045_241,
+        };
+        assert_eq!(range.without_weight(&[0.02; 3], None), None, "Bo 905, Fr 0.1");
+        // 20 mm at 9.81 m/s²: V = 0.02 √(9.81/0.045241) = 0.2945 m/s, We = 1000 V² 0.0815/0.072 = 98.2
+        let cut = range.without_weight(&[0.02; 3], Some(&[9.81, 1.0, 0.01])).unwrap();
+        for words in ["Bond number 0.923", "Weber number 98.", "Froude number 106.", "inertia"] {
+            assert!(cut.contains(words), "{words}: {cut}");
+        }
+        // without weight at all, and at rest
+        let still = range.without_weight(&[0.0; 2], Some(&[9.81, 0.0])).unwrap();
+        assert!(still.contains("Froude number infinite"), "{still}");
+        assert!(still.contains("surface tension"), "{still}");
+        // at Bo 9 gravity still rules, but no flat surface is left
+        let low = Range { g: 0.1, ..range.clone() }.without_weight(&[1e-4], None).unwrap();
+        assert!(low.contains("Bond number 9.225") && low.contains("curved"), "{low}");
+        let frozen = Range { length: 0.0, ..range };
+        assert_eq!(frozen.without_weight(&[0.0], Some(&[0.0])), None, "nothing sloshes");
+    }
 }
