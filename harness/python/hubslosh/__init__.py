@@ -9,9 +9,9 @@
 `margins` how far that loop is from instability, `monte_carlo` many runs with drawn parameters,
 `linearize` a state-space model, `frequency_response` an estimate from a history, `fit` a transfer
 function through such an estimate; `analyse`, `campaign`, `identify` and `tank` call the program
-``hubslosh``, `liquid_modes` finds slosh modes in three dimensions, `posterior` samples what
-`identify` states. `view` shows a run in 3-D, `plot` draws. `Plant` and `drive` are for those who
-step an instance themselves.
+``hubslosh``, `liquid_modes` finds slosh modes in three dimensions, `mode_errors` says how many a
+model needs, `posterior` samples what `identify` states. `view` shows a run in 3-D, `plot` draws.
+`Plant` and `drive` are for those who step an instance themselves.
 """
 
 from importlib import import_module
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from .liquid import LiquidModes, liquid_modes
     from .loop import Law, Loop, closed_loop
     from .mcmc import posterior
+    from .modes import mode_errors
     from .plant import COLUMNS, TORQUE, Plant, RunError, drive
     from .program import Estimated, Identification, analyse, campaign, identify
     from .sampling import draw, monte_carlo, quantiles
@@ -48,6 +49,7 @@ _MODULES = {
     "liquid": ("LiquidModes", "liquid_modes"),
     "loop": ("Law", "Loop", "closed_loop"),
     "mcmc": ("posterior",),
+    "modes": ("mode_errors",),
     "plant": ("COLUMNS", "TORQUE", "Plant", "RunError", "drive"),
     "program": ("Estimated", "Identification", "analyse", "campaign", "identify"),
     "sampling": ("draw", "monte_carlo", "quantiles"),
@@ -93,6 +95,7 @@ __all__ = [
     "linearize",
     "liquid_modes",
     "margins",
+    "mode_errors",
     "monte_carlo",
     "plot",
     "posterior",

@@ -1,0 +1,103 @@
+"""How many slosh modes a model needs: the force's error against their number."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from .fmu import FmuError, Quantity
+from .plant import Plant
+from .simulation import parameters_of
+
+Vector = NDArray[np.float64]
+
+TOLERANCES = (0.05, 0.01)
+"""Of which `mode_errors` says how many modes meet them, as the thesis does (4.2.1)."""
+
+
+def impulse(masses: Vector, omegas: Vector, zetas: Vector, time: Vector) -> NDArray[np.float64]:
+    """Force (N) of each mode on a tank after an impulse of 1 m/s of the tank, a row a mode.
+
+    l a'' + 2 zeta omega l a' + g a = -u for u an impulse, F = m (g a + 2 zeta omega l a') (4.16 to
+    4.21 of Rubaga's thesis).
+    """
+    omegas, zetas = omegas[:, None], zetas[:, None]
+    damped = omegas * np.sqrt(1 - zetas**2)
+    decay = np.exp(-zetas * omegas * time)
+    angle = -decay * np.sin(damped * time) / damped
+    rate = -decay * (np.cos(damped * time) - zetas * omegas / damped * np.sin(damped * time))
+    return masses[:, None] * (omegas**2 * angle + 2 * zetas * omegas * rate)
+
+
+def mode_responses(
+    masses: Vector, omegas: Vector, zetas: Vector, frequencies: Vector
+) -> NDArray[np.complex128]:
+    """Force of each mode on a tank over its acceleration (kg) at frequencies (Hz), a row a mode."""
+    w = 2 * np.pi * np.asarray(frequencies)
+    spring = omegas[:, None] ** 2 + 2j * (zetas * omegas)[:, None] * w
+    return -masses[:, None] * spring / (spring - w**2)
+
+
+def mode_errors(
+    parameters: Mapping[str, Quantity] | str | Path | None = None,
+    below: float | None = None,
+    fmu: str | Path = "HubSlosh",
+) -> pd.DataFrame:
+    """Say what the force on HubSlosh's tank lacks with fewer modes than ``slosh.modes``.
+
+    parameters: of HubSlosh, as for `simulate`; ``slosh.modes``, the reference, is 10 if not said.
+    below: band that matters, from 0, Hz; by default up to 1.5 times the first mode's frequency.
+
+    Returns a row a number of modes, with the columns
+
+    * ``impulse``: the error of the force after an impulse of the tank, over the largest force of
+      the reference (4.24 of the thesis);
+    * ``band``: the largest error below ``below`` of force over acceleration, over the liquid's
+      mass.
+
+    ``.attrs["needed"]`` says how many modes are enough for 5 % and 1 % of each. The impulse excites
+    every frequency alike; a loop does not: `band` is what counts there.
+    """
+    settings: dict[str, Quantity] = {"slosh.modes": 10} | dict(parameters_of(parameters))
+    with Plant(fmu, settings) as plant:
+        count = int(plant.get(["slosh.modes"])[0])
+        names = ("slosh.mass", "slosh.frequency", "slosh.damping")
+        values = plant.get([f"{name}[{n}]" for name in names for n in range(1, count + 1)])
+        (liquid,) = plant.get(["tank.m_liq"])
+    masses, frequencies, zetas = np.array(values).reshape(3, count)
+    if not (masses > 0).all() or not (frequencies > 0).all():
+        raise FmuError("no mode moves: slosh.model is frozen, or g_axial is 0")
+    omegas = 2 * np.pi * frequencies
+    below = 1.5 * frequencies[0] if below is None else below
+    if not below > 0:
+        raise FmuError(f"below={below} (allowed: above 0)")
+    # sixty points in the fastest period, twenty periods of the slowest
+    time = np.arange(0, 20 / frequencies[0], 1 / (60 * frequencies[-1]))
+    forces = impulse(masses, omegas, zetas, time)
+    # the peak of a mode is 2 zeta wide: ten points in it
+    peaks = [
+        np.linspace(f * (1 - 5 * z), f * (1 + 5 * z), 51)
+        for f, z in zip(frequencies, zetas, strict=True)
+    ]
+    grid = np.unique(np.concatenate([np.linspace(0, below, 2001), *peaks]))
+    grid = grid[(grid >= 0) & (grid <= below)]
+    whole = forces.sum(axis=0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # what is left out moves with the tank; without damping a mode in the band makes it infinite
+        lacks = mode_responses(masses, omegas, zetas, grid) + masses[:, None]
+    lacks[~np.isfinite(lacks)] = np.inf
+    rows = []
+    for n in range(1, count + 1):
+        force, mass = (np.abs(left[n:].sum(axis=0)).max() for left in (forces, lacks))
+        rows.append((force / np.abs(whole).max(), mass / liquid))
+    table = pd.DataFrame(
+        rows, columns=["impulse", "band"], index=pd.RangeIndex(1, count + 1, name="modes")
+    )
+    table.attrs["needed"] = {
+        column: {tolerance: int((table[column] < tolerance).idxmax()) for tolerance in TOLERANCES}
+        for column in table.columns
+    }
+    table.attrs["below"] = float(below)
+    return table

@@ -1,0 +1,56 @@
+"""Draw the force's error against the number of modes: book/mode_errors.svg.
+
+    python3 harness/python/mode_errors.py
+
+needs dist/HubSlosh.fmu (``cargo run --release -- pack``) and the packages in requirements.txt.
+Figure 4.4 of Rubaga's thesis, for the bench's two fills, and beside it the error within the band
+of the bench's sweeps.
+"""
+
+from pathlib import Path
+
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+
+import hubslosh
+from hubslosh import plot
+
+ROOT = Path(__file__).resolve().parents[2]
+PICTURE = ROOT / "book" / "mode_errors.svg"
+BELOW = 3.5  # Hz, the end of the sweeps
+
+
+def main() -> None:
+    """Compute and draw."""
+    mpl.rcParams["svg.hashsalt"] = "hubslosh"
+    figure, axes = plt.subplots(figsize=(7.2, 4.2), layout="constrained")
+    for fill, color in ((0.1, plot.COLORS[0]), (0.05, plot.COLORS[1])):
+        errors = hubslosh.mode_errors({"tank.h": fill}, BELOW, ROOT / "dist" / "HubSlosh.fmu")
+        fewer = errors.iloc[:-1]
+        label = f"{100 * fill:g} cm"
+        axes.semilogy(
+            fewer.index,
+            100 * fewer["impulse"],
+            "o-",
+            color=color,
+            label=f"after an impulse, {label}",
+        )
+        axes.semilogy(
+            fewer.index, 100 * fewer["band"], "s--", color=color,
+            label=f"below {BELOW} Hz, of the liquid's mass, {label}",
+        )  # fmt: skip
+        print(label, errors.attrs["needed"], errors.to_string(), sep="\n")
+    for percent in (5, 1):
+        axes.axhline(percent, color="#888888", linewidth=0.8)
+        axes.annotate(f"{percent} %", (9, percent), textcoords="offset points", xytext=(-4, 3))
+    axes.set_xlabel("slosh modes kept (reference: 10)")
+    axes.set_ylabel("error of the force on the tank, %")
+    axes.set_title("What fewer modes cost: much after an impulse, little in a band")
+    axes.grid(alpha=0.3, which="both")
+    axes.legend(fontsize=9)
+    figure.savefig(PICTURE, metadata={"Date": None, "Creator": None})
+    print(f"wrote {PICTURE}")
+
+
+if __name__ == "__main__":
+    main()
