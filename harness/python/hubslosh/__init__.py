@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .files import to_csv, to_mat, to_parquet
     from .fitting import TransferFunction, fit
     from .fmu import Fmu, FmuError, FmuWarning, Quantity, Value
+    from .inertia import bottom_up
     from .linearization import LinearModel, linearize
     from .liquid import LiquidModes, liquid_modes
     from .loop import Law, Loop, closed_loop
@@ -45,6 +46,7 @@ _MODULES = {
     "files": ("to_csv", "to_mat", "to_parquet"),
     "fitting": ("TransferFunction", "fit"),
     "fmu": ("Fmu", "FmuError", "FmuWarning", "Quantity", "Value"),
+    "inertia": ("bottom_up",),
     "linearization": ("LinearModel", "linearize"),
     "liquid": ("LiquidModes", "liquid_modes"),
     "loop": ("Law", "Loop", "closed_loop"),
@@ -85,6 +87,7 @@ __all__ = [
     "analyse",
     "attitude",
     "batch",
+    "bottom_up",
     "campaign",
     "closed_loop",
     "draw",

@@ -1,0 +1,87 @@
+"""Inertia of a hub from its parts (thesis 5.3): a sum of own inertias and m r^2."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from .fmu import FmuError
+
+SHAPES = {
+    "point": "nothing of its own",
+    "box": "(a, b): a block, its sides across the bearing axis, m",
+    "disc": "radius: a solid cylinder along the bearing axis, m",
+    "tube": "(inner, outer): a hollow cylinder along the bearing axis, radii, m",
+    "rod": "(radius, length): a solid cylinder across the bearing axis, m",
+    "inertia": "the part's own inertia about its centre, parallel to the bearing axis, kg m2",
+}
+"""What a part may be, and what says how large it is."""
+
+
+def _own(shape: str, mass: float, size: Any) -> float:
+    """Return a part's inertia about its own centre, parallel to the bearing axis."""
+    numbers = np.atleast_1d(np.asarray(size, dtype=float))
+    count = {"box": 2, "tube": 2, "rod": 2}.get(shape, 1)
+    if numbers.shape != (count,) or not np.isfinite(numbers).all() or (numbers < 0).any():
+        raise FmuError(f"{shape}={size!r} (allowed: {SHAPES[shape]}; 0 or more)")
+    if shape == "inertia":
+        return float(numbers[0])
+    if shape == "disc":
+        return float(mass * numbers[0] ** 2 / 2)
+    a, b = numbers
+    if shape == "tube":
+        if a > b:
+            raise FmuError(f"tube={size!r}: the inner radius is above the outer one")
+        return float(mass * (a**2 + b**2) / 2)
+    return float(mass * ((a**2 + b**2) if shape == "box" else (3 * a**2 + b**2)) / 12)
+
+
+def bottom_up(parts: Mapping[str, Mapping[str, Any]] | Sequence[Mapping[str, Any]]) -> pd.DataFrame:
+    """Add up the inertia of HubSlosh's hub and dry tank about the bearing axis.
+
+    parts: by name, each a mapping with ``mass`` (kg), ``position`` (x, y) of its centre (m; from
+    the bearing axis, x radial towards the tank, y towards +theta; (0, 0) if not said) and one of
+    `SHAPES`: ``{"plate": {"mass": 2.1, "box": (0.5, 0.3)}}``. With ``inertia`` alone, as from CAD
+    and about the bearing axis, ``mass`` is 0 if not said.
+
+    Returns a row a part: ``mass``, ``own`` inertia, ``offset`` (m r^2), their sum ``inertia`` and
+    its ``share``. ``.attrs["parameters"]`` are HubSlosh's ``hub.I``, ``hub.imbalance`` and
+    ``hub.imbalance_angle``, for `simulate`.
+    """
+    if not isinstance(parts, Mapping):
+        parts = {str(part.get("name", k)): part for k, part in enumerate(parts, 1)}
+    rows, problems, moment = {}, [], np.zeros(2)
+    for name, part in parts.items():
+        try:
+            given = [shape for shape in SHAPES if shape in part]
+            wrong = set(part) - set(SHAPES) - {"name", "mass", "position"}
+            if wrong or len(given) > 1:
+                keys = ", ".join(sorted(wrong) or given)
+                raise FmuError(f"{keys} (allowed: mass, position and one of {', '.join(SHAPES)})")
+            shape = given[0] if given else "point"
+            mass = float(part.get("mass", 0.0 if shape == "inertia" else np.nan))
+            if not (np.isfinite(mass) and mass >= 0):
+                raise FmuError(f"mass={part.get('mass')!r} (allowed: 0 or more, kg)")
+            at = np.asarray(part.get("position", (0.0, 0.0)), dtype=float)
+            if at.shape != (2,) or not np.isfinite(at).all():
+                raise FmuError(f"position={part['position']!r} (allowed: (x, y), m)")
+            own = 0.0 if shape == "point" else _own(shape, mass, part[shape])
+        except (FmuError, TypeError, ValueError) as error:
+            problems.append(f"{name}: {error}")
+            continue
+        rows[name] = (mass, own, mass * (at @ at))
+        moment += mass * at
+    if problems or not rows:
+        raise FmuError("; ".join(problems) or "there are no parts")
+    table = pd.DataFrame.from_dict(rows, orient="index", columns=["mass", "own", "offset"])
+    table.index.name = "part"
+    table["inertia"] = table["own"] + table["offset"]
+    total = float(table["inertia"].sum())
+    table["share"] = table["inertia"] / total if total > 0 else 0.0
+    table.attrs["parameters"] = {
+        "hub.I": total,
+        "hub.imbalance": float(np.hypot(*moment)),
+        "hub.imbalance_angle": float(np.arctan2(moment[1], moment[0])),
+    }
+    return table
