@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from . import accessor as accessor  # run.hubslosh
 from .arguments import names_of, not_numbers
 from .fmu import INTEGERS, Fmu, FmuError, Quantity, did_you_mean
 from .plant import TORQUE, Plant

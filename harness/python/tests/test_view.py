@@ -32,6 +32,11 @@ def test_a_table_is_shown_with_the_parameters_it_was_made_with(fmu: Path, reques
     angle = np.frombuffer(base64.b64decode(drawn["columns"]["slosh_angle"]), "<f4")
     assert np.array_equal(angle, run["slosh_angle"].to_numpy().astype("f4"))
     assert "srcdoc" in page._repr_html_() and page.path is None
+    # the table's own name for it, also of a part of the table
+    same = run.hubslosh.view(program=option(request, "--hubslosh"))
+    assert same.html == page.html
+    part = run[run["time"] < 1.0].hubslosh.view(program=option(request, "--hubslosh"))
+    assert shown(part.html)["time"]["count"] == (run["time"] < 1.0).sum()
 
 
 def test_a_table_without_what_moves_is_refused_by_the_columns(
