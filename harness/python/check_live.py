@@ -1,4 +1,4 @@
-"""Try the live pages of the book in a browser: bits, controls, link, margins, sizes.
+"""Try the live pages of the book in a browser: bits, controls, link, margins, contrast, sizes.
 
 A page's plant answers the inputs of its FMU's example with the bits of ``hubslosh run --hold`` on
 this machine; the margins of "Slew" are those of ``slew_margins.py``. Needs Playwright
@@ -16,6 +16,8 @@ import sys
 from pathlib import Path
 
 from playwright.sync_api import Browser, Page, sync_playwright
+
+import contrast
 
 SHARED = ("three.js", "scene.js", "fmu.js", "live.js")
 PAGES = {
@@ -253,7 +255,7 @@ def slew(browser: Browser, address: str, native: Path, expected: Path) -> None:
     page.context.close()
 
 
-def your_tank(browser: Browser, address: str, program: Path, folder: Path) -> None:
+def your_tank(browser: Browser, address: str, program: Path, folder: Path, axe: Path) -> None:
     """Try the page "Your tank"."""
     page = opened(browser, address, viewport={"width": 1400, "height": 1000})
     print(speed(page, "your_tank"))
@@ -283,11 +285,13 @@ def your_tank(browser: Browser, address: str, program: Path, folder: Path) -> No
     page.evaluate("location.hash = 'shape=torus&ring=0.1&tube=0.3'")
     page.wait_for_function("your_tank.problems?.length > 0")
     assert page.inner_text(".live-says")
+    contrast.demand(page, axe, "your_tank, refused")
 
     # a drawing by keyboard alone, and the page that its address opens
     page.evaluate("location.hash = 'shape=drawn'")
     page.wait_for_function("your_tank.drawn && !your_tank.problems")
     before = page.evaluate("your_tank.answer.modal.modes[0].lambda")
+    contrast.demand(page, axe, "your_tank, drawn")
     page.focus(".point >> nth=2")
     page.keyboard.press("ArrowRight")
     page.keyboard.press("ArrowRight")
@@ -302,8 +306,8 @@ def your_tank(browser: Browser, address: str, program: Path, folder: Path) -> No
     page.context.close()
 
 
-def looks(browser: Browser, address: str, name: str, pictures: Path | None) -> None:
-    """Nothing moves by itself where it should not; no page is wider than a phone."""
+def looks(browser: Browser, address: str, name: str, axe: Path, pictures: Path | None) -> None:
+    """Nothing moves by itself where it should not; no page is wider than a phone, or too faint."""
     wide, phone = {"width": 1400, "height": 1000}, {"width": 400, "height": 860}
     kinds: dict[str, dict] = {
         "wide": {"viewport": wide},
@@ -317,6 +321,8 @@ def looks(browser: Browser, address: str, name: str, pictures: Path | None) -> N
         assert (one.evaluate(f"{name}.time") == 0) == (look == "still")
         width = options["viewport"]["width"]
         assert one.evaluate("document.documentElement.scrollWidth") <= width, (name, look)
+        passed = contrast.demand(one, axe, f"{name}, {look}")
+        print(f"{name}, {look}: {passed} texts with contrast for WCAG AA, no finding of axe-core")
         if pictures:
             pictures.mkdir(parents=True, exist_ok=True)
             one.wait_for_timeout(4000)
@@ -339,6 +345,7 @@ def main() -> None:
         help="a folder: HubSlosh.csv and Spacecraft.csv of hubslosh run --hold, margins.json",
     )
     parser.add_argument("program", type=Path, help="the program hubslosh")
+    parser.add_argument("axe", type=Path, help="axe.min.js of npm's axe-core")
     parser.add_argument("--pictures", type=Path, help="folder for pictures of the pages")
     arguments = parser.parse_args()
     chromium = shutil.which("chromium")
@@ -353,9 +360,9 @@ def main() -> None:
         )
         swirl(browser, address["swirl"], native / "HubSlosh.csv")
         slew(browser, address["slew"], native / "Spacecraft.csv", native / "margins.json")
-        your_tank(browser, address["your_tank"], arguments.program, native)
+        your_tank(browser, address["your_tank"], arguments.program, native, arguments.axe)
         for name in PAGES:
-            looks(browser, address[name], name, arguments.pictures)
+            looks(browser, address[name], name, arguments.axe, arguments.pictures)
         browser.close()
     # other pages load nothing of this
     for other in arguments.book.glob("*.html"):

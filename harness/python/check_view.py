@@ -2,7 +2,8 @@
 
 Makes three runs: a sweep with rotary slosh, a slew in six axes with two tanks, a tank that drains.
 Of each, at three instants, the bobs that are drawn are read back and compared with where the
-table's numbers put them; so is the wave at the wall. Leaves nine screenshots.
+table's numbers put them; so is the wave at the wall. Contrast and the rest of WCAG 2 AA are
+axe-core's to judge. Leaves nine screenshots.
 
 Needs Playwright (``requirements-browser.txt``) and Debian's Chromium; ``.ci/browser`` gets both.
 """
@@ -20,6 +21,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from playwright.sync_api import Browser, Page, sync_playwright
+
+import contrast
 
 Row = dict[str, float]
 Vector = Sequence[float]
@@ -289,37 +292,12 @@ def keys(page: Page) -> None:
     assert span[1] < span[0] < span[2], "a click on a plot goes nowhere"
 
 
-CONTRAST = """
-() => {
-  const channel = (c) => (c <= 10 ? c / 3294.6 : ((c / 255 + 0.055) / 1.055) ** 2.4);
-  const luminance = ([r, g, b]) => 0.2126 * channel(r) + 0.7152 * channel(g) + 0.0722 * channel(b);
-  const numbers = (color) => color.match(/[\\d.]+/g).map(Number);
-  const behind = (element) => {
-    for (let e = element; e; e = e.parentElement) {
-      const color = numbers(getComputedStyle(e).backgroundColor);
-      if (color.length < 4 || color[3] > 0.8) return color;
-    }
-    return [255, 255, 255];
-  };
-  const all = "h1, p, span, b, label, output, button, summary, li, kbd, select";
-  const texts = [...document.querySelectorAll(all)];
-  return texts.filter((e) => e.textContent.trim() && e.getClientRects().length).flatMap((e) => {
-    const [one, two] = [numbers(getComputedStyle(e).color), behind(e)].map(luminance)
-      .sort((a, b) => a - b);
-    const ratio = (two + 0.05) / (one + 0.05);
-    const text = `${e.tagName} "${e.textContent.trim().slice(0, 20)}" ${ratio.toFixed(2)}`;
-    return ratio < 4.5 ? [text] : [];
-  });
-}
-"""
-"""Texts below WCAG's 4.5 : 1."""
-
-
 def main() -> None:
     """Check all cases; exit with 1 and a sentence if one is not drawn as its table says."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("binary", type=Path, help="the program hubslosh")
     parser.add_argument("fmus", type=Path, help="the folder with the packed FMUs")
+    parser.add_argument("axe", type=Path, help="axe.min.js of npm's axe-core")
     parser.add_argument("out", type=Path, help="a folder for runs, pages and screenshots")
     arguments = parser.parse_args()
     chromium = shutil.which("chromium")
@@ -343,8 +321,7 @@ def main() -> None:
                 row = min(data, key=lambda row: abs(row["time"] - instant))
                 worst = max(worst, compare(page, case, row, reach))
                 assert page.evaluate("document.documentElement.scrollWidth") <= width
-                faint = page.evaluate(CONTRAST)
-                assert not faint, f"{case.name}, {scheme}: too faint: {faint[:5]}"
+                contrast.demand(page, arguments.axe, f"{case.name}, {scheme}, {width} px")
                 page.wait_for_timeout(300)
                 shot = f"{case.name}_{instant:g}s_{width}_{scheme}.png"
                 page.screenshot(path=arguments.out / shot)
