@@ -463,10 +463,11 @@ mod tests {
         }
     }
 
-    /// All tolerances occur; the tightest is where rounding makes trouble.
+    /// All tolerances occur; the tightest is where rounding makes trouble. Sixteen craft at every tolerance
+    /// take a minute: below.
     #[test]
     fn a_long_step_of_a_draining_craft_ends_where_its_pieces_do_for_at_most_twice_their_work() {
-        for seed in 0..16 {
+        for seed in 0..4 {
             let other = [1e-4, 1e-6, 1e-8, 1e-10][seed as usize % 4];
             compare_lengths_of_steps(seed, &[other, 1e-12]);
         }
