@@ -268,15 +268,13 @@ fn nested(levels: usize) -> String {
     xml().replacen("<ModelVariables>", &format!("{annotations}<ModelVariables>"), 1)
 }
 
+/// No parser sees them: `host::xml` refuses levels without an end as too deep, not as ill-formed.
 #[test]
-fn two_hundred_thousand_levels_are_refused_within_a_second() {
+fn two_hundred_thousand_levels_are_refused_by_their_number() {
     let bytes = zipped(&with(XML, nested(200_000).into_bytes()), CompressionMethod::Deflated);
-    let started = std::time::Instant::now();
     let report = look(&bytes, &[]);
-    let time = started.elapsed().as_secs_f64();
     assert_eq!(broken(&report), BTreeSet::from(["xml.size"]), "{}", report.text());
     assert!(report.text().contains("256 levels"), "{}", report.text());
-    assert!(time < 1.0, "{time} s");
     // what annotations have is read
     let report =
         look(&zipped(&with(XML, nested(50).into_bytes()), CompressionMethod::Stored), &["xml"]);
