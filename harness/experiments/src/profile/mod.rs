@@ -119,7 +119,13 @@ impl Written {
         let (name, rest) = text.split_once(':').unwrap_or((text, ""));
         let name = name.trim();
         let mut written = Written { name: name.into(), pairs: Vec::new() };
-        for pair in rest.split(',').filter(|pair| !pair.trim().is_empty()) {
+        // a comma within a name, p[1,2], divides no pairs
+        let mut depth = 0i32;
+        let pairs = rest.split(|c| {
+            depth += i32::from(c == '[') - i32::from(c == ']');
+            c == ',' && depth == 0
+        });
+        for pair in pairs.filter(|pair| !pair.trim().is_empty()) {
             let (key, value) = pair.split_once('=').with_context(|| {
                 format!("{what} {name}: \"{pair}\" is not of the form key=value")
             })?;

@@ -257,6 +257,8 @@ fn what_is_wrong_with_a_sensor_is_said_with_what_is_allowed() {
     ] {
         assert!(refused(text, &[set]).contains(words), "{text}: {}", refused(text, &[set]));
     }
+    // elements of two-dimensional arrays have commas in their names
+    assert!(refused("a=variable:of=p[1,2],noise=1", &[]).contains("no variable \"p[1,2]\""));
     let plan = "profile = \"sine\"\n[sensor]\nwave = \"gage\"\nload = 3\n";
     let error = format!("{:#}", Plan::parse(plan).unwrap_err());
     assert!(error.contains("line 3: sensor wave: there is no kind \"gage\""), "{error}");
