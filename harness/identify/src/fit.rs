@@ -529,7 +529,10 @@ impl<'a> Problem<'a> {
     }
 
     /// Gauss and Newton's steps from near a minimum, until the Newton decrement is below [`DECREMENT`], with
-    /// at most `rounds` sets of sensitivities. A step that makes it worse is shortened.
+    /// at most `rounds` sets of sensitivities. A step v that makes it worse has left a bent valley: there
+    /// e(x + v) − e(x) − J v is what the curvature has made, and −(JᵀJ)⁻¹Jᵀ of it leads back (second order, without another
+    /// simulation but that of the new point; Transtrum & Sethna, arXiv:1207.4999, geodesic acceleration). A step that is worse
+    /// even so is shortened.
     pub fn polish(
         &self,
         x: &[f64],
@@ -572,17 +575,27 @@ impl<'a> Problem<'a> {
                 before = decrement;
                 let (mut part, mut taken) = (1.0, false);
                 while part > 1e-3 && !taken {
-                    let mut part_of_step = vec![0.0; x.len()];
-                    free.iter()
-                        .zip(step.iter())
-                        .for_each(|(&j, step)| part_of_step[j] = part * step);
-                    let moved = stribeck::moved(&self.unknowns, &x, &part_of_step, fastest);
-                    simulations += 1;
-                    if let Ok(there) = self.answer(&moved) {
-                        let new = self.stacked(&there, &moved);
+                    let mut straight = DVector::zeros(x.len());
+                    free.iter().zip(step.iter()).for_each(|(&j, step)| straight[j] = part * step);
+                    let mut trial =
+                        stribeck::moved(&self.unknowns, &x, straight.as_slice(), fastest);
+                    // the step and, where it makes it worse, the same along the bent valley
+                    for is_straight in [true, false] {
+                        simulations += 1;
+                        let Ok(there) = self.answer(&trial) else { break };
+                        let new = self.stacked(&there, &trial);
                         if new.norm_squared() < e.norm_squared() {
-                            (x, answer, e, taken) = (moved, there, new, true);
+                            (x, answer, e, taken) = (trial, there, new, true);
+                            break;
                         }
+                        if !is_straight {
+                            break;
+                        }
+                        let bend = &new - &e - part * (&jacobian * &step);
+                        let back = -(&covariance.x * jacobian.tr_mul(&bend));
+                        let mut aside = vec![0.0; x.len()];
+                        free.iter().zip(back.iter()).for_each(|(&j, back)| aside[j] = *back);
+                        trial = stribeck::moved(&self.unknowns, &trial, &aside, fastest);
                     }
                     part *= 0.3;
                 }

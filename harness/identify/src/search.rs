@@ -21,7 +21,7 @@ const NEAR: f64 = 1.5;
 const JOINS: f64 = 20.0;
 
 /// Sets of sensitivities that Gauss and Newton's steps have at most.
-const ROUNDS: usize = 6;
+pub const ROUNDS: usize = 6;
 
 /// The search for one model's minimum.
 pub struct Search<'a, 'h> {

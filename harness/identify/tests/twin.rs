@@ -130,6 +130,34 @@ fn along_the_frictions_flat_valley_the_interval_is_that_of_the_likelihood() {
     assert!(said, "{:?}", found.verdict);
 }
 
+/// Tank, hub, friction and the gyro's scale stand for one another along a valley that bends: across it the tank is known 200 times
+/// better than along it. Spherical slosh shows the scale, and the minimum is a hundredth away from where the fit begins to seek it.
+#[test]
+fn the_minimum_is_found_along_the_bent_valley_of_the_gyros_scale() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let torque = twin::torque("multisine:0.25,200").unwrap();
+    let settings = [
+        ("slosh.model", "spherical"),
+        ("slosh.zeta_from_correlation", "false"),
+        ("slosh.zeta", "0.003"),
+    ];
+    let errors = SensorErrors { gyro_scale: 1.01, ..SensorErrors::default() };
+    let recording = twin::record(&fmu, &settings, &torque, Some(4), errors).unwrap();
+    let options = Options {
+        models: vec!["spherical".into()],
+        gyro_scale: 0.01,
+        intersample: Some(Intersample::FirstOrderHold),
+        ..options()
+    };
+    let found = identify(&fmu, &[recording], &options, &mut |_| {}).unwrap();
+    let fit = &found.details.fit;
+    assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
+    assert!(fit.newton_decrement < 0.1, "{} standard deviations away", fit.newton_decrement);
+    let scale = &found.measurement["gyro_scale"];
+    // the recording says more of it than was known before, or there was no valley to go along
+    assert!((scale.value - 1.01).abs() < 4.0 * scale.std && scale.std < 0.005, "{scale:?}");
+}
+
 /// Which the general tests of the residual do not see: they stay below 4, and the friction is off by tens of its standard deviations.
 #[test]
 fn a_drag_that_the_model_lacks_is_named_with_its_size() {

@@ -23,6 +23,7 @@ use crate::news::News;
 use crate::options::Options;
 use crate::plausible;
 use crate::recording::{self, Recording};
+use crate::search::ROUNDS;
 use crate::start::{self, Response};
 use crate::uncertainty::{self, Covariance, Sources};
 use crate::unknown::{Quantity, Unknown};
@@ -257,7 +258,7 @@ fn finish(
     }
     // the gyro's scale is nearly a combination of the others: only exact sensitivities tell it from them
     problem.differences = Differences::Central;
-    let polished = problem.polish(&x, Some(&known), 3)?;
+    let polished = problem.polish(&x, Some(&known), ROUNDS)?;
     fit.simulations += polished.simulations;
     fit.converged = polished.decrement < NEAR;
     fit.newton_decrement = polished.decrement;
