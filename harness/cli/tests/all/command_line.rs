@@ -541,14 +541,17 @@ fn quiet_leaves_results_and_warnings_and_strict_makes_warnings_fail() {
     assert_eq!(text(&loud.stdout), "11 rows in out.csv\n");
     let quiet = short_run(directory, &["--profile", "zero", "--quiet", "--strict"]);
     assert!(quiet.status.success() && quiet.stdout.is_empty() && quiet.stderr.is_empty());
-    // no stiffness: the FMU warns
+    // no stiffness: the FMU warns, and the run says which force rules the liquid
     let weightless = ["--profile", "zero", "--set", "g_axial=0", "--quiet"];
     let warned = short_run(directory, &weightless);
     assert!(warned.status.success() && text(&warned.stderr).starts_with("warning: "));
     let strict = short_run(directory, &[&weightless[..], &["--strict"]].concat());
     assert_eq!(strict.status.code(), Some(1));
     let last = text(&strict.stderr).lines().last().map(String::from);
-    assert_eq!(last.as_deref(), Some("error: there was a warning, which --strict makes an error"));
+    assert_eq!(
+        last.as_deref(),
+        Some("error: there were 2 warnings, which --strict makes an error")
+    );
     let rows = hubslosh(directory, &["--quiet", "torque", "--profiles"]);
     assert!(text(&rows.stdout).contains("exp-sweep"), "what is asked for is no notice");
 }
