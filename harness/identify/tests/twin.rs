@@ -130,8 +130,8 @@ fn along_the_frictions_flat_valley_the_interval_is_that_of_the_likelihood() {
     assert!(said, "{:?}", found.verdict);
 }
 
-/// Tank, hub, friction and the gyro's scale stand for one another along a valley that bends: across it the tank is known 200 times
-/// better than along it. Spherical slosh shows the scale, and the minimum is a hundredth away from where the fit begins to seek it.
+/// Tank, hub, friction and the gyro's scale stand for one another along a valley that bends. Spherical slosh shows the scale, and the
+/// minimum is two hundredths away from where the fit begins to seek it.
 #[test]
 fn the_minimum_is_found_along_the_bent_valley_of_the_gyros_scale() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
@@ -141,11 +141,11 @@ fn the_minimum_is_found_along_the_bent_valley_of_the_gyros_scale() {
         ("slosh.zeta_from_correlation", "false"),
         ("slosh.zeta", "0.003"),
     ];
-    let errors = SensorErrors { gyro_scale: 1.01, ..SensorErrors::default() };
+    let errors = SensorErrors { gyro_scale: 1.02, ..SensorErrors::default() };
     let recording = twin::record(&fmu, &settings, &torque, Some(4), errors).unwrap();
     let options = Options {
         models: vec!["spherical".into()],
-        gyro_scale: 0.01,
+        gyro_scale: 0.02,
         intersample: Some(Intersample::FirstOrderHold),
         ..options()
     };
@@ -155,7 +155,7 @@ fn the_minimum_is_found_along_the_bent_valley_of_the_gyros_scale() {
     assert!(fit.newton_decrement < 0.1, "{} standard deviations away", fit.newton_decrement);
     let scale = &found.measurement["gyro_scale"];
     // the recording says more of it than was known before, or there was no valley to go along
-    assert!((scale.value - 1.01).abs() < 4.0 * scale.std && scale.std < 0.005, "{scale:?}");
+    assert!((scale.value - 1.02).abs() < 4.0 * scale.std && scale.std < 0.01, "{scale:?}");
 }
 
 /// Which the general tests of the residual do not see: they stay below 4, and the friction is off by tens of its standard deviations.
