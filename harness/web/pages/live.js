@@ -106,6 +106,22 @@ globalThis.Live = (() => {
     }
   }
 
+  // What counts its frames: .ci/browser reads how many there were and when the first stood.
+  class Page {
+    frames = 0;
+    first = null; // ms since the page was asked for
+    #wall = null;
+
+    // Begins a frame at the browser's time `wall`, ms; returns the time since the last in s, at most 0.1 s: a page that was hidden does not catch up.
+    tick(wall) {
+      const elapsed = Math.min(0.1, (wall - (this.#wall ?? wall)) / 1000);
+      this.#wall = wall;
+      this.frames += 1;
+      this.first ??= performance.now();
+      return elapsed;
+    }
+  }
+
   /**
    * A plot over one abscissa; `lines` are added and grow. The ordinate begins at 0 or, `signed`, has 0 in the middle, and its
    * range grows with them from `most`; with `range` it stays. `x`: range, label, and the step of its grid or, `log`, decades.
@@ -239,5 +255,5 @@ globalThis.Live = (() => {
     }
   }
 
-  return { make, draw, print, button, fmu, Settings, Plot, mount, still: () => matchMedia("(prefers-reduced-motion: reduce)").matches };
+  return { make, draw, print, button, fmu, Settings, Page, Plot, mount, still: () => matchMedia("(prefers-reduced-motion: reduce)").matches };
 })();

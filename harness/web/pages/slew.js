@@ -43,8 +43,9 @@
     ];
   }
 
-  class Slew {
+  class Slew extends Live.Page {
     constructor(fmu, element) {
+      super();
       this.fmu = fmu;
       this.settings = new Settings(SETTINGS, (key) => this.changed(key));
       this.running = !Live.still();
@@ -236,10 +237,7 @@
     advance(time, step) { this.plant.doStep(time, step); }
 
     frame(wall) {
-      const elapsed = Math.min(0.1, (wall - (this.wall ?? wall)) / 1000);
-      this.wall = wall;
-      this.frames = (this.frames ?? 0) + 1;
-      this.first ??= performance.now(); // ms since the page was asked for
+      const elapsed = this.tick(wall);
       if (this.running) {
         const stop = performance.now() + BUDGET, behind = Math.min(1, (this.behind ?? 0) + (elapsed * this.settings.values.speed) / PERIOD % 1);
         let steps = Math.floor((elapsed * this.settings.values.speed) / PERIOD + behind);

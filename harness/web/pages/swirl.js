@@ -25,7 +25,7 @@
   // What an instance is made with: a change of these begins anew.
   const FIXED = ["fill", "damping", "model", "bearing"];
 
-  class Swirl {
+  class Swirl extends Live.Page {
     // 1: the frequency rises, -1: it falls, 0: it is held.
     get sweep() { return WAYS[this.settings.values.sweep]; }
 
@@ -34,6 +34,7 @@
     }
 
     constructor(fmu, element) {
+      super();
       this.fmu = fmu;
       this.settings = new Settings(SETTINGS, (key) => this.changed(key));
       this.running = !Live.still();
@@ -168,10 +169,7 @@
     }
 
     frame(wall) {
-      const elapsed = Math.min(0.1, (wall - (this.wall ?? wall)) / 1000);
-      this.wall = wall;
-      this.frames = (this.frames ?? 0) + 1;
-      this.first ??= performance.now(); // ms since the page was asked for
+      const elapsed = this.tick(wall);
       if (this.running) {
         const { speed, frequency } = this.settings.values;
         // Fast, several periods pass from frame to frame: of them the instant is drawn whose phase goes on as in real time.

@@ -58,8 +58,9 @@
     }
   }
 
-  class YourTank {
+  class YourTank extends Live.Page {
     constructor(solver, element) {
+      super();
       this.time = 0;
       this.solver = solver;
       this.settings = new Settings(SETTINGS, () => this.changed());
@@ -246,10 +247,7 @@
     }
 
     frame(wall) {
-      const elapsed = Math.min(0.1, (wall - (this.wall ?? wall)) / 1000);
-      this.wall = wall;
-      this.frames = (this.frames ?? 0) + 1;
-      this.first ??= performance.now(); // ms since the page was asked for
+      const elapsed = this.tick(wall);
       if (this.running && this.scene) {
         this.time += elapsed;
         this.show();
