@@ -144,12 +144,8 @@ impl AnyFmuArgs {
             solver: self.exchange.map_or(Solver::Own, Solver::Host),
             starts: self.tries,
         };
-        for sensor in self.sensors.iter().filter(|s| {
-            let its = |output: &String| {
-                output.strip_prefix(&s.name).is_some_and(|r| r.is_empty() || r.starts_with('.'))
-            };
-            !question.outputs.iter().any(its)
-        }) {
+        let unread = |sensor: &&Sensor| !question.outputs.iter().any(|output| sensor.has(output));
+        for sensor in self.sensors.iter().filter(unread) {
             problems.push(format!("--sensor {}: it is not among the --outputs", sensor.name));
         }
         if self.exchange.is_some_and(|tolerance| !(1e-13..=1e-2).contains(&tolerance)) {

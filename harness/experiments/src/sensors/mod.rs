@@ -240,6 +240,12 @@ impl Sensor {
         }
     }
 
+    /// Whether a column has the name of one of its channels.
+    pub fn has(&self, column: &str) -> bool {
+        let rest = column.strip_prefix(&self.name);
+        rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+    }
+
     /// What it would read if it sampled in every row and had neither noise nor steps.
     pub fn expected(&self, value: f64) -> f64 {
         self.errors.scale * value + self.errors.bias

@@ -204,11 +204,9 @@ impl Question {
         column: &str,
         description: &ModelDescription,
     ) -> Result<Option<(&Sensor, Quantity, usize)>> {
-        let is_its = |sensor: &&Sensor| {
-            let rest = column.strip_prefix(&sensor.name);
-            rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+        let Some(sensor) = self.sensors.iter().find(|sensor| sensor.has(column)) else {
+            return Ok(None);
         };
-        let Some(sensor) = self.sensors.iter().find(is_its) else { return Ok(None) };
         let of_all = self.settings.iter().filter(|setting| setting.recording.is_none());
         let settings: Vec<_> = of_all.map(|s| (s.name.clone(), s.value.clone())).collect();
         let quantity = sensor.quantity(description, &settings)?;
