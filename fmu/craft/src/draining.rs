@@ -184,10 +184,7 @@ impl Draining {
         if now == state.flow {
             return false;
         }
-        let energy = |x: &[f64; STATES], flow: [f64; TANKS]| {
-            self.evaluate(x, &Acting::flowing(flow, [0.0; TANKS])).1.outputs(x).energy
-        };
-        let before = energy(&state.x, state.flow);
+        let before = self.energy(state);
         let jump = core::array::from_fn(|i| now[i] - state.flow[i]);
         // Rates are linear in the slopes.
         let [with, without] = [jump, [0.0; TANKS]]
@@ -203,9 +200,24 @@ impl Draining {
         for at in (index::BOBS..index::LIQUID).step_by(6) {
             add(at + 3);
         }
-        state.x[index::DRAINED] += before - energy(&state.x, now);
         state.flow = now;
+        state.x[index::DRAINED] += before - self.energy(state);
         true
+    }
+
+    /// Takes account of the impulse of the wheels that has moved the craft on from the state `before`: where the liquid
+    /// flows, it works on the rods' moving ends, too, as T does in drained' (`contents.rs`).
+    pub fn drain_by_impulse(&self, before: &State, state: &mut State) {
+        if state.flow != [0.0; TANKS] {
+            let work = state.x[index::WORK] - before.x[index::WORK];
+            state.x[index::DRAINED] += self.energy(before) + work - self.energy(state);
+        }
+    }
+
+    /// Of everything, J.
+    fn energy(&self, state: &State) -> f64 {
+        let acting = Acting::flowing(state.flow, [0.0; TANKS]);
+        self.evaluate(&state.x, &acting).1.outputs(&state.x).energy
     }
 
     /// [a; w'] from the equations of motion; on a pivot a is given.

@@ -273,11 +273,14 @@ impl Spacecraft {
         let Some(draining) = &self.draining else {
             return self.motion.set_wheels(inputs.h_wheels.value);
         };
-        if inputs.h_wheels.value != self.motion.state.h_wheels {
+        let turned = inputs.h_wheels.value != self.motion.state.h_wheels;
+        if turned {
+            let before = self.motion.state;
             let tanks = draining.tanks(&self.motion.state.x);
             self.motion.refill(tanks.iter());
+            self.motion.set_wheels(inputs.h_wheels.value);
+            draining.drain_by_impulse(&before, &mut self.motion.state);
         }
-        let turned = self.motion.set_wheels(inputs.h_wheels.value);
         draining.set_flow(&mut self.motion.state, &inputs.mass_flow) || turned
     }
 

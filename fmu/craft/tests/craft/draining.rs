@@ -52,7 +52,7 @@ pub fn tank(random: &mut Random, modes: usize) -> Tank {
 }
 
 /// A craft with one to three draining tanks and one that stays.
-fn craft(seed: u64, modes: usize) -> (Parameters, Inputs) {
+pub fn craft(seed: u64, modes: usize) -> (Parameters, Inputs) {
     let mut random = Random::new(seed);
     let mut p = random.parameters();
     p.tanks = 2 + seed as usize % 3;
@@ -74,7 +74,7 @@ fn attitude(q: &[f64]) -> UnitQuaternion<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3]))
 }
 
-fn after(u: &Inputs, t: f64) -> Inputs {
+pub fn after(u: &Inputs, t: f64) -> Inputs {
     let at = |ramp: &Ramp| Ramp { value: ramp.at(t), slope: ramp.slope };
     Inputs {
         force: at(&u.force),
@@ -99,7 +99,7 @@ fn rates(p: &Parameters, u: &Inputs, out: &Outputs) -> [V; 2] {
 }
 
 /// P, and H about the inertial origin.
-fn momenta(out: &Outputs) -> [V; 2] {
+pub fn momenta(out: &Outputs) -> [V; 2] {
     let center = v(&out.position) + attitude(&out.q) * v(&out.center_of_mass);
     let momentum = v(&out.momentum);
     [momentum, v(&out.angular_momentum) + center.cross(&momentum)]
@@ -353,7 +353,7 @@ fn directional_derivatives_of_draining_craft_are_those_by_differences() {
 }
 
 /// Energy that is in it, has been dissipated and has gone with the outflow, less work.
-fn energy(out: &Outputs) -> f64 {
+pub fn energy(out: &Outputs) -> f64 {
     out.energy + out.dissipated + out.drained - out.work
 }
 

@@ -1,4 +1,4 @@
-//! Impulses on a tank alone, where its table ends, and what a step costs.
+//! Impulses on a tank alone and on a craft that drains, where a table ends, and what a step costs.
 
 use craft::{
     Inputs, Line, Parameters, Ramp, SloshTank, Spacecraft, Tank, TankInputs, TankParameters,
@@ -55,6 +55,45 @@ fn an_impulse_of_the_host_leaves_the_bobs_velocities_across_their_rods() {
         }
         assert_eq!(before[18..], after[18..], "energy and liquid");
     }
+}
+
+/// The impulse acts on the craft as it is, not as it was filled: after some of its liquid has left, a jump of the wheels
+/// keeps P and H. Its work is what energy and `drained` gain: rods whose ends the flow moves work, too, as much as while
+/// the wheels turn within 0.1 us.
+#[test]
+fn a_jump_of_the_wheels_keeps_momentum_and_energy_of_a_craft_that_has_drained_and_does() {
+    let (mut by_rods, h) = (0.0_f64, 1e-7);
+    for seed in 0..6 {
+        let (p, u) = draining::craft(seed, seed as usize % 4);
+        let mut now =
+            Inputs { force: Ramp::held([0.0, 0.0, 2.0 * p.craft.mass]), ..Inputs::default() };
+        now.mass_flow = u.mass_flow.map(|flow| Line { value: 4.0 * flow.value, slope: 0.0 });
+        let mut craft = Spacecraft::new(&p, &now, 0.0, 1e-12).unwrap();
+        craft.step(&now, 10.0).unwrap();
+        let before = craft.outputs(&now);
+        let jump = [20.0, -30.0, 10.0];
+        let jumped = craft.outputs(&Inputs { h_wheels: Ramp::held(jump), ..now });
+        let [p_0, h_0] = draining::momenta(&before);
+        let [p_1, h_1] = draining::momenta(&jumped);
+        // A few roundings of numbers of this size.
+        assert!((p_1 - p_0).norm() < 1e-14 * p_0.norm(), "{seed} {p_0} {p_1}");
+        assert!((h_1 - h_0).norm() < 1e-13 * h_0.norm(), "{seed} {h_0} {h_1}");
+        assert!((V::from(jumped.omega) - V::from(before.omega)).norm() > 1e-3);
+        let off = (draining::energy(&jumped) - draining::energy(&before)).abs();
+        assert!(off < 1e-13 * before.energy, "{seed} {off:e}");
+
+        let [turned, coasted] = [1.0 / h, 0.0].map(|rate| {
+            let (mut craft, mut u) = (craft.clone(), now);
+            u.h_wheels.slope = jump.map(|jump| rate * jump);
+            craft.step(&u, h).unwrap();
+            craft.continuous_states()[craft::index::DRAINED]
+        });
+        let (limit, gone) = (turned - coasted, jumped.drained - before.drained);
+        // What drains at other rates in h is some 0.1 W times h.
+        assert!((gone - limit).abs() < 1e-3 * gone.abs() + h, "{seed}: {gone:e} {limit:e}");
+        by_rods = by_rods.max(gone.abs());
+    }
+    assert!(by_rods > 1e3 * h, "{by_rods:e} J");
 }
 
 /// What a host that integrates itself makes of the mass of liquid is held against the table.
