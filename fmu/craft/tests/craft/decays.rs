@@ -7,6 +7,9 @@ use craft::{
     Craft, DampingLaw, Inertia, Inputs, MODES, Parameters, Ramp, Ranges, Regime, SloshTank,
     Spacecraft, Tank, TankInputs, TankParameters, index,
 };
+use nalgebra::Vector3;
+
+type V = Vector3<f64>;
 
 const G: f64 = 9.81;
 
@@ -102,13 +105,28 @@ fn free_oscillations_lose_zeta_plus_zeta_a_times_amplitude() {
     }
 }
 
-/// The tank of a craft whose thrust goes from one direction to the other.
-fn ranges(k: f64, thrust: f64, angle: f64) -> Ranges {
+/// The ranges of a tank in a craft with that thrust, and of the tank alone under the craft's motion, which are the same.
+fn ranges_of(tank: Tank, thrust: f64) -> Ranges {
     let mut p = Parameters::default();
-    p.tank[0] = Tank { k: [k; MODES], ..tank(angle) };
+    p.tank[0] = tank;
     let inputs = Inputs { force: Ramp::held([0.0, 0.0, thrust]), ..Inputs::default() };
     let mut craft = Spacecraft::new(&p, &inputs, 0.0, 1e-9).unwrap();
-    craft.outputs(&inputs).tank[0].ranges
+    let out = craft.outputs(&inputs);
+    let motion = TankInputs {
+        a: Ramp::held(out.specific_force),
+        omega_dot: Ramp::held(out.omega_dot),
+        ..TankInputs::default()
+    };
+    let p = TankParameters { tank, ..TankParameters::default() };
+    let mut alone = SloshTank::new(&p, &motion, 0.0, 1e-9).unwrap();
+    let seen = [alone.ranges(&motion), alone.ranges_held(), alone.outputs(&motion).tank.ranges];
+    assert_eq!(seen, [out.tank[0].ranges; 3]);
+    seen[0]
+}
+
+/// Of one with centring, released at an angle.
+fn ranges(k: f64, thrust: f64, angle: f64) -> Ranges {
+    ranges_of(Tank { k: [k; MODES], ..tank(angle) }, thrust)
 }
 
 /// Wave over radius is 0.837 of the angle: 0.15 at 0.179 rad, 0.25 at 0.299.
@@ -131,6 +149,84 @@ fn regimes_end_at_waves_of_0_15_and_0_25_radii_and_a_pushed_back_tank_is_out_of_
     assert!(!ranges(0.0, -2000.0, 0.1).in_range);
     assert!(!ranges(500.0, -2000.0, 0.1).in_range);
     assert!(ranges(800.0, -2000.0, 0.1).in_range);
+}
+
+/// Each mode's wave counts: 0.1 rad of the first are 0.084 R and linear, 0.1 rad of the second too, whose wave is half as
+/// high, are 0.126 R, and 0.15 rad of both 0.188 R. Of a tank whose waves are not given the first angle is that of a
+/// cylinder.
+#[test]
+fn the_regime_is_that_of_all_modes_waves_together_and_a_cylinder_s_where_no_wave_is_given() {
+    let with = |wave: [f64; MODES], angle: f64| {
+        let mut tank = Tank { modes: 2, wave, ..tank(angle) };
+        tank.p_0[1] = tank.p_0[0];
+        ranges_of(tank, 2000.0).regime
+    };
+    let two = [0.4, 0.2, 0.0];
+    assert_eq!([0.1, 0.15].map(|angle| with(two, angle)), [Regime::Linear, Regime::Transitional]);
+    let one = [0.4, 0.0, 0.0];
+    assert_eq!([0.1, 0.15].map(|angle| with(one, angle)), [Regime::Linear; 2]);
+    let seen = [0.02, 0.178, 0.181, 0.297, 0.301].map(|angle| with([0.0; MODES], angle));
+    use Regime::{Linear, Nonlinear, Transitional};
+    assert_eq!(seen, [Linear, Linear, Transitional, Transitional, Nonlinear]);
+}
+
+/// Every bob of every tank within 45 degrees of its axis, or not: what a step's end is asked is what the outputs show.
+#[test]
+fn a_step_ends_out_of_range_where_any_bob_of_any_tank_does() {
+    let mut found = [0; 2];
+    for (tank, mode) in [(0, 0), (0, 1), (1, 0), (1, 1), (3, 0), (3, 1)] {
+        for angle in [0.6, 1.0f64] {
+            let mut p = Parameters { tanks: 4, ..Parameters::default() };
+            for tank in &mut p.tank {
+                tank.modes = 2;
+            }
+            p.tank[tank].p_0[mode] = [angle.sin(), 0.0, -angle.cos()];
+            let inputs = Inputs { force: Ramp::held([0.0, 0.0, 2000.0]), ..Inputs::default() };
+            let mut craft = Spacecraft::new(&p, &inputs, 0.0, 1e-9).unwrap();
+            craft.step(&inputs, 1e-3).unwrap();
+            let in_range = craft.outputs(&inputs).tank.map(|tank| tank.ranges.in_range);
+            let expected: [bool; 4] = std::array::from_fn(|i| i != tank || angle < 0.7);
+            assert_eq!(in_range, expected);
+            assert_eq!(craft.is_in_range(), angle < 0.7, "{tank} {mode} {angle}");
+            found[usize::from(craft.is_in_range())] += 1;
+        }
+    }
+    assert_eq!(found, [6, 6]);
+}
+
+/// However the host makes the acceleration at the hinge, by a, by w' or by w, the drag under it is the same: what zeta
+/// adds to p'' under 2 m/s2 along the tank.
+#[test]
+fn drag_follows_the_acceleration_at_the_hinge_whatever_makes_it() {
+    let position = [0.7, -0.4, 0.2];
+    let tank = Tank { position, p_dot_0: [[0.5, 0.2, 0.0]; MODES], ..tank(0.1) };
+    let hinge = V::new(0.7, -0.4, 0.2 + tank.hinge[0]);
+    let drag = |w: V, w_d: V| {
+        let made = w_d.cross(&hinge) + w.cross(&w.cross(&hinge));
+        assert!(made[2].abs() > 0.5 || made == V::zeros(), "no small part of 2 m/s2: {made:?}");
+        let u = TankInputs {
+            a: Ramp::held((V::z() * 2.0 - made).into()),
+            omega: w.into(),
+            omega_dot: Ramp::held(w_d.into()),
+            ..TankInputs::default()
+        };
+        let [with, without] = [0.05, 0.0].map(|zeta| {
+            let mut tank = tank;
+            (tank.zeta[0], tank.zeta_amplitude[0]) = (zeta, 0.0);
+            let p = TankParameters { tank, ..TankParameters::default() };
+            SloshTank::new(&p, &u, 0.0, 1e-9).unwrap().derivatives(&u)
+        });
+        V::from_row_slice(&with[3..6]) - V::from_row_slice(&without[3..6])
+    };
+    let still = drag(V::zeros(), V::zeros());
+    // c/m p'_x of the laminar layer; p' is made tangential, 0.1 rad from the axis.
+    let w_ref = (G / tank.length[0]).sqrt();
+    let expected = -2.0 * 0.05 * w_ref * (2.0 / G).powf(0.25) * 0.5;
+    assert!((still.x / expected - 1.0).abs() < 0.02, "{still} {expected}");
+    for (w, w_d) in [(V::zeros(), V::new(1.5, 2.0, 0.0)), (V::new(1.0, -0.5, 1.2), V::zeros())] {
+        // Differences of numbers of some 10 1/s2.
+        assert!((drag(w, w_d) - still).norm() < 1e-13, "{} {still}", drag(w, w_d));
+    }
 }
 
 /// A point of its table is the default tank: one that could drain, and does not, and one that cannot have the same

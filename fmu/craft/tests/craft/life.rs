@@ -66,6 +66,27 @@ fn the_tolerance_is_kept() {
     }
 }
 
+/// What a step's errors are compared with begins at 0 in a craft at rest, and grows along with the motion: spun up by
+/// 1 rad/s2, so that a stiffly held bob, too light for the craft to feel it, begins to swing at 10 rad/s.
+#[test]
+fn the_tolerance_is_kept_from_rest() {
+    let mut p = Parameters::default();
+    (p.tank[0].mass[0], p.tank[0].k[0]) = (1e-3, 0.1);
+    let torque = Ramp::held([900.0, 300.0, 600.0]);
+    let u = Inputs { torque, ..Inputs::default() };
+    let run = |tolerance: f64| {
+        let mut craft = Spacecraft::new(&p, &u, 0.0, tolerance).unwrap();
+        craft.step(&u, 1.0).unwrap();
+        let x = craft.continuous_states();
+        [&x[..index::POSITION], &x[index::BOBS..]].concat()
+    };
+    let exact = run(1e-13);
+    for tolerance in [1e-3, 1e-5, 1e-8] {
+        let off = largest_difference(&run(tolerance), &exact);
+        assert!(off < tolerance, "{tolerance:e}: {off:e}");
+    }
+}
+
 /// A tank that drains, alone and on a craft, over one step of 5 s, against runs at 1e-13: a hundred times the
 /// tolerance, which is what one internal step may leave.
 #[test]
@@ -84,6 +105,7 @@ fn the_tolerance_is_kept_while_tanks_drain() {
         let of_tank = |tolerance: f64| {
             let mut tank = SloshTank::new(&alone, &u, 0.0, tolerance).unwrap();
             tank.step(&u, 5.0).unwrap();
+            assert_eq!(&tank.continuous_states(), tank.borrow_states());
             tank.continuous_states().to_vec()
         };
         let mut p = Parameters { tanks: 1, ..random.parameters() };
@@ -246,7 +268,9 @@ fn a_refused_step_leaves_the_craft_as_it_was_and_says_why() {
     for h in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         refused(&u, h, is_length, "allowed: a finite length above 0");
     }
-    let not_finite: fn(&StepError) -> bool = |e| matches!(e, StepError::NotFinite { .. });
+    // Within the step, from 0.1 s on.
+    let not_finite: fn(&StepError) -> bool =
+        |e| matches!(e, StepError::NotFinite { time } if (0.1..=0.2).contains(time));
     for bad in [f64::NAN, f64::INFINITY, 1e200] {
         let mut wrong = u;
         wrong.force.value[1] = bad;
@@ -279,11 +303,19 @@ fn a_refused_step_leaves_the_craft_as_it_was_and_says_why() {
 
     let p = TankParameters { tank: p.tank[0], ..TankParameters::default() };
     let u = TankInputs { a: Ramp::held([0.1, 0.2, 2.0]), ..TankInputs::default() };
-    let mut tank = SloshTank::new(&p, &u, 0.0, 1e-9).unwrap();
+    let mut tank = SloshTank::new(&p, &u, 3.0, 1e-9).unwrap();
     let before = *tank.state();
-    for (a, h) in [(f64::NAN, 0.1), (1e200, 0.1), (1.0, 0.0), (1.0, 1e9)] {
+    let not_finite: fn(&StepError) -> bool =
+        |e| matches!(e, StepError::NotFinite { time } if (3.0..=3.1).contains(time));
+    for (a, h, kind) in [
+        (f64::NAN, 0.1, not_finite),
+        (1e200, 0.1, not_finite),
+        (1.0, 0.0, is_length),
+        (1.0, 1e9, too_many),
+    ] {
         let u = TankInputs { a: Ramp::held([a; 3]), ..u };
-        assert!(tank.step(&u, h).is_err());
+        let error = tank.step(&u, h).unwrap_err();
+        assert!(kind(&error), "{error:?}");
         assert_eq!(*tank.state(), before);
     }
 }
@@ -513,8 +545,36 @@ fn a_flow_that_cannot_be_is_refused() {
         assert!(matches!(error, StepError::Model(_)), "{message}");
         assert!(message.contains("(allowed: 10 to 20 kg"), "{message}");
     }
+    // Out and back within a step, 6 - 3 t kg/s for 4 s: 6 kg are missing on the way, at the end none.
+    for (value, missing) in [(6.0, 6.0), (-6.0, -6.0)] {
+        u.mass_flow = flow(value);
+        u.mass_flow[0].slope = -value / 2.0;
+        let message = craft.step(&u, 4.0).unwrap_err().to_string();
+        let wanted = format!("mass_flow[1] would leave {} kg in tank[1]", 15.0 - missing);
+        assert!(message.contains(&wanted), "{message}");
+    }
+    u.mass_flow = flow(4.5);
+    u.mass_flow[0].slope = -2.25;
+    craft.step(&u, 4.0).unwrap();
+    assert_eq!(craft.continuous_states()[index::LIQUID], 15.0);
     u.mass_flow = flow(5.0);
     craft.step(&u, 1.0).unwrap();
+
+    // All of it, in pieces whose sum is that but for rounding.
+    (p.tank[0].fill.liquid[0], p.tank[0].fill.liquid[1]) = (1000.0, 2000.0);
+    p.tank[0].liquid_0 = 1500.0;
+    let mut rounded = false;
+    for pieces in [3, 7, 11, 13, 49, 300] {
+        u.mass_flow = flow(500.0 / f64::from(pieces));
+        let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap();
+        for _ in 0..pieces {
+            craft.step(&u, 1.0).unwrap();
+        }
+        let left = craft.continuous_states()[index::LIQUID];
+        assert!((left - 1000.0).abs() < 1e-10, "{left}");
+        rounded |= left < 1000.0;
+    }
+    assert!(rounded);
 
     p.tank[0].fill.liquid[1] = 9.0;
     p.tank[0].liquid_0 = 30.0;
