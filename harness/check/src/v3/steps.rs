@@ -579,6 +579,27 @@ fn deriving(subject: &Subject, flag: &str, findings: &mut Findings) -> Option<Us
     Some(Use::EXCHANGE)
 }
 
+/// A central difference.
+struct Difference {
+    quotient: f64,
+    /// What rounding of the two values may have taken of it.
+    rounding: f64,
+}
+
+impl Difference {
+    fn new(above: f64, below: f64, h: f64) -> Difference {
+        let rounding = 1e-13 * above.abs().max(below.abs()) / h;
+        Difference { quotient: (above - below) / (2.0 * h), rounding }
+    }
+
+    /// Whether a derivative is that of the difference, which loses what rounding takes of the values, and sees
+    /// curvature.
+    fn is_near(&self, derivative: f64, unsure: f64) -> bool {
+        let size = self.quotient.abs().max(derivative.abs());
+        (derivative - self.quotient).abs() <= 1e-4 * size + self.rounding + unsure + 1e-9
+    }
+}
+
 /// `derivatives.directional`
 pub fn directional(subject: &Subject, findings: &mut Findings) -> Result<()> {
     let Some(using) = deriving(subject, "providesDirectionalDerivatives", findings) else {
@@ -603,25 +624,36 @@ pub fn directional(subject: &Subject, findings: &mut Findings) -> Result<()> {
                     unknown.length(),
                 )?;
                 let h = 1e-5 * base[element].abs().max(1e-3 * known.nominal()).max(1e-6);
-                let plus = displaced(&mut session, &unknown, &known, &base, element, h)?;
-                let minus = displaced(&mut session, &unknown, &known, &base, element, -h)?;
-                for (i, own) in own.iter().enumerate() {
-                    let (a, b) = (plus[i], minus[i]);
-                    let difference = (a - b) / (2.0 * h);
-                    // a difference loses what rounding takes of the values, and sees curvature
-                    let slack = 1e-4 * difference.abs().max(own.abs())
-                        + 1e-13 * a.abs().max(b.abs()) / h
-                        + 1e-9;
-                    let error = (own - difference).abs();
-                    if error.is_nan() || error > slack {
-                        findings.add(
-                            unknown.place(),
-                            format!(
-                                "its derivative by {} is {own:?}, and {difference:?} by central differences",
-                                known.name
-                            ),
-                        );
+                let mut differences = |h: f64| -> Result<Vec<Difference>> {
+                    let plus = displaced(&mut session, &unknown, &known, &base, element, h)?;
+                    let minus = displaced(&mut session, &unknown, &known, &base, element, -h)?;
+                    Ok(plus.iter().zip(&minus).map(|(a, b)| Difference::new(*a, *b, h)).collect())
+                };
+                let mut last = differences(h)?;
+                let mut wrong: Vec<usize> =
+                    (0..own.len()).filter(|i| !last[*i].is_near(own[*i], 0.0)).collect();
+                // Where terms cancel in a value, rounding takes more of it than its size tells: what two steps disagree
+                // by shows how much. A derivative is wrong if it is wrong by all steps.
+                for h in [10.0, 100.0, 1000.0].map(|times| times * h) {
+                    let (min, max) = known.bounds();
+                    if wrong.is_empty() || base[element] - h < min || base[element] + h > max {
+                        break;
                     }
+                    let wider = differences(h)?;
+                    wrong.retain(|i| {
+                        let unsure = (wider[*i].quotient - last[*i].quotient).abs();
+                        !wider[*i].is_near(own[*i], unsure)
+                    });
+                    last = wider;
+                }
+                for i in wrong {
+                    findings.add(
+                        unknown.place(),
+                        format!(
+                            "its derivative by {} is {:?}, and {:?} by central differences",
+                            known.name, own[i], last[i].quotient
+                        ),
+                    );
                 }
             }
         }
