@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use host::xml::Element;
 use runtime::Model;
+use runtime::table::Scalar;
 use runtime::v3::Fmi3;
+use runtime::variable::Access;
 use runtime::version::Version;
 
 fn parse(text: &str) -> Element {
@@ -50,7 +52,8 @@ fn every_variable_is_as_in_fmi_2<M: Model>() {
         assert_eq!(new.get("valueReference"), Some(&*reference), "{name}");
         assert_eq!(kind.get("derivative"), new.get("derivative"), "{name}");
         let port = matches!(old.get("causality"), Some("input" | "output")) && kind.name == "Real";
-        assert_eq!(new.get("intermediateUpdate"), port.then_some("true"), "{name}");
+        let follows = M::table().scalars[place].variable.follows_inputs;
+        assert_eq!(new.get("intermediateUpdate"), (port && !follows).then_some("true"), "{name}");
     }
     let [time, z @ ..] = &new[old.len()..] else { panic!("no independent variable") };
     assert_eq!((time.get("causality"), time.get("unit")), (Some("independent"), Some("s")));
@@ -69,6 +72,30 @@ fn every_variable_of_fmi_3_is_as_in_fmi_2() {
     every_variable_is_as_in_fmi_2::<HubSlosh::HubSlosh>();
     every_variable_is_as_in_fmi_2::<Spacecraft::Model>();
     every_variable_is_as_in_fmi_2::<SloshTank::Model>();
+}
+
+fn an_input_follows_others_exactly_where_the_model_sets_its_slope<M: Model>() {
+    let given = 0.25;
+    let mut inputs = M::Inputs::default();
+    let slope = |inputs: &mut M::Inputs, scalar: &Scalar<M>| match scalar.access {
+        Access::Input(ramp) => std::mem::replace(ramp(inputs, scalar.element)[1], given),
+        _ => panic!("{} is no input", scalar.name()),
+    };
+    for scalar in M::table().inputs() {
+        slope(&mut inputs, scalar);
+    }
+    M::set_dependent_slopes(&mut inputs, 0.1);
+    for scalar in M::table().inputs() {
+        let is_set = slope(&mut inputs, scalar) != given;
+        assert_eq!(is_set, scalar.variable.follows_inputs, "{}", scalar.name());
+    }
+}
+
+#[test]
+fn inputs_without_intermediate_update_are_those_whose_slopes_the_model_sets() {
+    an_input_follows_others_exactly_where_the_model_sets_its_slope::<HubSlosh::HubSlosh>();
+    an_input_follows_others_exactly_where_the_model_sets_its_slope::<Spacecraft::Model>();
+    an_input_follows_others_exactly_where_the_model_sets_its_slope::<SloshTank::Model>();
 }
 
 fn the_structure_is_as_in_fmi_2<M: Model>() {

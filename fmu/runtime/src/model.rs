@@ -97,7 +97,8 @@ pub trait Model: Clone + Debug + Sized + 'static {
     fn outputs(&mut self, inputs: &Self::Inputs) -> Self::Outputs;
 
     /// Sets the slopes, over a step of length `h`, of inputs that follow from others during it, such
-    /// as a rate from its derivative. Returns whether there are any.
+    /// as a rate from its derivative: those declared by
+    /// [`Variable::follows_inputs`](crate::variable::Variable::follows_inputs). Returns whether there are any.
     fn set_dependent_slopes(inputs: &mut Self::Inputs, h: f64) -> bool {
         let _ = (inputs, h);
         false

@@ -254,11 +254,13 @@ impl<M: Model> Table<M> {
         std::str::from_utf8(bytes).unwrap_or_default()
     }
 
-    /// As the GUID, for model descriptions of FMI 3.0.
+    /// As the GUID, for model descriptions of FMI 3.0, which say besides what can be set within a step.
     pub fn token(&self) -> &str {
         let bytes = self.token.get_or_init(|| {
             let mut bytes = [0; GUID_LENGTH];
             let hash = Hash::new().text(self.guid()).text("FMI 3.0, scalars");
+            let following = self.variables.iter().filter(|v| v.follows_inputs);
+            let hash = following.fold(hash, |h, v| h.text(v.name));
             bytes.copy_from_slice(braced(hash).as_bytes());
             bytes
         });

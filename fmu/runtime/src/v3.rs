@@ -370,10 +370,11 @@ impl<M: Model> Host<M> {
     }
 }
 
-/// Whether hosts may get or set a variable within a step.
+/// Whether hosts may get or set a variable within a step: an input that follows others has no end of its own.
 pub fn has_intermediate_update<M: Model>(scalar: &Scalar<M>) -> bool {
     matches!(scalar.variable.causality, Causality::Input | Causality::Output)
         && scalar.c_type == CType::Real
+        && !scalar.variable.follows_inputs
 }
 
 // ---- Inquiry, life and death ----
@@ -513,7 +514,8 @@ pub unsafe fn fmi3InstantiateCoSimulation<M: Model>(
                     let scalar = Fmi3::scalar::<M>(*reference, Some(CType::Real))?;
                     if !has_intermediate_update(scalar) {
                         return Err(format!(
-                            "{} is among requiredIntermediateVariables (allowed: continuous inputs and outputs)",
+                            "{} is among requiredIntermediateVariables (allowed: variables with intermediateUpdate, which are \
+                             continuous inputs and outputs)",
                             scalar.name()
                         ));
                     }

@@ -143,6 +143,9 @@ pub struct Variable<M: Model> {
     pub state: Option<Place>,
     /// Whether an event can make this state jump.
     pub reinit: bool,
+    /// Whether this input's slope over a step follows from other inputs
+    /// ([`Model::set_dependent_slopes`]), whatever the host gives.
+    pub follows_inputs: bool,
     /// Whether this parameter can be set while the simulation runs.
     pub tunable: bool,
     /// The inputs and continuous states it depends on without delay: a name as it is, the
@@ -200,6 +203,7 @@ const fn variable<M: Model>(
         shape: &[],
         state: None,
         reinit: false,
+        follows_inputs: false,
         tunable: false,
         depends_on: &[],
         initial_depends_on: &[],
@@ -419,6 +423,12 @@ impl<M: Model> Variable<M> {
     /// An event can make this state jump.
     pub const fn reinit(mut self) -> Self {
         self.reinit = true;
+        self
+    }
+
+    /// During a step this input goes where other inputs take it.
+    pub const fn follows_inputs(mut self) -> Self {
+        self.follows_inputs = true;
         self
     }
 

@@ -79,7 +79,7 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(VECTOR).range(-1e9, 1e9),
     V::input("omega", |i, n| [&mut i.tank.omega[n], &mut i.omega_slope[n]], "rad/s",
         "Angular velocity of the host, host axes, at the start of the step; in the step it follows from omega_dot, and unless it is set anew it goes on from there")
-        .display_unit("deg/s").shape(VECTOR).range(-1e9, 1e9),
+        .display_unit("deg/s").shape(VECTOR).range(-1e9, 1e9).follows_inputs(),
     V::input("omega_dot", |i, n| [&mut i.tank.omega_dot.value[n], &mut i.tank.omega_dot.slope[n]], "rad/s2",
         "Angular acceleration of the host, host axes; held over a step unless its derivative is set")
         .display_unit("deg/s2").shape(VECTOR).range(-1e9, 1e9),

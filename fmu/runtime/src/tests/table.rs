@@ -169,7 +169,7 @@ fn guid_changes_with_whatever_a_host_depends_on() {
     let about = TABLE.about;
     let all = || TABLE.variables.to_vec();
     assert_eq!(guid(about, all()), own);
-    let silent: [Change; 1] = [|v| v[0].description = "other"];
+    let silent: [Change; 2] = [|v| v[0].description = "other", |v| v[10].follows_inputs = false];
     for change in silent {
         let mut variables = all();
         change(&mut variables);
@@ -215,6 +215,17 @@ fn guid_changes_with_whatever_a_host_depends_on() {
         change(&mut variables);
         assert_ne!(guid(about, variables), own, "change {n}");
     }
+}
+
+#[test]
+fn token_of_fmi_3_changes_with_an_input_that_can_be_set_within_a_step() {
+    let token = |variables: Vec<Variable<Vessels>>| {
+        Table::new(TABLE.about, variables.leak(), &[]).token().to_string()
+    };
+    let mut variables = TABLE.variables.to_vec();
+    assert_eq!((variables[10].name, token(variables.clone())), ("z", TABLE.token().into()));
+    variables[10].follows_inputs = false;
+    assert_ne!(token(variables), TABLE.token());
 }
 
 #[test]

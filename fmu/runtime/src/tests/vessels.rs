@@ -116,7 +116,7 @@ static VARIABLES: &[Variable<Vessels>] = &[
     V::derivative("der(level)", |i| 1 - i, "m/s", "Derivatives of the levels").shape(&[2])
         .depends_on(&["level[]", "q[]"]).initial_depends_on(&["start.", "leak"]),
     V::input("q", |i, n| i.q[n].each_mut(), "m/s", "What flows in").shape(&[2]).range(1.0, 10.0),
-    V::input("z", |i, _| i.z.each_mut(), "m", "Height of the platform"),
+    V::input("z", |i, _| i.z.each_mut(), "m", "Height of the platform").follows_inputs(),
     V::input("w", |i, _| i.w.each_mut(), "m/s", "Rate of the platform").range(-8.0, 2.0),
     V::parameter("leak", |p, _| &mut p.k, "1/s", "Leak").at_least(0.0).tunable(),
     V::parameter("start.level", |p, i| &mut p.level_0[i], "m", "Levels at the start")
