@@ -112,13 +112,10 @@ fn an_fmu_3_has_the_platform_tuple_the_icon_and_the_list_of_its_references() {
         .unwrap()
         .read_to_string(&mut manifest)
         .unwrap();
-    let sources: Vec<_> = manifest
-        .split("source=\"../")
-        .skip(1)
-        .map(|rest| rest.split('"').next().unwrap())
-        .collect();
+    let sources: Vec<_> =
+        manifest.split("source=\"").skip(1).map(|rest| rest.split('"').next().unwrap()).collect();
     assert_eq!(sources.len(), 3);
     for source in sources {
-        assert!(names.contains(&format!("extra/{source}")), "{source}");
+        assert!(names.contains(&format!("{folder}/{source}")), "{source}");
     }
 }

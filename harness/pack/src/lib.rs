@@ -22,7 +22,7 @@ use host::description::ModelDescription;
 
 use crate::archive::{Files, Packed, below, read};
 pub use crate::fmi::Fmi;
-pub use crate::models::{HUBSLOSH, MODELS, Model, Sizes, model};
+pub use crate::models::{HUBSLOSH, MODELS, Model, REFERENCES, Sizes, model};
 pub use crate::platforms::Built;
 use crate::project::build_in;
 pub use crate::project::{build, has_source, needs_source, root};
@@ -107,18 +107,15 @@ fn pack_for_tests(model: &Model, fmi: Fmi) -> Result<PathBuf> {
     Ok(out)
 }
 
-/// What the layered standard FMI-LS-REF calls the list of files that belong to an FMU.
-const REFERENCES: &str = "extra/org.fmi-standard.fmi-ls-ref/fmi-ls-manifest.xml";
-
-/// The list: the example's inputs and the result they lead to. FMI-LS-REF, 1.0.0-beta.1.
+/// The list of files that belong to the FMU: the example's inputs and the result they lead to. FMI-LS-REF, 1.0.0-beta.1.
 fn references(model: &Model) -> String {
     let name = model.name;
     format!(
         r#"<?xml version="1.0" encoding="UTF-8"?>
 <fmiReferences xmlns:fmi-ls="http://fmi-standard.org/fmi-ls-manifest" fmi-ls:fmi-ls-name="org.fmi-standard.fmi-ls-ref" fmi-ls:fmi-ls-version="1.0.0-beta.1" fmi-ls:fmi-ls-description="Layered Standard providing information on related files included in an FMU.">
-  <Related type="text/csv" source="../{name}/{name}_in.csv" role="experiment" description="Inputs of the example, with every parameter and start value as they are" />
-  <Related type="text/csv" source="../{name}/{name}_ref.csv" role="result" description="All outputs of the example" />
-  <Related type="text/markdown" source="../{name}/README.md" role="report" description="What the example shows, and how to compare with it" />
+  <Related type="text/csv" source="{name}_in.csv" role="experiment" description="Inputs of the example, with every parameter and start value as they are" />
+  <Related type="text/csv" source="{name}_ref.csv" role="result" description="All outputs of the example" />
+  <Related type="text/markdown" source="README.md" role="report" description="What the example shows, and how to compare with it" />
 </fmiReferences>
 "#
     )
@@ -163,7 +160,7 @@ fn files(model: &Model, fmi: Fmi, binaries: &[Packed]) -> Result<Files> {
     if extra.is_dir() {
         let extra = below(&extra)?.into_iter();
         files.extend(extra.map(|(name, bytes)| (format!("extra/{name}"), bytes)));
-        files.push((REFERENCES.into(), references(model).into_bytes()));
+        files.push((format!("{REFERENCES}/fmi-ls-manifest.xml"), references(model).into_bytes()));
     }
     let sbom = components::sbom(model, fmi, &description, binaries, &components);
     files.push((model.sbom(), sbom.into_bytes()));

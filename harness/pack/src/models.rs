@@ -10,6 +10,9 @@ use crate::archive::read;
 use crate::fmi::Fmi;
 use crate::project::{self, root};
 
+/// The folder of the layered standard FMI-LS-REF in an FMU.
+pub const REFERENCES: &str = "extra/org.fmi-standard.fmi-ls-ref";
+
 /// An FMU of this project.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Model {
@@ -122,14 +125,14 @@ impl Model {
         root().join("modelDescription").join(self.name)
     }
 
-    /// Folder in the FMU for what the standard has no place for: the model's name, where FMI asks
-    /// for a reversed domain name. The project has no domain, and another's is not to be taken.
-    pub fn extra(&self) -> String {
-        format!("extra/{}", self.name)
+    /// The example with its reference result, in the FMU and in the model's own folder: where the layered standard
+    /// FMI-LS-REF has such files. Folders in `extra` are named by reversed domain names, and the project has no domain.
+    pub fn example(&self) -> PathBuf {
+        self.folder().join(REFERENCES)
     }
 
-    /// The software bill of materials (SBOM) in the FMU.
+    /// The software bill of materials (SBOM) in the FMU: what is in the binary, and under which licence.
     pub fn sbom(&self) -> String {
-        format!("{}/{}.cdx.json", self.extra(), self.name)
+        format!("documentation/licenses/{}.cdx.json", self.name)
     }
 }

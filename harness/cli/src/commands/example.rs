@@ -25,7 +25,7 @@ impl ExampleArgs {
         let fmu = open(&self.fmu)?;
         let example = Example::of(&fmu)?;
         let model = pack::model(example.model)?;
-        let folder = model.folder().join(model.extra());
+        let folder = model.example();
         example.write(&fmu, &folder)?;
         done!("wrote {}", folder.display());
         Ok(())

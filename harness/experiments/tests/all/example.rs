@@ -25,8 +25,7 @@ fn differences(answer: &Table, reference: &Table) -> Vec<(String, f64)> {
 
 /// Where the example is committed.
 fn folder(example: &Example) -> PathBuf {
-    let model = pack::model(example.model).unwrap();
-    model.folder().join(model.extra())
+    pack::model(example.model).unwrap().example()
 }
 
 fn packed(example: &Example) -> Fmu {
