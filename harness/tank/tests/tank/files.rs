@@ -357,11 +357,24 @@ fn a_contour_is_read_from_an_svg_drawing() {
         }
         assert!((tank.solve(1.8, 1).unwrap().modes[0].lambda / 5.445_194 - 1.0).abs() < 2e-3);
     }
+    // a parabola is a quadratic curve: z = r^2 from the axis to 1, pi/2 m3 of a paraboloid
+    for path in ["M 0 1 Q 0.5 1 1 0", "m 0 3 q 0.5 0 1 -1"] {
+        let data = read(path, 1.0).unwrap().solve(1.0, 1).unwrap();
+        let volume = data.m_liq / 1000.0;
+        assert!((volume / core::f64::consts::FRAC_PI_2 - 1.0).abs() < 1e-12, "{path}: {volume}");
+        // and its centre at two thirds of the height
+        let center = data.z_cg - data.z_lowest;
+        assert!((center - 2.0 / 3.0).abs() < 1e-12, "{path}: {center}");
+    }
     // arcs the long way round and the other sense: a whole sphere's section
     let sphere = read("M 0 2 A 1 1 0 0 0 1 1 A 1 1 0 0 0 0 0", 1.0).unwrap();
     assert!((sphere.solve(1.0, 1).unwrap().modes[0].lambda - 1.560_157_174).abs() < 1e-8);
     let whole = read("M 0 2 A 1 1 0 1 0 0 0", 1.0).unwrap();
     assert!((whole.solve(1.0, 1).unwrap().modes[0].lambda - 1.560_157_174).abs() < 1e-8);
+    for scale in [0.0, -1.0, f64::INFINITY] {
+        let said = read(drawn, scale).unwrap_err().to_string();
+        assert!(said.contains("it must be a number above 0, in m per unit"), "{scale}: {said}");
+    }
     for (path, words) in [
         ("M 0 2 L 1 2 M 3 3 L 4 4", "several parts"),
         ("M 0 2 A 1 2 30 0 0 1 1", "rotated axes"),

@@ -54,6 +54,10 @@ fn laminar_layer_is_the_known_one_in_cylinder_and_box() {
         let decrement = (pi * 1e-6 * period).sqrt() / w * bracket;
         let zeta = damping::keulegan(a, w, h, 1e-6, 9.81).zeta;
         assert!((zeta * 2.0 * pi / decrement - 1.0).abs() < 1e-12, "{h}");
+        // the layer is thin against the wave: 0.6 mm in water, 0.6 m in a liquid a million times as viscous
+        assert_eq!(damping::laminar(mode, 1e-6, 9.81).outside, [""; 0]);
+        let [thick] = &damping::laminar(mode, 1.0, 9.81).outside[..] else { panic!("{h}") };
+        assert!(thick.contains("e-1 m is not thin against the wave"), "{thick}");
     }
 }
 
@@ -249,6 +253,8 @@ fn stiffnesses_have_the_limits_of_a_flat_surface_and_of_large_bond_numbers() {
     }
     let none = deep(f64::INFINITY, 5.0, 0.0);
     assert_eq!([k(&none), real(&none, "slosh.table.k[2]")], [0.0, 0.0]);
+    let told = |why: &String| why.contains("none below 0");
+    assert!(!none.warnings.iter().any(told), "0 is allowed: {:?}", none.warnings);
 }
 
 /// Nothing that jumps or turns between the values; the published formula's distance.
@@ -275,6 +281,14 @@ fn curved_meniscus_is_smooth_between_its_values() {
                 > low_gravity::cylinder_omega2(2.0, angle - 1.0)
         );
     }
+    // Straight on in the cosine beyond the last column, 5 degrees: an angle's sign does not matter, so at 0 nothing turns.
+    let cos = |angle: f64| f64::to_radians(angle).cos();
+    for (bond, _) in MENISCUS {
+        let [at_15, at_5, at_0] =
+            [15.0, 5.0, 0.0].map(|angle| low_gravity::cylinder_omega2(bond, angle));
+        let slopes = [(at_5 - at_15) / (cos(5.0) - cos(15.0)), (at_0 - at_5) / (1.0 - cos(5.0))];
+        assert!((slopes[1] / slopes[0] - 1.0).abs() < 1e-9, "{bond} {slopes:?}");
+    }
     // the published formula: 0.6 % at 100, 4 % at 10
     for (bond, most) in [(30.0, 0.003), (100.0, 0.007), (10.0, 0.045)] {
         let ratio =
@@ -283,6 +297,12 @@ fn curved_meniscus_is_smooth_between_its_values() {
     }
     let mode = &solve(BENCH, 0.2, 1).modes[0];
     let fluid = Fluid { rho: 997.0, sigma: 0.072, g: 0.0 };
+    // Gravity and the spring together make the frequency, under any meniscus.
+    for (angle, g) in [(90.0, 9.81), (60.0, 0.1), (30.0, 0.01), (5.0, 0.0)] {
+        let found = low_gravity::cylinder(mode, 0.0815, 0.2, angle, Fluid { g, ..fluid });
+        let together = g * mode.lambda + found.spring / mode.m;
+        assert!((found.omega2 / together - 1.0).abs() < 1e-12, "{angle} {g}");
+    }
     let zero = low_gravity::cylinder(mode, 0.0815, 0.2, 30.0, fluid);
     assert!(zero.spring > 0.0 && zero.outside.is_empty() && zero.omega2 > 0.0);
     assert_eq!(low_gravity::cylinder(mode, 0.0815, 0.2, 120.0, fluid).outside.len(), 1);

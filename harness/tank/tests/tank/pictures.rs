@@ -36,6 +36,30 @@ fn a_tank_and_its_sweep_look_as_before() {
     is_drawn(&picture::sweep(&tank, &swept, 9.80665), "tests/tank/drawn/sweep.svg");
 }
 
+/// What is drawn of curves: walls, surfaces, modes, charts.
+fn curves(svg: &str) -> Vec<&str> {
+    svg.lines().filter(|line| line.contains(" fill=\"none\"") && line.contains("width")).collect()
+}
+
+/// A tank four times as large is drawn as the same lines, beside other numbers.
+#[test]
+fn a_larger_tank_of_the_same_shape_has_the_same_lines() {
+    let drawn = |factor: f64| {
+        let text = format!("density = 1.0\nprofile = [{{ arc = [0, 0, {factor}, -90, 90] }}]");
+        let tank = Tank::parse(&text, Path::new("")).unwrap();
+        let data = tank.solve(0.7 * factor, 3).unwrap();
+        let fills = [0.5, 1.0, 1.5].map(|fill| fill * factor);
+        let swept = sweep(&tank, &fills, 3).unwrap();
+        [picture::tank(&tank, &data, 9.80665), picture::sweep(&tank, &swept, 9.80665)]
+    };
+    let [small, large] = [1.0, 4.0].map(drawn);
+    for (small, large) in small.iter().zip(&large) {
+        assert!(curves(small).len() > 8);
+        assert_eq!(curves(small), curves(large));
+        assert_ne!(small, large);
+    }
+}
+
 /// An axis has some length where all its values are the same: frequencies without gravity, hinges at a sphere's centre.
 #[test]
 fn a_sweep_whose_values_are_all_the_same_can_be_drawn() {
@@ -46,6 +70,17 @@ fn a_sweep_whose_values_are_all_the_same_can_be_drawn() {
     assert!(!svg.contains("NaN") && !svg.contains("inf"));
     // ticks of 0.1 and 0.2 over a width of 1
     assert!(svg.matches("<text").count() < 80, "{}", svg.matches("<text").count());
+    // and every curve is in the picture
+    let view = svg.split("viewBox=\"0 0 ").nth(1).unwrap().split('"').next().unwrap();
+    let size: Vec<f64> = view.split(' ').map(|x| x.parse().unwrap()).collect();
+    for line in curves(&svg) {
+        let path = line.split('"').nth(1).unwrap();
+        for point in path.split(['M', 'L']).skip(1) {
+            let place: Vec<f64> = point.split(' ').map(|x| x.parse().unwrap()).collect();
+            assert!((0.0..=size[0]).contains(&place[0]), "{line}");
+            assert!((0.0..=size[1]).contains(&place[1]), "{line}");
+        }
+    }
 }
 
 /// Every example: well-formed XML without anything that is not a number, the table with every mode.
