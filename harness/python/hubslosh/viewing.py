@@ -70,7 +70,8 @@ def view(
     Nothing is simulated. The table needs ``theta`` or ``omega``, ``slosh_angle`` and
     ``slosh_angle_radial`` (HubSlosh), ``q[1]`` to ``q[4]`` (Spacecraft), and of tanks the
     directions ``p`` or the slosh angles, all of which ``simulate`` records by default; of tanks
-    that drain also ``liquid``.
+    that drain also ``liquid``, of HubSlosh's modes after the first ``slosh.q_radial[n]`` and
+    ``slosh.q_tangential[n]``.
 
     Raises FmuError with the columns that are missing.
     """

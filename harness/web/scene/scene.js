@@ -24,7 +24,7 @@ globalThis.HubSloshScene = (() => {
   };
   // For arrows without a colour of their own: Okabe and Ito's, each at 3:1 on its background.
   const ARROWS = { light: ["#b84a00", "#0072b2", "#00805d", "#a8527f", "#6d4fb3", "#8a6a00"], dark: ["#ff8a4c", "#56b4e9", "#2fd0a3", "#e79ac4", "#b79cf0", "#f0c24b"] };
-  const AROUND = 64, RINGS = 16, WALL = 40;
+  const AROUND = 64, RINGS = 16, WALL = 40; // at least so many rings; eight for every mode
 
   // An upright cylinder's contour from the axis along the bottom and up the wall, (r, z), m.
   const cylinder = (radius, bottom, top) => [[0, bottom], [radius, bottom], [radius, top]];
@@ -64,15 +64,18 @@ globalThis.HubSloshScene = (() => {
     };
   }
 
-  // The side of each mode's surface on the radius, s = 0 at the axis to 1 at the wall, 1 at the wall.
-  const sideView = (mode, n) => {
-    if (mode.shape) {
-      const last = mode.shape.length - 1;
-      return (s) => { const i = Math.min(Math.floor(s * last), last - 1); return mode.shape[i] + (mode.shape[i + 1] - mode.shape[i]) * (s * last - i); };
+  // The nth mode's surface along the radius, from the axis or the inner wall at s = s0 to the outer wall at s = 1, 1 there.
+  function alongRadius(mode, shape, n, s0) {
+    if (shape) {
+      const last = shape.length - 1;
+      return (s) => {
+        const at = ((s - s0) / (1 - s0)) * last, i = Math.max(0, Math.min(Math.floor(at), last - 1));
+        return shape[i] + (shape[i + 1] - shape[i]) * (at - i);
+      };
     }
     const xi = XI[Math.min(n, XI.length - 1)], whole = j1(xi);
     return (s) => j1(xi * s) / whole;
-  };
+  }
 
   const angle = (component) => Math.asin(Math.max(-1, Math.min(1, component)));
 
@@ -90,6 +93,7 @@ globalThis.HubSloshScene = (() => {
       this.metal = new THREE.MeshLambertMaterial();
       this.rod = new THREE.MeshLambertMaterial();
       this.materials = [this.glass, this.edge, this.wet, this.top, this.metal, this.rod];
+      this.rings = Math.max(RINGS, 8 * data.modes.length);
       if (data.shape.box) this.makeBox(data.shape); else this.makeRevolved(data.shape.contour);
       const reach = this.extent;
       const masses = data.modes.map((m) => m.mass || 1), most = Math.max(...masses);
@@ -101,7 +105,6 @@ globalThis.HubSloshScene = (() => {
         this.group.add(bob, rod, hinge);
         return { bob, rod, hinge, thick: 0.1 * radius };
       });
-      this.sides = data.modes.map(sideView);
     }
 
     makeRevolved(contour) {
@@ -116,7 +119,7 @@ globalThis.HubSloshScene = (() => {
       const corners = contour.filter((p, i) => p[0] > 0 && (i === 0 || i === contour.length - 1 || turn(contour[i - 1], p, contour[i + 1]) > 0.35));
       const widest = contour.reduce((a, b) => (b[0] > a[0] ? b : a));
       for (const [r, z] of [...corners, widest]) this.group.add(circle(r, z, this.edge));
-      this.surface = grid(AROUND + 1, RINGS + 1, this.top);
+      this.surface = grid(AROUND + 1, this.rings + 1, this.top);
       this.body = grid(AROUND + 1, this.contour.length, this.wet);
       this.rim = circle(1, 0, this.edge);
       this.group.add(this.body, this.surface, this.rim);
@@ -129,24 +132,16 @@ globalThis.HubSloshScene = (() => {
       mesh.position.z = (bottom + top) / 2;
       const edges = new THREE.LineSegments(new THREE.EdgesGeometry(mesh.geometry), this.edge);
       edges.position.copy(mesh.position);
-      this.surface = grid(RINGS + 1, RINGS + 1, this.top);
-      this.body = grid(4 * RINGS + 1, 2, this.wet);
+      this.surface = grid(this.rings + 1, this.rings + 1, this.top);
+      this.body = grid(4 * this.rings + 1, 2, this.wet);
       this.group.add(mesh, edges, this.body, this.surface);
-    }
-
-    // Elevation of the surface at (s, azimuth), s on the radius, m.
-    elevation(s, azimuth) {
-      let sum = 0;
-      const cos = Math.cos(azimuth), sin = Math.sin(azimuth);
-      this.angles.forEach(([x, y], n) => { sum += this.data.modes[n].wave * this.sides[n](s) * (x * cos + y * sin); });
-      return sum;
     }
 
     draw(state, exaggeration) {
       const level = state.level ?? this.data.level, p = state.p;
       this.angles = p.map((one) => [angle(one[0]), angle(one[1])]);
       this.height = (value) => Math.max(this.wall.bottom, Math.min(this.wall.top, level + exaggeration * value));
-      if (this.data.shape.box) this.drawBox(); else this.drawRevolved(level);
+      if (this.data.shape.box) this.drawBox(); else this.drawRevolved(level, state.modes);
       this.surface.geometry.computeVertexNormals();
       this.body.geometry.computeVertexNormals();
       this.pendulums.forEach(({ bob, rod, hinge, thick }, n) => {
@@ -160,18 +155,24 @@ globalThis.HubSloshScene = (() => {
       });
     }
 
-    drawRevolved(level) {
+    drawRevolved(level, modes) {
       const surface = this.surface.geometry.attributes.position, body = this.body.geometry.attributes.position;
-      const rim = this.rim.geometry.attributes.position;
-      const hollow = this.wall.inner(level) > 0;
+      const rim = this.rim.geometry.attributes.position, rings = this.rings;
+      const hollow = this.wall.inner(level) > 0, s0 = hollow ? this.wall.inner(level) / this.wall.outer(level) : 0;
+      // every mode's elevation per angle on each ring, m/rad
+      const eta = this.data.modes.map((mode, n) => {
+        const along = alongRadius(mode, modes?.[n].shape ?? mode.shape, n, s0);
+        return Array.from({ length: rings + 1 }, (_, k) => mode.wave * along(s0 + ((1 - s0) * k) / rings));
+      });
       for (let i = 0; i <= AROUND; i++) {
         const azimuth = (2 * Math.PI * i) / AROUND, cos = Math.cos(azimuth), sin = Math.sin(azimuth);
-        const edge = this.height(this.elevation(1, azimuth)), r1 = this.wall.outer(edge);
-        const s0 = hollow ? this.wall.inner(level) / this.wall.outer(level) : 0;
-        const innerEdge = hollow ? this.height(this.elevation(s0, azimuth)) : Infinity, r0 = hollow ? this.wall.inner(innerEdge) : 0;
-        for (let k = 0; k <= RINGS; k++) {
-          const s = s0 + ((1 - s0) * k) / RINGS, r = r0 + ((r1 - r0) * k) / RINGS;
-          surface.setXYZ(i * (RINGS + 1) + k, r * cos, r * sin, this.height(this.elevation(s, azimuth)));
+        const tilt = this.angles.map(([x, y]) => x * cos + y * sin);
+        const height = (k) => this.height(eta.reduce((sum, one, n) => sum + one[k] * tilt[n], 0));
+        const edge = height(rings), r1 = this.wall.outer(edge);
+        const innerEdge = hollow ? height(0) : Infinity, r0 = hollow ? this.wall.inner(innerEdge) : 0;
+        for (let k = 0; k <= rings; k++) {
+          const r = r0 + ((r1 - r0) * k) / rings;
+          surface.setXYZ(i * (rings + 1) + k, r * cos, r * sin, height(k));
         }
         this.contour.forEach(([r, z], k) => {
           const [end, at] = k < this.low ? [innerEdge, r0] : [edge, r1];
@@ -184,18 +185,18 @@ globalThis.HubSloshScene = (() => {
     }
 
     drawBox() {
-      const [a, b] = this.data.shape.box, surface = this.surface.geometry.attributes.position, body = this.body.geometry.attributes.position;
+      const [a, b] = this.data.shape.box, surface = this.surface.geometry.attributes.position, body = this.body.geometry.attributes.position, rings = this.rings;
       // the modes of a box along each side: sin((2n - 1) pi x/a), 1 at the wall
       const eta = (x, y) => this.angles.reduce((sum, [ax, ay], n) => {
         const odd = 2 * n + 1, sign = n % 2 ? -1 : 1;
         return sum + sign * this.data.modes[n].wave * (ax * Math.sin((odd * Math.PI * x) / a) + ay * Math.sin((odd * Math.PI * y) / b));
       }, 0);
-      for (let i = 0; i <= RINGS; i++) for (let k = 0; k <= RINGS; k++) {
-        const x = a * (i / RINGS - 0.5), y = b * (k / RINGS - 0.5);
-        surface.setXYZ(i * (RINGS + 1) + k, x, y, this.height(eta(x, y)));
+      for (let i = 0; i <= rings; i++) for (let k = 0; k <= rings; k++) {
+        const x = a * (i / rings - 0.5), y = b * (k / rings - 0.5);
+        surface.setXYZ(i * (rings + 1) + k, x, y, this.height(eta(x, y)));
       }
-      for (let i = 0; i <= 4 * RINGS; i++) {
-        const side = Math.floor(i / RINGS) % 4, along = (i % RINGS) / RINGS - 0.5;
+      for (let i = 0; i <= 4 * rings; i++) {
+        const side = Math.floor(i / rings) % 4, along = (i % rings) / rings - 0.5;
         const [x, y] = [[a * along, -b / 2], [a / 2, b * along], [-a * along, b / 2], [-a / 2, -b * along]][side];
         body.setXYZ(2 * i, x, y, this.wall.bottom);
         body.setXYZ(2 * i + 1, x, y, this.height(eta(x, y)));
@@ -603,18 +604,24 @@ globalThis.HubSloshScene = (() => {
         pen.font = `600 ${unit}px system-ui, sans-serif`;
         pen.fillText(text, unit, high - 1.2 * unit);
       },
-      // What is drawn, read back from its meshes: of each tank and mode hinge and bob in the body's frame, m, and the elevation
-      // of the surface at the wall on the tank's x axis and y axis, m, exaggerated as it is drawn.
+      // What is drawn, read back from its meshes: of each tank and mode hinge and bob in the body's frame, m; the surface above the
+      // tank's x axis and y axis from the axis or inner wall outwards, (r, elevation), m, exaggerated as it is drawn, and its ends
+      // at the wall.
       read() {
         scene.updateMatrixWorld(true);
         const inBody = (mesh) => root.worldToLocal(mesh.getWorldPosition(new THREE.Vector3())).toArray();
         return tanks.map((tank, i) => {
           const position = tank.surface.geometry.attributes.position, level = state.tanks[i].level ?? tank.data.level;
-          const at = (column) => position.getZ(column * (RINGS + 1) + RINGS) - level;
+          const section = (column) => Array.from({ length: tank.rings + 1 }, (_, k) => {
+            const at = column * (tank.rings + 1) + k;
+            return [Math.hypot(position.getX(at), position.getY(at)), position.getZ(at) - level];
+          });
+          const sections = tank.data.shape.box ? null : [section(0), section(AROUND / 4)];
           return {
             modes: tank.pendulums.map(({ hinge, bob }) => ({ hinge: inBody(hinge), bob: inBody(bob) })),
             level,
-            wall: tank.data.shape.box ? null : [at(0), at(AROUND / 4)],
+            sections,
+            wall: sections && sections.map((points) => points[tank.rings][1]),
           };
         });
       },

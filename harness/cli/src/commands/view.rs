@@ -209,6 +209,9 @@ fn part(table: &Table, from: Option<f64>, to: Option<f64>) -> Result<Table> {
 /// Points of a drawn contour's segment, and masses at which the surface's height is computed.
 const POINTS: usize = 24;
 
+/// Steps of the radius over which a mode's surface is given.
+const STEPS: usize = 80;
+
 /// What `--tank [N:]FILE` names.
 fn drawing(text: &str) -> Result<(usize, Drawing)> {
     let (number, path) = match text.split_once(':') {
@@ -236,14 +239,33 @@ fn drawing(text: &str) -> Result<(usize, Drawing)> {
                     Ok([mass, bottom + height(mass)?])
                 })
                 .collect::<Result<_>>()?;
-            (number, Drawing { name, outline: Outline::Revolved(points), levels })
+            let surfaces = Some(Box::new(move |mass, modes| {
+                let solved =
+                    tank.height_of(Fill::Mass(mass)).and_then(|fill| tank.solve(fill, modes));
+                let solved = solved.map_err(|problems| anyhow::anyhow!("{problems}"))?;
+                Ok(solved.modes.iter().map(|mode| equally_spaced(&mode.shape)).collect())
+            }) as Box<view::Surfaces>);
+            (number, Drawing { name, outline: Outline::Revolved(points), levels, surfaces })
         }
         Geometry::Box { length_x, length_y } => {
             // open at the top: as high as it is long
             let top = length_x.max(*length_y);
             let most = top * length_x * length_y * tank.density;
             let outline = Outline::Box([*length_x, *length_y, 0.0, top]);
-            (number, Drawing { name, outline, levels: vec![[0.0, 0.0], [most, top]] })
+            let levels = vec![[0.0, 0.0], [most, top]];
+            (number, Drawing { name, outline, levels, surfaces: None })
         }
     })
+}
+
+/// Elevations at equal steps of the radius, over that at the outer wall.
+fn equally_spaced(shape: &[[f64; 2]]) -> Vec<f64> {
+    let (first, last) = (shape[0], shape[shape.len() - 1]);
+    let at = |i: usize| {
+        let r = first[0] + (last[0] - first[0]) * i as f64 / STEPS as f64;
+        let after = shape.partition_point(|p| p[0] < r).clamp(1, shape.len() - 1);
+        let (a, b) = (shape[after - 1], shape[after]);
+        (a[1] + (b[1] - a[1]) * (r - a[0]) / (b[0] - a[0])) / last[1]
+    };
+    (0..=STEPS).map(at).collect()
 }

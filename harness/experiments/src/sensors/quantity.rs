@@ -17,7 +17,7 @@
 
 use std::collections::BTreeMap;
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use formulas::cylinder::{MODES, XI};
 use host::description::{ModelDescription, Type};
 
@@ -40,15 +40,39 @@ enum Rule {
     Acceleration { radius: f64, angle: f64 },
 }
 
-/// How a model's coordinate of a mode makes an angle.
+/// How the coordinates `slosh.q_radial` and `slosh.q_tangential` of a mode of HubSlosh make slosh angles.
 #[derive(Clone, Copy, Debug)]
-enum Coordinate {
+pub enum Coordinate {
     /// It is the angle.
     Angle,
     /// The tangent of half the angle from the vertical, times the direction.
     Stereographic,
     /// The displacement, m.
     Displacement,
+}
+
+impl Coordinate {
+    /// That of a `slosh.model`; none of a model whose liquid does not move.
+    pub fn of(model: &str) -> Option<Coordinate> {
+        match model {
+            "linear" | "planar" => Some(Coordinate::Angle),
+            "spherical" => Some(Coordinate::Stereographic),
+            "paraboloid" | "liquid" => Some(Coordinate::Displacement),
+            _ => None,
+        }
+    }
+
+    /// Slosh angles, radial and tangential, rad, of a mode whose pendulum has this length, m.
+    pub fn angles(self, q: [f64; 2], length: f64) -> [f64; 2] {
+        match self {
+            Coordinate::Angle => q,
+            Coordinate::Stereographic => {
+                let k = 2.0 / (1.0 + q[0] * q[0] + q[1] * q[1]);
+                q.map(|q| (k * q).clamp(-1.0, 1.0).asin())
+            }
+            Coordinate::Displacement => q.map(|q| (q / length).clamp(-1.0, 1.0).asin()),
+        }
+    }
 }
 
 /// The modes whose coordinates are the first things needed: of each radial, tangential and length; then the tank's diameter.
@@ -206,17 +230,7 @@ impl Modes {
 
     /// Slosh angles, radial and tangential, rad.
     fn angles(&self, read: &[f64]) -> Vec<[f64; 2]> {
-        let angle = |mode: &[f64]| {
-            let q = [mode[0], mode[1]];
-            match self.coordinate {
-                Coordinate::Angle => q,
-                Coordinate::Stereographic => {
-                    let k = 2.0 / (1.0 + q[0] * q[0] + q[1] * q[1]);
-                    q.map(|q| (k * q).clamp(-1.0, 1.0).asin())
-                }
-                Coordinate::Displacement => q.map(|q| (q / mode[2]).clamp(-1.0, 1.0).asin()),
-            }
-        };
+        let angle = |mode: &[f64]| self.coordinate.angles([mode[0], mode[1]], mode[2]);
         read[..3 * self.count].chunks_exact(3).map(angle).collect()
     }
 }
@@ -253,12 +267,9 @@ impl Surface<'_> {
             source == "geometry",
             "it is known of an upright cylinder alone (slosh.source = geometry), not of a {source}"
         );
-        let coordinate = match self.choice("slosh.model", "slosh.kind")?.as_str() {
-            "linear" | "planar" => Coordinate::Angle,
-            "spherical" => Coordinate::Stereographic,
-            "paraboloid" | "liquid" => Coordinate::Displacement,
-            other => bail!("slosh.model = {other} has no surface that moves"),
-        };
+        let model = self.choice("slosh.model", "slosh.kind")?;
+        let coordinate = Coordinate::of(&model)
+            .with_context(|| format!("slosh.model = {model} has no surface that moves"))?;
         let count = (self.number("slosh.modes")? as usize).clamp(1, MODES);
         let mut needs = Vec::new();
         for n in 1..=count {

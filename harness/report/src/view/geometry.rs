@@ -13,7 +13,7 @@
 
 use std::collections::BTreeMap;
 
-use formulas::cylinder::{XI, pendulum};
+use formulas::cylinder::{MODES, XI, pendulum};
 use formulas::interpolation::{derivatives, quintic};
 use host::description::{ModelDescription, Value};
 
@@ -48,6 +48,14 @@ impl Parameters<'_> {
         items.iter().find(|item| item.value == n).map_or(text, |item| item.name.clone())
     }
 
+    /// An enumeration's item, or the one whose number `kind` is, for hosts that cannot set enumerations.
+    pub fn choice(&self, name: &str, kind: &str) -> String {
+        let number = self.number(kind) as i64;
+        let items = self.description.variable(name).map(|v| self.description.items(v));
+        let item = items.unwrap_or_default().iter().find(|item| item.value == number);
+        item.map_or_else(|| self.item(name), |item| item.name.clone())
+    }
+
     /// `name[1]` to `name[N]`.
     pub fn vector<const N: usize>(&self, name: &str) -> [f64; N] {
         std::array::from_fn(|i| self.number(&format!("{name}[{}]", i + 1)))
@@ -63,8 +71,11 @@ pub enum Outline {
     Box([f64; 4]),
 }
 
+/// Surfaces of the first modes of a tank with some liquid, kg: of each the elevation at equal steps of the radius from the axis or
+/// the inner wall to the outer wall, over that at the outer wall.
+pub type Surfaces = dyn Fn(f64, usize) -> anyhow::Result<Vec<Vec<f64>>>;
+
 /// A tank as somebody has drawn it.
-#[derive(Clone, Debug, PartialEq)]
 pub struct Drawing {
     /// What it is called.
     pub name: String,
@@ -72,6 +83,8 @@ pub struct Drawing {
     pub outline: Outline,
     /// Masses of liquid, kg, rising, each with the height of its surface at rest, m.
     pub levels: Vec<[f64; 2]>,
+    /// Its modes' surfaces; none of a box, whose modes are sines.
+    pub surfaces: Option<Box<Surfaces>>,
 }
 
 impl Drawing {
@@ -100,6 +113,13 @@ pub(super) struct Pendulum {
     pub wave: f64,
 }
 
+impl Pendulum {
+    fn of(one: &formulas::cylinder::Pendulum) -> Pendulum {
+        let formulas::cylinder::Pendulum { mass, length, hinge, wave } = *one;
+        Pendulum { mass, length, hinge, wave }
+    }
+}
+
 /// What is drawn of a tank.
 pub(super) struct Tank {
     /// `tank[1]`, `tank`, or of the bench nothing.
@@ -109,7 +129,11 @@ pub(super) struct Tank {
     pub outline: Outline,
     /// Of the surface at rest, at the start.
     pub level: f64,
+    /// Its liquid at the start, kg.
+    pub liquid: f64,
     pub modes: Vec<Pendulum>,
+    /// Their surfaces where somebody has drawn the tank and it does not drain, as of [`Surfaces`].
+    pub shapes: Vec<Vec<f64>>,
     /// How it drains.
     pub fill: Option<Fill>,
     /// What the outline is taken from, as a sentence.
@@ -119,11 +143,31 @@ pub(super) struct Tank {
 impl Tank {
     /// The distance from its origin in which it is, m.
     pub fn extent(&self) -> f64 {
+        self.extent_from(0.0)
+    }
+
+    /// The height of its middle above its origin, and the distance from there in which it is, m.
+    pub fn middle_and_extent(&self) -> [f64; 2] {
+        let middle = match &self.outline {
+            Outline::Revolved(points) => {
+                let heights = points.iter().map(|p| p[1]);
+                let [low, high] = [f64::min, f64::max].map(|of| heights.clone().reduce(of));
+                0.5 * (low.unwrap_or(0.0) + high.unwrap_or(0.0))
+            }
+            Outline::Box([_, _, low, high]) => 0.5 * (low + high),
+        };
+        [middle, self.extent_from(middle)]
+    }
+
+    fn extent_from(&self, height: f64) -> f64 {
         match &self.outline {
             Outline::Revolved(points) => {
-                points.iter().map(|p| p[0].hypot(p[1])).fold(0.0, f64::max)
+                points.iter().map(|p| p[0].hypot(p[1] - height)).fold(0.0, f64::max)
             }
-            Outline::Box([a, b, low, high]) => (0.5 * a.hypot(*b)).hypot(low.abs().max(high.abs())),
+            Outline::Box([a, b, low, high]) => {
+                let off = (low - height).abs().max((high - height).abs());
+                (0.5 * a.hypot(*b)).hypot(off)
+            }
         }
     }
 }
@@ -185,39 +229,53 @@ fn length(given: f64, frequency: f64, g: f64, k_over_m: f64) -> f64 {
 }
 
 const DRAWN: &str = "an upright cylinder with the radius that its wave at the wall has, the depth that its first mode's share of the \
-    liquid has, and the liquid's centre of mass";
+    liquid has, and the liquid's centre of mass, with a cylinder's surface (--tank draws the tank itself)";
 
 /// The tank of the bench, its origin in the middle of the bottom.
 pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank {
     let number = |name: &str| parameters.number(name);
     let radius = 0.5 * number("tank.d");
-    let is_table = parameters.item("slosh.source") == "table" || number("slosh.source_kind") == 2.0;
-    let (mode, level, mut bottom, m_liq, mut note) = match is_table {
+    let is_table = parameters.choice("slosh.source", "slosh.source_kind") == "table";
+    let count = match parameters.choice("slosh.model", "slosh.kind").as_str() {
+        "frozen" => 0,
+        _ => (number("slosh.modes") as usize).clamp(1, MODES),
+    };
+    let (modes, level, mut bottom, m_liq, mut note) = match is_table {
         false => {
             let h = number("tank.h");
             let m_liq = number("fluid.rho") * std::f64::consts::PI * radius * radius * h;
-            let mode = pendulum(0, 2.0 * radius, h, m_liq);
+            let modes: Vec<_> = (0..count).map(|n| pendulum(n, 2.0 * radius, h, m_liq)).collect();
             let note =
                 "The tank is drawn by tank.d and tank.h; how high its wall is, is no parameter."
                     .into();
-            (mode, h, 0.0, m_liq, note)
+            (modes, h, 0.0, m_liq, note)
         }
         true => {
-            let one = |key: &str| number(&format!("slosh.table.{key}[1]"));
-            let (mass, m_liq) = (one("mass"), number("slosh.table.m_liq"));
+            let m_liq = number("slosh.table.m_liq");
             let g = number("slosh.table.g_ref");
-            let l = length(one("length"), one("frequency"), g, one("k") / mass);
-            let depth = radius * depth_over_radius(mass / m_liq);
-            let like = pendulum(0, 2.0 * radius, depth, m_liq);
-            let wave = if one("wave") > 0.0 { one("wave") } else { like.wave };
-            // where the table has no heights, those of the cylinder
-            let hinge = if one("hinge") == 0.0 { like.hinge } else { one("hinge") };
-            let bottom = (hinge - l) - (like.hinge - like.length);
-            let mode = formulas::cylinder::Pendulum { mass, length: l, hinge, wave };
+            let of = |key: &str, n: usize| number(&format!("slosh.table.{key}[{}]", n + 1));
+            let mass = |n: usize| of("mass", n);
+            let depth = radius * depth_over_radius(mass(0) / m_liq);
+            let mut modes = Vec::new();
+            let mut bottom = 0.0;
+            // the first mode with its place, and the others that are used
+            for n in (0..count.max(1)).take_while(|n| *n == 0 || mass(*n) > 0.0) {
+                let l = length(of("length", n), of("frequency", n), g, of("k", n) / mass(n));
+                let like = pendulum(n, 2.0 * radius, depth, m_liq);
+                let wave = if of("wave", n) > 0.0 { of("wave", n) } else { like.wave };
+                // where the table has no heights, those of the cylinder
+                let hinge =
+                    if of("hinge", n) == 0.0 { bottom + like.hinge } else { of("hinge", n) };
+                if n == 0 {
+                    bottom = (hinge - l) - (like.hinge - like.length);
+                }
+                modes.push(formulas::cylinder::Pendulum { mass: mass(n), length: l, hinge, wave });
+            }
+            modes.truncate(count);
             let note = format!(
                 "Of the tank only modes are known (slosh.source = table): it is drawn as {DRAWN}."
             );
-            (mode, bottom + depth, bottom, m_liq, note)
+            (modes, bottom + depth, bottom, m_liq, note)
         }
     };
     let mut level = level;
@@ -226,7 +284,11 @@ pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank 
             note = format!("The tank is drawn as {}.", drawing.name);
             level = drawing.level(m_liq);
             bottom = lowest(&drawing.outline);
-            drawing.outline.clone()
+            match drawing.outline {
+                // its first length, whose modes `hubslosh tank` writes, lies along the tangent
+                Outline::Box([a, b, low, high]) => Outline::Box([b, a, low, high]),
+                Outline::Revolved(_) => drawing.outline.clone(),
+            }
         }
         None => cylinder(radius, bottom, level),
     };
@@ -237,12 +299,9 @@ pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank 
         q: [1.0, 0.0, 0.0, 0.0],
         outline,
         level,
-        modes: vec![Pendulum {
-            mass: mode.mass,
-            length: mode.length,
-            hinge: mode.hinge,
-            wave: mode.wave,
-        }],
+        liquid: m_liq,
+        modes: modes.iter().map(Pendulum::of).collect(),
+        shapes: Vec::new(),
         fill: None,
         note,
     }
@@ -290,12 +349,7 @@ pub(super) fn tank(parameters: &Parameters, prefix: &str, drawing: Option<&Drawi
         radius = 0.5 * diameter;
         let depth = number("depth");
         m_liq = number("density") * std::f64::consts::PI * radius * radius * depth;
-        modes = (0..count)
-            .map(|n| {
-                let one = pendulum(n, diameter, depth, m_liq);
-                Pendulum { mass: one.mass, length: one.length, hinge: one.hinge, wave: one.wave }
-            })
-            .collect();
+        modes = (0..count).map(|n| Pendulum::of(&pendulum(n, diameter, depth, m_liq))).collect();
         (level, bottom) = (depth, 0.0);
         note = format!(
             "{prefix} is drawn by its diameter and depth; how high its wall is, is no parameter."
@@ -324,7 +378,18 @@ pub(super) fn tank(parameters: &Parameters, prefix: &str, drawing: Option<&Drawi
     });
     let q: [f64; 4] = parameters.vector(&format!("{prefix}.q"));
     let position = parameters.vector(&format!("{prefix}.position"));
-    Tank { prefix: prefix.into(), position, q, outline, level, modes, fill, note }
+    Tank {
+        prefix: prefix.into(),
+        position,
+        q,
+        outline,
+        level,
+        liquid: m_liq,
+        modes,
+        shapes: Vec::new(),
+        fill,
+        note,
+    }
 }
 
 fn radius_of(mode: &Pendulum) -> f64 {

@@ -7,15 +7,16 @@ mod geometry;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
+use experiments::sensors::quantity::Coordinate;
 use host::description::ModelDescription;
 use maud::{DOCTYPE, PreEscaped, html};
 use serde_json::{Value, json};
 use signals::table::Table;
 
 use self::data::{Thinning, integral, peak};
-pub use self::geometry::{Drawing, Outline};
-use self::geometry::{Parameters, Tank};
+pub use self::geometry::{Drawing, Outline, Surfaces};
+use self::geometry::{Parameters, Pendulum, Tank};
 use crate::campaign::{PLOTLY, PLOTLY_LICENSE};
 
 /// A run and what is known of it.
@@ -88,19 +89,23 @@ pub fn columns(
     let parameters = Parameters { description, set: parameters };
     let of = |names: &[&str]| names.iter().map(|n| n.to_string()).collect::<Vec<_>>();
     let mut all = match kind(description) {
-        Some(Kind::Bench) => of(&[
-            "theta",
-            "omega",
-            "slosh_angle",
-            "slosh_angle_radial",
-            "wave_height",
-            "tau_actuator",
-            "tau_friction",
-            "tau_fluid",
-            "F_radial",
-            "F_tangential",
-            "wheel_speed",
-        ]),
+        Some(Kind::Bench) => {
+            let all = of(&[
+                "theta",
+                "omega",
+                "slosh_angle",
+                "slosh_angle_radial",
+                "wave_height",
+                "tau_actuator",
+                "tau_friction",
+                "tau_fluid",
+                "F_radial",
+                "F_tangential",
+                "wheel_speed",
+            ]);
+            let modes = parameters.number("slosh.modes") as usize;
+            all.into_iter().chain((2..=modes).flat_map(coordinates)).collect()
+        }
         Some(Kind::Craft) => {
             let q = (1..=4).map(|i| format!("q[{i}]"));
             q.chain(["omega", "slosh_force", "slosh_torque"].iter().flat_map(|n| three(n)))
@@ -172,6 +177,43 @@ impl Columns<'_> {
     }
 }
 
+/// The coordinates of mode `n` of HubSlosh, from 1.
+fn coordinates(n: usize) -> [String; 2] {
+    ["radial", "tangential"].map(|along| format!("slosh.q_{along}[{n}]"))
+}
+
+/// Slosh angles, radial and tangential, of HubSlosh's modes after the first, of which the FMU shows states alone: as far as
+/// those are recorded.
+fn higher_modes(table: &Table, model: &str, modes: &[Pendulum]) -> Vec<[Vec<f64>; 2]> {
+    let Some(coordinate) = Coordinate::of(model) else { return Vec::new() };
+    let recorded = (2..).zip(&modes[1..]).map_while(|(n, mode)| {
+        let [radial, tangential] = coordinates(n);
+        let y = table.column(&tangential)?;
+        let x = match (coordinate, table.column(&radial)) {
+            (_, Some(x)) => x.to_vec(),
+            // in a plane it is unused
+            (Coordinate::Angle, None) => vec![0.0; y.len()],
+            _ => return None,
+        };
+        let angles = |(x, y): (&f64, &f64)| coordinate.angles([*x, *y], mode.length);
+        let all: Vec<[f64; 2]> = x.iter().zip(y).map(angles).collect();
+        Some([0, 1].map(|axis| all.iter().map(|angles| angles[axis]).collect()))
+    });
+    recorded.collect()
+}
+
+/// Masses of liquid at which a draining tank's surfaces are computed.
+const MASSES: usize = 9;
+
+/// Evenly from the least of these to the largest.
+fn spread(values: &[f64]) -> Vec<f64> {
+    let [low, high] =
+        [f64::min, f64::max].map(|of| values.iter().copied().reduce(of).unwrap_or(0.0));
+    let count = if high > low { MASSES } else { 1 };
+    let step = (high - low) / (count - 1).max(1) as f64;
+    (0..count).map(|i| low + step * i as f64).collect()
+}
+
 fn three(name: &str) -> Vec<String> {
     (1..=3).map(|i| format!("{name}[{i}]")).collect()
 }
@@ -225,7 +267,7 @@ pub fn page(run: &Run) -> Result<Page> {
 
     // tanks and their pendulums
     let drawing = |i: usize| run.drawings.get(&(i + 1));
-    let tanks: Vec<Tank> = match kind {
+    let mut tanks: Vec<Tank> = match kind {
         Kind::Bench => vec![geometry::bench(&parameters, drawing(0))],
         _ => prefixes(&parameters)
             .iter()
@@ -237,12 +279,12 @@ pub fn page(run: &Run) -> Result<Page> {
         anyhow::bail!("--tank {number}: the run has {} tank(s) (allowed: 1 to that)", tanks.len());
     }
     let mut tank_columns = Vec::new();
-    for tank in &tanks {
+    for (i, tank) in tanks.iter_mut().enumerate() {
         let prefix = &tank.prefix;
         let mut of_modes = Vec::new();
-        if kind == Kind::Bench {
-            let planar =
-                ["frozen", "linear", "planar"].contains(&parameters.item("slosh.model").as_str());
+        if kind == Kind::Bench && !tank.modes.is_empty() {
+            let model = parameters.choice("slosh.model", "slosh.kind");
+            let planar = ["linear", "planar"].contains(&model.as_str());
             let both = vec!["slosh_angle_radial".to_string(), "slosh_angle".to_string()];
             let lists = if planar && run.parameters_known {
                 vec![both, one("slosh_angle")]
@@ -252,11 +294,31 @@ pub fn page(run: &Run) -> Result<Page> {
             let found = columns.need(&lists);
             let radial = (found == Some(0)).then_some("slosh_angle_radial");
             of_modes.push(json!({ "angles": [radial, "slosh_angle"] }));
-            let more = parameters.number("slosh.modes");
-            if more > 1.0 {
-                notes.push(format!(
-                    "Mode 1 of {more} is drawn: of the others the FMU shows no angle."
-                ));
+            let higher = higher_modes(run.table, &model, &tank.modes);
+            for (n, angles) in (2..).zip(higher) {
+                let names = ["radial", "tangential"].map(|along| format!("{along} angle {n}"));
+                of_modes.push(json!({ "angles": names }));
+                derived.extend(names.into_iter().zip(angles));
+            }
+            let (drawn, all) = (of_modes.len(), tank.modes.len());
+            tank.modes.truncate(drawn);
+            match all {
+                _ if drawn < all => {
+                    let missing: Vec<String> = (drawn + 1..=all).flat_map(coordinates).collect();
+                    let sentence = format!(
+                        "{drawn} of {all} slosh modes are drawn: the run does not have {}",
+                        missing.join(", ")
+                    );
+                    notes.push(format!("Note: {sentence}."));
+                    warnings.push(format!(
+                        "{source}: {sentence} (all that is drawn: `hubslosh run … --columns {}`)",
+                        self::columns(run.description, run.parameters).join(",")
+                    ));
+                }
+                2.. => notes.push(format!(
+                    "Slosh angles of modes 2 to {all} follow from the states slosh.q_radial and slosh.q_tangential."
+                )),
+                _ => {}
             }
         }
         for n in (1..=tank.modes.len()).filter(|_| kind != Kind::Bench) {
@@ -287,6 +349,23 @@ pub fn page(run: &Run) -> Result<Page> {
                 }
             }
         }
+        let surfaces = drawing(i).and_then(|drawing| drawing.surfaces.as_ref());
+        if let Some(surfaces) = surfaces.filter(|_| !tank.modes.is_empty()) {
+            let of = |mass: &f64| {
+                let shapes = surfaces(*mass, tank.modes.len());
+                shapes.with_context(|| format!("--tank {}: with {mass} kg of liquid", i + 1))
+            };
+            let name = format!("{prefix}.liquid");
+            match tank.fill.as_ref().and(run.table.column(&name)) {
+                Some(liquid) => {
+                    let masses = spread(liquid);
+                    let shapes = masses.iter().map(of).collect::<Result<Vec<_>>>()?;
+                    entry["surfaces"] =
+                        json!({ "liquid": name, "masses": masses, "shapes": shapes });
+                }
+                None => tank.shapes = of(&tank.liquid)?,
+            }
+        }
         tank_columns.push(entry);
     }
     ensure!(
@@ -312,9 +391,10 @@ pub fn page(run: &Run) -> Result<Page> {
     let scene = scene(kind, &parameters, &tanks, run.table, &mut columns, &mut notes);
     notes.extend(tanks.iter().map(|tank| tank.note.clone()));
     notes.push(
-        "The surface is that of linear potential flow for the slosh angles: J₁(ξr/R) over the radius (sin πx/a in a box), as high at \
-         the wall as the FMU's wave per angle says. A high wave breaks before it looks like that. Pendulums are drawn where they are; \
-         the exaggeration is of the surface alone, which ends at bottom and rim."
+        "The surface is that of linear potential flow for the slosh angles, the sum of all modes, each as high at the wall as the FMU's \
+         wave per angle says: in an upright cylinder J₁(ξr/R) over the radius, in a box sin (2n − 1)πx/a, in another tank of --tank \
+         the modes that `hubslosh tank` finds there. A high wave breaks before it looks like that. Pendulums are drawn where they \
+         are; the exaggeration is of the surface alone, which ends at bottom and rim."
             .into(),
     );
     if !run.parameters_known {
@@ -440,7 +520,11 @@ fn scene(
             let modes: Vec<Value> = tank
                 .modes
                 .iter()
-                .map(|m| json!({ "hinge": m.hinge, "length": m.length, "wave": m.wave, "mass": m.mass }))
+                .enumerate()
+                .map(|(n, m)| {
+                    let shape = tank.shapes.get(n);
+                    json!({ "hinge": m.hinge, "length": m.length, "wave": m.wave, "mass": m.mass, "shape": shape })
+                })
                 .collect();
             json!({ "position": tank.position, "q": tank.q, "shape": shape, "level": tank.level, "modes": modes })
         })
@@ -590,26 +674,22 @@ fn scene(
             })
         }
         Kind::Tank => {
-            let long = 0.5 * reach;
+            // about its middle, in which the tank is seen, with O and full arrows from there
+            let tank = &tanks[0];
+            let [middle, half] = tank.middle_and_extent();
+            let [x, y, z] = tank.position;
+            let off = x.hypot(y).hypot(z + middle);
+            reach = half.max(off);
+            let long = 0.6 * reach;
             let force = json!({ "kind": "force", "unit": "N", "length": long });
             add(columns, "force", "liquid force on the host at O".into(), force, three("force"));
             let torque = json!({ "kind": "torque", "unit": "N·m", "length": long });
             add(columns, "torque", "liquid torque about O".into(), torque, three("torque"));
             let acceleration = json!({ "kind": "acceleration", "unit": "m/s²", "length": long });
             add(columns, "a", "specific force at O".into(), acceleration, three("a"));
-            let tank = &tanks[0];
-            let heights = match &tank.outline {
-                Outline::Revolved(points) => {
-                    points.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], p| {
-                        [low.min(p[1]), high.max(p[1])]
-                    })
-                }
-                Outline::Box([_, _, low, high]) => [*low, *high],
-            };
-            let middle = tank.position[2] + 0.5 * (heights[0] + heights[1]);
             json!({
-                "from": [1.0, -1.25, 0.55], "axes": { "length": 0.45 * reach }, "radius": 1.1 * tank.extent(),
-                "target": [tank.position[0], tank.position[1], middle],
+                "from": [1.0, -1.25, 0.55], "axes": { "length": 0.5 * reach },
+                "radius": f64::max(1.1 * half, off + 1.1 * long), "target": [x, y, z + middle],
             })
         }
     };

@@ -41,6 +41,15 @@
     return [x, y, -Math.sign(Math.cos(a) * Math.cos(b)) * Math.sqrt(Math.max(0, 1 - x * x - y * y))];
   }
 
+  // A mode's surface, linear between the masses of liquid at which it is known.
+  function surface({ liquid, masses, shapes }, n, where) {
+    const last = masses.length - 1, found = masses.findIndex((m) => m >= value(liquid, where));
+    if (last === 0) return shapes[0][n];
+    const k = found < 0 ? last : Math.max(1, found), [a, b] = [shapes[k - 1][n], shapes[k][n]];
+    const part = (value(liquid, where) - masses[k - 1]) / (masses[k] - masses[k - 1]);
+    return a.map((one, i) => one + (b[i] - one) * part);
+  }
+
   function stateAt(t) {
     const where = place(t), state = { arrows: {} };
     if (run.motion.theta) {
@@ -54,6 +63,7 @@
       if (tank.level) {
         drawn.level = value(tank.level, where);
         drawn.modes = tank.modes.map((mode) => ({ length: value(mode.length, where), hinge: value(mode.hinge, where) }));
+        if (tank.surfaces) drawn.modes.forEach((mode, n) => { mode.shape = surface(tank.surfaces, n, where); });
       }
       return drawn;
     });
