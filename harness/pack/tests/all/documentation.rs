@@ -88,6 +88,18 @@ fn every_link_and_figure_of_the_book_leads_to_one_of_its_files() {
     }
 }
 
+/// They load no slower than in a book without live pages: their bytes are the same, and so are those of all that they load.
+#[test]
+fn live_pages_change_no_byte_of_any_other_page() {
+    let module = |needed| Module { needed, bytes: b"module".to_vec() };
+    let modules: Vec<_> = live::needed().map(module).collect();
+    let live: BTreeMap<_, _> = book::render(&pack::root(), &modules).unwrap().into_iter().collect();
+    let plain = book::render(&pack::root(), &[]).unwrap();
+    let changed: Vec<_> =
+        plain.iter().filter(|(name, bytes)| live[name] != *bytes).map(|(name, _)| name).collect();
+    assert_eq!(changed, ["swirl.html", "slew.html", "your_tank.html"]);
+}
+
 #[test]
 fn every_equation_is_typeset_and_every_place_the_search_finds_exists() {
     let files: BTreeMap<_, _> = book::render(&pack::root(), &[]).unwrap().into_iter().collect();
