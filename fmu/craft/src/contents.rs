@@ -534,5 +534,8 @@ mod tests {
             assert_eq!(passes(sign, sign, 0.0, liquid), 1.0);
             assert_eq!(passes(sign, sign, 1.0, liquid), 10.0);
         }
+        // 4 t - t^2 = 3, too
+        assert_eq!(passes(4.0, -2.0, 0.0, 103.0), 1.0);
+        assert_eq!(passes(4.0, -2.0, 1.0, 103.0), 3.0);
     }
 }

@@ -174,6 +174,15 @@ fn words_that_are_no_state_are_refused() {
         assert_eq!(State::from_words(&words), None);
     }
     assert_eq!(State::from_words(&[0; State::WORDS]), None);
+    let p = TankParameters::default();
+    let tank = SloshTank::new(&p, &TankInputs::default(), 0.0, 1e-9).unwrap();
+    for at in 0..TankState::WORDS {
+        for wrong in [f64::NAN, f64::INFINITY] {
+            let mut words = tank.state().to_words();
+            words[at] = wrong.to_bits();
+            assert_eq!(TankState::from_words(&words), None, "{at}");
+        }
+    }
     assert_eq!(TankState::from_words(&[0; TankState::WORDS]), None);
 }
 

@@ -303,6 +303,14 @@ fn curved_meniscus_is_smooth_between_its_values() {
         let together = g * mode.lambda + found.spring / mode.m;
         assert!((found.omega2 / together - 1.0).abs() < 1e-12, "{angle} {g}");
     }
+    // What the meniscus changes goes down with the depth as tanh(xi h/R) does.
+    let [deep, shallow] = [0.5, 0.05].map(|fill| {
+        let mode = &solve("shape = { cylinder = { radius = 0.1, height = 1 } }", fill, 1).modes[0];
+        let [curved, flat] = [30.0, 90.0]
+            .map(|angle| low_gravity::cylinder(mode, 0.1, fill, angle, Fluid { g: 0.1, ..fluid }));
+        (curved.omega2 - flat.omega2) / f64::tanh(xi * fill / 0.1)
+    });
+    assert!((shallow / deep - 1.0).abs() < 1e-12, "{shallow} {deep}");
     let zero = low_gravity::cylinder(mode, 0.0815, 0.2, 30.0, fluid);
     assert!(zero.spring > 0.0 && zero.outside.is_empty() && zero.omega2 > 0.0);
     assert_eq!(low_gravity::cylinder(mode, 0.0815, 0.2, 120.0, fluid).outside.len(), 1);

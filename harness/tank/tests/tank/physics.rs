@@ -176,6 +176,13 @@ fn closed_forms_agree_with_the_boundary_integral_equation() {
         (closed_form::annulus(0.5, 1.0, 0.8, 1000.0, 5), solve(&ring(0.5, 1.0, 0.8), 0.8, 5)),
         (closed_form::annulus(0.1, 0.7, 0.3, 1000.0, 5), solve(&ring(0.1, 0.7, 0.3), 0.3, 5)),
     ];
+    // A shape that has a closed form is solved by it.
+    for shape in [
+        "cylinder = { radius = 0.5, height = 3.0 }",
+        "annulus = { inner_radius = 0.1, outer_radius = 0.7, height = 3.0 }",
+    ] {
+        assert_eq!(solve(&format!("shape = {{ {shape} }}"), 0.3, 5).error, pairs[0].0.error);
+    }
     for (exact, solved) in &pairs {
         let (m_liq, r) = (exact.m_liq, exact.r_surface.unwrap());
         assert!((exact.i_eff_cg - solved.i_eff_cg).abs() < 1e-9 * m_liq * r * r);
