@@ -302,6 +302,10 @@ fn curved_meniscus_is_smooth_between_its_values() {
         let found = low_gravity::cylinder(mode, 0.0815, 0.2, angle, Fluid { g, ..fluid });
         let together = g * mode.lambda + found.spring / mode.m;
         assert!((found.omega2 / together - 1.0).abs() < 1e-12, "{angle} {g}");
+        // and it is the deep cylinder's, rho R^3 omega^2/sigma of the Bond number, less tanh(xi h/R)
+        let (r, bond) = (0.0815f64, 997.0 * g * 0.0815 * 0.0815 / 0.072);
+        let deep = low_gravity::cylinder_omega2(bond, angle) * 0.072 / (997.0 * r.powi(3));
+        assert!((found.omega2 / (deep * (xi * 0.2 / r).tanh()) - 1.0).abs() < 1e-12, "{angle} {g}");
     }
     // What the meniscus changes goes down with the depth as tanh(xi h/R) does.
     let [deep, shallow] = [0.5, 0.05].map(|fill| {
