@@ -186,8 +186,10 @@ class Slave(FMU3Slave):
     def fmi2SetRealInputDerivatives(
         self, c: Any, vr: Any, count: int, order: Any, values: Any
     ) -> None:
-        """Have inputs go with these slopes through the next step."""
-        self.setRealInputDerivatives(vr[:count], order[:count], values[:count])
+        """Have inputs go with these slopes through the next step, those that it takes there."""
+        lines = zip(vr[:count], values[:count], strict=True)
+        taken = {reference: slope for reference, slope in lines if reference in self._taken}
+        self.setRealInputDerivatives(list(taken), [1] * len(taken), list(taken.values()))
 
     def fmi2DoStep(self, c: Any, time: float, step: float, *_: Any) -> None:
         """Make a step, to its end."""

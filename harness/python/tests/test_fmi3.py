@@ -14,7 +14,13 @@ TIME = np.arange(501) * STEP
 INPUTS = {
     "HubSlosh": {"tau_cmd": 0.1 * np.sin(14.0 * TIME), "g_axial": 9.81 + 0.5 * np.sin(TIME)},
     "Spacecraft": {"torque[1]": 0.2 * np.sin(3.0 * TIME), "force[3]": 1.0 + 0.0 * TIME},
-    "SloshTank": {"a[1]": 0.3 * np.sin(5.0 * TIME), "a[3]": 9.81 + 0.0 * TIME},
+    "SloshTank": {
+        "a[1]": 0.3 * np.sin(5.0 * TIME),
+        "a[3]": 9.81 + 0.0 * TIME,
+        # in a step it follows from omega_dot, and is not set there
+        "omega[2]": 0.1 * np.sin(4.0 * TIME),
+        "omega_dot[2]": 0.4 * np.cos(4.0 * TIME),
+    },
 }
 PARAMETERS = {
     "HubSlosh": {
