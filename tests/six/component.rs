@@ -91,6 +91,17 @@ impl Settings {
         if tank.fill.points > 0 {
             self.fill(name, tank);
         }
+        if tank.ball.travel > 0.0 {
+            for (what, value) in [
+                ("travel", tank.ball.travel),
+                ("radius", tank.ball.radius),
+                ("restitution", tank.ball.restitution),
+                ("contact_speed", tank.ball.contact_speed),
+                ("drag", tank.ball.drag),
+            ] {
+                self.real(of(&format!("ball.{what}")), value);
+            }
+        }
         for (what, values) in [
             ("mass", &tank.mass),
             ("length", &tank.length),
@@ -293,6 +304,9 @@ fn read_tank(force: [f64; 3], torque: [f64; 3], next: &mut Numbers) -> TankOutpu
         // Not read: what tests compare is forces and motion.
         axial: 0.0,
         ranges: craft::Ranges::default(),
+        ball_state: craft::BallState::Settled,
+        ball_position: [0.0; 3],
+        ball_velocity: [0.0; 3],
     }
 }
 

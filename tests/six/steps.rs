@@ -1,7 +1,7 @@
 //! Communication steps of both FMUs: what is shown after one, and that how many there are does not
 //! matter.
 
-use craft::{Inputs, Line, Ramp, TankInputs, TankParameters};
+use craft::{Inputs, Line, Parameters, Ramp, TankInputs, TankParameters};
 use host::fmi2::{CallError, MODEL_EXCHANGE, Status};
 use runtime::call::Interface;
 use runtime::instance::Instance;
@@ -201,4 +201,30 @@ fn wheels_that_move_without_a_torque_in_model_exchange_are_warned_of_once() {
     let [warning] = &warnings[..] else { panic!("{warnings:?}") };
     assert_eq!((warning.status, warning.category.as_str()), (Status::Warning, "logStatusWarning"));
     assert!(warning.text.contains("add -d(h_wheels)/dt to torque"), "{}", warning.text);
+}
+
+/// What the crate computes, bit for bit: flight, impacts, sliding and both hand-overs.
+#[test]
+fn liquid_that_leaves_its_bottom_moves_through_the_packed_fmu_as_in_the_crate() {
+    let mut p = Parameters::default();
+    p.tank[0].ball.travel = 0.6;
+    (p.tank[0].ball.drag, p.tank[0].ball.contact_speed) = (0.2, 0.05);
+    p.tank[0].position[0] = 0.1;
+    let thrust = |force: f64| Inputs { force: Ramp::held([0.0, 0.0, force]), ..Inputs::default() };
+    let pieces = [(thrust(-100.0), 120), (thrust(0.0), 20), (thrust(700.0), 200)];
+    let mut packed = Spacecraft::new(&p, &pieces[0].0, 0.0, 1e-8).unwrap();
+    let mut own = craft::Spacecraft::new(&p, &pieces[0].0, 0.0, 1e-8).unwrap();
+    let mut seen = Vec::new();
+    for (u, steps) in &pieces {
+        for _ in 0..*steps {
+            packed.step(u, 0.1).unwrap();
+            own.step(u, 0.1).unwrap();
+            seen.push(own.outputs(u).tank[0].ball_state);
+        }
+        assert_eq!(packed.continuous_states(), own.continuous_states());
+    }
+    for state in [craft::BallState::Flying, craft::BallState::Sliding] {
+        assert!(seen.contains(&state), "{state:?}");
+    }
+    assert_eq!(seen.last(), Some(&craft::BallState::Settled));
 }

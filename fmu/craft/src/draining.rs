@@ -27,7 +27,7 @@ use crate::parameters::{Mount, Parameters, Tank};
 use crate::pivot::Pivot;
 use crate::rigid::{Factors, Mat6, Rigid};
 use crate::sizes::{MODES, TANKS};
-use crate::state::{INPUTS, Inputs, Line, STATES, State, index};
+use crate::state::{BallState, INPUTS, Inputs, Line, STATES, State, index};
 
 /// What acts from outside, as numbers of the wanted kind.
 pub struct Acting<T> {
@@ -340,6 +340,8 @@ impl Draining {
                 flow_momentum: tank.flow_momentum,
                 wrench: tank.wrench(a, w, w_d),
                 bobs: mounted.bobs_now(tank),
+                lump: None,
+                ball_state: BallState::Settled,
             });
         }
         put(index::DRAINED, &[drained]);

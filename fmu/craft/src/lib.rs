@@ -23,7 +23,7 @@
 //!
 //! Where to look: `spacecraft.rs` and `slosh_tank.rs` are the two components as a host sees
 //! them; `motion.rs` has the craft's equations, `bob.rs` those of one slosh mode, `rigid.rs`
-//! the mass matrix, `outputs.rs` energy and momentum; the crate `taylor` steps through time.
+//! the mass matrix, `lump.rs` liquid that has left its bottom, `outputs.rs` energy and momentum; the crate `taylor` steps through time.
 //! `contents.rs` is what is in a tank that drains by a table (`table.rs`),
 //! `draining.rs` a craft with such tanks.
 
@@ -35,6 +35,7 @@ mod bob;
 mod contents;
 mod damping;
 mod draining;
+mod lump;
 mod motion;
 mod outputs;
 mod parameters;
@@ -49,7 +50,7 @@ mod table;
 
 pub use formulas::regime::Regime;
 pub use outputs::{Outputs, TankOutputs};
-pub use parameters::{Craft, DampingLaw, Inertia, Init, Mount, Parameters, Tank};
+pub use parameters::{Ball, Craft, DampingLaw, Inertia, Init, Mount, Parameters, Tank};
 pub use pivot::Pivot;
 pub use sizes::{MODES, POINTS, TANKS};
 pub use slosh_tank::{
@@ -57,6 +58,6 @@ pub use slosh_tank::{
     TankParameters, TankState,
 };
 pub use spacecraft::Spacecraft;
-pub use state::{INPUTS, Inputs, Line, Ramp, Ranges, STATES, State, index};
+pub use state::{BallState, INPUTS, Inputs, Line, Ramp, Ranges, STATES, State, index};
 pub use table::FillTable;
 pub use taylor::error::StepError;

@@ -24,6 +24,9 @@
 //! With O on a pivot a = -C^T g is given, a' = -w x a; the lower half of the system is left, and tau has the pivot's
 //! torque (pivot.rs) from its axis Z = C^T e_z, Z' = -w x Z.
 //!
+//! A tank whose liquid has left its bottom has neither rigid liquid nor bobs, but a lump and the inertia that turns with the
+//! tank (lump.rs). Changes between the two are impulses, at the roots of what decides.
+//!
 //! Source: Newton-Euler about O with the bobs' pulls eliminated.
 
 use alloc::vec::Vec;
@@ -43,10 +46,12 @@ use taylor::vector::{
 };
 
 use crate::bob::Bob;
+use crate::lump::{Directions, Due, Lump};
 use crate::parameters::{Limits, Mount, Parameters, Tank};
 use crate::pivot::Pivot;
 use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod};
-use crate::state::{Inputs, STATES, State, index};
+use crate::sizes::MODES;
+use crate::state::{BallState, Inputs, STATES, State, index};
 
 /// Rates change within this time at most, s: a step much longer does not see how fast they are.
 pub const SCALE_TIME: f64 = 0.1;
@@ -94,6 +99,12 @@ pub struct CraftMotion {
     mass_matrix: Mat6,
     pub liquids: Vec<Rigid>,
     pub bobs: Vec<Bob>,
+    /// Bobs of the tanks whose liquid has left its bottom.
+    parked: Vec<Bob>,
+    /// Of each tank with a ball regime.
+    pub lumps: Vec<Lump>,
+    /// What happens to the liquid of which lump at the end of the expansion.
+    due: Option<(usize, Due)>,
     /// M at the start of the expansion, and its factors.
     /// Whether any bob's drag follows the acceleration.
     follows: bool,
@@ -123,6 +134,8 @@ pub struct CraftMotion {
     pub dissipation: Series,
     /// 1 over what is allowed of attitude, rate, the bobs' v, and velocity
     inv_allowed: [f64; 4],
+    /// 1 over what is allowed of the lumps' u.
+    lumps_allowed: f64,
     /// The longest pendulum, m.
     longest: f64,
 }
@@ -172,9 +185,19 @@ impl CraftMotion {
             dissipation: ZERO,
             inv_allowed: [0.0; 4],
             longest: bobs.iter().fold(0.0, |longest, bob| bob.l.max(longest)),
+            parked: Vec::with_capacity(bobs.len()),
             bobs,
+            lumps: match p.mount {
+                Mount::Free => {
+                    (0..).zip(tanks).filter_map(|(i, tank)| Lump::new(tank, i)).collect()
+                }
+                Mount::Pivot => Vec::new(),
+            },
+            due: None,
+            lumps_allowed: 0.0,
         };
         motion.freeze();
+        motion.arrange();
         motion
     }
 
@@ -214,6 +237,11 @@ impl CraftMotion {
         self.matrix = self.mass_matrix;
         for bob in &self.bobs {
             add_rank_one(&mut self.matrix, bob.m, &along_rod(bob.p[0], bob.hinge));
+        }
+        for lump in &self.lumps {
+            if let Some(u) = lump.along_normal() {
+                add_rank_one(&mut self.matrix, lump.m, &u);
+            }
         }
         match self.mount {
             Mount::Free => self.factors.set(&self.matrix),
@@ -260,6 +288,9 @@ impl CraftMotion {
             let at = index::bob(bob.tank, bob.mode);
             bob.after_impulse((&mut x[at..at + 6]).try_into().unwrap(), dv, dw);
         }
+        for lump in self.lumps.iter().filter(|lump| lump.is_loose()) {
+            lump.after_impulse(&mut x[index::ball(lump.tank)..], dv, dw);
+        }
         self.state.h_wheels = h;
         true
     }
@@ -303,6 +334,10 @@ impl CraftMotion {
             let at = index::bob(bob.tank, bob.mode);
             let [x, dx] = [x, dx].map(|x| x[at..at + 6].try_into().unwrap());
             bob.seed_direction(x, dx, self.w[0], dw);
+        }
+        for lump in self.lumps.iter_mut().filter(|lump| lump.is_loose()) {
+            let at = index::ball(lump.tank);
+            lump.seed_direction(dx[at..at + 6].try_into().unwrap(), self.w[0], dw);
         }
         self.rates_of::<1>();
     }
@@ -351,6 +386,11 @@ impl CraftMotion {
             force = add(force, f);
             torque = add(torque, tau);
         }
+        for lump in self.lumps.iter_mut().filter(|lump| lump.is_loose()) {
+            let [f, tau] = lump.reaction(N, &self.w, &self.w_d);
+            force = add(force, f);
+            torque = add(torque, tau);
+        }
         if N == 0 {
             self.factorise();
         }
@@ -380,6 +420,10 @@ impl CraftMotion {
         for bob in &mut self.bobs {
             bob.accelerate::<N>(self.a[N], w_d);
             dissipation += bob.dissipation::<N>();
+        }
+        for lump in self.lumps.iter_mut().filter(|lump| lump.is_loose()) {
+            lump.accelerate(N, self.a[N], w_d);
+            dissipation += lump.dissipation(N);
         }
         self.dissipation[N] = dissipation;
     }
@@ -431,6 +475,9 @@ impl CraftMotion {
         for bob in &self.bobs {
             put(index::bob(bob.tank, bob.mode), &bob.rates::<N>(&self.w, &self.w_d));
         }
+        for lump in self.lumps.iter().filter(|lump| lump.is_loose()) {
+            put(index::ball(lump.tank), &lump.rates(N, &self.w, &self.w_d));
+        }
         rate
     }
 }
@@ -438,6 +485,9 @@ impl CraftMotion {
 impl Motion for CraftMotion {
     #[inline(always)]
     fn start(&mut self, t: f64) {
+        if !self.lumps.is_empty() {
+            self.arrange();
+        }
         let Inputs { force, torque, h_wheels, .. } = &self.inputs;
         self.force = [force.at(t), force.slope];
         self.torque = [sub(torque.at(t), h_wheels.slope), torque.slope];
@@ -458,6 +508,10 @@ impl Motion for CraftMotion {
             let at = index::bob(bob.tank, bob.mode);
             bob.start(x[at..at + 6].try_into().unwrap(), self.w[0]);
         }
+        for lump in self.lumps.iter_mut().filter(|lump| lump.is_loose()) {
+            let at = index::ball(lump.tank);
+            lump.start(x[at..at + 6].try_into().unwrap(), self.w[0]);
+        }
     }
 
     #[inline(always)]
@@ -475,6 +529,10 @@ impl Motion for CraftMotion {
         // Force passes zero, too.
         let speed = largest(self.a[0]) * time + self.longest * swing + RATE_FLOOR;
         self.inv_allowed = [1.0, rate, swing, speed].map(|scale| 1.0 / (allowed * scale));
+        let loose = self.lumps.iter().filter(|lump| lump.is_loose());
+        let fastest =
+            loose.fold(RATE_FLOOR, |most, lump| most.max(lump.speed_scale(self.w[0], time)));
+        self.lumps_allowed = 1.0 / (allowed * fastest);
         h
     }
 
@@ -487,7 +545,14 @@ impl Motion for CraftMotion {
         let q = larger(q_0.abs(), largest(q)) * (1_u64 << n) as f64;
         let v = self.bobs.iter().map(|bob| bob.coefficient_norm(n)).fold(0.0, larger);
         let body = larger(q * attitude, largest(self.w[n]) * rate);
-        larger(body, larger(v * swing, largest(self.gain[n]) * speed))
+        let norm = larger(body, larger(v * swing, largest(self.gain[n]) * speed));
+        let loose = self.lumps.iter().filter(|lump| lump.is_loose());
+        loose.map(|lump| lump.coefficient_norm(n) * self.lumps_allowed).fold(norm, larger)
+    }
+
+    #[inline(always)]
+    fn event(&mut self, n: usize, h: f64) -> Option<f64> {
+        if self.lumps.is_empty() { None } else { self.next_of_lumps(n, h) }
     }
 
     #[inline(always)]
@@ -521,9 +586,302 @@ impl Motion for CraftMotion {
             finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
             x[at..at + 6].copy_from_slice(&moved);
         }
+        for lump in self.lumps.iter().filter(|lump| lump.is_loose()) {
+            let at = index::ball(lump.tank);
+            let moved = lump.at(x[at..at + 6].try_into().unwrap(), n, h, w);
+            finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
+            x[at..at + 6].copy_from_slice(&moved);
+        }
         if !finite {
             return Err(StepError::NotFinite { time: self.state.time + t });
         }
+        if let Some((lump, due)) = self.due.take() {
+            self.change(lump, due, t);
+        }
         Ok(ControlFlow::Continue(()))
     }
+}
+
+// Liquid that leaves its bottom, meets the wall, and settles (lump.rs).
+impl CraftMotion {
+    /// Rigid liquids and bobs as the liquids' states want them. Does not allocate.
+    fn arrange(&mut self) {
+        let mut changed = false;
+        for lump in &mut self.lumps {
+            let state = self.state.ball[lump.tank];
+            let was_loose = lump.is_loose();
+            lump.state = state;
+            if lump.is_loose() {
+                // Its directions are those with which it has left.
+                let shape = lump.shape(&directions(&self.state.x, lump.tank));
+                changed |= self.liquids[lump.tank] != shape;
+                self.liquids[lump.tank] = shape;
+            } else if was_loose {
+                self.liquids[lump.tank] = lump.rigid;
+                changed = true;
+            }
+        }
+        if !changed {
+            return;
+        }
+        let CraftMotion { bobs, parked, lumps, .. } = self;
+        parked.append(bobs);
+        parked.sort_unstable_by_key(|bob| (bob.tank, bob.mode));
+        let is_loose = |tank: usize| lumps.iter().any(|lump| lump.tank == tank && lump.is_loose());
+        let mut at = 0;
+        while at < parked.len() {
+            if is_loose(parked[at].tank) {
+                at += 1;
+            } else {
+                bobs.push(parked.remove(at));
+            }
+        }
+        self.rigid = self.liquids.iter().fold(self.craft, |sum, tank| sum.and(tank));
+        self.mass_matrix = self.rigid.mass_matrix();
+        self.freeze();
+    }
+
+    #[inline(never)]
+    fn next_of_lumps(&mut self, n: usize, h: f64) -> Option<f64> {
+        self.due = None;
+        let mut first = None;
+        for (i, lump) in self.lumps.iter().enumerate() {
+            let bobs = self.bobs.iter().filter(|bob| bob.tank == lump.tank);
+            let motion = [&self.a, &self.w, &self.w_d];
+            if let Some((t, due)) = lump.next(n, first.unwrap_or(h), motion, bobs)
+                && first.is_none_or(|first| t < first)
+            {
+                first = Some(t);
+                self.due = Some((i, due));
+            }
+        }
+        first
+    }
+
+    /// Does all that is due now, for hosts that integrate themselves. Returns whether anything was.
+    pub fn take_due(&mut self, inputs: &Inputs) -> bool {
+        self.inputs = *inputs;
+        let mut any = false;
+        // As many as a lump can go through at once, for every tank.
+        for _ in 0..4 * self.lumps.len() {
+            self.start(0.0);
+            for n in 0..4 {
+                self.rates(n);
+            }
+            self.next_of_lumps(4, 0.0);
+            let Some((lump, due)) = self.due.take() else { break };
+            self.change(lump, due, 0.0);
+            any = true;
+        }
+        any
+    }
+
+    /// Functions that cross zero at events, two a tank.
+    pub fn indicators(&mut self, inputs: &Inputs, indicators: &mut [f64]) {
+        indicators.fill(1.0);
+        if self.lumps.is_empty() {
+            return;
+        }
+        self.evaluate(inputs);
+        for lump in &self.lumps {
+            let i = lump.tank;
+            let heights = self.bobs.iter().filter(|bob| bob.tank == i);
+            let heights = heights.map(|bob| self.state.x[index::bob(i, bob.mode) + 2]);
+            let now = lump.indicators([&self.a, &self.w, &self.w_d], heights);
+            indicators[2 * i..2 * i + 2].copy_from_slice(&now);
+        }
+    }
+
+    /// The equations `t` after the start of the call.
+    fn evaluate_at(&mut self, t: f64) {
+        self.start(t);
+        self.rates_of::<0>();
+    }
+
+    #[inline(never)]
+    fn change(&mut self, lump: usize, due: Due, t: f64) {
+        let tank = self.lumps[lump].tank;
+        self.evaluate_at(t);
+        match due {
+            Due::Leave => self.leave(lump, t),
+            Due::Impact => self.throw_back(lump, t),
+            Due::Release => {
+                let drags = self.lumps[lump].state == BallState::Sliding;
+                if !(drags && self.try_on_wall(lump, BallState::Light, t)) {
+                    self.state.ball[tank] = BallState::Flying;
+                }
+            }
+            Due::Drag => {
+                if !self.try_on_wall(lump, BallState::Sliding, t) {
+                    self.state.ball[tank] = BallState::Light;
+                }
+            }
+            Due::Settle if self.lumps[lump].may_settle(&self.a, &self.w, &self.w_d) => {
+                let before = self.state;
+                if !self.settle(lump, t) {
+                    self.state = before;
+                    self.state.ball[tank] = BallState::Held;
+                }
+            }
+            Due::Settle if self.lumps[lump].state == BallState::Held => {
+                self.state.ball[tank] = BallState::Sliding;
+            }
+            Due::Settle | Due::Look => {}
+        }
+    }
+
+    /// An impulse on the craft about O, body axes, and on all that hangs on it. Returns the changes of V and w.
+    fn kick(&mut self, impulse: [Vec3; 2], t: f64) -> [Vec3; 2] {
+        self.evaluate_at(t);
+        let [dv, dw] = self.factors.solve(impulse);
+        let velocity_change = times(&rotation(&self.q.get(0)), dv);
+        let x = &mut self.state.x;
+        for i in 0..3 {
+            x[index::OMEGA + i] += dw[i];
+            x[index::VELOCITY + i] += velocity_change[i];
+        }
+        for bob in &self.bobs {
+            let at = index::bob(bob.tank, bob.mode);
+            bob.after_impulse((&mut x[at..at + 6]).try_into().unwrap(), dv, dw);
+        }
+        for lump in self.lumps.iter().filter(|lump| lump.is_loose()) {
+            lump.after_impulse(&mut x[index::ball(lump.tank)..], dv, dw);
+        }
+        [dv, dw]
+    }
+
+    /// Kinetic energy and that of the centring springs in a frame in which O moves with `v`, body axes, after
+    /// [`CraftMotion::evaluate_at`]; there nothing cancels, however fast the craft is.
+    fn energy_with(&self, v: Vec3) -> f64 {
+        let (w, rigid) = (self.w[0], &self.rigid);
+        let spin = vector::dot(w, times(&rigid.inertia, w));
+        let along = vector::dot(v, vector::cross(w, rigid.moment));
+        let mut energy = (rigid.mass * vector::dot(v, v) + spin) / 2.0 + along;
+        let loose = self.lumps.iter().filter(|lump| lump.is_loose()).map(Lump::now::<f64>);
+        for point in self.bobs.iter().map(Bob::now::<f64>).chain(loose) {
+            let speed = add(v, add(vector::cross(w, point.rho), point.rate));
+            energy += point.m * vector::dot(speed, speed) / 2.0 + point.centring;
+        }
+        energy
+    }
+
+    /// Mass of everything, and its velocity against O as O turns, body axes.
+    fn drift_of_center(&self) -> (f64, Vec3) {
+        let w = self.w[0];
+        let mut momentum = vector::cross(w, self.rigid.moment);
+        let mut mass = self.rigid.mass;
+        let loose = self.lumps.iter().filter(|lump| lump.is_loose()).map(Lump::now::<f64>);
+        for point in self.bobs.iter().map(Bob::now::<f64>).chain(loose) {
+            let speed = add(vector::cross(w, point.rho), point.rate);
+            momentum = add(momentum, scale(point.m, speed));
+            mass += point.m;
+        }
+        (mass, scale(1.0 / mass, momentum))
+    }
+
+    fn put_ball(&mut self, tank: usize, numbers: &[f64; 6]) {
+        self.state.x[index::ball(tank)..][..6].copy_from_slice(numbers);
+    }
+
+    /// The liquid leaves its bottom: its centre keeps its velocity; motions within it are caught by the shape, whose
+    /// moment of momentum the craft turns with.
+    fn leave(&mut self, lump: usize, t: f64) {
+        let (lump, before) = (&self.lumps[lump], self.energy_with([0.0; 3]));
+        let tank = lump.tank;
+        let bobs = self.bobs.iter().filter(|bob| bob.tank == tank).map(Bob::now::<f64>);
+        let center = lump.center_of(&directions(&self.state.x, tank));
+        let [rate, moment] = lump.stirred(center, bobs);
+        let numbers = lump.numbers(center, rate);
+        self.put_ball(tank, &numbers);
+        for n in 0..MODES {
+            self.state.x[index::bob(tank, n) + 3..][..3].fill(0.0);
+        }
+        self.state.ball[tank] = BallState::Flying;
+        let [dv, _] = self.kick([[0.0; 3], moment], t);
+        self.evaluate_at(t);
+        self.state.x[index::DISSIPATED] += before - self.energy_with(dv);
+    }
+
+    /// The wall throws the lump back, or holds it if it is slow and pressed to the wall.
+    fn throw_back(&mut self, lump: usize, t: f64) {
+        let before = self.state;
+        let (e, contact_speed) = self.lumps[lump].restitution();
+        if e * self.lumps[lump].approach() <= contact_speed {
+            self.strike(lump, 0.0, t);
+            let stays = [BallState::Sliding, BallState::Light];
+            if stays.into_iter().any(|state| self.try_on_wall(lump, state, t)) {
+                return;
+            }
+            self.state = before;
+            self.evaluate_at(t);
+        }
+        self.strike(lump, e, t);
+    }
+
+    /// Puts the lump on the wall in the state `on_wall`. Returns whether it is pressed there.
+    fn try_on_wall(&mut self, lump: usize, on_wall: BallState, t: f64) -> bool {
+        self.state.ball[self.lumps[lump].tank] = on_wall;
+        self.evaluate_at(t);
+        self.lumps[lump].is_pressed()
+    }
+
+    /// An impact with the coefficient of restitution `e`.
+    fn strike(&mut self, lump: usize, e: f64, t: f64) {
+        let struck = &self.lumps[lump];
+        let (tank, m, v_n) = (struck.tank, struck.m, struck.approach());
+        let impulse = struck.impulse(&self.factors, e);
+        self.kick(impulse, t);
+        let mut numbers = [0.0; 6];
+        numbers.copy_from_slice(&self.state.x[index::ball(tank)..][..6]);
+        let change = self.lumps[lump].numbers([0.0; 3], scale(-1.0 / m, impulse[0]));
+        for i in 3..6 {
+            numbers[i] += change[i];
+        }
+        self.put_ball(tank, &numbers);
+        // (1 + e) mu v_n = J
+        let j = libm::sqrt(vector::dot(impulse[0], impulse[0]));
+        self.state.x[index::DISSIPATED] += (1.0 - e) * j * v_n / 2.0;
+    }
+
+    /// The pendulums take the liquid back. Returns whether that costs energy; if not, the states are unusable.
+    fn settle(&mut self, lump: usize, t: f64) -> bool {
+        let before = self.energy_with([0.0; 3]);
+        let (mass, of_center) = self.drift_of_center();
+        let (lump, w) = (&self.lumps[lump], self.w[0]);
+        let tank = lump.tank;
+        let p = lump.hanging();
+        // The parts go to where they hang from, each with the velocity that it has: the whole turns on with the same angular
+        // momentum, about the same centre of mass.
+        let moved = sub(lump.center_of(&p), lump.position());
+        let velocity = add(vector::cross(w, lump.position()), lump.rate());
+        let lever = scale(-lump.m, vector::cross(moved, sub(velocity, of_center)));
+        let left_with = lump.shape(&directions(&self.state.x, tank)).inertia;
+        let grown = sub(times(&lump.shape(&p).inertia, w), times(&left_with, w));
+        let ([force, torque], rates) = lump.caught(&p, sub(lump.rate(), vector::cross(w, moved)));
+        let torque = add(torque, sub(lever, grown));
+        let shift = times(&rotation(&self.q.get(0)), scale(-lump.m / mass, moved));
+        let at_rest = lump.at_rest();
+        let x = &mut self.state.x;
+        for i in 0..3 {
+            x[index::POSITION + i] += shift[i];
+        }
+        for n in 0..MODES {
+            let at = index::bob(tank, n);
+            x[at..at + 3].copy_from_slice(&p[n]);
+            x[at + 3..at + 6].copy_from_slice(&rates[n]);
+        }
+        self.put_ball(tank, &at_rest);
+        self.state.ball[tank] = BallState::Settled;
+        let [dv, _] = self.kick([force, torque], t);
+        self.evaluate_at(t);
+        let loss = before - self.energy_with(dv);
+        self.state.x[index::DISSIPATED] += loss;
+        // To rounding.
+        loss >= -1e-14 * before
+    }
+}
+
+/// The directions of a tank's bobs.
+fn directions(x: &[f64; STATES], tank: usize) -> Directions {
+    core::array::from_fn(|n| part(x, index::bob(tank, n)))
 }

@@ -24,7 +24,7 @@ use crate::parameters::Mount;
 use crate::pivot::Pivot;
 use crate::rigid::Rigid;
 use crate::sizes::{MODES, TANKS};
-use crate::state::{Ranges, STATES, index};
+use crate::state::{BallState, Ranges, STATES, index};
 
 /// What one tank shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,6 +47,12 @@ pub struct TankOutputs {
     pub axial: f64,
     /// Where the pendulums stand for the liquid.
     pub ranges: Ranges,
+    /// What the liquid does.
+    pub ball_state: BallState,
+    /// The lump's centre from the tank's origin, m, tank axes; while settled where the settled liquid's is at rest.
+    pub ball_position: Vec3,
+    /// Its velocity against the tank, m/s, tank axes.
+    pub ball_velocity: Vec3,
 }
 
 /// What the craft shows at one instant.
@@ -112,6 +118,9 @@ impl TankOutputs {
             wave_height: 0.0,
             axial: 0.0,
             ranges: Ranges::default(),
+            ball_state: BallState::Settled,
+            ball_position: [0.0; 3],
+            ball_velocity: [0.0; 3],
         }
     }
 
@@ -194,6 +203,9 @@ pub(crate) struct TankNow<T> {
     /// Momentum and moment of momentum about O of the flow within (draining.rs).
     pub flow_momentum: [Vec3<T>; 2],
     pub bobs: [Option<BobNow<T>>; MODES],
+    /// The liquid as one lump, while it has left its bottom.
+    pub lump: Option<BobNow<T>>,
+    pub ball_state: BallState,
 }
 
 /// The craft at an instant, or its derivative along a direction.
@@ -231,7 +243,20 @@ impl CraftMotion {
                 bobs[bob.mode] = Some(bob.now());
             }
             let flow_momentum = [constant([0.0; 3]); 2];
-            tanks[i] = Some(TankNow { rigid, wrench, flow_momentum, bobs });
+            let mut now = TankNow {
+                rigid,
+                wrench,
+                flow_momentum,
+                bobs,
+                lump: None,
+                ball_state: BallState::Settled,
+            };
+            if let Some(lump) = self.lumps.iter().find(|lump| lump.tank == i && lump.is_loose()) {
+                let [f, tau] = lump.wrench::<T>();
+                now.wrench = [add(now.wrench[0], f), add(now.wrench[1], tau)];
+                (now.lump, now.ball_state) = (Some(lump.now()), lump.state);
+            }
+            tanks[i] = Some(now);
         }
         Now {
             a,
@@ -253,16 +278,21 @@ impl<T: Number> Now<T> {
     pub fn outputs(&self, x: &[f64; STATES]) -> Outputs {
         let Now { w, velocity, .. } = *self;
         let tanks = || self.tanks.iter().flatten();
-        let bobs = || tanks().flat_map(|tank| tank.bobs.iter().flatten());
+        let bobs = || tanks().flat_map(|tank| tank.bobs.iter().flatten().chain(&tank.lump));
         let lifted = self.craft.lift::<T>();
         let rigid = tanks().fold(lifted, |sum, tank| sum.and(&tank.rigid));
 
         let mut tank: [TankOutputs; TANKS] =
             core::array::from_fn(|i| TankOutputs::of_states(&x[index::bob(i, 0)..]));
+        for (i, tank) in tank.iter_mut().enumerate() {
+            tank.ball_position = part(x, index::ball(i));
+            tank.ball_velocity = part(x, index::ball(i) + 3);
+        }
         let (mut slosh_force, mut slosh_torque) = ([0.0; 3], [0.0; 3]);
         for (out, now) in tank.iter_mut().zip(tanks()) {
             [out.force, out.torque] = now.wrench.map(result);
             out.set_angles([self.a, w, self.w_d], now.bobs.iter().flatten());
+            out.ball_state = now.ball_state;
             slosh_force = add(slosh_force, out.force);
             slosh_torque = add(slosh_torque, out.torque);
         }

@@ -7,7 +7,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use formulas::cylinder;
 use taylor::integrator::Steps;
-use taylor::vector::{Quaternion, Vec3, add, rotation, scale, unit_quaternion};
+use taylor::vector::{Mat3, Quaternion, Vec3, add, rotation, scale, unit_quaternion};
 
 use crate::pivot::Pivot;
 use crate::rigid::{Rigid, smallest_pivot};
@@ -112,6 +112,42 @@ impl DampingLaw {
         [DampingLaw::Laminar, DampingLaw::ConstantRatio, DampingLaw::Constant];
 }
 
+/// The liquid as one lump that crosses the tank (`lump.rs`).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ball {
+    /// How far the liquid's centre is moved along the axis from the settled liquid's at the bottom to that at the top,
+    /// m. 0: no ball regime.
+    pub travel: f64,
+    /// How far it gets from the axis, m; 0: as far as makes the surface's curvature at the bottom that of the pendulums'
+    /// common centre.
+    pub radius: f64,
+    /// Coefficient of restitution of an impact on the wall, 0 to 1.
+    pub restitution: f64,
+    /// Speed after an impact below which a lump that is pressed to the wall stays on it, m/s.
+    pub contact_speed: f64,
+    /// Rate at which its speed along the wall decays while it slides, 1/s.
+    pub drag: f64,
+}
+
+impl Default for Ball {
+    fn default() -> Self {
+        Ball { travel: 0.0, radius: 0.0, restitution: 0.3, contact_speed: 1e-3, drag: 0.05 }
+    }
+}
+
+/// The surface that a lump's centre reaches.
+pub(crate) struct BallSurface {
+    /// The liquid's mass, kg.
+    pub mass: f64,
+    /// R_p, m.
+    pub gyration: f64,
+    /// The surface's centre on the tank's axis, m.
+    pub height: f64,
+    /// Its semi-axes along the axis and across, a and b, m.
+    pub half: f64,
+    pub radius: f64,
+}
+
 /// One tank: rigid liquid and pendulums, in the tank's own axes. Its z axis is the tank's
 /// axis; liquid at rest hangs towards -z.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -169,6 +205,8 @@ pub struct Tank {
     pub liquid_0: f64,
     /// Height of the outlet on the tank's axis, m.
     pub outlet: f64,
+    /// Where the liquid leaves its bottom; of effect on a free craft.
+    pub ball: Ball,
     /// Direction from hinge to bob at the start, tank axes; normalised on reading.
     pub p_0: [Vec3; MODES],
     /// Its rate at the start, 1/s, tank axes; made tangential on reading.
@@ -215,6 +253,12 @@ impl Tank {
     /// The rigid liquid: m_0 on the axis at height H_0, J_0 = I_0 1 + (I_z - I_0) e e^T.
     pub(crate) fn rigid(&self) -> Rigid {
         let e = rotation(&unit_quaternion(self.q)).map(|row| row[2]);
+        Rigid::new(self.m_0, add(self.position, scale(self.h_0, e)), &self.own_inertia())
+    }
+
+    /// J_0, kg m2, body axes.
+    pub(crate) fn own_inertia(&self) -> Mat3 {
+        let e = rotation(&unit_quaternion(self.q)).map(|row| row[2]);
         let mut own = [[0.0; 3]; 3];
         for i in 0..3 {
             for j in 0..3 {
@@ -222,7 +266,31 @@ impl Tank {
                 own[i][j] = one + (self.i_z - self.i_0) * e[i] * e[j];
             }
         }
-        Rigid::new(self.m_0, add(self.position, scale(self.h_0, e)), &own)
+        own
+    }
+
+    /// The specific force along the axis below which mode n (from 0) does not stand for liquid, m/s2: thrust that is off is
+    /// not thrust that is reversed.
+    pub(crate) fn lowest(&self, n: usize) -> f64 {
+        -self.smallest_acceleration() - self.k[n] * self.length[n] / self.mass[n]
+    }
+
+    /// The surface that the lump's centre reaches, of a tank with all that follows from its parameters; `None` without a
+    /// ball regime.
+    pub(crate) fn ball_surface(&self) -> Option<BallSurface> {
+        if self.ball.travel <= 0.0 || self.modes == 0 {
+            return None;
+        }
+        let modes = 0..self.modes.min(MODES);
+        let mass = modes.clone().fold(self.m_0, |sum, n| sum + self.mass[n]);
+        let moment = modes.clone().fold(self.m_0 * self.h_0, |sum, n| {
+            sum + self.mass[n] * (self.hinge[n] - self.length[n])
+        });
+        let gyration = modes.fold(0.0, |sum, n| sum + self.mass[n] * self.length[n]) / mass;
+        let half = self.ball.travel / 2.0;
+        let least = libm::sqrt(half * gyration);
+        let radius = if self.ball.radius > 0.0 { self.ball.radius } else { least };
+        Some(BallSurface { mass, gyration, height: moment / mass + half, half, radius })
     }
 
     /// a_f, m/s2.
@@ -337,6 +405,7 @@ impl Default for Tank {
             g_floor: 0.0,
             zeta_amplitude: [0.0; MODES],
             wave: modes_of([0.376618, 0.0328144, 0.0125218]),
+            ball: Ball::default(),
             fill: FillTable { points: 0, ..CYLINDER },
             liquid_0: 381.704,
             outlet: -0.3,
@@ -537,6 +606,7 @@ impl Tank {
         }
         problems.number(&format!("{name}.g_ref"), self.g_ref, 1e-9, 1e6, "m/s2");
         problems.number(&format!("{name}.g_floor"), self.g_floor, 0.0, 1e6, "m/s2");
+        self.find_ball_problems(name, problems);
         for n in 0..self.modes.min(MODES) {
             let i = n + 1;
             problems.number(&format!("{name}.mass[{i}]"), self.mass[n], LIGHTEST, HEAVIEST, "kg");
@@ -560,6 +630,48 @@ impl Tank {
             problems.number(&format!("{name}.wave[{i}]"), self.wave[n], 0.0, FARTHEST, "m/rad");
             problems.direction(&format!("{name}.p_0[{i}]"), &self.p_0[n]);
             problems.vector(&format!("{name}.p_dot_0[{i}]"), &self.p_dot_0[n], "1/s");
+        }
+    }
+
+    fn find_ball_problems(&self, name: &str, problems: &mut Problems) {
+        let ball = &self.ball;
+        problems.number(&format!("{name}.ball.travel"), ball.travel, 0.0, 1e3, "m");
+        if ball.travel <= 0.0 {
+            return;
+        }
+        problems.number(&format!("{name}.ball.radius"), ball.radius, 0.0, 1e3, "m");
+        problems.number(&format!("{name}.ball.restitution"), ball.restitution, 0.0, 1.0, "");
+        problems.number(
+            &format!("{name}.ball.contact_speed"),
+            ball.contact_speed,
+            1e-9,
+            1e3,
+            "m/s",
+        );
+        problems.number(&format!("{name}.ball.drag"), ball.drag, 0.0, 1e3, "1/s");
+        let Some(surface) = self.ball_surface() else {
+            let modes = self.modes;
+            problems.0.push(format!(
+                "{name}.ball.travel with {name}.modes = {modes} (allowed: at least one mode, which says when the liquid leaves)"
+            ));
+            return;
+        };
+        let least = 2.0 * surface.gyration;
+        if ball.travel < least {
+            problems.0.push(format!(
+                "{name}.ball.travel = {:?} (allowed: 0, or at least {least:?} m, twice the sum of {name}.mass {name}.length \
+                 over the liquid's mass)",
+                ball.travel
+            ));
+            return;
+        }
+        let least = libm::sqrt(surface.half * surface.gyration);
+        if ball.radius > 0.0 && ball.radius < least {
+            problems.0.push(format!(
+                "{name}.ball.radius = {:?} (allowed: 0, or at least {least:?} m, where the surface is as curved at the bottom as \
+                 the path of the pendulums' common centre)",
+                ball.radius
+            ));
         }
     }
 
@@ -656,6 +768,23 @@ impl Parameters {
         }
         for (i, tank) in self.tank[..self.tanks.min(TANKS)].iter().enumerate() {
             tank.find_problems(&format!("tank[{}]", i + 1), &mut problems);
+        }
+        let tanks = &self.tank[..self.tanks.min(TANKS)];
+        let with_ball = tanks.iter().position(|tank| tank.ball.travel > 0.0);
+        let that_drains = tanks.iter().position(|tank| tank.fill.points > 0);
+        if let (Some(ball), Some(drains)) = (with_ball, that_drains) {
+            problems.0.push(format!(
+                "tank[{}].ball.travel with tank[{}].fill.points (allowed: one of them 0; no tank of a craft with a ball \
+                 regime can drain)",
+                ball + 1,
+                drains + 1
+            ));
+        }
+        if let (Some(ball), Mount::Pivot) = (with_ball, self.mount) {
+            problems.0.push(format!(
+                "tank[{}].ball.travel with mount = pivot (allowed with mount = pivot: 0)",
+                ball + 1
+            ));
         }
         problems.direction("init.q", &self.init.q);
         problems.vector("init.omega", &self.init.omega, "rad/s");

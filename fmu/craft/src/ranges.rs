@@ -6,15 +6,17 @@
 //!
 //! Liquid is at the bottom of its tank where thrust or capillarity holds it there: w^2 = x/l + k/m > 0, x the specific
 //! force along the tank at the hinge. Against that a bob swings over, and the liquid would fall. Beyond 45 degrees
-//! from the tank's axis a bob has a direction and no surface that stands for it.
+//! from the tank's axis a bob has a direction and no surface that stands for it. Liquid that has left the bottom as a
+//! lump (`lump.rs`) is in no range of the pendulums.
 
 use formulas::cylinder::XI;
 use formulas::regime::Regime;
 
+use crate::lump::COS_45;
 use crate::outputs::TankOutputs;
 use crate::parameters::Tank;
 use crate::sizes::MODES;
-use crate::state::Ranges;
+use crate::state::{BallState, Ranges};
 
 /// What a tank's ranges follow from. Of a tank that drains they are those of its contents at the start.
 #[derive(Clone, Copy, Debug)]
@@ -26,23 +28,21 @@ pub(crate) struct Bounds {
     lowest: [f64; MODES],
 }
 
-/// Cosine of the largest angle from the axis.
-const COS_45: f64 = core::f64::consts::FRAC_1_SQRT_2;
-
 impl Bounds {
     /// Of a tank with all that follows from its parameters.
     pub fn new(tank: &Tank) -> Bounds {
-        // Thrust that is off is not thrust that is reversed.
-        let floor = tank.smallest_acceleration();
         Bounds {
             modes: tank.modes,
             radius: tank.wave[0] * (XI[0] * XI[0] - 1.0) / 2.0,
-            lowest: core::array::from_fn(|n| -floor - tank.k[n] * tank.length[n] / tank.mass[n]),
+            lowest: core::array::from_fn(|n| tank.lowest(n)),
         }
     }
 
     /// The ranges of what a tank shows.
     pub fn of(&self, out: &TankOutputs) -> Ranges {
+        if out.ball_state != BallState::Settled {
+            return Ranges { regime: Regime::Nonlinear, in_range: false };
+        }
         let heights = out.p.map(|p| p[2]);
         let in_range = self.contain(heights, out.axial);
         let upright = self.are_upright(heights);

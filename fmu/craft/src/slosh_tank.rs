@@ -125,6 +125,10 @@ impl TankParameters {
             problems.extend(host.problems("host"));
         }
         problems.extend(steps_problem(self.max_steps));
+        if self.tank.ball.travel > 0.0 {
+            // An impact is an impulse on the host, which a force cannot be.
+            problems.push("tank.ball.travel (allowed: 0 on somebody else's craft)".into());
+        }
         problems
     }
 }

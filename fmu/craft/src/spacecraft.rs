@@ -15,7 +15,7 @@ use crate::outputs::{Now, Outputs};
 use crate::parameters::{Limits, Parameters, tolerance_problem};
 use crate::ranges;
 use crate::sizes::{MODES, TANKS};
-use crate::state::{INPUTS, Inputs, Ranges, STATES, State, index};
+use crate::state::{BallState, INPUTS, Inputs, Ranges, STATES, State, index};
 
 /// A rigid body with up to four tanks, free or on a pivot.
 #[derive(Clone, Debug)]
@@ -70,10 +70,16 @@ impl Spacecraft {
                 put(index::bob(i, n) + 3, &rate);
             }
         }
+        for i in 0..p.tanks {
+            if let Some(surface) = p.tank[i].resolve().ball_surface() {
+                put(index::ball(i) + 2, &[surface.height - surface.half]);
+            }
+        }
         let flow = inputs.mass_flow.map(|flow| flow.value);
         let h_wheels = inputs.h_wheels.value;
         let ranges = [Ranges::default(); TANKS];
-        let state = State { time: start_time, x, h_wheels, flow, ranges };
+        let ball = [BallState::Settled; TANKS];
+        let state = State { time: start_time, x, h_wheels, flow, ranges, ball };
         let mut craft = Spacecraft::resume(p, &state, tolerance);
         craft.motion.state.ranges = craft.ranges(inputs);
         Ok(craft)
@@ -161,10 +167,19 @@ impl Spacecraft {
         self.motion.state.ranges
     }
 
-    /// Whether every tank is in its range after a step, of the liquid's directions then and the accelerations in it.
+    /// Whether a tank without a ball regime is out of its range.
+    pub fn leaves_range(&self, ranges: &[Ranges; TANKS]) -> bool {
+        (0..TANKS).any(|i| !ranges[i].in_range && !self.has_ball(i))
+    }
+
+    fn has_ball(&self, tank: usize) -> bool {
+        self.motion.lumps.iter().any(|lump| lump.tank == tank)
+    }
+
+    /// Whether every tank without a ball regime is in its range after a step, of the liquid's directions then and the accelerations in it.
     pub fn is_in_range(&self) -> bool {
         let CraftMotion { bobs, state, a, w, w_d, .. } = &*self.motion;
-        self.bounds.iter().enumerate().all(|(i, limits)| {
+        self.bounds.iter().enumerate().filter(|(i, _)| !self.has_ball(*i)).all(|(i, limits)| {
             let mut first = bobs.iter().filter(|bob| bob.tank == i && bob.mode == 0);
             // The accelerations of a craft that drains are its equations' alone.
             let axial = first.next().filter(|_| self.draining.is_none()).map_or(0.0, |bob| {
@@ -284,11 +299,26 @@ impl Spacecraft {
         draining.set_flow(&mut self.motion.state, &inputs.mass_flow) || turned
     }
 
-    /// Does what is due at an event: a jump of `h_wheels` or `mass_flow` acts as an impulse. Returns
+    /// Whether the liquid of a tank with a ball regime is not at its bottom.
+    pub fn has_lump(&self) -> bool {
+        self.motion.state.ball.iter().any(|state| *state != BallState::Settled)
+    }
+
+    /// Functions of states and inputs that cross zero at events, two for each tank: what leaves the present state of the
+    /// liquid, and what ends its sliding on the wall; 1 where there is none.
+    pub fn event_indicators(&mut self, inputs: &Inputs, indicators: &mut [f64]) {
+        self.motion.indicators(inputs, indicators);
+    }
+
+    /// Does what is due at an event: a jump of `h_wheels` or `mass_flow` acts as an impulse, and liquid leaves its bottom, meets
+    /// the wall or settles. Returns
     /// whether continuous states have changed. On an error nothing has.
     pub fn take_event(&mut self, inputs: &Inputs) -> Result<bool, StepError> {
         let before = self.motion.state;
-        let changed = self.take_jumps(inputs);
+        let mut changed = self.take_jumps(inputs);
+        if !self.motion.lumps.is_empty() {
+            changed |= self.motion.take_due(inputs);
+        }
         if self.motion.state.x.iter().any(|x| !x.is_finite()) {
             self.motion.state = before;
             return Err(StepError::NotFinite { time: before.time });

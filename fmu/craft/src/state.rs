@@ -6,7 +6,7 @@ use taylor::vector::Vec3;
 
 use crate::sizes::{MODES, TANKS};
 
-/// Places in x. Units: 1, rad/s, m, m/s, J, J, then 1 and 1/s for each bob.
+/// Places in x. Units: 1, rad/s, m, m/s, J, J, 1 and 1/s for each bob, kg, J, then m and m/s for each lump.
 pub mod index {
     use super::{MODES, TANKS};
 
@@ -31,6 +31,15 @@ pub mod index {
     /// Energy that has gone with the outflow since the start, J.
     pub const DRAINED: usize = LIQUID + TANKS;
 
+    /// The lumps: for each tank position from the tank's origin, m, and rate, m/s, tank axes. Of effect in
+    /// tanks with a ball regime.
+    pub const BALLS: usize = DRAINED + 1;
+
+    /// Where position and rate of a lump begin; tank from 0.
+    pub const fn ball(tank: usize) -> usize {
+        BALLS + 6 * tank
+    }
+
     /// Where direction and rate of a bob begin; tank and mode from 0.
     pub const fn bob(tank: usize, mode: usize) -> usize {
         BOBS + 6 * (tank * MODES + mode)
@@ -38,7 +47,7 @@ pub mod index {
 }
 
 /// Number of continuous states.
-pub const STATES: usize = index::DRAINED + 1;
+pub const STATES: usize = index::ball(TANKS);
 
 /// Number of inputs: force, torque, h_wheels, mass flows.
 pub const INPUTS: usize = 9 + TANKS;
@@ -96,6 +105,35 @@ impl Ranges {
     }
 }
 
+/// What a tank's liquid does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[repr(u8)]
+pub enum BallState {
+    /// It is at the bottom: rigid liquid and pendulums.
+    #[default]
+    Settled = 1,
+    /// It flies through the tank as one lump.
+    Flying = 2,
+    /// The lump slides on the wall with drag.
+    Sliding = 3,
+    /// It slides without, so lightly that the drag's reaction on the craft would take the wall away from it.
+    Light = 4,
+    /// The same, when the pendulums could have taken it back but for the energy that this would have raised: they try again
+    /// when it has come nearest to the tank's axis.
+    Held = 5,
+}
+
+impl BallState {
+    /// All, by their numbers.
+    pub const ALL: [BallState; 5] = [
+        BallState::Settled,
+        BallState::Flying,
+        BallState::Sliding,
+        BallState::Light,
+        BallState::Held,
+    ];
+}
+
 /// The craft's memory: all that a saved state needs besides parameters and inputs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State {
@@ -106,11 +144,13 @@ pub struct State {
     pub(crate) flow: [f64; TANKS],
     /// Ranges of the tanks' motion since the last event, for hosts that integrate themselves.
     pub(crate) ranges: [Ranges; TANKS],
+    /// What the tanks' liquids do.
+    pub(crate) ball: [BallState; TANKS],
 }
 
 impl State {
     /// Length of the flat form.
-    pub const WORDS: usize = Self::REALS + TANKS;
+    pub const WORDS: usize = Self::REALS + 2 * TANKS;
 
     /// How many of the words are real numbers; the ranges follow.
     const REALS: usize = 4 + TANKS + STATES;
@@ -131,6 +171,9 @@ impl State {
         for (word, ranges) in words[Self::REALS..].iter_mut().zip(self.ranges) {
             *word = ranges.to_word();
         }
+        for (word, ball) in words[Self::REALS + TANKS..].iter_mut().zip(self.ball) {
+            *word = ball as u64;
+        }
         words
     }
 
@@ -141,6 +184,10 @@ impl State {
         for (ranges, word) in ranges.iter_mut().zip(&words[Self::REALS..]) {
             *ranges = Ranges::from_word(*word)?;
         }
+        let mut ball = [BallState::default(); TANKS];
+        for (ball, word) in ball.iter_mut().zip(&words[Self::REALS + TANKS..]) {
+            *ball = BallState::ALL.into_iter().find(|ball| *ball as u64 == *word)?;
+        }
         let x: [f64; STATES] = core::array::from_fn(|i| numbers[4 + TANKS + i]);
         let bobs = (0..TANKS * MODES).all(|i| has_direction(&x[index::bob(0, i)..][..3]));
         let is_state = numbers[0].is_finite()
@@ -149,7 +196,7 @@ impl State {
             && bobs;
         let h_wheels = [numbers[1], numbers[2], numbers[3]];
         let flow = core::array::from_fn(|i| numbers[4 + i]);
-        is_state.then_some(State { time: numbers[0], x, h_wheels, flow, ranges })
+        is_state.then_some(State { time: numbers[0], x, h_wheels, flow, ranges, ball })
     }
 }
 

@@ -16,14 +16,20 @@ pub struct Model {
     /// at once in Co-Simulation.
     present: bool,
     wheels: Wheels,
-    /// Whether a tank has left its range.
+    /// Whether a tank without a ball regime has left its range.
     has_left_range: bool,
+    /// Whether the liquid of one with has left its bottom.
+    has_had_lump: bool,
 }
 
 /// Said once.
 const OUT_OF_RANGE: &str = "a tank leaves its range (tank[].in_range): thrust pulls it off its liquid and nothing \
                             centres it, or a bob is more than 45 degrees from the axis; the pendulums go on, but \
                             stand for no liquid there";
+
+/// Said once.
+const LUMP: &str = "the liquid of a tank leaves its bottom and goes on as one lump (tank[].ball.state): times and momenta of \
+                    crossings hold, forces of impacts are indications of their order, and so is what follows them";
 
 /// Whether a host that integrates itself, and from whom no slope of h_wheels is known, leaves the wheels' reaction
 /// -h_w' out of the torque: on an axis on which h_wheels moves and torque has never been other than 0.
@@ -157,7 +163,13 @@ impl runtime::Model for Model {
         tolerance: f64,
     ) -> Result<Self, Vec<String>> {
         let craft = Spacecraft::new(&parameters.resolved()?, inputs, start_time, tolerance)?;
-        Ok(Model { craft, present: false, wheels: Wheels::default(), has_left_range: false })
+        Ok(Model {
+            craft,
+            present: false,
+            wheels: Wheels::default(),
+            has_left_range: false,
+            has_had_lump: false,
+        })
     }
 
     fn save(&self, words: &mut Vec<u64>) {
@@ -168,7 +180,13 @@ impl runtime::Model for Model {
         let p = parameters.resolved().ok()?;
         let state = State::from_words(words.try_into().ok()?)?;
         let craft = p.problems().is_empty().then(|| Spacecraft::resume(&p, &state, tolerance))?;
-        Some(Model { craft, present: false, wheels: Wheels::default(), has_left_range: false })
+        Some(Model {
+            craft,
+            present: false,
+            wheels: Wheels::default(),
+            has_left_range: false,
+            has_had_lump: false,
+        })
     }
 
     fn step(&mut self, inputs: &Inputs, h: f64) -> Result<(), StepFailure> {
@@ -177,11 +195,12 @@ impl runtime::Model for Model {
             shorter_may_succeed: why.shorter_may_succeed(),
         })?;
         self.has_left_range |= !self.craft.is_in_range();
+        self.has_had_lump |= self.craft.has_lump();
         Ok(())
     }
 
     fn warnings(&self, _: &Parameters, _: &Inputs) -> Vec<String> {
-        let left = self.craft.ranges_held().iter().any(|ranges| !ranges.in_range);
+        let left = self.craft.leaves_range(&self.craft.ranges_held());
         left.then(|| format!("at the start {OUT_OF_RANGE}")).into_iter().collect()
     }
 
@@ -244,13 +263,21 @@ impl runtime::Model for Model {
         self.craft.follow_inputs(inputs);
         self.craft.check_liquids().map_err(|why| why.to_string())?;
         let ranges = self.craft.ranges(inputs);
-        self.has_left_range |= ranges.iter().any(|ranges| !ranges.in_range);
+        self.has_left_range |= self.craft.leaves_range(&ranges);
+        self.has_had_lump |= self.craft.has_lump();
         Ok(ranges != self.craft.ranges_held())
+    }
+
+    fn event_indicators(&mut self, inputs: &Inputs, indicators: &mut [f64]) {
+        self.craft.event_indicators(inputs, indicators);
     }
 
     fn step_warning(&self) -> Option<&'static str> {
         if self.has_left_range && !self.wheels.lack_reaction() {
             return Some(OUT_OF_RANGE);
+        }
+        if self.has_had_lump && !self.wheels.lack_reaction() {
+            return Some(LUMP);
         }
         self.wheels.lack_reaction().then_some(
             "h_wheels moves on an axis on which torque has always been 0: in Model Exchange the slope of an input is not \

@@ -6,7 +6,7 @@
 //! Arrays have FMI's structured names: `tank[].p` of the shape 4, 3, 3 is `tank[1].p[1,1]`, …: tank,
 //! mode, axis.
 
-use craft::{DampingLaw, MODES, POINTS, STATES, State, TANKS, index};
+use craft::{BallState, DampingLaw, MODES, POINTS, STATES, State, TANKS, index};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::{Enumeration, Item, Variable};
 
@@ -20,7 +20,7 @@ pub static TABLE: Table<Model> = Table::new(
         version: env!("CARGO_PKG_VERSION"),
         description: DESCRIPTION,
         events: "",
-        event_indicators: 0,
+        event_indicators: 2 * TANKS,
         saved_words: State::WORDS,
     },
     VARIABLES,
@@ -68,6 +68,8 @@ const MOTION: &[&str] = &[
     "tank[].p",
     "tank[].p_dot",
     "tank[].liquid",
+    "tank[].ball.position",
+    "tank[].ball.velocity",
     "force",
     "torque",
     "h_wheels",
@@ -80,6 +82,8 @@ const MOMENTUM: &[&str] = &[
     "tank[].p",
     "tank[].p_dot",
     "tank[].liquid",
+    "tank[].ball.position",
+    "tank[].ball.velocity",
     "h_wheels",
     "mass_flow",
 ];
@@ -90,12 +94,14 @@ const ENERGIES: &[&str] = &[
     "tank[].p",
     "tank[].p_dot",
     "tank[].liquid",
+    "tank[].ball.position",
+    "tank[].ball.velocity",
     "force",
     "torque",
     "h_wheels",
     "mass_flow",
 ];
-const PLACES: &[&str] = &["tank[].p", "tank[].liquid"];
+const PLACES: &[&str] = &["tank[].p", "tank[].liquid", "tank[].ball.position"];
 const ANGLES: &[&str] = &["tank[].p"];
 // Where they start.
 const EVERYTHING: &[&str] = &[
@@ -139,6 +145,20 @@ fn bob(n: usize) -> usize {
     index::bob(tank, mode) + axis
 }
 
+/// The place among the continuous states of an element of a lump's position.
+fn ball(n: usize) -> usize {
+    index::ball(n / 3) + n % 3
+}
+
+/// As an item of [`BALL_STATE`].
+fn ball_state(state: BallState) -> i32 {
+    match state {
+        BallState::Settled => 1,
+        BallState::Flying => 2,
+        BallState::Sliding | BallState::Light | BallState::Held => 3,
+    }
+}
+
 type V = Variable<Model>;
 
 /// The variables. Outputs come first, in reading order.
@@ -160,7 +180,7 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(VECTOR).depends_on(MOTION).initial_depends_on(EVERYTHING),
     V::output("position", |o, n| o.position[n], "m",
         "Position of O in the freely falling frame")
-        .shape(VECTOR).is_state(|n| index::POSITION + n).depends_on(&["position[]"]).initial_depends_on(&["init.position"]),
+        .shape(VECTOR).is_state(|n| index::POSITION + n).reinit().depends_on(&["position[]"]).initial_depends_on(&["init.position"]),
     V::output("velocity", |o, n| o.velocity[n], "m/s",
         "Velocity of O against the freely falling frame, inertial axes")
         .shape(VECTOR).is_state(|n| index::VELOCITY + n).reinit().depends_on(&["velocity[]"]).initial_depends_on(&["init.velocity"]),
@@ -198,7 +218,7 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(VECTOR).depends_on(MOMENTUM),
     V::local("energy", |o, _| o.energy, "J",
         "Kinetic energy of everything, of the centring springs, and on a pivot of gravity and of its stiffness; the wheels' spin and the flow towards an outlet left out")
-        .depends_on(&["q", "omega", "velocity", "tank[].p", "tank[].p_dot", "tank[].liquid", "mass_flow"]),
+        .depends_on(&["q", "omega", "velocity", "tank[].p", "tank[].p_dot", "tank[].liquid", "tank[].ball.position", "tank[].ball.velocity", "mass_flow"]),
     V::local("work", |o, _| o.work, "J",
         "Work of force, torque and wheels on the craft since the start: energy - energy(0) = work - dissipated - drained")
         .is_state(|_| index::WORK).depends_on(&["work"]),
@@ -227,13 +247,16 @@ static VARIABLES: &[Variable<Model>] = &[
         "Amplitude of a tank's surface at the wall, all modes together: wave times slosh angle")
         .display_unit("mm").shape(PER_TANK).depends_on(ANGLES),
     V::local_enumeration("tank[].regime", &REGIME, |o, n| o.tank[n].ranges.regime as i32,
-        "How far a tank's wave_height is inside the range of linear theory; nonlinear, too, where a bob is beyond 45 degrees")
+        "How far a tank's wave_height is inside the range of linear theory; nonlinear, too, where a bob is beyond 45 degrees or the liquid has left as one lump")
         .shape(PER_TANK).depends_on(ANGLES),
     V::local_boolean("tank[].in_range", |o, n| o.tank[n].ranges.in_range,
-        "The pendulums stand for the liquid: thrust or centring holds it at the tank's bottom, and every bob is within 45 degrees of the axis")
+        "The pendulums stand for the liquid: thrust or centring holds it at the tank's bottom, and every bob is within 45 degrees of the axis; false while the liquid is a lump")
         .shape(PER_TANK).depends_on(MOTION),
     V::local_integer("tank[].in_range_kind", |o, n| i32::from(o.tank[n].ranges.in_range),
         "tank[].in_range for hosts that misread Booleans (OpenModelica up to 1.27): 0 false, 1 true")
+        .shape(PER_TANK).depends_on(MOTION),
+    V::local_enumeration("tank[].ball.state", &BALL_STATE, |o, n| ball_state(o.tank[n].ball_state),
+        "What the liquid of a tank does whose ball.travel is above 0; where it is not settled no pendulum stands for it (in_range), and the tank's angles and wave_height are 0")
         .shape(PER_TANK).depends_on(MOTION),
     V::local("tank[].angle_x", |o, n| o.tank[n / MODES].angle_x[n % MODES], "rad",
         "Slosh angle of a mode: its sine is the bob's displacement along the tank's x axis over the pendulum's length")
@@ -245,10 +268,17 @@ static VARIABLES: &[Variable<Model>] = &[
     // The modes' directions and rates
     V::state("tank[].p", bob, "1",
         "Direction from hinge to bob of a slosh mode, a unit vector in tank axes; at rest under thrust along the tank's axis (0, 0, -1)")
-        .shape(MODE_VECTOR).nominal(0.1).depends_on(&["tank[].p[]"]).initial_depends_on(BOBS),
+        .shape(MODE_VECTOR).nominal(0.1).reinit().depends_on(&["tank[].p[]"]).initial_depends_on(BOBS),
     V::state("tank[].p_dot", |n| bob(n) + 3, "1/s",
         "Rate of tank[].p against the tank, tank axes")
         .shape(MODE_VECTOR).nominal(0.1).reinit().depends_on(&["tank[].p_dot[]"]).initial_depends_on(BOBS),
+
+    V::state("tank[].ball.position", ball, "m",
+        "Centre of the liquid as one lump from the tank's origin, tank axes; while it is settled, where its centre is at rest; 0 in a tank with ball.travel = 0")
+        .shape(TANK_VECTOR).reinit().depends_on(&["tank[].ball.position[]"]).initial_depends_on(BOBS),
+    V::state("tank[].ball.velocity", |n| ball(n) + 3, "m/s",
+        "Velocity of the lump against the tank, tank axes; 0 while the liquid is settled")
+        .shape(TANK_VECTOR).nominal(0.01).reinit().depends_on(&["tank[].ball.velocity[]"]).initial_depends_on(BOBS),
 
     V::state("tank[].liquid", |n| index::LIQUID + n, "kg",
         "Mass of the whole liquid in a tank")
@@ -276,6 +306,11 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(MODE_VECTOR).depends_on(&["tank[].p", "tank[].p_dot"]).initial_depends_on(BOBS),
     V::derivative("der(tank[].p_dot)", |n| bob(n) + 3, "1/s2", "Derivative of tank[].p_dot")
         .shape(MODE_VECTOR).depends_on(MOTION).initial_depends_on(EVERYTHING),
+
+    V::derivative("der(tank[].ball.position)", ball, "m/s", "Derivative of tank[].ball.position: tank[].ball.velocity")
+        .shape(TANK_VECTOR).depends_on(&["tank[].ball.position", "tank[].ball.velocity"]).initial_depends_on(BOBS),
+    V::derivative("der(tank[].ball.velocity)", |n| ball(n) + 3, "m/s2", "Derivative of tank[].ball.velocity")
+        .shape(TANK_VECTOR).depends_on(MOTION).initial_depends_on(EVERYTHING),
 
     // The dry craft
     V::parameter("craft.mass", |p, _| &mut p.craft.mass, "kg", "Mass of the dry craft, wheels included")
@@ -357,6 +392,21 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(PER_MODE).range(0.0, 10.0),
     V::parameter("tank[].wave", |p, n| &mut p.tank[n / MODES].wave[n % MODES], "m", "Elevation of the surface at the wall per slosh angle of a mode, for wave_height alone")
         .shape(PER_MODE).range(0.0, 1e9),
+    V::parameter("tank[].ball.travel", |p, n| &mut p.tank[n].ball.travel, "m",
+        "Above 0: where thrust pulls the liquid off the tank's bottom, or a bob passes 45 degrees, all of it goes on as one lump that flies, is thrown back by the wall and settles; how far its centre is moved along the axis from the bottom to the top. On a free craft without tanks that drain, in a tank with modes")
+        .display_unit("mm").shape(PER_TANK).range(0.0, 1e3),
+    V::parameter("tank[].ball.radius", |p, n| &mut p.tank[n].ball.radius, "m",
+        "How far the lump's centre gets from the tank's axis; 0: as far as makes the surface that it reaches as curved at the bottom as the path of the pendulums' common centre")
+        .display_unit("mm").shape(PER_TANK).range(0.0, 1e3),
+    V::parameter("tank[].ball.restitution", |p, n| &mut p.tank[n].ball.restitution, "1",
+        "Coefficient of restitution of the lump's impacts on the wall: speed along the normal after over that before. A guess unless measured")
+        .shape(PER_TANK).range(0.0, 1.0),
+    V::parameter("tank[].ball.contact_speed", |p, n| &mut p.tank[n].ball.contact_speed, "m/s",
+        "Speed after an impact below which a lump that is pressed to the wall stays on it")
+        .shape(PER_TANK).range(1e-9, 1e3),
+    V::parameter("tank[].ball.drag", |p, n| &mut p.tank[n].ball.drag, "1/s",
+        "Rate at which the lump's speed along the wall decays while it slides there. A guess unless measured")
+        .shape(PER_TANK).range(0.0, 1e3),
     V::integer("tank[].fill.points", |p, n| &mut p.points[n], "Points of the tank's table: 0 for a tank whose liquid stays; with 2 or more the tank can drain, and modes and rigid liquid are the table's, interpolated monotonely with two continuous derivatives; as they start, the default tank at depths of 0.1 to 1.2 m")
         .between(0, POINTS as i32).shape(PER_TANK),
     V::parameter("tank[].liquid_0", |p, n| &mut p.tank[n].liquid_0, "kg", "Mass of liquid at the start, used with fill.points > 0")
@@ -427,6 +477,16 @@ static REGIME: Enumeration = Enumeration {
     ],
 };
 
+static BALL_STATE: Enumeration = Enumeration {
+    name: "BallState",
+    description: "What the liquid of a tank does",
+    items: &[
+        Item::new("settled", "It is at the bottom: rigid liquid and pendulums"),
+        Item::new("flying", "It flies through the tank as one lump; the craft feels none of it"),
+        Item::new("sliding", "The lump slides on the wall"),
+    ],
+};
+
 static MOUNT: Enumeration = Enumeration {
     name: "Mount",
     description: "How the craft is held",
@@ -439,4 +499,4 @@ static MOUNT: Enumeration = Enumeration {
     ],
 };
 
-const _: () = assert!(STATES == index::DRAINED + 1);
+const _: () = assert!(STATES == index::BALLS + 6 * TANKS);

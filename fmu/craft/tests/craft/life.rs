@@ -482,7 +482,7 @@ fn constraints_are_kept_to_rounding() {
         let x = craft.continuous_states();
         let size: f64 = x[..4].iter().map(|x| x * x).sum();
         assert!((size - 1.0).abs() < 1e-15 * 4.0);
-        for bob in x[index::BOBS..].chunks_exact(6) {
+        for bob in x[index::BOBS..index::LIQUID].chunks_exact(6) {
             let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
             assert!((dot(&bob[..3], &bob[..3]) - 1.0).abs() < 1e-15 * 4.0);
             assert!(dot(&bob[..3], &bob[3..]).abs() < 1e-14);

@@ -4,6 +4,7 @@
 //! and has the coupling by co-simulation.
 
 mod balances;
+mod ball;
 mod component;
 mod decays;
 mod draining;

@@ -1,0 +1,735 @@
+//! The "ball" regime: liquid that has left the bottom of its tank, as one lump.
+//!
+//! Where thrust reverses, or a bob passes 45 degrees, no pendulum stands for the liquid. Of a tank with
+//! `ball.travel` > 0 all liquid is then one body: its centre flies freely, is thrown back by the wall with losses,
+//! slides on it, and is handed back to the pendulums where it comes to lie at the bottom again.
+//!
+//! **What the centre reaches.** Liquid at rest under a specific force across any direction has its centre on the
+//! tank's surface of centres of buoyancy; there the surface is perpendicular to that force, and its radius of curvature
+//! is I/V, second moment of the free surface over the liquid's volume (Dupin 1822, as in the theory of ships).
+//! A mass point that slides on this surface rests where the liquid rests, with the same energy. Of a sphere it is a
+//! sphere about its centre through the settled liquid's centre; of any other tank it is taken for an ellipsoid of
+//! revolution about the tank's axis through the liquid's centres at bottom and top,
+//!
+//! ```text
+//! f = 1 - x.D x >= 0,   D = diag(1/b^2, 1/b^2, 1/a^2) in tank axes,   x from the surface's centre
+//! z_s = (m_0 H_0 + sum of m (h - l))/m_liq      lower pole: the settled liquid's centre
+//! a   = travel/2,   b^2 = a R_p or more,   R_p = sum of m l/m_liq
+//! ```
+//!
+//! With b^2 = a R_p its curvature at the bottom is that of the pendulums' common centre, which for all modes is I/V; for
+//! R_p <= a the pendulums' centre, on a sphere of radius R_p, is then within the surface in every direction:
+//! f = q (1 - c)^2 (1 - q), q = R_p/a, c the cosine of the angle.
+//!
+//! **Motion.** u = x' + w x rho, rho from O, n outwards. The lump's own inertia, that of the shape in which it has left,
+//! turns with the tank (J_a, a massless part of the craft).
+//!
+//! ```text
+//! x' = u - w x rho
+//! u' = -a - w x u - F/m                  F = N G + m d x' on the craft at rho, G = D x; 0 in flight
+//! N  = (m/G.G) [x'.D x' - G.(a + w' x rho + w x (u + x'))]       keeps f = 0 while it slides, N > 0
+//! ```
+//!
+//! The drag's reaction may move the craft away from the lump; where it would, while without drag the lump stays, there is
+//! none until the wall's force exceeds it twice.
+//!
+//! Like a rod, the wall adds a matrix of rank one: N is affine in [a; w'], with slope -m G.(..)/G.G.
+//!
+//! **Impact** at the speed v_n = n.x': impulse J = (1 + e) mu v_n along n, 1/mu = 1/m + U.M^-1 U, U = [n; rho x n],
+//! M the craft's with all that hangs on it. Momentum is kept, (1 - e^2) mu v_n^2/2 dissipated. Below
+//! `ball.contact_speed` after an impact, pressed to the wall, the lump stays on it (e = 0): a sequence of bounces ends.
+//!
+//! **Hand-over.** Both ways each part of the liquid keeps its momentum until it is caught, plastically, by what it
+//! becomes a part of; so the whole keeps linear and angular momentum and its centre of mass, and loses energy (Carnot).
+//! Away: relative motions within the liquid are caught by the shape. Back: m_0 is caught by the tank, the bobs keep what
+//! their rods allow. They take it while |p_perp|^2 + |x'|^2/(g l) <= sin^2 30 deg. A hand-over that would raise the energy (of
+//! centring, or because the shape changes while the craft turns) waits until the lump is nearest to the axis.
+//!
+//! What it is worth: times and momenta of crossings, their order at impacts; not the wall's pressure, sprays, films or the
+//! liquid's way along the wall. e and d are guesses unless measured.
+
+use taylor::number::Number;
+use taylor::root::first_root;
+use taylor::series::{Series, ZERO};
+use taylor::space::{self, Vector, ZERO_VECTOR};
+use taylor::vector::{
+    Mat3, Vec3, add, constant, cross, dot, largest, part, rotation, scale, sub, times,
+    transposed_times, unit_quaternion,
+};
+
+use crate::bob::{Bob, BobNow};
+use crate::parameters::Tank;
+use crate::rigid::{Factors, Rigid, along_rod};
+use crate::sizes::MODES;
+use crate::state::BallState;
+
+/// Cosine of the largest angle from the axis at which a bob stands for liquid.
+pub(crate) const COS_45: f64 = core::f64::consts::FRAC_1_SQRT_2;
+
+/// f within which the lump touches the wall.
+const TOUCHING: f64 = 1e-10;
+/// f' below which it does not move from or towards the wall, 1/s.
+const RESTING: f64 = 1e-9;
+/// f'' below which nothing presses it to the wall, 1/s2.
+const PRESSING: f64 = 1e-9;
+/// Square of the sine of 30 degrees: how far the pendulums may swing that take the liquid back.
+const SWING: f64 = 0.25;
+
+/// What happens to a tank's liquid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Due {
+    /// It leaves the bottom.
+    Leave,
+    /// It meets the wall.
+    Impact,
+    /// Nothing presses it to the wall any more.
+    Release,
+    /// It is pressed to the wall enough for its drag.
+    Drag,
+    /// The pendulums take it back.
+    Settle,
+    /// A condition has changed that does not decide alone.
+    Look,
+}
+
+/// The directions of a tank's bobs, tank axes.
+pub(crate) type Directions = [Vec3; MODES];
+
+/// One tank's liquid in the ball regime, and the series of its motion; body axes.
+#[derive(Clone, Debug)]
+pub(crate) struct Lump {
+    pub tank: usize,
+    /// What the motion has been arranged for.
+    pub state: BallState,
+    pub m: f64,
+    restitution: f64,
+    contact_speed: f64,
+    /// d, 1/s
+    drag: f64,
+    /// Tank axes to body axes, the tank's axis, and its origin from O.
+    axes: Mat3,
+    e: Vec3,
+    origin: Vec3,
+    /// The surface's centre, on the tank's axis and from O; its semi-axes a and b.
+    height: f64,
+    center: Vec3,
+    half: f64,
+    radius: f64,
+    d: Mat3,
+    /// R_p
+    gyration: f64,
+    /// Mode 1.
+    hinge: Vec3,
+    length: f64,
+    /// The rigid liquid, its centre from O, and its inertia about it.
+    pub rigid: Rigid,
+    m_0: f64,
+    s: Vec3,
+    own: Mat3,
+    modes: usize,
+    masses: [f64; MODES],
+    lengths: [f64; MODES],
+    hinges: [Vec3; MODES],
+    /// Specific force along the axis: the liquid leaves below `lowest` and comes back above `floor`.
+    lowest: f64,
+    floor: f64,
+
+    x_0: Vec3,
+    rho: Vector,
+    u: Vector,
+    x_d: Vector,
+    normal: Vector,
+    squared: Series,
+    pull: Series,
+    force: Vector,
+    /// a + w' x rho
+    specific: Vector,
+    /// u + x', and w x (u + x')
+    sum: Vector,
+    turned: Vector,
+    /// w x u
+    u_turned: Vec3,
+    /// Of the order at hand: what does not depend on [a; w'] of this order.
+    known_pull: f64,
+    known_force: Vec3,
+    known_specific: Vec3,
+}
+
+/// Sum over k from `first` to n of a_k . b_(n-k).
+fn dots(a: &Vector, b: &Vector, first: usize, n: usize) -> f64 {
+    (first..=n).map(|k| dot(a[k], b[n - k])).sum()
+}
+
+/// Sum over k from `first` to n of b_(n-k) x a_k.
+fn crosses(b: &Vector, a: &Vector, first: usize, n: usize) -> Vec3 {
+    (first..=n).fold([0.0; 3], |sum, k| add(sum, cross(b[n - k], a[k])))
+}
+
+/// Sum over k from `first` to n of s_(n-k) a_k.
+fn scaled(s: &Series, a: &Vector, first: usize, n: usize) -> Vec3 {
+    (first..=n).fold([0.0; 3], |sum, k| add(sum, scale(s[n - k], a[k])))
+}
+
+/// Coefficient n of a product.
+fn product(a: &Series, b: &Series, n: usize) -> f64 {
+    (0..=n).map(|k| a[k] * b[n - k]).sum()
+}
+
+impl Lump {
+    /// Of the tank that is number `index`, from 0, with all that follows from its parameters; `None` where it has no
+    /// ball regime.
+    pub fn new(tank: &Tank, index: usize) -> Option<Lump> {
+        let surface = tank.ball_surface()?;
+        let axes = rotation(&unit_quaternion(tank.q));
+        let e = axes.map(|row| row[2]);
+        let on_axis = |z: f64| add(tank.position, scale(z, e));
+        let (a, b) = (surface.half, surface.radius);
+        let (across, along) = (1.0 / (b * b), 1.0 / (a * a));
+        let mut d = [[0.0; 3]; 3];
+        for i in 0..3 {
+            for j in 0..3 {
+                let one = if i == j { across } else { 0.0 };
+                d[i][j] = one + (along - across) * e[i] * e[j];
+            }
+        }
+        let ball = &tank.ball;
+        Some(Lump {
+            tank: index,
+            state: BallState::Settled,
+            m: surface.mass,
+            restitution: ball.restitution,
+            contact_speed: ball.contact_speed,
+            drag: ball.drag,
+            axes,
+            e,
+            origin: tank.position,
+            height: surface.height,
+            center: on_axis(surface.height),
+            half: a,
+            radius: b,
+            d,
+            gyration: surface.gyration,
+            hinge: on_axis(tank.hinge[0]),
+            length: tank.length[0],
+            rigid: tank.rigid(),
+            m_0: tank.m_0,
+            s: on_axis(tank.h_0),
+            own: tank.own_inertia(),
+            modes: tank.modes,
+            masses: tank.mass,
+            lengths: tank.length,
+            hinges: tank.hinge.map(on_axis),
+            lowest: (0..tank.modes).map(|n| tank.lowest(n)).fold(f64::NEG_INFINITY, f64::max),
+            floor: tank.smallest_acceleration(),
+            x_0: [0.0; 3],
+            rho: ZERO_VECTOR,
+            u: ZERO_VECTOR,
+            x_d: ZERO_VECTOR,
+            normal: ZERO_VECTOR,
+            squared: ZERO,
+            pull: ZERO,
+            force: ZERO_VECTOR,
+            specific: ZERO_VECTOR,
+            sum: ZERO_VECTOR,
+            turned: ZERO_VECTOR,
+            u_turned: [0.0; 3],
+            known_pull: 0.0,
+            known_force: [0.0; 3],
+            known_specific: [0.0; 3],
+        })
+    }
+
+    /// Where the settled liquid's centre is, and at rest; tank axes.
+    pub fn at_rest(&self) -> [f64; 6] {
+        [0.0, 0.0, self.height - self.half, 0.0, 0.0, 0.0]
+    }
+
+    /// Whether it is under way: the pendulums are not in use.
+    pub fn is_loose(&self) -> bool {
+        self.state != BallState::Settled
+    }
+
+    /// d while it drags, 1/s.
+    fn drag(&self) -> f64 {
+        if self.state == BallState::Sliding { self.drag } else { 0.0 }
+    }
+
+    fn slides(&self) -> bool {
+        matches!(self.state, BallState::Sliding | BallState::Light | BallState::Held)
+    }
+
+    /// Masses of the rigid liquid and the bobs, and where they are from O with the rods along `p`.
+    fn parts(&self, p: &Directions) -> [(f64, Vec3); MODES + 1] {
+        core::array::from_fn(|i| match i {
+            0 => (self.m_0, self.s),
+            _ if i > self.modes => (0.0, [0.0; 3]),
+            _ => (self.masses[i - 1], self.bob_at(i - 1, times(&self.axes, p[i - 1]))),
+        })
+    }
+
+    /// Where bob n is from O, with its rod along `p`, body axes.
+    fn bob_at(&self, n: usize, p: Vec3) -> Vec3 {
+        add(self.hinges[n], scale(self.lengths[n], p))
+    }
+
+    /// The common centre of its parts from O.
+    pub fn center_of(&self, p: &Directions) -> Vec3 {
+        let moment = self.parts(p).iter().fold([0.0; 3], |sum, (m, rho)| add(sum, scale(*m, *rho)));
+        scale(1.0 / self.m, moment)
+    }
+
+    /// J_a: inertia of the shape with the rods along `p`, about its own centre.
+    pub fn shape(&self, p: &Directions) -> Rigid {
+        let center = self.center_of(p);
+        let around =
+            |sum: Mat3, (m, rho): &(f64, Vec3)| Rigid::new(*m, sub(*rho, center), &sum).inertia;
+        let inertia = self.parts(p).iter().fold(self.own, around);
+        Rigid { mass: 0.0, moment: [0.0; 3], inertia }
+    }
+
+    /// Its six numbers when its centre is `rho` from O and moves with `rate` against the tank.
+    pub fn numbers(&self, rho: Vec3, rate: Vec3) -> [f64; 6] {
+        let at = transposed_times(&self.axes, sub(rho, self.origin));
+        let rate = transposed_times(&self.axes, rate);
+        [at[0], at[1], at[2], rate[0], rate[1], rate[2]]
+    }
+
+    /// The same number, on the wall and along it.
+    fn on_wall(&self, x: &[f64; 6]) -> [f64; 6] {
+        let [across, along] = [self.radius, self.half].map(|r| 1.0 / (r * r));
+        let at = [x[0], x[1], x[2] - self.height];
+        let g = [at[0] * across, at[1] * across, at[2] * along];
+        let [at, g] = [at, g].map(|y| scale(1.0 / libm::sqrt(dot(at, g)), y));
+        let rate = part(x, 3);
+        let rate = sub(rate, scale(dot(g, rate) / dot(g, g), g));
+        [at[0], at[1], at[2] + self.height, rate[0], rate[1], rate[2]]
+    }
+
+    /// Starts an expansion at position and rate (tank axes, six numbers) while the craft turns at `w`; of a lump that
+    /// slides both are brought to the wall first.
+    pub fn start(&mut self, x: &[f64; 6], w: Vec3) {
+        let x = if self.slides() { self.on_wall(x) } else { *x };
+        self.x_0 = times(&self.axes, [x[0], x[1], x[2] - self.height]);
+        self.rho[0] = add(self.center, self.x_0);
+        self.x_d[0] = times(&self.axes, part(&x, 3));
+        self.u[0] = add(self.x_d[0], cross(w, self.rho[0]));
+    }
+
+    /// Sets coefficient 1 of position and velocity to their derivative in the direction `dx` of the six numbers and `dw`
+    /// of the rate; of a lump that slides, at numbers on the wall.
+    pub fn seed_direction(&mut self, dx: &[f64; 6], w: Vec3, dw: Vec3) {
+        let mut at = times(&self.axes, part(dx, 0));
+        let mut rate = times(&self.axes, part(dx, 3));
+        if self.slides() {
+            let g = self.normal[0];
+            at = sub(at, scale(dot(g, at), self.x_0));
+            let turned = dot(times(&self.d, at), self.x_d[0]);
+            rate = sub(rate, scale((turned + dot(g, rate)) / dot(g, g), g));
+        }
+        self.rho[1] = at;
+        self.u[1] = add(rate, add(cross(dw, self.rho[0]), cross(w, at)));
+    }
+
+    /// Position and rate `t` after the start at `x`, from the series cut after order n, when the craft turns at `w` by then.
+    pub fn at(&self, x: &[f64; 6], n: usize, t: f64, w: Vec3) -> [f64; 6] {
+        let (rho, u) = (space::value(&self.rho, n, t), space::value(&self.u, n, t));
+        let rate = sub(u, cross(w, rho));
+        let moved = transposed_times(&self.axes, sub(rho, self.rho[0]));
+        let change = transposed_times(&self.axes, sub(rate, self.x_d[0]));
+        let x = if self.slides() { self.on_wall(x) } else { *x };
+        let x: [f64; 6] =
+            core::array::from_fn(|i| x[i] + if i < 3 { moved[i] } else { change[i - 3] });
+        if self.slides() { self.on_wall(&x) } else { x }
+    }
+
+    /// Coefficient n of what does not depend on [a; w'] of this order: force and torque about O on the craft.
+    pub fn reaction(&mut self, n: usize, w: &Vector, w_d: &Vector) -> [Vec3; 2] {
+        self.x_d[n] = sub(self.u[n], crosses(w, &self.rho, 0, n));
+        self.u_turned = crosses(w, &self.u, 0, n);
+        (self.known_pull, self.known_force) = (0.0, [0.0; 3]);
+        if !self.slides() {
+            return [[0.0; 3]; 2];
+        }
+        self.normal[n] = times(&self.d, if n == 0 { self.x_0 } else { self.rho[n] });
+        self.squared[n] = dots(&self.normal, &self.normal, 0, n);
+        self.sum[n] = add(self.u[n], self.x_d[n]);
+        self.turned[n] = crosses(w, &self.sum, 0, n);
+        self.known_specific = crosses(w_d, &self.rho, 1, n);
+        let bent: f64 = (0..=n).map(|k| dot(self.x_d[k], times(&self.d, self.x_d[n - k]))).sum();
+        let across = bent
+            - dots(&self.normal, &self.turned, 0, n)
+            - dots(&self.normal, &self.specific, 1, n)
+            - dot(self.normal[0], self.known_specific);
+        let before: f64 = (1..=n).map(|k| self.squared[k] * self.pull[n - k]).sum();
+        self.known_pull = (self.m * across - before) / self.squared[0];
+        self.known_force = add(
+            add(scaled(&self.pull, &self.normal, 1, n), scale(self.known_pull, self.normal[0])),
+            scale(self.m * self.drag(), self.x_d[n]),
+        );
+        let torque = add(
+            cross(self.rho[0], self.known_force),
+            scale(-1.0, crosses(&self.force, &self.rho, 1, n)),
+        );
+        [self.known_force, torque]
+    }
+
+    /// n and rho x n at the start of the expansion, of a lump that slides: what it adds to the matrix.
+    pub fn along_normal(&self) -> Option<[f64; 6]> {
+        self.slides().then(|| along_rod(self.outwards(), self.rho[0]))
+    }
+
+    /// n at the start of the expansion.
+    pub fn outwards(&self) -> Vec3 {
+        let g = times(&self.d, self.x_0);
+        scale(1.0 / libm::sqrt(dot(g, g)), g)
+    }
+
+    /// From O at the start of the expansion.
+    pub fn position(&self) -> Vec3 {
+        self.rho[0]
+    }
+
+    /// x' at the start of the expansion.
+    pub fn rate(&self) -> Vec3 {
+        self.x_d[0]
+    }
+
+    /// Coefficient n of the rest, and n + 1 of position and velocity, from coefficient n of [a; w'].
+    pub fn accelerate(&mut self, n: usize, a: Vec3, w_d: Vec3) {
+        let specific = add(a, cross(w_d, self.rho[0]));
+        if self.slides() {
+            self.specific[n] = add(specific, self.known_specific);
+            let pull = -self.m * dot(self.normal[0], specific) / self.squared[0];
+            self.pull[n] = self.known_pull + pull;
+            self.force[n] = add(self.known_force, scale(pull, self.normal[0]));
+        } else {
+            (self.pull[n], self.force[n]) = (0.0, [0.0; 3]);
+        }
+        let fall = add(add(a, self.u_turned), scale(1.0 / self.m, self.force[n]));
+        let order = (n + 1) as f64;
+        self.u[n + 1] = fall.map(|x| -x / order);
+        self.rho[n + 1] = self.x_d[n].map(|x| x / order);
+    }
+
+    /// Coefficient n of the power dissipated, m d |x'|^2, W.
+    pub fn dissipation(&self, n: usize) -> f64 {
+        let drag = self.drag();
+        if drag > 0.0 { self.m * drag * dots(&self.x_d, &self.x_d, 0, n) } else { 0.0 }
+    }
+
+    /// Coefficient n (0 or 1) of the rates of the six numbers: x', x'' = u' - w' x rho - w x x'.
+    pub fn rates(&self, n: usize, w: &Vector, w_d: &Vector) -> [f64; 6] {
+        let u_d = scale((n + 1) as f64, self.u[n + 1]);
+        let turned = add(crosses(w_d, &self.rho, 0, n), crosses(w, &self.x_d, 0, n));
+        let x_d = transposed_times(&self.axes, self.x_d[n]);
+        let x_dd = transposed_times(&self.axes, sub(u_d, turned));
+        [x_d[0], x_d[1], x_d[2], x_dd[0], x_dd[1], x_dd[2]]
+    }
+
+    /// The scale of u within the time `t`, m/s.
+    pub fn speed_scale(&self, w: Vec3, t: f64) -> f64 {
+        largest(self.x_d[0]) + self.half * largest(w) + largest(self.u[1]) * t
+    }
+
+    /// Size of coefficient n of u.
+    pub fn coefficient_norm(&self, n: usize) -> f64 {
+        largest(self.u[n])
+    }
+
+    fn of<T: Number>(a: &Vector) -> Vec3<T> {
+        [0, 1, 2].map(|i| T::of(a[0][i], a[1][i]))
+    }
+
+    /// Force on the craft and its torque about O.
+    pub fn wrench<T: Number>(&self) -> [Vec3<T>; 2] {
+        let force = Self::of::<T>(&self.force);
+        [force, cross(Self::of(&self.rho), force)]
+    }
+
+    /// What the outputs need.
+    pub fn now<T: Number>(&self) -> BobNow<T> {
+        BobNow {
+            m: T::constant(self.m),
+            rho: Self::of(&self.rho),
+            rate: Self::of(&self.x_d),
+            hinge: constant(self.hinge),
+            e: self.e,
+            in_tank: constant([0.0; 3]),
+            wave: 0.0,
+            centring: T::constant(0.0),
+        }
+    }
+
+    /// What an impulse of the craft does to its rate: in flight the lump keeps its velocity, on the wall across the normal.
+    pub fn after_impulse(&self, x: &mut [f64], dv: Vec3, dw: Vec3) {
+        let mut kick = add(dv, cross(dw, self.rho[0]));
+        if self.slides() {
+            let n = self.outwards();
+            kick = sub(kick, scale(dot(n, kick), n));
+        }
+        let change = transposed_times(&self.axes, kick);
+        for i in 0..3 {
+            x[3 + i] -= change[i];
+        }
+    }
+
+    /// J n on the craft at rho for the speed v_n with which the wall throws it back.
+    pub fn impulse(&self, matrix: &Factors, e: f64) -> [Vec3; 2] {
+        let n = self.outwards();
+        let u = [n, cross(self.rho[0], n)];
+        let [dv, dw] = matrix.solve(u);
+        let mu = 1.0 / (1.0 / self.m + dot(u[0], dv) + dot(u[1], dw));
+        u.map(|half| scale((1.0 + e) * mu * self.approach(), half))
+    }
+
+    /// v_n at the start of the expansion, m/s.
+    pub fn approach(&self) -> f64 {
+        dot(self.outwards(), self.x_d[0]).max(0.0)
+    }
+
+    /// Coefficient of restitution, and the speed after an impact below which the lump may stay on the wall, m/s.
+    pub fn restitution(&self) -> (f64, f64) {
+        (self.restitution, self.contact_speed)
+    }
+
+    /// Whether something presses it to the wall.
+    pub fn is_pressed(&self) -> bool {
+        self.pull[0] > 0.0
+    }
+
+    /// The directions of rods that put the pendulums' centre where the lump is, as far as it can.
+    pub fn hanging(&self) -> Directions {
+        let in_tank = transposed_times(&self.axes, self.x_0);
+        let [x, y] = [in_tank[0] / self.gyration, in_tank[1] / self.gyration];
+        [[x, y, -libm::sqrt((1.0 - x * x - y * y).max(0.0))]; MODES]
+    }
+
+    /// What the tank catches of its parts, which all move with `rate` against it, rods along `p`: the impulse on the craft, and
+    /// the bobs' rates p'.
+    pub fn caught(&self, p: &Directions, rate: Vec3) -> ([Vec3; 2], Directions) {
+        let mut impulse = scale(self.m_0, rate);
+        let mut torque = cross(self.s, impulse);
+        let mut rates = [[0.0; 3]; MODES];
+        for n in 0..self.modes {
+            let rod = times(&self.axes, p[n]);
+            let along = scale(dot(rod, rate), rod);
+            let pulled = scale(self.masses[n], along);
+            impulse = add(impulse, pulled);
+            torque = add(torque, cross(self.bob_at(n, rod), pulled));
+            let across = scale(1.0 / self.lengths[n], sub(rate, along));
+            rates[n] = transposed_times(&self.axes, across);
+        }
+        ([impulse, torque], rates)
+    }
+
+    /// Momentum of the bobs' motion in the tank over the liquid's mass, and its moment about the liquid's centre.
+    pub fn stirred(&self, center: Vec3, bobs: impl Iterator<Item = BobNow<f64>>) -> [Vec3; 2] {
+        bobs.fold([[0.0; 3]; 2], |[rate, moment], bob| {
+            let momentum = scale(bob.m, bob.rate);
+            let arm = sub(bob.rho, center);
+            [add(rate, scale(1.0 / self.m, momentum)), add(moment, cross(arm, momentum))]
+        })
+    }
+
+    /// Coefficients below n of the specific force along the tank at the hinge of mode 1.
+    fn axial(&self, n: usize, a: &Vector, w: &Vector, w_d: &Vector) -> Series {
+        let turned = cross(self.hinge, self.e);
+        let height = dot(self.e, self.hinge);
+        let mut axial = ZERO;
+        for (k, x) in axial.iter_mut().enumerate().take(n) {
+            let turning: f64 = (0..=k)
+                .map(|i| {
+                    dot(self.e, w[i]) * dot(w[k - i], self.hinge) - height * dot(w[i], w[k - i])
+                })
+                .sum();
+            *x = dot(self.e, a[k]) + dot(turned, w_d[k]) + turning;
+        }
+        axial
+    }
+
+    /// Coefficients below n of what has to be positive for the pendulums to take the liquid back, each with what of it is
+    /// rounding: the swing that is left, thrust along the tank, depth below the surface's centre.
+    fn settling(&self, n: usize, a: &Vector, w: &Vector, w_d: &Vector) -> [(Series, f64); 3] {
+        let mut thrust = self.axial(n, a, w, w_d);
+        thrust[0] -= self.floor;
+        let (mut left, mut depth, mut swing) = (ZERO, ZERO, ZERO);
+        for k in 0..n {
+            let x = |k: usize| if k == 0 { self.x_0 } else { self.rho[k] };
+            depth[k] = -dot(self.e, x(k));
+            let across: f64 = (0..=k)
+                .map(|i| dot(x(i), x(k - i)) - dot(self.e, x(i)) * dot(self.e, x(k - i)))
+                .sum();
+            left[k] = -across / (self.gyration * self.gyration);
+        }
+        left[0] += SWING;
+        for k in 0..n {
+            swing[k] = product(&thrust, &left, k) - dots(&self.x_d, &self.x_d, 0, k) / self.length;
+        }
+        // What rounds: the specific force of everything that turns, and what it is multiplied by.
+        let arm = largest(self.hinge);
+        let turning = largest(w[0]) * largest(w[0]) + largest(w_d[0]);
+        let of_thrust = 1e-10 * self.floor + 1e-12 * (largest(a[0]) + turning * arm);
+        let far = SWING + left[0].abs();
+        let speed = dot(self.x_d[0], self.x_d[0]) / self.length;
+        let of_swing = 1e-10 * (thrust[0].abs() * far + speed) + of_thrust * far;
+        [(swing, of_swing), (thrust, of_thrust), (depth, 1e-10 * self.half)]
+    }
+
+    /// What happens next to the liquid, within `h` after the start of the expansion cut after order n, and when. `bobs` are
+    /// the tank's.
+    pub fn next<'a>(
+        &self,
+        n: usize,
+        h: f64,
+        [a, w, w_d]: [&Vector; 3],
+        bobs: impl Iterator<Item = &'a Bob>,
+    ) -> Option<(f64, Due)> {
+        match self.state {
+            BallState::Settled => {
+                let mut above = self.axial(n, a, w, w_d);
+                above[0] -= self.lowest;
+                let first = first_root(&above[..n], h);
+                let leave = bobs.fold(first, |first, bob| {
+                    let mut below: Series = core::array::from_fn(|k| -dot(self.e, bob.p[k]));
+                    below[0] -= COS_45;
+                    earlier(first, first_root(&below[..=n], first.unwrap_or(h)))
+                });
+                leave.map(|t| (t, Due::Leave))
+            }
+            BallState::Flying => self.next_contact(n, h).map(|t| (t, Due::Impact)),
+            BallState::Sliding | BallState::Light | BallState::Held => {
+                let mut first = first_root(&self.pull[..n], h).map(|t| (t, Due::Release));
+                let mut sooner = |due: Option<(f64, Due)>| {
+                    if let Some((t, _)) = due
+                        && first.is_none_or(|(first, _)| t < first)
+                    {
+                        first = due;
+                    }
+                };
+                match self.state {
+                    BallState::Held => sooner(self.next_passage(n, h).map(|t| (t, Due::Settle))),
+                    _ => sooner(self.next_settling(n, h, [a, w, w_d])),
+                }
+                if self.state == BallState::Light {
+                    let rise = rise(&self.excess(n), n, h);
+                    sooner(rise.map(|t| (t, Due::Drag)));
+                }
+                first
+            }
+        }
+    }
+
+    fn next_contact(&self, n: usize, h: f64) -> Option<f64> {
+        let x = |k: usize| if k == 0 { self.x_0 } else { self.rho[k] };
+        let mut f = ZERO;
+        for (k, f) in f.iter_mut().enumerate().take(n + 1) {
+            *f = -(0..=k).map(|i| dot(x(i), times(&self.d, x(k - i)))).sum::<f64>();
+        }
+        f[0] += 1.0;
+        if f[0] > TOUCHING {
+            return first_root(&f[..=n], h);
+        }
+        if f[1] > RESTING {
+            // The root at 0 is behind.
+            return first_root(&f[1..=n], h);
+        }
+        if f[1] < -RESTING || f[2] < -PRESSING {
+            return Some(0.0);
+        }
+        f[0] = TOUCHING;
+        first_root(&f[..=n], h)
+    }
+
+    /// Coefficients below n of the square of the wall's force over that of twice the drag that there would be, minus 1, times
+    /// the latter.
+    fn excess(&self, n: usize) -> Series {
+        let (mut pull, mut excess) = (ZERO, ZERO);
+        for (k, x) in pull.iter_mut().enumerate().take(n) {
+            *x = product(&self.pull, &self.pull, k);
+        }
+        let twice = 2.0 * self.m * self.drag;
+        for (k, x) in excess.iter_mut().enumerate().take(n) {
+            *x =
+                product(&pull, &self.squared, k) - twice * twice * dots(&self.x_d, &self.x_d, 0, k);
+        }
+        excess
+    }
+
+    /// When it comes nearest to the tank's axis.
+    fn next_passage(&self, n: usize, h: f64) -> Option<f64> {
+        let x = |k: usize| if k == 0 { self.x_0 } else { self.rho[k] };
+        let across = |y: Vec3| sub(y, scale(dot(self.e, y), self.e));
+        let mut outwards = ZERO;
+        for (k, out) in outwards.iter_mut().enumerate().take(n) {
+            *out = (0..=k).map(|i| dot(across(x(i)), self.x_d[k - i])).sum();
+        }
+        rise(&outwards, n, h)
+    }
+
+    fn next_settling(&self, n: usize, h: f64, motion: [&Vector; 3]) -> Option<(f64, Due)> {
+        let [a, w, w_d] = motion;
+        let conditions = self.settling(n, a, w, w_d);
+        let lacking = || conditions.iter().filter(|(x, fine)| x[0] <= -fine);
+        let (mut first, mut many) = (None, 0);
+        for (x, _) in lacking() {
+            many += 1;
+            let below = x.map(|x| -x);
+            first = earlier(first, first_root(&below[..n], h));
+        }
+        let due = if many == 1 { Due::Settle } else { Due::Look };
+        if many == 0 { Some((0.0, Due::Settle)) } else { first.map(|t| (t, due)) }
+    }
+
+    /// Whether the pendulums may take the liquid back at the start of the expansion.
+    pub fn may_settle(&self, a: &Vector, w: &Vector, w_d: &Vector) -> bool {
+        self.settling(1, a, w, w_d).iter().all(|(x, fine)| x[0] > -fine)
+    }
+
+    /// Functions that cross zero at events, for hosts that integrate themselves; `heights` are the bobs' p_z.
+    pub fn indicators(
+        &self,
+        [a, w, w_d]: [&Vector; 3],
+        heights: impl Iterator<Item = f64>,
+    ) -> [f64; 2] {
+        match self.state {
+            BallState::Settled => {
+                let above = self.axial(1, a, w, w_d)[0] - self.lowest;
+                [heights.fold(above, |least, z| least.min(-COS_45 - z)), 1.0]
+            }
+            BallState::Flying => [1.0 - dot(self.x_0, times(&self.d, self.x_0)), 1.0],
+            BallState::Held => {
+                let out = dot(sub(self.x_0, scale(dot(self.e, self.x_0), self.e)), self.x_d[0]);
+                [self.pull[0] / self.m, -out]
+            }
+            BallState::Sliding | BallState::Light => {
+                let mut least = self
+                    .settling(1, a, w, w_d)
+                    .iter()
+                    .fold(f64::INFINITY, |least, (x, fine)| least.min(x[0] + fine));
+                if self.state == BallState::Light {
+                    least = least.max(self.excess(1)[0]);
+                }
+                [self.pull[0] / self.m, -least]
+            }
+        }
+    }
+}
+
+/// When the series of a, cut before order n, rises through zero from below, within h; at h = 0, where hosts ask that have found
+/// the event themselves, whether it has.
+fn rise(a: &Series, n: usize, h: f64) -> Option<f64> {
+    let size = a[..n].iter().rev().fold(0.0, |sum, x| sum * h.min(1.0) + x.abs());
+    let below = a.map(|x| -x);
+    if h == 0.0 && a[0] > 0.0 {
+        return Some(0.0);
+    }
+    if below[0] > 1e-10 * size { first_root(&below[..n], h) } else { None }
+}
+
+/// The earlier of two times, if any.
+fn earlier(a: Option<f64>, b: Option<f64>) -> Option<f64> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(if b < a { b } else { a }),
+        (a, b) => a.or(b),
+    }
+}
