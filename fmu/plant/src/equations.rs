@@ -65,14 +65,15 @@ impl Plant {
         with_modes!(&mut self.liquid, modes => {
             let acting = (tau, along(inputs.g_axial, du[2]));
             self.motion.start(modes, &self.state, acting);
-            self.motion.derivatives(0, true, modes, contact);
+            let forces = (true, self.motion.suspension.exists);
+            self.motion.derivatives(0, forces, modes, contact);
             self.motion.hub.theta[1] = dx[x::THETA];
             self.motion.hub.omega[1] = dx[x::OMEGA];
             self.motion.law.set_state(1, dx[x::BRISTLE]);
             for (mode, dq) in modes.iter_mut().zip(dx[x::SLOSH..].as_chunks::<4>().0) {
                 mode.seed_direction(dq, &self.motion.hub);
             }
-            self.motion.derivatives(1, true, modes, contact);
+            self.motion.derivatives(1, forces, modes, contact);
         });
         self.coefficients(1, -torque.slope / self.wheel.inertia)
     }

@@ -43,8 +43,25 @@ pub(crate) struct Stop {
 impl Stop {
     /// Whether the step stops at an event `t` after the stretch's start.
     #[inline(always)]
-    pub fn is_at(&self, t: f64) -> bool {
+    pub fn is_at(self, t: f64) -> bool {
         self.offset + t > self.passed
+    }
+
+    /// When, at most `h` after `t` in the stretch, which is `since_start` after the gyro's start, the gyro takes the
+    /// first sample at which the step stops, of `allowed` samples from number `next` on.
+    // By value: an address of what a stretch keeps would keep all of it in memory.
+    #[cold]
+    fn at_sample(
+        self,
+        (t, h): (f64, f64),
+        since_start: f64,
+        imu: &Imu,
+        (next, allowed): (u64, usize),
+    ) -> Option<f64> {
+        let due = (next..).take(allowed).map(|k| imu.due(k, since_start));
+        due.take_while(|due| imu.falls_within(*due, h))
+            .map(|due| due.max(0.0).min(h))
+            .find(|due| self.is_at(t + due))
     }
 }
 
@@ -190,12 +207,12 @@ impl Motion {
 
     /// Coefficient n of every quantity from coefficients up to n of the state, and
     /// coefficient n + 1 of the state; `ramp` says whether the specific force, the drag or the
-    /// weight changes.
+    /// weight changes, `hangs` whether there is a suspension line.
     #[inline(always)]
     pub fn derivatives<M: SloshMode>(
         &mut self,
         n: usize,
-        ramp: bool,
+        (ramp, hangs): (bool, bool),
         modes: &mut [M],
         contact: Contact,
     ) {
@@ -205,7 +222,7 @@ impl Motion {
             self.hub.tilt.expand(n, &self.hub.theta, &self.hub.g);
             net += self.gravity_torque(n) + self.rigid_moment * self.hub.tilt.e[1][n];
         }
-        if self.suspension.exists {
+        if hangs {
             net += self.suspension.torque(n, &self.hub);
         }
         for mode in modes.iter_mut() {
@@ -213,7 +230,9 @@ impl Motion {
             inertia += reaction.j;
             net += reaction.t;
         }
-        self.inertia[n] = series::constant(n, self.i0) + inertia;
+        if n == 0 || M::MOVES_INERTIA {
+            self.inertia[n] = series::constant(n, self.i0) + inertia;
+        }
         if n == 0 {
             self.inv_inertia = 1.0 / self.inertia[0];
         }
@@ -235,7 +254,7 @@ impl Motion {
         self.hub.omega[n + 1] = series::next(n, self.hub.omega_dot[n]);
         self.power[n] = series::mul_ramp(n, &self.tau, &self.hub.omega);
         self.dissipation[n] = self.law.dissipation(n, &self.tau_f, &self.hub.omega);
-        if self.suspension.exists {
+        if hangs {
             self.dissipation[n] += self.suspension.dissipation(n, &self.hub);
         }
         for mode in modes.iter_mut() {
@@ -248,7 +267,7 @@ impl Motion {
     #[cold]
     #[inline(never)]
     pub fn derivatives_varying<M: SloshMode>(&mut self, modes: &mut [M], contact: Contact) {
-        self.derivatives(0, true, modes, contact);
+        self.derivatives(0, (true, self.suspension.exists), modes, contact);
     }
 
     /// The sign that the hub's contact has by its rate or, at rest, by the torque
@@ -261,10 +280,11 @@ impl Motion {
         if omega < 0.0 {
             return Contact::Backward;
         }
-        self.derivatives(0, self.varies, modes, Contact::Stuck);
+        let forces = (self.varies, self.suspension.exists);
+        self.derivatives(0, forces, modes, Contact::Stuck);
         // A law that can't hold the hub needs to know where the torque goes from 0.
         if !self.law.sticks() {
-            self.derivatives(1, self.varies, modes, Contact::Stuck);
+            self.derivatives(1, forces, modes, Contact::Stuck);
         }
         let net = [self.net[0], self.net[1]];
         self.law.contact_at_rest(net, state.x[x::THETA], state.contact)
@@ -323,7 +343,7 @@ impl Motion {
     ) -> Result<ControlFlow<f64>, StepError> {
         // The usual case is compiled apart: one mode, no loops over modes and orders.
         match modes {
-            [one] if M::UNROLLED && acting.1.slope == 0.0 && !self.varies => {
+            [one] if M::UNROLLED && acting.1.slope == 0.0 && self.is_plain() => {
                 let one = core::slice::from_mut(one);
                 self.advance_along::<true, M>(one, state, acting, h, (imu, stop), steps)
             }
@@ -331,7 +351,12 @@ impl Motion {
         }
     }
 
-    /// As [`Motion::advance`]; `UNROLLED` only where the specific force is held.
+    /// Whether drag and weight change with g alone, and there is no suspension line.
+    fn is_plain(&self) -> bool {
+        !self.varies && !self.suspension.exists
+    }
+
+    /// As [`Motion::advance`]; `UNROLLED` only where the specific force is held and the motion is plain.
     #[inline(always)]
     fn advance_along<const UNROLLED: bool, M: SloshMode>(
         &mut self,
@@ -416,18 +441,6 @@ impl<const UNROLLED: bool, M: SloshMode> Stretch<'_, UNROLLED, M> {
         !UNROLLED && self.varies
     }
 
-    /// When, at most `h` after the start of the expansion, the gyro takes the first sample at which the step stops.
-    #[cold]
-    fn stop_at_sample(&self, h: f64, allowed: usize) -> Option<f64> {
-        let since_start = self.begin + self.t - self.state.start_time;
-        let (imu, next) = (self.imu, self.state.gyro.next);
-        let mut due = (next..).take(allowed).map(|k| imu.due(k, since_start));
-        due.by_ref()
-            .take_while(|due| imu.falls_within(*due, h))
-            .map(|due| due.max(0.0).min(h))
-            .find(|due| self.stop.is_at(self.t + due))
-    }
-
     #[inline(always)]
     fn acting_at(&self, t: f64) -> (Ramp, Ramp) {
         (self.acting.0.after(t), self.acting.1.after(t))
@@ -445,8 +458,8 @@ impl<const UNROLLED: bool, M: SloshMode> integrator::Motion for Stretch<'_, UNRO
 
     #[inline(always)]
     fn rates(&mut self, n: usize) {
-        let varies = self.varies();
-        self.motion.derivatives(n, varies, self.modes, self.state.contact);
+        let forces = (self.varies(), !UNROLLED && self.motion.suspension.exists);
+        self.motion.derivatives(n, forces, self.modes, self.state.contact);
     }
 
     #[inline(always)]
@@ -515,19 +528,19 @@ impl<const UNROLLED: bool, M: SloshMode> integrator::Motion for Stretch<'_, UNRO
         steps: &mut Steps,
     ) -> Result<ControlFlow<f64>, StepError> {
         let mut flow = ControlFlow::Continue(());
-        if self.imu.enabled
-            && self.stop.passed < f64::INFINITY
-            && let Some(due) = self.stop_at_sample(h, steps.left())
-        {
-            if due < h {
-                (h, t) = (due, self.t + due);
-                self.event = None;
-            }
-            flow = ControlFlow::Break(t);
-        }
         let Stretch { motion, modes, state, begin, .. } = self;
         if self.imu.enabled {
             let since_start = *begin + self.t - state.start_time;
+            let samples = (state.gyro.next, steps.left());
+            if self.stop.passed < f64::INFINITY
+                && let Some(due) = self.stop.at_sample((self.t, h), since_start, self.imu, samples)
+            {
+                if due < h {
+                    (h, t) = (due, self.t + due);
+                    self.event = None;
+                }
+                flow = ControlFlow::Break(t);
+            }
             let omega = |s| series::values([&motion.hub.omega], n, s)[0];
             let taken = self.imu.follow(&mut state.gyro, since_start, h, omega, steps.left());
             steps.count(taken, *begin + self.t)?;

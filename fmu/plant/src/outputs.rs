@@ -123,16 +123,17 @@ impl Plant {
             e_y * self.m_0 - wd * (self.m_0 * self.r),
         ];
         let [tau_gravity, on_rigid]: [T; 2] = motion.gravity_torques();
-        let [tau_suspension, strain]: [T; 2] = motion.suspension.present(hub);
         let mut tau_fluid = on_rigid - wd * self.i_0;
         let inertia = self.hub_inertia + self.i_0;
         let stored = T::of(motion.law.energy(0), motion.law.energy(1));
         let mut energy = w * inertia * w * 0.5 + stored + motion.potential();
+        let zero = T::constant(0.0);
+        let mut tau_suspension = zero;
         if motion.suspension.exists {
-            energy = energy + strain;
+            let [torque, strain]: [T; 2] = motion.suspension.present(hub);
+            (tau_suspension, energy) = (torque, energy + strain);
         }
         let mut momentum = w * inertia;
-        let zero = T::constant(0.0);
         let (mut wave, mut mode1) = ([zero; 2], Angles::<T>::zero());
         let (mut amplitude, mut baffle_zeta) = (zero, zero);
         with_modes!(&self.liquid, modes => for (i, mode) in modes.iter().enumerate() {

@@ -326,6 +326,7 @@ impl Plant {
 
     /// As [`Plant::step`], but an error leaves the state unusable, and it stops at the first event more than
     /// `passed` seconds after its start; then it returns how many.
+    #[inline(always)]
     fn advance(
         &mut self,
         inputs: &Inputs,
@@ -420,7 +421,8 @@ impl Plant {
             if self.motion.varies {
                 self.motion.derivatives_varying(modes, contact);
             } else {
-                self.motion.derivatives(0, false, modes, contact);
+                let hangs = self.motion.suspension.exists;
+                self.motion.derivatives(0, (false, hangs), modes, contact);
             }
         });
     }

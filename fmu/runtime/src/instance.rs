@@ -343,9 +343,10 @@ impl<M: Model, V: Version> Instance<M, V> {
     ) -> Result<(), Fault> {
         let call = self.check(call)?;
         if let [reference] = references {
-            let scalar = self.check_set(call, *reference, value(0))?;
+            let value = value(0);
+            let scalar = self.check_set(call, *reference, value)?;
             if matches!(scalar.access, Access::Input(_)) {
-                self.put(scalar, value(0));
+                self.put(scalar, value);
                 return Ok(());
             }
         }
@@ -1264,7 +1265,7 @@ fn state_refusal<M: Model>(scalar: &Scalar<M>, value: Value) -> String {
 }
 
 /// Takes the inputs to where their slopes lead in `h`, which is in their ranges.
-#[inline]
+#[inline(always)]
 fn follow_slopes<M: Model>(call: &Call, inputs: &mut M::Inputs, h: f64) -> Result<(), Fault> {
     for scalar in M::table().inputs() {
         let Access::Input(ramp) = scalar.access else { continue };
@@ -1308,7 +1309,7 @@ fn no_value<M: Model>(call: &Call, scalar: &Scalar<M>) -> Fault {
 }
 
 /// Whether an input can have this derivative.
-#[inline]
+#[inline(always)]
 fn check_slope<M: Model>(
     call: &Call,
     scalar: &Scalar<M>,
@@ -1316,9 +1317,20 @@ fn check_slope<M: Model>(
     slope: f64,
 ) -> Result<(), Fault> {
     let is_input = matches!(scalar.access, Access::Input(_));
-    if is_input && order == 1 && scalar.variable.allows_rate(slope) {
-        return Ok(());
+    match is_input && order == 1 && scalar.variable.allows_rate(slope) {
+        true => Ok(()),
+        false => refuse_slope(call, scalar, order, slope),
     }
+}
+
+#[cold]
+fn refuse_slope<M: Model>(
+    call: &Call,
+    scalar: &Scalar<M>,
+    order: i32,
+    slope: f64,
+) -> Result<(), Fault> {
+    let is_input = matches!(scalar.access, Access::Input(_));
     if !is_input {
         return Err(call.error(format_args!("{} is not an input", scalar.name())));
     }

@@ -243,10 +243,12 @@ pub fn advance<M: Motion>(
         motion.start(t);
         let left = h - t;
         let (n, length) = expand(motion, left, tolerance);
-        let event = motion.event(n, length);
-        let length = event.unwrap_or(length);
         // An event may be due at once.
-        if !(length.is_finite() && (length > 0.0 || event.is_some())) {
+        let (length, moves) = match motion.event(n, length) {
+            Some(event) => (event, event.is_finite()),
+            None => (length, length > 0.0 && length.is_finite()),
+        };
+        if !moves {
             return Err(StepError::NotFinite { time: begin + t });
         }
         t = if length == left { h } else { t + length };
