@@ -384,29 +384,36 @@ impl<M: Model, V: Version> Instance<M, V> {
     }
 
     /// Sets an input or a parameter; what follows from it has to be computed anew.
-    #[inline]
+    #[inline(always)]
     fn put(&mut self, scalar: &Scalar<M>, value: Value) {
         match (scalar.access, value) {
             (Access::Input(ramp), Value::Real(x)) => {
                 self.drop_past_slopes();
                 *ramp(&mut self.inputs, scalar.element)[0] = x;
             }
-            (_, Value::Real(x)) if V::SETS_STATES && scalar.state.is_some() => {
+            _ => self.put_any(scalar, value),
+        }
+        self.outputs = None;
+        if !self.is_running() {
+            self.model = None;
+        }
+    }
+
+    /// Sets a parameter, or a continuous state where a host may.
+    fn put_any(&mut self, scalar: &Scalar<M>, value: Value) {
+        match value {
+            Value::Real(x) if V::SETS_STATES && scalar.state.is_some() => {
                 if let (Some(model), Some(place)) = (&mut self.model, scalar.state()) {
                     self.scratch[0].copy_from_slice(model.continuous_states());
                     self.scratch[0][place] = x;
                     model.set_continuous_states(&self.scratch[0]);
                 }
             }
-            (_, value) => {
+            _ => {
                 if let Some(slot) = self.parameters.get_mut(scalar.slot) {
                     *slot = value;
                 }
             }
-        }
-        self.outputs = None;
-        if !self.is_running() {
-            self.model = None;
         }
     }
 
@@ -767,20 +774,37 @@ impl<M: Model, V: Version> Instance<M, V> {
     }
 
     /// As [`Instance::do_step`], for a host that is told of events, and where it allows so stops at the first.
+    #[inline(always)]
     pub fn step_to_event(&mut self, at: f64, h: f64, stops: bool) -> Result<StepInfo, Fault> {
         let call = self.check(V::DO_STEP)?;
-        let reported = self.events == Events::Reported;
+        if self.events != Events::Reported {
+            let step = |model: &mut M, inputs: &_| model.step(inputs, h).map(|()| StepEnd::End);
+            self.step_by(call, at, h, step)?;
+            return Ok(StepInfo { event: false, early: false });
+        }
+        self.step_reported(call, at, h, stops)
+    }
+
+    /// The same where the host is told of events.
+    fn step_reported(
+        &mut self,
+        call: &Call,
+        at: f64,
+        h: f64,
+        stops: bool,
+    ) -> Result<StepInfo, Fault> {
         let next_time = self.model.as_ref().and_then(M::next_time_event);
-        let end = self.step_by(call, at, h, |model, inputs| match stops && reported {
+        let end = self.step_by(call, at, h, |model, inputs| match stops {
             true => model.step_to_event(inputs, h),
             false => model.step(inputs, h).map(|()| StepEnd::End),
         })?;
         let sampled = self.model.as_ref().and_then(M::next_time_event) != next_time;
-        let event = reported && (end != StepEnd::End || sampled || self.hides_discrete(call)?);
+        let event = end != StepEnd::End || sampled || self.hides_discrete(call)?;
         Ok(StepInfo { event, early: matches!(end, StepEnd::Event(_)) })
     }
 
     /// What is wrong with a step from `at` on by `h`, whatever it finds on its way.
+    #[inline(always)]
     pub(crate) fn check_step(&self, call: &Call, at: f64, h: f64) -> Result<(), Fault> {
         if !(is_finite(h) && h > 0.0) {
             return Err(call.error(format_args!(

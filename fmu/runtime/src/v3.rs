@@ -26,7 +26,7 @@ use crate::c_abi::{
 };
 use crate::call::states::*;
 use crate::call::{CType, Call, Events, Fault, InstanceState, Interface, Severity};
-use crate::instance::Instance;
+use crate::instance::{Instance, StepInfo};
 use crate::log::Filter;
 use crate::model::Model;
 use crate::snapshot;
@@ -646,7 +646,7 @@ unsafe fn get<M: Model, T>(
     }
 }
 
-#[inline]
+#[inline(always)]
 fn value<M: Model>(
     component: &mut Component<M, Fmi3>,
     call: &Call,
@@ -1574,6 +1574,40 @@ unsafe fn intermediate_update<M: Model>(
     Ok(Wish { early_return: Some(at).filter(|_| requested != 0 && can_return) })
 }
 
+/// Where a step's answers go.
+#[derive(Clone, Copy)]
+struct Answers {
+    event: *mut fmi3Boolean,
+    terminate: *mut fmi3Boolean,
+    early: *mut fmi3Boolean,
+    last: *mut fmi3Float64,
+}
+
+impl Answers {
+    /// Answers as they are before the step, as far as there is a place for them; or which place is missing.
+    unsafe fn begin(&self, call: &Call, time: f64) -> Result<(), Fault> {
+        let Answers { event, terminate, early, last } = *self;
+        let flags = [
+            ("eventHandlingNeeded", event),
+            ("terminateSimulation", terminate),
+            ("earlyReturn", early),
+        ];
+        for (_, flag) in flags {
+            if let Some(flag) = unsafe { flag.as_mut() } {
+                *flag = 0;
+            }
+        }
+        if let Some(last) = unsafe { last.as_mut() } {
+            *last = time;
+        }
+        let flag = flags.iter().find(|(_, flag)| flag.is_null()).map(|(name, _)| *name);
+        match flag.or(last.is_null().then_some("lastSuccessfulTime")) {
+            Some(name) => Err(null(call, name)),
+            None => Ok(()),
+        }
+    }
+}
+
 /// One step. It may stop at an event where the host allows it; then, and where the host is told of events at its
 /// end, something discrete waits for event mode. `noSetFMUStatePriorToCurrentPoint` changes nothing here: no past is
 /// kept.
@@ -1587,103 +1621,117 @@ pub unsafe fn fmi3DoStep<M: Model>(
     earlyReturn: *mut fmi3Boolean,
     lastSuccessfulTime: *mut fmi3Float64,
 ) -> fmi3Status {
-    let call = Fmi3::DO_STEP;
-    let (at, mut h) = (currentCommunicationPoint, communicationStepSize);
-    let mut looks_in = false;
-    // The answers are there whatever follows, as far as there is a place for them.
-    let begun = unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
-            let places = [
-                ("eventHandlingNeeded", eventHandlingNeeded),
-                ("terminateSimulation", terminateSimulation),
-                ("earlyReturn", earlyReturn),
-            ];
-            let last = place(call, "lastSuccessfulTime", lastSuccessfulTime);
-            let mut missing = None;
-            for (name, pointer) in places {
-                match place(call, name, pointer) {
-                    Ok(place) => *place = 0,
-                    Err(fault) => missing = missing.or(Some(fault)),
-                }
-            }
-            match last {
-                Ok(place) => *place = component.instance.time(),
-                Err(fault) => missing = missing.or(Some(fault)),
-            }
-            missing.map_or(Ok(()), Err)?;
-            component.instance.check(call)?;
-            looks_in = component.host.intermediate_update.is_some();
-            Ok(())
-        })
+    let (at, h) = (currentCommunicationPoint, communicationStepSize);
+    let answers = Answers {
+        event: eventHandlingNeeded,
+        terminate: terminateSimulation,
+        early: earlyReturn,
+        last: lastSuccessfulTime,
     };
-    if begun != fmi3OK {
-        return begun;
-    }
-    if looks_in {
-        let checked = unsafe {
-            on::<M, Fmi3>(instance, call, |component| component.instance.check_step(call, at, h))
-        };
-        if checked != fmi3OK {
-            return checked;
-        }
-        let wish = match unsafe { intermediate_update::<M>(instance, at + h, Phase::Set) } {
-            Ok(wish) => wish,
-            Err(status) => return status,
-        };
-        let ramps = unsafe {
-            on::<M, Fmi3>(instance, call, |component| {
-                let Component { instance, host, .. } = component;
-                instance.ramp_to(call, &host.set, &host.ends, h)
-            })
-        };
-        if ramps != fmi3OK {
-            return ramps;
-        }
-        // Anywhere in the step; before it begins is at once, and so is NaN.
-        if let Some(time) = wish
-            .early_return
-            .filter(|time| !matches!(time.partial_cmp(&(at + h)), Some(Greater | Equal)))
-        {
-            h = time - at;
-            unsafe { *earlyReturn = 1 };
-            let moves = h > 0.0;
-            if !moves {
-                let drop_ramps = |component: &mut Component<M, Fmi3>| {
-                    component.instance.drop_ramps();
-                    Ok(())
-                };
-                return unsafe { on::<M, Fmi3>(instance, call, drop_ramps) };
-            }
-        }
-    }
+    let mut looks_in = false;
     let status = unsafe {
-        on::<M, Fmi3>(instance, call, |component| {
-            let before = component.instance.event_count();
-            let stops = component.host.early_return_allowed;
-            let step = component.instance.step_to_event(at, h, stops);
+        on::<M, Fmi3>(instance, Fmi3::DO_STEP, |component| {
+            answers.begin(Fmi3::DO_STEP, component.instance.time())?;
+            component.instance.check(Fmi3::DO_STEP)?;
+            looks_in = component.host.intermediate_update.is_some();
             if looks_in {
-                let Component { instance, host, .. } = component;
-                match &step {
-                    Ok(step) if !step.early && h == communicationStepSize => {
-                        instance.end_ramps(&host.set, &host.ends);
-                    }
-                    Ok(_) => {}
-                    Err(_) => instance.drop_ramps(),
-                }
+                return Ok(());
             }
-            let step = step?;
-            *eventHandlingNeeded = step.event.into();
-            *earlyReturn |= fmi3Boolean::from(step.early);
-            *lastSuccessfulTime = component.instance.time();
-            component.log.report_event(call, before, &component.instance);
-            component.log.report_step_warning(&component.instance);
+            let (before, stops) =
+                (component.instance.event_count(), component.host.early_return_allowed);
+            let step = component.instance.step_to_event(at, h, stops)?;
+            stepped(component, before, step, answers);
             Ok(())
         })
     };
     if status != fmi3OK || !looks_in {
         return status;
     }
-    let end = unsafe { *lastSuccessfulTime };
+    unsafe { step_looked_into::<M>(instance, at, h, answers) }
+}
+
+/// What is answered and told after a step, before which so many events had happened.
+#[inline(always)]
+unsafe fn stepped<M: Model>(
+    component: &mut Component<M, Fmi3>,
+    before: i32,
+    step: StepInfo,
+    answers: Answers,
+) {
+    let Component { instance, log, .. } = component;
+    unsafe {
+        *answers.event = step.event.into();
+        *answers.early |= fmi3Boolean::from(step.early);
+        *answers.last = instance.time();
+    }
+    log.report_event(Fmi3::DO_STEP, before, instance);
+    log.report_step_warning(instance);
+}
+
+/// A step of which the host is told where it begins, when it may set inputs for its end and wish to return earlier, and
+/// where it has ended.
+unsafe fn step_looked_into<M: Model>(
+    instance: fmi3Instance,
+    at: f64,
+    mut h: f64,
+    answers: Answers,
+) -> fmi3Status {
+    let (call, whole) = (Fmi3::DO_STEP, h);
+    let checked = unsafe {
+        on::<M, Fmi3>(instance, call, |component| component.instance.check_step(call, at, h))
+    };
+    if checked != fmi3OK {
+        return checked;
+    }
+    let wish = match unsafe { intermediate_update::<M>(instance, at + h, Phase::Set) } {
+        Ok(wish) => wish,
+        Err(status) => return status,
+    };
+    let ramps = unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            let Component { instance, host, .. } = component;
+            instance.ramp_to(call, &host.set, &host.ends, h)
+        })
+    };
+    if ramps != fmi3OK {
+        return ramps;
+    }
+    // Anywhere in the step; before it begins is at once, and so is NaN.
+    if let Some(time) = wish
+        .early_return
+        .filter(|time| !matches!(time.partial_cmp(&(at + h)), Some(Greater | Equal)))
+    {
+        h = time - at;
+        unsafe { *answers.early = 1 };
+        let moves = h > 0.0;
+        if !moves {
+            let drop_ramps = |component: &mut Component<M, Fmi3>| {
+                component.instance.drop_ramps();
+                Ok(())
+            };
+            return unsafe { on::<M, Fmi3>(instance, call, drop_ramps) };
+        }
+    }
+    let status = unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            let Component { instance, host, .. } = component;
+            let before = instance.event_count();
+            let step = instance.step_to_event(at, h, host.early_return_allowed);
+            match &step {
+                Ok(step) if !step.early && h == whole => {
+                    instance.end_ramps(&host.set, &host.ends);
+                }
+                Ok(_) => {}
+                Err(_) => instance.drop_ramps(),
+            }
+            stepped(component, before, step?, answers);
+            Ok(())
+        })
+    };
+    if status != fmi3OK {
+        return status;
+    }
+    let end = unsafe { *answers.last };
     match unsafe { intermediate_update::<M>(instance, end, Phase::Get) } {
         Ok(_) => fmi3OK,
         Err(status) => status,
