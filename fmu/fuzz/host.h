@@ -8,7 +8,7 @@ extern double host_slowest_allowed;
 
 /* What happened so far, over all inputs. */
 extern struct host_report {
-    unsigned long inputs, calls, accepted, messages;
+    unsigned long inputs, calls, accepted, errors, messages;
     /* of a single call, CPU time, s */
     double slowest;
     const char *slowest_call;
@@ -16,10 +16,13 @@ extern struct host_report {
 
 /* What the host knows of the FMU that it is linked with. */
 struct host_fmu {
-    const char *guid;
+    /* of FMI 2.0; the token of FMI 3.0 */
+    const char *guid, *token;
     /* scalar variables; the first of them are the outputs, reals */
     size_t variables, outputs;
     size_t states, indicators;
+    /* the value reference in FMI 3.0 of the first of three inputs at least, reals */
+    size_t inputs;
 };
 
 /* Turns the bytes into calls of the FMU; aborts with a sentence on what must not

@@ -4,7 +4,7 @@
  *   replay FMU… SLOWEST FILE…            # SLOWEST: seconds that one call may take
  *   replay FMU… SLOWEST --noise COUNT SEED
  *
- * FMU…: what `struct host_fmu` has, in its order: the GUID and four numbers. */
+ * FMU…: what `struct host_fmu` has, in its order: GUID, token and five numbers. */
 #include "host.h"
 
 #include <stdio.h>
@@ -22,26 +22,26 @@ static uint64_t next(uint64_t *state) {
 }
 
 int main(int count, char **arguments) {
-    if (count < 8) {
-        fprintf(stderr, "usage: replay GUID VARIABLES OUTPUTS STATES INDICATORS SLOWEST "
+    if (count < 10) {
+        fprintf(stderr, "usage: replay GUID TOKEN VARIABLES OUTPUTS STATES INDICATORS INPUTS SLOWEST "
                         "FILE… | --noise COUNT SEED\n");
         return 2;
     }
-    size_t sizes[4];
-    for (int n = 0; n < 4; n++)
-        sizes[n] = (size_t)atol(arguments[2 + n]);
-    struct host_fmu fmu = {arguments[1], sizes[0], sizes[1], sizes[2], sizes[3]};
-    host_slowest_allowed = atof(arguments[6]);
-    if (!strcmp(arguments[7], "--noise") && count == 10) {
-        uint64_t seed = strtoull(arguments[9], NULL, 10);
-        for (long n = atol(arguments[8]); n > 0; n--) {
+    size_t sizes[5];
+    for (int n = 0; n < 5; n++)
+        sizes[n] = (size_t)atol(arguments[3 + n]);
+    struct host_fmu fmu = {arguments[1], arguments[2], sizes[0], sizes[1], sizes[2], sizes[3], sizes[4]};
+    host_slowest_allowed = atof(arguments[8]);
+    if (!strcmp(arguments[9], "--noise") && count == 12) {
+        uint64_t seed = strtoull(arguments[11], NULL, 10);
+        for (long n = atol(arguments[10]); n > 0; n--) {
             size_t size = next(&seed) % 1000;
             for (size_t i = 0; i < size; i++)
                 bytes[i] = (uint8_t)next(&seed);
             host_run(&fmu, bytes, size);
         }
     } else {
-        for (int n = 7; n < count; n++) {
+        for (int n = 9; n < count; n++) {
             FILE *file = fopen(arguments[n], "rb");
             if (!file) {
                 perror(arguments[n]);
@@ -52,8 +52,8 @@ int main(int count, char **arguments) {
             host_run(&fmu, bytes, size);
         }
     }
-    printf("%lu inputs, %lu calls, %lu accepted, %lu messages, slowest %.3f s (%s)\n",
-           host_report.inputs, host_report.calls, host_report.accepted, host_report.messages,
+    printf("%lu inputs, %lu calls, %lu accepted, %lu errors, %lu messages, slowest %.3f s (%s)\n",
+           host_report.inputs, host_report.calls, host_report.accepted, host_report.errors, host_report.messages,
            host_report.slowest, host_report.slowest_call ? host_report.slowest_call : "none");
     return 0;
 }

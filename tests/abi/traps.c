@@ -3,23 +3,15 @@
  * with and without the gyro, in both interfaces, each in a process of its own; one line for each that
  * a trap has ended. A start that a model refuses is no fault.
  *
- *   traps LIBRARY GUID STATES INDICATORS SLOSH_MODELS FRICTION_MODELS NAME=REFERENCE... -- REFERENCE...
+ *   traps LIBRARY GUID STATES INDICATORS SLOSH_MODELS FRICTION_MODELS all|half NAME=REFERENCE... -- REFERENCE...
  *
- * SLOSH_MODELS and FRICTION_MODELS are how many items the two enumerations have. The names are those of `variables` below; the references after -- are all Reals, which are read.
- * The functions' types are the official headers'. */
+ * SLOSH_MODELS and FRICTION_MODELS are how many items the two enumerations have. The names are those of `variables` below;
+ * the references after -- are all Reals, which are read. Half: every second one, the others being the other version's of
+ * FMI (fmi.h), which handles events itself where it can. */
 #define _GNU_SOURCE
-#include <dlfcn.h>
-#include <fenv.h>
-#include <math.h>
+#include "fmi.h"
 #include <signal.h>
-#include <stdarg.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include <sys/wait.h>
-#include <unistd.h>
-
-#include "fmi2Functions.h"
 
 /* What the host sets, by name; the value references come from the model description. */
 enum {
@@ -31,11 +23,10 @@ static const char *const names[VARIABLES] = {
     "init.omega", "init.slosh_angle", "tank.r", "friction.c", "friction.d",
     "friction.b", "friction.sigma0", "tau_cmd", "g_axial",
 };
-static fmi2ValueReference variables[VARIABLES];
+static Reference variables[VARIABLES];
 
-static const char *guid;
 static size_t states, indicators;
-static fmi2ValueReference reals[1000];
+static Reference reals[1000];
 static size_t count;
 
 /* What a run starts from and how it is driven, besides the models. The friction sticks up to
@@ -59,27 +50,6 @@ static const struct scene scenes[] = {
 };
 static const char *const gyro_names[] = {"no gyro", "gyro", "gyro, quantised"};
 
-static void *library;
-#define CALL(name) ((name##TYPE *)dlsym(library, #name))
-#define MUST(call)                                                 \
-    do {                                                           \
-        if ((call) != fmi2OK) {                                    \
-            fprintf(stderr, "error: %s is not fmi2OK\n", #call);   \
-            _exit(2);                                              \
-        }                                                          \
-    } while (0)
-
-static void logger(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status,
-                   fmi2String category, fmi2String format, ...)
-{
-    va_list list;
-    (void)environment, (void)name, (void)status, (void)category;
-    va_start(list, format);
-    vfprintf(stderr, format, list);
-    va_end(list);
-    fputc('\n', stderr);
-}
-
 /* Ends the process with the kind of the exception. */
 static void trapped(int signal, siginfo_t *info, void *context)
 {
@@ -87,27 +57,17 @@ static void trapped(int signal, siginfo_t *info, void *context)
     _exit(info->si_code == FPE_FLTDIV ? 10 : info->si_code == FPE_FLTOVF ? 11 : 12);
 }
 
-static void real(fmi2Component c, int variable, double x)
+static void set(Instance c, char type, int variable, double value)
 {
-    MUST(CALL(fmi2SetReal)(c, &variables[variable], 1, &x));
-}
-static void integer(fmi2Component c, int variable, int x)
-{
-    MUST(CALL(fmi2SetInteger)(c, &variables[variable], 1, &x));
-}
-static void boolean(fmi2Component c, int variable, int x)
-{
-    MUST(CALL(fmi2SetBoolean)(c, &variables[variable], 1, &x));
+    MUST(set_value(c, type, variables[variable], value));
 }
 
-static void read_all(fmi2Component c)
+static void read_all(Instance c)
 {
     static double x[1000];
-    const double along = 1;
-    double answer[1];
-    MUST(CALL(fmi2GetReal)(c, reals, count, x));
-    /* the first Real is an output */
-    MUST(CALL(fmi2GetDirectionalDerivative)(c, reals, 1, &variables[TORQUE], 1, &along, answer));
+    double answer;
+    MUST(get_reals(c, reals, count, x));
+    MUST(derivative(c, reals[0], variables[TORQUE], &answer)); /* the first Real is an output */
 }
 
 static double torque(const struct scene *scene, int step)
@@ -117,68 +77,58 @@ static double torque(const struct scene *scene, int step)
     return step % 40 < 10 ? 0 : scene->torque * (step % 7 - 3) / 3;
 }
 
-static void stepping(fmi2Component c, const struct scene *scene)
+static void stepping(Instance c, const struct scene *scene)
 {
-    const int order = 1;
     double slope;
-    for (int n = 0; n < 300; n++) {
-        real(c, TORQUE, torque(scene, n));
-        MUST(CALL(fmi2DoStep)(c, 0.02 * n, 0.02, fmi2True));
+    for (int n = 0; n < 200; n++) {
+        set(c, 'R', TORQUE, torque(scene, n));
+        MUST(do_step(c, 0.02 * n, 0.02));
         read_all(c);
-        MUST(CALL(fmi2GetRealOutputDerivatives)(c, reals, 1, &order, &slope));
+        MUST(output_derivative(c, reals[0], &slope));
     }
-}
-
-static void events(fmi2Component c)
-{
-    fmi2EventInfo info;
-    do
-        MUST(CALL(fmi2NewDiscreteStates)(c, &info));
-    while (info.newDiscreteStatesNeeded);
-    MUST(CALL(fmi2EnterContinuousTimeMode)(c));
 }
 
 enum { MOST = 1000 };
 
 /* One step of the classical method: explicit Euler would feed the fast slosh modes. */
-static void runge_kutta(fmi2Component c, double t, double h, double *x)
+static void runge_kutta(Instance c, double t, double h, double *x)
 {
     static double k[4][MOST], there[MOST];
     static const double at[4] = {0, 0.5, 0.5, 1};
-    MUST(CALL(fmi2GetContinuousStates)(c, x, states));
+    MUST(get_states(c, x, states));
     for (int stage = 0; stage < 4; stage++) {
         for (size_t i = 0; i < states; i++)
             there[i] = x[i] + (stage ? h * at[stage] * k[stage - 1][i] : 0);
-        MUST(CALL(fmi2SetTime)(c, t + h * at[stage]));
-        MUST(CALL(fmi2SetContinuousStates)(c, there, states));
-        MUST(CALL(fmi2GetDerivatives)(c, k[stage], states));
+        MUST(set_time(c, t + h * at[stage]));
+        MUST(set_states(c, there, states));
+        MUST(get_rates(c, k[stage], states));
     }
     for (size_t i = 0; i < states; i++)
         x[i] += h / 6 * (k[0][i] + 2 * k[1][i] + 2 * k[2][i] + k[3][i]);
-    MUST(CALL(fmi2SetTime)(c, t + h));
-    MUST(CALL(fmi2SetContinuousStates)(c, x, states));
+    MUST(set_time(c, t + h));
+    MUST(set_states(c, x, states));
 }
 
-static void exchange(fmi2Component c, const struct scene *scene)
+static void exchange(Instance c, const struct scene *scene)
 {
     static double x[MOST], z[MOST], before[MOST];
     const double h = 1e-3;
     if (states > MOST || indicators > MOST)
         _exit(2);
-    events(c);
-    MUST(CALL(fmi2GetEventIndicators)(c, before, indicators));
-    for (int n = 1; n <= 2000; n++) {
-        fmi2Boolean event = fmi2False, end = fmi2False;
+    MUST(to_continuous_time(c));
+    MUST(get_indicators(c, before, indicators));
+    for (int n = 1; n <= 1200; n++) {
+        int event = 0;
         runge_kutta(c, h * (n - 1), h, x);
-        MUST(CALL(fmi2GetEventIndicators)(c, z, indicators));
-        MUST(CALL(fmi2CompletedIntegratorStep)(c, fmi2True, &event, &end));
+        MUST(get_indicators(c, z, indicators));
+        MUST(completed_step(c, &event));
         for (size_t i = 0; i < indicators; i++)
             event |= (z[i] > 0) != (before[i] > 0);
         if (event || n % 20 == 0) {
-            MUST(CALL(fmi2EnterEventMode)(c));
-            real(c, TORQUE, torque(scene, n / 20));
-            events(c);
-            MUST(CALL(fmi2GetEventIndicators)(c, z, indicators));
+            MUST(enter_event_mode(c));
+            set(c, 'R', TORQUE, torque(scene, n / 20));
+            MUST(to_continuous_time(c));
+            MUST(get_indicators(c, z, indicators));
         }
         if (n % 10 == 0)
             read_all(c);
@@ -186,47 +136,45 @@ static void exchange(fmi2Component c, const struct scene *scene)
     }
 }
 
-static void run(fmi2Type type, int slosh, int friction, int gyro, const struct scene *scene)
+static void run(int kind, int slosh, int friction, int gyro, const struct scene *scene)
 {
-    fmi2CallbackFunctions callbacks = {logger, calloc, free, NULL, NULL};
     struct sigaction action = {.sa_sigaction = trapped, .sa_flags = SA_SIGINFO};
-    fmi2Component c;
+    Instance c;
     sigaction(SIGFPE, &action, NULL);
     feenableexcept(FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW);
-    c = CALL(fmi2Instantiate)("traps", type, guid, "file:///nowhere", &callbacks, fmi2False, fmi2True);
+    shows_messages = 1;
+    c = instantiate(kind);
     if (!c)
         _exit(2);
-    integer(c, SLOSH, slosh);
-    integer(c, FRICTION, friction);
-    integer(c, MODES, scene->modes);
-    boolean(c, GYRO, gyro > 0);
-    boolean(c, WHEEL, scene->wheel);
-    real(c, LSB, gyro == 2 ? 1e-4 : 0);
-    real(c, OMEGA_0, scene->omega);
-    real(c, ANGLE_0, scene->angle);
-    real(c, RADIUS, scene->radius);
-    real(c, COULOMB, scene->coulomb);
-    real(c, STATIC, 0.7 * scene->coulomb);
-    real(c, VISCOUS, scene->viscous);
-    real(c, GRAVITY, scene->gravity);
-    if (type == fmi2ModelExchange) /* bristles that an explicit method can follow */
-        real(c, STIFFNESS, 1);
-    MUST(CALL(fmi2SetupExperiment)(c, fmi2False, 0, 0, fmi2False, 0));
-    MUST(CALL(fmi2EnterInitializationMode)(c));
-    if (CALL(fmi2ExitInitializationMode)(c) != fmi2OK)
+    set(c, 'E', SLOSH, slosh);
+    set(c, 'E', FRICTION, friction);
+    set(c, 'I', MODES, scene->modes);
+    set(c, 'B', GYRO, gyro > 0);
+    set(c, 'B', WHEEL, scene->wheel);
+    set(c, 'R', LSB, gyro == 2 ? 1e-4 : 0);
+    set(c, 'R', OMEGA_0, scene->omega);
+    set(c, 'R', ANGLE_0, scene->angle);
+    set(c, 'R', RADIUS, scene->radius);
+    set(c, 'R', COULOMB, scene->coulomb);
+    set(c, 'R', STATIC, 0.7 * scene->coulomb);
+    set(c, 'R', VISCOUS, scene->viscous);
+    set(c, 'R', GRAVITY, scene->gravity);
+    if (kind == MODEL_EXCHANGE) /* bristles that an explicit method can follow */
+        set(c, 'R', STIFFNESS, 1);
+    if (initialise(c, kind, 0, 0) != OK)
         _exit(3); /* a scene that a model refuses */
-    if (type == fmi2CoSimulation)
+    if (kind == CO_SIMULATION)
         stepping(c, scene);
     else
         exchange(c, scene);
-    MUST(CALL(fmi2Terminate)(c));
-    CALL(fmi2FreeInstance)(c);
+    MUST(terminate(c));
+    free_instance(c);
 }
 
 static void arguments(int argc, char **argv)
 {
-    int i = 7;
-    guid = argv[2];
+    int i = 8;
+    identity = argv[2];
     states = strtoul(argv[3], NULL, 10);
     indicators = strtoul(argv[4], NULL, 10);
     for (; i < argc && strcmp(argv[i], "--") != 0; i++) {
@@ -234,16 +182,16 @@ static void arguments(int argc, char **argv)
         for (int v = 0; value && v < VARIABLES; v++)
             if (strncmp(argv[i], names[v], (size_t)(value - argv[i])) == 0 &&
                 names[v][value - argv[i]] == '\0')
-                variables[v] = (fmi2ValueReference)strtoul(value + 1, NULL, 10);
+                variables[v] = (Reference)strtoul(value + 1, NULL, 10);
     }
     for (i++; i < argc && count < sizeof reals / sizeof *reals; i++)
-        reals[count++] = (fmi2ValueReference)strtoul(argv[i], NULL, 10);
+        reals[count++] = (Reference)strtoul(argv[i], NULL, 10);
 }
 
 int main(int argc, char **argv)
 {
-    int runs = 0, refused = 0, ended = 0;
-    if (argc < 8) {
+    int runs = 0, refused = 0, ended = 0, half;
+    if (argc < 9) {
         fprintf(stderr, "usage: see the beginning of traps.c\n");
         return 2;
     }
@@ -253,17 +201,23 @@ int main(int argc, char **argv)
         fprintf(stderr, "error: %s\n", dlerror());
         return 2;
     }
-    for (int type = 0; type <= 1; type++)
+#if FMI == 3
+    events_by_host = 1;
+#endif
+    half = strcmp(argv[7], "half") == 0;
+    for (int kind = 0; kind < KINDS; kind++)
         for (int slosh = 1; slosh <= atoi(argv[5]); slosh++)
             for (int friction = 1; friction <= atoi(argv[6]); friction++)
                 for (int gyro = 0; gyro < 3; gyro++)
                     for (size_t n = 0; n < sizeof scenes / sizeof *scenes; n++) {
                         int status = 0, code;
                         pid_t child;
+                        if (half && (kind + slosh + friction + gyro + (int)n) % 2 != FMI % 2)
+                            continue;
                         fflush(stdout);
                         child = fork();
                         if (child == 0) {
-                            run(type, slosh, friction, gyro, &scenes[n]);
+                            run(kind, slosh, friction, gyro, &scenes[n]);
                             _exit(0);
                         }
                         if (child < 0 || waitpid(child, &status, 0) != child)
@@ -276,7 +230,7 @@ int main(int argc, char **argv)
                         ended++;
                         code = WIFEXITED(status) ? WEXITSTATUS(status) : 0;
                         printf("%s, slosh.model %d, friction.model %d, %s, %s: %s\n",
-                               type == fmi2CoSimulation ? "Co-Simulation" : "Model Exchange",
+                               kind == CO_SIMULATION ? "Co-Simulation" : "Model Exchange",
                                slosh, friction, gyro_names[gyro], scenes[n].name,
                                code == 10   ? "division by zero"
                                : code == 11 ? "overflow"

@@ -1,4 +1,4 @@
-//! Any calls of the C interface with any arguments: bytes to the hostile host of `host.c`.
+//! Any calls of the C interface of either version with any arguments: bytes to the hostile host of `host.c`.
 
 // One call of a C function.
 #![allow(unsafe_code)]
@@ -13,17 +13,19 @@ use crate::sizes;
 #[repr(C)]
 struct HostFmu {
     guid: *const c_char,
-    sizes: [usize; 4],
+    token: *const c_char,
+    sizes: [usize; 5],
 }
 
 unsafe extern "C" {
-    /// Needs a description whose GUID ends with NUL, and as many bytes as said.
+    /// Needs a description whose GUID and token end with NUL, and as many bytes as said.
     fn host_run(fmu: *const HostFmu, data: *const u8, size: usize);
 }
 
 /// The FMU that this program is linked with must be that of the model.
 pub fn run<M: Model>(data: &[u8]) {
-    let guid = CString::new(M::table().guid()).expect("a GUID has no NUL");
-    let fmu = HostFmu { guid: guid.as_ptr(), sizes: sizes::<M>() };
+    let c_string = |text: &str| CString::new(text).expect("a GUID has no NUL");
+    let (guid, token) = (c_string(M::table().guid()), c_string(M::table().token()));
+    let fmu = HostFmu { guid: guid.as_ptr(), token: token.as_ptr(), sizes: sizes::<M>() };
     unsafe { host_run(&fmu, data.as_ptr(), data.len()) }
 }

@@ -9,11 +9,12 @@ pub mod states;
 pub mod values;
 
 use runtime::Model;
-use runtime::call::Call;
-use runtime::instance::Instance;
+use runtime::call::{Call, Fault, InstanceState};
+use runtime::instance::{Instance, StepInfo};
 use runtime::snapshot::{from_bytes, to_bytes};
 use runtime::table::Scalar;
-use runtime::v2::{Fmi2, GET_BOOLEAN, GET_INTEGER, GET_REAL, SET_BOOLEAN, SET_INTEGER, SET_REAL};
+use runtime::v2::{self, Fmi2};
+use runtime::v3::{self, Fmi3};
 use runtime::variable::{Access, Causality, Kind, Value};
 use runtime::version::Version;
 
@@ -33,30 +34,78 @@ pub fn run<M: Model>(data: &[u8]) {
     target(data);
 }
 
-/// What the hostile host knows of an FMU besides its GUID (`host.h`): the number of scalar
-/// variables, of outputs, of continuous states, of event indicators.
-pub fn sizes<M: Model>() -> [usize; 4] {
+/// What the hostile host knows of an FMU besides GUID and token (`host.h`): the number of scalar
+/// variables, of outputs, of continuous states, of event indicators; the first input's reference in FMI 3.0.
+pub fn sizes<M: Model>() -> [usize; 5] {
     let table = M::table();
     let is_output = |s: &&Scalar<M>| s.variable.causality == Causality::Output;
     let outputs = table.scalars.iter().take_while(is_output).count();
-    [table.scalars.len(), outputs, table.derivatives().len(), table.about.event_indicators]
+    let input = table.inputs().first().map_or(0, Fmi3::reference);
+    let states = table.derivatives().len();
+    [table.scalars.len(), outputs, states, table.about.event_indicators, input as usize]
 }
 
-/// The call that reads a variable of this type.
-fn getter<M: Model>(scalar: &Scalar<M>) -> &'static Call {
+/// The calls of a version of FMI that get and set values: of reals, integers, enumerations and Booleans.
+pub trait Values: Version {
+    /// Those that get.
+    const GET: [&'static Call; 4];
+    /// Those that set.
+    const SET: [&'static Call; 4];
+}
+
+impl Values for Fmi2 {
+    const GET: [&'static Call; 4] =
+        [&v2::GET_REAL, &v2::GET_INTEGER, &v2::GET_INTEGER, &v2::GET_BOOLEAN];
+    const SET: [&'static Call; 4] =
+        [&v2::SET_REAL, &v2::SET_INTEGER, &v2::SET_INTEGER, &v2::SET_BOOLEAN];
+}
+
+impl Values for Fmi3 {
+    const GET: [&'static Call; 4] =
+        [&v3::GET_FLOAT64, &v3::GET_INT32, &v3::GET_INT64, &v3::GET_BOOLEAN];
+    const SET: [&'static Call; 4] =
+        [&v3::SET_FLOAT64, &v3::SET_INT32, &v3::SET_INT64, &v3::SET_BOOLEAN];
+}
+
+/// Where a variable's call stands.
+fn place<M: Model>(scalar: &Scalar<M>) -> usize {
     match scalar.variable.kind {
-        Kind::Real(_) => &GET_REAL,
-        Kind::Integer { .. } | Kind::Enumeration(_) => &GET_INTEGER,
-        Kind::Boolean => &GET_BOOLEAN,
+        Kind::Real(_) => 0,
+        Kind::Integer { .. } => 1,
+        Kind::Enumeration(_) => 2,
+        Kind::Boolean => 3,
     }
 }
 
-/// A value's own call to set it.
-fn setter(value: Value) -> &'static Call {
-    match value {
-        Value::Real(_) => &SET_REAL,
-        Value::Integer(_) => &SET_INTEGER,
-        Value::Boolean(_) => &SET_BOOLEAN,
+/// Sets a variable.
+fn set<M: Model, V: Values>(
+    instance: &mut Instance<M, V>,
+    scalar: &Scalar<M>,
+    value: Value,
+) -> Result<(), Fault> {
+    instance.set(V::SET[place(scalar)], &[V::reference(scalar)], |_| value)
+}
+
+/// One step, which stops at an event if the instance's host is told of such; the host handles it then.
+fn step<M: Model, V: Version>(
+    instance: &mut Instance<M, V>,
+    at: f64,
+    h: f64,
+) -> Result<StepInfo, Fault> {
+    let info = instance.step_to_event(at, h, true)?;
+    if info.event {
+        instance.enter_event_mode().expect("a step has told of an event");
+        to_steps(instance);
+    }
+    Ok(info)
+}
+
+/// From event mode on, where steps follow.
+fn to_steps<M: Model, V: Version>(instance: &mut Instance<M, V>) {
+    if instance.state() == InstanceState::Event {
+        let next = instance.new_discrete_states().expect("in event mode").next_time;
+        assert!(next.is_none_or(|next| next > instance.time()), "the next event is in the past");
+        _ = instance.enter_step_mode(&v3::ENTER_STEP);
     }
 }
 
@@ -64,14 +113,14 @@ fn setter(value: Value) -> &'static Call {
 ///
 /// # Panics
 /// If not.
-fn everything_is_a_number<M: Model>(instance: &mut Instance<M, Fmi2>) {
+fn everything_is_a_number<M: Model, V: Values>(instance: &mut Instance<M, V>) {
     let shown = |scalar: &&Scalar<M>| {
         matches!(scalar.variable.causality, Causality::Output | Causality::Local)
             // these are read one by one from all states together: slow, and seen in the states
             && !matches!(scalar.variable.access, Access::Derivative(_))
     };
     for scalar in M::table().scalars.iter().filter(shown) {
-        match instance.get(getter(scalar), Fmi2::reference(scalar)) {
+        match instance.get(V::GET[place(scalar)], V::reference(scalar)) {
             Ok(Value::Real(x)) => assert!(x.is_finite(), "{} = {x}", scalar.name()),
             Ok(_) => {}
             Err(fault) => panic!("{}: {}", scalar.name(), fault.text),
@@ -83,7 +132,7 @@ fn everything_is_a_number<M: Model>(instance: &mut Instance<M, Fmi2>) {
 ///
 /// # Panics
 /// If not.
-fn survives_being_saved<M: Model>(instance: &Instance<M, Fmi2>) -> Instance<M, Fmi2> {
+fn survives_being_saved<M: Model, V: Version>(instance: &Instance<M, V>) -> Instance<M, V> {
     let bytes = to_bytes(instance);
     let again = from_bytes(&bytes).unwrap_or_else(|why| panic!("own bytes are refused: {why}"));
     assert!(to_bytes(&again) == bytes, "bytes that were read are written otherwise");

@@ -5,30 +5,39 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 
 use runtime::Model;
-use runtime::call::{InstanceState, Interface};
+use runtime::call::{Events, InstanceState, Interface};
 use runtime::hash::Hash;
 use runtime::instance::Instance;
 use runtime::snapshot::{from_bytes, to_bytes};
-use runtime::v2::{Fmi2, GET_REAL, SET_REAL};
+use runtime::v2::Fmi2;
+use runtime::v3::Fmi3;
 use runtime::variable::Value::{self, Boolean, Integer, Real};
 use runtime::version::Version;
 
-use crate::{everything_is_a_number, setter, survives_being_saved};
+use crate::{Values, everything_is_a_number, set, step, survives_being_saved, to_steps};
 
 /// Bytes of the checksum, at the end.
 const CHECKSUM: usize = 16;
 
-/// The bytes are: which state to start from; then patches, each a place (two bytes), a length
+/// The bytes are: which version of FMI and which state to start from; then patches, each a place (two bytes), a length
 /// (one byte) and that many bytes of new content. What is left over, or an odd first byte, is
 /// taken as a saved state by itself.
 pub fn run<M: Model>(data: &[u8]) {
-    let Some((which, mut patches)) = data.split_first() else { return };
+    let Some((which, patches)) = data.split_first() else { return };
     if *which == u8::MAX {
         _ = from_bytes::<M, Fmi2>(patches);
+        _ = from_bytes::<M, Fmi3>(patches);
         return;
     }
-    let bases = bases::<M>();
-    let mut bytes = bases[usize::from(*which) % bases.len()].clone();
+    match which % 2 {
+        0 => damaged::<M, Fmi2>(usize::from(which / 2), patches),
+        _ => damaged::<M, Fmi3>(usize::from(which / 2), patches),
+    }
+}
+
+fn damaged<M: Model, V: Values>(which: usize, mut patches: &[u8]) {
+    let bases = bases::<M, V>();
+    let mut bytes = bases[which % bases.len()].clone();
     let body = bytes.len() - CHECKSUM;
     while let [low, high, length, rest @ ..] = patches {
         let (content, rest) = rest.split_at(rest.len().min(usize::from(length % 9)));
@@ -40,19 +49,32 @@ pub fn run<M: Model>(data: &[u8]) {
     }
     let checksum = Hash::new().bytes(&bytes[..body]).value().to_le_bytes();
     bytes[body..].copy_from_slice(&checksum);
-    let Ok(read) = from_bytes::<M, Fmi2>(&bytes) else { return };
+    let Ok(read) = from_bytes::<M, V>(&bytes) else { return };
     let read = survives_being_saved(&read);
-    let mut instance = Instance::new(read.interface());
-    instance.restore(&read).expect("a state that could be read can be restored");
+    // An instance takes a state of one whose host handles events as its own does.
+    let mut instance = lives::<V>()
+        .filter(|(interface, _)| *interface == read.interface())
+        .map(|(interface, events)| Instance::with_events(interface, events))
+        .find_map(|mut instance| instance.restore(&read).is_ok().then_some(instance))
+        .expect("a state that could be read can be restored");
     live(&mut instance);
+}
+
+/// How hosts may use a version.
+fn lives<V: Version>() -> impl Iterator<Item = (Interface, Events)> {
+    let interfaces = [Interface::CoSimulation, Interface::ModelExchange].into_iter();
+    let all = interfaces.flat_map(|interface| {
+        [Events::InStep, Events::ByHost, Events::Reported].map(|events| (interface, events))
+    });
+    all.filter(|(interface, events)| V::allows(*interface, *events))
 }
 
 /// What a host may do next. Calls may be refused; after a step that succeeded everything is a
 /// number.
-fn live<M: Model>(instance: &mut Instance<M, Fmi2>) {
+fn live<M: Model, V: Values>(instance: &mut Instance<M, V>) {
     let table = M::table();
     for input in table.inputs() {
-        _ = instance.set(&SET_REAL, &[Fmi2::reference(input)], |_| Real(0.1));
+        _ = set(instance, input, Real(0.1));
     }
     if instance.state() == InstanceState::Instantiated {
         _ = instance.enter_initialization_mode();
@@ -61,13 +83,14 @@ fn live<M: Model>(instance: &mut Instance<M, Fmi2>) {
         _ = instance.exit_initialization_mode();
     }
     for n in 0..table.scalars.len() as u32 {
-        _ = instance.get(&GET_REAL, n);
+        _ = instance.get(V::GET[0], n);
         _ = instance.output_derivatives(&[n], &[1], &mut [0.0]);
     }
     match instance.interface() {
         Interface::CoSimulation => {
+            to_steps(instance);
             for h in [1e-3, 0.1] {
-                if instance.do_step(instance.time(), h).is_ok() {
+                if step(instance, instance.time(), h).is_ok() {
                     everything_is_a_number(instance);
                 }
             }
@@ -97,14 +120,14 @@ fn live<M: Model>(instance: &mut Instance<M, Fmi2>) {
 
 /// Both interfaces, every one of the model's [`settings`], every instance state that can be reached
 /// without an error.
-fn bases<M: Model>() -> &'static [Vec<u8>] {
-    static BASES: Mutex<BTreeMap<&str, &[Vec<u8>]>> = Mutex::new(BTreeMap::new());
+fn bases<M: Model, V: Values>() -> &'static [Vec<u8>] {
+    static BASES: Mutex<BTreeMap<[&str; 2], &[Vec<u8>]>> = Mutex::new(BTreeMap::new());
     let mut bases = BASES.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-    bases.entry(M::table().about.model).or_insert_with(|| {
+    bases.entry([M::table().about.model, V::PREFIX]).or_insert_with(|| {
         let mut all = Vec::new();
-        for interface in [Interface::CoSimulation, Interface::ModelExchange] {
+        for (interface, events) in lives::<V>() {
             for settings in settings(M::table().about.model) {
-                life_of::<M>(interface, &settings, &mut all);
+                life_of::<M, V>(interface, events, &settings, &mut all);
             }
         }
         all.leak()
@@ -112,11 +135,16 @@ fn bases<M: Model>() -> &'static [Vec<u8>] {
 }
 
 /// The saved states of one life.
-fn life_of<M: Model>(interface: Interface, settings: &[(&str, Value)], all: &mut Vec<Vec<u8>>) {
-    let mut instance = Instance::<M, Fmi2>::new(interface);
+fn life_of<M: Model, V: Values>(
+    interface: Interface,
+    events: Events,
+    settings: &[(&str, Value)],
+    all: &mut Vec<Vec<u8>>,
+) {
+    let mut instance = Instance::<M, V>::with_events(interface, events);
     for (name, value) in settings {
-        let reference = M::table().find(name).expect("the table has the variable");
-        instance.set(setter(*value), &[reference], |_| *value).expect("a good value");
+        let scalar = M::table().find(name).expect("the table has the variable");
+        set(&mut instance, &M::table().scalars[scalar as usize], *value).expect("a good value");
     }
     all.push(to_bytes(&instance));
     instance.setup_experiment(Some(1e-6), 1.0, Some(9.0)).expect("a good experiment");
@@ -125,7 +153,15 @@ fn life_of<M: Model>(interface: Interface, settings: &[(&str, Value)], all: &mut
     instance.exit_initialization_mode().expect("good parameters");
     all.push(to_bytes(&instance));
     match interface {
-        Interface::CoSimulation => instance.do_step(1.0, 0.5).expect("a good step"),
+        Interface::CoSimulation => {
+            to_steps(&mut instance);
+            instance.step_to_event(1.0, 0.5, true).expect("a good step");
+            if events == Events::Reported {
+                // With what waits for event mode, and in it.
+                all.push(to_bytes(&instance));
+                instance.enter_event_mode().expect("allowed");
+            }
+        }
         Interface::ModelExchange => {
             instance.enter_continuous_time_mode().expect("allowed");
         }
