@@ -323,11 +323,12 @@ fn enumeration_type(of: &Enumeration) -> EnumerationType {
 fn variable<M: Model>(scalar: &Scalar<M>) -> Variable {
     let v = scalar.variable;
     let (causality, initial) = match v.causality {
-        Causality::Input => ("input", "exact"),
-        Causality::Output => ("output", "calculated"),
-        Causality::Local => ("local", "calculated"),
-        Causality::Parameter => ("parameter", "exact"),
-        Causality::CalculatedParameter => ("calculatedParameter", "calculated"),
+        // That an input is exact is the default, and CasADi refuses to read it.
+        Causality::Input => ("input", None),
+        Causality::Output => ("output", Some("calculated")),
+        Causality::Local => ("local", Some("calculated")),
+        Causality::Parameter => ("parameter", Some("exact")),
+        Causality::CalculatedParameter => ("calculatedParameter", Some("calculated")),
     };
     let variability = match (v.causality, v.kind) {
         (Causality::Parameter, _) if v.tunable => "tunable",
@@ -341,7 +342,7 @@ fn variable<M: Model>(scalar: &Scalar<M>) -> Variable {
         description: v.description.into(),
         causality,
         variability,
-        initial: Some(initial),
+        initial,
         intermediate_update: has_intermediate_update(scalar).then_some(true),
         start: scalar.start().map(|value| match value {
             Value::Real(x) => real(x),
