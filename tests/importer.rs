@@ -162,3 +162,181 @@ fn model_exchange_gives_the_crate_fmi_the_bits_that_it_gives_us() {
     assert!(nominals.iter().all(|x| *x > 0.0));
     theirs.terminate().unwrap();
 }
+
+/// FMI 3.0 in the crate's hands, beside FMI 2.0 in ours.
+mod fmi3 {
+    use fmi::EventFlags;
+    use fmi::fmi3::import::Fmi3Import;
+    use fmi::fmi3::{CoSimulation, Common, Fmi3Model, GetSet, ModelExchange};
+    use host::description::{ModelDescription, Type};
+    use host::fmi2::MODEL_EXCHANGE;
+    use pack::{Fmi, HUBSLOSH, MODELS, Model, packed_model_for_tests, packed_version_for_tests};
+    use plant::{INDICATORS, STATES};
+
+    use super::{SPHERICAL, bits, started};
+
+    fn import(model: &Model) -> (Fmi3Import, ModelDescription) {
+        let packed = packed_version_for_tests(model, Fmi::V3);
+        (fmi::import::from_path(packed).unwrap(), ModelDescription::of_packed(packed).unwrap())
+    }
+
+    fn references(description: &ModelDescription, names: &[&str]) -> Vec<u32> {
+        names.iter().map(|name| description.variable(name).unwrap().reference).collect()
+    }
+
+    /// Through event mode; where there is none, nothing.
+    fn handle(instance: &mut impl Common) {
+        let mut flags = EventFlags::default();
+        instance.update_discrete_states(&mut flags).unwrap();
+        assert!(!flags.discrete_states_need_update && !flags.terminate_simulation);
+    }
+
+    /// A torque, or a pull on a tank, of a communication step.
+    fn input(model: &Model) -> (&'static str, f64) {
+        match model.name {
+            "HubSlosh" => ("tau_cmd", 0.05),
+            "Spacecraft" => ("force[1]", 20.0),
+            _ => ("a[1]", 0.1),
+        }
+    }
+
+    #[test]
+    fn co_simulation_of_fmi_3_gives_the_crate_fmi_the_bits_of_fmi_2_however_it_handles_events() {
+        for model in &MODELS {
+            let (import, description) = import(model);
+            let two = host::fmu::Fmu::open(packed_model_for_tests(model)).unwrap();
+            let outputs = description.variables.iter();
+            let outputs = outputs.filter(|v| v.causality == "output" && v.kind() == Type::Real);
+            let names: Vec<&str> = outputs.map(|v| v.name.as_str()).collect();
+            let outputs = references(&description, &names);
+            let ours_outputs = references(two.description(), &names);
+            let (name, amplitude) = input(model);
+            for (event_mode, early_return) in
+                [(false, false), (false, true), (true, false), (true, true)]
+            {
+                let mut ours = two.instantiate("ours").unwrap();
+                let mut theirs = import
+                    .instantiate_cs("theirs", false, true, event_mode, early_return, &[])
+                    .unwrap();
+                if model.name == "HubSlosh" {
+                    ours.set("slosh.model", &SPHERICAL.to_string()).unwrap();
+                    ours.set("imu.enabled", "true").unwrap();
+                    ours.set("imu.rate", "7").unwrap();
+                    let reference = |name| references(&description, &[name]);
+                    theirs.set_int64(&reference("slosh.model"), &[SPHERICAL.into()]).unwrap();
+                    theirs.set_boolean(&reference("imu.enabled"), &[true]).unwrap();
+                    theirs.set_float64(&reference("imu.rate"), &[7.0]).unwrap();
+                }
+                ours.enter_initialization_mode(None, 0.0, None).unwrap();
+                ours.exit_initialization_mode().unwrap();
+                Common::enter_initialization_mode(&mut theirs, None, 0.0, None).unwrap();
+                Common::exit_initialization_mode(&mut theirs).unwrap();
+                if event_mode {
+                    handle(&mut theirs);
+                    theirs.enter_step_mode().unwrap();
+                }
+                let mut returns = 0;
+                for n in 0..200 {
+                    let (at, h) = (f64::from(n) * 0.02, 0.02);
+                    let value = amplitude * f64::sin(0.3 * f64::from(n));
+                    ours.set_real(&references(two.description(), &[name]), &[value]).unwrap();
+                    ours.do_step(at, h).unwrap();
+                    theirs.set_float64(&references(&description, &[name]), &[value]).unwrap();
+                    let (mut from, end) = (at, at + h);
+                    loop {
+                        let (mut event, mut over, mut early) = (true, true, true);
+                        let mut last = f64::NAN;
+                        let length = if from == at { h } else { end - from };
+                        theirs
+                            .do_step(
+                                from, length, true, &mut event, &mut over, &mut early, &mut last,
+                            )
+                            .unwrap();
+                        assert!(!over && (event_mode || !event) && (early_return || !early));
+                        if event {
+                            theirs.enter_event_mode().unwrap();
+                            handle(&mut theirs);
+                            theirs.enter_step_mode().unwrap();
+                        }
+                        if !early {
+                            assert_eq!(last, end);
+                            break;
+                        }
+                        returns += 1;
+                        from = last;
+                    }
+                    let (mut a, mut b) = (vec![0.0; outputs.len()], vec![0.0; outputs.len()]);
+                    theirs.get_float64(&outputs, &mut a).unwrap();
+                    ours.get_real(&ours_outputs, &mut b).unwrap();
+                    assert_eq!(bits(&a), bits(&b), "{}, step {n}", model.name);
+                }
+                assert_eq!(
+                    returns > 20,
+                    model.name == "HubSlosh" && event_mode && early_return,
+                    "{} early returns",
+                    returns
+                );
+                Common::terminate(&mut theirs).unwrap();
+            }
+        }
+    }
+
+    #[test]
+    fn model_exchange_of_fmi_3_gives_the_crate_fmi_the_bits_of_fmi_2() {
+        let (import, description) = import(HUBSLOSH);
+        let two = host::fmi2::Fmu::open(packed_model_for_tests(HUBSLOSH)).unwrap();
+        let mut ours = started(&two, MODEL_EXCHANGE);
+        let mut theirs = import.instantiate_me("theirs", false, true).unwrap();
+        let names = super::START.map(|(name, _)| name);
+        let values = super::START.map(|(_, value)| value);
+        theirs.set_float64(&references(&description, &names), &values).unwrap();
+        let model = references(&description, &["slosh.model"]);
+        theirs.set_int64(&model, &[SPHERICAL.into()]).unwrap();
+        Common::enter_initialization_mode(&mut theirs, Some(1e-9), 0.0, Some(100.0)).unwrap();
+        Common::exit_initialization_mode(&mut theirs).unwrap();
+        handle(&mut theirs);
+        ours.new_discrete_states().unwrap();
+        ModelExchange::enter_continuous_time_mode(&mut theirs).unwrap();
+        ours.enter_continuous_time_mode().unwrap();
+        assert_eq!(ModelExchange::get_number_of_continuous_states(&mut theirs).unwrap(), STATES);
+        assert_eq!(ModelExchange::get_number_of_event_indicators(&mut theirs).unwrap(), INDICATORS);
+        let (mut x, mut y) = ([0.0; STATES], [0.0; STATES]);
+        let (mut dx, mut dy) = ([0.0; STATES], [0.0; STATES]);
+        let (mut z, mut w) = ([0.0; INDICATORS], [0.0; INDICATORS]);
+        for n in 1..=1000 {
+            let time = f64::from(n) * 1e-3;
+            ModelExchange::get_continuous_states(&mut theirs, &mut x).unwrap();
+            ours.continuous_states(&mut y).unwrap();
+            ModelExchange::get_continuous_state_derivatives(&mut theirs, &mut dx).unwrap();
+            ours.derivatives(&mut dy).unwrap();
+            ModelExchange::get_event_indicators(&mut theirs, &mut z).unwrap();
+            ours.event_indicators(&mut w).unwrap();
+            assert_eq!(
+                (bits(&x), bits(&dx), bits(&z)),
+                (bits(&y), bits(&dy), bits(&w)),
+                "step {n}"
+            );
+            for (x, dx) in x.iter_mut().zip(dx) {
+                *x += 1e-3 * dx;
+            }
+            ModelExchange::set_time(&mut theirs, time).unwrap();
+            ours.set_time(time).unwrap();
+            ModelExchange::set_continuous_states(&mut theirs, &x).unwrap();
+            ours.set_continuous_states(&x).unwrap();
+            let (mut event, mut end) = (false, false);
+            ModelExchange::completed_integrator_step(&mut theirs, true, &mut event, &mut end)
+                .unwrap();
+            assert_eq!(ours.completed_integrator_step().unwrap().0, event, "step {n}");
+            assert!(!end);
+            if event {
+                Common::enter_event_mode(&mut theirs).unwrap();
+                handle(&mut theirs);
+                ModelExchange::enter_continuous_time_mode(&mut theirs).unwrap();
+                ours.enter_event_mode().unwrap();
+                ours.new_discrete_states().unwrap();
+                ours.enter_continuous_time_mode().unwrap();
+            }
+        }
+        Common::terminate(&mut theirs).unwrap();
+    }
+}

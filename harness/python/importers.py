@@ -1,24 +1,34 @@
-"""What others say of the packed FMU: XML schema, fmpy's validation, fmutool, FMI Library.
+"""What others say of the packed FMU: XML schema, fmpy's validation, fmutool, FMI Library, CasADi.
 
-As a program: ``python importers.py dist/HubSlosh.fmu``; leaves with 1 when anybody finds anything.
+As a program: ``python importers.py dist/HubSlosh.fmu``; leaves with 1 when anybody finds anything. An
+FMU of FMI 3.0 is shown to CasADi in place of FMI Library, which reads FMI 2.0 here.
 ``.ci/importers`` makes the environment (requirements-importers.txt) and calls it.
 """
 
 import subprocess
 import sys
+import tempfile
 import zipfile
 from pathlib import Path
 
+import casadi
 import fmpy
-from fmpy import simulate_fmu
+import numpy as np
+from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 from lxml import etree
 
 
+def version_of(fmu: Path) -> int:
+    """Return 2 or 3."""
+    return int(read_model_description(str(fmu), validate=False).fmiVersion[0])
+
+
 def schema_findings(fmu: Path) -> list[str]:
-    """Return what the schema of FMI 2.0, as fmpy carries it, finds in modelDescription.xml."""
-    folder = Path(fmpy.__file__).parent / "schema" / "fmi2"
-    schema = etree.XMLSchema(etree.parse(str(folder / "fmi2ModelDescription.xsd")))
+    """Return what the schema of its FMI, as fmpy carries it, finds in modelDescription.xml."""
+    name = f"fmi{version_of(fmu)}"
+    folder = Path(fmpy.__file__).parent / "schema" / name
+    schema = etree.XMLSchema(etree.parse(str(folder / f"{name}ModelDescription.xsd")))
     with zipfile.ZipFile(fmu) as archive:
         document = etree.fromstring(archive.read("modelDescription.xml"))
     schema.validate(document)
@@ -47,7 +57,11 @@ def fmutool_findings(fmu: Path) -> list[str]:
     )
     said = [line.strip() for line in (done.stdout + done.stderr).splitlines() if line.strip()]
     # Each check ends with one sentence of its own when it has found nothing.
-    well = ("seems to be compliant with FMI-2.0", "No semantic error against the FMI-2 standard")
+    version = version_of(fmu)
+    well = (
+        f"seems to be compliant with FMI-{version}.0",
+        f"No semantic error against the FMI-{version} standard",
+    )
     findings = [line for line in said if not line.startswith("INFO")]
     findings += [f'does not say "{words}"' for words in well if words not in done.stdout]
     return findings if done.returncode == 0 else [*said, f"ended with {done.returncode}"]
@@ -76,6 +90,47 @@ sys.exit(not run.step(50))
     return said if done.returncode == 0 else [*said, f"ended with {done.returncode}"]
 
 
+def casadi_findings(fmu: Path) -> list[str]:
+    """Return where CasADi's Model Exchange fails, or the FMU's Jacobians are not the slopes."""
+    name = read_model_description(str(fmu)).modelName
+    with tempfile.TemporaryDirectory() as folder:
+        with zipfile.ZipFile(fmu) as archive:
+            archive.extractall(folder)
+        try:
+            dae = casadi.DaeBuilder(name, folder, {})
+            function = dae.create("f", ["x", "u"], ["ode", "y"])
+            jacobians = function.factory(
+                "jacobians", ["x", "u"], ["jac:ode:x", "jac:ode:u", "jac:y:u"]
+            )
+        except RuntimeError as error:
+            return [str(error)]
+        # CasADi has no start of states that parameters make, such as unit vectors: fmpy has.
+        start = simulate_fmu(str(fmu), fmi_type="ModelExchange", stop_time=0.01, output=dae.x())
+        x, u = (np.array(list(start[0])[1:]), np.array(dae.start(dae.u())).ravel())
+        found = [np.array(part) for part in jacobians(x, u)]
+        step = 1e-6
+
+        def slopes(of: int, by: int) -> np.ndarray:
+            columns = []
+            for n in range(len((x, u)[by])):
+                ends = []
+                for side in (1, -1):
+                    point = [x.copy(), u.copy()]
+                    point[by][n] += side * step
+                    ends.append(np.array(function(*point)[of]).ravel())
+                columns.append((ends[0] - ends[1]) / (2 * step))
+            return np.array(columns).T
+
+        findings = []
+        which = [("dx'/dx", 0, 0), ("dx'/du", 0, 1), ("dy/du", 1, 1)]
+        for jacobian, (words, of, by) in zip(found, which, strict=True):
+            expected = slopes(of, by)
+            difference = np.abs(jacobian - expected).max() / max(1.0, np.abs(expected).max())
+            if not difference < 1e-6:
+                findings.append(f"{words} differs from central differences by {difference:.1e}")
+        return findings
+
+
 def main() -> None:
     """Ask all, show what they find."""
     if len(sys.argv) != 2:
@@ -83,12 +138,16 @@ def main() -> None:
     fmu = Path(sys.argv[1])
     if not fmu.is_file():
         sys.exit(f"error: there is no file {fmu}; cargo run --release -- pack")
+    version = version_of(fmu)
     asked = {
-        "XML schema of FMI 2.0": schema_findings,
+        f"XML schema of FMI {version}.0": schema_findings,
         f"fmpy {fmpy.__version__}": fmpy_findings,
         "fmutool": fmutool_findings,
-        "FMI Library": fmi_library_findings,
     }
+    if version == 2:
+        asked["FMI Library"] = fmi_library_findings
+    else:
+        asked[f"CasADi {casadi.__version__}"] = casadi_findings
     count = 0
     for who, findings_of in asked.items():
         findings = findings_of(fmu)
