@@ -1,7 +1,7 @@
 """What others say of the packed FMU: XML schema, fmpy's validation, fmutool, FMI Library, CasADi.
 
-As a program: ``python importers.py dist/HubSlosh.fmu``; leaves with 1 when anybody finds anything. An
-FMU of FMI 3.0 is shown to CasADi in place of FMI Library, which reads FMI 2.0 here.
+As a program: ``python importers.py dist/HubSlosh.fmu``; leaves with 1 when anybody finds anything.
+An FMU of FMI 3.0 is shown to CasADi in place of FMI Library, which reads FMI 2.0 here.
 ``.ci/importers`` makes the environment (requirements-importers.txt) and calls it.
 """
 

@@ -321,3 +321,29 @@ fn a_step_with_too_much_work_is_discarded_and_a_shorter_one_goes_on() {
     assert_eq!(to_bytes(&three), before);
     three.step_to_event(0.0, 0.1, false).unwrap();
 }
+
+#[test]
+fn reset_is_a_fresh_instance_however_events_are_handled() {
+    for events in [Events::InStep, Events::Reported] {
+        let fresh: Three = Instance::with_events(Interface::CoSimulation, events);
+        let mut three: Three = initialised(events, LIVELY);
+        if events == Events::Reported {
+            handle(&mut three);
+        }
+        set(&mut three, "tau_cmd", Value::Real(0.03));
+        three.step_to_event(0.0, 1.0, true).unwrap();
+        assert!(to_bytes(&three) != to_bytes(&fresh));
+        three.reset().unwrap();
+        assert!(to_bytes(&three) == to_bytes(&fresh), "{events:?}");
+    }
+}
+
+#[test]
+fn states_are_set_in_no_mode_of_co_simulation() {
+    let mut three: Three = initialised(Events::Reported, LIVELY);
+    let omega = [reference::<Fmi3>("omega")];
+    assert_eq!(three.state(), InstanceState::Event);
+    assert!(three.set(&v3::SET_FLOAT64, &omega, |_| Value::Real(0.1)).is_err());
+    handle(&mut three);
+    assert!(three.set(&v3::SET_FLOAT64, &omega, |_| Value::Real(0.1)).is_err());
+}

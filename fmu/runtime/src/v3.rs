@@ -2363,4 +2363,72 @@ mod tests {
             fmi3FreeInstance::<Spring>(ptr::null_mut());
         }
     }
+
+    #[test]
+    fn times_come_with_initialization_and_those_that_are_not_defined_may_be_nan() {
+        let host = Mutex::new(TestHost::default());
+        unsafe {
+            let instance = fmi3InstantiateCoSimulation::<Spring>(
+                c"one".as_ptr(),
+                token().as_ptr(),
+                ptr::null(),
+                0,
+                0,
+                0,
+                0,
+                ptr::null(),
+                0,
+                ptr::from_ref(&host).cast_mut().cast(),
+                Some(log),
+                None,
+            );
+            let begin = |tolerance, at, stop_defined, stop| {
+                fmi3EnterInitializationMode::<Spring>(
+                    instance,
+                    0,
+                    tolerance,
+                    at,
+                    stop_defined,
+                    stop,
+                )
+            };
+            assert_eq!(begin(f64::NAN, 2.0, 1, 1.0), fmi3Error, "it stops before it starts");
+            assert_eq!(fmi3Reset::<Spring>(instance), fmi3OK);
+            assert_eq!(begin(f64::NAN, 2.0, 1, 3.0), fmi3OK);
+            assert_eq!(fmi3ExitInitializationMode::<Spring>(instance), fmi3OK);
+            assert_eq!(step(instance, 2.0, 1.0), (fmi3OK, false, 3.0));
+            assert_eq!(step(instance, 3.0, 0.1).0, fmi3Error, "past the stop time");
+            assert_eq!(fmi3Reset::<Spring>(instance), fmi3OK);
+            assert_eq!(begin(f64::NAN, -1.0, 0, f64::NAN), fmi3OK);
+            assert_eq!(fmi3ExitInitializationMode::<Spring>(instance), fmi3OK);
+            assert_eq!(step(instance, -1.0, 5.0), (fmi3OK, false, 4.0));
+            fmi3FreeInstance::<Spring>(instance);
+        }
+    }
+
+    /// fmusim 0.8 asks in continuous-time mode, where the standard's table has neither.
+    #[test]
+    fn fmusim_may_ask_for_the_numbers_of_states_and_indicators_in_continuous_time_mode() {
+        let host = Mutex::new(TestHost::default());
+        unsafe {
+            let instance = fmi3InstantiateModelExchange::<Spring>(
+                c"one".as_ptr(),
+                token().as_ptr(),
+                ptr::null(),
+                0,
+                0,
+                ptr::from_ref(&host).cast_mut().cast(),
+                Some(log),
+            );
+            fmi3EnterInitializationMode::<Spring>(instance, 0, 0.0, 0.0, 0, 0.0);
+            fmi3ExitInitializationMode::<Spring>(instance);
+            assert_eq!(fmi3EnterContinuousTimeMode::<Spring>(instance), fmi3OK);
+            let mut count = 9;
+            assert_eq!(fmi3GetNumberOfContinuousStates::<Spring>(instance, &mut count), fmi3OK);
+            assert_eq!(count, 2);
+            assert_eq!(fmi3GetNumberOfEventIndicators::<Spring>(instance, &mut count), fmi3OK);
+            assert_eq!(count, 0);
+            fmi3FreeInstance::<Spring>(instance);
+        }
+    }
 }
