@@ -69,8 +69,11 @@ impl Sweep {
         }
     }
 
-    /// Lowest and highest frequency, Hz.
+    /// Lowest and highest frequency, Hz; of a sweep that begins at 0 Hz the lowest is that at the end of its first cycle, √(2 f1/T).
     pub fn band(&self) -> (f64, f64) {
+        if self.f0 == 0.0 {
+            return ((2.0 * self.f1 / self.duration).sqrt().min(self.f1), self.f1);
+        }
         (self.f0.min(self.f1), self.f0.max(self.f1))
     }
 }

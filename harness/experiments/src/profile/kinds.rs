@@ -110,31 +110,40 @@ const fn time(name: &'static str, default: f64, label: &'static str) -> Paramete
     parameter(name, default, "s", label, Allowed::NotNegative)
 }
 
-/// Both sweeps.
-const SWEEP: &[Parameter] = &[
-    parameter("amplitude", Sweep::THESIS.amplitude, "N·m", "torque amplitude", Allowed::NotZero),
-    parameter("f0", Sweep::THESIS.f0, "Hz", "first frequency", Allowed::Positive),
-    parameter("f1", Sweep::THESIS.f1, "Hz", "last frequency", Allowed::Positive),
-    duration(Sweep::THESIS.duration),
-];
-const SWEEPS: &[Demand] = &[(|v| v.of("f0") != v.of("f1"), "f0 and f1 are equal; use sine"), BAND];
+/// A sweep from a first frequency of which this is allowed.
+const fn sweep_from(first: Allowed) -> [Parameter; 4] {
+    [
+        parameter(
+            "amplitude",
+            Sweep::THESIS.amplitude,
+            "N·m",
+            "torque amplitude",
+            Allowed::NotZero,
+        ),
+        parameter("f0", Sweep::THESIS.f0, "Hz", "first frequency", first),
+        parameter("f1", Sweep::THESIS.f1, "Hz", "last frequency", Allowed::Positive),
+        duration(Sweep::THESIS.duration),
+    ]
+}
+/// No sweep stays where it is.
+const MOVES: Demand = (|v| v.of("f0") != v.of("f1"), "f0 and f1 are equal; use sine");
 /// Beyond it a phase has no digit left that its sine depends on.
 const BAND: Demand = (
     |v| ["f0", "f1"].iter().all(|name| (1.0 / FREQUENCY..=FREQUENCY).contains(&v.of(name))),
     "f0 and f1 must be from 1e-9 to 1e9 Hz",
 );
 
-/// Of noise, which may begin at 0 Hz.
-const NOISE_BAND: [Demand; 2] = [
-    (|v| v.of("f0") < v.of("f1"), "it expects f0 < f1"),
-    (
-        |v| {
-            let (f0, f1) = (v.of("f0"), v.of("f1"));
-            (f0 == 0.0 || f0 >= 1.0 / FREQUENCY) && (1.0 / FREQUENCY..=FREQUENCY).contains(&f1)
-        },
-        "f0 must be 0 or, as f1, from 1e-9 to 1e9 Hz",
-    ),
-];
+/// Of what may begin at 0 Hz.
+const BAND_FROM_ZERO: Demand = (
+    |v| {
+        let band = 1.0 / FREQUENCY..=FREQUENCY;
+        let (f0, f1) = (v.of("f0"), v.of("f1"));
+        (f0 == 0.0 || band.contains(&f0)) && band.contains(&f1)
+    },
+    "f0 must be 0 or, as f1, from 1e-9 to 1e9 Hz",
+);
+const NOISE_BAND: [Demand; 2] =
+    [(|v| v.of("f0") < v.of("f1"), "it expects f0 < f1"), BAND_FROM_ZERO];
 
 fn noise(v: &Values, limit: f64) -> Noise {
     let band = (v.of("f0"), v.of("f1"));
@@ -155,15 +164,15 @@ pub const KINDS: &[Kind] = &[
     Kind {
         name: "exp-sweep",
         says: "A sin φ, φ = 2π f0 (e^(at) - 1)/a, a = ln(f1/f0)/duration: a sine whose frequency changes exponentially from f0 to f1, upwards or downwards (thesis 5.1.4)",
-        parameters: SWEEP,
-        demands: SWEEPS,
+        parameters: &sweep_from(Allowed::Positive),
+        demands: &[MOVES, BAND],
         shape: |v| sweep(v, Law::Exponential),
     },
     Kind {
         name: "lin-sweep",
         says: "A sin φ, φ = 2π (f0 t + s t²/2), s = (f1 - f0)/duration: a sine whose frequency changes linearly in time",
-        parameters: SWEEP,
-        demands: SWEEPS,
+        parameters: &sweep_from(Allowed::NotNegative),
+        demands: &[MOVES, BAND_FROM_ZERO],
         shape: |v| sweep(v, Law::Linear),
     },
     Kind {

@@ -422,15 +422,29 @@ mod tests {
         }
     }
 
+    /// φ = π f1 t²/T: with 4 Hz and 8 s a quarter cycle by t = 1 s, the first whole one by 2 s, at 1 Hz.
+    #[test]
+    fn a_linear_sweep_begins_at_zero_hertz() {
+        let profile: Profile = "lin-sweep:amplitude=2,f0=0,f1=4,duration=8".parse().unwrap();
+        let torque = Torque::Profile(profile.clone());
+        for (t, tau) in [(0.0, 0.0), (1.0, 2.0), (2f64.sqrt(), 0.0), (2.0, 0.0)] {
+            assert!((torque.at(t) - tau).abs() < 1e-14, "{t} s");
+        }
+        assert_eq!(profile.band(), Some((1.0, 4.0)));
+        assert_eq!(profile.to_string().parse::<Profile>().unwrap(), profile);
+    }
+
     #[test]
     fn wrong_profiles_are_refused_with_what_there_is() {
         for (text, word) in [
             ("exp-swep:f0=1", "did you mean \"exp-sweep\""),
             ("sine:freq=2", "it has amplitude, frequency, duration"),
             ("sine:frequency=2,frequency=3", "frequency is given twice"),
-            ("lin-sweep:f0=0,duration=0", "f0 must be positive; duration must be positive"),
+            ("exp-sweep:f0=0,duration=0", "f0 must be positive; duration must be positive"),
+            ("lin-sweep:f0=-1", "f0 must not be negative"),
+            ("lin-sweep:f0=1,f1=0", "f1 must be positive"),
             ("exp-sweep:f0=1e-320", "f0 and f1 must be from 1e-9 to 1e9 Hz"),
-            ("lin-sweep:f1=1e300", "f0 and f1 must be from 1e-9 to 1e9 Hz"),
+            ("lin-sweep:f1=1e300", "f0 must be 0 or, as f1, from 1e-9 to 1e9 Hz"),
             ("noise:f0=1e-300", "f0 must be 0 or, as f1, from 1e-9 to 1e9 Hz"),
             ("sine:frequency=1e308", "frequency must be from -1000000000 to 1000000000"),
             ("exp-sweep:amplitude=0", "amplitude must not be 0"),
