@@ -267,7 +267,7 @@ def make_runs_in(
     missing = []
     for run in todo["runs"]:
         path = harness.out / run["file"]
-        why = why_not_stored(path, run, columns) if path.exists() else ""
+        why = why_not_stored(path, run, todo["kept"]) if path.exists() else ""
         if why is None and folder.is_damaged(run["file"]):
             why = f"its SHA-256 is not that in {folder.manifest.name}"
         if why:

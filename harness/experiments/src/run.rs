@@ -259,6 +259,22 @@ impl Run {
         Ok(instance)
     }
 
+    /// These columns and, after them, what else must be recorded because something `needs` it; what is driven is in the table anyway.
+    pub fn columns_with<'n>(
+        &self,
+        columns: &[&'n str],
+        needs: impl IntoIterator<Item = &'n str>,
+    ) -> Vec<&'n str> {
+        let driven = self.driven();
+        let mut all = columns.to_vec();
+        for name in needs {
+            if !all.contains(&name) && driven.iter().all(|(driven, _)| *driven != name) {
+                all.push(name);
+            }
+        }
+        all
+    }
+
     /// Steps an initialised instance to the stop time. The table has `time`, the driven inputs and
     /// the variables `columns` at every communication point. `progress` hears how many steps were
     /// made since it was last called.

@@ -124,18 +124,8 @@ impl RunArgs {
         // read along, to say at the end whether the model still meant something
         let range = Range::of(description, &mut instance)?;
         let sensors = Sensors::new(&self.sensors, description, &run.settings, run.step)?;
-        let driven: Vec<&str> = run
-            .input
-            .iter()
-            .chain(run.others.iter().map(|(name, _)| name))
-            .map(String::as_str)
-            .collect();
-        let mut columns = columns;
-        for name in range.as_ref().map(|_| WAVE).into_iter().chain(sensors.needs()) {
-            if !columns.contains(&name) && !driven.contains(&name) {
-                columns.push(name);
-            }
-        }
+        let wave = range.as_ref().map(|_| WAVE);
+        let columns = run.columns_with(&columns, wave.into_iter().chain(sensors.needs()));
         // the table, its copy for --columns, and what is written: 25 characters for a number
         let all = columns.len() + sensors.columns().len();
         guard::allow((run.steps() * (all + 3) * 50) as u64);
@@ -171,11 +161,8 @@ impl RunArgs {
             .flatten()
             .collect();
         let driven = table.names().len() - columns.len();
-        let kept = table.names()[..driven + asked].to_vec();
-        let kept: Vec<String> = kept.into_iter().chain(sensors.columns()).collect();
-        let kept: Vec<&str> = kept.iter().map(String::as_str).collect();
-        let table = sensors.read(table, "run", run.step)?;
-        write_out(&table.only(&kept), &self.out, &notes)?;
+        let table = sensors.recorded(table, driven + asked, "run", run.step)?;
+        write_out(&table, &self.out, &notes)?;
         for how in beyond {
             terminal::warn(format_args!("the run left the range of its model: {how}"));
         }

@@ -152,13 +152,14 @@ fn the_runs_of_a_plan_with_sensors_have_their_readings_and_are_reused() {
     let plan = "profile = \"sine:duration=2\"\n[vary]\nprofile.amplitude = [0.05, 0.1]\n\
         [sensor]\nwave = \"gauge:rate=25,noise=0.2mm\"\nload = \"force:noise=0.01\"\n";
     std::fs::write(directory.join("plan.toml"), plan).unwrap();
-    let run = || {
+    let run = |out: &str, more: &[&str]| {
         let program = env!("CARGO_BIN_EXE_hubslosh");
-        let flags = ["campaign", "--plan", "plan.toml", "--out", "c", "--fmu"];
+        let flags = ["campaign", "--plan", "plan.toml", "--out", out, "--fmu"];
         let mut command = Command::new(program);
-        command.current_dir(directory).args(flags).arg(packed_for_tests()).output().unwrap()
+        let command = command.current_dir(directory).args(flags).arg(packed_for_tests());
+        command.args(more).output().unwrap()
     };
-    let done = run();
+    let done = run("c", &[]);
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     let loads = ["50", "100"].map(|name| {
         let file = directory.join(format!("c/runs/linear_100mm_{name}.parquet"));
@@ -171,7 +172,65 @@ fn the_runs_of_a_plan_with_sensors_have_their_readings_and_are_reused() {
     // one seed, but the runs' noise is not the same
     let alike = loads[0].iter().zip(&loads[1]).filter(|(a, b)| (*a - *b).abs() < 1e-6).count();
     assert!(alike < 5, "{alike} of {}", loads[0].len());
-    let again = run();
+    let again = run("c", &[]);
     let text = String::from_utf8_lossy(&again.stderr);
     assert!(again.status.success() && !text.contains("re-running"), "{text}");
+
+    // another program makes the runs of the list, without readings: they are made when its files are taken
+    let listed = run("other", &["--list"]);
+    let listed: serde_json::Value = serde_json::from_slice(&listed.stdout).unwrap();
+    let columns: Vec<&str> =
+        listed["columns"].as_array().unwrap().iter().map(|name| name.as_str().unwrap()).collect();
+    assert!(!columns.contains(&"wave"));
+    for run in listed["runs"].as_array().unwrap() {
+        let text = |key: &str| run[key].as_str().map_or(run[key].to_string(), String::from);
+        let mut one = Command::new(env!("CARGO_BIN_EXE_hubslosh"));
+        one.current_dir(directory).args(["run", "--out", "one.parquet", "--fmu"]);
+        one.arg(packed_for_tests()).args(["--profile", &text("profile"), "--step", &text("step")]);
+        let others = columns.iter().filter(|name| !["time", "tau_cmd"].contains(name));
+        one.args(["--columns", &others.copied().collect::<Vec<_>>().join(",")]);
+        for (name, value) in run["settings"].as_object().unwrap() {
+            let value = value.as_str().map_or(value.to_string(), String::from);
+            one.args(["--set", &format!("{name}={value}")]);
+        }
+        let done = one.output().unwrap();
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        let notes = run["notes"].as_object().unwrap().iter();
+        let notes = notes.map(|(key, note)| (key.clone(), note.as_str().unwrap().into())).collect();
+        let file = directory.join("other").join(text("file"));
+        std::fs::create_dir_all(file.parent().unwrap()).unwrap();
+        let table = Table::read(&directory.join("one.parquet"), &columns).unwrap();
+        table.write(&file, &notes).unwrap();
+    }
+    let taken = run("other", &[]);
+    let text = String::from_utf8_lossy(&taken.stderr);
+    assert!(taken.status.success() && !text.contains("re-running"), "{text}");
+    for name in ["50", "100"] {
+        let [ours, theirs] = ["c", "other"].map(|folder| {
+            let file = directory.join(format!("{folder}/runs/linear_100mm_{name}.parquet"));
+            let table = Table::read(&file, &["load", "F_tangential"]).unwrap();
+            (signals::table::names(&file).unwrap(), table)
+        });
+        assert_eq!(ours.0, theirs.0);
+        assert_eq!(ours.1.column("load"), theirs.1.column("load"), "the readings of run {name}");
+    }
+}
+
+#[test]
+fn a_liquid_without_weight_is_told_in_the_tables_and_at_the_end() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    // Bond number 1000 · 0.1 · 0.0815²/0.072 = 9.2
+    let plan = "profile = \"sine:amplitude=0.001,duration=2\"\n[set]\ng_axial = 0.1\n";
+    std::fs::write(directory.join("plan.toml"), plan).unwrap();
+    let done = Command::new(env!("CARGO_BIN_EXE_hubslosh"))
+        .current_dir(directory)
+        .args(["campaign", "--plan", "plan.toml", "--out", "c", "--fmu"])
+        .arg(packed_for_tests())
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&done.stderr);
+    assert!(done.status.success() && text.contains("1 of 1 runs left the range"), "{text}");
+    let table = std::fs::read_to_string(directory.join("c/runs.csv")).unwrap();
+    assert!(table.contains("Bond number 9.2"), "{table}");
 }

@@ -26,6 +26,7 @@ use host::fmu::Fmu;
 use host::output::sha256;
 use rayon::prelude::*;
 use serde_json::json;
+use signals::table;
 
 pub use self::folder::{Folder, MANIFEST};
 pub use self::outcome::{
@@ -247,16 +248,19 @@ impl Campaign {
     /// that its Parquet file must carry for the analysis to take it.
     pub fn list(&self, fmu: &Fmu) -> Result<serde_json::Value> {
         let description = fmu.description();
-        let mut columns = Vec::new();
+        let (mut columns, mut kept) = (Vec::<String>::new(), Vec::new());
         let mut runs = Vec::new();
         let cases = self.plan.cases(description)?;
         for case in cases.into_iter().filter(|case| case.recording.is_none()) {
             let run = case.run();
-            anyhow::ensure!(
-                case.sensors.is_empty(),
-                "runs with sensors are made by hubslosh campaign alone, not by another program"
-            );
-            columns = stored_columns(description, run.input.as_deref());
+            kept = stored_columns(description, run.input.as_deref());
+            // what sensors read is recorded with the rest; their readings are made where the run is taken
+            let sensors = Sensors::new(&case.sensors, description, &case.settings, case.step)?;
+            for name in kept.iter().map(String::as_str).chain(sensors.needs()) {
+                if !columns.iter().any(|column| column == name) {
+                    columns.push(name.to_string());
+                }
+            }
             let starts = description.moving_starts().iter();
             let at_rest = starts.filter(|name| Some(**name) != run.input.as_deref());
             let mut settings: serde_json::Map<_, _> =
@@ -284,7 +288,7 @@ impl Campaign {
                 "steps": run.steps(),
                 "tolerance": run.tolerance,
                 "hold": run.hold,
-                "notes": store::recipe(fmu, &case, &columns),
+                "notes": store::recipe(fmu, &case, &kept),
             }));
         }
         Ok(json!({
@@ -298,6 +302,7 @@ impl Campaign {
             },
             "out": self.out,
             "columns": columns,
+            "kept": kept,
             "runs": runs,
         }))
     }
@@ -339,42 +344,43 @@ impl Campaign {
                 analysed.map_or_else(Done::Failed, |outcome| Done::Analysed(Box::new(outcome)))
             );
         }
+        let sensors = Sensors::new(&case.sensors, fmu.description(), &case.settings, case.step)?;
         let path = folder.path().join(folder::file_of(&case.name));
         let there = match self.force || !path.exists() {
             true => None,
             false => folder
                 .check(&case.name)
-                .and_then(|sum| Ok((store::stored(&path, &run, &recipe, &columns)?, sum)))
+                .and_then(|sum| {
+                    let (table, lacks) = store::stored(&path, &run, &recipe, (&columns, &sensors))?;
+                    Ok((table, lacks, sum))
+                })
                 .map_err(|why| watch(Progress::Note(store::because(case, &why))))
                 .ok(),
         };
         let reused = there.is_some();
         let table = match there {
-            Some((table, sum)) => {
+            Some((table, lacks_sensors, sum)) => {
                 watch(Progress::Steps(run.steps() as u64));
-                folder.adopt(&case.name, sum)?;
-                table
+                if lacks_sensors {
+                    let table = sensors.recorded(table, columns.len(), &case.name, case.step)?;
+                    folder.store(&case.name, &table, &table::metadata(&path)?)?;
+                    table
+                } else {
+                    folder.adopt(&case.name, sum)?;
+                    table
+                }
             }
             None => {
                 // time and the driven input are there anyway
                 let others = columns[1 + usize::from(run.input.is_some())..].iter();
-                let mut others: Vec<&str> = others.map(String::as_str).collect();
-                let sensors =
-                    Sensors::new(&case.sensors, fmu.description(), &case.settings, case.step)?;
-                for name in sensors.needs() {
-                    if !others.contains(&name) && Some(name) != run.input.as_deref() {
-                        others.push(name);
-                    }
-                }
+                let others: Vec<&str> = others.map(String::as_str).collect();
+                let others = run.columns_with(&others, sensors.needs());
                 let driven =
                     run.drive(&mut instance, &others, |steps| watch(Progress::Steps(steps)));
                 instance.take_warnings().into_iter().for_each(|warning| warn(case, warning));
                 let read = driven.and_then(|table| {
                     table.all_finite()?;
-                    let kept = table.names()[..columns.len()].iter().cloned();
-                    let kept: Vec<String> = kept.chain(sensors.columns()).collect();
-                    let kept: Vec<&str> = kept.iter().map(String::as_str).collect();
-                    Ok(sensors.read(table, &case.name, case.step)?.only(&kept))
+                    sensors.recorded(table, columns.len(), &case.name, case.step)
                 });
                 let table = match read {
                     Ok(table) => table,

@@ -210,6 +210,8 @@ pub struct Outcome {
     pub history: History,
     /// The crest's path seen from above.
     pub path: SloshPath,
+    /// What ruled the liquid where its weight did not ([`Range::without_weight`]).
+    pub weightless: Option<String>,
     /// It was not simulated but read.
     pub reused: bool,
 }
@@ -547,6 +549,7 @@ impl Outcome {
                 None => Totals::of(table),
             },
             case: case.clone(),
+            weightless: range.without_weight(column(WAVE), table.column("g_axial")),
             range,
             linear,
             record,
@@ -580,7 +583,9 @@ impl Outcome {
 
     /// How the run left the range of its model, if it did.
     pub fn beyond_model(&self) -> Option<String> {
-        self.range.left(&[self.totals.peak_wave_height])
+        let how = [self.range.left(&[self.totals.peak_wave_height]), self.weightless.clone()];
+        let how: Vec<String> = how.into_iter().flatten().collect();
+        (!how.is_empty()).then(|| how.join("; "))
     }
 
     /// Features of the `spa` response.

@@ -7,6 +7,7 @@ use host::fmu::Fmu;
 
 use super::Case;
 use crate::run::{self, Run};
+use crate::sensors::Sensors;
 use signals::table::{self, Table};
 
 /// Raised when stored runs of an older program mean something else.
@@ -53,13 +54,14 @@ pub fn recipe(fmu: &Fmu, case: &Case, columns: &[String]) -> BTreeMap<String, St
     recipe
 }
 
-/// The stored run, if it is complete and of this recipe; else why not.
+/// The stored run, if it is complete and of this recipe, else why not; and whether it lacks the sensors' readings, having what they are made
+/// of: another program made it.
 pub fn stored(
     path: &Path,
     run: &Run,
     recipe: &BTreeMap<String, String>,
-    columns: &[String],
-) -> Result<Table, String> {
+    (columns, sensors): (&[String], &Sensors),
+) -> Result<(Table, bool), String> {
     const INCOMPLETE: &str = "file incomplete";
     let found = table::metadata(path).map_err(|_| INCOMPLETE.to_string())?;
     if let Some(why) = difference(&found, recipe) {
@@ -68,13 +70,19 @@ pub fn stored(
     if found.contains_key("sensors") && !recipe.contains_key("sensors") {
         return Err("it has sensors".into());
     }
-    let names: Vec<&str> = columns.iter().map(String::as_str).collect();
+    let there = table::names(path).map_err(|_| INCOMPLETE.to_string())?;
+    let lacks_sensors = sensors.columns().iter().any(|column| !there.contains(column));
+    let mut names: Vec<&str> = columns.iter().map(String::as_str).collect();
+    if lacks_sensors {
+        let needs = sensors.needs().into_iter().filter(|name| !columns.iter().any(|c| c == name));
+        names.extend(needs);
+    }
     let table = Table::read(path, &names).map_err(|_| INCOMPLETE.to_string())?;
     let last = table.column("time").and_then(|time| time.last()).copied();
     if table.rows() != run.steps() + 1 || last != Some(run.stop) {
         return Err(format!("{INCOMPLETE}, {} rows of {}", table.rows(), run.steps() + 1));
     }
-    Ok(table)
+    Ok((table, lacks_sensors))
 }
 
 /// Parameters that are named when several differ.

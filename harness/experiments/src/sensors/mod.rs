@@ -323,6 +323,17 @@ impl Sensors {
         self.0.iter().flat_map(one).collect()
     }
 
+    /// The first `kept` columns of a run's table and the readings of [`Sensors::read`], without what was recorded for these alone.
+    ///
+    /// # Errors
+    /// If the table lacks what they need.
+    pub fn recorded(&self, table: Table, kept: usize, run: &str, step: f64) -> Result<Table> {
+        let names: Vec<String> =
+            table.names()[..kept].iter().cloned().chain(self.columns()).collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        Ok(self.read(table, run, step)?.only(&names))
+    }
+
     /// A run's table and their readings of it. `run` tells the noise of runs with one seed apart.
     ///
     /// # Errors
