@@ -70,7 +70,7 @@ pub(crate) const COS_45: f64 = core::f64::consts::FRAC_1_SQRT_2;
 const TOUCHING: f64 = 1e-10;
 /// f' below which it does not move from or towards the wall, 1/s.
 const RESTING: f64 = 1e-9;
-/// f'' below which nothing presses it to the wall, 1/s2.
+/// f'' below which nothing presses it to the wall, over 1/s2 and what it is the sum of.
 const PRESSING: f64 = 1e-9;
 /// Square of the sine of 30 degrees: how far the pendulums may swing that take the liquid back.
 const SWING: f64 = 0.25;
@@ -633,7 +633,12 @@ impl Lump {
             // The root at 0 is behind.
             return first_root(&f[1..=n], h);
         }
-        if f[1] < -RESTING || f[2] < -PRESSING {
+        // What f'' is the sum of rounds.
+        let g = times(&self.d, self.x_0);
+        let size = 1.0
+            + 2.0 * largest(g) * largest(self.rho[2])
+            + dot(self.rho[1], times(&self.d, self.rho[1]));
+        if f[1] < -RESTING || f[2] < -PRESSING * size {
             return Some(0.0);
         }
         f[0] = TOUCHING;
