@@ -5,8 +5,10 @@
 //! needs an effect before its cause.
 
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
-use crate::fit::Problem;
+use crate::evidence::{ALIKE, DECIDES, probabilities};
+use crate::fit::{Polished, Problem};
 use crate::recording::Recording;
 use crate::simulate::Intersample;
 use crate::uncertainty::Covariance;
@@ -25,7 +27,9 @@ const NEAR_HALF: f64 = 0.1;
 pub struct Alternative {
     /// Which.
     pub behaviour: Intersample,
-    /// Sum of squares with all unknowns free, to first order.
+    /// The minimum with it, all unknowns free.
+    pub minimum: Polished,
+    /// Sum of squares there, less what steps would still win by their second order.
     pub cost: f64,
     /// The delay with it, s, and its standard deviation; `None` if it is not estimated.
     pub delay: Option<(f64, f64)>,
@@ -62,51 +66,121 @@ pub fn matters(recordings: &[Recording]) -> bool {
     recordings.iter().any(varies)
 }
 
-/// The other behaviours at a minimum `x` with these sensitivities. Each costs one simulation.
-pub fn alternatives(
-    problem: &Problem,
-    x: &[f64],
-    jacobian: &DMatrix<f64>,
-    covariance: &Covariance,
-) -> Vec<Alternative> {
+/// The other behaviours, each with its own minimum, which is sought from this one: a torque that is held is late by half a row. The
+/// sensitivities are nearly the same, so each costs a few simulations.
+pub fn alternatives(problem: &Problem, minimum: &Polished) -> Vec<Alternative> {
     let now = problem.setup.intersample;
     let delayed = problem.unknowns.iter().position(|u| u.quantity == Quantity::Delay);
     let late = |b: Intersample| if b == Intersample::ZeroOrderHold { 0.5 } else { 0.0 };
     let one = |behaviour: Intersample| {
         let mut problem = problem.clone();
         problem.setup.intersample = behaviour;
-        // held torque is late by half a row
-        let mut x = DVector::from_column_slice(x);
+        let mut x = minimum.x.clone();
         if let Some(index) = delayed {
             let scale = problem.unknowns[index].scale;
             let rows = late(now) - late(behaviour);
             let delay = scale.value(x[index]) + rows * problem.recordings[0].step();
             x[index] = scale.variable(delay);
         }
-        let answer = problem.answer(x.as_slice()).ok()?;
-        let e = problem.stacked(&answer, x.as_slice());
-        let gradient = jacobian.tr_mul(&e);
-        let step = &covariance.x * &gradient;
-        let cost = e.norm_squared() - gradient.dot(&step);
-        let delay = delay(&problem, (&x - &step).as_slice(), covariance);
-        Some(Alternative { behaviour, cost, delay })
+        let minimum = problem.polish_near(&x, &minimum.jacobian).ok()?;
+        let delay = delay(&problem, &minimum.x, &minimum.covariance);
+        let left = if minimum.decrement < 1.0 { minimum.decrement.powi(2) } else { 0.0 };
+        let cost = minimum.cost - left;
+        Some(Alternative { behaviour, minimum, cost, delay })
     };
-    Intersample::ALL.into_iter().filter(|b| *b != now).filter_map(one).collect()
+    let others: Vec<Intersample> = Intersample::ALL.into_iter().filter(|b| *b != now).collect();
+    others.into_par_iter().filter_map(one).collect()
 }
 
-/// What the choice rests on, in words: the behaviour that was fitted with its sum of squares `cost`, and the others. Rows come every
+/// Which of the behaviours fits best: `None` if no other one that is allowed is clearly better.
+pub fn better(cost: f64, step: f64, acausal: bool, others: &[Alternative]) -> Option<&Alternative> {
+    others
+        .iter()
+        .filter(|other| acausal || !other.is_acausal(step))
+        .min_by(|a, b| a.cost.total_cmp(&b.cost))
+        .filter(|best| best.cost < cost - ALIKE)
+}
+
+/// What the covariance of the unknowns x gains because the torque may be another one between rows: Σ p_k δ_k δ_kᵀ, with p_k the
+/// probability of behaviour k, all equally probable beforehand, and δ_k how far its minimum is from this one's. `None`: this one is sure.
+pub fn gained(
+    found: &Polished,
+    step: f64,
+    acausal: bool,
+    others: &[Alternative],
+) -> Option<DMatrix<f64>> {
+    let near: Vec<&Alternative> = near(found.cost, step, acausal, others).collect();
+    let costs = near.iter().map(|other| other.cost);
+    let probabilities = probabilities(std::iter::once(found.cost).chain(costs));
+    let mut gained = None;
+    for (other, probability) in near.iter().zip(&probabilities[1..]) {
+        let off =
+            DVector::from_column_slice(&other.minimum.x) - DVector::from_column_slice(&found.x);
+        let one = &off * off.transpose() * *probability;
+        gained = Some(gained.map_or_else(|| one.clone(), |sum: DMatrix<f64>| sum + &one));
+    }
+    gained
+}
+
+/// The behaviours that cannot be told from the one that was fitted.
+fn near(
+    cost: f64,
+    step: f64,
+    acausal: bool,
+    others: &[Alternative],
+) -> impl Iterator<Item = &Alternative> {
+    others
+        .iter()
+        .filter(move |other| (acausal || !other.is_acausal(step)) && other.cost < cost + DECIDES)
+}
+
+/// What the choice rests on, in words: the behaviour that was fitted with its sum of squares, and the others. Rows come every
 /// `step` seconds.
-pub fn evidence((now, cost): (Intersample, f64), step: f64, others: &[Alternative]) -> String {
+pub fn evidence(
+    problem: &Problem,
+    found: &Polished,
+    step: f64,
+    acausal: bool,
+    others: &[Alternative],
+) -> String {
+    let now = problem.setup.intersample;
+    let allowed = others.iter().filter(|other| acausal || !other.is_acausal(step));
+    let cost = allowed.map(|other| other.cost).fold(found.cost, f64::min);
+    let late = |delay: Option<(f64, f64)>| {
+        delay.map_or(String::new(), |(delay, _)| format!(" with a delay of {:.2} ms", 1e3 * delay))
+    };
+    let alike: Vec<&Alternative> = near(cost, step, acausal, others).collect();
+    let is_near = found.cost < cost + DECIDES;
+    let cost = found.cost;
+    if is_near && !alike.is_empty() {
+        let costs = std::iter::once(cost).chain(alike.iter().map(|other| other.cost));
+        let first = (now, delay(problem, &found.x, &found.covariance));
+        let all = std::iter::once(first).chain(alike.iter().map(|o| (o.behaviour, o.delay)));
+        let each: Vec<String> = all
+            .zip(probabilities(costs))
+            .map(|((behaviour, delay), p)| {
+                format!("{}{} (probability {p:.2})", behaviour.words(), late(delay))
+            })
+            .collect();
+        return format!(
+            "Cannot tell what the torque does between rows: {}. The values are those of the first; their standard deviations hold \
+             that it may be another. --torque sets it.",
+            each.join(", ")
+        );
+    }
     let each: Vec<String> = others
         .iter()
         .map(|other| {
             let more = other.cost - cost;
             let behaviour = other.behaviour.words();
-            match other.delay.filter(|_| other.is_acausal(step)) {
+            match other.delay.filter(|_| !acausal && other.is_acausal(step)) {
                 Some((delay, _)) => {
                     format!("{behaviour} would need a delay of {:.2} ms", 1e3 * delay)
                 }
-                None => format!("{behaviour} changes the sum of squares by {more:+.0}"),
+                None => format!(
+                    "{behaviour}{} changes the sum of squares by {more:+.0}",
+                    late(other.delay)
+                ),
             }
         })
         .collect();

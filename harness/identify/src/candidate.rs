@@ -186,7 +186,8 @@ fn unknowns(
         // what it does not need to nothing, and its influence with it.
         let vague = match name {
             "friction.b" => 3.0,
-            "friction.c" | "friction.d" | "friction.omega_s" => 1.5,
+            // a deep tank's fill shows next to nothing of itself
+            "friction.c" | "friction.d" | "friction.omega_s" | "tank.h" => 1.5,
             _ => 0.0,
         };
         if vague > 0.0 {
@@ -230,8 +231,9 @@ fn unknowns(
         list.push(Unknown::delay());
         list.extend((0..recordings.len()).map(Unknown::gyro_bias));
     }
-    // with an encoder the rate's scale shows, and without it no residual would be noise
-    if options.gyro_scale > 0.0 && recordings.iter().any(|r| r.angle.is_some()) {
+    // with an encoder the rate's scale shows, and where slosh is not linear: without it no residual would be noise
+    let nonlinear = !frozen && model != "linear";
+    if options.gyro_scale > 0.0 && (nonlinear || recordings.iter().any(|r| r.angle.is_some())) {
         list.push(Unknown::gyro_scale().known(1.0, options.gyro_scale));
     }
     for (i, recording) in recordings.iter().enumerate() {

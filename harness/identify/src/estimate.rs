@@ -7,7 +7,7 @@ use serde::Serialize;
 pub struct Estimated {
     /// SI.
     pub value: f64,
-    /// Standard deviation, everything in it.
+    /// Standard deviation, everything in it; where the interval is skew, that of its longer side.
     pub std: f64,
     /// Standard deviation from the noise alone.
     pub std_noise: f64,

@@ -37,9 +37,11 @@ use host::fmu::Fmu;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use crate::nominal::{Bench, Nominal};
 use crate::recording::Recording;
 use crate::simulate::{Motion, Setup};
 use crate::stribeck;
+use crate::tank;
 use crate::uncertainty::{self, Covariance};
 use crate::unknown::{Quantity, Scale, Unknown};
 use analysis::gauss_markov::{FLOOR, Noise, Whitening};
@@ -56,6 +58,8 @@ const STEPS: (f64, f64) = (1e-6, 2e-2);
 const LONGEST_STEP: f64 = 0.05;
 /// A search has ended where the Newton decrement is below this: a hundredth of a standard deviation.
 pub const DECREMENT: f64 = 0.01;
+/// A sum of squares is known to a hundredth where the Newton decrement is below this.
+const NEAR: f64 = 0.1;
 
 /// What is compared with the FMU's answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,6 +81,16 @@ pub struct Channel {
     pub noise: Noise,
 }
 
+/// Whether the noise of channels is no longer what it was, by so much that the minimum is another one: the white noise, or a drift that
+/// counts.
+pub fn is_other(before: &[Channel], now: &[Channel]) -> bool {
+    let differs = |a: f64, b: f64, by: f64| (a / b).ln().abs() > by;
+    before.iter().map(|c| c.noise).zip(now.iter().map(|c| c.noise)).any(|(a, b)| {
+        let drifts = a.drift.max(b.drift) > 0.02;
+        differs(a.white, b.white, 0.05) || drifts && differs(a.drift, b.drift, 0.2)
+    })
+}
+
 /// Recordings, a set-up of the FMU, and the unknowns.
 #[derive(Clone)]
 pub struct Problem<'a> {
@@ -92,6 +106,8 @@ pub struct Problem<'a> {
     pub channels: Vec<Channel>,
     /// How sensitivities are differenced.
     pub differences: Differences,
+    /// The bench as it is set up; `None`: the FMU refuses its settings.
+    pub bench: Option<Bench>,
 }
 
 /// What an answer looks like for given unknowns.
@@ -142,6 +158,17 @@ impl Polished {
     }
 }
 
+/// What is known of sensitivities before Gauss and Newton's steps.
+#[derive(Clone, Copy, Debug)]
+pub enum Known<'j> {
+    /// Nothing.
+    Nothing,
+    /// Those of a similar problem, which give the directions of the first differences.
+    Directions(&'j DMatrix<f64>),
+    /// Those of nearly the same problem: they are the first ones.
+    Sensitivities(&'j DMatrix<f64>),
+}
+
 /// How sensitivities are differenced.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Differences {
@@ -171,7 +198,8 @@ impl<'a> Problem<'a> {
             }
         }
         let differences = Differences::Forward;
-        Problem { fmu, setup, recordings, unknowns, channels, differences }
+        let bench = Nominal::of(fmu, &setup.settings, &[]).ok().map(|nominal| nominal.bench);
+        Problem { fmu, setup, recordings, unknowns, channels, differences, bench }
     }
 
     /// Values of the unknowns for variables x.
@@ -485,7 +513,7 @@ impl<'a> Problem<'a> {
             let moved = |by: f64| {
                 let mut part = vec![0.0; x.len()];
                 mixed.iter().zip(&direction).for_each(|(&j, d)| part[j] = by * d);
-                self.motions(&stribeck::moved(&self.unknowns, x, &part, fastest))
+                self.motions(&self.moved(x, &part, fastest))
             };
             self.differenced(x, base, step, &moved)
         };
@@ -493,6 +521,31 @@ impl<'a> Problem<'a> {
         let inverse = directions.clone().try_inverse();
         let found = differences * inverse.context("sensitivities without a direction")?;
         Ok(self.with_priors(&found, mixed))
+    }
+
+    /// x with a step added along the valleys that are known: of the friction's curve, and of tank and hub.
+    pub fn moved(&self, x: &[f64], step: &[f64], fastest: f64) -> Vec<f64> {
+        let mut there = stribeck::moved(&self.unknowns, x, step, fastest);
+        if let Some(bench) = self.bench {
+            tank::bent(&self.unknowns, bench, x, step, &mut there);
+        }
+        there
+    }
+
+    /// An end of the interval of unknown j: its value `reach` standard deviations of `covariance` from x, along the valley that it is in.
+    pub fn end(
+        &self,
+        x: &[f64],
+        covariance: &DMatrix<f64>,
+        (j, reach): (usize, f64),
+        fastest: f64,
+    ) -> f64 {
+        let (unknown, deviation) = (&self.unknowns[j], covariance[(j, j)].sqrt());
+        if unknown.is_additive() || deviation == 0.0 {
+            return unknown.end(x[j], reach * deviation);
+        }
+        let step = covariance.column(j) * (reach / deviation);
+        unknown.scale.value(self.moved(x, step.as_slice(), fastest)[j])
     }
 
     /// Sensitivities at x: those to the parameters `which` by differences along the directions of `known`, the others as known.
@@ -540,7 +593,15 @@ impl<'a> Problem<'a> {
         rounds: usize,
     ) -> Result<Polished> {
         let all: Vec<usize> = (0..x.len()).collect();
+        let known = known.map_or(Known::Nothing, Known::Directions);
         self.polish_some(x, &all, known, (rounds, DECREMENT))
+    }
+
+    /// The same from sensitivities of a problem that differs by next to nothing: they serve until they no longer do, and one more set
+    /// is found then.
+    pub fn polish_near(&self, x: &[f64], sensitivities: &DMatrix<f64>) -> Result<Polished> {
+        let all: Vec<usize> = (0..x.len()).collect();
+        self.polish_some(x, &all, Known::Sensitivities(sensitivities), (2, NEAR))
     }
 
     /// The same in the variables `free` alone, until the decrement is below `enough`. Sensitivities and covariance are those of
@@ -549,7 +610,7 @@ impl<'a> Problem<'a> {
         &self,
         x: &[f64],
         free: &[usize],
-        known: Option<&DMatrix<f64>>,
+        known: Known,
         (rounds, enough): (usize, f64),
     ) -> Result<Polished> {
         let mut x = x.to_vec();
@@ -557,10 +618,16 @@ impl<'a> Problem<'a> {
         let mut e = self.stacked(&answer, &x);
         let mut simulations = 1;
         let fastest = fastest(&answer.motion);
-        let mut known = known.cloned();
+        let (mut known, mut given) = match known {
+            Known::Nothing => (None, None),
+            Known::Directions(known) => (Some(known.clone()), None),
+            Known::Sensitivities(known) => (None, Some(known.select_columns(free))),
+        };
         for round in 1.. {
-            let (jacobian, needed) =
-                self.sensitivities(&x, free, &answer.motion, known.as_ref())?;
+            let (jacobian, needed) = match given.take() {
+                Some(jacobian) => (jacobian, 0),
+                None => self.sensitivities(&x, free, &answer.motion, known.as_ref())?,
+            };
             simulations += needed;
             let covariance = self.covariance(&jacobian)?;
             let mut before = f64::INFINITY;
@@ -577,8 +644,7 @@ impl<'a> Problem<'a> {
                 while part > 1e-3 && !taken {
                     let mut straight = DVector::zeros(x.len());
                     free.iter().zip(step.iter()).for_each(|(&j, step)| straight[j] = part * step);
-                    let mut trial =
-                        stribeck::moved(&self.unknowns, &x, straight.as_slice(), fastest);
+                    let mut trial = self.moved(&x, straight.as_slice(), fastest);
                     // the step and, where it makes it worse, the same along the bent valley
                     for is_straight in [true, false] {
                         simulations += 1;
@@ -595,7 +661,7 @@ impl<'a> Problem<'a> {
                         let back = -(&covariance.x * jacobian.tr_mul(&bend));
                         let mut aside = vec![0.0; x.len()];
                         free.iter().zip(back.iter()).for_each(|(&j, back)| aside[j] = *back);
-                        trial = stribeck::moved(&self.unknowns, &trial, &aside, fastest);
+                        trial = self.moved(&trial, &aside, fastest);
                     }
                     part *= 0.3;
                 }
@@ -777,3 +843,25 @@ const JUMP: f64 = 3.0;
 const SHORTEST: f64 = 0.05;
 /// How far a parameter may be from its start in a window, relatively.
 const PRIOR_WIDTH: f64 = 0.5;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn channels(white: f64, drift: f64) -> [Channel; 1] {
+        let noise = Noise { white, drift, time: 100.0 };
+        [Channel { recording: 0, signal: Signal::Angle, noise }]
+    }
+
+    /// An encoder's angle is taken for all drift at first: once that is known to be little, the minimum is another one, whatever the white
+    /// noise.
+    #[test]
+    fn noise_is_another_one_by_its_drift_too_where_that_counts() {
+        let first = channels(3e-4, 30.0);
+        assert!(is_other(&first, &channels(3e-4, 0.8)));
+        assert!(is_other(&first, &channels(2e-4, 30.0)));
+        assert!(!is_other(&first, &channels(3.1e-4, 29.0)));
+        // next to nothing, and nothing
+        assert!(!is_other(&channels(3e-4, 1e-3), &channels(3e-4, 1e-4)));
+    }
+}

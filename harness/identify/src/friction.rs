@@ -22,7 +22,7 @@ use anyhow::Result;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
-use crate::fit::{self, Polished, Problem};
+use crate::fit::{self, Known, Polished, Problem};
 use crate::stribeck::Indices;
 use crate::uncertainty::spread_out;
 
@@ -30,7 +30,7 @@ use crate::uncertainty::spread_out;
 const GRID: [f64; 6] = [0.1, 0.3, 0.7, 1.5, 4.0, 15.0];
 
 /// Relative standard deviation of d or ω_s beyond which a minimum may be one of several.
-const VAGUE: f64 = 0.2;
+const VAGUE: f64 = 0.05;
 /// The same beyond which intervals are no longer those of a quadratic.
 const BENT: f64 = 0.05;
 /// Sum of squares above the least at the ends of the 95 % interval of one unknown: 1.96².
@@ -83,8 +83,8 @@ pub fn grid(problem: &Problem, from: &Polished, indices: Indices) -> Result<Vec<
     points.into_iter().collect()
 }
 
-/// Rounds of steps at one speed.
-const STEPS: usize = 6;
+/// Sets of sensitivities at one speed, the first of them mostly that of another one.
+const STEPS: usize = 3;
 
 /// The fit at ω_s = `speed`: b, c and d whose curve is nearest to that of `near` over the recording's speeds, then Gauss and
 /// Newton's steps in all unknowns but ω_s. The sensitivities to b, c and d are taken there, the others are those of `near`.
@@ -109,53 +109,20 @@ fn point(
     }
     let bearing = [indices.b, indices.c, indices.d];
     let others: Vec<usize> = (0..x.len()).filter(|j| *j != indices.speed).collect();
-    let mut answer = problem.answer(&x)?;
-    let mut e = problem.stacked(&answer, &x);
-    let mut jacobian = problem.refreshed(&x, &bearing, &answer.motion, known)?;
-    let mut simulations = 1 + bearing.len();
-    let mut free = jacobian.select_columns(&others);
-    let mut covariance = problem.covariance(&free)?;
-    let (mut before, mut refreshed) = (f64::INFINITY, false);
-    for _ in 0..STEPS {
-        let gradient = free.tr_mul(&e);
-        let step = -(&covariance.x * &gradient);
-        let decrement = (-gradient.dot(&step)).max(0.0).sqrt();
-        if decrement < CLOSE {
-            break;
-        }
-        if decrement > 0.7 * before && !refreshed {
-            jacobian = problem.refreshed(&x, &bearing, &answer.motion, &jacobian)?;
-            simulations += bearing.len();
-            free = jacobian.select_columns(&others);
-            covariance = problem.covariance(&free)?;
-            (before, refreshed) = (f64::INFINITY, true);
-            continue;
-        }
-        before = decrement;
-        let mut taken = false;
-        for part in [1.0, 0.3, 0.1] {
-            let mut there = x.clone();
-            others.iter().zip(step.iter()).for_each(|(&j, step)| there[j] += part * step);
-            simulations += 1;
-            let Ok(new) = problem.answer(&there) else { continue };
-            let stacked = problem.stacked(&new, &there);
-            if stacked.norm_squared() < e.norm_squared() {
-                (x, answer, e, taken) = (there, new, stacked, true);
-                break;
-            }
-        }
-        if !taken {
-            break;
-        }
-    }
+    let motion = problem.answer(&x)?.motion;
+    let jacobian = problem.refreshed(&x, &bearing, &motion, known)?;
+    let found =
+        problem.polish_some(&x, &others, Known::Sensitivities(&jacobian), (STEPS, CLOSE))?;
+    // what further steps would win to second order, where that can be told
+    let left = if found.decrement < 1.0 { found.decrement.powi(2) } else { 0.0 };
     Ok(Point {
         speed,
-        cost: e.norm_squared(),
-        data: e.norm_squared() - problem.vague_cost(&x),
-        covariance: spread_out(&covariance.x, &others, x.len()),
-        jacobian,
-        x,
-        simulations,
+        cost: found.cost,
+        data: found.cost - left - problem.vague_cost(&found.x),
+        covariance: spread_out(&found.covariance.x, &others, found.x.len()),
+        jacobian: found.jacobian.insert_column(indices.speed, 0.0),
+        simulations: 1 + bearing.len() + found.simulations,
+        x: found.x,
     })
 }
 
@@ -228,7 +195,36 @@ pub fn profile(problem: &Problem, minimum: &Polished) -> Result<Option<Profile>>
     let ends = [GRID[0] * fastest, GRID[GRID.len() - 1] * fastest];
     let sides: Vec<Result<(Vec<Point>, bool)>> = [(-1.0, ends[0]), (1.0, ends[1])]
         .into_par_iter()
-        .map(|(side, end)| outwards(problem, minimum, indices, &middle, (side, end, deviation)))
+        .map(|(side, end)| {
+            let (mut found, mut open) = outwards(
+                problem,
+                minimum,
+                indices,
+                (&middle, middle.data),
+                (side, end, deviation),
+            )?;
+            // there may be another minimum beyond
+            let mut beyond: Vec<f64> = GRID.iter().map(|part| part * fastest).collect();
+            beyond.sort_by(|a, b| (side * a).total_cmp(&(side * b)));
+            for speed in beyond {
+                let furthest = found.iter().map(|p| side * p.speed.ln()).fold(f64::MIN, f64::max);
+                if open || side * speed.ln() <= furthest {
+                    continue;
+                }
+                let from = found.last().unwrap_or(&middle);
+                let other = point(problem, (&from.x, &from.jacobian), minimum, indices, speed)?;
+                let is_in = other.data - middle.data <= LIMIT;
+                found.push(other.clone());
+                if is_in {
+                    let reference = (&other, middle.data);
+                    let (more, is_open) =
+                        outwards(problem, minimum, indices, reference, (side, end, deviation))?;
+                    found.extend(more);
+                    open = is_open;
+                }
+            }
+            Ok((found, open))
+        })
         .collect();
     let (mut points, mut open) = (vec![middle], [false; 2]);
     for (side, found) in sides.into_iter().enumerate() {
@@ -238,7 +234,7 @@ pub fn profile(problem: &Problem, minimum: &Polished) -> Result<Option<Profile>>
     }
     points.sort_by(|a, b| a.speed.total_cmp(&b.speed));
     let least = points.iter().map(|p| p.data).fold(f64::INFINITY, f64::min);
-    let mut intervals = intervals(problem, &points, least);
+    let mut intervals = intervals(problem, &points, least, fastest);
     intervals[indices.speed] = speeds(&points, least, open);
     Ok(Some(Profile {
         covariance: covariance(problem, minimum, &points, least),
@@ -248,19 +244,19 @@ pub fn profile(problem: &Problem, minimum: &Polished) -> Result<Option<Profile>>
     }))
 }
 
-/// Fits from the middle outwards until the sum of squares is beyond [`LIMIT`], then nearer to it; whether even at the last speed, `end`, it
+/// Fits from the middle outwards until the sum of squares is beyond [`LIMIT`] over `least`, then nearer to it; whether even at the last speed, `end`, it
 /// is not.
 fn outwards(
     problem: &Problem,
     minimum: &Polished,
     indices: Indices,
-    middle: &Point,
+    (middle, least): (&Point, f64),
     (side, end, deviation): (f64, f64, f64),
 ) -> Result<(Vec<Point>, bool)> {
     let mut points: Vec<Point> = Vec::new();
     let mut step = (1.96 * deviation).clamp(0.02, LONGEST);
-    // signed root of the sum of squares above the middle's
-    let root = |p: &Point| (p.data - middle.data).max(0.0).sqrt();
+    // root of the sum of squares above the least
+    let root = |p: &Point| (p.data - least).max(0.0).sqrt();
     // the last within and the first beyond
     let (mut inside, mut outside) = (middle.clone(), None::<Point>);
     while points.len() < POINTS {
@@ -282,7 +278,7 @@ fn outwards(
             .min_by(|a, b| (a.speed / speed).ln().abs().total_cmp(&(b.speed / speed).ln().abs()));
         let near = near.unwrap_or(middle);
         let found = point(problem, (&near.x, &near.jacobian), minimum, indices, speed)?;
-        let above = found.data - middle.data;
+        let above = found.data - least;
         points.push(found.clone());
         if above > LIMIT {
             let near_enough = above < LIMIT * (1.0 + ENOUGH);
@@ -332,20 +328,14 @@ fn speeds(points: &[Point], least: f64, open: [bool; 2]) -> [f64; 2] {
 }
 
 /// The union of the intervals at fixed speeds, of every unknown.
-fn intervals(problem: &Problem, points: &[Point], least: f64) -> Vec<[f64; 2]> {
+fn intervals(problem: &Problem, points: &[Point], least: f64, fastest: f64) -> Vec<[f64; 2]> {
     let mut all = vec![[f64::INFINITY, f64::NEG_INFINITY]; problem.unknowns.len()];
     for point in points.iter().filter(|p| p.data - least <= LIMIT) {
         let reach = (LIMIT - (point.data - least)).max(0.0).sqrt();
-        for (j, unknown) in problem.unknowns.iter().enumerate() {
-            let x = point.x[j];
-            let deviation = reach * point.covariance[(j, j)].sqrt();
-            let (low, high) = if unknown.is_additive() {
-                let (value, width) =
-                    (unknown.scale.value(x), deviation * unknown.scale.slope(x).abs());
-                ((value - width).max(0.0), value + width)
-            } else {
-                (unknown.scale.value(x - deviation), unknown.scale.value(x + deviation))
-            };
+        for j in 0..problem.unknowns.len() {
+            let end =
+                |side: f64| problem.end(&point.x, &point.covariance, (j, side * reach), fastest);
+            let (low, high) = (end(-1.0), end(1.0));
             all[j] = [all[j][0].min(low), all[j][1].max(high)];
         }
     }

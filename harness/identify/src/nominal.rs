@@ -1,6 +1,7 @@
 //! The bench as the FMU is set up, before anything is estimated.
 
 use anyhow::{Result, ensure};
+use formulas::cylinder::pendulum;
 use host::fmu::{Fmu, Instance};
 
 /// What is known of the bench without the recording.
@@ -70,6 +71,11 @@ impl Bench {
     /// Mass of the liquid in an upright cylinder, kg.
     pub fn liquid(self, d: f64, h: f64) -> f64 {
         self.density * std::f64::consts::PI / 4.0 * d * d * h
+    }
+
+    /// Mass of the first mode in an upright cylinder, kg.
+    pub fn slosh_mass(self, d: f64, h: f64) -> f64 {
+        pendulum(0, d, h, self.liquid(d, h)).mass
     }
 
     /// Moment of inertia about the hub's axis of a mass (kg) in the tank that turns with the hub, kg·m².

@@ -7,7 +7,7 @@ use anyhow::{Result, bail};
 use nalgebra::DMatrix;
 
 use crate::between;
-use crate::fit::{Polished, Problem, WHOLE, WINDOWS};
+use crate::fit::{Polished, Problem, WHOLE, WINDOWS, is_other};
 use crate::friction;
 use crate::goodness::{fit_pct, is_poor, tests};
 use crate::simulate::Intersample;
@@ -17,8 +17,8 @@ use analysis::innovations::Tests;
 /// Sum of squares over the rows below which a model may be near its minimum: that of noise, and half as much again.
 const NEAR: f64 = 1.5;
 
-/// By how much less the sum of squares must be for another torque between rows.
-const JOINS: f64 = 20.0;
+/// What the steps of one set of sensitivities leave of the sum of squares, where they lead far.
+const LEADS: f64 = 0.7;
 
 /// Sets of sensitivities that Gauss and Newton's steps have at most.
 pub const ROUNDS: usize = 6;
@@ -203,11 +203,23 @@ impl<'a> Search<'a, '_> {
         self.simulations += rough.simulations;
         let answer = self.problem.answer(&rough.x)?;
         self.problem.estimate_noise(&answer);
-        if is_poor(&self.problem, &answer) {
-            // a model that does not fit has no minimum worth the search
-            return self.polish(&rough.x, rough.jacobian.as_ref(), 1);
+        let (mut x, mut known, mut poor) =
+            (rough.x, rough.jacobian, is_poor(&self.problem, &answer));
+        let mut before = f64::INFINITY;
+        while poor {
+            // a model that does not fit has no minimum worth the search, unless single steps lead far
+            let near = self.polish(&x, known.as_ref(), 1)?;
+            poor = is_poor(&self.problem, &near.answer);
+            if poor && near.cost > LEADS * before {
+                return Ok(near);
+            }
+            before = near.cost;
+            if !poor {
+                self.problem.estimate_noise(&near.answer);
+            }
+            (x, known) = (near.x, Some(near.jacobian));
         }
-        let near = self.polish(&rough.x, rough.jacobian.as_ref(), ROUNDS)?;
+        let near = self.polish(&x, known.as_ref(), ROUNDS)?;
         let near = self.joined(near)?;
         let mut best = self.friction(near)?;
         if !best.converged() {
@@ -224,8 +236,7 @@ impl<'a> Search<'a, '_> {
         // the noise from the residual and, if it is another one, the minimum with its filter
         let before = self.problem.channels.clone();
         self.problem.estimate_noise(&best.answer);
-        let pairs = before.iter().zip(&self.problem.channels);
-        if pairs.into_iter().any(|(a, b)| (a.noise.white / b.noise.white - 1.0).abs() > 0.05) {
+        if is_other(&before, &self.problem.channels) {
             let again = self.polish(&best.x, Some(&best.jacobian), ROUNDS)?;
             best = self.friction(again)?;
         }
@@ -234,36 +245,28 @@ impl<'a> Search<'a, '_> {
 
     /// The minimum with what the torque does between rows, which only a minimum can tell.
     fn joined(&mut self, near: Polished) -> Result<Polished> {
-        if !near.converged() || !self.join(&near)? {
+        if !near.converged()
+            || self.intersample.is_some()
+            || !between::matters(self.problem.recordings)
+        {
             return Ok(near);
         }
-        self.polish(&near.x, Some(&near.jacobian), ROUNDS)
-    }
-
-    /// Tries what else the torque may do between rows. Returns whether another behaviour was better and is set.
-    fn join(&mut self, near: &Polished) -> Result<bool> {
-        if self.intersample.is_some() || !between::matters(self.problem.recordings) {
-            return Ok(false);
-        }
-        let (now, step) = (self.problem.setup.intersample, self.problem.recordings[0].step());
-        let others =
-            between::alternatives(&self.problem, &near.x, &near.jacobian, &near.covariance);
-        self.simulations += others.len();
-        (self.progress)(format!(
-            "{}: {}",
-            self.model,
-            between::evidence((now, near.cost), step, &others)
-        ));
-        let best = others
-            .iter()
-            .filter(|other| self.acausal || !other.is_acausal(step))
-            .min_by(|a, b| a.cost.total_cmp(&b.cost));
-        let Some(best) = best.filter(|best| best.cost < near.cost - JOINS) else {
-            return Ok(false);
+        let step = self.problem.recordings[0].step();
+        let others = between::alternatives(&self.problem, &near);
+        self.simulations += others.iter().map(|other| other.minimum.simulations).sum::<usize>();
+        let said = between::evidence(&self.problem, &near, step, self.acausal, &others);
+        (self.progress)(format!("{}: {said}", self.model));
+        let Some(best) = between::better(near.cost, step, self.acausal, &others) else {
+            return Ok(near);
         };
-        self.problem.setup.intersample = best.behaviour;
+        let before = std::mem::replace(&mut self.problem.setup.intersample, best.behaviour);
+        let other = self.polish(&best.minimum.x, Some(&best.minimum.jacobian), ROUNDS)?;
+        if other.cost > near.cost {
+            self.problem.setup.intersample = before;
+            return Ok(near);
+        }
         (self.progress)(format!("{}: the torque is {}", self.model, best.behaviour.words()));
-        Ok(true)
+        Ok(other)
     }
 
     /// Whether it is a minimum whose residual is only noise.

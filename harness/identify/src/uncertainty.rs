@@ -114,6 +114,8 @@ pub struct Sources<'a> {
     pub friction_curves: Option<&'a DMatrix<f64>>,
     /// Of the same variables because another slosh model may be the right one.
     pub models: Option<&'a DMatrix<f64>>,
+    /// Of all variables because the torque may be another one between rows.
+    pub between_rows: Option<&'a DMatrix<f64>>,
     /// Of all variables, by tolerances of what is not estimated.
     pub tolerances: Option<&'a DMatrix<f64>>,
     /// The sandwich, where the residual is more than noise: no variance is less than there.
@@ -132,8 +134,8 @@ impl Sources<'_> {
             let with = all.view((0, 0), (n, n)) + models;
             all.view_mut((0, 0), (n, n)).copy_from(&with);
         }
-        if let Some(tolerances) = self.tolerances {
-            all += tolerances;
+        for more in [self.between_rows, self.tolerances].into_iter().flatten() {
+            all += more;
         }
         if let Some(sandwich) = self.residual {
             for i in 0..all.nrows() {
@@ -208,6 +210,7 @@ mod tests {
             noise: &noise,
             friction_curves: None,
             models: None,
+            between_rows: None,
             tolerances: None,
             residual: None,
         };

@@ -5,12 +5,10 @@ use std::collections::BTreeMap;
 use crate::budget::Effect;
 use crate::candidate::ModelFit;
 use crate::estimate::{Estimated, prose};
+use crate::evidence::{DECIDES, probabilities};
 use crate::missing::Missing;
 use crate::uncertainty::Combination;
 use analysis::innovations::{self, Tests};
-
-/// Least difference of the information criterion that decides (Kass and Raftery: very strong).
-pub const DECIDES: f64 = 10.0;
 
 /// Newton decrement from which on it is told.
 const TOLD: f64 = 0.1;
@@ -125,15 +123,6 @@ pub fn words(
     lines
 }
 
-/// Probabilities of models by their information criterion, all equally probable beforehand (Kass and Raftery 1995):
-/// exp(−BIC/2) over the sum.
-pub fn probabilities(bic: impl Iterator<Item = f64> + Clone) -> Vec<f64> {
-    let least = bic.clone().fold(f64::INFINITY, f64::min);
-    let weights: Vec<f64> = bic.map(|b| (-(b - least) / 2.0).exp()).collect();
-    let sum: f64 = weights.iter().sum();
-    weights.iter().map(|w| w / sum).collect()
-}
-
 fn slosh(question: &Question, fits: bool) -> Option<String> {
     let best = question.slosh.first()?;
     if question.slosh.len() == 1 {
@@ -219,16 +208,4 @@ fn reasons(tests: &Tests) -> String {
     let words: Vec<String> =
         failed.map(|(deviations, what)| format!("{what} ({deviations:.0} σ)")).collect();
     words.join(", ")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_difference_of_ten_in_the_criterion_is_a_probability_of_99_percent() {
-        let found = probabilities([-1000.0, -990.0].into_iter());
-        assert!((found[0] - 1.0 / (1.0 + (-5f64).exp())).abs() < 1e-15 && found[0] > 0.99);
-        assert!((found[0] + found[1] - 1.0).abs() < 1e-15);
-    }
 }

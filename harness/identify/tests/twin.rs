@@ -195,6 +195,38 @@ fn twenty_spikes_are_told_and_left_out() {
     }
 }
 
+/// A torque that is held and comes 5 ms late is, to a gyro, a linear one that comes 15 ms late: no choice may be stated as sure.
+#[test]
+fn a_delay_that_another_torque_between_rows_explains_as_well_is_not_stated_as_sure() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let known = [
+        ("slosh.zeta_from_correlation", "false"),
+        ("slosh.zeta", "0.003"),
+        ("friction.model", "viscous"),
+        ("friction.asymmetry", "0"),
+    ];
+    let settings: Vec<_> = known.map(|(name, value)| (name.to_string(), value.to_string())).into();
+    let sensor_errors = SensorErrors { delay: 0.005, ..SensorErrors::default() };
+    let intersample = Intersample::ZeroOrderHold;
+    let twin = Twin { settings, intersample, sensor_errors, ..Twin::default() };
+    let torque =
+        Torque::Profile("lin-sweep:amplitude=0.05,duration=130,f0=2,f1=3".parse().unwrap());
+    let recording = twin.record(&fmu, &torque, Some(1)).unwrap();
+    // of the friction only what is viscous, which is quick
+    let asked = Options { sensor_errors: true, friction: vec!["viscous".into()], ..options() };
+    let found = identify(&fmu, std::slice::from_ref(&recording), &asked, &mut |_| {}).unwrap();
+    let said = found.verdict.iter().find(|line| line.contains("torque does between rows")).unwrap();
+    assert!(said.contains("held from row to row (zero-order hold) with a delay of"), "{said}");
+    let delay = &found.measurement["delay"];
+    assert!((delay.interval[0]..=delay.interval[1]).contains(&0.005), "{delay:?}");
+    assert!(delay.std > 1e-3, "{delay:?}");
+    // told which it is, the delay is known to tens of microseconds
+    let told = Options { intersample: Some(intersample), ..asked };
+    let found = identify(&fmu, &[recording], &told, &mut |_| {}).unwrap();
+    let delay = &found.measurement["delay"];
+    assert!((delay.value - 0.005).abs() < 4.0 * delay.std && delay.std < 2e-4, "{delay:?}");
+}
+
 /// The bench's dry friction is smooth near rest, and its torque linear between rows. Held torque that comes 10 ms before it is commanded
 /// would explain that a little better.
 #[test]

@@ -25,7 +25,8 @@ use identify::methods::output_error::identify;
 use identify::options::Options;
 use identify::recording;
 
-/// Standard deviations beyond which an answer that says "described" is wrong.
+/// Standard deviations beyond which an answer that says "described" is wrong, unless its interval holds the truth all the same: one
+/// that is open says that it does not know.
 const WRONG: f64 = 5.0;
 
 /// What was found of one parameter, over all twins.
@@ -63,14 +64,18 @@ impl Tally {
             };
             let inside = (p.interval[0]..=p.interval[1]).contains(&truth);
             let off = (p.value - truth) / p.std;
-            each.push(format!("{name} {off:+.1}{}", if inside { "" } else { "!" }));
+            let outside = format!(
+                "! ({truth:.4e} is not from {:.4e} to {:.4e}; {:.4e} ± {:.1e})",
+                p.interval[0], p.interval[1], p.value, p.std
+            );
+            each.push(format!("{name} {off:+.1}{}", if inside { "" } else { &outside }));
             if !described {
                 continue;
             }
             let row = self.rows.entry(name.into()).or_default();
             row.off.push(off);
             row.inside += usize::from(inside);
-            if off.abs() > WRONG {
+            if off.abs() > WRONG && !inside {
                 self.wrong.push(format!("{} {name} {off:+.1}", twin.seed));
             }
         }

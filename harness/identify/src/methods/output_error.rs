@@ -16,8 +16,10 @@ use crate::between;
 use crate::budget::{self, Effect};
 use crate::candidate::{self, Fitted, ModelFit};
 use crate::estimate::Estimated;
-use crate::fit::{Answer, Differences, Polished, Problem};
+use crate::evidence::{self, ALIKE, DECIDES};
+use crate::fit::{self, Answer, Differences, Polished, Problem, is_other};
 use crate::friction;
+use crate::goodness::{fit_pct, is_poor, tests};
 use crate::missing;
 use crate::news::News;
 use crate::options::Options;
@@ -27,7 +29,7 @@ use crate::search::ROUNDS;
 use crate::start::{self, Response};
 use crate::uncertainty::{self, Covariance, Sources};
 use crate::unknown::{Quantity, Unknown};
-use crate::verdict::{self, DECIDES, Findings};
+use crate::verdict::{self, Findings};
 
 /// The FMU fitted in the time domain.
 pub struct OutputError {
@@ -59,9 +61,6 @@ impl Method for OutputError {
         Some(page::of(found))
     }
 }
-
-/// Difference below which the simpler model is taken (not worth more than a bare mention, ibid.).
-const ALIKE: f64 = 2.0;
 
 /// Newton decrement up to which a search has ended near enough to a minimum: the standard deviations take it in, by an eighth at most.
 const NEAR: f64 = 0.5;
@@ -223,7 +222,7 @@ fn sort(fitted: &mut [Fitted]) -> (usize, usize) {
 /// What the covariance of the first model's unknowns x gains because it may be one of the others: Σ p_k δ_k δ_kᵀ, with p_k
 /// the probability of model k and δ_k how far its estimate is from the first's.
 fn of_models(near: &[Fitted]) -> DMatrix<f64> {
-    let probabilities = verdict::probabilities(near.iter().map(|f| f.fit.bic));
+    let probabilities = evidence::probabilities(near.iter().map(|f| f.fit.bic));
     let (first, unknowns) = (&near[0].polished.x, &near[0].problem.unknowns);
     let mut gained = DMatrix::zeros(first.len(), first.len());
     for (other, probability) in near.iter().zip(probabilities).skip(1) {
@@ -258,14 +257,26 @@ fn finish(
     }
     // the gyro's scale is nearly a combination of the others: only exact sensitivities tell it from them
     problem.differences = Differences::Central;
-    let polished = problem.polish(&x, Some(&known), ROUNDS)?;
+    let mut polished = problem.polish(&x, Some(&known), ROUNDS)?;
     fit.simulations += polished.simulations;
+    // a search that ended elsewhere has taken what it left for noise
+    let before = problem.channels.clone();
+    problem.estimate_noise(&polished.answer);
+    if is_other(&before, &problem.channels) {
+        polished = problem.polish(&polished.x, Some(&polished.jacobian), ROUNDS)?;
+        fit.simulations += polished.simulations;
+    }
+    let between_rows = torque_between_rows(&mut problem, &mut polished, options, &mut fit)?;
+    fit.fit_pct = fit_pct(&problem, &polished.answer);
+    fit.tests = tests(&problem, &polished.answer);
+    fit.poor = is_poor(&problem, &polished.answer);
+    fit.noise_white = problem.channels[0].noise.white;
     fit.converged = polished.decrement < NEAR;
     fit.newton_decrement = polished.decrement;
     x.clone_from(&polished.x);
     let e = problem.stacked(&polished.answer, &x);
     let findings = Findings {
-        torque: torque_between_rows(&problem, &polished, options),
+        torque: between_rows.words,
         missing: missing::torques(&problem, &polished, &e)?,
         doubts: question
             .doubts
@@ -300,11 +311,13 @@ fn finish(
         noise: &covariance.x,
         friction_curves: friction_curves.as_ref(),
         models: None,
+        between_rows: None,
         tolerances: None,
         residual: None,
     };
     let full = Sources {
         models: of_models.as_ref(),
+        between_rows: between_rows.gained.as_ref(),
         tolerances: Some(&tolerances),
         residual: sandwich.as_ref(),
         ..noise
@@ -313,24 +326,30 @@ fn finish(
         * wider;
     let noise = noise.total();
     let of_values = DMatrix::from_fn(x.len(), x.len(), |i, j| full[(i, j)] * slopes[i] * slopes[j]);
+    let fastest = fit::fastest(&answer.motion);
     let (mut parameters, mut measurement) = (BTreeMap::new(), BTreeMap::new());
     for (i, unknown) in problem.unknowns.iter().enumerate() {
-        let deviation = full[(i, i)].sqrt();
-        let interval = match &profile {
-            // the profile's ends, and what is not noise
-            Some(profile) => {
-                let more =
-                    1.96_f64.powi(2) * slopes[i].powi(2) * (full[(i, i)] - noise[(i, i)]).max(0.0);
-                let [low, high] = profile.intervals[i];
-                let least = if unknown.is_positive() { 0.0 } else { f64::NEG_INFINITY };
-                [
-                    (values[i] - ((values[i] - low).powi(2) + more).sqrt()).max(least),
-                    values[i] + ((high - values[i]).powi(2) + more).sqrt(),
-                ]
-            }
-            None => [-1.0, 1.0].map(|side| unknown.end(x[i], side * 1.96 * deviation)),
+        let ends = |covariance: &DMatrix<f64>| {
+            [-1.96, 1.96].map(|reach| problem.end(&x, covariance, (i, reach), fastest))
         };
-        let std = of_values[(i, i)].sqrt();
+        let mut interval = ends(&full);
+        if let Some(profile) = &profile {
+            // the profile's ends, and what is not noise
+            let of_noise = ends(&noise);
+            for side in 0..2 {
+                let off = |end: f64| (end - values[i]).powi(2);
+                let more = (off(interval[side]) - off(of_noise[side])).max(0.0);
+                let reach = (off(profile.intervals[i][side]) + more).sqrt();
+                interval[side] = if side == 0 { values[i] - reach } else { values[i] + reach };
+            }
+            if unknown.is_positive() {
+                interval[0] = interval[0].max(0.0);
+            }
+        }
+        // of a skew interval that of the longer side
+        let reach = interval.map(|end| (end - values[i]).abs() / 1.96);
+        let reach = reach.into_iter().filter(|reach| reach.is_finite()).fold(0.0, f64::max);
+        let std = of_values[(i, i)].sqrt().max(reach);
         let is_zero = !unknown.is_positive();
         let estimated = Estimated {
             value: values[i],
@@ -431,17 +450,50 @@ fn shares(
 /// Share of the variance from which on it is told.
 const TOLD_SHARE: f64 = 0.2;
 
-/// What the choice of the torque between rows rests on, if it was free, in words.
-fn torque_between_rows(problem: &Problem, found: &Polished, options: &Options) -> Vec<String> {
+/// What the torque between rows is, if that was free.
+#[derive(Default)]
+struct BetweenRows {
+    /// What the choice rests on.
+    words: Vec<String>,
+    /// What the covariance gains because it may be another.
+    gained: Option<DMatrix<f64>>,
+}
+
+/// Judges once more what the torque does between rows, now that everything is free; problem and minimum are those of the best.
+fn torque_between_rows(
+    problem: &mut Problem,
+    found: &mut Polished,
+    options: &Options,
+    fit: &mut ModelFit,
+) -> Result<BetweenRows> {
     if options.intersample.is_some() || !between::matters(problem.recordings) {
-        return Vec::new();
+        return Ok(BetweenRows::default());
     }
-    let others = between::alternatives(problem, &found.x, &found.jacobian, &found.covariance);
-    let (now, step) = (problem.setup.intersample, problem.recordings[0].step());
-    let evidence = between::evidence((now, found.cost), step, &others);
+    let (step, acausal) = (problem.recordings[0].step(), options.acausal);
+    let count = |others: &[between::Alternative]| {
+        others.iter().map(|other| other.minimum.simulations).sum::<usize>()
+    };
+    let mut others = between::alternatives(problem, found);
+    fit.simulations += count(&others);
+    if let Some(best) = between::better(found.cost, step, acausal, &others) {
+        let before = std::mem::replace(&mut problem.setup.intersample, best.behaviour);
+        let other = problem.polish(&best.minimum.x, Some(&best.minimum.jacobian), ROUNDS)?;
+        fit.simulations += other.simulations;
+        if other.cost < found.cost {
+            *found = other;
+            others = between::alternatives(problem, found);
+            fit.simulations += count(&others);
+        } else {
+            problem.setup.intersample = before;
+        }
+    }
+    let evidence = between::evidence(problem, found, step, acausal, &others);
     let delay = between::delay(problem, &found.x, &found.covariance);
     let half = delay.and_then(|delay| between::half_a_row(delay, step));
-    std::iter::once(evidence).chain(half).collect()
+    Ok(BetweenRows {
+        words: std::iter::once(evidence).chain(half).collect(),
+        gained: between::gained(found, step, acausal, &others),
+    })
 }
 
 /// A rate that comes before the torque, if that is not allowed, in words.
