@@ -2,6 +2,7 @@
 
 use experiments::profile::{Profile, Torque};
 use host::fmu::Fmu;
+use identify::between;
 use identify::estimate::Estimated;
 use identify::fit::{Differences, Problem};
 use identify::methods::output_error::identify;
@@ -128,6 +129,37 @@ fn along_the_frictions_flat_valley_the_interval_is_that_of_the_likelihood() {
     }
     let said = found.verdict.iter().any(|l| l.starts_with("friction.omega_s is not determined"));
     assert!(said, "{:?}", found.verdict);
+}
+
+/// Slower yet: the hub never comes near the Stribeck speed, which may be as high as it likes, and the likelihood has one end alone.
+#[test]
+fn an_end_that_the_likelihood_does_not_have_is_open() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let gentle = "lin-sweep:amplitude=0.0125,duration=600,f0=1.8,f1=3";
+    let recordings = [sweep(&fmu, gentle, &[])];
+    let found = identify(&fmu, &recordings, &options(), &mut |_| {}).unwrap();
+    assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
+    let speed = &found.parameters["friction.omega_s"];
+    let [low, high] = speed.interval;
+    assert!(0.0 < low && low < 0.08581 && high == f64::INFINITY, "{speed:?}");
+    assert!(!speed.determined);
+    let said = found.verdict.iter().any(|l| l.starts_with("friction.omega_s is not determined"));
+    assert!(said, "{:?}", found.verdict);
+    // what the recording does show has two ends
+    for (name, truth) in [("tank.d", 0.163), ("tank.h", 0.1), ("hub.I", 0.322414)] {
+        let [low, high] = found.parameters[name].interval;
+        assert!(low < truth && truth < high && high < 1.1 * low, "{name}: {low} {high}");
+    }
+}
+
+/// The torque is held where it is taken as linear, or the other way round.
+#[test]
+fn a_delay_of_half_a_row_is_a_finding_where_it_is_known() {
+    let said = between::half_a_row((-0.0098, 1e-4), 0.02).unwrap();
+    assert!(said.contains("-9.80 ms, is half a row (10.00 ms)"), "{said}");
+    for (delay, std) in [(0.005, 1e-4), (0.02, 1e-4), (0.01, 0.01)] {
+        assert_eq!(between::half_a_row((delay, std), 0.02), None, "{delay} ± {std}");
+    }
 }
 
 /// Tank, hub, friction and the gyro's scale stand for one another along a valley that bends. Spherical slosh shows the scale, and the

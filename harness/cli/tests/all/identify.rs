@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::process::{Command, Output};
 
+use analysis::statistics::deviation;
 use signals::table::Table;
 
 /// Runs the program in a folder.
@@ -43,7 +44,9 @@ fn what_was_identified_is_fed_back_to_a_run() {
     let folder = folder.path();
     record(folder, "data.csv", &["hub.I=0.5"]);
     let asked = ["identify", "data.csv", "--model", "frozen", "--perfect", "--out", "result.json"];
-    hubslosh(folder, &asked).unwrap();
+    let said = hubslosh(folder, &asked).unwrap();
+    // the liquid's part of the inertia is what the tank says
+    assert!(said.contains("its interval holds for that liquid"), "{said}");
     let asked = ["run", "--parameters", "result.json", "--input", "data.csv", "--ignore-columns"];
     hubslosh(folder, &[&asked[..], &["--columns", "omega", "--out", "twin.csv"]].concat()).unwrap();
     let column = |name: &str| {
@@ -153,4 +156,46 @@ fn a_designed_multisine_is_within_the_wheels_limits_and_its_distortion_is_seen()
     // dry friction is odd; the linear liquid adds nothing
     assert!(said.contains("Odd nonlinear distortion is"), "{said}");
     assert!(said.contains("Even nonlinear distortion is not seen"), "{said}");
+}
+
+/// Each torque is given to the FMU, and its gyro's samples are taken apart into rate and noise.
+#[test]
+fn the_torque_for_a_signal_to_noise_ratio_gives_it_in_the_gyros_samples() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let asked = ["design", "--snr", "20", "--band", "1.25,20"];
+    // A linear bench: 7500 samples have the noise to 0.8 %, 0.07 dB; four of that. Dry friction takes a quarter of the torque at
+    // the lower end and more than half at the resonance; as viscous friction of the same first harmonic it is good to a twentieth.
+    let linear = ["friction.c=0", "friction.d=0"];
+    for (set, most) in [(&linear[..], 0.3), (&[], 0.5)] {
+        let set: Vec<&str> = set.iter().flat_map(|one| ["--set", one]).collect();
+        let said = hubslosh(folder, &[&asked[..], &["--json"], &set].concat()).unwrap();
+        let found: serde_json::Value = serde_json::from_str(&said).unwrap();
+        for what in ["lower end", "least", "upper end of"] {
+            let needs = found["needs"].as_array().unwrap();
+            let row = needs.iter().find(|n| n["what"].as_str().unwrap().starts_with(what)).unwrap();
+            let profile = format!(
+                "sine:amplitude={},frequency={},duration=300",
+                row["torque"], row["frequency"]
+            );
+            // lines between rows are the sine to (2π 20 Hz 1 ms)²/12 = 0.13 %
+            let flags = ["--step", "0.001", "--set", "imu.enabled=true", "--set", "imu.rate=50"];
+            let out = ["--columns", "omega,omega_imu", "--out", "twin.parquet"];
+            let run = ["run", "--profile", &profile];
+            hubslosh(folder, &[&run[..], &flags, &out, &set].concat()).unwrap();
+            let table = Table::read(&folder.join("twin.parquet"), &["omega", "omega_imu"]).unwrap();
+            // at the gyro's instants, once the liquid's own oscillation has decayed by exp(−0.003 · 2π 2.4 · 150) = e⁻⁷
+            let taken = |name: &str| -> Vec<f64> {
+                table.column(name).unwrap()[150_000..].iter().copied().step_by(20).collect()
+            };
+            let (rate, gyro) = (taken("omega"), taken("omega_imu"));
+            let noise: Vec<f64> = rate.iter().zip(&gyro).map(|(rate, gyro)| gyro - rate).collect();
+            let off = 20.0 * (deviation(&rate) / deviation(&noise)).log10() - 20.0;
+            println!("{profile} {set:?}: {off:+.2} dB");
+            assert!(off.abs() < most, "{profile} {set:?}: {off:+.2} dB off");
+        }
+    }
+    let said = hubslosh(folder, &asked).unwrap();
+    let line = said.lines().find(|line| line.starts_with("upper end of")).unwrap();
+    assert!(line.ends_with("more than the wheel gives"), "{said}");
 }
