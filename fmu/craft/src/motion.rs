@@ -103,6 +103,8 @@ pub struct CraftMotion {
     parked: Vec<Bob>,
     /// Of each tank with a ball regime.
     pub lumps: Vec<Lump>,
+    /// Whether the liquid of any has left its bottom.
+    any_loose: bool,
     /// What happens to the liquid of which lump at the end of the expansion.
     due: Option<(usize, Due)>,
     /// M at the start of the expansion, and its factors.
@@ -193,6 +195,7 @@ impl CraftMotion {
                 }
                 Mount::Pivot => Vec::new(),
             },
+            any_loose: false,
             due: None,
             lumps_allowed: 0.0,
         };
@@ -298,8 +301,7 @@ impl CraftMotion {
     /// Evaluates the equations at the present instant.
     pub fn evaluate(&mut self, inputs: &Inputs) {
         self.inputs = *inputs;
-        self.start(0.0);
-        self.rates_of::<0>();
+        self.evaluate_at(0.0);
     }
 
     /// Coefficients 0 and 1 of everything along the direction (dx, du).
@@ -361,7 +363,9 @@ impl CraftMotion {
     }
 
     /// Coefficient N of every quantity and N + 1 of the states.
-    #[inline(always)]
+    // In WebAssembly, which a page has to carry, each order is there once.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
     fn rates_of<const N: usize>(&mut self) {
         self.w_both.set(N, self.w[N], self.w[N]);
         let ww = products::<N>(&self.w);
@@ -386,10 +390,8 @@ impl CraftMotion {
             force = add(force, f);
             torque = add(torque, tau);
         }
-        for lump in self.lumps.iter_mut().filter(|lump| lump.is_loose()) {
-            let [f, tau] = lump.reaction(N, &self.w, &self.w_d);
-            force = add(force, f);
-            torque = add(torque, tau);
+        if self.any_loose {
+            [force, torque] = self.add_reactions_of_lumps(N, [force, torque]);
         }
         if N == 0 {
             self.factorise();
@@ -421,9 +423,8 @@ impl CraftMotion {
             bob.accelerate::<N>(self.a[N], w_d);
             dissipation += bob.dissipation::<N>();
         }
-        for lump in self.lumps.iter_mut().filter(|lump| lump.is_loose()) {
-            lump.accelerate(N, self.a[N], w_d);
-            dissipation += lump.dissipation(N);
+        if self.any_loose {
+            dissipation = self.accelerate_lumps(N, dissipation);
         }
         self.dissipation[N] = dissipation;
     }
@@ -508,9 +509,8 @@ impl Motion for CraftMotion {
             let at = index::bob(bob.tank, bob.mode);
             bob.start(x[at..at + 6].try_into().unwrap(), self.w[0]);
         }
-        for lump in self.lumps.iter_mut().filter(|lump| lump.is_loose()) {
-            let at = index::ball(lump.tank);
-            lump.start(x[at..at + 6].try_into().unwrap(), self.w[0]);
+        if self.any_loose {
+            self.start_lumps();
         }
     }
 
@@ -529,10 +529,9 @@ impl Motion for CraftMotion {
         // Force passes zero, too.
         let speed = largest(self.a[0]) * time + self.longest * swing + RATE_FLOOR;
         self.inv_allowed = [1.0, rate, swing, speed].map(|scale| 1.0 / (allowed * scale));
-        let loose = self.lumps.iter().filter(|lump| lump.is_loose());
-        let fastest =
-            loose.fold(RATE_FLOOR, |most, lump| most.max(lump.speed_scale(self.w[0], time)));
-        self.lumps_allowed = 1.0 / (allowed * fastest);
+        if self.any_loose {
+            self.set_error_scale_of_lumps(time, allowed);
+        }
         h
     }
 
@@ -546,8 +545,7 @@ impl Motion for CraftMotion {
         let v = self.bobs.iter().map(|bob| bob.coefficient_norm(n)).fold(0.0, larger);
         let body = larger(q * attitude, largest(self.w[n]) * rate);
         let norm = larger(body, larger(v * swing, largest(self.gain[n]) * speed));
-        let loose = self.lumps.iter().filter(|lump| lump.is_loose());
-        loose.map(|lump| lump.coefficient_norm(n) * self.lumps_allowed).fold(norm, larger)
+        if self.any_loose { larger(norm, self.coefficient_norm_of_lumps(n)) } else { norm }
     }
 
     #[inline(always)]
@@ -586,11 +584,8 @@ impl Motion for CraftMotion {
             finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
             x[at..at + 6].copy_from_slice(&moved);
         }
-        for lump in self.lumps.iter().filter(|lump| lump.is_loose()) {
-            let at = index::ball(lump.tank);
-            let moved = lump.at(x[at..at + 6].try_into().unwrap(), n, h, w);
-            finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
-            x[at..at + 6].copy_from_slice(&moved);
+        if self.any_loose {
+            finite &= self.take_lumps(n, h, w);
         }
         if !finite {
             return Err(StepError::NotFinite { time: self.state.time + t });
@@ -602,8 +597,58 @@ impl Motion for CraftMotion {
     }
 }
 
-// Liquid that leaves its bottom, meets the wall, and settles (lump.rs).
+// Liquid that leaves its bottom, meets the wall, and settles (lump.rs). Apart from the equations of a craft without, which
+// take fewer instructions so.
 impl CraftMotion {
+    #[inline(never)]
+    fn start_lumps(&mut self) {
+        let CraftMotion { lumps, state, w, .. } = self;
+        for lump in lumps.iter_mut().filter(|lump| lump.is_loose()) {
+            let at = index::ball(lump.tank);
+            lump.start(state.x[at..at + 6].try_into().unwrap(), w[0]);
+        }
+    }
+
+    /// Adds coefficient n of what the lumps do to the craft, about O.
+    #[inline(never)]
+    fn add_reactions_of_lumps(
+        &mut self,
+        n: usize,
+        [mut force, mut torque]: [Vec3; 2],
+    ) -> [Vec3; 2] {
+        for lump in self.lumps.iter_mut().filter(|lump| lump.is_loose()) {
+            let [f, tau] = lump.reaction(n, &self.w, &self.w_d);
+            force = add(force, f);
+            torque = add(torque, tau);
+        }
+        [force, torque]
+    }
+
+    /// Coefficients n of the lumps' accelerations, from those of the craft. Adds what they dissipate.
+    #[inline(never)]
+    fn accelerate_lumps(&mut self, n: usize, mut dissipation: f64) -> f64 {
+        for lump in self.lumps.iter_mut().filter(|lump| lump.is_loose()) {
+            lump.accelerate(n, self.a[n], self.w_d[n]);
+            dissipation += lump.dissipation(n);
+        }
+        dissipation
+    }
+
+    #[inline(never)]
+    fn set_error_scale_of_lumps(&mut self, time: f64, allowed: f64) {
+        let loose = self.lumps.iter().filter(|lump| lump.is_loose());
+        let fastest =
+            loose.fold(RATE_FLOOR, |most, lump| most.max(lump.speed_scale(self.w[0], time)));
+        self.lumps_allowed = 1.0 / (allowed * fastest);
+    }
+
+    #[inline(never)]
+    fn coefficient_norm_of_lumps(&self, n: usize) -> f64 {
+        let loose = self.lumps.iter().filter(|lump| lump.is_loose());
+        let norms = loose.map(|lump| lump.coefficient_norm(n) * self.lumps_allowed);
+        norms.fold(0.0, |most, norm| if norm > most { norm } else { most })
+    }
+
     /// Rigid liquids and bobs as the liquids' states want them. Does not allocate.
     fn arrange(&mut self) {
         let mut changed = false;
@@ -621,6 +666,7 @@ impl CraftMotion {
                 changed = true;
             }
         }
+        self.any_loose = self.lumps.iter().any(Lump::is_loose);
         if !changed {
             return;
         }
@@ -639,6 +685,19 @@ impl CraftMotion {
         self.rigid = self.liquids.iter().fold(self.craft, |sum, tank| sum.and(tank));
         self.mass_matrix = self.rigid.mass_matrix();
         self.freeze();
+    }
+
+    /// Moves the lumps' states on by a step of length h. Returns whether they are numbers within bounds.
+    #[inline(never)]
+    fn take_lumps(&mut self, n: usize, h: f64, w: Vec3) -> bool {
+        let (x, mut finite) = (&mut self.state.x, true);
+        for lump in self.lumps.iter().filter(|lump| lump.is_loose()) {
+            let at = index::ball(lump.tank);
+            let moved = lump.at(x[at..at + 6].try_into().unwrap(), n, h, w);
+            finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
+            x[at..at + 6].copy_from_slice(&moved);
+        }
+        finite
     }
 
     #[inline(never)]
@@ -664,8 +723,8 @@ impl CraftMotion {
         let mut any = false;
         // As many as a lump can go through at once, for every tank.
         for _ in 0..4 * self.lumps.len() {
-            self.start(0.0);
-            for n in 0..4 {
+            self.evaluate_at(0.0);
+            for n in 1..4 {
                 self.rates(n);
             }
             self.next_of_lumps(4, 0.0);
@@ -693,6 +752,7 @@ impl CraftMotion {
     }
 
     /// The equations `t` after the start of the call.
+    #[inline(never)]
     fn evaluate_at(&mut self, t: f64) {
         self.start(t);
         self.rates_of::<0>();

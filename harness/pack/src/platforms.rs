@@ -379,8 +379,8 @@ impl Toolchain {
             flags.push(format!("--remap-path-prefix={}=library", source.display()));
         }
         if platform.folder == WASM.folder {
-            // a page has to carry it: an FMU is a tenth smaller than at 3
-            let level = if matches!(product, Product::Fmu(_)) { "2" } else { "z" };
+            // a page has to carry it: an FMU is a fifth smaller than at 2, and a tenth slower
+            let level = if matches!(product, Product::Fmu(_)) { "s" } else { "z" };
             command.env("CARGO_PROFILE_FMU_OPT_LEVEL", level);
         }
         command.env("CARGO_ENCODED_RUSTFLAGS", flags.join("\x1f"));
