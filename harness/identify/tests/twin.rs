@@ -131,19 +131,17 @@ fn along_the_frictions_flat_valley_the_interval_is_that_of_the_likelihood() {
     assert!(said, "{:?}", found.verdict);
 }
 
-/// Slower yet: the hub never comes near the Stribeck speed, which may be as high as it likes, and the likelihood has one end alone.
+/// Slower yet: the hub never comes near the Stribeck speed, which may be as high as it likes. Then it may be as low, too: the curves
+/// b ω + c + d exp(−(ω/ω_s)²) tend to b ω + (c + d) for ω_s → ∞, and with that sum for c and d = 0 it is the same curve at any ω_s.
 #[test]
-#[ignore = "fails since every torque between rows has a fit of its own; not yet known whether the test or the interval is wrong"]
-fn an_end_that_the_likelihood_does_not_have_is_open() {
+fn ends_that_the_likelihood_does_not_have_are_open() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let gentle = "lin-sweep:amplitude=0.0125,duration=600,f0=1.8,f1=3";
     let recordings = [sweep(&fmu, gentle, &[])];
     let found = identify(&fmu, &recordings, &options(), &mut |_| {}).unwrap();
     assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
     let speed = &found.parameters["friction.omega_s"];
-    let [low, high] = speed.interval;
-    assert!(0.0 < low && low < 0.08581 && high == f64::INFINITY, "{speed:?}");
-    assert!(!speed.determined);
+    assert!(speed.interval == [0.0, f64::INFINITY] && !speed.determined, "{speed:?}");
     let said = found.verdict.iter().any(|l| l.starts_with("friction.omega_s is not determined"));
     assert!(said, "{:?}", found.verdict);
     // what the recording does show has two ends
