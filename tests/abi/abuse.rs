@@ -482,7 +482,7 @@ fn no_allowed_value_of_sloshtank_raises_a_floating_point_exception() {
 /// What the suite divides between the versions, each of them tries here: before a release, by hand.
 #[cfg(target_os = "linux")]
 #[test]
-#[ignore = "minutes; CI runs it"]
+#[ignore = "minutes"]
 fn lives_traps_and_allowed_values_all_in_both_versions() {
     for fmi in VERSIONS {
         a_whole_life(fmi, ALL);

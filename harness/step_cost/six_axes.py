@@ -1,0 +1,156 @@
+"""The instructions of fmi2DoStep in one and in six axes, as a table in Markdown.
+
+    python3 harness/step_cost/six_axes.py dist/HubSlosh.fmu dist/Spacecraft.fmu
+
+needs Linux, a C compiler, Python 3.11 or newer and valgrind. FMUs packed from older source will
+do, too: what they have no name for is left out. The FMU is driven as a host does, from its file
+(six_axes.c): a torque and its slope are set, fmi2DoStep makes a step of 20 ms, 1000 times after
+100; callgrind counts what happens in fmi2DoStep alone, the same on any machine.
+
+| case | what |
+| --- | --- |
+| hub | HubSlosh's bench, spherical model, no friction |
+| held | a craft with the same liquid, one tank and mode, under 1 g, held to one axis by its mass |
+| one | 1180 kg under 2400 N, one tank, one mode, drag by the constant law, as in all releases |
+| two | the same, two tanks of one mode, as in the comparison with Basilisk |
+| four | the same, four tanks of three modes each |
+"""
+
+import math
+import re
+import subprocess
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+from xml.etree import ElementTree
+
+STEP = 0.02  # s
+STEPS = (100, 1100)  # between which instructions are counted
+HELD_MASS = 1e9  # kg
+
+# case, tolerance, what
+ROWS = [
+    ("hub", 1e-6, "HubSlosh's bench, spherical model, no friction (2.3 Hz)"),
+    ("held", 1e-6, "the same liquid in a craft held to one axis"),
+    ("one", 1e-6, "1180 kg, one tank, one mode (0.4 Hz)"),
+    ("two", 1e-6, "the same with two tanks of one mode"),
+    ("four", 1e-6, "the same with four tanks of three modes"),
+    ("two", 1e-8, "two tanks at a tolerance of 1e-8"),
+]
+
+
+def parameters(case: str) -> dict[str, float | str]:
+    """Return what is set before the start."""
+    if case == "hub":
+        return {
+            "slosh.model": "spherical",
+            "friction.model": "none",
+            "init.slosh_angle": 0.1,
+            "init.slosh_angle_radial": 0.05,
+        }
+    p: dict[str, float | str] = {"init.omega[1]": 0.01, "init.omega[2]": -0.02}
+    p["init.omega[3]"] = 0.03
+
+    def vector(name: str, values: tuple[float, ...]) -> None:
+        p.update({f"{name}[{i}]": x for i, x in enumerate(values, 1)})
+
+    def bob(tank: int, mode: int, values: tuple[float, ...]) -> None:
+        p.update({f"tank[{tank}].p_0[{mode},{i}]": x for i, x in enumerate(values, 1)})
+
+    bob(1, 1, (0.05, 0.1, -0.99))
+    p["tank[1].damping_law"] = "constant"
+    if case == "held":
+        inertia = {"Jxx": HELD_MASS, "Jyy": HELD_MASS, "Jzz": 0.322414}
+        p.update({f"craft.{j}": x for j, x in {**inertia, "Jxy": 0, "Jxz": 0, "Jyz": 0}.items()})
+        p["craft.mass"] = HELD_MASS
+        vector("craft.r", (0, 0, 0))
+        vector("init.omega", (0, 0, 0))
+        vector("tank[1].position", (0.225, 0, 0))
+        p.update({"tank[1].g_ref": 9.81, "tank[1].diameter": 0.163, "tank[1].depth": 0.10})
+    elif case == "two":
+        p.update({"tanks": 2, "tank[2].damping_law": "constant"})
+        bob(2, 1, (-0.02, 0.05, -0.99))
+        vector("tank[1].position", (0.6, 0, 0))
+        vector("tank[2].position", (-0.6, 0, 0))
+    elif case == "four":
+        p["tanks"] = 4
+        for i, (x, y) in enumerate([(0.6, 0.6), (0.6, -0.6), (-0.6, 0.6), (-0.6, -0.6)], 1):
+            p.update({f"tank[{i}].modes": 3, f"tank[{i}].damping_law": "constant"})
+            vector(f"tank[{i}].position", (x, y, -0.2))
+            vector(f"tank[{i}].q", (0.97, 0.1 * x, -0.1 * y, 0.05))
+            for mode in (1, 2, 3):
+                bob(i, mode, (0.1, 0.05, -0.99))
+    return p
+
+
+def arguments(folder: Path, case: str, tolerance: float) -> list[str]:
+    """Return what six_axes.c is told of a case, but for the steps, which are third."""
+    root = ElementTree.parse(folder / "modelDescription.xml").getroot()
+    variables = {v.get("name"): v for v in root.iter("ScalarVariable")}
+    items = {
+        kind.get("name"): {item.get("name"): item.get("value") for item in kind.iter("Item")}
+        for kind in root.iter("SimpleType")
+    }
+    identifier = root.find("CoSimulation").get("modelIdentifier")
+    library = folder / "binaries" / "linux64" / f"{identifier}.so"
+    values = parameters(case)
+    if case == "hub":
+        w, swing = 13.0, {"tau_cmd": 0.05}
+    elif case == "held":
+        values["force[3]"] = HELD_MASS * 9.81
+        w, swing = 13.0, {"torque[3]": 0.05}
+    else:
+        values["force[3]"] = 2400.0
+        w, swing = 2.5, {"torque[1]": 20.0, "torque[2]": 10.0, "torque[3]": 20.0}
+    told = [str(library), root.get("guid"), str(tolerance), "", str(w)]
+    for name, value in values.items():
+        if name not in variables:
+            continue
+        kind = variables[name][0]
+        code = "r" if kind.tag == "Real" else "i"
+        number = items[kind.get("declaredType")][value] if isinstance(value, str) else value
+        told += [code, variables[name].get("valueReference"), str(number)]
+    for name, size in swing.items():
+        told += ["u", variables[name].get("valueReference"), str(size)]
+    return told
+
+
+def count(program: Path, told: list[str]) -> float:
+    """Return the instructions of one fmi2DoStep."""
+    counts = []
+    for steps in STEPS:
+        tool = ["valgrind", "--tool=callgrind", "--callgrind-out-file=/dev/null"]
+        command = [*tool, "--toggle-collect=fmi2DoStep", program, *told[:3], str(steps), *told[4:]]
+        done = subprocess.run(command, capture_output=True, text=True)
+        found = re.search(r"Collected : (\d+)", done.stderr)
+        if done.returncode or not found:
+            sys.exit(done.stderr)
+        counts.append(int(found[1]))
+    return (counts[1] - counts[0]) / (STEPS[1] - STEPS[0])
+
+
+def main() -> None:
+    """Print the table, a row per case."""
+    if len(sys.argv) != 3:
+        sys.exit(__doc__)
+    print("| what | instructions | over HubSlosh |")
+    print("| --- | --- | --- |")
+    with tempfile.TemporaryDirectory() as folder:
+        program = Path(folder, "six_axes")
+        source = Path(__file__).with_suffix(".c")
+        options = ["-std=gnu11", "-O2", "-Wall", "-Wextra"]
+        subprocess.run(["cc", *options, source, "-ldl", "-lm", "-o", program], check=True)
+        hub, craft = Path(folder, "hub"), Path(folder, "craft")
+        zipfile.ZipFile(sys.argv[1]).extractall(hub)
+        zipfile.ZipFile(sys.argv[2]).extractall(craft)
+        unit = math.nan
+        for case, tolerance, what in ROWS:
+            told = arguments(hub if case == "hub" else craft, case, tolerance)
+            n = count(program, told)
+            unit = n if case == "hub" else unit
+            print(f"| {what} | {n:,.0f} | {n / unit:.1f} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
