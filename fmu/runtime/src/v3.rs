@@ -2245,15 +2245,7 @@ mod tests {
     fn dependencies_are_those_of_the_start_until_it_is_over_and_then_those_declared() {
         let host = Mutex::new(TestHost::default());
         unsafe {
-            let instance = fmi3InstantiateModelExchange::<Spring>(
-                c"one".as_ptr(),
-                token().as_ptr(),
-                ptr::null(),
-                0,
-                0,
-                ptr::from_ref(&host).cast_mut().cast(),
-                Some(log),
-            );
+            let instance = model_exchange(&host);
             let of = |instance, name: &str| {
                 let mut count = 99;
                 let status = fmi3GetNumberOfVariableDependencies::<Spring>(
@@ -2296,19 +2288,28 @@ mod tests {
         }
     }
 
+    /// An instance of Model Exchange that tells its messages to `host`.
+    fn model_exchange(host: &Mutex<TestHost>) -> fmi3Instance {
+        let environment = ptr::from_ref(host).cast_mut().cast();
+        let (name, token) = (c"one".as_ptr(), token());
+        unsafe {
+            fmi3InstantiateModelExchange::<Spring>(
+                name,
+                token.as_ptr(),
+                ptr::null(),
+                0,
+                0,
+                environment,
+                Some(log),
+            )
+        }
+    }
+
     #[test]
     fn model_exchange_goes_through_its_modes_and_takes_single_states() {
         let host = Mutex::new(TestHost::default());
         unsafe {
-            let instance = fmi3InstantiateModelExchange::<Spring>(
-                c"one".as_ptr(),
-                token().as_ptr(),
-                ptr::null(),
-                0,
-                0,
-                ptr::from_ref(&host).cast_mut().cast(),
-                Some(log),
-            );
+            let instance = model_exchange(&host);
             assert_eq!(fmi3EnterConfigurationMode::<Spring>(instance), fmi3OK);
             assert_eq!(fmi3ExitConfigurationMode::<Spring>(instance), fmi3OK);
             let mut count = 0;
@@ -2411,15 +2412,7 @@ mod tests {
     fn fmusim_may_ask_for_the_numbers_of_states_and_indicators_in_continuous_time_mode() {
         let host = Mutex::new(TestHost::default());
         unsafe {
-            let instance = fmi3InstantiateModelExchange::<Spring>(
-                c"one".as_ptr(),
-                token().as_ptr(),
-                ptr::null(),
-                0,
-                0,
-                ptr::from_ref(&host).cast_mut().cast(),
-                Some(log),
-            );
+            let instance = model_exchange(&host);
             fmi3EnterInitializationMode::<Spring>(instance, 0, 0.0, 0.0, 0, 0.0);
             fmi3ExitInitializationMode::<Spring>(instance);
             assert_eq!(fmi3EnterContinuousTimeMode::<Spring>(instance), fmi3OK);
