@@ -3,6 +3,7 @@
 mod abi {
     mod abuse;
     mod calls;
+    mod derivatives;
     mod model_exchange;
 }
 mod architecture;
