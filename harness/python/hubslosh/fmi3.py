@@ -1,8 +1,8 @@
 # ruff: noqa: N802, N803, N815 - the names of FMI and of fmpy
-"""An instance of an FMU 3.0 with the calls of FMI 2.0, as `plant` and `batch` make them.
+"""An instance of an FMU 3.0 with the calls of FMI 2.0, as the rest of the package makes them.
 
-Neither event mode nor early return is used: the FMU handles its events within its steps, as FMI 2.0
-has it. What FMI 3.0 no longer has, derivatives of inputs, are lines that the FMU hears of in
+In Co-Simulation neither event mode nor early return is used: the FMU handles its events within its
+steps, as FMI 2.0 has it. What FMI 3.0 no longer has, derivatives of inputs, are lines that the FMU hears of in
 intermediate update.
 """
 
@@ -11,7 +11,7 @@ from ctypes import byref
 from typing import Any
 
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi3 import FMU3Slave, fmi3Boolean, fmi3Float64
+from fmpy.fmi3 import FMU3Model, FMU3Slave, fmi3Boolean, fmi3Float64
 from fmpy.model_description import ScalarVariable
 
 KINDS = {"Float64": "Real", "Int32": "Integer"}
@@ -21,7 +21,75 @@ _DISCARD = 2
 _ERROR = 3
 
 
-class Slave(FMU3Slave):
+class _Calls:
+    """What the instances of both interfaces are called by; a part of one of fmpy's classes."""
+
+    _enumerations: Collection[int]
+    _experiment: dict[str, Any]
+
+    def _begin(self, variables: Mapping[str, ScalarVariable]) -> None:
+        """Remember of an FMU's variables what the calls need; no experiment is set up yet."""
+        self._enumerations = {
+            v.valueReference for v in variables.values() if v.type == "Enumeration"
+        }
+        self._experiment = {}
+
+    # by name of fmpy.fmi2, with lists
+
+    def setupExperiment(self, **experiment: Any) -> None:
+        """Keep tolerance, start and stop for `enterInitializationMode`."""
+        self._experiment = experiment
+
+    def enterInitializationMode(self) -> None:
+        """Enter initialization mode with what `setupExperiment` was given."""
+        super().enterInitializationMode(**self._experiment)  # type: ignore[misc]
+
+    def setReal(self: Any, vr: Sequence[int], values: Sequence[float]) -> None:
+        """Set Float64s."""
+        self.setFloat64(vr, values)
+
+    def getReal(self: Any, vr: Sequence[int]) -> list[float]:
+        """Return Float64s."""
+        return self.getFloat64(vr)
+
+    def setInteger(self: Any, vr: Sequence[int], values: Sequence[int]) -> None:
+        """Set Int32s and enumerations."""
+        for reference, value in zip(vr, values, strict=True):
+            wide = reference in self._enumerations
+            (self.setInt64 if wide else self.setInt32)([reference], [value])
+
+    def getInteger(self: Any, vr: Sequence[int]) -> list[int]:
+        """Return Int32s and enumerations."""
+        return [
+            (self.getInt64 if reference in self._enumerations else self.getInt32)([reference])[0]
+            for reference in vr
+        ]
+
+
+def _logger(say: Callable[[str], None]) -> Callable[..., None]:
+    """Return a callback that hands the texts of messages on."""
+    return lambda environment, status, category, text: say(text.decode(errors="replace"))
+
+
+class Model(_Calls, FMU3Model):
+    """A Model Exchange instance of ``fmpy.fmi3`` that is called like one of ``fmpy.fmi2``."""
+
+    def instantiate(
+        self,
+        variables: Mapping[str, ScalarVariable],
+        intermediate: Collection[str],
+        say: Callable[[str], None],
+    ) -> None:
+        """Instantiate, as `Slave.instantiate`; nothing is intermediate here."""
+        self._begin(variables)
+        super().instantiate(logMessage=_logger(say))
+
+    def newDiscreteStates(self) -> tuple[Any, ...]:
+        """Return what fmi3UpdateDiscreteStates says: that it is needed once more, and so on."""
+        return tuple(self.updateDiscreteStates())
+
+
+class Slave(_Calls, FMU3Slave):
     """A Co-Simulation instance of ``fmpy.fmi3`` that is called like one of ``fmpy.fmi2``."""
 
     def instantiate(
@@ -35,9 +103,7 @@ class Slave(FMU3Slave):
         variables: of the FMU by name. intermediate: those that take part in intermediate update.
         """
         self._say = say
-        self._enumerations = {
-            v.valueReference for v in variables.values() if v.type == "Enumeration"
-        }
+        self._begin(variables)
         taken = [
             variables[name].valueReference
             for name in sorted(intermediate)
@@ -47,11 +113,8 @@ class Slave(FMU3Slave):
         self._lines: list[tuple[int, float, float]] = []
         self._from = 0.0
         self._refused: FMICallException | None = None
-        self._experiment: dict[str, Any] = {}
         super().instantiate(
-            logMessage=lambda environment, status, category, text: say(
-                text.decode(errors="replace")
-            ),
+            logMessage=_logger(say),
             intermediateUpdate=self._update if taken else None,
             requiredIntermediateVariables=taken,
         )
@@ -79,35 +142,6 @@ class Slave(FMU3Slave):
             self._refused = error
 
     # by name of fmpy.fmi2, with lists
-
-    def setupExperiment(self, **experiment: Any) -> None:
-        """Keep tolerance, start and stop for `enterInitializationMode`."""
-        self._experiment = experiment
-
-    def enterInitializationMode(self) -> None:
-        """Enter initialization mode with what `setupExperiment` was given."""
-        super().enterInitializationMode(**self._experiment)
-
-    def setReal(self, vr: Sequence[int], values: Sequence[float]) -> None:
-        """Set Float64s."""
-        self.setFloat64(vr, values)
-
-    def getReal(self, vr: Sequence[int]) -> list[float]:
-        """Return Float64s."""
-        return self.getFloat64(vr)
-
-    def setInteger(self, vr: Sequence[int], values: Sequence[int]) -> None:
-        """Set Int32s and enumerations."""
-        for reference, value in zip(vr, values, strict=True):
-            wide = reference in self._enumerations
-            (self.setInt64 if wide else self.setInt32)([reference], [value])
-
-    def getInteger(self, vr: Sequence[int]) -> list[int]:
-        """Return Int32s and enumerations."""
-        return [
-            (self.getInt64 if reference in self._enumerations else self.getInt32)([reference])[0]
-            for reference in vr
-        ]
 
     def setRealInputDerivatives(
         self, vr: Sequence[int], order: Sequence[int], values: Sequence[float]

@@ -102,8 +102,13 @@ class Fmu:
             raise FmuError(f"{path} is of FMI {version}; 2.0 or 3.0 is expected")
         self.is_fmi3 = self.description.fmiVersion == "3.0"
         """Whether it is of FMI 3.0."""
-        self.intermediate = _intermediate(path) if self.is_fmi3 else frozenset()
+        self.intermediate: frozenset[str] = frozenset()
         """Names of the variables that take part in intermediate update."""
+        if self.is_fmi3:
+            self.intermediate, directional = _of_fmi3(path)
+            if self.description.modelExchange is not None:
+                # the name that fmpy has of FMI 2.0
+                self.description.modelExchange.providesDirectionalDerivative = directional
         for interface in (self.description.coSimulation, self.description.modelExchange):
             if interface is not None and not is_file_name(interface.modelIdentifier):
                 raise FmuError(
@@ -211,15 +216,21 @@ class Fmu:
         return float(shown[unit].factor), float(shown[unit].offset)
 
 
-def _intermediate(path: Path) -> frozenset[str]:
-    """Return the names of the variables with ``intermediateUpdate``, which fmpy does not read."""
+def _of_fmi3(path: Path) -> tuple[frozenset[str], bool]:
+    """Return what fmpy does not read of an FMU 3.0.
+
+    The names of the variables with ``intermediateUpdate``, and whether Model Exchange
+    ``providesDirectionalDerivatives``.
+    """
+    true = ("true", "1")
+    intermediate, directional = set(), False
     with zipfile.ZipFile(path) as archive, archive.open(DESCRIPTION) as file:
-        variables = (element for _, element in ElementTree.iterparse(file))
-        return frozenset(
-            element.attrib["name"]
-            for element in variables
-            if element.get("intermediateUpdate") in ("true", "1")
-        )
+        for _, element in ElementTree.iterparse(file):
+            if element.get("intermediateUpdate") in true:
+                intermediate.add(element.attrib["name"])
+            if element.tag == "ModelExchange":
+                directional = element.get("providesDirectionalDerivatives") in true
+    return frozenset(intermediate), directional
 
 
 def _with_unit(text: str) -> Quantity:

@@ -213,7 +213,7 @@ def linearize(
     *,
     all_states: bool = False,
 ) -> LinearModel:
-    """Linearise an FMU where its parameters start it, by fmi2GetDirectionalDerivative.
+    """Linearise an FMU where its parameters start it, by its directional derivatives.
 
     model, parameters: as for `simulate`; start values among the parameters (``init.omega``) and
     values of inputs (``g_axial``) are the point of linearisation. The FMU must offer Model Exchange
@@ -227,8 +227,6 @@ def linearize(
     """
     fmu = Fmu.open(model)
     exchange = fmu.description.modelExchange
-    if fmu.is_fmi3:
-        raise FmuError(f"{fmu.path} is of FMI 3.0; 2.0 is expected here: its model is the same")
     if exchange is None or not exchange.providesDirectionalDerivative:
         raise FmuError(f"{fmu.path} offers no directional derivatives in Model Exchange")
     parameters = parameters_of(parameters)
@@ -236,6 +234,8 @@ def linearize(
     names_out = _reals(fmu, outputs, "output")
     derivatives = [unknown.variable for unknown in fmu.description.derivatives]
     states = [derivative.derivative for derivative in derivatives]
+    if arrays := [state.name for state in states if state.dimensions]:
+        raise FmuError(f"{fmu.name} has arrays of states ({', '.join(arrays)}): scalars alone")
     references = [fmu.variable(name).valueReference for name in names_out]
     unknown = [v.valueReference for v in derivatives] + references
     known = [v.valueReference for v in states]
@@ -290,17 +290,17 @@ def _seen(A: Matrix, C: Matrix) -> NDArray[np.bool_]:
 def _reals(fmu: Fmu, names: Sequence[str] | str | None, causality: str) -> list[str]:
     """Return the Real variables meant."""
     if names is None:
-        return [name for name in fmu.names(causality) if fmu.variable(name).type == "Real"]
+        return [name for name in fmu.names(causality) if fmu.kind(name) == "Real"]
     problems: list[str] = []
     names = names_of(names, f"{causality}s", problems)
     for name in names:
         try:
-            variable = fmu.variable(name)
+            variable, kind = fmu.variable(name), fmu.kind(name)
         except FmuError as error:
             problems.append(str(error))
             continue
-        if variable.type != "Real":
-            problems.append(f"{name} is of type {variable.type}, not Real")
+        if kind != "Real":
+            problems.append(f"{name} is of type {kind}, not Real")
         elif causality == "input" and variable.causality != "input":
             allowed = ", ".join(fmu.names("input"))
             problems.append(f"{name} is no input of {fmu.name} (inputs: {allowed})")

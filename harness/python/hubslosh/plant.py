@@ -118,12 +118,12 @@ _STARTS = {
 class Instance:
     """An instance of an FMU, from fmi2Instantiate to fmi2FreeInstance; variables by name.
 
-    Those of FMI 3.0 are for Co-Simulation, with the calls of FMI 2.0 (`fmi3.Slave`).
+    Those of FMI 3.0 have the calls of FMI 2.0 (`fmi3`).
 
     Use it in a ``with`` statement. The package's FMUs start at rest here: what moves was asked for.
     """
 
-    def __init__(self, fmu: Fmu, kind: type[fmi2.FMU2Slave] | type[fmi2.FMU2Model]) -> None:
+    def __init__(self, fmu: Fmu, kind: type) -> None:
         """Instantiate for Co-Simulation (``FMU2Slave``) or Model Exchange (``FMU2Model``)."""
         self._instance: Any = None
         self.fmu = fmu
@@ -134,7 +134,6 @@ class Instance:
             interface, name = description.modelExchange, "Model Exchange"
         if interface is None:
             raise FmuError(f"{fmu.path} offers no {name}")
-        assert not fmu.is_fmi3 or kind is fmi2.FMU2Slave, "FMI 3.0 is for Co-Simulation here"
         folder = Path(fmu.directory) / "binaries"
         platform = platform_tuple if fmu.is_fmi3 else PLATFORM
         binary = folder / platform / f"{interface.modelIdentifier}{sharedLibraryExtension}"
@@ -142,9 +141,9 @@ class Instance:
             there = ", ".join(sorted(path.name for path in folder.glob("*"))) or "none"
             raise FmuError(f"{fmu.path} has no binary for {platform} (platforms in it: {there})")
         try:
-            instance = _loaded(
-                fmi3.Slave if fmu.is_fmi3 else kind, fmu, interface.modelIdentifier, binary
-            )
+            if fmu.is_fmi3:
+                kind = fmi3.Slave if kind is fmi2.FMU2Slave else fmi3.Model
+            instance = _loaded(kind, fmu, interface.modelIdentifier, binary)
         except Exception as error:  # fmpy raises nothing more special
             raise FmuError(f"{fmu.path} cannot be loaded: {error}") from None
         _messages.said.clear()

@@ -110,11 +110,34 @@ def test_a_controller_in_the_loop_gives_the_bits_of_fmi_2(fmu: Path) -> None:
 
 
 def test_what_an_fmu_3_refuses_is_said_in_its_own_words(fmu: Path) -> None:
-    """A value out of its range, a step that fails, an interface that is not used here."""
+    """A value out of its range, a step that fails, a model that does not start."""
     with pytest.raises(FmuError, match=r"fmi3.*tank\.h"):
         simulate(three(fmu), {"tank.h": -1.0}, stop=0.1)
     inputs = pd.DataFrame({"time": [0.0, 0.1, 0.2], "g_axial": [9.81, -1e9, 9.81]})
     with pytest.raises(RunError, match=r"fmi3SetFloat64 returned fmi3.*g_axial"):
         simulate(three(fmu), None, inputs, hold=True)
-    with pytest.raises(FmuError, match=r"is of FMI 3\.0; 2\.0 is expected here"):
-        linearize(three(fmu))
+    with pytest.raises(FmuError, match=r"fmi3.*wheel\.speed_min"):
+        linearize(three(fmu), {"wheel.speed_min": 500.0, "wheel.enabled": True})
+
+
+@pytest.mark.parametrize("model", INPUTS)
+def test_a_linear_model_has_the_bits_of_fmi_2(fmu: Path, model: str) -> None:
+    """All matrices and names, at a start that is no rest, with parameters and inputs of every type.
+
+    The FMU evaluates the same derivatives for the same seeds, whatever the function is called.
+    """
+    moving = {
+        "HubSlosh": {"friction.model": "viscous", "init.omega": 0.1, "tau_cmd": 0.02},
+        "Spacecraft": {"init.omega[2]": 0.1, "force[3]": 100.0, "tank[1].p_0[1,1]": 0.2},
+        "SloshTank": {"omega[2]": 0.1, "a[3]": 1.5, "tank.p_0[1,1]": 0.2},
+    }[model]
+    arguments = {"parameters": PARAMETERS[model] | moving, "all_states": True}
+    first = linearize(fmu.with_name(f"{model}.fmu"), **arguments)
+    second = linearize(three(fmu, model), **arguments)
+    assert (first.states, first.inputs, first.outputs) == (
+        second.states, second.inputs, second.outputs,
+    )  # fmt: skip
+    for one, other in zip(first, second, strict=True):
+        assert np.array_equal(one, other) and one.any()
+    some = {"inputs": second.inputs[0], "outputs": second.outputs[:2]}
+    assert linearize(three(fmu, model), moving, **some).D.shape == (2, 1)
