@@ -9,7 +9,7 @@ use std::ffi::{c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use crate::feedback::{Closed, Controller, Feedback, Linear, Open};
-use crate::instance::Instance;
+use crate::instance::{DISCARD, ERROR, Function, Instance, OK, WARNING};
 use crate::run::{self, Inputs, Outputs, Run, Stop};
 
 type Set<T> = unsafe extern "C" fn(*mut c_void, *const u32, usize, *const T) -> c_int;
@@ -18,7 +18,12 @@ type SetDerivatives =
     unsafe extern "C" fn(*mut c_void, *const u32, usize, *const c_int, *const f64) -> c_int;
 type DoStep = unsafe extern "C" fn(*mut c_void, f64, f64, c_int) -> c_int;
 
-/// An instance between two steps, and the functions of its FMU.
+type Set3<T> = unsafe extern "C" fn(*mut c_void, *const u32, usize, *const T, usize) -> c_int;
+type Get3<T> = unsafe extern "C" fn(*mut c_void, *const u32, usize, *mut T, usize) -> c_int;
+type DoStep3 =
+    unsafe extern "C" fn(*mut c_void, f64, f64, u8, *mut u8, *mut u8, *mut u8, *mut f64) -> c_int;
+
+/// An instance of FMI 2.0 between two steps, and the functions of its FMU.
 #[repr(C)]
 pub struct CInstance {
     /// `fmi2Component`.
@@ -39,6 +44,73 @@ pub struct CInstance {
     pub get_integer: Get<c_int>,
     /// fmi2GetBoolean
     pub get_boolean: Get<c_int>,
+}
+
+/// An instance of FMI 3.0 between two steps, made without event mode and early return, and the functions of its FMU.
+#[repr(C)]
+pub struct CInstance3 {
+    /// `fmi3Instance`.
+    pub component: *mut c_void,
+    /// fmi3SetFloat64
+    pub set_float64: Set3<f64>,
+    /// fmi3SetInt32
+    pub set_int32: Set3<c_int>,
+    /// fmi3SetInt64
+    pub set_int64: Set3<i64>,
+    /// fmi3SetBoolean
+    pub set_boolean: Set3<u8>,
+    /// fmi3DoStep
+    pub do_step: DoStep3,
+    /// fmi3GetFloat64
+    pub get_float64: Get3<f64>,
+    /// fmi3GetInt32
+    pub get_int32: Get3<c_int>,
+    /// fmi3GetInt64
+    pub get_int64: Get3<i64>,
+    /// fmi3GetBoolean
+    pub get_boolean: Get3<u8>,
+    /// How many enumerations the FMU has: what is passed as Int64.
+    pub enumerations: usize,
+    /// Their value references, rising.
+    pub enumeration_references: *const u32,
+    /// The instance's environment.
+    pub step: *mut CStep,
+}
+
+/// What a step of FMI 3.0 is made with, and what it said: the environment with which the instance was made if its
+/// intermediateUpdate is [`hubslosh_batch_intermediate_update`].
+#[repr(C)]
+pub struct CStep {
+    /// `fmi3Instance`.
+    pub component: *mut c_void,
+    /// fmi3SetFloat64
+    pub set_float64: Set3<f64>,
+    /// How many inputs the FMU takes within a step; the arrays have as many places.
+    pub taken: usize,
+    /// Their value references, rising.
+    pub taken_references: *const u32,
+    /// How many of them go in lines through the step.
+    pub count: usize,
+    /// Which.
+    pub references: *mut u32,
+    /// Their values at `start`.
+    pub values: *mut f64,
+    /// Their slopes, per s.
+    pub slopes: *mut f64,
+    /// Room for their values at a point of the step.
+    pub at: *mut f64,
+    /// Where the step begins, s.
+    pub start: f64,
+    /// The worst status of fmi3SetFloat64 within the step.
+    pub status: c_int,
+    /// eventHandlingNeeded
+    pub event: u8,
+    /// terminateSimulation
+    pub terminate: u8,
+    /// earlyReturn
+    pub early_return: u8,
+    /// lastSuccessfulTime, s
+    pub reached: f64,
 }
 
 /// Variables of one type: `rows` × `count` values, row after row.
@@ -129,7 +201,7 @@ pub const STOPPED: c_int = 1;
 pub const BAD_ARGUMENTS: c_int = 2;
 
 /// Version of this interface; another one has other structures.
-pub const VERSION: c_int = 2;
+pub const VERSION: c_int = 3;
 
 /// The version of this interface.
 #[unsafe(no_mangle)]
@@ -137,30 +209,69 @@ pub extern "C" fn hubslosh_batch_version() -> c_int {
     VERSION
 }
 
+/// The callback intermediateUpdate of an instance of FMI 3.0: sets the inputs that go in lines to where they are at
+/// `time`, s; asks for no early return.
+///
+/// # Safety
+/// `environment` must be NULL or a [`CStep`] whose arrays have the lengths it says; the other pointers NULL or writable.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn hubslosh_batch_intermediate_update(
+    environment: *mut c_void,
+    time: f64,
+    set_requested: u8,
+    _get_allowed: u8,
+    _step_finished: u8,
+    _can_return_early: u8,
+    early_return_requested: *mut u8,
+    early_return_time: *mut f64,
+) {
+    // SAFETY: as this function demands. The instance's step looks at the structure before and after fmi3DoStep alone.
+    unsafe {
+        if let Some(asked) = early_return_requested.as_mut() {
+            *asked = 0;
+        }
+        if let Some(when) = early_return_time.as_mut() {
+            *when = time;
+        }
+        let Some(step) = environment.cast::<CStep>().as_mut() else { return };
+        if set_requested == 0 || step.count == 0 {
+            return;
+        }
+        for i in 0..step.count {
+            let (value, slope) = (*step.values.add(i), *step.slopes.add(i));
+            *step.at.add(i) = value + slope * (time - step.start);
+        }
+        let (component, n) = (step.component, step.count);
+        let status = (step.set_float64)(component, step.references, n, step.at, n);
+        step.status = step.status.max(status);
+    }
+}
+
 /// Drives an instance through a run; see [`run::run`] for the order of calls. Returns [`DONE`],
 /// [`STOPPED`] or [`BAD_ARGUMENTS`].
 ///
 /// # Safety
-/// `instance` must hold an instance of FMI 2.0 for Co-Simulation in the state stepComplete and the
-/// functions of its binary; the arrays of `run` must have the lengths they say; `stop` must be
+/// `instance` must be, for `fmi` = 2, a [`CInstance`] with an instance for Co-Simulation in the state stepComplete and the
+/// functions of its binary; for `fmi` = 3 a [`CInstance3`] in step mode, whose arrays have the lengths they say. The
+/// arrays of `run` must have the lengths they say; `stop` must be
 /// writable. No other thread may use the instance meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hubslosh_batch_run(
-    instance: *const CInstance,
+    fmi: c_int,
+    instance: *const c_void,
     run: *const CRun,
     stop: *mut Stop,
 ) -> c_int {
     // A panic must not unwind into the host.
     catch_unwind(AssertUnwindSafe(|| {
         // SAFETY: as this function demands; NULL becomes None.
-        let (instance, run, stop) = unsafe { (instance.as_ref(), run.as_ref(), stop.as_mut()) };
-        let (Some(instance), Some(run), Some(stop)) = (instance, run, stop) else {
-            return BAD_ARGUMENTS;
-        };
+        let (run, stop) = unsafe { (run.as_ref(), stop.as_mut()) };
+        let (Some(run), Some(stop)) = (run, stop) else { return BAD_ARGUMENTS };
         // SAFETY: as this function demands.
         let Some(mut run) = (unsafe { run.slices() }) else { return BAD_ARGUMENTS };
-        let caller = Caller::new(instance, &run);
-        answer(run::run(&caller, &mut run, &mut Open), stop)
+        // SAFETY: as this function demands.
+        let Some(caller) = (unsafe { caller(fmi, instance, &run) }) else { return BAD_ARGUMENTS };
+        answer(run::run(&*caller, &mut run, &mut Open), stop)
     }))
     .unwrap_or(BAD_ARGUMENTS)
 }
@@ -172,21 +283,20 @@ pub unsafe extern "C" fn hubslosh_batch_run(
 /// As there; the arrays of `feedback` must have the lengths they say.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hubslosh_batch_loop(
-    instance: *const CInstance,
+    fmi: c_int,
+    instance: *const c_void,
     run: *const CRun,
     feedback: *const CFeedback,
     stop: *mut Stop,
 ) -> c_int {
     catch_unwind(AssertUnwindSafe(|| {
         // SAFETY: as this function demands; NULL becomes None.
-        let (instance, run, c, stop) =
-            unsafe { (instance.as_ref(), run.as_ref(), feedback.as_ref(), stop.as_mut()) };
-        let (Some(instance), Some(run), Some(c), Some(stop)) = (instance, run, c, stop) else {
-            return BAD_ARGUMENTS;
-        };
+        let (run, c, stop) = unsafe { (run.as_ref(), feedback.as_ref(), stop.as_mut()) };
+        let (Some(run), Some(c), Some(stop)) = (run, c, stop) else { return BAD_ARGUMENTS };
         // SAFETY: as this function demands.
         let Some(mut run) = (unsafe { run.slices() }) else { return BAD_ARGUMENTS };
-        let caller = Caller::new(instance, &run);
+        // SAFETY: as this function demands.
+        let Some(caller) = (unsafe { caller(fmi, instance, &run) }) else { return BAD_ARGUMENTS };
         let rows = c.cycles.checked_mul(c.parts).and_then(|steps| steps.checked_add(1));
         if rows != Some(run.time.len()) || c.switch >= c.parts {
             return BAD_ARGUMENTS;
@@ -194,9 +304,9 @@ pub unsafe extern "C" fn hubslosh_batch_loop(
         // SAFETY: as this function demands.
         let result = match c.law {
             Some(law) => unsafe { c.feedback(CLaw(law)) }
-                .map(|feedback| run::run(&caller, &mut run, &mut Closed::new(feedback))),
+                .map(|feedback| run::run(&*caller, &mut run, &mut Closed::new(feedback))),
             None => unsafe { c.linear().and_then(|controller| c.feedback(controller)) }
-                .map(|feedback| run::run(&caller, &mut run, &mut Closed::new(feedback))),
+                .map(|feedback| run::run(&*caller, &mut run, &mut Closed::new(feedback))),
         };
         result.map_or(BAD_ARGUMENTS, |result| answer(result, stop))
     }))
@@ -351,7 +461,34 @@ impl CRun {
     }
 }
 
-/// An instance whose functions are called through their addresses.
+/// The instance of a version of FMI whose functions are called through their addresses; None if it cannot be one.
+///
+/// # Safety
+/// As [`hubslosh_batch_run`].
+unsafe fn caller<'a>(
+    fmi: c_int,
+    instance: *const c_void,
+    run: &Run,
+) -> Option<Box<dyn Instance + 'a>> {
+    // SAFETY: as this function demands; NULL becomes None.
+    unsafe {
+        match fmi {
+            2 => Some(Box::new(Caller::new(instance.cast::<CInstance>().as_ref()?, run))),
+            3 => {
+                let instance = instance.cast::<CInstance3>().as_ref()?;
+                let step = instance.step.as_ref()?;
+                Some(Box::new(Caller3 {
+                    instance,
+                    enumerations: slice(instance.enumeration_references, instance.enumerations)?,
+                    taken: slice(step.taken_references, step.taken)?,
+                }))
+            }
+            _ => None,
+        }
+    }
+}
+
+/// An instance of FMI 2.0.
 struct Caller<'a> {
     instance: &'a CInstance,
     /// A 1 for each Real input: the order of the derivatives.
@@ -382,7 +519,7 @@ impl Instance for Caller<'_> {
         unsafe { set_boolean(component, references.as_ptr(), references.len(), values.as_ptr()) }
     }
 
-    fn set_slopes(&self, references: &[u32], slopes: &[f64]) -> c_int {
+    fn set_slopes(&self, references: &[u32], _: &[f64], slopes: &[f64]) -> c_int {
         let CInstance { component, set_real_input_derivatives, .. } = *self.instance;
         let orders = self.first_order.as_ptr();
         unsafe {
@@ -391,9 +528,10 @@ impl Instance for Caller<'_> {
         }
     }
 
-    fn do_step(&self, time: f64, step: f64) -> c_int {
+    fn do_step(&self, time: f64, step: f64) -> (Function, c_int) {
         // 1: the past is not asked for again
-        unsafe { (self.instance.do_step)(self.instance.component, time, step, 1) }
+        let status = unsafe { (self.instance.do_step)(self.instance.component, time, step, 1) };
+        (Function::DoStep, status)
     }
 
     fn get_real(&self, references: &[u32], values: &mut [f64]) -> c_int {
@@ -413,5 +551,138 @@ impl Instance for Caller<'_> {
         unsafe {
             get_boolean(component, references.as_ptr(), references.len(), values.as_mut_ptr())
         }
+    }
+}
+
+/// An instance of FMI 3.0.
+struct Caller3<'a> {
+    instance: &'a CInstance3,
+    /// Value references of the enumerations, rising.
+    enumerations: &'a [u32],
+    /// Of the inputs that the FMU takes within a step, rising.
+    taken: &'a [u32],
+}
+
+impl Caller3<'_> {
+    /// Calls for one variable after the other until one fails, with the larger of the status.
+    fn each(references: &[u32], mut call: impl FnMut(usize, &u32) -> c_int) -> c_int {
+        let mut worst = OK;
+        for (i, reference) in references.iter().enumerate() {
+            worst = worst.max(call(i, reference));
+            if worst > WARNING {
+                break;
+            }
+        }
+        worst
+    }
+
+    fn is_enumeration(&self, reference: &u32) -> bool {
+        self.enumerations.binary_search(reference).is_ok()
+    }
+}
+
+// SAFETY of all methods: as for `Caller`; every array has the length that is passed, and those of the step as many places
+// as inputs are taken.
+impl Instance for Caller3<'_> {
+    fn set_real(&self, references: &[u32], values: &[f64]) -> c_int {
+        let CInstance3 { component, set_float64, .. } = *self.instance;
+        let n = references.len();
+        unsafe { set_float64(component, references.as_ptr(), n, values.as_ptr(), values.len()) }
+    }
+
+    fn set_integer(&self, references: &[u32], values: &[c_int]) -> c_int {
+        let CInstance3 { component, set_int32, set_int64, .. } = *self.instance;
+        Self::each(references, |i, reference| match self.is_enumeration(reference) {
+            true => unsafe { set_int64(component, reference, 1, &i64::from(values[i]), 1) },
+            false => unsafe { set_int32(component, reference, 1, &values[i], 1) },
+        })
+    }
+
+    fn set_boolean(&self, references: &[u32], values: &[c_int]) -> c_int {
+        let CInstance3 { component, set_boolean, .. } = *self.instance;
+        Self::each(references, |i, reference| {
+            let byte = u8::from(values[i] != 0);
+            unsafe { set_boolean(component, reference, 1, &byte, 1) }
+        })
+    }
+
+    fn set_slopes(&self, references: &[u32], values: &[f64], slopes: &[f64]) -> c_int {
+        // The FMU calls back within fmi3DoStep alone.
+        let step = unsafe { &mut *self.instance.step };
+        step.count = 0;
+        for ((reference, value), slope) in references.iter().zip(values).zip(slopes) {
+            // Each is there once, so that there are places for all; the others hold.
+            if self.taken.binary_search(reference).is_ok() && step.count < step.taken {
+                unsafe {
+                    *step.references.add(step.count) = *reference;
+                    *step.values.add(step.count) = *value;
+                    *step.slopes.add(step.count) = *slope;
+                }
+                step.count += 1;
+            }
+        }
+        OK
+    }
+
+    fn do_step(&self, time: f64, step: f64) -> (Function, c_int) {
+        let CInstance3 { component, do_step, step: within, .. } = *self.instance;
+        // No reference to the structure lives while the FMU calls back.
+        let status = unsafe {
+            (*within).start = time;
+            (*within).status = OK;
+            ((*within).terminate, (*within).early_return) = (0, 0);
+            do_step(
+                component,
+                time,
+                step,
+                1,
+                &raw mut (*within).event,
+                &raw mut (*within).terminate,
+                &raw mut (*within).early_return,
+                &raw mut (*within).reached,
+            )
+        };
+        let within = unsafe { &mut *within };
+        within.count = 0;
+        match status {
+            OK | WARNING if within.status > WARNING => {
+                (Function::SetRealInputDerivatives, within.status)
+            }
+            // as FMI 2.0 says it: the step was not made to its end
+            OK | WARNING if within.terminate != 0 => (Function::DoStep, DISCARD),
+            // it was not allowed to
+            OK | WARNING if within.early_return != 0 => (Function::DoStep, ERROR),
+            status => (Function::DoStep, status),
+        }
+    }
+
+    fn get_real(&self, references: &[u32], values: &mut [f64]) -> c_int {
+        let CInstance3 { component, get_float64, .. } = *self.instance;
+        let (n, m) = (references.len(), values.len());
+        unsafe { get_float64(component, references.as_ptr(), n, values.as_mut_ptr(), m) }
+    }
+
+    fn get_integer(&self, references: &[u32], values: &mut [c_int]) -> c_int {
+        let CInstance3 { component, get_int32, get_int64, .. } = *self.instance;
+        Self::each(references, |i, reference| match self.is_enumeration(reference) {
+            true => {
+                let mut wide = 0;
+                let status = unsafe { get_int64(component, reference, 1, &mut wide, 1) };
+                // An item beyond 32 bits has no place in a row of FMI 2.0's integers.
+                values[i] = c_int::try_from(wide).unwrap_or(c_int::MAX);
+                status
+            }
+            false => unsafe { get_int32(component, reference, 1, &mut values[i], 1) },
+        })
+    }
+
+    fn get_boolean(&self, references: &[u32], values: &mut [c_int]) -> c_int {
+        let CInstance3 { component, get_boolean, .. } = *self.instance;
+        Self::each(references, |i, reference| {
+            let mut byte = 0;
+            let status = unsafe { get_boolean(component, reference, 1, &mut byte, 1) };
+            values[i] = c_int::from(byte != 0);
+            status
+        })
     }
 }

@@ -130,14 +130,14 @@ pub trait AtPoint {
     ///
     /// # Errors
     /// The function that failed and its status.
-    fn act(&mut self, fmu: &impl Instance, row: usize, time: f64) -> Result<(), (Function, c_int)>;
+    fn act(&mut self, fmu: &dyn Instance, row: usize, time: f64) -> Result<(), (Function, c_int)>;
 }
 
 /// Nothing: inputs follow their table.
 pub struct Open;
 
 impl AtPoint for Open {
-    fn act(&mut self, _: &impl Instance, _: usize, _: f64) -> Result<(), (Function, c_int)> {
+    fn act(&mut self, _: &dyn Instance, _: usize, _: f64) -> Result<(), (Function, c_int)> {
         Ok(())
     }
 }
@@ -160,7 +160,7 @@ impl<'a, C: Controller> Closed<'a, C> {
 }
 
 impl<C: Controller> AtPoint for Closed<'_, C> {
-    fn act(&mut self, fmu: &impl Instance, row: usize, time: f64) -> Result<(), (Function, c_int)> {
+    fn act(&mut self, fmu: &dyn Instance, row: usize, time: f64) -> Result<(), (Function, c_int)> {
         let Feedback { controller, measured, command, parts, switch, latency, commands } =
             &mut self.feedback;
         let (width, cycle) = (command.len(), row / *parts);

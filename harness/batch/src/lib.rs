@@ -1,4 +1,4 @@
-//! A whole run of an FMU 2.0 for Co-Simulation in one call of a C library.
+//! A whole run of an FMU 2.0 or 3.0 for Co-Simulation in one call of a C library.
 //!
 //! A host written in Python pays some 3 µs for every call of a C function, and a step takes four.
 //! Such a host instantiates and initialises the FMU itself, then hands over the instance, the FMU's

@@ -81,7 +81,7 @@ impl<T> Outputs<'_, T> {
 ///
 /// # Errors
 /// The first call that fails ends the run.
-pub fn run(fmu: &impl Instance, run: &mut Run, at_point: &mut impl AtPoint) -> Result<(), Stop> {
+pub fn run(fmu: &dyn Instance, run: &mut Run, at_point: &mut impl AtPoint) -> Result<(), Stop> {
     for k in 0..run.time.len() {
         let check = |function, status| match status {
             OK | WARNING => Ok(()),
@@ -101,11 +101,12 @@ pub fn run(fmu: &impl Instance, run: &mut Run, at_point: &mut impl AtPoint) -> R
         check(Function::SetInteger, run.integers.set(k, |r, v| fmu.set_integer(r, v)))?;
         check(Function::SetBoolean, run.booleans.set(k, |r, v| fmu.set_boolean(r, v)))?;
         if let Some(slopes) = run.slopes {
-            let slopes = Inputs { references: run.reals.references, values: slopes };
-            let status = slopes.set(k, |r, v| fmu.set_slopes(r, v));
+            let n = run.reals.references.len();
+            let status = run.reals.set(k, |r, v| fmu.set_slopes(r, v, &slopes[k * n..(k + 1) * n]));
             check(Function::SetRealInputDerivatives, status)?;
         }
-        check(Function::DoStep, fmu.do_step(time, next - time))?;
+        let (function, status) = fmu.do_step(time, next - time);
+        check(function, status)?;
     }
     Ok(())
 }
@@ -143,15 +144,16 @@ mod tests {
         fn set_boolean(&self, references: &[u32], values: &[c_int]) -> c_int {
             self.said(format!("boolean {references:?} {values:?}"))
         }
-        fn set_slopes(&self, references: &[u32], slopes: &[f64]) -> c_int {
+        fn set_slopes(&self, references: &[u32], values: &[f64], slopes: &[f64]) -> c_int {
+            assert_eq!(values, [self.sum.borrow()[1]]);
             self.sum.borrow_mut()[2] = slopes[0];
             self.said(format!("slope {references:?} {slopes:?}"))
         }
-        fn do_step(&self, time: f64, step: f64) -> c_int {
+        fn do_step(&self, time: f64, step: f64) -> (Function, c_int) {
             let [sum, input, slope] = *self.sum.borrow();
             *self.sum.borrow_mut() = [sum + step * (input + slope * step / 2.0), input, 0.0];
             self.said(format!("step {time} {step}"));
-            if self.fails == Some(time) { 3 } else { WARNING }
+            (Function::DoStep, if self.fails == Some(time) { 3 } else { WARNING })
         }
         fn get_real(&self, references: &[u32], values: &mut [f64]) -> c_int {
             values.fill(self.sum.borrow()[0]);

@@ -21,7 +21,7 @@ from fmpy import sharedLibraryExtension
 from fmpy.fmi1 import FMICallException
 
 from .feedback import Feedback, Linear
-from .fmi3 import Slave
+from .fmi3 import Slave, Step
 from .fmu import PLATFORM, FmuError, source_tree
 
 FUNCTIONS = (
@@ -34,7 +34,32 @@ FUNCTIONS = (
     "fmi2GetInteger",
     "fmi2GetBoolean",
 )
-"""The functions of FMI that a run calls; the library knows them by their places here."""
+"""The functions of FMI 2.0 that a run calls; the library knows them by their places here."""
+
+FUNCTIONS_3 = (
+    "fmi3SetFloat64",
+    "fmi3SetInt32",
+    "fmi3SetInt64",
+    "fmi3SetBoolean",
+    "fmi3DoStep",
+    "fmi3GetFloat64",
+    "fmi3GetInt32",
+    "fmi3GetInt64",
+    "fmi3GetBoolean",
+)
+"""The functions of FMI 3.0 that a run calls."""
+
+_NAMES_3 = (
+    "fmi3SetFloat64",
+    "fmi3SetInt32 or fmi3SetInt64",
+    "fmi3SetBoolean",
+    "fmi3SetFloat64",
+    "fmi3DoStep",
+    "fmi3GetFloat64",
+    "fmi3GetInt32 or fmi3GetInt64",
+    "fmi3GetBoolean",
+)
+"""What FMI 3.0 has in the places of FUNCTIONS."""
 
 CONTROLLER = "controller"
 """In the place of a function's name: the controller of a closed loop ended the run."""
@@ -84,6 +109,16 @@ class Stop:
 
 class _Instance(Structure):
     _fields_ = (("component", c_void_p), *((name, c_void_p) for name in FUNCTIONS))
+
+
+class _Instance3(Structure):
+    _fields_ = (
+        ("component", c_void_p),
+        *((name, c_void_p) for name in FUNCTIONS_3),
+        ("enumerations", c_size_t),
+        ("enumeration_references", c_void_p),
+        ("step", POINTER(Step)),
+    )
 
 
 class _Signals(Structure):
@@ -140,7 +175,7 @@ def library() -> ctypes.CDLL | None:
 _kept = ExitStack()
 """Files that live as long as the program."""
 
-_VERSION = 2
+_VERSION = 3
 """Of the library's interface."""
 
 
@@ -152,25 +187,31 @@ def _load(path: Path) -> ctypes.CDLL:
         raise FmuError(f"the library {path} cannot be used: {error}") from None
     if version != _VERSION:
         raise FmuError(f"the library {path} has interface {version}, not {_VERSION}; build it anew")
-    loaded.hubslosh_batch_run.argtypes = (POINTER(_Instance), POINTER(_Run), POINTER(_Stop))
     loaded.hubslosh_batch_run.restype = c_int
     loaded.hubslosh_batch_loop.restype = c_int
     return loaded
 
 
-def run(fmu: Any, rows: Rows, feedback: Feedback | None = None) -> Stop | None:
-    """Drive an instance of ``fmpy.fmi2.FMU2Slave`` through a run, by the library if there is one.
+def intermediate_update() -> int | None:
+    """Return the address of the library's intermediateUpdate, for `Slave`; None without one."""
+    loaded = library()
+    if loaded is None:
+        return None
+    return ctypes.cast(loaded.hubslosh_batch_intermediate_update, c_void_p).value
 
-    One of an FMU 3.0 is driven call by call.
+
+def run(fmu: Any, rows: Rows, feedback: Feedback | None = None) -> Stop | None:
+    """Drive an instance through a run, by the library if there is one.
+
+    fmu: ``fmpy.fmi2.FMU2Slave`` or `Slave`.
 
     At every communication point the outputs are read, then the inputs set and the step made; after
     the last step outputs are read once more. A controller acts between the two. Returns None at the
     end, or where it stopped: at the first call that answers neither fmi2OK nor fmi2Warning.
     """
-    loaded = None if isinstance(fmu, Slave) else library()
+    loaded = library()
     if loaded is None:
         return step_by_step(fmu, rows, feedback)
-    functions = (ctypes.cast(fmu._functions[name], c_void_p) for name in FUNCTIONS)
     slopes = None if rows.slopes is None else rows.slopes.ctypes.data
     arguments = _Run(
         len(rows.time),
@@ -184,17 +225,39 @@ def run(fmu: Any, rows: Rows, feedback: Feedback | None = None) -> Stop | None:
         _Signals.of(rows.boolean_outputs),
     )
     stop = _Stop()
-    instance = _Instance(fmu.component, *functions)
+    fmi, instance, names = _instance(fmu)
     if feedback is None:
-        answer = loaded.hubslosh_batch_run(ctypes.byref(instance), ctypes.byref(arguments), stop)
+        pointers = [ctypes.byref(item) for item in (instance, arguments, stop)]
+        answer = loaded.hubslosh_batch_run(fmi, *pointers)
     else:
         structure, _kept = feedback.structure()
-        pointers = (ctypes.byref(item) for item in (instance, arguments, structure, stop))
-        answer = loaded.hubslosh_batch_loop(*pointers)
+        pointers = [ctypes.byref(item) for item in (instance, arguments, structure, stop)]
+        answer = loaded.hubslosh_batch_loop(fmi, *pointers)
     if answer == 0:
         return None
     assert answer == 1, "the arrays of a run have the lengths that they say"
-    return Stop(stop.row, (*FUNCTIONS, CONTROLLER)[stop.function], stop.status)
+    function = (*names, CONTROLLER)[stop.function]
+    if function == "fmi3DoStep":
+        fmu.explain()
+    return Stop(stop.row, function, stop.status)
+
+
+def _instance(fmu: Any) -> tuple[int, Structure, Sequence[str]]:
+    """Return the version of FMI, the instance for the library, and the names of FUNCTIONS there."""
+
+    def functions(names: Sequence[str]) -> list[c_void_p]:
+        return [ctypes.cast(fmu._functions[name], c_void_p) for name in names]
+
+    if not isinstance(fmu, Slave):
+        return 2, _Instance(fmu.component, *functions(FUNCTIONS)), FUNCTIONS
+    instance = _Instance3(
+        fmu.component,
+        *functions(FUNCTIONS_3),
+        len(fmu.enumerations),
+        fmu.enumerations.ctypes.data,
+        ctypes.pointer(fmu.made),
+    )
+    return 3, instance, _NAMES_3
 
 
 def step_by_step(fmu: Any, rows: Rows, feedback: Feedback | None = None) -> Stop | None:

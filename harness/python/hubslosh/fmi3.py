@@ -2,14 +2,16 @@
 """An instance of an FMU 3.0 with the calls of FMI 2.0, as the rest of the package makes them.
 
 In Co-Simulation neither event mode nor early return is used: the FMU handles its events within its
-steps, as FMI 2.0 has it. What FMI 3.0 no longer has, derivatives of inputs, are lines that the FMU hears of in
-intermediate update.
+steps, as FMI 2.0 has it. What FMI 3.0 no longer has, derivatives of inputs, are lines that the FMU
+hears of in intermediate update.
 """
 
+import ctypes
 from collections.abc import Callable, Collection, Mapping, Sequence
-from ctypes import byref
+from ctypes import Structure, byref, c_double, c_int, c_size_t, c_uint8, c_void_p
 from typing import Any
 
+import numpy as np
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi3 import FMU3Model, FMU3Slave, fmi3Boolean, fmi3Float64
 from fmpy.model_description import ScalarVariable
@@ -17,8 +19,34 @@ from fmpy.model_description import ScalarVariable
 KINDS = {"Float64": "Real", "Int32": "Integer"}
 """Types that FMI 2.0 has under another name; Boolean, Enumeration and String have the same."""
 
+_WARNING = 1
 _DISCARD = 2
 _ERROR = 3
+
+
+class Step(Structure):
+    """What a step is made with, and what it said; the environment that `Slave` instantiates with.
+
+    The library ``hubslosh_batch`` has the same structure (``CStep``).
+    """
+
+    _fields_ = (
+        ("component", c_void_p),
+        ("set_float64", c_void_p),
+        ("taken", c_size_t),
+        ("taken_references", c_void_p),
+        ("count", c_size_t),
+        ("references", c_void_p),
+        ("values", c_void_p),
+        ("slopes", c_void_p),
+        ("at", c_void_p),
+        ("start", c_double),
+        ("status", c_int),
+        ("event", c_uint8),
+        ("terminate", c_uint8),
+        ("early_return", c_uint8),
+        ("reached", c_double),
+    )
 
 
 class _Calls:
@@ -79,6 +107,7 @@ class Model(_Calls, FMU3Model):
         variables: Mapping[str, ScalarVariable],
         intermediate: Collection[str],
         say: Callable[[str], None],
+        update: int | None = None,
     ) -> None:
         """Instantiate, as `Slave.instantiate`; nothing is intermediate here."""
         self._begin(variables)
@@ -97,27 +126,47 @@ class Slave(_Calls, FMU3Slave):
         variables: Mapping[str, ScalarVariable],
         intermediate: Collection[str],
         say: Callable[[str], None],
+        update: int | None = None,
     ) -> None:
         """Instantiate; ``say`` is given what the FMU logs.
 
         variables: of the FMU by name. intermediate: those that take part in intermediate update.
+        update: address of a function of C that does what `_update` does, faster; None: there is
+        none.
         """
         self._say = say
         self._begin(variables)
-        taken = [
+        taken = sorted(
             variables[name].valueReference
-            for name in sorted(intermediate)
+            for name in intermediate
             if variables[name].causality == "input"
-        ]
-        self._taken = set(taken)
-        self._lines: list[tuple[int, float, float]] = []
-        self._from = 0.0
-        self._refused: FMICallException | None = None
+        )
+        self._taken = np.array(taken, np.uint32)
+        self.enumerations = np.array(sorted(self._enumerations), np.uint32)
+        self._references = np.zeros(len(taken), np.uint32)
+        self._values, self._slopes, self._at = np.zeros((3, len(taken)))
+        self.made = Step(
+            set_float64=ctypes.cast(self._functions["fmi3SetFloat64"], c_void_p),
+            taken=len(taken),
+            taken_references=self._taken.ctypes.data,
+            references=self._references.ctypes.data,
+            values=self._values.ctypes.data,
+            slopes=self._slopes.ctypes.data,
+            at=self._at.ctypes.data,
+        )
         super().instantiate(
             logMessage=_logger(say),
-            intermediateUpdate=self._update if taken else None,
+            intermediateUpdate=(self._update if update is None else update) if taken else None,
             requiredIntermediateVariables=taken,
         )
+        self.made.component = self.component
+
+    def _call(self, name: str, *arguments: Any) -> Any:
+        """Call a function of the FMU; `made` is the environment, for which fmpy has no argument."""
+        if name == "fmi3InstantiateCoSimulation":
+            environment = c_void_p(ctypes.addressof(self.made))
+            arguments = (*arguments[:9], environment, *arguments[10:])
+        return super()._call(name, *arguments)
 
     def _update(
         self,
@@ -130,16 +179,19 @@ class Slave(_Calls, FMU3Slave):
         early_return_requested: Any,
         early_return_time: Any,
     ) -> None:
-        """Set the inputs that go in lines to their values at ``time``, s."""
-        if not set_requested or not self._lines:
+        """Set the inputs that go in lines to their values at ``time``, s; ask for no early return.
+
+        As ``hubslosh_batch_intermediate_update``, for where there is no such library.
+        """
+        early_return_requested[0], early_return_time[0] = False, time
+        made, n = self.made, self.made.count
+        if not set_requested or not n:
             return
+        at = self._values[:n] + self._slopes[:n] * (time - made.start)
         try:
-            self.setFloat64(
-                [reference for reference, _, _ in self._lines],
-                [value + slope * (time - self._from) for _, value, slope in self._lines],
-            )
+            self.setFloat64(self._references[:n].tolist(), at.tolist())
         except FMICallException as error:  # nothing leaves a callback; the step's end says it
-            self._refused = error
+            made.status = max(made.status, error.status)
 
     # by name of fmpy.fmi2, with lists
 
@@ -151,14 +203,16 @@ class Slave(_Calls, FMU3Slave):
         if untaken := [reference for reference in vr if reference not in self._taken]:
             self._say(f"inputs {untaken} (value references) are not set within a step")
             raise FMICallException(function="fmi3SetFloat64", status=_ERROR)
-        values_now = self.getFloat64(vr)
-        self._lines = list(zip(vr, values_now, values, strict=True))
+        n = len(vr)
+        self._references[:n], self._values[:n], self._slopes[:n] = vr, self.getFloat64(vr), values
+        self.made.count = n
 
     def doStep(
         self, currentCommunicationPoint: float, communicationStepSize: float, *_: Any
     ) -> None:
         """Make a step, to its end."""
-        self._from, self._refused = currentCommunicationPoint, None
+        made = self.made
+        made.start, made.status = currentCommunicationPoint, 0
         event, terminate, early = fmi3Boolean(), fmi3Boolean(), fmi3Boolean()
         reached = fmi3Float64()
         try:
@@ -173,15 +227,23 @@ class Slave(_Calls, FMU3Slave):
                 byref(reached),
             )
         finally:
-            self._lines = []
-        if self._refused is not None:
-            raise self._refused
-        if terminate.value:
+            made.count = 0
+        made.terminate, made.early_return = terminate.value, early.value
+        made.reached = reached.value
+        if made.status > _WARNING:
+            raise FMICallException(function="fmi3SetFloat64", status=made.status)
+        if made.terminate or made.early_return:
+            self.explain()
+            status = _DISCARD if made.terminate else _ERROR
+            raise FMICallException(function="fmi3DoStep", status=status)
+
+    def explain(self) -> None:
+        """Say why the last step, which the FMU made, is no whole one."""
+        if self.made.terminate:
             self._say("the FMU wants the simulation to end")
-            raise FMICallException(function="fmi3DoStep", status=_DISCARD)
-        if early.value:
-            self._say(f"it returned early, at {reached.value} s, which it was not allowed to")
-            raise FMICallException(function="fmi3DoStep", status=_ERROR)
+        elif self.made.early_return:
+            reached = self.made.reached
+            self._say(f"it returned early, at {reached} s, which it was not allowed to")
 
     getFMUstate = FMU3Slave.getFMUState
     setFMUstate = FMU3Slave.setFMUState

@@ -149,7 +149,8 @@ class Instance:
         _messages.said.clear()
         try:
             if fmu.is_fmi3:
-                instance.instantiate(fmu.variables, fmu.intermediate, _say)
+                update = batch.intermediate_update()
+                instance.instantiate(fmu.variables, fmu.intermediate, _say, update)
             else:
                 instance.instantiate(callbacks=_CALLBACKS)
         except Exception as error:
