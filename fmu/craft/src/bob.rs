@@ -86,8 +86,8 @@ pub struct Bob {
     both: Pair,
     p_d: Vector,
     v_d: Vector,
-    /// B
-    specific_force: Vector,
+    /// B: at the hinge, m/s^2, body axes
+    pub specific_force: Vector,
     /// T/m
     tension: Series,
     /// p.e

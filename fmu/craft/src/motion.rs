@@ -107,13 +107,13 @@ pub struct CraftMotion {
     any_loose: bool,
     /// What happens to the liquid of which lump at the end of the expansion.
     due: Option<(usize, Due)>,
-    /// M at the start of the expansion, and its factors.
     /// Whether any bob's drag follows the acceleration.
     follows: bool,
     /// Craft and liquids at rest as one rigid body, and what of its motion is along each bob's tank (on a pivot of
     /// [a; torque], else of [force; torque]).
     whole: Rigid,
     along: Vec<[Vec3; 2]>,
+    /// M at the start of the expansion, and its factors.
     matrix: Mat6,
     factors: Factors,
     force: [Vec3; 2],

@@ -6,7 +6,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use taylor::error::StepError;
 use taylor::number::{Dual, Number};
-use taylor::vector::{add, cross, dot, on_sphere, unit_quaternion};
+use taylor::vector::{dot, on_sphere, unit_quaternion};
 
 use crate::contents::Drains;
 use crate::draining::{Acting, Draining, Run};
@@ -178,14 +178,14 @@ impl Spacecraft {
 
     /// Whether every tank without a ball regime is in its range after a step, of the liquid's directions then and the accelerations in it.
     pub fn is_in_range(&self) -> bool {
-        let CraftMotion { bobs, state, a, w, w_d, .. } = &*self.motion;
+        let CraftMotion { bobs, state, .. } = &*self.motion;
         self.bounds.iter().enumerate().filter(|(i, _)| !self.has_ball(*i)).all(|(i, limits)| {
             let mut first = bobs.iter().filter(|bob| bob.tank == i && bob.mode == 0);
             // The accelerations of a craft that drains are its equations' alone.
-            let axial = first.next().filter(|_| self.draining.is_none()).map_or(0.0, |bob| {
-                let turning = add(cross(w_d[0], bob.hinge), cross(w[0], cross(w[0], bob.hinge)));
-                dot(bob.along_axis()[0], add(a[0], turning))
-            });
+            let axial = first
+                .next()
+                .filter(|_| self.draining.is_none())
+                .map_or(0.0, |bob| dot(bob.along_axis()[0], bob.specific_force[0]));
             limits.contain(core::array::from_fn(|n| state.x[index::bob(i, n) + 2]), axial)
         })
     }
@@ -301,7 +301,8 @@ impl Spacecraft {
 
     /// Whether the liquid of a tank with a ball regime is not at its bottom.
     pub fn has_lump(&self) -> bool {
-        self.motion.state.ball.iter().any(|state| *state != BallState::Settled)
+        let CraftMotion { lumps, state, .. } = &*self.motion;
+        !lumps.is_empty() && state.ball.iter().any(|state| *state != BallState::Settled)
     }
 
     /// Functions of states and inputs that cross zero at events, two for each tank: what leaves the present state of the
