@@ -3,8 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
 use cargo_metadata::{DependencyKind, MetadataCommand};
+
+use crate::common::run;
 
 /// What each package of the workspace links, tests and build scripts left out.
 fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
@@ -89,6 +92,25 @@ fn the_harness_never_links_a_model_and_its_packages_depend_one_way() {
             assert!(HARNESS.iter().any(named), "{} is not in the list", folder.path().display());
         }
     }
+}
+
+/// Otherwise `cargo run` compiles once more what `cargo test` has compiled, and a test that builds the program does.
+#[test]
+fn tests_turn_on_no_feature_of_what_the_program_is_made_of() {
+    let packages = |edges: &str| -> BTreeSet<String> {
+        let mut tree = Command::new(env!("CARGO"));
+        tree.current_dir(pack::root()).args(["tree", "--locked", "--offline", "--edges", edges]);
+        tree.args(["--prefix", "none", "--no-dedupe", "--format", "{p}: {f};"]);
+        let said = run(&mut tree, "cargo does not say what this is made of");
+        said.lines().filter_map(|line| Some(line.split_once(';')?.0.into())).collect()
+    };
+    let name = |package: &String| package.split(": ").next().unwrap_or_default().to_string();
+    let program = packages("normal,build");
+    let names: BTreeSet<String> = program.iter().map(name).collect();
+    let mut tested = packages("normal,build,dev");
+    tested.retain(|package| names.contains(&name(package)));
+    assert!(names.len() > 100);
+    assert_eq!(tested, program);
 }
 
 #[test]

@@ -61,14 +61,14 @@ pub fn harness() -> PathBuf {
     binary("hubslosh", &[])
 }
 
-/// A binary of the workspace by its name, of the profile that this test was built with; `package`
-/// says where it is if not in one of the default members.
+/// A binary of the workspace by its name, of the profile that this test was built with; `of` says where it is if not in one
+/// of the default members: in the `--workspace`. Not by `-p`: with one package's features alone Cargo compiles most again.
 ///
 /// # Panics
 /// If it does not build.
-pub fn binary(name: &str, package: &[&str]) -> PathBuf {
+pub fn binary(name: &str, of: &[&str]) -> PathBuf {
     let mut build = Command::new(env!("CARGO"));
-    build.current_dir(pack::root()).args(["build", "--quiet", "--bin", name]).args(package);
+    build.current_dir(pack::root()).args(["build", "--quiet", "--bin", name]).args(of);
     let profile = if cfg!(debug_assertions) { "debug" } else { "release" };
     if profile == "release" {
         build.arg("--release");

@@ -52,7 +52,7 @@ fn the_examples_give_what_their_readmes_say() {
     let [fmu, ..] = pack::MODELS.each_ref().map(pack::packed_model_for_tests);
     let folder = fmu.with_file_name("one-loop");
     std::fs::create_dir_all(&folder).expect("a folder in the target directory");
-    let one_loop = binary("one-loop", &["-p", "one-loop"]);
+    let one_loop = binary("one-loop", &["--workspace"]);
     run(Command::new(one_loop).arg(fmu).arg(&folder), "the loop in the harness failed");
     pytest(
         Command::new(python())
