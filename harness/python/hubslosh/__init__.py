@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from .modes import mode_errors
     from .plant import COLUMNS, TORQUE, Plant, RunError, drive
     from .program import Estimated, Identification, analyse, campaign, identify
+    from .run import Run
     from .sampling import draw, monte_carlo, quantiles
     from .simulation import simulate
     from .spectrum import frequency_response
@@ -54,6 +55,7 @@ _MODULES = {
     "modes": ("mode_errors",),
     "plant": ("COLUMNS", "TORQUE", "Plant", "RunError", "drive"),
     "program": ("Estimated", "Identification", "analyse", "campaign", "identify"),
+    "run": ("Run",),
     "sampling": ("draw", "monte_carlo", "quantiles"),
     "simulation": ("simulate",),
     "spectrum": ("frequency_response",),
@@ -79,6 +81,7 @@ __all__ = [
     "Margins",
     "Plant",
     "Quantity",
+    "Run",
     "RunError",
     "Tank",
     "TransferFunction",

@@ -14,6 +14,7 @@ from .feedback import Feedback, Linear
 from .fmu import Fmu, FmuError, Quantity, did_you_mean
 from .linearization import LinearModel, linearize, split_delay, wrong_seconds
 from .plant import TORQUE, Plant
+from .run import Run
 from .simulation import (
     History,
     check_outputs,
@@ -169,7 +170,7 @@ class Loop:
         outputs: Sequence[str] | str | None = None,
         substeps: int = 1,
         tolerance: float | None = None,
-    ) -> pd.DataFrame:
+    ) -> Run:
         """Simulate the loop from time 0 to ``stop``, s; see `closed_loop`.
 
         parameters: further ones, which go before those of the loop.
@@ -235,7 +236,7 @@ class Loop:
             )
         commands = feedback.commands
         commands[-1] = commands[-2]
-        table = pd.DataFrame(
+        table = Run(
             {"time": points}
             | dict(zip(command, commands.T, strict=True))
             | {name: values for name, (values, _) in given.items()}
@@ -301,7 +302,7 @@ def closed_loop(
     outputs: Sequence[str] | str | None = None,
     substeps: int = 1,
     tolerance: float | None = None,
-) -> pd.DataFrame:
+) -> Run:
     """Simulate an FMU under a sampled controller from time 0 to ``stop``, s.
 
     controller, period, measured, command, latency, delay: see `Loop`. In every cycle of ``period``

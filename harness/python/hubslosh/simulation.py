@@ -7,10 +7,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from . import accessor as accessor  # run.hubslosh
 from .arguments import names_of, not_numbers
 from .fmu import INTEGERS, Fmu, FmuError, Quantity, did_you_mean
 from .plant import TORQUE, Plant
+from .run import Run
 from .tables import read_parameters
 
 Real = NDArray[np.float64]
@@ -61,7 +61,7 @@ def simulate(
     start: float | None = None,
     tolerance: float | None = None,
     hold: bool = False,
-) -> pd.DataFrame:
+) -> Run:
     """Simulate an FMU by its own solver (Co-Simulation) and return what it shows over time.
 
     model: the name of an FMU of this package, ``"HubSlosh"`` or, of FMI 3.0, ``"HubSlosh-fmi3"``;
@@ -81,9 +81,11 @@ def simulate(
     tolerance: relative, for the FMU's solver; by default its own choice.
     hold: inputs are held from row to row.
 
-    Returns a table with the columns ``time``, the inputs and ``outputs``; enumerations by number.
+    Returns a pandas table with the columns ``time``, the inputs and ``outputs``; enumerations by
+    number.
     An output that follows an input at once shows a jump in the next row. Units are in
-    ``.attrs["units"]``, what was simulated in ``.attrs["model"]`` and ``.attrs["parameters"]``.
+    ``.attrs["units"]``, what was simulated in ``.attrs["model"]`` and ``.attrs["parameters"]``;
+    ``.view()`` shows it in 3-D.
 
     Raises FmuError with everything that is wrong with the arguments, or with what the FMU says.
     """
@@ -142,7 +144,7 @@ def simulate(
         inputs={name: value[0] for name, value in given.items()},
     ) as plant:
         recorded = plant.run(points, given, slopes, asked)
-    table = pd.DataFrame({"time": points} | given | recorded, copy=False)
+    table = Run({"time": points} | given | recorded, copy=False)
     if wanted is not None:
         table = table[wanted].reset_index(drop=True)
     units = {name: fmu.unit(name) for name in table.columns if name != "time"}

@@ -2,10 +2,12 @@
 
 import base64
 import json
+import pickle
 import re
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from conftest import option
 
@@ -32,10 +34,10 @@ def test_a_table_is_shown_with_the_parameters_it_was_made_with(fmu: Path, reques
     angle = np.frombuffer(base64.b64decode(drawn["columns"]["slosh_angle"]), "<f4")
     assert np.array_equal(angle, run["slosh_angle"].to_numpy().astype("f4"))
     assert "srcdoc" in page._repr_html_() and page.path is None
-    # the table's own name for it, also of a part of the table
-    same = run.hubslosh.view(program=option(request, "--hubslosh"))
+    # by the table itself, also a part of it
+    same = run.view(program=option(request, "--hubslosh"))
     assert same.html == page.html
-    part = run[run["time"] < 1.0].hubslosh.view(program=option(request, "--hubslosh"))
+    part = run[run["time"] < 1.0].view(program=option(request, "--hubslosh"))
     assert shown(part.html)["time"]["count"] == (run["time"] < 1.0).sum()
 
 
@@ -63,3 +65,14 @@ def test_a_tank_is_drawn_by_its_file(fmu: Path, tmp_path: Path, request) -> None
     # between heights computed at a hundredth of the volume
     assert drawn["level"] == pytest.approx(0.1, abs=1e-4)
     assert max(r for r, _ in drawn["shape"]["contour"]) == pytest.approx(0.1)
+
+
+def test_a_run_is_a_pandas_table_also_after_a_loop_a_copy_and_a_pickle(fmu: Path, request) -> None:
+    """``run.view()`` is there wherever the table is; what is no run is refused by its columns."""
+    run = hubslosh.closed_loop([[0.5, 0.6]], 0.1, 2.0, fmu)
+    for table in (run, run.iloc[5:], run.copy(), pickle.loads(pickle.dumps(run))):
+        assert isinstance(table, hubslosh.Run) and isinstance(table, pd.DataFrame)
+        assert table.attrs["model"] == str(fmu)
+    assert type(run["theta"]) is pd.Series
+    with pytest.raises(FmuError, match=r"no theta \(or omega\)"):
+        run[["time", "tau_cmd"]].view(program=option(request, "--hubslosh"))
