@@ -10,6 +10,7 @@ use experiments::run::{self, Run, driven, histories};
 use experiments::sensors::{self, Sensor, Sensors};
 use host::description::ModelDescription;
 use host::guard;
+use report::view;
 
 use super::{DEFAULT_FMU, check_out, open, setting, write_out};
 use crate::{progress, set_file, terminal};
@@ -58,7 +59,7 @@ pub struct RunArgs {
     drive: Option<String>,
     /// Variables to record beside time and the driven inputs [default:
     /// omega,omega_imu,slosh_angle,slosh_angle_radial; of an FMU without these all outputs and slosh
-    /// angles].
+    /// angles; what `hubslosh view` draws slosh modes after the first and draining tanks by].
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
     columns: Vec<String>,
     /// A sensor that is recorded too: sampled, late, noisy, biased, in steps (kinds below); one for each flag.
@@ -111,9 +112,15 @@ impl RunArgs {
         for warning in instance.take_warnings() {
             terminal::warn(warning);
         }
+        let named: Vec<String> =
+            run.input.iter().chain(run.others.iter().map(|(name, _)| name)).cloned().collect();
+        // at rest, but for what is set
+        let rest = description.moving_starts().iter().map(|name| (name.to_string(), "0".into()));
+        let settings: Vec<_> = rest.chain(run.settings.iter().cloned()).collect();
+        let parameters = run::parameters(description, &settings, &named);
         let columns = match self.columns.is_empty() {
             // what is driven stands in the table anyway
-            true => default_columns(description),
+            true => default_columns(description, &parameters),
             false => whole_names(self.columns),
         };
         let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
@@ -136,12 +143,6 @@ impl RunArgs {
         for warning in instance.take_warnings() {
             terminal::warn(warning);
         }
-        let named: Vec<String> =
-            run.input.iter().chain(run.others.iter().map(|(name, _)| name)).cloned().collect();
-        // at rest, but for what is set
-        let rest = description.moving_starts().iter().map(|name| (name.to_string(), "0".into()));
-        let settings: Vec<_> = rest.chain(run.settings.iter().cloned()).collect();
-        let parameters = run::parameters(description, &settings, &named);
         let mut notes = BTreeMap::from([
             ("fmu".into(), fmu.hash().into()),
             ("guid".into(), fmu.description().guid.clone()),
@@ -171,13 +172,20 @@ impl RunArgs {
 }
 
 /// What people look at first: of the bench four signals, of another FMU what a campaign stores: all
-/// outputs that are numbers, and the slosh angles.
-fn default_columns(description: &ModelDescription) -> Vec<String> {
+/// outputs that are numbers, and the slosh angles. And what a page cannot draw the liquid without: the states of the bench's
+/// modes after the first, and how much is left in tanks that drain.
+fn default_columns(
+    description: &ModelDescription,
+    parameters: &BTreeMap<String, String>,
+) -> Vec<String> {
     const BENCH: [&str; 4] = ["omega", "omega_imu", "slosh_angle", "slosh_angle_radial"];
-    if BENCH.iter().all(|name| description.variable(name).is_ok()) {
-        return BENCH.map(String::from).into();
-    }
-    stored_columns(description, None).split_off(1) // without time
+    let mut names = match BENCH.iter().all(|name| description.variable(name).is_ok()) {
+        true => BENCH.map(String::from).into(),
+        false => stored_columns(description, None).split_off(1), // without time
+    };
+    let liquid = |name: &String| name.starts_with("slosh.q_") || name.ends_with(".liquid");
+    names.extend(view::columns(description, parameters).into_iter().filter(liquid));
+    names
 }
 
 /// Names from what stands between commas: that in `inertia[1,2]` is part of the name.

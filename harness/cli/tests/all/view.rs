@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use base64ct::{Base64, Encoding};
-use pack::packed_for_tests;
+use pack::{packed_for_tests, packed_model_for_tests};
 
 fn hubslosh(directory: &Path, arguments: &[&str]) -> Output {
     let fmu = ["--fmu", packed_for_tests().to_str().unwrap()];
@@ -128,9 +128,15 @@ fn the_modes_that_are_drawn_add_up_at_the_wall_to_the_wave_height_of_the_fmu() {
             );
         }
     }
-    // without the states of the higher modes the first one is drawn, and it is said
+    // recorded by default; without the states of the higher modes the first one is drawn, and it is said
     let run = ["run", "--profile", "exp-sweep:amplitude=0.1,duration=5", "--set", "slosh.modes=3"];
-    assert!(hubslosh(directory, &[&run[..], &["--out", "less.parquet"]].concat()).status.success());
+    assert!(hubslosh(directory, &[&run[..], &["--out", "all.parquet"]].concat()).status.success());
+    let done = hubslosh(directory, &["view", "all.parquet"]);
+    assert!(done.status.success() && said(&done).is_empty(), "{}", said(&done));
+    let page = drawn(directory, "all.html");
+    assert_eq!(page["scene"]["geometry"]["tanks"][0]["modes"].as_array().unwrap().len(), 3);
+    let columns = ["--columns", "omega,slosh_angle,slosh_angle_radial", "--out", "less.parquet"];
+    assert!(hubslosh(directory, &[&run[..], &columns].concat()).status.success());
     let done = hubslosh(directory, &["view", "less.parquet"]);
     let warning = said(&done);
     assert!(done.status.success() && warning.contains("1 of 3 slosh modes are drawn"), "{warning}");
@@ -211,4 +217,24 @@ fn a_box_on_the_bench_lies_with_its_first_length_along_the_tangent() {
     let tank = &page["scene"]["geometry"]["tanks"][0];
     assert_eq!(tank["shape"]["box"], serde_json::json!([0.2, 0.3]));
     assert_eq!(tank["modes"].as_array().unwrap().len(), 2);
+}
+
+#[test]
+fn a_run_of_a_tank_that_drains_records_by_default_what_its_page_needs() {
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
+    let fmu = packed_model_for_tests(pack::model("SloshTank").unwrap());
+    let of_tank = |arguments: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_hubslosh"));
+        command.current_dir(directory).args(arguments).arg("--fmu").arg(fmu).output().unwrap()
+    };
+    let set = ["--set", "tank.fill.points=8", "--set", "mass_flow=0.1", "--set", "a[3]=1"];
+    let run =
+        ["run", "--profile", "zero", "--drive", "a[1]", "--stop", "2", "--out", "drain.parquet"];
+    let done = of_tank(&[&run[..], &set].concat());
+    assert!(done.status.success(), "{}", said(&done));
+    let done = of_tank(&["view", "drain.parquet"]);
+    assert!(done.status.success() && said(&done).is_empty(), "{}", said(&done));
+    let liquid = column(&drawn(directory, "drain.html"), "tank.liquid");
+    assert!(liquid[0] - liquid[liquid.len() - 1] > 0.1);
 }
