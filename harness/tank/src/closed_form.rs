@@ -119,8 +119,7 @@ pub fn cylinder(radius: f64, h: f64, rho: f64, modes: usize) -> ModalData {
         if n == 0 {
             surface.peak = Some([r, wave]);
         }
-        let shallow =
-            if 2.0 * k * h > 700.0 { 0.0 } else { 2.0 * xi * (1.0 - h / r) / (2.0 * k * h).sinh() };
+        let shallow = 2.0 * xi * (1.0 - h / r) / (2.0 * k * h).sinh();
         let beta = ((xi * xi + 1.0) / square + shallow) / r;
         let mut mode = upright_mode(n + 1, k, h, m, m_liq, surface, beta);
         mode.lambda_r = Some(mode.lambda * r);
@@ -264,11 +263,7 @@ pub fn box_axis(length: f64, width: f64, h: f64, rho: f64, modes: usize) -> Axis
         let wave = 4.0 / (a * k * k);
         let sign = if n.is_multiple_of(2) { 1.0 } else { -1.0 };
         let surface = sampled([0.0, 0.5 * a], k, h, |x| sign * wave * (k * x).sin());
-        let shallow = if 2.0 * k * h > 700.0 {
-            0.0
-        } else {
-            2.0 * k * (1.0 - 2.0 * h / a) / (2.0 * k * h).sinh()
-        };
+        let shallow = 2.0 * k * (1.0 - 2.0 * h / a) / (2.0 * k * h).sinh();
         let beta = 2.0 / a + 2.0 / width + shallow;
         let mut mode = upright_mode(n + 1, k, h, m, m_liq, surface, beta);
         mode.lambda_l = Some(mode.lambda * a);

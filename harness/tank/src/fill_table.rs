@@ -97,11 +97,11 @@ fn bob(row: &ModalData, n: usize) -> f64 {
     row.modes[n].height.unwrap_or(row.z_cg)
 }
 
-/// Modes that carry liquid at every fill, at least one.
-fn carrying(rows: &[ModalData], most: usize) -> usize {
-    let carries =
-        |n: usize| rows.iter().all(|row| row.modes.len() > n && row.modes[n].m > 1e-6 * row.m_liq);
-    (1..most.min(MODES)).take_while(|n| carries(*n)).last().map_or(1, |n| n + 1)
+/// Modes that all rows have and that carry liquid in each, at least one.
+fn carrying(rows: &[ModalData]) -> usize {
+    let most = rows.iter().map(|row| row.modes.len()).min().unwrap_or(0);
+    let carries = |n: &usize| rows.iter().all(|row| row.modes[*n].m > 1e-6 * row.m_liq);
+    (1..most.min(MODES)).take_while(carries).last().map_or(1, |n| n + 1)
 }
 
 /// Places [`POINTS`] fills between two, m above the lowest point, ends included.
@@ -124,7 +124,7 @@ pub fn place(tank: &Tank, low: f64, high: f64, modes: usize) -> Result<Placed, P
             .to_string()
             .into());
     }
-    let curves = Curves::new(&dense, carrying(&dense, modes));
+    let curves = Curves::new(&dense, carrying(&dense));
     let mut points: Vec<usize> =
         (0..POINTS).map(|i| (i * (CANDIDATES - 1) + (POINTS - 1) / 2) / (POINTS - 1)).collect();
     let mut best = curves.cost(&points);
@@ -187,8 +187,7 @@ pub fn parameters(
             .into());
     }
     let (first, last) = (&rows[0], &rows[rows.len() - 1]);
-    let most = rows.iter().map(|row| row.modes.len()).min().unwrap_or(0);
-    let modes = carrying(rows, most);
+    let modes = carrying(rows);
     let with_modes = |row: &ModalData| {
         let row = ModalData { modes: row.modes[..modes].to_vec(), ..row.clone() };
         ParameterSet::new(tank, &row, target, liquid)

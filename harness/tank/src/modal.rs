@@ -523,24 +523,22 @@ fn approximate(
     rho: f64,
     modes: usize,
 ) -> Option<Approximation> {
-    let solution: Solution = mesh.solve(modes, volume.z_cg)?;
-    let weights = mesh.weights();
-    let points: Vec<_> = mesh.points().collect();
+    let pitch = mesh.pitch(volume.z_cg);
+    let solution: Solution = mesh.solve(modes, &pitch)?;
+    let (weights, radii) = (mesh.weights(), mesh.radii());
     let surface = mesh.on_surface();
-    let pitch: Vec<f64> =
-        points.iter().map(|(p, n)| (p[1] - solution.z0) * n[0] - p[0] * n[1]).collect();
     let sum = |range: core::ops::Range<usize>, f: &dyn Fn(usize) -> f64| -> f64 {
         range.map(|i| weights[i] * f(i)).sum()
     };
     let rho_pi = rho * core::f64::consts::PI;
-    let i_eff = rho_pi * sum(0..points.len(), &|i| solution.psi[i] * pitch[i]);
+    let i_eff = rho_pi * sum(0..radii.len(), &|i| solution.psi[i] * pitch[i]);
     let upright = |tangent: [f64; 2]| tangent[0].abs() < 1e-9;
     let last = wall.segments.len() - 1;
     let vertical = upright(wall.segments[last].tangent(1.0))
         && (wall.r_inner == 0.0 || upright(wall.segments[0].tangent(0.0)));
     let of_mode = |(k, (&lambda, phi)): (usize, (&f64, &Vec<f64>))| {
         let big_n = sum(surface.clone(), &|i| phi[i] * phi[i]);
-        let a = sum(surface.clone(), &|i| phi[i] * points[i].0[0]);
+        let a = sum(surface.clone(), &|i| phi[i] * radii[i]);
         let b = (sum(0..surface.start, &|i| phi[i] * pitch[i]) - a) / lambda;
         // elevation per angle of the pendulum
         let scale = a / big_n;

@@ -141,7 +141,8 @@ impl Boundary {
     /// distance over the panel's local ds; `w` = x - start of the panel.
     pub(crate) fn foot(&self, panel: &Panel, w: Point) -> [f64; 2] {
         let segment = &self.segments[panel.segment];
-        let sign = (segment.to - segment.from).signum() * if panel.end { -1.0 } else { 1.0 };
+        let run = (segment.to - segment.from).signum();
+        let sign = if panel.end { -run } else { run };
         let t0 = if panel.end { segment.to } else { segment.from } + sign * panel.s0;
         let step = sign * panel.length;
         let whole = segment.curve.chord(t0, step);

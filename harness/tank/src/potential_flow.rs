@@ -42,9 +42,8 @@ pub(crate) struct Solution {
     pub(crate) lambda: Vec<f64>,
     /// phi_n at all points, sum over F of phi_n^2 r ds = 1.
     pub(crate) phi: Vec<Vec<f64>>,
-    /// psi at all points, about the height `z0`.
+    /// psi at all points.
     pub(crate) psi: Vec<f64>,
-    pub(crate) z0: f64,
 }
 
 /// A part [v0, v1] of a panel with points to integrate over it.
@@ -129,9 +128,14 @@ impl Discretisation {
         self.points.iter().enumerate().map(weight).collect()
     }
 
-    /// Points of the boundary: position, normal.
-    pub(crate) fn points(&self) -> impl Iterator<Item = (Point, Point)> + '_ {
-        self.points.iter().map(|x| (x.p, x.n))
+    /// Radii of the points.
+    pub(crate) fn radii(&self) -> Vec<f64> {
+        self.points.iter().map(|x| x.p[0]).collect()
+    }
+
+    /// Normal velocity of the boundary that turns about (0, `z0`), at all points.
+    pub(crate) fn pitch(&self, z0: f64) -> Vec<f64> {
+        self.points.iter().map(|x| (x.p[1] - z0) * x.n[0] - x.p[0] * x.n[1]).collect()
     }
 
     /// Range of the points on the free surface.
@@ -139,14 +143,12 @@ impl Discretisation {
         self.surface..self.points.len()
     }
 
-    /// The first `modes` modes, and the pitch function about (0, `z0`). None if the matrix cannot be
+    /// The first `modes` modes, and psi of the normal velocity `pitch`. None if the matrix cannot be
     /// solved: for m = 1 the operator is regular, so only if the panels are useless.
-    pub(crate) fn solve(&self, modes: usize, z0: f64) -> Option<Solution> {
+    pub(crate) fn solve(&self, modes: usize, pitch: &[f64]) -> Option<Solution> {
         let count = self.len();
         let surface = self.on_surface();
-        let pitch: Vec<f64> =
-            self.points.iter().map(|x| (x.p[1] - z0) * x.n[0] - x.p[0] * x.n[1]).collect();
-        let (matrix, right) = self.assemble(&pitch);
+        let (matrix, right) = self.assemble(pitch);
         let solved = matrix.lu().solve(&right)?;
         if !solved.iter().all(|x| x.is_finite()) {
             return None;
@@ -154,7 +156,7 @@ impl Discretisation {
         let size = surface.len();
         let psi = (0..count).map(|i| solved[(i, size)]).collect();
         if size == 0 {
-            return Some(Solution { lambda: Vec::new(), phi: Vec::new(), psi, z0 });
+            return Some(Solution { lambda: Vec::new(), phi: Vec::new(), psi });
         }
         // Subspace iteration; T is self-adjoint under the weight r ds, so its projection on an
         // orthonormal basis is symmetric but for the discretisation's error. (Symmetrising T
@@ -190,7 +192,7 @@ impl Discretisation {
             lambda.push(value);
             phi.push((value * (solved.columns(0, size) * q)).as_slice().to_vec());
         }
-        Some(Solution { lambda, phi, psi, z0 })
+        Some(Solution { lambda, phi, psi })
     }
 
     /// 1/2 + D, and S for sources at each point of F and for `q` on the whole boundary.

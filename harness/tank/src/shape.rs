@@ -69,14 +69,13 @@ pub(crate) fn recognise(wall: &Wall, fill: f64) -> Option<Recognised> {
         }
         return None;
     }
-    // The circle through both contact lines and the lowest point; level contact lines lie symmetrically about it.
+    // The circle through both contact lines, which are level, and the lowest point.
     let tube = {
         let half = 0.5 * (last[0] - first[0]);
         (half * half + fill * fill) / (2.0 * fill)
     };
     let center = [0.5 * (first[0] + last[0]), bottom + tube];
-    let is_level = (first[1] - last[1]).abs() <= SAME * size;
-    (is_level && center[0] > tube && fits(&|p| norm(sub(p, center)) - tube)).then_some(Recognised {
+    (center[0] > tube && fits(&|p| norm(sub(p, center)) - tube)).then_some(Recognised {
         shape: Shape::Torus { ring_radius: center[0], tube_radius: tube },
         fill,
     })
