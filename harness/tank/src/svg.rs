@@ -163,3 +163,79 @@ fn arc(p: Point, q: Point, rx: f64, ry: f64, large: bool, up: bool) -> Segment {
         Curve::Ellipse { center: [rx * center[0], ry * center[1]], a_r: grow * rx, a_z: grow * ry };
     Segment { curve, from, to: from + turn }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use core::f64::consts::{PI, TAU};
+
+    /// Between (2, 0) and (0, 1) of an ellipse of 2 by 1 there are four arcs: a quarter and three, about one centre and
+    /// the one opposite, each one way and the other.
+    #[test]
+    fn the_four_arcs_between_two_points_have_their_turns_and_centres() {
+        let (p, q) = ([2.0, 0.0], [0.0, 1.0]);
+        for (large, up, center, turn) in [
+            (false, true, [0.0, 0.0], 0.25 * TAU),
+            (true, true, [2.0, 1.0], 0.75 * TAU),
+            (true, false, [0.0, 0.0], -0.75 * TAU),
+            (false, false, [2.0, 1.0], -0.25 * TAU),
+        ] {
+            for size in [1.0, 3.0] {
+                let scaled = |p: Point| p.map(|x| size * x);
+                let found = arc(scaled(p), scaled(q), 2.0 * size, -size, large, up);
+                let Curve::Ellipse { center: c, a_r, a_z } = found.curve else { panic!() };
+                let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-15 * 8.0 * size, "{a} {b}");
+                close(found.to - found.from, turn);
+                for i in 0..2 {
+                    close(c[i], size * center[i]);
+                    close(found.curve.at(found.from)[i], size * p[i]);
+                    close(found.curve.at(found.to)[i], size * q[i]);
+                }
+                close(a_r, 2.0 * size);
+                close(a_z, size);
+            }
+        }
+    }
+
+    /// An ellipse that does not reach from one point to the other grows until it does: half of it, about their middle.
+    #[test]
+    fn an_arc_that_is_too_small_grows() {
+        let found = arc([0.0, 0.0], [4.0, 0.0], 1.0, 0.5, false, true);
+        let Curve::Ellipse { center, a_r, a_z } = found.curve else { panic!() };
+        assert_eq!((center, a_r, a_z), ([2.0, 0.0], 2.0, 1.0));
+        assert!((found.to - found.from - PI).abs() < 1e-15);
+    }
+
+    /// Smooth curves begin with the last control point mirrored, without a curve of their kind before them with their own
+    /// start: (1, 0), (2, 1) ends with the slope (1, 1), so it goes on to (3, 2). Horizontal and vertical lines keep the
+    /// other coordinate. Both of each, absolute and relative, y down.
+    #[test]
+    fn short_commands_of_a_path_are_the_long_ones() {
+        let read = |path: &str| segments(path, 0.5).unwrap();
+        let start = "M 1 5 ";
+        for (short, long) in [
+            ("C 1 4 2 4 3 3 S 5 2 6 2", "C 1 4 2 4 3 3 C 4 2 5 2 6 2"),
+            ("C 1 4 2 4 3 3 s 2 -1 3 -1", "C 1 4 2 4 3 3 C 4 2 5 2 6 2"),
+            ("S 2 4 3 3", "C 1 5 2 4 3 3"),
+            ("Q 2 5 3 4 T 5 3", "Q 2 5 3 4 Q 4 3 5 3"),
+            ("Q 2 5 3 4 t 2 -1", "Q 2 5 3 4 Q 4 3 5 3"),
+            ("T 5 3", "Q 1 5 5 3"),
+            ("Q 2 5 3 4 S 5 2 6 2", "Q 2 5 3 4 C 3 4 5 2 6 2"),
+            ("L 3 4 T 5 3", "L 3 4 Q 3 4 5 3"),
+            ("H 4 V 2", "L 4 5 L 4 2"),
+            ("h 3 v -3", "L 4 5 L 4 2"),
+            ("L 4 4 L 3 2 Z", "L 4 4 L 3 2 L 1 5"),
+        ] {
+            assert_eq!(
+                read(&format!("{start}{short}")),
+                read(&format!("{start}{long}")),
+                "{short}"
+            );
+        }
+        // what has no length is no segment, and lines along the axis are none
+        assert_eq!(read("M 1 5 L 1 5 L 2 5").len(), 1);
+        assert_eq!(read("M 0 5 L 2 5 L 0 1 L 0 3 Z").len(), 2);
+        let [line] = &read("M 1 5 l 2 -1")[..] else { panic!() };
+        assert_eq!([line.start(), line.end()], [[0.5, -2.5], [1.5, -2.0]]);
+    }
+}

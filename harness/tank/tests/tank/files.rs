@@ -99,6 +99,34 @@ fn impossible_fills_are_described() {
             0.5,
             "horizontal part",
         ),
+        // walls that are level at the free surface: an inner one, an outer one, and the top of a dome
+        (
+            "profile = [{ arc = [0.5, 0, 0.3, 90, 0] }, { line = [0.8, 0, 1, 0] }, { line = [1, 0, 1, 1] }]",
+            0.3,
+            "horizontal part",
+        ),
+        (
+            "profile = [{ line = [0, 0, 0.7, 0] }, { arc = [1, 0, 0.3, 180, 90] }]",
+            0.3,
+            "horizontal part",
+        ),
+        (
+            "profile = [{ arc = [0, 0, 0.3, 90, 0] }, { line = [0.3, 0, 1, 0] }, { line = [1, 0, 1, 1] }]",
+            0.3,
+            "horizontal part",
+        ),
+        // and a little below
+        (
+            "profile = [{ arc = [0.5, 0, 0.3, 90, 0] }, { line = [0.8, 0, 1, 0] }, { line = [1, 0, 1, 1] }]",
+            0.295,
+            "",
+        ),
+        ("profile = [{ line = [0, 0, 0.7, 0] }, { arc = [1, 0, 0.3, 180, 90] }]", 0.295, ""),
+        (
+            "profile = [{ arc = [0, 0, 0.3, 90, 0] }, { line = [0.3, 0, 1, 0] }, { line = [1, 0, 1, 1] }]",
+            0.295,
+            "",
+        ),
         // a ring-shaped sump around a dome, and a second one outside
         (
             "profile = [{ line = [0, 0, 1, 1] }, { line = [1, 1, 2, 0] }, { line = [2, 0, 3, 2] }]",
@@ -127,6 +155,52 @@ fn impossible_fills_are_described() {
                 assert!(!words.is_empty() && said.contains(words), "{text} {fill}: {said}");
             }
         }
+    }
+}
+
+/// A gap of 1e-6 of the size is closed, and a free surface within 1e-6 of a shoulder is refused: of the tank's own size. The
+/// largest is 100 m.
+#[test]
+fn small_tanks_and_large_ones_are_judged_alike() {
+    for c in [0.01, 1.0, 50.0] {
+        let parsed = |gap: f64| {
+            let text = format!(
+                "density = 1.0\nprofile = [{{ line = [0, 0, {c}, 0] }}, {{ line = [{}, 0, {c}, {}] }}, {{ line = [{c}, {}, {}, {}] }}, {{ line = [{}, {}, {}, {}] }}]",
+                c * (1.0 + gap),
+                0.5 * c,
+                0.5 * c,
+                2.0 * c,
+                0.5 * c,
+                2.0 * c,
+                0.5 * c,
+                2.0 * c,
+                c
+            );
+            Tank::parse(&text, Path::new(""))
+        };
+        // over the size, 2
+        assert!(parsed(1.9e-6).is_ok());
+        assert!(parsed(2.1e-6).unwrap_err().to_string().contains("open"), "{c}");
+        let tank = parsed(0.0).unwrap();
+        for off in [-1.9e-6, 1.9e-6, 1e-9] {
+            let said = tank.solve(c * (0.5 + off), 1).unwrap_err().to_string();
+            assert!(said.contains("horizontal part"), "{c} {off}: {said}");
+        }
+        for off in [-2.1e-6, 2.1e-6] {
+            let solved = tank.solve(c * (0.5 + off), 1);
+            let refused = solved.as_ref().is_err_and(|p| p.to_string().contains("horizontal part"));
+            assert!(!refused, "{c} {off}");
+        }
+    }
+    for (text, allowed) in [
+        ("box = [100, 100]", true),
+        ("box = [100.01, 1]", false),
+        ("box = [1, 100.01]", false),
+        ("shape = { cylinder = { radius = 100, height = 1 } }", true),
+        ("shape = { cylinder = { radius = 1, height = 100.01 } }", false),
+    ] {
+        let parsed = Tank::parse(&format!("density = 1.0\n{text}"), Path::new(""));
+        assert_eq!(parsed.is_ok(), allowed, "{text}");
     }
 }
 

@@ -400,6 +400,37 @@ fn every_mode_of_a_cylinder_has_its_own_layer() {
     assert_eq!(second.interval[0], second.laminar);
 }
 
+/// From half a radius of depth on a cylinder's damping is Mikishev and Dorozhkin's, in shallower liquid that of Stephens.
+#[test]
+fn a_cylinder_s_damping_names_its_source() {
+    for radius in [0.2, 3.0] {
+        let shape = format!("shape = {{ cylinder = {{ radius = {radius}, height = 9 }} }}");
+        for (depth, source) in [(0.48, "Stephens"), (0.52, "Mikishev"), (1.5, "Mikishev")] {
+            let taken = damped(&shape, depth * radius, 1e-6, 9.81, None).taken;
+            assert!(taken.contains(source), "{radius} {depth}: {taken}");
+        }
+    }
+}
+
+/// What a shape's formula says of its range, said of the tank at the specific force that its frequency makes: gravity's.
+#[test]
+fn a_tank_s_damping_warns_as_the_formula_of_its_shape() {
+    for (shape, fill, formula) in [
+        ("sphere = { radius = 0.5 }", 0.4, damping::sphere(0.5, 0.4, 1e-6, 9.81)),
+        ("cone = { half_angle = 50, height = 1 }", 0.4, damping::cone(0.4, 50.0, 1e-6, 9.81)),
+        (
+            "torus = { ring_radius = 2, tube_radius = 0.5 }",
+            0.4,
+            damping::torus(0.5, 0.4, 1e-8, 9.81),
+        ),
+    ] {
+        let nu = if shape.starts_with("torus") { 1e-8 } else { 1e-6 };
+        let warnings = damped(&format!("shape = {{ {shape} }}"), fill, nu, 9.81, None).warnings;
+        let [why] = &formula.outside[..] else { panic!("{shape}: {formula:?}") };
+        assert!(warnings.contains(&format!("damping: {why}")), "{shape}: {warnings:?} {why}");
+    }
+}
+
 /// A sphere of 0.5 m, half full: at 0.05 m/s2 measured, twice the layers; at 9.81 m/s2 not measured.
 #[test]
 fn two_estimates_that_disagree_are_both_written() {

@@ -315,6 +315,19 @@ fn stated_error_covers_hard_tanks() {
     }
 }
 
+/// A full tank has no free surface to measure errors by: they are over its radius of gyration, so that the same lens has
+/// them in every size. Powers of two, so the same digits.
+#[test]
+fn a_full_tank_s_error_does_not_depend_on_its_size() {
+    let error = |c: f64| {
+        let lens =
+            format!("shape = {{ spheroid = {{ radius = {c:?}, half_height = {:?} }} }}", 0.02 * c);
+        solve(&lens, 0.04 * c, 1).error
+    };
+    assert!(error(1.0) > 1e-10, "rounding alone: {:e}", error(1.0));
+    assert_eq!([error(0.0625), error(16.0)], [error(1.0); 2]);
+}
+
 /// Liquids thin against the tank and details small against it cost no accuracy. A lens and a needle: where two
 /// discretisations differ by 2e-7, a third, finer one is taken. A knuckle of 2 % of the radius: panels are as short as the
 /// gap to its other end, and the error is a smooth tank's. A shelf 2 cm thick, 2 cm above the floor: 1e-6 needs finer

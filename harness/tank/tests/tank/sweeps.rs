@@ -2,7 +2,7 @@
 
 use crate::common::tank;
 use hubslosh_tank::interpolation::Monotone;
-use hubslosh_tank::parameters::{Liquid, Target, Value};
+use hubslosh_tank::parameters::{Liquid, Target, Value, damping_of};
 use hubslosh_tank::sweep::{Depletion, sweep};
 use hubslosh_tank::{Fill, ModalData, closed_form, fill_table};
 
@@ -24,6 +24,10 @@ fn interpolated_modes_are_those_between_the_fills() {
             assert!((a.l / b.l - 1.0).abs() < 1e-4, "{fill} {} {}", a.l, b.l);
             assert!((a.m - b.m).abs() < 1e-4 * exact.m_liq, "{fill}");
             assert!((a.m_h - b.m_h).abs() < 1e-3 * exact.m_liq, "{fill}");
+        }
+        // between the fills, too, a mode has one height
+        for mode in &at.modes {
+            assert!((mode.m * mode.m_h2 - mode.m_h * mode.m_h).abs() < 1e-14 * mode.m_h.powi(2));
         }
         assert!((at.rest.m_0 - exact.rest(3).m_0).abs() < 1e-3 * exact.m_liq);
         // the sphere's hinge is the centre, between the fills too
@@ -233,4 +237,57 @@ fn a_table_over_the_fill_is_written_for_the_six_axis_fmus() {
     let empty = sweep(&tank, &[0.0, 0.4], 3).unwrap();
     assert!(refused(&empty, Target::SloshTank).contains("free surface"));
     assert!(fill_table::place(&tank, 0.1, 1.0, 3).is_err());
+}
+
+/// Of a cone of 45 degrees the first mode alone carries liquid (phi_1 = r z), of a sphere all do, and a six-axis FMU keeps
+/// three of them.
+#[test]
+fn a_table_has_the_modes_that_carry_liquid_at_every_fill() {
+    let liquid = Liquid { gravity: 9.81, nu: None, sigma: None, contact_angle: 90.0 };
+    for (shape, asked, kept) in [
+        ("cone = { half_angle = 45.0, height = 1.5 }", 4, 1),
+        ("sphere = { radius = 0.5 }", 1, 1),
+        ("sphere = { radius = 0.5 }", 2, 2),
+        ("sphere = { radius = 0.5 }", 4, 3),
+    ] {
+        let tank = tank(&format!("density = 1000.0\nshape = {{ {shape} }}"));
+        let table = sweep(&tank, &[0.3, 0.7], asked).unwrap();
+        let set = fill_table::parameters(&tank, &table, None, Target::SloshTank, liquid).unwrap();
+        let modes = Value::Integer(kept);
+        assert!(set.values.contains(&("tank.modes".to_string(), modes)), "{shape} {asked}");
+        for n in 1..=asked as i64 {
+            let name = format!("tank.fill.mass[{n},2]");
+            let is_there = set.values.iter().any(|(known, _)| *known == name);
+            assert_eq!(is_there, n <= kept, "{shape} {asked}: {name}");
+        }
+    }
+}
+
+/// The errors between a table's points, of 1 for all, in per cent; from 0.5 % on a warning says that the points are few.
+#[test]
+fn the_parameters_state_the_errors_between_a_table_s_points() {
+    let tank = tank("density = 1000.0\nshape = { sphere = { radius = 0.5 } }");
+    let table = sweep(&tank, &[0.1, 0.4, 0.8], 1).unwrap();
+    let liquid = Liquid { gravity: 9.81, nu: Some(1e-6), sigma: None, contact_angle: 90.0 };
+    for (error, few) in [
+        ([0.001, 0.002, 0.003], false),
+        ([0.006, 0.002, 0.003], true),
+        ([0.001, 0.006, 0.003], true),
+        ([0.001, 0.002, 0.006], true),
+    ] {
+        let set =
+            fill_table::parameters(&tank, &table, Some(error), Target::SloshTank, liquid).unwrap();
+        let [frequency, mass, hinge] = error.map(|x| format!("{:.2} %", 100.0 * x));
+        let words = format!("frequency within {frequency}, mass {mass}, hinge {hinge}");
+        assert!(set.notes.iter().any(|note| note.contains(&words)), "{:?}", set.notes);
+        let warned = |words: &str| set.warnings.iter().any(|warning| warning.contains(words));
+        assert_eq!(warned("3 points are few for this tank"), few, "{:?}", set.warnings);
+        // the ratio that stays, and what it is at the other end
+        let ratio = |fill: f64| {
+            let data = tank.solve(fill, 1).unwrap();
+            damping_of(&tank, &data, 1e-6, liquid).unwrap().modes[0].zeta
+        };
+        let [most, least] = [0.8, 0.1].map(ratio);
+        assert!(warned(&format!("zeta[1] is {most:.4} there, {least:.4} at the least")));
+    }
 }
