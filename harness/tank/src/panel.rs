@@ -309,3 +309,194 @@ impl Piece {
         pairs.map(|(a, b)| norm(sub(*a, *b))).fold(f64::MAX, f64::min)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gauss::Gauss;
+    use core::f64::consts::PI;
+
+    fn sphere() -> Vec<Segment> {
+        vec![Segment::arc([0.0, 0.0], 0.8, -90.0, 20.0)]
+    }
+
+    /// An inner corner on the floor.
+    fn step() -> Vec<Segment> {
+        vec![
+            Segment::line([0.0, 0.3], [0.4, 0.3]),
+            Segment::line([0.4, 0.3], [0.4, 0.0]),
+            Segment::line([0.4, 0.0], [0.9, 0.0]),
+            Segment::line([0.9, 0.0], [0.9, 0.7]),
+        ]
+    }
+
+    fn ring() -> Vec<Segment> {
+        vec![Segment::arc([1.1, 0.2], 0.5, -200.0, 20.0)]
+    }
+
+    /// Right angles are pi/2 of the liquid, nu = 2; a re-entrant one 3 pi/2, nu = 2/3; where the curvature jumps rho^2 log
+    /// rho is smooth in the cube of v; a cusp has the largest gamma. Weak corners of many segments count less.
+    #[test]
+    fn corners_are_graded_by_their_angle() {
+        let at = |degrees: f64, many: bool| {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            grading_at([1.0, 0.0], [cos, sin], many)
+        };
+        for (turn, gamma, nu) in [
+            (90.0, 3.0, 2.0),
+            (-90.0, 9.0, 2.0 / 3.0),
+            (0.0, 3.0, 1.0),
+            (62.0, 4.0, 180.0 / 118.0),
+            (45.0, 5.0, 4.0 / 3.0),
+            (-179.0, 9.0, 180.0 / 359.0),
+            (152.0, 1.0, 180.0 / 28.0),
+        ] {
+            let found = at(turn, false);
+            assert_eq!(found.0, gamma, "{turn}");
+            assert!((found.1 / nu - 1.0).abs() < 1e-12, "{turn} {found:?}");
+        }
+        // 0.1 and 0.3 rad are 5.7 and 17.2 degrees
+        for (turn, gamma) in [(5.7, 1.0), (-5.7, 1.0), (5.8, 2.0), (-17.1, 2.0), (17.3, 6.0)] {
+            assert_eq!(at(turn, true).0, gamma, "{turn}");
+        }
+        assert_eq!(at(1.0, false).0, 6.0);
+    }
+
+    /// Points begin and end where the panels do, one panel after the other; ds/dv is their distance's slope, the normal
+    /// is across and out; lengths add up.
+    #[test]
+    fn panels_follow_one_another_along_the_whole_boundary() {
+        let cap = 0.8 * 20f64.to_radians().cos();
+        let gap = 2.0 * 0.5 * 20f64.to_radians().cos();
+        for (wall, whole) in [
+            (sphere(), 0.8 * 110f64.to_radians() + cap),
+            (step(), 0.4 + 0.3 + 0.5 + 0.7 + 0.9),
+            (ring(), 0.5 * 220f64.to_radians() + gap),
+        ] {
+            let boundary = Boundary::new(&wall);
+            assert_eq!(boundary.surface, wall.len());
+            for fine in [false, true] {
+                let panels = boundary.panels(3, fine);
+                let ends = |panel: &Panel| {
+                    let ends = [1e-300, 1.0].map(|v| boundary.point(panel, v).p);
+                    if panel.end { [ends[1], ends[0]] } else { ends }
+                };
+                for pair in panels.windows(2) {
+                    let gap = norm(sub(ends(&pair[0])[1], ends(&pair[1])[0]));
+                    assert!(gap < 1e-15, "{gap:e} {pair:?}");
+                }
+                let rule = Gauss::new(24);
+                let mut length = 0.0;
+                for panel in &panels {
+                    for (v, w) in rule.nodes.iter().zip(&rule.weights) {
+                        length += w * boundary.point(panel, *v).speed;
+                    }
+                    for v in [0.3, 0.6, 0.9] {
+                        let h = 1e-5;
+                        let [a, x, b] = [v - h, v, v + h].map(|v| boundary.point(panel, v));
+                        let slope = sub(b.p, a.p).map(|d| 0.5 * d / h);
+                        // h^2 times the third derivative of v^9, 504 of the length
+                        assert!((norm(slope) - x.speed).abs() < 1e-7, "{panel:?}");
+                        assert!(dot(slope, x.n).abs() < 1e-7 && (norm(x.n) - 1.0).abs() < 1e-15);
+                        // to the left of the way along the boundary is the liquid
+                        let way = if panel.end { -1.0 } else { 1.0 };
+                        assert!(way * cross(slope, x.n) < 0.0, "{panel:?}");
+                        assert!(norm(sub(boundary.difference(&a, &b), sub(b.p, a.p))) < 1e-15);
+                    }
+                }
+                assert!((length / whole - 1.0).abs() < 1e-13, "{length} {whole}");
+            }
+        }
+    }
+
+    /// Next to a corner places differ by v^gamma, far less than coordinates have digits: on one wall and across the corner.
+    #[test]
+    fn differences_next_to_a_corner_keep_their_digits() {
+        let boundary = Boundary::new(&step());
+        let panels = boundary.panels(3, false);
+        let corner = |segment: usize, end: bool| {
+            let own = |p: &&Panel| p.segment == segment && p.end == end && p.gamma > 1.0;
+            *panels.iter().find(own).unwrap()
+        };
+        // the floor's inner edge, nu = 2/3 and gamma = 9: along -r on the upper floor, down the step
+        let (above, below) = (corner(0, true), corner(1, false));
+        for (v, w) in [(1e-3, 2e-3), (0.01, 0.02), (0.5, 0.3)] {
+            let [x, y] = [v, w].map(|v| boundary.point(&above, v));
+            let across = boundary.point(&below, w);
+            let along = |panel: &Panel, v: f64| {
+                boundary.segments[panel.segment].size() * panel.length * v.powi(9)
+            };
+            let (dx, dy) = (along(&above, v), along(&above, w));
+            let same = boundary.difference(&x, &y);
+            assert!((same[0] / (dx - dy) - 1.0).abs() < 1e-13 && same[1] == 0.0, "{same:?}");
+            let other = boundary.difference(&x, &across);
+            assert!((other[0] / dx - 1.0).abs() < 1e-13, "{other:?}");
+            assert!((other[1] / -along(&below, w) - 1.0).abs() < 1e-13, "{other:?}");
+        }
+    }
+
+    /// The foot of a point beside an arc is at its angle, and its distance over the arc's; beside a line over the line. Four
+    /// steps, each of which leaves the ratio of distance to radius of what there was, 1e-1.
+    #[test]
+    fn the_foot_of_a_point_is_the_nearest_of_the_panel() {
+        for wall in [sphere(), ring(), step()] {
+            let boundary = Boundary::new(&wall);
+            for panel in boundary.panels(3, false) {
+                let start = boundary.point(&panel, 1e-300).p;
+                for (v, off) in [(0.2f64, 0.1), (0.5, -0.05), (0.8, 0.3), (1.0, 0.0)] {
+                    let x = boundary.point(&panel, v);
+                    let p = add(x.p, x.n.map(|n| off * 0.2 * n));
+                    let [s, distance] = boundary.foot(&panel, sub(p, start));
+                    let power = v.powf(panel.gamma);
+                    let local = x.speed * v / (panel.gamma * power);
+                    assert!((s - power).abs() < 1e-5, "{panel:?}: {s} {power}");
+                    assert!((distance - 0.2 * f64::abs(off) / local).abs() < 1e-5, "{distance}");
+                }
+            }
+        }
+    }
+
+    /// 60 degrees a panel, 1.05 rad: a full sphere, whose three are neither close to each other nor to a surface, has no more.
+    #[test]
+    fn a_full_sphere_has_three_panels() {
+        let boundary = Boundary::new(&[Segment::arc([0.0, 0.0], 1.0, -90.0, 90.0)]);
+        assert_eq!((boundary.surface, boundary.segments.len()), (1, 1));
+        let panels = boundary.panels(1, false);
+        assert_eq!(panels.len(), 3);
+        for panel in panels {
+            let [a, b] = [1e-300, 1.0].map(|v| boundary.point(&panel, v).n);
+            assert!((dot(a, b).acos() - PI / 3.0).abs() < 1e-12);
+        }
+    }
+
+    /// Three times its neighbour's length, at most; around a ring the last panel and the first are neighbours, too.
+    #[test]
+    fn panels_change_their_length_gradually() {
+        let fine = [
+            Segment::line([1.0, 0.01], [1.0, 0.0]),
+            Segment::line([1.0, 0.0], [2.0, 0.0]),
+            Segment::line([2.0, 0.0], [2.0, 0.01]),
+        ];
+        for wall in [sphere(), ring(), step(), fine.to_vec()] {
+            let boundary = Boundary::new(&wall);
+            for fine in [false, true] {
+                let panels = boundary.panels(3, fine);
+                let length = |panel: &Panel| {
+                    let [a, b] = [1e-300, 1.0].map(|v| boundary.point(panel, v).p);
+                    // between chord and arc of 60 degrees at most
+                    (norm(sub(a, b)), norm(sub(a, b)) * (PI / 6.0) / 0.5)
+                };
+                let mut pairs: Vec<_> = panels.windows(2).map(|p| [p[0], p[1]]).collect();
+                if wall[0].start()[0] > 0.0 {
+                    pairs.push([panels[panels.len() - 1], panels[0]]);
+                }
+                for [a, b] in pairs {
+                    assert!(
+                        length(&a).0 <= 3.0 * length(&b).1 && length(&b).0 <= 3.0 * length(&a).1,
+                        "{a:?} {b:?}"
+                    );
+                }
+            }
+        }
+    }
+}

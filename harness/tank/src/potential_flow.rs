@@ -541,3 +541,190 @@ fn bernstein(point: [f64; 2], v0: f64, v1: f64) -> f64 {
     let sum = 0.5 * (((x - 1.0).powi(2) + y * y).sqrt() + ((x + 1.0).powi(2) + y * y).sqrt());
     sum + (sum * sum - 1.0).max(0.0).sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::curve::dot;
+    use nalgebra::DVector;
+
+    /// A bowl, a cylinder with an inner corner on its floor, and a ring, each with a free surface.
+    fn walls() -> [Vec<Segment>; 3] {
+        [
+            vec![Segment::arc([0.0, 0.1], 0.8, -90.0, 20.0)],
+            vec![
+                Segment::line([0.0, 0.3], [0.4, 0.3]),
+                Segment::line([0.4, 0.3], [0.4, 0.0]),
+                Segment::line([0.4, 0.0], [0.9, 0.0]),
+                Segment::line([0.9, 0.0], [0.9, 0.7]),
+            ],
+            vec![Segment::arc([1.1, 0.2], 0.5, -200.0, 20.0)],
+        ]
+    }
+
+    /// Harmonic with cos theta: r, r z and r (4 z^2 - r^2), with their gradients.
+    const HARMONIC: [fn(Point) -> (f64, Point); 3] = [
+        |[r, _]| (r, [1.0, 0.0]),
+        |[r, z]| (r * z, [z, r]),
+        |[r, z]| (r * (4.0 * z * z - r * r), [4.0 * z * z - 3.0 * r * r, 8.0 * r * z]),
+    ];
+
+    /// Green's third identity, to the error of 16 points a panel: at the step's inner edge, where r goes as v^9, the cubic is a
+    /// polynomial of degree 27.
+    #[test]
+    fn harmonic_functions_satisfy_the_integral_equation() {
+        for wall in walls() {
+            for fine in [false, true] {
+                let mesh = Discretisation::new(&wall, 3, 16, fine);
+                for (harmonic, error) in HARMONIC.into_iter().zip([1e-10, 1e-10, 1e-7]) {
+                    let values: Vec<_> = mesh.points.iter().map(|x| harmonic(x.p)).collect();
+                    let slopes = mesh.points.iter().zip(&values);
+                    let q: Vec<f64> = slopes.map(|(x, (_, slope))| dot(*slope, x.n)).collect();
+                    let (matrix, right) = mesh.assemble(&q);
+                    let u = DVector::from_iterator(values.len(), values.iter().map(|v| v.0));
+                    let off = matrix * &u - right.column(right.ncols() - 1);
+                    assert!(off.amax() < error, "{:e}", off.amax());
+                    // the sources on the free surface alone are the last of them
+                    let on_surface = DVector::from_column_slice(&q[mesh.on_surface()]);
+                    let mut wall_alone = q.clone();
+                    wall_alone[mesh.on_surface()].fill(0.0);
+                    let alone = mesh.assemble(&wall_alone).1;
+                    let parts = right.columns(0, right.ncols() - 1) * on_surface;
+                    let all = parts + alone.column(alone.ncols() - 1);
+                    assert!((all - right.column(right.ncols() - 1)).amax() < 1e-14);
+                }
+            }
+        }
+    }
+
+    /// r cos theta is a uniform flow: int [u_s^2 + u^2/r^2] r ds by hand over the free surfaces and the walls. Next to the
+    /// step's inner edge the last 1e-6 of a panel counts thrice, as a flow around the edge does.
+    #[test]
+    fn the_gradient_of_a_uniform_flow_is_that_of_the_surface_it_is_taken_on() {
+        let (sin, cos) = 20f64.to_radians().sin_cos();
+        let around = |t: f64| {
+            let (sin, cos) = t.to_radians().sin_cos();
+            let own = 1.1 * 0.5 * (1.5 * t.to_radians() - 0.5 * sin * cos);
+            own + 0.25 * (sin.powi(3) / 3.0 + sin)
+        };
+        let known = [
+            [(0.8 * cos).powi(2), 0.64 * ((sin.powi(3) + 1.0) / 3.0 + sin + 1.0)],
+            [0.81, 0.81 + 0.4 * 0.3 + 0.9 * 0.7],
+            [(1.1 + 0.5 * cos).powi(2) - (1.1 - 0.5 * cos).powi(2), around(20.0) - around(-200.0)],
+        ];
+        for (wall, known) in walls().iter().zip(known) {
+            let mesh = Discretisation::new(wall, 3, 16, false);
+            for (on_surface, known) in [(true, known[0]), (false, known[1])] {
+                let found = mesh.gradient(&mesh.radii(), on_surface);
+                assert!((found / known - 1.0).abs() < 2e-7, "{on_surface} {found} {known}");
+            }
+        }
+    }
+
+    /// The radius itself along surface and wall, and the speed of the uniform flow along the wall, |dr/ds|. Dividing by
+    /// ds/dv next to corners leaves 1e-5 of it where they are nearest.
+    #[test]
+    fn values_along_the_boundary_are_at_their_places() {
+        for wall in walls() {
+            let mesh = Discretisation::new(&wall, 3, 16, false);
+            let u = mesh.radii();
+            let surface = mesh.along_surface(&u, 5);
+            let (start, end) = (wall[0].start(), wall[wall.len() - 1].end());
+            let inner = if wall.len() == 1 && start[0] > 0.0 { start[0] } else { 0.0 };
+            assert!((surface[0][0] - end[0]).abs() < 1e-14);
+            assert!((surface[surface.len() - 1][0] - inner).abs() < 1e-14);
+            assert!(surface.windows(2).all(|pair| pair[1][0] < pair[0][0]));
+            assert!(surface.iter().all(|[r, u]| (r - u).abs() < 1e-12));
+            let along = mesh.along_wall(&u);
+            for [r, z, speed] in &along {
+                let near = |s: &Segment| {
+                    (0..=4000).any(|i| norm(sub(s.at(i as f64 / 4000.0), [*r, *z])) < 1e-3)
+                };
+                assert!(wall.iter().any(near), "({r}, {z})");
+                let direction = match wall[..] {
+                    [arc] => {
+                        let center = if inner > 0.0 { [1.1, 0.2] } else { [0.0, 0.1] };
+                        let radius = arc.size();
+                        ((z - center[1]) / radius).abs()
+                    }
+                    _ if *r == 0.4 || *r == 0.9 => 0.0,
+                    _ => 1.0,
+                };
+                assert!((speed - direction).abs() < 2e-5, "({r}, {z}): {speed} {direction}");
+            }
+            // from the outer contact line, one after the other, without holes and twice the same
+            let length: f64 =
+                along.windows(2).map(|p| norm(sub([p[1][0], p[1][1]], [p[0][0], p[0][1]]))).sum();
+            let whole: f64 = wall
+                .iter()
+                .map(|s| {
+                    (0..999)
+                        .map(|i| norm(sub(s.at((i + 1) as f64 / 999.0), s.at(i as f64 / 999.0))))
+                        .sum::<f64>()
+                })
+                .sum();
+            assert!(length < whole && length > 0.98 * whole, "{length} {whole}");
+            assert!(norm(sub([along[0][0], along[0][1]], end)) < 0.02);
+        }
+    }
+
+    /// r (1 - r^2/(3 b^2)) is largest at b, 2 b/3; of either sign.
+    #[test]
+    fn the_surface_s_largest_elevation_is_found_between_points() {
+        for (wall, b) in walls().iter().zip([0.5, 0.61, 1.2]) {
+            let mesh = Discretisation::new(wall, 3, 16, false);
+            for sign in [1.0, -1.0] {
+                let wave = |r: f64| sign * r * (1.0 - r * r / (3.0 * b * b));
+                let u: Vec<f64> = mesh.radii().into_iter().map(wave).collect();
+                let [r, value] = mesh.surface_peak(&u);
+                // A flat maximum is known to the root of its value's digits.
+                assert!(
+                    (r - b).abs() < 1e-6 && (value - sign * b / 1.5).abs() < 1e-12,
+                    "{r} {value}"
+                );
+            }
+        }
+    }
+
+    /// On 1..3 about 2: 1.25 on the real axis and 0.75 on the imaginary one are on the ellipse with semi-axes 5/4 and 3/4.
+    #[test]
+    fn bernstein_s_ellipse_has_its_foci_at_the_ends() {
+        for point in [[2.0 + 1.25, 0.0], [2.0 - 1.25, 0.0], [2.0, 0.75], [2.0, -0.75]] {
+            assert!((bernstein(point, 1.0, 3.0) - 2.0).abs() < 1e-15, "{point:?}");
+        }
+        assert_eq!([bernstein([1.0, 0.0], 1.0, 3.0), bernstein([2.5, 0.0], 1.0, 3.0)], [1.0; 2]);
+    }
+
+    /// int v^k log|v - x| dv for k = 0 and 1, and of the polynomials themselves: 20 points on each side of x, stretched by
+    /// the fifth power, which leave 1e-12 of the logarithm.
+    #[test]
+    fn the_own_panel_s_rules_integrate_a_logarithm() {
+        let mesh = Discretisation::new(&walls()[0], 3, 12, false);
+        let rules = mesh.own_rules();
+        assert_eq!(rules.len(), 12);
+        for (rule, x) in rules.iter().zip(&mesh.rule.nodes) {
+            let sum =
+                |f: &dyn Fn(f64) -> f64| rule.points.iter().map(|(v, w)| w * f(*v)).sum::<f64>();
+            let part = |y: f64| {
+                if y == 0.0 {
+                    [0.0; 2]
+                } else {
+                    let log = y.abs().ln();
+                    [y * (log - 1.0), 0.5 * y * y * (log - 0.5)]
+                }
+            };
+            let [b, a] = [part(1.0 - x), part(-x)];
+            let known = [b[0] - a[0], b[1] - a[1] + x * (b[0] - a[0])];
+            for (k, known) in known.into_iter().enumerate() {
+                let found = sum(&|v| v.powi(k as i32) * (v - x).abs().ln());
+                assert!((found - known).abs() < 5e-12, "{x} {k}: {found} {known}");
+                assert!((sum(&|v| v.powi(7 * k as i32)) - 1.0 / (1 + 7 * k) as f64).abs() < 1e-14);
+            }
+            let mut values = vec![0.0; 12];
+            for ((v, _), own) in rule.points.iter().zip(rule.values.chunks(12)) {
+                legendre(*v, &mut values);
+                assert_eq!(own, values);
+            }
+        }
+    }
+}
