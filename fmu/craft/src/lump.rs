@@ -738,3 +738,43 @@ fn earlier(a: Option<f64>, b: Option<f64>) -> Option<f64> {
         (a, b) => a.or(b),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// t - 1/4, 1/4 - t, t - 1/4 from far below, and what only touches zero.
+    #[test]
+    fn a_series_rises_where_it_passes_zero_from_below() {
+        let of = |terms: &[f64]| {
+            let mut series = ZERO;
+            series[..terms.len()].copy_from_slice(terms);
+            series
+        };
+        let close = |found: Option<f64>, t: f64| assert!((found.unwrap() - t).abs() < 1e-12);
+        close(rise(&of(&[-0.25, 1.0]), 2, 1.0), 0.25);
+        close(rise(&of(&[-0.25, 0.0, 1.0]), 3, 1.0), 0.5);
+        close(rise(&of(&[-2.5e9, 1e10]), 2, 1.0), 0.25);
+        assert_eq!(rise(&of(&[-0.25, 1.0]), 2, 0.2), None);
+        // coefficients from n on are not of the series
+        assert_eq!(rise(&of(&[-0.25, 0.0, 1.0]), 2, 1.0), None);
+        for falling in [[0.25, -1.0], [0.25, 1.0], [-0.25, -1.0], [-1e-12, 1.0]] {
+            assert_eq!(rise(&of(&falling), 2, 1.0), None, "{falling:?}");
+        }
+        // a host at an event: above zero or not
+        assert_eq!([1e-9, -1e-9].map(|a| rise(&of(&[a, 1.0]), 2, 0.0)), [Some(0.0), None]);
+    }
+
+    #[test]
+    fn the_earlier_of_two_times_is_the_one_there_is_or_the_smaller() {
+        for (a, b, first) in [
+            (Some(1.0), Some(2.0), Some(1.0)),
+            (Some(2.0), Some(1.0), Some(1.0)),
+            (Some(1.0), None, Some(1.0)),
+            (None, Some(2.0), Some(2.0)),
+            (None, None, None),
+        ] {
+            assert_eq!(earlier(a, b), first);
+        }
+    }
+}

@@ -170,6 +170,8 @@ impl FillCurves {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use alloc::vec::Vec;
+    use taylor::number::Dual;
 
     /// Random monotone data, also with flat stretches: never a slope of the wrong sign, values and
     /// both derivatives the same from either side of a point.
@@ -248,5 +250,27 @@ mod tests {
             assert!(((exact.length / l).sqrt() - 1.0).abs() < 5e-3, "h {h}: length {l}");
             assert!((hinge - exact.hinge).abs() < 5e-3 * r, "h {h}: {hinge} {}", exact.hinge);
         }
+    }
+
+    /// Beyond its table's ends a tank is as it is there, and what is left of its liquid changes nothing.
+    #[test]
+    fn beyond_the_ends_of_its_table_a_tank_is_as_it_is_there() {
+        let table = FillTable { points: 3, ..crate::Tank::default().fill };
+        let curves = table.curves(MODES);
+        let all = |m: f64| {
+            // of the liquid's mass, by the liquid's mass
+            let at = curves.place(Dual::of(m, 1.0));
+            let modes = (0..MODES).flat_map(|n| curves.mode(n, at));
+            let jets: Vec<_> = modes.chain(curves.rigid(at)).collect();
+            let values: Vec<_> = jets.iter().map(|jet| jet[0].value()).collect();
+            (values, jets.iter().map(|jet| jet[0].result()).collect::<Vec<_>>())
+        };
+        let [low, middle, high] = [0, 1, 2].map(|i| table.liquid[i]);
+        for (m, end) in [(0.5 * low, low), (-1.0, low), (1.5 * high, high), (2.5 * high, high)] {
+            let ((values, slopes), (at_end, _)) = (all(m), all(end));
+            assert_eq!(values, at_end, "{m}");
+            assert!(slopes.iter().all(|slope| *slope == 0.0), "{m} {slopes:?}");
+        }
+        assert!(all(low).0 != all(high).0 && all(middle).1.iter().any(|slope| *slope != 0.0));
     }
 }

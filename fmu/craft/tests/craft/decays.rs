@@ -183,15 +183,39 @@ fn a_step_ends_out_of_range_where_any_bob_of_any_tank_does() {
             p.tank[tank].p_0[mode] = [angle.sin(), 0.0, -angle.cos()];
             let inputs = Inputs { force: Ramp::held([0.0, 0.0, 2000.0]), ..Inputs::default() };
             let mut craft = Spacecraft::new(&p, &inputs, 0.0, 1e-9).unwrap();
+            let [held, shown] = [craft.ranges_held(), craft.ranges(&inputs)];
+            assert_eq!(held, shown);
+            assert_eq!(held[tank].in_range, angle < 0.7);
+            assert_eq!(craft.leaves_range(&held), angle > 0.7);
             craft.step(&inputs, 1e-3).unwrap();
             let in_range = craft.outputs(&inputs).tank.map(|tank| tank.ranges.in_range);
             let expected: [bool; 4] = std::array::from_fn(|i| i != tank || angle < 0.7);
             assert_eq!(in_range, expected);
             assert_eq!(craft.is_in_range(), angle < 0.7, "{tank} {mode} {angle}");
             found[usize::from(craft.is_in_range())] += 1;
+            // Liquid that may leave its tank's bottom is never out of range.
+            p.tank[tank].ball.travel = 0.6;
+            let craft = Spacecraft::new(&p, &inputs, 0.0, 1e-9).unwrap();
+            assert!(!craft.leaves_range(&craft.ranges_held()) && craft.is_in_range());
         }
     }
     assert_eq!(found, [6, 6]);
+}
+
+/// Under thrust along the first tank and against the second: there k l/m has to be more than 1.3 m/s2.
+#[test]
+fn each_tank_s_range_is_that_of_the_acceleration_along_its_own_axis() {
+    for (k, holds) in [(500.0, false), (800.0, true)] {
+        let mut p = Parameters { tanks: 2, ..Parameters::default() };
+        p.tank = [0.0, 0.0, 0.0, 0.0].map(|angle| Tank { k: [k; MODES], ..tank(angle) });
+        p.tank[0].k = [0.0; MODES];
+        p.tank[1].q = [0.0, 1.0, 0.0, 0.0];
+        let inputs = Inputs { force: Ramp::held([0.0, 0.0, 2000.0]), ..Inputs::default() };
+        let mut craft = Spacecraft::new(&p, &inputs, 0.0, 1e-9).unwrap();
+        craft.step(&inputs, 1e-3).unwrap();
+        let in_range = craft.outputs(&inputs).tank.map(|tank| tank.ranges.in_range);
+        assert_eq!((in_range[0], in_range[1], craft.is_in_range()), (true, holds, holds), "{k}");
+    }
 }
 
 /// However the host makes the acceleration at the hinge, by a, by w' or by w, the drag under it is the same: what zeta
