@@ -268,6 +268,10 @@ mod tests {
             Curve::Cubic { c: [[0.1, 0.0], [1.0, 0.2], [-0.3, 0.5], [0.2, -0.1]] },
         ];
         for curve in curves {
+            // an eighth of the interval's square times the third derivative, up to 40
+            let [before, after] = [0.3999, 0.4001].map(|t| curve.at(t));
+            let slope = sub(after, before).map(|d| d / 2e-4);
+            assert!(norm(sub(slope, curve.slope(0.4))) < 1e-6, "{curve:?}");
             for dt in [0.5, -0.09, 1e-3] {
                 let (chord, plain) = (curve.chord(0.4, dt), sub(curve.at(0.4 + dt), curve.at(0.4)));
                 assert!(norm(sub(chord, plain)) < 4e-16, "{curve:?} {dt}");

@@ -224,7 +224,30 @@ fn a_table_over_the_fill_is_written_for_the_six_axis_fmus() {
         assert_eq!(value("fill.points"), Some(Value::Integer(3)));
         assert_eq!(value("liquid_0"), Some(Value::Real(table.rows[2].m_liq)));
         assert_eq!(value("fill.length[2,3]"), Some(Value::Real(table.rows[2].modes[1].l)));
-        assert_eq!(value("fill.H_0[1]"), Some(Value::Real(table.rows[0].rest(3).height)));
+        for (i, row) in table.rows.iter().enumerate() {
+            let (at, rest) = (format!("[{}]", i + 1), row.rest(3));
+            let numbers =
+                [("liquid", row.m_liq), ("H_0", rest.height), ("I_0", rest.inertia), ("I_z", 0.0)];
+            for (what, number) in numbers {
+                assert_eq!(
+                    value(&format!("fill.{what}{at}")),
+                    Some(Value::Real(number)),
+                    "{what}{at}"
+                );
+            }
+            for mode in &row.modes {
+                let at = format!("[{},{}]", mode.n, i + 1);
+                let numbers =
+                    [("mass", mode.m), ("length", mode.l), ("hinge", mode.hinge.unwrap())];
+                for (what, number) in numbers {
+                    assert_eq!(
+                        value(&format!("fill.{what}{at}")),
+                        Some(Value::Real(number)),
+                        "{what}{at}"
+                    );
+                }
+            }
+        }
         assert!(value("m_0").is_none() && value("mass[1]").is_none());
         assert!(value("zeta[1]").is_some() && value("wave[3]").is_some());
     }
