@@ -777,4 +777,114 @@ mod tests {
             assert_eq!(earlier(a, b), first);
         }
     }
+
+    /// A loose lump of the default tank, its surface 2 high and 2 wide about its centre, still at the bottom.
+    fn lump(state: BallState) -> Lump {
+        let mut tank = Tank::default();
+        tank.ball.travel = 0.6;
+        let mut lump = Lump::new(&tank, 0).unwrap();
+        (lump.state, lump.half, lump.d) =
+            (state, 1.0, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+        lump.x_0 = [0.0, 0.0, -1.0];
+        (lump.m, lump.drag) = (5.0, 0.3);
+        lump
+    }
+
+    /// The x component of a vector's coefficients.
+    fn along_x(terms: &[f64]) -> Vector {
+        let mut vector = ZERO_VECTOR;
+        for (n, term) in terms.iter().enumerate() {
+            vector[n][0] = *term;
+        }
+        vector
+    }
+
+    fn along_z(terms: &[f64]) -> Vector {
+        along_x(terms).map(|[x, y, z]| [z, y, x])
+    }
+
+    /// What is next within a second of a lump without specific force, which no pendulum takes.
+    fn next(lump: &Lump) -> Option<(f64, Due)> {
+        lump.next(4, 1.0, [&ZERO_VECTOR; 3], core::iter::empty())
+    }
+
+    fn is(found: Option<(f64, Due)>, t: f64, due: Due) {
+        let found = found.unwrap();
+        assert!((found.0 - t).abs() < 1e-9 && found.1 == due, "{found:?} {t} {due:?}");
+    }
+
+    /// N |n| of a wall's force N n is to be twice the drag m d |x'|: 2 x 5 kg x 0.3 1/s x 2 m/s are 6 N. Where it rises from
+    /// 4.5 N by 4 N/s that is after 0.375 s, and nothing is due of a lump that drags, or where |n| is a half.
+    #[test]
+    fn a_light_lump_drags_from_twice_its_drag_on() {
+        let mut lump = lump(BallState::Light);
+        (lump.pull[0], lump.pull[1], lump.squared[0]) = (4.5, 4.0, 1.0);
+        lump.x_d = along_x(&[2.0]);
+        let excess = lump.excess(3);
+        assert_eq!(excess[..3], [4.5 * 4.5 - 36.0, 2.0 * 4.5 * 4.0, 16.0]);
+        is(next(&lump), 0.375, Due::Drag);
+        lump.squared[0] = 0.25;
+        assert_eq!(next(&lump), None);
+        lump.squared[0] = 1.0;
+        lump.state = BallState::Sliding;
+        assert_eq!(next(&lump), None);
+        // a rate that grows, too
+        lump.x_d = along_x(&[2.0, 1.0]);
+        assert_eq!(lump.excess(3)[1], 36.0 - 36.0);
+    }
+
+    /// The wall's force of 1 N that falls by 2 N/s is gone after 0.5 s; the axis is passed after 0.25 or 0.75 s.
+    #[test]
+    fn of_release_and_passage_the_earlier_is_due() {
+        let mut lump = lump(BallState::Held);
+        (lump.pull[0], lump.pull[1]) = (1.0, -2.0);
+        lump.x_d = along_x(&[1.0]);
+        lump.rho = along_x(&[0.0, 1.0]);
+        for (x, t, due) in [(-0.25, 0.25, Due::Settle), (-0.75, 0.5, Due::Release)] {
+            lump.x_0[0] = x;
+            is(next(&lump), t, due);
+        }
+        lump.pull[1] = 0.0;
+        is(next(&lump), 0.75, Due::Settle);
+        // along the axis is no way from it
+        (lump.x_d, lump.rho) = (along_z(&[1.0]), along_z(&[0.0, 1.0]));
+        assert_eq!(next(&lump), None);
+    }
+
+    /// From halfway down with 3 m/s to the top in half a second; from the wall, which it leaves with 4 m/s, as well; at once
+    /// where it moves into the wall, or rests there and is pressed; never where it falls away from rest.
+    #[test]
+    fn a_lump_in_flight_meets_the_wall_before_it() {
+        let mut lump = lump(BallState::Flying);
+        lump.x_0[2] = -0.5;
+        lump.rho = along_z(&[0.0, 3.0]);
+        is(next(&lump), 0.5, Due::Impact);
+        lump.x_0[2] = -1.0;
+        lump.rho = along_z(&[0.0, 4.0]);
+        is(next(&lump), 0.5, Due::Impact);
+        for (terms, at_once) in [
+            (&[0.0, -4.0][..], true),
+            (&[0.0, -1e-8], true),
+            (&[0.0, 0.0, -0.1], true),
+            (&[0.0, 0.0, 0.1], false),
+            (&[0.0, 1e-8, -0.1], false),
+        ] {
+            lump.rho = along_z(terms);
+            let found = next(&lump);
+            assert_eq!(found == Some((0.0, Due::Impact)), at_once, "{terms:?}: {found:?}");
+        }
+        // beside the wall the round way counts: 1 m/s along it is 1 m/s² towards it
+        lump.rho = along_x(&[0.0, 1.0]);
+        assert_eq!(next(&lump), Some((0.0, Due::Impact)));
+    }
+
+    /// 2 m/s and what it has from 3 rad/s in half of its surface's height and from 5 m/s² in a tenth of a second.
+    #[test]
+    fn a_lump_s_speed_is_measured_by_all_that_moves_it() {
+        let mut lump = lump(BallState::Flying);
+        lump.x_d = along_x(&[-2.0]);
+        lump.u = along_z(&[7.0, 5.0]);
+        assert_eq!(lump.speed_scale([0.0, -3.0, 1.0], 0.1), 2.0 + 3.0 + 0.5);
+        assert_eq!([lump.coefficient_norm(0), lump.coefficient_norm(1)], [7.0, 5.0]);
+    }
 }
