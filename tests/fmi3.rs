@@ -82,6 +82,75 @@ fn fmpy_finds_no_fault_in_fmi_3_and_gets_the_bits_of_fmi_2_whatever_it_is_told_o
     }
 }
 
+/// With arrays: as FMPy gives them, and sized by hand in configuration mode, which it leaves to its users.
+const FMPY_ARRAYS: &str = r#"
+import shutil
+import sys
+import numpy as np
+from fmpy import extract, instantiate_fmu, read_model_description, simulate_fmu
+from fmpy.validation import validate_fmu
+
+name, size, number, scalars, arrays = sys.argv[1:]
+number = int(number)
+problems = validate_fmu(arrays)
+assert not problems, problems
+description = read_model_description(arrays)
+reference = {v.name: v.valueReference for v in description.modelVariables}[size]
+
+
+def compare(mine, theirs, error):
+    assert len(mine) == len(theirs)
+    for output in mine.dtype.names:
+        values = np.asarray(mine[output]).reshape(len(mine), -1)
+        names = [output] if mine[output].ndim == 1 else [f"{output}[{n + 1}]" for n in range(values.shape[1])]
+        for column, scalar in zip(values.T, names, strict=True):
+            difference = np.max(np.abs(column - theirs[scalar]))
+            assert difference <= error * max(1.0, np.max(np.abs(theirs[scalar]))), (scalar, difference)
+
+
+settings = {"stop_time": 2, "output_interval": 0.02}
+for kind, error in (("CoSimulation", 0.0), ("ModelExchange", 1e-6)):
+    both = [
+        simulate_fmu(fmu, fmi_type=kind, relative_tolerance=1e-9, **settings) for fmu in (arrays, scalars)
+    ]
+    if kind == "ModelExchange":
+        # it steps where its solver finds events
+        times = np.arange(1, 100) * settings["output_interval"]
+        both = [result[np.searchsorted(result["time"], times + 1e-9) - 1] for result in both]
+        # what jumps at events is compared by its integrals
+        if name == "HubSlosh":
+            both = [result[["theta", "slosh_angle", "wave_height"]] for result in both]
+    compare(*both, error)
+
+unpacked = extract(arrays)
+try:
+    instance = instantiate_fmu(unpacked, description, fmi_type="CoSimulation")
+    instance.enterConfigurationMode()
+    instance.setUInt64([reference], [number])
+    instance.exitConfigurationMode()
+    mine = simulate_fmu(unpacked, model_description=description, fmu_instance=instance, **settings)
+finally:
+    shutil.rmtree(unpacked)
+theirs = simulate_fmu(scalars, start_values={size: number}, fmi_type="CoSimulation", **settings)
+compare(mine, theirs, 0.0)
+plain = simulate_fmu(scalars, fmi_type="CoSimulation", **settings)
+assert any(not np.array_equal(theirs[output], plain[output]) for output in theirs.dtype.names), "the size is felt"
+"#;
+
+#[test]
+fn fmpy_reads_arrays_and_sizes_them_in_configuration_mode() {
+    let sizes = [("slosh.modes", "3"), ("tanks", "2"), ("tank.modes", "3")];
+    for (model, (size, number)) in MODELS.iter().zip(sizes) {
+        run(
+            Command::new(python())
+                .args(["-c", FMPY_ARRAYS, model.name, size, number])
+                .arg(packed_version_for_tests(model, Fmi::V3))
+                .arg(packed_version_for_tests(model, Fmi::V3Arrays)),
+            "FMPy does not drive the FMU with arrays as it drives the FMU with scalars",
+        );
+    }
+}
+
 #[test]
 fn an_fmu_3_has_the_platform_tuple_the_icon_and_the_list_of_its_references() {
     let file = std::fs::File::open(packed_version_for_tests(pack::HUBSLOSH, Fmi::V3)).unwrap();

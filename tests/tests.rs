@@ -7,6 +7,7 @@ mod abi {
     mod model_exchange;
 }
 mod architecture;
+mod arrays;
 mod common;
 mod fmi3;
 mod life {

@@ -1,7 +1,8 @@
 """What others say of the packed FMU: XML schema, fmpy's validation, fmutool, FMI Library, CasADi.
 
 As a program: ``python importers.py dist/HubSlosh.fmu``; leaves with 1 when anybody finds anything.
-An FMU of FMI 3.0 is shown to CasADi in place of FMI Library, which reads FMI 2.0 here.
+An FMU of FMI 3.0 is shown to CasADi in place of FMI Library, which reads FMI 2.0 here; one with
+arrays to neither.
 ``.ci/importers`` makes the environment (requirements-importers.txt) and calls it.
 """
 
@@ -146,7 +147,10 @@ def main() -> None:
     }
     if version == 2:
         asked["FMI Library"] = fmi_library_findings
-    else:
+    elif not any(
+        variable.dimensions
+        for variable in read_model_description(str(fmu), validate=False).modelVariables
+    ):
         asked[f"CasADi {casadi.__version__}"] = casadi_findings
     count = 0
     for who, findings_of in asked.items():

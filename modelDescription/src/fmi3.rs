@@ -1,15 +1,18 @@
 //! modelDescription.xml of FMI 3.0 from the same table: scalars with the names of FMI 2.0, and behind them
-//! the independent variable and the event indicators, which FMI 2.0 has no variables for.
+//! the independent variable and the event indicators, which FMI 2.0 has no variables for. With arrays an entry of the
+//! table is one variable.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use runtime::Model;
 use runtime::instance::DEFAULT_TOLERANCE;
 use runtime::log::categories;
-use runtime::table::Scalar;
+use runtime::table::{Layout, Scalar};
 use runtime::unit::{UNITS, Unit};
+use runtime::v3::arrays::{self, Arrays};
 use runtime::v3::{Fmi3, extra_names, has_intermediate_update, time_reference};
-use runtime::variable::{Access, Causality, Enumeration, Kind, Quantity, Value};
+use runtime::variable::{Access, Causality, Dimension, Enumeration, Kind, Quantity, Value};
 use runtime::version::Version;
 use serde::Serialize;
 
@@ -17,13 +20,16 @@ use crate::schema::{Category, DefaultExperiment, Item, LogCategories, Units};
 use crate::{RELEASED, STEP_SIZE, STOP_TIME, folder, is_derivative, is_output, real, unit, write};
 
 /// Where the committed XML is.
-pub fn path<M: Model>() -> PathBuf {
-    folder::<M>().join("fmi3/modelDescription.xml")
+pub fn path<M: Model>(layout: Layout) -> PathBuf {
+    folder::<M>().join(match layout {
+        Layout::Scalars => "fmi3/modelDescription.xml",
+        Layout::Arrays => "fmi3-arrays/modelDescription.xml",
+    })
 }
 
 /// The file's text.
-pub fn xml<M: Model>() -> Result<String, serde_xml_rs::Error> {
-    write(&description::<M>())
+pub fn xml<M: Model>(layout: Layout) -> Result<String, serde_xml_rs::Error> {
+    write(&description::<M>(layout))
 }
 
 // ---- The elements, in the order that the schema of FMI 3.0 demands ----
@@ -155,6 +161,7 @@ struct Variables {
 enum Variable {
     Float64(Box<Attributes>),
     Int32(Box<Attributes>),
+    UInt64(Box<Attributes>),
     Boolean(Box<Attributes>),
     Enumeration(Box<Attributes>),
 }
@@ -194,6 +201,17 @@ struct Attributes {
     derivative: Option<u32>,
     #[serde(rename = "@reinit")]
     reinit: Option<bool>,
+    #[serde(rename = "Dimension")]
+    dimensions: Vec<Size>,
+}
+
+/// How long an array is along one of its dimensions: always, or as a structural parameter says.
+#[derive(Debug, Serialize)]
+struct Size {
+    #[serde(rename = "@start")]
+    start: Option<usize>,
+    #[serde(rename = "@valueReference")]
+    value_reference: Option<u32>,
 }
 
 #[derive(Debug, Serialize)]
@@ -221,12 +239,12 @@ struct Unknown {
 
 // ---- What they hold ----
 
-fn description<M: Model>() -> ModelDescription {
+fn description<M: Model>(layout: Layout) -> ModelDescription {
     let table = M::table();
     ModelDescription {
         fmi_version: "3.0",
         model_name: table.about.model,
-        instantiation_token: Fmi3::token::<M>(),
+        instantiation_token: Fmi3::token::<M>(layout),
         description: table.about.description,
         author: env!("CARGO_PKG_AUTHORS"),
         version: table.about.version,
@@ -281,19 +299,25 @@ fn description<M: Model>() -> ModelDescription {
             step_size: real(STEP_SIZE),
         },
         variables: Variables {
-            all: table.scalars.iter().map(variable).chain(extra::<M>()).collect(),
+            all: match layout {
+                Layout::Scalars => table.scalars.iter().map(variable).chain(extra::<M>()).collect(),
+                Layout::Arrays => {
+                    table.variables.iter().map(array).chain(extra_arrays::<M>()).collect()
+                }
+            },
         },
         structure: Structure {
-            outputs: unknowns::<M>(is_output, |s| s.depends_on().collect()),
-            derivatives: unknowns::<M>(is_derivative, |s| s.depends_on().collect()),
+            outputs: unknowns::<M>(layout, is_output, |s| s.depends_on().collect()),
+            derivatives: unknowns::<M>(layout, is_derivative, |s| s.depends_on().collect()),
             initial_unknowns: unknowns::<M>(
+                layout,
                 |s| {
                     let calculated = s.variable.causality == Causality::CalculatedParameter;
                     is_output(s) || calculated || s.variable.state.is_some() || is_derivative(s)
                 },
                 |s| s.initial_depends_on().collect(),
             ),
-            event_indicators: event_indicators::<M>(),
+            event_indicators: event_indicators::<M>(layout),
         },
     }
 }
@@ -322,11 +346,92 @@ fn enumeration_type(of: &Enumeration) -> EnumerationType {
 
 fn variable<M: Model>(scalar: &Scalar<M>) -> Variable {
     let v = scalar.variable;
+    let derivative = match v.access {
+        Access::Derivative(place) => M::table().state_at(place(scalar.element)),
+        _ => None,
+    };
+    of_entry(
+        Layout::Scalars,
+        v,
+        Attributes {
+            name: scalar.name(),
+            value_reference: Fmi3::reference(scalar),
+            start: scalar.start().map(text),
+            derivative: derivative.map(Fmi3::reference),
+            ..Attributes::default()
+        },
+    )
+}
+
+/// An entry of the table as one variable, of the size it starts with.
+fn array<M: Model>(v: &'static runtime::variable::Variable<M>) -> Variable {
+    let derivative = match v.access {
+        Access::Derivative(place) => M::table().state_at(place(0)),
+        _ => None,
+    };
+    let (mut parameters, mut inputs) = (M::Parameters::default(), M::Inputs::default());
+    let present = elements(v).into_iter();
+    let mut starts: Vec<_> = present
+        .filter_map(|element| v.start(&mut parameters, &mut inputs, element))
+        .map(text)
+        .collect();
+    // One value is for all.
+    if starts.iter().all(|start| *start == starts[0]) {
+        starts.truncate(1);
+    }
+    let size = |dimension: &Dimension| match dimension {
+        Dimension::Fixed(length) => Size { start: Some(*length), value_reference: None },
+        Dimension::Sized(name, _) => {
+            Size { start: None, value_reference: entry::<M>(name).map(arrays::reference) }
+        }
+    };
+    of_entry(
+        Layout::Arrays,
+        v,
+        Attributes {
+            name: v.array_name(),
+            value_reference: arrays::reference(v),
+            start: Some(starts.join(" ")).filter(|starts| !starts.is_empty()),
+            derivative: derivative.map(|state| arrays::reference(state.variable)),
+            dimensions: v.shape.iter().map(size).collect(),
+            ..Attributes::default()
+        },
+    )
+}
+
+/// The entry of that name.
+fn entry<M: Model>(name: &str) -> Option<&'static runtime::variable::Variable<M>> {
+    M::table().variables.iter().find(|v| v.name == name)
+}
+
+/// The elements that an entry has at the start, counted by rows in the largest array.
+fn elements<M: Model>(v: &runtime::variable::Variable<M>) -> Vec<usize> {
+    let all = Arrays::new::<M>(&M::table().starts());
+    let scalars = all.of(arrays::reference(v)).unwrap_or_default().iter();
+    scalars.map(|reference| M::table().scalars[*reference as usize - 1].element).collect()
+}
+
+fn text(value: Value) -> String {
+    match value {
+        Value::Real(x) => real(x),
+        Value::Integer(n) => n.to_string(),
+        Value::Boolean(b) => b.to_string(),
+    }
+}
+
+/// What is said of all elements of an entry. Those of `own` are the variable's own.
+fn of_entry<M: Model>(
+    layout: Layout,
+    v: &runtime::variable::Variable<M>,
+    own: Attributes,
+) -> Variable {
+    let is_structural = layout == Layout::Arrays && M::table().is_structural(v);
     let (causality, initial) = match v.causality {
         // That an input is exact is the default, and CasADi refuses to read it.
         Causality::Input => ("input", None),
         Causality::Output => ("output", Some("calculated")),
         Causality::Local => ("local", Some("calculated")),
+        Causality::Parameter if is_structural => ("structuralParameter", Some("exact")),
         Causality::Parameter => ("parameter", Some("exact")),
         Causality::CalculatedParameter => ("calculatedParameter", Some("calculated")),
     };
@@ -337,42 +442,39 @@ fn variable<M: Model>(scalar: &Scalar<M>) -> Variable {
         _ => "discrete",
     };
     let common = Attributes {
-        name: scalar.name(),
-        value_reference: Fmi3::reference(scalar),
-        description: v.description.into(),
+        description: match layout {
+            Layout::Scalars => v.description.into(),
+            Layout::Arrays => v.description.replace("[]", ""),
+        },
         causality,
         variability,
         initial,
-        intermediate_update: has_intermediate_update(scalar).then_some(true),
-        start: scalar.start().map(|value| match value {
-            Value::Real(x) => real(x),
-            Value::Integer(n) => n.to_string(),
-            Value::Boolean(b) => b.to_string(),
-        }),
-        ..Attributes::default()
+        intermediate_update: has_intermediate_update(v).then_some(true),
+        ..own
     };
     match v.kind {
         Kind::Real(Quantity { unit, display_unit, min, max, nominal }) => {
-            let derivative = match v.access {
-                Access::Derivative(place) => M::table().state_at(place(scalar.element)),
-                _ => None,
-            };
             Variable::Float64(Box::new(Attributes {
                 unit: Some(unit).filter(|unit| !unit.is_empty()),
                 display_unit,
                 min: min.map(real),
                 max: max.map(real),
                 nominal: nominal.map(real),
-                derivative: derivative.map(Fmi3::reference),
                 reinit: v.reinit.then_some(true),
                 ..common
             }))
         }
-        Kind::Integer { min, max } => Variable::Int32(Box::new(Attributes {
-            min: min.map(|n| n.to_string()),
-            max: max.map(|n| n.to_string()),
-            ..common
-        })),
+        Kind::Integer { min, max } => {
+            let of_integer = Box::new(Attributes {
+                min: min.map(|n| n.to_string()),
+                max: max.map(|n| n.to_string()),
+                ..common
+            });
+            match is_structural {
+                true => Variable::UInt64(of_integer),
+                false => Variable::Int32(of_integer),
+            }
+        }
         Kind::Boolean => Variable::Boolean(Box::new(common)),
         Kind::Enumeration(of) => {
             Variable::Enumeration(Box::new(Attributes { declared_type: Some(of.name), ..common }))
@@ -385,51 +487,90 @@ fn extra<M: Model>() -> impl Iterator<Item = Variable> {
     let references = time_reference::<M>()..;
     references.zip(extra_names::<M>()).map(|(value_reference, name)| {
         let is_time = value_reference == time_reference::<M>();
-        let common = Attributes {
-            value_reference,
-            variability: "continuous",
-            name,
-            ..Attributes::default()
-        };
-        Variable::Float64(Box::new(if is_time {
-            Attributes {
-                description: "Simulation time".into(),
-                causality: "independent",
-                unit: Some(TIME_UNIT),
-                ..common
-            }
-        } else {
-            Attributes {
-                description: "Crosses zero at events; positive between them".into(),
-                causality: "local",
-                initial: Some("calculated"),
-                ..common
-            }
-        }))
+        let of = if is_time { of_time() } else { of_indicators() };
+        Variable::Float64(Box::new(Attributes { name, value_reference, ..of }))
     })
 }
 
-/// Some of the scalars in the order of their value references, with what they depend on.
+fn of_time() -> Attributes {
+    Attributes {
+        description: "Simulation time".into(),
+        causality: "independent",
+        variability: "continuous",
+        unit: Some(TIME_UNIT),
+        ..Attributes::default()
+    }
+}
+
+fn of_indicators() -> Attributes {
+    Attributes {
+        description: "Crosses zero at events; positive between them".into(),
+        causality: "local",
+        variability: "continuous",
+        initial: Some("calculated"),
+        ..Attributes::default()
+    }
+}
+
+/// The same where the event indicators are one array.
+fn extra_arrays<M: Model>() -> impl Iterator<Item = Variable> {
+    let indicators = M::table().about.event_indicators;
+    let time = arrays::time::<M>();
+    let both = [
+        Attributes { name: "time".into(), value_reference: time, ..of_time() },
+        Attributes {
+            name: arrays::INDICATORS.into(),
+            value_reference: time + 1,
+            dimensions: vec![Size { start: Some(indicators), value_reference: None }],
+            ..of_indicators()
+        },
+    ];
+    let count = if indicators > 0 { 2 } else { 1 };
+    both.into_iter().take(count).map(|attributes| Variable::Float64(Box::new(attributes)))
+}
+
+/// Some of the scalars in the order of their value references, with what they depend on. An array depends on what any
+/// of its elements does.
 fn unknowns<M: Model>(
+    layout: Layout,
     of_interest: impl Fn(&Scalar<M>) -> bool,
     dependencies: impl Fn(&Scalar<M>) -> Vec<&'static Scalar<M>>,
 ) -> Vec<Unknown> {
     let all = M::table().scalars.iter().filter(|scalar| of_interest(scalar));
-    all.map(|scalar| unknown(Fmi3::reference(scalar), dependencies(scalar))).collect()
+    let mut unknowns: BTreeMap<u32, BTreeSet<u32>> = BTreeMap::new();
+    for scalar in all {
+        let known = dependencies(scalar);
+        let known = known.iter().map(|known| reference(layout, known));
+        unknowns.entry(reference(layout, scalar)).or_default().extend(known);
+    }
+    unknowns.into_iter().map(|(reference, known)| unknown(reference, &known)).collect()
+}
+
+/// The value reference by which a scalar goes.
+fn reference<M: Model>(layout: Layout, scalar: &Scalar<M>) -> u32 {
+    match layout {
+        Layout::Scalars => Fmi3::reference(scalar),
+        Layout::Arrays => arrays::reference(scalar.variable),
+    }
 }
 
 /// The event indicators; which inputs and states each depends on is the model's choice of contact and limits.
-fn event_indicators<M: Model>() -> Vec<Unknown> {
-    let known = |s: &&'static Scalar<M>| {
+fn event_indicators<M: Model>(layout: Layout) -> Vec<Unknown> {
+    let is_known = |s: &&'static Scalar<M>| {
         s.variable.causality == Causality::Input || s.variable.state.is_some()
     };
+    let known = M::table().scalars.iter().filter(is_known);
+    let known: BTreeSet<u32> = known.map(|scalar| reference(layout, scalar)).collect();
     let count = M::table().about.event_indicators as u32;
-    let references = (1..=count).map(|n| time_reference::<M>() + n);
-    references.map(|n| unknown(n, M::table().scalars.iter().filter(known).collect())).collect()
+    let references = match layout {
+        Layout::Scalars => time_reference::<M>() + 1..=time_reference::<M>() + count,
+        Layout::Arrays => arrays::time::<M>() + 1..=arrays::time::<M>() + count.min(1),
+    };
+    references.map(|n| unknown(n, &known)).collect()
 }
 
-fn unknown<M: Model>(value_reference: u32, known: Vec<&Scalar<M>>) -> Unknown {
-    let references: Vec<_> = known.iter().map(|s| Fmi3::reference(s).to_string()).collect();
+fn unknown(value_reference: u32, known: &BTreeSet<u32>) -> Unknown {
+    let references: Vec<_> = known.iter().map(u32::to_string).collect();
     Unknown {
         value_reference,
         dependencies: references.join(" "),

@@ -1,10 +1,11 @@
 //! Rewrites what is committed and follows from something else: each FMU's modelDescription.xml
 //! and page of variables from its variable table; with the feature `icon`, the icon's pixels from
-//! its drawing. With `--print-spacecraft` or `--print-spacecraft-fmi3` it prints the XML of Spacecraft.fmu as
+//! its drawing. With `--print-spacecraft`, `--print-spacecraft-fmi3` or `--print-spacecraft-fmi3-arrays` it prints the XML of Spacecraft.fmu as
 //! compiled, for `hubslosh pack --tanks`.
 
 use model_description::{fmi3, path, variables, xml};
 use runtime::Model;
+use runtime::table::Layout;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     // of a variant, which is not committed
@@ -14,7 +15,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             return Ok(());
         }
         Some("--print-spacecraft-fmi3") => {
-            print!("{}", fmi3::xml::<Spacecraft::Model>()?);
+            print!("{}", fmi3::xml::<Spacecraft::Model>(Layout::Scalars)?);
+            return Ok(());
+        }
+        Some("--print-spacecraft-fmi3-arrays") => {
+            print!("{}", fmi3::xml::<Spacecraft::Model>(Layout::Arrays)?);
             return Ok(());
         }
         _ => {}
@@ -29,10 +34,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 
 fn write<M: Model>() -> Result<(), Box<dyn std::error::Error>> {
     std::fs::write(path::<M>(), xml::<M>()?)?;
-    let fmi3 = fmi3::path::<M>();
-    std::fs::create_dir_all(fmi3.with_file_name(""))?;
-    std::fs::write(&fmi3, fmi3::xml::<M>()?)?;
-    println!("wrote {}", fmi3.display());
+    for layout in Layout::ALL {
+        let fmi3 = fmi3::path::<M>(layout);
+        std::fs::create_dir_all(fmi3.with_file_name(""))?;
+        std::fs::write(&fmi3, fmi3::xml::<M>(layout)?)?;
+        println!("wrote {}", fmi3.display());
+    }
     std::fs::write(variables::path::<M>(), variables::page::<M>())?;
     println!("wrote {}\nwrote {}", path::<M>().display(), variables::path::<M>().display());
     Ok(())

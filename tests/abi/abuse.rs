@@ -13,6 +13,7 @@ use crate::common::{python, run};
 use host::description::{ModelDescription, Type, Variable};
 use host::xml::Element;
 use pack::{Fmi, HUBSLOSH, packed_version_for_tests, root};
+use runtime::table::Layout;
 
 const VERSIONS: [Fmi; 2] = [Fmi::V2, Fmi::V3];
 
@@ -43,7 +44,9 @@ impl Unpacked {
         let states = root.list("ModelVariables").filter(derivative).count();
         let indicators = match fmi {
             Fmi::V2 => root.get("numberOfEventIndicators").map_or(0, |n| n.parse().unwrap()),
-            Fmi::V3 => root.list("ModelStructure").filter(|e| e.name == "EventIndicator").count(),
+            Fmi::V3 | Fmi::V3Arrays => {
+                root.list("ModelStructure").filter(|e| e.name == "EventIndicator").count()
+            }
         };
         let description = ModelDescription::of_packed(packed).unwrap();
         Unpacked { fmi, directory, library, description, states, indicators }
@@ -187,7 +190,7 @@ fn no_calls_break<M: runtime::Model>(inputs: u32) {
     let folder = fmu.library.parent().unwrap();
     let path = format!("-Wl,-rpath,{}", folder.display());
     let mut host = fmu.host("replay", &sources, &[&fmu.library, Path::new(&path)]);
-    host.args([M::table().guid(), M::table().token()])
+    host.args([M::table().guid(), M::table().token(Layout::Scalars)])
         .args(hubslosh_fuzz::sizes::<M>().map(|n| n.to_string()));
     // Under valgrind time passes otherwise; without, no call may take longer than 10 s.
     host.arg(if under_valgrind() { "1000" } else { "10" });

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use host::xml::Element;
 use runtime::Model;
-use runtime::table::Scalar;
+use runtime::table::{Layout, Scalar};
 use runtime::v3::Fmi3;
 use runtime::variable::Access;
 use runtime::version::Version;
@@ -18,7 +18,7 @@ fn two<M: Model>() -> Element {
 }
 
 fn three<M: Model>() -> Element {
-    parse(&model_description::fmi3::xml::<M>().unwrap())
+    parse(&model_description::fmi3::xml::<M>(Layout::Scalars).unwrap())
 }
 
 fn every_variable_is_as_in_fmi_2<M: Model>() {
@@ -169,12 +169,15 @@ fn every_unit_of_fmi_3_is_defined_that_of_time_too() {
 
 #[test]
 fn the_root_of_fmi_3_has_its_own_token_and_the_form_of_the_schema() {
-    let text = model_description::fmi3::xml::<HubSlosh::HubSlosh>().unwrap();
+    let text = model_description::fmi3::xml::<HubSlosh::HubSlosh>(Layout::Scalars).unwrap();
     assert!(text.starts_with(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<fmiModelDescription fmiVersion=\"3.0\""
     ));
     let (two, three) = (two::<HubSlosh::HubSlosh>(), three::<HubSlosh::HubSlosh>());
-    assert_eq!(three.get("instantiationToken"), Some(Fmi3::token::<HubSlosh::HubSlosh>()));
+    assert_eq!(
+        three.get("instantiationToken"),
+        Some(Fmi3::token::<HubSlosh::HubSlosh>(Layout::Scalars))
+    );
     assert_ne!(three.get("instantiationToken"), two.get("guid"));
     for attribute in ["modelName", "description", "author", "version", "generationDateAndTime"] {
         assert_eq!(two.get(attribute), three.get(attribute));

@@ -3,8 +3,9 @@
 
 use std::path::Path;
 
-use model_description::{icon, variables};
+use model_description::{fmi3, icon, variables};
 use runtime::Model;
+use runtime::table::Layout::{Arrays, Scalars};
 
 const GENERATE: &str = "run: cargo run --release -p model-description";
 
@@ -23,7 +24,8 @@ fn description_and_page_of_variables_are_what_the_table_says() {
 fn up_to_date<M: Model>() {
     for (path, text) in [
         (model_description::path::<M>(), model_description::xml::<M>().unwrap()),
-        (model_description::fmi3::path::<M>(), model_description::fmi3::xml::<M>().unwrap()),
+        (fmi3::path::<M>(Scalars), fmi3::xml::<M>(Scalars).unwrap()),
+        (fmi3::path::<M>(Arrays), fmi3::xml::<M>(Arrays).unwrap()),
         (variables::path::<M>(), variables::page::<M>()),
     ] {
         let there = String::from_utf8(committed(&path)).unwrap();

@@ -6,6 +6,7 @@
 use std::ffi::{CString, c_char};
 
 use runtime::Model;
+use runtime::table::Layout;
 
 use crate::sizes;
 
@@ -25,7 +26,7 @@ unsafe extern "C" {
 /// The FMU that this program is linked with must be that of the model.
 pub fn run<M: Model>(data: &[u8]) {
     let c_string = |text: &str| CString::new(text).expect("a GUID has no NUL");
-    let (guid, token) = (c_string(M::table().guid()), c_string(M::table().token()));
+    let (guid, token) = (c_string(M::table().guid()), c_string(M::table().token(Layout::Scalars)));
     let fmu = HostFmu { guid: guid.as_ptr(), token: token.as_ptr(), sizes: sizes::<M>() };
     unsafe { host_run(&fmu, data.as_ptr(), data.len()) }
 }

@@ -12,7 +12,8 @@
 
 use plant::{DampingLaw, FrictionModel, INDICATORS, MODES, Ramp, SloshModel, SloshSource, x};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
-use runtime::variable::{Enumeration, Item, Variable};
+use runtime::variable::Dimension::{Fixed, Sized};
+use runtime::variable::{Dimension, Enumeration, Item, Variable};
 
 use crate::HubSlosh;
 use crate::model::SAVED_WORDS;
@@ -72,6 +73,11 @@ const LIQUID: &[&str] = &["tank.", "fluid.", "slosh."];
 // The plant keeps positions and velocities in space, not angles: going there and
 // back mixes the directions in the last digit.
 const SLOSH_START: &[&str] = &["tank.", "slosh.", "init."];
+
+/// Of the modes that are kept.
+const PER_MODE: &[Dimension] = &[Sized("slosh.modes", MODES)];
+/// Of a table of modes, of which those of the lowest frequencies are kept.
+const TABLE_OF_MODES: &[Dimension] = &[Fixed(MODES)];
 
 type V = Variable<HubSlosh>;
 
@@ -158,7 +164,7 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         .nominal(0.01).depends_on(&["theta", "slosh.q_radial", "slosh.q_tangential", "g_axial"]),
     V::local_of_inputs("slosh.damping", |model, inputs, n| model.damping_ratio(n, inputs), "1",
         "Damping ratio of a mode at the present g_axial, without a baffle's; 0 for modes that are not used")
-        .shape(&[MODES]).depends_on(&["g_axial"]).initial_depends_on(LIQUID),
+        .shape(PER_MODE).depends_on(&["g_axial"]).initial_depends_on(LIQUID),
     V::local("baffle.zeta", |o, _| o.baffle_zeta, "1",
         "Damping ratio of mode 1 by the ring baffle at the present amplitude, in addition to slosh.damping[1]; 0 without one")
         .depends_on(WAVE_1).initial_depends_on(&["baffle.", "tank.", "fluid.", "slosh.", "init."]),
@@ -206,19 +212,19 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     // wheel_speed the continuous states
     V::state("slosh.q_radial", |n| x::SLOSH + 4 * n, "",
         "Radial coordinate of a slosh mode, positive outwards. Models linear and planar: unused; spherical: stereographic, the tangent of half the pendulum's angle from the vertical times the direction's radial part (unit 1); paraboloid and liquid: displacement (m)")
-        .shape(&[MODES])
+        .shape(PER_MODE)
         .nominal(1e-3).depends_on(&["slosh.q_radial[]"]).initial_depends_on(SLOSH_START),
     V::state("slosh.q_tangential", |n| x::SLOSH + 4 * n + 1, "",
         "Tangential coordinate of a slosh mode, positive towards +theta. Models linear and planar: slosh angle (rad); spherical: stereographic, as slosh.q_radial (unit 1); paraboloid and liquid: displacement (m)")
-        .shape(&[MODES])
+        .shape(PER_MODE)
         .nominal(1e-3).depends_on(&["slosh.q_tangential[]"]).initial_depends_on(SLOSH_START),
     V::state("slosh.v_radial", |n| x::SLOSH + 4 * n + 2, "",
         "Derivative of slosh.q_radial; its unit is that of slosh.q_radial per second")
-        .shape(&[MODES])
+        .shape(PER_MODE)
         .nominal(0.01).depends_on(&["slosh.v_radial[]"]).initial_depends_on(SLOSH_START),
     V::state("slosh.v_tangential", |n| x::SLOSH + 4 * n + 3, "",
         "Derivative of slosh.q_tangential; its unit is that of slosh.q_tangential per second")
-        .shape(&[MODES])
+        .shape(PER_MODE)
         .nominal(0.01).depends_on(&["slosh.v_tangential[]"]).initial_depends_on(SLOSH_START),
 
     // The derivatives of the continuous states; a Model Exchange host has them in this
@@ -246,19 +252,19 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         .depends_on(&["theta", "omega", "bristle"]).initial_depends_on(&["init.theta", "init.omega", "friction."]),
     V::derivative("der(slosh.q_radial)", |n| x::SLOSH + 4 * n, "",
         "Derivative of slosh.q_radial: slosh.v_radial")
-        .shape(&[MODES])
+        .shape(PER_MODE)
         .depends_on(&["slosh.v_radial[]"]).initial_depends_on(SLOSH_START),
     V::derivative("der(slosh.q_tangential)", |n| x::SLOSH + 4 * n + 1, "",
         "Derivative of slosh.q_tangential: slosh.v_tangential")
-        .shape(&[MODES])
+        .shape(PER_MODE)
         .depends_on(&["slosh.v_tangential[]"]).initial_depends_on(SLOSH_START),
     V::derivative("der(slosh.v_radial)", |n| x::SLOSH + 4 * n + 2, "",
         "Derivative of slosh.v_radial")
-        .shape(&[MODES])
+        .shape(PER_MODE)
         .depends_on(ALL_TORQUES).initial_depends_on(DYNAMICS),
     V::derivative("der(slosh.v_tangential)", |n| x::SLOSH + 4 * n + 3, "",
         "Derivative of slosh.v_tangential")
-        .shape(&[MODES])
+        .shape(PER_MODE)
         .depends_on(ALL_TORQUES).initial_depends_on(DYNAMICS),
 
     // Hub, tank, liquid
@@ -364,25 +370,25 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         .range(1e-9, 1e4),
     V::parameter("slosh.table.mass", |p, n| &mut p.slosh.table.mass[n], "kg",
         "Sloshing mass of a mode, source table; the first slosh.modes modes are used, in the order of their frequencies")
-        .shape(&[MODES]).range(0.0, 1e9),
+        .shape(TABLE_OF_MODES).range(0.0, 1e9),
     V::parameter("slosh.table.length", |p, n| &mut p.slosh.table.length[n], "m",
         "Pendulum length of a mode, source table; 0: from slosh.table.frequency")
-        .shape(&[MODES]).display_unit("mm").range(0.0, 1e4),
+        .shape(TABLE_OF_MODES).display_unit("mm").range(0.0, 1e4),
     V::parameter("slosh.table.frequency", |p, n| &mut p.slosh.table.frequency[n], "Hz",
         "Natural frequency of a mode at slosh.table.g_ref, source table, if slosh.table.length is 0")
-        .shape(&[MODES]).range(0.0, 1e4),
+        .shape(TABLE_OF_MODES).range(0.0, 1e4),
     V::parameter("slosh.table.hinge", |p, n| &mut p.slosh.table.hinge[n], "m",
         "Height of a mode's hinge on the tank's axis, source table; the motion about the bearing's axis does not depend on it")
-        .shape(&[MODES]).range(-1e6, 1e6),
+        .shape(TABLE_OF_MODES).range(-1e6, 1e6),
     V::parameter("slosh.table.k", |p, n| &mut p.slosh.table.k[n], "N/m",
         "Centring stiffness of a mode at the bob (capillarity, diaphragm), source table")
-        .shape(&[MODES]).range(0.0, 1e9),
+        .shape(TABLE_OF_MODES).range(0.0, 1e9),
     V::parameter("slosh.table.zeta", |p, n| &mut p.slosh.table.zeta[n], "1",
         "Damping ratio of a mode, source table")
-        .shape(&[MODES]).range(0.0, 0.999),
+        .shape(TABLE_OF_MODES).range(0.0, 0.999),
     V::parameter("slosh.table.wave", |p, n| &mut p.slosh.table.wave[n], "m/rad",
         "Elevation of the surface at the wall per slosh angle, source table; 0: that of an upright cylinder of the diameter tank.d")
-        .shape(&[MODES]).range(0.0, 1e4),
+        .shape(TABLE_OF_MODES).range(0.0, 1e4),
 
     // Ring baffle
     V::parameter("baffle.width", |p, _| &mut p.baffle.width, "m",
@@ -533,15 +539,15 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         .depends_on(&["g_axial"]).initial_depends_on(&["tank.", "fluid."]),
     V::calculated("slosh.mass", |m, n| m.calculated().mass[n], "kg",
         "Sloshing mass of a mode; 0 for modes that are not used")
-        .shape(&[MODES])
+        .shape(PER_MODE)
         .initial_depends_on(LIQUID),
     V::calculated("slosh.length", |m, n| m.calculated().length[n], "m",
         "Pendulum length of a mode; 0 for modes that are not used")
-        .shape(&[MODES])
+        .shape(PER_MODE)
         .display_unit("mm").initial_depends_on(LIQUID),
     V::calculated("slosh.frequency", |m, n| m.calculated().frequency[n], "Hz",
         "Natural frequency of a mode in the tank at rest, at the initial g_axial; 0 for modes that are not used")
-        .shape(&[MODES])
+        .shape(PER_MODE)
         .depends_on(&["g_axial"]).initial_depends_on(LIQUID),
 ];
 

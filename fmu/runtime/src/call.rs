@@ -128,6 +128,8 @@ pub enum CType {
     Integer,
     /// Where a version passes enumerations in a type of their own.
     Enumeration,
+    /// Where a version passes structural parameters in a type of their own.
+    Size,
     Boolean,
     String,
 }

@@ -12,8 +12,8 @@ use std::marker::PhantomData;
 
 use crate::call::{CType, Call, Events, Fault, InstanceState, Interface};
 use crate::model::{Model, StepEnd, StepFailure};
-use crate::table::Scalar;
-use crate::variable::{Access, Causality, Value, is_finite, text};
+use crate::table::{Layout, Scalar};
+use crate::variable::{Access, Causality, Value, Variable, is_finite, text};
 use crate::version::Version;
 
 /// The tolerance when the host names none.
@@ -35,6 +35,8 @@ pub struct Instance<M: Model, V: Version> {
     pub(crate) interface: Interface,
     /// Who handles events.
     pub(crate) events: Events,
+    /// What the host has as variables.
+    pub(crate) layout: Layout,
     pub(crate) state: InstanceState,
     pub(crate) start: f64,
     pub(crate) stop: Option<f64>,
@@ -118,6 +120,7 @@ impl<M: Model, V: Version> Instance<M, V> {
             version: PhantomData,
             interface,
             events,
+            layout: Layout::Scalars,
             state: InstanceState::Instantiated,
             start: 0.0,
             stop: None,
@@ -254,7 +257,8 @@ impl<M: Model, V: Version> Instance<M, V> {
     /// As new.
     pub fn reset(&mut self) -> Result<(), Fault> {
         self.check(V::RESET)?;
-        *self = Instance::with_events(self.interface, self.events);
+        let layout = self.layout;
+        *self = Instance { layout, ..Instance::with_events(self.interface, self.events) };
         Ok(())
     }
 
@@ -362,6 +366,15 @@ impl<M: Model, V: Version> Instance<M, V> {
             self.put(scalar::<M, V>(call, *reference)?, value(n));
         }
         Ok(())
+    }
+
+    /// Gives inputs and parameters the values that they start with, all elements of the variables that are `meant`.
+    pub(crate) fn restart(&mut self, meant: impl Fn(&Variable<M>) -> bool) {
+        for scalar in M::table().scalars.iter().filter(|scalar| meant(scalar.variable)) {
+            if let Some(start) = scalar.start() {
+                self.put(scalar, start);
+            }
+        }
     }
 
     /// Brings what the host is shown of what is discrete up to date. Returns whether it was not.
@@ -1164,8 +1177,19 @@ impl<M: Model, V: Version> Instance<M, V> {
                 "the state is of an instance whose host handles events otherwise: eventModeUsed must be the same",
             ));
         }
+        self.check_layout(call, saved)?;
         self.clone_from(saved);
         Ok(())
+    }
+
+    /// Whether a saved state is of an instance whose host has the same variables.
+    pub(crate) fn check_layout(&self, call: &Call, saved: &Self) -> Result<(), Fault> {
+        if saved.layout == self.layout {
+            return Ok(());
+        }
+        Err(call.error(
+            "the state is of this library's other FMU 3.0: variables are scalars in one, arrays in the other",
+        ))
     }
 
     /// The model; it is made when it is first asked for.

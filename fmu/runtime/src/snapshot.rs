@@ -24,7 +24,7 @@ use crate::call::{Events, InstanceState, Interface};
 use crate::hash::Hash;
 use crate::instance::{Instance, TOLERANCES};
 use crate::model::Model;
-use crate::table::Scalar;
+use crate::table::{Layout, Scalar};
 use crate::variable::{Access, Value};
 use crate::version::Version;
 
@@ -51,7 +51,7 @@ pub fn to_bytes<M: Model, V: Version>(saved: &Instance<M, V>) -> Vec<u8> {
     bytes.extend(MAGIC);
     bytes.extend(FORMAT.to_le_bytes());
     bytes.extend((size as u32).to_le_bytes());
-    bytes.extend(V::token::<M>().as_bytes());
+    bytes.extend(V::token::<M>(saved.layout).as_bytes());
     let flag = |is: bool, flag: u8| if is { flag } else { 0 };
     let flags = flag(saved.stop.is_some(), HAS_STOP)
         | flag(saved.model.is_some(), HAS_MODEL)
@@ -111,12 +111,13 @@ pub fn from_bytes<M: Model, V: Version>(bytes: &[u8]) -> Result<Instance<M, V>, 
         return Err(format!("the saved state should have {length} bytes, not {}", bytes.len()));
     }
     let guid = rest.take::<38>()?;
-    if guid != V::token::<M>().as_bytes() {
+    let of = |layout: &Layout| guid == V::token::<M>(*layout).as_bytes();
+    let Some(layout) = Layout::ALL.into_iter().find(of) else {
         let guid = String::from_utf8_lossy(&guid);
         return Err(format!(
             "the saved state is of another FMU or of another version of {model}, {guid}"
         ));
-    }
+    };
     if length != size {
         return Err(format!("a saved state has {size} bytes, not {length}"));
     }
@@ -135,6 +136,7 @@ pub fn from_bytes<M: Model, V: Version>(bytes: &[u8]) -> Result<Instance<M, V>, 
     let events = events.filter(|events| V::allows(interface, *events));
     let events = events.ok_or("the saved state is damaged: who handles events")?;
     let mut saved = Instance::with_events(interface, events);
+    saved.layout = layout;
     let possible =
         |s: &InstanceState| *s != InstanceState::Fatal && s.is_reachable(interface, saved.events);
     let state = InstanceState::ALL.get(usize::from(state)).copied().filter(possible);

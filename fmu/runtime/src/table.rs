@@ -9,7 +9,7 @@ use crate::call::CType;
 use crate::hash::Hash;
 use crate::model::Model;
 use crate::unit::{self, Unit};
-use crate::variable::{Access, Causality, Enumeration, Kind, Place, Value, Variable};
+use crate::variable::{Access, Causality, Dimension, Enumeration, Kind, Place, Value, Variable};
 
 /// What a model description says of the FMU as a whole.
 #[derive(Clone, Copy, Debug)]
@@ -42,7 +42,23 @@ pub struct Table<M: Model> {
     parameters: Span,
     derivatives: Span,
     guid: OnceLock<[u8; GUID_LENGTH]>,
-    token: OnceLock<[u8; GUID_LENGTH]>,
+    tokens: [OnceLock<[u8; GUID_LENGTH]>; 2],
+}
+
+/// What a table's entries are as variables.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Layout {
+    /// Each element of an array is a variable.
+    Scalars = 0,
+    /// Each entry is a variable, with dimensions if it is an array. The integer parameters that size arrays are
+    /// structural.
+    Arrays = 1,
+}
+
+impl Layout {
+    /// Both.
+    pub const ALL: [Layout; 2] = [Layout::Scalars, Layout::Arrays];
 }
 
 /// Length of a GUID in braces.
@@ -234,7 +250,7 @@ impl<M: Model> Table<M> {
             parameters: span(scalars, 'p'),
             derivatives: span(scalars, 'd'),
             guid: OnceLock::new(),
-            token: OnceLock::new(),
+            tokens: [const { OnceLock::new() }; 2],
         }
     }
 
@@ -254,17 +270,33 @@ impl<M: Model> Table<M> {
         std::str::from_utf8(bytes).unwrap_or_default()
     }
 
-    /// As the GUID, for model descriptions of FMI 3.0, which say besides what can be set within a step.
-    pub fn token(&self) -> &str {
-        let bytes = self.token.get_or_init(|| {
+    /// As the GUID, for model descriptions of FMI 3.0, which say besides what can be set within a step and, of arrays,
+    /// what sizes them: by its token the binary knows which of the two a host has read.
+    pub fn token(&self, layout: Layout) -> &str {
+        let bytes = self.tokens[layout as usize].get_or_init(|| {
             let mut bytes = [0; GUID_LENGTH];
-            let hash = Hash::new().text(self.guid()).text("FMI 3.0, scalars");
+            let hash = Hash::new().text(self.guid());
+            let hash = hash.text(match layout {
+                Layout::Scalars => "FMI 3.0, scalars",
+                Layout::Arrays => "FMI 3.0, arrays",
+            });
             let following = self.variables.iter().filter(|v| v.follows_inputs);
-            let hash = following.fold(hash, |h, v| h.text(v.name));
+            let mut hash = following.fold(hash, |h, v| h.text(v.name));
+            if layout == Layout::Arrays {
+                let shapes = self.variables.iter().filter(|v| !v.shape.is_empty());
+                hash = shapes.fold(hash, |h, v| h.text(&format!("{:?}", v.shape)));
+            }
             bytes.copy_from_slice(braced(hash).as_bytes());
             bytes
         });
         std::str::from_utf8(bytes).unwrap_or_default()
+    }
+
+    /// Whether arrays are sized by a parameter: it is structural where they are variables.
+    pub fn is_structural(&self, variable: &Variable<M>) -> bool {
+        let sizes =
+            |d: &Dimension| matches!(d, Dimension::Sized(name, _) if *name == variable.name);
+        self.variables.iter().any(|v| v.shape.iter().any(sizes))
     }
 
     /// The outputs that are discrete, in the table's order, each at its slot.
@@ -346,7 +378,8 @@ impl<M: Model> Table<M> {
         let mut hash = Hash::new().text(self.about.model).text(self.about.version);
         hash = hash.bytes(&(self.about.event_indicators as u64).to_le_bytes());
         for v in self.variables {
-            hash = hash.text(v.name).text(&format!("{:?} {:?}", v.causality, v.shape));
+            let lengths: Vec<_> = v.lengths().collect();
+            hash = hash.text(v.name).text(&format!("{:?} {lengths:?}", v.causality));
             hash = hash.bytes(&[u8::from(v.reinit), u8::from(v.tunable)]);
             hash = match v.kind {
                 Kind::Real(q) => {
@@ -421,7 +454,9 @@ mod tests {
     #[test]
     fn an_arrays_elements_have_their_indices_in_its_brackets() {
         let scalar = Spring::table().variables[0];
-        let names = |name, shape| {
+        let names = |name, lengths: &[usize]| {
+            let shape: Vec<_> = lengths.iter().map(|length| Dimension::Fixed(*length)).collect();
+            let shape = &*shape.leak();
             let v = Variable { name, shape, ..scalar };
             (v.element_name(0), v.element_name(v.len() - 1), v.pattern())
         };

@@ -26,7 +26,7 @@ use crate::instance::Instance;
 use crate::log::Filter;
 use crate::model::Model;
 use crate::snapshot;
-use crate::table::Scalar;
+use crate::table::{Layout, Scalar};
 use crate::variable::Value;
 use crate::version::Version;
 
@@ -200,7 +200,7 @@ impl Version for Fmi2 {
     const GET_CONTINUOUS_STATES:  &'static Call = &me(both("fmi2GetContinuousStates", M | E | C | T | F));
     const GET_NOMINALS:           &'static Call = &me(both("fmi2GetNominalsOfContinuousStates", ANY));
 
-    fn token<M: Model>() -> &'static str {
+    fn token<M: Model>(_: Layout) -> &'static str {
         M::table().guid()
     }
 

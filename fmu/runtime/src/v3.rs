@@ -5,8 +5,11 @@
 //! asks for in any version in [`crate::c_abi`].
 //!
 //! A value reference is a scalar's place among the variables, counted from 1. Behind the table's follow the
-//! independent variable and the event indicators, which FMI 2.0 has no variables for. There are no clocks, no binary
-//! variables, no structural parameters: functions for these answer as the standard asks of an FMU that has none.
+//! independent variable and the event indicators, which FMI 2.0 has no variables for. There are no clocks and no binary
+//! variables: functions for these answer as the standard asks of an FMU that has none.
+//!
+//! A host that has read the description with arrays, known by its token, counts the table's entries instead, and means
+//! all scalars of an array by its reference ([`arrays`]).
 
 #![allow(unsafe_code)]
 // The names are the standard's.
@@ -15,11 +18,13 @@
 // make one and is not yet freed, arrays have the lengths given, strings end with NUL.
 #![allow(clippy::missing_safety_doc, clippy::too_many_arguments)]
 
+use std::borrow::Cow;
 use std::cmp::Ordering::{Equal, Greater};
 use std::ffi::{c_char, c_int, c_void};
 use std::panic::catch_unwind;
 use std::ptr;
 
+use self::arrays::Arrays;
 use crate::c_abi::{
     self, Component, Log, Logger, array, array_mut, c_string, free_component, free_state,
     new_component, new_state, null, on, on_start, place, saved_state, text,
@@ -30,9 +35,13 @@ use crate::instance::{Instance, StepInfo};
 use crate::log::Filter;
 use crate::model::Model;
 use crate::snapshot;
-use crate::table::Scalar;
-use crate::variable::{Access, Causality, Kind, Value, is_finite, text as number};
+use crate::table::{Layout, Scalar};
+use crate::variable::{
+    Access, Causality, Dimension, Kind, Value, Variable, is_finite, text as number,
+};
 use crate::version::Version;
+
+pub mod arrays;
 
 /// An instance, opaque to the host.
 pub type fmi3Instance = *mut c_void;
@@ -155,6 +164,11 @@ mod list {
     pub static SET_INT32:           Call = of(CType::Integer, "fmi3SetInt32", SET);
     pub static SET_INT64:           Call = of(CType::Enumeration, "fmi3SetInt64", SET);
     pub static SET_BOOLEAN:         Call = of(CType::Boolean, "fmi3SetBoolean", SET);
+    pub static GET_UINT64:          Call = of(CType::Size, "fmi3GetUInt64", GET | CONFIGURATION);
+    pub static SET_UINT64:          Call = of(CType::Size, "fmi3SetUInt64", SET | CONFIGURATION);
+    // The same where there is a structural parameter, which is an integer in the table.
+    pub static GET_SIZE:            Call = of(CType::Integer, "fmi3GetUInt64", GET | CONFIGURATION);
+    pub static SET_SIZE:            Call = of(CType::Integer, "fmi3SetUInt64", CONFIGURATION);
     pub static NUMBER_OF_DEPENDENCIES: Call = of(CType::Real, "fmi3GetNumberOfVariableDependencies", ANY);
     pub static DEPENDENCIES:        Call = of(CType::Real, "fmi3GetVariableDependencies", ANY);
     pub static GET_STATE:           Call = both("fmi3GetFMUState", ANY);
@@ -213,8 +227,8 @@ impl Version for Fmi3 {
     const GET_CONTINUOUS_STATES:  &'static Call = &me(both("fmi3GetContinuousStates", M | E | C | T));
     const GET_NOMINALS:           &'static Call = &me(both("fmi3GetNominalsOfContinuousStates", ANY));
 
-    fn token<M: Model>() -> &'static str {
-        M::table().token()
+    fn token<M: Model>(layout: Layout) -> &'static str {
+        M::table().token(layout)
     }
 
     fn events(interface: Interface) -> Events {
@@ -244,7 +258,7 @@ impl Version for Fmi3 {
 
 /// The C type in which FMI 3.0 passes a scalar.
 #[inline]
-fn type_of<M: Model>(scalar: &Scalar<M>) -> CType {
+pub(crate) fn type_of<M: Model>(scalar: &Scalar<M>) -> CType {
     match scalar.c_type {
         CType::Integer if matches!(scalar.variable.kind, Kind::Enumeration(_)) => {
             CType::Enumeration
@@ -259,6 +273,7 @@ fn type_name(c_type: CType) -> &'static str {
         CType::Real => "Float64",
         CType::Integer => "Int32",
         CType::Enumeration => "Enumeration (Int64)",
+        CType::Size => "UInt64",
         CType::Boolean => "Boolean",
         CType::String => "String",
     }
@@ -346,6 +361,10 @@ pub struct Host<M: Model> {
     set: Vec<fmi3ValueReference>,
     /// Room for event indicators.
     indicators: Vec<f64>,
+    /// The scalars behind the variables that it knows, if these are not the scalars.
+    arrays: Option<Box<Arrays>>,
+    /// The variables that it wants within steps, as it knows them.
+    required_variables: Vec<fmi3ValueReference>,
 }
 
 /// What a host may do in an intermediate update.
@@ -366,15 +385,17 @@ impl<M: Model> Host<M> {
             ends: M::Inputs::default(),
             set: Vec::new(),
             indicators: vec![0.0; M::table().about.event_indicators],
+            arrays: None,
+            required_variables: Vec::new(),
         }
     }
 }
 
 /// Whether hosts may get or set a variable within a step: an input that follows others has no end of its own.
-pub fn has_intermediate_update<M: Model>(scalar: &Scalar<M>) -> bool {
-    matches!(scalar.variable.causality, Causality::Input | Causality::Output)
-        && scalar.c_type == CType::Real
-        && !scalar.variable.follows_inputs
+pub fn has_intermediate_update<M: Model>(variable: &Variable<M>) -> bool {
+    matches!(variable.causality, Causality::Input | Causality::Output)
+        && variable.c_type() == CType::Real
+        && !variable.follows_inputs
 }
 
 // ---- Inquiry, life and death ----
@@ -424,12 +445,19 @@ unsafe fn instantiate<M: Model>(
     function: &str,
     (name, token): (fmi3String, fmi3String),
     (environment, log_message): (fmi3InstanceEnvironment, fmi3LogMessageCallback),
-    make: impl FnOnce() -> Result<(Instance<M, Fmi3>, Host<M>), String>,
+    make: impl FnOnce(Option<&Arrays>) -> Result<(Instance<M, Fmi3>, Host<M>), String>,
 ) -> fmi3Instance {
     c_abi::silence_panics();
     let made = catch_unwind(std::panic::AssertUnwindSafe(|| unsafe {
         let log = Log::new(logger(environment, log_message));
-        match check_token::<M>(text(name), text(token)).and_then(|()| make()) {
+        let made = check_token::<M>(text(name), text(token)).and_then(|layout| {
+            let arrays = arrays::for_layout::<M>(layout, &M::table().starts());
+            let (mut instance, mut host) = make(arrays.as_deref())?;
+            instance.layout = layout;
+            host.arrays = arrays;
+            Ok((instance, host))
+        });
+        match made {
             Ok((instance, host)) => new_component(instance, log, host),
             Err(why) => {
                 let text = format!("{function}: {why}");
@@ -441,19 +469,22 @@ unsafe fn instantiate<M: Model>(
     made.unwrap_or(ptr::null_mut())
 }
 
-/// Why there can be no instance of this name, for this model description.
-fn check_token<M: Model>(name: Option<String>, token: Option<String>) -> Result<(), String> {
-    let expected = M::table().token();
+/// What the variables are in the model description of this token, or why there can be no instance of this name, for
+/// this model description.
+fn check_token<M: Model>(name: Option<String>, token: Option<String>) -> Result<Layout, String> {
+    let [scalars, with_arrays] = Layout::ALL.map(|layout| M::table().token(layout));
     if name.is_none_or(|name| name.trim().is_empty()) {
         return Err("instanceName is NULL or empty".into());
     }
+    let expected = || format!("expected {scalars}, or {with_arrays} with arrays");
     match token {
-        None => Err(format!("instantiationToken is NULL; expected {expected}")),
-        Some(token) if token != expected => Err(format!(
-            "instantiationToken is {token}; expected {expected}: model description and binary do not belong \
-             together"
+        None => Err(format!("instantiationToken is NULL; {}", expected())),
+        Some(token) if token == scalars => Ok(Layout::Scalars),
+        Some(token) if token == with_arrays => Ok(Layout::Arrays),
+        Some(token) => Err(format!(
+            "instantiationToken is {token}; {}: model description and binary do not belong together",
+            expected()
         )),
-        Some(_) => Ok(()),
     }
 }
 
@@ -472,7 +503,7 @@ pub unsafe fn fmi3InstantiateModelExchange<M: Model>(
             "fmi3InstantiateModelExchange",
             (instanceName, instantiationToken),
             (instanceEnvironment, logMessage),
-            || {
+            |_| {
                 let instance = Instance::new(Interface::ModelExchange);
                 Ok((instance, Host::new(instanceEnvironment)))
             },
@@ -501,7 +532,7 @@ pub unsafe fn fmi3InstantiateCoSimulation<M: Model>(
             function,
             (instanceName, instantiationToken),
             (instanceEnvironment, logMessage),
-            || {
+            |arrays| {
                 let call = &both("fmi3InstantiateCoSimulation", 0);
                 let required = array(
                     call,
@@ -510,9 +541,16 @@ pub unsafe fn fmi3InstantiateCoSimulation<M: Model>(
                     nRequiredIntermediateVariables,
                 )
                 .map_err(|fault| fault.text)?;
-                for reference in required {
+                let scalars = match arrays {
+                    None => required.to_vec(),
+                    Some(arrays) => {
+                        let all = expand::<M>(arrays, Fmi3::DIRECTIONAL_DERIVATIVE, required);
+                        all.map_err(|fault| fault.text)?
+                    }
+                };
+                for reference in &scalars {
                     let scalar = Fmi3::scalar::<M>(*reference, Some(CType::Real))?;
-                    if !has_intermediate_update(scalar) {
+                    if !has_intermediate_update(scalar.variable) {
                         return Err(format!(
                             "{} is among requiredIntermediateVariables (allowed: variables with intermediateUpdate, which are \
                              continuous inputs and outputs)",
@@ -524,8 +562,9 @@ pub unsafe fn fmi3InstantiateCoSimulation<M: Model>(
                 let host = Host {
                     intermediate_update: intermediateUpdate,
                     early_return_allowed: earlyReturnAllowed != 0,
-                    required: required.to_vec(),
-                    set: Vec::with_capacity(required.len()),
+                    set: Vec::with_capacity(scalars.len()),
+                    required: scalars,
+                    required_variables: required.to_vec(),
                     ..Host::new(instanceEnvironment)
                 };
                 Ok((Instance::with_events(Interface::CoSimulation, events), host))
@@ -552,7 +591,7 @@ pub unsafe fn fmi3InstantiateScheduledExecution<M: Model>(
             "fmi3InstantiateScheduledExecution",
             (instanceName, instantiationToken),
             (instanceEnvironment, logMessage),
-            || Err("this FMU has Model Exchange and Co-Simulation, no Scheduled Execution".into()),
+            |_| Err("this FMU has Model Exchange and Co-Simulation, no Scheduled Execution".into()),
         )
     }
 }
@@ -606,7 +645,111 @@ pub unsafe fn fmi3Terminate<M: Model>(instance: fmi3Instance) -> fmi3Status {
 
 /// As new.
 pub unsafe fn fmi3Reset<M: Model>(instance: fmi3Instance) -> fmi3Status {
-    unsafe { on::<M, Fmi3>(instance, Fmi3::RESET, |component| component.instance.reset()) }
+    unsafe {
+        on::<M, Fmi3>(instance, Fmi3::RESET, |component| {
+            component.instance.reset()?;
+            resize(component);
+            Ok(())
+        })
+    }
+}
+
+// ---- Arrays ----
+
+/// The scalars behind value references of the host's.
+fn scalars_of<'a, M: Model>(
+    component: &Component<M, Fmi3>,
+    call: &Call,
+    references: &'a [fmi3ValueReference],
+) -> Result<Cow<'a, [u32]>, Fault> {
+    match &component.host.arrays {
+        None => Ok(Cow::Borrowed(references)),
+        Some(arrays) => expand::<M>(arrays, call, references).map(Cow::Owned),
+    }
+}
+
+/// The scalars behind variables, if they pass in the C type that the call is for.
+fn expand<M: Model>(
+    arrays: &Arrays,
+    call: &Call,
+    references: &[fmi3ValueReference],
+) -> Result<Vec<u32>, Fault> {
+    let mut scalars = Vec::with_capacity(references.len());
+    for reference in references {
+        match arrays.of(*reference) {
+            Some(all) if call.c_type.is_none_or(|t| t == arrays.c_type(*reference)) => {
+                scalars.extend_from_slice(all);
+            }
+            _ => return Err(call.error(wrong_variable::<M>(arrays, *reference))),
+        }
+    }
+    Ok(scalars)
+}
+
+#[cold]
+fn wrong_variable<M: Model>(arrays: &Arrays, reference: u32) -> String {
+    match arrays::name::<M>(reference) {
+        Some(name) => {
+            let is = type_name(arrays.c_type(reference));
+            format!("{name} (value reference {reference}) is of type {is}")
+        }
+        None => format!(
+            "no variable has the value reference {reference} (allowed: 1 to {})",
+            arrays.len()
+        ),
+    }
+}
+
+/// There is a value for each element.
+fn check_elements<M: Model>(
+    component: &Component<M, Fmi3>,
+    call: &Call,
+    references: &[fmi3ValueReference],
+    expected: usize,
+    values: usize,
+) -> Result<(), Fault> {
+    if values == expected {
+        return Ok(());
+    }
+    /// So many variables are named.
+    const NAMED: usize = 4;
+    let mut shapes: Vec<_> = references
+        .iter()
+        .take(NAMED)
+        .map(|reference| arrays::shape::<M>(*reference, &component.instance.parameters))
+        .collect();
+    if references.len() > NAMED {
+        shapes.push("…".into());
+    }
+    Err(call.error(format_args!(
+        "nValues = {values} (allowed: {expected}, by rows: {})",
+        shapes.join(", ")
+    )))
+}
+
+/// What the host knows follows the structural parameters.
+fn resize<M: Model>(component: &mut Component<M, Fmi3>) {
+    let Component { instance, host, .. } = component;
+    if let Some(arrays) = &mut host.arrays {
+        **arrays = Arrays::new::<M>(&instance.parameters);
+        let all = host.required_variables.iter().filter_map(|reference| arrays.of(*reference));
+        host.required = all.flatten().copied().collect();
+        host.set = Vec::with_capacity(host.required.len());
+    }
+}
+
+/// Structural parameters were others before: what they size has its start values from here on.
+fn start_resized<M: Model>(component: &mut Component<M, Fmi3>, scalars: &[u32], before: &[Value]) {
+    let after = &component.instance.parameters;
+    let changed: Vec<_> = scalars
+        .iter()
+        .filter_map(|reference| M::table().scalars.get(*reference as usize - 1))
+        .filter(|scalar| before.get(scalar.slot) != after.get(scalar.slot))
+        .map(|scalar| scalar.variable.name)
+        .collect();
+    let is_resized = |d: &Dimension| matches!(d, Dimension::Sized(by, _) if changed.contains(by));
+    component.instance.restart(|variable| variable.shape.iter().any(is_resized));
+    resize(component);
 }
 
 // ---- Values ----
@@ -635,6 +778,14 @@ unsafe fn get<M: Model, T>(
         on::<M, Fmi3>(instance, call, |component| {
             component.instance.check(call)?;
             let references = array(call, "valueReferences", references, count)?;
+            if component.host.arrays.is_some() {
+                let found = array_values(component, call, references, value_count)?;
+                let places = array_mut(call, "values", values, value_count)?;
+                for (value, place) in found.into_iter().zip(places) {
+                    *place = as_c(value).ok_or_else(|| call.error("wrong type"))?;
+                }
+                return Ok(());
+            }
             check_count(call, count, value_count)?;
             let places = array_mut(call, "values", values, value_count)?;
             for (reference, place) in references.iter().zip(places) {
@@ -644,6 +795,20 @@ unsafe fn get<M: Model, T>(
             Ok(())
         })
     }
+}
+
+/// The values of all elements of arrays, `count` of them.
+#[cold]
+fn array_values<M: Model>(
+    component: &mut Component<M, Fmi3>,
+    call: &Call,
+    references: &[fmi3ValueReference],
+    count: usize,
+) -> Result<Vec<Value>, Fault> {
+    let scalars = scalars_of(component, call, references)?;
+    check_elements(component, call, references, scalars.len(), count)?;
+    let call = if call.c_type == Some(CType::Size) { &GET_SIZE } else { call };
+    scalars.iter().map(|reference| value(component, call, *reference)).collect()
 }
 
 #[inline(always)]
@@ -719,6 +884,11 @@ unsafe fn set<M: Model, T: Copy>(
         on::<M, Fmi3>(instance, call, |component| {
             component.instance.check(call)?;
             let references = array(call, "valueReferences", references, count)?;
+            if component.host.arrays.is_some() {
+                let values = array(call, "values", values, value_count)?;
+                let values: Vec<_> = values.iter().map(|value| from_c(*value)).collect();
+                return set_arrays(component, call, references, &values);
+            }
             check_count(call, count, value_count)?;
             let values = array(call, "values", values, value_count)?;
             if component.instance.state() == InstanceState::Intermediate {
@@ -727,6 +897,29 @@ unsafe fn set<M: Model, T: Copy>(
             component.instance.set(call, references, |n| from_c(values[n]))
         })
     }
+}
+
+/// Sets all elements of arrays.
+#[cold]
+fn set_arrays<M: Model>(
+    component: &mut Component<M, Fmi3>,
+    call: &'static Call,
+    references: &[fmi3ValueReference],
+    values: &[Value],
+) -> Result<(), Fault> {
+    let scalars = scalars_of(component, call, references)?;
+    check_elements(component, call, references, scalars.len(), values.len())?;
+    let value = |n: usize| values[n];
+    if component.instance.state() == InstanceState::Intermediate {
+        return set_ends(component, call, &scalars, value);
+    }
+    let before = (call.c_type == Some(CType::Size)).then(|| component.instance.parameters.clone());
+    let call = if before.is_some() { &SET_SIZE } else { call };
+    component.instance.set(call, &scalars, value)?;
+    if let Some(before) = before {
+        start_resized(component, &scalars, &before);
+    }
+    Ok(())
 }
 
 /// Within a step: what inputs are at the end of the piece that comes.
@@ -876,7 +1069,26 @@ pub unsafe fn fmi3SetBoolean<M: Model>(
 }
 
 /// Gets or sets variables of a type that no variable has: fine when there are none.
-unsafe fn of_no_variable<M: Model>(
+fn of_no_variable<M: Model>(
+    component: &Component<M, Fmi3>,
+    call: &Call,
+    references: &[fmi3ValueReference],
+    value_count: usize,
+) -> Result<(), Fault> {
+    match references.first() {
+        Some(reference) => Err(call.error(match &component.host.arrays {
+            Some(arrays) => wrong_variable::<M>(arrays, *reference),
+            None => {
+                let scalar = M::table().scalars.get(reference.wrapping_sub(1) as usize);
+                wrong_reference::<M>(*reference, scalar, call.c_type)
+            }
+        })),
+        None => check_count(call, 0, value_count),
+    }
+}
+
+/// The same as a call.
+unsafe fn call_of_no_variable<M: Model>(
     instance: fmi3Instance,
     call: &'static Call,
     (references, count): (*const fmi3ValueReference, usize),
@@ -885,13 +1097,62 @@ unsafe fn of_no_variable<M: Model>(
     unsafe {
         on::<M, Fmi3>(instance, call, |component| {
             component.instance.check(call)?;
-            match array(call, "valueReferences", references, count)?.first() {
-                Some(reference) => {
-                    let scalar = M::table().scalars.get(reference.wrapping_sub(1) as usize);
-                    Err(call.error(wrong_reference::<M>(*reference, scalar, call.c_type)))
-                }
-                None => check_count(call, count, value_count),
+            let references = array(call, "valueReferences", references, count)?;
+            of_no_variable(component, call, references, value_count)
+        })
+    }
+}
+
+/// Reads structural parameters, which there are with arrays.
+pub unsafe fn fmi3GetUInt64<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    values: *mut fmi3UInt64,
+    nValues: usize,
+) -> fmi3Status {
+    let call = &GET_UINT64;
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let references = array(call, "valueReferences", valueReferences, nValueReferences)?;
+            if component.host.arrays.is_none() {
+                return of_no_variable(component, call, references, nValues);
             }
+            let found = array_values(component, call, references, nValues)?;
+            let places = array_mut(call, "values", values, nValues)?;
+            for (value, place) in found.into_iter().zip(places) {
+                *place = match value {
+                    Value::Integer(n) => u64::try_from(n).unwrap_or(0),
+                    _ => return Err(call.error("wrong type")),
+                };
+            }
+            Ok(())
+        })
+    }
+}
+
+/// Sets structural parameters, which there are with arrays.
+pub unsafe fn fmi3SetUInt64<M: Model>(
+    instance: fmi3Instance,
+    valueReferences: *const fmi3ValueReference,
+    nValueReferences: usize,
+    values: *const fmi3UInt64,
+    nValues: usize,
+) -> fmi3Status {
+    let call = &SET_UINT64;
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let references = array(call, "valueReferences", valueReferences, nValueReferences)?;
+            if component.host.arrays.is_none() {
+                return of_no_variable(component, call, references, nValues);
+            }
+            // More than the largest integer is more than any size may be.
+            let size = |n: &u64| Value::Integer(i32::try_from(*n).unwrap_or(i32::MAX));
+            let values = array(call, "values", values, nValues)?;
+            let values: Vec<_> = values.iter().map(size).collect();
+            set_arrays(component, call, references, &values)
         })
     }
 }
@@ -909,7 +1170,7 @@ macro_rules! of_no_variable {
         ) -> fmi3Status {
             static CALL: Call = both(stringify!($name), $allowed);
             let references = (valueReferences, nValueReferences);
-            unsafe { of_no_variable::<M>(instance, &CALL, references, nValues) }
+            unsafe { call_of_no_variable::<M>(instance, &CALL, references, nValues) }
         }
     )*};
 }
@@ -921,7 +1182,6 @@ of_no_variable! {
     fmi3GetInt16(*mut i16), GET;
     fmi3GetUInt16(*mut u16), GET;
     fmi3GetUInt32(*mut u32), GET;
-    fmi3GetUInt64(*mut u64), GET;
     fmi3GetString(*mut fmi3String), GET;
     fmi3SetFloat32(*const fmi3Float32), SET;
     fmi3SetInt8(*const i8), SET;
@@ -929,7 +1189,6 @@ of_no_variable! {
     fmi3SetInt16(*const i16), SET;
     fmi3SetUInt16(*const u16), SET;
     fmi3SetUInt32(*const u32), SET;
-    fmi3SetUInt64(*const u64), SET;
     fmi3SetString(*const fmi3String), SET;
 }
 
@@ -943,7 +1202,9 @@ pub unsafe fn fmi3GetBinary<M: Model>(
     nValues: usize,
 ) -> fmi3Status {
     static CALL: Call = both("fmi3GetBinary", GET);
-    unsafe { of_no_variable::<M>(instance, &CALL, (valueReferences, nValueReferences), nValues) }
+    unsafe {
+        call_of_no_variable::<M>(instance, &CALL, (valueReferences, nValueReferences), nValues)
+    }
 }
 
 /// No variable is binary.
@@ -956,7 +1217,9 @@ pub unsafe fn fmi3SetBinary<M: Model>(
     nValues: usize,
 ) -> fmi3Status {
     static CALL: Call = both("fmi3SetBinary", SET);
-    unsafe { of_no_variable::<M>(instance, &CALL, (valueReferences, nValueReferences), nValues) }
+    unsafe {
+        call_of_no_variable::<M>(instance, &CALL, (valueReferences, nValueReferences), nValues)
+    }
 }
 
 /// Functions for clocks, of which there are none.
@@ -972,7 +1235,7 @@ macro_rules! of_no_clock {
             static CALL: Call = both(stringify!($name), ANY);
             let _ = ($($argument,)*);
             let references = (valueReferences, nValueReferences);
-            unsafe { of_no_variable::<M>(instance, &CALL, references, nValueReferences) }
+            unsafe { call_of_no_variable::<M>(instance, &CALL, references, nValueReferences) }
         }
     )*};
 }
@@ -1007,20 +1270,51 @@ pub unsafe fn fmi3ActivateModelPartition<M: Model>(
 
 // ---- Dependencies ----
 
+/// That an element of a variable depends on an element of another.
+struct Dependency {
+    element: usize,
+    independent: fmi3ValueReference,
+    independent_element: usize,
+}
+
 /// What a variable depends on.
 fn dependencies<M: Model>(
     component: &mut Component<M, Fmi3>,
     call: &Call,
     reference: u32,
-) -> Result<Vec<u32>, Fault> {
-    let found = M::table().scalars.get(reference.wrapping_sub(1) as usize);
-    let scalar = found.ok_or_else(|| call.error(wrong_reference::<M>(reference, found, None)))?;
-    let is_unknown = !matches!(scalar.variable.causality, Causality::Input | Causality::Parameter);
-    if !is_unknown {
-        let name = scalar.name();
-        return Err(call.error(format_args!("{name} is set by the host and depends on nothing")));
+) -> Result<Vec<Dependency>, Fault> {
+    let Component { instance, host, .. } = component;
+    let scalars = match &host.arrays {
+        None => std::slice::from_ref(&reference),
+        Some(arrays) => arrays
+            .of(reference)
+            .ok_or_else(|| call.error(wrong_variable::<M>(arrays, reference)))?,
+    };
+    let mut all = Vec::new();
+    for (scalar, element) in scalars.iter().zip(1..) {
+        let found = M::table().scalars.get(scalar.wrapping_sub(1) as usize);
+        let wrong = || call.error(wrong_reference::<M>(*scalar, found, None));
+        let scalar = found.ok_or_else(wrong)?;
+        if matches!(scalar.variable.causality, Causality::Input | Causality::Parameter) {
+            let name = scalar.name();
+            return Err(
+                call.error(format_args!("{name} is set by the host and depends on nothing"))
+            );
+        }
+        for known in instance.dependencies(call, scalar)? {
+            let place = match &host.arrays {
+                None => Some((known, 1)),
+                Some(arrays) => arrays.place(known),
+            };
+            let of = |(independent, independent_element)| Dependency {
+                element,
+                independent,
+                independent_element,
+            };
+            all.extend(place.map(of));
+        }
     }
-    component.instance.dependencies(call, scalar)
+    Ok(all)
 }
 
 /// How much a variable depends on.
@@ -1062,10 +1356,16 @@ pub unsafe fn fmi3GetVariableDependencies<M: Model>(
                 )));
             }
             let n = nDependencies;
-            array_mut(call, "elementIndicesOfDependent", elementIndicesOfDependent, n)?.fill(1);
-            array_mut(call, "independents", independents, n)?.copy_from_slice(&all);
-            array_mut(call, "elementIndicesOfIndependents", elementIndicesOfIndependents, n)?
-                .fill(1);
+            let elements =
+                array_mut(call, "elementIndicesOfDependent", elementIndicesOfDependent, n)?;
+            let independents = array_mut(call, "independents", independents, n)?;
+            let independent_elements =
+                array_mut(call, "elementIndicesOfIndependents", elementIndicesOfIndependents, n)?;
+            for (n, dependency) in all.iter().enumerate() {
+                elements[n] = dependency.element;
+                independents[n] = dependency.independent;
+                independent_elements[n] = dependency.independent_element;
+            }
             array_mut(call, "dependencyKinds", dependencyKinds, n)?.fill(fmi3Dependent);
             Ok(())
         })
@@ -1103,7 +1403,9 @@ pub unsafe fn fmi3SetFMUState<M: Model>(
     unsafe {
         on::<M, Fmi3>(instance, call, |component| {
             component.instance.check(call)?;
-            component.instance.restore(saved_state(call, "FMUState", FMUState)?)
+            component.instance.restore(saved_state(call, "FMUState", FMUState)?)?;
+            resize(component);
+            Ok(())
         })
     }
 }
@@ -1174,8 +1476,9 @@ pub unsafe fn fmi3DeserializeFMUState<M: Model>(
                 return Err(null(call, "FMUState"));
             }
             let bytes = array(call, "serializedState", serializedState, size)?;
-            let saved = snapshot::from_bytes::<M, Fmi3>(bytes);
-            ptr::write(FMUState, new_state(saved.map_err(|why| call.error(why))?));
+            let saved = snapshot::from_bytes::<M, Fmi3>(bytes).map_err(|why| call.error(why))?;
+            component.instance.check_layout(call, &saved)?;
+            ptr::write(FMUState, new_state(saved));
             Ok(())
         })
     }
@@ -1209,18 +1512,22 @@ pub unsafe fn fmi3GetDirectionalDerivative<M: Model>(
         on::<M, Fmi3>(instance, call, |component| {
             component.instance.check(call)?;
             let unknowns = array(call, "unknowns", unknowns, nUnknowns)?;
+            let unknowns = scalars_of(component, call, unknowns)?;
             let knowns = array(call, "knowns", knowns, nKnowns)?;
-            check_numbers(call, "nSeed", nSeed, nKnowns)?;
-            check_numbers(call, "nSensitivity", nSensitivity, nUnknowns)?;
+            let knowns = scalars_of(component, call, knowns)?;
+            check_numbers(call, "nSeed", nSeed, knowns.len())?;
+            check_numbers(call, "nSensitivity", nSensitivity, unknowns.len())?;
             let seed = array(call, "seed", seed, nSeed)?;
             let answers = array_mut(call, "sensitivity", sensitivity, nSensitivity)?;
             let time = time_reference::<M>();
             if !knowns.contains(&time) {
-                return component.instance.directional_derivative(unknowns, knowns, seed, answers);
+                return component
+                    .instance
+                    .directional_derivative(&unknowns, &knowns, seed, answers);
             }
             let others = knowns.iter().zip(seed).filter(|(known, _)| **known != time);
             let (knowns, seed): (Vec<u32>, Vec<f64>) = others.unzip();
-            component.instance.directional_derivative(unknowns, &knowns, &seed, answers)
+            component.instance.directional_derivative(&unknowns, &knowns, &seed, answers)
         })
     }
 }
@@ -1242,9 +1549,11 @@ pub unsafe fn fmi3GetAdjointDerivative<M: Model>(
         on::<M, Fmi3>(instance, call, |component| {
             component.instance.check(call)?;
             let unknowns = array(call, "unknowns", unknowns, nUnknowns)?;
+            let unknowns = scalars_of(component, call, unknowns)?;
             let knowns = array(call, "knowns", knowns, nKnowns)?;
-            check_numbers(call, "nSeed", nSeed, nUnknowns)?;
-            check_numbers(call, "nSensitivity", nSensitivity, nKnowns)?;
+            let knowns = scalars_of(component, call, knowns)?;
+            check_numbers(call, "nSeed", nSeed, unknowns.len())?;
+            check_numbers(call, "nSensitivity", nSensitivity, knowns.len())?;
             let seed = array(call, "seed", seed, nSeed)?;
             for weight in seed {
                 if !is_finite(*weight) {
@@ -1262,7 +1571,7 @@ pub unsafe fn fmi3GetAdjointDerivative<M: Model>(
                     continue;
                 }
                 let (known, one) = (std::slice::from_ref(known), &[1.0]);
-                component.instance.directional_derivative(unknowns, known, one, &mut column)?;
+                component.instance.directional_derivative(&unknowns, known, one, &mut column)?;
                 *answer = seed.iter().zip(&column).map(|(weight, d)| weight * d).sum();
             }
             Ok(())
@@ -1272,7 +1581,7 @@ pub unsafe fn fmi3GetAdjointDerivative<M: Model>(
 
 // ---- Configuration ----
 
-/// There are no structural parameters to set.
+/// From here on structural parameters can be set, if there are any.
 pub unsafe fn fmi3EnterConfigurationMode<M: Model>(instance: fmi3Instance) -> fmi3Status {
     unsafe {
         on::<M, Fmi3>(instance, &ENTER_CONFIGURATION, |component| {
@@ -1386,7 +1695,39 @@ pub unsafe fn fmi3SetContinuousStates<M: Model>(
         on::<M, Fmi3>(instance, call, |component| {
             component.instance.check(call)?;
             let states = array(call, "continuousStates", continuousStates, nContinuousStates)?;
-            component.instance.set_continuous_states(states)
+            let Component { instance, host, .. } = component;
+            let Some(arrays) = &host.arrays else { return instance.set_continuous_states(states) };
+            check_numbers(call, "nx", states.len(), arrays.states().len())?;
+            let mut all = vec![0.0; M::table().derivatives().len()];
+            instance.continuous_states(&mut all)?;
+            for (place, x) in arrays.states().iter().zip(states) {
+                all[*place] = *x;
+            }
+            instance.set_continuous_states(&all)
+        })
+    }
+}
+
+/// Fills the host's array with something of each state by `body`, which knows the most that there can be.
+unsafe fn fill_states<M: Model>(
+    instance: fmi3Instance,
+    call: &'static Call,
+    (name, pointer, length): (&str, *mut fmi3Float64, usize),
+    body: impl FnOnce(&mut Instance<M, Fmi3>, &mut [fmi3Float64]) -> Result<(), Fault>,
+) -> fmi3Status {
+    unsafe {
+        on::<M, Fmi3>(instance, call, |component| {
+            component.instance.check(call)?;
+            let room = array_mut(call, name, pointer, length)?;
+            let Component { instance, host, .. } = component;
+            let Some(arrays) = &host.arrays else { return body(instance, room) };
+            check_numbers(call, "nx", room.len(), arrays.states().len())?;
+            let mut all = vec![0.0; M::table().derivatives().len()];
+            body(instance, &mut all)?;
+            for (place, x) in arrays.states().iter().zip(room) {
+                *x = all[*place];
+            }
+            Ok(())
         })
     }
 }
@@ -1413,7 +1754,7 @@ pub unsafe fn fmi3GetContinuousStateDerivatives<M: Model>(
     nContinuousStates: usize,
 ) -> fmi3Status {
     let into = ("derivatives", derivatives, nContinuousStates);
-    unsafe { fill::<M>(instance, Fmi3::GET_DERIVATIVES, into, Instance::derivatives) }
+    unsafe { fill_states::<M>(instance, Fmi3::GET_DERIVATIVES, into, Instance::derivatives) }
 }
 
 /// Functions that cross zero at events.
@@ -1433,7 +1774,9 @@ pub unsafe fn fmi3GetContinuousStates<M: Model>(
     nContinuousStates: usize,
 ) -> fmi3Status {
     let into = ("continuousStates", continuousStates, nContinuousStates);
-    unsafe { fill::<M>(instance, Fmi3::GET_CONTINUOUS_STATES, into, Instance::continuous_states) }
+    unsafe {
+        fill_states::<M>(instance, Fmi3::GET_CONTINUOUS_STATES, into, Instance::continuous_states)
+    }
 }
 
 /// The states' orders of magnitude.
@@ -1443,19 +1786,21 @@ pub unsafe fn fmi3GetNominalsOfContinuousStates<M: Model>(
     nContinuousStates: usize,
 ) -> fmi3Status {
     let into = ("nominals", nominals, nContinuousStates);
-    unsafe { fill::<M>(instance, Fmi3::GET_NOMINALS, into, |instance, x| instance.nominals(x)) }
+    unsafe {
+        fill_states::<M>(instance, Fmi3::GET_NOMINALS, into, |instance, x| instance.nominals(x))
+    }
 }
 
 unsafe fn tell<M: Model>(
     instance: fmi3Instance,
     call: &'static Call,
     (name, pointer): (&str, *mut usize),
-    count: usize,
+    count: impl FnOnce(&Host<M>) -> usize,
 ) -> fmi3Status {
     unsafe {
         on::<M, Fmi3>(instance, call, |component| {
             component.instance.check(call)?;
-            *place(call, name, pointer)? = count;
+            *place(call, name, pointer)? = count(&component.host);
             Ok(())
         })
     }
@@ -1467,7 +1812,7 @@ pub unsafe fn fmi3GetNumberOfEventIndicators<M: Model>(
     nEventIndicators: *mut usize,
 ) -> fmi3Status {
     let into = ("nEventIndicators", nEventIndicators);
-    let count = M::table().about.event_indicators;
+    let count = |_: &Host<M>| M::table().about.event_indicators;
     unsafe { tell::<M>(instance, &NUMBER_OF_INDICATORS, into, count) }
 }
 
@@ -1477,7 +1822,10 @@ pub unsafe fn fmi3GetNumberOfContinuousStates<M: Model>(
     nContinuousStates: *mut usize,
 ) -> fmi3Status {
     let into = ("nContinuousStates", nContinuousStates);
-    let count = M::table().derivatives().len();
+    let count = |host: &Host<M>| match &host.arrays {
+        None => M::table().derivatives().len(),
+        Some(arrays) => arrays.states().len(),
+    };
     unsafe { tell::<M>(instance, &NUMBER_OF_STATES, into, count) }
 }
 
@@ -1507,14 +1855,26 @@ pub unsafe fn fmi3GetOutputDerivatives<M: Model>(
             component.instance.check(call)?;
             let references = array(call, "valueReferences", valueReferences, nValueReferences)?;
             let orders = array(call, "orders", orders, nValueReferences)?;
-            check_count(call, nValueReferences, nValues)?;
+            let (mut scalars, mut orders) = (Cow::Borrowed(references), Cow::Borrowed(orders));
+            match &component.host.arrays {
+                None => check_count(call, nValueReferences, nValues)?,
+                Some(arrays) => {
+                    let each = references.iter().zip(orders.iter());
+                    let each = each
+                        .flat_map(|(r, order)| vec![*order; arrays.of(*r).map_or(0, <[u32]>::len)]);
+                    let each: Vec<i32> = each.collect();
+                    scalars = Cow::Owned(expand::<M>(arrays, call, references)?);
+                    orders = Cow::Owned(each);
+                    check_elements(component, call, references, scalars.len(), nValues)?;
+                }
+            }
             let places = array_mut(call, "values", values, nValues)?;
             if component.instance.state() == InstanceState::Intermediate {
-                for reference in references {
+                for reference in scalars.iter() {
                     check_intermediate(component, call, *reference, Phase::Get)?;
                 }
             }
-            component.instance.output_derivatives(references, orders, places)
+            component.instance.output_derivatives(&scalars, &orders, places)
         })
     }
 }
@@ -1844,7 +2204,7 @@ mod tests {
     use std::sync::Mutex;
 
     fn token() -> std::ffi::CString {
-        c_string(Spring::table().token())
+        c_string(Spring::table().token(Layout::Scalars))
     }
 
     /// The value reference of a name.

@@ -94,6 +94,26 @@ pub enum Kind {
 /// 0 for the first, to the state's.
 pub type Place = fn(usize) -> usize;
 
+/// How long an array is along one of its dimensions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Dimension {
+    /// Always so long.
+    Fixed(usize),
+    /// As long as the integer parameter of this name says, and at most so long. Where every element is a variable of
+    /// its own, there are always the most; where the array is one, the parameter is structural (see
+    /// [`Layout`](crate::table::Layout)).
+    Sized(&'static str, usize),
+}
+
+impl Dimension {
+    /// The most that it can be.
+    pub const fn most(self) -> usize {
+        match self {
+            Dimension::Fixed(length) | Dimension::Sized(_, length) => length,
+        }
+    }
+}
+
 /// Where a variable lives in the model. The last argument is the element's number in an array,
 /// 0 for the first and for a scalar.
 #[derive(Debug)]
@@ -138,7 +158,7 @@ pub struct Variable<M: Model> {
     /// Where it lives.
     pub access: Access<M>,
     /// An array's dimensions, none for a scalar.
-    pub shape: &'static [usize],
+    pub shape: &'static [Dimension],
     /// Its place, if it is a continuous state.
     pub state: Option<Place>,
     /// Whether an event can make this state jump.
@@ -409,7 +429,7 @@ impl<M: Model> Variable<M> {
     }
 
     /// It is an array with these dimensions.
-    pub const fn shape(mut self, shape: &'static [usize]) -> Self {
+    pub const fn shape(mut self, shape: &'static [Dimension]) -> Self {
         self.shape = shape;
         self
     }
@@ -454,10 +474,20 @@ impl<M: Model> Variable<M> {
     pub const fn len(&self) -> usize {
         let (mut len, mut n) = (1, 0);
         while n < self.shape.len() {
-            len *= self.shape[n];
+            len *= self.shape[n].most();
             n += 1;
         }
         len
+    }
+
+    /// The most that each of its dimensions can be.
+    pub fn lengths(&self) -> impl DoubleEndedIterator<Item = usize> + ExactSizeIterator + use<M> {
+        self.shape.iter().map(|dimension| dimension.most())
+    }
+
+    /// Its name where an array is one variable: `tank[].p` is `tank.p`.
+    pub fn array_name(&self) -> String {
+        self.name.replace("[]", "")
     }
 
     /// No variable is.
@@ -469,7 +499,7 @@ impl<M: Model> Variable<M> {
     pub fn element_name(&self, element: usize) -> String {
         let mut indices = Vec::with_capacity(self.shape.len());
         let mut rest = element;
-        for length in self.shape.iter().rev() {
+        for length in self.lengths().rev() {
             indices.push((rest % length + 1).to_string());
             rest /= length;
         }
@@ -479,7 +509,7 @@ impl<M: Model> Variable<M> {
 
     /// The name of an array with the range of its indices, `slosh.mass[1..10]`.
     pub fn pattern(&self) -> String {
-        let ranges: Vec<_> = self.shape.iter().map(|length| format!("1..{length}")).collect();
+        let ranges: Vec<_> = self.lengths().map(|length| format!("1..{length}")).collect();
         self.indexed(&ranges)
     }
 

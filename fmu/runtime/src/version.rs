@@ -3,7 +3,7 @@
 
 use crate::call::{CType, Call, Events, InstanceState, Interface, Severity};
 use crate::model::Model;
-use crate::table::Scalar;
+use crate::table::{Layout, Scalar};
 
 /// A version of FMI. Each constant is the call by which it asks for an operation of
 /// [`Instance`](crate::instance::Instance); getting and setting values, for which a version has several
@@ -49,7 +49,7 @@ pub trait Version: std::fmt::Debug + 'static {
     const GET_NOMINALS: &'static Call;
 
     /// By which a model description and this binary know that they belong together.
-    fn token<M: Model>() -> &'static str;
+    fn token<M: Model>(layout: Layout) -> &'static str;
 
     /// Who handles the events of an instance for this interface, unless the host says more.
     fn events(interface: Interface) -> Events;

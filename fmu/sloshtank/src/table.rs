@@ -3,7 +3,8 @@
 
 use craft::{Coupling, DampingLaw, MODES, POINTS, TANK_STATES, TRIANGLE, TankState};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
-use runtime::variable::{Enumeration, Item, Variable};
+use runtime::variable::Dimension::{Fixed, Sized};
+use runtime::variable::{Dimension, Enumeration, Item, Variable};
 
 use crate::Model;
 use crate::model::Parameters;
@@ -34,11 +35,12 @@ const EVERYTHING: &[&str] =
 const TANK: &[&str] = &["tank."];
 const PLACES: &[&str] = &["tank.p", "tank.liquid"];
 
-const VECTOR: &[usize] = &[3];
-const PER_MODE: &[usize] = &[MODES];
-const MODE_VECTOR: &[usize] = &[MODES, 3];
-const TABLE_OF_TANK: &[usize] = &[POINTS];
-const TABLE_OF_MODE: &[usize] = &[MODES, POINTS];
+const MODE: Dimension = Sized("tank.modes", MODES);
+const VECTOR: &[Dimension] = &[Fixed(3)];
+const PER_MODE: &[Dimension] = &[MODE];
+const MODE_VECTOR: &[Dimension] = &[MODE, Fixed(3)];
+const TABLE_OF_TANK: &[Dimension] = &[Fixed(POINTS)];
+const TABLE_OF_MODE: &[Dimension] = &[MODE, Fixed(POINTS)];
 
 /// Place among the continuous states of an element of the shape [`MODE_VECTOR`].
 fn bob(n: usize) -> usize {
@@ -68,10 +70,10 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(VECTOR).depends_on(WRENCH).initial_depends_on(EVERYTHING),
     V::output("bias", |o, n| o.bias[n], "",
         "Force (1 to 3, N) and torque about O (4 to 6, N.m) that the host adds on its right side: force, torque = bias - added_mass [a; omega_dot]. Split, it contains neither a nor omega_dot but through the drag that follows them (with tank.damping_law = constant not at all): of a change of a some 1e-4 of the bobs' mass, which one evaluation settles. With coupling = rigid_body it is for a body that has the constant added_mass in its own mass, centre of mass and inertia, centrifugal and gyroscopic terms included")
-        .shape(&[6]).depends_on(WRENCH).initial_depends_on(EVERYTHING),
+        .shape(&[Fixed(6)]).depends_on(WRENCH).initial_depends_on(EVERYTHING),
     V::output("added_mass", |o, n| o.added_mass[n], "",
         "Symmetric 6 x 6 added-mass matrix about O that the host adds on its left side, upper triangle by rows (kg, kg.m, kg.m2): it follows from tank.p and tank.liquid alone; with coupling = lumped or rigid_body it is that of rigid liquid and each bob at its hinge at the start, constant")
-        .shape(&[TRIANGLE]).depends_on(PLACES).initial_depends_on(EVERYTHING),
+        .shape(&[Fixed(TRIANGLE)]).depends_on(PLACES).initial_depends_on(EVERYTHING),
 
     // Inputs
     V::input("a", |i, n| [&mut i.tank.a.value[n], &mut i.tank.a.slope[n]], "m/s2",
@@ -107,7 +109,7 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(VECTOR).depends_on(PLACES),
     V::local("inertia", |o, n| o.inertia[n / 3][n % 3], "kg.m2",
         "Inertia of the whole liquid about its centre of mass, each bob a point mass where it is, host axes")
-        .shape(&[3, 3]).depends_on(PLACES),
+        .shape(&[Fixed(3), Fixed(3)]).depends_on(PLACES),
     V::local("tank.angle_x", |o, n| o.tank.angle_x[n], "rad",
         "Slosh angle of a mode: its sine is the bob's displacement along the tank's x axis over the pendulum's length")
         .display_unit("deg").shape(PER_MODE).depends_on(&["tank.p"]),
@@ -149,7 +151,7 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(VECTOR).range(-1e4, 1e4),
     V::parameter("tank.q", |p, n| &mut p.tank.q[n], "1",
         "Attitude of the tank, tank to host axes, scalar first; normalised")
-        .shape(&[4]),
+        .shape(&[Fixed(4)]),
     V::parameter("tank.diameter", |p, _| &mut p.tank.diameter, "m", "Diameter of an upright cylinder; above 0 it makes with depth and density m_0, H_0, I_0 and each mode's mass, length, hinge and wave by potential flow, and the tank's origin is the centre of its bottom")
         .display_unit("mm").range(0.0, 1e3),
     V::parameter("tank.depth", |p, _| &mut p.tank.depth, "m", "Depth of the liquid in the cylinder, used where diameter is above 0")

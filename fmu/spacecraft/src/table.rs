@@ -8,7 +8,8 @@
 
 use craft::{BallState, DampingLaw, MODES, POINTS, STATES, State, TANKS, index};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
-use runtime::variable::{Enumeration, Item, Variable};
+use runtime::variable::Dimension::{Fixed, Sized};
+use runtime::variable::{Dimension, Enumeration, Item, Variable};
 
 use crate::Model;
 use crate::model::Parameters;
@@ -120,14 +121,17 @@ const EVERYTHING: &[&str] = &[
 ];
 const BOBS: &[&str] = &["tanks", "tank[]."];
 
-const VECTOR: &[usize] = &[3];
-const PER_TANK: &[usize] = &[TANKS];
-const TANK_VECTOR: &[usize] = &[TANKS, 3];
-const PER_MODE: &[usize] = &[TANKS, MODES];
-const MODE_VECTOR: &[usize] = &[TANKS, MODES, 3];
+const TANK: Dimension = Sized("tanks", TANKS);
+const VECTOR: &[Dimension] = &[Fixed(3)];
+const QUATERNION: &[Dimension] = &[Fixed(4)];
+const MATRIX: &[Dimension] = &[Fixed(3), Fixed(3)];
+const PER_TANK: &[Dimension] = &[TANK];
+const TANK_VECTOR: &[Dimension] = &[TANK, Fixed(3)];
+const PER_MODE: &[Dimension] = &[TANK, Fixed(MODES)];
+const MODE_VECTOR: &[Dimension] = &[TANK, Fixed(MODES), Fixed(3)];
 
-const TABLE_OF_TANK: &[usize] = &[TANKS, POINTS];
-const TABLE_OF_MODE: &[usize] = &[TANKS, MODES, POINTS];
+const TABLE_OF_TANK: &[Dimension] = &[TANK, Fixed(POINTS)];
+const TABLE_OF_MODE: &[Dimension] = &[TANK, Fixed(MODES), Fixed(POINTS)];
 
 /// Tank, mode and point of an element of the shape [`TABLE_OF_MODE`].
 const fn point(n: usize) -> (usize, usize, usize) {
@@ -167,7 +171,7 @@ static VARIABLES: &[Variable<Model>] = &[
     // Outputs
     V::output("q", |o, n| o.q[n], "1",
         "Attitude quaternion, scalar first, body to inertial axes")
-        .shape(&[4]).is_state(|n| index::Q + n).depends_on(&["q[]"]).initial_depends_on(&["init.q"]),
+        .shape(QUATERNION).is_state(|n| index::Q + n).depends_on(&["q[]"]).initial_depends_on(&["init.q"]),
     V::output("omega", |o, n| o.omega[n], "rad/s",
         "Angular velocity against the inertial frame, body axes")
         .display_unit("deg/s").shape(VECTOR).nominal(0.01).is_state(|n| index::OMEGA + n).reinit()
@@ -236,7 +240,7 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(VECTOR).depends_on(PLACES),
     V::local("inertia", |o, n| o.inertia[n / 3][n % 3], "kg.m2",
         "Inertia of everything about its centre of mass, each bob a point mass where it is, body axes")
-        .shape(&[3, 3]).depends_on(PLACES),
+        .shape(MATRIX).depends_on(PLACES),
     V::local("tank[].force", |o, n| o.tank[n / 3].force[n % 3], "N",
         "Force of a tank's whole liquid on the craft, body axes")
         .shape(TANK_VECTOR).depends_on(MOTION),
@@ -286,7 +290,7 @@ static VARIABLES: &[Variable<Model>] = &[
 
     // The derivatives of the continuous states
     V::derivative("der(q)", |n| index::Q + n, "1/s", "Derivative of q")
-        .shape(&[4]).depends_on(&["q", "omega"]).initial_depends_on(&["init.q", "init.omega"]),
+        .shape(QUATERNION).depends_on(&["q", "omega"]).initial_depends_on(&["init.q", "init.omega"]),
     V::derivative("der(omega)", |n| index::OMEGA + n, "rad/s2", "Derivative of omega: omega_dot")
         .shape(VECTOR).depends_on(MOTION).initial_depends_on(EVERYTHING),
     V::derivative("der(position)", |n| index::POSITION + n, "m/s", "Derivative of position: velocity")
@@ -335,7 +339,7 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(VECTOR).range(-1e4, 1e4),
     V::parameter("pivot.k", |p, n| &mut p.pivot.k[n], "N.m/rad",
         "Stiffness of a pivot against tilt of the body's z axis from the inertial z axis, about the body's x and y axis")
-        .shape(&[2]).range(0.0, 1e12),
+        .shape(&[Fixed(2)]).range(0.0, 1e12),
     V::parameter("pivot.c", |p, n| &mut p.pivot.c[n], "N.m.s/rad",
         "Damping coefficient of a pivot about each body axis: against omega")
         .shape(VECTOR).range(0.0, 1e12),
@@ -348,7 +352,7 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(TANK_VECTOR).range(-1e4, 1e4),
     V::parameter("tank[].q", |p, n| &mut p.tank[n / 4].q[n % 4], "1",
         "Attitude of the tank, tank to body axes, scalar first; normalised")
-        .shape(&[TANKS, 4]),
+        .shape(&[TANK, Fixed(4)]),
     V::parameter("tank[].diameter", |p, n| &mut p.tank[n].diameter, "m", "Diameter of an upright cylinder; above 0 it makes with depth and density m_0, H_0, I_0 and each mode's mass, length, hinge and wave by potential flow, and the tank's origin is the centre of its bottom")
         .display_unit("mm").shape(PER_TANK).range(0.0, 1e3),
     V::parameter("tank[].depth", |p, n| &mut p.tank[n].depth, "m", "Depth of the liquid in the cylinder, used where diameter is above 0")
@@ -436,7 +440,7 @@ static VARIABLES: &[Variable<Model>] = &[
 
     // Where the motion starts
     V::parameter("init.q", |p, n| &mut p.init.q[n], "1", "q at the start; normalised")
-        .shape(&[4]),
+        .shape(QUATERNION),
     V::parameter("init.omega", |p, n| &mut p.init.omega[n], "rad/s",
         "omega at the start. Not 0, so that with nothing set something moves; 0 to start at rest")
         .display_unit("deg/s").shape(VECTOR).range(-1e3, 1e3),

@@ -54,7 +54,8 @@ pub fn find(name: &Path) -> Result<PathBuf> {
     Ok(packed)
 }
 
-/// What `--fmu` calls one of this project's FMUs: `HubSlosh`, and of FMI 3.0 `HubSlosh-fmi3`.
+/// What `--fmu` calls one of this project's FMUs: `HubSlosh`, and of FMI 3.0 `HubSlosh-fmi3` and
+/// `HubSlosh-fmi3-arrays`.
 fn named(fmi: Fmi, model: &Model) -> String {
     format!("{}{}", model.name, fmi.suffix())
 }

@@ -9,19 +9,24 @@ pub enum Fmi {
     V2,
     /// FMI 3.0
     V3,
+    /// FMI 3.0 with arrays as variables, some of them sized by structural parameters.
+    V3Arrays,
 }
 
 impl Fmi {
-    /// Both of them.
-    pub const ALL: [Fmi; 2] = [Fmi::V2, Fmi::V3];
+    /// All of them.
+    pub const ALL: [Fmi; 3] = [Fmi::V2, Fmi::V3, Fmi::V3Arrays];
+
+    /// Those in releases and wheels.
+    pub const RELEASED: [Fmi; 2] = [Fmi::V2, Fmi::V3];
 
     /// Folders under `binaries/` for a platform that is known by its folder in FMI 2.0. A universal binary for macOS
     /// lies in two of FMI 3.0.
     pub fn folders(self, platform: &'static str) -> &'static [&'static str] {
         match (self, platform) {
-            (Fmi::V3, "linux64") => &["x86_64-linux"],
-            (Fmi::V3, "win64") => &["x86_64-windows"],
-            (Fmi::V3, "darwin64") => &["aarch64-darwin", "x86_64-darwin"],
+            (Fmi::V3 | Fmi::V3Arrays, "linux64") => &["x86_64-linux"],
+            (Fmi::V3 | Fmi::V3Arrays, "win64") => &["x86_64-windows"],
+            (Fmi::V3 | Fmi::V3Arrays, "darwin64") => &["aarch64-darwin", "x86_64-darwin"],
             (_, "linux64") => &["linux64"],
             (_, "win64") => &["win64"],
             (_, "darwin64") => &["darwin64"],
@@ -37,7 +42,7 @@ impl Fmi {
     pub fn icon(self) -> &'static str {
         match self {
             Fmi::V2 => "model.png",
-            Fmi::V3 => "terminalsAndIcons/icon.png",
+            Fmi::V3 | Fmi::V3Arrays => "terminalsAndIcons/icon.png",
         }
     }
 
@@ -46,10 +51,11 @@ impl Fmi {
         match self {
             Fmi::V2 => "",
             Fmi::V3 => "-fmi3",
+            Fmi::V3Arrays => "-fmi3-arrays",
         }
     }
 
-    /// The FMU of that name in a folder: `NAME.fmu`, of FMI 3.0 `NAME-fmi3.fmu`. Hosts take the name of the library
+    /// The FMU of that name in a folder: `NAME.fmu`, of FMI 3.0 `NAME-fmi3.fmu` and `NAME-fmi3-arrays.fmu`. Hosts take the name of the library
     /// from the description, not from the file.
     pub fn path(self, folder: &Path, name: &str) -> PathBuf {
         folder.join(format!("{name}{}.fmu", self.suffix()))

@@ -85,14 +85,15 @@ pub fn packed_model_for_tests(model: &Model) -> &'static Path {
     packed_version_for_tests(model, Fmi::V2)
 }
 
-/// As [`packed_model_for_tests`], for a version of FMI: `test-fmu/<name>-fmi3.fmu` for 3.0.
+/// As [`packed_model_for_tests`], for a version of FMI: `test-fmu/<name>-fmi3.fmu` for 3.0, and with arrays
+/// `test-fmu/<name>-fmi3-arrays.fmu`.
 ///
 /// # Panics
 /// If it cannot be built.
 pub fn packed_version_for_tests(model: &Model, fmi: Fmi) -> &'static Path {
     static PACKED: Mutex<BTreeMap<(&str, &str), &Path>> = Mutex::new(BTreeMap::new());
     let mut packed = PACKED.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-    packed.entry((model.name, fmi.icon())).or_insert_with(|| match pack_for_tests(model, fmi) {
+    packed.entry((model.name, fmi.suffix())).or_insert_with(|| match pack_for_tests(model, fmi) {
         Ok(path) => Box::leak(path.into_boxed_path()),
         Err(error) => panic!("the FMU for the tests could not be packed: {error:#}"),
     })

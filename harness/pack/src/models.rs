@@ -109,6 +109,7 @@ impl Model {
         let (file, print) = match fmi {
             Fmi::V2 => ("modelDescription.xml", "--print-spacecraft"),
             Fmi::V3 => ("fmi3/modelDescription.xml", "--print-spacecraft-fmi3"),
+            Fmi::V3Arrays => ("fmi3-arrays/modelDescription.xml", "--print-spacecraft-fmi3-arrays"),
         };
         match self.sizes {
             None => read(&self.folder().join(file)),

@@ -43,7 +43,7 @@ pub fn write(
         eprintln!("{}: {}", built.folder, built.binary);
     }
     let mut files = Vec::new();
-    for fmi in Fmi::ALL {
+    for fmi in Fmi::RELEASED {
         let fmu = path(model, fmi, folder);
         for (ending, bytes) in of_version(model, fmi, &all, &check)? {
             files.push((fmu.with_extension(ending), bytes));

@@ -87,7 +87,7 @@ fn native() -> Result<Binaries> {
     let mut fmus = Files::new();
     let mut all = Vec::new();
     for model in &MODELS {
-        for fmi in Fmi::ALL {
+        for fmi in Fmi::RELEASED {
             let fmu = fmi.path(made.path(), model.name);
             pack(model, fmi, &fmu)?;
             fmus.push((file_name(&fmu), read(&fmu)?));
@@ -143,7 +143,7 @@ fn cross_one(
     for model in &MODELS {
         let bytes = built(&Product::Fmu(model))?;
         let binary = [Packed { folder: platform.folder, ending: platform.ending, bytes }];
-        for fmi in Fmi::ALL {
+        for fmi in Fmi::RELEASED {
             let fmu = fmi.path(made.path(), model.name);
             archive::write(&files_of_fmu(model, fmi, &binary)?, &fmu)?;
             fmus.push((file_name(&fmu), archive::read(&fmu)?));

@@ -1,6 +1,7 @@
 //! Which values a variable takes, and what is said of those that it does not.
 
 use super::*;
+use crate::variable::Dimension::Fixed;
 use crate::variable::{Enumeration, Item, Variable, is_finite, text};
 use Value::{Boolean, Integer, Real};
 
@@ -85,7 +86,7 @@ fn values_out_of_range_are_refused_with_the_range_and_unit() {
     for n in [-1, 0, 3] {
         assert_eq!(why(&choice, Integer(n)), format!("c = {n} (allowed: 1 a, 2 b)"));
     }
-    let array = a_real("m").range(0.0, 1.0).shape(&[2, 2]);
+    let array = a_real("m").range(0.0, 1.0).shape(&[Fixed(2), Fixed(2)]);
     assert!(array.problem(2, Real(2.0)).unwrap().starts_with("p[2,1] = 2.0 m"));
 }
 
@@ -132,7 +133,7 @@ fn properties_of_a_quantity_are_those_given() {
     let integer = an_integer().between(1, 2);
     assert_eq!((integer.unit(), integer.min(), integer.nominal_value()), ("", None, 1.0));
     assert!(!plain.is_empty());
-    assert_eq!((plain.len(), plain.shape(&[4, 3]).len()), (1, 12));
+    assert_eq!((plain.len(), plain.shape(&[Fixed(4), Fixed(3)]).len()), (1, 12));
 }
 
 #[test]

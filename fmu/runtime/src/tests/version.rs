@@ -3,7 +3,7 @@
 
 use super::*;
 use crate::call::{CType, Call, Events, InstanceState};
-use crate::table::Scalar;
+use crate::table::{Layout, Scalar};
 use crate::version::Version;
 
 #[derive(Clone, Copy, Debug)]
@@ -51,7 +51,7 @@ impl Version for Other {
     const GET_CONTINUOUS_STATES:  &'static Call = &call("otherGetContinuousStates");
     const GET_NOMINALS:           &'static Call = &call("otherGetNominals");
 
-    fn token<M: Model>() -> &'static str {
+    fn token<M: Model>(_: Layout) -> &'static str {
         M::table().guid()
     }
 

@@ -7,6 +7,7 @@
 use crate::Model;
 use crate::model::StepFailure;
 use crate::table::{About, Scalar, Table, scalar_count, scalars};
+use crate::variable::Dimension::Fixed;
 use crate::variable::{Enumeration, Item, Variable};
 
 /// The height of the platform at which the valve opens, m.
@@ -101,26 +102,26 @@ type V = Variable<Vessels>;
 
 #[rustfmt::skip]
 static VARIABLES: &[Variable<Vessels>] = &[
-    V::output("level", |_, _| 0.0, "m", "Levels").shape(&[2]).is_state(|i| 1 - i).reinit().nominal(5.0)
+    V::output("level", |_, _| 0.0, "m", "Levels").shape(&[Fixed(2)]).is_state(|i| 1 - i).reinit().nominal(5.0)
         .depends_on(&["level[]"]).initial_depends_on(&["start."]),
     V::output("sum", |o, _| o.sum, "m", "Sum of the levels")
         .depends_on(&["level"]).initial_depends_on(&["start."]),
     V::local("trend", |o, _| o.trend, "1/s2", "Sum of the slopes of q, with a step's memory"),
-    V::local("net", |o, i| o.net[i], "m/s", "Rates of the levels").shape(&[2])
+    V::local("net", |o, i| o.net[i], "m/s", "Rates of the levels").shape(&[Fixed(2)])
         .depends_on(&["level[]", "q[]"]).initial_depends_on(&["start.level[1]", "leak"]),
     V::local_of_inputs("room", |_, i, _| [OPENS - i.z[0], -i.z[1]], "m", "Room below the valve")
         .depends_on(&["z"]),
     V::local_boolean("open", |o, _| o.open, "Whether the valve is open"),
     V::local_integer("events", |o, _| o.events, "How often the valve has moved"),
     V::local_enumeration("valve", &VALVE, |o, _| o.valve, "Where the valve is"),
-    V::derivative("der(level)", |i| 1 - i, "m/s", "Derivatives of the levels").shape(&[2])
+    V::derivative("der(level)", |i| 1 - i, "m/s", "Derivatives of the levels").shape(&[Fixed(2)])
         .depends_on(&["level[]", "q[]"]).initial_depends_on(&["start.", "leak"]),
-    V::input("q", |i, n| i.q[n].each_mut(), "m/s", "What flows in").shape(&[2]).range(1.0, 10.0),
+    V::input("q", |i, n| i.q[n].each_mut(), "m/s", "What flows in").shape(&[Fixed(2)]).range(1.0, 10.0),
     V::input("z", |i, _| i.z.each_mut(), "m", "Height of the platform").follows_inputs(),
     V::input("w", |i, _| i.w.each_mut(), "m/s", "Rate of the platform").range(-8.0, 2.0),
     V::parameter("leak", |p, _| &mut p.k, "1/s", "Leak").at_least(0.0).tunable(),
     V::parameter("start.level", |p, i| &mut p.level_0[i], "m", "Levels at the start")
-        .shape(&[2]).range(0.0, 100.0).display_unit("mm"),
+        .shape(&[Fixed(2)]).range(0.0, 100.0).display_unit("mm"),
     V::parameter("inspection", |p, _| &mut p.inspection, "s", "Time of the inspection"),
     V::switch("has_lid", |p| &mut p.has_lid, "Whether there is a lid"),
     V::integer("number", |p, _| &mut p.number, "A number").between(-3, 5),

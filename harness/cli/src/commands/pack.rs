@@ -11,7 +11,7 @@ use pack::{Fmi, Model, sdist, wheel};
 #[command(
     after_help = "Examples:\n  hubslosh pack --out dist/HubSlosh.fmu\n  hubslosh pack --all-platforms\n  hubslosh pack --wasm\n  \
                   hubslosh pack --model Spacecraft --tanks 1 --modes 1\n  \
-                  hubslosh pack --fmi 3\n  \
+                  hubslosh pack --fmi 3\n  hubslosh pack --fmi 3 --arrays\n  \
                   hubslosh pack --python\n  hubslosh pack --python --all-platforms\n  hubslosh pack --sdist"
 )]
 pub struct PackArgs {
@@ -21,6 +21,10 @@ pub struct PackArgs {
     /// Of FMI 2.0 or of FMI 3.0; the binary is the same.
     #[arg(long, value_name = "2|3", default_value = "2", value_parser = fmi, conflicts_with_all = ["python", "sdist"])]
     fmi: Fmi,
+    /// Of FMI 3.0: vectors and matrices are variables, and how many tanks or modes there are is a structural parameter
+    /// that a host can set before it initialises; the binary is the same.
+    #[arg(long, conflicts_with_all = ["python", "sdist"])]
+    arrays: bool,
     /// Pack the Python package instead, with all FMUs and the command hubslosh inside, as a wheel.
     #[arg(long, conflicts_with = "model")]
     python: bool,
@@ -30,7 +34,7 @@ pub struct PackArgs {
     /// Pack the source as an sdist instead, from which pip builds the Python package.
     #[arg(long, conflicts_with_all = ["model", "python", "all_platforms"])]
     sdist: bool,
-    /// Where to put the FMU; the folder for wheels and sdist [default: dist/NAME.fmu, dist/NAME-fmi3.fmu, dist].
+    /// Where to put the FMU; the folder for wheels and sdist [default: dist/NAME.fmu, dist/NAME-fmi3.fmu, dist/NAME-fmi3-arrays.fmu, dist].
     #[arg(long, value_name = "FILE|FOLDER")]
     out: Option<PathBuf>,
     /// Of Spacecraft: a variant for this many tanks, 1 to 4, which has no variables of more. It is called Spacecraft_1x1
@@ -75,10 +79,15 @@ impl PackArgs {
                 &variant
             }
         };
-        let out = self.out.unwrap_or_else(|| self.fmi.path("dist".as_ref(), &model.identifier()));
+        let fmi = match (self.fmi, self.arrays) {
+            (fmi, false) => fmi,
+            (Fmi::V2, true) => bail!("FMI 2.0 has no arrays (allowed with --arrays: --fmi 3)"),
+            _ => Fmi::V3Arrays,
+        };
+        let out = self.out.unwrap_or_else(|| fmi.path("dist".as_ref(), &model.identifier()));
         if self.wasm {
             ensure!(
-                self.fmi == Fmi::V2,
+                fmi == Fmi::V2,
                 "WebAssembly comes with FMI 2.0 (allowed with --wasm: --fmi 2)"
             );
             let size = pack::pack_with_wasm(model, &out)?;
@@ -86,9 +95,9 @@ impl PackArgs {
             return Ok(());
         }
         if !self.all_platforms {
-            return native(model, self.fmi, &out);
+            return native(model, fmi, &out);
         }
-        for built in pack::pack_all(model, self.fmi, &out)? {
+        for built in pack::pack_all(model, fmi, &out)? {
             done!("{}: {}", built.folder, built.binary);
         }
         done!("packed {} ({} bytes)", out.display(), out.metadata()?.len());

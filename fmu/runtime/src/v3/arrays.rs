@@ -1,0 +1,178 @@
+//! The layout in which an entry of the table is one variable: which scalars stand behind a value reference.
+//!
+//! An instance knows scalars alone. What a host says of arrays is put in their terms here, before anything is done
+//! with it: an array is the row of its elements, by rows, as long as its structural parameters say at present. An
+//! element that is beyond keeps its start value.
+
+use super::{Fmi3, time_reference, type_of};
+use crate::call::CType;
+use crate::model::Model;
+use crate::table::{Layout, Scalar};
+use crate::variable::{Access, Dimension, Value, Variable};
+use crate::version::Version;
+
+/// The scalars behind each variable, at the present sizes.
+#[derive(Clone, Debug, Default)]
+pub struct Arrays {
+    /// References of scalars, variable by variable.
+    scalars: Vec<u32>,
+    /// Where each variable's end there.
+    ends: Vec<usize>,
+    /// The C type in which each variable passes.
+    types: Vec<CType>,
+    /// Each scalar's array with its place in it from 1; place 0 is beyond the present size.
+    places: Vec<(u32, usize)>,
+    /// The places of the states that there are among the most that there can be, in a host's order.
+    states: Vec<usize>,
+}
+
+impl Arrays {
+    /// At the sizes that an instance's parameters say, in the table's order.
+    pub fn new<M: Model>(parameters: &[Value]) -> Arrays {
+        let table = M::table();
+        let mut arrays = Arrays::default();
+        let mut first = 0;
+        for (variable, array) in table.variables.iter().zip(1..) {
+            let lengths = lengths(variable, |name| size_of::<M>(parameters, name));
+            let mut place = 0;
+            for element in 0..variable.len() {
+                let scalar = &table.scalars[first + element];
+                let is_there = is_within(variable, element, &lengths);
+                if is_there {
+                    place += 1;
+                    arrays.scalars.push(Fmi3::reference(scalar));
+                    if matches!(scalar.access, Access::Derivative(_)) {
+                        arrays.states.push(first + element - first_derivative::<M>());
+                    }
+                }
+                arrays.places.push((array, if is_there { place } else { 0 }));
+            }
+            arrays.ends.push(arrays.scalars.len());
+            let is_structural = table.is_structural(variable);
+            let c_type = if is_structural { CType::Size } else { type_of(&table.scalars[first]) };
+            arrays.types.push(c_type);
+            first += variable.len();
+        }
+        let time = time_reference::<M>();
+        arrays.scalars.push(time);
+        arrays.ends.push(arrays.scalars.len());
+        let indicators = table.about.event_indicators as u32;
+        if indicators > 0 {
+            arrays.scalars.extend(time + 1..=time + indicators);
+            arrays.ends.push(arrays.scalars.len());
+        }
+        arrays
+    }
+
+    /// The scalars behind a value reference.
+    pub fn of(&self, reference: u32) -> Option<&[u32]> {
+        let n = (reference as usize).checked_sub(1)?;
+        let begin = if n == 0 { 0 } else { *self.ends.get(n - 1)? };
+        self.scalars.get(begin..*self.ends.get(n)?)
+    }
+
+    /// The C type in which a variable passes: those behind the table's are real.
+    pub fn c_type(&self, reference: u32) -> CType {
+        let n = (reference as usize).wrapping_sub(1);
+        self.types.get(n).copied().unwrap_or(CType::Real)
+    }
+
+    /// How many variables there are.
+    pub fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.ends.is_empty()
+    }
+
+    /// The array of a scalar of the table with its place there, counted from 1, unless it is beyond the present size.
+    pub fn place(&self, scalar: u32) -> Option<(u32, usize)> {
+        let place = *self.places.get((scalar as usize).checked_sub(1)?)?;
+        (place.1 > 0).then_some(place)
+    }
+
+    /// The places of the states that there are among the most that there can be, in a host's order.
+    pub fn states(&self) -> &[usize] {
+        &self.states
+    }
+}
+
+/// The place of the first derivative among the scalars.
+fn first_derivative<M: Model>() -> usize {
+    M::table().derivatives().first().map_or(0, |scalar| scalar.index as usize)
+}
+
+/// What a parameter that sizes arrays says.
+fn size_of<M: Model>(parameters: &[Value], name: &str) -> usize {
+    let is_it = |scalar: &&Scalar<M>| scalar.variable.name == name;
+    let slot = M::table().parameters().iter().find(is_it).map(|scalar| scalar.slot);
+    match slot.and_then(|slot| parameters.get(slot)) {
+        Some(Value::Integer(n)) => usize::try_from(*n).unwrap_or(0),
+        _ => 0,
+    }
+}
+
+/// How long a variable is along each of its dimensions, where structural parameters have these values.
+pub fn lengths<M: Model>(variable: &Variable<M>, size: impl Fn(&str) -> usize) -> Vec<usize> {
+    let length = |dimension: &Dimension| match dimension {
+        Dimension::Fixed(length) => *length,
+        Dimension::Sized(name, most) => size(name).min(*most),
+    };
+    variable.shape.iter().map(length).collect()
+}
+
+/// Whether an element, counted by rows in the largest array, is within these lengths.
+fn is_within<M: Model>(variable: &Variable<M>, element: usize, lengths: &[usize]) -> bool {
+    let mut rest = element;
+    variable.lengths().zip(lengths).rev().all(|(most, length)| {
+        let index = rest % most;
+        rest /= most;
+        index < *length
+    })
+}
+
+/// The value reference of an entry of the table.
+pub fn reference<M: Model>(variable: &Variable<M>) -> u32 {
+    let place = M::table().variables.iter().position(|v| v.name == variable.name);
+    place.map_or(0, |place| place as u32 + 1)
+}
+
+/// The value reference of the independent variable, behind the table's; the event indicators', one array, follows.
+pub fn time<M: Model>() -> u32 {
+    M::table().variables.len() as u32 + 1
+}
+
+/// The event indicators' name.
+pub const INDICATORS: &str = "event_indicator";
+
+/// The name of a variable.
+pub fn name<M: Model>(reference: u32) -> Option<String> {
+    let beyond = reference.checked_sub(time::<M>());
+    match beyond {
+        None => {
+            M::table().variables.get((reference as usize).checked_sub(1)?).map(Variable::array_name)
+        }
+        Some(0) => Some("time".into()),
+        Some(1) if M::table().about.event_indicators > 0 => Some(INDICATORS.into()),
+        Some(_) => None,
+    }
+}
+
+/// A variable in messages, with its lengths at present if it is an array: `tank.p[1,3,3]`.
+pub fn shape<M: Model>(reference: u32, parameters: &[Value]) -> String {
+    let name = name::<M>(reference).unwrap_or_default();
+    let lengths = match M::table().variables.get((reference as usize).wrapping_sub(1)) {
+        Some(variable) => lengths(variable, |name| size_of::<M>(parameters, name)),
+        None if name == INDICATORS => vec![M::table().about.event_indicators],
+        None => Vec::new(),
+    };
+    let lengths: Vec<_> = lengths.iter().map(usize::to_string).collect();
+    if lengths.is_empty() { name } else { format!("{name}[{}]", lengths.join(",")) }
+}
+
+/// What the host of this layout keeps: nothing where scalars are its variables.
+pub fn for_layout<M: Model>(layout: Layout, parameters: &[Value]) -> Option<Box<Arrays>> {
+    (layout == Layout::Arrays).then(|| Box::new(Arrays::new::<M>(parameters)))
+}

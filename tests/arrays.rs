@@ -1,0 +1,645 @@
+//! The FMU 3.0 with arrays is the FMU 3.0 with scalars: the same library, the same variables, the same bits. What sizes
+//! its arrays can be set before it initialises.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use host::archive::Archive;
+use host::c_abi::{CallError, Status};
+use host::description::{CType, Value};
+use host::fmi3::{Fmu, Instance, Instantiation, Interface};
+use host::xml::Element;
+use pack::{Fmi, MODELS, Model, packed_version_for_tests};
+
+/// A number's place in the physics: the name without brackets, and all indices.
+type Key = (String, Vec<usize>);
+
+/// Of a scalar's name: `tank[1].p[2,3]` is tank.p at 1, 2, 3.
+fn key(name: &str) -> Key {
+    let (mut plain, mut indices) = (String::new(), Vec::new());
+    let mut rest = name;
+    while let Some((before, after)) = rest.split_once('[') {
+        let (inside, after) = after.split_once(']').unwrap();
+        plain += before;
+        indices.extend(inside.split(',').map(|n| n.parse::<usize>().unwrap()));
+        rest = after;
+    }
+    (plain + rest, indices)
+}
+
+/// A variable as modelDescription.xml has it.
+struct Variable {
+    name: String,
+    reference: u32,
+    kind: String,
+    causality: String,
+    /// Sizes, or the references of what says them.
+    dimensions: Vec<Result<usize, u32>>,
+    xml: Element,
+}
+
+impl Variable {
+    fn all(root: &Element) -> Vec<Variable> {
+        let number = |text: &str| text.parse::<u32>().unwrap();
+        root.list("ModelVariables")
+            .map(|e| Variable {
+                name: e.get("name").unwrap().into(),
+                reference: number(e.get("valueReference").unwrap()),
+                kind: e.name.clone(),
+                causality: e.get("causality").unwrap().into(),
+                dimensions: e
+                    .children
+                    .iter()
+                    .filter(|child| child.name == "Dimension")
+                    .map(|d| match d.get("start") {
+                        Some(start) => Ok(start.parse().unwrap()),
+                        None => Err(number(d.get("valueReference").unwrap())),
+                    })
+                    .collect(),
+                xml: e.clone(),
+            })
+            .collect()
+    }
+
+    /// Its elements by rows, where structural parameters have these values.
+    fn keys(&self, sizes: &BTreeMap<u32, usize>) -> Vec<Key> {
+        let mut all = vec![Vec::new()];
+        for dimension in &self.dimensions {
+            let length = dimension.unwrap_or_else(|reference| sizes[&reference]);
+            let longer = |n: usize| move |head: &Vec<usize>| [&head[..], &[n]].concat();
+            all = all.iter().flat_map(|head| (1..=length).map(move |n| longer(n)(head))).collect();
+        }
+        let name = key(&self.name).0;
+        // A scalar of the table keeps its indices in its own name.
+        let own = key(&self.name).1;
+        all.into_iter().map(|indices| (name.clone(), [&own[..], &indices].concat())).collect()
+    }
+
+    fn c_type(&self) -> CType {
+        CType::of_element(&self.kind).unwrap().0
+    }
+}
+
+/// A packed FMU, its binary loaded.
+struct Opened {
+    fmu: Fmu,
+    variables: Vec<Variable>,
+    _folder: tempfile::TempDir,
+}
+
+impl Opened {
+    fn new(model: &'static Model, fmi: Fmi) -> Opened {
+        let path: &Path = packed_version_for_tests(model, fmi);
+        let archive = Archive::open(path).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        archive.unpack(folder.path()).unwrap();
+        let root = Element::parse(archive.description().unwrap().as_bytes()).unwrap();
+        let fmu = Fmu::load_for(None, folder.path(), path).unwrap();
+        Opened { fmu, variables: Variable::all(&root), _folder: folder }
+    }
+
+    fn variable(&self, name: &str) -> &Variable {
+        self.variables.iter().find(|v| v.name == name).unwrap()
+    }
+
+    fn instance(&self, interface: Interface) -> Run<'_> {
+        let with = Instantiation {
+            interface,
+            intermediate_update: false,
+            required: Vec::new(),
+            ..self.fmu.instantiation("one")
+        };
+        let instance = self.fmu.instantiate_with(&with).unwrap();
+        let starts = self.variables.iter().filter(|v| v.kind == "UInt64");
+        let starts =
+            starts.map(|v| (v.reference, v.xml.get("start").unwrap().parse().unwrap())).collect();
+        Run { opened: self, instance, sizes: starts }
+    }
+}
+
+/// An instance, and what its structural parameters are.
+struct Run<'a> {
+    opened: &'a Opened,
+    instance: Instance<'a>,
+    sizes: BTreeMap<u32, usize>,
+}
+
+impl Run<'_> {
+    /// Sets a structural parameter.
+    fn resize(&mut self, name: &str, size: usize) {
+        let reference = self.opened.variable(name).reference;
+        self.instance.enter_configuration_mode().unwrap();
+        self.instance.give(&[reference], &[size as u64]).unwrap();
+        self.instance.exit_configuration_mode().unwrap();
+        self.sizes.insert(reference, size);
+    }
+
+    /// Gives variables the values of a function of key, where it has one; each array in one call.
+    fn set(&mut self, value: impl Fn(&Key) -> Option<Value>) {
+        for v in &self.opened.variables {
+            let keys = v.keys(&self.sizes);
+            let values: Option<Vec<Value>> = keys.iter().map(&value).collect();
+            if let Some(values) = values.filter(|all| !all.is_empty()) {
+                self.instance.set_values(v.c_type(), v.reference, &values).unwrap();
+            }
+        }
+    }
+
+    /// The bits of everything that can be read.
+    fn everything(&mut self) -> BTreeMap<Key, u64> {
+        let mut all = BTreeMap::new();
+        for v in self.opened.variables.iter().filter(|v| v.kind != "UInt64") {
+            let keys = v.keys(&self.sizes);
+            let values = self.instance.values(v.c_type(), v.reference, keys.len()).unwrap();
+            all.extend(keys.into_iter().zip(values.iter().map(bits)));
+        }
+        all
+    }
+
+    fn initialise(&mut self) {
+        self.instance.enter_initialization_mode(Some(1e-8), 0.0, None).unwrap();
+        self.instance.exit_initialization_mode().unwrap();
+    }
+}
+
+fn bits(value: &Value) -> u64 {
+    match value {
+        Value::Real(x) => x.to_bits(),
+        Value::Integer(n) => *n as u64,
+        Value::Boolean(b) => (*b).into(),
+        Value::String(_) => panic!("there are no strings"),
+    }
+}
+
+/// Everything that the FMU with arrays has, the other has with the same bits; what it has besides is beyond the sizes.
+fn assert_same(arrays: &BTreeMap<Key, u64>, scalars: &BTreeMap<Key, u64>, when: &str) {
+    for (key, bits) in arrays {
+        assert_eq!(scalars.get(key), Some(bits), "{key:?} {when}");
+    }
+}
+
+/// What the FMU with arrays is sized to, and what is set in both.
+struct Case {
+    model: &'static Model,
+    size: Option<(&'static str, usize)>,
+}
+
+fn cases() -> Vec<Case> {
+    let case = |n: usize, size| Case { model: &MODELS[n], size };
+    vec![
+        case(0, None),
+        case(0, Some(("slosh.modes", 3))),
+        case(1, None),
+        case(1, Some(("tanks", 3))),
+        case(1, Some(("tanks", 0))),
+        case(2, None),
+        case(2, Some(("tank.modes", 3))),
+        case(2, Some(("tank.modes", 0))),
+    ]
+}
+
+/// Parameters, by their places, that are not as they start: every tank and mode another one.
+fn parameter(model: &Model, (name, indices): &Key) -> Option<Value> {
+    let real = |x: f64| Some(Value::Real(x));
+    let integer = |n: usize| Some(Value::Integer(n as i64));
+    match (model.name, &**name, &indices[..]) {
+        ("HubSlosh", "slosh.model", _) => integer(4),
+        ("HubSlosh", "init.slosh_angle", _) => real(0.4),
+        ("HubSlosh", "init.slosh_angle_radial", _) => real(0.2),
+        ("Spacecraft", "tank.position", [tank, axis]) => {
+            real(0.3 * (*tank as f64) - 0.2 * (*axis as f64) * (*tank as f64 - 1.5))
+        }
+        ("Spacecraft", "tank.modes", [tank]) => integer(*tank),
+        ("Spacecraft", "tank.zeta", [tank, mode]) => real(1e-3 * (3 * tank + mode) as f64),
+        ("Spacecraft", "tank.p_0", [tank, mode, axis]) => real(match axis {
+            3 => -1.0,
+            axis => 0.02 * (*tank as f64) - 0.03 * (*mode as f64) + 0.01 * (*axis as f64),
+        }),
+        ("SloshTank", "tank.zeta", [mode]) => real(2e-3 * *mode as f64),
+        ("SloshTank", "tank.p_0", [mode, axis]) => real(match axis {
+            3 => -1.0,
+            axis => 0.05 - 0.02 * (*mode as f64) + 0.01 * (*axis as f64),
+        }),
+        _ => None,
+    }
+}
+
+/// Inputs that go to and fro, each element in its own way.
+fn input(model: &Model, inputs: &[String], (name, indices): &Key, time: f64) -> Option<Value> {
+    if !inputs.contains(name) {
+        return None;
+    }
+    let n = indices.first().map_or(1.0, |n| *n as f64);
+    let size = match (model.name, &**name) {
+        ("HubSlosh", "g_axial") => return Some(Value::Real(9.81 + 0.1 * (3.0 * time).sin())),
+        ("HubSlosh", _) => 0.05,
+        ("SloshTank", "a") if n == 3.0 => return Some(Value::Real(1.5 + 0.1 * time.cos())),
+        (_, "force") if n == 3.0 => return Some(Value::Real(2340.0)),
+        (_, "force") => 10.0,
+        (_, "mass_flow") => 0.0,
+        _ => 0.02,
+    };
+    Some(Value::Real(size * (n * time + 0.3 * n).sin()))
+}
+
+/// Both FMUs, set up as a case says.
+fn set_up<'a>(
+    case: &Case,
+    [arrays, scalars]: [&'a Opened; 2],
+    interface: Interface,
+) -> [Run<'a>; 2] {
+    let mut two = [arrays.instance(interface), scalars.instance(interface)];
+    if let Some((name, size)) = case.size {
+        two[0].resize(name, size);
+        two[1].set(|(key, _)| (key == name).then_some(Value::Integer(size as i64)));
+    }
+    // What is beyond the size stays as it starts in both.
+    let most = case.size.map_or(1, |(_, size)| size);
+    for run in &mut two {
+        run.set(|key| {
+            let is_beyond = key.0.starts_with("tank.") && key.1.first().is_some_and(|n| *n > most);
+            parameter(case.model, key).filter(|_| !is_beyond)
+        });
+    }
+    two
+}
+
+fn inputs(opened: &Opened) -> Vec<String> {
+    let all = opened.variables.iter().filter(|v| v.causality == "input");
+    let mut names: Vec<String> = all.map(|v| key(&v.name).0).collect();
+    names.dedup();
+    names
+}
+
+#[test]
+fn the_fmu_with_arrays_steps_to_the_bits_of_that_with_scalars() {
+    for case in cases() {
+        let opened = [Fmi::V3Arrays, Fmi::V3].map(|fmi| Opened::new(case.model, fmi));
+        assert_eq!(opened[0].fmu.binary_hash(), opened[1].fmu.binary_hash(), "one library");
+        let names = inputs(&opened[0]);
+        let mut two = set_up(&case, [&opened[0], &opened[1]], Interface::CoSimulation);
+        for run in &mut two {
+            run.initialise();
+        }
+        let h = 0.02;
+        for n in 0..100 {
+            let time = f64::from(n) * h;
+            let all = two.each_mut().map(|run| {
+                run.set(|key| input(case.model, &names, key, time));
+                run.instance.do_step(time, h).unwrap();
+                run.everything()
+            });
+            assert_same(&all[0], &all[1], &format!("of {} at {time} s", case.model.name));
+        }
+    }
+}
+
+#[test]
+fn the_fmu_with_arrays_has_the_states_derivatives_and_indicators_of_that_with_scalars() {
+    for case in cases() {
+        let opened = [Fmi::V3Arrays, Fmi::V3].map(|fmi| Opened::new(case.model, fmi));
+        let names = inputs(&opened[0]);
+        let mut two = set_up(&case, [&opened[0], &opened[1]], Interface::ModelExchange);
+        let h = 1e-3;
+        for run in &mut two {
+            let known = run.opened.variables.iter().filter(|v| v.xml.get("derivative").is_some());
+            let expected: usize = known.map(|v| v.keys(&run.sizes).len()).sum();
+            assert_eq!(run.instance.number_of_states().unwrap(), expected);
+            run.initialise();
+            run.instance.update_discrete_states().unwrap();
+            run.instance.enter_continuous_time_mode().unwrap();
+        }
+        let indicators = two.each_mut().map(|run| run.instance.number_of_indicators().unwrap());
+        assert_eq!(indicators[0], indicators[1]);
+        // Euler's method: any will do where the bits are compared.
+        for n in 1..200 {
+            let time = f64::from(n) * h;
+            let all = two.each_mut().map(|run| {
+                let mut x = vec![0.0; run.instance.number_of_states().unwrap()];
+                let (mut x_dot, mut z) = (x.clone(), vec![0.0; indicators[0]]);
+                run.instance.continuous_states(&mut x).unwrap();
+                run.instance.derivatives(&mut x_dot).unwrap();
+                for (x, x_dot) in x.iter_mut().zip(&x_dot) {
+                    *x += h * x_dot;
+                }
+                run.instance.set_time(time).unwrap();
+                run.set(|key| input(case.model, &names, key, time));
+                run.instance.set_continuous_states(&x).unwrap();
+                let (event, _) = run.instance.completed_integrator_step().unwrap();
+                if event {
+                    run.instance.enter_event_mode().unwrap();
+                    run.instance.update_discrete_states().unwrap();
+                    run.instance.enter_continuous_time_mode().unwrap();
+                }
+                run.instance.event_indicators(&mut z).unwrap();
+                run.instance.nominals(&mut x).unwrap();
+                let z: Vec<u64> = z.iter().map(|z| z.to_bits()).collect();
+                (run.everything(), z, x.len())
+            });
+            assert_same(&all[0].0, &all[1].0, &format!("of {} at {time} s", case.model.name));
+            assert_eq!(all[0].1, all[1].1);
+            assert!(all[0].2 <= all[1].2);
+        }
+    }
+}
+
+/// The error's words, and the status.
+fn refusal<T>(called: Result<T, CallError>) -> (Status, String) {
+    let error = called.err().expect("it is refused");
+    let texts: Vec<_> = error.messages.iter().map(|message| &*message.text).collect();
+    (error.status, texts.join("\n"))
+}
+
+#[test]
+fn a_size_is_set_in_configuration_mode_alone_and_what_it_sizes_starts_anew() {
+    let craft = Opened::new(pack::model("Spacecraft").unwrap(), Fmi::V3Arrays);
+    let tanks = craft.variable("tanks").reference;
+    let position = craft.variable("tank.position").reference;
+    let mut run = craft.instance(Interface::ModelExchange);
+    let states = |tanks: usize| 4 + 3 + 3 + 3 + 3 + tanks * (1 + 3 * 6 + 6);
+    assert_eq!(run.instance.number_of_states().unwrap(), states(1));
+    let mut size = [0u64];
+    run.instance.fetch(&[tanks], &mut size).unwrap();
+    assert_eq!(size, [1]);
+    let start: Vec<f64> = vec![0.0, 0.0, -0.45];
+    run.instance.give(&[position], &[7.0, 8.0, 9.0]).unwrap();
+    run.resize("tanks", 4);
+    assert_eq!(run.instance.number_of_states().unwrap(), states(4));
+    let mut there = vec![0.0; 12];
+    run.instance.fetch(&[position], &mut there).unwrap();
+    assert_eq!(there[..3], start, "what was set before is gone");
+    let far: Vec<f64> = (0..12).map(f64::from).collect();
+    run.instance.give(&[position], &far).unwrap();
+    // The same size again changes nothing, and values that were beyond it do not come back.
+    run.resize("tanks", 4);
+    run.instance.fetch(&[position], &mut there).unwrap();
+    assert_eq!(there, far);
+    run.resize("tanks", 1);
+    run.resize("tanks", 2);
+    let mut two = vec![0.0; 6];
+    run.instance.fetch(&[position], &mut two).unwrap();
+    assert_eq!(two[..3], start);
+    assert_ne!(two[3..], far[3..6]);
+    run.initialise();
+    let mut x = vec![0.0; states(2)];
+    run.instance.continuous_states(&mut x).unwrap();
+    run.instance.reset().unwrap();
+    run.instance.fetch(&[tanks], &mut size).unwrap();
+    assert_eq!((size, run.instance.number_of_states().unwrap()), ([1], states(1)), "reset");
+}
+
+#[test]
+fn wrong_sizes_counts_and_types_of_arrays_are_refused_in_words() {
+    let craft = Opened::new(pack::model("Spacecraft").unwrap(), Fmi::V3Arrays);
+    let reference = |name: &str| craft.variable(name).reference;
+    let (tanks, mass) = (reference("tanks"), reference("tank.mass"));
+    let said = |what: &mut dyn FnMut(&mut Instance) -> Result<(), CallError>| {
+        let mut run = craft.instance(Interface::CoSimulation);
+        refusal(what(&mut run.instance))
+    };
+    let (status, text) = said(&mut |i| i.give(&[tanks], &[2u64]));
+    assert_eq!(status, Status::Error);
+    assert_eq!(
+        text,
+        "fmi3SetUInt64: not allowed in state \"instantiated\"; allowed in: configuration mode"
+    );
+    for wrong in [5, u64::MAX] {
+        let mut run = craft.instance(Interface::CoSimulation);
+        run.instance.enter_configuration_mode().unwrap();
+        let (status, text) = refusal(run.instance.give(&[tanks], &[wrong]));
+        assert_eq!(status, Status::Discard);
+        assert!(text.contains("tanks = ") && text.contains("(allowed: 0 to 4)"), "{text}");
+        // It can go on.
+        run.instance.give(&[tanks], &[3u64]).unwrap();
+        let (_, text) = refusal(run.instance.give(&[mass], &[1.0]));
+        assert!(text.contains("configuration mode"), "{text}");
+    }
+    let (status, text) = said(&mut |i| i.give(&[mass], &[1.0]));
+    assert_eq!(status, Status::Error);
+    assert_eq!(text, "fmi3SetFloat64: nValues = 1 (allowed: 3, by rows: tank.mass[1,3])");
+    let (_, text) = said(&mut |i| i.fetch(&[reference("q"), mass], &mut [0.0; 8]));
+    assert_eq!(text, "fmi3GetFloat64: nValues = 8 (allowed: 7, by rows: q[4], tank.mass[1,3])");
+    let (_, text) = said(&mut |i| i.give(&[tanks], &[2i32]));
+    assert_eq!(text, format!("fmi3SetInt32: tanks (value reference {tanks}) is of type UInt64"));
+    let (_, text) = said(&mut |i| i.fetch(&[mass], &mut [0u64; 3]));
+    assert_eq!(
+        text,
+        format!("fmi3GetUInt64: tank.mass (value reference {mass}) is of type Float64")
+    );
+    let (_, text) = said(&mut |i| i.fetch(&[mass], &mut [0u8; 3]));
+    assert!(text.ends_with(&format!("tank.mass (value reference {mass}) is of type Float64")));
+    let most = craft.variables.len();
+    let (_, text) = said(&mut |i| i.fetch(&[0], &mut [0.0]));
+    assert_eq!(
+        text,
+        format!("fmi3GetFloat64: no variable has the value reference 0 (allowed: 1 to {most})")
+    );
+}
+
+#[test]
+fn a_saved_state_brings_its_sizes_and_is_not_of_the_other_fmu() {
+    let opened =
+        [Fmi::V3Arrays, Fmi::V3].map(|fmi| Opened::new(pack::model("SloshTank").unwrap(), fmi));
+    let mut three = opened[0].instance(Interface::CoSimulation);
+    three.resize("tank.modes", 3);
+    three.initialise();
+    three.instance.do_step(0.0, 0.1).unwrap();
+    let there = three.everything();
+    let state = three.instance.get_state().unwrap();
+    let bytes = three.instance.serialize(&state).unwrap();
+    // Into an instance of another size, whose size follows.
+    let mut one = opened[0].instance(Interface::CoSimulation);
+    let state = one.instance.deserialize(&bytes).unwrap();
+    one.instance.set_state(&state).unwrap();
+    one.sizes = three.sizes.clone();
+    assert_eq!(one.everything(), there);
+    for run in [&mut one, &mut three] {
+        run.instance.do_step(0.1, 0.1).unwrap();
+    }
+    assert_eq!(one.everything(), three.everything());
+    let mut other = opened[1].instance(Interface::CoSimulation);
+    let (status, text) = refusal(other.instance.deserialize(&bytes));
+    assert_eq!(status, Status::Error);
+    assert!(text.contains("variables are scalars in one, arrays in the other"), "{text}");
+}
+
+#[test]
+fn derivatives_and_dependencies_of_arrays_are_those_of_their_elements_by_rows() {
+    for case in cases() {
+        let opened = [Fmi::V3Arrays, Fmi::V3].map(|fmi| Opened::new(case.model, fmi));
+        let mut two = set_up(&case, [&opened[0], &opened[1]], Interface::CoSimulation);
+        for run in &mut two {
+            run.initialise();
+            run.instance.do_step(0.0, 0.05).unwrap();
+        }
+        let [arrays, scalars] = &mut two;
+        let of_scalar: BTreeMap<Key, u32> =
+            opened[1].variables.iter().map(|v| (key(&v.name), v.reference)).collect();
+        let is_derivative = |v: &&Variable| v.xml.get("derivative").is_some();
+        let derivatives: Vec<_> = opened[0].variables.iter().filter(is_derivative).collect();
+        let states = derivatives.iter().map(|v| v.xml.get("derivative").unwrap());
+        let mut known: Vec<u32> = states.map(|r| r.parse().unwrap()).collect();
+        let inputs = opened[0].variables.iter().filter(|v| v.causality == "input");
+        known.extend(inputs.map(|v| v.reference));
+        let outputs = opened[0].variables.iter().filter(|v| v.causality == "output");
+        let unknown: Vec<_> = derivatives.iter().copied().chain(outputs).collect();
+        let unknowns: Vec<u32> = unknown.iter().map(|v| v.reference).collect();
+        let elements = |references: &[u32], run: &Run| -> Vec<Key> {
+            let at = |r: &u32| &opened[0].variables[*r as usize - 1];
+            references.iter().flat_map(|r| at(r).keys(&run.sizes)).collect()
+        };
+        let (columns, rows) = (elements(&known, arrays), elements(&unknowns, arrays));
+        let of = |keys: &[Key]| -> Vec<u32> { keys.iter().map(|key| of_scalar[key]).collect() };
+        let seed: Vec<f64> = (0..columns.len()).map(|n| (n as f64).sin()).collect();
+        let along = arrays.instance.directional_derivative(&unknowns, &known, &seed, rows.len());
+        let (of_rows, of_columns) = (of(&rows), of(&columns));
+        let expected =
+            scalars.instance.directional_derivative(&of_rows, &of_columns, &seed, rows.len());
+        assert_eq!(along.unwrap(), expected.unwrap(), "{}", case.model.name);
+        let weights: Vec<f64> = (0..rows.len()).map(|n| (n as f64).cos()).collect();
+        let along = arrays.instance.adjoint_derivative(&unknowns, &known, &weights, columns.len());
+        let expected =
+            scalars.instance.adjoint_derivative(&of_rows, &of_columns, &weights, columns.len());
+        assert_eq!(along.unwrap(), expected.unwrap(), "{}", case.model.name);
+        // Rates of the outputs, an order for each array.
+        let outputs: Vec<_> =
+            unknown.iter().filter(|v| v.causality == "output").map(|v| v.reference).collect();
+        let keys = elements(&outputs, arrays);
+        let mut rates = [vec![0.0; keys.len()], vec![0.0; keys.len()]];
+        let of_keys = of(&keys);
+        let orders = vec![1; keys.len()];
+        arrays
+            .instance
+            .output_derivatives(&outputs, &orders[..outputs.len()], &mut rates[0])
+            .unwrap();
+        scalars.instance.output_derivatives(&of_keys, &orders, &mut rates[1]).unwrap();
+        assert_eq!(rates[0], rates[1]);
+        // What each element depends on at this point.
+        for v in &unknown {
+            let found = arrays.instance.dependencies(v.reference).unwrap();
+            let own = v.keys(&arrays.sizes);
+            let mut mapped: Vec<(Key, Key)> = Vec::new();
+            for d in found {
+                let known = &opened[0].variables[d.independent as usize - 1];
+                let known = known.keys(&arrays.sizes)[d.independent_element - 1].clone();
+                mapped.push((own[d.element - 1].clone(), known));
+            }
+            let name: BTreeMap<u32, Key> =
+                of_scalar.iter().map(|(key, reference)| (*reference, key.clone())).collect();
+            let mut expected = Vec::new();
+            for key in &own {
+                for d in scalars.instance.dependencies(of_scalar[key]).unwrap() {
+                    expected.push((key.clone(), name[&d.independent].clone()));
+                }
+            }
+            // What is beyond the size is no variable here.
+            expected.retain(|(_, known)| columns.contains(known));
+            assert_eq!(mapped, expected, "{}", v.name);
+        }
+    }
+}
+
+#[test]
+fn inputs_of_arrays_ramp_by_intermediate_update_as_scalars_do() {
+    let model = pack::model("Spacecraft").unwrap();
+    let opened = [Fmi::V3Arrays, Fmi::V3].map(|fmi| Opened::new(model, fmi));
+    let all = opened.each_ref().map(|opened| {
+        let required: Vec<u32> = opened
+            .variables
+            .iter()
+            .filter(|v| ["torque", "omega"].contains(&&*key(&v.name).0))
+            .map(|v| v.reference)
+            .collect();
+        let (omega, torque) = required.split_at(required.len() / 2);
+        let with = Instantiation {
+            intermediate_update: true,
+            required: required.clone(),
+            ..opened.fmu.instantiation("one")
+        };
+        let mut instance = opened.fmu.instantiate_with(&with).unwrap();
+        instance.enter_initialization_mode(None, 0.0, None).unwrap();
+        instance.exit_initialization_mode().unwrap();
+        let mut seen = Vec::new();
+        for n in 0..10 {
+            let mut within = |update: &host::fmi3::Update| {
+                if update.set_requested {
+                    let at = f64::from(n) + 1.0;
+                    let status = update.set(torque, &[0.1 * at, -0.2 * at, 0.3 * at.sin()]);
+                    assert_eq!(status, Status::Ok);
+                } else {
+                    let mut rates = [0.0; 3];
+                    assert_eq!(update.get(omega, &mut rates), Status::Ok);
+                    seen.push(rates.map(f64::to_bits));
+                }
+                None
+            };
+            instance.do_step_hearing(f64::from(n) * 0.1, 0.1, Some(&mut within)).unwrap();
+        }
+        seen
+    });
+    assert_eq!(all[0].len(), 10);
+    assert_eq!(all[0], all[1]);
+}
+
+#[test]
+fn each_element_of_an_array_says_of_itself_what_the_scalar_says() {
+    for model in &MODELS {
+        let read = |fmi: Fmi| {
+            let archive = Archive::open(packed_version_for_tests(model, fmi)).unwrap();
+            Element::parse(archive.description().unwrap().as_bytes()).unwrap()
+        };
+        let (with_arrays, with_scalars) = (read(Fmi::V3Arrays), read(Fmi::V3));
+        let scalars: BTreeMap<Key, Variable> =
+            Variable::all(&with_scalars).into_iter().map(|v| (key(&v.name), v)).collect();
+        let arrays = Variable::all(&with_arrays);
+        let sizes: BTreeMap<u32, usize> = arrays
+            .iter()
+            .filter(|v| v.kind == "UInt64")
+            .map(|v| (v.reference, v.xml.get("start").unwrap().parse().unwrap()))
+            .collect();
+        assert_eq!(sizes.len(), 1, "{}", model.name);
+        for (n, v) in arrays.iter().enumerate() {
+            assert_eq!(v.reference as usize, n + 1, "{}: references are places", v.name);
+            assert!(!v.name.contains('['), "{}", v.name);
+            let starts: Vec<_> = v.xml.get("start").unwrap_or_default().split(' ').collect();
+            let keys = v.keys(&sizes);
+            assert!([1, keys.len()].contains(&starts.len()), "{}", v.name);
+            for (n, key) in keys.iter().enumerate() {
+                let scalar = &scalars[key];
+                let own = |name: &str| scalar.xml.get(name);
+                for attribute in [
+                    "unit",
+                    "displayUnit",
+                    "min",
+                    "max",
+                    "nominal",
+                    "initial",
+                    "variability",
+                    "declaredType",
+                    "reinit",
+                    "intermediateUpdate",
+                ] {
+                    assert_eq!(v.xml.get(attribute), own(attribute), "{} {attribute}", v.name);
+                }
+                let description = own("description").map(|text| text.replace("[]", ""));
+                assert_eq!(v.xml.get("description"), description.as_deref());
+                let start = starts.get(n).unwrap_or(&starts[0]);
+                assert_eq!(*start, own("start").unwrap_or_default(), "{}", v.name);
+                let structural = v.kind == "UInt64";
+                assert_eq!(structural, sizes.contains_key(&v.reference));
+                if !structural {
+                    assert_eq!((&v.kind, &v.causality), (&scalar.kind, &scalar.causality));
+                }
+                // A state and its derivative are of one shape, element by element.
+                if let Some(state) = v.xml.get("derivative") {
+                    let state = &arrays[state.parse::<usize>().unwrap() - 1];
+                    assert_eq!(v.dimensions, state.dimensions, "{}", v.name);
+                    let of = own("derivative").unwrap().parse::<u32>().unwrap();
+                    assert_eq!(scalars[&state.keys(&sizes)[n]].reference, of, "{}", v.name);
+                }
+            }
+        }
+        let token = |root: &Element| root.get("instantiationToken").map(String::from);
+        assert_ne!(token(&with_arrays), token(&with_scalars));
+    }
+}
