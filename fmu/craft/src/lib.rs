@@ -51,7 +51,7 @@ mod table;
 pub use formulas::regime::Regime;
 pub use outputs::{Outputs, TankOutputs};
 pub use parameters::{Ball, Craft, DampingLaw, Inertia, Init, Mount, Parameters, Tank};
-pub use pivot::Pivot;
+pub use pivot::{Pivot, PivotFriction};
 pub use sizes::{MODES, POINTS, TANKS};
 pub use slosh_tank::{
     Coupling, SloshTank, SloshTankOutputs, TANK_INPUTS, TANK_STATES, TRIANGLE, TankInputs,

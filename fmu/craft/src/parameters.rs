@@ -762,6 +762,15 @@ impl Parameters {
         for (i, c) in self.pivot.c.iter().enumerate() {
             problems.number(&format!("pivot.c[{}]", i + 1), *c, 0.0, HEAVIEST, "N.m.s/rad");
         }
+        let friction = &self.pivot.friction;
+        for (name, torques) in [("c", &friction.c), ("d", &friction.d)] {
+            for (i, torque) in torques.iter().enumerate() {
+                let name = format!("pivot.friction.{name}[{}]", i + 1);
+                problems.number(&name, *torque, 0.0, HEAVIEST, "N.m");
+            }
+        }
+        problems.number("pivot.friction.omega_s", friction.omega_s, 1e-6, 1e6, "rad/s");
+        problems.number("pivot.friction.eps", friction.eps, 1e-7, 1e3, "rad/s");
         problems.0.extend(steps_problem(self.max_steps));
         if self.tanks > TANKS {
             problems.0.push(format!("tanks = {} (allowed: 0 to {TANKS})", self.tanks));

@@ -1,40 +1,84 @@
-//! What a pivot does to the craft besides holding O: stiffness against tilt, damping about each axis.
+//! What a pivot does to the craft besides holding O: stiffness against tilt, damping and dry friction about each axis.
 //!
 //! The pivot's axis is the inertial z axis; Z = C^T e_z is its direction in body axes, (0, 0, 1) for a craft that stands
 //! upright, and Z_y, -Z_x are its small angles of tilt about x and y.
 //!
 //! ```text
 //! U = (k_x Z_y^2 + k_y Z_x^2)/2
-//! torque = Z x (k_y Z_x, k_x Z_y, 0) - (c_x w_x, c_y w_y, c_z w_z),      dissipation sum of c_i w_i^2
+//! torque = Z x (k_y Z_x, k_x Z_y, 0) - (c_x w_x, c_y w_y, c_z w_z) - (r_x, r_y, r_z)
+//! r_i = (C_i + D_i exp(-(w_i/w_s)^2)) tanh(w_i/eps)                         dissipation sum of c_i w_i^2 + r_i w_i
 //! ```
 //!
-//! The torque follows from U exactly, for Z' = Z x w: U' = -torque.w. Turning about the axis is free but for c_z, through
-//! any number of revolutions. A polynomial in Z and w: it goes into the series as it stands.
+//! The torque of the stiffness follows from U exactly, for Z' = Z x w: U' = -torque.w. Turning about the axis is free but for
+//! c_z and r_z, through any number of revolutions. Without dry friction it is a polynomial in Z and w, which goes into the series as
+//! it stands.
+//!
+//! r is Stribeck's curve (Rubaga's thesis, eq. 5.1) with its jump at rest smoothed over eps, as HubSlosh's friction
+//! `stribeck_smooth`: an axis that should stick creeps instead, at |w| ~ eps |torque|/(C + D).
 
 use taylor::number::Number;
+use taylor::series::{self, Series, ZERO};
 use taylor::space::{Vector, products};
 use taylor::vector::{Mat3, Vec3};
 
-/// Stiffness and damping of the pivot, body axes.
+/// Stiffness, damping and dry friction of the pivot, body axes.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Pivot {
     /// Stiffness against tilt about x and y, N m/rad.
     pub k: [f64; 2],
     /// Damping coefficient about each axis, N m s/rad.
     pub c: Vec3,
+    /// Dry friction.
+    pub friction: PivotFriction,
+}
+
+/// Dry friction about each axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PivotFriction {
+    /// Coulomb torque about each axis, N m.
+    pub c: Vec3,
+    /// What the torque at rest exceeds it by, N m.
+    pub d: Vec3,
+    /// Stribeck speed, rad/s, > 0.
+    pub omega_s: f64,
+    /// Width of the smoothed sign, rad/s, > 0.
+    pub eps: f64,
+}
+
+impl Default for PivotFriction {
+    fn default() -> Self {
+        PivotFriction { c: [0.0; 3], d: [0.0; 3], omega_s: 0.1, eps: 1e-3 }
+    }
+}
+
+impl PivotFriction {
+    /// Whether there is any.
+    pub(crate) fn acts(&self) -> bool {
+        self.c.iter().chain(&self.d).any(|torque| *torque > 0.0)
+    }
+
+    /// r at an instant, N m.
+    fn present<T: Number>(&self, w: Vec3<T>) -> Vec3<T> {
+        core::array::from_fn(|i| {
+            let v = w[i] * (1.0 / self.omega_s);
+            let curve = T::constant(self.c[i]) + (-(v * v)).exp() * self.d[i];
+            curve * (w[i] * (1.0 / self.eps)).tanh()
+        })
+    }
 }
 
 impl Pivot {
     /// Whether it does anything but hold O.
     pub(crate) fn acts(&self) -> bool {
-        *self != Pivot::default()
+        let Pivot { k, c, friction } = *self;
+        k != [0.0; 2] || c != [0.0; 3] || friction.acts()
     }
 
-    /// Coefficient N of torque (N m) and dissipation (W), from Z and w, with the products of w's components.
+    /// Coefficient N of torque (N m) and dissipation (W) but for dry friction, from Z and w, with the products of w's components.
     #[inline(always)]
     pub(crate) fn load<const N: usize>(&self, z: &Vector, w: &Vector, ww: [f64; 6]) -> (Vec3, f64) {
         let [_, _, _, xy, xz, yz] = products::<N>(z);
-        let Pivot { k: [k_x, k_y], c } = *self;
+        let Pivot { k: [k_x, k_y], c, .. } = *self;
         let torque = [
             -k_x * yz - c[0] * w[N][0],
             k_y * xz - c[1] * w[N][1],
@@ -46,13 +90,98 @@ impl Pivot {
     /// The torque, N m, dissipation, W, and energy, J, at an instant; `axes` is body to inertial.
     pub(crate) fn present<T: Number>(&self, axes: &Mat3<T>, w: Vec3<T>) -> (Vec3<T>, T, T) {
         let [x, y, z] = axes[2];
-        let Pivot { k: [k_x, k_y], c } = *self;
-        let torque = [
+        let Pivot { k: [k_x, k_y], c, friction } = *self;
+        let mut torque = [
             -(y * z * k_x) - w[0] * c[0],
             x * z * k_y - w[1] * c[1],
             x * y * (k_x - k_y) - w[2] * c[2],
         ];
-        let dissipation = w[0] * w[0] * c[0] + w[1] * w[1] * c[1] + w[2] * w[2] * c[2];
+        let mut dissipation = w[0] * w[0] * c[0] + w[1] * w[1] * c[1] + w[2] * w[2] * c[2];
+        if friction.acts() {
+            let r = friction.present(w);
+            for i in 0..3 {
+                torque[i] = torque[i] - r[i];
+                dissipation = dissipation + r[i] * w[i];
+            }
+        }
         (torque, dissipation, (y * y * k_x + x * x * k_y) * 0.5)
+    }
+}
+
+/// Dry friction about one axis as power series.
+#[derive(Clone, Debug)]
+pub(crate) struct Rubbing {
+    c: f64,
+    d: f64,
+    inv_omega_s: f64,
+    inv_eps: f64,
+    /// w; u' and e = exp u with u = -(w/w_s)^2; v' and t = tanh v with v = w/eps; 1 - t^2
+    w: Series,
+    u_d: Series,
+    e: Series,
+    v_d: Series,
+    t: Series,
+    sech2: Series,
+    /// C + D e, and r
+    curve: Series,
+    r: Series,
+}
+
+impl Rubbing {
+    /// About axis i, from 0.
+    pub(crate) fn new(p: &PivotFriction, i: usize) -> Rubbing {
+        Rubbing {
+            c: p.c[i],
+            d: p.d[i],
+            inv_omega_s: 1.0 / p.omega_s,
+            inv_eps: 1.0 / p.eps,
+            w: ZERO,
+            u_d: ZERO,
+            e: ZERO,
+            v_d: ZERO,
+            t: ZERO,
+            sech2: ZERO,
+            curve: ZERO,
+            r: ZERO,
+        }
+    }
+
+    /// Coefficient n of r and of r w, from that of w.
+    pub(crate) fn expand(&mut self, n: usize, w: f64) -> (f64, f64) {
+        self.w[n] = w;
+        let u = -series::square(n, &self.w) * self.inv_omega_s * self.inv_omega_s;
+        self.e[n] = if n == 0 { libm::exp(u) } else { series::chain(n, u, &mut self.u_d, &self.e) };
+        let v = w * self.inv_eps;
+        self.t[n] =
+            if n == 0 { libm::tanh(v) } else { series::chain(n, v, &mut self.v_d, &self.sech2) };
+        let t2 = series::square(n, &self.t);
+        self.sech2[n] = if n == 0 { 1.0 - t2 } else { -t2 };
+        self.curve[n] = series::constant(n, self.c) + self.d * self.e[n];
+        self.r[n] = series::mul(n, &self.curve, &self.t);
+        (self.r[n], series::mul(n, &self.r, &self.w))
+    }
+
+    /// How far ahead the series show what they hold, s, from w, w' and w''/2.
+    ///
+    /// tanh has its nearest poles at distance sqrt(v^2 + (pi/2)^2) from v = w/eps, and is so flat away from 0 that its
+    /// coefficients there do not tell; half the way is safe. exp(-v^2), v = w/w_s, has none; beyond v = 3 no tolerance sees its
+    /// terms, which grow before they decay: over dv the term of order n is (2 v dv)^n/n!. Either it is below 1e-12 at the
+    /// end, too, beyond v = 5.3, or the terms decay from order 5 on.
+    pub(crate) fn convergence_radius(&self, w: [f64; 3]) -> f64 {
+        if self.c + self.d == 0.0 {
+            return f64::INFINITY;
+        }
+        let until = |scale: f64, way: f64| {
+            let [v1, v2] = [w[1], w[2]].map(|x| (x * scale).abs());
+            let speed = v1 + libm::sqrt(v1 * v1 + 4.0 * v2 * way);
+            if speed > 0.0 { 2.0 * way / speed } else { f64::INFINITY }
+        };
+        let v = w[0] * self.inv_eps;
+        let sign = until(self.inv_eps, libm::sqrt(v * v + 2.4674) / 2.0);
+        let v = (w[0] * self.inv_omega_s).abs();
+        if self.d == 0.0 || v < 3.0 {
+            return sign;
+        }
+        sign.min(until(self.inv_omega_s, f64::max(v - 5.3, 2.5 / v)))
     }
 }

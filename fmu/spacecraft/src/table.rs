@@ -212,7 +212,7 @@ static VARIABLES: &[Variable<Model>] = &[
 
     // Locals
     V::local("pivot.torque", |o, n| o.pivot_torque[n], "N.m",
-        "Torque of a pivot's stiffness and damping on the craft, body axes; 0 while free")
+        "Torque of a pivot's stiffness, damping and friction on the craft, body axes; 0 while free")
         .shape(VECTOR).depends_on(&["q", "omega"]),
     V::local("momentum", |o, n| o.momentum[n], "kg.m/s",
         "Linear momentum of everything, inertial axes")
@@ -227,7 +227,7 @@ static VARIABLES: &[Variable<Model>] = &[
         "Work of force, torque and wheels on the craft since the start: energy - energy(0) = work - dissipated - drained")
         .is_state(|_| index::WORK).depends_on(&["work"]),
     V::local("dissipated", |o, _| o.dissipated, "J",
-        "Energy dissipated by the liquids and by a pivot's damping since the start")
+        "Energy dissipated by the liquids and by a pivot's damping and friction since the start")
         .is_state(|_| index::DISSIPATED).depends_on(&["dissipated"]),
     V::local("drained", |o, _| o.drained, "J",
         "Energy that has gone with the outflow since the start: the kinetic energy of what has left, and what the flow within the tanks has taken")
@@ -343,6 +343,18 @@ static VARIABLES: &[Variable<Model>] = &[
     V::parameter("pivot.c", |p, n| &mut p.pivot.c[n], "N.m.s/rad",
         "Damping coefficient of a pivot about each body axis: against omega")
         .shape(VECTOR).range(0.0, 1e12),
+    V::parameter("pivot.friction.c", |p, n| &mut p.pivot.friction.c[n], "N.m",
+        "Coulomb torque of a pivot about each body axis: against the sign of omega")
+        .display_unit("mN.m").shape(VECTOR).range(0.0, 1e12),
+    V::parameter("pivot.friction.d", |p, n| &mut p.pivot.friction.d[n], "N.m",
+        "What the pivot's dry friction at rest exceeds the Coulomb torque by, about each body axis")
+        .display_unit("mN.m").shape(VECTOR).range(0.0, 1e12),
+    V::parameter("pivot.friction.omega_s", |p, _| &mut p.pivot.friction.omega_s, "rad/s",
+        "Stribeck speed of the pivot's friction: the excess falls with exp(-(omega/omega_s)^2)")
+        .display_unit("deg/s").range(1e-6, 1e6),
+    V::parameter("pivot.friction.eps", |p, _| &mut p.pivot.friction.eps, "rad/s",
+        "Width of the smoothed sign, tanh(omega/eps): an axis that would stick creeps at less than that")
+        .display_unit("deg/s").range(1e-7, 1e3),
     V::integer("tanks", |p, _| &mut p.tanks, "Number of tanks")
         .between(0, TANKS as i32),
 
@@ -498,7 +510,7 @@ static MOUNT: Enumeration = Enumeration {
         Item::new("free", "It flies: position and velocity count from a freely falling frame"),
         Item::new(
             "pivot",
-            "O rests on a bearing in uniform gravity; the craft turns about it, freely unless pivot.k or pivot.c is set",
+            "O rests on a bearing in uniform gravity; the craft turns about it, freely unless pivot.k, pivot.c or pivot.friction is set",
         ),
     ],
 };

@@ -35,6 +35,10 @@ pub trait Number:
     fn sqrt(self) -> Self;
     /// sin
     fn sin(self) -> Self;
+    /// exp
+    fn exp(self) -> Self;
+    /// tanh
+    fn tanh(self) -> Self;
     /// asin, its derivative 0 at +-1, where it has none.
     fn asin(self) -> Self;
     /// sqrt(self^2 + b^2), its derivative 0 at 0, where it has none.
@@ -68,6 +72,14 @@ impl Number for f64 {
 
     fn sin(self) -> f64 {
         libm::sin(self)
+    }
+
+    fn exp(self) -> f64 {
+        libm::exp(self)
+    }
+
+    fn tanh(self) -> f64 {
+        libm::tanh(self)
     }
 
     fn asin(self) -> f64 {
@@ -168,6 +180,16 @@ impl Number for Dual {
         Dual { value, slope: self.slope * cos }
     }
 
+    fn exp(self) -> Dual {
+        let value = libm::exp(self.value);
+        Dual { value, slope: self.slope * value }
+    }
+
+    fn tanh(self) -> Dual {
+        let value = libm::tanh(self.value);
+        Dual { value, slope: self.slope * (1.0 - value * value) }
+    }
+
     fn asin(self) -> Dual {
         let cos = libm::sqrt(f64::max((1.0 - self.value) * (1.0 + self.value), 0.0));
         let slope = if cos > 0.0 { self.slope / cos } else { 0.0 };
@@ -186,7 +208,7 @@ mod tests {
     use super::*;
 
     /// Uses everything that a number can do, each with an argument of its own.
-    fn formulas<T: Number>(x: T) -> [T; 14] {
+    fn formulas<T: Number>(x: T) -> [T; 16] {
         let c = T::constant;
         [
             x + c(2.0),
@@ -199,6 +221,8 @@ mod tests {
             x.recip(),
             x.sqrt(),
             x.sin(),
+            x.exp(),
+            x.tanh(),
             (x * 0.5).asin(),
             x.hypot(x * x),
             x.at_least(0.1),

@@ -43,11 +43,18 @@ fn bodies(p: &Parameters) -> Vec<(f64, V, Matrix3<f64>)> {
     bodies
 }
 
-/// A pivot's torque: the turn that brings its axis from where it is in the body to the body's z axis, and damping.
+/// A pivot's torque: the turn that brings its axis from where it is in the body to the body's z axis, damping and
+/// dry friction.
 fn of_pivot(p: &Parameters, x: &[f64; STATES]) -> V {
     let upright = rotation(&x[..4]).inverse() * V::z();
     let pull = V::new(p.pivot.k[1] * upright.x, p.pivot.k[0] * upright.y, 0.0);
-    upright.cross(&pull) - v(&p.pivot.c).component_mul(&v(&x[index::OMEGA..]))
+    let w = v(&x[index::OMEGA..]);
+    let friction = &p.pivot.friction;
+    let rubs = V::from_fn(|i, _| {
+        let curve = friction.c[i] + friction.d[i] * f64::exp(-(w[i] / friction.omega_s).powi(2));
+        curve * (w[i] / friction.eps).tanh()
+    });
+    upright.cross(&pull) - v(&p.pivot.c).component_mul(&w) - rubs
 }
 
 /// [a; w'] of craft and liquids at rest as one rigid body, about its centre of mass; body axes.

@@ -1,7 +1,8 @@
 //! Random craft, states and inputs, of the sizes that spacecraft have.
 
 use craft::{
-    Craft, DampingLaw, Inertia, Init, Inputs, Mount, Parameters, Pivot, Ramp, TANKS, Tank,
+    Craft, DampingLaw, Inertia, Init, Inputs, Mount, Parameters, Pivot, PivotFriction, Ramp, TANKS,
+    Tank,
 };
 
 pub struct Random(fastrand::Rng);
@@ -95,7 +96,11 @@ impl Random {
     /// Stiffness and damping of a pivot for a craft of 150 to 3000 kg.
     pub fn pivot(&mut self) -> Pivot {
         let k = [(); 2].map(|()| self.magnitude(1e2, 1e4));
-        Pivot { k, c: [(); 3].map(|()| self.magnitude(1.0, 100.0)) }
+        let mut torques = || [(); 3].map(|()| self.magnitude(0.1, 10.0));
+        let (c, d) = (torques(), torques());
+        // So wide that differences and sums over time see it, too; steep signs are in tilting.rs.
+        let friction = PivotFriction { c, d, omega_s: 2.0, eps: 0.5 };
+        Pivot { k, c: [(); 3].map(|()| self.magnitude(1.0, 100.0)), friction }
     }
 
     pub fn inputs(&mut self) -> Inputs {

@@ -2,7 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use craft::{Craft, Inertia, Inputs, Mount, Parameters, Pivot, Ramp, STATES, Tank, index};
+use craft::{
+    Craft, Inertia, Inputs, Mount, Parameters, Pivot, PivotFriction, Ramp, STATES, Tank, index,
+};
 use nalgebra::{Complex, DMatrix, DVector};
 
 use super::component::Spacecraft;
@@ -15,7 +17,7 @@ fn platform() -> Parameters {
     Parameters {
         craft: Craft { mass: 12.0, r: [0.0, 0.0, 0.1], j },
         mount: Mount::Pivot,
-        pivot: Pivot { k: [40.0; 2], c: [0.0; 3] },
+        pivot: Pivot { k: [40.0; 2], c: [0.0; 3], ..Pivot::default() },
         gravity: [0.0, 0.0, -G],
         tanks: 0,
         ..Parameters::default()
@@ -179,7 +181,7 @@ fn a_stiff_pivot_tends_to_a_hub_that_only_turns() {
         p.tanks = 1;
         p.tank[0] = Tank { position: [0.225, 0.0, 0.05], ..tank() };
         // Critically damped.
-        p.pivot = Pivot { k: [k; 2], c: [1.3 * k.sqrt(), 1.3 * k.sqrt(), 0.0] };
+        p.pivot = Pivot { k: [k; 2], c: [1.3 * k.sqrt(), 1.3 * k.sqrt(), 0.0], ..Pivot::default() };
         let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-10).unwrap();
         craft.step(&u, 1.5).unwrap();
         craft.outputs(&u).omega[2]
@@ -196,6 +198,65 @@ fn a_stiff_pivot_tends_to_a_hub_that_only_turns() {
     assert!((ratio - 10.0).abs() < 0.5, "{ratio} {soft:e} {stiff:e}");
 }
 
+/// Far above eps the sign is 1 to the last bit: I w' = -C until the platform stops, from 2 rad/s after 2 I/C = 16 s.
+#[test]
+fn coulomb_friction_slows_a_platform_by_its_torque_over_the_inertia_and_lets_it_lie() {
+    let mut p = platform();
+    p.pivot.friction = PivotFriction { c: [0.0, 0.0, 0.05], ..PivotFriction::default() };
+    p.init.omega = [0.0, 0.0, 2.0];
+    let mut craft = start(&p);
+    for k in 1..=15 {
+        craft.step(&Inputs::default(), 1.0).unwrap();
+        let out = craft.outputs(&Inputs::default());
+        let want = 2.0 - 0.05 / 0.4 * f64::from(k);
+        assert!((out.omega[2] - want).abs() < 1e-12, "{k}: {} {want}", out.omega[2]);
+        assert_eq!(out.pivot_torque, [0.0, 0.0, -0.05]);
+        let lost = 0.4 * (2.0 * 2.0 - want * want) / 2.0;
+        assert!((out.dissipated - lost).abs() < 1e-11, "{k}: {} {lost}", out.dissipated);
+    }
+    // Within eps, 1e-3 rad/s, it decays with I eps/C = 8 ms.
+    craft.step(&Inputs::default(), 2.0).unwrap();
+    let out = craft.outputs(&Inputs::default());
+    assert!(out.omega[2].abs() < 1e-20, "{}", out.omega[2]);
+}
+
+/// The law by itself, r = (C + D exp(-(w/w_s)^2)) tanh(w/eps), in another simulator: I w' = tau - c w - r by the classical
+/// Runge-Kutta method in steps of eps I/(C + D)/20, whose error is below 1e-9 rad/s (a twentieth of it with half the step).
+#[test]
+fn a_platform_that_rubs_under_a_swinging_torque_follows_the_law_of_stribeck() {
+    let (mut p, i_z, tau, w) = (platform(), 0.4, 0.12, 3.0);
+    let friction =
+        PivotFriction { c: [0.0, 0.0, 0.03], d: [0.0, 0.0, 0.02], omega_s: 0.05, eps: 5e-3 };
+    (p.pivot.friction, p.pivot.c[2]) = (friction, 0.02);
+    let rate = |t: f64, x: f64| {
+        let r = (0.03 + 0.02 * (-(x / 0.05) * (x / 0.05)).exp()) * (x / 5e-3).tanh();
+        (tau * (w * t).sin() - 0.02 * x - r) / i_z
+    };
+    let mut craft = start(&p);
+    let (mut x, mut t, h) = (0.0, 0.0, 2e-4);
+    let mut most: f64 = 0.0;
+    for k in 0..2000 {
+        // The craft's torque is linear between its steps of 2 ms, which leaves tau w^2 h^2/8 = 4e-7 N m.
+        let at = |k: i32| tau * (w * 2e-3 * f64::from(k)).sin();
+        let slope = (at(k + 1) - at(k)) / 2e-3;
+        let torque = Ramp { value: [0.0, 0.0, at(k)], slope: [0.0, 0.0, slope] };
+        craft.step(&Inputs { torque, ..Inputs::default() }, 2e-3).unwrap();
+        for _ in 0..10 {
+            let k1 = rate(t, x);
+            let k2 = rate(t + h / 2.0, x + h / 2.0 * k1);
+            let k3 = rate(t + h / 2.0, x + h / 2.0 * k2);
+            let k4 = rate(t + h, x + h * k3);
+            x += h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4);
+            t += h;
+        }
+        most = most.max(x.abs());
+        let got = craft.outputs(&Inputs::default()).omega[2];
+        // 4e-7 N m over I for half a swing of the torque.
+        assert!((got - x).abs() < 1e-6, "{t}: {got} {x}");
+    }
+    assert!(most > 0.05, "it has to slide past w_s: {most}");
+}
+
 #[test]
 fn a_free_craft_takes_no_notice_of_the_pivot() {
     let run = |pivot: Pivot| {
@@ -204,7 +265,10 @@ fn a_free_craft_takes_no_notice_of_the_pivot() {
         craft.step(&Inputs::default(), 3.0).unwrap();
         craft.continuous_states().map(f64::to_bits)
     };
-    assert_eq!(run(Pivot::default()), run(Pivot { k: [5.0, 6.0], c: [1.0; 3] }));
+    assert_eq!(
+        run(Pivot::default()),
+        run(Pivot { k: [5.0, 6.0], c: [1.0; 3], ..Pivot::default() })
+    );
 }
 
 /// The bench of book/tilting.md: root mean square of the leakage from 1.25 to 3.5 Hz. With a damping ratio of 0.03
@@ -215,7 +279,7 @@ fn the_leakage_of_the_books_platform_is_that_of_its_linear_equations() {
     let j = Inertia { xx: 0.22, yy: 0.25, zz: 0.304, xy: 0.0, xz: 0.004, yz: -0.006 };
     let mut p = Parameters {
         craft: Craft { mass: 12.0, r: [-0.039, 0.0, 0.05], j },
-        pivot: Pivot { k: [600.0; 2], c: [0.5, 0.5, 0.03793] },
+        pivot: Pivot { k: [600.0; 2], c: [0.5, 0.5, 0.03793], ..Pivot::default() },
         tanks: 1,
         ..platform()
     };
