@@ -39,8 +39,15 @@ static void free_instance(int which) {
     instances[which] = NULL;
 }
 
-/* How many values: as many as references, mostly. */
-static size_t values_of(size_t n) { return one_in(12) ? length() : n; }
+static int has_arrays(void) { return fmu->outputs == 0; }
+
+/* How many values: as many as references, mostly; of arrays as many as they may have elements. */
+static size_t values_of(size_t n) {
+    static const size_t elements[] = {1, 1, 3, 3, 3, 4, 9, 12};
+    if (has_arrays())
+        n *= elements[byte() % 8];
+    return one_in(12) ? length() : n;
+}
 
 static fmi3Boolean *booleans(size_t n) {
     unsigned char *x = array(n, sizeof *x);
@@ -205,7 +212,7 @@ static void instantiate(void) {
     } else {
         /* inputs follow parameters; what is no input or output is refused */
         size_t n = well ? 0 : length();
-        unsigned some[2] = {1 + looks_in % 4, (unsigned)(fmu->inputs + looks_in % 3)};
+        unsigned some[2] = {1 + looks_in % 4, (unsigned)(fmu->inputs + (has_arrays() ? 0 : looks_in % 3))};
         unsigned *required = well ? some : references(n);
         begin("fmi3InstantiateCoSimulation");
         instances[which] = fmi3InstantiateCoSimulation(

@@ -18,7 +18,8 @@ extern struct host_report {
 struct host_fmu {
     /* of FMI 2.0; the token of FMI 3.0 */
     const char *guid, *token;
-    /* scalar variables; the first of them are the outputs, reals */
+    /* scalar variables; the first of them are the outputs, reals. Where the token is that of the FMU 3.0 with arrays: its variables,
+     * and 0 outputs */
     size_t variables, outputs;
     size_t states, indicators;
     /* the value reference in FMI 3.0 of the first of three inputs at least, reals */

@@ -26,7 +26,10 @@ unsafe extern "C" {
 /// The FMU that this program is linked with must be that of the model.
 pub fn run<M: Model>(data: &[u8]) {
     let c_string = |text: &str| CString::new(text).expect("a GUID has no NUL");
-    let (guid, token) = (c_string(M::table().guid()), c_string(M::table().token(Layout::Scalars)));
-    let fmu = HostFmu { guid: guid.as_ptr(), token: token.as_ptr(), sizes: sizes::<M>() };
+    // Of the inputs for FMI 3.0, whose first byte is odd, every fourth is for the FMU with arrays.
+    let with_arrays = data.first().is_some_and(|first| first % 8 == 7);
+    let layout = if with_arrays { Layout::Arrays } else { Layout::Scalars };
+    let (guid, token) = (c_string(M::table().guid()), c_string(M::table().token(layout)));
+    let fmu = HostFmu { guid: guid.as_ptr(), token: token.as_ptr(), sizes: sizes::<M>(layout) };
     unsafe { host_run(&fmu, data.as_ptr(), data.len()) }
 }

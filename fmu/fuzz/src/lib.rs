@@ -12,8 +12,9 @@ use runtime::Model;
 use runtime::call::{Call, Fault, InstanceState};
 use runtime::instance::{Instance, StepInfo};
 use runtime::snapshot::{from_bytes, to_bytes};
-use runtime::table::Scalar;
+use runtime::table::{Layout, Scalar};
 use runtime::v2::{self, Fmi2};
+use runtime::v3::arrays::{self, Arrays};
 use runtime::v3::{self, Fmi3};
 use runtime::variable::{Access, Causality, Kind, Value};
 use runtime::version::Version;
@@ -36,8 +37,14 @@ pub fn run<M: Model>(data: &[u8]) {
 
 /// What the hostile host knows of an FMU besides GUID and token (`host.h`): the number of scalar
 /// variables, of outputs, of continuous states, of event indicators; the first input's reference in FMI 3.0.
-pub fn sizes<M: Model>() -> [usize; 5] {
+pub fn sizes<M: Model>(layout: Layout) -> [usize; 5] {
     let table = M::table();
+    if layout == Layout::Arrays {
+        let all = Arrays::new::<M>(&table.starts());
+        let input = table.inputs().first().map_or(0, |input| arrays::reference(input.variable));
+        let (variables, states) = (table.variables.len(), all.states().len());
+        return [variables, 0, states, table.about.event_indicators, input as usize];
+    }
     let is_output = |s: &&Scalar<M>| s.variable.causality == Causality::Output;
     let outputs = table.scalars.iter().take_while(is_output).count();
     let input = table.inputs().first().map_or(0, Fmi3::reference);
