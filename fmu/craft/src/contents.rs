@@ -534,8 +534,45 @@ mod tests {
             assert_eq!(passes(sign, sign, 0.0, liquid), 1.0);
             assert_eq!(passes(sign, sign, 1.0, liquid), 10.0);
         }
+        // a flow that is held takes 1.5 kg in 0.75 s; one that is shut nothing
+        assert_eq!(passes(2.0, 0.0, 0.0, 101.5), 0.75);
+        assert_eq!(passes(-2.0, 0.0, 0.0, 98.5), 0.75);
+        assert_eq!(passes(0.0, 0.0, 0.0, 101.5), 10.0);
         // 4 t - t^2 = 3, too
         assert_eq!(passes(4.0, -2.0, 0.0, 103.0), 1.0);
         assert_eq!(passes(4.0, -2.0, 1.0, 103.0), 3.0);
+    }
+
+    /// Liquid may stand at the ends of its table, to rounding, and go on for as long as it stays between them: a flow of
+    /// 1 - t kg/s has taken half a kilogram when it turns after a second, and by 4 s has brought back 4 kg.
+    #[test]
+    fn a_flow_goes_on_while_the_liquid_is_within_its_table() {
+        let tank = Tank::default();
+        let mut mounted = MountedTank::new(&tank);
+        mounted.tank.fill.points = 2;
+        mounted.tank.fill.liquid[..2].copy_from_slice(&[100.0, 1000.0]);
+        let goes_on = |value: f64, slope: f64, liquid: f64, h: f64| {
+            let flow = Line { value, slope };
+            Outflow { mounted: &mounted, flow, at: 0, tank: 0 }.check(liquid, h).is_ok()
+        };
+        for (liquid, allowed) in [
+            (100.0, true),
+            (1000.0, true),
+            (100.0 - 0.9e-9, true),
+            (1000.0 + 0.9e-9, true),
+            (100.0 - 1.2e-9, false),
+            (1000.0 + 1.2e-9, false),
+            (f64::NAN, false),
+        ] {
+            assert_eq!(goes_on(0.0, 0.0, liquid, 1.0), allowed, "{liquid}");
+        }
+        for h in [0.5, 4.0] {
+            assert!(goes_on(1.0, -1.0, 100.6, h) && goes_on(-1.0, 1.0, 999.4, h));
+            // after 0.5 s 0.375 kg are gone, the most after 1 s
+            assert_eq!(goes_on(1.0, -1.0, 100.4, h), h < 1.0);
+            assert_eq!(goes_on(-1.0, 1.0, 999.6, h), h < 1.0);
+        }
+        assert!(!goes_on(1.0, -1.0, 998.0, 4.0) && goes_on(1.0, -1.0, 995.0, 4.0));
+        assert!(goes_on(1.0, 0.0, 101.0, 1.0) && !goes_on(1.0, 0.0, 101.0, 1.1));
     }
 }

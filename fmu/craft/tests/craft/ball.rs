@@ -93,6 +93,30 @@ fn reversed_thrust_sends_the_liquid_across_the_tank_in_the_time_of_free_fall() {
     assert!(height.abs() < 1e-8);
 }
 
+/// Of settled liquid: the least of what the axial acceleration exceeds its limit by and of how far every bob of the tank is
+/// within 45 degrees. Without thrust it is at its limit, 0; a tank that stays has 1.
+#[test]
+fn a_host_sees_a_bob_pass_45_degrees() {
+    for (tank, mode) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+        for angle in [0.6, 0.7, 0.9f64] {
+            let mut p = Parameters { tanks: 2, ..Parameters::default() };
+            for tank in &mut p.tank {
+                tank.modes = 2;
+            }
+            p.tank[1].ball.travel = 0.6;
+            p.tank[tank].p_0[mode] = [0.0, angle.sin(), -angle.cos()];
+            let inputs = thrust(1e4);
+            let mut craft = Spacecraft::new(&p, &inputs, 0.0, 1e-9).unwrap();
+            let mut seen = [0.0; 2 * TANKS];
+            craft.event_indicators(&inputs, &mut seen);
+            let [upright, hangs] = [1.0, angle.cos()].map(|cos| cos - 0.5f64.sqrt());
+            let expected = if tank == 1 { hangs } else { upright };
+            assert!((seen[2] - expected).abs() < 1e-15, "{tank} {mode} {angle}: {seen:?}");
+            assert_eq!([seen[0], seen[1], seen[3]], [1.0; 3]);
+        }
+    }
+}
+
 /// Bounce k takes 2 e^k v/g: the sum of all is 2 v e/(g (1 - e)), and m v^2/2 has gone.
 #[test]
 fn bounces_are_a_geometric_series_that_ends_at_rest() {
