@@ -74,6 +74,8 @@ impl Cli {
             Example(args) => Some(&args.fmu),
             Identify(args) => args.needs_fmu().then_some(&args.fmu),
             Design(args) => Some(&args.fmu),
+            // what is traced has no other process around it
+            StepCost(args) => args.counted.is_empty().then_some(&args.fmu),
             _ => None,
         }
     }
@@ -121,6 +123,7 @@ enum Command {
     #[command(hide = true)]
     CheckCalls(check::CheckCallsArgs),
     Scale(scale::ScaleArgs),
+    StepCost(step_cost::StepCostArgs),
     Tank(tank::TankArgs),
     Gyro(gyro::GyroArgs),
     Example(example::ExampleArgs),
@@ -230,6 +233,7 @@ fn carry_out(cli: Cli) -> u8 {
         Some(Command::Check(args)) => args.run(),
         Some(Command::CheckCalls(args)) => args.run(),
         Some(Command::Scale(args)) => args.run(),
+        Some(Command::StepCost(args)) => args.run(),
         Some(Command::Tank(args)) => args.run(),
         Some(Command::Gyro(args)) => args.run(),
         Some(Command::Example(args)) => args.run(),

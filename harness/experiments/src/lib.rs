@@ -10,3 +10,4 @@ pub mod rounding;
 pub mod run;
 pub mod scaling;
 pub mod sensors;
+pub mod step_cost;

@@ -233,6 +233,15 @@ impl Run {
 
     /// A new instance with the start values set, ready for the first step.
     pub fn initialise<'fmu>(&self, fmu: &'fmu Fmu) -> Result<Instance<'fmu>> {
+        self.initialise_until(fmu, Some(self.stop))
+    }
+
+    /// The same for a host that does not know when it stops: no step is too long.
+    pub(crate) fn initialise_without_end<'fmu>(&self, fmu: &'fmu Fmu) -> Result<Instance<'fmu>> {
+        self.initialise_until(fmu, None)
+    }
+
+    fn initialise_until<'fmu>(&self, fmu: &'fmu Fmu, stop: Option<f64>) -> Result<Instance<'fmu>> {
         self.check()?;
         let mut instance = fmu.instantiate_at_rest("run")?;
         for (name, value) in &self.settings {
@@ -253,7 +262,7 @@ impl Run {
             &mut instance,
             self.tolerance,
             self.start(),
-            Some(self.stop),
+            stop,
             &first,
         )?;
         Ok(instance)

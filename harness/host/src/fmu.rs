@@ -31,6 +31,14 @@ pub enum Instance<'fmu> {
     V3(fmi3::Instance<'fmu>, &'fmu Fmu),
 }
 
+/// A snapshot of an instance.
+pub enum State {
+    /// Of an FMU 2.0.
+    V2(fmi2::FmuState),
+    /// Of an FMU 3.0.
+    V3(fmi3::FmuState),
+}
+
 impl Fmu {
     /// Opens a packed FMU and loads the binary for this platform.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
@@ -163,6 +171,38 @@ impl<'fmu> Instance<'fmu> {
         match self {
             Instance::V2(instance, _) => instance.exit_initialization_mode(),
             Instance::V3(instance, _) => instance.exit_initialization_mode(),
+        }
+    }
+
+    /// A snapshot of the instance. Must be given back with [`Instance::free_state`]; otherwise its memory is lost.
+    pub fn get_state(&mut self) -> Called<State> {
+        Ok(match self {
+            Instance::V2(instance, _) => State::V2(instance.get_state()?),
+            Instance::V3(instance, _) => State::V3(instance.get_state()?),
+        })
+    }
+
+    /// Goes back to a snapshot of this instance.
+    ///
+    /// # Panics
+    /// If it is of an FMU of the other version.
+    pub fn set_state(&mut self, state: &State) -> Called {
+        match (self, state) {
+            (Instance::V2(instance, _), State::V2(state)) => instance.set_state(state),
+            (Instance::V3(instance, _), State::V3(state)) => instance.set_state(state),
+            _ => panic!("a snapshot of the other version of FMI"),
+        }
+    }
+
+    /// Gives a snapshot of this instance back.
+    ///
+    /// # Panics
+    /// If it is of an FMU of the other version.
+    pub fn free_state(&mut self, state: State) -> Called {
+        match (self, state) {
+            (Instance::V2(instance, _), State::V2(state)) => instance.free_state(state),
+            (Instance::V3(instance, _), State::V3(state)) => instance.free_state(state),
+            _ => panic!("a snapshot of the other version of FMI"),
         }
     }
 

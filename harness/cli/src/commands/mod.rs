@@ -24,6 +24,7 @@ pub mod pack;
 pub mod release;
 pub mod run;
 pub mod scale;
+pub mod step_cost;
 pub mod tank;
 pub mod torque;
 pub mod variables;

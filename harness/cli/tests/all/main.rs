@@ -10,6 +10,7 @@ mod identify;
 mod plans;
 mod recordings;
 mod report;
+mod step_cost;
 mod tank;
 mod view;
 mod words;
