@@ -179,6 +179,43 @@ fn a_c_host_lives_through_everything_and_nothing_is_left_behind() {
     }
 }
 
+/// The table of functions and modes (`modes.c`) for an FMU, by an output, what follows an input at once, that input, and an
+/// Integer, an enumeration and a Boolean.
+fn functions_answer_as_the_table_has_it(model: &pack::Model, names: [&str; 6], sets: bool) {
+    let fmu = Unpacked::new(model, Fmi::V3);
+    run(
+        fmu.host("modes", &["tests/abi/modes.c"], &[])
+            .arg(&fmu.library)
+            .arg(fmu.guid())
+            .args(names.map(|name| fmu.reference(name)))
+            .arg(u8::from(sets).to_string()),
+        "a function answers otherwise than the standard's tables have it",
+    );
+}
+
+#[test]
+fn every_function_of_fmi_3_is_allowed_or_refused_in_words_in_every_mode() {
+    for (model, names, sets) in [
+        (
+            "HubSlosh",
+            ["omega", "omega_dot", "tau_cmd", "slosh.modes", "slosh.model", "wheel.enabled"],
+            true,
+        ),
+        (
+            "Spacecraft",
+            ["omega[1]", "omega_dot[1]", "torque[1]", "tanks", "mount", "tank[1].in_range"],
+            false,
+        ),
+        (
+            "SloshTank",
+            ["force[1]", "force[1]", "a[1]", "tank.modes", "coupling", "tank.in_range"],
+            false,
+        ),
+    ] {
+        functions_answer_as_the_table_has_it(pack::model(model).unwrap(), names, sets);
+    }
+}
+
 /// Noise, or the fuzzer's corpus in the folder `HUBSLOSH_CORPUS`, as calls of either version; among what must not
 /// happen (`host.c`) are floating-point exceptions in calls that succeed.
 fn no_calls_break<M: runtime::Model>(inputs: u32) {

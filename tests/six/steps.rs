@@ -228,3 +228,38 @@ fn liquid_that_leaves_its_bottom_moves_through_the_packed_fmu_as_in_the_crate() 
     }
     assert_eq!(seen.last(), Some(&craft::BallState::Settled));
 }
+
+/// `canInterpolateInputs` is of all Real inputs, so that hosts set the derivatives of all: omega's is taken, and what omega
+/// does within the step is omega_dot's doing.
+#[test]
+fn a_derivative_that_is_set_for_omega_is_taken_and_changes_no_bit() {
+    let table = &::SloshTank::table::TABLE;
+    let find = |name: &str| table.find(name).unwrap();
+    let run = |slope: Option<f64>| {
+        let mut tank = Instance::<::SloshTank::Model, Fmi2>::new(Interface::CoSimulation);
+        tank.setup_experiment(None, 0.0, None).unwrap();
+        tank.enter_initialization_mode().unwrap();
+        tank.exit_initialization_mode().unwrap();
+        let rate = find("omega_dot[2]");
+        tank.set(&SET_REAL, &[rate], |_| Value::Real(0.3)).unwrap();
+        let mut seen = Vec::new();
+        for k in 0..20 {
+            tank.set_input_derivatives(&[rate], &[1], &[0.1]).unwrap();
+            if let Some(slope) = slope {
+                tank.set_input_derivatives(&[find("omega[2]")], &[1], &[slope]).unwrap();
+            }
+            tank.do_step(f64::from(k) * 0.1, 0.1).unwrap();
+            let shown = ["omega[2]", "force[1]", "torque[2]", "tank.angle_x[1]"].map(find);
+            seen.push(shown.map(|r| tank.get(&GET_REAL, r).unwrap()));
+            let mut slopes = [0.0; 2];
+            let outputs = ["force[1]", "torque[2]"].map(find);
+            tank.output_derivatives(&outputs, &[1; 2], &mut slopes).unwrap();
+            seen.push([slopes[0], slopes[1], 0.0, 0.0].map(Value::Real));
+        }
+        seen
+    };
+    let consistent = run(None);
+    for slope in [0.0, -7.0, 1e6] {
+        assert_eq!(run(Some(slope)), consistent, "{slope}");
+    }
+}
