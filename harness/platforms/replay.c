@@ -1,14 +1,18 @@
-/* A small host: plays a list of FMI 2.0 calls to one FMU binary and prints the
+/* A small host: plays a list of FMI calls to one FMU binary and prints the
  * bits of what it answers. Numbers travel as the hexadecimal digits of their
  * bits, so that neither this program nor the C library of a platform computes
  * or converts any. harness/platforms/compare writes the list and runs the same
  * one on every platform.
  *
  *   replay LIBRARY GUID < calls
+ *   replay LIBRARY TOKEN INPUT... < calls         by the functions of FMI 3.0
  *
  * Calls, one a line (T, H, X: 16 hexadecimal digits of a double):
- *   real REFERENCE X | integer REFERENCE NUMBER   set a variable
- *   slope REFERENCE X                             first derivative of an input
+ *   real REFERENCE X | integer REFERENCE NUMBER | item REFERENCE NUMBER
+ *                                                 set a variable; item: an enumeration
+ *   slope REFERENCE X                             first derivative of an input (FMI 2.0)
+ *   end REFERENCE X                               what one of INPUT is at the end of the next step,
+ *                                                 set in intermediate update (FMI 3.0)
  *   outputs COUNT REFERENCE...                    what is read after each step
  *   start T                                       set up and initialise
  *   step T H                                      one step
@@ -94,14 +98,168 @@ static uint64_t hashed(uint64_t hash, const void *bytes, size_t count)
 
 static const uint64_t FRESH = UINT64_C(0xcbf29ce484222325);
 
-#define FUNCTION(type, variable, name, ...)                                                        \
-    type (*variable)(__VA_ARGS__);                                                                 \
+/* The calls, by the names and types of FMI 2.0. */
+static void *library;
+static Component (*instantiate)(const char *, int, const char *, const char *, const struct callbacks *,
+                                int, int);
+static void (*free_instance)(Component);
+static int (*setup)(Component, int, double, double, int, double);
+static int (*enter)(Component), (*leave)(Component), (*terminate)(Component);
+static int (*get_real)(Component, const uint32_t *, size_t, double *);
+static int (*set_real)(Component, const uint32_t *, size_t, const double *);
+static int (*set_integer)(Component, const uint32_t *, size_t, const int *);
+static int (*set_item)(Component, const uint32_t *, size_t, const int *);
+static int (*set_slope)(Component, const uint32_t *, size_t, const int *, const double *);
+static int (*do_step)(Component, double, double, int);
+static int (*get_state)(Component, void **), (*set_state)(Component, void *), (*free_state)(Component, void **);
+static int (*state_size)(Component, void *, size_t *);
+static int (*serialize)(Component, void *, char *, size_t);
+static int (*deserialize)(Component, const char *, size_t, void **);
+
+#define LOAD(variable, name)                                                                       \
     *(void **)&variable = named(library, name);                                                    \
     if (!variable)                                                                                 \
     fail("the binary lacks " name)
+
+/* ---- FMI 3.0 under these names ---- */
+
+enum { LINES = 16 };
+static uint32_t inputs[LINES]; /* that move within steps */
+static size_t inputs_count;
+static struct {
+    uint32_t input;
+    double end;
+} lines[LINES]; /* through the next step */
+static size_t lines_count;
+static double start;
+
+static Component (*instantiate_3)(const char *, const char *, const char *, char, char, char, char,
+                                  const uint32_t *, size_t, void *,
+                                  void (*)(void *, int, const char *, const char *),
+                                  void (*)(void *, double, char, char, char, char, char *, double *));
+static int (*enter_3)(Component, char, double, double, char, double);
+static int (*get_float64)(Component, const uint32_t *, size_t, double *, size_t);
+static int (*set_float64)(Component, const uint32_t *, size_t, const double *, size_t);
+static int (*set_int32)(Component, const uint32_t *, size_t, const int32_t *, size_t);
+static int (*set_int64)(Component, const uint32_t *, size_t, const int64_t *, size_t);
+static int (*do_step_3)(Component, double, double, char, char *, char *, char *, double *);
+
+static void logger_3(void *environment, int status, const char *category, const char *message)
+{
+    (void)environment;
+    if (status != OK)
+        fprintf(stderr, "%s: %s\n", category, message);
+}
+
+static Component stepping;
+
+static void update(void *environment, double time, char set_requested, char get_allowed, char finished,
+                   char can_return, char *early_return, double *early_time)
+{
+    (void)environment, (void)get_allowed, (void)finished, (void)can_return;
+    *early_return = 0;
+    *early_time = time;
+    for (size_t i = 0; set_requested && i < lines_count; i++) {
+        if (set_float64(stepping, &lines[i].input, 1, &lines[i].end, 1) != OK)
+            fail("an input is not set within the step");
+    }
+}
+
+static Component instantiate_as_2(const char *name, int type, const char *token, const char *resources,
+                                  const struct callbacks *callbacks, int visible, int logging)
+{
+    (void)type, (void)resources, (void)callbacks, (void)visible;
+    return instantiate_3(name, token, NULL, 0, (char)logging, 0, 0, inputs, inputs_count, NULL, logger_3, update);
+}
+
+static int setup_as_2(Component c, int has_tolerance, double tolerance, double time, int has_stop, double stop)
+{
+    (void)c, (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
+    start = time;
+    return OK;
+}
+
+static int enter_as_2(Component c) { return enter_3(c, 0, 0.0, start, 0, 0.0); }
+
+static int get_as_2(Component c, const uint32_t *r, size_t n, double *x) { return get_float64(c, r, n, x, n); }
+
+static int set_as_2(Component c, const uint32_t *r, size_t n, const double *x) { return set_float64(c, r, n, x, n); }
+
+static int integer_as_2(Component c, const uint32_t *r, size_t n, const int *x)
+{
+    int32_t number = *x;
+    return set_int32(c, r, n, &number, n);
+}
+
+static int item_as_2(Component c, const uint32_t *r, size_t n, const int *x)
+{
+    int64_t number = *x;
+    return set_int64(c, r, n, &number, n);
+}
+
+static int step_as_2(Component c, double time, double step, int no_way_back)
+{
+    char event, end, early;
+    double last;
+    stepping = c;
+    int status = do_step_3(c, time, step, (char)no_way_back, &event, &end, &early, &last);
+    lines_count = 0;
+    return event || end || early ? -1 : status;
+}
+
+static void load_2(void)
+{
+    LOAD(instantiate, "fmi2Instantiate");
+    LOAD(free_instance, "fmi2FreeInstance");
+    LOAD(setup, "fmi2SetupExperiment");
+    LOAD(enter, "fmi2EnterInitializationMode");
+    LOAD(leave, "fmi2ExitInitializationMode");
+    LOAD(terminate, "fmi2Terminate");
+    LOAD(get_real, "fmi2GetReal");
+    LOAD(set_real, "fmi2SetReal");
+    LOAD(set_integer, "fmi2SetInteger");
+    set_item = set_integer;
+    LOAD(set_slope, "fmi2SetRealInputDerivatives");
+    LOAD(do_step, "fmi2DoStep");
+    LOAD(get_state, "fmi2GetFMUstate");
+    LOAD(set_state, "fmi2SetFMUstate");
+    LOAD(free_state, "fmi2FreeFMUstate");
+    LOAD(state_size, "fmi2SerializedFMUstateSize");
+    LOAD(serialize, "fmi2SerializeFMUstate");
+    LOAD(deserialize, "fmi2DeSerializeFMUstate");
+}
+
+static void load_3(void)
+{
+    LOAD(instantiate_3, "fmi3InstantiateCoSimulation");
+    LOAD(free_instance, "fmi3FreeInstance");
+    LOAD(enter_3, "fmi3EnterInitializationMode");
+    LOAD(leave, "fmi3ExitInitializationMode");
+    LOAD(terminate, "fmi3Terminate");
+    LOAD(get_float64, "fmi3GetFloat64");
+    LOAD(set_float64, "fmi3SetFloat64");
+    LOAD(set_int32, "fmi3SetInt32");
+    LOAD(set_int64, "fmi3SetInt64");
+    LOAD(do_step_3, "fmi3DoStep");
+    LOAD(get_state, "fmi3GetFMUState");
+    LOAD(set_state, "fmi3SetFMUState");
+    LOAD(free_state, "fmi3FreeFMUState");
+    LOAD(state_size, "fmi3SerializedFMUStateSize");
+    LOAD(serialize, "fmi3SerializeFMUState");
+    LOAD(deserialize, "fmi3DeserializeFMUState");
+    instantiate = instantiate_as_2;
+    setup = setup_as_2;
+    enter = enter_as_2;
+    get_real = get_as_2;
+    set_real = set_as_2;
+    set_integer = integer_as_2;
+    set_item = item_as_2;
+    do_step = step_as_2;
+}
+
 #define MUST(call)                                                                                 \
     if ((call) != OK)                                                                              \
-    fail("not fmi2OK: " #call)
+    fail("not OK: " #call)
 
 int main(int count, char **arguments)
 {
@@ -111,33 +269,19 @@ int main(int count, char **arguments)
     double outputs[OUTPUTS];
     size_t outputs_count = 0;
     uint64_t hash = FRESH;
-    void *library;
     Component instance;
 
-    if (count != 3)
-        fail("usage: replay LIBRARY GUID < calls");
+    if (count < 3 || count > 3 + LINES)
+        fail("usage: see the beginning of replay.c");
     library = opened(arguments[1]);
     if (!library)
         fail("the binary cannot be loaded");
-    FUNCTION(Component, instantiate, "fmi2Instantiate", const char *, int, const char *,
-             const char *, const struct callbacks *, int, int);
-    FUNCTION(void, free_instance, "fmi2FreeInstance", Component);
-    FUNCTION(int, setup, "fmi2SetupExperiment", Component, int, double, double, int, double);
-    FUNCTION(int, enter, "fmi2EnterInitializationMode", Component);
-    FUNCTION(int, leave, "fmi2ExitInitializationMode", Component);
-    FUNCTION(int, terminate, "fmi2Terminate", Component);
-    FUNCTION(int, get_real, "fmi2GetReal", Component, const uint32_t *, size_t, double *);
-    FUNCTION(int, set_real, "fmi2SetReal", Component, const uint32_t *, size_t, const double *);
-    FUNCTION(int, set_integer, "fmi2SetInteger", Component, const uint32_t *, size_t, const int *);
-    FUNCTION(int, set_slope, "fmi2SetRealInputDerivatives", Component, const uint32_t *, size_t,
-             const int *, const double *);
-    FUNCTION(int, do_step, "fmi2DoStep", Component, double, double, int);
-    FUNCTION(int, get_state, "fmi2GetFMUstate", Component, void **);
-    FUNCTION(int, set_state, "fmi2SetFMUstate", Component, void *);
-    FUNCTION(int, free_state, "fmi2FreeFMUstate", Component, void **);
-    FUNCTION(int, state_size, "fmi2SerializedFMUstateSize", Component, void *, size_t *);
-    FUNCTION(int, serialize, "fmi2SerializeFMUstate", Component, void *, char *, size_t);
-    FUNCTION(int, deserialize, "fmi2DeSerializeFMUstate", Component, const char *, size_t, void **);
+    for (int i = 3; i < count; i++)
+        inputs[inputs_count++] = (uint32_t)strtoul(arguments[i], NULL, 10);
+    if (inputs_count)
+        load_3();
+    else
+        load_2();
 
     instance = instantiate("replay", 1, arguments[2], NULL, &callbacks, 0, 1);
     if (!instance)
@@ -162,7 +306,13 @@ int main(int count, char **arguments)
         } else if (!strcmp(call, "integer") && n == 3) {
             int value = atoi(words[2]);
             MUST(set_integer(instance, &reference, 1, &value));
-        } else if (!strcmp(call, "slope") && n == 3) {
+        } else if (!strcmp(call, "item") && n == 3) {
+            int value = atoi(words[2]);
+            MUST(set_item(instance, &reference, 1, &value));
+        } else if (!strcmp(call, "end") && n == 3 && lines_count < LINES) {
+            lines[lines_count].input = reference;
+            lines[lines_count++].end = number(words[2]);
+        } else if (!strcmp(call, "slope") && n == 3 && set_slope) {
             double value = number(words[2]);
             int order = 1;
             MUST(set_slope(instance, &reference, 1, &order, &value));
