@@ -280,13 +280,17 @@ fn derivatives_of_hubslosh_are_transposed_and_those_of_differences_in_slip_in_st
  {
     let fmu = open("HubSlosh");
     let mut rng = Rng::with_seed(73);
-    let models = ["frozen", "linear", "planar", "spherical", "paraboloid", "liquid"];
-    let frictions = ["none", "viscous", "stribeck_smooth", "stribeck", "lugre"];
+    let description = fmu.description();
+    let names = |name: &str| {
+        let items = description.items(description.variable(name).unwrap()).iter();
+        items.map(|item| item.name.as_str()).collect::<Vec<_>>()
+    };
+    let (models, frictions) = (names("slosh.model"), names("friction.model"));
     let wheels = ["none", "torque", "speed"];
     for model in models {
         // Of an angle; with paraboloid and liquid of a length, the third mode's pendulum's being 9 mm.
         let unit = if ["paraboloid", "liquid"].contains(&model) { 0.009 } else { 1.0 };
-        for (k, friction) in frictions.into_iter().chain(["stick"]).enumerate() {
+        for (k, friction) in frictions.iter().copied().chain(["stick"]).enumerate() {
             let is_stuck = friction == "stick";
             let friction = if is_stuck { "stribeck" } else { friction };
             let wheel = wheels[(k + usize::from(unit < 1.0)) % 3];

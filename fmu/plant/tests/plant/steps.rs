@@ -61,9 +61,9 @@ fn where_series_end_a_long_step_takes_as_many_internal_ones_as_a_short_one() {
     assert_eq!(long, short);
 }
 
-/// None, viscous, smoothed, set-valued, LuGre; at the tolerances 1e-5 and 1e-10. More would be slower, fewer
+/// By slosh model and friction law, each in the order of its numbers; at the tolerances 1e-5 and 1e-10. More would be slower, fewer
 /// less exact; one in twenty is rounding.
-const STEPS: [[[usize; 2]; 5]; 6] = [
+const STEPS: [[[usize; 2]; FrictionModel::ALL.len()]; SloshModel::ALL.len()] = [
     [[2, 2], [2, 2], [7, 11], [4, 5], [121, 129]],
     [[7, 12], [7, 12], [34, 56], [16, 29], [174, 194]],
     [[15, 28], [15, 28], [34, 56], [16, 30], [172, 194]],
