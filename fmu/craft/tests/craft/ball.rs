@@ -489,6 +489,16 @@ fn derivatives_along_a_direction_are_those_of_the_rates_and_outputs() {
             }
         }
         let du: [f64; INPUTS] = random.vector(1.0);
+        let list = |rates: &[f64; STATES], out: &Outputs| {
+            let vectors = [
+                out.specific_force,
+                out.slosh_force,
+                out.slosh_torque,
+                out.momentum,
+                out.angular_momentum,
+            ];
+            [&rates[..], vectors.as_flattened(), &[out.energy], out.inertia.as_flattened()].concat()
+        };
         let mut at = |s: f64| {
             let moved: [f64; STATES] = std::array::from_fn(|i| x[i] + s * dx[i]);
             craft.set_continuous_states(&moved);
@@ -498,31 +508,13 @@ fn derivatives_along_a_direction_are_those_of_the_rates_and_outputs() {
                 u.torque.value[i] += s * du[3 + i];
                 u.h_wheels.value[i] += s * du[6 + i];
             }
-            let rates = craft.derivatives(&u);
-            let out = craft.outputs_held(&u);
-            let forces = [
-                out.specific_force,
-                out.slosh_force,
-                out.slosh_torque,
-                out.momentum,
-                out.angular_momentum,
-            ];
-            [&rates[..], forces.as_flattened(), &[out.energy], out.inertia.as_flattened()].concat()
+            list(&craft.derivatives(&u), &craft.outputs_held(&u))
         };
         let step = 1e-3;
         let [p2, p1, m1, m2] = [2.0, 1.0, -1.0, -2.0].map(|s| at(s * step));
         craft.set_continuous_states(&x);
         let rates = craft.directional_derivative(&u, &dx, &du);
-        let out = craft.output_derivatives(&u, &dx, &du);
-        let forces = [
-            out.specific_force,
-            out.slosh_force,
-            out.slosh_torque,
-            out.momentum,
-            out.angular_momentum,
-        ];
-        let have =
-            [&rates[..], forces.as_flattened(), &[out.energy], out.inertia.as_flattened()].concat();
+        let have = list(&rates, &craft.output_derivatives(&u, &dx, &du));
         for i in 0..have.len() {
             let want = (8.0 * (p1[i] - m1[i]) - (p2[i] - m2[i])) / (12.0 * step);
             // (step^4, 1e-16/step) of the size of the quantity and of what it curves by.

@@ -5,18 +5,9 @@ use craft::{
     StepError, TANK_STATES, TankInputs, TankParameters, TankState, index,
 };
 
+use super::draining::after;
 use super::random::Random;
 use super::records::{STEP, at_end, inputs, record, spacecraft};
-
-fn later(u: &Inputs, t: f64) -> Inputs {
-    let at = |ramp: &Ramp| Ramp { value: ramp.at(t), slope: ramp.slope };
-    Inputs {
-        force: at(&u.force),
-        torque: at(&u.torque),
-        h_wheels: at(&u.h_wheels),
-        ..Inputs::default()
-    }
-}
 
 fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs() / (1.0 + a.abs().max(b.abs()))).fold(0.0, f64::max)
@@ -34,7 +25,7 @@ fn the_choice_of_communication_step_does_not_matter() {
         let mut t = 0.0;
         while t < 2.0 {
             let h = f64::min(random.magnitude(1e-4, 0.5), 2.0 - t);
-            cut.step(&later(&u, t), h).unwrap();
+            cut.step(&after(&u, t), h).unwrap();
             t += h;
         }
         // Both within the tolerance per step, grown by the liquids' motion.
