@@ -287,18 +287,24 @@ pub fn licenses(archive: &Archive, findings: &mut Findings) {
 
 /// `zip.folders`
 pub fn folders(archive: &Archive, findings: &mut Findings) {
+    folders_of("2.0", &AT_THE_TOP, archive, findings);
+}
+
+/// Names at the top that a version of FMI does not have.
+pub fn folders_of(version: &str, allowed: &[&str], archive: &Archive, findings: &mut Findings) {
     let mut unknown: Vec<&str> = archive
         .entries
         .iter()
         .filter_map(|entry| entry.name.split(['/', '\\']).next())
-        .filter(|top| !AT_THE_TOP.contains(top) && *top != "..")
+        .filter(|top| !allowed.contains(top) && *top != "..")
         .collect();
     unknown.sort_unstable();
     unknown.dedup();
+    let allowed = allowed.join(", ");
     for name in unknown {
         findings.add(
             name,
-            format!("FMI 2.0 has no such file or folder (allowed: {})", AT_THE_TOP.join(", ")),
+            format!("FMI {version} has no such file or folder (allowed: {allowed})"),
         );
     }
 }

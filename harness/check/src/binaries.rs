@@ -25,9 +25,12 @@ const ARCHITECTURES: [&str; 8] =
 /// The ending of the binary in a folder, and what can be read of it here; none of a folder that a
 /// vendor has named.
 fn platform(folder: &str) -> Option<(&'static str, Option<Kind>)> {
-    if let Some((_, ending, kind)) = PLATFORMS.iter().find(|(known, ..)| *known == folder) {
-        return Some((ending, *kind));
-    }
+    let known = PLATFORMS.iter().find(|(known, ..)| *known == folder);
+    known.map(|(_, ending, kind)| (*ending, *kind)).or_else(|| tuple(folder))
+}
+
+/// The ending of the binary in the folder of a platform tuple, and what can be read of it here.
+pub(crate) fn tuple(folder: &str) -> Option<(&'static str, Option<Kind>)> {
     // arch-sys or arch-sys-abi
     let mut parts = folder.splitn(3, '-');
     let (architecture, system) = (parts.next()?, parts.next()?);

@@ -108,6 +108,17 @@ pub struct Rule {
     pub check: Check,
 }
 
+/// A rule as a line of a table.
+const fn rule(
+    id: &'static str,
+    severity: Severity,
+    title: &'static str,
+    source: &'static str,
+    check: Check,
+) -> Rule {
+    Rule { id, title, source, severity, check }
+}
+
 /// The function behind a rule, by what it looks at.
 pub enum Check {
     /// The zip archive.

@@ -2,20 +2,9 @@
 
 use super::Severity::{Error, Warning};
 use super::{
-    Check, Rule, Severity, archive, arrays, binaries, dependencies, description, events, exchange,
-    kinds, life, log, memory, portable, ranges, reading, schema, states, steps, tunable, units,
-    values,
+    Check, Rule, archive, arrays, binaries, dependencies, description, events, exchange, kinds, life,
+    log, memory, portable, ranges, reading, rule, schema, states, steps, tunable, units, values,
 };
-
-const fn rule(
-    id: &'static str,
-    severity: Severity,
-    title: &'static str,
-    source: &'static str,
-    check: Check,
-) -> Rule {
-    Rule { id, title, source, severity, check }
-}
 
 use Check::{Archive, Binaries, Calls, Description};
 

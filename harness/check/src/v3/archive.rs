@@ -1,6 +1,8 @@
 //! What is in the archive of an FMU 3.0 (FMI 3.0.2, sections 2.5 and 2.6), and its binaries.
 
 use super::Description;
+use crate::archive::folders_of;
+use crate::binaries::tuple;
 use crate::{Archive, Findings};
 use host::binary::{Binary, Kind};
 use host::fmi3::{Fmu, PLATFORM};
@@ -19,20 +21,7 @@ const AT_THE_TOP: [&str; 7] = [
 
 /// `zip.folders`
 pub fn folders(archive: &Archive, findings: &mut Findings) {
-    let mut unknown: Vec<&str> = archive
-        .entries
-        .iter()
-        .filter_map(|entry| entry.name.split(['/', '\\']).next())
-        .filter(|top| !AT_THE_TOP.contains(top) && *top != "..")
-        .collect();
-    unknown.sort_unstable();
-    unknown.dedup();
-    for name in unknown {
-        findings.add(
-            name,
-            format!("FMI 3.0 has no such file or folder (allowed: {})", AT_THE_TOP.join(", ")),
-        );
-    }
+    folders_of("3.0", &AT_THE_TOP, archive, findings);
 }
 
 fn has(archive: &Archive, name: &str) -> bool {
@@ -129,8 +118,6 @@ pub fn extra(archive: &Archive, findings: &mut Findings) {
 
 // ---------------------------------------------------------------- binaries
 
-const ARCHITECTURES: [&str; 8] =
-    ["aarch32", "aarch64", "riscv32", "riscv64", "x86", "x86_64", "ppc32", "ppc64"];
 /// Folders of FMI 2.0, and the tuple in their place.
 const OF_FMI_2: [(&str, &str); 6] = [
     ("win32", "x86-windows"),
@@ -140,28 +127,6 @@ const OF_FMI_2: [(&str, &str); 6] = [
     ("darwin32", "x86-darwin"),
     ("darwin64", "x86_64-darwin"),
 ];
-
-/// The ending of the library of a platform tuple, and what can be read of it here.
-fn tuple(folder: &str) -> Option<(&'static str, Option<Kind>)> {
-    let mut parts = folder.splitn(3, '-');
-    let (architecture, system) = (parts.next()?, parts.next()?);
-    if !ARCHITECTURES.contains(&architecture) {
-        return None;
-    }
-    let kind = match (architecture, system) {
-        ("x86_64", "linux") => Some(Kind::Linux),
-        ("aarch64", "linux") => Some(Kind::LinuxArm),
-        ("x86_64", "windows") => Some(Kind::Windows),
-        ("x86_64" | "aarch64", "darwin") => Some(Kind::MacOs),
-        _ => None,
-    };
-    match system {
-        "windows" => Some((".dll", kind)),
-        "linux" => Some((".so", kind)),
-        "darwin" => Some((".dylib", kind)),
-        _ => None,
-    }
-}
 
 /// The archive with the names that its binaries have.
 pub struct Binaries<'a> {

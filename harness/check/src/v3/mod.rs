@@ -13,17 +13,7 @@ pub use self::subject::Subject;
 
 use crate::Check::{Archive, Binaries3, Calls3, Description3};
 use crate::Severity::{Error, Warning};
-use crate::{Check, Rule, Severity, portable, reading};
-
-const fn rule(
-    id: &'static str,
-    severity: Severity,
-    title: &'static str,
-    source: &'static str,
-    check: Check,
-) -> Rule {
-    Rule { id, title, source, severity, check }
-}
+use crate::{Rule, portable, reading, rule};
 
 /// Every rule for FMI 3.0, group by group.
 #[rustfmt::skip]

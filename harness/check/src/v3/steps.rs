@@ -63,6 +63,17 @@ fn stepping_uses(subject: &Subject) -> Vec<Use> {
     uses.filter(|u| u.interface == Interface::CoSimulation).collect()
 }
 
+/// Those in which the host handles events; the rule is skipped if there are none.
+fn uses_with_events(subject: &Subject, findings: &mut Findings) -> Vec<Use> {
+    let uses = subject.uses().into_iter();
+    let uses: Vec<Use> =
+        uses.filter(|u| u.event_mode || u.interface == Interface::ModelExchange).collect();
+    if uses.is_empty() {
+        findings.skip("it has no event mode");
+    }
+    uses
+}
+
 /// Steps long enough to meet events.
 const LONG: usize = 200;
 
@@ -134,13 +145,7 @@ pub fn wrong(subject: &Subject, findings: &mut Findings) -> Result<()> {
 
 /// `events.answers`
 pub fn event_answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    let uses = subject.uses().into_iter();
-    let uses: Vec<Use> =
-        uses.filter(|u| u.event_mode || u.interface == Interface::ModelExchange).collect();
-    if uses.is_empty() {
-        findings.skip("it has no event mode");
-    }
-    for using in uses {
+    for using in uses_with_events(subject, findings) {
         let mut session = subject.session(using)?;
         session.enter_initialization()?;
         session.instance.exit_initialization_mode()?;
@@ -193,13 +198,7 @@ pub fn event_answers(subject: &Subject, findings: &mut Findings) -> Result<()> {
 
 /// `events.idempotent`
 pub fn idempotent(subject: &Subject, findings: &mut Findings) -> Result<()> {
-    let uses = subject.uses().into_iter();
-    let uses: Vec<Use> =
-        uses.filter(|u| u.event_mode || u.interface == Interface::ModelExchange).collect();
-    if uses.is_empty() {
-        findings.skip("it has no event mode");
-    }
-    for using in uses {
+    for using in uses_with_events(subject, findings) {
         let mut session = subject.running(using)?;
         session.advance(STEPS)?;
         if session.ended {
