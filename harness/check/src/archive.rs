@@ -302,9 +302,7 @@ pub fn folders_of(version: &str, allowed: &[&str], archive: &Archive, findings: 
     unknown.dedup();
     let allowed = allowed.join(", ");
     for name in unknown {
-        findings.add(
-            name,
-            format!("FMI {version} has no such file or folder (allowed: {allowed})"),
-        );
+        findings
+            .add(name, format!("FMI {version} has no such file or folder (allowed: {allowed})"));
     }
 }

@@ -8,6 +8,7 @@
 pub mod archive;
 pub mod arrays;
 pub mod binaries;
+pub mod definitions;
 pub mod dependencies;
 pub mod description;
 pub mod events;
@@ -28,12 +29,14 @@ pub mod sarif;
 pub mod schema;
 pub mod states;
 pub mod steps;
+pub mod structure;
 pub mod trace;
 pub mod tunable;
 pub mod under_test;
 pub mod units;
 pub mod v3;
 pub mod values;
+pub mod variables;
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -2,10 +2,13 @@
 
 pub mod archive;
 pub mod calls;
+pub mod definitions;
 pub mod description;
 pub mod schema;
 pub mod steps;
+pub mod structure;
 pub mod subject;
+pub mod variables;
 
 pub use self::archive::Binaries;
 pub use self::description::{Description, Variable};
@@ -34,42 +37,42 @@ pub static RULES: &[Rule] = &[
     rule("zip.extra", Warning, "extra/ holds folders in reverse domain notation", "2.5.1.6", Archive(archive::extra)),
     rule("zip.layered_standards", Error, "manifests of layered standards have name, version and description", "2.6", Archive(archive::layered_standards)),
 
-    rule("xml.well_formed", Error, "modelDescription.xml is well-formed XML in UTF-8", "2.4", Archive(crate::description::well_formed)),
+    rule("xml.well_formed", Error, "modelDescription.xml is well-formed XML in UTF-8", "2.4", Archive(crate::definitions::well_formed)),
     rule("xml.encoding", Error, "the first line of modelDescription.xml declares UTF-8", "2.4", Archive(reading::utf8)),
     rule("xml.size", Error, "modelDescription.xml is within the budgets of a host", "hosts that read the tree by recursion", Archive(reading::size)),
     rule("xml.doctype", Error, "modelDescription.xml has no document type declaration and no entities of its own", "parsers refuse it, expand entities without bound or open other files", Archive(reading::doctype)),
     rule("xml.schema", Error, "elements and attributes are those of the schema, in its order, none missing", "2.4, fmi3ModelDescription.xsd", Description3(schema::structure)),
     rule("xml.values", Error, "attributes are written as the schema says", "2.4, fmi3ModelDescription.xsd", Description3(schema::values)),
-    rule("xml.fmi_version", Error, "fmiVersion is exactly 3.0", "2.4.1", Description3(description::fmi_version)),
-    rule("xml.token", Error, "there is an instantiationToken", "2.4.1", Description3(description::token)),
-    rule("xml.interfaces", Error, "ModelExchange, CoSimulation or ScheduledExecution is there", "2.4.1", Description3(description::interfaces)),
-    rule("xml.model_identifier", Error, "modelIdentifier is an identifier of C", "2.4.2", Description3(description::model_identifier)),
-    rule("xml.capabilities", Error, "capability flags do not contradict each other", "2.4.2, 4.4", Description3(description::capabilities)),
-    rule("xml.default_experiment", Error, "times of the default experiment are finite, steps and tolerances above 0, the stop not before the start", "2.4.6", Description3(description::default_experiment)),
-    rule("xml.unique", Error, "names of units, display units, types, items and log categories, and values of items, are unique", "2.4.3 to 2.4.5", Description3(description::unique)),
-    rule("xml.units", Error, "every unit and displayUnit is defined, factors are finite and not 0", "2.4.3, 2.4.7.5", Description3(description::units)),
-    rule("xml.types", Error, "every declaredType is defined and of the variable's type", "2.4.4, 2.4.7.5", Description3(description::types)),
-    rule("xml.names", Error, "variables and aliases have names, each its own", "2.4.7.3, 2.4.7.5.1", Description3(description::names)),
-    rule("xml.structured_names", Error, "names follow the declared naming convention", "2.4.7.5.1", Description3(description::structured_names)),
-    rule("xml.references", Error, "every variable has a value reference of its own", "2.4.7.4", Description3(description::references)),
-    rule("xml.causality", Error, "causality, variability and type go together", "2.4.7.4, table of variability and causality", Description3(description::causality)),
-    rule("xml.initial", Error, "initial is allowed with the causality and variability", "2.4.7.5, table of initial", Description3(description::initial)),
-    rule("xml.start", Error, "start values are there where they must be and nowhere else: one, or one for each element", "2.4.7.5", Description3(description::start)),
-    rule("xml.finite", Error, "start, min, max and nominal are finite, nominal is above 0", "2.4.7.5; no host can set NaN", Description3(description::finite)),
-    rule("xml.range", Error, "min is not above max, start is between them and an item of its enumeration", "2.4.7.5", Description3(description::range)),
-    rule("xml.independent", Error, "exactly one independent variable, a floating-point number without start, min, max and initial", "2.4.7.4", Description3(description::independent)),
-    rule("xml.flags", Error, "canHandleMultipleSetPerTimeInstant belongs to inputs, intermediateUpdate to continuous variables", "2.4.7.4", Description3(description::flags)),
-    rule("xml.clocks", Error, "clocks and previous name variables that may be meant", "2.4.7.4", Description3(description::clocks)),
-    rule("xml.dimensions", Error, "a Dimension has start or valueReference, that of a structural parameter or constant of type UInt64 that starts above 0", "2.4.7.2, 2.4.7.4", Description3(description::dimensions)),
-    rule("xml.derivatives_of", Error, "derivative names another continuous floating-point number of the same dimensions; reinit belongs to states", "2.4.7.5", Description3(description::derivatives_of)),
-    rule("xml.outputs", Error, "ModelStructure lists every output once", "2.4.8", Description3(description::outputs)),
-    rule("xml.derivatives", Error, "ContinuousStateDerivative lists variables with the attribute derivative, one for each state", "2.4.8", Description3(description::derivatives)),
-    rule("xml.clocked_states", Error, "ClockedState lists every variable with the attribute previous", "2.4.8", Description3(description::clocked_states)),
-    rule("xml.initial_unknowns", Error, "InitialUnknown lists what is computed at the start, each once, and nothing else", "2.4.8", Description3(description::initial_unknowns)),
-    rule("xml.event_indicators", Error, "EventIndicator lists continuous floating-point numbers, each once", "2.4.8", Description3(description::event_indicators)),
-    rule("xml.structure_references", Error, "value references of ModelStructure are those of variables", "2.4.8", Description3(description::structure_references)),
-    rule("xml.dependencies", Error, "each dependency is listed once and has its kind, of those allowed for the unknown", "2.4.8", Description3(description::dependencies)),
-    rule("xml.dependencies_known", Error, "dependencies are on knowns", "2.4.8", Description3(description::dependencies_known)),
+    rule("xml.fmi_version", Error, "fmiVersion is exactly 3.0", "2.4.1", Description3(definitions::fmi_version)),
+    rule("xml.token", Error, "there is an instantiationToken", "2.4.1", Description3(definitions::token)),
+    rule("xml.interfaces", Error, "ModelExchange, CoSimulation or ScheduledExecution is there", "2.4.1", Description3(definitions::interfaces)),
+    rule("xml.model_identifier", Error, "modelIdentifier is an identifier of C", "2.4.2", Description3(definitions::model_identifier)),
+    rule("xml.capabilities", Error, "capability flags do not contradict each other", "2.4.2, 4.4", Description3(definitions::capabilities)),
+    rule("xml.default_experiment", Error, "times of the default experiment are finite, steps and tolerances above 0, the stop not before the start", "2.4.6", Description3(definitions::default_experiment)),
+    rule("xml.unique", Error, "names of units, display units, types, items and log categories, and values of items, are unique", "2.4.3 to 2.4.5", Description3(definitions::unique)),
+    rule("xml.units", Error, "every unit and displayUnit is defined, factors are finite and not 0", "2.4.3, 2.4.7.5", Description3(definitions::units)),
+    rule("xml.types", Error, "every declaredType is defined and of the variable's type", "2.4.4, 2.4.7.5", Description3(definitions::types)),
+    rule("xml.names", Error, "variables and aliases have names, each its own", "2.4.7.3, 2.4.7.5.1", Description3(variables::names)),
+    rule("xml.structured_names", Error, "names follow the declared naming convention", "2.4.7.5.1", Description3(variables::structured_names)),
+    rule("xml.references", Error, "every variable has a value reference of its own", "2.4.7.4", Description3(variables::references)),
+    rule("xml.causality", Error, "causality, variability and type go together", "2.4.7.4, table of variability and causality", Description3(variables::causality)),
+    rule("xml.initial", Error, "initial is allowed with the causality and variability", "2.4.7.5, table of initial", Description3(variables::initial)),
+    rule("xml.start", Error, "start values are there where they must be and nowhere else: one, or one for each element", "2.4.7.5", Description3(variables::start)),
+    rule("xml.finite", Error, "start, min, max and nominal are finite, nominal is above 0", "2.4.7.5; no host can set NaN", Description3(variables::finite)),
+    rule("xml.range", Error, "min is not above max, start is between them and an item of its enumeration", "2.4.7.5", Description3(variables::range)),
+    rule("xml.independent", Error, "exactly one independent variable, a floating-point number without start, min, max and initial", "2.4.7.4", Description3(variables::independent)),
+    rule("xml.flags", Error, "canHandleMultipleSetPerTimeInstant belongs to inputs, intermediateUpdate to continuous variables", "2.4.7.4", Description3(variables::flags)),
+    rule("xml.clocks", Error, "clocks and previous name variables that may be meant", "2.4.7.4", Description3(variables::clocks)),
+    rule("xml.dimensions", Error, "a Dimension has start or valueReference, that of a structural parameter or constant of type UInt64 that starts above 0", "2.4.7.2, 2.4.7.4", Description3(variables::dimensions)),
+    rule("xml.derivatives_of", Error, "derivative names another continuous floating-point number of the same dimensions; reinit belongs to states", "2.4.7.5", Description3(variables::derivatives_of)),
+    rule("xml.outputs", Error, "ModelStructure lists every output once", "2.4.8", Description3(structure::outputs)),
+    rule("xml.derivatives", Error, "ContinuousStateDerivative lists variables with the attribute derivative, one for each state", "2.4.8", Description3(structure::derivatives)),
+    rule("xml.clocked_states", Error, "ClockedState lists every variable with the attribute previous", "2.4.8", Description3(structure::clocked_states)),
+    rule("xml.initial_unknowns", Error, "InitialUnknown lists what is computed at the start, each once, and nothing else", "2.4.8", Description3(structure::initial_unknowns)),
+    rule("xml.event_indicators", Error, "EventIndicator lists continuous floating-point numbers, each once", "2.4.8", Description3(structure::event_indicators)),
+    rule("xml.structure_references", Error, "value references of ModelStructure are those of variables", "2.4.8", Description3(structure::structure_references)),
+    rule("xml.dependencies", Error, "each dependency is listed once and has its kind, of those allowed for the unknown", "2.4.8", Description3(structure::dependencies)),
+    rule("xml.dependencies_known", Error, "dependencies are on knowns", "2.4.8", Description3(structure::dependencies_known)),
 
     rule("bin.present", Error, "there is a library of the model's name for a platform tuple or in a vendor's folder, or sources", "2.5", Binaries3(archive::present)),
     rule("bin.tuples", Error, "folders are platform tuples, not the names of FMI 2.0", "2.5.1.4.1", Binaries3(archive::tuples)),

@@ -1,0 +1,246 @@
+//! Head and definitions of modelDescription.xml (FMI 2.0.5, section 2.2): interfaces, capabilities, units, types.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::Findings;
+use super::description::Description;
+use host::xml::{Element, Fault};
+
+/// `xml.well_formed`
+pub fn well_formed(archive: &super::Archive, findings: &mut Findings) {
+    match archive.file("modelDescription.xml") {
+        None => findings.skip("there is no modelDescription.xml that can be unpacked"),
+        Some(bytes) => {
+            let read = Element::read(bytes);
+            if let Err(Fault::TooLarge(_) | Fault::Doctype(_)) = read {
+                // rules of their own
+                findings.skip("modelDescription.xml is not read to its end");
+            } else if let Err(why) = read {
+                findings.add("modelDescription.xml", format!("line and column {why}"));
+            }
+        }
+    }
+}
+
+/// `xml.fmi_version`
+pub fn fmi_version(d: &Description, findings: &mut Findings) {
+    if let Some(other) = d.other_version() {
+        return findings.add(
+            "fmiVersion",
+            format!(
+                "\"{other}\": it is no FMU 2.0, and no other rule is looked at (allowed: \"2.0\")"
+            ),
+        );
+    }
+    match d.root.get("fmiVersion") {
+        Some("2.0") => {}
+        Some(other) => findings.add("fmiVersion", format!("\"{other}\" (allowed: \"2.0\")")),
+        None => findings.add("fmiVersion", "it is missing (allowed: \"2.0\")"),
+    }
+}
+
+/// `xml.guid`
+pub fn guid(d: &Description, findings: &mut Findings) {
+    if d.root.get("guid").is_none_or(|guid| guid.trim().is_empty()) {
+        findings.add("guid", "it is missing or empty");
+    }
+}
+
+/// `xml.date`
+pub fn date(d: &Description, findings: &mut Findings) {
+    if let Some(date) = d.root.get("generationDateAndTime")
+        && !(date.len() == 20 && date.ends_with('Z') && date.as_bytes().get(10) == Some(&b'T'))
+    {
+        findings.add(
+            "generationDateAndTime",
+            format!("\"{date}\" (allowed: in UTC, like 2026-01-31T12:00:00Z)"),
+        );
+    }
+}
+
+/// `xml.interfaces`
+pub fn interfaces(d: &Description, findings: &mut Findings) {
+    if d.interfaces().next().is_none() {
+        findings.add("fmiModelDescription", "neither ModelExchange nor CoSimulation is there");
+    }
+}
+
+/// `xml.model_identifier`
+pub fn model_identifier(d: &Description, findings: &mut Findings) {
+    for interface in d.interfaces() {
+        let name = interface.get("modelIdentifier").unwrap_or_default();
+        let first = name.chars().next();
+        let is_identifier = first.is_some_and(|c| c.is_ascii_alphabetic() || c == '_')
+            && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+        if !is_identifier {
+            findings.add(
+                format!("line {}, {}", interface.line, interface.name),
+                format!(
+                    "modelIdentifier=\"{name}\" (allowed: letters, digits and _, no digit first: \
+                     it becomes part of a C name)"
+                ),
+            );
+        }
+    }
+}
+
+/// `xml.capabilities`
+pub fn capabilities(d: &Description, findings: &mut Findings) {
+    for interface in d.interfaces() {
+        if interface.flag("canSerializeFMUstate") && !interface.flag("canGetAndSetFMUstate") {
+            findings.add(
+                format!("line {}, {}", interface.line, interface.name),
+                "canSerializeFMUstate without canGetAndSetFMUstate",
+            );
+        }
+    }
+    let first = d.model_exchange.as_ref().zip(d.co_simulation.as_ref());
+    if let Some((exchange, stepping)) = first
+        && exchange.get("modelIdentifier") == stepping.get("modelIdentifier")
+    {
+        const SHARED: [&str; 3] = [
+            "needsExecutionTool",
+            "canBeInstantiatedOnlyOncePerProcess",
+            "canNotUseMemoryManagementFunctions",
+        ];
+        for flag in SHARED {
+            if exchange.flag(flag) != stepping.flag(flag) {
+                findings.add(flag, "one binary, but the two interfaces say different things of it");
+            }
+        }
+    }
+}
+
+/// `xml.state_capability`
+pub fn state_capability(d: &Description, findings: &mut Findings) {
+    for interface in d.interfaces() {
+        for flag in ["canGetAndSetFMUstate", "canSerializeFMUstate"] {
+            if !interface.flag(flag) {
+                findings.add(
+                    format!("line {}, {}", interface.line, interface.name),
+                    format!("{flag} is not true"),
+                );
+            }
+        }
+    }
+}
+
+/// `xml.default_experiment`
+pub fn default_experiment(d: &Description, findings: &mut Findings) {
+    let Some(experiment) = d.root.child("DefaultExperiment") else {
+        return findings.skip("there is no DefaultExperiment");
+    };
+    let place = format!("line {}, DefaultExperiment", experiment.line);
+    let number = |name| experiment.number(name);
+    for name in ["startTime", "stopTime", "tolerance", "stepSize"] {
+        if let Some(x) = number(name)
+            && !(x.is_finite() && (x > 0.0 || name.ends_with("Time")))
+        {
+            findings
+                .add(&place, format!("{name}={x} (allowed: finite, steps and tolerances above 0)"));
+        }
+    }
+    let start = number("startTime").unwrap_or(0.0);
+    if let Some(stop) = number("stopTime").filter(|stop| *stop >= start) {
+        if stop == start {
+            findings.add(&place, format!("stopTime={stop} (allowed: above startTime {start})"));
+        } else if let Some(step) = number("stepSize").filter(|step| *step > stop - start) {
+            findings.add(
+                &place,
+                format!(
+                    "stepSize={step} (allowed: at most stopTime - startTime = {})",
+                    stop - start
+                ),
+            );
+        }
+    }
+}
+
+/// `xml.stop_time`
+pub fn stop_time(d: &Description, findings: &mut Findings) {
+    let Some(experiment) = d.root.child("DefaultExperiment") else {
+        return findings.skip("there is no DefaultExperiment");
+    };
+    let start = experiment.number("startTime").unwrap_or(0.0);
+    if let Some(stop) = experiment.number("stopTime").filter(|stop| *stop < start) {
+        findings.add(
+            format!("line {}, DefaultExperiment", experiment.line),
+            format!("stopTime={stop} is before startTime={start} (allowed: after it)"),
+        );
+    }
+}
+
+/// `xml.unique`
+pub fn unique(d: &Description, findings: &mut Findings) {
+    let mut one = |what: &str, elements: &mut dyn Iterator<Item = &Element>, attribute: &str| {
+        let mut seen = BTreeSet::new();
+        for element in elements {
+            if let Some(value) = element.get(attribute)
+                && !seen.insert(value)
+            {
+                findings.add(
+                    format!("line {}, {what}", element.line),
+                    format!("the {attribute} \"{value}\" is there already"),
+                );
+            }
+        }
+    };
+    one("Unit", &mut d.root.list("UnitDefinitions"), "name");
+    one("SimpleType", &mut d.root.list("TypeDefinitions"), "name");
+    one("Category", &mut d.root.list("LogCategories"), "name");
+    for unit in d.root.list("UnitDefinitions") {
+        one("DisplayUnit", &mut unit.children.iter().filter(|c| c.name == "DisplayUnit"), "name");
+    }
+    for simple in d.root.list("TypeDefinitions") {
+        for attribute in ["name", "value"] {
+            one("Item", &mut simple.list("Enumeration"), attribute);
+        }
+    }
+}
+
+/// `xml.units`
+pub fn units(d: &Description, findings: &mut Findings) {
+    let units: BTreeMap<&str, &Element> =
+        d.root.list("UnitDefinitions").filter_map(|unit| Some((unit.get("name")?, unit))).collect();
+    d.each(findings, |v| {
+        let unit = v.typed.get("unit");
+        let display_unit = v.typed.get("displayUnit");
+        let defined = |name: &str| units.get(name);
+        match (unit, display_unit) {
+            (None, Some(shown)) => Some(format!("displayUnit \"{shown}\" without a unit")),
+            (Some(unit), _) if defined(unit).is_none() => {
+                Some(format!("the unit \"{unit}\" is not among UnitDefinitions"))
+            }
+            (Some(unit), Some(shown)) => {
+                let all = defined(unit).into_iter().flat_map(|unit| &unit.children);
+                let mut all = all.filter(|c| c.name == "DisplayUnit").filter_map(|c| c.get("name"));
+                (shown != unit && !all.any(|name| name == shown))
+                    .then(|| format!("displayUnit \"{shown}\" is not defined for \"{unit}\""))
+            }
+            _ => None,
+        }
+    });
+}
+
+/// `xml.types`
+pub fn types(d: &Description, findings: &mut Findings) {
+    let types: BTreeMap<&str, &str> = d
+        .root
+        .list("TypeDefinitions")
+        .filter_map(|t| Some((t.get("name")?, t.children.first()?.name.as_str())))
+        .collect();
+    d.each(findings, |v| {
+        let declared = v.typed.get("declaredType")?;
+        match types.get(declared) {
+            None => Some(format!("declaredType \"{declared}\" is not among TypeDefinitions")),
+            Some(kind) if *kind != v.typed.name => {
+                Some(format!("it is a {}, its declaredType \"{declared}\" a {kind}", v.typed.name))
+            }
+            Some(_) => None,
+        }
+    });
+    let used: BTreeSet<&str> = d.variables.iter().map(|v| v.name.as_str()).collect();
+    for name in types.keys().filter(|name| used.contains(*name)) {
+        findings.add(format!("SimpleType \"{name}\""), "a variable has the same name");
+    }
+}

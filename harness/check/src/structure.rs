@@ -1,0 +1,177 @@
+//! ModelStructure of modelDescription.xml (FMI 2.0.5, section 2.2), and dependencies.
+
+use std::collections::BTreeSet;
+
+use super::Findings;
+use super::description::{Description, Unknown, Variable};
+
+/// Says what is missing, repeated, or listed although it must not be.
+fn compare(
+    d: &Description,
+    findings: &mut Findings,
+    list: &str,
+    listed: &[Unknown],
+    expected: &BTreeSet<usize>,
+    why: &str,
+) {
+    let mut seen = BTreeSet::new();
+    for unknown in listed {
+        let place = format!("line {}, {list}, {}", unknown.line, d.name_of(unknown.index));
+        // An index out of range is another rule's business.
+        if d.at(unknown.index).is_some() && !expected.contains(&unknown.index) {
+            findings.add(&place, format!("it is not allowed here (allowed: {why})"));
+        }
+        if !seen.insert(unknown.index) {
+            findings.add(&place, "it is listed already");
+        }
+    }
+    for missing in expected.difference(&seen) {
+        findings.add(
+            format!("{list}, {}", d.name_of(*missing)),
+            format!("it is missing (required: {why})"),
+        );
+    }
+}
+
+fn indices(d: &Description, wanted: impl Fn(&Variable) -> bool) -> BTreeSet<usize> {
+    d.variables.iter().filter(|v| wanted(v)).map(|v| v.index).collect()
+}
+
+/// `xml.outputs`
+pub fn outputs(d: &Description, findings: &mut Findings) {
+    let expected = indices(d, |v| v.causality == "output");
+    compare(d, findings, "Outputs", &d.outputs, &expected, "every output, once");
+}
+
+/// `xml.derivatives`
+pub fn derivatives(d: &Description, findings: &mut Findings) {
+    let expected = indices(d, |v| v.derivative_of().is_some());
+    if d.model_exchange.is_none() && d.derivatives.is_empty() {
+        return findings.skip("Co-Simulation alone need not list derivatives");
+    }
+    let why = "every variable with the attribute derivative, once";
+    compare(d, findings, "Derivatives", &d.derivatives, &expected, why);
+}
+
+/// `xml.initial_unknowns`
+pub fn initial_unknowns(d: &Description, findings: &mut Findings) {
+    let states = d.states();
+    let expected = indices(d, |v| {
+        let computed = matches!(v.initial.as_deref(), Some("calculated" | "approx"));
+        let state = states.contains(&v.index) || v.derivative_of().is_some();
+        computed && (v.causality == "output" || v.causality == "calculatedParameter" || state)
+    });
+    // What a Co-Simulation FMU says of its states is up to it.
+    let expected = match d.derivatives.is_empty() && d.model_exchange.is_none() {
+        true => indices(d, |v| {
+            expected.contains(&v.index)
+                && (v.causality != "local" || d.initial_unknowns.iter().any(|u| u.index == v.index))
+        }),
+        false => expected,
+    };
+    let why = "outputs, states and derivatives with initial calculated or approx, and calculated \
+               parameters, once";
+    compare(d, findings, "InitialUnknowns", &d.initial_unknowns, &expected, why);
+    for pair in d.initial_unknowns.windows(2) {
+        if pair[1].index < pair[0].index {
+            findings.add(
+                format!("line {}, InitialUnknowns, {}", pair[1].line, d.name_of(pair[1].index)),
+                format!("index {} after {} (required: ascending)", pair[1].index, pair[0].index),
+            );
+        }
+    }
+}
+
+/// The three lists of ModelStructure with their names.
+fn lists(d: &Description) -> [(&'static str, &[Unknown]); 3] {
+    [
+        ("Outputs", &d.outputs),
+        ("Derivatives", &d.derivatives),
+        ("InitialUnknowns", &d.initial_unknowns),
+    ]
+}
+
+/// `xml.indices`
+pub fn indices_in_range(d: &Description, findings: &mut Findings) {
+    let count = d.variables.len();
+    for (list, unknowns) in lists(d) {
+        for unknown in unknowns {
+            let place = format!("line {}, {list}", unknown.line);
+            if d.at(unknown.index).is_none() {
+                findings.add(&place, format!("index {} (allowed: 1 to {count})", unknown.index));
+            }
+            for index in unknown.dependencies.iter().flatten().filter(|i| d.at(**i).is_none()) {
+                findings.add(&place, format!("dependency {index} (allowed: 1 to {count})"));
+            }
+        }
+    }
+}
+
+/// `xml.dependencies`
+pub fn dependencies(d: &Description, findings: &mut Findings) {
+    for (list, unknowns) in lists(d) {
+        let initial = list == "InitialUnknowns";
+        for unknown in unknowns {
+            let place = format!("line {}, {list}, {}", unknown.line, d.name_of(unknown.index));
+            let dependencies = unknown.dependencies.as_deref().unwrap_or_default();
+            if let Some(kinds) = &unknown.kinds {
+                if unknown.dependencies.is_none() {
+                    findings.add(&place, "dependenciesKind without dependencies");
+                } else if kinds.len() != dependencies.len() {
+                    let (kinds, all) = (kinds.len(), dependencies.len());
+                    findings.add(&place, format!("{all} dependencies, but {kinds} kinds of them"));
+                }
+                let odd = kinds.iter().find(|k| !matches!(k.as_str(), "dependent" | "constant"));
+                if let Some(odd) = odd.filter(|_| initial) {
+                    findings.add(
+                        &place,
+                        format!("dependenciesKind {odd} (allowed: dependent, constant)"),
+                    );
+                }
+            }
+            let distinct: BTreeSet<_> = dependencies.iter().collect();
+            if distinct.len() < dependencies.len() {
+                findings.add(&place, "a dependency is listed twice");
+            }
+        }
+    }
+}
+
+/// `xml.dependencies_known`
+pub fn dependencies_known(d: &Description, findings: &mut Findings) {
+    let states = d.states();
+    for (list, unknowns) in lists(d) {
+        let initial = list == "InitialUnknowns";
+        for unknown in unknowns {
+            let place = format!("line {}, {list}, {}", unknown.line, d.name_of(unknown.index));
+            let dependencies = unknown.dependencies.as_deref().unwrap_or_default();
+            let known = |v: &Variable| {
+                let common = v.causality == "input" || v.causality == "independent";
+                match initial {
+                    true => common || v.initial.as_deref() == Some("exact"),
+                    // a Co-Simulation FMU may hide its derivatives and still name its states
+                    false => common || states.contains(&v.index) || d.model_exchange.is_none(),
+                }
+            };
+            for v in dependencies.iter().filter_map(|i| d.at(*i)).filter(|v| !known(v)) {
+                let allowed = match initial {
+                    true => "inputs, variables with initial=exact",
+                    false => "inputs, continuous states, the independent variable",
+                };
+                findings
+                    .add(&place, format!("it cannot depend on {} (allowed: {allowed})", v.name));
+            }
+        }
+    }
+}
+
+/// `xml.dependencies_written`
+pub fn dependencies_written(d: &Description, findings: &mut Findings) {
+    for unknown in d.outputs.iter().filter(|unknown| unknown.dependencies.is_none()) {
+        findings.add(
+            format!("line {}, Outputs, {}", unknown.line, d.name_of(unknown.index)),
+            "no attribute dependencies: that means it depends on everything (write \
+             dependencies=\"\" where there is no feedthrough)",
+        );
+    }
+}

@@ -1,0 +1,176 @@
+//! ModelStructure of modelDescription.xml (FMI 3.0.2, section 2.4), and dependencies.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::description::{Description, Unknown, Variable};
+use crate::Findings;
+use host::description::Type;
+
+fn place(d: &Description, u: &Unknown) -> String {
+    format!("line {}, {}, {}", u.line, u.list, d.name_of(u.reference))
+}
+
+/// Says what is missing, repeated, or listed although it must not be.
+fn compare(
+    d: &Description,
+    findings: &mut Findings,
+    list: &str,
+    needed: &BTreeSet<u32>,
+    allowed: impl Fn(&Variable) -> bool,
+    why: &str,
+) {
+    let mut seen = BTreeSet::new();
+    for unknown in d.unknowns(list) {
+        let Some(reference) = unknown.reference else { continue };
+        if d.at(reference).is_some_and(|v| !allowed(v)) {
+            findings.add(place(d, unknown), format!("it is not allowed here (allowed: {why})"));
+        }
+        if !seen.insert(reference) {
+            findings.add(place(d, unknown), "it is listed already");
+        }
+    }
+    for missing in needed.difference(&seen) {
+        findings.add(
+            format!("{list}, {}", d.name_of(Some(*missing))),
+            format!("it is missing (required: {why})"),
+        );
+    }
+}
+
+fn all(d: &Description, wanted: impl Fn(&Variable) -> bool) -> BTreeSet<u32> {
+    d.variables.iter().filter(|v| wanted(v)).map(|v| v.reference).collect()
+}
+
+/// `xml.outputs`
+pub fn outputs(d: &Description, findings: &mut Findings) {
+    let is_output = |v: &Variable| v.causality == "output";
+    compare(d, findings, "Output", &all(d, is_output), is_output, "every output, once");
+}
+
+/// `xml.derivatives`
+pub fn derivatives(d: &Description, findings: &mut Findings) {
+    let why = "variables with the attribute derivative, once";
+    let allowed = |v: &Variable| v.derivative_of().is_some();
+    compare(d, findings, "ContinuousStateDerivative", &BTreeSet::new(), allowed, why);
+    let mut taken: BTreeMap<u32, String> = BTreeMap::new();
+    for unknown in d.unknowns("ContinuousStateDerivative") {
+        let v = unknown.reference.and_then(|r| d.at(r));
+        if let Some(v) = v
+            && let Some(state) = v.derivative_of()
+            && let Some(other) =
+                taken.insert(state, v.name.clone()).filter(|other| *other != v.name)
+        {
+            findings.add(place(d, unknown), format!("{other} is the derivative of the same state"));
+        }
+    }
+}
+
+/// `xml.clocked_states`
+pub fn clocked_states(d: &Description, findings: &mut Findings) {
+    let is_state = |v: &Variable| v.written.get("previous").is_some();
+    let why = "every variable with the attribute previous, once";
+    compare(d, findings, "ClockedState", &all(d, is_state), is_state, why);
+}
+
+/// `xml.initial_unknowns`
+pub fn initial_unknowns(d: &Description, findings: &mut Findings) {
+    let derivatives: BTreeSet<u32> =
+        d.unknowns("ContinuousStateDerivative").filter_map(|u| u.reference).collect();
+    let states: BTreeSet<u32> = d.states().into_iter().collect();
+    let needed = |v: &Variable| {
+        let computed = matches!(v.initial.as_deref(), Some("calculated" | "approx"));
+        let state = states.contains(&v.reference) || derivatives.contains(&v.reference);
+        v.written.get("clocks").is_none()
+            && v.kind != Type::Clock
+            && (v.causality == "calculatedParameter"
+                || (computed && (v.causality == "output" || state)))
+    };
+    let why = "outputs, states and their derivatives with initial calculated or approx, calculated \
+               parameters, once; clocked variables";
+    let allowed = |v: &Variable| needed(v) || v.written.get("clocks").is_some();
+    compare(d, findings, "InitialUnknown", &all(d, needed), allowed, why);
+}
+
+/// `xml.event_indicators`
+pub fn event_indicators(d: &Description, findings: &mut Findings) {
+    let why = "continuous Float32 and Float64, each once";
+    compare(d, findings, "EventIndicator", &BTreeSet::new(), Variable::is_continuous, why);
+}
+
+/// `xml.structure_references`
+pub fn structure_references(d: &Description, findings: &mut Findings) {
+    for unknown in &d.structure {
+        let all =
+            unknown.reference.into_iter().chain(unknown.dependencies.iter().flatten().copied());
+        for reference in all.filter(|r| d.at(*r).is_none()) {
+            findings.add(
+                format!("line {}, {}", unknown.line, unknown.list),
+                format!("no variable has the valueReference {reference}"),
+            );
+        }
+    }
+}
+
+/// `xml.dependencies`
+pub fn dependencies(d: &Description, findings: &mut Findings) {
+    for unknown in &d.structure {
+        let place = place(d, unknown);
+        let listed = unknown.dependencies.as_deref().unwrap_or_default();
+        let distinct: BTreeSet<_> = listed.iter().collect();
+        if distinct.len() < listed.len() {
+            findings.add(&place, "a dependency is listed twice");
+        }
+        let Some(kinds) = &unknown.kinds else { continue };
+        if unknown.dependencies.is_none() {
+            findings.add(&place, "dependenciesKind without dependencies");
+        } else if kinds.len() != listed.len() {
+            let (kinds, all) = (kinds.len(), listed.len());
+            findings.add(&place, format!("{all} dependencies, but {kinds} kinds of them"));
+        }
+        let is_float = unknown.reference.and_then(|r| d.at(r)).is_none_or(Variable::is_float);
+        for kind in kinds {
+            let fits = match kind.as_str() {
+                "dependent" => true,
+                "constant" => is_float,
+                _ => is_float && unknown.list != "InitialUnknown",
+            };
+            if !fits {
+                let allowed = if is_float { "dependent, constant" } else { "dependent" };
+                findings.add(&place, format!("dependenciesKind {kind} (allowed: {allowed})"));
+            }
+        }
+    }
+}
+
+/// `xml.dependencies_known`
+pub fn dependencies_known(d: &Description, findings: &mut Findings) {
+    let states: BTreeSet<u32> = d.states().into_iter().collect();
+    // what event indicators may depend on is not said
+    for unknown in d.structure.iter().filter(|u| u.list != "EventIndicator") {
+        let initial = unknown.list == "InitialUnknown";
+        let known = |v: &Variable| {
+            matches!(
+                v.causality.as_str(),
+                "input" | "independent" | "parameter" | "structuralParameter"
+            ) || match initial {
+                true => v.initial.as_deref() == Some("exact"),
+                // a discrete variable may be a discrete-time state
+                false => states.contains(&v.reference) || v.variability == "discrete",
+            } || v.kind == Type::Clock
+                || v.written.get("clocks").is_some()
+        };
+        let listed = unknown.dependencies.iter().flatten().filter_map(|r| d.at(*r));
+        for v in listed.filter(|v| !known(v)) {
+            let allowed = match initial {
+                true => "inputs, variables with initial=exact, the independent variable",
+                false => {
+                    "inputs, continuous and discrete states, parameters, the independent variable"
+                }
+            };
+            findings.add(
+                place(d, unknown),
+                format!("it cannot depend on {} (allowed: {allowed})", v.name),
+            );
+        }
+    }
+}

@@ -1,0 +1,392 @@
+//! Variables of modelDescription.xml (FMI 2.0.5, section 2.2): names, causality, start values, ranges.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::Findings;
+use super::description::{Description, Variable, initials};
+use host::description::Type;
+use host::xml::double;
+
+/// `xml.names`
+pub fn names(d: &Description, findings: &mut Findings) {
+    let mut seen: BTreeMap<&str, u64> = BTreeMap::new();
+    for v in &d.variables {
+        if v.name.is_empty() {
+            findings.add(v.place(), "the name is empty");
+        } else if let Some(line) = seen.insert(&v.name, v.line) {
+            findings.add(v.place(), format!("line {line} has the same name"));
+        }
+    }
+}
+
+/// `xml.structured_names`
+pub fn structured_names(d: &Description, findings: &mut Findings) {
+    if d.root.get("variableNamingConvention") != Some("structured") {
+        return findings.skip("names are not declared as structured");
+    }
+    d.each(findings, |v| {
+        (!is_structured(&v.name))
+            .then(|| "the name is no path like a.b[1].c, der(a.b) or a.'b c'".to_string())
+    });
+}
+
+/// The grammar of section 2.2.9.
+pub(crate) fn is_structured(name: &str) -> bool {
+    if let Some(inner) = name.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')')) {
+        // A comma after the last index is the order's, one between brackets the indices'.
+        return match inner.rsplit_once(',') {
+            Some((path, order)) if !order.contains(']') => {
+                is_structured(path) && order.trim().parse::<u32>().is_ok()
+            }
+            _ => is_structured(inner),
+        };
+    }
+    // An identifier, then indices, then a point and the next one.
+    let mut rest = name;
+    loop {
+        let end = match rest.strip_prefix('\'') {
+            Some(quoted) => {
+                let escaped = |at: usize| quoted[..at].ends_with('\\');
+                let close = quoted.match_indices('\'').find(|(at, _)| !escaped(*at));
+                close.map_or(0, |(at, _)| at + 2)
+            }
+            None if rest.starts_with(|c: char| c.is_ascii_digit()) => 0,
+            None => {
+                rest.find(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).unwrap_or(rest.len())
+            }
+        };
+        if end == 0 {
+            return false;
+        }
+        rest = &rest[end..];
+        if let Some(open) = rest.strip_prefix('[') {
+            let Some((indices, after)) = open.split_once(']') else { return false };
+            if !indices.split(',').all(|i| i.trim().parse::<u32>().is_ok()) {
+                return false;
+            }
+            rest = after;
+        }
+        match rest.strip_prefix('.') {
+            _ if rest.is_empty() => return true,
+            Some(next) => rest = next,
+            None => return false,
+        }
+    }
+}
+
+/// `xml.parameter_names`
+pub fn parameter_names(d: &Description, findings: &mut Findings) {
+    const LONGEST: usize = 55;
+    d.each(findings, |v| {
+        let length = v.name.chars().count();
+        (v.causality == "parameter" && length > LONGEST)
+            .then(|| format!("the name has {length} characters (allowed: {LONGEST})"))
+    });
+}
+
+/// `xml.flat_ports`
+///
+/// A point makes a member of a structure of the name, and importers that know such names make one port of all its
+/// members. An index makes an element of an array (2.2.9), of which importers make a vector or leave the elements
+/// alone: both can be wired, if the array is whole.
+pub fn flat_ports(d: &Description, findings: &mut Findings) {
+    let is_structured = d.root.get("variableNamingConvention") == Some("structured");
+    let is_port = |v: &&Variable| matches!(v.causality.as_str(), "input" | "output");
+    // Elements of each array by name, in the order of the variables.
+    let mut arrays: BTreeMap<(&str, &str), Vec<Vec<u32>>> = BTreeMap::new();
+    for v in d.variables.iter().filter(is_port) {
+        if let Some((array, index)) = indexed(&v.name) {
+            arrays.entry((&v.causality, array)).or_default().push(index);
+        }
+    }
+    d.each(findings, |v| {
+        if !is_port(&v) {
+            return None;
+        }
+        if v.name.contains('.') {
+            return Some("the name of a port has a point".to_string());
+        }
+        if !v.name.contains(['[', ']']) {
+            return None;
+        }
+        if !is_structured {
+            return Some("the name of a port has a bracket, and names are not structured".to_string());
+        }
+        let whole = indexed(&v.name)
+            .and_then(|(array, _)| arrays.get(&(v.causality.as_str(), array)))
+            .is_some_and(|indices| is_whole(indices));
+        (!whole).then(|| {
+            "the port is an element of an array some of whose elements are missing (allowed: every index \
+             from 1 to the last, each once, all inputs or all outputs)"
+                .to_string()
+        })
+    });
+}
+
+/// Array and indices of `array[1,2]`.
+fn indexed(name: &str) -> Option<(&str, Vec<u32>)> {
+    let (array, indices) = name.strip_suffix(']')?.split_once('[')?;
+    let indices: Option<Vec<u32>> = indices.split(',').map(|i| i.trim().parse().ok()).collect();
+    Some((array, indices?))
+}
+
+/// Whether these are all indices of an array, each once.
+fn is_whole(indices: &[Vec<u32>]) -> bool {
+    let dimensions = indices[0].len();
+    if indices.iter().any(|index| index.len() != dimensions || index.contains(&0)) {
+        return false;
+    }
+    let last = |k: usize| indices.iter().map(|index| index[k] as usize).max().unwrap_or(0);
+    let count = (0..dimensions).try_fold(1_usize, |count, k| count.checked_mul(last(k)));
+    let different: BTreeSet<_> = indices.iter().collect();
+    count == Some(indices.len()) && different.len() == indices.len()
+}
+
+/// `xml.causality`
+pub fn causality(d: &Description, findings: &mut Findings) {
+    d.each(findings, |v| {
+        let (causality, variability) = (v.causality.as_str(), v.variability.as_str());
+        if initials(causality, variability).is_none() {
+            let all = ["constant", "fixed", "tunable", "discrete", "continuous"];
+            let allowed: Vec<_> =
+                all.into_iter().filter(|v| initials(causality, v).is_some()).collect();
+            let allowed = allowed.join(", ");
+            return Some(format!(
+                "causality {causality} with variability {variability} (allowed: {allowed})"
+            ));
+        }
+        (variability == "continuous" && v.kind != Type::Real)
+            .then(|| format!("a continuous {} (allowed: Real alone)", v.typed.name))
+    });
+}
+
+/// `xml.variability`
+pub fn variability(d: &Description, findings: &mut Findings) {
+    d.each(findings, |v| {
+        (v.kind != Type::Real && v.written.get("variability").is_none()).then(|| {
+            format!("variability is not written, and the schema's default, continuous, is not allowed for {}", v.typed.name)
+        })
+    });
+}
+
+/// `xml.initial`
+pub fn initial(d: &Description, findings: &mut Findings) {
+    d.each(findings, |v| {
+        let written = v.written.get("initial")?;
+        // A combination that is not allowed is another rule's business.
+        let allowed = initials(&v.causality, &v.variability)?;
+        let how = if allowed.is_empty() { "none".into() } else { allowed.join(", ") };
+        (!allowed.contains(&written)).then(|| {
+            format!(
+                "initial={written} with causality {} and variability {} (allowed: {how})",
+                v.causality, v.variability
+            )
+        })
+    });
+}
+
+/// `xml.start`
+pub fn start(d: &Description, findings: &mut Findings) {
+    d.each(findings, |v| {
+        let start = v.typed.get("start").is_some();
+        let initial = v.initial.as_deref();
+        if v.causality == "independent" || initial == Some("calculated") {
+            return start.then(|| {
+                let why = initial.map_or("independent".into(), |i| format!("initial={i}"));
+                format!("a start value with {why} (allowed: none)")
+            });
+        }
+        let needed = v.causality == "input"
+            || v.variability == "constant"
+            || matches!(initial, Some("exact" | "approx"));
+        (needed && !start).then(|| {
+            let why = initial.map_or(v.causality.clone(), |i| format!("initial={i}"));
+            format!("no start value with {why}")
+        })
+    });
+}
+
+/// `xml.finite`
+pub fn finite(d: &Description, findings: &mut Findings) {
+    d.each(findings, |v| {
+        let wrong = ["start", "min", "max", "nominal"].into_iter().find_map(|name| {
+            let x = v.typed.number(name).filter(|_| v.kind == Type::Real)?;
+            let fits = x.is_finite() && (name != "nominal" || x > 0.0);
+            (!fits).then_some((name, x))
+        });
+        wrong.map(|(name, x)| match name {
+            "nominal" => format!("nominal={x} (allowed: finite, above 0)"),
+            _ => format!("{name}={x} (allowed: finite numbers)"),
+        })
+    });
+}
+
+/// `xml.range`
+pub fn range(d: &Description, findings: &mut Findings) {
+    let items = |name: &str| -> Vec<f64> {
+        let simple = d.root.list("TypeDefinitions").find(|t| t.get("name") == Some(name));
+        simple
+            .into_iter()
+            .flat_map(|t| t.list("Enumeration"))
+            .filter_map(|item| item.number("value"))
+            .collect()
+    };
+    d.each(findings, |v| {
+        let (min, max) = v.bounds();
+        if min > max {
+            return Some(format!("min={min} is above max={max}"));
+        }
+        let start = v.typed.get("start").and_then(double)?;
+        if matches!(v.kind, Type::Boolean | Type::String) {
+            return None;
+        }
+        if start < min || start > max {
+            return Some(format!("start={start} (allowed: {min} to {max})"));
+        }
+        if v.kind == Type::Enumeration {
+            let items = v.typed.get("declaredType").map(items).unwrap_or_default();
+            let list: Vec<_> = items.iter().map(f64::to_string).collect();
+            return (!items.is_empty() && !items.contains(&start))
+                .then(|| format!("start={start} is no item (allowed: {})", list.join(", ")));
+        }
+        None
+    });
+}
+
+/// `xml.aliases`
+pub fn aliases(d: &Description, findings: &mut Findings) {
+    // Integers and enumerations share their calls.
+    let group = |v: &Variable| match v.kind {
+        Type::Real => 0,
+        Type::Integer | Type::Enumeration => 1,
+        Type::Boolean => 2,
+        // FMI 2.0 has no Binary and no Clock
+        Type::String | Type::Binary | Type::Clock => 3,
+    };
+    let mut sets: BTreeMap<(i32, u32), Vec<&Variable>> = BTreeMap::new();
+    for v in &d.variables {
+        sets.entry((group(v), v.reference)).or_default().push(v);
+    }
+    for set in sets.values().filter(|set| set.len() > 1) {
+        let first = set[0];
+        let names: Vec<_> = set.iter().map(|v| v.name.as_str()).collect();
+        let place = format!("valueReference {}, {}", first.reference, names.join(" = "));
+        let settable = set.iter().filter(|v| v.is_set_by_hosts()).count();
+        if settable > 1 {
+            findings.add(&place, format!("{settable} of them are set by hosts (allowed: one)"));
+        }
+        let started =
+            set.iter().filter(|v| v.typed.get("start").is_some() && v.variability != "constant");
+        if settable <= 1 && started.count() > 1 {
+            findings.add(&place, "several of them have a start value (allowed: one)");
+        }
+        if set.iter().any(|v| v.typed.get("unit") != first.typed.get("unit")) {
+            findings.add(&place, "one value, but several units");
+        }
+        let constant = |v: &Variable| v.variability == "constant";
+        if set.iter().any(|v| constant(v) != constant(first)) {
+            findings.add(&place, "one value, but constant and not constant");
+        }
+        if set.iter().any(|v| v.kind != first.kind) {
+            findings.add(&place, "one value, but several types");
+        }
+    }
+}
+
+/// `xml.independent`
+pub fn independent(d: &Description, findings: &mut Findings) {
+    let all: Vec<_> = d.variables.iter().filter(|v| v.causality == "independent").collect();
+    if all.len() > 1 {
+        findings.add(all[1].place(), format!("{} independent variables (allowed: one)", all.len()));
+    }
+    for v in all.iter().filter(|v| v.kind != Type::Real) {
+        findings.add(v.place(), "the independent variable is no Real");
+    }
+}
+
+/// `xml.multiple_set`
+pub fn multiple_set(d: &Description, findings: &mut Findings) {
+    d.each(findings, |v| {
+        v.written.get("canHandleMultipleSetPerTimeInstant")?;
+        if d.model_exchange.is_none() {
+            return Some("canHandleMultipleSetPerTimeInstant without ModelExchange".into());
+        }
+        (v.causality != "input")
+            .then(|| format!("canHandleMultipleSetPerTimeInstant of causality {}", v.causality))
+    });
+}
+
+/// `xml.states`
+pub fn states(d: &Description, findings: &mut Findings) {
+    let mut taken = BTreeMap::new();
+    d.each(findings, |v| {
+        v.typed.get("derivative")?;
+        let index = v.derivative_of().unwrap_or(0);
+        let Some(state) = d.at(index) else {
+            return Some(format!("derivative={index} (allowed: 1 to {})", d.variables.len()));
+        };
+        if !(v.is_continuous() && state.is_continuous()) {
+            return Some(format!("it and its state {} must be continuous Reals", state.name));
+        }
+        (index == v.index).then(|| "it is its own derivative".to_string())
+    });
+    for v in &d.variables {
+        if let Some(index) = v.derivative_of()
+            && let Some(other) = taken.insert(index, &v.name)
+        {
+            let name = d.name_of(index);
+            findings.add(v.place(), format!("{other} is a derivative of {name} as well"));
+        }
+    }
+    let states = d.states();
+    d.each(findings, |v| {
+        (v.typed.flag("reinit") && !states.contains(&v.index))
+            .then(|| "reinit, but it is no state: nobody is its derivative".to_string())
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn structured_names_are_paths() {
+        for right in [
+            "a",
+            "a.b_1[2,3].c",
+            "der(a.b)",
+            "der(a[1],2)",
+            "der(a[1].b[2,3])",
+            "der(a[1,2],2)",
+            "a.'b c\\'d'.e",
+            "_x",
+        ] {
+            assert!(is_structured(right), "{right}");
+        }
+        for wrong in ["", "a b", "1a", "a..b", "a.", "a[x]", "a[1", "der(a,b)", "a-b", "'a"] {
+            assert!(!is_structured(wrong), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn arrays_are_whole_from_index_1_to_the_last() {
+        let whole = |names: &[&str]| {
+            is_whole(&names.iter().map(|name| indexed(name).unwrap().1).collect::<Vec<_>>())
+        };
+        assert!(whole(&["a[1]"]) && whole(&["a[2]", "a[1]"]));
+        assert!(whole(&["a[1,1]", "a[1,2]", "a[2,1]", "a[2,2]"]));
+        for broken in [
+            &["a[0]"][..],
+            &["a[2]"],
+            &["a[1]", "a[3]"],
+            &["a[1]", "a[1]"],
+            &["a[1,1]", "a[2,2]"],
+            &["a[1]", "a[1,2]"],
+            &["a[4294967295,4294967295,4294967295]"],
+        ] {
+            assert!(!whole(broken), "{broken:?}");
+        }
+        assert_eq!(indexed("a"), None);
+        assert_eq!(indexed("a[x]"), None);
+    }
+}
