@@ -4,6 +4,7 @@
 
 mod data;
 mod geometry;
+mod scene;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,12 +12,13 @@ use anyhow::{Context, Result, ensure};
 use experiments::sensors::quantity::Coordinate;
 use host::description::ModelDescription;
 use maud::{DOCTYPE, PreEscaped, html};
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use signals::table::Table;
 
 use self::data::{Thinning, integral, peak};
 pub use self::geometry::{Drawing, Outline, Surfaces};
 use self::geometry::{Parameters, Pendulum, Tank};
+use self::scene::scene;
 use crate::campaign::{PLOTLY, PLOTLY_LICENSE};
 
 /// A run and what is known of it.
@@ -77,9 +79,6 @@ const BENCH_PANELS: [(&str, &[&str]); 7] = [
 
 /// Most panels of plots.
 const MOST_PANELS: usize = 8;
-
-/// Angle of a full arc, rad.
-const FULL_ARC: f64 = 2.4;
 
 /// All columns that a page can use, in the order of a table: the answer to "which columns shall I record?".
 pub fn columns(
@@ -214,6 +213,10 @@ fn spread(values: &[f64]) -> Vec<f64> {
     (0..count).map(|i| low + step * i as f64).collect()
 }
 
+fn one(name: &str) -> Vec<String> {
+    vec![name.to_string()]
+}
+
 fn three(name: &str) -> Vec<String> {
     (1..=3).map(|i| format!("{name}[{i}]")).collect()
 }
@@ -223,260 +226,38 @@ fn three(name: &str) -> Vec<String> {
 /// # Errors
 /// If the FMU is none of this project's kinds, columns are missing, or the table has fewer than two rows.
 pub fn page(run: &Run) -> Result<Page> {
-    let parameters = Parameters { description: run.description, set: run.parameters };
-    let source = &run.source;
     let Some(kind) = kind(run.description) else {
         anyhow::bail!(
-            "{source}: a run of {} cannot be drawn (allowed: HubSlosh, Spacecraft, SloshTank)",
+            "{}: a run of {} cannot be drawn (allowed: HubSlosh, Spacecraft, SloshTank)",
+            run.source,
             run.description.model_name
         );
     };
-    let mut columns = Columns { table: Some(run.table), ..Columns::default() };
-    let mut notes: Vec<String> = Vec::new();
-    let mut warnings: Vec<String> = Vec::new();
-    let mut derived: Vec<(String, Vec<f64>)> = Vec::new();
-    let time = run.table.column("time").unwrap_or_default();
-    let one = |name: &str| vec![name.to_string()];
-
-    // what moves the body
-    let mut motion = json!({});
-    if kind == Kind::Bench {
-        match columns.need(&[one("theta"), one("omega")]) {
-            Some(1) => {
-                derived.push((
-                    "theta".into(),
-                    integral(time, run.table.column("omega").unwrap_or_default()),
-                ));
-                notes.push("The hub's angle is the integral of omega by the trapezoidal rule from 0: theta is not in the table.".into());
-            }
-            _ => motion["theta"] = json!("theta"),
-        }
-        motion["theta"] = json!("theta");
-        if let Some(speed) = run.table.column("wheel_speed") {
-            derived.push(("wheel_angle".into(), integral(time, speed)));
-            motion["wheel"] = json!("wheel_angle");
-        }
-    } else if kind == Kind::Craft {
-        let q: Vec<String> = (1..=4).map(|i| format!("q[{i}]")).collect();
-        columns.need(std::slice::from_ref(&q));
-        motion["q"] = json!(q);
-        notes.push("The view follows O; the faint circles are directions that do not turn.".into());
-    } else {
-        notes.push("The host's frame stands still here: a tank alone knows no attitude.".into());
-    }
-
-    // tanks and their pendulums
-    let drawing = |i: usize| run.drawings.get(&(i + 1));
-    let mut tanks: Vec<Tank> = match kind {
-        Kind::Bench => vec![geometry::bench(&parameters, drawing(0))],
-        _ => prefixes(&parameters)
-            .iter()
-            .enumerate()
-            .map(|(i, (prefix, _))| geometry::tank(&parameters, prefix, drawing(i)))
-            .collect(),
+    let mut draft = Draft {
+        run,
+        kind,
+        parameters: Parameters { description: run.description, set: run.parameters },
+        columns: Columns { table: Some(run.table), ..Columns::default() },
+        derived: Vec::new(),
+        notes: Vec::new(),
+        warnings: Vec::new(),
     };
-    if let Some(number) = run.drawings.keys().find(|n| **n == 0 || **n > tanks.len()) {
-        anyhow::bail!("--tank {number}: the run has {} tank(s) (allowed: 1 to that)", tanks.len());
-    }
-    let mut tank_columns = Vec::new();
-    for (i, tank) in tanks.iter_mut().enumerate() {
-        let prefix = &tank.prefix;
-        let mut of_modes = Vec::new();
-        if kind == Kind::Bench && !tank.modes.is_empty() {
-            let model = parameters.choice("slosh.model", "slosh.kind");
-            let planar = ["linear", "planar"].contains(&model.as_str());
-            let both = vec!["slosh_angle_radial".to_string(), "slosh_angle".to_string()];
-            let lists = if planar && run.parameters_known {
-                vec![both, one("slosh_angle")]
-            } else {
-                vec![both]
-            };
-            let found = columns.need(&lists);
-            let radial = (found == Some(0)).then_some("slosh_angle_radial");
-            of_modes.push(json!({ "angles": [radial, "slosh_angle"] }));
-            let higher = higher_modes(run.table, &model, &tank.modes);
-            for (n, angles) in (2..).zip(higher) {
-                let names = ["radial", "tangential"].map(|along| format!("{along} angle {n}"));
-                of_modes.push(json!({ "angles": names }));
-                derived.extend(names.into_iter().zip(angles));
-            }
-            let (drawn, all) = (of_modes.len(), tank.modes.len());
-            tank.modes.truncate(drawn);
-            match all {
-                _ if drawn < all => {
-                    let missing: Vec<String> = (drawn + 1..=all).flat_map(coordinates).collect();
-                    let sentence = format!(
-                        "{drawn} of {all} slosh modes are drawn: the run does not have {}",
-                        missing.join(", ")
-                    );
-                    notes.push(format!("Note: {sentence}."));
-                    warnings.push(format!(
-                        "{source}: {sentence} (all that is drawn: `hubslosh run … --columns {}`)",
-                        self::columns(run.description, run.parameters).join(",")
-                    ));
-                }
-                2.. => notes.push(format!(
-                    "Slosh angles of modes 2 to {all} follow from the states slosh.q_radial and slosh.q_tangential."
-                )),
-                _ => {}
-            }
-        }
-        for n in (1..=tank.modes.len()).filter(|_| kind != Kind::Bench) {
-            let p: Vec<String> = (1..=3).map(|i| format!("{prefix}.p[{n},{i}]")).collect();
-            let angles: Vec<String> =
-                ["x", "y"].map(|axis| format!("{prefix}.angle_{axis}[{n}]")).to_vec();
-            match columns.need(&[p.clone(), angles.clone()]) {
-                Some(1) => of_modes.push(json!({ "angles": angles })),
-                _ => of_modes.push(json!({ "p": p })),
-            }
-        }
-        let mut entry = json!({ "modes": of_modes });
-        if let Some(fill) = &tank.fill {
-            let name = format!("{prefix}.liquid");
-            if columns.need(&[one(&name)]).is_some() {
-                let liquid = run.table.column(&name).unwrap_or_default();
-                let mut add = |what: String, values: Vec<f64>| {
-                    derived.push((what.clone(), values));
-                    json!(what)
-                };
-                entry["level"] =
-                    add(format!("{prefix} level"), liquid.iter().map(|m| fill.level(*m)).collect());
-                for n in 0..tank.modes.len() {
-                    for (k, key) in ["length", "hinge"].into_iter().enumerate() {
-                        let values = liquid.iter().map(|m| fill.mode(n, *m)[k]).collect();
-                        entry["modes"][n][key] = add(format!("{prefix} {key} {}", n + 1), values);
-                    }
-                }
-            }
-        }
-        let surfaces = drawing(i).and_then(|drawing| drawing.surfaces.as_ref());
-        if let Some(surfaces) = surfaces.filter(|_| !tank.modes.is_empty()) {
-            let of = |mass: &f64| {
-                let shapes = surfaces(*mass, tank.modes.len());
-                shapes.with_context(|| format!("--tank {}: with {mass} kg of liquid", i + 1))
-            };
-            let name = format!("{prefix}.liquid");
-            match tank.fill.as_ref().and(run.table.column(&name)) {
-                Some(liquid) => {
-                    let masses = spread(liquid);
-                    let shapes = masses.iter().map(of).collect::<Result<Vec<_>>>()?;
-                    entry["surfaces"] =
-                        json!({ "liquid": name, "masses": masses, "shapes": shapes });
-                }
-                None => tank.shapes = of(&tank.liquid)?,
-            }
-        }
-        tank_columns.push(entry);
-    }
-    ensure!(
-        columns.missing.is_empty() && columns.has("time"),
-        "{source} cannot be drawn: it has no {}.\nRecord what is drawn by `hubslosh run … --columns {}`; what it has: {}",
-        if columns.has("time") { columns.missing.join("; no ") } else { "time".into() },
-        self::columns(run.description, run.parameters).join(","),
-        run.table.names().join(", ")
-    );
-    ensure!(
-        time.len() > 1,
-        "{source} cannot be drawn: it has {} row(s) (allowed: two or more)",
-        time.len()
-    );
-    if let Some(k) = time.windows(2).position(|pair| pair[1] <= pair[0]) {
-        anyhow::bail!(
-            "{source} cannot be drawn: time does not rise after row {}, {} s",
-            k + 1,
-            time[k]
-        );
-    }
-
-    let scene = scene(kind, &parameters, &tanks, run.table, &mut columns, &mut notes);
-    notes.extend(tanks.iter().map(|tank| tank.note.clone()));
-    notes.push(
-        "The surface is that of linear potential flow for the slosh angles, the sum of all modes, each as high at the wall as the FMU's \
-         wave per angle says: in an upright cylinder J₁(ξr/R) over the radius, in a box sin (2n − 1)πx/a, in another tank of --tank \
-         the modes that `hubslosh tank` finds there. A high wave breaks before it looks like that. Pendulums are drawn where they \
-         are; the exaggeration is of the surface alone, which ends at bottom and rim."
-            .into(),
-    );
-    if !run.parameters_known {
-        warnings.push(format!(
-            "{source} does not say which parameters it was run with: drawn with the FMU's start values and what --set and --parameters \
-             say (a .parquet of `hubslosh run` has them in its metadata)"
-        ));
-        notes.push("The file does not hold its parameters: those are the FMU's start values and what the command said.".into());
-    }
-
-    // what goes into the page
-    let panels = panels(kind, run.table);
-    let plotted: BTreeSet<&String> = panels.iter().flat_map(|(_, names)| names).collect();
-    let mut moving = columns.moving.clone();
-    // where all of it has room, what is only plotted keeps its rows, too
-    let all: BTreeSet<String> =
-        moving.iter().cloned().chain(plotted.iter().map(|n| n.to_string())).collect();
-    if Thinning::of(time.len(), all.len() + derived.len()).every == 1 {
-        moving = all;
-    }
-    let thinning = Thinning::of(time.len(), moving.len() + derived.len());
-    let rows = thinning.rows(time.len());
-    let column = |name: &str| run.table.column(name).unwrap_or_default();
-    if thinning.every > 1 {
-        notes.push(format!(
-            "Of {} rows every {} is drawn, {:.3} s apart, and motion between them along straight lines; --from and --to show a part \
-             with more of them. Plots of what does not move have the extremes of all rows.",
-            time.len(),
-            ordinal(thinning.every),
-            (time[time.len() - 1] - time[0]) / (rows.len() - 1) as f64,
-        ));
-    }
-    let angles: Vec<&[f64]> = moving
-        .iter()
-        .filter(|n| n.contains("angle") || n.contains(".p["))
-        .map(|n| column(n))
-        .collect();
-    if let Some(frames) = thinning.too_few(&angles) {
-        let sentence = format!(
-            "the liquid's oscillations have {frames:.1} frames each: what is drawn between them is not the motion (--from and --to \
-             show a part; a smaller --step of `hubslosh run` records more)"
-        );
-        notes.push(format!("Note: {sentence}."));
-        warnings.push(sentence);
-    }
-    let unit = |name: &str| {
-        let variable = run.description.variable(name).ok();
-        let unit = variable.and_then(|v| v.attributes().unit.clone()).unwrap_or_default();
-        crate::campaign::printed(&unit)
-    };
-    let unplotted = run.table.names().len() - 1 - plotted.len();
-    if unplotted > 0 {
-        notes.push(format!(
-            "{unplotted} columns of the table are not plotted: what is 0 throughout, and what {MOST_PANELS} panels do not hold."
-        ));
-    }
-    let mut data = serde_json::Map::new();
-    for name in &moving {
-        data.insert(name.clone(), json!(data::thinned(column(name), &rows)));
-    }
-    for (name, values) in &derived {
-        data.insert(name.clone(), json!(data::thinned(values, &rows)));
-    }
-    let envelopes: serde_json::Map<String, Value> = plotted
-        .iter()
-        .filter(|name| !moving.contains(**name))
-        .map(|name| (name.to_string(), data::envelope(time, column(name))))
-        .collect();
-    let panels: Vec<Value> = panels
-        .iter()
-        .map(|(title, names)| json!({ "title": title, "names": names, "unit": unit(&names[0]) }))
-        .collect();
-    let page = json!({
-        "kind": match kind { Kind::Bench => "bench", Kind::Craft => "craft", Kind::Tank => "tank" },
-        "time": data::times(time, &rows),
-        "columns": data,
-        "envelopes": envelopes,
-        "panels": panels,
-        "motion": motion,
-        "tanks": tank_columns,
-        "scene": scene,
+    let motion = draft.body();
+    let mut tanks = draft.tanks()?;
+    let of_tank = |(i, tank): (usize, &mut Tank)| draft.tank(i, tank);
+    let moved: Vec<Value> = tanks.iter_mut().enumerate().map(of_tank).collect::<Result<_>>()?;
+    draft.check()?;
+    let scene =
+        scene(kind, &draft.parameters, &tanks, run.table, &mut draft.columns, &mut draft.notes);
+    draft.say_what_is_drawn(&tanks);
+    let mut page = draft.data();
+    page["kind"] = json!(match kind {
+        Kind::Bench => "bench",
+        Kind::Craft => "craft",
+        Kind::Tank => "tank",
     });
+    (page["motion"], page["tanks"], page["scene"]) = (motion, json!(moved), scene);
+    let time = draft.time();
     let facts = format!(
         "{} {} · {} to {} s · {} rows",
         run.description.model_name,
@@ -485,7 +266,320 @@ pub fn page(run: &Run) -> Result<Page> {
         shown(time[time.len() - 1]),
         time.len(),
     );
-    Ok(Page { html: markup(&run.title, &facts, kind, &page, &notes), warnings })
+    let html = markup(&run.title, &facts, kind, &page, &draft.notes);
+    Ok(Page { html, warnings: draft.warnings })
+}
+
+/// A page in the making.
+struct Draft<'a> {
+    run: &'a Run<'a>,
+    kind: Kind,
+    parameters: Parameters<'a>,
+    columns: Columns<'a>,
+    /// Columns that follow from others.
+    derived: Vec<(String, Vec<f64>)>,
+    /// What the page says of how it is drawn.
+    notes: Vec<String>,
+    warnings: Vec<String>,
+}
+
+impl Draft<'_> {
+    fn time(&self) -> &[f64] {
+        self.run.table.column("time").unwrap_or_default()
+    }
+
+    /// The name of a new column.
+    fn derive(&mut self, name: String, values: Vec<f64>) -> Value {
+        let value = json!(name);
+        self.derived.push((name, values));
+        value
+    }
+
+    /// What moves the body.
+    fn body(&mut self) -> Value {
+        let table = self.run.table;
+        let mut motion = json!({});
+        match self.kind {
+            Kind::Bench => {
+                motion["theta"] = json!("theta");
+                if self.columns.need(&[one("theta"), one("omega")]) == Some(1) {
+                    let omega = table.column("omega").unwrap_or_default();
+                    self.derive("theta".into(), integral(self.time(), omega));
+                    self.notes.push("The hub's angle is the integral of omega by the trapezoidal rule from 0: theta is not in the table.".into());
+                }
+                if let Some(speed) = table.column("wheel_speed") {
+                    let angle = integral(self.time(), speed);
+                    motion["wheel"] = self.derive("wheel_angle".into(), angle);
+                }
+            }
+            Kind::Craft => {
+                let q: Vec<String> = (1..=4).map(|i| format!("q[{i}]")).collect();
+                self.columns.need(std::slice::from_ref(&q));
+                motion["q"] = json!(q);
+                self.notes.push(
+                    "The view follows O; the faint circles are directions that do not turn.".into(),
+                );
+            }
+            Kind::Tank => self
+                .notes
+                .push("The host's frame stands still here: a tank alone knows no attitude.".into()),
+        }
+        motion
+    }
+
+    /// Tank `i`, counted from 0, as somebody has drawn it.
+    fn drawing(&self, i: usize) -> Option<&'_ Drawing> {
+        self.run.drawings.get(&(i + 1))
+    }
+
+    /// The tanks with their pendulums.
+    fn tanks(&self) -> Result<Vec<Tank>> {
+        let tanks: Vec<Tank> = match self.kind {
+            Kind::Bench => vec![geometry::bench(&self.parameters, self.drawing(0))],
+            _ => prefixes(&self.parameters)
+                .iter()
+                .enumerate()
+                .map(|(i, (prefix, _))| geometry::tank(&self.parameters, prefix, self.drawing(i)))
+                .collect(),
+        };
+        if let Some(number) = self.run.drawings.keys().find(|n| **n == 0 || **n > tanks.len()) {
+            anyhow::bail!(
+                "--tank {number}: the run has {} tank(s) (allowed: 1 to that)",
+                tanks.len()
+            );
+        }
+        Ok(tanks)
+    }
+
+    /// What moves the liquid of a tank; modes that the run does not have are taken from it.
+    fn tank(&mut self, i: usize, tank: &mut Tank) -> Result<Value> {
+        let modes = match self.kind {
+            Kind::Bench => self.modes_of_bench(tank),
+            _ => self.modes_in_space(tank),
+        };
+        let mut moved = json!({ "modes": modes });
+        self.drain(tank, &mut moved);
+        self.shape_surfaces(i, tank, &mut moved)?;
+        Ok(moved)
+    }
+
+    fn modes_of_bench(&mut self, tank: &mut Tank) -> Vec<Value> {
+        let run = self.run;
+        if tank.modes.is_empty() {
+            return Vec::new();
+        }
+        let model = self.parameters.choice("slosh.model", "slosh.kind");
+        let planar = ["linear", "planar"].contains(&model.as_str());
+        let both = vec!["slosh_angle_radial".to_string(), "slosh_angle".to_string()];
+        let lists = if planar && run.parameters_known {
+            vec![both, one("slosh_angle")]
+        } else {
+            vec![both]
+        };
+        let found = self.columns.need(&lists);
+        let radial = (found == Some(0)).then_some("slosh_angle_radial");
+        let mut modes = vec![json!({ "angles": [radial, "slosh_angle"] })];
+        let higher = higher_modes(run.table, &model, &tank.modes);
+        for (n, angles) in (2..).zip(higher) {
+            let names = ["radial", "tangential"].map(|along| format!("{along} angle {n}"));
+            modes.push(json!({ "angles": names }));
+            self.derived.extend(names.into_iter().zip(angles));
+        }
+        let (drawn, all) = (modes.len(), tank.modes.len());
+        tank.modes.truncate(drawn);
+        match all {
+            _ if drawn < all => {
+                let missing: Vec<String> = (drawn + 1..=all).flat_map(coordinates).collect();
+                let sentence = format!(
+                    "{drawn} of {all} slosh modes are drawn: the run does not have {}",
+                    missing.join(", ")
+                );
+                self.notes.push(format!("Note: {sentence}."));
+                self.warnings.push(format!(
+                    "{}: {sentence} (all that is drawn: `hubslosh run … --columns {}`)",
+                    run.source,
+                    columns(run.description, run.parameters).join(",")
+                ));
+            }
+            2.. => self.notes.push(format!(
+                "Slosh angles of modes 2 to {all} follow from the states slosh.q_radial and slosh.q_tangential."
+            )),
+            _ => {}
+        }
+        modes
+    }
+
+    fn modes_in_space(&mut self, tank: &Tank) -> Vec<Value> {
+        let prefix = &tank.prefix;
+        let mode = |n: usize| {
+            let p: Vec<String> = (1..=3).map(|i| format!("{prefix}.p[{n},{i}]")).collect();
+            let angles: Vec<String> =
+                ["x", "y"].map(|axis| format!("{prefix}.angle_{axis}[{n}]")).to_vec();
+            match self.columns.need(&[p.clone(), angles.clone()]) {
+                Some(1) => json!({ "angles": angles }),
+                _ => json!({ "p": p }),
+            }
+        };
+        (1..=tank.modes.len()).map(mode).collect()
+    }
+
+    /// Level, lengths and hinges of a tank that drains.
+    fn drain(&mut self, tank: &Tank, moved: &mut Value) {
+        let (prefix, Some(fill)) = (&tank.prefix, &tank.fill) else { return };
+        let name = format!("{prefix}.liquid");
+        if self.columns.need(&[one(&name)]).is_none() {
+            return;
+        }
+        let liquid = self.run.table.column(&name).unwrap_or_default();
+        let level = liquid.iter().map(|m| fill.level(*m)).collect();
+        moved["level"] = self.derive(format!("{prefix} level"), level);
+        for n in 0..tank.modes.len() {
+            for (k, key) in ["length", "hinge"].into_iter().enumerate() {
+                let values = liquid.iter().map(|m| fill.mode(n, *m)[k]).collect();
+                moved["modes"][n][key] = self.derive(format!("{prefix} {key} {}", n + 1), values);
+            }
+        }
+    }
+
+    /// Surfaces of the modes of a tank that somebody has drawn.
+    fn shape_surfaces(&self, i: usize, tank: &mut Tank, moved: &mut Value) -> Result<()> {
+        let surfaces = self.drawing(i).and_then(|drawing| drawing.surfaces.as_ref());
+        let Some(surfaces) = surfaces.filter(|_| !tank.modes.is_empty()) else { return Ok(()) };
+        let modes = tank.modes.len();
+        let of = |mass: &f64| {
+            surfaces(*mass, modes)
+                .with_context(|| format!("--tank {}: with {mass} kg of liquid", i + 1))
+        };
+        let name = format!("{}.liquid", tank.prefix);
+        match tank.fill.as_ref().and(self.run.table.column(&name)) {
+            Some(liquid) => {
+                let masses = spread(liquid);
+                let shapes = masses.iter().map(of).collect::<Result<Vec<_>>>()?;
+                moved["surfaces"] = json!({ "liquid": name, "masses": masses, "shapes": shapes });
+            }
+            None => tank.shapes = of(&tank.liquid)?,
+        }
+        Ok(())
+    }
+
+    /// Whether the table has what has been asked for, and time runs.
+    fn check(&self) -> Result<()> {
+        let (run, source, time) = (self.run, &self.run.source, self.time());
+        let (missing, has_time) = (&self.columns.missing, self.columns.has("time"));
+        ensure!(
+            missing.is_empty() && has_time,
+            "{source} cannot be drawn: it has no {}.\nRecord what is drawn by `hubslosh run … --columns {}`; what it has: {}",
+            if has_time { missing.join("; no ") } else { "time".into() },
+            columns(run.description, run.parameters).join(","),
+            run.table.names().join(", ")
+        );
+        ensure!(
+            time.len() > 1,
+            "{source} cannot be drawn: it has {} row(s) (allowed: two or more)",
+            time.len()
+        );
+        if let Some(k) = time.windows(2).position(|pair| pair[1] <= pair[0]) {
+            anyhow::bail!(
+                "{source} cannot be drawn: time does not rise after row {}, {} s",
+                k + 1,
+                time[k]
+            );
+        }
+        Ok(())
+    }
+
+    fn say_what_is_drawn(&mut self, tanks: &[Tank]) {
+        self.notes.extend(tanks.iter().map(|tank| tank.note.clone()));
+        self.notes.push(
+            "The surface is that of linear potential flow for the slosh angles, the sum of all modes, each as high at the wall as the FMU's \
+             wave per angle says: in an upright cylinder J₁(ξr/R) over the radius, in a box sin (2n − 1)πx/a, in another tank of --tank \
+             the modes that `hubslosh tank` finds there. A high wave breaks before it looks like that. Pendulums are drawn where they \
+             are; the exaggeration is of the surface alone, which ends at bottom and rim."
+                .into(),
+        );
+        if !self.run.parameters_known {
+            self.warnings.push(format!(
+                "{} does not say which parameters it was run with: drawn with the FMU's start values and what --set and --parameters \
+                 say (a .parquet of `hubslosh run` has them in its metadata)",
+                self.run.source
+            ));
+            self.notes.push("The file does not hold its parameters: those are the FMU's start values and what the command said.".into());
+        }
+    }
+
+    /// The rows and columns that go into the page, and its plots.
+    fn data(&mut self) -> Value {
+        let (table, description) = (self.run.table, self.run.description);
+        let time = table.column("time").unwrap_or_default();
+        let panels = panels(self.kind, table);
+        let plotted: BTreeSet<&String> = panels.iter().flat_map(|(_, names)| names).collect();
+        let mut moving = self.columns.moving.clone();
+        // where all of it has room, what is only plotted keeps its rows, too
+        let all: BTreeSet<String> =
+            moving.iter().cloned().chain(plotted.iter().map(|n| n.to_string())).collect();
+        if Thinning::of(time.len(), all.len() + self.derived.len()).every == 1 {
+            moving = all;
+        }
+        let thinning = Thinning::of(time.len(), moving.len() + self.derived.len());
+        let rows = thinning.rows(time.len());
+        let column = |name: &str| table.column(name).unwrap_or_default();
+        if thinning.every > 1 {
+            self.notes.push(format!(
+                "Of {} rows every {} is drawn, {:.3} s apart, and motion between them along straight lines; --from and --to show a part \
+                 with more of them. Plots of what does not move have the extremes of all rows.",
+                time.len(),
+                ordinal(thinning.every),
+                (time[time.len() - 1] - time[0]) / (rows.len() - 1) as f64,
+            ));
+        }
+        let angles: Vec<&[f64]> = moving
+            .iter()
+            .filter(|n| n.contains("angle") || n.contains(".p["))
+            .map(|n| column(n))
+            .collect();
+        if let Some(frames) = thinning.too_few(&angles) {
+            let sentence = format!(
+                "the liquid's oscillations have {frames:.1} frames each: what is drawn between them is not the motion (--from and --to \
+                 show a part; a smaller --step of `hubslosh run` records more)"
+            );
+            self.notes.push(format!("Note: {sentence}."));
+            self.warnings.push(sentence);
+        }
+        let unplotted = table.names().len() - 1 - plotted.len();
+        if unplotted > 0 {
+            self.notes.push(format!(
+                "{unplotted} columns of the table are not plotted: what is 0 throughout, and what {MOST_PANELS} panels do not hold."
+            ));
+        }
+        let unit = |name: &str| {
+            let variable = description.variable(name).ok();
+            let unit = variable.and_then(|v| v.attributes().unit.clone()).unwrap_or_default();
+            crate::campaign::printed(&unit)
+        };
+        let of_table = moving.iter().map(|name| (name, column(name)));
+        let derived = self.derived.iter().map(|(name, values)| (name, values.as_slice()));
+        let columns: Map<String, Value> = of_table
+            .chain(derived)
+            .map(|(name, values)| (name.clone(), json!(data::thinned(values, &rows))))
+            .collect();
+        let envelopes: Map<String, Value> = plotted
+            .iter()
+            .filter(|name| !moving.contains(**name))
+            .map(|name| (name.to_string(), data::envelope(time, column(name))))
+            .collect();
+        let panels: Vec<Value> = panels
+            .iter()
+            .map(
+                |(title, names)| json!({ "title": title, "names": names, "unit": unit(&names[0]) }),
+            )
+            .collect();
+        json!({
+            "time": data::times(time, &rows),
+            "columns": columns,
+            "envelopes": envelopes,
+            "panels": panels,
+        })
+    }
 }
 
 fn ordinal(n: usize) -> String {
@@ -499,213 +593,6 @@ fn ordinal(n: usize) -> String {
 /// A number without the dust of binary fractions.
 fn shown(value: f64) -> f64 {
     (value * 1e6).round() / 1e6
-}
-
-/// What is drawn, as the scene's `geometry` (harness/web/scene/README.md).
-fn scene(
-    kind: Kind,
-    parameters: &Parameters,
-    tanks: &[Tank],
-    table: &Table,
-    columns: &mut Columns,
-    notes: &mut Vec<String>,
-) -> Value {
-    let drawn: Vec<Value> = tanks
-        .iter()
-        .map(|tank| {
-            let shape = match &tank.outline {
-                Outline::Revolved(contour) => json!({ "contour": contour }),
-                Outline::Box([a, b, bottom, top]) => json!({ "box": [a, b], "bottom": bottom, "top": top }),
-            };
-            let modes: Vec<Value> = tank
-                .modes
-                .iter()
-                .enumerate()
-                .map(|(n, m)| {
-                    let shape = tank.shapes.get(n);
-                    json!({ "hinge": m.hinge, "length": m.length, "wave": m.wave, "mass": m.mass, "shape": shape })
-                })
-                .collect();
-            json!({ "position": tank.position, "q": tank.q, "shape": shape, "level": tank.level, "modes": modes })
-        })
-        .collect();
-    let at = |tank: &Tank| tank.position.iter().map(|x| x * x).sum::<f64>().sqrt() + tank.extent();
-    let mut reach = tanks.iter().map(at).fold(0.0, f64::max);
-    let (mut arrows, mut of_arrows) = (Vec::new(), serde_json::Map::new());
-    // (column or beginning, label, kind, unit, where, whether it ends there)
-    let mut add =
-        |columns: &mut Columns, name: &str, label: String, entry: Value, names: Vec<String>| {
-            // an input that is not in the table has its start value throughout
-            let constant = |name: &String| {
-                let variable = parameters.description.variable(name).ok()?;
-                (variable.causality == "input").then(|| parameters.number(name))
-            };
-            let there: Vec<String> = names.iter().filter(|n| columns.has(n)).cloned().collect();
-            if there.is_empty() || names.iter().any(|n| !columns.has(n) && constant(n).is_none()) {
-                return;
-            }
-            let at = |name: &String, k: usize| match table.column(name) {
-                Some(values) => values[k],
-                None => constant(name).unwrap_or(0.0),
-            };
-            let size = |k: usize| names.iter().map(|name| at(name, k).powi(2)).sum::<f64>().sqrt();
-            let most = (0..table.rows()).map(size).fold(0.0, f64::max);
-            if most > 0.0 {
-                columns.take(&there);
-                let mut arrow = entry;
-                (arrow["name"], arrow["label"], arrow["most"]) =
-                    (json!(name), json!(label), json!(most));
-                arrows.push(arrow);
-                let source =
-                    |n: &String| if columns.has(n) { json!(n) } else { json!(constant(n)) };
-                let all: Vec<Value> = names.iter().map(source).collect();
-                of_arrows
-                    .insert(name.into(), if all.len() == 1 { all[0].clone() } else { json!(all) });
-            }
-        };
-    let mut geometry = match kind {
-        Kind::Bench => {
-            let tank = &tanks[0];
-            let r = tank.position[0];
-            let radius = match &tank.outline {
-                Outline::Revolved(points) => points.iter().map(|p| p[0]).fold(0.0, f64::max),
-                Outline::Box([a, b, ..]) => 0.5 * a.hypot(*b),
-            };
-            reach = r + 1.25 * radius;
-            let wheel = 0.0625_f64.min(0.4 * reach);
-            let below = r < radius + 1.1 * wheel;
-            let actuator = if columns.has("tau_actuator") { "tau_actuator" } else { "tau_cmd" };
-            let torques = [
-                (
-                    actuator,
-                    if actuator == "tau_cmd" { "torque command" } else { "actuator torque" },
-                ),
-                ("tau_ext", "external torque"),
-                ("tau_friction", "friction torque"),
-                ("tau_fluid", "liquid torque"),
-            ];
-            let [inner, outer] =
-                if below { [1.1 * radius, 1.4 * radius] } else { [1.25 * wheel, 0.42 * reach] };
-            for (i, (name, label)) in torques.into_iter().enumerate() {
-                let arc = json!({
-                    "radius": inner + (outer - inner) * (i as f64 + 0.5) / 4.0, "z": 0.03 * reach,
-                    "from": std::f64::consts::PI, "most": FULL_ARC,
-                });
-                add(
-                    columns,
-                    name,
-                    label.into(),
-                    json!({ "kind": "torque", "unit": "N·m", "arc": arc }),
-                    vec![name.into()],
-                );
-            }
-            let force = json!({
-                "kind": "force", "unit": "N", "length": 0.7 * reach,
-                "at": [r, 0.0, tank.position[2] + tank.level],
-            });
-            let names = vec!["F_radial".to_string(), "F_tangential".to_string()];
-            add(columns, "force", "liquid force on the tank".into(), force, names);
-            json!({
-                "bench": {
-                    "wheel": wheel, "below": below,
-                    "arm": { "length": r, "width": 1.2 * radius, "plate": 1.12 * radius },
-                },
-                "target": [0.3 * r, 0.0, -0.07 * reach], "from": [0.55, -1.25, 0.75], "radius": 0.87 * reach,
-                "axes": {
-                    "length": 0.2 * reach, "names": ["radial", "tangential", "z"],
-                    "at": if below { [0.0, 0.0, 0.0] } else { [0.0, 0.0, 0.5 * wheel] },
-                },
-            })
-        }
-        Kind::Craft => {
-            let size = geometry::craft_box(parameters);
-            let center: [f64; 3] = parameters.vector("craft.r");
-            if let Some(size) = size {
-                let length = |v: &[f64; 3]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
-                reach = reach.max(0.5 * length(&size) + length(&center));
-                notes.push("The craft is drawn as the box with the dry craft's mass and moments of inertia, its middle at the dry \
-                    craft's centre of mass."
-                    .into());
-            } else {
-                notes.push(
-                    "No box has the dry craft's moments of inertia: the craft itself is not drawn."
-                        .into(),
-                );
-            }
-            let long = 0.8 * reach;
-            let force = |at: [f64; 3], tip: bool| json!({ "kind": "force", "unit": "N", "length": long, "at": at, "tip": tip });
-            let torque = json!({ "kind": "torque", "unit": "N·m", "length": long });
-            add(columns, "force", "force at O".into(), force([0.0; 3], true), three("force"));
-            add(columns, "torque", "torque about O".into(), torque.clone(), three("torque"));
-            let each = tanks.len() > 1
-                && tanks
-                    .iter()
-                    .all(|t| three(&format!("{}.force", t.prefix)).iter().all(|n| columns.has(n)));
-            if each {
-                for tank in tanks {
-                    let name = format!("{}.force", tank.prefix);
-                    add(
-                        columns,
-                        &name,
-                        format!("liquid force, {}", tank.prefix),
-                        force(tank.position, false),
-                        three(&name),
-                    );
-                }
-            } else {
-                add(
-                    columns,
-                    "slosh_force",
-                    "liquid force at O".into(),
-                    force([0.0; 3], false),
-                    three("slosh_force"),
-                );
-            }
-            add(
-                columns,
-                "slosh_torque",
-                "liquid torque about O".into(),
-                torque,
-                three("slosh_torque"),
-            );
-            json!({
-                "body": { "size": size, "center": center },
-                "from": [1.0, -1.25, 0.55], "axes": { "length": 0.85 * reach },
-            })
-        }
-        Kind::Tank => {
-            // about its middle, in which the tank is seen, with O and full arrows from there
-            let tank = &tanks[0];
-            let [middle, half] = tank.middle_and_extent();
-            let [x, y, z] = tank.position;
-            let off = x.hypot(y).hypot(z + middle);
-            reach = half.max(off);
-            let long = 0.6 * reach;
-            let force = json!({ "kind": "force", "unit": "N", "length": long });
-            add(columns, "force", "liquid force on the host at O".into(), force, three("force"));
-            let torque = json!({ "kind": "torque", "unit": "N·m", "length": long });
-            add(columns, "torque", "liquid torque about O".into(), torque, three("torque"));
-            let acceleration = json!({ "kind": "acceleration", "unit": "m/s²", "length": long });
-            add(columns, "a", "specific force at O".into(), acceleration, three("a"));
-            json!({
-                "from": [1.0, -1.25, 0.55], "axes": { "length": 0.5 * reach },
-                "radius": f64::max(1.1 * half, off + 1.1 * long), "target": [x, y, z + middle],
-            })
-        }
-    };
-    // one scale for all that share a unit, so that lengths can be compared
-    let mut most: BTreeMap<String, f64> = BTreeMap::new();
-    for arrow in &arrows {
-        let one = most.entry(arrow["unit"].to_string()).or_insert(0.0);
-        *one = one.max(arrow["most"].as_f64().unwrap_or(0.0));
-    }
-    for arrow in &mut arrows {
-        arrow["most"] = json!(most[&arrow["unit"].to_string()]);
-    }
-    geometry["reach"] = json!(reach);
-    geometry["tanks"] = json!(drawn);
-    geometry["arrows"] = json!(arrows);
-    json!({ "geometry": geometry, "arrows": of_arrows })
 }
 
 /// Titles and columns of the plots, in order.
