@@ -8,9 +8,10 @@ use analysis::linear::{Linear, Mode};
 use anyhow::{Result, bail, ensure};
 use experiments::profile::Written;
 use host::budget;
+use host::fmu::Fmu;
 use identify::design::{self, Multisine, Wheel};
 use identify::nominal;
-use identify::simulate::Setup;
+use identify::simulate::{Intersample, Setup};
 use identify::unknown::Unknown;
 use serde_json::json;
 use signals::table::{self, Table};
@@ -127,6 +128,37 @@ impl DesignArgs {
         if let Some(snr) = self.snr {
             return self.torque_for(snr, wheel.torque, &mut real);
         }
+        let (time, torque, by_wheel) = self.torque(&wheel, &mut real)?;
+        let bench = Bench::new(&self, &fmu, &mut real)?;
+        let full = analysis::statistics::peak(&torque);
+        let (by_angle, torque) = bench.limited(&time, torque)?;
+        let plan = Plan {
+            factor: by_wheel * by_angle,
+            peak: analysis::statistics::peak(&torque),
+            angle: design::slosh_angle(&fmu, &bench.setup, &time, &torque)?,
+            speeds: wheel.range(&time, &torque),
+            bounds: bench.bounds(&time, &torque)?,
+            sweep: self.optimal.then(|| self.sweep(&bench, &time, full)).transpose()?,
+        };
+        if self.json {
+            terminal::say_json(&plan.json(&fmu, &wheel))?;
+        } else {
+            plan.print(&wheel, self.slosh_angle);
+        }
+        if let Some(out) = &self.out {
+            let names = ["time", "tau_cmd"].map(String::from).to_vec();
+            Table::new(names, vec![time, torque]).write(out, &BTreeMap::new())?;
+            done!("{}", out.display());
+        }
+        Ok(())
+    }
+
+    /// Rows of the torque that is planned, s and N·m, and the factor that brought it within the wheel's limits.
+    fn torque(
+        &self,
+        wheel: &Wheel,
+        real: &mut dyn FnMut(&str) -> Result<f64>,
+    ) -> Result<(Vec<f64>, Vec<f64>, f64)> {
         let sampled = |stop: f64, at: &dyn Fn(f64) -> f64| -> Result<(Vec<f64>, Vec<f64>)> {
             // time, torque, rate and its derivative with respect to every unknown
             budget::table(budget::steps(stop, STEP)? + 1, COLUMNS)?;
@@ -135,87 +167,81 @@ impl DesignArgs {
             let tau = time.iter().map(|&t| at(t)).collect();
             Ok((time, tau))
         };
-        let mut scaled_by = 1.0;
-        let (time, torque) = match (&self.profile, self.multisine) {
-            (Some(profile), _) => {
-                let torque = profile.parse::<Written>()?.torque()?;
-                sampled(torque.span().1, &|t| torque.at(t))?
-            }
-            (None, Some(peak)) => {
-                let [f0, f1] = self.band[..] else { bail!("--band needs two frequencies, Hz") };
-                ensure!(
-                    f1 <= 0.5 / STEP,
-                    "--band ends at {f1} Hz (allowed: up to {} Hz, half of what rows {STEP} s apart show)",
-                    0.5 / STEP
-                );
-                let mut torque = Multisine::new(self.period, (f0, f1), peak, self.seed)?;
-                if self.optimal {
-                    let plant = expected(&mut real, peak)?;
-                    let shares = design::d_optimal(&plant, &torque.frequencies());
-                    torque = torque.shaped(&shares, peak, self.seed);
-                }
-                torque.check_rows(budget::steps(self.duration, STEP)?)?;
-                let (time, tau) = sampled(self.duration, &|t| torque.at(t))?;
-                let factor = wheel.factor(&time, &tau);
-                if factor < 1.0 {
-                    scaled_by = factor;
-                    torque = torque.scaled(factor);
-                }
-                sampled(self.duration, &|t| torque.at(t))?
-            }
-            (None, None) => bail!("a plan needs --profile or --multisine"),
-        };
-        let mut settings = self.settings.clone();
-        settings.push(("slosh.zeta_from_correlation".into(), "false".into()));
-        let intersample = identify::simulate::Intersample::FirstOrderHold;
-        // the damping as the FMU has it, whether by the correlation or not
-        let setup = Setup { settings: self.settings.clone(), intersample };
-        let limited = |time: &[f64], torque: Vec<f64>| -> Result<(f64, Vec<f64>)> {
-            let Some(limit) = self.slosh_angle else { return Ok((1.0, torque)) };
-            ensure!(limit > 0.0, "--slosh-angle must be a positive number, rad");
-            let factor = design::within_angle(&fmu, &setup, time, &torque, limit)?;
-            Ok((factor, torque.iter().map(|t| factor * t).collect()))
-        };
-        let full = analysis::statistics::peak(&torque);
-        let (by_angle, torque) = limited(&time, torque)?;
-        scaled_by *= by_angle;
-        let angle = design::slosh_angle(&fmu, &setup, &time, &torque)?;
-        let (least, largest) = wheel.range(&time, &torque);
-        let peak = analysis::statistics::peak(&torque);
-        let rpm = std::f64::consts::TAU / 60.0;
-        let [_, low, high] = wheel.speeds;
-        if scaled_by < 1.0 && !self.json {
-            println!(
-                "torques times {scaled_by:.4}, within the wheel's limits{}",
-                match self.slosh_angle {
-                    Some(limit) => format!(" and {limit} rad of slosh"),
-                    None => String::new(),
-                }
-            );
+        if let Some(profile) = &self.profile {
+            let torque = profile.parse::<Written>()?.torque()?;
+            let (time, tau) = sampled(torque.span().1, &|t| torque.at(t))?;
+            return Ok((time, tau, 1.0));
         }
-        let shown = format!(
-            "peak {peak:.3} N·m (the wheel gives {:.3}), wheel from {:.0} to {:.0} rpm (allowed {:.0} to {:.0}), \
-             slosh angle up to {angle:.3} rad{}",
-            wheel.torque,
-            least / rpm,
-            largest / rpm,
-            low / rpm,
-            high / rpm,
-            if angle > LINEAR {
-                format!(" (linear theory ends at {LINEAR}: --slosh-angle limits it)")
-            } else {
-                String::new()
-            }
+        let Some(peak) = self.multisine else { bail!("a plan needs --profile or --multisine") };
+        let [f0, f1] = self.band[..] else { bail!("--band needs two frequencies, Hz") };
+        ensure!(
+            f1 <= 0.5 / STEP,
+            "--band ends at {f1} Hz (allowed: up to {} Hz, half of what rows {STEP} s apart show)",
+            0.5 / STEP
         );
-        let zeta = real("slosh.damping[1]")?;
+        let mut torque = Multisine::new(self.period, (f0, f1), peak, self.seed)?;
+        if self.optimal {
+            let plant = expected(real, peak)?;
+            let shares = design::d_optimal(&plant, &torque.frequencies());
+            torque = torque.shaped(&shares, peak, self.seed);
+        }
+        torque.check_rows(budget::steps(self.duration, STEP)?)?;
+        let (time, tau) = sampled(self.duration, &|t| torque.at(t))?;
+        let factor = wheel.factor(&time, &tau).min(1.0);
+        if factor < 1.0 {
+            torque = torque.scaled(factor);
+        }
+        let (time, tau) = sampled(self.duration, &|t| torque.at(t))?;
+        Ok((time, tau, factor))
+    }
+
+    /// What a plain sweep of the peak `peak` tells, N·m, before its liquid is limited.
+    fn sweep(&self, bench: &Bench, time: &[f64], peak: f64) -> Result<Sweep> {
+        let (f0, f1) = (self.band[0], self.band[1]);
+        let written = |peak: f64| {
+            format!("lin-sweep:amplitude={peak:.4},f0={f0},f1={f1},duration={}", self.duration)
+        };
+        let profile = written(peak).parse::<Written>()?.torque()?;
+        let (factor, sweep) = bench.limited(time, time.iter().map(|&t| profile.at(t)).collect())?;
+        Ok(Sweep {
+            profile: written(factor * peak),
+            angle: design::slosh_angle(bench.fmu, &bench.setup, time, &sweep)?,
+            bounds: bench.bounds(time, &sweep)?,
+        })
+    }
+}
+
+/// What a plan is tried on.
+struct Bench<'f> {
+    fmu: &'f Fmu,
+    /// With the damping as the FMU has it, whether by the correlation or not.
+    setup: Setup,
+    /// With the damping ratio of the unknowns.
+    fitted: Setup,
+    unknowns: Vec<Unknown>,
+    noise: Noise,
+    /// Largest slosh angle that is wanted, rad.
+    limit: Option<f64>,
+}
+
+impl<'f> Bench<'f> {
+    fn new(
+        asked: &DesignArgs,
+        fmu: &'f Fmu,
+        real: &mut dyn FnMut(&str) -> Result<f64>,
+    ) -> Result<Self> {
+        let intersample = Intersample::FirstOrderHold;
+        let setup = Setup { settings: asked.settings.clone(), intersample };
+        let mut fitted = setup.clone();
+        fitted.settings.push(("slosh.zeta_from_correlation".into(), "false".into()));
         let mut unknowns = Vec::new();
         for name in identify::start::PARAMETERS {
             let unit =
                 fmu.description().variable(name)?.attributes().unit.clone().unwrap_or_default();
-            let value = if name == "slosh.zeta" { zeta } else { real(name)? };
-            unknowns.push(Unknown::positive(name, &unit, value));
+            let shown = if name == "slosh.zeta" { "slosh.damping[1]" } else { name };
+            unknowns.push(Unknown::positive(name, &unit, real(shown)?));
         }
-        if self.sensor_errors {
+        if asked.sensor_errors {
             unknowns.extend([Unknown::asymmetry(), Unknown::delay(), Unknown::gyro_bias(0)]);
         }
         let (arw, rate) = (real("imu.arw")?, real("imu.rate")?);
@@ -223,89 +249,135 @@ impl DesignArgs {
         // Gauss–Markov bias of IEEE Std 952: its standard deviation is the instability over 0.664
         let drift = real("imu.bias_instability")? / 0.664 / white;
         let noise = Noise { white, drift, time: real("imu.bias_time")? };
-        let bounds_of = |time: &[f64], torque: &[f64]| {
-            let setup = Setup { settings: settings.clone(), intersample };
-            design::cramer_rao(
-                &fmu,
-                setup,
-                (time.to_vec(), torque.to_vec()),
-                unknowns.clone(),
-                noise,
-            )
-        };
-        let bounds = bounds_of(&time, &torque)?;
-        // what a plain sweep tells at the same peak, before its liquid is limited
-        let sweep = if self.optimal {
-            let (f0, f1) = (self.band[0], self.band[1]);
-            let written = |peak: f64| {
-                format!("lin-sweep:amplitude={peak:.4},f0={f0},f1={f1},duration={}", self.duration)
+        Ok(Bench { fmu, setup, fitted, unknowns, noise, limit: asked.slosh_angle })
+    }
+
+    /// A torque as much smaller as the liquid's angle needs, and the factor.
+    fn limited(&self, time: &[f64], torque: Vec<f64>) -> Result<(f64, Vec<f64>)> {
+        let Some(limit) = self.limit else { return Ok((1.0, torque)) };
+        ensure!(limit > 0.0, "--slosh-angle must be a positive number, rad");
+        let factor = design::within_angle(self.fmu, &self.setup, time, &torque, limit)?;
+        Ok((factor, torque.iter().map(|t| factor * t).collect()))
+    }
+
+    /// What a torque tells at best: name, expected value and standard deviation of every unknown.
+    fn bounds(&self, time: &[f64], torque: &[f64]) -> Result<Bounds> {
+        let rows = (time.to_vec(), torque.to_vec());
+        let unknowns = self.unknowns.clone();
+        design::cramer_rao(self.fmu, self.fitted.clone(), rows, unknowns, self.noise)
+    }
+}
+
+/// Name, expected value and standard deviation of every unknown.
+type Bounds = Vec<(String, f64, f64)>;
+
+/// A plain sweep beside an optimal multisine.
+struct Sweep {
+    profile: String,
+    /// rad.
+    angle: f64,
+    bounds: Bounds,
+}
+
+/// What a torque does and tells.
+struct Plan {
+    /// By how much it has been made smaller.
+    factor: f64,
+    /// N·m.
+    peak: f64,
+    /// Largest slosh angle, rad.
+    angle: f64,
+    /// Least and largest speed of the wheel, rad/s.
+    speeds: (f64, f64),
+    bounds: Bounds,
+    sweep: Option<Sweep>,
+}
+
+impl Plan {
+    /// The sweep, if it tells more.
+    fn better(&self) -> Option<&Sweep> {
+        let merit = design::merit(&self.bounds);
+        self.sweep.as_ref().filter(|sweep| design::merit(&sweep.bounds) < merit)
+    }
+
+    fn json(&self, fmu: &Fmu, wheel: &Wheel) -> serde_json::Value {
+        let parameters = |bounds: &[(String, f64, f64)]| {
+            let one = |(name, value, std): &(String, f64, f64)| {
+                let variable = fmu.description().variable(name);
+                let unit = variable.map(|v| fmu.description().unit(v).to_string()).ok();
+                (name.clone(), json!({ "value": value, "std": std, "unit": unit }))
             };
-            let profile = written(full).parse::<Written>()?.torque()?;
-            let (factor, sweep) = limited(&time, time.iter().map(|&t| profile.at(t)).collect())?;
-            let angle = design::slosh_angle(&fmu, &setup, &time, &sweep)?;
-            Some((written(factor * full), angle, bounds_of(&time, &sweep)?))
-        } else {
-            None
+            bounds.iter().map(one).collect::<serde_json::Map<_, _>>()
         };
-        let is_better =
-            sweep.as_ref().is_some_and(|s| design::merit(&s.2) < design::merit(&bounds));
-        if self.json {
-            let parameters = |bounds: &[(String, f64, f64)]| {
-                let one = |(name, value, std): &(String, f64, f64)| {
-                    let variable = fmu.description().variable(name);
-                    let unit = variable.map(|v| fmu.description().unit(v).to_string()).ok();
-                    (name.clone(), json!({ "value": value, "std": std, "unit": unit }))
-                };
-                bounds.iter().map(one).collect::<serde_json::Map<_, _>>()
-            };
-            let other = sweep.as_ref().map(|(profile, angle, bounds)| {
-                json!({ "profile": profile, "slosh_angle": angle, "parameters": parameters(bounds) })
-            });
-            terminal::say_json(&json!({
-                "peak": peak,
-                "torque_factor": scaled_by,
-                "wheel_speed": [least, largest],
-                "wheel_speed_allowed": [low, high],
-                "slosh_angle": angle,
-                "parameters": parameters(&bounds),
-                "sweep": other,
-                "recommended": if is_better { "sweep" } else { "this" },
-            }))?;
-        } else {
-            println!("{shown}");
-            let head = if sweep.is_some() { "sweep %" } else { "" };
-            println!("{:20} {:>12} {:>12} {:>9} {head:>9}", "", "expected", "std", "std %");
-            for (k, (name, value, deviation)) in bounds.iter().enumerate() {
-                let percent = |std: f64| format!("{:.4}", 100.0 * std / value.abs());
-                let other = sweep.as_ref().map_or(String::new(), |sweep| percent(sweep.2[k].2));
-                println!(
-                    "{name:20} {value:>12.6} {deviation:>12.2e} {:>9} {other:>9}",
-                    percent(*deviation)
-                );
-            }
-            if let Some((profile, angle, other)) = &sweep {
-                let (own, other) = (design::merit(&bounds), design::merit(other));
-                println!(
-                    "Mean standard deviation (geometric): multisine {:.4} %, linear sweep {:.4} % (slosh angle up to {angle:.3} rad).",
-                    100.0 * own,
-                    100.0 * other
-                );
-                println!(
-                    "Recommended: {}",
-                    if is_better {
-                        format!("the sweep, --profile {profile}")
-                    } else {
-                        "the multisine".into()
-                    }
-                );
-            }
+        let other = self.sweep.as_ref().map(|Sweep { profile, angle, bounds }| {
+            json!({ "profile": profile, "slosh_angle": angle, "parameters": parameters(bounds) })
+        });
+        let [_, low, high] = wheel.speeds;
+        json!({
+            "peak": self.peak,
+            "torque_factor": self.factor,
+            "wheel_speed": [self.speeds.0, self.speeds.1],
+            "wheel_speed_allowed": [low, high],
+            "slosh_angle": self.angle,
+            "parameters": parameters(&self.bounds),
+            "sweep": other,
+            "recommended": if self.better().is_some() { "sweep" } else { "this" },
+        })
+    }
+
+    fn print(&self, wheel: &Wheel, limit: Option<f64>) {
+        if self.factor < 1.0 {
+            println!(
+                "torques times {:.4}, within the wheel's limits{}",
+                self.factor,
+                match limit {
+                    Some(limit) => format!(" and {limit} rad of slosh"),
+                    None => String::new(),
+                }
+            );
         }
-        if let Some(out) = &self.out {
-            let names = ["time", "tau_cmd"].map(String::from).to_vec();
-            Table::new(names, vec![time, torque]).write(out, &BTreeMap::new())?;
-            done!("{}", out.display());
+        let rpm = std::f64::consts::TAU / 60.0;
+        let [_, low, high] = wheel.speeds;
+        println!(
+            "peak {:.3} N·m (the wheel gives {:.3}), wheel from {:.0} to {:.0} rpm (allowed {:.0} to {:.0}), \
+             slosh angle up to {:.3} rad{}",
+            self.peak,
+            wheel.torque,
+            self.speeds.0 / rpm,
+            self.speeds.1 / rpm,
+            low / rpm,
+            high / rpm,
+            self.angle,
+            if self.angle > LINEAR {
+                format!(" (linear theory ends at {LINEAR}: --slosh-angle limits it)")
+            } else {
+                String::new()
+            }
+        );
+        let head = if self.sweep.is_some() { "sweep %" } else { "" };
+        println!("{:20} {:>12} {:>12} {:>9} {head:>9}", "", "expected", "std", "std %");
+        for (k, (name, value, deviation)) in self.bounds.iter().enumerate() {
+            let percent = |std: f64| format!("{:.4}", 100.0 * std / value.abs());
+            let other = self.sweep.as_ref().map_or(String::new(), |s| percent(s.bounds[k].2));
+            println!(
+                "{name:20} {value:>12.6} {deviation:>12.2e} {:>9} {other:>9}",
+                percent(*deviation)
+            );
         }
-        Ok(())
+        if let Some(Sweep { profile, angle, bounds }) = &self.sweep {
+            println!(
+                "Mean standard deviation (geometric): multisine {:.4} %, linear sweep {:.4} % (slosh angle up to {angle:.3} rad).",
+                100.0 * design::merit(&self.bounds),
+                100.0 * design::merit(bounds)
+            );
+            println!(
+                "Recommended: {}",
+                match self.better() {
+                    Some(_) => format!("the sweep, --profile {profile}"),
+                    None => "the multisine".into(),
+                }
+            );
+        }
     }
 }
 
