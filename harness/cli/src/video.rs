@@ -2,7 +2,7 @@
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
 use base64ct::{Base64, Encoding};
@@ -57,55 +57,10 @@ pub fn film(page: &str, film: &Film, out: &Path) -> Result<()> {
     let folder = temporary::Folder::new()?;
     let html = folder.path().join("page.html");
     std::fs::write(&html, page).context("the page cannot be written")?;
-    let [width, height] = SIZE;
-    let mut drawn = Command::new(browser);
-    drawn.args([
-        "--headless=new",
-        "--hide-scrollbars",
-        "--use-angle=swiftshader",
-        "--enable-unsafe-swiftshader",
-    ]);
-    #[cfg(unix)] // Chromium refuses to have root in its sandbox; the page is this program's own
-    if std::fs::metadata("/proc/self").is_ok_and(|m| std::os::unix::fs::MetadataExt::uid(&m) == 0) {
-        drawn.arg("--no-sandbox");
-    }
-    drawn
-        .arg(format!("--user-data-dir={}", folder.path().join("profile").display()))
-        .arg(format!("--window-size={width},{height}"))
-        .arg("--dump-dom")
-        .arg(format!(
-            "file://{}#video={},{},{width},{height}",
-            html.display(),
-            film.rate,
-            film.speed
-        ));
-    let mut drawn = drawn
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .spawn()
-        .with_context(|| format!("{browser} cannot be started"))?;
     let ending = out.extension().unwrap_or_default().to_string_lossy().into_owned();
     let draft = folder.path().join(format!("film.{ending}"));
-    let mut made = Command::new("ffmpeg")
-        .args(["-y", "-loglevel", "error", "-f", "image2pipe", "-c:v", "mjpeg", "-framerate"])
-        .arg(film.rate.to_string())
-        .args([
-            "-i",
-            "-",
-            "-c:v",
-            "libx264",
-            "-crf",
-            "20",
-            "-pix_fmt",
-            "yuv420p",
-            "-movflags",
-            "+faststart",
-        ])
-        .arg(&draft)
-        .stdin(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .context("ffmpeg cannot be started")?;
+    let mut drawn = draw(browser, &html, film, folder.path())?;
+    let mut made = encode(film.rate, &draft)?;
     let bar = progress::of_frames()?;
     bar.set_length(frames as u64);
     let mut found = 0u64;
@@ -136,4 +91,59 @@ pub fn film(page: &str, film: &Film, out: &Path) -> Result<()> {
     ensure!(found == frames as u64, "{browser} drew {found} of {frames} frames: has it no WebGL?");
     let bytes = std::fs::read(&draft).context("the film cannot be read")?;
     host::output::atomically(out, |file| Ok(file.write_all(&bytes)?))
+}
+
+/// Starts a browser that draws the frames of a page; its output has them, a line each.
+fn draw(browser: &str, html: &Path, film: &Film, folder: &Path) -> Result<Child> {
+    let [width, height] = SIZE;
+    let mut drawn = Command::new(browser);
+    drawn.args([
+        "--headless=new",
+        "--hide-scrollbars",
+        "--use-angle=swiftshader",
+        "--enable-unsafe-swiftshader",
+    ]);
+    #[cfg(unix)] // Chromium refuses to have root in its sandbox; the page is this program's own
+    if std::fs::metadata("/proc/self").is_ok_and(|m| std::os::unix::fs::MetadataExt::uid(&m) == 0) {
+        drawn.arg("--no-sandbox");
+    }
+    drawn
+        .arg(format!("--user-data-dir={}", folder.join("profile").display()))
+        .arg(format!("--window-size={width},{height}"))
+        .arg("--dump-dom")
+        .arg(format!(
+            "file://{}#video={},{},{width},{height}",
+            html.display(),
+            film.rate,
+            film.speed
+        ));
+    drawn
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .with_context(|| format!("{browser} cannot be started"))
+}
+
+/// Starts ffmpeg, which makes a film of the frames that it is given.
+fn encode(rate: u32, draft: &Path) -> Result<Child> {
+    Command::new("ffmpeg")
+        .args(["-y", "-loglevel", "error", "-f", "image2pipe", "-c:v", "mjpeg", "-framerate"])
+        .arg(rate.to_string())
+        .args([
+            "-i",
+            "-",
+            "-c:v",
+            "libx264",
+            "-crf",
+            "20",
+            "-pix_fmt",
+            "yuv420p",
+            "-movflags",
+            "+faststart",
+        ])
+        .arg(draft)
+        .stdin(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .context("ffmpeg cannot be started")
 }

@@ -414,72 +414,12 @@ impl Reader {
                 self.problem(element, "there is no such type");
                 continue;
             };
-            let of = |name: &str| element.get(name).map(String::from);
-            let starts: Vec<String> = match c_type {
-                CType::String | CType::Binary => {
-                    let starts = element.children.iter().filter(|child| child.name == "Start");
-                    starts.map(|start| start.get("value").unwrap_or_default().into()).collect()
-                }
-                _ => of("start")
-                    .iter()
-                    .flat_map(|s| s.split_whitespace())
-                    .map(String::from)
-                    .collect(),
-            };
-            let variability = element.get("variability").map(String::from).unwrap_or_else(|| {
-                let is_parameter = element
-                    .get("causality")
-                    .is_some_and(|c| c.to_lowercase().ends_with("parameter"));
-                match (is_parameter, kind) {
-                    (true, _) => "fixed".into(),
-                    (false, Type::Real) => "continuous".into(),
-                    (false, _) => "discrete".into(),
-                }
-            });
-            let variable = Variable {
-                name: self.must(element, "name", |n| (n.len() <= LONGEST_NAME).then(|| n.into())),
-                reference: self.must(element, "valueReference", |text| text.trim().parse().ok()),
-                causality: element.get("causality").unwrap_or("local").into(),
-                variability,
-                description: element.get("description").unwrap_or_default().into(),
-                intermediate: element.flag("intermediateUpdate"),
-                c_type,
-                kind,
-                attributes: Attributes {
-                    start: starts.first().cloned(),
-                    unit: of("unit"),
-                    display_unit: of("displayUnit"),
-                    min: of("min"),
-                    max: of("max"),
-                    declared_type: of("declaredType"),
-                },
-            };
-            let mut dimensions = Vec::new();
-            for dimension in element.children.iter().filter(|child| child.name == "Dimension") {
-                let size = match (dimension.get("start"), dimension.get("valueReference")) {
-                    (Some(start), _) => start.trim().parse().ok(),
-                    (None, Some(reference)) => sizes.get(reference).copied(),
-                    (None, None) => None,
-                };
-                match size {
-                    Some(size) => dimensions.push(size as usize),
-                    None => self.problem(dimension, "its size is not known"),
-                }
-            }
+            let (variable, starts) = self.variable3(element, c_type, kind);
+            let dimensions = self.dimensions(element, &sizes);
             if dimensions.is_empty() {
-                for alias in element.children.iter().filter(|child| child.name == "Alias") {
-                    let name = self.text(alias, "name");
-                    let description = alias.get("description").unwrap_or_default().into();
-                    let mut other = Variable { name, description, ..variable.clone() };
-                    // it is set and recorded by its first name
-                    other.causality = "local".into();
-                    let shown = alias.get("displayUnit").map(String::from);
-                    other.attributes.display_unit = shown.or(other.attributes.display_unit);
-                    to.variables.push(other);
-                }
-                let at = to.variables.len()
-                    - element.children.iter().filter(|c| c.name == "Alias").count();
-                to.variables.insert(at, variable);
+                let aliases = self.aliases(element, &variable);
+                to.variables.push(variable);
+                to.variables.extend(aliases);
                 continue;
             }
             let length = dimensions.iter().try_fold(1usize, |n, size| n.checked_mul(*size));
@@ -505,6 +445,82 @@ impl Reader {
             }
             to.arrays.insert(variable.reference, Array { length, c_type, start: starts });
         }
+    }
+
+    /// A variable of FMI 3.0 as it is written, and its start values.
+    fn variable3(
+        &mut self,
+        element: &Element,
+        c_type: CType,
+        kind: Type,
+    ) -> (Variable, Vec<String>) {
+        let of = |name: &str| element.get(name).map(String::from);
+        let starts: Vec<String> = match c_type {
+            CType::String | CType::Binary => {
+                let starts = element.children.iter().filter(|child| child.name == "Start");
+                starts.map(|start| start.get("value").unwrap_or_default().into()).collect()
+            }
+            _ => of("start").iter().flat_map(|s| s.split_whitespace()).map(String::from).collect(),
+        };
+        let variability = of("variability").unwrap_or_else(|| {
+            let causality = element.get("causality");
+            match (causality.is_some_and(|c| c.to_lowercase().ends_with("parameter")), kind) {
+                (true, _) => "fixed".into(),
+                (false, Type::Real) => "continuous".into(),
+                (false, _) => "discrete".into(),
+            }
+        });
+        let variable = Variable {
+            name: self.must(element, "name", |n| (n.len() <= LONGEST_NAME).then(|| n.into())),
+            reference: self.must(element, "valueReference", |text| text.trim().parse().ok()),
+            causality: element.get("causality").unwrap_or("local").into(),
+            variability,
+            description: element.get("description").unwrap_or_default().into(),
+            intermediate: element.flag("intermediateUpdate"),
+            c_type,
+            kind,
+            attributes: Attributes {
+                start: starts.first().cloned(),
+                unit: of("unit"),
+                display_unit: of("displayUnit"),
+                min: of("min"),
+                max: of("max"),
+                declared_type: of("declaredType"),
+            },
+        };
+        (variable, starts)
+    }
+
+    /// Sizes of an array, those by structural parameters from `sizes`; none of a scalar.
+    fn dimensions(&mut self, element: &Element, sizes: &BTreeMap<&str, u64>) -> Vec<usize> {
+        let mut dimensions = Vec::new();
+        for dimension in element.children.iter().filter(|child| child.name == "Dimension") {
+            let size = match (dimension.get("start"), dimension.get("valueReference")) {
+                (Some(start), _) => start.trim().parse().ok(),
+                (None, Some(reference)) => sizes.get(reference).copied(),
+                (None, None) => None,
+            };
+            match size {
+                Some(size) => dimensions.push(size as usize),
+                None => self.problem(dimension, "its size is not known"),
+            }
+        }
+        dimensions
+    }
+
+    /// A variable by its other names; it is set and recorded by its first one.
+    fn aliases(&mut self, element: &Element, variable: &Variable) -> Vec<Variable> {
+        let mut aliases = Vec::new();
+        for alias in element.children.iter().filter(|child| child.name == "Alias") {
+            let name = self.text(alias, "name");
+            let description = alias.get("description").unwrap_or_default().into();
+            let mut other = Variable { name, description, ..variable.clone() };
+            other.causality = "local".into();
+            let shown = alias.get("displayUnit").map(String::from);
+            other.attributes.display_unit = shown.or(other.attributes.display_unit);
+            aliases.push(other);
+        }
+        aliases
     }
 }
 
