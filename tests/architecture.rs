@@ -123,9 +123,18 @@ fn only_the_command_line_draws_progress() {
 /// Files in which the workspace's `unsafe_code = "deny"` is lifted.
 #[test]
 fn unsafe_code_stands_in_the_files_of_the_c_interface() {
-    let mut found = BTreeSet::new();
     let root = pack::root();
+    let mut found = Vec::new();
     collect(&root, &root, &mut found);
+    let lifted = format!("allow({}", "unsafe_code)");
+    found.retain(|file| {
+        file.ends_with(".rs")
+            && fs::read_to_string(root.join(file))
+                .expect("a source file")
+                .lines()
+                .any(|line| line.trim_start().starts_with('#') && line.contains(&lifted))
+    });
+    let found: BTreeSet<String> = found.into_iter().collect();
     let known = [
         "fmu/fuzz/src/calls.rs",
         "fmu/runtime/src/c_abi.rs",
@@ -140,20 +149,33 @@ fn unsafe_code_stands_in_the_files_of_the_c_interface() {
     assert_eq!(found, known.map(String::from).into());
 }
 
-fn collect(root: &Path, folder: &Path, found: &mut BTreeSet<String>) {
+/// A file is named by its path from the root, or by its end where the text says which folder it is in.
+#[test]
+fn source_files_that_architecture_names_are_there() {
+    let text = fs::read_to_string(pack::root().join("ARCHITECTURE.md")).expect("the text");
+    let is_file =
+        |name: &&str| [".rs", ".py", ".js", ".c", ".h"].iter().any(|ending| name.ends_with(ending));
+    let named: BTreeSet<&str> = text.split('`').skip(1).step_by(2).filter(is_file).collect();
+    assert!(named.len() > 100, "{named:?}");
+    let mut files = Vec::new();
+    collect(&pack::root(), &pack::root(), &mut files);
+    let is_there = |name: &str| {
+        files.iter().any(|f| f.strip_suffix(name).is_some_and(|f| f.is_empty() || f.ends_with('/')))
+    };
+    let missing: Vec<&&str> = named.iter().filter(|name| !is_there(name)).collect();
+    assert!(missing.is_empty(), "{missing:?}");
+}
+
+/// Files below a folder, as paths from the root.
+fn collect(root: &Path, folder: &Path, found: &mut Vec<String>) {
     for entry in fs::read_dir(folder).expect("a folder of the project").flatten() {
         let path = entry.path();
-        let name = entry.file_name().to_string_lossy().into_owned();
-        if path.is_dir() && name != "target" && !name.starts_with('.') {
+        let name = entry.file_name();
+        if path.is_dir() && name != "target" && !name.to_string_lossy().starts_with('.') {
             collect(root, &path, found);
-        } else if name.ends_with(".rs") {
-            let text = fs::read_to_string(&path).expect("a source file");
-            let lifted = format!("allow({}", "unsafe_code)");
-            if text.lines().any(|line| line.trim_start().starts_with("#") && line.contains(&lifted))
-            {
-                let relative = path.strip_prefix(root).expect("below the root");
-                found.insert(relative.to_string_lossy().replace('\\', "/"));
-            }
+        } else if path.is_file() {
+            let relative = path.strip_prefix(root).expect("below the root");
+            found.push(relative.to_string_lossy().replace('\\', "/"));
         }
     }
 }
