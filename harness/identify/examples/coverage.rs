@@ -174,7 +174,7 @@ impl Tally {
         }
         let tests = found.details.fit.tests.iter().map(Tests::worst).fold(0.0, f64::max);
         println!(
-            "seed {seed}: {} {:.1} s, {} answers, worst {} {:.1} std, tests {tests:.1}, decrement {:.3}{}",
+            "seed {seed}: {} {:.1} s, {:.0} simulations, worst {} {:.1} std, tests {tests:.1}, decrement {:.3}{}",
             found.details.fit.model,
             found.details.seconds,
             found.details.fit.simulations,

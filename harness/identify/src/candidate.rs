@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::fit::{Polished, Problem};
 use crate::goodness::{fit_pct, is_poor, tests};
-use crate::news::News;
+use crate::news::{News, Since};
 use crate::nominal::Start;
 use crate::options::Options;
 use crate::recording::Recording;
@@ -39,8 +39,8 @@ pub struct ModelFit {
     pub validation_pct: Vec<f64>,
     /// The gyro's noise: white, rad/s.
     pub noise_white: f64,
-    /// Simulations that were needed.
-    pub simulations: usize,
+    /// Simulations that were needed, of all recordings; those of a part of them count as that part.
+    pub simulations: f64,
     /// Neither noise nor a small effect explains the residual.
     #[serde(skip)]
     pub poor: bool,
@@ -50,7 +50,7 @@ impl ModelFit {
     /// What it is in one line.
     pub fn line(&self) -> String {
         format!(
-            "{} with {} friction: fit {:.3} %, BIC {:.1}, worst residual test {:.1} standard deviations, {} \
+            "{} with {} friction: fit {:.3} %, BIC {:.1}, worst residual test {:.1} standard deviations, {:.0} \
              simulations",
             self.model,
             self.friction,
@@ -102,7 +102,7 @@ pub fn fit<'a>(
         acausal: options.acausal,
         alone: options.models.iter().filter(|m| *m != "frozen").count() == 1,
         model,
-        simulations: 0,
+        since: Since::default(),
         progress: &mut |line| progress(News::Detail(line)),
     };
     let sibling = from.map(|other| {
@@ -116,9 +116,9 @@ pub fn fit<'a>(
         }
     });
     let polished = search.run(sibling.as_ref())?;
-    let (mut problem, simulations) = (search.problem, search.simulations);
+    let mut problem = search.problem;
     problem.estimate_noise(&polished.answer);
-    let fit = summary(&problem, &polished, options, (model, law), simulations)?;
+    let fit = summary(&problem, &polished, options, (model, law))?;
     progress(News::Step(fit.line()));
     Ok(Fitted { problem, polished, fit })
 }
@@ -256,7 +256,6 @@ fn summary(
     polished: &Polished,
     options: &Options,
     (model, law): (&str, &str),
-    simulations: usize,
 ) -> Result<ModelFit> {
     let answer = &polished.answer;
     let deviance = problem.deviance(answer);
@@ -274,7 +273,7 @@ fn summary(
         tests: tests(problem, answer),
         validation_pct: validate(problem, &polished.x, options)?,
         noise_white: problem.channels[0].noise.white,
-        simulations,
+        simulations: problem.simulations(),
         poor: is_poor(problem, answer),
     })
 }

@@ -31,6 +31,8 @@
 //! each and at right angles to one another; then J = D L⁻¹ is as good along the valley as across it.
 
 use std::cell::{Cell, RefCell};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use anyhow::{Context, Result};
 use host::fmu::Fmu;
@@ -108,6 +110,8 @@ pub struct Problem<'a> {
     pub differences: Differences,
     /// The bench as it is set up; `None`: the FMU refuses its settings.
     pub bench: Option<Bench>,
+    /// Rows that the FMU was driven through, by this problem and its clones.
+    pub driven: Arc<AtomicUsize>,
 }
 
 /// What an answer looks like for given unknowns.
@@ -128,8 +132,6 @@ pub struct Estimate {
     pub reason: String,
     /// Sensitivities near there.
     pub jacobian: Option<DMatrix<f64>>,
-    /// Simulations that were needed, of all recordings together.
-    pub simulations: usize,
 }
 
 /// A minimum with its sensitivities.
@@ -147,8 +149,6 @@ pub struct Polished {
     pub cost: f64,
     /// Newton decrement: the distance to the minimum, in standard deviations.
     pub decrement: f64,
-    /// Simulations that were needed.
-    pub simulations: usize,
 }
 
 impl Polished {
@@ -199,7 +199,14 @@ impl<'a> Problem<'a> {
         }
         let differences = Differences::Forward;
         let bench = Nominal::of(fmu, &setup.settings, &[]).ok().map(|nominal| nominal.bench);
-        Problem { fmu, setup, recordings, unknowns, channels, differences, bench }
+        let driven = Arc::default();
+        Problem { fmu, setup, recordings, unknowns, channels, differences, bench, driven }
+    }
+
+    /// Simulations so far, of all recordings; of a part of them they count as that part.
+    pub fn simulations(&self) -> f64 {
+        let rows: usize = self.recordings.iter().map(|r| r.time.len()).sum();
+        self.driven.load(Relaxed) as f64 / rows as f64
     }
 
     /// Values of the unknowns for variables x.
@@ -242,6 +249,7 @@ impl<'a> Problem<'a> {
             .collect();
         let delay = self.value_of(x, &Quantity::Delay, 0.0);
         let recording = &self.recordings[recording];
+        self.driven.fetch_add(recording.time.len(), Relaxed);
         self.setup.run_under(self.fmu, &values, recording, delay, besides)
     }
 
@@ -478,14 +486,12 @@ impl<'a> Problem<'a> {
         free: &[usize],
         base: &[Motion],
         known: Option<&DMatrix<f64>>,
-    ) -> Result<(DMatrix<f64>, usize)> {
-        let each = if self.differences == Differences::Central { 2 } else { 1 };
+    ) -> Result<DMatrix<f64>> {
         let Some(known) = known else {
             let axes = vec![1e-5; x.len()];
             let rough = self.jacobian(x, free, base, &axes)?;
             let known = at_places(&rough, free, x.len());
-            let (found, needed) = self.sensitivities(x, free, base, Some(&known))?;
-            return Ok((found, needed + each * free.len()));
+            return self.sensitivities(x, free, base, Some(&known));
         };
         let is_parameter = |j: &usize| matches!(self.unknowns[*j].quantity, Quantity::Parameter(_));
         let (mixed, single): (Vec<usize>, Vec<usize>) =
@@ -494,7 +500,7 @@ impl<'a> Problem<'a> {
         let along_axes = self.jacobian(x, &single, base, &steps)?;
         let mixture = self.along(x, &mixed, base, known)?;
         let all = at_places(&along_axes, &single, x.len()) + at_places(&mixture, &mixed, x.len());
-        Ok((all.select_columns(free), each * free.len()))
+        Ok(all.select_columns(free))
     }
 
     /// Sensitivities to the parameters `mixed`, differenced along the directions that `known` ones give.
@@ -616,7 +622,6 @@ impl<'a> Problem<'a> {
         let mut x = x.to_vec();
         let mut answer = self.answer(&x)?;
         let mut e = self.stacked(&answer, &x);
-        let mut simulations = 1;
         let fastest = fastest(&answer.motion);
         let (mut known, mut given) = match known {
             Known::Nothing => (None, None),
@@ -624,11 +629,10 @@ impl<'a> Problem<'a> {
             Known::Sensitivities(known) => (None, Some(known.select_columns(free))),
         };
         for round in 1.. {
-            let (jacobian, needed) = match given.take() {
-                Some(jacobian) => (jacobian, 0),
+            let jacobian = match given.take() {
+                Some(jacobian) => jacobian,
                 None => self.sensitivities(&x, free, &answer.motion, known.as_ref())?,
             };
-            simulations += needed;
             let covariance = self.covariance(&jacobian)?;
             let mut before = f64::INFINITY;
             let decrement = loop {
@@ -647,7 +651,6 @@ impl<'a> Problem<'a> {
                     let mut trial = self.moved(&x, straight.as_slice(), fastest);
                     // the step and, where it makes it worse, the same along the bent valley
                     for is_straight in [true, false] {
-                        simulations += 1;
                         let Ok(there) = self.answer(&trial) else { break };
                         let new = self.stacked(&there, &trial);
                         if new.norm_squared() < e.norm_squared() {
@@ -671,9 +674,7 @@ impl<'a> Problem<'a> {
             };
             if decrement < enough || round >= rounds {
                 let cost = e.norm_squared();
-                let found =
-                    Polished { x, jacobian, covariance, answer, cost, decrement, simulations };
-                return Ok(found);
+                return Ok(Polished { x, jacobian, covariance, answer, cost, decrement });
             }
             known = Some(at_places(&jacobian, free, x.len()));
         }
@@ -685,7 +686,7 @@ impl<'a> Problem<'a> {
     pub fn information(&self, x: &[f64]) -> Result<(Covariance, DMatrix<f64>)> {
         let motion = self.motions(x)?;
         let all: Vec<usize> = (0..x.len()).collect();
-        let (jacobian, _) = self.sensitivities(x, &all, &motion, None)?;
+        let jacobian = self.sensitivities(x, &all, &motion, None)?;
         Ok((self.covariance(&jacobian)?, jacobian))
     }
 
@@ -710,9 +711,7 @@ impl<'a> Problem<'a> {
         let motion = RefCell::new(None);
         let steps = RefCell::new(vec![1e-5; x.len()]);
         let last = RefCell::new(None);
-        let simulations = Cell::new(0);
         let residuals = |x: &[f64]| {
-            simulations.set(simulations.get() + 1);
             let answer = first.take().map_or_else(|| self.answer(x), Ok);
             let answer = answer.unwrap_or_else(|_| {
                 // a parameter the FMU refuses: worse than anything, so that the step is taken back
@@ -727,7 +726,6 @@ impl<'a> Problem<'a> {
         let derivatives = |x: &[f64]| {
             let motion = motion.borrow();
             let found = self.jacobian(x, &all, motion.as_ref()?, &steps.borrow()).ok()?;
-            simulations.set(simulations.get() + x.len());
             *steps.borrow_mut() = Problem::steps(&found);
             *last.borrow_mut() = Some(found.clone());
             Some(found)
@@ -735,7 +733,7 @@ impl<'a> Problem<'a> {
         let method = least_squares::tolerances(tolerance, 1e-8).with_gtol(0.0).with_patience(4);
         let found = least_squares::minimise_by(&method, &residuals, &derivatives, x);
         let jacobian = last.borrow_mut().take();
-        Ok(Estimate { x: found.x, reason: found.reason, jacobian, simulations: simulations.get() })
+        Ok(Estimate { x: found.x, reason: found.reason, jacobian })
     }
 
     /// The same over windows of the recordings that grow, each from the estimate of the one before.
@@ -751,19 +749,13 @@ impl<'a> Problem<'a> {
         progress: &mut dyn FnMut(String),
     ) -> Result<Estimate> {
         let mut to_come: Vec<f64> = windows.iter().rev().copied().collect();
-        let (mut from, mut jacobian, mut simulations) = (x.to_vec(), None, 0);
+        let (mut from, mut jacobian) = (x.to_vec(), None);
         // the last window, its residual, its estimate; none once a leap was taken all the same
         let mut before: Option<(f64, f64, Vec<f64>)> = None;
         let mut careful = true;
         while let Some(window) = to_come.pop() {
             let (estimate, residual) = self.search_window(x, &from, window)?;
-            progress(format!(
-                "window of {:.0} %: {}, {} simulations",
-                100.0 * window,
-                estimate.reason,
-                estimate.simulations
-            ));
-            simulations += estimate.simulations;
+            progress(format!("window of {:.0} %: {}", 100.0 * window, estimate.reason));
             if let Some((reached, less, estimate)) = before.take_if(|b| residual > JUMP * b.1) {
                 if window - reached > SHORTEST {
                     to_come.extend([window, 0.5 * (reached + window)]);
@@ -779,7 +771,7 @@ impl<'a> Problem<'a> {
             from = estimate.x;
             jacobian = estimate.jacobian.map(|jacobian| jacobian * NOISE_FACTOR);
         }
-        Ok(Estimate { x: from, simulations, jacobian, reason: String::new() })
+        Ok(Estimate { x: from, jacobian, reason: String::new() })
     }
 
     /// The search over a window of the recordings from x, and the residual's mean square. Each parameter is

@@ -71,8 +71,6 @@ pub struct Point {
     /// Covariance of x at this ω_s; its own row and column are 0.
     covariance: DMatrix<f64>,
     jacobian: DMatrix<f64>,
-    /// Simulations that were needed.
-    pub simulations: usize,
 }
 
 /// Fits at the Stribeck speeds of a grid over the recording's speeds, near the fit `from`.
@@ -121,7 +119,6 @@ fn point(
         data: found.cost - left - problem.vague_cost(&found.x),
         covariance: spread_out(&found.covariance.x, &others, found.x.len()),
         jacobian: found.jacobian.insert_column(indices.speed, 0.0),
-        simulations: 1 + bearing.len() + found.simulations,
         x: found.x,
     })
 }
@@ -168,8 +165,6 @@ pub struct Profile {
     pub intervals: Vec<[f64; 2]>,
     /// The speeds at which it was fitted, rad/s, with the sum of squares above the least.
     pub points: Vec<(f64, f64)>,
-    /// Simulations that were needed.
-    pub simulations: usize,
 }
 
 /// The profile likelihood from a minimum outwards; `None` where ω_s is not unknown or so well known that the sum of squares
@@ -189,7 +184,6 @@ pub fn profile(problem: &Problem, minimum: &Polished) -> Result<Option<Profile>>
         data: minimum.cost - problem.vague_cost(&minimum.x),
         covariance: spread_out(&held.x, &others, minimum.x.len()),
         jacobian: minimum.jacobian.clone(),
-        simulations: 0,
     };
     let fastest = fit::fastest(&minimum.answer.motion);
     let ends = [GRID[0] * fastest, GRID[GRID.len() - 1] * fastest];
@@ -240,7 +234,6 @@ pub fn profile(problem: &Problem, minimum: &Polished) -> Result<Option<Profile>>
         covariance: covariance(problem, minimum, &points, least),
         intervals,
         points: points.iter().map(|p| (p.speed, p.data - least)).collect(),
-        simulations: points.iter().map(|p| p.simulations).sum(),
     }))
 }
 

@@ -10,6 +10,7 @@ use crate::between;
 use crate::fit::{Polished, Problem, WHOLE, WINDOWS, is_other};
 use crate::friction;
 use crate::goodness::{fit_pct, is_poor, tests};
+use crate::news::Since;
 use crate::simulate::Intersample;
 use crate::stribeck::Indices;
 use analysis::innovations::Tests;
@@ -39,8 +40,8 @@ pub struct Search<'a, 'h> {
     pub alone: bool,
     /// Name of the model.
     pub model: &'h str,
-    /// Simulations so far.
-    pub simulations: usize,
+    /// What the lines so far were told to cost.
+    pub since: Since,
     /// Is told what happens.
     pub progress: &'h mut dyn FnMut(String),
 }
@@ -171,6 +172,11 @@ impl When {
 }
 
 impl<'a> Search<'a, '_> {
+    /// Tells a line, with the simulations since the line before.
+    fn say(&mut self, line: String) {
+        (self.progress)(self.since.line(line, self.problem.simulations()));
+    }
+
     /// Gauss and Newton's steps.
     fn polish(
         &mut self,
@@ -179,10 +185,9 @@ impl<'a> Search<'a, '_> {
         rounds: usize,
     ) -> Result<Polished> {
         let polished = self.problem.polish(x, known, rounds)?;
-        self.simulations += polished.simulations;
-        (self.progress)(format!(
-            "{}: {:.4} standard deviations from the minimum after {} simulations",
-            self.model, polished.decrement, polished.simulations
+        self.say(format!(
+            "{}: {:.4} standard deviations from the minimum",
+            self.model, polished.decrement
         ));
         Ok(polished)
     }
@@ -190,17 +195,16 @@ impl<'a> Search<'a, '_> {
     /// Levenberg and Marquardt's search, then Gauss and Newton's steps.
     fn search(&mut self, x: &[f64], tolerance: f64) -> Result<Polished> {
         let rough = self.problem.search(x, tolerance)?;
-        self.simulations += rough.simulations;
         self.polish(&rough.x, rough.jacobian.as_ref(), ROUNDS)
     }
 
     /// From variables x, over windows; the noise is estimated on the way.
     fn windows(&mut self, x: &[f64], windows: &[f64]) -> Result<Polished> {
-        let (label, progress) = (self.model, &mut *self.progress);
-        let rough = self
-            .problem
-            .search_growing(x, windows, &mut |line| progress(format!("{label}: {line}")))?;
-        self.simulations += rough.simulations;
+        let (label, problem) = (self.model, &self.problem);
+        let (since, progress) = (&mut self.since, &mut *self.progress);
+        let mut say =
+            |line| progress(since.line(format!("{label}: {line}"), problem.simulations()));
+        let rough = problem.search_growing(x, windows, &mut say)?;
         let answer = self.problem.answer(&rough.x)?;
         self.problem.estimate_noise(&answer);
         let (mut x, mut known, mut poor) =
@@ -253,9 +257,8 @@ impl<'a> Search<'a, '_> {
         }
         let step = self.problem.recordings[0].step();
         let others = between::alternatives(&self.problem, &near);
-        self.simulations += others.iter().map(|other| other.minimum.simulations).sum::<usize>();
         let said = between::evidence(&self.problem, &near, step, self.acausal, &others);
-        (self.progress)(format!("{}: {said}", self.model));
+        self.say(format!("{}: {said}", self.model));
         let Some(best) = between::better(near.cost, step, self.acausal, &others) else {
             return Ok(near);
         };
@@ -265,7 +268,7 @@ impl<'a> Search<'a, '_> {
             self.problem.setup.intersample = before;
             return Ok(near);
         }
-        (self.progress)(format!("{}: the torque is {}", self.model, best.behaviour.words()));
+        self.say(format!("{}: the torque is {}", self.model, best.behaviour.words()));
         Ok(other)
     }
 
@@ -281,9 +284,8 @@ impl<'a> Search<'a, '_> {
             return Ok(near);
         };
         let points = friction::grid(&self.problem, &near, indices)?;
-        self.simulations += points.iter().map(|p| p.simulations).sum::<usize>();
         for point in &points {
-            (self.progress)(format!(
+            self.say(format!(
                 "{}: friction.omega_s held at {:.3e} rad/s, all else free: sum of squares {:.1}, all free {:.1}",
                 self.model, point.speed, point.cost, near.cost
             ));
@@ -357,12 +359,12 @@ impl<'a> Search<'a, '_> {
             let is_due = self.is_due(attempt.when, &best);
             best.moved = false;
             if !is_due {
-                (self.progress)(format!("{label}: not made, only if {}", attempt.when.words()));
+                self.say(format!("{label}: not made, only if {}", attempt.when.words()));
                 continue;
             }
             best.started |= matches!(attempt.from, From::Start(_));
             let before = self.problem.clone();
-            (self.progress)(format!("{label}: made, for {}", attempt.when.words()));
+            self.say(format!("{label}: made, for {}", attempt.when.words()));
             let said = match self.attempt(attempt, best.found.as_ref(), sibling) {
                 Ok(found) => {
                     let (accepted, why) =
@@ -382,7 +384,7 @@ impl<'a> Search<'a, '_> {
                     said
                 }
             };
-            (self.progress)(format!("{}, attempt {}: {said}", self.model, number + 1));
+            self.say(format!("{}, attempt {}: {said}", self.model, number + 1));
         }
         match (best.found, failed) {
             (Some(best), _) => Ok(best),
@@ -411,7 +413,7 @@ impl<'a> Search<'a, '_> {
         let values = self.problem.unknowns.iter().zip(self.problem.values(&x));
         let free: Vec<String> =
             values.map(|(u, value)| format!("{} {value:.4e}", u.quantity.name())).collect();
-        (self.progress)(format!("{}: free, from {}", self.model, free.join(", ")));
+        self.say(format!("{}: free, from {}", self.model, free.join(", ")));
         match attempt.how {
             How::Windows(windows) => self.windows(&x, windows),
             How::Steps(rounds) => self.polish(&x, known, rounds),

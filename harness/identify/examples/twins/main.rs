@@ -81,7 +81,7 @@ impl Tally {
         }
         let tests = found.details.fit.tests.iter().map(Tests::worst).fold(0.0, f64::max);
         println!(
-            "{}: {} as {}, {:.0} s, {} simulations, tests {tests:.1}, decrement {:.3}{}: {}",
+            "{}: {} as {}, {:.0} s, {:.0} simulations, tests {tests:.1}, decrement {:.3}{}: {}",
             twin.seed,
             twin.words(),
             found.details.fit.model,

@@ -21,7 +21,7 @@ use crate::fit::{self, Answer, Differences, Polished, Problem, is_other};
 use crate::friction;
 use crate::goodness::{fit_pct, is_poor, tests};
 use crate::missing;
-use crate::news::News;
+use crate::news::{News, Since};
 use crate::options::Options;
 use crate::plausible;
 use crate::recording::{self, Recording};
@@ -50,7 +50,7 @@ impl Method for OutputError {
     fn lines(found: &Identification) -> Vec<String> {
         let Details { fit, condition, seconds, .. } = &found.details;
         vec![format!(
-            "fit {:.3} %, noise {:.2e} rad/s, condition number {condition:.0}, {} simulations in {seconds:.1} s",
+            "fit {:.3} %, noise {:.2e} rad/s, condition number {condition:.0}, {:.0} simulations in {seconds:.1} s",
             fit.fit_pct, fit.noise_white, fit.simulations
         )]
     }
@@ -196,7 +196,7 @@ fn identify_whole(
     };
     let question =
         verdict::Question { slosh: &models[..slosh], near, laws: &laws, doubts: &doubts };
-    let mut found = finish(best, of_models, &question, options)?;
+    let mut found = finish(best, of_models, &question, options, &mut tell)?;
     let details = &mut found.details;
     let fit = &details.fit;
     let chosen = models.iter().position(|m| *m.model == fit.model && m.friction == fit.friction);
@@ -243,8 +243,14 @@ fn finish(
     of_models: Option<DMatrix<f64>>,
     question: &verdict::Question,
     options: &Options,
+    tell: &mut dyn FnMut(News),
 ) -> Result<Identification> {
     let Fitted { mut problem, polished, mut fit } = best;
+    let (mut since, model) = (Since::default(), fit.model.clone());
+    let mut say = |what: &str, problem: &Problem| {
+        tell(News::Detail(since.line(format!("{model}: {what}"), problem.simulations())));
+    };
+    say("chosen", &problem);
     let (mut x, mut known) = (polished.x.clone(), polished.jacobian.clone());
     let place =
         |problem: &Problem| problem.unknowns.iter().position(|u| u.quantity == Quantity::GyroScale);
@@ -258,15 +264,15 @@ fn finish(
     // the gyro's scale is nearly a combination of the others: only exact sensitivities tell it from them
     problem.differences = Differences::Central;
     let mut polished = problem.polish(&x, Some(&known), ROUNDS)?;
-    fit.simulations += polished.simulations;
     // a search that ended elsewhere has taken what it left for noise
     let before = problem.channels.clone();
     problem.estimate_noise(&polished.answer);
     if is_other(&before, &problem.channels) {
         polished = problem.polish(&polished.x, Some(&polished.jacobian), ROUNDS)?;
-        fit.simulations += polished.simulations;
     }
-    let between_rows = torque_between_rows(&mut problem, &mut polished, options, &mut fit)?;
+    say("central differences at the minimum", &problem);
+    let between_rows = torque_between_rows(&mut problem, &mut polished, options)?;
+    say("other torques between rows", &problem);
     fit.fit_pct = fit_pct(&problem, &polished.answer);
     fit.tests = tests(&problem, &polished.answer);
     fit.poor = is_poor(&problem, &polished.answer);
@@ -285,12 +291,15 @@ fn finish(
             .chain(acausal(&problem, &polished, options))
             .collect(),
     };
+    say("torques that may be missing", &problem);
     let fits = findings.fits(&fit);
     let profile = friction::profile(&problem, &polished)?;
-    fit.simulations += profile.as_ref().map_or(0, |p| p.simulations);
+    say("profile of the friction's curve", &problem);
     let Polished { jacobian, covariance, answer, .. } = polished;
     let error_budget =
         budget::of(&problem, (&x, &answer), &jacobian, &covariance, &options.tolerances)?;
+    say("tolerances and higher slosh modes", &problem);
+    fit.simulations = problem.simulations();
     let tolerances = budget::of_tolerances(&error_budget, x.len());
     let noise_only = place(&problem)
         .and_then(|scale| without(&jacobian, scale))
@@ -464,25 +473,18 @@ fn torque_between_rows(
     problem: &mut Problem,
     found: &mut Polished,
     options: &Options,
-    fit: &mut ModelFit,
 ) -> Result<BetweenRows> {
     if options.intersample.is_some() || !between::matters(problem.recordings) {
         return Ok(BetweenRows::default());
     }
     let (step, acausal) = (problem.recordings[0].step(), options.acausal);
-    let count = |others: &[between::Alternative]| {
-        others.iter().map(|other| other.minimum.simulations).sum::<usize>()
-    };
     let mut others = between::alternatives(problem, found);
-    fit.simulations += count(&others);
     if let Some(best) = between::better(found.cost, step, acausal, &others) {
         let before = std::mem::replace(&mut problem.setup.intersample, best.behaviour);
         let other = problem.polish(&best.minimum.x, Some(&best.minimum.jacobian), ROUNDS)?;
-        fit.simulations += other.simulations;
         if other.cost < found.cost {
             *found = other;
             others = between::alternatives(problem, found);
-            fit.simulations += count(&others);
         } else {
             problem.setup.intersample = before;
         }

@@ -259,7 +259,7 @@ fn models(models: &[ModelFit]) -> Markup {
             format!("{:.1}", m.bic - best),
             format!("{worst:.1}"),
             held.join(", "),
-            m.simulations.to_string(),
+            format!("{:.0}", m.simulations),
         ]
     };
     let head = [
