@@ -33,8 +33,8 @@ pub struct Effect {
     pub x: DVector<f64>,
 }
 
-/// Relative change by which the answer is differenced: of a long recording, some tenths of a standard deviation.
-const STEP: f64 = 2e-5;
+/// Relative change by which the answer is differenced: of a long recording, less than a tenth of a standard deviation.
+const STEP: f64 = 5e-6;
 /// Rounds of [`modes`]; each leaves a few tenths of the error before it.
 const ROUNDS: usize = 5;
 /// Step, in standard deviations, after which the estimates stay.
@@ -57,6 +57,7 @@ pub fn of(
         let changes = changes.map(|(u, (before, after))| (u.quantity.name(), after - before));
         Effect { source, change: changes.collect(), tolerance, x: change }
     };
+    let base = problem.stacked(answer, x);
     let mut instance = nominal::initialised(problem.fmu, &problem.setup.settings)?;
     for (name, tolerance) in NAMES.into_iter().zip(tolerances.all()) {
         let estimated = problem.index(name).is_some();
@@ -85,7 +86,7 @@ pub fn of(
             let other = Problem { recordings: &recordings, ..other };
             Ok(other.stacked(&other.answer(x)?, x))
         };
-        let slope = (moved(STEP)? - moved(-STEP)?) / (2.0 * STEP);
+        let slope = (moved(STEP)? - &base) / STEP;
         let change = -(&covariance.x * jacobian.tr_mul(&slope)) * tolerance;
         let source = format!("{name} wrong by {}", percent(tolerance));
         effects.push(effect(source, change, true));

@@ -70,6 +70,8 @@ pub struct Fitted<'a> {
     pub polished: Polished,
     /// In numbers for the reader.
     pub fit: ModelFit,
+    /// Stribeck speeds that were tried, rad/s, with the sum of squares above the least.
+    pub speeds: Vec<(f64, f64)>,
 }
 
 /// Fits a slosh model with a friction law, from the data's starts, the likeliest first, or from the fit of another model.
@@ -102,6 +104,7 @@ pub fn fit<'a>(
         acausal: options.acausal,
         alone: options.models.iter().filter(|m| *m != "frozen").count() == 1,
         model,
+        speeds: Vec::new(),
         since: Since::default(),
         progress: &mut |line| progress(News::Detail(line)),
     };
@@ -116,11 +119,11 @@ pub fn fit<'a>(
         }
     });
     let polished = search.run(sibling.as_ref())?;
-    let mut problem = search.problem;
+    let (mut problem, speeds) = (search.problem, search.speeds);
     problem.estimate_noise(&polished.answer);
     let fit = summary(&problem, &polished, options, (model, law))?;
     progress(News::Step(fit.line()));
-    Ok(Fitted { problem, polished, fit })
+    Ok(Fitted { problem, polished, fit, speeds })
 }
 
 fn problem<'a>(

@@ -58,8 +58,10 @@ const TYPICAL: Noise = Noise { white: 1.0, drift: 0.2, time: 100.0 };
 const STEPS: (f64, f64) = (1e-6, 2e-2);
 /// Longest step of a difference along a direction, in units of x.
 const LONGEST_STEP: f64 = 0.05;
-/// A search has ended where the Newton decrement is below this: a hundredth of a standard deviation.
-pub const DECREMENT: f64 = 0.01;
+/// Steps end where the Newton decrement is below this: a hundredth of a standard deviation.
+const DECREMENT: f64 = 0.01;
+/// A minimum has a Newton decrement below this; no sensitivities are found anew for less.
+const MINIMUM: f64 = 0.1;
 /// A sum of squares is known to a hundredth where the Newton decrement is below this.
 const NEAR: f64 = 0.1;
 
@@ -139,7 +141,7 @@ pub struct Estimate {
 pub struct Polished {
     /// Variables x of the unknowns.
     pub x: Vec<f64>,
-    /// Sensitivities there or, if a step went from there, very near.
+    /// Sensitivities there or, if a step went from there, very near; those of a part of the recordings where that part refuted the model.
     pub jacobian: DMatrix<f64>,
     /// Covariance there.
     pub covariance: Covariance,
@@ -154,7 +156,7 @@ pub struct Polished {
 impl Polished {
     /// Whether it is a minimum.
     pub fn converged(&self) -> bool {
-        self.decrement < 10.0 * DECREMENT
+        self.decrement < MINIMUM
     }
 }
 
@@ -167,6 +169,29 @@ pub enum Known<'j> {
     Directions(&'j DMatrix<f64>),
     /// Those of nearly the same problem: they are the first ones.
     Sensitivities(&'j DMatrix<f64>),
+}
+
+/// When Gauss and Newton's steps end.
+#[derive(Clone, Copy, Debug)]
+pub struct Until {
+    /// Newton decrement that is small enough.
+    pub decrement: f64,
+    /// After so many sets of sensitivities.
+    pub rounds: usize,
+    /// Where the sum of squares cannot come below this one.
+    pub cost: f64,
+}
+
+impl Until {
+    /// At the minimum, whatever its sum of squares.
+    fn minimum(rounds: usize) -> Self {
+        Until { decrement: DECREMENT, rounds, cost: f64::INFINITY }
+    }
+
+    /// Whether the sum of squares will not come below the one that counts: to second order it falls by the decrement's square.
+    pub fn is_hopeless(&self, cost: f64, decrement: f64) -> bool {
+        cost - 1.5 * decrement * decrement > self.cost
+    }
 }
 
 /// How sensitivities are differenced.
@@ -600,27 +625,34 @@ impl<'a> Problem<'a> {
     ) -> Result<Polished> {
         let all: Vec<usize> = (0..x.len()).collect();
         let known = known.map_or(Known::Nothing, Known::Directions);
-        self.polish_some(x, &all, known, (rounds, DECREMENT))
+        let answer = self.answer(x)?;
+        self.polish_some((x, answer), &all, known, Until::minimum(rounds))
     }
 
     /// The same from sensitivities of a problem that differs by next to nothing: they serve until they no longer do, and one more set
-    /// is found then.
-    pub fn polish_near(&self, x: &[f64], sensitivities: &DMatrix<f64>) -> Result<Polished> {
+    /// is found then, unless the sum of squares stays above `cost` all the same.
+    pub fn polish_near(
+        &self,
+        x: &[f64],
+        sensitivities: &DMatrix<f64>,
+        cost: f64,
+    ) -> Result<Polished> {
         let all: Vec<usize> = (0..x.len()).collect();
-        self.polish_some(x, &all, Known::Sensitivities(sensitivities), (2, NEAR))
+        let answer = self.answer(x)?;
+        let until = Until { decrement: NEAR, rounds: 2, cost };
+        self.polish_some((x, answer), &all, Known::Sensitivities(sensitivities), until)
     }
 
-    /// The same in the variables `free` alone, until the decrement is below `enough`. Sensitivities and covariance are those of
+    /// The same in the variables `free` alone, from x with the FMU's answer there. Sensitivities and covariance are those of
     /// these variables.
     pub fn polish_some(
         &self,
-        x: &[f64],
+        (x, mut answer): (&[f64], Answer),
         free: &[usize],
         known: Known,
-        (rounds, enough): (usize, f64),
+        until: Until,
     ) -> Result<Polished> {
         let mut x = x.to_vec();
-        let mut answer = self.answer(&x)?;
         let mut e = self.stacked(&answer, &x);
         let fastest = fastest(&answer.motion);
         let (mut known, mut given) = match known {
@@ -640,12 +672,15 @@ impl<'a> Problem<'a> {
                 let step = -(&covariance.x * &gradient);
                 let decrement = (-gradient.dot(&step)).max(0.0).sqrt();
                 // the same sensitivities serve as long as they come much closer
-                if decrement < enough || decrement > 0.5 * before {
+                let hopeless = until.is_hopeless(e.norm_squared(), decrement);
+                if decrement < until.decrement || decrement > 0.5 * before || hopeless {
                     break decrement;
                 }
                 before = decrement;
                 let (mut part, mut taken) = (1.0, false);
-                while part > 1e-3 && !taken {
+                // what is left to gain shows in whole steps or not at all
+                let shortest = if decrement < MINIMUM { 0.5 } else { 1e-3 };
+                while part > shortest && !taken {
                     let mut straight = DVector::zeros(x.len());
                     free.iter().zip(step.iter()).for_each(|(&j, step)| straight[j] = part * step);
                     let mut trial = self.moved(&x, straight.as_slice(), fastest);
@@ -672,7 +707,8 @@ impl<'a> Problem<'a> {
                     break decrement;
                 }
             };
-            if decrement < enough || round >= rounds {
+            let ended = decrement < until.decrement.max(MINIMUM);
+            if ended || round >= until.rounds || until.is_hopeless(e.norm_squared(), decrement) {
                 let cost = e.norm_squared();
                 return Ok(Polished { x, jacobian, covariance, answer, cost, decrement });
             }
@@ -779,7 +815,27 @@ impl<'a> Problem<'a> {
     /// model cannot follow yet counts as noise of [`NOISE_FACTOR`] times the gyro's.
     fn search_window(&self, first: &[f64], x: &[f64], fraction: f64) -> Result<(Estimate, f64)> {
         let part: Vec<Recording> = self.recordings.iter().map(|r| r.beginning(fraction)).collect();
-        let mut problem = Problem { recordings: &part, ..self.clone() };
+        self.search_part(first, x, &part)
+    }
+
+    /// The same over the loudest parts, from x; over the whole recordings where they have none.
+    pub fn search_loudest(&self, x: &[f64]) -> Result<Estimate> {
+        let Some(part) = self.loudest() else { return self.search_growing(x, &WHOLE, &mut |_| {}) };
+        let (mut estimate, _) = self.search_part(x, x, &part)?;
+        let rows = |all: &[Recording]| all.iter().map(|r| r.time.len()).sum::<usize>() as f64;
+        let more = NOISE_FACTOR * (rows(self.recordings) / rows(&part)).sqrt();
+        estimate.jacobian = estimate.jacobian.map(|jacobian| jacobian * more);
+        Ok(estimate)
+    }
+
+    /// The loudest parts of the recordings; `None` where one has none.
+    pub fn loudest(&self) -> Option<Vec<Recording>> {
+        self.recordings.iter().map(|r| r.loudest(LOUDEST, RUN_IN)).collect()
+    }
+
+    /// The search over parts of the recordings.
+    fn search_part(&self, first: &[f64], x: &[f64], part: &[Recording]) -> Result<(Estimate, f64)> {
+        let mut problem = Problem { recordings: part, ..self.clone() };
         for (unknown, &x) in problem.unknowns.iter_mut().zip(first) {
             if let Some(name) = unknown.quantity.parameter() {
                 // the friction's shape is left to the search that knows of its valleys
@@ -825,8 +881,12 @@ pub fn fastest(motion: &[Motion]) -> f64 {
 
 /// Windows for starts that are far off, as fractions of the recordings.
 pub const WINDOWS: [f64; 7] = [0.1, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0];
-/// Windows for starts from the frequency response.
-pub const WHOLE: [f64; 1] = [1.0];
+/// Length of the loudest part, s: a slow sweep's resonance, some times over.
+const LOUDEST: f64 = 300.0;
+/// What a model takes to forget how it began, s: some five times the slosh's time constant 1/(2π · 2.4 Hz · 0.003) = 22 s.
+const RUN_IN: f64 = 100.0;
+/// All of the recordings at once.
+const WHOLE: [f64; 1] = [1.0];
 /// By how much the noise of a window is taken for larger than the gyro's.
 const NOISE_FACTOR: f64 = 10.0;
 /// Mean square of a window's residual over that of the one before beyond which it is reached in smaller steps.

@@ -22,7 +22,7 @@ use anyhow::Result;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
-use crate::fit::{self, Known, Polished, Problem};
+use crate::fit::{self, Differences, Known, Polished, Problem, Until};
 use crate::stribeck::Indices;
 use crate::uncertainty::spread_out;
 
@@ -37,6 +37,8 @@ const BENT: f64 = 0.05;
 const LIMIT: f64 = 3.8415;
 /// The same that still counts for the covariance: three standard deviations.
 const NEAR: f64 = 9.0;
+/// The same beyond which no other noise makes a minimum of it.
+const FAR: f64 = 30.0;
 /// Longest step along ln ω_s.
 const LONGEST: f64 = 0.7;
 /// Points on either side of the minimum.
@@ -76,7 +78,10 @@ pub struct Point {
 /// Fits at the Stribeck speeds of a grid over the recording's speeds, near the fit `from`.
 pub fn grid(problem: &Problem, from: &Polished, indices: Indices) -> Result<Vec<Point>> {
     let fastest = fit::fastest(&from.answer.motion);
-    let one = |part: &f64| point(problem, (&from.x, &from.jacobian), from, indices, part * fastest);
+    let one = |part: &f64| {
+        let x = on_its_curve(problem, &from.x, from, indices, part * fastest);
+        point(problem, &x, &from.jacobian, indices, from.cost)
+    };
     let points: Vec<Result<Point>> = GRID.par_iter().map(one).collect();
     points.into_iter().collect()
 }
@@ -84,15 +89,14 @@ pub fn grid(problem: &Problem, from: &Polished, indices: Indices) -> Result<Vec<
 /// Sets of sensitivities at one speed, the first of them mostly that of another one.
 const STEPS: usize = 3;
 
-/// The fit at ω_s = `speed`: b, c and d whose curve is nearest to that of `near` over the recording's speeds, then Gauss and
-/// Newton's steps in all unknowns but ω_s. The sensitivities to b, c and d are taken there, the others are those of `near`.
-fn point(
+/// x near `near` at ω_s = `speed`: b, c and d whose curve is nearest to that of `near` over the recording's speeds.
+fn on_its_curve(
     problem: &Problem,
-    (near, known): (&[f64], &DMatrix<f64>),
+    near: &[f64],
     minimum: &Polished,
     indices: Indices,
     speed: f64,
-) -> Result<Point> {
+) -> Vec<f64> {
     let mut x = near.to_vec();
     let value = |index: usize| problem.unknowns[index].scale.value(near[index]);
     let curve = |w: f64| {
@@ -105,16 +109,46 @@ fn point(
     for (index, value) in [(indices.b, b), (indices.c, c), (indices.d, d), (indices.speed, speed)] {
         x[index] = problem.unknowns[index].scale.variable(value);
     }
+    x
+}
+
+/// x near `near` at ω_s = `speed` as the minimum's covariance foresees it: where the others are likeliest, Σ_js/Σ_ss (x_s − …) on.
+fn foreseen(
+    problem: &Problem,
+    near: &[f64],
+    minimum: &Polished,
+    indices: Indices,
+    speed: f64,
+) -> Vec<f64> {
+    let (s, covariance) = (indices.speed, &minimum.covariance.x);
+    let by = problem.unknowns[s].scale.variable(speed) - near[s];
+    let step = covariance.column(s) * (by / covariance[(s, s)]);
+    problem.moved(near, step.as_slice(), fit::fastest(&minimum.answer.motion))
+}
+
+/// The fit at the ω_s of x: Gauss and Newton's steps from there in all unknowns but ω_s, unless the sum of squares stays above `most` all the
+/// same. The sensitivities to b, c and d are taken there, the others are `known` ones.
+fn point(
+    problem: &Problem,
+    x: &[f64],
+    known: &DMatrix<f64>,
+    indices: Indices,
+    most: f64,
+) -> Result<Point> {
     let bearing = [indices.b, indices.c, indices.d];
     let others: Vec<usize> = (0..x.len()).filter(|j| *j != indices.speed).collect();
-    let motion = problem.answer(&x)?.motion;
-    let jacobian = problem.refreshed(&x, &bearing, &motion, known)?;
+    // a sum of squares to a hundredth is enough
+    let problem = &Problem { differences: Differences::Forward, ..problem.clone() };
+    let answer = problem.answer(x)?;
+    let jacobian = problem.refreshed(x, &bearing, &answer.motion, known)?;
+    let until = Until { decrement: CLOSE, rounds: STEPS, cost: most };
     let found =
-        problem.polish_some(&x, &others, Known::Sensitivities(&jacobian), (STEPS, CLOSE))?;
+        problem.polish_some((x, answer), &others, Known::Sensitivities(&jacobian), until)?;
     // what further steps would win to second order, where that can be told
-    let left = if found.decrement < 1.0 { found.decrement.powi(2) } else { 0.0 };
+    let far = found.decrement > 1.0 && !until.is_hopeless(found.cost, found.decrement);
+    let left = if far { 0.0 } else { found.decrement.powi(2) };
     Ok(Point {
-        speed,
+        speed: problem.unknowns[indices.speed].scale.value(x[indices.speed]),
         cost: found.cost,
         data: found.cost - left - problem.vague_cost(&found.x),
         covariance: spread_out(&found.covariance.x, &others, found.x.len()),
@@ -168,8 +202,12 @@ pub struct Profile {
 }
 
 /// The profile likelihood from a minimum outwards; `None` where ω_s is not unknown or so well known that the sum of squares
-/// is quadratic.
-pub fn profile(problem: &Problem, minimum: &Polished) -> Result<Option<Profile>> {
+/// is quadratic. Speeds `known` to have so much more of it are not tried again where that is far too much.
+pub fn profile(
+    problem: &Problem,
+    minimum: &Polished,
+    known: &[(f64, f64)],
+) -> Result<Option<Profile>> {
     let Some(indices) = Indices::of(&problem.unknowns) else { return Ok(None) };
     let deviation = relative(problem, minimum, indices.speed);
     if deviation < BENT && relative(problem, minimum, indices.d) < BENT {
@@ -186,6 +224,7 @@ pub fn profile(problem: &Problem, minimum: &Polished) -> Result<Option<Profile>>
         jacobian: minimum.jacobian.clone(),
     };
     let fastest = fit::fastest(&minimum.answer.motion);
+    let most = minimum.cost + NEAR;
     let ends = [GRID[0] * fastest, GRID[GRID.len() - 1] * fastest];
     let sides: Vec<Result<(Vec<Point>, bool)>> = [(-1.0, ends[0]), (1.0, ends[1])]
         .into_par_iter()
@@ -202,11 +241,13 @@ pub fn profile(problem: &Problem, minimum: &Polished) -> Result<Option<Profile>>
             beyond.sort_by(|a, b| (side * a).total_cmp(&(side * b)));
             for speed in beyond {
                 let furthest = found.iter().map(|p| side * p.speed.ln()).fold(f64::MIN, f64::max);
-                if open || side * speed.ln() <= furthest {
+                let is_known = |(s, more): &(f64, f64)| (s / speed).ln().abs() < 0.2 && *more > FAR;
+                if open || side * speed.ln() <= furthest || known.iter().any(is_known) {
                     continue;
                 }
                 let from = found.last().unwrap_or(&middle);
-                let other = point(problem, (&from.x, &from.jacobian), minimum, indices, speed)?;
+                let x = on_its_curve(problem, &from.x, minimum, indices, speed);
+                let other = point(problem, &x, &from.jacobian, indices, most)?;
                 let is_in = other.data - middle.data <= LIMIT;
                 found.push(other.clone());
                 if is_in {
@@ -228,10 +269,11 @@ pub fn profile(problem: &Problem, minimum: &Polished) -> Result<Option<Profile>>
     }
     points.sort_by(|a, b| a.speed.total_cmp(&b.speed));
     let least = points.iter().map(|p| p.data).fold(f64::INFINITY, f64::min);
-    let mut intervals = intervals(problem, &points, least, fastest);
+    let places = places(&points, least);
+    let mut intervals = intervals(problem, &places, fastest);
     intervals[indices.speed] = speeds(&points, least, open);
     Ok(Some(Profile {
-        covariance: covariance(problem, minimum, &points, least),
+        covariance: covariance(problem, minimum, &places),
         intervals,
         points: points.iter().map(|p| (p.speed, p.data - least)).collect(),
     }))
@@ -270,7 +312,9 @@ fn outwards(
         let near = near
             .min_by(|a, b| (a.speed / speed).ln().abs().total_cmp(&(b.speed / speed).ln().abs()));
         let near = near.unwrap_or(middle);
-        let found = point(problem, (&near.x, &near.jacobian), minimum, indices, speed)?;
+        let most = minimum.cost + NEAR;
+        let x = foreseen(problem, &near.x, minimum, indices, speed);
+        let found = point(problem, &x, &near.jacobian, indices, most)?;
         let above = found.data - least;
         points.push(found.clone());
         if above > LIMIT {
@@ -320,14 +364,55 @@ fn speeds(points: &[Point], least: f64, open: [bool; 2]) -> [f64; 2] {
     [low, high]
 }
 
+/// A place on the profile, at or between its points.
+struct Place {
+    /// ln ω_s.
+    at: f64,
+    /// All unknowns' variables.
+    x: DVector<f64>,
+    /// Sum of squares above the least.
+    above: f64,
+    /// Covariance of x at this ω_s.
+    covariance: DMatrix<f64>,
+}
+
+/// Places between two points.
+const BETWEEN: usize = 8;
+
+/// The profile between its points as well: x and its covariance are joined by lines, and so is the root of the sum of squares above the
+/// least, with its sign, which is what a quadratic makes a line. Without them, an unknown that goes with ω_s would have an interval too
+/// narrow by up to 1/√2, for the widest is between the middle and the end.
+fn places(points: &[Point], least: f64) -> Vec<Place> {
+    let lowest = points.iter().position(|p| p.data == least).unwrap_or(0);
+    let root = |k: usize| {
+        let root = (points[k].data - least).max(0.0).sqrt();
+        if k < lowest { -root } else { root }
+    };
+    let place = |k: usize, part: f64| {
+        let (a, b) = (&points[k], &points[(k + 1).min(points.len() - 1)]);
+        let mix = |a: f64, b: f64| a + part * (b - a);
+        let x = a.x.iter().zip(&b.x).map(|(a, b)| mix(*a, *b));
+        Place {
+            at: mix(a.speed.ln(), b.speed.ln()),
+            x: DVector::from_iterator(a.x.len(), x),
+            above: mix(root(k), root((k + 1).min(points.len() - 1))).powi(2),
+            covariance: a.covariance.zip_map(&b.covariance, mix),
+        }
+    };
+    let gaps = (0..points.len() - 1)
+        .flat_map(|k| (0..BETWEEN).map(move |part| (k, part as f64 / BETWEEN as f64)));
+    gaps.chain([(points.len() - 1, 0.0)]).map(|(k, part)| place(k, part)).collect()
+}
+
 /// The union of the intervals at fixed speeds, of every unknown.
-fn intervals(problem: &Problem, points: &[Point], least: f64, fastest: f64) -> Vec<[f64; 2]> {
+fn intervals(problem: &Problem, places: &[Place], fastest: f64) -> Vec<[f64; 2]> {
     let mut all = vec![[f64::INFINITY, f64::NEG_INFINITY]; problem.unknowns.len()];
-    for point in points.iter().filter(|p| p.data - least <= LIMIT) {
-        let reach = (LIMIT - (point.data - least)).max(0.0).sqrt();
+    for place in places.iter().filter(|p| p.above <= LIMIT) {
+        let reach = (LIMIT - place.above).sqrt();
         for j in 0..problem.unknowns.len() {
-            let end =
-                |side: f64| problem.end(&point.x, &point.covariance, (j, side * reach), fastest);
+            let end = |side: f64| {
+                problem.end(place.x.as_slice(), &place.covariance, (j, side * reach), fastest)
+            };
             let (low, high) = (end(-1.0), end(1.0));
             all[j] = [all[j][0].min(low), all[j][1].max(high)];
         }
@@ -336,22 +421,22 @@ fn intervals(problem: &Problem, points: &[Point], least: f64, fastest: f64) -> V
 }
 
 /// Covariance of the unknowns' values about the minimum.
-fn covariance(problem: &Problem, minimum: &Polished, points: &[Point], least: f64) -> DMatrix<f64> {
+fn covariance(problem: &Problem, minimum: &Polished, places: &[Place]) -> DMatrix<f64> {
     let n = minimum.x.len();
     let middle = problem.values(&minimum.x);
     let (mut total, mut sum) = (0.0, DMatrix::zeros(n, n));
-    for (k, point) in points.iter().enumerate().filter(|(_, p)| p.data - least < NEAR) {
+    for (k, place) in places.iter().enumerate().filter(|(_, p)| p.above < NEAR) {
         // the part of ln ω_s that it stands for
         let (before, after) =
-            (&points[k.saturating_sub(1)], &points[(k + 1).min(points.len() - 1)]);
-        let width = 0.5 * (after.speed / before.speed).ln();
-        let weight = width * (-(point.data - least) / 2.0).exp();
+            (&places[k.saturating_sub(1)], &places[(k + 1).min(places.len() - 1)]);
+        let weight = 0.5 * (after.at - before.at) * (-place.above / 2.0).exp();
+        let x = place.x.as_slice();
         let slopes: Vec<f64> =
-            problem.unknowns.iter().zip(&point.x).map(|(u, &x)| u.scale.slope(x)).collect();
-        let values = problem.values(&point.x);
+            problem.unknowns.iter().zip(x).map(|(u, &x)| u.scale.slope(x)).collect();
+        let values = problem.values(x);
         let off = DVector::from_iterator(n, values.iter().zip(&middle).map(|(a, b)| a - b));
         let within =
-            DMatrix::from_fn(n, n, |i, j| point.covariance[(i, j)] * slopes[i] * slopes[j]);
+            DMatrix::from_fn(n, n, |i, j| place.covariance[(i, j)] * slopes[i] * slopes[j]);
         sum += (within + &off * off.transpose()) * weight;
         total += weight;
     }

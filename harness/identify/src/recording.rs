@@ -128,6 +128,26 @@ impl Recording {
         Recording { from_rest: self.from_rest, ..part }
     }
 
+    /// The part of `seconds` in which the hub moves most, after `run_in` more in which the model forgets how it began; those rows are not
+    /// fitted. `None` where that is no small part, where the beginning counts (it is not at rest), or an encoder's angle does.
+    pub fn loudest(&self, seconds: f64, run_in: f64) -> Option<Recording> {
+        if self.duration() < 2.0 * (seconds + run_in) || !self.from_rest || self.angle.is_some() {
+            return None;
+        }
+        let rows = |time: f64| (time / self.step()) as usize;
+        let (run_in, length) = (rows(run_in), rows(seconds));
+        let power = |from: usize| {
+            self.rate[from..from + length].iter().map(|rate| rate * rate).sum::<f64>()
+        };
+        let starts = (0..self.time.len() - length).step_by((length / 20).max(1));
+        let from = starts.max_by(|a, b| power(*a).total_cmp(&power(*b)))?;
+        let first = from.saturating_sub(run_in);
+        let part = self.rows(first, from + length);
+        let fresh = (0..part.time.len())
+            .map(|row| first + row >= from && part.fresh.as_ref().is_none_or(|fresh| fresh[row]));
+        Some(Recording { fresh: Some(fresh.collect()), from_rest: true, ..part })
+    }
+
     /// Torque and rate on an even grid of the mean step, joined by lines: for spectra alone.
     pub fn even(&self) -> (f64, Vec<f64>, Vec<f64>) {
         let step = self.step();

@@ -7,7 +7,7 @@ use anyhow::{Result, bail};
 use nalgebra::DMatrix;
 
 use crate::between;
-use crate::fit::{Polished, Problem, WHOLE, WINDOWS, is_other};
+use crate::fit::{Estimate, Polished, Problem, WINDOWS, is_other};
 use crate::friction;
 use crate::goodness::{fit_pct, is_poor, tests};
 use crate::news::Since;
@@ -40,6 +40,8 @@ pub struct Search<'a, 'h> {
     pub alone: bool,
     /// Name of the model.
     pub model: &'h str,
+    /// What other Stribeck speeds make of the sum of squares, once that was asked: speed, rad/s, and how much more.
+    pub speeds: Vec<(f64, f64)>,
     /// What the lines so far were told to cost.
     pub since: Since,
     /// Is told what happens.
@@ -81,11 +83,15 @@ enum From {
 enum How {
     /// Gauss and Newton's steps over the whole recordings, with so many sets of sensitivities at most.
     Steps(usize),
+    /// The same over the loudest part of long recordings first, and over the whole only where that comes near the noise ([`NEAR`]).
+    Glance(usize),
     /// Levenberg and Marquardt's search over the whole recordings, then such steps.
     Search,
     /// Levenberg and Marquardt's search over parts of the recordings that grow, then such steps; noise, intersample
     /// behaviour and the friction's curve are found on the way.
     Windows(&'static [f64]),
+    /// The same over the loudest part of long recordings, then over the whole; over the whole from the beginning on where they are short.
+    Loudest,
 }
 
 /// What must hold of the best minimum so far for an attempt to be made.
@@ -131,8 +137,8 @@ impl Attempt {
     }
 
     /// Over windows, with a noise of its own.
-    fn over(from: From, windows: &'static [f64], when: When) -> Self {
-        Attempt { from, how: How::Windows(windows), when, accept: Accept::BetterFit }
+    fn over(from: From, how: How, when: When) -> Self {
+        Attempt { from, how, when, accept: Accept::BetterFit }
     }
 
     /// Where it starts and how it searches, in words.
@@ -146,7 +152,11 @@ impl Attempt {
             How::Steps(rounds) => {
                 format!("{from}, Gauss–Newton steps with {rounds} sets of sensitivities at most")
             }
+            How::Glance(rounds) => {
+                format!("{from}, a glance with {rounds} sets of sensitivities at most")
+            }
             How::Search => format!("{from}, Levenberg–Marquardt over the whole recording"),
+            How::Loudest => format!("{from}, the loudest part of a long recording first"),
             How::Windows(parts) => {
                 let parts: Vec<String> =
                     parts.iter().map(|part| format!("{:.0}", 100.0 * part)).collect();
@@ -192,19 +202,55 @@ impl<'a> Search<'a, '_> {
         Ok(polished)
     }
 
+    /// Gauss and Newton's steps over the loudest parts, and over the whole recordings if they come near the noise there.
+    fn glance(
+        &mut self,
+        x: &[f64],
+        known: Option<&DMatrix<f64>>,
+        rounds: usize,
+    ) -> Result<Polished> {
+        let Some(part) = self.problem.loudest() else { return self.polish(x, known, rounds) };
+        let problem = Problem { recordings: &part, ..self.problem.clone() };
+        let there = problem.polish(x, known, rounds)?;
+        let rows: usize = part.iter().map(|r| r.of_fresh(&r.time).len()).sum();
+        let excess = there.cost / rows as f64;
+        self.say(format!(
+            "{}: the loudest part has a mean square of {excess:.1} of noise",
+            self.model
+        ));
+        if excess < NEAR {
+            return self.polish(&there.x, Some(&there.jacobian), rounds);
+        }
+        let answer = self.problem.answer(&there.x)?;
+        let cost = self.problem.stacked(&answer, &there.x).norm_squared();
+        Ok(Polished { answer, cost, ..there })
+    }
+
     /// Levenberg and Marquardt's search, then Gauss and Newton's steps.
     fn search(&mut self, x: &[f64], tolerance: f64) -> Result<Polished> {
         let rough = self.problem.search(x, tolerance)?;
         self.polish(&rough.x, rough.jacobian.as_ref(), ROUNDS)
     }
 
-    /// From variables x, over windows; the noise is estimated on the way.
+    /// From variables x, over windows that grow.
     fn windows(&mut self, x: &[f64], windows: &[f64]) -> Result<Polished> {
         let (label, problem) = (self.model, &self.problem);
         let (since, progress) = (&mut self.since, &mut *self.progress);
         let mut say =
             |line| progress(since.line(format!("{label}: {line}"), problem.simulations()));
         let rough = problem.search_growing(x, windows, &mut say)?;
+        self.on(rough)
+    }
+
+    /// From variables x, over the loudest parts.
+    fn loudest(&mut self, x: &[f64]) -> Result<Polished> {
+        let rough = self.problem.search_loudest(x)?;
+        self.say(format!("{}: the loudest part: {}", self.model, rough.reason));
+        self.on(rough)
+    }
+
+    /// On from a rough estimate, over the whole recordings; the noise is estimated on the way.
+    fn on(&mut self, rough: Estimate) -> Result<Polished> {
         let answer = self.problem.answer(&rough.x)?;
         self.problem.estimate_noise(&answer);
         let (mut x, mut known, mut poor) =
@@ -290,6 +336,7 @@ impl<'a> Search<'a, '_> {
                 self.model, point.speed, point.cost, near.cost
             ));
         }
+        self.speeds = points.iter().map(|p| (p.speed, p.cost - near.cost)).collect();
         let lowest = points.iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
         let mut best = near;
         if let Some(point) = lowest.filter(|p| p.cost < best.cost) {
@@ -306,44 +353,47 @@ impl<'a> Search<'a, '_> {
         let frozen = self.model == "frozen";
         // The response that starts come from is linear: a model that is not may be far from it.
         let nonlinear = !frozen && self.model != "linear";
-        let windows: &[f64] = if self.far || nonlinear { &WINDOWS } else { &WHOLE };
+        let how = if self.far || nonlinear { How::Windows(&WINDOWS) } else { How::Loudest };
         let others = (1..if frozen { 1 } else { self.starts.len() }).flat_map(|i| {
             [
-                Attempt::over(From::Start(i), &WHOLE, When::Unexplained),
-                Attempt::over(From::Best, &WINDOWS, When::Moved),
+                Attempt::over(From::Start(i), How::Loudest, When::Unexplained),
+                Attempt::over(From::Best, How::Windows(&WINDOWS), When::Moved),
             ]
         });
         let Some(sibling) = sibling else {
-            let mut all = vec![Attempt::over(From::Start(0), windows, When::Always)];
+            let mut all = vec![Attempt::over(From::Start(0), how, When::Always)];
             all.extend(others);
             if self.model == "linear" && self.alone && !self.far {
-                all.push(Attempt::over(From::Start(0), &WINDOWS, When::Poor));
+                all.push(Attempt::over(From::Start(0), How::Windows(&WINDOWS), When::Poor));
             }
             return all;
         };
-        let near = Attempt::near(From::Sibling, How::Steps(3), When::Always);
+        let is_explained =
+            tests(sibling.problem, &sibling.minimum.answer).iter().all(Tests::passed);
+        // where the residual of the other is only noise, this one is as good near there or not at all
+        let how = if is_explained { How::Glance(3) } else { How::Steps(3) };
+        let near = Attempt::near(From::Sibling, how, When::Always);
         if frozen {
             return vec![near];
         }
         if is_poor(sibling.problem, &sibling.minimum.answer) {
             // so nonlinear that the other model's estimate leads nowhere
             return vec![
-                Attempt::over(From::Start(0), &WINDOWS, When::Always),
-                Attempt::over(From::Start(0), &WHOLE, When::Poor),
+                Attempt::over(From::Start(0), How::Windows(&WINDOWS), When::Always),
+                Attempt::over(From::Start(0), How::Loudest, When::Poor),
             ];
         }
         let mut all = vec![near, Attempt::near(From::Best, How::Steps(ROUNDS), When::Near)];
-        if tests(sibling.problem, &sibling.minimum.answer).iter().all(Tests::passed) {
-            // where the residual of the other is only noise, this one is as good near there or not at all
+        if is_explained {
             all.push(Attempt::near(From::Best, How::Search, When::Near));
             if sibling.is_poorer {
-                all.push(Attempt::over(From::Start(0), &WINDOWS, When::Poor));
+                all.push(Attempt::over(From::Start(0), How::Windows(&WINDOWS), When::Poor));
             }
         } else {
             // its minimum may be anywhere
             all.push(Attempt::near(From::Best, How::Search, When::Unfinished));
-            all.push(Attempt::over(From::Start(0), &WINDOWS, When::Poor));
-            all.push(Attempt::over(From::Start(0), &WHOLE, When::Poor));
+            all.push(Attempt::over(From::Start(0), How::Windows(&WINDOWS), When::Poor));
+            all.push(Attempt::over(From::Start(0), How::Loudest, When::Poor));
         }
         all.extend(others.filter(|_| sibling.is_poorer));
         all
@@ -416,7 +466,9 @@ impl<'a> Search<'a, '_> {
         self.say(format!("{}: free, from {}", self.model, free.join(", ")));
         match attempt.how {
             How::Windows(windows) => self.windows(&x, windows),
+            How::Loudest => self.loudest(&x),
             How::Steps(rounds) => self.polish(&x, known, rounds),
+            How::Glance(rounds) => self.glance(&x, known, rounds),
             How::Search => self.search(&x, 1e-3),
         }
     }

@@ -245,7 +245,7 @@ fn finish(
     options: &Options,
     tell: &mut dyn FnMut(News),
 ) -> Result<Identification> {
-    let Fitted { mut problem, polished, mut fit } = best;
+    let Fitted { mut problem, polished, mut fit, speeds } = best;
     let (mut since, model) = (Since::default(), fit.model.clone());
     let mut say = |what: &str, problem: &Problem| {
         tell(News::Detail(since.line(format!("{model}: {what}"), problem.simulations())));
@@ -293,7 +293,7 @@ fn finish(
     };
     say("torques that may be missing", &problem);
     let fits = findings.fits(&fit);
-    let profile = friction::profile(&problem, &polished)?;
+    let profile = friction::profile(&problem, &polished, &speeds)?;
     say("profile of the friction's curve", &problem);
     let Polished { jacobian, covariance, answer, .. } = polished;
     let error_budget =
