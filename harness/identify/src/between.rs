@@ -23,9 +23,6 @@ const SYNCHRONOUS: f64 = 0.02;
 /// Part of a row by which a delay may differ from half a row and still be taken for one.
 const NEAR_HALF: f64 = 0.1;
 
-/// Sum of squares above the best beyond which a behaviour is out; how far beyond is not found.
-const HOPELESS: f64 = 100.0;
-
 /// Another behaviour than the one that was fitted.
 pub struct Alternative {
     /// Which.
@@ -85,8 +82,7 @@ pub fn alternatives(problem: &Problem, minimum: &Polished) -> Vec<Alternative> {
             let delay = scale.value(x[index]) + rows * problem.recordings[0].step();
             x[index] = scale.variable(delay);
         }
-        let enough = minimum.cost + HOPELESS;
-        let minimum = problem.polish_near(&x, &minimum.jacobian, enough).ok()?;
+        let minimum = problem.polish_near(&x, &minimum.jacobian).ok()?;
         let delay = delay(&problem, &minimum.x, &minimum.covariance);
         let left = if minimum.decrement < 1.0 { minimum.decrement.powi(2) } else { 0.0 };
         let cost = minimum.cost - left;

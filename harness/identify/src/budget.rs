@@ -40,25 +40,26 @@ const ROUNDS: usize = 5;
 /// Step, in standard deviations, after which the estimates stay.
 const SETTLED: f64 = 0.1;
 
-/// What may be wrong in a problem, the tolerances first, and what that does at the minimum x.
-pub fn of(
+/// What an error of something that is known within a tolerance does to the innovations.
+pub struct Slope {
+    /// Its name.
+    name: &'static str,
+    /// Relative standard deviation of what is known of it.
+    tolerance: f64,
+    /// Change of the stacked innovations by an error of that size.
+    pub change: DVector<f64>,
+}
+
+/// Of all tolerances that count, at x with the FMU's answer there.
+pub fn slopes(
     problem: &Problem,
     (x, answer): (&[f64], &Answer),
-    jacobian: &DMatrix<f64>,
-    covariance: &Covariance,
     tolerances: &Tolerances,
-) -> Result<Vec<Effect>> {
-    let mut effects = Vec::new();
+) -> Result<Vec<Slope>> {
     let sloshes = problem.index("slosh.zeta").is_some();
-    let effect = |source: String, change: DVector<f64>, tolerance: bool| {
-        let there: Vec<f64> = x.iter().zip(change.iter()).map(|(x, change)| x + change).collect();
-        let values = problem.values(x).into_iter().zip(problem.values(&there));
-        let changes = problem.unknowns.iter().zip(values);
-        let changes = changes.map(|(u, (before, after))| (u.quantity.name(), after - before));
-        Effect { source, change: changes.collect(), tolerance, x: change }
-    };
     let base = problem.stacked(answer, x);
     let mut instance = nominal::initialised(problem.fmu, &problem.setup.settings)?;
+    let mut slopes = Vec::new();
     for (name, tolerance) in NAMES.into_iter().zip(tolerances.all()) {
         let estimated = problem.index(name).is_some();
         let recorded = name == "g_axial" && problem.recordings.iter().any(|r| r.gravity.is_some());
@@ -66,35 +67,51 @@ pub fn of(
         if tolerance == 0.0 || estimated || recorded || unseen {
             continue;
         }
-        let nominal = match name {
-            "torque" | "clock" => 1.0,
-            _ => instance.real(name)?,
-        };
-        let moved = |by: f64| -> Result<DVector<f64>> {
-            let factor = 1.0 + by;
-            let mut recordings = problem.recordings.to_vec();
-            let mut other = problem.clone();
-            match name {
-                "torque" => {
-                    recordings.iter_mut().flat_map(|r| &mut r.torque).for_each(|t| *t *= factor)
-                }
-                "clock" => {
-                    recordings.iter_mut().flat_map(|r| &mut r.time).for_each(|t| *t *= factor)
-                }
-                _ => other.setup.settings.push((name.into(), (nominal * factor).to_string())),
+        let factor = 1.0 + STEP;
+        let mut recordings = problem.recordings.to_vec();
+        let mut other = problem.clone();
+        match name {
+            "torque" => {
+                recordings.iter_mut().flat_map(|r| &mut r.torque).for_each(|t| *t *= factor)
             }
-            let other = Problem { recordings: &recordings, ..other };
-            Ok(other.stacked(&other.answer(x)?, x))
-        };
-        let slope = (moved(STEP)? - &base) / STEP;
-        let change = -(&covariance.x * jacobian.tr_mul(&slope)) * tolerance;
-        let source = format!("{name} wrong by {}", percent(tolerance));
-        effects.push(effect(source, change, true));
+            "clock" => recordings.iter_mut().flat_map(|r| &mut r.time).for_each(|t| *t *= factor),
+            _ => {
+                let value = instance.real(name)? * factor;
+                other.setup.settings.push((name.into(), value.to_string()));
+            }
+        }
+        let other = Problem { recordings: &recordings, ..other };
+        let moved = other.stacked(&other.answer(x)?, x);
+        slopes.push(Slope { name, tolerance, change: (moved - &base) * (tolerance / STEP) });
     }
+    Ok(slopes)
+}
+
+/// What may be wrong in a problem, the tolerances first, and what that does at the minimum x.
+pub fn of(
+    problem: &Problem,
+    (x, answer): (&[f64], &Answer),
+    jacobian: &DMatrix<f64>,
+    covariance: &Covariance,
+    slopes: &[Slope],
+) -> Vec<Effect> {
+    let effect = |source: String, change: DVector<f64>, tolerance: bool| {
+        let there: Vec<f64> = x.iter().zip(change.iter()).map(|(x, change)| x + change).collect();
+        let values = problem.values(x).into_iter().zip(problem.values(&there));
+        let changes = problem.unknowns.iter().zip(values);
+        let changes = changes.map(|(u, (before, after))| (u.quantity.name(), after - before));
+        Effect { source, change: changes.collect(), tolerance, x: change }
+    };
+    let of_slope = |slope: &Slope| {
+        let change = -(&covariance.x * jacobian.tr_mul(&slope.change));
+        effect(format!("{} wrong by {}", slope.name, percent(slope.tolerance)), change, true)
+    };
+    let mut effects: Vec<Effect> = slopes.iter().map(of_slope).collect();
+    let sloshes = problem.index("slosh.zeta").is_some();
     if let Some(change) = modes(problem, (x, answer), jacobian, covariance).filter(|_| sloshes) {
         effects.push(effect("slosh modes 2 to 4, left out".into(), change, false));
     }
-    Ok(effects)
+    effects
 }
 
 /// A share in percent.

@@ -563,6 +563,32 @@ impl<'a> Problem<'a> {
         there
     }
 
+    /// How a small change of `step` changes where it leads from x, ∂[`Problem::moved`]/∂step, in the variables `free`.
+    pub fn turn(&self, x: &[f64], step: &[f64], free: &[usize], fastest: f64) -> DMatrix<f64> {
+        let small = 1e-5;
+        let column = |k: usize| {
+            let at = |by: f64| {
+                let mut step = step.to_vec();
+                step[free[k]] += by;
+                self.moved(x, &step, fastest)
+            };
+            let (ahead, behind) = (at(small), at(-small));
+            let of = |j: &usize| (ahead[*j] - behind[*j]) / (2.0 * small);
+            DVector::from_iterator(free.len(), free.iter().map(of))
+        };
+        DMatrix::from_columns(&(0..free.len()).map(column).collect::<Vec<_>>())
+    }
+
+    /// Sensitivities carried along a valley, without a simulation: they are the same in the variables in which the valley is straight, and so
+    /// J there is J here times the inverse of that `turn`. What is known of unknowns stays as it is.
+    pub fn carry(&self, jacobian: &mut DMatrix<f64>, turn: &DMatrix<f64>) {
+        let known = self.unknowns.iter().filter(|unknown| unknown.prior.is_some()).count();
+        let Some(back) = turn.clone().try_inverse() else { return };
+        let mut rows = jacobian.rows_mut(0, jacobian.nrows() - known);
+        let carried = &rows * back;
+        rows.copy_from(&carried);
+    }
+
     /// An end of the interval of unknown j: its value `reach` standard deviations of `covariance` from x, along the valley that it is in.
     pub fn end(
         &self,
@@ -630,16 +656,11 @@ impl<'a> Problem<'a> {
     }
 
     /// The same from sensitivities of a problem that differs by next to nothing: they serve until they no longer do, and one more set
-    /// is found then, unless the sum of squares stays above `cost` all the same.
-    pub fn polish_near(
-        &self,
-        x: &[f64],
-        sensitivities: &DMatrix<f64>,
-        cost: f64,
-    ) -> Result<Polished> {
+    /// is found then.
+    pub fn polish_near(&self, x: &[f64], sensitivities: &DMatrix<f64>) -> Result<Polished> {
         let all: Vec<usize> = (0..x.len()).collect();
         let answer = self.answer(x)?;
-        let until = Until { decrement: NEAR, rounds: 2, cost };
+        let until = Until { decrement: NEAR, ..Until::minimum(2) };
         self.polish_some((x, answer), &all, Known::Sensitivities(sensitivities), until)
     }
 
@@ -661,34 +682,46 @@ impl<'a> Problem<'a> {
             Known::Sensitivities(known) => (None, Some(known.select_columns(free))),
         };
         for round in 1.. {
-            let jacobian = match given.take() {
+            let mut jacobian = match given.take() {
                 Some(jacobian) => jacobian,
                 None => self.sensitivities(&x, free, &answer.motion, known.as_ref())?,
             };
-            let covariance = self.covariance(&jacobian)?;
-            let mut before = f64::INFINITY;
+            let mut covariance = self.covariance(&jacobian)?;
+            // decrement of the step before, and which part of that was taken
+            let (mut before, mut part) = (f64::INFINITY, 1.0_f64);
             let decrement = loop {
                 let gradient = jacobian.tr_mul(&e);
                 let step = -(&covariance.x * &gradient);
                 let decrement = (-gradient.dot(&step)).max(0.0).sqrt();
-                // the same sensitivities serve as long as they come much closer
+                // the same sensitivities serve as long as they come closer by half of what they foresee
+                let serve = decrement <= (1.0 - 0.5 * part) * before;
                 let hopeless = until.is_hopeless(e.norm_squared(), decrement);
-                if decrement < until.decrement || decrement > 0.5 * before || hopeless {
+                if decrement < until.decrement || !serve || hopeless {
                     break decrement;
                 }
                 before = decrement;
-                let (mut part, mut taken) = (1.0, false);
+                let mut taken = false;
+                part = (3.0 * part).min(1.0);
                 // what is left to gain shows in whole steps or not at all
                 let shortest = if decrement < MINIMUM { 0.5 } else { 1e-3 };
                 while part > shortest && !taken {
-                    let mut straight = DVector::zeros(x.len());
-                    free.iter().zip(step.iter()).for_each(|(&j, step)| straight[j] = part * step);
-                    let mut trial = self.moved(&x, straight.as_slice(), fastest);
+                    let at_free = |values: DVector<f64>| {
+                        let mut all = vec![0.0; x.len()];
+                        free.iter().zip(values.iter()).for_each(|(&j, value)| all[j] = *value);
+                        all
+                    };
+                    let mut way = vec![(x.clone(), at_free(part * &step))];
+                    let mut trial = self.moved(&x, &way[0].1, fastest);
                     // the step and, where it makes it worse, the same along the bent valley
                     for is_straight in [true, false] {
                         let Ok(there) = self.answer(&trial) else { break };
                         let new = self.stacked(&there, &trial);
                         if new.norm_squared() < e.norm_squared() {
+                            for (from, step) in &way {
+                                let turn = self.turn(from, step, free, fastest);
+                                self.carry(&mut jacobian, &turn);
+                                covariance.x = &turn * covariance.x * turn.transpose();
+                            }
                             (x, answer, e, taken) = (trial, there, new, true);
                             break;
                         }
@@ -697,19 +730,20 @@ impl<'a> Problem<'a> {
                         }
                         let bend = &new - &e - part * (&jacobian * &step);
                         let back = -(&covariance.x * jacobian.tr_mul(&bend));
-                        let mut aside = vec![0.0; x.len()];
-                        free.iter().zip(back.iter()).for_each(|(&j, back)| aside[j] = *back);
-                        trial = self.moved(&trial, &aside, fastest);
+                        way.push((trial, at_free(back)));
+                        trial = self.moved(&way[1].0, &way[1].1, fastest);
                     }
-                    part *= 0.3;
+                    if !taken {
+                        part *= 0.3;
+                    }
                 }
-                if !taken || part < 0.2 {
+                if !taken {
                     break decrement;
                 }
             };
             let ended = decrement < until.decrement.max(MINIMUM);
             if ended || round >= until.rounds || until.is_hopeless(e.norm_squared(), decrement) {
-                let cost = e.norm_squared();
+                let (cost, covariance) = (e.norm_squared(), self.covariance(&jacobian)?);
                 return Ok(Polished { x, jacobian, covariance, answer, cost, decrement });
             }
             known = Some(at_places(&jacobian, free, x.len()));

@@ -15,13 +15,16 @@
 //! 95 % interval of another:  the union of v ± sqrt((1.96² + C_min − C) V)
 //! ```
 //!
-//! (Pawitan, In All Likelihood, 3.4; for one interval of several minima too). What holds an unknown only vaguely beforehand does not count in C. An end that the speeds of the
+//! (Pawitan, In All Likelihood, 3.4). A valley elsewhere whose sum of squares is not clearly larger ([`DECIDES`], as between models) is not
+//! refuted by being a little higher: which of several valleys is the lowest is a matter of chance, for the difference of two has not the
+//! distribution of one's own width (Davies, Biometrika 74, 1987). Its interval is that about its own least, and all are joined. What holds an unknown only vaguely beforehand does not count in C. An end that the speeds of the
 //! recording do not reach is open: the unknown is not determined there.
 
 use anyhow::Result;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
+use crate::evidence::DECIDES;
 use crate::fit::{self, Differences, Known, Polished, Problem, Until};
 use crate::stribeck::Indices;
 use crate::uncertainty::spread_out;
@@ -39,6 +42,8 @@ const LIMIT: f64 = 3.8415;
 const NEAR: f64 = 9.0;
 /// The same beyond which no other noise makes a minimum of it.
 const FAR: f64 = 30.0;
+/// By how much less the sum of squares must grow from one speed to the next grid speed for it to be no wall.
+const FLAT: f64 = 1.0;
 /// Longest step along ln ω_s.
 const LONGEST: f64 = 0.7;
 /// Points on either side of the minimum.
@@ -224,7 +229,7 @@ pub fn profile(
         jacobian: minimum.jacobian.clone(),
     };
     let fastest = fit::fastest(&minimum.answer.motion);
-    let most = minimum.cost + NEAR;
+    let most = minimum.cost + DECIDES;
     let ends = [GRID[0] * fastest, GRID[GRID.len() - 1] * fastest];
     let sides: Vec<Result<(Vec<Point>, bool)>> = [(-1.0, ends[0]), (1.0, ends[1])]
         .into_par_iter()
@@ -247,16 +252,21 @@ pub fn profile(
                 }
                 let from = found.last().unwrap_or(&middle);
                 let x = on_its_curve(problem, &from.x, minimum, indices, speed);
-                let other = point(problem, &x, &from.jacobian, indices, most)?;
-                let is_in = other.data - middle.data <= LIMIT;
-                found.push(other.clone());
-                if is_in {
-                    let reference = (&other, middle.data);
-                    let (more, is_open) =
+                let mut other = point(problem, &x, &from.jacobian, indices, most)?;
+                let above = (other.data - middle.data).max(0.0);
+                // what goes on rising is the wall of the same valley
+                let is_rival = above <= DECIDES && other.data < from.data + FLAT;
+                if above <= LIMIT || is_rival {
+                    let reference = (&other, other.data);
+                    let (mut more, is_open) =
                         outwards(problem, minimum, indices, reference, (side, end, deviation))?;
+                    more.iter_mut().for_each(|p| p.data = (p.data - above).max(middle.data));
                     found.extend(more);
+                    other.data -= above;
                     open = is_open;
                 }
+                found.push(other);
+                found.sort_by(|a, b| (side * a.speed).total_cmp(&(side * b.speed)));
             }
             Ok((found, open))
         })

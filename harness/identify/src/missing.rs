@@ -11,13 +11,15 @@
 //! k/σ_k is normal with unit variance if nothing is missing. A general test of the innovations spreads over hundreds of rows
 //! or bands what this one gathers in a single number: an estimate can be off by ten standard deviations while
 //! those see nothing. The torques are tried together: the one that explains most is taken, then of the others what it does not
-//! explain.
+//! explain. What is known within a tolerance counts as an unknown of which that is known: a clock that is wrong by its tolerance leaves a
+//! trace in the angle of an encoder that no other unknown can take, and that is no torque.
 
 use anyhow::Result;
 use nalgebra::DVector;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::budget::Slope;
 use crate::estimate::prose;
 use crate::fit::{Differences, Polished, Problem};
 use crate::recording::Recording;
@@ -104,16 +106,30 @@ impl Missing {
 
 /// Torques that the model lacks, what explains most first; none where the FMU has no input for them. `e` are the stacked
 /// innovations at the minimum `found`.
-pub fn torques(problem: &Problem, found: &Polished, e: &DVector<f64>) -> Result<Vec<Missing>> {
-    let Polished { x, jacobian, covariance, answer, .. } = found;
+pub fn torques(
+    problem: &Problem,
+    found: &Polished,
+    e: &DVector<f64>,
+    tolerances: &[Slope],
+) -> Result<Vec<Missing>> {
+    let Polished { x, answer, .. } = found;
     let base = &answer.motion;
     // a size to a thousandth is enough
     let problem = &Problem { differences: Differences::Forward, ..problem.clone() };
     if problem.fmu.description().variable(TORQUE_BESIDES).is_err() {
         return Ok(Vec::new());
     }
-    let rest = |v: &DVector<f64>| v - jacobian * (&covariance.x * jacobian.tr_mul(v));
-    let mut left = rest(e);
+    let (rows, n) = found.jacobian.shape();
+    let more = tolerances.len();
+    let mut jacobian = found.jacobian.clone().resize(rows + more, n + more, 0.0);
+    for (k, slope) in tolerances.iter().enumerate() {
+        jacobian.view_mut((0, n + k), (rows, 1)).copy_from(&slope.change);
+        jacobian[(rows + k, n + k)] = 1.0;
+    }
+    let covariance = problem.covariance(&jacobian)?;
+    let extended = |v: &DVector<f64>| v.clone().resize_vertically(rows + more, 0.0);
+    let rest = |v: DVector<f64>| &v - &jacobian * (&covariance.x * jacobian.tr_mul(&v));
+    let mut left = rest(extended(e));
     let of_kind = |kind: &'static Kind| -> Result<Option<(&Kind, DVector<f64>)>> {
         let torque = course(problem, base, kind);
         let size = rms(torque.iter().flatten());
@@ -123,7 +139,7 @@ pub fn torques(problem: &Problem, found: &Polished, e: &DVector<f64>) -> Result<
         let command = rms(problem.recordings.iter().flat_map(|r| &r.torque));
         let step = STEP * command.max(QUIET) / size;
         let s = problem.to_torque(x, base, &torque, step)?;
-        let seen = rest(&s);
+        let seen = rest(extended(&s));
         Ok((seen.norm() > SEEN * s.norm()).then_some((kind, seen)))
     };
     let seen: Vec<_> = KINDS.par_iter().map(of_kind).collect::<Result<_>>()?;

@@ -196,7 +196,7 @@ fn a_drag_that_the_model_lacks_is_named_with_its_size() {
     let settings = [("slosh.zeta_from_correlation", "false"), ("slosh.zeta", "0.003")];
     let settings = settings.map(|(name, value)| (name.to_string(), value.to_string())).to_vec();
     let twin = Twin { settings, unmodelled: vec![Unmodelled::Drag], ..Twin::default() };
-    let torque = Torque::Profile("lin-sweep:amplitude=0.25".parse().unwrap());
+    let torque = Torque::Profile("lin-sweep:amplitude=0.4,duration=900".parse().unwrap());
     let recording = twin.record(&fmu, &torque, Some(1)).unwrap();
     let found = identify(&fmu, &[recording], &options(), &mut |_| {}).unwrap();
     let [drag] = &found.details.missing[..] else { panic!("{:?}", found.details.missing) };
@@ -264,7 +264,7 @@ fn a_delay_that_another_torque_between_rows_explains_as_well_is_not_stated_as_su
 fn no_model_error_makes_the_rate_come_before_the_torque() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
     let settings = [("friction.model", "stribeck_smooth"), ("friction.eps", "1e-3")];
-    let torque = Torque::Profile(LONG.parse().unwrap());
+    let torque = Torque::Profile("lin-sweep:amplitude=0.1,duration=900".parse().unwrap());
     let zeta = [("slosh.zeta_from_correlation", "false"), ("slosh.zeta", "0.0029757")];
     let settings = [&zeta[..], &settings].concat();
     let recording =

@@ -281,9 +281,11 @@ fn finish(
     fit.newton_decrement = polished.decrement;
     x.clone_from(&polished.x);
     let e = problem.stacked(&polished.answer, &x);
+    let slopes = budget::slopes(&problem, (&x, &polished.answer), &options.tolerances)?;
+    say("tolerances", &problem);
     let findings = Findings {
         torque: between_rows.words,
-        missing: missing::torques(&problem, &polished, &e)?,
+        missing: missing::torques(&problem, &polished, &e, &slopes)?,
         doubts: question
             .doubts
             .iter()
@@ -296,9 +298,8 @@ fn finish(
     let profile = friction::profile(&problem, &polished, &speeds)?;
     say("profile of the friction's curve", &problem);
     let Polished { jacobian, covariance, answer, .. } = polished;
-    let error_budget =
-        budget::of(&problem, (&x, &answer), &jacobian, &covariance, &options.tolerances)?;
-    say("tolerances and higher slosh modes", &problem);
+    let error_budget = budget::of(&problem, (&x, &answer), &jacobian, &covariance, &slopes);
+    say("higher slosh modes", &problem);
     fit.simulations = problem.simulations();
     let tolerances = budget::of_tolerances(&error_budget, x.len());
     let noise_only = place(&problem)
