@@ -350,7 +350,7 @@ static void dependencies(void *c) {
 }
 
 static void call_of(unsigned which, void *c) {
-    size_t n, m;
+    size_t n, m, many;
     fmi3Boolean flags[2];
     void **handle;
     switch (which) {
@@ -384,12 +384,12 @@ static void call_of(unsigned which, void *c) {
         CALL(fmi3SerializeFMUState, c, state(), array(n, 1), n);
         break;
     case 30: case 31:
-        n = length(), m = length();
-        CALL(fmi3GetDirectionalDerivative, c, references(n), n, references(m), m, reals(m), values_of(m), reals(n), n);
+        n = length(), m = length(), many = values_of(m);
+        CALL(fmi3GetDirectionalDerivative, c, references(n), n, references(m), m, reals(many), many, reals(n), n);
         break;
     case 32: case 33:
-        n = length(), m = length();
-        CALL(fmi3GetAdjointDerivative, c, references(n), n, references(m), m, reals(n), n, reals(m), values_of(m));
+        n = length(), m = length(), many = values_of(m);
+        CALL(fmi3GetAdjointDerivative, c, references(n), n, references(m), m, reals(n), n, reals(many), many);
         break;
     case 34: do_step(c, real(), real()); break;
     case 35:
