@@ -118,9 +118,9 @@ pub fn fit<'a>(
             is_poorer: is_poorer && !other.fit.poor,
         }
     });
-    let polished = search.run(sibling.as_ref())?;
+    let mut polished = search.run(sibling.as_ref())?;
     let (mut problem, speeds) = (search.problem, search.speeds);
-    problem.estimate_noise(&polished.answer);
+    problem.renew_noise(&mut polished);
     let fit = summary(&problem, &polished, options, (model, law))?;
     progress(News::Step(fit.line()));
     Ok(Fitted { problem, polished, fit, speeds })

@@ -62,6 +62,8 @@ const LONGEST_STEP: f64 = 0.05;
 const DECREMENT: f64 = 0.01;
 /// A minimum has a Newton decrement below this; no sensitivities are found anew for less.
 const MINIMUM: f64 = 0.1;
+/// A change of one variable there by more than this of one here is no valley's bend.
+const SHARPEST: f64 = 1e3;
 /// A sum of squares is known to a hundredth where the Newton decrement is below this.
 const NEAR: f64 = 0.1;
 
@@ -87,7 +89,7 @@ pub struct Channel {
 
 /// Whether the noise of channels is no longer what it was, by so much that the minimum is another one: the white noise, or a drift that
 /// counts.
-pub fn is_other(before: &[Channel], now: &[Channel]) -> bool {
+fn is_other(before: &[Channel], now: &[Channel]) -> bool {
     let differs = |a: f64, b: f64, by: f64| (a / b).ln().abs() > by;
     before.iter().map(|c| c.noise).zip(now.iter().map(|c| c.noise)).any(|(a, b)| {
         let drifts = a.drift.max(b.drift) > 0.02;
@@ -346,6 +348,27 @@ impl<'a> Problem<'a> {
         self.channels.iter_mut().zip(noises).for_each(|(channel, noise)| channel.noise = noise);
     }
 
+    /// The noise from the residual at a minimum; whether it is so much another one that the minimum is, too. Sum of squares, sensitivities
+    /// and covariance there are then of that noise.
+    pub fn renew_noise(&mut self, found: &mut Polished) -> bool {
+        let before = self.channels.clone();
+        self.estimate_noise(&found.answer);
+        found.cost = self.stacked(&found.answer, &found.x).norm_squared();
+        let rows = |c: &Channel| self.recordings[c.recording].time.len();
+        // those of a part of the recordings lead nowhere
+        if found.jacobian.nrows() >= self.channels.iter().map(rows).sum() {
+            let mut first = 0;
+            for (then, now) in before.iter().zip(&self.channels) {
+                let factor = then.noise.white / now.noise.white;
+                found.jacobian.rows_mut(first, rows(now)).scale_mut(factor);
+                first += rows(now);
+            }
+            found.covariance =
+                Covariance::of(&found.jacobian).unwrap_or_else(|| found.covariance.clone());
+        }
+        is_other(&before, &self.channels)
+    }
+
     /// Innovations of all channels, and how far the unknowns are from what is known of them.
     pub fn stacked(&self, answer: &Answer, x: &[f64]) -> DVector<f64> {
         let mut all = self.innovations(answer).concat();
@@ -580,13 +603,17 @@ impl<'a> Problem<'a> {
     }
 
     /// Sensitivities carried along a valley, without a simulation: they are the same in the variables in which the valley is straight, and so
-    /// J there is J here times the inverse of that `turn`. What is known of unknowns stays as it is.
-    pub fn carry(&self, jacobian: &mut DMatrix<f64>, turn: &DMatrix<f64>) {
+    /// J there is J here times the inverse of that `turn`. What is known of unknowns stays as it is. False: a step that a bound has
+    /// cut short (there is no such tank) leads there from many places, and says nothing of sensitivities; they stay.
+    pub fn carry(&self, jacobian: &mut DMatrix<f64>, turn: &DMatrix<f64>) -> bool {
         let known = self.unknowns.iter().filter(|unknown| unknown.prior.is_some()).count();
-        let Some(back) = turn.clone().try_inverse() else { return };
+        let Some(back) = turn.clone().try_inverse().filter(|back| back.amax() < SHARPEST) else {
+            return false;
+        };
         let mut rows = jacobian.rows_mut(0, jacobian.nrows() - known);
         let carried = &rows * back;
         rows.copy_from(&carried);
+        true
     }
 
     /// An end of the interval of unknown j: its value `reach` standard deviations of `covariance` from x, along the valley that it is in.
@@ -719,8 +746,9 @@ impl<'a> Problem<'a> {
                         if new.norm_squared() < e.norm_squared() {
                             for (from, step) in &way {
                                 let turn = self.turn(from, step, free, fastest);
-                                self.carry(&mut jacobian, &turn);
-                                covariance.x = &turn * covariance.x * turn.transpose();
+                                if self.carry(&mut jacobian, &turn) {
+                                    covariance.x = &turn * covariance.x * turn.transpose();
+                                }
                             }
                             (x, answer, e, taken) = (trial, there, new, true);
                             break;

@@ -252,7 +252,9 @@ pub fn profile(
                 }
                 let from = found.last().unwrap_or(&middle);
                 let x = on_its_curve(problem, &from.x, minimum, indices, speed);
-                let mut other = point(problem, &x, &from.jacobian, indices, most)?;
+                let Ok(mut other) = point(problem, &x, &from.jacobian, indices, most) else {
+                    continue;
+                };
                 let above = (other.data - middle.data).max(0.0);
                 // what goes on rising is the wall of the same valley
                 let is_rival = above <= DECIDES && other.data < from.data + FLAT;
@@ -324,7 +326,10 @@ fn outwards(
         let near = near.unwrap_or(middle);
         let most = minimum.cost + NEAR;
         let x = foreseen(problem, &near.x, minimum, indices, speed);
-        let found = point(problem, &x, &near.jacobian, indices, most)?;
+        // where some combination of unknowns has no influence any more nothing is determined
+        let Ok(found) = point(problem, &x, &near.jacobian, indices, most) else {
+            return Ok((points, outside.is_none()));
+        };
         let above = found.data - least;
         points.push(found.clone());
         if above > LIMIT {

@@ -7,7 +7,7 @@ use anyhow::{Result, bail};
 use nalgebra::DMatrix;
 
 use crate::between;
-use crate::fit::{Estimate, Polished, Problem, WINDOWS, is_other};
+use crate::fit::{Estimate, Polished, Problem, WINDOWS};
 use crate::friction;
 use crate::goodness::{fit_pct, is_poor, tests};
 use crate::news::Since;
@@ -284,9 +284,7 @@ impl<'a> Search<'a, '_> {
             }
         }
         // the noise from the residual and, if it is another one, the minimum with its filter
-        let before = self.problem.channels.clone();
-        self.problem.estimate_noise(&best.answer);
-        if is_other(&before, &self.problem.channels) {
+        if self.problem.renew_noise(&mut best) {
             let again = self.polish(&best.x, Some(&best.jacobian), ROUNDS)?;
             best = self.friction(again)?;
         }

@@ -438,6 +438,34 @@ fn sensitivities_are_those_of_smaller_and_larger_steps() {
     }
 }
 
+/// What other intersample behaviours make of a sum of squares is compared with it: both must be of the same noise.
+#[test]
+fn after_its_noise_is_renewed_a_minimum_is_of_that_noise() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let recordings = [sweep(&fmu, SHORT, &[])];
+    let setup = Setup {
+        settings: vec![("slosh.zeta_from_correlation".into(), "false".into())],
+        intersample: Intersample::FirstOrderHold,
+    };
+    let names = [("tank.d", "m", 0.163), ("slosh.zeta", "1", 0.003), ("friction.c", "N.m", 0.0035)];
+    let unknowns = names.map(|(name, unit, value)| Unknown::positive(name, unit, value)).to_vec();
+    let mut problem = Problem::new(&fmu, setup, &recordings, unknowns);
+    problem.channels[0].noise.white *= 1.3;
+    let mut found = problem.polish(&problem.start(), None, 3).unwrap();
+    let (before, was, deviations) =
+        (found.cost, problem.channels[0].noise.white, found.covariance.x.diagonal());
+    assert!(problem.renew_noise(&mut found), "30 % more is another noise");
+    let rows = recordings[0].time.len() as f64;
+    // the noise of maximum likelihood has a mean square of 1
+    assert!((found.cost / rows - 1.0).abs() < 1e-9, "{} of {rows}, before {before}", found.cost);
+    // and standard deviations are in proportion to it
+    let factor = (problem.channels[0].noise.white / was).powi(2);
+    for (now, then) in found.covariance.x.diagonal().iter().zip(&deviations) {
+        assert!((now / then / factor - 1.0).abs() < 1e-9, "{now} {then} {factor}");
+    }
+    assert!(!problem.renew_noise(&mut found), "nothing has changed");
+}
+
 #[test]
 fn no_model_fits_a_torque_that_is_clipped() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();

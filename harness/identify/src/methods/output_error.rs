@@ -17,7 +17,7 @@ use crate::budget::{self, Effect};
 use crate::candidate::{self, Fitted, ModelFit};
 use crate::estimate::Estimated;
 use crate::evidence::{self, ALIKE, DECIDES};
-use crate::fit::{self, Answer, Differences, Polished, Problem, is_other};
+use crate::fit::{self, Answer, Differences, Polished, Problem};
 use crate::friction;
 use crate::goodness::{fit_pct, is_poor, tests};
 use crate::missing;
@@ -265,9 +265,7 @@ fn finish(
     problem.differences = Differences::Central;
     let mut polished = problem.polish(&x, Some(&known), ROUNDS)?;
     // a search that ended elsewhere has taken what it left for noise
-    let before = problem.channels.clone();
-    problem.estimate_noise(&polished.answer);
-    if is_other(&before, &problem.channels) {
+    if problem.renew_noise(&mut polished) {
         polished = problem.polish(&polished.x, Some(&polished.jacobian), ROUNDS)?;
     }
     say("central differences at the minimum", &problem);
