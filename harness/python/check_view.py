@@ -35,6 +35,16 @@ XI = (1.8411837813406593, 5.3314427735250325, 8.536316366346285, 11.706004902592
 SINGLE = 1e-6
 """m per m of reach: a page holds numbers of 32 bits."""
 
+HIDDEN = """() => {
+  const legend = document.querySelector(".hs-legend").getBoundingClientRect();
+  return [...document.querySelectorAll(".hs-axis")].filter((letter) => {
+    const { left, right, top, bottom } = letter.getBoundingClientRect();
+    const beside = right < legend.left || left > legend.right;
+    return !(beside || bottom < legend.top || top > legend.bottom);
+  }).map((letter) => letter.textContent);
+}"""
+"""Axes whose letters lie under the legend."""
+
 VIEWS = ((1400, "light"), (400, "light"), (1400, "dark"))
 """Width, px, and colours at the three instants."""
 
@@ -457,6 +467,10 @@ def main() -> None:
                 worst = tuple(map(max, worst, compare(page, case, row, reach)))
                 assert page.evaluate("document.documentElement.scrollWidth") <= width
                 contrast.demand(page, arguments.axe, f"{case.name}, {scheme}, {width} px")
+                if width == 400:
+                    # a wide picture has its legend at the side
+                    hidden = page.evaluate(HIDDEN)
+                    assert not hidden, f"{case.name}: the legend lies over {hidden}"
                 page.wait_for_timeout(300)
                 shot = f"{case.name}_{instant:g}s_{width}_{scheme}.png"
                 page.screenshot(path=arguments.out / shot)

@@ -465,10 +465,15 @@ globalThis.HubSloshScene = (() => {
     let width = 0, height = 0, asked = false, state = null, exaggeration = options.exaggeration ?? 1, frame = options.frame || "inertial";
     const dark = matchMedia("(prefers-color-scheme: dark)");
 
+    // What is left of the height below the legend, where the picture is too narrow to have it at its side.
+    const NARROW = 600;
+    let below = 0;
+    const part = () => Math.min(width, below) / Math.max(height, 1);
+
     // All of it in the picture, whatever its shape.
     function home() {
-      const half = (camera.fov * Math.PI) / 360, narrow = Math.min(1, width / Math.max(height, 1));
-      const distance = (geometry.radius || reach) / Math.sin(Math.atan(Math.tan(half) * narrow));
+      const half = (camera.fov * Math.PI) / 360;
+      const distance = (geometry.radius || reach) / Math.sin(Math.atan(Math.tan(half) * Math.min(1, part())));
       controls.target.copy(target);
       camera.position.copy(target).addScaledVector(direction, distance);
       controls.update();
@@ -477,14 +482,17 @@ globalThis.HubSloshScene = (() => {
     function resize() {
       const [w, h] = [element.clientWidth, element.clientHeight];
       if (!w || !h || (w === width && h === height)) return;
-      const first = !width, before = Math.min(1, width / Math.max(height, 1));
+      const first = !width, before = Math.min(1, part());
       [width, height] = [w, h];
+      // no less than half: a legend of many lines is not all there is to see
+      below = w < NARROW ? Math.max(h - legend.offsetTop - legend.offsetHeight, h / 2) : h;
       renderer.setPixelRatio(Math.min(devicePixelRatio || 1, 2));
       renderer.setSize(w, h, false);
       camera.aspect = w / h;
-      camera.updateProjectionMatrix();
+      // updates the projection
+      camera.setViewOffset(w, h, 0, (below - h) / 2, w, h);
       if (first) home();
-      else camera.position.sub(controls.target).multiplyScalar(before / Math.min(1, w / h)).add(controls.target);
+      else camera.position.sub(controls.target).multiplyScalar(before / Math.min(1, part())).add(controls.target);
       draw();
     }
 
