@@ -4,9 +4,9 @@ Makes five runs: a sweep with rotary slosh, four modes of the liquid, a slew in 
 tanks, a tank that drains, a sphere. Of each, at three instants, the bobs that are drawn are read
 back and compared with where the table's numbers put them; so is the wave at the wall, with the
 FMU's wave_height, too. The surface has to move the liquid's centre of mass as far as the pendulums
-do. Contrast and the rest of WCAG 2 AA are axe-core's to judge. Leaves fifteen screenshots.
+do. Contrast and the rest of WCAG 2 AA are axe-core's to judge. Leaves fifteen screenshots, and a film.
 
-Needs Playwright (``requirements-browser.txt``) and Debian's Chromium; ``.ci/browser`` gets both.
+Needs Playwright (``requirements-browser.txt``), Debian's Chromium and ffmpeg; ``.ci/browser`` gets them.
 """
 
 import argparse
@@ -437,6 +437,26 @@ def keys(page: Page) -> None:
     assert span[1] < span[0] < span[2], "a click on a plot goes nowhere"
 
 
+def film(binary: Path, run: Path, fmu: Path, out: Path) -> str:
+    """Film a second of a run; return what the film is, after a look at its frames."""
+    page = out.with_suffix(".html")
+    part = ["--from", "420", "--to", "421", "--rate", "10"]
+    command = [binary, "view", run, "--fmu", fmu, *part, "--out", page, "--video", out]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    decode = ["ffmpeg", "-v", "error", "-i", out, "-f", "rawvideo", "-pix_fmt", "gray", "-"]
+    pixels = subprocess.run(decode, check=True, capture_output=True).stdout
+    size = 1280 * 720
+    frames = [pixels[k : k + size] for k in range(0, len(pixels), size)]
+    # ten a second, the first and the last included
+    assert [len(frame) for frame in frames] == 11 * [size], len(frames)
+    for frame, other in zip(frames, frames[1:], strict=False):
+        dark = sum(value < 0x60 for value in frame)
+        assert dark > size // 1000, "there is a picture with letters and lines"
+        moved = sum(abs(a - b) > 0x40 for a, b in zip(frame, other, strict=True))
+        assert moved > size // 1000, "the liquid moves"
+    return f"film: {len(frames)} frames of 1280 x 720, {out.stat().st_size} bytes"
+
+
 def main() -> None:
     """Check all cases; exit with 1 and a sentence if one is not drawn as its table says."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
@@ -483,6 +503,8 @@ def main() -> None:
                 f"table, liquid moved by the surface within {worst[1]:.1e} of that by the pendulums"
             )
         browser.close()
+    sweep = arguments.out / "sweep.parquet"
+    print(film(arguments.binary, sweep, arguments.fmus / "HubSlosh.fmu", arguments.out / "film.mp4"))
 
 
 if __name__ == "__main__":
