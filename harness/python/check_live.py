@@ -43,6 +43,26 @@ REPLAY = """([page, start, times, inputs, names]) => {
   return rows;
 }"""
 
+TIMED = """(() => {
+  const next = requestAnimationFrame.bind(globalThis);
+  globalThis.spent = [];
+  globalThis.requestAnimationFrame = (draw) => next((time) => {
+    const start = performance.now();
+    draw(time);
+    spent.push(performance.now() - start);
+  });
+})();"""
+"""Keeps how long the page's scripts take for each frame, ms."""
+
+LETTERS = """[...document.querySelectorAll(".live svg text")].map((text) => {
+  const { a, b } = text.getScreenCTM();
+  return parseFloat(getComputedStyle(text).fontSize) * Math.hypot(a, b);
+})"""
+"""Size of the letters in plots, px."""
+
+FRAME = 1000 / 60
+"""What scripts may take of a frame, ms, where a graphics processor shows 60 a second."""
+
 TORQUE = "swirl.settings.values.torque"
 TABBED = "document.activeElement.name || document.activeElement.textContent"
 
@@ -112,6 +132,7 @@ def replay(page: Page, name: str, native: Path, start: dict[str, float]) -> str:
 def opened(browser: Browser, address: str, **options: object) -> Page:
     """Return the page, live; an error in a script, or something fetched, is an error here."""
     page = browser.new_context(**options).new_page()
+    page.add_init_script(TIMED)
     page.on("pageerror", lambda error: sys.exit(f"error in the page: {error}"))
     local = ("file:", "data:", "blob:")
     page.on(
@@ -125,12 +146,17 @@ def opened(browser: Browser, address: str, **options: object) -> Page:
 
 
 def speed(page: Page, name: str) -> str:
-    """Say when the first frame stood and how many follow in a second."""
-    before = page.evaluate(f"[{name}.frames, performance.now()]")
+    """Say when the first frame stood, how many follow in a second, and the scripts' part of one."""
+    before = page.evaluate(f"[{name}.frames, performance.now(), spent.length = 0]")
     page.wait_for_timeout(3000)
     after = page.evaluate(f"[{name}.frames, {name}.first, performance.now()]")
     rate = 1000 * (after[0] - before[0]) / (after[2] - before[1])
-    return f"{name}: first frame after {after[1]:.0f} ms, {rate:.0f} frames a second"
+    spent = sorted(page.evaluate("spent"))
+    median, most = spent[len(spent) // 2], spent[-1]
+    return (
+        f"{name}: first frame after {after[1]:.0f} ms, {rate:.0f} frames a second; "
+        f"scripts take {median:.1f} ms of each (median), {most:.1f} ms at most, of {FRAME:.1f} ms"
+    )
 
 
 def said(page: Page) -> dict[str, str]:
@@ -321,6 +347,8 @@ def looks(browser: Browser, address: str, name: str, axe: Path, pictures: Path |
         assert (one.evaluate(f"{name}.time") == 0) == (look == "still")
         width = options["viewport"]["width"]
         assert one.evaluate("document.documentElement.scrollWidth") <= width, (name, look)
+        letters = one.evaluate(LETTERS)
+        assert min(letters, default=12) > 10, f"{name}, {look}: letters of {min(letters)} px"
         passed = contrast.demand(one, axe, f"{name}, {look}")
         print(f"{name}, {look}: {passed} texts with contrast for WCAG AA, no finding of axe-core")
         if pictures:

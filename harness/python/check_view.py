@@ -4,13 +4,16 @@ Makes five runs: a sweep with rotary slosh, four modes of the liquid, a slew in 
 tanks, a tank that drains, a sphere. Of each, at three instants, the bobs that are drawn are read
 back and compared with where the table's numbers put them; so is the wave at the wall, with the
 FMU's wave_height, too. The surface has to move the liquid's centre of mass as far as the pendulums
-do. Contrast and the rest of WCAG 2 AA are axe-core's to judge. Leaves fifteen screenshots, and a film.
+do. Contrast and the rest of WCAG 2 AA are axe-core's to judge. Leaves fifteen screenshots and a
+film.
 
-Needs Playwright (``requirements-browser.txt``), Debian's Chromium and ffmpeg; ``.ci/browser`` gets them.
+Needs Playwright (``requirements-browser.txt``), Debian's Chromium and ffmpeg; ``.ci/browser`` gets
+them.
 """
 
 import argparse
 import csv
+import itertools
 import json
 import math
 import re
@@ -449,7 +452,7 @@ def film(binary: Path, run: Path, fmu: Path, out: Path) -> str:
     frames = [pixels[k : k + size] for k in range(0, len(pixels), size)]
     # ten a second, the first and the last included
     assert [len(frame) for frame in frames] == 11 * [size], len(frames)
-    for frame, other in zip(frames, frames[1:], strict=False):
+    for frame, other in itertools.pairwise(frames):
         dark = sum(value < 0x60 for value in frame)
         assert dark > size // 1000, "there is a picture with letters and lines"
         moved = sum(abs(a - b) > 0x40 for a, b in zip(frame, other, strict=True))
@@ -504,7 +507,9 @@ def main() -> None:
             )
         browser.close()
     sweep = arguments.out / "sweep.parquet"
-    print(film(arguments.binary, sweep, arguments.fmus / "HubSlosh.fmu", arguments.out / "film.mp4"))
+    print(
+        film(arguments.binary, sweep, arguments.fmus / "HubSlosh.fmu", arguments.out / "film.mp4")
+    )
 
 
 if __name__ == "__main__":

@@ -125,20 +125,28 @@ globalThis.Live = (() => {
   /**
    * A plot over one abscissa; `lines` are added and grow. The ordinate begins at 0 or, `signed`, has 0 in the middle, and its
    * range grows with them from `most`; with `range` it stays. `x`: range, label, and the step of its grid or, `log`, decades.
+   * A phone has a narrower drawing, whose letters are as large there as the others are on a wide page.
    */
   class Plot {
-    #x; #lines = []; #least; #low; #high; #fixed; #axis = draw("g"); #curves = draw("g"); #now = draw("line", { class: "now" });
-    static WIDTH = 560; static HEIGHT = 210; static LEFT = 62; static BOTTOM = 36; static TOP = 10; static RIGHT = 16;
+    #x; #lines = []; #least; #low; #high; #fixed; #axis = draw("g"); #curves = draw("g"); #now = draw("line", { class: "now" }); #dots = []; #width; #at_now = null;
+    static WIDE = 560; static NARROW = 360; static HEIGHT = 210; static LEFT = 62; static BOTTOM = 36; static TOP = 10; static RIGHT = 16;
 
     constructor({ label, x, y, most, signed = false, range = null, caption }) {
       this.#x = x;
       this.#least = signed ? [-most, most] : [0, most];
       this.#fixed = range;
       this.y = y;
-      this.svg = draw("svg", { viewBox: `0 0 ${Plot.WIDTH} ${Plot.HEIGHT}`, role: "img", "aria-label": label });
+      this.svg = draw("svg", { role: "img", "aria-label": label });
       this.svg.append(this.#axis, this.#curves, this.#now);
       this.figure = make("figure", {}, this.svg, make("figcaption", {}, caption));
-      this.#redraw();
+      const phone = matchMedia("(max-width: 30rem)"), fit = () => {
+        this.#width = phone.matches ? Plot.NARROW : Plot.WIDE;
+        this.svg.setAttribute("viewBox", `0 0 ${this.#width} ${Plot.HEIGHT}`);
+        this.#redraw();
+        if (this.#at_now !== null) this.now = this.#at_now;
+      };
+      phone.addEventListener("change", fit);
+      fit();
     }
 
     line(kind) {
@@ -163,21 +171,19 @@ globalThis.Live = (() => {
     // A curve as a whole, and dots with a class each, [x, y, class], in the place of what was there.
     draw(kind, points, dots = []) {
       this.#lines = [{ points, curve: draw("polyline", { class: kind }) }];
-      const circles = dots.map(([x, y, kind]) => {
-        const [cx, cy] = this.#at(x, y);
-        return draw("circle", { class: kind, cx, cy, r: 4.5 });
-      });
-      this.#curves.replaceChildren(this.#lines[0].curve, ...circles);
+      this.#dots = dots.map(([x, y, kind]) => [draw("circle", { class: kind, r: 4.5 }), x, y]);
+      this.#curves.replaceChildren(this.#lines[0].curve, ...this.#dots.map(([circle]) => circle));
       this.#redraw();
     }
 
     clear() {
-      this.#lines = [];
+      [this.#lines, this.#dots] = [[], []];
       this.#curves.replaceChildren();
       this.#redraw();
     }
 
     set now(x) {
+      this.#at_now = x;
       const at = this.#at(x, 0)[0];
       for (const [key, value] of Object.entries({ x1: at, x2: at, y1: Plot.TOP, y2: Plot.HEIGHT - Plot.BOTTOM })) this.#now.setAttribute(key, value);
     }
@@ -186,7 +192,7 @@ globalThis.Live = (() => {
       const [low, high] = this.#x.range, part = this.#x.log ? Math.log(x / low) / Math.log(high / low) : (x - low) / (high - low);
       const up = (Math.min(this.#high, Math.max(this.#low, y)) - this.#low) / (this.#high - this.#low);
       return [
-        Plot.LEFT + part * (Plot.WIDTH - Plot.LEFT - Plot.RIGHT),
+        Plot.LEFT + part * (this.#width - Plot.LEFT - Plot.RIGHT),
         Plot.HEIGHT - Plot.BOTTOM - up * (Plot.HEIGHT - Plot.BOTTOM - Plot.TOP),
       ];
     }
@@ -206,7 +212,7 @@ globalThis.Live = (() => {
       const put = (tag, attributes, text) => this.#axis.append(draw(tag, attributes, text));
       for (let n = Math.ceil(this.#low / step - 1e-9); n * step <= this.#high + 1e-9 * step; n++) {
         const y = n * step, [, at] = this.#at(this.#x.range[0], y);
-        put("line", { class: n || !this.#low ? "grid" : "grid zero", x1: Plot.LEFT, x2: Plot.WIDTH - Plot.RIGHT, y1: at, y2: at });
+        put("line", { class: n || !this.#low ? "grid" : "grid zero", x1: Plot.LEFT, x2: this.#width - Plot.RIGHT, y1: at, y2: at });
         put("text", { x: Plot.LEFT - 6, y: at + 4, "text-anchor": "end" }, String(Number(y.toPrecision(6))).replace("-", "−"));
       }
       for (const x of this.#ticks()) {
@@ -214,9 +220,10 @@ globalThis.Live = (() => {
         put("line", { class: "grid", x1: at, x2: at, y1: Plot.TOP, y2: Plot.HEIGHT - Plot.BOTTOM });
         put("text", { x: at, y: Plot.HEIGHT - Plot.BOTTOM + 15, "text-anchor": "middle" }, this.#x.log ? String(Number(x.toPrecision(3))) : x.toFixed(this.#x.digits ?? 1));
       }
-      put("text", { x: (Plot.LEFT + Plot.WIDTH) / 2, y: Plot.HEIGHT - 5, "text-anchor": "middle" }, this.#x.label);
+      put("text", { x: (Plot.LEFT + this.#width) / 2, y: Plot.HEIGHT - 5, "text-anchor": "middle" }, this.#x.label);
       put("text", { x: 12, y: Plot.HEIGHT / 2 - 10, "text-anchor": "middle", transform: `rotate(-90 12 ${Plot.HEIGHT / 2 - 10})` }, this.y);
       this.#lines.forEach((line) => line.curve.setAttribute("points", this.#path(line.points)));
+      for (const [circle, x, y] of this.#dots) this.#at(x, y).forEach((at, i) => circle.setAttribute(["cx", "cy"][i], at));
     }
 
     #ticks() {
