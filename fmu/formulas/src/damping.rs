@@ -400,4 +400,173 @@ mod tests {
     fn the_laminar_layer_grows_with_the_root_of_viscosity() {
         assert!((laminar(10.0, 8e-6, 4.0) - 5e-3).abs() < 1e-17);
     }
+
+    /// Waves as deep as the radius know nothing of the bottom's bracket; at half of it xi/sinh xi counts, and the next mode has
+    /// its own zero.
+    #[test]
+    fn a_cylinder_s_modes_rub_at_their_own_rate() {
+        for n in [0, 1] {
+            let xi = XI[n];
+            let wide = (xi * xi + 1.0) / (xi * xi - 1.0);
+            for (depth, beta) in [(2.0, wide), (1.0, wide + xi / sinh(xi)), (1e4, wide)] {
+                let mode = Mode::of_cylinder(n, 2.0, depth, 3.0);
+                assert!((mode.beta * 2.0 / beta - 1.0).abs() < 1e-15, "{n} {depth}");
+                assert_eq!(mode.beta, cylinder_beta(n, 2.0, depth));
+                let lambda = 0.5 * xi * tanh(0.5 * xi * depth);
+                assert!((mode.lambda / lambda - 1.0).abs() < 1e-15, "{n} {depth}");
+                assert!((mode.omega * mode.omega / (3.0 * lambda) - 1.0).abs() < 1e-15, "{n}");
+            }
+        }
+        // x = 2: 1 - x is -1
+        let deep = cylinder_beta(0, 1.0, 2.0) - cylinder_beta(0, 1.0, 1.0);
+        assert!((deep / (-2.0 * XI[0] / sinh(4.0 * XI[0])) - 1.0).abs() < 1e-12, "{deep}");
+    }
+
+    #[test]
+    fn a_cylinder_has_stephens_s_damping_below_half_a_radius_and_mikishev_s_from_there_on() {
+        let (r, nu, g) = (2.0, 1e-6, 9.81);
+        assert_eq!(cylinder(r, 1.0, nu, g), mikishev_dorozhkin(r, 1.0, nu, g));
+        assert_eq!(cylinder(r, 1.7, nu, g), mikishev_dorozhkin(r, 1.7, nu, g));
+        assert_eq!(cylinder(r, 0.99, nu, g), stephens(r, 0.99, nu, g));
+    }
+
+    /// 8.2 (32)^(-3/5) = 8.2/8; nu^2/(g R^3) = 1e-8/4: its fourth root is 0.01/2^(1/2).
+    #[test]
+    fn a_low_bond_number_adds_its_contact_line() {
+        let zeta = low_bond_cylinder(1.0, 1e-4, 4.0, 32.0);
+        assert!(
+            (zeta / (0.83 * 0.01 / sqrt(2.0) * (1.0 + 8.2 / 8.0)) - 1.0).abs() < 1e-14,
+            "{zeta}"
+        );
+    }
+
+    /// Depth, angle and the number of viscosity, each just inside and just outside of what was measured.
+    #[test]
+    fn a_correlation_says_where_it_was_measured() {
+        let (r, g) = (2.0, 9.81);
+        let in_range =
+            |shape: Shape, nu: f64| shape.correlation(nu, g).map(|found| found.in_range).unwrap();
+        let sphere = |x: f64| Shape::Sphere { radius: r, depth: x * r };
+        let nu = 0.1 / sphere_number(r, 1.0, g);
+        assert_eq!(
+            [0.09, 0.11, 1.89, 1.91].map(|x| in_range(sphere(x), nu)),
+            [false, true, true, false]
+        );
+        let numbers = [0.0099, 0.0101, 0.99, 1.01].map(|b| in_range(sphere(1.0), 10.0 * b * nu));
+        assert_eq!(numbers, [false, true, true, false]);
+        let cone = |half_angle: f64| Shape::Cone { radius: r, half_angle };
+        assert_eq!([44.9, 45.1].map(|b| in_range(cone(b), nu)), [true, false]);
+        let torus = |y: f64| Shape::Torus { tube_radius: r, depth: 2.0 * y * r };
+        let nu = 1.0 / torus_number(r, 1.0, g);
+        assert_eq!(
+            [0.09, 0.11, 0.89, 0.91].map(|y| in_range(torus(y), nu)),
+            [false, true, true, false]
+        );
+        let numbers = [0.099, 0.101, 9.9, 10.1].map(|times| in_range(torus(0.5), times * nu));
+        assert_eq!(numbers, [false, true, true, false]);
+        assert!(in_range(Shape::Cylinder { radius: r, depth: 0.01 }, 1.0));
+        assert_eq!(Shape::Other.correlation(nu, g), None);
+        // and what it says is the shape's formula
+        let zeta = |shape: Shape| shape.correlation(nu, g).unwrap().zeta;
+        assert_eq!(zeta(sphere(0.7)), super::sphere(r, 0.7 * r, nu, g));
+        assert_eq!(zeta(cone(20.0)), super::cone(r, 20.0, nu, g));
+        assert_eq!(zeta(torus(0.3)), super::torus(r, 0.6 * r, nu, g));
+        assert_eq!(zeta(Shape::Cylinder { radius: r, depth: r }), cylinder(r, r, nu, g));
+    }
+
+    /// A mode whose layer alone makes `zeta`, of the length of a half full sphere's of 1 m.
+    fn with_layer(zeta: f64, nu: f64, omega: f64) -> Mode {
+        Mode { beta: zeta / sqrt(nu / (8.0 * omega)), lambda: 1.56, omega }
+    }
+
+    fn is_near(found: [f64; 3], expected: [f64; 3]) {
+        for (a, b) in found.into_iter().zip(expected) {
+            assert!((a / b - 1.0).abs() < 1e-14, "{found:?} {expected:?}");
+        }
+    }
+
+    fn numbers(estimate: Estimate) -> [f64; 3] {
+        [estimate.zeta, estimate.interval[0], estimate.interval[1]]
+    }
+
+    /// A measured shape's first mode: the correlation and its scatter; the second as many of its own layers.
+    #[test]
+    fn a_measured_shape_has_its_correlation_and_other_modes_as_many_layers() {
+        let (nu, shape) = (1e-6, Shape::Cylinder { radius: 1.0, depth: 1.0 });
+        let [first, second] = [0, 1].map(|n| Mode::of_cylinder(n, 1.0, 1.0, 9.81));
+        let correlation = cylinder(1.0, 1.0, nu, 9.81);
+        let found = estimate(shape, nu, first, first);
+        assert_eq!((found.basis, found.disagree), (Basis::Correlation, false));
+        is_near(numbers(found), [correlation, 0.7 * correlation, 1.3 * correlation]);
+        assert_eq!(found.laminar, first.laminar(nu));
+        let layers = second.laminar(nu) / first.laminar(nu);
+        let found = estimate(shape, nu, first, second);
+        // of layers and correlation the larger one: 1.45 layers of the first mode, or 1.39
+        let high = correlation.max(1.45 * first.laminar(nu));
+        is_near(numbers(found), [correlation * layers, second.laminar(nu), 1.3 * high * layers]);
+        assert!((found.laminar / second.laminar(nu) - 1.0).abs() < 1e-14);
+        // without viscosity there is no damping, in no mode
+        assert_eq!(numbers(estimate(shape, 0.0, first, second)), [0.0; 3]);
+    }
+
+    /// The specific force of the correlation is the one that makes the frequency, omega^2/lambda: capillarity's share, too.
+    #[test]
+    fn a_correlation_holds_at_the_force_that_makes_the_frequency() {
+        let shape = Shape::Cylinder { radius: 1.0, depth: 1.0 };
+        let first = Mode { omega: 3.0, ..Mode::of_cylinder(0, 1.0, 1.0, 9.81) };
+        let correlation = cylinder(1.0, 1.0, 1e-6, 9.0 / first.lambda);
+        assert_eq!(estimate(shape, 1e-6, first, first).correlation, Some(correlation));
+    }
+
+    /// No correlation, one that was not measured there, one below the layer: 1.45 layers each time, up to 1.3 of the larger
+    /// of both.
+    #[test]
+    fn what_was_not_measured_has_1_45_layers() {
+        let (nu, omega) = (1e-6, 4.0);
+        let mode = with_layer(1e-3, nu, omega);
+        let other = estimate(Shape::Other, nu, mode, mode);
+        assert_eq!((other.basis, other.correlation), (Basis::Unmeasured, None));
+        is_near(numbers(other), [1.45e-3, 1e-3, 1.3 * 1.45e-3]);
+        assert!(!other.disagree);
+        let g = omega * omega / mode.lambda;
+        // too little viscosity for the measured spheres
+        let shape = Shape::Sphere { radius: 1.0, depth: 1.0 };
+        let zeta = sphere(1.0, 1.0, nu, g);
+        for (layer, high, disagree) in [(zeta / 3.0, zeta, true), (zeta, 1.45 * zeta, true)] {
+            let mode = with_layer(layer, nu, omega);
+            let found = estimate(shape, nu, mode, mode);
+            assert_eq!((found.basis, found.disagree), (Basis::OutOfRange, disagree));
+            is_near(numbers(found), [1.45 * layer, layer, 1.3 * high]);
+        }
+        // measured, but no wall takes less than its layer
+        let nu = 0.1 / sphere_number(1.0, 1.0, g);
+        let zeta = sphere(1.0, 1.0, nu, g);
+        for (share, basis) in [(1.01, Basis::BelowLayer), (0.99, Basis::Correlation)] {
+            let mode = with_layer(share * zeta, nu, omega);
+            let found = estimate(shape, nu, mode, mode);
+            assert_eq!(found.basis, basis);
+            let taken = if share > 1.0 { 1.45 * share * zeta } else { zeta };
+            is_near(numbers(found), [taken, share * zeta, 1.3 * 1.45 * share * zeta]);
+        }
+    }
+
+    /// By more than 30 %, the correlation above the 1.45 layers, or below.
+    #[test]
+    fn two_estimates_disagree_by_more_than_the_scatter() {
+        let (nu, omega) = (1e-6, 4.0);
+        let g = omega * omega / 1.56;
+        let nu = nu * 0.1 / sphere_number(1.0, nu, g);
+        let shape = Shape::Sphere { radius: 1.0, depth: 1.0 };
+        let zeta = sphere(1.0, 1.0, nu, g);
+        for (ratio, disagree) in
+            [(1.29, false), (1.31, true), (1.0 / 1.29, false), (1.0 / 1.31, true)]
+        {
+            let mode = with_layer(zeta / (1.45 * ratio), nu, omega);
+            let found = estimate(shape, nu, mode, mode);
+            assert_eq!((found.basis, found.disagree), (Basis::Correlation, disagree), "{ratio}");
+            let low = if disagree { mode.laminar(nu) } else { 0.7 * zeta };
+            let high = if disagree { 1.3 * zeta.max(1.45 * mode.laminar(nu)) } else { 1.3 * zeta };
+            is_near(numbers(found), [zeta, low, high]);
+        }
+    }
 }

@@ -100,3 +100,186 @@ pub fn quintic(h: f64, [y_0, d_0, s_0]: [f64; 3], [y_1, d_1, s_1]: [f64; 3]) -> 
         6.0 * rise - 3.0 * (d_0 + d_1) - s_0 + s_1,
     ]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const X: [f64; 9] = [0.0, 0.3, 0.5, 1.1, 1.2, 1.9, 2.4, 2.7, 3.5];
+
+    /// At the points `x`: slopes and second derivatives.
+    fn found<const N: usize>(x: [f64; N], y: [f64; N], within: bool) -> ([f64; N], [f64; N]) {
+        let (mut slope, mut curvature) = ([0.0; N], [0.0; N]);
+        derivatives(&x, &y, within, &mut slope, &mut curvature);
+        (slope, curvature)
+    }
+
+    /// Powers of x - 0.7, at any place and between points that are not evenly apart, up to as many as there are points.
+    #[test]
+    fn the_polynomial_through_the_points_has_their_derivatives() {
+        let power = |x: f64, n: i32| {
+            libm::pow(x.abs(), f64::from(n)) * if n % 2 == 0 { 1.0 } else { x.signum() }
+        };
+        for count in 2..=5 {
+            for n in 1..count as i32 {
+                let y = X.map(|x| 1.5 + power(x - 0.7, n));
+                for x in [X[0], X[1], X[count - 1], 0.83] {
+                    let (first, second) = of_polynomial(x, &X[..count], &y[..count]);
+                    let exact = f64::from(n) * power(x - 0.7, n - 1);
+                    let bent =
+                        if n < 2 { 0.0 } else { f64::from(n * (n - 1)) * power(x - 0.7, n - 2) };
+                    assert!((first - exact).abs() < 1e-12, "{count} {n} {x}: {first} {exact}");
+                    assert!((second - bent).abs() < 2e-11, "{count} {n} {x}: {second} {bent}");
+                }
+            }
+        }
+    }
+
+    /// Each point has two neighbours on either side, or the five at an end; what is farther away does not count. Smooth data
+    /// are not limited.
+    #[test]
+    fn derivatives_of_smooth_data_are_those_through_the_five_nearest_points() {
+        let y = X.map(libm::exp);
+        for sign in [1.0, -1.0] {
+            let y = y.map(|y| sign * y);
+            for within in [false, true] {
+                let (slope, curvature) = found(X, y, within);
+                for i in 0..9 {
+                    let own = [0, 0, 0, 1, 2, 3, 4, 4, 4][i];
+                    let expected = of_polynomial(X[i], &X[own..own + 5], &y[own..own + 5]);
+                    assert_eq!((slope[i], curvature[i]), expected, "{i}");
+                }
+            }
+        }
+        // with fewer points all of them
+        let parabola = [0.0, 1.0, 3.0].map(|x| x + x * x);
+        let (slope, curvature) = found([0.0, 1.0, 3.0], parabola, true);
+        for i in 0..3 {
+            assert!((slope[i] - [1.0, 3.0, 7.0][i]).abs() < 1e-14, "{slope:?}");
+            assert!((curvature[i] - 2.0).abs() < 1e-14, "{curvature:?}");
+        }
+    }
+
+    /// The data's maximum lies between points: beside it the parabola is met, unless the curve has to stay within its points,
+    /// which then turns at one.
+    #[test]
+    fn beside_a_turning_point_nothing_is_limited_unless_the_curve_is_to_stay_within_its_points() {
+        let x = [0.0, 1.0, 2.0, 3.0, 4.0];
+        for sign in [1.0, -1.0] {
+            let y = x.map(|x| sign * (x - 1.9) * (x - 1.9));
+            let (slope, curvature) = found(x, y, false);
+            for i in 0..5 {
+                assert!((slope[i] - sign * 2.0 * (x[i] - 1.9)).abs() < 1e-13, "{i} {slope:?}");
+                assert!((curvature[i] - sign * 2.0).abs() < 1e-12, "{i} {curvature:?}");
+            }
+            assert_eq!(found(x, y, true).0[2], 0.0);
+        }
+    }
+
+    /// In the direction of the rise the differences of the quintic's Bernstein coefficients between two points, over h:
+    /// d/5, d/5 + h s/20, what is left between, and the same from the right end.
+    fn steps(h: f64, [y_0, d_0, s_0]: [f64; 3], [y_1, d_1, s_1]: [f64; 3]) -> [f64; 5] {
+        let secant = (y_1 - y_0) / h;
+        let sign = if secant < 0.0 { -1.0 } else { 1.0 };
+        [
+            d_0 / 5.0,
+            d_0 / 5.0 + h * s_0 / 20.0,
+            secant - 0.4 * (d_0 + d_1) + h * (s_1 - s_0) / 20.0,
+            d_1 / 5.0 - h * s_1 / 20.0,
+            d_1 / 5.0,
+        ]
+        .map(|step| sign * step)
+    }
+
+    /// Data that jump by factors up to 1e4 and smoother ones, rising and falling, and data that turn: every coefficient between two points rises
+    /// as they do. Rounding is of the order of the largest value's last digit over the smallest distance, 1e-11.
+    #[test]
+    fn the_curve_rises_where_the_data_rise() {
+        let mut seed = 1_u64;
+        let mut random = || {
+            seed = seed
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        let (mut limited, mut free) = (0, 0);
+        for round in 0..600 {
+            let (turns, jumps) = (round % 3 == 2, if round % 2 == 0 { 4.0 } else { 0.3 });
+            let direction = if round % 3 == 0 { 1.0 } else { -1.0 };
+            let (mut x, mut y) = ([0.0; 8], [0.0; 8]);
+            for i in 1..8 {
+                x[i] = x[i - 1] + 0.05 + random();
+                let rise = libm::pow(10.0, jumps * (random() - 0.5));
+                let sign = if turns && random() < 0.3 { -direction } else { direction };
+                y[i] = y[i - 1] + sign * rise;
+            }
+            let (slope, curvature) = found(x, y, true);
+            for j in 0..7 {
+                let at = |i: usize| [y[i], slope[i], curvature[i]];
+                for step in steps(x[j + 1] - x[j], at(j), at(j + 1)) {
+                    assert!(step > -1e-11, "{round} {j}: {step}");
+                }
+            }
+            // What obeys the limits beforehand, each end taking half of what is left between, stays as it is.
+            let (mut own, mut bent) = ([0.0; 8], [0.0; 8]);
+            for i in 0..8 {
+                let first = [0, 0, 0, 1, 2, 3, 3, 3][i];
+                (own[i], bent[i]) = of_polynomial(x[i], &x[first..first + 5], &y[first..first + 5]);
+            }
+            for i in 2..6 {
+                let obeys = |j: usize| {
+                    let h = x[j + 1] - x[j];
+                    let left = steps(h, [y[j], own[j], bent[j]], [y[j + 1], own[j + 1], 0.0]);
+                    let right = steps(h, [y[j], own[j], 0.0], [y[j + 1], own[j + 1], bent[j + 1]]);
+                    let both = steps(h, [y[j], own[j], 0.0], [y[j + 1], own[j + 1], 0.0]);
+                    let secant = ((y[j + 1] - y[j]) / h).abs();
+                    both.iter().chain(&left).chain(&right).all(|step| *step >= 0.0)
+                        && both[0].max(both[4]) <= 0.48 * secant
+                        && both[2] >= 0.05 * secant
+                        && left[2].min(right[2]) >= 0.5 * both[2]
+                };
+                if (i - 2..i + 2).all(obeys) {
+                    free += 1;
+                    assert_eq!((slope[i], curvature[i]), (own[i], bent[i]), "{round} {i}");
+                } else {
+                    limited += 1;
+                }
+            }
+        }
+        assert!(free > 20 && limited > 1000, "{free} {limited}");
+    }
+
+    /// A corner after a level stretch: in the rise both slopes are scaled to 0.95 of what two and a half secants allow.
+    #[test]
+    fn steep_slopes_are_held_at_their_limits() {
+        // secants 1 and 10 alternate; each slope at most 2.4 of the smaller one
+        let (slope, _) = found([0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 10.0, 11.0, 21.0, 22.0], true);
+        for i in 1..4 {
+            assert!(slope[i] <= 2.4 + 1e-15, "{slope:?}");
+        }
+        // and together at most 2.375 of it
+        for j in [1, 3] {
+            assert!((slope[j] + slope[j + 1]) <= 2.375 + 1e-14, "{slope:?}");
+        }
+        assert!((slope[1] + slope[2] - 2.375).abs() < 1e-14, "{slope:?}");
+        // level stretches stay level
+        let (slope, curvature) = found([0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 0.0, 0.0, 1.0, 3.0], true);
+        assert_eq!((slope[0], slope[1], slope[2]), (0.0, 0.0, 0.0));
+        assert_eq!((curvature[0], curvature[1]), (0.0, 0.0));
+    }
+
+    /// Value, slope and second derivative at t = 0 and 1, by x = h t: h = 1/2 and numbers without a pattern.
+    #[test]
+    fn a_quintic_has_what_is_given_at_its_ends() {
+        let (left, right) = ([1.25, -0.5, 3.0], [2.0, 0.75, -1.5]);
+        let c = quintic(0.5, left, right);
+        let sum = |f: &dyn Fn(f64) -> f64| {
+            c.iter().enumerate().map(|(n, c)| c * f(n as f64)).sum::<f64>()
+        };
+        assert_eq!(c[..3].first(), Some(&left[0]));
+        assert_eq!([c[1] / 0.5, 2.0 * c[2] / 0.25], [left[1], left[2]]);
+        assert!((sum(&|_| 1.0) - right[0]).abs() < 1e-14);
+        assert!((sum(&|n| n) / 0.5 - right[1]).abs() < 1e-13);
+        assert!((sum(&|n| n * (n - 1.0)) / 0.25 - right[2]).abs() < 1e-12);
+    }
+}

@@ -151,6 +151,7 @@ mod tests {
         let (we, fr, bo) = (liquid.weber(v, l), froude_number(v, a, l), liquid.bond(a, l));
         assert_eq!((we, fr, bo), (1000.0, 4.0, 250.0));
         assert_eq!(we / fr, bo);
+        assert_eq!(gravity_time(0.25, 4.0), 4.0);
         let ratio = liquid.capillary_time(l) / gravity_time(a, l);
         assert!((ratio * ratio / bo - 1.0).abs() < 1e-15);
         let rules = [(250.0, 1000.0), (250.0, 10.0), (0.1, 0.5), (0.1, 3.0)]

@@ -255,6 +255,47 @@ mod tests {
         assert!((x[0] - 32.0).abs() < 1e-12, "{}", x[0]);
         assert!(system.0.get() <= work(3) as usize, "{}", system.0.get());
         assert_eq!([work(0), work(1), work(2)], [3.0, 7.0, 13.0]);
+        let (system, mut x) = (Quartic(Cell::new(0)), [1.0]);
+        advance(&system, &mut x, (1.0, 2.0), 1e-10, &mut Pace::new(1.0, STEPS)).unwrap();
+        assert!((x[0] - 32.0).abs() < 1e-12, "{}", x[0]);
+    }
+
+    /// x' = x, errors over `scale`; how often a step began.
+    struct Growth {
+        scale: f64,
+        starts: Cell<usize>,
+    }
+
+    impl System<1> for Growth {
+        fn rates(&self, _: f64, x: &[f64; 1]) -> [f64; 1] {
+            *x
+        }
+
+        fn error_scale(&self, _: f64, _: &[f64; 1], _: &[f64; 1], _: f64) -> [f64; 1] {
+            self.starts.set(self.starts.get() + 1);
+            [self.scale]
+        }
+    }
+
+    /// Without a tolerance what is asked for is rounding's share, of a large scale as of 1.
+    #[test]
+    fn no_more_is_asked_for_than_rounding_allows() {
+        for scale in [1e6, 1.0, 1e-6] {
+            let system = Growth { scale, starts: Cell::new(0) };
+            let mut x = [f64::max(scale, 1.0)];
+            let begin = x[0];
+            advance(&system, &mut x, (0.0, 1.0), 0.0, &mut Pace::new(1.0, STEPS)).unwrap();
+            assert!((x[0] / begin / 1f64.exp() - 1.0).abs() < 1e-13, "{scale} {}", x[0]);
+            assert!(system.starts.get() < 10, "{scale} {}", system.starts.get());
+        }
+    }
+
+    /// Where hardly any error is seen, 1, 4, 16, ... milliseconds: the sixth reaches the end.
+    #[test]
+    fn a_step_is_at_most_four_times_as_long_as_the_one_before() {
+        let system = Growth { scale: 1e6, starts: Cell::new(0) };
+        advance(&system, &mut [1.0], (0.0, 1.0), 1e-2, &mut Pace::new(1e-3, STEPS)).unwrap();
+        assert_eq!(system.starts.get(), 6);
     }
 
     #[test]

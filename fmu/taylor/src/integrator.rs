@@ -435,6 +435,7 @@ mod tests {
         assert!(!are_negligible([1.1, 0.1, 9.0, 9.0]));
         // 2 x 0.5/20 = 0.05 and 2 x 2/30 are below a quarter, after decays of ten and more.
         assert!(are_negligible([0.5, 2.0, 20.0, 30.0]));
+        assert!(are_negligible([0.5, 2.0, 9.0, 30.0]));
         // No decay from two orders before, of the one and of the other.
         assert!(!are_negligible([0.5, 2.0, 4.0, 30.0]));
         assert!(!are_negligible([0.05, 2.0, 20.0, 19.0]));
@@ -547,6 +548,9 @@ mod tests {
         assert_eq!(motion.advance(1.0, 1e-8), Err(StepError::NotFinite { time: 0.5 }));
         let mut motion = Oscillator::new(Convergence::Decay);
         assert_eq!(motion.advance(f64::INFINITY, 1e-8).map_err(|_| ()), Err(()));
+        // Where no error is allowed no step has a length.
+        let mut motion = Oscillator::new(Convergence::Decay);
+        assert_eq!(motion.advance(1.0, 0.0), Err(StepError::NotFinite { time: 7.0 }));
     }
 
     #[test]

@@ -221,6 +221,7 @@ mod tests {
             let mut line = ZERO;
             line[..2].copy_from_slice(&ramp);
             assert_eq!(mul_ramp(n, &ramp, &a), product(&line, &a));
+            assert_eq!(mul_ramp(n, &ramp, &b), product(&line, &b));
             assert_eq!(next(n, 1.0), 1.0 / (n + 1) as f64);
         }
         assert_eq!((constant(0, 3.0), constant(1, 3.0)), (3.0, 0.0));
