@@ -329,26 +329,12 @@ impl Contour {
 
     /// The inner and the outer contact line at height z.
     fn contact_lines(&self, z: f64, fill: f64) -> Result<(Option<Crossing>, Crossing), Problems> {
-        let mut crossings = self.crossings(z);
+        let crossings = self.crossings(z);
+        // Above the brim of an inner wall, where only a shoulder is looked for.
         let start = self.segments[0].start();
-        let end = self.segments[self.segments.len() - 1].end();
         let level = LEVEL * self.size;
-        let on_axis = start[0] <= level;
-        if start[1] < z - level && !on_axis {
-            return Err(format!(
-                "The contour is open: it starts at ({:.6}, {:.6}) m, below the free surface; it must \
-                 start on the axis or at the top of an inner wall.",
-                start[0], start[1]
-            )
-            .into());
-        }
-        if (end[1] - z).abs() <= level && end[0] > level && !crossings.last().is_some_and(|c| c.up)
-        {
-            let segment = self.segments.len() - 1;
-            crossings.push(Crossing { segment, t: self.segments[segment].to, up: true });
-        }
-        if (start[1] - z).abs() <= level && !on_axis && crossings.first().is_none_or(|c| c.up) {
-            crossings.insert(0, Crossing { segment: 0, t: self.segments[0].from, up: false });
+        if start[1] < z - level && start[0] > level {
+            return Err(shoulder(fill));
         }
         match crossings[..] {
             [up] if up.up => Ok((None, up)),
@@ -632,6 +618,45 @@ mod tests {
             assert!((place - (-90.0 - from) / (to - from)).abs() < 1e-7, "{from} {place}");
             let top = 0.2 + 0.1 * f64::min(to, 90.0).to_radians().sin();
             assert!((-extreme(&arc, -1.0).1 - top).abs() < 1e-15, "{to}");
+        }
+    }
+
+    /// Two walls that lean towards each other, a micrometre apart at the brim, and a cone's tip: of a tank of 1.5 m from
+    /// 1.5 micrometres on a free surface has a width.
+    #[test]
+    fn a_free_surface_without_width_is_refused_with_its_width() {
+        let gap = |width: f64| {
+            let corners = [[1.0, 1.0], [0.5, 0.0], [1.5, 0.0], [1.0 + width, 1.0]];
+            let walls = corners.windows(2).map(|p| Segment::line(p[0], p[1])).collect();
+            Contour::new(walls).unwrap().cut(1.0)
+        };
+        let refused = gap(1e-6).unwrap_err().to_string();
+        assert_eq!(refused, "At a fill of 1 m the free surface is only 1.000e-6 m wide.");
+        let wall = gap(2e-6).unwrap();
+        assert!((wall.r_outer - wall.r_inner - 2e-6).abs() < 1e-15);
+        let tip = |radius: f64| {
+            let walls = [[0.0, 0.0], [1.5, 0.0], [radius, 1.0]];
+            let walls = walls.windows(2).map(|p| Segment::line(p[0], p[1])).collect();
+            Contour::new(walls).unwrap().cut(1.0)
+        };
+        assert!(tip(1e-6).unwrap_err().to_string().contains("only 1.000e-6 m wide"));
+        assert!((tip(2e-6).unwrap().r_outer - 2e-6).abs() < 1e-15);
+    }
+
+    /// A ring's ends are one to 1e-6 of its size, in a model's tank and in a large one; then it begins at its top.
+    #[test]
+    fn a_ring_is_closed_to_a_millionth_of_its_size() {
+        for size in [1.0 / 64.0, 1.0, 16.0] {
+            for (gap, is_closed) in [(0.9e-6, true), (1.1e-6, false)] {
+                let to = |r: f64, z: f64| [size * r, size * z];
+                let corners =
+                    [to(0.5, 0.5), to(0.5, 0.0), to(1.0, 0.0), to(1.0, 0.6), to(0.5, 0.5 + gap)];
+                let walls = corners.windows(2).map(|p| Segment::line(p[0], p[1])).collect();
+                let contour = Contour::new(walls).unwrap();
+                assert_eq!(contour.closed().is_some(), is_closed, "{size} {gap}");
+                let begins = if is_closed { to(1.0, 0.6) } else { to(0.5, 0.5) };
+                assert_eq!(contour.segments()[0].start(), begins, "{size} {gap}");
+            }
         }
     }
 }

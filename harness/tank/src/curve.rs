@@ -264,7 +264,7 @@ mod tests {
             Curve::Line { from: [0.1, 0.2], to: [1.0, -0.4] },
             Curve::Ellipse { center: [0.3, 0.4], a_r: 1.2, a_z: 0.7 },
             Curve::Cassini { zc: 0.8, a: 1.0, c: 0.6 },
-            Curve::Cosine { r0: 1.0, r1: 0.4, z: [0.0, 2.0], p: [0.2, 1.7] },
+            Curve::Cosine { r0: 1.0, r1: 0.4, z: [0.5, 2.5], p: [0.2, 1.7] },
             Curve::Cubic { c: [[0.1, 0.0], [1.0, 0.2], [-0.3, 0.5], [0.2, -0.1]] },
         ];
         for curve in curves {

@@ -578,3 +578,64 @@ fn approximate(
     let modes = solution.lambda.iter().zip(&solution.phi).enumerate().map(of_mode).collect();
     Some(Approximation { modes, i_eff })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Twice each difference over what the error is stated of: lambda of itself, masses of the liquid's 5 kg, moments and
+    /// waves of R = 2 m, inertias of both; beta by itself.
+    #[test]
+    fn each_quantity_s_difference_counts_over_what_its_error_is_stated_of() {
+        let approximation = |change: &dyn Fn(&mut Mode)| {
+            let surface = Surface { shape: vec![[2.0, 0.5]], ..Surface::default() };
+            let mut mode = Mode::new(1, 4.0, [3.0, 0.75, 0.25], 0.0, 5.0, surface, 8.0);
+            mode.wave_inner = Some(-0.25);
+            change(&mut mode);
+            Approximation { modes: vec![mode], i_eff: 1.5 }
+        };
+        let found = |a: &Approximation| {
+            let b = approximation(&|_| {});
+            (difference(a, &b, 2.0, 5.0), difference(&b, a, 2.0, 5.0))
+        };
+        assert_eq!(found(&approximation(&|_| {})), ((0.0, 0.0), (0.0, 0.0)));
+        let step = 0.125;
+        let changes: [(&dyn Fn(&mut Mode), f64); 5] = [
+            (&|mode| mode.m -= step, step / 5.0),
+            (&|mode| mode.m_h -= step, step / 10.0),
+            (&|mode| mode.m_h2 -= step, step / 20.0),
+            (&|mode| mode.wave -= step, step / 2.0),
+            (&|mode| mode.wave_inner = Some(-0.25 - step), step / 2.0),
+        ];
+        for (k, (change, expected)) in changes.into_iter().enumerate() {
+            let error = 2.0 * expected;
+            assert_eq!(found(&approximation(change)), ((error, 0.0), (error, 0.0)), "{k}");
+        }
+        let mut other = approximation(&|_| {});
+        other.i_eff -= step;
+        assert_eq!(found(&other), ((step / 10.0, 0.0), (step / 10.0, 0.0)));
+        // 3 and 6 of 4 and 8, the other way 4 and 8 of 3 and 6
+        let ratios = found(&approximation(&|mode| (mode.lambda, mode.beta) = (3.0, 6.0)));
+        assert_eq!(ratios.0, (0.5, 0.5));
+        assert!((ratios.1.0 - 2.0 / 3.0).abs() < 1e-15 && (ratios.1.1 - 2.0 / 3.0).abs() < 1e-15);
+    }
+
+    /// A sphere filled up to a surface of 0.14 m: errors are of that radius, not of the tank's.
+    #[test]
+    fn errors_are_over_the_radius_of_the_free_surface() {
+        let segments = vec![crate::curve::Segment::arc([0.0, 1.0], 1.0, -90.0, 90.0)];
+        let wall = crate::contour::Contour::new(segments).unwrap().cut(1.99).unwrap();
+        let volume = Volume::of(&wall);
+        let found = pair_on(&wall, &volume, 2.0, 3, false).unwrap();
+        let mesh = Discretisation::new(&wall.segments, 3, 16, false);
+        let [a, b, c] = orders(mesh.panel_count())
+            .map(|order| approximate(&mesh.with_order(order), &wall, &volume, 2.0, 3).unwrap());
+        let radius = (1.0 - 0.99f64 * 0.99).sqrt();
+        let over =
+            |a: &Approximation, b: &Approximation| difference(a, b, radius, 2.0 * volume.volume).0;
+        // where two differ by more than wanted, the next two are compared
+        let expected = if over(&a, &b) > WANTED { over(&b, &c) } else { over(&a, &b) };
+        assert!(expected > 2.0 * ROUNDING, "{expected:e}");
+        assert!((found.error / expected - 1.0).abs() < 1e-6, "{:e} {expected:e}", found.error);
+    }
+}

@@ -460,3 +460,31 @@ pub fn third_order(overlaps: &Overlaps) -> String {
     text(&mut svg, frame.left, 26.0, "start", title);
     page(720.0, frame.top + frame.height + 50.0, title, &svg)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 1, 2 or 5 times a power of ten apart, the ends included where they are round, in any unit; no more than asked for.
+    #[test]
+    fn ticks_are_round_and_reach_both_ends() {
+        for unit in [1e-9, 1e-3, 1.0, 1e6] {
+            for (range, count, first, step, number) in [
+                ([0.0, 3.0], 4, 0.0, 1.0, 4),
+                ([0.0, 3.0], 5, 0.0, 1.0, 4),
+                ([-1.0, 1.0], 5, -1.0, 0.5, 5),
+                ([0.1, 2.0], 8, 0.5, 0.5, 4),
+                ([2.0, 12.0], 6, 2.0, 2.0, 6),
+                ([0.0, 0.9], 0, 0.0, 0.5, 2),
+                ([0.0, 0.9], 1, 0.0, 0.5, 2),
+            ] {
+                let found = ticks(range.map(|x| unit * x), count);
+                assert_eq!(found.len(), number, "{unit} {range:?}: {found:?}");
+                for (k, x) in found.iter().enumerate() {
+                    let expected = unit * (first + step * k as f64);
+                    assert!((x - expected).abs() < 1e-9 * unit, "{unit} {range:?}: {found:?}");
+                }
+            }
+        }
+    }
+}

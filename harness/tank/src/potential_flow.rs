@@ -727,4 +727,39 @@ mod tests {
             }
         }
     }
+
+    /// Where a point is, and its image behind the axis, in a panel's own v: v^gamma is its foot on the panel and its distance
+    /// over the length; what is found is closer than the rule of the panel's own points allows.
+    #[test]
+    fn a_point_s_preimage_is_the_root_of_its_place() {
+        let (mut graded, mut plain, mut far) = (0, 0, 0);
+        for wall in walls() {
+            let mesh = Discretisation::new(&wall, 3, 8, false);
+            for panel in &mesh.panels {
+                let ends = [1e-300, 1.0].map(|v| mesh.boundary.point(panel, v));
+                let length = norm(mesh.boundary.difference(&ends[0], &ends[1]));
+                for x in &mesh.points {
+                    let image = sub([-x.p[0], x.p[1]], ends[0].p);
+                    let places = [mesh.boundary.difference(&ends[0], x), image];
+                    let found = mesh.preimages(panel, &ends, length, x);
+                    for (found, w) in found.into_iter().zip(places) {
+                        let Some(v) = found else {
+                            far += 1;
+                            // nothing that touches the panel is left out
+                            assert!(norm(w) > 0.1 * length, "{panel:?} {w:?}");
+                            continue;
+                        };
+                        let (size, angle) = (v[0].hypot(v[1]), v[1].atan2(v[0]));
+                        let (size, angle) = (size.powf(panel.gamma), panel.gamma * angle);
+                        let foot = mesh.boundary.foot(panel, w);
+                        let off = [size * angle.cos() - foot[0], size * angle.sin() - foot[1]];
+                        assert!(norm(off) < 1e-12 * (1.0 + norm(foot)), "{panel:?}: {off:?}");
+                        assert!(bernstein(v, 0.0, 1.0) < FAR_WHOLE);
+                        *(if panel.gamma > 1.0 { &mut graded } else { &mut plain }) += 1;
+                    }
+                }
+            }
+        }
+        assert!(graded > 100 && plain > 100 && far > 1000, "{graded} {plain} {far}");
+    }
 }

@@ -28,6 +28,27 @@ fn bad_contours_are_described() {
             "profile = [{ line = [0, 0, 1, 0] }, { line = [1, 0, 0.5, 1] }, { line = [0.5, 1, 0.5, -0.5] }]",
             "crosses itself near (0.5",
         ),
+        // its first line and its last one; a corner on a line, at its height or at its radius
+        (
+            "profile = [{ line = [0.5, 1, 0.5, 0] }, { line = [0.5, 0, 1, 0] }, { line = [1, 0, 1, 1] }, { line = [1, 1, 0.4, 0.5] }]",
+            "crosses itself near (0.500000, 0.583333) m (segments 1 and 4)",
+        ),
+        (
+            "profile = [{ line = [0, 0, 1, 0] }, { line = [1, 0, 1, 1] }, { line = [1, 1, 0.5, 0] }, { line = [0.5, 0, 0.2, 1] }]",
+            "crosses itself near (0.500000, 0.000000) m (segments 1 and 3)",
+        ),
+        (
+            "profile = [{ line = [0.5, 1, 0.5, 0] }, { line = [0.5, 0, 1, 0] }, { line = [1, 0, 0.5, 0.5] }, { line = [0.5, 0.5, 1, 1] }]",
+            "crosses itself near (0.500000, 0.500000) m (segments 1 and 3)",
+        ),
+        (
+            "profile = [{ line = [0, 0, 1, 0] }, { line = [1, 0, 1, 1] }, { line = [1, 1, 0.5, 0.6] }, { line = [0.5, 0.6, 1, 0.2] }]",
+            "crosses itself near (1.000000, 0.200000) m (segments 2 and 4)",
+        ),
+        (
+            "profile = [{ line = [0, 0.5, 0.5, 0.5] }, { line = [0.5, 0.5, 0.6, 0] }, { line = [0.6, 0, 1, 0] }, { line = [1, 0, 0.3, 0.5] }, { line = [0.3, 0.5, 1, 0.9] }]",
+            "crosses itself",
+        ),
         ("profile = [{ line = [1, 1, 1, 0] }, { line = [1, 0, 0, 0] }]", "inside out (clockwise)"),
         (
             "profile = [{ line = [0, 0, nan, 0] }]",
@@ -505,4 +526,52 @@ fn a_contour_has_at_most_200_segments() {
     assert!(parsed(200).is_ok());
     let message = parsed(201).unwrap_err().to_string();
     assert!(message.contains("The contour has 201 segments, at most 200."), "{message}");
+}
+
+/// What a result is of is in it: by it a reader knows which lengths to expect.
+#[test]
+fn a_result_says_whether_it_is_of_a_body_of_revolution_or_of_a_box() {
+    for (text, kind) in [
+        ("shape = { cylinder = { radius = 1.0, height = 1.0 } }", "revolution"),
+        ("profile = [{ arc = [0, 0, 1, -90, 90] }]", "revolution"),
+        ("box = [1.0, 2.0]", "box"),
+    ] {
+        let tank = tank(&format!("density = 1.0\n{text}"));
+        for fill in [0.0, 0.7] {
+            let swept = hubslosh_tank::sweep::sweep(&tank, &[fill], 1).unwrap();
+            assert_eq!(swept.rows[0].kind, kind, "{text} {fill}");
+        }
+    }
+}
+
+/// Of a box of 0.8 m by 0.5 m both axes; each number where the heading says.
+#[test]
+fn the_table_has_the_damping_of_every_mode_with_its_frequency_in_hertz() {
+    let tank = tank("density = 1000.0\nbox = [0.8, 0.5]");
+    let mut data = tank.solve(0.3, 2).unwrap();
+    let liquid = Liquid { gravity: 9.81, nu: Some(1e-6), sigma: None, contact_angle: 90.0 };
+    data.damping = Some(hubslosh_tank::parameters::damping_of(&tank, &data, 1e-6, liquid).unwrap());
+    let damping = data.damping.clone().unwrap();
+    let text = table(&data, 9.81);
+    assert!(
+        text.contains("damping at 9.81 m/s², nu 0.000001 m2/s: ") || text.contains("nu 1e-6 m2/s"),
+        "{text}"
+    );
+    let (_, rows) = text.split_once("damping at").unwrap();
+    let numbers: Vec<Vec<f64>> = rows
+        .lines()
+        .map(|line| line.split_whitespace().filter_map(|word| word.parse().ok()).collect())
+        .filter(|row: &Vec<f64>| row.len() == 6)
+        .collect();
+    let modes = damping.modes.iter().chain(&damping.modes_y);
+    assert_eq!((numbers.len(), damping.modes.len(), damping.modes_y.len()), (4, 2, 2), "{text}");
+    for ((row, mode), n) in numbers.iter().zip(modes).zip([1.0, 2.0, 1.0, 2.0]) {
+        let [low, high] = mode.interval;
+        let expected = [n, mode.omega / core::f64::consts::TAU, mode.zeta, low, high, mode.laminar];
+        for (found, expected) in row.iter().zip(expected) {
+            // three digits of an interval
+            assert!((found / expected - 1.0).abs() < 5e-3, "{row:?} {expected}");
+        }
+    }
+    assert_eq!(rows.matches("n along y").count(), 1, "{rows}");
 }

@@ -56,6 +56,12 @@ fn laminar_layer_is_the_known_one_in_cylinder_and_box() {
         assert!((zeta * 2.0 * pi / decrement - 1.0).abs() < 1e-12, "{h}");
         // the layer is thin against the wave: 0.6 mm in water, 0.6 m in a liquid a million times as viscous
         assert_eq!(damping::laminar(mode, 1e-6, 9.81).outside, [""; 0]);
+        // thin is a tenth of 1/lambda: (2 nu/omega)^(1/2) = 0.1 l
+        let omega = (9.81 * mode.lambda).sqrt();
+        let limit = 0.5 * omega * (0.1 * mode.l).powi(2);
+        assert_eq!(damping::laminar(mode, 0.99 * limit, 9.81).outside.len(), 0);
+        let [near] = &damping::laminar(mode, 1.01 * limit, 9.81).outside[..] else { panic!("{h}") };
+        assert!(near.contains(&format!("{:.3e} m", 0.1 * mode.l * 1.01f64.sqrt())), "{near}");
         let [thick] = &damping::laminar(mode, 1.0, 9.81).outside[..] else { panic!("{h}") };
         assert!(thick.contains("e-1 m is not thin against the wave"), "{thick}");
     }
@@ -510,4 +516,122 @@ fn a_box_with_two_lengths_says_along_which_its_modes_are() {
     assert!(two.to_toml().contains("\"slosh.table.one_axis\" = true\n"));
     assert!(two.to_ssv().contains("name=\"slosh.table.one_axis\"><ssv:Boolean value=\"true\"/>"));
     assert!(set("[0.5, 0.5]").values.iter().all(|(name, _)| name != "slosh.table.one_axis"));
+}
+
+/// In a cylinder of 2 m by both formulas: what a wave leaves dry, a ring of more than a quarter of the section, strokes out
+/// of 0.64 to 6.4 (exp(-1.84 0.25) = 0.6313 half a metre down). A quarter is covered at w/R = 1 - 0.75^(1/2) = 0.134.
+#[test]
+fn a_ring_says_which_of_its_limits_it_leaves_and_by_how_much() {
+    let cylinder = solve("shape = { cylinder = { radius = 2.0, height = 9.0 } }", 6.0, 1);
+    for (depth, width, amplitude, words) in [
+        (0.5, 0.4, 0.5, Some("covers 0.360 of the section, more than 0.25")),
+        (0.5, 0.27, 0.5, Some("covers 0.252 of the section, more than 0.25")),
+        (0.5, 0.26, 0.5, None),
+        (0.3, 0.2, 0.31, Some("at a depth of 0.3 m comes out of a wave of 0.31 m")),
+        (0.3, 0.2, 0.29, None),
+        (0.5, 0.0480, 0.5, Some("outside 0.64 to 6.4")),
+        (0.5, 0.0505, 0.5, None),
+        (0.5, 0.1002, 0.1, Some("outside 0.64 to 6.4")),
+        (0.5, 0.0970, 0.1, None),
+    ] {
+        let ring = Ring { depth, width };
+        let of_any = damping::ring(&cylinder, ring, amplitude).unwrap();
+        for found in [damping::miles_ring(2.0, ring, amplitude), of_any] {
+            match (words, &found.outside[..]) {
+                (None, []) => {}
+                (Some(words), [why]) => assert!(why.contains(words), "{why}"),
+                _ => panic!("{depth} {width} {amplitude}: {:?}", found.outside),
+            }
+        }
+    }
+    let [stroke] = &damping::miles_ring(2.0, Ring { depth: 0.5, width: 0.025 }, 0.5).outside[..]
+    else {
+        panic!()
+    };
+    assert!(stroke.contains("(eta/w) times the decay is 12.626,"), "{stroke}");
+}
+
+/// A quarter of a cone's section at the ring, not at the surface: 45 degrees, so that the radius is the height.
+#[test]
+fn a_ring_in_any_tank_covers_a_part_of_the_section_at_its_own_depth() {
+    let cone = solve("shape = { cone = { half_angle = 45.0, height = 1.5 } }", 1.2, 1);
+    let found = damping::ring(&cone, Ring { depth: 0.2, width: 0.2 }, 0.19).unwrap();
+    // r = 1, w = 0.2, but for the wall's points: 1e-3
+    assert!(found.outside.iter().any(|why| why.contains("covers 0.36")), "{:?}", found.outside);
+}
+
+/// Where the words of a correlation's damping name the other estimate, they have its number: 1.45 layers, or what the
+/// correlation makes; three digits at least.
+#[test]
+fn the_words_of_a_damping_have_the_number_that_was_not_taken() {
+    let number = |taken: &str, before: &str| -> f64 {
+        let Some((_, rest)) = taken.split_once(before) else { panic!("{taken}") };
+        let end = rest.find(|c: char| !"0123456789.e-".contains(c)).unwrap_or(rest.len());
+        rest[..end].parse().unwrap()
+    };
+    let sphere = "shape = { sphere = { radius = 0.5 } }";
+    for (shape, fill) in
+        [("shape = { cylinder = { radius = 0.5, height = 9 } }", 1.0), (sphere, 0.5)]
+    {
+        let found = damped(shape, fill, 1e-6, 0.05, None);
+        let layers = number(&found.taken, "measured there; 1.45 laminar layers make ");
+        assert!((layers / (1.45 * found.modes[0].laminar) - 1.0).abs() < 1e-3, "{}", found.taken);
+    }
+    let found = damped(sphere, 0.5, 1e-6, 9.81, None);
+    let correlation = number(&found.taken, "was not measured there; its correlation makes ");
+    assert!((correlation / found.correlation.unwrap() - 1.0).abs() < 1e-3, "{}", found.taken);
+}
+
+/// The meniscus was computed over deep liquid: a surface that is curved, by less than gravity flattens it, over less than a
+/// radius. Bo = 100 g here.
+#[test]
+fn a_meniscus_warns_in_shallow_liquid_at_low_bond_numbers_and_outside_of_its_angles() {
+    let mode = &solve("shape = { cylinder = { radius = 0.1, height = 1 } }", 0.2, 1).modes[0];
+    let outside = |fill: f64, angle: f64, g: f64| {
+        let fluid = Fluid { rho: 1000.0, sigma: 0.1, g };
+        low_gravity::cylinder(mode, 0.1, fill, angle, fluid).outside
+    };
+    let deep = "the meniscus was computed over deep liquid, h/R of 1 and more";
+    assert_eq!(outside(0.09, 30.0, 0.99), [deep]);
+    assert_eq!(outside(0.09, 0.0, 0.0), [deep]);
+    for (fill, angle, g) in
+        [(0.11, 30.0, 0.5), (0.1, 30.0, 0.5), (0.09, 90.0, 0.5), (0.09, 30.0, 1.01)]
+    {
+        assert_eq!(outside(fill, angle, g), [""; 0], "{fill} {angle} {g}");
+    }
+    for (angle, taken) in [(91.0, 90), (-1.0, 0)] {
+        let words =
+            format!("nothing is known at a contact angle of {angle} degrees; {taken} is taken");
+        assert_eq!(outside(0.2, angle, 0.5), [words]);
+        let fluid = Fluid { rho: 1000.0, sigma: 0.1, g: 0.5 };
+        let omega2 = |angle: f64| low_gravity::cylinder(mode, 0.1, 0.2, angle, fluid).omega2;
+        assert_eq!(omega2(angle), omega2(f64::from(taken)));
+    }
+    assert_eq!(outside(0.2, 30.0, -0.1), ["the Bond number -1.000e1 is below 0; 0 is taken"]);
+    // below 0 the meniscus is that without gravity
+    let added = |g: f64| {
+        let found = [30.0, 90.0].map(|angle| {
+            low_gravity::cylinder(mode, 0.1, 0.2, angle, Fluid { rho: 1000.0, sigma: 0.1, g })
+                .omega2
+        });
+        found[0] - found[1]
+    };
+    assert!((added(-0.1) / added(0.0) - 1.0).abs() < 1e-12);
+}
+
+/// More than a tenth of what gravity makes, in a tank whose modes capillarity changes: half full sphere, Bo = 1e4 g.
+#[test]
+fn capillarity_is_unknown_from_a_tenth_of_gravity_s_share_on() {
+    let half = &solve("shape = { sphere = { radius = 1.0 } }", 1.0, 1).modes[0];
+    let flat = |g: f64| low_gravity::flat(half, Fluid { rho: 1000.0, sigma: 0.1, g });
+    let added = flat(1.0).omega2 - half.lambda;
+    let limit = 10.0 * added / half.lambda;
+    assert!(!flat(1.01 * limit).unknown && flat(1.01 * limit).outside.is_empty());
+    let near = flat(0.99 * limit);
+    assert!(near.unknown);
+    assert_eq!(near.outside, ["it adds 10 % to omega^2, too much for the first order in it"]);
+    assert_eq!(
+        flat(0.1 * limit).outside,
+        ["it adds 100 % to omega^2, too much for the first order in it"]
+    );
 }

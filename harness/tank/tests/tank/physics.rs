@@ -380,6 +380,9 @@ fn a_cusp_at_the_edge_of_an_inverted_dome_is_harmless() {
 #[test]
 fn wave_numbers_of_an_annulus_scale_and_have_the_limits_of_a_thin_one() {
     let ones = closed_form::annular_wave_numbers(0.4, 1.0, 5);
+    for count in [0, 1, 5] {
+        assert_eq!(closed_form::annular_wave_numbers(0.4, 1.0, count), ones[..count]);
+    }
     for size in [1e-3, 0.3, 7.0, 1e3] {
         let found = closed_form::annular_wave_numbers(0.4 * size, size, 5);
         for (k, one) in found.iter().zip(&ones) {

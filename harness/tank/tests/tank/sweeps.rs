@@ -205,6 +205,18 @@ fn a_placed_table_states_the_errors_between_its_points() {
         assert!((0.95..1.1).contains(&(found / stated)), "{found:e} {stated:e}");
         assert!(stated < 5e-3);
     }
+    // What placing is for: twelve fills evenly apart are ten times as far off.
+    let even = sweep(&tank, &fills(0.03, 1.47, fill_table::POINTS - 1), 1).unwrap().rows;
+    let x: Vec<f64> = even.iter().map(|row| row.m_liq).collect();
+    let y: Vec<f64> = even.iter().map(|row| 1.0 / row.modes[0].l).collect();
+    let stiffness = Monotone::within(&x, &y);
+    let off = |fill: f64| {
+        let exact = closed_form::cylinder(0.5, fill, 1000.0, 1);
+        ((stiffness.at(exact.m_liq) * exact.modes[0].l).sqrt() - 1.0).abs()
+    };
+    let worst = fills(0.03, 1.47, 1000).into_iter().map(off).fold(0.0, f64::max);
+    let placed = placed.error.into_iter().fold(0.0, f64::max);
+    assert!(worst > 10.0 * placed, "{worst:e} {placed:e}");
 }
 
 /// Names and numbers of a table for both FMUs, and what is refused.
