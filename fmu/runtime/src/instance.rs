@@ -1420,3 +1420,58 @@ fn check_length(call: &Call, name: &str, given: usize, needed: usize) -> Result<
 fn scalar<M: Model, V: Version>(call: &Call, reference: u32) -> Result<&'static Scalar<M>, Fault> {
     V::scalar(reference, call.c_type).map_err(|why| call.error(why))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::trays::Trays;
+    use crate::v3::Fmi3;
+
+    /// Levels have the nominal value 5 m, inputs 4 m/s: aside by up to a hundredth of it, inputs upwards, within their range.
+    #[test]
+    fn points_close_by_differ_in_every_state_and_input_by_a_share_of_its_size() {
+        let moved = |share: f64, point: u64, q: f64| {
+            let mut instance = Instance::<Trays, Fmi3>::new(Interface::ModelExchange);
+            instance.enter_initialization_mode().unwrap();
+            instance.exit_initialization_mode().unwrap();
+            let inputs = INPUTS.map(|n| &Trays::table().scalars[n]);
+            for scalar in inputs {
+                instance.put(scalar, Value::Real(q));
+            }
+            instance.move_aside(share, point);
+            let x = instance.model.as_ref().unwrap().continuous_states();
+            let by_state = [x[0] - 1.0, x[1] - 2.0, x[2] - 4.0].map(|dx| dx / (5.0 * share));
+            let by_input = inputs.map(|scalar| {
+                let Access::Input(ramp) = scalar.access else { panic!() };
+                (*ramp(&mut instance.inputs, scalar.element)[0] - q) / (4.0 * share)
+            });
+            (by_state, by_input)
+        };
+        const INPUTS: [usize; 3] = [7, 8, 9];
+        let (mut states, mut inputs) = (Vec::new(), Vec::new());
+        for point in 1..9 {
+            let (by_state, by_input) = moved(0.01, point, 0.5);
+            // another share, other sizes
+            let (twice, inputs_twice) = moved(0.02, point, 0.5);
+            for n in 0..3 {
+                assert!((by_state[n] - twice[n]).abs() < 1e-12, "{by_state:?} {twice:?}");
+                assert!((by_input[n] - inputs_twice[n]).abs() < 1e-12, "{by_input:?}");
+            }
+            states.extend(by_state);
+            inputs.extend(by_input);
+        }
+        assert!(states.iter().all(|part| part.abs() <= 1.0), "{states:?}");
+        assert!(inputs.iter().all(|part| (0.0..=1.0).contains(part)), "{inputs:?}");
+        // They fill the interval: of 24 places none is far from its neighbour. An input has the same place in two points.
+        states.sort_unstable_by(f64::total_cmp);
+        assert!(states[0] < -0.85 && states[23] > 0.85, "{states:?}");
+        assert!(
+            states.windows(2).all(|pair| (1e-3..0.25).contains(&(pair[1] - pair[0]))),
+            "{states:?}"
+        );
+        inputs.sort_unstable_by(f64::total_cmp);
+        assert!(inputs[0] < 0.2 && inputs[23] > 0.7, "{inputs:?}");
+        // at the end of the range they stay
+        assert_eq!(moved(0.01, 1, 8.0).1, [0.0; 3]);
+    }
+}

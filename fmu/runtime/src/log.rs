@@ -161,6 +161,14 @@ mod tests {
     }
 
     #[test]
+    fn why_calls_fail_is_told_to_those_who_ask_for_nothing_else() {
+        assert_eq!(Filter::NONE.with_errors(), Filter::ERRORS);
+        assert_eq!(Filter::ALL.with_errors(), Filter::ALL);
+        let events = Filter { events: true, ..Filter::NONE }.with_errors();
+        assert!(events.wants(Topic::Event) && !events.wants(Topic::Warning));
+    }
+
+    #[test]
     fn events_are_for_those_who_ask() {
         assert!(!Filter::FAILURES.wants(Topic::Event));
     }

@@ -600,7 +600,8 @@ mod tests {
         };
         assert_eq!(found(&approximation(&|_| {})), ((0.0, 0.0), (0.0, 0.0)));
         let step = 0.125;
-        let changes: [(&dyn Fn(&mut Mode), f64); 5] = [
+        type Change<'a> = &'a dyn Fn(&mut Mode);
+        let changes: [(Change, f64); 5] = [
             (&|mode| mode.m -= step, step / 5.0),
             (&|mode| mode.m_h -= step, step / 10.0),
             (&|mode| mode.m_h2 -= step, step / 20.0),

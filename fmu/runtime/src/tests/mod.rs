@@ -4,13 +4,15 @@
 mod experiment;
 mod log;
 mod model_exchange;
+mod reported;
 mod snapshot;
 mod steps;
 mod table;
+pub(crate) mod trays;
 mod values;
 mod variable;
 mod version;
-mod vessels;
+pub(crate) mod vessels;
 
 use crate::call::{Fault, Interface, Severity};
 use crate::instance::Instance;

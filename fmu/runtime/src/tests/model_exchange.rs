@@ -98,6 +98,27 @@ fn discrete_changes_happen_at_events_alone() {
     );
 }
 
+/// Before the motion what it starts from; then a state's derivatives are not asked for, another's are: without a leak a
+/// rate depends on what flows in alone.
+#[test]
+fn dependencies_are_what_counts_at_present_of_what_is_declared() {
+    let of = |instance: &mut Subject, name: &str| {
+        let scalar = &TABLE.scalars[reference(name) as usize];
+        instance.dependencies(&GET_REAL, scalar).unwrap()
+    };
+    let mut instance = fresh(ME);
+    let initially = references(["q[2]", "leak", "start.level[1]"]);
+    assert_eq!(of(&mut instance, "net[2]"), initially);
+    for (leak, expected) in [(0.5, vec!["level[2]", "q[2]"]), (0.0, vec!["q[2]"])] {
+        let mut instance = continuous(&[("leak", leak)]);
+        let expected: Vec<_> = expected.into_iter().map(reference).collect();
+        assert_eq!(of(&mut instance, "net[2]"), expected, "{leak}");
+        assert_eq!(of(&mut instance, "level[2]"), [reference("level[2]")]);
+        assert_eq!(of(&mut instance, "room"), [reference("z")]);
+        assert_eq!(of(&mut instance, "open"), [0; 0]);
+    }
+}
+
 #[test]
 fn outputs_follow_what_the_host_sets() {
     let mut instance = continuous(&[]);

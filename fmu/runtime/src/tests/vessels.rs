@@ -5,7 +5,7 @@
 //! [`OPENS`] of the platform a valve opens, which spills half of the first vessel.
 
 use crate::Model;
-use crate::model::StepFailure;
+use crate::model::{StepEnd, StepFailure};
 use crate::table::{About, Scalar, Table, scalar_count, scalars};
 use crate::variable::Dimension::Fixed;
 use crate::variable::{Enumeration, Item, Variable};
@@ -219,6 +219,16 @@ impl Model for Vessels {
         self.x = x;
         self.time += h;
         self.handle_event(inputs).map(|_| ()).map_err(failure)
+    }
+
+    /// Stops at the inspection.
+    fn step_to_event(&mut self, inputs: &Inputs, h: f64) -> Result<StepEnd, StepFailure> {
+        let left = self.inspection - self.time;
+        if left <= 0.0 || left > h {
+            return self.step(inputs, h).map(|()| StepEnd::End);
+        }
+        self.step(inputs, left)?;
+        Ok(if left == h { StepEnd::EventAtEnd } else { StepEnd::Event(self.time) })
     }
 
     fn outputs(&mut self, inputs: &Inputs) -> Outputs {

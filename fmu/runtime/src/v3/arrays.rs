@@ -176,3 +176,99 @@ pub fn shape<M: Model>(reference: u32, parameters: &[Value]) -> String {
 pub fn for_layout<M: Model>(layout: Layout, parameters: &[Value]) -> Option<Box<Arrays>> {
     (layout == Layout::Arrays).then(|| Box::new(Arrays::new::<M>(parameters)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::trays::Trays;
+
+    /// The table's start values with another number of trays.
+    fn parameters(rows: i32) -> Vec<Value> {
+        let mut all = Trays::table().starts();
+        all[0] = Value::Integer(rows);
+        all
+    }
+
+    /// Variables from 1: level, square, der(level), q, rows, w, m, k, time, indicators. By rows, of 3 trays; time is scalar 25.
+    #[test]
+    fn an_array_is_the_row_of_its_elements_as_long_as_its_parameter_says() {
+        let of = |rows: i32| {
+            let arrays = Arrays::new::<Trays>(&parameters(rows));
+            let all: Vec<Vec<u32>> = (1..=10).map(|n| arrays.of(n).unwrap().to_vec()).collect();
+            assert_eq!((arrays.len(), arrays.of(0), arrays.of(11)), (10, None, None));
+            assert!(!arrays.is_empty());
+            all
+        };
+        let behind = [vec![24], vec![25], vec![26, 27]];
+        let mut expected = vec![vec![1, 2, 3], vec![4], vec![5, 6, 7], vec![8, 9, 10], vec![11]];
+        expected.extend([(12..18).collect(), (18..24).collect::<Vec<u32>>()]);
+        expected.extend(behind.clone());
+        assert_eq!(of(3), expected);
+        let mut expected = vec![vec![1, 2], vec![4], vec![5, 6], vec![8, 9], vec![11]];
+        expected.extend([vec![12, 13, 14, 15], vec![18, 19, 21, 22]]);
+        expected.extend(behind.clone());
+        assert_eq!(of(2), expected);
+        let mut expected = vec![vec![1], vec![4], vec![5], vec![8], vec![11]];
+        expected.extend([vec![12, 13], vec![18, 21]]);
+        expected.extend(behind);
+        assert_eq!(of(1), expected);
+        assert!(Arrays::default().is_empty());
+    }
+
+    #[test]
+    fn a_scalar_knows_its_array_and_its_place_there_unless_it_is_beyond() {
+        let arrays = Arrays::new::<Trays>(&parameters(2));
+        let places = [1, 2, 3, 4, 11, 15, 16, 18, 19, 20, 21, 22, 23, 24].map(|n| arrays.place(n));
+        let (level, square, rows, w, m, k) = (1, 2, 5, 6, 7, 8);
+        assert_eq!(
+            places,
+            [
+                Some((level, 1)),
+                Some((level, 2)),
+                None,
+                Some((square, 1)),
+                Some((rows, 1)),
+                Some((w, 4)),
+                None,
+                Some((m, 1)),
+                Some((m, 2)),
+                None,
+                Some((m, 3)),
+                Some((m, 4)),
+                None,
+                Some((k, 1)),
+            ]
+        );
+        assert_eq!([0, 25].map(|n| arrays.place(n)), [None; 2]);
+        assert_eq!(arrays.states(), [0, 1]);
+        assert_eq!(Arrays::new::<Trays>(&parameters(3)).states(), [0, 1, 2]);
+    }
+
+    #[test]
+    fn a_variable_has_its_reference_name_type_and_shape() {
+        let arrays = Arrays::new::<Trays>(&parameters(2));
+        let names = ["level", "square", "der(level)", "q", "rows", "w", "m", "k"];
+        for (n, (variable, known)) in Trays::table().variables.iter().zip(names).enumerate() {
+            let n = n as u32 + 1;
+            assert_eq!((reference(variable), name::<Trays>(n).unwrap().as_str()), (n, known));
+            let c_type = if known == "rows" { CType::Size } else { CType::Real };
+            assert_eq!(arrays.c_type(n), c_type, "{known}");
+        }
+        let behind = [0, 9, 10, 11].map(name::<Trays>);
+        assert_eq!(behind, [None, Some("time".into()), Some("event_indicator".into()), None]);
+        assert_eq!([0, 9, 10].map(|n| arrays.c_type(n)), [CType::Real; 3]);
+        assert_eq!(time::<Trays>(), 9);
+        let shapes = [1, 2, 5, 6, 7, 9, 10].map(|n| shape::<Trays>(n, &parameters(2)));
+        let expected =
+            ["level[2]", "square", "rows", "w[2,2]", "m[2,2]", "time", "event_indicator[2]"];
+        assert_eq!(shapes, expected);
+        assert_eq!(shape::<Trays>(6, &parameters(1)), "w[1,2]");
+        assert_eq!(
+            name::<crate::spring::Spring>(13),
+            None,
+            "without indicators nothing is behind time"
+        );
+        assert!(for_layout::<Trays>(Layout::Scalars, &parameters(2)).is_none());
+        assert!(for_layout::<Trays>(Layout::Arrays, &parameters(2)).is_some());
+    }
+}

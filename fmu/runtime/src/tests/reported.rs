@@ -1,0 +1,109 @@
+//! Co-Simulation of FMI 3.0 by a host that is told of events: they happen within the steps, what is discrete is shown when
+//! the host says that it has come to that.
+
+use super::*;
+use crate::call::{Events, InstanceState};
+use crate::instance::{EventInfo, StepInfo};
+use crate::v3::{ENTER_STEP, Fmi3, GET_BOOLEAN, GET_FLOAT64, GET_INT32, GET_INT64, SET_FLOAT64};
+
+type Host = Instance<Vessels, Fmi3>;
+
+fn number(name: &str) -> u32 {
+    reference(name) + 1
+}
+
+/// In step mode at `start`, with these values set before.
+fn stepping(events: Events, start: f64, values: &[(&str, f64)]) -> Host {
+    let mut host = Host::with_events(CS, events);
+    for (name, x) in values {
+        host.set(&SET_FLOAT64, &[number(name)], |_| Value::Real(*x)).unwrap();
+    }
+    host.setup_experiment(None, start, None).unwrap();
+    host.enter_initialization_mode().unwrap();
+    host.exit_initialization_mode().unwrap();
+    if events == Events::Reported {
+        assert_eq!(host.state(), InstanceState::Event);
+        host.enter_step_mode(&ENTER_STEP).unwrap();
+    }
+    host
+}
+
+/// Whether the valve is open, how often it has moved, where it is: as the host is shown it.
+fn shown(host: &mut Host) -> [Value; 3] {
+    [
+        host.get(&GET_BOOLEAN, number("open")).unwrap(),
+        host.get(&GET_INT32, number("events")).unwrap(),
+        host.get(&GET_INT64, number("valve")).unwrap(),
+    ]
+}
+
+const CLOSED: [Value; 3] = [Value::Boolean(false), Value::Integer(0), Value::Integer(1)];
+const OPENED: [Value; 3] = [Value::Boolean(true), Value::Integer(1), Value::Integer(2)];
+
+#[test]
+fn what_is_discrete_is_shown_as_it_was_until_the_host_handles_the_event() {
+    let mut host = stepping(Events::Reported, 0.0, &[("inspection", 5.0)]);
+    assert_eq!(shown(&mut host), CLOSED);
+    let quiet = StepInfo { event: false, early: false };
+    assert_eq!(host.step_to_event(0.0, 0.5, false), Ok(quiet));
+    host.set(&SET_FLOAT64, &[number("z")], |_| Value::Real(3.0)).unwrap();
+    let level = |host: &mut Host| match host.get(&GET_FLOAT64, number("level[1]")) {
+        Ok(Value::Real(x)) => x,
+        other => panic!("{other:?}"),
+    };
+    let before = level(&mut host);
+    let event = StepInfo { event: true, early: false };
+    assert_eq!(host.step_to_event(0.5, 0.001, false), Ok(event));
+    assert_eq!(shown(&mut host), CLOSED, "the valve has opened");
+    assert!((level(&mut host) / before - 0.5).abs() < 1e-3, "and half of the vessel is spilt");
+    // it stays an event until it is handled
+    assert_eq!(host.step_to_event(0.501, 0.5, false), Ok(event));
+    host.enter_event_mode().unwrap();
+    assert_eq!(shown(&mut host), CLOSED);
+    let info = EventInfo { states_changed: false, next_time: Some(5.0) };
+    assert_eq!(host.new_discrete_states(), Ok(info));
+    assert_eq!(shown(&mut host), OPENED);
+    host.enter_step_mode(&ENTER_STEP).unwrap();
+    assert_eq!(host.step_to_event(1.001, 0.5, false), Ok(quiet));
+    assert_eq!(shown(&mut host), OPENED);
+}
+
+/// The platform rises by w = 0.25 m/s, from 0 at t = 1.
+#[test]
+fn a_step_stops_at_an_event_if_the_host_allows_it_and_inputs_with_it() {
+    let real = |host: &mut Host, name: &str| match host.get(&GET_FLOAT64, number(name)) {
+        Ok(Value::Real(x)) => x,
+        other => panic!("{name}: {other:?}"),
+    };
+    let values = [("inspection", 5.0), ("w", 0.25)];
+    let after = |events, stops, h| {
+        let mut host = stepping(events, 1.0, &values);
+        let info = host.step_to_event(1.0, h, stops).unwrap();
+        ((info.event, info.early), (host.time(), real(&mut host, "z")))
+    };
+    assert_eq!(after(Events::Reported, true, 6.0), ((true, true), (5.0, 1.0)));
+    assert_eq!(after(Events::Reported, true, 4.0), ((true, false), (5.0, 1.0)), "at its end");
+    assert_eq!(after(Events::Reported, true, 2.0), ((false, false), (3.0, 0.5)), "before");
+    assert_eq!(after(Events::Reported, false, 6.0), ((true, false), (7.0, 1.5)), "passed");
+    assert_eq!(after(Events::InStep, true, 6.0), ((false, false), (7.0, 1.5)), "not told");
+}
+
+/// The slack of a time before the last event: 1e-9 of it, none at 0.
+#[test]
+fn time_may_go_back_to_the_last_event_but_for_rounding_errors() {
+    for (last, slack) in [(1000.0, 1e-6), (-1000.0, 1e-6), (0.0, 0.0)] {
+        let mut host = Host::new(ME);
+        host.setup_experiment(None, last, None).unwrap();
+        host.enter_initialization_mode().unwrap();
+        host.exit_initialization_mode().unwrap();
+        host.new_discrete_states().unwrap();
+        host.enter_continuous_time_mode().unwrap();
+        host.set_time(last + 2.0).unwrap();
+        host.set_time(last - 0.9 * slack).unwrap();
+        let why = refused(host.set_time(last - 1.1 * slack - 1e-9));
+        assert!(
+            why.contains(&format!("before the last event (allowed: {last:?} s or later)")),
+            "{why}"
+        );
+    }
+}
