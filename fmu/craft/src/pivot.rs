@@ -185,3 +185,79 @@ impl Rubbing {
         sign.min(until(self.inv_omega_s, f64::max(v - 5.3, 2.5 / v)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use taylor::vector::{cross, dot};
+
+    const PIVOT: Pivot = Pivot {
+        k: [3.0, 5.0],
+        c: [0.5, 0.25, 2.0],
+        friction: PivotFriction { c: [0.0; 3], d: [0.0; 3], omega_s: 0.1, eps: 1e-3 },
+    };
+    const Z: Vec3 = [0.25, -0.5, 0.75];
+    const W: Vec3 = [0.5, -1.0, 2.0];
+
+    /// By hand: Z x (5/4, -3/2, 0) = (9/8, 15/16, 1/4), c w = (1/4, -1/4, 4), c w^2 = 1/8 + 1/4 + 8, 2 U = 3/4 + 5/16.
+    #[test]
+    fn torque_dissipation_and_energy_are_those_of_spring_and_damper_about_each_axis() {
+        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], Z];
+        let (torque, dissipation, energy) = PIVOT.present(&axes, W);
+        assert_eq!(torque, [1.125 - 0.25, 0.9375 + 0.25, 0.25 - 4.0]);
+        assert_eq!((dissipation, energy), (8.375, 0.53125));
+        // U' = -torque.w, for Z' = Z x w, but for what is dissipated
+        let turning = cross(Z, W);
+        let change = 3.0 * Z[1] * turning[1] + 5.0 * Z[0] * turning[0];
+        assert_eq!(change, -dot(torque, W) - dissipation);
+        // as series, and what each part acts by
+        let series = |x: Vec3| {
+            let mut all: Vector = [[0.0; 3]; taylor::series::ORDER + 1];
+            all[0] = x;
+            all
+        };
+        let ww = [0.25, 1.0, 4.0, -0.5, 1.0, -2.0];
+        assert_eq!(PIVOT.load::<0>(&series(Z), &series(W), ww), (torque, dissipation));
+        for (pivot, acts) in [
+            (Pivot::default(), false),
+            (Pivot { k: [0.0, 1.0], ..Pivot::default() }, true),
+            (Pivot { k: [1.0, 0.0], ..Pivot::default() }, true),
+            (Pivot { c: [0.0, 0.0, 1.0], ..Pivot::default() }, true),
+            (
+                Pivot {
+                    friction: PivotFriction { d: [0.0, 1.0, 0.0], ..PIVOT.friction },
+                    ..Pivot::default()
+                },
+                true,
+            ),
+        ] {
+            assert_eq!(pivot.acts(), acts, "{pivot:?}");
+        }
+    }
+
+    /// Each axis by itself: at w = w_s = 10 eps (C + D/e) tanh 10, and what it dissipates.
+    #[test]
+    fn dry_friction_acts_against_each_axis_by_its_own_curve() {
+        let friction =
+            PivotFriction { c: [1.0, 2.0, 4.0], d: [0.5, 0.25, 3.0], omega_s: 0.1, eps: 0.01 };
+        let pivot = Pivot { friction, ..Pivot::default() };
+        let upright = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        for i in 0..3 {
+            for sign in [1.0, -1.0] {
+                let mut w = [0.0; 3];
+                w[i] = sign * 0.1;
+                let (torque, dissipation, energy) = pivot.present(&upright, w);
+                let held = (friction.c[i] + friction.d[i] * libm::exp(-1.0)) * libm::tanh(10.0);
+                let mut expected = [0.0; 3];
+                expected[i] = -sign * held;
+                for k in 0..3 {
+                    assert!((torque[k] - expected[k]).abs() < 1e-15 * 8.0, "{i}: {torque:?}");
+                }
+                assert!((dissipation - 0.1 * held).abs() < 1e-15 && energy == 0.0, "{i}");
+                let mut rubbing = Rubbing::new(&friction, i);
+                let (r, rw) = rubbing.expand(0, w[i]);
+                assert!((r + expected[i]).abs() < 1e-15 * 8.0 && (rw - 0.1 * held).abs() < 1e-15);
+            }
+        }
+    }
+}

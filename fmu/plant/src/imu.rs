@@ -169,6 +169,23 @@ mod tests {
         }
     }
 
+    /// Noise belongs to (seed, k): rate, bias and a multiple of the normal number k. The bias goes on with the other one.
+    #[test]
+    fn a_reading_is_rate_bias_and_the_seed_s_own_noise() {
+        let imu = Imu { arw: 1e-3, bias_instability: 0.664e-3, bias_time: 0.1, ..clean(25.0) };
+        let mut gyro = imu.start();
+        for k in 0..4 {
+            assert_eq!(gyro.next, k);
+            let ((white, drift), bias) = (normals(imu.seed, k), gyro.bias);
+            imu.sample(&mut gyro, 0.5);
+            assert!((gyro.held - 0.5 - bias - 5e-3 * white).abs() < 1e-16, "{k}");
+            // e^(-1/2.5) is left, the spread of 1 mrad/s kept
+            let keep = libm::exp(-0.4);
+            let next = keep * bias + 1e-3 * libm::sqrt(1.0 - keep * keep) * drift;
+            assert!((gyro.bias - next).abs() < 1e-17, "{k}");
+        }
+    }
+
     #[test]
     fn bias_is_drawn_from_its_spread_and_keeps_its_correlation_time() {
         const COUNT: i32 = 40_000;

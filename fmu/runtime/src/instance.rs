@@ -377,16 +377,13 @@ impl<M: Model, V: Version> Instance<M, V> {
         }
     }
 
-    /// Brings what the host is shown of what is discrete up to date. Returns whether it was not.
-    fn show_discrete(&mut self, call: &Call) -> Result<bool, Fault> {
+    /// Brings what the host is shown of what is discrete up to date.
+    fn show_discrete(&mut self, call: &Call) -> Result<(), Fault> {
         let outputs = *self.outputs(call)?;
-        let mut changed = false;
         for (scalar, shown) in M::table().discrete().zip(&mut self.shown) {
-            let now = discrete(scalar, &outputs);
-            changed |= now != *shown;
-            *shown = now;
+            *shown = discrete(scalar, &outputs);
         }
-        Ok(changed)
+        Ok(())
     }
 
     /// Whether something discrete is not as the host is shown it.

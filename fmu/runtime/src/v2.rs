@@ -1031,6 +1031,12 @@ mod tests {
     use super::*;
     use crate::spring::Spring;
 
+    #[test]
+    fn the_version_is_2_0_on_the_default_platform() {
+        let said = [fmi2GetVersion(), fmi2GetTypesPlatform()].map(|said| unsafe { text(said) });
+        assert_eq!(said, [Some("2.0".into()), Some("default".into())]);
+    }
+
     /// An instance without a logger.
     fn instantiate() -> fmi2Component {
         let callbacks = fmi2CallbackFunctions {

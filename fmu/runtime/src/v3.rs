@@ -2387,6 +2387,22 @@ mod tests {
         unsafe { fmi3FreeInstance::<Spring>(instance) };
     }
 
+    /// The force is to run to 1 within the step; but the host wants to return at once, and sets nothing in the next one.
+    #[test]
+    fn after_an_early_return_at_once_inputs_are_held() {
+        let (instance, host) = stepping(true);
+        (host.lock().unwrap().force, host.lock().unwrap().wish) = (Some(1.0), Some(-1.0));
+        assert_eq!(step(instance, 0.0, 0.5), (fmi3OK, true, 0.0));
+        (host.lock().unwrap().force, host.lock().unwrap().wish) = (None, None);
+        assert_eq!(step(instance, 0.0, 0.5), (fmi3OK, false, 0.5));
+        let mut force = 9.0;
+        unsafe {
+            fmi3GetFloat64::<Spring>(instance, &reference("F"), 1, &mut force, 1);
+            fmi3FreeInstance::<Spring>(instance);
+        }
+        assert_eq!(force, 0.0);
+    }
+
     #[test]
     fn a_value_out_of_range_within_a_step_is_discarded_and_another_variable_is_an_error() {
         let (instance, host) = stepping(false);

@@ -884,6 +884,24 @@ fn what_a_ball_regime_cannot_be_combined_with_is_refused() {
     ]) {
         assert!(said.contains(word) && said.contains("allowed"), "{word}: {said}");
     }
+    // What a message allows is allowed, and no less.
+    for set in [
+        |p: &mut Parameters, x| p.tank[0].ball.travel = x,
+        |p: &mut Parameters, x| {
+            p.tank[0].ball.radius = x;
+        },
+    ] {
+        let said = |x: f64| {
+            let mut p = craft();
+            set(&mut p, x);
+            p.problems().join("\n")
+        };
+        let text = said(0.1);
+        let (_, rest) = text.split_once("or at least ").unwrap();
+        let least: f64 = rest.split(' ').next().unwrap().parse().unwrap();
+        assert_eq!(said(least), "");
+        assert!(said(least.next_down()).contains("or at least "));
+    }
 }
 
 #[test]

@@ -553,6 +553,12 @@ fn a_flow_that_cannot_be_is_refused() {
         let wanted = format!("mass_flow[1] would leave {} kg in tank[1]", 15.0 - missing);
         assert!(message.contains(&wanted), "{message}");
     }
+    // Of a tank alone there is one.
+    let alone = craft::TankParameters { tank: p.tank[0], ..craft::TankParameters::default() };
+    let of_tank = craft::TankInputs { mass_flow: flow(6.0)[0], ..craft::TankInputs::default() };
+    let mut tank = super::component::SloshTank::new(&alone, &of_tank, 0.0, 1e-9).unwrap();
+    let message = tank.step(&of_tank, 1.0).unwrap_err().to_string();
+    assert!(message.contains("mass_flow would leave 9 kg in tank (allowed"), "{message}");
     u.mass_flow = flow(4.5);
     u.mass_flow[0].slope = -2.25;
     craft.step(&u, 4.0).unwrap();

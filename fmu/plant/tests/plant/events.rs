@@ -1,7 +1,10 @@
 //! Events as a host that integrates itself meets them.
 
 use super::common::bench;
-use plant::{FrictionModel, Inputs, Plant, Ramp, STATES, SloshModel, indicator, x};
+use plant::{
+    FrictionModel, Inputs, Parameters, Plant, Ramp, STATES, SloshModel, StepEnd, StoppedStep,
+    indicator, x,
+};
 
 fn torque(value: f64) -> Inputs {
     Inputs { tau_cmd: Ramp::held(value), ..Inputs::default() }
@@ -143,4 +146,204 @@ fn output_derivatives_are_linear_in_each_direction() {
             }
         }
     }
+}
+
+/// What ends the steps of `plant` from its time to `end`, each begun where the last one ended.
+fn stops(plant: &mut Plant, inputs: &Inputs, end: f64) -> Vec<StepEnd> {
+    let mut all = Vec::new();
+    loop {
+        let stop = plant.step_to_event(inputs, end - plant.time()).unwrap();
+        all.push(stop);
+        if !matches!(stop, StepEnd::Event(_)) {
+            return all;
+        }
+        assert!(all.len() < 100, "{all:?}");
+    }
+}
+
+/// Rigid liquid on a hub that a torque brakes by Coulomb friction alone: at rest after I w/(tau + c), held.
+fn braked() -> (Parameters, f64) {
+    let mut p = bench(SloshModel::Frozen, FrictionModel::Stribeck);
+    (p.friction.b, p.friction.d, p.init.omega) = (0.0, 0.0, 0.02);
+    let m_liq = 1000.0 * std::f64::consts::PI / 4.0 * p.tank.d * p.tank.d * p.tank.h;
+    let inertia = p.hub.inertia + m_liq * p.tank.r * p.tank.r;
+    let rest = inertia * p.init.omega / (0.001 + p.friction.c);
+    (p, rest)
+}
+
+#[test]
+fn a_step_stops_where_the_hub_comes_to_rest() {
+    let (p, rest) = braked();
+    for start in [0.0, 1000.0] {
+        let mut plant = Plant::new(&p, &torque(-0.001), start, 1e-9).unwrap();
+        let end = plant.step_to_event(&torque(-0.001), 2.0 * rest).unwrap();
+        let StepEnd::Event(at) = end else { panic!("{end:?}") };
+        // the time's own last digit at the later start
+        assert!((at - start - rest).abs() < 1e-12 + 2e-16 * start, "{at} {rest}");
+        assert_eq!((plant.time(), plant.omega(), plant.last_contact().2), (at, 0.0, 0));
+        let left = start + 2.0 * rest - at;
+        assert_eq!(plant.step_to_event(&torque(-0.001), left).unwrap(), StepEnd::End);
+        assert_eq!(plant.time(), start + 2.0 * rest);
+        // An event beyond the step is none.
+        let mut plant = Plant::new(&p, &torque(-0.001), start, 1e-9).unwrap();
+        let end = plant.step_to_event(&torque(-0.001), 0.9 * rest).unwrap();
+        assert_eq!((end, plant.stopped()), (StepEnd::End, None));
+    }
+}
+
+/// The rotor turns by 1 rad/s a second and more slowly than its least speed after a quarter.
+#[test]
+fn a_step_stops_where_the_wheel_s_torque_changes() {
+    let mut p = bench(SloshModel::Frozen, FrictionModel::Viscous);
+    p.wheel.enabled = true;
+    p.wheel.speed_min = p.wheel.speed_0 - 0.25;
+    let inputs = torque(p.wheel.inertia);
+    let mut plant = Plant::new(&p, &inputs, 3.0, 1e-9).unwrap();
+    let [StepEnd::Event(at), StepEnd::End] = stops(&mut plant, &inputs, 4.0)[..] else { panic!() };
+    assert!((at - 3.25).abs() < 1e-12, "{at}");
+    assert_eq!(plant.continuous_states()[x::WHEEL_SPEED], p.wheel.speed_min);
+    // A command that rises through 0 and the limit: 1 N m/s from -0.13, the wheel at most 0.26.
+    p.wheel.speed_min = Parameters::default().wheel.speed_min;
+    let ramp = Inputs { tau_cmd: Ramp { value: -0.13, slope: 1.0 }, ..Inputs::default() };
+    let mut plant = Plant::new(&p, &ramp, 0.0, 1e-9).unwrap();
+    let first = plant.step_to_event(&ramp, 0.5).unwrap();
+    let StepEnd::Event(at) = first else { panic!("{first:?}") };
+    assert!((at - 0.13).abs() < 1e-12, "{at}");
+}
+
+/// Samples at 0.02, 0.04, ... after the start; the one at the end is no reason to stop before.
+#[test]
+fn a_step_stops_at_each_sample_of_the_gyro() {
+    let mut p = bench(SloshModel::Spherical, FrictionModel::Viscous);
+    (p.imu.enabled, p.init.omega) = (true, 0.1);
+    let inputs = torque(0.02);
+    let mut plant = Plant::new(&p, &inputs, 7.0, 1e-9).unwrap();
+    let all = stops(&mut plant, &inputs, 7.1);
+    assert_eq!(all.len(), 5, "{all:?}");
+    for (k, stop) in all[..4].iter().enumerate() {
+        let StepEnd::Event(at) = stop else { panic!("{all:?}") };
+        assert!((at - 7.0 - 0.02 * (k + 1) as f64).abs() < 4e-15, "{all:?}");
+    }
+    assert_eq!((all[4], plant.time()), (StepEnd::EventAtEnd, 7.1));
+    assert_eq!(plant.next_time_event(), Some(7.0 + 6.0 / 50.0));
+    // before the next one, and exactly to it but for rounding
+    assert_eq!(plant.step_to_event(&inputs, 0.015).unwrap(), StepEnd::End);
+    assert_eq!(plant.step_to_event(&inputs, 7.12 - plant.time()).unwrap(), StepEnd::EventAtEnd);
+}
+
+/// Stick and slip under a swinging liquid, a wheel that saturates, a gyro's samples: with stops and without, to the last bit;
+/// and as often as it may be.
+#[test]
+fn going_on_after_events_ends_as_the_whole_step_does() {
+    for slosh in SloshModel::ALL {
+        let mut p = bench(slosh, FrictionModel::Stribeck);
+        (p.imu.enabled, p.wheel.enabled) = (true, true);
+        p.wheel.speed_min = p.wheel.speed_0 - 2.0;
+        (p.init.omega, p.init.slosh_angle, p.init.slosh_angle_radial) = (0.01, 0.1, 0.05);
+        let inputs = torque(0.006);
+        let fresh = || Plant::new(&p, &inputs, 1.0, 1e-8).unwrap();
+        let (mut whole, mut stopped) = (fresh(), fresh());
+        whole.step(&inputs, 1.015625).unwrap();
+        let all = stops(&mut stopped, &inputs, 2.015625);
+        assert!(all.len() > 50, "{slosh:?}: {}", all.len());
+        assert_eq!(whole.state().to_words(), stopped.state().to_words(), "{slosh:?}");
+        // saved at each event and resumed by another plant
+        let (mut saved, mut count) = (fresh(), 0);
+        while saved.time() < 2.015625 {
+            let (state, words) = (*saved.state(), saved.stopped().map(StoppedStep::to_words));
+            let mut other = Plant::resume(&p, &state, 1e-8);
+            let step = words.map(|words| StoppedStep::from_words(&words).unwrap());
+            assert_eq!(step.as_ref(), saved.stopped());
+            other.set_stopped(step);
+            saved = other;
+            saved.step_to_event(&inputs, 2.015625 - saved.time()).unwrap();
+            count += 1;
+        }
+        assert_eq!(count, all.len(), "{slosh:?}");
+        assert_eq!(whole.state().to_words(), saved.state().to_words(), "{slosh:?}");
+    }
+}
+
+/// To another end or with another torque it is a step of its own, from where it is, which finds its own events.
+#[test]
+fn after_a_stop_another_step_begins_anew() {
+    let mut p = bench(SloshModel::Linear, FrictionModel::Stribeck);
+    (p.imu.enabled, p.init.omega, p.init.slosh_angle) = (true, 0.05, 0.1);
+    let inputs = torque(0.01);
+    for (inputs_then, h) in [
+        (torque(0.02), 0.08),
+        (inputs, 0.07),
+        (inputs, 0.09),
+        (Inputs { tau_ext: Ramp::held(0.01), ..inputs }, 0.08),
+        (Inputs { tau_cmd: Ramp { value: 0.01, slope: 1e-3 }, ..inputs }, 0.08),
+    ] {
+        let mut plant = Plant::new(&p, &inputs, 0.0, 1e-8).unwrap();
+        assert!(matches!(plant.step_to_event(&inputs, 0.1).unwrap(), StepEnd::Event(_)));
+        let mut fresh = Plant::resume(&p, plant.state(), 1e-8);
+        let (a, b) = (plant.step_to_event(&inputs_then, h), fresh.step_to_event(&inputs_then, h));
+        assert_eq!(a, b, "{inputs_then:?} {h}");
+        assert_eq!(plant.state().to_words(), fresh.state().to_words(), "{inputs_then:?} {h}");
+        assert_eq!(plant.stopped(), fresh.stopped(), "{inputs_then:?} {h}");
+    }
+    // The end may be off by what its computation rounds.
+    let mut plant = Plant::new(&p, &inputs, 0.0, 1e-8).unwrap();
+    let mut whole = plant.clone();
+    whole.step(&inputs, 0.1).unwrap();
+    plant.step_to_event(&inputs, 0.1).unwrap();
+    let off = 2.0 * f64::EPSILON * 0.1;
+    while plant.time() < 0.1 - 1e-9 {
+        plant.step_to_event(&inputs, 0.1 - plant.time() + off).unwrap();
+    }
+    assert_eq!(plant.state().to_words(), whole.state().to_words());
+}
+
+/// Finite, and stopped within the step.
+#[test]
+fn words_that_are_no_stopped_step_are_refused() {
+    let mut p = bench(SloshModel::Linear, FrictionModel::Viscous);
+    p.imu.enabled = true;
+    let inputs = torque(0.01);
+    let mut plant = Plant::new(&p, &inputs, 0.0, 1e-8).unwrap();
+    plant.step_to_event(&inputs, 0.1).unwrap();
+    let words = plant.stopped().unwrap().to_words();
+    let first = words.len() - 6 - STATES;
+    let with = |n: usize, x: f64| {
+        let mut words = words;
+        words[first + n] = x.to_bits();
+        StoppedStep::from_words(&words)
+    };
+    assert!(with(0, 0.1).is_some() && with(1, 0.0).is_some());
+    // the length, and how far it has come
+    let bad = [(0, 0.01), (0, f64::INFINITY), (0, f64::NAN), (1, 0.1), (1, -1e-9), (1, f64::NAN)];
+    assert!(bad.iter().all(|(n, x)| with(*n, *x).is_none()));
+    // each of the others
+    for n in 2..6 + STATES {
+        assert!(with(n, f64::NAN).is_none() && with(n, f64::INFINITY).is_none(), "{n}");
+        assert!(with(n, 0.25).is_some(), "{n}");
+    }
+    let mut none = words;
+    none[..first].fill(u64::MAX);
+    assert!(StoppedStep::from_words(&none).is_none(), "its start is no state");
+}
+
+/// On an error the plant is where it was, and so is the step that has stopped.
+#[test]
+fn a_step_that_fails_leaves_the_stopped_one() {
+    let mut p = bench(SloshModel::Linear, FrictionModel::Viscous);
+    (p.imu.enabled, p.solver.max_steps) = (true, 20);
+    let inputs = torque(0.01);
+    let mut plant = Plant::new(&p, &inputs, 0.0, 1e-8).unwrap();
+    plant.step_to_event(&inputs, 0.1).unwrap();
+    let (state, stopped) = (plant.state().to_words(), plant.stopped().copied());
+    assert!(plant.step_to_event(&inputs, 100.0).is_ok_and(|end| matches!(end, StepEnd::Event(_))));
+    let mut plant = Plant::resume(&p, plant.state(), 1e-8);
+    let before = plant.state().to_words();
+    assert!(plant.step(&inputs, 100.0).is_err());
+    assert_eq!(plant.state().to_words(), before);
+    assert!(stopped.is_some() && state != before);
+    p.solver.max_steps = 1;
+    let mut tired = Plant::resume(&p, plant.state(), 1e-8);
+    tired.set_stopped(stopped);
+    assert!(tired.step_to_event(&inputs, 0.5).is_err());
+    assert_eq!((tired.state().to_words(), tired.stopped().copied()), (before, stopped));
 }

@@ -100,6 +100,23 @@ fn a_small_motion_takes_no_more_steps_than_a_large_one() {
     }
 }
 
+/// On a hub too heavy to move: in full swing the rate is what errors are compared with, where the liquid turns what the angle
+/// will make of it.
+#[test]
+fn liquid_that_turns_takes_no_more_steps_than_liquid_in_full_swing() {
+    for slosh in SloshModel::ALL {
+        let mut p = bench(slosh, FrictionModel::None);
+        p.hub.inertia = 1e9;
+        let of_start = |angle: f64, rate: f64| {
+            let mut p = p;
+            (p.init.slosh_angle, p.init.slosh_rate) = (angle, rate);
+            steps(&p, &Inputs::default(), 1e-10, 0.1)
+        };
+        let [turning, swinging] = [of_start(0.01, 0.0), of_start(0.0, 0.15)];
+        assert!(turning <= swinging + 1, "{slosh:?}: {turning} {swinging}");
+    }
+}
+
 /// Stribeck's excess is 1e-30 and less at eight times its speed: a long step from there to rest must not miss it.
 #[test]
 fn a_long_step_from_a_fast_hub_to_rest_meets_short_ones() {

@@ -42,6 +42,17 @@ fn a_line_without_stiffness_and_damping_changes_no_bit() {
     }
 }
 
+/// k (theta - theta_0)^2/2 = 0.25 (0.1)^2 J beside I w^2/2, and -k (theta - theta_0) - c w = -0.05 - 0.02 N m.
+#[test]
+fn the_line_s_torque_and_energy_are_those_of_its_twist() {
+    let mut p = frozen(FrictionModel::None);
+    (p.hub.c, p.init.omega) = (0.1, 0.2);
+    let outputs = plant(&p).outputs(&Inputs::default());
+    assert!((outputs.tau_suspension + 0.07).abs() < 1e-16, "{}", outputs.tau_suspension);
+    let kinetic = 0.5 * inertia(&p) * 0.04;
+    assert!((outputs.energy - kinetic - 0.0025).abs() < 1e-15, "{} {kinetic}", outputs.energy);
+}
+
 /// I theta'' = -k (theta - theta_0) - c theta'.
 #[test]
 fn a_rigid_hub_swings_and_decays_as_a_torsion_pendulum() {

@@ -4,7 +4,9 @@
 use super::*;
 use crate::call::{Events, InstanceState};
 use crate::instance::{EventInfo, StepInfo};
+use crate::table::Layout;
 use crate::v3::{ENTER_STEP, Fmi3, GET_BOOLEAN, GET_FLOAT64, GET_INT32, GET_INT64, SET_FLOAT64};
+use crate::version::Version;
 
 type Host = Instance<Vessels, Fmi3>;
 
@@ -106,4 +108,31 @@ fn time_may_go_back_to_the_last_event_but_for_rounding_errors() {
             "{why}"
         );
     }
+}
+
+/// In FMI 3.0 the host may go on after both: a value out of its range, and a state that is none.
+#[test]
+fn values_out_of_range_are_discarded_and_say_what_is_allowed() {
+    let mut host = stepping(Events::Reported, 0.0, &[]);
+    let said = discarded(host.set(&SET_FLOAT64, &[number("q[2]")], |_| Value::Real(11.0)));
+    assert!(said.contains("q[2] = 11.0"), "{said}");
+    let mut host = Host::new(ME);
+    host.enter_initialization_mode().unwrap();
+    host.exit_initialization_mode().unwrap();
+    for (x, text) in [(1e100, "1e100"), (f64::NAN, "NaN"), (f64::NEG_INFINITY, "-inf")] {
+        let said = discarded(host.set(&SET_FLOAT64, &[number("level[2]")], |_| Value::Real(x)));
+        let expected = format!("level[2] = {text} (allowed: magnitudes below 1e100)");
+        assert!(said.contains(&expected), "{said}");
+    }
+    host.set(&SET_FLOAT64, &[number("level[2]")], |_| Value::Real(-9.9e99)).unwrap();
+}
+
+#[test]
+fn events_are_handled_as_the_interface_says_or_told_in_co_simulation() {
+    let allowed = |interface| Events::ALL.map(|events| Fmi3::allows(interface, events));
+    assert_eq!(allowed(CS), [true, false, true]);
+    assert_eq!(allowed(ME), [false, true, false]);
+    let tokens = Layout::ALL.map(Fmi3::token::<Vessels>);
+    assert_eq!(tokens, Layout::ALL.map(|layout| TABLE.token(layout)));
+    assert_ne!(tokens[0], tokens[1]);
 }

@@ -3,7 +3,7 @@
 use super::*;
 use crate::table::{About, Layout, Scalar, Table, scalar_count, scalars};
 use crate::unit::{self, UNITS};
-use crate::variable::{Enumeration, Item, Quantity, Variable};
+use crate::variable::{Dimension, Enumeration, Item, Quantity, Variable};
 
 fn names<'a>(of: impl IntoIterator<Item = &'a Scalar<Vessels>>) -> Vec<String> {
     of.into_iter().map(Scalar::name).collect()
@@ -238,4 +238,20 @@ fn inputs_that_do_not_stand_together_are_refused() {
     const N: usize = 4 + 1;
     assert_eq!(scalar_count(apart), N);
     Table::new(TABLE.about, apart, scalars::<Vessels, N>(apart).to_vec().leak());
+}
+
+/// What sizes an array is told in the description with arrays alone.
+#[test]
+fn token_with_arrays_changes_with_what_sizes_them() {
+    let tokens = |shape: &'static [Dimension]| {
+        let mut variables = TABLE.variables.to_vec();
+        variables[0] = variables[0].shape(shape);
+        let table = Table::new(TABLE.about, variables.leak(), &[]);
+        Layout::ALL.map(|layout| table.token(layout).to_string())
+    };
+    let fixed = tokens(&[Dimension::Fixed(2)]);
+    let sized = tokens(&[Dimension::Sized("gauges", 2)]);
+    assert_eq!(fixed[0], sized[0]);
+    assert_ne!(fixed[1], sized[1]);
+    assert_ne!(fixed[0], fixed[1]);
 }

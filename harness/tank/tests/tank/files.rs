@@ -575,3 +575,89 @@ fn the_table_has_the_damping_of_every_mode_with_its_frequency_in_hertz() {
     }
     assert_eq!(rows.matches("n along y").count(), 1, "{rows}");
 }
+
+/// Each dimension at its limit, which is not allowed, by itself, and a little above.
+#[test]
+fn every_dimension_of_a_shape_has_its_limit_and_is_named() {
+    let dome = |bottom: f64, top: f64| {
+        format!(
+            "domed_cylinder = {{ radius = 1.0, height = 0.5, bottom = {bottom:?}, top = {top:?} }}"
+        )
+    };
+    let dish = |crown: f64, knuckle: f64| {
+        let ends = format!("crown_radius = {crown:?}, knuckle_radius = {knuckle:?}");
+        format!("torispherical = {{ radius = 1.0, height = 0.5, {ends} }}")
+    };
+    let shape = |name: &str, dimensions: &[(&str, f64)]| {
+        let all: Vec<_> = dimensions.iter().map(|(name, x)| format!("{name} = {x:?}")).collect();
+        format!("{name} = {{ {} }}", all.join(", "))
+    };
+    type Case<'a> = (&'a str, f64, &'a dyn Fn(f64) -> String);
+    let cases: [Case; 18] = [
+        ("radius", 0.0, &|x| shape("cylinder", &[("radius", x), ("height", 1.0)])),
+        ("height", 0.0, &|x| shape("cylinder", &[("radius", 1.0), ("height", x)])),
+        ("radius", 0.0, &|x| shape("sphere", &[("radius", x)])),
+        ("radius", 0.0, &|x| shape("spheroid", &[("radius", x), ("half_height", 1.0)])),
+        ("half_height", 0.0, &|x| shape("spheroid", &[("radius", 1.0), ("half_height", x)])),
+        ("half_angle", 0.0, &|x| shape("cone", &[("half_angle", 300.0 * x), ("height", 1.0)])),
+        ("90 - half_angle", 0.0, &|x| {
+            shape("cone", &[("half_angle", 90.0 - 300.0 * x), ("height", 1.0)])
+        }),
+        ("height", 0.0, &|x| shape("cone", &[("half_angle", 30.0), ("height", x)])),
+        ("bottom", -0.5, &|x| dome(x, 0.5)),
+        ("top", -f64::MIN_POSITIVE, &|x| dome(0.0, x)),
+        ("crown_radius", 1.0, &|x| dish(x, 0.1)),
+        ("knuckle_radius", 0.0, &|x| dish(1.5, x)),
+        ("radius - knuckle_radius", 0.0, &|x| dish(1.5, 1.0 - x)),
+        ("inner_radius", 0.0, &|x| {
+            shape("annulus", &[("inner_radius", x), ("outer_radius", 1.0), ("height", 1.0)])
+        }),
+        ("outer_radius", 0.4, &|x| {
+            shape("annulus", &[("inner_radius", 0.4), ("outer_radius", x), ("height", 1.0)])
+        }),
+        ("height", 0.0, &|x| {
+            shape("annulus", &[("inner_radius", 0.4), ("outer_radius", 1.0), ("height", x)])
+        }),
+        ("tube_radius", 0.0, &|x| shape("torus", &[("ring_radius", 1.0), ("tube_radius", x)])),
+        ("ring_radius", 0.4, &|x| shape("torus", &[("ring_radius", x), ("tube_radius", 0.4)])),
+    ];
+    for (name, limit, with) in cases {
+        let said = problems(&format!("shape = {{ {} }}", with(limit)));
+        let words = format!("shape: {name} is {limit}; it must be a number above {limit}.");
+        assert!(said.contains(&words), "{said}\n{words}");
+        assert_eq!(said.lines().count(), 1, "{said}");
+        tank(&format!("density = 1.0\nshape = {{ {} }}", with(limit + 0.01)));
+    }
+}
+
+/// Closed form or solved, along either axis of a box.
+#[test]
+fn modes_are_numbered_from_1() {
+    for text in [
+        "shape = { cylinder = { radius = 1.0, height = 1.0 } }",
+        "shape = { annulus = { inner_radius = 0.3, outer_radius = 1.0, height = 2.0 } }",
+        "shape = { sphere = { radius = 1.0 } }",
+        "box = [1.0, 2.0]",
+    ] {
+        let data = solve(text, 0.7, 3);
+        let numbers = |modes: &[hubslosh_tank::Mode]| modes.iter().map(|m| m.n).collect::<Vec<_>>();
+        assert_eq!(numbers(&data.modes), [1, 2, 3], "{text}");
+        for axis in data.axes.iter().flat_map(|axes| [&axes.x, &axes.y]) {
+            assert_eq!(numbers(&axis.modes), [1, 2, 3], "{text}");
+        }
+        let rest: Vec<_> = data.rest.iter().map(|rest| rest.modes).collect();
+        assert_eq!(rest, [1, 2, 3], "{text}");
+    }
+}
+
+#[test]
+fn a_table_at_0_gravity_says_that_frequencies_are_0_where_there_are_any() {
+    let sphere = tank("density = 1000.0\nshape = { sphere = { radius = 1.0 } }");
+    let said = |fill: f64, gravity: f64| {
+        let text = table(&sphere.solve(fill, 1).unwrap(), gravity);
+        (text.contains("only capillarity brings the liquid back"), text.contains("does not slosh"))
+    };
+    assert_eq!(said(1.0, 0.0), (true, false));
+    assert_eq!(said(1.0, 9.81), (false, false));
+    assert_eq!(said(2.0, 0.0), (false, true));
+}
