@@ -2572,6 +2572,39 @@ mod tests {
         assert!(said.contains("##1 %s;"), "{said}");
     }
 
+    #[test]
+    fn the_version_is_3_0() {
+        assert_eq!(unsafe { text(fmi3GetVersion()) }, Some("3.0".into()));
+    }
+
+    #[test]
+    fn a_derivative_has_a_number_for_each_of_its_variables() {
+        for (seed, sensitivity, said) in
+            [(2, 2, "nSeed = 2 (allowed: 1)"), (1, 1, "nSensitivity = 1 (allowed: 2)")]
+        {
+            let (instance, host) = stepping(false);
+            let (unknowns, known) = (["a", "der(v)"].map(reference), reference("F"));
+            let (numbers, mut room) = ([1.0; 2], [7.0; 2]);
+            let status = unsafe {
+                fmi3GetDirectionalDerivative::<Spring>(
+                    instance,
+                    unknowns.as_ptr(),
+                    2,
+                    &known,
+                    1,
+                    numbers.as_ptr(),
+                    seed,
+                    room.as_mut_ptr(),
+                    sensitivity,
+                )
+            };
+            unsafe { fmi3FreeInstance::<Spring>(instance) };
+            assert_eq!((status, room), (fmi3Error, [7.0; 2]));
+            let lines = &host.lock().unwrap().lines;
+            assert!(lines[0].2.contains(said), "{lines:?}");
+        }
+    }
+
     /// w.(J v) = (J^T w).v: both sum the same products, in another order.
     #[test]
     fn adjoint_derivatives_are_the_transposed_directional_ones() {

@@ -125,6 +125,37 @@ fn values_out_of_range_are_discarded_and_say_what_is_allowed() {
         assert!(said.contains(&expected), "{said}");
     }
     host.set(&SET_FLOAT64, &[number("level[2]")], |_| Value::Real(-9.9e99)).unwrap();
+    // a state alone is set as one
+    let said = discarded(host.set(&SET_FLOAT64, &[number("q[2]")], |_| Value::Real(11.0)));
+    assert!(said.contains("q[2] = 11.0"), "{said}");
+    let start = number("start.level[1]");
+    assert!(
+        refused(host.set(&SET_FLOAT64, &[start], |_| Value::Real(2.0))).contains("start.level[1]")
+    );
+    let mut two = continuous(&[]);
+    assert!(refused(set(&mut two, "level[2]", 1.0)).contains("level[2]"));
+}
+
+/// A step that a shorter one may replace, a million internal ones; one that nothing replaces, a vessel that overflows. In
+/// FMI 2.0, where an error ends the simulation, both do.
+#[test]
+fn a_step_is_discarded_where_a_shorter_one_may_succeed() {
+    let too_long = |discards: bool, done: Result<(), Fault>| {
+        let said = if discards { discarded(done) } else { refused(done) };
+        assert!(said.contains("more than 1e6 internal steps"), "{said}");
+    };
+    let mut three = Instance::<Spring, Fmi3>::new(CS);
+    three.enter_initialization_mode().unwrap();
+    three.exit_initialization_mode().unwrap();
+    too_long(true, three.do_step(0.0, 1001.0));
+    assert_eq!(three.do_step(0.0, 1.0), Ok(()));
+    let mut two = spring(CS);
+    too_long(false, two.do_step(0.0, 1001.0));
+    assert_eq!(two.state(), InstanceState::Failed);
+    let mut host =
+        stepping(Events::InStep, 0.0, &[("start.level[1]", 79.0), ("q[1]", 10.0), ("leak", 1e-3)]);
+    assert!(refused(host.do_step(0.0, 1.0)).contains("a vessel overflows"));
+    assert_eq!(host.state(), InstanceState::Failed);
 }
 
 #[test]
