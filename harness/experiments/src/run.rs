@@ -140,7 +140,7 @@ pub fn parameters(
     driven: &[String],
 ) -> BTreeMap<String, String> {
     let settable = description.variables.iter().filter(|variable| {
-        ["parameter", "input"].contains(&variable.causality.as_str())
+        ["parameter", "structuralParameter", "input"].contains(&variable.causality.as_str())
             && !driven.contains(&variable.name)
     });
     settable
@@ -250,7 +250,7 @@ impl Run {
                 "input" if self.driven().iter().any(|(driven, _)| driven == name) => {
                     bail!("{name} comes from the profile or the file")
                 }
-                "parameter" | "input" => instance.set(name, value)?,
+                "parameter" | "structuralParameter" | "input" => instance.set(name, value)?,
                 other => bail!(
                     "{name} cannot be set: it is of causality {other}, not a parameter or an input"
                 ),

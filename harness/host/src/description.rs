@@ -53,6 +53,8 @@ pub struct Array {
     pub c_type: CType,
     /// Their start values, as written: none, one for all, or one for each.
     pub start: Vec<String>,
+    /// It has start values, but of another size.
+    pub(crate) is_resized: bool,
 }
 
 /// Where an element of an array is.
@@ -256,6 +258,18 @@ pub enum Value {
     String(String),
 }
 
+impl Value {
+    /// As a description writes it.
+    fn text(&self) -> String {
+        match self {
+            Value::Real(x) => x.to_string(),
+            Value::Integer(n) => n.to_string(),
+            Value::Boolean(yes) => yes.to_string(),
+            Value::String(text) => text.clone(),
+        }
+    }
+}
+
 impl Variable {
     /// Its type.
     pub fn kind(&self) -> Type {
@@ -265,6 +279,11 @@ impl Variable {
     /// In which type calls exchange it.
     pub fn c_type(&self) -> CType {
         self.c_type
+    }
+
+    /// Whether arrays may be sized by it: of FMI 3.0, set in configuration mode alone.
+    pub fn is_structural(&self) -> bool {
+        self.causality == "structuralParameter"
     }
 
     /// Start, unit, bounds.
@@ -400,11 +419,23 @@ impl Reader {
         }
     }
 
-    /// A variable of FMI 3.0 and its aliases; all its elements if it is an array.
-    fn variables3(&mut self, root: &Element, to: &mut ModelDescription) {
+    /// A variable of FMI 3.0 and its aliases; all its elements if it is an array. Structural parameters that are `set`, by
+    /// their references, have other values than those that are written.
+    fn variables3(
+        &mut self,
+        root: &Element,
+        set: &BTreeMap<u32, Value>,
+        to: &mut ModelDescription,
+    ) {
+        let set: BTreeMap<String, String> =
+            set.iter().map(|(reference, value)| (reference.to_string(), value.text())).collect();
+        let value = |e: &Element, reference: &str| -> Option<u64> {
+            set.get(reference).map(String::as_str).or(e.get("start"))?.trim().parse().ok()
+        };
         let sizes: BTreeMap<&str, u64> = root
             .list("ModelVariables")
-            .filter_map(|e| Some((e.get("valueReference")?, e.get("start")?.trim().parse().ok()?)))
+            .filter_map(|e| Some((e.get("valueReference")?, e)))
+            .filter_map(|(reference, e)| Some((reference, value(e, reference)?)))
             .collect();
         let references = root.list("ModelVariables").filter_map(|e| e.get("valueReference"));
         let references = references.filter_map(|r| r.trim().parse::<u32>().ok());
@@ -414,7 +445,10 @@ impl Reader {
                 self.problem(element, "there is no such type");
                 continue;
             };
-            let (variable, starts) = self.variable3(element, c_type, kind);
+            let (mut variable, starts) = self.variable3(element, c_type, kind);
+            if let Some(value) = set.get(&variable.reference.to_string()) {
+                variable.attributes.start = Some(value.clone());
+            }
             let dimensions = self.dimensions(element, &sizes);
             if dimensions.is_empty() {
                 let aliases = self.aliases(element, &variable);
@@ -422,6 +456,10 @@ impl Reader {
                 to.variables.extend(aliases);
                 continue;
             }
+            let is_resized = element.children.iter().any(|child| {
+                child.name == "Dimension"
+                    && child.get("valueReference").is_some_and(|r| set.contains_key(r))
+            });
             let length = dimensions.iter().try_fold(1usize, |n, size| n.checked_mul(*size));
             let Some(length) = length.filter(|n| to.elements.len() + n <= MOST_ELEMENTS) else {
                 self.problem(
@@ -439,11 +477,15 @@ impl Reader {
                 let mut one = variable.clone();
                 one.name = format!("{}[{}]", variable.name, indices(index, &dimensions));
                 one.reference = own;
-                one.attributes.start = starts.get(index).or(starts.first()).cloned();
+                let start = starts.get(index).or(starts.first());
+                one.attributes.start = start.filter(|_| !is_resized).cloned();
                 to.elements.insert(own, ArrayElement { array: variable.reference, index });
                 to.variables.push(one);
             }
-            to.arrays.insert(variable.reference, Array { length, c_type, start: starts });
+            let is_resized = is_resized && !starts.is_empty();
+            let start = if is_resized { Vec::new() } else { starts };
+            let array = Array { length, c_type, start, is_resized };
+            to.arrays.insert(variable.reference, array);
         }
     }
 
@@ -598,11 +640,36 @@ impl ModelDescription {
         self.arrays.get(&reference)
     }
 
+    /// The arrays with their value references.
+    pub(crate) fn arrays(&self) -> impl Iterator<Item = (u32, &Array)> {
+        self.arrays.iter().map(|(reference, array)| (*reference, array))
+    }
+
+    /// Start values of an array, one for each element.
+    pub(crate) fn set_starts(&mut self, array: u32, values: &[Value]) {
+        let texts: Vec<String> = values.iter().map(Value::text).collect();
+        for variable in &mut self.variables {
+            let element = self.elements.get(&variable.reference);
+            if let Some(element) = element.filter(|element| element.array == array) {
+                variable.attributes.start = texts.get(element.index).cloned();
+            }
+        }
+        if let Some(array) = self.arrays.get_mut(&array) {
+            (array.start, array.is_resized) = (texts, false);
+        }
+    }
+
     /// Reads the XML text.
     ///
     /// # Errors
     /// If it is not well-formed, of FMI 1, or without what a host needs; what is missing is named.
     pub fn from_xml(text: &str) -> Result<Self> {
+        ModelDescription::from_xml_with(text, &BTreeMap::new())
+    }
+
+    /// The same, where structural parameters have these values, by their references: arrays have the sizes that follow. The
+    /// start values of those that are longer or shorter than declared mean nothing (FMI 3.0.2, section 2.4.7.2).
+    pub(crate) fn from_xml_with(text: &str, set: &BTreeMap<u32, Value>) -> Result<Self> {
         let root = Element::parse(text.as_bytes())
             .map_err(|why| anyhow!("modelDescription.xml, line and column {why}"))?;
         // what other versions have is not missing here
@@ -649,7 +716,7 @@ impl ModelDescription {
             elements: BTreeMap::new(),
         };
         if is_fmi3 {
-            reader.variables3(&root, &mut description);
+            reader.variables3(&root, set, &mut description);
         } else {
             let variables = root.list("ModelVariables").map(|e| reader.variable(e));
             description.variables = variables.collect();
@@ -884,6 +951,22 @@ mod tests {
         assert!(!d.variables.iter().any(|v| v.name != "a[3,2]" && v.reference == last.reference));
         assert_eq!(d.array(2).unwrap().length, 6);
         assert_eq!((d.unit(last), last.intermediate), ("rad", true));
+    }
+
+    #[test]
+    fn arrays_have_the_size_that_a_structural_parameter_is_set_to_and_no_start_values_then() {
+        let set = BTreeMap::from([(7, Value::Integer(3))]);
+        let mut d = ModelDescription::from_xml_with(XML3, &set).unwrap();
+        assert_eq!(d.variable("n").unwrap().attributes().start.as_deref(), Some("3"));
+        let last = d.variable("a[3,3]").unwrap();
+        assert_eq!(d.element(last.reference), Some(ArrayElement { array: 2, index: 8 }));
+        assert_eq!(d.array(2).unwrap().length, 9);
+        assert_eq!(last.attributes().start, None, "those that are declared mean nothing now");
+        let values: Vec<_> = (0..9).map(|n| Value::Real(f64::from(n) / 8.0)).collect();
+        d.set_starts(2, &values);
+        let start = |name: &str| d.variable(name).unwrap().attributes().start.clone();
+        assert_eq!((start("a[1,2]"), start("a[3,3]")), (Some("0.125".into()), Some("1".into())));
+        assert_eq!(start("y"), None);
     }
 
     #[test]

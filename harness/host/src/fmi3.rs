@@ -9,6 +9,7 @@ use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 use std::ptr::{null, null_mut};
+use std::slice;
 
 use anyhow::{Context, Result, bail};
 use libloading::Library;
@@ -336,6 +337,8 @@ pub struct Fmu {
     is_plain: bool,
     /// References of those that are, in order.
     plain: Vec<u32>,
+    /// Structural parameters that every instance of [`Fmu::instantiate`] begins with, by reference.
+    structural: BTreeMap<u32, Value>,
     // dropped in this order: first the code, then the files
     library: Option<Library>,
     _directory: Option<temporary::Folder>,
@@ -409,16 +412,11 @@ impl Fmu {
         let resources = resources
             .is_dir()
             .then(|| format!("{}{}", resources.display(), std::path::MAIN_SEPARATOR));
-        let reals = description.variables.iter().filter(|v| v.kind() == Type::Real);
-        let (plain, others): (Vec<&Variable>, Vec<&Variable>) = reals.partition(|v| {
-            v.c_type() == CType::Float64 && description.element(v.reference).is_none()
-        });
-        let is_plain = others.is_empty();
-        let mut plain: Vec<u32> = plain.iter().map(|v| v.reference).collect();
-        plain.sort_unstable();
+        let (is_plain, plain) = plain(&description);
         Ok(Fmu {
             is_plain,
             plain,
+            structural: BTreeMap::new(),
             description,
             functions,
             stepping,
@@ -437,6 +435,39 @@ impl Fmu {
     pub(crate) fn keep(&mut self, hash: String, directory: temporary::Folder) {
         self.hash = hash;
         self._directory = Some(directory);
+    }
+
+    /// Gives structural parameters other values than those that they start with: every instance of [`Fmu::instantiate`] sets
+    /// them first, in configuration mode, and [`Fmu::description`] has the sizes that follow. Of arrays whose size has changed
+    /// it has the start values that the FMU tells then. `text` is modelDescription.xml.
+    ///
+    /// # Errors
+    /// If the FMU refuses one.
+    pub(crate) fn configure(&mut self, text: &str, settings: &[(&str, &str)]) -> Result<()> {
+        for (name, value) in settings {
+            let variable = self.description.variable(name)?;
+            let value = self.description.value(variable, value)?;
+            let start = variable.attributes().start.as_deref().unwrap_or_default();
+            // as declared: nothing is to be done
+            match self.description.value(variable, start).is_ok_and(|start| start == value) {
+                true => self.structural.remove(&variable.reference),
+                false => self.structural.insert(variable.reference, value),
+            };
+        }
+        // first: what is too large for the FMU may be too large for a description
+        let mut instance = self.instantiate("sizes")?;
+        let mut description = ModelDescription::from_xml_with(text, &self.structural)?;
+        let mut starts = Vec::new();
+        for (reference, array) in description.arrays().filter(|(_, array)| array.is_resized) {
+            starts.push((reference, instance.values(array.c_type, reference, array.length)?));
+        }
+        drop(instance);
+        for (array, values) in starts {
+            description.set_starts(array, &values);
+        }
+        (self.is_plain, self.plain) = plain(&description);
+        self.description = description;
+        Ok(())
     }
 
     /// What the FMU says of itself.
@@ -515,9 +546,20 @@ impl Fmu {
         }
     }
 
-    /// A new co-simulation instance with logging on.
+    /// A new co-simulation instance with logging on, in the sizes of the description.
     pub fn instantiate(&self, name: &str) -> Called<Instance<'_>> {
-        self.instantiate_with(&self.instantiation(name))
+        let mut instance = self.instantiate_with(&self.instantiation(name))?;
+        if !self.structural.is_empty() {
+            instance.enter_configuration_mode()?;
+            for (reference, value) in &self.structural {
+                let of = |v: &&Variable| v.is_structural() && v.reference == *reference;
+                if let Some(variable) = self.description.variables.iter().find(of) {
+                    instance.set_values(variable.c_type(), *reference, slice::from_ref(value))?;
+                }
+            }
+            instance.exit_configuration_mode()?;
+        }
+        Ok(instance)
     }
 
     /// Makes an instance with exactly these arguments.
@@ -595,6 +637,16 @@ impl Fmu {
         // SAFETY: the standard allows NULL here (section 2.3.1).
         unsafe { (self.functions.free_instance)(null_mut()) }
     }
+}
+
+/// Whether all Reals are Float64 and scalar, and the references of those that are, in order.
+fn plain(description: &ModelDescription) -> (bool, Vec<u32>) {
+    let reals = description.variables.iter().filter(|v| v.kind() == Type::Real);
+    let (plain, others): (Vec<&Variable>, Vec<&Variable>) = reals
+        .partition(|v| v.c_type() == CType::Float64 && description.element(v.reference).is_none());
+    let mut plain: Vec<u32> = plain.iter().map(|v| v.reference).collect();
+    plain.sort_unstable();
+    (others.is_empty(), plain)
 }
 
 /// Somebody who hears of no point within a step: gives a NULL pointer its type.

@@ -5,13 +5,14 @@
 //! in straight lines through a step are told by their derivatives in FMI 2.0; in FMI 3.0 they are set in intermediate
 //! update, where the FMU provides it.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail};
 
 use crate::archive::Archive;
 use crate::c_abi::{CallError, Called, Message, Status};
-use crate::description::{ModelDescription, Type, Value, Variable};
+use crate::description::{CType, ModelDescription, Type, Value, Variable};
 use crate::temporary;
 use crate::{fmi2, fmi3};
 
@@ -42,6 +43,15 @@ pub enum State {
 impl Fmu {
     /// Opens a packed FMU and loads the binary for this platform.
     pub fn open(path: impl AsRef<Path>) -> Result<Self> {
+        Fmu::open_with(path, &[])
+    }
+
+    /// The same; of the settings it takes those that are structural parameters of FMI 3.0, which say how long arrays are. Every
+    /// instance sets them before anything else, and the description has the elements that there are then.
+    ///
+    /// # Errors
+    /// Also if the FMU refuses such a parameter.
+    pub fn open_with(path: impl AsRef<Path>, settings: &[(String, String)]) -> Result<Self> {
         let path = path.as_ref();
         let name = path.display();
         let archive = Archive::open(path)?;
@@ -59,6 +69,20 @@ impl Fmu {
         let mut fmu = fmi3::Fmu::load(directory.path(), path)?;
         let hash = archive.hash().with_context(|| format!("{name} cannot be read"))?;
         fmu.keep(hash, directory);
+        let structural: Vec<&str> = description
+            .variables
+            .iter()
+            .filter(|v| v.is_structural())
+            .map(|v| v.name.as_str())
+            .collect();
+        let settings: Vec<(&str, &str)> = settings
+            .iter()
+            .map(|(name, value)| (name.as_str(), value.as_str()))
+            .filter(|(name, _)| structural.contains(name))
+            .collect();
+        if !settings.is_empty() {
+            fmu.configure(&text, &settings)?;
+        }
         Ok(Fmu::V3(fmu))
     }
 
@@ -231,24 +255,20 @@ impl<'fmu> Instance<'fmu> {
                 instance.do_step(time, step)
             }
             Instance::V3(instance, _) => {
-                // those that the FMU takes within a step
-                let variables = &instance.fmu().description().variables;
-                let takes = |r: &u32| variables.iter().any(|v| v.reference == *r && v.intermediate);
-                let moving: Vec<usize> =
-                    (0..references.len()).filter(|i| takes(&references[*i])).collect();
-                let references: Vec<u32> = moving.iter().map(|i| references[*i]).collect();
-                let mut at = vec![0.0; moving.len()];
+                let mut line = Line::of(instance, references, values)?;
                 let mut refused = Status::Ok;
                 let done = whole(instance, time, step, |instance, from, h| {
                     instance.do_step_hearing(
                         from,
                         h,
                         Some(&mut |update: &fmi3::Update| {
-                            if update.set_requested && !moving.is_empty() {
-                                for (x, i) in at.iter_mut().zip(&moving) {
-                                    *x = values[*i] + slopes[*i] * (update.time - time);
+                            if update.set_requested && !line.moving.is_empty() {
+                                for (place, i) in &line.moving {
+                                    line.values[*place] =
+                                        values[*i] + slopes[*i] * (update.time - time);
                                 }
-                                refused = refused.max(update.set(&references, &at));
+                                let set = update.set(&line.references, &line.values);
+                                refused = refused.max(set);
                             }
                             None
                         }),
@@ -339,19 +359,67 @@ impl<'fmu> Instance<'fmu> {
     /// Sets a variable from text: a number, `true`/`false`, or an enumeration's value by name or number.
     ///
     /// # Errors
-    /// If the text is not of its type, or the FMU refuses it. A structural parameter of FMI 3.0 that arrays are sized by
-    /// keeps its start value here.
+    /// If the text is not of its type, or the FMU refuses it. A structural parameter of FMI 3.0 keeps the value that it has since
+    /// [`Fmu::open_with`].
     pub fn set(&mut self, name: &str, text: &str) -> Result<()> {
         let description = self.fmu().description();
         let variable = description.variable(name)?;
         let value = description.value(variable, text)?;
-        if variable.causality == "structuralParameter" {
+        if variable.is_structural() {
+            let now = variable.attributes().start.as_deref().unwrap_or_default();
+            if description.value(variable, now).is_ok_and(|now| now == value) {
+                return Ok(());
+            }
             bail!(
-                "{name} cannot be set: it is a structural parameter, and this host takes arrays in the \
-                 size that the FMU declares"
+                "{name} cannot be set to {text}: it is a structural parameter, by which arrays have their size, and that is \
+                 {now} for all that is done with the FMU here (`hubslosh run` and `step-cost` set it)"
             );
         }
         self.set_value(variable, value).with_context(|| format!("{name}={text} was refused"))
+    }
+}
+
+/// What an FMU 3.0 is told within a step, in its own value references: of an array all elements.
+#[derive(Default)]
+struct Line {
+    references: Vec<u32>,
+    values: Vec<f64>,
+    /// Places among the values that move, each with the place of its input among those that were asked for.
+    moving: Vec<(usize, usize)>,
+}
+
+impl Line {
+    /// Of these inputs, at `values` now, those that the FMU takes within a step.
+    fn of(instance: &mut fmi3::Instance, references: &[u32], values: &[f64]) -> Called<Line> {
+        let description = instance.fmu().description();
+        let mut line = Line::default();
+        let mut begins = BTreeMap::new();
+        for (i, reference) in references.iter().enumerate() {
+            let is_taken = |v: &Variable| v.intermediate && v.c_type() == CType::Float64;
+            if !description.variables.iter().any(|v| v.reference == *reference && is_taken(v)) {
+                continue;
+            }
+            let Some(element) = description.element(*reference) else {
+                line.moving.push((line.values.len(), i));
+                line.references.push(*reference);
+                line.values.push(values[i]);
+                continue;
+            };
+            let begin = match begins.get(&element.array) {
+                Some(begin) => *begin,
+                None => {
+                    let length = description.array(element.array).map_or(0, |array| array.length);
+                    let begin = line.values.len();
+                    line.values.resize(begin + length, 0.0);
+                    instance.fetch(&[element.array], &mut line.values[begin..])?;
+                    line.references.push(element.array);
+                    begins.insert(element.array, begin);
+                    begin
+                }
+            };
+            line.moving.push((begin + element.index, i));
+        }
+        Ok(line)
     }
 }
 

@@ -37,8 +37,13 @@ pub const DEFAULT_CAMPAIGN: &str = "dist/campaign";
 
 /// Opens the FMU that `--fmu` names, and says what that has changed.
 pub fn open(name: &Path) -> Result<Fmu> {
+    open_with(name, &[])
+}
+
+/// The same; arrays of FMI 3.0 have the sizes that structural parameters among the settings give them.
+pub fn open_with(name: &Path, settings: &[(String, String)]) -> Result<Fmu> {
     let path = crate::fmu::find(name)?;
-    let fmu = Fmu::open(&path)?;
+    let fmu = Fmu::open_with(&path, settings)?;
     for what in fmu.changed() {
         terminal::warn(format_args!(
             "loading {} has changed this process's {what}",

@@ -12,7 +12,7 @@ use host::description::ModelDescription;
 use host::guard;
 use report::view;
 
-use super::{DEFAULT_FMU, check_out, open, setting, write_out};
+use super::{DEFAULT_FMU, check_out, open_with, setting, write_out};
 use crate::{progress, set_file, terminal};
 
 /// Simulates one run: a torque history in, signals out.
@@ -39,7 +39,7 @@ pub struct RunArgs {
     #[arg(long, visible_alias = "set-file", value_name = "FILE")]
     parameters: Option<PathBuf>,
     /// Sets a parameter or an input by its FMU name: a number in SI or with a unit of the variable (50mm); enumerations by
-    /// name or number.
+    /// name or number. Structural parameters of FMI 3.0 are set first, whatever the order.
     #[arg(long = "set", value_name = "NAME=VALUE", value_parser = setting)]
     settings: Vec<(String, String)>,
     /// Communication step, s.
@@ -77,7 +77,12 @@ impl RunArgs {
     /// Runs the command.
     pub fn run(self) -> Result<()> {
         check_out(&self.out)?;
-        let fmu = open(&self.fmu)?;
+        let mut settings = match &self.parameters {
+            Some(path) => set_file::read(path)?,
+            None => Vec::new(),
+        };
+        settings.extend(self.settings);
+        let fmu = open_with(&self.fmu, &settings)?;
         let description = fmu.description();
         let drive = self.drive.as_deref();
         let (input, torque, others) = match (&self.profile, &self.input) {
@@ -93,11 +98,6 @@ impl RunArgs {
             }
             (None, None) => bail!("a run needs --profile or --input"),
         };
-        let mut settings = match &self.parameters {
-            Some(path) => set_file::read(path)?,
-            None => Vec::new(),
-        };
-        settings.extend(self.settings);
         let run = Run {
             settings,
             input,

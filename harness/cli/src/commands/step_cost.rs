@@ -11,7 +11,7 @@ use experiments::step_cost::{self, Choice, MAX_STEPS, Spread};
 use host::fmu::Fmu;
 use serde_json::{Value, json};
 
-use super::{DEFAULT_FMU, open, setting};
+use super::{DEFAULT_FMU, open_with, setting};
 use crate::{progress, terminal};
 
 /// Measures what one communication step costs, in time and instructions, and chooses solver.max_steps for a deadline.
@@ -88,7 +88,7 @@ impl StepCostArgs {
 
     /// Runs the command.
     pub fn run(self) -> Result<()> {
-        let fmu = open(&self.fmu)?;
+        let fmu = open_with(&self.fmu, &self.settings)?;
         let (run, profile) = self.manoeuvre(&fmu)?;
         #[cfg(target_os = "linux")]
         if !self.counted.is_empty() {

@@ -4,3 +4,4 @@ mod example;
 mod gyro;
 mod plans;
 mod sensors;
+mod sizes;

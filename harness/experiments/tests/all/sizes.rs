@@ -1,0 +1,117 @@
+//! FMUs 3.0 with arrays: how long they are is set like any other parameter.
+
+use experiments::profile::Torque;
+use experiments::run::{Run, parameters};
+use host::fmu::Fmu;
+use pack::{Fmi, packed_version_for_tests};
+use signals::table::Table;
+
+/// A craft with two tanks, as the FMU with scalars has it.
+const SCALARS: [(&str, &str); 6] = [
+    ("tank[1].position[3]", "-0.55"),
+    ("tank[2].position[3]", "0.45"),
+    ("tank[2].diameter", "800 mm"),
+    ("tank[2].depth", "0.35"),
+    ("tank[2].modes", "2"),
+    ("tanks", "2"),
+];
+
+/// Four signals of both tanks.
+const COLUMNS: [&str; 4] = ["omega[1]", "tank[1].p[1,2]", "tank[2].p[2,2]", "tank[2].wave_height"];
+
+/// `tank[2].p[1,3]` is `tank.p[2,1,3]` where arrays are variables.
+fn in_arrays(name: &str) -> String {
+    let Some((tank, rest)) = name.strip_prefix("tank[").and_then(|rest| rest.split_once("]."))
+    else {
+        return name.into();
+    };
+    match rest.split_once('[') {
+        Some((name, indices)) => format!("tank.{name}[{tank},{indices}"),
+        None => format!("tank.{rest}[{tank}]"),
+    }
+}
+
+fn settings(pairs: &[(&str, &str)]) -> Vec<(String, String)> {
+    pairs.iter().map(|(name, value)| (name.to_string(), value.to_string())).collect()
+}
+
+fn run(settings: Vec<(String, String)>) -> Run {
+    Run {
+        settings,
+        input: Some("torque[1]".into()),
+        torque: Torque::Profile("sine:amplitude=5,frequency=0.5".parse().unwrap()),
+        others: Vec::new(),
+        step: 0.1,
+        stop: 5.0,
+        tolerance: None,
+        hold: false,
+    }
+}
+
+fn record(fmu: &Fmu, run: &Run, columns: &[&str]) -> Table {
+    let mut instance = run.initialise(fmu).unwrap();
+    run.drive(&mut instance, columns, |_| {}).unwrap()
+}
+
+fn spacecraft(fmi: Fmi, settings: &[(String, String)]) -> anyhow::Result<Fmu> {
+    let model = pack::model("Spacecraft").unwrap();
+    Fmu::open_with(packed_version_for_tests(model, fmi), settings)
+}
+
+#[test]
+fn a_structural_parameter_sizes_arrays_and_the_motion_is_that_of_scalars_to_the_last_bit() {
+    let set = settings(&SCALARS);
+    let scalars = spacecraft(Fmi::V3, &set).unwrap();
+    let expected = record(&scalars, &run(set), &COLUMNS);
+    // Elements that only the larger size has come before it.
+    let set: Vec<_> =
+        SCALARS.iter().map(|(name, value)| (in_arrays(name), value.to_string())).collect();
+    assert_eq!((&*set[1].0, &*set[2].0), ("tank.position[2,3]", "tank.diameter[2]"));
+    let arrays = spacecraft(Fmi::V3Arrays, &set).unwrap();
+    let names = COLUMNS.map(in_arrays);
+    let names: Vec<_> = names.iter().map(String::as_str).collect();
+    let found = record(&arrays, &run(set.clone()), &names);
+    for (name, scalar) in names.iter().zip(COLUMNS) {
+        assert_eq!(found.column(name), expected.column(scalar), "{scalar}");
+        let moves = found.column(name).unwrap().iter().any(|x| x.abs() > 1e-6);
+        assert!(moves, "{scalar}");
+    }
+    // What a run's table says of itself: the size, what was set, and starts of what was not.
+    let all = parameters(arrays.description(), &set, &[]);
+    let of = |name: &str| all.get(name).map(String::as_str);
+    assert_eq!((of("tanks"), of("tank.modes[2]")), (Some("2"), Some("2")));
+    let same = parameters(scalars.description(), &settings(&SCALARS), &[]);
+    assert_eq!(of("tank.hinge[2,1]"), same.get("tank[2].hinge[1]").map(String::as_str));
+    assert_eq!(of("tank.diameter[3]"), None);
+}
+
+#[test]
+fn arrays_have_the_declared_size_where_no_setting_says_another() {
+    let fmu = spacecraft(Fmi::V3Arrays, &settings(&[("tank.position[1,3]", "-0.5")])).unwrap();
+    assert!(fmu.description().variable("tank.position[1,3]").is_ok());
+    assert!(fmu.description().variable("tank.position[2,3]").is_err());
+    // and of none there are none
+    let fmu = spacecraft(Fmi::V3Arrays, &settings(&[("tanks", "0")])).unwrap();
+    assert!(fmu.description().variable("tank.position[1,3]").is_err());
+    let table = record(&fmu, &run(settings(&[("tanks", "0")])), &["omega[1]"]);
+    assert!(table.column("omega[1]").unwrap().iter().any(|rate| rate.abs() > 1e-3));
+}
+
+#[test]
+fn sizes_that_the_fmu_refuses_and_sizes_that_come_too_late_are_told_with_what_is_allowed() {
+    let wrong = |value: &str| {
+        let error = spacecraft(Fmi::V3Arrays, &settings(&[("tanks", value)]));
+        format!("{:#}", error.err().expect("it is refused"))
+    };
+    assert!(wrong("5").contains("tanks = 5 (allowed: 0 to 4)"), "{}", wrong("5"));
+    assert!(wrong("-1").contains("tanks expects a whole number"), "{}", wrong("-1"));
+    let most = wrong("9000000000000000000");
+    assert!(most.contains("(allowed: 0 to 4)"), "{most}");
+    let fmu = spacecraft(Fmi::V3Arrays, &[]).unwrap();
+    let late = run(settings(&[("tanks", "2")])).initialise(&fmu);
+    let late = format!("{:#}", late.err().expect("it is refused"));
+    assert!(late.contains("tanks cannot be set to 2: it is a structural parameter"), "{late}");
+    // of scalars it is a parameter like any other
+    let fmu = spacecraft(Fmi::V3, &[]).unwrap();
+    run(settings(&[("tanks", "2")])).initialise(&fmu).unwrap();
+}
