@@ -364,6 +364,10 @@ fn a_size_is_set_in_configuration_mode_alone_and_what_it_sizes_starts_anew() {
     let start: Vec<f64> = vec![0.0, 0.0, -0.45];
     run.instance.give(&[position], &[7.0, 8.0, 9.0]).unwrap();
     run.resize("tanks", 4);
+    let said: Vec<_> = run.instance.take_messages();
+    let said: Vec<_> = said.iter().map(|m| (&*m.category, m.status, &*m.text)).collect();
+    let text = "fmi3SetUInt64: tanks changed, what was set before is lost of tank.position";
+    assert_eq!(said, [("logStatusWarning", Status::Warning, text)], "nobody else is named");
     assert_eq!(run.instance.number_of_states().unwrap(), states(4));
     let mut there = vec![0.0; 12];
     run.instance.fetch(&[position], &mut there).unwrap();

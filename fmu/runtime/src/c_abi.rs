@@ -76,6 +76,12 @@ impl Log {
         }
     }
 
+    /// Warns of what a call has done beside what it was called for.
+    #[cold]
+    pub fn report_effect(&self, call: &Call, effect: impl FnOnce() -> String) {
+        self.write(WARNING, Topic::Warning, || format!("{}: {}", call.name, effect()));
+    }
+
     /// Warns, once, of how the host drives the model.
     pub fn report_step_warning<M: Model, V: Version>(&mut self, instance: &Instance<M, V>) {
         if !self.step_warned

@@ -368,13 +368,28 @@ impl<M: Model, V: Version> Instance<M, V> {
         Ok(())
     }
 
-    /// Gives inputs and parameters the values that they start with, all elements of the variables that are `meant`.
-    pub(crate) fn restart(&mut self, meant: impl Fn(&Variable<M>) -> bool) {
+    /// Gives inputs and parameters the values that they start with, all elements of the variables that are `meant`. Returns
+    /// those of which an element had another value, in the table's order.
+    pub(crate) fn restart(
+        &mut self,
+        meant: impl Fn(&Variable<M>) -> bool,
+    ) -> Vec<&'static Variable<M>> {
+        let mut lost: Vec<&'static Variable<M>> = Vec::new();
         for scalar in M::table().scalars.iter().filter(|scalar| meant(scalar.variable)) {
-            if let Some(start) = scalar.start() {
-                self.put(scalar, start);
+            let Some(start) = scalar.start() else { continue };
+            let before = match scalar.access {
+                Access::Input(ramp) => {
+                    Some(Value::Real(*ramp(&mut self.inputs, scalar.element)[0]))
+                }
+                _ => self.parameters.get(scalar.slot).copied(),
+            };
+            let is_named = lost.last().is_some_and(|last| last.name == scalar.variable.name);
+            if before != Some(start) && !is_named {
+                lost.push(scalar.variable);
             }
+            self.put(scalar, start);
         }
+        lost
     }
 
     /// Brings what the host is shown of what is discrete up to date.

@@ -1,7 +1,7 @@
 //! Which messages go to the host's logger.
 //!
-//! Calls that fail, what to be warned of when the motion begins, and, for those who ask, the
-//! model's events. A host that asks for
+//! Calls that fail, what to be warned of when the motion begins or a size changes, and, for those
+//! who ask, the model's events. A host that asks for
 //! nothing gets no chatter: `loggingOn` of a new instance switches nothing, because
 //! failures are reported either way (a status without a reason helps nobody) and
 //! events only on an explicit wish. Setting the debug logging is one and is obeyed: off means

@@ -738,8 +738,14 @@ fn resize<M: Model>(component: &mut Component<M, Fmi3>) {
     }
 }
 
-/// Structural parameters were others before: what they size has its start values from here on.
-fn start_resized<M: Model>(component: &mut Component<M, Fmi3>, scalars: &[u32], before: &[Value]) {
+/// Structural parameters were others before: what they size has its start values from here on. A host that had set others is
+/// told.
+fn start_resized<M: Model>(
+    component: &mut Component<M, Fmi3>,
+    call: &Call,
+    scalars: &[u32],
+    before: &[Value],
+) {
     let after = &component.instance.parameters;
     let changed: Vec<_> = scalars
         .iter()
@@ -748,8 +754,15 @@ fn start_resized<M: Model>(component: &mut Component<M, Fmi3>, scalars: &[u32], 
         .map(|scalar| scalar.variable.name)
         .collect();
     let is_resized = |d: &Dimension| matches!(d, Dimension::Sized(by, _) if changed.contains(by));
-    component.instance.restart(|variable| variable.shape.iter().any(is_resized));
+    let lost = component.instance.restart(|variable| variable.shape.iter().any(is_resized));
     resize(component);
+    if !lost.is_empty() {
+        component.log.report_effect(call, || {
+            let names: Vec<_> = lost.iter().map(|variable| variable.array_name()).collect();
+            let sizes = changed.join(", ");
+            format!("{sizes} changed, what was set before is lost of {}", names.join(", "))
+        });
+    }
 }
 
 // ---- Values ----
@@ -917,7 +930,7 @@ fn set_arrays<M: Model>(
     let call = if before.is_some() { &SET_SIZE } else { call };
     component.instance.set(call, &scalars, value)?;
     if let Some(before) = before {
-        start_resized(component, &scalars, &before);
+        start_resized(component, call, &scalars, &before);
     }
     Ok(())
 }
