@@ -39,6 +39,7 @@ use taylor::vector::{
 
 use crate::damping::Drag;
 use crate::parameters::Tank;
+use crate::rigid::along_rod;
 
 /// One bob, as the outputs need it.
 pub(crate) struct BobNow<T> {
@@ -76,6 +77,8 @@ pub struct Bob {
     inv_l: f64,
     e: Vec3,
     pub hinge: Vec3,
+    /// b of a planar mode (`contents.rs`), body axes, for impulses alone: its motion is not expanded here.
+    across: Option<Vec3>,
     /// Elevation at the wall per slosh angle, m/rad.
     pub wave: f64,
     /// Tank axes to body axes.
@@ -106,6 +109,7 @@ impl Bob {
         let axes = rotation(&unit_quaternion(tank.q));
         let e = axes.map(|row| row[2]);
         let (m, l, k, c) = (tank.mass[mode], tank.length[mode], tank.k[mode], tank.drag(mode));
+        let (hinge, across) = tank.hinge_and_across(mode);
         Bob {
             tank: index,
             mode,
@@ -120,7 +124,8 @@ impl Bob {
             k_m: k / m,
             inv_l: 1.0 / l,
             e,
-            hinge: add(tank.position, scale(tank.hinge[mode], e)),
+            hinge,
+            across,
             wave: tank.wave[mode],
             axes,
             p: ZERO_VECTOR,
@@ -241,6 +246,13 @@ impl Bob {
     /// The bob at rest as a point mass, from O.
     pub fn at_rest(&self) -> Vec3 {
         sub(self.hinge, scale(self.l, self.e))
+    }
+
+    /// [b; rho x b] of a planar mode, along which its bob is carried along; `x` is its six numbers.
+    pub fn carried_along(&self, x: &[f64]) -> Option<[f64; 6]> {
+        let b = self.across?;
+        let rho = add(self.hinge, scale(self.l, times(&self.axes, [x[0], x[1], x[2]])));
+        Some(along_rod(b, rho))
     }
 
     /// Coefficient N of c p'.
@@ -380,13 +392,16 @@ impl Bob {
     }
 
     /// What an impulse of the craft does to the rate: the bob keeps its velocity across the rod,
-    /// l p' changes by -(1 - p p^T)(dV + dw x rho). `x` is the six numbers that the bob was
+    /// l p' changes by -(1 - p p^T)(dV + dw x rho), of a planar mode by -(1 - p p^T - b b^T)(dV + dw x rho). `x` is the six numbers that the bob was
     /// started with; dV of O and dw in body axes.
     pub fn after_impulse(&self, x: &mut [f64; 6], dv: Vec3, dw: Vec3) {
         let p = self.p[0];
         let rho = add(self.hinge, scale(self.l, p));
         let kick = add(dv, cross(dw, rho));
-        let across = sub(kick, scale(dot(p, kick), p));
+        let mut across = sub(kick, scale(dot(p, kick), p));
+        if let Some(b) = self.across {
+            across = sub(across, scale(dot(b, kick), b));
+        }
         let change = transposed_times(&self.axes, scale(-self.inv_l, across));
         for i in 0..3 {
             x[3 + i] += change[i];

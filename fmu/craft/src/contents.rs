@@ -10,6 +10,17 @@
 //! G = a + w' x rho + w x (w x rho) + 2 w x rho' + P'' + 2 l' p' + (c l/m) p' + (k l/m) p_perp
 //! ```
 //!
+//! The bob of a planar mode swings in the plane through P across b, a unit vector fixed in the tank, which holds it there:
+//!
+//! ```text
+//! -N b to the right-hand side of Newton's law,   N = N_0 - m u.[a; w'],  u = [b; rho x b]
+//! N_0 = -m b.(w x (w x rho) + 2 w x rho')
+//! p'' = -(1 - p p^T - b b^T) G/l - |p'|^2 p                  p.b = p'.b = 0
+//! ```
+//!
+//! Such a tank does not drain. Across its plane the bob is as rigid liquid: with modes along two directions m_0 is the liquid less
+//! the masses of both, and may be below 0.
+//!
 //! Mass leaves a bob with the bob's velocity and the craft with the velocity of the tank at the outlet,
 //! r_out = d + z_out e. On its way, along the tank's axis and level to it from the bobs, it has the
 //! momentum K against the tank, and the moment of momentum L about O:
@@ -50,7 +61,7 @@ use taylor::vector::{
     transposed_times, unit_quaternion,
 };
 
-use crate::bob::BobNow;
+use crate::bob::{Bob, BobNow};
 use crate::damping;
 use crate::parameters::{Limits, Tank};
 use crate::rigid::{Mat6, Rigid};
@@ -66,11 +77,24 @@ pub struct MountedTank {
     axes: Mat3,
     e: Vec3,
     d: Vec3,
+    /// The rigid liquid and all liquid at rest, where they are not alike all around the axis.
+    uneven: Option<[Rigid; 2]>,
 }
 
 /// A quantity that stays, with its derivatives by time.
 fn jet<T: Number>(x: f64) -> Jet<T> {
     [x, 0.0, 0.0].map(T::constant)
+}
+
+/// What holds a bob in one direction: m u u^T of the mass matrix, and a pull, force on the craft.
+#[derive(Clone, Copy)]
+struct Hold<T> {
+    /// p or b
+    along: Vec3<T>,
+    /// [p; rho x p] or [b; rho x b]
+    u: [T; 6],
+    /// T_0 or N_0
+    at_rest: T,
 }
 
 /// A bob, with what its equation has besides [a; w'].
@@ -81,9 +105,9 @@ pub struct Swing<T> {
     p_d: Vec3<T>,
     rho: Vec3<T>,
     rho_d: Vec3<T>,
-    /// [p; P x p]
-    u: [T; 6],
-    t_0: T,
+    rod: Hold<T>,
+    /// Of a planar mode.
+    guide: Option<Hold<T>>,
     /// phi, and G without a + w' x rho
     phi: Vec3<T>,
     known: Vec3<T>,
@@ -118,7 +142,13 @@ impl MountedTank {
     pub fn new(tank: &Tank) -> MountedTank {
         let axes = rotation(&unit_quaternion(tank.q));
         let curves = tank.fill.curves(tank.modes);
-        MountedTank { tank: *tank, curves, axes, e: axes.map(|row| row[2]), d: tank.position }
+        let (e, d) = (axes.map(|row| row[2]), tank.position);
+        let uneven = (!tank.is_axial()).then(|| {
+            let point = |bob: Bob| Rigid::new(bob.m, bob.at_rest(), &[[0.0; 3]; 3]);
+            let bobs = (0..tank.modes).map(|n| point(Bob::new(tank, 0, n)));
+            [tank.rigid(), bobs.fold(tank.rigid(), |sum, bob| sum.and(&bob))]
+        });
+        MountedTank { tank: *tank, curves, axes, e, d, uneven }
     }
 
     /// Whether any mode's drag depends on acceleration or amplitude.
@@ -129,6 +159,9 @@ impl MountedTank {
     /// The liquid at rest as a rigid body; `liquid` counts for tanks with a table.
     pub fn at_rest<T: Number>(&self, liquid: T) -> Rigid<T> {
         let MountedTank { tank, curves, .. } = self;
+        if let Some([_, whole]) = &self.uneven {
+            return whole.lift();
+        }
         let constant_of = |x: f64| T::constant(x);
         let place = (tank.fill.points > 0).then(|| curves.place(liquid));
         let (e, d, zero) = (constant::<T>(self.e), constant::<T>(self.d), constant_of(0.0));
@@ -191,10 +224,15 @@ impl MountedTank {
             if drains {
                 m_0 = [m_0[0] - m[0], m_0[1] - m[1], m_0[2] - m[2]];
             }
-            let p = times(&axes, vec_of(x, 6 * n));
-            let p_d = times(&axes, vec_of(x, 6 * n + 3));
+            let mut p = times(&axes, vec_of(x, 6 * n));
+            let mut p_d = times(&axes, vec_of(x, 6 * n + 3));
+            let mut hinge = add(d, scale(h[0], e));
+            let across = tank.across(n).map(|b| times(&self.axes, b));
+            if let Some(b) = across.map(constant) {
+                [p, p_d] = [p, p_d].map(|x| sub(x, scale(dot(b, x), b)));
+                hinge = sub(hinge, b.map(|b| b * tank.arm[n]));
+            }
             let [p, p_d] = on_sphere(p, p_d);
-            let hinge = add(d, scale(h[0], e));
             let rho = add(hinge, scale(l[0], p));
             let rho_d = add(add(scale(h[1], e), scale(l[1], p)), scale(l[0], p_d));
             let (height, height_d) = (dot(e, p), dot(e, p_d));
@@ -209,7 +247,15 @@ impl MountedTank {
             let t_0 = m[0] * (l[0] * dot(p_d, p_d) - dot(p, settling) - l[2])
                 - l[0] * dot(p_perp, p_perp) * k;
             let known = add(add(settling, scale(l[1] * 2.0, p_d)), scale(m[0].recip(), phi));
-            let turned = cross(hinge, p);
+            let hold = |along: Vec3<T>, from: Vec3<T>, at_rest: T| {
+                let turned = cross(from, along);
+                let u = [along[0], along[1], along[2], turned[0], turned[1], turned[2]];
+                Hold { along, u, at_rest }
+            };
+            let guide = across.map(|b| {
+                let b = constant(b);
+                hold(b, rho, -(m[0] * dot(b, settling)))
+            });
             // What leaves the bob.
             let b = h[0] + l[0] * height;
             let b_d = h[1] + l[1] * height + l[0] * height_d;
@@ -236,8 +282,8 @@ impl MountedTank {
                 p_d,
                 rho,
                 rho_d,
-                u: [p[0], p[1], p[2], turned[0], turned[1], turned[2]],
-                t_0,
+                rod: hold(p, hinge, t_0),
+                guide,
                 phi,
                 known,
                 centring: l[0] * l[0] * dot(p_perp, p_perp) * (0.5 * k),
@@ -253,7 +299,10 @@ impl MountedTank {
         // The rigid liquid about O.
         let s = add(d, scale(h_0[0], e));
         let s_d = scale(h_0[1], e);
-        let rigid = Rigid::axial(m_0[0], s, i_0[0], i_z[0], e);
+        let rigid = match &self.uneven {
+            Some([rigid, _]) => rigid.lift(),
+            None => Rigid::axial(m_0[0], s, i_0[0], i_z[0], e),
+        };
         let mut shrinking = (m_0[1], [zero; 2]);
         if drains {
             let moment = m_0[1] * h_0[0] + m_0[0] * h_0[1];
@@ -293,7 +342,10 @@ impl MountedTank {
         let axes: Mat3<T> = self.axes.map(constant);
         for (n, bob) in contents.bobs.iter().flatten().enumerate() {
             let g = add(add(a, cross(w_d, bob.rho)), bob.known);
-            let across = sub(g, scale(dot(bob.p, g), bob.p));
+            let mut across = sub(g, scale(dot(bob.p, g), bob.p));
+            if let Some(Hold { along: b, .. }) = bob.guide {
+                across = sub(across, scale(dot(b, g), b));
+            }
             let p_dd = add(scale(bob.l.recip(), across), scale(dot(bob.p_d, bob.p_d), bob.p));
             put(6 * n, &transposed_times(&axes, bob.p_d));
             put(6 * n + 3, &transposed_times(&axes, p_dd).map(|x| -x));
@@ -319,33 +371,60 @@ impl MountedTank {
         bobs
     }
 
+    /// Puts the bobs of planar modes into their planes; x as in [`MountedTank::contents`].
+    pub fn flatten(&self, x: &mut [f64]) {
+        for n in 0..self.tank.modes {
+            let Some(b) = self.tank.across(n) else { continue };
+            for at in [6 * n, 6 * n + 3] {
+                let flat = sub(vec_of(x, at), scale(dot(b, vec_of(x, at)), b));
+                x[at..at + 3].copy_from_slice(&flat);
+            }
+        }
+    }
+
     /// Whether its liquid follows a table.
     pub fn drains(&self) -> bool {
         self.tank.fill.points > 0
     }
 }
 
-impl<T: Number> Swing<T> {
-    /// T under [a; w'].
-    fn tension(&self, a: Vec3<T>, w_d: Vec3<T>) -> T {
+impl<T: Number> Hold<T> {
+    /// The pull on a bob of mass m under [a; w'].
+    fn pull(&self, m: T, [a, w_d]: [Vec3<T>; 2]) -> T {
         let u = self.u;
-        self.t_0 - self.m * (dot([u[0], u[1], u[2]], a) + dot([u[3], u[4], u[5]], w_d))
+        self.at_rest - m * (dot([u[0], u[1], u[2]], a) + dot([u[3], u[4], u[5]], w_d))
+    }
+}
+
+impl<T: Number> Swing<T> {
+    fn holds(&self) -> impl Iterator<Item = &Hold<T>> {
+        core::iter::once(&self.rod).chain(&self.guide)
     }
 
-    /// Force and torque about O on the craft at the tension T.
-    fn wrench(&self, tension: T) -> [Vec3<T>; 2] {
-        let force = add(scale(tension, self.p), self.phi);
+    /// T under [a; w'].
+    fn tension(&self, a: Vec3<T>, w_d: Vec3<T>) -> T {
+        self.rod.pull(self.m, [a, w_d])
+    }
+
+    /// Force and torque about O on the craft with the pull of each hold.
+    fn wrench(&self, pull: impl Fn(&Hold<T>) -> T) -> [Vec3<T>; 2] {
+        let mut force = add(scale(pull(&self.rod), self.p), self.phi);
+        if let Some(guide) = &self.guide {
+            force = add(force, scale(pull(guide), guide.along));
+        }
         [force, cross(self.rho, force)]
     }
 }
 
 impl<T: Number> Contents<T> {
-    /// Adds the bobs' inertia along their rods, m u u^T.
+    /// Adds the bobs' inertia along their rods and across the planes of planar modes, m u u^T.
     pub fn add_rods(&self, matrix: &mut Mat6<T>) {
         for bob in self.bobs.iter().flatten() {
-            for i in 0..6 {
-                for k in 0..6 {
-                    matrix[i][k] = matrix[i][k] + bob.m * bob.u[i] * bob.u[k];
+            for hold in bob.holds() {
+                for i in 0..6 {
+                    for k in 0..6 {
+                        matrix[i][k] = matrix[i][k] + bob.m * hold.u[i] * hold.u[k];
+                    }
                 }
             }
         }
@@ -353,14 +432,15 @@ impl<T: Number> Contents<T> {
 
     /// Force and torque about O on the craft at a = w' = 0, the rigid liquid's inertia left out.
     pub fn loads(&self) -> [Vec3<T>; 2] {
-        let bobs = self.bobs.iter().flatten().map(|bob| bob.wrench(bob.t_0));
+        let bobs = self.bobs.iter().flatten().map(|bob| bob.wrench(|hold| hold.at_rest));
         bobs.fold(self.flow_wrench, |sum, bob| [add(sum[0], bob[0]), add(sum[1], bob[1])])
     }
 
     /// Force and torque about O on the craft.
     pub fn wrench(&self, a: Vec3<T>, w: Vec3<T>, w_d: Vec3<T>) -> [Vec3<T>; 2] {
         let rigid = self.rigid.inertial_wrench(a, w, w_d);
-        let bobs = self.bobs.iter().flatten().map(|bob| bob.wrench(bob.tension(a, w_d)));
+        let bobs =
+            (self.bobs.iter().flatten()).map(|bob| bob.wrench(|hold| hold.pull(bob.m, [a, w_d])));
         let sum =
             bobs.fold(self.flow_wrench, |sum, bob| [add(sum[0], bob[0]), add(sum[1], bob[1])]);
         [sub(sum[0], rigid[0]), sub(sum[1], rigid[1])]

@@ -1,4 +1,4 @@
-//! A craft whose tanks drain, each with its contents as in `contents.rs`.
+//! A craft whose tanks drain or have planar modes, each with its contents as in `contents.rs`.
 //!
 //! ```text
 //! M [a; w'] = [ f - w x (w x S) + sum of force ; tau - h_w' - w x (I w + h_w) + sum of torque ]
@@ -76,7 +76,7 @@ impl Acting<Dual> {
         }
     }
 }
-/// A craft with at least one tank that can drain.
+/// A craft with at least one tank that can drain or has planar modes.
 #[derive(Clone, Debug)]
 pub struct Draining {
     craft: Rigid,
@@ -135,6 +135,9 @@ impl Drains<STATES> for Run<'_> {
     fn normalise(&self, x: &mut [f64; STATES], _: f64) {
         let q = unit_quaternion([x[0], x[1], x[2], x[3]]);
         x[index::Q..index::Q + 4].copy_from_slice(&q);
+        for (i, mounted) in self.craft.tanks.iter().enumerate() {
+            mounted.flatten(&mut x[index::bob(i, 0)..]);
+        }
         normalise_bobs(&mut x[index::BOBS..index::LIQUID]);
     }
 
@@ -144,10 +147,10 @@ impl Drains<STATES> for Run<'_> {
 }
 
 impl Draining {
-    /// `None` if no tank can drain.
+    /// `None` if no tank can drain and none has planar modes.
     pub fn new(p: &Parameters) -> Option<Draining> {
         let tanks = &p.tank[..p.tanks];
-        tanks.iter().any(|tank| tank.fill.points > 0).then(|| Draining {
+        tanks.iter().any(|tank| tank.fill.points > 0 || tank.is_planar()).then(|| Draining {
             craft: p.craft.rigid(),
             mount: p.mount,
             gravity: p.gravity,

@@ -227,7 +227,7 @@ impl CraftMotion {
         }
     }
 
-    /// Takes other rigid liquids and bobs, of as many tanks and modes.
+    /// Takes other rigid liquids and bobs, of as many tanks and modes; the bobs of planar modes count where they are now.
     pub fn refill<'a>(&mut self, tanks: impl Iterator<Item = &'a Tank> + Clone) {
         self.rigid = self.craft;
         for (liquid, tank) in self.liquids.iter_mut().zip(tanks.clone()) {
@@ -238,6 +238,10 @@ impl CraftMotion {
         for bob in &mut self.bobs {
             if let Some(tank) = tanks.clone().nth(bob.tank) {
                 *bob = Bob::new(tank, bob.tank, bob.mode);
+            }
+            let at = index::bob(bob.tank, bob.mode);
+            if let Some(u) = bob.carried_along(&self.state.x[at..at + 3]) {
+                add_rank_one(&mut self.mass_matrix, bob.m, &u);
             }
         }
         self.freeze();

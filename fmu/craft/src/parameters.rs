@@ -7,10 +7,13 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use formulas::cylinder;
 use taylor::integrator::Steps;
-use taylor::vector::{Mat3, Quaternion, Vec3, add, rotation, scale, unit_quaternion};
+use taylor::vector::{
+    Mat3, Quaternion, Vec3, add, dot, largest, on_sphere, rotation, scale, sub, times,
+    unit_quaternion,
+};
 
 use crate::pivot::Pivot;
-use crate::rigid::{Rigid, smallest_pivot};
+use crate::rigid::{Mat6, Rigid, add_rank_one, along_rod, smallest_pivot};
 use crate::sizes::{MODES, POINTS, TANKS, modes_of};
 use crate::table::FillTable;
 
@@ -172,6 +175,12 @@ pub struct Tank {
     pub i_0: f64,
     /// Its inertia about the axis, kg m2.
     pub i_z: f64,
+    /// How far its centre of mass is off the axis, x and y, m, tank axes.
+    pub r_0: [f64; 2],
+    /// By how much its inertia about the tank's y axis exceeds `i_0`, which then is that about x, kg m2.
+    pub di_y: f64,
+    /// Its products of inertia, elements xy, xz and yz, tank axes, kg m2.
+    pub products: [f64; 3],
     /// How many modes are kept, 0 to [`MODES`].
     pub modes: usize,
     /// Acceleration along the axis at which `zeta` holds, m/s2, > 0.
@@ -185,6 +194,11 @@ pub struct Tank {
     pub frequency: [f64; MODES],
     /// Height of the hinge on the tank's axis, m.
     pub hinge: [f64; MODES],
+    /// Direction in which the mode moves its mass, x and y, tank axes; normalised on reading. Where it is not 0, 0 the mode is
+    /// planar: its bob swings in the plane of this direction and the tank's axis, and is held across.
+    pub direction: [[f64; 2]; MODES],
+    /// How far that plane is off the tank's axis, m: the arm about it of a momentum in the direction.
+    pub arm: [f64; MODES],
     /// Centring stiffness (capillarity, diaphragm), N/m.
     pub k: [f64; MODES],
     /// Damping ratio at `g_ref`.
@@ -250,15 +264,21 @@ impl Tank {
         tank
     }
 
-    /// The rigid liquid: m_0 on the axis at height H_0, J_0 = I_0 1 + (I_z - I_0) e e^T.
+    /// The rigid liquid: m_0 on the axis at height H_0, J_0 = I_0 1 + (I_z - I_0) e e^T; without axial symmetry r_0 off it and
+    /// with dI_y and the products besides.
     pub(crate) fn rigid(&self) -> Rigid {
-        let e = rotation(&unit_quaternion(self.q)).map(|row| row[2]);
-        Rigid::new(self.m_0, add(self.position, scale(self.h_0, e)), &self.own_inertia())
+        let axes = rotation(&unit_quaternion(self.q));
+        let mut center = add(self.position, scale(self.h_0, axes.map(|row| row[2])));
+        if !self.is_axial() {
+            center = add(center, times(&axes, [self.r_0[0], self.r_0[1], 0.0]));
+        }
+        Rigid::new(self.m_0, center, &self.own_inertia())
     }
 
     /// J_0, kg m2, body axes.
     pub(crate) fn own_inertia(&self) -> Mat3 {
-        let e = rotation(&unit_quaternion(self.q)).map(|row| row[2]);
+        let axes = rotation(&unit_quaternion(self.q));
+        let e = axes.map(|row| row[2]);
         let mut own = [[0.0; 3]; 3];
         for i in 0..3 {
             for j in 0..3 {
@@ -266,7 +286,68 @@ impl Tank {
                 own[i][j] = one + (self.i_z - self.i_0) * e[i] * e[j];
             }
         }
+        if !self.is_axial() {
+            let [xy, xz, yz] = self.products;
+            let more = [[0.0, xy, xz], [xy, self.di_y, yz], [xz, yz, 0.0]];
+            let half = axes.map(|row| times(&more, row));
+            for i in 0..3 {
+                own[i] = add(own[i], times(&axes, half[i]));
+            }
+        }
         own
+    }
+
+    /// Whether the liquid moves alike in every direction across the axis.
+    pub(crate) fn is_axial(&self) -> bool {
+        let [x, y] = self.r_0;
+        let rigid = [x, y, self.di_y].into_iter().chain(self.products);
+        let modes = 0..self.modes.min(MODES);
+        rigid.into_iter().all(|more| more == 0.0)
+            && modes.into_iter().all(|n| self.across(n).is_none())
+    }
+
+    /// Whether any mode is planar.
+    pub(crate) fn is_planar(&self) -> bool {
+        (0..self.modes.min(MODES)).any(|n| self.across(n).is_some())
+    }
+
+    /// Unit vector b, tank axes, across the plane in which the bob of mode n (from 0) swings: e x b is its direction backwards;
+    /// `None` where it swings in every direction.
+    pub(crate) fn across(&self, n: usize) -> Option<Vec3> {
+        let [x, y] = self.direction[n];
+        let size = libm::hypot(x, y);
+        (size > 0.0).then(|| [-y / size, x / size, 0.0])
+    }
+
+    /// The hinge of mode n (from 0) from O, m, and b of a planar mode; body axes.
+    pub(crate) fn hinge_and_across(&self, n: usize) -> (Vec3, Option<Vec3>) {
+        let axes = rotation(&unit_quaternion(self.q));
+        let on_axis = add(self.position, scale(self.hinge[n], axes.map(|row| row[2])));
+        match self.across(n).map(|b| times(&axes, b)) {
+            Some(b) => (sub(on_axis, scale(self.arm[n], b)), Some(b)),
+            None => (on_axis, None),
+        }
+    }
+
+    /// Adds what the bobs of planar modes are carried along with where they hang: across their planes and along their rods.
+    fn add_planar_bobs(&self, matrix: &mut Mat6) {
+        let e = rotation(&unit_quaternion(self.q)).map(|row| row[2]);
+        for n in 0..self.modes {
+            let (hinge, Some(b)) = self.hinge_and_across(n) else { continue };
+            let rho = sub(hinge, scale(self.length[n], e));
+            for u in [along_rod(e, hinge), along_rod(b, rho)] {
+                add_rank_one(matrix, self.mass[n], &u);
+            }
+        }
+    }
+
+    /// Direction and rate of the bob of mode n (from 0) at the start, tank axes.
+    pub(crate) fn at_start(&self, n: usize) -> [Vec3; 2] {
+        let [p, p_d] = [self.p_0[n], self.p_dot_0[n]].map(|x| match self.across(n) {
+            Some(b) => sub(x, scale(dot(b, x), b)),
+            None => x,
+        });
+        on_sphere(p, p_d)
     }
 
     /// The specific force along the axis below which mode n (from 0) does not stand for liquid, m/s2: thrust that is off is
@@ -393,12 +474,17 @@ impl Default for Tank {
             h_0: 0.0563967,
             i_0: 3.67522,
             i_z: 0.0,
+            r_0: [0.0; 2],
+            di_y: 0.0,
+            products: [0.0; 3],
             modes: 1,
             g_ref: 1.5,
             mass: modes_of([128.211, 3.91595, 0.93327]),
             length: modes_of([0.248039, 0.084405, 0.0527159]),
             frequency: [0.0; MODES],
             hinge: modes_of([0.136534, 0.215871, 0.247286]),
+            direction: [[0.0; 2]; MODES],
+            arm: [0.0; MODES],
             k: [0.0; MODES],
             zeta: [0.005; MODES],
             damping_law: DampingLaw::Laminar,
@@ -597,10 +683,18 @@ impl Tank {
     fn find_resolved_problems(&self, name: &str, problems: &mut Problems) {
         problems.vector(&format!("{name}.position"), &self.position, "m");
         problems.direction(&format!("{name}.q"), &self.q);
-        problems.number(&format!("{name}.m_0"), self.m_0, 0.0, HEAVIEST, "kg");
+        // Across their planes the bobs of planar modes are rigid liquid, too: what they have may be more than all.
+        let least = if self.is_planar() { -HEAVIEST } else { 0.0 };
+        problems.number(&format!("{name}.m_0"), self.m_0, least, HEAVIEST, "kg");
         problems.number(&format!("{name}.H_0"), self.h_0, -FARTHEST, FARTHEST, "m");
-        problems.number(&format!("{name}.I_0"), self.i_0, 0.0, HEAVIEST, "kg.m2");
-        problems.number(&format!("{name}.I_z"), self.i_z, 0.0, HEAVIEST, "kg.m2");
+        problems.number(&format!("{name}.I_0"), self.i_0, least, HEAVIEST, "kg.m2");
+        problems.number(&format!("{name}.I_z"), self.i_z, least, HEAVIEST, "kg.m2");
+        problems.vector(&format!("{name}.r_0"), &self.r_0, "m");
+        let [xy, xz, yz] = self.products;
+        for (what, value) in [("dI_y", self.di_y), ("I_xy", xy), ("I_xz", xz), ("I_yz", yz)] {
+            problems.number(&format!("{name}.{what}"), value, -HEAVIEST, HEAVIEST, "kg.m2");
+        }
+        self.find_axial_problems(name, problems);
         if self.modes > MODES {
             problems.0.push(format!("{name}.modes = {} (allowed: 0 to {MODES})", self.modes));
         }
@@ -628,8 +722,48 @@ impl Tank {
             let growth = self.zeta_amplitude[n];
             problems.number(&format!("{name}.zeta_amplitude[{i}]"), growth, 0.0, 10.0, "1/rad");
             problems.number(&format!("{name}.wave[{i}]"), self.wave[n], 0.0, FARTHEST, "m/rad");
+            if self.direction[n] != [0.0; 2] {
+                problems.direction(&format!("{name}.direction[{i}]"), &self.direction[n]);
+                problems.number(&format!("{name}.arm[{i}]"), self.arm[n], -FARTHEST, FARTHEST, "m");
+            }
+            let before = problems.0.len();
             problems.direction(&format!("{name}.p_0[{i}]"), &self.p_0[n]);
+            if let Some(b) = self.across(n)
+                && problems.0.len() == before
+            {
+                let flat = sub(self.p_0[n], scale(dot(b, self.p_0[n]), b));
+                if largest(flat) < 1e-6 {
+                    problems.0.push(format!(
+                        "{name}.p_0[{i}] = {:?} has no direction in the plane of {name}.direction[{i}] and the tank's \
+                         axis (allowed: length above 1e-6 in it)",
+                        self.p_0[n]
+                    ));
+                }
+            }
             problems.vector(&format!("{name}.p_dot_0[{i}]"), &self.p_dot_0[n], "1/s");
+        }
+    }
+
+    /// What is alike all around the axis does not go with what is not.
+    fn find_axial_problems(&self, name: &str, problems: &mut Problems) {
+        let uneven = [
+            ("r_0", self.r_0 != [0.0; 2]),
+            ("dI_y", self.di_y != 0.0),
+            ("I_xy, I_xz, I_yz", self.products != [0.0; 3]),
+            ("direction", self.is_planar()),
+        ];
+        let axial = [
+            ("diameter", self.diameter > 0.0),
+            ("fill.points", self.fill.points > 0),
+            ("ball.travel", self.ball.travel > 0.0),
+        ];
+        for (what, _) in uneven.iter().filter(|(_, is_set)| *is_set) {
+            for (other, _) in axial.iter().filter(|(_, is_set)| *is_set) {
+                problems.0.push(format!(
+                    "{name}.{other} with {name}.{what} (allowed: one of them 0; {other} is for tanks that are alike all \
+                     around their axis)"
+                ));
+            }
         }
     }
 
@@ -789,6 +923,17 @@ impl Parameters {
                 drains + 1
             ));
         }
+        let that_is_planar = tanks.iter().position(Tank::is_planar);
+        if let (Some(ball), Some(planar)) = (with_ball, that_is_planar)
+            && ball != planar
+        {
+            problems.0.push(format!(
+                "tank[{}].ball.travel with tank[{}].direction (allowed: one of them 0; no tank of a craft with a ball \
+                 regime can have planar modes)",
+                ball + 1,
+                planar + 1
+            ));
+        }
         if let (Some(ball), Mount::Pivot) = (with_ball, self.mount) {
             problems.0.push(format!(
                 "tank[{}].ball.travel with mount = pivot (allowed with mount = pivot: 0)",
@@ -806,10 +951,13 @@ impl Parameters {
             ));
         }
         if problems.0.is_empty() {
-            let rigid = self.tank[..self.tanks]
-                .iter()
-                .fold(self.craft.rigid(), |sum, tank| sum.and(&tank.resolve().rigid()));
-            if smallest_pivot(&rigid.mass_matrix()) < 1e-12 {
+            let tanks = self.tank[..self.tanks].iter().map(Tank::resolve);
+            let rigid = tanks.clone().fold(self.craft.rigid(), |sum, tank| sum.and(&tank.rigid()));
+            let mut matrix = rigid.mass_matrix();
+            for tank in tanks {
+                tank.add_planar_bobs(&mut matrix);
+            }
+            if smallest_pivot(&matrix) < 1e-12 {
                 problems.0.push(
                     "craft.J with the tanks' m_0, I_0 and I_z is singular: the inertia of craft \
                      and rigid liquid about every axis through their centre of mass must be above 0"

@@ -47,9 +47,7 @@ use taylor::integrator::{self, MAX_MAGNITUDE, Motion, RATE_FLOOR, Steps};
 use taylor::number::{Dual, Number};
 use taylor::series::{self, ORDER, Series, ZERO};
 use taylor::space::{self, Pair, Vector, ZERO_PAIR, ZERO_VECTOR, products};
-use taylor::vector::{
-    Mat3, Vec3, add, constant, cross, dot, largest, on_sphere, part, scale, times,
-};
+use taylor::vector::{Mat3, Vec3, add, constant, cross, dot, largest, part, scale, times};
 
 use crate::bob::{Bob, BobNow};
 use crate::contents::{Drains, MountedTank, Outflow, has_diverged, normalise_bobs, vec_of};
@@ -125,6 +123,11 @@ impl TankParameters {
             problems.extend(host.problems("host"));
         }
         problems.extend(steps_problem(self.max_steps));
+        if !self.tank.is_axial() {
+            problems.push(
+                "tank.direction, r_0, dI_y, I_xy, I_xz or I_yz (allowed: 0 on somebody else's craft)".into(),
+            );
+        }
         if self.tank.ball.travel > 0.0 {
             // An impact is an impulse on the host, which a force cannot be.
             problems.push("tank.ball.travel (allowed: 0 on somebody else's craft)".into());
@@ -505,11 +508,8 @@ impl SloshTank {
         }
         let mut x = [0.0; TANK_STATES];
         for n in 0..MODES {
-            let [direction, rate] = if n < p.tank.modes {
-                on_sphere(p.tank.p_0[n], p.tank.p_dot_0[n])
-            } else {
-                [[0.0, 0.0, -1.0], [0.0; 3]]
-            };
+            let [direction, rate] =
+                if n < p.tank.modes { p.tank.at_start(n) } else { [[0.0, 0.0, -1.0], [0.0; 3]] };
             x[6 * n..6 * n + 3].copy_from_slice(&direction);
             x[6 * n + 3..6 * n + 6].copy_from_slice(&rate);
         }

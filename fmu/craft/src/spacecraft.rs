@@ -6,7 +6,7 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use taylor::error::StepError;
 use taylor::number::{Dual, Number};
-use taylor::vector::{dot, on_sphere, unit_quaternion};
+use taylor::vector::{dot, unit_quaternion};
 
 use crate::contents::Drains;
 use crate::draining::{Acting, Draining, Run};
@@ -21,7 +21,7 @@ use crate::state::{BallState, INPUTS, Inputs, Ranges, STATES, State, index};
 #[derive(Clone, Debug)]
 pub struct Spacecraft {
     motion: Box<CraftMotion>,
-    /// Equations with draining tanks, if there are any.
+    /// Equations with draining tanks or planar modes, if there are any.
     draining: Option<Box<Draining>>,
     limits: Limits,
     /// Of the tanks in use.
@@ -61,11 +61,8 @@ impl Spacecraft {
             }
             for n in 0..MODES {
                 let is_used = i < p.tanks && n < p.tank[i].modes;
-                let [direction, rate] = if is_used {
-                    on_sphere(p.tank[i].p_0[n], p.tank[i].p_dot_0[n])
-                } else {
-                    [[0.0, 0.0, -1.0], [0.0; 3]]
-                };
+                let [direction, rate] =
+                    if is_used { p.tank[i].at_start(n) } else { [[0.0, 0.0, -1.0], [0.0; 3]] };
                 put(index::bob(i, n), &direction);
                 put(index::bob(i, n) + 3, &rate);
             }

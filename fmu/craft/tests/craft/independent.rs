@@ -36,11 +36,25 @@ fn bodies(p: &Parameters) -> Vec<(f64, V, Matrix3<f64>)> {
     let mut bodies = vec![(p.craft.mass, v(&p.craft.r), own(p.craft.j.matrix()))];
     for tank in &p.tank[..p.tanks] {
         let axes = rotation(&tank.q);
-        let local = Matrix3::from_diagonal(&V::new(tank.i_0, tank.i_0, tank.i_z));
-        let s = v(&tank.position) + axes * V::new(0.0, 0.0, tank.h_0);
+        let [xy, xz, yz] = tank.products;
+        let (xx, yy) = (tank.i_0, tank.i_0 + tank.di_y);
+        let local = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, tank.i_z);
+        let s = v(&tank.position) + axes * V::new(tank.r_0[0], tank.r_0[1], tank.h_0);
         bodies.push((tank.m_0, s, axes.matrix() * local * axes.matrix().transpose()));
     }
     bodies
+}
+
+/// Unit vector across the plane of a mode that swings in one, tank axes, and its hinge from the tank's origin.
+fn plane(tank: &Tank, n: usize) -> (Option<V>, V) {
+    let direction = V::new(tank.direction[n][0], tank.direction[n][1], 0.0);
+    let on_axis = V::z() * tank.hinge[n];
+    if direction == V::zeros() {
+        return (None, on_axis);
+    }
+    // A momentum along the direction has the moment arm about the axis where it is at arm z x direction, backwards.
+    let across = V::z().cross(&direction).normalize();
+    (Some(across), on_axis - across * tank.arm[n])
 }
 
 /// A pivot's torque: the turn that brings its axis from where it is in the body to the body's z axis, damping and
@@ -62,9 +76,9 @@ fn rigid_motion(p: &Parameters, x: &[f64; STATES], u: &Inputs) -> [V; 2] {
     let w = v(&x[index::OMEGA..]);
     let mut all = bodies(p);
     for tank in &p.tank[..p.tanks] {
-        let e = rotation(&tank.q) * V::z();
+        let axes = rotation(&tank.q);
         for n in 0..tank.modes {
-            let s = v(&tank.position) + e * (tank.hinge[n] - tank.length[n]);
+            let s = v(&tank.position) + axes * (plane(tank, n).1 - V::z() * tank.length[n]);
             all.push((tank.mass[n], s, Matrix3::zeros()));
         }
     }
@@ -155,7 +169,7 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
     let w = v(&x[index::OMEGA..]);
     let bobs: Vec<(usize, usize)> =
         (0..p.tanks).flat_map(|i| (0..p.tank[i].modes).map(move |n| (i, n))).collect();
-    let size = 6 + 4 * bobs.len();
+    let size = 6 + 5 * bobs.len();
     let mut m = DMatrix::<f64>::zeros(size, size);
     let mut rhs = DVector::<f64>::zeros(size);
     let put = |m: &mut DMatrix<f64>, i: usize, j: usize, block: Matrix3<f64>| {
@@ -188,18 +202,21 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
         let tank = &p.tank[i];
         let axes = rotation(&tank.q);
         let at = index::bob(i, n);
-        let dir = (axes * v(&x[at..])).normalize();
-        let rate = axes * v(&x[at + 3..]);
+        let (across, hinge) = plane(tank, n);
+        // What a host sets off the plane does not count.
+        let flat = |x: V| across.map_or(x, |b| x - b * b.dot(&x));
+        let dir = (axes * flat(v(&x[at..]))).normalize();
+        let rate = axes * flat(v(&x[at + 3..]));
         let rate = rate - dir * dir.dot(&rate);
         let (e, l, mass) = (axes * V::z(), tank.length[n], tank.mass[n]);
-        let rho = v(&tank.position) + e * tank.hinge[n] + dir * l;
+        let rho = v(&tank.position) + axes * hinge + dir * l;
         let perp = dir - e * e.dot(&dir);
         let hinge = rho - dir * l;
         let along = e.dot(&(rigid_a + rigid_w_d.cross(&hinge) + w.cross(&w.cross(&hinge))));
         let c = drag(tank, n, along, perp.norm_squared(), rate.norm_squared());
         let (drag, centring) = (rate * (c * l), perp * (tank.k[n] * l));
         let phi = drag + centring;
-        let at = 6 + 4 * b;
+        let at = 6 + 5 * b;
         // Newton's law of the bob.
         put(&mut m, at, 0, one * mass);
         let euler = if wrong(EulerSign) { -1.0 } else { unless(EulerLeftOut) };
@@ -213,6 +230,18 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
             let arm = if wrong(PullAboutTank) { rho - v(&tank.position) } else { rho };
             m[(k, at + 3)] = -dir[k] * unless(NoAddedMass);
             m[(3 + k, at + 3)] = -arm.cross(&dir)[k] * unless(NoAddedMass);
+        }
+        match across.map(|b| axes * b) {
+            // b.p = 0 twice differentiated, and what holds it there.
+            Some(b) => {
+                for k in 0..3 {
+                    m[(at + k, at + 4)] = b[k];
+                    m[(at + 4, at + k)] = b[k];
+                    m[(k, at + 4)] = -b[k];
+                    m[(3 + k, at + 4)] = -rho.cross(&b)[k];
+                }
+            }
+            None => m[(at + 4, at + 4)] = 1.0,
         }
         let coriolis = if wrong(CoriolisOnce) { l } else { 2.0 * l };
         let inertial = w.cross(&w.cross(&rho)) + w.cross(&rate) * coriolis;
@@ -237,7 +266,7 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
         let arm = |at_hinge: Mistake| if wrong(at_hinge) { hinge } else { rho };
         torque += arm(DragAtHinge).cross(&drag) * unless(DragWithoutReaction);
         torque += arm(CentringAtHinge).cross(&centring) * unless(CentringWithoutReaction);
-        seen.push((i, axes, dir, rho, phi));
+        seen.push((i, axes, dir, across.map_or(V::zeros(), |b| axes * b), rho, phi));
     }
     rhs.rows_mut(0, 3).copy_from(&force);
     rhs.rows_mut(3, 3).copy_from(&torque);
@@ -260,10 +289,10 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
         })
         .collect();
     let mut p_dd = Vec::new();
-    for (b, (i, axes, dir, rho, phi)) in seen.iter().enumerate() {
-        let at = 6 + 4 * b;
+    for (b, (i, axes, dir, across, rho, phi)) in seen.iter().enumerate() {
+        let at = 6 + 5 * b;
         p_dd.push(axes.inverse() * v(&y.as_slice()[at..]));
-        let f = dir * y[at + 3] + phi;
+        let f = dir * y[at + 3] + across * y[at + 4] + phi;
         wrench[*i][0] += f;
         wrench[*i][1] += rho.cross(&f);
     }
@@ -272,8 +301,17 @@ fn solve_with(mistake: Mistake, p: &Parameters, x: &[f64; STATES], u: &Inputs) -
 
 /// A random craft at a random state with bobs anywhere on their spheres.
 fn anywhere(seed: u64) -> (Random, Parameters, [f64; STATES], Inputs) {
+    anywhere_with(seed, |_, _| {})
+}
+
+/// The same with other tanks.
+fn anywhere_with(
+    seed: u64,
+    change: impl Fn(&mut Random, &mut Tank),
+) -> (Random, Parameters, [f64; STATES], Inputs) {
     let mut random = Random::new(seed);
     let mut p = random.parameters();
+    p.tank.iter_mut().for_each(|tank| change(&mut random, tank));
     if seed.is_multiple_of(4) {
         (p.mount, p.init.velocity) = (Mount::Pivot, [0.0; 3]);
         p.pivot = random.pivot();
@@ -307,36 +345,53 @@ const ROUNDING: f64 = 1e-11;
 #[test]
 fn accelerations_and_wrenches_are_those_of_newtons_law_with_the_pulls_as_unknowns() {
     for seed in 0..300 {
-        let (mut random, mut p, x, u) = anywhere(seed);
-        if seed.is_multiple_of(2) {
-            p.tank.iter_mut().for_each(|tank| random.follow(tank));
+        compare_with_newton(seed, anywhere(seed));
+    }
+}
+
+/// Planar modes among others, off the axis, in tanks whose rigid liquid is not alike all around it.
+#[test]
+fn planar_modes_are_those_of_newtons_law_with_what_holds_them_as_unknowns() {
+    for seed in 0..300 {
+        let craft = anywhere_with(seed, Random::make_planar);
+        if craft.1.tanks > 0 {
+            compare_with_newton(seed, craft);
         }
-        let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap();
-        craft.set_continuous_states(&x);
-        let want = solve(&p, &x, &u);
-        let rate = craft.derivatives(&u);
-        let out = craft.outputs_held(&u);
-        let what = format!("seed {seed}");
-        let size = want.a.amax().max(want.w_d.amax());
-        assert_close(&out.specific_force, want.a.as_slice(), size, ROUNDING, &what);
-        assert_close(&out.omega_dot, want.w_d.as_slice(), size, ROUNDING, &what);
-        assert_close(&rate[index::OMEGA..][..3], want.w_d.as_slice(), size, ROUNDING, &what);
-        if p.mount == Mount::Free {
-            let v_d = rotation(&x[..4]) * want.a;
-            assert_close(&rate[index::VELOCITY..][..3], v_d.as_slice(), size, ROUNDING, &what);
+    }
+}
+
+fn compare_with_newton(
+    seed: u64,
+    (mut random, mut p, x, u): (Random, Parameters, [f64; STATES], Inputs),
+) {
+    if seed.is_multiple_of(2) {
+        p.tank.iter_mut().for_each(|tank| random.follow(tank));
+    }
+    let mut craft = Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap();
+    craft.set_continuous_states(&x);
+    let want = solve(&p, &x, &u);
+    let rate = craft.derivatives(&u);
+    let out = craft.outputs_held(&u);
+    let what = format!("seed {seed}");
+    let size = want.a.amax().max(want.w_d.amax());
+    assert_close(&out.specific_force, want.a.as_slice(), size, ROUNDING, &what);
+    assert_close(&out.omega_dot, want.w_d.as_slice(), size, ROUNDING, &what);
+    assert_close(&rate[index::OMEGA..][..3], want.w_d.as_slice(), size, ROUNDING, &what);
+    if p.mount == Mount::Free {
+        let v_d = rotation(&x[..4]) * want.a;
+        assert_close(&rate[index::VELOCITY..][..3], v_d.as_slice(), size, ROUNDING, &what);
+    }
+    let mut bobs = want.p_dd.iter();
+    for i in 0..p.tanks {
+        for n in 0..p.tank[i].modes {
+            let at = index::bob(i, n) + 3;
+            let p_dd = bobs.next().unwrap().as_slice();
+            assert_close(&rate[at..at + 3], p_dd, size / p.tank[i].length[n], ROUNDING, &what);
         }
-        let mut bobs = want.p_dd.iter();
-        for i in 0..p.tanks {
-            for n in 0..p.tank[i].modes {
-                let at = index::bob(i, n) + 3;
-                let p_dd = bobs.next().unwrap().as_slice();
-                assert_close(&rate[at..at + 3], p_dd, size / p.tank[i].length[n], ROUNDING, &what);
-            }
-            let [f, tau] = want.wrench[i];
-            let size = f.amax();
-            assert_close(&out.tank[i].force, f.as_slice(), size, ROUNDING, &what);
-            assert_close(&out.tank[i].torque, tau.as_slice(), size, ROUNDING, &what);
-        }
+        let [f, tau] = want.wrench[i];
+        let size = f.amax();
+        assert_close(&out.tank[i].force, f.as_slice(), size, ROUNDING, &what);
+        assert_close(&out.tank[i].torque, tau.as_slice(), size, ROUNDING, &what);
     }
 }
 

@@ -66,6 +66,24 @@ impl Random {
         }
     }
 
+    /// Takes a tank its axial symmetry: two thirds of its modes are planar, with less rigid liquid than their masses.
+    pub fn make_planar(&mut self, tank: &mut Tank) {
+        tank.m_0 *= self.between(-0.3, 1.0);
+        tank.i_0 = self.between(-1.0, 5.0);
+        (tank.r_0, tank.di_y) = (self.vector(0.1), self.between(-2.0, 2.0));
+        tank.products = self.vector(0.5);
+        for n in 0..tank.modes {
+            if self.below(3) > 0 {
+                tank.direction[n] = self.vector(2.0);
+                tank.arm[n] = self.between(-0.3, 0.3);
+            }
+        }
+        // At least one, which makes them effective below 0.
+        if tank.direction[0] == [0.0; 2] {
+            tank.direction[0] = [0.0, 1.0];
+        }
+    }
+
     pub fn parameters(&mut self) -> Parameters {
         let mass = self.magnitude(150.0, 3000.0);
         let size = mass * self.between(0.3, 1.0);
