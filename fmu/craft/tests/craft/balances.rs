@@ -177,7 +177,7 @@ fn name(record: &Value) -> &str {
 #[test]
 fn momentum_angular_momentum_and_energy_balance_over_1000_s_of_random_craft() {
     let mut excess = Vec::new();
-    for seed in 0..11 {
+    for seed in 0..14 {
         let mut random = Random::new(seed);
         let mut p = random.parameters();
         if seed >= 9 {
@@ -187,6 +187,14 @@ fn momentum_angular_momentum_and_energy_balance_over_1000_s_of_random_craft() {
         if seed == 10 {
             // Its torque changes the momentum about every axis.
             (p.pivot, end) = (random.pivot(), 1000);
+        }
+        if seed > 10 {
+            // 20 s: their steps take longer.
+            (p.mount, end) = (if seed == 13 { Mount::Pivot } else { Mount::Free }, 1000);
+            random.make_all_planar(&mut p);
+        }
+        if seed == 13 {
+            p.init.velocity = [0.0; 3];
         }
         if seed.is_multiple_of(3) {
             p.tank.iter_mut().for_each(|tank| random.follow(tank));

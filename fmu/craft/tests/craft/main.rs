@@ -15,6 +15,7 @@ mod independent;
 mod invariances;
 mod life;
 mod mass;
+mod planar;
 mod random;
 mod records;
 mod reference;

@@ -66,9 +66,15 @@ impl Random {
         }
     }
 
+    /// [`Random::make_planar`] for every tank of a craft.
+    pub fn make_all_planar(&mut self, p: &mut Parameters) {
+        p.tanks = p.tanks.max(1);
+        p.tank.iter_mut().for_each(|tank| self.make_planar(tank));
+    }
+
     /// Takes a tank its axial symmetry: two thirds of its modes are planar, with less rigid liquid than their masses.
     pub fn make_planar(&mut self, tank: &mut Tank) {
-        tank.m_0 *= self.between(-0.3, 1.0);
+        tank.m_0 *= self.between(-0.1, 1.0);
         tank.i_0 = self.between(-1.0, 5.0);
         (tank.r_0, tank.di_y) = (self.vector(0.1), self.between(-2.0, 2.0));
         tank.products = self.vector(0.5);
