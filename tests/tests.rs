@@ -37,6 +37,8 @@ mod six {
     mod exchange;
     #[path = "../../fmu/craft/tests/craft/invariances.rs"]
     mod invariances;
+    #[path = "../../fmu/craft/tests/craft/planar.rs"]
+    mod planar;
     #[path = "../../fmu/craft/tests/craft/random.rs"]
     mod random;
     #[path = "../../fmu/craft/tests/craft/records.rs"]

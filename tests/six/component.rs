@@ -91,6 +91,24 @@ impl Settings {
         if tank.fill.points > 0 {
             self.fill(name, tank);
         }
+        for (what, value) in [
+            ("dI_y", tank.di_y),
+            ("I_xy", tank.products[0]),
+            ("I_xz", tank.products[1]),
+            ("I_yz", tank.products[2]),
+        ] {
+            if value != 0.0 {
+                self.real(of(what), value);
+            }
+        }
+        // Of Spacecraft alone.
+        if tank.r_0 != [0.0; 2] {
+            self.reals(elements(&of("r_0"), 2), &tank.r_0);
+        }
+        if tank.direction != [[0.0; 2]; MODES] {
+            self.reals(rows(&of("direction"), (MODES, 2)), tank.direction.as_flattened());
+            self.reals(elements(&of("arm"), MODES), &tank.arm);
+        }
         if tank.ball.travel > 0.0 {
             for (what, value) in [
                 ("travel", tank.ball.travel),

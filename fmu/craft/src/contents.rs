@@ -13,8 +13,7 @@
 //! The bob of a planar mode swings in the plane through P across b, a unit vector fixed in the tank, which holds it there:
 //!
 //! ```text
-//! -N b to the right-hand side of Newton's law,   N = N_0 - m u.[a; w'],  u = [b; rho x b]
-//! N_0 = -m b.(w x (w x rho) + 2 w x rho')
+//! -N b to the right-hand side of Newton's law,   N = -m b.G = N_0 - m u.[a; w'],  u = [b; rho x b]
 //! p'' = -(1 - p p^T - b b^T) G/l - |p'|^2 p                  p.b = p'.b = 0
 //! ```
 //!
@@ -77,6 +76,9 @@ pub struct MountedTank {
     axes: Mat3,
     e: Vec3,
     d: Vec3,
+    /// Whether there are planar modes, and their b, body axes.
+    planar: bool,
+    across: [Option<Vec3>; MODES],
     /// The rigid liquid and all liquid at rest, where they are not alike all around the axis.
     uneven: Option<[Rigid; 2]>,
 }
@@ -84,17 +86,6 @@ pub struct MountedTank {
 /// A quantity that stays, with its derivatives by time.
 fn jet<T: Number>(x: f64) -> Jet<T> {
     [x, 0.0, 0.0].map(T::constant)
-}
-
-/// What holds a bob in one direction: m u u^T of the mass matrix, and a pull, force on the craft.
-#[derive(Clone, Copy)]
-struct Hold<T> {
-    /// p or b
-    along: Vec3<T>,
-    /// [p; rho x p] or [b; rho x b]
-    u: [T; 6],
-    /// T_0 or N_0
-    at_rest: T,
 }
 
 /// A bob, with what its equation has besides [a; w'].
@@ -105,9 +96,9 @@ pub struct Swing<T> {
     p_d: Vec3<T>,
     rho: Vec3<T>,
     rho_d: Vec3<T>,
-    rod: Hold<T>,
-    /// Of a planar mode.
-    guide: Option<Hold<T>>,
+    /// [p; P x p]
+    u: [T; 6],
+    t_0: T,
     /// phi, and G without a + w' x rho
     phi: Vec3<T>,
     known: Vec3<T>,
@@ -121,7 +112,8 @@ pub struct Swing<T> {
 }
 
 /// A tank's contents at an instant.
-pub struct Contents<T> {
+pub struct Contents<'a, T> {
+    mounted: &'a MountedTank,
     pub rigid: Rigid<T>,
     /// Force and torque about O that the flow within makes.
     flow_wrench: [Vec3<T>; 2],
@@ -148,7 +140,10 @@ impl MountedTank {
             let bobs = (0..tank.modes).map(|n| point(Bob::new(tank, 0, n)));
             [tank.rigid(), bobs.fold(tank.rigid(), |sum, bob| sum.and(&bob))]
         });
-        MountedTank { tank: *tank, curves, axes, e, d, uneven }
+        let across = core::array::from_fn(|n| {
+            (n < tank.modes).then(|| tank.hinge_and_across(n).1).flatten()
+        });
+        MountedTank { tank: *tank, curves, axes, e, d, planar: tank.is_planar(), across, uneven }
     }
 
     /// Whether any mode's drag depends on acceleration or amplitude.
@@ -184,6 +179,15 @@ impl MountedTank {
         bobs.and(&Rigid::axial(m_0, add(d, scale(h_0, e)), i_0, i_z, e))
     }
 
+    /// Hinge, p and p' of mode n (from 0) from those on the axis and in every direction.
+    // Apart, as all of planar modes: craft without take fewer instructions so.
+    #[inline(never)]
+    fn guided<T: Number>(&self, n: usize, [hinge, p, p_d]: [Vec3<T>; 3]) -> [Vec3<T>; 3] {
+        let Some(b) = self.across[n].map(constant) else { return [hinge, p, p_d] };
+        let [p, p_d] = [p, p_d].map(|x| sub(x, scale(dot(b, x), b)));
+        [sub(hinge, b.map(|b| b * self.tank.arm[n])), p, p_d]
+    }
+
     /// x: p and p' of each mode, tank axes; `a`, `w_d`: the motion whose acceleration along the tank the drag follows;
     /// `liquid`, `flow` and its `slope` count for tanks with a table.
     pub fn contents<T: Number>(
@@ -193,7 +197,7 @@ impl MountedTank {
         liquid: T,
         flow: T,
         slope: f64,
-    ) -> Contents<T> {
+    ) -> Contents<'_, T> {
         let MountedTank { tank, curves, axes, .. } = self;
         let drains = tank.fill.points > 0;
         let c = T::constant;
@@ -227,10 +231,8 @@ impl MountedTank {
             let mut p = times(&axes, vec_of(x, 6 * n));
             let mut p_d = times(&axes, vec_of(x, 6 * n + 3));
             let mut hinge = add(d, scale(h[0], e));
-            let across = tank.across(n).map(|b| times(&self.axes, b));
-            if let Some(b) = across.map(constant) {
-                [p, p_d] = [p, p_d].map(|x| sub(x, scale(dot(b, x), b)));
-                hinge = sub(hinge, b.map(|b| b * tank.arm[n]));
+            if self.planar {
+                [hinge, p, p_d] = self.guided(n, [hinge, p, p_d]);
             }
             let [p, p_d] = on_sphere(p, p_d);
             let rho = add(hinge, scale(l[0], p));
@@ -247,15 +249,7 @@ impl MountedTank {
             let t_0 = m[0] * (l[0] * dot(p_d, p_d) - dot(p, settling) - l[2])
                 - l[0] * dot(p_perp, p_perp) * k;
             let known = add(add(settling, scale(l[1] * 2.0, p_d)), scale(m[0].recip(), phi));
-            let hold = |along: Vec3<T>, from: Vec3<T>, at_rest: T| {
-                let turned = cross(from, along);
-                let u = [along[0], along[1], along[2], turned[0], turned[1], turned[2]];
-                Hold { along, u, at_rest }
-            };
-            let guide = across.map(|b| {
-                let b = constant(b);
-                hold(b, rho, -(m[0] * dot(b, settling)))
-            });
+            let turned = cross(hinge, p);
             // What leaves the bob.
             let b = h[0] + l[0] * height;
             let b_d = h[1] + l[1] * height + l[0] * height_d;
@@ -282,8 +276,8 @@ impl MountedTank {
                 p_d,
                 rho,
                 rho_d,
-                rod: hold(p, hinge, t_0),
-                guide,
+                u: [p[0], p[1], p[2], turned[0], turned[1], turned[2]],
+                t_0,
                 phi,
                 known,
                 centring: l[0] * l[0] * dot(p_perp, p_perp) * (0.5 * k),
@@ -329,21 +323,31 @@ impl MountedTank {
                 torque.into_iter().fold(flow_wrench[1], |sum, part| sub(sum, part)),
             ];
         }
-        Contents { rigid, flow_wrench, flow_momentum: level, bobs, dissipation, shrinking }
+        Contents {
+            mounted: self,
+            rigid,
+            flow_wrench,
+            flow_momentum: level,
+            bobs,
+            dissipation,
+            shrinking,
+        }
     }
 
     /// The bobs' p' and p'' in tank axes, as six numbers each, under [a; w'].
     pub fn put_rates<T: Number>(
         &self,
-        contents: &Contents<T>,
+        contents: &Contents<'_, T>,
         [a, w_d]: [Vec3<T>; 2],
         mut put: impl FnMut(usize, &[T]),
     ) {
         let axes: Mat3<T> = self.axes.map(constant);
         for (n, bob) in contents.bobs.iter().flatten().enumerate() {
-            let g = add(add(a, cross(w_d, bob.rho)), bob.known);
+            let g = bob.acceleration(a, w_d);
             let mut across = sub(g, scale(dot(bob.p, g), bob.p));
-            if let Some(Hold { along: b, .. }) = bob.guide {
+            if self.planar
+                && let Some(b) = self.across[n].map(constant)
+            {
                 across = sub(across, scale(dot(b, g), b));
             }
             let p_dd = add(scale(bob.l.recip(), across), scale(dot(bob.p_d, bob.p_d), bob.p));
@@ -353,7 +357,7 @@ impl MountedTank {
     }
 
     /// What the outputs need of the bobs.
-    pub fn bobs_now<T: Number>(&self, contents: &Contents<T>) -> [Option<BobNow<T>>; MODES] {
+    pub fn bobs_now<T: Number>(&self, contents: &Contents<'_, T>) -> [Option<BobNow<T>>; MODES] {
         let axes: Mat3<T> = self.axes.map(constant);
         let mut bobs = [(); MODES].map(|()| None);
         for (n, bob) in contents.bobs.iter().flatten().enumerate() {
@@ -388,61 +392,90 @@ impl MountedTank {
     }
 }
 
-impl<T: Number> Hold<T> {
-    /// The pull on a bob of mass m under [a; w'].
-    fn pull(&self, m: T, [a, w_d]: [Vec3<T>; 2]) -> T {
-        let u = self.u;
-        self.at_rest - m * (dot([u[0], u[1], u[2]], a) + dot([u[3], u[4], u[5]], w_d))
-    }
-}
-
 impl<T: Number> Swing<T> {
-    fn holds(&self) -> impl Iterator<Item = &Hold<T>> {
-        core::iter::once(&self.rod).chain(&self.guide)
-    }
-
     /// T under [a; w'].
     fn tension(&self, a: Vec3<T>, w_d: Vec3<T>) -> T {
-        self.rod.pull(self.m, [a, w_d])
+        let u = self.u;
+        self.t_0 - self.m * (dot([u[0], u[1], u[2]], a) + dot([u[3], u[4], u[5]], w_d))
     }
 
-    /// Force and torque about O on the craft with the pull of each hold.
-    fn wrench(&self, pull: impl Fn(&Hold<T>) -> T) -> [Vec3<T>; 2] {
-        let mut force = add(scale(pull(&self.rod), self.p), self.phi);
-        if let Some(guide) = &self.guide {
-            force = add(force, scale(pull(guide), guide.along));
-        }
+    /// G under [a; w'].
+    fn acceleration(&self, a: Vec3<T>, w_d: Vec3<T>) -> Vec3<T> {
+        add(add(a, cross(w_d, self.rho)), self.known)
+    }
+
+    /// Force and torque about O on the craft at the tension T.
+    fn wrench(&self, tension: T) -> [Vec3<T>; 2] {
+        let force = add(scale(tension, self.p), self.phi);
         [force, cross(self.rho, force)]
     }
 }
 
-impl<T: Number> Contents<T> {
+impl<T: Number> Contents<'_, T> {
     /// Adds the bobs' inertia along their rods and across the planes of planar modes, m u u^T.
     pub fn add_rods(&self, matrix: &mut Mat6<T>) {
         for bob in self.bobs.iter().flatten() {
-            for hold in bob.holds() {
-                for i in 0..6 {
-                    for k in 0..6 {
-                        matrix[i][k] = matrix[i][k] + bob.m * hold.u[i] * hold.u[k];
-                    }
+            for i in 0..6 {
+                for k in 0..6 {
+                    matrix[i][k] = matrix[i][k] + bob.m * bob.u[i] * bob.u[k];
+                }
+            }
+        }
+        if self.mounted.planar {
+            self.add_carried(matrix);
+        }
+    }
+
+    #[inline(never)]
+    fn add_carried(&self, matrix: &mut Mat6<T>) {
+        for (bob, b) in self.planar() {
+            let c = cross(bob.rho, b);
+            let u = [b[0], b[1], b[2], c[0], c[1], c[2]];
+            for i in 0..6 {
+                for k in 0..6 {
+                    matrix[i][k] = matrix[i][k] + bob.m * u[i] * u[k];
                 }
             }
         }
     }
 
+    /// The bobs of planar modes with b.
+    fn planar(&self) -> impl Iterator<Item = (&Swing<T>, Vec3<T>)> {
+        let across = self.bobs.iter().zip(&self.mounted.across);
+        across.filter_map(|(bob, b)| Some((bob.as_ref()?, constant((*b)?))))
+    }
+
+    /// Adds what holds planar modes in their planes under [a; w'].
+    #[inline(never)]
+    fn add_guides(&self, sum: [Vec3<T>; 2], [a, w_d]: [Vec3<T>; 2]) -> [Vec3<T>; 2] {
+        let guides = self.planar().map(|(bob, b)| {
+            let n = -(bob.m * dot(b, bob.acceleration(a, w_d)));
+            let force = scale(n, b);
+            [force, cross(bob.rho, force)]
+        });
+        guides.fold(sum, |sum, guide| [add(sum[0], guide[0]), add(sum[1], guide[1])])
+    }
+
     /// Force and torque about O on the craft at a = w' = 0, the rigid liquid's inertia left out.
     pub fn loads(&self) -> [Vec3<T>; 2] {
-        let bobs = self.bobs.iter().flatten().map(|bob| bob.wrench(|hold| hold.at_rest));
-        bobs.fold(self.flow_wrench, |sum, bob| [add(sum[0], bob[0]), add(sum[1], bob[1])])
+        let bobs = self.bobs.iter().flatten().map(|bob| bob.wrench(bob.t_0));
+        let sum =
+            bobs.fold(self.flow_wrench, |sum, bob| [add(sum[0], bob[0]), add(sum[1], bob[1])]);
+        match self.mounted.planar {
+            true => self.add_guides(sum, [constant([0.0; 3]); 2]),
+            false => sum,
+        }
     }
 
     /// Force and torque about O on the craft.
     pub fn wrench(&self, a: Vec3<T>, w: Vec3<T>, w_d: Vec3<T>) -> [Vec3<T>; 2] {
         let rigid = self.rigid.inertial_wrench(a, w, w_d);
-        let bobs =
-            (self.bobs.iter().flatten()).map(|bob| bob.wrench(|hold| hold.pull(bob.m, [a, w_d])));
-        let sum =
+        let bobs = self.bobs.iter().flatten().map(|bob| bob.wrench(bob.tension(a, w_d)));
+        let mut sum =
             bobs.fold(self.flow_wrench, |sum, bob| [add(sum[0], bob[0]), add(sum[1], bob[1])]);
+        if self.mounted.planar {
+            sum = self.add_guides(sum, [a, w_d]);
+        }
         [sub(sum[0], rigid[0]), sub(sum[1], rigid[1])]
     }
 

@@ -129,6 +129,7 @@ const PER_TANK: &[Dimension] = &[TANK];
 const TANK_VECTOR: &[Dimension] = &[TANK, Fixed(3)];
 const PER_MODE: &[Dimension] = &[TANK, Fixed(MODES)];
 const MODE_VECTOR: &[Dimension] = &[TANK, Fixed(MODES), Fixed(3)];
+const MODE_PAIR: &[Dimension] = &[TANK, Fixed(MODES), Fixed(2)];
 
 const TABLE_OF_TANK: &[Dimension] = &[TANK, Fixed(POINTS)];
 const TABLE_OF_MODE: &[Dimension] = &[TANK, Fixed(MODES), Fixed(POINTS)];
@@ -371,14 +372,24 @@ static VARIABLES: &[Variable<Model>] = &[
         .display_unit("mm").shape(PER_TANK).range(1e-3, 1e3),
     V::parameter("tank[].density", |p, n| &mut p.tank[n].density, "kg/m3", "Density of the liquid, used where diameter is above 0")
         .shape(PER_TANK).range(1e-3, 1e5),
-    V::parameter("tank[].m_0", |p, n| &mut p.tank[n].m_0, "kg", "Mass of the rigid liquid")
-        .shape(PER_TANK).range(0.0, 1e9),
+    V::parameter("tank[].m_0", |p, n| &mut p.tank[n].m_0, "kg", "Mass of the rigid liquid; below 0 allowed with planar modes (direction) alone")
+        .shape(PER_TANK).range(-1e9, 1e9),
     V::parameter("tank[].H_0", |p, n| &mut p.tank[n].h_0, "m", "Height of the rigid liquid's centre of mass on the tank's axis")
         .shape(PER_TANK),
-    V::parameter("tank[].I_0", |p, n| &mut p.tank[n].i_0, "kg.m2", "Moment of inertia of the rigid liquid across the axis, about its centre of mass")
-        .shape(PER_TANK).range(0.0, 1e12),
-    V::parameter("tank[].I_z", |p, n| &mut p.tank[n].i_z, "kg.m2", "Moment of inertia of the rigid liquid about the tank's axis")
-        .shape(PER_TANK).range(0.0, 1e12),
+    V::parameter("tank[].I_0", |p, n| &mut p.tank[n].i_0, "kg.m2", "Moment of inertia of the rigid liquid across the axis, about its centre of mass; with dI_y that about the tank's x axis; below 0 as m_0")
+        .shape(PER_TANK).range(-1e12, 1e12),
+    V::parameter("tank[].I_z", |p, n| &mut p.tank[n].i_z, "kg.m2", "Moment of inertia of the rigid liquid about the tank's axis, through its centre of mass; below 0 as m_0")
+        .shape(PER_TANK).range(-1e12, 1e12),
+    V::parameter("tank[].r_0", |p, n| &mut p.tank[n / 2].r_0[n % 2], "m", "How far the rigid liquid's centre of mass is off the tank's axis, along the tank's x and y axis")
+        .shape(&[TANK, Fixed(2)]),
+    V::parameter("tank[].dI_y", |p, n| &mut p.tank[n].di_y, "kg.m2", "By how much the moment of inertia of the rigid liquid about the tank's y axis exceeds I_0")
+        .shape(PER_TANK).range(-1e12, 1e12),
+    V::parameter("tank[].I_xy", |p, n| &mut p.tank[n].products[0], "kg.m2", "Product of inertia of the rigid liquid about its centre of mass, tank axes, minus the integral of x y dm")
+        .shape(PER_TANK).range(-1e12, 1e12),
+    V::parameter("tank[].I_xz", |p, n| &mut p.tank[n].products[1], "kg.m2", "Product of inertia of the rigid liquid, minus the integral of x z dm")
+        .shape(PER_TANK).range(-1e12, 1e12),
+    V::parameter("tank[].I_yz", |p, n| &mut p.tank[n].products[2], "kg.m2", "Product of inertia of the rigid liquid, minus the integral of y z dm")
+        .shape(PER_TANK).range(-1e12, 1e12),
     V::integer("tank[].modes", |p, n| &mut p.modes[n], "Number of slosh modes of the tank")
         .between(0, MODES as i32).shape(PER_TANK),
     V::parameter("tank[].g_ref", |p, n| &mut p.tank[n].g_ref, "m/s2", "Acceleration along the tank's axis at which zeta holds")
@@ -391,6 +402,12 @@ static VARIABLES: &[Variable<Model>] = &[
         "Natural frequency of a mode with the tank held, at g_ref; above 0 it stands in place of length: (2 pi f)^2 = g_ref/l + k/m")
         .shape(PER_MODE).range(0.0, 1e6),
     V::parameter("tank[].hinge", |p, n| &mut p.tank[n / MODES].hinge[n % MODES], "m", "Height of a mode's hinge on the tank's axis")
+        .shape(PER_MODE),
+    V::parameter("tank[].direction", |p, n| &mut p.tank[n / (2 * MODES)].direction[n / 2 % MODES][n % 2], "1",
+        "Direction in which a mode moves its mass, x and y in tank axes, normalised: the mode is planar, its bob swings in the plane of this direction and the tank's axis and is carried along across it; 0, 0: it swings in every direction")
+        .shape(MODE_PAIR),
+    V::parameter("tank[].arm", |p, n| &mut p.tank[n / MODES].arm[n % MODES], "m",
+        "How far a planar mode's plane is off the tank's axis: the arm about it of a momentum in the mode's direction")
         .shape(PER_MODE),
     V::parameter("tank[].k", |p, n| &mut p.tank[n / MODES].k[n % MODES], "N/m", "Centring stiffness of a mode (capillarity, diaphragm)")
         .shape(PER_MODE).range(0.0, 1e12),
@@ -444,7 +461,7 @@ static VARIABLES: &[Variable<Model>] = &[
     V::parameter("tank[].fill.hinge", |p, n| { let (i, m, k) = point(n); &mut p.tank[i].fill.hinge[m][k] }, "m", "Height of a mode's hinge at a point of the table")
         .shape(TABLE_OF_MODE),
     V::parameter("tank[].p_0", |p, n| { let (i, m, k) = place(n); &mut p.tank[i].p_0[m][k] }, "1",
-        "Direction from hinge to bob at the start, tank axes; normalised")
+        "Direction from hinge to bob at the start, tank axes; normalised, of a planar mode within its plane")
         .shape(MODE_VECTOR),
     V::parameter("tank[].p_dot_0", |p, n| { let (i, m, k) = place(n); &mut p.tank[i].p_dot_0[m][k] }, "1/s",
         "Its rate at the start, tank axes; made tangential")
