@@ -130,6 +130,17 @@ fn springs(
     all.iter().map(|capillary| capillary.spring).collect()
 }
 
+/// Axis and number of the modes of a box in Spacecraft, which has three: the first along either axis, and the heavier one of the
+/// second.
+fn along_both(axes: [&[modal::Mode]; 2]) -> Vec<(usize, usize)> {
+    let mass = |axis: usize| axes[axis].get(1).map_or(0.0, |mode| mode.m);
+    let mut chosen = vec![(0, 0), (1, 0)];
+    if axes.iter().all(|modes| modes.len() > 1) {
+        chosen.push((usize::from(mass(1) > mass(0)), 1));
+    }
+    chosen
+}
+
 /// The damping of a tank's modes with the capillarity of the liquid: see [`damping::of_tank`].
 ///
 /// # Errors
@@ -153,7 +164,7 @@ impl ParameterSet {
     /// The parameters of a tank that was solved for `data`, as many modes as both have.
     ///
     /// # Errors
-    /// A tank that the FMU cannot have: more than four of them, a box with unequal sides in six axes, a full one;
+    /// A tank that the FMU cannot have: more than four of them, a box with unequal sides in SloshTank, a full one;
     /// damping ratios without a specific force.
     pub fn new(
         tank: &Tank,
@@ -172,8 +183,7 @@ impl ParameterSet {
             format!("heights (hinge, H_0): {}", data.origin()),
         ];
         let most = if target == Target::HubSlosh { 10 } else { 3 };
-        let modes = &data.modes[..data.modes.len().min(most)];
-        let Some(first) = modes.first() else {
+        if data.modes.is_empty() {
             return Err(format!(
                 "There are no modes: the tank is full and does not slosh. Its liquid is a rigid body: {:.6} kg at \
                  z = {:.6} m ({}), inertia {} kg·m² across the axis and {} kg·m² about it.",
@@ -184,30 +194,50 @@ impl ParameterSet {
                 significant(data.i_eff_axis.unwrap_or(0.0))
             )
             .into());
-        };
+        }
         if liquid.gravity == 0.0 && liquid.nu.is_some() {
             return Err("A damping ratio holds at a specific force, and at 0 m/s² there is none: give the one that it \
                         is to hold at, or no viscosity."
                 .to_string()
                 .into());
         }
-        if let Geometry::Box { length_x, length_y } = &tank.geometry
-            && target != Target::HubSlosh
-            && length_x != length_y
+        let sides = match &tank.geometry {
+            Geometry::Box { length_x, length_y } if length_x != length_y => {
+                Some([length_x, length_y])
+            }
+            _ => None,
+        };
+        if let Some([length_x, length_y]) = sides
+            && target == Target::SloshTank
         {
             return Err(format!(
-                "A box of {length_x} m by {length_y} m has other modes along x than along y; the six-axis FMUs have the \
-                 same along both: a square box, or a body of revolution."
+                "A box of {length_x} m by {length_y} m has other modes along x than along y; SloshTank has the same along \
+                 both: take Spacecraft, a square box, or a body of revolution."
             )
             .into());
         }
+        // Of a box with unequal sides in Spacecraft the modes along both; else those along the first axis.
+        let both = data.axes.as_ref().filter(|_| sides.is_some() && target != Target::HubSlosh);
+        let chosen: Vec<(usize, usize)> = match both {
+            Some(axes) => along_both([&axes.x.modes, &axes.y.modes]),
+            None => (0..data.modes.len().min(most)).map(|n| (0, n)).collect(),
+        };
+        let count = data.modes.len().min(most);
+        let of_axes = [&data.modes[..count], both.map_or(&[], |axes| &axes.y.modes[..count])];
+        let modes: Vec<modal::Mode> =
+            chosen.iter().map(|&(axis, n)| of_axes[axis][n].clone()).collect();
         let (mut warnings, mut unknown) = (Vec::new(), Vec::new());
-        let springs = springs(tank, data, modes, liquid, &mut notes, &mut warnings, &mut unknown);
-        let ratios = match liquid.nu {
+        let springs = of_axes.map(|all| match all {
+            [] => Vec::new(),
+            _ => springs(tank, data, all, liquid, &mut notes, &mut warnings, &mut unknown),
+        });
+        let ratios: Vec<f64> = match liquid.nu {
             Some(nu) => {
                 let found = damping_of(tank, data, nu, liquid)?;
                 notes.push(format!("damping ratio of mode 1: {}", found.taken));
-                for (n, mode) in found.modes.iter().take(modes.len()).enumerate() {
+                let of_axes = [&found.modes, &found.modes_y];
+                let found_of = chosen.iter().map(|&(axis, n)| &of_axes[axis][n]);
+                for (n, mode) in found_of.clone().enumerate() {
                     let [low, high] = mode.interval.map(significant);
                     let zeta = significant(mode.zeta);
                     notes.push(format!(
@@ -215,22 +245,23 @@ impl ParameterSet {
                         n + 1
                     ));
                 }
+                let ratios = found_of.map(|mode| mode.zeta).collect();
                 warnings.extend(found.warnings);
-                found.modes.iter().map(|mode| mode.zeta).collect()
+                ratios
             }
             None => {
                 notes.push("no viscosity was given: the damping ratios are 0".to_string());
-                vec![0.0; data.modes.len()]
+                vec![0.0; modes.len()]
             }
         };
         // The same of every FMU, under the name of its tank.
         let of_modes = |prefix: &str, values: &mut Vec<(String, Value)>| {
-            for (n, mode) in modes.iter().enumerate() {
+            for (n, (mode, &(axis, of_axis))) in modes.iter().zip(&chosen).enumerate() {
                 for (what, value) in [
                     ("mass", mode.m),
                     ("length", mode.l),
                     ("hinge", mode.hinge.unwrap_or(0.0)),
-                    ("k", springs[n]),
+                    ("k", springs[axis][of_axis]),
                     ("zeta", ratios[n]),
                     ("wave", mode.wave),
                 ] {
@@ -239,8 +270,8 @@ impl ParameterSet {
             }
         };
         let mut values = Vec::new();
-        if let Geometry::Box { length_x, length_y } = &tank.geometry
-            && length_x != length_y
+        if let Some([length_x, _]) = sides
+            && target == Target::HubSlosh
         {
             notes.push(format!(
                 "the modes are those along the box's first length, {length_x} m: on HubSlosh's hub it lies along the \
@@ -280,14 +311,30 @@ impl ParameterSet {
                     }
                     _ => "tank".to_string(),
                 };
-                let rest = data.rest(modes.len());
+                let rest = match both {
+                    // Each bob is rigid liquid for motion along the other axis. About x: moved along y.
+                    Some(axes) => modal::rest(data.m_liq, data.z_cg, axes.y.i_eff_cg, &modes),
+                    None => data.rest(modes.len()),
+                };
                 real(format!("{prefix}.m_0"), rest.m_0);
                 real(format!("{prefix}.H_0"), rest.height);
                 // The largest number of modes may leave it below 0 by rounding.
-                real(format!("{prefix}.I_0"), rest.inertia.max(0.0));
+                let least = if both.is_some() { f64::NEG_INFINITY } else { 0.0 };
+                real(format!("{prefix}.I_0"), rest.inertia.max(least));
                 real(format!("{prefix}.I_z"), data.i_eff_axis.unwrap_or(0.0));
                 if liquid.gravity > 0.0 {
                     real(format!("{prefix}.g_ref"), liquid.gravity);
+                }
+                if let Some(axes) = both {
+                    real(format!("{prefix}.dI_y"), axes.x.i_eff_cg - axes.y.i_eff_cg);
+                    for (n, &(axis, _)) in chosen.iter().enumerate() {
+                        real(format!("{prefix}.direction[{},{}]", n + 1, axis + 1), 1.0);
+                    }
+                    notes.push(format!(
+                        "planar modes along both lengths: m_0 = {:.6} kg is the liquid less the masses of all, each of which is \
+                         rigid for motion across it",
+                        rest.m_0
+                    ));
                 }
                 of_modes(&prefix, &mut values);
                 values.push((format!("{prefix}.modes"), Value::Integer(modes.len() as i64)));
@@ -296,10 +343,12 @@ impl ParameterSet {
                 }
             }
         }
-        if modes.len() < data.modes.len() {
-            notes.push(format!("the first {} of {} modes", modes.len(), data.modes.len()));
+        let all = data.modes.len() * if both.is_some() { 2 } else { 1 };
+        if modes.len() < all {
+            let which = if both.is_some() { "" } else { "first " };
+            notes.push(format!("the {which}{} of {all} modes", modes.len()));
         }
-        if first.height.is_none() {
+        if modes[0].height.is_none() {
             warnings.push("mode 1 carries hardly any mass: its hinge has no meaning".to_string());
         }
         warnings.dedup();

@@ -635,3 +635,54 @@ fn capillarity_is_unknown_from_a_tenth_of_gravity_s_share_on() {
         ["it adds 100 % to omega^2, too much for the first order in it"]
     );
 }
+
+/// In Spacecraft the same box has planar modes along both lengths. Rigid liquid and bobs where they hang have the liquid's mass and
+/// centre, and about either axis its inertia under a lid, in closed form; SloshTank has no planar modes.
+#[test]
+fn a_box_with_two_lengths_has_planar_modes_in_spacecraft_that_keep_mass_centre_and_inertia() {
+    let tank = Tank::parse("density = 1000.0\nbox = [0.8, 0.5]", Path::new("")).unwrap();
+    let set = |modes: usize, target: Target| {
+        let data = tank.solve(0.4, modes).unwrap();
+        let liquid =
+            Liquid { gravity: 9.81, nu: Some(1e-6), sigma: Some(0.07), contact_angle: 90.0 };
+        ParameterSet::new(&tank, &data, target, liquid)
+    };
+    let refused = set(1, Target::SloshTank).unwrap_err().to_string();
+    assert!(refused.contains("0.8 m by 0.5 m") && refused.contains("Spacecraft"), "{refused}");
+    let axes = tank.solve(0.4, 2).unwrap().axes.unwrap();
+    for (modes, kept) in [(1, 2), (2, 3), (5, 3)] {
+        let set = set(modes, Target::Spacecraft { tank: 2 }).unwrap();
+        let value = |name: &str| real(&set, &format!("tank[2].{name}"));
+        assert!(set.values.contains(&("tank[2].modes".to_string(), Value::Integer(kept))));
+        let bobs: Vec<[f64; 2]> = (1..=kept)
+            .map(|n| {
+                let height = value(&format!("hinge[{n}]")) - value(&format!("length[{n}]"));
+                [value(&format!("mass[{n}]")), height]
+            })
+            .chain([[value("m_0"), value("H_0")]])
+            .collect();
+        let sum = |of: fn(&[f64; 2]) -> f64| bobs.iter().map(of).sum::<f64>();
+        assert!((sum(|[m, _]| *m) - 160.0).abs() < 1e-10);
+        assert!((sum(|[m, z]| m * z) - 160.0 * 0.2).abs() < 1e-10);
+        // 0.2 m is the centre's height.
+        let about_x = value("I_0") + sum(|[m, z]| m * (z - 0.2).powi(2));
+        for (inertia, axis) in [(about_x, &axes.y), (about_x + value("dI_y"), &axes.x)] {
+            assert!((inertia / axis.i_eff_cg - 1.0).abs() < 1e-10, "{modes} {inertia}");
+        }
+        // Waves along x are longer, and slower: l = 1/k coth k h, k = pi/a.
+        for (n, (a, along)) in [(0.8, 1), (0.5, 2)].into_iter().enumerate() {
+            let k = std::f64::consts::PI / a;
+            let length = value(&format!("length[{}]", n + 1));
+            assert!((length * k * (k * 0.4).tanh() - 1.0).abs() < 1e-12);
+            assert_eq!(value(&format!("direction[{},{along}]", n + 1)), 1.0);
+            assert!(
+                value(&format!("zeta[{}]", n + 1)) > 1e-4 && value(&format!("k[{}]", n + 1)) > 0.0
+            );
+        }
+        if kept == 3 {
+            let [x, y] = [&axes.x, &axes.y].map(|axis| axis.modes[1].m);
+            assert!(x > y && (value("mass[3]") - x).abs() < 1e-12);
+            assert_eq!(value("direction[3,1]"), 1.0);
+        }
+    }
+}
