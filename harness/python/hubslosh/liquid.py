@@ -142,6 +142,74 @@ class LiquidModes:
             }
         return values
 
+    def parameters(
+        self,
+        number: int = 1,
+        *,
+        modes: int | None = None,
+        position: Sequence[float] = (0.0, 0.0, 0.0),
+    ) -> "dict[str, Value]":
+        """Return the liquid as tank ``number`` (1 to 4) of Spacecraft, for `simulate`, `Loop`, ….
+
+        Each of its modes is planar, with its own direction. modes: how many, 1 to 3, the heaviest;
+        by default 3, or as many as there are with displacement. position: of O in body axes, m; the
+        axes are parallel. Damping ratios are 0.
+
+        The bobs hang at r_n from the liquid's centre, which the tank's axis passes through. What is
+        left is a rigid body, so that mass, centre and inertia under a lid are the liquid's:
+
+            m_0 = m − Σ m_n,   m_0 r_0 = −Σ m_n r_n,
+            J_0 = J − Σ m_n (|r_n|² 1 − r_n⊗r_n) − m_0 (|r_0|² 1 − r_0⊗r_0)
+        """
+        if number not in (1, 2, 3, 4):
+            raise FmuError(f"the tank's number is 1 to 4, not {number!r}")
+        moving = self.all[self.all["mass"] > _MASSLESS * self.mass]
+        most = min(3, len(moving))
+        count = most if modes is None else modes
+        if not (isinstance(count, int) and 1 <= count <= most):
+            raise FmuError(f"modes is 1 to {most} here, not {modes!r}")
+        place = [float(x) for x in position]
+        if len(place) != 3 or not np.isfinite(place).all():
+            raise FmuError(f"position must be three numbers, not {position!r}")
+        kept = moving.sort_values("mass", ascending=False, kind="stable").head(count)
+        center = np.array(self.center)
+        turn = np.radians(kept["direction"].to_numpy())
+        along = np.array([np.cos(turn), np.sin(turn)])
+        arm = kept["arm"].to_numpy() - (center[0] * along[1] - center[1] * along[0])
+        masses, height = kept["mass"].to_numpy(), kept["bob"].to_numpy() - center[2]
+        bobs = np.array([arm * along[1], -arm * along[0], height])
+        m_0 = self.mass - masses.sum()
+        r_0 = -(bobs @ masses) / m_0
+
+        def of_points(m: np.ndarray, r: np.ndarray) -> np.ndarray:
+            return np.einsum("n,in,in->", m, r, r) * np.eye(3) - np.einsum("n,in,jn->ij", m, r, r)
+
+        inertia = self.lid_inertia - of_points(np.array([self.mass]), center[:, None])
+        left = inertia - of_points(masses, bobs) - of_points(np.array([m_0]), r_0[:, None])
+        axis = (place[0] + center[0], place[1] + center[1], place[2])
+        name = f"tank[{number}]"
+        values: dict[str, Value] = {
+            **{f"{name}.position[{i}]": float(x) for i, x in enumerate(axis, 1)},
+            f"{name}.m_0": float(m_0), f"{name}.H_0": float(center[2] + r_0[2]),
+            f"{name}.r_0[1]": float(r_0[0]), f"{name}.r_0[2]": float(r_0[1]),
+            f"{name}.I_0": float(left[0, 0]), f"{name}.dI_y": float(left[1, 1] - left[0, 0]),
+            f"{name}.I_z": float(left[2, 2]), f"{name}.I_xy": float(left[0, 1]),
+            f"{name}.I_xz": float(left[0, 2]), f"{name}.I_yz": float(left[1, 2]),
+            f"{name}.g_ref": self.gravity, f"{name}.modes": count,
+        }  # fmt: skip
+        for n, (_, mode) in enumerate(kept.iterrows(), 1):
+            values |= {
+                f"{name}.mass[{n}]": float(mode["mass"]),
+                f"{name}.length[{n}]": float(mode["length"]),
+                f"{name}.hinge[{n}]": float(mode["hinge"]),
+                f"{name}.direction[{n},1]": float(along[0, n - 1]),
+                f"{name}.direction[{n},2]": float(along[1, n - 1]),
+                f"{name}.arm[{n}]": float(arm[n - 1]),
+                f"{name}.wave[{n}]": float(mode["wave"]),
+                f"{name}.zeta[{n}]": 0.0,
+            }
+        return values
+
 
 def liquid_modes(
     shape: Mapping[str, Any],

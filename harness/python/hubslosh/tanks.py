@@ -116,10 +116,11 @@ class Tank:
                 raise FmuError(f"the tank's number is 1 to 4, not {number!r}")
             prefix = f"tank[{number}]"
             found = {
-                prefix + name.removeprefix("tank"): value for name, value in self._six_axes.items()
+                prefix + name.removeprefix("tank[1]"): value
+                for name, value in self._of_spacecraft.items()
             }
         elif model == "SloshTank":
-            prefix, found = "tank", dict(self._six_axes)
+            prefix, found = "tank", self._files("SloshTank")
         elif model == "HubSlosh":
             if rigid:
                 raise FmuError("HubSlosh has the rigid liquid as slosh.model = frozen")
@@ -128,10 +129,13 @@ class Tank:
             raise FmuError(f"there are no parameters of a tank for {model!r} (for: Spacecraft, "
                            "SloshTank, HubSlosh)")  # fmt: skip
         if rigid:
-            kept = {f"{prefix}.{name}" for name in ("m_0", "H_0", "I_0", "I_z", "g_ref", "modes")}
+            whole = ("m_0", "H_0", "I_0", "dI_y", "I_z", "g_ref", "modes")
+            kept = {f"{prefix}.{name}" for name in whole}
             found = {name: value for name, value in found.items() if name in kept}
             found |= {f"{prefix}.m_0": self.mass, f"{prefix}.H_0": float(self.all["z_cg"])}
-            found |= {f"{prefix}.I_0": float(self.all["I_eff_cg"]), f"{prefix}.modes": 0}
+            # of a box with two lengths that about y, along its first length
+            about_x = float(self.all["I_eff_cg"]) - float(found.get(f"{prefix}.dI_y", 0.0))
+            found |= {f"{prefix}.I_0": about_x, f"{prefix}.modes": 0}
         if position is not None:
             found |= {f"{prefix}.position[{i + 1}]": float(x) for i, x in enumerate(position)}
         if axis is not None:
@@ -139,8 +143,8 @@ class Tank:
         return found
 
     @cached_property
-    def _six_axes(self) -> "dict[str, Value]":
-        return self._files("SloshTank")
+    def _of_spacecraft(self) -> "dict[str, Value]":
+        return self._files("Spacecraft")
 
     def _files(self, model: str) -> "dict[str, Value]":
         from .tables import read_parameters

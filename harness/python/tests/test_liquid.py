@@ -10,7 +10,7 @@ from scipy.linalg import eigh
 from scipy.optimize import brentq
 from scipy.special import jvp
 
-from hubslosh import FmuError, LiquidModes, liquid_modes, tank
+from hubslosh import FmuError, LiquidModes, linearize, liquid_modes, tank
 
 XI = 1.841183781340659  # first zero of J1'
 
@@ -155,6 +155,58 @@ def test_a_box_drags_liquid_about_its_vertical() -> None:
     table = found.table("x")
     assert table["slosh.table.length[1]"] == pytest.approx(1 / lambdas(found)[0], rel=1e-4)
     assert table["tank.I_own"] == pytest.approx(0.1565 * rigid, rel=4e-3)
+
+
+@pytest.mark.parametrize(
+    ("shape", "fill"),
+    [
+        ({"horizontal_cylinder": {"radius": 0.5, "length": 1.6}}, "40%"),
+        ({"sector": {"inner_radius": 0.3, "radius": 1, "angle": 70, "height": 1}}, 0.5),
+    ],
+)
+def test_spacecraft_has_the_modes_of_each_direction_and_what_they_turn(
+    fmu: Path, shape: dict, fill: float | str
+) -> None:
+    """On a pivot that turns about the vertical alone, off the liquid's centre.
+
+    With the angle ψ, Lzz the liquid's inertia about the vertical through the pivot, arms a_n about
+    it: (J + Lzz) ψ'' + Σ m_n a_n η_n'' = 0, η_n'' + ω_n² η_n + a_n ψ'' = 0, from the potential
+    flow alone.
+    """
+    found = liquid_modes(shape, fill, modes=8, resolution=8)
+    values = found.parameters(2)
+    shift, count = np.array([0.4, 0.7, 0.2]), values["tank[2].modes"]
+    assert count == 3
+    with pytest.raises(FmuError, match="modes is 1 to 3"):
+        found.parameters(modes=4)
+    values = found.parameters(position=shift)
+    own, heavy = 0.3 * found.mass, 1e9 * found.mass
+    craft = {
+        "mount": "pivot", "tanks": 1, "craft.mass": 1.0, "craft.r[3]": 0.0, "craft.Jxx": heavy,
+        "craft.Jyy": heavy, "craft.Jzz": own, "gravity[3]": -found.gravity,
+        "init.omega[1]": 0.0, "init.omega[3]": 0.0,
+    }  # fmt: skip
+    model = linearize(fmu.with_name("Spacecraft.fmu"), craft | values, all_states=True)
+    kept = found.modes.sort_values("mass", ascending=False).head(count)
+    turn = np.radians(kept["direction"])
+    arms = kept["arm"] + shift[0] * np.sin(turn) - shift[1] * np.cos(turn)
+    mass, omega = kept["mass"].to_numpy(), 2 * np.pi * kept["frequency"].to_numpy()
+    center = np.array(found.center[:2])
+    level = found.mass * (((center + shift[:2]) ** 2).sum() - (center**2).sum())
+    inertia = np.diag([own + found.lid_inertia[2, 2] + level, *mass])
+    inertia[0, 1:] = inertia[1:, 0] = mass * arms
+    expected = np.sqrt(eigh(np.diag([0.0, *mass * omega**2]), inertia, eigvals_only=True)[1:])
+    poles = np.abs(model.poles.imag)
+    for w in expected:
+        assert np.abs(poles / w - 1).min() < 1e-6
+    # and every frequency is another than with the pivot held, by what the arms make of it
+    assert np.abs(np.sort(omega) / expected - 1).max() > 0.02
+    # rigid liquid and bobs where they hang: the liquid's mass and centre
+    get = lambda name, n: float(values[f"tank[1].{name}[{n}]"])  # noqa: E731
+    m = np.array([get("mass", n) for n in range(1, count + 1)] + [values["tank[1].m_0"]])
+    z = [get("hinge", n) - get("length", n) for n in range(1, count + 1)]
+    assert m.sum() == pytest.approx(found.mass, rel=1e-12)
+    assert m @ [*z, values["tank[1].H_0"]] == pytest.approx(found.mass * found.center[2], rel=1e-9)
 
 
 @pytest.mark.parametrize("degrees", [10.0, 40.0])
