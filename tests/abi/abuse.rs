@@ -470,7 +470,18 @@ fn scenes(model: &str) -> Vec<Vec<(&'static str, &'static str)>> {
                 ("force[1]", "10"),
             ];
             let on_a_pivot = [&four_tanks[..], &[("mount", "2")]].concat();
-            vec![vec![few], four_tanks, on_a_pivot]
+            let planar = vec![
+                few,
+                ("tank[1].modes", "3"),
+                ("tank[1].direction[1,1]", "1"),
+                ("tank[1].direction[2,2]", "1"),
+                ("tank[1].arm[2]", "0.2"),
+                ("tank[1].r_0[1]", "-0.01"),
+                ("tank[1].I_xz", "0.3"),
+                ("tank[1].p_dot_0[1,1]", "0.1"),
+                ("force[1]", "10"),
+            ];
+            vec![vec![few], four_tanks, on_a_pivot, planar]
         }
         "SloshTank" => vec![
             vec![few],

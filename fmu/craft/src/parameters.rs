@@ -299,24 +299,22 @@ impl Tank {
 
     /// Whether the liquid moves alike in every direction across the axis.
     pub(crate) fn is_axial(&self) -> bool {
-        let [x, y] = self.r_0;
-        let rigid = [x, y, self.di_y].into_iter().chain(self.products);
-        let modes = 0..self.modes.min(MODES);
-        rigid.into_iter().all(|more| more == 0.0)
-            && modes.into_iter().all(|n| self.across(n).is_none())
+        let rigid = self.r_0 == [0.0; 2] && self.di_y == 0.0 && self.products == [0.0; 3];
+        rigid && !self.is_planar()
     }
 
     /// Whether any mode is planar.
     pub(crate) fn is_planar(&self) -> bool {
-        (0..self.modes.min(MODES)).any(|n| self.across(n).is_some())
+        self.direction[..self.modes.min(MODES)].iter().any(|direction| *direction != [0.0; 2])
     }
 
     /// Unit vector b, tank axes, across the plane in which the bob of mode n (from 0) swings: e x b is its direction backwards;
     /// `None` where it swings in every direction.
     pub(crate) fn across(&self, n: usize) -> Option<Vec3> {
         let [x, y] = self.direction[n];
-        let size = libm::hypot(x, y);
-        (size > 0.0).then(|| [-y / size, x / size, 0.0])
+        // Of any use above 1e-6. A compiler may divide before it looks whether there is a direction.
+        let size = libm::hypot(x, y).max(1e-9);
+        (self.direction[n] != [0.0; 2]).then(|| [-y / size, x / size, 0.0])
     }
 
     /// The hinge of mode n (from 0) from O, m, and b of a planar mode; body axes.
@@ -722,14 +720,14 @@ impl Tank {
             let growth = self.zeta_amplitude[n];
             problems.number(&format!("{name}.zeta_amplitude[{i}]"), growth, 0.0, 10.0, "1/rad");
             problems.number(&format!("{name}.wave[{i}]"), self.wave[n], 0.0, FARTHEST, "m/rad");
+            let before = problems.0.len();
             if self.direction[n] != [0.0; 2] {
                 problems.direction(&format!("{name}.direction[{i}]"), &self.direction[n]);
                 problems.number(&format!("{name}.arm[{i}]"), self.arm[n], -FARTHEST, FARTHEST, "m");
             }
-            let before = problems.0.len();
             problems.direction(&format!("{name}.p_0[{i}]"), &self.p_0[n]);
-            if let Some(b) = self.across(n)
-                && problems.0.len() == before
+            if problems.0.len() == before
+                && let Some(b) = self.across(n)
             {
                 let flat = sub(self.p_0[n], scale(dot(b, self.p_0[n]), b));
                 if largest(flat) < 1e-6 {
