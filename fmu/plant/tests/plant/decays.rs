@@ -71,6 +71,24 @@ fn damping_of_decays_follows_the_frequency_down_to_a_millionth_of_a_metre_per_se
     }
 }
 
+/// A ratio that is given holds where the motion starts: with capillarity without gravity, too; without it, where nothing
+/// restores the liquid there, at 1 m/s2.
+#[test]
+fn a_given_damping_ratio_holds_at_the_start_or_at_1_m_per_s2() {
+    let mut p = held(SloshModel::Linear);
+    (p.slosh.zeta_from_correlation, p.slosh.zeta, p.init.slosh_angle) = (false, 2e-3, 0.01);
+    p.slosh.damping_law = DampingLaw::Laminar;
+    for (capillarity, g_start, g) in [(true, 0.0, 0.0), (true, 2.0, 2.0), (false, 0.0, 1.0)] {
+        p.slosh.capillarity = capillarity;
+        let xi = 1.8411837813 / (p.tank.d / 2.0);
+        let a = if capillarity { 0.07213 * xi * xi / 1000.0 } else { 0.0 };
+        let plant = Plant::new(&p, &at(g_start), 0.0, TOLERANCE).unwrap();
+        let omega = ((g + a) / plant.calculated().length[0]).sqrt();
+        let measured = zeta_of_decay(&p, g_start, g, omega);
+        assert!((measured / 2e-3 - 1.0).abs() < 3e-4, "{capillarity} {g_start}: {measured}");
+    }
+}
+
 /// Amplitudes at the turning points of the tangential angle, by parabolas through samples, and their times.
 fn turning_points(p: &Parameters, length: f64) -> Vec<[f64; 2]> {
     let (h, mut found) = (2e-3, Vec::new());

@@ -168,6 +168,16 @@ fn sectors_of_a_ring_add_up() {
     assert!((damping::sector(0.3, 0.3 + 4.0 * quarter) - 0.5).abs() < 1e-6);
     assert!((2.0 * damping::sector(-quarter, quarter) - 0.855).abs() < 5e-4);
     assert!((2.0 * damping::sector(quarter, 3.0 * quarter) - 0.145).abs() < 5e-4);
+    // The same wherever it begins: half a turn farther, or some turns back.
+    for turns in [0.5, 3.0, -2.5] {
+        let on = |from: f64| {
+            damping::sector(from + 8.0 * quarter * turns, from + quarter + 8.0 * quarter * turns)
+        };
+        for from in [-quarter, 0.3, 3.0] {
+            let same = damping::sector(from, from + quarter);
+            assert!((on(from) - same).abs() < 1e-7, "{turns} {from}: {} {same}", on(from));
+        }
+    }
 }
 
 /// omega^2 = (g xi/R + sigma xi^3/(rho R^3)) tanh(xi h/R) exactly; the contour's own integral agrees;
@@ -325,7 +335,11 @@ fn curved_meniscus_is_smooth_between_its_values() {
         let slopes = [(at_5 - at_15) / (cos(5.0) - cos(15.0)), (at_0 - at_5) / (1.0 - cos(5.0))];
         assert!((slopes[1] / slopes[0] - 1.0).abs() < 1e-9, "{bond} {slopes:?}");
     }
-    // the published formula: 0.6 % at 100, 4 % at 10
+    // the published formula's terms, and its distance: 0.6 % at 100, 4 % at 10
+    for (angle, cosine) in [(90.0, 0.0), (60.0, 0.5), (0.0, 1.0)] {
+        let by_hand = 6.26 + 1.84 * 50.0 - 4.76 * cosine;
+        assert!((low_gravity::satterlee_reynolds(50.0, angle) - by_hand).abs() < 1e-13, "{angle}");
+    }
     for (bond, most) in [(30.0, 0.003), (100.0, 0.007), (10.0, 0.045)] {
         let ratio =
             low_gravity::satterlee_reynolds(bond, 5.0) / low_gravity::cylinder_omega2(bond, 5.0);
