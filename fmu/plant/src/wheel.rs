@@ -99,6 +99,26 @@ mod tests {
         Wheel { enabled: true, ..Wheel::default() }
     }
 
+    /// A command that is at a limit, or at 0, is within or beyond by where it goes: at the ends of the speed, of the torque.
+    #[test]
+    fn a_command_at_a_limit_is_judged_by_where_it_goes() {
+        let w = wheel();
+        let none = Ramp { value: 0.0, slope: 0.0 };
+        for (speed, blocked) in [(w.speed_min, 1.0), (w.speed_max, -1.0)] {
+            for value in [0.0, 0.1] {
+                let command = |sign: f64| Ramp { value: sign * value, slope: sign };
+                assert_eq!(w.torque(speed, command(blocked)), none);
+                assert_eq!(w.torque(speed, command(-blocked)), command(-blocked));
+            }
+        }
+        for sign in [1.0, -1.0] {
+            let at = |slope: f64| w.torque(w.speed_0, Ramp { value: sign * w.tau_max, slope });
+            let limit = Ramp { value: sign * w.tau_max, slope: 0.0 };
+            assert_eq!((at(sign), at(0.0)), (limit, limit));
+            assert_eq!(at(-sign), Ramp { slope: -sign, ..limit });
+        }
+    }
+
     #[test]
     fn torque_is_clipped_at_the_limit() {
         // A ramp through 0 from -1 to 1 N m in 2 s keeps zero impulse; both ends are clipped.
