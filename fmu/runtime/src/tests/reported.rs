@@ -132,6 +132,15 @@ fn values_out_of_range_are_discarded_and_say_what_is_allowed() {
     assert!(
         refused(host.set(&SET_FLOAT64, &[start], |_| Value::Real(2.0))).contains("start.level[1]")
     );
+    // and by a host that integrates itself, once the motion has begun
+    let level = |host: &mut Host| {
+        refused(host.set(&SET_FLOAT64, &[number("level[2]")], |_| Value::Real(1.0)))
+    };
+    let mut early = Host::new(ME);
+    assert!(level(&mut early).contains("level[2]"));
+    let mut stepped = stepping(Events::Reported, 0.0, &[]);
+    stepped.enter_event_mode().unwrap();
+    assert!(level(&mut stepped).contains("level[2]"));
     let mut two = continuous(&[]);
     assert!(refused(set(&mut two, "level[2]", 1.0)).contains("level[2]"));
 }
@@ -163,6 +172,8 @@ fn events_are_handled_as_the_interface_says_or_told_in_co_simulation() {
     let allowed = |interface| Events::ALL.map(|events| Fmi3::allows(interface, events));
     assert_eq!(allowed(CS), [true, false, true]);
     assert_eq!(allowed(ME), [false, true, false]);
+    let of_2 = [CS, ME].map(|interface| Events::ALL.map(|events| Fmi2::allows(interface, events)));
+    assert_eq!(of_2, [[true, false, false], [false, true, false]]);
     let tokens = Layout::ALL.map(Fmi3::token::<Vessels>);
     assert_eq!(tokens, Layout::ALL.map(|layout| TABLE.token(layout)));
     assert_ne!(tokens[0], tokens[1]);

@@ -62,6 +62,13 @@ fn bad_contours_are_described() {
         ),
         ("profile = [{ line = [0, 0, -1, 0] }, { line = [-1, 0, -1, 1] }]", "r >= 0"),
         ("profile = [{ arc = [0, 1, -1, -90, 0] }]", "radii -1 and -1 m must be above 0"),
+        ("profile = [{ ellipse = [0, 1, 1, 0, -90, 0] }]", "radii 1 and 0 m must be above 0"),
+        ("profile = [{ ellipse = [0, 1, 0, 1, -90, 0] }]", "radii 0 and 1 m must be above 0"),
+        // 110 m high, and 1 m wide
+        (
+            "profile = [{ line = [0, -60, 1, -60] }, { line = [1, -60, 1, 50] }]",
+            "is 110.000000 m large",
+        ),
         (
             "profile = [{ arc = [0, 1, 1, -90, 400] }]",
             "an arc of 490.0 degrees goes round more than once",
@@ -102,6 +109,7 @@ fn all_problems_are_reported_at_once() {
     }
     let tank = tank("density = 1.0\nbox = [1.0, 1.0]");
     assert_eq!(tank.solve(-1.0, 0).unwrap_err().0.len(), 2);
+    assert_eq!(tank.solve(1.0, 0).unwrap_err().0.len(), 1);
 }
 
 /// Fills that have no modes say why.
@@ -660,4 +668,27 @@ fn a_table_at_0_gravity_says_that_frequencies_are_0_where_there_are_any() {
     assert_eq!(said(1.0, 0.0), (true, false));
     assert_eq!(said(1.0, 9.81), (false, false));
     assert_eq!(said(2.0, 0.0), (false, true));
+}
+
+/// Wherever the drawing's zero is, a metre of height is one.
+#[test]
+fn a_tank_drawn_far_above_its_zero_is_no_large_one() {
+    let far = solve("profile = [{ line = [0, 80, 1, 80] }, { line = [1, 80, 1, 81] }]", 0.5, 1);
+    assert!((far.m_liq / (500.0 * core::f64::consts::PI) - 1.0).abs() < 1e-12);
+}
+
+/// 200 lines join 201 points of a file.
+#[test]
+fn a_file_of_points_joins_at_most_201_by_lines() {
+    let folder = tempfile::tempdir().unwrap();
+    let read = |count: usize| {
+        let angle = |i: usize| 3.0 * i as f64 / (count - 1) as f64;
+        let rows: String =
+            (0..count).map(|i| format!("{},{}\n", angle(i).sin(), 1.0 - angle(i).cos())).collect();
+        std::fs::write(folder.path().join("points.csv"), rows).unwrap();
+        Tank::parse("density = 1.0\npoints = 'points.csv'", folder.path())
+    };
+    assert!(read(201).is_ok(), "{:?}", read(201));
+    let said = read(202).unwrap_err().to_string();
+    assert!(said.contains("202 points are joined by straight lines, at most 200"), "{said}");
 }
