@@ -49,6 +49,15 @@ fn bad_contours_are_described() {
             "profile = [{ line = [0, 0.5, 0.5, 0.5] }, { line = [0.5, 0.5, 0.6, 0] }, { line = [0.6, 0, 1, 0] }, { line = [1, 0, 0.3, 0.5] }, { line = [0.3, 0.5, 1, 0.9] }]",
             "crosses itself",
         ),
+        // back on itself, exactly or but for a billionth of a radian
+        (
+            "profile = [{ line = [0, 0, 1, 0] }, { line = [1, 0, 1, 1] }, { line = [1, 1, 1, 0.5] }]",
+            "crosses itself near (1.000000, 1.000000) m (segments 2 and 3)",
+        ),
+        (
+            "profile = [{ line = [0, 0, 1, 0] }, { line = [1, 0, 1, 1] }, { line = [1, 1, 0.9999999999, 0.5] }]",
+            "crosses itself near (1.000000, 1.000000) m (segments 2 and 3)",
+        ),
         ("profile = [{ line = [1, 1, 1, 0] }, { line = [1, 0, 0, 0] }]", "inside out (clockwise)"),
         (
             "profile = [{ line = [0, 0, nan, 0] }]",
@@ -655,6 +664,10 @@ fn modes_are_numbered_from_1() {
         }
         let rest: Vec<_> = data.rest.iter().map(|rest| rest.modes).collect();
         assert_eq!(rest, [1, 2, 3], "{text}");
+        // a wave at an inner wall where there is one
+        let inner = data.modes.iter().all(|mode| mode.wave_inner.is_some());
+        let none = data.modes.iter().all(|mode| mode.wave_inner.is_none());
+        assert_eq!((inner, none), (text.contains("annulus"), !text.contains("annulus")), "{text}");
     }
 }
 

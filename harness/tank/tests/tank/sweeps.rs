@@ -306,6 +306,7 @@ fn the_parameters_state_the_errors_between_a_table_s_points() {
     let liquid = Liquid { gravity: 9.81, nu: Some(1e-6), sigma: None, contact_angle: 90.0 };
     for (error, few) in [
         ([0.001, 0.002, 0.003], false),
+        ([0.005, 0.002, 0.003], false),
         ([0.006, 0.002, 0.003], true),
         ([0.001, 0.006, 0.003], true),
         ([0.001, 0.002, 0.006], true),
