@@ -14,6 +14,7 @@ do, too: what they have no name for is left out. The FMU is driven as a host doe
 | one | 1180 kg under 2400 N, one tank, one mode, drag by the constant law, as in all releases |
 | two | the same, two tanks of one mode, as in the comparison with Basilisk |
 | four | the same, four tanks of three modes each |
+| planar | one tank, one mode that swings in one plane alone: the equations of tanks that drain |
 """
 
 import math
@@ -37,6 +38,7 @@ ROWS = [
     ("two", 1e-6, "the same with two tanks of one mode"),
     ("four", 1e-6, "the same with four tanks of three modes"),
     ("two", 1e-8, "two tanks at a tolerance of 1e-8"),
+    ("planar", 1e-6, "one tank, one planar mode"),
 ]
 
 
@@ -58,7 +60,7 @@ def parameters(case: str) -> dict[str, float | str]:
     def bob(tank: int, mode: int, values: tuple[float, ...]) -> None:
         p.update({f"tank[{tank}].p_0[{mode},{i}]": x for i, x in enumerate(values, 1)})
 
-    bob(1, 1, (0.05, 0.1, -0.99))
+    bob(1, 1, (0.05, 0.0 if case == "planar" else 0.1, -0.99))
     p["tank[1].damping_law"] = "constant"
     if case == "held":
         inertia = {"Jxx": HELD_MASS, "Jyy": HELD_MASS, "Jzz": 0.322414}
@@ -68,6 +70,8 @@ def parameters(case: str) -> dict[str, float | str]:
         vector("init.omega", (0, 0, 0))
         vector("tank[1].position", (0.225, 0, 0))
         p.update({"tank[1].g_ref": 9.81, "tank[1].diameter": 0.163, "tank[1].depth": 0.10})
+    elif case == "planar":
+        p["tank[1].direction[1,1]"] = 1.0
     elif case == "two":
         p.update({"tanks": 2, "tank[2].damping_law": "constant"})
         bob(2, 1, (-0.02, 0.05, -0.99))
