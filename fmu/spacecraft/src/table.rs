@@ -373,13 +373,13 @@ static VARIABLES: &[Variable<Model>] = &[
     V::parameter("tank[].density", |p, n| &mut p.tank[n].density, "kg/m3", "Density of the liquid, used where diameter is above 0")
         .shape(PER_TANK).range(1e-3, 1e5),
     V::parameter("tank[].m_0", |p, n| &mut p.tank[n].m_0, "kg", "Mass of the rigid liquid; below 0 allowed with planar modes (direction) alone")
-        .shape(PER_TANK).range(-1e9, 1e9),
+        .shape(PER_TANK),
     V::parameter("tank[].H_0", |p, n| &mut p.tank[n].h_0, "m", "Height of the rigid liquid's centre of mass on the tank's axis")
         .shape(PER_TANK),
     V::parameter("tank[].I_0", |p, n| &mut p.tank[n].i_0, "kg.m2", "Moment of inertia of the rigid liquid across the axis, about its centre of mass; with dI_y that about the tank's x axis; below 0 as m_0")
-        .shape(PER_TANK).range(-1e12, 1e12),
+        .shape(PER_TANK),
     V::parameter("tank[].I_z", |p, n| &mut p.tank[n].i_z, "kg.m2", "Moment of inertia of the rigid liquid about the tank's axis, through its centre of mass; below 0 as m_0")
-        .shape(PER_TANK).range(-1e12, 1e12),
+        .shape(PER_TANK),
     V::parameter("tank[].r_0", |p, n| &mut p.tank[n / 2].r_0[n % 2], "m", "How far the rigid liquid's centre of mass is off the tank's axis, along the tank's x and y axis")
         .shape(&[TANK, Fixed(2)]),
     V::parameter("tank[].dI_y", |p, n| &mut p.tank[n].di_y, "kg.m2", "By how much the moment of inertia of the rigid liquid about the tank's y axis exceeds I_0")
