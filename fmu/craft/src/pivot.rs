@@ -260,4 +260,28 @@ mod tests {
             }
         }
     }
+
+    /// Half the way to the nearest pole of tanh, v = i pi/2, by v'' t^2/2 alone and by v' t; with D, from w = 4 w_s on, where the
+    /// curve of Stribeck is seen, 2.5/4 of w_s if that is sooner.
+    #[test]
+    fn series_of_dry_friction_reach_half_the_way_to_the_pole() {
+        let friction = PivotFriction { c: [1.0; 3], d: [0.0; 3], omega_s: 0.1, eps: 0.01 };
+        let way = 0.5 * libm::sqrt(2.4674);
+        let rubbing = Rubbing::new(&friction, 0);
+        let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-14, "{a} {b}");
+        near(rubbing.convergence_radius([0.0, 0.0, 3.0]), libm::sqrt(way / 300.0));
+        near(rubbing.convergence_radius([0.0, -3.0, 0.0]), way / 300.0);
+        // both: (v')^2 + 4 v''/2 way = 10^2 + 4 100 way
+        let speed = 10.0 + libm::sqrt(100.0 + 400.0 * way);
+        near(rubbing.convergence_radius([0.0, 0.1, -1.0]), 2.0 * way / speed);
+        assert_eq!(rubbing.convergence_radius([0.0; 3]), f64::INFINITY);
+        // farther from 0 the pole is farther: v = 3
+        near(rubbing.convergence_radius([0.03, 0.01, 0.0]), 0.5 * libm::sqrt(9.0 + 2.4674));
+        let curved = Rubbing::new(&PivotFriction { d: [1.0; 3], ..friction }, 0);
+        near(curved.convergence_radius([0.4, 0.01, 0.0]), 2.5 / 4.0 / 0.1);
+        near(curved.convergence_radius([0.29, 0.01, 0.0]), 0.5 * libm::sqrt(29.0 * 29.0 + 2.4674));
+        near(curved.convergence_radius([0.8, 0.01, 0.0]), (8.0 - 5.3) / 0.1);
+        let none = Rubbing::new(&PivotFriction { c: [0.0; 3], ..friction }, 0);
+        assert_eq!(none.convergence_radius([0.0, 1.0, 1.0]), f64::INFINITY);
+    }
 }

@@ -829,3 +829,28 @@ impl SloshTank {
         Some(largest_eigenvalue(&Factors::of(&host.rigid().mass_matrix()), &matrix))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use taylor::ramp::Ramp;
+
+    /// Upright under 9.81 m/s2 along its axis; 2 s of 30 m/s2 across, and the pendulum has passed 45 degrees. At one m/s2 up,
+    /// whose liquid hangs from the lid, the specific force is the wrong way.
+    #[test]
+    fn a_tank_is_in_range_while_its_bobs_are_upright_and_the_force_holds_them() {
+        let after = |a: [f64; 3], h: f64| {
+            let p = TankParameters::default();
+            let start =
+                TankInputs { a: Ramp::<[f64; 3]>::held([0.0, 0.0, 9.81]), ..TankInputs::default() };
+            let mut tank = SloshTank::new(&p, &start, 0.0, 1e-9).unwrap();
+            let inputs = TankInputs { a: Ramp::<[f64; 3]>::held(a), ..start };
+            tank.step(&inputs, h).unwrap();
+            tank.is_in_range_after(&inputs, h)
+        };
+        assert!(after([0.0, 0.0, 9.81], 0.5));
+        assert!(after([1.0, 0.0, 9.81], 0.5));
+        assert!(!after([30.0, 0.0, 9.81], 0.4));
+        assert!(!after([0.0, 0.0, -1.0], 0.01));
+    }
+}
