@@ -834,7 +834,12 @@ fn a_host_that_integrates_itself_meets_the_crafts_own_impacts_and_hand_overs() {
     }
     let states = [BallState::Flying, BallState::Sliding, BallState::Settled];
     assert!(states.iter().all(|state| seen.contains(state)), "not all states");
-    assert_eq!(own.outputs(&forward).tank[0].ball_state, BallState::Settled);
+    let out = own.outputs(&forward);
+    assert_eq!(out.tank[0].ball_state, BallState::Settled);
+    // Settled liquid's ball stands on the axis, at the height of the centre of the tank's liquid at rest, in tank axes.
+    let (middle, half, _) = wall(&p, 0);
+    assert!((v(&out.tank[0].ball_position) - V::z() * (middle - half.z)).norm() < 1e-14);
+    assert_eq!(out.tank[0].ball_velocity, [0.0; 3]);
     println!("{events} events");
     let want = own.continuous_states();
     for i in 0..STATES {
