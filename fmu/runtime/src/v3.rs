@@ -1499,8 +1499,7 @@ pub unsafe fn fmi3DeserializeFMUState<M: Model>(
 
 // ---- Derivatives ----
 
-/// A derivative's unknowns and knowns, with as many numbers for the one as for the other. The independent variable,
-/// on which nothing depends but by states and inputs, is left out of the knowns.
+/// As many numbers are given as a derivative has scalars.
 fn check_numbers(call: &Call, name: &str, given: usize, expected: usize) -> Result<(), Fault> {
     if given == expected {
         return Ok(());
@@ -1532,6 +1531,7 @@ pub unsafe fn fmi3GetDirectionalDerivative<M: Model>(
             check_numbers(call, "nSensitivity", nSensitivity, unknowns.len())?;
             let seed = array(call, "seed", seed, nSeed)?;
             let answers = array_mut(call, "sensitivity", sensitivity, nSensitivity)?;
+            // the independent variable, on which nothing depends but by states and inputs, is left out of the knowns
             let time = time_reference::<M>();
             if !knowns.contains(&time) {
                 return component

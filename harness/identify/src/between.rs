@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::evidence::{ALIKE, DECIDES, probabilities};
-use crate::fit::{Polished, Problem};
+use crate::fit::{Polished, Problem, ROUNDS};
 use crate::recording::Recording;
 use crate::simulate::Intersample;
 use crate::uncertainty::Covariance;
@@ -67,7 +67,8 @@ pub fn matters(recordings: &[Recording]) -> bool {
 }
 
 /// The other behaviours, each with its own minimum, which is sought from this one: a torque that is held is late by half a row. The
-/// sensitivities are nearly the same, so each costs a few simulations.
+/// sensitivities are nearly the same, so each costs a few simulations; where they do not lead to the minimum (the wrong behaviour may have
+/// moved what a recording hardly shows far along its valley) it has its own, for a sum of squares on the way is no evidence.
 pub fn alternatives(problem: &Problem, minimum: &Polished) -> Vec<Alternative> {
     let now = problem.setup.intersample;
     let delayed = problem.unknowns.iter().position(|u| u.quantity == Quantity::Delay);
@@ -82,7 +83,10 @@ pub fn alternatives(problem: &Problem, minimum: &Polished) -> Vec<Alternative> {
             let delay = scale.value(x[index]) + rows * problem.recordings[0].step();
             x[index] = scale.variable(delay);
         }
-        let minimum = problem.polish_near(&x, &minimum.jacobian).ok()?;
+        let mut minimum = problem.polish_near(&x, &minimum.jacobian).ok()?;
+        if !minimum.converged() {
+            minimum = problem.polish(&minimum.x, Some(&minimum.jacobian), ROUNDS).ok()?;
+        }
         let delay = delay(&problem, &minimum.x, &minimum.covariance);
         let left = if minimum.decrement < 1.0 { minimum.decrement.powi(2) } else { 0.0 };
         let cost = minimum.cost - left;

@@ -62,6 +62,8 @@ const LONGEST_STEP: f64 = 0.05;
 const DECREMENT: f64 = 0.01;
 /// A minimum has a Newton decrement below this; no sensitivities are found anew for less.
 const MINIMUM: f64 = 0.1;
+/// Sets of sensitivities that Gauss and Newton's steps have at most.
+pub const ROUNDS: usize = 6;
 /// A change of one variable there by more than this of one here is no valley's bend.
 const SHARPEST: f64 = 1e3;
 /// A sum of squares is known to a hundredth where the Newton decrement is below this.

@@ -7,7 +7,7 @@ use anyhow::{Result, bail};
 use nalgebra::DMatrix;
 
 use crate::between;
-use crate::fit::{Estimate, Polished, Problem, WINDOWS};
+use crate::fit::{Estimate, Polished, Problem, ROUNDS, WINDOWS};
 use crate::friction;
 use crate::goodness::{fit_pct, is_poor, tests};
 use crate::news::Since;
@@ -20,9 +20,6 @@ const NEAR: f64 = 1.5;
 
 /// What the steps of one set of sensitivities leave of the sum of squares, where they lead far.
 const LEADS: f64 = 0.7;
-
-/// Sets of sensitivities that Gauss and Newton's steps have at most.
-pub const ROUNDS: usize = 6;
 
 /// The search for one model's minimum.
 pub struct Search<'a, 'h> {
