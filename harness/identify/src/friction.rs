@@ -81,14 +81,13 @@ pub struct Point {
 }
 
 /// Fits at the Stribeck speeds of a grid over the recording's speeds, near the fit `from`.
-pub fn grid(problem: &Problem, from: &Polished, indices: Indices) -> Result<Vec<Point>> {
+pub fn grid(problem: &Problem, from: &Polished, indices: Indices) -> Vec<Point> {
     let fastest = fit::fastest(&from.answer.motion);
     let one = |part: &f64| {
         let x = on_its_curve(problem, &from.x, from, indices, part * fastest);
         point(problem, &x, &from.jacobian, indices, from.cost)
     };
-    let points: Vec<Result<Point>> = GRID.par_iter().map(one).collect();
-    points.into_iter().collect()
+    GRID.par_iter().filter_map(one).collect()
 }
 
 /// Sets of sensitivities at one speed, the first of them mostly that of another one.
@@ -132,27 +131,28 @@ fn foreseen(
 }
 
 /// The fit at the ω_s of x: Gauss and Newton's steps from there in all unknowns but ω_s, unless the sum of squares stays above `most` all the
-/// same. The sensitivities to b, c and d are taken there, the others are `known` ones.
+/// same. The sensitivities to b, c and d are taken there, the others are `known` ones. `None`: nothing is known of that speed, for the FMU
+/// refuses it, or some combination of the other unknowns has no influence there.
 fn point(
     problem: &Problem,
     x: &[f64],
     known: &DMatrix<f64>,
     indices: Indices,
     most: f64,
-) -> Result<Point> {
+) -> Option<Point> {
     let bearing = [indices.b, indices.c, indices.d];
     let others: Vec<usize> = (0..x.len()).filter(|j| *j != indices.speed).collect();
     // a sum of squares to a hundredth is enough
     let problem = &Problem { differences: Differences::Forward, ..problem.clone() };
-    let answer = problem.answer(x)?;
-    let jacobian = problem.refreshed(x, &bearing, &answer.motion, known)?;
+    let answer = problem.answer(x).ok()?;
+    let jacobian = problem.refreshed(x, &bearing, &answer.motion, known).ok()?;
     let until = Until { decrement: CLOSE, rounds: STEPS, cost: most };
-    let found =
-        problem.polish_some((x, answer), &others, Known::Sensitivities(&jacobian), until)?;
+    let known = Known::Sensitivities(&jacobian);
+    let found = problem.polish_some((x, answer), &others, known, until).ok()?;
     // what further steps would win to second order, where that can be told
     let far = found.decrement > 1.0 && !until.is_hopeless(found.cost, found.decrement);
     let left = if far { 0.0 } else { found.decrement.powi(2) };
-    Ok(Point {
+    Some(Point {
         speed: problem.unknowns[indices.speed].scale.value(x[indices.speed]),
         cost: found.cost,
         data: found.cost - left - problem.vague_cost(&found.x),
@@ -231,16 +231,11 @@ pub fn profile(
     let fastest = fit::fastest(&minimum.answer.motion);
     let most = minimum.cost + DECIDES;
     let ends = [GRID[0] * fastest, GRID[GRID.len() - 1] * fastest];
-    let sides: Vec<Result<(Vec<Point>, bool)>> = [(-1.0, ends[0]), (1.0, ends[1])]
+    let sides: Vec<(Vec<Point>, bool)> = [(-1.0, ends[0]), (1.0, ends[1])]
         .into_par_iter()
         .map(|(side, end)| {
-            let (mut found, mut open) = outwards(
-                problem,
-                minimum,
-                indices,
-                (&middle, middle.data),
-                (side, end, deviation),
-            )?;
+            let (mut found, mut open) =
+                outwards(problem, minimum, indices, (&middle, middle.data), (side, end, deviation));
             // there may be another minimum beyond
             let mut beyond: Vec<f64> = GRID.iter().map(|part| part * fastest).collect();
             beyond.sort_by(|a, b| (side * a).total_cmp(&(side * b)));
@@ -252,7 +247,7 @@ pub fn profile(
                 }
                 let from = found.last().unwrap_or(&middle);
                 let x = on_its_curve(problem, &from.x, minimum, indices, speed);
-                let Ok(mut other) = point(problem, &x, &from.jacobian, indices, most) else {
+                let Some(mut other) = point(problem, &x, &from.jacobian, indices, most) else {
                     continue;
                 };
                 let above = (other.data - middle.data).max(0.0);
@@ -261,7 +256,7 @@ pub fn profile(
                 if above <= LIMIT || is_rival {
                     let reference = (&other, other.data);
                     let (mut more, is_open) =
-                        outwards(problem, minimum, indices, reference, (side, end, deviation))?;
+                        outwards(problem, minimum, indices, reference, (side, end, deviation));
                     more.iter_mut().for_each(|p| p.data = (p.data - above).max(middle.data));
                     found.extend(more);
                     other.data -= above;
@@ -270,12 +265,11 @@ pub fn profile(
                 found.push(other);
                 found.sort_by(|a, b| (side * a.speed).total_cmp(&(side * b.speed)));
             }
-            Ok((found, open))
+            (found, open)
         })
         .collect();
     let (mut points, mut open) = (vec![middle], [false; 2]);
-    for (side, found) in sides.into_iter().enumerate() {
-        let (found, is_open) = found?;
+    for (side, (found, is_open)) in sides.into_iter().enumerate() {
         points.extend(found);
         open[side] = is_open;
     }
@@ -299,7 +293,7 @@ fn outwards(
     indices: Indices,
     (middle, least): (&Point, f64),
     (side, end, deviation): (f64, f64, f64),
-) -> Result<(Vec<Point>, bool)> {
+) -> (Vec<Point>, bool) {
     let mut points: Vec<Point> = Vec::new();
     let mut step = (1.96 * deviation).clamp(0.02, LONGEST);
     // root of the sum of squares above the least
@@ -318,7 +312,7 @@ fn outwards(
         let last = side * (at - end.ln()) >= 0.0 && outside.is_none();
         let speed = if last { end } else { at.exp() };
         if side * (speed / inside.speed).ln() <= 0.0 {
-            return Ok((points, true));
+            return (points, true);
         }
         let near = [Some(&inside), outside.as_ref()].into_iter().flatten();
         let near = near
@@ -326,9 +320,9 @@ fn outwards(
         let near = near.unwrap_or(middle);
         let most = minimum.cost + NEAR;
         let x = foreseen(problem, &near.x, minimum, indices, speed);
-        // where some combination of unknowns has no influence any more nothing is determined
-        let Ok(found) = point(problem, &x, &near.jacobian, indices, most) else {
-            return Ok((points, outside.is_none()));
+        let Some(found) = point(problem, &x, &near.jacobian, indices, most) else {
+            // nor is the end then, unless it is known from beyond
+            return (points, outside.is_none());
         };
         let above = found.data - least;
         points.push(found.clone());
@@ -343,14 +337,14 @@ fn outwards(
             inside = found;
             step = (2.0 * step).min(LONGEST);
             if last {
-                return Ok((points, true));
+                return (points, true);
             }
             if near_enough && outside.is_some() {
                 break;
             }
         }
     }
-    Ok((points, outside.is_none()))
+    (points, outside.is_none())
 }
 
 /// The 95 % interval of ω_s.

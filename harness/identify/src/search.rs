@@ -324,7 +324,7 @@ impl<'a> Search<'a, '_> {
         let Some(indices) = indices.filter(|i| friction::is_vague(&self.problem, &near, *i)) else {
             return Ok(near);
         };
-        let points = friction::grid(&self.problem, &near, indices)?;
+        let points = friction::grid(&self.problem, &near, indices);
         for point in &points {
             self.say(format!(
                 "{}: friction.omega_s held at {:.3e} rad/s, all else free: sum of squares {:.1}, all free {:.1}",

@@ -4,9 +4,14 @@ use std::f64::consts::TAU;
 
 use analysis::random::Random;
 use analysis::statistics::mean;
+use anyhow::Result;
 use experiments::profile::Profile;
+use host::fmu::Fmu;
 use identify::design::Multisine;
-use identify::recording::Recording;
+use identify::methods::identification::Identification;
+use identify::methods::output_error;
+use identify::options::Options;
+use identify::recording::{Recording, prepare};
 use identify::simulate::Intersample;
 use identify::tolerance::Tolerances;
 
@@ -232,5 +237,18 @@ impl Twin {
         let time = time.iter().map(|t| self.clock * t).collect();
         let tau = tau.iter().map(|tau| self.torque_scale * tau).collect();
         Recording { angle, ..Recording::of("twin", time, tau, rate) }
+    }
+
+    /// Identifies its recording as a user would, with these slosh models; `hear` is told what happens.
+    pub fn identify(
+        &self,
+        fmu: &Fmu,
+        models: Vec<String>,
+        hear: &dyn Fn(&str),
+    ) -> Result<Identification> {
+        let options = Options { intersample: self.told(), models, ..Options::default() };
+        let coarsest = options.nominal(fmu)?.coarsest();
+        let parts = prepare(self.record(), coarsest, &mut |line| hear(&line))?;
+        output_error::identify(fmu, &parts, &options, &mut |news| hear(news.line()))
     }
 }

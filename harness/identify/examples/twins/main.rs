@@ -21,9 +21,6 @@ use anyhow::{Context, Result, bail};
 use draw::Twin;
 use host::fmu::Fmu;
 use identify::methods::identification::Identification;
-use identify::methods::output_error::identify;
-use identify::options::Options;
-use identify::recording;
 
 /// Standard deviations beyond which an answer that says "described" is wrong, unless its interval holds the truth all the same: one
 /// that is open says that it does not know.
@@ -146,16 +143,12 @@ fn main() -> Result<()> {
         twins += 1;
         let twin = Twin::draw(seed, duration);
         let models = models.clone().unwrap_or_else(|| twin.models());
-        let options = Options { intersample: twin.told(), models, ..Options::default() };
-        let coarsest = options.nominal(&fmu)?.coarsest();
         let hear = |line: &str| {
             if say {
                 println!("  {line}");
             }
         };
-        let found = recording::prepare(twin.record(), coarsest, &mut |line| hear(&line))
-            .and_then(|parts| identify(&fmu, &parts, &options, &mut |news| hear(news.line())));
-        match found {
+        match twin.identify(&fmu, models, &hear) {
             Ok(found) => {
                 tally.add(&twin, &found);
                 if say || found.fits != Some(true) || !found.converged {
