@@ -63,7 +63,7 @@ use taylor::vector::{
 use crate::bob::{Bob, BobNow};
 use crate::damping;
 use crate::parameters::{Limits, Tank};
-use crate::rigid::{Mat6, Rigid};
+use crate::rigid::{Mat6, Rigid, along_rod};
 use crate::sizes::MODES;
 use crate::state::Line;
 use crate::table::{FillCurves, Jet};
@@ -429,8 +429,7 @@ impl<T: Number> Contents<'_, T> {
     #[inline(never)]
     fn add_carried(&self, matrix: &mut Mat6<T>) {
         for (bob, b) in self.planar() {
-            let c = cross(bob.rho, b);
-            let u = [b[0], b[1], b[2], c[0], c[1], c[2]];
+            let u = along_rod(b, bob.rho);
             for i in 0..6 {
                 for k in 0..6 {
                     matrix[i][k] = matrix[i][k] + bob.m * u[i] * u[k];

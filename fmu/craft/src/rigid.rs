@@ -113,7 +113,7 @@ pub fn add_rank_one(matrix: &mut Mat6, m: f64, u: &[f64; 6]) {
 
 /// [p; P x p].
 #[inline(always)]
-pub fn along_rod(p: Vec3, hinge: Vec3) -> [f64; 6] {
+pub fn along_rod<T: Number>(p: Vec3<T>, hinge: Vec3<T>) -> [T; 6] {
     let c = cross(hinge, p);
     [p[0], p[1], p[2], c[0], c[1], c[2]]
 }
