@@ -66,8 +66,11 @@ pub fn matters(recordings: &[Recording]) -> bool {
     recordings.iter().any(varies)
 }
 
+/// Sum of squares over the first behaviour's beyond which another one is no rival, wherever its minimum is.
+const FAR: f64 = 1.5;
+
 /// The other behaviours, each with its own minimum, which is sought from this one: a torque that is held is late by half a row. The
-/// sensitivities are nearly the same, so each costs a few simulations; where they do not lead to the minimum (the wrong behaviour may have
+/// sensitivities are nearly the same, so each costs a few simulations; where they lead near the minimum but not to it (the wrong behaviour may have
 /// moved what a recording hardly shows far along its valley) it has its own, for a sum of squares on the way is no evidence.
 pub fn alternatives(problem: &Problem, minimum: &Polished) -> Vec<Alternative> {
     let now = problem.setup.intersample;
@@ -83,8 +86,9 @@ pub fn alternatives(problem: &Problem, minimum: &Polished) -> Vec<Alternative> {
             let delay = scale.value(x[index]) + rows * problem.recordings[0].step();
             x[index] = scale.variable(delay);
         }
+        let most = FAR * minimum.cost;
         let mut minimum = problem.polish_near(&x, &minimum.jacobian).ok()?;
-        if !minimum.converged() {
+        if !minimum.converged() && minimum.cost < most {
             minimum = problem.polish(&minimum.x, Some(&minimum.jacobian), ROUNDS).ok()?;
         }
         let delay = delay(&problem, &minimum.x, &minimum.covariance);
