@@ -7,16 +7,16 @@
 //!
 //! (5.1 and 5.3 to 5.6; the difference as printed, ω_{k+1} − ω_k over two steps, is half of the acceleration).
 //! It needs no simulation and no start, and no liquid that moves: its torque is not in the equation.
-//! Three things make it biased, and here each is dealt with:
+//! Rows closer than 10 ms are taken together first. The noise's share of the power of y goes with the cube of the sampling rate;
+//! I (ω̄_{k+1} − ω̄_{k−1}) = T̄_{k+1} − T̄_{k−1} holds for means over blocks of rows as it does for rows, T the integral of the torque.
+//! Three things make the estimate biased, and here each is dealt with:
 //!
 //! * y_k is the mean of the acceleration from t_{k−1} to t_{k+1}, less than its value at t_k by (Ωh)²/6:
 //!   3.2 % at 3.5 Hz and 50 Hz sampling, which goes into I. [`Form::Averaged`] takes the mean of the
 //!   torques over the same interval: of a torque joined by lines or held, and of the friction at the rates of the
 //!   parabola through three rows, whose sign may change within it.
 //! * The gyro's noise is in y_k, and I multiplies it: I comes out too small by the noise's share of the
-//!   power of y. That share is known from the noise; the estimate is
-//!   p + (JᵀJ − N)⁻¹ N p, N the noise's expected part of JᵀJ (Söderström, Errors-in-Variables
-//!   Methods, 2018, chapter 4).
+//!   power of y. The residual is r_k/I instead: y_k is then what is explained, and its noise biases nothing, however large.
 //! * Near ω = 0 the measured sign is not that of ω. Expected is the mean over the noise, erf(ω/σ√2) ≈ tanh(ω/1.25σ).
 
 use std::collections::BTreeMap;
@@ -54,9 +54,9 @@ pub enum Weights {
 /// Which torques are set against the difference of rates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// Those at t_k (5.4).
+    /// Those at t_k; the residual is the thesis's, r_k (5.4).
     AtRow,
-    /// Their means from t_{k−1} to t_{k+1}.
+    /// Their means from t_{k−1} to t_{k+1}; the residual is r_k/I.
     Averaged,
 }
 
@@ -85,7 +85,7 @@ pub struct Details {
     pub fit: Fit,
     /// The same without any of the corrections above: 5.4 to 5.6 as they stand.
     pub uncorrected: BTreeMap<String, f64>,
-    /// Unknowns that ended at a bound; they have no standard deviation.
+    /// Unknowns that ended at a bound; their standard deviation is as if there were none.
     pub at_bound: Vec<String>,
     /// Condition number of the sensitivities with columns of unit length.
     pub condition: f64,
@@ -175,42 +175,94 @@ const SPEEDS: [f64; 3] = [0.1, 0.4, 1.2];
 const FIRST: [&str; 6] =
     ["hub.I", "friction.b", "friction.c", "friction.d", "friction.omega_s", "friction.asymmetry"];
 
-/// A recording's rows 1 to n − 2 and what is differenced.
-struct Rows<'a> {
-    recording: &'a Recording,
+/// Rows that are closer are taken together, s. The mean of a sine of 3.5 Hz over it is 0.2 % less than its peak.
+const BLOCK: f64 = 0.01;
+/// Rows by which the starts are told apart; the best is followed over all.
+const ROUGH: usize = 20_000;
+/// Place of the Stribeck speed among them.
+const STRIBECK: usize = 4;
+
+/// A recording as means over blocks of rows; differenced are its rows 1 to n − 2.
+#[derive(Clone)]
+struct Rows {
+    time: Vec<f64>,
+    rate: Vec<f64>,
+    torque: Vec<f64>,
+    /// Integral of the torque, N·m·s.
+    impulse: Vec<f64>,
+    /// In the middle of each block.
+    angle: Option<Vec<f64>>,
+    /// Time between rows, s.
+    step: f64,
     /// Standard deviation of the gyro's noise, rad/s.
     noise: f64,
-    /// sqrt(w_k).
+    /// sqrt(w_k) of the rows 1 to n − 2.
     weight: Vec<f64>,
-    /// The torque is held from row to row.
-    held: bool,
+    /// Only every so many of them counts.
+    every: usize,
 }
 
-impl Rows<'_> {
-    fn inner(&self) -> std::ops::Range<usize> {
-        1..self.recording.time.len() - 1
+impl Rows {
+    /// `held`: the torque is held from row to row.
+    fn new(recording: &Recording, held: bool) -> Self {
+        let Recording { time: t, torque, .. } = recording;
+        let block = ((BLOCK / recording.step() * (1.0 + 1e-9)) as usize).max(1);
+        let means = |signal: &[f64]| -> Vec<f64> {
+            signal.chunks_exact(block).map(analysis::statistics::mean).collect()
+        };
+        let mut impulse = vec![0.0];
+        for k in 1..t.len() {
+            let mean = if held { torque[k - 1] } else { 0.5 * (torque[k - 1] + torque[k]) };
+            impulse.push(impulse[k - 1] + mean * (t[k] - t[k - 1]));
+        }
+        let rate = means(&recording.rate);
+        let middle =
+            |angle: &Vec<f64>| angle.chunks_exact(block).map(|part| part[block / 2]).collect();
+        Rows {
+            time: means(t),
+            torque: means(torque),
+            impulse: means(&impulse),
+            angle: recording.angle.as_ref().map(middle),
+            step: block as f64 * recording.step(),
+            noise: noise_level(&rate).max(analysis::gauss_markov::FLOOR),
+            weight: Vec::new(),
+            every: 1,
+            rate,
+        }
     }
 
-    /// Weights of the rows k − 1, k, k + 1 in the torque's mean.
-    fn mean(&self, form: Form, k: usize) -> [f64; 3] {
-        let t = &self.recording.time;
+    fn inner(&self) -> std::iter::StepBy<std::ops::Range<usize>> {
+        (1..self.time.len() - 1).step_by(self.every)
+    }
+
+    /// A signal's slope from t_{k−1} to t_{k+1}.
+    fn slope(&self, signal: &[f64], k: usize) -> f64 {
+        (signal[k + 1] - signal[k - 1]) / (self.time[k + 1] - self.time[k - 1])
+    }
+
+    /// y_k.
+    fn acceleration(&self, k: usize) -> f64 {
+        self.slope(&self.rate, k)
+    }
+
+    /// τ_k, or its mean from t_{k−1} to t_{k+1}.
+    fn torque(&self, form: Form, k: usize) -> f64 {
         match form {
-            Form::AtRow => [0.0, 1.0, 0.0],
-            Form::Averaged if self.held => {
-                let whole = t[k + 1] - t[k - 1];
-                [(t[k] - t[k - 1]) / whole, (t[k + 1] - t[k]) / whole, 0.0]
-            }
-            Form::Averaged => {
-                let whole = 2.0 * (t[k + 1] - t[k - 1]);
-                [(t[k] - t[k - 1]) / whole, 0.5, (t[k + 1] - t[k]) / whole]
-            }
+            Form::AtRow => self.torque[k],
+            Form::Averaged => self.slope(&self.impulse, k),
         }
+    }
+
+    /// What the noise makes of w_k y_k² on average.
+    fn noise_power(&self, k: usize) -> f64 {
+        let interval = self.time[k + 1] - self.time[k - 1];
+        2.0 * (self.weight[k - 1] * self.noise / interval).powi(2)
     }
 
     /// Instants within the interval where the friction is taken, and the weights of the three rows in the parabola through
     /// them (Lagrange).
     fn instants(&self, form: Form, k: usize) -> ([[f64; 3]; PARTS], usize) {
-        let t = &self.recording.time;
+        let t = &self.time;
         let mut weights = [[0.0, 1.0, 0.0]; PARTS];
         if form == Form::AtRow {
             return (weights, 1);
@@ -226,56 +278,41 @@ impl Rows<'_> {
         }
         (weights, PARTS)
     }
-
-    /// y_k.
-    fn acceleration(&self, k: usize) -> f64 {
-        let (t, w) = (&self.recording.time, &self.recording.rate);
-        (w[k + 1] - w[k - 1]) / (t[k + 1] - t[k - 1])
-    }
 }
 
-struct Problem<'a> {
-    rows: Vec<Rows<'a>>,
+#[derive(Clone)]
+struct Problem {
+    rows: Vec<Rows>,
     harmonics: usize,
     form: Form,
     scales: Vec<Scale>,
     names: Vec<String>,
 }
 
-impl<'a> Problem<'a> {
-    fn new(recordings: &'a [Recording], options: &Options, form: Form) -> Result<Self> {
-        let count: usize = recordings.iter().map(|r| r.time.len() - 2).sum();
-        let rows: Vec<Rows> = recordings
-            .iter()
-            .map(|recording| {
-                let t = &recording.time;
-                let n = t.len() - 2;
-                let each = match options.weights {
-                    Weights::Uniform | Weights::Time => 1.0,
-                    Weights::Run | Weights::RunTime => {
-                        count as f64 / n as f64 / recordings.len() as f64
-                    }
-                };
-                let timed = matches!(options.weights, Weights::Time | Weights::RunTime);
-                let weight = (1..=n).map(|k| match timed {
-                    true => each * (t[k + 1] - t[k - 1]) / (2.0 * recording.step()),
-                    false => each,
-                });
-                Rows {
-                    recording,
-                    noise: noise_level(&recording.rate).max(analysis::gauss_markov::FLOOR),
-                    weight: weight.map(f64::sqrt).collect(),
-                    held: options.held,
-                }
-            })
-            .collect();
+impl Problem {
+    fn new(recordings: &[Recording], options: &Options, form: Form) -> Result<Self> {
+        let mut rows: Vec<Rows> =
+            recordings.iter().map(|recording| Rows::new(recording, options.held)).collect();
+        let count: usize = rows.iter().map(|r| r.inner().len()).sum();
+        let each_alike = matches!(options.weights, Weights::Run | Weights::RunTime);
+        let timed = matches!(options.weights, Weights::Time | Weights::RunTime);
+        let recordings = rows.len() as f64;
+        for rows in &mut rows {
+            let n = rows.inner().len() as f64;
+            let each = if each_alike { count as f64 / n / recordings } else { 1.0 };
+            let weight = rows.inner().map(|k| match timed {
+                true => each * (rows.time[k + 1] - rows.time[k - 1]) / (2.0 * rows.step),
+                false => each,
+            });
+            rows.weight = weight.map(f64::sqrt).collect();
+        }
         let largest = |of: &dyn Fn(&Rows) -> f64| rows.iter().map(of).fold(0.0, f64::max);
-        let torque = largest(&|r| peak(&r.recording.torque));
-        let speed = largest(&|r| peak(&r.recording.rate));
+        let torque = largest(&|r| peak(&r.torque));
+        let speed = largest(&|r| peak(&r.rate));
         let size = |of: &dyn Fn(&Rows, usize) -> f64| {
             rows.iter().flat_map(|r| r.inner().map(|k| of(r, k).powi(2))).sum::<f64>().sqrt()
         };
-        let inertia = size(&|r, k| r.recording.torque[k]) / size(&|r, k| r.acceleration(k));
+        let inertia = size(&|r, k| r.torque[k]) / size(&|r, k| r.acceleration(k));
         let mut names: Vec<String> = FIRST.map(String::from).to_vec();
         let mut bounds = vec![
             (0.0, 30.0 * inertia),
@@ -306,6 +343,14 @@ impl<'a> Problem<'a> {
         }
         let scales = bounds.into_iter().map(|(a, b)| Scale::Logit(a, b)).collect();
         Ok(Problem { rows, harmonics: options.harmonics, form, scales, names })
+    }
+
+    /// The same with so many rows, or a few more, taken evenly.
+    fn thinned(&self, rows: usize) -> Self {
+        let mut thinned = self.clone();
+        let every = (self.count() / rows).max(1);
+        thinned.rows.iter_mut().for_each(|rows| rows.every = every);
+        thinned
     }
 
     fn values(&self, x: &[f64]) -> Vec<f64> {
@@ -349,7 +394,7 @@ impl<'a> Problem<'a> {
         let mut factor = 1.0 + asymmetry * sign;
         let mut factor_by_sign = asymmetry;
         let per_way = 2 * self.harmonics;
-        if let (Some(angle), true) = (&rows.recording.angle, self.harmonics > 0) {
+        if let (Some(angle), true) = (&rows.angle, self.harmonics > 0) {
             for h in 0..self.harmonics {
                 let (sin, cos) = (angle[i] * (h + 1) as f64).sin_cos();
                 for (k, trig) in [cos, sin].into_iter().enumerate() {
@@ -373,34 +418,35 @@ impl<'a> Problem<'a> {
         b * w + sign * factor * dry
     }
 
-    /// Residuals and, with values p, their derivatives.
+    /// Residuals at the values p and, if asked for, their derivatives.
     fn evaluate(&self, p: &[f64], mut jacobian: Option<&mut DMatrix<f64>>) -> Vec<f64> {
         let n = p.len();
         let (mut residuals, mut slopes) = (Vec::new(), vec![0.0; n]);
         for (index, rows) in self.rows.iter().enumerate() {
             let bias = n - self.rows.len() + index;
             for k in rows.inner() {
-                let mean = rows.mean(self.form, k);
-                let around = |signal: &[f64], weights: [f64; 3]| -> f64 {
-                    (0..3).map(|j| weights[j] * signal[k - 1 + j]).sum()
-                };
                 let (instants, parts) = rows.instants(self.form, k);
                 slopes.fill(0.0);
                 let mut friction = 0.0;
                 for weights in &instants[..parts] {
-                    let rate = around(&rows.recording.rate, *weights);
+                    let rate = (0..3).map(|j| weights[j] * rows.rate[k - 1 + j]).sum();
                     friction += self.friction(p, rows, (bias, k, rate), &mut slopes);
                 }
                 let (weight, y) = (rows.weight[k - 1], rows.acceleration(k));
-                let torque = around(&rows.recording.torque, mean);
+                let torque = rows.torque(self.form, k);
+                let acting = torque - friction / parts as f64;
+                let (over, slope) = match self.form {
+                    Form::AtRow => (1.0, y),
+                    Form::Averaged => (p[0], acting / (p[0] * p[0])),
+                };
                 if let Some(jacobian) = jacobian.as_deref_mut() {
                     let row = residuals.len();
-                    jacobian[(row, 0)] = weight * y;
+                    jacobian[(row, 0)] = weight * slope;
                     for j in 1..n {
-                        jacobian[(row, j)] = weight * slopes[j] / parts as f64;
+                        jacobian[(row, j)] = weight * slopes[j] / parts as f64 / over;
                     }
                 }
-                residuals.push(weight * (p[0] * y - torque + friction / parts as f64));
+                residuals.push(weight * (p[0] * y - acting) / over);
             }
         }
         residuals
@@ -432,17 +478,17 @@ impl<'a> Problem<'a> {
         best.expect("there is a start")
     }
 
-    /// What the noise adds to JᵀJ on average. It is in I alone: in b it is (σ/ω)², below a thousandth.
-    fn of_noise(&self) -> DMatrix<f64> {
-        let mut part = DMatrix::zeros(self.names.len(), self.names.len());
-        for rows in &self.rows {
-            let t = &rows.recording.time;
-            for k in rows.inner() {
-                let step = t[k + 1] - t[k - 1];
-                part[(0, 0)] += 2.0 * (rows.weight[k - 1] * rows.noise / step).powi(2);
-            }
+    /// What the gyro's noise makes of the sum of w_k y_k² on average.
+    fn noise_power(&self) -> f64 {
+        self.rows.iter().flat_map(|rows| rows.inner().map(|k| rows.noise_power(k))).sum()
+    }
+
+    /// Whether a value is at one of its bounds.
+    fn is_at_bound(&self, place: usize, value: f64) -> bool {
+        match self.scales[place] {
+            Scale::Logit(a, b) => (value - a).min(b - value) < 1e-5 * (b - a),
+            _ => false,
         }
-        part
     }
 }
 
@@ -463,50 +509,39 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     // it turns with the hub, all of it
     let liquid = bench.real("tank.m_liq")? * bench.real("tank.r")?.powi(2);
     let plain = Problem::new(recordings, options, Form::AtRow)?;
-    let near = plain.solve(&SPEEDS.map(|part| plain.start(part)));
+    let rough = plain.thinned(ROUGH);
+    let start = rough.solve(&SPEEDS.map(|part| rough.start(part)));
+    let near = plain.solve(&[off_the_bounds(&start.x)]);
     let uncorrected = plain.values(&near.x);
     let problem = Problem::new(recordings, options, Form::Averaged)?;
-    let minimum = problem.solve(&[near.x]);
+    let minimum = problem.solve(&[off_the_bounds(&near.x)]);
     let p = problem.values(&minimum.x);
     let n = p.len();
-    let at_bound: Vec<bool> = (0..n)
-        .map(|j| match problem.scales[j] {
-            Scale::Logit(a, b) => (p[j] - a).min(b - p[j]) < 1e-5 * (b - a),
-            _ => false,
-        })
-        .collect();
-    let free: Vec<usize> = (0..n).filter(|&j| !at_bound[j]).collect();
-    let jacobian = problem.jacobian(&p).select_columns(&free);
-    let Some(covariance) = Covariance::of(&jacobian) else {
+    let at_bound: Vec<bool> = (0..n).map(|j| problem.is_at_bound(j, p[j])).collect();
+    // how sure the others are must not depend on a value that only a bound keeps from going on
+    let whole = problem.jacobian(&p);
+    let acting = (0..n).filter(|&j| whole.column(j).norm() > 0.0).collect();
+    let inner = (0..n).filter(|&j| !at_bound[j]).collect();
+    let known = [acting, inner].into_iter().find_map(|places: Vec<usize>| {
+        let jacobian = whole.select_columns(&places);
+        Some((Covariance::of(&jacobian)?, jacobian, places))
+    });
+    let Some((covariance, jacobian, shown)) = known else {
         bail!("some combination of inertia and friction has no influence on the recording")
     };
     let e = problem.evaluate(&p, None);
-    let of_noise = problem.of_noise().select_rows(&free).select_columns(&free);
-    // p + (JᵀJ − N)⁻¹ N p
-    let p_free = DVector::from_iterator(free.len(), free.iter().map(|&j| p[j]));
-    let normal = jacobian.tr_mul(&jacobian);
-    let corrected_normal = (&normal - &of_noise).try_inverse().filter(|m| m[(0, 0)] > 0.0);
-    let mut values = p.clone();
-    let mut scatter = covariance.sandwich(&jacobian, &e, &windows(&problem));
+    let scatter = covariance.sandwich(&jacobian, &e, &windows(&problem));
     let correlations = Covariance::correlations(&scatter);
-    if let Some(inverse) = &corrected_normal {
-        let moved = inverse * (&of_noise * &p_free);
-        for (&j, moved) in free.iter().zip(&moved) {
-            values[j] = problem.bounded(j, p[j] + moved);
-        }
-        // the correction multiplies the noise's scatter as it does the estimate
-        let widened = inverse * &normal;
-        scatter = &widened * scatter * widened.transpose();
-    }
-    let of_values = uncertainty::spread_out(&scatter, &free, n);
-    let rms = (e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64).sqrt();
-    let expected = p[0] * (problem.of_noise()[(0, 0)] / e.len() as f64).sqrt();
-    let fits = rms < MISFIT * expected && corrected_normal.is_some();
+    let of_values = uncertainty::spread_out(&scatter, &shown, n);
+    let root_mean = |sum: f64| (sum / e.len() as f64).sqrt();
+    let rms = root_mean(e.iter().map(|e| e * e).sum());
+    let expected = root_mean(problem.noise_power());
+    let fits = rms < MISFIT * expected;
     let estimated = |j: usize, less: f64| {
         let std = of_values[(j, j)].sqrt();
-        let end = |side: f64| problem.bounded(j, values[j] + side * 1.96 * std) - less;
+        let end = |side: f64| problem.bounded(j, p[j] + side * 1.96 * std) - less;
         let interval = [end(-1.0), end(1.0)];
-        Estimated { interval, ..Estimated::normal(values[j] - less, std, unit(&problem.names[j])) }
+        Estimated { interval, ..Estimated::normal(p[j] - less, std, unit(&problem.names[j])) }
     };
     let (mut parameters, mut measurement) = (BTreeMap::new(), BTreeMap::new());
     for (j, name) in problem.names.iter().enumerate() {
@@ -517,6 +552,13 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
         }
     }
     measurement.insert("inertia".into(), estimated(0, 0.0));
+    let excess = &parameters["friction.d"];
+    if let (true, Scale::Logit(low, high)) = (excess.interval[0] <= 0.0, problem.scales[STRIBECK]) {
+        // without an excess of the friction at rest there is no speed at which it vanishes
+        let speed = parameters.get_mut("friction.omega_s").expect("one of the first");
+        (speed.interval, speed.determined) = ([low, high], false);
+        speed.std = (high - low) / 12.0_f64.sqrt();
+    }
     let named = |keep: &dyn Fn(usize) -> bool| -> Vec<String> {
         (0..n).filter(|&j| keep(j)).map(|j| problem.names[j].clone()).collect()
     };
@@ -532,8 +574,8 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
     let details = Details {
         fit: Fit {
             rows: e.len(),
-            rmse: rms / p[0],
-            expected: expected / p[0],
+            rmse: rms,
+            expected,
             noise: problem.rows.iter().map(|r| r.noise).collect(),
             weights: options.weights,
         },
@@ -547,13 +589,19 @@ pub fn identify(fmu: &Fmu, recordings: &[Recording], options: &Options) -> Resul
         parameters,
         measurement,
         settings,
-        correlations: (named(&|j| !at_bound[j]), correlations),
+        correlations: (named(&|j| shown.contains(&j)), correlations),
         converged: minimum.converged,
         fits: Some(fits),
         ..Found::new(details)
     };
     found.verdict = words(&found);
     Ok(found)
+}
+
+/// A start from where a search ended that may be at a bound, where a variable hardly changes its value any more: a logit of 6 is a
+/// four-hundredth of the range off.
+fn off_the_bounds(x: &[f64]) -> Vec<f64> {
+    x.iter().map(|x| x.clamp(-6.0, 6.0)).collect()
 }
 
 fn unit(name: &str) -> &'static str {
@@ -569,7 +617,7 @@ fn unit(name: &str) -> &'static str {
 
 /// Rows of the windows, over all recordings.
 fn windows(problem: &Problem) -> Vec<(usize, usize)> {
-    let rows = problem.rows.iter().map(|rows| (rows.inner().len(), rows.recording.step()));
+    let rows = problem.rows.iter().map(|rows| (rows.inner().len(), rows.step));
     uncertainty::windows(rows, WINDOW)
 }
 
@@ -640,6 +688,13 @@ fn words(found: &Found) -> Vec<String> {
     }
     for name in at_bound {
         words.push(format!("{name} ended at a bound; its value is the bound's."));
+    }
+    if found.parameters.get("friction.omega_s").is_some_and(|speed| !speed.determined) {
+        words.push(
+            "friction.omega_s is not determined: friction.d is zero within its interval, and the recording may have no Stribeck effect. Its \
+             interval is that of its bounds."
+                .into(),
+        );
     }
     let (names, matrix) = &found.correlations;
     for i in 0..names.len() {
