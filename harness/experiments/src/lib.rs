@@ -11,3 +11,4 @@ pub mod run;
 pub mod scaling;
 pub mod sensors;
 pub mod step_cost;
+pub mod weight;

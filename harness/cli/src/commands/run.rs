@@ -8,6 +8,7 @@ use experiments::campaign::{Range, WAVE, stored_columns};
 use experiments::profile::{self, Written};
 use experiments::run::{self, Run, driven, histories};
 use experiments::sensors::{self, Sensor, Sensors};
+use experiments::weight::{Tanks, WATER_TENSION};
 use host::description::ModelDescription;
 use host::guard;
 use report::view;
@@ -57,6 +58,10 @@ pub struct RunArgs {
     /// Input that the profile drives [default: tau_cmd, or the FMU's only Real input].
     #[arg(long, value_name = "NAME")]
     drive: Option<String>,
+    /// Surface tension of the liquid in the tanks of Spacecraft and SloshTank, N/m, for the warning where weight does not rule it; its
+    /// density is the tank's parameter [default: water's, 0.07213].
+    #[arg(long, value_name = "N/M")]
+    tension: Option<f64>,
     /// Variables to record beside time and the driven inputs [default:
     /// omega,omega_imu,slosh_angle,slosh_angle_radial; of an FMU without these all outputs and slosh
     /// angles; what `hubslosh view` draws slosh modes after the first and draining tanks by].
@@ -130,9 +135,17 @@ impl RunArgs {
         let asked = columns.len();
         // read along, to say at the end whether the model still meant something
         let range = Range::of(description, &mut instance)?;
+        let tanks = Tanks::of(description, &mut instance, self.tension.unwrap_or(WATER_TENSION))?;
+        if self.tension.is_some() && tanks.is_none() {
+            bail!(
+                "--tension is for the tanks of Spacecraft and SloshTank (the bench's is fluid.sigma)"
+            );
+        }
+        let forces = tanks.iter().flat_map(Tanks::needs).collect::<Vec<_>>();
         let sensors = Sensors::new(&self.sensors, description, &run.settings, run.step)?;
         let wave = range.as_ref().map(|_| WAVE);
-        let columns = run.columns_with(&columns, wave.into_iter().chain(sensors.needs()));
+        let needs = wave.into_iter().chain(forces.iter().map(String::as_str));
+        let columns = run.columns_with(&columns, needs.chain(sensors.needs()));
         // the table, its copy for --columns, and what is written: 25 characters for a number
         let all = columns.len() + sensors.columns().len();
         guard::allow((run.steps() * (all + 3) * 50) as u64);
@@ -160,6 +173,7 @@ impl RunArgs {
                 [range.left(waves), range.without_weight(waves, table.column("g_axial"))]
             })
             .flatten()
+            .chain(tanks.iter().flat_map(|tanks| tanks.without_weight(&table)))
             .collect();
         let driven = table.names().len() - columns.len();
         let table = sensors.recorded(table, driven + asked, "run", run.step)?;

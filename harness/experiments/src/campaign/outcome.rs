@@ -12,6 +12,7 @@ use super::Case;
 use crate::plan::RECORDING;
 use crate::profile::{Profile, Torque};
 use crate::run::{Run, TORQUE};
+use crate::weight::Contents;
 use analysis::features::{Deviations, Features};
 use analysis::lengths::Lengths;
 use analysis::linear::{Linear, Mode};
@@ -22,7 +23,7 @@ use analysis::rotary::{self, Rotary};
 use analysis::sweep::Sweep;
 use analysis::welch::{self, Spectra};
 use analysis::{FrequencyResponse, demodulation, logarithmic_grid, noise, spa};
-use formulas::similarity::{Liquid, ruling_force};
+use formulas::similarity::Liquid;
 use signals::table::Table;
 
 /// Frequencies at which responses are evaluated: 1.2 mHz apart at the antiresonance of the thesis's
@@ -649,9 +650,6 @@ pub struct Range {
     pub length: f64,
 }
 
-/// Below this Bond number no model here stands for the liquid (thesis 2.5, 8.2.2).
-const LEAST_BOND: f64 = 30.0;
-
 impl Range {
     /// Of an initialised instance; `None` if the FMU is not the bench.
     pub fn of(description: &ModelDescription, instance: &mut Instance) -> Result<Option<Range>> {
@@ -681,32 +679,12 @@ impl Range {
         if self.length <= 0.0 {
             return None;
         }
-        let g_at = |row: usize| g.map_or(self.g, |g| g[row]);
-        let (mut velocity, mut worst) = (0.0f64, None::<(f64, f64, f64)>);
-        for (row, wave) in waves.iter().enumerate() {
-            let g = g_at(row);
-            velocity = velocity.max(wave.abs() * (g.max(0.0) / self.length).sqrt());
-            let (bond, weber) =
-                (self.liquid.bond(g, self.radius), self.liquid.weber(velocity, self.radius));
-            // how far weight is from ruling: against 30, and against inertia
-            let rules = (bond / LEAST_BOND).min(bond / weber.max(1.0));
-            if rules < 1.0 && worst.is_none_or(|(other, ..)| rules < other) {
-                worst = Some((rules, bond, weber));
-            }
-        }
-        let (_, bond, weber) = worst?;
-        let froude = if bond > 0.0 { format!("{:.2}", weber / bond) } else { "infinite".into() };
-        let rules = match ruling_force(bond, weber) {
-            // it still rules, but the surface is curved
-            gravity if gravity.starts_with("gravity") => {
-                "the surface is curved, and where the liquid is, is uncertain"
-            }
-            other => other,
-        };
-        Some(format!(
-            "Bond number {bond:.3}, Weber number {weber:.3}, Froude number {froude} (waves and pendulums need a \
-             Bond number above {LEAST_BOND} and a Froude number below 1): {rules}"
-        ))
+        let contents = Contents { liquid: self.liquid, radius: self.radius };
+        let rows = waves.iter().enumerate().map(|(row, wave)| {
+            let g = g.map_or(self.g, |g| g[row]);
+            (g, wave.abs() * (g.max(0.0) / self.length).sqrt())
+        });
+        contents.without_weight(rows).map(|numbers| numbers.to_string())
     }
 
     /// How a run with these wave heights, m, left it: a linear liquid in waves beyond a quarter of

@@ -5,3 +5,4 @@ mod gyro;
 mod plans;
 mod sensors;
 mod sizes;
+mod weight;

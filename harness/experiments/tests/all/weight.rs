@@ -1,0 +1,71 @@
+//! Warnings of runs of the packed FMUs in six axes in which weight does not rule the liquid.
+
+use experiments::profile::Torque;
+use experiments::run::Run;
+use experiments::weight::Tanks;
+use host::fmu::Fmu;
+use pack::packed_model_for_tests;
+
+/// What is said of a run of `model` with these settings, `input` driven by rows, and this surface tension, N/m.
+fn said(
+    model: &str,
+    settings: &[(&str, &str)],
+    (input, times, values): (&str, &[f64], &[f64]),
+    tension: f64,
+) -> Vec<String> {
+    let fmu = Fmu::open(packed_model_for_tests(pack::model(model).unwrap())).unwrap();
+    let run = Run {
+        settings: settings
+            .iter()
+            .map(|(name, value)| (name.to_string(), value.to_string()))
+            .collect(),
+        input: Some(input.into()),
+        torque: Torque::rows(times, values, None, true).unwrap(),
+        others: Vec::new(),
+        step: 0.25,
+        stop: times[times.len() - 1],
+        tolerance: None,
+        hold: true,
+    };
+    let mut instance = run.initialise(&fmu).unwrap();
+    let tanks = Tanks::of(fmu.description(), &mut instance, tension).unwrap().unwrap();
+    let needs = tanks.needs();
+    let columns = run.columns_with(&["dissipated"], needs.iter().map(String::as_str));
+    tanks.without_weight(&run.drive(&mut instance, &columns, |_| {}).unwrap())
+}
+
+/// The default craft at rest, 1180 kg with 381.704 kg of water in a tank of R = 0.376618 (1.841184² − 1)/2 = 0.45005 m: at 60 N,
+/// 0.03842 m/s², Bo = 1000 0.03842 0.45005²/0.07213 = 107.9; a tenth of that after a cut-off to 6 N; 0 without thrust.
+#[test]
+fn a_cut_off_of_thrust_is_told_with_the_numbers_of_a_hand_calculation() {
+    let rest = [("init.omega[1]", "0"), ("init.omega[3]", "0")];
+    let (times, water) = ([0.0, 10.0, 20.0], 0.07213);
+    let of = |values: &[f64]| said("Spacecraft", &rest, ("force[3]", &times, values), water);
+    assert_eq!(of(&[60.0; 3]), [""; 0], "under thrust");
+    let [low] = <[String; 1]>::try_from(of(&[60.0, 6.0, 6.0])).unwrap();
+    assert!(low.starts_with("tank[1]: Bond number 10.788, Weber number 0.000,"), "{low}");
+    let [cut] = <[String; 1]>::try_from(of(&[60.0, 0.0, 0.0])).unwrap();
+    for words in ["Bond number 0.000", "Froude number infinite", "surface tension"] {
+        assert!(cut.contains(words), "{words}: {cut}");
+    }
+    // The same after the same fall of a liquid with a fifth of the tension: Bo = 53.9 at 6 N.
+    let thin = said("Spacecraft", &rest, ("force[3]", &times, &[60.0, 6.0, 6.0]), water / 5.0);
+    assert_eq!(thin, [""; 0]);
+    // A diaphragm holds it.
+    let held: Vec<_> = rest.into_iter().chain([("tank[1].k[1]", "20")]).collect();
+    assert_eq!(said("Spacecraft", &held, ("force[3]", &times, &[60.0, 0.0, 0.0]), water), [""; 0]);
+}
+
+/// A tank of 0.9 m by its diameter at 0.1 m/s² along its axis, Bo = 280.7, then 0.002: Bo = 5.61. Its bob starts with 0.2 1/s:
+/// V = 0.37657 m 0.2 1/s, We = 1000 V² 0.45/0.07213 = 35.39.
+#[test]
+fn slosh_tank_s_host_is_told_of_a_cut_off_by_the_acceleration_that_it_gives() {
+    let settings = [("tank.diameter", "0.9"), ("a[1]", "0"), ("tank.p_dot_0[1,1]", "0.2")];
+    let (times, water) = ([0.0, 5.0, 10.0], 0.07213);
+    let of = |values: &[f64]| said("SloshTank", &settings, ("a[3]", &times, values), water);
+    assert_eq!(of(&[0.1; 3]), [""; 0]);
+    let [cut] = <[String; 1]>::try_from(of(&[0.1, 0.002, 0.002])).unwrap();
+    let words = "tank: Bond number 5.615, Weber number 35.3";
+    assert!(cut.starts_with(words) && cut.contains("inertia"), "{cut}");
+    assert!(!cut.contains("ball"), "{cut}");
+}
