@@ -39,7 +39,7 @@ use taylor::vector::{
 
 use crate::damping::Drag;
 use crate::parameters::Tank;
-use crate::rigid::along_rod;
+use crate::rigid::{Rigid, along_rod};
 
 /// One bob, as the outputs need it.
 pub(crate) struct BobNow<T> {
@@ -246,6 +246,15 @@ impl Bob {
     /// The bob at rest as a point mass, from O.
     pub fn at_rest(&self) -> Vec3 {
         sub(self.hinge, scale(self.l, self.e))
+    }
+
+    /// The body that it counts for with hosts that solve with a constant matrix (`slosh_tank.rs`).
+    pub fn lumped(&self) -> Rigid {
+        let Some(b) = self.across else { return Rigid::new(self.m, self.hinge, &[[0.0; 3]; 3]) };
+        let own = 2.0 * self.m * self.l * self.l;
+        let element = |i: usize, j: usize| own * (if i == j { 1.0 } else { 0.0 } - b[i] * b[j]);
+        let own = [0, 1, 2].map(|i| [0, 1, 2].map(|j| element(i, j)));
+        Rigid::new(2.0 * self.m, self.hinge, &own)
     }
 
     /// [b; rho x b] of a planar mode, along which its bob is carried along; `x` is its six numbers.

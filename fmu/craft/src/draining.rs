@@ -150,7 +150,7 @@ impl Draining {
     /// `None` if no tank can drain and none has planar modes.
     pub fn new(p: &Parameters) -> Option<Draining> {
         let tanks = &p.tank[..p.tanks];
-        tanks.iter().any(|tank| tank.fill.points > 0 || tank.is_planar()).then(|| Draining {
+        tanks.iter().any(Tank::is_extrapolated).then(|| Draining {
             craft: p.craft.rigid(),
             mount: p.mount,
             gravity: p.gravity,

@@ -308,6 +308,16 @@ impl Tank {
         self.direction[..self.modes.min(MODES)].iter().any(|direction| *direction != [0.0; 2])
     }
 
+    /// Whether its motion is extrapolated (`contents.rs`): it can drain or has planar modes.
+    pub(crate) fn is_extrapolated(&self) -> bool {
+        self.fill.points > 0 || self.is_planar()
+    }
+
+    /// Mass of the whole liquid, kg.
+    pub(crate) fn whole_mass(&self) -> f64 {
+        self.mass[..self.modes].iter().fold(self.m_0, |sum, m| sum + m)
+    }
+
     /// Unit vector b, tank axes, across the plane in which the bob of mode n (from 0) swings: e x b is its direction backwards;
     /// `None` where it swings in every direction.
     pub(crate) fn across(&self, n: usize) -> Option<Vec3> {
@@ -882,6 +892,16 @@ impl Craft {
     }
 }
 
+/// Whether a body with rigid liquid and what is carried along of planar modes has no inertia about some axis.
+pub(crate) fn has_no_inertia(body: Rigid, tanks: impl Iterator<Item = Tank> + Clone) -> bool {
+    let rigid = tanks.clone().fold(body, |sum, tank| sum.and(&tank.rigid()));
+    let mut matrix = rigid.mass_matrix();
+    for tank in tanks {
+        tank.add_planar_bobs(&mut matrix);
+    }
+    smallest_pivot(&matrix) < 1e-12
+}
+
 impl Parameters {
     /// Everything that is wrong with the parameters; empty when nothing is.
     pub fn problems(&self) -> Vec<String> {
@@ -950,12 +970,7 @@ impl Parameters {
         }
         if problems.0.is_empty() {
             let tanks = self.tank[..self.tanks].iter().map(Tank::resolve);
-            let rigid = tanks.clone().fold(self.craft.rigid(), |sum, tank| sum.and(&tank.rigid()));
-            let mut matrix = rigid.mass_matrix();
-            for tank in tanks {
-                tank.add_planar_bobs(&mut matrix);
-            }
-            if smallest_pivot(&matrix) < 1e-12 {
+            if has_no_inertia(self.craft.rigid(), tanks) {
                 problems.0.push(
                     "craft.J with the tanks' m_0, I_0 and I_z is singular: the inertia of craft \
                      and rigid liquid about every axis through their centre of mass must be above 0"

@@ -24,6 +24,16 @@
 //! loop that is left converges at any mass ratio. In a tank that drains M_a^ is that of the start: what is less
 //! of it later makes the loop converge the faster.
 //!
+//! A planar mode (`contents.rs`) is carried along across its plane where its bob is, not where it hangs: m u u^T,
+//! u = [b; rho x b], besides. With the acceleration a_P of the hinge
+//!
+//! ```text
+//! (u.[a; w'])^2 = (b.a_P + l w'.(p x b))^2 <= 2 (b.a_P)^2 + 2 l^2 |w' - b b.w'|^2
+//! ```
+//!
+//! because p x b is a unit vector in the plane. So it counts for 2 m at its hinge and for the inertia 2 m l^2 (1 - b b^T)
+//! about it.
+//!
 //! [`Coupling::RigidBody`] is for hosts that are plain rigid bodies of M_host + M_a^. These have the centrifugal and
 //! gyroscopic terms of M_a^ (mass m^, moment S^, inertia I^) in their own equations, so that
 //!
@@ -33,10 +43,11 @@
 //!
 //! Within a step a and w' are linear in time, and w = w_n + w'_n t + w''_n t^2/2.
 //!
-//! A tank that drains (`contents.rs`) moves by extrapolation instead of power series, as a craft does. A jump of its
-//! flow is an impulse on the host, which a force cannot be; it is left out, here and in the bobs.
+//! A tank that drains or has planar modes (`contents.rs`) moves by extrapolation instead of power series, as a craft does. A
+//! jump of its flow is an impulse on the host, which a force cannot be; it is left out, here and in the bobs.
 
 use alloc::boxed::Box;
+use alloc::format;
 use alloc::string::String;
 use alloc::vec::Vec;
 use core::ops::ControlFlow;
@@ -53,7 +64,9 @@ use crate::bob::{Bob, BobNow};
 use crate::contents::{Drains, MountedTank, Outflow, has_diverged, normalise_bobs, vec_of};
 use crate::motion::{SCALE_TIME, twice_crossed};
 use crate::outputs::{MassProperties, TankOutputs};
-use crate::parameters::{Craft, Limits, MAX_STEPS, Tank, steps_problem, tolerance_problem};
+use crate::parameters::{
+    Craft, Limits, MAX_STEPS, Tank, has_no_inertia, steps_problem, tolerance_problem,
+};
 use crate::ranges;
 use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod, largest_eigenvalue};
 use crate::sizes::MODES;
@@ -123,16 +136,32 @@ impl TankParameters {
             problems.extend(host.problems("host"));
         }
         problems.extend(steps_problem(self.max_steps));
-        if !self.tank.is_axial() {
-            problems.push(
-                "tank.direction, r_0, dI_y, I_xy, I_xz or I_yz (allowed: 0 on somebody else's craft)".into(),
-            );
+        if problems.is_empty() && !self.tank.is_axial() {
+            problems.extend(self.uneven_problem());
         }
         if self.tank.ball.travel > 0.0 {
             // An impact is an impulse on the host, which a force cannot be.
             problems.push("tank.ball.travel (allowed: 0 on somebody else's craft)".into());
         }
         problems
+    }
+
+    /// Rigid liquid that is less than nothing, or off by more than the rest can bear, where it is not alike all around the axis.
+    fn uneven_problem(&self) -> Option<String> {
+        let tank = self.tank.resolve();
+        let mass = tank.whole_mass();
+        if mass <= 0.0 {
+            return Some(format!(
+                "tank.m_0 = {:?} kg leaves {mass:?} kg of liquid with the bobs of all modes (allowed: more than 0)",
+                tank.m_0
+            ));
+        }
+        let host = self.host?;
+        has_no_inertia(host.rigid(), core::iter::once(tank)).then(|| {
+            "host.J with the tank's m_0, I_0, dI_y, I_z and products is singular: the inertia of host and rigid liquid \
+             about every axis through their centre of mass must be above 0"
+                .into()
+        })
     }
 }
 
@@ -238,13 +267,13 @@ pub struct SloshTank {
     host: Option<Craft>,
     /// M of [`Coupling::Lumped`].
     lumped: Rigid,
-    /// If the tank can drain.
+    /// If the tank can drain or has planar modes.
     draining: Option<Box<MountedTank>>,
     limits: Limits,
     bounds: ranges::Bounds,
 }
 
-/// The motion of a tank that drains over one step.
+/// The motion of a tank that drains or has planar modes over one step.
 struct Run<'a> {
     mounted: &'a MountedTank,
     inputs: &'a TankInputs,
@@ -289,12 +318,14 @@ impl System<TANK_STATES> for Run<'_> {
 
 impl Drains<TANK_STATES> for Run<'_> {
     fn normalise(&self, x: &mut [f64; TANK_STATES], _: f64) {
+        self.mounted.flatten(x);
         normalise_bobs(&mut x[..DISSIPATED]);
     }
 
     fn outflows(&self) -> impl Iterator<Item = Outflow<'_>> {
         let Run { mounted, inputs } = *self;
-        core::iter::once(Outflow { mounted, flow: inputs.mass_flow, at: LIQUID, tank: 0 })
+        let flow = Outflow { mounted, flow: inputs.mass_flow, at: LIQUID, tank: 0 };
+        mounted.drains().then_some(flow).into_iter()
     }
 }
 
@@ -311,7 +342,9 @@ fn draining_rates<T: Number>(
         rate[at..at + numbers.len()].copy_from_slice(numbers);
     });
     rate[DISSIPATED] = contents.dissipation;
-    rate[LIQUID] = -flow;
+    if mounted.drains() {
+        rate[LIQUID] = -flow;
+    }
     rate
 }
 
@@ -514,7 +547,7 @@ impl SloshTank {
             x[6 * n + 3..6 * n + 6].copy_from_slice(&rate);
         }
         let tank = p.tank.resolve();
-        x[LIQUID] = tank.mass[..tank.modes].iter().fold(tank.m_0, |sum, m| sum + m);
+        x[LIQUID] = tank.whole_mass();
         let state = TankState { time: start_time, x, ranges: Ranges::default() };
         let mut tank = SloshTank::resume(p, &state, tolerance);
         tank.take_event(inputs);
@@ -527,9 +560,7 @@ impl SloshTank {
         let tank = p.tank.resolve();
         let rigid = tank.rigid();
         let bobs: Vec<Bob> = (0..tank.modes).map(|n| Bob::new(&tank, 0, n)).collect();
-        let lumped = bobs
-            .iter()
-            .fold(rigid, |sum, bob| sum.and(&Rigid::new(bob.m, bob.hinge, &[[0.0; 3]; 3])));
+        let lumped = bobs.iter().fold(rigid, |sum, bob| sum.and(&bob.lumped()));
         let motion = TankMotion {
             state: *state,
             inputs: TankInputs::default(),
@@ -547,7 +578,7 @@ impl SloshTank {
             coupling: p.coupling,
             host: p.host,
             lumped,
-            draining: (tank.fill.points > 0).then(|| Box::new(MountedTank::new(&tank))),
+            draining: tank.is_extrapolated().then(|| Box::new(MountedTank::new(&tank))),
             limits: Limits { tolerance, max_steps: p.max_steps },
             bounds: ranges::Bounds::new(&tank),
         }
@@ -803,6 +834,7 @@ impl SloshTank {
     pub fn take_impulse(&mut self, dv: Vec3, dw: Vec3) {
         let TankMotion { state, bobs, .. } = &mut *self.motion;
         if let Some(mounted) = &self.draining {
+            mounted.flatten(&mut state.x);
             let tank = Tank { liquid_0: state.x[LIQUID], ..mounted.tank }.resolve();
             bobs.iter_mut().for_each(|bob| *bob = Bob::new(&tank, 0, bob.mode));
         }
@@ -825,6 +857,9 @@ impl SloshTank {
         let mut matrix = self.motion.rigid.mass_matrix();
         for bob in &self.motion.bobs {
             add_rank_one(&mut matrix, bob.m, &along_rod(bob.p[0], bob.hinge));
+            if let Some(u) = bob.carried_along(&self.motion.state.x[6 * bob.mode..]) {
+                add_rank_one(&mut matrix, bob.m, &u);
+            }
         }
         Some(largest_eigenvalue(&Factors::of(&host.rigid().mass_matrix()), &matrix))
     }

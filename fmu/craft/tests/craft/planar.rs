@@ -1,8 +1,14 @@
 //! Tanks without axial symmetry: modes that swing in one plane.
 
-use craft::{Inertia, Inputs, Mount, POINTS, Parameters, Ramp, STATES, Tank, index};
+use craft::{
+    Coupling, Inertia, Inputs, Line, MODES, Mount, POINTS, Parameters, Ramp, STATES, TANK_STATES,
+    Tank, TankInputs, TankParameters, index,
+};
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
-use super::component::Spacecraft;
+use super::component::{SloshTank, Spacecraft};
+use super::exchange::{HostWithTanks, runge_kutta};
+use super::random::Random;
 
 /// A box of 1000 kg of liquid as wide as deep along y and twice as long along x: a mode along each axis, whose masses are more
 /// than the liquid's.
@@ -177,4 +183,192 @@ fn rigid_liquid_below_0_is_allowed_with_planar_modes_as_long_as_the_whole_is_not
     assert!(said[0].starts_with("tank[1].p_0[2] = ") && said[0].contains("tank[1].direction[2]"));
     p.tank[0].direction[1] = [1e-9, 0.0];
     assert!(p.problems()[0].starts_with("tank[1].direction[2] = "), "{:?}", p.problems());
+}
+
+type V = Vector3<f64>;
+
+/// Momentum and angular momentum about the origin of space, and energy, of a body with its tanks, from positions and velocities of
+/// every mass: a second sum that shares nothing with the outputs.
+fn sums(p: &Parameters, x: &[f64; STATES]) -> [f64; 7] {
+    let v = |at: usize| V::from_column_slice(&x[at..at + 3]);
+    let turn = UnitQuaternion::from_quaternion(Quaternion::new(x[0], x[1], x[2], x[3]));
+    let (w, o, v_o) = (v(index::OMEGA), v(index::POSITION), turn.inverse() * v(index::VELOCITY));
+    let (mut momentum, mut angular, mut energy) = (V::zeros(), V::zeros(), 0.0);
+    let mut add = |m: f64, s: V, own: Matrix3<f64>, rate: V| {
+        let velocity = v_o + w.cross(&s) + rate;
+        momentum += turn * velocity * m;
+        angular += (o + turn * s).cross(&(turn * velocity * m)) + turn * (own * w);
+        energy += m * velocity.norm_squared() / 2.0 + w.dot(&(own * w)) / 2.0;
+    };
+    let j = p.craft.j.matrix();
+    let zero = Matrix3::zeros();
+    add(p.craft.mass, V::from(p.craft.r), Matrix3::from_fn(|i, k| j[i][k]), V::zeros());
+    let mut springs = 0.0;
+    for (i, tank) in p.tank[..p.tanks].iter().enumerate() {
+        let [q, x, y, z] = tank.q;
+        let axes = UnitQuaternion::from_quaternion(Quaternion::new(q, x, y, z));
+        let axes: Matrix3<f64> = axes.to_rotation_matrix().into();
+        let at = |r: V| V::from(tank.position) + axes * r;
+        let [xy, xz, yz] = tank.products;
+        let (xx, yy) = (tank.i_0, tank.i_0 + tank.di_y);
+        let own = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, tank.i_z);
+        let center = V::new(tank.r_0[0], tank.r_0[1], tank.h_0);
+        add(tank.m_0, at(center), axes * own * axes.transpose(), V::zeros());
+        for n in 0..tank.modes {
+            let place = index::bob(i, n);
+            let (rod, rate, l) = (v(place), v(place + 3), tank.length[n]);
+            let [along, across] = tank.direction[n];
+            // Off the axis by the arm, on the side from which the direction goes round it.
+            let aside = V::new(along, across, 0.0).try_normalize(0.0).unwrap_or_default();
+            let hinge = aside.cross(&V::z()) * tank.arm[n] + V::z() * tank.hinge[n];
+            add(tank.mass[n], at(hinge + rod * l), zero, axes * rate * l);
+            springs += tank.k[n] * l * l * (rod.x * rod.x + rod.y * rod.y) / 2.0;
+        }
+    }
+    let [p, h] = [momentum, angular];
+    [p.x, p.y, p.z, h.x, h.y, h.z, energy + springs]
+}
+
+/// Nothing acts on a body whose host solves (M_body + sum of M_a) [a; w'] = rest + sum of bias: it keeps momentum and angular
+/// momentum, and loses of its energy what the tanks say that they dissipate, in every stage of the host's integrator.
+#[test]
+fn a_host_with_its_tanks_keeps_momentum_and_loses_the_energy_that_they_dissipate() {
+    let mut telling = 0;
+    for seed in 0..8 {
+        let mut random = Random::new(seed);
+        let mut p = random.parameters();
+        random.make_all_planar(&mut p);
+        for tank in &mut p.tank {
+            // Held, so that bias does not hang on the acceleration that it is to give.
+            tank.zeta = [0.05; MODES];
+        }
+        let u = Inputs::default();
+        let start = Spacecraft::new(&p, &u, 0.0, 1e-9).unwrap().continuous_states();
+        let mut host = HostWithTanks::new(&p, u);
+        let mut x = start;
+        runge_kutta(|t, x| host.rates(t, x), &mut x, 2.0, 4000);
+        let (before, after) = (sums(&p, &start), sums(&p, &x));
+        let size = before.iter().fold(0.0, |size: f64, x| size.max(x.abs()));
+        for i in 0..6 {
+            // (h w)^5/120 of bobs at up to 60 1/s, 4000 times; drift of |p| alike.
+            let off = (after[i] - before[i]).abs();
+            assert!(off < 1e-10 * size, "{seed} [{i}] {off:e} of {size}");
+        }
+        let dissipated = x[index::DISSIPATED];
+        let off = (after[6] + dissipated - before[6]).abs();
+        assert!(off < 1e-9 * before[6], "{seed} {off:e} of {}", before[6]);
+        telling += usize::from(dissipated > 1e-5 * before[6]);
+    }
+    assert!(telling > 5, "{telling}");
+}
+
+/// The host's motion over a step that begins `t` later.
+fn later(u: &TankInputs, t: f64) -> TankInputs {
+    let at = |ramp: &Ramp| Ramp { value: ramp.at(t), slope: ramp.slope };
+    let slope = u.omega_dot.slope;
+    let omega = [0, 1, 2].map(|i| u.omega[i] + (u.omega_dot.value[i] + slope[i] * t / 2.0) * t);
+    TankInputs { a: at(&u.a), omega, omega_dot: at(&u.omega_dot), ..*u }
+}
+
+/// One step of 2 s ends where its pieces do and where Runge-Kutta's does on the tank's own derivatives, whatever the drag follows.
+/// A mass flow has no effect.
+#[test]
+fn a_tank_s_steps_are_those_of_a_host_that_integrates_it() {
+    for seed in 0..8 {
+        let mut random = Random::new(seed);
+        let mut p = TankParameters { tank: random.tank(), ..TankParameters::default() };
+        random.make_planar(&mut p.tank);
+        if seed.is_multiple_of(2) {
+            random.follow(&mut p.tank);
+        }
+        let mut ramp = || Ramp { value: random.vector(1.0), slope: random.vector(1.0) };
+        let (a, omega_dot) = (ramp(), ramp());
+        let mass_flow = Line { value: 5.0, slope: 1.0 };
+        let u = TankInputs { a, omega: random.vector(0.5), omega_dot, mass_flow };
+        let mut whole = SloshTank::new(&p, &u, 0.0, 1e-12).unwrap();
+        let mut cut = SloshTank::new(&p, &u, 0.0, 1e-12).unwrap();
+        let mut host = SloshTank::new(&p, &u, 0.0, 1e-12).unwrap();
+        let start = whole.continuous_states();
+        whole.step(&u, 2.0).unwrap();
+        let mut t = 0.0;
+        while t < 2.0 {
+            let h = f64::min(random.magnitude(1e-3, 0.5), 2.0 - t);
+            cut.step(&later(&u, t), h).unwrap();
+            t += h;
+        }
+        let mut x = [0.0; STATES];
+        x[..TANK_STATES].copy_from_slice(&start);
+        let rates = |t: f64, x: &[f64; STATES]| {
+            host.set_continuous_states(x[..TANK_STATES].try_into().unwrap());
+            let mut rate = [0.0; STATES];
+            rate[..TANK_STATES].copy_from_slice(&host.derivatives(&later(&u, t)));
+            rate
+        };
+        runge_kutta(rates, &mut x, 2.0, 10_000);
+        let (whole, cut) = (whole.continuous_states(), cut.continuous_states());
+        for i in 0..TANK_STATES {
+            let size = 1.0 + whole[i].abs();
+            // 1e-12 a step, grown over 2 s; Runge-Kutta as in `exchange.rs`.
+            assert!(
+                (cut[i] - whole[i]).abs() < 1e-10 * size,
+                "{seed} [{i}] {} {}",
+                cut[i],
+                whole[i]
+            );
+            assert!((x[i] - whole[i]).abs() < 1e-9 * size, "{seed} [{i}] {} {}", x[i], whole[i]);
+        }
+        assert_eq!(whole[TANK_STATES - 1], start[TANK_STATES - 1], "liquid");
+    }
+}
+
+/// In a tank that is held, g/l along each axis. Pushed along x, its liquid has a_x the less to carry along: what the host feels of
+/// its mass at rest is m_liq less the masses that move along x.
+#[test]
+fn a_box_on_a_host_has_two_frequencies_and_two_masses() {
+    let p = TankParameters { tank: a_box(), ..TankParameters::default() };
+    let u = TankInputs { a: Ramp::held([0.0, 0.0, 9.81]), ..TankInputs::default() };
+    let mut tank = SloshTank::new(&p, &u, 0.0, 1e-9).unwrap();
+    let out = tank.outputs(&u);
+    for along in [0, 1] {
+        let mut x = [0.0; TANK_STATES];
+        x.copy_from_slice(&tank.continuous_states());
+        let small = 1e-6;
+        x[6 * along + along] = small;
+        let mut moved = SloshTank::new(&p, &u, 0.0, 1e-9).unwrap();
+        moved.set_continuous_states(&x);
+        let got = -moved.derivatives(&u)[6 * along + 3 + along] / small;
+        let want = 9.81 / p.tank.length[along];
+        // sin of 1e-6
+        assert!((got / want - 1.0).abs() < 1e-11, "{along}: {got} {want}");
+        let diagonal = out.added_mass[if along == 0 { 0 } else { 6 }];
+        assert!((diagonal - (1000.0 - p.tank.mass[along])).abs() < 1e-10, "{along} {diagonal}");
+    }
+    assert!((out.mass - 1000.0).abs() < 1e-10);
+}
+
+/// Liquid of less than no mass, and a host that it leaves without inertia.
+#[test]
+fn a_tank_whose_liquid_is_less_than_nothing_is_refused() {
+    let mut p = TankParameters { tank: a_box(), ..TankParameters::default() };
+    p.host = Some(craft(a_box()).craft);
+    for coupling in Coupling::ALL {
+        p.coupling = coupling;
+        assert_eq!(p.problems(), [""; 0]);
+    }
+    p.tank.i_z = -2000.0;
+    let said = p.problems();
+    assert!(said.len() == 1 && said[0].starts_with("host.J with the tank's m_0"), "{said:?}");
+    p.host = None;
+    assert_eq!(p.problems(), [""; 0]);
+    p.tank.m_0 = -1120.0;
+    let said = p.problems();
+    assert_eq!(
+        said,
+        [
+            "tank.m_0 = -1120.0 kg leaves 0.0 kg of liquid with the bobs of all modes (allowed: more than 0)"
+        ]
+    );
+    (p.tank.m_0, p.tank.direction) = (-120.0, Default::default());
+    let said = p.problems();
+    assert!(said[0].starts_with("tank.m_0 = -120.0 (allowed: 0.0 to "), "{said:?}");
 }

@@ -74,7 +74,8 @@ impl Random {
 
     /// Takes a tank its axial symmetry: two thirds of its modes are planar, with less rigid liquid than their masses.
     pub fn make_planar(&mut self, tank: &mut Tank) {
-        tank.m_0 *= self.between(-0.1, 1.0);
+        let bobs: f64 = tank.mass[..tank.modes].iter().sum();
+        tank.m_0 = f64::max(tank.m_0 * self.between(-0.1, 1.0), -0.5 * bobs);
         tank.i_0 = self.between(-1.0, 5.0);
         (tank.r_0, tank.di_y) = (self.vector(0.1), self.between(-2.0, 2.0));
         tank.products = self.vector(0.5);
