@@ -101,7 +101,6 @@ impl Settings {
                 self.real(of(what), value);
             }
         }
-        // Of Spacecraft alone.
         if tank.r_0 != [0.0; 2] {
             self.reals(elements(&of("r_0"), 2), &tank.r_0);
         }

@@ -39,6 +39,7 @@ const MODE: Dimension = Sized("tank.modes", MODES);
 const VECTOR: &[Dimension] = &[Fixed(3)];
 const PER_MODE: &[Dimension] = &[MODE];
 const MODE_VECTOR: &[Dimension] = &[MODE, Fixed(3)];
+const MODE_PAIR: &[Dimension] = &[MODE, Fixed(2)];
 const TABLE_OF_TANK: &[Dimension] = &[Fixed(POINTS)];
 const TABLE_OF_MODE: &[Dimension] = &[MODE, Fixed(POINTS)];
 
@@ -72,7 +73,7 @@ static VARIABLES: &[Variable<Model>] = &[
         "Force (1 to 3, N) and torque about O (4 to 6, N.m) that the host adds on its right side: force, torque = bias - added_mass [a; omega_dot]. Split, it contains neither a nor omega_dot but through the drag that follows them (with tank.damping_law = constant not at all): of a change of a some 1e-4 of the bobs' mass, which one evaluation settles. With coupling = rigid_body it is for a body that has the constant added_mass in its own mass, centre of mass and inertia, centrifugal and gyroscopic terms included")
         .shape(&[Fixed(6)]).depends_on(WRENCH).initial_depends_on(EVERYTHING),
     V::output("added_mass", |o, n| o.added_mass[n], "",
-        "Symmetric 6 x 6 added-mass matrix about O that the host adds on its left side, upper triangle by rows (kg, kg.m, kg.m2): it follows from tank.p and tank.liquid alone; with coupling = lumped or rigid_body it is that of rigid liquid and each bob at its hinge at the start, constant")
+        "Symmetric 6 x 6 added-mass matrix about O that the host adds on its left side, upper triangle by rows (kg, kg.m, kg.m2): it follows from tank.p and tank.liquid alone; with coupling = lumped or rigid_body it is that of rigid liquid and each bob at its hinge at the start, constant; the bob of a planar mode counts twice there, with 2 m l^2 about the axes in its plane")
         .shape(&[Fixed(TRIANGLE)]).depends_on(PLACES).initial_depends_on(EVERYTHING),
 
     // Inputs
@@ -158,13 +159,20 @@ static VARIABLES: &[Variable<Model>] = &[
         .display_unit("mm").range(1e-3, 1e3),
     V::parameter("tank.density", |p, _| &mut p.tank.density, "kg/m3", "Density of the liquid, used where diameter is above 0")
         .range(1e-3, 1e5),
-    V::parameter("tank.m_0", |p, _| &mut p.tank.m_0, "kg", "Mass of the rigid liquid")
-        .range(0.0, 1e9),
+    V::parameter("tank.m_0", |p, _| &mut p.tank.m_0, "kg", "Mass of the rigid liquid; below 0 allowed with planar modes (direction) alone"),
     V::parameter("tank.H_0", |p, _| &mut p.tank.h_0, "m", "Height of the rigid liquid's centre of mass on the tank's axis"),
-    V::parameter("tank.I_0", |p, _| &mut p.tank.i_0, "kg.m2", "Moment of inertia of the rigid liquid across the axis, about its centre of mass")
-        .range(0.0, 1e12),
-    V::parameter("tank.I_z", |p, _| &mut p.tank.i_z, "kg.m2", "Moment of inertia of the rigid liquid about the tank's axis")
-        .range(0.0, 1e12),
+    V::parameter("tank.I_0", |p, _| &mut p.tank.i_0, "kg.m2", "Moment of inertia of the rigid liquid across the axis, about its centre of mass; with dI_y that about the tank's x axis; below 0 as m_0"),
+    V::parameter("tank.I_z", |p, _| &mut p.tank.i_z, "kg.m2", "Moment of inertia of the rigid liquid about the tank's axis, through its centre of mass; below 0 as m_0"),
+    V::parameter("tank.r_0", |p, n| &mut p.tank.r_0[n], "m", "How far the rigid liquid's centre of mass is off the tank's axis, along the tank's x and y axis")
+        .shape(&[Fixed(2)]),
+    V::parameter("tank.dI_y", |p, _| &mut p.tank.di_y, "kg.m2", "By how much the moment of inertia of the rigid liquid about the tank's y axis exceeds I_0")
+        .range(-1e12, 1e12),
+    V::parameter("tank.I_xy", |p, _| &mut p.tank.products[0], "kg.m2", "Product of inertia of the rigid liquid about its centre of mass, tank axes, minus the integral of x y dm")
+        .range(-1e12, 1e12),
+    V::parameter("tank.I_xz", |p, _| &mut p.tank.products[1], "kg.m2", "Product of inertia of the rigid liquid, minus the integral of x z dm")
+        .range(-1e12, 1e12),
+    V::parameter("tank.I_yz", |p, _| &mut p.tank.products[2], "kg.m2", "Product of inertia of the rigid liquid, minus the integral of y z dm")
+        .range(-1e12, 1e12),
     V::integer("tank.modes", |p, _| &mut p.modes, "Number of slosh modes of the tank")
         .between(0, MODES as i32),
     V::parameter("tank.g_ref", |p, _| &mut p.tank.g_ref, "m/s2", "Acceleration along the tank's axis at which zeta holds")
@@ -177,6 +185,12 @@ static VARIABLES: &[Variable<Model>] = &[
         "Natural frequency of a mode with the tank held, at g_ref; above 0 it stands in place of length: (2 pi f)^2 = g_ref/l + k/m")
         .shape(PER_MODE).range(0.0, 1e6),
     V::parameter("tank.hinge", |p, n| &mut p.tank.hinge[n], "m", "Height of a mode's hinge on the tank's axis")
+        .shape(PER_MODE),
+    V::parameter("tank.direction", |p, n| &mut p.tank.direction[n / 2][n % 2], "1",
+        "Direction in which a mode moves its mass, x and y in tank axes, normalised: the mode is planar, its bob swings in the plane of this direction and the tank's axis and is carried along across it; 0, 0: it swings in every direction")
+        .shape(MODE_PAIR),
+    V::parameter("tank.arm", |p, n| &mut p.tank.arm[n], "m",
+        "How far a planar mode's plane is off the tank's axis: the arm about it of a momentum in the mode's direction")
         .shape(PER_MODE),
     V::parameter("tank.k", |p, n| &mut p.tank.k[n], "N/m", "Centring stiffness of a mode (capillarity, diaphragm)")
         .shape(PER_MODE).range(0.0, 1e12),
@@ -214,7 +228,7 @@ static VARIABLES: &[Variable<Model>] = &[
     V::parameter("tank.fill.hinge", |p, n| &mut p.tank.fill.hinge[n / POINTS][n % POINTS], "m", "Height of a mode's hinge at a point of the table")
         .shape(TABLE_OF_MODE),
     V::parameter("tank.p_0", |p, n| &mut p.tank.p_0[n / 3][n % 3], "1",
-        "Direction from hinge to bob at the start, tank axes; normalised")
+        "Direction from hinge to bob at the start, tank axes; normalised, of a planar mode within its plane")
         .shape(MODE_VECTOR),
     V::parameter("tank.p_dot_0", |p, n| &mut p.tank.p_dot_0[n / 3][n % 3], "1/s",
         "Its rate at the start, tank axes; made tangential")
