@@ -32,6 +32,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .fmu import FmuError
+from .tanks import SIX_AXES
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -146,10 +147,13 @@ class LiquidModes:
         self,
         number: int = 1,
         *,
+        model: str = "Spacecraft",
         modes: int | None = None,
         position: Sequence[float] = (0.0, 0.0, 0.0),
     ) -> "dict[str, Value]":
         """Return the liquid as tank ``number`` (1 to 4) of Spacecraft, for `simulate`, `Loop`, ….
+
+        model: Spacecraft, or SloshTank, which has one tank.
 
         Each of its modes is planar, with its own direction. modes: how many, 1 to 3, the heaviest;
         by default 3, or as many as there are with displacement. position: of O in body axes, m; the
@@ -161,6 +165,8 @@ class LiquidModes:
             m_0 = m − Σ m_n,   m_0 r_0 = −Σ m_n r_n,
             J_0 = J − Σ m_n (|r_n|² 1 − r_n⊗r_n) − m_0 (|r_0|² 1 − r_0⊗r_0)
         """
+        if model not in SIX_AXES:
+            raise FmuError(f"parameters are for {' and '.join(SIX_AXES)}, not for {model!r}")
         if number not in (1, 2, 3, 4):
             raise FmuError(f"the tank's number is 1 to 4, not {number!r}")
         moving = self.all[self.all["mass"] > _MASSLESS * self.mass]
@@ -187,7 +193,7 @@ class LiquidModes:
         inertia = self.lid_inertia - of_points(np.array([self.mass]), center[:, None])
         left = inertia - of_points(masses, bobs) - of_points(np.array([m_0]), r_0[:, None])
         axis = (place[0] + center[0], place[1] + center[1], place[2])
-        name = f"tank[{number}]"
+        name = f"tank[{number}]" if model == "Spacecraft" else "tank"
         values: dict[str, Value] = {
             **{f"{name}.position[{i}]": float(x) for i, x in enumerate(axis, 1)},
             f"{name}.m_0": float(m_0), f"{name}.H_0": float(center[2] + r_0[2]),

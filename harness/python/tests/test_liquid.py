@@ -175,6 +175,10 @@ def test_spacecraft_has_the_modes_of_each_direction_and_what_they_turn(
     """
     found = liquid_modes(shape, fill, modes=8, resolution=8)
     values = found.parameters(2)
+    alone = {name.replace("tank[2]", "tank"): value for name, value in values.items()}
+    assert found.parameters(model="SloshTank") == alone
+    with pytest.raises(FmuError, match="for Spacecraft and SloshTank, not for 'HubSlosh'"):
+        found.parameters(model="HubSlosh")
     shift, count = np.array([0.4, 0.7, 0.2]), values["tank[2].modes"]
     assert count == 3
     with pytest.raises(FmuError, match="modes is 1 to 3"):

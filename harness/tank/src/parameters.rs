@@ -164,7 +164,7 @@ impl ParameterSet {
     /// The parameters of a tank that was solved for `data`, as many modes as both have.
     ///
     /// # Errors
-    /// A tank that the FMU cannot have: more than four of them, a box with unequal sides in SloshTank, a full one;
+    /// A tank that the FMU cannot have: more than four of them, a full one;
     /// damping ratios without a specific force.
     pub fn new(
         tank: &Tank,
@@ -207,16 +207,7 @@ impl ParameterSet {
             }
             _ => None,
         };
-        if let Some([length_x, length_y]) = sides
-            && target == Target::SloshTank
-        {
-            return Err(format!(
-                "A box of {length_x} m by {length_y} m has other modes along x than along y; SloshTank has the same along \
-                 both: take Spacecraft, a square box, or a body of revolution."
-            )
-            .into());
-        }
-        // Of a box with unequal sides in Spacecraft the modes along both; else those along the first axis.
+        // Of a box with unequal sides in Spacecraft and SloshTank the modes along both; else those along the first axis.
         let both = data.axes.as_ref().filter(|_| sides.is_some() && target != Target::HubSlosh);
         let chosen: Vec<(usize, usize)> = match both {
             Some(axes) => along_both([&axes.x.modes, &axes.y.modes]),
