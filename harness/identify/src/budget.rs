@@ -57,8 +57,6 @@ pub fn slopes(
     tolerances: &Tolerances,
 ) -> Result<Vec<Slope>> {
     let sloshes = problem.index("slosh.zeta").is_some();
-    let base = problem.stacked(answer, x);
-    let mut instance = nominal::initialised(problem.fmu, &problem.setup.settings)?;
     let mut slopes = Vec::new();
     for (name, tolerance) in NAMES.into_iter().zip(tolerances.all()) {
         let estimated = problem.index(name).is_some();
@@ -67,24 +65,32 @@ pub fn slopes(
         if tolerance == 0.0 || estimated || recorded || unseen {
             continue;
         }
-        let factor = 1.0 + STEP;
-        let mut recordings = problem.recordings.to_vec();
-        let mut other = problem.clone();
-        match name {
-            "torque" => {
-                recordings.iter_mut().flat_map(|r| &mut r.torque).for_each(|t| *t *= factor)
-            }
-            "clock" => recordings.iter_mut().flat_map(|r| &mut r.time).for_each(|t| *t *= factor),
-            _ => {
-                let value = instance.real(name)? * factor;
-                other.setup.settings.push((name.into(), value.to_string()));
-            }
-        }
-        let other = Problem { recordings: &recordings, ..other };
-        let moved = other.stacked(&other.answer(x)?, x);
-        slopes.push(Slope { name, tolerance, change: (moved - &base) * (tolerance / STEP) });
+        let change = relative_slope(problem, (x, answer), name)? * tolerance;
+        slopes.push(Slope { name, tolerance, change });
     }
     Ok(slopes)
+}
+
+/// Derivative of the stacked innovations with respect to the logarithm of `torque`, `clock` or a parameter of the FMU that is not estimated.
+pub fn relative_slope(
+    problem: &Problem,
+    (x, answer): (&[f64], &Answer),
+    name: &str,
+) -> Result<DVector<f64>> {
+    let factor = 1.0 + STEP;
+    let mut recordings = problem.recordings.to_vec();
+    let mut other = problem.clone();
+    match name {
+        "torque" => recordings.iter_mut().flat_map(|r| &mut r.torque).for_each(|t| *t *= factor),
+        "clock" => recordings.iter_mut().flat_map(|r| &mut r.time).for_each(|t| *t *= factor),
+        _ => {
+            let instance = nominal::initialised(problem.fmu, &problem.setup.settings);
+            let value = instance?.real(name)? * factor;
+            other.setup.settings.push((name.into(), value.to_string()));
+        }
+    }
+    let other = Problem { recordings: &recordings, ..other };
+    Ok((other.stacked(&other.answer(x)?, x) - problem.stacked(answer, x)) / STEP)
 }
 
 /// What may be wrong in a problem, the tolerances first, and what that does at the minimum x.

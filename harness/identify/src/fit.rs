@@ -781,6 +781,39 @@ impl<'a> Problem<'a> {
         unreachable!("the rounds are counted")
     }
 
+    /// Where a search has ended off the minimum: the minimum with those unknowns held that have it at a kink, which no Newton step finds. These are a
+    /// friction that the step would lead below zero, and an initial rate of the hub that is zero within two standard deviations: dry friction
+    /// stops a slow hub within a row, whatever the sign of its rate. Sensitivities and covariance are those of all unknowns.
+    pub fn polish_at_kink(&self, found: Polished, rounds: usize) -> Result<Polished> {
+        if found.decrement < MINIMUM {
+            return Ok(found);
+        }
+        let e = self.stacked(&found.answer, &found.x);
+        let step = -(&found.covariance.x * found.jacobian.tr_mul(&e));
+        let is_held = |&j: &usize| {
+            let Unknown { quantity, scale, .. } = &self.unknowns[j];
+            let (x, deviation) = (found.x[j], found.covariance.x[(j, j)].sqrt());
+            match quantity {
+                Quantity::Initial(_, name) => name == "init.omega" && x.abs() < 2.0 * deviation,
+                _ => {
+                    matches!(scale, Scale::Softplus(_))
+                        && scale.value(x) + scale.slope(x) * step[j] < 0.0
+                }
+            }
+        };
+        let all: Vec<usize> = (0..found.x.len()).collect();
+        let (held, free): (Vec<usize>, Vec<usize>) = all.iter().partition(|j| is_held(j));
+        if held.is_empty() {
+            return Ok(found);
+        }
+        let known = Known::Directions(&found.jacobian);
+        let start = (&found.x[..], found.answer);
+        let there = self.polish_some(start, &free, known, Until::minimum(rounds))?;
+        let motion = &there.answer.motion;
+        let jacobian = self.sensitivities(&there.x, &all, motion, Some(&found.jacobian))?;
+        Ok(Polished { covariance: self.covariance(&jacobian)?, jacobian, ..there })
+    }
+
     /// The covariance of estimates at x, where the recordings are what the FMU does: the Cramér–Rao bound; and the
     /// sensitivities.
     pub fn information(&self, x: &[f64]) -> Result<(Covariance, DMatrix<f64>)> {

@@ -15,16 +15,18 @@ use crate::unknown::Unknown;
 
 /// Where d, h and I stand among the unknowns.
 #[derive(Clone, Copy, Debug)]
-struct Indices {
-    d: usize,
-    h: usize,
-    /// `None`: known.
-    hub: Option<usize>,
+pub struct Indices {
+    /// tank.d.
+    pub d: usize,
+    /// tank.h.
+    pub h: usize,
+    /// hub.I; `None`: known.
+    pub hub: Option<usize>,
 }
 
 impl Indices {
     /// `None` unless the tank is unknown.
-    fn of(unknowns: &[Unknown]) -> Option<Self> {
+    pub fn of(unknowns: &[Unknown]) -> Option<Self> {
         let index = |name: &str| unknowns.iter().position(|u| u.quantity.parameter() == Some(name));
         Some(Indices { d: index("tank.d")?, h: index("tank.h")?, hub: index("hub.I") })
     }

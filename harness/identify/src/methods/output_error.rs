@@ -15,6 +15,7 @@ use super::{Identified, Method, Needs, Residual, Task, page};
 use crate::between;
 use crate::budget::{self, Effect};
 use crate::candidate::{self, Fitted, ModelFit};
+use crate::deep_tank;
 use crate::estimate::Estimated;
 use crate::evidence::{self, ALIKE, DECIDES};
 use crate::fit::{self, Answer, Differences, Polished, Problem, ROUNDS};
@@ -267,6 +268,7 @@ fn finish(
     if problem.renew_noise(&mut polished) {
         polished = problem.polish(&polished.x, Some(&polished.jacobian), ROUNDS)?;
     }
+    polished = problem.polish_at_kink(polished, ROUNDS)?;
     say("central differences at the minimum", &problem);
     let between_rows = torque_between_rows(&mut problem, &mut polished, options)?;
     say("other torques between rows", &problem);
@@ -278,11 +280,11 @@ fn finish(
     fit.newton_decrement = polished.decrement;
     x.clone_from(&polished.x);
     let e = problem.stacked(&polished.answer, &x);
-    let slopes = budget::slopes(&problem, (&x, &polished.answer), &options.tolerances)?;
+    let changes = budget::slopes(&problem, (&x, &polished.answer), &options.tolerances)?;
     say("tolerances", &problem);
     let findings = Findings {
         torque: between_rows.words,
-        missing: missing::torques(&problem, &polished, &e, &slopes)?,
+        missing: missing::torques(&problem, &polished, &e, &changes)?,
         doubts: question
             .doubts
             .iter()
@@ -295,7 +297,7 @@ fn finish(
     let profile = friction::profile(&problem, &polished, &speeds)?;
     say("profile of the friction's curve", &problem);
     let Polished { jacobian, covariance, answer, .. } = polished;
-    let error_budget = budget::of(&problem, (&x, &answer), &jacobian, &covariance, &slopes);
+    let error_budget = budget::of(&problem, (&x, &answer), &jacobian, &covariance, &changes);
     say("higher slosh modes", &problem);
     fit.simulations = problem.simulations();
     let tolerances = budget::of_tolerances(&error_budget, x.len());
@@ -332,6 +334,22 @@ fn finish(
     .total()
         * wider;
     let noise = noise.total();
+    let n = x.len();
+    let mut more = between_rows.gained.clone().unwrap_or_else(|| DMatrix::zeros(n, n));
+    if let Some(models) = &of_models {
+        let mut first = more.view_mut((0, 0), models.shape());
+        first += models;
+    }
+    let deep = deep_tank::Minimum {
+        x: &x,
+        answer: &answer,
+        jacobian: &jacobian,
+        e: &e,
+        tolerances: changes.iter().map(|slope| &slope.change).collect(),
+        more: &more,
+        wider,
+    };
+    let deep = deep_tank::intervals(&problem, &deep)?;
     let of_values = DMatrix::from_fn(x.len(), x.len(), |i, j| full[(i, j)] * slopes[i] * slopes[j]);
     let fastest = fit::fastest(&answer.motion);
     let (mut parameters, mut measurement) = (BTreeMap::new(), BTreeMap::new());
@@ -353,10 +371,14 @@ fn finish(
                 interval[0] = interval[0].max(0.0);
             }
         }
+        let of_deep = deep.iter().flat_map(|deep| &deep.0).find(|(place, _)| *place == i);
+        if let Some((_, ends)) = of_deep {
+            interval = *ends;
+        }
         // of a skew interval that of the longer side
         let reach = interval.map(|end| (end - values[i]).abs() / 1.96);
         let reach = reach.into_iter().filter(|reach| reach.is_finite()).fold(0.0, f64::max);
-        let std = of_values[(i, i)].sqrt().max(reach);
+        let std = if of_deep.is_some() { reach } else { of_values[(i, i)].sqrt().max(reach) };
         let is_zero = !unknown.is_positive();
         let estimated = Estimated {
             value: values[i],
