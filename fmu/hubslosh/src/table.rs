@@ -389,6 +389,9 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
     V::parameter("slosh.table.wave", |p, n| &mut p.slosh.table.wave[n], "m/rad",
         "Elevation of the surface at the wall per slosh angle, source table; 0: that of an upright cylinder of the diameter tank.d")
         .shape(TABLE_OF_MODES).range(0.0, 1e4),
+    V::parameter("slosh.table.direction", |p, n| &mut p.slosh.table.direction[n], "rad",
+        "Direction in which a mode moves its mass, angle from the tangent, outwards positive, source table: 0 along the tangent, 90 deg along the radius; slosh.model = linear and planar. Modes of one direction in the order of their frequencies")
+        .shape(TABLE_OF_MODES).display_unit("deg").range(-std::f64::consts::FRAC_PI_2, std::f64::consts::FRAC_PI_2),
 
     // Ring baffle
     V::parameter("baffle.width", |p, _| &mut p.baffle.width, "m",

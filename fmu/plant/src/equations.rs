@@ -270,7 +270,7 @@ impl Plant {
 mod tests {
     use super::*;
     use crate::outputs::Outputs;
-    use crate::parameters::{FrictionModel, Parameters, SloshModel};
+    use crate::parameters::{FrictionModel, Parameters, SloshModel, SloshSource};
 
     /// Whether the model's coordinates are lengths, not angles.
     fn is_a_length(slosh: SloshModel) -> bool {
@@ -292,6 +292,17 @@ mod tests {
         p.slosh.zeta_amplitude = 0.05;
     }
 
+    /// Modes along any direction, where the model has such.
+    fn every_direction(p: &mut Parameters) {
+        every_option(p);
+        (p.slosh.source, p.baffle.width) = (SloshSource::Table, 0.0);
+        let table = &mut p.slosh.table;
+        table.m_liq = 3.0;
+        (table.mass[0], table.mass[1]) = (1.5, 1.2);
+        (table.length[0], table.length[1]) = (0.05, 0.04);
+        (table.direction[0], table.direction[1]) = (0.6, -1.2);
+    }
+
     fn plant_with(
         slosh: SloshModel,
         friction: FrictionModel,
@@ -301,6 +312,10 @@ mod tests {
         change(&mut p);
         p.slosh.model = slosh;
         p.slosh.modes = 2;
+        if !matches!(slosh, SloshModel::Frozen | SloshModel::Linear | SloshModel::Planar) {
+            let whole = Parameters::default().slosh;
+            (p.slosh.table, p.slosh.source) = (whole.table, whole.source);
+        }
         p.friction.model = friction;
         p.friction.eps = 0.05;
         p.friction.asymmetry = 0.1;
@@ -338,6 +353,7 @@ mod tests {
     fn directional_derivatives_agree_with_finite_differences() {
         compare_directional_derivatives(|_| {});
         compare_directional_derivatives(every_option);
+        compare_directional_derivatives(every_direction);
     }
 
     fn compare_directional_derivatives(change: fn(&mut Parameters)) {
@@ -393,6 +409,7 @@ mod tests {
     fn output_derivatives_agree_with_finite_differences() {
         compare_output_derivatives(|_| {});
         compare_output_derivatives(every_option);
+        compare_output_derivatives(every_direction);
     }
 
     /// Every continuous output, with its name.

@@ -16,7 +16,7 @@ use crate::damping::{Damping, RAMP_ORDER};
 use crate::friction::Law;
 use crate::hub::HubMotion;
 use crate::inputs::Ramp;
-use crate::parameters::{Imu, Parameters, SloshModel};
+use crate::parameters::{Imu, Parameters, SloshModel, SloshSource};
 use crate::slosh::SloshMode;
 use crate::state::{State, x};
 use crate::suspension::Suspension;
@@ -75,7 +75,7 @@ pub(crate) struct Motion {
     pub suspension: Suspension,
     pub damping: Damping,
     /// Whether drag or weight change along an expansion though g is held: with drag by amplitude, or
-    /// on a bench that leans.
+    /// on a bench that leans; or modes move along other directions than the tangent.
     pub varies: bool,
     /// Whether drag depends on the amplitude: by a baffle, or growing with it.
     with_amplitude: bool,
@@ -112,12 +112,14 @@ impl Motion {
         hub.tilt.azimuth = p.bench.tilt_azimuth;
         let with_amplitude = (p.baffle.width > 0.0 || p.slosh.zeta_amplitude > 0.0)
             && p.slosh.model != SloshModel::Frozen;
+        let is_askew =
+            p.slosh.source == SloshSource::Table && p.slosh.table.is_askew(p.slosh.modes);
         Motion {
             i0: p.hub.inertia + i_0,
             law: Law::new(&p.friction),
             suspension: Suspension::new(&p.hub),
             damping,
-            varies: with_amplitude || hub.tilt.tangent != 0.0,
+            varies: with_amplitude || hub.tilt.tangent != 0.0 || is_askew,
             with_amplitude,
             imbalance: [p.hub.imbalance * cos, p.hub.imbalance * sin],
             rigid_moment: m_0 * p.tank.r,

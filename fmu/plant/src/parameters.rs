@@ -150,9 +150,17 @@ pub struct ModeTable {
     pub k: [f64; MODES],
     pub zeta: [f64; MODES],
     pub wave: [f64; MODES],
+    /// Angle from the tangent, outwards positive, of the direction in which a mode moves its mass, rad.
+    pub direction: [f64; MODES],
 }
 
 impl ModeTable {
+    /// Radial and tangential component of a mode's direction.
+    pub(crate) fn along(&self, n: usize) -> [f64; 2] {
+        let (sin, cos) = libm::sincos(self.direction[n]);
+        [sin, cos]
+    }
+
     /// Pendulum length, m: as given, or from the frequency f at g_ref and the centring stiffness,
     /// (2 pi f)^2 = g_ref/l + k/m.
     pub(crate) fn length_of(&self, n: usize) -> f64 {
@@ -325,6 +333,7 @@ impl Default for ModeTable {
             k: none,
             zeta: none,
             wave: none,
+            direction: none,
         }
     }
 }

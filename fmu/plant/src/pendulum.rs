@@ -18,7 +18,12 @@ pub struct Pendulum {
     pub c_0: f64,
     /// Distance of the hinge from the bearing's axis, m.
     pub r: f64,
-    /// c/m, r/l and 1/l: quotients that every order of every step needs.
+    /// Direction in which the bob moves, radially and tangentially, a unit vector, of models that move along one: (0, 1) is the
+    /// tangent. With it r_x = r n_x and r_t = r n_t.
+    pub along: [f64; 2],
+    pub r_x: f64,
+    pub r_t: f64,
+    /// c/m, r_t/l and 1/l: quotients that every order of every step needs.
     pub c_m: f64,
     pub r_l: f64,
     pub inv_l: f64,
@@ -47,6 +52,9 @@ impl Default for Pendulum {
             c: 0.0,
             c_0: 0.0,
             r: 0.0,
+            along: [0.0, 1.0],
+            r_x: 0.0,
+            r_t: 0.0,
             c_m: 0.0,
             r_l: 0.0,
             inv_l: 1.0,
@@ -103,6 +111,46 @@ impl Pendulum {
         let Pendulum { baffle, growth, .. } = self;
         let other = if baffle.zeta > 0.0 { baffle.expand(n, at) } else { growth.viscous[n] };
         self.course[n] = if growth.zeta > 0.0 { growth.expand(n, at, other) } else { other };
+    }
+
+    /// Whether the bob moves along another direction than the tangent.
+    #[inline(always)]
+    pub fn is_askew(&self) -> bool {
+        self.along[0] != 0.0
+    }
+
+    /// Radial and tangential part of what is along the bob's direction.
+    #[inline(always)]
+    pub fn spread<T: Number>(&self, a: T) -> [T; 2] {
+        let [x, t] = self.along;
+        if self.is_askew() { [a * x, a * t] } else { [T::constant(0.0), a] }
+    }
+
+    /// What is along the bob's direction.
+    #[inline(always)]
+    pub fn gather(&self, [radial, tangential]: [f64; 2]) -> f64 {
+        let [x, t] = self.along;
+        if self.is_askew() { x * radial + t * tangential } else { tangential }
+    }
+
+    /// Coefficient n of a_x n_x + a_t n_t, of a vector a.
+    #[inline(always)]
+    pub fn component(&self, n: usize, [a_x, a_t]: &[Series; 2]) -> f64 {
+        self.along[0] * a_x[n] + self.along[1] * a_t[n]
+    }
+
+    /// Coefficient n of (a_x n_x + a_t n_t) b.
+    #[inline(always)]
+    pub fn component_times(&self, n: usize, [a_x, a_t]: &[Series; 2], b: &Series) -> f64 {
+        let radial = if self.is_askew() { self.along[0] * mul(n, a_x, b) } else { 0.0 };
+        radial + self.along[1] * mul(n, a_t, b)
+    }
+
+    /// Coefficient n of (a_x n_t - a_t n_x) b.
+    #[inline(always)]
+    pub fn across_times(&self, n: usize, [a_x, a_t]: &[Series; 2], b: &Series) -> f64 {
+        let tangential = if self.is_askew() { self.along[0] * mul(n, a_t, b) } else { 0.0 };
+        self.along[1] * mul(n, a_x, b) - tangential
     }
 
     /// Restoring specific force and viscous coefficient at the start of an expansion.

@@ -20,7 +20,7 @@ use formulas::third_order::{coefficients, secondary_resonance};
 
 use crate::amplitude::Growth;
 use crate::baffle::{self, Baffle};
-use crate::parameters::{MODES, Parameters, SloshModel, SloshSource};
+use crate::parameters::{MODES, ModeTable, Parameters, SloshModel, SloshSource};
 use crate::pendulum::Pendulum;
 
 /// What follows from the parameters; 0 for modes that are not used.
@@ -66,12 +66,23 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
                 .to_string(),
         );
     }
+    let modes = slosh.modes.min(MODES);
+    let askew = (0..modes).find(|n| table.direction[*n] != 0.0);
+    let along_one =
+        matches!(slosh.model, SloshModel::Frozen | SloshModel::Linear | SloshModel::Planar);
+    if let (Some(n), false) = (askew, along_one) {
+        problems.push(format!(
+            "slosh.table.direction[{}] = {} rad: slosh.model = spherical, paraboloid and liquid move along all directions with the \
+             same frequency (allowed: frozen, linear, planar)",
+            n + 1,
+            table.direction[n]
+        ));
+    }
     let positive = |name: &str, value: f64| {
         (value.is_nan() || value <= 0.0)
             .then(|| format!("slosh.table.{name} = {value} (allowed: greater than 0)"))
     };
     problems.extend(positive("m_liq", table.m_liq));
-    let modes = slosh.modes.min(MODES);
     for n in 0..modes {
         problems.extend(positive(&format!("mass[{}]", n + 1), table.mass[n]));
         let (length, frequency, n) = (table.length[n], table.frequency[n], n + 1);
@@ -95,23 +106,70 @@ pub(crate) fn problems(p: &Parameters) -> Vec<String> {
         ));
     }
     let omega2 = |n: usize| table.g_ref / length(n) + table.k[n] / table.mass[n];
-    for n in (1..modes).filter(|n| omega2(*n) < omega2(n - 1)) {
+    for n in 1..modes {
+        // The modes of each direction are in an order of their own.
+        let same = |m: &usize| table.direction[*m] == table.direction[n];
+        let Some(before) = (0..n).rev().find(same).filter(|m| omega2(n) < omega2(*m)) else {
+            continue;
+        };
         problems.push(format!(
             "the modes of slosh.table must stand in the order of their frequencies: mode {} has a \
-             lower one than mode {n}",
-            n + 1
+             lower one than mode {}",
+            n + 1,
+            before + 1
         ));
     }
-    let sum: f64 = table.mass[..modes].iter().sum();
+    let sum = table.most_along_one(modes);
     // A table written in decimals may leave the fixed mass below 0 by its last digit.
     if sum > table.m_liq * (1.0 + 1e-9) {
         problems.push(format!(
-            "the masses of slosh.table add up to {sum} kg, more than the liquid's slosh.table.m_liq = \
+            "the masses of slosh.table add up to {sum} kg along one direction, more than the liquid's slosh.table.m_liq = \
              {} kg",
             table.m_liq
         ));
     }
+    let least = p.hub.inertia + p.tank.own_inertia + table.least_inertia(modes, p.tank.r);
+    if askew.is_some() && slosh.model == SloshModel::Planar && least <= 0.0 {
+        problems.push(format!(
+            "slosh.table.direction: with the bobs where they make hub and liquid least inert, both together have {least} kg m2 \
+             (allowed: greater than 0; hub.I = {} kg m2)",
+            p.hub.inertia
+        ));
+    }
     problems
+}
+
+impl ModeTable {
+    /// Whether a mode moves along another direction than the tangent.
+    pub(crate) fn is_askew(&self, modes: usize) -> bool {
+        self.direction[..modes].iter().any(|direction| *direction != 0.0)
+    }
+
+    /// The most mass that the modes have along one direction, kg: the larger eigenvalue of the sum of m n n^T.
+    fn most_along_one(&self, modes: usize) -> f64 {
+        if self.direction[..modes].iter().all(|direction| *direction == self.direction[0]) {
+            return self.mass[..modes].iter().sum();
+        }
+        let (mut half, mut cross, mut sum) = (0.0, 0.0, 0.0);
+        for (n, m) in self.mass[..modes].iter().enumerate() {
+            let [x, t] = self.along(n);
+            (half, cross, sum) = (half + m * (x * x - t * t) / 2.0, cross + m * x * t, sum + m);
+        }
+        sum / 2.0 + libm::hypot(half, cross)
+    }
+
+    /// The least inertia that the liquid at the distance r can have in the model `planar`, kg m2: m_0 r^2 and of each mode the least
+    /// J = m [r_x^2 + 2 r_x l s + (r_t^2 + l^2) s^2] over s from -1 to 1.
+    fn least_inertia(&self, modes: usize, r: f64) -> f64 {
+        let of_mode = |n: usize| {
+            let ([n_x, n_t], l) = (self.along(n), self.length_of(n));
+            let (r_x, r_t) = (r * n_x, r * n_t);
+            let s = (-r_x * l / (r_t * r_t + l * l)).clamp(-1.0, 1.0);
+            let j = r_x * r_x + 2.0 * r_x * l * s + (r_t * r_t + l * l) * s * s;
+            self.mass[n] * (j - r * r)
+        };
+        self.m_liq * r * r + (0..modes).map(of_mode).sum::<f64>()
+    }
 }
 
 /// What is to be said about the parameters at the specific force `g`, if anything.
@@ -123,6 +181,13 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
         return warnings;
     }
     warnings.extend(baffle::warnings(p));
+    if !geometry && slosh.model == SloshModel::Linear && slosh.table.is_askew(slosh.modes) {
+        warnings.push(
+            "slosh.table.direction with slosh.model = linear: to first order a hub that only turns moves a mode by its part along the \
+             tangent alone; slosh.model = planar has the centrifugal and Coriolis forces"
+                .to_string(),
+        );
+    }
     let start = Parameters::default();
     let unused: Vec<&str> = [
         ("tank.h", p.tank.h != start.tank.h),
@@ -244,7 +309,8 @@ impl Calculated {
             };
             all.m_0 -= all.mass[n];
         }
-        if slosh.source == SloshSource::Table {
+        // Along one direction alone it is below 0 by the last digit of a table at most.
+        if slosh.source == SloshSource::Table && !slosh.table.is_askew(modes) {
             all.m_0 = f64::max(all.m_0, 0.0);
         }
         all
@@ -266,6 +332,11 @@ impl Calculated {
                 SloshSource::Table if slosh.table.wave[n] > 0.0 => slosh.table.wave[n],
                 _ => 2.0 * radius / (XI[n] * XI[n] - 1.0),
             };
+            let along = match slosh.source {
+                SloshSource::Table => slosh.table.along(n),
+                SloshSource::Geometry => [0.0, 1.0],
+            };
+            let [r_x, r_t] = along.map(|component| r * component);
             let (s, kappa) = if n == 0 { (s_1, kappa_1) } else { (1.0, 1.0) };
             let hardening = match slosh.model {
                 SloshModel::Liquid => kappa / (2.0 * l * l),
@@ -277,8 +348,11 @@ impl Calculated {
                 c,
                 c_0: c,
                 r,
+                along,
+                r_x,
+                r_t,
                 c_m: c / m,
-                r_l: r / l,
+                r_l: r_t / l,
                 inv_l: 1.0 / l,
                 wave,
                 hardening,

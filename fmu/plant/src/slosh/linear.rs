@@ -1,4 +1,5 @@
-//! Linear planar pendulum. q_y = al, the tangential angle in rad; q_x unused.
+//! Linear planar pendulum. al in rad is the angle along the direction n = (n_x, n_t), radially and tangentially, in which the
+//! bob moves, q = al n. By default that is the tangent, q_x = 0.
 //!
 //! ```text
 //! T   = r (m g al + c l al'),   no share of J beyond the hub's I0
@@ -12,6 +13,18 @@
 //! ```
 //! On a bench that leans, gravity across the axis, e, adds e_y/l to al'', -m l e_x al to T and
 //! -m (e_x r + e_y l al) to E.
+//!
+//! Along another direction than the tangent (a box with modes along both axes), u = l al, r_x = r n_x, r_t = r n_t, the bob at
+//! (r + u n_x, u n_t): its kinetic energy to second order is m [(r_t w + u')^2 + (r_x w)^2]/2, and Lagrange's equations are
+//!
+//! ```text
+//! J   = m r_x^2,   T = r_t (m g al + c l al') - m (r_x + u)(e_x n_t - e_y n_x)
+//! al'' = -(c/m) al' - (g/l) al - (r_t/l) w' + (e_x n_x + e_y n_t)/l
+//! H = m (r^2 w + r_t u')
+//! ```
+//!
+//! A hub that only turns moves a mode along the radius (n_t = 0) by terms of second order alone, r w^2 and 2 w u': they
+//! are in `planar.rs`. Here such a mode is moved by a lean of the bench, and its mass is carried on the circle of radius r.
 
 use taylor::number::Number;
 use taylor::series::{Series, ZERO, constant, mul, next, number, square, values};
@@ -53,40 +66,50 @@ impl SloshMode for Linear {
     }
 
     fn coordinates(&self, at: &Angles) -> [f64; 4] {
-        [0.0, at.angle[1], 0.0, at.rate[1]]
+        let (angle, rate) =
+            (self.p.spread(self.p.gather(at.angle)), self.p.spread(self.p.gather(at.rate)));
+        [angle[0], angle[1], rate[0], rate[1]]
     }
 
     fn angles<T: Number>(&self) -> Angles<T> {
-        let zero = T::constant(0.0);
-        Angles { angle: [zero, number(&self.al)], rate: [zero, number(&self.al_d)] }
+        let [angle, rate] = [&self.al, &self.al_d].map(|x| self.p.spread(number::<T>(x)));
+        Angles { angle, rate }
     }
 
     fn start(&mut self, q: &[f64; 4], _: &HubMotion) {
-        (self.al[0], self.al_d[0]) = (q[1], q[3]);
+        (self.al[0], self.al_d[0]) = (self.p.gather([q[0], q[1]]), self.p.gather([q[2], q[3]]));
     }
 
     fn seed_direction(&mut self, dq: &[f64; 4], _: &HubMotion) {
-        (self.al[1], self.al_d[1]) = (dq[1], dq[3]);
+        (self.al[1], self.al_d[1]) = (self.p.gather([dq[0], dq[1]]), self.p.gather([dq[2], dq[3]]));
     }
 
     fn derivatives(&self, n: usize, _: &HubMotion) -> [f64; 4] {
-        [0.0, self.al_d[n], 0.0, self.al_dd[n]]
+        let ([x_d, y_d], [x_dd, y_dd]) =
+            (self.p.spread(self.al_d[n]), self.p.spread(self.al_dd[n]));
+        [x_d, y_d, x_dd, y_dd]
     }
 
     #[inline(always)]
     fn hub_reaction(&mut self, n: usize, ramp: bool, hub: &HubMotion) -> HubReaction {
-        let Pendulum { m, l, c, r, .. } = self.p;
+        let Pendulum { m, l, c, r_x, r_t, .. } = self.p;
         if ramp && self.p.follows_amplitude() {
             let at = [square(n, &self.al), square(n, &self.al_d)];
             self.p.expand_drag(n, at);
         }
         self.g_al[n] = self.p.weight(n, ramp, &self.al);
         self.drag[n] = self.p.drag(n, ramp, &self.al_d);
-        let mut t = r * (m * self.g_al[n] + c * l * self.drag[n]);
+        let mut t = r_t * (m * self.g_al[n] + c * l * self.drag[n]);
+        let mut j = 0.0;
         if ramp {
-            t -= m * l * mul(n, &hub.tilt.e[0], &self.al);
+            t -= m * l * self.p.across_times(n, &hub.tilt.e, &self.al);
+            if self.p.is_askew() {
+                let ([n_x, n_t], [e_x, e_t]) = (self.p.along, &hub.tilt.e);
+                t -= m * r_x * (n_t * e_x[n] - n_x * e_t[n]);
+                j = constant(n, m * r_x * r_x);
+            }
         }
-        HubReaction { j: 0.0, t }
+        HubReaction { j, t }
     }
 
     #[inline(always)]
@@ -94,7 +117,7 @@ impl SloshMode for Linear {
         let Pendulum { c_m, r_l, inv_l, .. } = self.p;
         self.al_dd[n] = -c_m * self.drag[n] - inv_l * self.g_al[n] - r_l * hub.omega_dot[n];
         if ramp {
-            self.al_dd[n] += inv_l * hub.tilt.e[1][n];
+            self.al_dd[n] += inv_l * self.p.component(n, &hub.tilt.e);
         }
         self.al[n + 1] = next(n, self.al_d[n]);
         self.al_d[n + 1] = next(n, self.al_dd[n]);
@@ -121,53 +144,60 @@ impl SloshMode for Linear {
     /// m l al^2/2
     #[inline(always)]
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64 {
-        let Pendulum { m, l, r, .. } = self.p;
-        let place = |j: usize| [constant(j, r), l * self.al[j]];
+        let Pendulum { m, l, r, along: [n_x, n_t], .. } = self.p;
+        let place = |j: usize| [constant(j, r) + l * self.al[j] * n_x, l * self.al[j] * n_t];
         m * l * square(n, &self.al) / 2.0 + m * hub.tilt.height(n, place)
     }
 
     #[inline(always)]
     fn at(&self, n: usize, t: f64, _: f64) -> [f64; 4] {
         let [al, al_d] = values([&self.al, &self.al_d], n, t);
-        [0.0, al, 0.0, al_d]
+        let ([x, y], [x_d, y_d]) = (self.p.spread(al), self.p.spread(al_d));
+        [x, y, x_d, y_d]
     }
 
     fn height<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
         let Pendulum { m, l, r, .. } = self.p;
         let (al, al_d): (T, T) = (number(&self.al), number(&self.al_d));
-        let (place, rate) = ([T::constant(r), al * l], [T::constant(0.0), al_d * l]);
+        let ([x, y], rate) = (self.p.spread(al * l), self.p.spread(al_d * l));
+        let place = [x + T::constant(r), y];
         let tilted = hub.tilt.height_now(place, rate, number(&hub.omega));
         [al * al * (m * l) * 0.5 + tilted[0] * m, al * al_d * (m * l) + tilted[1] * m]
     }
 
-    /// Tangential -m (r w' + l al''); radial from the bob's place (r, l al):
-    /// m (r w^2 + 2 w l al' + w' l al), of second order in the motion.
+    /// Tangential -m (r w' + l al'' n_t); radial from the bob's place (r + l al n_x, l al n_t): -m l al'' n_x and, of second order in
+    /// the motion, m (r w^2 + 2 w l al' n_t + w' l al n_t).
     fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
         let Pendulum { m, l, r, .. } = self.p;
         let [w, wd]: [T; 2] = [number(&hub.omega), number(&hub.omega_dot)];
         let [al, al_d, al_dd] = [&self.al, &self.al_d, &self.al_dd].map(number::<T>);
-        let radial = (w * r * w + w * 2.0 * l * al_d + wd * l * al) * m;
+        let [n_x, n_t] = self.p.along;
+        let radial = (w * r * w + w * 2.0 * l * al_d * n_t + wd * l * al * n_t) * m;
         let [e_x, e_y]: [T; 2] = hub.tilt.now();
-        [radial + e_x * m, e_y * m - (wd * r + al_dd * l) * m]
+        [radial + e_x * m - al_dd * (m * l * n_x), e_y * m - (wd * r + al_dd * l * n_t) * m]
     }
 
     /// r F_y: in the linear model the force acts at the hinge; gravity of a leaning bench at the bob.
     fn torque<T: Number>(&self, hub: &HubMotion) -> T {
         let Pendulum { m, l, r, .. } = self.p;
-        let ([_, f_y], [e_x, _]): ([T; 2], [T; 2]) = (self.force(hub), hub.tilt.now());
-        f_y * r - number::<T>(&self.al) * (m * l) * e_x
+        let ([_, f_y], [e_x, e_y]): ([T; 2], [T; 2]) = (self.force(hub), hub.tilt.now());
+        let [n_x, n_t] = self.p.along;
+        f_y * r - number::<T>(&self.al) * (m * l) * (e_x * n_t - e_y * n_x)
     }
 
     fn energy<T: Number>(&self, hub: &HubMotion) -> T {
-        let Pendulum { m, l, r, .. } = self.p;
+        let Pendulum { m, l, r, r_x, r_t, along: [n_x, n_t], .. } = self.p;
         let (al, [g, _]) = (number::<T>(&self.al), self.p.restoring_and_drag::<T>());
-        let speed = number::<T>(&hub.omega) * r + number::<T>(&self.al_d) * l;
+        let w = number::<T>(&hub.omega);
+        let speed = w * r_t + number::<T>(&self.al_d) * l;
         let [e_x, e_y]: [T; 2] = hub.tilt.now();
-        (speed * m * speed + g * m * l * al * al) * 0.5 - (e_x * r + e_y * l * al) * m
+        let place = al * (l * n_x) + T::constant(r);
+        (speed * m * speed + g * m * l * al * al + w * (m * r_x * r_x) * w) * 0.5
+            - (e_x * place + e_y * l * al * n_t) * m
     }
 
     fn momentum<T: Number>(&self, hub: &HubMotion) -> T {
-        let Pendulum { m, l, r, .. } = self.p;
-        (number::<T>(&hub.omega) * r + number::<T>(&self.al_d) * l) * (m * r)
+        let Pendulum { m, l, r, along: [_, n_t], .. } = self.p;
+        (number::<T>(&hub.omega) * r + number::<T>(&self.al_d) * l * n_t) * (m * r)
     }
 }

@@ -1,5 +1,5 @@
-//! Nonlinear planar pendulum: the bob swings in the tangential plane only, with
-//! centripetal terms and a changing inertia. q_y = al in rad; q_x unused.
+//! Nonlinear planar pendulum: the bob swings in one plane only, by default the tangential one, with
+//! centripetal terms and a changing inertia. al in rad is the angle along the plane's direction n = (n_x, n_t), q = al n.
 //! With s = sin al, c_ = cos al, the bob at (r, l s, -l c_) in the hub's frame:
 //!
 //! ```text
@@ -14,6 +14,23 @@
 //! Lagrange's equations for this bob on the hub; to first order the linear model. On a bench
 //! that leans, gravity across the axis, e, adds -e_y c_ to p, m (r e_y - l s e_x) to T and
 //! -m (e_x r + e_y l s) to E.
+//!
+//! Along another direction than the tangent (a box with modes along both axes), u = l s, r_x = r n_x, r_t = r n_t, the bob at
+//! (r + u n_x, u n_t, -l c_). Lagrange's equations of
+//!
+//! ```text
+//! L = m [w^2 (r^2 + u^2 + 2 r_x u) + 2 w r_t u' + (l al')^2]/2 - m g l (1 - c_) + m [e_x (r + u n_x) + e_y u n_t]
+//!
+//! p    = g s + (c/m) l al' - w^2 (u + r_x) c_ - (e_x n_x + e_y n_t) c_
+//! J    = m [r_x^2 + 2 r_x u + (r_t^2 + l^2) s^2]
+//! T    = m [ -2 (u + r_x) l c_ w al' + r_t l s al'^2 + r_t c_ p + r e_y + u (e_y n_x - e_x n_t) ]
+//! al'' = -(r_t/l) c_ w' - p/l
+//! E = m [(r_t w + l c_ al')^2 + (l s al')^2 + (r_x + u)^2 w^2]/2 + 2 m g l sin^2(al/2) - m [e_x (r + u n_x) + e_y u n_t]
+//! H = m [(r^2 + u^2 + 2 r_x u) w + r_t l c_ al']
+//! ```
+//!
+//! Along the radius (n_t = 0) the hub's acceleration does not move the bob: w^2 (r + u) throws it outwards, and it turns with
+//! the hub at r + u, so that its motion slows and speeds up the hub (2 w u').
 
 use taylor::number::Number;
 use taylor::series::{Series, ZERO, constant, mul, next, number, sin_cos, square, values};
@@ -72,29 +89,33 @@ impl SloshMode for Planar {
     }
 
     fn coordinates(&self, at: &Angles) -> [f64; 4] {
-        [0.0, at.angle[1], 0.0, at.rate[1]]
+        let (angle, rate) =
+            (self.p.spread(self.p.gather(at.angle)), self.p.spread(self.p.gather(at.rate)));
+        [angle[0], angle[1], rate[0], rate[1]]
     }
 
     fn angles<T: Number>(&self) -> Angles<T> {
-        let zero = T::constant(0.0);
-        Angles { angle: [zero, number(&self.al)], rate: [zero, number(&self.al_d)] }
+        let [angle, rate] = [&self.al, &self.al_d].map(|x| self.p.spread(number::<T>(x)));
+        Angles { angle, rate }
     }
 
     fn start(&mut self, q: &[f64; 4], _: &HubMotion) {
-        (self.al[0], self.al_d[0]) = (q[1], q[3]);
+        (self.al[0], self.al_d[0]) = (self.p.gather([q[0], q[1]]), self.p.gather([q[2], q[3]]));
     }
 
     fn seed_direction(&mut self, dq: &[f64; 4], _: &HubMotion) {
-        (self.al[1], self.al_d[1]) = (dq[1], dq[3]);
+        (self.al[1], self.al_d[1]) = (self.p.gather([dq[0], dq[1]]), self.p.gather([dq[2], dq[3]]));
     }
 
     fn derivatives(&self, n: usize, _: &HubMotion) -> [f64; 4] {
-        [0.0, self.al_d[n], 0.0, self.al_dd[n]]
+        let ([x_d, y_d], [x_dd, y_dd]) =
+            (self.p.spread(self.al_d[n]), self.p.spread(self.al_dd[n]));
+        [x_d, y_d, x_dd, y_dd]
     }
 
     #[inline(always)]
     fn hub_reaction(&mut self, n: usize, ramp: bool, hub: &HubMotion) -> HubReaction {
-        let Pendulum { m, l, c_m, r, .. } = self.p;
+        let Pendulum { m, l, c_m, r, r_x, r_t, .. } = self.p;
         (self.s[n], self.c[n]) = sin_cos(n, self.al[n], &mut self.slope, &self.s, &self.c);
         self.sc[n] = mul(n, &self.s, &self.c);
         self.w_al_d[n] = mul(n, &hub.omega, &self.al_d);
@@ -106,17 +127,22 @@ impl SloshMode for Planar {
         self.drag[n] = self.p.drag(n, ramp, &self.al_d);
         self.force[n] = self.p.weight(n, ramp, &self.s) + c_m * l * self.drag[n]
             - l * mul(n, &hub.omega2, &self.sc);
-        let mut t = 0.0;
+        let (mut j, mut t) = (m * (r_t * r_t + l * l) * square(n, &self.s), 0.0);
         if ramp {
-            self.force[n] -= mul(n, &hub.tilt.e[1], &self.c);
-            t = m * (r * hub.tilt.e[1][n] - l * mul(n, &hub.tilt.e[0], &self.s));
+            self.force[n] -= self.p.component_times(n, &hub.tilt.e, &self.c);
+            t = m * (r * hub.tilt.e[1][n] - l * self.p.across_times(n, &hub.tilt.e, &self.s));
+            if self.p.is_askew() {
+                self.force[n] -= r_x * mul(n, &hub.omega2, &self.c);
+                j += m * r_x * (2.0 * l * self.s[n] + constant(n, r_x));
+                t -= 2.0 * m * r_x * l * mul(n, &self.c, &self.w_al_d);
+            }
         }
         HubReaction {
-            j: m * (r * r + l * l) * square(n, &self.s),
+            j,
             t: t + m
                 * (-2.0 * l * l * mul(n, &self.sc, &self.w_al_d)
-                    + r * l * mul(n, &self.s, &self.al_d2)
-                    + r * mul(n, &self.c, &self.force)),
+                    + r_t * l * mul(n, &self.s, &self.al_d2)
+                    + r_t * mul(n, &self.c, &self.force)),
         }
     }
 
@@ -149,58 +175,65 @@ impl SloshMode for Planar {
     /// 2 m l sin^2(al/2), whose rate is m l s al'
     #[inline(always)]
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64 {
-        let Pendulum { m, l, r, .. } = self.p;
+        let Pendulum { m, l, r, along: [n_x, n_t], .. } = self.p;
         let half = libm::sin(self.al[0] / 2.0);
-        let place = |j: usize| [constant(j, r), l * self.s[j]];
+        let place = |j: usize| [constant(j, r) + l * self.s[j] * n_x, l * self.s[j] * n_t];
         m * l * if n == 0 { 2.0 * half * half } else { -self.c[n] } + m * hub.tilt.height(n, place)
     }
 
     #[inline(always)]
     fn at(&self, n: usize, t: f64, _: f64) -> [f64; 4] {
         let [al, al_d] = values([&self.al, &self.al_d], n, t);
-        [0.0, al, 0.0, al_d]
+        let ([x, y], [x_d, y_d]) = (self.p.spread(al), self.p.spread(al_d));
+        [x, y, x_d, y_d]
     }
 
     fn height<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
         let Pendulum { m, l, r, .. } = self.p;
         let [al, al_d, s, c] = [&self.al, &self.al_d, &self.s, &self.c].map(number::<T>);
         let half = (al * 0.5).sin();
-        let (place, rate) = ([T::constant(r), s * l], [T::constant(0.0), c * l * al_d]);
+        let ([x, y], rate) = (self.p.spread(s * l), self.p.spread(c * l * al_d));
+        let place = [x + T::constant(r), y];
         let tilted = hub.tilt.height_now(place, rate, number(&hub.omega));
         [half * 2.0 * half * (m * l) + tilted[0] * m, s * al_d * (m * l) + tilted[1] * m]
     }
 
-    /// -m times the bob's acceleration at (r, l s); the plane's guide takes the
-    /// radial part.
+    /// -m times the bob's acceleration at (r + u n_x, u n_t); the plane's guide takes what is across it.
     fn force<T: Number>(&self, hub: &HubMotion) -> [T; 2] {
         let Pendulum { m, l, r, .. } = self.p;
         let [s, c, ad, al_dd] = [&self.s, &self.c, &self.al_d, &self.al_dd].map(number::<T>);
         let [w, wd]: [T; 2] = [number(&hub.omega), number(&hub.omega_dot)];
-        let (y, y_d, y_dd) = (s * l, c * l * ad, (c * al_dd - s * ad * ad) * l);
-        let [e_x, e_y]: [T; 2] = hub.tilt.now();
-        [(wd * y + w * 2.0 * y_d + w * w * r + e_x) * m, -((y_dd + wd * r - w * w * y - e_y) * m)]
+        let ([x, y], [x_d, y_d]) = (self.p.spread(s * l), self.p.spread(c * l * ad));
+        let [x_dd, y_dd] = self.p.spread((c * al_dd - s * ad * ad) * l);
+        let (x, [e_x, e_y]): (T, [T; 2]) = (x + T::constant(r), hub.tilt.now());
+        [
+            (wd * y + w * 2.0 * y_d + w * w * x + e_x - x_dd) * m,
+            -((y_dd + wd * x - w * w * y - e_y + w * 2.0 * x_d) * m),
+        ]
     }
 
     fn torque<T: Number>(&self, hub: &HubMotion) -> T {
         let [f_x, f_y]: [T; 2] = self.force(hub);
-        f_y * self.p.r - number::<T>(&self.s) * self.p.l * f_x
+        let [x, y] = self.p.spread(number::<T>(&self.s) * self.p.l);
+        f_y * (x + T::constant(self.p.r)) - y * f_x
     }
 
     fn energy<T: Number>(&self, hub: &HubMotion) -> T {
-        let Pendulum { m, l, r, .. } = self.p;
+        let Pendulum { m, l, r, r_x, r_t, .. } = self.p;
         let [al, s, c, ad] = [&self.al, &self.s, &self.c, &self.al_d].map(number::<T>);
         let (w, [g, _]) = (number::<T>(&hub.omega), self.p.restoring_and_drag::<T>());
-        let (along, up, across) = (w * r + c * l * ad, s * l * ad, s * l * w);
+        let (along, up, across) =
+            (w * r_t + c * l * ad, s * l * ad, (s * l + T::constant(r_x)) * w);
         let half = (al * 0.5).sin();
-        let [e_x, e_y]: [T; 2] = hub.tilt.now();
+        let ([e_x, e_y], [n_x, n_t]): ([T; 2], _) = (hub.tilt.now(), self.p.along);
         (along * along + up * up + across * across) * m * 0.5 + g * (2.0 * m) * l * half * half
-            - (e_x * r + e_y * l * s) * m
+            - (e_x * (s * (l * n_x) + T::constant(r)) + e_y * l * s * n_t) * m
     }
 
     fn momentum<T: Number>(&self, hub: &HubMotion) -> T {
-        let Pendulum { m, l, r, .. } = self.p;
+        let Pendulum { m, l, r, r_x, r_t, .. } = self.p;
         let [s, c, ad] = [&self.s, &self.c, &self.al_d].map(number::<T>);
-        let inertia = T::constant(r * r) + s * (l * l) * s;
-        (inertia * number::<T>(&hub.omega) + c * (r * l) * ad) * m
+        let inertia = T::constant(r * r) + s * (l * l) * s + s * (2.0 * r_x * l);
+        (inertia * number::<T>(&hub.omega) + c * (r_t * l) * ad) * m
     }
 }

@@ -4,6 +4,7 @@ mod balances;
 mod changing_g;
 mod common;
 mod decays;
+mod directions;
 mod errata;
 mod events;
 mod free_oscillation;

@@ -724,18 +724,27 @@ fn item(instance: &mut Instance, name: &str, kind: &str) -> Result<Option<String
 pub(super) fn exact_linear(instance: &mut Instance) -> Result<Linear> {
     let mut real = |name: &str| instance.real(name);
     let arm = real("tank.r")?;
-    let mut modes = Vec::new();
+    // What of the modes' masses is carried across their directions.
+    let (mut modes, mut carried) = (Vec::new(), 0.0);
     for n in 1..=10 {
         let mass = real(&format!("slosh.mass[{n}]"))?;
-        if mass > 0.0 {
+        if mass <= 0.0 {
+            continue;
+        }
+        // A bench of before 0.5 has modes along the tangent alone. A mode at an angle to it has the arm r cos: to first order it is
+        // one of mass m cos^2 along the tangent, and the rest of it is carried along.
+        let direction = real(&format!("slosh.table.direction[{n}]")).unwrap_or(0.0);
+        let across = mass * direction.sin().powi(2);
+        carried += across;
+        if mass - across > 1e-12 * mass {
             modes.push(Mode {
-                mass,
+                mass: mass - across,
                 frequency: real(&format!("slosh.frequency[{n}]"))?,
                 damping: real(&format!("slosh.damping[{n}]"))?,
             });
         }
     }
-    let inertia = real("hub.I")? + real("tank.m_0")? * arm * arm;
+    let inertia = real("hub.I")? + (real("tank.m_0")? + carried) * arm * arm;
     let viscous = real("friction.b")?;
     let law = item(instance, "friction.model", "friction.kind")?;
     let bearing = if law.as_deref() == Some("none") { 0.0 } else { viscous };
