@@ -207,13 +207,20 @@ impl ParameterSet {
             }
             _ => None,
         };
-        // Of a box with unequal sides in Spacecraft and SloshTank the modes along both; else those along the first axis.
-        let both = data.axes.as_ref().filter(|_| sides.is_some() && target != Target::HubSlosh);
-        let chosen: Vec<(usize, usize)> = match both {
-            Some(axes) => along_both([&axes.x.modes, &axes.y.modes]),
-            None => (0..data.modes.len().min(most)).map(|n| (0, n)).collect(),
+        // Of a box with unequal sides the modes along both; else those along the first axis.
+        let both = data.axes.as_ref().filter(|_| sides.is_some());
+        let count = match (both, target) {
+            (Some(_), Target::HubSlosh) => data.modes.len().min(most / 2),
+            _ => data.modes.len().min(most),
         };
-        let count = data.modes.len().min(most);
+        let chosen: Vec<(usize, usize)> = match (both, target) {
+            // Those of one axis are HubSlosh's first: its outputs are mode 1's.
+            (Some(_), Target::HubSlosh) => {
+                (0..2).flat_map(|axis| (0..count).map(move |n| (axis, n))).collect()
+            }
+            (Some(axes), _) => along_both([&axes.x.modes, &axes.y.modes]),
+            (None, _) => (0..count).map(|n| (0, n)).collect(),
+        };
         let of_axes = [&data.modes[..count], both.map_or(&[], |axes| &axes.y.modes[..count])];
         let modes: Vec<modal::Mode> =
             chosen.iter().map(|&(axis, n)| of_axes[axis][n].clone()).collect();
@@ -261,14 +268,18 @@ impl ParameterSet {
             }
         };
         let mut values = Vec::new();
-        if let Some([length_x, _]) = sides
-            && target == Target::HubSlosh
-        {
+        if let (Some([length_x, length_y]), Target::HubSlosh) = (sides, target) {
+            let first_across = count + 1;
             notes.push(format!(
-                "the modes are those along the box's first length, {length_x} m: on HubSlosh's hub it lies along the \
-                 tangent, and models that move along both axes (spherical, paraboloid) are refused"
+                "modes 1 to {count} are those along the box's first length, {length_x} m, which lies along the tangent on HubSlosh's hub; \
+                 {first_across} to {} those along {length_y} m, along the radius (slosh.table.direction): what the hub's rate \
+                 does to these is in slosh.model = planar, to first order (linear) nothing; spherical and paraboloid are refused",
+                2 * count
             ));
-            values.push(("slosh.table.one_axis".into(), Value::Boolean(true)));
+            for n in first_across..=2 * count {
+                let radial = Value::Real(std::f64::consts::FRAC_PI_2);
+                values.push((format!("slosh.table.direction[{n}]"), radial));
+            }
         }
         let mut real = |name: String, value: f64| values.push((name, Value::Real(value)));
         match target {

@@ -186,9 +186,9 @@ globalThis.HubSloshScene = (() => {
 
     drawBox() {
       const [a, b] = this.data.shape.box, surface = this.surface.geometry.attributes.position, body = this.body.geometry.attributes.position, rings = this.rings;
-      // the modes of a box along each side: sin((2n - 1) pi x/a), 1 at the wall
+      // the modes of a box along each side, each side with a count of its own: sin((2n - 1) pi x/a), 1 at the wall
       const eta = (x, y) => this.angles.reduce((sum, [ax, ay], n) => {
-        const odd = 2 * n + 1, sign = n % 2 ? -1 : 1;
+        const order = this.data.modes[n].order ?? n, odd = 2 * order + 1, sign = order % 2 ? -1 : 1;
         return sum + sign * this.data.modes[n].wave * (ax * Math.sin((odd * Math.PI * x) / a) + ay * Math.sin((odd * Math.PI * y) / b));
       }, 0);
       for (let i = 0; i <= rings; i++) for (let k = 0; k <= rings; k++) {

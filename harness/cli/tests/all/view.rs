@@ -195,7 +195,7 @@ fn the_surface_that_is_drawn_in_a_sphere_moves_its_liquid_as_far_as_the_pendulum
     }
 }
 
-/// `hubslosh tank` writes the modes along the first length for HubSlosh, whose linear models move along the tangent, y of the tank.
+/// `hubslosh tank` writes for HubSlosh the modes along the first length as those along the tangent, y of the tank.
 #[test]
 fn a_box_on_the_bench_lies_with_its_first_length_along_the_tangent() {
     let directory = tempfile::tempdir().unwrap();
@@ -208,15 +208,19 @@ fn a_box_on_the_bench_lies_with_its_first_length_along_the_tangent() {
     assert!(solved.status.success(), "{}", said(&solved));
     let run = ["run", "--profile", "exp-sweep:amplitude=0.1,duration=5", "--out", "run.parquet"];
     let rest = ["--parameters", "liquid.toml", "--set", "slosh.model=linear"];
-    let columns = ["--columns", "theta,slosh_angle,slosh.q_tangential[2]"];
-    let done = hubslosh(directory, &[&run[..], &rest, &columns].concat());
+    let states = "slosh.q_tangential[2],slosh.q_radial[3],slosh.q_radial[4]";
+    let others = "slosh.q_radial[2],slosh.q_tangential[3],slosh.q_tangential[4]";
+    let columns = format!("theta,slosh_angle,slosh_angle_radial,{states},{others}");
+    let done = hubslosh(directory, &[&run[..], &rest, &["--columns", &columns]].concat());
     assert!(done.status.success(), "{}", said(&done));
     let done = hubslosh(directory, &["view", "run.parquet", "--tank", "box.toml"]);
     assert!(done.status.success() && said(&done).is_empty(), "{}", said(&done));
     let page = drawn(directory, "run.html");
     let tank = &page["scene"]["geometry"]["tanks"][0];
     assert_eq!(tank["shape"]["box"], serde_json::json!([0.2, 0.3]));
-    assert_eq!(tank["modes"].as_array().unwrap().len(), 2);
+    let modes = tank["modes"].as_array().unwrap();
+    let orders: Vec<_> = modes.iter().map(|mode| mode["order"].as_u64().unwrap()).collect();
+    assert_eq!(orders, [0, 1, 0, 1], "two along the tangent, two along the radius");
 }
 
 #[test]

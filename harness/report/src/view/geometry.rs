@@ -111,13 +111,20 @@ pub(super) struct Pendulum {
     pub length: f64,
     pub hinge: f64,
     pub wave: f64,
+    /// Which mode of its direction it is, from 0.
+    pub order: usize,
 }
 
 impl Pendulum {
-    fn of(one: &formulas::cylinder::Pendulum) -> Pendulum {
+    fn of((order, one): (usize, &formulas::cylinder::Pendulum)) -> Pendulum {
         let formulas::cylinder::Pendulum { mass, length, hinge, wave } = *one;
-        Pendulum { mass, length, hinge, wave }
+        Pendulum { mass, length, hinge, wave, order }
     }
+}
+
+/// Which mode of its direction mode n is, from 0.
+fn order<T: PartialEq>(n: usize, direction: impl Fn(usize) -> T) -> usize {
+    (0..n).filter(|m| direction(*m) == direction(n)).count()
 }
 
 /// What is drawn of a tank.
@@ -300,7 +307,14 @@ pub(super) fn bench(parameters: &Parameters, drawing: Option<&Drawing>) -> Tank 
         outline,
         level,
         liquid: m_liq,
-        modes: modes.iter().map(Pendulum::of).collect(),
+        modes: modes
+            .iter()
+            .enumerate()
+            .map(|(n, mode)| {
+                let direction = |n: usize| number(&format!("slosh.table.direction[{}]", n + 1));
+                Pendulum::of((if is_table { order(n, direction) } else { n }, mode))
+            })
+            .collect(),
         shapes: Vec::new(),
         fill: None,
         note,
@@ -326,7 +340,9 @@ pub(super) fn tank(parameters: &Parameters, prefix: &str, drawing: Option<&Drawi
         .map(|n| {
             let mass = of("mass", n);
             let l = length(of("length", n), of("frequency", n), number("g_ref"), of("k", n) / mass);
-            Pendulum { mass, length: l, hinge: of("hinge", n), wave: of("wave", n) }
+            let direction = |n: usize| [1, 2].map(|i| number(&format!("direction[{},{i}]", n + 1)));
+            let order = order(n, direction);
+            Pendulum { mass, length: l, hinge: of("hinge", n), wave: of("wave", n), order }
         })
         .collect();
     let (radius, level, bottom, m_liq, mut note);
@@ -349,7 +365,8 @@ pub(super) fn tank(parameters: &Parameters, prefix: &str, drawing: Option<&Drawi
         radius = 0.5 * diameter;
         let depth = number("depth");
         m_liq = number("density") * std::f64::consts::PI * radius * radius * depth;
-        modes = (0..count).map(|n| Pendulum::of(&pendulum(n, diameter, depth, m_liq))).collect();
+        modes =
+            (0..count).map(|n| Pendulum::of((n, &pendulum(n, diameter, depth, m_liq)))).collect();
         (level, bottom) = (depth, 0.0);
         note = format!(
             "{prefix} is drawn by its diameter and depth; how high its wall is, is no parameter."

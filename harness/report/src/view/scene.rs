@@ -96,7 +96,7 @@ fn drawn(tank: &Tank) -> Value {
         .enumerate()
         .map(|(n, m)| {
             let shape = tank.shapes.get(n);
-            json!({ "hinge": m.hinge, "length": m.length, "wave": m.wave, "mass": m.mass, "shape": shape })
+            json!({ "hinge": m.hinge, "length": m.length, "wave": m.wave, "order": m.order, "mass": m.mass, "shape": shape })
         })
         .collect();
     json!({ "position": tank.position, "q": tank.q, "shape": shape, "level": tank.level, "modes": modes })
