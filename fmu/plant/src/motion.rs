@@ -547,6 +547,7 @@ impl<const UNROLLED: bool, M: SloshMode> integrator::Motion for Stretch<'_, UNRO
             let taken = self.imu.follow(&mut state.gyro, since_start, h, omega, steps.left());
             steps.count(taken, *begin + self.t)?;
         }
+        let varies = !UNROLLED && self.varies;
         let stuck = state.contact == Contact::Stuck;
         let [theta, omega] = series::values([&motion.hub.theta, &motion.hub.omega], n, h);
         let omega = if stuck { 0.0 } else { omega };
@@ -560,7 +561,7 @@ impl<const UNROLLED: bool, M: SloshMode> integrator::Motion for Stretch<'_, UNRO
         state.x[x::THETA] = theta;
         state.x[x::OMEGA] = omega;
         for (i, (mode, q)) in modes.iter().zip(state.slosh_mut()).enumerate() {
-            *q = mode.at(n, h, omega);
+            *q = mode.at(n, h, omega, varies);
             if let Some(what) = mode.out_of_range(q) {
                 return Err(out_of_range(*begin + self.t + h, i, what));
             }

@@ -126,11 +126,18 @@ impl Pendulum {
         if self.is_askew() { [a * x, a * t] } else { [T::constant(0.0), a] }
     }
 
-    /// What is along the bob's direction.
+    /// q_x, q_y, q_x', q_y' of an angle along the bob's direction and its rate.
     #[inline(always)]
-    pub fn gather(&self, [radial, tangential]: [f64; 2]) -> f64 {
+    pub fn coordinates(&self, [al, al_d]: [f64; 2]) -> [f64; 4] {
         let [x, t] = self.along;
-        if self.is_askew() { x * radial + t * tangential } else { tangential }
+        if self.is_askew() { [al * x, al * t, al_d * x, al_d * t] } else { [0.0, al, 0.0, al_d] }
+    }
+
+    /// The angle along the bob's direction and its rate, of q_x, q_y, q_x', q_y'.
+    #[inline(always)]
+    pub fn angle_and_rate(&self, [q_x, q_y, x_d, y_d]: [f64; 4]) -> [f64; 2] {
+        let [x, t] = self.along;
+        if self.is_askew() { [x * q_x + t * q_y, x * x_d + t * y_d] } else { [q_y, y_d] }
     }
 
     /// Coefficient n of a_x n_x + a_t n_t, of a vector a.

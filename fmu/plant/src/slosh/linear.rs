@@ -66,9 +66,8 @@ impl SloshMode for Linear {
     }
 
     fn coordinates(&self, at: &Angles) -> [f64; 4] {
-        let (angle, rate) =
-            (self.p.spread(self.p.gather(at.angle)), self.p.spread(self.p.gather(at.rate)));
-        [angle[0], angle[1], rate[0], rate[1]]
+        let ([q_x, q_y], [x_d, y_d]) = (at.angle, at.rate);
+        self.p.coordinates(self.p.angle_and_rate([q_x, q_y, x_d, y_d]))
     }
 
     fn angles<T: Number>(&self) -> Angles<T> {
@@ -77,29 +76,29 @@ impl SloshMode for Linear {
     }
 
     fn start(&mut self, q: &[f64; 4], _: &HubMotion) {
-        (self.al[0], self.al_d[0]) = (self.p.gather([q[0], q[1]]), self.p.gather([q[2], q[3]]));
+        [self.al[0], self.al_d[0]] = self.p.angle_and_rate(*q);
     }
 
     fn seed_direction(&mut self, dq: &[f64; 4], _: &HubMotion) {
-        (self.al[1], self.al_d[1]) = (self.p.gather([dq[0], dq[1]]), self.p.gather([dq[2], dq[3]]));
+        [self.al[1], self.al_d[1]] = self.p.angle_and_rate(*dq);
     }
 
     fn derivatives(&self, n: usize, _: &HubMotion) -> [f64; 4] {
-        let ([x_d, y_d], [x_dd, y_dd]) =
-            (self.p.spread(self.al_d[n]), self.p.spread(self.al_dd[n]));
-        [x_d, y_d, x_dd, y_dd]
+        self.p.coordinates([self.al_d[n], self.al_dd[n]])
     }
 
     #[inline(always)]
     fn hub_reaction(&mut self, n: usize, ramp: bool, hub: &HubMotion) -> HubReaction {
-        let Pendulum { m, l, c, r_x, r_t, .. } = self.p;
+        let Pendulum { m, l, c, r, r_x, r_t, .. } = self.p;
         if ramp && self.p.follows_amplitude() {
             let at = [square(n, &self.al), square(n, &self.al_d)];
             self.p.expand_drag(n, at);
         }
         self.g_al[n] = self.p.weight(n, ramp, &self.al);
         self.drag[n] = self.p.drag(n, ramp, &self.al_d);
-        let mut t = r_t * (m * self.g_al[n] + c * l * self.drag[n]);
+        // what varies nowhere is along the tangent
+        let arm = if ramp { r_t } else { r };
+        let mut t = arm * (m * self.g_al[n] + c * l * self.drag[n]);
         let mut j = 0.0;
         if ramp {
             t -= m * l * self.p.across_times(n, &hub.tilt.e, &self.al);
@@ -150,10 +149,9 @@ impl SloshMode for Linear {
     }
 
     #[inline(always)]
-    fn at(&self, n: usize, t: f64, _: f64) -> [f64; 4] {
+    fn at(&self, n: usize, t: f64, _: f64, varies: bool) -> [f64; 4] {
         let [al, al_d] = values([&self.al, &self.al_d], n, t);
-        let ([x, y], [x_d, y_d]) = (self.p.spread(al), self.p.spread(al_d));
-        [x, y, x_d, y_d]
+        if varies { self.p.coordinates([al, al_d]) } else { [0.0, al, 0.0, al_d] }
     }
 
     fn height<T: Number>(&self, hub: &HubMotion) -> [T; 2] {

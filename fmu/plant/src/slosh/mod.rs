@@ -151,8 +151,9 @@ pub trait SloshMode {
     fn dissipation(&mut self, n: usize, ramp: bool) -> f64;
     /// Coefficient n of mass times height above rest, kg m: the potential energy over g.
     fn mass_height(&mut self, n: usize, hub: &HubMotion) -> f64;
-    /// Coordinates at t, where the hub turns with `omega`, from the series cut after order n.
-    fn at(&self, n: usize, t: f64, omega: f64) -> [f64; 4];
+    /// Coordinates at t, where the hub turns with `omega`, from the series cut after order n; `varies` as `ramp` above: where nothing does,
+    /// modes move along the tangent.
+    fn at(&self, n: usize, t: f64, omega: f64, varies: bool) -> [f64; 4];
     /// Mass times height above rest, kg m, and its rate.
     fn height<T: Number>(&self, hub: &HubMotion) -> [T; 2];
     /// Force of the bob on the tank, N, radial and tangential.

@@ -220,7 +220,7 @@ impl SloshMode for Paraboloid {
     }
 
     #[inline(always)]
-    fn at(&self, n: usize, t: f64, _: f64) -> [f64; 4] {
+    fn at(&self, n: usize, t: f64, _: f64, _: bool) -> [f64; 4] {
         let ([x, y], [x_d, y_d]) = (&self.q, &self.q_d);
         values([x, y, x_d, y_d], n, t)
     }

@@ -89,9 +89,8 @@ impl SloshMode for Planar {
     }
 
     fn coordinates(&self, at: &Angles) -> [f64; 4] {
-        let (angle, rate) =
-            (self.p.spread(self.p.gather(at.angle)), self.p.spread(self.p.gather(at.rate)));
-        [angle[0], angle[1], rate[0], rate[1]]
+        let ([q_x, q_y], [x_d, y_d]) = (at.angle, at.rate);
+        self.p.coordinates(self.p.angle_and_rate([q_x, q_y, x_d, y_d]))
     }
 
     fn angles<T: Number>(&self) -> Angles<T> {
@@ -100,17 +99,15 @@ impl SloshMode for Planar {
     }
 
     fn start(&mut self, q: &[f64; 4], _: &HubMotion) {
-        (self.al[0], self.al_d[0]) = (self.p.gather([q[0], q[1]]), self.p.gather([q[2], q[3]]));
+        [self.al[0], self.al_d[0]] = self.p.angle_and_rate(*q);
     }
 
     fn seed_direction(&mut self, dq: &[f64; 4], _: &HubMotion) {
-        (self.al[1], self.al_d[1]) = (self.p.gather([dq[0], dq[1]]), self.p.gather([dq[2], dq[3]]));
+        [self.al[1], self.al_d[1]] = self.p.angle_and_rate(*dq);
     }
 
     fn derivatives(&self, n: usize, _: &HubMotion) -> [f64; 4] {
-        let ([x_d, y_d], [x_dd, y_dd]) =
-            (self.p.spread(self.al_d[n]), self.p.spread(self.al_dd[n]));
-        [x_d, y_d, x_dd, y_dd]
+        self.p.coordinates([self.al_d[n], self.al_dd[n]])
     }
 
     #[inline(always)]
@@ -182,10 +179,9 @@ impl SloshMode for Planar {
     }
 
     #[inline(always)]
-    fn at(&self, n: usize, t: f64, _: f64) -> [f64; 4] {
+    fn at(&self, n: usize, t: f64, _: f64, varies: bool) -> [f64; 4] {
         let [al, al_d] = values([&self.al, &self.al_d], n, t);
-        let ([x, y], [x_d, y_d]) = (self.p.spread(al), self.p.spread(al_d));
-        [x, y, x_d, y_d]
+        if varies { self.p.coordinates([al, al_d]) } else { [0.0, al, 0.0, al_d] }
     }
 
     fn height<T: Number>(&self, hub: &HubMotion) -> [T; 2] {

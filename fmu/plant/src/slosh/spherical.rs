@@ -332,7 +332,7 @@ impl SloshMode for Spherical {
 
     /// xi = p/k and k xi' = p' + v_z xi; k = 1 - p_z, above the horizontal by |p| = 1.
     #[inline(always)]
-    fn at(&self, n: usize, t: f64, omega: f64) -> [f64; 4] {
+    fn at(&self, n: usize, t: f64, omega: f64, _: bool) -> [f64; 4] {
         let [[x, y], [v_x, v_y]] = plane::values([&self.dir, &self.v], n, t);
         let [z, v_z] = values([&self.dir_z, &self.v_z], n, t);
         let inv_k = if z > 0.0 { (1.0 + z) / (x * x + y * y) } else { 1.0 / (1.0 - z) };
@@ -455,7 +455,7 @@ mod tests {
             assert!((x_dd - expected[0]).abs() < 1e-13 * size, "{x_dd} {}", expected[0]);
             assert!((y_dd - expected[1]).abs() < 1e-13 * size, "{y_dd} {}", expected[1]);
             // The way back.
-            let back = mode.at(ORDER, 0.0, w);
+            let back = mode.at(ORDER, 0.0, w, false);
             for (a, b) in back.iter().zip(q) {
                 assert!((a - b).abs() < 1e-13 * (1.0 + b.abs()), "{a} {b}");
             }
