@@ -1016,7 +1016,9 @@ impl<M: Model, V: Version> Instance<M, V> {
         model.take_present_inputs(&inputs);
         self.outputs = None;
         self.show_discrete(call)?;
-        Ok(EventInfo { states_changed: false, next_time: self.model(call)?.next_time_event() })
+        // what a damaged saved state has left overdue, the next step takes
+        let next_time = self.model(call)?.next_time_event().filter(|next| *next > time);
+        Ok(EventInfo { states_changed: false, next_time })
     }
 
     /// Into configuration mode or back.
