@@ -112,7 +112,10 @@ fn to_steps<M: Model, V: Version>(instance: &mut Instance<M, V>) {
     if instance.state() == InstanceState::Event {
         let next = instance.new_discrete_states().expect("in event mode").next_time;
         let time = instance.time();
-        assert!(next.is_none_or(|next| next > time), "the next event, {next:?}, is not after {time:?}");
+        assert!(
+            next.is_none_or(|next| next > time),
+            "the next event, {next:?}, is not after {time:?}"
+        );
         _ = instance.enter_step_mode(&v3::ENTER_STEP);
     }
 }
