@@ -349,7 +349,8 @@ fn finish(
         more: &more,
         wider,
     };
-    let deep = deep_tank::intervals(&problem, &deep)?;
+    // of a residual that is more than noise the sandwich says more
+    let deep = if fits { deep_tank::intervals(&problem, &deep)? } else { None };
     let of_values = DMatrix::from_fn(x.len(), x.len(), |i, j| full[(i, j)] * slopes[i] * slopes[j]);
     let fastest = fit::fastest(&answer.motion);
     let (mut parameters, mut measurement) = (BTreeMap::new(), BTreeMap::new());
