@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::evidence::{ALIKE, DECIDES, probabilities};
-use crate::fit::{Polished, Problem, ROUNDS};
+use crate::fit::{Channel, Polished, Problem, ROUNDS, is_other};
 use crate::recording::Recording;
 use crate::simulate::Intersample;
 use crate::uncertainty::Covariance;
@@ -24,6 +24,7 @@ const SYNCHRONOUS: f64 = 0.02;
 const NEAR_HALF: f64 = 0.1;
 
 /// Another behaviour than the one that was fitted.
+#[derive(Clone)]
 pub struct Alternative {
     /// Which.
     pub behaviour: Intersample,
@@ -35,7 +36,45 @@ pub struct Alternative {
     pub delay: Option<(f64, f64)>,
 }
 
+/// The other behaviours, and the minimum that they were sought from.
+#[derive(Clone)]
+pub struct Others {
+    /// The variables there.
+    from: Vec<f64>,
+    /// With what noise.
+    channels: Vec<Channel>,
+    /// Each with its own minimum.
+    pub all: Vec<Alternative>,
+}
+
+impl Others {
+    /// The one with a behaviour, where the noise is the same and a minimum less than a standard deviation from the one that it was sought from.
+    fn near(
+        &self,
+        behaviour: Intersample,
+        channels: &[Channel],
+        minimum: &Polished,
+    ) -> Option<&Alternative> {
+        let n = self.from.len();
+        let off = minimum.x.iter().zip(&self.from).map(|(now, then)| now - then);
+        let off = DVector::from_iterator(n, off);
+        let is_near = (minimum.jacobian.columns(0, n) * off).norm_squared() < 1.0;
+        let is_same = is_near && !is_other(&self.channels, channels);
+        self.all.iter().find(|other| is_same && other.behaviour == behaviour)
+    }
+}
+
 impl Alternative {
+    /// Variables and sensitivities of its minimum; what was not unknown there is as at `now`.
+    fn with_unknowns_of(&self, now: &Polished) -> (Vec<f64>, DMatrix<f64>) {
+        let (known, (rows, n)) = (self.minimum.x.len(), now.jacobian.shape());
+        let x = self.minimum.x.iter().chain(&now.x[known..]).copied().collect();
+        let mut jacobian = self.minimum.jacobian.clone().resize(rows, n, 0.0);
+        let new = now.jacobian.columns(known, n - known);
+        jacobian.columns_mut(known, n - known).copy_from(&new);
+        (x, jacobian)
+    }
+
     /// Whether the rate would come before the torque.
     pub fn is_acausal(&self, step: f64) -> bool {
         self.delay.is_some_and(|delay| is_acausal(delay, step))
@@ -71,23 +110,35 @@ const FAR: f64 = 1.5;
 
 /// The other behaviours, each with its own minimum, which is sought from this one: a torque that is held is late by half a row. The
 /// sensitivities are nearly the same, so each costs a few simulations; where they lead near the minimum but not to it (the wrong behaviour may have
-/// moved what a recording hardly shows far along its valley) it has its own, for a sum of squares on the way is no evidence.
-pub fn alternatives(problem: &Problem, minimum: &Polished) -> Vec<Alternative> {
+/// moved what a recording hardly shows far along its valley) it has its own, for a sum of squares on the way is no evidence. Where they were sought
+/// `before`, of nearly the same noise and from nearly the same minimum, they are sought on from where they were found, and one that was far is still far.
+pub fn alternatives(problem: &Problem, minimum: &Polished, before: Option<&Others>) -> Others {
     let now = problem.setup.intersample;
     let delayed = problem.unknowns.iter().position(|u| u.quantity == Quantity::Delay);
     let late = |b: Intersample| if b == Intersample::ZeroOrderHold { 0.5 } else { 0.0 };
+    let most = FAR * minimum.cost;
     let one = |behaviour: Intersample| {
         let mut problem = problem.clone();
         problem.setup.intersample = behaviour;
-        let mut x = minimum.x.clone();
-        if let Some(index) = delayed {
-            let scale = problem.unknowns[index].scale;
-            let rows = late(now) - late(behaviour);
-            let delay = scale.value(x[index]) + rows * problem.recordings[0].step();
-            x[index] = scale.variable(delay);
+        let known = before.and_then(|b| b.near(behaviour, &problem.channels, minimum));
+        let is_far =
+            |other: &&Alternative| !other.minimum.converged() && other.minimum.cost >= most;
+        if let Some(far) = known.filter(is_far) {
+            return Some(far.clone());
         }
-        let most = FAR * minimum.cost;
-        let mut minimum = problem.polish_near(&x, &minimum.jacobian).ok()?;
+        let (x, jacobian) = if let Some(other) = known {
+            other.with_unknowns_of(minimum)
+        } else {
+            let mut x = minimum.x.clone();
+            if let Some(index) = delayed {
+                let scale = problem.unknowns[index].scale;
+                let rows = late(now) - late(behaviour);
+                let delay = scale.value(x[index]) + rows * problem.recordings[0].step();
+                x[index] = scale.variable(delay);
+            }
+            (x, minimum.jacobian.clone())
+        };
+        let mut minimum = problem.polish_near(&x, &jacobian).ok()?;
         if !minimum.converged() && minimum.cost < most {
             minimum = problem.polish(&minimum.x, Some(&minimum.jacobian), ROUNDS).ok()?;
         }
@@ -97,7 +148,8 @@ pub fn alternatives(problem: &Problem, minimum: &Polished) -> Vec<Alternative> {
         Some(Alternative { behaviour, minimum, cost, delay })
     };
     let others: Vec<Intersample> = Intersample::ALL.into_iter().filter(|b| *b != now).collect();
-    others.into_par_iter().filter_map(one).collect()
+    let all = others.into_par_iter().filter_map(one).collect();
+    Others { from: minimum.x.clone(), channels: problem.channels.clone(), all }
 }
 
 /// Which of the behaviours fits best: `None` if no other one that is allowed is clearly better.

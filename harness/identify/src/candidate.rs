@@ -4,6 +4,7 @@ use anyhow::{Result, ensure};
 use host::fmu::Fmu;
 use serde::Serialize;
 
+use crate::between::Others;
 use crate::fit::{Polished, Problem};
 use crate::goodness::{fit_pct, is_poor, tests};
 use crate::news::{News, Since};
@@ -72,6 +73,8 @@ pub struct Fitted<'a> {
     pub fit: ModelFit,
     /// Stribeck speeds that were tried, rad/s, with the sum of squares above the least.
     pub speeds: Vec<(f64, f64)>,
+    /// What the torque may be between rows instead, if that was asked.
+    pub others: Option<Others>,
 }
 
 /// Fits a slosh model with a friction law, from the data's starts, the likeliest first, or from the fit of another model.
@@ -105,6 +108,7 @@ pub fn fit<'a>(
         alone: options.models.iter().filter(|m| *m != "frozen").count() == 1,
         model,
         speeds: Vec::new(),
+        others: None,
         since: Since::default(),
         progress: &mut |line| progress(News::Detail(line)),
     };
@@ -119,11 +123,11 @@ pub fn fit<'a>(
         }
     });
     let mut polished = search.run(sibling.as_ref())?;
-    let (mut problem, speeds) = (search.problem, search.speeds);
+    let Search { mut problem, speeds, others, .. } = search;
     problem.renew_noise(&mut polished);
     let fit = summary(&problem, &polished, options, (model, law))?;
     progress(News::Step(fit.line()));
-    Ok(Fitted { problem, polished, fit, speeds })
+    Ok(Fitted { problem, polished, fit, speeds, others })
 }
 
 fn problem<'a>(

@@ -91,7 +91,7 @@ pub struct Channel {
 
 /// Whether the noise of channels is no longer what it was, by so much that the minimum is another one: the white noise, or a drift that
 /// counts.
-fn is_other(before: &[Channel], now: &[Channel]) -> bool {
+pub fn is_other(before: &[Channel], now: &[Channel]) -> bool {
     let differs = |a: f64, b: f64, by: f64| (a / b).ln().abs() > by;
     before.iter().map(|c| c.noise).zip(now.iter().map(|c| c.noise)).any(|(a, b)| {
         let drifts = a.drift.max(b.drift) > 0.02;

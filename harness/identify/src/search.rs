@@ -39,6 +39,8 @@ pub struct Search<'a, 'h> {
     pub model: &'h str,
     /// What other Stribeck speeds make of the sum of squares, once that was asked: speed, rad/s, and how much more.
     pub speeds: Vec<(f64, f64)>,
+    /// What the torque may be between rows instead, once that was asked.
+    pub others: Option<between::Others>,
     /// What the lines so far were told to cost.
     pub since: Since,
     /// Is told what happens.
@@ -297,10 +299,11 @@ impl<'a> Search<'a, '_> {
             return Ok(near);
         }
         let step = self.problem.recordings[0].step();
-        let others = between::alternatives(&self.problem, &near);
-        let said = between::evidence(&self.problem, &near, step, self.acausal, &others);
+        let others = between::alternatives(&self.problem, &near, self.others.as_ref());
+        let said = between::evidence(&self.problem, &near, step, self.acausal, &others.all);
         self.say(format!("{}: {said}", self.model));
-        let Some(best) = between::better(near.cost, step, self.acausal, &others) else {
+        let others = &self.others.insert(others).all;
+        let Some(best) = between::better(near.cost, step, self.acausal, others).cloned() else {
             return Ok(near);
         };
         let before = std::mem::replace(&mut self.problem.setup.intersample, best.behaviour);

@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::identification::{Details, Identification};
 use super::{Identified, Method, Needs, Residual, Task, page};
-use crate::between;
+use crate::between::{self, Others};
 use crate::budget::{self, Effect};
 use crate::candidate::{self, Fitted, ModelFit};
 use crate::deep_tank;
@@ -245,7 +245,7 @@ fn finish(
     options: &Options,
     tell: &mut dyn FnMut(News),
 ) -> Result<Identification> {
-    let Fitted { mut problem, polished, mut fit, speeds } = best;
+    let Fitted { mut problem, polished, mut fit, speeds, others } = best;
     let (mut since, model) = (Since::default(), fit.model.clone());
     let mut say = |what: &str, problem: &Problem| {
         tell(News::Detail(since.line(format!("{model}: {what}"), problem.simulations())));
@@ -270,7 +270,7 @@ fn finish(
     }
     polished = problem.polish_at_kink(polished, ROUNDS)?;
     say("central differences at the minimum", &problem);
-    let between_rows = torque_between_rows(&mut problem, &mut polished, options)?;
+    let between_rows = torque_between_rows(&mut problem, &mut polished, others.as_ref(), options)?;
     say("other torques between rows", &problem);
     fit.fit_pct = fit_pct(&problem, &polished.answer);
     fit.tests = tests(&problem, &polished.answer);
@@ -493,19 +493,20 @@ struct BetweenRows {
 fn torque_between_rows(
     problem: &mut Problem,
     found: &mut Polished,
+    before: Option<&Others>,
     options: &Options,
 ) -> Result<BetweenRows> {
     if options.intersample.is_some() || !between::matters(problem.recordings) {
         return Ok(BetweenRows::default());
     }
     let (step, acausal) = (problem.recordings[0].step(), options.acausal);
-    let mut others = between::alternatives(problem, found);
+    let mut others = between::alternatives(problem, found, before).all;
     if let Some(best) = between::better(found.cost, step, acausal, &others) {
         let before = std::mem::replace(&mut problem.setup.intersample, best.behaviour);
         let other = problem.polish(&best.minimum.x, Some(&best.minimum.jacobian), ROUNDS)?;
         if other.cost < found.cost {
             *found = other;
-            others = between::alternatives(problem, found);
+            others = between::alternatives(problem, found, None).all;
         } else {
             problem.setup.intersample = before;
         }
