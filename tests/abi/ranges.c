@@ -4,15 +4,16 @@
  * own. A value that the FMU refuses is no fault; a trap is, and so is a number that is none. What no
  * description allows, NaN and infinity, has to be refused.
  *
- *   ranges LIBRARY GUID STATES INDICATORS FILE PAIRS SEED all|half
+ *   ranges LIBRARY GUID STATES INDICATORS FILE PAIRS SEED all|part
  *
  * FILE has a line for each scalar variable,
  *     v CAUSALITY TYPE REFERENCE MIN START MAX NAME    (CAUSALITY p, i or -; TYPE R, I, E or B)
  * and for what a scene, by its number from 0, sets before,
  *     s SCENE TYPE REFERENCE VALUE
  *
- * Half: what is left out for one version of FMI (fmi.h) is what the other one tries; starts, which are no others than
- * those that are there already, are set once in every scene. */
+ * Part: of four scenes in a row an end of a range is set in one by each version of FMI (fmi.h), which are neighbours;
+ * starts, which are no others than those that are there already, are set once in every scene; of what is no number each
+ * version tries half. */
 #define _GNU_SOURCE
 #include "fmi.h"
 #include <float.h>
@@ -274,7 +275,7 @@ static void read_file(const char *path)
 int main(int argc, char **argv)
 {
     static const struct variable *settable[MOST];
-    int n = 0, half;
+    int n = 0, part;
     double signalling;
     const uint64_t bits = 0x7ff0000000000001;
     memcpy(&signalling, &bits, sizeof bits);
@@ -288,7 +289,7 @@ int main(int argc, char **argv)
     indicators = strtoul(argv[4], NULL, 10);
     read_file(argv[5]);
     state = strtoull(argv[7], NULL, 10);
-    half = strcmp(argv[8], "half") == 0;
+    part = strcmp(argv[8], "part") == 0;
 #if FMI == 3
     events_by_host = 1;
 #endif
@@ -308,7 +309,7 @@ int main(int argc, char **argv)
         for (int i = 0; i < n; i++)
             for (int k = 0; k < 3; k++) {
                 struct trial trial = {settable[i], settable[i]->value[k]};
-                if (half && (k == 1 ? i > 0 : (scene + i + k / 2) % 2 != FMI % 2))
+                if (part && (k == 1 ? i > 0 : (scene + i + k / 2) % 4 != FMI % 2))
                     continue;
                 run(allowed, scene, &trial, 1);
             }
@@ -323,7 +324,7 @@ int main(int argc, char **argv)
     for (int i = 0; i < n; i++)
         for (size_t k = 0; k < sizeof none / sizeof *none && settable[i]->type == 'R'; k++) {
             struct trial trial = {settable[i], none[k]};
-            if (half && (i + (int)k) % 2 != FMI % 2)
+            if (part && (i + (int)k) % 2 != FMI % 2)
                 continue;
             run(forbidden, 0, &trial, 1);
         }

@@ -3,10 +3,10 @@
  * with and without the gyro, in both interfaces, each in a process of its own; one line for each that
  * a trap has ended. A start that a model refuses is no fault.
  *
- *   traps LIBRARY GUID STATES INDICATORS SLOSH_MODELS FRICTION_MODELS all|half NAME=REFERENCE... -- REFERENCE...
+ *   traps LIBRARY GUID STATES INDICATORS SLOSH_MODELS FRICTION_MODELS all|part NAME=REFERENCE... -- REFERENCE...
  *
  * SLOSH_MODELS and FRICTION_MODELS are how many items the two enumerations have. The names are those of `variables` below;
- * the references after -- are all Reals, which are read. Half: every second one, the others being the other version's of
+ * the references after -- are all Reals, which are read. Part: every second one, the others being the other version's of
  * FMI (fmi.h), which handles events itself where it can. */
 #define _GNU_SOURCE
 #include "fmi.h"
@@ -190,7 +190,7 @@ static void arguments(int argc, char **argv)
 
 int main(int argc, char **argv)
 {
-    int runs = 0, refused = 0, ended = 0, half;
+    int runs = 0, refused = 0, ended = 0, part;
     if (argc < 9) {
         fprintf(stderr, "usage: see the beginning of traps.c\n");
         return 2;
@@ -204,7 +204,7 @@ int main(int argc, char **argv)
 #if FMI == 3
     events_by_host = 1;
 #endif
-    half = strcmp(argv[7], "half") == 0;
+    part = strcmp(argv[7], "part") == 0;
     for (int kind = 0; kind < KINDS; kind++)
         for (int slosh = 1; slosh <= atoi(argv[5]); slosh++)
             for (int friction = 1; friction <= atoi(argv[6]); friction++)
@@ -212,7 +212,7 @@ int main(int argc, char **argv)
                     for (size_t n = 0; n < sizeof scenes / sizeof *scenes; n++) {
                         int status = 0, code;
                         pid_t child;
-                        if (half && (kind + slosh + friction + gyro + (int)n) % 2 != FMI % 2)
+                        if (part && (kind + slosh + friction + gyro + (int)n) % 2 != FMI % 2)
                             continue;
                         fflush(stdout);
                         child = fork();

@@ -29,9 +29,11 @@ fn sweep(fmu: &Fmu, torque: &str, settings: &[(&str, &str)]) -> Recording {
         .unwrap()
 }
 
+/// Told that the torque is linear between rows.
 fn options() -> Options {
     Options {
         models: vec!["linear".into()],
+        intersample: Some(Intersample::FirstOrderHold),
         sensor_errors: false,
         gyro_scale: 0.0,
         tolerances: Tolerances::NONE,
@@ -39,10 +41,15 @@ fn options() -> Options {
     }
 }
 
+/// Not told what the torque is between rows.
+fn of_any_torque() -> Options {
+    Options { intersample: None, ..options() }
+}
+
 #[test]
 fn parameters_come_back_and_coulomb_and_stribeck_friction_as_their_sum() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
-    let found = identify(&fmu, &[sweep(&fmu, LONG, &[])], &options(), &mut |_| {}).unwrap();
+    let found = identify(&fmu, &[sweep(&fmu, LONG, &[])], &of_any_torque(), &mut |_| {}).unwrap();
     assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
     for (name, truth) in [
         ("tank.d", 0.163),
@@ -174,12 +181,7 @@ fn the_minimum_is_found_along_the_bent_valley_of_the_gyros_scale() {
     ];
     let errors = SensorErrors { gyro_scale: 1.02, ..SensorErrors::default() };
     let recording = twin::record(&fmu, &settings, &torque, Some(4), errors).unwrap();
-    let options = Options {
-        models: vec!["spherical".into()],
-        gyro_scale: 0.02,
-        intersample: Some(Intersample::FirstOrderHold),
-        ..options()
-    };
+    let options = Options { models: vec!["spherical".into()], gyro_scale: 0.02, ..options() };
     let found = identify(&fmu, &[recording], &options, &mut |_| {}).unwrap();
     let fit = &found.details.fit;
     assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
@@ -244,7 +246,8 @@ fn a_delay_that_another_torque_between_rows_explains_as_well_is_not_stated_as_su
         Torque::Profile("lin-sweep:amplitude=0.05,duration=130,f0=2,f1=3".parse().unwrap());
     let recording = twin.record(&fmu, &torque, Some(1)).unwrap();
     // of the friction only what is viscous, which is quick
-    let asked = Options { sensor_errors: true, friction: vec!["viscous".into()], ..options() };
+    let asked =
+        Options { sensor_errors: true, friction: vec!["viscous".into()], ..of_any_torque() };
     let found = identify(&fmu, std::slice::from_ref(&recording), &asked, &mut |_| {}).unwrap();
     let said = found.verdict.iter().find(|line| line.contains("torque does between rows")).unwrap();
     assert!(said.contains("held from row to row (zero-order hold) with a delay of"), "{said}");
@@ -269,7 +272,7 @@ fn no_model_error_makes_the_rate_come_before_the_torque() {
     let settings = [&zeta[..], &settings].concat();
     let recording =
         twin::record(&fmu, &settings, &torque, Some(1), SensorErrors::default()).unwrap();
-    let options = Options { sensor_errors: true, gyro_scale: 0.01, ..options() };
+    let options = Options { sensor_errors: true, gyro_scale: 0.01, ..of_any_torque() };
     let found = identify(&fmu, &[recording], &options, &mut |_| {}).unwrap();
     let delay = &found.measurement["delay"];
     assert!(delay.value.abs() < 4.0 * delay.std && delay.std < 1e-4, "{delay:?}");
@@ -398,7 +401,7 @@ fn a_recording_with_an_encoder_is_described_as_one_without() {
             ..Twin::default()
         };
         let recording = twin.record(&fmu, &torque, Some(1)).unwrap();
-        let options = Options { sensor_errors: true, gyro_scale: 0.01, ..options() };
+        let options = Options { sensor_errors: true, gyro_scale: 0.01, ..of_any_torque() };
         let found = identify(&fmu, &[recording], &options, &mut |_| {}).unwrap();
         assert!(found.converged && found.fits == Some(true), "{:?}", found.verdict);
         let scale = &found.measurement["gyro_scale"];
