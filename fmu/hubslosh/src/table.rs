@@ -70,9 +70,11 @@ const DYNAMICS: &[&str] = &[
     "hub.", "tank.", "fluid.", "slosh.", "baffle.", "bench.", "friction.", "init.", "wheel.",
 ];
 const LIQUID: &[&str] = &["tank.", "fluid.", "slosh."];
+// Modes of a surface that gravity tilts, by how the tank stands to it at the start.
+const LIQUID_MODES: &[&str] = &["tank.", "fluid.", "slosh.", "bench.", "init.theta"];
 // The plant keeps positions and velocities in space, not angles: going there and
 // back mixes the directions in the last digit.
-const SLOSH_START: &[&str] = &["tank.", "slosh.", "init."];
+const SLOSH_START: &[&str] = &["tank.", "slosh.", "bench.", "init."];
 
 /// Of the modes that are kept.
 const PER_MODE: &[Dimension] = &[Sized("slosh.modes", MODES)];
@@ -167,11 +169,11 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         .shape(PER_MODE).depends_on(&["g_axial"]).initial_depends_on(LIQUID),
     V::local("baffle.zeta", |o, _| o.baffle_zeta, "1",
         "Damping ratio of mode 1 by the ring baffle at the present amplitude, in addition to slosh.damping[1]; 0 without one")
-        .depends_on(WAVE_1).initial_depends_on(&["baffle.", "tank.", "fluid.", "slosh.", "init."]),
+        .depends_on(WAVE_1).initial_depends_on(&["baffle.", "tank.", "fluid.", "slosh.", "bench.", "init."]),
     V::local("baffle.wave", |o, _| o.baffle_wave, "m",
         "Amplitude at the wall of the oscillation of mode 1, from its angle and its rate, that baffle.zeta belongs to; 0 without a baffle")
         .display_unit("mm").nominal(0.01)
-        .depends_on(WAVE_1).initial_depends_on(&["baffle.", "tank.", "fluid.", "slosh.", "init."]),
+        .depends_on(WAVE_1).initial_depends_on(&["baffle.", "tank.", "fluid.", "slosh.", "bench.", "init."]),
     V::local("tau_actuator", |o, _| o.tau_actuator, "N.m",
         "Torque of the actuator on the hub, positive towards +theta: tau_cmd after the wheel's limits")
         .display_unit("mN.m").depends_on(&["tau_cmd", "wheel_speed"]),
@@ -287,7 +289,7 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         "Damping coefficient of that line; unlike friction.b it acts with every friction.model")
         .range(0.0, 1e6),
     V::parameter("bench.tilt", |p, _| &mut p.bench.tilt, "rad",
-        "By how much the bearing's axis leans. g_axial is the part of gravity along the axis; g_axial tan(bench.tilt) across it acts on hub and liquid")
+        "By how much the bearing's axis leans. g_axial is the part of gravity along the axis; g_axial tan(bench.tilt) across it acts on hub and liquid and tilts the liquid's surface: the modes of a tank given by its dimensions change, those of slosh.table do not")
         .display_unit("deg").range(0.0, 1.5),
     V::parameter("bench.tilt_azimuth", |p, _| &mut p.bench.tilt_azimuth, "rad",
         "The theta at which the tank is on the lowest side: where gravity's part across the axis points to")
@@ -536,22 +538,22 @@ static VARIABLES: &[Variable<HubSlosh>] = &[
         .initial_depends_on(LIQUID),
     V::calculated("tank.m_0", |m, _| m.calculated().m_0, "kg",
         "Part of the liquid's mass that moves with the tank")
-        .initial_depends_on(LIQUID),
+        .initial_depends_on(LIQUID_MODES),
     V::calculated("tank.bond", |m, _| m.calculated().bond, "1",
         "Bond number: gravity over surface tension; the model holds far above 1")
         .depends_on(&["g_axial"]).initial_depends_on(&["tank.", "fluid."]),
     V::calculated("slosh.mass", |m, n| m.calculated().mass[n], "kg",
-        "Sloshing mass of a mode; 0 for modes that are not used")
+        "Sloshing mass of a mode, on a bench that leans of a pendulum that hangs obliquely; 0 for modes that are not used")
         .shape(PER_MODE)
-        .initial_depends_on(LIQUID),
+        .initial_depends_on(LIQUID_MODES),
     V::calculated("slosh.length", |m, n| m.calculated().length[n], "m",
-        "Pendulum length of a mode; 0 for modes that are not used")
+        "Pendulum length of a mode, on a bench that leans of a pendulum that hangs obliquely; 0 for modes that are not used")
         .shape(PER_MODE)
-        .display_unit("mm").initial_depends_on(LIQUID),
+        .display_unit("mm").initial_depends_on(LIQUID_MODES),
     V::calculated("slosh.frequency", |m, n| m.calculated().frequency[n], "Hz",
         "Natural frequency of a mode in the tank at rest, at the initial g_axial; 0 for modes that are not used")
         .shape(PER_MODE)
-        .depends_on(&["g_axial"]).initial_depends_on(LIQUID),
+        .depends_on(&["g_axial"]).initial_depends_on(LIQUID_MODES),
 ];
 
 /// The models of the liquid.

@@ -25,6 +25,7 @@ mod friction;
 mod hub;
 mod imu;
 mod inputs;
+mod leaning;
 mod motion;
 mod outputs;
 mod parameters;

@@ -9,6 +9,8 @@
 //! ```text
 //! a_n = k_n l_n/m_n = sigma xi_n^2/(rho R^2)
 //! ```
+//!
+//! On a bench that leans the cylinder's surface is tilted: `leaning.rs`. A table is taken as given.
 
 use alloc::format;
 use alloc::string::{String, ToString};
@@ -20,6 +22,7 @@ use formulas::third_order::{coefficients, secondary_resonance};
 
 use crate::amplitude::Growth;
 use crate::baffle::{self, Baffle};
+use crate::leaning::{self, Leaning};
 use crate::parameters::{MODES, ModeTable, Parameters, SloshModel, SloshSource};
 use crate::pendulum::Pendulum;
 
@@ -34,9 +37,9 @@ pub struct Calculated {
     pub bond: f64,
     /// Pendulum masses, kg.
     pub mass: [f64; MODES],
-    /// Pendulum lengths, m.
+    /// Pendulum lengths, m; on a bench that leans of those that, hanging obliquely, have the frequencies.
     pub length: [f64; MODES],
-    /// Natural frequencies sqrt((g + a)/l) / 2 pi, Hz.
+    /// Natural frequencies, Hz; on an upright bench sqrt((g + a)/l) / 2 pi.
     pub frequency: [f64; MODES],
     /// Damping ratios.
     pub damping: [f64; MODES],
@@ -48,6 +51,7 @@ pub struct Calculated {
 pub(crate) fn problems(p: &Parameters) -> Vec<String> {
     let (slosh, table) = (&p.slosh, &p.slosh.table);
     let mut problems = baffle::problems(p);
+    problems.extend(leaning::problems(p));
     if slosh.source != SloshSource::Table {
         return problems;
     }
@@ -181,6 +185,7 @@ pub(crate) fn warnings(p: &Parameters, g: f64) -> Vec<String> {
         return warnings;
     }
     warnings.extend(baffle::warnings(p));
+    warnings.extend(leaning::warnings(p));
     if !geometry && slosh.model == SloshModel::Linear && slosh.table.is_askew(slosh.modes) {
         warnings.push(
             "slosh.table.direction with slosh.model = linear: to first order a hub that only turns moves a mode by its part along the \
@@ -275,12 +280,20 @@ impl Calculated {
         let bond = liquid.bond(g, radius);
         let mut all = Calculated { m_liq, m_0: m_liq, bond, ..Default::default() };
         let modes = if slosh.model == SloshModel::Frozen { 0 } else { slosh.modes.min(MODES) };
+        let leaning = Leaning::of(p);
         for n in 0..modes {
+            // Of an upright pendulum of the mode's frequency; one that hangs obliquely has another.
+            let upright;
             match slosh.source {
                 SloshSource::Geometry => {
                     let xi = XI[n];
                     let pendulum = cylinder::pendulum(n, tank.d, tank.h, m_liq);
                     (all.mass[n], all.length[n]) = (pendulum.mass, pendulum.length);
+                    upright = leaning.map_or(pendulum.length, |leaning| {
+                        let mode = leaning.mode(n, p, &pendulum);
+                        (all.mass[n], all.length[n]) = (mode.mass, mode.length);
+                        mode.upright
+                    });
                     if slosh.capillarity {
                         all.centring[n] = fluid.sigma * xi * xi / (fluid.rho * radius * radius);
                     }
@@ -289,10 +302,11 @@ impl Calculated {
                     all.mass[n] = slosh.table.mass[n];
                     all.length[n] = slosh.table.length_of(n);
                     all.centring[n] = slosh.table.k[n] * all.length[n] / all.mass[n];
+                    upright = all.length[n];
                 }
             }
             let restoring = g + all.centring[n];
-            all.frequency[n] = libm::sqrt(restoring / all.length[n]) / core::f64::consts::TAU;
+            all.frequency[n] = libm::sqrt(restoring / upright) / core::f64::consts::TAU;
             all.damping[n] = match (slosh.source, slosh.zeta_from_correlation) {
                 _ if restoring <= 0.0 => 0.0,
                 (SloshSource::Table, _) => slosh.table.zeta[n],

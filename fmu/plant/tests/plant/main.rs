@@ -9,6 +9,7 @@ mod errata;
 mod events;
 mod free_oscillation;
 mod kinematics;
+mod leaning;
 mod liquid;
 mod lugre;
 mod options;

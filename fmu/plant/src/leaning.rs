@@ -1,0 +1,226 @@
+//! The modes of an upright cylinder on a bench that leans: its free surface is tilted, which changes their frequencies
+//! (`formulas::tilt`), and pendulums hang obliquely, which would change theirs otherwise.
+//!
+//! With the tangent s of the tilt and n = sin(beta), the tangential component of the direction that gravity across the axis points
+//! to at the hub's start angle (e = g s (cos beta, sin beta), `hub.rs`), the liquid's force on a hub that turns a little has
+//!
+//! ```text
+//! omega^2 = f g/l,   f = f_along n^2 + f_across (1 - n^2)
+//! ```
+//!
+//! l the upright tank's pendulum, and the sloshing mass m f: a mode's m/omega^2 is its share of the surface's static moment,
+//! rho pi R^4/4 g/omega^2 for all together, which no tilt changes. A pendulum of the mass m' and the length l' that swings about a rest u l' away from the hinge
+//! has
+//!
+//! ```text
+//! omega^2 = (g/l') F,   sloshing mass m' M
+//! linear              F = M = 1
+//! planar              F = (1 + s^2 n^2)^(1/2),   M = 1/(1 + s^2 n^2)
+//! spherical           F = (1 + s^2)^(1/2),       M = 1 - n^2 s^2/(1 + s^2)
+//! paraboloid, liquid  u (1 + H u^2) = s,         M = 1 - n^2 + n^2/(1 + sigma u^2)
+//!                     F = M/[(1 - n^2)/(1 + H u^2) + n^2/(1 + 3 H u^2)]
+//! ```
+//!
+//! (H l'^-2 the coefficient of the quartic spring, sigma that of the vertical inertia: `paraboloid.rs`; M and F are e.(M^-1 e) and its ratio to
+//! e.(K^-1 e) of the two equations of small motions, e the tangent.) So l' = l F/f and m' = m f/M.
+//!
+//! f belongs to the tangent. Models with one pendulum for both directions have radially what F with n^2 and 1 - n^2 exchanged gives
+//! them, the liquid f with both exchanged. A spherical pendulum has the same frequency for both; `liquid` splits them by itself much as the liquid
+//! does (deep, c = -0.36 along the slope and 0.37 across it, against -0.42 and 0.23).
+
+use alloc::format;
+use alloc::string::String;
+use alloc::vec::Vec;
+
+use formulas::cylinder;
+use formulas::third_order;
+use formulas::tilt::{factors, largest_slope};
+
+use crate::parameters::{Parameters, SloshModel, SloshSource};
+
+/// How gravity leans from the axis of an upright cylinder.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Leaning {
+    /// s
+    slope: f64,
+    /// n^2
+    tangential: f64,
+}
+
+/// How a pendulum that hangs obliquely swings: F and M above.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Oblique {
+    stiffness: f64,
+    share: f64,
+}
+
+/// A mode: mass and length of its pendulum in the plant, and the length l/f of an upright one of its frequency.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Mode {
+    pub mass: f64,
+    pub length: f64,
+    pub upright: f64,
+}
+
+impl Leaning {
+    /// Of the bench at the start; `None` where it is upright or the tank is no cylinder by its dimensions.
+    pub fn of(p: &Parameters) -> Option<Leaning> {
+        let leans = p.bench.tilt != 0.0 && p.slosh.source == SloshSource::Geometry;
+        leans.then(|| {
+            let n = libm::sin(p.bench.tilt_azimuth - p.init.theta);
+            Leaning { slope: libm::tan(p.bench.tilt), tangential: n * n }
+        })
+    }
+
+    /// f of mode n from 0: along the tangent and across it.
+    fn factors(self, n: usize, fill: f64) -> [f64; 2] {
+        let [along, across] = factors(n, fill, self.slope);
+        let mixed = |part: f64| along * part + across * (1.0 - part);
+        [mixed(self.tangential), mixed(1.0 - self.tangential)]
+    }
+
+    /// Mode n from 0, of the upright tank's pendulum.
+    pub fn mode(self, n: usize, p: &Parameters, upright: &cylinder::Pendulum) -> Mode {
+        let [f, _] = self.factors(n, 2.0 * p.tank.h / p.tank.d);
+        // The paraboloid's quartic spring is in the length: F changes it by a share H s^2.
+        let mut length = upright.length / f;
+        let mut oblique = self.oblique(n, p, length);
+        for _ in 0..LENGTHS {
+            let before = length;
+            length = upright.length * oblique.stiffness / f;
+            if length == before {
+                break;
+            }
+            oblique = self.oblique(n, p, length);
+        }
+        Mode { mass: upright.mass * f / oblique.share, length, upright: upright.length / f }
+    }
+
+    /// The frequency of mode 1's pendulum across the tangent over the liquid's there.
+    fn radial_frequency(self, p: &Parameters) -> f64 {
+        let fill = 2.0 * p.tank.h / p.tank.d;
+        let upright = cylinder::pendulum(0, p.tank.d, p.tank.h, 1.0);
+        let [tangential, radial] = self.factors(0, fill);
+        let length = self.mode(0, p, &upright).length;
+        let turned = Leaning { tangential: 1.0 - self.tangential, ..self };
+        let stiffness = |leaning: Leaning| leaning.oblique(0, p, length).stiffness;
+        libm::sqrt(stiffness(turned) / stiffness(self) * tangential / radial)
+    }
+
+    /// F and M of mode n from 0 as a pendulum of this length.
+    fn oblique(self, n: usize, p: &Parameters, length: f64) -> Oblique {
+        let (s2, n2) = (self.slope * self.slope, self.tangential);
+        match p.slosh.model {
+            SloshModel::Frozen | SloshModel::Linear => Oblique { stiffness: 1.0, share: 1.0 },
+            SloshModel::Planar => {
+                let t = 1.0 + s2 * n2;
+                Oblique { stiffness: libm::sqrt(t), share: 1.0 / t }
+            }
+            SloshModel::Spherical => {
+                Oblique { stiffness: libm::sqrt(1.0 + s2), share: 1.0 - n2 * s2 / (1.0 + s2) }
+            }
+            SloshModel::Paraboloid | SloshModel::Liquid => {
+                let (sigma, spring) = quartic(n, p, length);
+                let u = rest(spring, self.slope);
+                let (u2, c2) = (u * u, 1.0 - n2);
+                let share = c2 + n2 / (1.0 + sigma * u2);
+                let soft = c2 / (1.0 + spring * u2) + n2 / (1.0 + 3.0 * spring * u2);
+                Oblique { stiffness: share / soft, share }
+            }
+        }
+    }
+}
+
+/// Substitutions of the length at most: each leaves a share of about 2 H s^2 of the error, of the hardest spring 2/3.
+const LENGTHS: usize = 100;
+
+/// Coefficients sigma of the vertical inertia and H of the quartic spring of mode n from 0.
+fn quartic(n: usize, p: &Parameters, length: f64) -> (f64, f64) {
+    let radius = p.tank.d / 2.0;
+    match p.slosh.model {
+        SloshModel::Liquid if n == 0 => {
+            let (s, kappa) = third_order::coefficients(p.tank.h / radius);
+            (s, kappa / 2.0)
+        }
+        SloshModel::Liquid => (1.0, 0.5),
+        _ => (1.0, p.slosh.hardening * (length / radius) * (length / radius)),
+    }
+}
+
+/// u of u (1 + H u^2) = s by Newton's method, where the spring grows stiffer; where it grows softer the nearest to 0, if there is one.
+fn rest(spring: f64, slope: f64) -> f64 {
+    let mut u = if spring > 0.0 { slope } else { 0.0 };
+    for _ in 0..60 {
+        u -= (u * (1.0 + spring * u * u) - slope) / (1.0 + 3.0 * spring * u * u);
+    }
+    u
+}
+
+/// What can't be under this tilt.
+pub(crate) fn problems(p: &Parameters) -> Vec<String> {
+    let mut problems = Vec::new();
+    let (Some(Leaning { slope, .. }), true) = (Leaning::of(p), p.slosh.model != SloshModel::Frozen)
+    else {
+        return problems;
+    };
+    let (radius, tilt) = (p.tank.d / 2.0, p.bench.tilt);
+    let fill = p.tank.h / radius;
+    if slope >= fill {
+        problems.push(format!(
+            "bench.tilt = {tilt} rad: the liquid's surface, tank.h = {} m deep in the middle, reaches the bottom of the tank (allowed: less \
+             than atan(2 tank.h/tank.d) = {} rad; beyond, slosh.source = table with the modes of the tilted tank, or slosh.model = frozen)",
+            p.tank.h,
+            libm::atan(fill)
+        ));
+    } else if p.slosh.model == SloshModel::Liquid {
+        let (s, spring) = quartic(0, p, 0.0);
+        // A spring that grows softer holds up to u = (3 |H|)^(-1/2), s = 2 u/3.
+        let most =
+            if spring < 0.0 { 2.0 / (3.0 * libm::sqrt(-3.0 * spring)) } else { f64::INFINITY };
+        let u = if slope < most { rest(spring, slope) } else { slope };
+        if slope >= most || 1.0 + s * u * u <= 0.0 {
+            problems.push(format!(
+                "bench.tilt = {tilt} rad: to the third order in the amplitude liquid at h/R = {fill:.3} (s = {s:.3}, kappa = {:.3}) has no \
+                 rest under this tilt (allowed with slosh.model = liquid: a smaller bench.tilt)",
+                2.0 * spring
+            ));
+        }
+    }
+    problems
+}
+
+/// By what share a pendulum for both directions may be off radially, before it is said.
+const APART: f64 = 0.01;
+
+/// What is to be said of the modes under this tilt, if anything.
+pub(crate) fn warnings(p: &Parameters) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let Some(leaning) = Leaning::of(p) else { return warnings };
+    let fill = 2.0 * p.tank.h / p.tank.d;
+    let most = largest_slope(fill);
+    if leaning.slope > most {
+        warnings.push(format!(
+            "bench.tilt = {} rad: beyond {:.3} rad at h/R = {fill:.3} slosh frequencies are off by more than 1 % (slosh.source = table \
+             with the modes of the tilted tank has them)",
+            p.bench.tilt,
+            libm::atan(most)
+        ));
+    }
+    let name = match p.slosh.model {
+        SloshModel::Spherical => "spherical",
+        SloshModel::Paraboloid => "paraboloid",
+        SloshModel::Liquid => "liquid",
+        SloshModel::Frozen | SloshModel::Linear | SloshModel::Planar => return warnings,
+    };
+    let off = leaning.radial_frequency(p) - 1.0;
+    if off.abs() > APART {
+        warnings.push(format!(
+            "bench.tilt = {} rad: the tilted liquid has two frequencies, slosh.model = {name} one pendulum for both directions: tangentially \
+             it has the liquid's, radially one that is {:.1} % too {}",
+            p.bench.tilt,
+            100.0 * off.abs(),
+            if off > 0.0 { "high" } else { "low" }
+        ));
+    }
+    warnings
+}
