@@ -23,7 +23,8 @@
 //!
 //! Where to look: `spacecraft.rs` and `slosh_tank.rs` are the two components as a host sees
 //! them; `motion.rs` has the craft's equations, `bob.rs` those of one slosh mode, `rigid.rs`
-//! the mass matrix, `lump.rs` liquid that has left its bottom, `outputs.rs` energy and momentum; the crate `taylor` steps through time.
+//! the mass matrix, `lump.rs` liquid that has left its bottom, `handover.rs` its
+//! impulses on what carries it, `outputs.rs` energy and momentum; the crate `taylor` steps through time.
 //! `contents.rs` is what is in a tank that drains by a table (`table.rs`),
 //! `draining.rs` a craft with such tanks.
 
@@ -35,6 +36,7 @@ mod bob;
 mod contents;
 mod damping;
 mod draining;
+mod handover;
 mod lump;
 mod motion;
 mod outputs;

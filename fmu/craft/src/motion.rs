@@ -45,12 +45,13 @@ use taylor::vector::{
     unit_quaternion, unit_quaternion_slope,
 };
 
-use crate::bob::Bob;
+use crate::bob::{Bob, BobNow};
+use crate::handover::Carrier;
 use crate::lump::{Directions, Due, Lump};
 use crate::parameters::{Limits, Mount, Parameters, Tank};
 use crate::pivot::{Pivot, Rubbing};
 use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod};
-use crate::sizes::MODES;
+
 use crate::state::{BallState, Inputs, STATES, State, index};
 
 /// Rates change within this time at most, s: a step much longer does not see how fast they are.
@@ -794,47 +795,71 @@ impl CraftMotion {
             indicators[2 * i..2 * i + 2].copy_from_slice(&now);
         }
     }
+}
 
-    /// The equations `t` after the start of the call.
+impl Carrier for CraftMotion {
+    type Memory = State;
+
+    fn memory(&self) -> State {
+        self.state
+    }
+
+    fn restore(&mut self, memory: &State) {
+        self.state = *memory;
+    }
+
     #[inline(never)]
     fn evaluate_at(&mut self, t: f64) {
         self.start(t);
         self.rates_of::<0>();
     }
 
-    #[inline(never)]
-    fn change(&mut self, lump: usize, due: Due, t: f64) {
-        let tank = self.lumps[lump].tank;
-        self.evaluate_at(t);
-        match due {
-            Due::Leave => self.leave(lump, t),
-            Due::Impact => self.throw_back(lump, t),
-            Due::Release => {
-                let drags = self.lumps[lump].state == BallState::Sliding;
-                if !(drags && self.try_on_wall(lump, BallState::Light, t)) {
-                    self.state.ball[tank] = BallState::Flying;
-                }
-            }
-            Due::Drag => {
-                if !self.try_on_wall(lump, BallState::Sliding, t) {
-                    self.state.ball[tank] = BallState::Light;
-                }
-            }
-            Due::Settle if self.lumps[lump].may_settle(&self.a, &self.w, &self.w_d) => {
-                let before = self.state;
-                if !self.settle(lump, t) {
-                    self.state = before;
-                    self.state.ball[tank] = BallState::Held;
-                }
-            }
-            Due::Settle if self.lumps[lump].state == BallState::Held => {
-                self.state.ball[tank] = BallState::Sliding;
-            }
-            Due::Settle | Due::Look => {}
-        }
+    fn lump(&self, lump: usize) -> &Lump {
+        &self.lumps[lump]
     }
 
-    /// An impulse on the craft about O, body axes, and on all that hangs on it. Returns the changes of V and w.
+    fn ball_state(&mut self, lump: usize) -> &mut BallState {
+        &mut self.state.ball[self.lumps[lump].tank]
+    }
+
+    fn ball(&mut self, lump: usize) -> &mut [f64] {
+        &mut self.state.x[index::ball(self.lumps[lump].tank)..][..6]
+    }
+
+    fn bob(&mut self, lump: usize, n: usize) -> &mut [f64] {
+        &mut self.state.x[index::bob(self.lumps[lump].tank, n)..][..6]
+    }
+
+    fn directions(&self, lump: usize) -> Directions {
+        directions(&self.state.x, self.lumps[lump].tank)
+    }
+
+    fn bobs_of(&self, lump: usize) -> impl Iterator<Item = BobNow<f64>> {
+        let tank = self.lumps[lump].tank;
+        self.bobs.iter().filter(move |bob| bob.tank == tank).map(Bob::now::<f64>)
+    }
+
+    fn points(&self) -> impl Iterator<Item = BobNow<f64>> {
+        let loose = self.lumps.iter().filter(|lump| lump.is_loose()).map(Lump::now::<f64>);
+        self.bobs.iter().map(Bob::now::<f64>).chain(loose)
+    }
+
+    fn rigid(&self) -> Rigid {
+        self.rigid
+    }
+
+    fn motion(&self) -> [&Vector; 3] {
+        [&self.a, &self.w, &self.w_d]
+    }
+
+    fn factors(&self) -> &Factors {
+        &self.factors
+    }
+
+    fn dissipated(&mut self) -> &mut f64 {
+        &mut self.state.x[index::DISSIPATED]
+    }
+
     fn kick(&mut self, impulse: [Vec3; 2], t: f64) -> [Vec3; 2] {
         self.evaluate_at(t);
         let [dv, dw] = self.factors.solve(impulse);
@@ -854,134 +879,16 @@ impl CraftMotion {
         [dv, dw]
     }
 
-    /// Kinetic energy and that of the centring springs in a frame in which O moves with `v`, body axes, after
-    /// [`CraftMotion::evaluate_at`]; there nothing cancels, however fast the craft is.
-    fn energy_with(&self, v: Vec3) -> f64 {
-        let (w, rigid) = (self.w[0], &self.rigid);
-        let spin = vector::dot(w, times(&rigid.inertia, w));
-        let along = vector::dot(v, vector::cross(w, rigid.moment));
-        let mut energy = (rigid.mass * vector::dot(v, v) + spin) / 2.0 + along;
-        let loose = self.lumps.iter().filter(|lump| lump.is_loose()).map(Lump::now::<f64>);
-        for point in self.bobs.iter().map(Bob::now::<f64>).chain(loose) {
-            let speed = add(v, add(vector::cross(w, point.rho), point.rate));
-            energy += point.m * vector::dot(speed, speed) / 2.0 + point.centring;
+    fn shift(&mut self, by: Vec3) {
+        let shift = times(&rotation(&self.q.get(0)), by);
+        for i in 0..3 {
+            self.state.x[index::POSITION + i] += shift[i];
         }
-        energy
     }
 
-    /// Mass of everything, and its velocity against O as O turns, body axes.
-    fn drift_of_center(&self) -> (f64, Vec3) {
-        let w = self.w[0];
-        let mut momentum = vector::cross(w, self.rigid.moment);
-        let mut mass = self.rigid.mass;
-        let loose = self.lumps.iter().filter(|lump| lump.is_loose()).map(Lump::now::<f64>);
-        for point in self.bobs.iter().map(Bob::now::<f64>).chain(loose) {
-            let speed = add(vector::cross(w, point.rho), point.rate);
-            momentum = add(momentum, scale(point.m, speed));
-            mass += point.m;
-        }
-        (mass, scale(1.0 / mass, momentum))
-    }
-
-    fn put_ball(&mut self, tank: usize, numbers: &[f64; 6]) {
-        self.state.x[index::ball(tank)..][..6].copy_from_slice(numbers);
-    }
-
-    /// The liquid leaves its bottom: its centre keeps its velocity; motions within it are caught by the shape, whose
-    /// moment of momentum the craft turns with.
-    fn leave(&mut self, lump: usize, t: f64) {
-        let (lump, before) = (&self.lumps[lump], self.energy_with([0.0; 3]));
-        let tank = lump.tank;
-        let bobs = self.bobs.iter().filter(|bob| bob.tank == tank).map(Bob::now::<f64>);
-        let center = lump.center_of(&directions(&self.state.x, tank));
-        let [rate, moment] = lump.stirred(center, bobs);
-        let numbers = lump.numbers(center, rate);
-        self.put_ball(tank, &numbers);
-        for n in 0..MODES {
-            self.state.x[index::bob(tank, n) + 3..][..3].fill(0.0);
-        }
-        self.state.ball[tank] = BallState::Flying;
-        let [dv, _] = self.kick([[0.0; 3], moment], t);
-        self.evaluate_at(t);
-        self.state.x[index::DISSIPATED] += before - self.energy_with(dv);
-    }
-
-    /// The wall throws the lump back, or holds it if it is slow and pressed to the wall.
-    fn throw_back(&mut self, lump: usize, t: f64) {
-        let before = self.state;
-        let (e, contact_speed) = self.lumps[lump].restitution();
-        if e * self.lumps[lump].approach() <= contact_speed {
-            self.strike(lump, 0.0, t);
-            let stays = [BallState::Sliding, BallState::Light];
-            if stays.into_iter().any(|state| self.try_on_wall(lump, state, t)) {
-                return;
-            }
-            self.state = before;
-            self.evaluate_at(t);
-        }
-        self.strike(lump, e, t);
-    }
-
-    /// Puts the lump on the wall in the state `on_wall`. Returns whether it is pressed there.
-    fn try_on_wall(&mut self, lump: usize, on_wall: BallState, t: f64) -> bool {
-        self.state.ball[self.lumps[lump].tank] = on_wall;
+    fn is_pressed(&mut self, lump: usize, t: f64) -> bool {
         self.evaluate_at(t);
         self.lumps[lump].is_pressed()
-    }
-
-    /// An impact with the coefficient of restitution `e`.
-    fn strike(&mut self, lump: usize, e: f64, t: f64) {
-        let struck = &self.lumps[lump];
-        let (tank, m, v_n) = (struck.tank, struck.m, struck.approach());
-        let impulse = struck.impulse(&self.factors, e);
-        self.kick(impulse, t);
-        let mut numbers = [0.0; 6];
-        numbers.copy_from_slice(&self.state.x[index::ball(tank)..][..6]);
-        let change = self.lumps[lump].numbers([0.0; 3], scale(-1.0 / m, impulse[0]));
-        for i in 3..6 {
-            numbers[i] += change[i];
-        }
-        self.put_ball(tank, &numbers);
-        // (1 + e) mu v_n = J
-        let j = libm::sqrt(vector::dot(impulse[0], impulse[0]));
-        self.state.x[index::DISSIPATED] += (1.0 - e) * j * v_n / 2.0;
-    }
-
-    /// The pendulums take the liquid back. Returns whether that costs energy; if not, the states are unusable.
-    fn settle(&mut self, lump: usize, t: f64) -> bool {
-        let before = self.energy_with([0.0; 3]);
-        let (mass, of_center) = self.drift_of_center();
-        let (lump, w) = (&self.lumps[lump], self.w[0]);
-        let tank = lump.tank;
-        let p = lump.hanging();
-        // The parts go to where they hang from, each with the velocity that it has: the whole turns on with the same angular
-        // momentum, about the same centre of mass.
-        let moved = sub(lump.center_of(&p), lump.position());
-        let velocity = add(vector::cross(w, lump.position()), lump.rate());
-        let lever = scale(-lump.m, vector::cross(moved, sub(velocity, of_center)));
-        let left_with = lump.shape(&directions(&self.state.x, tank)).inertia;
-        let grown = sub(times(&lump.shape(&p).inertia, w), times(&left_with, w));
-        let ([force, torque], rates) = lump.caught(&p, sub(lump.rate(), vector::cross(w, moved)));
-        let torque = add(torque, sub(lever, grown));
-        let shift = times(&rotation(&self.q.get(0)), scale(-lump.m / mass, moved));
-        let at_rest = lump.at_rest();
-        let x = &mut self.state.x;
-        for i in 0..3 {
-            x[index::POSITION + i] += shift[i];
-        }
-        for n in 0..MODES {
-            let at = index::bob(tank, n);
-            x[at..at + 3].copy_from_slice(&p[n]);
-            x[at + 3..at + 6].copy_from_slice(&rates[n]);
-        }
-        self.put_ball(tank, &at_rest);
-        self.state.ball[tank] = BallState::Settled;
-        let [dv, _] = self.kick([force, torque], t);
-        self.evaluate_at(t);
-        let loss = before - self.energy_with(dv);
-        self.state.x[index::DISSIPATED] += loss;
-        // To rounding.
-        loss >= -1e-14 * before
     }
 }
 

@@ -1,0 +1,220 @@
+//! Changes of a liquid between pendulums and lump (`lump.rs`), and the lump's impacts: impulses on what carries the tank, a craft
+//! or a host.
+//!
+//! Both ways momentum is kept, angular momentum about the common centre of mass, and energy is lost; see `lump.rs`.
+
+use taylor::space::Vector;
+use taylor::vector::{Vec3, add, cross, dot, scale, sub, times};
+
+use crate::bob::BobNow;
+use crate::lump::{Directions, Due, Lump};
+use crate::rigid::{Factors, Rigid};
+use crate::sizes::MODES;
+use crate::state::BallState;
+
+/// What carries tanks with a ball regime. `lump` is which of its lumps, `t` the time since the start of the call, s; vectors
+/// are in body axes.
+pub(crate) trait Carrier {
+    /// All that a change may alter.
+    type Memory;
+
+    fn memory(&self) -> Self::Memory;
+
+    fn restore(&mut self, memory: &Self::Memory);
+
+    /// The equations at `t`.
+    fn evaluate_at(&mut self, t: f64);
+
+    fn lump(&self, lump: usize) -> &Lump;
+
+    /// What its liquid does.
+    fn ball_state(&mut self, lump: usize) -> &mut BallState;
+
+    /// Its six numbers among the states.
+    fn ball(&mut self, lump: usize) -> &mut [f64];
+
+    /// The six numbers of a bob of its tank.
+    fn bob(&mut self, lump: usize, n: usize) -> &mut [f64];
+
+    /// The directions of its tank's bobs.
+    fn directions(&self, lump: usize) -> Directions;
+
+    /// The bobs of its tank, after [`Carrier::evaluate_at`].
+    fn bobs_of(&self, lump: usize) -> impl Iterator<Item = BobNow<f64>>;
+
+    /// All bobs and lumps that move, after [`Carrier::evaluate_at`].
+    fn points(&self) -> impl Iterator<Item = BobNow<f64>>;
+
+    /// The carrier with all rigid liquids.
+    fn rigid(&self) -> Rigid;
+
+    /// a, w, w'
+    fn motion(&self) -> [&Vector; 3];
+
+    /// Of the matrix with all that hangs on the carrier.
+    fn factors(&self) -> &Factors;
+
+    /// Energy dissipated since the start, J.
+    fn dissipated(&mut self) -> &mut f64;
+
+    /// An impulse on the carrier about O, and on all that hangs on it. Returns the changes of V and w.
+    fn kick(&mut self, impulse: [Vec3; 2], t: f64) -> [Vec3; 2];
+
+    /// Moves the carrier, if that can be.
+    fn shift(&mut self, by: Vec3);
+
+    /// Whether the wall presses on the lump in its present state.
+    fn is_pressed(&mut self, lump: usize, t: f64) -> bool;
+
+    /// Does what is due.
+    #[inline(never)]
+    fn change(&mut self, lump: usize, due: Due, t: f64) {
+        self.evaluate_at(t);
+        match due {
+            Due::Leave => self.leave(lump, t),
+            Due::Impact => self.throw_back(lump, t),
+            Due::Release => {
+                let drags = self.lump(lump).state == BallState::Sliding;
+                if !(drags && self.try_on_wall(lump, BallState::Light, t)) {
+                    *self.ball_state(lump) = BallState::Flying;
+                }
+            }
+            Due::Drag => {
+                if !self.try_on_wall(lump, BallState::Sliding, t) {
+                    *self.ball_state(lump) = BallState::Light;
+                }
+            }
+            Due::Settle if self.may_settle(lump) => {
+                let before = self.memory();
+                if !self.settle(lump, t) {
+                    self.restore(&before);
+                    *self.ball_state(lump) = BallState::Held;
+                }
+            }
+            Due::Settle if self.lump(lump).state == BallState::Held => {
+                *self.ball_state(lump) = BallState::Sliding;
+            }
+            Due::Settle | Due::Look => {}
+        }
+    }
+
+    fn may_settle(&self, lump: usize) -> bool {
+        let [a, w, w_d] = self.motion();
+        self.lump(lump).may_settle(a, w, w_d)
+    }
+
+    /// Kinetic energy and that of the centring springs in a frame in which O moves with `v`, body axes, after
+    /// [`Carrier::evaluate_at`]; there nothing cancels, however fast the carrier is.
+    fn energy_with(&self, v: Vec3) -> f64 {
+        let (w, rigid) = (self.motion()[1][0], self.rigid());
+        let spin = dot(w, times(&rigid.inertia, w));
+        let along = dot(v, cross(w, rigid.moment));
+        let mut energy = (rigid.mass * dot(v, v) + spin) / 2.0 + along;
+        for point in self.points() {
+            let speed = add(v, add(cross(w, point.rho), point.rate));
+            energy += point.m * dot(speed, speed) / 2.0 + point.centring;
+        }
+        energy
+    }
+
+    /// Mass of everything, and its velocity against O as O turns, body axes.
+    fn drift_of_center(&self) -> (f64, Vec3) {
+        let (w, rigid) = (self.motion()[1][0], self.rigid());
+        let mut momentum = cross(w, rigid.moment);
+        let mut mass = rigid.mass;
+        for point in self.points() {
+            let speed = add(cross(w, point.rho), point.rate);
+            momentum = add(momentum, scale(point.m, speed));
+            mass += point.m;
+        }
+        (mass, scale(1.0 / mass, momentum))
+    }
+
+    /// The liquid leaves its bottom: its centre keeps its velocity; motions within it are caught by the shape, whose
+    /// moment of momentum the carrier turns with.
+    fn leave(&mut self, lump: usize, t: f64) {
+        let before = self.energy_with([0.0; 3]);
+        let center = self.lump(lump).center_of(&self.directions(lump));
+        let [rate, moment] = self.lump(lump).stirred(center, self.bobs_of(lump));
+        let numbers = self.lump(lump).numbers(center, rate);
+        self.ball(lump).copy_from_slice(&numbers);
+        for n in 0..MODES {
+            self.bob(lump, n)[3..].fill(0.0);
+        }
+        *self.ball_state(lump) = BallState::Flying;
+        let [dv, _] = self.kick([[0.0; 3], moment], t);
+        self.evaluate_at(t);
+        let loss = before - self.energy_with(dv);
+        *self.dissipated() += loss;
+    }
+
+    /// The wall throws the lump back, or holds it if it is slow and pressed to the wall.
+    fn throw_back(&mut self, lump: usize, t: f64) {
+        let before = self.memory();
+        let (e, contact_speed) = self.lump(lump).restitution();
+        if e * self.lump(lump).approach() <= contact_speed {
+            self.strike(lump, 0.0, t);
+            let stays = [BallState::Sliding, BallState::Light];
+            if stays.into_iter().any(|state| self.try_on_wall(lump, state, t)) {
+                return;
+            }
+            self.restore(&before);
+            self.evaluate_at(t);
+        }
+        self.strike(lump, e, t);
+    }
+
+    /// Puts the lump on the wall in the state `on_wall`. Returns whether it is pressed there.
+    fn try_on_wall(&mut self, lump: usize, on_wall: BallState, t: f64) -> bool {
+        *self.ball_state(lump) = on_wall;
+        self.is_pressed(lump, t)
+    }
+
+    /// An impact with the coefficient of restitution `e`.
+    fn strike(&mut self, lump: usize, e: f64, t: f64) {
+        let struck = self.lump(lump);
+        let (m, v_n) = (struck.m, struck.approach());
+        let impulse = struck.impulse(self.factors(), e);
+        self.kick(impulse, t);
+        let change = self.lump(lump).numbers([0.0; 3], scale(-1.0 / m, impulse[0]));
+        let numbers = self.ball(lump);
+        for i in 3..6 {
+            numbers[i] += change[i];
+        }
+        // (1 + e) mu v_n = J
+        let j = libm::sqrt(dot(impulse[0], impulse[0]));
+        *self.dissipated() += (1.0 - e) * j * v_n / 2.0;
+    }
+
+    /// The pendulums take the liquid back. Returns whether that costs energy; if not, the states are unusable.
+    fn settle(&mut self, lump: usize, t: f64) -> bool {
+        let before = self.energy_with([0.0; 3]);
+        let (mass, of_center) = self.drift_of_center();
+        let (settling, w) = (self.lump(lump), self.motion()[1][0]);
+        let p = settling.hanging();
+        // The parts go to where they hang from, each with the velocity that it has: the whole turns on with the same angular
+        // momentum, about the same centre of mass.
+        let moved = sub(settling.center_of(&p), settling.position());
+        let velocity = add(cross(w, settling.position()), settling.rate());
+        let lever = scale(-settling.m, cross(moved, sub(velocity, of_center)));
+        let left_with = settling.shape(&self.directions(lump)).inertia;
+        let grown = sub(times(&settling.shape(&p).inertia, w), times(&left_with, w));
+        let ([force, torque], rates) = settling.caught(&p, sub(settling.rate(), cross(w, moved)));
+        let torque = add(torque, sub(lever, grown));
+        let (share, at_rest) = (-settling.m / mass, settling.at_rest());
+        self.shift(scale(share, moved));
+        for n in 0..MODES {
+            let bob = self.bob(lump, n);
+            bob[..3].copy_from_slice(&p[n]);
+            bob[3..].copy_from_slice(&rates[n]);
+        }
+        self.ball(lump).copy_from_slice(&at_rest);
+        *self.ball_state(lump) = BallState::Settled;
+        let [dv, _] = self.kick([force, torque], t);
+        self.evaluate_at(t);
+        let loss = before - self.energy_with(dv);
+        *self.dissipated() += loss;
+        // To rounding.
+        loss >= -1e-14 * before
+    }
+}
