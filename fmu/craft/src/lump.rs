@@ -690,16 +690,18 @@ impl Lump {
         self.settling(1, a, w, w_d).iter().all(|(x, fine)| x[0] > -fine)
     }
 
-    /// Functions that cross zero at events, for hosts that integrate themselves; `heights` are the bobs' p_z.
-    pub fn indicators(
+    /// Functions that cross zero at events, for hosts that integrate themselves; `bobs` are the tank's. They cross where
+    /// [`Lump::next`] finds the event: with directions of unit length, which a host's need not be.
+    pub fn indicators<'a>(
         &self,
         [a, w, w_d]: [&Vector; 3],
-        heights: impl Iterator<Item = f64>,
+        bobs: impl Iterator<Item = &'a Bob>,
     ) -> [f64; 2] {
         match self.state {
             BallState::Settled => {
                 let above = self.axial(1, a, w, w_d)[0] - self.lowest;
-                [heights.fold(above, |least, z| least.min(-COS_45 - z)), 1.0]
+                let upright = |bob: &Bob| -dot(self.e, bob.p[0]) - COS_45;
+                [bobs.fold(above, |least, bob| least.min(upright(bob))), 1.0]
             }
             BallState::Flying => [1.0 - dot(self.x_0, times(&self.d, self.x_0)), 1.0],
             BallState::Held => {

@@ -789,9 +789,8 @@ impl CraftMotion {
         self.evaluate(inputs);
         for lump in &self.lumps {
             let i = lump.tank;
-            let heights = self.bobs.iter().filter(|bob| bob.tank == i);
-            let heights = heights.map(|bob| self.state.x[index::bob(i, bob.mode) + 2]);
-            let now = lump.indicators([&self.a, &self.w, &self.w_d], heights);
+            let bobs = self.bobs.iter().filter(|bob| bob.tank == i);
+            let now = lump.indicators([&self.a, &self.w, &self.w_d], bobs);
             indicators[2 * i..2 * i + 2].copy_from_slice(&now);
         }
     }

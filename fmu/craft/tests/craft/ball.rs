@@ -113,6 +113,13 @@ fn a_host_sees_a_bob_pass_45_degrees() {
             let expected = if tank == 1 { hangs } else { upright };
             assert!((seen[2] - expected).abs() < 1e-15, "{tank} {mode} {angle}: {seen:?}");
             assert_eq!([seen[0], seen[1], seen[3]], [1.0; 3]);
+            // A host's directions need not be of unit length.
+            let mut x = craft.continuous_states();
+            x[index::bob(1, 0)..index::bob(2, 0)].iter_mut().for_each(|x| *x *= 1.5);
+            craft.set_continuous_states(&x);
+            let mut longer = [0.0; 2 * TANKS];
+            craft.event_indicators(&inputs, &mut longer);
+            assert!((longer[2] - expected).abs() < 1e-15, "{tank} {mode} {angle}: {longer:?}");
         }
     }
 }
