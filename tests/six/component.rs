@@ -498,6 +498,7 @@ impl SloshTank {
         inputs_named.push("mass_flow".into());
         let mut outputs: Vec<String> = elements("force", 3).chain(elements("torque", 3)).collect();
         outputs.extend(elements("bias", 6).chain(elements("added_mass", TRIANGLE)));
+        outputs.extend(elements("impulse", 6));
         outputs.extend(["dissipated", "tank.liquid", "mass"].map(String::from));
         outputs.extend(elements("center_of_mass", 3).chain(rows("inertia", (3, 3))));
         outputs.extend(tank_outputs("tank."));
@@ -538,6 +539,7 @@ impl SloshTank {
         SloshTankOutputs {
             bias: next.array(),
             added_mass: next.array(),
+            impulse: next.array(),
             dissipated: next.one(),
             liquid: next.one(),
             mass: next.one(),

@@ -229,6 +229,42 @@ fn liquid_that_leaves_its_bottom_moves_through_the_packed_fmu_as_in_the_crate() 
     assert_eq!(seen.last(), Some(&craft::BallState::Settled));
 }
 
+/// The same of a tank on somebody else's craft, and of the impulses that this gets.
+#[test]
+fn liquid_that_leaves_its_bottom_gives_its_host_the_impulses_of_the_crate() {
+    let mut p = TankParameters { host: Some(Parameters::default().craft), ..Default::default() };
+    p.tank.ball.travel = 0.6;
+    (p.tank.ball.drag, p.tank.ball.contact_speed) = (0.2, 0.05);
+    p.tank.position[0] = 0.1;
+    let given = |x: f64, z: f64| TankInputs {
+        a: Ramp::held([x, 0.0, z]),
+        omega: [0.01, 0.0, 0.0],
+        ..TankInputs::default()
+    };
+    let pieces = [(given(0.0, -0.1), 120), (given(0.01, 0.0), 20), (given(0.0, 0.7), 200)];
+    let mut packed = SloshTank::new(&p, &pieces[0].0, 0.0, 1e-8).unwrap();
+    let mut own = craft::SloshTank::new(&p, &pieces[0].0, 0.0, 1e-8).unwrap();
+    let (mut seen, mut impulses) = (Vec::new(), 0);
+    for (u, steps) in &pieces {
+        for _ in 0..*steps {
+            let before = own.outputs(u).impulse;
+            packed.step(u, 0.1).unwrap();
+            own.step(u, 0.1).unwrap();
+            let (want, got) = (own.outputs(u), packed.outputs(u));
+            assert_eq!((got.impulse, got.bias), (want.impulse, want.bias));
+            assert_eq!(got.added_mass, want.added_mass);
+            seen.push(want.tank.ball_state);
+            impulses += usize::from(before != want.impulse);
+        }
+        assert_eq!(packed.continuous_states(), own.continuous_states());
+    }
+    for state in [craft::BallState::Flying, craft::BallState::Sliding] {
+        assert!(seen.contains(&state), "{state:?}");
+    }
+    assert_eq!(seen.last(), Some(&craft::BallState::Settled));
+    assert!(impulses >= 4, "{impulses}");
+}
+
 /// `canInterpolateInputs` is of all Real inputs, so that hosts set the derivatives of all: omega's is taken, and what omega
 /// does within the step is omega_dot's doing.
 #[test]

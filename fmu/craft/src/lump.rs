@@ -446,6 +446,33 @@ impl Lump {
         [force, cross(Self::of(&self.rho), force)]
     }
 
+    /// G and G.G, of a lump that slides.
+    fn gradient<T: Number>(&self) -> (Vec3<T>, T) {
+        let g = times(&self.d.map(constant), sub(Self::of(&self.rho), constant(self.center)));
+        (g, dot(g, g))
+    }
+
+    /// The wrench at a = 0 and w' = 0 (with w' = 0, too, in N).
+    pub fn bias<T: Number>(&self, w: Vec3<T>) -> [Vec3<T>; 2] {
+        if !self.slides() {
+            return [constant([0.0; 3]); 2];
+        }
+        let (rho, x_d) = (Self::of::<T>(&self.rho), Self::of::<T>(&self.x_d));
+        let (g, squared) = self.gradient::<T>();
+        let twice = add(add(x_d, x_d), cross(w, rho));
+        let bent = dot(x_d, times(&self.d.map(constant), x_d));
+        let pull = (bent - dot(g, cross(w, twice))) * squared.recip() * self.m;
+        let force = add(scale(pull, g), scale(T::constant(self.m * self.drag()), x_d));
+        [force, cross(rho, force)]
+    }
+
+    /// m and u of m u u^T, the added mass of a lump that slides: m/G.G and [G; rho x G].
+    pub fn added_mass<T: Number>(&self) -> Option<(T, [T; 6])> {
+        let (g, squared) = self.gradient::<T>();
+        let along = || along_rod(g, Self::of::<T>(&self.rho));
+        self.slides().then(|| (squared.recip() * self.m, along()))
+    }
+
     /// What the outputs need.
     pub fn now<T: Number>(&self) -> BobNow<T> {
         BobNow {

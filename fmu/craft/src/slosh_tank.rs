@@ -45,6 +45,29 @@
 //!
 //! A tank that drains or has planar modes (`contents.rs`) moves by extrapolation instead of power series, as a craft does. A
 //! jump of its flow is an impulse on the host, which a force cannot be; it is left out, here and in the bobs.
+//!
+//! **Liquid that leaves its bottom** (`lump.rs`, `handover.rs`) gives its host impulses. M_a and bias are those of what the liquid
+//! is: in flight of the inertia that turns with the tank alone, on the wall with m u u^T, u = [n; rho x n], besides. The host's matrix M_h
+//! is given with its mass properties, and with it what an impulse makes of the host,
+//!
+//! ```text
+//! [dV; dw] = (M_h + what of the liquid hangs on it)^-1 [J n; rho x J n],   P = M_h [dV; dw]
+//! ```
+//!
+//! P is what the host's own momentum, about O, changes by, and the liquid's by -P: it adds M_h^-1 P to V and w. The tank goes on as if it
+//! had, within a step with w + dw; V is in none of its equations.
+//!
+//! Where the liquid changes within a step, the a and w' given are those of a host that still answers to what the liquid was. From
+//! the first change to the step's end the tank moves with what the host would have, a^ and w'^, at a rest of the forces on the host that
+//! stays what it was then,
+//!
+//! ```text
+//! rest = M_h [a; w'] + [w x (w x S_h); w x (I_h w)] - [F; torque]
+//! (M_h + M_a) [a^; w'^] = rest - [w x (w x S_h); w x (I_h w)] + bias
+//! ```
+//!
+//! and M_h times the integral of [a^ - a; w'^ - w'], which the host lacks, goes into P. So momentum is not lost between two
+//! communication points.
 
 use alloc::boxed::Box;
 use alloc::format;
@@ -58,10 +81,12 @@ use taylor::integrator::{self, MAX_MAGNITUDE, Motion, RATE_FLOOR, Steps};
 use taylor::number::{Dual, Number};
 use taylor::series::{self, ORDER, Series, ZERO};
 use taylor::space::{self, Pair, Vector, ZERO_PAIR, ZERO_VECTOR, products};
-use taylor::vector::{Mat3, Vec3, add, constant, cross, dot, largest, part, scale, times};
+use taylor::vector::{Mat3, Vec3, add, constant, cross, dot, largest, part, scale, sub, times};
 
 use crate::bob::{Bob, BobNow};
 use crate::contents::{Drains, MountedTank, Outflow, has_diverged, normalise_bobs, vec_of};
+use crate::handover::Carrier;
+use crate::lump::{Directions, Due, Lump};
 use crate::motion::{SCALE_TIME, twice_crossed};
 use crate::outputs::{MassProperties, TankOutputs};
 use crate::parameters::{
@@ -70,11 +95,11 @@ use crate::parameters::{
 use crate::ranges;
 use crate::rigid::{Factors, Mat6, Rigid, add_rank_one, along_rod, largest_eigenvalue};
 use crate::sizes::MODES;
-use crate::state::{Line, Ramp, Ranges, has_direction};
+use crate::state::{BallState, Line, Ramp, Ranges, has_direction};
 
-/// Number of continuous states of a tank: p and p' of each mode, then the dissipated energy and the
-/// mass of liquid.
-pub const TANK_STATES: usize = 6 * MODES + 2;
+/// Number of continuous states of a tank: p and p' of each mode, then the dissipated energy, the
+/// mass of liquid, and the lump's position (m) and rate (m/s) from and against the tank's origin, tank axes.
+pub const TANK_STATES: usize = 6 * MODES + 8;
 
 /// Number of a tank's inputs: a, omega, omega_dot, mass_flow.
 pub const TANK_INPUTS: usize = 10;
@@ -84,6 +109,7 @@ pub const TRIANGLE: usize = 21;
 
 const DISSIPATED: usize = 6 * MODES;
 const LIQUID: usize = DISSIPATED + 1;
+const BALL: usize = LIQUID + 1;
 
 /// What `bias` and `added_mass` stand for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -111,7 +137,8 @@ pub struct TankParameters {
     pub tank: Tank,
     /// What the host does with `bias` and `added_mass`.
     pub coupling: Coupling,
-    /// The host's mass properties without this tank, for [`SloshTank::coupling_ratio`] alone.
+    /// The host's mass properties without this tank: for [`SloshTank::coupling_ratio`], and what impulses of a tank with a
+    /// ball regime do, which has to know them.
     pub host: Option<Craft>,
     /// The integrator's steps that one step may take, at least 1.
     pub max_steps: usize,
@@ -140,10 +167,28 @@ impl TankParameters {
             problems.extend(self.uneven_problem());
         }
         if self.tank.ball.travel > 0.0 {
-            // An impact is an impulse on the host, which a force cannot be.
-            problems.push("tank.ball.travel (allowed: 0 on somebody else's craft)".into());
+            problems.extend(self.ball_problems().into_iter().map(String::from));
         }
         problems
+    }
+
+    /// What a ball regime does not go with on somebody else's craft.
+    fn ball_problems(&self) -> Vec<&'static str> {
+        let drains = self.tank.fill.points > 0;
+        let all = [
+            (
+                self.host.is_none(),
+                "tank.ball.travel with host.mass = 0 (allowed: one of them 0 and the other not; what an impact is follows \
+                 from the mass and the inertia that it meets, host.mass to host.Jyz)",
+            ),
+            (
+                self.coupling != Coupling::Split,
+                "tank.ball.travel with coupling = lumped or rigid_body (allowed: coupling = split; liquid that flies adds no \
+                 mass to the host)",
+            ),
+            (drains, "tank.ball.travel with tank.fill.points (allowed: one of them 0)"),
+        ];
+        all.into_iter().filter(|(is_so, _)| *is_so).map(|(_, said)| said).collect()
     }
 
     /// Rigid liquid that is less than nothing, or off by more than the rest can bear, where it is not alike all around the axis.
@@ -196,6 +241,9 @@ pub struct SloshTankOutputs {
     pub bias: [f64; 6],
     /// Added mass, kg, kg m, kg m2: upper triangle by rows; see [`Coupling`].
     pub added_mass: [f64; TRIANGLE],
+    /// Impulses of a liquid in the ball regime on the host since the start, N s, and about O, N m s, each in the host's axes at
+    /// its time: the host adds M_host^-1 of what they change by to its velocity and rate. 0 in derivatives.
+    pub impulse: [f64; 6],
     /// Energy dissipated by the liquid since the start, J.
     pub dissipated: f64,
     /// The state it is in a tank that drains, kg.
@@ -215,19 +263,27 @@ pub struct TankState {
     x: [f64; TANK_STATES],
     /// Ranges of the motion since the last event, for hosts that integrate themselves.
     ranges: Ranges,
+    /// What the liquid does.
+    ball: BallState,
+    /// [`SloshTankOutputs::impulse`].
+    impulse: [f64; 6],
 }
 
 impl TankState {
     /// Length of the flat form.
-    pub const WORDS: usize = 2 + TANK_STATES;
+    pub const WORDS: usize = Self::REALS + 2;
+
+    /// How many of the words are real numbers; ranges and state of the liquid follow.
+    const REALS: usize = 7 + TANK_STATES;
 
     /// The state as plain words, for saving.
     pub fn to_words(&self) -> [u64; Self::WORDS] {
         let mut words = [self.time.to_bits(); Self::WORDS];
-        for (word, number) in words[1..].iter_mut().zip(self.x) {
+        for (word, number) in words[1..].iter_mut().zip(self.x.iter().chain(&self.impulse)) {
             *word = number.to_bits();
         }
-        words[Self::WORDS - 1] = self.ranges.to_word();
+        words[Self::REALS] = self.ranges.to_word();
+        words[Self::REALS + 1] = self.ball as u64;
         words
     }
 
@@ -235,10 +291,13 @@ impl TankState {
     pub fn from_words(words: &[u64; Self::WORDS]) -> Option<TankState> {
         let numbers = words.map(f64::from_bits);
         let x: [f64; TANK_STATES] = core::array::from_fn(|i| numbers[1 + i]);
+        let impulse = core::array::from_fn(|i| numbers[1 + TANK_STATES + i]);
         let bobs = (0..MODES).all(|n| has_direction(&part(&x, 6 * n)));
-        let is_state = numbers[0].is_finite() && x.iter().all(|x| x.abs() < MAX_MAGNITUDE) && bobs;
-        let ranges = Ranges::from_word(words[Self::WORDS - 1])?;
-        is_state.then_some(TankState { time: numbers[0], x, ranges })
+        let bounded = numbers[1..Self::REALS].iter().all(|x| x.abs() < MAX_MAGNITUDE);
+        let ranges = Ranges::from_word(words[Self::REALS])?;
+        let ball = BallState::ALL.into_iter().find(|it| *it as u64 == words[Self::REALS + 1])?;
+        let is_state = numbers[0].is_finite() && bounded && bobs;
+        is_state.then_some(TankState { time: numbers[0], x, ranges, ball, impulse })
     }
 }
 
@@ -256,6 +315,27 @@ struct TankMotion {
     w_d: Vector,
     dissipation: Series,
     /// 1 over what is allowed of v
+    inv_allowed: f64,
+    /// If the tank has a ball regime.
+    ball: Option<Loose>,
+}
+
+/// What a tank with a ball regime has besides.
+#[derive(Clone, Debug)]
+struct Loose {
+    lump: Lump,
+    /// The bobs, while they are not in use.
+    parked: Vec<Bob>,
+    /// The host without the tank, and the factors of its matrix with all of the tank that hangs on it.
+    host: Rigid,
+    factors: Factors,
+    /// What impulses have changed w by that the host does not know yet.
+    turned: Vec3,
+    /// The rest of the forces on the host, from before the first change within a step.
+    rest: Option<[Vec3; 2]>,
+    /// What happens at the end of the expansion.
+    due: Option<Due>,
+    /// 1 over what is allowed of the lump's u.
     inv_allowed: f64,
 }
 
@@ -284,7 +364,7 @@ type Acting<T> = ([Vec3<T>; 3], T);
 
 /// Scales of directions, which are 1, and of the bobs' rates, from where these stand in the states.
 fn scales(swing: impl Fn(usize) -> f64) -> [f64; TANK_STATES] {
-    // The dissipated energy and the liquid follow from the rest.
+    // The dissipated energy and the liquid follow from the rest, and there is no lump.
     let mut scale = [f64::INFINITY; TANK_STATES];
     for at in (0..DISSIPATED).step_by(6) {
         scale[at..at + 3].fill(1.0);
@@ -365,15 +445,22 @@ fn along(
 impl Motion for TankMotion {
     #[inline(always)]
     fn start(&mut self, t: f64) {
+        let by_impulses = if self.ball.is_some() { Some(self.start_ball()) } else { None };
         let TankInputs { a, omega_dot, .. } = &self.inputs;
         (self.a[0], self.a[1]) = (a.at(t), a.slope);
         (self.w_d[0], self.w_d[1]) = (omega_dot.at(t), omega_dot.slope);
-        let turned = self.inputs.omega_at(t);
+        let mut turned = self.inputs.omega_at(t);
+        if let Some(by_impulses) = by_impulses {
+            turned = add(turned, by_impulses);
+        }
         (self.w[0], self.w[1]) = (turned, self.w_d[0]);
         self.w[2] = scale(0.5, omega_dot.slope);
         for bob in &mut self.bobs {
             let at = 6 * bob.mode;
             bob.start(self.state.x[at..at + 6].try_into().unwrap(), turned);
+        }
+        if by_impulses.is_some() {
+            self.start_lump();
         }
     }
 
@@ -388,13 +475,29 @@ impl Motion for TankMotion {
         let swing =
             self.bobs.iter().map(Bob::rate_scale).fold(0.0, |a, b| if b > a { b } else { a });
         self.inv_allowed = 1.0 / (allowed * (RATE_FLOOR + largest(self.w[0]) + swing));
+        if let Some(ball) = &mut self.ball {
+            let speed = ball.lump.speed_scale(self.w[0], h.min(SCALE_TIME));
+            ball.inv_allowed = 1.0 / (allowed * RATE_FLOOR.max(speed));
+        }
         h
     }
 
     #[inline(always)]
     fn coefficient_norm(&self, n: usize) -> f64 {
         let larger = |a: f64, b: f64| if b > a { b } else { a };
-        self.bobs.iter().map(|bob| bob.coefficient_norm(n)).fold(0.0, larger) * self.inv_allowed
+        let norm = self.bobs.iter().map(|bob| bob.coefficient_norm(n)).fold(0.0, larger)
+            * self.inv_allowed;
+        match &self.ball {
+            Some(ball) if ball.lump.is_loose() => {
+                larger(norm, ball.lump.coefficient_norm(n) * ball.inv_allowed)
+            }
+            _ => norm,
+        }
+    }
+
+    #[inline(always)]
+    fn event(&mut self, n: usize, h: f64) -> Option<f64> {
+        if self.ball.is_none() { None } else { self.next_of_ball(n, h) }
     }
 
     #[inline(always)]
@@ -406,6 +509,9 @@ impl Motion for TankMotion {
         _: &mut Steps,
     ) -> Result<ControlFlow<f64>, StepError> {
         let w = space::value(&self.w, 2, h);
+        if self.ball.is_some() {
+            self.lag(h, t);
+        }
         let x = &mut self.state.x;
         x[DISSIPATED] += series::integrals([&self.dissipation], n - 1, h)[0];
         let mut finite = x[DISSIPATED].abs() < MAX_MAGNITUDE && largest(w) < MAX_MAGNITUDE;
@@ -415,11 +521,25 @@ impl Motion for TankMotion {
             finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
             x[at..at + 6].copy_from_slice(&moved);
         }
+        if let Some(lump) = loose(&mut self.ball) {
+            let moved = lump.at(x[BALL..].try_into().unwrap(), n, h, w);
+            finite &= moved.iter().all(|x| x.abs() < MAX_MAGNITUDE);
+            x[BALL..].copy_from_slice(&moved);
+        }
         if !finite {
             return Err(StepError::NotFinite { time: self.state.time + t });
         }
+        if let Some(due) = self.ball.as_mut().and_then(|ball| ball.due.take()) {
+            self.answer(due, t);
+        }
         Ok(ControlFlow::Continue(()))
     }
+}
+
+/// The liquid as a lump, if it is one now.
+#[inline(always)]
+fn loose(ball: &mut Option<Loose>) -> Option<&mut Lump> {
+    ball.as_mut().map(|ball| &mut ball.lump).filter(|lump| lump.is_loose())
 }
 
 impl TankMotion {
@@ -442,6 +562,9 @@ impl TankMotion {
             let at = 6 * bob.mode;
             let [x, dx] = [&self.state.x, dx].map(|x| x[at..at + 6].try_into().unwrap());
             bob.seed_direction(x, dx, self.w[0], dw);
+        }
+        if let Some(lump) = loose(&mut self.ball) {
+            lump.seed_direction(dx[BALL..].try_into().unwrap(), self.w[0], dw);
         }
         self.rates_of::<1>();
     }
@@ -470,6 +593,9 @@ impl TankMotion {
             bob.accelerate::<N>(self.a[N], self.w_d[N]);
             dissipation += bob.dissipation::<N>();
         }
+        if self.ball.is_some() {
+            dissipation += self.rates_of_ball(N);
+        }
         self.dissipation[N] = dissipation;
     }
 
@@ -479,8 +605,291 @@ impl TankMotion {
             let at = 6 * bob.mode;
             rate[at..at + 6].copy_from_slice(&bob.rates::<N>(&self.w, &self.w_d));
         }
+        if let Some(Loose { lump, .. }) = &self.ball
+            && lump.is_loose()
+        {
+            rate[BALL..].copy_from_slice(&lump.rates(N, &self.w, &self.w_d));
+        }
         rate[DISSIPATED] = self.dissipation[N];
         rate
+    }
+
+    /// What the outputs follow from, of coefficients 0 and 1.
+    fn parts<T: Number>(&self) -> Parts<T> {
+        let of = |a: &[Vec3]| -> Vec3<T> { [0, 1, 2].map(|i| T::of(a[0][i], a[1][i])) };
+        let (a, w, w_d) = (of(&self.a), of(&self.w), of(&self.w_d));
+        let zero = constant::<T>([0.0; 3]);
+        let rigid = self.rigid.lift::<T>();
+        let mut parts = Parts {
+            motion: [a, w, w_d],
+            wrench: rigid.inertial_wrench(a, w, w_d).map(|half| half.map(|x| -x)),
+            loads: [zero; 2],
+            matrix: self.rigid.mass_matrix().map(|row| row.map(T::constant)),
+            rigid,
+            bobs: [(); MODES].map(|()| None),
+            lump: None,
+            ball_state: self.state_of_ball(),
+        };
+        for bob in &self.bobs {
+            parts.wrench = plus(parts.wrench, bob.wrench());
+            parts.loads = plus(parts.loads, bob.bias(w));
+            add_added_mass(&mut parts.matrix, bob);
+            parts.bobs[bob.mode] = Some(bob.now::<T>());
+        }
+        if let Some(Loose { lump, .. }) = &self.ball
+            && lump.is_loose()
+        {
+            parts.wrench = plus(parts.wrench, lump.wrench());
+            parts.loads = plus(parts.loads, lump.bias(w));
+            if let Some((m, u)) = lump.added_mass() {
+                add_square(&mut parts.matrix, m, &u);
+            }
+            parts.lump = Some(lump.now::<T>());
+        }
+        parts
+    }
+}
+
+// Liquid that leaves its bottom (lump.rs, handover.rs). Apart from the equations of a tank without.
+impl TankMotion {
+    /// Rigid liquid and bobs as the liquid's state wants them. Does not allocate. Returns what w has changed by.
+    #[inline(never)]
+    fn start_ball(&mut self) -> Vec3 {
+        let Some(ball) = &mut self.ball else { return [0.0; 3] };
+        let was_loose = ball.lump.is_loose();
+        ball.lump.state = self.state.ball;
+        if ball.lump.is_loose() {
+            // Its directions are those with which it has left.
+            self.rigid = ball.lump.shape(&directions(&self.state.x));
+            ball.parked.append(&mut self.bobs);
+        } else if was_loose {
+            self.rigid = ball.lump.rigid;
+            self.bobs.append(&mut ball.parked);
+        }
+        ball.turned
+    }
+
+    /// Coefficient n of what the lump does, and n + 1 of its motion. Returns what it dissipates.
+    #[inline(never)]
+    fn rates_of_ball(&mut self, n: usize) -> f64 {
+        let Some(lump) = loose(&mut self.ball) else { return 0.0 };
+        lump.reaction(n, &self.w, &self.w_d);
+        lump.accelerate(n, self.a[n], self.w_d[n]);
+        lump.dissipation(n)
+    }
+
+    #[inline(never)]
+    fn next_of_ball(&mut self, n: usize, h: f64) -> Option<f64> {
+        let ball = self.ball.as_mut()?;
+        let next = ball.lump.next(n, h, [&self.a, &self.w, &self.w_d], self.bobs.iter());
+        ball.due = next.map(|(_, due)| due);
+        next.map(|(t, _)| t)
+    }
+
+    /// Does what is due `t` after the start of the call.
+    #[inline(never)]
+    fn answer(&mut self, due: Due, t: f64) {
+        if self.loose().rest.is_none() {
+            self.evaluate_at(t);
+            let [a, w, w_d] = self.motion().map(|series| series[0]);
+            let taken = self.loose().host.inertial_wrench(a, w, w_d);
+            let wrench = self.parts::<f64>().wrench;
+            self.loose_mut().rest = Some([0, 1].map(|i| sub(taken[i], wrench[i])));
+        }
+        self.change(0, due, t);
+    }
+
+    /// The lump at the start of an expansion; after a change, a and w' of the host's answer to it, held.
+    #[inline(never)]
+    fn start_lump(&mut self) {
+        let w = self.w[0];
+        if let Some(lump) = loose(&mut self.ball) {
+            lump.start(self.state.x[BALL..].try_into().unwrap(), w);
+        }
+        let Some(rest) = self.loose().rest else { return };
+        self.rates_of::<0>();
+        self.factorise();
+        let turning = self.rigid().inertial_wrench([0.0; 3], w, [0.0; 3]);
+        let loads = self.parts::<f64>().loads;
+        let right = [0, 1].map(|i| add(sub(rest[i], turning[i]), loads[i]));
+        [self.a[0], self.w_d[0]] = self.loose().factors.solve(right);
+        (self.a[1], self.w_d[1]) = ([0.0; 3], [0.0; 3]);
+        (self.w[1], self.w[2]) = (self.w_d[0], [0.0; 3]);
+    }
+
+    /// Over the `h` before `t`, adds what the host does not do of its answer.
+    #[inline(never)]
+    fn lag(&mut self, h: f64, t: f64) {
+        if self.loose().rest.is_none() {
+            return;
+        }
+        let middle = t - h / 2.0;
+        let TankInputs { a, omega_dot, .. } = &self.inputs;
+        let dv = scale(h, sub(self.a[0], a.at(middle)));
+        let dw = scale(h, sub(self.w_d[0], omega_dot.at(middle)));
+        self.give(dv, dw);
+    }
+
+    /// Adds an impulse that changes the host's velocity and rate so.
+    fn give(&mut self, dv: Vec3, dw: Vec3) {
+        let ball = self.loose_mut();
+        ball.turned = add(ball.turned, dw);
+        let impulse = ball.host.inertial_wrench(dv, [0.0; 3], dw);
+        for (sum, given) in self.state.impulse.iter_mut().zip(impulse.as_flattened()) {
+            *sum += given;
+        }
+    }
+
+    fn factorise(&mut self) {
+        let mut matrix = self.rigid().mass_matrix();
+        for bob in &self.bobs {
+            add_rank_one(&mut matrix, bob.m, &along_rod(bob.p[0], bob.hinge));
+        }
+        let ball = self.loose_mut();
+        if let Some(u) = ball.lump.along_normal() {
+            add_rank_one(&mut matrix, ball.lump.m, &u);
+        }
+        ball.factors.set(&matrix);
+    }
+
+    /// Does all that is due now, for hosts that integrate themselves. Returns whether anything was.
+    fn take_due(&mut self, inputs: &TankInputs) -> bool {
+        self.inputs = *inputs;
+        self.forget();
+        let mut any = false;
+        // As many as a lump can go through at once.
+        for _ in 0..4 {
+            self.evaluate_at(0.0);
+            for n in 1..4 {
+                self.rates(n);
+            }
+            self.next_of_ball(4, 0.0);
+            let Some(due) = self.loose_mut().due.take() else { break };
+            self.answer(due, 0.0);
+            any = true;
+        }
+        self.forget();
+        any
+    }
+
+    /// The host knows what impulses have done to it.
+    fn forget(&mut self) {
+        if let Some(ball) = &mut self.ball {
+            (ball.turned, ball.rest, ball.due) = ([0.0; 3], None, None);
+        }
+    }
+
+    /// What the liquid does.
+    fn state_of_ball(&self) -> BallState {
+        if self.ball.is_some() { self.state.ball } else { BallState::Settled }
+    }
+
+    fn loose(&self) -> &Loose {
+        self.ball.as_ref().expect("a tank with a ball regime")
+    }
+
+    fn loose_mut(&mut self) -> &mut Loose {
+        self.ball.as_mut().expect("a tank with a ball regime")
+    }
+}
+
+/// The directions of a tank's bobs.
+fn directions(x: &[f64; TANK_STATES]) -> Directions {
+    core::array::from_fn(|n| part(x, 6 * n))
+}
+
+impl Carrier for TankMotion {
+    /// The state, and what w has changed by.
+    type Memory = (TankState, Vec3);
+
+    fn memory(&self) -> (TankState, Vec3) {
+        (self.state, self.loose().turned)
+    }
+
+    fn restore(&mut self, (state, turned): &(TankState, Vec3)) {
+        self.state = *state;
+        self.loose_mut().turned = *turned;
+    }
+
+    #[inline(never)]
+    fn evaluate_at(&mut self, t: f64) {
+        self.start(t);
+        self.rates_of::<0>();
+        self.factorise();
+    }
+
+    fn lump(&self, _: usize) -> &Lump {
+        &self.loose().lump
+    }
+
+    fn ball_state(&mut self, _: usize) -> &mut BallState {
+        &mut self.state.ball
+    }
+
+    fn ball(&mut self, _: usize) -> &mut [f64] {
+        &mut self.state.x[BALL..]
+    }
+
+    fn bob(&mut self, _: usize, n: usize) -> &mut [f64] {
+        &mut self.state.x[6 * n..][..6]
+    }
+
+    fn directions(&self, _: usize) -> Directions {
+        directions(&self.state.x)
+    }
+
+    fn bobs_of(&self, _: usize) -> impl Iterator<Item = BobNow<f64>> {
+        self.bobs.iter().map(Bob::now::<f64>)
+    }
+
+    fn points(&self) -> impl Iterator<Item = BobNow<f64>> {
+        let lump = Some(&self.loose().lump).filter(|lump| lump.is_loose()).map(Lump::now::<f64>);
+        self.bobs.iter().map(Bob::now::<f64>).chain(lump)
+    }
+
+    fn rigid(&self) -> Rigid {
+        self.loose().host.and(&self.rigid)
+    }
+
+    fn motion(&self) -> [&Vector; 3] {
+        [&self.a, &self.w, &self.w_d]
+    }
+
+    fn factors(&self) -> &Factors {
+        &self.loose().factors
+    }
+
+    fn dissipated(&mut self) -> &mut f64 {
+        &mut self.state.x[DISSIPATED]
+    }
+
+    fn kick(&mut self, impulse: [Vec3; 2], t: f64) -> [Vec3; 2] {
+        self.evaluate_at(t);
+        let [dv, dw] = self.loose().factors.solve(impulse);
+        self.give(dv, dw);
+        self.follow_impulse(dv, dw);
+        [dv, dw]
+    }
+
+    /// The host stays where it is.
+    fn shift(&mut self, _: Vec3) {}
+
+    fn is_pressed(&mut self, _: usize, t: f64) -> bool {
+        self.evaluate_at(t);
+        self.loose().lump.is_pressed()
+    }
+}
+
+impl TankMotion {
+    /// What bobs and lump keep of their velocities when the host's are changed, after [`Motion::start`].
+    fn follow_impulse(&mut self, dv: Vec3, dw: Vec3) {
+        for bob in &self.bobs {
+            let at = 6 * bob.mode;
+            bob.after_impulse((&mut self.state.x[at..at + 6]).try_into().unwrap(), dv, dw);
+        }
+        if let Some(lump) = loose(&mut self.ball) {
+            lump.after_impulse(&mut self.state.x[BALL..], dv, dw);
+        }
     }
 }
 
@@ -497,6 +906,9 @@ struct Parts<T> {
     /// M_a
     matrix: Mat6<T>,
     bobs: [Option<BobNow<T>>; MODES],
+    /// The liquid as one lump, while it has left its bottom.
+    lump: Option<BobNow<T>>,
+    ball_state: BallState,
 }
 
 fn plus<T: Number>(a: [Vec3<T>; 2], b: [Vec3<T>; 2]) -> [Vec3<T>; 2] {
@@ -507,10 +919,14 @@ fn plus<T: Number>(a: [Vec3<T>; 2], b: [Vec3<T>; 2]) -> [Vec3<T>; 2] {
 fn add_added_mass<T: Number>(matrix: &mut [[T; 6]; 6], bob: &Bob) {
     let p = [0, 1, 2].map(|i| T::of(bob.p[0][i], bob.p[1][i]));
     let c = cross(constant(bob.hinge), p);
-    let u = [p[0], p[1], p[2], c[0], c[1], c[2]];
+    add_square(matrix, T::constant(bob.m), &[p[0], p[1], p[2], c[0], c[1], c[2]]);
+}
+
+/// m u u^T into a matrix of any kind of numbers.
+fn add_square<T: Number>(matrix: &mut [[T; 6]; 6], m: T, u: &[T; 6]) {
     for i in 0..6 {
         for j in 0..6 {
-            matrix[i][j] = matrix[i][j] + u[i] * u[j] * bob.m;
+            matrix[i][j] = matrix[i][j] + u[i] * u[j] * m;
         }
     }
 }
@@ -548,9 +964,13 @@ impl SloshTank {
         }
         let tank = p.tank.resolve();
         x[LIQUID] = tank.whole_mass();
-        let state = TankState { time: start_time, x, ranges: Ranges::default() };
+        if let Some(surface) = tank.ball_surface() {
+            x[BALL + 2] = surface.height - surface.half;
+        }
+        let (ranges, ball) = (Ranges::default(), BallState::Settled);
+        let state = TankState { time: start_time, x, ranges, ball, impulse: [0.0; 6] };
         let mut tank = SloshTank::resume(p, &state, tolerance);
-        tank.take_event(inputs);
+        tank.motion.state.ranges = tank.ranges(inputs);
         Ok(tank)
     }
 
@@ -561,6 +981,19 @@ impl SloshTank {
         let rigid = tank.rigid();
         let bobs: Vec<Bob> = (0..tank.modes).map(|n| Bob::new(&tank, 0, n)).collect();
         let lumped = bobs.iter().fold(rigid, |sum, bob| sum.and(&bob.lumped()));
+        let ball = Lump::new(&tank, 0).map(|lump| {
+            let host = p.host.unwrap_or_default().rigid();
+            Loose {
+                lump,
+                parked: Vec::with_capacity(bobs.len()),
+                host,
+                factors: Factors::of(&host.mass_matrix()),
+                turned: [0.0; 3],
+                rest: None,
+                due: None,
+                inv_allowed: 0.0,
+            }
+        });
         let motion = TankMotion {
             state: *state,
             inputs: TankInputs::default(),
@@ -572,6 +1005,7 @@ impl SloshTank {
             w_d: ZERO_VECTOR,
             dissipation: ZERO,
             inv_allowed: 0.0,
+            ball,
         };
         SloshTank {
             motion: Box::new(motion),
@@ -612,6 +1046,7 @@ impl SloshTank {
         }
         let before = self.motion.state;
         self.motion.inputs = *inputs;
+        self.motion.forget();
         let given = inputs.a.value.iter().chain(&inputs.a.slope).chain(&inputs.omega);
         let mut given = given.chain(&inputs.omega_dot.value).chain(&inputs.omega_dot.slope);
         let done = if !given.all(|x| x.is_finite()) {
@@ -622,6 +1057,7 @@ impl SloshTank {
         } else {
             self.motion.advance(h, self.limits)
         };
+        self.motion.forget();
         match done {
             Ok(()) => self.motion.state.time = before.time + h,
             Err(_) => self.motion.state = before,
@@ -640,9 +1076,22 @@ impl SloshTank {
         self.motion.state.ranges
     }
 
-    /// Whether the motion is in the tank's range at the end of the step that it has made last, `h` long.
+    /// Whether the tank has a ball regime.
+    pub fn has_ball(&self) -> bool {
+        self.motion.ball.is_some()
+    }
+
+    /// Whether its liquid is not at its bottom.
+    pub fn has_lump(&self) -> bool {
+        self.motion.state_of_ball() != BallState::Settled
+    }
+
+    /// Whether the motion is in the tank's range at the end of the step that it has made last, `h` long; a ball regime has none.
     pub fn is_in_range_after(&self, inputs: &TankInputs, h: f64) -> bool {
-        let TankMotion { state, bobs, .. } = &*self.motion;
+        let TankMotion { state, bobs, ball, .. } = &*self.motion;
+        if ball.is_some() {
+            return true;
+        }
         let [a, w, w_d] = [inputs.a.at(h), inputs.omega_at(h), inputs.omega_dot.at(h)];
         let axial = bobs.first().map_or(0.0, |bob| {
             let turning = add(cross(w_d, bob.hinge), cross(w, cross(w, bob.hinge)));
@@ -651,9 +1100,30 @@ impl SloshTank {
         self.bounds.contain(core::array::from_fn(|n| state.x[6 * n + 2]), axial)
     }
 
-    /// Does what is due at an event: the ranges are those of the present motion from now on.
-    pub fn take_event(&mut self, inputs: &TankInputs) {
+    /// Functions of states and inputs that cross zero at events: what leaves the present state of the liquid, and what ends its
+    /// sliding on the wall; 1 in a tank without a ball regime.
+    pub fn event_indicators(&mut self, inputs: &TankInputs) -> [f64; 2] {
+        if !self.has_ball() {
+            return [1.0; 2];
+        }
+        self.motion.evaluate(inputs);
+        let TankMotion { bobs, a, w, w_d, .. } = &*self.motion;
+        self.motion.loose().lump.indicators([a, w, w_d], bobs.iter())
+    }
+
+    /// Does what is due at an event: liquid leaves its bottom, meets the wall or settles, and the ranges are those of the present
+    /// motion from now on. Returns whether continuous states have changed. On an error nothing has.
+    pub fn take_event(&mut self, inputs: &TankInputs) -> Result<bool, StepError> {
+        let before = self.motion.state;
+        let changed = self.has_ball() && self.motion.take_due(inputs);
+        let TankState { x, impulse, time, .. } = &self.motion.state;
+        if changed && x.iter().chain(impulse).any(|x| !x.is_finite()) {
+            let time = *time;
+            self.motion.state = before;
+            return Err(StepError::NotFinite { time });
+        }
         self.motion.state.ranges = self.ranges(inputs);
+        Ok(changed)
     }
 
     /// What the tank shows now, under the inputs' present values.
@@ -678,7 +1148,7 @@ impl SloshTank {
             );
         }
         self.motion.evaluate(inputs);
-        self.outputs_of::<f64>(&x)
+        self.outputs_from(&x, self.motion.parts::<f64>())
     }
 
     fn draining_outputs<T: Number>(
@@ -699,38 +1169,19 @@ impl SloshTank {
             loads: contents.loads(),
             matrix,
             bobs: mounted.bobs_now(&contents),
+            lump: None,
+            ball_state: BallState::Settled,
         };
         self.outputs_from(shown, parts)
     }
 
-    fn outputs_of<T: Number>(&self, x: &[f64; TANK_STATES]) -> SloshTankOutputs {
-        let motion = &self.motion;
-        let of = |a: &[Vec3]| -> Vec3<T> { [0, 1, 2].map(|i| T::of(a[0][i], a[1][i])) };
-        let (a, w, w_d) = (of(&motion.a), of(&motion.w), of(&motion.w_d));
-        let zero = constant::<T>([0.0; 3]);
-        let rigid = motion.rigid.lift::<T>();
-        let mut parts = Parts {
-            motion: [a, w, w_d],
-            wrench: rigid.inertial_wrench(a, w, w_d).map(|half| half.map(|x| -x)),
-            loads: [zero; 2],
-            matrix: motion.rigid.mass_matrix().map(|row| row.map(T::constant)),
-            rigid,
-            bobs: [(); MODES].map(|()| None),
-        };
-        for bob in &motion.bobs {
-            parts.wrench = plus(parts.wrench, bob.wrench());
-            parts.loads = plus(parts.loads, bob.bias(w));
-            add_added_mass(&mut parts.matrix, bob);
-            parts.bobs[bob.mode] = Some(bob.now::<T>());
-        }
-        self.outputs_from(x, parts)
-    }
-
     fn outputs_from<T: Number>(&self, x: &[f64; TANK_STATES], parts: Parts<T>) -> SloshTankOutputs {
-        let Parts { motion: [a, w, w_d], rigid, wrench, loads, mut matrix, bobs } = parts;
+        let Parts { motion: [a, w, w_d], rigid, wrench, loads, mut matrix, bobs, lump, .. } = parts;
         let mut tank = TankOutputs::of_states(x);
+        (tank.ball_position, tank.ball_velocity) = (part(x, BALL), part(x, BALL + 3));
+        tank.ball_state = parts.ball_state;
         let mut all = MassProperties::of(&rigid);
-        for bob in bobs.iter().flatten() {
+        for bob in bobs.iter().flatten().chain(&lump) {
             all.add(bob.m, bob.rho);
         }
         tank.set_angles([a, w, w_d], bobs.iter().flatten());
@@ -753,6 +1204,7 @@ impl SloshTank {
             tank,
             bias: [f[0], f[1], f[2], tau[0], tau[1], tau[2]],
             added_mass: triangle(&matrix),
+            impulse: self.motion.state.impulse,
             dissipated: x[DISSIPATED],
             liquid: x[LIQUID],
             mass: all.mass.result(),
@@ -761,7 +1213,8 @@ impl SloshTank {
         }
     }
 
-    /// x: p and p' of each mode, tank axes, then the dissipated energy, J, and the mass of liquid, kg.
+    /// x: p and p' of each mode, tank axes, then the dissipated energy, J, the mass of liquid, kg, and position, m, and rate, m/s,
+    /// of the lump, tank axes.
     pub fn continuous_states(&self) -> [f64; TANK_STATES] {
         self.motion.state.x
     }
@@ -814,7 +1267,8 @@ impl SloshTank {
             return self.draining_outputs(mounted, dx, &x, &acting, inputs.mass_flow.slope);
         }
         self.motion.evaluate_direction(inputs, dx, du);
-        self.outputs_of::<Dual>(dx)
+        let parts = self.motion.parts::<Dual>();
+        SloshTankOutputs { impulse: [0.0; 6], ..self.outputs_from(dx, parts) }
     }
 
     /// The derivative of the outputs with time, along the inputs' ramps: what a host needs to
@@ -839,11 +1293,7 @@ impl SloshTank {
             bobs.iter_mut().for_each(|bob| *bob = Bob::new(&tank, 0, bob.mode));
         }
         self.motion.start(0.0);
-        let TankMotion { state, bobs, .. } = &mut *self.motion;
-        for bob in bobs {
-            let at = 6 * bob.mode;
-            bob.after_impulse((&mut state.x[at..at + 6]).try_into().unwrap(), dv, dw);
-        }
+        self.motion.follow_impulse(dv, dw);
     }
 
     /// The largest eigenvalue lambda of M_host^-1 M_a at the present directions; `None` when

@@ -215,22 +215,28 @@ fn settings(model: &str) -> Vec<Vec<(&'static str, Value)>> {
                 ]
             })
             .into(),
-        // split, lumped (2), rigid_body (3); the last two drain
-        "SloshTank" => [(1, 0, 0), (1, 1, 0), (1, 3, 0), (2, 2, 0), (3, 1, 8), (1, 2, 8)]
-            .map(|(coupling, modes, points)| {
-                vec![
-                    ("coupling", Integer(coupling)),
-                    ("tank.modes", Integer(modes)),
-                    ("tank.k[1]", Real(20.0)),
-                    ("tank.p_0[1,1]", Real(0.3)),
-                    ("host.mass", Real(1000.0)),
-                    ("a[3]", Real(2.0)),
-                    ("omega_dot[1]", Real(0.1)),
-                    ("tank.fill.points", Integer(points)),
-                    ("mass_flow", Real(0.5)),
-                ]
-            })
-            .into(),
+        // split, lumped (2), rigid_body (3); two drain, and of one the liquid leaves its bottom
+        "SloshTank" => {
+            [(1, 0, 0), (1, 1, 0), (1, 3, 0), (2, 2, 0), (3, 1, 8), (1, 2, 8), (1, 2, 0)]
+                .into_iter()
+                .enumerate()
+                .map(|(i, (coupling, modes, points))| {
+                    let leaves = i == 6;
+                    vec![
+                        ("coupling", Integer(coupling)),
+                        ("tank.modes", Integer(modes)),
+                        ("tank.k[1]", Real(20.0)),
+                        ("tank.p_0[1,1]", Real(0.3)),
+                        ("host.mass", Real(1000.0)),
+                        ("a[3]", Real(if leaves { -2.0 } else { 2.0 })),
+                        ("omega_dot[1]", Real(0.1)),
+                        ("tank.fill.points", Integer(points)),
+                        ("tank.ball.travel", Real(if leaves { 0.6 } else { 0.0 })),
+                        ("mass_flow", Real(0.5)),
+                    ]
+                })
+                .collect()
+        }
         _ => panic!("nobody has said what to damage in {model}"),
     }
 }

@@ -19,6 +19,10 @@ const OUT_OF_RANGE: &str = "the tank leaves its range (tank.in_range): thrust pu
                             centres it, or a bob is more than 45 degrees from the axis; the pendulums go on, but \
                             stand for no liquid there";
 
+/// Said once.
+const LUMP: &str = "the liquid leaves the tank's bottom and goes on as one lump (tank.ball.state): times and momenta of crossings \
+                    hold, forces of impacts are indications of their order, and so is what follows them; the host takes impulse";
+
 /// One tank.
 #[derive(Clone, Debug)]
 pub struct Model {
@@ -26,8 +30,10 @@ pub struct Model {
     coupling_ratio: f64,
     /// Whether the present inputs are applied: in Co-Simulation ranges are those of the present motion.
     present: bool,
-    /// Whether the motion has left the tank's range.
+    /// Whether the motion of a tank without a ball regime has left its range.
     has_left_range: bool,
+    /// Whether the liquid of one with has left its bottom.
+    has_had_lump: bool,
 }
 
 impl Model {
@@ -152,17 +158,24 @@ impl runtime::Model for Model {
         let p = parameters.resolved()?;
         let mut tank = SloshTank::new(&p, &inputs.tank, start_time, tolerance)?;
         let coupling_ratio = tank.coupling_ratio().unwrap_or(0.0);
-        Ok(Model { tank, coupling_ratio, present: false, has_left_range: false })
+        Ok(Model {
+            tank,
+            coupling_ratio,
+            present: false,
+            has_left_range: false,
+            has_had_lump: false,
+        })
     }
 
     fn warnings(&self, parameters: &Parameters, _: &Inputs) -> Vec<String> {
         let mut warnings = Vec::new();
-        if !self.tank.ranges_held().in_range {
+        if !self.tank.has_ball() && !self.tank.ranges_held().in_range {
             warnings.push(format!("at the start {OUT_OF_RANGE}"));
         }
         let ratio = self.coupling_ratio;
         let is_split = parameters.resolved().is_ok_and(|p| p.coupling == Coupling::Split);
-        if !is_split || ratio <= LIMIT {
+        // With a ball regime the host has to say its mass, and cannot take the wrench as it is.
+        if !is_split || ratio <= LIMIT || self.tank.has_ball() {
             return warnings;
         }
         warnings.push(format!(
@@ -184,7 +197,13 @@ impl runtime::Model for Model {
         let state = TankState::from_words(state.try_into().ok()?)?;
         let tank = p.problems().is_empty().then(|| SloshTank::resume(&p, &state, tolerance))?;
         let coupling_ratio = f64::from_bits(*ratio);
-        let model = Model { tank, coupling_ratio, present: false, has_left_range: false };
+        let model = Model {
+            tank,
+            coupling_ratio,
+            present: false,
+            has_left_range: false,
+            has_had_lump: false,
+        };
         coupling_ratio.is_finite().then_some(model)
     }
 
@@ -194,6 +213,7 @@ impl runtime::Model for Model {
             shorter_may_succeed: why.shorter_may_succeed(),
         })?;
         self.has_left_range |= !self.tank.is_in_range_after(&inputs.tank, h);
+        self.has_had_lump |= self.tank.has_lump();
         Ok(())
     }
 
@@ -214,18 +234,25 @@ impl runtime::Model for Model {
     }
 
     fn handle_event(&mut self, inputs: &Inputs) -> Result<bool, String> {
-        self.tank.take_event(&inputs.tank);
-        Ok(false)
+        self.tank.take_event(&inputs.tank).map_err(|why| why.to_string())
     }
 
     fn accept_step(&mut self, inputs: &Inputs) -> Result<bool, String> {
         let ranges = self.tank.ranges(&inputs.tank);
-        self.has_left_range |= !ranges.in_range;
+        self.has_left_range |= !ranges.in_range && !self.tank.has_ball();
+        self.has_had_lump |= self.tank.has_lump();
         Ok(ranges != self.tank.ranges_held())
     }
 
     fn step_warning(&self) -> Option<&'static str> {
-        self.has_left_range.then_some(OUT_OF_RANGE)
+        if self.has_left_range {
+            return Some(OUT_OF_RANGE);
+        }
+        self.has_had_lump.then_some(LUMP)
+    }
+
+    fn event_indicators(&mut self, inputs: &Inputs, indicators: &mut [f64]) {
+        indicators.copy_from_slice(&self.tank.event_indicators(&inputs.tank));
     }
 
     fn set_dependent_slopes(inputs: &mut Inputs, h: f64) -> bool {

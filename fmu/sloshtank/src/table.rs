@@ -1,7 +1,7 @@
 //! Every variable of SloshTank.fmu, once. Start values are those of
 //! `craft::TankParameters::default()` and `model::START_ACCELERATION`.
 
-use craft::{Coupling, DampingLaw, MODES, POINTS, TANK_STATES, TRIANGLE, TankState};
+use craft::{BallState, Coupling, DampingLaw, MODES, POINTS, TRIANGLE, TankState};
 use runtime::table::{About, Scalar, Table, scalar_count, scalars};
 use runtime::variable::Dimension::{Fixed, Sized};
 use runtime::variable::{Dimension, Enumeration, Item, Variable};
@@ -17,7 +17,7 @@ pub static TABLE: Table<Model> = Table::new(
         description: "One tank of sloshing liquid on somebody else's spacecraft: its wrench, and the \
                       added mass that breaks the algebraic loop",
         events: "",
-        event_indicators: 0,
+        event_indicators: 2,
         saved_words: TankState::WORDS + 1,
     },
     VARIABLES,
@@ -28,12 +28,23 @@ static SCALARS: [Scalar<Model>; scalar_count(VARIABLES)] = scalars(VARIABLES);
 
 // The added mass contains neither a nor omega_dot, the bias only by the drag, which follows them weakly: a
 // host that solves with them at the a it has has no algebraic loop. With the other couplings the bias contains both, as given in the step before.
-const WRENCH: &[&str] =
-    &["tank.p", "tank.p_dot", "tank.liquid", "a", "omega", "omega_dot", "mass_flow"];
+const WRENCH: &[&str] = &[
+    "tank.p",
+    "tank.p_dot",
+    "tank.liquid",
+    "tank.ball.position",
+    "tank.ball.velocity",
+    "a",
+    "omega",
+    "omega_dot",
+    "mass_flow",
+];
 const EVERYTHING: &[&str] =
     &["tank.", "a", "omega", "omega_dot", "mass_flow", "coupling", "coupling_kind"];
 const TANK: &[&str] = &["tank."];
-const PLACES: &[&str] = &["tank.p", "tank.liquid"];
+const PLACES: &[&str] = &["tank.p", "tank.liquid", "tank.ball.position"];
+// What says whether the liquid is where its pendulums stand for it.
+const MOTION: &[&str] = &["tank.p", "a", "omega", "omega_dot"];
 
 const MODE: Dimension = Sized("tank.modes", MODES);
 const VECTOR: &[Dimension] = &[Fixed(3)];
@@ -48,8 +59,18 @@ fn bob(n: usize) -> usize {
     6 * (n / 3) + n % 3
 }
 
-const DISSIPATED: usize = TANK_STATES - 2;
-const LIQUID: usize = TANK_STATES - 1;
+const DISSIPATED: usize = 6 * MODES;
+const LIQUID: usize = DISSIPATED + 1;
+const BALL: usize = LIQUID + 1;
+
+/// As an item of [`BALL_STATE`].
+fn ball_state(state: BallState) -> i32 {
+    match state {
+        BallState::Settled => 1,
+        BallState::Flying => 2,
+        BallState::Sliding | BallState::Light | BallState::Held => 3,
+    }
+}
 
 fn set_coupling(p: &mut Parameters, _: usize, number: i32) {
     if let Some(coupling) = usize::try_from(number - 1).ok().and_then(|i| Coupling::ALL.get(i)) {
@@ -73,8 +94,11 @@ static VARIABLES: &[Variable<Model>] = &[
         "Force (1 to 3, N) and torque about O (4 to 6, N.m) that the host adds on its right side: force, torque = bias - added_mass [a; omega_dot]. Split, it contains neither a nor omega_dot but through the drag that follows them (with tank.damping_law = constant not at all): of a change of a some 1e-4 of the bobs' mass, which one evaluation settles. With coupling = rigid_body it is for a body that has the constant added_mass in its own mass, centre of mass and inertia, centrifugal and gyroscopic terms included")
         .shape(&[Fixed(6)]).depends_on(WRENCH).initial_depends_on(EVERYTHING),
     V::output("added_mass", |o, n| o.added_mass[n], "",
-        "Symmetric 6 x 6 added-mass matrix about O that the host adds on its left side, upper triangle by rows (kg, kg.m, kg.m2): it follows from tank.p and tank.liquid alone; with coupling = lumped or rigid_body it is that of rigid liquid and each bob at its hinge at the start, constant; the bob of a planar mode counts twice there, with 2 m l^2 about the axes in its plane")
+        "Symmetric 6 x 6 added-mass matrix about O that the host adds on its left side, upper triangle by rows (kg, kg.m, kg.m2): it follows from tank.p, tank.liquid and, of liquid that is a lump, tank.ball.position alone; with coupling = lumped or rigid_body it is that of rigid liquid and each bob at its hinge at the start, constant; the bob of a planar mode counts twice there, with 2 m l^2 about the axes in its plane")
         .shape(&[Fixed(TRIANGLE)]).depends_on(PLACES).initial_depends_on(EVERYTHING),
+    V::output("impulse", |o, n| o.impulse[n], "",
+        "What impulses of a liquid in the ball regime (tank.ball.travel) have given the host since the start: of force (1 to 3, N.s) and of torque about O (4 to 6, N.m.s), host axes at the time of each. After each step or event the host adds M^-1 of what it has grown by to its velocity and rate, M the 6 x 6 mass matrix about O of host.mass to host.Jyz. 0 with tank.ball.travel = 0")
+        .shape(&[Fixed(6)]).depends_on(&[]),
 
     // Inputs
     V::input("a", |i, n| [&mut i.tank.a.value[n], &mut i.tank.a.slope[n]], "m/s2",
@@ -95,14 +119,17 @@ static VARIABLES: &[Variable<Model>] = &[
         "Amplitude of the surface at the wall, all modes together: wave times slosh angle")
         .display_unit("mm").depends_on(&["tank.p"]),
     V::local_enumeration("tank.regime", &REGIME, |o, _| o.tank.ranges.regime as i32,
-        "How far tank.wave_height is inside the range of linear theory; nonlinear, too, where a bob is beyond 45 degrees")
+        "How far tank.wave_height is inside the range of linear theory; nonlinear, too, where a bob is beyond 45 degrees or the liquid has left as one lump")
         .depends_on(&["tank.p"]),
     V::local_boolean("tank.in_range", |o, _| o.tank.ranges.in_range,
-        "The pendulums stand for the liquid: thrust or centring holds it at the tank's bottom, and every bob is within 45 degrees of the axis")
-        .depends_on(&["tank.p", "a", "omega", "omega_dot"]),
+        "The pendulums stand for the liquid: thrust or centring holds it at the tank's bottom, and every bob is within 45 degrees of the axis; false while the liquid is a lump")
+        .depends_on(MOTION),
     V::local_integer("tank.in_range_kind", |o, _| i32::from(o.tank.ranges.in_range),
         "tank.in_range for hosts that misread Booleans (OpenModelica up to 1.27): 0 false, 1 true")
-        .depends_on(&["tank.p", "a", "omega", "omega_dot"]),
+        .depends_on(MOTION),
+    V::local_enumeration("tank.ball.state", &BALL_STATE, |o, _| ball_state(o.tank.ball_state),
+        "What the liquid does with tank.ball.travel above 0; where it is not settled no pendulum stands for it (tank.in_range), and the angles and tank.wave_height are 0")
+        .depends_on(WRENCH),
     V::local("mass", |o, _| o.mass, "kg",
         "Mass of the whole liquid").depends_on(&["tank.liquid"]),
     V::local("center_of_mass", |o, n| o.center_of_mass[n], "m",
@@ -122,10 +149,17 @@ static VARIABLES: &[Variable<Model>] = &[
         .is_state(|_| DISSIPATED).depends_on(&["dissipated"]),
     V::state("tank.p", bob, "1",
         "Direction from hinge to bob of a slosh mode, a unit vector in tank axes; at rest under thrust along the tank's axis (0, 0, -1)")
-        .shape(MODE_VECTOR).nominal(0.1).depends_on(&["tank.p[]"]).initial_depends_on(TANK),
+        .shape(MODE_VECTOR).nominal(0.1).reinit().depends_on(&["tank.p[]"]).initial_depends_on(TANK),
     V::state("tank.p_dot", |n| bob(n) + 3, "1/s",
         "Rate of tank.p against the tank, tank axes")
-        .shape(MODE_VECTOR).nominal(0.1).depends_on(&["tank.p_dot[]"]).initial_depends_on(TANK),
+        .shape(MODE_VECTOR).nominal(0.1).reinit().depends_on(&["tank.p_dot[]"]).initial_depends_on(TANK),
+
+    V::state("tank.ball.position", |n| BALL + n, "m",
+        "Centre of the liquid as one lump from the tank's origin, tank axes; while it is settled, where its centre is at rest; 0 with tank.ball.travel = 0")
+        .shape(VECTOR).reinit().depends_on(&["tank.ball.position[]"]).initial_depends_on(TANK),
+    V::state("tank.ball.velocity", |n| BALL + 3 + n, "m/s",
+        "Velocity of the lump against the tank, tank axes; 0 while the liquid is settled")
+        .shape(VECTOR).nominal(0.01).reinit().depends_on(&["tank.ball.velocity[]"]).initial_depends_on(TANK),
 
     V::state("tank.liquid", |_| LIQUID, "kg",
         "Mass of the whole liquid")
@@ -140,6 +174,10 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(MODE_VECTOR).depends_on(&["tank.p", "tank.p_dot"]).initial_depends_on(TANK),
     V::derivative("der(tank.p_dot)", |n| bob(n) + 3, "1/s2", "Derivative of tank.p_dot")
         .shape(MODE_VECTOR).depends_on(WRENCH).initial_depends_on(EVERYTHING),
+    V::derivative("der(tank.ball.position)", |n| BALL + n, "m/s", "Derivative of tank.ball.position: tank.ball.velocity")
+        .shape(VECTOR).depends_on(&["tank.ball.position", "tank.ball.velocity"]).initial_depends_on(TANK),
+    V::derivative("der(tank.ball.velocity)", |n| BALL + 3 + n, "m/s2", "Derivative of tank.ball.velocity")
+        .shape(VECTOR).depends_on(WRENCH).initial_depends_on(EVERYTHING),
 
     // The tank
     V::choice("coupling", &COUPLING, |p, _| p.coupling as i32, set_coupling,
@@ -207,6 +245,21 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(PER_MODE).range(0.0, 10.0),
     V::parameter("tank.wave", |p, n| &mut p.tank.wave[n], "m", "Elevation of the surface at the wall per slosh angle of a mode, for wave_height alone")
         .shape(PER_MODE).range(0.0, 1e9),
+    V::parameter("tank.ball.travel", |p, _| &mut p.tank.ball.travel, "m",
+        "Above 0: where thrust pulls the liquid off the tank's bottom, or a bob passes 45 degrees, all of it goes on as one lump that flies, is thrown back by the wall and settles; how far its centre is moved along the axis from the bottom to the top. With coupling = split, host.mass and the host's inertia, in a tank with modes that does not drain, on a host that takes impulse")
+        .display_unit("mm").range(0.0, 1e3),
+    V::parameter("tank.ball.radius", |p, _| &mut p.tank.ball.radius, "m",
+        "How far the lump's centre gets from the tank's axis; 0: as far as makes the surface that it reaches as curved at the bottom as the path of the pendulums' common centre")
+        .display_unit("mm").range(0.0, 1e3),
+    V::parameter("tank.ball.restitution", |p, _| &mut p.tank.ball.restitution, "1",
+        "Coefficient of restitution of the lump's impacts on the wall: speed along the normal after over that before. A guess unless measured")
+        .range(0.0, 1.0),
+    V::parameter("tank.ball.contact_speed", |p, _| &mut p.tank.ball.contact_speed, "m/s",
+        "Speed after an impact below which a lump that is pressed to the wall stays on it")
+        .range(1e-9, 1e3),
+    V::parameter("tank.ball.drag", |p, _| &mut p.tank.ball.drag, "1/s",
+        "Rate at which the lump's speed along the wall decays while it slides there. A guess unless measured")
+        .range(0.0, 1e3),
     V::integer("tank.fill.points", |p, _| &mut p.points, "Points of the tank's table: 0 for a tank whose liquid stays; with 2 or more the tank can drain, and modes and rigid liquid are the table's, interpolated monotonely with two continuous derivatives; as they start, the default tank at depths of 0.1 to 1.2 m")
         .between(0, POINTS as i32),
     V::parameter("tank.liquid_0", |p, _| &mut p.tank.liquid_0, "kg", "Mass of liquid at the start, used with fill.points > 0")
@@ -235,7 +288,7 @@ static VARIABLES: &[Variable<Model>] = &[
         .shape(MODE_VECTOR),
 
     // The host, if it tells
-    V::parameter("host.mass", |p, _| &mut p.host.mass, "kg", "Mass of the host without this tank, for coupling_ratio and its warning alone; 0: not known")
+    V::parameter("host.mass", |p, _| &mut p.host.mass, "kg", "Mass of the host without this tank, for coupling_ratio and its warning, and for the impulses of tank.ball.travel; 0: not known")
         .range(0.0, 1e9),
     V::parameter("host.r", |p, n| &mut p.host.r[n], "m", "Its centre of mass from O, host axes")
         .shape(VECTOR).range(-1e4, 1e4),
@@ -280,6 +333,16 @@ static REGIME: Enumeration = Enumeration {
         Item::new("linear", "Below 0.15 R: linear theory holds"),
         Item::new("transitional", "0.15 R to 0.25 R"),
         Item::new("nonlinear", "Above 0.25 R: heights and forces are indications"),
+    ],
+};
+
+static BALL_STATE: Enumeration = Enumeration {
+    name: "BallState",
+    description: "What the tank's liquid does",
+    items: &[
+        Item::new("settled", "It is at the bottom: rigid liquid and pendulums"),
+        Item::new("flying", "It flies through the tank as one lump; the host feels none of it"),
+        Item::new("sliding", "The lump slides on the wall"),
     ],
 };
 

@@ -8,13 +8,13 @@ use nalgebra::{DMatrix, DVector, Matrix3, Quaternion, Rotation3, UnitQuaternion,
 
 use super::random::Random;
 
-type V = Vector3<f64>;
+pub(super) type V = Vector3<f64>;
 
-fn v(x: &[f64]) -> V {
+pub(super) fn v(x: &[f64]) -> V {
     V::new(x[0], x[1], x[2])
 }
 
-fn thrust(force: f64) -> Inputs {
+pub(super) fn thrust(force: f64) -> Inputs {
     Inputs { force: Ramp::held([0.0, 0.0, force]), ..Inputs::default() }
 }
 
@@ -27,7 +27,7 @@ fn craft() -> Parameters {
 }
 
 /// With two tanks that do not stand on the axis nor along it.
-fn askew(random: &mut Random) -> Parameters {
+pub(super) fn askew(random: &mut Random) -> Parameters {
     let mut p = Parameters { tanks: 2, ..random.parameters() };
     p.mount = Mount::Free;
     for i in 0..2 {
@@ -46,7 +46,7 @@ fn askew(random: &mut Random) -> Parameters {
 }
 
 /// The same craft in a state of the liquid that is given.
-fn with_states(
+pub(super) fn with_states(
     craft: &Spacecraft,
     change: impl Fn(&mut [f64; STATES]),
     ball: &[BallState],
@@ -328,7 +328,7 @@ struct Rates {
     x_dd: Vec<V>,
 }
 
-fn rotation(q: &[f64]) -> Rotation3<f64> {
+pub(super) fn rotation(q: &[f64]) -> Rotation3<f64> {
     UnitQuaternion::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3])).into()
 }
 

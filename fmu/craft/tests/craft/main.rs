@@ -5,6 +5,7 @@
 
 mod balances;
 mod ball;
+mod ball_on_host;
 mod component;
 mod decays;
 mod draining;
