@@ -251,7 +251,7 @@ def test_small_tilts_change_frequencies_by_their_square() -> None:
 def test_a_tilted_cylinder_is_that_of_perturbation_theory() -> None:
     """At h/R = 1, to the second order: `fmu/formulas/src/tilt.rs`, whose Λ is ω² over g cos t.
 
-    The meshes are good to 4e-4 of λ, upright and tilted alike to 1e-4; the fourth order is below it.
+    The meshes are good to 4e-4 of λ, upright and tilted alike to 1e-4; the fourth order is below.
     """
     slope = 0.15
     t = np.arctan(slope)
