@@ -23,11 +23,12 @@ rotations. A mode without one only twists. Sources: H. N. Abramson (ed.), NASA S
 Moiseyev and Rumyantsev, Dynamic Stability of Bodies Containing Fluid (1968).
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -252,18 +253,14 @@ def liquid_modes(
     if not (density > 0 and np.isfinite(density)):
         raise FmuError(f"density is a positive number of kg/m³, not {density!r}")
     gravity = float(np.linalg.norm(force))
-    found = []
-    for elements in (max(3.0, resolution / 1.5), float(resolution)):
-        for again in range(4):
-            mesh, surface = _mesh(name, size, _level(force), fill, elements * 1.05**again)
-            try:
-                found.append(_solve(mesh, surface, density, gravity, modes))
-                break
-            except Exception as error:  # scikit-fem's, of an element that is bent too much
-                reason = error
-        else:
-            raise FmuError(f"no usable mesh ({reason}); try another resolution")
-    coarse, fine = found
+    tank = _Tank(name, size, _level(force))
+    meshes = (max(3.0, resolution / 1.5), float(resolution))
+    surface = _surface(tank, fill, meshes[0])
+
+    def solve(mesh: Any) -> LiquidModes:
+        return _solve(mesh, surface, density, gravity, modes)
+
+    coarse, fine = (_on_a_mesh(tank, surface, elements, solve) for elements in meshes)
     error = pd.DataFrame({
         key: np.abs(coarse.all[key] - fine.all[key]).to_numpy()
         / (fine.mass if key == "mass" else fine.all[key])
@@ -368,39 +365,76 @@ def _solid(occ: Any, name: str, size: Mapping[str, Any]) -> int:
     return int(solids[0])
 
 
-def _mesh(
-    name: str, size: Mapping[str, Any], level: np.ndarray, fill: float | str, elements: float
-) -> "tuple[Any, float]":
-    """Return a mesh of the liquid of curved tetrahedra, and the height of its surface."""
-    try:
-        import gmsh
-        from skfem import MeshTet2
-    except (ImportError, OSError) as error:
-        raise FmuError(
-            f"{error}: modes in three dimensions need the extra fem: pip install 'hubslosh[fem]' "
-            "(gmsh also needs the system's libGLU: Debian's libglu1-mesa)"
-        ) from None
+class _Tank(NamedTuple):
+    """A shape with its dimensions, and the rotation that takes the specific force to z."""
 
-    gmsh.initialize(interruptible=False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.option.setString("Geometry.OCCTargetUnit", "M")
-        occ = gmsh.model.occ
-        solid = _solid(occ, name, size)
-        turn = np.eye(4)
-        turn[:3, :3] = level
-        occ.affineTransform([(3, solid)], turn.ravel().tolist())
-        occ.synchronize()
-        box = gmsh.model.occ.getBoundingBox(3, solid)
-        low, high = _heights(occ, solid, name, size, level)
-        surface = _surface(occ, solid, box, low, high, fill)
-        liquid = _cut(occ, solid, box, surface)
-        occ.synchronize()
-        faces = gmsh.model.getEntities(2)
-        flat = [tag for _, tag in faces if _is_at(gmsh, tag, surface, box)]
-        if not flat:
-            raise FmuError("no free surface: the tank is empty or full")
-        extent = np.array([gmsh.model.occ.getBoundingBox(2, tag) for tag in flat])
+    name: str
+    size: Mapping[str, Any]
+    level: np.ndarray
+
+    @contextmanager
+    def solid(self) -> "Iterator[tuple[Any, int, Sequence[float]]]":
+        """Give gmsh, the turned inside of the tank as a solid, and the box about it."""
+        try:
+            import gmsh
+            import skfem  # noqa: F401, of the same extra
+        except (ImportError, OSError) as error:
+            raise FmuError(
+                f"{error}: modes in three dimensions need the extra fem: pip install "
+                "'hubslosh[fem]' (gmsh also needs the system's libGLU: Debian's libglu1-mesa)"
+            ) from None
+
+        gmsh.initialize(interruptible=False)
+        try:
+            gmsh.option.setNumber("General.Terminal", 0)
+            gmsh.option.setString("Geometry.OCCTargetUnit", "M")
+            occ = gmsh.model.occ
+            solid = _solid(occ, self.name, self.size)
+            turn = np.eye(4)
+            turn[:3, :3] = self.level
+            occ.affineTransform([(3, solid)], turn.ravel().tolist())
+            occ.synchronize()
+            yield gmsh, solid, gmsh.model.occ.getBoundingBox(3, solid)
+        except FmuError:
+            raise
+        except Exception as error:  # gmsh raises what it is
+            raise FmuError(f"no mesh of the liquid: {error}") from None
+        finally:
+            gmsh.finalize()
+
+
+def _on_a_mesh(
+    tank: _Tank, surface: float | None, elements: float, do: "Callable[[Any], Any]"
+) -> Any:
+    """Do something on a mesh; on a slightly finer one if it has unusable elements."""
+    for again in range(4):
+        mesh = _mesh(tank, surface, elements * 1.05**again)
+        try:
+            return do(mesh)
+        except Exception as error:  # scikit-fem's, of an element that is bent too much
+            reason = error
+    raise FmuError(f"no usable mesh ({reason}); try another resolution")
+
+
+def _mesh(tank: _Tank, surface: float | None, elements: float) -> Any:
+    """Return a mesh of the liquid of curved tetrahedra, elements across its surface.
+
+    surface: its height; None: of the whole tank.
+    """
+    from skfem import MeshTet2
+
+    with tank.solid() as (gmsh, solid, box):
+        if surface is None:
+            liquid, flat = solid, []
+            extent = np.array([box])
+        else:
+            liquid = _cut(gmsh.model.occ, solid, box, surface)
+            gmsh.model.occ.synchronize()
+            faces = gmsh.model.getEntities(2)
+            flat = [tag for _, tag in faces if _is_at(gmsh, tag, surface, box)]
+            if not flat:
+                raise FmuError("no free surface: the tank is empty or full")
+            extent = np.array([gmsh.model.occ.getBoundingBox(2, tag) for tag in flat])
         across = float(min(extent[:, 3].max() - extent[:, 0].min(),
                            extent[:, 4].max() - extent[:, 1].min()))  # fmt: skip
         _set_sizes(gmsh, flat, across / elements)
@@ -411,30 +445,36 @@ def _mesh(
         index[tags] = np.arange(len(tags))
         kinds, _, nodes = gmsh.model.mesh.getElements(3, liquid)
         cells = index[nodes[list(kinds).index(11)].reshape(-1, 10)]  # 11: ten nodes
-    except FmuError:
-        raise
-    except Exception as error:  # gmsh raises what it is
-        raise FmuError(f"no mesh of the liquid: {error}") from None
-    finally:
-        gmsh.finalize()
     # gmsh's order of the middle nodes, as scikit-fem has it: 01, 12, 02, 03, 13, 23
     cells = cells[:, [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]]
     used, cells = np.unique(cells, return_inverse=True)
     locations = np.ascontiguousarray(points.reshape(-1, 3)[used].T)
-    return MeshTet2(locations, np.ascontiguousarray(cells.reshape(-1, 10).T)), surface
+    return MeshTet2(locations, np.ascontiguousarray(cells.reshape(-1, 10).T))
 
 
-def _surface(
-    occ: Any, solid: int, box: Sequence[float], low: float, high: float, fill: float | str
-) -> float:
-    """Return the height of the free surface."""
-    if isinstance(fill, str) and fill.strip().endswith("%"):
-        try:
+def _surface(tank: _Tank, fill: float | str, elements: float) -> float:
+    """Return the height of the free surface.
+
+    Volumes are those of meshes and closed forms: the geometry's kernel has those of round tanks up
+    to a hundredth wrong, and is good for a first guess.
+    """
+    per_cent = isinstance(fill, str) and fill.strip().endswith("%")
+    part = np.nan
+    if per_cent:
+        with suppress(ValueError):
             part = float(fill.strip()[:-1]) / 100
-        except ValueError:
-            part = np.nan
         if not 0 < part < 1:
             raise FmuError(f"fill is between 0% and 100% of the volume, not {fill!r}")
+    with tank.solid() as (gmsh, solid, box):
+        occ = gmsh.model.occ
+        low, high = _heights(occ, solid, tank.name, tank.size, tank.level)
+        if not per_cent:
+            if isinstance(fill, bool | str) or not 0 < float(fill) < high - low:
+                raise FmuError(
+                    f"fill is a height between 0 and {high - low:.6g} m, or a text like "
+                    f'"60%", not {fill!r}'
+                )
+            return low + float(fill)
         whole = occ.getMass(3, solid)
 
         def excess(height: float) -> float:
@@ -447,12 +487,52 @@ def _surface(
         from scipy.optimize import brentq
 
         edge = 1e-4 * (high - low)
-        return float(brentq(excess, low + edge, high - edge, xtol=1e-9 * (high - low)))
-    if isinstance(fill, bool | str) or not 0 < float(fill) < high - low:
-        raise FmuError(
-            f'fill is a height between 0 and {high - low:.6g} m, or a text like "60%", not {fill!r}'
-        )
-    return low + float(fill)
+        surface = float(brentq(excess, low + edge, high - edge, xtol=1e-4 * (high - low)))
+
+    if tank.name == "step":
+        whole = _on_a_mesh(tank, None, 1.5 * elements, _volume)
+    else:
+        whole = _VOLUMES[tank.name](**tank.size)
+    for _ in range(5):
+        volume, area = _on_a_mesh(tank, surface, elements, partial(_volume_and_area, surface))
+        step = (part * whole - volume) / area
+        surface += step
+        if abs(step) < 1e-4 * (high - low):
+            break  # what is left is a hundredth of this step, or less
+    return surface
+
+
+_VOLUMES: "dict[str, Callable[..., float]]" = {
+    "cylinder": lambda radius, height: np.pi * radius**2 * height,
+    "horizontal_cylinder": lambda radius, length: np.pi * radius**2 * length,
+    "sphere": lambda radius: 4 / 3 * np.pi * radius**3,
+    "box": lambda length, width, height: length * width * height,
+    "sector": lambda radius, inner_radius, angle, height: (
+        np.radians(angle) / 2 * (radius**2 - inner_radius**2) * height
+    ),
+}
+
+
+def _volume(mesh: Any) -> float:
+    from skfem import Basis, ElementTetP2, Functional
+
+    basis = Basis(mesh, ElementTetP2(), intorder=4)
+    return float(Functional(lambda w: np.ones_like(w.x[0])).assemble(basis))
+
+
+def _on_surface(mesh: Any, surface: float) -> np.ndarray:
+    """Return the facets at a height."""
+    outside = mesh.boundary_facets()
+    heights = mesh.p[2, mesh.facets[:, outside]]
+    tall = mesh.p[2].max() - mesh.p[2].min()
+    return outside[np.all(np.abs(heights - surface) < 1e-7 * tall, axis=0)]
+
+
+def _volume_and_area(surface: float, mesh: Any) -> tuple[float, float]:
+    """Return a liquid's volume and the area of its surface, a little of its rim left out."""
+    a, b, c = (mesh.p[:2, corner] for corner in mesh.facets[:, _on_surface(mesh, surface)])
+    (x, y), (u, v) = b - a, c - a
+    return _volume(mesh), float(np.abs(x * v - y * u).sum() / 2)
 
 
 def _cut(occ: Any, solid: int, box: Sequence[float], surface: float) -> int:
@@ -477,24 +557,31 @@ def _is_at(gmsh: Any, tag: int, surface: float, box: Sequence[float]) -> bool:
 
 
 def _set_sizes(gmsh: Any, flat: list[int], size: float) -> None:
-    """Let elements grow away from the surface, where the modes are, and be fine at its edge."""
-    mesh = gmsh.model.mesh
-    edges = gmsh.model.getBoundary([(2, tag) for tag in flat], oriented=False)
-    lines = sorted({tag for _, tag in edges})
-    near, distance = mesh.field, mesh.field.add("Distance")
-    near.setNumbers(distance, "SurfacesList", flat)
-    near.setNumbers(distance, "CurvesList", lines)
-    near.setNumber(distance, "Sampling", 60)
-    away = near.add("MathEval")
-    near.setString(away, "F", f"{size!r} + 0.1*F{distance}")
-    edge = near.add("Distance")
-    near.setNumbers(edge, "CurvesList", lines)
-    near.setNumber(edge, "Sampling", 200)
-    fine = near.add("MathEval")
-    near.setString(fine, "F", f"{0.6 * size!r} + 0.4*F{edge}")
-    both = near.add("Min")
-    near.setNumbers(both, "FieldsList", [away, fine])
-    near.setAsBackgroundMesh(both)
+    """Let elements grow away from the surface, where the modes are, and be fine at its edge.
+
+    Without a surface they are of one size.
+    """
+    fields = gmsh.model.mesh.field
+    if flat:
+        edges = gmsh.model.getBoundary([(2, tag) for tag in flat], oriented=False)
+        lines = sorted({tag for _, tag in edges})
+        distance = fields.add("Distance")
+        fields.setNumbers(distance, "SurfacesList", flat)
+        fields.setNumbers(distance, "CurvesList", lines)
+        fields.setNumber(distance, "Sampling", 60)
+        away = fields.add("MathEval")
+        fields.setString(away, "F", f"{size!r} + 0.1*F{distance}")
+        edge = fields.add("Distance")
+        fields.setNumbers(edge, "CurvesList", lines)
+        fields.setNumber(edge, "Sampling", 200)
+        fine = fields.add("MathEval")
+        fields.setString(fine, "F", f"{0.6 * size!r} + 0.4*F{edge}")
+        sizes = fields.add("Min")
+        fields.setNumbers(sizes, "FieldsList", [away, fine])
+    else:
+        sizes = fields.add("MathEval")
+        fields.setString(sizes, "F", f"{size!r}")
+    fields.setAsBackgroundMesh(sizes)
     for key in ("MeshSizeExtendFromBoundary", "MeshSizeFromPoints", "MeshSizeFromCurvature"):
         gmsh.option.setNumber(f"Mesh.{key}", 0)
 
@@ -507,11 +594,8 @@ def _solve(mesh: Any, surface: float, density: float, gravity: float, count: int
 
     element = ElementTetP2()
     volume = Basis(mesh, element, intorder=4)
-    outside = mesh.boundary_facets()
-    heights = mesh.p[2, mesh.facets[:, outside]]
-    tall = mesh.p[2].max() - mesh.p[2].min()
-    free = outside[np.all(np.abs(heights - surface) < 1e-7 * tall, axis=0)]
-    wet, lid = (FacetBasis(mesh, element, facets=f, intorder=5) for f in (outside, free))
+    facets = (mesh.boundary_facets(), _on_surface(mesh, surface))
+    wet, lid = (FacetBasis(mesh, element, facets=f, intorder=5) for f in facets)
 
     @BilinearForm
     def stiffness(u: Any, v: Any, _: Any) -> Any:
@@ -557,7 +641,7 @@ def _solve(mesh: Any, surface: float, density: float, gravity: float, count: int
     ]
     table = pd.DataFrame(rows)
     # elevation at the surface's highest place per angle of the pendulum, a_n = A φ(wall)/N
-    on_lid = np.unique(volume.get_dofs(free).flatten())
+    on_lid = np.unique(volume.get_dofs(facets[1]).flatten())
     crest = np.abs(phi[on_lid]).max(axis=0)
     table["wave"] = np.hypot(b[:, 0], b[:, 1]) * crest / norm
     units = dict.fromkeys(("length", "bob", "hinge", "arm"), "m")
