@@ -178,13 +178,12 @@ fn a_stopped_campaign_leaves_what_was_there_and_nothing_temporary() {
     }
 }
 
-/// A disk with room for files of 1.35 MB: more than the FMU's binary, less than the report or a run
-/// of a sweep.
+/// A disk with room for files of so many blocks of 512 bytes.
 #[cfg(unix)]
-fn limited(command: &Command) -> Command {
+fn limited(command: &Command, blocks: usize) -> Command {
     let mut shell = Command::new("sh");
-    // POSIX counts blocks of 512 bytes; with the signal ignored, a write beyond fails as on a full disk
-    shell.args(["-c", "trap '' XFSZ; ulimit -f 2640; exec \"$0\" \"$@\""]);
+    // POSIX counts such blocks; with the signal ignored, a write beyond fails as on a full disk
+    shell.args(["-c", &format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" \"$@\"")]);
     shell.arg(command.get_program()).args(command.get_args());
     shell.current_dir(command.get_current_dir().unwrap());
     shell.envs(command.get_envs().filter_map(|(name, value)| Some((name, value?))));
@@ -199,10 +198,12 @@ fn a_full_disk_names_the_file_and_leaves_what_was_there() {
     let plan = "title = \"A\"\nprofile = \"sine:duration=0.2\"\n";
     successful(campaign(directory, plan));
     let before = published(directory);
+    // 4 KiB less than the report, which is larger than the FMU's binary and smaller than a run of a sweep
+    let room = before["report.html"].len() / 512 - 8;
     let sweep = "title = \"B\"\nprofile = \"exp-sweep:duration=2700\"\n";
     let short = "title = \"C\"\nprofile = \"sine:duration=0.3\"\n";
     for (plan, file) in [(sweep, "c/runs/linear_100mm_100.parquet"), (short, "c/report.html")] {
-        let done = limited(&campaign(directory, plan)).output().unwrap();
+        let done = limited(&campaign(directory, plan), room).output().unwrap();
         let (_, error) = said(&done);
         assert_eq!(done.status.code(), Some(1), "{error}");
         assert!(error.contains(file), "{file} is not in: {error}");
@@ -216,7 +217,7 @@ fn a_full_disk_names_the_file_and_leaves_what_was_there() {
     }
     let mut torque = Command::new(env!("CARGO_BIN_EXE_hubslosh"));
     torque.current_dir(directory).args(["torque", "--profile", "exp-sweep", "--out", "t.csv"]);
-    let done = limited(&torque).output().unwrap();
+    let done = limited(&torque, room).output().unwrap();
     let (_, error) = said(&done);
     assert!(!done.status.success() && error.contains("t.csv cannot be written"), "{error}");
     assert!(!directory.join("t.csv").exists());
