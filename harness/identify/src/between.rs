@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::evidence::{ALIKE, DECIDES, probabilities};
-use crate::fit::{Channel, Polished, Problem, ROUNDS, is_other};
+use crate::fit::{Channel, Polished, Problem, ROUNDS, Until, is_other};
 use crate::recording::Recording;
 use crate::simulate::Intersample;
 use crate::uncertainty::Covariance;
@@ -108,15 +108,32 @@ pub fn matters(recordings: &[Recording]) -> bool {
 /// Sum of squares over the first behaviour's beyond which another one is no rival, wherever its minimum is.
 const FAR: f64 = 1.5;
 
+/// The same beyond which another one is given up, if a step has been taken.
+const LOST: f64 = 10.0;
+
+/// A sum of squares is known to a hundredth where the Newton decrement is below this.
+const NEAR: f64 = 0.1;
+
+/// Newton decrement below which the sum of squares of the minimum is foreseen well enough to say that it does not count.
+const FORESEEN: f64 = 1.0;
+
 /// The other behaviours, each with its own minimum, which is sought from this one: a torque that is held is late by half a row. The
 /// sensitivities are nearly the same, so each costs a few simulations; where they lead near the minimum but not to it (the wrong behaviour may have
-/// moved what a recording hardly shows far along its valley) it has its own, for a sum of squares on the way is no evidence. Where they were sought
+/// moved what a recording hardly shows far along its valley) it has its own, for a sum of squares on the way is no evidence, unless it is
+/// less than a standard deviation from a minimum that decides against it. Where they were sought
 /// `before`, of nearly the same noise and from nearly the same minimum, they are sought on from where they were found, and one that was far is still far.
 pub fn alternatives(problem: &Problem, minimum: &Polished, before: Option<&Others>) -> Others {
     let now = problem.setup.intersample;
     let delayed = problem.unknowns.iter().position(|u| u.quantity == Quantity::Delay);
     let late = |b: Intersample| if b == Intersample::ZeroOrderHold { 0.5 } else { 0.0 };
     let most = FAR * minimum.cost;
+    let until = Until {
+        decrement: NEAR,
+        rounds: 2,
+        trust: FORESEEN,
+        far: LOST * minimum.cost,
+        ..Until::at_most(minimum.cost + DECIDES)
+    };
     let one = |behaviour: Intersample| {
         let mut problem = problem.clone();
         problem.setup.intersample = behaviour;
@@ -138,8 +155,9 @@ pub fn alternatives(problem: &Problem, minimum: &Polished, before: Option<&Other
             }
             (x, minimum.jacobian.clone())
         };
-        let mut minimum = problem.polish_near(&x, &jacobian).ok()?;
-        if !minimum.converged() && minimum.cost < most {
+        let mut minimum = problem.polish_near(&x, &jacobian, until).ok()?;
+        let is_out = until.is_hopeless(minimum.cost, minimum.decrement);
+        if !minimum.converged() && !is_out && minimum.cost < most {
             minimum = problem.polish(&minimum.x, Some(&minimum.jacobian), ROUNDS).ok()?;
         }
         let delay = delay(&problem, &minimum.x, &minimum.covariance);
@@ -236,6 +254,9 @@ pub fn evidence(
             match other.delay.filter(|_| !acausal && other.is_acausal(step)) {
                 Some((delay, _)) => {
                     format!("{behaviour} would need a delay of {:.2} ms", 1e3 * delay)
+                }
+                None if other.minimum.decrement >= 1.0 => {
+                    format!("{behaviour} was given up with a sum of squares {more:.0} larger")
                 }
                 None => format!(
                     "{behaviour}{} changes the sum of squares by {more:+.0}",

@@ -66,8 +66,6 @@ const MINIMUM: f64 = 0.1;
 pub const ROUNDS: usize = 6;
 /// A change of one variable there by more than this of one here is no valley's bend.
 const SHARPEST: f64 = 1e3;
-/// A sum of squares is known to a hundredth where the Newton decrement is below this.
-const NEAR: f64 = 0.1;
 
 /// What is compared with the FMU's answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -184,17 +182,27 @@ pub struct Until {
     pub rounds: usize,
     /// Where the sum of squares cannot come below this one.
     pub cost: f64,
+    /// Newton decrement up to which that is believed.
+    pub trust: f64,
+    /// Where a step has been taken and left the sum of squares beyond this one.
+    pub far: f64,
 }
 
 impl Until {
     /// At the minimum, whatever its sum of squares.
     fn minimum(rounds: usize) -> Self {
-        Until { decrement: DECREMENT, rounds, cost: f64::INFINITY }
+        Until { decrement: DECREMENT, rounds, ..Until::at_most(f64::INFINITY) }
+    }
+
+    /// At the minimum, unless its sum of squares is above `cost`.
+    pub fn at_most(cost: f64) -> Self {
+        let (decrement, rounds) = (DECREMENT, ROUNDS);
+        Until { decrement, rounds, cost, trust: f64::INFINITY, far: f64::INFINITY }
     }
 
     /// Whether the sum of squares will not come below the one that counts: to second order it falls by the decrement's square.
     pub fn is_hopeless(&self, cost: f64, decrement: f64) -> bool {
-        cost - 1.5 * decrement * decrement > self.cost
+        decrement < self.trust && cost - 1.5 * decrement * decrement > self.cost
     }
 }
 
@@ -686,10 +694,14 @@ impl<'a> Problem<'a> {
 
     /// The same from sensitivities of a problem that differs by next to nothing: they serve until they no longer do, and one more set
     /// is found then.
-    pub fn polish_near(&self, x: &[f64], sensitivities: &DMatrix<f64>) -> Result<Polished> {
+    pub fn polish_near(
+        &self,
+        x: &[f64],
+        sensitivities: &DMatrix<f64>,
+        until: Until,
+    ) -> Result<Polished> {
         let all: Vec<usize> = (0..x.len()).collect();
         let answer = self.answer(x)?;
-        let until = Until { decrement: NEAR, ..Until::minimum(2) };
         self.polish_some((x, answer), &all, Known::Sensitivities(sensitivities), until)
     }
 
@@ -718,15 +730,17 @@ impl<'a> Problem<'a> {
             let mut covariance = self.covariance(&jacobian)?;
             // decrement of the step before, and which part of that was taken
             let (mut before, mut part) = (f64::INFINITY, 1.0_f64);
-            let decrement = loop {
+            let (decrement, hopeless) = loop {
                 let gradient = jacobian.tr_mul(&e);
                 let step = -(&covariance.x * &gradient);
                 let decrement = (-gradient.dot(&step)).max(0.0).sqrt();
                 // the same sensitivities serve as long as they come closer by half of what they foresee
                 let serve = decrement <= (1.0 - 0.5 * part) * before;
-                let hopeless = until.is_hopeless(e.norm_squared(), decrement);
+                let cost = e.norm_squared();
+                let is_far = before.is_finite() && cost > until.far;
+                let hopeless = is_far || until.is_hopeless(cost, decrement);
                 if decrement < until.decrement || !serve || hopeless {
-                    break decrement;
+                    break (decrement, hopeless);
                 }
                 before = decrement;
                 let mut taken = false;
@@ -768,11 +782,11 @@ impl<'a> Problem<'a> {
                     }
                 }
                 if !taken {
-                    break decrement;
+                    break (decrement, false);
                 }
             };
             let ended = decrement < until.decrement.max(MINIMUM);
-            if ended || round >= until.rounds || until.is_hopeless(e.norm_squared(), decrement) {
+            if ended || hopeless || round >= until.rounds {
                 let (cost, covariance) = (e.norm_squared(), self.covariance(&jacobian)?);
                 return Ok(Polished { x, jacobian, covariance, answer, cost, decrement });
             }
@@ -1000,6 +1014,16 @@ mod tests {
     fn channels(white: f64, drift: f64) -> [Channel; 1] {
         let noise = Noise { white, drift, time: 100.0 };
         [Channel { recording: 0, signal: Signal::Angle, noise }]
+    }
+
+    /// To second order the sum of squares falls by the decrement's square; by how much that may be too little is for whoever asks.
+    #[test]
+    fn a_search_is_hopeless_only_where_its_foresight_is_trusted() {
+        let until = Until { trust: 1.0, ..Until::at_most(100.0) };
+        assert!(until.is_hopeless(103.0, 0.9));
+        assert!(!until.is_hopeless(101.0, 0.9));
+        assert!(!until.is_hopeless(103.0, 1.1));
+        assert!(Until::at_most(100.0).is_hopeless(103.0, 1.1));
     }
 
     /// An encoder's angle is taken for all drift at first: once that is known to be little, the minimum is another one, whatever the white

@@ -146,7 +146,7 @@ fn point(
     let problem = &Problem { differences: Differences::Forward, ..problem.clone() };
     let answer = problem.answer(x).ok()?;
     let jacobian = problem.refreshed(x, &bearing, &answer.motion, known).ok()?;
-    let until = Until { decrement: CLOSE, rounds: STEPS, cost: most };
+    let until = Until { decrement: CLOSE, rounds: STEPS, ..Until::at_most(most) };
     let known = Known::Sensitivities(&jacobian);
     let found = problem.polish_some((x, answer), &others, known, until).ok()?;
     // what further steps would win to second order, where that can be told

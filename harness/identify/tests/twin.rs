@@ -168,6 +168,28 @@ fn a_delay_of_half_a_row_is_a_finding_where_it_is_known() {
     }
 }
 
+/// Held torque comes half a row late, which nothing can make up for where no delay is estimated; smooth torque is told from a linear one
+/// long before its minimum is known to a hundredth. Neither is sought further than that: 6 and 3 simulations, and one more of each at the end.
+#[test]
+fn what_the_torque_between_rows_cannot_be_costs_few_simulations() {
+    let fmu = Fmu::open(packed_for_tests()).unwrap();
+    let recordings = [sweep(&fmu, "lin-sweep:amplitude=0.1,duration=200,f0=2,f1=2.8", &[])];
+    let perfect = |options: Options| Options { sensor_errors: false, gyro_scale: 0.0, ..options };
+    let [told, found] = [options(), of_any_torque()]
+        .map(|options| identify(&fmu, &recordings, &perfect(options), &mut |_| {}).unwrap());
+    let more = found.details.fit.simulations - told.details.fit.simulations;
+    assert!(more < 15.0, "{more}");
+    let said = found.verdict.iter().find(|line| line.starts_with("The torque is taken")).unwrap();
+    assert!(
+        said.contains("smooth between rows (band-limited) changes the sum of squares by +"),
+        "{said}"
+    );
+    assert!(said.contains("held from row to row (zero-order hold) was given up with"), "{said}");
+    for (name, estimated) in &told.parameters {
+        assert_eq!(estimated.value, found.parameters[name].value, "{name}");
+    }
+}
+
 /// Tank, hub, friction and the gyro's scale stand for one another along a valley that bends. Spherical slosh shows the scale, and the
 /// minimum is two hundredths away from where the fit begins to seek it.
 #[test]
