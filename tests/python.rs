@@ -29,19 +29,44 @@ fn pytest(arguments: &mut Command, sentence: &str) {
     println!("{last}");
 }
 
+/// Tests of `harness/python` that take the longest and drive no wheel. They run beside the others, which would otherwise be one long test.
+const LONGEST: [&str; 5] = [
+    "test_analysis.py",
+    "test_cluster.py",
+    "test_liquid.py",
+    "test_measured.py",
+    "test_model_exchange.py",
+];
+
+/// pytest with what the package's tests are given: FMU and command.
+fn of_the_package() -> Command {
+    let mut command = Command::new(python());
+    command
+        .args(["-m", "pytest"])
+        .args([Path::new("--fmu"), pack::packed_for_tests()])
+        .args([Path::new("--hubslosh"), &harness()]);
+    command
+}
+
 #[test]
 fn fmpy_drives_the_fmu_as_the_harness_does() {
-    let fmu = pack::packed_for_tests();
     let both = Fmi::RELEASED
         .map(|fmi| MODELS.each_ref().map(|model| pack::packed_version_for_tests(model, fmi)));
     let wheel = pack::wheel::for_tests(both.as_flattened());
+    let tests = pack::root().join("harness/python");
+    let mut command = of_the_package();
+    command.args([Path::new("--wheel"), &wheel]).arg(&tests);
+    for file in LONGEST {
+        command.arg("--ignore").arg(tests.join("tests").join(file));
+    }
+    pytest(&mut command, "the tests in Python failed");
+}
+
+#[test]
+fn the_package_analyses_runs_liquids_and_recordings() {
+    let tests = pack::root().join("harness/python/tests");
     pytest(
-        Command::new(python())
-            .args(["-m", "pytest"])
-            .args([Path::new("--fmu"), fmu])
-            .args([Path::new("--hubslosh"), &harness()])
-            .args([Path::new("--wheel"), &wheel])
-            .arg(pack::root().join("harness/python")),
+        of_the_package().args(LONGEST.map(|file| tests.join(file))),
         "the tests in Python failed",
     );
 }
