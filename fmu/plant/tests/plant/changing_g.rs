@@ -5,16 +5,9 @@ use plant::{
     FrictionModel, Inputs, Outputs, Parameters, Plant, Ramp, STATES, SloshModel, Solver, x,
 };
 
-const TOLERANCE: f64 = 1e-9;
+use crate::common::SLOSHING;
 
-/// The models with sloshing liquid.
-const SLOSHING: [SloshModel; 5] = [
-    SloshModel::Linear,
-    SloshModel::Planar,
-    SloshModel::Spherical,
-    SloshModel::Paraboloid,
-    SloshModel::Liquid,
-];
+const TOLERANCE: f64 = 1e-9;
 
 fn bench(slosh: SloshModel, friction: FrictionModel) -> Parameters {
     let mut p = Parameters::default();

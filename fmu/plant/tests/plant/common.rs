@@ -5,6 +5,15 @@ use plant::{FrictionModel, Parameters, SloshModel};
 /// Every slosh model.
 pub const SLOSH: [SloshModel; SloshModel::ALL.len()] = SloshModel::ALL;
 
+/// Those of liquid that sloshes.
+pub const SLOSHING: [SloshModel; 5] = [
+    SloshModel::Linear,
+    SloshModel::Planar,
+    SloshModel::Spherical,
+    SloshModel::Paraboloid,
+    SloshModel::Liquid,
+];
+
 /// Whether the model ends at a rim, which a violent motion reaches.
 pub fn has_rim(slosh: SloshModel) -> bool {
     matches!(slosh, SloshModel::Paraboloid | SloshModel::Liquid)

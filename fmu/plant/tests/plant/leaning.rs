@@ -5,15 +5,9 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use formulas::{third_order, tilt};
 use plant::{FrictionModel, Inputs, Parameters, Plant, Ramp, SloshModel, SloshSource};
 
-const G: f64 = 9.81;
+use crate::common::SLOSHING;
 
-const SLOSHING: [SloshModel; 5] = [
-    SloshModel::Linear,
-    SloshModel::Planar,
-    SloshModel::Spherical,
-    SloshModel::Paraboloid,
-    SloshModel::Liquid,
-];
+const G: f64 = 9.81;
 
 /// A tank of h/R = 1, undamped, on a hub that its liquid can't move. Gravity across the axis, of the slope `s`, points `beta` from outwards
 /// to the tangent.
