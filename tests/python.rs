@@ -29,8 +29,8 @@ fn pytest(arguments: &mut Command, sentence: &str) {
     println!("{last}");
 }
 
-/// Tests of `harness/python` that take the longest and drive no wheel. They run beside the others, which would otherwise be one long test.
-const LONGEST: [&str; 5] = [
+/// Tests of `harness/python` that need no wheel, enough of them to run beside the others, which would otherwise be one long test.
+const BESIDE: [&str; 5] = [
     "test_analysis.py",
     "test_cluster.py",
     "test_liquid.py",
@@ -56,7 +56,7 @@ fn fmpy_drives_the_fmu_as_the_harness_does() {
     let tests = pack::root().join("harness/python");
     let mut command = of_the_package();
     command.args([Path::new("--wheel"), &wheel]).arg(&tests);
-    for file in LONGEST {
+    for file in BESIDE {
         command.arg("--ignore").arg(tests.join("tests").join(file));
     }
     pytest(&mut command, "the tests in Python failed");
@@ -66,7 +66,7 @@ fn fmpy_drives_the_fmu_as_the_harness_does() {
 fn the_package_analyses_runs_liquids_and_recordings() {
     let tests = pack::root().join("harness/python/tests");
     pytest(
-        of_the_package().args(LONGEST.map(|file| tests.join(file))),
+        of_the_package().args(BESIDE.map(|file| tests.join(file))),
         "the tests in Python failed",
     );
 }

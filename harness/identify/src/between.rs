@@ -161,7 +161,7 @@ pub fn alternatives(problem: &Problem, minimum: &Polished, before: Option<&Other
             minimum = problem.polish(&minimum.x, Some(&minimum.jacobian), ROUNDS).ok()?;
         }
         let delay = delay(&problem, &minimum.x, &minimum.covariance);
-        let left = if minimum.decrement < 1.0 { minimum.decrement.powi(2) } else { 0.0 };
+        let left = if minimum.decrement < FORESEEN { minimum.decrement.powi(2) } else { 0.0 };
         let cost = minimum.cost - left;
         Some(Alternative { behaviour, minimum, cost, delay })
     };
@@ -255,7 +255,7 @@ pub fn evidence(
                 Some((delay, _)) => {
                     format!("{behaviour} would need a delay of {:.2} ms", 1e3 * delay)
                 }
-                None if other.minimum.decrement >= 1.0 => {
+                None if other.minimum.decrement >= FORESEEN => {
                     format!("{behaviour} was given up with a sum of squares {more:.0} larger")
                 }
                 None => format!(

@@ -692,8 +692,8 @@ impl<'a> Problem<'a> {
         self.polish_some((x, answer), &all, known, Until::minimum(rounds))
     }
 
-    /// The same from sensitivities of a problem that differs by next to nothing: they serve until they no longer do, and one more set
-    /// is found then.
+    /// The same from sensitivities of a problem that differs by next to nothing: they serve until they no longer do, and others
+    /// are found then.
     pub fn polish_near(
         &self,
         x: &[f64],

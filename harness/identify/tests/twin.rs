@@ -169,7 +169,8 @@ fn a_delay_of_half_a_row_is_a_finding_where_it_is_known() {
 }
 
 /// Held torque comes half a row late, which nothing can make up for where no delay is estimated; smooth torque is told from a linear one
-/// long before its minimum is known to a hundredth. Neither is sought further than that: 6 and 3 simulations, and one more of each at the end.
+/// long before its minimum is known to a hundredth. Neither is sought further than that: of a sweep of 2700 s
+/// nine simulations in all, and one at the end.
 #[test]
 fn what_the_torque_between_rows_cannot_be_costs_few_simulations() {
     let fmu = Fmu::open(packed_for_tests()).unwrap();
