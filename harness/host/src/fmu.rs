@@ -250,8 +250,12 @@ impl<'fmu> Instance<'fmu> {
     ) -> Called {
         match self {
             Instance::V2(instance, _) => {
-                let orders = vec![1; references.len()];
-                instance.set_real_input_derivatives(references, &orders, slopes)?;
+                assert_eq!(references.len(), slopes.len());
+                // no allocation in a step, so as many at a time as there are ones
+                let ones = [1; 16];
+                for (some, slopes) in references.chunks(ones.len()).zip(slopes.chunks(ones.len())) {
+                    instance.set_real_input_derivatives(some, &ones[..some.len()], slopes)?;
+                }
                 instance.do_step(time, step)
             }
             Instance::V3(instance, _) => {

@@ -322,12 +322,13 @@ pub fn balance(recording: &Recording, bench: Bench, band: (f64, f64)) -> Option<
             let terms = [j * w[k], j * g * w[k], w[k], s[k], -j * t[k]];
             for a in 0..5 {
                 right[a] += weight * (terms[a].conj() * t[k]).re;
-                for b in 0..5 {
+                for b in a..5 {
                     normal[(a, b)] += weight * (terms[a].conj() * terms[b]).re;
                 }
             }
             total += weight * t[k].norm_sqr();
         }
+        normal.fill_lower_triangle_with_upper_triangle();
         let scale = normal.diagonal().map(|d| 1.0 / d.sqrt());
         let scaled = nalgebra::Matrix5::from_fn(|a, b| normal[(a, b)] * scale[a] * scale[b]);
         let found = scaled.cholesky()?.solve(&right.component_mul(&scale)).component_mul(&scale);
